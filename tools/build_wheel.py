@@ -1,14 +1,17 @@
 #!/usr/bin/env python3
-"""Builds the Python package and tests it as somebody would who has no compiler. Plain Python 3.11 or later, needs cargo and pip.
+"""Builds the Python package and tests it without a compiler.
 
-    python3 tools/build_wheel.py                    a wheel for Linuxes as new as this one in target/wheels, tested
-    python3 tools/build_wheel.py --manylinux        one for all Linux machines of this kind (zig from PyPI is the linker)
-    python3 tools/build_wheel.py --sdist            the source package as well, and a wheel of it alone, which is tried out
-    python3 tools/build_wheel.py --no-test          build only
-    python3 tools/build_wheel.py --quick            test without the tools that check types and draw
+Needs Python 3.11 or later, cargo and pip.
 
-The tests run in an environment of their own, in an empty folder, with a PATH without cargo. Status 0: all is well; 1: something
-failed; 3: pip cannot get what it needs (no network).
+    python3 tools/build_wheel.py                    builds and tests a wheel for Linux as new as this
+    python3 tools/build_wheel.py --manylinux        builds one for older Linux (links with zig)
+    python3 tools/build_wheel.py --sdist            also builds and tests the source package
+    python3 tools/build_wheel.py --no-test          builds only
+    python3 tools/build_wheel.py --quick            tests without type checkers and plotting tools
+
+Wheels are written to target/wheels. The linker for older Linux is zig from PyPI. The tests run in a
+separate environment, in an empty folder, with a PATH without cargo. Status 0: success; 1: a step
+failed; 3: pip cannot download what it needs (no network).
 """
 import argparse
 import os
@@ -28,9 +31,10 @@ ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / "crates/faces/flexarm-python"
 MOST_BYTES = 30e6
 MATURIN = "maturin>=1.13,<2"
-#: Of the Linuxes that a wheel for all of them still runs on.
+#: Oldest glibc on which a manylinux wheel must run.
 OLDEST_GLIBC = "2.28"
-#: Tests need the first; what they can do without is skipped.
+#: Packages that the tests require, and optional ones; tests without an optional package are
+#: skipped.
 NEEDED = ["numpy", "pytest"]
 OTHERS = ["matplotlib", "pandas", "polars", "pyarrow", "pin", "mypy", "pyright[nodejs]", "nbclient", "nbformat", "ipykernel"]
 NO_NETWORK = 3
@@ -42,7 +46,7 @@ def run(*line, **options):
 
 
 def environment(folder, *packages, without=()):
-    """A virtual environment; packages in `without` may be missing."""
+    """Creates a virtual environment; packages in `without` may be missing."""
     venv.create(folder, with_pip=True)
     python = folder / "bin/python"
     install = [python, "-m", "pip", "install", "-q", "--disable-pip-version-check"]
@@ -56,7 +60,7 @@ def environment(folder, *packages, without=()):
 
 
 def zig_linker(tools):
-    """A linker with the C library of old Linuxes: what is compiled already is only linked again."""
+    """Returns a linker with an old C library; compiled objects are only linked again."""
     linker = tools / "zig-cc"
     target = f"{platform.machine()}-linux-gnu.{OLDEST_GLIBC}"
     linker.write_text(f'#!/bin/sh\nexec "{tools}/maturin" zig cc -- -target {target} "$@"\n')
@@ -65,11 +69,11 @@ def zig_linker(tools):
 
 
 def build(tools, out, manylinux, source=PACKAGE):
-    """The wheel, made by maturin, which looks whether the symbols fit the name that the wheel gets."""
+    """Builds the wheel with maturin, which checks that the symbols match the wheel's name."""
     line = [tools / "maturin", "build", "--release", "--locked", "--compression-level", "9", "-o", out]
     if manylinux:
         line += ["--compatibility", f"manylinux_{OLDEST_GLIBC.replace('.', '_')}", "--", "-C", f"linker={zig_linker(tools)}"]
-    # Where the workspace is built: what tests have compiled is not compiled again.
+    # Use the build folder of the workspace, so that nothing is compiled twice.
     extra = {"CARGO_TARGET_DIR": os.environ.get("CARGO_TARGET_DIR", str(ROOT / "target"))}
     before = set(out.glob("*.whl"))
     run(*line, cwd=source, env={**os.environ, **extra, "PATH": f"{tools}{os.pathsep}{os.environ['PATH']}"})
@@ -78,7 +82,7 @@ def build(tools, out, manylinux, source=PACKAGE):
 
 
 def sdist(out):
-    """The sources that a wheel is made of, as pip takes them: what git has, and pyproject.toml above it."""
+    """Creates the source package in pip's layout: tracked files, with pyproject.toml at the top."""
     version = tomllib.loads((ROOT / "Cargo.toml").read_text())["workspace"]["package"]["version"]
     name = f"flexarm-{version}"
     with tempfile.TemporaryDirectory() as scratch:
@@ -86,7 +90,7 @@ def sdist(out):
         folder.mkdir()
         archive = subprocess.run(["git", "archive", "HEAD"], cwd=ROOT, check=True, stdout=subprocess.PIPE).stdout
         subprocess.run(["tar", "x", "-C", folder], input=archive, check=True)
-        # Tests and their data are not built.
+        # Tests and their data are not included.
         for part in [".ci", "tests/golden", "tests/verification", "docs/images", "docs/verification"]:
             shutil.rmtree(folder / part, ignore_errors=True)
         text = (folder / "crates/faces/flexarm-python/pyproject.toml").read_text()
@@ -116,7 +120,8 @@ print(f"recipe.yaml: {recipe['package']['name']} {recipe['package']['version']},
 
 
 def check_recipe(python):
-    """The recipe has the version of the workspace, and rattler-build, if pip has it, reads it."""
+    """Checks that the recipe has the workspace version, and that rattler-build can read it if
+    installed."""
     version = tomllib.loads((ROOT / "Cargo.toml").read_text())["workspace"]["package"]["version"]
     recipe = PACKAGE / "recipe.yaml"
     if f'  version: "{version}"\n' not in recipe.read_text():
@@ -128,7 +133,7 @@ def check_recipe(python):
 
 
 def inspect(wheel):
-    """Small enough, and everything in it."""
+    """Checks size and contents of the wheel."""
     size = wheel.stat().st_size
     names = zipfile.ZipFile(wheel).namelist()
     print(f"{wheel}: {size / 1e6:.1f} MB, {len(names)} files")
@@ -139,7 +144,7 @@ def inspect(wheel):
 
 
 def installed(wheel, scratch, *needed, without=()):
-    """An environment with a wheel, an empty folder, and variables in which there is no compiler."""
+    """Creates an environment with a wheel, an empty folder, and variables without a compiler."""
     python = environment(scratch / "venv", *needed, without=without)
     run(python, "-m", "pip", "install", "-q", "--no-deps", "--disable-pip-version-check", wheel)
     empty = scratch / "empty"
@@ -151,7 +156,7 @@ def installed(wheel, scratch, *needed, without=()):
 
 
 def try_out(wheel):
-    """A wheel is imported and runs."""
+    """Imports a wheel and runs the program."""
     with tempfile.TemporaryDirectory() as scratch:
         python, empty, bare = installed(wheel, Path(scratch), "numpy")
         run(python, "-c", "import flexarm; print(flexarm.load('kr210').flexible().simulate())", cwd=empty, env=bare)
@@ -159,7 +164,7 @@ def try_out(wheel):
 
 
 def test(wheel, quick):
-    """Installs the wheel where there is no compiler, and runs its tests."""
+    """Installs the wheel in an environment without a compiler, and runs its tests."""
     with tempfile.TemporaryDirectory() as scratch:
         python, empty, bare = installed(wheel, Path(scratch), *NEEDED, without=() if quick else OTHERS)
         begin = time.time()

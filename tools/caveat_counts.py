@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
-"""Counts slips that the program tells, and false alarms on robots as they are.
+"""Counts reported mistakes, and false alarms on unmodified robots.
 
     tools/caveat_counts.py [--flexarm PATH] [--verbose] [URDF ...]
 
-Each slip is one wrong number in a copy of a shipped robot, a motion, loads or a command line. It is caught if the command
-then warns of something that it does not warn of without the slip, or refuses it (exit code 2). False alarms are warnings of
-`flexarm check` about shipped robots, and about the robots that `flexarm new` makes of the URDFs given.
+Each mistake is one wrong number in a copy of a shipped robot, a motion, loads or a command line. It
+is caught if the command then gives a warning that it does not give without the mistake, or refuses
+it (exit code 2). False alarms are warnings of `flexarm check` about shipped robots, and about the
+robots that `flexarm new` makes from the URDFs given.
 """
 
 import argparse
@@ -21,15 +22,15 @@ from collections.abc import Callable
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 ROBOTS = ROOT / "robots"
 POSE = "0,-60deg,90deg,0,60deg,0"
-# Codes that are about the URDF as it came, not about what is asked of the robot.
+# Codes that concern the URDF itself, not the request.
 MESHES = {"missing-mesh"}
 
 
 class Place:
-    """A folder with copies of robots and motions, in which one thing is wrong."""
+    """A folder with copies of robots and motions that contain one mistake."""
 
     def __init__(self, program: str) -> None:
-        """Makes the folder; `program`: the command line that is tried."""
+        """Creates the folder; `program`: the command line under test."""
         self.program = program
         self.folder = pathlib.Path(tempfile.mkdtemp(prefix="flexarm-slips-"))
         shutil.copytree(ROBOTS, self.folder / "robots")
@@ -40,7 +41,7 @@ class Place:
         shutil.rmtree(self.folder, ignore_errors=True)
 
     def change(self, file: str, pattern: str, new: str, count: int = 1) -> None:
-        """Replaces what fits a pattern; it is an error if nothing does."""
+        """Replaces text that matches a pattern; raises an error if nothing matches."""
         path = self.folder / file
         text, times = re.subn(pattern, new, path.read_text(), count=count, flags=re.MULTILINE)
         if times == 0:
@@ -52,7 +53,7 @@ class Place:
         (self.folder / file).write_text(text)
 
     def told(self, line: list[str]) -> tuple[int, set[str]]:
-        """Exit code and warnings (numbers left out) of a command."""
+        """Returns exit code and warnings (without numbers) of a command."""
         done = subprocess.run(
             [self.program, "--json", *line], cwd=self.folder, capture_output=True, text=True, timeout=600, check=False
         )
@@ -62,7 +63,7 @@ class Place:
         except json.JSONDecodeError:
             answer = {}
         said |= set(answer.get("warnings", []))
-        # What is wrong in a URDF itself is told with its line.
+        # Errors in a URDF itself are reported with their line.
         findings = [f for f in answer.get("findings", []) if ".urdf" not in f["where"] and f["code"] not in MESHES]
         said |= {f["message"] for f in findings if f["severity"] != "note"}
         return done.returncode, {re.sub(r"-?\d[\d.e+-]*", "#", text).replace(str(self.folder), "") for text in said}
@@ -73,7 +74,7 @@ CHECK = ["check", "robots/kr210/robot.toml"]
 
 
 def toml(robot: str, pattern: str, new: str, count: int = 1) -> Slip:
-    """A wrong value in a robot file."""
+    """Returns a mistake with a wrong value in a robot file."""
 
     def slip(place: Place) -> list[str]:
         place.change(f"robots/{robot}", pattern, new, count)
@@ -83,7 +84,7 @@ def toml(robot: str, pattern: str, new: str, count: int = 1) -> Slip:
 
 
 def stiffness(change: Callable[[list[list[float]]], list[list[float]]]) -> Slip:
-    """The matrix of the .flex file of link_2 in its robot file, changed."""
+    """Returns a mistake with the changed matrix of the .flex file of link_2 in its robot file."""
 
     def slip(place: Place) -> list[str]:
         text = (place.folder / "robots/kr210/fe/link_2.flex").read_text()
@@ -98,12 +99,12 @@ def stiffness(change: Callable[[list[list[float]]], list[list[float]]]) -> Slip:
 
 
 def diagonal(rows: list[list[float]]) -> list[list[float]]:
-    """The diagonal alone."""
+    """Keeps only the diagonal."""
     return [[x if i == j else 0.0 for j, x in enumerate(row)] for i, row in enumerate(rows)]
 
 
 def loads(entry: str, table: str = "") -> Slip:
-    """A file of loads on kr210."""
+    """Returns a mistake with a file of loads on kr210."""
 
     def slip(place: Place) -> list[str]:
         place.write("push.csv", table)
@@ -114,12 +115,12 @@ def loads(entry: str, table: str = "") -> Slip:
 
 
 def asked(*line: str) -> Slip:
-    """A wrong word on the command line."""
+    """Returns a mistake on the command line."""
     return lambda _: list(line)
 
 
 def swept(path: str, value: str) -> Slip:
-    """A study with one wrong value."""
+    """Returns a study with one wrong value."""
 
     def slip(place: Place) -> list[str]:
         entry = f'[[parameter]]\npath = "{path}"\nvalues = [{value}]\n'
@@ -131,7 +132,8 @@ def swept(path: str, value: str) -> Slip:
 
 
 def matrices(flexibility: bool, heavy: float) -> Slip:
-    """A bar of steel (0.6 m, 60 x 40 mm) as two matrices: its stiffness, or its flexibility in the place of it, and its mass."""
+    """Returns a steel bar (0.6 m, 60 x 40 mm) as two matrices: stiffness or flexibility, and
+    mass."""
 
     def slip(place: Place) -> list[str]:
         e, rho, length, width, height = 210e9, 7850.0, 0.6, 0.06, 0.04
@@ -148,7 +150,7 @@ def matrices(flexibility: bool, heavy: float) -> Slip:
                 k[across][turn] = k[turn][across] = sign * 6 * ei / length**2
         if flexibility:
             k[0][0], k[3][3] = 1 / k[0][0], 1 / k[3][3]
-        # How the far end moves as seen from the near end: u_B - u_A - theta_A x p, theta_B -
+        # Motion of the far end relative to the near end: u_B - u_A - theta_A x p, theta_B -
         # theta_A.
         seen = [[float(j == i + 6) - float(j == i) for j in range(12)] for i in range(6)]
         seen[1][5], seen[2][4] = -length, length
@@ -169,7 +171,7 @@ def matrices(flexibility: bool, heavy: float) -> Slip:
 
 
 def reduced(half: str) -> Slip:
-    """A reduction with a box of nodes as its interface A."""
+    """Returns a reduction with a box of nodes as its interface A."""
 
     def slip(_: Place) -> list[str]:
         mesh = ["reduce", "robots/one_beam/fe/one_beam.msh", "--units", "m-kg-s", "--material", "aluminium"]
@@ -186,7 +188,7 @@ TOOL = ["lobes", "robots/kr210/robot.toml", "--at", POSE, "--no-files", "--tool"
 
 
 def tool(pattern: str, new: str) -> Slip:
-    """A wrong value in the file of a cutting tool."""
+    """Returns a mistake with a wrong value in the file of a cutting tool."""
 
     def slip(place: Place) -> list[str]:
         place.change("robots/tools/endmill_20mm.toml", pattern, new)
@@ -196,7 +198,7 @@ def tool(pattern: str, new: str) -> Slip:
 
 
 def table(missing: range) -> Slip:
-    """A recorded table of a move of joint 1 at 100 Hz, without some of its samples."""
+    """Returns a recorded table of a move of joint 1 at 100 Hz, without some of its samples."""
 
     def slip(place: Place) -> list[str]:
         rows = ["time,joint_1,joint_2,joint_3,joint_4,joint_5,joint_6"]
@@ -210,7 +212,7 @@ def table(missing: range) -> Slip:
     return slip
 
 
-# Name, the same without the slip, with it.
+# Name, command without the mistake, command with it.
 SLIPS: list[tuple[str, Slip, Slip]] = [
     ("TCP on the base link", asked(*CHECK), toml("kr210/robot.toml", 'tcp = { link = "tool0"', 'tcp = { link = "base_link"')),
     ("TCP on the elbow", asked(*CHECK), toml("kr210/robot.toml", 'tcp = { link = "tool0"', 'tcp = { link = "link_3"')),
@@ -256,7 +258,7 @@ SLIPS: list[tuple[str, Slip, Slip]] = [
     ("interface box over half of the link", reduced("A=plane(0,0,0; 1,0,0)"), reduced("A=box(-1,-1,-1; 0.4,1,1)")),
     ("import: flexibility for stiffness", matrices(False, 1.0), matrices(True, 1.0)),
     ("import: mass in g", matrices(False, 1.0), matrices(False, 1000.0)),
-    # What other commands have to tell.
+    # Warnings of other commands.
     ("settling band of 100 m", asked("compare", "kr210", "--no-files"), asked("compare", "kr210", "--no-files", "--settling-band", "100")),
     (
         "explicit stepper with a coarse step",
@@ -282,7 +284,7 @@ SLIPS: list[tuple[str, Slip, Slip]] = [
 
 
 def tried(program: str, slip: Slip) -> tuple[int, set[str]]:
-    """What a command says in a folder of its own."""
+    """Runs a command in a separate folder; returns exit code and warnings."""
     place = Place(program)
     try:
         return place.told(slip(place))
@@ -291,7 +293,8 @@ def tried(program: str, slip: Slip) -> tuple[int, set[str]]:
 
 
 def false_alarms(program: str, urdfs: list[str]) -> tuple[int, list[str]]:
-    """Robots tried and what is warned of them: robots as shipped, and as `flexarm new` makes them."""
+    """Returns the number of robots tested and their warnings: shipped ones and those of `flexarm
+    new`."""
     place = Place(program)
     robots = sorted(str(p.relative_to(place.folder)) for p in (place.folder / "robots").glob("*/*.toml"))
     robots = [robot for robot in robots if "urdf =" in (place.folder / robot).read_text()]

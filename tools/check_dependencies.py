@@ -1,18 +1,18 @@
 #!/usr/bin/env python3
-"""Checks that the crates depend on each other as ARCHITECTURE.md says. Plain Python 3, needs cargo.
+"""Checks the dependencies between crates against ARCHITECTURE.md. Plain Python 3, needs cargo.
 
     python3 tools/check_dependencies.py                status 1 and one line per violation
-    python3 tools/check_dependencies.py --self-test    feeds made-up workspaces to every rule
+    python3 tools/check_dependencies.py --self-test    tests every rule on artificial workspaces
 
 Rules:
- * a crate uses crates of its own folder and of folders below (FOLDERS); dev-dependencies may reach up;
- * the faces use the facade and each other alone (ONLY);
- * an outside crate that belongs to some folders (OWNERS) is named in no other;
- * the files of a crate import each other in cycles of at most three, but for those in CYCLES;
- * no source file but the faces' prints, and none from base to results reads a clock, but for the writers of recordings;
- * no library crate knows a command line: flags, the environment, the exit of the process (ALLOWED: what may);
- * what works on numbers alone (NUMBERS) does not name files;
- * every crate takes the workspace's lints and is named in ARCHITECTURE.md, which names no other.
+  * a crate uses crates of its own folder and of folders below (FOLDERS), except dev-dependencies;
+  * the faces use only the facade and each other (ONLY);
+  * an outside crate that belongs to some folders (OWNERS) is used in no other;
+  * the files of a crate import each other in cycles of at most three, except those in CYCLES;
+  * only faces print; from base to results only the writers of recordings read a clock;
+  * no library crate refers to a command line: flags, environment, exit (exceptions: ALLOWED);
+  * purely numerical crates (NUMBERS) do not access files;
+  * every crate uses the workspace's lints and is named in ARCHITECTURE.md, which names no other.
 """
 import json
 import re
@@ -22,9 +22,10 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = "ARCHITECTURE.md"
-FOLDERS = ["base", "dynamics", "links", "robot", "motion", "results", "run", "studies", "faces"]  # bottom to top
+# bottom to top
+FOLDERS = ["base", "dynamics", "links", "robot", "motion", "results", "run", "studies", "faces"]
 TOP = {"proof": "faces"}  # the case studies use the facade, the command line uses them
-TESTS = "tests"  # flexarm-tests and flexarm-testkit, for dev-dependencies alone
+TESTS = "tests"  # flexarm-tests and flexarm-testkit, only for dev-dependencies
 ONLY = {"flexarm-cli": ["flexarm", "flexarm-verify"], "flexarm-python": ["flexarm", "flexarm-cli"]}
 OWNERS = {  # outside crate: folders that may name it
     **dict.fromkeys(["rerun", "re_cdr", "parquet", "arrow-array", "arrow-ipc", "arrow-schema", "rustix"], ["results"]),
@@ -36,7 +37,7 @@ OWNERS = {  # outside crate: folders that may name it
     **dict.fromkeys(["clap", "clap_complete", "clap_mangen", "indicatif", "numpy", "pyo3", "pyo3-build-config", "signal-hook"], ["faces"]),
 }
 LARGEST_CYCLE = 3
-CYCLES = {  # crate: files in its largest cycle of imports, to become smaller
+CYCLES = {  # crate: files in its largest cycle of imports, to be reduced
     "flexarm-cli": 21, "flexarm-fe-io": 5, "flexarm-fem": 5, "flexarm-identify": 8, "flexarm-kinematics": 12, "flexarm-log": 4,
     "flexarm-motion-io": 5, "flexarm-new": 4, "flexarm-path": 9, "flexarm-python": 13, "flexarm-run": 16, "flexarm-stepping": 9,
     "flexarm-sweep": 5, "flexarm-trajectory": 7, "flexarm-urdf": 7,
@@ -49,7 +50,7 @@ FLAG = re.compile(r"(?<![\w-])--[a-z][a-z-]*|(?<![\w/-])-o(?![\w-])")
 FACE_WORDS = re.compile(r"\b(?:command line|exit code|terminal|stdout|stderr)\b")
 FILES = re.compile(r"\bstd::(?:fs|path)\b|\bPathBuf\b|\bFile::open\b")
 NUMBERS = ["flexarm-spatial", "flexarm-settings", "flexarm-kinematics", "flexarm-stepping", "flexarm-flexlink", "flexarm-path", "flexarm-analysis"]
-ALLOWED = {  # file: what it may have (a pattern of the hit), and why
+ALLOWED = {  # file: allowed hit (a pattern), and the reason
     "crates/links/flexarm-fe-io/src/mesh/read.rs": (r"-o", "how to call another program, Gmsh"),
     "crates/motion/flexarm-motion-io/src/error.rs": (r"--full-length", "how to call another program, ROS 2"),
     "crates/robot/flexarm-urdf/src/resolve.rs": (r"std::env", "search_paths_from_environment, which the caller may use or not"),
@@ -63,7 +64,7 @@ CRATE_NAME = re.compile(r"(?<![\w/-])flexarm(?:-[a-z0-9]+)+(?![\w-])")
 
 
 def check_page(page, folder_of):
-    """Problems of the page."""
+    """Returns the problems of the page."""
     named = set(CRATE_NAME.findall(page)) | {"flexarm"}
     return [f"{PAGE}: crate {crate} is not on it: say what it is" for crate in sorted(set(folder_of) - named)] + [
         f"{PAGE}: names {crate}, which is not a crate of the workspace" for crate in sorted(named - set(folder_of))]
@@ -96,7 +97,7 @@ def check_packages(packages, folder_of):
 
 
 def imports(path, text, files):
-    """Files of the crate that a file names by `crate::`, `super::` or `self::`."""
+    """Returns the files of the crate that a file imports by `crate::`, `super::` or `self::`."""
     module = list(Path(path).with_suffix("").parts)
     module = module[:-1] if module[-1] in ("lib", "mod") else module
     found = set()
@@ -142,7 +143,7 @@ def imports(path, text, files):
 
 
 def largest_cycle(graph):
-    """The files of the largest strongly connected part of a graph (Tarjan), sorted."""
+    """Returns the files of the largest strongly connected component of a graph (Tarjan), sorted."""
     order, low, stack, best, count = {}, {}, [], [], 0
     for root in graph:
         if root in order:
@@ -184,13 +185,14 @@ def check_cycles(crate, texts):
 
 
 def code_of(text):
-    """Source without comments and without the unit tests at its end; line breaks stay."""
+    """Returns source without comments and without the unit tests at its end; keeps line breaks."""
     text = text.split("\n#[cfg(test)]\nmod ", 1)[0]
     return re.sub(r"//[^\n]*", "", text)
 
 
 def scan(text):
-    """Pieces of Rust source: (kind, start, end) with kind "code", "comment" or "literal" (between its quotes)."""
+    """Splits Rust source into (kind, start, end), kind "code", "comment" or "literal" (without
+    quotes)."""
     at, done, end = 0, 0, len(text)
     while at < end:
         char, stop, inner = text[at], None, None
@@ -226,12 +228,12 @@ def scan(text):
 
 
 def literals(text):
-    """Line and text of each string literal."""
+    """Yields line and text of each string literal."""
     return [(text.count("\n", 0, start) + 1, text[start:end]) for kind, start, end in scan(text) if kind == "literal"]
 
 
 def without_literals(text):
-    """The code alone; line breaks stay."""
+    """Returns the code without literals; keeps line breaks."""
     kept = list(re.sub(r"[^\n]", " ", text))
     for kind, start, end in scan(text):
         if kind == "code":
@@ -294,7 +296,7 @@ def check_workspace():
 # ------------------------------------------------------------------------------------------
 # self-test
 def self_test():
-    """Every rule must speak on a workspace that breaks it, and keep silent on one that does not."""
+    """Checks that every rule reports a workspace that violates it, and no other."""
     def package(name, *dependencies):
         split = [d.split(":") for d in dependencies]
         return {"name": name, "dependencies": [{"name": d[-1], "kind": d[0] if len(d) > 1 else None} for d in split]}
@@ -315,7 +317,7 @@ def self_test():
 
     source = lambda folder, text: check_source("c", folder, "c.rs", text)
     chain = {f"{a}.rs": f"use crate::{b}::X;" for a, b in zip("abcd", "bcda")}
-    cases = [  # what is wrong, what is found, words the message must have; None: nothing may be found
+    cases = [  # mistake, findings, words of the message; None: no finding allowed
         ("a sound workspace", found(), None),
         ("upwards", found({"flexarm-kinematics": ["flexarm-fem"]}), "flexarm-kinematics (dynamics): dependency on flexarm-fem (links)"),
         ("upwards in tests", found({"flexarm-kinematics": ["dev:flexarm"]}), None),

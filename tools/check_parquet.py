@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
-"""Reads Parquet and Arrow recordings with another program's reader and compares them with the CSV of the same run.
+"""Compares Parquet and Arrow recordings, read by another library, with the CSV of the same run.
 
-    python3 tools/check_parquet.py FOLDER                   run.parquet and run.arrow, as far as there, and run.csv in FOLDER
+    python3 tools/check_parquet.py FOLDER                   run.parquet, run.arrow and run.csv in it
     python3 tools/check_parquet.py FILE.parquet FILE.csv    or FILE.arrow
 
-    flexarm compare --also parquet --also arrow -o FOLDER   makes all
+    flexarm compare --also parquet --also arrow -o FOLDER   makes all of them
 
-Checked: the names of the columns and their order, every number to the last bit, doubles without missing values, row
-groups of bounded size, and the texts beside the table. Needs pyarrow (Apache-2.0); says so and ends well without it.
-Status 1 and a line per difference if there are any.
+Checks the names of the columns and their order, every number to the last bit, doubles without
+missing values, row groups of bounded size, and the metadata. Needs pyarrow (Apache-2.0); without it
+prints a message and succeeds. Status 1 and a line per difference if there are any.
 """
 import csv
 import json
@@ -24,7 +24,7 @@ def bits(x):
 
 
 def read(path):
-    """The table of a file, the rows of its groups or batches, and its texts."""
+    """Returns the table of a file, the rows of its groups or batches, and its metadata."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 

@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
-"""Reads the recordings of a run back with other people's readers and compares them with each other.
+"""Reads the recordings of a run with third-party readers and compares them with each other.
 
     flexarm compare -o out/check && python3 tools/check_recordings.py out/check
 
-Uses what is installed and says what is not; for everything: pip install mcap mcap-ros2-support pymcap-cli rerun-sdk==0.36.3
-One line per check; exit status 1 if any fails, 0 else (also if checks were skipped), 2 for wrong usage.
+Uses installed readers and lists missing ones; for all of them: pip install mcap mcap-ros2-support
+pymcap-cli rerun-sdk==0.36.3. One line per check; exit status 1 if any fails, 0 otherwise (also if
+checks were skipped), 2 for wrong usage.
 """
 
 import argparse
@@ -20,16 +21,16 @@ import subprocess
 import sys
 from xml.etree import ElementTree
 
-# Largest difference between two files that hold the same number.
+# Maximum difference between two files that contain the same number.
 SAME = 1e-12
-# Longest wait for another program.
+# Maximum waiting time for another program.
 PATIENCE_S = 60
-# Poses made of up to ten transforms multiplied: some units in the last place of metres.
+# Tolerance of poses from up to ten multiplied transforms: a few units in the last place, in metres.
 CHAINED = 1e-11
 
 
 class Report:
-    """Prints a line per check and remembers failures."""
+    """Prints a line per check and records failures."""
 
     def __init__(self):
         self.failed = False
@@ -43,12 +44,12 @@ class Report:
 
 
 def tool(report, name, command):
-    """A checker of its own: exit status 0 is good."""
+    """Runs a separate checker; exit status 0 is success."""
     program = shutil.which(command[0]) or shutil.which(command[0], path=str(pathlib.Path(sys.executable).parent))
     if program is None:
         report.skip(name, f"there is no {command[0]}")
         return
-    # A group of its own: what a wrapper has started must end with it.
+    # A separate process group, so that children of a wrapper end with it.
     process = subprocess.Popen(
         [program, *command[1:]], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=True
     )
@@ -64,14 +65,14 @@ def tool(report, name, command):
 
 
 def table(path):
-    """Columns of run.csv by name."""
+    """Returns the columns of run.csv by name."""
     with path.open(newline="") as file:
         rows = list(csv.reader(file))
     return {name: [float(row[k]) for row in rows[1:]] for k, name in enumerate(rows[0])}
 
 
 def largest(pairs):
-    """Largest absolute difference; infinite if one list is longer."""
+    """Maximum absolute difference; infinite if one list is longer."""
     worst = 0.0
     for a, b in pairs:
         if len(a) != len(b):
@@ -81,7 +82,7 @@ def largest(pairs):
 
 
 def product(A, B):
-    """Of two poses: rotation as rows, place."""
+    """Product of two poses: rotation as rows, position."""
     (R, p), (S, q) = A, B
     turn = [[sum(R[i][k] * S[k][j] for k in range(3)) for j in range(3)] for i in range(3)]
     return turn, [p[i] + sum(R[i][k] * q[k] for k in range(3)) for i in range(3)]
@@ -102,7 +103,7 @@ def flat(X):
 
 
 class Tree:
-    """Frames as far as they were sent."""
+    """Frames received so far."""
 
     def __init__(self):
         self.parents = {}
@@ -180,7 +181,7 @@ def mcap_file(report, path, rows):
                     decoded.data
                 )
                 messages[topic].append([decoded.layout.dim[0].label.split(","), list(decoded.data)])
-            # Frames come before all else of their time, but not at every time.
+            # Frames precede all other messages of the same time, but are not sent at every time.
             if topic == "/solver":
                 for twin, time, tool in pending:
                     frame = f"{tcp}/tcp" if twin == "flexible" else f"{twin}/{tcp}/tcp"
@@ -206,11 +207,11 @@ def mcap_file(report, path, rows):
         whole = (summary.statistics.message_start_time, summary.statistics.message_end_time) == (first, last)
         report.check("times of chunks and file agree", whole, f"{first * 1e-9:g} s to {last * 1e-9:g} s")
 
-        # Against the table.
+        # Compare with the table.
         n = len(rows["time"])
         per_sample = ["/joint_states", "/tcp/flexible", "/energy", "/solver"]
         report.check("one message per row of run.csv", all(seen[t] == n for t in per_sample), f"{n} rows")
-        # Every row up to 200 a second, fewer of faster ones.
+        # Every row up to 200 per second, fewer for higher rates.
         spacing = min((b - a for a, b in zip(rows["time"], rows["time"][1:])), default=1.0)
         each = max(1, math.ceil(0.005 / spacing - 1e-6))
         report.check("frames at least at one of so many rows", n / each <= seen["/tf"] <= n, f"{seen['/tf']}, one of {each}")
@@ -256,8 +257,8 @@ def mcap_file(report, path, rows):
                     break
             same("/tcp/contributions", shares, names)
             if seen["/tcp/error"]:
-                # To first order the shares make up the error of an arm whose drives follow; servos
-                # have an error of their own.
+                # To first order the shares add up to the error of an arm with ideal drives; servos
+                # have an additional error.
                 sums = [[math.fsum(row[c::3]) for c in range(3)] for row in shares]
                 errors = [row[:3] for row in messages["/tcp/error"]]
                 peak = max(math.hypot(*row) for row in errors)
@@ -285,7 +286,7 @@ def mcap_file(report, path, rows):
 
 
 def layouts(report, folder, topics):
-    """The layouts beside the recording can be read, and refer to its topics."""
+    """Checks that the layouts next to the recording are readable and refer to its topics."""
     foxglove, plotjuggler = folder / "run.foxglove.json", folder / "run.plotjuggler.xml"
     if not foxglove.is_file() or not plotjuggler.is_file():
         report.skip("layouts", "the run did not write them")
@@ -316,7 +317,7 @@ def main():
         tool(report, "pymcap-cli doctor run.mcap", ["pymcap-cli", "doctor", str(mcap)])
         try:
             mcap_file(report, mcap, table(folder / "run.csv"))
-        except Exception as error:  # readers raise what they like at a damaged file
+        except Exception as error:  # readers raise arbitrary exceptions for a damaged file
             report.check("run.mcap reads to its end", False, f"{type(error).__name__}: {error}")
     else:
         report.skip("run.mcap", "the run did not write one")

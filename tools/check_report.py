@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
-"""Opens a report.html in a browser without a network and checks that it works; writes pictures of it.
+"""Opens a report.html in a browser without a network, checks that it works, and takes pictures.
 
     python3 tools/check_report.py out/run/report.html [more.html ...] [--pictures FOLDER] [--require]
 
-Checks: nothing is loaded but the file itself, nothing is said on the console, every view of every plot
-shows curves (and would not without values), x, y and z have one colour each, texts are large enough on a phone, pictures
-of the arm have no ground of their own, links lead somewhere, dragging zooms,
-other time plots follow, a double click resets, the cursor is shared, the page prints.
-Needs playwright (pip install playwright) and a Chromium on the PATH or in CHROMIUM; without them it says "skipped" and
-exits with 0, with 1 under --require. Exit code 1 if a check fails.
+Checks: only the file itself is loaded, the console is empty, every view of every plot shows curves
+(and would not without values), x, y and z have one colour each, texts are large enough on a phone,
+pictures of the arm are transparent, links have targets, dragging zooms, other time plots follow, a
+double click resets, the cursor is shared, the page prints.
+Needs playwright (pip install playwright) and a Chromium on the PATH or in CHROMIUM; without them it
+prints "skipped" and exits with 0, or with 1 under --require. Exit code 1 if a check fails.
 """
 
 import argparse
@@ -21,8 +21,8 @@ from pathlib import Path
 
 BROWSERS = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable"]
 WIDTHS = [390, 1000, 1280, 1600]
-# Pixels within the axes in the colour of a curve; grid, axes and texts have others, and marks are
-# left out.
+# Counts pixels within the axes in the colour of a curve; grid, axes and texts have other colours,
+# and marks are excluded.
 INK = """async id => {
   const drawn = () => new Promise(done => setTimeout(done, 0));
   window.flexarmBare(true);
@@ -46,7 +46,7 @@ INK = """async id => {
   await drawn();
   return count;
 }"""
-# A curve that is seen has at least so many pixels.
+# Minimum number of pixels of a visible curve.
 FEWEST = 40
 DEAD = """() => [...document.querySelectorAll("a[href^='#']")].map(a => a.getAttribute("href"))
   .filter(href => href.length < 2 || !document.getElementById(href.slice(1)))"""
@@ -71,10 +71,10 @@ class Checks:
         return good
 
 
-# Size (CSS pixels) of the smallest text that is not within a plot.
+# Size (CSS pixels) of the smallest text outside plots.
 SMALLEST = """() => Math.min(...[...document.querySelectorAll("p, figcaption, td, th, dd, dt, li, summary, .triad text")]
   .filter(e => e.getClientRects().length && !e.closest(".u-legend")).map(e => parseFloat(getComputedStyle(e).fontSize)))"""
-# Of each curve of an axis, its colour; and the variables of the page.
+# Colour of each curve of an axis; and the variables of the page.
 AXES = """() => {
   const style = getComputedStyle(document.documentElement);
   const wanted = Object.fromEntries(["x", "y", "z"].map(k => [k, style.getPropertyValue("--" + k).trim()]));
@@ -83,7 +83,7 @@ AXES = """() => {
     chart.series.forEach((s, k) => { if (wanted[s.label]) found.push([id, s.label, s.stroke(chart, k), wanted[s.label]]); });
   return found;
 }"""
-# Opacity of a corner of each picture of the arm.
+# Opacity in a corner of each picture of the arm.
 CORNERS = """async () => {
   const found = [];
   for (const image of document.querySelectorAll(".arm img")) {
@@ -153,7 +153,7 @@ def check_cursor(page, checks):
 
 
 def ink_of_views(page):
-    """Pixels of curves in every choice of every plot."""
+    """Counts pixels of curves in every view of every plot."""
     ink = {}
     for name in ranges(page):
         select = page.locator(f"#plot-{name} select")
@@ -177,7 +177,7 @@ def check_views(page, checks):
 
 
 def check_empty(context, path, checks):
-    """The same page without a single value must not pass: this check can fail."""
+    """Checks that the same page without values does not pass, so that the check is able to fail."""
     def nothing(found):
         return '"y":[' + ",".join(["null"] * (found.group().count(",") + 1)) + "]"
 

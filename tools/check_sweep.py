@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
-"""Reads the table of a fresh study with pandas and DuckDB, by the examples of docs/sweep.md, and compares both.
+"""Reads the table of a new study with pandas and DuckDB (docs/sweep.md) and compares both.
 
     pip install pandas pyarrow duckdb
     python3 tools/check_sweep.py                 # the release build in target/
     python3 tools/check_sweep.py --program PATH
 
-What is not installed is skipped, with a word. The study also has runs that fail and a parameter of words: nulls and texts must come
-back as such. And the program is killed while it runs, twice, and goes on: the bytes must be those of a run that nobody killed.
+Missing packages are skipped with a message. The study also has failing runs and a text parameter:
+nulls and texts must be read back as such. The program is killed twice during the study and
+continued: the bytes must equal those of an uninterrupted study.
 """
 import argparse
 import os
@@ -54,13 +55,13 @@ count = 12
 
 
 def examples():
-    """The pandas and the DuckDB code of the page."""
+    """Returns the pandas and the DuckDB code of the page."""
     page = (ROOT / "docs/sweep.md").read_text()
     return [re.search(rf"```{language}\n(.*?)```", page, re.S)[1] for language in ("python", "sql")]
 
 
 def killed(program, study, folder):
-    """Starts the study, kills it while it runs, twice, and lets it end."""
+    """Starts the study, kills it twice, and lets it finish."""
     for wanted in (20, 90):
         process = subprocess.Popen([program, "sweep", study, "-o", folder, "--quiet"], stdout=subprocess.DEVNULL)
         journal = folder / "parts/1-of-1.journal"

@@ -1,11 +1,11 @@
-"""Checks trajectories/ against the robots they are made for: limits, torques, floor. Needs Pinocchio.
+"""Checks trajectories/ against their robots: limits, torques, floor. Needs Pinocchio.
 
     python tools/check_trajectories.py
 
-Samples each file at 1 kHz with an own reading of the format, and prints the largest share of the position
-range, speed limit and effort limit (rigid arm with payload) that any joint uses, and the lowest point of arm and
-payload above the floor z = 0. Ends with status 1 if a limit is broken, except that stress.toml may exceed the
-efforts: it is made to.
+Samples each file at 1 kHz with an independent reader of the format, and prints the maximum used
+share of position range, speed limit and effort limit (rigid arm with payload) of any joint, and the
+lowest point of arm and payload above the floor z = 0. Ends with status 1 if a limit is exceeded,
+except that stress.toml exceeds the efforts by design.
 """
 import sys
 import tomllib
@@ -22,12 +22,14 @@ ROOT = Path(__file__).parent.parent
 FILES = {"pick_and_place.toml": "kr210", "point_to_point.toml": "kr210", "large_moves.toml": "kr210", "stress.toml": "kr210", "iso9283_path.csv": "kr210",
          "reference_arm.toml": "reference_arm", "beam_hold.toml": "one_beam", "beam_swing.toml": "three_beams",
          "manutec_r3.toml": "manutec_r3", "identified_arms.toml": ("kr210_identified", "kr500_identified"), "three_mass.toml": "abb_three_mass"}
-PAYLOAD_HALF_SIZE = np.array([0.25, 0.25, 0.20])                     # m; the box behind the inertia of the payload
+# m; the box behind the inertia of the payload
+PAYLOAD_HALF_SIZE = np.array([0.25, 0.25, 0.20])
 quintic = lambda u: u**3 * (10 - 15 * u + 6 * u * u)
 
 
 def quintic_move(points, duration, weights):
-    """Curve of least squared jerk through the points; passing times by the way of the fastest joint."""
+    """Curve of minimum squared jerk through the points; passing times by the travel of the fastest
+    joint."""
     points = np.array(points)
     if np.ptp(points, axis=0).max() == 0:
         return lambda t: points[0] + 0 * t[:, None]
@@ -41,7 +43,8 @@ def quintic_move(points, duration, weights):
 
 
 def ramp_move(p, q, v, a, jerk):
-    """Synchronised seven-phase move within speed, acceleration and jerk limits; returns curve and duration."""
+    """Synchronised seven-phase move within speed, acceleration and jerk limits; returns curve and
+    duration."""
     d = np.abs(q - p)
     moving = d > 0
     v, a = (v[moving] / d[moving]).min(), (a[moving] / d[moving]).min()
@@ -91,7 +94,8 @@ def read_csv(path):
 
 
 def corners(arm, folder):
-    """Points of each link, link axes: vertices of its meshes, corners of its primitives, box of the payload."""
+    """Points of each link, link axes: vertices of its meshes, corners of its primitives, box of the
+    payload."""
     import xml.etree.ElementTree as ET
     signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T
     out = {}
@@ -124,13 +128,13 @@ def check(name, robot):
     qd = np.gradient(q, t, axis=0)
     qdd = np.gradient(qd, t, axis=0)
     tau = np.array([pin.rnea(arm.model, arm.data, *x) for x in zip(q[::5], qd[::5], qdd[::5])])
-    # frames of the links through a second model, straight from the URDF
+    # frames of the links from a second model, directly from the URDF
     model = pin.buildModelFromUrdf(str(folder / arm.file["urdf"]))
     data, points, lowest = model.createData(), corners(arm, folder), {}
     for x in q[::20]:
         pin.framesForwardKinematics(model, data, x)
         for link, p in points.items():
-            if link in ("base_link", "link_0", "link_1", "beam_1"):   # these stand on the floor
+            if link in ("base_link", "link_0", "link_1", "beam_1"):   # these are on the floor
                 continue
             X = data.oMf[model.getFrameId(link)]
             lowest[link] = min(lowest.get(link, np.inf), (p @ X.rotation[2] + X.translation[2]).min())
@@ -141,7 +145,8 @@ def check(name, robot):
     print(f"{name:20} {robot:14} {t[-1]:6.2f} s; position {share[0]:.2f}, speed {share[1]:.3f}, effort {share[2]:.2f} of the limit;"
           f" TCP up to {np.linalg.norm(np.diff(tcp, axis=0), axis=1).max() / 5e-3:.2f} m/s; lowest {lowest[link]:.3f} m ({link})")
     ok = share[0] <= 1 and share[1] <= 1.001 and (share[2] <= 1 or name == "stress.toml")
-    return ok and (lowest[link] > 0.05 or robot in ("one_beam", "abb_three_mass"))     # their axis is the height zero
+    # their axis is at height zero
+    return ok and (lowest[link] > 0.05 or robot in ("one_beam", "abb_three_mass"))
 
 
 if __name__ == "__main__":

@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
-"""Checks that the stored results of other programs belong to the files that are there. Plain Python 3.
+"""Checks that the stored results of other programs match the current input files. Plain Python 3.
 
     python3 tools/check_truths.py        status 1 and one line per file that has changed since
 
-Each tests/verification/*.json names the files that its program was given, with their SHA-256, and the script that writes it again.
+Each tests/verification/*.json lists the input files of its program with their SHA-256, and the
+script that writes it again.
 """
 import hashlib
 import json
@@ -14,7 +15,7 @@ ROOT = Path(__file__).resolve().parent.parent
 
 
 def given(stored):
-    """Files and hashes that a stored result names."""
+    """Yields the files and hashes listed in a stored result."""
     yield from ((mesh["file"], mesh["sha256"]) for mesh in stored.get("meshes", []))
     yield from stored.get("model", {}).get("sha256", {}).items()
 

@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
-"""Runs two builds of the program on all shipped robots, steppers and link models and compares what they write, byte by byte.
+"""Compares the output of two builds on all shipped robots, steppers and link models.
 
     python3 tools/compare_builds.py OLD/flexarm NEW/flexarm [--only WORD] [--keep FOLDER]
 
-For a change that must not change results. Each case runs once with either program, into the same folder, so that paths in
-the files are equal. Compared are exit status, recordings (.csv, .mcap, .parquet) and pages byte by byte, the keys of
-summary.json, and its values without those that depend on the clock. A case that both refuse with the same words is equal.
-One line per case that differs, one at the end; exit status 1 if any does.
+For changes that must not change results. Each case runs once with either program, into the same
+folder, so that paths in the files are equal. Compares exit status, recordings (.csv, .mcap,
+.parquet) and pages byte by byte, the keys of summary.json, and its values except timings. A case
+that both refuse with the same message is equal. Prints one line per differing case, and one at the
+end; exit status 1 if any differs.
 """
 import argparse
 import json
@@ -21,7 +22,7 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 ROBOTS = ["abb_three_mass", "kr210", "robots/kr210/beams.toml", "robots/kr210/drives.toml", "robots/kr210/links.toml", "kr210_identified",
           "robots/kr210_identified/loaded.toml", "kr500_identified", "lower_arm", "manutec_r3", "one_beam", "robots/one_beam/mesh.toml",
           "reference_arm", "reference_arm_coupled", "three_beams", "robots/three_beams/mesh.toml"]
-# Options that reach each stepper, link model and way of starting; short motions, few samples.
+# Options that cover each stepper, link model and initial state; short motions, few samples.
 RUNS = [
     ["--stepper", "generalized-alpha"],
     ["--stepper", "generalized-alpha", "--no-dispersion-correction", "--links", "modal", "--parquet"],
@@ -34,7 +35,7 @@ RUNS = [
 ]
 POINTS = [["inspect"], ["check"], ["statics"], ["modes"], ["response", "--points", "50"]]
 CLOCK = re.compile(r"cpu|wall|elapsed|real_time", re.I)
-# In pages: how long the run took.
+# Computation times in pages.
 TOOK = re.compile(r"simulated in [^<\n]*? processor time|^\| (?:in|processor) \|.*$", re.M)
 
 
@@ -44,7 +45,7 @@ def run(program, words, timeout=900):
 
 
 def without_clock(value):
-    """A JSON value without what depends on the clock; keys stay."""
+    """Replaces timings in a JSON value; keeps the keys."""
     if isinstance(value, dict):
         return {k: ("*" if CLOCK.search(k) else without_clock(v)) for k, v in value.items()}
     if isinstance(value, list):
@@ -58,12 +59,12 @@ def content(path):
     if path.suffix in (".html", ".md"):
         return TOOK.sub("", path.read_text(encoding="utf-8"))
     if path.suffix == ".rrd":
-        return b""  # Rerun's SDK draws identifiers from clock and chance
+        return b""  # Rerun's SDK derives identifiers from time and random numbers
     return path.read_bytes()
 
 
 def differing(old, new):
-    """Names of files that differ, with the first place."""
+    """Returns the names of files that differ, with the first differing position."""
     found = []
     names = {p.relative_to(f) for f in (old, new) for p in f.rglob("*") if p.is_file()} if old.exists() or new.exists() else set()
     for name in sorted(names):

@@ -1,11 +1,13 @@
-"""Arms with elastic gearboxes, read without flexarm: an independent truth for the drives of the robot files.
+"""Arms with elastic gearboxes, read without flexarm: independent truth for the drives.
 
-A drive of kind "gearbox" puts a spring and a damper between the motor, which follows the motion exactly, and the link:
+A drive of kind "gearbox" places a spring and a damper between the motor, which follows the motion
+exactly, and the link:
 
     tau = k (q_motor - q) + d (q_motor' - q')            joint side, q the angle of the link
     M_ff q'' = tau - h_f(q, q', [0, q_p''])              f the geared joints, p those that follow the motion
 
-with h by one RNEA and M from CRBA (Pinocchio). The motor's inertia loads the motor alone and does not enter. No friction.
+with h by one RNEA and M from CRBA (Pinocchio). The motor's inertia loads only the motor and does
+not enter. No friction.
 """
 import numpy as np
 import pinocchio as pin
@@ -16,7 +18,8 @@ from robot_file import Arm
 
 
 class Trapezoid:
-    """One move as fast as the limits allow, all joints in step, constant accelerations; then a rest."""
+    """One move as fast as the limits allow, all joints synchronised, constant accelerations; then a
+    rest."""
 
     def __init__(self, file):
         assert file["profile"] == "trapezoid" and file["rounding"] == 0 and file["unit"] == "rad" and len(file["move"]) == 1
@@ -32,7 +35,8 @@ class Trapezoid:
         self.kinks = [0.0, self.ramp, self.duration - self.ramp, self.duration, self.t_end]
 
     def piece(self, number):
-        """The motion between two kinks, continued beyond them: integrators look a rounding error too far."""
+        """The motion between two kinks, continued beyond them: integrators overshoot by a rounding
+        error."""
         a, r, T = self.acceleration, self.ramp, self.duration
         s = [lambda t: (a * t * t / 2, a * t, a), lambda t: (a * r * (t - r / 2), a * r, 0.0),
              lambda t: (1 - a * (T - t) ** 2 / 2, a * (T - t), -a), lambda t: (1.0, 0.0, 0.0)][number]
@@ -72,7 +76,8 @@ class Quintic:
 
 
 class GearedArm:
-    """A robot file without flexible links and with gearboxes; `q_m`: positions of the motors, joint side, all joints."""
+    """A robot file without flexible links and with gearboxes; `q_m`: motor positions, joint side,
+    all joints."""
 
     def __init__(self, path):
         self.arm = Arm(path, elastic=False)
@@ -112,7 +117,8 @@ class GearedArm:
         return np.diag(self.k) + 0.5 * (dg + dg.T)
 
     def modes(self, q_m, gravity):
-        """Undamped frequencies (Hz), and those (Hz) and damping ratios with the dampers; motors held."""
+        """Undamped frequencies (Hz), and frequencies (Hz) and damping ratios with the dampers;
+        motors held."""
         q = self.link(q_m, self.statics(q_m)) if gravity else np.array(q_m, float)
         M, K, n = self.mass(q), self.tangent(q) if gravity else np.diag(self.k), len(self.free)
         undamped = np.sqrt(sl.eigh(K, M, eigvals_only=True)) / (2 * np.pi)
@@ -125,7 +131,8 @@ class GearedArm:
         return J @ np.diag(1 / self.k) @ J.T
 
     def integrate(self, motion, times, method="DOP853", rtol=1e-12, atol=1e-15):
-        """Windup and its rate at the times, from static equilibrium; restarted where the motion has a kink."""
+        """Returns windup and its rate at the times, from static equilibrium; restarted at kinks of
+        the motion."""
         n = len(self.free)
         y = np.concatenate([self.statics(motion(0.0)[0]), np.zeros(n)])
         out, calls = np.empty((len(times), 2 * n)), 0
@@ -135,11 +142,11 @@ class GearedArm:
             def rates(t, y):
                 q_m, v_m, a_m = follow(t)
                 q, v, a = self.link(q_m, y[:n]), self.link(v_m, y[n:]), a_m.copy()
-                # a = a_m: the windup's own acceleration is what remains
+                # a = a_m: the acceleration of the windup is the unknown
                 bias = pin.rnea(self.model, self.data, q, v, a)[self.free]
                 return np.concatenate([y[n:], np.linalg.solve(self.mass(q), -self.k * y[:n] - self.d * y[n:] - bias)])
 
-            # a time on a kink belongs to the piece before it
+            # a time on a kink belongs to the preceding piece
             inside = (times > begin) & (times <= end) if number else times <= end
             asked = np.union1d(times[inside], [end])
             run = solve_ivp(rates, (begin, end), y, method=method, rtol=rtol, atol=atol, max_step=0.02, t_eval=asked)
@@ -149,7 +156,8 @@ class GearedArm:
         return out, calls
 
     def table(self, motion, times, y):
-        """time, rigid and flexible TCP, rotation vector of R_flexible R_rigid^T, windup of each gearbox."""
+        """time, rigid and flexible TCP, rotation vector of R_flexible R_rigid^T, windup of each
+        gearbox."""
         rows = []
         for t, w in zip(times, y[:, :len(self.free)]):
             q_m = motion(t)[0]

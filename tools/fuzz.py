@@ -1,18 +1,20 @@
 #!/usr/bin/env python3
-"""Broken input of every format, and odd command lines, through the built program.
+"""Runs the built program on corrupted input of every format, and on odd command lines.
 
     python3 tools/fuzz.py                      # 300 runs with the release build, two at a time
     python3 tools/fuzz.py --runs 5000 --seed 7 # as a nightly job
     python3 tools/fuzz.py --only urdf,mesh-inp --runs 1000
     python3 tools/fuzz.py --first 1234 --runs 1 --keep found   # one run again
 
-Every run changes one sound file (bytes, lines, numbers, counts, nesting) and gives it to a command. A run is wrong if it
-ends by a signal or with another exit code than 0, 1 or 2, if it panics, takes too long or too much memory, fails without
-a word, or succeeds with a number that is none. Runs that step through time may be long: they must stop when asked to.
+Every run changes one valid file (bytes, lines, numbers, counts, nesting) and passes it to a
+command. A run fails if it ends by a signal or with an exit code other than 0, 1 or 2, if it panics,
+takes too much time or memory, fails without a message, or succeeds with NaN or infinity. Runs that
+step through time may be long: they must stop when asked to.
 
-The same seed makes the same runs. Wrong inputs are written to the folder --keep with the command line and what was said.
-Needs nothing but Python; the sound files stand in this repository, are written here, or by the program itself. Formats
-that the build does not write (Rerun recordings of a light build) are left out, with a word.
+The same seed gives the same runs. Failing inputs are written to the folder --keep with the command
+line and the output. Needs only Python; the valid files are in this repository, are written here, or
+by the program itself. Formats that the build does not support (Rerun recordings of a light build)
+are left out, with a message.
 """
 
 import argparse
@@ -628,7 +630,7 @@ acceleration = [[0.0, 0.0], [10.0, 0.0], [-90.0, 80.0], [0.0, 0.0]]
 
 
 def universal(binary):
-    """Two frequency responses and the units of a universal file (datasets 58 and 164)."""
+    """Returns a universal file with two frequency responses and units (datasets 58 and 164)."""
     out = b"    -1\n   164\n         1SI                           2\n 1.0D+00 1.0D+00 1.0D+00\n-2.7D+02\n    -1\n"
     for direction in (3, -3):
         values = [(5.0, -0.12, -0.0035), (12.0, 0.9, -0.21), (22.5, -0.34, -0.055)]
@@ -748,7 +750,8 @@ def glb():
 
 
 def stiffness12():
-    """A clamped Euler-Bernoulli beam of 0.8 m freed at both ends, and its mass as two halves: rows of 12 numbers."""
+    """Free-free stiffness of an Euler-Bernoulli beam of 0.8 m, and its mass as two halves: rows of
+    12 numbers."""
     e, g, l, w, h = 70e9, 26e9, 0.8, 0.02, 0.04
     iy, iz, k = w * h**3 / 12, h * w**3 / 12, [[0.0] * 6 for _ in range(6)]
     k[0][0], k[3][3] = e * w * h / l, g * 0.229 * h * w**3 / l
@@ -838,7 +841,7 @@ NEW_ARM = """<?xml version="1.0"?>
 
 
 def box_stl(length, width, height):
-    """A box from x = 0 on, as binary STL."""
+    """Returns a box starting at x = 0, as binary STL."""
     corner = lambda k: (length * (k & 1), width * ((k >> 1 & 1) - 0.5), height * ((k >> 2 & 1) - 0.5))
     faces = [(0, 4, 6, 2), (1, 3, 7, 5), (0, 1, 5, 4), (2, 6, 7, 3), (0, 2, 3, 1), (4, 5, 7, 6)]
     triangles = [t for a, b, c, d in faces for t in ((a, b, c), (a, c, d))]
@@ -878,7 +881,7 @@ TOOL_RESPONSE = "frequency_hz,xx_re,xx_im,yy_re,yy_im\n" + "".join(f"{hz},1e-7,{
 
 
 class Target:
-    """A sound file to change, the files beside it, and the commands that read it."""
+    """A valid file to change, the files it needs, and the commands that read it."""
 
     def __init__(self, name, change, files, commands, steps=False):
         self.name, self.change, self.files, self.commands, self.steps = name, change, files, commands, steps
@@ -893,7 +896,7 @@ COMPARE = ["compare", "robot.toml", "motion.toml", "--no-files", "--step", "1e-3
 
 
 def own_targets():
-    """Targets of files that are written here or stand in the repository."""
+    """Targets with files that are written here or are in the repository."""
     base = {"beam.urdf": BOX, "robot.toml": ROBOT, "motion.toml": MOTION, "motion.csv": motion_csv()}
     check = ["check", "robot.toml", "motion.toml", "--json"]
     stiffness, mass = stiffness12()
@@ -980,7 +983,7 @@ def own_targets():
 
 
 def made_targets(run, folder):
-    """Targets of files that the program writes: link files, exported matrices, recordings."""
+    """Targets with files written by the program: link files, exported matrices, recordings."""
     for name, content in {"beam.urdf": BOX, "robot.toml": ROBOT, "motion.toml": MOTION, "bar.inp": bar_inp(), "job.toml": JOB}.items():
         write(folder / name, content)
     run(["reduce", "job.toml", "--flex", "bar.flex", "--quiet"])
@@ -1033,11 +1036,11 @@ FLOATS = [float("nan"), float("inf"), 1e308, -1e308, 0.0, -1.0, 5e-324]
 
 
 def mutate(data, rng):
-    """The bytes, changed in one to three ways, and the names of the ways."""
+    """Returns the bytes changed in one to three ways, and the names of the ways."""
     ways = []
     binary = b"\0" in data[:4000]
     for _ in range(rng.choice([1, 1, 1, 2, 3])):
-        # What is still well formed gets farthest.
+        # Well-formed files get farthest.
         kinds, weights = [VALUES, LINES_OF_TEXT, BYTES, TRAPS], [1, 1, 16, 1] if binary else [14, 3, 2, 1]
         way = rng.choice(rng.choices(kinds, weights)[0])
         data = way(data, rng)
@@ -1168,13 +1171,13 @@ def pack(data, rng):
 
 @functools.cache
 def packed_run(byte):
-    """300 MB of one byte, packed to 300 kB without ever being in memory."""
+    """Returns 300 MB of one byte, packed to 300 kB without ever being in memory."""
     packer = zlib.compressobj(1, wbits=31)
     return b"".join(packer.compress(byte * (1 << 20)) for _ in range(300)) + packer.flush()
 
 
 def bomb(data, rng):
-    """A packed file that begins soundly and goes on for 300 MB."""
+    """Returns a packed file with a valid start that continues for 300 MB."""
     return gzip.compress(data, 1, mtime=0) + packed_run(rng.choice([b"\0", b"\n"]))
 
 
@@ -1231,9 +1234,10 @@ class Runner:
         self.environment = {"PATH": "/nonexistent", "HOME": "/nonexistent", "LANG": "C.UTF-8", "RUST_BACKTRACE": "0"}
 
     def run(self, line, folder):
-        """Runs a command with limits of memory and time; one that is late is asked to stop, then killed."""
-        # The limit of the address space is generous (threads reserve much and use little); what was
-        # used is measured.
+        """Runs a command with limits on memory and time; a late one is asked to stop, then
+        killed."""
+        # The limit on the address space is generous (threads reserve much and use little); the
+        # memory used is measured.
         words = ["/bin/sh", "-c", 'ulimit -v "$0"; ulimit -c 0; ulimit -f 2000000; exec "$@"', str(4096 * self.megabytes), self.program, *line]
         with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
             begin = time.monotonic()
@@ -1267,7 +1271,7 @@ class Runner:
 
 
 def nulls(value, key=""):
-    """Keys of a JSON value that are null, which is how a number that is none is written."""
+    """Yields the keys of a JSON value that are null, which is how NaN and infinity are written."""
     if value is None:
         yield key
     elif isinstance(value, dict):
@@ -1278,19 +1282,19 @@ def nulls(value, key=""):
             yield from nulls(inner, key + "[]")
 
 
-# Keys that may be null with a reason that docs or comments of the summary give.
+# Keys that may be null for a reason given in docs or comments of the summary.
 MAY_BE_NULL = {"settling_s", "frequency_hz", "at_rest", "compliance_share[]", "overshoot", "damping", "duration_s", "first_frequency_hz", "misfit"}
-# Of new: what a link has no section for, what a description does not limit, a run that was left out
+# For new: links without a section, quantities that a description does not limit, a skipped run
 # (docs/new_robot.md).
 NEW_MAY_BE_NULL = {"section", "width", "height", "wall", "wall_of_half_mass", "material", "y_axis", "offset", "taper", "open_cuts", "reason", "mass", "lower", "upper", "velocity", "effort", "effort_fault", "summary", "lower_limit", "upper_limit", "speed_limit", "torque_limit"}
 
 
-# Of sweep: what no run gave, and what was not asked for (docs/sweep.md).
+# For sweep: results that no run gave, and results not requested (docs/sweep.md).
 SWEEP_MAY_BE_NULL = {"min", "max", "mean", "std", "quantiles", "best", "pareto", "minimise", "shard", "page", "motion", "loads", "files", "command", "start", "range", "progress", "value"}
 
 
 def without_shares(answer):
-    """The answer of sweep without what is null under the names of parameters and metrics."""
+    """Returns the answer of sweep without nulls under the names of parameters and metrics."""
     for metric in answer.get("metrics", []):
         metric.pop("shares", None)
     (answer.get("best") or {}).pop("metrics", None)
@@ -1298,7 +1302,7 @@ def without_shares(answer):
 
 
 def judge(line, result, steps, known_nulls):
-    """What the run was: a word, and whether it was wrong."""
+    """Classifies a run: a word, and whether it failed."""
     text = result.err.decode("utf-8", "replace")
     if "panicked at" in text:
         return "panic", True
@@ -1322,13 +1326,13 @@ def judge(line, result, steps, known_nulls):
             return "silent", True
         return ("refused" if result.code == 2 else "failed"), False
     if "--json" in line:
-        # Behind -- there are no options.
+        # There are no options after --.
         if "--" in line:
             return "done", False
         try:
             answer = json.loads(result.out, parse_constant=lambda word: (_ for _ in ()).throw(ValueError(word)))
         except ValueError:
-            # --help and --version win over --json.
+            # --help and --version override --json.
             if any(word in ("--help", "-h", "--version", "-V") for word in line):
                 return "done", False
             return "not JSON", True
@@ -1363,7 +1367,7 @@ class Fuzzer:
         self.wrong = []
 
     def prepare(self):
-        """All targets, each with every command run once on the sound files."""
+        """Prepares all targets; runs each command once on the valid files."""
         made = self.scratch / "made"
         made.mkdir()
 
@@ -1396,7 +1400,7 @@ class Fuzzer:
                 except ValueError:
                     pass
                 word, wrong = judge(line, result, target.steps, self.known_nulls)
-                # A program that is not installed is no fault (xacro).
+                # A missing program is not a failure (xacro).
                 if wrong or result.code != 0 and target.name != "xacro":
                     raise SystemExit(f"{target.name}: the sound file is not taken ({word}): {shown(line)}\n{result.err.decode()}{result.out.decode()[:500]}")
         return targets
@@ -1422,8 +1426,8 @@ class Fuzzer:
             line, data, ways = mutate_line(rng), b"", ["words"]
         else:
             sound = target.files[target.change]
-            # Of packed files the content, mostly: a changed byte of the packing is found by its
-            # checksum.
+            # For packed files mostly the content is changed: changes of packed bytes are found by
+            # the checksum.
             packed = target.change.endswith(".gz") and rng.random() < 0.7
             sound = gzip.decompress(sound) if packed else sound
             data, ways = mutate(sound if isinstance(sound, bytes) else sound.encode(), rng)

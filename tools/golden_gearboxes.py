@@ -1,7 +1,9 @@
-"""Regenerates tests/golden/{manutec_r3,kr210_identified}.csv: converged motion of arms with elastic gearboxes.
+"""Regenerates tests/golden/{manutec_r3,kr210_identified}.csv: arms with elastic gearboxes.
+
+The files contain the converged motion.
 
     python tools/golden_gearboxes.py             compare with the stored files; status 1 if they differ by over 1e-11
-    python tools/golden_gearboxes.py --check     also integrate with Radau, and say how far the two are apart
+    python tools/golden_gearboxes.py --check     also compare with Radau
     python tools/golden_gearboxes.py --write     replace the stored files          (pip install pin scipy)
 
 The model is described in drives.py; motors follow the motion exactly, start in static equilibrium.

@@ -1,10 +1,11 @@
-"""Writes tests/golden/identified_arms.json: frequencies and compliance of the arms with identified gearboxes.
+"""Writes tests/golden/identified_arms.json: frequencies and compliance of the arms with identified
+gearboxes.
 
     python tools/golden_identified.py             (pip install pin scipy)
 
-Everything is computed twice: from the robot files by Pinocchio, and from the Denavit-Hartenberg tables of
-make_identified_robots.py by Jacobians of the mass centres, written out below. The two must agree to 1e-11 before
-anything is written.
+Everything is computed twice: from the robot files by Pinocchio, and from the Denavit-Hartenberg
+tables of make_identified_robots.py by Jacobians of the centres of mass, written out below. The two
+must agree to 1e-11 before anything is written.
 """
 import json
 from pathlib import Path
@@ -50,7 +51,7 @@ def frames(arm, q):
 
 
 def by_table(arm, q, load):
-    """Mass matrix and Jacobian at the flange."""
+    """Returns mass matrix and Jacobian at the flange."""
     T = frames(arm, q)
     axes, origins, tip = [X[:3, 2] for X in T[:-1]], [X[:3, 3] for X in T[:-1]], T[6][:3, 3]
     jacobian = lambda p, n: np.array([[*np.cross(axes[j], p - origins[j]), *axes[j]] if j < n else [0.0] * 6 for j in range(6)]).T
@@ -93,7 +94,7 @@ def case(robot, loaded, pose):
 
 if __name__ == "__main__":
     np.set_printoptions(precision=6, linewidth=150, suppress=True)
-    for name, arm in ARMS.items():      # a real body has no moment larger than the sum of the other two
+    for name, arm in ARMS.items():      # no moment of a real body exceeds the sum of the other two
         for i, entries in enumerate(arm["inertia"]):
             low, middle, high = np.linalg.eigvalsh(tensor(*entries))
             assert 0 < low and high <= low + middle, (name, i + 1)

@@ -1,11 +1,14 @@
 #!/usr/bin/env python3
-"""Least durations of paths within joint speeds, accelerations and jerks, by a nonlinear program over time.
+"""Minimum durations of paths within joint speeds, accelerations and jerks (nonlinear program).
 
-Writes tests/golden/jerk.json. Needs: pip install casadi numpy (casadi 3.8.2 with its IPOPT wrote the stored file).
+Writes tests/golden/jerk.json. Needs: pip install casadi numpy (casadi 3.8.2 with its IPOPT wrote
+the stored file).
 
-The paths are q_i(s) = b_i s + a_i sin(w_i s + p_i), 0 <= s <= 1, run from rest to rest with the acceleration zero at both ends.
-The jerk of s is constant on each of N equal intervals of time; s, its speed and its acceleration follow exactly; bounds hold at
-both ends and in the middle of each interval. The file has two N; what N costs falls with its power 1.4 (seeds 0 and 1 up to 1200).
+The paths are q_i(s) = b_i s + a_i sin(w_i s + p_i), 0 <= s <= 1, traversed from rest to rest with
+zero acceleration at both ends. The jerk of s is constant on each of N equal intervals of time; s,
+its speed and its acceleration follow exactly; bounds are imposed at both ends and in the middle of
+each interval. The file has two values of N; the discretisation error falls with N^-1.4 (seeds 0 and
+1 up to 1200).
 """
 
 import json
@@ -41,7 +44,7 @@ def duration(path: dict, n: int) -> float:
     h = T / n
 
     def after(t):
-        """Place, speed and acceleration a time behind the beginning of each interval."""
+        """Position, speed and acceleration at time t after the beginning of each interval."""
         s0, v0, a0 = s[:n], v[:n], acc[:n]
         return s0 + t * (v0 + t * (a0 / 2 + t * j / 6)), v0 + t * (a0 + t * j / 2), a0 + t * j
 

@@ -1,25 +1,30 @@
-"""Regenerates tests/golden/{kane,kane_slow,simo}_spin_up.csv: the spin-up of a cantilever about its root, in the plane.
+"""Regenerates tests/golden/{kane,kane_slow,simo}_spin_up.csv: spin-up of a cantilever.
+
+The cantilever turns about its root, in the plane.
 
     python tools/golden_kane.py             compare with the stored files; status 1 if they differ by over 1e-8 m
     python tools/golden_kane.py --check     also finer and coarser meshes, tighter tolerance, shear, and Exudyn's ANCF cable
     python tools/golden_kane.py --write     replace the stored files          (pip install numpy scipy exudyn)
 
-The root turns by psi(t), psi' = Omega (t/T - sin(2 pi t/T)/(2 pi)) for t < T = 15 s, then Omega. Published beams:
+The root turns by psi(t), psi' = Omega (t/T - sin(2 pi t/T)/(2 pi)) for t < T = 15 s, then Omega.
+Published beams:
 
     kane       Kane, Ryan and Banerjee 1987, Wu and Haug 1988: thin tube of 8 m, Omega = 6 rad/s; its first bending frequency
                at rest is 2.91 rad/s
     kane_slow  the same with Omega = 4 rad/s
     simo       Simo and Vu-Quoc 1986 (part II): 10 m, Omega = 6 rad/s
 
-Truth: geometrically exact beam (Simo and Reissner: stretch, shear and bending; rotary inertia), in a frame that turns with
-the root. With r = (x, y) and phi there, N the shape functions, c = cos(phi), s = sin(phi),
+Truth: geometrically exact beam (Simo and Reissner: stretch, shear and bending; rotary inertia), in
+a frame that rotates with the root. With r = (x, y) and phi there, N the shape functions,
+c = cos(phi), s = sin(phi),
 
     e = c x' + s y' - 1,  g = -s x' + c y',  k = phi'          energy 1/2 (EA e2 + kGA g2 + EI k2)
     rA (r'' + 2 W x r' + W' x r - W2 r), rI (phi'' + W')       inertia forces of the section, W = psi'
 
-Cubic elements, as many Gauss points as the degree for the energy (no locking), one more for the mass; Radau. Start straight,
-at rest; no gravity, no damping. For contrast `linear`: the same with the stiffness of the straight, unstressed beam. It lacks
-the stiffening by the centrifugal force, has K - W2 M instead, and diverges once W passes the first frequency.
+Cubic elements, as many Gauss points as the degree for the energy (no locking), one more for the
+mass; Radau. Start straight, at rest; no gravity, no damping. For contrast `linear`: the same with
+the stiffness of the straight, unstressed beam. It lacks the centrifugal stiffening, has K - W2 M
+instead, and diverges once W exceeds the first frequency.
 """
 import argparse
 import sys
@@ -32,7 +37,8 @@ from scipy.integrate import solve_ivp
 GOLDEN = Path(__file__).parent.parent / "tests" / "golden"
 RISE, END, EVERY = 15.0, 20.0, 0.05                             # s
 E, G, A, I, RHO = 6.8952e10, 2.6519e10, 7.2968e-5, 8.2181e-9, 2766.67
-TUBE = (8.0, E * A, 0.5 * G * A, E * I, RHO * A, RHO * I)           # shear factor of a thin tube, about 1/2
+# shear factor of a thin tube, about 1/2
+TUBE = (8.0, E * A, 0.5 * G * A, E * I, RHO * A, RHO * I)
 CASES = {  # Omega (rad/s); length (m), EA, kGA (N), EI (N m2), rA (kg/m), rI (kg m)
     "kane": (6.0, TUBE), "kane_slow": (4.0, TUBE), "simo": (6.0, (10.0, 2.8e7, 1e7, 1.4e4, 1.2, 6e-4)),
 }
@@ -46,7 +52,8 @@ HEADER = """\
 # Twice the elements: {finer} m; Exudyn 1.13.6, 32 ANCFCable2D, without shear and rotary inertia, whose doing that is: {cable} m.
 time,rate,tip_u,tip_v,tip_angle,linear_tip_v
 """
-AGREES = {"kane": ("4.1e-8", "5.1e-5"), "kane_slow": ("8.2e-9", "2.8e-5"), "simo": ("1.3e-8", "5.3e-5")}    # by --check; tip_v, m
+# by --check; tip_v, m
+AGREES = {"kane": ("4.1e-8", "5.1e-5"), "kane_slow": ("8.2e-9", "2.8e-5"), "simo": ("1.3e-8", "5.3e-5")}
 
 
 def spin(turn, t):
@@ -57,7 +64,8 @@ def spin(turn, t):
 
 
 class Beam:
-    """Unknowns q: displacements along and across and rotation phi of every node but the root, in the turning axes."""
+    """Unknowns q: displacements along and across and rotation phi of every node except the root, in
+    rotating axes."""
 
     def __init__(self, turn, numbers, elements=ELEMENTS, degree=DEGREE):
         length, EA, kGA, EI, rA, rI = numbers
@@ -66,10 +74,12 @@ class Beam:
         at = np.linspace(-1, 1, degree + 1)
         lagrange = [np.poly1d(np.poly(np.delete(at, j))) / np.prod(at[j] - np.delete(at, j)) for j in range(degree + 1)]
         shape = lambda points: (np.array([[p(x) for p in lagrange] for x in points]), np.array([[p.deriv()(x) * 2 / h for p in lagrange] for x in points]))
-        where = np.arange(elements)[:, None] * degree + np.arange(degree + 1)      # nodes of each element
+        # nodes of each element
+        where = np.arange(elements)[:, None] * degree + np.arange(degree + 1)
 
         def spread(local):
-            """Values at the points of an element to a matrix over all nodes, one row for each point of each element."""
+            """Scatters values at the points of an element to a matrix over all nodes, one row per
+            point of each element."""
             out = np.zeros((elements, local.shape[0], self.nodes))
             for e in range(elements):
                 out[e][:, where[e]] = local
@@ -96,13 +106,14 @@ class Beam:
         return np.hstack([np.zeros((3, 1)), q.reshape(3, -1)])
 
     def strains(self, z):
-        """c, s, e, g, k at the points; e without the difference of numbers near 1, whose rounding the stiffness would magnify."""
+        """c, s, e, g, k at the points; e without a difference of numbers near 1, whose rounding
+        would be amplified."""
         (du, dy, curvature), phi = z @ self.dN.T, self.N @ z[2]
         c, s = np.cos(phi), np.sin(phi)
         return c, s, c * du + s * dy - 2 * np.sin(phi / 2) ** 2, -s * (1 + du) + c * dy, curvature
 
     def elastic(self, q):
-        """Forces of the energy on the nodes."""
+        """Nodal forces of the elastic energy."""
         EA, kGA, EI = self.stiffness
         c, s, e, g, k = self.strains(self.fields(q))
         n, v, m = EA * e * self.w, kGA * g * self.w, EI * k * self.w
@@ -153,7 +164,7 @@ class Beam:
             K = self.K0 if linear else self.tangent(z[:n])
             return np.block([[np.zeros((n, n)), np.eye(n)], [-self.inverse @ (K + by_q), -self.inverse @ by_v]])
 
-        # m and m/s; rates of the stiff shear waves carry rounding errors of 1e-10 m/s
+        # m and m/s; rates of the stiff shear waves have rounding errors of 1e-10 m/s
         tolerance = np.repeat([0.01 * rtol, rtol], n)
         far = lambda t, z: abs(z[2 * n // 3 - 1]) - self.length
         far.terminal = True
@@ -173,7 +184,8 @@ class Beam:
 
 
 def exudyn_cable(turn, numbers, elements, step, times):
-    """The same by Exudyn's ANCFCable2D (no shear, no rotary inertia), in the inertial frame; tip (u, v)."""
+    """The same by Exudyn's ANCFCable2D (no shear, no rotary inertia), in the inertial frame; tip
+    (u, v)."""
     import exudyn as exu
     from exudyn.utilities import CoordinateConstraint, MarkerNodeCoordinate, NodePoint2DSlope1, NodePointGround, Cable2D, SensorNode
     length, EA, _, EI, rA, _ = numbers

@@ -1,10 +1,13 @@
-"""Writes tests/golden/closed_loops.json: constrained dynamics of the palletiser's URDF with three closed loops by Pinocchio.
+"""Writes tests/golden/closed_loops.json: closed-loop dynamics by Pinocchio.
 
     python tools/golden_loops.py          (pip install pin)
 
-The bars are not those of the shipped robot: two rods are shorter, so that no loop is a parallelogram. Loops are point contacts between two links
-(pin.RigidConstraintModel, CONTACT_3D), the dynamics pin.constraintDynamics. Before writing, the accelerations are checked against the equations with
-multipliers in the plane of the loops, solved with numpy. Rerunning writes the same file up to rounding.
+Constrained dynamics of the palletiser's URDF with three closed loops. The bars differ from those of
+the shipped robot: two rods are shorter, so that no loop is a parallelogram. Loops are point
+contacts between two links (pin.RigidConstraintModel, CONTACT_3D), the dynamics
+pin.constraintDynamics. Before writing, the accelerations are checked against the equations with
+multipliers in the plane of the loops, solved with numpy. Rerunning writes the same file up to
+rounding.
 """
 import json
 from pathlib import Path
@@ -29,7 +32,8 @@ def number(model, name):
 
 
 def gaps(model, data, q):
-    """Pin to eye in the plane of the column, two numbers per loop, and their Jacobian."""
+    """Vectors from pin to eye in the plane of the column, two numbers per loop, and their
+    Jacobian."""
     pin.computeJointJacobians(model, data, q)
     pin.updateFramePlacements(model, data)
     column = data.oMf[model.getFrameId("column")].rotation
@@ -90,7 +94,7 @@ def main():
     for _ in range(CASES):
         q = np.zeros(model.nq)
         start = np.array([rng.uniform(-2, 2), rng.uniform(-0.3, 0.6), rng.uniform(0.2, 0.9), rng.uniform(-3, 3)])
-        # From rest in small steps, so that each loop stays assembled as it was.
+        # From rest in small steps, so that each loop stays in its assembly branch.
         for s in np.linspace(0, 1, 41):
             q[driven] = s * start
             q = close(model, data, q, dependent)
@@ -100,7 +104,7 @@ def main():
         v[dependent] = -np.linalg.solve(J[:, dependent], J[:, driven] @ v[driven])
         tau = np.zeros(model.nv)
         tau[driven] = rng.uniform(-1, 1, 4) * [3000, 6000, 6000, 200]
-        # Across the plane the contacts say the same thing again: a proximal solution.
+        # Out of the plane the contacts are redundant: a proximal solution.
         settings = pin.ProximalSettings(1e-15, 1e-15, 1e-8, 200)
         a = pin.constraintDynamics(model, data, q, v, tau, contacts, contact_data, settings).copy()
         worst = max(worst, np.abs(a - multipliers(model, data, q, v, tau)).max() / np.abs(a).max())

@@ -1,10 +1,12 @@
-"""Writes tests/golden/{kr210,ur10_like,seven_axis,branched,scara}.json: dynamics of rigid robots by Pinocchio.
+"""Writes tests/golden/{kr210,ur10_like,seven_axis,branched,scara}.json: dynamics of rigid robots by
+Pinocchio.
 
     python tools/golden_pinocchio.py [NAME ...]          (pip install pin)
 
-Models: robots/kr210/kr210.urdf, the others beside the JSON files; made-up, plausible numbers. Rerunning writes
-the same files up to rounding. Before writing, the data are checked against each other: M q'' + bias = tau,
-forward dynamics back to q'', J' against central differences, energy against the mass matrix.
+Models: robots/kr210/kr210.urdf, the others next to the JSON files; artificial, plausible numbers.
+Rerunning writes the same files up to rounding. Before writing, the data are checked for
+consistency: M q'' + bias = tau, forward dynamics back to q'', J' against central differences,
+energy against the mass matrix.
 """
 import json
 import sys
@@ -22,7 +24,8 @@ MODELS = {  # name: (URDF, frame)
     "branched": ("tests/golden/branched.urdf", "tip"),
     "scara": ("tests/golden/scara.urdf", "tip"),
 }
-LEADS = {"scara": {"quill": 0.05}}  # joints that slide along their axis as they turn, m per turn
+# joints that translate along their axis as they turn, m per turn
+LEADS = {"scara": {"quill": 0.05}}
 SEED, CASES = 20240607, 6
 GRAVITY = [0.0, 0.0, -9.81]
 FIELDS = {
@@ -55,7 +58,8 @@ def jacobian(model, q, frame):
 
 
 def with_leads(model, urdf, leads):
-    """The model with helical joints in place of revolute ones: built anew, joint by joint (URDF has no such joints)."""
+    """Returns the model with helical instead of revolute joints, rebuilt joint by joint (URDF has
+    no such joints)."""
     axes = {j.get("name"): np.array([float(x) for x in j.find("axis").get("xyz").split()])
             for j in ET.parse(urdf).getroot().iter("joint") if j.find("axis") is not None}
     made = pin.Model()
@@ -143,6 +147,6 @@ if __name__ == "__main__":
         if leads:
             doc["leads"] = leads
         text = written(doc)
-        assert json.loads(text) == doc                       # every digit survives
+        assert json.loads(text) == doc                       # every digit is kept
         (ROOT / "tests" / "golden" / f"{name}.json").write_text(text + "\n")
         print(name, model.nv, "joints:", ", ".join(doc["joints"]))

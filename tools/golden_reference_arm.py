@@ -1,16 +1,19 @@
-"""Regenerates tests/golden/reference_arm_mid.csv: converged TCP motion of the reference arm by Pinocchio and scipy.
+"""Regenerates tests/golden/reference_arm_mid.csv: converged TCP motion of the reference arm.
+
+Computed by Pinocchio and scipy.
 
     python tools/golden_reference_arm.py             compare with the stored file; status 1 if they differ by over 1e-11
-    python tools/golden_reference_arm.py --check     also integrate with Radau, and say how far the two are apart
+    python tools/golden_reference_arm.py --check     also compare with Radau
     python tools/golden_reference_arm.py --write     replace the stored file          (pip install pin scipy)
 
-Hybrid dynamics: the six actuated joints follow the motion of trajectories/reference_arm.toml exactly, the twelve
-elastic coordinates e are free:
+Hybrid dynamics: the six actuated joints follow the motion of trajectories/reference_arm.toml
+exactly, the twelve elastic coordinates e are free:
 
     M_ee e'' = -K e - beta K e' - h_e(q, q', [q_a'', 0])          h by one RNEA, M_ee from CRBA
 
-Model: robots/reference_arm as read by robot_file.py; each elastic joint is a translation and a Z-Y-X rotation, so
-that all coordinates live in a vector space. The integrator is restarted where the jerk of the motion jumps.
+Model: robots/reference_arm as read by robot_file.py; each elastic joint is a translation and a
+Z-Y-X rotation, so that all coordinates live in a vector space. The integrator is restarted where
+the jerk of the motion jumps.
 """
 import argparse
 import sys
@@ -39,7 +42,7 @@ time,rigid_x,rigid_y,rigid_z,flexible_x,flexible_y,flexible_z,rotation_x,rotatio
 
 
 class Motion:
-    """Quintic moves from rest to rest with holds, from a waypoint file; each piece knows its end."""
+    """Quintic moves from rest to rest with holds, from a waypoint file."""
 
     def __init__(self, path):
         file = tomllib.loads(path.read_text())

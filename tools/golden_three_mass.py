@@ -1,4 +1,5 @@
-"""Writes tests/golden/three_mass.json and three_mass_frf.csv: frequencies and frequency response of robots/abb_three_mass.
+"""Writes tests/golden/three_mass.json and three_mass_frf.csv: frequencies and frequency response of
+robots/abb_three_mass.
 
     python tools/golden_three_mass.py             (pip install numpy)
 
@@ -6,8 +7,9 @@
     Jg q_g'' =       dg (q_m' - q_g') + kg (q_m - q_g) - da (q_g' - q_a') - ka (q_g - q_a)
     Ja q_a'' = t_a + da (q_g' - q_a') + ka (q_g - q_a)
 
-linear: without the friction of the motor. The numbers are read from the robot's files. The frequencies come from the
-quadratic in w2 and, to check it, from an eigensolver; the response from one complex solve at each frequency.
+linear: without motor friction. The numbers are read from the robot's files. The frequencies come
+from the quadratic in w2 and, as a check, from an eigensolver; the response from one complex solve
+at each frequency.
 """
 import json
 import math

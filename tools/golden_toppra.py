@@ -1,10 +1,12 @@
 #!/usr/bin/env python3
-"""Least durations of random paths within joint speeds and accelerations, by TOPP-RA.
+"""Minimum durations of random paths within joint speeds and accelerations, by TOPP-RA.
 
-Writes tests/golden/toppra.json. Needs: pip install toppra scipy numpy (toppra 0.6.10 wrote the stored file).
+Writes tests/golden/toppra.json. Needs: pip install toppra scipy numpy (toppra 0.6.10 wrote the
+stored file).
 
-The paths are those of TOPP-RA's own examples and benchmark (Pham & Pham 2018, section VI): cubic splines through random
-points, random bounds. Each case has the pieces of its spline, so that no other spline code is in the comparison.
+The paths are those of TOPP-RA's own examples and benchmark (Pham & Pham 2018, section VI): cubic
+splines through random points, random bounds. Each case stores the pieces of its spline, so that no
+other spline code affects the comparison.
 """
 
 import json

@@ -1,13 +1,15 @@
 #!/usr/bin/env python3
-"""A study through HyperQueue: a real server with workers on this machine, killed in the middle, started again, the bytes compared.
+"""Runs a study through HyperQueue with a restart and compares the bytes.
 
     pip install hyperqueue
     python3 tools/hyperqueue_sweep.py                          # the release build in target/
     python3 tools/hyperqueue_sweep.py --program PATH --shards 12
 
-The workers of the Python package live in the process of its server, so both are killed, with what they run (SIGKILL to all of the
-process group), after the first runs are there; then the shards are submitted to a new server. Without the package it says so and ends
-with status 0. Status 1 if the merged table is not, byte by byte, the one of a run on one machine.
+The server and its workers run on this machine. The workers of the Python package run in the process
+of its server, so both are killed with their tasks (SIGKILL to the whole process group) after the
+first runs are stored; then the shards are submitted to a new server. Without the package it prints
+a message and ends with status 0. Status 1 if the merged table differs in any byte from that of a
+run on one machine.
 """
 import argparse
 import importlib.util
@@ -50,7 +52,7 @@ seed = 7
 
 
 def runs_kept(results):
-    """Lines of the journals so far."""
+    """Returns the number of journal lines so far."""
     parts = results / "parts"
     return sum(path.read_bytes().count(b"\n") for path in parts.glob("*.journal")) if parts.exists() else 0
 

@@ -1,11 +1,12 @@
-"""Instructions of the numeric kernels, as a snapshot: a loss shows without timing, on a machine that others use.
+"""Snapshot of instruction counts of the numeric kernels, which shows regressions without timing.
 
     python3 tools/instruction_counts.py            count and compare with docs/performance/instructions.json; status 1 beyond 5 %
-    python3 tools/instruction_counts.py --write    store the counts of today
+    python3 tools/instruction_counts.py --write    store the current counts
 
-Each kernel of the example `kernels` runs twice under valgrind, with more calls the second time; the difference is what a call takes.
-Counts depend on compiler and processor family: where these are others than stored, or there is no valgrind, nothing is compared,
-and the script says so. Fewer instructions than stored are told as well: the snapshot is to be written anew then.
+Each kernel of the example `kernels` runs twice under valgrind, with more calls the second time; the
+difference is the count per call. Counts depend on compiler and processor family: if these differ
+from the stored ones, or valgrind is missing, nothing is compared, and the script prints that. A
+lower count is also reported: the snapshot should then be updated.
 """
 import argparse
 import json
@@ -20,10 +21,10 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 STORE = ROOT / "docs" / "performance" / "instructions.json"
 TARGET = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
-# Part by which a count may differ from the stored one; builds of other sets of crates differ by up
-# to 2 %.
+# Allowed relative difference from the stored count; builds of other sets of crates differ by up to
+# 2 %.
 ALLOWED = 0.05
-# Calls of the first and the second run.
+# Number of calls in the first and the second run.
 CALLS = {"step_spook": (100, 600), "step_rk4": (100, 600)}
 USUAL = (200, 1200)
 

@@ -1,15 +1,17 @@
-"""Writes robots/kr210_identified and robots/kr500_identified: arms whose joint stiffness and damping were identified.
+"""Writes robots/kr210_identified and robots/kr500_identified: arms with identified joints.
 
     python tools/make_identified_robots.py
 
-Numbers: `Robot_Model.m` and `Robot_DK_28N6.mat` of GBT-ADL/Interactive-Coupling-Simulation-for-Robotic-Milling (see
-the READMEs of the robots). Denavit-Hartenberg, standard: frame i sits at the far end of link i,
+Joint stiffness and damping are identified values. Numbers: `Robot_Model.m` and `Robot_DK_28N6.mat`
+of GBT-ADL/Interactive-Coupling-Simulation-for-Robotic-Milling (see the READMEs of the robots).
+Denavit-Hartenberg, standard: frame i is at the far end of link i,
 
     X_(i-1)(i) = Rz(q + offset) Tz(d) Tx(a) Rx(alpha)
 
-and mass centre and inertia (about the mass centre) are given in it. The frame of the URDF's link i sits on the axis of
-joint i instead, turned by q alone; what is left, C = Rz(offset) Tz(d) Tx(a) Rx(alpha), is the origin of the next joint
-and of the inertia, so the moments of inertia stand in the URDF as they were published. Needs numpy.
+and centre of mass and inertia (about it) are given in that frame. The frame of the URDF's link i is
+on the axis of joint i instead, rotated only by q; the remaining transform, C = Rz(offset) Tz(d)
+Tx(a) Rx(alpha), is the origin of the next joint and of the inertia, so the URDF contains the
+moments of inertia as published. Needs numpy.
 """
 import math
 from pathlib import Path
@@ -33,7 +35,7 @@ ARMS = {
         # run 28N6; damping of axis 3 from run 38M3
         stiffness=[2207197.5, 3376721.9, 2775692.4, 2350164.6, 2157458.9, 467055.9],
         damping=[4706.2, 4481.0, 1232.3, 3065.7, 3506.0, 728.3],
-        # those of robots/kr210
+        # from robots/kr210
         speed=[2.0384, 1.9451, 1.9547687622336491, 3.12413936106985, 3.001966313430247, 3.839724354387525],
         effort=[7290, 8910, 6988.84717, 2274.29199, 1398.30298, 781.554626]),
     "kr500_identified": dict(
@@ -46,12 +48,13 @@ ARMS = {
                  (0.700, 0.684, 0.438, 0, 0, 0.112), (0.018, 0.018, 0.034, 0, 0, 0)],
         stiffness=[2.3e6, 8.6e6, 2.8e6, 3.0e6, 0.2e6, 0.9e6],
         damping=[1.9e3, 1.4e3, 0.6e3, 1.9e3, 1.4e3, 1.4e3],
-        # KR 500 R2800-2 of kroshu/kuka_robot_descriptions
+        # from KR 500 R2800-2 of kroshu/kuka_robot_descriptions
         speed=[1.74532925199433, 1.38831658329915, 1.5707963267949, 1.5707963267949, 1.74532925199433, 2.84488668075076],
         effort=[13440, 18360, 11026.993040108, 5359.09461871641, 5363.94964557179, 3112.65024319794]),
 }
 RANGE_DEG = [(-185, 185), (-130, 20), (-100, 144), (-350, 350), (-120, 120), (-350, 350)]
-HUB = [(0.24, 0.30), (0.19, 0.36), (0.16, 0.34), (0.12, 0.24), (0.10, 0.22), (0.08, 0.06)]        # radius, length (m)
+# radius, length (m)
+HUB = [(0.24, 0.30), (0.19, 0.36), (0.16, 0.34), (0.12, 0.24), (0.10, 0.22), (0.08, 0.06)]
 
 
 def tensor(xx, yy, zz, xy, xz, yz):
@@ -72,7 +75,8 @@ def constants(row):
 
 
 def equal_inertia_box(mass, inertia):
-    """Edges of the box of the same mass and principal moments, and its axes (rotation) in the axes of the inertia."""
+    """Edges of the box with the same mass and principal moments, and its axes (rotation) in inertia
+    axes."""
     moments, axes = np.linalg.eigh(inertia)
     if np.linalg.det(axes) < 0:
         axes[:, 2] *= -1

@@ -1,12 +1,14 @@
-"""Writes trajectories/iso9283_path.csv: a test path in the diagonal plane of a cube. Needs Pinocchio.
+"""Writes trajectories/iso9283_path.csv: a test path in the diagonal plane of a cube. Needs
+Pinocchio.
 
     python tools/make_iso_path.py
 
-In the manner of ISO 9283 (not a conformity test): the test plane is the diagonal plane of a cube in front of
-the arm; the TCP of robots/kr210 runs along the four sides of a rectangle and around a circle in that plane,
-at 0.5 m/s, its orientation fixed, square to the plane. Each side starts and ends at rest; the speed rises
-and falls as a quintic, so that the acceleration has no jumps. Joint positions come from inverse kinematics,
-velocities and accelerations from the Jacobian: J q' = V, J q'' = A - J' q'.
+In the manner of ISO 9283 (not a conformity test): the test plane is the diagonal plane of a cube in
+front of the arm; the TCP of robots/kr210 moves along the four sides of a rectangle and around a
+circle in that plane, at 0.5 m/s, with fixed orientation perpendicular to the plane. Each side
+starts and ends at rest; the speed rises and falls as a quintic, so that the acceleration is
+continuous. Joint positions come from inverse kinematics, velocities and accelerations from the
+Jacobian: J q' = V, J q'' = A - J' q'.
 """
 from pathlib import Path
 
@@ -18,17 +20,20 @@ from robot_file import Arm
 ROOT = Path(__file__).parent.parent
 RATE_HZ, SPEED, RAMP_S, REST_S = 100, 0.5, 0.4, 0.5
 CENTRE, CUBE = np.array([1.75, 0.0, 1.05]), 0.63                     # m, world
-RECTANGLE, DIAMETER = 0.8, 0.40                                      # part of the cube's diagonal plane; m
+# part of the cube's diagonal plane; m
+RECTANGLE, DIAMETER = 0.8, 0.40
 ACROSS, UP = np.array([0.0, 1.0, 0.0]), np.array([1.0, 0.0, 1.0]) / np.sqrt(2)
 SEED = np.radians([0.0, -70.0, 85.0, 0.0, 30.0, 0.0])
 
 
 def profile(length):
-    """Way, speed and acceleration along a path from rest to rest, as functions of time, and the duration."""
+    """Distance, speed and acceleration along a path from rest to rest, as functions of time, and
+    the duration."""
     total = length / SPEED + RAMP_S
     assert total >= 2 * RAMP_S, "too short for the cruising speed"
 
-    def rise(t):                                                     # from 0, with v = SPEED (10 u3 - 15 u4 + 6 u5)
+    # from 0, with v = SPEED (10 u3 - 15 u4 + 6 u5)
+    def rise(t):
         u = min(max(t / RAMP_S, 0.0), 1.0)
         s = SPEED * RAMP_S * (2.5 * u**4 - 3 * u**5 + u**6) + SPEED * max(t - RAMP_S, 0.0)
         return s, SPEED * u**3 * (10 - 15 * u + 6 * u * u), SPEED / RAMP_S * 30 * u * u * (1 - u)**2
@@ -78,9 +83,11 @@ def path():
 
 
 def joints(arm, samples):
-    """q, q', q'' of the joints for (position, velocity, acceleration) of the TCP, orientation fixed."""
+    """q, q', q'' of the joints for (position, velocity, acceleration) of the TCP, orientation
+    fixed."""
     z = np.cross(UP, ACROSS)
-    z = z if z[2] < 0 else -z                                        # tool z: square to the plane, forward and down
+    # tool z: perpendicular to the plane, forward and down
+    z = z if z[2] < 0 else -z
     R_WT = np.column_stack([np.cross(ACROSS, z), ACROSS, z])
     R_WT = R_WT if np.trace(R_WT.T @ arm.pose(SEED).rotation) > 0 else R_WT @ np.diag([-1, -1, 1.0])
     q, rows = SEED.copy(), []
@@ -96,7 +103,8 @@ def joints(arm, samples):
         qd = np.linalg.solve(J, np.r_[v, 0, 0, 0])
         pin.forwardKinematics(arm.model, arm.data, q, qd, np.zeros(6))
         pin.updateFramePlacements(arm.model, arm.data)
-        bias = pin.getFrameClassicalAcceleration(arm.model, arm.data, arm.tcp, pin.LOCAL_WORLD_ALIGNED)   # J' q'
+        # J' q'
+        bias = pin.getFrameClassicalAcceleration(arm.model, arm.data, arm.tcp, pin.LOCAL_WORLD_ALIGNED)
         rows.append((q, qd, np.linalg.solve(J, np.r_[a, 0, 0, 0] - bias.vector)))
     return rows
 
@@ -107,7 +115,7 @@ if __name__ == "__main__":
     times = np.arange(int(np.ceil(total * RATE_HZ)) + 1) / RATE_HZ
     rows = joints(arm, [sample(t) for t in times])
     q, qd, qdd = (np.array([r[i] for r in rows]) for i in range(3))
-    # the columns belong together: central differences, bounded by their own error of order h2
+    # consistency of the columns: central differences, bounded by their own error of order h2
     for name, x, dx in (("velocity", q, qd), ("acceleration", qd, qdd)):
         print(f"largest difference of {name} from central differences: {np.abs(np.gradient(x, times, axis=0)[1:-1] - dx[1:-1]).max():.2e}")
     header = ["time"] + [f"joint_{i}{part}" for i in range(1, 7) for part in ("", ".vel", ".acc")]

@@ -1,17 +1,21 @@
-"""Draws and meshes the castings of robots/lower_arm and robots/kr210/fe. Needs gmsh and numpy (`pip install gmsh numpy`).
+"""Draws and meshes the castings of robots/lower_arm and robots/kr210/fe.
+
+Needs gmsh and numpy (`pip install gmsh numpy`).
 
     python tools/make_link_meshes.py                                      # all meshes and the skin, to their places
     python tools/make_link_meshes.py lower_arm --size-mm 12 --out FILE    # one, finer; .msh is binary, .msh.gz text
 
-Own shapes. A casting is a shell between an outer and an inner solid (a loft between two drums), with a thick bearing
-seat in the front of each drum, a hole in its back, ribs and core holes. It lies in the link frame of its URDF, so
-that the seats lie around the joint axes. Volume group `body`, surface groups `interface_A` (proximal seat, at the
-joint the link turns about) and `interface_B` (distal seat).
+Own designs. A casting is a shell between an outer and an inner solid (a loft between two drums),
+with a thick bearing seat in the front of each drum, a hole in its back, ribs and core holes. It is
+given in the link frame of its URDF, so that the seats are around the joint axes. Volume group
+`body`, surface groups `interface_A` (proximal seat, at the link's own joint) and `interface_B`
+(distal seat).
 
-Elements are TET10 with straight edges: corners are rounded to 2 um and mid-edge nodes are their exact means (so the
-text needs three decimals). The Jacobian is then constant in each element, cuts at a plane are exact and every
-quadrature of order 2 is exact for the stiffness. Written files are read again and checked from what they say.
-At some coarse sizes gmsh cannot fill the thin walls ("PLC Error") or leaves slivers: a size a few per cent off helps.
+Elements are TET10 with straight edges: corners are rounded to 2 um and mid-edge nodes are their
+exact means (so the text needs three decimals). The Jacobian is then constant in each element, cuts
+at a plane are exact and every quadrature of order 2 is exact for the stiffness. Written files are
+read back and checked. At some coarse sizes gmsh cannot fill the thin walls ("PLC Error") or leaves
+slivers: a size a few per cent different helps.
 """
 import argparse
 import gzip
@@ -28,8 +32,8 @@ occ = gmsh.model.occ
 
 # A casting: its solid and the planes of its seats. Lengths in m until `mesh_casting` scales them.
 #   build   draws it and returns the volume's tag
-#   seats   for A and B: centre, direction the seat faces, outer and inner radius
-#   unit    length unit of the file in m; size: largest element edge in m
+#   seats   for A and B: centre, direction that the seat faces, outer and inner radius
+#   unit    length unit of the file in m; size: maximum element edge in m
 Casting = namedtuple("Casting", "folder stem build seats unit size density")
 Seat = namedtuple("Seat", "centre facing outer inner")
 
@@ -37,7 +41,7 @@ Seat = namedtuple("Seat", "centre facing outer inner")
 # Solids
 
 def cylinder(centre, axis, start, end, radius):
-    """From centre + start * axis to centre + end * axis."""
+    """Cylinder from centre + start * axis to centre + end * axis."""
     p, d = np.asarray(centre) + start * np.asarray(axis), (end - start) * np.asarray(axis)
     return [(3, occ.addCylinder(*p, *d, radius))]
 
@@ -47,7 +51,8 @@ def box(low, high):
 
 
 def loft(stations, u, v, power, shrink=0.0):
-    """Through superellipses (centre, half size along u, half size along v, wall), each smaller by shrink * wall."""
+    """Loft through superellipses (centre, half size along u, along v, wall), each reduced by shrink
+    * wall."""
     loops = []
     for centre, a, b, wall in stations:
         angle = 2 * np.pi * np.arange(24) / 24
@@ -102,7 +107,8 @@ class Drum:
             low, high = np.array([r0, -wall / 2, -wall / 2]), np.array([r1, wall / 2, wall / 2])
             axis = np.array([0.0, 0.0, 1.0])
             span = sorted((0.6 * self.thick * self.inward[i], (self.thick + height) * self.inward[i]))
-            low[2], high[2] = span                                   # drawn about z, then turned onto the drum's axis
+            # drawn about z, then turned onto the drum's axis
+            low[2], high[2] = span
             plate = box(low, high)
             occ.rotate(plate, 0, 0, 0, *axis, angle)
             if i == 1:                                               # z to y: about x by -90 deg
@@ -115,10 +121,10 @@ class Drum:
 
 
 def shell(lofts, drums, ribs, holes, gussets=()):
-    """Outer minus inner solid, plus the ribs as far as they lie in the cavity, minus bores and holes."""
+    """Outer minus inner solid, plus the ribs within the cavity, minus bores and holes."""
     outer = fuse(*[f(0.0) for f in lofts], *[d.outer() for d in drums])
     inner = fuse(*[f(1.0) for f in lofts], *[d.inner() for d in drums])
-    # ribs end in the middle of the wall: they join it over an area and do not show outside
+    # ribs end in the middle of the wall: they join it over an area and are not visible outside
     middle = fuse(*[f(0.5) for f in lofts], *[d.inner(0.5) for d in drums])
     ribs = common(sum(ribs, []) + list(gussets), middle)
     solid = fuse(cut(outer, inner), ribs)
@@ -130,7 +136,7 @@ def shell(lofts, drums, ribs, holes, gussets=()):
 # The castings
 
 def rib(axis, at, wall, hole_centre, hole):
-    """Plate square to `axis` with a round hole (hole_centre: the two other coordinates)."""
+    """Plate perpendicular to `axis` with a round hole (hole_centre: the two other coordinates)."""
     low, high = np.full(3, -BIG / 2), np.full(3, BIG / 2)
     low[axis], high[axis] = at - wall / 2, at + wall / 2
     centre = np.insert(np.asarray(hole_centre, float), axis, at)
@@ -141,7 +147,8 @@ LOWER_SEATS = (Seat((0.0, 0.0, 0.0), (0, -1, 0), 0.160, 0.108), Seat((0.060, 0.1
 
 
 def lower_arm():
-    """Stands on joint 1 (axis y), bowed forward and leaning sideways: no plane of symmetry, so no zero coupling."""
+    """Upright on joint 1 (axis y), bowed forward and leaning sideways: no symmetry plane, no zero
+    coupling."""
     a, b = LOWER_SEATS
     drums = [Drum(a, 0.126, 0.011, 0.026, 0.062), Drum(b, 0.116, 0.009, 0.020, 0.046)]
     stations = [((-0.010, 0.068, 0.00), 0.126, 0.044, 0.011), ((-0.030, 0.070, 0.28), 0.112, 0.047, 0.010),
@@ -149,7 +156,8 @@ def lower_arm():
                 ((0.060, 0.088, 1.10), 0.074, 0.040, 0.009)]
     body = lambda shrink: loft([(np.array(c), p, q, w) for c, p, q, w in stations], [1, 0, 0], [0, 1, 0], 4.0, shrink)
     ribs = [rib(2, 0.330, 0.009, (-0.030, 0.069), 0.026), rib(2, 0.690, 0.009, (-0.014, 0.078), 0.024)]
-    holes = [cylinder((-0.02, 0.0745, 0.500), (1, 0, 0), -0.30, 0.0, 0.025),     # core holes, in the back
+    # core holes, in the back
+    holes = [cylinder((-0.02, 0.0745, 0.500), (1, 0, 0), -0.30, 0.0, 0.025),
              cylinder((0.0, 0.082, 0.820), (1, 0, 0), -0.30, 0.0, 0.022),
              cylinder((-0.018, 0.07, 0.200), (0, 1, 0), 0.0, 0.20, 0.040)]     # and the side
     gussets = drums[0].gussets((20, 80, 145), 0.010, 0.050) + drums[1].gussets((-30, -100, 210), 0.009, 0.040)
@@ -160,7 +168,7 @@ LINK_2_SEATS = (Seat((0.0, 0.0, 0.064), (0, 0, 1), 0.195, 0.130), Seat((1.150, 0
 
 
 def link_2():
-    """Link arm of the KR 210 class: runs beside both bearings (axes z), seats on the same side."""
+    """Link arm of the KR 210 class: next to both bearings (axes z), seats on the same side."""
     a, b = LINK_2_SEATS
     drums = [Drum(a, 0.386, 0.011, 0.032, 0.100), Drum(b, 0.214, 0.010, 0.030, 0.085)]
     stations = [((0.00, 0, -0.196), 0.166, 0.102, 0.011), ((0.30, 0, -0.204), 0.154, 0.100, 0.011),
@@ -172,18 +180,21 @@ def link_2():
     return shell([body], drums, ribs, holes, gussets)
 
 
-AXIS_4 = np.array([0.0, -0.115, 0.175])          # axis of joint 4 in link_3: along x through this point
+# axis of joint 4 in link_3: along x through this point
+AXIS_4 = np.array([0.0, -0.115, 0.175])
 LINK_3_SEATS = (Seat((0.0, 0.0, 0.0), (0, 0, -1), 0.168, 0.100), Seat((0.828, *AXIS_4[1:]), (1, 0, 0), 0.118, 0.078))
 
 
 def link_3():
-    """Forearm: drum about joint 3 (axis z), box with three holes for the wrist drives, tube up to joint 4 (axis x)."""
+    """Forearm: drum about joint 3 (axis z), box with three holes for the wrist drives, tube up to
+    joint 4 (axis x)."""
     a, b = LINK_3_SEATS
     drums = [Drum(a, 0.326, 0.010, 0.028, 0.085), Drum(b, 0.150, 0.010, 0.026, 0.070)]
     stations = [(-0.200, 0.124, 0.124, 0.010), (0.080, 0.138, 0.128, 0.010), (0.380, 0.120, 0.116, 0.0095),
                 (0.705, 0.092, 0.092, 0.009)]
     place = lambda x: AXIS_4 + [x, 0, 0]
-    rear = lambda shrink, x, wall: shrink * wall if x < 0 else 0.0           # the cavity leaves a rear wall
+    # the cavity leaves a rear wall
+    rear = lambda shrink, x, wall: shrink * wall if x < 0 else 0.0
     body = lambda shrink: loft([(place(x + rear(shrink, x, w)), p, q, w) for x, p, q, w in stations], [0, 1, 0], [0, 0, 1], 4.0, shrink)
     ribs = [rib(0, 0.300, 0.009, AXIS_4[1:], 0.060), rib(0, 0.560, 0.009, AXIS_4[1:], 0.055)]
     drives = [cylinder(AXIS_4 + [0, dy, dz], (1, 0, 0), -0.25, -0.15, 0.038) for dy, dz in ((0.050, -0.050), (0.050, 0.050), (-0.055, 0))]
@@ -202,7 +213,7 @@ CASTINGS = {
 # Meshing
 
 def interface_faces(volume, seat):
-    """The faces of the volume that lie in the seat's plane, within its outer radius."""
+    """Returns the faces of the volume in the seat's plane, within its outer radius."""
     found = []
     for _, face in gmsh.model.getBoundary([(3, volume)], oriented=False):
         low, high = np.array(gmsh.model.getBoundingBox(2, face)).reshape(2, 3)
@@ -217,7 +228,8 @@ def interface_faces(volume, seat):
 
 
 def mesh_casting(casting, size):
-    """Meshes in the unit of the file, straight TET10, nodes on a decimal grid. Leaves the mesh as gmsh's model."""
+    """Meshes in the unit of the file, straight TET10, nodes on a decimal grid. The mesh stays the
+    gmsh model."""
     gmsh.clear()
     gmsh.model.add(casting.stem)
     volume = casting.build()
@@ -272,10 +284,11 @@ def write(path):
     plain = path.with_suffix("")
     gmsh.option.setNumber("Mesh.Binary", 0)
     gmsh.write(str(plain))
-    # gmsh prints 16 digits of 99.332, hence 99.33199999999999: print what was meant
+    # gmsh prints 99.332 with 16 digits as 99.33199999999999: print the intended value
     head, nodes, rest = re.split(r"(?s)(\$Nodes.*?\$EndNodes)", plain.read_text())
     nodes = re.sub(r"-?\d+\.\d+(e-?\d+)?", lambda m: f"{float(m[0]):.10g}", nodes)
-    path.write_bytes(gzip.compress((head + nodes + rest).encode(), 9, mtime=0))   # no time of day: same bytes each run
+    # no timestamp: same bytes in each run
+    path.write_bytes(gzip.compress((head + nodes + rest).encode(), 9, mtime=0))
     plain.unlink()
 
 
@@ -300,7 +313,7 @@ def shape(r):
 
 
 def read(path):
-    """Points (m in the file's unit), TET10, faces of A and B, from a file as a reader sees it."""
+    """Reads points (m in the file's unit), TET10, faces of A and B from a file."""
     gmsh.clear()
     if str(path).endswith(".gz"):
         plain = Path(str(path)[:-3] + ".check.msh")
@@ -323,12 +336,13 @@ def read(path):
 
 
 def jacobians(points, cells, at):
-    """det J of each element at the points `at`."""
+    """Returns det J of each element at the points `at`."""
     return np.linalg.det(np.einsum("eai,gaj->egij", points[cells], shape(at)[1]))
 
 
 def mass_properties(points, cells, density):
-    """Mass, centre of mass, inertia about it. Exact for straight-sided elements (4 points integrate order 2)."""
+    """Mass, centre of mass, inertia about it. Exact for straight-sided elements (4 points integrate
+    order 2)."""
     weight = jacobians(points, cells, GAUSS) / 24 * density
     x = np.einsum("ga,eai->egi", shape(GAUSS)[0], points[cells])
     mass = weight.sum()
@@ -338,7 +352,7 @@ def mass_properties(points, cells, density):
 
 
 def quality(points, cells):
-    """3 x inradius / circumradius of the corner tetrahedra: 1 is regular."""
+    """Returns 3 x inradius / circumradius of the corner tetrahedra: 1 is regular."""
     p = points[cells[:, :4]]
     a, b, c = (p[:, k] - p[:, 0] for k in (1, 2, 3))
     six = np.abs(np.einsum("ei,ei->e", a, np.cross(b, c)))

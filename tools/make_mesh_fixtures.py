@@ -1,9 +1,12 @@
 #!/usr/bin/env python3
-"""Makes crates/links/flexarm-fe-io/tests/data/three_blocks.*: one small mesh in every layout that Gmsh writes.
+"""Writes three_blocks.* for the tests of flexarm-fe-io: one small mesh in every Gmsh layout.
+
+The files are in crates/links/flexarm-fe-io/tests/data.
 
 Three separate blocks of 1 x 1 x 1 m side by side along x, second order, straight edges: tetrahedra
 (`tets`, x = 0 to 1), hexahedra (`hexes`, x = 2 to 3) and wedges (`wedges`, x = 4 to 5). Groups: the
-faces x = 0 (`left`) and x = 5 (`right`), one edge of the first block (`rim`), its first corner (`corner`).
+faces x = 0 (`left`) and x = 5 (`right`), one edge of the first block (`rim`), its first corner
+(`corner`).
 
 Run with the gmsh package (made with 4.15.2): python tools/make_mesh_fixtures.py
 """
@@ -16,7 +19,7 @@ FOLDER = pathlib.Path(__file__).resolve().parent.parent / "crates/links/flexarm-
 
 
 def block(x, size, recombine=False, layers=0):
-    """A unit cube at x: extruded when it has layers. Returns its volume."""
+    """Creates a unit cube at x, extruded if it has layers. Returns its volume."""
     geo = gmsh.model.occ
     if layers == 0:
         return geo.addBox(x, 0, 0, 1, 1, 1)
@@ -30,7 +33,7 @@ def block(x, size, recombine=False, layers=0):
 
 
 def entity_at(dim, low, high):
-    """The one entity of a dimension inside a box."""
+    """Returns the single entity of a dimension inside a box."""
     found = gmsh.model.getEntitiesInBoundingBox(*[v - 1e-3 for v in low], *[v + 1e-3 for v in high], dim)
     assert len(found) == 1, found
     return found[0][1]
@@ -59,7 +62,7 @@ def main():
     gmsh.model.mesh.generate(3)
 
     FOLDER.mkdir(parents=True, exist_ok=True)
-    os.chdir(FOLDER)  # the .inp writes the path that it was given into its heading
+    os.chdir(FOLDER)  # the .inp contains the given path in its heading
     for version, label in ((2.2, "v22"), (4.1, "v41")):
         gmsh.option.setNumber("Mesh.MshFileVersion", version)
         for binary, kind in ((0, "ascii"), (1, "binary")):

@@ -1,10 +1,11 @@
-"""Draws the meshes of robots/kr210: closed solids from lofted rings, as binary STL. Needs numpy only.
+"""Draws the meshes of robots/kr210: closed solids from lofted rings, as binary STL. Needs numpy
+only.
 
     python tools/make_meshes.py [FOLDER]
 
-Own shapes in the link frames of kr210.urdf: they show where the joints and the load-bearing parts are and
-have roughly the outer size of the real arm, nothing more. Metres. Every solid is closed, normals outward;
-the solids of one link overlap where they meet.
+Own designs in the link frames of kr210.urdf: they show the positions of the joints and the
+load-bearing parts and have roughly the outer size of the real arm, no more. Metres. Every solid is
+closed, normals outward; the solids of one link overlap at their contacts.
 """
 import sys
 from pathlib import Path
@@ -17,7 +18,8 @@ ANGLE = 2 * np.pi * (np.arange(N) + 0.5) / N
 
 
 def ring(centre, u, v, a, b, power=2.0):
-    """Superellipse with half axes a, b along u, v: power 2 an ellipse, 5 to 8 a rounded rectangle."""
+    """Superellipse with half axes a, b along u, v: power 2 gives an ellipse, 5 to 8 a rounded
+    rectangle."""
     c, s = np.cos(ANGLE), np.sin(ANGLE)
     r = (np.abs(c)**power + np.abs(s)**power)**(-1 / power)
     return np.asarray(centre, float) + np.outer(a * r * c, u) + np.outer(b * r * s, v)
@@ -49,7 +51,7 @@ def across(axis):
 
 
 def cylinder(centre, axis, radius, start, end, chamfer=0.008):
-    """Along `axis` from centre + start to centre + end, edges broken."""
+    """Cylinder along `axis` from centre + start to centre + end, with chamfered edges."""
     u, v = across(axis)
     start, end = min(start, end), max(start, end)
     at = ((start, radius - chamfer), (start + chamfer, radius), (end - chamfer, radius), (end, radius - chamfer))
@@ -57,7 +59,8 @@ def cylinder(centre, axis, radius, start, end, chamfer=0.008):
 
 
 def body(axis, stations, power=5.0):
-    """Tapered body: stations (centre, half size along u, half size along v), u and v as in `across`."""
+    """Tapered body: stations (centre, half size along u, half size along v), u and v as in
+    `across`."""
     u, v = across(axis)
     return loft([ring(c, u, v, a, b, power) for c, a, b in stations])
 
@@ -69,43 +72,56 @@ def links():
         body(Z, [(p(0, 0, 0), 0.37, 0.37), (p(0, 0, 0.045), 0.37, 0.37)], 8),
         body(Z, [(p(0, 0, 0.04), 0.33, 0.33), (p(0, 0, 0.20), 0.29, 0.29), (p(0, 0, 0.24), 0.285, 0.285)], 3.5),
         cylinder(o, Z, 0.29, 0.22, 0.30),
-        body(X, [(p(-0.60, 0, 0.13), 0.14, 0.09), (p(-0.25, 0, 0.13), 0.16, 0.09)], 8),      # connector box
+        # connector box
+        body(X, [(p(-0.60, 0, 0.13), 0.14, 0.09), (p(-0.25, 0, 0.13), 0.16, 0.09)], 8),
     ]
     shoulder = p(0.33, 0.0, -0.3394)
-    yield "link_1", [                                                                          # z down
+    # z down
+    yield "link_1", [
         cylinder(o, Z, 0.285, -0.10, 0.0),
         body(Z, [(p(0.02, 0, -0.08), 0.29, 0.25), (p(0.10, -0.06, -0.20), 0.31, 0.20), (p(0.22, -0.08, -0.36), 0.26, 0.15),
                  (p(0.27, -0.08, -0.46), 0.16, 0.13)], 4),
-        cylinder(shoulder, Y, 0.205, -0.24, 0.005),                                            # joint 2 housing
-        cylinder(shoulder, Y, 0.115, -0.42, -0.23),                                            # drive 2
-        cylinder(p(-0.27, 0.06, 0), Z, 0.10, -0.48, -0.06),                                    # drive 1
+        # joint 2 housing
+        cylinder(shoulder, Y, 0.205, -0.24, 0.005),
+        # drive 2
+        cylinder(shoulder, Y, 0.115, -0.42, -0.23),
+        # drive 1
+        cylinder(p(-0.27, 0.06, 0), Z, 0.10, -0.48, -0.06),
     ]
-    yield "link_2", [                                                                          # x along, z lateral
+    # x along, z lateral
+    yield "link_2", [
         cylinder(o, Z, 0.20, -0.14, 0.064),
         cylinder(o, Z, 0.185, -0.32, -0.12),
         body(X, [(p(-0.06, 0, -0.20), 0.165, 0.115), (p(0.25, 0, -0.215), 0.155, 0.120), (p(0.70, 0, -0.225), 0.138, 0.115),
                  (p(1.15, 0, -0.215), 0.128, 0.10)], 6),
         cylinder(p(1.15, 0, 0), Z, 0.165, -0.315, -0.105),
     ]
-    y, z = -0.115, 0.175                                                                       # axis 4 in link_3
-    yield "link_3", [                                                                          # x along the forearm
+    # axis 4 in link_3
+    y, z = -0.115, 0.175
+    # x along the forearm
+    yield "link_3", [
         cylinder(o, Z, 0.17, 0.002, 0.10),
         body(Z, [(p(0, -0.02, 0.06), 0.16, 0.16), (p(0.01, -0.06, 0.175), 0.17, 0.19), (p(0.01, -0.08, 0.30), 0.14, 0.15)], 3.5),
         body(X, [(p(-0.20, y, z), 0.135, 0.145), (p(0.12, y, z), 0.145, 0.145), (p(0.36, y, z), 0.122, 0.125),
                  (p(0.74, y, z), 0.105, 0.105)], 6),
-        cylinder(p(0, y, z), X, 0.118, 0.72, 0.828),                                           # joint 4 housing
-        cylinder(p(0, y + 0.085, z - 0.075), X, 0.058, -0.40, -0.18),                          # drives 4, 5, 6
+        # joint 4 housing
+        cylinder(p(0, y, z), X, 0.118, 0.72, 0.828),
+        # drives 4, 5, 6
+        cylinder(p(0, y + 0.085, z - 0.075), X, 0.058, -0.40, -0.18),
         cylinder(p(0, y + 0.085, z + 0.075), X, 0.058, -0.40, -0.18),
         cylinder(p(0, y - 0.075, z), X, 0.058, -0.40, -0.18),
-        cylinder(o, Z, 0.115, 0.29, 0.42),                                                     # drive 3
+        # drive 3
+        cylinder(o, Z, 0.115, 0.29, 0.42),
     ]
-    yield "link_4", [                                                                          # -z along the forearm
+    # -z along the forearm
+    yield "link_4", [
         cylinder(o, Z, 0.100, -0.075, 0.0),
         body(Z, [(p(0, 0, -0.06), 0.098, 0.098), (p(0, 0, -0.13), 0.072, 0.075), (p(0, 0, -0.30), 0.058, 0.056),
                  (p(0, 0, -0.40), 0.062, 0.050)], 3),
         cylinder(p(0, 0, -0.392), Y, 0.084, -0.055, 0.055),
     ]
-    yield "link_5", [                                                                          # x forward, z lateral
+    # x forward, z lateral
+    yield "link_5", [
         cylinder(o, Z, 0.098, -0.040, 0.025),
         cylinder(o, Z, 0.098, -0.205, -0.152),
         body(X, [(p(-0.02, 0, -0.010), 0.085, 0.026), (p(0.14, 0, -0.014), 0.075, 0.026)], 5),
@@ -113,14 +129,15 @@ def links():
         body(X, [(p(0.098, 0, -0.096), 0.078, 0.100), (p(0.15, 0, -0.096), 0.078, 0.085)], 4),
         cylinder(p(0, 0, -0.096), X, 0.078, 0.14, 0.1665),
     ]
-    yield "link_6", [                                                                          # -z out of the flange
+    # -z out of the flange
+    yield "link_6", [
         cylinder(o, Z, 0.072, -0.034, 0.0, 0.004),
         cylinder(o, Z, 0.050, -0.0485, -0.030, 0.003),
     ]
 
 
 def check_closed(solid):
-    """Each edge belongs to exactly two triangles, once in each direction."""
+    """Checks that each edge belongs to exactly two triangles, once in each direction."""
     points, index = np.unique(solid.reshape(-1, 3).round(9), axis=0, return_inverse=True)
     t = index.reshape(-1, 3)
     edges = np.vstack([t[:, [0, 1]], t[:, [1, 2]], t[:, [2, 0]]])

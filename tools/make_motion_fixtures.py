@@ -1,13 +1,14 @@
 #!/usr/bin/env python3
-"""Small motions in the formats of other programs, for crates/motion/flexarm-motion-io/tests.
+"""Writes small motions in the formats of other programs, for crates/motion/flexarm-motion-io/tests.
 
     pip install rosbags==0.11.9 mcap==1.6.0 lz4==4.4.5 zstandard==0.25.0 PyYAML==6.0.3
     python3 tools/make_motion_fixtures.py
 
-One motion of two joints, sampled from closed forms, as our own CSV (the truth of the tests) and as messages and bags that
-the Python readers and writers of ROS write: rosbags for SQLite bags, MCAP bags, bags of ROS 1 and the bytes of messages (CDR of both byte
-orders, ROS 1), the MCAP library of Foxglove for chunks packed by lz4 and zstd, PyYAML and json for texts. A gripper is in
-the messages and not in the CSV. Times of reception differ from the stamps by design.
+One motion of two joints, sampled from closed forms, as flexarm's CSV (the truth of the tests) and
+as messages and bags written by the Python libraries of ROS: rosbags for SQLite bags, MCAP bags, ROS
+1 bags and the bytes of messages (CDR in both byte orders, ROS 1), Foxglove's MCAP library for
+chunks packed by lz4 and zstd, PyYAML and json for texts. The messages contain a gripper, the CSV
+does not. Reception times differ from the stamps by design.
 """
 import json
 import math
@@ -26,7 +27,8 @@ FOLDER = Path(__file__).resolve().parent.parent / "crates/motion/flexarm-motion-
 JOINTS = ["joint_1", "joint_2"]
 STEP_NS = 20_000_000
 COUNT = 26
-STAMP_0 = 1_700_000_000_123_456_789                                      # ns since 1970: more digits than an f64 has
+# ns since 1970: more digits than an f64 has
+STAMP_0 = 1_700_000_000_123_456_789
 CONTROLLER = """std_msgs/Header header
 string[] joint_names
 trajectory_msgs/JointTrajectoryPoint reference
@@ -38,7 +40,8 @@ ROBOT_TRAJECTORY = "trajectory_msgs/JointTrajectory joint_trajectory\n"
 
 
 def at(k):
-    """Positions, velocities, accelerations of the joints at sample k: a sine from rest to rest, and a cubic wave."""
+    """Positions, velocities, accelerations of the joints at sample k: a sine from rest to rest, and
+    a cubic wave."""
     t, total = k * STEP_NS * 1e-9, (COUNT - 1) * STEP_NS * 1e-9
     w = math.pi / total
     s, c = math.sin(w * t), math.cos(w * t)
@@ -56,7 +59,7 @@ def csv(path, derivatives):
 
 
 def trajectory(duration):
-    """A JointTrajectory as plain values; the gripper stands first and is still."""
+    """Returns a JointTrajectory as plain values; the gripper comes first and is at rest."""
     points = []
     for k in range(COUNT):
         q, v, a = at(k)
@@ -94,7 +97,8 @@ def texts():
 
 
 def states():
-    """Stamp, names, positions, velocities of the JointStates: their order changes from message to message."""
+    """Yields stamp, names, positions, velocities of the JointStates; their order varies between
+    messages."""
     for k in range(COUNT):
         q, v, _ = at(k)
         pairs = list(zip(JOINTS + ["gripper_finger_joint"], q + [0.02], v + [0.0]))
@@ -158,12 +162,12 @@ class Types:
 
 
 def received(ns, k):
-    """Time of reception: a little later than the stamp, by another amount each time."""
+    """Returns the reception time: later than the stamp by a varying amount."""
     return ns + 1_000_000 + (k * 7919) % 400_000
 
 
 def bag(name, types, topics, plugin=StoragePlugin.SQLITE3, mode=None):
-    """A folder of rosbag2."""
+    """Writes a rosbag2 folder."""
     path = FOLDER / name
     shutil.rmtree(path, ignore_errors=True)
     writer = Writer(path, version=9, storage_plugin=plugin)
@@ -178,7 +182,7 @@ def bag(name, types, topics, plugin=StoragePlugin.SQLITE3, mode=None):
 
 
 def mcap(name, types, topics, compression, little=True, ros1=False):
-    """An MCAP file of its own."""
+    """Writes an MCAP file."""
     with open(FOLDER / name, "wb") as file:
         writer = McapWriter(file, chunk_size=2048, compression=compression)
         writer.start(profile="ros1" if ros1 else "ros2", library="")
@@ -196,7 +200,7 @@ def mcap(name, types, topics, compression, little=True, ros1=False):
 
 
 def rosbag1(name, types, topics, compression=None):
-    """A bag of ROS 1; its chunks are closed at 1 KiB, so that there are several."""
+    """Writes a ROS 1 bag; its chunks are closed at 1 KiB, so that there are several."""
     path = FOLDER / name
     path.unlink(missing_ok=True)
     writer = Rosbag1Writer(path)
@@ -212,7 +216,7 @@ def rosbag1(name, types, topics, compression=None):
 
 
 def old_database(new, old):
-    """As recorders before ROS 2 Iron wrote it: without definitions of messages."""
+    """Writes the format of recorders before ROS 2 Iron: without message definitions."""
     shutil.copy(new, old)
     database = sqlite3.connect(old)
     database.execute("DROP TABLE message_definitions")

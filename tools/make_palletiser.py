@@ -1,24 +1,29 @@
 #!/usr/bin/env python3
-"""Writes robots/palletiser/palletiser.urdf: a generic four-axis palletiser with closed loops. Usage: make_palletiser.py [-o FILE]
+"""Writes robots/palletiser/palletiser.urdf: a generic four-axis palletiser with closed loops.
+Usage: make_palletiser.py [-o FILE]
 
-All dimensions and masses are assumptions of the class (see robots/palletiser/README.md). Inertias are those of the drawn boxes and cylinders with the
-mass of the link spread evenly over their volume. Without third-party packages.
+All dimensions and masses are assumptions for the class (see robots/palletiser/README.md). Inertias
+are those of the drawn boxes and cylinders with the mass of the link distributed evenly over their
+volume. Needs no third-party packages.
 """
 import argparse
 import math
 from pathlib import Path
 
-# Places in the plane of the loops, x forward, z up (m), at rest: lower arm upright, upper arm
+# Positions in the plane of the loops, x forward, z up (m), at rest: lower arm upright, upper arm
 # horizontal.
 SHOULDER = (0.30, 0.81)                 # joint_2 in the column
 LOWER, UPPER = 1.28, 1.35               # lower arm, upper arm from elbow to wrist
 HAND = (0.22, -0.25)                    # flange from the wrist
 LEVER = 0.40                            # crank, and lever behind the elbow
-LEVER_AT = math.radians(215.0)          # its direction from x to z: square to the lower arm with the elbow at 35 deg
+# its direction from x to z: perpendicular to the lower arm with the elbow at 35 deg
+LEVER_AT = math.radians(215.0)
 PLATE = 0.28                            # levers that keep the hand level
-BRACKET_AT = math.radians(159.0)        # square to the lower arm when that leans 21 deg forward
-ARM_AT = math.radians(40.0)             # square to the upper arm when that hangs 50 deg down
-# Rods lie beside the arm (m).
+# perpendicular to the lower arm when that leans 21 deg forward
+BRACKET_AT = math.radians(159.0)
+# perpendicular to the upper arm when that points 50 deg down
+ARM_AT = math.radians(40.0)
+# Rods are next to the arm (m).
 DRIVE_Y, LEVEL_Y = 0.24, -0.24
 
 
@@ -36,7 +41,8 @@ def triple(v):
 
 
 class Solid:
-    """A box or a cylinder (axis z before pitch) at a place, turned by pitch about y or by roll about x."""
+    """A box or a cylinder (axis z before pitch) at a position, rotated by pitch about y or roll
+    about x."""
 
     def __init__(self, kind, size, at, pitch=0.0, roll=0.0):
         self.kind, self.size, self.at, self.pitch, self.roll = kind, size, at, pitch, roll
@@ -47,7 +53,7 @@ class Solid:
         return math.pi * self.size[0] ** 2 * self.size[1]
 
     def moments(self, m):
-        """3x3 about its own centre, in link axes."""
+        """Returns the 3x3 inertia about its own centre, in link axes."""
         if self.kind == "box":
             x, y, z = (s * s for s in self.size)
             d = [m * (y + z) / 12, m * (x + z) / 12, m * (x + y) / 12]
@@ -70,7 +76,7 @@ class Solid:
 
 
 def bar(start, end, width, y, depth=None):
-    """A box from one point of the plane to another."""
+    """Returns a box from one point of the plane to another."""
     dx, dz = end[0] - start[0], end[1] - start[1]
     length = math.hypot(dx, dz)
     at = ((start[0] + end[0]) / 2, y, (start[1] + end[1]) / 2)
@@ -116,7 +122,7 @@ def joint(name, kind, parent, child, at, axis="0 1 0", limit=None):
 def urdf():
     lever, bracket, arm = polar(LEVER, LEVER_AT), polar(PLATE, BRACKET_AT), polar(PLATE, ARM_AT)
     o = (0.0, 0.0)
-    # Passive joints bear no torque; their limits are those of the machine.
+    # Passive joints carry no torque; their limits are those of the machine.
     passive = lambda low, high: (low, high, 0, 360)
     out = ['<?xml version="1.0"?>', "<!--", "  A generic four-axis palletiser with three closed loops; written by tools/make_palletiser.py.",
            "  The bars that close the loops end in the air here: robot.toml has the pins. Units: m, kg, kg m2, rad. See README.md.", "-->",
@@ -145,9 +151,9 @@ def urdf():
     out += link("crank", 35, [bar(o, lever, 0.14, DRIVE_Y - 0.06, 0.05), hub(o, 0.15, 0.05, DRIVE_Y - 0.06)], "rods")
     out += joint("drive_rod", "revolute", "crank", "drive_rod_bar", (lever[0], 0, lever[1]), limit=passive(-90, 20))
     out += link("drive_rod_bar", 22, [bar(o, (0, LOWER), 0.07, DRIVE_Y, 0.05)], "rods")
-    # A frame where the pin goes through, so that the rod can be a link that bends.
+    # A frame at the pin, so that the rod can be a flexible link.
     out += joint("drive_rod_end_joint", "fixed", "drive_rod_bar", "drive_rod_end", (0, 0, LOWER)) + ['  <link name="drive_rod_end"/>']
-    # What keeps the hand level.
+    # Linkage that keeps the hand level.
     out += joint("level_rod", "revolute", "column", "level_rod_bar", (s[0] + bracket[0], 0, s[1] + bracket[1]), limit=passive(-42, 85))
     out += link("level_rod_bar", 14, [bar(o, (0, LOWER), 0.05, LEVEL_Y - 0.07, 0.04)], "rods")
     out += joint("plate", "revolute", "lower_arm", "plate_body", (0, 0, LOWER), limit=passive(-85, 42))

@@ -1,11 +1,13 @@
-"""Writes robots/reference_arm and robots/reference_arm_coupled: URDF and robot.toml. Needs numpy only.
+"""Writes robots/reference_arm and robots/reference_arm_coupled: URDF and robot.toml. Needs numpy
+only.
 
     python tools/make_reference_arm.py
 
-A made-up six-axis arm with two uniform beams, for comparing simulators. The plain variant splits each beam
-at mid length, its elastic centre, so the stiffness of the elastic joint is diagonal. The coupled variant
-has the same beams off the joint line, the box turned by 25 degrees, and splits at 0.4 and 0.6: all of the
-6x6 is filled. All joint frames are parallel to the world at q = 0.
+An artificial six-axis arm with two uniform beams, for comparing simulators. The plain variant
+splits each beam at half its length, its elastic centre, so that the stiffness of the elastic joint
+is diagonal. The coupled variant has the same beams off the joint line, the box rotated by 25
+degrees, and splits at 0.4 and 0.6: the 6x6 is full. All joint frames are parallel to the world at
+q = 0.
 """
 import math
 from pathlib import Path
@@ -23,7 +25,9 @@ ALUMINIUM = dict(E=70e9, nu=0.33, rho=2700.0)
 # tube
 RO, RI, STEEL_E, STEEL_NU = 0.070, 0.064, 210e9, 0.30
 
-VARIANTS = {   # split, offset, roll of lower arm and forearm; beta of D = beta K, about 3 % on the first mode at q = 0
+# split, offset, roll of lower arm and forearm; beta of D = beta K, about 3 % on the first mode at q
+# = 0
+VARIANTS = {
     "reference_arm": dict(low=(0.5, [0, 0, 0], 0.0), up=(0.5, [0, 0, 0], 0.0), beta=0.0010536078174585805),
     "reference_arm_coupled": dict(low=(0.4, [0.03, 0.05, 0], math.radians(25.0)), up=(0.6, [0, 0.02, -0.04], 0.0),
                                   beta=0.0010220415109918086),
@@ -71,7 +75,8 @@ def tube_numbers():
 
 
 def arm(variant):
-    """(link, axis, joint origin, body, visual primitives (shape, xyz, rpy, colour)) from the base to the tool."""
+    """(link, axis, joint origin, body, visual primitives (shape, xyz, rpy, colour)) from the base
+    to the tool."""
     low, up = variant["low"], variant["up"]
     tube = tube_numbers()
     i2 = tube["rotary_y"] / tube["mass_per_length"]
@@ -123,7 +128,8 @@ def urdf(name, links):
 
 
 def box_numbers():
-    """The box as the reference data have it: Bredt's torsion, shear in the walls along the force alone."""
+    """The box as in the reference data: Bredt's torsion, shear only in the walls along the
+    force."""
     w, h, t = 0.16, 0.12, 0.01
     E, nu, rho = (ALUMINIUM[k] for k in ("E", "nu", "rho"))
     A = w * h - (w - 2 * t) * (h - 2 * t)

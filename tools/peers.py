@@ -1,17 +1,20 @@
-"""Work against precision, ours beside other programs in one run: table and picture of docs/performance.md.
+"""Work-precision comparison of flexarm with other programs, for docs/performance.md.
 
     python3 tools/peers.py                     measure and print the table
-    python3 tools/peers.py --write             and store it: docs/performance/peers.json, peers.md and work_precision.svg
-    python3 tools/peers.py --draw              write table and picture again from the stored numbers, without measuring
+    python3 tools/peers.py --write             also store it in docs/performance (json, md, svg)
+    python3 tools/peers.py --draw              write table and picture from the stored numbers
 
-The robot is robots/reference_arm (18 coordinates, 12 of them elastic) on its motion of 4 s. The error is the largest distance of the
-tool from tests/golden/reference_arm_mid.csv over the peak deflection, every 4 ms. Ours thrice: a run of an arm that is built (set-up of
-the run, steps, a sample at its start and its end: crates/faces/flexarm/examples/prepared_runs.rs), the same with 100 samples a second beside the
-rigid twin, and the whole process `flexarm compare --no-files`; the others: the call that steps, without set-up. CPU time of one thread,
-all lines in turn, the smallest of --repeat runs.
+The robot is robots/reference_arm (18 coordinates, 12 of them elastic) on its motion of 4 s. The
+error is the maximum TCP distance from tests/golden/reference_arm_mid.csv over the peak deflection,
+every 4 ms. Three measurements of flexarm: a run of a prepared arm (set-up of the run, steps, a
+sample at its start and its end: crates/faces/flexarm/examples/prepared_runs.rs), the same with 100
+samples per second and the rigid twin, and the whole process `flexarm compare --no-files`; of the
+others: the stepping call, without set-up. CPU time of one thread, all lines in turn, the minimum of
+--repeat runs.
 
-MuJoCo and Exudyn come from PyPI into an environment of the script's own (target/peers-venv); where they cannot be had the line says so,
-and ours are measured alone. Needs cargo's release build of flexarm and its example, or --flexarm PROGRAM --prepared PROGRAM.
+MuJoCo and Exudyn are installed from PyPI into a separate environment (target/peers-venv); if they
+are unavailable, the line says so and only flexarm is measured. Needs cargo's release build of
+flexarm and its example, or --flexarm PROGRAM --prepared PROGRAM.
 """
 import argparse
 import datetime
@@ -33,7 +36,7 @@ PACKAGES = ["numpy", "scipy", "pin", "mujoco", "exudyn"]
 GOLDEN = ROOT / "tests" / "golden" / "reference_arm_mid.csv"
 END_S = 4.0
 
-# Program, stepper, steps (s).
+# Program, stepper, step sizes (s).
 OURS = [
     ("generalized-alpha", [1.6e-2, 1e-2, 8e-3, 5e-3, 4e-3, 2.5e-3, 2e-3, 1e-3, 5e-4, 2.5e-4]),
     ("extrapolated-alpha", [8e-3, 4e-3, 3e-3, 2.5e-3, 2e-3]),
@@ -44,7 +47,7 @@ OURS = [
 ]
 MUJOCO = [("implicitfast", [2e-3, 1e-3, 8e-4, 5e-4, 2.5e-4, 1e-4]), ("Euler", [2e-4, 1e-4]), ("RK4", [1.25e-4, 1e-4])]
 EXUDYN = [("tree, generalised-alpha", [4e-3, 2e-3, 1e-3, 5e-4])]
-# Largest error of a line, and what is aimed at (CPU ms per simulated s).
+# Maximum error of a line, and target cost (CPU ms per simulated s).
 CLASSES = [(1e-2, 0.15), (2e-3, 0.25), (3e-4, 0.6), (1e-5, 1.5)]
 
 
@@ -74,7 +77,7 @@ def inside():
 # --------------------------------------------------------------------------------------------------------------
 # truth
 def golden():
-    """Times in ms -> place of the flexible tool; peak deflection (m)."""
+    """Returns times in ms -> flexible TCP position; peak deflection (m)."""
     places, peak = {}, 0.0
     for line in GOLDEN.read_text().splitlines():
         if line[0] in "#t":
@@ -86,13 +89,14 @@ def golden():
 
 
 def error_of(samples):
-    """Largest distance from the truth over the peak deflection, at the times that both have; nothing if a number is none."""
+    """Maximum distance from the truth over the peak deflection, at common times; None if a value is
+    not finite."""
     places, peak = golden()
     distances = [math.dist(p, places[k]) for t, p in samples for k in [round(1e3 * t)] if abs(1e3 * t - k) < 1e-3 and k in places]
-    # Steps of 8 and 10 ms meet every second or fifth of its times.
+    # Steps of 8 and 10 ms hit every second or fifth of its times.
     if len(distances) <= 90 or not all(map(math.isfinite, distances)):
         return None
-    # What is as far off as the whole deflection is no solution.
+    # An error as large as the whole deflection is no solution.
     return error if (error := max(distances) / peak) < 1.0 else None
 
 
@@ -102,7 +106,7 @@ def flexarm(program, stepper, step, files=None):
     """CPU s of the whole process, user and system."""
     command = [program, "compare", str(ROOT / "robots" / "reference_arm"), "--stepper", stepper, "-q", "--json"]
     command += ["--rtol", repr(step)] if stepper == "reference" else ["--step", repr(step)]
-    # Samples at the times of the truth, or at every step where its steps are others.
+    # Samples at the times of the truth, or at every step if its steps do not match them.
     every_4_ms = stepper == "reference" or abs(round(4e-3 / step) * step - 4e-3) < 1e-12
     rate = 100.0 if files is None else 250.0 if every_4_ms else 1 / step
     command += ["--log-rate", repr(rate)] + (["--no-files"] if files is None else ["-o", files])
@@ -115,7 +119,8 @@ def flexarm(program, stepper, step, files=None):
 
 
 def prepared(program):
-    """CPU ms per simulated second of runs of an arm that is built, without and with samples, for all our lines."""
+    """CPU ms per simulated second of runs of a prepared arm, without and with samples, for all
+    flexarm lines."""
     wanted = [f"{name}:{h!r}" for name, steps in OURS for h in steps]
     done = subprocess.run([program, *wanted], capture_output=True, text=True, check=True)
     return {name: [float(x) for x in spent] for name, *spent in map(str.split, done.stdout.splitlines())}
@@ -134,7 +139,8 @@ def our_error(program, stepper, step):
 # ------------------------------------------------------------------------------------------------------------
 # the robot
 def read_robot():
-    """Bodies of the arm in a row, from the robot file as tools/robot_file.py reads it; the motion; elastic coordinates at rest."""
+    """Returns the chain of bodies from the robot file (by tools/robot_file.py), motion, static
+    deflections."""
     sys.path.insert(0, str(ROOT / "tools"))
     import numpy as np
     from golden_reference_arm import Motion
@@ -165,8 +171,9 @@ def read_robot():
 # --------------------------------------------------------------------------------------------------------------
 # MuJoCo
 class MuJoCo:
-    """Elastic joints as three slides and three hinges with fixed tendons for the full 6x6. Motors of huge inertia carry the joints along
-    the motion, MuJoCo has no prescribed ones; their set points are such that the steps of each integrator meet the motion."""
+    """Elastic joints as three slides and three hinges with fixed tendons for the full 6x6. MuJoCo
+    has no prescribed motion: motors of huge inertia carry the joints, with set points that each
+    integrator hits."""
 
     ROTOR, PD = 1e8, 200.0
 
@@ -247,7 +254,8 @@ class MuJoCo:
 # --------------------------------------------------------------------------------------------------------------
 # Exudyn
 class Exudyn:
-    """A kinematic tree of one-DoF joints with a stiffness on its coordinates; the motion as constraints with compiled user functions."""
+    """A kinematic tree of one-DoF joints with stiffness; the motion by constraints with compiled
+    user functions."""
 
     def __init__(self, robot):
         self.robot = robot
@@ -323,7 +331,7 @@ class Exudyn:
         s.parallel.numberOfThreads = 1
         s.linearSolver.solverType = exu.LinearSolverType.EXUdense
         s.staticSolver.newton.relativeTolerance, s.staticSolver.newton.absoluteTolerance = 1e-10, 1e-12
-        s.staticSolver.loadStepDuration = 1e-9  # the static solver goes on in time
+        s.staticSolver.loadStepDuration = 1e-9  # the static solver advances time
         system.SolveStatic(s, updateInitialValues=True)
         s.timeIntegration.numberOfSteps, s.timeIntegration.endTime = round(END_S / h), END_S
         s.timeIntegration.generalizedAlpha.spectralRadius = 0.9
@@ -336,7 +344,7 @@ class Exudyn:
 
     @staticmethod
     def four(function):
-        """The argument list that the compiler of user functions asks for."""
+        """Argument list required by the compiler of user functions."""
         return lambda mbs, t, itemNumber, lOffset: function(t)
 
 
@@ -423,7 +431,7 @@ COLORS = ["#0b6e4f", "#3a7ca5", "#7a5195", "#8d99ae", "#2f4858", "#d1495b", "#ed
 
 
 def picture(found):
-    """Error against CPU time, both logarithmic, a line per stepper."""
+    """Error over CPU time, both logarithmic, a line per stepper."""
     series = {}
     for line in found["lines"]:
         if line["error"]:

@@ -1,8 +1,11 @@
-"""Processor time of whole processes, user and system as the system counts them: builds in turn, so that a busy machine is busy for all.
+"""CPU time (user and system) of whole processes.
+
+Builds run in turn, so that machine load affects all alike.
 
     python3 tools/process_times.py BEFORE target/release/flexarm -- compare reference_arm --no-files --step 0.008
 
-Prints the smallest time, the lower quartile and the median of each program in ms, and its page faults.
+Prints the minimum time, the lower quartile and the median of each program in ms, and its page
+faults.
 """
 
 import argparse
@@ -11,7 +14,7 @@ import sys
 
 
 def run(program, arguments):
-    """Milliseconds and page faults of one process; what it prints is dropped."""
+    """Returns milliseconds and page faults of one process; its output is dropped."""
     nowhere = os.open(os.devnull, os.O_RDWR)
     quiet = [(os.POSIX_SPAWN_DUP2, nowhere, stream) for stream in (1, 2)]
     pid = os.posix_spawn(program, [program, *arguments], os.environ, file_actions=quiet)

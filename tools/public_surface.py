@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
-"""The public surface of the library `flexarm`, item by item, from the pages that `cargo doc` has made.
+"""Lists the public API of the library `flexarm`, item by item, from the pages made by `cargo doc`.
 
     cargo doc --release --no-deps --workspace
     python3 tools/public_surface.py            writes docs/public-surface.txt
-    python3 tools/public_surface.py --check    status 1 if the file is not what the pages say
+    python3 tools/public_surface.py --check    status 1 if the file differs from the pages
 
-Pages differ between versions of rustdoc: with another one than the list was made with, the check is skipped and says so.
-The list is kept so that a change of the surface is seen in review: a line that goes is a break for those who build on it.
+Pages differ between versions of rustdoc: with a version other than that of the list, the check is
+skipped with a message. The list makes changes of the API visible in review: a removed line is a
+breaking change.
 """
 import html
 import os
@@ -22,14 +23,14 @@ KINDS = ["mod", "trait", "struct", "enum", "fn", "constant", "type", "macro"]
 
 
 def text(markup):
-    """Markup as one line of code."""
+    """Converts markup to one line of code."""
     plain = html.unescape(re.sub(r"<[^>]+>", "", re.sub(r'<a class="src.*?</a>', "", markup)))
     plain = re.sub(r"ⓘ", "", plain)
     return re.sub(r"\s+", " ", plain).strip()
 
 
 def own_part(page):
-    """The page without what traits bring."""
+    """Returns the page without trait implementations."""
     for mark in ('id="trait-implementations"', 'id="deref-methods', 'id="synthetic-implementations"', 'id="blanket-implementations"'):
         page = page.split(mark, 1)[0]
     return page
@@ -68,7 +69,7 @@ def surface():
 
 
 def rustdoc():
-    """Version of rustdoc without its patch: 1.95."""
+    """Returns the version of rustdoc without its patch number: 1.95."""
     said = subprocess.run(["rustdoc", "--version"], stdout=subprocess.PIPE, text=True, check=True).stdout
     return re.match(r"rustdoc (\d+\.\d+)", said).group(1)
 

@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
-"""Types of the dictionaries that the Python package returns, made of the structs that `--json` is made of. Plain Python 3.
+"""Generates the Python types of result dictionaries from the structs behind `--json`.
 
     python3 tools/python_types.py            writes crates/faces/flexarm-python/python/flexarm/types.py
-    python3 tools/python_types.py --check    says whether it is what would be written
+    python3 tools/python_types.py --check    checks that the file is up to date
 
-It reads the `#[derive(Serialize)]` structs of the library with their documentation and their serde attributes; what a struct
-writes in another way is told in WRITTEN below. The tests of the package hold answers against the types.
+It reads the `#[derive(Serialize)]` structs of the library with their documentation and serde
+attributes; structs with custom serialisation are described in WRITTEN below. The tests of the
+package check results against the types.
 """
 import keyword
 import re
@@ -16,7 +17,7 @@ ROOT = Path(__file__).resolve().parent.parent
 TARGET = ROOT / "crates/faces/flexarm-python/python/flexarm/types.py"
 CRATES = ["flexarm-run", "flexarm-linkmaker", "flexarm-settings", *(f"flexarm-{study}" for study in (
     "chatter", "compensate", "identify", "map", "new", "sensitivity", "sweep"))]
-#: Answers: struct, its file, and the name of its type in Python.
+#: Results: struct, its file, and the name of its type in Python.
 ROOTS = [
     ("Summary", "flexarm-run/src/summary.rs", "RunSummary"),
     ("Statics", "flexarm-run/src/statics.rs", "StaticsDetails"),
@@ -37,9 +38,9 @@ ROOTS = [
     ("Finding", "flexarm-run/src/check.rs", "Finding"),
     ("NewRobot", "flexarm-new/src/report.rs", "NewRobot"),
 ]
-#: Names of Python's for structs whose own say too little outside their module.
+#: Python names of structs whose Rust names are ambiguous outside their module.
 NAMES = {"Caveat": "CaveatDict", "Files": "RunFiles"}
-#: Fields that are written by hand in Rust: key, type, whether it is always there, meaning.
+#: Hand-written fields: key, type, whether it is always present, description.
 WRITTEN = {
     "RecordingFiles": [
         *((key, "str | None", True, f"Recording ({key}), if it was written.") for key in ["csv", "mcap", "rrd", "parquet"]),
@@ -54,8 +55,7 @@ WRITTEN = {
         ("method", "str", False, "Of the reference stepper."),
     ],
 }
-#: Fields that are there in all but the rarest answers: checkers would want them asked for each
-#: time.
+#: Fields present in almost all results: otherwise type checkers would require a test each time.
 THERE = {("Summary", "tcp")}
 PLAIN = {"f64": "float", "f32": "float", "bool": "bool", "String": "str", "str": "str", "PathBuf": "str", "char": "str"}
 PLAIN |= {f"{sign}{bits}": "int" for sign in "iu" for bits in ["8", "16", "32", "64", "size"]}
@@ -75,7 +75,7 @@ class Struct:
 
 
 def structs():
-    """All structs that are serialised, by name."""
+    """Returns all serialised structs, by name."""
     found = {}
     for crate in CRATES:
         for file in sorted(ROOT.glob(f"crates/*/{crate}/src/**/*.rs")):
@@ -93,7 +93,7 @@ def comment(text):
 
 
 def fields_of(body):
-    """Key, Rust type, whether it is always there, whether it is flattened, meaning."""
+    """Yields key, Rust type, whether it is always present, whether it is flattened, description."""
     pattern = r"((?:^[ \t]*///[^\n]*\n)*)((?:^[ \t]*#\[[^\n]*\n)*)^[ \t]*pub(?:\([a-z]+\))? (\w+): (.*?),\n(?=[ \t]*(?:///|#|pub|$))"
     for doc, attributes, name, kind in re.findall(pattern, body + "\n", re.M | re.S):
         if re.search(r"serde\(skip\)", attributes):
@@ -108,7 +108,8 @@ class Types:
         self.known, self.made, self.names, self.order = structs(), {}, {}, []
 
     def struct(self, name, near):
-        """The struct that a name means in a file: its own, of a module near by, or the only one."""
+        """Returns the struct that a name means in a file: its own, of a nearby module, or the only
+        one."""
         there = self.known.get(name, [])
         same = [s for s in there if s.file == near] or [s for s in there if s.file.parent == near.parent] or there
         if len(same) != 1:
@@ -116,7 +117,7 @@ class Types:
         return same[0]
 
     def python(self, rust, near):
-        """A Rust type in Python."""
+        """Converts a Rust type to Python."""
         rust = re.sub(r"^&('\w+ )?", "", rust).strip()
         rust = re.sub(r"^(?:\w+::)+(?=\w)", "", rust)
         if rust in PLAIN:
@@ -137,7 +138,7 @@ class Types:
         return self.typed(self.struct(rust, near))
 
     def typed(self, struct, name=None):
-        """Name of the type of a struct, which is made if it is not there yet."""
+        """Returns the type name of a struct; creates the type if needed."""
         key = (struct.name, struct.file)
         if key in self.names:
             return self.names[key]
@@ -172,7 +173,7 @@ class Types:
             named = [f for f in fields if not keyword.iskeyword(f[0])]
             needed, optional = [f for f in named if f[2]], [f for f in named if not f[2]]
             base = "TypedDict"
-            # A word of Python's is no name in a class.
+            # A Python keyword cannot be a field name in a class.
             for key, kind, always, _ in [f for f in fields if f not in named]:
                 out.append(f'_{name}{key.capitalize()} = TypedDict("_{name}{key.capitalize()}", {{"{key}": "{kind}"}}, total={always})\n')
                 base = f"_{name}{key.capitalize()}"

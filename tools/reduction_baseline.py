@@ -1,9 +1,12 @@
-"""What one can do today without flexarm: numpy assembly, Guyan and fixed-interface modes of a TET10 mesh. Needs gmsh, scipy, pypardiso.
+"""Baseline without flexarm: Guyan and fixed-interface modes of a TET10 mesh by numpy.
+
+Needs gmsh, scipy, pypardiso.
 
     OMP_NUM_THREADS=1 MKL_NUM_THREADS=1 python tools/reduction_baseline.py MESH [--unit 1e-3] [--modes 20]
 
-One thread, CPU seconds of each stage, peak memory, first frequencies; faces interface_A and interface_B are tied rigidly at
-the mean of their nodes, aluminium, 4-point rule. To be compared, in one run on one machine, with
+One thread, CPU seconds of each stage, peak memory, first frequencies; faces interface_A and
+interface_B are tied rigidly at the mean of their nodes, aluminium, 4-point rule. To be compared, in
+one run on one machine, with
 
     flexarm reduce MESH --units mm-t-s --material aluminium --interface A=interface_A --interface B=interface_B \
         --at A=centroid --at B=centroid --quadrature calculix --modes 20 --json

@@ -1,11 +1,12 @@
-"""Robot files read without flexarm: URDF + robot.toml to a Pinocchio model with elastic joints.
+"""Reads robot files without flexarm: URDF + robot.toml to a Pinocchio model with elastic joints.
 
-An independent reading of the format, for choosing numbers and for checking the simulator against
-another tool. Needs Python 3.11 or newer, numpy, scipy and Pinocchio (`pip install pin scipy`).
+An independent implementation of the format, for choosing numbers and for checking the simulator
+against another tool. Needs Python 3.11 or newer, numpy, scipy and Pinocchio
+(`pip install pin scipy`).
 
-Six-vectors are ordered (linear, angular). An elastic joint has e = (x, y, z, rx, ry, rz) in the axes of
-its link, R = Rz(rz) Ry(ry) Rx(rx), stiffness K_S. Letters: L link, A proximal and B distal interface,
-S split, E beam frame (x along the beam, y and z the axes of the section).
+Six-vectors are ordered (linear, angular). An elastic joint has e = (x, y, z, rx, ry, rz) in the
+axes of its link, R = Rz(rz) Ry(ry) Rx(rx), stiffness K_S. Letters: L link, A proximal and B distal
+interface, S split, E beam frame (x along the beam, y and z the axes of the section).
 """
 import math
 import tomllib
@@ -67,7 +68,8 @@ def origin(element):
 
 
 def read_urdf(path):
-    """links: name -> (mass, com, inertia about com, link axes) or None; joints: list in file order."""
+    """links: name -> (mass, com, inertia about com, link axes) or None; joints: list in file
+    order."""
     root = ET.parse(path).getroot()
     links, joints = {}, []
     for link in root.findall("link"):
@@ -92,7 +94,8 @@ def read_urdf(path):
 # ----------------------------------------------------------------------------------------------
 # beam
 def box_shear_factor(along, across, nu):
-    """Cowper 1966, thin-walled box of one wall thickness; lengths of the midline along and across the force."""
+    """Cowper 1966, thin-walled box with uniform wall; midline lengths along and across the
+    force."""
     m = n = across / along
     return (10 * (1 + nu) * (1 + 3 * m)**2
             / (12 + 72 * m + 150 * m**2 + 90 * m**3 + nu * (11 + 66 * m + 135 * m**2 + 90 * m**3)
@@ -100,7 +103,8 @@ def box_shear_factor(along, across, nu):
 
 
 def section_stiffness(beam):
-    """EA, EI_y, EI_z, GJ, kGA_y, kGA_z and the squared section radii i_y2, i_z2 (rotary inertia over mass)."""
+    """EA, EI_y, EI_z, GJ, kGA_y, kGA_z and the squared section radii i_y2, i_z2 (rotary inertia
+    over mass)."""
     kind = beam["section"]
     if kind == "given":
         s = {k: beam[k] for k in ("EA", "EI_y", "EI_z", "GJ")}
@@ -130,7 +134,8 @@ def section_stiffness(beam):
         I_z, J = I_y, 2 * I_y
         m2 = (ri / ro)**2
         q = (1 + m2)**2
-        k_y = k_z = 6 * (1 + nu) * q / ((7 + 6 * nu) * q + (20 + 12 * nu) * m2)   # Cowper 1966, hollow circle
+        # Cowper 1966, hollow circle
+        k_y = k_z = 6 * (1 + nu) * q / ((7 + 6 * nu) * q + (20 + 12 * nu) * m2)
     else:
         raise ValueError(f"section {kind!r}")
     return dict(EA=E * A, EI_y=E * I_y, EI_z=E * I_z, GJ=G * J, kGA_y=k_y * G * A, kGA_z=k_z * G * A,
@@ -149,7 +154,8 @@ def tip_compliance(s, length, timoshenko=True):
 
 
 def beam_link(beam, p_AB, body):
-    """K_S and p_AS of a flexible link, and its two parts (mass, com, inertia about com, link axes)."""
+    """K_S and p_AS of a flexible link, and its two parts (mass, com, inertia about com, link
+    axes)."""
     length = np.linalg.norm(p_AB)
     x = p_AB / length
     offset, split = np.asarray(beam.get("offset", [0, 0, 0]), float), beam.get("split", 0.5)
@@ -161,7 +167,7 @@ def beam_link(beam, p_AB, body):
     R = np.column_stack([x, y, np.cross(x, y)])
     s = section_stiffness(beam)
 
-    # rigid arms lead from the beam's end E2 = B + offset to B, and from S to B
+    # rigid arms from the beam's end E2 = B + offset to B, and from S to B
     R6 = np.kron(np.eye(2), R)
     K_E2 = R6 @ np.linalg.inv(tip_compliance(s, length, beam.get("theory", "timoshenko") == "timoshenko")) @ R6.T
     Ad_E2S = transport(p_AB + offset - split * p_AB)
@@ -282,9 +288,11 @@ class Arm:
         return M + np.triu(M, 1).T
 
     def gravity_stiffness(self, q, step=1e-5):
-        """dg/dq of all coordinates, by central differences of the gravity forces; symmetric up to rounding.
+        """dg/dq of all coordinates, by central differences of the gravity forces; symmetric up to
+        rounding.
 
-        Not pin.computeGeneralizedGravityDerivatives: that leaves out dS/dq of the ZYX joint (Pinocchio 4.1).
+        Not pin.computeGeneralizedGravityDerivatives: it omits dS/dq of the ZYX joint (Pinocchio
+        4.1).
         """
         gravity = lambda x: pin.computeGeneralizedGravity(self.model, self.data, x).copy()
         return np.column_stack([(gravity(q + d) - gravity(q - d)) / (2 * step) for d in step * np.eye(self.model.nv)])
@@ -302,7 +310,8 @@ class Arm:
         return e
 
     def modes(self, q_a, joint_stiffness=None, links=True):
-        """Undamped frequencies in Hz about rest: links elastic, joints too if their stiffness is given."""
+        """Undamped frequencies in Hz about rest: elastic links, and joints if their stiffness is
+        given."""
         e = self.statics(q_a)
         free, K = (list(self.elastic), self.K) if links else ([], np.zeros((0, 0)))
         if joint_stiffness is not None:

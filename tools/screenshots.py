@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
-"""Makes the pictures of docs/images that show recordings and reports as their viewers draw them.
+"""Takes the pictures of docs/images that show recordings and reports in their viewers.
 
     pip install rerun-sdk==0.36.3 playwright pillow     (in a virtual environment; a Chromium on PATH for the reports)
     tools/screenshots.py [--flexarm target/release/flexarm] [--only recording,mcap,...] [--out docs/images]
 
-Each picture is a command of flexarm and the file of it that is looked at. Nothing needs a display: the Rerun viewer runs
-headless (it needs a Vulkan driver; in software: Debian's mesa-vulkan-drivers and libvulkan1). What is missing is said and
-skipped; the exit status is 1 only if a picture that could be made was not.
+Each picture is a flexarm command and the output file to show. No display is needed: the Rerun
+viewer runs headless (it needs a Vulkan driver; in software: Debian's mesa-vulkan-drivers and
+libvulkan1). Missing programs are reported and skipped; the exit status is 1 only if a possible
+picture failed.
 """
 
 import argparse
@@ -21,8 +22,7 @@ import tempfile
 import time
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
-# Picture: arguments of flexarm, file in its output folder, seconds that the viewer plays before the
-# shot.
+# Picture: arguments of flexarm, file in its output folder, seconds of playback before the shot.
 RERUN = {
     "recording": (["compare"], "run.rrd", 6.5),
     "mcap": (["compare"], "run.mcap", 6.5),
@@ -45,13 +45,13 @@ def free_port():
 
 
 def viewer_picture(file, out, seconds):
-    """What the Rerun viewer shows `seconds` after it was opened."""
+    """Takes a picture of the Rerun viewer `seconds` after it was opened."""
     from rerun.experimental import ViewerClient
 
     port = free_port()
     viewer = shutil.which("rerun", path=f"{pathlib.Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}")
     command = [viewer, "--headless", "--bind", "127.0.0.1", "--port", str(port), "--window-size", "1600x1000", str(file)]
-    # A process group of its own: the wrapper of the Python package does not pass signals on.
+    # A separate process group: the wrapper of the Python package does not forward signals.
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
     try:
         client, deadline = None, time.monotonic() + 60
@@ -64,7 +64,7 @@ def viewer_picture(file, out, seconds):
                 time.sleep(0.3)
         time.sleep(seconds)
         client.save_screenshot(str(out))
-        # The viewer writes when it has drawn.
+        # The viewer writes the file after drawing.
         size, deadline = -1, time.monotonic() + 30
         while time.monotonic() < deadline:
             time.sleep(0.5)
@@ -78,12 +78,12 @@ def viewer_picture(file, out, seconds):
 
 
 def smaller(picture):
-    """256 colours are enough for a screen and a quarter of the size."""
+    """Reduces to 256 colours, which suffice for a screen, at a quarter of the size."""
     try:
         from PIL import Image
     except ImportError:
         return
-    # Few pixels have the colours of curves: a median cut would merge them.
+    # Curves have few pixels: a median cut would merge their colours.
     image = Image.open(picture).convert("RGB")
     image.quantize(256, method=Image.Quantize.MAXCOVERAGE, kmeans=2, dither=Image.Dither.NONE).save(picture, optimize=True)
 

@@ -1,10 +1,11 @@
-"""What the chosen beam sections of robots/kr210 give, next to published joint stiffness. Needs Pinocchio.
+"""Compares the beam sections of robots/kr210 with published joint stiffness. Needs Pinocchio.
 
     python tools/tune_sections.py            the shipped sections: cut parts, frequencies, compliance, sag
     python tools/tune_sections.py --scan     neighbouring wall thicknesses too
 
-"links": the two flexible links, joints held. "joints": rigid links on the published joint stiffness of a
-KR 210 (identified by modal analysis; see robots/kr210/README.md). "both": the two in series.
+"links": the two flexible links, joints held. "joints": rigid links with the published joint
+stiffness of a KR 210 (identified by modal analysis; see robots/kr210/README.md). "both": the two in
+series.
 """
 import argparse
 from pathlib import Path

@@ -1,8 +1,10 @@
 #!/usr/bin/env python3
-"""What ROS's xacro makes of the files in crates/robot/flexarm-urdf/tests/data/xacro, written beside them as NAME.expected.xml.
+"""Writes the output of ROS's xacro for the test files of flexarm-urdf, as NAME.expected.xml.
+
+The files are in crates/robot/flexarm-urdf/tests/data/xacro; results are written next to them.
 
 Needs xacro from PyPI (2.1.1 was used, with PyYAML 6.0.3): python3 tools/xacro_expectations.py
-The package test_parts, which one file asks for, is that folder itself; its path is written as PACKAGE.
+The package test_parts, required by one file, is that folder itself; its path is written as PACKAGE.
 """
 import sys
 import types

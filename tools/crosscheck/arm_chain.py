@@ -1,8 +1,9 @@
-"""One reading of a robot file with links from .flex files, as a chain of bodies that any program can be given.
+"""Reads a robot file with links from .flex files as a chain of bodies, as input for any program.
 
-A body's frame sits at its joint. `X` is that frame in the frame of the body before it, everything held at zero. A joint turns
-about one axis, or is elastic: e = (x, y, z, rx, ry, rz) in the axes of the link, R = Rz(rz) Ry(ry) Rx(rx), force -(K e + beta K e').
-The motion of the joints is a list of quintics, for the same reason.
+The frame of a body is at its joint. `X` is that frame in the frame of the preceding body, with all
+coordinates zero. A joint rotates about one axis, or is elastic: e = (x, y, z, rx, ry, rz) in the
+axes of the link, R = Rz(rz) Ry(ry) Rx(rx), force -(K e + beta K e'). The motion of the joints is a
+list of quintics, also independent of the program.
 """
 import math
 import sys
@@ -26,7 +27,7 @@ def tensor(xx, yy, zz, xy, xz, yz):
 
 
 def moved(X, body):
-    """Mass, centre and inertia of a body given in a frame that sits at X."""
+    """Returns mass, centre and inertia of a body given in a frame at X."""
     mass, com, inertia = body
     return mass, X.act(np.asarray(com, float)), X.rotation @ inertia @ X.rotation.T
 
@@ -36,7 +37,8 @@ def read_flex(path):
     file = tomllib.loads(path.read_text())
     assert (file["format"], file["version"]) == ("flexarm-reduced-link", 1) and len(file["part"]) == 2
     length, force, mass = (TO_SI[file["units"][k]] for k in ("length", "force", "mass"))
-    for frame in (file["interface"]["A"], file["split"]):                                # both in link axes, A the origin
+    # both in link axes, A the origin
+    for frame in (file["interface"]["A"], file["split"]):
         assert np.abs(frame.get("rpy", [0.0])).max() == 0 and np.abs(np.array(frame.get("rotation", np.eye(3))) - np.eye(3)).max() == 0
     assert np.abs(file["interface"]["A"]["xyz"]).max() == 0
     s = file["stiffness"]
@@ -64,7 +66,7 @@ class Body:
 
 
 class Chain:
-    """bodies from base to tool, the TCP in the last one's frame."""
+    """Bodies from base to tool, with the TCP in the frame of the last one."""
 
     def __init__(self, path):
         folder, file = path.parent, tomllib.loads(path.read_text())
@@ -75,7 +77,7 @@ class Chain:
         tcp, load = file["tcp"], file["payload"]
 
         def visit(link, X, number):
-            """X: the link's frame in that of the body of that number."""
+            """X: the link's frame in that of the body with this index."""
             assert number == len(self.bodies) - 1                            # a chain, not a tree
             own = [links[link]] if links[link] else []
             if load["link"] == link:
@@ -90,7 +92,8 @@ class Chain:
                 S = pin.SE3(np.eye(3), p_S)
                 self.bodies.append(Body(link, X * S, None, K_S))
                 X, own, number = S.inverse(), [parts[1]], number + 1
-            if self.bodies:                                                  # what stands on the floor does not move
+            # bodies on the floor do not move
+            if self.bodies:
                 self.bodies[-1].inertias += [moved(X, b) for b in own]
             if tcp["link"] == link:
                 self.tcp = X.act(np.array(tcp["xyz"], float))
@@ -108,7 +111,8 @@ class Chain:
 
 
 class Motion:
-    """A waypoint file of quintic moves as pieces: joint = sum over k of coefficient[k] (t - knot)^k."""
+    """A waypoint file of quintic moves as pieces: joint = sum over k of coefficient[k] (t -
+    knot)^k."""
 
     def __init__(self, path, speed_limits):
         file = tomllib.loads(path.read_text())
@@ -130,9 +134,10 @@ class Motion:
 
     @staticmethod
     def move(points, duration, weights):
-        """Curve of least squared jerk through the points; passing times by the way of the fastest joint.
+        """Curve of minimum squared jerk through the points; passing times by the travel of the
+        fastest joint.
 
-        Pairs of the time of a point and the Taylor coefficients from there on."""
+        Returns pairs of the time of a point and the Taylor coefficients from there on."""
         quintic = lambda u: u**3 * (10 - 15 * u + 6 * u * u)
         if len(points) == 2:
             way, zero = points[1] - points[0], 0 * points[0]
@@ -151,7 +156,7 @@ class Motion:
                 2 * c[2] + s * (6 * c[3] + s * (12 * c[4] + s * 20 * c[5])))
 
     def many(self, times):
-        """Values, speeds, accelerations and jerks at many times: arrays of rows."""
+        """Values, velocities, accelerations and jerks at many times: arrays of rows."""
         k = np.clip(np.searchsorted(self.knots, times, side="right") - 1, 0, len(self.knots) - 1)
         c, s = self.pieces[k], (np.asarray(times) - self.knots[k])[:, None]
         out = []

@@ -1,26 +1,34 @@
-"""Modal links against Exudyn: the reference arm with both flexible links as floating-frame bodies, same meshes, same motion.
+"""Compares modal links with floating-frame bodies of Exudyn on the reference arm.
 
     cargo build --release -p flexarm-cli --no-default-features --features mcap
     python tools/crosscheck/exudyn_ffrf.py                       # pip install exudyn ngsolve numpy scipy pin
     python tools/crosscheck/exudyn_ffrf.py --curved --size-mm 25 --program target/release/flexarm --keep out/exudyn
 
-Each link is meshed once as the hollow section it stands for (netgen, ten-node tetrahedra) at the density that gives its mass.
-flexarm gets the mesh as a file: `reduce`, then `model = "modal"`. Exudyn gets it through NGSolve, which assembles its own K and
-M, makes its own Hurty-Craig-Bampton modes (rigid ends, RBE2), and runs its own ObjectFFRFreducedOrder with GenericJoint in
-redundant coordinates by generalised-alpha with index 3 constraints. Common are only the nodes, the elements and the numbers.
+Both flexible links have the same meshes and the same motion in both programs. Each link is meshed
+once as its hollow section (netgen, ten-node tetrahedra) with the density that gives its mass.
+flexarm gets the mesh as a file: `reduce`, then `model = "modal"`. Exudyn gets it through NGSolve,
+which assembles its own K and M, computes its own Hurty-Craig-Bampton modes (rigid ends, RBE2), and
+runs its own ObjectFFRFreducedOrder with GenericJoint in redundant coordinates by generalised-alpha
+with index 3 constraints. Only the nodes, the elements and the parameters are shared.
 
-Printed: frequencies of each reduced link held at A; of the arm at home; sag; difference of the TCP over 4 s, over the peak
-deflection; CPU time per simulated second, one thread each. Converged curves are compared: Exudyn at its two smallest steps,
-extrapolated to none (its error falls with the square of the step), and flexarm by its stepper with error control.
-Curved elements also differ by the integration: NGSolve takes the rule that `reduce --quadrature calculix` takes, flexarm else an exact one.
+Prints frequencies of each reduced link held at A, and of the arm at home; sag; TCP difference over
+4 s, relative to the peak deflection; CPU time per simulated second, one thread each. Converged
+curves are compared: Exudyn at its two smallest steps, extrapolated to zero (its error is
+proportional to the square of the step), and flexarm with its stepper with error control. Curved
+elements also differ in the integration: NGSolve uses the rule of `reduce --quadrature calculix`,
+flexarm otherwise an exact one.
 
-Two properties of Exudyn's MarkerSuperElementRigid (1.13.6) show, both found by statics of one link:
-- Its `offset` shifts the point but not the moment of the force. The mean of an unstructured set of nodes misses the joint by
-  0.2 to 0.6 mm here, and the sag by 0.06 %. Weights whose centre is the joint need no offset: sag to 4e-8.
-- A moment m on the marker enters the coordinates as J m instead of J^T m, J the left Jacobian of the exponential map at the
-  rotation vector of the interface. The difference is theta x m: nothing for bending in one plane, of second order in space.
-  Statics are then not where the energy is least (flexarm's are, to all digits), 4e-4 of the deflection under its own weight
-  sideways. What is left between the curves is of that kind: `--stiffer 10` brings it from 5.6e-4 of the peak to 3.3e-5.
+Two properties of Exudyn's MarkerSuperElementRigid (1.13.6) are visible, both found by statics of
+one link:
+- Its `offset` shifts the point but not the moment of the force. The mean of an unstructured set of
+  nodes misses the joint by 0.2 to 0.6 mm here, and the sag by 0.06 %. Weights whose centre is the
+  joint need no offset: sag to 4e-8.
+- A moment m on the marker enters the coordinates as J m instead of J^T m, with J the left Jacobian
+  of the exponential map at the rotation vector of the interface. The difference is theta x m: zero
+  for bending in one plane, of second order in space. The static solution is then not at the minimum
+  of the energy (that of flexarm is, to all digits): 4e-4 of the deflection under lateral gravity.
+  The remaining difference between the curves is of that kind: `--stiffer 10` reduces it from 5.6e-4
+  of the peak to 3.3e-5.
 """
 import argparse
 import json
@@ -64,7 +72,7 @@ LINKS = {
     "link_2": dict(distal="joint_3", B=np.array([0.0, 0.0, 1.095]), E=70e9, nu=0.33),
     "link_4": dict(distal="joint_5", B=np.array([1.0, 0.0, 0.0]), E=210e9, nu=0.30),
 }
-# Nodes of a netgen tetrahedron (turned the other way round) in the order of Abaqus
+# Nodes of a netgen tetrahedron (with opposite orientation) in the order of Abaqus
 ABAQUS_ORDER = [1, 0, 2, 3, 4, 5, 7, 8, 6, 9]
 
 
@@ -84,7 +92,8 @@ def solid(name):
 
 
 def straight(mesh):
-    """The same without its geometry, so that mid-edge nodes are the means of their corners."""
+    """Returns the mesh without its geometry, so that mid-edge nodes are the means of their
+    corners."""
     flat = meshing.Mesh(dim=3)
     for point in mesh.Points():
         flat.Add(meshing.MeshPoint(csg.Pnt(*point.p)))
@@ -114,7 +123,7 @@ def write_inp(path, x, elements):
 # ----------------------------------------------------------------------------------------------
 # Exudyn
 class ExudynLink:
-    """A link's mesh in Exudyn, with K, M and modes of its own."""
+    """A link's mesh in Exudyn, with its own K, M and modes."""
 
     def __init__(self, name, mass, size, curved, modes):
         self.link = LINKS[name]
@@ -141,7 +150,7 @@ class ExudynLink:
         self.cpu = dict(mesh=meshed - start, assembly_and_modes=reduced - meshed, integrals=time.process_time() - reduced)
 
     def frequencies(self):
-        """Held at A: the frame of this body."""
+        """Frequencies with A, the frame of this body, held."""
         omega2 = sl.eigh(self.cms.stiffnessMatrixReduced, self.cms.massMatrixReduced, eigvals_only=True)
         return np.sqrt(omega2) / (2 * math.pi)
 
@@ -156,7 +165,7 @@ KEEP = []                                # Exudyn does not keep user functions a
 
 
 def drive(mbs, joint, axis, number, motion):
-    """The joint's angle along the motion, compiled: quintic moves from rest to rest."""
+    """Adds the joint angle along the motion, compiled: quintic moves from rest to rest."""
     sym = exu.symbolic
     moves = [(start, T, float(way[number])) for start, T, way in motion.moves]
     first = float(motion.start[number])
@@ -193,7 +202,8 @@ def drive(mbs, joint, axis, number, motion):
 
 
 def centred(x, p):
-    """Weights of the nodes x, nearly equal, whose centre is p: then the marker needs no offset, see above."""
+    """Weights of the nodes x, nearly equal, with centre p, so that the marker needs no offset (see
+    above)."""
     A, equal = np.vstack([np.ones(len(x)), 10 * (x - p).T]), np.full(len(x), 1 / len(x))
     w = equal + np.linalg.lstsq(A, np.array([1.0, 0.0, 0.0, 0.0]) - A @ equal, rcond=1e-10)[0]
     assert w.min() > 0
@@ -205,11 +215,13 @@ def equal(x, p):
 
 
 def exudyn_arm(links, motion, weights=centred, gravity=GRAVITY):
-    """The arm at q = 0: all frames parallel to the world. Returns the system and the sensor of the TCP."""
+    """The arm at q = 0: all frames parallel to the world. Returns the system and the sensor of the
+    TCP."""
     inertials, joints = read_urdf(ROBOT / "reference_arm.urdf")
     mbs = exu.SystemContainer().AddSystem()
     base = mbs.CreateGround()
-    tip = lambda r: mbs.AddMarker(item.MarkerBodyRigid(bodyNumber=base, localPosition=r))       # marker at r of the last link
+    # marker at r of the last link
+    tip = lambda r: mbs.AddMarker(item.MarkerBodyRigid(bodyNumber=base, localPosition=r))
     here, number = np.zeros(3), 0
     for j in joints:
         assert j["type"] == "revolute" and np.abs(j["X"].rotation - np.eye(3)).max() == 0
@@ -246,7 +258,7 @@ def exudyn_arm(links, motion, weights=centred, gravity=GRAVITY):
 
 
 def at_rest(links, motion, weights=centred, gravity=GRAVITY):
-    """The arm in static equilibrium at q = 0: system, sensor, settings."""
+    """Returns the arm in static equilibrium at q = 0: system, sensor, settings."""
     mbs, sensor = exudyn_arm(links, motion, weights, gravity)
     s = exu.SimulationSettings()
     s.solution.file.write = False
@@ -254,13 +266,14 @@ def at_rest(links, motion, weights=centred, gravity=GRAVITY):
     s.linearSolver.solverType = exu.LinearSolverType.EXUdense
     s.staticSolver.newton.relativeTolerance = 1e-10
     s.staticSolver.newton.absoluteTolerance = 1e-12
-    s.staticSolver.loadStepDuration = 1e-9                       # statics run in a pseudo time, and the joints move with time
+    # statics use a pseudo time, and the joints move with time
+    s.staticSolver.loadStepDuration = 1e-9
     mbs.SolveStatic(s, updateInitialValues=True)
     return mbs, sensor, s
 
 
 def run_exudyn(links, motion, step, weights=centred, every=EVERY_S, rho=0.9):
-    """Times and positions of the TCP, CPU seconds of the integration per simulated second."""
+    """Returns TCP times and positions, and CPU seconds of the integration per simulated second."""
     mbs, sensor, s = at_rest(links, motion, weights)
     s.solution.sensors.writePeriod = every
     s.timeIntegration.numberOfSteps = round(motion.t_end / step)
@@ -275,7 +288,8 @@ def run_exudyn(links, motion, step, weights=centred, every=EVERY_S, rho=0.9):
 
 
 def exudyn_modes(links, motion):
-    """Frequencies at home without weight (Hz): what constraint forces add to the stiffness is not in Exudyn's eigenvalues."""
+    """Frequencies at home without gravity (Hz): Exudyn's eigenvalues omit the stiffness of
+    constraint forces."""
     mbs, _, s = at_rest(links, motion, gravity=[0.0, 0.0, 0.0])
     values = ComputeODE2Eigenvalues(mbs, s, useSparseSolver=False, computeComplexEigenvalues=False, ignoreAlgebraicEquations=False)[0]
     return np.sqrt(np.abs(np.sort(values))) / (2 * math.pi)
@@ -328,7 +342,7 @@ damping = {{ stiffness_beta = {BETA!r} }}
         return self.folder / file
 
     def frequencies(self, name):
-        """Of the stored modal link held at A."""
+        """Frequencies of the stored modal link held at A."""
         text = (self.folder / f"{name}.flex").read_text().split("[modal]")[1]
         matrix = {}
         for key in "KM":

@@ -1,9 +1,12 @@
-"""What the finite element cross-checks share: meshes, CalculiX, NGSolve, an own assembly, ties, solving, JSON.
+"""Shared code of the finite element cross-checks.
 
-CalculiX prints few digits. `*FREQUENCY, STORAGE=YES` keeps its stiffness and mass in `job.eig`, in binary double
-precision but without their pattern; `SOLVER=MATRIXSTORAGE` prints the pattern (and 14 digits, here the check that the two
-were put together rightly). Ties, loads and condensation then follow in double precision, and what CalculiX prints when it
-solves the same case by itself, with its own ties, is compared to its seven digits.
+Meshes, CalculiX, NGSolve, an own assembly, ties, solving, JSON.
+
+CalculiX prints few digits. `*FREQUENCY, STORAGE=YES` keeps its stiffness and mass in `job.eig`, in
+binary double precision but without their pattern; `SOLVER=MATRIXSTORAGE` prints the pattern (and 14
+digits, used here to check that the two were combined correctly). Ties, loads and condensation
+follow in double precision; the output of CalculiX for the same case, with its own ties, is compared
+to its seven digits.
 """
 import gzip
 import hashlib
@@ -34,7 +37,8 @@ GRAVITY = 9.81
 
 DIGITS_NOTE = "digits: relative, from comparison with an own assembly in extended precision; it is rounding of the program's K in double precision"
 
-Mesh = namedtuple("Mesh", "path x kind cells groups")     # kind: "HEX20" or "TET10", nodes in the order of gmsh; m
+# kind: "HEX20" or "TET10", nodes in the order of gmsh; m
+Mesh = namedtuple("Mesh", "path x kind cells groups")
 HEX_CORNERS = np.array([(-1, -1, -1), (1, -1, -1), (1, 1, -1), (-1, 1, -1), (-1, -1, 1), (1, -1, 1), (1, 1, 1), (-1, 1, 1)])
 EDGES = {"HEX20": ((0, 1), (0, 3), (0, 4), (1, 2), (1, 5), (2, 3), (2, 6), (3, 7), (4, 5), (4, 7), (5, 6), (6, 7)),
          "TET10": ((0, 1), (1, 2), (2, 0), (3, 0), (3, 2), (3, 1))}
@@ -71,7 +75,8 @@ def read_mesh(path, unit=1.0):
         else:
             groups[gmsh.model.getPhysicalName(dim, group)] = np.unique(nodes)
     gmsh.finalize()
-    return Mesh(path, x.reshape(-1, 3)[order] / round(1 / unit), kind, cells, groups)       # 29.5 / 1000 is 0.0295
+    # 29.5 / 1000 is 0.0295
+    return Mesh(path, x.reshape(-1, 3)[order] / round(1 / unit), kind, cells, groups)
 
 
 def dofs(nodes):
@@ -93,13 +98,13 @@ def numbered(name, numbers):
 
 
 def short(v):
-    """CalculiX reads numbers of up to 20 characters."""
+    """Formats a number for CalculiX, which reads up to 20 characters."""
     text = repr(float(v))
     return text if len(text) <= 20 else f"{v:.13e}"
 
 
 def deck(mesh, first_node=0, first_cell=0, label=""):
-    """Nodes, elements, sets and material; nodes are numbered from 1 (plus `first_node`)."""
+    """Returns nodes, elements, sets and material; nodes are numbered from 1 (plus `first_node`)."""
     out = ["*NODE"]
     out += [f"{first_node + k + 1}, " + ", ".join(short(v) for v in p) for k, p in enumerate(mesh.x.tolist())]
     out.append(f"*ELEMENT, TYPE={'C3D20' if mesh.kind == 'HEX20' else 'C3D10'}, ELSET=BODY{label}")
@@ -116,7 +121,7 @@ def deck(mesh, first_node=0, first_cell=0, label=""):
 
 
 def rigid_ties(mesh, places):
-    """Both ends tied rigidly; reference nodes n+1 (A), n+2 (its rotation), n+3 (B), n+4."""
+    """Ties both ends rigidly; reference nodes n+1 (A), n+2 (its rotation), n+3 (B), n+4."""
     n = len(mesh.x)
     out = ["*NODE"]
     for k, place in enumerate(places):
@@ -127,7 +132,7 @@ def rigid_ties(mesh, places):
 
 
 def run_ccx(lines):
-    """Runs a deck in a folder of its own; its files by their extension."""
+    """Runs a deck in a separate folder; returns its files by extension."""
     folder = Path(tempfile.mkdtemp(prefix="ccx_"))
     try:
         (folder / "job.inp").write_text("\n".join(lines) + "\n")
@@ -139,7 +144,7 @@ def run_ccx(lines):
 
 
 def ccx_matrices(mesh):
-    """CalculiX's own K and M of the mesh, free and untied, in double precision."""
+    """Returns CalculiX's own K and M of the mesh, free and untied, in double precision."""
     base = deck(mesh) + ["*STEP"]
     text = run_ccx(base + ["*FREQUENCY, SOLVER=MATRIXSTORAGE", "1", "*END STEP"])
     kept = run_ccx(base + ["*FREQUENCY, STORAGE=YES", "8", "*END STEP"])[".eig"]
@@ -149,11 +154,13 @@ def ccx_matrices(mesh):
     assert n == 3 * len(mesh.x)
     found = {}
     nev = int(np.frombuffer(kept, np.int32, 4)[3])
-    values = np.frombuffer(kept[16:], np.float64, (len(kept) - 16) // 8)[nev:]          # after four integers and the eigenvalues
+    # after four integers and the eigenvalues
+    values = np.frombuffer(kept[16:], np.float64, (len(kept) - 16) // 8)[nev:]
     for name in (".sti", ".mas"):
         table = np.array(text[name].split(), dtype=object).reshape(-1, 3)
         i, j, printed = table[:, 0].astype(np.int64) - 1, table[:, 1].astype(np.int64) - 1, table[:, 2].astype(float)
-        order = np.lexsort((j, i))                             # printed by columns, kept by rows of the upper triangle
+        # printed by columns, stored by rows of the upper triangle
+        order = np.lexsort((j, i))
         i, j, printed = i[order], j[order], printed[order]
         off = i != j
         diagonal, above = values[:n], values[n:n + off.sum()]
@@ -168,7 +175,8 @@ def ccx_matrices(mesh):
 
 
 def ccx_numbers(dat, title):
-    """Tables of a .dat file under a title: one array of rows (node, values) for each time that it is there."""
+    """Returns the tables of a .dat file under a title: one array of rows (node, values) per
+    occurrence."""
     tables, rows = [], None
     for line in dat.decode().splitlines():
         if line.strip().startswith(title):
@@ -184,7 +192,8 @@ def ccx_numbers(dat, title):
 # ------------------------------------------------------------------------------- own assembly,
 # NGSolve
 def hex20(p):
-    """Shape functions and derivatives at reference points (gmsh's order): (points, 20), (points, 20, 3)."""
+    """Shape functions and derivatives at reference points (gmsh's order): (points, 20), (points,
+    20, 3)."""
     N, D = np.zeros((len(p), 20)), np.zeros((len(p), 20, 3))
     edges = [(HEX_CORNERS[i] + HEX_CORNERS[j]) // 2 for i, j in EDGES["HEX20"]]
     for k, c in enumerate([*HEX_CORNERS, *edges]):
@@ -223,7 +232,8 @@ def brick_rule(n):
 
 
 def tet_rule(n):
-    """Gauss points of a brick collapsed to the tetrahedron: exact to order 2 n - 3. n = 0: the 4 points of C3D10."""
+    """Gauss points of a brick collapsed to a tetrahedron: exact to order 2 n - 3. n = 0: the 4
+    points of C3D10."""
     if n == 0:
         return (5 - 5**0.5) / 20 + np.vstack([np.zeros(3), np.eye(3)]) * 5**0.5 / 5, np.full(4, 1 / 24)
     p, w = brick_rule(n)
@@ -232,17 +242,17 @@ def tet_rule(n):
 
 
 def inverse(J):
-    """Determinants and inverses of 3 x 3, in any precision."""
+    """Determinants and inverses of 3 x 3 matrices, in any precision."""
     r = np.stack([np.cross(J[..., 1, :], J[..., 2, :]), np.cross(J[..., 2, :], J[..., 0, :]), np.cross(J[..., 0, :], J[..., 1, :])], -1)
     det = (J[..., 0, :] * r[..., 0]).sum(-1)
     return det, r / det[..., None, None]
 
 
 def assemble(mesh, points, real=np.float64, chunk=400):
-    """K and M by an own assembly. `points`: per direction; 0 for the 4 points of C3D10.
+    """Computes K and M by an own assembly. `points`: per direction; 0 for the 4 points of C3D10.
 
-    With real=np.longdouble a slender link keeps its digits: rounding of K in double precision, 1e-16 of its entries, works
-    against rigid motions and turns up as 1e-9 to 1e-7 of the compliance.
+    real=np.longdouble keeps slender links accurate: rounding of K in double precision, 1e-16 of its
+    entries, acts against rigid motions and gives errors of 1e-9 to 1e-7 in the compliance.
     """
     lam, mu = E * NU / ((1 + NU) * (1 - 2 * NU)), E / (2 * (1 + NU))
     p, w = (brick_rule if mesh.kind == "HEX20" else tet_rule)(points)
@@ -268,11 +278,12 @@ def assemble(mesh, points, real=np.float64, chunk=400):
 
 
 def ngsolve_matrices(mesh, bonus=4):
-    """K and M of NGSolve, turned from its hierarchical functions to displacements of the mesh's nodes.
+    """Computes K and M with NGSolve, transformed from its hierarchical functions to nodal
+    displacements.
 
-    Its functions of second order on a brick are those of HEX20 and bubbles on faces and inside: those are left out. Nodes
-    beside the middle of a straight edge enter as a deformation in the same functions. `bonus`: orders of integration beyond
-    what NGSolve takes by itself.
+    Its functions of second order on a brick are those of HEX20 and bubbles on faces and inside: the
+    bubbles are left out. Nodes off the middle of a straight edge enter as a deformation in the same
+    functions. `bonus`: orders of integration beyond NGSolve's default.
     """
     import ngsolve
     from netgen import meshing
@@ -295,9 +306,11 @@ def ngsolve_matrices(mesh, bonus=4):
     space = ngsolve.VectorH1(ng, order=2)
     one = ngsolve.H1(ng, order=2)
     keys = {tuple(sorted((c[i], c[j]))): c[corners + k] for c in mesh.cells.tolist() for k, (i, j) in enumerate(EDGES[mesh.kind])}
-    n, at = one.ndof, np.full(len(mesh.x), -1)                    # `at`: NGSolve's function for each node
+    # `at`: NGSolve's function of each node
+    n, at = one.ndof, np.full(len(mesh.x), -1)
     at[vertices] = np.arange(len(vertices))
-    height = np.zeros(len(mesh.x))                                # of the edge's function in the middle of the edge
+    # of the function of the edge, in the middle of the edge
+    height = np.zeros(len(mesh.x))
     ends = np.zeros((len(mesh.x), 2), int)
     points = {v.nr: np.array(v.point) for v in ng.vertices}
     for edge in ng.edges:
@@ -306,7 +319,7 @@ def ngsolve_matrices(mesh, bonus=4):
         dof, = one.GetDofNrs(ngsolve.NodeId(ngsolve.EDGE, edge.nr))
         at[node], ends[node] = dof, (vertices[a], vertices[b])
         assert np.allclose(points[a], mesh.x[vertices[a]], atol=1e-15)
-    # the height is the same on all edges up to the sign: measured on each element
+    # the height is the same on all edges except for the sign: measured on each element
     for element in ng.Elements(ngsolve.VOL):
         fel = one.GetFE(element)
         nrs = list(one.GetDofNrs(element))
@@ -336,7 +349,7 @@ def ngsolve_matrices(mesh, bonus=4):
     dx = ngsolve.dx(bonus_intorder=bonus)
     work = lam * ngsolve.Trace(strain(u)) * ngsolve.Trace(strain(v)) + 2 * mu * ngsolve.InnerProduct(strain(u), strain(v))
     out = []
-    # From nodal values to coefficients: an edge's is (middle - mean of its ends) / height
+    # From nodal values to coefficients: for an edge (middle - mean of its ends) / height
     rows, columns, values = [at[vertices]], [vertices], [np.ones(len(vertices))]
     for column, value in ((mids, 1.0), (ends[mids, 0], -0.5), (ends[mids, 1], -0.5)):
         rows.append(at[mids])
@@ -375,7 +388,8 @@ def rigid(x, nodes, place):
 
 
 def mean(x, nodes, place):
-    """RBE3 with equal weights: the motion (6) of a frame from the displacements of the nodes (3 n)."""
+    """RBE3 with equal weights: the motion (6) of a frame from the displacements of the nodes (3
+    n)."""
     R = rigid(x, nodes, place)
     # Equal weights: least squares of the rigid motion, which is the mean displacement and the
     # least-squares rotation
@@ -383,7 +397,8 @@ def mean(x, nodes, place):
 
 
 def tie_matrix(n_nodes, n_columns, pieces, held=()):
-    """T with u = T q: free nodes one to one, then the six columns of each frame. pieces: (nodes, matrix (3 n x 6), frame number)."""
+    """T with u = T q: free nodes one to one, then the six columns of each frame. pieces: (nodes,
+    matrix (3 n x 6), frame number)."""
     tied = np.zeros(n_nodes, bool)
     for nodes in [p[0] for p in pieces] + list(held):
         tied[nodes] = True
@@ -399,7 +414,8 @@ def tie_matrix(n_nodes, n_columns, pieces, held=()):
 
 
 class Solver:
-    """Factor of a symmetric positive matrix; solutions are refined with residuals in extended precision."""
+    """Factorisation of a symmetric positive matrix; solutions are refined with extended-precision
+    residuals."""
 
     def __init__(self, K):
         self.long = sp.csr_matrix(K).astype(np.longdouble)
@@ -433,13 +449,14 @@ class Solver:
 # ----------------------------------------------------------------------------------------------
 # comparing
 def apart(a, b):
-    """Largest difference of two symmetric 6 x 6, entries over sqrt(d_i d_j)."""
+    """Maximum difference of two symmetric 6 x 6 matrices, entries over sqrt(d_i d_j)."""
     d = np.sqrt(np.abs(np.diag(b)))
     return float(np.abs((np.asarray(a) - b) / np.outer(d, d)).max())
 
 
 def relative(a, b):
-    """Largest difference over the largest entry of b, separately for displacements and rotations of motions (..., 6)."""
+    """Maximum difference over the maximum entry of b, separately for displacements and rotations
+    (..., 6)."""
     a, b = np.asarray(a, float), np.asarray(b, float)
     if b.shape[-1] == 6:
         return max(relative(a[..., :3], b[..., :3]), relative(a[..., 3:], b[..., 3:]))
@@ -447,17 +464,19 @@ def relative(a, b):
 
 
 class LinkFile:
-    """What a .flex file says of the same things."""
+    """The same quantities from a .flex file."""
 
     def __init__(self, path):
         flex = tomllib.loads(Path(path).read_text())
         self.C_BB = np.linalg.inv(np.array(flex["stiffness"]["matrix"]))
-        self.K, self.M = (np.array(flex["superelement"][k]) for k in ("stiffness", "mass"))      # A, B, modes
+        # A, B, modes
+        self.K, self.M = (np.array(flex["superelement"][k]) for k in ("stiffness", "mass"))
         self.frequencies_hz = np.array([m["mesh_hz"] for m in flex["gate"]["modes"]])
         self.fixed_hz = np.array(flex["gate"]["fixed_frequencies_hz"])
 
     def weight(self, acceleration):
-        """Load on A and B: shapes that move as a whole are among those of the link, so that this is exact."""
+        """Load on A and B: rigid-body accelerations are among the shapes of the link, so this is
+        exact."""
         return self.M[:12, :12] @ np.tile([*acceleration, 0, 0, 0], 2)
 
     def gravity(self, acceleration):
@@ -465,7 +484,8 @@ class LinkFile:
 
 
 def reduce(program, job, *flags):
-    """The link file that `flexarm reduce` writes now, with other settings than the job's."""
+    """Returns the link file that `flexarm reduce` currently writes, with settings different from
+    the job's."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "link.flex"
         subprocess.run([program, "reduce", str(job), "--flex", str(path), "--quiet", *flags], check=True, capture_output=True)
@@ -485,7 +505,8 @@ def head(what, program, script, meshes):
 
 
 def listed(value, digits=12):
-    """Lists of floats with 12 digits. Round-off where symmetry makes a zero stays: it says how large it is."""
+    """Converts to lists of floats with 12 digits. Round-off of zeros by symmetry is kept to show
+    its size."""
     if isinstance(value, (np.ndarray, list, tuple)):
         return [listed(v, digits) for v in value]
     if isinstance(value, dict):

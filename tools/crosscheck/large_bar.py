@@ -1,8 +1,9 @@
-"""Large deflections of a clamped bar of HEX20 under a force that keeps its direction: CalculiX, and an own program.
+"""Large deflections of a clamped HEX20 bar under a dead load: CalculiX, and an own program.
 
-Both: linear law between Green strain and second Piola-Kirchhoff stress, 3x3x3 points, far end rigid, near end held.
-CalculiX prints seven digits. So it runs twice: the second time extra nodes are tied to (what was asked) - (what was printed
-the first time), with the printed number prescribed on another node, and the small difference is printed to seven digits.
+Both: linear law between Green strain and second Piola-Kirchhoff stress, 3x3x3 points, far end
+rigid, near end held. CalculiX prints seven digits, so it runs twice: in the second run extra nodes
+are tied to (requested result) - (result printed in the first run), with the printed number
+prescribed on another node, and the small difference is printed to seven digits.
 """
 import numpy as np
 import scipy.sparse as sp
@@ -21,7 +22,8 @@ def middle(mesh):
 # ----------------------------------------------------------------------------------------------
 # CalculiX
 def calculix_run(mesh, forces, known):
-    """Rows of 9 numbers (u_B, rotation_B, u_mid) less those in `known` (forces x 9), as printed."""
+    """Returns rows of 9 numbers (u_B, rotation_B, u_mid) minus those in `known` (forces x 9), as
+    printed."""
     n = len(mesh.x)
     tip, turn = n + 3, n + 4
     asked, constant = n + 10, n + 20                     # three nodes each: u_B, rotation_B, u_mid
@@ -57,7 +59,8 @@ def calculix(mesh, forces):
 # ------------------------------------------------------------------------------------------- own
 # program
 class Bar:
-    """Residual and tangent of the bar. Unknowns: free nodes, then u_x, u_z of B and its turn about y."""
+    """Residual and tangent of the bar. Unknowns: free nodes, then u_x, u_z of B and its rotation
+    about y."""
 
     def __init__(self, mesh):
         self.mesh = mesh
@@ -76,7 +79,8 @@ class Bar:
         self.rows, self.ij = rows, (np.repeat(rows, 60, 1).ravel(), np.tile(rows, (1, 60)).ravel())
 
     def turned(self, angle):
-        """Displacement of the far face's nodes about B, and its first and second derivative by the turn."""
+        """Displacement of the nodes of the far face about B, and its first and second derivative by
+        the angle."""
         c, s = np.cos(angle), np.sin(angle)
         R = np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
         dR = np.array([[-s, 0, c], [0, 0, 0], [-c, 0, -s]])

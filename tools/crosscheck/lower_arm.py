@@ -1,10 +1,12 @@
-"""The casting of robots/lower_arm by CalculiX and by NGSolve: statics with two kinds of ties, weight, frequencies.
+"""The casting of robots/lower_arm by CalculiX and NGSolve: statics, gravity, frequencies.
 
     python tools/crosscheck/lower_arm.py [--program target/release/flexarm]
 
-Writes tests/verification/lower_arm_calculix.json and lower_arm_ngsolve.json and prints how far they are from each other, from
-an own assembly, from what CalculiX prints when it solves with its own ties, and from robots/lower_arm/lower_arm.flex.
-The edges are straight, so that the 4 points of C3D10 are exact for the stiffness; for the mass they are not: weight is exact, frequencies are 3e-5 and 6e-5 off.
+Statics use two kinds of ties. Writes tests/verification/lower_arm_calculix.json and
+lower_arm_ngsolve.json and prints their differences from each other, from an own assembly, from
+CalculiX's own solution with its own ties, and from robots/lower_arm/lower_arm.flex. The edges are
+straight, so that the 4 points of C3D10 are exact for the stiffness, but not for the mass: gravity
+loads are exact, frequencies have errors of 3e-5 and 6e-5.
 """
 import argparse
 
@@ -35,10 +37,11 @@ def rigid_ties(mesh, K, M):
 
 
 def distributing(mesh, K):
-    """C_BB with both seats tied by the mean of their nodes.
+    """Returns C_BB with both seats tied by the mean of their nodes.
 
-    Three nodes are held so that nothing else is: loads on B and the reactions of A, spread over their nodes, are in
-    equilibrium and leave them without force. Then the whole is moved until the mean of A has not moved.
+    Three nodes are held to make the problem determinate: loads on B and the reactions of A,
+    distributed over their nodes, are in equilibrium and leave the held nodes without force. Then
+    the whole body is moved rigidly so that the mean of A has no displacement.
     """
     n = len(mesh.x)
     A, B = mesh.groups["interface_A"], mesh.groups["interface_B"]
@@ -54,8 +57,8 @@ def distributing(mesh, K):
     far = np.argmax(np.linalg.norm(mesh.x - mesh.x[0], axis=1))
     line = mesh.x[far] - mesh.x[0]
     aside = np.argmax(np.linalg.norm(np.cross(mesh.x - mesh.x[0], line), axis=1))
-    # of the node far away the two directions most across the line, of the third the one out of
-    # their plane
+    # on the distant node, the two directions most nearly across the line; on the third, the
+    # direction out of their plane
     out = int(np.argmax(np.abs(np.cross(line, mesh.x[aside] - mesh.x[0]))))
     along = int(np.argmax(np.abs(line)))
     held = {0, 1, 2} | {3 * int(far) + d for d in range(3) if d != along} | {3 * int(aside) + out}

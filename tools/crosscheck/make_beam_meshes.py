@@ -2,12 +2,14 @@
 
     python tools/crosscheck/make_beam_meshes.py
 
-A section of quadrilaterals, swept along the link. Volume group `body`, surface groups `interface_A` (near end) and
-`interface_B` (far end); m; Gmsh 4.1 text, the same bytes each run. No mesher takes part, so that planes of nodes lie
-where stations are wanted; coordinates are written so that they read back as they were.
+A section of quadrilaterals, swept along the link. Volume group `body`, surface groups `interface_A`
+(near end) and `interface_B` (far end); m; Gmsh 4.1 text, the same bytes in each run. No mesher is
+used, so that planes of nodes are at the wanted stations; coordinates are written so that they are
+read back exactly.
 
-A tube of second-order elements has arcs of parabolas: its two radii are chosen so that area and second moment are
-those of the true tube, 60 mm and wall 3 mm. They differ from 30 and 27 mm by less than 1 um.
+A tube of second-order elements has parabolic arcs: its two radii are chosen so that area and second
+moment equal those of the true tube, 60 mm and wall 3 mm. They differ from 30 and 27 mm by less than
+1 um.
 """
 import gzip
 from pathlib import Path
@@ -21,11 +23,10 @@ HEX_EDGES = ((0, 1), (0, 3), (0, 4), (1, 2), (1, 5), (2, 3), (2, 6), (3, 7), (4,
 CORNERS = ((-1, -1, -1), (1, -1, -1), (1, 1, -1), (-1, 1, -1), (-1, -1, 1), (1, -1, 1), (1, 1, 1), (-1, 1, 1))
 
 
-# Sections: arrays (quadrilaterals, 8 nodes, 2), corners counterclockwise, then the nodes between
-# them
+# Sections: arrays (quadrilaterals, 8 nodes, 2), corners counterclockwise, then the mid-side nodes
 
 def grid(first, second, keep=lambda p, q: True):
-    """Rectangles between the lines; `keep` says which, by the middle."""
+    """Rectangles between the lines; `keep` selects them by their centre."""
     quads = []
     for a0, a1 in zip(first, first[1:]):
         for b0, b1 in zip(second, second[1:]):
@@ -44,7 +45,7 @@ def ring(inner, outer, around):
 
 
 def section_moments(quads):
-    """Area and integral of y^2 + z^2, exact for edges that are parabolas."""
+    """Area and integral of y^2 + z^2, exact for parabolic edges."""
     g, w = np.polynomial.legendre.leggauss(6)
     (R, S), W = np.meshgrid(g, g), np.outer(w, w)
     r, s, w = R.ravel(), S.ravel(), W.ravel()
@@ -68,7 +69,8 @@ def section_moments(quads):
 
 
 def tube(outer, wall, around):
-    """Ring of the area and second moment of the true tube, by Newton's method on the two radii."""
+    """Ring with the area and second moment of the true tube, by Newton's method on the two
+    radii."""
     a, b = outer, outer - wall
     wanted = np.pi * np.array([a**2 - b**2, (a**4 - b**4) / 2])
     radii = np.array([b, a])
@@ -83,7 +85,8 @@ def tube(outer, wall, around):
 # The mesh
 
 def sweep(quads, length, layers, axis):
-    """Nodes, HEX20 in gmsh's order, QUAD8 of both ends. `axis` 0: section in y, z; 2: section in x, y."""
+    """Nodes, HEX20 in gmsh's order, QUAD8 of both ends. `axis` 0: section in y, z; 2: section in x,
+    y."""
     place = {}
     points = []
 
@@ -105,7 +108,7 @@ def sweep(quads, length, layers, axis):
     for level in (0, 2 * layers):
         order = range(8) if level else (0, 3, 2, 1, 7, 6, 5, 4)              # normals outwards
         faces.append(np.array([[node(quad[k], level) for k in order] for quad in quads]))
-    # by level, so that the file compresses and the matrices have a small band
+    # sorted by level, so that the file compresses well and the matrices have a small bandwidth
     points, cells = np.array(points) + 0.0, np.array(cells)
     order = np.lexsort((np.arange(len(points)), np.round(points[:, axis] / 1e-9)))
     new = np.empty(len(points), int)
@@ -114,7 +117,8 @@ def sweep(quads, length, layers, axis):
 
 
 def number(v):
-    """As few digits as give the value back, without those that only rounding made (0.30000000000000004)."""
+    """Formats with the fewest digits that restore the value, without digits due to rounding
+    (0.30000000000000004)."""
     short = f"{v:.12g}"
     return short if abs(float(short) - v) < 1e-16 else repr(float(v))
 

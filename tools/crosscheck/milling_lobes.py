@@ -1,17 +1,19 @@
 #!/usr/bin/env python3
-"""Limits of depth of milling on a robot from its exported frequency response, by the multi-frequency solution.
+"""Limits of milling depth from an exported frequency response (multi-frequency solution).
 
     python3 tools/crosscheck/milling_lobes.py FLEXARM OUT.json
 
-FLEXARM: the built program. For each case it runs `flexarm response` (forces on the TCP to displacements, world axes) and
-`flexarm inspect` and `flexarm statics` (axes of the TCP, sagged), reads the tool's file, and solves [Budak and Altintas 1998]
+FLEXARM: the built program. For each case it runs `flexarm response` (forces on the TCP to
+displacements, world axes), `flexarm inspect` and `flexarm statics` (axes of the TCP, with sag),
+reads the tool's file, and solves [Budak and Altintas 1998]
 
     det(1 + b (1 - e^{-i w T}) [G(i (w + p W)) H_{p-q}]) = 0        p, q = -n .. n
 
-with the Fourier coefficients H_k of the directional matrix over a tooth period (W = 2 pi / T) and the response G interpolated in
-the table, tool modes added in closed form. Straight teeth only. Limits: eigenvalues followed over 0 <= w <= W/2, b real and positive,
-refined; n doubled until the lowest changes by less than 0.02 %. No modes of the robot, no time steps: nothing in common with the
-program but the response and the tool's file. numpy and scipy.
+with the Fourier coefficients H_k of the directional matrix over a tooth period (W = 2 pi / T) and
+the response G interpolated in the table, with tool modes added in closed form. Straight teeth only.
+Limits: eigenvalues followed over 0 <= w <= W/2, b real and positive, refined; n is doubled until
+the lowest limit changes by less than 0.02 %. No robot modes, no time steps: only the response and
+the tool's file are shared with the program. Needs numpy and scipy.
 """
 import csv, json, subprocess, sys, tempfile, tomllib
 from pathlib import Path
@@ -34,7 +36,8 @@ def run(program, *words):
 
 
 def response(program, robot, pose, folder):
-    """Interpolated 3x3 response of the TCP in world axes, as a function of w of either sign."""
+    """Interpolated 3x3 response of the TCP in world axes, as a function of positive or negative
+    w."""
     at = ",".join(map(repr, pose))
     run(program, "response", robot, f"--at={at}", "--from", "0.02", "--to", str(HIGHEST_HZ), "--points", "20000", "-o", str(folder), "--force")
     with open(folder / "response.csv") as text:
@@ -87,14 +90,16 @@ class Tool:
         return G
 
     def directional(self, phi):
-        """Force on the tool per displacement and depth, its sign turned, of a tooth at phi that cuts."""
+        """Force on the tool per displacement and depth, with opposite sign, of a cutting tooth at
+        phi."""
         s, c, sk, ck = np.sin(phi), np.cos(phi), np.sin(self.lead), np.cos(self.lead)
         n = np.array([sk * s, sk * c, -ck])
         force = self.Kt * np.array([c, -s, 0.0]) + self.Kr * n + self.Ka * np.array([ck * s, ck * c, sk])
         return np.outer(force, n) / sk
 
     def fourier(self, n):
-        """H_k, k = -n .. n, of the sum over the teeth: H(t) = sum H_k e^{i k W t}, by Gauss quadrature over the engagement."""
+        """H_k, k = -n .. n, of the sum over the teeth: H(t) = sum H_k e^{i k W t}, by Gauss
+        quadrature over the engagement."""
         x, weight = np.polynomial.legendre.leggauss(400)
         phi = self.st + (x + 1) / 2 * (self.ex - self.st)
         H = np.array([self.directional(p) for p in phi])
@@ -159,7 +164,7 @@ def main(program, out):
             world = response(program, robot, pose, Path(folder) / "response")
             seen = run(program, "inspect", robot, "--at=" + ",".join(map(repr, pose)))
             R = Rotation.from_quat(np.roll(seen["tcp"]["quaternion_wxyz"], -1)).as_matrix()
-            # The tool as it hangs under the arm's weight.
+            # The tool pose under the arm's weight.
             R = Rotation.from_rotvec(run(program, "statics", robot, "--at=" + ",".join(map(repr, pose)))["sag_rad"]).as_matrix() @ R
             z = -R @ tool.axis
             x = R @ tool.feed - z * (z @ (R @ tool.feed))

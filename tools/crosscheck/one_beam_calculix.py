@@ -1,11 +1,12 @@
-"""The bar of robots/one_beam by CalculiX: statics, loads along it, weight, frequencies, large deflections.
+"""The bar of robots/one_beam by CalculiX: statics, gravity, frequencies, large deflections.
 
     python tools/crosscheck/one_beam_calculix.py [--skip-large]
 
-Writes tests/verification/one_beam_calculix.json and prints how far CalculiX is from NGSolve, from an own assembly, from
-what it prints itself when it solves with its own ties, and from robots/one_beam/fe/one_beam.flex.
-Stations: a section of nodes carries a unit load as an RBE3 with equal weights would spread it, and its motion is the mean
-of its nodes (mean displacement, least-squares rotation).
+Writes tests/verification/one_beam_calculix.json and prints the differences of CalculiX from
+NGSolve, from an own assembly, from CalculiX's own solution with its own ties, and from
+robots/one_beam/fe/one_beam.flex. Stations: a unit load is distributed over a section of nodes like
+an RBE3 with equal weights, and the motion of the section is the mean of its nodes (mean
+displacement, least-squares rotation).
 """
 import argparse
 
@@ -29,7 +30,7 @@ def section(mesh, x):
 
 
 def linear(mesh, K, M):
-    """All linear cases with the matrices given: a dictionary as it is stored."""
+    """Computes all linear cases with the given matrices: a dictionary as it is stored."""
     n = len(mesh.x)
     A, B = mesh.groups["interface_A"], mesh.groups["interface_B"]
     T = fe.tie_matrix(n, 1, [(B, fe.rigid(mesh.x, B, B_AT), 0)], [A])
@@ -56,13 +57,14 @@ def linear(mesh, K, M):
 
 
 def by_itself(mesh):
-    """C_BB, weight and frequencies of CalculiX with its own ties and solver: statics to the seven digits that it prints."""
+    """C_BB, gravity and frequencies of CalculiX with its own ties and solver: statics to the seven
+    printed digits."""
     n = len(mesh.x)
     base = fe.deck(mesh) + fe.rigid_ties(mesh, (A_AT, B_AT)) + ["*BOUNDARY", f"{n + 1}, 1, 3", f"{n + 2}, 1, 3"]
     lines = list(base)
     for k in range(6):
         lines += ["*STEP", "*STATIC", "*CLOAD, OP=NEW", f"{n + 3 + k // 3}, {k % 3 + 1}, 1.", "*NODE PRINT, NSET=TIP", "U", "*END STEP"]
-    # a load of zero, or the last unit load would stay
+    # a zero load, otherwise the last unit load would remain
     for d in ("-1., 0., 0.", "0., -1., 0.", "0., 0., -1."):
         lines += ["*STEP", "*STATIC", "*CLOAD, OP=NEW", f"{n + 3}, 1, 0.", "*DLOAD, OP=NEW", f"BODY, GRAV, {fe.GRAVITY}, {d}",
                   "*NODE PRINT, NSET=TIP", "U", "*END STEP"]
@@ -74,7 +76,8 @@ def by_itself(mesh):
 
 
 def elastica(force):
-    """Inextensible Euler-Bernoulli bar, dead force: tip (along, up), slope at the tip, middle (along, up)."""
+    """Inextensible Euler-Bernoulli bar, dead force: tip (along, up), slope at the tip, middle
+    (along, up)."""
     load = force / EI
 
     def rhs(s, y):                                     # slope, curvature, x, z
@@ -96,7 +99,8 @@ def compare(name, a, b):
 
 
 def by_load(a, b):
-    """The worst of the loads, each over its own largest entry; what symmetry makes zero over the largest of all loads."""
+    """Maximum error of the loads, each over its own maximum entry; zeros by symmetry over that of
+    all loads."""
     worst = 0.0
     for part in (slice(0, 3), slice(3, 6)):                        # displacements, rotations
         u, v = a.reshape(-1, 6)[:, part], b.reshape(-1, 6)[:, part]

@@ -1,31 +1,40 @@
-"""One arm, one motion, in Pinocchio, Exudyn, MuJoCo and flexarm: how far apart are the curves, and what do they cost?
+"""Compares one arm and motion in Pinocchio, Exudyn, MuJoCo and flexarm: curves and CPU times.
 
     cargo build --release -p flexarm-cli --no-default-features --features mcap
     python tools/crosscheck/other_programs.py            # pip install pin exudyn mujoco numpy scipy; seven minutes
     python tools/crosscheck/other_programs.py --write    # also replaces the two files in tests/verification/
 
-Robot: robots/kr210/links.toml, two links of two rigid parts each with one elastic joint between them, full 6x6. Two things are changed, for every
-program, flexarm too, since not every program has them: the damping is D = beta K (the first mode at the start of
-pick_and_place gets 3 %), and the angles of the elastic joints are Z-Y-X Euler angles. Everybody starts from an equilibrium of its own.
+Robot: robots/kr210/links.toml, two links of two rigid parts each with one elastic joint between
+them, full 6x6. Two things are changed in every program, including flexarm, since not every program
+supports them: the damping is D = beta K (3 % for the first mode at the start of pick_and_place),
+and the angles of the elastic joints are Z-Y-X Euler angles. Each program starts from its own
+equilibrium.
 
-Truth: hybrid dynamics by Pinocchio (joints given, elastic coordinates e free), e'' = M_ee^-1 (-K e - beta K e' - h_e), integrated by
-scipy's DOP853 at rtol 1e-12, restarted at the knots of the motion. Errors are differences of the TCP to it, every 2 ms (every step, where that is
-longer), over the peak deflection of the flexible arm against the rigid one.
+Truth: hybrid dynamics by Pinocchio (joints given, elastic coordinates e free), e'' = M_ee^-1 (-K e
+- beta K e' - h_e), integrated by scipy's DOP853 at rtol 1e-12, restarted at the knots of the
+motion. Errors are TCP differences from it, every 2 ms (every step if that is longer), over the peak
+deflection of the flexible arm from the rigid one.
 
-Exudyn: one ObjectKinematicTree (minimal coordinates, the same ones), K and D by ObjectGenericODE2 on its node, the six joints by
-CoordinateConstraint with compiled functions of time (symbolic: no Python while it runs). The same in redundant coordinates is another
-model: the torque of a RigidBodySpringDamper is K times Tait-Bryan angles, not their generalised force. The sag differs by 3.2e-4 of itself,
-by a tenth of that with springs ten times as stiff: terms of second order in the deflection.
+Exudyn: one ObjectKinematicTree (minimal coordinates, the same ones), K and D by ObjectGenericODE2
+on its node, the six joints by CoordinateConstraint with compiled functions of time (symbolic: no
+Python during the run). The same in redundant coordinates is another model: the torque of a
+RigidBodySpringDamper is K times Tait-Bryan angles, not their generalised force. The relative
+difference of the sag is 3.2e-4, and a tenth of that with springs ten times as stiff: terms of
+second order in the deflection.
 
-MuJoCo: slides x, y, z and hinges z, y, x on one body. K = sum_k s_k l_k l_k^T (Cholesky), so that six fixed tendons with coefficients l_k,
-stiffness s_k and damping beta s_k are K and D exactly. It has no joints that follow a given motion: each gets an armature of
-1e18 kg m2 and a motor with the torque for the wanted acceleration. The load then moves it by less than 1e-12 rad, and a sequence of
-accelerations whose steps add up to the motion makes feedback unnecessary. (discrete: 1e12 and 1e-7 rad.) The largest error of the
-joints is in the notes. implicitfast takes D implicitly, K not: unstable here beyond 1.75 ms. discrete is backward Euler.
+MuJoCo: slides x, y, z and hinges z, y, x on one body. K = sum_k s_k l_k l_k^T (Cholesky), so that
+six fixed tendons with coefficients l_k, stiffness s_k and damping beta s_k give K and D exactly. It
+has no joints with prescribed motion: each gets an armature of 1e18 kg m2 and a motor with the
+torque for the wanted acceleration. The load then moves it by less than 1e-12 rad, and a sequence of
+accelerations whose steps add up to the motion makes feedback unnecessary. (discrete: 1e12 and 1e-7
+rad.) The maximum error of the joints is in the notes. implicitfast treats D implicitly, but not K:
+unstable here beyond 1.75 ms. discrete is backward Euler.
 
-CPU: process time on one thread, the smallest of three runs. Exudyn: SolveDynamic. MuJoCo: rollout, which steps in C. flexarm: what
-`compare --no-files` tells: steps, rigid twin, samples and figures, but not the reading of files. At large steps the samples cost as much
-as the steps, so that the notes also have the cost with few samples. Pinocchio: a loop in Python, which says nothing about Pinocchio.
+CPU: process time on one thread, the minimum of three runs. Exudyn: SolveDynamic. MuJoCo: rollout,
+which steps in C. flexarm: the time that `compare --no-files` reports: steps, rigid twin, samples
+and figures, but not reading files. At large steps the samples cost as much as the steps, so the
+notes also have the cost with few samples. Pinocchio: a loop in Python, not representative of
+Pinocchio.
 """
 import argparse
 import hashlib
@@ -68,13 +77,13 @@ RATIO = 0.03                       # of the first mode at the start of pick_and_
 EVERY_S, CURVE_EVERY_S = 0.002, 0.010
 REPEATS = 3
 FEW_HZ = 10
-# kg m2; the solver of discrete stops early beside 1e18
+# kg m2; the solver of discrete stops early with 1e18
 ARMATURE = {"implicitfast": 1e18, "RK4": 1e18, "discrete": 1e12}
 norm = lambda x: np.linalg.norm(x, axis=-1)
 
 
 def cheapest(run, repeats=REPEATS):
-    """Result of the last run and the smallest CPU time."""
+    """Returns the result of the last run and the minimum CPU time."""
     best = math.inf
     for _ in range(repeats):
         *result, cpu = run()
@@ -90,7 +99,8 @@ class Hybrid:
         self.model, self.rigid = pin.Model(), pin.Model()
         self.given, self.free, blocks = [], [], []
         parent = rigid_parent = 0
-        held = pin.SE3.Identity()                             # of the last body in that of the rigid twin's
+        # of the last body in that of the rigid twin
+        held = pin.SE3.Identity()
         for model in (self.model, self.rigid):
             model.gravity.linear = chain.gravity
         for body in chain.bodies:
@@ -125,7 +135,8 @@ class Hybrid:
         return pin.computeGeneralizedGravity(self.model, self.data, self.full(q_a, e))[self.free].copy()
 
     def tangent(self, q_a, e, step=1e-5):
-        """K and how gravity changes it; Pinocchio's own derivative leaves out dS/dq of the Z-Y-X joint."""
+        """K plus the tangent of gravity; Pinocchio's own derivative omits dS/dq of the Z-Y-X
+        joint."""
         columns = [(self.gravity(q_a, e + d) - self.gravity(q_a, e - d)) / (2 * step) for d in step * np.eye(self.n)]
         return self.K + np.column_stack(columns)
 
@@ -156,7 +167,7 @@ class Hybrid:
         return np.r_[e_dot, sl.cho_solve(sl.cho_factor(self.mass(q), check_finite=False), -self.K @ (e + beta * e_dot) - bias, check_finite=False)]
 
     def integrate(self, motion, beta, times, method, rtol):
-        """Elastic coordinates at the times."""
+        """Returns the elastic coordinates at the times."""
         atol = np.r_[np.full(self.n, 1e-4), np.full(self.n, 1e-2)] * rtol       # m and rad, per s
         y, out = np.r_[self.statics(motion(0.0)[0]), np.zeros(self.n)], np.empty((len(times), self.n))
         edges = np.r_[motion.knots, motion.t_end]
@@ -192,7 +203,8 @@ KEEP = []                          # Exudyn does not keep user functions alive
 
 
 def exudyn_motion(motion, joint):
-    """Angle and speed of a joint as expressions of t; a tree of conditions leads to the piece, which is twice as fast as to add up all."""
+    """Angle and speed of a joint as expressions of t. A tree of conditions selects the piece; a sum
+    over all pieces would take twice as long."""
     pieces = [(float(knot), [float(x) for x in c[:, joint]]) for knot, c in zip(motion.knots, motion.pieces)]
 
     def at(t, piece, low, high):
@@ -218,7 +230,7 @@ def exudyn_drive(mbs, constraint, motion, joint, vector=False):
 
 
 def exudyn_tree(chain, motion, beta):
-    """Minimal coordinates: system, sensor of the TCP, numbers of the given coordinates."""
+    """Minimal coordinates: system, TCP sensor, indices of the prescribed coordinates."""
     turns = (exu.JointType.RevoluteX, exu.JointType.RevoluteY, exu.JointType.RevoluteZ)
     slides = (exu.JointType.PrismaticX, exu.JointType.PrismaticY, exu.JointType.PrismaticZ)
     nothing = (0.0, np.zeros(3), np.zeros((3, 3)))
@@ -262,7 +274,8 @@ def exudyn_tree(chain, motion, beta):
 
 
 def exudyn_bodies(chain, motion, beta):
-    """Redundant coordinates: rigid bodies, GenericJoint and RigidBodySpringDamper, put up in the pose of the start."""
+    """Redundant coordinates: rigid bodies, GenericJoint and RigidBodySpringDamper, assembled in the
+    start pose."""
     mbs = exu.SystemContainer().AddSystem()
     before, centre, place, joint = mbs.CreateGround(), np.zeros(3), pin.SE3.Identity(), 0
     for body in chain.bodies:
@@ -286,7 +299,8 @@ def exudyn_bodies(chain, motion, beta):
 
 
 def exudyn_at_rest(build, chain, motion, beta):
-    """The arm at rest at t = 0: system, sensor, settings, numbers of the given coordinates."""
+    """Returns the arm at rest at t = 0: system, sensor, settings, indices of the prescribed
+    coordinates."""
     mbs, sensor, given = build(chain, motion, beta)
     mbs.Assemble()
     s = exu.SimulationSettings()
@@ -295,13 +309,14 @@ def exudyn_at_rest(build, chain, motion, beta):
     s.linearSolver.solverType = exu.LinearSolverType.EXUdense
     s.staticSolver.newton.relativeTolerance = 1e-10
     s.staticSolver.newton.absoluteTolerance = 1e-12
-    s.staticSolver.loadStepDuration = 1e-9                       # statics run in a pseudo time, and the joints move with time
+    # statics use a pseudo time, and the joints move with time
+    s.staticSolver.loadStepDuration = 1e-9
     mbs.SolveStatic(s, updateInitialValues=True)
     return mbs, sensor, s, given
 
 
 def run_exudyn(build, chain, motion, beta, step, every):
-    """Times, positions, CPU seconds of the integration per simulated second."""
+    """Returns times, positions, CPU seconds of the integration per simulated second."""
     mbs, sensor, s, _ = exudyn_at_rest(build, chain, motion, beta)
     s.solution.sensors.writePeriod = every
     s.timeIntegration.numberOfSteps = round(motion.t_end / step)
@@ -355,7 +370,7 @@ class MuJoCo:
         self.given, self.free = ([self.model.joint(n).qposadr[0] for n in names] for names in (given, free))
 
     def force(self, e):
-        """Of springs and weight on the elastic coordinates, at rest."""
+        """Static force of springs and gravity on the elastic coordinates."""
         self.data.qpos[self.free] = e
         mujoco.mj_forward(self.model, self.data)
         return (self.data.qfrc_passive - self.data.qfrc_bias)[self.free]
@@ -381,10 +396,11 @@ class MuJoCo:
         return np.sqrt(sl.eigh(0.5 * (K + K.T), M[np.ix_(self.free, self.free)], eigvals_only=True)) / (2 * math.pi)
 
     def accelerations(self, motion):
-        """One per step and joint, with which the integrator goes through the motion."""
+        """Accelerations per step and joint with which the integrator follows the motion."""
         times = np.arange(round(motion.t_end / self.step) + 2) * self.step
         q, v, a, _ = motion.many(times)
-        if self.integrator == "RK4":          # q+ = q + h (v + v+)/2: speeds less the error that this makes in q
+        # q+ = q + h (v + v+)/2: speeds minus the resulting error in q
+        if self.integrator == "RK4":
             j = np.gradient(a, self.step, axis=0)
             j[0] = 0
             w = v - self.step**2 / 12 * j
@@ -393,7 +409,8 @@ class MuJoCo:
         return (np.diff(w, axis=0) / self.step)[:-1], q[:-1]
 
     def run(self, motion, every):
-        """Times, positions, CPU per simulated second, error of the joints; None instead of positions if it blew up."""
+        """Returns times, positions, CPU per simulated second, joint error; None for positions if it
+        diverged."""
         m, d = self.model, self.data
         control, wanted = self.accelerations(motion)
         self.rest(motion.start)
@@ -417,7 +434,8 @@ class MuJoCo:
         return np.array(out)
 
     def run_exact(self, motion, every):
-        """RK4 with the acceleration of each of its stages, by a Python function: too slow to be timed."""
+        """RK4 with the acceleration at each of its stages, by a Python function: too slow for
+        timing."""
         m, d = self.model, self.data
         stages = motion.many(np.arange(2 * round(motion.t_end / self.step) + 2) * self.step / 2)[2]
         self.rest(motion.start)
@@ -461,7 +479,8 @@ class Flexarm:
         return self.json("modes", self.robot, "--at", ",".join(repr(float(x)) for x in q_a))["undamped_frequencies_hz"]
 
     def run(self, trajectory, step, every, *words, repeats=REPEATS):
-        """Times, rigid and flexible positions, CPU, CPU with few samples; what the program says if it refuses the step."""
+        """Returns times, rigid and flexible positions, CPU, CPU with few samples; the message if
+        the step is refused."""
         words = ["compare", self.robot, trajectory, "--step", step, *words]
         out = self.folder / "run"
         done = self.json(*words, "--log-rate", round(1 / every), "-o", out, "--force")
@@ -482,7 +501,7 @@ def digits(x, n=6):
 
 
 def written(x, depth=0):
-    """JSON, one line for what holds no object."""
+    """JSON with one line for values without objects."""
     flat = lambda x: not isinstance(x, dict) and not (isinstance(x, list) and any(isinstance(y, (dict, list)) for y in x))
     if flat(x) or (depth > 2 and isinstance(x, dict)):
         return json.dumps(x)
@@ -515,18 +534,20 @@ class Table:
 
 
 def extrapolated(runs, weights):
-    """To no step: times and positions, from runs each of half the step of the one before."""
+    """Extrapolates times and positions to zero step size; each run has half the step of the
+    previous one."""
     times = runs[-1][0]
     assert len(runs) == len(weights) and all(np.abs(t - times).max() < 1e-9 for t, _ in runs)
     return times, sum(w * p for w, (_, p) in zip(weights, runs))
 
 
-SECOND_ORDER = (-1 / 3, 4 / 3)              # takes away h^2
+SECOND_ORDER = (-1 / 3, 4 / 3)              # eliminates h^2
 FIRST_ORDER = (1 / 3, -2.0, 8 / 3)          # h and h^2
 
 
 def compare(name, chain, hybrid, beta, soft, vector):
-    """All programs on one motion. soft: flexarm with Euler angles; vector: with rotation vectors."""
+    """Runs all programs on one motion. soft: flexarm with Euler angles; vector: with rotation
+    vectors."""
     path = ROOT / "trajectories" / f"{name}.toml"
     motion = Motion(path, chain.speed_limits)
     times = np.arange(round(motion.t_end / EVERY_S) + 1) * EVERY_S

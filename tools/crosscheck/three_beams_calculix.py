@@ -1,11 +1,12 @@
-"""The three beams of robots/three_beams, meshed and put together, by CalculiX and by NGSolve: compliance, sag, frequencies.
+"""The meshed arm of robots/three_beams by CalculiX and NGSolve: compliance, sag, frequencies.
 
     python tools/crosscheck/three_beams_calculix.py
 
-Writes tests/verification/three_beams_calculix.json and three_beams_ngsolve.json and prints how far they are from each other,
-from an own assembly, from what CalculiX prints when it solves the whole with its own ties, and from the link files.
-At a corner both faces are tied rigidly to one node. The tube is curved: CalculiX takes 3x3x3 points there, which do not
-integrate curved elements exactly; NGSolve's rule does to rounding. Box and rectangle are the same with both.
+Writes tests/verification/three_beams_calculix.json and three_beams_ngsolve.json and prints their
+differences from each other, from an own assembly, from CalculiX's own solution of the whole with
+its own ties, and from the link files. At a corner both faces are tied rigidly to one node. The tube
+is curved: CalculiX uses 3x3x3 points there, which do not integrate curved elements exactly;
+NGSolve's rule does to rounding. Box and rectangle are the same in both.
 """
 import numpy as np
 import scipy.linalg
@@ -17,7 +18,8 @@ FOLDER = fe.ROOT / "robots/three_beams/fe"
 FILES = [FOLDER / f"beam_{k}.msh.gz" for k in (1, 2, 3)]
 TURN = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])              # frame of beam_3 in world axes
 PLACES = [(np.eye(3), np.zeros(3)), (np.eye(3), np.array([0, 0, 0.8])), (TURN, np.array([0.6, 0, 0.8]))]
-FRAMES = [np.array([0, 0, 0.8]), np.array([0.6, 0, 0.8]), np.array([0.6, 0.4, 0.8])]     # corners, tip
+# corners, tip
+FRAMES = [np.array([0, 0, 0.8]), np.array([0.6, 0, 0.8]), np.array([0.6, 0.4, 0.8])]
 TIP_MASS, TIP_INERTIA = 1.0, 0.00036
 
 
@@ -64,7 +66,7 @@ def by_itself(parts):
               "*NSET, NSET=TIE3", "INTERFACE_B3"]
     lines += [f"*RIGID BODY, NSET=TIE{k}, REF NODE={n + 2 * k + 1}, ROT NODE={n + 2 * k + 2}" for k in range(4)]
     tip, turn = n + 7, n + 8
-    # the node that turns has the rotations as its displacements: a mass on it is a rotary inertia
+    # the rotation node has the rotations as its displacements: a mass on it is a rotary inertia
     lines += ["*ELEMENT, TYPE=MASS, ELSET=BALL", f"{cell + 1}, {tip}", "*ELEMENT, TYPE=MASS, ELSET=SPIN", f"{cell + 2}, {turn}",
               "*MASS, ELSET=BALL", f"{TIP_MASS}", "*MASS, ELSET=SPIN", f"{TIP_INERTIA}"]
     lines += fe.numbered("*NSET, NSET=TIP", [tip, turn]) + ["*ELSET, ELSET=SOLID", "BODY1, BODY2, BODY3"]
@@ -80,7 +82,8 @@ def by_itself(parts):
 
 
 def from_link_files():
-    """The same from the Craig-Bampton models of the three .flex files: statics exact, frequencies a little high."""
+    """The same from the Craig-Bampton models of the three .flex files: statics exact, frequencies
+    slightly high."""
     links = [fe.LinkFile(FOLDER / f"beam_{k}.flex") for k in (1, 2, 3)]
     n = 24 + sum(len(link.K) - 12 for link in links)
     K, M, f, first = np.zeros((n, n)), np.zeros((n, n)), np.zeros(n), 24

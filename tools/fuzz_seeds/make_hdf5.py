@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Writes exudyn.hdf5: a small braced frame of springs in the layout of Exudyn's FEMinterface.SaveToFile. Needs h5py, numpy."""
+"""Writes exudyn.hdf5: a small braced frame of springs in the layout of Exudyn's
+FEMinterface.SaveToFile. Needs h5py, numpy."""
 
 import itertools
 from pathlib import Path

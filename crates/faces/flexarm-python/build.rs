@@ -1,5 +1,5 @@
-//! Puts what the wheel brings along, robots, trajectories and licences, where maturin finds it, and
-//! links as extension modules do.
+//! Copies the data of the wheel (robots, trajectories and licences) to where maturin finds it, and
+//! sets the linker flags of extension modules.
 
 use std::path::Path;
 use std::{env, fs, io};
@@ -9,7 +9,7 @@ fn main() -> io::Result<()> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(3).expect("the workspace");
     let share = Path::new(&env::var_os("OUT_DIR").expect("cargo sets it")).join("share");
     if share.exists() {
-        fs::remove_dir_all(&share)?; // what is gone there must go here
+        fs::remove_dir_all(&share)?; // files deleted at the source must disappear here too
     }
     for folder in ["robots", "trajectories"] {
         println!("cargo::rerun-if-changed={}", root.join(folder).display());
@@ -25,7 +25,7 @@ fn copy(from: &Path, to: &Path) -> io::Result<()> {
     fs::create_dir_all(to)?;
     for entry in fs::read_dir(from)? {
         let entry = entry?;
-        // Meshes of links that are reduced already are for those who have the sources.
+        // Meshes of links that are already reduced are available only with the sources.
         if from.ends_with("fe") && entry.file_name().to_string_lossy().ends_with(".msh.gz") {
             continue;
         }

@@ -1,4 +1,4 @@
-//! The command line: words, defaults and help texts.
+//! Command-line arguments, defaults and help texts.
 
 use std::path::PathBuf;
 
@@ -24,7 +24,7 @@ use crate::sweep::SweepArgs;
 use crate::verify::VerifyArgs;
 use crate::view::ViewArgs;
 
-/// How far is a robot's tool from where the rigid model puts it, because its links bend?
+/// Computes how far the links' flexibility moves a robot's tool from where the rigid model puts it
 #[derive(Debug, Parser)]
 #[command(name = "flexarm", version, arg_required_else_help = true)]
 pub(crate) struct Cli {
@@ -33,14 +33,14 @@ pub(crate) struct Cli {
     /// Print one JSON object on standard output and nothing else
     #[arg(long, global = true, help_heading = "Terminal")]
     pub(crate) json: bool,
-    /// No progress bar and no messages but errors
+    /// Hide the progress bar and all messages except errors
     #[arg(long, short, global = true, help_heading = "Terminal")]
     pub(crate) quiet: bool,
 }
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Run the flexible robot beside its rigid twin, log both, measure the TCP error
+    /// Run the flexible robot and its rigid twin, log both, measure the TCP error
     ///
     /// Without arguments: the shipped industrial arm on its pick-and-place cycle.
     Compare(Later<RunArgs>),
@@ -48,51 +48,52 @@ pub(crate) enum Command {
     Run(Later<RunArgs>),
     /// Show what was loaded, and kinematics and dynamics at a pose
     Inspect(Later<InspectArgs>),
-    /// Look for everything that is wrong with a robot and a trajectory
+    /// Check a robot and a trajectory and list all problems
     Check(Later<CheckArgs>),
-    /// Make a robot file, a sample motion and the first run of a URDF or xacro file
+    /// Create a robot file, a sample motion and a first run from a URDF or xacro file
     New(Later<NewArgs>),
-    /// Show what is in a motion, against the limits of a robot, and write it in other formats
+    /// Show the contents of a motion, check it against a robot's limits, and convert it to other
+    /// formats
     Motion(Later<MotionArgs>),
-    /// Find a robot's stiffness from measurements, and the poses that are worth measuring
+    /// Identify a robot's stiffness from measurements, and plan the poses to measure
     Identify(Later<IdentifyArgs>),
-    /// Find the motion with which the flexible arm's tool follows the rigid one's, and judge it on
-    /// other plants
+    /// Find the motion with which the flexible arm's TCP follows the rigid one's, and evaluate it
+    /// on other plants
     Compensate(Later<CompensateArgs>),
-    /// How the tool's error along a motion depends on every number of the robot: derivatives of one
-    /// run, for all at once
+    /// Derivatives of the TCP error along a motion with respect to all parameters of the robot,
+    /// from one run
     Sensitivity(Later<SensitivityArgs>),
     /// Sag, stiffness and frequencies over the workspace, over joints or along a motion, and where
     /// to put a workpiece
     Map(Later<MapArgs>),
-    /// Run a study: many runs with other payloads, stiffness, speeds, options; tables,
+    /// Run a study: many runs with varied payloads, stiffness, speeds, options; tables,
     /// sensitivities, shards
     Sweep(Box<SweepArgs>),
-    /// Equilibrium under weight and load at a pose, and the compliance of the TCP
+    /// Equilibrium under gravity and load at a pose, and the compliance of the TCP
     Statics(Later<StaticsArgs>),
     /// Natural frequencies, damping and shapes at a pose, drives locked
     Modes(Later<ModesArgs>),
     /// Frequency response of the TCP to forces on it and to motions of joints
     Response(Later<ResponseArgs>),
-    /// Limits of depth beyond which a cutting tool on the arm chatters, over the spindle speed
+    /// Limits of depth of cut for chatter of a cutting tool on the arm, over the spindle speed
     Lobes(Later<LobesArgs>),
-    /// Make the HTML report of recorded runs
+    /// Write the HTML report of recorded runs
     Report(Later<ReportArgs>),
     #[command(about = formats::about_convert())]
     Convert(Later<ConvertArgs>),
-    /// Make a flexible link of a finite element mesh, with its checks
+    /// Create a flexible link from a finite element mesh, with checks
     Reduce(Later<ReduceArgs>),
-    /// Make a flexible link of matrices from another FE program
+    /// Create a flexible link from matrices of another FE program
     Import(Later<ImportArgs>),
     /// Write the matrices of a flexible link for another FE program
     Export(Later<ExportArgs>),
-    /// Run the case studies against their truths and write the page of the results
+    /// Run the case studies against their truths and write the page of results
     Verify(Later<VerifyArgs>),
     /// Open a recording in the Rerun viewer
     View(Later<ViewArgs>),
     /// Print the page of a file format: keys, units, defaults, examples
     Format {
-        /// Which file
+        /// Format to describe
         #[arg(value_enum)]
         page: PageName,
     },
@@ -111,13 +112,13 @@ pub(crate) struct RobotArgs {
     /// Frame to use as TCP instead of the robot file's
     #[arg(long, value_name = "FRAME")]
     pub(crate) tcp: Option<String>,
-    /// Where package://NAME/ leads (may be repeated)
+    /// Folder of package://NAME/ (may be repeated)
     #[arg(long = "package", hide_short_help = true, value_name = "NAME=FOLDER")]
     pub(crate) packages: Vec<String>,
-    /// Argument of a xacro file, before those of the robot file (may be repeated)
+    /// Argument of a xacro file, overrides those of the robot file (may be repeated)
     #[arg(long = "arg", value_name = "NAME=VALUE")]
     pub(crate) arguments: Vec<String>,
-    /// Link whose inertia may be one that no body has (may be repeated)
+    /// Link whose inertia may be physically impossible (may be repeated)
     #[arg(long, value_name = "LINK")]
     pub(crate) waive_inertia: Vec<String>,
     /// Estimate missing inertias from the meshes with this density (kg/m^3)
@@ -129,12 +130,12 @@ pub(crate) struct RobotArgs {
         allow_hyphen_values = true
     )]
     pub(crate) inertia_from_density: Option<f64>,
-    /// Estimate missing inertias from the meshes, all together of this mass (kg)
+    /// Estimate missing inertias from the meshes, scaled to this total mass (kg)
     #[arg(long, hide_short_help = true, value_name = "KG", allow_hyphen_values = true)]
     pub(crate) inertia_from_total_mass: Option<f64>,
 }
 
-/// How links and drives are modelled.
+/// Model choices for links and drives.
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Models")]
 pub(crate) struct ModellingArgs {
@@ -152,7 +153,7 @@ pub(crate) struct ModellingArgs {
     pub(crate) modes: Option<u32>,
 }
 
-/// One of the words of a list of the facade, each with what it means.
+/// Parser for the words of a list of the facade, each with its help text.
 fn word_of<T: Copy + Send + Sync + 'static>(
     words: &'static [(&'static str, T, &'static str)],
 ) -> impl TypedValueParser<Value = T> {
@@ -186,7 +187,7 @@ pub(crate) struct RunArgs {
     /// Time stepper
     #[arg(long, help_heading = "Stepper", value_name = "NAME", value_parser = stepper_words(), default_value = STEPPERS[0].name)]
     pub(crate) stepper: &'static StepperEntry,
-    /// Step of the stepper (s) [default: the stepper's own]
+    /// Step size of the stepper (s) [default: the stepper's own]
     #[arg(long, help_heading = "Stepper", value_name = "SECONDS", allow_hyphen_values = true)]
     pub(crate) step: Option<f64>,
     #[command(flatten)]
@@ -195,10 +196,10 @@ pub(crate) struct RunArgs {
     pub(crate) load: RobotArgs,
     #[command(flatten)]
     pub(crate) motion: MotionInputArgs,
-    /// Round corners of the trajectory, where a velocity jumps, by blends that last this long (s)
+    /// Round corners of the trajectory, where the velocity jumps, by blends of this duration (s)
     #[arg(long, help_heading = "Models", hide_short_help = true, value_name = "SECONDS", allow_hyphen_values = true)]
     pub(crate) round_corners: Option<f64>,
-    /// File with loads and changes of payload during the run (.toml; flexarm format loads)
+    /// File with loads and payload changes during the run (.toml; flexarm format loads)
     #[arg(long, help_heading = "Models", value_name = "FILE")]
     pub(crate) loads: Option<PathBuf>,
     /// Logged samples per second
@@ -211,10 +212,11 @@ pub(crate) struct RunArgs {
         allow_hyphen_values = true
     )]
     pub(crate) log_rate: f64,
-    /// How the run starts
+    /// Initial state of the run
     #[arg(long, help_heading = "Models", hide_short_help = true, value_enum, default_value_t = StartName::Equilibrium)]
     pub(crate) from_rest: StartName,
-    /// Spectral radius of generalized-alpha: 1 damps nothing, 0 damps the highest modes at once
+    /// Spectral radius of generalized-alpha: 1 for no numerical damping, 0 to annihilate the
+    /// highest modes
     #[arg(
         long,
         help_heading = "Stepper",
@@ -233,8 +235,8 @@ pub(crate) struct RunArgs {
     /// Preset of spook: exact formulas, or those of the method's source
     #[arg(long, help_heading = "Stepper", hide_short_help = true, value_enum, default_value_t = PresetName::Exact)]
     pub(crate) spook_preset: PresetName,
-    /// Relative tolerance of reference, which chooses its steps by error control; --step is then
-    /// the distance of the points
+    /// Relative tolerance of reference, which chooses its step size by error control; --step is
+    /// then the interval of the output points
     #[arg(
         long,
         help_heading = "Stepper",
@@ -244,7 +246,7 @@ pub(crate) struct RunArgs {
         allow_hyphen_values = true
     )]
     pub(crate) rtol: f64,
-    /// Method of reference
+    /// Integration method of reference
     #[arg(long, help_heading = "Stepper", hide_short_help = true, value_enum, default_value_t = MethodName::Bdf)]
     pub(crate) reference_method: MethodName,
     /// Band around the final TCP error for the settling time (m)
@@ -257,42 +259,42 @@ pub(crate) struct RunArgs {
         allow_hyphen_values = true
     )]
     pub(crate) settling_band: f64,
-    /// One more run beside this one, with some options changed: links=modal, or
+    /// An additional run with some options changed: links=modal, or
     /// stepper=spook,step=5e-4,name=spook, or robot=..., trajectory=... (may be repeated; compare
     /// only)
     #[arg(long, help_heading = "Results", value_name = "KEY=VALUE,...")]
     pub(crate) with: Vec<String>,
-    /// Factor by which recordings and pictures show deflections [default: so that they are seen]
+    /// Magnification of deflections in recordings and pictures [default: so that they are visible]
     #[arg(long, help_heading = "Results", hide_short_help = true, value_name = "FACTOR", allow_hyphen_values = true)]
     pub(crate) magnify: Option<f64>,
-    /// When the run begins in recordings whose times have a date (MCAP), as seconds since 1970
-    /// [default: 946684800, the first of January 2000, so that equal runs are equal files]
+    /// Start time of the run in recordings with absolute times (MCAP), in seconds since 1970
+    /// [default: 946684800, 1 January 2000, so that equal runs give equal files]
     #[arg(long, value_name = "now|SECONDS", value_parser = parse_start_time, allow_hyphen_values = true)]
     pub(crate) start_time: Option<u64>,
-    /// Write the mesh files into the robot description of the MCAP, so that it has its shapes on
-    /// any machine (Foxglove draws them; Rerun and RViz want files)
+    /// Embed the mesh files in the robot description of the MCAP, so that it shows on any machine
+    /// (Foxglove draws them; Rerun and RViz need files)
     #[arg(long)]
     pub(crate) embed_meshes: bool,
     /// Output folder [default: a new one in out/]
     #[arg(short, long, help_heading = "Files", value_name = "FOLDER")]
     pub(crate) output: Option<PathBuf>,
-    /// Overwrite what is in the output folder
+    /// Overwrite files in the output folder
     #[arg(long, help_heading = "Files")]
     pub(crate) force: bool,
-    /// Write a folder "figures" for papers too: plots as SVG with their data as CSV, pictures of
+    /// Also write a folder "figures" for papers: plots as SVG with their data as CSV, pictures of
     /// the arm as PNG
     #[arg(long, help_heading = "Files", hide_short_help = true)]
     pub(crate) figures: bool,
-    /// Write the table as Parquet too (run.parquet); not readable before the run ends
+    /// Also write the table as Parquet (run.parquet); not readable before the run ends
     #[arg(long, help_heading = "Files", hide_short_help = true, conflicts_with = "no_files")]
     pub(crate) parquet: bool,
-    /// Write the run in this format too (may be repeated)
+    /// Also write the run in this format (may be repeated)
     #[arg(long, help_heading = "Files", hide_short_help = true, value_name = "FORMAT", conflicts_with = "no_files", value_parser = formats::also())]
     pub(crate) also: Vec<RecordingFormat>,
-    /// Write nothing, only print the figures
+    /// Write no files, only print the figures
     #[arg(long, help_heading = "Files", conflicts_with_all = ["output", "force", "figures"])]
     pub(crate) no_files: bool,
-    /// Run although the trajectory passes joint limits
+    /// Run even if the trajectory exceeds joint limits
     #[arg(long, help_heading = "Models", hide_short_help = true)]
     pub(crate) ignore_limits: bool,
 }
@@ -305,7 +307,7 @@ pub(crate) struct InspectArgs {
     /// [default: where the robot's own motion begins, else all zero]
     #[arg(long, value_name = "Q1,Q2,...", allow_hyphen_values = true)]
     pub(crate) at: Option<String>,
-    /// Joint velocities, likewise (rad/s, m/s)
+    /// Joint velocities, in the same form (rad/s, m/s)
     #[arg(long, value_name = "V1,V2,...", allow_hyphen_values = true)]
     pub(crate) velocity: Option<String>,
     #[command(flatten)]
@@ -318,7 +320,7 @@ pub(crate) struct CheckArgs {
     pub(crate) robot: PathBuf,
     /// Trajectory to check against the robot's limits
     pub(crate) trajectory: Option<PathBuf>,
-    /// File of loads during the trajectory to check as well
+    /// File of loads during the trajectory, also checked
     #[arg(long, value_name = "FILE")]
     pub(crate) loads: Option<PathBuf>,
     #[command(flatten)]
@@ -327,7 +329,7 @@ pub(crate) struct CheckArgs {
     pub(crate) load: RobotArgs,
 }
 
-/// Words and help of the registry of steppers.
+/// Parser for the names of the registered steppers, with their help.
 fn stepper_words() -> impl TypedValueParser<Value = &'static StepperEntry> {
     let help = |entry: &StepperEntry| format!("{}; step {} ms", entry.help, 1e3 * entry.default_step_s);
     let words = STEPPERS.map(|entry| PossibleValue::new(entry.name).help(help(entry)).aliases(entry.aliases));
@@ -337,20 +339,20 @@ fn stepper_words() -> impl TypedValueParser<Value = &'static StepperEntry> {
     })
 }
 
-/// Pages of file formats.
+/// Pages on file formats.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum PageName {
-    /// robot.toml: tool, payload, links that bend, drives
+    /// robot.toml: tool, payload, flexible links, drives
     Robot,
     /// Motions: waypoints, samples and tables, messages and bags of ROS
     Motion,
-    /// Motions told by the path of the tool, standard motions (.toml)
+    /// Motions given by the TCP path, standard motions (.toml)
     Path,
     /// Robot programs: KUKA KRL, ABB RAPID, URScript, G-code
     Program,
-    /// What acts on the arm during a run (.toml)
+    /// Loads on the arm during a run (.toml)
     Loads,
-    /// What was measured at a robot, for flexarm identify (.toml)
+    /// Measurements of a robot, for flexarm identify (.toml)
     Measurements,
     /// Cutting tools, for flexarm lobes (.toml)
     Tool,
@@ -384,9 +386,9 @@ impl PageName {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum StartName {
-    /// The springs carry the weight
+    /// Static equilibrium under gravity
     Equilibrium,
-    /// The springs are relaxed: the arm falls into its sag and rings
+    /// Undeformed: the arm falls into its static deflection and rings
     Undeformed,
 }
 
@@ -416,7 +418,7 @@ pub(crate) enum MethodName {
     Tsit45,
 }
 
-/// A time as nanoseconds since 1970; ROS has no later ones than in 2038.
+/// Parses a time as nanoseconds since 1970; ROS times end in 2038.
 fn parse_start_time(text: &str) -> Result<u64, String> {
     const LATEST_S: f64 = i32::MAX as f64;
     if text == "now" {

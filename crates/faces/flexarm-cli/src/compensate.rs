@@ -1,4 +1,4 @@
-//! `flexarm compensate`: a motion with which the flexible arm's tool follows the rigid one's.
+//! `flexarm compensate`: finds a motion with which the flexible arm's TCP follows the rigid one's.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -31,9 +31,9 @@ Use it as any motion: flexarm compare kr210 out/kr210_compensated-001/compensate
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub(crate) enum MethodName {
-    /// Inertia, damping and weight, iterated on the simulation
+    /// Inertia, damping and gravity, iterated on the simulation
     Dynamic,
-    /// Weight and constant loads alone, point by point
+    /// Gravity and constant loads only, point by point
     Static,
 }
 
@@ -41,20 +41,20 @@ pub(crate) enum MethodName {
 pub(crate) enum ShaperName {
     /// Two copies half a period apart
     Zv,
-    /// Three copies: forgives a frequency that is off, takes twice as long
+    /// Three copies: robust against frequency errors, twice as long
     Zvd,
-    /// What leaves least of all modes that the motion makes swing within --delay, their frequencies
-    /// off by up to --band
+    /// Minimises the residual vibration of all modes that the motion excites, within --delay, for
+    /// frequency errors up to --band
     Optimal,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub(crate) enum LimitName {
-    /// The motion is slower; what time does not mend is an error
+    /// Slow the motion down; a violation that slowing does not remove is an error
     Slow,
-    /// An error that names all of them
+    /// Stop with an error that lists all violations
     Refuse,
-    /// They are listed, and the motion is written all the same
+    /// List the violations and write the motion all the same
     Tell,
 }
 
@@ -68,45 +68,45 @@ pub(crate) struct CompensateArgs {
     pub(crate) motion: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) input: MotionInputArgs,
-    /// How the new motion is found
+    /// Method of compensation
     #[arg(long, value_enum, default_value = "dynamic")]
     pub(crate) method: MethodName,
-    /// Which of x, y, z, rx, ry, rz of the tool count (world axes) [default: all]
+    /// Components of the TCP error to correct, of x, y, z, rx, ry, rz (world axes) [default: all]
     #[arg(long, value_name = "X,Y,...", value_delimiter = ',')]
     pub(crate) components: Vec<String>,
-    /// Most iterations
+    /// Maximum number of iterations
     #[arg(long, value_name = "N", default_value_t = 5)]
     pub(crate) iterations: usize,
-    /// Highest frequency that is corrected (Hz) [default: as far as the arm can be inverted]
+    /// Highest frequency to correct (Hz) [default: up to the limit of the arm's inversion]
     #[arg(long, value_name = "HZ")]
     pub(crate) cutoff: Option<f64>,
-    /// Run the motion through a shaper of the modes at its end before
+    /// Filter the motion first by an input shaper for the modes at its end
     #[arg(long, value_enum)]
     pub(crate) shape: Option<ShaperName>,
-    /// Longest delay of the optimal shaper (s) [default: a period of the first mode]
+    /// Maximum delay of the optimal shaper (s) [default: a period of the first mode]
     #[arg(long, value_name = "S")]
     pub(crate) delay: Option<f64>,
-    /// Part by which each frequency may be off, for the optimal shaper [default: 0.1]
+    /// Relative frequency error that the optimal shaper tolerates [default: 0.1]
     #[arg(long, value_name = "PART")]
     pub(crate) band: Option<f64>,
-    /// Loads and payloads over time (TOML, see docs/loads.md) that act on the arm: forces of a
-    /// process
+    /// File of loads and payloads over time that act on the arm, such as process forces (TOML, see
+    /// docs/loads.md)
     #[arg(long, value_name = "FILE")]
     pub(crate) loads: Option<PathBuf>,
-    /// What becomes of commands that pass a limit of position, speed, acceleration or torque which
-    /// the motion itself keeps
+    /// Response to commands that exceed a limit of position, velocity, acceleration or torque which
+    /// the motion itself respects
     #[arg(long, value_enum, default_value = "slow")]
     pub(crate) limits: LimitName,
-    /// Greatest acceleration of each joint in order (rad/s² or m/s²) [default: not looked at]
+    /// Maximum acceleration of each joint in order (rad/s² or m/s²) [default: not checked]
     #[arg(long, value_name = "A1,A2,...", value_delimiter = ',', allow_hyphen_values = true)]
     pub(crate) accelerations: Vec<f64>,
-    /// Another robot that judges: stiffness, links or drives that the first does not know
+    /// Another robot to evaluate on, with stiffness, links or drives that the first does not model
     #[arg(long, value_name = "ROBOT")]
     pub(crate) plant: Option<PathBuf>,
-    /// Do not judge on plants whose stiffness, damping and drives are off
+    /// Skip the evaluation on plants with perturbed stiffness, damping and drives
     #[arg(long)]
     pub(crate) no_sweep: bool,
-    /// Step of the simulation (s)
+    /// Step size of the simulation (s)
     #[arg(long, value_name = "S", default_value_t = 1e-3)]
     pub(crate) step: f64,
     #[command(flatten)]
@@ -116,17 +116,17 @@ pub(crate) struct CompensateArgs {
     /// Folder of the new motion and the page [default: a new one in out/]
     #[arg(short, long, help_heading = "Files", value_name = "FOLDER")]
     pub(crate) output: Option<PathBuf>,
-    /// Write the new motion to this file too, by its ending: .csv (samples), .toml, .yaml or .json
-    /// (JointTrajectory of ROS); may be repeated
+    /// Also write the new motion to this file, format by extension: .csv (samples), .toml, .yaml or
+    /// .json (JointTrajectory of ROS); may be repeated
     #[arg(long, help_heading = "Files", value_name = "FILE")]
     pub(crate) write: Vec<PathBuf>,
-    /// No recording of the arm before and after
+    /// Do not record the arm before and after
     #[arg(long, help_heading = "Files")]
     pub(crate) no_recording: bool,
     /// Write no files
     #[arg(long, help_heading = "Files", conflicts_with_all = ["output", "write"])]
     pub(crate) no_files: bool,
-    /// Overwrite what is there
+    /// Overwrite existing files
     #[arg(long, help_heading = "Files")]
     pub(crate) force: bool,
 }
@@ -210,7 +210,7 @@ pub(crate) fn run(cli: &Cli, args: &CompensateArgs) -> Result<ExitCode, Failure>
     Ok(ExitCode::SUCCESS)
 }
 
-/// What the motion makes swing, and what a shaper leaves of it.
+/// Lists the modes that the motion excites, and their residual vibration after the shaper.
 fn shaper_text(found: &Compensation) -> String {
     let Some(shaper) = &found.shaper else { return String::new() };
     let mut t = table(&["mode Hz", "damping ratio", "swings behind the motion mm", "shaped mm"]);
@@ -225,7 +225,7 @@ fn shaper_text(found: &Compensation) -> String {
     format!("{}\n\n", lines(&t))
 }
 
-/// Errors before and after, on the arm and on others.
+/// Lists the errors before and after, on the arm and on the other plants.
 fn plants_text(found: &Compensation) -> String {
     let mut t = table(&["mm", "peak before", "after", "RMS before", "after", "taken away", "end before", "after"]);
     let mut row = |name: &str, before: &ErrorFigures, after: &ErrorFigures| {

@@ -1,4 +1,4 @@
-//! `flexarm convert`: words and table.
+//! `flexarm convert`: arguments and table.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -25,12 +25,12 @@ Examples:
 pub(crate) struct ConvertArgs {
     #[arg(value_name = "IN", help = formats::help_input())]
     pub(crate) input: PathBuf,
-    /// Recording to write; its ending says the format
+    /// Recording to write, format by extension
     #[arg(value_name = "OUT")]
     pub(crate) output: PathBuf,
     #[arg(long, value_name = "FORMAT", value_parser = parse_recording_format, help = formats::help_from())]
     pub(crate) from: Option<RecordingFormat>,
-    /// Format of OUT, whatever its name ends with
+    /// Format of OUT, regardless of its extension
     #[arg(long, value_name = "FORMAT", value_parser = parse_recording_format)]
     pub(crate) to: Option<RecordingFormat>,
     /// Overwrite OUT

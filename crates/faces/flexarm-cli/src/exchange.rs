@@ -1,4 +1,4 @@
-//! `flexarm import` and `flexarm export`: flags to a job.
+//! `flexarm import` and `flexarm export`: from flags to a job.
 
 use std::process::ExitCode;
 

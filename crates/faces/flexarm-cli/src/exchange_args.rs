@@ -1,4 +1,4 @@
-//! Words of `flexarm import` and `flexarm export`.
+//! Arguments of `flexarm import` and `flexarm export`.
 
 use std::path::PathBuf;
 
@@ -34,23 +34,24 @@ Lengths are in the unit of the file, masses and inertias in SI.";
 #[derive(Debug, Args)]
 #[command(after_long_help = IMPORT_EXAMPLES, after_help = "More, with examples: flexarm import --help")]
 pub(crate) struct ImportArgs {
-    /// Files of one structure (stiffness, mass, list of rows); companions beside them are found
+    /// Files of one structure (stiffness, mass, list of rows); companion files in the same folder
+    /// are found
     #[arg(required = true, value_name = "FILE")]
     pub(crate) files: Vec<PathBuf>,
-    /// Format that the files must have; auto: by content
+    /// Required format of the files; auto: by content
     #[arg(long, value_enum, default_value_t = ImportFormatName::Auto, help_heading = "Matrices")]
     pub(crate) format: ImportFormatName,
     /// Units of the files: m-kg-s (N, Pa), mm-t-s (N, MPa), in-slinch-s, ...
     #[arg(long, value_name = "LENGTH-MASS-TIME", help_heading = "Matrices")]
     pub(crate) units: Option<UnitsOfFile>,
-    /// Which rows or nodes are which interface, proximal first, such as A=1001,B=1002
+    /// Rows or nodes of each interface, proximal first, such as A=1001,B=1002
     #[arg(long, value_name = "NAME=ROWS,...", help_heading = "Interfaces")]
     pub(crate) map: Option<ImportMap>,
     /// Frame of an interface in the link frame: x,y,z or x,y,z,roll,pitch,yaw (unit of the file,
     /// rad; repeat)
     #[arg(long, value_name = "NAME=PLACE", help_heading = "Interfaces")]
     pub(crate) at: Vec<FrameAt>,
-    /// File of the mass, if its name does not tell
+    /// File of the mass matrix, if its name does not show it
     #[arg(long, value_name = "FILE", help_heading = "Matrices", hide_short_help = true)]
     pub(crate) mass_file: Option<PathBuf>,
     /// Name of the stiffness in a file with several matrices
@@ -65,10 +66,10 @@ pub(crate) struct ImportArgs {
     /// Fixed-interface modes to keep of a full model; 0 for Guyan [default: 10]
     #[arg(long, value_name = "N", help_heading = "Matrices")]
     pub(crate) modes: Option<usize>,
-    /// Mass of the link (kg), where the matrices have none or another
+    /// Mass of the link (kg), if the matrices have none or a different one
     #[arg(long, value_name = "KG", requires_all = ["com", "inertia"], allow_hyphen_values = true, help_heading = "Mass of the link")]
     pub(crate) mass: Option<f64>,
-    /// Its centre of mass in the link frame: x,y,z (m)
+    /// Centre of mass in the link frame: x,y,z (m)
     #[arg(
         long,
         value_name = "X,Y,Z",
@@ -77,7 +78,7 @@ pub(crate) struct ImportArgs {
         help_heading = "Mass of the link"
     )]
     pub(crate) com: Option<String>,
-    /// Its inertia about the centre of mass: ixx,iyy,izz,ixy,ixz,iyz (kg m2, link axes)
+    /// Inertia about the centre of mass: ixx,iyy,izz,ixy,ixz,iyz (kg m2, link axes)
     #[arg(
         long,
         value_name = "IXX,IYY,...",
@@ -89,11 +90,11 @@ pub(crate) struct ImportArgs {
     /// Proximal rigid part: mass;x,y,z;ixx,iyy,izz,ixy,ixz,iyz (kg, m, kg m2, link axes)
     #[arg(long, value_name = "PART", value_parser = parse_part, requires = "part_b", conflicts_with = "mass", help_heading = "Mass of the link", hide_short_help = true)]
     pub(crate) part_a: Option<RigidPart>,
-    /// Distal rigid part, likewise
+    /// Distal rigid part, in the same form
     #[arg(long, value_name = "PART", value_parser = parse_part, requires = "part_a", conflicts_with = "mass", help_heading = "Mass of the link", hide_short_help = true)]
     pub(crate) part_b: Option<RigidPart>,
-    /// Where the elastic joint of the two parts sits: elastic-centre, mid, a fraction of the way
-    /// from A to B, or x,y,z
+    /// Position of the elastic joint between the two parts: elastic-centre, mid, a fraction of the
+    /// distance from A to B, or x,y,z
     #[arg(long, value_name = "WHERE", value_parser = parse_split, allow_hyphen_values = true, help_heading = "Mass of the link", hide_short_help = true)]
     pub(crate) split: Option<Split>,
     /// Name of the link [default: that of the file]
@@ -103,13 +104,13 @@ pub(crate) struct ImportArgs {
     /// --flex]
     #[arg(short, long, value_name = "FOLDER", help_heading = "Files")]
     pub(crate) output: Option<PathBuf>,
-    /// Write the link file (also) here
+    /// Write the link file (also) to this path
     #[arg(long, value_name = "FILE", help_heading = "Files")]
     pub(crate) flex: Option<PathBuf>,
-    /// Overwrite what is there
+    /// Overwrite existing files
     #[arg(long, help_heading = "Files")]
     pub(crate) force: bool,
-    /// Write nothing, only print the figures
+    /// Write no files, only print the figures
     #[arg(long, conflicts_with_all = ["output", "flex", "force"], help_heading = "Files")]
     pub(crate) no_files: bool,
 }
@@ -125,14 +126,14 @@ pub(crate) struct ExportArgs {
     /// Units to write: m-kg-s (N), mm-t-s (N, MPa), ...
     #[arg(long, value_name = "LENGTH-MASS-TIME", help_heading = "Matrices")]
     pub(crate) units: UnitsOfFile,
-    /// Node numbers of the interfaces in formats that have some, proximal first [default:
+    /// Node numbers of the interfaces in formats that use them, proximal first [default:
     /// 1001,1002,...; 1,2,... for sid]
     #[arg(long, value_name = "N,N,...", value_delimiter = ',', help_heading = "Interfaces")]
     pub(crate) nodes: Vec<i64>,
     /// Output folder [default: a new one in out/]
     #[arg(short, long, value_name = "FOLDER", help_heading = "Files")]
     pub(crate) output: Option<PathBuf>,
-    /// Overwrite what is there
+    /// Overwrite existing files
     #[arg(long, help_heading = "Files")]
     pub(crate) force: bool,
 }

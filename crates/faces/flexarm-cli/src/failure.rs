@@ -1,5 +1,5 @@
-//! What ends a command: an error of the library, of the case studies, or words on the command line
-//! that make no sense; its message, and the code that the process ends with.
+//! Errors that end a command: of the library, of the case studies, or of the command line; their
+//! messages, and the exit code of the process.
 
 use std::process::ExitCode;
 
@@ -7,16 +7,16 @@ use flexarm::{Fault, TrajectoryError};
 
 use crate::print::complaint;
 
-/// What ends a command.
+/// An error that ends a command.
 #[derive(Debug)]
 pub(crate) enum Failure {
-    /// Words on the command line that make no sense together.
+    /// Inconsistent command-line arguments.
     Usage(String),
-    /// A run of a study whose command line makes no sense.
+    /// Inconsistent arguments of one run of a study.
     InStudy { label: String, source: Box<Failure> },
-    /// What the library says.
+    /// An error of the library.
     Library(flexarm::Error),
-    /// What the case studies say.
+    /// An error of the case studies.
     Verify(flexarm_verify::Error),
 }
 
@@ -64,7 +64,7 @@ impl std::error::Error for Failure {
 }
 
 impl Failure {
-    /// What the process ends with: 2 for bad input, 1 for a run that failed.
+    /// Returns the exit code: 2 for bad input, 1 for a failed run.
     pub(crate) fn exit_code(&self) -> ExitCode {
         let fault = match self {
             Self::Usage(_) => Fault::Input,
@@ -78,13 +78,13 @@ impl Failure {
         })
     }
 
-    /// The message with its causes, and where help is to be had.
+    /// Prints the message with its causes, and where to find help.
     pub(crate) fn print(&self) {
         let text = self.to_string();
         complaint("error", &text);
         let mut source = std::error::Error::source(self);
         while let Some(cause) = source {
-            // Messages that already contain their cause do not say it twice.
+            // Skip causes that the message already contains.
             if !text.contains(&cause.to_string()) {
                 complaint("  because", &cause.to_string());
             }
@@ -95,7 +95,7 @@ impl Failure {
         }
     }
 
-    /// The page of the format of a file that is not as it should be.
+    /// Returns the format page for a file that is malformed.
     fn page(&self) -> Option<&'static str> {
         match self {
             Self::InStudy { source, .. } => source.page(),

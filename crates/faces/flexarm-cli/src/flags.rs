@@ -1,8 +1,8 @@
-//! What the settings of the library are called on the command line.
+//! Names of the library's settings on the command line.
 
 use flexarm::{Names, Setting};
 
-/// The flags, for all messages of this process.
+/// The flags, used in all messages of this process.
 pub(crate) const NAMES: Names = Names { setting: flag, caller: "the command line" };
 
 fn flag(setting: Setting) -> &'static str {

@@ -1,4 +1,4 @@
-//! Formats of recordings as words of the command line: all of them come from the library's table.
+//! Formats of recordings as command-line words, all taken from the table of the library.
 
 use std::path::PathBuf;
 
@@ -8,7 +8,7 @@ use flexarm::{Outputs, RecordingFormat};
 use crate::args::RunArgs;
 use crate::failure::Failure;
 
-/// `a, b or c`
+/// Joins words as `a, b or c`.
 fn listed(words: &[String]) -> String {
     match words {
         [] => String::new(),
@@ -21,25 +21,25 @@ fn endings(formats: &[RecordingFormat]) -> Vec<String> {
     formats.iter().map(|format| format!(".{}", format.extension())).collect()
 }
 
-/// What `convert` does.
+/// Description of `convert`.
 pub(crate) fn about_convert() -> String {
     let names = RecordingFormat::ALL.map(|format| format.to_string());
     format!("Write a recording as {}", listed(&names))
 }
 
-/// What `convert` reads.
+/// Input of `convert`.
 pub(crate) fn help_input() -> String {
     format!("Recording to read: {}", listed(&endings(&RecordingFormat::read_back())))
 }
 
-/// The words of `--from`.
+/// Values of `--from`.
 pub(crate) fn help_from() -> String {
     let words: Vec<&str> = RecordingFormat::read_back().into_iter().map(RecordingFormat::extension).collect();
     let words = words.join(", ");
     format!("Format of IN, whatever its name ends with: {words}")
 }
 
-/// What `report` reads.
+/// Input of `report`.
 pub(crate) fn help_report() -> String {
     let endings = endings(&RecordingFormat::read_back());
     let (most, others) = endings.split_first().expect("there are formats");
@@ -49,12 +49,12 @@ pub(crate) fn help_report() -> String {
     )
 }
 
-/// The page about recordings.
+/// Description of the page about recordings.
 pub(crate) fn help_page() -> String {
     format!("Recordings: {}", RecordingFormat::ALL.map(|format| format.to_string()).join(", "))
 }
 
-/// The words of `--also`: formats that a run does not write unless it is told to.
+/// Parser for `--also`: formats that a run does not write by default.
 pub(crate) fn also() -> impl TypedValueParser<Value = RecordingFormat> {
     let formats = RecordingFormat::ALL.map(RecordingFormat::info).into_iter().filter(|info| !info.by_default);
     let words = formats.map(|info| {
@@ -65,10 +65,10 @@ pub(crate) fn also() -> impl TypedValueParser<Value = RecordingFormat> {
     parser.try_map(|word| flexarm::parse_recording_format(&word))
 }
 
-/// Where a run's files go, and which are asked for.
+/// Returns the output folder of a run and the requested files.
 ///
 /// # Errors
-/// [`Failure::Usage`] for a format that this program was built without.
+/// [`Failure::Usage`] for a format that is disabled in this build.
 pub(crate) fn outputs(args: &RunArgs, folder: PathBuf) -> Result<Outputs, Failure> {
     let mut outputs = Outputs { overwrite: args.force, figures: args.figures, ..Outputs::everything(folder) };
     let parquet = args.parquet.then(|| (RecordingFormat::Parquet, "--parquet".to_owned()));
@@ -89,7 +89,7 @@ mod tests {
     use super::*;
     use crate::args::Cli;
 
-    /// Truth: the sentences of the help texts.
+    /// Truth: the sentences in the help texts.
     #[test]
     fn help_texts_name_every_format_once() {
         let (all, read) = (RecordingFormat::ALL.to_vec(), RecordingFormat::read_back());
@@ -107,7 +107,7 @@ mod tests {
         assert!(help_report().starts_with("Recordings (.mcap holds most; .parquet, "));
     }
 
-    /// A format is written by default, or there is a word that asks for it.
+    /// A format is written by default, or an option requests it.
     #[test]
     fn every_format_can_be_asked_for() {
         let mut command = Cli::command();

@@ -1,4 +1,4 @@
-//! `flexarm identify`: parameters from measurements, and poses worth measuring.
+//! `flexarm identify`: parameters from measurements, and plans of poses to measure.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -29,13 +29,13 @@ The file of measurements: flexarm format measurements";
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct IdentifyArgs {
-    /// robot.toml, a folder with one, or the name of a shipped robot; its stiffnesses are the first
-    /// guess
+    /// robot.toml, a folder with one, or the name of a shipped robot; its stiffnesses are the
+    /// initial values
     pub(crate) robot: PathBuf,
-    /// What was measured (.toml)
+    /// File of measurements (.toml)
     #[arg(required_unless_present = "plan")]
     pub(crate) measurements: Option<PathBuf>,
-    /// Find these parameters, * for anything (may be repeated) [default: those of the file, else
+    /// Parameters to identify, * as a wildcard (may be repeated) [default: those of the file, else
     /// all stiffnesses]
     #[arg(long, value_name = "NAME")]
     pub(crate) fit: Vec<String>,
@@ -43,11 +43,11 @@ pub(crate) struct IdentifyArgs {
     pub(crate) modelling: ModellingArgs,
     #[command(flatten)]
     pub(crate) load: RobotArgs,
-    /// Choose N poses that tell the parameters best, instead of reading measurements
+    /// Choose the N most informative poses instead of reading measurements
     #[arg(long, help_heading = "Plan", value_name = "N", conflicts_with = "measurements")]
     pub(crate) plan: Option<usize>,
-    /// Forces among which the plan chooses, world axes (N; may be repeated) [default: 500 N down,
-    /// along x and along y]
+    /// Candidate forces of the plan, world axes (N; may be repeated) [default: 500 N down, along x
+    /// and along y]
     #[arg(
         long = "pull",
         help_heading = "Plan",
@@ -56,25 +56,25 @@ pub(crate) struct IdentifyArgs {
         allow_hyphen_values = true
     )]
     pub(crate) forces: Vec<String>,
-    /// Points of the tool at which the forces may act, tool axes (m; may be repeated) [default: the
-    /// TCP]
+    /// Candidate points on the tool at which the forces act, tool axes (m; may be repeated)
+    /// [default: the TCP]
     #[arg(long = "lever", help_heading = "Plan", value_name = "X,Y,Z", requires = "plan", allow_hyphen_values = true)]
     pub(crate) levers: Vec<String>,
-    /// Points of the tool that may be watched, tool axes (m; may be repeated) [default: the TCP]
+    /// Candidate points on the tool to observe, tool axes (m; may be repeated) [default: the TCP]
     #[arg(long = "point", help_heading = "Plan", value_name = "X,Y,Z", requires = "plan", allow_hyphen_values = true)]
     pub(crate) points: Vec<String>,
-    /// Directions along which a dial gauge may stand, world axes (may be repeated) [default: all
-    /// three numbers are read]
+    /// Candidate directions of a dial gauge, world axes (may be repeated) [default: all three
+    /// components are measured]
     #[arg(long = "gauge", help_heading = "Plan", value_name = "X,Y,Z", requires = "plan", allow_hyphen_values = true)]
     pub(crate) gauges: Vec<String>,
     /// Standard deviation of a measured displacement (m)
     #[arg(long, help_heading = "Plan", value_name = "M", requires = "plan", default_value_t = 3e-5)]
     pub(crate) std: f64,
-    /// Poses among which the plan chooses (.csv, a column per joint, rad or m) [default: spread
-    /// over the joint ranges]
+    /// Candidate poses of the plan (.csv, a column per joint, rad or m) [default: spread over the
+    /// joint ranges]
     #[arg(long, help_heading = "Plan", value_name = "FILE", requires = "plan")]
     pub(crate) poses: Option<PathBuf>,
-    /// Poses where the work will be done (.csv): the plan makes the tool's error there sure
+    /// Poses of the later work (.csv): the plan minimises the uncertainty of the TCP error there
     #[arg(long, help_heading = "Plan", value_name = "FILE", requires = "plan")]
     pub(crate) work: Option<PathBuf>,
     /// Folder of the new robot file and the page, or of the plan [default: a new one in out/]
@@ -83,7 +83,7 @@ pub(crate) struct IdentifyArgs {
     /// Write no files
     #[arg(long, help_heading = "Files", conflicts_with = "output")]
     pub(crate) no_files: bool,
-    /// Overwrite what is in the output folder
+    /// Overwrite files in the output folder
     #[arg(long, help_heading = "Files", requires = "output")]
     pub(crate) force: bool,
 }
@@ -110,7 +110,7 @@ pub(crate) fn run(cli: &Cli, args: &IdentifyArgs) -> Result<ExitCode, Failure> {
     }
 }
 
-/// Three numbers each.
+/// Parses three numbers from each text.
 fn threes(flag: &str, what: &str, texts: &[String]) -> Result<Vec<[f64; 3]>, Failure> {
     let of = |text: &String| match flexarm::reduce::numbers(text).as_deref() {
         Ok([x, y, z]) => Ok([*x, *y, *z]),
@@ -144,7 +144,7 @@ fn plan(cli: &Cli, args: &IdentifyArgs, robot: &Robot, count: usize) -> Result<E
     Ok(ExitCode::SUCCESS)
 }
 
-/// Unit for people, and its factor.
+/// Returns a readable unit and its conversion factor.
 fn readable(unit: &str) -> (&str, f64) {
     match unit {
         "m" => ("mm", 1e3),
@@ -282,7 +282,7 @@ fn plan_text(found: &MeasurementPlan) -> String {
     out
 }
 
-/// A number with the digits that a person reads.
+/// Formats a number with readable digits.
 fn number(x: f64) -> String {
     match x.abs() {
         0.0 => "0".into(),
@@ -294,12 +294,13 @@ fn number(x: f64) -> String {
     }
 }
 
-/// A deviation, if there is one.
+/// Formats a standard deviation, "-" if there is none.
 fn deviation(std: f64) -> String {
     if std.is_nan() { "-".to_owned() } else { number(std) }
 }
 
-/// A deviation as a part of a value; none of what counts from zero, such as the place of the tool.
+/// Formats a standard deviation relative to its value; "-" for parameters whose initial value is
+/// zero, such as the position of the tool.
 fn part_of(std: f64, value: f64, initial: f64) -> String {
     if initial == 0.0 { "-".to_owned() } else { format!("{:.1} %", 100.0 * std / value.abs()) }
 }

@@ -1,15 +1,15 @@
-//! Arguments of a command that are told to the parser when the command is called.
+//! Arguments of a command that are added to the parser only when the command is used.
 //!
-//! The flags of all commands are a thousand allocations before a line is read; those of one command
-//! are few.
+//! Building the flags of all commands takes a thousand allocations before anything is parsed; those
+//! of one command take few.
 
 use std::ops::Deref;
 
 use clap::builder::Resettable;
 use clap::{ArgMatches, Args, Command, Error, FromArgMatches};
 
-/// Arguments of a subcommand without commands of its own, which completions of `help` would miss;
-/// help, errors and completions are those of `T` by itself.
+/// Arguments of a subcommand that has no subcommands of its own (completions of `help` would miss
+/// them). Help, errors and completions are the same as with `T` itself.
 #[derive(Debug)]
 pub(crate) struct Later<T>(pub(crate) Box<T>);
 
@@ -45,12 +45,12 @@ impl<T: FromArgMatches> FromArgMatches for Later<T> {
     }
 }
 
-/// The command with the arguments of `T`, before those that all commands share; what the command
-/// says of itself stays.
+/// Returns the command with the arguments of `T` placed before those shared by all commands; the
+/// description of the command is kept.
 fn with_arguments_of<T: Args>(command: Command) -> Command {
     let (about, long_about) = (command.get_about().cloned(), command.get_long_about().cloned());
     let shared: Vec<_> = command.get_arguments().map(|argument| argument.get_id().clone()).collect();
     let command = T::augment_args(command).about(Resettable::from(about)).long_about(Resettable::from(long_about));
-    // An argument that is changed goes to the end.
+    // An argument that is changed moves to the end.
     shared.into_iter().fold(command, |command, id| command.mut_arg(id, |argument| argument))
 }

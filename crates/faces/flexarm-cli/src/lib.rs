@@ -1,8 +1,8 @@
-//! The `flexarm` command line: arguments, progress, tables, exit codes. The work is done by the
-//! crate `flexarm`.
+//! The `flexarm` command line: arguments, progress, tables, exit codes. The crate `flexarm` does
+//! the work.
 //!
 //! Start at [`run`], which the program `flexarm` and the command of the Python package call.
-//! [`shipped_robot`] and [`shipped_motion`] find by name what comes with the program.
+//! [`shipped_robot`] and [`shipped_motion`] find shipped files by name.
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "printing is what this face is for")]
 
 mod args;
@@ -54,11 +54,11 @@ use flexarm::{
 use indicatif::{ProgressBar, ProgressStyle};
 use shipped::OutputFolder;
 
-/// Runs a command line, the name of the program first, and says what the process should end with: 0
-/// done, 1 the run failed, 2 bad input.
+/// Runs a command line, program name first, and returns the exit code of the process: 0 success, 1
+/// failed run, 2 bad input.
 ///
-/// It takes the process for its own: settings get the names of its flags in all messages, and
-/// signals end what it does.
+/// This function assumes that it owns the process: messages name settings by its flags, and signals
+/// stop the current command.
 pub fn run(line: Vec<OsString>) -> u8 {
     signals::turn_into_errors();
     flexarm::name_settings(flags::NAMES);
@@ -76,7 +76,7 @@ pub fn run(line: Vec<OsString>) -> u8 {
     [0, 1].into_iter().find(|number| ExitCode::from(*number) == code).unwrap_or(2)
 }
 
-/// Shows what was typed without characters that a terminal obeys.
+/// Escapes control characters in the quoted user input, which a terminal would execute.
 fn with_visible_words(mut usage: clap::Error) -> clap::Error {
     let shown = |value: &ContextValue| match value {
         ContextValue::String(text) => Some(ContextValue::String(message(text))),
@@ -90,7 +90,7 @@ fn with_visible_words(mut usage: clap::Error) -> clap::Error {
     usage
 }
 
-/// Says how a number is written where a word stands that is none.
+/// Adds a hint on the number format if a word was given instead of a number.
 fn with_number_tip(mut usage: clap::Error) -> clap::Error {
     let tip = match std::error::Error::source(&usage) {
         Some(cause) if cause.is::<std::num::ParseFloatError>() => {
@@ -103,50 +103,52 @@ fn with_number_tip(mut usage: clap::Error) -> clap::Error {
     usage
 }
 
-/// Where robots and trajectories are besides: a folder with `robots/` and `trajectories/` in it.
-/// The first call counts.
+/// Adds a folder with `robots/` and `trajectories/` to the places that are searched. Only the first
+/// call has an effect.
 pub fn ship_from(folder: PathBuf) {
     shipped::ship_from(folder);
 }
 
-/// The robot of a path, or of a name that is shipped.
+/// Returns the path of a robot, given by path or by the name of a shipped robot.
 ///
 /// # Errors
-/// [`flexarm::Error::File`] for a name that no robot has, with the ones that there are.
+/// [`flexarm::Error::File`] for an unknown name; the message lists the known names.
 pub fn shipped_robot(given: &Path) -> Result<PathBuf, flexarm::Error> {
     shipped::robot(Some(given))
 }
 
-/// The motion of a path, or of a name that is shipped; the path itself if there is none.
+/// Returns the path of a motion, given by path or by shipped name; the path itself if neither
+/// exists.
 pub fn shipped_motion(given: &Path) -> PathBuf {
     shipped::trajectory_file(given)
 }
 
-/// The robot file of a path, or of a name that is shipped; the path itself if there is none.
+/// Returns the path of a robot file, given by path or by shipped name; the path itself if neither
+/// exists.
 pub fn shipped_robot_file(given: &Path) -> PathBuf {
     shipped::robot_file(given)
 }
 
-/// The file of a cutting tool of a path, or of a name that is shipped; the path itself if there is
-/// none.
+/// Returns the path of a cutting tool file, given by path or by shipped name; the path itself if
+/// neither exists.
 pub fn shipped_tool(given: &Path) -> PathBuf {
     shipped::find(given, "robots/tools", &["", ".toml"])
 }
 
-/// Text for people or JSON for programs, without characters that a terminal obeys; a closed pipe is
+/// Prints text for people or JSON for programs, with control characters escaped; a closed pipe is
 /// not an error.
 fn answer(cli: &Cli, json: impl FnOnce() -> String, text: impl FnOnce() -> String) {
     answer_styled(cli, json, || print::plain_zeros(&visible(&text())));
 }
 
-/// The same for a text with styles, whose names are [`visible`] already.
+/// The same for styled text, whose names are already [`visible`].
 fn answer_styled(cli: &Cli, json: impl FnOnce() -> String, text: impl FnOnce() -> String) {
     let out = if cli.json { visible_json(&json()) + "\n" } else { text() };
-    // Colours go to terminals alone, and not there if NO_COLOR is set.
+    // Colours go only to terminals, and not if NO_COLOR is set.
     let mut stdout = anstream::stdout().lock();
     match stdout.write_all(out.as_bytes()).and_then(|()| stdout.flush()) {
         Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
-            // An answer that is lost must not look like one that was given.
+            // A lost answer must not look like success.
             print::complaint("error", &format!("standard output cannot be written: {error}"));
             std::process::exit(1);
         }
@@ -154,14 +156,14 @@ fn answer_styled(cli: &Cli, json: impl FnOnce() -> String, text: impl FnOnce() -
     }
 }
 
-/// JSON with the control characters escaped that its writer leaves: they stand in strings alone.
+/// Escapes the control characters that the JSON writer leaves; they occur only in strings.
 fn visible_json(text: &str) -> String {
     let is_left = |c: &char| ('\u{7f}'..='\u{9f}').contains(c);
     let escaped = |c: char| if is_left(&c) { format!("\\u{:04x}", u32::from(c)) } else { c.to_string() };
     if text.chars().any(|c| is_left(&c)) { text.chars().map(escaped).collect() } else { text.to_owned() }
 }
 
-/// Text that was made in memory; for programs under a key.
+/// Prints text generated in memory; in JSON under the given key.
 fn written(cli: &Cli, key: &str, bytes: Vec<u8>) -> ExitCode {
     let text = String::from_utf8_lossy(&bytes);
     answer(cli, || to_json(&serde_json::json!({ key: text })), || text.to_string());
@@ -222,7 +224,7 @@ fn load_options(args: &RobotArgs) -> Result<LoadOptions, Failure> {
         urdf.packages.push((name.to_owned(), folder.into()));
     }
     for argument in &args.arguments {
-        // NAME:=VALUE is how ROS writes it
+        // ROS writes NAME:=VALUE.
         let (name, value) = argument
             .split_once(":=")
             .or_else(|| argument.split_once('='))
@@ -277,7 +279,7 @@ fn run_options(args: &RunArgs, with_twin: bool) -> RunOptions {
     }
 }
 
-/// Robot, motion and choices of a run; the robot as its file models it.
+/// Returns robot, motion and options of a run, and the robot modelled as its file specifies.
 fn variant(label: String, args: &RunArgs, with_twin: bool) -> Result<(Variant, FlexibleRobot), Failure> {
     let (robot, as_filed) = Robot::load_modelled(&shipped::robot(args.robot.as_deref())?, &load_options(&args.load)?)?;
     let trajectory = match (&args.trajectory, &robot.default_trajectory) {
@@ -379,7 +381,7 @@ fn check(cli: &Cli, args: &CheckArgs) -> Result<ExitCode, Failure> {
     Ok(if wrong { ExitCode::from(2) } else { ExitCode::SUCCESS })
 }
 
-/// A progress bar that shows itself only on a terminal and only for runs over two seconds.
+/// A progress bar that appears only on a terminal and only for runs longer than two seconds.
 struct Bar {
     bar: Option<ProgressBar>,
     wanted: bool,

@@ -1,4 +1,4 @@
-//! `flexarm lobes`: flags to a request, a table for people.
+//! `flexarm lobes`: from flags to a request, and a table for people.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -30,7 +30,7 @@ Examples:
       flexarm lobes kr210 --along milling_square --places 12 --tool endmill_20mm
 The file of a tool: flexarm format tool";
 
-/// Speeds that a terminal has room for.
+/// Maximum number of speeds in the table on a terminal.
 const SHOWN: usize = 25;
 
 #[derive(Debug, Args)]
@@ -41,46 +41,46 @@ pub(crate) struct LobesArgs {
     /// Tool: a .toml file, or the name of a shipped one
     #[arg(long, help_heading = "Cut", value_name = "TOOL")]
     pub(crate) tool: PathBuf,
-    /// Along this motion instead of at one pose: the lowest limit over its places
+    /// Evaluate along this motion instead of at one pose: lowest limit over its positions
     #[arg(long, help_heading = "Cut", value_name = "MOTION", conflicts_with = "at")]
     pub(crate) along: Option<PathBuf>,
-    /// How many places along the motion
+    /// Number of positions along the motion
     #[arg(long, help_heading = "Cut", value_name = "N", default_value_t = 12, requires = "along")]
     pub(crate) places: usize,
     /// Spindle speeds (1/min) [default: those of the tool's file]
     #[arg(long, help_heading = "Cut", value_name = "RPM,...", value_delimiter = ',', allow_hyphen_values = true)]
     pub(crate) rpm: Vec<f64>,
-    /// Deepest cut that is looked at (m) [default: that of the tool's file]
+    /// Maximum depth of cut to examine (m) [default: that of the tool's file]
     #[arg(long, help_heading = "Cut", value_name = "METRES", allow_hyphen_values = true)]
     pub(crate) deepest: Option<f64>,
-    /// From the mean cutting force alone (zero-order solution): quick, blind to period doubling
+    /// Use only the mean cutting force (zero-order solution): fast, does not detect period doubling
     #[arg(long, help_heading = "Cut")]
     pub(crate) zero_order: bool,
-    /// All unstable ranges of depth, not the lowest limit alone
+    /// List all unstable ranges of depth, not only the lowest limit
     #[arg(long, help_heading = "Cut", conflicts_with_all = ["zero_order", "along"])]
     pub(crate) ranges: bool,
-    /// Follow one cut over time instead: spindle speed (1/min) and depth (m)
+    /// Simulate one cut over time instead: spindle speed (1/min) and depth (m)
     #[arg(long, help_heading = "Cut over time", value_name = "RPM,DEPTH", allow_hyphen_values = true,
         conflicts_with_all = ["along", "rpm", "zero_order", "ranges", "deepest"])]
     pub(crate) cut: Option<String>,
-    /// How long (s) [default: until it is seen whether it chatters]
+    /// Duration (s) [default: until chatter or stability is evident]
     #[arg(long, help_heading = "Cut over time", value_name = "SECONDS", requires = "cut", allow_hyphen_values = true)]
     pub(crate) seconds: Option<f64>,
-    /// Steps from tooth to tooth
+    /// Number of steps per tooth period
     #[arg(long, help_heading = "Cut over time", value_name = "N", requires = "cut", default_value_t = 60)]
     pub(crate) steps: usize,
     /// Output folder [default: a new one in out/]
     #[arg(short, long, help_heading = "Files", value_name = "FOLDER")]
     pub(crate) output: Option<PathBuf>,
-    /// Overwrite what is in the output folder
+    /// Overwrite files in the output folder
     #[arg(long, help_heading = "Files")]
     pub(crate) force: bool,
-    /// Write nothing, only print the figures
+    /// Write no files, only print the figures
     #[arg(long, help_heading = "Files", conflicts_with_all = ["output", "force"])]
     pub(crate) no_files: bool,
 }
 
-/// The tool of a file or a shipped one, at other speeds than its own if any are told.
+/// Loads a tool from a file or a shipped one; `rpm` replaces its speeds unless it is empty.
 pub(crate) fn cutting_tool(given: &Path, rpm: &[f64]) -> Result<CuttingTool, Failure> {
     let tool = CuttingTool::load(shipped::tool(given)?)?;
     Ok(if rpm.is_empty() { tool } else { tool.at_speeds(rpm.to_vec()) })
@@ -121,7 +121,7 @@ pub(crate) fn run(cli: &Cli, args: &LobesArgs) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// One cut over time.
+/// Simulates one cut over time.
 fn follow(
     cli: &Cli,
     args: &LobesArgs,
@@ -182,7 +182,7 @@ fn cut_text(c: &CutRun) -> String {
     out
 }
 
-/// Of limits that are found; on a terminal alone.
+/// Progress bar over the limits found; only on a terminal.
 fn progress(cli: &Cli) -> ProgressBar {
     let target = if cli.quiet || cli.json { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
     let style = ProgressStyle::with_template("{bar:40} {pos} of {len} limits, {eta} left");
@@ -217,7 +217,7 @@ fn text(found: &Lobes) -> String {
     head.extend(along.then_some("at [s]"));
     head.extend(ranges.then_some("unstable [mm]"));
     let mut t = table(&head);
-    // Evenly, where there are too many.
+    // Thin out evenly if there are too many.
     let every = found.points.len().div_ceil(SHOWN).max(1);
     for point in found.points.iter().step_by(every) {
         t.add_row(row(found, point, along, ranges));
@@ -264,7 +264,7 @@ fn row(found: &Lobes, point: &LobePoint, along: bool, ranges: bool) -> Vec<Strin
     row
 }
 
-/// Lowest limit and compliance place by place.
+/// Table of the lowest limit and the compliance at each position.
 fn poses(found: &Lobes) -> String {
     let mut t =
         table(&["time [s]", "lowest limit [mm]", "at [1/min]", "feed [um/N]", "across", "along the tool", "f1 [Hz]"]);

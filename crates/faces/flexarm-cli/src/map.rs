@@ -1,4 +1,4 @@
-//! `flexarm map`: flags to a request, a table for people.
+//! `flexarm map`: from flags to a request, and a table for people.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -39,10 +39,10 @@ Examples:
 
 #[derive(Clone, Copy, Debug, Default, ValueEnum)]
 pub(crate) enum KeepName {
-    /// The best pose of each place
+    /// The best pose at each position
     #[default]
     Best,
-    /// The worst pose of each place
+    /// The worst pose at each position
     Worst,
     /// All poses
     All,
@@ -53,17 +53,17 @@ pub(crate) enum KeepName {
 pub(crate) struct MapArgs {
     /// robot.toml, a folder with one, a .urdf or .xacro file, or the name of a shipped robot
     pub(crate) robot: PathBuf,
-    /// Box of places of the tool (m, world) [default: all that the arm can reach]
+    /// Box of TCP positions (m, world) [default: the whole workspace]
     #[arg(long = "box", help_heading = "Where", value_name = "X0:X1,Y0:Y1,Z0:Z1", allow_hyphen_values = true)]
     pub(crate) bounds: Option<String>,
-    /// Distance of the places (m) [default: about 32 along the longest edge]
+    /// Spacing of the positions (m) [default: about 32 along the longest edge]
     #[arg(long, help_heading = "Where", value_name = "M", allow_hyphen_values = true)]
     pub(crate) grid: Option<f64>,
-    /// Leave out places nearer than this to the upright line through the first joint (m): the arm
-    /// itself is there
+    /// Exclude positions nearer than this to the vertical line through the first joint (m), where
+    /// the arm itself is
     #[arg(long, help_heading = "Where", value_name = "M", default_value_t = 0.0, allow_hyphen_values = true)]
     pub(crate) keep_out: f64,
-    /// Where the z axis of the tool points in the world
+    /// Direction of the tool's z axis in the world
     #[arg(long, help_heading = "Where", value_name = "X,Y,Z", default_value = "0,0,-1", allow_hyphen_values = true)]
     pub(crate) tool_axis: String,
     /// Rotation of the tool about that axis (degrees); at 0 its x axis points along world x
@@ -72,38 +72,38 @@ pub(crate) struct MapArgs {
     /// Half angle of a cone within which the tool may tilt (degrees)
     #[arg(long, help_heading = "Where", value_name = "DEG", default_value_t = 0.0, allow_hyphen_values = true)]
     pub(crate) cone: f64,
-    /// Directions of the tool in the cone [default: 9 with a cone, else 1]
+    /// Number of tool directions in the cone [default: 9 with a cone, else 1]
     #[arg(long, help_heading = "Where", value_name = "N")]
     pub(crate) tilts: Option<usize>,
-    /// Rotations of the tool about its axis that count, evenly over a turn
+    /// Number of tool rotations about its axis, evenly over a turn
     #[arg(long, help_heading = "Where", value_name = "N", default_value_t = 1)]
     pub(crate) rolls: usize,
-    /// Go through values of a joint instead of places (may be repeated; rad or m, 30deg for
-    /// degrees)
+    /// Scan values of a joint instead of positions (may be repeated; rad or m, 30deg for degrees)
     #[arg(long, help_heading = "Where", value_name = "JOINT=FROM:TO:N", allow_hyphen_values = true, conflicts_with_all = ["bounds", "grid", "along"])]
     pub(crate) over: Vec<String>,
-    /// Go along a motion instead of places
+    /// Evaluate along a motion instead of at positions
     #[arg(long, help_heading = "Where", value_name = "MOTION", conflicts_with_all = ["bounds", "grid"])]
     pub(crate) along: Option<PathBuf>,
-    /// Instants of that motion
+    /// Number of instants along that motion
     #[arg(long, help_heading = "Where", value_name = "N", default_value_t = 1000, requires = "along")]
     pub(crate) points: usize,
-    /// Go through the poses of a file: a table with a column for each joint (_deg after its name
-    /// for degrees), or a .toml file with poses = [[...], ...]; the table of the map then has the
-    /// 6x6 compliance of each
+    /// Evaluate the poses of a file: a table with a column for each joint (_deg after its name for
+    /// degrees), or a .toml file with poses = [[...], ...]; the table of the map then has the 6x6
+    /// compliance of each
     #[arg(long, help_heading = "Where", value_name = "FILE", conflicts_with_all = ["bounds", "grid", "over", "along"])]
     pub(crate) poses: Option<PathBuf>,
-    /// Joints that the map does not move, and near which branches are taken [default: zero]
+    /// Values of the joints that the map does not move; also selects the inverse kinematics
+    /// branches [default: zero]
     #[arg(long, help_heading = "Where", value_name = "Q1,Q2,...", allow_hyphen_values = true)]
     pub(crate) at: Option<String>,
-    /// Force and moment on the TCP besides weight, world axes (N, N m)
+    /// Force and moment on the TCP in addition to gravity, world axes (N, N m)
     #[arg(long, help_heading = "What", value_name = "FX,FY,FZ[,TX,TY,TZ]", allow_hyphen_values = true)]
     pub(crate) wrench: Option<String>,
-    /// A tool that cuts: how deep it may before it chatters; a .toml file, or the name of a shipped
-    /// one (flexarm format tool)
+    /// Cutting tool for which to compute the chatter-free depth of cut; a .toml file, or the name
+    /// of a shipped one (flexarm format tool)
     #[arg(long, help_heading = "What", value_name = "TOOL", requires = "rpm")]
     pub(crate) tool: Option<PathBuf>,
-    /// Spindle speeds of the tool, of which the lowest limit counts (1/min)
+    /// Spindle speeds of the tool; their lowest limit is used (1/min)
     #[arg(
         long,
         help_heading = "What",
@@ -113,21 +113,21 @@ pub(crate) struct MapArgs {
         requires = "tool"
     )]
     pub(crate) rpm: Vec<f64>,
-    /// Limits of depth from the mean cutting force alone (zero-order solution): quick, blind to
-    /// period doubling
+    /// Compute limits of depth only from the mean cutting force (zero-order solution): fast, does
+    /// not detect period doubling
     #[arg(long, help_heading = "What", requires = "tool")]
     pub(crate) zero_order: bool,
     /// Quantity by which poses are compared [default: depth_m with a tool, error_m with a wrench,
     /// else compliance_worst_m_per_n]
     #[arg(long, help_heading = "What", value_name = "NAME")]
     pub(crate) by: Option<String>,
-    /// Which of a place's poses are kept, of all directions and branches
+    /// Poses to keep at each position, of all directions and branches
     #[arg(long, help_heading = "What", value_enum, default_value = "best")]
     pub(crate) keep: KeepName,
-    /// Natural frequencies
+    /// Number of natural frequencies
     #[arg(long, help_heading = "What", value_name = "N", default_value_t = 3)]
     pub(crate) frequencies: usize,
-    /// Find the best place for a box with these edges (m, along world axes)
+    /// Find the best position for a box with these edges (m, along world axes)
     #[arg(long, help_heading = "What", value_name = "DX,DY,DZ", allow_hyphen_values = true, conflicts_with_all = ["over", "along", "poses"])]
     pub(crate) workpiece: Option<String>,
     #[command(flatten)]
@@ -142,19 +142,19 @@ pub(crate) struct MapArgs {
     /// Write no files
     #[arg(long, help_heading = "Files", conflicts_with = "output")]
     pub(crate) no_files: bool,
-    /// Overwrite what is in the output folder
+    /// Overwrite files in the output folder
     #[arg(long, help_heading = "Files", requires = "output")]
     pub(crate) force: bool,
 }
 
-/// Three numbers of a flag.
+/// Parses the three numbers of a flag.
 fn three(flag: &str, text: &str, unit: &str) -> Result<[f64; 3], Failure> {
     let found = numbers(text).map_err(|what| Failure::Usage(format!("{flag}: {what}{unit}")))?;
     <[f64; 3]>::try_from(found.as_slice())
         .map_err(|_| Failure::Usage(format!("{flag} has {} numbers; expected three{unit}", found.len())))
 }
 
-/// Reads `x0:x1,y0:y1,z0:z1`.
+/// Parses `x0:x1,y0:y1,z0:z1`.
 fn bounds(text: &str) -> Result<[[f64; 3]; 2], Failure> {
     let wrong =
         || Failure::Usage(format!("--box {text:?}: expected X0:X1,Y0:Y1,Z0:Z1 in m, world, such as 1:2,-0.5:0.5,0:1"));
@@ -170,7 +170,7 @@ fn bounds(text: &str) -> Result<[[f64; 3]; 2], Failure> {
     Ok([[x[0], y[0], z[0]], [x[1], y[1], z[1]]])
 }
 
-/// Reads `joint=from:to:n`.
+/// Parses `joint=from:to:n`.
 fn joint_range(text: &str, robot: &Robot) -> Result<JointRange, Failure> {
     let wrong = || {
         Failure::Usage(format!(

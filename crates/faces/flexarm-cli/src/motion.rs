@@ -1,4 +1,4 @@
-//! `flexarm motion`: what is in a motion, against the limits of a robot.
+//! `flexarm motion`: contents of a motion, compared with the limits of a robot.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -12,16 +12,16 @@ use crate::failure::Failure;
 use crate::print::{lines, table};
 use crate::{answer, load_options, shipped, to_json};
 
-/// Letters of a curve in the terminal.
+/// Width of a curve in the terminal (characters).
 const WIDTH: usize = 60;
 const LEVELS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
 
-/// What is said about a motion file beside its path.
+/// Options for reading a motion file.
 #[derive(Clone, Debug, Default, Args)]
 #[command(next_help_heading = "Motion")]
 pub(crate) struct MotionInputArgs {
-    /// Topic of a bag that holds the motion [default: the one that moves most joints of the robot,
-    /// and told]
+    /// Topic of a bag that holds the motion [default: the one that moves the largest number of the
+    /// robot's joints, and it is reported]
     #[arg(long, value_name = "TOPIC")]
     pub(crate) topic: Option<String>,
     /// Columns of a table: t=Time[s],joint_1=A1[deg]; a column by its name, with another unit, or
@@ -40,24 +40,24 @@ impl MotionInputArgs {
 pub(crate) struct MotionArgs {
     /// Motion file of any format (flexarm format motion), or the name of a shipped one
     pub(crate) motion: PathBuf,
-    /// robot.toml, a folder with one, a .urdf or .xacro file, or the name of a shipped robot: its
-    /// limits, its torques, the way of its tool [default: the values of the joints alone]
+    /// robot.toml, a folder with one, a .urdf or .xacro file, or the name of a shipped robot, for
+    /// its limits, torques and TCP path [default: only the joint values]
     pub(crate) robot: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) input: MotionInputArgs,
     #[command(flatten)]
     pub(crate) load: RobotArgs,
-    /// Write the motion to this file, by its ending: .csv (samples), .toml (waypoints), .yaml or
-    /// .json (JointTrajectory of ROS), .svg (curves); may be repeated
+    /// Write the motion to this file, format by extension: .csv (samples), .toml (waypoints), .yaml
+    /// or .json (JointTrajectory of ROS), .svg (curves); may be repeated
     #[arg(short, long, help_heading = "Files", value_name = "FILE")]
     pub(crate) output: Vec<PathBuf>,
     /// Draw positions, speeds and torques over time (SVG)
     #[arg(long, help_heading = "Files", value_name = "FILE")]
     pub(crate) svg: Option<PathBuf>,
-    /// Rows or points per second of what is written
+    /// Rows or points per second in the written files
     #[arg(long, help_heading = "Files", value_name = "HZ", default_value_t = 500.0, allow_hyphen_values = true)]
     pub(crate) rate: f64,
-    /// Overwrite files that are there
+    /// Overwrite existing files
     #[arg(long, help_heading = "Files")]
     pub(crate) force: bool,
 }
@@ -117,14 +117,14 @@ fn text(report: &MotionReport) -> String {
     out
 }
 
-/// A number with the digits that a person reads.
+/// Formats a number with readable digits.
 fn rounded(value: f64) -> String {
     let text = format!("{value:.4}");
     let text = text.trim_end_matches('0').trim_end_matches('.');
     if text == "-0" { "0".to_owned() } else { text.to_owned() }
 }
 
-/// Angles in degrees, with the part of the limit that is used.
+/// Table of peak values; angles in degrees, with the used share of the limit.
 fn peaks(peaks: &[MotionPeak]) -> String {
     let with_torque = peaks.iter().any(|peak| peak.torque.is_some());
     let mut header = vec!["joint", "", "from", "to", "speed", "acceleration", "jerk"];
@@ -166,7 +166,7 @@ fn peaks(peaks: &[MotionPeak]) -> String {
     lines(&t) + note
 }
 
-/// A line per joint: its position over time, each from its least to its greatest.
+/// One line per joint: its position over time, scaled from its minimum to its maximum.
 fn curves(curves: &[MotionCurve], peaks: &[MotionPeak]) -> String {
     let longest = curves.iter().map(|curve| curve.joint.chars().count()).max().unwrap_or(0);
     let mut out = String::new();

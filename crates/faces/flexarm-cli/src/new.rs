@@ -1,4 +1,4 @@
-//! `flexarm new`: a robot file, a sample motion and the first run from a robot description.
+//! `flexarm new`: a robot file, a sample motion and a first run from a robot description.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -20,34 +20,34 @@ use crate::{Bar, answer_styled, load_options, signals, summary_table, to_json};
 pub(crate) struct NewArgs {
     /// URDF or xacro file of the robot
     pub(crate) urdf: PathBuf,
-    /// Folder for robot.toml, motion.toml, README.md and, if it does not lie beside, a copy of the
-    /// description with its meshes [default: a folder here with the robot's name]
+    /// Folder for robot.toml, motion.toml, README.md and, unless it is in the same folder, a copy
+    /// of the description with its meshes [default: a new folder named after the robot]
     #[arg(short, long, help_heading = "Files", value_name = "DIR")]
     pub(crate) output: Option<PathBuf>,
-    /// Overwrite files that are there
+    /// Overwrite existing files
     #[arg(long, help_heading = "Files")]
     pub(crate) force: bool,
-    /// Write the files and leave the first run out
+    /// Write the files but skip the first run
     #[arg(long, help_heading = "Files")]
     pub(crate) no_run: bool,
     /// Link at which the arm begins [default: the first of the description]; joints before it are
     /// held
     #[arg(long, help_heading = "Robot", value_name = "LINK")]
     pub(crate) base: Option<String>,
-    /// Link that is the tool [default: tool0, tcp, flange, ... at the end of the arm with most
-    /// joints]
+    /// Link that is the tool [default: tool0, tcp, flange, ... at the end of the arm with the
+    /// largest number of joints]
     #[arg(long, help_heading = "Robot", value_name = "LINK", alias = "tcp")]
     pub(crate) tool: Option<String>,
-    /// Joints that the sample motion moves, with commas between; all others are held [default:
+    /// Joints that the sample motion moves, separated by commas; all others are held [default:
     /// those from base to tool]
     #[arg(long, help_heading = "Robot", value_name = "JOINT,...", value_delimiter = ',')]
     pub(crate) joints: Option<Vec<String>>,
-    /// Mass that the tool carries (kg), 0 for none [default: about 15 % of the mass that moves, and
-    /// said]
+    /// Mass of the payload (kg), 0 for none [default: about 15 % of the moving mass; it is
+    /// reported]
     #[arg(long, help_heading = "Robot", value_name = "KG", allow_hyphen_values = true)]
     pub(crate) payload: Option<f64>,
-    /// Mass of the arm's links without <inertial>, or with one that only holds a place, together
-    /// (kg): spread by the volumes of their meshes or by their lengths
+    /// Total mass of the arm's links without <inertial>, or with a placeholder (kg): distributed by
+    /// mesh volume or by length
     #[arg(
         long = "inertia-from-total-mass",
         help_heading = "Robot",
@@ -66,7 +66,7 @@ pub(crate) struct NewArgs {
         allow_hyphen_values = true
     )]
     pub(crate) density: Option<f64>,
-    /// Where package://NAME/ leads (may be repeated)
+    /// Folder of package://NAME/ (may be repeated)
     #[arg(long = "package", help_heading = "Robot", value_name = "NAME=FOLDER")]
     pub(crate) packages: Vec<String>,
     /// Argument of a xacro file (may be repeated)
@@ -89,12 +89,12 @@ impl NewArgs {
         Ok(NewOptions { base, tool, joints, payload_kg: self.payload, urdf })
     }
 
-    /// The folder asked for, or one here with a name from the description.
+    /// Returns the requested folder, or one in the current folder named after the description.
     fn folder(&self, urdf: &ReadOptions) -> PathBuf {
         let stem = || {
             let name = self.urdf.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
             let name = name.split('.').next().unwrap_or_default().to_owned();
-            // A file that serves several robots says by an argument which one is meant.
+            // If one file describes several robots, an argument selects the robot.
             let which = urdf.arguments.iter().find(|(name, _)| name == "name" || name.ends_with("_type"));
             which.map_or(name, |(_, value)| value.clone())
         };
@@ -120,7 +120,7 @@ pub(crate) fn run(cli: &Cli, args: &NewArgs) -> Result<ExitCode, Failure> {
     Ok(if wrong { ExitCode::from(1) } else { ExitCode::SUCCESS })
 }
 
-/// The flexible arm beside its rigid twin on the sample motion, with a report in the folder
+/// Runs the flexible arm and its rigid twin on the sample motion, with a report in the folder
 /// `first_run`.
 fn first_run(cli: &Cli, made: &NewRobot, folder: &Path, overwrite: bool) -> Result<Summary, Failure> {
     let robot = Robot::load(&made.robot)?;

@@ -1,5 +1,5 @@
-//! `flexarm statics`, `flexarm modes` and `flexarm response`: flags to a request, tables for
-//! people.
+//! `flexarm statics`, `flexarm modes` and `flexarm response`: from flags to a request, and tables
+//! for people.
 
 use std::process::ExitCode;
 
@@ -16,7 +16,7 @@ use crate::print::{caveats, filled, lines, table};
 use crate::shipped::OutputFolder;
 use crate::{answer, load_options, shipped, to_json, values};
 
-/// Directions at the TCP.
+/// Names of the directions at the TCP.
 const AXES: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
 /// Peaks of a response in the columns of a terminal.
 const SHOWN_PEAKS: usize = 3;
@@ -96,7 +96,7 @@ pub(crate) fn response(cli: &Cli, args: &ResponseArgs) -> Result<ExitCode, Failu
     Ok(ExitCode::SUCCESS)
 }
 
-/// Numbers to the right from a column on.
+/// Aligns the columns from `from` on to the right.
 fn right(table: &mut comfy_table::Table, from: usize) {
     for k in from..table.column_count() {
         if let Some(column) = table.column_mut(k) {
@@ -197,12 +197,12 @@ fn modes_text(m: &ModeTable) -> String {
     out
 }
 
-/// The one mass that moves like the mode, for the square of the motion at unit modal mass.
+/// Effective mass of a mode from the squared motion at unit modal mass.
 fn mass(square: f64) -> String {
     if square > 1e-12 { format!("{:.2}", 1.0 / square) } else { "-".into() }
 }
 
-/// Components of a translation that count, the largest as 1.
+/// Significant components of a translation, scaled so that the largest is 1.
 fn direction(tcp: &[f64; 6]) -> String {
     let largest = tcp[..3].iter().fold(0.0f64, |top, x| top.max(x.abs()));
     if largest < 1e-9 {

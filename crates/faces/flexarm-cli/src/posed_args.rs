@@ -1,4 +1,4 @@
-//! Words of `flexarm statics`, `flexarm modes` and `flexarm response`.
+//! Arguments of `flexarm statics`, `flexarm modes` and `flexarm response`.
 
 use std::path::PathBuf;
 
@@ -37,14 +37,14 @@ pub(crate) struct PoseArgs {
 pub(crate) struct StaticsArgs {
     #[command(flatten)]
     pub(crate) pose: PoseArgs,
-    /// Force and moment on the TCP besides weight, world axes (N, N m)
+    /// Force and moment on the TCP in addition to gravity, world axes (N, N m)
     #[arg(long, value_name = "FX,FY,FZ[,TX,TY,TZ]", allow_hyphen_values = true)]
     pub(crate) wrench: Option<String>,
-    /// Write to this folder a picture of the arm, its deflections magnified beside the rigid arm,
-    /// and the figures
+    /// Folder for the figures and a picture of the arm with magnified deflections next to the rigid
+    /// arm
     #[arg(short, long, value_name = "FOLDER")]
     pub(crate) output: Option<PathBuf>,
-    /// Overwrite what is in the output folder
+    /// Overwrite files in the output folder
     #[arg(long, requires = "output")]
     pub(crate) force: bool,
 }
@@ -53,19 +53,19 @@ pub(crate) struct StaticsArgs {
 pub(crate) struct ModesArgs {
     #[command(flatten)]
     pub(crate) pose: PoseArgs,
-    /// How many modes, from the lowest
+    /// Number of modes, from the lowest
     #[arg(long, value_name = "N", default_value_t = 10)]
     pub(crate) count: usize,
-    /// Write a recording to this folder, in which each mode swings after another
+    /// Write a recording to this folder that shows one mode after the other
     #[arg(short, long, value_name = "FOLDER")]
     pub(crate) output: Option<PathBuf>,
-    /// Overwrite what is in the output folder
+    /// Overwrite files in the output folder
     #[arg(long, requires = "output")]
     pub(crate) force: bool,
-    /// How long each mode swings in the recording (s)
+    /// Duration of each mode in the recording (s)
     #[arg(long, value_name = "SECONDS", default_value_t = 3.0, requires = "output", allow_hyphen_values = true)]
     pub(crate) seconds: f64,
-    /// How far the TCP moves in the recording (m) [default: a twentieth of the arm's reach]
+    /// Amplitude of the TCP in the recording (m) [default: a twentieth of the arm's reach]
     #[arg(long, value_name = "METRES", requires = "output", allow_hyphen_values = true)]
     pub(crate) tool_motion: Option<f64>,
 }
@@ -75,7 +75,7 @@ pub(crate) struct ModesArgs {
 pub(crate) struct ResponseArgs {
     #[command(flatten)]
     pub(crate) pose: PoseArgs,
-    /// What shakes the arm: force-x ... torque-z on the TCP, or joints
+    /// Input: force-x ... torque-z on the TCP, or joints
     #[arg(
         long,
         help_heading = "Response",
@@ -84,10 +84,10 @@ pub(crate) struct ResponseArgs {
         default_value = "force-x,force-y,force-z"
     )]
     pub(crate) input: Vec<String>,
-    /// What answers: x, y, z, rx, ry, rz of the TCP
+    /// Output: x, y, z, rx, ry, rz of the TCP
     #[arg(long, help_heading = "Response", value_name = "NAME,...", value_delimiter = ',', default_value = "x,y,z")]
     pub(crate) output: Vec<String>,
-    /// Of the outputs
+    /// Quantity of the outputs
     #[arg(long, help_heading = "Response", hide_short_help = true, value_enum, default_value_t = QuantityName::Displacement)]
     pub(crate) quantity: QuantityName,
     /// Lowest frequency (Hz) [default: a tenth of the first mode's]
@@ -96,19 +96,19 @@ pub(crate) struct ResponseArgs {
     /// Highest frequency (Hz) [default: twice the sixth mode's]
     #[arg(long, help_heading = "Response", value_name = "HZ", allow_hyphen_values = true)]
     pub(crate) to: Option<f64>,
-    /// How many frequencies; more are put in around resonances
+    /// Number of frequencies; more are added around resonances
     #[arg(long, help_heading = "Response", hide_short_help = true, value_name = "N", default_value_t = 500)]
     pub(crate) points: usize,
-    /// Of the frequencies
+    /// Spacing of the frequencies
     #[arg(long, help_heading = "Response", hide_short_help = true, value_enum, default_value_t = SpacingName::Log)]
     pub(crate) spacing: SpacingName,
     /// Output folder [default: a new one in out/]
     #[arg(short = 'o', long = "output-folder", help_heading = "Files", value_name = "FOLDER")]
     pub(crate) folder: Option<PathBuf>,
-    /// Overwrite what is in the output folder
+    /// Overwrite files in the output folder
     #[arg(long, help_heading = "Files")]
     pub(crate) force: bool,
-    /// Write nothing, only print the figures
+    /// Write no files, only print the figures
     #[arg(long, help_heading = "Files", conflicts_with_all = ["folder", "force"])]
     pub(crate) no_files: bool,
 }

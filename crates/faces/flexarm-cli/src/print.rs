@@ -9,10 +9,10 @@ use flexarm::{Caveat, Finding, Inspection, gathered};
 
 use crate::args::Cli;
 
-/// Longest name in a table (characters).
+/// Maximum length of a name in a table (characters).
 const LONGEST_NAME: usize = 60;
 
-/// A table whose cells a terminal can show.
+/// A table with cells that a terminal can display.
 pub(crate) struct TextTable {
     table: Table,
     shortens: bool,
@@ -32,13 +32,13 @@ impl DerefMut for TextTable {
 }
 
 impl TextTable {
-    /// Adds a row; names that are too long for a table are shortened.
+    /// Adds a row; names that are too long are shortened.
     pub(crate) fn add_row<C: ToString>(&mut self, cells: impl IntoIterator<Item = C>) {
         let cells: Vec<String> = cells.into_iter().map(|cell| self.cell(&cell.to_string())).collect();
         self.table.add_row(cells);
     }
 
-    /// Names of the columns.
+    /// Sets the names of the columns.
     pub(crate) fn set_header<C: ToString>(&mut self, cells: impl IntoIterator<Item = C>) {
         let cells: Vec<String> = cells.into_iter().map(|cell| self.cell(&cell.to_string())).collect();
         self.table.set_header(cells);
@@ -65,13 +65,13 @@ pub(crate) fn table<C: AsRef<str>>(header: &[C]) -> TextTable {
     table
 }
 
-/// The table without the blanks that pad its last column.
+/// Formats the table without trailing blanks.
 pub(crate) fn lines(table: &TextTable) -> String {
     let rows: String = table.to_string().lines().map(|l| l.trim_end().to_owned() + "\n").collect();
     if table.shortens { rows + SHORTENED } else { rows }
 }
 
-/// Where names are whole.
+/// Note that names are shortened.
 pub(crate) const SHORTENED: &str = "names that end in … are shortened: --json has them whole\n";
 
 /// Text in lines of at most 80 columns, broken after a separator.
@@ -114,7 +114,7 @@ fn limit(x: Option<f64>) -> String {
     x.map_or_else(|| "-".into(), |x| format!("{x:.4}"))
 }
 
-/// A closed loop: what follows from it, and how well it hands on force.
+/// Describes a closed loop: its dependent joints, and its transmission angle.
 fn loop_line(own: &flexarm::LoopInfo) -> String {
     let joints: Vec<String> = own.dependent.iter().map(|joint| format!("{} at {:.4}", joint.name, joint.q)).collect();
     let least = own
@@ -129,7 +129,7 @@ fn loop_line(own: &flexarm::LoopInfo) -> String {
     )
 }
 
-/// What was loaded.
+/// Formats what was loaded.
 pub(crate) fn inspection(i: &Inspection) -> String {
     let mut out = format!("{}, {:.2} kg\n", i.robot, i.mass_kg);
     // Without velocities the bias is the gravity torque.
@@ -223,7 +223,7 @@ pub(crate) fn inspection(i: &Inspection) -> String {
     out
 }
 
-/// All findings.
+/// Lists all findings.
 pub(crate) fn findings(findings: &[Finding]) -> String {
     if findings.is_empty() {
         return "nothing found\n".into();
@@ -257,7 +257,7 @@ fn report_table(report: &ReportTable) -> String {
     format!("\n{}\n{}", report.title, lines(&t))
 }
 
-/// The figures of a reduction.
+/// Formats the figures of a reduction.
 pub(crate) fn reduction(summary: &ReduceSummary) -> String {
     let mut out = format!("link {}\n{}\n", summary.link, flexarm::reduce::headline(summary));
     for report in flexarm::reduce::tables(summary).iter().filter(|report| !report.page_only) {
@@ -282,7 +282,7 @@ pub(crate) fn reduction(summary: &ReduceSummary) -> String {
     out
 }
 
-/// The figures of an import.
+/// Formats the figures of an import.
 pub(crate) fn imported(summary: &flexarm::import::ImportSummary) -> String {
     let mut out = format!(
         "link {}\n{}: {}, {}, {} rows; {}\n",
@@ -312,7 +312,7 @@ pub(crate) fn imported(summary: &flexarm::import::ImportSummary) -> String {
     out
 }
 
-/// What was exported.
+/// Formats the figures of an export.
 pub(crate) fn exported(summary: &flexarm::export::ExportSummary) -> String {
     let mut out = format!(
         "link {} as {} in {}: {} rows, {} of them modes\n",
@@ -330,7 +330,7 @@ pub(crate) fn exported(summary: &flexarm::export::ExportSummary) -> String {
     out
 }
 
-/// What is in a mesh.
+/// Lists the contents of a mesh.
 pub(crate) fn listing(l: &MeshListing) -> String {
     let units = l.units.as_deref().unwrap_or("units not declared");
     let mut out = format!("{} ({}, {units}): {} nodes, {} elements\n", l.mesh, l.format, l.nodes, l.elements);
@@ -370,26 +370,26 @@ fn sets(title: &str, sets: &[SetListing]) -> String {
     format!("\n{title} (unit of the mesh)\n{}", lines(&t))
 }
 
-/// A warning on standard error.
+/// Prints a warning to standard error.
 pub(crate) fn warning(text: &str) {
     let yellow = anstyle::AnsiColor::Yellow.on_default().bold();
     anstream::eprintln!("{yellow}warning:{yellow:#} {}", message(text));
 }
 
-/// An error on standard error, or another line that begins with a word of its own.
+/// Prints an error, or another line with its own first word, to standard error.
 pub(crate) fn complaint(word: &str, text: &str) {
     eprintln!("{word}: {}", message(text));
 }
 
-/// Warnings on standard error, those of one kind as one, unless nobody wants to see them.
+/// Prints warnings to standard error, those of one kind merged, unless `--quiet` is set.
 pub(crate) fn warnings(cli: &Cli, texts: &[String]) {
     if !cli.quiet {
         gathered(texts).iter().for_each(|text| warning(text));
     }
 }
 
-/// The same of caveats. What the description of the robot has is told in full by `check` and `new`,
-/// here in one line.
+/// Prints the warnings among the caveats. Those of the robot description are summarised in one
+/// line; `check` and `new` list them in full.
 pub(crate) fn caveats(cli: &Cli, caveats: &[Caveat]) {
     let (of_description, own): (Vec<&Caveat>, Vec<&Caveat>) =
         caveats.iter().filter(|caveat| caveat.warns()).partition(|caveat| caveat.of_description);

@@ -1,4 +1,4 @@
-//! `flexarm reduce`: flags to a job, steps on the terminal.
+//! `flexarm reduce`: from flags to a job, and progress on the terminal.
 
 use std::io::IsTerminal;
 use std::process::ExitCode;
@@ -42,7 +42,7 @@ pub(crate) fn run(cli: &Cli, args: &ReduceArgs) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// What the flags say, as a job without a mesh.
+/// Returns the job of the flags, without a mesh.
 fn flags(args: &ReduceArgs) -> Result<ReduceJob, Failure> {
     let urdf = args.urdf.clone().zip(args.link.clone());
     let mut job = ReduceJob {
@@ -111,7 +111,7 @@ fn once<T>(own: &mut Option<T>, value: T, flag: &str) -> Result<(), Failure> {
     }
 }
 
-/// The interface of that name; a new one if there is none yet.
+/// Returns the interface of that name, adding it if there is none yet.
 fn entry<'a>(job: &'a mut ReduceJob, name: &str) -> &'a mut InterfaceEntry {
     let found = job.interface.iter().position(|own| own.name.as_deref() == Some(name));
     let index = found.unwrap_or_else(|| {
@@ -121,10 +121,10 @@ fn entry<'a>(job: &'a mut ReduceJob, name: &str) -> &'a mut InterfaceEntry {
     &mut job.interface[index]
 }
 
-/// The step under way, shown on a terminal once the work takes more than two seconds.
+/// The current step, shown on a terminal if the work takes more than two seconds.
 struct Steps {
     bar: ProgressBar,
-    /// Ends the wait of the thread that shows the bar.
+    /// Stops the waiting thread that shows the bar.
     waiting: Option<(Sender<()>, JoinHandle<()>)>,
 }
 
@@ -138,7 +138,7 @@ impl Steps {
             let (sender, receiver) = channel();
             let shown = bar.clone();
             let wait = move || {
-                // A step may last minutes: the bar cannot wait for the next one to show itself.
+                // A step may take minutes: the bar must appear without waiting for the next step.
                 if receiver.recv_timeout(Duration::from_secs(2)) == Err(RecvTimeoutError::Timeout) {
                     shown.set_draw_target(ProgressDrawTarget::stderr());
                     shown.enable_steady_tick(Duration::from_millis(200));
@@ -158,7 +158,7 @@ impl Steps {
     fn clear(self) {
         if let Some((sender, thread)) = self.waiting {
             drop(sender);
-            // It only waits and shows; there is nothing to tell if it failed.
+            // The thread only displays progress; its failure can be ignored.
             let _ = thread.join();
         }
         self.bar.finish_and_clear();

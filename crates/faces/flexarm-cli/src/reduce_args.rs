@@ -1,4 +1,4 @@
-//! Words of `flexarm reduce`.
+//! Arguments of `flexarm reduce`.
 
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -40,7 +40,7 @@ pub(crate) struct ReduceArgs {
     /// "...")
     #[arg(value_name = "MESH_OR_JOB")]
     pub(crate) mesh: PathBuf,
-    /// Show what is in the mesh and stop: groups, node sets, regions, materials, sizes
+    /// List the contents of the mesh and stop: groups, node sets, regions, materials, sizes
     #[arg(long, alias = "dry-run", help_heading = "Mesh")]
     pub(crate) list: bool,
     /// Units of the mesh: m-kg-s (N, Pa), mm-t-s (N, MPa), in-slinch-s, ...
@@ -50,8 +50,8 @@ pub(crate) struct ReduceArgs {
     /// be repeated)
     #[arg(long = "material", value_name = "[REGION=]MATERIAL", value_parser = Named::<MaterialChoice>::parse, help_heading = "Mesh")]
     pub(crate) materials: Vec<Named<MaterialChoice>>,
-    /// Nodes of an interface, the proximal one first (repeat); named A, B, C in turn unless NAME is
-    /// given
+    /// Nodes of an interface, the proximal one first (repeat); named A, B, C in order unless NAME
+    /// is given
     #[arg(long = "interface", value_name = "[NAME=]SELECTOR", value_parser = Named::<NodeSelector>::parse, help_heading = "Interfaces")]
     pub(crate) interfaces: Vec<Named<NodeSelector>>,
     /// Frame of an interface in the link frame: x,y,z or x,y,z,roll,pitch,yaw (unit of the mesh,
@@ -62,18 +62,18 @@ pub(crate) struct ReduceArgs {
     /// rigid]
     #[arg(long = "tie", value_name = "[NAME=]TIE", value_parser = Named::<TieWord>::parse, help_heading = "Interfaces")]
     pub(crate) ties: Vec<Named<TieWord>>,
-    /// URDF or xacro whose joints are the interfaces: A at the origin of the link, B at that of the
-    /// next joint
+    /// URDF or xacro whose joints define the interfaces: A at the origin of the link, B at that of
+    /// the next joint
     #[arg(long, value_name = "FILE", requires = "link", help_heading = "Mesh")]
     pub(crate) urdf: Option<PathBuf>,
     /// The link in the URDF
     #[arg(long, value_name = "NAME", requires = "urdf", help_heading = "Mesh")]
     pub(crate) link: Option<String>,
-    /// The joint at B, where several follow the link
+    /// The joint at B, if several follow the link
     #[arg(long, value_name = "NAME", requires = "urdf", help_heading = "Mesh", hide_short_help = true)]
     pub(crate) joint: Option<String>,
 
-    /// With --urdf: what the URDF's link weighs beyond the mesh (motors, gears) rides on the two
+    /// With --urdf: add the mass of the URDF's link that the mesh lacks (motors, gears) to the two
     /// parts
     #[arg(long, requires = "urdf", help_heading = "Mesh", hide_short_help = true)]
     pub(crate) rest: bool,
@@ -84,7 +84,7 @@ pub(crate) struct ReduceArgs {
     /// Fixed-interface modes to keep (Craig-Bampton); 0 for Guyan [default: 10]
     #[arg(long, value_name = "N", help_heading = "Reduction")]
     pub(crate) modes: Option<usize>,
-    /// Keep all fixed-interface modes up to this frequency (Hz); take twice the highest one of
+    /// Keep all fixed-interface modes up to this frequency (Hz); use twice the highest frequency of
     /// interest
     #[arg(
         long,
@@ -95,22 +95,21 @@ pub(crate) struct ReduceArgs {
         hide_short_help = true
     )]
     pub(crate) modes_up_to: Option<f64>,
-    /// Where the elastic joint of the two parts sits: elastic-centre, mid, a fraction of the way
-    /// from A to B, or x,y,z
+    /// Position of the elastic joint between the two parts: elastic-centre, mid, a fraction of the
+    /// distance from A to B, or x,y,z
     #[arg(long, value_name = "WHERE", allow_hyphen_values = true, help_heading = "Reduction", hide_short_help = true)]
     pub(crate) split: Option<SplitChoice>,
-    /// Numbers of parts of longer chains to store in the link, such as 3,4,8
+    /// Numbers of parts of longer chains to store in the link file, such as 3,4,8
     #[arg(long, value_name = "N,N,...", value_delimiter = ',', help_heading = "Reduction", hide_short_help = true)]
     pub(crate) chains: Option<Vec<usize>>,
-    /// Store the stiffness by load of the modal link (12 more solves), for geometric_stiffening =
-    /// true of a robot file
+    /// Store the load-dependent stiffness of the modal link (12 more solves), for
+    /// geometric_stiffening = true of a robot file
     #[arg(long, help_heading = "Reduction", hide_short_help = true)]
     pub(crate) geometric: bool,
-    /// Make one node of nodes nearer to each other than this (unit of the mesh), to close seams and
-    /// cracks
+    /// Merge nodes closer to each other than this (unit of the mesh), to close seams and cracks
     #[arg(long, value_name = "DISTANCE", allow_hyphen_values = true)]
     pub(crate) merge: Option<f64>,
-    /// Integration of the elements
+    /// Quadrature of the elements
     #[arg(long, value_enum, help_heading = "Reduction", hide_short_help = true)]
     pub(crate) quadrature: Option<QuadratureName>,
     /// Order of elimination
@@ -123,18 +122,18 @@ pub(crate) struct ReduceArgs {
     /// with --flex]
     #[arg(short, long, value_name = "FOLDER", help_heading = "Files")]
     pub(crate) output: Option<PathBuf>,
-    /// Write the link file (also) here
+    /// Write the link file (also) to this path
     #[arg(long, value_name = "FILE", help_heading = "Files")]
     pub(crate) flex: Option<PathBuf>,
-    /// Overwrite what is there
+    /// Overwrite existing files
     #[arg(long, help_heading = "Files")]
     pub(crate) force: bool,
-    /// Write nothing, only print the figures
+    /// Write no files, only print the figures
     #[arg(long, conflicts_with_all = ["output", "flex", "force"], help_heading = "Files")]
     pub(crate) no_files: bool,
 }
 
-/// `NAME=VALUE`, or a value for all.
+/// `NAME=VALUE`, or a value without a name.
 #[derive(Clone, Debug)]
 pub(crate) struct Named<T> {
     pub(crate) name: Option<String>,
@@ -143,7 +142,7 @@ pub(crate) struct Named<T> {
 
 impl<T: FromStr<Err: ToString>> Named<T> {
     fn parse(text: &str) -> Result<Self, String> {
-        // An = inside quotes or brackets belongs to the value.
+        // An = inside quotes or brackets is part of the value.
         let name = text.split_once('=').filter(|(name, _)| !name.contains(['"', '(']));
         let (name, value) = match name {
             Some((name, _)) if name.trim().is_empty() => return Err("there is no name before the =".into()),
@@ -155,7 +154,7 @@ impl<T: FromStr<Err: ToString>> Named<T> {
     }
 }
 
-/// Where an interface is.
+/// Position of an interface.
 #[derive(Clone, Debug)]
 pub(crate) enum PlaceWord {
     Centroid,
@@ -185,7 +184,7 @@ fn parse_frame(text: &str) -> Result<FrameEntry, String> {
     }
 }
 
-/// Ties by their words.
+/// A tie, given by its name.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TieWord(pub(crate) Tie);
 
@@ -203,7 +202,7 @@ impl FromStr for TieWord {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum QuadratureName {
-    /// Enough points for stiffness and mass [default]
+    /// Sufficient points for stiffness and mass [default]
     Exact,
     /// The points of CalculiX, for comparison with it
     Calculix,

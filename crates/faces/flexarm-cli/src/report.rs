@@ -1,4 +1,4 @@
-//! `flexarm report`: words and answer.
+//! `flexarm report`: arguments and answer.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -21,13 +21,13 @@ Examples:
 pub(crate) struct ReportArgs {
     #[arg(required = true, value_name = "RECORDING", help = crate::formats::help_report())]
     pub(crate) recordings: Vec<PathBuf>,
-    /// The page to write [default: report.html beside the first recording]
+    /// Page to write [default: report.html next to the first recording]
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: Option<PathBuf>,
-    /// Write a folder "figures" for papers beside the page too
+    /// Also write a folder "figures" for papers next to the page
     #[arg(long)]
     pub(crate) figures: bool,
-    /// Overwrite what is there
+    /// Overwrite existing files
     #[arg(long)]
     pub(crate) force: bool,
 }

@@ -1,4 +1,5 @@
-//! `flexarm sensitivity`: how the tool's error along a motion depends on the numbers of the robot.
+//! `flexarm sensitivity`: derivatives of the TCP error along a motion with respect to the
+//! parameters of the robot.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -37,31 +38,31 @@ pub(crate) struct SensitivityArgs {
     pub(crate) motion: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) input: MotionInputArgs,
-    /// Names of what counts, * for anything: drive.joint_2.gearbox.stiffness, drive.*.friction.*,
+    /// Names of parameters, * as a wildcard: drive.joint_2.gearbox.stiffness, drive.*.friction.*,
     /// drive.*.servo.*, link.*, motion.joint_1, tcp.x (may be repeated) [default: all]
     #[arg(long = "by", value_name = "NAME")]
     pub(crate) by: Vec<String>,
-    /// A pose instead of a motion: the tool at rest, its compliance, natural frequencies. Joint
-    /// values in coordinate order, or name=value pairs (rad or m; 30deg for degrees)
+    /// Evaluate a pose instead of a motion: static TCP error, compliance, natural frequencies.
+    /// Joint values in coordinate order, or name=value pairs (rad or m; 30deg for degrees)
     #[arg(long, value_name = "Q1,Q2,...", allow_hyphen_values = true, conflicts_with_all = ["motion", "loads", "table"])]
     pub(crate) at: Option<String>,
-    /// Loads and payloads over time (TOML, see docs/loads.md) that act on the arm
+    /// File of loads and payloads over time that act on the arm (TOML, see docs/loads.md)
     #[arg(long, value_name = "FILE")]
     pub(crate) loads: Option<PathBuf>,
-    /// Step of the run (s)
+    /// Step size of the run (s)
     #[arg(long, value_name = "S", default_value_t = 1e-3)]
     pub(crate) step: f64,
-    /// Go on although the motion passes joint limits
+    /// Continue even if the motion exceeds joint limits
     #[arg(long)]
     pub(crate) ignore_limits: bool,
     #[command(flatten)]
     pub(crate) modelling: ModellingArgs,
     #[command(flatten)]
     pub(crate) load: RobotArgs,
-    /// Write error and derivatives after every step (CSV)
+    /// Write error and derivatives at every step (CSV)
     #[arg(long, help_heading = "Files", value_name = "FILE")]
     pub(crate) table: Option<PathBuf>,
-    /// Overwrite what is there
+    /// Overwrite existing files
     #[arg(long, help_heading = "Files")]
     pub(crate) force: bool,
 }
@@ -137,12 +138,12 @@ fn micro(x: f64) -> String {
 }
 
 fn value(value: f64, unit: &str) -> String {
-    // Gains that were found have as many digits as numbers have; what a file says has few.
+    // Computed gains have all digits of a double; values from a file have few.
     let short = format!("{value:.6e}").parse().unwrap_or(value);
     if unit == "1" { short.to_string() } else { format!("{short} {unit}") }
 }
 
-/// The table with numbers to the right.
+/// Formats the table with numbers aligned to the right.
 fn right(t: &mut crate::print::TextTable) -> String {
     for column in t.column_iter_mut().skip(1) {
         column.set_cell_alignment(CellAlignment::Right);
@@ -150,7 +151,7 @@ fn right(t: &mut crate::print::TextTable) -> String {
     lines(t)
 }
 
-/// Frequencies that are told of each parameter.
+/// Number of frequencies shown for each parameter.
 const FREQUENCIES: usize = 3;
 
 fn pose_text(found: &PoseSensitivity) -> String {

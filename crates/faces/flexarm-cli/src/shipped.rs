@@ -1,5 +1,5 @@
-//! Where shipped robots and trajectories are found: by path, or by name in the folders that come
-//! with the program.
+//! Look-up of shipped robots and trajectories, by path or by name in the folders that come with the
+//! program.
 
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -9,16 +9,16 @@ use flexarm::{Error, closest};
 
 use crate::failure::Failure;
 
-/// A folder that the process brought along.
+/// A folder registered by the process.
 static BROUGHT: OnceLock<PathBuf> = OnceLock::new();
 
-/// Names it; the first call counts.
+/// Registers the folder; only the first call has an effect.
 pub(crate) fn ship_from(folder: PathBuf) {
     let _ = BROUGHT.set(folder);
 }
 
-/// Folders that may hold `robots/` and `trajectories/`: here, what the process brought, beside the
-/// program, and where it was built.
+/// Folders that may hold `robots/` and `trajectories/`: the current folder, the registered one, the
+/// one of the program, and the one where it was built.
 fn roots() -> Vec<PathBuf> {
     let mut roots = vec![PathBuf::from(".")];
     roots.extend(BROUGHT.get().cloned());
@@ -29,7 +29,7 @@ fn roots() -> Vec<PathBuf> {
     roots
 }
 
-/// The path itself if it exists, else `<root>/<folder>/<name>` with one of the endings.
+/// Returns the path itself if it exists, else `<root>/<folder>/<name>` with one of the extensions.
 pub(crate) fn find(given: &Path, folder: &str, endings: &[&str]) -> PathBuf {
     let is_name = given.components().count() == 1;
     if given.exists() || !is_name {
@@ -43,8 +43,8 @@ pub(crate) fn find(given: &Path, folder: &str, endings: &[&str]) -> PathBuf {
         .unwrap_or_else(|| given.to_owned())
 }
 
-/// A robot by path, name, or place below the folder of the shipped ones (`kr210/beams.toml`), for
-/// files that name robots.
+/// Returns a robot by path, name, or path below the folder of the shipped ones
+/// (`kr210/beams.toml`), for files that refer to robots.
 pub(crate) fn robot_file(given: &Path) -> PathBuf {
     let found = robot(Some(given)).unwrap_or_else(|_| given.to_owned());
     if found.exists() {
@@ -81,7 +81,7 @@ pub(crate) fn trajectory_file(given: &Path) -> PathBuf {
     find(given, "trajectories", &["", ".toml", ".csv"])
 }
 
-/// A cutting tool by path or name.
+/// Returns a cutting tool by path or name.
 ///
 /// # Errors
 /// [`Error::File`] for a name that no shipped tool has, with the names that there are.
@@ -125,26 +125,25 @@ fn known(
     Err(Error::File { path, what })
 }
 
-/// Where a command puts its files: the folder that was asked for, else a new one that no other run
-/// can have.
+/// Output folder of a command: the requested folder, or a new one that is unique to this run.
 pub(crate) enum OutputFolder {
     None,
     Asked(PathBuf),
     New(NewFolder),
 }
 
-/// A folder `out/<stem>-<n>` that was made just now. It goes away again if nothing was put into it.
+/// A newly created folder `out/<stem>-<n>`. It is removed if nothing was written into it.
 pub(crate) struct NewFolder {
     path: PathBuf,
-    /// Whether `out` itself is new.
+    /// Whether `out` itself was created.
     with_parent: bool,
 }
 
 impl OutputFolder {
-    /// The folder asked for, or a new one named after `stem`, or none if no files are wanted.
+    /// Returns the requested folder, a new one named after `stem`, or none if no files are wanted.
     ///
     /// # Errors
-    /// [`Error::Write`] if a new one cannot be made.
+    /// [`Error::Write`] if a new folder cannot be created.
     pub(crate) fn of(asked: Option<&Path>, stem: &str, wanted: bool) -> Result<Self, Failure> {
         match asked {
             _ if !wanted => Ok(Self::None),
@@ -163,8 +162,8 @@ impl OutputFolder {
 }
 
 impl NewFolder {
-    /// Takes the first number that is free. To make a folder and to find it free are one step, so
-    /// runs that start at the same time get different ones.
+    /// Takes the first free number. Creating the folder and checking that it is free are one
+    /// operation, so concurrent runs get different folders.
     fn create(stem: &str) -> Result<Self, Failure> {
         let clean: String =
             stem.chars().map(|c| if c.is_alphanumeric() || c == '-' || c == '_' { c } else { '_' }).collect();
@@ -177,7 +176,7 @@ impl NewFolder {
             match std::fs::create_dir(&path) {
                 Ok(()) => return Ok(Self { path, with_parent }),
                 Err(error) if error.kind() == ErrorKind::AlreadyExists => number += 1,
-                // Another run has just removed `out`, which it had made and not used.
+                // Another run has just removed `out`, which it had created and not used.
                 Err(error) if error.kind() == ErrorKind::NotFound && !out.exists() => {}
                 Err(source) => return Err(Error::Write { path, source }.into()),
             }
@@ -186,7 +185,7 @@ impl NewFolder {
 }
 
 impl Drop for NewFolder {
-    /// Only empty folders can be removed so.
+    /// `remove_dir` removes only empty folders.
     fn drop(&mut self) {
         if std::fs::remove_dir(&self.path).is_ok() && self.with_parent {
             let _ = std::fs::remove_dir("out");
@@ -194,8 +193,8 @@ impl Drop for NewFolder {
     }
 }
 
-/// The folder with `robots` and `tests`: the first root that has both, else where the program was
-/// built.
+/// Returns the folder with `robots` and `tests/verification`: the first root that has both, else
+/// the current folder.
 pub(crate) fn checkout() -> PathBuf {
     let has_both = |root: &PathBuf| root.join("robots").is_dir() && root.join("tests/verification").is_dir();
     roots().into_iter().find(has_both).unwrap_or_else(|| PathBuf::from("."))

@@ -1,9 +1,9 @@
-//! Signals: those that ask a command to stop, and those that must not end it without a word.
+//! Signal handling: stop requests, and signals that must not end a command without a message.
 //!
-//! Until a command looks for a wish to stop for the first time, nothing is open that must be
-//! closed, and the signals do what they always do; from then on they only leave a note, and the
-//! command stops at a place where its files are whole. What the caller has told the system to
-//! ignore (`nohup`, a job in the background) stays ignored.
+//! Until a command first checks for a stop request, nothing is open that must be closed, and
+//! signals keep their default effect. From then on they only set a flag, and the command stops at a
+//! point where its files are complete. Signals that the caller has set to be ignored (`nohup`, a
+//! background job) stay ignored.
 
 use std::ops::ControlFlow;
 use std::process::ExitCode;
@@ -14,17 +14,18 @@ use std::time::Duration;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
 
-/// To be called before anything else: a file that may not grow further (`ulimit -f`) is then an
-/// error of the write, which names the file, and no longer a signal that kills the program.
+/// Must be called first. A file that reaches its size limit (`ulimit -f`) then gives a write error,
+/// which names the file, instead of a signal that kills the program.
 pub(crate) fn turn_into_errors() {
     #[cfg(unix)]
     {
-        // Nobody looks at the note: a signal that has a handler does not kill.
+        // The flag is not used: a signal with a handler does not kill the process.
         let _ = flag::register(signal_hook::consts::SIGXFSZ, Arc::default());
     }
 }
 
-/// Says whether the user, or the system, has asked to stop since this was first asked.
+/// Returns a function that reports whether the user or the system has requested a stop since its
+/// first call.
 pub(crate) fn stop_when_asked() -> impl FnMut() -> ControlFlow<()> {
     let asked = Arc::new(AtomicBool::new(false));
     let mut armed = false;
@@ -38,12 +39,13 @@ pub(crate) fn stop_when_asked() -> impl FnMut() -> ControlFlow<()> {
     }
 }
 
-/// Ends the process if a command does not stop by itself soon after it was asked to; see
+/// Ends the process if a command does not stop by itself soon after a stop request; see
 /// [`end_if_not_stopped`].
 pub(crate) struct Watch(Arc<AtomicBool>);
 
 impl Watch {
-    /// The command has come to its end: whoever asks this first has the last word.
+    /// Marks the command as finished; returns true for the first caller, which decides the exit
+    /// code.
     fn is_first(over: &AtomicBool) -> bool {
         !over.swap(true, Ordering::SeqCst)
     }
@@ -51,21 +53,20 @@ impl Watch {
 
 impl Drop for Watch {
     fn drop(&mut self) {
-        // The process is being ended: there is nothing left to say.
+        // The other thread is ending the process: wait.
         while !Self::is_first(&self.0) {
             std::thread::sleep(PATIENCE);
         }
     }
 }
 
-/// How long a command may take to stop by itself, and how often it is looked whether it was asked
-/// to.
+/// Time that a command may take to stop by itself, and polling interval of stop requests.
 const PATIENCE: Duration = Duration::from_millis(300);
 const LOOK: Duration = Duration::from_millis(20);
 
-/// Watches a command whose files are whole at any time: if it was asked to stop and has not after
-/// [`PATIENCE`], the process ends with what `last_words` returns. The watch ends with what is
-/// returned.
+/// Watches a command whose files are complete at any time. If the command has not stopped within
+/// [`PATIENCE`] after a request, the process ends with the exit code that `last_words` returns.
+/// Dropping the returned value ends the watch.
 pub(crate) fn end_if_not_stopped(last_words: impl Fn() -> ExitCode + Send + 'static) -> Watch {
     let over = Arc::new(AtomicBool::new(false));
     let watched = over.clone();
@@ -87,19 +88,19 @@ pub(crate) fn end_if_not_stopped(last_words: impl Fn() -> ExitCode + Send + 'sta
     Watch(over)
 }
 
-/// Ctrl-C, a polite kill, and a terminal that closes, as far as they are not ignored.
+/// Ctrl-C, SIGTERM and a closed terminal, unless they are ignored.
 fn signals() -> Vec<i32> {
     #[cfg(target_os = "linux")]
     let known = vec![SIGINT, SIGTERM, signal_hook::consts::SIGHUP];
-    // Where it cannot be told whether it is ignored, a terminal that closes is left alone:
-    // recordings survive being killed.
+    // Without a way to detect whether it is ignored, SIGHUP keeps its default effect: recordings
+    // survive being killed.
     #[cfg(not(target_os = "linux"))]
     let known = vec![SIGINT, SIGTERM];
     let ignored = ignored();
     known.into_iter().filter(|signal| ignored >> (signal - 1) & 1 == 0).collect()
 }
 
-/// The signals that this process was started to ignore: bit k - 1 is signal k.
+/// Bit mask of the signals that this process was started to ignore: bit k - 1 is signal k.
 fn ignored() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));

@@ -1,4 +1,4 @@
-//! `--with`: more runs beside the one that was asked for, each with some options changed.
+//! `--with`: additional runs, each with some options changed.
 
 use std::borrow::Cow;
 use std::ffi::OsString;
@@ -9,20 +9,20 @@ use flexarm::{Caveat, Summary};
 use crate::args::{Cli, Command, RunArgs};
 use crate::failure::Failure;
 
-/// A run of a study: label, and the arguments that it would have on a command line of its own.
+/// A run of a study: its label, and the arguments it would have on its own command line.
 pub(crate) struct Part<'a> {
     pub(crate) label: String,
     pub(crate) args: Cow<'a, RunArgs>,
 }
 
-/// Most runs beside the first one.
+/// Maximum number of additional runs.
 const MOST_OTHERS: usize = 50;
 
-/// Options that belong to the study as a whole.
+/// Options that apply to the study as a whole.
 const SHARED: [&str; 10] =
     ["with", "output", "force", "no-files", "magnify", "json", "quiet", "figures", "parquet", "also"];
 
-/// The caveats of all runs, each once: those of the other runs with their labels.
+/// Returns the caveats of all runs without duplicates; those of additional runs carry their labels.
 pub(crate) fn caveats(summary: &Summary) -> Vec<Caveat> {
     let mut all = summary.caveats.clone();
     for other in &summary.with {
@@ -34,7 +34,7 @@ pub(crate) fn caveats(summary: &Summary) -> Vec<Caveat> {
     all
 }
 
-/// The runs of a study, the one that was asked for first. `line` is the command line as given.
+/// Returns the runs of a study, the main one first. `line` is the command line as given.
 pub(crate) fn parts<'a>(main: &'a RunArgs, line: &[OsString]) -> Result<Vec<Part<'a>>, Failure> {
     if main.with.len() > MOST_OTHERS {
         let found = main.with.len();
@@ -91,7 +91,7 @@ fn without_with(line: &[OsString]) -> Vec<OsString> {
     let mut words = line.iter();
     while let Some(word) = words.next() {
         match word.to_str() {
-            // What follows are names of files.
+            // The following words are file names.
             Some("--") => {
                 kept.push(word.clone());
                 kept.extend(words.by_ref().cloned());
@@ -106,9 +106,9 @@ fn without_with(line: &[OsString]) -> Vec<OsString> {
     kept
 }
 
-/// The arguments of the line with some of them replaced.
+/// Parses the command line with some of its options replaced.
 fn changed(line: &[OsString], words: &[(String, String, bool)]) -> Result<RunArgs, String> {
-    // After a `--` there are no options.
+    // There are no options after `--`.
     let (options, names) = line.split_at(line.iter().position(|word| word == "--").unwrap_or(line.len()));
     let mut line = options.to_vec();
     let (mut robot, mut trajectory) = (None, None);
@@ -123,7 +123,7 @@ fn changed(line: &[OsString], words: &[(String, String, bool)]) -> Result<RunArg
     line.extend_from_slice(names);
     let command = Cli::command().args_override_self(true).mut_subcommand("compare", |c| c.args_override_self(true));
     let matches = command.try_get_matches_from(line).map_err(|error| {
-        // The first lines say what is wrong; usage and hints are those of the whole program.
+        // Keep the first line of the error; usage and hints refer to the whole program.
         let text = error.to_string();
         let first = text.lines().next().unwrap_or_default().trim_start_matches("error: ");
         format!("{first}; a key is robot, trajectory, name or an option of compare (flexarm compare --help)")
@@ -137,7 +137,7 @@ fn changed(line: &[OsString], words: &[(String, String, bool)]) -> Result<RunArg
     Ok(*args.0)
 }
 
-/// What the line gives for an option, as a word for a label.
+/// Returns the value of an option on the command line, as a word for a label.
 fn given(line: &[OsString], key: &str) -> String {
     let Ok(matches) = Cli::command().try_get_matches_from(line) else { return "as given".into() };
     let Some((_, matches)) = matches.subcommand() else { return "as given".into() };

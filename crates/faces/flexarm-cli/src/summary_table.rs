@@ -1,7 +1,7 @@
-//! The figures of a run on a terminal: a table in groups and a small plot of the error over time.
+//! Figures of a run on a terminal: a grouped table and a small plot of the error over time.
 //!
-//! Text is styled with ANSI codes; where it does not go to a terminal they are taken out again
-//! (`main::answer`).
+//! Text is styled with ANSI codes; they are removed if the output is not a terminal
+//! (`crate::answer`).
 
 use anstyle::{AnsiColor, Style};
 use comfy_table::Table;
@@ -10,15 +10,15 @@ use flexarm::{Figure, Files, Holds, RecordingFormat, STUDY_NOTE, Summary, Weight
 
 use crate::print::SHORTENED;
 
-/// Columns where the terminal does not say how many it has.
+/// Width if the terminal does not report one (columns).
 const USUAL_WIDTH: usize = 80;
-/// Fewer columns are treated as so many: nothing fits into less.
+/// Minimum width (columns); narrower terminals are treated like this.
 const LEAST_WIDTH: usize = 40;
-/// Most columns of the plot; wider ones are no clearer.
+/// Maximum width of the plot (columns); a wider one is no clearer.
 const WIDEST_PLOT: usize = 100;
-/// Rows of text of the plot.
+/// Height of the plot (rows of text).
 const PLOT_ROWS: usize = 4;
-/// Dots of a braille character, across and up.
+/// Dots of a braille character, horizontally and vertically.
 const DOTS: (usize, usize) = (2, 4);
 
 const HEADING: Style = Style::new().bold();
@@ -26,13 +26,13 @@ const FAINT: Style = Style::new().dimmed();
 const HEADLINE: Style = AnsiColor::Cyan.on_default().bold();
 const ALERT: Style = AnsiColor::Red.on_default().bold();
 
-/// Columns of the terminal that standard output goes to.
+/// Width of the terminal that standard output goes to (columns).
 pub(crate) fn terminal_width() -> usize {
-    // Some pretend to have none.
+    // Some terminals report a width of zero.
     Table::new().width().filter(|width| *width > 0).map_or(USUAL_WIDTH, usize::from)
 }
 
-/// The figures of a run in so many columns.
+/// Formats the figures of a run at a given width.
 pub(crate) fn summary(summary: &Summary, width: usize) -> String {
     let width = width.max(LEAST_WIDTH);
     let (robot, trajectory, links) =
@@ -57,13 +57,13 @@ pub(crate) fn summary(summary: &Summary, width: usize) -> String {
                 Weight::Headline => HEADLINE,
                 Weight::Alert => ALERT,
             };
-            // Pads by columns, not by bytes.
+            // Pad by columns, not by bytes.
             let name = format!("  {}{}", row.name, " ".repeat(names - columns(&row.name)));
             let value = format!("{}{}", " ".repeat(values - columns(&row.value)), row.value);
             let unit = format!("{}{}", row.unit, " ".repeat(units - columns(row.unit)));
             let before = columns(&name) + 2 + columns(&value) + 1 + columns(&unit) + 2;
             let room = width.saturating_sub(before);
-            // Where notes would be a narrow strip they get lines of their own.
+            // Notes get separate lines if their column would be too narrow.
             let (indent, room) = if room < 20 { (4, width - 4) } else { (before, room) };
             let mut notes = wrapped(&row.note, room).into_iter();
             let first = if indent == before { notes.next().unwrap_or_default() } else { String::new() };
@@ -84,10 +84,10 @@ pub(crate) fn summary(summary: &Summary, width: usize) -> String {
     out + &files(&summary.files)
 }
 
-/// Where the files are, and how to look at them.
+/// Lists the files, and how to view them.
 fn files(f: &Files) -> String {
     let mut out = String::new();
-    // Recordings for the eye before those for programs.
+    // Recordings for viewers come before those for programs.
     let mut recordings: Vec<(RecordingFormat, &str)> = f.recordings.iter().collect();
     recordings.sort_by_key(|(format, _)| format.info().holds != Holds::Pictures);
     let recordings = recordings.iter().map(|(format, path)| (format.info().name, Some(*path)));
@@ -106,7 +106,7 @@ fn files(f: &Files) -> String {
     out
 }
 
-/// The runs of a study side by side.
+/// Table of the runs of a study.
 fn study(summary: &Summary, width: usize) -> String {
     let rows: Vec<Vec<String>> =
         study_rows(summary).iter().map(|row| row.iter().map(|cell| one_line(cell)).collect()).collect();
@@ -130,7 +130,7 @@ fn fits(table: &str, width: usize) -> bool {
     table.lines().all(|line| columns(line) <= width)
 }
 
-/// Cells as they are, names to the left and numbers to the right.
+/// Aligns the first column to the left and the others to the right.
 fn aligned(rows: &[Vec<String>]) -> String {
     let count = rows.iter().map(Vec::len).max().unwrap_or(0);
     let widest = |k: usize| rows.iter().filter_map(|row| row.get(k)).map(|cell| columns(cell)).max().unwrap_or(0);
@@ -148,8 +148,8 @@ fn aligned(rows: &[Vec<String>]) -> String {
     out
 }
 
-/// A row for every figure and a column for every run, in as many tables as they need. Names too
-/// long for a column are listed below and numbered.
+/// Transposes the table: a row for every figure and a column for every run, split into as many
+/// tables as needed. Names too long for a column are numbered and listed below.
 fn turned(rows: &[Vec<String>], width: usize) -> String {
     let names: Vec<&str> = rows[1..].iter().map(|row| row[0].as_str()).collect();
     let part = |runs: &[usize], numbered: bool| {
@@ -186,7 +186,7 @@ fn turned(rows: &[Vec<String>], width: usize) -> String {
     out
 }
 
-/// The text in at most so many columns.
+/// Shortens the text to at most `room` columns.
 fn shortened(text: &str, room: usize) -> String {
     if columns(text) <= room {
         return text.to_owned();
@@ -194,12 +194,13 @@ fn shortened(text: &str, room: usize) -> String {
     text.chars().take(room.saturating_sub(1)).chain(['…']).collect()
 }
 
-/// Width of a text on the terminal; names of robots are letters, each of one column.
+/// Width of a text on the terminal, one column per character, which holds for the letters of robot
+/// names.
 fn columns(text: &str) -> usize {
     text.chars().count()
 }
 
-/// Lines of at most `width` columns, broken at blanks.
+/// Splits text at blanks into lines of at most `width` columns.
 fn wrapped(text: &str, width: usize) -> Vec<String> {
     let text = one_line(text);
     let mut lines: Vec<String> = Vec::new();
@@ -215,8 +216,8 @@ fn wrapped(text: &str, width: usize) -> Vec<String> {
     lines
 }
 
-/// Size of the TCP error over time in braille dots, with the largest value, the span of time and
-/// the moves.
+/// Plots the magnitude of the TCP error over time in braille dots, with the maximum, the time span
+/// and the moving phases.
 fn plot(summary: &Summary, width: usize) -> String {
     let curve = &summary.error_curve;
     let top = curve.iter().copied().filter(|e| e.is_finite()).fold(0.0, f64::max);
@@ -228,7 +229,7 @@ fn plot(summary: &Summary, width: usize) -> String {
     let cells = width - margin - 3;
     let dots = DOTS.0 * cells;
     let height = DOTS.1 * PLOT_ROWS;
-    // Largest value of each column of dots, and its place from below.
+    // Maximum of each column of dots, and its height.
     let value = |x: usize| {
         let range = x * curve.len() / dots..((x + 1) * curve.len()).div_ceil(dots).min(curve.len());
         curve[range].iter().copied().filter(|e| e.is_finite()).fold(0.0, f64::max)
@@ -251,7 +252,7 @@ fn plot(summary: &Summary, width: usize) -> String {
         let room = margin - 2;
         out += &format!("  {label:>room$} {tick}{HEADLINE}{line}{HEADLINE:#}\n");
     }
-    // The axis is thick where the robot moves.
+    // The axis is thick while the robot moves.
     let span = summary.duration_s.max(1e-12);
     let moving = |cell: usize| {
         let t = span * (cell as f64 + 0.5) / cells as f64;
@@ -267,7 +268,7 @@ fn plot(summary: &Summary, width: usize) -> String {
     out
 }
 
-/// Bit of a dot in a braille character, counted from the left and from below.
+/// Bit of a dot in a braille character, counted from the left and from the bottom.
 fn dot(x: usize, y: usize) -> u8 {
     const BITS: [[u8; 4]; 2] = [[0x40, 0x04, 0x02, 0x01], [0x80, 0x20, 0x10, 0x08]];
     BITS[x][y]
@@ -309,7 +310,7 @@ mod tests {
         }
     }
 
-    /// What a pipe gets.
+    /// Text as written to a pipe.
     fn plain(summary: &Summary, width: usize) -> String {
         anstream::adapter::strip_str(&super::summary(summary, width)).to_string()
     }
@@ -357,7 +358,7 @@ files
         assert_eq!(plain(&example(), 80), expected);
     }
 
-    /// How far the tool is off and what bends is read before anything else.
+    /// The TCP error and its contributors come first.
     #[test]
     fn the_first_line_says_what_bends() {
         let headline = "TCP error 6.01 mm = 5.02 static + 0.99 dynamic (maximum 2.85); links 1.41, gearboxes 4.61";
@@ -365,7 +366,7 @@ files
         assert!(text.starts_with(&format!("{headline}\narm on swing")), "{text}");
     }
 
-    /// A study of so many runs.
+    /// A study of `runs` runs.
     fn study_of(runs: usize) -> Summary {
         let run = |label: String| {
             let difference =

@@ -1,17 +1,17 @@
-//! Joint values and wrenches as people type them.
+//! Joint values and wrenches as typed by the user.
 
 use flexarm::reduce::numbers;
 use flexarm::{Motion, Robot};
 
 use crate::failure::Failure;
 
-/// Reads a joint vector: `v1,v2,...` in coordinate order, or `name=value,...` with the rest zero;
-/// rad or m, or degrees with the ending `deg`.
+/// Parses a joint vector: `v1,v2,...` in coordinate order, or `name=value,...` with the others
+/// zero; rad or m, or degrees with the suffix `deg`.
 ///
-/// * `joints`: names, and whether they slide.
+/// * `joints`: names, and whether they are prismatic.
 ///
 /// # Errors
-/// [`Failure::Usage`] saying which joints there are.
+/// [`Failure::Usage`], listing the joints.
 fn parse_joint_values(text: &str, joints: &[(&str, bool)]) -> Result<Vec<f64>, Failure> {
     let mut values = vec![0.0; joints.len()];
     let items: Vec<&str> = text.split(',').map(str::trim).filter(|s| !s.is_empty()).collect();
@@ -80,7 +80,7 @@ pub(crate) fn pose(text: Option<&str>, robot: &Robot) -> Result<Option<Vec<f64>>
 /// Values of a robot's joints, if any are given; see [`parse_joint_values`].
 ///
 /// # Errors
-/// As [`parse_joint_values`], and [`Error::Model`].
+/// Those of [`parse_joint_values`], and [`Error::Model`].
 pub(crate) fn joint_values(text: Option<&str>, robot: &Robot) -> Result<Option<Vec<f64>>, Failure> {
     let Some(text) = text else { return Ok(None) };
     let model = robot.rigid_model()?;
@@ -89,9 +89,9 @@ pub(crate) fn joint_values(text: Option<&str>, robot: &Robot) -> Result<Option<V
     parse_joint_values(text, &joints).map(Some)
 }
 
-/// Reads a wrench: `fx,fy,fz` or `fx,fy,fz,tx,ty,tz` (N, N m).
+/// Parses a wrench: `fx,fy,fz` or `fx,fy,fz,tx,ty,tz` (N, N m).
 ///
-/// * `flag`: what messages call it.
+/// * `flag`: its name in messages.
 ///
 /// # Errors
 /// [`Failure::Usage`].

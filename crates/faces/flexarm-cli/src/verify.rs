@@ -1,4 +1,4 @@
-//! `flexarm verify`: the case studies, their page, and whether a stored page still holds.
+//! `flexarm verify`: runs the case studies, writes their page, and compares it with a stored page.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -18,7 +18,7 @@ use crate::{Bar, Cli, answer, shipped, signals};
 pub(crate) struct VerifyArgs {
     /// Cases to run: one-beam, three-beams, lower-arm, manipulator, programs [default: all]
     pub(crate) cases: Vec<String>,
-    /// Leave out what takes long
+    /// Leave out slow parts
     #[arg(long)]
     pub(crate) quick: bool,
     /// Folder with robots, trajectories and tests/verification [default: here, else where the
@@ -28,7 +28,7 @@ pub(crate) struct VerifyArgs {
     /// Folder for verification.md, its pictures and verification.json [default: a new one in out]
     #[arg(long, short, value_name = "DIR")]
     pub(crate) output: Option<PathBuf>,
-    /// Overwrite what is there
+    /// Overwrite existing files
     #[arg(long)]
     pub(crate) force: bool,
     /// Write no files
@@ -40,7 +40,7 @@ pub(crate) struct VerifyArgs {
     pub(crate) check: Option<PathBuf>,
 }
 
-/// Differences that are shown.
+/// Maximum number of differences shown.
 const SHOWN: usize = 20;
 
 pub(crate) fn run(cli: &Cli, args: &VerifyArgs) -> Result<ExitCode, Failure> {
@@ -103,7 +103,7 @@ fn line(difference: &flexarm_verify::check::Difference) -> String {
     }
 }
 
-/// Claims, then where the rest is.
+/// Formats the claims, then the location of the full results.
 fn text(verification: &Verification, changed: &[String], args: &VerifyArgs, page: Option<&str>, wall_s: f64) -> String {
     let mut text = String::new();
     for case in &verification.cases {

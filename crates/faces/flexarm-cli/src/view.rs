@@ -14,18 +14,18 @@ use crate::failure::Failure;
 use crate::print::{complaint, warning};
 use crate::{answer, to_json};
 
-/// Version of the viewer that this program writes `.rrd` files for.
+/// Viewer version for which this program writes `.rrd` files.
 const WRITTEN_FOR: &str = "0.36";
-/// The newest viewer of that version.
+/// Latest viewer release of that version.
 const WANTED: &str = "0.36.3";
-/// How long a viewer is watched: one that cannot start says so at once.
+/// Time for which a new viewer is watched: one that cannot start fails at once.
 const WATCHED: Duration = Duration::from_secs(1);
 
 #[derive(Debug, Args)]
 pub(crate) struct ViewArgs {
     /// .rrd or .mcap recording, .html report, or the folder of a run
     pub(crate) file: PathBuf,
-    /// Return only when the viewer is closed
+    /// Return only after the viewer is closed
     #[arg(long)]
     pub(crate) wait: bool,
 }
@@ -54,7 +54,7 @@ pub(crate) fn run(cli: &Cli, args: &ViewArgs) -> Result<ExitCode, Failure> {
     }
 }
 
-/// The file to show: the one given, or that of a run's folder.
+/// Returns the file to show: the given one, or that of a run's folder.
 fn recording(given: &Path) -> Result<PathBuf, Failure> {
     let fault = |what: &str| Err(Error::File { path: given.to_owned(), what: what.to_owned() }.into());
     if given.is_dir() {
@@ -80,21 +80,21 @@ fn ending(path: &Path) -> String {
     path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase()).unwrap_or_default()
 }
 
-/// A viewer that answered when asked for its version.
+/// A viewer that reported its version.
 struct Viewer {
-    /// Program and first arguments.
+    /// Program and leading arguments.
     words: &'static [&'static str],
     version: String,
 }
 
 impl Viewer {
-    /// The one on the path, else the one of python3.
+    /// Returns the viewer on the path, else the one of python3.
     fn find() -> Option<Self> {
         let ways: [&[&str]; 2] = [&["rerun"], &["python3", "-m", "rerun"]];
         ways.into_iter().find_map(|words| {
             let output = command(words).arg("--version").stdin(Stdio::null()).stderr(Stdio::null()).output().ok()?;
             let text = String::from_utf8_lossy(&output.stdout).into_owned();
-            // Other programs of that name would not answer so.
+            // Another program of that name would print something else.
             let version = text.contains("rerun").then(|| text.split_whitespace().find(|word| is_version(word)))??;
             output.status.success().then(|| Self { words, version: version.to_owned() })
         })
@@ -111,16 +111,16 @@ fn command(words: &[&str]) -> Command {
     command
 }
 
-/// Digits, point, digits, point, something.
+/// Returns whether a word is digits, point, digits, point, something.
 fn is_version(word: &str) -> bool {
     let mut parts = word.split('.');
     let mut number = || parts.next().is_some_and(|part| !part.is_empty() && part.bytes().all(|b| b.is_ascii_digit()));
     number() && number() && parts.next().is_some_and(|rest| rest.starts_with(|c: char| c.is_ascii_digit()))
 }
 
-/// Starts the viewer, and stays with it for a moment or to its end.
+/// Starts the viewer, and watches it for a moment or waits until it is closed.
 fn show(cli: &Cli, file: &Path, viewer: &Viewer, wait: bool) -> ExitCode {
-    // What a viewer says when it cannot start. A pipe would break under it when this program ends.
+    // Error output of a viewer that cannot start. A pipe would break when this program ends.
     let log = std::env::temp_dir().join(format!("flexarm-view-{}.log", std::process::id()));
     let mut command = command(viewer.words);
     command.arg(file).stdin(Stdio::null()).stdout(Stdio::null());
@@ -134,7 +134,7 @@ fn show(cli: &Cli, file: &Path, viewer: &Viewer, wait: bool) -> ExitCode {
     };
     let ended = watch(&mut child);
     let said = std::fs::read_to_string(&log).unwrap_or_default();
-    let _ = std::fs::remove_file(&log); // still open in the viewer, gone with it
+    let _ = std::fs::remove_file(&log); // still open in the viewer, deleted when it closes
     if let Some(Err(status)) = ended {
         return failed(&format!("`{} {}` ended with {status}{}", viewer.name(), file.display(), last_lines(&said)));
     }
@@ -158,7 +158,7 @@ fn show(cli: &Cli, file: &Path, viewer: &Viewer, wait: bool) -> ExitCode {
     ExitCode::SUCCESS
 }
 
-/// The keys that stop a program in the terminal shall not close a viewer that was left open.
+/// Detaches the viewer, so that Ctrl-C in the terminal does not close it.
 fn detach(command: &mut Command) {
     #[cfg(unix)]
     std::os::unix::process::CommandExt::process_group(command, 0);
@@ -166,7 +166,7 @@ fn detach(command: &mut Command) {
     let _ = command;
 }
 
-/// How the viewer ended, if it did so at once.
+/// Returns how the viewer ended, if it ended at once.
 fn watch(child: &mut Child) -> Option<Result<(), std::process::ExitStatus>> {
     let begin = Instant::now();
     while begin.elapsed() < WATCHED {
@@ -186,7 +186,7 @@ fn last_lines(text: &str) -> String {
     })
 }
 
-/// A report is for a browser; without a way to start one, it says which file to open.
+/// Opens a report in the browser; if none can be started, prints which file to open.
 fn browse(cli: &Cli, file: &Path) -> ExitCode {
     let path = file.canonicalize().unwrap_or_else(|_| file.to_owned());
     let mut opener = Command::new("xdg-open");

@@ -1,27 +1,27 @@
-//! Bad input: each kind has its own message with the place and the way to mend it, exit code 2,
-//! nothing on standard output, and no file or folder made or changed.
+//! Bad input: each kind has its own message with the location and the fix, exit code 2, nothing on
+//! standard output, and no file or folder is created or changed.
 //!
-//! The words that are demanded are those a user needs: which file, where in it, what was found,
-//! what is expected. Tests marked `ignore` state what is wanted and not yet so.
+//! The required words are those a user needs: file, location in it, what was found, what is
+//! expected. Tests marked `ignore` state the wanted behaviour that is not implemented yet.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 mod common;
 
 use common::{Answer, Place, ROBOT, SWING, URDF, flex, garbage, line_of, with};
 
-/// `compare` with the swing.
+/// Runs `compare` with the swing.
 fn compare_robot(place: &Place, robot: &str, words: &[&str]) -> Answer {
     place.refused(&["compare", robot, "swing.toml", "-o", "result"], words)
 }
 
-/// `compare` of the beam along a trajectory of this text.
+/// Runs `compare` with the beam along a trajectory given as text.
 fn compare_motion(file: &str, text: impl AsRef<[u8]>, words: &[&str]) -> Answer {
     let place = Place::new();
     place.write(file, text);
     place.refused(&["compare", "robot.toml", file, "-o", "result"], words)
 }
 
-/// A robot file of this text; the message must point into it, to the line with `piece`.
+/// A robot file given as text; the message must point to its line with `piece`.
 fn robot_file(text: &str, piece: &str, words: &[&str]) {
     let place = Place::new();
     place.write("robot.toml", text);
@@ -29,7 +29,7 @@ fn robot_file(text: &str, piece: &str, words: &[&str]) {
     compare_robot(&place, "robot.toml", &[&[here.as_str()], words].concat());
 }
 
-/// A URDF of this text; the message must point to the line with `piece` and offer help.
+/// A URDF given as text; the message must point to the line with `piece` and offer help.
 fn urdf(text: &str, piece: &str, words: &[&str]) {
     let place = Place::new();
     place.write("beam.urdf", text);
@@ -39,7 +39,7 @@ fn urdf(text: &str, piece: &str, words: &[&str]) {
     compare_robot(&place, "robot.toml", words);
 }
 
-/// A reduced link of this text; the message must point to the line with `piece`.
+/// A reduced link given as text; the message must point to the line with `piece`.
 fn flex_file(text: &str, piece: &str, words: &[&str]) {
     let place = Place::new();
     place.write("robot.toml", flex::robot());
@@ -48,7 +48,7 @@ fn flex_file(text: &str, piece: &str, words: &[&str]) {
     compare_robot(&place, "robot.toml", &[&[here.as_str()], words].concat());
 }
 
-/// Options after a sound `compare`.
+/// Options after a valid `compare`.
 fn options(arguments: &[&str], words: &[&str]) {
     let place = Place::new();
     place.refused(&[&["compare", "robot.toml", "swing.toml", "-o", "result"], arguments].concat(), words);
@@ -232,8 +232,8 @@ mod trajectory {
 
     #[test]
     fn toml_cut_off() {
-        // Within a string, within an array, between lines: no cut before the first whole move may
-        // pass.
+        // Truncated within a string, within an array, between lines: no truncation before the first
+        // complete move may pass.
         let end = SWING.find(".0]\nduration").unwrap();
         for length in 0..end {
             let answer = compare_motion("m.toml", &SWING[..length], &["m.toml"]);
@@ -263,7 +263,7 @@ mod trajectory {
         compare_motion("m.toml", toml, &["m.toml", "7", "format = 1"]);
     }
 
-    /// Above, below and too fast, all in one motion.
+    /// Above, below and too fast in one motion.
     const WILD: &str = "time,swing\n0,0\n1,3.5\n2,-3.5\n3,0\n";
 
     #[test]
@@ -314,7 +314,7 @@ mod robot_description {
 
     #[test]
     fn urdf_cut_off() {
-        // Wherever the file ends, it is refused with a place in it.
+        // At any truncation the file is refused with a location in it.
         let end = URDF.rfind("</robot>").unwrap();
         let place = Place::new();
         for length in (0..end).step_by(7) {
@@ -332,7 +332,7 @@ mod robot_description {
             place.write("garbled.urdf", garbage(2000, seed));
             compare_robot(&place, "garbled.urdf", &["garbled.urdf:1:", "help: "]);
         }
-        // Bytes that are text, but no XML.
+        // Bytes that are text but not XML.
         let letters: String = garbage(500, 5).iter().map(|b| char::from(b' ' + b % 90)).collect();
         place.write("garbled.urdf", letters);
         compare_robot(&place, "garbled.urdf", &["garbled.urdf:1:", "expected", "help: "]);
@@ -340,7 +340,7 @@ mod robot_description {
 
     #[test]
     fn urdf_with_one_byte_spoilt() {
-        // Nearly sound files must never make the program panic; some are still sound.
+        // Nearly valid files must never cause a panic; some are still valid.
         let place = Place::new();
         for (k, place_of_byte) in (30..URDF.len()).step_by(23).enumerate() {
             let mut bytes = URDF.as_bytes().to_vec();
@@ -420,7 +420,8 @@ mod robot_description {
         urdf(&text, "<inertial>", &["link \"bar\"", "triangle inequality", "5.0", "order ixx ixy ixz iyy iyz izz"]);
     }
 
-    /// A bare arm without masses can be moved; that it has none is told, with options that exist.
+    /// A bare arm without masses can be moved; the missing masses are reported, with options that
+    /// exist.
     #[test]
     fn missing_inertial() {
         let place = Place::new();
@@ -466,7 +467,7 @@ mod robot_toml {
     fn cut_off() {
         let end = ROBOT.find("damping").unwrap();
         let place = Place::new();
-        // A cut between two lines may leave a sound file; within a line it never does.
+        // A truncation between two lines may leave a valid file; one within a line never does.
         for length in (1..end).filter(|n| !ROBOT[..*n].ends_with('\n') && !ROBOT[*n..].starts_with('\n')) {
             place.write("robot.toml", &ROBOT[..length]);
             place.refused(&["inspect", "robot.toml"], &["robot.toml:"]);
@@ -643,7 +644,7 @@ mod reduced_link {
         flex::text(&flex::stiffness_6())
     }
 
-    /// The files that the tests below spoil are sound, and both kinds describe the same link.
+    /// The files that the tests below corrupt are valid, and both kinds describe the same link.
     #[test]
     fn sound_files_pass() {
         let place = Place::new();
@@ -660,11 +661,11 @@ mod reduced_link {
 
     #[test]
     fn singular_stiffness() {
-        // Free to twist.
+        // No torsional stiffness.
         let mut k = flex::stiffness_6();
         k[3][3] = 0.0;
         flex_file(&flex::text(&k), "matrix", &["singular", "rx", "eigenvalue", "untied"]);
-        // Bending without the shear that goes with it: a combination is free.
+        // Bending without the coupled shear: a combination is free.
         let mut k = flex::stiffness_6();
         k[1][5] = -(k[1][1] * k[5][5]).sqrt();
         k[5][1] = k[1][5];
@@ -693,7 +694,7 @@ mod reduced_link {
 
     #[test]
     fn interfaces_elsewhere() {
-        // The 12x12 tells the lever itself, the 6x6 is measured at the robot's joint.
+        // The 12x12 matrix defines the lever itself, the 6x6 refers to the robot's joint.
         let moved = |text: &str| with(text, "[interface.B]\nxyz = [0.8,", "[interface.B]\nxyz = [0.7,");
         let text = moved(&flex::text(&flex::stiffness_12()));
         flex_file(&text, "matrix", &["p_AB = (0.7", "the matrix itself (0.8"]);
@@ -735,7 +736,7 @@ mod reduced_link {
         compare_robot(&place, "robot.toml", &["bar.flex:", "no distal part", "cut off?"]);
         place.write("bar.flex", &text[..text.rfind("inertia").unwrap()]);
         compare_robot(&place, "robot.toml", &["bar.flex:", "\"inertia\"", "ixx, iyy, izz"]);
-        // No cut may pass, wherever it is: the last key is needed, too.
+        // No truncation may pass at any position: the last key is also required.
         for length in (0..text.len() - 2).step_by(17) {
             place.write("bar.flex", &text[..length]);
             place.refused(&["inspect", "robot.toml"], &["bar.flex:"]);
@@ -900,7 +901,7 @@ mod outputs {
         let place = Place::new();
         place.json(&["compare", "robot.toml", "swing.toml", "-o", "result"]);
         compare_robot(&place, "robot.toml", &["exists already", "--force"]);
-        // Nor does --force touch them before the input is known to be sound.
+        // Nor does --force touch them before the input has been validated.
         let forced = ["compare", "robot.toml", "swing.toml", "-o", "result", "--force"];
         place.refused(&[&forced[..], &["--step", "0"]].concat(), &["step"]);
         place.refused(&[&forced[..], &["--log-rate", "0"]].concat(), &["log rate"]);
@@ -918,7 +919,7 @@ mod outputs {
     }
 }
 
-/// A column that comes twice has no meaning, whichever table it is in; both places are told.
+/// A duplicate column is ambiguous in any table; both positions are reported.
 #[test]
 fn a_column_that_comes_twice_is_refused_with_both_places() {
     let place = Place::new();
@@ -949,8 +950,8 @@ fn a_column_that_comes_twice_is_refused_with_both_places() {
     }
 }
 
-/// A slide instead of the swing: numbers in degrees, of joints and of motions, are no places of it;
-/// and the other way round.
+/// A prismatic joint instead of the swing: numbers in degrees, of joints and of motions, are not
+/// positions of it; and vice versa.
 #[test]
 fn units_that_contradict_what_a_joint_does_are_refused_wherever_it_is_told() {
     let place = Place::new();
@@ -978,7 +979,7 @@ fn units_that_contradict_what_a_joint_does_are_refused_wherever_it_is_told() {
     place.refused(&run("robot.toml", "m.toml"), &[&["m.toml, line 3"][..], &turns].concat());
     place.write("m.csv", "# metres: swing\ntime,swing\n0,0\n1,0.1\n2,0.1\n");
     place.refused(&run("robot.toml", "m.csv"), &[&["m.csv, line 1"][..], &turns].concat());
-    // What is told rightly is read: 0.3 m, and as radians without a word.
+    // Correct units are read: 0.3 m, and radians without a unit.
     place.write(
         "right.toml",
         with(SWING, "unit = \"deg\"", "unit = \"deg\"\nmetres = [\"swing\"]").replace("60.0", "0.3"),

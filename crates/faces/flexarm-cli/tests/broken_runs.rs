@@ -1,5 +1,5 @@
-//! What is left of a run that is killed, or that fills the disk: files that read up to there, and
-//! one clear message.
+//! Remains of a run that is killed or that fills the disk: files that are readable up to that
+//! point, and one clear message.
 #![cfg(all(unix, feature = "mcap"))]
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use common::{Answer, Place, Table, with};
 
-/// A run that takes long, and has much to write: half a minute of rest in small steps.
+/// A long run with much output: half a minute of rest in small steps.
 const LONG: [&str; 9] = ["compare", "robot.toml", "long.toml", "-o", "result", "--step", "1e-5", "--log-rate", "1000"];
 
 fn place() -> Place {
@@ -38,16 +38,16 @@ fn last_time(file: &[u8]) -> (Option<f64>, bool) {
     (last.map(|nanoseconds| (nanoseconds - 946_684_800_000_000_000) as f64 * 1e-9), rest.is_empty() || rest == MAGIC)
 }
 
-/// Truth: the promise of the recorders, at most the last moment is lost: of an MCAP a chunk, which
-/// is half a second of the motion. What was in the file a second before the kill cannot be all that
-/// is left, because the run went on in that second.
+/// Truth: the guarantee of the recorders that at most the last moment is lost: for an MCAP one
+/// chunk, which is half a second of motion. The recording after the kill must go beyond its state
+/// one second before, since the run continued in that second.
 #[test]
 fn a_killed_run_leaves_recordings_up_to_the_last_moment() {
     let place = place();
     let mut run = place.command(&LONG).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
     let reached = || std::fs::read(place.path("result/run.mcap")).ok().and_then(|file| last_time(&file).0);
     let begin = Instant::now();
-    // Until the run is under way.
+    // Wait until the run has started.
     while reached().is_none_or(|t| t < 0.5) {
         assert!(run.try_wait().unwrap().is_none(), "the run was over too soon");
         assert!(begin.elapsed() < Duration::from_secs(60), "the run does not get going");
@@ -64,7 +64,7 @@ fn a_killed_run_leaves_recordings_up_to_the_last_moment() {
     let text = place.text("result/run.csv");
     let table = Table::parse(&text[..=text.rfind('\n').unwrap()]);
     assert!(*table.column("time").last().unwrap() > before);
-    // Read back by the program itself, the recording goes as far.
+    // Read back by the program itself, the recording reaches as far.
     let summary = place.json(&["convert", "result/run.mcap", "left.csv"]);
     let reached = Table::parse(&place.text("left.csv")).column("time").last().copied().unwrap();
     assert!(reached > before, "{reached} s, {before} s a second before the kill");
@@ -73,9 +73,9 @@ fn a_killed_run_leaves_recordings_up_to_the_last_moment() {
         let left = place.read("result/run.rrd").len();
         assert!(left > 20_000, "{left} bytes are left in the .rrd");
     }
-    // And a report can be made of what is left.
+    // A report can be made from the remains.
     let report = place.json(&["report", "result/run.mcap", "-o", "left.html"]);
-    // Between them stands how many samples are kept, if a quick machine has got that far.
+    // In between is the number of kept samples, if a fast machine has got that far.
     let warnings: Vec<&str> =
         report["warnings"].as_array().unwrap().iter().map(|text| text.as_str().unwrap()).collect();
     let broken = |text: &&str| text.contains("was not finished") || text.contains("breaks off");
@@ -83,8 +83,8 @@ fn a_killed_run_leaves_recordings_up_to_the_last_moment() {
     assert!(place.text("left.html").contains("TCP error"));
 }
 
-/// The program under a limit of the size of files (in the shell's blocks of 512 or 1024 bytes),
-/// writing past which is an error as on a full disk.
+/// The program under a limit on file sizes (in the shell's blocks of 512 or 1024 bytes); writing
+/// beyond it is an error as on a full disk.
 fn limited(place: &Place, blocks: u32, arguments: &[&str]) -> Answer {
     let program = env!("CARGO_BIN_EXE_flexarm");
     let script = format!("trap '' XFSZ; ulimit -f {blocks}; exec \"$0\" \"$@\"");
@@ -101,7 +101,7 @@ fn a_recording_that_may_not_grow_ends_the_run_with_its_name_and_reads_up_to_ther
     assert_eq!((answer.code, answer.out.as_str()), (1, ""));
     answer.says(&["result/run.", "may not grow further", "File too large"]);
     assert_eq!(answer.err.matches("error:").count(), 1, "{}", answer.err);
-    // Closing the files fails as well; what counts is what came first.
+    // Closing the files fails as well; the first error counts.
     assert!(!answer.err.contains("index") && !answer.err.contains("last samples"), "{}", answer.err);
     let (last, whole) = last_time(&place.read("result/run.mcap"));
     assert!(last.is_some_and(|last| (0.1..59.0).contains(&last)) && whole, "{last:?} s are left");
@@ -111,7 +111,7 @@ fn a_recording_that_may_not_grow_ends_the_run_with_its_name_and_reads_up_to_ther
     }
 }
 
-/// The first file that is written to fails at once: the device is always full.
+/// Writing the first file fails at once: the device is always full.
 #[test]
 #[cfg(target_os = "linux")]
 fn a_full_disk_is_named_with_what_to_do() {

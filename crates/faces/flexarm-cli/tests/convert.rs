@@ -1,4 +1,4 @@
-//! `flexarm convert` and `--parquet` as a user meets them.
+//! `flexarm convert` and `--parquet` from the user's point of view.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 mod common;
@@ -11,7 +11,7 @@ fn recorded() -> Place {
     recorded_at("200")
 }
 
-/// The same with so many samples per second.
+/// The same with a given number of samples per second.
 fn recorded_at(log_rate: &str) -> Place {
     let place = Place::new();
     place.json(&["compare", "robot.toml", "swing.toml", "-o", "result", "--log-rate", log_rate]);
@@ -47,7 +47,7 @@ fn a_table_is_the_same_bytes_through_every_format() {
         convert(&place, "c.parquet", "c.mcap");
         convert(&place, "c.mcap", "c.csv");
         assert!(place.read("c.csv") == truth);
-        // The formats can be said instead of named.
+        // Formats can be given explicitly instead of by extension.
         place.json(&["convert", "c.parquet", "c.bin", "--to", "csv"]);
         assert!(place.read("c.bin") == truth);
         place.json(&["convert", "c.bin", "d.csv", "--from", "csv"]);
@@ -65,7 +65,7 @@ fn names_beside_the_output_belong_to_others() {
     place.write("y.csv.new", "mine");
     convert(&place, "x.csv", "y.csv");
     assert_eq!(place.text("y.csv.new"), "mine");
-    // Nothing stays behind, whether it went well or not.
+    // Nothing remains, whether it succeeded or not.
     place.write("broken.csv", "time\n");
     assert_ne!(place.flexarm(&["convert", "broken.csv", "z.csv"]).code, 0);
     let hidden = |path: &std::path::PathBuf| path.to_string_lossy().starts_with('.');
@@ -87,8 +87,7 @@ fn parquet_is_written_by_a_run_that_is_asked_for_it() {
     assert!(!place.path("result/run.parquet.partial").exists());
 }
 
-/// What a run does not write by itself it writes when it is asked to, and its summary names the
-/// file.
+/// Formats not written by default are written on request, and the summary names the file.
 #[cfg(feature = "arrow")]
 #[test]
 fn a_run_that_is_asked_for_arrow_writes_it_and_a_report_is_made_of_it() {
@@ -104,12 +103,12 @@ fn a_run_that_is_asked_for_arrow_writes_it_and_a_report_is_made_of_it() {
     let summary = convert(&place, "b.feather", "b.csv");
     assert_eq!((&summary["from"], &summary["to"]), (&Value::from("arrow"), &Value::from("csv")));
     assert!(place.read("b.csv") == place.read("a.csv"));
-    // The file holds the result: the report needs no other.
+    // The file contains the result: the report needs no other file.
     let report = place.json(&["report", "result/run.arrow", "-o", "page.html"]);
     assert_eq!(report["inputs"][0], "result/run.arrow");
     assert_eq!(report["warnings"].as_array().unwrap().len(), 0);
     assert!(place.text("page.html").contains("id=\"plots\""));
-    // A later run without it leaves none behind.
+    // A later run without it removes the old file.
     place.json(&[&run[..], &["--force"]].concat());
     assert!(!place.path("result/run.arrow").exists());
 }
@@ -156,7 +155,7 @@ fn what_cannot_be_converted_is_refused_and_nothing_is_touched() {
     assert!(place.read("taken.csv") == place.read("result/run.csv"));
 }
 
-/// A place that cannot be written is a failure of the run, and leaves nothing behind.
+/// An unwritable location is a failure of the run, and leaves nothing behind.
 #[cfg(unix)]
 #[test]
 fn an_output_that_cannot_be_written_ends_with_1_and_leaves_nothing() {

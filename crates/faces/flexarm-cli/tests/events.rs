@@ -1,5 +1,5 @@
-//! Healthy runs over what happens at discrete times, the same with every stepper: payloads, corners
-//! of a motion; joint efforts of all of them.
+//! Runs across discrete events, the same with every stepper: payloads, corners of a motion; joint
+//! efforts of all of them.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 
@@ -11,7 +11,7 @@ use common::{Place, shipped_robot, shipped_trajectory};
 use flexarm::{STEPPERS, StepRule, StepperEntry};
 use serde_json::Value;
 
-/// Options with which each stepper of the registry meets what is sudden.
+/// Options with which each stepper of the registry handles sudden events.
 fn steppers() -> impl Iterator<Item = Vec<&'static str>> {
     let options = |entry: &StepperEntry| {
         let step = match entry.steps {
@@ -30,11 +30,11 @@ fn peak_m(summary: &Value) -> f64 {
     summary["tcp"]["peak_m"].as_f64().unwrap()
 }
 
-/// The arm drops what it carries and takes it up again, 150 kg at once. Links alone, so that
-/// nobody's drives matter.
+/// The arm drops its payload and picks it up again, 150 kg at once. Only links are elastic, to
+/// exclude the drives.
 ///
-/// Truth: the stepper with error control. Measured: 1.4922 mm in all. Generalised-alpha diverged at
-/// 4.001 s at every step.
+/// Truth: the stepper with error control. Measured: 1.4922 mm in total. Generalised-alpha used to
+/// diverge at 4.001 s at every step size.
 #[test]
 fn an_arm_that_picks_up_its_payload_goes_on() {
     let place = Place::new();
@@ -59,7 +59,7 @@ fn an_arm_that_picks_up_its_payload_goes_on() {
     }
 }
 
-/// The shipped cycle with the pick that it is named after: all steppers agree.
+/// The shipped cycle with its pick: all steppers agree.
 #[test]
 fn the_shipped_pick_and_place_picks_and_places() {
     let place = Place::new();
@@ -75,7 +75,7 @@ fn the_shipped_pick_and_place_picks_and_places() {
     assert!((alpha / fine - 1.0).abs() < 5e-3, "{alpha} {fine}");
 }
 
-/// A triangle of 2 rad/s at one joint, as positions alone: three corners.
+/// A triangle of 2 rad/s at one joint, given only as positions: three corners.
 fn corners(rate_hz: u32) -> String {
     let mut text = "time,joint_1,joint_2,joint_3,joint_4,joint_5,joint_6\n".to_owned();
     for k in 0..=2 * rate_hz {
@@ -86,11 +86,12 @@ fn corners(rate_hz: u32) -> String {
     text
 }
 
-/// Sampled at 1 kHz and at 500 Hz, by every stepper, at 1 ms, 2 ms and steps that meet no corner:
-/// one peak, to 1 %.
+/// Sampled at 1 kHz and at 500 Hz, by every stepper, at 1 ms, 2 ms and at step sizes that do not
+/// hit the corners: the same peak, to 1 %.
 ///
-/// Measured: 0.1329 m, 0.1327 m by generalised-alpha at 2 ms. It took accelerations at the ends of
-/// steps alone and missed the impulse: half the peak at 1 ms, three times it at 2 ms.
+/// Measured: 0.1329 m, 0.1327 m by generalised-alpha at 2 ms. It used to evaluate accelerations
+/// only at the ends of steps and missed the velocity jump: half the peak at 1 ms, three times the
+/// peak at 2 ms.
 #[test]
 fn every_stepper_takes_the_blow_of_a_corner() {
     let place = Place::new();
@@ -116,12 +117,12 @@ fn every_stepper_takes_the_blow_of_a_corner() {
     }
 }
 
-/// From rest to 2 rad/s within a few samples of 1 ms and back: no corner, and as hard a blow.
+/// From rest to 2 rad/s within a few samples of 1 ms and back: no corner, but the same impulse.
 /// Truth: RK4 in fine steps.
 ///
-/// Accelerations at the ends of steps alone say another impulse: a default run had 0.034 m of 0.063
-/// m for three samples and 15 % too little for ten. Measured with steps that are cut: within 0.33
-/// %, 0.5 % without the dispersion correction.
+/// Accelerations only at the ends of steps give a different impulse: a default run had 0.034 m of
+/// 0.063 m for three samples and 15 % too little for ten. Measured with subdivided steps: within
+/// 0.33 %, 0.5 % without the dispersion correction.
 #[test]
 fn every_stepper_takes_the_blow_of_a_short_ramp() {
     let place = Place::new();
@@ -155,9 +156,9 @@ fn every_stepper_takes_the_blow_of_a_short_ramp() {
     }
 }
 
-/// A table of a slow motion with five digits, at 1 kHz: its steps are as large as the way of a
-/// sample at the ends. Truth: RK4 on the same table. Measured: within 0.41 %; with accelerations at
-/// the ends of steps alone 7 %.
+/// A table of a slow motion with five digits, at 1 kHz: at its ends the rounding steps are as large
+/// as the motion per sample. Truth: RK4 on the same table. Measured: within 0.41 %; with
+/// accelerations only at the ends of steps 7 %.
 #[test]
 fn a_table_of_few_digits_moves_the_arm_alike_in_every_stepper() {
     let place = Place::new();
@@ -190,17 +191,18 @@ fn corners_are_told_and_can_be_rounded() {
     let told = |summary: &Value| summary["warnings"].to_string().replace('\\', "").contains(words);
     let (sharp, round) = (place.json(&line), place.json(&[&line[..], &["--round-corners", "0.1"]].concat()));
     assert!(told(&sharp) && !told(&round), "{}", round["warnings"]);
-    // Struck by 4 rad/s at once or within a tenth of a second, longer than the first period.
+    // A velocity jump of 4 rad/s at once, or within a tenth of a second, longer than the first
+    // period.
     assert!(peak_m(&round) < 0.7 * peak_m(&sharp), "{} {}", peak_m(&round), peak_m(&sharp));
-    // The energy of the blows is in the books.
+    // The energy of the velocity jumps is in the balance.
     let imbalance = sharp["energy"]["imbalance"].as_f64().unwrap();
     assert!(imbalance < 0.02, "{}", sharp["energy"]);
     place.refused(&[&line[..], &["--round-corners", "0"]].concat(), &["corners", "positive"]);
 }
 
 /// Joint efforts of the shipped arms, by a stepper whose constraint forces are the joint forces,
-/// and by one that evaluates them: of one another within 2 % of the largest. The rotor of the
-/// three-mass arm has nine tenths of them.
+/// and by one that evaluates them: they agree within 2 % of the maximum. The rotor of the
+/// three-mass arm accounts for nine tenths of them.
 #[test]
 fn all_steppers_agree_about_joint_efforts() {
     let place = Place::new();
@@ -216,7 +218,7 @@ fn all_steppers_agree_about_joint_efforts() {
         ("lower_arm/robot.toml", "1e-4"),
     ] {
         let path = shipped_robot(robot);
-        // The rotor's energy is in the books as well: a tenth of it was missing.
+        // The rotor's energy is in the balance as well: a tenth of it used to be missing.
         let efforts = |options: &[&str]| {
             let line =
                 [&["compare", &path, "--no-files", "--log-rate", "1000", "--ignore-limits"][..], options].concat();
@@ -235,8 +237,8 @@ fn all_steppers_agree_about_joint_efforts() {
     }
 }
 
-/// A point at the end of the arm has no moments of inertia: refused by name, before anything is
-/// made.
+/// A point mass at the end of the arm has no moments of inertia: refused by name, before anything
+/// is created.
 #[test]
 fn spook_says_which_link_it_cannot_carry() {
     let place = Place::new();

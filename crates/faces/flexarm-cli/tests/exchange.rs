@@ -1,4 +1,4 @@
-//! `flexarm import` and `flexarm export` as a user meets them.
+//! `flexarm import` and `flexarm export` from the user's point of view.
 #![allow(
     clippy::unwrap_used,
     clippy::print_stderr,
@@ -12,7 +12,7 @@ use std::path::PathBuf;
 use common::flex;
 use common::{Place, matrix, numbers};
 
-/// Largest difference of two matrices over the geometric mean of the diagonal of the first.
+/// Maximum difference of two matrices over the geometric mean of the diagonal of the first.
 fn difference(a: &[Vec<f64>], b: &[Vec<f64>]) -> f64 {
     let mut worst = 0.0_f64;
     for i in 0..a.len() {
@@ -23,7 +23,7 @@ fn difference(a: &[Vec<f64>], b: &[Vec<f64>]) -> f64 {
     worst
 }
 
-/// Outside samples, where they are there.
+/// External samples, if they are available.
 fn sample(name: &str) -> Option<PathBuf> {
     common::reference(name)
 }
@@ -31,8 +31,7 @@ fn sample(name: &str) -> Option<PathBuf> {
 const MASS: [&str; 6] = ["--mass", "1.728", "--com", "0.4,0,0", "--inertia", "0.0003,0.0924,0.0922,0,0,0"];
 const AT: [&str; 4] = ["--at", "A=0,0,0", "--at", "B=0.8,0,0"];
 
-/// `node,dof,node,dof,value` of the beam of the tests; `order` gives the component that stands in
-/// each row.
+/// `node,dof,node,dof,value` of the beam of the tests; `order` gives the component in each row.
 fn labelled(order: [usize; 6]) -> String {
     let k = flex::stiffness_12();
     let mut text = String::new();
@@ -219,7 +218,7 @@ fn a_sid_and_an_exudyn_model_are_beams_too() {
     }
 }
 
-/// Numbers of a SID, block by block, in the order of the file.
+/// Numbers of a SID file, block by block, in the order of the file.
 fn numbers_of_sid(text: &str) -> Vec<(String, Vec<f64>)> {
     let mut blocks: Vec<(String, Vec<f64>)> = vec![("head".into(), Vec::new())];
     for line in text.lines().map(str::trim) {
@@ -235,7 +234,8 @@ fn numbers_of_sid(text: &str) -> Vec<(String, Vec<f64>)> {
     blocks
 }
 
-/// Truth: the modal link of a mesh as it was written; each block of numbers against its largest.
+/// Truth: the modal link of a mesh before it was written; each block is compared relative to its
+/// maximum.
 #[test]
 fn a_modal_link_survives_sid_and_the_way_back() {
     let place = Place::new();
@@ -266,7 +266,7 @@ fn a_modal_link_survives_sid_and_the_way_back() {
         assert!((numbers(&back["interfaces"][1]["position_m"])[2] - 1.1).abs() < 1e-12);
         assert!(back["warnings"].as_array().unwrap().iter().all(|w| !w.as_str().unwrap().contains("SID")), "{back}");
 
-        // Written once more, it has the same numbers.
+        // Written again, it has the same numbers.
         let flex = format!("{into}/lower_arm.flex");
         let again = format!("again-{units}");
         place.json(&["export", &flex, "--format", "sid", "--units", units, "--nodes", "11,12", "-o", &again]);
@@ -281,8 +281,8 @@ fn a_modal_link_survives_sid_and_the_way_back() {
             assert!(gap <= 1e-12 * size, "{name}, {mesh_units}: {gap:.1e} of {size:.1e}");
         }
     }
-    // In other axes it is the same link: same frequencies, B where it then is, and the robot
-    // refuses it only for that.
+    // In other axes it is the same link: same frequencies, B at its rotated position, and the robot
+    // refuses it only because of that position.
     let turned = ["import", "out-m-kg-s/lower_arm.SID_FEM", "--units", "m-kg-s", "--map", "A=11,B=12", "-o", "turned"];
     let turned = place.json(&[&turned[..], &["--axes-rpy", "0,0,1.5707963267948966"]].concat());
     assert!((numbers(&turned["modal"]["frequencies_hz"])[0] / 66.66771323663794 - 1.0).abs() < 1e-12);
@@ -310,7 +310,7 @@ fn a_sid_needs_modes_and_nodes() {
     ] {
         place.refused(&[&import[..], &[map]].concat(), words);
     }
-    // Bodies that ride on the link are no part of it.
+    // Additional bodies on the link are not part of it.
     let said = place.json(&[
         "export",
         &common::shipped_robot("kr210/fe/link_2.flex"),
@@ -324,7 +324,8 @@ fn a_sid_needs_modes_and_nodes() {
     assert!(said["warnings"][0].as_str().unwrap().contains("attached bodies of"), "{said}");
 }
 
-/// Truth: a cantilever of the sample's figures with its own weight; see `shared/fe` for its origin.
+/// Truth: a cantilever with the figures of the sample and its own weight; see `shared/fe` for its
+/// origin.
 #[test]
 fn a_sample_sid_runs_as_a_modal_link() {
     let Some(path) = sample("formats/beam_synthetic.SID_FEM") else { return };
@@ -338,7 +339,7 @@ fn a_sample_sid_runs_as_a_modal_link() {
     place.write("robot.toml", common::with(&robot, "damping", "model = \"modal\"\ndamping"));
     let modal = place.json(&["compare", "robot.toml", "swing.toml", "--no-files"]);
     assert_eq!(modal["links_model"], "modal");
-    // 210 GPa, 100 mm x 50 mm lying flat; measured -1.1e-2: its tied ends are stiff.
+    // 210 GPa, 100 mm x 50 mm lying flat; measured -1.1e-2, since its tied ends are stiff.
     let sag = modal["tcp"]["static_sag_m"].as_f64().unwrap();
     let truth = 9.81 / (210e9 * 0.1 * 0.05f64.powi(3) / 12.0) * (39.25 / 8.0 + 0.5 / 3.0);
     assert!((sag / truth - 1.0).abs() < 0.02, "{sag:.4e} instead of {truth:.4e}");

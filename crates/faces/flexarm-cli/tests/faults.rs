@@ -1,5 +1,4 @@
-//! Disks that fill up, folders that go away, signals, runs at the same time: what a run leaves, and
-//! what it says.
+//! Full disks, removed folders, signals, concurrent runs: remaining files and messages of a run.
 #![cfg(unix)]
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 #![allow(clippy::print_stderr, reason = "a test that skips says so")]
@@ -11,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use common::{Answer, Place, Table, with};
 
-/// A run that takes long: half a minute of rest in small steps.
+/// A long run: half a minute of rest in small steps.
 const LONG: [&str; 9] = ["compare", "robot.toml", "long.toml", "-o", "result", "--step", "1e-5", "--log-rate", "1000"];
 
 fn place() -> Place {
@@ -20,8 +19,7 @@ fn place() -> Place {
     place
 }
 
-/// A command of the shell in the place's folder, with the program as `$0` and its arguments as
-/// `$@`.
+/// A shell command in the test folder, with the program as `$0` and its arguments as `$@`.
 fn shell(place: &Place, script: &str, arguments: &[&str]) -> Command {
     let mut command = Command::new("sh");
     command.args(["-c", script, env!("CARGO_BIN_EXE_flexarm")]).args(arguments).current_dir(place.path("."));
@@ -54,14 +52,14 @@ fn last_time(text: &str) -> f64 {
     table.column("time").last().copied().unwrap_or(-1.0)
 }
 
-/// Recordings that this build writes beside the table.
+/// Recordings that this build writes in addition to the table.
 fn recordings() -> Vec<&'static str> {
     let built = [("run.mcap", cfg!(feature = "mcap")), ("run.rrd", cfg!(feature = "rerun"))];
     built.into_iter().filter_map(|(name, is_built)| is_built.then_some(name)).collect()
 }
 
-/// Truth: all recordings see the same samples. A disk in memory of 2 MB, in a name space that goes
-/// away with its shell.
+/// Truth: all recordings get the same samples. Uses a RAM disk of 2 MB, in a namespace that ends
+/// with its shell.
 #[test]
 fn on_a_disk_that_fills_up_all_recordings_reach_about_as_far() {
     let place = place();
@@ -90,15 +88,15 @@ fn on_a_disk_that_fills_up_all_recordings_reach_about_as_far() {
         }
         let summary = place.json(&["convert", &format!("left/{name}"), &format!("{name}.csv")]);
         let reached = last_time(&place.text(&format!("{name}.csv")));
-        // Flushes are 64 samples apart; an MCAP has whole chunks, of half a second at most.
+        // Flushes are 64 samples apart; an MCAP has complete chunks, of at most half a second.
         let behind = if name == "run.mcap" { 0.7 } else { 0.2 };
         assert!(reached > table - behind, "{name} reaches {reached} s, the table {table} s");
-        // Of a file whose end had no room; one that was closed in time is whole.
+        // A file whose end had no space; one that was closed in time is complete.
         assert!(summary["warnings"].as_array().unwrap().len() <= 1, "{summary}");
     }
 }
 
-/// The signal that a file may not grow would kill without a word.
+/// The signal for the file size limit would kill the program without a message.
 #[test]
 fn a_limit_of_file_sizes_is_an_error_with_the_name_of_the_file() {
     let place = place();
@@ -123,7 +121,7 @@ fn a_terminal_that_closes_stops_a_run_unless_it_was_started_to_go_on() {
     assert_eq!(answer.code, 1, "{}", answer.err);
     answer.says(&["stopped at t = ", "readable"]);
     if cfg!(not(target_os = "linux")) {
-        return; // where it is not known, it ends the run as it ends any program
+        return; // where the signal is unknown, it ends the run as it ends any program
     }
 
     std::fs::remove_dir_all(place.path("result")).unwrap();
@@ -149,10 +147,10 @@ fn a_run_whose_folder_is_removed_ends_with_1_and_says_what_is_lost() {
     assert_eq!((answer.code, answer.out.as_str()), (1, ""), "{}", answer.err);
     answer.says(&["result/run.csv", "no longer there"]);
     recordings().iter().for_each(|name| answer.says(&[&format!("result/{name}")]));
-    // A folder with a report alone would look like a result.
+    // A folder with only a report would look like a result.
     assert!(!place.path("result").exists());
 
-    // Stopped by hand it must not promise a log either.
+    // A run stopped by hand must not promise a log either.
     let mut run = shell(&place, "exec \"$0\" \"$@\"", &LONG).spawn().unwrap();
     under_way(&place, &mut run);
     std::fs::remove_dir_all(place.path("result")).unwrap();
@@ -179,7 +177,7 @@ fn runs_that_start_at_the_same_time_get_folders_of_their_own() {
         .collect();
     tables.sort();
     assert_eq!(tables, [1, 2, 3, 4].map(|n| format!("out/beam-swing-00{n}/run.csv")));
-    // A command that is refused leaves no empty folder behind.
+    // A refused command leaves no empty folder behind.
     place.refused(&["compare", "robot.toml", "swing.toml", "--step", "-1"], &["step"]);
     std::fs::remove_dir_all(place.path("out")).unwrap();
     place.refused(&["compare", "robot.toml", "swing.toml", "--step", "-1"], &["step"]);
@@ -187,7 +185,7 @@ fn runs_that_start_at_the_same_time_get_folders_of_their_own() {
 
 #[test]
 fn a_file_that_cannot_be_made_leaves_nothing_of_the_others() {
-    // A folder in its place.
+    // A folder at the path of a file.
     let place = Place::new();
     std::fs::create_dir_all(place.path("result/run.csv")).unwrap();
     let before = place.snapshot();
@@ -226,7 +224,7 @@ fn a_recording_without_a_sample_has_no_report() {
     }
 }
 
-/// The hidden folder in which a conversion comes into being is nobody's business.
+/// The hidden temporary folder of a conversion must not appear in messages.
 #[test]
 fn a_conversion_names_the_files_that_it_was_given_and_leaves_nothing_when_stopped() {
     let place = place();
@@ -242,14 +240,14 @@ fn a_conversion_names_the_files_that_it_was_given_and_leaves_nothing_when_stoppe
         if !built {
             continue;
         }
-        // At several instants, and by a limit of file sizes.
+        // At several instants, and by a limit on file sizes.
         for milliseconds in [0, 30, 100, 250] {
             let run = shell(&place, "exec \"$0\" \"$@\"", &["convert", "result/run.csv", output]).spawn().unwrap();
             std::thread::sleep(Duration::from_millis(milliseconds));
             let _ = Command::new("kill").args(["-TERM", &run.id().to_string()]).stderr(Stdio::null()).status();
             let output_of_run = run.wait_with_output().unwrap();
             match output_of_run.status.code() {
-                // Before it had begun it was killed, as any program.
+                // Killed before it had begun, like any program.
                 None => assert!(output_of_run.stdout.is_empty()),
                 Some(0) => std::fs::remove_file(place.path(output)).unwrap(),
                 Some(code) => assert_eq!(code, 1),
@@ -276,6 +274,6 @@ fn a_second_run_into_the_folder_of_one_that_is_under_way_is_refused_and_the_firs
     send(common::stop_signal(), &first);
     ended(first);
     assert!(place.text("result/run.csv").lines().count() >= rows && place.path("result/summary.json").exists());
-    // When it has ended the folder is free.
+    // Afterwards the folder is available.
     place.json(&["compare", "robot.toml", "swing.toml", "-o", "result", "--force"]);
 }

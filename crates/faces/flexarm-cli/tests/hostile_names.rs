@@ -1,4 +1,4 @@
-//! Names with control characters, markup and formulas: no output obeys them.
+//! Names with control characters, markup and formulas: no output interprets them.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
 mod common;
@@ -37,7 +37,7 @@ fn motion() -> String {
     format!("format = 1\nunit = \"deg\"\njoints = [{TOML}]\nstart = [0.0]\n[[move]]\nto = [20.0]\nduration = 0.5\n")
 }
 
-/// The first control character of a text besides ends of lines and tabs.
+/// The first control character of a text other than line ends and tabs.
 fn obeyed(text: &str) -> Option<char> {
     text.chars().find(|c| c.is_control() && !"\n\r\t".contains(*c))
 }
@@ -82,7 +82,7 @@ fn names_of_a_robot_are_shown_and_not_obeyed_in_every_file_of_a_run() {
         }
     }
     assert!(seen >= 4, "{seen} files");
-    // The program reads its own table again.
+    // The program reads its own table back.
     let again = place.flexarm(&["report", "out/run.csv", "-o", "again.html"]);
     assert_eq!(again.code, 0, "{}", again.err);
     let again = std::fs::read_to_string(place.path("again.html")).unwrap();
@@ -149,7 +149,7 @@ fn warnings_of_one_kind_are_one_line_with_their_count_and_each_description_warns
     ] {
         let run = place.flexarm(line);
         assert_eq!(run.code, 0, "{}", run.err);
-        // One line for all that the description has: twelve places outside and two others.
+        // One line for all findings of the description: twelve outside places and two others.
         let of_description = run.err.lines().filter(|line| line.contains("of the description: flexarm check)")).count();
         assert!(of_description == 1 && outside(&run.err) <= 1, "{}", run.err);
         assert!(run.err.contains("(and 13 more of the description: flexarm check)"), "{}", run.err);

@@ -1,4 +1,4 @@
-//! `inspect`: keys, and numbers that hold each other up. `check`: all findings of a file, not the
+//! `inspect`: keys, and consistency of the numbers. `check`: all findings of a file, not only the
 //! first.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
@@ -26,8 +26,8 @@ mod inspect {
         a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
     }
 
-    /// Looking at another frame must not move the load: it once hung on whatever frame `--tcp`
-    /// named.
+    /// Observing another frame must not move the load: it used to be attached to the frame of
+    /// `--tcp`.
     #[test]
     fn another_tcp_leaves_the_payload_where_it_is() {
         let place = Place::new();
@@ -41,7 +41,7 @@ mod inspect {
         assert_eq!(masses(&[]), masses(&["--tcp", "base"]));
     }
 
-    /// The two parts of a flexible link weigh the link, with nothing of what hangs on them.
+    /// The two parts of a flexible link have the mass of the link, without bodies attached to it.
     #[test]
     fn parts_of_flexible_links_are_the_links_own() {
         let place = Place::new();
@@ -117,7 +117,7 @@ mod inspect {
 
     #[test]
     fn beam_by_hand() {
-        // A bar and a ball about a vertical axis: everything is known.
+        // A bar and a ball about a vertical axis: all results are known.
         let place = Place::new();
         let seen = at(&place, "robot.toml", &[0.5], &["--velocity", "2"]);
         let position = numbers(&seen["tcp"]["position_m"]);
@@ -137,11 +137,11 @@ mod inspect {
         place.write("beam.urdf", with(URDF, "\"0 0 1\"", "\"0 1 0\""));
         for angle in [0.0, 0.7f64] {
             let seen = at(&place, "robot.toml", &[angle], &[]);
-            // Turning about +y lowers the tip; the drive holds against it.
+            // A rotation about +y lowers the tip; the drive holds against it.
             let expected = -9.81 * (1.728 * 0.4 + 0.5 * 0.8) * angle.cos();
             assert!((numbers(&seen["gravity_torque"])[0] - expected).abs() < 1e-10, "{seen}");
         }
-        // Weightless where the robot file says so.
+        // Without gravity if the robot file sets it to zero.
         place.write("robot.toml", with(ROBOT, "-9.81]", "0.0]"));
         assert_eq!(numbers(&place.json(&["inspect", "robot.toml"])["gravity_torque"])[0].abs(), 0.0);
     }
@@ -183,8 +183,8 @@ mod inspect {
         }
     }
 
-    /// Angular velocity in world axes that turns quaternion `a` into `b` in unit time, for small
-    /// turns (w first).
+    /// Angular velocity in world axes that rotates quaternion `a` into `b` in unit time, for small
+    /// rotations (w first).
     fn turn(a: &[f64], b: &[f64]) -> [f64; 3] {
         let dot: f64 = a.iter().zip(b).map(|(x, y)| x * y).sum();
         let b: Vec<f64> = b.iter().map(|x| x * dot.signum()).collect();
@@ -237,8 +237,8 @@ mod inspect {
         let twice = at(&place, &robot, &POSE, &["--velocity", &joined(&v.map(|x| 2.0 * x))]);
         let four: Vec<f64> = coriolis.iter().map(|c| 4.0 * c).collect();
         assert!(distance(&numbers(&twice["coriolis"]), &four) < 1e-9);
-        // Coriolis forces do half of what changes the mass matrix: v'(dM/dt)v = 2 v'c, dM/dt along
-        // v by differences.
+        // Coriolis forces do half the work of the change of the mass matrix: v'(dM/dt)v = 2 v'c,
+        // with dM/dt along v by differences.
         let h = 1e-5;
         let energy = |sign: f64| {
             let q: Vec<f64> = POSE.iter().zip(&v).map(|(q, v)| q + sign * h * v).collect();
@@ -272,7 +272,7 @@ mod inspect {
         let seen = place.json(&["inspect", "robot.toml", "--tcp", "bar"]);
         assert_eq!(seen["tcp"]["link"], "bar");
         assert_eq!(numbers(&seen["tcp"]["position_m"]), [0.0; 3]);
-        // The offset of the robot file belongs to its own TCP.
+        // The offset in the robot file applies to its own TCP.
         place.write("robot.toml", with(ROBOT, "{ link = \"ball\" }", "{ link = \"ball\", xyz = [0.0, 0.0, 0.1] }"));
         let own = numbers(&place.json(&["inspect", "robot.toml"])["tcp"]["position_m"]);
         assert!(distance(&own, &[0.8, 0.0, 0.1]) < 1e-12, "{own:?}");
@@ -306,8 +306,8 @@ mod inspect {
         let modal = &place.json(&["inspect", "robot.toml"])["flexible_links"][0];
         assert_eq!((&modal["model"], &modal["coordinates"]), (&"modal".into(), &9.into()));
         let hz = numbers(&modal["modal_frequencies_hz"]);
-        // Clamped beam: 1.8751² sqrt(EI/(mu l⁴))/2π with shear and rotary inertia, which a slender
-        // beam hardly feels.
+        // Clamped beam: 1.8751² sqrt(EI/(mu l⁴))/2π; shear and rotary inertia are negligible for a
+        // slender beam.
         let truth = 3.516 / 0.64 * (70e9 * 0.02f64.powi(2) / 12.0 / 2700.0).sqrt() / std::f64::consts::TAU;
         assert!(hz.len() == 9 && (hz[0] / truth - 1.0).abs() < 3e-3, "{hz:?} {truth}");
         let answer = place.flexarm(&["inspect", "robot.toml"]);
@@ -428,7 +428,7 @@ mod check {
         for word in ["upper limit", "lower limit", "velocity", "wild.csv"] {
             assert!(text.contains(word), "{word}: {text}");
         }
-        // It starts at speed, which is no error.
+        // It starts at speed, which is not an error.
         assert!(codes(&found, "warning").contains(&"trajectory".to_owned()), "{found:?}");
     }
 
@@ -448,7 +448,7 @@ mod check {
     #[test]
     fn doubts_about_modal_links() {
         let place = Place::new();
-        // Matrices tell no terms of second order, and no stiffness by load.
+        // Matrices contain no second-order terms, and no load-dependent stiffness.
         let [k, m] = super::condensed_beam();
         place.write("arm_K.csv", k);
         place.write("arm_M.csv", m);
@@ -501,7 +501,8 @@ mod check {
         }
     }
 
-    /// A run, statics and `check` say the same of the same slip, with value and yardstick.
+    /// A run, statics and `check` report the same mistake in the same way, with value and reference
+    /// value.
     #[test]
     fn a_slip_is_told_by_check_runs_and_statics_alike() {
         let place = Place::new();
@@ -535,7 +536,7 @@ mod check {
         assert!(carried.out.contains("\"code\":\"payload-mass\""), "{}", carried.out);
         let nowhere = loads("[[load]]\nframe = \"elbow\"\nkind = \"step\"\nforce = [0.0, 0.0, -1.0]\n");
         assert!(nowhere.code == 2 && nowhere.out.contains("elbow"), "{}", nowhere.out);
-        // A run says the same.
+        // A run reports the same.
         loads("[[load]]\nkind = \"step\"\nstart = 0.3\nforce = [0.0, 0.0, -1e3]\n");
         let run = place.json(&["compare", "robot.toml", "swing.toml", "--loads", "loads.toml", "--no-files"]);
         let told = run["caveats"].as_array().unwrap().iter().find(|c| c["code"] == "load").unwrap();
@@ -555,7 +556,7 @@ mod check {
         assert_eq!(place.json(&["statics", "robot.toml"])["sag_m"], none["sag_m"]);
     }
 
-    /// At zero the shipped arm stands outside its limits.
+    /// At zero the shipped arm is outside its limits.
     #[test]
     fn the_robot_is_held_where_the_motion_begins() {
         let place = Place::new();
@@ -568,13 +569,13 @@ mod check {
         assert!(at(&[&robot, &motion]).contains("at the start of large_moves"));
         assert!(at(&[&robot]).contains("at the start of pick_and_place"));
         assert!(at(&["robot.toml"]).contains("in the middle of the joint ranges"));
-        // The frequencies are those of a run from there.
+        // The frequencies are those of a run from the start of the motion.
         let run = place.json(&["compare", &robot, &motion, "--no-files", "--step", "2e-3"]);
         let first = format!("{:.2}", numbers(&run["frequencies_hz"])[0]);
         assert!(at(&[&robot, &motion]).contains(&first), "{first}");
     }
 
-    /// Limits that the robot would have given are not missed beside its own faults.
+    /// Limits that the robot would have are not reported as missing if the robot has errors.
     #[test]
     fn a_broken_robot_makes_no_fault_of_the_motion() {
         let place = Place::new();
@@ -621,8 +622,8 @@ mod check {
     }
 }
 
-/// Stiffness and mass of the beam as CSV, six rows per end: the mass is the consistent one of Euler
-/// and Bernoulli.
+/// Stiffness and mass of the beam as CSV, six rows per end; the mass is the consistent one of
+/// Euler-Bernoulli theory.
 fn condensed_beam() -> [String; 2] {
     let (l, mass, w, h) = (0.8, 1.728, 0.02f64, 0.04f64);
     let mut m = vec![vec![0.0; 12]; 12];

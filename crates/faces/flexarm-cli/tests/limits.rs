@@ -1,5 +1,5 @@
-//! Sizes that no robot has: refused at once with the number and the limit, or worked through; never
-//! a stack that overflows, memory without end or a program that cannot be stopped.
+//! Unrealistic sizes: refused at once with the number and the limit, or processed; never a stack
+//! overflow, unbounded memory or a program that cannot be stopped.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 mod common;
@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use common::{Place, ROBOT, SWING, URDF, with};
 
-/// Generous for a busy machine and a debug build; what is refused takes a tenth of a second.
+/// Generous for a busy machine and a debug build; a refusal takes a tenth of a second.
 const AT_ONCE: Duration = Duration::from_secs(20);
 
 fn refused_at_once(place: &Place, arguments: &[&str], words: &[&str]) {
@@ -42,7 +42,8 @@ fn segments_and_modes_beyond_what_a_step_can_carry_are_refused_with_the_reason()
     refused_at_once(&place, &RUN, &["robot.toml:", "9000 segments", "at most 101"]);
 }
 
-/// A set-up of seconds (594 elastic coordinates) must end with the signal, not after it.
+/// A set-up that takes seconds (594 elastic coordinates) must end on the signal, not after
+/// completion.
 #[test]
 #[cfg(unix)]
 fn a_signal_during_the_preparation_ends_the_program_at_once() {
@@ -105,7 +106,7 @@ fn an_expression_of_100_000_terms_is_refused_at_once() {
             &["loads.toml:4", "200001 characters", "2000", "table"],
         );
     }
-    // As long as it may be: 999 terms.
+    // The maximum length: 999 terms.
     let formula = "1".to_owned() + &"+t".repeat(999);
     place.write("loads.toml", format!("format = 1\n[[load]]\nkind = \"expression\"\nfx = \"{formula}\"\n"));
     place.json(&[&RUN[..], &["--loads", "loads.toml", "--step", "1e-2"]].concat());
@@ -125,7 +126,7 @@ fn a_column_of_a_table_of_loads_that_is_there_twice_is_refused() {
     }
 }
 
-/// 300 MB of line ends in 300 kB, behind the first line of a mesh.
+/// 300 MB of line ends in 300 kB, after the first line of a mesh.
 #[test]
 fn a_packed_mesh_that_grows_beyond_reason_is_refused_with_its_size_and_a_way_around() {
     let place = Place::new();
@@ -151,7 +152,7 @@ fn files_that_are_no_files_are_refused_and_not_waited_for() {
     for name in ["robot.csv", "robot.flex"] {
         std::fs::create_dir(place.path(name)).unwrap();
     }
-    // Not `refused`, which reads all files to see that they are as before.
+    // Not `refused`, which reads all files to check that they are unchanged.
     let refused = |arguments: &[&str], words: &[&str]| {
         let begin = Instant::now();
         let answer = place.flexarm(arguments);
@@ -187,7 +188,7 @@ fn a_motion_of_100_000_waypoints_is_read_in_seconds() {
     assert!(answer.code == 0 && begin.elapsed() < Duration::from_secs(60), "{:?}: {}", begin.elapsed(), answer.err);
 }
 
-/// JSON writes what is no number as null: an answer that overflows is refused instead.
+/// JSON writes NaN and infinity as null: an answer that overflows is refused instead.
 #[test]
 fn answers_that_overflow_are_refused() {
     let place = Place::new();

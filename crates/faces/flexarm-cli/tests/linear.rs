@@ -1,5 +1,4 @@
-//! `statics`, `modes`, `response`, `map`: keys, numbers that hold each other up, files, and bad
-//! input.
+//! `statics`, `modes`, `response`, `map`: keys, consistency of the numbers, files, and bad input.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 #![allow(non_snake_case, reason = "C for compliance")]
 
@@ -7,8 +6,8 @@ mod common;
 
 use common::{Place, ROBOT, Table, matrix, mcap_records, numbers, shipped_robot, with};
 
-/// The bar of the test robot: EI across in the horizontal plane and upright (aluminium, 20 x 40 mm,
-/// lying flat), 0.8 m.
+/// The bar of the test robot: EI in the horizontal and in the vertical plane (aluminium, 20 x 40
+/// mm, lying flat), 0.8 m.
 const LENGTH: f64 = 0.8;
 
 mod statics {
@@ -36,7 +35,7 @@ mod statics {
         }
     }
 
-    /// Truth: a cantilever, `F l³ / 3EI + F l / kGA`; the bar lies flat, y is its wide way.
+    /// Truth: a cantilever, `F l³ / 3EI + F l / kGA`; the bar is flat, y is its wide side.
     #[test]
     fn a_bar_yields_like_a_cantilever() {
         let place = Place::new();
@@ -49,16 +48,17 @@ mod statics {
         assert!((y / (10.0 * C[1][1]) - 1.0).abs() < 1e-4, "small: linear");
         let torque = numbers(&pushed["holding_torque"])[0];
         assert!((torque + 10.0 * LENGTH).abs() < 1e-3, "the drive holds against the force: {torque}");
-        // Slope over deflection of a cantilever under a force at its end: 3 / (2 l), but for shear.
+        // Slope over deflection of a cantilever under a force at its end: 3 / (2 l), except for
+        // shear.
         assert!((C[5][1] / C[1][1] * LENGTH / 1.5 - 1.0).abs() < 0.01);
         assert!((C[5][1] - C[1][5]).abs() < 1e-12 * C[5][5]);
-        // Turned by a right angle, x and y change places.
+        // Rotated by a right angle, x and y are exchanged.
         let C_turned = matrix(&place.json(&["statics", "robot.toml", "--at", "90deg"])["compliance"]);
         assert!((C_turned[0][0] / C[1][1] - 1.0).abs() < 1e-9);
         assert!((C_turned[1][1] / C[0][0] - 1.0).abs() < 1e-6);
     }
 
-    /// The rigid share of weight, and what the parts say together.
+    /// The rigid share of the weight, and the sum of the parts.
     #[test]
     fn elements_add_up_to_the_displacement() {
         let place = Place::new();
@@ -124,10 +124,10 @@ mod statics {
         place.refused(&["statics", "robot.toml", "--tcp", "hand"], &["hand", "ball"]);
     }
 
-    /// Beyond the buckling load there is an equilibrium, but the bar does not stay there. Truth:
-    /// Euler's load of a clamped bar, `π² EI / (2l)²`; a single elastic joint buckles somewhat
-    /// below it (a spring EI/l half way: `2 EI / l²`). Far pulled, the answer is a number with a
-    /// warning.
+    /// Beyond the buckling load there is an equilibrium, but an unstable one. Truth: Euler's load
+    /// of a clamped bar, `π² EI / (2l)²`; a single elastic joint buckles slightly below it (a
+    /// spring EI/l at half the length: `2 EI / l²`). Under a large pull the result is a number with
+    /// a warning.
     #[test]
     fn a_load_beyond_buckling_is_no_answer() {
         let place = Place::new();
@@ -178,7 +178,7 @@ mod modes {
         }
     }
 
-    /// The recording holds every mode for its time, and the tool moves as far as asked.
+    /// The recording contains every mode for its duration, with the requested TCP amplitude.
     #[test]
     fn modes_swing_in_a_recording() {
         let place = Place::new();
@@ -243,12 +243,12 @@ mod response {
         }
         assert_eq!((curves[1]["unit"].as_str(), curves[2]["unit"].as_str()), (Some("m/N"), Some("m/rad")));
 
-        // A slow joint moves the tool by its lever; a slow force by the compliance.
+        // A slow joint motion moves the TCP by its lever; a slow force by the compliance.
         assert!((curves[2]["at_rest"].as_f64().unwrap() - LENGTH).abs() < 1e-3);
         let C = matrix(&place.json(&["statics", "robot.toml"])["compliance"]);
         assert!((curves[1]["at_rest"].as_f64().unwrap() / C[2][2] - 1.0).abs() < 1e-12);
-        // With one mode in the direction, the peak stands near its frequency and is 1/(2 ζ) as high
-        // as the rest.
+        // With one mode in the direction, the peak is near its frequency and is 1/(2 ζ) times the
+        // static response.
         let peak = &curves[1]["peaks"][0];
         let modes = numbers(&seen["frequencies_hz"]);
         assert!(modes.iter().any(|f| (f / peak["frequency_hz"].as_f64().unwrap() - 1.0).abs() < 2e-3));
@@ -261,7 +261,7 @@ mod response {
             assert!((csv / json - 1.0).abs() < 1e-12);
         }
         let plot = place.text("bode/response.svg");
-        // What a person sees: readable units, the pose, the natural frequencies, z in the colour of
+        // The picture has readable units, the pose, the natural frequencies, and z in the colour of
         // z.
         let shown =
             ["<svg", "frequency [Hz]", "force-z to z", "magnitude [µm/N]", "magnitude [m/rad]", "at swing 0°", "f1"];
@@ -270,7 +270,8 @@ mod response {
         }
         assert!(plot.contains(&format!("f1 {}", (modes[0] * 100.0).round() / 100.0)));
         assert!(plot.contains("stroke=\"#2A6FDB\""), "force-z to z");
-        // Straight lines between the points are the curve: twice as many points add nothing to it.
+        // Linear interpolation between the points reproduces the curve: twice as many points add
+        // nothing.
         let finer = place.json(&[&words_of("120")[..], &["--from", "2", "--to", "300", "--no-files"]].concat());
         let fine: Vec<(f64, f64)> =
             numbers(&finer["frequency_hz"]).into_iter().zip(numbers(&finer["curves"][1]["magnitude"])).collect();
@@ -322,7 +323,7 @@ mod response {
         refused(&["--no-files"], &["--no-files"]);
     }
 
-    /// Without damping the answer at the resonance is infinite: said, not hidden.
+    /// Without damping the response at resonance is infinite, which is reported.
     #[test]
     fn an_undamped_arm_is_told_so() {
         let place = Place::new();

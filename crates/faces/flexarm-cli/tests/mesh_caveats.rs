@@ -1,5 +1,5 @@
-//! Meshes that outside checks found to pass without a word: what `flexarm reduce` says of them,
-//! with truths.
+//! Meshes that used to pass without a warning: messages of `flexarm reduce` about them, with
+//! truths.
 //!
 //! The meshes in `tests/data` are bars of 600 x 60 x 40 mm in cells of 50 x 30 x 20 mm.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
@@ -9,7 +9,7 @@ mod common;
 use common::Place;
 use serde_json::Value;
 
-/// A place with a mesh of `tests/data`.
+/// A test folder with a mesh of `tests/data`.
 fn place(mesh: &str) -> Place {
     let place = Place::new();
     let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data");
@@ -41,7 +41,7 @@ fn softness(figures: &Value, k: usize) -> f64 {
     figures["compliance"][k][k].as_f64().unwrap()
 }
 
-/// Truth: the same cells in ten-node tetrahedra, reduced by themselves.
+/// Truth: the same cells in ten-node tetrahedra, reduced separately.
 #[test]
 fn linear_tetrahedra_are_called_too_stiff_by_what_quadratic_ones_give() {
     let (linear, said) = reduced(&place("tet4"), &arguments("A=A", "B=B"));
@@ -55,7 +55,7 @@ fn linear_tetrahedra_are_called_too_stiff_by_what_quadratic_ones_give() {
     assert!(linear["checks"]["order_ratio"].as_f64().unwrap() > 2.5);
 }
 
-/// Truth: the faces chosen by place, with all their nodes.
+/// Truth: the faces selected by position, with all their nodes.
 #[test]
 fn sets_of_corner_nodes_are_completed_and_said() {
     let place = place("tet10_same");
@@ -76,7 +76,7 @@ fn a_crack_is_told_with_its_place_and_merging_closes_it() {
     assert!(said.contains("lie in one place") && said.contains("merge"), "{said}");
     let (merged, quiet) = reduced(&place, &[&arguments("A=A", "B=B")[..], &["--merge", "0.001"]].concat());
     assert!(!quiet.contains("lie in one place") && quiet.contains("merge: 5 of"), "{quiet}");
-    // The fault was found by a lateral compliance that is 15 to 22 % too large.
+    // The fault was found by a lateral compliance 15 to 22 % too large.
     let lateral = [1, 2].map(|k| softness(&cracked, k) / softness(&merged, k));
     assert!(lateral.iter().all(|ratio| *ratio > 1.10), "{lateral:?}");
 }
@@ -99,7 +99,8 @@ fn nastran_bulk_data_are_told_how_to_become_a_mesh() {
     assert!(output.status.code() == Some(2) && said.contains("Nastran bulk data") && said.contains("-save"), "{said}");
 }
 
-/// A link that is heavy at one end: no two bodies at the middles of the halves make it up.
+/// A link that is heavy at one end cannot be represented by two bodies at the centres of the
+/// halves.
 #[test]
 fn a_beam_whose_link_cannot_be_cut_takes_the_mass_of_the_uniform_beam_and_says_so() {
     let place = Place::new();
@@ -107,7 +108,7 @@ fn a_beam_whose_link_cannot_be_cut_takes_the_mass_of_the_uniform_beam_and_says_s
     let output = place.command(&["check", "robot.toml"]).output().unwrap();
     let said = format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
     assert!(said.contains("cannot be spread along the beam") && said.contains("0.3000 m"), "{said}");
-    // Asked for, it stays an error.
+    // If requested explicitly, it remains an error.
     place.write("robot.toml", common::ROBOT.replace("section = ", "parts = \"from-link\", section = "));
     let output = place.command(&["check", "robot.toml"]).output().unwrap();
     assert_ne!(output.status.code(), Some(0));
@@ -129,7 +130,7 @@ fn a_stiffness_finds_its_mass_and_two_coarse_parts_are_judged_as_in_a_reduction(
     assert!(place.command(&export).output().unwrap().status.success());
     std::fs::remove_file(place.path("matrices/bar.toml")).unwrap();
 
-    // Nothing tells rows and places any more; the matrix itself does.
+    // Nothing else identifies rows and positions; the matrix itself does.
     let bare = ["import", "matrices/bar_K.mtx", "--units", "m-kg-s", "--no-files"];
     let output = place.command(&bare).output().unwrap();
     let asked = String::from_utf8_lossy(&output.stderr);
@@ -137,8 +138,8 @@ fn a_stiffness_finds_its_mass_and_two_coarse_parts_are_judged_as_in_a_reduction(
     assert!(asked.contains("B at (0.600000, 0.000000, 0.000000)"), "{asked}");
 
     let map = ["--json", "--map", "A=#1-6,B=#7-12,modal=#13-22", "--at", "A=0,0.03,0.02", "--at", "B=0.6,0.03,0.02"];
-    // The halves of the bar are as good as two parts get (+1.96 %); pieces of nine and one tenths
-    // are not.
+    // The halves of the bar are as good as two parts can be (+1.96 %); pieces of nine and one
+    // tenths are not.
     let (_, said) = reduced(&place, &[&bare[..], &map].concat());
     assert!(said.contains("bar_M.mtx, found beside") && !said.contains(coarse), "{said}");
     let a = "10.1736;0.27,0.03,0.02;0.00440856,0.24857496,0.25027056,0,0,0";

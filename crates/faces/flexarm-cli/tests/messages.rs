@@ -1,15 +1,15 @@
-//! Messages that tell how to mend something: the library names the setting as a value, the program
-//! by its flag. One row per sentence, each as a user reads it, letter by letter.
+//! Messages that state how to fix something: the library gives the setting as a value, the program
+//! prints its flag. One row per sentence, compared letter by letter.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 mod common;
 
 use common::{Place, ROBOT, SWING, URDF, flex};
 
-/// Options, and the sentence that they bring.
+/// Options, and the resulting sentence.
 type Row<'a> = (&'a [&'a str], &'a str);
 
-/// Each row after `command` must be refused with just its sentence.
+/// Each row after `command` must be refused with exactly its sentence.
 fn refused(place: &Place, command: &[&str], rows: &[Row<'_>]) {
     for (options, sentence) in rows {
         let answer = place.refused(&[command, options].concat(), &[]);
@@ -91,7 +91,7 @@ fn a_run_names_the_flags_that_mend_it() {
     refused(&place, &COMPARE, &[(&[], taken)]);
 }
 
-/// The summary, in the file and on standard output, says the same as the terminal.
+/// The summary, in the file and on standard output, has the same text as the terminal.
 #[test]
 fn caveats_of_a_run_name_the_flags_in_every_place() {
     let place = Place::new();
@@ -352,7 +352,7 @@ fn an_import_and_an_export_name_their_flags() {
     );
     let modes = "--modes applies only to full models; these matrices are already reduced";
     told(&place, &[&["import", "e/bar.op4", "--no-files"], &with(&["--modes", "3"])[..]].concat(), &[modes]);
-    // A sidecar beside the matrices says units and places; what the user says counts.
+    // A sidecar file next to the matrices defines units and positions; options override it.
     let matrices = ["export", "bar.flex", "--format", "matrix-market", "--units", "m-kg-s", "-o", "m"];
     assert_eq!(place.flexarm(&matrices).code, 0);
     let otherwise = ["import", "m/bar_K.mtx", "--no-files", "--units", "cm-kg-s", "--at", "B=0.8,0,0.00001"];

@@ -1,5 +1,5 @@
-//! Models of links and drives, and loads during a run: what the words of the command line do, and
-//! what is refused.
+//! Models of links and drives, and loads during a run: effect of the command-line options, and
+//! refusals.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 mod common;
@@ -24,7 +24,7 @@ fn slender() -> String {
     with(ROBOT, "y_axis", "theory = \"euler-bernoulli\", parts = \"uniform\", y_axis")
 }
 
-/// With a drive on its joint.
+/// The same with a drive on its joint.
 fn driven(drive: &str) -> String {
     format!("{}\n[[drive]]\njoint = \"swing\"\n{drive}\n", slender())
 }
@@ -72,7 +72,7 @@ mod links {
         assert_eq!((rigid["links_model"].as_str(), sag(&rigid)), (Some("rigid"), 0.0));
     }
 
-    /// Truth: the mesh, as close as its ten modes are; the two-part links are a little stiffer.
+    /// Truth: the mesh, as accurately as its ten modes; the two-part links are slightly stiffer.
     #[test]
     fn shipped_castings_bend_in_modes() {
         let place = Place::new();
@@ -106,8 +106,8 @@ mod links {
 mod drives {
     use super::*;
 
-    /// Truth: the gear's spring and the bending stiffness in series under the torque of a load at
-    /// rest.
+    /// Truth: the spring of the gear and the bending stiffness in series under the torque of a
+    /// static load.
     #[test]
     fn are_rigid_or_give_way_or_follow_a_servo() {
         let [_, ei] = stiffness();
@@ -117,7 +117,7 @@ mod drives {
         place.write("robot.toml", driven(GEAR));
         place.write("loads.toml", load);
         place.write("hold.toml", hold);
-        // Across, at the end: the drive's share and the beam's.
+        // Transverse deflection at the end: the shares of drive and beam.
         let end = |words: &[&str]| {
             let run = ["compare", "robot.toml", "hold.toml", "--loads", "loads.toml", "-o", "result", "--force"];
             let summary = place.json(&[&run[..], words].concat());
@@ -131,14 +131,14 @@ mod drives {
         let (elastic, summary) = end(&["--drives", "elastic", "--links", "modal"]);
         near(elastic, bending + 10.0 * L * L / 2e4, 1e-4, "elastic drives");
         assert_eq!(summary["elastic_drives"][0]["joint"], "swing");
-        // The gear's windup alone.
+        // Deflection of the gear without the beam.
         let (alone, _) = end(&["--drives", "elastic", "--links", "rigid"]);
         near(alone, 10.0 * L * L / 2e4, 1e-4, "gear alone");
-        // A servo with an integral puts the motor back, not the link.
+        // A servo with an integrator corrects the motor position, not the link.
         let (servo, summary) = end(&["--drives", "servo", "--links", "modal"]);
         near(servo, elastic, 0.02, "servo");
         assert_eq!(summary["elastic_drives"][0]["joint"], "swing");
-        // As the file says.
+        // With the drive of the file.
         near(end(&["--links", "modal"]).0, elastic, 1e-12, "as the file says");
     }
 }
@@ -174,7 +174,7 @@ mod loads {
         }
     }
 
-    /// Truth: in rest, a payload of the same weight at the start.
+    /// Truth: at rest, a payload of the same weight from the start.
     #[test]
     fn payloads_are_picked_and_dropped() {
         let place = Place::new();
@@ -191,7 +191,7 @@ mod loads {
     }
 }
 
-/// A robot file that is refused at the line with `piece`, and the column of the value where that is
+/// A robot file that is refused at the line with `piece`, and the column of the value if that is
 /// known.
 fn robot_file(text: &str, piece: &str, words: &[&str]) {
     let place = Place::new();
@@ -275,7 +275,7 @@ mod bad_robot_files {
 mod contradictions {
     use super::*;
 
-    /// What no link takes up is refused and not passed over.
+    /// Options that no link uses are refused, not ignored.
     #[test]
     fn segments_and_modes_need_links_of_their_kind() {
         let place = Place::new();
@@ -287,8 +287,8 @@ mod contradictions {
         refused(&["--links", "lumped", "--modes", "3"], &["3 modes", "no link", "--links modal"]);
     }
 
-    /// Truth: behind the play a straight spring carries what the drive holds; energy is that of the
-    /// straight part.
+    /// Truth: beyond the backlash a linear spring carries the drive load; the energy is that of the
+    /// linear part.
     #[test]
     fn statics_tell_the_load_behind_a_play() {
         let place = Place::new();
@@ -346,7 +346,7 @@ mod bad_loads_files {
         refused(&load("kind = \"expression\"\nfx = \"ln(t)\""), "fx", &["no finite number at t = 0 s"]);
     }
 
-    /// Of two columns with one name the last once won without a word.
+    /// Of two columns with the same name the last used to win silently.
     #[test]
     fn a_column_twice_is_refused() {
         let place = Place::new();
@@ -358,7 +358,7 @@ mod bad_loads_files {
         }
     }
 
-    /// Loads that come to nothing, or that the steps do not see, are told of.
+    /// Loads without effect, or that fall between steps, are reported.
     #[test]
     fn doubts() {
         let place = Place::new();
@@ -372,11 +372,12 @@ mod bad_loads_files {
         warned("[[payload]]\nat = 99.0\nmass = 1.0", &["99 s", "stays as it is"]);
         let sine = "[[load]]\nkind = \"sine\"\nfrequency = 500.0\nforce = [1.0, 0.0, 0.0]";
         warned(sine, &["500.0 Hz", "2.0 steps per period"]);
-        // An expression is looked at where it acts.
+        // An expression is checked only where it acts.
         warned("[[load]]\nkind = \"expression\"\nstart = 0.6\nfx = \"sqrt(t-0.6)\"", &[]);
     }
 
-    /// Truth: what is stored is what was supplied, the energy that leaves with a payload included.
+    /// Truth: stored energy equals supplied energy, including the energy that leaves with a
+    /// payload.
     #[test]
     fn a_payload_that_is_dropped_takes_its_energy_along() {
         let place = Place::new();
@@ -417,8 +418,8 @@ mod bad_loads_files {
     }
 }
 
-/// Truth: forward kinematics, and that an impulse of the same size moves an arm alike however short
-/// it is; 20 us steps see all of it.
+/// Truth: forward kinematics, and equal impulses move an arm alike for any duration; steps of 20 us
+/// resolve all of it.
 #[test]
 fn an_impulse_within_one_step_acts_as_it_does_in_fine_steps() {
     let place = Place::new();
@@ -436,7 +437,7 @@ fn an_impulse_within_one_step_acts_as_it_does_in_fine_steps() {
 }
 
 /// Truth: by hand, x = cos 0.2 + 0.8 cos 1.2 and z = -sin 0.2 - 0.8 sin 1.2. The joint of the
-/// camera is on the near half of the flexible link and written behind the one at its end.
+/// camera is on the near half of the flexible link and listed after the one at its end.
 #[test]
 fn joints_have_their_values_whichever_half_of_a_flexible_link_carries_them() {
     let place = Place::new();
@@ -489,7 +490,7 @@ fn joints_have_their_values_whichever_half_of_a_flexible_link_carries_them() {
     }
 }
 
-/// An arm at rest: its energy does not change but by rounding, nothing swings.
+/// An arm at rest: its energy changes only by rounding, nothing oscillates.
 #[test]
 fn an_arm_that_stands_still_neither_swings_nor_loses_energy() {
     let place = Place::new();

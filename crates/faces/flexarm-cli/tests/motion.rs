@@ -1,4 +1,4 @@
-//! `flexarm motion`, and motions of other programs in the commands that take one.
+//! `flexarm motion`, and motions of other programs in the commands that accept one.
 
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
@@ -17,7 +17,8 @@ fn fixture(name: &str) -> PathBuf {
 const SWING_DEG: f64 = 60.0;
 const SWING_S: f64 = 0.5;
 
-/// A trajectory as MoveIt plans it, with a gripper that no arm has; the pose is one of the KR 210.
+/// A trajectory as planned by MoveIt, with a gripper that no arm has; the pose is one of the KR
+/// 210.
 fn planned() -> String {
     let mut points = String::new();
     for k in 0..=20 {
@@ -45,7 +46,7 @@ fn planned() -> String {
     )
 }
 
-/// Truth: the same motion as our own CSV, with positions, velocities and accelerations.
+/// Truth: the same motion in flexarm's CSV format, with positions, velocities and accelerations.
 fn planned_csv(place: &Place) {
     let yaml = planned();
     let numbers = |key: &str| -> Vec<Vec<f64>> {
@@ -88,7 +89,7 @@ fn peaks_torque_and_way_of_the_tool_are_those_of_a_quintic_swing_about_the_verti
         assert!((value(key) - truth).abs() <= bound * truth.abs().max(1.0), "{key}: {} {truth}", value(key));
     }
     assert!((value("acceleration").abs() - acceleration).abs() < 1e-9, "{}", value("acceleration"));
-    // Of 4000 times the nearest to the peak: measured 5.5e-7 of it.
+    // Of 4000 instants, the one nearest to the peak: measured 5.5e-7 relative error.
     let error = (value("torque").abs() / (inertia * acceleration) - 1.0).abs();
     assert!(error < 1e-6, "{error:e}");
     assert_eq!((value("torque_limit"), value("speed_limit"), value("upper_limit")), (500.0, 4.0, 3.0));
@@ -141,7 +142,7 @@ fn a_planned_trajectory_with_a_gripper_runs_on_a_shipped_arm_and_gives_the_figur
     let (message, csv) = (run("plan.yaml"), run("plan.csv"));
     for key in ["peak_m", "rms_m", "end_m", "static_sag_m"] {
         let of = |found: &serde_json::Value| found["tcp"][key].as_f64().unwrap();
-        // The numbers are the same, letter by letter.
+        // The numbers are identical, letter by letter.
         let (message, csv) = (of(&message), of(&csv));
         assert!(csv > 0.0 && (message - csv).abs() < 1e-12, "{key}: {message} {csv}");
     }
@@ -155,7 +156,7 @@ fn joints_that_no_robot_has_are_refused_with_those_that_may_be_meant() {
     let place = Place::new();
     place.write("plan.yaml", planned().replace("joint_1, joint_2, joint_3", "joitn_1, joitn_2, joitn_3"));
     place.refused(&["motion", "plan.yaml", "kr210"], &["joitn_1", "did you mean \"joint_1\"?", "its joints are"]);
-    // In our own format one is enough.
+    // In flexarm's own format one is enough.
     place.write("own.csv", "time,swing,finger\n0,0,0\n1,1,0\n");
     place
         .refused(&["motion", "own.csv", "robot.toml"], &["the motion moves \"finger\", which the robot does not have"]);
@@ -182,13 +183,13 @@ fn what_is_written_is_read_again_as_the_same_motion() {
             );
         }
     }
-    // Never over what is there, unless told.
+    // Existing files are never overwritten without --force.
     place.refused(&arguments, &["out/a.csv", "--force"]);
     arguments.push("--force");
     place.json(&arguments);
     place.refused(&["motion", "swing.toml", "-o", "a.xlsx"], &["-o writes by the ending of the name", ".yaml", "xlsx"]);
     place.refused(&["motion", "swing.toml", "-o", "b.csv", "--rate", "0"], &["sampling rate 0 Hz"]);
-    // Samples are no waypoints: they are written as samples.
+    // Samples cannot be written as waypoints: they are written as samples.
     place.write("sine.csv", "time,swing\n0,0\n0.5,0.3\n1,0.5\n1.5,0.3\n2,0\n");
     let first = place.json(&["motion", "sine.csv", "robot.toml", "-o", "sine.toml"]);
     let again = place.json(&["motion", "sine.toml", "robot.toml"]);
@@ -227,7 +228,7 @@ fn a_run_is_replayed_from_its_table() {
     place.json(&["compare", "robot.toml", "swing.toml", "-o", "run", "--log-rate", "200"]);
     let found = place.json(&["motion", "run/run.csv", "robot.toml"]);
     assert_eq!(found["duration_s"].as_f64(), Some(1.0));
-    // Sampled every 5 ms and joined by a spline; measured 2e-8.
+    // Sampled every 5 ms and interpolated by a spline; measured 2e-8.
     let speed = found["peaks"][0]["speed"].as_f64().unwrap();
     assert!((speed / (15.0 / 8.0 * SWING_DEG.to_radians() / SWING_S) - 1.0).abs() < 1e-6, "{speed}");
     place.json(&["compare", "robot.toml", "run/run.csv", "--no-files"]);

@@ -52,7 +52,7 @@ fn new_writes_a_robot_that_runs_and_answers_with_its_keys() {
     assert!(answer["findings"].as_array().unwrap().iter().all(|f| f["severity"] == "note"), "{}", answer["findings"]);
     assert!(place.path("made/first_run/report.html").is_file());
     assert_eq!(place.flexarm(&["check", "made"]).code, 0);
-    // What is there stays.
+    // Existing files are kept.
     place.refused(&["new", "two.urdf", "-o", "made", "--no-run"], &["--force", "exists already"]);
     let forced = place.flexarm(&["new", "two.urdf", "-o", "made", "--no-run", "--force"]);
     assert_eq!(forced.code, 0, "{}", forced.err);

@@ -1,7 +1,7 @@
-//! `flexarm reduce`: a small beam mesh to a link file, the keys of its figures, and every sort of
-//! bad input.
+//! `flexarm reduce`: from a small beam mesh to a link file, the keys of its figures, and every kind
+//! of bad input.
 //!
-//! Reference cases are used where they are there; the tests say so where they are not.
+//! Reference cases are used if they are available; otherwise the tests print that they skip them.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 #![allow(clippy::print_stderr, reason = "a test that skips says so")]
 
@@ -76,14 +76,14 @@ fn beam(scale: f64) -> String {
     nodes + &elements + &set("INTERFACE_A", &a) + &set("INTERFACE_B", &b)
 }
 
-/// A place with `beam.inp` (mm).
+/// A test folder with `beam.inp` (mm).
 fn place() -> Place {
     let place = Place::new();
     place.write("beam.inp", beam(1.0));
     place
 }
 
-/// Complete arguments but for `-o`.
+/// Complete arguments except for `-o`.
 const SOUND: [&str; 14] = [
     "reduce",
     "beam.inp",
@@ -133,7 +133,7 @@ fn close(found: f64, expected: f64, tolerance: f64, what: &str) {
 mod a_run {
     use super::*;
 
-    /// Truth: the same job again; and the mesh, for which the modal link stands.
+    /// Truth: the same job again; and the mesh, which the modal link represents.
     #[test]
     fn stores_a_modal_link_and_its_stiffness_by_load_if_asked() {
         let place = place();
@@ -157,7 +157,7 @@ mod a_run {
             assert!(place.text(&format!("{folder}/report.md")).contains(word));
         }
         assert_eq!(asked["stiffness"], plain["stiffness"]);
-        // The job that was written gives the same link; so does its key alone.
+        // The written job gives the same link; so does its key without the rest.
         place.json(&["reduce", "asked/reduce.toml", "-o", "again"]);
         assert_eq!(place.text("again/beam.flex"), place.text("asked/beam.flex"));
         place.write("job.toml", with(JOB, "modes = 4", "modes = 4\ngeometric = true"));
@@ -165,7 +165,7 @@ mod a_run {
         place.write("job.toml", with(JOB, "modes = 4", "modes = 4\ngeometric = \"yes\""));
         place.refused(&["reduce", "job.toml"], &["job.toml:5:13:", "boolean"]);
 
-        // Standard Input Data keep it.
+        // The SID format keeps it.
         place.json(&["export", "asked/beam.flex", "--format", "sid", "--units", "mm-t-s", "-o", "sid"]);
         let import = ["import", "sid/beam.SID_FEM", "--units", "mm-t-s", "--map", "A=1,B=2", "-o", "back"];
         let back = place.json(&import);
@@ -174,7 +174,7 @@ mod a_run {
         assert!(said["checks"]["integrals_error"].as_f64().unwrap() < 1e-12, "{said}");
     }
 
-    /// Truth: closed forms of a clamped beam; bounds leave room for the tied ends of a coarse mesh.
+    /// Truth: closed forms of a clamped beam; the bounds allow for the tied ends of a coarse mesh.
     #[test]
     fn of_a_beam_gives_the_beam_its_files_and_all_keys() {
         let place = place();
@@ -188,7 +188,8 @@ mod a_run {
         let compliance = matrix(&figures["compliance"]);
         let shear = l / (5.0 / 6.0 * young / (2.0 * (1.0 + nu)) * area);
         let bending = |moment: f64| l.powi(3) / (3.0 * young * moment);
-        // measured -1.3e-2, -2.9e-2, -3.4e-2: the tied ends cannot narrow, and the mesh is coarse
+        // measured -1.3e-2, -2.9e-2, -3.4e-2: the tied ends cannot contract laterally, and the mesh
+        // is coarse
         close(compliance[0][0], l / (young * area), 5e-2, "stretching");
         close(compliance[1][1], bending(h * w.powi(3) / 12.0) + shear, 5e-2, "bending in y");
         close(compliance[2][2], bending(w * h.powi(3) / 12.0) + shear, 5e-2, "bending in z");
@@ -231,7 +232,7 @@ mod a_run {
         }
         assert!(figures["phases"]["assembly_s"].as_f64().unwrap() > 0.0);
         assert!(!cfg!(target_os = "linux") || figures["peak_rss_bytes"].as_u64().unwrap() > 1_000_000);
-        // The deck has no material of its own, but the job gives one: nothing to warn of.
+        // The deck has no material of its own, but the job defines one: no warning.
         assert_eq!(figures["warnings"].as_array().unwrap().len(), 0, "{}", figures["warnings"]);
 
         for (key, file) in
@@ -241,7 +242,7 @@ mod a_run {
         }
         assert!(place.text("result/beam.flex").contains("link = \"beam\""));
         let saved: Value = serde_json::from_str(&place.text("result/summary.json")).unwrap();
-        // The entry to be pasted has a path of this machine and is printed only.
+        // The entry to paste contains a path of this machine and is only printed.
         let mut printed = figures.clone();
         assert!(printed["files"]["entry"].take().as_str().unwrap().contains("beam.flex"));
         assert_eq!(saved, printed);
@@ -262,7 +263,7 @@ mod a_run {
         assert_eq!(place.text("first/reduce.toml"), place.text("second/reduce.toml"));
         assert_eq!(again["interfaces"][1]["tie"], "distributing");
         assert!(place.text("second/reduce.toml").contains("mesh = \"../beam.inp\""));
-        // A flag goes before the file.
+        // A flag overrides the file.
         let other = place.json(&["reduce", "first/reduce.toml", "--modes", "0", "--tie", "rigid", "--no-files"]);
         assert_eq!(other["method"], "guyan");
         assert_eq!(other["interfaces"][1]["tie"], "rigid");
@@ -313,7 +314,7 @@ mod a_run {
     #[test]
     fn takes_its_frames_from_a_robot_and_its_mesh_from_anywhere() {
         let place = place();
-        // The bar of the test robot is 0.8 m long: B stands 0.2 m beyond the mesh.
+        // The bar of the test robot is 0.8 m long: B is 0.2 m beyond the mesh.
         let arguments: Vec<&str> =
             SOUND[..10].iter().copied().chain(["--urdf", "beam.urdf", "--link", "bar"]).collect();
         let figures = place.json(&[&arguments[..], &["-o", "result"]].concat());
@@ -321,7 +322,7 @@ mod a_run {
         assert_eq!(numbers(&figures["interfaces"][1]["position_m"]), [0.8, 0.0, 0.0]);
         assert_eq!(figures["link"], "bar");
         assert!(place.text("result/reduce.toml").contains("file = \"../beam.urdf\""));
-        // Moved by 100 mm along x: the centre of mass goes with it, the interfaces stay.
+        // Moved by 100 mm along x: the centre of mass moves with it, the interfaces do not.
         let moved = place.json(&["reduce", "result/reduce.toml", "--mesh-frame", "100,0,0", "--no-files"]);
         close(numbers(&moved["com_m"])[0], 0.4, 1e-9, "centre of mass");
         assert_eq!(numbers(&moved["interfaces"][1]["position_m"]), [0.8, 0.0, 0.0]);
@@ -334,7 +335,7 @@ mod a_run {
         place.refused(&alone, &["interface \"B\"", "--urdf"]);
     }
 
-    /// Truth: the program itself, which reads what it told to paste.
+    /// Truth: the program itself, which reads what it printed for pasting.
     #[test]
     fn what_it_prints_for_a_robot_file_can_be_pasted_into_one_anywhere() {
         let place = place();
@@ -346,7 +347,7 @@ mod a_run {
         place.write("robots/mine/robot.toml", format!("format = 1\nurdf = \"../../beam.urdf\"\n\n{entry}"));
         let found = place.json(&["inspect", "robots/mine"]);
         assert_eq!(found["flexible_links"][0]["name"], "bar");
-        // Without a robot the name is the link file's, and the joint is left to the reader.
+        // Without a robot the name is that of the link file, and the joint is left to the user.
         let far_end = "B=800,0,0";
         let answer = place.flexarm(&[&SOUND[..13], &[far_end, "--flex", "bar.flex", "--name", "bar"]].concat());
         let (_, entry) = answer.out.split_once("to be pasted into a robot file:\n").unwrap();
@@ -376,7 +377,7 @@ mod a_run {
         let folder = [&SOUND[..], &["-o", "result"]].concat();
         place.json(&folder);
         place.refused(&folder, &["result/beam.flex", "exists already", "--force"]);
-        // The same file by two names.
+        // The same file under two names.
         place.json(&[&folder[..], &["--force", "--flex", "./result/../result/beam.flex"]].concat());
         place.refused(&[&SOUND[..], &["-o", "beam.inp"]].concat(), &["beam.inp", "is a file"]);
     }
@@ -463,7 +464,7 @@ mod refused {
             &without("--interface", "B=INTERFACE_B"),
             &["interface \"B\"", "no nodes", "\"INTERFACE_A\" (8 nodes)", "\"INTERFACE_B\" (8 nodes)"],
         );
-        // All at once.
+        // All missing arguments at once.
         place.refused(&["reduce", "beam.inp"], &["--units", "--material", "--interface A=SELECTOR", "INTERFACE_A"]);
     }
 
@@ -493,12 +494,12 @@ mod refused {
         let place = place();
         let sound = beam(1.0);
 
-        // The first two corners of element 3 change places.
+        // The first two corners of element 3 are swapped.
         let (a, b) = (number([4, 0, 0]), number([6, 0, 0]));
         place.write("beam.inp", with(&sound, &format!("\n3, {a}, {b},"), &format!("\n3, {b}, {a},")));
         place.refused(&SOUND, &["beam.inp", "inverted", "HEX20 3"]);
 
-        // Element 4 is left out.
+        // Element 4 is removed.
         let line = line_of(&sound, &format!("4, {},", number([6, 0, 0]))) - 1;
         let rest: Vec<&str> =
             sound.lines().enumerate().filter(|(k, _)| *k != line && *k != line + 1).map(|(_, l)| l).collect();
@@ -569,8 +570,8 @@ mod refused {
     }
 }
 
-/// The reference cases: their numbers come from CalculiX and are tested in `flexarm-fem`; here they
-/// go through the command line as a user would type it.
+/// Reference cases: their numbers come from CalculiX and are tested in `flexarm-fem`; here they are
+/// run through the command line.
 mod reference {
     use super::*;
 

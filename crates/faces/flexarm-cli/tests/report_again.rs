@@ -1,4 +1,4 @@
-//! `flexarm report`: the page again from recordings.
+//! `flexarm report`: recreates the page from recordings.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 mod common;
@@ -11,7 +11,7 @@ fn recorded(extra: &[&str]) -> Place {
     place
 }
 
-/// The page without the one paragraph that holds times of the machine and the names of files.
+/// The page without the paragraph with computation times and file names.
 fn timeless(page: &str) -> String {
     let kept = page
         .lines()
@@ -19,7 +19,7 @@ fn timeless(page: &str) -> String {
     kept.collect::<Vec<_>>().join("\n")
 }
 
-/// Truth: the page that the run itself wrote.
+/// Truth: the page written by the run itself.
 #[cfg(feature = "mcap")]
 #[test]
 fn the_page_of_a_recording_is_that_of_the_run() {
@@ -33,7 +33,7 @@ fn the_page_of_a_recording_is_that_of_the_run() {
     assert_eq!(first.lines().count(), again.lines().count());
 }
 
-/// A table has no result: the figures of the tool come from its curves, and are the same.
+/// A table contains no result: the TCP figures are computed from its curves, and are the same.
 #[test]
 fn a_table_gives_a_page_with_the_same_peak() {
     let place = recorded(&[]);
@@ -46,8 +46,7 @@ fn a_table_gives_a_page_with_the_same_peak() {
     assert!(page.contains(&peak), "{peak} mm");
 }
 
-/// Truth: a table holds no moves, no energies, no stepper and no end; figures of those would be
-/// made up.
+/// Truth: a table contains no moves, energies, stepper or end; figures of those would be invented.
 #[test]
 fn what_a_table_does_not_hold_is_not_a_figure_of_its_page() {
     let place = recorded(&[]);
@@ -72,7 +71,7 @@ fn what_a_table_does_not_hold_is_not_a_figure_of_its_page() {
     assert_eq!(text.matches("no poses of links").count(), usize::from(!text.contains("data:image")));
 }
 
-/// Truth: recordings hold no times of the machine.
+/// Truth: recordings contain no computation times.
 #[cfg(feature = "mcap")]
 #[test]
 fn the_page_of_a_recording_says_nothing_about_the_time_it_took() {
@@ -82,7 +81,7 @@ fn the_page_of_a_recording_says_nothing_about_the_time_it_took() {
     assert!(!page.contains("real time") && !page.contains("End not known") && page.contains("within 0.1 mm"));
 }
 
-/// A recording whose end is cut off knows its stepper and links, and says what is wrong.
+/// A recording with its end cut off has its stepper and links, and reports the damage.
 #[cfg(feature = "mcap")]
 #[test]
 fn the_page_of_a_killed_run_names_its_stepper_and_what_is_missing() {
@@ -113,7 +112,7 @@ fn a_report_does_not_replace_what_it_is_made_of() {
     assert!(!other.err.contains("--from"), "{}", other.err);
 }
 
-/// Truth: the page that the study itself wrote.
+/// Truth: the page written by the study itself.
 #[cfg(feature = "mcap")]
 #[test]
 fn the_page_of_a_study_folder_is_that_of_the_study() {
@@ -127,7 +126,7 @@ fn the_page_of_a_study_folder_is_that_of_the_study() {
     let different = first.lines().zip(again.lines()).filter(|(a, b)| a != b).map(|(a, _)| a.get(..200).unwrap_or(a));
     assert_eq!(different.collect::<Vec<_>>(), Vec::<&str>::new());
     assert!(again.contains("apart from the first run"));
-    // A run that is gone is told, not passed over.
+    // A missing run is reported, not skipped silently.
     std::fs::remove_dir_all(place.path("study/coarse___long")).unwrap();
     let answer = place.json(&["report", "study", "-o", "less.html"]);
     assert!(answer["warnings"][0].as_str().unwrap().contains("coarse & long"), "{answer}");

@@ -1,11 +1,11 @@
-//! Robots of other people: grippers, missing masses, arguments.
+//! Third-party robots: grippers, missing masses, arguments.
 #![allow(clippy::unwrap_used, reason = "a test stops at what it did not expect")]
 
 mod common;
 
 use common::{Place, ROBOT, SWING, URDF, with};
 
-/// The beam with a finger that slides at its end, between 0.01 and 0.05 m.
+/// The beam with a prismatic finger at its end, between 0.01 and 0.05 m.
 fn with_finger() -> String {
     let finger = "<link name=\"finger\"/>\n<joint name=\"grip\" type=\"prismatic\"><parent link=\"ball\"/><child \
                   link=\"finger\"/><axis xyz=\"0 1 0\"/><limit lower=\"0.01\" upper=\"0.05\" effort=\"10\" \
@@ -69,7 +69,7 @@ fn a_bare_urdf_is_waived_and_estimated_from_the_command_line_or_the_robot_file()
     }
     place.write("bare.toml", "format = 1\nurdf = \"bare.urdf\"\ninertia_from_total_mass = 3.0\n");
     assert!((mass(&["inspect", "bare.toml"]) / 3.0 - 1.0).abs() < 1e-12);
-    // the command line goes before the file
+    // the command line overrides the file
     assert!((mass(&["inspect", "bare.toml", "--inertia-from-density", "2500"]) / 0.8 - 1.0).abs() < 1e-12);
 }
 

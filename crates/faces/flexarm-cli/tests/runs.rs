@@ -1,5 +1,4 @@
-//! Runs that go well, and runs that stop on the way: what is printed, what is written, and that
-//! both agree.
+//! Successful runs, and runs that stop early: printed and written output, and their consistency.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 mod common;
@@ -21,7 +20,7 @@ fn near(a: f64, b: f64, relative: f64) {
     assert!((a - b).abs() <= relative * a.abs().max(b.abs()), "{a} and {b} differ by more than {relative:e}");
 }
 
-/// Keys and types that other programs rely on.
+/// Keys and types on which other programs rely.
 fn has_stable_keys(summary: &Value) {
     for key in ["robot", "trajectory"] {
         assert!(summary[key].is_string(), "{key}: {summary}");
@@ -53,7 +52,7 @@ fn has_stable_keys(summary: &Value) {
     }
 }
 
-/// What the summary says about the TCP must be in the table.
+/// The TCP figures of the summary must agree with the table.
 fn agrees_with_table(summary: &Value, table: &Table) {
     let tcp = &summary["tcp"];
     let times = table.column("time");
@@ -75,7 +74,7 @@ fn agrees_with_table(summary: &Value, table: &Table) {
             (1..times.len()).map(|k| 0.5 * (square(k) + square(k - 1)) * (times[k] - times[k - 1])).sum();
         near(number(tcp, key), (integral / times.last().unwrap()).sqrt(), 1e-9);
     }
-    // The path frame turns the error, it does not stretch it.
+    // The path frame rotates the error but keeps its magnitude.
     let along = table.length(["error_tangential_m", "error_normal_m", "error_binormal_m"]);
     for (a, b) in along.iter().zip(&error) {
         assert!((a - b).abs() < 1e-12, "{a} {b}");
@@ -127,13 +126,14 @@ mod compare {
         for (k, t) in table.column("time").iter().enumerate() {
             near(*t, 0.002 * k as f64, 1e-12);
         }
-        // The joint goes where the trajectory tells it, 60 degrees.
+        // The joint follows the trajectory, 60 degrees.
         near(*table.column("swing_position_rad").last().unwrap(), 60f64.to_radians(), 1e-9);
     }
 
     #[test]
     fn sag_of_the_beam_is_that_of_the_books() {
-        // Weight of the ball at the tip: m g l³/(3 EI); the bar's own acts on two rigid parts.
+        // Weight of the ball at the tip: m g l³/(3 EI); the bar's own weight acts on two rigid
+        // parts.
         let place = Place::new();
         let bare = "theory = \"euler-bernoulli\", parts = \"uniform\", y_axis";
         place.write("robot.toml", with(ROBOT, "y_axis", bare));
@@ -141,7 +141,7 @@ mod compare {
         let (e, l, g) = (70e9, 0.8f64, 9.81);
         let ei = e * 0.02 * 0.04f64.powi(3) / 12.0;
         let ball = 0.5 * g * l.powi(3) / (3.0 * ei);
-        // Of its own weight only the distal half loads the joint in the middle: 5/6 of q l⁴/(8 EI).
+        // Only the distal half of its own weight loads the joint in the middle: 5/6 of q l⁴/(8 EI).
         let own = 5.0 / 6.0 * (1.728 / l * g) * l.powi(4) / (8.0 * ei);
         near(number(&summary["tcp"], "static_sag_m"), ball + own, 1e-3);
     }
@@ -200,7 +200,7 @@ mod compare {
         assert!(place.text("result/figures/tcp_error.svg").starts_with("<svg"));
         assert!(place.text("result/figures/tcp_error.csv").starts_with("time_s,size_mm"));
         assert_eq!(place.path("result/figures/arm_side.png").is_file(), cfg!(feature = "png"));
-        // Not over those of another run, and not where nothing is to be written.
+        // Not over those of another run, and not if no files are to be written.
         assert_eq!(place.flexarm(&[&RUN[..], &["--figures"]].concat()).code, 2);
         let answer = place.flexarm(&["compare", "robot.toml", "swing.toml", "--no-files", "--figures"]);
         assert_eq!(answer.code, 2);
@@ -264,8 +264,8 @@ mod compare {
         let sag = number(&rest["tcp"], "static_sag_m");
         near(number(&rest["tcp"], "peak_m"), sag, 1e-6);
         near(number(&fall["tcp"], "static_sag_m"), sag, 1e-9);
-        // It falls to nearly twice the sag: 3 per cent damping takes exp(-0.03 pi) = 9 per cent off
-        // the overshoot.
+        // It falls to nearly twice the sag: 3 per cent damping reduces the overshoot by exp(-0.03
+        // pi), 9 per cent.
         near(number(&fall["tcp"], "peak_m"), sag * (1.0 + (-0.03 * std::f64::consts::PI).exp()), 0.02);
     }
 
@@ -302,8 +302,8 @@ mod run {
         assert!(table.names.contains(&"swing_position_m".to_owned()), "{:?}", table.names);
     }
 
-    /// A load beyond the cut of a flexible link bends it as much as the same load on the link after
-    /// it.
+    /// A load beyond the cut of a flexible link deflects it as much as the same load on the next
+    /// link.
     #[test]
     fn payload_at_the_far_end_of_a_flexible_link_bends_it() {
         let place = Place::new();
@@ -472,7 +472,7 @@ mod folders {
 
     #[test]
     fn shipped_names() {
-        // Robots and trajectories that come with the program go by their names.
+        // Shipped robots and trajectories are found by their names.
         let place = Place::new();
         let summary = place.json(&["compare", "one_beam", "beam_hold", "--no-files"]);
         assert_eq!((summary["robot"].as_str(), summary["trajectory"].as_str()), (Some("one_beam"), Some("beam_hold")));
@@ -525,7 +525,7 @@ mod first_line {
 mod robot_name {
     use super::*;
 
-    /// A robot file without a name takes that of its folder, whatever way leads there.
+    /// A robot file without a name gets that of its real folder, by any path.
     #[test]
     fn is_that_of_the_real_folder() {
         let place = Place::new();
@@ -555,7 +555,7 @@ mod robot_name {
 mod stopped {
     use super::*;
 
-    /// A spin that no beam survives: from rest with 2000 rad/s² for 10 s.
+    /// A spin that no beam withstands: from rest with 2000 rad/s² for 10 s.
     fn spin() -> String {
         let row = |k: i32| {
             let t = 0.01 * f64::from(k);
@@ -564,7 +564,8 @@ mod stopped {
         "time,swing,swing.vel,swing.acc\n".to_owned() + &(0..=1000).map(row).collect::<String>()
     }
 
-    /// Complete lines of finite numbers in the table; a closed MCAP. Returns the last time.
+    /// Checks complete lines of finite numbers in the table, and a closed MCAP. Returns the last
+    /// time.
     fn readable(place: &Place) -> f64 {
         let table = Table::parse(&place.text("result/run.csv"));
         assert!(table.rows.len() > 5, "{} rows", table.rows.len());
@@ -592,7 +593,7 @@ mod stopped {
             assert_eq!((answer.code, answer.out.as_str()), (1, ""), "{stepper}: {}", answer.err);
             answer.says(&["error: ", "t = ", "step 1e-4 s", "--step", "readable"]);
             assert!(answer.err.contains("diverged") || answer.err.contains("did not converge"), "{}", answer.err);
-            // The log ends where the message says, to a sample.
+            // The log ends at the time in the message, to one sample.
             let (stop, last) = (time_in(&answer.err), readable(&place));
             assert!((0.0..=1.1e-3).contains(&(stop - last)), "{stepper}: stopped at {stop}, logged to {last}");
         }
@@ -600,8 +601,8 @@ mod stopped {
 
     #[test]
     fn by_an_explicit_step_outside_its_region() {
-        // Modal damping moves the eigenvalues; what the check of the step lets pass must still not
-        // end well.
+        // Modal damping shifts the eigenvalues; a step that passes the stability check must still
+        // not end well.
         let place = Place::new();
         place.write("robot.toml", with(ROBOT, "modal = 0.03", "modal = 0.6"));
         for step in ["2e-4", "3e-4", "3.8e-4", "5e-4"] {
@@ -653,10 +654,10 @@ mod stopped {
         use std::time::{Duration, Instant};
 
         let place = Place::new();
-        // Samples 0.1 ms apart: the message rounds the time of the stop by up to 0.5 ms.
+        // Samples 0.1 ms apart: the message rounds the stop time by up to 0.5 ms.
         let arguments = [&RUN[..], &["--step", "1e-8", "--log-rate", "10000", "--json"]].concat();
         let child = place.command(&arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-        // Wait for rows in the table: then the run is under way.
+        // Wait for rows in the table: then the run has started.
         let started = Instant::now();
         let rows = || std::fs::read_to_string(place.path("result/run.csv")).map_or(0, |t| t.lines().count());
         while rows() < 8 {

@@ -1,4 +1,4 @@
-//! Several runs beside each other: `compare --with`.
+//! Several runs side by side: `compare --with`.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 mod common;
@@ -12,7 +12,7 @@ fn number(value: &Value) -> f64 {
     value.as_f64().unwrap_or_else(|| panic!("no number: {value}"))
 }
 
-/// Truth: the same command without `--with`, with the option in its place.
+/// Truth: the same command without `--with`, with the option instead.
 #[test]
 fn every_run_of_a_study_is_the_run_that_stands_alone() {
     let place = Place::new();
@@ -65,7 +65,7 @@ fn a_study_names_its_files_and_overwrites_nothing() {
     }
     place.refused(&[&COMPARE[..], &with[..]].concat(), &["exists already", "--force"]);
     place.json(&[&COMPARE[..], &with[..], &["--force"]].concat());
-    // Other runs' folders are looked at before the first run starts.
+    // The folders of the other runs are checked before the first run starts.
     std::fs::remove_dir_all(place.path("result")).unwrap();
     place.write("result/modal/run.csv", "mine");
     place.refused(&[&COMPARE[..], &with[..]].concat(), &["modal", "run.csv", "exists already"]);
@@ -97,7 +97,7 @@ fn bad_runs_of_a_study_are_named_before_anything_runs() {
         .refused(&["run", "robot.toml", "swing.toml", "-o", "result", "--with", "links=modal"], &["--with", "compare"]);
 }
 
-/// Truth: the same options before the names of the files.
+/// Truth: the same options before the file names.
 #[test]
 fn options_of_other_runs_stand_before_two_dashes() {
     let place = Place::new();
@@ -127,7 +127,7 @@ fn force_leaves_no_recording_of_an_earlier_run_beside_the_new_ones() {
     for new in ["result/run.csv", "result/report.html", "result/summary.json"] {
         assert!(place.read(new) != b"old");
     }
-    // A study's recording alone is not overwritten either.
+    // A recording of a study without other files is not overwritten either.
     let other = Place::new();
     other.write("result/study.rrd", "old");
     other.refused(&COMPARE, &["study.rrd", "exists already"]);

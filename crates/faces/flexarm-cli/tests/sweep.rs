@@ -1,4 +1,4 @@
-//! `flexarm sweep`: studies, what stops them, plans for engines, the least of a metric.
+//! `flexarm sweep`: studies, interruptions, plans for engines, minimisation of a metric.
 #![cfg(feature = "parquet")]
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
@@ -54,7 +54,7 @@ fn a_study_answers_with_its_figures_a_table_a_page_and_the_best_run() {
     for part in ["<h1>Study study</h1>", "Heat maps", "Main effects", "Pareto front", "Scatter matrix", "Best run"] {
         assert!(page.contains(part), "{part}");
     }
-    // The best run again, by its command, has the number of the study.
+    // The best run, repeated by its command, gives the number of the study.
     let command = found["best"]["command"].as_str().unwrap();
     let words: Vec<&str> = command.split(' ').skip(1).chain(["--no-files"]).collect();
     let again = place.json(&words);
@@ -64,7 +64,7 @@ fn a_study_answers_with_its_figures_a_table_a_page_and_the_best_run() {
     assert!(told.out.contains("200 of 200 runs done") && told.out.contains("peak_mm"), "{}", told.out);
 }
 
-/// A study that takes a while, for what stops it.
+/// A study that takes a while, to be interrupted.
 fn long() -> String {
     common::with(STUDY, "step = 0.002", "step = 0.00005")
 }
@@ -77,8 +77,8 @@ fn a_study_that_is_stopped_or_killed_goes_on_and_makes_the_same_bytes() {
     let started = |signal: &str, wanted: usize| {
         let journal = place.path("out/parts/1-of-1.journal");
         let lines = || std::fs::read(&journal).map_or(0, |text| text.iter().filter(|byte| **byte == b'\n').count());
-        // More than what is there: runs go side by side, and many may have been over when the one
-        // before was stopped.
+        // More than the existing lines: runs are concurrent, and many may have finished when the
+        // previous one was stopped.
         let wanted = lines() + wanted;
         let mut child = place.command(&["sweep", "study.toml", "-o", "out", "--quiet"]).spawn().unwrap();
         let begun = Instant::now();
@@ -98,12 +98,12 @@ fn a_study_that_is_stopped_or_killed_goes_on_and_makes_the_same_bytes() {
     assert_eq!(place.read("out/runs.parquet"), place.read("whole/runs.parquet"));
 }
 
-/// Truth: a run of which the program is in the middle gives no answer anywhere, and is run when the
-/// study goes on.
+/// Truth: a run that is interrupted by the end of the program gives no result, and is run when the
+/// study continues.
 #[cfg(unix)]
 #[test]
 fn a_study_stops_within_half_a_second_in_the_middle_of_a_run_which_does_not_count() {
-    // Without and with the whole summary of a run: the two ways in which runs are run.
+    // Without and with the complete summary of a run: the two ways in which runs are executed.
     for (name, metric) in [("quick", "tcp.peak_m"), ("whole", "tcp.overshoot_m")] {
         let place = Place::new();
         let study = format!(
@@ -113,7 +113,7 @@ fn a_study_stops_within_half_a_second_in_the_middle_of_a_run_which_does_not_coun
         place.write("study.toml", &study);
         let arguments = ["sweep", "study.toml", "-o", "out", "--json", "--threads", "2"];
         for signal in [common::stop_signal(), "-TERM"] {
-            // A busy machine may need another go.
+            // A busy machine may need another attempt.
             let stopped = (0..3).map(|_| {
                 let mut command = place.command(&arguments);
                 let child = command.stdout(std::process::Stdio::piped()).stderr(std::process::Stdio::piped()).spawn();
@@ -146,7 +146,7 @@ fn a_study_stops_within_half_a_second_in_the_middle_of_a_run_which_does_not_coun
     }
 }
 
-/// Truth: the first frequency of the beam depends on its width, and not on how fast it is swung.
+/// Truth: the first frequency of the beam depends on its width, not on the speed of the swing.
 #[test]
 fn a_parameter_without_effect_is_not_named_with_twenty_draws() {
     let place = place();
@@ -171,7 +171,7 @@ fn a_parameter_without_effect_is_not_named_with_twenty_draws() {
     assert_eq!(named, 0); // 0.06 expected
 }
 
-/// Truth: frequencies are better if higher, whatever stands first.
+/// Truth: higher frequencies are better, whatever their name starts with.
 #[test]
 fn the_best_run_and_the_front_have_high_frequencies_and_small_errors() {
     let place = place();
@@ -185,10 +185,10 @@ fn the_best_run_and_the_front_have_high_frequencies_and_small_errors() {
     let last = found["pareto"]["runs"].as_array().unwrap().last().unwrap();
     let first = &found["pareto"]["runs"][0];
     assert_eq!(first["values"][0], *highest);
-    // From the highest frequency on each has less of both.
+    // From the highest frequency on, each has less of both.
     assert!(last["values"][0].as_f64() <= first["values"][0].as_f64());
     assert!(last["values"][1].as_f64() <= first["values"][1].as_f64());
-    // The study has the last word.
+    // The setting in the study takes precedence.
     place.write("study.toml", study + "\n[better]\nf1_hz = \"lower\"\n");
     let found = place.json(&["sweep", "study.toml", "-o", "low"]);
     assert_eq!(found["best"]["value"], found["metrics"][0]["min"]);
@@ -198,7 +198,7 @@ fn the_best_run_and_the_front_have_high_frequencies_and_small_errors() {
     place.refused(&["sweep", "study.toml", "-o", "x"], &["f1_hz", "\"more\"", "\"lower\" or \"higher\""]);
 }
 
-/// Truth: what `compare` warns of each run by itself.
+/// Truth: the warnings of `compare` for each run separately.
 #[test]
 fn what_compare_warns_of_runs_is_said_once_with_their_number() {
     let place = place();
@@ -228,7 +228,7 @@ fn what_compare_warns_of_runs_is_said_once_with_their_number() {
             warnings.iter().any(|text| text.as_str().unwrap().ends_with("(4 of 6 runs; worst in run 4)")),
             "{warnings:?}"
         );
-        // By `compare`, run by run.
+        // With `compare`, run by run.
         for (run, (gravity, step)) in [("-98.1", "0.1"), ("-9.81", "0.001")].into_iter().enumerate() {
             place.write("own.toml", common::with(common::ROBOT, "-9.81", gravity));
             let own = place.json(&["compare", "own.toml", "swing.toml", "--step", step, "--no-files"]);
@@ -240,7 +240,7 @@ fn what_compare_warns_of_runs_is_said_once_with_their_number() {
                 );
             }
         }
-        // They are there when nothing is left to run, on the page and on standard error.
+        // They also appear if nothing is left to run, on the page and on standard error.
         let again = place.flexarm(&["sweep", "study.toml", "-o", name]);
         again.says(&["gravity is 98.5", "4 of 6 runs"]);
         assert!(place.text(&format!("{name}/report.html")).contains("gravity is 98.5"));
@@ -257,7 +257,7 @@ fn a_disk_that_is_full_stops_the_study_with_a_word_and_loses_no_run() {
     let said = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(1), "{said}");
     assert!(said.contains("1-of-1.journal") && said.contains("cannot be written"), "{said}");
-    // What was over before the disk was full is there, as a part.
+    // Runs finished before the disk was full are stored, as a part.
     assert!(!place.read("out/parts/1-of-1-0.parquet").is_empty());
     let found = place.json(&["sweep", "study.toml", "-o", "out"]);
     assert_eq!(found["done"], 200);
@@ -289,7 +289,7 @@ fn shards_are_planned_run_and_joined_by_a_shell() {
     place.refused(&["sweep", "plan", "study.toml", "-n", "3", "-o", "plan"], &["exists already", "--force"]);
     place.refused(&["sweep", "plan", "study.toml", "-n", "300", "-o", "p"], &["200 shards"]);
     place.refused(&["sweep", "study.toml", "--shard", "4/3"], &["4/3"]);
-    // A shard is told which it is, and what it lacks.
+    // A shard reports its number, and the missing runs.
     let one = place.json(&["sweep", "study.toml", "--shard", "2/3", "-o", "part"]);
     assert_eq!((one["shard"].as_str(), one["done"].as_u64()), (Some("2/3"), Some(67)));
     let lacking = place.flexarm(&["sweep", "merge", "study.toml", "part", "-o", "joined"]);
@@ -300,7 +300,7 @@ fn shards_are_planned_run_and_joined_by_a_shell() {
     place.refused(&["sweep", "study.toml", "-o", "whole"], &["another study", "200 runs and 208", "--force"]);
 }
 
-/// Truth: the beam that is as heavy as it must be for its first frequency has exactly that.
+/// Truth: the minimum-width beam has exactly the required first frequency.
 #[test]
 fn the_least_width_of_a_beam_has_the_frequency_that_must_hold() {
     let place = place();
@@ -326,7 +326,7 @@ fn the_least_width_of_a_beam_has_the_frequency_that_must_hold() {
     assert_eq!((found["minimise"]["kept"].as_bool(), found["best"]["metric"].as_str()), (Some(true), Some("width")));
     let f1 = found["best"]["metrics"]["f1_hz"].as_f64().unwrap();
     assert!((20.0..20.02).contains(&f1), "{f1}"); // measured 20.002
-    // Once more: nothing is run again, and the answer is the same.
+    // Again: nothing is run again, and the answer is the same.
     let again = place.json(&words);
     assert_eq!(again["best"], found["best"]);
     place.refused(&["sweep", "study.toml", "--minimise", "-o", "x"], &["[minimise]"]);

@@ -16,7 +16,7 @@ fn a_case_is_written_once_and_then_checked() {
     let claims = found["claims"].as_array().unwrap();
     assert!(claims.len() > 20 && claims.iter().all(|c| c["case"] == "one-beam" && c["claim"]["holds"] == true));
     assert_eq!(found["file"], "page/verification.md");
-    // The page names its pictures and they are there.
+    // The page refers to its pictures and they exist.
     let page = place.text("page/verification.md");
     assert!(
         page.contains("## 1. One beam")
@@ -34,7 +34,7 @@ fn a_case_is_written_once_and_then_checked() {
 
     place.refused(&[&CASE[..], &["-o", "page"]].concat(), &["verification.md", "--force"]);
 
-    // The same page is what the command prints; another number is not, and says where.
+    // The command prints the same page; a changed number is reported with its location.
     let check = [&CASE[..], &["--check", "page/verification.md"]].concat();
     let same = place.flexarm(&check);
     assert_eq!((same.code, same.out.contains("is what this command prints")), (0, true), "{}", same.out);
@@ -44,14 +44,14 @@ fn a_case_is_written_once_and_then_checked() {
     assert_eq!(other.code, 1, "{}", other.out);
     assert!(other.out.contains(&format!("line {line}\n")) && other.out.contains("95.4286"), "{}", other.out);
 
-    // A picture that is gone is news too.
+    // A missing picture is reported too.
     place.write("page/verification.md", &page);
     std::fs::remove_file(place.path("page/verification/one-beam-steps.svg")).unwrap();
     let gone = place.flexarm(&check);
     assert_eq!((gone.code, gone.out.contains("one-beam-steps.svg")), (1, true), "{}", gone.out);
 }
 
-/// Ctrl-C within a long case: at once, and nothing is left.
+/// Ctrl-C within a long case stops at once, and leaves nothing behind.
 #[cfg(unix)]
 #[test]
 fn a_stopped_verification_leaves_nothing() {

@@ -1,5 +1,5 @@
-//! `flexarm view` with viewers that are shell scripts: which one is asked, what it is given, and
-//! what is said when it fails.
+//! `flexarm view` with shell scripts as viewers: which one is started, its arguments, and the
+//! messages on failure.
 #![cfg(unix)]
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use common::{Answer, Place};
 
-/// Answers to `--version`, then notes its arguments and stays open.
+/// Answers `--version`, otherwise logs its arguments and stays open.
 const VIEWER: &str = r#"#!/bin/sh
 case "$*" in *--version*) echo "rerun-cli 0.36.3 [rustc 1.95.0] x86_64 release-0.36.3"; exit 0 ;; esac
 echo "$*" > "$NOTE"
@@ -37,7 +37,7 @@ fn view(place: &Place, arguments: &[&str]) -> Answer {
     Answer::of(command.env("PATH", place.path("bin")).env("NOTE", place.path("note")).output().unwrap())
 }
 
-/// Ends a viewer that a test left open, by its number.
+/// Ends a viewer that a test left open, by its process id.
 fn close(answer: &Answer) {
     let pid = answer.json()["pid"].as_u64().unwrap().to_string();
     assert!(std::process::Command::new("/bin/kill").arg(pid).status().unwrap().success(), "the viewer is gone already");
@@ -90,7 +90,7 @@ fn a_viewer_that_cannot_start_is_reported_with_what_it_said() {
     }
 }
 
-/// A second viewer hands the file to the first and ends.
+/// A second viewer passes the file to the first and exits.
 #[test]
 fn a_viewer_that_ends_well_at_once_is_no_failure() {
     let place = place(&[("rerun", &VIEWER.replace("exec /bin/sleep 20", "exit 0"))]);
@@ -110,7 +110,7 @@ fn waiting_lasts_as_long_as_the_viewer_and_ends_as_it_ends() {
     }
 }
 
-/// `.rrd` files are of one version of the viewer, `.mcap` files are not.
+/// `.rrd` files depend on the viewer version, `.mcap` files do not.
 #[test]
 fn another_version_of_the_viewer_gives_a_warning_for_rrd_only() {
     let script = VIEWER.replace("0.36.3", "0.29.1").replace("exec /bin/sleep 20", "exit 0");
@@ -137,7 +137,7 @@ fn a_report_goes_to_the_browser_or_is_named() {
     assert_eq!(answer.code, 0);
     assert!(answer.out.contains("browser") && answer.out.contains("file:///"), "{}", answer.out);
     assert!(view(&place, &["report.html", "--json"]).json()["viewer"].is_null());
-    // A folder with nothing else shows its report.
+    // A folder with only a report shows that.
     place.write("pages/report.html", "content");
     assert_eq!(view(&place, &["pages", "--json"]).json()["file"], "pages/report.html");
 

@@ -1,4 +1,4 @@
-"""Load, run, look: the shipped arm, and a motion of one's own."""
+"""Load, run, analyse: the shipped arm, and a user-defined motion."""
 
 from __future__ import annotations
 

@@ -1,6 +1,7 @@
-"""A flexible arm under servos behind ``step(targets)``, as Gymnasium and MuJoCo have it: 1 kHz, with the real-time factor.
+"""A servo-controlled flexible arm behind ``step(targets)``, as in Gymnasium and MuJoCo, at 1 kHz.
 
-The interface is Gymnasium's (``reset``, ``step`` with five results); with Gymnasium installed, wrap or subclass it as you like.
+Prints the real-time factor. The interface is that of Gymnasium (``reset``, ``step`` with five
+results); with Gymnasium installed, wrap or subclass it.
 """
 
 from __future__ import annotations
@@ -17,10 +18,11 @@ Floats = NDArray[np.float64]
 
 
 class FlexibleArmEnv:
-    """Follow a place of the tool with an arm that bends.
+    """Reach a position of the TCP with a flexible arm.
 
-    The action is the joint targets of the next millisecond (rad); the observation is joints, velocities, and the place of the tool
-    minus the goal (m); the reward is minus the distance to the goal (m).
+    The action is the joint targets of the next millisecond (rad); the observation is joint
+    positions, velocities, and TCP position minus goal (m); the reward is minus the distance to the
+    goal (m).
     """
 
     def __init__(self, robot: str = "reference_arm", period: float = 1e-3) -> None:
@@ -30,7 +32,7 @@ class FlexibleArmEnv:
         self.goal: Floats = self.live.target_pose[:3, 3]
 
     def reset(self, *, seed: int | None = None) -> tuple[Floats, dict[str, Any]]:
-        """Stand still at home; the goal is the tool of a pose nearby."""
+        """Rest at home; the goal is the TCP position of a nearby pose."""
         nearby = self.home + np.random.default_rng(seed).uniform(-0.1, 0.1, self.home.size)
         self.goal = self.arm.robot.model.fk(nearby)[:3, 3]
         self.live.reset(self.home)
@@ -56,7 +58,7 @@ def main(seconds: float = 2.0) -> None:
     distance = np.zeros(steps)
     begin = time.perf_counter()
     for k in range(steps):
-        # Half a second to the goal, softly; then the arm rings and settles.
+        # Half a second to the goal, smoothly; then the arm rings and settles.
         s = min(1.0, (k + 1) * env.live.period / 0.5)
         targets = start + (end - start) * s**3 * (10.0 - 15.0 * s + 6.0 * s * s)
         _, _, _, _, told = env.step(targets)

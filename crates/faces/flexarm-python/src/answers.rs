@@ -1,4 +1,4 @@
-//! Answers at a pose: statics, modes, frequency response.
+//! Results at a pose: statics, modes, frequency response.
 
 use flexarm::{ModeTable, OperatingPoint, OperatingPoints, Quantity, Response, ResponseRequest, Spacing};
 use pyo3::prelude::*;
@@ -12,9 +12,10 @@ use crate::figures::Figures;
 use crate::parts::{Parts, Pickled};
 use crate::values::{plain, word};
 
-/// Static equilibrium at a pose, or at m of them: arrays then have an axis of m in front.
+/// Static equilibrium at a pose, or at m poses: arrays then have a leading axis of length m.
 ///
-/// World axes at the tool, linear first. Poses without an equilibrium have NaN everywhere and stand in :attr:`failures`.
+/// World axes at the TCP, linear first. Poses without an equilibrium have NaN everywhere and are
+/// listed in :attr:`failures`.
 #[pyclass(frozen, name = "Statics", module = "flexarm")]
 pub(crate) struct PyStatics {
     rows: Option<usize>,
@@ -24,7 +25,7 @@ pub(crate) struct PyStatics {
     frequencies: Vec<f64>,
     elastic: usize,
     failures: Vec<(usize, String)>,
-    /// Of a single pose: how it was asked for.
+    /// For a single pose: its inputs.
     asked: Option<(Py<PyArm>, Vec<f64>, [f64; 6])>,
 }
 
@@ -37,7 +38,7 @@ impl PyStatics {
     ) -> PyResult<Self> {
         let tool = at.tcp_pose().translation.vector;
         let moved = tool - at.rigid_tcp_pose().translation.vector;
-        // Rows first.
+        // numpy arrays are row-major.
         let C = at.compliance().transpose();
         let frequencies = at.frequencies_hz().to_vec();
         Ok(Self {
@@ -79,19 +80,19 @@ impl PyStatics {
 
 #[pymethods]
 impl PyStatics {
-    /// Place of the tool (m), (3,) or (m, 3).
+    /// Position of the TCP (m), (3,) or (m, 3).
     #[getter]
     fn tcp<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         Self::array(slf, |_| vec![3], |own| &own.tcp)
     }
 
-    /// The same minus that of the rigid arm (m), (3,) or (m, 3).
+    /// TCP position minus that of the rigid arm (m), (3,) or (m, 3).
     #[getter]
     fn deflection<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         Self::array(slf, |_| vec![3], |own| &own.deflection)
     }
 
-    /// Displacement of the tool per wrench on it (m/N, rad/N; m/(N m), rad/(N m)), (6, 6) or (m, 6, 6).
+    /// Compliance of the TCP (m/N, rad/N; m/(N m), rad/(N m)), (6, 6) or (m, 6, 6).
     #[getter]
     fn compliance<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         Self::array(slf, |_| vec![6, 6], |own| &own.compliance)
@@ -103,14 +104,15 @@ impl PyStatics {
         Self::array(slf, |own| vec![own.elastic], |own| &own.frequencies)
     }
 
-    /// Poses without an answer, and why (list of (int, str)).
+    /// Poses without a solution, and the reasons (list of (int, str)).
     #[getter]
     fn failures(&self) -> Vec<(usize, String)> {
         self.failures.clone()
     }
 
-    /// All that is known of a single pose, found when it is first asked for (dict as ``flexarm statics --json``): sag,
-    /// holding torques, what each element carries.
+    /// All results at a single pose, computed on first access (dict as ``flexarm statics --json``).
+    ///
+    /// These include sag, holding torques and the load of each element.
     #[getter]
     fn details<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let (arm, q, wrench) = self.asked.as_ref().ok_or_else(|| only_for_one("details"))?;
@@ -174,11 +176,11 @@ impl Pickled for PyStatics {
 pub(crate) struct PyModes {
     frequencies: Vec<f64>,
     damping_ratio: Vec<f64>,
-    /// Real and imaginary part, six numbers for each mode.
+    /// Real and imaginary parts, six numbers for each mode.
     tcp: [Vec<f64>; 2],
     strain_energy: Vec<f64>,
     elements: Vec<String>,
-    /// How many modes there are; these may be fewer.
+    /// Total number of modes; fewer may be listed.
     total: usize,
     figures: Figures,
 }
@@ -213,7 +215,7 @@ impl PyModes {
         view(slf, |own| Ok((vec![own.damping_ratio.len()], &own.damping_ratio)))
     }
 
-    /// Motion of the tool in each mode scaled to unit modal mass, (modes, 6), complex.
+    /// Motion of the TCP in each mode, scaled to unit modal mass, (modes, 6), complex.
     #[getter]
     fn tcp<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let part = |values: &[f64]| array(py, [values.len() / 6, 6], values.to_vec());
@@ -232,7 +234,7 @@ impl PyModes {
         PyTuple::new(py, &self.elements)
     }
 
-    /// What limits the worth of the answer (list of flexarm.Caveat).
+    /// Limits of the validity of the result (list of flexarm.Caveat).
     #[getter]
     fn caveats<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         self.figures.caveats(py)
@@ -290,7 +292,7 @@ fn complex<'py>(real: &Bound<'py, PyAny>, imaginary: &Bound<'py, PyAny>) -> PyRe
     real.add(imaginary.mul(j)?)
 }
 
-/// Words of a frequency response.
+/// Arguments of a frequency response.
 pub(crate) struct ResponseArgs<'a> {
     pub(crate) inputs: Option<Vec<String>>,
     pub(crate) outputs: Option<Vec<String>>,
@@ -322,12 +324,12 @@ impl ResponseArgs<'_> {
     }
 }
 
-/// Frequency response of the tool at a pose.
+/// Frequency response of the TCP at a pose.
 #[pyclass(frozen, name = "Response", module = "flexarm")]
 pub(crate) struct PyResponse {
     frequency: Vec<f64>,
     natural_frequencies: Vec<f64>,
-    /// Curve after curve, outputs fastest.
+    /// One curve after the other, outputs fastest.
     magnitude: Vec<f64>,
     phase: Vec<f64>,
     inputs: Vec<String>,
@@ -352,7 +354,7 @@ pub(crate) fn response(response: Response, request: &ResponseRequest) -> PyRespo
 }
 
 impl PyResponse {
-    /// A field of all curves, (inputs, outputs, f).
+    /// An array with a value per point of each curve, (inputs, outputs, f).
     fn field<'py>(slf: &Bound<'py, Self>, values: fn(&Self) -> &[f64]) -> PyResult<Bound<'py, PyAny>> {
         view(slf, |own| Ok((vec![own.inputs.len(), own.outputs.len(), own.frequency.len()], values(own))))
     }
@@ -378,13 +380,13 @@ impl PyResponse {
         PyTuple::new(py, &self.outputs)
     }
 
-    /// Amplitude of the output per amplitude of the input, (inputs, outputs, f).
+    /// Output amplitude over input amplitude, (inputs, outputs, f).
     #[getter]
     fn magnitude<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         Self::field(slf, |own| &own.magnitude)
     }
 
-    /// How far the output is ahead of the input (rad), (inputs, outputs, f).
+    /// Phase lead of the output with respect to the input (rad), (inputs, outputs, f).
     #[getter]
     fn phase<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         Self::field(slf, |own| &own.phase)
@@ -396,7 +398,7 @@ impl PyResponse {
         view(slf, |own| Ok((vec![own.natural_frequencies.len()], &own.natural_frequencies)))
     }
 
-    /// What limits the worth of the answer (list of flexarm.Caveat).
+    /// Limits of the validity of the result (list of flexarm.Caveat).
     #[getter]
     fn caveats<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         self.figures.caveats(py)
@@ -407,12 +409,12 @@ impl PyResponse {
         self.figures.plain(py)
     }
 
-    /// Draws the magnitudes with matplotlib.
+    /// Plots the magnitudes with matplotlib.
     ///
     /// Parameters
     /// ----------
     /// ax : matplotlib.axes.Axes, optional
-    ///     Where to draw; a new figure without it.
+    ///     Axes to draw on. Default: a new figure.
     ///
     /// Returns
     /// -------

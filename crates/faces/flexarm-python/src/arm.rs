@@ -1,4 +1,4 @@
-//! Arms: robots with their flexible links and drives in place, asked with numbers.
+//! Arms: robots with their flexible links and drives, evaluated with numpy arrays.
 
 use std::collections::HashMap;
 use std::sync::{Mutex, OnceLock, PoisonError};
@@ -24,9 +24,9 @@ use crate::scenario::{PyScenario, scenario};
 use crate::values::{as_wrench, path, stepper, texts, whole, word, wrench};
 use crate::watch::{Watch, stoppable};
 
-/// A robot with its flexible links and drives in place. Made by :meth:`Robot.flexible`.
+/// A robot with its flexible links and drives. Created by :meth:`Robot.flexible`.
 ///
-/// It does not change, threads share it, and it can be pickled.
+/// Immutable, shareable between threads, and picklable.
 ///
 /// Examples
 /// --------
@@ -40,7 +40,7 @@ use crate::watch::{Watch, stoppable};
 pub(crate) struct PyArm {
     robot: Py<PyRobot>,
     pub(crate) arm: Arm,
-    /// A workspace for single poses, made when it is first asked for.
+    /// Workspace for single poses, created on first use.
     point: OnceLock<Mutex<OperatingPoint>>,
 }
 
@@ -53,13 +53,13 @@ impl PyArm {
         self.arm.flexible().model.n_actuated()
     }
 
-    /// One pose, if one is given.
+    /// Parses one pose, if one is given.
     pub(crate) fn pose(&self, q: Option<&Bound<'_, PyAny>>) -> PyResult<Option<Vec<f64>>> {
         let n = self.n();
         q.filter(|q| !q.is_none()).map(|q| Ok(numbers("q", q, &[(n, "joints")], false)?.values().to_vec())).transpose()
     }
 
-    /// The workspace for single poses.
+    /// Returns the workspace for single poses.
     fn point(&self) -> PyResult<&Mutex<OperatingPoint>> {
         if let Some(point) = self.point.get() {
             return Ok(point);
@@ -75,7 +75,7 @@ impl PyArm {
         if is_one(runs) {
             return Err(wrong());
         }
-        // The same object again, as in [None] * 1000, is the same scenario.
+        // The same object again, as in [None] * 1000, gives the same scenario.
         let mut known: HashMap<*mut pyo3::ffi::PyObject, (Bound<'_, PyAny>, Scenario)> = HashMap::new();
         let mut all = Vec::new();
         for run in runs.try_iter().map_err(|_| wrong())? {
@@ -93,7 +93,7 @@ impl PyArm {
     }
 }
 
-/// Whether it is one motion or scenario, and not several.
+/// Returns whether the argument is one motion or scenario, not a sequence.
 fn is_one(runs: &Bound<'_, PyAny>) -> bool {
     runs.is_none()
         || runs.cast::<PyMotion>().is_ok()
@@ -101,7 +101,7 @@ fn is_one(runs: &Bound<'_, PyAny>) -> bool {
         || runs.extract::<std::path::PathBuf>().is_ok()
 }
 
-/// Options of a run that are the same for one and for many.
+/// Options shared by single and multiple runs.
 fn run_options(
     step: Option<f64>,
     stepper_word: Option<&str>,
@@ -112,7 +112,7 @@ fn run_options(
     Ok(RunOptions { step_s, stepper, ..RunOptions::default() })
 }
 
-/// Where recordings go, and which.
+/// Returns the output folder and the requested recordings.
 fn outputs(
     folder: Option<&Bound<'_, PyAny>>,
     overwrite: bool,
@@ -135,7 +135,7 @@ fn outputs(
     Ok(Some(outputs))
 }
 
-/// A function that is told how far a run is: the caller's, or a bar if True was given.
+/// Returns the progress function: the caller's, or a bar if True was given.
 pub(crate) fn progress_function<'py>(
     py: Python<'py>,
     given: Option<Bound<'py, PyAny>>,
@@ -153,7 +153,7 @@ pub(crate) fn progress_function<'py>(
 
 #[pymethods]
 impl PyArm {
-    /// The robot that it was made of.
+    /// Robot from which the arm was created.
     #[getter]
     fn robot(&self, py: Python<'_>) -> Py<PyRobot> {
         self.robot.clone_ref(py)
@@ -177,22 +177,22 @@ impl PyArm {
         self.arm.flexible().model.n_elastic()
     }
 
-    /// Tree with the elastic coordinates after the actuated ones, for recursions (Model).
+    /// Tree with elastic coordinates after the actuated ones, for rigid-body algorithms (Model).
     #[getter]
     fn model(&self) -> PyModel {
         PyModel::new(self.arm.recursions())
     }
 
-    /// Runs a motion beside the rigid twin.
+    /// Simulates a motion of the arm and of its rigid twin.
     ///
-    /// The interpreter's lock is given back; Ctrl-C ends the run with readable files.
+    /// Releases the GIL; Ctrl-C stops the run and leaves readable files.
     ///
     /// Parameters
     /// ----------
     /// motion : Motion, Scenario, str or os.PathLike, optional
-    ///     Where the joints go: a file, the name of a shipped motion, or the robot's own motion without it.
+    ///     A file, the name of a shipped motion, or a motion. Default: the robot's own motion.
     /// step : float, optional
-    ///     Time step (s), without it that of the stepper: 1e-3, of spook and rk4 1e-4.
+    ///     Time step (s). Default: that of the stepper: 1e-3, for spook and rk4 1e-4.
     /// stepper : str, default "generalized-alpha"
     ///     Or ``"spook"``, ``"rk4"``, ``"reference"``, ``"sdirk3"``, ``"extrapolated-alpha"``.
     /// stepper_options : dict, optional
@@ -201,26 +201,28 @@ impl PyArm {
     /// payloads : sequence of Payload, optional
     /// start : {"equilibrium", "undeformed"}, default "equilibrium"
     /// log_rate : float, default 500
-    ///     Samples per second; the nearest whole number of steps is used.
+    ///     Samples per second, rounded to a whole number of steps per sample.
     /// twin : bool, default True
-    ///     Measure against the rigid robot.
+    ///     Compare with the rigid robot.
     /// ignore_limits : bool, default False
-    ///     Run although the motion passes joint limits.
+    ///     Run even if the motion exceeds joint limits.
     /// settling_band : float, default 1e-4
     ///     Band of the settling time (m).
     /// output : str or os.PathLike, optional
-    ///     Folder for recordings and a report; nothing is written without it.
+    ///     Folder for recordings and a report. Default: nothing is written.
     /// overwrite : bool, default False
     /// formats : sequence of str, optional
-    ///     Recordings to write, of ``"csv"``, ``"mcap"``, ``"rrd"``, ``"parquet"``, ``"arrow"``; the usual ones without it.
+    ///     Recordings to write, of ``"csv"``, ``"mcap"``, ``"rrd"``, ``"parquet"``, ``"arrow"``.
+    ///     Default: the usual ones.
     /// figures : bool, default False
     ///     Also write plots and pictures for papers.
     /// magnify : float, optional
-    ///     Factor by which recordings show deflections.
+    ///     Magnification of deflections in recordings.
     /// observer : callable, optional
-    ///     Called with each logged :class:`Sample`; if it returns False the run stops with :class:`flexarm.Stopped`.
+    ///     Called with each logged :class:`Sample`; if it returns False, the run stops with
+    ///     :class:`flexarm.Stopped`.
     /// progress : bool or callable, default False
-    ///     True for a bar of tqdm if that is there; or a function of simulated and total time.
+    ///     True for a tqdm bar if tqdm is installed; or a function of simulated and total time.
     ///
     /// Returns
     /// -------
@@ -279,7 +281,7 @@ impl PyArm {
         Ok(run)
     }
 
-    /// Runs many motions or Scenarios on all cores; each has the bits of the run alone.
+    /// Runs many motions or Scenarios on all cores; results are bitwise equal to single runs.
     ///
     /// Parameters
     /// ----------
@@ -287,7 +289,7 @@ impl PyArm {
     /// step, stepper, stepper_options, log_rate, twin, ignore_limits, settling_band
     ///     As for :meth:`simulate`.
     /// errors : {"raise", "return"}, default "raise"
-    ///     What becomes of runs that fail: the first one is raised, or the exceptions stand in the list.
+    ///     For runs that fail: raise the first exception, or return the exceptions in the list.
     ///
     /// Returns
     /// -------
@@ -331,31 +333,32 @@ impl PyArm {
         Ok(list)
     }
 
-    /// How far the tool is off in many runs: figures alone, several runs at a time in vector registers, on all cores.
+    /// Computes TCP deflections of many runs: only figures, vectorised over runs, on all cores.
     ///
-    /// Runs are a list, or one motion or Scenario with arrays of parameters; each parameter is one for all runs, or an array
-    /// with one for each. A run has the same bits in any company; :meth:`simulate` finds the same within rounding.
+    /// Runs are a list, or one motion or Scenario with arrays of parameters; each parameter has one
+    /// value for all runs, or an array with one per run. The result of a run is bitwise independent
+    /// of the other runs; :meth:`simulate` gives the same within rounding.
     ///
     /// Parameters
     /// ----------
     /// runs : sequence of Motion, Scenario, str or os.PathLike, or one of them, optional
-    ///     The robot's own motion without it.
+    ///     Default: the robot's own motion.
     /// stiffness, damping : float or array_like, shape (m,), default 1
-    ///     Factors of all stiffnesses and of all damping.
+    ///     Factors on all stiffnesses and on all damping.
     /// time_scale : float or array_like, shape (m,), default 1
-    ///     Each motion in so many times its time: 1.25 is slower, 0.8 faster.
+    ///     Factor on the duration of each motion: 1.25 is slower, 0.8 faster.
     /// payload_mass : float or array_like, shape (m,), optional
-    ///     What the tool carries from the start in the place of the robot's own payload (kg); 0 is nothing.
+    ///     Mass at the tool from the start, replacing the robot's own payload (kg); 0 for none.
     /// payload_com : array_like, shape (3,) or (m, 3), optional
-    ///     Its centre of mass in the link that carries it (m).
+    ///     Its centre of mass in the frame of the carrying link (m).
     /// payload_inertia : array_like, shape (3, 3) or (m, 3, 3), optional
-    ///     About the centre of mass, axes of the link (kg m²); a point without it.
+    ///     About the centre of mass, link axes (kg m²). Default: a point mass.
     /// step, stepper, stepper_options, ignore_limits
     ///     As for :meth:`simulate`.
     /// samples : bool, default False
-    ///     Keep the deflection after every step.
+    ///     Keep the deflection at every step.
     /// errors : {"raise", "nan"}, default "raise"
-    ///     Runs that fail are raised, or have NaN and stand in ``failures``.
+    ///     For runs that fail: raise, or return NaN and list them in ``failures``.
     ///
     /// Returns
     /// -------
@@ -405,19 +408,21 @@ impl PyArm {
         PyDeflections::of(found, raises, step_s)
     }
 
-    /// Static equilibrium under weight and a wrench at the tool, drives locked, with compliance and natural frequencies.
+    /// Static equilibrium under gravity and a wrench at the TCP, drives locked.
+    ///
+    /// Includes compliance and natural frequencies.
     ///
     /// Parameters
     /// ----------
     /// q : array_like, shape (n,) or (m, n), optional
-    ///     Joints (rad or m), one pose or m poses, which all cores share; zero without it.
+    ///     Joints (rad or m), one pose or m poses, which run on all cores. Default: zero.
     /// wrench : array_like, shape (3,) or (6,), optional
-    ///     Force (N), and moment (N m), on the tool at its origin, world axes.
+    ///     Force (N), and moment (N m), on the tool at the TCP, world axes.
     ///
     /// Returns
     /// -------
     /// Statics
-    ///     Of m poses its arrays have one more axis in front.
+    ///     For m poses its arrays have a leading axis of length m.
     #[pyo3(signature = (q=None, wrench=None))]
     fn statics(
         slf: &Bound<'_, Self>,
@@ -440,17 +445,19 @@ impl PyArm {
         PyStatics::of_one(slf, &mut at, poses, F)
     }
 
-    /// A workspace for one pose after another, for loops in which the calls are to cost nothing (OperatingPoint).
+    /// Creates a workspace for successive poses, for loops with low overhead per call
+    /// (OperatingPoint).
     fn operating_point(slf: &Bound<'_, Self>) -> PyResult<PyOperatingPoint> {
         Ok(PyOperatingPoint::new(slf.get().arm.operating_point().or_raise()?, slf.get().n()))
     }
 
-    /// Lowest natural modes at a pose under weight, drives locked or under their servos.
+    /// Computes the lowest natural modes at a pose under gravity, drives locked or
+    /// servo-controlled.
     ///
     /// Parameters
     /// ----------
     /// q : array_like, shape (n,), optional
-    ///     Joints (rad or m); zero without it.
+    ///     Joints (rad or m). Default: zero.
     /// count : int, default 10
     ///
     /// Returns
@@ -469,19 +476,19 @@ impl PyArm {
         Ok(modes(table))
     }
 
-    /// Frequency response of the tool at a pose, other drives locked.
+    /// Computes the frequency response of the TCP at a pose, other drives locked.
     ///
     /// Parameters
     /// ----------
     /// q : array_like, shape (n,), optional
-    ///     Joints (rad or m); zero without it.
+    ///     Joints (rad or m). Default: zero.
     /// inputs : sequence of str, default ("force-x", "force-y", "force-z")
-    ///     Of ``"force-x"`` to ``"torque-z"`` on the tool, and names of joints.
+    ///     ``"force-x"`` to ``"torque-z"`` on the tool, and names of joints.
     /// outputs : sequence of str, default ("x", "y", "z")
-    ///     Of x, y, z, rx, ry, rz of the tool, world axes.
+    ///     x, y, z, rx, ry, rz of the TCP, world axes.
     /// quantity : {"displacement", "velocity", "acceleration"}, default "displacement"
     /// from_hz, to_hz : float, optional
-    ///     Lowest and highest frequency; chosen by the modes without them.
+    ///     Lowest and highest frequency (Hz). Default: derived from the modes.
     /// points : int, default 500
     /// spacing : {"log", "linear"}, default "log"
     ///
@@ -510,14 +517,14 @@ impl PyArm {
         Ok(response(found, &request))
     }
 
-    /// Mass, damping and stiffness of the free coordinates about the equilibrium at a pose.
+    /// Linearises about the equilibrium at a pose: mass, damping, stiffness matrices.
     ///
     /// Parameters
     /// ----------
     /// q : array_like, shape (n,), optional
-    ///     Joints (rad or m); zero without it.
+    ///     Joints (rad or m). Default: zero.
     /// wrench : array_like, shape (3,) or (6,), optional
-    ///     On the tool, world axes (N, N m).
+    ///     Wrench on the tool, world axes (N, N m).
     ///
     /// Returns
     /// -------
@@ -533,16 +540,16 @@ impl PyArm {
         Ok(linear(&py.detach(|| self.arm.linearise(q.as_deref(), F)).or_raise()?))
     }
 
-    /// The arm at rest at a pose, to be commanded while it moves.
+    /// Creates a live arm at rest at a pose, which is commanded while it moves.
     ///
     /// Parameters
     /// ----------
     /// q : array_like, shape (n,), optional
-    ///     Joints (rad or m); zero without it.
+    ///     Joints (rad or m). Default: zero.
     /// period : float, default 1e-3
     ///     Control period (s), a whole number of steps.
     /// step : float, optional
-    ///     Time step (s), without it that of the stepper: 1e-3, of spook and rk4 1e-4.
+    ///     Time step (s). Default: that of the stepper: 1e-3, for spook and rk4 1e-4.
     /// stepper, stepper_options
     ///     As for :meth:`simulate`.
     ///
@@ -585,7 +592,7 @@ impl PyArm {
 }
 
 impl PyArm {
-    /// A run that signals, an observer and a progress function can end.
+    /// Runs a simulation that signals, an observer and a progress function can stop.
     fn watched(
         &self,
         py: Python<'_>,
@@ -626,7 +633,7 @@ impl PyArm {
     }
 }
 
-/// Kept for answers that cannot be had.
+/// Error of results that exist only for a single pose.
 pub(crate) fn only_for_one(what: &str) -> PyErr {
     PyRuntimeError::new_err(format!("{what} is there for a single pose: ask for one"))
 }

@@ -1,6 +1,6 @@
-//! Arrays of numpy: what comes in is checked and named if it is wrong, what goes out is C-contiguous and not copied.
+//! numpy arrays: inputs are checked, with named errors; outputs are C-contiguous and not copied.
 //!
-//! A batch has one axis more in front. Start at [`numbers`] for what comes in, [`array`] for what goes out.
+//! A batch has a leading axis. Start at [`numbers`] for inputs and at [`array`] for outputs.
 #![allow(unsafe_code, reason = "an array of numpy that borrows from its owner has no lifetime; see `view`")]
 
 use numpy::ndarray::{Array, ArrayView, Dim, Dimension, IntoDimension, ShapeError};
@@ -14,26 +14,26 @@ use pyo3::intern;
 use pyo3::prelude::*;
 use pyo3::pyclass::boolean_struct::True;
 
-/// Numbers that came in, C-contiguous and finite: one row, or m of them.
+/// Input numbers, C-contiguous and finite: one row, or m rows.
 pub(crate) struct Numbers<'py> {
     array: PyReadonlyArrayDyn<'py, f64>,
-    /// Rows, if there is an axis for them.
+    /// Number of rows, if there is an axis for them.
     pub(crate) rows: Option<usize>,
 }
 
 impl Numbers<'_> {
-    /// All numbers, row after row.
+    /// Returns all numbers, row after row.
     pub(crate) fn values(&self) -> &[f64] {
         self.array.as_slice().unwrap_or(&[])
     }
 
-    /// Number of rows, 1 without an axis for them.
+    /// Number of rows; 1 if there is no axis for them.
     pub(crate) fn len(&self) -> usize {
         self.rows.unwrap_or(1)
     }
 }
 
-/// How a shape is asked for in messages.
+/// Describes the expected shape for messages.
 fn expected(row: &[(usize, &str)], batch: bool) -> String {
     if row.is_empty() {
         return "expected one number, or (m,) with one for each of m runs".into();
@@ -54,7 +54,7 @@ fn shape_of(shape: &[usize]) -> String {
     }
 }
 
-/// An array of `float64` as it is, or made of what is nearly one: lists, integers, other orders in memory.
+/// Returns a `float64` array as it is, or converts lists, integers and other memory orders.
 fn floats<'py>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
     if let Ok(array) = value.cast::<PyArrayDyn<f64>>()
         && array.is_c_contiguous()
@@ -82,17 +82,17 @@ fn floats<'py>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyA
     Ok(array.cast_into::<PyArrayDyn<f64>>()?)
 }
 
-/// Numbers of an array of any shape, NaN and infinite ones too.
+/// Reads the numbers of an array of any shape, including NaN and infinities.
 pub(crate) fn any_numbers(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
     let array = floats(name, value)?;
     let array = array.try_readonly().map_err(|error| PyValueError::new_err(format!("{name}: {error}")))?;
     Ok(array.as_slice().unwrap_or(&[]).to_vec())
 }
 
-/// Numbers of an argument: a row of the shape `row`, or with `batch` also m rows.
+/// Reads the numbers of an argument: a row of the shape `row`, or with `batch` also m rows.
 ///
 /// # Errors
-/// `ValueError` with the argument, what was found and what is expected.
+/// `ValueError` with the argument, the found and the expected shape.
 pub(crate) fn numbers<'py>(
     name: &str,
     value: &Bound<'py, PyAny>,
@@ -102,7 +102,7 @@ pub(crate) fn numbers<'py>(
     let array = floats(name, value)?;
     let shape = array.shape();
     let fits = |shape: &[usize]| shape.len() == row.len() && shape.iter().zip(row).all(|(n, (want, _))| n == want);
-    // numpy's dimension 0 would swallow shapes of a single number.
+    // numpy's dimension 0 would also accept shapes of a single number.
     let rows = match shape.split_first() {
         _ if fits(shape) => None,
         Some((m, rest)) if batch && fits(rest) => Some(*m),
@@ -117,7 +117,7 @@ pub(crate) fn numbers<'py>(
     Ok(numbers)
 }
 
-/// An argument with any number of rows of `width` numbers; `width` 0 for plain numbers.
+/// Reads an argument with any number of rows of `width` numbers; `width` 0 for plain numbers.
 pub(crate) fn table<'py>(name: &str, value: &Bound<'py, PyAny>, width: usize, what: &str) -> PyResult<Numbers<'py>> {
     let array = floats(name, value)?;
     let rows = match *array.shape() {
@@ -149,7 +149,7 @@ fn finite(name: &str, values: &[f64], shape: &[usize]) -> PyResult<()> {
     Err(PyValueError::new_err(format!("{name}[{place}] is {found}: expected finite numbers")))
 }
 
-/// An array of these numbers, which it takes over.
+/// Creates an array that takes ownership of these numbers.
 pub(crate) fn array<'py, const N: usize>(
     py: Python<'py>,
     shape: [usize; N],
@@ -164,7 +164,7 @@ where
     Ok(array.into_pyarray(py).into_any())
 }
 
-/// An answer for one row, or for m of them: of shape `row`, or (m, row).
+/// Creates the result array for one row, or for m rows: shape `row`, or (m, row).
 pub(crate) fn answer<'py>(
     py: Python<'py>,
     rows: Option<usize>,
@@ -180,11 +180,11 @@ pub(crate) fn answer<'py>(
     }
 }
 
-/// Returns a read-only array on numbers of `owner`, with their shape. Nothing is copied; the array
-/// keeps its owner alive.
+/// Returns a read-only array that views numbers of `owner`, with their shape. Nothing is copied;
+/// the array keeps its owner alive.
 ///
 /// # Errors
-/// What `numbers` returns; `ValueError` if the shape does not fit the numbers.
+/// Those of `numbers`; `ValueError` if the shape does not fit the numbers.
 pub(crate) fn view<'py, T>(
     owner: &Bound<'py, T>,
     numbers: impl for<'a> FnOnce(&'a T) -> PyResult<(Vec<usize>, &'a [f64])>,

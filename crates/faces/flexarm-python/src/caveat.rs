@@ -1,4 +1,4 @@
-//! Caveats: what is probably wrong with an input, or limits the worth of a result, as warnings of their own class.
+//! Caveats (probable mistakes in inputs, limits of results) as warnings of their own class.
 
 use flexarm::{Caveat, gathered, written};
 use pyo3::call::PyCallArgs;
@@ -7,7 +7,7 @@ use pyo3::types::{PyDict, PyList};
 
 use crate::values::plain;
 
-/// Caveats as instances of `flexarm.Caveat`, which can be warned with as they are.
+/// Converts caveats to instances of `flexarm.Caveat`, which can be passed to `warnings.warn`.
 pub(crate) fn list<'py>(py: Python<'py>, caveats: &[Caveat]) -> PyResult<Bound<'py, PyList>> {
     let class = py.import("flexarm.errors")?.getattr("Caveat")?;
     let instance = |caveat: &Caveat| -> PyResult<Bound<'py, PyAny>> {
@@ -25,7 +25,7 @@ pub(crate) fn list<'py>(py: Python<'py>, caveats: &[Caveat]) -> PyResult<Bound<'
     PyList::new(py, caveats.iter().map(instance).collect::<PyResult<Vec<_>>>()?)
 }
 
-/// Warns of those that warn, as if the caller's line did, and logs the others.
+/// Issues caveats of severity warning as Python warnings at the caller's line; logs the others.
 pub(crate) fn tell(py: Python<'_>, caveats: &[Caveat]) -> PyResult<()> {
     let (told, notes): (Vec<Caveat>, Vec<Caveat>) = caveats.iter().cloned().partition(Caveat::warns);
     if !notes.is_empty() {
@@ -37,7 +37,7 @@ pub(crate) fn tell(py: Python<'_>, caveats: &[Caveat]) -> PyResult<()> {
     let warn = py.import("warnings")?.getattr("warn")?;
     let level = PyDict::new(py);
     level.set_item("stacklevel", 1)?;
-    // Those of one kind are one warning, with the fields of the first.
+    // Caveats of one kind become one warning, with the fields of the first.
     let texts: Vec<String> = told.iter().map(|caveat| caveat.message.clone()).collect();
     let of = |text: String| {
         let first = told.iter().find(|caveat| text.starts_with(&caveat.message));
@@ -50,17 +50,17 @@ pub(crate) fn tell(py: Python<'_>, caveats: &[Caveat]) -> PyResult<()> {
     Ok(())
 }
 
-/// Sentences as they may be logged: those of one kind as one, without characters that a terminal obeys.
+/// Merges sentences of one kind and escapes control characters, for logging.
 pub(crate) fn sentences(texts: &[String]) -> Vec<String> {
     gathered(texts).iter().map(|text| written::message(text)).collect()
 }
 
-/// Says something through `logging`, by a function of `flexarm._say`.
+/// Logs something by calling a function of `flexarm._say`.
 pub(crate) fn say<'py>(py: Python<'py>, what: &str, arguments: impl PyCallArgs<'py>) -> PyResult<()> {
     py.import("flexarm._say")?.call_method1(what, arguments).map(drop)
 }
 
-/// An answer as a dict; its caveats are told, and the files that it names.
+/// Converts a result to a dict, issues its caveats, and logs the files that it names.
 pub(crate) fn answer<'py>(
     py: Python<'py>,
     found: &impl serde::Serialize,

@@ -6,7 +6,8 @@ use std::sync::Once;
 
 use pyo3::prelude::*;
 
-/// From the first call of the library on, messages name keyword arguments; a process that is a command line names flags before.
+/// Makes messages name keyword arguments, from the first call on, unless the process is a command
+/// line, which has set flag names before.
 pub(crate) fn name_keywords() {
     static NAMED: Once = Once::new();
     NAMED.call_once(|| {
@@ -14,15 +15,15 @@ pub(crate) fn name_keywords() {
     });
 }
 
-/// Where robots and trajectories are besides.
+/// Registers a folder of robots and trajectories.
 #[pyfunction]
 pub(crate) fn ship_from(folder: PathBuf) {
     flexarm_cli::ship_from(folder);
 }
 
-/// Runs a command line, the name of the program first, and says what the process should end with.
+/// Runs a command line, program name first, and returns the exit code of the process.
 ///
-/// It takes the process for its own: signals end what it does, messages name flags.
+/// Assumes that it owns the process: signals stop the command, messages name flags.
 #[pyfunction]
 pub(crate) fn run_command(py: Python<'_>, line: Vec<OsString>) -> u8 {
     py.detach(|| flexarm_cli::run(line))

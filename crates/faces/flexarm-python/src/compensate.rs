@@ -1,4 +1,4 @@
-//! Joint commands with which a flexible arm's tool follows the rigid one.
+//! Joint commands with which a flexible arm's TCP follows the rigid one's.
 
 use std::path::PathBuf;
 
@@ -20,12 +20,12 @@ use crate::watch::stoppable;
 
 const COMPONENTS: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
 
-/// A motion whose flexible tool follows the rigid one's path. Made by :func:`flexarm.compensate`.
+/// A motion whose flexible TCP follows the rigid one's path. Created by :func:`flexarm.compensate`.
 #[pyclass(frozen, name = "Compensated", module = "flexarm")]
 pub(crate) struct PyCompensated {
     motion: Py<PyMotion>,
     curves: Vec<f64>,
-    /// What is told in one line.
+    /// Summary in one line.
     headline: String,
     figures: Figures,
 }
@@ -38,19 +38,19 @@ impl PyCompensated {
         self.motion.clone_ref(py)
     }
 
-    /// Error of the tool with the motion as it was (dict): ``peak_m``, ``rms_m``, ``peak_rad``, ``end_m``.
+    /// TCP error with the original motion (dict): ``peak_m``, ``rms_m``, ``peak_rad``, ``end_m``.
     #[getter]
     fn before<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.figures.plain(py)?.get_item("before")
     }
 
-    /// The same with the new motion (dict).
+    /// TCP error with the new motion (dict), same keys.
     #[getter]
     fn after<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.figures.plain(py)?.get_item("after")
     }
 
-    /// Time (s), and distance of the tool before and after (m), (n, 3).
+    /// Time (s), and TCP error before and after (m), (n, 3).
     #[getter]
     fn curves<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         view(slf, |own| Ok((vec![own.curves.len() / 3, 3], &own.curves)))
@@ -61,7 +61,7 @@ impl PyCompensated {
         self.figures.plain(py)
     }
 
-    /// What limits the worth of the answer (list of flexarm.Caveat).
+    /// Limits of the validity of the result (list of flexarm.Caveat).
     #[getter]
     fn caveats<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         self.figures.caveats(py)
@@ -94,46 +94,46 @@ impl Pickled for PyCompensated {
     }
 }
 
-/// Finds joint commands with which the tool of a flexible arm follows the path of the rigid one.
+/// Finds joint commands with which the TCP of a flexible arm follows the path of the rigid one.
 ///
 /// Parameters
 /// ----------
 /// robot : Robot
 /// motion : Motion, Scenario or path, optional
-///     The robot's own motion without it.
+///     Default: the robot's own motion.
 /// method : {"dynamic", "static"}, default "dynamic"
-///     With inertia and damping, iterated on the simulation; or weight alone, point by point.
+///     With inertia and damping, iterated on the simulation; or only gravity, point by point.
 /// components : sequence of str, optional
-///     Which of x, y, z, rx, ry, rz of the tool count; all without it.
+///     Components of the TCP error to correct, of x, y, z, rx, ry, rz. Default: all.
 /// iterations : int, default 5
 /// cutoff_hz : float, optional
-///     Highest frequency that is corrected.
+///     Highest frequency to correct.
 /// shaper : {"zv", "zvd", "optimal"}, optional
-///     Run the motion through a shaper before: of the first mode at its end, or what leaves least of all modes there
-///     within ``delay``.
+///     Input shaper applied first: for the first mode at the end of the motion, or minimising the
+///     residual vibration of all modes there within ``delay``.
 /// delay : float, optional
-///     At most so much longer the motion is with the optimal shaper (s); a period of the first mode without it.
+///     Maximum delay of the optimal shaper (s). Default: a period of the first mode.
 /// band : float, default 0.1
-///     Part by which frequencies may be off, for the optimal shaper.
+///     Relative frequency error that the optimal shaper tolerates.
 /// plant : Robot, optional
-///     Another robot that judges.
+///     Another robot for the evaluation.
 /// sweep : bool, default True
-///     Judge with stiffness, damping and drives that are off as well.
+///     Also evaluate with perturbed stiffness, damping and drives.
 /// step : float, default 1e-3
 ///     Time step (s).
 /// loads : sequence of Load, or path of a file of loads, optional
 /// payloads : sequence of Payload, optional
-///     What acts on the arm besides weight, corrected as well.
+///     Loads on the arm in addition to gravity, corrected as well.
 /// limits : {"slow", "refuse", "tell"}, default "slow"
-///     What becomes of commands that pass a limit of a joint which the motion itself keeps.
+///     Response to commands that exceed a joint limit which the motion itself respects.
 /// accelerations : array_like, optional
-///     Greatest acceleration of each joint (rad/s² or m/s²); not looked at without it.
+///     Maximum acceleration of each joint (rad/s² or m/s²). Default: not checked.
 /// links, drives : str, optional
 ///     As for :meth:`Robot.flexible`.
 /// output : path, optional
-///     Folder of the new motion, a page and a recording; nothing is written without it.
+///     Folder of the new motion, a page and a recording. Default: nothing is written.
 /// write : sequence of path, optional
-///     Further files of the new motion: .csv, .toml, .yaml or .json by their endings.
+///     Further files of the new motion: .csv, .toml, .yaml or .json by extension.
 /// overwrite : bool, default False
 ///
 /// Returns

@@ -1,4 +1,4 @@
-//! How far the tool is off in many runs, by lists of runs or by arrays of parameters.
+//! TCP deflections of many runs, given as lists of runs or as arrays of parameters.
 
 use flexarm::{PayloadChange, Scenario, ToolDeflection, Variation};
 use pyo3::exceptions::{PyIndexError, PyValueError};
@@ -10,7 +10,7 @@ use crate::parts::{Parts, Pickled};
 use crate::robot::PyRobot;
 use crate::scenario::inertia_matrix;
 
-/// Parameters of many runs as they were given: one for all, or one for each.
+/// Parameters of many runs as given: one value for all, or one per run.
 pub(crate) struct Parameters<'a, 'py> {
     pub(crate) stiffness: Option<&'a Bound<'py, PyAny>>,
     pub(crate) damping: Option<&'a Bound<'py, PyAny>>,
@@ -29,7 +29,7 @@ struct Parameter<'py> {
 impl<'py> Parameter<'py> {
     fn new(name: &'static str, value: Option<&Bound<'py, PyAny>>, row: &[(usize, &str)]) -> PyResult<Self> {
         let Some(value) = value.filter(|value| !value.is_none()) else { return Ok(Self { name, values: None }) };
-        // A single number, which numpy's contiguous arrays have an axis for.
+        // A single number, to which numpy's contiguous arrays add an axis.
         let axes: usize = value.getattr("ndim").and_then(|n| n.extract()).unwrap_or(0);
         let is_one = row.is_empty() && axes == 0 && value.extract::<f64>().is_ok();
         let mut found = numbers(name, value, row, true)?;
@@ -39,12 +39,12 @@ impl<'py> Parameter<'py> {
         Ok(Self { name, values: Some(found) })
     }
 
-    /// How many there are, if there is one for each run.
+    /// Number of runs, if there is one value per run.
     fn rows(&self) -> Option<(&'static str, usize)> {
         Some((self.name, self.values.as_ref()?.rows?))
     }
 
-    /// Numbers of a run.
+    /// Returns the numbers of a run.
     fn row(&self, k: usize) -> Option<&[f64]> {
         let found = self.values.as_ref()?;
         let width = found.values().len() / found.len().max(1);
@@ -52,13 +52,13 @@ impl<'py> Parameter<'py> {
         Some(&found.values()[k * width..][..width])
     }
 
-    /// A factor of a run.
+    /// Returns the factor of a run.
     fn factor(&self, k: usize) -> f64 {
         self.row(k).and_then(|row| row.first().copied()).unwrap_or(1.0)
     }
 }
 
-/// The runs that are meant: scenarios, or one for all, with their parameters.
+/// Returns the requested runs: scenarios, or one for all, with their parameters.
 pub(crate) fn variations(
     robot: &Bound<'_, PyRobot>,
     scenarios: Scenarios,
@@ -114,15 +114,15 @@ pub(crate) fn variations(
     Ok(runs)
 }
 
-/// What happens in many runs.
+/// Scenarios of many runs.
 pub(crate) enum Scenarios {
-    /// The same in all.
+    /// The same for all runs.
     One(Box<Scenario>),
-    /// In each its own.
+    /// One per run.
     Each(Vec<Scenario>),
 }
 
-/// How far the tool was off in each of m runs. Made by :meth:`Arm.deflections`.
+/// TCP deflections of m runs. Created by :meth:`Arm.deflections`.
 #[pyclass(frozen, name = "Deflections", module = "flexarm")]
 pub(crate) struct PyDeflections {
     peak: Vec<f64>,
@@ -167,31 +167,32 @@ impl PyDeflections {
 
 #[pymethods]
 impl PyDeflections {
-    /// Largest distance of the tool from the rigid one (m), (m,).
+    /// Maximum distance of the TCP from the rigid one (m), (m,).
     #[getter]
     fn peak<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         view(slf, |own| Ok((vec![own.peak.len()], &own.peak)))
     }
 
-    /// When (s), (m,).
+    /// Time of the maximum (s), (m,).
     #[getter]
     fn time_of_peak<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         view(slf, |own| Ok((vec![own.peak.len()], &own.time_of_peak)))
     }
 
-    /// Root of the mean square distance (m), (m,).
+    /// Root mean square distance (m), (m,).
     #[getter]
     fn rms<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         view(slf, |own| Ok((vec![own.peak.len()], &own.rms)))
     }
 
-    /// Flexible minus rigid at the end, world axes (m), (m, 3).
+    /// Flexible minus rigid TCP at the end, world axes (m), (m, 3).
     #[getter]
     fn end<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         view(slf, |own| Ok((vec![own.peak.len(), 3], &own.end)))
     }
 
-    /// The same at the start and after every step, of run ``k``, (steps + 1, 3); with ``samples=True``.
+    /// Deflection at the start and at every step of run ``k``, (steps + 1, 3); with
+    /// ``samples=True``.
     fn samples<'py>(slf: &Bound<'py, Self>, k: usize) -> PyResult<Bound<'py, PyAny>> {
         view(slf, |own| {
             let all = &own.samples;
@@ -207,7 +208,7 @@ impl PyDeflections {
         self.step
     }
 
-    /// Runs that failed, and why (list of (int, str)).
+    /// Runs that failed, and the reasons (list of (int, str)).
     #[getter]
     fn failures(&self) -> Vec<(usize, String)> {
         self.failures.clone()

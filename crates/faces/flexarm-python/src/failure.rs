@@ -1,4 +1,5 @@
-//! Errors of the library as exceptions, by cause. The classes are Python's (`flexarm/errors.py`), for they have two parents.
+//! Library errors as exceptions, by cause. The classes are defined in Python (`flexarm/errors.py`),
+//! since they have two base classes.
 
 use flexarm::compensate::CompensateError;
 use flexarm::identify::IdentifyFileError;
@@ -7,7 +8,7 @@ use flexarm::{Error, Fault, NewError};
 use pyo3::prelude::*;
 use pyo3::types::PyType;
 
-/// Name of the class of an error.
+/// Class name of an error.
 fn class(error: &Error) -> &'static str {
     match error {
         Error::File { .. } | Error::Taken { .. } => "FileError",
@@ -31,7 +32,7 @@ fn class(error: &Error) -> &'static str {
     }
 }
 
-/// Name of the class of a study's error.
+/// Class name of an error of a study.
 fn class_of_study(error: &Error) -> &'static str {
     match error {
         _ if error.external::<NewError>().is_some() => "RobotError",
@@ -42,7 +43,7 @@ fn class_of_study(error: &Error) -> &'static str {
     }
 }
 
-/// The exception for an error.
+/// Creates the exception for an error.
 pub(crate) fn exception(error: Error) -> PyErr {
     let fault = error.fault();
     let mut message = error.to_string();
@@ -55,7 +56,7 @@ pub(crate) fn exception(error: Error) -> PyErr {
         source = cause.source();
     }
     let named = class(&error);
-    // A step that cannot even start is bad input, a file that is not a recording too.
+    // A step that cannot start is bad input, as is a file that is not a recording.
     let class = match (fault, named) {
         (Fault::Input, "StepError" | "WriteError") => "InputError",
         (Fault::Run, "StepError" | "WriteError" | "Stopped") => named,
@@ -65,19 +66,19 @@ pub(crate) fn exception(error: Error) -> PyErr {
     Python::attach(|py| raised(py, class, message))
 }
 
-/// An exception of a class of `flexarm.errors`.
+/// Creates an exception of a class of `flexarm.errors`.
 pub(crate) fn raised(py: Python<'_>, class: &str, message: String) -> PyErr {
     let made = || -> PyResult<PyErr> {
         let class = py.import("flexarm.errors")?.getattr(class)?.cast_into::<PyType>()?;
-        // Python prints what it does not catch as it is.
+        // Python prints uncaught messages without escaping.
         Ok(PyErr::from_type(class, flexarm::written::message(&message)))
     };
     made().unwrap_or_else(|error| error)
 }
 
-/// Results of the library as results of Python.
+/// Converts library results to Python results.
 pub(crate) trait OrRaise<T> {
-    /// The value, or the exception.
+    /// Returns the value, or the exception.
     fn or_raise(self) -> PyResult<T>;
 }
 

@@ -1,4 +1,4 @@
-//! Figures of a result with the keys of `--json`, and their caveats: as they were found, or as a pickle told them.
+//! Figures of a result with the keys of `--json`, and its caveats; computed, or from a pickle.
 
 use std::sync::Arc;
 
@@ -10,7 +10,7 @@ use pyo3::types::PyList;
 use crate::caveat;
 use crate::parts::Parts;
 
-/// What becomes a text of `--json` when it is asked for.
+/// A result that is serialised to JSON on demand.
 trait Json: Send + Sync {
     fn json(&self) -> serde_json::Result<String>;
 }
@@ -33,7 +33,7 @@ pub(crate) struct Figures {
 }
 
 impl Figures {
-    /// Figures as they were found.
+    /// Wraps the figures of a computed result.
     pub(crate) fn of(found: impl serde::Serialize + Send + Sync + 'static, caveats: &[Caveat]) -> Self {
         Self { source: Source::Found(Arc::new(found)), caveats: caveats.to_vec() }
     }
@@ -45,24 +45,24 @@ impl Figures {
         }
     }
 
-    /// As dicts, lists and numbers, in the order and with the keys of `--json`.
+    /// Converts to dicts, lists and numbers, in the order and with the keys of `--json`.
     pub(crate) fn plain<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         py.import("json")?.call_method1("loads", (self.json()?,))
     }
 
-    /// The caveats as instances of `flexarm.Caveat`.
+    /// Returns the caveats as instances of `flexarm.Caveat`.
     pub(crate) fn caveats<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         caveat::list(py, &self.caveats)
     }
 
-    /// For a pickle.
+    /// Stores figures and caveats in a pickle.
     pub(crate) fn put_into(&self, parts: &Parts<'_>) -> PyResult<()> {
         let caveats = serde_json::to_string(&self.caveats).map_err(|error| PyValueError::new_err(error.to_string()))?;
         parts.put("figures", self.json()?)?;
         parts.put("caveats", caveats)
     }
 
-    /// Out of a pickle.
+    /// Restores figures and caveats from a pickle.
     pub(crate) fn of_parts(parts: &Parts<'_>) -> PyResult<Self> {
         let caveats: String = parts.get("caveats")?;
         let caveats = serde_json::from_str(&caveats).map_err(|error| PyValueError::new_err(error.to_string()))?;

@@ -1,4 +1,4 @@
-//! Parameters from measurements, and poses that are worth measuring.
+//! Parameters from measurements, and plans of poses to measure.
 
 use std::path::PathBuf;
 
@@ -12,7 +12,7 @@ use crate::robot::PyRobot;
 use crate::values::{modelling, texts, whole};
 use crate::watch::stoppable;
 
-/// Finds numbers of a robot file from measurements at the robot: tracker, dial gauge, hammer, encoders.
+/// Identifies parameters of a robot file from measurements: tracker, dial gauge, hammer, encoders.
 ///
 /// Parameters
 /// ----------
@@ -20,11 +20,11 @@ use crate::watch::stoppable;
 /// measurements : path
 ///     A file of measurements (``flexarm format measurements`` describes it).
 /// fit : sequence of str, optional
-///     Names of what is unknown, ``*`` for anything, in the place of those in the file.
+///     Names of the parameters to identify, ``*`` as a wildcard, instead of those in the file.
 /// links, drives : str, optional
 ///     As for :meth:`Robot.flexible`.
 /// output : path, optional
-///     Folder of the new robot file and a page; nothing is written without it.
+///     Folder of the new robot file and a page. Default: nothing is written.
 /// overwrite : bool, default False
 ///
 /// Returns
@@ -51,31 +51,32 @@ pub(crate) fn identify<'py>(
     caveat::answer(py, &found, &found.caveats)
 }
 
-/// Chooses poses and forces that tell most of what is unknown.
+/// Chooses the most informative poses and forces for the unknown parameters.
 ///
 /// Parameters
 /// ----------
 /// robot : Robot
 /// count : int
-///     How many readings.
+///     Number of readings.
 /// fit : sequence of str, optional
-///     Names of what is to be found; all stiffnesses without it.
+///     Names of the parameters to identify. Default: all stiffnesses.
 /// forces : array_like, shape (m, 3), optional
-///     Forces on the tool among which the plan chooses, world axes (N).
+///     Candidate forces on the tool, world axes (N).
 /// levers : array_like, optional
-///     Points of the tool at which the forces may act, tool axes (m), a row each; the TCP without.
+///     Candidate points of application of the forces, tool axes (m), one per row. Default: the TCP.
 /// points : array_like, optional
-///     Points of the tool that may be watched, tool axes (m), a row each; the TCP without.
+///     Candidate points on the tool to observe, tool axes (m), one per row. Default: the TCP.
 /// gauges : array_like, optional
-///     Directions along which a dial gauge may stand, world axes, a row each; without, all three numbers are read.
+///     Candidate directions of a dial gauge, world axes, one per row. Default: all three components
+///     are measured.
 /// std : float, default 3e-5
-///     Deviation of a measured displacement (m).
+///     Standard deviation of a measured displacement (m).
 /// poses, work : path, optional
-///     Tables of poses: those that are reachable, and those where the work will be done.
+///     Tables of poses: the candidates, and those of the later work.
 /// links, drives : str, optional
 ///     As for :meth:`Robot.flexible`.
 /// output : path, optional
-///     Folder of the files to fill in; nothing is written without it.
+///     Folder of the files to fill in. Default: nothing is written.
 /// overwrite : bool, default False
 ///
 /// Returns

@@ -1,8 +1,9 @@
-//! The Python package `flexarm`: the facade one to one, numpy in and out, and the command line.
+//! The Python package `flexarm`: the facade one to one, with numpy arrays, and the command line.
 //!
-//! A module per thing that can be held (`robot`, `motion`, `arm`, `run`, ...); what all share is how arrays come in and go out
-//! (`arrays`), how errors become exceptions (`failure`) and caveats warnings (`caveat`), and how long calls give back the
-//! interpreter's lock and are ended by Ctrl-C (`watch`). What needs no speed is Python, in `python/flexarm`.
+//! One module per class (`robot`, `motion`, `arm`, `run`, ...). Shared modules: array conversion
+//! (`arrays`), errors as exceptions (`failure`), caveats as warnings (`caveat`), and long calls
+//! that release the GIL and can be stopped by Ctrl-C (`watch`). Parts that need no speed are
+//! written in Python, in `python/flexarm`.
 #![allow(non_snake_case, reason = "the letters of the matrices")]
 
 mod answers;
@@ -35,7 +36,7 @@ mod table;
 mod values;
 mod watch;
 
-/// The extension module; `flexarm/__init__.py` gives its names on.
+/// The extension module; `flexarm/__init__.py` re-exports its names.
 #[pyo3::pymodule]
 mod _flexarm {
     #[pymodule_export]

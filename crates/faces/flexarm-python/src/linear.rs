@@ -1,4 +1,4 @@
-//! The linear structure about an equilibrium.
+//! The linear system about an equilibrium.
 
 use flexarm::Linear;
 use pyo3::prelude::*;
@@ -7,9 +7,10 @@ use crate::arrays::view;
 use crate::failure::raised;
 use crate::parts::{Parts, Pickled};
 
-/// Linear structure about an equilibrium; k free coordinates (joints driven by torque, then elastic ones), n joints.
+/// Linear system about an equilibrium, with k free coordinates and n joints.
 ///
-/// World axes at the tool, linear first. Made by :meth:`Arm.linearise`.
+/// Free coordinates are joints driven by torque, then elastic coordinates. World axes at the TCP,
+/// linear first. Created by :meth:`Arm.linearise`.
 ///
 /// Examples
 /// --------
@@ -32,18 +33,18 @@ pub(crate) struct PyLinear {
     holding: Vec<f64>,
     driven: usize,
     elements: Vec<(String, usize, usize)>,
-    /// Why there is none, where a motion has no stiffness.
+    /// Reason if there is none, when a direction has no stiffness.
     compliance: Result<Matrix, String>,
 }
 
-/// Rows after each other.
+/// A matrix, row-major.
 struct Matrix {
     shape: [usize; 2],
     values: Vec<f64>,
 }
 
 impl Matrix {
-    /// Of numbers that lie column after column.
+    /// Converts from column-major numbers.
     fn of((rows, columns): (usize, usize), by_columns: &[f64]) -> Self {
         let values = (0..rows * columns).map(|k| by_columns[(k % columns) * rows + k / columns]).collect();
         Self { shape: [rows, columns], values }
@@ -101,25 +102,25 @@ impl PyLinear {
         Self::matrix(slf, |own| &own.D)
     }
 
-    /// Tangent stiffness: springs, change of weight and of the wrench, (k, k).
+    /// Tangent stiffness: springs, and changes of gravity forces and of the wrench, (k, k).
     #[getter]
     fn K<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         Self::matrix(slf, |own| &own.K)
     }
 
-    /// Twist of the tool per rate of the free coordinates, (6, k).
+    /// TCP twist per rate of the free coordinates (Jacobian), (6, k).
     #[getter]
     fn J<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         Self::matrix(slf, |own| &own.J)
     }
 
-    /// Forces on the free coordinates per acceleration of the commands, (k, n).
+    /// Forces on the free coordinates per command acceleration, (k, n).
     #[getter]
     fn M_a<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         Self::matrix(slf, |own| &own.M_a)
     }
 
-    /// Forces on the free coordinates per rate of the commands, (k, n).
+    /// Forces on the free coordinates per command velocity, (k, n).
     #[getter]
     fn D_a<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         Self::matrix(slf, |own| &own.D_a)
@@ -131,7 +132,7 @@ impl PyLinear {
         Self::matrix(slf, |own| &own.K_a)
     }
 
-    /// Twist of the tool per rate of the commands, the structure not yielding, (6, n).
+    /// TCP twist per command velocity with the structure rigid, (6, n).
     #[getter]
     fn J_a<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         Self::matrix(slf, |own| &own.J_a)
@@ -143,25 +144,25 @@ impl PyLinear {
         view(slf, |own| Ok((vec![own.equilibrium.len()], &own.equilibrium)))
     }
 
-    /// Forces with which the drives hold the pose (N m or N), (n,).
+    /// Drive forces that hold the pose (N m or N), (n,).
     #[getter]
     fn holding<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         view(slf, |own| Ok((vec![own.holding.len()], &own.holding)))
     }
 
-    /// How many of the free coordinates are joints driven by torque; they come first.
+    /// Number of free coordinates that are joints driven by torque; they come first.
     #[getter]
     fn driven(&self) -> usize {
         self.driven
     }
 
-    /// Name, and first and last but one free coordinate, of each elastic element (list of (str, int, int)).
+    /// Name, first and one-past-last free coordinate of each element (list of (str, int, int)).
     #[getter]
     fn elements(&self) -> Vec<(String, usize, usize)> {
         self.elements.clone()
     }
 
-    /// Displacement of the tool per wrench on it, motors held, (6, 6).
+    /// Compliance of the TCP with the motors held, (6, 6).
     #[getter]
     fn compliance<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         view(slf, |own| {

@@ -1,4 +1,4 @@
-//! Links from meshes and matrices, and back.
+//! Links from meshes and matrices, and their export.
 
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -20,9 +20,11 @@ use crate::watch::{stoppable, stoppable_telling};
 /// Parameters
 /// ----------
 /// job : str, os.PathLike or dict
-///     A job file, a mesh, or the keys of a job file as a dict: ``mesh``, ``units``, ``material``, ``modes``, ``interface``, ...
+///     A job file, a mesh, or the keys of a job file as a dict: ``mesh``, ``units``, ``material``,
+///     ``modes``, ``interface``, ...
 /// output : str or os.PathLike, optional
-///     Folder for the link file, the complete job, the figures and a report; nothing is written without it.
+///     Folder for the link file, the complete job, the figures and a report. Default: nothing is
+///     written.
 /// overwrite : bool, default False
 ///
 /// Returns
@@ -51,7 +53,7 @@ pub(crate) fn reduce<'py>(
     };
     let folder = output.map(|output| path("output", output)).transpose()?;
     let outputs = folder.map(|folder| ReduceOutputs { folder: Some(folder), flex: None, overwrite });
-    // Steps as they begin, told by the thread that may call Python.
+    // Steps that have begun, logged by the thread that may call Python.
     let begun: Arc<Mutex<Vec<ReduceProgress>>> = Arc::default();
     let steps = begun.clone();
     let lock =
@@ -68,7 +70,7 @@ pub(crate) fn reduce<'py>(
     caveat::answer(py, &summary, &summary.caveats)
 }
 
-/// A text or several.
+/// Reads one path or several.
 fn paths(argument: &str, files: &Bound<'_, PyAny>) -> PyResult<Vec<PathBuf>> {
     match path(argument, files) {
         Ok(one) => Ok(vec![one]),
@@ -76,7 +78,7 @@ fn paths(argument: &str, files: &Bound<'_, PyAny>) -> PyResult<Vec<PathBuf>> {
     }
 }
 
-/// A value in the words of the command line.
+/// Parses a value in the form used on the command line.
 fn parsed<T: std::str::FromStr<Err: std::fmt::Display>>(argument: &str, text: Option<&str>) -> PyResult<Option<T>> {
     let wrong = |error: T::Err| PyValueError::new_err(format!("{argument}: {error}"));
     text.map(|text| text.parse().map_err(wrong)).transpose()
@@ -95,27 +97,27 @@ const FORMATS: [(&str, ImportFormat); 10] = [
     ("sid", ImportFormat::Sid),
 ];
 
-/// Makes a flexible link of matrices of another finite element program.
+/// Creates a flexible link from matrices of another finite element program.
 ///
 /// Parameters
 /// ----------
 /// files : path or sequence of paths
-///     Files of one structure; companions beside them are found.
+///     Files of one structure; companion files in the same folder are found.
 /// format : str, optional
-///     The format that the files must have; by content without it.
+///     Required format of the files. Default: detected by content.
 /// units : str, optional
 ///     ``"m-kg-s"``, ``"mm-t-s"``, ...
 /// map : str, optional
-///     Which rows or nodes are which interface: ``"A=1001,B=1002"``.
+///     Rows or nodes of each interface: ``"A=1001,B=1002"``.
 /// at : sequence of str, optional
 ///     Frames of interfaces: ``"B=0,0,1.1"``.
 /// modes : int, optional
-///     Modes to keep of a full model.
+///     Number of modes to keep of a full model.
 /// mass_file : path, optional
 /// name : str, optional
 ///     Name of the link.
 /// output : path, optional
-///     Folder of the link file and its report; nothing is written without it.
+///     Folder of the link file and its report. Default: nothing is written.
 /// overwrite : bool, default False
 ///
 /// Returns
@@ -178,7 +180,7 @@ const EXPORTS: [(&str, ExportFormat); 6] = [
 /// format : str
 ///     ``"matrix-market"``, ``"user-element"``, ``"dmig"``, ``"op4"``, ``"simscape"`` or ``"sid"``.
 /// output : path
-///     Folder.
+///     Output folder.
 /// units : str, default "m-kg-s"
 /// nodes : sequence of int, optional
 ///     Node numbers of the interfaces.

@@ -42,17 +42,17 @@ impl PyLive {
 
 #[pymethods]
 impl PyLive {
-    /// One control period, at whose end the joints are told to be at ``q``.
+    /// Advances one control period, at whose end the joint targets are ``q``.
     ///
     /// Parameters
     /// ----------
     /// q : array_like, shape (n,)
     ///     Targets (rad or m).
     /// velocity : array_like, shape (n,), optional
-    ///     Target velocities. Without them joints go on the parabola through the last three targets, and the feed-forward
-    ///     of servos is a period late.
+    ///     Target velocities. Default: those of the parabola through the last three targets; the
+    ///     feed-forward of servos is then one period late.
     /// wrench : array_like, shape (3,) or (6,), optional
-    ///     What pulls at the tool meanwhile, world axes (N, N m).
+    ///     Wrench on the tool during the period, world axes (N, N m).
     #[pyo3(signature = (q, velocity=None, wrench=None))]
     fn step(
         &self,
@@ -66,12 +66,12 @@ impl PyLive {
         self.lock().step(q.values(), velocity.as_ref().map(|v| v.values()), &F).or_raise()
     }
 
-    /// To rest at a pose at time 0 again.
+    /// Resets to rest at a pose at time 0.
     ///
     /// Parameters
     /// ----------
     /// q : array_like, shape (n,), optional
-    ///     Joints (rad or m); zero without it.
+    ///     Joints (rad or m). Default: zero.
     #[pyo3(signature = (q=None))]
     fn reset(&self, q: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
         let q = q.map(|q| numbers("q", q, &[(self.n, "joints")], false)).transpose()?;
@@ -90,19 +90,19 @@ impl PyLive {
         self.lock().period_s()
     }
 
-    /// Joints as they are (rad or m), (n,): behind their targets under servos.
+    /// Actual joint positions (rad or m), (n,); with servos they lag behind their targets.
     #[getter]
     fn position<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         Self::vector(py, self.lock().position().to_vec())
     }
 
-    /// Their velocities, (n,).
+    /// Actual joint velocities, (n,).
     #[getter]
     fn velocity<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         Self::vector(py, self.lock().velocity().to_vec())
     }
 
-    /// Forces of the drives (N m or N), (n,).
+    /// Drive forces (N m or N), (n,).
     #[getter]
     fn effort<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         Self::vector(py, self.lock().effort().to_vec())
@@ -114,13 +114,13 @@ impl PyLive {
         Self::vector(py, self.lock().deflection().to_vec())
     }
 
-    /// Pose of the tool in the world, (4, 4).
+    /// TCP pose in the world, (4, 4).
     #[getter]
     fn tcp_pose<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         homogeneous(py, &self.lock().tcp_pose())
     }
 
-    /// Where a rigid arm with its joints at the last targets has the tool, (4, 4).
+    /// TCP pose of a rigid arm with its joints at the last targets, (4, 4).
     #[getter]
     fn target_pose<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         homogeneous(py, &self.lock().target_pose())

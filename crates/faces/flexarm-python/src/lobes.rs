@@ -1,4 +1,4 @@
-//! How deep a tool may cut.
+//! Chatter-free depth of cut.
 
 use std::path::{Path, PathBuf};
 
@@ -14,38 +14,39 @@ use crate::scenario::scenario;
 use crate::values::{modelling, whole};
 use crate::watch::stoppable;
 
-/// Finds the depth of cut beyond which a tool chatters, over the spindle speed.
+/// Finds the limit depth of cut for chatter over the spindle speed.
 ///
 /// Parameters
 /// ----------
 /// robot : Robot
 /// tool : path or str
-///     A file of a cutting tool (``flexarm format tool`` describes it), or the name of a shipped one, such as
-///     ``"endmill_20mm"``.
+///     A file of a cutting tool (``flexarm format tool`` describes it), or the name of a shipped
+///     one, such as ``"endmill_20mm"``.
 /// q : array_like, shape (n,), optional
-///     The pose (rad or m), all zero without it.
+///     The pose (rad or m). Default: all zero.
 /// along : Motion or path, optional
-///     A motion in the place of a pose.
+///     A motion, instead of a pose.
 /// places : int, default 12
-///     At how many places of it.
+///     Number of positions along it.
 /// rpm : array_like, optional
-///     Spindle speeds (1/min) in the place of those in the file.
+///     Spindle speeds (1/min), instead of those in the file.
 /// deepest : float, optional
-///     Deepest cut that is looked at (m).
+///     Maximum depth of cut to examine (m).
 /// zero_order : bool, default False
-///     By the mean force alone.
+///     Use only the mean cutting force.
 /// ranges : bool, default False
-///     All unstable ranges of depth at each speed.
+///     Return all unstable ranges of depth at each speed.
 /// links, drives : str, optional
 ///     As for :meth:`Robot.flexible`.
 /// output : path, optional
-///     Folder of table, picture and page; nothing is written without it.
+///     Folder of table, picture and page. Default: nothing is written.
 /// overwrite : bool, default False
 ///
 /// Returns
 /// -------
 /// dict
-///     ``points`` with ``spindle_rpm``, ``depth_m``, ``chatter_hz`` and ``kind``, and more, as ``flexarm lobes --json``.
+///     ``points`` with ``spindle_rpm``, ``depth_m``, ``chatter_hz`` and ``kind``, and more, as
+///     ``flexarm lobes --json``.
 #[pyfunction]
 #[pyo3(signature = (robot, tool, *, q=None, along=None, places=12, rpm=None, deepest=None, zero_order=false, ranges=false,
                     links=None, drives=None, output=None, overwrite=false))]
@@ -87,7 +88,7 @@ pub(crate) fn lobes<'py>(
     caveat::answer(py, &found, &found.caveats)
 }
 
-/// The exception for a tool that is not there, with those that are shipped.
+/// Creates the exception for an unknown tool, listing the shipped ones.
 fn no_tool(py: Python<'_>, tool: &Path) -> PyResult<PyErr> {
     let shipped: Vec<String> = py.import("flexarm._show")?.call_method0("shipped_tools")?.extract()?;
     let name = tool.to_string_lossy();
@@ -99,7 +100,7 @@ fn no_tool(py: Python<'_>, tool: &Path) -> PyResult<PyErr> {
     Ok(raised(py, "FileError", message))
 }
 
-/// The tool of a file or a shipped one, at other speeds than its own if any are told.
+/// Loads a tool from a file or a shipped one; `rpm` replaces its speeds.
 pub(crate) fn cutting_tool(py: Python<'_>, tool: &Path, rpm: Option<Vec<f64>>) -> PyResult<CuttingTool> {
     let file = flexarm_cli::shipped_tool(tool);
     if !file.exists() {

@@ -21,14 +21,14 @@ use crate::scenario::scenario;
 use crate::values::{maybe_whole, modelling, whole, word, wrench};
 use crate::watch::Watch;
 
-/// Sag, compliance, frequencies and error under load at many poses. Made by :func:`flexarm.map`.
+/// Sag, compliance, frequencies and error under load at many poses. Created by :func:`flexarm.map`.
 #[pyclass(frozen, name = "Map", module = "flexarm")]
 pub(crate) struct PyMap {
-    /// Names and meanings of the columns.
+    /// Names and descriptions of the columns.
     columns: Vec<(String, String)>,
     /// Row after row.
     values: Vec<f64>,
-    /// What is told in one line.
+    /// Summary in one line.
     headline: String,
     figures: Figures,
 }
@@ -55,7 +55,7 @@ impl PyMap {
 
 #[pymethods]
 impl PyMap {
-    /// Every pose as a row: names and numbers of the columns (dict of str to ndarray).
+    /// Every pose as a row: names and values of the columns (dict of str to ndarray).
     #[getter]
     fn table<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let table = PyDict::new(py);
@@ -65,7 +65,7 @@ impl PyMap {
         Ok(table)
     }
 
-    /// What each column means (dict of str to str).
+    /// Description of each column (dict of str to str).
     #[getter]
     fn meanings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let meanings = PyDict::new(py);
@@ -75,19 +75,19 @@ impl PyMap {
         Ok(meanings)
     }
 
-    /// Pose with the worst value of the quantity that is compared (dict).
+    /// Pose with the worst value of the compared quantity (dict).
     #[getter]
     fn worst<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.figures.plain(py)?.get_item("worst")
     }
 
-    /// Pose with the best one (dict).
+    /// Pose with the best value of the compared quantity (dict).
     #[getter]
     fn best<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.figures.plain(py)?.get_item("best")
     }
 
-    /// What limits the worth of the answer (list of flexarm.Caveat).
+    /// Limits of the validity of the result (list of flexarm.Caveat).
     #[getter]
     fn caveats<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         self.figures.caveats(py)
@@ -133,14 +133,14 @@ impl Pickled for PyMap {
     }
 }
 
-/// Three numbers.
+/// Reads three numbers.
 fn three(name: &str, value: &Bound<'_, PyAny>) -> PyResult<[f64; 3]> {
     let found = numbers(name, value, &[(3, "numbers")], false)?;
     let values = found.values();
     Ok([values[0], values[1], values[2]])
 }
 
-/// A map over joints: ``{"joint_2": (from, to, points)}``.
+/// Region of a map over joints: ``{"joint_2": (from, to, points)}``.
 fn over_joints(joints: &Bound<'_, PyDict>) -> PyResult<MapRegion> {
     let range = |(joint, range): (Bound<'_, PyAny>, Bound<'_, PyAny>)| -> PyResult<JointRange> {
         let joint: String = joint.extract()?;
@@ -160,45 +160,49 @@ fn over_joints(joints: &Bound<'_, PyDict>) -> PyResult<MapRegion> {
 /// ----------
 /// robot : Robot
 /// bounds : array_like, shape (2, 3), optional
-///     Lowest and highest corner of a box of places of the tool (m, world); all that the arm can reach without it.
+///     Lowest and highest corner of a box of TCP positions (m, world). Default: the whole
+///     workspace.
 /// spacing : float, optional
-///     Distance of the places (m).
+///     Spacing of the positions (m).
 /// keep_out : float, default 0
-///     Leave out places nearer than this to the upright line through the first joint (m).
+///     Exclude positions nearer than this to the vertical line through the first joint (m).
 /// tool_axis : array_like, shape (3,), default (0, 0, -1)
-///     Where the z axis of the tool points in the world.
+///     Direction of the tool's z axis in the world.
 /// roll, cone : float, default 0
 ///     Rotation about that axis, half angle of a cone within which the tool may tilt (rad).
 /// tilts, rolls : int, optional
-///     Directions in the cone, and rotations of the tool, that count.
+///     Numbers of directions in the cone, and of rotations of the tool.
 /// joints : dict of str to (float, float, int), optional
-///     Go through values of joints instead: from, to, how many (rad or m).
+///     Scan joint values instead: from, to, number of points (rad or m).
 /// poses : array_like, shape (m, n), optional
-///     Go through these joint values instead, in coordinate order (rad or m); the table then has the 6x6 compliance of each.
+///     Evaluate these joint values instead, in coordinate order (rad or m); the table then has the
+///     6x6 compliance of each.
 /// along : Motion or path, optional
-///     Go along a motion instead, at ``points`` instants.
+///     Evaluate along a motion instead, at ``points`` instants.
 /// points : int, default 1000
 /// at : array_like, shape (n,), optional
-///     Joints that the map does not move, and near which branches are taken.
+///     Values of the joints that the map does not move; also selects the inverse kinematics
+///     branches.
 /// wrench : array_like, shape (3,) or (6,), optional
-///     On the tool besides weight, world axes (N, N m).
+///     On the tool in addition to gravity, world axes (N, N m).
 /// by : str, optional
 ///     Quantity by which poses are compared.
 /// keep : {"best", "worst", "all"}, default "best"
-///     Which of a place's poses are kept.
+///     Poses to keep at each position.
 /// frequencies : int, default 3
 /// workpiece : array_like, shape (3,), optional
-///     Edges of a box whose best place is to be found (m).
+///     Edges of a box whose best position is searched (m).
 /// tool : path or str, optional
-///     A cutting tool as for :func:`lobes`: the depth beyond which it chatters becomes the quantity ``depth_m``.
+///     A cutting tool as for :func:`lobes`; its chatter-free depth of cut becomes the quantity
+///     ``depth_m``.
 /// rpm : sequence of float, optional
-///     Its spindle speeds (1/min), of which the lowest limit counts; those of its file without them.
+///     Its spindle speeds (1/min); their lowest limit is used. Default: those of its file.
 /// zero_order : bool, default False
-///     Limits from the mean cutting force alone: quick, blind to period doubling.
+///     Compute limits only from the mean cutting force: fast, does not detect period doubling.
 /// links, drives : str, optional
 ///     As for :meth:`Robot.flexible`.
 /// output : path, optional
-///     Folder of table, page and recording; nothing is written without it.
+///     Folder of table, page and recording. Default: nothing is written.
 /// overwrite : bool, default False
 /// progress : bool or callable, default False
 ///
@@ -310,7 +314,7 @@ pub(crate) fn map<'py>(
     Ok(PyMap::new(map))
 }
 
-/// A map that signals and a progress function can end.
+/// Computes a map that signals and a progress function can stop.
 fn watched(py: Python<'_>, robot: &Robot, request: &MapRequest, progress: Option<Py<PyAny>>) -> PyResult<Map> {
     let watch = Mutex::new(Watch::new(progress));
     let locked = || watch.lock().unwrap_or_else(PoisonError::into_inner);

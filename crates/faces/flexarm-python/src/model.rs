@@ -1,4 +1,4 @@
-//! The recursions on arrays, for those who bring their own dynamics.
+//! Rigid-body algorithms on arrays, for users with their own dynamics.
 
 use std::sync::Arc;
 
@@ -10,14 +10,14 @@ use crate::arrays::{Numbers, answer, numbers};
 use crate::failure::OrRaise;
 use crate::values::word;
 
-/// Rows from which on the interpreter's lock is given back.
+/// Number of rows from which on the GIL is released.
 const MANY: usize = 64;
 
-/// A tree of rigid bodies with its recursions. Springs, dampers and friction are none of it.
+/// A tree of rigid bodies with its algorithms. Springs, dampers and friction are not included.
 ///
-/// Six-vectors are linear first, world axes at the origin of the frame. Every argument takes a row of n numbers, or m rows,
-/// which are shared by all cores. Names in Pinocchio: ``rnea``, ``crba``, ``aba``, ``computeFrameJacobian`` with
-/// LOCAL_WORLD_ALIGNED.
+/// Six-vectors are linear first, world axes at the origin of the frame. Every argument takes a row
+/// of n numbers, or m rows, which are distributed over all cores. Names as in Pinocchio: ``rnea``,
+/// ``crba``, ``aba``, ``computeFrameJacobian`` with LOCAL_WORLD_ALIGNED.
 ///
 /// Examples
 /// --------
@@ -37,13 +37,13 @@ impl PyModel {
         Self { recursions: Arc::new(recursions) }
     }
 
-    /// Names of the frames that there are.
+    /// Names of the available frames.
     fn frame_names(&self) -> Vec<&str> {
         let named = self.recursions.model().frames().iter().map(|frame| frame.name.as_str());
         named.filter(|name| !name.starts_with("__")).chain(["tcp"]).collect()
     }
 
-    /// A frame that there is.
+    /// Checks that a frame exists.
     fn check_frame(&self, name: &str) -> PyResult<()> {
         let known: Vec<(&str, ())> = self.frame_names().into_iter().map(|name| (name, ())).collect();
         word("frame", name, &known)
@@ -53,7 +53,7 @@ impl PyModel {
         numbers(name, value, &[(self.recursions.model().nv(), "coordinates")], true)
     }
 
-    /// An answer of the shape `row` for each row of inputs that have equally many.
+    /// Computes a result of the shape `row` for each row of inputs with equally many rows.
     fn each<'py, const K: usize>(
         &self,
         py: Python<'py>,
@@ -81,7 +81,7 @@ impl PyModel {
         if m < MANY {
             compute(&self.recursions, values, &mut out).or_raise()?;
         } else {
-            // Others may write into the arrays while the lock is not held.
+            // Other threads may write into the arrays while the GIL is released.
             let copies = values.map(<[f64]>::to_vec);
             let copies: [&[f64]; K] = std::array::from_fn(|k| copies[k].as_slice());
             py.detach(|| compute(&self.recursions, copies, &mut out)).or_raise()?;
@@ -98,7 +98,7 @@ impl PyModel {
         self.recursions.model().nv()
     }
 
-    /// Number of coordinates that have a motor; elastic ones come after them.
+    /// Number of actuated coordinates; elastic ones come after them.
     #[getter]
     fn n_actuated(&self) -> usize {
         self.recursions.model().n_actuated()
@@ -116,13 +116,13 @@ impl PyModel {
         PyTuple::new(py, self.frame_names())
     }
 
-    /// Mass of what moves (kg).
+    /// Mass of all moving bodies (kg).
     #[getter]
     fn moving_mass(&self) -> f64 {
         self.recursions.model().moving_mass()
     }
 
-    /// Forces τ = M(q) a + bias(q, v), (n,) or (m, n) (N m or N): inverse dynamics.
+    /// Inverse dynamics: forces τ = M(q) a + bias(q, v), (n,) or (m, n) (N m or N).
     fn rnea<'py>(
         &self,
         q: &Bound<'py, PyAny>,
@@ -151,7 +151,7 @@ impl PyModel {
         self.each(q.py(), ["q"], [q], &row, |r, [q], M| r.mass_matrix(q, M))
     }
 
-    /// Accelerations for the forces tau, all coordinates free, (n,) or (m, n): forward dynamics.
+    /// Forward dynamics: accelerations for the forces tau, all coordinates free, (n,) or (m, n).
     fn aba<'py>(
         &self,
         q: &Bound<'py, PyAny>,
@@ -163,7 +163,7 @@ impl PyModel {
         self.each(q.py(), names, [q, v, tau], &row, |r, [q, v, tau], a| r.forward_dynamics(q, v, tau, a))
     }
 
-    /// Jacobian of a frame, world axes at its origin, linear rows first, (6, n) or (m, 6, n).
+    /// Frame Jacobian, world axes at its origin, linear rows first, (6, n) or (m, 6, n).
     #[pyo3(signature = (q, frame="tcp"))]
     fn jacobian<'py>(&self, q: &Bound<'py, PyAny>, frame: &str) -> PyResult<Bound<'py, PyAny>> {
         self.check_frame(frame)?;
@@ -172,7 +172,7 @@ impl PyModel {
         self.each(q.py(), ["q"], [q], &row, |r, [q], J| r.jacobian(q, &frame, J))
     }
 
-    /// Pose of a frame in the world as a homogeneous matrix, (4, 4) or (m, 4, 4): forward kinematics.
+    /// Forward kinematics: frame pose in the world as homogeneous matrix, (4, 4) or (m, 4, 4).
     #[pyo3(signature = (q, frame="tcp"))]
     fn fk<'py>(&self, q: &Bound<'py, PyAny>, frame: &str) -> PyResult<Bound<'py, PyAny>> {
         self.check_frame(frame)?;

@@ -1,4 +1,4 @@
-//! Motions: where the joints go.
+//! Motions: joint positions over time.
 
 use std::path::PathBuf;
 
@@ -13,10 +13,10 @@ use crate::failure::OrRaise;
 use crate::robot::PyRobot;
 use crate::values::path;
 
-/// Where the joints go, as a function of time.
+/// Joint positions as a function of time.
 ///
-/// ``Motion(t, q)`` goes through samples by a spline; :meth:`Robot.motion` reads files. A motion of samples knows no robot yet:
-/// it is checked against the limits of the one that runs it.
+/// ``Motion(t, q)`` interpolates samples by a spline; :meth:`Robot.motion` reads files. A motion of
+/// samples is not bound to a robot: its limits are checked by the robot that runs it.
 ///
 /// Parameters
 /// ----------
@@ -25,7 +25,7 @@ use crate::values::path;
 /// q : array_like, shape (n, joints)
 ///     Positions of all actuated joints, in the order of :attr:`Robot.joints` (rad or m).
 /// name : str, default "samples"
-///     For logs and messages.
+///     Name for logs and messages.
 ///
 /// Examples
 /// --------
@@ -41,13 +41,13 @@ pub(crate) struct PyMotion {
 }
 
 enum Kind {
-    /// Samples that no robot has seen: times, rows of positions, numbers per row.
+    /// Samples not bound to a robot: times, rows of positions, numbers per row.
     Samples { name: String, t: Vec<f64>, q: Vec<f64>, width: usize },
-    /// A motion of a robot, and how it is made again in another process: what was read, or its curves without that.
+    /// A motion bound to a robot, and its source for pickling: what was read, or else its curves.
     Bound { motion: Box<Motion>, robot: Py<PyRobot>, again: Option<Py<PyAny>> },
 }
 
-/// Choices at reading.
+/// Options for reading.
 pub(crate) struct MotionOptionsArgs {
     pub(crate) topic: Option<String>,
     pub(crate) columns: Option<String>,
@@ -86,12 +86,12 @@ pub(crate) fn load_motion(
 }
 
 impl PyMotion {
-    /// A motion that was made for a robot.
+    /// Wraps a motion made for a robot.
     pub(crate) fn made(motion: Motion, robot: &Bound<'_, PyRobot>) -> Self {
         Self { kind: Kind::Bound { motion: Box::new(motion), robot: robot.clone().unbind(), again: None } }
     }
 
-    /// The motion for a robot.
+    /// Returns the motion for a robot.
     pub(crate) fn on(&self, robot: &Robot) -> PyResult<Motion> {
         match &self.kind {
             Kind::Samples { name, t, q, width } => {
@@ -162,7 +162,7 @@ impl PyMotion {
         Ok(Self { kind: Kind::Samples { name: name.to_owned(), t, q, width } })
     }
 
-    /// The motion checked against a robot (Motion).
+    /// Returns the motion checked against a robot (Motion).
     #[pyo3(name = "on")]
     fn on_robot(slf: &Bound<'_, Self>, robot: &Bound<'_, PyRobot>) -> PyResult<Self> {
         let motion = slf.get().on(&robot.get().robot)?;
@@ -170,7 +170,7 @@ impl PyMotion {
         Ok(Self { kind: Kind::Bound { motion: Box::new(motion), robot: robot.clone().unbind(), again: Some(again) } })
     }
 
-    /// The same motion in so many times its time, rests too; needs a robot.
+    /// Returns the motion with its duration, including rests, multiplied; needs a robot.
     ///
     /// Parameters
     /// ----------
@@ -192,7 +192,7 @@ impl PyMotion {
         Ok(Self::made(motion.scaled(factor, &model).or_raise()?, robot))
     }
 
-    /// Name, for logs.
+    /// Name for logs.
     #[getter]
     fn name(&self) -> &str {
         match &self.kind {
@@ -201,7 +201,7 @@ impl PyMotion {
         }
     }
 
-    /// How long it lasts (s).
+    /// Duration (s).
     #[getter]
     fn duration(&self) -> f64 {
         match &self.kind {
@@ -210,7 +210,7 @@ impl PyMotion {
         }
     }
 
-    /// Joints that it moves, in the order of the columns; needs a robot.
+    /// Joints that it moves, in column order; needs a robot.
     #[getter]
     fn joints<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
         PyTuple::new(py, self.bound("joints")?.trajectory.joints())
@@ -223,13 +223,13 @@ impl PyMotion {
         array(py, [moves.len(), 2], moves.iter().flat_map(|m| [m.start, m.end]).collect())
     }
 
-    /// Limits of the robot that it passes, as sentences; needs a robot.
+    /// Violated limits of the robot, as sentences; needs a robot.
     #[getter]
     fn violations(&self) -> PyResult<Vec<String>> {
         Ok(self.bound("violations")?.violations.iter().map(ToString::to_string).collect())
     }
 
-    /// What is doubtful about it (list of flexarm.Caveat); needs a robot.
+    /// Doubts about the motion (list of flexarm.Caveat); needs a robot.
     #[getter]
     fn caveats<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, pyo3::types::PyList>> {
         caveat::list(py, &self.bound("caveats")?.caveats())
@@ -288,10 +288,10 @@ impl PyMotion {
     }
 }
 
-/// A joint with its knots and pieces, as arrays.
+/// A joint with its knots and polynomial pieces, as arrays.
 type Curve<'py> = (String, Bound<'py, PyAny>, Bound<'py, PyAny>);
 
-/// The curves of a trajectory: of each joint its name, knots, and a row of seven numbers for each piece.
+/// Curves of a trajectory: name, knots, and a row of seven numbers per piece, for each joint.
 fn pieces<'py>(py: Python<'py>, trajectory: &Trajectory) -> PyResult<Vec<Curve<'py>>> {
     let mut curves = Vec::new();
     for (k, joint) in trajectory.joints().iter().enumerate() {
@@ -302,7 +302,7 @@ fn pieces<'py>(py: Python<'py>, trajectory: &Trajectory) -> PyResult<Vec<Curve<'
     Ok(curves)
 }
 
-/// A motion of such curves; for `flexarm._pickle`.
+/// Creates a motion from such curves; for `flexarm._pickle`.
 #[pyfunction]
 #[pyo3(name = "_motion_of_pieces")]
 pub(crate) fn motion_of_pieces(
@@ -322,7 +322,7 @@ pub(crate) fn motion_of_pieces(
     Ok(PyMotion::made(Motion { name: name.to_owned(), ..motion }, robot))
 }
 
-/// A path of a motion in words of people: a name that is shipped, or a file.
+/// Returns the path of a motion: a shipped name, or a file.
 pub(crate) fn motion_file(given: &Bound<'_, PyAny>) -> PyResult<PathBuf> {
     Ok(flexarm_cli::shipped_motion(&path("motion", given)?))
 }

@@ -1,8 +1,8 @@
-//! What the settings of the library are called in Python: keyword arguments.
+//! Names of the library's settings in Python: keyword arguments.
 
 use flexarm::{Names, Setting};
 
-/// The names, for all messages of this process.
+/// The names, used in all messages of this process.
 pub(crate) const NAMES: Names = Names { setting: keyword, caller: "the keyword arguments" };
 
 fn keyword(setting: Setting) -> &'static str {
@@ -28,7 +28,7 @@ fn keyword(setting: Setting) -> &'static str {
         Setting::GridSpacing => "spacing",
         Setting::ToolAxis => "tool_axis",
         Setting::MapJoints => "joints",
-        // The library's own words are Python's as well.
+        // The other names are the same as in the library.
         other => other.key(),
     }
 }

@@ -11,23 +11,23 @@ use crate::failure::OrRaise;
 use crate::robot::estimate;
 use crate::values::{plain, texts};
 
-/// Makes a robot file with first guesses, and a sample motion, of a URDF or xacro file.
+/// Creates a robot file with initial guesses, and a sample motion, from a URDF or xacro file.
 ///
 /// Parameters
 /// ----------
 /// urdf : path
 /// folder : path
-///     Where the files go.
+///     Output folder.
 /// base, tool : str, optional
-///     Link at which the arm begins, and link that is the tool.
+///     First link of the arm, and link of the tool.
 /// joints : sequence of str, optional
 ///     Joints that the motion moves.
 /// payload : float, optional
 ///     Mass at the tool (kg); 0 for none.
 /// inertia_from_density : float, optional
-///     Density (kg/m³) of links without a mass, or with one that only holds a place.
+///     Density (kg/m³) of links without a mass, or with a placeholder.
 /// inertia_from_total_mass : float, optional
-///     Mass (kg) of all these links together.
+///     Total mass (kg) of these links.
 /// overwrite : bool, default False
 ///
 /// Returns

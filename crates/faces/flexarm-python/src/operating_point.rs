@@ -1,4 +1,4 @@
-//! One pose after another in a workspace of its own.
+//! Successive poses in a workspace.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -9,9 +9,10 @@ use crate::arrays::{array, numbers};
 use crate::failure::OrRaise;
 use crate::values::{as_wrench, wrench};
 
-/// A workspace for one pose after another; made by :meth:`Arm.operating_point`.
+/// A workspace for successive poses; created by :meth:`Arm.operating_point`.
 ///
-/// A pose near the last one costs least. For many poses at once ask :meth:`Arm.statics` with an array: that takes all cores.
+/// A pose near the last one is cheapest. For many poses at once, call :meth:`Arm.statics` with an
+/// array, which uses all cores.
 ///
 /// Examples
 /// --------
@@ -34,21 +35,21 @@ impl PyOperatingPoint {
     }
 }
 
-/// The first three rows of a pose over the last one of a homogeneous matrix.
+/// Converts a pose to a homogeneous matrix, row-major.
 pub(crate) fn homogeneous<'py>(py: Python<'py>, pose: &flexarm::Pose) -> PyResult<Bound<'py, PyAny>> {
     array(py, [4, 4], pose.to_homogeneous().transpose().as_slice().to_vec())
 }
 
 #[pymethods]
 impl PyOperatingPoint {
-    /// Finds the equilibrium with the joints at ``q`` under weight and a wrench at the tool.
+    /// Solves for the equilibrium with the joints at ``q``, under gravity and a wrench at the TCP.
     ///
     /// Parameters
     /// ----------
     /// q : array_like, shape (n,)
     ///     Joints (rad or m).
     /// wrench : array_like, shape (3,) or (6,), optional
-    ///     On the tool at its origin, world axes (N, N m).
+    ///     Wrench on the tool at the TCP, world axes (N, N m).
     #[pyo3(signature = (q, wrench=None))]
     fn solve(&self, q: &Bound<'_, PyAny>, wrench: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
         let q = numbers("q", q, &[(self.n, "joints")], false)?;
@@ -57,12 +58,12 @@ impl PyOperatingPoint {
         self.lock().solve(q.values(), &F).map_err(failed).or_raise()
     }
 
-    /// Pose of the tool in the world, (4, 4).
+    /// TCP pose in the world, (4, 4).
     fn tcp_pose<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         homogeneous(py, &self.lock().tcp_pose())
     }
 
-    /// Pose of the rigid tool in the world, (4, 4).
+    /// TCP pose of the rigid arm in the world, (4, 4).
     fn rigid_tcp_pose<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         homogeneous(py, &self.lock().rigid_tcp_pose())
     }
@@ -73,13 +74,13 @@ impl PyOperatingPoint {
         array(py, [values.len()], values)
     }
 
-    /// Forces of the drives that hold the pose (N m or N), (n,).
+    /// Drive forces that hold the pose (N m or N), (n,).
     fn holding_efforts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let values = self.lock().holding_efforts().to_vec();
         array(py, [values.len()], values)
     }
 
-    /// Displacement of the tool per wrench on it (m/N, rad/N; m/(N m), rad/(N m)), (6, 6).
+    /// Compliance of the TCP (m/N, rad/N; m/(N m), rad/(N m)), (6, 6).
     fn compliance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let C = self.lock().compliance().transpose();
         array(py, [6, 6], C.as_slice().to_vec())

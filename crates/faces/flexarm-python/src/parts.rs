@@ -1,4 +1,4 @@
-//! Results in parts that can be pickled: numbers as arrays, the rest as plain values, under names.
+//! Results as named parts that can be pickled: numbers as arrays, the rest as plain values.
 
 use pyo3::conversion::FromPyObjectOwned;
 use pyo3::exceptions::{PyTypeError, PyValueError};
@@ -11,14 +11,14 @@ use crate::arrays::{any_numbers, array};
 /// The parts of a result.
 pub(crate) struct Parts<'py>(Bound<'py, PyDict>);
 
-/// A class whose instances are pickled by their parts.
+/// A class whose instances are pickled as parts.
 pub(crate) trait Pickled: pyo3::PyClass<Frozen = True> + Sync {
-    /// Takes them apart.
+    /// Stores the parts.
     fn parts(&self, parts: &Parts<'_>) -> PyResult<()>;
-    /// Puts them together.
+    /// Creates an instance from the parts.
     fn of_parts(parts: &Parts<'_>) -> PyResult<Self>;
 
-    /// What `__reduce__` returns.
+    /// Return value of `__reduce__`.
     fn reduced<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         let py = slf.py();
         let parts = Parts(PyDict::new(py));
@@ -30,12 +30,12 @@ pub(crate) trait Pickled: pyo3::PyClass<Frozen = True> + Sync {
 }
 
 impl<'py> Parts<'py> {
-    /// Keeps a value.
+    /// Stores a value.
     pub(crate) fn put(&self, name: &str, value: impl IntoPyObject<'py>) -> PyResult<()> {
         self.0.set_item(name, value)
     }
 
-    /// Keeps numbers.
+    /// Stores numbers.
     pub(crate) fn put_numbers(&self, name: &str, values: &[f64]) -> PyResult<()> {
         self.0.set_item(name, array(self.0.py(), [values.len()], values.to_vec())?)
     }
@@ -45,17 +45,17 @@ impl<'py> Parts<'py> {
         self.0.get_item(name)?.ok_or_else(missing)
     }
 
-    /// A value.
+    /// Returns a value.
     pub(crate) fn get<T: FromPyObjectOwned<'py>>(&self, name: &str) -> PyResult<T> {
         self.item(name)?.extract().map_err(Into::into)
     }
 
-    /// Numbers.
+    /// Returns numbers.
     pub(crate) fn numbers(&self, name: &str) -> PyResult<Vec<f64>> {
         any_numbers(name, &self.item(name)?)
     }
 
-    /// As many numbers as a shape has.
+    /// Returns numbers, checking their count against a shape.
     pub(crate) fn shaped(&self, name: &str, shape: &[usize]) -> PyResult<Vec<f64>> {
         let (values, wanted) = (self.numbers(name)?, shape.iter().product::<usize>());
         match values.len() == wanted {
@@ -67,7 +67,7 @@ impl<'py> Parts<'py> {
     }
 }
 
-/// Puts a result together again; for `flexarm._pickle`.
+/// Restores a result; for `flexarm._pickle`.
 #[pyfunction]
 #[pyo3(name = "_restore")]
 pub(crate) fn restore<'py>(kind: &Bound<'py, PyType>, parts: &Bound<'py, PyDict>) -> PyResult<Bound<'py, PyAny>> {

@@ -16,9 +16,9 @@ use crate::model::PyModel;
 use crate::motion::{MotionOptionsArgs, PyMotion, load_motion};
 use crate::values::{maybe_whole, modelling, path, plain, texts};
 
-/// A robot as loaded: links, joints, drives, tool. Made by :func:`flexarm.load`.
+/// A loaded robot: links, joints, drives, tool. Created by :func:`flexarm.load`.
 ///
-/// It does not change, threads share it, and it can be pickled: the files are read again.
+/// Immutable, shareable between threads, and picklable: unpickling reads the files again.
 ///
 /// Examples
 /// --------
@@ -30,11 +30,11 @@ use crate::values::{maybe_whole, modelling, path, plain, texts};
 #[pyclass(frozen, name = "Robot", module = "flexarm")]
 pub(crate) struct PyRobot {
     pub(crate) robot: Arc<Robot>,
-    /// How it is made again: a function of `flexarm._pickle` and its arguments.
+    /// For pickling: a function of `flexarm._pickle` and its arguments.
     again: (&'static str, Py<PyAny>),
 }
 
-/// How missing inertias are estimated.
+/// Estimation of missing inertias.
 pub(crate) fn estimate(density: Option<f64>, total_mass: Option<f64>) -> PyResult<Option<InertiaEstimate>> {
     Ok(match (density, total_mass) {
         (Some(density), _) => Some(InertiaEstimate::Density(positive("inertia_from_density", density)?)),
@@ -56,9 +56,9 @@ pub(crate) fn estimate(density: Option<f64>, total_mass: Option<f64>) -> PyResul
 /// arguments : dict of str to str, optional
 ///     Values of ``$(arg name)`` in xacro files.
 /// inertia_from_density : float, optional
-///     Density (kg/m³) from which missing inertias are estimated by the meshes.
+///     Density (kg/m³) for estimating missing inertias from the meshes.
 /// inertia_from_total_mass : float, optional
-///     Mass of the whole arm (kg) from which they are estimated.
+///     Mass of the whole arm (kg) for estimating missing inertias.
 /// waive_inertia : sequence of str, optional
 ///     Links whose inertia may be rank deficient.
 ///
@@ -69,7 +69,7 @@ pub(crate) fn estimate(density: Option<f64>, total_mass: Option<f64>) -> PyResul
 /// Raises
 /// ------
 /// flexarm.InputError
-///     With file, line, what was found and how to mend it.
+///     With file, line, what was found and how to fix it.
 ///
 /// Examples
 /// --------
@@ -119,25 +119,26 @@ pub(crate) fn load(
     Ok(PyRobot { robot: Arc::new(robot), again })
 }
 
-/// A path, or a shipped robot by its name or as the checkout has it, `robots/NAME`.
+/// Returns a path, or a shipped robot by its name or by its path in the checkout, `robots/NAME`.
 fn shipped(given: &Path) -> PyResult<PathBuf> {
     let name = given.strip_prefix("robots").ok().filter(|_| !given.exists());
     flexarm_cli::shipped_robot(name.unwrap_or(given)).or_raise()
 }
 
-/// Makes a robot of values: the keys of a robot file as a dict, or changed ones of a file that was read.
+/// Creates a robot from values: the keys of a robot file as a dict, possibly modified.
 ///
-/// :class:`RobotBuilder` writes the keys, one call each, and the links and joints too if there is no URDF.
+/// :class:`RobotBuilder` writes the keys by calls, and also links and joints if there is no URDF.
 ///
 /// Parameters
 /// ----------
 /// keys : dict
-///     What ``robot.toml`` would have: ``urdf``, ``tcp``, ``payload``, ``flexible_link``, ``drive``, ...
-///     (``flexarm format robot`` prints all). Arrays are taken as lists; ``format = 1`` may be left out.
+///     Contents of ``robot.toml``: ``urdf``, ``tcp``, ``payload``, ``flexible_link``, ``drive``,
+///     ... (``flexarm format robot`` prints all). Arrays are converted to lists; ``format = 1`` is
+///     optional.
 /// folder : path, default "."
-///     Paths in the keys are relative to it.
+///     Folder to which paths in the keys are relative.
 /// urdf : str, optional
-///     Text of a URDF or xacro, in the place of the file that the keys name.
+///     Text of a URDF or xacro, instead of the file that the keys name.
 ///
 /// Returns
 /// -------
@@ -181,10 +182,11 @@ pub(crate) fn robot(
     Ok(PyRobot { robot: Arc::new(robot), again })
 }
 
-/// Where a robot of values would be: nothing is there.
+/// Placeholder for the file of a robot made from values.
 const VALUES: &str = "robot of values";
 
-/// The exception without places in a text that nobody has seen.
+/// Removes line and column from an exception, since they refer to a text that the user has not
+/// seen.
 fn of_keys(error: PyErr, py: Python<'_>, path: &Path) -> PyErr {
     let value = error.value(py);
     let (message, place) = (value.to_string(), format!("{}:", path.display()));
@@ -208,7 +210,7 @@ fn positive(what: &str, x: f64) -> PyResult<f64> {
 }
 
 impl PyRobot {
-    /// A limit of the actuated joints.
+    /// Returns a limit of the actuated joints.
     fn limits_of<'py, const N: usize>(
         &self,
         py: Python<'py>,
@@ -245,13 +247,13 @@ impl PyRobot {
         PyTuple::new(py, model.coordinates()[..model.n_actuated()].iter().map(|c| c.joint.clone()))
     }
 
-    /// Lowest and highest position of each joint, (n, 2) (rad or m); infinite where there is no limit.
+    /// Lower and upper limit of each joint, (n, 2) (rad or m); infinite if there is no limit.
     #[getter]
     fn limits<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.limits_of(py, |c| [c.limits.lower, c.limits.upper])
     }
 
-    /// Highest speed of each joint, (n,) (rad/s or m/s).
+    /// Maximum speed of each joint, (n,) (rad/s or m/s).
     #[getter]
     fn velocity_limits<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.limits_of(py, |c| [c.limits.velocity])
@@ -263,32 +265,33 @@ impl PyRobot {
         self.robot.tcp().0
     }
 
-    /// File of the motion that the robot comes with, or None.
+    /// File of the robot's default motion, or None.
     #[getter]
     fn default_motion(&self) -> Option<&Path> {
         self.robot.default_trajectory.as_deref()
     }
 
-    /// What is probably wrong with the robot, or good to know (list of flexarm.Caveat).
+    /// Probable mistakes in the robot, and notes (list of flexarm.Caveat).
     #[getter]
     fn caveats<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, pyo3::types::PyList>> {
         caveat::list(py, &self.robot.caveats())
     }
 
-    /// The rigid tree with the payload, for recursions (Model).
+    /// The rigid tree with the payload, for rigid-body algorithms (Model).
     #[getter]
     fn model(&self) -> PyResult<PyModel> {
         Ok(PyModel::new(self.robot.recursions().or_raise()?))
     }
 
-    /// Puts flexible links and drives in place, which costs milliseconds; the arm is then asked often.
+    /// Adds flexible links and drives, which takes milliseconds; the arm can then be reused.
     ///
     /// Parameters
     /// ----------
     /// links : {"rigid", "lumped", "modal"}, optional
-    ///     How flexible links are modelled; as the robot file says without it.
+    ///     Model of the flexible links. Default: that of the robot file.
     /// drives : {"rigid", "elastic", "servo"}, optional
-    ///     How drives are modelled: exactly on the motion, with gearboxes that yield, by torque under servos.
+    ///     Model of the drives: exactly on the motion, with elastic gearboxes, or by torque under
+    ///     servos.
     /// segments : int, optional
     ///     Number of rigid parts of lumped links.
     /// modes : int, optional
@@ -316,13 +319,13 @@ impl PyRobot {
     /// Parameters
     /// ----------
     /// motion : str or os.PathLike, optional
-    ///     A file or the name of a shipped motion; the robot's own without it.
+    ///     A file or the name of a shipped motion. Default: the robot's own.
     /// topic : str, optional
     ///     Topic of a bag.
     /// columns : str, optional
-    ///     Which columns of a table are time and joints: ``"t=Time[ms],joint_1=A1[deg]"``.
+    ///     Columns of time and joints in a table: ``"t=Time[ms],joint_1=A1[deg]"``.
     /// round_corners : float, optional
-    ///     Time (s) within which corners, where a velocity jumps, are rounded.
+    ///     Duration (s) of blends that round corners, where the velocity jumps.
     ///
     /// Returns
     /// -------
@@ -339,12 +342,14 @@ impl PyRobot {
         load_motion(slf, motion, args)
     }
 
-    /// What was loaded, with kinematics and dynamics at a pose (dict as ``flexarm inspect --json``).
+    /// Returns what was loaded, with kinematics and dynamics at a pose.
+    ///
+    /// A dict as ``flexarm inspect --json``.
     ///
     /// Parameters
     /// ----------
     /// q, velocity : array_like, shape (n,), optional
-    ///     Joints (rad or m) and their velocities; zero without them.
+    ///     Joints (rad or m) and their velocities. Default: zero.
     #[pyo3(signature = (q=None, velocity=None))]
     fn inspect<'py>(
         &self,
@@ -361,7 +366,7 @@ impl PyRobot {
         caveat::answer(py, &found, &found.caveats)
     }
 
-    /// Keys, folder, text of the URDF and choices at loading, for `flexarm.RobotBuilder`.
+    /// Keys, folder, text of the URDF and options of loading, for `flexarm.RobotBuilder`.
     fn _made_of<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let (function, arguments) = &self.again;
         let arguments = arguments.bind(py);
@@ -398,7 +403,7 @@ impl PyRobot {
     }
 }
 
-/// Everything that is wrong or doubtful with a robot and a motion, with the yardsticks.
+/// Lists errors and doubts about a robot and a motion, with the reference values.
 ///
 /// Parameters
 /// ----------

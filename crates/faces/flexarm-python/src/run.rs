@@ -10,9 +10,10 @@ use crate::arrays::{array, view};
 use crate::figures::Figures;
 use crate::parts::{Parts, Pickled};
 
-/// What a run gives: figures, and every logged sample as columns.
+/// Result of a run: figures, and every logged sample as columns.
 ///
-/// Columns are read-only arrays on the run's own numbers: nothing is copied. ``run[name]`` is any of :attr:`columns`.
+/// Columns are read-only arrays that view the run's data without copying. ``run[name]`` returns any
+/// of :attr:`columns`.
 ///
 /// Examples
 /// --------
@@ -26,9 +27,9 @@ use crate::parts::{Parts, Pickled};
 pub(crate) struct PyRun {
     columns: Columns,
     figures: Figures,
-    /// What is told in one line.
+    /// Summary in one line.
     headline: String,
-    /// The figures as they were asked for.
+    /// The figures, converted on first access.
     summary: PyOnceLock<Py<PyAny>>,
 }
 
@@ -43,12 +44,12 @@ impl PyRun {
         Self { columns, figures: Figures::of(summary, &caveats), headline, summary: PyOnceLock::new() }
     }
 
-    /// What is told in one line.
+    /// Summary in one line.
     pub(crate) fn headline(&self) -> &str {
         &self.headline
     }
 
-    /// Shape of a column.
+    /// Returns the shape of a column.
     fn shape(&self, column: &Column) -> Vec<usize> {
         let columns = &self.columns;
         let n = columns.rows();
@@ -90,7 +91,7 @@ impl PyRun {
         Ok(made.bind(py).clone())
     }
 
-    /// What limits the worth of the result (list of flexarm.Caveat).
+    /// Limits of the validity of the result (list of flexarm.Caveat).
     #[getter]
     fn caveats<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         self.figures.caveats(py)
@@ -118,13 +119,13 @@ impl PyRun {
         PyTuple::new(py, &self.columns.elements)
     }
 
-    /// Who moves the tool, in the order of ``contribution`` (tuple of str).
+    /// Names of the contributors to the TCP error, in the order of ``contribution`` (tuple of str).
     #[getter]
     fn contributors<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
         PyTuple::new(py, &self.columns.contributors)
     }
 
-    /// Paths of the files that were written (dict of str to str).
+    /// Paths of the written files (dict of str to str).
     #[getter]
     fn files<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.summary(py)?.get_item("files")
@@ -142,19 +143,19 @@ impl PyRun {
         Self::signal(slf, "error_world")
     }
 
-    /// The same as a rotation vector (rad), (n, 3).
+    /// Orientation error of the TCP as a rotation vector (rad), (n, 3).
     #[getter]
     fn error_rotation<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         Self::signal(slf, "error_rotation")
     }
 
-    /// Along, normal and binormal to the path (m), (n, 3).
+    /// TCP error along, normal and binormal to the path (m), (n, 3).
     #[getter]
     fn error_path<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         Self::signal(slf, "error_path")
     }
 
-    /// What of the error the arm would have standing still (m), (n, 3).
+    /// Static share of the TCP error (m), (n, 3).
     #[getter]
     fn error_static<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         Self::signal(slf, "error_static")
@@ -172,19 +173,19 @@ impl PyRun {
         Self::signal(slf, "velocity")
     }
 
-    /// Forces of the drives (N m or N), (n, joints).
+    /// Drive forces (N m or N), (n, joints).
     #[getter]
     fn effort<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         Self::signal(slf, "effort")
     }
 
-    /// Place of the flexible tool, world (m), (n, 3).
+    /// Position of the flexible TCP, world (m), (n, 3).
     #[getter]
     fn tcp<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         Self::signal(slf, "tcp_position")
     }
 
-    /// Place of the rigid tool, world (m), (n, 3).
+    /// Position of the rigid TCP, world (m), (n, 3).
     #[getter]
     fn rigid_tcp<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         Self::signal(slf, "rigid_tcp_position")
@@ -217,7 +218,7 @@ impl PyRun {
         self.columns.rows()
     }
 
-    /// Columns one number wide, with names as in ``run.csv`` (dict of str to ndarray); this copies.
+    /// Returns scalar columns, with names as in ``run.csv`` (dict of str to ndarray); this copies.
     fn table<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let table = PyDict::new(py);
         for (name, values) in flexarm::flat_columns(&self.columns) {
@@ -226,40 +227,40 @@ impl PyRun {
         Ok(table)
     }
 
-    /// The stream of Arrow's C interface, by which pyarrow, pandas, polars and DuckDB take the table without a copy.
+    /// Exports Arrow's C stream: pyarrow, pandas, polars and DuckDB read the table without a copy.
     #[pyo3(signature = (requested_schema=None))]
     fn __arrow_c_stream__<'py>(
         &self,
         py: Python<'py>,
         requested_schema: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        drop(requested_schema); // the protocol lets us ignore it
+        drop(requested_schema); // may be ignored according to the protocol
         crate::table::stream(py, &self.columns)
     }
 
-    /// The table as a ``pyarrow.Table``.
+    /// Returns the table as a ``pyarrow.Table``.
     fn to_arrow<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         slf.py().import("flexarm._tables")?.call_method1("to_arrow", (slf,))
     }
 
-    /// The table as a ``pandas.DataFrame``, indexed by time.
+    /// Returns the table as a ``pandas.DataFrame``, indexed by time.
     fn to_pandas<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         slf.py().import("flexarm._tables")?.call_method1("to_pandas", (slf,))
     }
 
-    /// The table as a ``polars.DataFrame``.
+    /// Returns the table as a ``polars.DataFrame``.
     fn to_polars<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         slf.py().import("flexarm._tables")?.call_method1("to_polars", (slf,))
     }
 
-    /// Draws the TCP error over time with matplotlib.
+    /// Plots the TCP error over time with matplotlib.
     ///
     /// Parameters
     /// ----------
     /// ax : matplotlib.axes.Axes, optional
-    ///     Where to draw; a new figure without it.
+    ///     Axes to draw on. Default: a new figure.
     /// parts : bool, default True
-    ///     Draw what standing still and motion are of it.
+    ///     Draw its static and dynamic shares.
     ///
     /// Returns
     /// -------
@@ -269,7 +270,9 @@ impl PyRun {
         slf.py().import("flexarm._plot")?.call_method1("run", (slf, ax, parts))
     }
 
-    /// Opens the recording: in the notebook with ``rerun.notebook``, else in the Rerun viewer. The run needs ``output=``.
+    /// Shows the recording in the notebook (``rerun.notebook``) or in the Rerun viewer.
+    ///
+    /// The run needs ``output=``.
     fn show<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         slf.py().import("flexarm._show")?.call_method1("run", (slf,))
     }
@@ -321,7 +324,7 @@ impl Pickled for PyRun {
     }
 }
 
-/// An instant of a run, as observers see it.
+/// An instant of a run, as passed to observers.
 #[pyclass(frozen, name = "Sample", module = "flexarm")]
 pub(crate) struct PySample {
     time: f64,
@@ -380,13 +383,13 @@ impl PySample {
         vector(py, &self.velocity)
     }
 
-    /// Forces of the drives (N m or N), (joints,).
+    /// Drive forces (N m or N), (joints,).
     #[getter]
     fn effort<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         vector(py, &self.effort)
     }
 
-    /// Place of the flexible tool, world (m), (3,).
+    /// Position of the flexible TCP, world (m), (3,).
     #[getter]
     fn tcp<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         vector(py, &self.tcp)
@@ -398,7 +401,7 @@ impl PySample {
         vector(py, &self.error)
     }
 
-    /// What of it the arm would have standing still (m), (3,).
+    /// Static share of the TCP error (m), (3,).
     #[getter]
     fn error_static<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         vector(py, &self.error_static)

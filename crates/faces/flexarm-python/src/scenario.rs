@@ -1,4 +1,4 @@
-//! What happens in a run: motion, loads, payloads, start.
+//! Scenarios of a run: motion, loads, payloads, initial state.
 
 use flexarm::{AppliedLoad, Motion, PayloadChange, Scenario, Wrench};
 use pyo3::exceptions::{PyTypeError, PyValueError};
@@ -10,7 +10,7 @@ use crate::motion::{PyMotion, motion_file};
 use crate::robot::PyRobot;
 use crate::values::{as_wrench, path, start, wrench};
 
-/// What pulls at a frame, in world axes.
+/// A load on a frame, in world axes.
 ///
 /// Examples
 /// --------
@@ -19,13 +19,13 @@ use crate::values::{as_wrench, path, start, wrench};
 pub(crate) struct PyLoad {
     pub(crate) load: AppliedLoad,
     text: String,
-    /// How it is made again: function and arguments.
+    /// For pickling: function and arguments.
     again: (&'static str, Py<PyAny>),
 }
 
 #[pymethods]
 impl PyLoad {
-    /// The same wrench from start to end (s), nothing before and after.
+    /// A constant wrench from start to end (s), zero before and after.
     ///
     /// Parameters
     /// ----------
@@ -47,14 +47,14 @@ impl PyLoad {
         Ok(Self { load, text: format!("{F:?} on {frame:?} from {start} s to {end} s"), again })
     }
 
-    /// A wrench that is linear between samples, nothing before and after them.
+    /// A wrench interpolated linearly between samples, zero before and after them.
     ///
     /// Parameters
     /// ----------
     /// t : array_like, shape (n,)
     ///     Times (s), increasing.
     /// wrench : array_like, shape (n, 6)
-    ///     Force (N) and moment (N m) at each.
+    ///     Force (N) and moment (N m) at each time.
     /// frame : str, default "tcp"
     ///     ``"tcp"`` or a link.
     #[staticmethod]
@@ -80,7 +80,7 @@ impl PyLoad {
     }
 }
 
-/// What a link carries from an instant on.
+/// Payload of a link from an instant on.
 ///
 /// Examples
 /// --------
@@ -94,20 +94,20 @@ pub(crate) struct PyPayload {
 
 #[pymethods]
 impl PyPayload {
-    /// A payload is picked up.
+    /// Attaches a payload.
     ///
     /// Parameters
     /// ----------
     /// at : float
-    ///     When (s).
+    ///     Time (s).
     /// mass : float
     ///     kg.
     /// com : array_like, shape (3,)
     ///     Centre of mass in the carrying link (m).
     /// inertia : array_like, shape (3, 3), optional
-    ///     About the centre of mass, axes of the link (kg m²); a point without it.
+    ///     About the centre of mass, link axes (kg m²). Default: a point mass.
     /// link : str, optional
-    ///     The link that carries it; the one with the robot's own payload, else with the tool, without it.
+    ///     The carrying link. Default: that of the robot's own payload, else that of the tool.
     #[staticmethod]
     #[pyo3(signature = (at, mass, com, inertia=None, link=None))]
     fn attach(
@@ -136,7 +136,7 @@ impl PyPayload {
         Ok(Self { change, again: ("attach", again) })
     }
 
-    /// Whatever is carried is put down at this time (s).
+    /// Releases the carried payload at this time (s).
     #[staticmethod]
     fn release(py: Python<'_>, at: f64) -> PyResult<Self> {
         let again = (at,).into_pyobject(py)?.into_any().unbind();
@@ -154,7 +154,7 @@ impl PyPayload {
     }
 }
 
-/// Columns of a moment of inertia of nine numbers.
+/// Columns of an inertia matrix given by nine numbers.
 pub(crate) fn inertia_matrix(name: &str, I: &[f64]) -> PyResult<[[f64; 3]; 3]> {
     let size = I.iter().fold(1e-12, |size: f64, x| size.max(x.abs()));
     if (0..3).any(|i| (0..i).any(|j| (I[3 * i + j] - I[3 * j + i]).abs() > 1e-9 * size)) {
@@ -164,27 +164,27 @@ pub(crate) fn inertia_matrix(name: &str, I: &[f64]) -> PyResult<[[f64; 3]; 3]> {
     Ok([column(0), column(1), column(2)])
 }
 
-/// A motion with what happens on it; for batches of runs that differ in more than their motion.
+/// A motion with loads, payloads and start, for batches that differ in more than the motion.
 ///
 /// Parameters
 /// ----------
 /// motion : Motion or str or os.PathLike, optional
-///     Where the joints go; the robot's own motion without it.
+///     Default: the robot's own motion.
 /// loads : sequence of Load, or path of a file of loads, optional
 /// payloads : sequence of Payload, optional
 /// start : {"equilibrium", "undeformed"}, default "equilibrium"
 #[pyclass(frozen, name = "Scenario", module = "flexarm")]
 pub(crate) struct PyScenario {
-    /// Where the joints go.
+    /// Motion of the joints.
     #[pyo3(get)]
     motion: Option<Py<PyAny>>,
-    /// What pulls and pushes.
+    /// Applied loads.
     #[pyo3(get)]
     loads: Option<Py<PyAny>>,
-    /// What is picked up and put down.
+    /// Payload changes.
     #[pyo3(get)]
     payloads: Option<Py<PyAny>>,
-    /// Whether the springs carry the weight at the start.
+    /// Initial state: springs in equilibrium, or undeformed.
     #[pyo3(get)]
     start: Option<String>,
 }
@@ -219,7 +219,7 @@ impl PyScenario {
     }
 }
 
-/// The motion that is meant: one, a file, a pair of times and positions, or the robot's own.
+/// Returns the requested motion: one, a file, a pair of times and positions, or the robot's own.
 fn motion_of(robot: &Bound<'_, PyRobot>, given: Option<&Bound<'_, PyAny>>) -> PyResult<Motion> {
     let own = &robot.get().robot;
     let read = |file: &std::path::Path| Motion::load(file, own).or_raise();
@@ -244,7 +244,7 @@ fn motion_of(robot: &Bound<'_, PyRobot>, given: Option<&Bound<'_, PyAny>>) -> Py
     }
 }
 
-/// A scenario of its parts; `given` is a motion of any kind, or a Scenario that has all parts itself.
+/// Creates a scenario from its parts; `given` is a motion of any kind, or a complete Scenario.
 pub(crate) fn scenario(
     robot: &Bound<'_, PyRobot>,
     given: Option<&Bound<'_, PyAny>>,
@@ -286,7 +286,7 @@ pub(crate) fn scenario(
     Ok(made)
 }
 
-/// The elements of a sequence.
+/// Returns the elements of a sequence.
 fn each<'py>(sequence: &Bound<'py, PyAny>, argument: &str, expected: &str) -> PyResult<Vec<Bound<'py, PyAny>>> {
     let wrong = || PyTypeError::new_err(format!("{argument} is {}: expected {expected}", sequence.get_type()));
     sequence.try_iter().map_err(|_| wrong())?.collect()

@@ -1,4 +1,4 @@
-//! How the tool's error along a motion depends on the numbers of the robot.
+//! Derivatives of the TCP error along a motion with respect to the parameters of the robot.
 
 use std::path::PathBuf;
 
@@ -12,24 +12,26 @@ use crate::robot::PyRobot;
 use crate::scenario::scenario;
 use crate::values::{modelling, texts};
 
-/// Derivatives of the tool's error along a motion by every number of the robot, its tool and its motion, in one run.
+/// Derivatives of the TCP error along a motion with respect to all parameters, from one run.
+///
+/// Parameters of the robot, of its tool and of its motion are included.
 ///
 /// Parameters
 /// ----------
 /// robot : Robot
 /// motion : Motion, Scenario or path, optional
-///     The robot's own motion without it.
+///     Default: the robot's own motion.
 /// by : sequence of str, optional
-///     Names of what counts, ``*`` for anything: ``"drive.*"``, ``"motion.joint_1"``; all without it.
+///     Names of parameters, ``*`` as a wildcard: ``"drive.*"``, ``"motion.joint_1"``. Default: all.
 /// step : float, default 1e-3
 ///     Time step (s).
 /// loads : sequence of Load, or path of a file of loads, optional
 /// payloads : sequence of Payload, optional
-///     What acts on the arm besides weight.
+///     Loads on the arm in addition to gravity.
 /// links, drives : str, optional
 ///     As for :meth:`Robot.flexible`.
 /// table : path, optional
-///     A table of error and derivatives after every step (CSV).
+///     Write a table of error and derivatives at every step (CSV).
 /// overwrite : bool, default False
 ///
 /// Returns

@@ -1,4 +1,4 @@
-//! Studies of many runs by a file.
+//! Studies of many runs, defined by a file.
 
 use std::ops::ControlFlow;
 use std::path::PathBuf;
@@ -14,12 +14,13 @@ use crate::failure::OrRaise;
 use crate::values::maybe_whole;
 use crate::watch::stoppable_telling;
 
-/// Robots and motions by path or shipped name.
+/// Look-up of robots and motions by path or shipped name.
 const FINDERS: Finders = Finders { robot: flexarm_cli::shipped_robot_file, motion: flexarm_cli::shipped_motion };
 
-/// Runs a study: many runs with other payloads, stiffness, speeds or options, on all cores.
+/// Runs a study: many runs with varied payloads, stiffness, speeds or options, on all cores.
 ///
-/// What is in the folder of the same study already is not run again, so a study that was stopped goes on with the same call.
+/// Existing results of the same study in the folder are not run again, so repeating the call
+/// continues a stopped study.
 ///
 /// Parameters
 /// ----------
@@ -28,11 +29,11 @@ const FINDERS: Finders = Finders { robot: flexarm_cli::shipped_robot_file, motio
 /// output : path
 ///     Folder of the results: ``runs.parquet``, a page, the best run.
 /// threads : int, optional
-///     As many as there are cores without it.
+///     Default: the number of cores.
 /// overwrite : bool, default False
 ///     Replace results of another study.
 /// progress : callable or bool, optional
-///     Called with the runs that are over and all of them; True shows a bar.
+///     Called with the numbers of finished and of all runs; True shows a bar.
 ///
 /// Returns
 /// -------
@@ -51,7 +52,7 @@ pub(crate) fn sweep<'py>(
     let mut sweep = Sweep::load(&study, &FINDERS).or_raise()?;
     let request = SweepRequest { output, overwrite, shard: Shard::ALL, threads, command: None };
     let bar = progress_function(py, progress)?;
-    // How far it is, told by the thread that may call Python.
+    // Progress, reported by the thread that may call Python.
     let at: Arc<Mutex<Option<(usize, usize)>>> = Arc::default();
     let seen = at.clone();
     let work = move |stop: &(dyn Fn() -> bool + Sync)| {

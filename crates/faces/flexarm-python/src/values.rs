@@ -1,4 +1,4 @@
-//! Words and plain values on their way in and out.
+//! Conversion of words and plain values.
 
 use std::path::PathBuf;
 
@@ -12,10 +12,10 @@ use pyo3::types::PyDict;
 
 use crate::arrays::numbers;
 
-/// One of several words.
+/// Returns the value of one of several words.
 ///
 /// # Errors
-/// `ValueError` with the argument, what was found, what is near, and all there are.
+/// `ValueError` with the argument, the word, a similar word, and all allowed ones.
 pub(crate) fn word<T: Copy>(argument: &str, found: &str, words: &[(&str, T)]) -> PyResult<T> {
     if let Some((_, value)) = words.iter().find(|(word, _)| *word == found) {
         return Ok(*value);
@@ -26,7 +26,7 @@ pub(crate) fn word<T: Copy>(argument: &str, found: &str, words: &[(&str, T)]) ->
     Err(PyValueError::new_err(format!("{argument}={found:?}: expected one of {known}{meant}")))
 }
 
-/// How links and drives are modelled.
+/// Returns the modelling of links and drives.
 pub(crate) fn modelling(
     links: Option<&str>,
     drives: Option<&str>,
@@ -40,7 +40,7 @@ pub(crate) fn modelling(
     Ok(Modelling { links, drives, segments, modes })
 }
 
-/// A stepper by its word, with its own options by theirs.
+/// Returns a stepper by its name, with its options by theirs.
 pub(crate) fn stepper(name: Option<&str>, options: Option<&Bound<'_, PyDict>>) -> PyResult<StepperKind> {
     let mut known: Vec<(&str, usize)> = Vec::new();
     for (k, entry) in STEPPERS.iter().enumerate() {
@@ -67,7 +67,7 @@ pub(crate) fn stepper(name: Option<&str>, options: Option<&Bound<'_, PyDict>>) -
     Ok((entry.with)(&chosen))
 }
 
-/// One option of a stepper.
+/// Sets one option of a stepper.
 fn set(chosen: &mut StepperOptions, key: &str, value: &Bound<'_, PyAny>) -> PyResult<()> {
     let text = || value.extract::<String>();
     match key {
@@ -101,13 +101,13 @@ fn set(chosen: &mut StepperOptions, key: &str, value: &Bound<'_, PyAny>) -> PyRe
     Ok(())
 }
 
-/// How a run starts.
+/// Returns the initial state of a run.
 pub(crate) fn start(found: Option<&str>) -> PyResult<Start> {
     let known = [("equilibrium", Start::Equilibrium), ("undeformed", Start::Undeformed)];
     found.map_or(Ok(Start::Equilibrium), |found| word("start", found, &known))
 }
 
-/// Force and moment: six numbers, or three for a force alone; zero without it.
+/// Reads force and moment: six numbers, or three for a force. Default: zero.
 pub(crate) fn wrench(value: Option<&Bound<'_, PyAny>>) -> PyResult<[f64; 6]> {
     let Some(value) = value else { return Ok([0.0; 6]) };
     let is_force = value.len().is_ok_and(|n| n == 3);
@@ -119,12 +119,12 @@ pub(crate) fn wrench(value: Option<&Bound<'_, PyAny>>) -> PyResult<[f64; 6]> {
     Ok(wrench)
 }
 
-/// The same as the library takes it.
+/// Converts six numbers to a wrench.
 pub(crate) fn as_wrench([x, y, z, rx, ry, rz]: [f64; 6]) -> Wrench {
     Wrench::new([x, y, z].into(), [rx, ry, rz].into())
 }
 
-/// A path: a text or an object with `__fspath__`.
+/// Reads a path: a string or an object with `__fspath__`.
 pub(crate) fn path(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<PathBuf> {
     value.extract::<PathBuf>().map_err(|_| {
         let found = value.get_type();
@@ -132,10 +132,10 @@ pub(crate) fn path(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<PathBuf
     })
 }
 
-/// Several texts, or one; for arguments.
+/// Reads one or several strings, for arguments.
 ///
 /// # Errors
-/// `TypeError` with what was found.
+/// `TypeError` with the value found.
 pub(crate) fn texts(value: &Bound<'_, PyAny>) -> PyResult<Option<Vec<String>>> {
     if value.is_none() {
         return Ok(None);
@@ -147,10 +147,10 @@ pub(crate) fn texts(value: &Bound<'_, PyAny>) -> PyResult<Option<Vec<String>>> {
     value.try_iter().and_then(|each| each.map(|one| one?.extract()).collect()).map(Some).map_err(wrong)
 }
 
-/// A number of things; for arguments.
+/// Reads a count, for arguments.
 ///
 /// # Errors
-/// `ValueError` for what is negative, `TypeError` for what is no whole number.
+/// `ValueError` if it is negative, `TypeError` if it is not a whole number.
 pub(crate) fn whole(value: &Bound<'_, PyAny>) -> PyResult<usize> {
     let negative = value.lt(0).unwrap_or(false);
     value.extract::<usize>().map_err(|_| {
@@ -159,20 +159,20 @@ pub(crate) fn whole(value: &Bound<'_, PyAny>) -> PyResult<usize> {
     })
 }
 
-/// A number of things, or None; for arguments.
+/// Reads a count or None, for arguments.
 ///
 /// # Errors
-/// As [`whole`].
+/// Those of [`whole`].
 pub(crate) fn maybe_whole(value: &Bound<'_, PyAny>) -> PyResult<Option<usize>> {
     if value.is_none() { Ok(None) } else { whole(value).map(Some) }
 }
 
-/// How a value is told in messages.
+/// Formats a value for messages.
 fn found(value: &Bound<'_, PyAny>) -> String {
     value.repr().map_or_else(|_| value.get_type().to_string(), |text| text.to_string())
 }
 
-/// Plain values as dicts, lists and numbers, in the order and with the keys of `--json`.
+/// Converts to dicts, lists and numbers, in the order and with the keys of `--json`.
 pub(crate) fn plain<'py>(py: Python<'py>, value: &impl serde::Serialize) -> PyResult<Bound<'py, PyAny>> {
     let text = serde_json::to_string(value).map_err(|error| PyValueError::new_err(error.to_string()))?;
     py.import("json")?.call_method1("loads", (text,))

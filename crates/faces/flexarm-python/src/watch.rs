@@ -1,4 +1,4 @@
-//! Long calls: the interpreter's lock is given back, Ctrl-C ends them, progress is told.
+//! Long calls: they release the GIL, Ctrl-C stops them, and they report progress.
 
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -9,19 +9,19 @@ use std::time::{Duration, Instant};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 
-/// Between two looks at signals.
+/// Interval of signal checks.
 const LOOK_EVERY: Duration = Duration::from_millis(25);
-/// How long work that was asked to stop is waited for.
+/// Time to wait for work that was asked to stop.
 const PATIENCE: Duration = Duration::from_millis(100);
-/// Between two calls of a progress function.
+/// Interval of calls of a progress function.
 const TELL_EVERY: Duration = Duration::from_millis(50);
 
-/// Looks at signals and tells progress from within a run on the thread that called it.
+/// Checks signals and reports progress from within a run, on the calling thread.
 pub(crate) struct Watch {
     progress: Option<Py<PyAny>>,
     looked: Instant,
     told: Instant,
-    /// Why it broke off.
+    /// Exception that stopped the run.
     pub(crate) raised: Option<PyErr>,
 }
 
@@ -31,7 +31,7 @@ impl Watch {
         Self { progress, looked: now, told: now, raised: None }
     }
 
-    /// Whether to go on at `done` of `total`.
+    /// Checks signals and reports `done` of `total`; breaks if the run must stop.
     pub(crate) fn look(&mut self, done: f64, total: f64) -> ControlFlow<()> {
         let looks = self.looked.elapsed() >= LOOK_EVERY;
         let tells = self.progress.is_some() && self.told.elapsed() >= TELL_EVERY;
@@ -52,7 +52,7 @@ impl Watch {
         self.keep(result)
     }
 
-    /// Goes on unless an exception was raised.
+    /// Continues unless an exception was raised.
     pub(crate) fn keep(&mut self, result: PyResult<()>) -> ControlFlow<()> {
         match result {
             Ok(()) => ControlFlow::Continue(()),
@@ -63,7 +63,7 @@ impl Watch {
         }
     }
 
-    /// Tells the end.
+    /// Reports the end.
     pub(crate) fn done(&mut self, total: f64) -> PyResult<()> {
         match self.progress.take() {
             Some(progress) => Python::attach(|py| progress.call1(py, (total, total)).map(drop)),
@@ -72,12 +72,13 @@ impl Watch {
     }
 }
 
-/// Work on a thread of its own that looks at a flag; meanwhile this thread looks at signals.
+/// Runs work on a separate thread that polls a flag; meanwhile this thread checks signals.
 ///
-/// After a signal the work has a moment to end; then nobody waits for it any more: what it finds is lost, and it writes no files.
+/// After a signal the work has [`PATIENCE`] to end. Then it is abandoned: its result is lost, and
+/// it writes no files.
 ///
 /// # Errors
-/// What a signal raised.
+/// An exception raised by a signal handler.
 pub(crate) fn stoppable<T: Send + 'static>(
     py: Python<'_>,
     work: impl FnOnce(&(dyn Fn() -> bool + Sync)) -> T + Send + 'static,
@@ -85,10 +86,10 @@ pub(crate) fn stoppable<T: Send + 'static>(
     stoppable_telling(py, work, &mut |_| Ok(()))
 }
 
-/// As [`stoppable`]; `tell` is called now and then on this thread, and once at the end.
+/// Like [`stoppable`]; also calls `tell` repeatedly on this thread, and once at the end.
 ///
 /// # Errors
-/// What a signal or `tell` raised.
+/// An exception raised by a signal handler or by `tell`.
 pub(crate) fn stoppable_telling<T: Send + 'static>(
     py: Python<'_>,
     work: impl FnOnce(&(dyn Fn() -> bool + Sync)) -> T + Send + 'static,
@@ -100,7 +101,7 @@ pub(crate) fn stoppable_telling<T: Send + 'static>(
     let worker = std::thread::spawn(move || {
         let work = || work(&|| asked.load(Ordering::Relaxed));
         let found = flexarm::writing_unless(move || unwanted.load(Ordering::Relaxed), work);
-        let _ = sender.send(found); // nobody may be waiting
+        let _ = sender.send(found); // the receiver may be gone
     });
     let receiver = Mutex::new(receiver);
     let receive = |wait| receiver.lock().unwrap_or_else(PoisonError::into_inner).recv_timeout(wait);

@@ -1,4 +1,4 @@
-"""What the tests share. They run on the installed package, never on the sources beside them."""
+"""Helpers of the tests. They run on the installed package, never on the sources next to them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The dictionaries that answers are have the keys and the types that the package declares, no more and no fewer."""
+"""Result dictionaries have exactly the keys and types that the package declares."""
 
 import types as builtin
 import typing
@@ -14,7 +14,7 @@ from flexarm import types
 
 
 def check(value: Any, kind: Any, where: str) -> None:
-    """The value is of the declared type, all the way down."""
+    """Check recursively that the value has the declared type."""
     origin, arguments = typing.get_origin(kind), typing.get_args(kind)
     if kind is Any:
         return
@@ -52,7 +52,7 @@ def check(value: Any, kind: Any, where: str) -> None:
 
 
 def without_twin(arm: flexarm.Arm) -> "dict[str, Any]":
-    """Figures that have no error, with the error of another run."""
+    """Figures of a run without error, completed with the error of another run."""
     found, other = (arm.simulate("point_to_point", step=2e-3, twin=twin).summary for twin in [False, True])
     assert "tcp" not in found
     return {**found, "tcp": other["tcp"]}

@@ -1,4 +1,4 @@
-"""Arrays of parameters in one call: each run has the bits of the same run alone, made the long way."""
+"""Arrays of parameters in one call: each run is bitwise equal to the same run on its own."""
 
 import re
 import time
@@ -15,7 +15,7 @@ def reference() -> flexarm.Arm:
 
 
 def parameters(m: int) -> "dict[str, np.ndarray]":
-    """What crates/faces/flexarm/examples/many_runs.rs varies, and inertias besides."""
+    """Parameters varied in crates/faces/flexarm/examples/many_runs.rs, and inertias."""
     part = np.arange(m) / m
     com = np.zeros((m, 3))
     com[:, 2] = 0.05 + 0.01 * part

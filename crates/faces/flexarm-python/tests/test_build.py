@@ -1,4 +1,4 @@
-"""Robots of values: the closed forms of a pendulum and a cantilever, and the same robot as from files."""
+"""Robots from values: closed forms of a pendulum and a cantilever, and equality with files."""
 
 import json
 import pickle
@@ -16,7 +16,7 @@ STEEL = {"E": 210e9, "nu": 0.3, "rho": 7850.0}
 
 
 def cantilever(model: str = "modal") -> flexarm.RobotBuilder:
-    """A steel rod of 1 m along x that weighs next to nothing, on a hinge about z that is held; 2 kg at its end."""
+    """A nearly massless steel rod of 1 m along x on a held hinge about z; 2 kg at its end."""
     builder = flexarm.RobotBuilder(name="cantilever").link("base").link("rod", 1e-6).link("tool0")
     builder.joint("hinge", "base", "rod", axis=[0, 0, 1], lower=-1.0, upper=1.0)
     builder.joint("tip", "rod", "tool0", "fixed", xyz=[1.0, 0.0, 0.0])
@@ -44,7 +44,7 @@ def test_a_pendulum_of_values_weighs_what_it_should() -> None:
 
 
 def test_the_calls_write_the_keys_of_a_file() -> None:
-    """The shipped arm by calls is the shipped arm by its file, to the last bit."""
+    """The shipped arm built by calls equals the one from its file, to the last bit."""
     folder = SHARE / "robots/kr210"
     keys = tomllib.loads((folder / "robot.toml").read_text())
     builder = flexarm.RobotBuilder(folder / "kr210.urdf", name="kr210")

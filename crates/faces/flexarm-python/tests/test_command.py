@@ -1,4 +1,4 @@
-"""The command line in the wheel, in an empty folder."""
+"""The command line of the wheel, in an empty folder."""
 
 import json
 import os

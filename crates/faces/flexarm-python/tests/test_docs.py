@@ -1,4 +1,4 @@
-"""Docstrings are run, and everything that can be held has one."""
+"""The examples in docstrings run, and everything public has a docstring."""
 
 import doctest
 import inspect

@@ -1,4 +1,4 @@
-"""Arms that are commanded while they move."""
+"""Arms that are commanded online."""
 
 import numpy as np
 import pytest
@@ -7,12 +7,12 @@ from conftest import WORKING_POSE
 import flexarm
 
 
-#: Within the limits of all robots here (rad).
+#: Within the limits of all robots in these tests (rad).
 POSE = [0.0, -0.9, 0.9, 0.0, 0.4, 0.0]
 
 
 def error_along(arm: flexarm.Arm, motion: flexarm.Motion, period: float) -> np.ndarray:
-    """TCP error of an arm that is given the motion as targets."""
+    """TCP error of an arm that gets the motion as targets."""
     steps = round(motion.duration / period)
     q, v, _ = motion.sample(period * np.arange(steps + 1))
     live = arm.live(q[0], period=period, step=1e-3)
@@ -47,7 +47,7 @@ def test_a_push_moves_the_tool_by_the_compliance(arm: flexarm.Arm) -> None:
     live = arm.live(WORKING_POSE)
     force = np.array([0.0, 0.0, -100.0, 0.0, 0.0, 0.0])
     begin = live.tcp_pose[:3, 3]
-    for _ in range(8000):  # until the ringing has gone
+    for _ in range(8000):  # until the ringing has decayed
         live.step(WORKING_POSE, wrench=force)
     moved = live.tcp_pose[:3, 3] - begin
     expected = (arm.statics(WORKING_POSE).compliance @ force)[:3]
@@ -63,7 +63,7 @@ def test_servos_follow_a_ramp_and_settle() -> None:
     for _ in range(100):
         target = target + [2e-4, 0, 0, 0, 0, 0]
         live.step(target)
-    assert abs(target[0] - live.position[0]) < 2e-3  # of a ramp that has begun with a jerk
+    assert abs(target[0] - live.position[0]) < 2e-3  # for a ramp that starts with a jerk
     assert live.position[0] != target[0]
     for _ in range(2000):
         live.step(target)

@@ -1,4 +1,4 @@
-"""What the command line says besides its answer goes through ``logging``; nothing is printed unasked."""
+"""Messages other than results go through ``logging``; nothing is printed unless requested."""
 
 import logging
 import re
@@ -38,7 +38,7 @@ def test_notes_are_logged_and_warnings_warned_as_the_command_line_says(arm: flex
     notes = [c for c in run.caveats if c.severity == "note"]
     logged = [record for record in caplog.records if record.levelname == "INFO"]
     assert [record.caveat.message for record in logged] == [c.message for c in notes]
-    # Warnings of one kind are one, with the number of the others.
+    # Warnings of one kind are merged into one, with the number of the others.
     more = [re.search(r" \(and (\d+) more of this kind: .*\)$", str(w.message)) for w in caught]
     firsts = [str(w.message)[: m.start()] if m else str(w.message) for w, m in zip(caught, more)]
     assert set(firsts) <= set(run.summary["warnings"])
@@ -54,7 +54,7 @@ def test_nothing_is_printed_unless_somebody_asks(tmp_path: Path) -> None:
     run[-1] = "import logging; logging.basicConfig(level=logging.INFO); " + run[-1].replace("'mine'", "'ours'").replace("'out'", "'more'")
     loud = subprocess.run(run, cwd=tmp_path, capture_output=True, text=True, check=True)
     assert "INFO:flexarm:wrote " in loud.stderr
-    # Findings of a new robot are those that the command line warns of.
+    # Findings of a new robot equal the warnings of the command line.
     theirs = command("new", urdf, "-o", "theirs", "--no-run", cwd=tmp_path).stderr
     ours = [line.split(":flexarm:", 1)[1] for line in loud.stderr.splitlines() if line.startswith("WARNING:")]
     assert ours == [line.removeprefix("warning: ") for line in theirs.splitlines() if line.startswith("warning: ")]

@@ -22,7 +22,7 @@ tomllib = pytest.importorskip("tomllib")
 
 
 def interrupted(code: str, cwd: Path, after: float = 1.0, patience: float = 60.0) -> "tuple[float, str]":
-    """Send Ctrl-C `after` seconds since the script says "go"; seconds until it has KeyboardInterrupt, and what it said."""
+    """Send Ctrl-C `after` seconds after "go"; return seconds to KeyboardInterrupt, and output."""
     script = "import flexarm, numpy as np, time, sys\n" + textwrap.dedent(code)
     child = subprocess.Popen([sys.executable, "-u", "-c", script], cwd=cwd, stdout=subprocess.PIPE, text=True)
     assert child.stdout is not None
@@ -65,8 +65,7 @@ def test_ctrl_c_ends_long_calls_at_once(prepare: str, call: str, tmp_path: Path)
     assert not list(tmp_path.rglob("*")), "what was broken off leaves no files"
 
 
-#: Work that is not looked into: nobody waits for it any more, and it writes nothing when it is
-#: done.
+#: Work that is not polled: it is abandoned, and writes nothing when it completes.
 BEHIND = """
 try:
     print("go", flush=True)
@@ -164,7 +163,7 @@ def test_threads_share_an_arm(arm: flexarm.Arm) -> None:
 
 
 def test_threads_share_everything_that_can_be_held(arm: flexarm.Arm) -> None:
-    """Eight threads ask robot, arm, model, motion and one workspace at once; each answer is the one of a single thread."""
+    """Eight threads use all objects at once; each result equals that of a single thread."""
     robot, model, motion, run = arm.robot, arm.model, arm.robot.motion("point_to_point"), arm.simulate(step=4e-3)
     rng = np.random.default_rng(5)
     poses = np.array(WORKING_POSE) + 0.1 * rng.standard_normal((24, 6))
@@ -261,7 +260,7 @@ def test_caveats_are_warnings_of_their_own_class(kr210: flexarm.Robot) -> None:
     assert caught[0].filename == __file__
     told = [caveat for caveat in run.caveats if caveat.severity == "warning"]
     assert told and all(caveat.message and caveat.code for caveat in told)
-    # Warnings of one kind are one, with the number of the others.
+    # Warnings of one kind are merged into one, with the number of the others.
     messages = [caveat.message for caveat in told]
     firsts = [str(warning.message).split(" (and ")[0] for warning in caught]
     assert set(firsts) <= set(messages) and len(caught) < len(messages)

@@ -1,4 +1,5 @@
-"""A new user in a notebook: the first ten lines in an empty folder, completion, help, tracebacks."""
+"""A new user in a notebook: the first ten lines in an empty folder, completion, help,
+tracebacks."""
 
 import re
 from pathlib import Path
@@ -25,7 +26,7 @@ class Notebook:
         self.kernel, self.client = manager.start_new_kernel(kernel_name="python3", cwd=str(folder))
 
     def run(self, code: str) -> str:
-        """What a cell shows."""
+        """Return the output of a cell."""
         shown: "list[str]" = []
 
         def look(message: "dict[str, Any]") -> None:

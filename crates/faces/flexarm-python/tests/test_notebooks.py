@@ -20,7 +20,7 @@ def test_there_are_notebooks() -> None:
 
 @pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda path: path.stem)
 def test_a_notebook_runs_and_draws(notebook: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    # The kernel draws into the notebook unless told otherwise.
+    # The kernel plots into the notebook by default.
     monkeypatch.delenv("MPLBACKEND", raising=False)
     book = nbformat.read(notebook, as_version=4)
     assert all(not cell.get("outputs") for cell in book.cells), "stored without outputs: they are made anew here"

@@ -1,4 +1,4 @@
-"""Links, identification, compensation, maps and new robots: the figures of the command line."""
+"""Links, identification, compensation, maps and new robots: same figures as the command line."""
 
 import json
 import pickle
@@ -29,7 +29,7 @@ def without_clock(figures: dict) -> dict:
 
 
 def test_a_mesh_is_reduced_to_the_link_of_the_command_line(tmp_path: Path) -> None:
-    # The keys of the job as a dict, with paths from here.
+    # The keys of the job as a dict, with paths relative to this folder.
     job = tomllib.loads(JOB.read_text())
     job["mesh"] = str(JOB.parent / job["mesh"])
     job["modes"] = 2
@@ -93,8 +93,7 @@ def test_a_plan_of_measurements_is_that_of_the_command_line(kr210: flexarm.Robot
 
 
 def test_measurements_of_an_arm_give_its_stiffness_back(arm: flexarm.Arm, tmp_path: Path) -> None:
-    # A robot file whose second gearbox is 1.4 times too stiff, and displacements of the arm as it
-    # is.
+    # A robot file whose second gearbox is 1.4 times too stiff, and displacements of the actual arm.
     shutil.copytree(SHARE / "robots/kr210", tmp_path / "kr210")
     file = tmp_path / "kr210/robot.toml"
     robot = tomllib.loads(file.read_text())
@@ -128,7 +127,7 @@ def test_measurements_of_an_arm_give_its_stiffness_back(arm: flexarm.Arm, tmp_pa
 
 
 def test_an_entry_of_a_links_matrix_and_the_tool_are_found_and_differentiated(arm: flexarm.Arm, tmp_path: Path) -> None:
-    # The tool of the file is 3 mm off along its own x.
+    # The tool of the file is wrong by 3 mm along its own x.
     shutil.copytree(SHARE / "robots/kr210", tmp_path / "kr210")
     file = tmp_path / "kr210/robot.toml"
     text = file.read_text()
@@ -161,7 +160,7 @@ def test_a_map_is_that_of_the_command_line_and_of_statics(kr210: flexarm.Robot, 
     assert without_clock(ours.to_dict()) == without_clock(theirs)
     table = ours.table
     assert set(table) == set(ours.meanings) and len(table[next(iter(table))]) == len(ours) == 12
-    # Frequencies of a map are those under weight, to the last bit.
+    # Frequencies of a map equal those under gravity, to the last bit.
     assert arm.statics(ours.worst["q"]).frequencies[0] == ours.worst["quantities"]["frequency_1_hz"]
 
 

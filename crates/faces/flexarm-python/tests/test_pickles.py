@@ -1,4 +1,4 @@
-"""Results go to other processes and to disk, and are there what they were here."""
+"""Results survive transfer to other processes and to disk unchanged."""
 
 import pickle
 from concurrent.futures import ProcessPoolExecutor
@@ -41,7 +41,7 @@ NAMES = [
 
 
 def same(a: Any, b: Any, where: str) -> None:
-    """Equal to the last bit, attribute by attribute."""
+    """Check equality to the last bit, attribute by attribute."""
     assert type(a) is type(b), where
     if isinstance(a, np.ndarray):
         assert a.shape == b.shape and a.dtype == b.dtype and a.tobytes() == b.tobytes(), where

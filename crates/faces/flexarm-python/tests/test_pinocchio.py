@@ -1,4 +1,4 @@
-"""The recursions against Pinocchio, which reads the same URDFs."""
+"""Rigid-body algorithms compared with Pinocchio, which reads the same URDFs."""
 
 import time
 from pathlib import Path
@@ -11,7 +11,7 @@ import flexarm
 
 pin = pytest.importorskip("pinocchio")
 
-#: Robots without payload, loops and balancers in their URDF, so that both read the same.
+#: Robots without payload, loops and balancers in their URDF, so that both read the same model.
 URDFS = ["kr210/kr210.urdf", "manutec_r3", "reference_arm", "three_beams", "kr300"]
 
 
@@ -56,7 +56,7 @@ def test_recursions_agree_with_pinocchio(both) -> None:
         close(gravity[k], pin.computeGeneralizedGravity(other, data, q[k]))
         expected = np.triu(pin.crba(other, data, q[k]))
         close(M[k], expected + np.triu(expected, 1).T)
-        # Of a single joint Pinocchio's is flat.
+        # Pinocchio's array for a single joint is one-dimensional.
         close(J[k], pin.computeFrameJacobian(other, data, q[k], frame, pin.LOCAL_WORLD_ALIGNED).reshape(6, n))
         close(X[k], data.oMf[frame].homogeneous)
 
@@ -67,7 +67,7 @@ def test_forward_dynamics_agree_with_pinocchio_and_undo_the_inverse(both) -> Non
     a = model.aba(q, v, 10 * tau)
     for k in range(len(q)):
         expected = pin.aba(other, data, q[k], v[k], 10 * tau[k])
-        # Small inertias: both are as exact as the condition of the mass matrix lets them be.
+        # Small inertias: both are as accurate as the condition of the mass matrix permits.
         condition = np.linalg.cond(model.crba(q[k]))
         assert np.abs(a[k] - expected).max() <= 1e-15 * condition * max(1.0, np.abs(expected).max()) + 1e-12 * np.abs(expected).max()
     scale = np.abs(10 * tau).max()

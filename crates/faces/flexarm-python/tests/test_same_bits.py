@@ -10,7 +10,7 @@ from conftest import ROBOTS, WORKING_POSE, command
 
 import flexarm
 
-#: What depends on the clock, and where files are.
+#: Entries that depend on computation time, and file locations.
 CLOCK = ["wall_s", "cpu_s", "real_time_factor", "cpu_s_per_simulated_s", "files"]
 
 

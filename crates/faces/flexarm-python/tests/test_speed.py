@@ -1,4 +1,4 @@
-"""What calls cost. Bounds are wide: machines that test are busy; the figures are printed."""
+"""Cost of calls. Bounds are wide, since test machines are busy; the figures are printed."""
 
 import subprocess
 import sys
@@ -25,7 +25,7 @@ def test_a_call_costs_microseconds(arm: flexarm.Arm, capsys: pytest.CaptureFixtu
     model, q = arm.robot.model, np.array(WORKING_POSE)
     many = np.tile(q, (60, 1))
     one, sixty = best(lambda: model.gravity(q), 3000), best(lambda: model.gravity(many), 300)
-    # What is left at no rows.
+    # Extrapolated to zero rows.
     overhead = one - (sixty - one) / 59
     with capsys.disabled():
         print(f"\ncall overhead {1e6 * overhead:.2f} us (gravity: {1e6 * one:.2f} us a call)", end="")

@@ -1,4 +1,4 @@
-"""Columns where people are."""
+"""Conversion of columns to pandas, polars and pyarrow."""
 
 import numpy as np
 import pytest

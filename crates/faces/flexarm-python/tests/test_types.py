@@ -1,4 +1,4 @@
-"""The stubs are those of the module, and the examples are clean under strict checkers."""
+"""The stubs match the module, and the examples pass strict type checkers."""
 
 import os
 import subprocess

@@ -1,4 +1,4 @@
-"""What is wrong is said: which argument, what was found, what is expected."""
+"""Errors name the argument, what was found, and what is expected."""
 
 from pathlib import Path
 

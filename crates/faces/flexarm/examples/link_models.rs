@@ -3,9 +3,9 @@
 //! ```text
 //! cargo run --release -p flexarm --no-default-features --example link_models [ROBOT [TRAJECTORY]]
 //! ```
-//! Truth is the modal link with 20 fixed-interface modes and stiffness by load, integrated by the
-//! reference stepper. Cost is processor time of the steps alone, the least of five runs;
-//! differences of single runs are noise.
+//! The truth is the modal link with 20 fixed-interface modes and load-dependent stiffness,
+//! integrated by the reference stepper. Cost is the CPU time of the steps only, the minimum of five
+//! runs; differences between single runs are noise.
 #![allow(clippy::print_stdout, clippy::unwrap_used, non_snake_case, reason = "a program for people; monogram notation")]
 
 use std::path::PathBuf;
@@ -16,7 +16,7 @@ use nalgebra::Vector3;
 
 const STEP: f64 = 1e-3;
 
-/// TCP positions every millisecond, cost (CPU seconds per simulated second).
+/// Computes TCP positions every millisecond, and the cost (CPU seconds per simulated second).
 fn run(arm: &FlexibleArm, kind: StepperKind, duration: f64) -> (Vec<Vector3<f64>>, f64) {
     let tcp = arm.model.frame(TCP_FRAME).unwrap().clone();
     let steps = (duration / STEP).round() as usize;

@@ -1,4 +1,4 @@
-//! A study of many runs of one arm, all cores: payload, stiffness, damping and speed vary.
+//! A study of many runs of one arm on all cores: payload, stiffness, damping and speed vary.
 //!
 //! ```text
 //! cargo run --release -p flexarm --no-default-features --example many_runs [RUNS]

@@ -1,26 +1,27 @@
 //! Compliance and first frequency of the shipped arm at 10,000 poses on all cores:
 //! `cargo run --release -p flexarm --no-default-features --example operating_points [POSES [ROBOT]]`
 //!
-//! Twice: one pose after another in a workspace for each thread, which allocates nothing after its
-//! first pose, and all in one call, which takes four poses side by side. Both find the same bits.
+//! Two variants: one pose after another in a workspace per thread, which does not allocate after
+//! its first pose, and all poses in one call, which processes four poses at a time. Both give
+//! bitwise equal results.
 #![allow(clippy::print_stdout, reason = "an example shows its answer")]
 
 use std::time::Instant;
 
 use flexarm::{Arm, Modelling, Robot, Wrench};
 
-/// Pose `k` of a sequence that fills the joint ranges evenly, whatever its length (Kronecker, by
-/// roots of primes).
+/// Pose `k` of a low-discrepancy sequence that fills the joint ranges evenly for any length
+/// (Kronecker, with square roots of primes).
 fn pose(k: usize, ranges: &[(f64, f64)], q: &mut Vec<f64>) {
     const PRIMES: [f64; 6] = [2.0, 3.0, 5.0, 7.0, 11.0, 13.0];
     q.extend(ranges.iter().zip(PRIMES).map(|((lower, upper), prime)| {
-        // the middle three fifths: an arm does not work at its stops
+        // the middle three fifths: an arm does not work at its limits
         lower + (upper - lower) * (0.2 + 0.6 * (prime.sqrt() * k as f64).fract())
     }));
 }
 
-/// Vertical compliance of the tool (m/N) and first frequency (Hz) at each pose, one after another
-/// on each thread.
+/// Vertical compliance of the TCP (m/N) and first frequency (Hz) at each pose, sequentially on each
+/// thread.
 fn one_by_one(arm: &Arm, poses: &[f64], joints: usize, threads: usize) -> Result<Vec<[f64; 2]>, String> {
     let share = (poses.len() / joints).div_ceil(threads) * joints;
     let parts: Vec<Result<Vec<[f64; 2]>, String>> = std::thread::scope(|scope| {

@@ -1,13 +1,13 @@
-//! What a run of an arm that is built costs, set-up and steps apart:
+//! Cost of a run of a prepared arm, separately for set-up and steps:
 //! `cargo run --release -p flexarm --no-default-features --example prepared_runs`
 //!
-//! CPU time of one thread, the smallest of nine runs. Set-up is what a run of one step at rest
-//! takes.
+//! CPU time of one thread, the minimum of nine runs. Set-up is the time of a run of one step at
+//! rest.
 //!
-//! With arguments `STEPPER:STEP ...` (the step in s; of `reference` the relative tolerance) a line
-//! for each with the CPU ms per simulated second of the reference arm: of a run with a sample at
-//! its start and its end, and of one with 100 samples a second beside the rigid twin. That is what
-//! `tools/peers.py` puts beside other programs.
+//! With arguments `STEPPER:STEP ...` (step size in s; for `reference` the relative tolerance),
+//! prints a line for each with the CPU ms per simulated second of the reference arm: for a run with
+//! samples only at its start and end, and for one with 100 samples per second and the rigid twin.
+//! `tools/peers.py` compares these with other programs.
 #![allow(clippy::print_stdout, reason = "an example shows its answer")]
 
 use std::path::Path;
@@ -19,7 +19,7 @@ use flexarm::{
 
 const TIMES: usize = 9;
 
-/// CPU time of a run (s), the smallest of some.
+/// CPU time of a run (s), the minimum of several.
 fn cost(mut run: impl FnMut() -> Result<(), Error>) -> Result<f64, Error> {
     let mut least = f64::INFINITY;
     for _ in 0..TIMES {
@@ -38,7 +38,7 @@ fn columns(arm: &Arm, motion: &Motion, options: &RunOptions) -> Result<f64, Erro
     cost(|| arm.simulate(motion, options).map(drop))
 }
 
-/// The options that `STEPPER:STEP` means.
+/// Parses the options of `STEPPER:STEP`.
 fn told(line: &str) -> Option<RunOptions> {
     let (name, step) = line.split_once(':')?;
     let (entry, step) = (STEPPERS.iter().find(|entry| entry.name == name)?, step.parse().ok()?);
@@ -52,7 +52,7 @@ fn told(line: &str) -> Option<RunOptions> {
     })
 }
 
-/// A line with CPU ms per simulated second for each argument.
+/// Prints a line with CPU ms per simulated second for each argument.
 fn lines(root: &Path, wanted: &[String]) -> Result<(), Error> {
     let robot = Robot::load(root.join("robots/reference_arm"))?;
     let motion = Motion::load(root.join("trajectories/reference_arm.toml"), &robot)?;
@@ -74,7 +74,7 @@ fn lines(root: &Path, wanted: &[String]) -> Result<(), Error> {
     Ok(())
 }
 
-/// The first place of a motion, for the time of a step.
+/// Returns a motion that rests at the first position, with the duration of one step.
 fn at_rest(motion: &Motion, robot: &Robot) -> Result<Motion, Error> {
     let joints = motion.trajectory.joints().len();
     let (mut q, mut rates) = (vec![0.0; joints], vec![0.0; 2 * joints]);

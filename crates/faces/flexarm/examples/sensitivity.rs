@@ -1,5 +1,5 @@
-//! Which number of the robot is worth most? Derivatives of the tool's error along a motion by all
-//! of them, in one run:
+//! Finds the parameters with the strongest effect: derivatives of the TCP error along a motion with
+//! respect to all parameters of the robot, from one run:
 //! `cargo run --release -p flexarm --no-default-features --example sensitivity`
 #![allow(clippy::print_stdout, reason = "an example shows its answer")]
 

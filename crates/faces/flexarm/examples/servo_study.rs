@@ -1,9 +1,9 @@
-//! Which gain of the position loops lets the tool come to rest soonest? One robot, one motion, a
+//! Finds the gain of the position loops with the shortest settling time. One robot, one motion, one
 //! run per gain on all cores:
 //! `cargo run --release -p flexarm --no-default-features --example servo_study`
 //!
-//! All joints are driven by torque, their gears give way. A slow loop follows late; a quick one
-//! shakes the arm.
+//! All joints are driven by torque through elastic gears. A slow loop lags; a fast one excites the
+//! arm.
 #![allow(clippy::print_stdout, reason = "an example shows its answer")]
 
 use flexarm::{DriveModel, Error, Modelling, Motion, Robot, RunOptions, TcpFigures};
@@ -11,7 +11,7 @@ use flexarm::{DriveModel, Error, Modelling, Motion, Robot, RunOptions, TcpFigure
 /// Gains of the position loops (1/s).
 const GAINS: [f64; 6] = [5.0, 10.0, 20.0, 40.0, 80.0, 160.0];
 
-/// The tool with all position loops at a gain (1/s).
+/// TCP figures with all position loops at a gain (1/s).
 fn tool(robot: &Robot, motion: &Motion, gain: f64) -> Result<TcpFigures, Error> {
     let mut tuned = robot.clone();
     for drive in &mut tuned.drives {

@@ -1,20 +1,19 @@
-//! An observer of one's own that ends the run: when the tool has stood still long enough, there is
-//! nothing left to see.
+//! A user-defined observer that ends the run once the TCP has been at rest long enough.
 //! `cargo run --release -p flexarm --no-default-features --example stop_at_rest`
 //!
-//! The observer is shown every logged sample while the run goes on and keeps what it wants of it,
-//! here one number.
+//! The observer receives every logged sample during the run and stores what it needs, here one
+//! number.
 #![allow(clippy::print_stdout, reason = "an example shows its answer")]
 
 use std::ops::ControlFlow;
 
 use flexarm::{Error, Modelling, Motion, Robot, RunOptions, RunRequest, Sample};
 
-/// The tool stands still when it is this near to where it comes to rest (m), for so long (s).
+/// Criterion of rest: distance of the TCP from its final position (m), and duration (s).
 const NEAR_M: f64 = 2e-4;
 const LONG_S: f64 = 0.25;
 
-/// Distance of the tool from where the arm would have it at rest (m): what its motion alone causes.
+/// Distance of the TCP from its static position (m), which is caused by motion only.
 fn ringing_m(sample: &Sample) -> f64 {
     let part = |c: usize| sample.error_world[c] - sample.static_m[c];
     (part(0).powi(2) + part(1).powi(2) + part(2).powi(2)).sqrt()

@@ -1,5 +1,5 @@
-//! One report of several runs: a robot with its links as lumped parts, in modes, and with links in
-//! eight parts.
+//! One report of several runs: a robot with lumped links, with modal links, and with links of eight
+//! parts.
 //!
 //! `cargo run -p flexarm --example study_report -- study.html`: three curves in one plot, figures
 //! side by side.

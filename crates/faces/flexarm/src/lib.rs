@@ -1,4 +1,4 @@
-//! From a robot file and a trajectory to a result: the facade of the flexarm workspace.
+//! Facade of the flexarm workspace: from a robot file and a trajectory to a result.
 //!
 //! ```no_run
 //! use flexarm::{Modelling, Motion, Robot, RunOptions, Wrench};
@@ -16,14 +16,14 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! [`Robot::load`] reads, [`Robot::flexible`] puts links and drives in place and returns an
-//! [`Arm`], which threads may share. [`Arm::simulate`] runs a [`Motion`], or a [`Scenario`] with
-//! loads and payloads, and returns a [`Run`] with figures and columns; [`Arm::operating_point`]
-//! answers statics, compliance and frequencies at thousands of poses without allocation.
+//! [`Robot::load`] reads a robot, [`Robot::flexible`] adds links and drives and returns an [`Arm`],
+//! which threads may share. [`Arm::simulate`] runs a [`Motion`], or a [`Scenario`] with loads and
+//! payloads, and returns a [`Run`] with figures and columns; [`Arm::operating_point`] computes
+//! statics, compliance and frequencies at thousands of poses without allocation.
 //!
-//! [`Arm::simulate_with`] writes recordings and a report as well. [`inspect()`] and [`check()`]
-//! look at what was loaded; [`statics()`], [`modes()`] and [`response()`] answer one pose in full;
-//! [`mod@reduce`] makes a flexible link of a mesh.
+//! [`Arm::simulate_with`] also writes recordings and a report. [`inspect()`] and [`check()`]
+//! examine what was loaded; [`statics()`], [`modes()`] and [`response()`] give complete results at
+//! one pose; [`mod@reduce`] creates a flexible link from a mesh.
 //!
 //! Examples, from simple to advanced
 //! (`cargo run --release -p flexarm --no-default-features --example NAME`):
@@ -31,15 +31,15 @@
 //! | name | what it shows |
 //! | --- | --- |
 //! | `five_lines` | load, run, print |
-//! | `operating_points` | an arm shared by threads, a workspace each: compliance and frequency at 10,000 poses |
-//! | `stop_at_rest` | an observer that looks at every sample and ends the run |
-//! | `servo_study` | a study: gains of the servos against settling time and overshoot |
+//! | `operating_points` | an arm shared by threads, one workspace each: compliance and frequency at 10,000 poses |
+//! | `stop_at_rest` | an observer that examines every sample and stops the run |
+//! | `servo_study` | a study: servo gains against settling time and overshoot |
 //! | `study_report` | link models compared on one page for the browser |
-//! | `sensitivity` | which number of the robot the error depends on most |
+//! | `sensitivity` | the parameters of the robot with the strongest effect on the error |
 //! | `link_models` | every link model against a reference: accuracy and cost |
 //!
-//! An [`Error`] names its cause with numbers; a [`Caveat`] warns of a doubtful result. Both carry
-//! the settings that mend them as values ([`Setting`]); a face names them once
+//! An [`Error`] states its cause with numbers; a [`Caveat`] warns of a doubtful result. Both carry
+//! the settings that would fix them as values ([`Setting`]); a front end sets their names once
 //! ([`name_settings`]).
 #![allow(non_snake_case, reason = "monogram notation: X_WL, K_S; see docs/references.md")]
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]

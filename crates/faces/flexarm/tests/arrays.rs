@@ -1,5 +1,5 @@
-//! What programs that bring arrays rest on: answers of an arm whose links are in place, recursions
-//! on rows, arms that are commanded while they move, work that is stopped.
+//! Array interfaces: results of an arm with its links, rigid-body algorithms on rows, arms
+//! commanded online, work that is stopped.
 #![allow(non_snake_case, reason = "the letters of the matrices")]
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 #![allow(clippy::print_stdout, reason = "measured errors beside their bounds")]
@@ -54,7 +54,7 @@ fn an_arm_answers_as_the_robot_that_is_substituted_for_each_question() {
     assert!(matches!(arm.statics(Some(&[0.0; 5]), wrench), Err(Error::Pose(_))));
 }
 
-/// Rows of the recursions, one by one and all at once.
+/// Rows of the rigid-body algorithms, one by one and all at once.
 fn check_rows(recursions: &Recursions) {
     let (n, m) = (recursions.model().nv(), 600);
     let [q, v, a] = [0.618, 0.324, 0.755].map(|seed| numbers(m * n, seed));
@@ -99,8 +99,8 @@ fn rows_of_the_recursions_have_the_bits_of_each_alone_and_fit_each_other() {
     check_rows(&robot("palletiser").recursions().unwrap());
 }
 
-/// Largest distance between the tool of an arm that is given a motion as targets, with their
-/// velocities or without, and that of the run along it, over the run's largest error.
+/// Maximum distance between the TCP of an arm that gets a motion as targets, with or without their
+/// velocities, and that of the run along it, over the maximum error of the run.
 fn off(arm: &Arm, motion: &Motion, period_s: f64, with_velocities: bool) -> f64 {
     let options = RunOptions { log_rate_hz: 1.0 / period_s, ..RunOptions::default() };
     let run = arm.simulate(motion, &options).unwrap();
@@ -132,7 +132,7 @@ fn an_arm_that_is_commanded_along_a_motion_goes_where_the_run_goes() {
     assert!(fine <= 2e-5 && coarse <= 0.02, "{fine:e}, {coarse:e}");
     assert!(coarse > 4.0 * fine, "shorter periods are closer: {fine:e}, {coarse:e}");
 
-    // Without velocities accelerations are a period late.
+    // Without velocities, accelerations are one period late.
     let (fine, coarse) = (off(&arm, &motion, 1e-3, false), off(&arm, &motion, 4e-3, false));
     println!("without velocities {fine:.1e} at 1 kHz, {coarse:.1e} at 250 Hz");
     assert!(fine <= 2e-2 && coarse <= 8e-2, "{fine:e}, {coarse:e}");

@@ -1,5 +1,5 @@
-//! Balancers of robot files: what they do in statics and runs, on links that bend, and what is
-//! refused with which words.
+//! Balancers of robot files: their effect in statics and runs, on flexible links, and the messages
+//! of refusals.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 #![allow(non_snake_case, reason = "monogram notation")]
 
@@ -31,7 +31,7 @@ fn the_counterbalance_of_the_kr300_turns_joint_2_as_its_formula_says() {
         let pressure = 1.01 * 296.8 * 328.0 * 0.159 / (0.00096 - (L - 0.6) * area);
         let torque = D * k * delta.sin() / L * pressure * area;
         let found = with.gravity_torque[1] - without.gravity_torque[1];
-        // measured 2.1e-8 N m: the digits of the robot file
+        // measured 2.1e-8 N m: rounding in the robot file
         assert!((found - torque).abs() < 1e-5, "{found} {torque}");
         let info = &with.balancers[0];
         assert!((info.length - L).abs() < 1e-10 && (info.torque[1] + torque).abs() < 1e-5);
@@ -42,7 +42,7 @@ fn the_counterbalance_of_the_kr300_turns_joint_2_as_its_formula_says() {
     }
 }
 
-/// A spring of 20 MN/m from the column to a point on the upper arm, without force at [`AT`].
+/// A spring of 20 MN/m from the column to a point on the upper arm, unloaded at [`AT`].
 fn strut(robot: &Robot, to: [f64; 3]) -> Robot {
     let with = |free: f64| {
         let law = BalancerLaw::Linear { rate: 2e7, free, preload: 0.0 };
@@ -54,9 +54,10 @@ fn strut(robot: &Robot, to: [f64; 3]) -> Robot {
 
 const AT: [f64; 6] = [0.0, -1.1, 1.2, 0.0, 0.4, 0.0];
 
-/// A strut at the far end of a link goes with the far end: tied to the near part it would carry the
-/// arm past the spring of the link. Truth: the compliance of the tool falls as the link's own
-/// springs are helped, in both models of the link by the same 1.1 %; measured 1.3e-4 between them.
+/// A strut at the far end of a link moves with the far end; attached to the near part it would
+/// bypass the spring of the link. Truth: the compliance of the TCP decreases because the springs of
+/// the link are supported, by the same 1.1 % in both models of the link; measured 1.3e-4 between
+/// them.
 #[test]
 fn a_balancer_at_the_far_end_of_a_link_that_bends_holds_its_far_end() {
     let robot = Robot::load_with(&project("robots/kr210/links.toml"), &LoadOptions::default()).unwrap();
@@ -71,14 +72,14 @@ fn a_balancer_at_the_far_end_of_a_link_that_bends_holds_its_far_end() {
     let [lumped, modal] =
         [LinkModel::Lumped, LinkModel::Modal].map(|links| softness(&helped, links) / softness(&robot, links));
     assert!(lumped < 0.995 && (lumped / modal - 1.0).abs() < 1e-3, "{lumped} {modal}");
-    // On the near part it does nothing to the bending link.
+    // On the near part it does not affect the flexible link.
     let near = strut(&robot, [0.1, 0.0, 0.0]);
     let near = softness(&near, LinkModel::Lumped) / softness(&robot, LinkModel::Lumped);
     assert!((near - 1.0).abs() < 1e-3, "{near}");
 }
 
-/// Energy in equals energy stored and lost, in a run with the counterbalance; SPOOK against
-/// generalised-alpha.
+/// Energy in equals energy stored and dissipated, in a run with the counterbalance; SPOOK compared
+/// with generalised-alpha.
 #[test]
 fn a_run_of_the_kr300_keeps_the_books_with_its_counterbalance() {
     let robot = Robot::load(project("robots/kr300")).unwrap();
@@ -94,7 +95,7 @@ fn a_run_of_the_kr300_keeps_the_books_with_its_counterbalance() {
     assert!(a > 3e-4 && (a / b - 1.0).abs() < 5e-3, "{a} {b}");
 }
 
-/// The robot of the examples with an entry more; the message.
+/// Returns the message for the robot of the examples with an additional entry.
 fn refused(entry: &str) -> String {
     let folder = std::env::temp_dir().join(format!("flexarm-balancers-{}", std::process::id()));
     std::fs::create_dir_all(&folder).unwrap();
@@ -159,7 +160,7 @@ fn what_no_balancer_is_is_refused_with_its_place_and_what_is_expected() {
     }
 }
 
-/// A pose in which the gas has no room is refused by every question, with length and end.
+/// A pose in which the gas has no volume is refused by every function, with length and end.
 #[test]
 fn a_pose_without_room_for_the_gas_is_refused() {
     let robot = Robot::load(project("robots/kr210")).unwrap();

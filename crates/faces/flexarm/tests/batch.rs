@@ -1,4 +1,4 @@
-//! Poses and runs by the thousand: the same answers as one by one, whatever the number of threads.
+//! Batches of poses and runs: the same results as one by one, for any number of threads.
 #![allow(non_snake_case, reason = "monogram notation")]
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
@@ -21,7 +21,7 @@ fn kr210() -> (Robot, Arm) {
     (robot, arm)
 }
 
-/// With so many threads.
+/// Runs work with this number of threads.
 fn with_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {
     rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(work)
 }
@@ -30,7 +30,7 @@ fn bits(values: &[f64]) -> Vec<u64> {
     values.iter().map(|x| x.to_bits()).collect()
 }
 
-/// 700 poses, more than two pieces of work; one of them has no numbers.
+/// 700 poses, more than two chunks of work; one of them is NaN.
 fn poses(joints: usize) -> Vec<f64> {
     let mut poses: Vec<f64> =
         (0..700 * joints).map(|k| -0.4 + 0.8 * ((k as f64) * 0.618_033_988_749_895).fract()).collect();
@@ -38,7 +38,7 @@ fn poses(joints: usize) -> Vec<f64> {
     poses
 }
 
-/// Truth: the workspace that answers one pose after another, to the last bit.
+/// Truth: the workspace that solves one pose after another, to the last bit.
 #[test]
 fn poses_on_all_cores_have_the_answers_of_one_by_one_and_the_bytes_of_one_thread() {
     let (_, arm) = kr210();
@@ -68,7 +68,7 @@ fn poses_on_all_cores_have_the_answers_of_one_by_one_and_the_bytes_of_one_thread
     }
 }
 
-/// Values that make no whole pose are refused with both numbers.
+/// Values that do not form complete poses are refused with both numbers.
 #[test]
 fn half_a_pose_is_refused() {
     let (_, arm) = kr210();
@@ -77,7 +77,7 @@ fn half_a_pose_is_refused() {
     assert!(arm.operating_points(&[], &Wrench::zeros()).unwrap().is_empty());
 }
 
-/// A rigid arm has poses and no frequencies.
+/// A rigid arm has poses but no frequencies.
 #[test]
 fn a_rigid_arm_has_poses_without_deflection() {
     let (robot, _) = kr210();
@@ -88,7 +88,7 @@ fn a_rigid_arm_has_poses_without_deflection() {
     assert!(found.failures.is_empty() && found.deflection_m.iter().all(|x| *x == 0.0));
 }
 
-/// Runs on all cores are those of one after the other, to the last bit.
+/// Runs on all cores equal sequential runs, to the last bit.
 #[test]
 fn runs_on_all_cores_are_those_of_one_thread() {
     let (robot, arm) = kr210();
@@ -103,8 +103,8 @@ fn runs_on_all_cores_are_those_of_one_thread() {
     }
 }
 
-/// A study of ten runs: other motions, payloads, stiffnesses, dampings; one with a load, which no
-/// lane knows.
+/// A study of ten runs: different motions, payloads, stiffnesses, dampings; one with a load, which
+/// the vectorised code does not support.
 fn study(robot: &Robot) -> Vec<Variation> {
     let motion = Motion::load(root().join("trajectories/point_to_point.toml"), robot).unwrap();
     let slower = motion.trajectory.scaled(1.5).unwrap();
@@ -127,8 +127,8 @@ fn study(robot: &Robot) -> Vec<Variation> {
     runs
 }
 
-/// Truth: the same run with all its figures; peak, time of the peak and last sample to the rounding
-/// of a distance.
+/// Truth: the same run with all its figures; peak, time of the peak and last sample agree to the
+/// rounding of a distance.
 #[test]
 fn deflections_of_a_study_are_those_of_whole_runs() {
     let (robot, arm) = kr210();
@@ -149,8 +149,7 @@ fn deflections_of_a_study_are_those_of_whole_runs() {
     }
 }
 
-/// Order, company and threads change no bit; the run with a load is the only one that is taken
-/// alone.
+/// Order, neighbours and threads change no bit; only the run with a load is run separately.
 #[test]
 fn deflections_do_not_depend_on_company_order_or_threads() {
     let (robot, arm) = kr210();
@@ -171,7 +170,7 @@ fn deflections_do_not_depend_on_company_order_or_threads() {
     assert!(one.windows(2).all(|pair| pair[0].peak_m != pair[1].peak_m), "each run is another one");
 }
 
-/// A run that cannot be is refused in its place, by name, and the others go on; other steppers give
+/// An invalid run is refused at its index, by name, and the others continue; other steppers give
 /// figures as well.
 #[test]
 fn a_bad_run_is_refused_in_its_place() {

@@ -1,9 +1,9 @@
-//! Slips in robot files, URDFs, motions and loads: how many are told, and that plausible changes
-//! are not.
+//! Mistakes in robot files, URDFs, motions and loads: counts those reported, and checks that
+//! plausible changes are not reported.
 //!
 //! A mutation changes one thing in a shipped robot; `check` and `statics` then have to warn (or
-//! refuse) with the code that belongs to it. A harmless change must not add a warning to those of
-//! the robot as shipped.
+//! refuse) with the corresponding code. A harmless change must not add a warning to those of the
+//! shipped robot.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 #![allow(clippy::print_stdout, reason = "the counts are what the page of caveats quotes")]
 
@@ -24,7 +24,7 @@ struct Texts {
     urdf: String,
 }
 
-/// A temporary folder with a copy of what the robot file needs beside the URDF.
+/// A temporary folder with a copy of the files that the robot file needs in addition to the URDF.
 struct Place {
     folder: PathBuf,
     texts: Texts,
@@ -53,14 +53,14 @@ impl Place {
         Self { folder, texts: Texts { robot, urdf } }
     }
 
-    /// Codes of what warns or fails, in `check` and in `statics` at the same pose.
+    /// Codes of warnings and errors, in `check` and in `statics` at the same pose.
     fn told(&self, texts: &Texts) -> [BTreeSet<String>; 2] {
         let file = self.folder.join("robot.toml");
         std::fs::write(&file, toml::to_string(&texts.robot).unwrap()).unwrap();
         std::fs::write(self.folder.join("robot.urdf"), &texts.urdf).unwrap();
         let options = LoadOptions::default();
         let found = check(&file, None, &options);
-        let found = found.iter().filter(|f| f.code != "missing-mesh"); // the copy leaves them behind
+        let found = found.iter().filter(|f| f.code != "missing-mesh"); // the copy has no meshes
         let loud = found.filter(|f| f.severity != "note").map(|f| f.code.clone()).collect();
         let held = Robot::load_with(&file, &options).and_then(|robot| {
             let motion = Motion::load_for(robot.default_trajectory.as_ref().unwrap(), &*robot.rigid_model()?)?;
@@ -121,8 +121,8 @@ fn times(value: &mut Value, factor: f64) {
 
 type Change = Box<dyn Fn(&mut Texts) -> bool>;
 
-/// Multiplies the value of a key path in the robot file; `*` stands for every entry of a list.
-/// False if nothing is there.
+/// Multiplies the value of a key path in the robot file; `*` matches every entry of a list. Returns
+/// false if nothing is there.
 fn key(path: &'static str, factor: f64) -> Change {
     fn walk(value: &mut Value, keys: &[&str], factor: f64) -> bool {
         match (keys, value) {
@@ -144,7 +144,7 @@ fn key(path: &'static str, factor: f64) -> Change {
     })
 }
 
-/// Puts a value (TOML) at a key path; with `*` into every entry.
+/// Sets a value (TOML) at a key path; with `*` in every entry.
 fn set(path: &'static str, text: &'static str) -> Change {
     fn walk(value: &mut Value, keys: &[&str], new: &Value) -> bool {
         match (keys, value) {
@@ -183,7 +183,7 @@ fn urdf(element: &'static str, attribute: &'static str, factor: f64) -> Change {
     })
 }
 
-/// Another material, where a section is filled with one.
+/// Another material, if a section has one.
 fn material(text: &'static str) -> Change {
     let new = set("flexible_link.*.beam.material", text);
     Box::new(move |texts| {
@@ -192,7 +192,7 @@ fn material(text: &'static str) -> Change {
     })
 }
 
-/// Channels across their webs instead of boxes and tubes.
+/// Transverse channels instead of boxes and tubes.
 fn channels() -> Change {
     let channel = "{ section = \"channel\", width = 0.1, height = 0.2, web = 0.01, flange = 0.01, material = \"steel\", \
                    parts = \"uniform\" }";
@@ -207,7 +207,7 @@ fn links(texts: &Texts) -> Vec<Value> {
     texts.robot.get("flexible_link").and_then(Value::as_array).cloned().unwrap_or_default()
 }
 
-/// Multiplies the stiffness of one gear of an arm that has five, that of the last joint but one.
+/// Multiplies the stiffness of one gear of an arm that has five, that of the second last joint.
 fn one_gear(factor: f64) -> Change {
     Box::new(move |texts| {
         let drives = texts.robot.get_mut("drive").and_then(Value::as_array_mut);
@@ -218,24 +218,24 @@ fn one_gear(factor: f64) -> Change {
     })
 }
 
-/// A change of robots without links from meshes, whose masses and lengths are their own.
+/// A change for robots without links from meshes, whose masses and lengths are independent.
 fn without_meshes(change: Change) -> Change {
     Box::new(move |texts| !links(texts).iter().any(|link| link.get("reduced").is_some()) && change(texts))
 }
 
-/// A change of robots whose beams do not cut the inertia of their link.
+/// A change for robots whose beams do not cut the inertia of their link.
 fn without_from_link(change: Change) -> Change {
     let cuts =
         |link: &Value| link.get("beam").is_some_and(|b| b.get("parts").and_then(Value::as_str) != Some("uniform"));
     Box::new(move |texts| !links(texts).iter().any(cuts) && change(texts))
 }
 
-/// The second change beside the first.
+/// Both changes together.
 fn both(first: Change, second: Change) -> Change {
     Box::new(move |texts| first(texts) && second(texts))
 }
 
-/// A change of robots that have torque-driven joints (or have none).
+/// A change for robots with torque-driven joints (or without).
 fn torque(has: bool, change: Change) -> Change {
     Box::new(move |texts| {
         let drives = texts.robot.get("drive").and_then(Value::as_array).cloned().unwrap_or_default();
@@ -243,14 +243,14 @@ fn torque(has: bool, change: Change) -> Change {
     })
 }
 
-/// A counterbalance whose gas has room for a part of the way only, and a gas spring that has
-/// enough.
+/// A counterbalance whose gas has volume for only a part of the stroke, and a gas spring with
+/// enough volume.
 const CRAMPED: &str = "[{ from = { link = \"link_1\", xyz = [-0.6, 0.0, 0.0] }, to = { link = \"link_2\", xyz = [0.0, 0.0, 0.3] }, \
                        gas = { acts = \"pull\", pressure = 2e6, volume = 1e-4, area = 1e-3, length = 0.6 } }]";
 const GAS_SPRING: &str = "[{ from = { link = \"link_1\", xyz = [-0.6, 0.0, 0.0] }, to = { link = \"link_2\", xyz = [0.0, 0.0, 0.3] }, \
                           gas_spring = { force = 900.0, length = 1.6, stroke = 1.4, progression = 1.3 } }]";
 
-/// Balancers on the arms that have their joints and links.
+/// Balancers on the arms that have the required joints and links.
 fn balanced(text: &'static str) -> Change {
     let new = set("balancer", text);
     Box::new(move |texts| {
@@ -259,18 +259,17 @@ fn balanced(text: &'static str) -> Change {
     })
 }
 
-/// A lumped link alone takes factors by direction.
+/// Only a lumped link accepts factors by direction.
 fn lumped(change: Change) -> Change {
     Box::new(move |texts| links(texts).iter().all(|link| link.get("reduced").is_none()) && change(texts))
 }
 
-/// A change of robots whose links are beams and nothing else: mass and inertia are those of the
-/// section.
+/// A change for robots whose links are only beams: mass and inertia are those of the section.
 fn bare(change: Change) -> Change {
     Box::new(move |texts| texts.urdf.contains("beam_1") && change(texts))
 }
 
-/// The name of the n-th link of the arms that number them.
+/// Name of the n-th link of arms with numbered links.
 fn link_n(texts: &Texts, n: usize) -> Option<String> {
     let names = if n == 0 { vec!["base_link".to_owned(), "base".to_owned()] } else { vec![format!("link_{n}")] };
     let six = texts.urdf.contains("name=\"link_6\"");
@@ -286,7 +285,7 @@ fn tcp_on(n: usize) -> Change {
     })
 }
 
-/// The payload on the n-th link, where there is one.
+/// The payload on the n-th link, if it exists.
 fn payload_on(n: usize) -> Change {
     Box::new(move |texts| {
         let Some(link) = link_n(texts, n) else { return false };
@@ -295,7 +294,7 @@ fn payload_on(n: usize) -> Change {
     })
 }
 
-/// The n-th of six drives without its gearbox, where all six have one.
+/// The n-th of six drives without its gearbox, if all six have one.
 fn without_gear(n: usize) -> Change {
     Box::new(move |texts| {
         let drives = texts.robot.get_mut("drive").and_then(Value::as_array_mut);
@@ -309,7 +308,7 @@ fn without_gear(n: usize) -> Change {
     })
 }
 
-/// A change of robots without a counterbalance, which is made for its weight and its mounting.
+/// A change for robots without a counterbalance, which is designed for a weight and a mounting.
 fn unbalanced(change: Change) -> Change {
     Box::new(move |texts| !texts.robot.contains_key("balancer") && change(texts))
 }
@@ -341,7 +340,7 @@ const ROBOTS: [&str; 15] = [
     "abb_three_mass/torque.toml",
 ];
 
-/// What is wrong, how it comes about, and the codes of which one has to be told.
+/// The mistake, its change, and the codes of which one must be reported.
 fn slips() -> Vec<(&'static str, Change, &'static [&'static str])> {
     let deg = 180.0 / std::f64::consts::PI;
     let soft: &[&str] = &["gear-stiffness", "gear-rotation", "sag", "first-frequency"];
@@ -450,7 +449,7 @@ fn slips() -> Vec<(&'static str, Change, &'static [&'static str])> {
     ]
 }
 
-/// What may be written as well.
+/// Valid alternatives.
 fn harmless() -> Vec<(&'static str, Change)> {
     vec![
         ("as shipped", Box::new(|_| true)),
@@ -532,7 +531,7 @@ fn slips_are_told_and_plausible_robots_are_not() {
             }
             made += 1;
             let told = place.told(&texts);
-            // Statics knows no motion; an error that stops both is an answer too.
+            // Statics has no motion; an error that stops both counts too.
             let stops = |c: &String| c.starts_with("error") || c == "robot-file" || c == "no-equilibrium";
             let heard = |told: &BTreeSet<String>| told.iter().any(|c| codes.contains(&c.as_str()) || stops(c));
             let heard = heard(&told[0]) && (codes.contains(&"motion-effort") || heard(&told[1]));
@@ -557,10 +556,10 @@ fn slips_are_told_and_plausible_robots_are_not() {
     println!("told {told} of {made} slips, {} false alarms in {tried} harmless changes", false_alarms.len());
     missed.iter().for_each(|missed| println!("missed: {missed}"));
     assert_eq!(false_alarms, [""; 0]);
-    // Gears of the arm seen from the motor are softer by the ratio squared; a tool of 10 m is
-    // within three times the reach of the large arm. The fifth gear of kr210 turns a quarter of
-    // what the others turn under their torques: in N m/deg it turns 14.7 times as far as they do,
-    // and a gear of kr500 that is half as stiff, which is plausible, 15 times.
+    // Gear stiffnesses of the arm on the motor side are lower by the ratio squared; a tool of 10 m
+    // is within three times the reach of the large arm. The fifth gear of kr210 rotates a quarter
+    // as far as the others under their torques: in N m/deg it rotates 14.7 times as far, and a gear
+    // of kr500 with half the stiffness, which is plausible, 15 times.
     let known = [
         ("abb_three_mass/", "gears in N mm/rad"),
         ("kr300/", "tcp in cm"),
@@ -573,7 +572,8 @@ fn slips_are_told_and_plausible_robots_are_not() {
     assert!(made > 200 && tried > 180, "{made} {tried}");
 }
 
-/// Every kind of the catalogue is on the page, and the page names none that is not in the program.
+/// Every kind of the catalogue is on the page, and the page lists none that does not exist in the
+/// program.
 #[test]
 fn the_page_lists_the_catalogue() {
     let page = std::fs::read_to_string(project("docs/caveats.md")).unwrap();

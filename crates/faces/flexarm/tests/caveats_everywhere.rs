@@ -1,4 +1,5 @@
-//! What `check` says of a robot, a motion and loads is said by everything that uses them.
+//! Caveats that `check` reports for a robot, a motion and loads are also reported by everything
+//! that uses them.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use std::collections::BTreeSet;
@@ -40,13 +41,13 @@ impl Folder {
     }
 }
 
-/// Codes of what warns.
+/// Codes of warnings.
 fn codes(caveats: &[Caveat]) -> BTreeSet<String> {
     caveats.iter().filter(|c| c.warns() && c.code != "missing-mesh").map(|c| c.code.clone()).collect()
 }
 
 /// The KR 210 with one drive in N m/deg, without damping in the next, on a motion that is far too
-/// quick for it.
+/// fast for it.
 fn odd_robot(folder: &Folder) -> (PathBuf, PathBuf) {
     let text = std::fs::read_to_string(project("robots/kr210/drives.toml")).unwrap();
     let urdf = project("robots/kr210/kr210.urdf").canonicalize().unwrap();
@@ -71,7 +72,7 @@ fn every_command_with_a_pose_says_of_a_robot_what_check_says() {
         .filter(|f| f.severity == "warning" && f.code != "missing-mesh")
         .map(|f| f.code.clone())
         .collect();
-    // The first two are of the robot, the last of the arm as it stands.
+    // The first two are caveats of the robot, the last one of the arm at its pose.
     for code in ["gear-stiffness", "no-damping", "gear-rotation"] {
         assert!(told.contains(code), "{told:?}");
     }

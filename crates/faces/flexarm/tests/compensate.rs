@@ -1,5 +1,5 @@
-//! Motions with which the flexible tool follows the rigid one: on the model itself, on plants that
-//! are off, at rest, with shapers.
+//! Motions with which the flexible TCP follows the rigid one: on the model itself, on perturbed
+//! plants, at rest, with shapers.
 #![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 
@@ -49,7 +49,7 @@ fn three_iterations_take_all_but_a_hundredth_of_the_peak_of_a_pick_and_place_cyc
     assert!(found.before.peak_m > 1e-3);
     assert!(found.after.peak_m <= 0.01 * found.before.peak_m, "{:e}", found.after.peak_m);
     assert!(found.limits.is_empty(), "{:?}", found.limits);
-    // What was found is what any run of that motion shows.
+    // Any run of the new motion shows the same figures.
     let arm = robot.flexible(Modelling::default()).unwrap();
     let again = Motion::along((*found.trajectory).clone(), "again", &robot).unwrap();
     let run = arm.simulate(&again, &RunOptions { log_rate_hz: 1000.0, ..RunOptions::default() }).unwrap();
@@ -98,7 +98,7 @@ fn at_rest_commands_leave_nothing_where_the_motion_ends() {
     let off = (at.tcp_pose().translation.vector - wanted.translation.vector).norm();
     eprintln!("at the end {off:.1e} m");
     assert!(off <= 1e-9, "{off:e}");
-    // In motion inertia is left.
+    // In motion, an inertia error remains.
     assert!(found.after.rms_m < 0.5 * found.before.rms_m);
 }
 
@@ -167,7 +167,7 @@ fn what_cannot_be_compensated_is_said() {
     }
 }
 
-/// A folder that goes away.
+/// A folder that is removed at the end.
 struct Place(PathBuf);
 
 impl Place {
@@ -190,7 +190,7 @@ fn at(trajectory: &flexarm::Trajectory, t: f64) -> [f64; 6] {
     q
 }
 
-/// Truth: the equilibrium under weight and the constant part of a milling force, found at the
+/// Truth: the equilibrium under gravity and the constant part of a milling force, computed at the
 /// operating point.
 #[test]
 fn under_the_force_of_a_cutter_the_tool_at_rest_is_where_the_rigid_arm_has_it() {
@@ -214,7 +214,7 @@ fn under_the_force_of_a_cutter_the_tool_at_rest_is_where_the_rigid_arm_has_it() 
     let (before, after) = (off(&motion.trajectory, &mut point), off(&found.trajectory, &mut point));
     eprintln!("under the mean force {before:.2e} m before, {after:.1e} m after");
     assert!(before > 1e-3 && after <= 1e-9, "{before:e} {after:e}");
-    // Without the force the commands are others by what it bends.
+    // Without the force the commands differ by the deflection under it.
     let bare = compensate_motion(&robot, &motion, &static_request).unwrap();
     assert!(off(&bare.trajectory, &mut point) > 0.2 * before);
 }
@@ -226,7 +226,7 @@ fn limits_of_speed_acceleration_and_torque_are_kept_or_named() {
     let free = compensate_motion(&robot, &motion, &request()).unwrap();
     let (own, new) = (motion.trajectory.peak(), free.trajectory.peak());
     let speeds = |k: usize| (own[k].velocity.value.abs(), new[k].velocity.value.abs());
-    // Of joints that move.
+    // For joints that move.
     let moves = |k: &usize| speeds(*k).0 > 0.2;
     let k = (0..6)
         .filter(moves)
@@ -254,7 +254,7 @@ fn limits_of_speed_acceleration_and_torque_are_kept_or_named() {
     assert!((slow.trajectory.duration() / motion.trajectory.duration() / slow.slowed - 1.0).abs() < 1e-3);
     assert!(slow.after.peak_m <= 0.01 * slow.before.peak_m);
 
-    // Accelerations are asked for, torques stand in the URDF.
+    // Acceleration limits are given, torque limits come from the URDF.
     let (robot, _) = shipped("kr210", "pick_and_place.toml");
     let accelerations: Vec<f64> = own.iter().map(|peak| peak.acceleration.value.abs().max(1e-3)).collect();
     let tell = CompensateRequest { accelerations, ..rule(LimitRule::Tell) };
@@ -317,8 +317,8 @@ const RAPID: &str = "MODULE Cut\n  CONST robtarget p1:=[[1650,0,1200],[0.7071068
     PROC main()\n  ConfL \\Off; ConfJ \\Off;\n  MoveAbsJ [[0,-70,80,0,60,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v200,fine,tool0;\n  MoveJ p1,v200,z5,tool0;\n\
       MoveL [[1600,150,1100],[0.7,0.1,0.7,0.1],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0;\n  ENDPROC\nENDMODULE\n";
 
-/// Truth: the equilibria at the targets of the program as it was written, read by the same reader
-/// as any program.
+/// Truth: the equilibria at the targets of the program as written, read by the same reader as any
+/// program.
 #[test]
 fn a_robot_program_comes_back_with_targets_at_which_the_flexible_tool_is_where_it_was_told_to_be() {
     let (robot, _) = shipped("kr210", "pick_and_place.toml");
@@ -333,7 +333,7 @@ fn a_robot_program_comes_back_with_targets_at_which_the_flexible_tool_is_where_i
             method: Method::Static,
             recording: false,
             // The second passes near a singular pose of the wrist, where the commands of the path
-            // turn quickly.
+            // change quickly.
             limits: LimitRule::Tell,
             ..request()
         };
@@ -348,7 +348,7 @@ fn a_robot_program_comes_back_with_targets_at_which_the_flexible_tool_is_where_i
         let new = std::fs::read_to_string(&program.files[0]).unwrap();
         assert_eq!(new.lines().count(), text.lines().count());
         assert!(new.contains("corrected by flexarm for"), "{new}");
-        // Read and run as any program; the end of the path is a target.
+        // Read and run like any program; the end of the path is a target.
         let again = Motion::load(&program.files[0], &robot).unwrap();
         let arm = robot.flexible(Modelling::default()).unwrap();
         let mut point = arm.operating_point().unwrap();
@@ -362,7 +362,7 @@ fn a_robot_program_comes_back_with_targets_at_which_the_flexible_tool_is_where_i
         // 4.0e-5 m.
         let bound = if name == "cut.src" { 1e-4 } else { 3e-7 };
         assert!(left < bound, "{left:e}");
-        // A corrected program is corrected into another folder, never over itself.
+        // A corrected program is written into another folder, never over itself.
         let inner = Motion::load(&program.files[0], &robot).unwrap();
         let careless = CompensateRequest { overwrite: true, ..asked.clone() };
         let error = compensate_motion(&robot, &inner, &careless).unwrap_err().to_string();
@@ -372,7 +372,7 @@ fn a_robot_program_comes_back_with_targets_at_which_the_flexible_tool_is_where_i
     }
 }
 
-/// Asked to stop at any look, it stops there, and writes nothing.
+/// A stop request at any check stops it there, and nothing is written.
 #[test]
 fn a_compensation_that_is_stopped_leaves_nothing() {
     use std::sync::atomic::{AtomicUsize, Ordering};
@@ -398,8 +398,8 @@ fn a_compensation_that_is_stopped_leaves_nothing() {
     }
 }
 
-/// A slender arm of two joints whose gearboxes have this damping (N m s/rad), and a motion of a
-/// second with a rest behind it.
+/// A slender arm of two joints with this gearbox damping (N m s/rad), and a motion of one second
+/// followed by a rest.
 fn slender(name: &str, damping: [f64; 2]) -> (Robot, Motion) {
     let folder = Place::new(name);
     let place = &folder.0;
@@ -440,17 +440,17 @@ fn slender(name: &str, damping: [f64; 2]) -> (Robot, Motion) {
     (robot, motion)
 }
 
-/// A slender arm whose tool still swings when its motion ends; gearboxes alone yield, so that
-/// nothing but the step ends the series. Truth: joints that rested in the motion rest in the
-/// commands, after which the tool swings less everywhere.
+/// A slender arm whose TCP still oscillates when its motion ends; only the gearboxes are elastic,
+/// so that only the step size limits the series. Truth: joints that rest in the motion rest in the
+/// commands, after which the TCP oscillates less everywhere.
 #[test]
 fn an_arm_that_rests_at_the_end_of_its_motion_is_not_struck_there() {
     let (robot, motion) = slender("end", [60.0, 12.0]);
     let components = [true, false, true, false, false, false];
     let found = compensate_motion(&robot, &motion, &CompensateRequest { components, ..request() }).unwrap();
     told("slender", &found);
-    // Best of two iterations 0.00151 of 3.203 mm; with the error held on behind its end 0.040, and
-    // 189 rad/s² in the last 12 ms.
+    // Best of two iterations 0.00151 of 3.203 mm; with the error continued as constant after its
+    // end 0.040, and 189 rad/s² in the last 12 ms.
     assert!(found.after.peak_m < 1e-3 * found.before.peak_m, "{:e}", found.after.peak_m);
     let (mut q, mut v, mut a) = ([0.0; 2], [0.0; 2], [0.0; 2]);
     let largest = |a: [f64; 2]| a[0].abs().max(a[1].abs());
@@ -463,8 +463,8 @@ fn an_arm_that_rests_at_the_end_of_its_motion_is_not_struck_there() {
     assert!(at_end < 4.0, "{at_end}"); // measured 1.29
 }
 
-/// Truth: a command that has a velocity at every time has none that jumps; the arm linearised goes
-/// along every 20 ms.
+/// Truth: commands with a continuous velocity have no velocity jump; the arm is relinearised every
+/// 20 ms.
 #[test]
 fn commands_of_a_smooth_motion_have_no_kink_where_the_arm_is_linearised_anew() {
     let (robot, motion) = shipped("kr210", "pick_and_place.toml");
@@ -476,8 +476,8 @@ fn commands_of_a_smooth_motion_have_no_kink_where_the_arm_is_linearised_anew() {
         motion.trajectory.sample(t, &mut q, &mut v, &mut b);
         a.iter().zip(&b).map(|(a, b)| a - b).collect::<Vec<f64>>()
     };
-    // What a sample of the change's acceleration has beside the mean of its neighbours, at nodes
-    // and half way between.
+    // Deviation of a sample of the change's acceleration from the mean of its neighbours, at nodes
+    // and half-way between.
     let mut beside = |t: f64| {
         let [before, at, behind] = [change(t - 2e-3), change(t), change(t + 2e-3)];
         (0..m).map(|k| (at[k] - 0.5 * (before[k] + behind[k])).abs()).fold(0.0, f64::max)
@@ -492,8 +492,8 @@ fn commands_of_a_smooth_motion_have_no_kink_where_the_arm_is_linearised_anew() {
     assert!(at_nodes < 3.0 * between.max(1e-3), "{at_nodes} {between}"); // measured 0.0022 and 0.0013; 0.188 with a chord
 }
 
-/// Without damping the error rings on at frequencies where the inverse does not hold. Truth: the
-/// simulation.
+/// Without damping the error keeps ringing at frequencies where the inverse is not valid. Truth:
+/// the simulation.
 #[test]
 fn an_iteration_that_enlarges_the_error_of_an_undamped_arm_is_discarded_and_the_next_one_corrects_lower_frequencies() {
     let (robot, motion) = slender("undamped", [0.0, 0.0]);
@@ -521,7 +521,7 @@ fn a_motion_that_begins_at_speed_is_corrected_by_the_static_method_and_refused_b
     let motion = Motion::from_samples(&t, &q, &robot).unwrap();
     let error = compensate_motion(&robot, &motion, &request()).unwrap_err().to_string();
     assert!(error.contains("jumps at 0 s") && error.contains("static method"), "{error}");
-    // The blow of the sudden start passes torque limits.
+    // The velocity jump at the sudden start exceeds torque limits.
     let asked = CompensateRequest { method: Method::Static, limits: LimitRule::Tell, ..request() };
     let found = compensate_motion(&robot, &motion, &asked).unwrap();
     told("at speed", &found);

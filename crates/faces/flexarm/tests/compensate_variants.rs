@@ -1,5 +1,4 @@
-//! Compensation of arms under servos, shapers of several modes, and programs whose targets are
-//! loaded.
+//! Compensation of arms under servos, shapers for several modes, and programs with loaded targets.
 #![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 
@@ -39,17 +38,17 @@ fn told(name: &str, found: &Compensation) {
     );
 }
 
-/// Truth: the simulation itself, sampled controllers and springs in it; the rigid arm on the motion
-/// that was asked for, so that the lag of the servos counts.
+/// Truth: the simulation itself, including sampled controllers and springs; the reference is the
+/// rigid arm on the requested motion, so that the lag of the servos counts.
 #[test]
 fn targets_of_servos_leave_a_hundredth_of_the_peak_or_the_cause_is_told() {
     let (robot, motion) = shipped("kr300", "kr300.toml");
     let found = compensate_motion(&robot, &motion, &servo()).unwrap();
     told("kr300", &found);
-    // 8e-4 of the peak; the inverse holds up to 25 Hz, the position loops have 3 Hz.
+    // 8e-4 of the peak; the inverse is valid up to 25 Hz, the position loops have 3 Hz.
     assert!(found.after.peak_m <= 0.002 * found.before.peak_m, "{:e} of {:e}", found.after.peak_m, found.before.peak_m);
     assert!(found.cutoff_hz.unwrap() > 20.0 && found.caveats.iter().all(|caveat| caveat.code != "servo-limit"));
-    // Accelerations that jump, and torques at their limit.
+    // Discontinuous accelerations, and torques at their limit.
     let (robot, motion) = shipped("manutec_r3", "manutec_r3.toml");
     let found = compensate_motion(&robot, &motion, &servo()).unwrap();
     told("manutec_r3", &found);
@@ -57,8 +56,8 @@ fn targets_of_servos_leave_a_hundredth_of_the_peak_or_the_cause_is_told() {
     assert!(found.caveats.iter().any(|caveat| caveat.code == "servo-limit" && caveat.message.contains("joint_2")));
 }
 
-/// Truth: the simulation; nothing fed forward and no integral, so that motors lag and sag into
-/// their gains.
+/// Truth: the simulation; without feed-forward and integral, so that motors lag and sag according
+/// to their gains.
 #[test]
 fn servos_that_lag_and_sag_are_told_ahead_of_it() {
     let (mut robot, motion) = shipped("kr300", "kr300.toml");
@@ -76,7 +75,7 @@ fn servos_that_lag_and_sag_are_told_ahead_of_it() {
     assert!(error.contains("joint_a1") && error.contains("does not control position"), "{error}");
 }
 
-/// A folder that goes away.
+/// A folder that is removed at the end.
 struct Place(PathBuf);
 
 impl Place {
@@ -99,7 +98,7 @@ fn end(trajectory: &flexarm::Trajectory) -> [f64; 6] {
     q
 }
 
-/// Truth: the equilibrium under weight with the motors where an integral holds them.
+/// Truth: the equilibrium under gravity with the motors at the positions held by an integrator.
 #[test]
 fn static_targets_of_servos_leave_nothing_at_rest() {
     let (robot, motion) = shipped("manutec_r3", "manutec_r3.toml");
@@ -114,15 +113,15 @@ fn static_targets_of_servos_leave_nothing_at_rest() {
     assert!(off <= 1e-9, "{off:e}");
 }
 
-/// Truth: swing of the simulated tool behind the motion, where the linear forecast of each mode
-/// should hold.
+/// Truth: oscillation of the simulated TCP after the motion, which the linear prediction of each
+/// mode must match.
 #[test]
 fn a_shaper_of_all_modes_leaves_less_than_zv_within_the_same_delay_and_zvd_within_its_own() {
     let (robot, motion) = shipped("kr210", "point_to_point.toml");
     let swing = |shaper: Option<Shaping>| {
         let found =
             compensate_motion(&robot, &motion, &CompensateRequest { iterations: 0, shaper, ..request() }).unwrap();
-        // From the end of the move on, the shaper in it.
+        // From the end of the move on, including the shaper.
         let from = 1.0 + found.shaper_delay_s;
         let errors = found.curves.iter().filter(|c| c[0] > from && c[0] < from + 0.5);
         let (low, high) = errors.fold((f64::INFINITY, 0.0f64), |(l, h), c| (l.min(c[1]), h.max(c[1])));
@@ -149,7 +148,7 @@ fn a_shaper_of_all_modes_leaves_less_than_zv_within_the_same_delay_and_zvd_withi
 const KRL: &str = "&ACCESS RVP\nDEF press()\n$VEL.CP = 0.2\nPTP {A1 10, A2 -80, A3 95, A4 5, A5 50, A6 -10}\n\
     LIN {X 1600, Y 100, Z 1100, A 10, B 80, C 20}\nWAIT SEC 0.5\nLIN {X 1600, Y -100, Z 1100, A 10, B 80, C 20}\nWAIT SEC 0.4\nEND\n";
 
-/// Truth: the equilibrium under the mean of the force while the arm waits, found at the operating
+/// Truth: the equilibrium under the mean force during a wait of the arm, computed at the operating
 /// point.
 #[test]
 fn targets_at_which_the_arm_waits_under_a_force_are_corrected_for_it() {
@@ -177,7 +176,7 @@ fn targets_at_which_the_arm_waits_under_a_force_are_corrected_for_it() {
     assert_eq!((program.targets, program.corrected, program.loaded), (3, 3, 2));
     assert!(program.residual_m < 3e-7 && program.before_m > 1e-3, "{:e}", program.residual_m);
     assert!(found.caveats.iter().any(|caveat| caveat.message.contains("loads change while the arm is there")));
-    // The second and the third target of the program as it was written.
+    // The second and the third target of the program as written.
     let again = Motion::load(&program.files[0], &robot).unwrap();
     let ends = |motion: &Motion, line: usize| {
         let t = motion.tool_path.as_ref().unwrap().moves.iter().find(|of| of.line == line).unwrap().span_s[1];

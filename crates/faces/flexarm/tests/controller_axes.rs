@@ -1,4 +1,4 @@
-//! Axes of a controller with other zeros and senses than the joints of the description.
+//! Controller axes whose zeros and signs differ from those of the joints in the description.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
 use std::path::PathBuf;
@@ -9,7 +9,7 @@ fn shipped(name: &str) -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../robots").join(name)
 }
 
-/// Where the flange is at axis values in degrees (m).
+/// Position of the flange at axis values in degrees (m).
 fn flange(robot: &str, degrees: [f64; 6]) -> [f64; 3] {
     let options = flexarm::LoadOptions { tcp: Some("tool0".into()), ..Default::default() };
     let robot = Robot::load_with(&shipped(robot).join("robot.toml"), &options).unwrap();
@@ -18,14 +18,14 @@ fn flange(robot: &str, degrees: [f64; 6]) -> [f64; 3] {
 }
 
 /// Truth: the drawings in KUKA's data sheets. At A2 = -90 the link arm is upright, at A3 = 90 the
-/// forearm level: lengths add up by hand. Axis 1 turns clockwise as seen from above. Bound 1 um:
-/// what is left is rounding of the description.
+/// forearm is horizontal: lengths add up by hand. Axis 1 turns clockwise as seen from above. Bound
+/// 1 um: the rest is rounding in the description.
 #[test]
 fn shipped_kuka_arms_have_the_zeros_and_senses_of_their_controller() {
     let home = [0.0, -90.0, 90.0, 0.0, 0.0, 0.0];
     let arms = [
         ("kr210", [0.33 + 1.22 + 0.215, 0.0, 0.645 + 1.15 + 0.115]),
-        // Its README: (1.590, 0, 1.784) m.
+        // According to its README: (1.590, 0, 1.784) m.
         ("kr300", [1.590, 0.0, 1.784]),
     ];
     for (name, truth) in arms {
@@ -35,7 +35,7 @@ fn shipped_kuka_arms_have_the_zeros_and_senses_of_their_controller() {
         }
         let turned = flange(name, [30.0, -90.0, 90.0, 0.0, 0.0, 0.0]);
         assert!((turned[1] + truth[0] * 0.5).abs() < 1e-6, "{name}: A1 turns the other way: {turned:?}");
-        // More of axis 2 leans the arm forward and down.
+        // Increasing axis 2 leans the arm forward and down.
         let leant = flange(name, [0.0, -60.0, 90.0, 0.0, 0.0, 0.0]);
         assert!(leant[0] > found[0] && leant[2] < found[2], "{name}: {leant:?}");
     }

@@ -1,5 +1,5 @@
-//! Errors as a program meets them: the cause as a variant with its numbers, the setting that mends
-//! it as a value, and a sentence in the library's own names.
+//! Errors in a program: the cause as a variant with its numbers, the setting that fixes it as a
+//! value, and a sentence with the library's own names.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
 use std::path::{Path, PathBuf};
@@ -21,7 +21,7 @@ fn beam() -> (Robot, Motion) {
     (robot, motion)
 }
 
-/// What a run with these options ends with.
+/// Returns the error of a run with these options.
 fn refused(modelling: Modelling, change: impl FnOnce(&mut RunOptions)) -> Error {
     let (robot, motion) = beam();
     let mut options = RunOptions { modelling, ..RunOptions::default() };
@@ -52,7 +52,7 @@ fn an_unstable_step_tells_the_largest_stable_one_and_what_to_set() {
     let Error::Step { source, partial: false } = error else { panic!("{error}") };
     assert_eq!(source.settings(), [Setting::Step, Setting::Stepper]);
     let StepError::UnstableStep { h, highest_hz, largest_s, .. } = source else { panic!("{source}") };
-    // The stability limit of RK4 on the imaginary axis, 2 sqrt(2), with room for damping.
+    // The stability limit of RK4 on the imaginary axis, 2 sqrt(2), with a margin for damping.
     assert!(h == 0.01 && largest_s < 2.9 / (std::f64::consts::TAU * highest_hz), "{h} {highest_hz} {largest_s}");
 }
 
@@ -91,10 +91,10 @@ fn poses_loads_and_responses_name_joint_frame_and_bound() {
 fn what_the_link_maker_finds_has_one_place_beside_what_the_rest_finds() {
     let options = ReduceOptions::default();
     let refused = |job: &ReduceJob| reduce(job, &options, None, &mut |_| {}).unwrap_err();
-    // Files are files, whoever looks for them.
+    // A missing file is a file error for any function.
     let error = Error::from(ReduceJob::load(Path::new("no_such_mesh.msh")).unwrap_err());
     assert!(matches!(&error, Error::File { path, .. } if path == Path::new("no_such_mesh.msh")), "{error}");
-    // A number of a job is the link maker's own.
+    // An invalid number of a job is an error of the link maker.
     let mesh = root().join("crates/links/flexarm-fe-io/tests/data/three_blocks_v41_ascii.msh");
     let error = refused(&ReduceJob { modes: Some(2000), ..ReduceJob::for_mesh(&mesh) });
     assert!(

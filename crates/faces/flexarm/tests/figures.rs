@@ -25,8 +25,8 @@ fn run(robot: &str, trajectory: &str, outputs: Option<&Outputs>) -> (Summary, Tr
     (run.summary, run.trace)
 }
 
-/// Truth: the recorded parts of the error. The beam swings in a plane and sags out of it: nothing
-/// is normal to its path.
+/// Truth: the recorded parts of the error. The beam swings in a plane and sags out of it: there is
+/// no error normal to its path.
 #[test]
 fn peaks_along_the_path_axes_are_those_of_the_recorded_errors() {
     for (robot, trajectory) in [("one_beam", "beam_swing.toml"), ("kr210", "pick_and_place.toml")] {
@@ -39,8 +39,8 @@ fn peaks_along_the_path_axes_are_those_of_the_recorded_errors() {
     }
 }
 
-/// Truth: the recorded error. The tool turns by e (rad) at 1 m from the one axis, so e²/2 (m) is
-/// left of second order.
+/// Truth: the recorded error. The TCP rotates by e (rad) at 1 m from the axis, so the second-order
+/// remainder is e²/2 (m).
 #[test]
 fn with_servos_the_contributions_still_add_up_to_the_error() {
     let (_, trace) = run("abb_three_mass/torque.toml", "three_mass.toml", None);
@@ -57,7 +57,7 @@ fn with_servos_the_contributions_still_add_up_to_the_error() {
     assert!(prescribed.header.contributors.iter().all(|name| name != "following error"));
 }
 
-/// Truth: rigid arms are where the motion wants them, whatever the step.
+/// Truth: rigid arms follow the motion exactly for any step size.
 #[test]
 fn runs_with_other_steps_are_apart_by_what_their_errors_differ() {
     let modelling = |links| Modelling { links, ..Modelling::default() };
@@ -70,14 +70,14 @@ fn runs_with_other_steps_are_apart_by_what_their_errors_differ() {
         let ends = [0, 1].map(|k: usize| traces[k].1.rows.last().map(|row: &TraceRow| row.time_s).unwrap());
         (summary.with[0].difference.as_ref().unwrap().peak_m, ends)
     };
-    // the last step of 7e-4 s passes the end of the motion
+    // the last step of 7e-4 s extends beyond the end of the motion
     for step in [8e-4, 7e-4] {
         let rigid = [with("a", LinkModel::Rigid, 4e-4), with("b", LinkModel::Rigid, step)];
         let (peak, ends) = apart(rigid);
         assert!(peak < 1e-9, "{peak:e}"); // measured 0
         assert_eq!(ends[0] == ends[1], step == 8e-4);
     }
-    // A flexible arm differs by its steps a little, by its stiffness much.
+    // The step size changes a flexible arm a little, the stiffness a lot.
     let (steps, _) = apart([with("a", LinkModel::Lumped, 4e-4), with("b", LinkModel::Lumped, 8e-4)]);
     let (models, _) = apart([with("a", LinkModel::Lumped, 4e-4), with("b", LinkModel::Rigid, 8e-4)]);
     assert!(steps < 5e-6 && models > 5e-4, "{steps:e} {models:e}");
@@ -93,7 +93,7 @@ fn a_conversion_that_is_stopped_leaves_nothing() {
     let mut asked = 0;
     let mut stop = |_| {
         asked += 1;
-        // Asked before the files are made, at the first sample, and then as it goes.
+        // Called before the files are created, at the first sample, and then repeatedly.
         if asked > 2 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
     let answer = convert_until(&folder.join("run.csv"), &folder.join("x.csv"), &ConvertOptions::default(), &mut stop);

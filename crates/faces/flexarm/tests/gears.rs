@@ -1,5 +1,5 @@
-//! Gears of robot files beyond their stiffness: from the keys to statics, runs of every stepper,
-//! figures and caveats.
+//! Gear properties of robot files other than stiffness: from the keys to statics, runs with every
+//! stepper, figures and caveats.
 #![allow(non_snake_case, reason = "monogram notation")]
 #![allow(clippy::print_stderr, reason = "what was measured stands beside the bound")]
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
@@ -14,7 +14,7 @@ use nalgebra::{Matrix2, Vector2};
 
 const ARCSEC: f64 = std::f64::consts::PI / 648_000.0;
 
-/// The shipped KR 210 class arm with other drives for its last joints.
+/// The shipped KR 210 class arm with different drives for its last joints.
 struct Place(PathBuf);
 
 impl Place {
@@ -70,9 +70,9 @@ fn steppers() -> [(StepperKind, f64, f64); 4] {
     ]
 }
 
-/// Truth: the ripple in arc seconds at the motor's angle, beside the sag of the same gear without
-/// it, to first order (2.2e-3: the weight gives way with it); RK4 at 0.05 ms for the other
-/// steppers. A run of many is a run alone.
+/// Truth: the ripple in arc seconds at the motor angle, added to the deflection of the same gear
+/// without ripple, to first order (2.2e-3: the gravity torque changes with it); RK4 at 0.05 ms for
+/// the other steppers. A run in a batch equals a single run.
 #[test]
 fn the_ripple_of_a_gear_is_where_the_robot_file_puts_it() {
     let place = Place::new("ripple");
@@ -86,7 +86,7 @@ fn the_ripple_of_a_gear_is_where_the_robot_file_puts_it() {
     let truth = 20.0 * ARCSEC * (200.0 * AT[1]).sin() + 5e-5 * (39.0 * AT[1] + 1.2).sin();
     let found = with.deflection[0] - without.deflection[0];
     assert!((found - truth).abs() < 5e-3 * truth.abs(), "{found} {truth}");
-    // The spring carries the weight as before, and no more energy than that.
+    // The spring carries the same weight, with no more energy.
     assert!(
         (with.load[0] / without.load[0] - 1.0).abs() < 1e-3 && (with.energy_j / without.energy_j - 1.0).abs() < 2e-3
     );
@@ -118,13 +118,14 @@ fn the_ripple_of_a_gear_is_where_the_robot_file_puts_it() {
     let spook =
         RunOptions { stepper: StepperKind::Spook(SpookSettings::default()), step_s: 1e-4, ..RunOptions::default() };
     assert!(arm.simulate(&motion, &spook).err().unwrap().to_string().contains("transmission errors"));
-    // Steps that do not follow the ripple are told.
+    // Steps that do not resolve the ripple are reported.
     let coarse = arm.simulate(&motion, &RunOptions { step_s: 5e-3, ..RunOptions::default() }).unwrap();
     assert!(coarse.summary.caveats.iter().any(|c| c.code == "ripple-step"), "{:?}", coarse.summary.warnings);
 }
 
-/// The loop of a gear takes its energy in a run and stands in the balance; statics say on which
-/// branch they stand. The reference and spook say what they do not know.
+/// The hysteresis loop of a gear dissipates energy in a run and is part of the energy balance;
+/// statics report their branch of the loop. The reference and spook steppers report that they do
+/// not support it.
 #[test]
 fn the_hysteresis_of_a_gear_takes_energy_and_says_what_statics_make_of_it() {
     let place = Place::new("hysteresis");
@@ -170,9 +171,9 @@ fn the_hysteresis_of_a_gear_takes_energy_and_says_what_statics_make_of_it() {
 
 const WRIST: &str = "[coupling]\njoints = [\"joint_5\", \"joint_6\"]\nmatrix = [[1.0, 0.0], [-0.05, 1.0]]\n";
 
-/// Truth: the wrist's part of the compliance about the axes of its joints is `C K_m^-1 Cᵀ`, its
-/// rotors `C^-T J_m C^-1` on the mass matrix, its motors' torques `Cᵀ τ`; a matrix of ones on the
-/// diagonal changes nothing.
+/// Truth: the wrist's part of the compliance about its joint axes is `C K_m^-1 Cᵀ`, its rotors add
+/// `C^-T J_m C^-1` to the mass matrix, its motor torques are `Cᵀ τ`; an identity coupling changes
+/// nothing.
 #[test]
 fn a_coupled_wrist_has_springs_rotors_and_torques_at_its_motors() {
     let place = Place::new("wrist");
@@ -207,7 +208,7 @@ fn a_coupled_wrist_has_springs_rotors_and_torques_at_its_motors() {
     }
     assert_eq!(inspected[0].coupling.as_ref().unwrap().matrix, [[1.0, 0.0], [-0.05, 1.0]]);
 
-    // Every stepper, by torque too.
+    // With every stepper, also torque-controlled.
     let motion = moving(&robot);
     for drives in [DriveModel::AsFiled, DriveModel::Servo] {
         let arm = robot.flexible(Modelling { drives, ..Modelling::default() }).unwrap();
@@ -238,8 +239,8 @@ fn a_coupled_wrist_has_springs_rotors_and_torques_at_its_motors() {
     assert_eq!(runs[0].error_world_m(), runs[1].error_world_m());
 }
 
-/// Truth: the torques of the drive without it, plus the ratio of the transmitted torque against the
-/// motion.
+/// Truth: the torques of the drive without it, plus the given ratio of the transmitted torque
+/// against the motion.
 #[test]
 fn friction_under_load_adds_its_part_of_the_torque() {
     let place = Place::new("load");
@@ -251,9 +252,9 @@ fn friction_under_load_adds_its_part_of_the_torque() {
         arm.simulate(moving(robot), &RunOptions::default()).unwrap().summary
     };
     let (with, without) = (run(&place.robot(&text(", load = 0.06"))), run(&place.robot(&text(""))));
-    // The same motion of the arm, for the motor is where it is.
+    // The arm moves in the same way, since the motor position is prescribed.
     let peaks = [&with, &without].map(|run| run.tcp.as_ref().unwrap().peak_m);
-    assert!((peaks[0] / peaks[1] - 1.0).abs() < 1e-6, "{peaks:?}"); // measured 1.2e-7, what steps may leave
+    assert!((peaks[0] / peaks[1] - 1.0).abs() < 1e-6, "{peaks:?}"); // measured 1.2e-7
     let more = with.energy.dissipated_j - without.energy.dissipated_j;
     assert!(more > 10.0 && with.energy.imbalance < 1e-3, "{more} {}", with.energy.imbalance);
     assert!((with.energy.drives_j - without.energy.drives_j - more).abs() < 1e-3 * more);
@@ -283,7 +284,7 @@ fn what_gears_cannot_have_is_refused_with_what_was_found_and_expected() {
     fails(both("stiffness = 1e5", &WRIST.replace("joint_6", "joint_7")), &["joint_7", "joint_6"]);
     let loaded = "[[drive]]\njoint = \"joint_5\"\nkind = \"torque\"\nfriction = { load = 0.1 }\n";
     fails(loaded.into(), &["needs a gearbox"]);
-    // Degrees, arc seconds and per cent where radians and ratios are meant are told.
+    // Degrees, arc seconds and per cent instead of radians and ratios are reported.
     let slips = gear(
         "stiffness = 1e5, hysteresis = { loss = 1.5 }, transmission_error = [{ amplitude = 20.0, per_motor_turn = 1 }]",
     )

@@ -1,4 +1,4 @@
-//! The first line of a result: what it says must be what the run, statics and the robot say.
+//! The headline of a result must agree with the run, statics and the robot.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 
@@ -30,8 +30,8 @@ fn run(robot: &Robot, trajectory: &str, options: &RunOptions) -> (Summary, Trace
     (run.summary, run.trace)
 }
 
-/// Truth: `statics` at the poses of the motion, which finds each equilibrium from nothing. Measured
-/// 3e-8 of the largest sag within moves, where the curve is interpolated.
+/// Truth: `statics` at the poses of the motion, which computes each equilibrium from scratch.
+/// Measured 3e-8 of the maximum sag within moves, where the curve is interpolated.
 #[test]
 fn the_static_part_of_a_run_is_the_sag_at_the_pose() {
     let robot = load("kr210");
@@ -52,7 +52,7 @@ fn the_static_part_of_a_run_is_the_sag_at_the_pose() {
     assert!((start - tcp.static_sag_m).abs() < 1e-9 * start); // measured 2e-12
 }
 
-/// Truth: the parts are a sum, and the shares are one to first order.
+/// Truth: the parts are a sum, and the shares add up to first order.
 #[test]
 fn the_parts_of_the_first_line_add_up_to_the_largest_error() {
     for (robot, of_second_order) in [("kr210", 3e-3), ("kr210/links.toml", 3e-3), ("abb_three_mass/torque.toml", 3e-2)]
@@ -64,7 +64,7 @@ fn the_parts_of_the_first_line_add_up_to_the_largest_error() {
         assert!((at_rest + moving - tcp.peak_m).abs() < 1e-15, "{robot}");
         let shares: f64 = tcp.shares_at_peak.iter().map(|share| share.along_m).sum();
         assert!((shares / tcp.peak_m - 1.0).abs() < of_second_order, "{robot}: {shares:e} of {:e}", tcp.peak_m);
-        // The largest dynamic part is that of the recorded curves.
+        // The maximum dynamic part is that of the recorded curves.
         let dynamic = trace.rows.iter().map(|row| {
             let error = Vector3::from_row_slice(&row.error_world[..3]);
             (error - Vector3::from(row.static_m)).norm()
@@ -73,7 +73,7 @@ fn the_parts_of_the_first_line_add_up_to_the_largest_error() {
     }
 }
 
-/// A number that follows a word in a text.
+/// A number after a word in a text.
 fn after(text: &str, word: &str) -> f64 {
     let rest = text.split(word).nth(1).unwrap_or_else(|| panic!("no {word:?} in {text:?}"));
     let number: String = rest.trim_start().chars().take_while(|c| c.is_ascii_digit() || *c == '.').collect();
@@ -104,7 +104,7 @@ fn a_robot_with_nothing_that_bends_says_so_first_and_how_to_give_it_something() 
     for word in ["[[flexible_link]]", "[[drive]]", "gearbox", "robot file"] {
         assert!(summary.headline.contains(word), "{word}: {}", summary.headline);
     }
-    // By choice it is no fault of the file.
+    // Rigid by choice is not a fault of the file.
     let modelling = Modelling { links: LinkModel::Rigid, drives: DriveModel::Rigid, ..Modelling::default() };
     let (summary, _) = run(&load("kr210"), "point_to_point.toml", &RunOptions { modelling, ..RunOptions::default() });
     let line = &summary.headline;
@@ -115,8 +115,8 @@ fn a_robot_with_nothing_that_bends_says_so_first_and_how_to_give_it_something() 
     assert_eq!(summary.headline, "flexible: links link_2, link_3; not compared with the rigid robot");
 }
 
-/// Truth: the stops of the same run. Two of its three last half a second, in which the arm on its
-/// gearboxes does not come to rest.
+/// Truth: the stops of the same run. Two of its three stops last half a second, in which the arm
+/// with elastic gearboxes does not come to rest.
 #[test]
 fn a_stop_at_which_the_tool_does_not_settle_is_the_settling_time_of_the_run() {
     let (summary, _) = run(&load("kr210"), "pick_and_place.toml", &RunOptions::default());
@@ -129,7 +129,7 @@ fn a_stop_at_which_the_tool_does_not_settle_is_the_settling_time_of_the_run() {
     for text in [flexarm::markdown(&summary), flexarm::rows(&summary).into_iter().map(|row| row.1).collect()] {
         assert!(text.contains("not settled at stop 1"), "{text}");
     }
-    // With a wider band the worst of the stops counts, not the last.
+    // With a wider band the worst stop counts, not the last one.
     let options = RunOptions { settling_band_m: 1.5e-4, ..RunOptions::default() };
     let (summary, _) = run(&load("kr210"), "pick_and_place.toml", &options);
     let tcp = summary.tcp.unwrap();

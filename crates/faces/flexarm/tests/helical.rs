@@ -1,4 +1,4 @@
-//! A SCARA whose quill moves along a thread as it turns: from the robot file to statics, runs of
+//! A SCARA whose quill moves along a thread as it turns: from the robot file to statics, runs with
 //! every stepper and recordings.
 #![allow(non_snake_case, reason = "monogram notation")]
 #![allow(clippy::print_stderr, reason = "what was measured stands beside the bound")]
@@ -12,7 +12,7 @@ use flexarm::{
     Wrench, inspect, statics,
 };
 
-/// Metres per turn.
+/// Lead of the thread (m per turn).
 const LEAD: f64 = 0.05;
 /// Stiffness of the gearbox at the quill (N m/rad).
 const GEAR: f64 = 900.0;
@@ -57,8 +57,8 @@ impl Drop for Place {
     }
 }
 
-/// Truth: a force F along the spindle turns its spring by F p/k and moves the tool by F p²/k along
-/// it, p the lead over 2π.
+/// Truth: a force F along the spindle rotates its spring by F p/k and moves the TCP by F p²/k along
+/// the spindle, with p the lead over 2π.
 #[test]
 fn a_force_along_the_spindle_turns_its_spring() {
     let place = Place::new("statics");
@@ -68,8 +68,8 @@ fn a_force_along_the_spindle_turns_its_spring() {
     let mut at = robot.flexible(modelling).unwrap().operating_point().unwrap();
     at.solve(&[0.3, -0.4, 0.1, 2.0], &Wrench::zeros()).unwrap();
     let C = at.compliance();
-    // The spring alone gives way, along S = (p a; a) moved to the tool: rank one, with 1/k in its
-    // turning block.
+    // Only the spring is elastic, along S = (p a; a) moved to the TCP: rank one, with 1/k in its
+    // rotational block.
     let turning = C.fixed_view::<3, 3>(3, 3).into_owned();
     assert!((turning.trace() * GEAR - 1.0).abs() < 1e-9, "{}", turning.trace() * GEAR);
     let axis = turning.symmetric_eigen();
@@ -79,8 +79,8 @@ fn a_force_along_the_spindle_turns_its_spring() {
     assert!((along * GEAR / (p * p) - 1.0).abs() < 1e-8, "{along}"); // measured 1e-12
 }
 
-/// Second algorithm: all steppers against the reference, with a link that bends and a spring behind
-/// the thread.
+/// Second algorithm: all steppers compared with the reference, with a flexible link and a spring
+/// behind the thread.
 #[test]
 fn every_stepper_runs_a_robot_with_a_helical_joint() {
     let place = Place::new("runs");
@@ -111,7 +111,7 @@ fn every_stepper_runs_a_robot_with_a_helical_joint() {
         eprintln!("{:<18} {:.1e} of {largest:.1e} m", stepper.name(), worst / largest);
         assert!(worst < bound * largest, "{}: {worst} of {largest}", stepper.name());
     }
-    // The weight of what the quill carries is on its spring.
+    // The weight carried by the quill loads its spring.
     assert!(statics(&robot, &Modelling::default(), None, [0.0; 6]).unwrap().sag_m.iter().all(|x| x.is_finite()));
 }
 

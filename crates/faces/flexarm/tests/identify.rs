@@ -1,4 +1,4 @@
-//! Shipped robots identified from made-up measurements: files in the units of a shop, honest
+//! Shipped robots identified from synthetic measurements: files in workshop units, correct standard
 //! deviations, new robot files.
 #![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
@@ -36,7 +36,7 @@ fn normal(draw: &mut Draw) -> f64 {
     (-2.0 * u.ln()).sqrt() * v.cos()
 }
 
-/// Pulls of 2 kN along the axes in turn on an arm of 0.4 m, at poses all over the middle of the
+/// Pulls of 2 kN along the axes in turn, with a lever of 0.4 m, at poses all over the middle of the
 /// joint ranges.
 fn pulls(draw: &mut Draw, count: usize) -> Measurements {
     let readings = (0..count).map(|k| {
@@ -48,7 +48,7 @@ fn pulls(draw: &mut Draw, count: usize) -> Measurements {
         let kind = ReadingKind::Displacement {
             before: LoadCase::none(),
             after: LoadCase { wrench, at: Vector3::new(0.4, 0.0, 0.0), ..LoadCase::none() },
-            // Off the axis of the last joint, which is blind to it.
+            // Off the axis of the last joint, which would otherwise be unobservable.
             point: Vector3::new(0.4, 0.0, 0.0),
             rows: rows.map(|d| Row { of: Component::Along(d), value: 0.0, std: NOISE }).to_vec(),
         };
@@ -57,12 +57,12 @@ fn pulls(draw: &mut Draw, count: usize) -> Measurements {
     Measurements { readings: readings.collect(), ..Measurements::default() }
 }
 
-/// What is identified unless something else is asked for.
+/// The default selection of identified parameters.
 fn stiffnesses(all: Vec<Parameter>) -> Vec<Parameter> {
     all.into_iter().filter(|p| p.name != "payload.mass" && !p.name.ends_with(".damping")).collect()
 }
 
-/// What an arm with parameters at `x` would have shown.
+/// Simulated readings of an arm with parameters at `x`.
 fn shown(plant: &Plant, parameters: &[Parameter], x: &[f64], of: &Measurements) -> Vec<f64> {
     let arm = MeasuredArm { plant, parameters, measurements: of };
     arm.predicted(&DVector::from_column_slice(x)).unwrap()
@@ -79,8 +79,8 @@ fn with_values(of: &Measurements, values: &[f64]) -> Measurements {
     read
 }
 
-/// Truth: the made-up arm. Share of 95 % intervals that hold it, and spread of the errors over
-/// their deviations, 200 seeds.
+/// Truth: the synthetic arm. Returns the share of 95 % intervals that contain it, and the spread of
+/// the errors over their deviations, 200 seeds.
 fn coverage(robot: &str) -> (f64, f64) {
     let arm = shipped(robot).flexible(Modelling::default()).unwrap();
     let (plant, parameters) = (plant(&arm), stiffnesses(parameters(&arm)));
@@ -118,7 +118,7 @@ fn two_links_and_six_gearboxes_of_one_arm_come_out_with_the_deviations_that_they
     assert!((0.92..0.98).contains(&inside) && (0.93..1.07).contains(&spread), "{inside} {spread}");
 }
 
-/// A table in mm and degrees of what an arm with other gearboxes shows.
+/// A table in mm and degrees of the readings of an arm with other gearboxes.
 fn table(joints: &[String], poses: &Measurements, values: &[f64], factor: f64) -> String {
     let mut text = format!("{},fx,fy,fz,dx,dy,dz\n", joints.join(","));
     for (k, reading) in poses.readings.iter().enumerate() {
@@ -160,8 +160,8 @@ fn a_table_in_millimetres_gives_a_robot_file_that_shows_what_was_measured() {
         assert!(error < 1e-8, "{}: {error:e}", p.name); // measured: below 1e-10
     }
     assert!(found.residual.before > 1e-5 && found.residual.after < 1e-12, "{:?}", found.residual);
-    // The new file has these stiffnesses to a hundredth of their deviations, and everything else of
-    // the old one.
+    // The new file has these stiffnesses to a hundredth of their deviations, and everything else
+    // from the old one.
     let new = Robot::load(&output).unwrap();
     assert_eq!(
         (new.urdf_path.canonicalize().unwrap(), &new.name),
@@ -174,7 +174,7 @@ fn a_table_in_millimetres_gives_a_robot_file_that_shows_what_was_measured() {
     }
     let page = std::fs::read_to_string(output.join("identification.html")).unwrap();
     assert!(page.contains("drive.joint_6.gearbox.stiffness") && page.matches("<svg").count() == 1);
-    // A second time: nothing is overwritten unasked.
+    // A second time: nothing is overwritten without permission.
     let again = identify_robot(&robot, &folder.join("job.toml"), &request);
     assert!(matches!(again, Err(Error::Taken { .. })), "{again:?}");
     std::fs::remove_dir_all(folder).unwrap();
@@ -187,7 +187,7 @@ fn a_table_in_metres_that_is_said_to_be_in_millimetres_is_recognised() {
     let folder = folder("units");
     for (factor, length, better) in [(1.0, "mm", "\"m\""), (1e3, "m", "\"mm\""), (1e6, "mm", "\"um\"")] {
         std::fs::write(folder.join("pulls.csv"), table(&joints, &poses, &values, factor)).unwrap();
-        // Where the load acts is in the unit of the file as well; it is left out here.
+        // The point of application is also in the unit of the file; it is left out here.
         let job = JOB
             .replace("\"mm\"", &format!("{length:?}"))
             .replace("load = { at = [400.0, 0, 0] }\npoint = [400.0, 0, 0]\n", "");
@@ -244,16 +244,16 @@ fn a_plan_tells_more_than_as_many_poses_as_they_come_and_its_table_is_read_when_
     std::fs::write(folder.join("displacements.csv"), filled).unwrap();
     let found = identify_robot(&robot, &job, &IdentifyRequest::default()).unwrap();
     for (found, promised) in found.parameters.iter().zip(&plan.parameters) {
-        // The file has four digits of a degree; what was measured is what was expected.
+        // The file has four digits of a degree; the measurement equals the expectation.
         assert!((found.value / found.initial - 1.0).abs() < 1e-3, "{}", found.name);
-        // At the TCP the axes of the forearm and of the flange are nearly one.
+        // At the TCP the axes of the forearm and of the flange nearly coincide.
         if !found.identifiable {
             assert!(found.std.is_nan() && promised.std > 0.3 * promised.initial, "{}", found.name);
             continue;
         }
         let ratio = found.std / promised.std;
-        // The plan counts what is known before, a factor of two, also of parameters that go along
-        // with this one; the fit does not.
+        // The plan includes prior knowledge, a factor of two, also for parameters correlated with
+        // this one; the fit does not.
         assert!((0.99..1.5).contains(&ratio), "{}: {ratio}", found.name); // measured: 1.0 to 1.3
     }
     std::fs::remove_dir_all(folder).unwrap();
@@ -294,8 +294,8 @@ fn what_is_wrong_in_a_file_of_measurements_is_said_with_its_place() {
 }
 
 /// Truth: `tests/verification/kr300`, three recordings of a real KUKA KR 300 (MIT licence, see the
-/// README there); the bounds are what a fit of the same kind gave elsewhere: A2 8.7e6 (without one
-/// run 8.7e6 to 8.9e6), A3 4.7e6 (4.6e6 to 5.0e6), A1 not possible.
+/// README there); the bounds come from a similar fit elsewhere: A2 8.7e6 (without one run 8.7e6 to
+/// 8.9e6), A3 4.7e6 (4.6e6 to 5.0e6), A1 not identifiable.
 #[test]
 fn a_measured_robot_tells_two_of_its_gears_and_is_silent_about_the_third() {
     let robot = shipped("kr300");
@@ -338,8 +338,8 @@ fn a_measured_robot_tells_two_of_its_gears_and_is_silent_about_the_third() {
     let [a1, a2, a3] = &found.encoders[..] else { panic!("three gears have encoders") };
     assert!(!a1.told && a2.told && a3.told);
     assert!((8.5e6..9.1e6).contains(&a2.stiffness) && (4.5e6..5.1e6).contains(&a3.stiffness));
-    // Up to 12 Hz the ripple of the encoders is left in; below 3 Hz runs that were not seen are met
-    // as well as elsewhere.
+    // Up to 12 Hz the ripple of the encoders remains; below 3 Hz the fit predicts unseen runs as
+    // well as elsewhere.
     let slow = std::fs::read_to_string(folder.join("job.toml"))
         .unwrap()
         .replace("[[encoders]]\n", "[[encoders]]\nbelow = 3.0\n");

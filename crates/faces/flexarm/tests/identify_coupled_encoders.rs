@@ -1,4 +1,4 @@
-//! Recordings of motors and links of an arm whose wrist gears move several joints.
+//! Recordings of motors and links of an arm with coupled wrist gears.
 #![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 
@@ -19,8 +19,8 @@ impl Drop for Place {
 /// C of the wrist: joints from motors.
 const C: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [-0.2, 1.0, 0.0], [0.4, -0.3, 1.0]];
 
-/// The arm with a load beside the axis of its last joint and a coupled wrist; `factors` on the
-/// springs of its motors.
+/// The arm with a load off the axis of its last joint and a coupled wrist; `factors` on the springs
+/// of its motors.
 fn coupled(folder: &Path, factors: [f64; 3]) -> Robot {
     let home = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../robots/kr210_identified").canonicalize().unwrap();
     let urdf = home.join("kr210_identified.urdf");
@@ -48,8 +48,8 @@ fn coupled(folder: &Path, factors: [f64; 3]) -> Robot {
     Robot::load(folder).unwrap()
 }
 
-/// Motors behind their gears, and links, of equilibria along a motion so slow that nothing but
-/// weight acts.
+/// Motor positions behind their gears, and link positions, of equilibria along a quasi-static
+/// motion, under gravity only.
 fn recording(robot: &Robot, seed: f64) -> String {
     let arm = robot.flexible(Modelling::default()).unwrap();
     let mut at = arm.operating_point().unwrap();
@@ -96,8 +96,8 @@ fn job(place: &Path, motor: &str, link: &str, positions: &str, head: &str) -> Pa
     path
 }
 
-/// Truth: the springs of the arm whose equilibria were recorded. The torques are those at the
-/// motors' angles, which the deflection is off from: a part of itself of second order.
+/// Truth: the springs of the arm whose equilibria were recorded. The torques are those at the motor
+/// angles, which differ from the link angles by the deflection: a relative error of second order.
 #[test]
 fn springs_of_coupled_motors_are_found_from_encoders_behind_the_gears() {
     let folder = std::env::temp_dir().join(format!("flexarm-coupled-encoders-{}", std::process::id()));
@@ -129,7 +129,7 @@ fn springs_of_coupled_motors_are_found_from_encoders_behind_the_gears() {
             assert!(gear.told && off.abs() < 1e-2, "{}: {off:e}", gear.joint);
         }
     }
-    // A gear that is kept deflects by the robot file: right where it is that of the arm.
+    // A gear that is kept deflects according to the robot file: correct if it is that of the arm.
     let kept = coupled(&place.0, [factors[0], 1.0, 1.0]);
     let head = "keep = [\"drive.joint_4.*\"]\n";
     let path = job(&place.0, MOTORS, ALL, motors, head);
@@ -139,7 +139,7 @@ fn springs_of_coupled_motors_are_found_from_encoders_behind_the_gears() {
         let off = gear.stiffness / (initial(&gear.joint) * factor_of(&gear.joint)) - 1.0;
         assert!(off.abs() < 1e-2, "{}: {off:e}", gear.joint);
     }
-    // Which angles the columns are of must be said.
+    // The meaning of the angle columns must be declared.
     let error = identify_robot(&robot, &job(&place.0, MOTORS, ALL, "", ""), &IdentifyRequest::default()).unwrap_err();
     assert!(error.to_string().contains("positions = \"motors\""), "{error}");
 }

@@ -1,4 +1,4 @@
-//! Gears from encoders of an arm that swings, recorded by the full simulator.
+//! Gears from encoders of an oscillating arm, recorded by the full simulator.
 #![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 
@@ -20,7 +20,7 @@ impl Drop for Folder {
     }
 }
 
-/// Brisk moves of all joints after which the arm rings.
+/// Fast moves of all joints after which the arm rings.
 const MOTION: &str = "format = 1\nunit = \"deg\"\njoints = [\"joint_1\", \"joint_2\", \"joint_3\", \"joint_4\", \"joint_5\", \"joint_6\"]\n\
     start = [-20.0, -25.0, 20.0, 0.0, 15.0, 0.0]\nprofile = \"quintic\"\nsynchronised = true\n\
     [[move]]\nto = [20.0, 5.0, 0.0, 15.0, -10.0, 20.0]\nduration = 0.9\nhold = 0.4\n\
@@ -33,7 +33,7 @@ fn normal(draw: &mut Draw) -> f64 {
     (-2.0 * u.ln()).sqrt() * v.cos()
 }
 
-/// The arm with identified gearboxes, with 150 kg at its flange.
+/// The arm with identified gearboxes and 150 kg at its flange.
 fn robot(folder: &Path) -> Robot {
     let home = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../robots/kr210_identified").canonicalize().unwrap();
     let urdf = home.join("kr210_identified.urdf");
@@ -48,7 +48,7 @@ fn robot(folder: &Path) -> Robot {
     Robot::load(folder).unwrap()
 }
 
-/// Motors, links and torques through the gears, twice, with noise of the encoders.
+/// Records motors, links and torques through the gears, twice, with encoder noise.
 fn record(robot: &Robot, folder: &Path) {
     std::fs::write(folder.join("motion.toml"), MOTION).unwrap();
     let motion = Motion::load(folder.join("motion.toml"), robot).unwrap();
@@ -91,8 +91,8 @@ fn identified(robot: &Robot, folder: &Path, extra: &str) -> Identification {
     identify_robot(robot, &folder.join("job.toml"), &IdentifyRequest::default()).unwrap()
 }
 
-/// Truth: the gearboxes of the simulated arm. From the motors' motion, which does not swing, they
-/// came out 1.2 to 5 % low.
+/// Truth: the gearboxes of the simulated arm. Identified from the motor motion, which does not
+/// oscillate, they were 1.2 to 5 % too low.
 #[test]
 fn gears_of_a_swinging_arm_come_out_from_the_motion_of_its_links_and_from_measured_torques() {
     let folder = Folder(std::env::temp_dir().join(format!("flexarm-identify-encoders-{}", std::process::id())));
@@ -118,15 +118,14 @@ fn gears_of_a_swinging_arm_come_out_from_the_motion_of_its_links_and_from_measur
             // Measured: 2.7e-3 and 2.1 deviations, with measured torques 1.2e-3 and 0.8 deviations.
             let deviations = (off * initial / gear.std).abs();
             assert!(gear.told && off.abs() < 5e-3 && deviations < 4.0, "{name}, {}: {off:e}", gear.joint);
-            // White noise of two encoders, of which the band of 12 of 250 Hz is left.
+            // White noise of two encoders, of which the band of 12 of 250 Hz remains.
             let noise = gear.noise_rms / (2f64.sqrt() * NOISE * (12f64 / 250.0).sqrt());
             assert!((0.7..1.4).contains(&noise), "noise {noise}");
         }
     }
 }
 
-/// A payload that the robot file does not know is in no torque; the rest of the deflection shows
-/// it.
+/// A payload that is missing in the robot file is in no torque; the residual deflection shows it.
 #[test]
 fn a_rest_that_is_larger_than_the_noise_of_the_encoders_is_told() {
     let folder = Folder(std::env::temp_dir().join(format!("flexarm-identify-rest-{}", std::process::id())));

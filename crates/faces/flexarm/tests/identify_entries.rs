@@ -1,5 +1,5 @@
-//! Entries of a link's matrix and the tool in files of measurements: what is found is written where
-//! it was taken from.
+//! Entries of a link's matrix and the tool in files of measurements: results are written to the
+//! place of the original values.
 #![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
 #![allow(non_snake_case, reason = "monogram notation")]
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
@@ -50,7 +50,7 @@ fn with_stiffness(K: &Matrix6<f64>) -> String {
     kr210().replace(LINK, &format!("{LINK}stiffness = {rows:?}\n"))
 }
 
-/// The matrix of link_2 as the shipped file has it.
+/// The matrix of link_2 in the shipped file.
 fn matrix(robot: &Robot) -> Matrix6<f64> {
     let arm = robot.flexible(Modelling::default()).unwrap();
     let mut K = Matrix6::zeros();
@@ -72,8 +72,8 @@ fn poses() -> Vec<[f64; 6]> {
         .collect()
 }
 
-/// Truth: a robot file with that matrix, whose equilibria are measured. Two entries are found
-/// again, written, and read again.
+/// Truth: a robot file with that matrix, whose equilibria are measured. Two entries are identified,
+/// written, and read again.
 #[test]
 fn the_coupling_of_shear_and_bending_is_found_and_written_into_the_robot_file() {
     let place = Place::new("coupling");
@@ -81,7 +81,7 @@ fn the_coupling_of_shear_and_bending_is_found_and_written_into_the_robot_file() 
     let K = matrix(&first);
     let mut other = K;
     let size = |i: usize, j: usize| (K[(i, i)] * K[(j, j)]).sqrt();
-    // The plane in which weight bends the link, whatever its axes are called.
+    // The plane in which gravity bends the link, for any naming of its axes.
     let (row, column) = if K[(0, 0)] < K[(2, 2)] { (0, 4) } else { (1, 5) };
     let name = format!("link.link_2.stiffness[{column}][{row}]");
     other[(row, column)] += 0.15 * size(row, column);
@@ -119,14 +119,14 @@ fn the_coupling_of_shear_and_bending_is_found_and_written_into_the_robot_file() 
     // Numbers are written to a hundredth of their deviation.
     let std = found.parameters.iter().map(|p| p.std).fold(0.0, f64::max);
     assert!(off.max() < 0.02 * std, "{off}");
-    // Both names of an entry are its name; a factor beside it says the same twice.
+    // Both names of an entry are accepted; an additional factor would duplicate it.
     let request = IdentifyRequest { fit: vec![name, "link.link_2.*".into()], ..IdentifyRequest::default() };
     let error = identify_robot(&first, &place.0.join("job.toml"), &request).unwrap_err().to_string();
     assert!(error.contains("say the same twice") && error.contains("link.link_2.stiffness_factor"), "{error}");
 }
 
-/// Truth: a robot file with another entry, by statics; the derivative of the entry as `sensitivity`
-/// has it.
+/// Truth: a robot file with a changed entry, by statics; compared with the derivative of the entry
+/// by `sensitivity`.
 #[test]
 fn an_entry_in_the_robot_file_does_what_its_derivative_says() {
     let place = Place::new("derivative");
@@ -152,7 +152,7 @@ fn an_entry_in_the_robot_file_does_what_its_derivative_says() {
         eprintln!("{}: slope {:.9e}, difference {difference:.9e}", p.name, p.tcp_m[2]);
         assert!((difference - p.tcp_m[2]).abs() < 1e-5 * largest.tcp_m[2].abs(), "{}", p.name);
     }
-    // Without their names entries are not asked for.
+    // Entries are included only if they are named.
     let all = pose_sensitivity(&here, Modelling::default(), Some(&at), &["*".to_owned()]).unwrap();
     assert!(all.parameters.iter().all(|p| !p.name.contains("][")));
 }
@@ -180,8 +180,8 @@ fn a_matrix_that_is_no_stiffness_is_refused_with_what_is_wrong() {
     assert!(error.contains("one spring between two rigid parts"), "{error}");
 }
 
-/// Truth: a robot whose tool is elsewhere, placed by its equilibria; the tool is found, written,
-/// and read again.
+/// Truth: a robot whose tool is elsewhere, observed at its equilibria; the tool is identified,
+/// written, and read again.
 #[test]
 fn a_tool_that_is_elsewhere_is_found_from_places_and_written_into_the_robot_file() {
     let place = Place::new("tool");
@@ -205,7 +205,7 @@ fn a_tool_that_is_elsewhere_is_found_from_places_and_written_into_the_robot_file
             text += &format!("[[place]]\ntarget = \"{name}\"\njoints = {q:?}\nvalue = {seen:?}\nstd = 2e-5\n");
         }
     }
-    // Tables of one kind stand together in a file, whatever their order here.
+    // Tables of one kind are grouped in a file, regardless of their order here.
     std::fs::write(place.0.join("job.toml"), &text).unwrap();
     let output = place.0.join("new");
     let request = IdentifyRequest { output: Some(output.clone()), ..IdentifyRequest::default() };
@@ -222,7 +222,7 @@ fn a_tool_that_is_elsewhere_is_found_from_places_and_written_into_the_robot_file
     eprintln!("written and read: {apart:.1e} m, {turned:.1e} rad");
     // Written to 1e-7.
     assert!(new.tcp().0 == link && apart < 2e-7 && turned < 2e-7, "{apart:e} {turned:e}");
-    // A tool chosen in the place of the file's cannot be written into it.
+    // A tool chosen instead of the file's cannot be written into the file.
     let error = identify_robot(&moved, &place.0.join("job.toml"), &IdentifyRequest::default()).unwrap_err().to_string();
     assert!(error.contains("chosen in its place"), "{error}");
 }

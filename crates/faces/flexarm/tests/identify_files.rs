@@ -1,5 +1,5 @@
-//! What people measure and the slips that they make: axes of instruments, loads with inertia, units
-//! of loads, joints in another order.
+//! Practical measurements and typical mistakes: axes of instruments, loads with inertia, units of
+//! loads, joints in another order.
 #![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 #![allow(non_snake_case, reason = "monogram notation")]
@@ -30,7 +30,7 @@ struct Place {
     parameters: Vec<Parameter>,
 }
 
-/// Poses with the load that pulls there.
+/// Poses with the applied load.
 type Loads = Vec<(Vec<f64>, LoadCase)>;
 
 impl Drop for Place {
@@ -62,7 +62,7 @@ impl Place {
         (0..count).map(|_| pose(&mut self.draw)).collect()
     }
 
-    /// Displacements (m) of the arm that was measured between two loads, with noise.
+    /// Displacements (m) of the measured arm between two loads, with noise.
     fn shown(&mut self, loads: &[(Vec<f64>, LoadCase)], target: Option<Vector3<f64>>) -> Vec<[f64; 3]> {
         let arm = self.robot.flexible(Modelling::default()).unwrap();
         let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
@@ -115,7 +115,7 @@ impl Place {
         (loads, shown)
     }
 
-    /// A table of pulls in m and rad.
+    /// Writes a table of pulls in m and rad.
     fn table(&self, loads: &[(Vec<f64>, LoadCase)], shown: &[[f64; 3]], force: f64) {
         let mut text = String::from("joint_1,joint_2,joint_3,joint_4,joint_5,joint_6,fx,fy,fz,dx,dy,dz\n");
         for ((q, load), d) in loads.iter().zip(shown) {
@@ -133,7 +133,7 @@ impl Place {
         identify_robot(&self.robot, &path, &IdentifyRequest { output, overwrite: true, ..IdentifyRequest::default() })
     }
 
-    /// Errors over deviations of what is told.
+    /// Errors over deviations of the identified parameters.
     fn off(found: &Identification) -> Vec<f64> {
         let z = |(p, x): (&flexarm::identify::FittedParameter, &f64)| (p.value - p.initial * x.exp()) / p.std;
         found.parameters.iter().zip(&TRUTH).filter(|(p, _)| p.identifiable).map(z).collect()
@@ -142,7 +142,7 @@ impl Place {
 
 const JOB: &str = "format = 1\n[[displacement]]\nfile = \"pulls.csv\"\nload = { at = [0.4, 0, 0] }\npoint = [0.4, 0, 0]\nstd = 3e-5\n";
 
-/// Truth: the made-up arm and the rotation of the instrument.
+/// Truth: the synthetic arm and the rotation of the instrument.
 #[test]
 fn displacements_in_the_axes_of_an_instrument_are_refused_without_it_and_met_with_it() {
     let mut place = Place::new("axes");
@@ -183,7 +183,7 @@ fn joint_values_in_another_order_are_recognised_of_displacements_and_places() {
     let text = error.to_string();
     assert!(text.contains("[\"joint_6\", \"joint_5\", \"joint_4\", \"joint_3\", \"joint_2\", \"joint_1\"]"), "{text}");
     assert_eq!(error.fault(), flexarm::Fault::Input);
-    // Places, two joints exchanged.
+    // Positions, with two joints exchanged.
     let target = Vector3::new(0.0, 0.05, 0.03);
     let loads: Vec<_> = place.poses(20).into_iter().map(|q| (q, LoadCase::none())).collect();
     let shown = place.shown(&loads, Some(target));
@@ -210,7 +210,7 @@ fn kilograms_given_as_newtons_and_newtons_given_as_kilograms_are_told_with_the_s
     assert!(caveat.likely.contains("kg given as N") && caveat.value.is_some_and(|ratio| (5.0..20.0).contains(&ratio)));
     place.table(&loads, &shown, 1.0);
     assert!(told(&place.identify(JOB).unwrap()).is_none());
-    // What hangs at the tool: 100 kg, written as 981.
+    // A load of 100 kg at the tool, entered as 981.
     let carried =
         flexarm_kinematics::SpatialInertia::from_com(100.0, &Vector3::new(0.4, 0.0, 0.0), &nalgebra::Matrix3::zeros());
     let loads: Vec<_> = place.poses(18).into_iter().map(|q| (q, LoadCase { carried, ..LoadCase::none() })).collect();
@@ -231,8 +231,7 @@ fn kilograms_given_as_newtons_and_newtons_given_as_kilograms_are_told_with_the_s
     }
 }
 
-/// Truth: frequencies of the arm itself; a load of a kilogram metre squared about its centre lowers
-/// them.
+/// Truth: frequencies of the arm itself; a load with 1 kg m² about its centre lowers them.
 #[test]
 fn inertia_of_loads_and_relative_deviations_of_frequencies_count() {
     let place = Place::new("hz");
@@ -256,7 +255,8 @@ fn inertia_of_loads_and_relative_deviations_of_frequencies_count() {
     refused("", "std = 0.1\nstd_relative = 0.01", "keep one of them");
 }
 
-/// Truth: the made-up place of the target. It is said 1 mm off, with a deviation of 1 mm.
+/// Truth: the synthetic position of the target. It is declared with an error of 1 mm and a
+/// deviation of 1 mm.
 #[test]
 fn a_target_that_is_known_with_a_deviation_is_found_between_what_is_said_and_what_is_seen() {
     let mut place = Place::new("target");
@@ -288,7 +288,7 @@ fn a_target_that_is_known_with_a_deviation_is_found_between_what_is_said_and_wha
     let b = Vector3::from(found.targets[0].xyz);
     eprintln!("target {:.1e} m off, {off:.2?}, misfit {:?}", (b - target).norm(), found.misfit);
     assert!((b - target).norm() < 1e-4 && found.misfit.is_none() && off.iter().all(|z| z.abs() < 4.0), "{off:?}");
-    // As if it were exact: the readings do not fit.
+    // Declared as exact: the readings do not fit.
     assert!(place.identify(&job("")).unwrap().misfit.is_some());
 }
 
@@ -297,7 +297,7 @@ fn plans_and_identifications_tell_what_check_tells_of_the_robot() {
     let mut place = Place::new("check");
     let urdf = place.robot.urdf_path.canonicalize().unwrap();
     let text = std::fs::read_to_string(&place.robot.path).unwrap();
-    // A payload of thirteen times the robot's mass.
+    // A payload of thirteen times the mass of the robot.
     let text = text.replace("\"kr210_identified.urdf\"", &format!("{urdf:?}"));
     let text: String = text.lines().filter(|l| !l.starts_with("default_")).fold(String::new(), |all, l| all + l + "\n");
     let text = text + "\n[payload]\nlink = \"tool0\"\nmass = 12000.0\ncom = [0.1, 0.0, 0.2]\n";
@@ -311,8 +311,8 @@ fn plans_and_identifications_tell_what_check_tells_of_the_robot() {
     assert!(plan.warnings.iter().any(|text| text.contains("payload")), "{:?}", plan.warnings);
 }
 
-/// Two dial gauge readings of 1 mm where the robot file expects half of it. With this prior the
-/// third gear was claimed to be found with a deviation of 247 %.
+/// Two dial gauge readings of 1 mm where the robot file predicts half of it. With this prior the
+/// third gear used to be reported as identified with a deviation of 247 %.
 #[test]
 fn what_the_readings_know_less_than_within_a_factor_of_two_is_not_claimed() {
     let place = Place::new("gauge");

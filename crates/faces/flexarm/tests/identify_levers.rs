@@ -1,4 +1,4 @@
-//! Plans that choose among levers and gauges, and arms whose gears are coupled.
+//! Plans that choose among levers and gauges, and arms with coupled gears.
 #![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
 #![allow(non_snake_case, reason = "monogram notation")]
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
@@ -12,7 +12,7 @@ use flexarm::identify::{
 use flexarm::{Modelling, Robot, Wrench};
 use nalgebra::{DVector, Vector3};
 
-/// A folder that goes away.
+/// A folder that is removed at the end.
 struct Place(PathBuf);
 
 impl Place {
@@ -33,7 +33,7 @@ fn home() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../robots/kr210_identified").canonicalize().unwrap()
 }
 
-/// The arm with gears of the wrist that move two joints each.
+/// The arm with wrist gears that move two joints each.
 fn coupled(place: &Place) -> Robot {
     let urdf = home().join("kr210_identified.urdf");
     let text = std::fs::read_to_string(home().join("robot.toml")).unwrap();
@@ -64,8 +64,8 @@ fn gears(all: Vec<Parameter>) -> Vec<Parameter> {
     all.into_iter().filter(|p| p.name.ends_with("gearbox.stiffness")).collect()
 }
 
-/// Truth: Richardson differences of displacements and frequencies; the made-up arm itself, measured
-/// without noise.
+/// Truth: Richardson differences of displacements and frequencies; the synthetic arm itself,
+/// measured without noise.
 #[test]
 fn springs_of_coupled_motors_have_the_derivatives_of_their_arm_and_are_found_from_displacements() {
     let place = Place::new("coupled");
@@ -100,7 +100,7 @@ fn springs_of_coupled_motors_have_the_derivatives_of_their_arm_and_are_found_fro
         eprintln!("{}: displacement {error:.1e}, frequency {apart:.1e}", parameter.name);
         assert!(error < 1e-8 && apart < 1e-7, "{k}: {error:e} {apart:e}");
     }
-    // What an arm with other springs shows, fitted.
+    // Readings of an arm with other springs, fitted.
     let truth: Vec<f64> = (0..6).map(|k| 0.3 * (1.7 * k as f64 + 1.0).sin()).collect();
     let mut values = shown(&truth).into_iter().copied().collect::<Vec<_>>().into_iter();
     let mut read = poses.clone();
@@ -179,14 +179,14 @@ fn dampers_of_coupled_motors_are_found_from_the_response_of_the_arm_that_has_the
     }
 }
 
-/// Derivatives of the residuals, over the deviations.
+/// Derivatives of the residuals, divided by the deviations.
 fn evaluated(arm: &MeasuredArm<'_>, J: &mut nalgebra::DMatrix<f64>) {
     use flexarm_identify::Residuals;
     arm.evaluate(&DVector::zeros(arm.parameters.len()), Some(J)).unwrap();
 }
 
-/// Truth: about an axis through the point where a force acts nothing turns; at a lever it does. The
-/// table that a plan writes is read again, and measurements of the arm as it is change nothing.
+/// Truth: a force has no moment about an axis through its point of application; at a lever it has.
+/// The table written by a plan is read again, and measurements of the unchanged arm change nothing.
 #[test]
 fn a_plan_with_levers_tells_the_last_gearbox_and_its_table_with_gauges_is_read_again() {
     let robot = Robot::load(home()).unwrap();
@@ -224,7 +224,7 @@ fn a_plan_with_levers_tells_the_last_gearbox_and_its_table_with_gauges_is_read_a
     std::fs::write(&table, filled.join("\n")).unwrap();
     let found = identify_robot(&robot, Path::new(&plan.file.unwrap()), &IdentifyRequest::default()).unwrap();
     eprintln!("residual {:.1e} {}", found.residual.after, found.residual.unit);
-    // Angles of the table have four decimals.
+    // Angles in the table have four decimals.
     assert!(found.residual.before < 1e-7, "{:e}", found.residual.before);
     for p in &found.parameters {
         assert!((p.value / p.initial - 1.0).abs() < 0.02, "{}: {} {}", p.name, p.value, p.initial);

@@ -1,5 +1,5 @@
 //! Stiffness and damping from hammer tests: tables and universal files, coverage of the intervals,
-//! units and places that are wrong.
+//! wrong units and positions.
 #![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 #![allow(non_snake_case, reason = "monogram notation")]
@@ -15,14 +15,14 @@ use flexarm::{Modelling, Robot};
 use nalgebra::{Complex, Vector3};
 
 const POSE: [f64; 6] = [0.1, -1.2, 1.5, 0.3, 0.7, 0.2];
-/// What is different in the arm that is hit: parameter and factor.
+/// Differences of the tested arm: parameter and factor.
 const TRUTH: [(&str, f64); 4] = [
     ("link.link_2.stiffness_factor", 0.8),
     ("drive.joint_2.gearbox.stiffness", 1.25),
     ("drive.joint_3.gearbox.stiffness", 0.75),
     ("link.link_2.damping", 1.6),
 ];
-/// Part of each value that is noise.
+/// Relative noise of each value.
 const NOISE: f64 = 0.03;
 
 struct Place(PathBuf);
@@ -68,7 +68,7 @@ impl Noise {
     }
 }
 
-/// The arm that is hit, and where: at the tool along z and x, seen along z.
+/// The tested arm, and the test: excited at the tool along z and x, observed along z.
 struct Test {
     plant: Plant,
     hz: Vec<f64>,
@@ -93,7 +93,7 @@ impl Test {
         values
     }
 
-    /// With noise in proportion.
+    /// Adds proportional noise.
     fn noisy(&self, watched: Vector3<f64>, hit: Vector3<f64>, noise: &mut Noise) -> Vec<Complex<f64>> {
         let one = |H: Complex<f64>| H * Complex::new(NOISE * noise.normal(), NOISE * noise.normal()).exp();
         self.response(watched, hit).into_iter().map(one).collect()
@@ -125,8 +125,7 @@ fn told(found: &Identification) -> usize {
     TRUTH.iter().map(|(name, factor)| inside(name, *factor)).sum()
 }
 
-/// Truth: the arm that was hit. Of 160 intervals chance leaves 144 to 158 with it in 99 of 100
-/// cases.
+/// Truth: the tested arm. Of 160 intervals, 144 to 158 contain it by chance in 99 of 100 cases.
 #[test]
 fn stiffness_and_damping_come_back_from_noisy_responses_with_intervals_that_hold_them() {
     let robot = kr210();
@@ -157,19 +156,19 @@ fn stiffness_and_damping_come_back_from_noisy_responses_with_intervals_that_hold
             eprintln!("{}: {:.4} -> {:.4} +- {:.4}", p.name, p.initial, p.value, p.std);
         }
         eprintln!("residual {:.3} -> {:.3} {}", found.residual.before, found.residual.after, found.residual.unit);
-        // The new robot file has the numbers, damping too.
+        // The new robot file has the numbers, including damping.
         let text = std::fs::read_to_string(found.file.unwrap()).unwrap();
         assert!(text.contains("damping = { modal = 0.0") && text.contains("link.link_2.damping ="), "{text}");
         Robot::load(place.0.join("out")).unwrap();
     }
-    // Of a standard normal over 160: 1 within 0.17 in 99 of 100 cases.
+    // For a standard normal distribution over 160: 1 within 0.17 in 99 of 100 cases.
     let spread = (squares / all as f64).sqrt();
     eprintln!("{inside} of {all} intervals hold the truth, errors over deviations {spread:.3}");
     assert!((0.85..1.15).contains(&spread), "{spread}");
     assert!((144..=158).contains(&inside), "{inside} of {all}");
 }
 
-/// A universal file of two functions, node 3 is the tool.
+/// A universal file with two functions; node 3 is the tool.
 fn universal(test: &Test, curves: &[(i64, Vec<Complex<f64>>)], binary: bool) -> Vec<u8> {
     let mut out = Vec::new();
     for (direction, values) in curves {
@@ -204,7 +203,7 @@ fn universal(test: &Test, curves: &[(i64, Vec<Complex<f64>>)], binary: bool) -> 
     out
 }
 
-/// Truth: without noise the arm that was hit, however its responses were written.
+/// Truth: without noise, the tested arm for any format of its responses.
 #[test]
 fn tables_and_universal_files_of_one_test_tell_the_same() {
     let robot = kr210();
@@ -297,8 +296,8 @@ fn shapes_of_modes_tell_how_stiffness_is_shared() {
     }
 }
 
-/// Truth: the dampers of the arm that is hit, each changed by a factor of its own. One factor for
-/// all six would put the part of one damper into the others.
+/// Truth: the dampers of the tested arm, each changed by its own factor. A single factor for all
+/// six would mix the dampers.
 #[test]
 fn dampers_of_a_gearbox_of_six_come_back_one_by_one() {
     let place = Place::new("dampers");

@@ -1,4 +1,4 @@
-//! The library as other programs use it: numbers in, columns out, built once and asked often.
+//! The library as used by other programs: numbers in, columns out, built once and used repeatedly.
 #![allow(non_snake_case, reason = "monogram notation: F, C; see docs/references.md")]
 #![allow(clippy::print_stderr, reason = "what was measured stands beside the bound")]
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
@@ -28,7 +28,7 @@ fn arms_are_shared_by_threads_and_workspaces_are_sent_to_them() {
     is_sent::<Error>();
 }
 
-/// Truth: the run that writes files, whose figures the other tests hold against physics.
+/// Truth: the run that writes files, whose figures are checked against physics by other tests.
 #[test]
 fn a_run_by_values_is_the_run_by_files() {
     let robot = Robot::load(root().join("robots/kr210")).unwrap();
@@ -38,7 +38,7 @@ fn a_run_by_values_is_the_run_by_files() {
     let run = arm.simulate(&motion, &options).unwrap();
     let curves = arm.simulate_with(&motion, &options, RunRequest::keeping(Keep::Curves)).unwrap().summary;
     assert_eq!(run.summary.tcp, curves.tcp);
-    // The figures are the same whatever else of a run is wanted.
+    // The figures do not depend on what else is requested of a run.
     let timeless = |mut summary: flexarm::Summary| {
         (summary.wall_s, summary.cpu_s) = (0.0, 0.0);
         (summary.real_time_factor, summary.cpu_s_per_simulated_s) = (0.0, 0.0);
@@ -46,7 +46,7 @@ fn a_run_by_values_is_the_run_by_files() {
     };
     let figures = timeless(run.summary.clone());
     for _ in 0..2 {
-        // The second finds the arm in equilibrium where the first left it.
+        // The second starts from the equilibrium of the first.
         assert_eq!(
             timeless(arm.simulate_with(&motion, &options, RunRequest::keeping(Keep::Figures)).unwrap().summary),
             figures
@@ -61,7 +61,7 @@ fn a_run_by_values_is_the_run_by_files() {
     for column in run.columns.columns() {
         assert_eq!(column.values.len(), column.width * run.columns.rows(), "{}", column.name);
     }
-    // What moves the tool adds up to its error, to first order in the deflection.
+    // The contributions to the TCP error add up to it, to first order in the deflection.
     let shares = run.values("contribution");
     let n = run.columns.contributors.len();
     for (e, shares) in e.chunks_exact(3).zip(shares.chunks_exact(3 * n)) {
@@ -118,7 +118,7 @@ fn loads_and_payloads_by_value_are_those_of_the_file() {
     assert_eq!(error(&applied(AppliedLoad::during("tcp", F, 0.2, 0.7))), pushed);
     assert_ne!(error(&Scenario::from(&motion)), pushed);
 
-    // Samples that say the same, within and without: nothing before, nothing after.
+    // Equivalent samples, inside and outside: zero before and after.
     let sampled = AppliedLoad::sampled("tcp", &[0.2, 0.4, 0.7], &[F; 3]).unwrap();
     for t in [0.1999, 0.2, 0.3, 0.7, 0.7001] {
         assert_eq!(sampled.wrench.at(t).force.y, if (0.2..=0.7).contains(&t) { 3.0 } else { 0.0 }, "{t}");
@@ -131,7 +131,7 @@ fn loads_and_payloads_by_value_are_those_of_the_file() {
     let said = |scenario: &Scenario| arm.simulate(scenario, &RunOptions::default()).unwrap_err().to_string();
     assert!(said(&elsewhere).contains("\"nowhere\": expected \"tcp\""));
 
-    // A payload is picked up and put down again; what comes and goes with it stands in the energy.
+    // A payload is attached and released again; the corresponding energy is in the balance.
     let text = "[[payload]]\nat = 0.3\nmass = 0.4\ncom = [0.0, 0.1, 0.0]\ninertia = [2e-3, 3e-3, 4e-3, 1e-4, 0.0, 0.0]\n\
                 [[payload]]\nat = 0.8\nmass = 0.0\n";
     let inertia = nalgebra::Matrix3::new(2e-3, 1e-4, 0.0, 1e-4, 3e-3, 0.0, 0.0, 0.0, 4e-3);
@@ -143,7 +143,7 @@ fn loads_and_payloads_by_value_are_those_of_the_file() {
     assert!(by_value.summary.energy.payload_j.abs() > 1e-3, "{:?}", by_value.summary.energy);
     let nowhere = Scenario::from(&motion).with_payload(PayloadChange::release(0.8).on_link("nowhere"));
     assert!(said(&nowhere).starts_with("payload link \"nowhere\": expected a link that moves"));
-    // The caveats too: a load after the end does nothing, wherever it is written.
+    // Same caveats: a load after the end has no effect in either form.
     let late = applied(AppliedLoad::during("tcp", F, 90.0, 91.0));
     assert!(run(&late).summary.warnings.iter().any(|warning| warning.contains("it does nothing")));
 }
@@ -168,9 +168,9 @@ fn an_observer_sees_every_sample_and_can_stop_the_run() {
     assert!(matches!(stopped, Err(Error::Interrupted { t, .. }) if (t - 0.102).abs() < 1e-9), "{:?}", stopped.err());
 }
 
-/// Truth: [`flexarm::statics`] and [`flexarm::modes`], which find equilibrium and modes by other
+/// Truth: [`flexarm::statics`] and [`flexarm::modes`], which compute equilibrium and modes by other
 /// code, with an eigenvalue solver for damped modes. Every shipped robot, link model and drive,
-/// with force and moment at the tool; the three-mass arm turns by half a radian under them.
+/// with force and moment at the TCP; the three-mass arm rotates by half a radian under them.
 /// Measured over 104 poses: 6e-13, 1e-10 (tangents by differences), 2e-14, 1e-13.
 #[test]
 fn operating_points_are_what_statics_and_modes_say() {
@@ -267,7 +267,7 @@ fn a_robot_of_texts_is_the_robot_of_its_files() {
     let read = |name: &str| std::fs::read_to_string(folder.join(name)).unwrap();
     let (text, urdf) = (read("robot.toml"), read("kr210.urdf"));
     let options = flexarm::LoadOptions::default();
-    // The description has no file: its name in the robot file is one that is not there.
+    // The description has no file: the robot file names one that does not exist.
     let text = text.replace("urdf = \"kr210.urdf\"", "urdf = \"nowhere.urdf\"");
     let ours = Robot::from_texts(&text, &urdf, &folder.join("nowhere.toml"), &options).unwrap();
     let theirs = Robot::load(&folder).unwrap();
@@ -277,7 +277,7 @@ fn a_robot_of_texts_is_the_robot_of_its_files() {
         (at.tcp_pose(), at.compliance())
     };
     assert_eq!(sag(&ours), sag(&theirs));
-    // What is wrong in the description is told with its line; what is wrong in the file too.
+    // Errors in the description are reported with their line, as are errors in the robot file.
     let wrong = Robot::from_texts(&text, &urdf.replace("joint_3", "joint_2"), &folder.join("nowhere.toml"), &options);
     let told = wrong.unwrap_err().to_string();
     assert!(told.contains("nowhere.urdf:") && told.contains("joint_2"), "{told}");
@@ -285,7 +285,7 @@ fn a_robot_of_texts_is_the_robot_of_its_files() {
     assert!(wrong.contains("there is no file"), "{wrong}");
 }
 
-/// Truth: the columns themselves. What does not fit is refused, not mended.
+/// Truth: the columns themselves. Inconsistent columns are refused.
 #[test]
 fn columns_that_were_kept_elsewhere_are_columns_again() {
     let robot = Robot::load(root().join("robots/reference_arm")).unwrap();

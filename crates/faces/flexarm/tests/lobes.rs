@@ -1,5 +1,5 @@
 //! Chatter of a tool on an arm: classical cases through the facade, an independent solution at
-//! three poses, runs that chatter.
+//! three poses, simulations that chatter.
 #![allow(
     clippy::unwrap_used,
     clippy::print_stderr,
@@ -29,7 +29,7 @@ fn shipped(tool: &str) -> CuttingTool {
     CuttingTool::load(root().join("robots/tools").join(format!("{tool}.toml"))).unwrap()
 }
 
-/// A folder of its own, gone when dropped.
+/// A folder that is removed when dropped.
 struct Folder(PathBuf);
 
 impl Folder {
@@ -62,8 +62,8 @@ fn at(robot: &Robot, tool: &CuttingTool, pose: &[f64], request: &LobesRequest) -
 }
 
 /// The tool of a classical case: its modes along the feed (x of the TCP) and across it. The axis of
-/// the cut is the tool's, turned: y of the cut is `z × x` with z from the tip to the spindle, so
-/// minus y of the TCP.
+/// the cut is that of the tool, reversed: y of the cut is `z × x` with z from the tip to the
+/// spindle, so minus y of the TCP.
 fn classical(case: &Value) -> String {
     let number = |key: &str| case[key].as_f64().unwrap();
     let mut text = format!(
@@ -89,8 +89,8 @@ fn classical(case: &Value) -> String {
     text
 }
 
-/// Truth: limits of another program (0.2 %). The arm is rigid, the tool is the structure: units,
-/// axes and files are on the way.
+/// Truth: limits of another program (0.2 %). The arm is rigid, the tool is the structure; units,
+/// axes and files are tested as well.
 #[test]
 fn a_tool_on_a_rigid_arm_has_the_limits_of_the_classical_cases() {
     let (robot, folder) = (kr210(), Folder::new("classical"));
@@ -113,8 +113,8 @@ fn a_tool_on_a_rigid_arm_has_the_limits_of_the_classical_cases() {
     assert!(worst < 0.005, "{worst}");
 }
 
-/// Truth: the multi-frequency solution of the exported frequency response, by a script that knows
-/// no modes and no steps.
+/// Truth: the multi-frequency solution of the exported frequency response, by a script that uses no
+/// modes and no time steps.
 #[test]
 fn limits_follow_the_pose_as_the_exported_response_says() {
     let (robot, golden) = (kr210(), golden("kr210_lobes.json"));
@@ -138,12 +138,12 @@ fn limits_follow_the_pose_as_the_exported_response_says() {
         }
     }
     eprintln!("largest difference {worst:.1e}");
-    // measured 2.8e-5: to 9e-5 the truth had settled
+    // measured 2.8e-5; the truth had converged to 9e-5
     assert!(worst < 3e-4, "{worst:.1e}");
 }
 
-/// A measured response of a mode, finely sampled, is that mode: the same zero-order limits; and it
-/// says that it has no others.
+/// A finely sampled measured response of a mode is equivalent to the mode: the same zero-order
+/// limits; and it reports that no other limits are available.
 #[test]
 fn a_measured_response_gives_the_zero_order_limits_of_its_mode() {
     let (robot, folder) = (kr210(), Folder::new("measured"));
@@ -180,7 +180,7 @@ fn a_measured_response_gives_the_zero_order_limits_of_its_mode() {
     assert!(refused.to_string().contains("zero-order"), "{refused}");
 }
 
-/// Identity: the limit along a motion is the smallest of those at its places, each with its feed
+/// Identity: the limit along a motion is the minimum of those at its positions, each with its feed
 /// along the motion.
 #[test]
 fn along_a_motion_the_limit_is_the_smallest_of_its_places() {
@@ -198,12 +198,12 @@ fn along_a_motion_the_limit_is_the_smallest_of_its_places() {
         assert_eq!(point.depth_m, Some(smallest));
         assert_eq!(found.poses[point.pose].depth_m[k], Some(smallest));
     }
-    // The square's sides go along x and y of the world.
+    // The sides of the square are along x and y of the world.
     for pose in &found.poses {
         let largest = pose.feed.iter().fold(0.0_f64, |top, x| top.max(x.abs()));
         assert!(largest > 0.99 || pose.feed[2].abs() < 0.02, "{:?}", pose.feed);
     }
-    // The same at one of its places, with that feed given.
+    // The same at one of its positions, with that feed given.
     let pose = &found.poses[0];
     let [x, y, z] = pose.feed;
     let given = text.replace("[tool]\n", &format!("[tool]\nfeed = [{x}, {y}, {z}]\nfeed_axes = \"world\"\n"));
@@ -215,13 +215,13 @@ fn along_a_motion_the_limit_is_the_smallest_of_its_places() {
     }
 }
 
-/// The arm as it moves, not linearised, with teeth that leave the work: chatters above the limit,
-/// at its frequency, and not below.
+/// The moving arm, not linearised, with teeth that leave the workpiece: it chatters above the
+/// limit, at its frequency, and not below.
 #[test]
 fn a_cut_chatters_above_the_limit_and_not_below() {
     let robot = kr210();
     let pose = [0.0, -1.0, 1.6, 0.0, 0.9, 0.0];
-    // At the first speed the arm itself chatters, at the second the tool on it.
+    // At the first speed the arm chatters, at the second the tool on it.
     for (rpm, chatter_below_hz) in [(1500.0, 60.0), (4000.0, 2000.0)] {
         let tool = shipped("face_mill_63mm");
         let request = LobesRequest::default();
@@ -260,7 +260,7 @@ fn a_cut_chatters_above_the_limit_and_not_below() {
     }
 }
 
-/// What people get wrong, with the place and how to mend it.
+/// Typical mistakes, reported with their location and the fix.
 #[test]
 fn a_wrong_tool_is_told_with_its_place() {
     let folder = Folder::new("wrong");
@@ -309,7 +309,7 @@ fn a_wrong_tool_is_told_with_its_place() {
     assert!(matches!(stopped, Err(Error::Interrupted { .. })));
 }
 
-/// Files are whole, read back, and not overwritten unless asked.
+/// Files are complete, readable, and not overwritten unless requested.
 #[test]
 fn table_diagram_page_and_figures_are_written_together() {
     let (robot, folder) = (kr210(), Folder::new("files"));
@@ -328,8 +328,8 @@ fn table_diagram_page_and_figures_are_written_together() {
     assert!(matches!(lobes(&robot, &tool, &place, &request, &|_, _| true), Err(Error::Taken { .. })));
 }
 
-/// Truth: the same direction in other axes. The tool's axis at the pose is known from a run with
-/// the axes of the TCP.
+/// Truth: the same direction in other axes. The tool's axis at the pose comes from a run with TCP
+/// axes.
 #[test]
 fn a_tool_axis_in_world_axes_is_the_same_axis() {
     let (robot, folder) = (kr210(), Folder::new("axis"));

@@ -1,5 +1,5 @@
-//! Closed loops of robot files: the shipped palletiser against closed forms, its runs, and what is
-//! refused with which words.
+//! Closed loops of robot files: the shipped palletiser compared with closed forms, its runs, and
+//! the messages of refusals.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 
@@ -21,13 +21,13 @@ fn palletiser() -> Robot {
 /// Values of joint_1 to joint_4.
 const PLACES: [[f64; 4]; 3] = [[0.3, 0.5, 0.8, -0.4], [-1.2, -0.1, 0.9, 2.0], [2.0, 0.9, 0.7, 0.0]];
 
-/// In the order of the tree, where the crank comes after all that the lower arm carries.
+/// In the order of the tree, where the crank comes after everything that the lower arm carries.
 fn order([turn, lower, crank, tool]: [f64; 4]) -> [f64; 4] {
     [turn, lower, tool, crank]
 }
 
-/// Truth: opposite sides stay parallel. The tool is where lower arm and upper arm bring it, each by
-/// its own driving joint, the hand stays level, and a weight at the tool is carried by virtual
+/// Truth: opposite sides stay parallel. Lower arm and upper arm position the TCP, each by its own
+/// driving joint, the hand stays level, and a weight at the TCP is carried according to virtual
 /// work. Measured 1.3e-15 m, 4e-16 and 1.9e-15 of the weight.
 #[test]
 fn the_palletiser_stands_and_holds_as_its_parallelograms_say() {
@@ -52,8 +52,8 @@ fn the_palletiser_stands_and_holds_as_its_parallelograms_say() {
             (0..4).map(|k| (seen.gravity_torque[k] - bare.gravity_torque[k] - held[k]).abs()).fold(0.0, f64::max);
         eprintln!("tool {off:.1e} m, tilt {:.1e}, torque {:.1e}", x.hypot(y), miss / weight);
         assert!(off < 1e-13 && x.hypot(y) < 1e-13 && miss < 1e-12 * weight, "{off:e} {x} {y} {miss:e}");
-        // The elbow turns by the difference of the two drives, the wrist takes back what the upper
-        // arm turned.
+        // The elbow turns by the difference of the two drives, the wrist compensates the rotation
+        // of the upper arm.
         let joint = |name: &str| seen.loops.iter().flat_map(|l| &l.dependent).find(|j| j.name == name).unwrap().q;
         assert!((joint("elbow") - (at[2] - at[1])).abs() < 1e-8, "{}", joint("elbow"));
         assert!((joint("wrist") + at[2]).abs() < 1e-8);
@@ -71,7 +71,7 @@ fn the_palletiser_as_shipped_has_no_warnings() {
     assert!(loud.is_empty(), "{loud:#?}");
 }
 
-/// Truth: the energy books close, and steppers that share nothing but the equations agree. Measured
+/// Truth: the energy balance closes, and steppers that share only the equations agree. Measured
 /// peak 3.94 mm, 2.4e-7 between them.
 #[test]
 fn a_run_of_the_palletiser_keeps_the_books_in_every_stepper() {
@@ -88,7 +88,7 @@ fn a_run_of_the_palletiser_keeps_the_books_in_every_stepper() {
     });
     eprintln!("peaks {peaks:?}");
     assert!(peaks[0] > 3e-4 && (peaks[0] / peaks[1] - 1.0).abs() < 1e-5, "{peaks:?}");
-    // SPOOK in its own coordinates, of first order and with damping in proportion to the stiffness.
+    // SPOOK in its own coordinates, first order and with stiffness-proportional damping.
     let spook = StepperKind::Spook(flexarm::SpookSettings::default());
     let run = arm.simulate(&motion, &options(spook)).unwrap();
     let off = run.summary.tcp.as_ref().unwrap().peak_m / peaks[0] - 1.0;
@@ -96,8 +96,8 @@ fn a_run_of_the_palletiser_keeps_the_books_in_every_stepper() {
     assert!(off.abs() < 1e-2, "{off:.1e}");
 }
 
-/// Truth: one spring on the crank, virtual work: with the gearbox of joint_3 alone the tool sinks
-/// by (dz/dq)² F/k, dz/dq = 1.35 cos q3.
+/// Truth: one spring on the crank, virtual work: with only the gearbox of joint_3 elastic, the TCP
+/// sinks by (dz/dq)² F/k, dz/dq = 1.35 cos q3.
 #[test]
 fn compliance_of_the_crank_reaches_the_tool_through_the_rod() {
     let mut robot = palletiser();
@@ -116,9 +116,9 @@ fn compliance_of_the_crank_reaches_the_tool_through_the_rod() {
     }
 }
 
-/// Truth: virtual work. A rod of stiffness EA/L that alone gives way lets the tool sink by (dS/dF)²
-/// L/EA, S = F 1.35 cos q3/(0.4 sin μ) the force in it, μ the transmission angle. Measured 3e-4,
-/// 2e-4 and 1e-3 (the weight on the lever).
+/// Truth: virtual work. With only a rod of stiffness EA/L elastic, the TCP sinks by (dS/dF)² L/EA,
+/// where S = F 1.35 cos q3/(0.4 sin μ) is the force in the rod, μ the transmission angle. Measured
+/// 3e-4, 2e-4 and 1e-3 (the weight on the lever).
 #[test]
 fn a_rod_that_stretches_lets_the_tool_sink_by_the_square_of_its_lever() {
     let shipped = std::fs::read_to_string(project("robots/palletiser/robot.toml")).unwrap();
@@ -157,13 +157,13 @@ fn a_motion_over_a_dead_point_or_out_of_reach_is_refused_with_time_and_loop() {
         let options = RunOptions { ignore_limits: true, ..RunOptions::default() };
         arm.simulate(motion_of(&robot, q), &options).map(|_| ()).unwrap_err().to_string()
     };
-    // The lever comes parallel to the lower arm with the elbow at 125 degrees.
+    // The lever becomes parallel to the lower arm with the elbow at 125 degrees.
     let error = run(&[[0.0, 0.0, 0.3, 0.0], [0.0, -0.4, 2.5, 0.0]]);
     assert!(
         error.contains("at t = 0.") && error.contains("\"drive of the upper arm\" passes its dead point"),
         "{error}"
     );
-    // A rod that is too short does not reach everywhere.
+    // A rod that is too short cannot close the loop everywhere.
     let mut short = palletiser();
     let mut own = short.rigid.loops.remove(0);
     own.name = "short".into();
@@ -193,7 +193,7 @@ fn a_motion_names_the_joints_that_drive() {
     }
 }
 
-/// The shipped robot file with a change; the message.
+/// Returns the message for the shipped robot file with a change.
 fn refused(from: &str, to: &str) -> String {
     let folder = std::env::temp_dir().join(format!("flexarm-loops-{}", std::process::id()));
     std::fs::create_dir_all(&folder).unwrap();
@@ -241,7 +241,7 @@ fn what_no_loop_is_is_refused_with_its_place_and_what_is_expected() {
     }
 }
 
-/// The same loop as a value; a joint of it with a drive is refused.
+/// The same loop as a value; a drive on one of its joints is refused.
 #[test]
 fn loops_are_values_too() {
     let robot = palletiser();
@@ -269,7 +269,8 @@ fn loops_are_values_too() {
     assert!(error.contains("has a drive and follows from the loop"), "{error}");
 }
 
-/// Bars that do not fit at rest are told: a pin 30 mm off leaves the loop closed elsewhere.
+/// Bars that do not fit at rest are reported: with a pin 30 mm off the loop closes at another
+/// position.
 #[test]
 fn a_loop_that_closes_elsewhere_than_it_is_drawn_is_told() {
     let mut robot = palletiser();

@@ -1,4 +1,4 @@
-//! Maps against single answers, symmetries and a search by hand.
+//! Maps compared with single results, symmetries and a manual search.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
 use std::ops::ControlFlow;
@@ -78,8 +78,8 @@ fn a_hundred_poses_of_a_map_are_those_of_statics_and_modes_to_the_last_bit() {
     }
 }
 
-/// Truth: turning the whole arm about the direction of gravity changes the direction of the sag and
-/// of the softest force, and nothing else. Joint 1 of these arms stands upright.
+/// Truth: turning the whole arm about the direction of gravity changes only the direction of the
+/// sag and of the softest force. Joint 1 of these arms is vertical.
 #[test]
 fn turning_the_arm_about_gravity_changes_no_size() {
     for name in ["kr210", "kr210_identified"] {
@@ -99,7 +99,7 @@ fn turning_the_arm_about_gravity_changes_no_size() {
     }
 }
 
-/// Truth: the place of the rigid tool at the joint values that were found.
+/// Truth: the position of the rigid TCP at the joint values found.
 #[test]
 fn every_pose_of_a_workspace_map_has_its_tool_on_the_grid_within_the_limits() {
     let robot = robot("kr210");
@@ -124,7 +124,7 @@ fn every_pose_of_a_workspace_map_has_its_tool_on_the_grid_within_the_limits() {
     }
     assert!(most_branches >= 3.0, "an arm with a wrist has several branches, found {most_branches}");
 
-    // The best and the worst of each place are those that all of them have.
+    // The best and the worst pose of each position are among all of its poses.
     let kept = |keep| taken(&robot, &MapRequest { region: region.clone(), keep, ..MapRequest::default() });
     let (best, worst) = (kept(KeptPoses::Best), kept(KeptPoses::Worst));
     assert_eq!(best.reachable, all.reachable);
@@ -139,7 +139,7 @@ fn every_pose_of_a_workspace_map_has_its_tool_on_the_grid_within_the_limits() {
     assert_eq!(worst.worst.value, worst.quantities[name].max);
 }
 
-/// Truth: the mirror image of an arm that is its own mirror image is the arm on the other side.
+/// Truth: for a mirror-symmetric arm, the mirrored pose gives the mirrored result.
 #[test]
 fn an_arm_that_is_symmetric_has_a_symmetric_map() {
     let robot = robot("kr210_identified");
@@ -156,7 +156,7 @@ fn an_arm_that_is_symmetric_has_a_symmetric_map() {
         worst = worst.max((sag / other - 1.0).abs());
     }
     assert!(rows.len() > 100);
-    // Measured: 6.1e-6, the links' products of inertia.
+    // Measured: 6.1e-6, from the products of inertia of the links.
     assert!(worst < 1e-4, "{worst:e}");
 }
 
@@ -174,8 +174,8 @@ fn a_map_is_the_same_bytes_on_one_thread_and_on_several() {
     assert!(one.iter().zip(&three).all(|(a, b)| a.to_bits() == b.to_bits()) && one.len() == three.len());
 }
 
-/// Truth: to first order the displacements that the elements cause add up to the whole; what is
-/// left is of second order.
+/// Truth: to first order the displacements due to the elements add up to the total; the rest is of
+/// second order.
 #[test]
 fn shares_of_the_elements_add_up_to_the_whole() {
     let robot = robot("kr210");
@@ -229,15 +229,15 @@ fn a_workpiece_goes_where_its_worst_place_is_best() {
     assert_eq!(values.len(), placement.points);
     assert_eq!(placement.points, 3 * 4 * 2);
     assert_eq!(values.iter().copied().fold(0.0, f64::max), placement.worst);
-    // Nothing is mapped where the arm itself stands.
+    // Nothing is mapped at the position of the arm itself.
     assert!((0..found.table.rows()).all(|k| found.table.row(k)[0].hypot(found.table.row(k)[1]) > 0.9 - 1e-9));
     let huge = MapRequest { workpiece_m: Some([3.0, 3.0, 3.0]), ..request };
     let found = taken(&robot, &huge);
     assert!(found.placement.is_none() && found.caveats.iter().any(|c| c.code == "no-placement"));
 }
 
-/// Truth: the place of the rigid tool; the arm is the shipped one with joint 5 out of square by 8
-/// degrees, of no known class.
+/// Truth: the position of the rigid TCP; the arm is the shipped one with joint 5 tilted by 8
+/// degrees, which belongs to no known class.
 #[test]
 fn an_arm_without_a_closed_form_is_searched_and_lands_on_the_grid() {
     let folder = std::env::temp_dir().join(format!("flexarm-map-{}", std::process::id()));
@@ -321,8 +321,8 @@ fn limits_of_depth_of_a_map_are_those_of_lobes_to_the_last_bit() {
     assert!(found.best.value > 1.05 * found.worst.value, "{depths:?}");
 }
 
-/// Truth: with the feed of the tool's own axes, turning the whole arm about the direction of
-/// gravity changes nothing.
+/// Truth: with the feed in tool axes, turning the whole arm about the direction of gravity changes
+/// nothing.
 #[test]
 fn turning_the_arm_about_gravity_changes_no_limit_of_depth() {
     let robot = robot("kr210");

@@ -1,4 +1,4 @@
-//! Sound meshes reduce without a word, meshes with one fault each are refused or told apart: both
+//! Valid meshes reduce without a warning, meshes with one fault each are refused or reported: both
 //! are counted.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 #![allow(clippy::print_stderr, reason = "the counts are what a reader of the test wants to see")]
@@ -10,12 +10,12 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use flexarm::reduce::{At, InterfaceEntry, MaterialChoice, QuadratureChoice, ReduceJob, ReduceOptions, Tie, reduce};
 
-/// A bar of 600 x 60 x 40 mm along x as a deck of CalculiX, in memory, so that single things can be
-/// spoilt.
+/// A bar of 600 x 60 x 40 mm along x as a CalculiX deck in memory, so that single entries can be
+/// corrupted.
 #[derive(Clone)]
 struct Bar {
     kind: &'static str,
-    /// By number: position, mm.
+    /// Position by node number, mm.
     nodes: BTreeMap<usize, [f64; 3]>,
     elements: Vec<Vec<usize>>,
     /// Material of the deck: E, nu, rho in mm-t-s.
@@ -29,8 +29,8 @@ const WEDGE_EDGES: &[[usize; 2]] = &[[0, 1], [1, 2], [2, 0], [3, 4], [4, 5], [5,
 const BRICK_EDGES: &[[usize; 2]] =
     &[[0, 1], [1, 2], [2, 3], [3, 0], [4, 5], [5, 6], [6, 7], [7, 4], [0, 4], [1, 5], [2, 6], [3, 7]];
 
-/// Corners of the elements in one cell (bits 0, 1, 2 of a number: x, y, z), and their edges where
-/// these have nodes.
+/// Corners of the elements in one cell (bits 0, 1, 2 of a number: x, y, z), and the edges with
+/// mid-side nodes.
 fn shape(kind: &str) -> (Vec<Vec<usize>>, &'static [[usize; 2]]) {
     let tets = vec![
         vec![0, 1, 3, 7],
@@ -53,11 +53,11 @@ fn shape(kind: &str) -> (Vec<Vec<usize>>, &'static [[usize; 2]]) {
 }
 
 impl Bar {
-    /// In cells; sets A and B at its ends.
+    /// Dimensions in cells; sets A and B at its ends.
     fn new(kind: &'static str, cells: [usize; 3]) -> Self {
         let (corners, edges) = shape(kind);
         let mut nodes: BTreeMap<usize, [f64; 3]> = BTreeMap::new();
-        // A number tells the place on a grid of half cells.
+        // A node number encodes the position on a grid of half cells.
         let mut number = |at: [usize; 3]| {
             let id = 1 + at[0] + 1000 * at[1] + 100_000 * at[2];
             nodes.insert(id, [0, 1, 2].map(|c| SIZE[c] * at[c] as f64 / (2 * cells[c]) as f64));
@@ -104,8 +104,8 @@ impl Bar {
         text
     }
 
-    /// Gives the elements that `far` chooses by the mean of their corners nodes of their own where
-    /// these pass `at`.
+    /// Gives the elements that `far` selects by the mean of their corners separate nodes where
+    /// these satisfy `at`.
     fn split(&mut self, far: impl Fn([f64; 3]) -> bool, at: impl Fn(&[f64; 3]) -> bool) {
         let mean = |nodes: &[usize], bar: &Self| {
             [0, 1, 2].map(|c| nodes.iter().map(|n| bar.nodes[n][c]).sum::<f64>() / nodes.len() as f64)
@@ -125,7 +125,7 @@ impl Bar {
     }
 }
 
-/// A folder that is gone when the test ends.
+/// A folder that is removed when the test ends.
 struct Folder(PathBuf);
 
 impl Folder {
@@ -158,7 +158,7 @@ fn job(mesh: &Path) -> ReduceJob {
     job
 }
 
-/// Everything that is said about a mesh: the error, or the warnings.
+/// All messages about a mesh: the error, or the warnings.
 fn said(deck: &str, change: impl Fn(&mut ReduceJob)) -> Vec<String> {
     let folder = Folder::new();
     let path = folder.0.join("bar.inp");
@@ -166,8 +166,8 @@ fn said(deck: &str, change: impl Fn(&mut ReduceJob)) -> Vec<String> {
     let mut job = job(&path);
     change(&mut job);
     match reduce(&job, &ReduceOptions::default(), None, &mut |_| {}) {
-        // That two rigid parts are coarse for a uniform bar is true and no fault of the mesh; nor
-        // is what C3D8 is read as.
+        // Excluded: two rigid parts are coarse for a uniform bar, which is no fault of the mesh;
+        // and the note on the interpretation of C3D8.
         Ok(summary) => summary
             .warnings
             .into_iter()
@@ -196,7 +196,7 @@ fn sound_meshes_of_every_kind_reduce_without_a_false_alarm() {
         ("C3D20", [12, 2, 2]),
         ("C3D15", [8, 1, 1]),
         ("C3D15", [12, 2, 2]),
-        // Bricks with incompatible modes bend in one layer.
+        // Bricks with incompatible modes can bend in one layer.
         ("C3D8", [24, 6, 4]),
         ("C3D8I", [24, 6, 4]),
         ("C3D8", [36, 8, 6]),
@@ -205,7 +205,7 @@ fn sound_meshes_of_every_kind_reduce_without_a_false_alarm() {
         see(format!("{kind} {cells:?}"), bar.deck(), &|_| {});
         see(format!("{kind} {cells:?}, distributing"), bar.deck(), &|job| job.tie = Some(Tie::Distributing));
     }
-    // Materials, units and shapes of real links.
+    // Realistic materials, units and shapes.
     let bar = Bar::new("C3D20", [6, 1, 1]);
     for material in
         ["steel", "aluminium", "cast_iron", "ductile_iron", "113e9,0.34,4430", "2.3e9,0.39,1050", "135e9,0.3,1600"]
@@ -220,7 +220,7 @@ fn sound_meshes_of_every_kind_reduce_without_a_false_alarm() {
     metres.material = [210e9, 0.3, 7850.0];
     see("metres".into(), metres.deck(), &|job| job.units = Some("m-kg-s".parse().unwrap()));
     let mut bent = Bar::new("C3D10", [12, 2, 2]);
-    // An arc of 60 degrees, mid-side nodes on it.
+    // An arc of 60 degrees, with mid-side nodes on it.
     bent.nodes.values_mut().for_each(|p| {
         let (angle, radius) = (p[0] / 573.0, 573.0 + p[1]);
         *p = [radius * angle.sin(), radius * angle.cos(), p[2]];
@@ -233,7 +233,7 @@ fn sound_meshes_of_every_kind_reduce_without_a_false_alarm() {
     assert_eq!(checked, 30);
 }
 
-/// What is spoilt, the deck, what the job says otherwise, and a word that must be in the answer.
+/// The fault, the deck, changes of the job, and a word that must be in the answer.
 type Fault = (&'static str, String, Box<dyn Fn(&mut ReduceJob)>, &'static str);
 
 fn same() -> Box<dyn Fn(&mut ReduceJob)> {
@@ -263,7 +263,7 @@ fn element_faults() -> Vec<Fault> {
     one.elements[7].swap(0, 1);
     list.push(("one folded element", one.deck(), same(), "inverted"));
     let mut sliver = Bar::new("C3D4", [12, 6, 6]);
-    // Nearly into the plane of three neighbours, within one element alone.
+    // Almost in the plane of three neighbours, within only one element.
     let [a, b, c, d] = sliver.elements[100][..] else { unreachable!() };
     let p = [a, b, c].map(|n| sliver.nodes[&n]);
     let centre = [0, 1, 2].map(|k| (p[0][k] + p[1][k] + p[2][k]) / 3.0);
@@ -322,7 +322,7 @@ fn connection_faults() -> Vec<Fault> {
     list
 }
 
-/// Corners are on even places of the grid of half cells.
+/// Corners are at even positions of the grid of half cells.
 fn is_corner(id: usize) -> bool {
     let at = [(id - 1) % 1000, (id - 1) / 1000 % 100, (id - 1) / 100_000];
     at.iter().all(|k| k % 2 == 0)
@@ -421,7 +421,7 @@ fn merging_closes_a_crack() {
     assert!(error.abs() < 1e-9, "{error:.1e}");
 }
 
-/// Truth: the same mesh in second order, reduced by itself, through another program path.
+/// Truth: the same mesh in second order, reduced separately, through another program path.
 #[test]
 fn the_estimate_of_the_stiffness_of_linear_elements_is_what_quadratic_ones_give() {
     let folder = Folder::new();
@@ -442,8 +442,8 @@ fn the_estimate_of_the_stiffness_of_linear_elements_is_what_quadratic_ones_give(
     }
 }
 
-/// Truth: on right-angled bricks the points of CalculiX integrate stiffness and mass as exactly as
-/// the own rules do.
+/// Truth: on rectangular bricks the points of CalculiX integrate stiffness and mass as exactly as
+/// flexarm's rules.
 #[test]
 fn c3d8i_keeps_its_incompatible_modes_under_the_rules_of_calculix() {
     let folder = Folder::new();
@@ -456,7 +456,7 @@ fn c3d8i_keeps_its_incompatible_modes_under_the_rules_of_calculix() {
     let truth = frequency("C3D8I", QuadratureChoice::Exact);
     let error = frequency("C3D8I", QuadratureChoice::Calculix) / truth - 1.0;
     assert!(error.abs() < 1e-10, "{error:.1e}");
-    // C3D8 has none there: it is what `calculix` says, and too stiff.
+    // C3D8 has none there, as `calculix` implies, and is too stiff.
     assert!(frequency("C3D8", QuadratureChoice::Calculix) / truth > 1.1);
 
     let both = Bar::new("C3D8I", [4, 1, 1]).deck().replacen(
@@ -469,7 +469,7 @@ fn c3d8i_keeps_its_incompatible_modes_under_the_rules_of_calculix() {
     assert!(said.iter().any(|sentence| sentence.contains("C3D8I as well as C3D8")), "{said:?}");
 }
 
-/// A brick beyond the end of a bar of four cells, as a line of a deck; its far nodes come with it.
+/// A brick beyond the end of a bar of four cells, as a line of a deck, with its far nodes.
 fn twin_brick() -> String {
     let id = |at: [usize; 3]| 1 + at[0] + 1000 * at[1] + 100_000 * at[2];
     let near = [[8, 0, 0], [8, 2, 0], [8, 2, 2], [8, 0, 2]].map(id);

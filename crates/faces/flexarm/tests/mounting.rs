@@ -1,4 +1,4 @@
-//! What the base of a robot stands on: springs, beams, walls and rails, against closed forms and
+//! Mounting of the base of a robot: springs, beams, walls and rails, compared with closed forms and
 //! between the steppers.
 #![allow(non_snake_case, reason = "monogram notation")]
 #![allow(clippy::print_stderr, reason = "what was measured stands beside the bound")]
@@ -26,7 +26,7 @@ const URDF: &str = r#"<robot name="cell">
   <link name="tool"/>
 </robot>"#;
 
-/// Without mass in the base.
+/// The same without mass in the base.
 fn light_base() -> String {
     let (head, rest) = URDF.split_once("<link name=\"base\">").unwrap();
     let rest = rest.split_once("</link>").unwrap().1;
@@ -63,7 +63,7 @@ impl Drop for Place {
     }
 }
 
-/// Six springs with blocks that couple them, positive definite.
+/// Six coupled springs, positive definite.
 fn coupled() -> Matrix6<f64> {
     let mut K = Matrix6::from_diagonal(&STIFF.into());
     for (i, j, k) in [(0, 4, 3e7), (1, 3, -2e7), (2, 5, 1e7), (0, 1, 4e7)] {
@@ -91,9 +91,9 @@ fn turned(R: &Matrix3<f64>) -> Matrix6<f64> {
     both
 }
 
-/// Truth: a rigid arm on springs moves its tool by `Ad C_S Adᵀ F`, C_S the inverse of the stiffness
-/// turned into world axes, Ad the lever from the springs to the tool. Measured 2.9e-16 of the
-/// largest compliance.
+/// Truth: a rigid arm on springs moves its TCP by `Ad C_S Adᵀ F`, with C_S the inverse of the
+/// stiffness rotated into world axes, Ad the lever from the springs to the TCP. Measured 2.9e-16 of
+/// the maximum compliance.
 #[test]
 fn the_tool_of_a_rigid_arm_gives_way_by_the_compliance_of_the_springs_at_its_lever() {
     let place = Place::new("tilt");
@@ -109,7 +109,7 @@ fn the_tool_of_a_rigid_arm_gives_way_by_the_compliance_of_the_springs_at_its_lev
     let error = Matrix6::from_fn(|i, j| found.compliance[i][j] - C[(i, j)]).amax() / C.amax();
     eprintln!("compliance at the lever: {error:.1e}");
     assert!(error < 1e-13, "{error}");
-    // Its share has its name, and the springs carry what pulls at the tool.
+    // Its share has its name, and the springs carry the load on the TCP.
     let pulled = statics(&robot, &Modelling::default(), Some(&[x, slew]), [0.0, 0.0, -500.0, 0.0, 0.0, 0.0]).unwrap();
     assert_eq!(pulled.elements.iter().map(|e| e.name.as_str()).collect::<Vec<_>>(), ["mounting"]);
     let share = pulled.elements[0].tcp_displacement_m;
@@ -122,7 +122,7 @@ fn the_tool_of_a_rigid_arm_gives_way_by_the_compliance_of_the_springs_at_its_lev
 }
 
 /// Truth: the whole robot is one body on springs, `K φ = ω² M φ` with its mass, centre and moments
-/// about the springs summed up by Steiner's theorem. Measured 2e-15.
+/// about the springs from Steiner's theorem. Measured 2e-15.
 #[test]
 fn the_first_frequencies_are_those_of_a_rigid_body_on_the_springs() {
     let place = Place::new("modes");
@@ -162,7 +162,7 @@ fn the_first_frequencies_are_those_of_a_rigid_body_on_the_springs() {
     assert!(error < 1e-12, "{error} {:?} {hz:?}", found.undamped_frequencies_hz);
 }
 
-/// The compliance of a beam at its end, clamped at the other, along x of the base; Euler-Bernoulli.
+/// The stiffness of a beam at its end, clamped at the other, along x of the base; Euler-Bernoulli.
 fn beam_stiffness(l: f64, EA: f64, EI: f64, GJ: f64) -> Matrix6<f64> {
     let mut C = Matrix6::zeros();
     (C[(0, 0)], C[(3, 3)]) = (l / EA, l / GJ);
@@ -173,10 +173,10 @@ fn beam_stiffness(l: f64, EA: f64, EI: f64, GJ: f64) -> Matrix6<f64> {
     C.try_inverse().unwrap()
 }
 
-/// Identity: a beam below the base is the springs of its far end's closed-form stiffness, in both
-/// link models; so is a joint with a 6x6 gearbox that stands still. Compliance, displacement and
-/// frequencies; measured 1.2e-8 for the beam in two parts, 1e-15 (frequencies 9.8e-7: its mass) in
-/// modes, the same bits for the gearbox.
+/// Identity: a beam below the base is equivalent to springs with the closed-form stiffness of its
+/// far end, in both link models; so is a joint at rest with a 6x6 gearbox. Compliance, displacement
+/// and frequencies; measured 1.2e-8 for the beam in two parts, 1e-15 (frequencies 9.8e-7, due to
+/// its mass) with modes, bitwise equal for the gearbox.
 #[test]
 fn springs_a_beam_and_a_gearbox_of_six_are_the_same_mounting() {
     let place = Place::new("identity");
@@ -208,7 +208,7 @@ fn springs_a_beam_and_a_gearbox_of_six_are_the_same_mounting() {
     compare("lumped beam", figures(&place.robot(&beam("lumped"))), 1e-6);
     compare("modal beam", figures(&place.robot(&beam("modal"))), 1e-5);
 
-    // A slide below the base that stands still, with a gearbox that yields in all directions.
+    // A prismatic joint at rest below the base, with a gearbox that is elastic in all directions.
     let below = URDF.replace(
         "<link name=\"base\">",
         "<link name=\"floor\"/><joint name=\"still\" type=\"prismatic\"><parent link=\"floor\"/><child link=\"base\"/><axis xyz=\"0 0 1\"/>\
@@ -227,9 +227,8 @@ fn springs_a_beam_and_a_gearbox_of_six_are_the_same_mounting() {
 }
 
 /// Truth, to first order: on springs at its origin a base sinks by `m g / k` along gravity and
-/// turns by the moment of the weight over the stiffness; on the ceiling and the wall as on the
-/// floor, and with the cart farther out by so much more. What is left of first order is the
-/// deflection times itself.
+/// rotates by the moment of the weight over the stiffness; on ceiling and wall as on the floor, and
+/// in proportion with the cart farther out. The remainder is of second order.
 #[test]
 fn the_sag_on_floor_wall_and_ceiling_follows_the_weight_and_the_place_on_the_rail() {
     let place = Place::new("wall");
@@ -263,7 +262,7 @@ const DAMPED: &str = "damping = { stiffness_beta = 2e-4 }\n";
 
 /// Truth: the reference stepper under error control; measured 5.3e-5 of the peak for
 /// generalised-alpha at 0.5 ms, 3.4e-5 SDIRK, 1.5e-7 RK4 at 0.1 ms, 5.8e-4 SPOOK at 0.1 ms. The
-/// mounting is the whole error, and by name; a run in a batch is the run alone.
+/// mounting is the whole error, under its name; a run in a batch equals a single run.
 #[test]
 fn every_stepper_swings_on_the_mounting_as_the_reference_does() {
     let place = Place::new("steppers");
@@ -306,7 +305,7 @@ fn every_stepper_swings_on_the_mounting_as_the_reference_does() {
         let found = found.unwrap();
         assert!((found.peak_m / alone.peak_m - 1.0).abs() < 1e-12, "{} {}", found.peak_m, alone.peak_m);
     }
-    // The rigid twin, and links that are rigid, stand on rigid ground.
+    // The rigid twin, and robots with rigid links, have a rigid mounting.
     let rigid = robot.flexible(Modelling { links: LinkModel::Rigid, ..Modelling::default() }).unwrap();
     assert_eq!(rigid.flexible().springs.len(), 0);
 }
@@ -345,12 +344,13 @@ fn what_makes_no_mounting_is_refused_with_what_was_found_and_expected() {
     fails("reduced = \"nowhere.flex\"", &["there is no file"]);
     fails(&format!("{six}mas = 3.0"), &["unknown field `mas`"]);
 
-    // A base without mass: what swings on the springs is not known, unless the file says so.
+    // A base without mass: the mass that oscillates on the springs is unknown, unless the file
+    // defines it.
     std::fs::write(place.0.join("cell.urdf"), light_base()).unwrap();
     fails(&six, &["\"base\"", "no mass", "mass = 0.0"]);
     let robot = place.robot(&format!("{HEAD}[mounting]\n{six}mass = 0.0\n"));
     assert_eq!(robot.flexible_robot().unwrap().model.n_elastic(), 6);
-    // Stiffness in N/mm is told.
+    // Stiffness in N/mm is reported.
     place.robot(&format!("{HEAD}[mounting]\nstiffness = [2e5, 3e5, 4e5, 5e4, 6e4, 7e4]\nmass = 100.0\n"));
     let told = check(&place.0, None, &LoadOptions::default());
     let soft: Vec<_> = told.iter().filter(|f| f.code == "mounting-soft").collect();
@@ -358,7 +358,7 @@ fn what_makes_no_mounting_is_refused_with_what_was_found_and_expected() {
     assert!(check(&place.0, None, &LoadOptions::default()).iter().all(|f| f.code != "no-flexible-link"));
 }
 
-/// The compliance of an operating point is that of statics, at any pose; measured 1e-15.
+/// The compliance of an operating point equals that of statics at any pose; measured 1e-15.
 #[test]
 fn an_operating_point_on_springs_has_the_compliance_of_statics() {
     let place = Place::new("point");

@@ -1,5 +1,4 @@
-//! `new_robot`: what it makes of descriptions can be loaded, moved along and checked, whatever the
-//! description lacks.
+//! `new_robot`: its robots can be loaded, moved and checked, whatever the description lacks.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 #![allow(clippy::print_stdout, reason = "the measured error stands beside its bound")]
 
@@ -8,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use flexarm::{Error, InertiaEstimate, Motion, NewError, NewOptions, NewRobot, Robot, check, new_robot};
 
-/// A folder that goes away with the test.
+/// A folder that is removed with the test.
 struct Folder(PathBuf);
 
 impl Folder {
@@ -33,17 +32,17 @@ impl Drop for Folder {
     }
 }
 
-/// What a generated arm has and lacks.
+/// Features of a generated arm.
 #[derive(Clone)]
 struct Arm {
-    /// Before the names of all links and joints.
+    /// Prefix of the names of all links and joints.
     prefix: &'static str,
     masses: bool,
-    /// Attributes of `<limit>`; none makes the joints continuous.
+    /// Attributes of `<limit>`; without them the joints are continuous.
     limit: Option<&'static str>,
     /// Element with the shapes: visual or collision.
     shapes: &'static str,
-    /// Instead of the box of the upper arm.
+    /// Shape instead of the box of the upper arm.
     upper_shape: Option<String>,
     /// Factor on the moments of inertia about x.
     odd: f64,
@@ -58,7 +57,7 @@ const ARM: Arm = Arm {
     odd: 1.0,
 };
 
-/// Wall, width (y) and height (z) of the upper arm, its length and density.
+/// Wall, width (y), height (z), length and density of the upper arm.
 const UPPER: (f64, f64, f64, f64, f64) = (0.006, 0.14, 0.18, 0.8, 2700.0);
 
 fn upper_mass() -> f64 {
@@ -67,7 +66,7 @@ fn upper_mass() -> f64 {
 }
 
 impl Arm {
-    /// Three joints: turn about z, then two about y; links along x.
+    /// Three joints: one about z, then two about y; links along x.
     fn elements(&self, parent: &str) -> String {
         let p = self.prefix;
         let mut t = String::new();
@@ -88,7 +87,7 @@ impl Arm {
         for (name, mass, com, shape, place) in links {
             write!(t, r#"<link name="{p}{name}">"#).unwrap();
             if self.masses {
-                // As of a box of 0.3 m.
+                // Inertia of a box of 0.3 m.
                 let i = mass * 0.09 / 6.0;
                 write!(
                     t,
@@ -133,7 +132,7 @@ fn made(folder: &Folder, urdf: &str, options: &NewOptions) -> NewRobot {
     new_robot(&path, &folder.0.join("far/away/made"), false, options).unwrap()
 }
 
-/// Codes of findings that are no notes, and what must hold of all robots that are made.
+/// Checks requirements on all generated robots; returns the codes of findings except notes.
 fn codes(made: &NewRobot) -> Vec<String> {
     let robot = Robot::load(&made.robot).unwrap();
     let motion = Motion::load(&made.motion, &robot).unwrap();
@@ -145,8 +144,8 @@ fn codes(made: &NewRobot) -> Vec<String> {
     bad.into_iter().map(|f| f.code).collect()
 }
 
-/// Truth: the box, its wall and its density, of which the description was made. Bound 1e-3, as
-/// written into the file.
+/// Truth: the box, its wall and its density, from which the description was made. Bound 1e-3, the
+/// precision in the file.
 #[test]
 fn an_arm_of_known_sections_is_found_with_its_sections_and_is_clean() {
     let folder = Folder::new("known");
@@ -166,14 +165,14 @@ fn an_arm_of_known_sections_is_found_with_its_sections_and_is_clean() {
     assert!(robot.flexible.iter().any(|link| link.flexible.link == "upper"));
     assert_eq!(robot.drives.len(), 3);
     assert!(made.assumptions.iter().any(|a| a.about == "payload"));
-    // The motion goes through a good part of the ranges.
+    // The motion covers a good part of the ranges.
     for peak in &made.peaks {
         assert!(peak.upper - peak.lower > 0.5, "{}: {} to {}", peak.joint, peak.lower, peak.upper);
         assert!(peak.speed.abs() <= 0.61 * 2.0 && peak.torque.unwrap().abs() <= 900.0);
     }
 }
 
-/// Truth: weight times lever of the stretched arm, by hand: 9.81 (m2 0.4 + m3 1.1 + p 1.4).
+/// Truth: weight times lever of the outstretched arm, by hand: 9.81 (m2 0.4 + m3 1.1 + p 1.4).
 #[test]
 fn the_torque_of_weight_is_that_of_the_stretched_arm() {
     let folder = Folder::new("torque");
@@ -190,7 +189,7 @@ fn the_torque_of_weight_is_that_of_the_stretched_arm() {
 #[test]
 fn a_copied_folder_has_its_meshes_and_can_be_moved() {
     let folder = Folder::new("copied");
-    // A box as ASCII STL, of which two links share the file name in different folders.
+    // A box as ASCII STL; two links share the file name in different folders.
     let stl = |[x, y, z]: [f64; 3]| {
         let corner = |k: usize| {
             let side = |bit: usize, size: f64| if k >> bit & 1 == 1 { size } else { -size };
@@ -266,7 +265,7 @@ fn an_arm_without_any_mass_is_refused_until_its_mass_is_given() {
     assert!(made.assumptions.iter().any(|a| a.about == "masses" && a.text.contains("60 kg in total")));
 }
 
-/// Five links in a row, all of this mass (kg), with or without shapes.
+/// Five links in a row with the same mass (kg), with or without shapes.
 fn equal_masses(mass: f64, lengths: [f64; 5], shapes: bool) -> String {
     let mut t = r#"<robot name="row"><link name="base"/>"#.to_owned();
     let mut before = ("base".to_owned(), 0.1);
@@ -294,7 +293,7 @@ fn equal_masses(mass: f64, lengths: [f64; 5], shapes: bool) -> String {
 }
 
 /// Truth: the share of each link in the volume of all boxes of one section, or in the length of all
-/// links, the base's 0.1 m included: its length over theirs.
+/// links including the base's 0.1 m: its length over theirs.
 #[test]
 fn one_mass_for_all_links_is_told_and_a_total_mass_is_spread_by_volume_or_length() {
     let lengths = [0.2, 0.6, 0.5, 0.3, 0.1];
@@ -338,9 +337,9 @@ fn a_payload_of_nothing_needs_no_centre_of_mass_and_another_one_does() {
     assert!(error.contains("robot.toml:4:11: payload has no com"), "{error}");
 }
 
-/// Truth: the upper arm with its frames as before; the wall of the box is found again where both
-/// its frames sit at its far end, the first joint turning about it. Bound 1e-3, as written into the
-/// file.
+/// Truth: the upper arm with its original frames; the wall of the box is identified again if both
+/// its frames are at its far end and the first joint turns about it. Bound 1e-3, the precision in
+/// the file.
 #[test]
 fn a_link_whose_frames_sit_at_its_far_end_bends_as_the_same_link_with_frames_at_both_ends() {
     let (wall, w, h, length, _) = UPPER;
@@ -403,7 +402,7 @@ fn fingers_are_held_and_of_two_arms_one_moves() {
     assert_eq!(codes(&two), [""; 0]);
     assert_eq!((two.tool.as_str(), two.held.len()), ("left_tool0", 3));
     assert!(two.assumptions[0].text.contains("right_tool0"), "{:?}", two.assumptions[0]);
-    // The other arm's mass is not moved.
+    // The mass of the other arm is not part of the moving mass.
     assert!((two.moving_mass_kg / (36.0 + upper_mass()) - 1.0).abs() < 1e-9);
 }
 
@@ -425,14 +424,14 @@ fn missing_and_senseless_limits_are_told_and_the_motion_keeps_what_it_can() {
         let folder = Folder::new(&format!("limits-{name}"));
         let made = made(&folder, &Arm { limit, ..ARM }.urdf(""), &NewOptions::default());
         let found = codes(&made);
-        // What is proposed is not judged by limits that make no sense.
+        // The proposal is not checked against meaningless limits.
         assert_eq!(found, [""; 0], "{name}");
         let first = Robot::load(&made.robot).unwrap().rigid_model().unwrap().coordinates()[1].limits.effort;
         assert_eq!(first, f64::INFINITY, "{name}");
         assert!(made.joints[1].effort_fault.unwrap().starts_with(fault), "{name}: {:?}", made.joints[1]);
         let speeds = made.assumptions.iter().filter(|a| a.text.contains("speed limit")).count();
         assert_eq!(speeds, if matches!(name, "none" | "zeros") { 3 } else { 0 }, "{name}");
-        // The class of the reducers comes from the weight, not from the limit.
+        // The class of the reducers is derived from the weight, not from the limit.
         let drive = &made.drives[1];
         assert!((1e4..1e7).contains(&drive.stiffness) && drive.low < drive.stiffness && drive.stiffness < drive.high);
     }
@@ -475,7 +474,7 @@ fn names_with_any_letters_come_through_every_file() {
         .replace("\"a2\"", &format!("\"{odd}\""))
         .replace("upper", "up [x]\"".replace('"', "&quot;").as_str());
     let urdf = urdf.replace("robot name=\"arm\"", "robot name=\"= #1 &quot;arm&quot;\"");
-    // The attribute of <limit> has a word in it that was replaced.
+    // The attribute of <limit> contains a word that was replaced.
     let urdf = urdf.replace("up [x]&quot;=", "upper=");
     let made = made(&folder, &urdf, &NewOptions::default());
     assert_eq!(codes(&made), [""; 0]);

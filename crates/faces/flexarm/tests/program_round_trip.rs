@@ -1,5 +1,5 @@
-//! Targets of programs, read to joints and written again, mean the same joints: with their branch
-//! of the inverse kinematics.
+//! Program targets that are read to joints and written again give the same joints, including their
+//! branch of the inverse kinematics.
 #![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
 #![allow(non_snake_case, reason = "monogram notation")]
 
@@ -14,7 +14,7 @@ use flexarm_programs::{NewTarget, ProgramText, ReadOptions, read_program_text};
 use flexarm_testkit::Draw;
 use nalgebra::{DVector, UnitQuaternion};
 
-/// A KUKA arm whose joints are the axes of its controller.
+/// A KUKA arm whose joints equal the axes of its controller.
 fn model() -> std::sync::Arc<Model> {
     let root = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../robots/kr210");
     Robot::load(root).unwrap().rigid_model().unwrap()
@@ -40,15 +40,15 @@ fn flange(model: &Model, q: &[f64; 6]) -> Pose {
     data.X_WF(model.frame("tool0").unwrap())
 }
 
-/// Wrist centre ahead of axis 1 (m) and axis 3 beyond the stretched arm (rad), by the lengths of
-/// the arm's README.
+/// Distance of the wrist centre ahead of axis 1 (m) and angle of axis 3 beyond the stretched arm
+/// (rad), with the lengths in the arm's README.
 fn sides(q: &[f64; 6]) -> [f64; 2] {
     let (a2, a23) = (q[1], q[1] + q[2]);
     let ahead = 0.33 + 1.15 * a2.cos() + 1.22 * a23.cos() + 0.115 * a23.sin();
     [ahead, q[2] - 0.115_f64.atan2(1.22)]
 }
 
-/// Axis values within the limits, clear of singular poses.
+/// Axis values within the limits, away from singular poses.
 fn random_axes(draw: &mut Draw, model: &Model) -> [f64; 6] {
     loop {
         let q: [f64; 6] = std::array::from_fn(|k| {
@@ -62,7 +62,7 @@ fn random_axes(draw: &mut Draw, model: &Model) -> [f64; 6] {
     }
 }
 
-/// Targets in a language with all that it says of the branch, by closed forms.
+/// Targets in a language with its full branch information, by closed forms.
 fn program(language: &str, model: &Model, all: &[[f64; 6]]) -> String {
     let mut text = match language {
         "src" => "DEF m()\n$TOOL={X 0,Y 0,Z 0,A 0,B 0,C 0}\nPTP {A1 0,A2 -90,A3 90,A4 0,A5 30,A6 0}\n".to_owned(),
@@ -110,7 +110,7 @@ fn assert_same(found: &[[f64; 6]], meant: &[[f64; 6]], bound: f64) {
     }
 }
 
-/// Truth: the axis values of which the targets were made, by closed forms of status, turn and
+/// Truth: the axis values from which the targets were made, by closed forms of status, turn and
 /// confdata.
 #[test]
 fn joints_of_a_program_come_back_from_its_targets_and_from_those_that_are_written_in_their_place() {
@@ -122,7 +122,7 @@ fn joints_of_a_program_come_back_from_its_targets_and_from_those_that_are_writte
     for language in ["src", "mod"] {
         let (text, found) = read(language, program(language, &model, &all).as_bytes(), &arm);
         assert_same(&found, &all, 1e-8); // measured 1e-9
-        // New targets a little beside the old ones, as compensated programs have them.
+        // New targets slightly off the old ones, as in compensated programs.
         let first = text.program.items.len() - all.len();
         let targets: Vec<_> = (moved.iter().enumerate())
             .map(|(k, q)| {
@@ -142,7 +142,7 @@ fn joints_of_a_program_come_back_from_its_targets_and_from_those_that_are_writte
     }
 }
 
-/// Truth: the sign of axis 5 that the status names. Turns are those next to the move before.
+/// Truth: the sign of axis 5 given by the status. Turns are the nearest to the previous move.
 #[test]
 fn the_status_alone_names_the_side_of_the_wrist() {
     let model = model();

@@ -1,4 +1,4 @@
-//! Numbers that no robot has are refused where they are given, with their place, and never end in a
+//! Unrealistic numbers are refused where they are given, with their location, and never cause a
 //! panic.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
@@ -70,8 +70,8 @@ fn a_payload_that_no_arm_carries_is_refused_with_its_unit() {
     }
 }
 
-/// The heaviest and farthest payload that is let through: a hundred million times the arm. It runs
-/// or stops with time and cause.
+/// The heaviest and farthest payload that is accepted: a hundred million times the arm. It runs or
+/// stops with time and cause.
 #[test]
 fn a_run_whose_mass_matrix_cannot_be_factorised_stops_with_its_time() {
     for mimic in [false, true] {
@@ -98,7 +98,7 @@ fn a_pose_and_a_force_that_no_arm_meets_are_refused() {
     assert!(told([0.0; 6], [1e12, 0.0, 0.0, 0.0, 0.0, 0.0]).contains("1e12 N"));
 }
 
-/// Places of all numbers in the text of a file.
+/// Positions of all numbers in the text of a file.
 fn numbers(value: &DeValue<'_>, span: std::ops::Range<usize>, found: &mut Vec<std::ops::Range<usize>>) {
     match value {
         DeValue::Float(_) => found.push(span),

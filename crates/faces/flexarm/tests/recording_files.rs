@@ -1,4 +1,4 @@
-//! What recordings say about the robot and the time, on this machine and on others.
+//! Information on the robot and the time in recordings, on this machine and on others.
 #![cfg(feature = "mcap")]
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
@@ -16,7 +16,7 @@ impl Drop for Folder {
     }
 }
 
-/// The shipped arm, stopped as soon as it may be: its files are there by then.
+/// The shipped arm, stopped as early as possible: its files exist by then.
 fn recorded(name: &str, options: &RunOptions) -> (Folder, RunHeader) {
     let folder = Folder(std::env::temp_dir().join(format!("flexarm-recording-{}-{name}", std::process::id())));
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../..");
@@ -37,7 +37,7 @@ fn mesh_references(urdf: &str) -> Vec<&str> {
     urdf.split("filename=\"").skip(1).map(|rest| rest.split_once('"').unwrap().0).collect()
 }
 
-/// Truth: the files of the robot's folder.
+/// Truth: the files in the robot's folder.
 #[test]
 fn collision_meshes_are_where_visual_ones_are_and_both_can_be_inside_the_file() {
     let (folder, header) = recorded("files", &RunOptions::default());

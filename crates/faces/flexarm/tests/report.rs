@@ -1,5 +1,5 @@
-//! The report page of real runs: it loads nothing, says what the runs said, and is the same for the
-//! same run.
+//! The report page of real runs: it loads no external files, agrees with the runs, and is
+//! reproducible.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
 use std::collections::BTreeSet;
@@ -24,7 +24,7 @@ fn run(robot: &str, trajectory: &str, options: &RunOptions, outputs: Option<&Out
     (run.summary, run.trace)
 }
 
-/// The shipped arm on its cycle, run once for all tests.
+/// The shipped arm on its cycle, simulated once for all tests.
 fn arm() -> &'static Run {
     static RUN: OnceLock<Run> = OnceLock::new();
     RUN.get_or_init(|| run("kr210", "pick_and_place.toml", &RunOptions::default(), None))
@@ -95,7 +95,7 @@ fn the_page_of_the_shipped_arm_is_small_and_complete() {
     for id in ["tcp_error", "path_time", "path_length", "spectrum", "contributions", "element_force", "torques"] {
         assert!(ids.contains(&id), "{id} of {ids:?}");
     }
-    // Truth: the largest error of the run, to the five digits of the page.
+    // Truth: the maximum error of the run, to the five digits of the page.
     let size = &plots[0]["views"][0]["tables"][0]["curves"][0];
     let largest = size["y"].as_array().unwrap().iter().map(|y| y.as_f64().unwrap()).fold(0.0, f64::max);
     assert!((largest / (1e3 * summary.tcp.as_ref().unwrap().peak_m) - 1.0).abs() < 1e-4);
@@ -111,7 +111,7 @@ fn the_page_of_the_shipped_arm_is_small_and_complete() {
     }
 }
 
-/// Truth: the table of colours that recordings and figures use.
+/// Truth: the colour table of recordings and figures.
 #[test]
 fn x_y_and_z_have_one_colour_each_in_plots_pictures_and_figures() {
     use flexarm_draw::palette::{Ground, axis, hex, series};
@@ -140,7 +140,7 @@ fn x_y_and_z_have_one_colour_each_in_plots_pictures_and_figures() {
 }
 
 /// Truth: the identity of net and gross work, and the energy that an arm of a tonne takes up and
-/// gives back.
+/// returns.
 #[test]
 fn work_of_the_drives_is_called_net_and_stands_beside_what_they_put_in_and_took_out() {
     let (summary, _) = arm();
@@ -159,7 +159,7 @@ fn the_same_run_gives_the_same_page_but_for_its_timings() {
     let options = RunOptions::default();
     let pages = [(); 2].map(|()| page_of(&run("one_beam", "beam_swing.toml", &options, None)));
     assert!(timeless(&pages[0]) == timeless(&pages[1]));
-    // Other timings alone change that paragraph alone.
+    // Different timings change only that paragraph.
     let (summary, trace) = arm();
     let slower =
         Summary { wall_s: 12.345, cpu_s: 3.0, real_time_factor: 0.5, cpu_s_per_simulated_s: 2.0, ..summary.clone() };
@@ -237,7 +237,7 @@ fn several_runs_lie_over_each_other() {
     }
     links_lead_somewhere(&page);
 
-    // The rigid run has no spectrum; the others' are shown though it is the first.
+    // The rigid run has no spectrum; those of the others are shown although it is the first.
     let runs =
         [("rigid", &rigid), ("as it is", arm())].map(|(label, (summary, trace))| ReportRun { label, summary, trace });
     let data = data_of(&html(&runs));
@@ -351,7 +351,7 @@ fn the_files_of_a_run_are_written_and_not_overwritten() {
     assert!(svgs.count() >= 10);
     assert!(text("figures/tcp_error.csv").starts_with("time_s,size_mm,x_mm,y_mm,z_mm\n"));
 
-    // Any one of them in the way stops the next run before it writes.
+    // Any existing one of them stops the next run before it writes.
     for name in ["report.html", "report.md", "summary.json", "figures"] {
         let other = Folder::new(name);
         std::fs::create_dir_all(&other.0).unwrap();

@@ -1,5 +1,5 @@
 //! The pages of the robot, motion and loads files in `docs/` and their schemas: every example
-//! loads, every key is there.
+//! loads, every key is documented.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -15,7 +15,7 @@ fn read(path: &str) -> String {
     std::fs::read_to_string(project(path)).unwrap_or_else(|e| panic!("{path}: {e}"))
 }
 
-/// Text of every fenced block of that language.
+/// Text of every fenced block in a language.
 fn blocks(page: &str, language: &str) -> Vec<String> {
     let fence = format!("```{language}\n");
     page.split(&fence).skip(1).map(|rest| rest.split("```").next().unwrap().to_owned()).collect()
@@ -52,7 +52,7 @@ fn every_example_of_a_robot_file_loads() {
         (read("docs/robot-file.md") + &read("docs/mounting.md") + &read("docs/gears.md"), Place::new("robots"));
     let (mut modal, mut torque) = (0, 0);
     for block in blocks(&page, "toml") {
-        // Loops are of another robot: the shipped palletiser has the same entries.
+        // Loops belong to another robot: the shipped palletiser has the same entries.
         if block.contains("[[loop]]") {
             let shipped = read("robots/palletiser/robot.toml");
             let keys = |text: &str| -> Vec<String> {
@@ -120,7 +120,7 @@ const RAIL: &str = r#"<robot name="rail">
   <link name="hand"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
 </robot>"#;
 
-/// Truth: the goals, durations and units that stand in the examples.
+/// Truth: the goals, durations and units in the examples.
 #[test]
 fn every_example_of_a_motion_file_loads_and_goes_where_it_says() {
     let (page, place) = (read("docs/motions.md"), Place::new("motions"));
@@ -210,8 +210,8 @@ fn every_key_is_on_its_page() {
     }
 }
 
-/// Definitions of a schema by name, with the struct that each describes; the first is the whole
-/// file.
+/// Compares the definitions of a schema, by name, with the struct that each describes; the first
+/// one is the whole file.
 fn same_keys(schema: &str, sources: &[&str], files: &[&str], definitions: &[(&str, &str)]) {
     let schema: serde_json::Value = serde_json::from_str(&read(schema)).unwrap();
     let properties = |node: &serde_json::Value| -> BTreeSet<String> {

@@ -1,5 +1,5 @@
-//! What a run says of itself: shares that are a sum in numbers and in print, steps that are too
-//! long, settling bands, poses in degrees, runs of different robots, colours.
+//! Messages of a run: shares that add up in numbers and in print, step sizes that are too large,
+//! settling bands, poses in degrees, runs of different robots, colours.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 
@@ -11,7 +11,7 @@ use flexarm::{
 };
 use serde_json::Value;
 
-/// Robot files of the repository with a motion of their own.
+/// Shipped robot files with a default motion.
 const SHIPPED: [&str; 17] = [
     "abb_three_mass",
     "abb_three_mass/torque.toml",
@@ -48,7 +48,7 @@ fn run(robot: &Robot, motion: &Motion, options: &RunOptions) -> Result<Summary, 
     Ok(run.summary)
 }
 
-/// The stepper with its own step.
+/// The stepper with its default step size.
 fn with(name: &str) -> RunOptions {
     let entry = STEPPERS.into_iter().find(|entry| entry.name == name).unwrap();
     RunOptions {
@@ -58,13 +58,13 @@ fn with(name: &str) -> RunOptions {
     }
 }
 
-/// Numbers of a text in their order.
+/// Numbers in a text, in order.
 fn numbers(text: &str) -> Vec<f64> {
     text.split(|c: char| !(c.is_ascii_digit() || c == '.' || c == '-')).filter_map(|word| word.parse().ok()).collect()
 }
 
-/// Truth: the sum of the shares is the error (measured 1e-12, of quadrature), and printed shares
-/// add up to the printed peak.
+/// Truth: the sum of the shares is the error (measured 1e-12, due to quadrature), and printed
+/// shares add up to the printed peak.
 fn check(name: &str, summary: &Summary) {
     let tcp = summary.tcp.as_ref().unwrap();
     let sum: f64 = tcp.shares_at_peak.iter().map(|share| share.along_m).sum();
@@ -100,7 +100,7 @@ fn shares_of_every_shipped_robot_add_up_to_its_largest_error() {
 fn shares_add_up_with_every_stepper() {
     for (name, entry) in ["lower_arm", "kr210"].iter().flat_map(|name| STEPPERS.map(|entry| (*name, entry))) {
         let (robot, motion) = load(name);
-        // An explicit stepper refuses steps that are too long for stiff springs.
+        // An explicit stepper refuses step sizes that are too large for stiff springs.
         match run(&robot, &motion, &with(entry.name)) {
             Ok(summary) => check(&format!("{name}, {}", entry.name), &summary),
             Err(error) => assert_eq!(entry.steps, StepRule::UpToTheStabilityLimit, "{name}, {}: {error}", entry.name),
@@ -112,18 +112,18 @@ fn codes(summary: &Summary) -> Vec<&str> {
     summary.caveats.iter().map(|caveat| caveat.code.as_str()).collect()
 }
 
-/// What a caveat about steps says.
+/// Whether a caveat about steps is present.
 fn of_steps(summary: &Summary) -> bool {
     codes(summary).iter().any(|code| ["coarse-step", "joint-drift"].contains(code))
 }
 
-/// Largest TCP error (m).
+/// Maximum TCP error (m).
 fn peak(summary: &Summary) -> f64 {
     summary.tcp.as_ref().unwrap().peak_m
 }
 
-/// Truth: SDIRK at 0.1 ms. With its default step every stepper is off by at most 1.6e-3 (SPOOK on
-/// the cast link), and what is not told is off by at most 1.0e-2 (SPOOK at 1 ms on one beam).
+/// Truth: SDIRK at 0.1 ms. With its default step size every stepper is wrong by at most 1.6e-3
+/// (SPOOK on the cast link), and unreported errors are at most 1.0e-2 (SPOOK at 1 ms on one beam).
 #[test]
 fn steps_that_lose_part_of_the_largest_error_are_told_and_default_steps_are_not() {
     let mut told = 0;
@@ -152,7 +152,7 @@ fn steps_that_lose_part_of_the_largest_error_are_told_and_default_steps_are_not(
     assert!(told > 5);
 }
 
-/// The step with which SPOOK loses a tenth of the error of the cast link.
+/// The step size with which SPOOK loses a tenth of the error of the cast link.
 #[test]
 fn joints_that_drift_apart_are_a_share_and_a_caveat() {
     let (robot, motion) = load("lower_arm");
@@ -189,7 +189,7 @@ fn a_pose_in_degrees_is_asked_about_wherever_a_pose_is_given() {
         let told: Vec<String> = found.caveats.into_iter().map(|caveat| caveat.message).collect();
         assert_eq!(asked(&told), count);
     }
-    // A little outside is no slip of units.
+    // Slightly outside the limits is not a mistake of units.
     let mut outside = radians;
     outside[1] = -2.6;
     let warnings = inspect(&robot, Some(&outside), None).unwrap().warnings;
@@ -220,7 +220,7 @@ fn runs_of_different_robots_are_said_to_be_and_have_no_differences() {
     assert!(same.contains("(+0.0 %)") && !same.contains("Another robot"), "{same}");
 }
 
-/// Every curve of the page with its colour, by what it is called.
+/// Every curve of the page with its colour, by its name.
 #[test]
 fn a_link_spring_or_joint_has_one_colour_on_the_page() {
     let (summary, trace) = traced("kr210");
@@ -246,7 +246,7 @@ fn a_link_spring_or_joint_has_one_colour_on_the_page() {
     assert_eq!(distinct.len(), colors.len(), "{colors:?}");
 }
 
-/// The arm's colours end just above its largest error.
+/// The colour scale of the arm ends just above its maximum error.
 #[test]
 fn the_scale_of_colours_ends_with_the_largest_error() {
     for name in ["kr210", "lower_arm"] {

@@ -1,5 +1,5 @@
-//! Derivatives of the tool's error by the numbers of shipped robots: against Richardson differences
-//! of runs, what they cost, what is refused.
+//! Derivatives of the TCP error with respect to parameters of shipped robots: compared with
+//! Richardson differences of runs, their cost, and refusals.
 #![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
 #![allow(non_snake_case, reason = "monogram notation")]
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
@@ -23,7 +23,7 @@ fn shipped(robot: &str, motion: &str) -> (Robot, Arm, Motion) {
     (robot, arm, motion)
 }
 
-/// Errors of all times of a run with one parameter changed.
+/// Errors at all instants of a run with one parameter changed.
 fn errors(arm: &Arm, motion: &Motion, parameter: &Parameter, x: f64) -> Vec<f64> {
     let plant = plant(arm).with(std::slice::from_ref(parameter), &[x]);
     let flexible = FlexibleArm::new(plant.model, plant.springs, motion.prescribed()).unwrap();
@@ -45,7 +45,7 @@ fn richardson(h: f64, f: impl Fn(f64) -> Vec<f64>) -> Vec<f64> {
     (0..a.len()).map(|k| (64.0 * c[k] - 20.0 * b[k] + a[k]) / 45.0).collect()
 }
 
-/// Truth: differences of whole runs, of every kind of number that the robot file of kr210 has.
+/// Truth: differences of complete runs, for every kind of parameter in the robot file of kr210.
 #[test]
 fn the_error_of_kr210_depends_on_its_numbers_as_differences_of_runs_say() {
     let (_, arm, motion) = shipped("kr210", "point_to_point");
@@ -65,8 +65,8 @@ fn the_error_of_kr210_depends_on_its_numbers_as_differences_of_runs_say() {
     let asked: Vec<RunParameter> = parameters.iter().cloned().map(RunParameter::Arm).collect();
     let found = error_slopes(&arm, &motion, &RunOptions::default(), &asked, true).unwrap();
     for (k, parameter) in parameters.iter().enumerate() {
-        // In five seconds the phase of the first mode changes by 80 times as much.
-        // What dampers do is small, and needs a longer way out of the rounding.
+        // In five seconds the phase of the first mode changes by 80 times as much. Dampers have a
+        // small effect, and need a larger difference to exceed the rounding.
         let h = match &parameter.effect {
             Effect::Stiffness(_) => 0.004,
             Effect::Damping(_) | Effect::Damper { .. } => 0.1,
@@ -78,14 +78,15 @@ fn the_error_of_kr210_depends_on_its_numbers_as_differences_of_runs_say() {
         let largest = truth.iter().fold(0.0f64, |m, x| m.max(x.abs()));
         let off = own.iter().zip(&truth).fold(0.0f64, |m, (a, b)| m.max((a - b).abs()));
         eprintln!("{}: {:.1e} of {largest:.2e}", parameter.name, off / largest);
-        // Of what changes the error by less than 10 um the differences are rounded at 1e-14 m.
+        // Differences of parameters that change the error by less than 10 um are rounded at 1e-14
+        // m.
         assert!(off < 1e-8 * largest + 2e-13, "{}: {:e}", parameter.name, off / largest);
     }
 }
 
-/// All numbers of kr210 at once against one ordinary run; differences would take two or more runs
-/// for each. Processor time of this thread, which others on the machine do not change; measured 23
-/// runs for 38 numbers.
+/// All parameters of kr210 at once compared with one ordinary run; differences would take two or
+/// more runs for each. CPU time of this thread, independent of the load of the machine; measured 23
+/// runs for 38 parameters.
 #[test]
 fn all_numbers_of_a_robot_cost_a_few_runs() {
     let (robot, arm, motion) = shipped("kr210", "pick_and_place");
@@ -118,7 +119,7 @@ fn all_numbers_of_a_robot_cost_a_few_runs() {
     assert!((found.peak_m - theirs).abs() < 1e-4 * theirs, "{} {theirs}", found.peak_m);
 }
 
-/// Truth: factors of all six directions together are the factor of the whole.
+/// Truth: factors on all six directions together equal the factor on the whole.
 #[test]
 fn the_six_directions_of_a_link_are_together_its_factor() {
     let (robot, _, motion) = shipped("kr210", "point_to_point");
@@ -140,7 +141,7 @@ fn the_six_directions_of_a_link_are_together_its_factor() {
     }
 }
 
-/// The robot file of a shipped robot in a folder of its own, to be changed.
+/// The robot file of a shipped robot in a separate folder, to be changed.
 struct Changed {
     folder: std::path::PathBuf,
     text: String,
@@ -164,7 +165,7 @@ impl Changed {
         Self { folder, text: absolute(text, "default_trajectory", "../../") }
     }
 
-    /// The robot with one place of its file changed for good.
+    /// The robot with one permanent change in its file.
     fn kept(mut self, old: &str, new: &str) -> Self {
         assert!(self.text.contains(old), "{old}");
         self.text = self.text.replacen(old, new, 1);
@@ -179,18 +180,18 @@ impl Changed {
     }
 }
 
-/// A number of a robot or motion file, and the parameter of that name.
+/// A number in a robot or motion file, and the parameter of that name.
 struct Written<'a> {
     name: &'a str,
     /// Text before it, the number, text after it.
     text: [&'a str; 3],
-    /// Length of the differences, of the logarithm for what is told per 1 %.
+    /// Step of the differences, of the logarithm for parameters reported per 1 %.
     size: f64,
 }
 
 impl Changed {
-    /// Errors of all times of a run, with a number of the robot file, or else of the motion file,
-    /// changed by x.
+    /// Errors at all instants of a run, with a number of the robot file, or else of the motion
+    /// file, changed by x.
     fn errors(&self, motion: &str, run: &RunOptions, own: Option<&Written<'_>>, x: f64) -> Vec<f64> {
         let motion = std::fs::read_to_string(place(&format!("trajectories/{motion}.toml"))).unwrap();
         let (mut robot, mut moved) = (self.text.clone(), motion);
@@ -217,7 +218,7 @@ impl Changed {
         found.errors.into_iter().flatten().collect()
     }
 
-    /// Derivatives against differences of runs of changed files.
+    /// Compares derivatives with differences of runs of changed files.
     fn compare(&self, motion: &str, run: &RunOptions, all: &[Written<'_>]) {
         let file = self.folder.join("robot.toml");
         std::fs::write(&file, &self.text).unwrap();
@@ -252,9 +253,9 @@ impl Changed {
     }
 }
 
-/// Truth: differences of whole runs of the robot with other numbers in its file: under servos whose
-/// gains follow the inertia at the start where the file leaves them out, and of which one is at its
-/// torque limit for a while.
+/// Truth: differences of complete runs of the robot with changed numbers in its file: under servos
+/// whose gains follow the inertia at the start if the file omits them, and one of which is
+/// temporarily at its torque limit.
 #[test]
 fn the_error_of_manutec_r3_under_servos_depends_on_the_numbers_of_its_files() {
     let friction = "friction = { viscous = 20.0, coulomb = 30.0, stribeck = 9.0, regularisation = 0.05 }";
@@ -286,8 +287,8 @@ fn the_error_of_manutec_r3_under_servos_depends_on_the_numbers_of_its_files() {
     assert!(limited.message.contains("joint_2") && limited.message.contains("first at 1.2"), "{}", limited.message);
 }
 
-/// Truth: differences of whole runs of changed files, of an arm with closed loops and of one whose
-/// links bend in modes with modal damping.
+/// Truth: differences of complete runs of changed files, for an arm with closed loops and for one
+/// with modal links with modal damping.
 #[test]
 fn loops_and_modes_depend_on_the_numbers_of_their_files() {
     let own = |name: &'static str, text: [&'static str; 3], size: f64| Written { name, text, size };
@@ -302,7 +303,7 @@ fn loops_and_modes_depend_on_the_numbers_of_their_files() {
         own("payload.mass", ["mass = ", "150.0", ","], 0.5),
         own("link.link_2.damping", ["damping = { modal = ", "0.03", " }"], 0.1),
     ];
-    // The first of the two links is link_2: the other one's damping is written otherwise.
+    // The first of the two links is link_2: the damping of the other one is written differently.
     let mut kr210 = Changed::new("modes");
     let second = kr210.text.rfind("damping = { modal = 0.03 }").unwrap();
     kr210.text.replace_range(second.., &kr210.text[second..].replacen("0.03 }", "0.0300 }", 1));
@@ -315,8 +316,8 @@ impl Drop for Changed {
     }
 }
 
-/// Truth: the same robot with a factor in its file, against the derivative; five digits are those
-/// of the difference.
+/// Truth: the same robot with a factor in its file, compared with the derivative; the difference is
+/// accurate to five digits.
 #[test]
 fn a_factor_of_one_direction_in_the_robot_file_does_what_its_derivative_says() {
     let kr210 = Changed::new("factors");
@@ -345,9 +346,9 @@ fn a_factor_of_one_direction_in_the_robot_file_does_what_its_derivative_says() {
     assert!(error.contains("lumped link"), "{error}");
 }
 
-/// Truth: differences of the static pose of changed files. A gear is deflected by what its spring
-/// carries less the error of its transmission: a stiffness acts on that; measured 1e-9 and less of
-/// the derivative. Without the error it would be five times as large.
+/// Truth: differences of the static pose of changed files. The deflection of a gear is that of its
+/// spring load minus the transmission error; a stiffness acts on the spring load; measured 1e-9 and
+/// less of the derivative. Without the transmission error it would be five times as large.
 #[test]
 fn a_gear_with_ripple_gives_way_at_a_pose_by_what_its_spring_carries() {
     let (old, at) = ("gearbox = { stiffness = 352800.0, damping = 441.0 }", [0.3, -0.4, 0.5, 0.2, 0.6, 0.0]);
@@ -370,15 +371,15 @@ fn a_gear_with_ripple_gives_way_at_a_pose_by_what_its_spring_carries() {
 }
 
 /// Truth: closed form. A point at r from the TCP, tool axes, moves with the tool as a rigid lever:
-/// its compliance is `X C Xᵀ` with `X = [1 -[R r]x; 0 1]`, R the tool's axes in the world, whatever
-/// the arm. The compliance of such a tool in the robot file shows whether the derivative has the
-/// right axes (other ones, or those of the flange, are far off), its first order whether it has the
+/// its compliance is `X C Xᵀ` with `X = [1 -[R r]x; 0 1]`, R the tool's axes in the world, for any
+/// arm. The compliance of such a tool in the robot file shows whether the derivative has the right
+/// axes (other ones, or those of the flange, give large errors), its first order whether it has the
 /// right sign.
 #[test]
 fn the_compliance_beside_the_tool_is_that_of_a_rigid_lever_in_the_tools_own_axes() {
     use nalgebra::{Matrix3, Matrix6, Rotation3, Vector3};
     let at = [0.3, -1.2, 1.5, 0.2, 0.4, -0.5];
-    // Turned against the flange, so that its axes are those of nothing else.
+    // Rotated relative to the flange, so that its axes differ from all others.
     let turn = [0.4, -0.7, 1.1];
     let kr210 = Changed::new("lever");
     let tool = |xyz: [f64; 3]| {
@@ -393,11 +394,11 @@ fn the_compliance_beside_the_tool_is_that_of_a_rigid_lever_in_the_tools_own_axes
     let C = matrix(here.compliance);
     let R_FT = Rotation3::from_euler_angles(turn[0], turn[1], turn[2]);
     for (axis, own) in here.parameters.iter().enumerate() {
-        // The tool 0.2 m along its own axis, by the robot file, in the axes of the flange.
+        // The tool moved by 0.2 m along its own axis, by the robot file, in flange axes.
         let r = 0.2;
         let place = Vector3::from(base) + R_FT * Vector3::ith(axis, r);
         let moved = matrix(tool(place.into()).compliance);
-        // Where that lies in the world: the derivative's direction, checked for itself.
+        // Its position in the world: the direction of the derivative, checked separately.
         let a = Vector3::from(own.tcp_m) * (r / 1e-3);
         let lever = |a: Vector3<f64>| {
             let mut X = Matrix6::identity();
@@ -408,7 +409,7 @@ fn the_compliance_beside_the_tool_is_that_of_a_rigid_lever_in_the_tools_own_axes
         let closed = lever(a) * C * lever(a).transpose();
         let scale = moved.amax();
         assert!((closed - moved).amax() < 1e-9 * scale, "{}: {:e}", own.name, (closed - moved).amax() / scale);
-        // The other side, and other axes, are far off.
+        // The opposite direction, and other axes, give large errors.
         for a in [-a, Vector3::ith(axis, r), R_FT * Vector3::ith(axis, r)] {
             let other = lever(a) * C * lever(a).transpose();
             assert!((other - moved).amax() > 1e-2 * scale, "{}", own.name);
@@ -422,8 +423,8 @@ fn the_compliance_beside_the_tool_is_that_of_a_rigid_lever_in_the_tools_own_axes
     }
 }
 
-/// Truth: the same robot with its tool elsewhere. The compliance is a polynomial of second degree
-/// in the place of the tool, so that differences of second order are exact but for rounding.
+/// Truth: the same robot with its tool elsewhere. The compliance is a quadratic polynomial in the
+/// tool position, so that second-order differences are exact except for rounding.
 #[test]
 fn the_place_of_the_tool_moves_it_and_changes_its_compliance_as_another_tool_does() {
     let at = [0.3, -1.2, 1.5, 0.2, 0.4, -0.5];

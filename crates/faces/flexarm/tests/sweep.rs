@@ -1,5 +1,5 @@
-//! Studies: runs are those of files written by hand, whatever ends the program loses none, shards
-//! make the same bytes.
+//! Studies: runs equal those of files written by hand, no interruption loses a finished run, shards
+//! give identical bytes.
 #![cfg(feature = "parquet")]
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
@@ -19,7 +19,7 @@ const FINDERS: Finders = Finders {
     motion: |name| root().join("trajectories").join(name).with_extension("toml"),
 };
 
-/// A folder of its own for a test.
+/// A separate folder for a test.
 fn folder(name: &str) -> PathBuf {
     let folder = std::env::temp_dir().join(format!("flexarm-sweep-{name}-{}", std::process::id()));
     let _ = std::fs::remove_dir_all(&folder);
@@ -50,7 +50,7 @@ fn numbers(table: &DataTable, name: &str) -> Vec<f64> {
 
 const REFERENCE: &str = "format = 1\nrobot = \"kr210/beams.toml\"\nmotion = \"point_to_point\"\n";
 
-/// Truth: the robot file, the motion and the options as a person writes them, run by themselves.
+/// Truth: robot file, motion and options as a user would write them, run separately.
 #[test]
 fn a_run_has_the_numbers_of_the_files_that_a_person_would_write() {
     let place = folder("by-hand");
@@ -71,7 +71,7 @@ fn a_run_has_the_numbers_of_the_files_that_a_person_would_write() {
     let text = std::fs::read_to_string(folder_of_robot.join("beams.toml")).unwrap();
     for run in 0..8 {
         let (mass, factor, speed) = ([30.0, 75.5][run / 4], [0.5, 2.0][run / 2 % 2], [1.0, 0.8][run % 2]);
-        // By hand: other numbers in the text, in a file beside the one that is shipped.
+        // By hand: other numbers in the text, in a file next to the shipped one.
         let mut document: toml::Table = toml::from_str(&text).unwrap();
         document["payload"]["mass"] = mass.into();
         let links = document["flexible_link"].as_array_mut().unwrap();
@@ -98,7 +98,7 @@ fn a_run_has_the_numbers_of_the_files_that_a_person_would_write() {
         ];
         for (name, value) in expected {
             assert_eq!(numbers(&tables[1], name)[run], value, "whole summary, run {run}, {name}");
-            // Four runs side by side: the same figures from other sums.
+            // Four runs in parallel lanes: the same figures from different sums.
             let quick = numbers(&tables[0], name)[run];
             assert!((quick / value - 1.0).abs() < 1e-11, "run {run}, {name}: {quick} {value}"); // measured 2e-13
         }
@@ -135,7 +135,7 @@ fn shards_in_any_number_and_order_make_the_same_bytes() {
         assert_eq!(std::fs::read(&merged.file).unwrap(), bytes, "{of} shards");
         assert_eq!(merged.doubles, 0);
     }
-    // Shards of one folder, as on a cluster with a common disk.
+    // Shards in one folder, as on a cluster with a shared disk.
     let common = place.join("common");
     for number in [3, 1, 2] {
         let shard = Shard { number, of: 3 };
@@ -162,7 +162,7 @@ fn shards_that_are_missing_twice_there_or_of_another_study_are_told() {
     assert!(matches!(missing.external(), Some(SweepError::Missing { missing: 7, runs: 21, .. })), "{missing}");
     assert!(missing.to_string().contains("shard 2/3 (all 7)"), "{missing}");
     assert!(!place.join("a/runs.parquet").exists());
-    // The same shard twice counts once.
+    // A duplicate shard counts once.
     let copy = place.join("copy");
     std::fs::create_dir_all(copy.join("parts")).unwrap();
     for name in ["study.json", "parts/2-of-3-0.parquet"] {
@@ -170,7 +170,7 @@ fn shards_that_are_missing_twice_there_or_of_another_study_are_told() {
     }
     let merged = join(&["1", "2", "3", "copy"], "b").unwrap();
     assert_eq!((merged.done, merged.doubles), (21, 7));
-    // Of another study.
+    // A shard of another study.
     let other = text.replace("count = 7", "count = 8");
     let request = SweepRequest { shard: Shard { number: 2, of: 3 }, ..request(place.join("other")) };
     study(&place, &other).unwrap().run(&request, &mut go_on).unwrap();
@@ -179,7 +179,7 @@ fn shards_that_are_missing_twice_there_or_of_another_study_are_told() {
     assert!(foreign.to_string().contains("24 runs and 21"), "{foreign}");
     let into = study(&place, &text).unwrap().run(&request, &mut go_on).unwrap_err();
     assert!(matches!(into.external(), Some(SweepError::Foreign { .. })), "{into}");
-    // A result that is not the same.
+    // A conflicting result.
     let journal = place.join("copy/parts/2-of-3.journal");
     std::fs::write(&journal, "[1,null,[0.5,0.25]]\n").unwrap();
     let twice = join(&["1", "2", "3", "copy"], "d").unwrap_err();
@@ -189,7 +189,7 @@ fn shards_that_are_missing_twice_there_or_of_another_study_are_told() {
     std::fs::remove_dir_all(&place).unwrap();
 }
 
-/// Truth: a folder whose points another program drew must not get points of this one beside them.
+/// Truth: a folder with points drawn by another program must not be mixed with points of this one.
 #[test]
 fn a_study_whose_points_were_drawn_differently_is_not_resumed() {
     let place = folder("drawn");
@@ -217,7 +217,7 @@ fn a_study_whose_points_were_drawn_differently_is_not_resumed() {
     std::fs::remove_dir_all(&place).unwrap();
 }
 
-/// Truth: the table of a study that nobody stopped.
+/// Truth: the table of an uninterrupted study.
 #[test]
 fn a_study_that_was_stopped_goes_on_and_runs_nothing_twice() {
     let place = folder("resume");
@@ -233,8 +233,8 @@ fn a_study_that_was_stopped_goes_on_and_runs_nothing_twice() {
     let Some(SweepError::Stopped { done, runs: 21, .. }) = stopped.external() else { panic!("{stopped}") };
     let done = *done;
     assert!((5..21).contains(&done), "{done}");
-    // As if the program had been killed while it wrote a line: the part goes back into a journal
-    // that is cut.
+    // As if the program had been killed while writing a line: the part is converted back into a
+    // truncated journal.
     let part = DataTable::read(&output.join("parts/1-of-1-0.parquet")).unwrap();
     let Some(DataValues::Whole(numbers_of_runs)) = part.column("run") else { panic!("runs") };
     let Some(DataValues::Text(caveats)) = part.column("caveats") else { panic!("caveats") };
@@ -252,11 +252,11 @@ fn a_study_that_was_stopped_goes_on_and_runs_nothing_twice() {
         ControlFlow::Continue(())
     };
     let resumed = study(&place, &text).unwrap().run(&request(output.clone()), &mut watch).unwrap();
-    // All but the run whose line was cut.
+    // All except the run with the truncated line.
     assert!(first.unwrap() >= done - 1, "{first:?} {done}");
     assert_eq!(std::fs::read(&resumed.file).unwrap(), std::fs::read(&whole.file).unwrap());
     assert!(!output.join("parts").exists());
-    // Once more: nothing is left to do, and nothing changes.
+    // Again: nothing is left to do, and nothing changes.
     let again = study(&place, &text).unwrap().run(&request(output), &mut go_on).unwrap();
     assert_eq!((again.done, std::fs::read(&again.file).unwrap()), (21, std::fs::read(&whole.file).unwrap()));
     std::fs::remove_dir_all(&place).unwrap();
@@ -313,8 +313,7 @@ fn what_is_wrong_in_a_study_is_told_with_line_and_what_is_near() {
     std::fs::remove_dir_all(&place).unwrap();
 }
 
-/// Truth: the definitions of a grid, of linked values and of a sample that every point of the grid
-/// gets.
+/// Truth: the definitions of a grid, of linked values and of a sample repeated at every grid point.
 #[test]
 fn grids_cross_linked_values_go_along_and_samples_are_the_same_at_every_point() {
     let place = folder("design");
@@ -337,7 +336,7 @@ fn grids_cross_linked_values_go_along_and_samples_are_the_same_at_every_point() 
     std::fs::remove_dir_all(&place).unwrap();
 }
 
-/// Truth: the product of both factors as one.
+/// Truth: the product of both factors as one factor.
 #[test]
 fn a_factor_goes_on_top_of_a_value_and_of_another_factor() {
     let place = folder("on-top");
@@ -364,8 +363,8 @@ fn a_factor_goes_on_top_of_a_value_and_of_another_factor() {
     std::fs::remove_dir_all(&place).unwrap();
 }
 
-/// Truth: closed form: with the mass of the beam following its wall the arm weighs that much more,
-/// and nothing else does.
+/// Truth: closed form: the mass of the beam follows its wall, and the mass of the arm changes by
+/// exactly that much.
 #[test]
 fn a_parameter_that_follows_from_another_changes_the_mass_of_the_arm() {
     let place = folder("derived");
@@ -387,7 +386,7 @@ fn a_parameter_that_follows_from_another_changes_the_mass_of_the_arm() {
     std::fs::remove_dir_all(&place).unwrap();
 }
 
-/// Truth: links that `reduce` makes of jobs written by hand, in robot files written by hand.
+/// Truth: links that `reduce` makes from jobs written by hand, in robot files written by hand.
 #[test]
 fn a_link_that_is_reduced_again_is_that_of_a_job_written_by_hand() {
     let (place, beam) = (folder("reduced"), root().join("robots/one_beam"));

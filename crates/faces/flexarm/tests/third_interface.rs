@@ -1,5 +1,5 @@
-//! Links with load on a third interface: springs between rigid parts know two, so such a link bends
-//! in modes or is refused.
+//! Links with load on a third interface: springs between rigid parts support only two, so such a
+//! link is modal or refused.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 #![allow(non_snake_case, reason = "monogram notation")]
@@ -21,7 +21,7 @@ fn branched(at: f64) -> ReducedLink {
     straight.theory = BeamTheory::EulerBernoulli;
     let mut modal = straight.modal(0).unwrap();
     let (x, x2, x3) = (at, at * at, at * at * at);
-    // Hermite's cubics of a displacement and of a rotation at the far end, and their slopes.
+    // Hermite cubics of a displacement and of a rotation at the far end, and their slopes.
     let (v, vs) = (3.0 * x2 - 2.0 * x3, (6.0 * x - 6.0 * x2) / L);
     let (r, rs) = (L * (x3 - x2), 3.0 * x2 - 2.0 * x);
     let mut Phi = Matrix6xX::zeros(6);
@@ -85,8 +85,8 @@ impl Drop for Place {
 }
 
 /// Truth: closed form. A camera of weight F at the distance a lowers the end by
-/// `F a² (3 l - a)/(6 EI)`; measured within 3e-7, and 1.9 times that before, with the camera riding
-/// on one of two rigid parts.
+/// `F a² (3 l - a)/(6 EI)`; measured within 3e-7, and previously 1.9 times that, with the camera
+/// attached to one of two rigid parts.
 #[test]
 fn a_camera_on_a_third_interface_bends_the_link_as_in_closed_form_whatever_model_is_asked_for() {
     let EI = Material::STEEL.E * TUBE.properties(Material::STEEL.nu).unwrap().I_z;
@@ -99,7 +99,7 @@ fn a_camera_on_a_third_interface_bends_the_link_as_in_closed_form_whatever_model
                 let robot = place.robot(at, camera, keys).unwrap();
                 statics(&robot, &modelling, None, [0.0; 6]).unwrap().sag_m[2]
             };
-            // Small, so that the sine is the slope; the tube's own weight is in both.
+            // Small, so that the sine equals the slope; the tube's own weight is in both.
             let (more, a) = (0.2, at * L);
             let lowered = sag(1.0 + more) - sag(1.0);
             let truth = -9.81 * more * a * a * (3.0 * L - a) / (6.0 * EI);
@@ -128,11 +128,13 @@ fn a_joint_a_little_off_the_third_interface_hangs_on_it_all_the_same() {
     assert!((beside / there - 1.0).abs() < 0.01, "{there:e} {beside:e}"); // measured 3e-3, the longer lever
 }
 
-/// What could only be answered wrongly is asked for, with the names of joint and interface.
+/// If only a wrong answer were possible, masses are requested, with the names of joint and
+/// interface.
 #[test]
 fn without_masses_for_modes_a_third_interface_is_refused() {
     let place = Place::new("refused", &branched(0.7));
-    // More modes than there are: the modal link cannot be made, and the lumped one is no way out.
+    // More modes than available: the modal link cannot be built, and the lumped one is no
+    // alternative.
     let error = place.robot(0.7, 3.0, "modes = 5\n").unwrap_err().to_string();
     for word in ["\"boom\"", "\"bolts\"", "\"bracket\"", "two ends"] {
         assert!(error.contains(word), "{word}: {error}");

@@ -1,5 +1,4 @@
-//! Motions told by the path of the tool: files, standard motions and robot programs on a shipped
-//! arm.
+//! Motions given by TCP paths: files, standard motions and robot programs on a shipped arm.
 #![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
 
 use std::path::{Path, PathBuf};
@@ -16,7 +15,7 @@ fn kr210() -> Robot {
     Robot::load(root().join("robots/kr210")).unwrap()
 }
 
-/// A folder of its own for each test.
+/// A separate folder for each test.
 fn folder(name: &str) -> PathBuf {
     let folder = std::env::temp_dir().join(format!("flexarm-tool-path-{}-{name}", std::process::id()));
     std::fs::create_dir_all(&folder).unwrap();
@@ -31,7 +30,7 @@ fn load(robot: &Robot, name: &str, text: &str) -> Result<Motion, flexarm::Error>
     motion
 }
 
-/// Times and poses of the tool at `n + 1` moments.
+/// Times and TCP poses at `n + 1` instants.
 fn poses(model: &Model, motion: &Motion, n: usize) -> Vec<(f64, Pose)> {
     let (frame, mut data) = (model.frame(TCP_FRAME).unwrap().clone(), Data::new(model));
     let joints = model.nv();
@@ -55,7 +54,7 @@ fn from_polyline(p: &Vector3<f64>, corners: &[Vector3<f64>]) -> f64 {
     corners.windows(2).map(from).fold(f64::INFINITY, f64::min)
 }
 
-/// Truth: the square as it is written, its speed, and the roundings at its corners.
+/// Truth: the square as written, its speed, and the blends at its corners.
 #[test]
 fn the_milling_square_is_milled_where_the_file_says() {
     let robot = kr210();
@@ -86,7 +85,7 @@ fn the_milling_square_is_milled_where_the_file_says() {
     assert!((moves[1].blend_m - 8e-3).abs() < 1e-9);
 }
 
-/// Truth: the two say the same thing in two languages.
+/// Truth: both express the same motion in two languages.
 #[test]
 fn a_program_of_the_controller_moves_as_the_path_file_that_says_the_same() {
     let robot = kr210();
@@ -119,8 +118,8 @@ fn a_program_of_the_controller_moves_as_the_path_file_that_says_the_same() {
     assert!(apart.fold(0.0, f64::max) < 1e-9);
 }
 
-/// A line past the singular pose of the wrist, where joint 4 would need more than its speed. Truth:
-/// the limits as runs check them.
+/// A line past the singular pose of the wrist, where joint 4 would exceed its speed. Truth: the
+/// limits as checked by runs.
 #[test]
 fn a_line_past_a_singular_pose_of_the_wrist_keeps_the_limits_that_runs_check() {
     let robot = kr210();
@@ -141,7 +140,7 @@ fn a_line_past_a_singular_pose_of_the_wrist_keeps_the_limits_that_runs_check() {
     }
 }
 
-/// Truth: the same table in UTF-8, and the samples that were left out.
+/// Truth: the same table in UTF-8, and the omitted samples.
 #[test]
 fn a_table_in_the_letters_of_old_windows_is_recognised_and_its_gap_is_told() {
     let robot = kr210();
@@ -248,7 +247,7 @@ fn what_joints_do_that_a_path_does_not_need_is_a_known_word_or_a_posture() {
              [[move]]\njoints = [0.0, -60.0, 90.0, 0.0, 60.0, 0.0]\n[[move]]\nline = [1.6, 0.1, 1.2]\n"
         )
     };
-    // Six joints have nothing left over: all rules give the same motion.
+    // Six joints have no redundancy: all rules give the same motion.
     let durations: Vec<f64> = ["\"hold\"", "\"away-from-limits\"", "[0.0, -60.0, 90.0, 0.0, 60.0, 0.0]"]
         .iter()
         .map(|word| load(&robot, "path.toml", &file(word)).unwrap().trajectory.duration())
@@ -260,7 +259,7 @@ fn what_joints_do_that_a_path_does_not_need_is_a_known_word_or_a_posture() {
     }
 }
 
-/// Truth: the third derivative of the joints' curves.
+/// Truth: the third derivative of the joint curves.
 #[test]
 fn jerks_of_joints_hold_in_a_path_file_and_in_a_program_and_are_shown_with_their_limits() {
     let robot = kr210();
@@ -291,7 +290,7 @@ fn jerks_of_joints_hold_in_a_path_file_and_in_a_program_and_are_shown_with_their
         assert!(most > 0.98 * limit, "{most}");
         assert!(report.violations.iter().all(|violation| violation.kind != "jerk"));
     }
-    // A limit that binds nothing but a corner: told with its joint.
+    // A limit that is active only at a corner: reported with its joint.
     let slowed = load(&robot, "path.toml", &path).unwrap();
     let said = &slowed.tool_path.as_ref().unwrap().moves;
     let by_jerk =
@@ -303,14 +302,13 @@ fn jerks_of_joints_hold_in_a_path_file_and_in_a_program_and_are_shown_with_their
     std::fs::remove_dir_all(folder).unwrap();
 }
 
-/// Truth: a circle by hand, and a tool that does not turn. Full circles are programmed as two
-/// halves.
+/// Truth: a circle by hand, and a tool with constant orientation. Full circles are programmed as
+/// two halves.
 #[test]
 fn two_halves_of_a_circle_with_one_orientation_leave_the_tool_as_it_stands_in_every_language() {
     let robot = kr210();
     let model = robot.rigid_model().unwrap();
-    // The tool points down: turned by half a turn about y. The flange is 350 mm above the tool
-    // centre point.
+    // The tool points down: rotated by half a turn about y. The flange is 350 mm above the TCP.
     let rapid = "MODULE m\nVAR robtarget p:=[[1700,0,1200],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\nPROC main()\n\
         ConfJ \\Off;\nConfL \\Off;\nMoveAbsJ [[0,-60,90,0,60,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v500,fine,tool0;\nMoveL p,v500,fine,tool0;\n\
         MoveC Offs(p,-100,100,0),Offs(p,-200,0,0),v200,z1,tool0;\nMoveC Offs(p,-100,-100,0),p,v200,fine,tool0;\nENDPROC\nENDMODULE\n";
@@ -337,13 +335,13 @@ fn two_halves_of_a_circle_with_one_orientation_leave_the_tool_as_it_stands_in_ev
             farthest = farthest.max((flange - nalgebra::Point3::new(1.7, 0.0, 1.2)).norm());
             assert!(t.is_finite());
         }
-        // Measured: 2e-7 rad (a quaternion of RAPID is exact; URScript's angles have nine digits),
-        // 2e-6 m in the blend.
+        // Measured: 2e-7 rad (a RAPID quaternion is exact; URScript angles have nine digits), 2e-6
+        // m in the blend.
         assert!(turned < 1e-6 && off < 1e-4 && farthest > 0.1999, "{name}: {turned:.1e} rad, {off:.1e} m, {farthest}");
     }
 }
 
-/// A number that no robot can follow is refused where it stands, before any work on it.
+/// A number that no robot can follow is refused at its location, before any computation.
 #[test]
 fn numbers_of_path_files_beyond_what_a_robot_can_do_are_refused() {
     let robot = kr210();
@@ -384,7 +382,7 @@ fn numbers_of_path_files_beyond_what_a_robot_can_do_are_refused() {
     std::fs::remove_dir_all(program).unwrap();
 }
 
-/// Truth: the straight line between the tool at the start and the first point.
+/// Truth: the straight line between the TCP at the start and the first point.
 #[test]
 fn the_first_rapid_from_joint_values_is_a_line_where_rapids_have_a_speed() {
     let robot = kr210();

@@ -1,5 +1,5 @@
-//! What the cases share: shipped files, arms held at a pose, loads, and a stepper that runs until
-//! it rests.
+//! Helpers shared by the cases: shipped files, arms held at a pose, loads, and a stepper that runs
+//! until the arm is at rest.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -19,17 +19,18 @@ use serde_json::Value;
 
 use crate::Error;
 
-/// The folder with `robots`, `trajectories` and `tests`, and how much is asked for.
+/// Test bench: root folder of a checkout (with `robots`, `trajectories` and `tests`) and extent of
+/// the run.
 #[derive(Clone, Debug)]
 pub struct Bench {
-    /// That folder.
+    /// Root folder.
     pub root: PathBuf,
-    /// Leave out what takes long.
+    /// Whether slow parts are left out.
     pub quick: bool,
 }
 
 impl Bench {
-    /// A shipped robot, by its path from the root.
+    /// Loads a shipped robot, by its path relative to the root.
     pub fn robot(&self, file: &str) -> Result<Robot, Error> {
         let path = self.root.join(file);
         if !path.is_file() {
@@ -45,18 +46,18 @@ impl Bench {
         self.root.join(file)
     }
 
-    /// A shipped motion.
+    /// Loads a shipped motion.
     pub fn motion(&self, robot: &Robot, file: &str) -> Result<Motion, Error> {
         Ok(Motion::load_for(&self.root.join(file), &*robot.rigid_model()?)?)
     }
 
-    /// Stored results of another program: `tests/verification/<name>`.
+    /// Reads stored results of another program from `tests/verification/<name>`.
     pub fn stored(&self, name: &str) -> Result<Stored, Error> {
         Stored::read(&self.root.join("tests/verification").join(name))
     }
 }
 
-/// Results of another program, with where they come from.
+/// Results of another program, with their provenance.
 #[derive(Clone, Debug)]
 pub struct Stored {
     path: PathBuf,
@@ -72,30 +73,30 @@ impl Stored {
         Ok(Self { path: path.to_owned(), value })
     }
 
-    /// A sentence about program, script and day.
+    /// Returns program, script and date in one line.
     pub fn provenance(&self) -> String {
         let word = |key: &str| self.value[key].as_str().unwrap_or("?").to_owned();
         format!("{} ({}, {})", word("program"), word("script"), word("date"))
     }
 
-    /// What is at a path of keys and places, `a/0/b`.
+    /// Returns the value at a path of keys and indices, such as `a/0/b`.
     pub fn at(&self, pointer: &str) -> Result<&Value, Error> {
         self.value.pointer(&format!("/{pointer}")).ok_or_else(|| self.fault(pointer, "is missing"))
     }
 
-    /// A number.
+    /// Returns a number.
     pub fn number(&self, pointer: &str) -> Result<f64, Error> {
         self.at(pointer)?.as_f64().ok_or_else(|| self.fault(pointer, "is no number"))
     }
 
-    /// A list of numbers.
+    /// Returns a list of numbers.
     pub fn numbers(&self, pointer: &str) -> Result<Vec<f64>, Error> {
         let list = self.at(pointer)?.as_array().ok_or_else(|| self.fault(pointer, "is no list"))?;
         let numbers = list.iter().map(Value::as_f64).collect::<Option<Vec<f64>>>();
         numbers.ok_or_else(|| self.fault(pointer, "has something that is no number"))
     }
 
-    /// A six-vector.
+    /// Returns a six-vector.
     pub fn vector6(&self, pointer: &str) -> Result<Vector6<f64>, Error> {
         let numbers = self.numbers(pointer)?;
         if numbers.len() == 6 {
@@ -105,7 +106,7 @@ impl Stored {
         }
     }
 
-    /// A 6x6 matrix, stored by rows.
+    /// Returns a 6x6 matrix, stored by rows.
     pub fn matrix6(&self, pointer: &str) -> Result<Matrix6<f64>, Error> {
         let mut matrix = Matrix6::zeros();
         for row in 0..6 {
@@ -120,48 +121,48 @@ impl Stored {
     }
 }
 
-/// Generalised-alpha as runs use it.
+/// Generalised-alpha with the settings of an ordinary run.
 pub const ALPHA: StepperKind = StepperKind::GeneralizedAlpha(AlphaSettings { rho: 0.9, dispersion_correction: true });
 
-/// Compliant constraints in their exact form.
+/// SPOOK with compliant constraints in their exact form.
 pub const fn spook(form: ConstraintForm) -> StepperKind {
     StepperKind::Spook(SpookSettings { form, preset: SpookPreset::Exact })
 }
 
-/// The three ways in which a lumped link is stepped.
+/// The three steppers for lumped links.
 pub const LUMPED: [(&str, StepperKind); 3] = [
     ("compliant constraints, local", spook(ConstraintForm::Local)),
     ("compliant constraints, global", spook(ConstraintForm::Global)),
     ("spring-damper", ALPHA),
 ];
 
-/// Links in rigid parts.
+/// Modelling with lumped links of `n` rigid parts.
 pub fn parts(n: usize) -> Modelling {
     Modelling { links: LinkModel::Lumped, segments: Some(n), ..Modelling::default() }
 }
 
-/// Links that bend in modes.
+/// Modelling with modal links.
 pub fn modal(modes: usize) -> Modelling {
     Modelling { links: LinkModel::Modal, modes: Some(modes), ..Modelling::default() }
 }
 
-/// Links in rigid parts, with their name on the page.
+/// Lumped links of `n` rigid parts, with their name on the page.
 pub fn in_parts(n: usize) -> (String, Modelling) {
     (format!("{n} parts"), parts(n))
 }
 
-/// Links that bend in modes, with their name on the page.
+/// Modal links, with their name on the page.
 pub fn in_modes(modes: usize) -> (String, Modelling) {
     (format!("modal, {modes} modes"), modal(modes))
 }
 
-/// A robot without weight.
+/// Returns the robot without gravity.
 pub fn weightless(mut robot: Robot) -> Robot {
     robot.rigid.gravity = Vector3::zeros();
     robot
 }
 
-/// A robot whose first mode is critically damped: for coming to rest.
+/// Returns the robot with its first mode critically damped, so that it comes to rest quickly.
 pub fn damped(mut robot: Robot) -> Robot {
     for link in &mut robot.flexible {
         link.damping = Damping::Modal(1.0);
@@ -169,18 +170,18 @@ pub fn damped(mut robot: Robot) -> Robot {
     robot
 }
 
-/// An arm with its joints held at zero, and the frame at which it is loaded and watched.
+/// An arm with its joints held at zero, and the frame at which it is loaded and observed.
 pub struct Rig {
     /// The arm.
     pub arm: FlexibleArm,
     /// The frame.
     pub frame: Frame,
-    /// The frame in the undeformed arm.
+    /// Pose of the frame in the undeformed arm.
     pub X_WF: Pose,
 }
 
 impl Rig {
-    /// At a frame of the robot, its tool without one.
+    /// Creates a rig at a named frame of the robot, or at its TCP if `frame` is `None`.
     pub fn new(robot: &Robot, modelling: &Modelling, frame: Option<&str>) -> Result<Self, Error> {
         let flexible = robot.modelled(modelling)?;
         let joints = vec![0.0; flexible.model.n_actuated()];
@@ -192,7 +193,8 @@ impl Rig {
         Ok(Self { arm, frame, X_WF })
     }
 
-    /// The same arm watched at a point of a body that is at `p_W` when undeformed, world axes.
+    /// Returns the same arm, observed at the point of a body that is at `p_W` (world axes) when
+    /// undeformed.
     pub fn at_point(&self, body: usize, p_W: Vector3<f64>) -> Self {
         let e = DVector::zeros(self.arm.model.n_elastic());
         let body_only = Frame { body, X_BF: Pose::identity(), ..self.frame.clone() };
@@ -202,8 +204,9 @@ impl Rig {
         Self { arm: self.arm.clone(), frame, X_WF }
     }
 
-    /// Frequencies (Hz) of the modes in which the frame moves along y and along z, world axes,
-    /// ascending; those that turn it or move it along x are left out.
+    /// Returns the frequencies (Hz), ascending, of the modes in which the frame moves mainly along
+    /// y and mainly along z (world axes). Modes that mainly rotate it or move it along x are left
+    /// out.
     pub fn bending_hz(&self) -> [Vec<f64>; 2] {
         let modes = &self.arm.modes;
         let mut found = [Vec::new(), Vec::new()];
@@ -213,7 +216,7 @@ impl Rig {
             let moved = tcp_error(&at(&modes.equilibrium - &step), &at(&modes.equilibrium + &step));
             let [x, y, z] = [moved[0].abs(), moved[1].abs(), moved[2].abs()];
             let turned = moved[3..].iter().copied().worst();
-            // A millimetre is no lever here.
+            // Skip modes that mainly rotate the frame: translation below 1 mm per rad.
             if y.max(z) > x && y.max(z) > 1e-3 * turned {
                 found[usize::from(z > y)].push(hz);
             }
@@ -221,27 +224,27 @@ impl Rig {
         found
     }
 
-    /// The arm under a wrench at the frame, world axes.
+    /// Returns the arm under a wrench at the frame, world axes.
     pub fn loaded(&self, wrench: &Vector6<f64>) -> Result<FlexibleArm, Error> {
         let F = Wrench::new(wrench.fixed_rows::<3>(0).into(), wrench.fixed_rows::<3>(3).into());
         let load = Load { body: self.frame.body, X_BF: self.frame.X_BF, wrench: TimedWrench::new(move |_| F) };
         self.arm.clone().with_timed_loads(vec![load]).map_err(step_error)
     }
 
-    /// Displacement and rotation of the frame in the equilibrium under a wrench at it, by Newton's
-    /// method.
+    /// Computes the displacement and rotation of the frame in equilibrium under a wrench at the
+    /// frame, by Newton's method.
     pub fn statics(&self, wrench: &Vector6<f64>) -> Result<Vector6<f64>, Error> {
         self.statics_at(wrench, self)
     }
 
-    /// The same at the frame of another rig of the same arm.
+    /// Like [`Rig::statics`], but observes the frame of another rig of the same arm.
     pub fn statics_at(&self, wrench: &Vector6<f64>, seen: &Self) -> Result<Vector6<f64>, Error> {
         let arm = self.loaded(wrench)?;
         let e = static_equilibrium(&arm, 0.0).map_err(step_error)?;
         Ok(Vector6::from(tcp_error(&seen.X_WF, &place(&arm, &seen.frame, &e))))
     }
 
-    /// The same by a stepper, from the undeformed arm until it rests.
+    /// Like [`Rig::statics`], but steps in time from the undeformed arm until it is at rest.
     pub fn settled(&self, wrench: &Vector6<f64>, kind: StepperKind, h: f64) -> Result<Vector6<f64>, Error> {
         const AT_MOST: usize = 100_000;
         const BETWEEN: usize = 50;
@@ -257,7 +260,7 @@ impl Rig {
             stepper.observe(&mut seen);
             let X = seen.X_WB[self.frame.body] * self.frame.X_BF;
             let now = Vector6::from(tcp_error(&self.X_WF, &X));
-            // It rests when what still changes is rounding of the pose.
+            // At rest: the pose changes only by rounding.
             calm = if (now - before).amax() < 1e-15 + 1e-12 * now.amax() { calm + 1 } else { 0 };
             before = now;
             if calm == 3 {
@@ -267,10 +270,10 @@ impl Rig {
         Err(Error::NotAtRest { steps: AT_MOST, step_s: h, stepper: kind.name() })
     }
 
-    /// Way of the frame from its undeformed place, let go there, seen at the start and every so
-    /// often.
+    /// Returns the displacement of the frame from its undeformed position after the arm is released
+    /// there, sampled at the start and every `every` seconds.
     ///
-    /// * `h`: step (s), of which `every` (s) is a multiple.
+    /// * `h`: step size (s); `every` is a multiple of it.
     pub fn path(&self, kind: StepperKind, h: f64, every: f64, duration: f64) -> Result<Vec<Vector3<f64>>, Error> {
         let mut stepper = new_stepper(kind, self.arm.clone(), h, Start::Undeformed).map_err(step_error)?;
         let mut seen = Observation::new(&self.arm);
@@ -287,10 +290,10 @@ impl Rig {
         Ok(path)
     }
 
-    /// Compliance at the frame from pairs of opposite loads, so that effects of second order
-    /// cancel.
+    /// Computes the compliance at the frame from pairs of opposite loads, which cancels
+    /// second-order effects.
     ///
-    /// `loads`: size of each load; `response`: displacement under a wrench.
+    /// `loads`: magnitude of each load; `response`: displacement under a wrench.
     pub fn compliance(
         &self,
         loads: &Vector6<f64>,
@@ -307,10 +310,10 @@ impl Rig {
     }
 }
 
-/// Damping of [`tool_path`] over stiffness (s).
+/// Ratio of damping to stiffness in [`tool_path`] (s).
 pub const PATH_DAMPING_S: f64 = 5e-4;
 
-/// Places of the tool at the end of each step of generalised-alpha, world axes.
+/// Computes the TCP positions after each step of generalised-alpha, world axes.
 ///
 /// `stiffening`: whether loads change the stiffness of modal links. Damping is [`PATH_DAMPING_S`]
 /// times stiffness in every model.
@@ -340,7 +343,8 @@ pub fn tool_path(
     Ok(path)
 }
 
-/// Pose of a frame at elastic coordinates, joints as prescribed at the start.
+/// Computes the pose of a frame for given elastic coordinates, with the joints at their prescribed
+/// start.
 pub fn place(arm: &FlexibleArm, frame: &Frame, e: &DVector<f64>) -> Pose {
     let model = &arm.model;
     let (mut data, mut state) = (Data::new(model), State::zeros(model));
@@ -350,26 +354,26 @@ pub fn place(arm: &FlexibleArm, frame: &Frame, e: &DVector<f64>) -> Pose {
     data.X_WF(frame)
 }
 
-/// A motion far above rounding, far below where geometry counts (m, rad).
+/// A motion well above rounding and well below geometric nonlinearity (m, rad).
 pub const SMALL_MOTION: f64 = 1e-5;
 
-/// Loads that move a point with compliance `C` by [`SMALL_MOTION`] each.
+/// Computes loads that each move a point with compliance `C` by [`SMALL_MOTION`].
 pub fn small_loads(C: &Matrix6<f64>) -> Vector6<f64> {
     Vector6::from_fn(|j, _| SMALL_MOTION / C[(j, j)])
 }
 
-/// Largest difference of the response to load `j`, relative to `sqrt(C_ii C_jj)`.
+/// Maximum error of the response to load `j`, each entry relative to `sqrt(C_ii C_jj)`.
 pub fn column_error(C: &Matrix6<f64>, truth: &Matrix6<f64>, j: usize) -> f64 {
     let scale = |i: usize| (truth[(i, i)] * truth[(j, j)]).sqrt();
     (0..6).map(|i| (C[(i, j)] - truth[(i, j)]).abs() / scale(i)).worst()
 }
 
-/// The same over all loads.
+/// Maximum of [`column_error`] over all loads.
 pub fn compliance_error(C: &Matrix6<f64>, truth: &Matrix6<f64>) -> f64 {
     (0..6).map(|j| column_error(C, truth, j)).worst()
 }
 
-/// Errors of the shift and of the rotation of a six-vector, each as a vector over its size.
+/// Relative errors of the translation and of the rotation of a six-vector, each as a vector norm.
 pub fn shift_and_turn_errors(u: &Vector6<f64>, truth: &Vector6<f64>) -> [f64; 2] {
     [0, 3].map(|from| {
         let truth = truth.fixed_rows::<3>(from);
@@ -377,19 +381,19 @@ pub fn shift_and_turn_errors(u: &Vector6<f64>, truth: &Vector6<f64>) -> [f64; 2]
     })
 }
 
-/// Largest distance of two paths that are seen at the same instants (m).
+/// Maximum distance between two paths sampled at the same instants (m).
 pub fn farthest(a: &[Vector3<f64>], b: &[Vector3<f64>]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).norm()).worst()
 }
 
-/// The larger of two errors; what is no number is the worst of all, where `f64::max` would drop it.
+/// Returns the larger of two errors; NaN wins, whereas `f64::max` would drop it.
 pub fn larger(a: f64, b: f64) -> f64 {
     if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }
 }
 
-/// The largest size of errors.
+/// Maximum absolute value of a sequence of errors.
 pub trait Worst: Iterator<Item = f64> + Sized {
-    /// Not a number if one of them is none, or if there are none at all: nothing was compared.
+    /// Returns NaN if one of them is NaN or if there are none: then nothing was compared.
     fn worst(self) -> f64 {
         self.map(f64::abs).reduce(larger).unwrap_or(f64::NAN)
     }
@@ -400,13 +404,13 @@ impl<I: Iterator<Item = f64>> Worst for I {}
 /// Names of the six loads.
 pub const LOADS: [&str; 6] = ["F_x", "F_y", "F_z", "M_x", "M_y", "M_z"];
 
-/// A step error of a verification.
+/// Wraps a step error.
 pub fn step_error(source: StepError) -> Error {
     flexarm::Error::Step { source, partial: false }.into()
 }
 
-/// Displacement and rotation of a frame per acceleration of gravity (m/s², world axes), times `g`:
-/// from a hundredth of it up and down, so that what is left is linear.
+/// Computes the displacement and rotation of a frame under gravity `g` (m/s², world axes),
+/// linearised: the difference of the responses to plus and minus a hundredth of `g`, scaled up.
 pub fn weight_response(
     robot: &Robot,
     modelling: &Modelling,
@@ -426,8 +430,8 @@ pub fn weight_response(
 mod tests {
     use super::*;
 
-    /// Truth by hand: (3, 4, 0) against (3, 0, 0) is off by 4 of 3, a rotation of 1.1 against 1 by
-    /// a tenth.
+    /// Truth by hand: (3, 4, 0) differs from (3, 0, 0) by 4, relative to 3; a rotation of 1.1
+    /// differs from 1 by a tenth.
     #[test]
     fn shift_and_turn_are_judged_by_their_own_sizes() {
         let truth = Vector6::new(3.0, 0.0, 0.0, 0.0, 0.0, 1.0);
@@ -452,8 +456,7 @@ mod tests {
         assert!(farthest(&[at(f64::NAN, 0.0)], &[at(0.0, 0.0)]).is_nan() && farthest(&[], &[]).is_nan());
     }
 
-    /// A number that is none must not be dropped, as `f64::max` does, nor may an empty comparison
-    /// pass.
+    /// NaN must not be dropped, as `f64::max` does, and an empty comparison must not pass.
     #[test]
     fn the_worst_error_is_what_is_no_number() {
         assert_eq!([1.0, -3.0, 2.0].into_iter().worst(), 3.0);

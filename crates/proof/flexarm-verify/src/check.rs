@@ -1,31 +1,31 @@
-//! Whether a stored page is what the command prints.
+//! Comparison of a stored page with the page that the command prints.
 //!
-//! Words and whole numbers must be equal. Numbers with decimals may differ by one of their last
-//! digit. Relative errors (per cent, or with an exponent) may differ by 3 %, and by 5e-9 where they
-//! are that small: that is rounding, which differs between processors. Pictures must have the same
-//! words and curves, with coordinates within three units of some two thousand.
+//! Words and whole numbers must be equal. Numbers with decimals may differ by one unit of their
+//! last digit. Relative errors (per cent, or with an exponent) may differ by 3 %, and small ones by
+//! 5e-9, since rounding differs between processors. Pictures must have the same words and curves,
+//! with coordinates within three units of about two thousand.
 
 use crate::page::FLOOR;
 
-/// Largest difference of relative errors that is rounding.
+/// Maximum absolute difference of relative errors that counts as rounding.
 const ROUNDING: f64 = 5e-9;
-/// Largest relative difference of relative errors that count as equal.
+/// Maximum relative difference of relative errors that count as equal.
 const RELATIVE: f64 = 0.03;
-/// Largest difference of coordinates of a picture.
+/// Maximum difference of coordinates in a picture.
 const COORDINATE: f64 = 3.0;
 
-/// A line that differs.
+/// A line in which two pages differ.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
 pub struct Difference {
-    /// Its number in the stored page, from 1.
+    /// Line number in the stored page, from 1.
     pub line: usize,
-    /// What is stored.
+    /// Stored text.
     pub stored: String,
-    /// What was found.
+    /// Text found now.
     pub found: String,
 }
 
-/// Lines in which two pages differ.
+/// Returns the lines in which two pages differ.
 pub fn differences(stored: &str, found: &str) -> Vec<Difference> {
     let (stored, found): (Vec<&str>, Vec<&str>) = (stored.lines().collect(), found.lines().collect());
     (0..stored.len().max(found.len()))
@@ -43,7 +43,7 @@ fn same_line(a: &str, b: &str) -> bool {
     a.len() == b.len() && a.iter().zip(&b).all(|(a, b)| a.same(b))
 }
 
-/// Whether two pictures show the same.
+/// Returns whether two pictures agree within the tolerances.
 pub fn same_picture(a: &str, b: &str) -> bool {
     let close = |(a, b): (&Piece, &Piece)| match (a, b) {
         (Piece::Number { value: a, .. }, Piece::Number { value: b, .. }) => (a - b).abs() <= COORDINATE,
@@ -59,14 +59,14 @@ enum Piece {
     Number { value: f64, last_digit: f64, kind: Kind },
 }
 
-/// What a number is, by its looks.
+/// Kind of a number, judged by its format.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Kind {
-    /// A count, a year, a version.
+    /// Count, year or version.
     Whole,
-    /// A figure with decimals.
+    /// Number with decimals.
     Decimal,
-    /// Per cent, or with an exponent.
+    /// Relative error: in per cent, or with an exponent.
     Error,
 }
 
@@ -76,14 +76,14 @@ impl Piece {
             (Self::Words(a), Self::Words(b)) => a == b,
             (Self::Number { value: a, last_digit: d, kind }, Self::Number { value: b, last_digit: e, kind: other }) => {
                 let apart = (a - b).abs();
-                // A thousandth more, for decimals in binary.
+                // A margin of a thousandth, since decimals are not exact in binary.
                 let by_digit = apart <= 1.001 * d.max(*e);
                 match (kind, other) {
                     (Kind::Whole, Kind::Whole) => a == b,
                     (Kind::Error, Kind::Error) => {
                         by_digit || apart <= RELATIVE * a.abs().max(b.abs()) || apart <= ROUNDING
                     }
-                    // A figure may round to a whole number.
+                    // A number with decimals may round to a whole number.
                     _ => by_digit,
                 }
             }
@@ -92,7 +92,7 @@ impl Piece {
     }
 }
 
-/// Words and numbers of a text by turns.
+/// Splits a line into alternating words and numbers.
 fn pieces(line: &str) -> Vec<Piece> {
     let line = line.replace(&format!("< {FLOOR:.0e}"), "+1e-9");
     let bytes = line.as_bytes();
@@ -126,7 +126,7 @@ fn pieces(line: &str) -> Vec<Piece> {
     pieces
 }
 
-/// Length of the number with which the text begins: sign, digits, point, digits, exponent.
+/// Length of the number at the start of the text: sign, digits, point, digits, exponent.
 fn number(text: &[u8]) -> Option<usize> {
     let digits = |from: usize| text[from..].iter().take_while(|c| c.is_ascii_digit()).count();
     let sign = usize::from(matches!(text.first(), Some(b'+' | b'-')));
@@ -191,7 +191,7 @@ mod tests {
     }
 
     /// Truth by hand: sign, digits, point, exponent; a point or an `e` without digits after it
-    /// belongs to the words.
+    /// belongs to the following word.
     #[test]
     fn a_number_ends_where_its_digits_end() {
         for (text, length, unit) in [

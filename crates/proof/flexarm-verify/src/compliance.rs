@@ -1,5 +1,4 @@
-//! The compliance of a point by every method, beside a truth: what the first three cases have in
-//! common.
+//! Compliance of a point by every method, compared with a truth; shared by the first three cases.
 
 use flexarm::{Modelling, Robot};
 use nalgebra::{Matrix6, Vector6};
@@ -8,24 +7,25 @@ use crate::Error;
 use crate::bench::{LUMPED, Rig, column_error, compliance_error, damped, parts, weightless};
 use crate::page::{Bound, Case, Table, error};
 
-/// Parts of a link that is stepped until it rests.
+/// Number of parts of a link that is stepped until it is at rest.
 pub(crate) const STEPPED_PARTS: usize = 2;
 
-/// What one method says.
+/// Result of one method.
 pub(crate) struct Method {
-    /// How it is called on the page.
+    /// Name on the page.
     pub(crate) name: String,
     /// Displacement and rotation of the point per wrench on it (m/N, rad/(N m), ...), world axes.
     pub(crate) C: Matrix6<f64>,
 }
 
-/// Compliance at a frame of a robot without weight by every method: lumped links of two parts in
-/// time, the others by Newton's method.
+/// Computes the compliance at a frame of a robot without gravity by every method: lumped links of
+/// two parts by stepping in time, the others by Newton's method.
 ///
-/// * `loads`: size of each of the six loads (N, N m). `step_s`: step of those that run in time (s).
+/// * `loads`: magnitude of each of the six loads (N, N m). `step_s`: step size of the time stepping
+///   (s).
 ///
 /// # Errors
-/// Where a model cannot be made, has no equilibrium, or does not come to rest.
+/// If a model cannot be built, has no equilibrium, or does not come to rest.
 pub(crate) fn by_every_method(
     robot: &Robot,
     frame: Option<&str>,
@@ -55,7 +55,7 @@ pub(crate) fn add_errors(table: &mut Table, truth: &Matrix6<f64>, methods: &[Met
     }
 }
 
-/// A claim per method: the worst of its errors over all loads.
+/// Adds a claim per method: its maximum error over all loads.
 pub(crate) fn claim_each(case: &mut Case, what: &str, truth: (&str, &Matrix6<f64>), methods: &[Method], bound: f64) {
     for Method { name, C } in methods {
         case.claim(format!("{what}, {name}"), truth.0, compliance_error(C, truth.1), Bound::AtMost(bound));
@@ -67,8 +67,8 @@ mod tests {
     use super::*;
     use crate::page::word;
 
-    /// Truth by hand: with C_ii = 1 everywhere, an entry that is off by 3e-3 in column 2 is the
-    /// error of load 2 alone.
+    /// Truth by hand: with C_ii = 1 everywhere, an entry of column 2 that is wrong by 3e-3 appears
+    /// only as the error of load 2.
     #[test]
     fn an_error_of_one_load_stands_in_the_row_of_that_load() {
         let truth = Matrix6::identity();

@@ -1,5 +1,4 @@
-//! What keeps a case study from being done: the library's errors, and truths that cannot be
-//! computed.
+//! Errors of the case studies: those of the library, and truths that cannot be computed.
 
 use flexarm::Fault;
 use flexarm_fe_io::MeshError;
@@ -7,61 +6,61 @@ use flexarm_fem::FemError;
 use flexarm_fem::sparse::ModesError;
 use flexarm_files::FileError;
 
-/// What keeps a case study from being done.
+/// Reason why a case study cannot be run.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// What the library says.
+    /// An error of the library.
     #[error(transparent)]
     Library(#[from] flexarm::Error),
-    /// A case that is not there.
+    /// An unknown case.
     #[error("there is no case {name:?}; the cases are {known}")]
     UnknownCase {
-        /// The name.
+        /// Requested name.
         name: String,
-        /// The names that there are, with commas between them.
+        /// Names of the cases, separated by commas.
         known: String,
     },
     /// A frame that the robot does not have.
     #[error("there is no frame {name:?}")]
     NoFrame {
-        /// The frame.
+        /// Requested frame.
         name: String,
     },
     /// A robot without a tool.
     #[error("the robot has no tool")]
     NoTool,
-    /// An arm that goes on swinging.
+    /// An arm that does not come to rest.
     #[error("the arm does not come to rest within {steps} steps of {step_s} s ({stepper})")]
     NotAtRest {
-        /// Steps taken.
+        /// Number of steps taken.
         steps: usize,
-        /// Their length (s).
+        /// Step size (s).
         step_s: f64,
-        /// Who took them.
+        /// Name of the stepper.
         stepper: &'static str,
     },
-    /// A mesh whose interface B is not held by A.
+    /// A mesh whose interface B is not constrained by interface A.
     #[error("interface B can move without force")]
     FreeInterface,
-    /// A mesh that can move although its interfaces are held.
+    /// A mesh that is a mechanism although its interfaces are held.
     #[error("{mesh}: the held mesh is a mechanism")]
     Mechanism {
-        /// Its file.
+        /// Mesh file.
         mesh: &'static str,
     },
-    /// Frequencies of a mesh.
+    /// A failed eigenvalue analysis of a mesh.
     #[error("{mesh}: {source}")]
     Modes {
-        /// Its file.
+        /// Mesh file.
         mesh: &'static str,
-        /// Why.
+        /// Cause.
         source: ModesError,
     },
-    /// A beam in closed form, or units of a mesh.
+    /// An error in a closed-form beam or in the units of a mesh.
     #[error(transparent)]
     Fem(Box<FemError>),
-    /// A link file without the mass over its interfaces and modes.
+    /// A link file without the condensed mass of its interfaces and modes.
     #[error("the link file has no condensed mass")]
     NoCondensedMass,
     /// A link file whose stiffness has no inverse.
@@ -88,7 +87,7 @@ impl From<FileError> for Error {
 }
 
 impl Error {
-    /// Whether the input or the run is to blame.
+    /// Returns whether the input or the run is at fault.
     pub fn fault(&self) -> Fault {
         match self {
             Self::Library(error) => error.fault(),

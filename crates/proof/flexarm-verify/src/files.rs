@@ -1,4 +1,4 @@
-//! The page and its files.
+//! The page and the files that belong to it.
 
 use std::path::{Path, PathBuf};
 
@@ -9,11 +9,11 @@ use crate::Verification;
 use crate::check::{Difference, differences, same_picture};
 use crate::page::{Block, Table, claims_table, markdown, table_text, word};
 
-/// Name of the page.
+/// File name of the page.
 pub const PAGE: &str = "verification.md";
-/// Folder of the pictures beside it.
+/// Folder of the pictures, next to the page.
 const PICTURES: &str = "verification";
-/// Every number with all its digits.
+/// File with every number at full precision.
 const NUMBERS: &str = "verification.json";
 
 const HEAD: &str = "\
@@ -37,17 +37,17 @@ Methods: *compliant constraints* are rigid parts in maximal coordinates with SPO
 [theory.md](theory.md) has the equations.
 ";
 
-/// Where everything goes.
+/// Output files of a verification.
 #[derive(Clone, Debug)]
 pub struct VerificationFiles {
     folder: PathBuf,
     overwrite: bool,
 }
 
-/// Lines and pictures in which a stored page differs from a verification.
+/// Returns the lines and pictures in which a stored page differs from a verification.
 ///
 /// # Errors
-/// [`flexarm::Error::File`] where a figure has nothing to draw.
+/// [`flexarm::Error::File`] if a figure has nothing to draw.
 pub fn differences_from(stored: &str, path: &Path, verification: &Verification) -> Result<Vec<Difference>, Error> {
     let mut found = differences(stored, &verification.page());
     let folder = path.parent().unwrap_or(Path::new(".")).join(PICTURES);
@@ -63,8 +63,8 @@ pub fn differences_from(stored: &str, path: &Path, verification: &Verification) 
 }
 
 impl VerificationFiles {
-    /// In a folder; refused if the page or its pictures are there already and are not to be
-    /// overwritten, or if nothing can be written there.
+    /// Output files in a folder. Refused if the page or its pictures already exist and may not be
+    /// overwritten, or if the folder is not writable.
     ///
     /// # Errors
     /// [`flexarm::Error::File`].
@@ -75,7 +75,7 @@ impl VerificationFiles {
         if !overwrite && pictures.exists() {
             return Err(flexarm::Error::Taken { path: pictures, place: "folder", movable: false }.into());
         }
-        // Better now than after a minute.
+        // Check write permission now rather than after a minute of computing.
         let there = folder.ancestors().find(|above| above.is_dir()).unwrap_or(Path::new("."));
         let probe = there.join(format!(".flexarm-{}", std::process::id()));
         std::fs::write(&probe, "").map_err(|source| flexarm::Error::Write { path: there.to_owned(), source })?;
@@ -83,12 +83,12 @@ impl VerificationFiles {
         Ok(Self { folder, overwrite })
     }
 
-    /// The page.
+    /// Path of the page.
     pub fn page(&self) -> PathBuf {
         self.folder.join(PAGE)
     }
 
-    /// Writes page, pictures and numbers, all or nothing.
+    /// Writes page, pictures and numbers; either all of them or none.
     ///
     /// # Errors
     /// [`flexarm::Error::File`], [`flexarm::Error::Write`].
@@ -106,7 +106,7 @@ impl VerificationFiles {
 }
 
 impl Verification {
-    /// The page, Markdown.
+    /// Returns the page as Markdown.
     pub fn page(&self) -> String {
         let mut text = HEAD.to_owned();
         if self.quick || self.cases.len() < crate::case_names().len() {
@@ -127,15 +127,15 @@ impl Verification {
         text + "\n## All claims\n" + &table_text(&claims_table(&self.cases))
     }
 
-    /// Everything with all digits.
+    /// Returns everything at full precision as JSON.
     pub fn json(&self) -> String {
         serde_json::to_string(self).expect("plain numbers and strings")
     }
 
-    /// Name and SVG of each picture.
+    /// Returns name and SVG of each picture.
     ///
     /// # Errors
-    /// [`flexarm::Error::File`] where a figure has nothing to draw.
+    /// [`flexarm::Error::File`] if a figure has nothing to draw.
     pub fn pictures(&self) -> Result<Vec<(String, String)>, Error> {
         let figures = self.cases.iter().flat_map(|case| &case.blocks).filter_map(|block| match block {
             Block::Figure(figure) => Some(figure),

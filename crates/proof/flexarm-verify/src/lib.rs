@@ -1,11 +1,11 @@
-//! The case studies: each method against each truth, from shipped files, as tables, figures and
-//! claims with bounds.
+//! Case studies that compare each method with each truth, from shipped files; the results are
+//! tables, figures and claims with bounds.
 //!
 //! [`verify`] runs them, [`Verification::page`] makes the page `docs/verification.md`. A case is a
-//! module with one function that takes a [`Bench`] and returns a [`page::Case`]; a new one gets a
-//! line in `CASES`. Within a case some files compute findings, plain numbers with names, and others
-//! say them: numbers of sentences come from the findings and from constants. What other programs
-//! computed is stored in `tests/verification`, with the script that writes it.
+//! module with one function that takes a [`Bench`] and returns a [`page::Case`]; a new case gets a
+//! line in `CASES`. Within a case, some files compute findings (plain numbers with names) and
+//! others write the text: the numbers in its sentences come from the findings and from constants.
+//! Results of other programs are stored in `tests/verification`, with the script that writes them.
 //!
 //! ```
 //! use flexarm_verify::{case_names, textbook::rectangle_torsion};
@@ -16,8 +16,8 @@
 //! assert!((rectangle_torsion(1.0, 1e-3) * 3e9 - 1.0).abs() < 1e-3);
 //! ```
 //!
-//! Not here: methods. Everything is done through the public faces of the other crates, and closed
-//! forms are written down again in [`textbook`], apart from the code that they judge.
+//! Not here: methods. The cases use only the public API of the other crates, and closed forms are
+//! written again in [`textbook`], independently of the code under test.
 #![allow(non_snake_case, reason = "monogram notation: X_WF, EI_y, C; see docs/references.md")]
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
@@ -44,7 +44,7 @@ use page::Case;
 pub use error::Error;
 pub use files::{PAGE, VerificationFiles, differences_from};
 
-/// A case study: name, how long it takes beside the others, how it is run.
+/// A case study: name, relative run time, and the function that runs it.
 type Entry = (&'static str, f64, fn(&Bench, &mut Pace<'_>) -> Result<Case, Error>);
 
 /// The cases, in the order of the page.
@@ -62,32 +62,32 @@ pub fn case_names() -> Vec<&'static str> {
     CASES.iter().map(|(name, ..)| *name).collect()
 }
 
-/// What came out.
+/// Result of the case studies.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Verification {
     /// The cases.
     pub cases: Vec<Case>,
     /// Whether every claim holds.
     pub passed: bool,
-    /// Whether what takes long was left out.
+    /// Whether slow parts were left out.
     pub quick: bool,
 }
 
-/// Called with the share that is done, 0 to 1, and the name of the case under way; breaking off
+/// Callback that receives the completed share, 0 to 1, and the name of the current case; `Break`
 /// ends the run.
 pub type Progress<'a> = dyn FnMut(f64, &str) -> ControlFlow<()> + 'a;
 
-/// How far a case is.
+/// Progress of a case.
 pub(crate) struct Pace<'a> {
     name: &'static str,
-    /// Share of all that was done before it, and its own.
+    /// Share of the whole run completed before this case, and the share of the case itself.
     begin: f64,
     own: f64,
     progress: &'a mut Progress<'a>,
 }
 
 impl Pace<'_> {
-    /// Tells that so much of the case is done, 0 to 1.
+    /// Reports the completed share of the case, 0 to 1.
     pub(crate) fn at(&mut self, share: f64) -> Result<(), Error> {
         match (self.progress)(self.begin + self.own * share, self.name) {
             ControlFlow::Continue(()) => Ok(()),
@@ -96,11 +96,11 @@ impl Pace<'_> {
     }
 }
 
-/// Runs cases, all if none is named.
+/// Runs the named cases, or all if none is named.
 ///
 /// # Errors
-/// [`Error::UnknownCase`], [`flexarm::Error::File`] where files of the checkout are missing,
-/// [`flexarm::Error::Interrupted`], and what the steps of a case may end with.
+/// [`Error::UnknownCase`], [`flexarm::Error::File`] if files of the checkout are missing,
+/// [`flexarm::Error::Interrupted`], and the errors of the individual cases.
 pub fn verify(bench: &Bench, names: &[String], progress: &mut Progress<'_>) -> Result<Verification, Error> {
     if let Some(unknown) = names.iter().find(|name| !case_names().contains(&name.as_str())) {
         let known = case_names().join(", ");
@@ -117,7 +117,7 @@ pub fn verify(bench: &Bench, names: &[String], progress: &mut Progress<'_>) -> R
         cases.push(run(bench, &mut pace)?);
         done += weight;
     }
-    // The last chance to stop before anything is written.
+    // Last opportunity to stop before anything is written.
     if progress(1.0, "").is_break() {
         return Err(flexarm::Error::Interrupted { t: 0.0, partial: false }.into());
     }

@@ -1,4 +1,4 @@
-//! Shipped meshes, assembled and condensed here and now: the truth of reduced links.
+//! Shipped meshes, assembled and condensed on the fly: the truth for reduced links.
 
 use std::path::{Path, PathBuf};
 
@@ -15,7 +15,7 @@ use nalgebra::{DMatrix, Matrix6, Vector3, Vector6};
 use crate::Error;
 use crate::bench::Bench;
 
-/// A mesh with its stiffness and mass, all in SI.
+/// A mesh with its stiffness and mass matrices, SI units.
 pub(crate) struct Meshed {
     path: PathBuf,
     /// The mesh.
@@ -25,13 +25,13 @@ pub(crate) struct Meshed {
 }
 
 impl Meshed {
-    /// A mesh of aluminium by its path from the root, with node sets `interface_A` and
-    /// `interface_B`, exact quadrature.
+    /// Reads an aluminium mesh by its path from the root, with node sets `interface_A` and
+    /// `interface_B` and exact quadrature.
     pub(crate) fn read(bench: &Bench, file: &str, units: UnitSystem) -> Result<Self, Error> {
         Self::read_with(bench, file, units, Material::ALUMINIUM, Quadrature::Exact)
     }
 
-    /// The same of another material or with the rules of another program.
+    /// Like [`Meshed::read`], with another material or another quadrature rule.
     pub(crate) fn read_with(
         bench: &Bench,
         file: &str,
@@ -47,7 +47,7 @@ impl Meshed {
         Ok(Self { path, mesh, model })
     }
 
-    /// Interface `A` or `B`, tied at `p` (m).
+    /// Interface `A` or `B`, tied to the reference point `p` (m).
     pub(crate) fn interface(&self, name: &str, p: Vector3<f64>, tie: Tie) -> Result<Interface, Error> {
         let set = format!("interface_{name}");
         let nodes = self.mesh.node_sets.get(&set);
@@ -55,14 +55,14 @@ impl Meshed {
         Ok(Interface { name: name.into(), X_LI: Pose::translation(p.x, p.y, p.z), nodes, tie })
     }
 
-    /// The nodes of the plane at `x`, tied by their mean to the x axis.
+    /// The nodes of the plane at `x`, tied by their mean to the point on the x axis.
     pub(crate) fn section(&self, x: f64) -> Interface {
         let nodes = self.mesh.nodes.iter().enumerate().filter(|(_, p)| (p.x - x).abs() < 1e-6).map(|(n, _)| n as u32);
         let (name, nodes) = (format!("x = {x}"), nodes.collect());
         Interface { name, X_LI: Pose::translation(x, 0.0, 0.0), nodes, tie: Tie::Distributing }
     }
 
-    /// Ties, factorises, condenses.
+    /// Ties the interfaces, factorises and condenses.
     pub(crate) fn condense(&self, interfaces: &[Interface]) -> Result<Condensation<'_>, Error> {
         Condensation::new(&self.model, interfaces, CondensationOptions::default()).map_err(|e| fault(&self.path, e))
     }
@@ -72,14 +72,14 @@ impl Meshed {
         self.model.size()
     }
 
-    /// Its mass (kg).
+    /// Mass (kg).
     pub(crate) fn mass(&self) -> f64 {
         let R = self.model.rigid_modes(&Vector3::zeros()).columns(0, 1).into_owned();
         (R.transpose() * self.model.M.product(&R))[(0, 0)]
     }
 
-    /// Condensed to its two interfaces, each with its tie, with their reference points at `p_A` and
-    /// `p_B` (m).
+    /// Condenses to the two interfaces with the given ties and reference points `p_A` and `p_B`
+    /// (m).
     pub(crate) fn condensed(
         &self,
         ties: [Tie; 2],
@@ -91,7 +91,7 @@ impl Meshed {
     }
 }
 
-/// A mesh with its interfaces.
+/// A mesh condensed to its interfaces.
 pub(crate) struct Condensed<'m> {
     path: &'m Path,
     inner: Condensation<'m>,
@@ -105,19 +105,18 @@ impl Condensed<'_> {
         (self.p_A, self.p_B)
     }
 
-    /// Motion of B (rows) under unit wrenches on it, A held.
+    /// Motion of B (rows) under unit wrenches at B, with A held.
     pub(crate) fn compliance(&self) -> Result<Matrix6<f64>, Error> {
         let K: Matrix6<f64> = self.inner.stiffness().fixed_view::<6, 6>(6, 6).into();
         inverse(&K).ok_or(Error::FreeInterface)
     }
 
-    /// Motion of B under an acceleration (m/s²) of everything, A held.
+    /// Motion of B under a uniform acceleration (m/s²), with A held.
     pub(crate) fn under_acceleration(&self, g: &Vector3<f64>) -> Vector6<f64> {
         self.under_weight_between(g, f64::NEG_INFINITY, f64::INFINITY)
     }
 
-    /// The same if only what lies between two fractions of the way from A to B has weight, node by
-    /// node.
+    /// The same, but only the nodes between two fractions of the distance from A to B have weight.
     pub(crate) fn under_weight_between(&self, g: &Vector3<f64>, from: f64, to: f64) -> Vector6<f64> {
         let model = self.inner.model();
         let R = model.rigid_modes(&Vector3::zeros());
@@ -134,8 +133,8 @@ impl Condensed<'_> {
         Vector6::from_fn(|i, _| u[(i, 0)])
     }
 
-    /// Where the energy of unit wrenches at B sits: its part in each of `n` equal slices from A to
-    /// B, as compliances at B.
+    /// Distribution of the strain energy under unit wrenches at B: share of each of `n` equal
+    /// slices from A to B, as compliances at B.
     pub(crate) fn slices(&self, mesh: &Meshed, n: usize) -> Vec<Matrix6<f64>> {
         let plane = |k: usize| CutPlane {
             point: self.p_A + (self.p_B - self.p_A) * (k as f64 / n as f64),
@@ -147,7 +146,7 @@ impl Condensed<'_> {
         energy_by_slice(&mesh.mesh, &mesh.model, &materials, Quadrature::Exact, &U, &planes)
     }
 
-    /// The chain of so many parts.
+    /// Chain of `parts` parts.
     pub(crate) fn chain(&self, mesh: &Meshed, parts: usize) -> Result<Chain, Error> {
         let source = ChainSource {
             mesh: &mesh.mesh,
@@ -167,7 +166,7 @@ impl Condensed<'_> {
     }
 }
 
-/// Inverse of a positive definite matrix whose rows have different units.
+/// Inverse of a positive definite matrix with rows of different units, by symmetric scaling.
 pub(crate) fn inverse(K: &Matrix6<f64>) -> Option<Matrix6<f64>> {
     let s = K.diagonal().map(|k| 1.0 / k.sqrt());
     let scale = s * s.transpose();

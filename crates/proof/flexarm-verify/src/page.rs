@@ -1,7 +1,7 @@
-//! What a verification says: cases with text, tables, figures and claims; as Markdown and as JSON.
+//! Content of a verification: cases with text, tables, figures and claims; as Markdown and as JSON.
 //!
-//! Numbers keep their value until they are printed. Relative errors below [`FLOOR`] are printed as
-//! that: what lies below is rounding and differs between machines.
+//! Numbers keep their full value until they are printed. Relative errors below [`FLOOR`] are
+//! printed as such: they are rounding and differ between machines.
 
 use flexarm_draw::{Panel, PlotError};
 use serde::Serialize;
@@ -12,11 +12,11 @@ pub const FLOOR: f64 = 1e-9;
 /// One case study.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Case {
-    /// Word of the command line.
+    /// Name on the command line.
     pub name: String,
     /// Heading.
     pub title: String,
-    /// What it shows, in order.
+    /// Content, in order.
     pub blocks: Vec<Block>,
 }
 
@@ -36,10 +36,10 @@ pub enum Block {
     Claim(Claim),
 }
 
-/// A table with what it is measured against.
+/// A table, with the truth that its numbers are compared with.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Table {
-    /// What it shows, with truth and units where the heads do not say them.
+    /// Description, with truth and units unless the column heads state them.
     pub caption: String,
     /// Heads of the columns.
     pub columns: Vec<String>,
@@ -57,18 +57,18 @@ pub enum Cell {
     Number {
         /// In the unit of the column; relative errors as fractions.
         value: f64,
-        /// Look.
+        /// Print format.
         #[serde(skip)]
         look: Look,
     },
 }
 
-/// How a number is printed.
+/// Print format of a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Look {
-    /// With so many decimals.
+    /// With this number of decimals.
     Decimals(usize),
-    /// With so many significant digits.
+    /// With this number of significant digits.
     Digits(usize),
     /// Relative error without sign.
     Error,
@@ -79,31 +79,31 @@ pub enum Look {
 /// Curves over a common axis.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Figure {
-    /// Stem of its file.
+    /// Stem of the file name.
     pub name: String,
-    /// What it shows.
+    /// Description.
     pub caption: String,
     /// Label of the horizontal axis.
     pub x_label: String,
-    /// Logarithmic horizontal axis.
+    /// Whether the horizontal axis is logarithmic.
     pub logarithmic_x: bool,
     /// Curves.
     #[serde(skip)]
     pub panels: Vec<Panel>,
 }
 
-/// A measured number that must keep a bound.
+/// A measured number with the bound that it must satisfy.
 #[derive(Clone, Debug, Serialize)]
 pub struct Claim {
-    /// A sentence.
+    /// Statement.
     pub text: String,
-    /// What it is measured against.
+    /// Truth that the number is compared with.
     pub truth: String,
-    /// The number.
+    /// Measured number.
     pub measured: f64,
-    /// The bound.
+    /// Bound.
     pub bound: Bound,
-    /// Whether it holds.
+    /// Whether the claim holds.
     pub holds: bool,
 }
 
@@ -111,9 +111,9 @@ pub struct Claim {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Bound {
-    /// Not above.
+    /// Upper bound.
     AtMost(f64),
-    /// Not below: an effect that must show.
+    /// Lower bound, for an effect that must be visible.
     AtLeast(f64),
 }
 
@@ -134,19 +134,19 @@ impl Bound {
 }
 
 impl Claim {
-    /// The number as printed.
+    /// Returns the measured number as printed.
     pub fn found(&self) -> String {
         if self.measured.is_finite() { bare_error(self.measured) } else { "-".into() }
     }
 
-    /// The bound as printed.
+    /// Returns the bound as printed.
     pub fn limit(&self) -> String {
         self.bound.text()
     }
 }
 
 impl Case {
-    /// A case without content.
+    /// Creates a case without content.
     pub fn new(name: &str, title: &str) -> Self {
         Self { name: name.into(), title: title.into(), blocks: Vec::new() }
     }
@@ -171,13 +171,13 @@ impl Case {
         self.blocks.push(Block::Figure(figure));
     }
 
-    /// Adds a claim; a number that is not finite does not hold.
+    /// Adds a claim; a number that is not finite violates it.
     pub fn claim(&mut self, text: impl Into<String>, truth: impl Into<String>, measured: f64, bound: Bound) {
         let holds = bound.holds(measured);
         self.blocks.push(Block::Claim(Claim { text: text.into(), truth: truth.into(), measured, bound, holds }));
     }
 
-    /// Its claims, in order.
+    /// Returns the claims, in order.
     pub fn claims(&self) -> impl Iterator<Item = &Claim> {
         self.blocks.iter().filter_map(|block| match block {
             Block::Claim(claim) => Some(claim),
@@ -185,7 +185,7 @@ impl Case {
         })
     }
 
-    /// Its figures, in order.
+    /// Returns the figures, in order.
     pub fn figures(&self) -> impl Iterator<Item = &Figure> {
         self.blocks.iter().filter_map(|block| match block {
             Block::Figure(figure) => Some(figure),
@@ -195,17 +195,17 @@ impl Case {
 }
 
 impl Table {
-    /// A table with these heads.
+    /// Creates a table with these column heads.
     pub fn new(caption: impl Into<String>, columns: &[&str]) -> Self {
         Self { caption: caption.into(), columns: columns.iter().map(|&c| c.into()).collect(), rows: Vec::new() }
     }
 }
 
 impl Figure {
-    /// The picture.
+    /// Returns the picture as SVG.
     ///
     /// # Errors
-    /// Where there is nothing to draw.
+    /// If there is nothing to draw.
     pub fn svg(&self) -> Result<String, PlotError> {
         flexarm_draw::page_plot(&self.x_label, self.logarithmic_x, &self.panels)
     }
@@ -216,12 +216,12 @@ pub fn word(text: impl Into<String>) -> Cell {
     Cell::Text(text.into())
 }
 
-/// A number with so many decimals.
+/// A number with the given number of decimals.
 pub fn fixed(value: f64, decimals: usize) -> Cell {
     Cell::Number { value, look: Look::Decimals(decimals) }
 }
 
-/// A number with so many significant digits.
+/// A number with the given number of significant digits.
 pub fn digits(value: f64, digits: usize) -> Cell {
     Cell::Number { value, look: Look::Digits(digits) }
 }
@@ -237,14 +237,14 @@ pub fn signed(value: f64) -> Cell {
 }
 
 impl Cell {
-    /// As printed.
+    /// Returns the cell as printed.
     pub fn print(&self) -> String {
         match self {
             Self::Text(text) => text.clone(),
             Self::Number { value, .. } if !value.is_finite() => "-".into(),
             Self::Number { value, look: Look::Decimals(n) } => {
                 let text = format!("{value:.n$}");
-                // A zero has no sign.
+                // Print zero without a sign.
                 let is_zero = text.trim_start_matches('-').chars().all(|c| c == '0' || c == '.');
                 if is_zero { text.trim_start_matches('-').into() } else { text }
             }
@@ -259,7 +259,7 @@ impl Cell {
     }
 }
 
-/// Per cent where a person thinks in them, else powers of ten.
+/// Formats an error in per cent where that is readable, otherwise with an exponent.
 pub(crate) fn bare_error(x: f64) -> String {
     match x {
         _ if x < FLOOR => "< 1e-9".into(),
@@ -268,18 +268,18 @@ pub(crate) fn bare_error(x: f64) -> String {
     }
 }
 
-/// A number within a sentence: what six significant digits tell of it, without zeros at their end.
+/// Formats a number within a sentence: six significant digits, without trailing zeros.
 pub(crate) fn plain(x: f64) -> String {
     let rounded: f64 = format!("{x:.5e}").parse().unwrap_or(x);
     if rounded != 0.0 && !(1e-4..1e6).contains(&rounded.abs()) { format!("{rounded:e}") } else { rounded.to_string() }
 }
 
-/// Percents within a sentence, so many decimals, sign as it is.
+/// Formats a percentage within a sentence with the given number of decimals, with its sign.
 pub(crate) fn percent(x: f64, decimals: usize) -> String {
     format!("{:.decimals$}", 100.0 * x)
 }
 
-/// Names with commas between them and a word before the last: `3, 4 and 8`.
+/// Joins names with commas and "and" before the last: `3, 4 and 8`.
 pub(crate) fn listed(names: &[impl ToString]) -> String {
     let names: Vec<String> = names.iter().map(ToString::to_string).collect();
     match names.split_last() {
@@ -288,7 +288,7 @@ pub(crate) fn listed(names: &[impl ToString]) -> String {
     }
 }
 
-/// `n` significant digits without an exponent between 1e-4 and 1e6.
+/// Formats `n` significant digits, without an exponent between 1e-4 and 1e6.
 fn significant(x: f64, n: usize) -> String {
     if x == 0.0 {
         return "0".into();
@@ -301,7 +301,7 @@ fn significant(x: f64, n: usize) -> String {
     format!("{:.*}", (n as i32 - 1 - exponent).max(0) as usize, x)
 }
 
-/// Markdown of a case; pictures are looked for in `folder`.
+/// Returns the Markdown of a case; its pictures are in `folder`.
 pub fn markdown(case: &Case, folder: &str) -> String {
     let mut text = format!("## {}\n", case.title);
     for block in &case.blocks {
@@ -313,7 +313,7 @@ pub fn markdown(case: &Case, folder: &str) -> String {
                 let Figure { name, caption, .. } = figure;
                 text += &format!("\n![{caption}]({folder}/{name}.svg)\n\n*{caption}*\n");
             }
-            // They stand together at the top of the page.
+            // All claims are listed at the top of the page.
             Block::Claim(_) => {}
         }
     }
@@ -328,7 +328,7 @@ pub(crate) fn table_text(table: &Table) -> String {
     format!("{caption}\n{heads}{rows}")
 }
 
-/// All claims of all cases as one table.
+/// Lists all claims of all cases in one table.
 pub fn claims_table(cases: &[Case]) -> Table {
     let mut table = Table::new("", &["case", "claim", "truth", "measured", "bound", ""]);
     for case in cases {
@@ -384,8 +384,8 @@ mod tests {
         assert!(table_text(&table).starts_with("\n| model |"));
     }
 
-    /// A bound that is met exactly holds; what passes it does not, is counted, and is printed in
-    /// bold.
+    /// A claim that reaches its bound exactly holds; one that exceeds it fails, is counted, and is
+    /// printed in bold.
     #[test]
     fn a_claim_fails_when_its_bound_is_passed() {
         let bounds = [(Bound::AtMost(0.01), [true, true, false]), (Bound::AtLeast(0.01), [false, true, true])];

@@ -1,4 +1,4 @@
-//! Closed forms written down from textbooks, apart from the code that they judge.
+//! Closed forms from textbooks, written independently of the code under test.
 //!
 //! A straight beam along x, clamped at x = 0; six-vectors `u_x u_y u_z theta_x theta_y theta_z`. SI
 //! units.
@@ -10,23 +10,23 @@ use nalgebra::{Matrix3, Matrix6, Vector3};
 pub struct Stiffness {
     /// Length (m).
     pub l: f64,
-    /// Stretch (N).
+    /// Axial stiffness (N).
     pub EA: f64,
-    /// Bending about y, so that the beam moves along z (N m²).
+    /// Bending stiffness about y, for deflection along z (N m²).
     pub EI_y: f64,
-    /// Bending about z (N m²).
+    /// Bending stiffness about z, for deflection along y (N m²).
     pub EI_z: f64,
-    /// Torsion (N m²).
+    /// Torsional stiffness (N m²).
     pub GJ: f64,
-    /// Shear along y and z (N); infinite for Euler and Bernoulli.
+    /// Shear stiffness along y and z (N); infinite for Euler-Bernoulli.
     pub kGA: [f64; 2],
     /// Mass per length (kg/m).
     pub mu: f64,
 }
 
 impl Stiffness {
-    /// Displacement of the end per wrench on it. Gere & Timoshenko, Mechanics of Materials,
-    /// appendix G; Cowper for shear.
+    /// Returns the compliance of the end. Gere & Timoshenko, Mechanics of Materials, appendix G;
+    /// Cowper for shear.
     pub fn tip_compliance(&self) -> Matrix6<f64> {
         let Self { l, EA, EI_y, EI_z, GJ, kGA, .. } = *self;
         let mut C = Matrix6::zeros();
@@ -43,7 +43,8 @@ impl Stiffness {
         C
     }
 
-    /// Deflection along z and slope `dw/dx` at `x` under a force along z (N) at `a`, without shear.
+    /// Returns the deflection along z and the slope `dw/dx` at `x` under a force along z (N) at
+    /// `a`, without shear.
     pub fn under_force(&self, force: f64, a: f64, x: f64) -> [f64; 2] {
         let k = force / self.EI_y;
         if x <= a {
@@ -53,21 +54,21 @@ impl Stiffness {
         }
     }
 
-    /// The same under a moment that bends it towards +z (about -y, N m) at `a`.
+    /// Returns the same under a moment at `a` that bends the beam towards +z (about -y, N m).
     pub fn under_moment(&self, moment: f64, a: f64, x: f64) -> [f64; 2] {
         let k = moment / self.EI_y;
         if x <= a { [k * x * x / 2.0, k * x] } else { [k * a * (2.0 * x - a) / 2.0, k * a] }
     }
 
-    /// Sag of the end along z under its own weight, without shear.
+    /// Returns the sag of the end along z under the beam's own weight, without shear.
     pub fn own_weight(&self, g: f64) -> f64 {
         self.mu * g * self.l.powi(4) / (8.0 * self.EI_y)
     }
 
-    /// First frequencies (Hz) of bending with stiffness `EI`, rotary inertia (kg m, `rho I`; zero
-    /// for Euler and Bernoulli) and a point mass (kg) at the end, without shear: the clamped
-    /// solution `w = A (cosh ax - cos bx) + B (sinh ax - (a/b) sin bx)` with `EI w'' = 0` and
-    /// `EI w''' + r omega² w' + m omega² w = 0` at the end. Blevins, tables 8-1 and 8-8, for
+    /// Computes the first frequencies (Hz) of bending with stiffness `EI`, rotary inertia (kg m,
+    /// `rho I`; zero for Euler-Bernoulli) and a point mass (kg) at the end, without shear. Uses the
+    /// clamped solution `w = A (cosh ax - cos bx) + B (sinh ax - (a/b) sin bx)` with `EI w'' = 0`
+    /// and `EI w''' + r omega² w' + m omega² w = 0` at the end. Blevins, tables 8-1 and 8-8, for
     /// `r = 0`.
     pub fn bending_hz(&self, EI: f64, rotary: f64, point_mass: f64, count: usize) -> Vec<f64> {
         let (l, mu) = (self.l, self.mu);
@@ -75,7 +76,7 @@ impl Stiffness {
             let (c, k) = (rotary * omega * omega / EI, mu * omega * omega / EI);
             let root = (0.25 * c * c + k).sqrt();
             let (a, b) = ((root - 0.5 * c).sqrt(), (root + 0.5 * c).sqrt());
-            // Everything over cosh(al), which is never zero.
+            // All terms are divided by cosh(al), which is never zero.
             let (ch, sh) = (1.0, (a * l).tanh());
             let over = 1.0 / (a * l).cosh();
             let (cos, sin) = ((b * l).cos() * over, (b * l).sin() * over);
@@ -99,9 +100,9 @@ impl Stiffness {
         found
     }
 
-    /// Height and shortening of the end over the length under a force (N) that keeps its direction,
-    /// however far it bends; neither stretch nor shear. The elastica `EI theta'' = -F cos theta` by
-    /// RK4 and bisection on the curvature at the clamp.
+    /// Computes the height and the shortening of the end, over the length, under a force (N) of
+    /// constant direction, for any deflection, without stretch or shear. Integrates the elastica
+    /// `EI theta'' = -F cos theta` by RK4, with bisection on the curvature at the clamp.
     pub fn elastica(&self, force: f64) -> [f64; 2] {
         let load = force * self.l.powi(2) / self.EI_y;
         let end = |curvature: f64| -> [f64; 4] {
@@ -134,17 +135,17 @@ pub fn rectangle_torsion(long: f64, short: f64) -> f64 {
     long * short.powi(3) * (1.0 / 3.0 - 64.0 / PI.powi(5) * short / long * series)
 }
 
-/// Torsion constant (m⁴) of a rectangle with a hole and one wall thickness, by finite differences
-/// on Prandtl's stress function: zero outside, one unknown constant on the hole. Timoshenko &
-/// Goodier, articles 104 and 115.
+/// Torsion constant (m⁴) of a hollow rectangle with uniform wall thickness, by finite differences
+/// on Prandtl's stress function: zero on the outer boundary, one unknown constant on the hole.
+/// Timoshenko & Goodier, articles 104 and 115.
 ///
-/// * `cells`: grid cells over the wall; the error falls with `cells^(-4/3)`, as inner corners have
-///   it.
+/// * `cells`: grid cells across the wall; the error decreases with `cells^(-4/3)` because of the
+///   inner corners.
 pub fn hollow_rectangle_torsion(width: f64, height: f64, wall: f64, cells: usize) -> f64 {
     let d = wall / cells as f64;
     let (nx, ny) = ((width / d).round() as usize, (height / d).round() as usize);
     let is_hole = |i: usize, j: usize| i >= cells && i <= nx - cells && j >= cells && j <= ny - cells;
-    // The hole with half a cell around it, in cells.
+    // Area of the hole plus half a cell around it, in cells.
     let hole_area = ((nx - 2 * cells + 1) * (ny - 2 * cells + 1)) as f64;
     let at = |i: usize, j: usize| i * (ny + 1) + j;
     let sides = (cells..=ny - cells).flat_map(|j| [at(cells - 1, j), at(nx - cells + 1, j)]);
@@ -175,7 +176,7 @@ pub fn hollow_rectangle_torsion(width: f64, height: f64, wall: f64, cells: usize
     J * d.powi(4)
 }
 
-/// A zero of `f` between two places where its signs differ.
+/// Finds a zero of `f` between two points at which its signs differ, by bisection.
 fn bisect(f: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
     let below = f(low) < 0.0;
     for _ in 0..80 {
@@ -185,15 +186,15 @@ fn bisect(f: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
     0.5 * (low + high)
 }
 
-/// Moves the point of a compliance by a rigid lever: `Ad C Adᵀ`, from B to T with `p_BT` (same
-/// axes).
+/// Moves the reference point of a compliance over a rigid lever: `Ad C Adᵀ`, from B to T with
+/// `p_BT` (same axes).
 pub fn at_lever(C: &Matrix6<f64>, p_BT: &Vector3<f64>) -> Matrix6<f64> {
     let mut Ad = Matrix6::identity();
     Ad.fixed_view_mut::<3, 3>(0, 3).copy_from(&-p_BT.cross_matrix());
     Ad * C * Ad.transpose()
 }
 
-/// A compliance in other axes: `R C Rᵀ` in both halves.
+/// Rotates a compliance to other axes: `R C Rᵀ`, with `R` on both halves.
 pub fn turned(C: &Matrix6<f64>, R: &Matrix3<f64>) -> Matrix6<f64> {
     let mut B = Matrix6::zeros();
     B.fixed_view_mut::<3, 3>(0, 0).copy_from(R);
@@ -209,7 +210,7 @@ mod tests {
         Stiffness { l: 0.8, EA: 5.6e7, EI_y: 7466.7, EI_z: 1866.7, GJ: 1928.0, kGA: [f64::INFINITY; 2], mu: 2.16 };
 
     /// Truth: the roots 1.8751 and 4.6941 of the clamped beam, and robots/one_beam/README.md with a
-    /// mass.
+    /// point mass.
     #[test]
     fn frequencies_are_those_of_the_tables() {
         let f = BAR.bending_hz(BAR.EI_y, 0.0, 0.0, 2);
@@ -242,8 +243,8 @@ mod tests {
         assert!((rectangle_torsion(2.0, 1.0) / 2.0 - 0.2287).abs() < 5e-5);
     }
 
-    /// Truth: the series of the solid square, whose hole is one grid point; a thin wall, Bredt with
-    /// the walls' own `s t³/3`.
+    /// Truth: the series for the solid square, whose hole is one grid point; for a thin wall, Bredt
+    /// plus the `s t³/3` of the walls themselves.
     #[test]
     fn torsion_of_hollow_rectangles_lies_between_solid_and_thin_ones() {
         let solid = hollow_rectangle_torsion(1.0, 1.0, 0.5, 40);
@@ -253,8 +254,8 @@ mod tests {
         assert!((thin / bredt - 1.0).abs() < 1e-2, "{}", thin / bredt);
     }
 
-    /// Truth: a force and a moment at the end against the compliance of the end; continuity at the
-    /// load.
+    /// Truth: a force and a moment at the end agree with the compliance of the end; curves are
+    /// continuous at the load.
     #[test]
     fn curves_along_the_beam_end_where_the_compliance_says() {
         let C = BAR.tip_compliance();
@@ -268,7 +269,7 @@ mod tests {
         }
     }
 
-    /// Truth: the weight of each slice deflects the end as a force of its own; the sum over 1000
+    /// Truth: the weight of each slice deflects the end like a separate force; the sum over 1000
     /// slices by the midpoint rule.
     #[test]
     fn own_weight_is_the_sum_of_the_weights_of_its_slices() {
@@ -279,19 +280,20 @@ mod tests {
         assert!((sum / BAR.own_weight(9.81) - 1.0).abs() < 1e-6, "{sum}");
     }
 
-    /// Truth by hand: under F_z at T, 0.5 m along x beyond B, B sees a moment -0.5 about y; T moves
-    /// by C_zz + 2 (-0.5) C_zy + 0.25 C_yy.
+    /// Truth by hand: under F_z at T, 0.5 m along x beyond B, B sees a moment of -0.5 about y; T
+    /// moves by C_zz + 2 (-0.5) C_zy + 0.25 C_yy.
     #[test]
     fn a_lever_makes_a_force_a_moment_and_a_turn_a_shift() {
         let C = BAR.tip_compliance();
         let at_T = at_lever(&C, &Vector3::new(0.5, 0.0, 0.0));
         assert!((at_T[(2, 2)] - (C[(2, 2)] - C[(2, 4)] + 0.25 * C[(4, 4)])).abs() < 1e-18);
         assert!((at_T[(4, 4)] - C[(4, 4)]).abs() < 1e-18 && (at_T - at_T.transpose()).amax() < 1e-18);
-        // A bar that is 0.5 m longer and does not bend there.
+        // A bar 0.5 m longer whose extension is rigid.
         assert!(at_T[(2, 2)] > C[(2, 2)] && at_T[(2, 2)] < C[(2, 2)] * (1.3f64 / 0.8).powi(3));
     }
 
-    /// Truth by hand: with the beam's x along z, its bending along z is the world's along x.
+    /// Truth by hand: with the beam's x along the world's z, its bending along z is along the
+    /// world's x.
     #[test]
     fn a_beam_that_stands_bends_sideways() {
         let (C, R) = (BAR.tip_compliance(), Matrix3::from_columns(&[Vector3::z(), Vector3::y(), -Vector3::x()]));

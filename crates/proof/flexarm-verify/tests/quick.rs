@@ -1,4 +1,4 @@
-//! A quick subset of the case studies: every claim holds, and the same command gives the same
+//! A quick subset of the case studies: every claim holds, and repeating the command gives identical
 //! bytes.
 
 use std::ops::ControlFlow;
@@ -29,7 +29,7 @@ fn every_claim_of_the_quick_cases_holds() {
         .map(|claim| format!("{}: {} {}", claim.text, claim.found(), claim.limit()))
         .collect();
     assert!(found.passed && broken.is_empty(), "{broken:#?}");
-    // Nothing was left out whole.
+    // No case was left out.
     assert_eq!(found.cases.len(), case_names().len());
     assert!(found.cases.iter().all(|case| case.claims().count() >= 3));
 }
@@ -42,7 +42,7 @@ fn the_same_case_gives_the_same_bytes() {
     assert_eq!(a.pictures().expect("drawn"), b.pictures().expect("drawn"));
 }
 
-/// A stiffness that is wrong by 1e-5 must not pass: the claims can fail.
+/// A stiffness error of 1e-5 must not pass: the claims are able to fail.
 #[test]
 fn a_link_that_is_slightly_wrong_breaks_claims() {
     let folder = std::env::temp_dir().join(format!("flexarm-verify-{}", std::process::id()));
@@ -72,7 +72,7 @@ fn copy(from: &Path, to: &Path) {
     }
 }
 
-/// Shares grow from 0 to at most 1, and a break ends the run.
+/// Progress grows from 0 to at most 1, and `Break` ends the run.
 #[test]
 fn a_run_tells_how_far_it_is_and_can_be_stopped() {
     let mut shares: Vec<(f64, String)> = Vec::new();

@@ -1,11 +1,11 @@
-//! Which flexible element moves the tool how far, and how strained a link is.
+//! Contribution of each flexible element to the TCP error, and strain of a link.
 //!
 //! To first order the TCP error is the sum over the elastic elements of `J_e d_e`: the deflection
-//! of the element, carried to the tool by the columns of the Jacobian that belong to it.
+//! of the element, mapped to the TCP by its columns of the Jacobian.
 
 use nalgebra::{Matrix6, Vector6};
 
-/// Displacement of the tool that the deflection of one element causes, the rest of the arm being
+/// Computes the TCP displacement caused by the deflection of one element, with the rest of the arm
 /// rigid.
 ///
 /// ```text
@@ -14,24 +14,23 @@ use nalgebra::{Matrix6, Vector6};
 /// Exact to first order in `d_e`; the contributions of all elements add up to the TCP error to
 /// first order.
 ///
-/// * `map`: 6×6, rates of the element's deflection to the twist of the tool in world axes at the
-///   tool point.
+/// * `map`: 6×6, from rates of the element's deflection to the TCP twist, in world axes at the TCP.
 /// * `deflection`: elastic coordinates of the element, three translations in m and three rotations
 ///   in rad.
 ///
-/// Returns the displacement of the tool in world axes, m and rad, linear first.
+/// Returns the TCP displacement in world axes, m and rad, linear first.
 pub fn tcp_displacement(map: &Matrix6<f64>, deflection: &Vector6<f64>) -> Vector6<f64> {
     map * deflection
 }
 
-/// Largest displacement of the tool due to one element.
+/// Peak TCP displacement due to one element.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ContributionPeak {
-    /// Largest translation of the tool, m.
+    /// Maximum TCP translation, m.
     pub peak_m: f64,
-    /// Its time, s.
+    /// Time of `peak_m`, s.
     pub t_peak_s: f64,
-    /// Largest rotation of the tool, rad.
+    /// Maximum TCP rotation, rad.
     pub peak_rad: f64,
 }
 
@@ -43,27 +42,26 @@ pub struct ContributionPeaks {
 }
 
 impl ContributionPeaks {
-    /// For this many elements, all at zero.
+    /// Creates peaks for this many elements, all zero.
     pub fn new(elements: usize) -> Self {
         Self { peaks: vec![ContributionPeak { peak_m: 0.0, t_peak_s: 0.0, peak_rad: 0.0 }; elements] }
     }
 
-    /// Takes in one element at time `t` (s); returns the displacement of the tool that it causes,
+    /// Adds a sample of one element at time `t` (s); returns the TCP displacement that it causes,
     /// as [`tcp_displacement`] does.
     ///
     /// # Panics
-    /// When there is no such element.
+    /// If there is no such element.
     pub fn update(&mut self, element: usize, t: f64, map: &Matrix6<f64>, deflection: &Vector6<f64>) -> Vector6<f64> {
         let displacement = tcp_displacement(map, deflection);
         self.add(element, t, &displacement);
         displacement
     }
 
-    /// Takes in the displacement of the tool (m, rad, world axes) that one element causes at time
-    /// `t` (s).
+    /// Adds the TCP displacement (m, rad, world axes) that one element causes at time `t` (s).
     ///
     /// # Panics
-    /// When there is no such element.
+    /// If there is no such element.
     pub fn add(&mut self, element: usize, t: f64, displacement: &Vector6<f64>) {
         assert!(element < self.peaks.len(), "element {element} of {}", self.peaks.len());
         let peak = &mut self.peaks[element];
@@ -80,9 +78,10 @@ impl ContributionPeaks {
     }
 }
 
-/// Change of the distance between the two interfaces of a link over its undeformed length.
+/// Returns the change of the distance between the two interfaces of a link over its undeformed
+/// length.
 ///
-/// A measure of how far a link is from the small deformations that the model assumes.
+/// It indicates how far a link is from the small deformations that the model assumes.
 ///
 /// * `interface_distance_change`: m, positive when the link gets longer. `length`: m.
 ///
@@ -98,8 +97,7 @@ mod tests {
     use nalgebra::{IsometryMatrix3, Rotation3, Translation3, Vector3};
     use proptest::prelude::*;
 
-    /// Map of the deflection of an element at S (in S axes) to the twist of the tool at T, in world
-    /// axes.
+    /// Map from the deflection of an element at S (in S axes) to the TCP twist at T, in world axes.
     fn map(X_WS: &IsometryMatrix3<f64>, p_WT: &Vector3<f64>) -> Matrix6<f64> {
         let R = *X_WS.rotation.matrix();
         let p_ST = p_WT - X_WS.translation.vector;
@@ -111,7 +109,7 @@ mod tests {
     }
 
     proptest! {
-        /// Truth: the finite motion of the tool through two elastic elements in series.
+        /// Truth: the finite TCP motion through two elastic elements in series.
         #[test]
         fn contributions_sum_to_the_tcp_error_to_first_order(
             angles in prop::array::uniform6(-3.0..3.0_f64),

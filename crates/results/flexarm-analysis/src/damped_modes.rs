@@ -1,12 +1,13 @@
-//! Free vibration of `M q̈ + D q̇ + K q = 0` with any damping: complex eigenvalues and shapes.
+//! Free vibration of `M q̈ + D q̇ + K q = 0` with arbitrary damping: complex eigenvalues and
+//! shapes.
 //!
 //! ```text
 //! (λ² M + λ D + K) φ = 0        λ = -ζ ω + i ω sqrt(1 - ζ²)
 //! ```
-//! The problem is written in the coordinates of the undamped modes, `q = Φ η`, `Φᵀ M Φ = 1`,
-//! `Φᵀ K Φ = diag μ`, with `z = (s η, η̇)` and `s = sqrt|μ|`: the first-order matrix is then as
-//! large as the highest frequency and not as its square, and low modes keep their digits beside
-//! stiff ones. Start at [`damped_modes`].
+//! The problem is written in modal coordinates of the undamped system, `q = Φ η`, `Φᵀ M Φ = 1`,
+//! `Φᵀ K Φ = diag μ`, with `z = (s η, η̇)` and `s = sqrt|μ|`. The norm of the first-order matrix is
+//! then proportional to the highest frequency, not to its square, so that low modes stay accurate
+//! next to stiff ones. Start at [`damped_modes`].
 
 use std::f64::consts::TAU;
 
@@ -14,50 +15,49 @@ use nalgebra::{Cholesky, Complex, DMatrix, DVector, Schur, SymmetricEigen};
 
 use crate::linear_system::LinearError;
 
-/// Undamped modes below this part of the highest `ω²` are rigid motions.
+/// Undamped modes with `ω²` below this fraction of the highest are rigid motions.
 const RIGID: f64 = 1e-13;
 
-/// A mode of a damped structure: an oscillation (which stands for a conjugate pair), a decay
-/// without oscillation (each of the two on its own), or a rigid motion (`λ = 0`).
+/// A mode of a damped structure: an oscillation (which represents a conjugate pair), a decay
+/// without oscillation (each of the two separately), or a rigid motion (`λ = 0`).
 #[derive(Debug, Clone, PartialEq)]
 pub struct DampedMode {
-    /// `λ`, 1/s; not below the real axis.
+    /// `λ`, 1/s; imaginary part not negative.
     pub eigenvalue: Complex<f64>,
-    /// `φ`, with `φᴴ M φ = 1` and `φᵀ M φ` real and positive: real where the damping is
-    /// proportional.
+    /// `φ`, with `φᴴ M φ = 1` and `φᵀ M φ` real and positive; real if the damping is proportional.
     pub shape: DVector<Complex<f64>>,
-    /// `|(λ² M + λ D + K) φ|` over the sum of the norms of its three terms: what the eigensolver
-    /// promises, evaluated.
+    /// Relative residual of the eigensolver: `|(λ² M + λ D + K) φ|` over the sum of the norms of
+    /// its three terms.
     pub residual: f64,
 }
 
 impl DampedMode {
-    /// `|λ| / 2π`: the frequency that the mode would have without damping if the damping is
-    /// proportional, Hz.
+    /// Returns `|λ| / 2π`, Hz: the undamped frequency of the mode if the damping is proportional.
     pub fn frequency_hz(&self) -> f64 {
         self.eigenvalue.norm() / TAU
     }
 
-    /// Frequency of the decaying oscillation, Hz; 0 where nothing oscillates.
+    /// Returns the frequency of the decaying oscillation, Hz; 0 if there is no oscillation.
     pub fn damped_frequency_hz(&self) -> f64 {
         self.eigenvalue.im / TAU
     }
 
-    /// `-Re λ / |λ|`: 1 for a decay without oscillation, negative for a motion that grows, 0 for a
-    /// rigid one.
+    /// Returns `-Re λ / |λ|`: 1 for a decay without oscillation, negative for a growing motion, 0
+    /// for a rigid one.
     pub fn damping_ratio(&self) -> f64 {
         let size = self.eigenvalue.norm();
         if size > 0.0 { -self.eigenvalue.re / size } else { 0.0 }
     }
 }
 
-/// All modes of `M q̈ + D q̇ + K q = 0`, by ascending `|λ|`.
+/// Computes all modes of `M q̈ + D q̇ + K q = 0`, by ascending `|λ|`.
 ///
 /// * `M`: n×n, positive definite. `D`, `K`: n×n, symmetric; they may be singular, and `K`
 ///   indefinite (an inverted pendulum has a mode with a negative damping ratio).
 ///
 /// # Errors
-/// [`LinearError`]: sizes that do not fit, `M` not positive definite, an iteration that does not end.
+/// [`LinearError`] if sizes do not fit, `M` is not positive definite, or an iteration does not
+/// converge.
 pub fn damped_modes(M: &DMatrix<f64>, D: &DMatrix<f64>, K: &DMatrix<f64>) -> Result<Vec<DampedMode>, LinearError> {
     let n = M.nrows();
     for (what, matrix) in [("mass matrix", M), ("damping matrix", D), ("stiffness matrix", K)] {
@@ -76,7 +76,7 @@ pub fn damped_modes(M: &DMatrix<f64>, D: &DMatrix<f64>, K: &DMatrix<f64>) -> Res
     let rigid: Vec<usize> = (0..n).filter(|&j| mu[j].abs() <= RIGID * largest).collect();
     let elastic: Vec<usize> = (0..n).filter(|j| !rigid.contains(j)).collect();
 
-    // z = (s η of the elastic modes, η̇ of all): ż = A z.
+    // z = (s η of the elastic modes, η̇ of all modes): ż = A z.
     let D_eta = Phi.tr_mul(&(D * &Phi));
     let (p, size) = (elastic.len(), elastic.len() + n);
     let mut A = DMatrix::<f64>::zeros(size, size);
@@ -100,8 +100,8 @@ pub fn damped_modes(M: &DMatrix<f64>, D: &DMatrix<f64>, K: &DMatrix<f64>) -> Res
         if eigenvalue.im.abs() <= 1e-11 * scale {
             eigenvalue.im = 0.0;
         }
-        // The lower one of a pair, and the velocity of a rigid motion without damping, are known
-        // already.
+        // Skip the conjugate of a pair, and the velocity of an undamped rigid motion: both are
+        // covered.
         if eigenvalue.im < 0.0 || eigenvalue.norm() <= 1e-11 * scale {
             continue;
         }
@@ -114,11 +114,12 @@ pub fn damped_modes(M: &DMatrix<f64>, D: &DMatrix<f64>, K: &DMatrix<f64>) -> Res
     Ok(modes)
 }
 
-/// `K Φ = M Φ diag μ`, `Φᵀ M Φ = 1`.
+/// Solves `K Φ = M Φ diag μ` with `Φᵀ M Φ = 1`.
 fn undamped(M: &DMatrix<f64>, K: &DMatrix<f64>) -> Result<(Vec<f64>, DMatrix<f64>), LinearError> {
     let mass = Cholesky::new(M.clone()).ok_or(LinearError::NotPositiveDefinite { what: "mass matrix" })?;
-    // Without rigid motions K = L Lᵀ and the eigenvalues 1/μ of L^-1 M L^-T: the low modes are the
-    // largest. Rounding may let a singular K pass; its rigid motions would then drown the rest.
+    // Without rigid motions K = L Lᵀ, and L^-1 M L^-T has the eigenvalues 1/μ: the low modes are
+    // the largest. Rounding may let a singular K pass; its rigid motions would then spoil the other
+    // modes.
     if let Some(stiffness) = Cholesky::new(K.clone()) {
         let eigen = congruent(&stiffness.l(), M);
         if let Some(eigen) = eigen.filter(|e| e.eigenvalues.min() > 1e3 * RIGID * e.eigenvalues.max()) {
@@ -136,21 +137,22 @@ fn undamped(M: &DMatrix<f64>, K: &DMatrix<f64>) -> Result<(Vec<f64>, DMatrix<f64
     Ok((eigen.eigenvalues.iter().copied().collect(), Phi))
 }
 
-/// Eigenvalues and vectors of `L^-1 S L^-T`.
+/// Computes eigenvalues and eigenvectors of `L^-1 S L^-T`.
 fn congruent(L: &DMatrix<f64>, S: &DMatrix<f64>) -> Option<SymmetricEigen<f64, nalgebra::Dyn>> {
     let half = L.solve_lower_triangular(S)?;
     let full = L.solve_lower_triangular(&half.transpose())?;
     Some(SymmetricEigen::new((&full + full.transpose()) * 0.5))
 }
 
-/// Eigenvector of an upper triangular matrix for its k-th diagonal entry, by back substitution.
+/// Computes the eigenvector of an upper triangular matrix for its k-th diagonal entry, by back
+/// substitution.
 fn triangular_eigenvector(T: &DMatrix<Complex<f64>>, k: usize, scale: f64) -> DVector<Complex<f64>> {
     let mut y = DVector::zeros(T.nrows());
     y[k] = Complex::new(1.0, 0.0);
     for i in (0..k).rev() {
         let sum: Complex<f64> = (i + 1..=k).map(|j| T[(i, j)] * y[j]).sum();
         let mut gap = T[(i, i)] - T[(k, k)];
-        // Equal eigenvalues: any small gap gives a vector of their common space.
+        // Equal eigenvalues: any small gap gives a vector of their common eigenspace.
         if gap.norm() < f64::EPSILON * scale {
             gap = Complex::new(f64::EPSILON * scale, 0.0);
         }
@@ -159,7 +161,7 @@ fn triangular_eigenvector(T: &DMatrix<Complex<f64>>, k: usize, scale: f64) -> DV
     y
 }
 
-/// The shape in its normal form, and how well it fits.
+/// Normalises the shape and evaluates its residual.
 fn finished(
     eigenvalue: Complex<f64>,
     mut shape: DVector<Complex<f64>>,

@@ -1,4 +1,4 @@
-//! The TCP error in two parts: what the arm would have at rest, and what its motion adds.
+//! Split of the TCP error into its static part and the part due to motion.
 
 use nalgebra::Vector3;
 
@@ -9,14 +9,14 @@ use crate::record::RecordError;
 /// ```text
 /// e = s + d
 /// ```
-/// `s`: displacement of the tool if the arm stood still where it is at the instant, under weight
-/// and the loads that act then; `d`: the rest, from inertia forces and ringing.
+/// `s`: static TCP displacement of the arm at the pose of the instant, under gravity and the loads
+/// that act then; `d`: the rest, from inertia forces and ringing.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct ErrorParts {
-    /// `s·u` at the largest error `e`, m, along its direction `u = e/|e|`; with
-    /// [`Self::dynamic_at_peak_m`] it makes `|e|`.
+    /// `s·u` at the maximum of `|e|`, m, along its direction `u = e/|e|`; together with
+    /// [`Self::dynamic_at_peak_m`] it gives `|e|`.
     pub static_at_peak_m: f64,
-    /// `d·u` there, m; negative where the motion relieves the arm.
+    /// `d·u` at the same instant, m; negative if the motion reduces the error.
     pub dynamic_at_peak_m: f64,
     /// `max |s|`, m.
     pub static_peak_m: f64,
@@ -28,14 +28,14 @@ pub struct ErrorParts {
     pub dynamic_rms_m: f64,
 }
 
-/// Splits a record.
+/// Splits a record into its static and dynamic part.
 ///
-/// * `times`: s, strictly increasing. `errors`: TCP errors, of which the translation counts (m).
+/// * `times`: s, strictly increasing. `errors`: TCP errors, of which the translation is used (m).
 ///   `statics`: `s` at the same times (m).
 ///
 /// # Errors
 /// [`RecordError::Empty`], [`RecordError::Length`], or [`RecordError::NotFinite`] if a static part
-/// is not known.
+/// is unknown.
 pub fn error_parts(times: &[f64], errors: &[[f64; 6]], statics: &[[f64; 3]]) -> Result<ErrorParts, RecordError> {
     let n = times.len();
     if n == 0 {
@@ -73,9 +73,9 @@ pub fn error_parts(times: &[f64], errors: &[[f64; 6]], statics: &[[f64; 3]]) -> 
 mod tests {
     use super::*;
 
-    /// Truth: closed form. A sag of 3 mm along z, ringing of 4 mm along x whose first crest is the
-    /// peak: 5 mm, of which 3·3/5 static and 4·4/5 dynamic; RMS of a sinusoid is its amplitude over
-    /// √2.
+    /// Truth: closed form. A sag of 3 mm along z and a ringing of 4 mm along x whose first crest is
+    /// the peak: 5 mm, of which 3·3/5 static and 4·4/5 dynamic; the RMS of a sinusoid is its
+    /// amplitude over √2.
     #[test]
     fn sag_and_ringing_across_it_add_up_along_the_peak() {
         let times: Vec<f64> = (0..=4000).map(|k| 0.25e-3 * f64::from(k)).collect();

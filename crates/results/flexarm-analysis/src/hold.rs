@@ -1,4 +1,5 @@
-//! What happens after a move, while the joints hold: final value, settling, overshoot, ringing.
+//! Figures of the TCP error after a move, while the joints hold: final value, settling, overshoot,
+//! ringing.
 
 use std::f64::consts::PI;
 
@@ -6,60 +7,60 @@ use nalgebra::Vector3;
 
 use crate::spectrum::{SpectralLine, Taper, strongest_line};
 
-/// Part of a hold, at its end, over which the final value is averaged when nothing oscillates.
+/// Final fraction of a hold over which the final value is averaged if there is no oscillation.
 const QUIET_PART: f64 = 0.25;
 
-/// Figures of one hold: the stretch from the end of a move to the start of the next one or the end
-/// of the record.
+/// Figures of one hold: the interval from the end of a move to the start of the next one or to the
+/// end of the record.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HoldMetrics {
-    /// Start: the end of the move before, s.
+    /// Start, which is the end of the preceding move, s.
     pub start_s: f64,
     /// End, s.
     pub end_s: f64,
-    /// Where the rigid tool is, m, world axes.
+    /// Position of the rigid TCP, m, world axes.
     pub place_m: [f64; 3],
     /// Translation error at the end, m, in world axes.
     pub end_error_m: [f64; 3],
-    /// Translation error that the arm comes to rest at, m, in world axes: the given quasi-static
-    /// value at the end of the hold; otherwise a weighted mean (`sin²`) over as many whole periods
-    /// of the oscillation as fit into the second half of the hold (at least two); otherwise over
-    /// its last quarter.
+    /// Translation error at which the arm comes to rest, m, in world axes: the given quasi-static
+    /// value at the end of the hold. If it is unknown, a weighted mean (`sin²`) over the largest
+    /// number of whole periods of the oscillation in the second half of the hold (at least two);
+    /// without an oscillation, over the last quarter.
     pub final_error_m: [f64; 3],
     /// Time from the start of the hold until the error stays within the band around its final
-    /// value, s. 0 when it never leaves the band. `None` when it is outside at the last sample, or
-    /// has not been inside for a whole period of its oscillation when the hold ends.
+    /// value, s. 0 if it never leaves the band. `None` if it is outside at the last sample, or has
+    /// not been inside for a whole period of its oscillation when the hold ends.
     pub settling_s: Option<f64>,
-    /// Largest excursion of the error beyond its final value in the direction of approach, m; 0
-    /// when it stays within the band, or when the tool did not move. As the rigid tool stands
-    /// still, this is how far the tool goes past the place where it comes to rest.
+    /// Maximum excursion of the error beyond its final value in the direction of approach, m; 0 if
+    /// it stays within the band, or if the tool did not move. As the rigid TCP is at rest, this is
+    /// the distance by which the TCP passes its final position.
     pub overshoot_m: f64,
     /// Strongest line of the error during the hold.
     pub line: Option<SpectralLine>,
 }
 
-/// Whether a line is worth telling: far below the settling band (m) it neither delays settling nor
-/// is it vibration.
+/// Returns whether a line is significant: far below the settling band (m) it neither delays
+/// settling nor counts as vibration.
 pub(crate) fn is_seen(line: &SpectralLine, band_m: f64) -> bool {
     line.amplitude > 1e-6 * band_m
 }
 
 /// The samples of one hold.
 pub(crate) struct Hold<'a> {
-    /// At least two, s.
+    /// Times of the samples, at least two, s.
     pub(crate) times: &'a [f64],
     /// Translation errors, m.
     pub(crate) errors: Vec<[f64; 3]>,
-    /// Place of the rigid tool, m.
+    /// Position of the rigid TCP, m.
     pub(crate) place_m: [f64; 3],
-    /// Quasi-static error at the end of the hold, m, when known.
+    /// Quasi-static error at the end of the hold, m, if known.
     pub(crate) final_static: Option<[f64; 3]>,
-    /// Direction in which the rigid tool arrived; `None` when it did not move.
+    /// Direction in which the rigid TCP arrived; `None` if it did not move.
     pub(crate) approach: Option<Vector3<f64>>,
 }
 
 impl Hold<'_> {
-    /// Computes the figures; `start_s` may lie before the first sample.
+    /// Computes the figures; `start_s` may be before the first sample.
     pub(crate) fn metrics(&self, start_s: f64, band_m: f64) -> HoldMetrics {
         let line = strongest_line(self.times, &self.errors, Taper::FadeOut);
         let line = line.filter(|line| is_seen(line, band_m));
@@ -90,13 +91,13 @@ impl Hold<'_> {
         self.mean_since(self.end() - span.min(length))
     }
 
-    /// Average from `start` to the end with weight `sin²`: an oscillation with two or more whole
-    /// periods in that time cancels, and nearly so if it dies away.
+    /// Averages from `start` to the end with weight `sin²`: an oscillation with two or more whole
+    /// periods in that time cancels, and a decaying one nearly cancels.
     fn mean_since(&self, start: f64) -> [f64; 3] {
         let n = self.times.len();
         let (mut sum, mut sum_of_weights) = (Vector3::zeros(), 0.0);
         for i in (0..n).filter(|&i| self.times[i] > start) {
-            // Half the time to either neighbour: the trapezoidal rule, as the weight vanishes at
+            // Half the time to either neighbour: the trapezoidal rule, since the weight vanishes at
             // both ends.
             let share = self.times[(i + 1).min(n - 1)] - self.times[i.saturating_sub(1)];
             let part = (self.times[i] - start) / (self.end() - start);
@@ -104,7 +105,7 @@ impl Hold<'_> {
             sum += Vector3::from(self.errors[i]) * weight;
             sum_of_weights += weight;
         }
-        // A span shorter than a few steps holds nothing but its end.
+        // A span shorter than a few steps contains only its end.
         if sum_of_weights > 1e-6 * (self.end() - start) { (sum / sum_of_weights).into() } else { self.errors[n - 1] }
     }
 
@@ -117,8 +118,8 @@ impl Hold<'_> {
         if outside + 1 == n {
             return None;
         }
-        // Where the straight line between the last sample outside and the first inside enters the
-        // band.
+        // Intersection of the band with the straight line between the last sample outside and the
+        // first one inside.
         let (out, inside) = (distance(outside), distance(outside + 1));
         let part = (out - band) / (out - inside);
         let entry = self.times[outside] + part * (self.times[outside + 1] - self.times[outside]);

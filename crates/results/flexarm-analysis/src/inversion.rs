@@ -1,33 +1,35 @@
-//! The change of joint commands that takes away an error of the tool over time.
+//! Change of the joint commands that compensates a TCP error over time.
 //!
 //! ```text
 //! M ẍ + D ẋ + K x + M_a ü + D_a u̇ + K_a u = 0        J x + J_a u = y
 //! H(s) = J_a - J (M s² + D s + K)^-1 (M_a s² + D_a s + K_a)
 //! u = A_0 y + A_1 ẏ + ... + A_4 y⁗                     A(s) = H(s)^-1 + O(s⁵)
 //! ```
-//! with the error -y of the tool, the change u of the commands and x of the free coordinates, all
-//! about the arm linearised along its motion. The inverse is its series at low frequencies: at
-//! rest, damping, inertia, and what these move in turn. It holds up to the first frequency at which
-//! the arm with its tool held would vibrate, which lies well above the first of the arm itself,
-//! needs no solution over time and looks ahead by derivatives alone. Each use leaves `1 - H A` of
-//! the error: where that is more than half the commands are filtered off, without phase, so that
-//! iteration settles and noise does not grow. With other numbers of joints than of components A_0
-//! is the pseudo-inverse; near singular poses it is damped.
+//! with the error -y of the TCP, the change u of the commands and x of the free coordinates, all
+//! about the arm linearised along its motion. The inverse is approximated by its series at low
+//! frequencies: static, damping, inertia, and higher-order terms. It is valid up to the first
+//! natural frequency of the arm with its TCP held, which is well above the first frequency of the
+//! arm itself; it needs no time integration, and looks ahead only by derivatives. Each application
+//! leaves `1 - H A` of the error. Where that is more than half, the commands are low-pass filtered
+//! without phase, so that the iteration converges and noise does not grow. If the numbers of joints
+//! and of components differ, A_0 is the pseudo-inverse; near singular poses it is damped.
 //!
-//! Joints under servos: the series is that of the arm whose motors are prescribed, and gives the
-//! motion of the motors and the torques that they need beyond those fed forward; what the servos
-//! must be told for these is a small equation over time (`servo`), stable as the servos themselves.
+//! Joints under servos: the series is that of the arm with prescribed motors. It gives the motion
+//! of the motors and the torques that they need in addition to the feed-forward; the servo commands
+//! for these follow from a small differential equation (`servo`), which is as stable as the servos
+//! themselves.
 
 use nalgebra::{Complex, DMatrix};
 
 use crate::servo::NodeServo;
 use crate::signal::LowPass;
 
-/// The arm linearised at a time of its motion; world axes at the tool, components that count only.
+/// The arm linearised at an instant of its motion; world axes at the TCP, only the selected
+/// components.
 ///
-/// As `Linear` of `flexarm-stepping`: n free coordinates, m commands, k components of the tool.
-/// Joints under servos are free coordinates, the first of them, driven by nothing; the columns of
-/// their commands are zero.
+/// As `Linear` of `flexarm-stepping`: n free coordinates, m commands, k TCP components. Joints
+/// under servos are the first of the free coordinates, without drive forces; the columns of their
+/// commands are zero.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Node {
     /// Mass, n×n.
@@ -36,30 +38,30 @@ pub struct Node {
     pub D: DMatrix<f64>,
     /// Tangent stiffness, n×n.
     pub K: DMatrix<f64>,
-    /// Forces per acceleration of the commands, n×m.
+    /// Forces per command acceleration, n×m.
     pub M_a: DMatrix<f64>,
-    /// Per their rates, n×m.
+    /// Forces per command velocity, n×m.
     pub D_a: DMatrix<f64>,
-    /// Per the commands, n×m.
+    /// Forces per command, n×m.
     pub K_a: DMatrix<f64>,
-    /// Tool per free coordinate, k×n.
+    /// TCP Jacobian with respect to the free coordinates, k×n.
     pub J: DMatrix<f64>,
-    /// Tool per command, k×m.
+    /// TCP Jacobian with respect to the commands, k×m.
     pub J_a: DMatrix<f64>,
-    /// Controllers of the joints among the free coordinates.
+    /// Controllers of the joints that are free coordinates.
     pub servo: Option<NodeServo>,
 }
 
-/// The equations of a node whose motors are prescribed, for its series.
+/// Equations of a node with prescribed motors, for its series.
 #[derive(Clone, Debug)]
 struct Prescribed {
     /// Stiffness, damping, mass of the elastic coordinates, e×e.
     own: [DMatrix<f64>; 3],
     /// The same per command, e×m.
     by_commands: [DMatrix<f64>; 3],
-    /// Torques of the motors per elastic coordinate, d×e.
+    /// Motor torques per elastic coordinate, d×e.
     motors: [DMatrix<f64>; 3],
-    /// And per command, d×m; without what is fed forward.
+    /// Motor torques per command, d×m, without the feed-forward.
     motors_by_commands: [DMatrix<f64>; 3],
     J: DMatrix<f64>,
     J_a: DMatrix<f64>,
@@ -70,7 +72,7 @@ impl Node {
         let axes: &[usize] = self.servo.as_ref().map_or(&[], |servo| &servo.axes);
         let (n, d) = (self.K.nrows(), axes.len());
         let parts = [&self.K, &self.D, &self.M];
-        // A motor's column is that of its command now.
+        // The column of a motor becomes the column of its command.
         let moved = |by_commands: &DMatrix<f64>, free: &DMatrix<f64>| {
             let mut all = by_commands.clone();
             axes.iter().enumerate().for_each(|(i, k)| all.set_column(*k, &free.column(i)));
@@ -94,58 +96,60 @@ impl Node {
     }
 }
 
-/// Why an error cannot be taken away.
+/// Reason why an error cannot be compensated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum InversionError {
-    /// At some time the joints cannot move the tool at all in the directions asked for.
+    /// At some instant the joints cannot move the TCP in any of the selected directions.
     #[error("at {t_s:.3} s the joints cannot move the tool in any direction asked for")]
     Singular {
-        /// When (s).
+        /// Time (s).
         t_s: f64,
     },
     /// The arm has no stiffness in some direction.
     #[error("at {t_s:.3} s the arm has no stiffness in some direction")]
     Slack {
-        /// When (s).
+        /// Time (s).
         t_s: f64,
     },
 }
 
-/// Below this part of the largest singular value the joints move the tool too little in a direction
-/// to correct it at once.
+/// Fraction of the largest singular value below which the joints move the TCP too little in a
+/// direction for a full correction in one step.
 const WEAK: f64 = 0.02;
-/// Part of the error that one use may leave at the highest frequency that is corrected.
+/// Fraction of the error that one application may leave at the highest corrected frequency.
 const LEFT: f64 = 0.5;
-/// Times of the slowest term of the series in which an error comes to rest at the end of a motion.
+/// Time in which an error comes to rest at the end of a motion, in time constants of the slowest
+/// term of the series.
 const COMES_TO_REST: f64 = 3.0;
-/// Terms of the series.
+/// Number of terms of the series.
 const ORDER: usize = 5;
-/// Frequencies at which that is looked at (Hz): a factor apart, from the lowest to the highest.
+/// Frequencies searched for the cutoff (Hz): lowest, highest, ratio of successive ones.
 const SEARCH: (f64, f64, f64) = (0.5, 200.0, 1.1);
 
 /// The series of the inverse at a node, m×k each.
 #[derive(Clone, Debug)]
 struct Series {
     A: [DMatrix<f64>; ORDER],
-    /// Torques that the motors of joints under servos need beyond those fed forward, d×k each.
+    /// Torques that the motors of joints under servos need in addition to the feed-forward, d×k
+    /// each.
     torques: [DMatrix<f64>; ORDER],
-    /// Directions of the tool that the joints move well, k×r, orthonormal.
+    /// TCP directions that the joints move well, k×r, orthonormal.
     moved: DMatrix<f64>,
 }
 
-/// The arm along its motion.
+/// Approximate inverse of the arm along its motion.
 #[derive(Clone, Debug)]
 pub struct Inversion {
     series: Vec<Series>,
-    /// Controllers at the nodes; none without.
+    /// Controllers at the nodes; empty if there are none.
     servos: Vec<NodeServo>,
     spacing_s: f64,
     cutoff_hz: f64,
 }
 
 impl Inversion {
-    /// The arm at even times from 0, `spacing_s` apart.
+    /// Creates the inverse from nodes at uniform times from 0, `spacing_s` apart.
     ///
     /// # Errors
     /// [`InversionError`].
@@ -161,25 +165,25 @@ impl Inversion {
         Ok(Self { series, servos, spacing_s, cutoff_hz })
     }
 
-    /// The same with the commands corrected up to this frequency at most (Hz).
+    /// Limits the corrected frequencies to this one (Hz).
     #[must_use]
     pub fn below(self, hz: f64) -> Self {
         Self { cutoff_hz: self.cutoff_hz.min(hz), ..self }
     }
 
-    /// When the joints move the tool in fewest directions (s), and in how many of those asked for;
-    /// the rest is not corrected there.
+    /// Returns the time at which the joints move the TCP in the smallest number of directions (s),
+    /// and that number; the other selected directions are not corrected there.
     pub fn fewest_directions(&self) -> Option<(f64, usize)> {
         let each = self.series.iter().enumerate().map(|(k, series)| (k as f64 * self.spacing_s, series.moved.ncols()));
         each.min_by_key(|(_, directions)| *directions)
     }
 
-    /// Up to which frequency the commands are corrected (Hz).
+    /// Returns the highest corrected frequency (Hz).
     pub fn cutoff_hz(&self) -> f64 {
         self.cutoff_hz
     }
 
-    /// What of an error (k×N, `step_s` apart) is above the cutoff.
+    /// Returns the part of an error (k×N, `step_s` apart) above the cutoff.
     pub fn quicker_than_cutoff(&self, y: &DMatrix<f64>, step_s: f64) -> DMatrix<f64> {
         if y.ncols() == 0 {
             return y.clone();
@@ -188,10 +192,11 @@ impl Inversion {
         y - slow.columns(pad, y.ncols())
     }
 
-    /// Change of the commands for which the tool moves by `y`, below the cutoff.
+    /// Computes the change of the commands that moves the TCP by `y`, below the cutoff.
     ///
-    /// * `y`: k×N, a column per time from 0, `step_s` apart; before and after it stays as at the
-    ///   ends, and over [`Inversion::edge_s`] it goes to that.
+    /// * `y`: k×N, a column per time from 0, `step_s` apart. It is continued as constant before the
+    ///   start and after the end; over [`Inversion::edge_s`] before the end it is blended into that
+    ///   constant.
     ///
     /// Returns m×N.
     pub fn commands(&self, y: &DMatrix<f64>, step_s: f64) -> DMatrix<f64> {
@@ -200,7 +205,7 @@ impl Inversion {
         if N == 0 || self.series.is_empty() {
             return DMatrix::zeros(m, N);
         }
-        // Derivatives are of the curve with its ends held on, so that none is one-sided.
+        // Derivatives are taken of the curve continued beyond its ends, so that none is one-sided.
         let (smooth, pad) = filtered(&ending_at_rest(y, step_s, self.rest_s()), step_s, self.cutoff_hz);
         let mut derivatives = vec![smooth];
         for order in 1..ORDER {
@@ -220,7 +225,7 @@ impl Inversion {
         };
         let mut u = of(|series| &series.A, m, pad, N);
         if let Some(servo) = self.servos.first() {
-            // From before the motion begins, so that it is met at rest.
+            // Starts before the motion begins, so that it is reached at rest.
             let torques = of(|series| &series.torques, servo.axes.len(), 0, pad + N);
             let at =
                 |column: usize| NodeServo::between(&self.servos, self.place((column as f64 - pad as f64) * step_s));
@@ -233,14 +238,15 @@ impl Inversion {
         u
     }
 
-    /// How far from its end an error is changed, so that it ends at rest (s): one that is known so
-    /// much longer than the commands are needed leaves them alone.
+    /// Returns the time over which an error is modified at its end so that it ends at rest (s). If
+    /// the error is known for this much longer than the commands are needed, the commands are not
+    /// affected.
     pub fn edge_s(&self) -> f64 {
         self.rest_s() + 1.0 / self.cutoff_hz
     }
 
-    /// Time in which an error comes to rest at the end: so slowly that no term of the series takes
-    /// more than the error itself does.
+    /// Time in which an error comes to rest at the end: slow enough that no term of the series
+    /// requires more than the error itself.
     fn rest_s(&self) -> f64 {
         let Some(end) = self.series.last() else { return 0.0 };
         let size = end.A[0].norm();
@@ -249,9 +255,9 @@ impl Inversion {
         (COMES_TO_REST * slowest).max(1.0 / self.cutoff_hz)
     }
 
-    /// Numbers of the nodes about a time, with their weights, which are those of a cubic B-spline:
-    /// what goes along with the arm has no kink at a node, and commands no velocity that jumps
-    /// there. At the ends it is even.
+    /// Indices of the nodes around a time with their weights, those of a cubic B-spline:
+    /// interpolated quantities have no kink at a node, so commands have no velocity jump there. At
+    /// the ends it is even.
     fn place(&self, t: f64) -> [(usize, f64); 4] {
         let last = self.series.len() as i64 - 1;
         let at = (t / self.spacing_s).clamp(0.0, last as f64);
@@ -276,7 +282,7 @@ impl Inversion {
 impl Series {
     fn of(node: &Node, t_s: f64) -> Result<Self, InversionError> {
         let arm = node.prescribed();
-        // x = X_0 u + X_1 u̇ + X_2 ü + ..., the tool and the torques by it.
+        // x = X_0 u + X_1 u̇ + X_2 ü + ..., then TCP motion and torques from it.
         let lu = arm.own[0].clone().lu();
         let solve = |F: DMatrix<f64>| lu.solve(&F).map(|x| -x).ok_or(InversionError::Slack { t_s });
         let by = |parts: &[DMatrix<f64>; 3], direct: &[DMatrix<f64>; 3], X: &[DMatrix<f64>], order: usize| {
@@ -306,7 +312,8 @@ impl Series {
         Ok(Self { A, torques, moved })
     }
 
-    /// The highest frequency below `most` up to which one use leaves less than [`LEFT`] (Hz).
+    /// Returns the highest frequency below `most` up to which one application leaves less than
+    /// [`LEFT`] (Hz).
     fn holds_up_to(&self, node: &Node, most: f64) -> f64 {
         let (lowest, highest, factor) = SEARCH;
         let mut hz = lowest;
@@ -319,8 +326,8 @@ impl Series {
         highest.min(most)
     }
 
-    /// Largest part of an error that one use leaves at a frequency, each component of the tool by
-    /// its own unit.
+    /// Maximum fraction of an error that one application leaves at a frequency, each TCP component
+    /// in its own unit.
     fn leaves(&self, node: &Node, hz: f64) -> Option<f64> {
         let s = Complex::new(0.0, std::f64::consts::TAU * hz);
         let poly =
@@ -346,7 +353,7 @@ impl Series {
         for k in 0..left.nrows() {
             left[(k, k)] += Complex::new(1.0, 0.0);
         }
-        // In the directions that the joints can move the tool in; a radian counts as a metre.
+        // In the directions in which the joints can move the TCP; a radian counts as a metre.
         let moved = complex(&self.moved);
         let left = moved.tr_mul(&left) * moved;
         Some(left.map(|z| z.norm()).singular_values().amax())
@@ -357,12 +364,12 @@ fn complex(A: &DMatrix<f64>) -> DMatrix<Complex<f64>> {
     A.map(|x| Complex::new(x, 0.0))
 }
 
-/// The damped pseudo-inverse, and an orthonormal basis of the directions that it does not damp;
-/// none of a matrix without any.
+/// Returns the damped pseudo-inverse, and an orthonormal basis of the undamped directions; `None`
+/// for a matrix without any.
 ///
-/// Near a singular pose joints would have to move far for little: singular values below [`WEAK`] of
-/// the largest are damped, the more the smaller they are (Nakamura and Hanafusa 1986), and what
-/// they would do is left to further iterations, or undone.
+/// Near a singular pose the joints would have to move far for a small correction. Singular values
+/// below [`WEAK`] of the largest are damped, more strongly the smaller they are (Nakamura and
+/// Hanafusa 1986); the remaining error is left to further iterations, or not corrected.
 fn damped_inverse(H: &DMatrix<f64>) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
     if !H.norm_squared().is_finite() {
         return None;
@@ -383,7 +390,7 @@ fn damped_inverse(H: &DMatrix<f64>) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
     Some((inverse, U.select_columns(&strong)))
 }
 
-/// Rates by central differences of fourth order, the ends held.
+/// Rates by central differences of fourth order, with constant continuation at the ends.
 fn derivative(y: &DMatrix<f64>, h: f64) -> DMatrix<f64> {
     let last = y.ncols() as i64 - 1;
     DMatrix::from_fn(y.nrows(), y.ncols(), |i, k| {
@@ -392,13 +399,13 @@ fn derivative(y: &DMatrix<f64>, h: f64) -> DMatrix<f64> {
     })
 }
 
-/// An error that ends at rest, within so many seconds. What the tool still swings by at the end of
-/// a motion is a kink where it is held on, and the derivatives of a kink would have the joints
-/// struck there.
+/// Returns the error blended into its final value within `within_s` before the end. A residual
+/// oscillation at the end of a motion would be a kink where the error is continued as constant, and
+/// the derivatives of a kink would give command peaks there.
 fn ending_at_rest(y: &DMatrix<f64>, step_s: f64, within_s: f64) -> DMatrix<f64> {
     let last = y.ncols() - 1;
     let length = (within_s / step_s).ceil().clamp(ORDER as f64, (0.5 * last as f64).max(ORDER as f64));
-    // From 0 to 1 with four derivatives that are 0 at both ends.
+    // From 0 to 1 with the first four derivatives zero at both ends.
     let rise = |s: f64| s.powi(5) * (126.0 + s * (-420.0 + s * (540.0 + s * (-315.0 + s * 70.0))));
     DMatrix::from_fn(y.nrows(), y.ncols(), |i, k| {
         let part = (last - k) as f64 / length;
@@ -406,11 +413,11 @@ fn ending_at_rest(y: &DMatrix<f64>, step_s: f64, within_s: f64) -> DMatrix<f64> 
     })
 }
 
-/// Each row without what is above a frequency, without phase: Butterworth's filter of fourth order
-/// forwards and backwards. The ends are held on for so many columns on either side, which is
-/// returned as well.
+/// Low-pass filters each row without phase: Butterworth of fourth order, forwards and backwards.
+/// The ends are continued as constant by a number of columns on either side, which is also
+/// returned.
 fn filtered(y: &DMatrix<f64>, step_s: f64, cutoff_hz: f64) -> (DMatrix<f64>, usize) {
-    // Over three periods at each end.
+    // More than three periods at each end.
     let pad = (3.0 / (cutoff_hz * step_s)).ceil() as usize + 2 * ORDER;
     let last = y.ncols() - 1;
     let mut out = DMatrix::from_fn(y.nrows(), y.ncols() + 2 * pad, |i, k| y[(i, k.saturating_sub(pad).min(last))]);

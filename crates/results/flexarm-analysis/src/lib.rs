@@ -1,4 +1,5 @@
-//! How far the tool of a flexible arm is from where the rigid arm would have it, in figures.
+//! Figures of the TCP error: the distance between the TCP of a flexible arm and that of the rigid
+//! arm.
 //!
 //! The TCP error is the flexible pose minus the pose of the rigid twin: the same robot on the same
 //! trajectory with every elastic coordinate held at zero. [`tcp_error`] gives it for one sample,
@@ -29,21 +30,20 @@
 //! # Ok::<(), flexarm_analysis::RecordError>(())
 //! ```
 //!
-//! [`error_parts`] says how much of the error is sag and how much comes from the motion.
+//! [`error_parts`] splits the error into its static part and the part due to motion.
 //!
-//! Linear structures are a part of their own: [`damped_modes`] with what each mode does
+//! A separate part treats linear structures: [`damped_modes`] with the participation of each mode
 //! ([`compliance_parts`], [`strain_energy_shares`]), and the response to harmonic excitation
 //! ([`LinearSystem::response`], [`response_peaks`]).
 //!
-//! The way back is [`Inversion`]: the joint commands that take an error of the tool away;
-//! [`Shaper`] leaves no vibration behind a motion.
+//! The inverse problem is solved by [`Inversion`]: joint commands that compensate a TCP error; a
+//! [`Shaper`] suppresses the residual vibration of a motion.
 //!
 //! Names of ISO 9283:1998 are used where they fit. A simulation is deterministic and has one cycle,
-//! so these are "ISO 9283-style" figures, not a test after the standard: path accuracy AT
+//! so these are "ISO 9283-style" figures, not a test according to the standard: path accuracy AT
 //! ([`TcpMetrics::path_accuracy_m`]), position overshoot OV ([`TcpMetrics::overshoot_m`]), position
-//! stabilisation time ([`TcpMetrics::settling_s`], which is that of the worst stop and counts from
-//! the end of the commanded move and not, as the standard does, from the first entry into the
-//! band).
+//! stabilisation time ([`TcpMetrics::settling_s`], which is that of the worst stop and is counted
+//! from the end of the commanded move, not from the first entry into the band as in the standard).
 //!
 //! Frames: W world, T tool. Order: linear first, angular second. SI units.
 //! Not here: simulation, robots, files. Everything is a pure function of slices and matrices.

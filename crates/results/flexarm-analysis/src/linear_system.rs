@@ -1,10 +1,10 @@
-//! A linear structure with inputs and outputs, and its answer to harmonic excitation.
+//! A linear structure with inputs and outputs, and its response to harmonic excitation.
 //!
 //! ```text
 //! M q̈ + D q̇ + K q = B_0 u + B_1 u̇ + B_2 ü        y = C q + F u
 //! H(ω) = C (K + iωD - ω²M)^-1 (B_0 + iωB_1 - ω²B_2) + F
 //! ```
-//! A force has `B_0` alone. A prescribed motion has `B_2` (inertia) and, with weight, `B_0`, and
+//! A force has only `B_0`. A prescribed motion has `B_2` (inertia), with gravity also `B_0`, and
 //! the rigid part `F`. Start at [`LinearSystem::response`]; [`response_peaks`] finds resonances,
 //! [`frequency_grid`] places frequencies.
 
@@ -35,7 +35,7 @@ pub struct LinearSystem {
     pub F: DMatrix<f64>,
 }
 
-/// What the response is in: the output itself or a rate of it.
+/// Quantity of a response: the output itself or one of its rates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Quantity {
     /// The output y.
@@ -48,7 +48,7 @@ pub enum Quantity {
 }
 
 impl Quantity {
-    /// Factor on the response at `omega` (rad/s).
+    /// Returns the factor on the response at `omega` (rad/s).
     pub fn factor(self, omega: f64) -> Complex<f64> {
         match self {
             Self::Displacement => Complex::new(1.0, 0.0),
@@ -59,10 +59,10 @@ impl Quantity {
 }
 
 impl LinearSystem {
-    /// Whether all matrices fit each other.
+    /// Checks that the sizes of all matrices fit each other and that their entries are finite.
     ///
     /// # Errors
-    /// [`LinearError::Size`], [`LinearError::NotFinite`] for the first that does not.
+    /// [`LinearError::Size`], [`LinearError::NotFinite`] for the first matrix that fails.
     pub fn check(&self) -> Result<(), LinearError> {
         let (n, m, p) = (self.M.nrows(), self.F.ncols(), self.F.nrows());
         let shapes = [
@@ -86,14 +86,14 @@ impl LinearSystem {
         Ok(())
     }
 
-    /// `H(ω)`, p×m, at `omega` (rad/s): complex amplitude of each output per unit amplitude of each
-    /// input.
+    /// Computes `H(ω)`, p×m, at `omega` (rad/s): complex amplitude of each output per unit
+    /// amplitude of each input.
     ///
-    /// At `omega = 0` it is the static answer, `C K^-1 B_0 + F`.
+    /// At `omega = 0` it is the static response, `C K^-1 B_0 + F`.
     ///
     /// # Errors
-    /// [`LinearError::Resonance`] where the dynamic stiffness is singular (no damping, or a rigid
-    /// motion at 0), and as [`LinearSystem::check`].
+    /// [`LinearError::Resonance`] if the dynamic stiffness is singular (no damping, or a rigid
+    /// motion at 0), and those of [`LinearSystem::check`].
     pub fn response(&self, omega: f64) -> Result<DMatrix<Complex<f64>>, LinearError> {
         self.check()?;
         let n = self.M.nrows();
@@ -125,7 +125,7 @@ pub enum Spacing {
     Linear,
 }
 
-/// Frequencies from one to the other, both included, ascending; at least two.
+/// Returns frequencies from `from` to `to`, both included, ascending; at least two.
 ///
 /// With [`Spacing::Logarithmic`] `from` must be positive.
 pub fn frequency_grid(from: f64, to: f64, points: usize, spacing: Spacing) -> Vec<f64> {
@@ -137,7 +137,7 @@ pub fn frequency_grid(from: f64, to: f64, points: usize, spacing: Spacing) -> Ve
             Spacing::Linear => from + (to - from) * part,
         }
     };
-    // The ends are as given, not as rounded.
+    // The ends are exactly as given.
     (0..=last)
         .map(|k| {
             if k == 0 {
@@ -151,15 +151,15 @@ pub fn frequency_grid(from: f64, to: f64, points: usize, spacing: Spacing) -> Ve
         .collect()
 }
 
-/// A grid with frequencies put in around each resonance, so that no peak falls between two points.
+/// Adds frequencies around each resonance to a grid, so that no peak falls between two points.
 ///
 /// * `grid`: ascending. `modes`: frequency (in the unit of the grid) and damping ratio of each
-///   mode; what lies outside the grid is left out.
+///   mode; frequencies outside the grid are left out.
 pub fn with_resonances(grid: &[f64], modes: &[(f64, f64)]) -> Vec<f64> {
     let (Some(&from), Some(&to)) = (grid.first(), grid.last()) else { return Vec::new() };
     let mut all = grid.to_vec();
     for &(frequency, ratio) in modes {
-        // Half-power width is 2 ζ f; without damping the peak has none, and a nearby point will do.
+        // The half-power width is 2 ζ f; an undamped peak has none, and a nearby point is used.
         let width = ratio.abs().clamp(1e-6, 0.5);
         let steps = [-4.0, -2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0, 4.0];
         all.extend(steps.map(|k: f64| frequency * (1.0 + k * width)).into_iter().filter(|f| *f > from && *f < to));
@@ -169,20 +169,20 @@ pub fn with_resonances(grid: &[f64], modes: &[(f64, f64)]) -> Vec<f64> {
     all
 }
 
-/// Deepest halving of an interval between two frequencies of a grid.
+/// Maximum number of halvings of an interval of the grid.
 const DEEPEST: u32 = 10;
-/// Entries below this part of the largest are rounding.
+/// Entries below this fraction of the largest are rounding.
 const ROUNDING: f64 = 1e-9;
 
-/// A response over a grid, with frequencies put in until straight lines between the points are the
-/// curves of all magnitudes on logarithmic axes, within a tolerance: many around resonances and
-/// where a curve dips, few elsewhere.
+/// Refines a response over a grid until linear interpolation between the points, on logarithmic
+/// axes, reproduces all magnitudes within a tolerance: many points around resonances and
+/// antiresonances, few elsewhere.
 ///
-/// * `grid`: ascending, with a point near each resonance ([`with_resonances`]): what is narrower
-///   than its steps is not found.
-/// * `answer`: the response at a frequency; `None` where there is none (an undamped resonance),
-///   which leaves that point out.
-/// * `tolerance`: relative, such as 0.01. An interval of the grid is halved ten times at most.
+/// * `grid`: ascending, with a point near each resonance ([`with_resonances`]): features narrower
+///   than its steps are not found.
+/// * `answer`: the response at a frequency; `None` if there is none (an undamped resonance), which
+///   leaves that point out.
+/// * `tolerance`: relative, such as 0.01. An interval of the grid is halved at most ten times.
 ///
 /// Returns the frequencies and the responses there.
 pub fn resolved_response(
@@ -192,7 +192,7 @@ pub fn resolved_response(
 ) -> (Vec<f64>, Vec<DMatrix<Complex<f64>>>) {
     let mut found: Vec<(f64, DMatrix<Complex<f64>>)> = Vec::new();
     for (frequency, response) in grid.iter().filter_map(|f| Some((*f, answer(*f)?))) {
-        // Intervals to the next point, the nearest last.
+        // Intervals to the next points, the nearest last.
         let mut open = vec![(frequency, response, 0)];
         while let Some((b, H_b, depth)) = open.pop() {
             let middle = found.last().filter(|_| depth < DEEPEST).and_then(|(a, H_a)| {
@@ -209,8 +209,8 @@ pub fn resolved_response(
     found.into_iter().unzip()
 }
 
-/// Whether a magnitude in the middle of an interval is off the line between its ends, on
-/// logarithmic axes.
+/// Returns whether a magnitude in the middle of an interval deviates from the line between its
+/// ends, on logarithmic axes.
 fn strays(
     H_a: &DMatrix<Complex<f64>>,
     H_m: &DMatrix<Complex<f64>>,
@@ -228,23 +228,22 @@ fn strays(
 /// A maximum of a response over frequency.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ResponsePeak {
-    /// Where, in the unit of the grid.
+    /// Frequency, in the unit of the grid.
     pub frequency: f64,
-    /// How high.
+    /// Magnitude.
     pub magnitude: f64,
 }
 
-/// Local maxima of `magnitude` over a grid of frequencies, each refined between its neighbours by
-/// golden-section search; the highest first. The ends of the grid are not peaks.
+/// Finds the local maxima of `magnitude` over a grid of frequencies, each refined between its
+/// neighbours by golden-section search; the highest first. The ends of the grid are not peaks.
 ///
-/// * `grid`: ascending, fine enough that a peak has a point of its own ([`with_resonances`]).
+/// * `grid`: ascending, fine enough that each peak has its own point ([`with_resonances`]).
 ///   `values`: magnitudes there.
 pub fn response_peaks(grid: &[f64], values: &[f64], magnitude: impl Fn(f64) -> f64) -> Vec<ResponsePeak> {
     let mut peaks: Vec<ResponsePeak> = (1..grid.len().saturating_sub(1))
         .filter(|&k| values[k] >= values[k - 1] && values[k] > values[k + 1])
         .map(|k| {
-            // 45 steps narrow the neighbourhood to 4e-10 of it, which is all that a maximum lets
-            // one see.
+            // 45 steps reduce the interval to 4e-10 of itself, the accuracy limit of a maximum.
             let refined = golden_maximum(&magnitude, grid[k - 1], grid[k + 1], 45);
             let top = magnitude(refined);
             if top >= values[k] { (refined, top) } else { (grid[k], values[k]) }
@@ -255,34 +254,34 @@ pub fn response_peaks(grid: &[f64], values: &[f64], magnitude: impl Fn(f64) -> f
     peaks
 }
 
-/// Why a linear structure has no answer.
+/// Reason why a linear structure has no solution.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum LinearError {
     /// A matrix of the wrong size.
     Size {
-        /// Which.
+        /// Name of the matrix.
         what: &'static str,
-        /// Its rows and columns.
+        /// Its number of rows and columns.
         found: (usize, usize),
-        /// What fits the others.
+        /// Expected number of rows and columns.
         expected: (usize, usize),
     },
     /// A NaN or infinite entry.
     NotFinite {
-        /// In which matrix.
+        /// Name of the matrix.
         what: &'static str,
     },
-    /// A matrix that must be positive definite is not.
+    /// A matrix that is not positive definite, although it must be.
     NotPositiveDefinite {
-        /// Which.
+        /// Name of the matrix.
         what: &'static str,
     },
-    /// The iteration for the eigenvalues did not end.
+    /// The eigenvalue iteration did not converge.
     NotConverged,
     /// The dynamic stiffness is singular.
     Resonance {
-        /// Where, rad/s.
+        /// Angular frequency, rad/s.
         omega: f64,
     },
 }

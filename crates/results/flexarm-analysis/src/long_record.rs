@@ -1,15 +1,14 @@
-//! A record that grows while a run goes on, in memory that does not.
+//! A record that grows during a run with bounded memory.
 //!
 //! Up to [`LongRecord::MOST`] samples all are kept, and the figures are those of
-//! [`tcp_metrics_on_path`]. Beyond, stops that are over are measured and their samples are dropped,
-//! and figures of the record as a whole are those that were gathered sample by sample, by the same
-//! sums. What is neither exact nor bounded otherwise:
+//! [`tcp_metrics_on_path`]. Beyond that, finished stops are evaluated and their samples dropped,
+//! and figures of the whole record are accumulated sample by sample, by the same sums. Exceptions
+//! to exactness:
 //!
-//! * a move or a stop that is longer than that by itself is thinned: the older half of it, except
-//!   for the beginning of the stop, loses every second sample, again and again, so that what is
-//!   recent has all of them. Only how a stop ends depends on it (final value, settling), to within
-//!   one distance of samples;
-//! * where no stop has a frequency, that of the record is the one of the samples that are left: its
+//! * a move or a stop longer than that is thinned: its older half, except for the beginning of the
+//!   stop, loses every second sample, repeatedly, so that recent samples are complete. Only the end
+//!   of a stop depends on it (final value, settling), to within one sampling interval;
+//! * if no stop has a frequency, that of the record is computed from the remaining samples, its
 //!   end.
 //!
 //! Start at [`LongRecord::push`].
@@ -22,35 +21,35 @@ use crate::metrics::{MetricSettings, TcpMetrics, tcp_metrics_on_path};
 use crate::record::{ErrorRecord, RecordError};
 use crate::repeated_pose::repeated_poses;
 
-/// First samples of a stop that are never dropped, and last ones of a move: ringing is seen there,
-/// and the way of arrival.
+/// Number of first samples of a stop and of last samples of a move that are never dropped; they
+/// determine the ringing and the direction of arrival.
 const RINGING: usize = 1 << 15;
 const ARRIVAL: usize = 64;
-/// Blocks of the curve of largest errors; half of them when there are more.
+/// Maximum number of blocks of the curve of maximum errors; beyond it pairs are merged.
 const MOST_BLOCKS: usize = 1 << 13;
 
 /// One sample: see the fields of [`ErrorRecord`].
 #[derive(Debug, Clone, Copy)]
 pub struct ErrorSample {
-    /// s.
+    /// Time, s.
     pub time_s: f64,
     /// Translation (m) and rotation vector (rad), world axes.
     pub error: [f64; 6],
     /// Translation along the path axes, m.
     pub path_error: [f64; 3],
-    /// Place of the rigid tool, m.
+    /// Position of the rigid TCP, m.
     pub rigid_position: [f64; 3],
-    /// Static part of the translation, m; NaN where it is not known.
+    /// Static part of the translation, m; NaN if unknown.
     pub static_m: [f64; 3],
 }
 
-/// See the module.
+/// A record of the TCP error with bounded memory; see the module.
 #[derive(Debug, Clone)]
 pub struct LongRecord {
     settings: MetricSettings,
     /// Start and end of each move, s.
     moves: Vec<(f64, f64)>,
-    /// Whether the tool comes to rest where the static part is.
+    /// Whether the TCP comes to rest at the static part of its error.
     rests_there: bool,
     most: usize,
     times: Vec<f64>,
@@ -60,25 +59,25 @@ pub struct LongRecord {
     statics: Vec<[f64; 3]>,
     /// Whether the static part of every sample is known.
     statics_known: bool,
-    /// Of all samples once the first are dropped; before, nobody asks for them.
+    /// Accumulated over all samples once the first are dropped; unused before.
     totals: Totals,
     curve: Curve,
-    /// Moves whose samples are no longer kept, and the stops after them.
+    /// Number of moves whose samples are no longer kept; `holds` are the stops after them.
     past: usize,
     holds: Vec<HoldMetrics>,
     condensed: bool,
-    /// The first thing that was wrong with a part that is no longer kept.
+    /// First error in a part that is no longer kept.
     fault: Option<RecordError>,
 }
 
 impl LongRecord {
-    /// Samples that are kept one by one: 65,536, which is 2 minutes and 11 seconds at 500 samples a
-    /// second and takes 8 MB.
+    /// Maximum number of samples kept individually: 65,536, which is 2 minutes and 11 seconds at
+    /// 500 samples per second and takes 8 MB.
     pub const MOST: usize = 1 << 16;
 
-    /// An empty record of a motion with these moves (start and end, s, ascending). `rests_there`
-    /// says that the tool comes to rest where the static part of its error is: it is then the final
-    /// value of stops ([`ErrorRecord::quasi_static`]).
+    /// Creates an empty record of a motion with these moves (start and end, s, ascending). If
+    /// `rests_there`, the TCP comes to rest at the static part of its error, which is then the
+    /// final value of stops ([`ErrorRecord::quasi_static`]).
     #[must_use]
     pub fn new(moves: Vec<(f64, f64)>, rests_there: bool, settings: MetricSettings) -> Self {
         Self { rests_there, ..Self::keeping(Self::MOST, moves, settings) }
@@ -105,7 +104,7 @@ impl LongRecord {
         }
     }
 
-    /// The same with room for so many samples, as far as they are kept.
+    /// Reserves memory for a number of samples, up to the number that is kept.
     #[must_use]
     pub fn with_room(mut self, samples: usize) -> Self {
         let samples = samples.min(self.most + 1);
@@ -133,7 +132,7 @@ impl LongRecord {
         }
     }
 
-    /// Adds a sample to the figures of the record as a whole.
+    /// Adds a sample to the figures of the whole record.
     fn gather(&mut self, sample: &ErrorSample) {
         let begun = self.moves.partition_point(|(start, _)| *start <= sample.time_s);
         let moves = begun > 0 && sample.time_s <= self.moves[begun - 1].1;
@@ -141,7 +140,7 @@ impl LongRecord {
         self.curve.add(norm3(&sample.error));
     }
 
-    /// A sample that is kept.
+    /// Returns a sample that is kept.
     fn sample(&self, k: usize) -> ErrorSample {
         ErrorSample {
             time_s: self.times[k],
@@ -152,28 +151,28 @@ impl LongRecord {
         }
     }
 
-    /// Number of samples that were added.
+    /// Returns the number of samples added.
     #[must_use]
     pub fn len(&self) -> usize {
         if self.condensed { self.totals.count } else { self.times.len() }
     }
 
-    /// Whether there is none.
+    /// Returns whether there are no samples.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Time of the last sample, s.
+    /// Returns the time of the last sample, s.
     #[must_use]
     pub fn last_time_s(&self) -> Option<f64> {
         self.times.last().copied()
     }
 
-    /// The figures of all samples so far.
+    /// Computes the figures of all samples so far.
     ///
     /// # Errors
-    /// As [`tcp_metrics_on_path`].
+    /// Those of [`tcp_metrics_on_path`].
     pub fn metrics(&self) -> Result<TcpMetrics, RecordError> {
         let rest = self.part(self.times.len(), self.past..self.moves.len())?;
         if !self.condensed {
@@ -209,10 +208,10 @@ impl LongRecord {
         })
     }
 
-    /// The translation in its static and its dynamic part.
+    /// Splits the translation into its static and its dynamic part.
     ///
     /// # Errors
-    /// As [`error_parts`].
+    /// Those of [`error_parts`].
     pub fn parts(&self) -> Result<ErrorParts, RecordError> {
         if !self.condensed {
             return error_parts(&self.times, &self.errors, &self.statics);
@@ -233,8 +232,8 @@ impl LongRecord {
         })
     }
 
-    /// Largest size of the translation in each of `pieces` equal pieces of the record, fewer for a
-    /// record of fewer samples.
+    /// Returns the maximum magnitude of the translation in each of `pieces` equal pieces of the
+    /// record, fewer if it has fewer samples.
     #[must_use]
     pub fn largest_errors(&self, pieces: usize) -> Vec<f64> {
         if self.condensed {
@@ -243,7 +242,7 @@ impl LongRecord {
         largest_of(&self.errors.iter().map(norm3).collect::<Vec<f64>>(), pieces)
     }
 
-    /// The figures of the first `length` samples that are kept, with some of the moves.
+    /// Computes the figures of the first `length` kept samples, with some of the moves.
     fn part(&self, length: usize, moves: std::ops::Range<usize>) -> Result<TcpMetrics, RecordError> {
         let record = ErrorRecord {
             times: &self.times[..length],
@@ -255,14 +254,13 @@ impl LongRecord {
         tcp_metrics_on_path(&record, Some(&self.path_errors[..length]), &self.settings)
     }
 
-    /// Measures the stops that are over and drops their samples; thins what is left if that is
-    /// still much.
+    /// Evaluates finished stops and drops their samples; thins the rest if it is still large.
     fn condense(&mut self) {
         if !std::mem::replace(&mut self.condensed, true) {
             (0..self.times.len()).for_each(|k| self.gather(&self.sample(k)));
         }
         let now = self.times[self.times.len() - 1];
-        // Times of moves and samples come from different sums.
+        // Times of moves and of samples come from different sums and differ by rounding.
         let slack = 1e-9 * (now - self.totals.start_s);
         let done = self.moves.partition_point(|(start, _)| *start + slack < now).saturating_sub(1);
         if done > self.past {
@@ -285,7 +283,7 @@ impl LongRecord {
         }
     }
 
-    /// Drops samples by their index and time.
+    /// Keeps only the samples selected by index and time.
     fn keep(&mut self, keep: impl Fn(usize, f64) -> bool) {
         let kept: Vec<bool> = self.times.iter().enumerate().map(|(k, t)| keep(k, *t)).collect();
         fn retain<T>(values: &mut Vec<T>, kept: &[bool]) {
@@ -300,7 +298,7 @@ impl LongRecord {
     }
 }
 
-/// Largest value in each of equal pieces.
+/// Maximum value in each of equal pieces.
 fn largest_of(values: &[f64], pieces: usize) -> Vec<f64> {
     let pieces = pieces.min(values.len());
     let range = |k: usize| {
@@ -314,43 +312,43 @@ fn norm3(error: &[f64; 6]) -> f64 {
     (error[0] * error[0] + error[1] * error[1] + error[2] * error[2]).sqrt()
 }
 
-/// Figures of the record as a whole, in the order and by the sums of [`tcp_metrics_on_path`].
+/// Figures of the whole record, in the order and by the sums of [`tcp_metrics_on_path`].
 #[derive(Debug, Clone, Default)]
 struct Totals {
     count: usize,
     start_s: f64,
     last_s: f64,
-    /// Sizes of translation and rotation in the last sample.
+    /// Magnitudes of translation and rotation in the last sample.
     last: [f64; 2],
     first_m: f64,
-    /// Time and size.
+    /// Time and magnitude.
     peak: (f64, f64),
     peak_rad: f64,
-    /// Integrals of the squares of both sizes.
+    /// Integrals of the squares of both magnitudes.
     areas: [f64; 2],
     path_peaks: [f64; 4],
-    /// In moves: largest distance from the path, sum of its squares, number of samples.
+    /// During moves: maximum distance from the path, sum of its squares, number of samples.
     off_path_m: f64,
     squares: f64,
     moving: usize,
     statics: StaticTotals,
 }
 
-/// The same of the static part and the rest, in the order and by the sums of [`error_parts`].
+/// Figures of the static and the dynamic part, in the order and by the sums of [`error_parts`].
 #[derive(Debug, Clone, Default)]
 struct StaticTotals {
     peak_m: f64,
-    /// Static part times error, where the error is largest (m²).
+    /// Static part times error at the maximum error (m²).
     along_peak: f64,
-    /// Time and size.
+    /// Time and magnitude.
     dynamic_peak: (f64, f64),
-    /// Square of the rest in the last sample, and the integral of it.
+    /// Square of the dynamic part in the last sample, and its integral.
     last: f64,
     area: f64,
 }
 
 impl StaticTotals {
-    /// `since` is the time since the sample before (s), `None` for the first one.
+    /// `since` is the time since the previous sample (s), `None` for the first one.
     fn add(&mut self, time_s: f64, since: Option<f64>, error: Vector3<f64>, resting: Vector3<f64>, is_peak: bool) {
         let rest = error - resting;
         self.peak_m = if since.is_none() { resting.norm() } else { self.peak_m.max(resting.norm()) };
@@ -397,7 +395,7 @@ impl Totals {
         self.count += 1;
     }
 
-    /// Root of the time average of the squares of translation (0) or rotation (1).
+    /// Root mean square over time of the translation (0) or rotation (1).
     fn rms(&self, which: usize) -> f64 {
         match self.count {
             0 | 1 => self.last[which],
@@ -406,7 +404,8 @@ impl Totals {
     }
 }
 
-/// Largest errors in blocks of equally many samples, which double when there are too many.
+/// Maximum errors in blocks with equal numbers of samples; the block size doubles when there are
+/// too many.
 #[derive(Debug, Clone)]
 struct Curve {
     blocks: Vec<f64>,
@@ -443,7 +442,7 @@ impl Curve {
 mod tests {
     use super::*;
 
-    /// A tool that moves along x for half a second and then rings, again and again.
+    /// A TCP that moves along x for half a second and then rings, repeatedly.
     fn sample(k: u32, moves: &[(f64, f64)]) -> ErrorSample {
         let t = f64::from(k) * 1e-3;
         let since = moves.iter().rev().find(|(_, end)| *end <= t).map_or(1e9, |(_, end)| t - end);
@@ -458,7 +457,7 @@ mod tests {
         }
     }
 
-    /// Truth: the same samples measured as one record.
+    /// Truth: the same samples evaluated as one record.
     #[test]
     fn stops_and_totals_of_a_condensed_record_are_those_of_the_whole() {
         let moves: Vec<(f64, f64)> = (0..12).map(|k| (f64::from(k) * 2.0, f64::from(k) * 2.0 + 0.5)).collect();
@@ -474,7 +473,8 @@ mod tests {
         }
         assert!(bounded.condensed && most <= 5001 && bounded.past > 8, "{most} samples, {} moves", bounded.past);
         assert_eq!((bounded.len(), bounded.last_time_s()), (whole.len(), whole.last_time_s()));
-        // To the last bit, but for the path axes of a stop, which are those of its own move.
+        // Equal to the last bit, except for the path axes of a stop, which are those of its own
+        // move.
         assert_eq!(bounded.metrics().unwrap(), whole.metrics().unwrap());
         assert_eq!(bounded.parts().unwrap(), whole.parts().unwrap());
         let curves = [bounded.largest_errors(240), whole.largest_errors(240)];
@@ -484,13 +484,13 @@ mod tests {
         }
     }
 
-    /// Truth: the closed form of a decaying exponential, t = ln(A/band)/rate; one stop longer than
-    /// what is kept.
+    /// Truth: the closed form of a decaying exponential, t = ln(A/band)/rate; one stop is longer
+    /// than the kept samples.
     #[test]
     fn a_stop_longer_than_what_is_kept_still_settles_when_it_does() {
         let moves = vec![(0.0, 0.5)];
-        // As many as are kept: where the beginning of a stop, which its frequency comes from, stays
-        // whole.
+        // A number of kept samples for which the beginning of a stop, which determines its
+        // frequency, stays complete.
         const KEPT: usize = 1 << 17;
         let settings = MetricSettings { settling_band_m: 1e-4, ..MetricSettings::default() };
         let mut record = LongRecord::keeping(KEPT, moves, settings);
@@ -511,7 +511,7 @@ mod tests {
         let metrics = record.metrics().unwrap();
         let truth = (1e-2_f64 / 1e-4).ln() / 0.05; // 92.1 s
         let settling = metrics.settling_s.unwrap();
-        // The final value is an average over the last quarter, and samples are far apart there.
+        // The final value is an average over the last quarter, where samples are far apart.
         assert!((settling - truth).abs() < 1.0, "{settling} s, {truth} s");
         assert_eq!(metrics.peak_m, 1e-2);
         assert_eq!(metrics.holds.len(), 1);

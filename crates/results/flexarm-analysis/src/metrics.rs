@@ -1,6 +1,6 @@
 //! The figures of a whole record.
 //!
-//! Start at [`tcp_metrics`]. What happens after each move is in `hold`, the spectrum in `spectrum`.
+//! Start at [`tcp_metrics`]. Figures after each move are in `hold`, the spectrum in `spectrum`.
 
 use nalgebra::Vector3;
 
@@ -10,14 +10,14 @@ use crate::record::{ErrorRecord, RecordError};
 use crate::repeated_pose::{RepeatedPose, repeated_poses};
 use crate::spectrum::{Taper, strongest_line_from};
 
-/// What a user may choose about the figures.
+/// Settings of the figures.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MetricSettings {
-    /// Half width of the band (radius of the ball) around the final value for settling and
+    /// Half width of the band (radius of the sphere) around the final value for settling and
     /// overshoot, m.
     pub settling_band_m: f64,
-    /// Frequency below which the arm does not ring by itself, Hz; 0 if that is not known. Where no
-    /// stop is long enough to show a line, slower ones in the whole record belong to the motion.
+    /// Frequency below which the arm does not ring, Hz; 0 if unknown. If no stop is long enough to
+    /// show a line, slower lines in the whole record are attributed to the motion.
     pub lowest_hz: f64,
 }
 
@@ -36,59 +36,60 @@ pub struct TcpMetrics {
     pub peak_m: f64,
     /// Time of `peak_m`, s.
     pub t_peak_s: f64,
-    /// `sqrt(1/(t_n - t_0) ∫ |e|² dt)`, m, by the trapezoidal rule, so uneven steps are weighed
-    /// rightly.
+    /// `sqrt(1/(t_n - t_0) ∫ |e|² dt)`, m, by the trapezoidal rule, so that uneven steps are
+    /// weighted correctly.
     pub rms_m: f64,
-    /// `|e(t_n)|`, m: the error that is left at the end of the record.
+    /// `|e(t_n)|`, m: the error at the end of the record.
     pub end_m: f64,
-    /// `|e(t_0)|`, m: the sag at rest, if the run was started in equilibrium; 0 if undeformed.
+    /// `|e(t_0)|`, m: the static deflection if the run started in equilibrium; 0 if undeformed.
     pub static_sag_m: f64,
     /// `max |θ|`, rad.
     pub peak_rad: f64,
     /// `sqrt(1/(t_n - t_0) ∫ |θ|² dt)`, rad.
     pub rms_rad: f64,
-    /// Settling time, s: the longest [`HoldMetrics::settling_s`] of all holds. `None` when the
-    /// error has not settled before the end of some hold, or when there is no hold after a move.
+    /// Settling time, s: the maximum [`HoldMetrics::settling_s`] of all holds. `None` if the error
+    /// has not settled before the end of some hold, or if there is no hold after a move.
     pub settling_s: Option<f64>,
-    /// Largest [`HoldMetrics::overshoot_m`] of all holds, m (position overshoot OV); 0 without a
+    /// Maximum [`HoldMetrics::overshoot_m`] of all holds, m (position overshoot OV); 0 without a
     /// hold.
     pub overshoot_m: f64,
     /// Frequency of the strongest line in any hold after a move, Hz. Without one: the strongest
     /// line, not slower than [`MetricSettings::lowest_hz`], of the whole record of `e` minus the
-    /// quasi-static error (minus its mean when that is not known). `None` when no line stands out.
+    /// quasi-static error (minus its mean if that is unknown). `None` if no line is significant.
     pub dominant_hz: Option<f64>,
-    /// `max |e·t|`, m: ahead of or behind the rigid tool, along its path.
+    /// `max |e·t|`, m: ahead of or behind the rigid TCP, along its path.
     pub tangential_peak_m: f64,
-    /// `max |e·n|`, m: in the plane of the path, across it.
+    /// `max |e·n|`, m: across the path, in its plane.
     pub normal_peak_m: f64,
     /// `max |e·b|`, m: out of the plane of the path.
     pub binormal_peak_m: f64,
     /// `max sqrt((e·n)² + (e·b)²)`, m: distance from the path.
     pub lateral_peak_m: f64,
-    /// The same while the robot moves, m (path accuracy AT); 0 without a move.
+    /// Maximum distance from the path while the robot moves, m (path accuracy AT); 0 without a
+    /// move.
     pub path_accuracy_m: f64,
-    /// Root mean square of that distance over the moves' samples, m; 0 without a move.
+    /// Root mean square distance from the path over the samples of the moves, m; 0 without a move.
     pub path_rms_m: f64,
-    /// The hold after each move, where there is one (two samples at least), in order.
+    /// The hold after each move, if there is one (at least two samples), in order.
     pub holds: Vec<HoldMetrics>,
-    /// Poses at which the tool rests more than once.
+    /// Poses at which the TCP rests more than once.
     pub repeated: Vec<RepeatedPose>,
 }
 
 /// Condenses a record of the TCP error.
 ///
 /// # Errors
-/// [`RecordError`] when the record is empty, its slices differ in length, a value is not finite,
+/// [`RecordError`] if the record is empty, its slices differ in length, a value is not finite,
 /// times or moves do not ascend, or the band is not positive.
 pub fn tcp_metrics(record: &ErrorRecord<'_>, settings: &MetricSettings) -> Result<TcpMetrics, RecordError> {
     tcp_metrics_on_path(record, None, settings)
 }
 
-/// As [`tcp_metrics`], with the parts of the errors along the path axes (tangential, normal,
-/// binormal; m) where they are known better than from positions, one per sample.
+/// Like [`tcp_metrics`], with given components of the errors along the path axes (tangential,
+/// normal, binormal; m), one per sample, if they are known more accurately than from positions.
 ///
 /// # Errors
-/// As [`tcp_metrics`], of the field `path_errors` too.
+/// Those of [`tcp_metrics`], also for the field `path_errors`.
 pub fn tcp_metrics_on_path(
     record: &ErrorRecord<'_>,
     path_errors: Option<&[[f64; 3]]>,
@@ -126,7 +127,7 @@ pub fn tcp_metrics_on_path(
     let [tangential_peak_m, normal_peak_m, binormal_peak_m, lateral_peak_m] = path_peaks(path_errors);
     let [path_accuracy_m, path_rms_m] = path_accuracy(record, path_errors);
     let holds = holds(record, band);
-    // One stop that does not settle is enough: the worst counts.
+    // The worst stop counts; one stop that does not settle is enough.
     let settling = holds.iter().map(|hold| hold.settling_s).reduce(|a, b| Some(a?.max(b?)));
     Ok(TcpMetrics {
         peak_m,
@@ -150,13 +151,13 @@ pub fn tcp_metrics_on_path(
     })
 }
 
-/// Time and size of the largest value, the first of several.
+/// Time and value of the maximum, the first one if there are several.
 fn peak(times: &[f64], values: &[f64]) -> (f64, f64) {
     let first = (times[0], values[0]);
     times.iter().copied().zip(values.iter().copied()).fold(first, |best, e| if e.1 > best.1 { e } else { best })
 }
 
-/// Root of the time average of the squares.
+/// Root mean square over time.
 fn rms(times: &[f64], values: &[f64]) -> f64 {
     let last = times.len() - 1;
     if last == 0 {
@@ -166,7 +167,7 @@ fn rms(times: &[f64], values: &[f64]) -> f64 {
     ((0..last).map(area).sum::<f64>() / (times[last] - times[0])).sqrt()
 }
 
-/// Peaks along the tangential, normal and binormal axis, and across the path.
+/// Peaks along the tangential, normal and binormal axis, and of the distance from the path.
 fn path_peaks(path_errors: &[[f64; 3]]) -> [f64; 4] {
     let mut peaks: [f64; 4] = [0.0; 4];
     for &[t, n, b] in path_errors {
@@ -177,7 +178,7 @@ fn path_peaks(path_errors: &[[f64; 3]]) -> [f64; 4] {
     peaks
 }
 
-/// Largest and root-mean-square distance from the path in the samples of the moves.
+/// Maximum and root mean square distance from the path in the samples of the moves.
 fn path_accuracy(record: &ErrorRecord<'_>, path_errors: &[[f64; 3]]) -> [f64; 2] {
     let (mut largest, mut squares, mut count) = (0.0_f64, 0.0, 0_usize);
     for (t, [_, n, b]) in record.times.iter().zip(path_errors) {
@@ -191,12 +192,12 @@ fn path_accuracy(record: &ErrorRecord<'_>, path_errors: &[[f64; 3]]) -> [f64; 2]
     [largest, (squares / count.max(1) as f64).sqrt()]
 }
 
-/// The hold after each move that has one.
+/// Returns the hold after each move that has one.
 fn holds(record: &ErrorRecord<'_>, band: f64) -> Vec<HoldMetrics> {
     let mut holds = Vec::new();
     for (i, &(start, end)) in record.moves.iter().enumerate() {
-        // Times of moves and samples come from different sums; a billionth of the record is no
-        // difference.
+        // Times of moves and of samples come from different sums; a billionth of the record counts
+        // as equal.
         let slack = 1e-9 * (record.times[record.times.len() - 1] - record.times[0]);
         let until = record.moves.get(i + 1).map_or(f64::INFINITY, |next| next.0);
         let first = record.times.partition_point(|&t| t < end - slack);
@@ -205,8 +206,8 @@ fn holds(record: &ErrorRecord<'_>, band: f64) -> Vec<HoldMetrics> {
             continue;
         }
 
-        // The axes are kept at rest, so those at the first sample of the hold still show the way of
-        // arrival.
+        // The axes are kept at rest, so those at the first sample of the hold still show the
+        // direction of arrival.
         let before = record.times.partition_point(|&t| t < start);
         let has_moved = record.rigid_positions[before..=first].iter().any(|p| *p != record.rigid_positions[first]);
         let hold = Hold {
@@ -230,6 +231,6 @@ fn dominant_hz(record: &ErrorRecord<'_>, holds: &[HoldMetrics], settings: &Metri
     let rest = record.errors.iter().enumerate();
     let rest: Vec<[f64; 3]> = rest.map(|(i, e)| std::array::from_fn(|c| e[c] - trend(i, c))).collect();
     let line = strongest_line_from(record.times, &rest, Taper::Both, settings.lowest_hz);
-    // An arm that stands still swings by rounding.
+    // An arm at rest oscillates by rounding.
     line.filter(|line| is_seen(line, settings.settling_band_m)).map(|line| line.hz)
 }

@@ -1,14 +1,14 @@
-//! The input shaper that leaves least vibration of several modes within a given delay, their
-//! frequencies known to a part.
+//! Input shaper with the smallest residual vibration of several modes within a given delay, for
+//! uncertain frequencies.
 //!
 //! ```text
 //! min over a of  max over k of  w_k |r_k|,    r_k = Σ a_i exp(λ_k (Δ - t_i)),    a_i >= 0,  Σ a_i = 1,  0 <= t_i <= Δ
 //! ```
-//! with modes λ, each at some frequencies of its band. On a grid of times t_i the problem is one of
-//! second-order cones, one for each mode and frequency [Boyd & Vandenberghe 2004, section 4.4.2];
-//! Clarabel solves it. The grid is then drawn closer about the copies that were found. Parts that
-//! are not negative keep the shaped motion within the ranges and below the speeds of the motion
-//! itself.
+//! with modes λ, each at several frequencies of its band. On a grid of times t_i this is a
+//! second-order cone program, with one cone for each mode and frequency [Boyd & Vandenberghe 2004,
+//! section 4.4.2]; Clarabel solves it. The grid is then refined around the copies found. Since the
+//! weights are not negative, the shaped motion stays within the ranges and below the speeds of the
+//! original motion.
 
 use std::f64::consts::TAU;
 
@@ -18,91 +18,92 @@ use nalgebra::Complex;
 
 use crate::shaping::Shaper;
 
-/// A mode that a shaper is made against.
+/// A mode to be suppressed by a shaper.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShapedMode {
     /// Natural frequency, undamped (Hz).
     pub hz: f64,
-    /// Its damping ratio, below 1.
+    /// Damping ratio, below 1.
     pub ratio: f64,
-    /// Vibration that it has without the shaper, in the unit of the answer.
+    /// Vibration without the shaper, in the unit of the result.
     pub vibration: f64,
 }
 
-/// A shaper and what it leaves.
+/// A shaper and its residual vibration.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OptimalShaper {
-    /// Its copies.
+    /// Copies of the shaper.
     pub shaper: Shaper,
-    /// Largest vibration that it leaves of any mode within its band, in the unit of the modes'
+    /// Maximum residual vibration of any mode within its band, in the unit of the modes'
     /// vibrations.
     pub left: f64,
 }
 
-/// Why there is no such shaper.
+/// Reason why there is no such shaper.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ShaperError {
-    /// A number that makes no sense.
+    /// An invalid number.
     #[error("{what} is {found}, expected {expected}")]
     Value {
-        /// Which.
+        /// Name of the number.
         what: &'static str,
-        /// Found.
+        /// Found value.
         found: f64,
-        /// Expected.
+        /// Expected values.
         expected: &'static str,
     },
-    /// The longest delay in periods of the quickest mode.
+    /// A delay of too many periods of the fastest mode.
     #[error(
         "a delay of {delay_s} s is {periods:.0} periods of the quickest mode, at most {most} are searched: ask for less delay, or for fewer modes"
     )]
     Long {
-        /// Asked for (s).
+        /// Requested delay (s).
         delay_s: f64,
-        /// In periods.
+        /// Delay in periods of the fastest mode.
         periods: f64,
-        /// Most.
+        /// Maximum number of periods.
         most: f64,
     },
-    /// The solver finds no least value.
+    /// The solver found no minimum.
     #[error("no shaper is found for a delay of {delay_s} s: ask for another delay, or for fewer modes")]
     Unsolved {
-        /// Asked for (s).
+        /// Requested delay (s).
         delay_s: f64,
     },
 }
 
-/// Times of the grid in a period of the quickest mode.
+/// Number of grid points per period of the fastest mode.
 const PER_PERIOD: f64 = 24.0;
-/// Most periods of the quickest mode in a delay.
+/// Maximum delay in periods of the fastest mode.
 const MOST_PERIODS: f64 = 25.0;
-/// Frequencies at which the band of a mode is looked at.
+/// Number of frequencies at which the band of a mode is evaluated.
 const IN_BAND: usize = 21;
-/// Widest band.
+/// Maximum width of the band.
 const WIDEST: f64 = 0.5;
-/// Parts below this one are no copies.
+/// Weights below this are not copies.
 const NO_COPY: f64 = 1e-6;
-/// How often the grid is drawn closer, how many times each, and so many of the old steps to both
-/// sides.
+/// Grid refinement: number of passes, and refinement factor, which is also the number of new steps
+/// to either side.
 const CLOSER: (usize, i32) = (3, 8);
-/// Vibration that counts as nothing, over the one without a shaper.
+/// Residual vibration that counts as zero, relative to the vibration without a shaper.
 const NOTHING: f64 = 1e-7;
-/// Distance from the least value, over the vibration without a shaper, at which the solver ends.
+/// Tolerance of the solver on the minimum, relative to the vibration without a shaper.
 const GAP: f64 = 1e-10;
 
 impl Shaper {
-    /// The shaper that leaves least of several modes at a delay after the end of the motion.
+    /// Computes the shaper with the smallest residual vibration of several modes, at a delay after
+    /// the end of the motion.
     ///
-    /// * `delay_s`: of the last copy, at most; `band`: part by which each frequency may be off to
-    ///   either side, such as 0.1.
+    /// * `delay_s`: maximum delay of the last copy; `band`: relative uncertainty of each frequency
+    ///   to either side, such as 0.1.
     ///
     /// # Errors
     /// [`ShaperError`].
     pub fn optimal(modes: &[ShapedMode], delay_s: f64, band: f64) -> Result<OptimalShaper, ShaperError> {
         check(modes, delay_s, band)?;
         let quickest = modes.iter().map(|mode| mode.hz).fold(0.0, f64::max);
-        // An even number of steps: halves of the delay are on the grid.
+        // Even number of steps, so that half the delay is on the grid.
         let half = (0.5 * PER_PERIOD * delay_s * quickest).ceil().max(4.0) as usize;
         let mut step = 0.5 * delay_s / half as f64;
         let mut times: Vec<f64> = (0..=2 * half).map(|k| step * k as f64).collect();
@@ -115,7 +116,7 @@ impl Shaper {
         for _ in 0..=CLOSER.0 {
             let Some(copies) = least(modes, band, delay_s, size, &times) else { break };
             let whole = Shaper { copies };
-            // Many shapers leave nothing: the one in their middle, as it is.
+            // If many shapers leave zero vibration, keep the central one unchanged.
             let many = left(&whole) < NOTHING * size;
             let shaper = if many { whole } else { gathered(&whole.copies, step) }.without_nothing();
             let around: Vec<f64> = shaper.copies.iter().map(|(t, _)| *t).collect();
@@ -166,7 +167,7 @@ fn check(modes: &[ShapedMode], delay_s: f64, band: f64) -> Result<(), ShaperErro
     Ok(())
 }
 
-/// Factors on a frequency at which its band is looked at.
+/// Factors on a frequency at which its band is evaluated.
 pub(crate) fn within(band: f64) -> Vec<f64> {
     if band == 0.0 {
         return vec![1.0];
@@ -174,7 +175,8 @@ pub(crate) fn within(band: f64) -> Vec<f64> {
     (0..IN_BAND).map(|k| 1.0 + band * (2.0 * k as f64 / (IN_BAND - 1) as f64 - 1.0)).collect()
 }
 
-/// One copy for each summit of the parts: neighbours on the grid are one that lies between them.
+/// Merges the weights into one copy for each local maximum: neighbours on the grid represent one
+/// copy between them.
 fn gathered(grid: &[(f64, f64)], step: f64) -> Shaper {
     let mut copies: Vec<(f64, f64)> = Vec::new();
     let mut falls = false;
@@ -197,8 +199,7 @@ fn gathered(grid: &[(f64, f64)], step: f64) -> Shaper {
 }
 
 impl Shaper {
-    /// Copies without those that are nothing; the rest of the parts goes to the others in
-    /// proportion.
+    /// Removes negligible copies; their weight is distributed to the others in proportion.
     fn without_nothing(self) -> Self {
         let kept: Vec<(f64, f64)> = self.copies.into_iter().filter(|(_, part)| *part > NO_COPY).collect();
         let sum: f64 = kept.iter().map(|(_, part)| part).sum();
@@ -206,13 +207,13 @@ impl Shaper {
     }
 }
 
-/// Returns the copies on a grid of times that leave least; none if the solver finds no least value.
+/// Returns the optimal copies on a grid of times; `None` if the solver finds no minimum.
 ///
 /// ```text
 /// min t    Σ a_i = 1,   a_i >= 0,   t >= w_k |r_k| / size
 /// ```
 fn least(modes: &[ShapedMode], band: f64, delay_s: f64, size: f64, times: &[f64]) -> Option<Vec<(f64, f64)>> {
-    // Clarabel's form: b - A x is in the cones, with x the parts and t.
+    // Clarabel's form: b - A x is in the cones, with x = (weights, t).
     let n = times.len();
     let mut cones = vec![SupportedConeT::ZeroConeT(1), SupportedConeT::NonnegativeConeT(n)];
     let mut A: Vec<(usize, usize, f64)> = (0..n).flat_map(|i| [(0, i, 1.0), (1 + i, i, -1.0)]).collect();
@@ -236,7 +237,7 @@ fn least(modes: &[ShapedMode], band: f64, delay_s: f64, size: f64, times: &[f64]
     let mut solver = DefaultSolver::new(&CscMatrix::zeros((n + 1, n + 1)), &q, &A, &b, &cones, settings).ok()?;
     solver.solve();
     let solved = matches!(solver.solution.status, SolverStatus::Solved | SolverStatus::AlmostSolved);
-    // The slacks of the parts are the parts, and never negative.
+    // The slacks of the weights equal the weights, and are never negative.
     solved.then(|| times.iter().copied().zip(solver.solution.s[1..].iter().copied()).collect())
 }
 
@@ -249,7 +250,7 @@ mod tests {
         ShapedMode { hz, ratio, vibration: 1.0 }
     }
 
-    /// Truth: Singer and Seering's two copies, the only ones that leave nothing within half a
+    /// Truth: the two copies of Singer and Seering, the only ones with zero residual within half a
     /// period.
     #[test]
     fn within_half_a_period_the_optimal_shaper_of_one_mode_is_zv() {
@@ -263,8 +264,8 @@ mod tests {
         }
     }
 
-    /// Truth: with less than half a period the least is at both ends, cos(ω Δ/2) of the undamped
-    /// mode.
+    /// Truth: with less than half a period the optimum has one copy at each end, with residual
+    /// cos(ω Δ/2) for the undamped mode.
     #[test]
     fn within_less_than_half_a_period_what_is_left_is_the_cosine_of_half_the_angle() {
         let (hz, delay) = (5.0, 0.06);
@@ -273,7 +274,7 @@ mod tests {
         assert!((found.left / wanted - 1.0).abs() < 1e-7, "{:e}", found.left / wanted - 1.0); // 1e-8
     }
 
-    /// Truth: the same largest residual of the closed forms within the band.
+    /// Truth: the maximum residual within the band of the closed-form shapers.
     #[test]
     fn with_the_delay_of_zv_or_zvd_it_leaves_no_more_than_they() {
         for (kind, band) in [(ShaperKind::Zv, 0.1), (ShaperKind::Zvd, 0.1), (ShaperKind::Zvd, 0.25)] {
@@ -282,7 +283,8 @@ mod tests {
                 let found = Shaper::optimal(&[mode(7.0, ratio)], other.delay_s(), band).unwrap();
                 let theirs = within(band).iter().map(|f| other.residual(7.0 * f, ratio)).fold(0.0, f64::max);
                 assert!(found.left <= theirs * (1.0 + 1e-6), "{kind:?} {band} {ratio}: {} {theirs}", found.left);
-                // With a period and a band there is something to win: zeros beside the frequency.
+                // With a full period and a band there is an improvement: zeros on both sides of the
+                // frequency.
                 if kind == ShaperKind::Zvd {
                     assert!(found.left < 0.6 * theirs, "{band} {ratio}: {} {theirs}", found.left); // 0.50
                 }
@@ -290,8 +292,7 @@ mod tests {
         }
     }
 
-    /// Truth: what is possible with a delay is possible with a longer one, where undamped modes are
-    /// concerned.
+    /// Truth: for undamped modes, any result for a delay is also possible with a longer one.
     #[test]
     fn more_delay_never_leaves_more_of_two_modes() {
         let modes = [
@@ -310,8 +311,8 @@ mod tests {
         assert!(found.left < 1e-6 && found.shaper.copies.iter().all(|(_, a)| *a > 0.0), "{found:?}");
     }
 
-    /// Truth: conditions of an optimum (Karush, Kuhn, Tucker) by small moves: no shift of a part to
-    /// any other time lowers the largest.
+    /// Truth: optimality conditions (Karush, Kuhn, Tucker) by small changes: shifting a weight to
+    /// any other time does not lower the maximum.
     #[test]
     fn no_small_change_of_its_parts_leaves_less() {
         let modes = [mode(6.6, 0.02), ShapedMode { vibration: 0.5, ..mode(11.0, 0.03) }];

@@ -1,25 +1,25 @@
-//! What a mode does: at the tool, and in which element its energy sits.
+//! Participation of a mode: at the TCP, and in the strain energy of the elements.
 
 use nalgebra::{Complex, DMatrix, DVector};
 
 use crate::damped_modes::DampedMode;
 
-/// Motion of the outputs in a mode, `C φ`, for a shape of unit modal mass.
+/// Computes the motion of the outputs in a mode, `C φ`, for a shape of unit modal mass.
 ///
-/// * `C`: p×n, output per coordinate (for the tool its Jacobian, rows linear first).
+/// * `C`: p×n, output per coordinate (for the TCP its Jacobian, rows linear first).
 pub fn mode_outputs(mode: &DampedMode, C: &DMatrix<f64>) -> DVector<Complex<f64>> {
     C.map(|x| Complex::new(x, 0.0)) * &mode.shape
 }
 
-/// Effective mass of a mode at an output: the single mass there that would store the same kinetic
+/// Computes the effective mass of a mode at an output: the point mass there with the same kinetic
 /// energy at the same speed, `1 / |c φ|²` (kg, or kg m² for an angle). Infinite at a node of the
 /// mode.
 pub fn effective_mass(output: Complex<f64>) -> f64 {
     1.0 / output.norm_sqr()
 }
 
-/// Part of the static compliance `c K^-1 cᵀ` of each output that a mode carries; over all modes the
-/// parts add up to the compliance, whatever the damping.
+/// Computes the share of a mode in the static compliance `c K^-1 cᵀ` of each output; the shares of
+/// all modes add up to the compliance for any damping.
 ///
 /// ```text
 /// c K^-1 cᵀ = Σ 2 Re (c φ)² / (-λ a)        a = φᵀ (2 λ M + D) φ        (half of that for a real λ)
@@ -43,8 +43,8 @@ pub fn compliance_parts(
     Some(mode_outputs(mode, C).map(|output| pair * (output * output / (-lambda * a)).re))
 }
 
-/// Share of each element in the strain energy of a shape, `φᴴ K_k φ` over the sum; zeros where
-/// there is none.
+/// Computes the share of each element in the strain energy of a shape, `φᴴ K_k φ` over the sum;
+/// zeros if there is no strain energy.
 ///
 /// * `blocks`: first coordinate and stiffness of each element.
 pub fn strain_energy_shares(shape: &DVector<Complex<f64>>, blocks: &[(usize, DMatrix<f64>)]) -> Vec<f64> {

@@ -1,49 +1,48 @@
-//! Path axes: along the path of the rigid tool, and two across it that turn no more than the path
-//! makes them.
+//! Path axes: one along the path of the rigid TCP, and two across it that rotate no more than the
+//! tangent requires.
 //!
-//! The axes across are carried along by the smallest rotation from one tangent to the next
+//! The transverse axes are carried along by the smallest rotation from one tangent to the next
 //! (parallel transport; a rotation-minimising frame, [Bishop 1975]). They are defined wherever
-//! there is a tangent: they do not flip where the curvature changes its side, and an error has one
-//! sign on a straight line. At rest they are kept. The normal begins towards the inside of the
-//! first bend; a path that stays in a plane has it in that plane and the binormal square to it.
+//! there is a tangent: they do not flip where the curvature changes sign, and an error keeps its
+//! sign on a straight line. At rest they are kept. The normal starts towards the inside of the
+//! first bend; for a plane path it stays in the plane and the binormal is perpendicular to it.
 
 use nalgebra::Vector3;
 
-/// Slower than this, in m/s, the tool is at rest.
+/// Speed below which the TCP is at rest, in m/s.
 const REST_SPEED: f64 = 1e-5;
-/// Lateral acceleration below this, in m/s², is taken for rounding.
+/// Lateral acceleration below which a path is straight, in m/s²: such values are rounding.
 const STRAIGHT_ACCELERATION: f64 = 1e-6;
-/// So is lateral acceleration below this part of the whole.
+/// Fraction of the total acceleration below which lateral acceleration is rounding.
 const STRAIGHT_FRACTION: f64 = 1e-6;
-/// Curvature below this, in 1/m, is straight.
+/// Curvature below which a path is straight, in 1/m.
 const STRAIGHT_CURVATURE: f64 = 1e-4;
-/// Cosine between two tangents below which the tool goes back the way it came: within 10 degrees.
+/// Cosine between two tangents below which the path reverses: within 10 degrees.
 const TURNED_BACK: f64 = -0.985;
 
-/// Unit axes in the world, square to each other; right-handed until the tool turns back on its own
-/// path.
+/// Orthonormal axes in the world; right-handed until the path reverses.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PathFrame {
     /// Direction of the velocity.
     pub tangential: Vector3<f64>,
-    /// Across the path: at first towards the centre of curvature of the first bend.
+    /// Across the path: initially towards the centre of curvature of the first bend.
     pub normal: Vector3<f64>,
-    /// Across both: at first `tangential × normal`.
+    /// Across both: initially `tangential × normal`.
     pub binormal: Vector3<f64>,
 }
 
 impl PathFrame {
-    /// Tangential, normal and binormal along the x, y and z axis of the world.
+    /// Returns tangential, normal and binormal along the x, y and z axis of the world.
     pub fn world() -> Self {
         Self { tangential: Vector3::x(), normal: Vector3::y(), binormal: Vector3::z() }
     }
 
-    /// The axes before the first sample, from the velocities (m/s) and accelerations (m/s²) of a
-    /// whole motion in order: tangential along its beginning, normal towards the inside of its
-    /// first bend. Without a bend the normal is any; without motion these are the world axes.
+    /// Returns the axes before the first sample, from the velocities (m/s) and accelerations (m/s²)
+    /// of a whole motion in order: tangential along its beginning, normal towards the inside of its
+    /// first bend. Without a bend the normal is arbitrary; without motion these are the world axes.
     ///
-    /// Straight is where the lateral acceleration is below 1e-6 m/s², below 1e-6 of the whole, or
-    /// the radius beyond 10 km.
+    /// A path counts as straight where the lateral acceleration is below 1e-6 m/s² or below 1e-6 of
+    /// the total, or the radius exceeds 10 km.
     pub fn before(rates: impl IntoIterator<Item = [Vector3<f64>; 2]>) -> Self {
         let mut first: Option<Vector3<f64>> = None;
         for [velocity, acceleration] in rates {
@@ -60,12 +59,11 @@ impl PathFrame {
         first.map_or_else(Self::world, |start| Self::world().next(&start).right_handed())
     }
 
-    /// The axes of the next sample, from the velocity (m/s) of the rigid tool in the world.
+    /// Returns the axes of the next sample, from the velocity (m/s) of the rigid TCP in the world.
     ///
-    /// * At rest (slower than 1e-5 m/s): these axes again.
-    /// * Moving: the new tangential axis, and normal and binormal turned with it by the smallest
-    ///   rotation.
-    /// * Turned back on its own path (within 10 degrees): the tangential axis changes its sign,
+    /// * At rest (slower than 1e-5 m/s): the same axes.
+    /// * Moving: the new tangential axis, with normal and binormal turned by the smallest rotation.
+    /// * Reversing on its own path (within 10 degrees): the tangential axis changes its sign,
     ///   normal and binormal do not.
     #[must_use]
     pub fn next(&self, velocity: &Vector3<f64>) -> Self {
@@ -81,7 +79,7 @@ impl PathFrame {
             // Rodrigues' formula with the sine in the axis.
             false => v + axis.cross(v) + axis.cross(&axis.cross(v)) / (1.0 + cosine),
         };
-        // Rounding does not add up: square to each other again at each step.
+        // Orthogonalise at each step, so that rounding does not accumulate.
         let across = |v: Vector3<f64>| v - tangential * tangential.dot(&v);
         let normal = across(carried(&self.normal)).normalize();
         let binormal = across(carried(&self.binormal));
@@ -89,7 +87,7 @@ impl PathFrame {
         Self { tangential, normal, binormal }
     }
 
-    /// Parts of a world vector along the tangential, normal and binormal axis.
+    /// Returns the components of a world vector along the tangential, normal and binormal axis.
     pub fn components(&self, v: &Vector3<f64>) -> [f64; 3] {
         [self.tangential.dot(v), self.normal.dot(v), self.binormal.dot(v)]
     }
@@ -99,7 +97,7 @@ impl PathFrame {
     }
 }
 
-/// Acceleration across the velocity, unless it is so small that the path is straight.
+/// Acceleration perpendicular to the velocity, unless it is so small that the path is straight.
 fn lateral(velocity: &Vector3<f64>, acceleration: &Vector3<f64>) -> Option<Vector3<f64>> {
     let speed = velocity.norm();
     let tangential = velocity / speed;
@@ -109,11 +107,11 @@ fn lateral(velocity: &Vector3<f64>, acceleration: &Vector3<f64>) -> Option<Vecto
     (lateral.norm() > noise).then_some(lateral)
 }
 
-/// Path axes at every sample of the rigid tool's positions.
+/// Computes the path axes at every sample of the rigid TCP positions.
 ///
 /// Velocity and acceleration are those of the parabola through a sample and its two neighbours
-/// (exact for constant acceleration, whatever the steps); the first and last sample use the
-/// parabola next to them. The axes begin as [`PathFrame::before`] says.
+/// (exact for constant acceleration with any steps); the first and last sample use the adjacent
+/// parabola. The initial axes are those of [`PathFrame::before`].
 ///
 /// * `times`: s, strictly increasing. `positions`: m, in the world, one per time.
 pub fn path_frames(times: &[f64], positions: &[[f64; 3]]) -> Vec<PathFrame> {
@@ -130,26 +128,26 @@ pub fn path_frames(times: &[f64], positions: &[[f64; 3]]) -> Vec<PathFrame> {
     (0..n).map(rates).map(next).collect()
 }
 
-/// The tangential axis of [`path_frames`] at one sample, without the others.
+/// Computes only the tangential axis of [`path_frames`] at one sample.
 pub(crate) fn tangential_at(times: &[f64], positions: &[[f64; 3]], sample: usize) -> Vector3<f64> {
     let n = times.len().min(positions.len());
     if n < 3 {
         return PathFrame::world().tangential;
     }
     let rates = |i: usize| parabola_rates(times, positions, i.clamp(1, n - 2), times[i]);
-    // At rest the axes are those of the last motion.
+    // At rest the axes are those of the preceding motion.
     let moving = (0..=sample).rev().map(|i| rates(i)[0]).find(|velocity| velocity.norm() > REST_SPEED);
     let at_rest = || PathFrame::before((0..n).map(rates)).tangential;
     moving.map_or_else(at_rest, |velocity| velocity / velocity.norm())
 }
 
-/// Velocity at `t` and acceleration of the parabola through samples `i - 1`, `i` and `i + 1`.
+/// Velocity at `t`, and acceleration, of the parabola through samples `i - 1`, `i` and `i + 1`.
 fn parabola_rates(times: &[f64], positions: &[[f64; 3]], i: usize, t: f64) -> [Vector3<f64>; 2] {
     let p = |k: usize| Vector3::from(positions[k]);
     let (before, after) = (times[i] - times[i - 1], times[i + 1] - times[i]);
     let (left, right) = ((p(i) - p(i - 1)) / before, (p(i + 1) - p(i)) / after);
     let acceleration = (right - left) * (2.0 / (before + after));
-    // The slope of a chord is the velocity half-way along it.
+    // The slope of a chord is the velocity at its midpoint in time.
     let velocity = left + acceleration * (t - 0.5 * (times[i - 1] + times[i]));
     [velocity, acceleration]
 }
@@ -171,7 +169,7 @@ mod tests {
         }
     }
 
-    /// Frames of a path given by its place over time, every millisecond.
+    /// Frames of a path given by its position over time, every millisecond.
     fn along(seconds: f64, place: impl Fn(f64) -> Vector3<f64>) -> Vec<PathFrame> {
         let times: Vec<f64> = (0..(1e3 * seconds) as u32).map(|k| 1e-3 * f64::from(k)).collect();
         let positions: Vec<[f64; 3]> = times.iter().map(|&t| place(t).into()).collect();
@@ -182,14 +180,14 @@ mod tests {
         (frame.tangential.cross(&frame.normal) - frame.binormal).norm()
     }
 
-    /// Largest angle between the axes across of two samples that follow each other.
+    /// Maximum change of the transverse axes between two successive samples.
     fn largest_turn(frames: &[PathFrame]) -> f64 {
         let turn = |w: &[PathFrame]| (w[1].normal - w[0].normal).norm().max((w[1].binormal - w[0].binormal).norm());
         frames.windows(2).map(turn).fold(0.0, f64::max)
     }
 
-    /// Truth: a plane curve. Where it changes from left to right the axis out of the plane stays,
-    /// and the normal turns with the tangent (by at most 1.3e-2 a sample here).
+    /// Truth: a plane curve. Where it changes from left to right, the axis out of the plane is
+    /// constant and the normal turns with the tangent (here by at most 1.3e-2 per sample).
     #[test]
     fn inflections_of_an_s_and_of_a_figure_eight_flip_nothing() {
         let tilt = nalgebra::Rotation3::from_euler_angles(0.4, -0.7, 0.2);
@@ -206,8 +204,8 @@ mod tests {
         }
     }
 
-    /// Truth: closed form. Against the principal normal N and binormal B of a helix of curvature κ
-    /// and torsion τ the frame turns back by the torsion: `n = cos(τs) N - sin(τs) B`.
+    /// Truth: closed form. With respect to the principal normal N and binormal B of a helix of
+    /// curvature κ and torsion τ, the frame turns back by the torsion: `n = cos(τs) N - sin(τs) B`.
     #[test]
     fn along_a_helix_the_axes_lag_the_principal_normal_by_its_torsion() {
         let (radius, rise, rate) = (0.3, 0.1, 1.5);
@@ -232,20 +230,20 @@ mod tests {
         assert!(largest_turn(&frames) < 2e-3);
     }
 
-    /// Truth: a path that is gone back. Only ahead and behind change places; an error across keeps
-    /// its sign.
+    /// Truth: a path that is traversed back. Only ahead and behind are exchanged; a transverse
+    /// error keeps its sign.
     #[test]
     fn turning_back_on_a_bent_path_keeps_both_axes_across() {
         let angle = |t: f64| 0.6 * (1.0 - (1.5 * t).cos());
         let frames = along(4.0, |t| Vector3::new(0.5 * angle(t).cos(), 0.5 * angle(t).sin(), 0.2));
-        // It turns back at t = π / 1.5.
+        // It reverses at t = π / 1.5.
         let (before, after) = (&frames[2000], &frames[2190]);
         assert!((before.tangential + after.tangential).norm() < 2e-2);
         assert!((before.normal - after.normal).norm() < 2e-2 && (before.binormal - after.binormal).norm() < 1e-9);
         assert!(largest_turn(&frames) < 5e-3, "{}", largest_turn(&frames));
     }
 
-    /// Truth: the axes of a straight line do not turn, not even when the tool stops and goes back.
+    /// Truth: the axes of a straight line do not turn, even if the TCP stops and goes back.
     #[test]
     fn on_a_line_and_at_rest_the_axes_are_kept() {
         let times: Vec<f64> = (0..300).map(|k| 0.01 * f64::from(k)).collect();
@@ -256,7 +254,7 @@ mod tests {
         for sample in [0, 50, 99, 110, 250, times.len() - 1] {
             assert_eq!(tangential_at(&times, &positions, sample), frames[sample].tangential);
         }
-        // at rest before the motion: the axes with which it begins
+        // at rest before the motion: the axes of its start
         assert!((frames[50].tangential - direction).norm() < 1e-12); // measured 2.2e-16
         assert_eq!(frames[50], frames[99]);
         for frame in &frames[110..] {
@@ -269,7 +267,7 @@ mod tests {
         }
     }
 
-    /// Truth: a circle lies in its plane from its first sample on, however slowly it begins.
+    /// Truth: a circle stays in its plane from its first sample on, however slowly it begins.
     #[test]
     fn a_circle_from_rest_has_its_own_plane_from_the_start() {
         let tilt = nalgebra::Rotation3::from_euler_angles(0.4, -0.7, 0.2);

@@ -2,16 +2,16 @@
 
 use flexarm_kinematics::{Pose, rotation_vector};
 
-/// TCP error: flexible minus rigid pose, in world axes.
+/// Computes the TCP error, flexible minus rigid pose, in world axes.
 ///
 /// ```text
 /// e = [ p_WT_flexible - p_WT_rigid ; rotation vector of R_flexible R_rigidᵀ ]
 /// ```
 ///
-/// * `rigid`, `flexible`: poses of the tool in the world, m.
+/// * `rigid`, `flexible`: TCP poses in the world, m.
 ///
-/// Returns three translations in m and three rotations in rad. The rotation is exact to about 2e-16
-/// rad absolutely, because it does not go through an arc cosine.
+/// Returns three translations in m and three rotations in rad. The rotation has an absolute
+/// accuracy of about 2e-16 rad, since it does not use an arc cosine.
 pub fn tcp_error(rigid: &Pose, flexible: &Pose) -> [f64; 6] {
     let p = flexible.translation.vector - rigid.translation.vector;
     let R = flexible.rotation.matrix() * rigid.rotation.matrix().transpose();
@@ -25,7 +25,7 @@ mod tests {
     use nalgebra::{Rotation3, Translation3, Vector3};
     use proptest::prelude::*;
 
-    /// Truth: a rotation by 1e-9 rad is the identity plus a skew matrix up to 5e-19.
+    /// Truth: a rotation by 1e-9 rad is the identity plus a skew-symmetric matrix, up to 5e-19.
     #[test]
     fn a_nanoradian_is_resolved_to_seven_digits() {
         let R_rigid = Rotation3::from_euler_angles(0.3, -1.1, 2.0);
@@ -53,7 +53,7 @@ mod tests {
         ) {
             let theta = Vector3::from(axis).normalize() * angle;
             let found = rotation_vector(Rotation3::new(theta).matrix());
-            // Within 1e-8 of half a turn the sign of the axis may be lost in rounding.
+            // Within 1e-8 of half a turn, rounding may flip the sign of the axis.
             let distance = (found - theta).norm().min(if angle > 3.14159264 { (found + theta).norm() } else { f64::MAX });
             prop_assert!(distance < 1e-14); // measured 9.4e-16
         }

@@ -1,9 +1,9 @@
-//! What the metrics are computed from, and the check that it makes sense.
+//! Input of the metrics, and its consistency check.
 
 use std::error::Error;
 use std::fmt;
 
-/// A record of the TCP error: one entry per sample, uniform in time or not.
+/// A record of the TCP error: one entry per sample, with uniform or varying steps.
 #[derive(Debug, Clone, Copy)]
 pub struct ErrorRecord<'a> {
     /// Times in s, strictly increasing.
@@ -11,23 +11,22 @@ pub struct ErrorRecord<'a> {
     /// TCP errors from [`crate::tcp_error`]: translation in m, rotation vector in rad, in world
     /// axes.
     pub errors: &'a [[f64; 6]],
-    /// Positions of the rigid tool in the world, m: they give the path axes.
+    /// Positions of the rigid TCP in the world, m; they define the path axes.
     pub rigid_positions: &'a [[f64; 3]],
-    /// Translation of the tool, in m, that the arm would have if it stood still at each sample,
-    /// when known: the final value of every hold, and the trend of which the dominant frequency is
-    /// not part.
+    /// Static TCP translation at the pose of each sample, m, if known: the final value of every
+    /// hold, and the trend that is removed before the dominant frequency is determined.
     pub quasi_static: Option<&'a [[f64; 3]]>,
     /// Start and end of each move, s, ascending; between them the joints hold.
     pub moves: &'a [(f64, f64)],
 }
 
-/// Why a record has no metrics.
+/// Reason why a record has no metrics.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum RecordError {
-    /// No sample at all.
+    /// No samples.
     Empty,
-    /// A slice of another length than `times`.
+    /// A slice whose length differs from that of `times`.
     Length {
         /// Field of [`ErrorRecord`].
         what: &'static str,
@@ -47,12 +46,12 @@ pub enum RecordError {
     TimeNotIncreasing {
         /// Index of the offending sample.
         index: usize,
-        /// Time of the sample before, s.
+        /// Time of the previous sample, s.
         previous: f64,
         /// Its time, s.
         this: f64,
     },
-    /// A move that ends before it starts, or starts before the one before it ends.
+    /// A move that ends before it starts, or starts before the previous one ends.
     BadMove {
         /// Index of the move.
         index: usize,
@@ -63,7 +62,7 @@ pub enum RecordError {
     },
     /// A settling band that is not a positive number.
     BadBand {
-        /// What was given, m.
+        /// Given band, m.
         found: f64,
     },
 }
@@ -95,7 +94,7 @@ impl ErrorRecord<'_> {
     /// Checks lengths, order and numbers.
     ///
     /// # Errors
-    /// The first fault found, as [`RecordError`].
+    /// The first error found, as [`RecordError`].
     pub fn check(&self) -> Result<(), RecordError> {
         let n = self.times.len();
         if n == 0 {

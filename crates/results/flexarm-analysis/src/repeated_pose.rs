@@ -1,29 +1,29 @@
-//! Poses at which the tool comes to rest more than once: pose accuracy and repeatability in the
+//! Poses at which the TCP comes to rest more than once: pose accuracy and repeatability in the
 //! sense of ISO 9283.
 
 use nalgebra::Vector3;
 
 use crate::hold::HoldMetrics;
 
-/// Two rests are at the same place of the rigid tool within this, m.
+/// Maximum distance of two rests at the same position of the rigid TCP, m.
 const SAME_PLACE: f64 = 1e-6;
 
 /// A pose that is visited at least twice.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RepeatedPose {
-    /// Place of the rigid tool, m, world axes.
+    /// Position of the rigid TCP, m, world axes.
     pub place_m: [f64; 3],
-    /// How often the tool came to rest there.
+    /// Number of times the TCP came to rest there.
     pub visits: usize,
-    /// Distance of the mean attained place from the rigid tool's, m (pose accuracy AP).
+    /// Distance of the mean attained position from that of the rigid TCP, m (pose accuracy AP).
     pub accuracy_m: f64,
-    /// `l̄ + 3 S`, m, of the distances `l` of the attained places from their mean, with their
-    /// standard deviation S (pose repeatability RP).
+    /// `l̄ + 3 S`, m, with the mean and the standard deviation S of the distances `l` of the
+    /// attained positions from their mean (pose repeatability RP).
     pub repeatability_m: f64,
 }
 
-/// Poses with two rests or more, in the order of the first; attained is what the tool has at the
-/// end of a rest.
+/// Returns the poses with two or more rests, ordered by their first rest; the attained position is
+/// that at the end of a rest.
 pub(crate) fn repeated_poses(holds: &[HoldMetrics]) -> Vec<RepeatedPose> {
     let mut groups: Vec<(Vector3<f64>, Vec<Vector3<f64>>)> = Vec::new();
     for hold in holds {
@@ -67,8 +67,9 @@ mod tests {
         }
     }
 
-    /// Truth: errors (1, 0, 0), (-1, 0, 0), (0, 2, 0), (0, -2, 0) about (3, 4, 0): the mean is 5
-    /// away, distances 1, 1, 2, 2 have the mean 1.5 and the standard deviation 1/sqrt(3).
+    /// Truth: errors (1, 0, 0), (-1, 0, 0), (0, 2, 0), (0, -2, 0) about (3, 4, 0): the mean has a
+    /// distance of 5, the distances 1, 1, 2, 2 have the mean 1.5 and the standard deviation
+    /// 1/sqrt(3).
     #[test]
     fn accuracy_and_repeatability_are_those_of_the_formulas_of_the_standard() {
         let (a, b) = ([1.0, 0.0, 0.5], [0.0, 1.0, 0.5]);

@@ -1,33 +1,33 @@
-//! What servos must be told so that their motors move as asked, linear about a motion.
+//! Servo commands for a required motor motion, linear about a motion.
 //!
 //! ```text
 //! τ = C(s) (u - q) + F(s) u            C(s) = k_v s + p + i/s,   p = k_v k_p + k_i,   i = k_i k_p
 //! (C + F) (u - q) = τ - F q
 //! ```
-//! with the commands u, the motors q, the torques τ that their motion needs and what is fed
-//! forward, F. The lead `u - q` obeys the equation of the servo on a rigid arm: it is stable where
-//! the servo is, and needs no look ahead. Here it is stepped by backward differences of second
-//! order, which also hold where nothing is fed forward.
+//! with the commands u, the motors q, the torques τ that their motion needs and the feed-forward F.
+//! The lead `u - q` obeys the equation of the servo on a rigid arm: it is stable if the servo is,
+//! and needs no look-ahead. It is integrated by backward differences of second order, which also
+//! work without feed-forward.
 
 use nalgebra::{Complex, DMatrix, DVector};
 
-/// Controllers of d joints, linear, at a time of a motion; m commands.
+/// Linear controllers of d joints at an instant of a motion; m commands.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NodeServo {
-    /// Number of the command that each follows.
+    /// Index of the command that each controller follows.
     pub axes: Vec<usize>,
-    /// `k_v k_p + k_i` of each (N m/rad or N/m).
+    /// `k_v k_p + k_i` of each controller (N m/rad or N/m).
     pub stiffness: DVector<f64>,
     /// `k_v` (N m s/rad or N s/m).
     pub damping: DVector<f64>,
     /// `k_i k_p` (N m/(rad s) or N/(m s)).
     pub integral: DVector<f64>,
-    /// Torques fed forward per command, its rate and its acceleration, d×m.
+    /// Feed-forward torques per command, its velocity and its acceleration, d×m.
     pub ahead: [DMatrix<f64>; 3],
 }
 
 impl NodeServo {
-    /// Controllers among some nodes, by their weights.
+    /// Interpolates the controllers between nodes, by weights.
     pub(crate) fn between(all: &[Self], nodes: [(usize, f64); 4]) -> Self {
         let first = &all[nodes[0].0];
         let sum = |k: usize| {
@@ -37,8 +37,8 @@ impl NodeServo {
         Self { ahead: std::array::from_fn(sum), ..first.clone() }
     }
 
-    /// Adds the controllers to the dynamic stiffness of the free coordinates, of which their motors
-    /// are the first, and to the forces per command.
+    /// Adds the controllers to the dynamic stiffness of the free coordinates, the first of which
+    /// are the motors, and to the forces per command.
     pub(crate) fn close(&self, s: Complex<f64>, Z: &mut DMatrix<Complex<f64>>, N: &mut DMatrix<Complex<f64>>) {
         let F = self.fed(s);
         for (i, axis) in self.axes.iter().enumerate() {
@@ -50,7 +50,7 @@ impl NodeServo {
         }
     }
 
-    /// `C + F`, d×d.
+    /// Returns `C + F`, d×d.
     pub(crate) fn references(&self, s: Complex<f64>) -> DMatrix<Complex<f64>> {
         let mut all = self.fed(s).select_columns(&self.axes);
         for i in 0..self.axes.len() {
@@ -64,8 +64,8 @@ impl NodeServo {
         part(0, Complex::new(1.0, 0.0)) + part(1, s) + part(2, s * s)
     }
 
-    /// How far commands must be ahead of their motors for torques beyond those fed forward, from
-    /// rest.
+    /// Computes the lead of the commands over their motors for torques in addition to the
+    /// feed-forward, from rest.
     ///
     /// * `at`: the controllers at each column; `torques`: d×N, `step_s` apart.
     ///
@@ -77,13 +77,13 @@ impl NodeServo {
             return leads;
         }
         let (sum, lead) = at(0).at_rest(&torques.column(0).into_owned());
-        // Integral, lead and its rate at the last two times.
+        // Integral, lead and its rate at the last two instants.
         let mut before = [[sum.clone(), lead.clone(), DVector::zeros(d)], [sum, lead, DVector::zeros(d)]];
         let b = 1.5 / step_s;
         for column in 0..N {
             let servo = at(column);
             let [K, D, M] = servo.equation();
-            // x = b X + x_0 for each X and its derivative x.
+            // x = b X + x_0 for each X and its derivative x (BDF2).
             let past = |k: usize| (&before[1][k] * 0.5 - &before[0][k] * 2.0) / step_s;
             let (lead_0, rate_0, acceleration_0) = (past(0), past(1), past(2));
             let integral = DMatrix::from_diagonal(&servo.integral);
@@ -99,18 +99,18 @@ impl NodeServo {
         leads
     }
 
-    /// Of lead, rate and acceleration, d×d.
+    /// Coefficients of lead, rate and acceleration, d×d.
     fn equation(&self) -> [DMatrix<f64>; 3] {
         let [K, D, M] = [0, 1, 2].map(|k| self.ahead[k].select_columns(&self.axes));
         [K + DMatrix::from_diagonal(&self.stiffness), D + DMatrix::from_diagonal(&self.damping), M]
     }
 
-    /// Integral of the lead, and lead, under torques that last.
+    /// Integral of the lead, and lead, under constant torques.
     fn at_rest(&self, torques: &DVector<f64>) -> (DVector<f64>, DVector<f64>) {
         let [K, _, _] = self.equation();
         let (mut left, mut right) = (K.clone(), torques.clone());
         for i in (0..self.axes.len()).filter(|i| self.integral[*i] > 0.0) {
-            // What integrates leads by nothing at rest.
+            // With an integrator the lead is zero at rest.
             left.row_mut(i).fill(0.0);
             left[(i, i)] = 1.0;
             right[i] = 0.0;
@@ -139,8 +139,8 @@ mod tests {
         }
     }
 
-    /// Truth: at rest what integrates leads by nothing, the other by its torque over its stiffness,
-    /// from the first moment on.
+    /// Truth: at rest, the axis with an integrator has zero lead, the other its torque over its
+    /// stiffness, from the first instant on.
     #[test]
     fn torques_that_last_are_met_at_rest() {
         let servo = two_axes();
@@ -151,8 +151,8 @@ mod tests {
         }
     }
 
-    /// Truth: amplitude and phase of `1 / (C + F)` at a frequency, of two axes, one with all of it
-    /// fed forward and one without, which has no integrator either.
+    /// Truth: amplitude and phase of `1 / (C + F)` at a frequency, for two axes, one with full
+    /// feed-forward, the other without feed-forward and integrator.
     #[test]
     fn leads_are_those_of_the_frequency_response_once_the_start_has_died_away() {
         let (h, omega, N) = (1e-3, 12.0, 6000);
@@ -163,7 +163,7 @@ mod tests {
         let s = Complex::new(0.0, omega);
         let size = DVector::from_vec(size.map(|x| Complex::new(x, 0.0)).to_vec());
         let wave = servo.references(s).lu().solve(&size).unwrap();
-        // The steady part: an integrator leads by nothing.
+        // Steady part: with an integrator the lead is zero.
         let steady = [0.0, -70.0 / 4e4];
         for k in N / 2..N {
             let turn = (s * h * k as f64).exp();

@@ -1,36 +1,36 @@
-//! Input shapers: a motion run through a few delayed copies of itself leaves no vibration of a
-//! known frequency behind.
+//! Input shapers: superposing a few delayed copies of a motion leaves no residual vibration at a
+//! known frequency.
 //!
 //! ```text
 //! q_s(t) = Σ a_i q(t - t_i),   Σ a_i = 1
 //! ```
-//! Zero vibration (ZV, two copies half a damped period apart), and zero vibration and slope (ZVD,
-//! three), which forgives a frequency that is off (Singer and Seering 1990). Shapers of several
-//! modes are convolved; the best one within a given delay is in `optimal_shaper`.
+//! Zero vibration (ZV, two copies half a damped period apart), and zero vibration and derivative
+//! (ZVD, three copies), which is robust against frequency errors (Singer and Seering 1990). Shapers
+//! of several modes are convolved; the best one within a given delay is in `optimal_shaper`.
 
 use std::f64::consts::{PI, TAU};
 
-/// Which shaper.
+/// Type of input shaper.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum ShaperKind {
-    /// Two copies: the shortest with positive parts.
+    /// Two copies: the shortest with positive weights.
     #[default]
     Zv,
-    /// Three copies: twice as long, and a frequency that is 10 % off leaves a fortieth.
+    /// Three copies: twice as long; a frequency error of 10 % leaves a fortieth of the vibration.
     Zvd,
 }
 
-/// Copies of a motion.
+/// Delayed copies of a motion.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Shaper {
-    /// Delay (s) and part of each copy.
+    /// Delay (s) and weight of each copy.
     pub copies: Vec<(f64, f64)>,
 }
 
 impl Shaper {
-    /// Against one mode.
+    /// Creates a shaper for one mode.
     ///
-    /// * `hz`: natural frequency, undamped; `ratio`: its damping, below 1.
+    /// * `hz`: undamped natural frequency; `ratio`: its damping ratio, below 1.
     pub fn new(kind: ShaperKind, hz: f64, ratio: f64) -> Self {
         let damped = hz * (1.0 - ratio * ratio).sqrt();
         let half = 0.5 / damped;
@@ -43,29 +43,29 @@ impl Shaper {
         Self { copies: parts.iter().enumerate().map(|(k, part)| (half * k as f64, part / sum)).collect() }
     }
 
-    /// Against the modes of both.
+    /// Returns the shaper for the modes of both.
     #[must_use]
     pub fn and(&self, other: &Self) -> Self {
         let both = self.copies.iter().flat_map(|(t, a)| other.copies.iter().map(move |(s, b)| (t + s, a * b)));
         Self { copies: both.collect() }
     }
 
-    /// How much longer a motion takes (s).
+    /// Returns the increase of the duration of a motion (s).
     pub fn delay_s(&self) -> f64 {
         self.copies.iter().map(|(t, _)| *t).fold(0.0, f64::max)
     }
 
-    /// The shaped value at time t of a curve.
+    /// Returns the shaped value of a curve at time t.
     pub fn apply(&self, t: f64, mut curve: impl FnMut(f64) -> f64) -> f64 {
         self.copies.iter().map(|(delay, part)| part * curve(t - delay)).sum()
     }
 
-    /// Vibration of a mode after a step, over that without the shaper.
+    /// Returns the vibration of a mode after a step, relative to that without the shaper.
     pub fn residual(&self, hz: f64, ratio: f64) -> f64 {
         self.residual_at(hz, ratio, self.delay_s())
     }
 
-    /// The same at a time after the step (s), when the last copy is through.
+    /// The same at a time after the step (s) that is not before the last copy.
     pub fn residual_at(&self, hz: f64, ratio: f64, end_s: f64) -> f64 {
         let (w, wd) = (TAU * hz, TAU * hz * (1.0 - ratio * ratio).sqrt());
         let end = end_s;
@@ -86,7 +86,7 @@ mod tests {
             let [zv, zvd] = [ShaperKind::Zv, ShaperKind::Zvd].map(|kind| Shaper::new(kind, 7.0, ratio));
             assert!(zv.residual(7.0, ratio) < 1e-15 && zvd.residual(7.0, ratio) < 1e-15);
             let off = |shaper: &Shaper| shaper.residual(7.7, ratio);
-            // Ten percent off and undamped: sin(π/20) = 0.156, and its square.
+            // Ten per cent error, undamped: sin(π/20) = 0.156, and its square.
             if ratio == 0.0 {
                 assert!((off(&zv) - 0.156_434).abs() < 1e-5 && (off(&zvd) - 0.024_472).abs() < 1e-5);
             }

@@ -1,27 +1,28 @@
-//! Signals: a low-pass without phase, derivatives, delays, linear least squares. Uniform samples.
+//! Signals with uniform samples: zero-phase low-pass, derivatives, delays, linear least squares.
 
 use nalgebra::{DMatrix, DVector};
 
-/// A section of second order, `b` over `a`, the leading `a` being 1.
+/// A second-order section, `b` over `a`, with leading `a` of 1.
 #[derive(Clone, Copy, Debug)]
 struct Section {
     b: [f64; 3],
     a: [f64; 2],
 }
 
-/// Butterworth's low-pass of fourth order, run forwards and backwards: no phase, the gain of one
-/// pass squared.
+/// Butterworth low-pass of fourth order, run forwards and backwards: zero phase, squared gain of
+/// one pass.
 #[derive(Clone, Copy, Debug)]
 pub struct LowPass {
     sections: [Section; 2],
-    /// Samples by which a signal is continued at both ends, turned about its last value.
+    /// Number of samples by which a signal is extended at both ends, by point reflection at its end
+    /// value.
     reach: usize,
 }
 
 impl LowPass {
-    /// The filter for a rate of samples.
+    /// Creates the filter for a sampling rate.
     ///
-    /// * `cut_hz`: where one pass has 3 dB less. * `rate_hz`: samples a second.
+    /// * `cut_hz`: frequency of 3 dB attenuation in one pass. * `rate_hz`: samples per second.
     pub fn new(cut_hz: f64, rate_hz: f64) -> Self {
         let k = (std::f64::consts::PI * cut_hz / rate_hz).tan();
         let section = |angle: f64| {
@@ -34,7 +35,7 @@ impl LowPass {
         Self { sections, reach: (3.0 * rate_hz / cut_hz) as usize }
     }
 
-    /// The signal without what is faster.
+    /// Filters a signal.
     pub fn of(&self, x: &[f64]) -> Vec<f64> {
         let (n, reach) = (x.len(), self.reach.min(x.len().saturating_sub(1)));
         if n == 0 {
@@ -52,7 +53,7 @@ impl LowPass {
 }
 
 impl Section {
-    /// Forwards, from rest at the first value.
+    /// Forward pass, from the steady state of the first value.
     fn pass(&self, x: &mut [f64]) {
         let Self { b, a } = self;
         let (mut s, first) = ([0.0; 2], x.first().copied().unwrap_or(0.0));
@@ -66,7 +67,7 @@ impl Section {
     }
 }
 
-/// Central differences, one-sided at the ends.
+/// Derivative by central differences, one-sided at the ends.
 pub fn derivative(x: &[f64], step_s: f64) -> Vec<f64> {
     let n = x.len();
     let at = |i: usize| {
@@ -76,7 +77,7 @@ pub fn derivative(x: &[f64], step_s: f64) -> Vec<f64> {
     (0..n).map(at).collect()
 }
 
-/// The signal so much later (s), straight between samples and constant before the first.
+/// Delays a signal by `by_s` (s), linear between samples and constant before the first.
 pub fn delayed(x: &[f64], by_s: f64, step_s: f64) -> Vec<f64> {
     let at = |i: usize| {
         let place = (i as f64 - by_s / step_s).clamp(0.0, (x.len() - 1) as f64);
@@ -86,7 +87,7 @@ pub fn delayed(x: &[f64], by_s: f64, step_s: f64) -> Vec<f64> {
     (0..x.len()).map(at).collect()
 }
 
-/// Root of the mean square; no number of nothing.
+/// Root mean square; NaN if there are no values.
 pub fn rms(x: impl Iterator<Item = f64>) -> f64 {
     let (mut sum, mut n) = (0.0, 0usize);
     for x in x {
@@ -96,7 +97,8 @@ pub fn rms(x: impl Iterator<Item = f64>) -> f64 {
     (sum / n as f64).sqrt()
 }
 
-/// Factors of the columns whose sum is nearest to `y`; columns are scaled to one size first.
+/// Factors of the columns whose sum best approximates `y` in the least-squares sense; columns are
+/// normalised first.
 pub fn least_squares(columns: &[Vec<f64>], y: &[f64]) -> Option<Vec<f64>> {
     let size = |column: &Vec<f64>| column.iter().map(|x| x * x).sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
     let sizes: Vec<f64> = columns.iter().map(size).collect();
@@ -108,7 +110,7 @@ pub fn least_squares(columns: &[Vec<f64>], y: &[f64]) -> Option<Vec<f64>> {
     Some(solved.iter().zip(&sizes).map(|(x, size)| x / size).collect())
 }
 
-/// `y` less the sum of the columns with their factors.
+/// Residual: `y` minus the sum of the columns with their factors.
 pub fn rest(columns: &[Vec<f64>], factors: &[f64], y: &[f64]) -> Vec<f64> {
     let sum = |i: usize| columns.iter().zip(factors).map(|(column, factor)| factor * column[i]).sum::<f64>();
     y.iter().enumerate().map(|(i, y)| y - sum(i)).collect()
@@ -122,8 +124,8 @@ mod tests {
 
     const RATE_HZ: f64 = 250.0;
 
-    /// Truth: Butterworth's gain, `1/(1 + (tan(π f/f_s)/tan(π f_c/f_s))^8)` of both passes, at
-    /// three frequencies, and no phase; measured 1.1e-14.
+    /// Truth: the Butterworth gain of both passes, `1/(1 + (tan(π f/f_s)/tan(π f_c/f_s))^8)`, at
+    /// three frequencies, and zero phase; measured 1.1e-14.
     #[test]
     fn a_wave_keeps_its_phase_and_loses_what_butterworth_says() {
         let low = LowPass::new(10.0, RATE_HZ);

@@ -1,60 +1,60 @@
-//! The strongest line in the spectrum of a vibration, between the bins of the transform.
+//! The strongest spectral line of a vibration, resolved between the bins of the transform.
 //!
-//! The signal is tapered, transformed by a radix-2 FFT of twice its length, and the highest peak is
+//! The signal is tapered and transformed by a radix-2 FFT of twice its length; the highest peak is
 //! refined by golden-section search on the exact transform. 10 s at 1 kHz take a few milliseconds.
 
 use std::f64::consts::{PI, TAU};
 
-/// More samples than this are not transformed.
+/// Maximum number of samples that are transformed.
 const MOST_SAMPLES: usize = 1 << 14;
-/// Fewer than this have no spectrum worth the name.
+/// Minimum number of samples for a spectrum.
 const FEWEST_SAMPLES: usize = 16;
-/// A line must be passed this many times within the record.
+/// Minimum number of cycles of a line within the record.
 const FEWEST_CYCLES: f64 = 1.5;
-/// Power of a line over the lowest power between DC and it.
+/// Minimum ratio of the power of a line to the lowest power between DC and it.
 const PROMINENCE: f64 = 4.0;
 
-/// Steps of the search for the peak: they narrow two bins down to 2e-5 of a bin.
+/// Steps of the peak search: they reduce two bins to 2e-5 of a bin.
 const REFINEMENTS: usize = 24;
 
-/// How the signal is faded in and out before the transform.
+/// Window applied to the signal before the transform.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Taper {
-    /// Full weight at the start, faded out by `cos²`: for a vibration that dies away. A long signal
-    /// is cut off.
+    /// Full weight at the start, fading out by `cos²`: for a decaying vibration. A long signal is
+    /// truncated.
     FadeOut,
-    /// Faded in and out by `sin²` (Hann): for a signal without a special start. A long signal is
-    /// averaged in blocks.
+    /// Fading in and out by `sin²` (Hann): for a signal without a distinguished start. A long
+    /// signal is averaged in blocks.
     Both,
 }
 
-/// A line of a spectrum.
+/// A spectral line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SpectralLine {
     /// Frequency, Hz.
     pub hz: f64,
-    /// Amplitude of the undamped sinusoid that would give this line, in the unit of the signal, all
-    /// components together (root of the sum of squares). Less than the initial amplitude of a
-    /// vibration that dies away.
+    /// Amplitude of the undamped sinusoid with this line, in the unit of the signal, all components
+    /// together (root of the sum of squares). Smaller than the initial amplitude of a decaying
+    /// vibration.
     pub amplitude: f64,
 }
 
-/// The strongest line of a signal with three components, over all components together.
+/// Finds the strongest line of a signal with three components, over all components together.
 ///
-/// * `times`: s, strictly increasing; steps may vary, the signal is interpolated to even ones.
+/// * `times`: s, strictly increasing; the signal is interpolated to uniform steps.
 /// * `signal`: one entry per time, any unit; its weighted mean is removed.
 ///
-/// Returns `None` when there is no line: fewer than 16 samples, nothing that repeats at least one
-/// and a half times and stands out by 6 dB from the spectrum below it, or an amplitude within the
-/// rounding of the signal.
+/// Returns `None` if there is no line: fewer than 16 samples, nothing that repeats at least one and
+/// a half times and exceeds the spectrum below it by 6 dB, or an amplitude within the rounding of
+/// the signal.
 ///
-/// Accuracy, of an undamped sinusoid with `n` cycles in the record: about `0.2 / n²` of the
-/// frequency.
+/// Relative accuracy of the frequency for an undamped sinusoid with `n` cycles in the record: about
+/// `0.2 / n²`.
 pub fn strongest_line(times: &[f64], signal: &[[f64; 3]], taper: Taper) -> Option<SpectralLine> {
     strongest_line_from(times, signal, taper, 0.0)
 }
 
-/// As [`strongest_line`], not below a frequency (Hz).
+/// Like [`strongest_line`], not below a frequency (Hz).
 pub(crate) fn strongest_line_from(
     times: &[f64],
     signal: &[[f64; 3]],
@@ -69,7 +69,7 @@ pub(crate) fn strongest_line_from(
     let power = tapered.power_spectrum(bins);
     let bin_hz = 1.0 / (bins as f64 * tapered.step);
 
-    // Local maxima that have room for enough cycles, away from the Nyquist frequency.
+    // Local maxima with enough cycles, away from the Nyquist frequency.
     let few_cycles = FEWEST_CYCLES / (tapered.samples.len() as f64 * tapered.step);
     let first = (few_cycles.max(lowest_hz) / bin_hz).ceil() as usize;
     let is_peak = |k: &usize| power[*k] >= power[k - 1] && power[*k] > power[k + 1];
@@ -85,24 +85,24 @@ pub(crate) fn strongest_line_from(
     (amplitude > 1e-12 * tapered.scale).then_some(SpectralLine { hz, amplitude })
 }
 
-/// Amplitudes over frequency.
+/// Amplitude spectrum.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct AmplitudeSpectrum {
     /// Frequencies, Hz, evenly spaced from 0.
     pub hz: Vec<f64>,
-    /// Amplitude of the sinusoid that would give this value, per component, in the unit of the
+    /// Amplitude of the sinusoid with this spectral value, per component, in the unit of the
     /// signal.
     pub amplitude: Vec<[f64; 3]>,
 }
 
-/// The spectrum of a signal with three components, faded in and out by `sin²` (Hann), without its
-/// mean.
+/// Computes the spectrum of a signal with three components without its mean, with a Hann window
+/// (`sin²`).
 ///
-/// * `times`: s, strictly increasing; steps may vary, the signal is interpolated to even ones.
+/// * `times`: s, strictly increasing; the signal is interpolated to uniform steps.
 ///
 /// A steady sinusoid of amplitude `a` gives a line of height `a` (1 % less between two
-/// frequencies), a vibration that dies away a lower one; over a time `T` lines are `4/T` wide at
-/// their foot. Returns `None` for fewer than 16 samples.
+/// frequencies), a decaying vibration a lower one; for a duration `T` lines are `4/T` wide at their
+/// base. Returns `None` for fewer than 16 samples.
 pub fn amplitude_spectrum(times: &[f64], signal: &[[f64; 3]]) -> Option<AmplitudeSpectrum> {
     if times.len() < FEWEST_SAMPLES || times.len() != signal.len() {
         return None;
@@ -119,14 +119,14 @@ pub fn amplitude_spectrum(times: &[f64], signal: &[[f64; 3]]) -> Option<Amplitud
     Some(AmplitudeSpectrum { hz: (0..bins / 2).map(|k| k as f64 * bin_hz).collect(), amplitude })
 }
 
-/// A signal at even steps, without its mean, times the taper.
+/// A uniformly sampled signal without its mean, times the window.
 struct Tapered {
     samples: Vec<[f64; 3]>,
-    /// Sampling step, s.
+    /// Sampling interval, s.
     step: f64,
-    /// Sum of the taper's weights.
+    /// Sum of the window weights.
     weight: f64,
-    /// Largest absolute value before the mean was removed.
+    /// Maximum absolute value before the mean was removed.
     scale: f64,
 }
 
@@ -173,8 +173,7 @@ impl Tapered {
         power
     }
 
-    /// Transform of one component, filled up with zeros to as many samples as the [`twiddles`] are
-    /// for.
+    /// Transform of one component, zero-padded to the length of the [`twiddles`].
     fn transform(&self, component: usize, twiddles: &[[f64; 2]]) -> Vec<[f64; 2]> {
         let mut data = vec![[0.0; 2]; 2 * twiddles.len()];
         for (slot, x) in data.iter_mut().zip(&self.samples) {
@@ -200,7 +199,7 @@ impl Tapered {
     }
 }
 
-/// Linear interpolation to as many even steps as there are samples.
+/// Interpolates linearly to equally many uniform steps.
 fn evenly(times: &[f64], signal: &[[f64; 3]]) -> (Vec<[f64; 3]>, f64) {
     let last = times.len() - 1;
     let step = (times[last] - times[0]) / last as f64;
@@ -229,8 +228,8 @@ fn twiddles(n: usize) -> Vec<[f64; 2]> {
     (0..n / 2).map(at).collect()
 }
 
-/// Radix-2 transform in place, decimation in time; the length is a power of two, `twiddles` are
-/// those for it.
+/// In-place radix-2 transform, decimation in time; the length is a power of two, with `twiddles`
+/// for that length.
 fn fft(data: &mut [[f64; 2]], twiddles: &[[f64; 2]]) {
     let n = data.len();
     // Bit reversal, then butterflies of growing span.
@@ -257,8 +256,8 @@ fn fft(data: &mut [[f64; 2]], twiddles: &[[f64; 2]]) {
     }
 }
 
-/// Place of the maximum of a function with one peak in the interval, by golden-section search in so
-/// many steps, each of which leaves 0.618 of the interval.
+/// Finds the maximum of a function with one peak in the interval, by golden-section search; each
+/// step reduces the interval by the factor 0.618.
 pub(crate) fn golden_maximum(f: impl Fn(f64) -> f64, mut low: f64, mut high: f64, steps: usize) -> f64 {
     const GOLDEN: f64 = 0.618_033_988_749_894_9;
     let (mut left, mut right) = (high - GOLDEN * (high - low), low + GOLDEN * (high - low));
@@ -285,7 +284,7 @@ mod tests {
         (0..n).map(|k| f64::from(k) / rate).collect()
     }
 
-    /// Second algorithm: the sum of the definition.
+    /// Second algorithm: the sum in the definition.
     #[test]
     fn fast_transform_equals_the_plain_sum() {
         let samples: Vec<[f64; 3]> = (0..50).map(|k| [f64::from(k * k % 17), f64::from(k % 5), 0.0]).collect();
@@ -310,7 +309,7 @@ mod tests {
         }
     }
 
-    /// Truth: the amplitudes that the signal was made with.
+    /// Truth: the amplitudes in the signal.
     #[test]
     fn a_spectrum_has_lines_as_high_as_the_sinusoids_in_the_signal() {
         let t = times(4000, 1000.0);

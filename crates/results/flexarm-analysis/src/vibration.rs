@@ -1,22 +1,23 @@
-//! Vibration that a motion leaves behind in each mode of the structure at its end.
+//! Residual vibration of a motion in each mode of the structure at its end.
 //!
 //! ```text
 //! x(t) = 2 Re Σ φ (φᵀ f) / (2 λ φᵀMφ + φᵀDφ) e^(λ (t-T)),     f = -(λ² M_a + λ D_a + K_a) / λ² ∫ q̈ e^(λ (T-τ)) dτ
 //! ```
-//! about the equilibrium at the end T, where the commands q rest. The structure is that of the end
-//! throughout: what a motion does long before has died away.
+//! about the equilibrium at the end T, where the commands q are at rest. The structure at the end
+//! is used throughout: earlier excitation has decayed.
 
 use nalgebra::{Complex, DMatrix, DVector};
 
 use crate::damped_modes::DampedMode;
 use crate::inversion::Node;
 
-/// Size of the tool's oscillation (m) that commands leave in a mode as they come to rest.
+/// Computes the amplitude of the TCP oscillation (m) that commands leave in a mode when they come
+/// to rest.
 ///
-/// * `node`: the structure at the end, controllers in its matrices; the first three components of
-///   its tool are the position.
+/// * `node`: the structure at the end, with the controllers in its matrices; the first three TCP
+///   components are the position.
 /// * `accelerations`: of the commands, m×N, `step_s` apart, the last at the end.
-/// * `detuned`: factor on the eigenvalue in the motion's spectrum, 1 for the mode as it is.
+/// * `detuned`: factor on the eigenvalue in the spectrum of the motion, 1 for the nominal mode.
 pub fn vibration_left(node: &Node, mode: &DampedMode, accelerations: &DMatrix<f64>, step_s: f64, detuned: f64) -> f64 {
     let (lambda, phi) = (mode.eigenvalue, &mode.shape);
     let last = accelerations.ncols().saturating_sub(1);
@@ -40,15 +41,15 @@ mod tests {
     use crate::damped_modes::damped_modes;
     use nalgebra::dmatrix;
 
-    /// Truth: `4 a sin²(ω τ/2) / ω²` behind an acceleration a over τ and -a over τ, of a mass that
-    /// is carried along and of one that is pulled by its spring; a fiftieth of damping takes as
-    /// much away as the exact integral says.
+    /// Truth: `4 a sin²(ω τ/2) / ω²` after an acceleration a over τ and -a over τ, for a mass
+    /// excited by inertia and one pulled by its spring; with two per cent of damping the reduction
+    /// is that of the exact integral.
     #[test]
     fn a_mass_on_a_spring_swings_behind_a_motion_as_its_closed_form_says() {
         let (omega, a, tau, h) = (40.0, 2.0, 0.05, 1e-5);
         let half = (tau / h) as usize;
         let pulse = DMatrix::from_fn(1, 2 * half, |_, k| if k < half { a } else { -a });
-        // Beside it a mass that the motion does not move.
+        // Beside it, a mass that the motion does not excite.
         let J = dmatrix![1.0, 0.0; 0.0, 0.0; 0.0, 0.0];
         let (zero, one) = (DMatrix::zeros(2, 2), DMatrix::identity(2, 2));
         let stiffness = omega * omega;

@@ -1,4 +1,4 @@
-//! Metrics of signals whose figures are known in closed form.
+//! Metrics of signals with closed-form figures.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
 use std::f64::consts::{PI, TAU};
@@ -23,18 +23,18 @@ impl Ringing {
         TAU * self.hz * self.damping_ratio / (1.0 - self.damping_ratio.powi(2)).sqrt()
     }
 
-    /// Excursion from the final value, `tau` after the end of the move.
+    /// Deviation from the final value at `tau` after the end of the move.
     fn excursion(&self, tau: f64) -> f64 {
         self.amplitude * (-self.decay() * tau).exp() * (TAU * self.hz * tau).sin()
     }
 
-    /// First maximum of the excursion, at tan(ω t) = ω / decay.
+    /// First maximum of the deviation, at tan(ω t) = ω / decay.
     fn first_swing(&self) -> f64 {
         let omega = TAU * self.hz;
         self.excursion((omega / self.decay()).atan() / omega)
     }
 
-    /// Last time at which the excursion leaves the band: the last extremum outside it, then
+    /// Last time at which the deviation leaves the band: the last extremum outside it, then
     /// bisection.
     fn settling(&self, band: f64) -> f64 {
         let omega = TAU * self.hz;
@@ -88,7 +88,7 @@ fn a_damped_oscillation_gives_its_frequency_settling_time_and_overshoot() {
         let metrics = ringing.metrics(&even(1000.0), quasi_static);
         assert!((metrics.dominant_hz.unwrap() / 11.3 - 1.0).abs() < 1e-2); // measured 6.0e-4
         assert!((metrics.settling_s.unwrap() - ringing.settling(1e-4)).abs() < 1e-3); // measured 3.8e-5
-        assert!((metrics.overshoot_m / ringing.first_swing() - 1.0).abs() < 1e-2); // measured 2.2e-4: the top between two samples
+        assert!((metrics.overshoot_m / ringing.first_swing() - 1.0).abs() < 1e-2); // measured 2.2e-4: the peak is between two samples
         let swing = ringing.first_swing();
         assert!((metrics.peak_m / swing.hypot(5e-4) - 1.0).abs() < 1e-2);
         assert!((metrics.static_sag_m - 5e-4).abs() < 1e-15 && (metrics.end_m - 5e-4).abs() < 1e-6);
@@ -128,7 +128,7 @@ fn rms_of_a_sine_is_its_amplitude_over_root_two() {
 fn an_oscillation_that_does_not_die_away_never_settles() {
     let ringing = Ringing { amplitude: 1e-3, hz: 9.0, damping_ratio: 1e-9, sag: 0.0 };
     assert_eq!(ringing.metrics(&even(1000.0), false).settling_s, None);
-    // Nor does one whose last swing ends within the last period of the record.
+    // Nor does one whose last oscillation ends within the last period of the record.
     let decay = (10.0_f64).ln() / 3.95;
     let damping_ratio = decay / (TAU * 9.0);
     let ringing = Ringing { damping_ratio, ..ringing };
@@ -153,8 +153,8 @@ fn a_record_that_ends_with_its_move_has_no_settling_time() {
 #[test]
 fn each_move_has_a_hold_of_its_own() {
     let times = even(1000.0);
-    // Rings at 8 Hz after the first move (along +x), at 16 Hz and half as much after the second
-    // (along -x).
+    // Rings at 8 Hz after the first move (along +x), at 16 Hz with half the amplitude after the
+    // second one (along -x).
     let ring = |tau: f64, hz: f64| (-6.0 * tau).exp() * (TAU * hz * tau).sin();
     let error = |t: f64| match t {
         t if (1.0..2.5).contains(&t) => 1e-3 * ring(t - 1.0, 8.0),
@@ -173,7 +173,7 @@ fn each_move_has_a_hold_of_its_own() {
     assert!((hz[0] - 8.0).abs() < 0.1 && (hz[1] - 16.0).abs() < 0.1, "{hz:?}");
     assert_eq!(metrics.dominant_hz, Some(hz[0]));
     assert!(metrics.holds[0].overshoot_m > 8e-4 && metrics.holds[1].overshoot_m > 4e-4); // both past the goal
-    // The first takes longer and counts.
+    // The first takes longer and determines the result.
     assert_eq!(metrics.settling_s, metrics.holds[0].settling_s);
     assert!(metrics.holds[1].settling_s < metrics.holds[0].settling_s);
 }
@@ -212,8 +212,8 @@ proptest! {
         let ringing = Ringing { amplitude, hz, damping_ratio, sag };
         let metrics = ringing.metrics(&even(1000.0), false);
         prop_assert!((metrics.dominant_hz.unwrap() / hz - 1.0).abs() < 0.02); // measured 3.7e-3
-        // A half swing that just leaves the band moves settling by half a period, and with 17
-        // samples per period its top may lie 1.7 % above the next sample.
+        // A half oscillation that just leaves the band changes the settling time by half a period,
+        // and with 17 samples per period its peak may be 1.7 % above the nearest sample.
         let (early, late) = (ringing.settling(1.03e-4), ringing.settling(0.99e-4));
         match metrics.settling_s {
             Some(found) => prop_assert!(found >= early - 1e-3 && found <= late + 1e-3, "{early} <= {found} <= {late}"),
@@ -221,7 +221,7 @@ proptest! {
         }
     }
 
-    /// The figures are finite and ordered whatever the record.
+    /// The figures are finite and ordered for any record.
     #[test]
     fn peaks_bound_the_other_figures(
         rows in prop::collection::vec((1e-4..0.1_f64, prop::array::uniform6(-1.0..1.0_f64)), 1..80),
@@ -243,8 +243,8 @@ proptest! {
     }
 }
 
-/// Truth: the record is made with 0.3 mm beside the path in motion and 0.9 mm at rest, and any lag
-/// along the path.
+/// Truth: the record has a distance of 0.3 mm from the path in motion and 0.9 mm at rest, and an
+/// arbitrary lag along the path.
 #[test]
 fn path_accuracy_is_the_distance_from_the_path_in_motion() {
     let times = even(1000.0);
@@ -262,7 +262,7 @@ fn path_accuracy_is_the_distance_from_the_path_in_motion() {
     assert_eq!((still.path_accuracy_m, still.path_rms_m), (0.0, 0.0));
 }
 
-/// A circle in the horizontal plane, from rest to rest, with a sag that stays the same.
+/// A circle in the horizontal plane, from rest to rest, with constant sag.
 fn circle_with_sag(seconds: f64) -> (Vec<f64>, Vec<[f64; 6]>, Vec<[f64; 3]>) {
     let times: Vec<f64> = (0..=1000).map(|k| seconds * f64::from(k) / 1000.0).collect();
     let place = |t: &f64| {
@@ -274,7 +274,7 @@ fn circle_with_sag(seconds: f64) -> (Vec<f64>, Vec<[f64; 6]>, Vec<[f64; 3]>) {
     (times, errors, rigid)
 }
 
-/// Truth: the sag is along the axis of the circle, at its slow beginning too.
+/// Truth: the sag is along the axis of the circle, also at its slow beginning.
 #[test]
 fn a_sag_out_of_the_plane_of_a_circle_is_not_normal_to_it() {
     for seconds in [1.0, 60.0] {
@@ -307,8 +307,8 @@ fn given_parts_along_the_path_take_the_place_of_computed_ones() {
     assert_eq!(fault, RecordError::NotFinite { what: "path_errors", index: 3 });
 }
 
-/// Truth: the frequency that the signal was made with. The stop is shorter than a period, and the
-/// error that the motion itself causes is ten times the ringing on it.
+/// Truth: the frequency in the signal. The stop is shorter than a period, and the error due to the
+/// motion itself is ten times the ringing.
 #[test]
 fn ringing_within_a_move_is_found_where_the_stop_is_too_short_to_show_it() {
     let times: Vec<f64> = (0..=425).map(|k| 2e-3 * f64::from(k)).collect();

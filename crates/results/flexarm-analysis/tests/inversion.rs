@@ -1,5 +1,5 @@
-//! Commands for the reference arm in motion against its linear equations of motion integrated
-//! forwards.
+//! Commands for the reference arm in motion, compared with forward integration of its linear
+//! equations of motion.
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 #![allow(clippy::expect_used, clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 #![allow(non_snake_case, reason = "monogram notation")]
@@ -23,7 +23,7 @@ fn arm() -> (FlexibleArm, Frame) {
     (FlexibleArm::new(model, springs, Arc::new(Held(POSE.to_vec()))).expect("valid"), tool)
 }
 
-/// Truth: forward integration of the linear equations by the trapezoidal rule .
+/// Truth: forward integration of the linear equations by the trapezoidal rule.
 #[test]
 fn commands_by_the_series_of_the_inverse_move_the_tool_as_asked_at_a_third_of_the_first_frequency() {
     let (arm, tool) = arm();
@@ -43,7 +43,7 @@ fn commands_by_the_series_of_the_inverse_move_the_tool_as_asked_at_a_third_of_th
     let hz = arm.modes.frequencies_hz()[0];
     let (length, h) = (3.0, 2.5e-4);
     let N = (length / h) as usize + 1;
-    // A smooth bump with vibration in it, at rest at both ends.
+    // A smooth bump with vibration, at rest at both ends.
     let wave = |t: f64| {
         let s: f64 = (t / length * std::f64::consts::PI).sin();
         s.powi(8) * (std::f64::consts::TAU * hz / 3.0 * t).cos()
@@ -54,11 +54,11 @@ fn commands_by_the_series_of_the_inverse_move_the_tool_as_asked_at_a_third_of_th
     let u = inversion.commands(&y, h);
     let shown = forwards(&node, &u, h);
     let error = (&shown - &y).amax() / y.amax();
-    // What one use leaves is asked for again.
+    // The residual of one application is corrected by a second one.
     let more = inversion.commands(&(&y - &shown), h);
     let twice = &u + more;
     let twice = (forwards(&node, &twice, h) - &y).amax() / y.amax();
-    // At rest the same commands would leave out the inertia.
+    // A static inverse would omit the inertia.
     let G = &node.J_a - &node.J * node.K.clone().lu().solve(&node.K_a).unwrap();
     let rest = G.try_inverse().unwrap() * &y;
     let as_at_rest = (forwards(&node, &rest, h) - &y).amax() / y.amax();
@@ -66,15 +66,15 @@ fn commands_by_the_series_of_the_inverse_move_the_tool_as_asked_at_a_third_of_th
     eprintln!(
         "first frequency {hz:.2} Hz, cutoff {cutoff:.1}; left {error:.1e}, {twice:.1e}, with commands as at rest {as_at_rest:.1e}"
     );
-    // The arm with its tool held has its first frequency at 25 Hz.
+    // The arm with its TCP held has its first frequency at 25 Hz.
     assert!((1.2 * hz..25.0).contains(&cutoff), "{cutoff}");
     assert!(error < 1e-2 && twice < 0.1 * error, "{error:e} {twice:e}");
     assert!(as_at_rest > 10.0 * error);
 }
 
-/// Truth: forward integration of the closed loop, which `linearise` makes by itself of the same
-/// servos; two joints follow their commands at once, two of the others have nothing fed forward.
-/// Without integral, so that the loop is of second order.
+/// Truth: forward integration of the closed loop, which `linearise` derives independently from the
+/// same servos; two joints follow their commands exactly, two of the others have no feed-forward.
+/// Without integrators, so that the loop is of second order.
 #[test]
 fn commands_of_servos_move_the_tool_as_asked_far_above_their_position_gains() {
     let (arm, tool) = arm();
@@ -117,7 +117,7 @@ fn commands_of_servos_move_the_tool_as_asked_far_above_their_position_gains() {
     let error = (&shown - &y).amax() / y.amax();
     let twice = &u + inversion.commands(&(&y - &shown), h);
     let twice = (forwards(&closed, &twice, h) - &y).amax() / y.amax();
-    // The series of the closed loop itself, slow as its position gain.
+    // The series of the closed loop itself, as slow as its position gain.
     let slow = Inversion::new(&[closed.clone(), closed.clone()], length).unwrap();
     eprintln!(
         "cutoff {:.1} Hz, of the closed loop {:.1} Hz; left {error:.1e}, {twice:.1e}",
@@ -128,7 +128,7 @@ fn commands_of_servos_move_the_tool_as_asked_far_above_their_position_gains() {
     assert!(error < 2e-2 && twice < 0.1 * error, "{error:e} {twice:e}");
 }
 
-/// The tool under commands: the trapezoidal rule, rates by central differences.
+/// TCP motion under commands: trapezoidal rule, rates by central differences.
 fn forwards(node: &Node, u: &DMatrix<f64>, h: f64) -> DMatrix<f64> {
     let (n, N) = (node.M.nrows(), u.ncols());
     let at = |k: i64| u.column(k.clamp(0, N as i64 - 1) as usize);

@@ -1,5 +1,5 @@
-//! Linear structures against closed forms: oscillators, chains of masses, rigid motions, resonance
-//! peaks.
+//! Linear structures compared with closed forms: oscillators, chains of masses, rigid motions,
+//! resonance peaks.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 #![allow(non_snake_case, reason = "M, D, K as everywhere in mechanics")]
@@ -75,8 +75,9 @@ fn a_chain_of_masses_has_the_frequencies_and_ratios_of_the_textbook() {
     }
 }
 
-/// Truth: two masses with one damper, whose quartic `λ⁴ + ...` is evaluated at what was found; and
-/// the trace of the first-order matrix. The damping is far from proportional. Measured 4e-15.
+/// Truth: two masses with one damper, whose quartic `λ⁴ + ...` is evaluated at the eigenvalues
+/// found; and the trace of the first-order matrix. The damping is far from proportional. Measured
+/// 4e-15.
 #[test]
 fn two_masses_with_one_damper_solve_their_quartic() {
     let (m_1, m_2, k_1, k_2, d) = (2.0, 0.5, 800.0, 300.0, 9.0);
@@ -91,7 +92,7 @@ fn two_masses_with_one_damper_solve_their_quartic() {
         eprintln!("quartic {:.1e} {:.1e}", quartic.norm() / ((k_1 + k_2) * k_2), mode.residual);
         assert!(quartic.norm() < 1e-11 * (k_1 + k_2) * k_2, "{quartic}");
         assert!(mode.residual < 1e-13);
-        // Shape by the first row.
+        // Shape from the first row.
         let ratio = (l * l * m_1 + (k_1 + k_2)) / k_2;
         assert!((mode.shape[1] / mode.shape[0] - ratio).norm() < 1e-12 * ratio.norm());
     }
@@ -100,8 +101,7 @@ fn two_masses_with_one_damper_solve_their_quartic() {
 }
 
 /// Truth: two masses on a spring, free in space: one rigid motion, `ω² = k (1/m_1 + 1/m_2)`. With a
-/// damper to the ground on a mass alone: `0` and `-d/m`. An inverted pendulum falls with
-/// `sqrt(g/l)`.
+/// single mass damped to the ground: `0` and `-d/m`. An inverted pendulum falls with `sqrt(g/l)`.
 #[test]
 fn rigid_motions_and_falling_are_modes_too() {
     let K = dmatrix![500.0, -500.0; -500.0, 500.0];
@@ -124,7 +124,7 @@ fn rigid_motions_and_falling_are_modes_too() {
     assert!(falling.iter().any(|mode| mode.damping_ratio() == -1.0));
 }
 
-/// Two equal oscillators: any pair of shapes will do if both satisfy the equation and span the
+/// Two equal oscillators: any pair of shapes is valid if both satisfy the equation and span the
 /// space.
 #[test]
 fn equal_frequencies_have_two_shapes() {
@@ -139,7 +139,7 @@ fn equal_frequencies_have_two_shapes() {
     assert!(modes.iter().all(|mode| mode.residual < 1e-13));
 }
 
-/// Low modes beside very stiff ones keep their digits: 1 Hz beside 100 kHz. Measured 3e-15.
+/// Low modes stay accurate next to very stiff ones: 1 Hz next to 100 kHz. Measured 3e-15.
 #[test]
 fn a_low_mode_beside_a_stiff_one_keeps_its_digits() {
     let (low, high) = (TAU, TAU * 1e5);
@@ -156,7 +156,7 @@ fn a_low_mode_beside_a_stiff_one_keeps_its_digits() {
 }
 
 /// Truth: at `ω sqrt(1 - 2ζ²)` the amplitude is `1 / (2 ζ k sqrt(1 - ζ²))`; static `1/k`; phase
-/// -90° at ω. Measured 2e-16 in height and 3e-9 in place.
+/// -90° at ω. Measured 2e-16 in magnitude and 3e-9 in frequency.
 #[test]
 fn an_oscillator_resonates_as_the_closed_form_says() {
     let (m, omega) = (1.7, TAU * 12.5);
@@ -181,8 +181,8 @@ fn an_oscillator_resonates_as_the_closed_form_says() {
     }
 }
 
-/// Truth: the closed form `1/|k - ω²m + iωd|` at places between the points; with two modes the
-/// difference of two such.
+/// Truth: the closed form `1/|k - ω²m + iωd|` between the points; with two modes the difference of
+/// two such terms.
 #[test]
 fn a_resolved_response_is_the_curve_and_not_a_chord_of_it() {
     let mode = |f: f64, zeta: f64, hz: f64| {
@@ -190,7 +190,8 @@ fn a_resolved_response_is_the_curve_and_not_a_chord_of_it() {
         nalgebra::Complex::new(1.0 - r * r, 2.0 * zeta * r).inv()
     };
     for zeta in [1e-3, 0.03] {
-        // The second mode with the other sign: no dip between them, one above both.
+        // The second mode with the opposite sign: without an antiresonance between them, but with
+        // one above both.
         let exact = |hz: f64| mode(12.5, zeta, hz) - mode(40.0, zeta, hz) * 0.2;
         let coarse =
             with_resonances(&frequency_grid(1.0, 200.0, 60, Spacing::Logarithmic), &[(12.5, zeta), (40.0, zeta)]);
@@ -213,7 +214,7 @@ fn a_resolved_response_is_the_curve_and_not_a_chord_of_it() {
     }
 }
 
-/// Truth: the undamped tuned-mass absorber holds the main mass still at `sqrt(k_2/m_2)`.
+/// Truth: the undamped tuned-mass absorber keeps the main mass at rest at `sqrt(k_2/m_2)`.
 #[test]
 fn an_absorber_stills_the_main_mass() {
     let (k_2, m_2) = (200.0, 0.5);
@@ -226,9 +227,9 @@ fn an_absorber_stills_the_main_mass() {
     assert_eq!(alone.response(1.0), Err(LinearError::Resonance { omega: 1.0 }));
 }
 
-/// Truth: a mass on a spring and damper whose foot moves: transmissibility
-/// `(k + iωd) / (k + iωd - ω²m)`, whether the coordinate is absolute (force by rate of the foot) or
-/// relative to the foot (inertia by its acceleration, and F).
+/// Truth: a mass on a spring and damper with a moving base: transmissibility
+/// `(k + iωd) / (k + iωd - ω²m)`, with an absolute coordinate (force by rate of the base) or one
+/// relative to the base (inertia by its acceleration, and F).
 #[test]
 fn a_moving_foot_is_force_or_inertia_alike() {
     let (m, d, k) = (1.3, 4.0, 900.0);
@@ -283,9 +284,9 @@ fn positive_definite(n: usize) -> impl Strategy<Value = DMatrix<f64>> {
 }
 
 proptest! {
-    /// Any damping: every mode satisfies its equation, the parts of the compliance add up to
-    /// `C K^-1 Cᵀ`, the sum of the eigenvalues is the trace of `-M^-1 D`, and shares of energy add
-    /// up to one.
+    /// For any damping: every mode satisfies its equation, the shares of the compliance add up to
+    /// `C K^-1 Cᵀ`, the sum of the eigenvalues is the trace of `-M^-1 D`, and energy shares add up
+    /// to one.
     #[test]
     fn modes_of_any_structure_hold_together(M in positive_definite(5), D in positive_definite(5), K in positive_definite(5), size in 0.01..3.0_f64) {
         let (D, K) = (D * size, K * 100.0);

@@ -1,12 +1,12 @@
-//! Pictures of the arm at one instant: bent more than it is, coloured by how far it is from its
-//! rigid twin.
+//! Pictures of the arm at one instant, with magnified deflections, coloured by the deviation from
+//! its rigid twin.
 //!
 //! The rigid twin is light grey with an outline, the flexible arm is magnified by
 //! [`RunHeader::magnification`]; colours show the true deviation, from 0 to
-//! [`RunHeader::color_scale_m`]. An arrow leads from the rigid tool centre point to the magnified
-//! one. Links without surfaces are drawn as rods. Start at [`arm_pictures`] for pages, which say
-//! beside the picture what is in it, and at [`arm_png`] for a picture that says so itself;
-//! [`arm_sheet`] has both sides beside each other under a heading.
+//! [`RunHeader::color_scale_m`]. An arrow points from the rigid TCP to the magnified one. Links
+//! without surfaces are drawn as rods. Start at [`arm_pictures`] for pages that explain the picture
+//! in their text, and at [`arm_png`] for a self-explanatory picture; [`arm_sheet`] shows both sides
+//! next to each other under a heading.
 
 use flexarm_spatial::Pose;
 use nalgebra::{Matrix2x3, Matrix3, Point3, SymmetricEigen, Vector3};
@@ -20,40 +20,41 @@ use flexarm_sample::{BendInfo, LinkMesh, RunHeader, Sample, TwinSample};
 
 /// Width of a picture at which lines and text have their nominal size (pixels).
 const NOMINAL_WIDTH: f64 = 900.0;
-/// Colours of the rigid twin, and how much of them is left.
+/// Colour of the rigid twin.
 const GHOST: Rgb = [196, 202, 212];
-/// How far the ghost fades into the paper.
+/// Transparency of the rigid twin.
 const GHOST_FADE: f64 = 0.35;
 /// Outline of the rigid twin where the flexible arm covers it.
 const GHOST_LINE: Rgb = [70, 78, 92];
-/// The arrow at the tool: vermilion, on no place of the scale.
+/// Colour of the arrow at the TCP: vermilion, which is not on the colour scale.
 const ARROW: Rgb = [213, 60, 0];
-/// Radius of rods that stand for links, as a share of the size of the arm.
+/// Radius of the rods drawn for links, as a share of the size of the arm.
 const ROD: f64 = 0.012;
-/// Where on the scale of [`color::magnitude`] zero lies: shade is not seen on its darkest colours.
+/// Position of zero on the scale of [`color::magnitude`]: shading is not visible on its darkest
+/// colours.
 const LOWEST: f64 = 0.16;
 /// Sides of a rod.
 const ROD_SIDES: u32 = 10;
 
-/// Why there is no picture of an arm.
+/// Reason why there is no picture of an arm.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ArmPictureError {
-    /// Nothing to compare with.
+    /// A run without a rigid twin to compare with.
     #[error("no picture of the arm: the run has no rigid twin")]
     NoTwin,
-    /// The sample does not belong to the header, or none was taken.
+    /// The sample does not match the header, or there is none.
     #[error("no picture of the arm: the sample has {found} links, the header {expected}")]
     Links {
-        /// Links of the sample.
+        /// Number of links in the sample.
         found: usize,
-        /// Links of the header.
+        /// Number of links in the header.
         expected: usize,
     },
     /// A diverged run.
     #[error("no picture of the arm: its places are not finite")]
     NotFinite,
-    /// Neither surfaces nor distances between joints.
+    /// An arm with neither surfaces nor distances between joints.
     #[error("no picture of the arm: it has no extent")]
     Nothing,
     /// The image does not fit into its file format.
@@ -61,26 +62,27 @@ pub enum ArmPictureError {
     Encode(String),
 }
 
-/// From where the arm is seen.
+/// Direction of view.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ArmSide {
-    /// Across the vertical plane through base and tool.
+    /// Perpendicular to the vertical plane through base and tool.
     Side,
     /// From the front, the side and above.
     Oblique,
 }
 
-/// A picture of the arm that says nothing about itself.
+/// A picture of the arm without legend.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ArmPicture {
-    /// A PNG file, see-through where there is no arm: it stands on light and on dark ground.
+    /// A PNG file, transparent where there is no arm, for light and dark backgrounds.
     pub png: Vec<u8>,
-    /// Where the axes x, y and z of the world point in it: right and up, as parts of their length.
+    /// Directions of the world axes x, y and z in the picture: right and up, as fractions of their
+    /// length.
     pub axes: [[f64; 2]; 3],
 }
 
-/// Rigid twin and magnified flexible arm from several sides, for a page that explains them: no
-/// scale, no axes, no ground.
+/// Draws the rigid twin and the magnified flexible arm from several sides, for a page that explains
+/// them: without scale, axes and background.
 ///
 /// * `size`: width and height, pixels.
 ///
@@ -98,8 +100,8 @@ pub fn arm_pictures(
     sides.par_iter().map(|side| stage.picture(*side, size)).collect()
 }
 
-/// The arm as a PNG picture on white with a scale of its colours: rigid twin and magnified flexible
-/// arm.
+/// Draws the rigid twin and the magnified flexible arm as a PNG picture on white, with a colour
+/// scale.
 ///
 /// * `size`: width and height, pixels.
 ///
@@ -117,12 +119,13 @@ pub fn arm_png(
     image.to_png().map_err(ArmPictureError::Encode)
 }
 
-/// The arm from both sides on one sheet (PNG), under lines of text, the first of which is the
+/// Draws the arm from both sides on one sheet (PNG), under lines of text, the first of which is the
 /// heading.
 ///
 /// * `width`: pixels.
-/// * `compliance`: displacement of the tool per force, world axes (m/N). Drawn at the tool as an
-///   ellipsoid: all places to which one force of any direction moves it, with its principal axes.
+/// * `compliance`: TCP displacement per force, world axes (m/N). It is drawn at the TCP as an
+///   ellipsoid: the displacements under a force of constant magnitude in all directions, with its
+///   principal axes.
 ///
 /// # Errors
 /// [`ArmPictureError`].
@@ -156,16 +159,16 @@ pub fn arm_sheet(
 /// Surfaces of both arms at one instant.
 struct Stage {
     rigid: Skin,
-    /// Magnified.
+    /// Surface of the magnified arm.
     shown: Skin,
-    /// Of each corner, where on the scale it is.
+    /// Position on the scale, per corner.
     values: Vec<f64>,
     rigid_twin: TwinSample,
     factor: f64,
-    /// Tool centre point of the rigid arm and of the magnified one (m).
+    /// TCP of the rigid arm and of the magnified one (m).
     tool: Vector3<f64>,
     moved: Vector3<f64>,
-    /// Largest distance of a link from the base (m).
+    /// Maximum distance of a link from the base (m).
     size: f64,
 }
 
@@ -193,7 +196,7 @@ impl Stage {
         Ok(Self { rigid, shown, values, rigid_twin: sample.rigid.clone(), factor, tool, moved, size })
     }
 
-    /// From a side, with everything within the margins beside and below (pixels).
+    /// View from a side that fits everything within the margins at the sides and below (pixels).
     fn view(
         &self,
         side: ArmSide,
@@ -236,7 +239,7 @@ impl Stage {
         ghost.outline().for_each(|(x, y, share)| image.blend(x, y, GHOST_LINE, 0.8 * share));
     }
 
-    /// On white, with everything that is to be known.
+    /// Draws the picture on white with legend.
     fn explained(&self, side: ArmSide, size: [usize; 2], header: &RunHeader, around: Option<&Ellipsoid>) -> Image {
         let unit = size[0] as f64 / NOMINAL_WIDTH;
         let view = self.view(side, size, [26.0 * unit, 78.0 * unit], around);
@@ -269,22 +272,22 @@ fn check(header: &RunHeader, sample: &Sample) -> Result<(), ArmPictureError> {
     Ok(())
 }
 
-/// Places to which one force of any direction moves the tool.
+/// Displacements of the TCP under a force of constant magnitude in all directions.
 struct Ellipsoid {
-    /// From the direction of the force to the drawn displacement (m).
+    /// Map from the direction of the force to the drawn displacement (m).
     map: Matrix3<f64>,
     /// Principal axes: drawn displacement (m), compliance (m/N).
     axes: [(Vector3<f64>, f64); 3],
 }
 
-/// Length of its longest half axis, as a share of the size of the arm.
+/// Length of the longest half axis, as a share of the size of the arm.
 const ELLIPSOID: f64 = 0.13;
-/// Pieces of its outline.
+/// Number of segments of the outline.
 const OUTLINE_PIECES: usize = 96;
 const ELLIPSOID_COLOR: Rgb = [126, 46, 132];
 
 impl Ellipsoid {
-    /// None for an arm that does not yield.
+    /// `None` for a rigid arm.
     fn new(C: &Matrix3<f64>, size: f64) -> Option<Self> {
         let eigen = SymmetricEigen::new(0.5 * (C + C.transpose()));
         let largest = eigen.eigenvalues.amax();
@@ -299,19 +302,20 @@ impl Ellipsoid {
         Some(Self { map: scale * C, axes })
     }
 
-    /// Ends of its axes about a place.
+    /// Ends of the axes about a position.
     fn corners(&self, at: &Vector3<f64>) -> Vec<Vector3<f64>> {
         self.axes.iter().flat_map(|(axis, _)| [at + axis, at - axis]).collect()
     }
 
-    /// Its outline, which is an ellipse, and its axes with their values.
+    /// Draws the outline, which is an ellipse, and the axes with their values.
     fn draw(&self, image: &mut Image, view: &View, unit: f64, at: &Vector3<f64>) {
         let point = |p: &Vector3<f64>| {
             let [x, y, _] = view.project(p);
             [x, y]
         };
-        // The outline is where the two directions of the page move by unit forces: with P onto the
-        // page, P C Cᵀ Pᵀ has its half axes as eigenvectors, their squares as eigenvalues.
+        // The outline is the image of unit forces in the picture plane: with P the projection onto
+        // the plane, its half axes are the eigenvectors of P C Cᵀ Pᵀ, their squared lengths the
+        // eigenvalues.
         let P = Matrix2x3::from_rows(&[view.right.transpose(), view.up.transpose()]);
         let A = P * self.map;
         let eigen = SymmetricEigen::new(A * A.transpose());
@@ -327,13 +331,13 @@ impl Ellipsoid {
             let ends = [at - axis, at + axis].map(|p| point(&p));
             image.line(ends[0], ends[1], 1.4 * unit, ELLIPSOID_COLOR, 0.8);
             let length = (ends[1][0] - ends[0][0]).hypot(ends[1][1] - ends[0][1]);
-            // Of an axis that points at the viewer there is nothing to name.
+            // An axis that points at the viewer has no label.
             if length > 44.0 * unit {
                 let right = usize::from(ends[1][0] > ends[0][0]);
                 let [x, y] = ends[right];
                 let style = Style::new(14.0 * unit, ELLIPSOID_COLOR).bold().halo(color::PAPER);
                 let text = format!("{} µm/N", short(1e6 * value));
-                // Within the picture, whatever is at its border.
+                // Keep the text within the picture.
                 let most = image.width as f64 - text_width(&text, style) - 6.0 * unit;
                 image.text(&text, [(x + 5.0 * unit).min(most), y - 6.0 * unit], Align::Left, style);
             }
@@ -341,25 +345,25 @@ impl Ellipsoid {
     }
 }
 
-/// Colour on the arm of a share of the largest deviation on the scale.
+/// Returns the colour on the arm for a share of the maximum deviation on the scale.
 #[must_use]
 pub fn arm_color(share: f64) -> Rgb {
     color::magnitude(on_scale(share.clamp(0.0, 1.0)))
 }
 
-/// Place on the scale of colours of a share of the largest deviation.
+/// Position on the colour scale for a share of the maximum deviation.
 fn on_scale(share: f64) -> f64 {
     LOWEST + (1.0 - LOWEST) * share
 }
 
-/// A surface that goes with a link, bent with it if the link bends.
+/// A surface attached to a link, deformed with it if the link is flexible.
 struct Body {
     link: usize,
     bent: Option<(BentMesh, usize, usize)>,
     mesh: LinkMesh,
 }
 
-/// Surfaces of the arm, cut where they bend; rods if there are none.
+/// Returns the surfaces of the arm, cut for deformation; rods if there are none.
 fn bodies(header: &RunHeader, sample: &Sample) -> Vec<Body> {
     let mut meshes = header.meshes.clone();
     let size = reach(&sample.rigid);
@@ -389,14 +393,14 @@ fn bodies(header: &RunHeader, sample: &Sample) -> Vec<Body> {
     meshes.into_iter().map(of).collect()
 }
 
-/// Largest distance of a link from the base (m).
+/// Maximum distance of a link from the base (m).
 fn reach(twin: &TwinSample) -> f64 {
     let base = twin.X_WL[0].translation.vector;
     let places = twin.X_WL.iter().chain([&twin.X_WT]);
     places.map(|X| (X.translation.vector - base).norm()).fold(0.0, f64::max)
 }
 
-/// A prism between two points of a link; none if they coincide.
+/// Creates a prism between two points of a link; `None` if they coincide.
 fn rod(link: usize, from: &Vector3<f64>, to: &Vector3<f64>, radius: f64) -> Option<LinkMesh> {
     let along = (to - from).try_normalize(1e-6)?;
     let y = along.cross(&Vector3::ith(along.iamin(), 1.0)).normalize();
@@ -419,7 +423,7 @@ fn rod(link: usize, from: &Vector3<f64>, to: &Vector3<f64>, radius: f64) -> Opti
     Some(LinkMesh { link, name: "rod".into(), positions, normals: Vec::new(), triangles, color: [0.7; 4], file: None })
 }
 
-/// Everything as triangles in the world.
+/// A set of triangles in the world.
 #[derive(Default)]
 struct Skin {
     positions: Vec<Vector3<f64>>,
@@ -460,12 +464,12 @@ impl Skin {
     }
 }
 
-/// Towards the viewer and to the right. The plane of the arm is the vertical one through base and
-/// tool.
+/// Returns the directions towards the viewer and to the right. The plane of the arm is the vertical
+/// plane through base and tool.
 fn directions(side: ArmSide, rigid: &TwinSample) -> (Vector3<f64>, Vector3<f64>) {
     let reach = rigid.X_WT.translation.vector - rigid.X_WL[0].translation.vector;
     let out = Vector3::new(reach.x, reach.y, 0.0).try_normalize(1e-3).unwrap_or(Vector3::x());
-    // With the arm reaching to the right, this is the side that faces the viewer.
+    // With the arm reaching to the right, this side faces the viewer.
     let across = out.cross(&Vector3::z());
     match side {
         ArmSide::Side => (across + Vector3::z() * 0.12, out),
@@ -473,7 +477,7 @@ fn directions(side: ArmSide, rigid: &TwinSample) -> (Vector3<f64>, Vector3<f64>)
     }
 }
 
-/// The error of the tool: from where the rigid arm has it to where the flexible one has it.
+/// Draws the TCP error as an arrow from the rigid to the flexible TCP.
 fn arrow(image: &mut Image, view: &View, unit: f64, from: &Vector3<f64>, to: &Vector3<f64>) {
     let [a, b] = [view.project(from), view.project(to)].map(|[x, y, _]| [x, y]);
     if (b[0] - a[0]).hypot(b[1] - a[1]) > 2.0 * unit {
@@ -484,7 +488,7 @@ fn arrow(image: &mut Image, view: &View, unit: f64, from: &Vector3<f64>, to: &Ve
     image.line(a, a, 5.5 * unit, color::INK, 1.0);
 }
 
-/// Axes, colour scale and what is shown, along the foot of the picture.
+/// Draws axes, colour scale and caption at the bottom of the picture.
 fn legend(image: &mut Image, view: &View, unit: f64, header: &RunHeader, factor: f64) {
     let (width, height) = (image.width as f64, image.height as f64);
     let text = |size: f64| Style::new(size * unit, color::INK);
@@ -493,7 +497,7 @@ fn legend(image: &mut Image, view: &View, unit: f64, header: &RunHeader, factor:
     order.sort_by(|a, b| view.toward[*a].total_cmp(&view.toward[*b]));
     for k in order {
         let direction = [view.right[k], -view.up[k]];
-        // An axis that points at the viewer has no length to see.
+        // Skip an axis that points at the viewer.
         if direction[0].hypot(direction[1]) < 0.15 {
             continue;
         }
@@ -529,7 +533,7 @@ fn legend(image: &mut Image, view: &View, unit: f64, header: &RunHeader, factor:
     image.text("TCP error", [next + 32.0 * unit, y], Align::Left, text(13.0));
 }
 
-/// A number without needless digits.
+/// Formats a number without trailing zeros.
 fn short(x: f64) -> String {
     let digits = if x == 0.0 { 0 } else { (2.0 - x.abs().log10().floor()).clamp(0.0, 9.0) as usize };
     let text = format!("{x:.digits$}");
@@ -542,8 +546,8 @@ mod tests {
     use flexarm_sample::LinkInfo;
     use nalgebra::{Rotation3, Translation3};
 
-    /// An arm without surfaces: base, upright link, arm that reaches out along x and is turned so
-    /// that its tool sags by 2 mm.
+    /// An arm without surfaces: base, upright link, and a link along x, rotated so that the TCP
+    /// sags by 2 mm.
     fn arm() -> (RunHeader, Sample) {
         let link = |name: &str, parent| LinkInfo { name: name.into(), parent, fixed: false };
         let header = RunHeader {
@@ -584,7 +588,7 @@ mod tests {
         for side in [ArmSide::Side, ArmSide::Oblique] {
             let png = arm_png(&header, &sample, side, size).unwrap();
             assert_eq!(png, arm_png(&header, &sample, side, size).unwrap(), "the same bytes");
-            // Without the words at the foot.
+            // Without the text at the bottom.
             let mut pixels = decoded(&png);
             pixels.truncate(size[0] * (size[1] - 50));
             let count = |near: Rgb, within: i32| {
@@ -601,7 +605,7 @@ mod tests {
         }
     }
 
-    /// Truth: the picture on paper, which is drawn without transparency.
+    /// Truth: the picture on paper, drawn without transparency.
     #[test]
     fn a_picture_without_ground_is_the_same_on_white_and_shows_dark_paper_where_there_is_no_arm() {
         let (header, sample) = arm();
@@ -632,8 +636,8 @@ mod tests {
         assert!(right.abs() < 1e-9 && up > 0.5, "{:?}", picture.axes);
     }
 
-    /// Truth: the ellipsoid's points `C f` of unit forces, none of which is outside of its outline
-    /// while some touch it.
+    /// Truth: the points `C f` of the ellipsoid for unit forces; none is outside its outline, and
+    /// some touch it.
     #[test]
     fn the_outline_of_the_compliance_holds_what_every_force_does() {
         let C = Matrix3::new(3.0, 0.4, -0.2, 0.4, 1.0, 0.3, -0.2, 0.3, 2.0) * 1e-6;

@@ -1,35 +1,35 @@
-//! A link drawn bent: its surface between stations that a run says the places of.
+//! A deformed link: its surface between stations whose motion is given by a run.
 //!
 //! Between two stations the link is a beam: cubic Hermite deflection across the line, linear
-//! stretch and twist along it, sections that stay plane and turn with the line's slope
-//! (Euler-Bernoulli). For loads at the ends that is the deflection line itself; at the stations it
-//! is exact for every model. Before the first station the surface is rigid with it, beyond the last
-//! one with that.
+//! stretch and twist along it, plane sections that rotate with the slope of the line
+//! (Euler-Bernoulli). For loads at the ends this is the exact deflection line; at the stations it
+//! is exact for every model. Before the first station and beyond the last one the surface moves
+//! rigidly with that station.
 
 use flexarm_spatial::{Pose, rotation_vector};
 use nalgebra::{Point3, Rotation3, Translation3, Vector3};
 
 use flexarm_sample::{BendInfo, LinkMesh};
 
-/// Slabs into which a surface is cut along the link, so that it can bend.
+/// Number of slabs into which a surface is cut along the link, so that it can deform.
 const SLABS: f64 = 12.0;
-/// A surface has at most this many times its triangles after cutting, to keep wild meshes in
-/// bounds.
+/// Maximum ratio of the numbers of triangles after and before cutting, as a bound for irregular
+/// meshes.
 const GROWTH: usize = 12;
 
-/// Where undeformed stations are and how a vertex lies between them.
+/// Undeformed stations, and the position of points between them.
 #[derive(Clone, Debug)]
 pub struct BendLine {
     stations: Vec<Vector3<f64>>,
-    /// Along the link, unit.
+    /// Direction along the link, unit vector.
     axis: Vector3<f64>,
-    /// Place of each station along `axis` (m).
+    /// Position of each station along `axis` (m).
     along: Vec<f64>,
 }
 
 impl BendLine {
-    /// The line through the stations; `None` if there are fewer than two or they do not follow each
-    /// other.
+    /// Creates the line through the stations; `None` if there are fewer than two or they are not in
+    /// order.
     #[must_use]
     pub fn new(bend: &BendInfo) -> Option<Self> {
         let stations: Vec<Vector3<f64>> = bend.X_LS.iter().map(|X| X.translation.vector).collect();
@@ -39,13 +39,13 @@ impl BendLine {
         along.windows(2).all(|pair| pair[1] > pair[0]).then_some(Self { stations, axis, along })
     }
 
-    /// Place of a point of the link along its line (m), 0 at the first station.
+    /// Returns the position of a point of the link along its line (m), 0 at the first station.
     #[must_use]
     pub fn place(&self, point: &Vector3<f64>) -> f64 {
         self.axis.dot(&(point - self.stations[0]))
     }
 
-    /// The undeformed point at `s` metres along the line (link axes).
+    /// Returns the undeformed point at `s` metres along the line (link axes).
     #[must_use]
     pub fn point(&self, s: f64) -> Point3<f64> {
         let last = self.stations.len() - 1;
@@ -54,13 +54,14 @@ impl BendLine {
         Point3::from(self.stations[k] + (self.stations[k + 1] - self.stations[k]) * x)
     }
 
-    /// Length of the line (m).
+    /// Returns the length of the line (m).
     #[must_use]
     pub fn length(&self) -> f64 {
         self.along[self.along.len() - 1]
     }
 
-    /// The line with its stations moved to `moved` (in the link, turned from the link's axes).
+    /// Returns the line with its stations moved to `moved` (poses in the link, rotations relative
+    /// to link axes).
     #[must_use]
     pub fn bent<'a>(&'a self, moved: &'a [Pose]) -> BentLine<'a> {
         let end = |(X, station): (&Pose, &Vector3<f64>)| {
@@ -75,18 +76,18 @@ impl BendLine {
 pub struct BentLine<'a> {
     line: &'a BendLine,
     moved: &'a [Pose],
-    /// Of each station its displacement and its rotation vector (link axes).
+    /// Displacement and rotation vector of each station (link axes).
     ends: Vec<(Vector3<f64>, Vector3<f64>)>,
 }
 
 impl BentLine<'_> {
-    /// Where a point of the undeformed link is (link axes).
+    /// Returns the deformed position of a point of the undeformed link (link axes).
     #[must_use]
     pub fn deformed(&self, point: &Vector3<f64>) -> Vector3<f64> {
         self.section(self.line.place(point)).transform_point(&Point3::from(*point)).coords
     }
 
-    /// The motion of the section at `s` metres along the line (link axes).
+    /// Returns the motion of the section at `s` metres along the line (link axes).
     #[must_use]
     pub fn section(&self, s: f64) -> Pose {
         match self.between(s) {
@@ -98,8 +99,8 @@ impl BentLine<'_> {
         }
     }
 
-    /// Where the point at `s` metres along the line is (link axes): what [`BentLine::section`] does
-    /// to it, without its turn.
+    /// Returns the deformed point at `s` metres along the line (link axes): the position from
+    /// [`BentLine::section`], without computing its rotation.
     #[must_use]
     pub fn point(&self, s: f64) -> Point3<f64> {
         match self.between(s) {
@@ -108,7 +109,8 @@ impl BentLine<'_> {
         }
     }
 
-    /// The piece of the line at a place, or the station with which it is rigid there.
+    /// Returns the piece of the line at a position, or the station with which it moves rigidly
+    /// there.
     fn between(&self, s: f64) -> Result<Piece, usize> {
         let BendLine { stations, along, .. } = self.line;
         let last = stations.len() - 1;
@@ -128,17 +130,17 @@ impl BentLine<'_> {
     }
 }
 
-/// A beam between two stations, and a place on it.
+/// A beam between two stations, and a position on it.
 struct Piece {
-    /// From the first station (0) to the second (1).
+    /// Position from the first station (0) to the second (1).
     x: f64,
-    /// From station to station; its length (m) and direction.
+    /// Vector between the stations; its length (m) and direction.
     line: Vector3<f64>,
     length: f64,
     direction: Vector3<f64>,
-    /// As in [`BentLine`].
+    /// Displacements and rotation vectors as in [`BentLine`].
     ends: [(Vector3<f64>, Vector3<f64>); 2],
-    /// The undeformed place.
+    /// The undeformed position.
     middle: Vector3<f64>,
 }
 
@@ -150,12 +152,12 @@ impl Piece {
         [across(u0), across(u1), theta0.cross(&self.line), theta1.cross(&self.line)]
     }
 
-    /// Along the line, and between its ends.
+    /// Interpolates the longitudinal component linearly between the ends.
     fn mixed(&self, a: &Vector3<f64>, b: &Vector3<f64>) -> Vector3<f64> {
         self.direction * (self.direction.dot(a) * (1.0 - self.x) + self.direction.dot(b) * self.x)
     }
 
-    /// Displacement of the place (m).
+    /// Displacement of the position (m).
     fn moved(&self) -> Vector3<f64> {
         let [v0, v1, slope0, slope1] = self.hermite();
         let x = self.x;
@@ -181,24 +183,26 @@ impl Piece {
     }
 }
 
-/// A surface that bends, cut finely enough along the link to be seen bent.
+/// A deformable surface, cut finely enough along the link to look smooth.
 #[derive(Clone, Debug)]
 pub struct BentMesh {
     /// The undeformed surface, cut.
     pub mesh: LinkMesh,
     line: BendLine,
-    /// Per corner: section before it, share of the one behind.
+    /// Per corner: index of the preceding section, and weight of the next one.
     places: Vec<(u32, f32)>,
 }
 
-/// Corners of a surface between the interfaces at most: they are written again and again.
+/// Maximum number of corners of a surface between the interfaces, since they are written at every
+/// instant.
 const CORNERS: usize = 3000;
 
-/// Sections whose motion is computed; corners between two of them take the mean of their motions.
+/// Number of sections whose motion is computed; the motion of corners between two sections is
+/// interpolated.
 const SECTIONS: usize = 48;
 
 impl BentMesh {
-    /// Cuts `mesh` for bending; `None` if the stations make no line.
+    /// Cuts `mesh` for deformation; `None` if the stations do not form a line.
     #[must_use]
     pub fn new(mesh: &LinkMesh, bend: &BendInfo) -> Option<Self> {
         let line = BendLine::new(bend)?;
@@ -210,7 +214,7 @@ impl BentMesh {
     fn of(mesh: LinkMesh, line: BendLine) -> Self {
         let place = |p: &[f32; 3]| {
             let x = line.place(&Vector3::from(p.map(f64::from))) / line.length() * SECTIONS as f64;
-            // The ends are sections of their own, rigid with what is beyond them.
+            // The ends are separate sections, rigid with the parts beyond them.
             let section = x.clamp(0.0, SECTIONS as f64 - 1.0).floor();
             (section as u32, (x - section).clamp(0.0, 1.0) as f32)
         };
@@ -218,13 +222,13 @@ impl BentMesh {
         Self { mesh, line, places }
     }
 
-    /// The line along which it bends.
+    /// Returns the line along which it deforms.
     #[must_use]
     pub fn line(&self) -> &BendLine {
         &self.line
     }
 
-    /// Corners in link axes (m), the stations being moved to `moved` (poses in the link).
+    /// Returns the corners in link axes (m) for stations moved to `moved` (poses in the link).
     pub fn positions<'a>(&'a self, moved: &[Pose]) -> impl Iterator<Item = [f32; 3]> + 'a {
         let bent = self.line.bent(moved);
         let at = |k: usize| bent.section(self.line.length() * k as f64 / SECTIONS as f64);
@@ -237,20 +241,20 @@ impl BentMesh {
     }
 }
 
-/// A link's surface in three: what is rigid with the near interface, what bends, what is rigid with
-/// the far one.
+/// The surface of a link in three pieces: rigid with the near interface, deformable, and rigid with
+/// the far interface.
 #[derive(Clone, Debug)]
 pub struct BentPieces {
-    /// Before the first station; stays as it is in the link's frame.
+    /// Piece before the first station; fixed in the frame of the link.
     pub near: LinkMesh,
-    /// Between the stations.
+    /// Piece between the stations.
     pub middle: BentMesh,
-    /// Beyond the last station; moves by `section` of the end.
+    /// Piece beyond the last station; moves with the section at the end.
     pub far: LinkMesh,
 }
 
 impl BentPieces {
-    /// Cuts `mesh` in pieces; `None` if the stations make no line.
+    /// Cuts `mesh` into pieces; `None` if the stations do not form a line.
     #[must_use]
     pub fn new(mesh: &LinkMesh, bend: &BendInfo) -> Option<Self> {
         let BentMesh { mesh, line, .. } = BentMesh::new(mesh, bend)?;
@@ -264,7 +268,7 @@ impl BentPieces {
     }
 }
 
-/// Halves edges until none spans more than a slab of the bending part of the link.
+/// Halves edges until none spans more than one slab of the flexible part of the link.
 fn cut_along(mesh: &mut LinkMesh, line: &BendLine) {
     use std::collections::HashMap;
     let (slab, most) = (line.length() / SLABS, mesh.triangles.len().max(64) * GROWTH);
@@ -329,7 +333,7 @@ mod tests {
     fn a_cantilever_with_a_force_at_its_end_is_drawn_as_its_deflection_line() {
         let L = 1.5;
         let line = BendLine::new(&bend(&[[0.2, 0.0, 0.0], [0.2 + L, 0.0, 0.0]])).unwrap();
-        let v_end = 1e-4; // small, so that the truth is the linear one
+        let v_end = 1e-4; // small, so that linear theory holds
         let slope_end = 1.5 * v_end / L;
         let moved = [pose([0.2, 0.0, 0.0], [0.0; 3]), pose([0.2 + L, v_end, 0.0], [0.0, 0.0, slope_end])];
         for k in 0..=10 {
@@ -340,7 +344,7 @@ mod tests {
         }
     }
 
-    /// Truth: the motion of the section, applied to the undeformed place.
+    /// Truth: the motion of the section, applied to the undeformed position.
     #[test]
     fn a_point_of_the_line_is_where_its_section_takes_it() {
         let bend = bend(&[[0.0, 0.1, 0.0], [0.5, 0.1, 0.2], [1.0, 0.0, 0.3]]);
@@ -359,7 +363,7 @@ mod tests {
         }
     }
 
-    /// Truth: what is beyond the far interface turns and moves with it as a rigid body, exactly.
+    /// Truth: the part beyond the far interface moves and rotates with it as a rigid body, exactly.
     #[test]
     fn the_surface_beyond_the_far_interface_is_rigid_with_it() {
         let line = BendLine::new(&bend(&[[0.0; 3], [0.5, 0.0, 0.1], [1.0, 0.0, 0.2]])).unwrap();
@@ -390,8 +394,8 @@ mod tests {
         }
     }
 
-    /// Truth: the deflection line at every corner; sections between are interpolated, 1/48 of the
-    /// link apart.
+    /// Truth: the deflection line at every corner; interpolated between sections 1/48 of the link
+    /// apart.
     #[test]
     fn the_corners_of_a_bent_surface_follow_the_line_closely_and_its_ends_exactly() {
         let bend = bend(&[[0.0; 3], [1.0, 0.0, 0.0]]);
@@ -410,7 +414,7 @@ mod tests {
 
     #[test]
     fn a_box_is_cut_without_cracks_until_it_can_bend() {
-        // Two triangles, one metre long: every inner edge belongs to two triangles after cutting.
+        // Two triangles, one metre long: after cutting, every inner edge belongs to two triangles.
         let bent = BentMesh::new(&plate(), &bend(&[[0.0; 3], [1.0, 0.0, 0.0]])).unwrap();
         let area = |mesh: &LinkMesh| -> f32 {
             let p = |k: u32| Vector3::from(mesh.positions[k as usize]);

@@ -1,7 +1,7 @@
-//! Charts of studies as SVG: main effects, bars with intervals, histograms, scatter plots alone and
-//! as a matrix.
+//! Charts of studies as SVG: main effects, bars with intervals, histograms, scatter plots, single
+//! and as a matrix.
 //!
-//! Plain numbers and names in, the text of a picture out; pixels of the browser.
+//! Input: plain numbers and names; output: SVG text with sizes in browser pixels.
 //! Not here: curves over time ([`crate::LinePlot`]), numbers over a plane ([`crate::FieldPlot`]).
 
 use std::cmp::Ordering;
@@ -16,9 +16,9 @@ use crate::plot::{Area, Axes, MARK, PlotError, axes, ink, picture};
 /// Means of a result over groups of a parameter.
 #[derive(Clone, Debug, Default)]
 pub struct EffectPanel<'a> {
-    /// The parameter.
+    /// Name of the parameter.
     pub x_label: &'a str,
-    /// The result.
+    /// Name of the result.
     pub y_label: &'a str,
     /// Parameter, mean, standard error.
     pub points: Vec<[f64; 3]>,
@@ -29,7 +29,7 @@ pub struct EffectPanel<'a> {
 pub struct BarPair<'a> {
     /// Label of the pair.
     pub name: &'a str,
-    /// Value, lower and upper end of its interval, of both.
+    /// Value, lower and upper end of its interval, for both.
     pub values: [[f64; 3]; 2],
 }
 
@@ -42,24 +42,24 @@ pub struct ScatterPlot<'a> {
     pub y_label: &'a str,
     /// All points.
     pub points: &'a [[f64; 2]],
-    /// Points that are joined and marked.
+    /// Points that are connected and marked.
     pub front: &'a [[f64; 2]],
-    /// A point that is marked more.
+    /// A point with a stronger mark.
     pub best: Option<[f64; 2]>,
 }
 
-/// Distance of two lines of a label.
+/// Line spacing of labels (pixels).
 pub(crate) const LEADING: u32 = 14;
 /// Height of a panel of effects.
 const PANEL: u32 = 134;
-/// Room for numbers at the left and below.
+/// Space for numbers on the left and below (pixels).
 const ROOM: [u32; 2] = [52, 22];
-/// Bars of a histogram behind a name.
+/// Number of bars of a histogram behind a name.
 const BINS: usize = 14;
 const BIN: RGBColor = RGBColor(201, 214, 228);
 
-/// Returns a label in lines of at most `most` letters, broken behind points, underscores and blanks
-/// where that is possible. No letter is left out: names that differ in one letter stay different.
+/// Splits a label into lines of at most `most` letters, after dots, underscores and blanks where
+/// possible. No letter is dropped: names that differ in one letter stay different.
 pub(crate) fn wrapped(label: &str, most: usize) -> Vec<String> {
     let most = most.max(8);
     let mut lines: Vec<Vec<char>> = vec![Vec::new()];
@@ -74,7 +74,8 @@ pub(crate) fn wrapped(label: &str, most: usize) -> Vec<String> {
     lines.into_iter().filter(|line| !line.is_empty()).map(String::from_iter).collect()
 }
 
-/// Lines around a place, below each other; or upwards and to the right of each other.
+/// Draws lines centred at a position, one below the other; or rotated upwards, one to the right of
+/// the other.
 pub(crate) fn draw_lines(
     area: &Area<'_>,
     (x, y): (u32, u32),
@@ -90,7 +91,7 @@ pub(crate) fn draw_lines(
     Ok(())
 }
 
-/// Returns minimum and maximum of the finite numbers, with a margin.
+/// Returns the minimum and maximum of the finite numbers, with a margin.
 pub(crate) fn range(values: impl Iterator<Item = f64>) -> Range<f64> {
     let (low, high) = values
         .filter(|x| x.is_finite())
@@ -103,7 +104,8 @@ pub(crate) fn range(values: impl Iterator<Item = f64>) -> Range<f64> {
     low - room..high + room
 }
 
-/// Main effects in rows of panels, one row per result; panels of a row share their vertical scale.
+/// Draws main effects in rows of panels, one row per result; the panels of a row share their
+/// vertical scale.
 pub fn effects(rows: &[Vec<EffectPanel<'_>>]) -> String {
     let columns = rows.iter().map(Vec::len).max().unwrap_or(0).max(1) as u32;
     let width = (900 / columns).clamp(150, 320);
@@ -137,13 +139,13 @@ pub fn effects(rows: &[Vec<EffectPanel<'_>>]) -> String {
         }
         Ok(())
     };
-    // Writing to a text does not fail; nor below.
+    // Writing to a string does not fail; nor below.
     picture((left + width * columns, height * (rows.len() as u32).max(1)), draw).unwrap_or_default()
 }
 
-/// Pairs of bars with intervals.
+/// Draws pairs of bars with intervals.
 ///
-/// * `names`: of both.
+/// * `names`: names of the two bars.
 pub fn bar_pairs(title: &str, names: [&str; 2], pairs: &[BarPair<'_>]) -> String {
     let labels: Vec<String> = pairs.iter().map(|pair| pair.name.to_owned()).collect();
     let longest = labels.iter().map(|name| name.chars().count()).max().unwrap_or(0);
@@ -176,7 +178,7 @@ pub fn bar_pairs(title: &str, names: [&str; 2], pairs: &[BarPair<'_>]) -> String
 }
 
 impl ScatterPlot<'_> {
-    /// The picture.
+    /// Returns the picture as SVG.
     pub fn svg(&self) -> String {
         self.draw().unwrap_or_default()
     }
@@ -206,10 +208,10 @@ fn dots(points: &[[f64; 2]], radius: u32, style: ShapeStyle) -> impl Iterator<It
     finite(points).map(move |point| Circle::new(point, radius, style))
 }
 
-/// Every column over every other one: points below the diagonal, the correlation of the ranks above
-/// it, counts on it.
+/// Draws every column against every other one: points below the diagonal, rank correlations above
+/// it, histograms on it.
 ///
-/// * `columns`: name and values, equally many.
+/// * `columns`: name and values, of equal length.
 pub fn scatter_matrix(columns: &[(&str, &[f64])]) -> String {
     let n = columns.len().max(1) as u32;
     let cell = (900 / n).clamp(70, 170);
@@ -251,7 +253,7 @@ pub fn scatter_matrix(columns: &[(&str, &[f64])]) -> String {
     picture((cell * n + 12, cell * n + 12), draw).unwrap_or_default()
 }
 
-/// A histogram; empty if no number is finite.
+/// Draws a histogram; empty if no number is finite.
 ///
 /// * `label`: name and unit of the numbers.
 pub fn histogram(label: &str, values: &[f64], bins: usize) -> String {
@@ -282,7 +284,7 @@ fn bars(values: &[f64], range: Range<f64>, bins: usize) -> Vec<[(f64, f64); 2]> 
     counts.iter().enumerate().map(|(k, count)| [(edge(k), 0.0), (edge(k + 1), *count as f64)]).collect()
 }
 
-/// Correlation of the ranks (Spearman); NaN where one of both does not vary.
+/// Computes Spearman's rank correlation; NaN if one of the two is constant.
 pub fn rank_correlation(x: &[f64], y: &[f64]) -> f64 {
     let pairs: Vec<(f64, f64)> =
         x.iter().copied().zip(y.iter().copied()).filter(|(x, y)| x.is_finite() && y.is_finite()).collect();
@@ -295,7 +297,7 @@ pub fn rank_correlation(x: &[f64], y: &[f64]) -> f64 {
     xy / (xx * yy).sqrt()
 }
 
-/// Places in ascending order; equal values share the mean of theirs.
+/// Ranks in ascending order; equal values share their mean rank.
 fn ranks(values: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..values.len()).collect();
     order.sort_by(|i, j| values[*i].total_cmp(&values[*j]));
@@ -314,8 +316,8 @@ mod tests {
     use super::*;
     use crate::FieldPlot;
 
-    /// Truth: Spearman's coefficient of a rising curve is 1, of a falling one -1; 1, 2, 3, 4
-    /// against 2, 1, 4, 3 by the formula 1 - 6 sum d^2 / (n (n^2 - 1)) = 0.6.
+    /// Truth: Spearman's coefficient is 1 for an increasing curve and -1 for a decreasing one; 1,
+    /// 2, 3, 4 against 2, 1, 4, 3 by the formula 1 - 6 sum d^2 / (n (n^2 - 1)) = 0.6.
     #[test]
     fn rank_correlations_are_those_of_the_formula() {
         let x = [1.0, 2.0, 3.0, 4.0];
@@ -325,7 +327,7 @@ mod tests {
         assert!(rank_correlation(&x, &[1.0; 4]).is_nan());
     }
 
-    /// The letters of all texts of a picture, one after the other.
+    /// The letters of all texts of a picture, concatenated.
     fn texts(svg: &str) -> String {
         svg.split("</text>")
             .filter_map(|part| part.rsplit_once('>'))
@@ -363,7 +365,7 @@ mod tests {
         assert_eq!(wrapped("abcdefghijklmnop", 8), ["abcdefgh", "ijklmnop"]);
     }
 
-    /// Truth: counted by hand; the range is wider than the numbers by a twentieth on both sides.
+    /// Truth: counted by hand; the range exceeds the numbers by a twentieth on both sides.
     #[test]
     fn bars_count_every_finite_number_once() {
         let values = [0.0, 1.0, 1.0, 4.0, f64::NAN, 10.0];

@@ -1,8 +1,8 @@
-//! A number over a plane of cells as a picture (SVG): colours with their scale, axes, marked
-//! places.
+//! A quantity over a plane of cells as a picture (SVG): colours with scale, axes, marked points.
 //!
-//! Neighbouring cells of one colour in a row are one rectangle. Grids finer than the picture are
-//! thinned to the maximum of the cells that coincide, so that a page with many maps stays small.
+//! Neighbouring cells of one colour in a row are drawn as one rectangle. Grids finer than the
+//! picture are thinned to the maximum of the merged cells, so that a page with many maps stays
+//! small.
 
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
@@ -13,48 +13,48 @@ use crate::plot::{Area, Axes, PlotError, axes, ink, picture, plain, three_digits
 
 /// Maximum number of cells along an axis of the picture.
 const MOST_CELLS: usize = 120;
-/// Shades of the scale.
+/// Number of shades of the scale.
 const SHADES: u8 = 48;
-/// Longest side of the cells' field (pixels), and sides of the field of named cells.
+/// Longest side of the field of cells (pixels), and sides of the field of named cells.
 const FIELD: f64 = 300.0;
 const NAMED_FIELD: [f64; 2] = [560.0, 360.0];
-/// Room above and below the field for title and names, and at its right for the scale.
+/// Space above and below the field for title and names, and on its right for the scale.
 const TOP: u32 = 28;
 const FOOT: u32 = 22;
 const RIGHT: u32 = 78;
-/// Around places that must be seen.
+/// Colour of outlines.
 const OUTLINE: RGBColor = RGBColor(200, 0, 60);
 
-/// A number over a plane.
+/// A quantity over a plane.
 #[derive(Clone, Debug, Default)]
 pub struct FieldPlot<'a> {
-    /// Above the picture.
+    /// Title above the picture.
     pub title: &'a str,
-    /// What is on the horizontal and on the vertical axis.
+    /// Labels of the horizontal and vertical axis.
     pub labels: [&'a str; 2],
     /// Centres of the first and of the last cell along both axes.
     pub ranges: [[f64; 2]; 2],
-    /// Cells along both axes.
+    /// Number of cells along both axes.
     pub count: [usize; 2],
-    /// A number per cell, along the horizontal axis first; NaN stays white.
+    /// One value per cell, along the horizontal axis first; NaN stays white.
     pub values: &'a [f64],
-    /// What the numbers are, beside the scale.
+    /// Label of the scale.
     pub value_label: &'a str,
-    /// Numbers of the first and last colour; those of the values without it.
+    /// Values at the first and last colour; if `None`, the range of the values.
     pub scale: Option<[f64; 2]>,
-    /// Whether a unit is as long on both axes.
+    /// Whether both axes have the same scale.
     pub equal: bool,
-    /// Rectangles to be outlined: lower left and upper right corner.
+    /// Outlined rectangles: lower left and upper right corner.
     pub outlines: &'a [[[f64; 2]; 2]],
-    /// Places to be marked, each with a letter.
+    /// Marked points, each with a letter.
     pub marks: &'a [([f64; 2], &'a str)],
-    /// Names of the columns and rows, in place of ranges and count. Numbers are written into cells
-    /// where there is room.
+    /// Names of columns and rows, instead of ranges and count. Values are written into the cells if
+    /// there is space.
     pub names: Option<[&'a [String]; 2]>,
 }
 
 impl FieldPlot<'_> {
-    /// The text of an SVG file; empty if there is no finite number.
+    /// Returns the text of an SVG file; empty if there is no finite value.
     #[must_use]
     pub fn svg(&self) -> String {
         let finite = || self.values.iter().copied().filter(|x| x.is_finite());
@@ -72,12 +72,12 @@ impl FieldPlot<'_> {
         if !(low.is_finite() && high.is_finite()) || named.count.contains(&0) {
             return String::new();
         }
-        // Writing to a text does not fail.
+        // Writing to a string does not fail.
         named.draw([low, high]).unwrap_or_default()
     }
 
     fn draw(&self, scale: [f64; 2]) -> Result<String, PlotError> {
-        // Cells that are drawn: whole pixels each.
+        // Drawn cells, each a whole number of pixels.
         let every = if self.names.is_some() { [1, 1] } else { self.count.map(|n| n.div_ceil(MOST_CELLS)) };
         let shown = [0, 1].map(|k| self.count[k].div_ceil(every[k]));
         let steps = [0, 1].map(|k| {
@@ -100,12 +100,12 @@ impl FieldPlot<'_> {
         let x_label = wrapped(self.labels[0], (width + RIGHT) as usize / 7);
         let y_label = wrapped(self.labels[1], (height + FOOT) as usize / 7);
         let left = 52 + LEADING * y_label.len() as u32;
-        // A long title does not reach into the scale.
+        // A long title must not overlap the scale.
         let right = left + width.max(8 * self.title.chars().count() as u32) + 14;
         let size = (right + RIGHT, TOP + height.max(80) + FOOT + LEADING * x_label.len() as u32 + 8);
         picture(size, |area| {
             area.draw(&Text::new(self.title, (left as i32, 6), ("sans-serif", 15).into_font().style(FontStyle::Bold)))?;
-            // The last row and column of pixels are those of the ends of the axes.
+            // The last row and column of pixels belong to the ends of the axes.
             let part = area.clone().shrink((0, TOP), (left + width + 1, height + FOOT + 1));
             let ranges = [0, 1].map(|k| edge[k]..edge[k] + span[k]);
             let names = [0, 1].map(|k| self.names.map(|names| names[k]));
@@ -151,13 +151,13 @@ impl FieldPlot<'_> {
         })
     }
 
-    /// The largest number of a cell that is drawn; NaN if there is none.
+    /// Maximum value of a drawn cell; NaN if there is none.
     fn largest(&self, cell: [usize; 2], every: [usize; 2]) -> f64 {
         let [columns, rows] = [0, 1].map(|k| cell[k] * every[k]..((cell[k] + 1) * every[k]).min(self.count[k]));
         rows.flat_map(|y| columns.clone().map(move |x| self.values[x + self.count[0] * y])).fold(f64::NAN, f64::max)
     }
 
-    /// The colours with their numbers, and what these are.
+    /// Draws the colours with their values and label.
     fn draw_scale(&self, area: &Area<'_>, [low, high]: [f64; 2]) -> Result<(), PlotError> {
         area.draw(&Text::new(self.value_label, (0, 6), ("sans-serif", 13)))?;
         let y = if high > low { low..high } else { range([low].into_iter()) };
@@ -175,7 +175,7 @@ impl FieldPlot<'_> {
     }
 }
 
-/// Returns the shade of a number; none for NaN.
+/// Returns the shade of a value; `None` for NaN.
 fn shade(value: f64, [low, high]: [f64; 2]) -> Option<u8> {
     let share = if high > low { (value - low) / (high - low) } else { 0.5 };
     value.is_finite().then(|| (share.clamp(0.0, 1.0) * f64::from(SHADES)).round() as u8)
@@ -200,7 +200,7 @@ mod tests {
 
     #[test]
     fn equal_neighbours_are_one_rectangle_and_holes_are_none() {
-        // Ground and scale are rectangles too.
+        // Background and scale are rectangles too.
         let cells = |svg: &str| svg.matches("<rect").count() - 1 - usize::from(SHADES);
         assert_eq!(cells(&map(&[1.0; 12], [4, 3]).svg()), 3);
         let mut values = [1.0; 12];
@@ -218,7 +218,7 @@ mod tests {
         assert!(line.contains(&format!("y=\"{TOP}\"")), "{line}");
     }
 
-    /// Truth: a grid of 240 by 240 cells in blocks of two, each as large as its largest number.
+    /// Truth: a grid of 240 by 240 cells in blocks of two by two, each with its maximum value.
     #[test]
     fn a_fine_grid_is_thinned_to_the_largest_of_what_falls_together() {
         let mut values = vec![0.0; 240 * 240];

@@ -1,8 +1,8 @@
-//! How an arm, a mesh and curves are drawn.
+//! Drawing of arms, meshes and curves.
 //!
-//! What recordings, markers and pictures show alike is decided here once: [`Magnifier`] enlarges
-//! deflections, [`BendLine`] and [`BentMesh`] bend surfaces, [`palette`] has the colours. Pictures
-//! need no graphics card: `arm_pictures`, `arm_png` and `arm_sheet` draw an arm at one instant,
+//! Conventions shared by recordings, markers and pictures: [`Magnifier`] magnifies deflections,
+//! [`BendLine`] and [`BentMesh`] deform surfaces, [`palette`] defines the colours. Pictures need no
+//! graphics card: `arm_pictures`, `arm_png` and `arm_sheet` draw an arm at one instant,
 //! `mesh_picture` the sheets of a mesh reduction (feature `png`), [`LinePlot`] curves as SVG.
 //!
 //! ```
@@ -23,7 +23,7 @@
 //! assert!((shown.X_WT.translation.z + 0.1).abs() < 1e-12);
 //! ```
 //!
-//! Not here: files of recordings, what the numbers mean.
+//! Not here: recording files, interpretation of the numbers.
 #![allow(non_snake_case, reason = "monogram notation: X_WL, pose of L in W")]
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 

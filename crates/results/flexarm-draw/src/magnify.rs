@@ -1,22 +1,23 @@
-//! The arm with its deflections magnified, made from the flexible robot and its rigid twin.
+//! The arm with magnified deflections, from the flexible robot and its rigid twin.
 
 use flexarm_spatial::{Pose, rotation_vector};
 use nalgebra::{Rotation3, Translation3};
 
 use flexarm_sample::{RunHeader, Sample, TwinSample};
 
-/// Draws deflections larger than they are.
+/// Magnifies deflections for drawing.
 ///
-/// Every frame is placed against the frame that carries it: what the flexible robot adds to the
-/// rigid twin's relative pose there is multiplied (its translation, and its rotation as a rotation
-/// vector), then the frames are chained again from the base. So joints still fit together and rigid
-/// links stay rigid, at any factor; with factor 1 the result is the flexible robot.
+/// Every frame is treated relative to its carrier: the difference between the relative poses of the
+/// flexible robot and of the rigid twin is multiplied (its translation, and its rotation as a
+/// rotation vector), then the frames are chained again from the base. Joints therefore stay
+/// connected and rigid links stay rigid at any factor; with factor 1 the result is the flexible
+/// robot.
 #[derive(Clone, Debug)]
 pub struct Magnifier {
     factor: f64,
-    /// Per link: what carries it.
+    /// Carrier of each link.
     carriers: Vec<Carrier>,
-    /// Per bend: link and undeformed stations.
+    /// Link and undeformed stations of each bend.
     bends: Vec<(usize, Vec<Pose>)>,
     tcp: Option<usize>,
 }
@@ -25,12 +26,12 @@ pub struct Magnifier {
 enum Carrier {
     World,
     Link(usize),
-    /// Station by its number in [`TwinSample::X_WS`].
+    /// Station by its index in [`TwinSample::X_WS`].
     Station(usize),
 }
 
 impl Magnifier {
-    /// With the factor of the header, or 1 if that has none.
+    /// Uses the factor of the header, or 1 if it has none.
     #[must_use]
     pub fn new(header: &RunHeader) -> Self {
         let factor = if header.magnification > 0.0 { header.magnification } else { 1.0 };
@@ -48,13 +49,13 @@ impl Magnifier {
         Self { factor, carriers, bends, tcp }
     }
 
-    /// How much larger deflections become.
+    /// Returns the magnification factor.
     #[must_use]
     pub fn factor(&self) -> f64 {
         self.factor
     }
 
-    /// Poses of links, stations and tool centre point, magnified. Joint values are those of the
+    /// Returns the magnified poses of links, stations and TCP. Joint values are those of the
     /// flexible robot.
     #[must_use]
     pub fn magnified(&self, sample: &Sample) -> TwinSample {
@@ -63,7 +64,7 @@ impl Magnifier {
         to
     }
 
-    /// As [`Magnifier::magnified`], into a sample that is used again.
+    /// Like [`Magnifier::magnified`], into an existing sample.
     pub fn magnify(&self, sample: &Sample, to: &mut TwinSample) {
         let (flexible, rigid) = (&sample.flexible, &sample.rigid);
         to.q.clone_from(&flexible.q);
@@ -72,7 +73,7 @@ impl Magnifier {
         to.X_WL.clone_from(&rigid.X_WL);
         to.X_WS.clear();
         to.X_WS.resize(flexible.X_WS.len(), Pose::identity());
-        // Parents come before their children, and so do the stations that carry them.
+        // Parents come before their children, as do the stations that carry them.
         for link in 0..self.carriers.len() {
             to.X_WL[link] = match self.carriers[link] {
                 Carrier::World => self.placed(
@@ -133,7 +134,8 @@ impl Magnifier {
         Pose::identity()
     }
 
-    /// `carrier` magnified, then the relative pose of the rigid robot, then the magnified rest.
+    /// Chains the magnified `carrier`, the relative pose of the rigid robot, and the magnified
+    /// difference.
     fn placed(
         &self,
         carrier: &Pose,
@@ -150,8 +152,8 @@ impl Magnifier {
     }
 }
 
-/// Stations of one bend as poses in its link, from the robot's poses in the world; `first` is the
-/// number of its first station.
+/// Returns the stations of one bend as poses in its link, from the world poses of the robot;
+/// `first` is the index of its first station.
 #[must_use]
 pub fn stations_in_link(twin: &TwinSample, link: usize, first: usize, count: usize) -> Vec<Pose> {
     twin.X_WS[first..first + count].iter().map(|X_WS| twin.X_WL[link].inv_mul(X_WS)).collect()

@@ -1,31 +1,31 @@
-//! The colours of everything that flexarm draws: recordings, reports, plots, pictures. One table,
-//! so that a colour means the same wherever it is seen.
+//! Colours of everything that flexarm draws: recordings, reports, plots, pictures. One table
+//! ensures that a colour has the same meaning everywhere.
 //!
-//! * [`axis`]: x is red, y green, z blue, as viewers draw their triads; in shades that people tell
-//!   apart who see red and green alike.
-//! * [`series`]: whatever is counted (runs, links, drives, joints), in one order.
-//! * [`rigid`]: the rigid twin, a grey that no run has.
+//! * [`axis`]: x is red, y green, z blue, as in the triads of viewers; in shades that are
+//!   distinguishable with red-green colour blindness.
+//! * [`series`]: numbered items (runs, links, drives, joints), in one order.
+//! * [`rigid`]: the rigid twin, a grey that no run uses.
 //!
-//! Each colour has a shade for paper and one for a dark ground.
-//! * [`magnitude`]: how large something is.
+//! Each colour has a shade for paper and one for a dark background.
+//! * [`magnitude`]: scale of magnitudes.
 
 /// Red, green, blue.
 pub type Rgb = [u8; 3];
 
-/// What a colour is seen on.
+/// Background of a colour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ground {
-    /// White or nearly so.
+    /// White or nearly white.
     Paper,
-    /// Black or nearly so.
+    /// Black or nearly black.
     Dark,
 }
 
-/// x, y, z on paper and on a dark ground.
+/// x, y, z on paper and on a dark background.
 const AXES: [[Rgb; 3]; 2] =
     [[[184, 32, 42], [31, 163, 107], [42, 111, 219]], [[242, 85, 74], [87, 224, 168], [91, 141, 239]]];
 
-/// After Okabe and Ito (2008), without their yellow and black, and longer.
+/// After Okabe and Ito (2008), without their yellow and black, and with additional colours.
 const SERIES: [[Rgb; 12]; 2] = [
     [
         [0, 114, 178],
@@ -57,7 +57,7 @@ const SERIES: [[Rgb; 12]; 2] = [
     ],
 ];
 
-/// Viridis (van der Walt and Smith, public domain) at nine places; between them linear.
+/// Viridis (van der Walt and Smith, public domain) at nine points, with linear interpolation.
 const SCALE: [Rgb; 9] = [
     [68, 1, 84],
     [71, 44, 122],
@@ -70,24 +70,24 @@ const SCALE: [Rgb; 9] = [
     [253, 231, 37],
 ];
 
-/// Where on that scale zero lies.
+/// Position of zero on that scale.
 const DARKEST: f64 = 0.08;
 
-/// So many colours of [`series`] are different; then they begin again.
+/// Number of different colours of [`series`] before they repeat.
 pub const SERIES_LENGTH: usize = 24;
 
-/// Colour of the axis x (0), y (1) or z (2).
+/// Returns the colour of axis x (0), y (1) or z (2).
 #[must_use]
 pub fn axis(number: usize, ground: Ground) -> Rgb {
     AXES[ground as usize][number % 3]
 }
 
-/// Colour of the thing with this number, counted from 0.
+/// Returns the colour of the item with this index, from 0.
 #[must_use]
 pub fn series(number: usize, ground: Ground) -> Rgb {
     let table = &SERIES[ground as usize];
     let color = table[number % table.len()];
-    // The second time round darker, and not so much that a dark ground swallows it.
+    // The second cycle is darker, but still visible on a dark background.
     match (number / table.len() % 2, ground) {
         (0, _) => color,
         (_, Ground::Paper) => mix(color, [0; 3], 0.45),
@@ -95,14 +95,14 @@ pub fn series(number: usize, ground: Ground) -> Rgb {
     }
 }
 
-/// Shade of [`series`] for one of the six components of the thing with this number: displacements,
-/// then rotations, darker from one to the next.
+/// Returns the shade of [`series`] for one of the six components of the item with this index:
+/// translations, then rotations, successively darker.
 #[must_use]
 pub fn component(number: usize, component: usize, ground: Ground) -> Rgb {
     mix(series(number, ground), [0; 3], 0.11 * (component % 6) as f64)
 }
 
-/// Colour of the rigid twin and of its curves.
+/// Returns the colour of the rigid twin and of its curves.
 #[must_use]
 pub fn rigid(ground: Ground) -> Rgb {
     match ground {
@@ -111,7 +111,7 @@ pub fn rigid(ground: Ground) -> Rgb {
     }
 }
 
-/// Colour of what sums up the others, such as the size of an error.
+/// Returns the colour of totals, such as the magnitude of an error.
 #[must_use]
 pub fn total(ground: Ground) -> Rgb {
     match ground {
@@ -120,15 +120,15 @@ pub fn total(ground: Ground) -> Rgb {
     }
 }
 
-/// `#rrggbb`.
+/// Formats as `#rrggbb`.
 #[must_use]
 pub fn hex([red, green, blue]: Rgb) -> String {
     format!("#{red:02x}{green:02x}{blue:02x}")
 }
 
-/// Colour of a magnitude from 0 to 1; perceptually even, dark to light.
+/// Returns the colour of a magnitude from 0 to 1; perceptually uniform, dark to light.
 ///
-/// The first part of the scale is left out: shade and edges are not seen on it.
+/// The darkest part of the scale is left out: shading and edges are not visible on it.
 #[must_use]
 #[inline]
 pub fn magnitude(value: f64) -> Rgb {
@@ -137,11 +137,11 @@ pub fn magnitude(value: f64) -> Rgb {
     mix(SCALE[lower], SCALE[lower + 1], place - lower as f64)
 }
 
-/// `a` at 0, `b` at 1.
+/// Interpolates between `a` at 0 and `b` at 1.
 #[must_use]
 #[inline]
 pub fn mix(a: Rgb, b: Rgb, at: f64) -> Rgb {
-    // The nearest, without a call: less than zero becomes zero.
+    // Rounds without a function call; negative values saturate to zero.
     let part = |k: usize| (f64::from(a[k]) + (f64::from(b[k]) - f64::from(a[k])) * at + 0.5) as u8;
     [part(0), part(1), part(2)]
 }
@@ -154,8 +154,8 @@ mod tests {
 
     const GROUNDS: [Ground; 2] = [Ground::Paper, Ground::Dark];
 
-    /// What is left of a colour for people without red cones (protanopia) and without green ones
-    /// (deuteranopia), on linear light [Machado, Oliveira and Fernandes 2009, table 1, severity 1].
+    /// Colour perception without red cones (protanopia) and without green cones (deuteranopia), on
+    /// linear light [Machado, Oliveira and Fernandes 2009, table 1, severity 1].
     fn eyes() -> [Matrix3<f64>; 3] {
         [
             Matrix3::identity(),
@@ -164,8 +164,8 @@ mod tests {
         ]
     }
 
-    /// Place of a colour in the perceptually even space OKLab [Ottosson 2020], hundredfold; 2 is
-    /// just seen side by side.
+    /// Coordinates of a colour in the perceptually uniform space OKLab [Ottosson 2020], times 100;
+    /// a distance of 2 is just visible side by side.
     fn oklab(color: Rgb, eye: &Matrix3<f64>) -> Vector3<f64> {
         let linear = |c: u8| {
             let c = f64::from(c) / 255.0;
@@ -210,9 +210,8 @@ mod tests {
                 assert!((0..3).all(|c| c == k || color[c] < color[k]), "{color:?}");
             }
             for eye in eyes() {
-                // Measured: 12.2 on paper and 15.8 on dark ground for eyes without green cones;
-                // red, green and blue of the usual kind (210,40,40), (30,150,50), (40,70,220) have
-                // 2.4.
+                // Measured: 12.2 on paper and 15.8 on a dark background without green cones; the
+                // common red, green and blue (210,40,40), (30,150,50), (40,70,220) have 2.4.
                 assert!(closest(&axes, &eye) > 12.0, "{ground:?}: {}", closest(&axes, &eye));
             }
         }

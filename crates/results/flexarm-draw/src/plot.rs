@@ -1,8 +1,8 @@
-//! Curves over a common axis as a picture (SVG): panels one above the other with a legend.
+//! Curves over a common axis as a picture (SVG): stacked panels with a legend.
 //!
-//! Start at [`LinePlot`] for the screen, [`paper_plot`] for a column of a paper. `plotters` draws
-//! all SVG pictures of the crate, with its SVG backend alone: no fonts, no files, no clock. They
-//! share [`picture`], [`axes`] and [`plain`].
+//! Start at [`LinePlot`] for the screen, [`paper_plot`] for a column of a paper. All SVG pictures
+//! of the crate are drawn by `plotters` with only its SVG backend: no fonts, no files, no clock.
+//! They share [`picture`], [`axes`] and [`plain`].
 
 use std::ops::Range;
 
@@ -14,14 +14,14 @@ use plotters::prelude::*;
 
 use crate::palette::{self, Ground, Rgb};
 
-/// Decades that a logarithmic panel shows at most below its highest value.
+/// Maximum ratio of the highest to the lowest value of a logarithmic panel.
 const MOST_DECADES: f64 = 1e8;
-/// Marks across a panel.
+/// Colour of marks across a panel.
 pub(crate) const MARK: RGBColor = RGBColor(140, 146, 156);
-/// Behind stretches that are to be seen as one, such as moves.
+/// Background colour of highlighted intervals, such as moves.
 const BAND: RGBColor = RGBColor(234, 241, 247);
 
-/// Why there is no picture.
+/// Reason why there is no picture.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("no plot: {0}")]
 pub struct PlotError(String);
@@ -32,24 +32,23 @@ impl<E: std::error::Error + Send + Sync> From<DrawingAreaErrorKind<E>> for PlotE
     }
 }
 
-/// How a curve is drawn.
+/// Style of a curve.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum CurveLook {
-    /// In a colour of its own.
+    /// With its own colour.
     #[default]
     Plain,
-    /// Black and a little wider: the size of others.
+    /// Black and slightly wider: the magnitude of the others.
     Total,
-    /// In a colour of its own, dashed: what others are compared with.
+    /// With its own colour, dashed: the reference of a comparison.
     Dashed,
-    /// In a colour of its own, a dot at each point: what was measured or computed there and nowhere
-    /// else.
+    /// With its own colour, a dot at each point: values measured or computed only there.
     Dots,
-    /// As [`CurveLook::Plain`] with a dot at each point.
+    /// Like [`CurveLook::Plain`], with a dot at each point.
     Marked,
-    /// In the colour of the axis x (0), y (1) or z (2).
+    /// In the colour of axis x (0), y (1) or z (2).
     Axis(usize),
-    /// In the colour of the link, spring or joint of this number.
+    /// In the colour of the link, spring or joint of this index.
     Part(usize),
     /// Dashed, in the grey of the rigid twin.
     Rigid,
@@ -60,7 +59,7 @@ impl CurveLook {
         matches!(self, Self::Dashed | Self::Rigid)
     }
 
-    /// Whether its colour is the next one in the order of the plot.
+    /// Returns whether its colour is the next one in the order of the plot.
     fn is_counted(self) -> bool {
         matches!(self, Self::Plain | Self::Dashed | Self::Dots | Self::Marked)
     }
@@ -69,26 +68,26 @@ impl CurveLook {
 /// A curve.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PlotCurve {
-    /// For the legend.
+    /// Name in the legend.
     pub name: String,
-    /// How it is drawn.
+    /// Style.
     pub look: CurveLook,
-    /// Ascending.
+    /// Abscissae, ascending.
     pub x: Vec<f64>,
-    /// One per x.
+    /// Ordinates, one per x.
     pub y: Vec<f64>,
 }
 
 /// Curves that share a vertical axis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Panel {
-    /// What is on the vertical axis.
+    /// Label of the vertical axis.
     pub label: String,
-    /// Logarithmic vertical axis; values that are not positive are left out.
+    /// Whether the vertical axis is logarithmic; values that are not positive are left out.
     pub logarithmic: bool,
     /// Whether its curves are named in a legend.
     pub legend: bool,
-    /// The curves; those of one name have one colour in all panels.
+    /// Curves; those with the same name have the same colour in all panels.
     pub curves: Vec<PlotCurve>,
 }
 
@@ -103,10 +102,10 @@ struct Style {
     font: u32,
     legend_font: u32,
     stroke: u32,
-    /// Width of the picture on paper (mm); without it units are pixels.
+    /// Width of the picture on paper (mm); if `None`, units are pixels.
     width_mm: Option<f64>,
     x_labels: usize,
-    /// Whether a unit is as long on both axes.
+    /// Whether both axes have the same scale.
     equal: bool,
 }
 
@@ -124,7 +123,7 @@ const SCREEN: Style = Style {
     equal: false,
 };
 
-/// A picture between paragraphs, 960 pixels of the browser in halves.
+/// A picture between paragraphs, 960 browser pixels in half-pixel units.
 const PAGE: Style = Style {
     panel: (1920, 660),
     margin: 24,
@@ -154,60 +153,61 @@ const COLUMN: Style = Style {
     equal: false,
 };
 
-/// A plan: a unit is as long on both axes.
+/// A plan: both axes have the same scale.
 const PLAN: Style = Style { panel: (1920, 1300), equal: true, ..PAGE };
 
 /// Panels over a common horizontal axis, for the screen. Curves are named above the panels, where
-/// they hide nothing.
+/// the names hide nothing.
 #[derive(Clone, Debug, Default)]
 pub struct LinePlot<'a> {
-    /// What is shown.
+    /// Title.
     pub title: &'a str,
-    /// What else is to be known, line by line, in smaller letters.
+    /// Notes below the title, one per line, in smaller letters.
     pub notes: &'a [String],
-    /// What is on the horizontal axis.
+    /// Label of the horizontal axis.
     pub x_label: &'a str,
-    /// Logarithmic horizontal axis, if possible.
+    /// Whether the horizontal axis is logarithmic, if possible.
     pub logarithmic_x: bool,
-    /// Places on it that are marked in every panel, with a name in the first.
+    /// Positions on the horizontal axis that are marked in every panel, with a name in the first.
     pub marks: &'a [(f64, String)],
-    /// From top to bottom.
+    /// Panels, from top to bottom.
     pub panels: &'a [Panel],
 }
 
 impl LinePlot<'_> {
-    /// The text of an SVG file.
+    /// Returns the text of an SVG file.
     ///
     /// # Errors
-    /// [`PlotError`] if nothing finite is to be drawn.
+    /// [`PlotError`] if there is nothing finite to draw.
     pub fn svg(&self) -> Result<String, PlotError> {
         plot(self, &[], &SCREEN)
     }
 }
 
-/// Panels in the size of a column of a two-column paper (88 mm, text of 8 points), without a title:
-/// that is the caption's work. Curves are named above the panels; `bands` are stretches of the
+/// Draws panels in the size of a column of a two-column paper (88 mm, text of 8 points), without a
+/// title, which belongs in the caption. Curves are named above the panels; `bands` are intervals of
+/// the horizontal axis to be tinted. SVG.
 /// horizontal axis to be tinted. SVG.
 ///
-/// # Errors
+/// Those of [`LinePlot::svg`].
 /// As [`LinePlot::svg`].
 pub fn paper_plot(x_label: &str, panels: &[Panel], bands: &[(f64, f64)]) -> Result<String, PlotError> {
     plot(&LinePlot { x_label, panels, ..LinePlot::default() }, bands, &COLUMN)
 }
 
-/// Panels below each other for a page of text, 960 pixels wide, curves named above them, as SVG.
+/// Draws stacked panels for a page of text, 960 pixels wide, with curve names above them, as SVG.
 ///
 /// # Errors
-/// As [`LinePlot::svg`].
+/// Those of [`LinePlot::svg`].
 pub fn page_plot(x_label: &str, logarithmic_x: bool, panels: &[Panel]) -> Result<String, PlotError> {
     plot(&LinePlot { x_label, logarithmic_x, panels, ..LinePlot::default() }, &[], &PAGE)
 }
 
-/// A plan for a page of text: one panel on which a unit is as long on both axes, curves that may go
-/// anywhere, named above it. SVG.
+/// Draws a plan for a page of text: one panel with the same scale on both axes and curves of any
+/// shape, named above it. SVG.
 ///
 /// # Errors
-/// As [`LinePlot::svg`].
+/// Those of [`LinePlot::svg`].
 pub fn plan_plot(x_label: &str, panel: &Panel) -> Result<String, PlotError> {
     plot(&LinePlot { x_label, panels: std::slice::from_ref(panel), ..LinePlot::default() }, &[], &PLAN)
 }
@@ -215,7 +215,7 @@ pub fn plan_plot(x_label: &str, panel: &Panel) -> Result<String, PlotError> {
 /// A picture or a part of it.
 pub(crate) type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
-/// The text of an SVG file: a picture on white of so many pixels.
+/// Creates an SVG picture on white with the given size in pixels.
 pub(crate) fn picture(
     size: (u32, u32),
     draw: impl FnOnce(&Area<'_>) -> Result<(), PlotError>,
@@ -226,7 +226,7 @@ pub(crate) fn picture(
     draw(&area)?;
     area.present()?;
     drop(area);
-    // The width of an absent stroke is left out: pages with many dots are smaller by a third.
+    // The stroke width of an absent stroke is removed: pages with many dots become a third smaller.
     let text = text.replace(" stroke=\"none\" stroke-width=\"1\"", "");
     // The drawing library escapes markup, not control characters.
     Ok(flexarm_settings::written::visible(&text))
@@ -235,15 +235,15 @@ pub(crate) fn picture(
 /// Axes of a chart.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Axes<'a> {
-    /// From left to right and from below; from above if the end is the smaller number.
+    /// From left to right and from bottom to top; from top to bottom if the end is smaller.
     pub(crate) ranges: [Range<f64>; 2],
-    /// Room for numbers at the left and below (pixels).
+    /// Space for numbers on the left and below (pixels).
     pub(crate) room: [u32; 2],
-    /// Names at 0, 1, 2, ... in place of numbers.
+    /// Names at 0, 1, 2, ... instead of numbers.
     pub(crate) names: [Option<&'a [String]>; 2],
 }
 
-/// A chart with its axes, and lines across at their numbers.
+/// Draws a chart with its axes, and grid lines at their numbers.
 pub(crate) fn axes<'a, 'b>(
     area: &Area<'b>,
     Axes { ranges: [x, y], room: [left, below], names }: Axes<'_>,
@@ -255,7 +255,7 @@ pub(crate) fn axes<'a, 'b>(
         Some(names) if (x - x.round()).abs() < 1e-6 => names.get(x.round() as usize).cloned().unwrap_or_default(),
         Some(_) => String::new(),
     };
-    // Not more than have room.
+    // At most as many labels as there is space for.
     let most = |k: usize, room: usize| match names[k] {
         None => (room / 40).max(3),
         Some(names) => (room / [44, 14][k]).clamp(1, names.len().max(1)),
@@ -319,7 +319,7 @@ fn plot(what: &LinePlot<'_>, bands: &[(f64, f64)], style: &Style) -> Result<Stri
     Ok(text)
 }
 
-/// Room for the title and the notes below it.
+/// Height of the title and the notes below it.
 fn heading_height(what: &LinePlot<'_>, style: &Style) -> u32 {
     match (what.title.is_empty(), what.notes.len() as u32) {
         (true, 0) => 0,
@@ -342,13 +342,13 @@ fn draw_heading(area: &Area<'_>, what: &LinePlot<'_>, style: &Style) -> Result<(
     Ok(())
 }
 
-/// The points of each curve that can be drawn.
+/// Returns the drawable points of each curve.
 fn points(panel: &Panel) -> Vec<Vec<(f64, f64)>> {
     let good = |(x, y): &(f64, f64)| x.is_finite() && y.is_finite() && (*y > 0.0 || !panel.logarithmic);
     panel.curves.iter().map(|c| c.x.iter().copied().zip(c.y.iter().copied()).filter(good).collect()).collect()
 }
 
-/// What the axes must show, with some room.
+/// Returns the ranges of the axes, with a margin.
 fn ranges(points: &[Vec<(f64, f64)>], logarithmic: bool) -> Option<(Range<f64>, Range<f64>)> {
     let all = || points.iter().flatten();
     let span = |f: fn(&(f64, f64)) -> f64| {
@@ -368,7 +368,7 @@ fn ranges(points: &[Vec<(f64, f64)>], logarithmic: bool) -> Option<(Range<f64>, 
     Some((x_low..if x_high > x_low { x_high } else { x_low + 1.0 }, y))
 }
 
-/// Ranges widened around their middles until a unit is as long on both axes, with some room.
+/// Widens the ranges around their centres until both axes have the same scale, with a margin.
 fn equally_long((x, y): (Range<f64>, Range<f64>), style: &Style) -> (Range<f64>, Range<f64>) {
     let wide = f64::from(style.panel.0 - 3 * style.margin - style.y_area);
     let high = f64::from(style.panel.1 - 2 * style.margin - style.x_area);
@@ -380,12 +380,12 @@ fn equally_long((x, y): (Range<f64>, Range<f64>), style: &Style) -> (Range<f64>,
     (around(x, wide), around(y, high))
 }
 
-/// A colour of the palette.
+/// Converts a colour of the palette.
 pub(crate) fn ink([red, green, blue]: Rgb) -> RGBColor {
     RGBColor(red, green, blue)
 }
 
-/// Colour and width of a curve; those of one name look the same in all panels.
+/// Returns colour and width of a curve; curves with the same name look the same in all panels.
 fn look_of(curve: &PlotCurve, all: &[&PlotCurve], style: &Style) -> ShapeStyle {
     match curve.look {
         CurveLook::Total => BLACK.stroke_width(style.stroke + style.stroke / 3),
@@ -399,13 +399,14 @@ fn look_of(curve: &PlotCurve, all: &[&PlotCurve], style: &Style) -> ShapeStyle {
     }
 }
 
-/// Places of names above the panels: curve and distance from the left, row by row.
+/// Returns the layout of the names above the panels: curve and distance from the left, row by row.
 fn legend_rows(curves: &[&PlotCurve], style: &Style) -> Vec<Vec<(usize, u32)>> {
     let mut rows = vec![Vec::new()];
     let first = style.y_area + style.margin;
     let mut x = first;
     for (k, curve) in curves.iter().enumerate() {
-        // Without fonts the width of a name is a guess: a little over half its height per letter.
+        // Without fonts the width of a name is estimated: slightly more than half its height per
+        // letter.
         let width = swatch(style) + curve.name.chars().count() as u32 * style.legend_font * 6 / 10 + style.legend_font;
         if x > first && x + width > style.panel.0 {
             rows.push(Vec::new());
@@ -423,7 +424,7 @@ fn dot_radius(style: &Style) -> u32 {
     2 * style.stroke
 }
 
-/// Length of the line beside a name in the legend, its gap included.
+/// Length of the line next to a name in the legend, with its gap.
 fn swatch(style: &Style) -> u32 {
     2 * style.legend_font
 }
@@ -464,11 +465,11 @@ struct Frame<'a> {
     x_label: &'a str,
     panel: &'a Panel,
     points: &'a [Vec<(f64, f64)>],
-    /// Of all panels, in the order of their colours.
+    /// Curves of all panels, in the order of their colours.
     all: &'a [&'a PlotCurve],
     bands: &'a [(f64, f64)],
     marks: &'a [(f64, String)],
-    /// Whether the marks are named here.
+    /// Whether the marks are named in this panel.
     named: bool,
     ranges: (Range<f64>, Range<f64>),
     style: &'a Style,
@@ -523,7 +524,7 @@ impl Frame<'_> {
         Ok(())
     }
 
-    /// Dashed lines across the panel; names that would lie on each other are left out.
+    /// Draws dashed lines across the panel; names that would overlap are left out.
     fn draw_marks<X, Y>(&self, chart: &mut Chart<'_, '_, X, Y>) -> Result<(), PlotError>
     where
         X: Ranged<ValueType = f64>,
@@ -551,7 +552,7 @@ impl Frame<'_> {
 /// A chart of `plotters` as SVG.
 pub(crate) type Chart<'a, 'b, X, Y> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<X, Y>>;
 
-/// Short form of a number on an axis.
+/// Short format of a number on an axis.
 pub(crate) fn plain(x: f64) -> String {
     match x.abs() {
         // Rounding residues of the axis are zeros.
@@ -561,7 +562,7 @@ pub(crate) fn plain(x: f64) -> String {
     }
 }
 
-/// The nearest number of three digits.
+/// Rounds to three significant digits.
 pub(crate) fn three_digits(x: f64) -> f64 {
     format!("{x:.2e}").parse().unwrap_or(x)
 }
@@ -596,7 +597,7 @@ mod tests {
         for word in ["all of it", "at rest", "time", "size", "angle", "a &lt; b", "f1"] {
             assert!(text.contains(word), "{word}");
         }
-        // The second would lie on the first, the third is beyond the axis.
+        // The second name would overlap the first, the third is beyond the axis.
         assert!(!text.contains("f2") && !text.contains("f3"));
         assert!(text.matches("<polyline").count() >= 2);
         assert_eq!(text, plot.svg().unwrap());
@@ -641,7 +642,7 @@ mod tests {
         }
     }
 
-    /// Truth: the width of a column, and a picture's units per millimetre.
+    /// Truth: the width of a column, and the units of the picture per millimetre.
     #[test]
     fn a_figure_for_a_paper_has_the_width_of_a_column_and_names_above_its_panel() {
         let mut curves: Vec<PlotCurve> =

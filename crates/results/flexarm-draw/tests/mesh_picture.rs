@@ -1,4 +1,4 @@
-//! Pictures of a reduction: what a person would see is counted in pixels.
+//! Pictures of a reduction, checked by counting pixels.
 #![cfg(feature = "png")]
 #![allow(non_snake_case, reason = "monogram notation: X_LI, pose of the interface in the link")]
 #![allow(
@@ -20,8 +20,8 @@ use flexarm_fem::{
 };
 use nalgebra::Vector3;
 
-/// Truth: the scene on paper, and four samples a pixel: ground shines through in quarters. Thin and
-/// large triangles, some of them partly outside.
+/// Truth: the scene on paper, and four samples per pixel: the background shows through in quarters.
+/// Thin and large triangles, some of them partly outside.
 #[test]
 fn a_layer_lies_over_any_ground_as_the_scene_does() {
     let mut seed = 7_u64;
@@ -118,7 +118,7 @@ fn pixels(image: &Image, [left, right, top, bottom]: [usize; 4], wanted: impl Fn
     all.filter(|(x, y)| wanted(image.pixel(*x, *y))).collect()
 }
 
-/// Whether a colour is `wanted` under more or less light: the same mixture of red, green and blue.
+/// Whether a colour is `wanted` with more or less light: the same ratio of red, green and blue.
 fn is_shade_of(wanted: Rgb) -> impl Fn(Rgb) -> bool {
     move |color| {
         let [a, b] = [wanted, color].map(|c| Vector3::from(c.map(f64::from)));
@@ -130,7 +130,7 @@ fn is_shade_of(wanted: Rgb) -> impl Fn(Rgb) -> bool {
 const VIEWS: [[usize; 4]; 2] = [[0, 1200, 60, 330], [0, 1200, 340, 610]];
 const LEGEND: [usize; 4] = [1215, 1600, 60, 900];
 
-/// Opposite directions: every flat face is turned to the viewer in one of the first two views.
+/// Opposite directions: every flat face points at the viewer in one of the first two views.
 #[test]
 fn each_tied_end_face_fills_an_area_of_its_colour_in_one_of_two_opposite_views() {
     let mesh = bar();
@@ -142,7 +142,7 @@ fn each_tied_end_face_fills_an_area_of_its_colour_in_one_of_two_opposite_views()
         let (more, less) = (counts[0].max(counts[1]), counts[0].min(counts[1]));
         assert!(more > 2000 && less < more / 3, "{counts:?}"); // the lesser: name and spokes
     }
-    // A hangs on the left and B on the right, whatever the side.
+    // A is on the left and B on the right, from either side.
     let column = |number: usize, view: [usize; 4]| {
         let found = pixels(&sheet, view, is_shade_of(color::interface(number)));
         found.iter().map(|(x, _)| *x).sum::<usize>() / found.len()
@@ -179,9 +179,9 @@ fn single_tied_nodes_without_a_whole_face_are_told_in_red() {
         pixels(&sheet, LEGEND, |c| c == color::ALERT).len()
     };
     let good = ends(&mesh);
-    // Two edges of the end face: nodes of no common face.
+    // Two edges of the end face: nodes without a common face.
     let edges = interface(&mesh, "B", [0.8, 0.05, 0.03], |p| p.x > 0.8 - 1e-9 && !(0.01..0.09).contains(&p.y));
-    // That bricks of first order are too stiff is told in red as well.
+    // The excessive stiffness of first-order bricks is reported in red as well.
     assert!(red(&[good[0].clone(), edges]) > red(&good) + 100);
 }
 
@@ -272,7 +272,7 @@ fn nearer_triangles_hide_farther_ones_and_keep_their_area() {
     assert!((count(back) / 3e4 - 1.0).abs() < 0.05, "{}", count(back));
 }
 
-/// The lower arm of the reference data: flanges that look to opposite sides.
+/// The lower arm of the reference data: flanges that face opposite sides.
 #[test]
 fn the_flanges_of_the_lower_arm_show_one_on_each_side() {
     let name = "shared/fe/A2_lower_arm/arm_tet10_h30mm.inp.gz";

@@ -1,7 +1,7 @@
-//! A run as columns: each signal one contiguous array with a name, a unit and a width. Every sample
-//! is kept.
+//! A run as columns: each signal is one contiguous array with a name, a unit and a width. Every
+//! sample is kept.
 //!
-//! Start at [`Columns::push`]. What thins long runs for pictures is `flexarm_log::Trace`.
+//! Start at [`Columns::push`]. Long runs are thinned for pictures by `flexarm_log::Trace`.
 
 use crate::{RunHeader, Sample};
 
@@ -10,18 +10,18 @@ use crate::{RunHeader, Sample};
 pub struct Column {
     /// Name, such as `error_world`.
     pub name: String,
-    /// Unit of its numbers, such as `m`; empty where joints turn and slide side by side.
+    /// Unit of its numbers, such as `m`; empty if revolute and prismatic joints are mixed.
     pub unit: &'static str,
     /// Numbers per row.
     pub width: usize,
-    /// Rows after each other: row `i` is `values[i * width..][..width]`.
+    /// Row-major values: row `i` is `values[i * width..][..width]`.
     pub values: Vec<f64>,
 }
 
-/// What is written into a column at each sample.
+/// Function that appends the values of a sample to a column.
 type Fill = fn(&Sample, &mut Vec<f64>);
 
-/// What there is to know of a signal before a run.
+/// Description of a signal before a run.
 struct Signal {
     name: &'static str,
     unit: &'static str,
@@ -44,7 +44,7 @@ const fn signal(name: &'static str, unit: &'static str, width: Width, fill: Fill
 
 use Width::{Numbers, PerContributor, PerElement, PerJoint};
 
-/// Every signal there is; what needs the rigid twin comes from the error on.
+/// All signals; those that need the rigid twin start with the error.
 const SIGNALS: [Signal; 18] = [
     signal("time", "s", Numbers(1), |s, to| to.push(s.time_s)),
     signal("position", "", PerJoint, |s, to| to.extend_from_slice(&s.flexible.q)),
@@ -65,7 +65,7 @@ const SIGNALS: [Signal; 18] = [
     signal("rigid_tcp_position", "m", Numbers(3), |s, to| to.extend(s.rigid.X_WT.translation.vector.iter())),
     signal("rigid_tcp_quaternion_wxyz", "", Numbers(4), |s, to| to.extend(wxyz(&s.rigid))),
 ];
-/// The first signal that needs the rigid twin.
+/// Index of the first signal that needs the rigid twin.
 const OF_TWIN: usize = 9;
 
 fn wxyz(twin: &crate::TwinSample) -> [f64; 4] {
@@ -73,23 +73,23 @@ fn wxyz(twin: &crate::TwinSample) -> [f64; 4] {
     [q.w, q.i, q.j, q.k]
 }
 
-/// The signals of a run, with the names of what they belong to.
+/// The signals of a run, with the names of their joints, elements and contributors.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Columns {
     /// Joints, in the order of `position`, `velocity` and `effort`.
     pub joints: Vec<String>,
-    /// Which of them slide.
+    /// Whether each joint is prismatic.
     pub prismatic: Vec<bool>,
     /// Elastic elements, in the order of `deflection` and `load`: six numbers each.
     pub elements: Vec<String>,
-    /// Who moves the tool, in the order of `contribution`: three numbers each.
+    /// Contributors to the TCP displacement, in the order of `contribution`: three numbers each.
     pub contributors: Vec<String>,
     columns: Vec<Column>,
     rows: usize,
 }
 
 impl Columns {
-    /// Empty columns of a run.
+    /// Creates empty columns for a run.
     #[must_use]
     pub fn new(header: &RunHeader) -> Self {
         let signals = if header.has_rigid { &SIGNALS[..] } else { &SIGNALS[..OF_TWIN] };
@@ -111,11 +111,11 @@ impl Columns {
         }
     }
 
-    /// Columns of the same joints, elements and contributors with numbers that were kept elsewhere,
-    /// each signal under its name.
+    /// Creates columns of the same joints, elements and contributors from stored numbers, each
+    /// signal by its name.
     ///
-    /// `None` if they are not all signals of a run, with or without the rigid twin, in their order
-    /// and equally long.
+    /// `None` if they are not all signals of a run, with or without the rigid twin, in order and of
+    /// equal length.
     #[must_use]
     pub fn filled(&self, signals: impl IntoIterator<Item = (String, Vec<f64>)>) -> Option<Self> {
         let signals: Vec<(String, Vec<f64>)> = signals.into_iter().collect();
@@ -149,19 +149,19 @@ impl Columns {
         self.rows += 1;
     }
 
-    /// Number of instants.
+    /// Returns the number of instants.
     #[must_use]
     pub fn rows(&self) -> usize {
         self.rows
     }
 
-    /// All signals.
+    /// Returns all signals.
     #[must_use]
     pub fn columns(&self) -> &[Column] {
         &self.columns
     }
 
-    /// The signal of this name.
+    /// Returns the signal of this name.
     #[must_use]
     pub fn column(&self, name: &str) -> Option<&Column> {
         self.columns.iter().find(|column| column.name == name)

@@ -1,9 +1,9 @@
-//! What a run gives: a [`RunHeader`] once, a [`Sample`] per logged instant, a [`RunResult`] at the
-//! end; [`Columns`] for those who want all of it as arrays.
+//! Output of a run: a [`RunHeader`] once, a [`Sample`] per logged instant, a [`RunResult`] at the
+//! end; [`Columns`] hold all of it as arrays.
 //!
-//! Recorders, reports, pictures and other programs read these same types. Poses are in the world,
-//! SI units, six-vectors linear first; "flexible" is the simulated robot, "rigid" its twin with
-//! every elastic coordinate held at zero.
+//! Recorders, reports, pictures and other programs read the same types. Poses are in the world, SI
+//! units, six-vectors linear first; "flexible" is the simulated robot, "rigid" its twin with every
+//! elastic coordinate held at zero.
 //!
 //! ```
 //! use flexarm_sample::{Columns, RunHeader, Sample, TwinSample};
@@ -18,7 +18,7 @@
 //! assert_eq!((position.width, position.values.as_slice()), (1, &[0.0, 0.1, 0.2][..]));
 //! ```
 //!
-//! Not here: files, how a run is made, what its numbers mean.
+//! Not here: files, the simulation itself, the interpretation of its numbers.
 #![allow(non_snake_case, reason = "monogram notation: X_WL, pose of L in W")]
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 

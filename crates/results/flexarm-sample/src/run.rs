@@ -1,5 +1,5 @@
-//! What a run gives: a [`RunHeader`] once, then one [`Sample`] per logged instant, its
-//! [`RunResult`] at the end.
+//! Output of a run: a [`RunHeader`] once, then one [`Sample`] per logged instant, a [`RunResult`]
+//! at the end.
 //!
 //! All poses are in the world; SI units; six-vectors linear first. "Flexible" is the simulated
 //! robot, "rigid" its twin with every elastic coordinate held at zero.
@@ -8,11 +8,11 @@ use std::path::PathBuf;
 
 use flexarm_spatial::Pose;
 
-/// The first of January 2000, 0:00 UTC (ns since 1970): when runs begin that are not told when, so
-/// that equal runs are equal files. Not 0, which ROS reads as no time at all.
+/// 1 January 2000, 0:00 UTC (ns since 1970): default start time of runs, so that equal runs give
+/// equal files. Not 0, which ROS interprets as no time.
 pub const START_NS: u64 = 946_684_800_000_000_000;
 
-/// What stays the same during a run.
+/// Constant data of a run.
 #[derive(Clone, Debug, Default)]
 pub struct RunHeader {
     /// Name of the robot; first part of entity paths.
@@ -23,7 +23,7 @@ pub struct RunHeader {
     pub urdf: String,
     /// Names of the actuated joints, in coordinate order.
     pub joints: Vec<String>,
-    /// Which of them slide instead of turning; all turn if empty.
+    /// Whether each joint is prismatic; all are revolute if empty.
     pub prismatic: Vec<bool>,
     /// Links of the URDF, parents before children; the first is the base.
     pub links: Vec<LinkInfo>,
@@ -31,7 +31,7 @@ pub struct RunHeader {
     pub elements: Vec<String>,
     /// Triangle meshes in link axes.
     pub meshes: Vec<LinkMesh>,
-    /// Name of the frame that is the tool centre point.
+    /// Name of the TCP frame.
     pub tcp: String,
     /// Labelled text: groups such as `flexarm.run` with their key-value pairs.
     pub metadata: Vec<(String, Vec<(String, String)>)>,
@@ -41,37 +41,37 @@ pub struct RunHeader {
     pub description: String,
     /// Whether samples carry a rigid twin.
     pub has_rigid: bool,
-    /// Whether samples carry [`Sample::static_m`], which without a twin nobody can say.
+    /// Whether samples carry [`Sample::static_m`], which needs the rigid twin.
     pub has_static: bool,
     /// Samples per second.
     pub log_rate_hz: f64,
-    /// Time of simulated time zero in recordings whose times have a date (ns since 1970);
-    /// [`START_NS`] without it.
+    /// Absolute time of simulated time zero in recordings with dates (ns since 1970); [`START_NS`]
+    /// if `None`.
     pub start_ns: Option<u64>,
-    /// Step of the stepper (s): times of samples are whole multiples of it; 0 if it is not known.
+    /// Step size of the stepper (s); sample times are whole multiples of it; 0 if unknown.
     pub step_s: f64,
-    /// Links that bend.
+    /// Flexible links.
     pub bends: Vec<BendInfo>,
-    /// Flexible links and drives that move the tool, in the order of [`Sample::contributions`].
+    /// Flexible links and drives that contribute to the TCP error, in the order of
+    /// [`Sample::contributions`].
     pub contributors: Vec<String>,
-    /// What is shown from which instant on, in a recording of shapes that have no size of their
-    /// own, such as modes: errors and deflections in it are drawn ones and are not told. Empty for
-    /// a run.
+    /// Captions by start time, in a recording of shapes without a magnitude of their own, such as
+    /// modes: its errors and deflections are only drawn, not reported. Empty for a run.
     pub captions: Vec<Caption>,
-    /// What stands still around the robot, such as the points of a map.
+    /// Static objects around the robot, such as the points of a map.
     pub scenery: Vec<Scenery>,
-    /// Factor by which pictures show deflections; 0 for recordings without a magnified arm.
+    /// Magnification of deflections in pictures; 0 for recordings without a magnified arm.
     pub magnification: f64,
-    /// Deviation from the rigid twin that gets the last colour of the scale (m).
+    /// Deviation from the rigid twin at the upper end of the colour scale (m).
     pub color_scale_m: f64,
-    /// Box in the world that holds all link frames at all times: lowest and highest corner (m).
-    /// What to point a camera at.
+    /// Box in the world that contains all link frames at all times, for camera placement: lowest
+    /// and highest corner (m).
     pub volume: Option<[[f64; 3]; 2]>,
 }
 
 impl RunHeader {
-    /// Number of the colour that a link, spring or joint has in all plots of the run: contributors
-    /// are counted first, then springs and joints of other names.
+    /// Returns the colour index of a link, spring or joint in all plots of the run: contributors
+    /// come first, then springs and joints with other names.
     #[must_use]
     pub fn color_number(&self, name: &str) -> usize {
         let mut known: Vec<&String> = Vec::new();
@@ -87,39 +87,39 @@ impl RunHeader {
     }
 }
 
-/// The name of what is shown from an instant on.
+/// Caption shown from an instant on.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Caption {
-    /// When (s).
+    /// Time (s).
     pub from_s: f64,
-    /// In a few words.
+    /// Short text.
     pub text: String,
 }
 
-/// Something that stands in the world and does not move.
+/// A static object in the world.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scenery {
-    /// Title of the view that shows it; those of one title are shown together, those without one in
-    /// all views.
+    /// Title of the view that shows it; objects with the same title are shown together, those
+    /// without one in all views.
     pub view: String,
     /// Name, unique within the view.
     pub name: String,
-    /// What it is.
+    /// Shape.
     pub form: SceneryForm,
 }
 
-/// Shape and colours of what stands still (m, world; red, green, blue, alpha).
+/// Shape and colours of a static object (m, world; red, green, blue, alpha).
 #[derive(Clone, Debug, PartialEq)]
 pub enum SceneryForm {
-    /// Balls.
+    /// Spheres.
     Points {
         /// Centres.
         places: Vec<[f32; 3]>,
-        /// One per ball, or one for all.
+        /// One per sphere, or one for all.
         colors: Vec<[u8; 4]>,
-        /// Of every ball.
+        /// Radius of every sphere.
         radius_m: f32,
-        /// One per ball, or none.
+        /// One per sphere, or none.
         labels: Vec<String>,
     },
     /// A surface of triangles.
@@ -128,7 +128,7 @@ pub enum SceneryForm {
         places: Vec<[f32; 3]>,
         /// Corner indices.
         triangles: Vec<[u32; 3]>,
-        /// Of all of it.
+        /// Colour of the surface.
         color: [u8; 4],
     },
     /// Ellipsoids.
@@ -146,22 +146,22 @@ pub enum SceneryForm {
     Box {
         /// Lowest and highest corner.
         corners: [[f32; 3]; 2],
-        /// Of all edges.
+        /// Colour of the edges.
         color: [u8; 4],
     },
 }
 
-/// How a link bends: stations along the line from its near interface to its far one.
+/// Deformation of a link: stations along the line from its near interface to its far one.
 ///
-/// In a sample [`TwinSample::X_WS`] says where the stations are; between them the link is drawn as
-/// a beam.
+/// [`TwinSample::X_WS`] of a sample gives the poses of the stations; between them the link is drawn
+/// as a beam.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct BendInfo {
     /// Index into [`RunHeader::links`].
     pub link: usize,
     /// Poses of the undeformed stations in the link, near interface first.
     pub X_LS: Vec<Pose>,
-    /// Links that hang on a station: index into [`RunHeader::links`], number of the station.
+    /// Links attached to a station: index into [`RunHeader::links`], index of the station.
     pub carries: Vec<(usize, usize)>,
 }
 
@@ -211,16 +211,16 @@ pub struct Attachment {
 pub struct TwinSample {
     /// Positions of the actuated joints (rad or m).
     pub q: Vec<f64>,
-    /// Velocities.
+    /// Velocities of the actuated joints (rad/s or m/s).
     pub qdot: Vec<f64>,
-    /// Forces the drives must supply (N m or N).
+    /// Drive forces (N m or N).
     pub effort: Vec<f64>,
     /// Pose of each link of the header in the world.
     pub X_WL: Vec<Pose>,
-    /// Pose of the tool centre point in the world.
+    /// TCP pose in the world.
     pub X_WT: Pose,
     /// Poses of the stations of all [`RunHeader::bends`] in the world, one link after the other;
-    /// empty for the rigid twin, whose stations are where [`BendInfo::X_LS`] says.
+    /// empty for the rigid twin, whose stations are given by [`BendInfo::X_LS`].
     pub X_WS: Vec<Pose>,
 }
 
@@ -231,7 +231,7 @@ impl Clone for TwinSample {
         copy
     }
 
-    /// Without allocation where there is room already.
+    /// Does not allocate if the capacity suffices.
     fn clone_from(&mut self, source: &Self) {
         let Self { q, qdot, effort, X_WL, X_WT, X_WS } = source;
         self.q.clone_from(q);
@@ -246,7 +246,7 @@ impl Clone for TwinSample {
 /// One elastic element at one instant.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ElasticSample {
-    /// Deflection in the proximal face's axes: 3 translations (m), 3 angles (rad).
+    /// Deflection in axes of the proximal face: 3 translations (m), 3 angles (rad).
     pub deflection: [f64; 6],
     /// Load on the distal part: force (N), moment (N m).
     pub load: [f64; 6],
@@ -255,11 +255,11 @@ pub struct ElasticSample {
 /// Energies of the flexible robot (J).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct EnergySample {
-    /// Kinetic.
+    /// Kinetic energy.
     pub kinetic: f64,
-    /// Gravity, zero at the world origin.
+    /// Gravitational energy, zero at the world origin.
     pub potential: f64,
-    /// Stored in the elastic elements.
+    /// Energy stored in the elastic elements.
     pub elastic: f64,
 }
 
@@ -268,7 +268,7 @@ pub struct EnergySample {
 pub struct Sample {
     /// Time since the start (s).
     pub time_s: f64,
-    /// Steps taken so far.
+    /// Number of steps so far.
     pub step: u64,
     /// Simulated robot.
     pub flexible: TwinSample,
@@ -276,15 +276,14 @@ pub struct Sample {
     pub rigid: TwinSample,
     /// TCP error flexible minus rigid, world axes: translation (m), rotation vector (rad).
     pub error_world: [f64; 6],
-    /// The same in path axes: tangential, normal, binormal.
+    /// The same error in path axes: tangential, normal, binormal.
     pub error_path: [f64; 6],
-    /// Static part of the error: the TCP error if the arm stood still where it is, under weight and
+    /// Static part of the error: the static TCP error at the pose of the instant, under gravity and
     /// the loads of the instant (m, world axes); meaningless unless [`RunHeader::has_static`].
     pub static_m: [f64; 3],
     /// Elastic elements, in header order.
     pub elastic: Vec<ElasticSample>,
-    /// TCP displacement that each contributor's deflection alone causes (m, world axes), in header
-    /// order.
+    /// TCP displacement due to each contributor's deflection (m, world axes), in header order.
     pub contributions: Vec<[f64; 3]>,
     /// Energies.
     pub energy: EnergySample,
@@ -299,7 +298,7 @@ impl Clone for Sample {
         copy
     }
 
-    /// Without allocation where there is room already.
+    /// Does not allocate if the capacity suffices.
     fn clone_from(&mut self, source: &Self) {
         let Self {
             time_s,
@@ -323,27 +322,27 @@ impl Clone for Sample {
     }
 }
 
-/// What kind of thing happened at an instant of a run.
+/// Kind of an event in a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum EventKind {
     /// A move begins.
     MoveStart,
     /// A move ends; the joints rest.
     MoveEnd,
-    /// The TCP error is largest.
+    /// The TCP error reaches its maximum.
     Peak,
     /// The TCP error stays within the settling band from here on.
     Settled,
-    /// A limit is passed.
+    /// A limit is exceeded.
     Limit,
     /// A load or payload changes.
     Load,
-    /// The run was given up.
+    /// The run was stopped early.
     Stopped,
 }
 
 impl EventKind {
-    /// A word for files.
+    /// Returns a word for files.
     #[must_use]
     pub fn word(self) -> &'static str {
         match self {
@@ -357,7 +356,7 @@ impl EventKind {
         }
     }
 
-    /// The kind that a word of [`EventKind::word`] names.
+    /// Returns the kind for a word of [`EventKind::word`].
     #[must_use]
     pub fn from_word(word: &str) -> Option<Self> {
         let all = [Self::MoveStart, Self::MoveEnd, Self::Peak, Self::Settled, Self::Limit, Self::Load, Self::Stopped];
@@ -365,26 +364,26 @@ impl EventKind {
     }
 }
 
-/// Something that happened at an instant.
+/// An event at an instant of a run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Event {
-    /// When (s).
+    /// Time (s).
     pub time_s: f64,
-    /// What kind of thing.
+    /// Kind of event.
     pub kind: EventKind,
-    /// In words, with numbers and units.
+    /// Description, with numbers and units.
     pub text: String,
 }
 
-/// What is known only at the end of a run.
+/// Results that are known only at the end of a run.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RunResult {
     /// Label and value pairs for programs.
     pub figures: Vec<(String, String)>,
-    /// The same for people: name, and value with its unit.
+    /// The same for people: name, and value with unit.
     pub readable: Vec<(String, String)>,
-    /// What happened, in order of time.
+    /// Events, in order of time.
     pub events: Vec<Event>,
-    /// Files about the result to put into the recording, such as its summary.
+    /// Files on the result to put into the recording, such as its summary.
     pub attachments: Vec<Attachment>,
 }

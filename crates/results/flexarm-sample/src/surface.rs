@@ -1,5 +1,5 @@
-//! Surfaces made ready to be drawn: corners shared where the surface is smooth, split where it has
-//! an edge.
+//! Preparation of surfaces for drawing: corners are shared where the surface is smooth, and split
+//! at edges.
 
 use std::collections::HashMap;
 
@@ -7,20 +7,20 @@ use nalgebra::Vector3;
 
 use crate::LinkMesh;
 
-/// Faces that meet at a smaller angle than this are drawn as one round surface (rad).
+/// Angle between faces below which they are drawn as one smooth surface (rad).
 const CREASE_RAD: f64 = 0.6;
 
 impl LinkMesh {
-    /// The same surface with normals of its own making: triangle soup (STL) becomes a mesh with
-    /// shared corners, which looks round where it is round and takes a third of the space.
+    /// Returns the same surface with recomputed normals: a triangle soup (STL) becomes a mesh with
+    /// shared corners, which looks smooth where it is and takes a third of the space.
     #[must_use]
     pub fn with_creases(mut self) -> Self {
         let point = |k: u32| Vector3::from(self.positions[k as usize].map(f64::from));
         let normal_of = |[a, b, c]: [u32; 3]| (point(b) - point(a)).cross(&(point(c) - point(a)));
         let area_normals: Vec<Vector3<f64>> = self.triangles.iter().map(|t| normal_of(*t)).collect();
 
-        // Per place: corners made so far, each with the direction that opened it and its sum of
-        // normals.
+        // Per position: corners created so far, each with the direction of its first face and its
+        // sum of normals.
         let mut made: HashMap<[u32; 3], Vec<(Vector3<f64>, usize)>> = HashMap::new();
         let (mut positions, mut sums): (Vec<[f32; 3]>, Vec<Vector3<f64>>) = (Vec::new(), Vec::new());
         let mut triangles = Vec::with_capacity(self.triangles.len());
@@ -28,7 +28,7 @@ impl LinkMesh {
             let Some(direction) = normal.try_normalize(1e-18) else { continue };
             let corners = triangle.map(|corner| {
                 let position = self.positions[corner as usize];
-                // -0 and 0 are the same place.
+                // -0 and 0 are the same position.
                 let place = position.map(|x| (x + 0.0).to_bits());
                 let here = made.entry(place).or_default();
                 let found = here.iter().find(|(first, _)| first.dot(&direction) > CREASE_RAD.cos()).map(|(_, k)| *k);
@@ -49,8 +49,8 @@ impl LinkMesh {
         self
     }
 
-    /// About the same surface with at most so many corners: corners that share a cell of a grid
-    /// become one, the grid being as fine as that allows.
+    /// Returns a similar surface with at most `corners` corners: corners in the same cell of a grid
+    /// are merged; the finest sufficient grid is used.
     #[must_use]
     pub fn simplified(self, corners: usize) -> Self {
         if self.positions.len() <= corners {
@@ -61,7 +61,7 @@ impl LinkMesh {
             places().fold(f32::MIN, f32::max) - places().fold(f32::MAX, f32::min)
         };
         let largest = (0..3).map(extent).fold(0.0, f32::max);
-        // Finer and finer while it fits; at last a handful of cells always does.
+        // Take the finest grid that fits; the coarsest one always does.
         let cells = [256.0, 192.0, 144.0, 108.0, 80.0, 60.0, 45.0, 34.0, 25.0, 19.0, 14.0, 10.0, 7.0, 5.0, 3.0, 2.0];
         let mut coarser = cells.iter().map(|cells| self.clustered(largest / cells));
         coarser.clone().find(|mesh| mesh.positions.len() <= corners).or_else(|| coarser.next_back()).unwrap_or(self)
@@ -69,7 +69,7 @@ impl LinkMesh {
 
     fn clustered(&self, cell: f32) -> Self {
         let with_normals = self.normals.len() == self.positions.len();
-        // One place per cell, whatever the normals, so that edges stay closed.
+        // One position per cell for all normals, so that edges stay closed.
         let mut places: HashMap<[i32; 3], [f32; 3]> = HashMap::new();
         let mut corners: HashMap<([i32; 3], [i8; 3]), u32> = HashMap::new();
         let mut to = Self { positions: Vec::new(), normals: Vec::new(), triangles: Vec::new(), ..self.clone() };
@@ -97,7 +97,7 @@ impl LinkMesh {
         to
     }
 
-    /// The part of the surface whose triangles are wanted, without corners that no triangle uses.
+    /// Returns the part of the surface with the wanted triangles, without unused corners.
     pub fn part(&self, wanted: impl Fn(&[u32; 3]) -> bool) -> Self {
         let with_normals = self.normals.len() == self.positions.len();
         let mut new_index = vec![None; self.positions.len()];
@@ -118,7 +118,7 @@ impl LinkMesh {
     }
 }
 
-/// Media type of a mesh file, by the ending of its name.
+/// Returns the media type of a mesh file by its extension.
 #[must_use]
 pub fn mesh_media_type(path: &std::path::Path) -> &'static str {
     let extension = path.extension().and_then(std::ffi::OsStr::to_str).unwrap_or_default().to_ascii_lowercase();
@@ -151,7 +151,7 @@ mod tests {
     #[test]
     fn flat_neighbours_share_corners_and_edges_keep_their_own() {
         let (o, x, y, z, xy) = ([0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 1.0, 0.0]);
-        // A square of two triangles, and a wall that stands on its edge o-y.
+        // A square of two triangles, and a perpendicular wall on its edge o-y.
         let mesh = soup(&[o, x, xy, o, xy, y, o, y, z]).with_creases();
         assert_eq!(mesh.positions.len(), 4 + 3);
         assert_eq!(mesh.triangles.len(), 3);

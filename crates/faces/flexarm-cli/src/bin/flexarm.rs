@@ -1,5 +1,5 @@
-//! The program `flexarm`. All of it is in the library beside it, which other programs can carry
-//! inside themselves.
+//! The program `flexarm`. All of its code is in the library of this crate, so that other programs
+//! can include it.
 
 use std::process::ExitCode;
 

@@ -1,4 +1,4 @@
-//! `flexarm sweep`: studies of many runs, their shards, and what they tell.
+//! `flexarm sweep`: studies of many runs, their shards, and their results.
 
 mod plan;
 
@@ -45,27 +45,27 @@ pub(crate) struct SweepArgs {
 
 #[derive(Debug, Args)]
 pub(crate) struct SweepRunArgs {
-    /// What is varied and asked (.toml)
+    /// The study: parameters and metrics (.toml)
     #[arg(required = true)]
     pub(crate) study: Option<PathBuf>,
-    /// Run only this part of the runs, number/of
+    /// Run only this shard of the runs, number/count
     #[arg(long, value_name = "I/N", value_parser = parse_shard)]
     pub(crate) shard: Option<Shard>,
-    /// Runs at the same time [default: one per core]
+    /// Number of concurrent runs [default: one per core]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub(crate) threads: Option<u16>,
-    /// Look for the least of this metric within the bounds of the parameters; without a name that
+    /// Search the minimum of this metric within the bounds of the parameters; without a name, that
     /// of the study's [minimise]
     #[arg(long, value_name = "METRIC", num_args = 0..=1, default_missing_value = "", conflicts_with = "shard")]
     pub(crate) minimise: Option<String>,
-    /// What must hold for the least one, such as 'peak_mm <= 6' (may be repeated)
+    /// Constraint on the minimum, such as 'peak_mm <= 6' (may be repeated)
     #[arg(long, value_name = "CONDITION", requires = "minimise")]
     pub(crate) constraint: Vec<String>,
-    /// Most runs of the search [default: 400]
+    /// Maximum number of runs of the search [default: 400]
     #[arg(long, value_name = "N", requires = "minimise", value_parser = clap::value_parser!(u32).range(1..))]
     pub(crate) most_runs: Option<u32>,
-    /// Folder of the results; what is there of the same study is not run again [default: out/ and
-    /// the name of the study]
+    /// Folder of the results; existing results of the same study are not run again [default: out/
+    /// and the name of the study]
     #[arg(short, long, help_heading = "Files", value_name = "FOLDER")]
     pub(crate) output: Option<PathBuf>,
     /// Replace results of another study in the folder
@@ -75,10 +75,10 @@ pub(crate) struct SweepRunArgs {
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum SweepCommand {
-    /// Write what an engine needs to run the shards of a study: scripts for Slurm, HyperQueue, a
-    /// shell, jobs of Kubernetes
+    /// Write the files that an engine needs to run the shards of a study: scripts for Slurm,
+    /// HyperQueue, a shell, jobs of Kubernetes
     Plan(PlanArgs),
-    /// Join the results of shards in one table
+    /// Merge the results of shards into one table
     Merge(MergeArgs),
 }
 
@@ -86,13 +86,13 @@ pub(crate) enum SweepCommand {
 pub(crate) struct MergeArgs {
     /// The study (.toml)
     pub(crate) study: PathBuf,
-    /// Folders that its shards wrote into
+    /// Folders with the results of its shards
     #[arg(required = true)]
     pub(crate) folders: Vec<PathBuf>,
     /// Folder of the table [default: the first one]
     #[arg(short, long, help_heading = "Files", value_name = "FOLDER")]
     pub(crate) output: Option<PathBuf>,
-    /// Replace a table that is there
+    /// Replace an existing table
     #[arg(long, help_heading = "Files")]
     pub(crate) force: bool,
 }
@@ -136,8 +136,7 @@ fn sweep(cli: &Cli, args: &SweepRunArgs, study: &Path) -> Result<ExitCode, Failu
     };
     let mut stop = signals::stop_when_asked();
     let mut bar = Bar::new(cli);
-    // Every run that is over is in a file: nothing is lost if the process ends in the middle of
-    // another one.
+    // Every finished run is in a file: nothing is lost if the process ends during another one.
     let counts = Arc::new([AtomicUsize::new(0), AtomicUsize::new(0)]);
     let (seen, folder) = (counts.clone(), request.output.clone());
     let watch = signals::end_if_not_stopped(move || {
@@ -168,7 +167,7 @@ fn sweep(cli: &Cli, args: &SweepRunArgs, study: &Path) -> Result<ExitCode, Failu
     let summary = result?;
     warn(cli, &summary);
     answer(cli, || to_json(&summary), || text(&summary));
-    // Some runs of a study may fail; a study of which nothing is left has.
+    // Some runs of a study may fail; the study fails only if no run succeeds.
     Ok(if summary.failed > 0 && summary.done == 0 { ExitCode::FAILURE } else { ExitCode::SUCCESS })
 }
 
@@ -178,7 +177,7 @@ fn warn(cli: &Cli, summary: &SweepSummary) {
     }
 }
 
-/// The command that runs the files of a run.
+/// Returns the command that reproduces a run from its files.
 fn command(replay: &Replay) -> String {
     let mut words = vec!["flexarm compare".to_owned(), plan::quoted(&replay.robot)];
     words.extend(replay.motion.as_deref().map(plan::quoted));
@@ -200,7 +199,7 @@ fn command(replay: &Replay) -> String {
     words.join(" ")
 }
 
-/// A name as a folder.
+/// Turns a name into a valid folder name.
 fn clean(name: &str) -> String {
     name.chars().map(|c| if c.is_alphanumeric() || c == '-' || c == '_' { c } else { '_' }).collect()
 }
@@ -283,7 +282,8 @@ fn text(found: &SweepSummary) -> String {
     out
 }
 
-/// The parameter that makes most of a metric's variance, as far as that is told from chance.
+/// Returns the parameter with the largest share in a metric's variance, if the share is
+/// statistically significant.
 fn strongest(metric: &MetricFigures) -> String {
     match (metric.matters.first(), metric.std) {
         (Some(name), _) => {
@@ -295,7 +295,7 @@ fn strongest(metric: &MetricFigures) -> String {
     }
 }
 
-/// A number with the digits that a person reads.
+/// Formats a number with readable digits.
 fn number(x: Option<f64>) -> String {
     match x {
         None => "-".into(),

@@ -1,9 +1,9 @@
-//! `flexarm sweep plan`: what an engine that is there already needs to run the shards of a study
-//! and to join them.
+//! `flexarm sweep plan`: files with which an existing engine runs the shards of a study and merges
+//! them.
 //!
-//! An engine is a function from a [`Plan`] to files. All of them run the same command with the
-//! number of a shard; results go into one folder, in which no two shards write the same file, and a
-//! shard that was killed goes on when it is started again.
+//! An engine is a function from a [`Plan`] to files. All engines run the same command with the
+//! number of a shard. Results go into one folder, in which no two shards write the same file, and a
+//! killed shard continues when it is started again.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -21,22 +21,23 @@ use crate::{answer, to_json};
 pub(crate) struct PlanArgs {
     /// The study (.toml)
     pub(crate) study: PathBuf,
-    /// Into how many shards the runs are cut
+    /// Number of shards
     #[arg(short = 'n', long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub(crate) shards: u32,
-    /// Who runs them
+    /// Engine that runs the shards
     #[arg(long, value_enum, default_value_t = Engine::None)]
     pub(crate) engine: Engine,
-    /// The program where the shards run [default: this one; of kubernetes flexarm]
+    /// Path of the program on the machines of the shards [default: this one; for kubernetes
+    /// flexarm]
     #[arg(long, value_name = "PATH")]
     pub(crate) program: Option<PathBuf>,
-    /// Cores of a shard
+    /// Cores per shard
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
     pub(crate) cores: u16,
-    /// Image of a container with the program (kubernetes)
+    /// Container image with the program (kubernetes)
     #[arg(long, value_name = "IMAGE", default_value = "flexarm:latest")]
     pub(crate) image: String,
-    /// Volume claim with the study and its files, where the results go too (kubernetes)
+    /// Volume claim with the study and its files; also receives the results (kubernetes)
     #[arg(long, value_name = "NAME", default_value = "flexarm")]
     pub(crate) claim: String,
     /// Folder of the results [default: out/ and the name of the study]
@@ -45,26 +46,26 @@ pub(crate) struct PlanArgs {
     /// Folder of the plan [default: the name of the study and _plan]
     #[arg(short, long, help_heading = "Files", value_name = "FOLDER")]
     pub(crate) output: Option<PathBuf>,
-    /// Overwrite what is in the folder of the plan
+    /// Overwrite files in the folder of the plan
     #[arg(long, help_heading = "Files")]
     pub(crate) force: bool,
 }
 
-/// Who runs shards.
+/// Engine that runs shards.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum Engine {
-    /// A shell script: one after the other, or by GNU parallel
+    /// A shell script: one after the other, or with GNU parallel
     None,
-    /// A job array of Slurm, and a job that joins
+    /// A Slurm job array, and a job that merges
     Slurm,
-    /// An indexed job of Kubernetes
+    /// An indexed Kubernetes job
     Kubernetes,
-    /// Tasks of HyperQueue
+    /// HyperQueue tasks
     Hyperqueue,
 }
 
-/// What all engines are told.
+/// Input of all engines.
 struct Plan<'a> {
     args: &'a PlanArgs,
     name: String,
@@ -81,9 +82,9 @@ struct PlanSummary {
     runs: usize,
     shards: u32,
     engine: Engine,
-    /// What is to be typed.
+    /// Command to type.
     start: String,
-    /// What joins the results, where the engine does not.
+    /// Command that merges the results, if the engine does not.
     merge: String,
     files: Vec<String>,
 }
@@ -103,7 +104,7 @@ pub(crate) fn run(cli: &Cli, args: &PlanArgs) -> Result<ExitCode, Failure> {
     let own = std::env::current_exe().ok().filter(|_| !inside);
     let program = args.program.clone().or(own).unwrap_or_else(|| PathBuf::from("flexarm"));
     let results = args.results.clone().unwrap_or_else(|| Path::new("out").join(&name));
-    // A container has a file system of its own: paths count from its volume.
+    // A container has its own file system: paths are relative to its volume.
     let shown = |path: &Path| if inside { quoted(&path.display().to_string()) } else { whole(path) };
     let plan = Plan {
         args,
@@ -136,7 +137,7 @@ pub(crate) fn run(cli: &Cli, args: &PlanArgs) -> Result<ExitCode, Failure> {
 type Planned = (Vec<(PathBuf, String)>, String, bool);
 
 impl Plan<'_> {
-    /// The command of a shard whose number is in a variable of the shell.
+    /// Returns the command of a shard whose number is in a shell variable.
     fn shard(&self, number: &str) -> String {
         let Self { program, study, results, args, .. } = self;
         format!(
@@ -191,7 +192,7 @@ impl Plan<'_> {
     fn hyperqueue(&self) -> Planned {
         let Self { name, args, folder, program, study, results } = self;
         let (n, cores) = (args.shards, args.cores);
-        // A task whose worker is lost is started again elsewhere.
+        // A task whose worker is lost is restarted elsewhere.
         let submit = format!(
             "#!/bin/sh\n# Submits the shards to the HyperQueue server of this user (hq), waits for them, and joins the results.\nset -e\n\
              cd \"$(dirname \"$0\")\"\n\
@@ -243,13 +244,13 @@ impl Plan<'_> {
     }
 }
 
-/// A word of a shell as a text of Python.
+/// Converts a quoted shell word to a Python string literal.
 fn literal(word: &str) -> String {
     let plain = word.strip_prefix('\'').and_then(|word| word.strip_suffix('\'')).map(|word| word.replace("'\\''", "'"));
     format!("{:?}", plain.unwrap_or_else(|| word.to_owned()))
 }
 
-/// A word of a shell.
+/// Quotes a word for a shell.
 pub(super) fn quoted(word: &str) -> String {
     match word.chars().all(|c| c.is_alphanumeric() || "/._-+=:,@".contains(c)) {
         true => word.to_owned(),

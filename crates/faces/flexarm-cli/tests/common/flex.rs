@@ -1,4 +1,4 @@
-//! Reduced-link files of the beam in `super::URDF`, sound and spoilt.
+//! Reduced-link files of the beam in `super::URDF`, valid and corrupted.
 
 /// Square matrix as rows.
 pub(crate) type Rows = Vec<Vec<f64>>;
@@ -25,8 +25,8 @@ pub(crate) fn stiffness_6() -> Rows {
     k
 }
 
-/// The same beam free at both ends, A then B: `[[Adᵀ K Ad, -Adᵀ K], [-K Ad, K]]`, `u_B = Ad u_A`
-/// when it does not bend.
+/// The same beam free at both ends, A then B: `[[Adᵀ K Ad, -Adᵀ K], [-K Ad, K]]`, with
+/// `u_B = Ad u_A` for rigid motions.
 pub(crate) fn stiffness_12() -> Rows {
     let k = stiffness_6();
     let mut ad: Rows = (0..6).map(|i| (0..6).map(|j| if i == j { 1.0 } else { 0.0 }).collect()).collect();

@@ -1,4 +1,4 @@
-//! What the command-line tests share: a temporary folder with a small robot in it, the program, its
+//! Helpers of the command-line tests: a temporary folder with a small robot, the program, its
 //! answers.
 #![allow(dead_code, reason = "each test binary uses its own part of this")]
 
@@ -12,8 +12,8 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use serde_json::Value;
 
-/// Whether the programs that a test starts ignore a signal, because the tests were started so: by
-/// nohup (SIGHUP, 1), in the background of a shell (SIGINT, 2).
+/// Whether the programs that a test starts ignore a signal, because the tests themselves were
+/// started that way: by nohup (SIGHUP, 1), in the background of a shell (SIGINT, 2).
 #[cfg(unix)]
 pub(crate) fn is_ignored(signal: u32) -> bool {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
@@ -22,7 +22,7 @@ pub(crate) fn is_ignored(signal: u32) -> bool {
     ignored & (1 << (signal - 1)) != 0
 }
 
-/// What Ctrl-C sends, or where that is ignored, what a job scheduler sends.
+/// Signal of Ctrl-C, or if that is ignored, of a job scheduler.
 #[cfg(unix)]
 pub(crate) fn stop_signal() -> &'static str {
     if is_ignored(2) { "-TERM" } else { "-INT" }
@@ -59,7 +59,7 @@ pub(crate) const URDF: &str = r#"<?xml version="1.0"?>
 </robot>
 "#;
 
-/// The beam's flexible description; every line that a test replaces stands alone.
+/// Flexible description of the beam; every line that a test replaces is unique.
 pub(crate) const ROBOT: &str = r#"format = 1
 name = "beam"
 urdf = "beam.urdf"
@@ -73,7 +73,7 @@ damping = { modal = 0.03 }
 beam = { section = "rectangle", width = 0.02, height = 0.04, material = "aluminium", y_axis = [0.0, 1.0, 0.0] }
 "#;
 
-/// A brisk swing of 60 degrees and a rest; 1 s.
+/// A fast swing of 60 degrees and a rest; 1 s.
 pub(crate) const SWING: &str = r#"format = 1
 unit = "deg"
 joints = ["swing"]
@@ -95,7 +95,7 @@ pub(crate) struct Place {
 }
 
 impl Place {
-    /// A new folder with `beam.urdf`, `robot.toml` and `swing.toml`.
+    /// Creates a folder with `beam.urdf`, `robot.toml` and `swing.toml`.
     pub(crate) fn new() -> Self {
         static COUNT: AtomicU32 = AtomicU32::new(0);
         let count = COUNT.fetch_add(1, Ordering::Relaxed);
@@ -126,7 +126,7 @@ impl Place {
         String::from_utf8(self.read(name)).unwrap()
     }
 
-    /// The program, to run in this folder, with no package paths from outside.
+    /// The program, to be run in this folder, without package paths from outside.
     pub(crate) fn command(&self, arguments: &[&str]) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_flexarm"));
         command.args(arguments).current_dir(&self.folder).stdin(Stdio::null());
@@ -140,15 +140,15 @@ impl Place {
         Answer::of(self.command(arguments).output().unwrap())
     }
 
-    /// Runs, demands success and returns the one JSON object on standard output.
+    /// Runs, requires success and returns the one JSON object on standard output.
     pub(crate) fn json(&self, arguments: &[&str]) -> Value {
         let answer = self.flexarm(&[arguments, &["--json"]].concat());
         assert_eq!(answer.code, 0, "{arguments:?}: {}", answer.err);
         answer.json()
     }
 
-    /// The command must end with 2, name every word on standard error, print nothing, and leave all
-    /// files alone.
+    /// The command must exit with 2, mention every word on standard error, print nothing, and leave
+    /// all files unchanged.
     pub(crate) fn refused(&self, arguments: &[&str], words: &[&str]) -> Answer {
         self.refused_by(&mut self.command(arguments), words)
     }
@@ -189,7 +189,7 @@ impl Drop for Place {
     }
 }
 
-/// How a run of the program ended.
+/// Result of a run of the program.
 #[derive(Debug)]
 pub(crate) struct Answer {
     pub(crate) code: i32,
@@ -222,7 +222,7 @@ impl Answer {
     }
 }
 
-/// The text with one piece replaced, which must be there.
+/// Replaces one piece of the text, which must exist.
 pub(crate) fn with(text: &str, old: &str, new: &str) -> String {
     assert!(text.contains(old), "{old:?} is not in the text");
     text.replacen(old, new, 1)
@@ -233,7 +233,7 @@ pub(crate) fn line_of(text: &str, piece: &str) -> usize {
     text.lines().position(|l| l.contains(piece)).unwrap_or_else(|| panic!("{piece:?} is not in the text")) + 1
 }
 
-/// Bytes that look random and are the same every time (xorshift).
+/// Pseudorandom bytes, reproducible (xorshift).
 pub(crate) fn garbage(length: usize, seed: u64) -> Vec<u8> {
     let mut x = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
     (0..length)
@@ -266,7 +266,7 @@ pub(crate) fn matrix(value: &Value) -> Vec<Vec<f64>> {
     value.as_array().unwrap().iter().map(numbers).collect()
 }
 
-/// A table as the program writes it: names of the columns, and rows that are all complete.
+/// A table written by the program: names of the columns, and complete rows.
 pub(crate) struct Table {
     pub(crate) names: Vec<String>,
     pub(crate) rows: Vec<Vec<f64>>,
@@ -300,8 +300,8 @@ impl Table {
     }
 }
 
-/// Walks over the records of an MCAP file from its first magic to its last; returns how often each
-/// opcode occurs.
+/// Reads the records of an MCAP file from its first magic to its last; returns the count of each
+/// opcode.
 pub(crate) fn mcap_records(bytes: &[u8]) -> BTreeMap<u8, usize> {
     const MAGIC: &[u8] = b"\x89MCAP0\r\n";
     assert!(bytes.starts_with(MAGIC), "no MCAP magic at the start");
@@ -321,8 +321,8 @@ pub(crate) fn mcap_records(bytes: &[u8]) -> BTreeMap<u8, usize> {
 const FOOTER: u8 = 0x02;
 const DATA_END: u8 = 0x0f;
 
-/// A file of the reference data, which stand beside the project or where FLEXARM_SHARED says;
-/// `None` and a word about it elsewhere.
+/// Path of a reference data file, next to the project or in the folder FLEXARM_SHARED; otherwise
+/// `None`, with a message.
 #[allow(clippy::print_stderr, reason = "a test that skips says so")]
 pub(crate) fn reference(name: &str) -> Option<PathBuf> {
     let named = std::env::var_os("FLEXARM_SHARED").map(PathBuf::from);

@@ -1,4 +1,4 @@
-"""Robot arms whose links bend.
+"""Robot arms with flexible links.
 
 >>> import flexarm
 >>> arm = flexarm.load("kr210").flexible(links="modal", drives="elastic")
@@ -6,10 +6,11 @@
 >>> run.error.shape[1]
 3
 
-:func:`load` reads a robot, :meth:`Robot.flexible` puts links and drives in place, and the :class:`Arm` that it returns is asked
-with numpy arrays: :meth:`Arm.simulate`, :meth:`Arm.statics`, :meth:`Arm.modes`, :meth:`Arm.response`, :meth:`Arm.linearise`.
-SI units; six-vectors are linear first. What goes wrong is a :class:`flexarm.Error`, what is doubtful a warning of the class
-:class:`flexarm.Caveat`.
+:func:`load` reads a robot, :meth:`Robot.flexible` adds flexible links and drives. The resulting
+:class:`Arm` is used with numpy arrays: :meth:`Arm.simulate`, :meth:`Arm.statics`,
+:meth:`Arm.modes`, :meth:`Arm.response`, :meth:`Arm.linearise`. SI units; six-vectors are linear
+first. Errors are of the class :class:`flexarm.Error`, warnings about doubtful inputs or results of
+the class :class:`flexarm.Caveat`.
 """
 
 from pathlib import Path as _Path
@@ -135,7 +136,7 @@ __all__ = [
     "sweep",
 ]
 
-#: Robots and motions that come with the package.
+#: Robots and motions included in the package.
 _SHARE = _Path(__file__).parent / "share"
 
 _flexarm.ship_from(_SHARE)
@@ -145,7 +146,7 @@ if _TYPE_CHECKING:
 
 
 def __getattr__(name: str) -> _Any:
-    # Of use to annotations alone, so that it is read when it is asked for.
+    # Used only by annotations, hence imported on first use.
     if name == "types":
         import importlib
 

@@ -8,8 +8,8 @@ def main() -> int:
     """Run the command line of this process."""
     from . import _flexarm
 
-    # The command takes the process for its own: what it does not look at ends it, as of any
-    # program.
+    # The command owns the process: Ctrl-C ends it wherever the command does not handle it, as in
+    # any other program.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     sys.stdout.flush()
     return _flexarm.run_command(["flexarm", *sys.argv[1:]])

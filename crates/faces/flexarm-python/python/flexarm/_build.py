@@ -1,4 +1,4 @@
-"""Robots of values: what a URDF and a robot file say, by calls."""
+"""Robots from values: the contents of a URDF and of a robot file, by calls."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _Path = Union[str, "os.PathLike[str]"]
 
 
 def plain(value: Any, name: str = "") -> Any:
-    """Keys as a file has them: arrays as lists, paths as text, nothing that is None."""
+    """Convert to robot file values: arrays to lists, paths to text, without None."""
     if isinstance(value, dict):
         inner = f"{name}." if name else ""
         return {str(key): plain(v, f"{inner}{key}") for key, v in value.items() if v is not None}
@@ -30,7 +30,7 @@ def plain(value: Any, name: str = "") -> Any:
         return value
     if isinstance(value, os.PathLike):
         return os.fspath(value)
-    if hasattr(value, "tolist"):  # numpy's arrays and numbers
+    if hasattr(value, "tolist"):  # numpy arrays and scalars
         return plain(value.tolist(), name)
     if isinstance(value, (list, tuple)):
         return [plain(v, f"{name}[{k}]") for k, v in enumerate(value)]
@@ -43,7 +43,7 @@ def json_of(keys: Any) -> str:
 
 
 def _numbers(name: str, value: ArrayLike, *shapes: tuple[int, ...]) -> Any:
-    """Numbers of one of several shapes, as lists; a number for the shape ()."""
+    """Check numbers against several allowed shapes and return lists; a number for the shape ()."""
     import numpy as np
 
     try:
@@ -67,7 +67,7 @@ def _number(name: str, value: Any) -> Any:
 
 
 def _inertia(value: Optional[ArrayLike]) -> Optional[list[float]]:
-    """A symmetric matrix, or ixx iyy izz ixy ixz iyz, as the latter."""
+    """Convert a symmetric matrix or ixx iyy izz ixy ixz iyz to the latter."""
     if value is None:
         return None
     found = _numbers("inertia", value, (3, 3), (6,))
@@ -81,23 +81,24 @@ def _inertia(value: Optional[ArrayLike]) -> Optional[list[float]]:
 
 
 class RobotBuilder:
-    """A robot by calls: links and joints, or a URDF; then tool, payload, links that bend, drives.
+    """Builder of a robot: links and joints, or a URDF; then tool, payload, flexible links, drives.
 
-    Every call returns the builder; :meth:`build` makes the robot, and says what does not fit. What has no call of its own is put
-    in by :meth:`add` with the keys of a robot file, which ``flexarm format robot`` prints.
+    Every call returns the builder; :meth:`build` creates the robot and reports inconsistencies.
+    Entries without a call of their own are added by :meth:`add` with the keys of a robot file,
+    which ``flexarm format robot`` prints.
 
     Parameters
     ----------
     urdf : str or os.PathLike, optional
-        A file, or the text, of a URDF or xacro. Without it the arm is made of :meth:`link` and :meth:`joint`.
+        A file, or the text, of a URDF or xacro. Without it, use :meth:`link` and :meth:`joint`.
     name : str, default "robot"
-        For logs and messages.
+        Name for logs and messages.
     folder : path, optional
-        Paths are relative to it; the folder of the URDF, or the current one, without it.
+        Folder to which paths are relative; default: that of the URDF, or the current one.
 
     Examples
     --------
-    A pendulum of a metre whose rod bends, under an elastic gearbox:
+    A pendulum of 1 m with a flexible rod and an elastic gearbox:
 
     >>> builder = flexarm.RobotBuilder(name="pendulum")
     >>> builder = builder.link("base").link("rod", 2.0, com=[0, 0, -0.5], inertia=[0.17, 0.17, 0.001, 0, 0, 0]).link("tool0")
@@ -109,7 +110,7 @@ class RobotBuilder:
     >>> arm.elements
     ('hinge', 'rod')
 
-    A robot that was loaded, with another payload:
+    A loaded robot with another payload:
 
     >>> robot = flexarm.RobotBuilder.of(flexarm.load("kr210")).payload(50.0, com=[0, 0, 0.1]).build()
     """
@@ -134,7 +135,7 @@ class RobotBuilder:
 
     @classmethod
     def of(cls, robot: Robot) -> RobotBuilder:
-        """Begin with a robot that was loaded or built.
+        """Start from a loaded or built robot.
 
         Parameters
         ----------
@@ -158,7 +159,7 @@ class RobotBuilder:
         waive_inertia: Any = None,
         **estimates: Optional[float],
     ) -> None:
-        """Choices of :func:`flexarm.load` as keys."""
+        """Set options of :func:`flexarm.load` as keys."""
         if tcp is not None:
             self._keys["tcp"] = {"link": tcp}
         for key, more in [("packages", packages), ("args", arguments)]:
@@ -175,7 +176,7 @@ class RobotBuilder:
         com: ArrayLike = (0.0, 0.0, 0.0),
         inertia: Optional[ArrayLike] = None,
     ) -> RobotBuilder:
-        """Add a rigid body, or a mere frame if it has no mass.
+        """Add a rigid body, or a frame if it has no mass.
 
         Parameters
         ----------
@@ -183,9 +184,10 @@ class RobotBuilder:
         mass : float, default 0
             kg.
         com : array_like, shape (3,), default (0, 0, 0)
-            Centre of mass in its axes (m).
+            Centre of mass in link axes (m).
         inertia : array_like, shape (3, 3) or (6,), optional
-            About the centre of mass, its axes (kg m²): a matrix, or ixx, iyy, izz, ixy, ixz, iyz. Zero without it.
+            About the centre of mass, link axes (kg m²): a matrix, or ixx, iyy, izz, ixy, ixz, iyz.
+            Default: zero.
 
         Returns
         -------
@@ -216,20 +218,20 @@ class RobotBuilder:
         velocity: float = 0.0,
         effort: float = 0.0,
     ) -> RobotBuilder:
-        """Join two links; the frame of the joint is that of the child.
+        """Join two links; the frame of the joint is the frame of the child.
 
         Parameters
         ----------
         name, parent, child : str
         kind : {"revolute", "continuous", "prismatic", "fixed"}, default "revolute"
         xyz, rpy : array_like, shape (3,), default (0, 0, 0)
-            Where the child is in the parent at joint value 0 (m; roll, pitch, yaw in rad).
+            Pose of the child in the parent at joint value 0 (m; roll, pitch, yaw in rad).
         axis : array_like, shape (3,), default (0, 0, 1)
-            In axes of the child.
+            Axis in child axes.
         lower, upper : float, optional
-            Limits (rad or m); revolute and prismatic joints need them.
+            Limits (rad or m); required for revolute and prismatic joints.
         velocity, effort : float, default 0
-            Highest speed and force (rad/s or m/s, N m or N); 0 is unknown.
+            Maximum speed and effort (rad/s or m/s, N m or N); 0 means unknown.
 
         Returns
         -------
@@ -254,13 +256,13 @@ class RobotBuilder:
     def tcp(
         self, link: str, xyz: ArrayLike = (0.0, 0.0, 0.0), rpy: ArrayLike = (0.0, 0.0, 0.0)
     ) -> RobotBuilder:
-        """Put the tool centre point in a link; ``tool0``, or the end of the longest chain, without it.
+        """Place the TCP on a link; default: on ``tool0``, or at the end of the longest chain.
 
         Parameters
         ----------
         link : str
         xyz, rpy : array_like, shape (3,), default (0, 0, 0)
-            In axes of the link (m; roll, pitch, yaw in rad).
+            Pose in link axes (m; roll, pitch, yaw in rad).
 
         Returns
         -------
@@ -276,18 +278,18 @@ class RobotBuilder:
         inertia: Optional[ArrayLike] = None,
         link: Optional[str] = None,
     ) -> RobotBuilder:
-        """Hang a body on a link, in the place of the one that was there.
+        """Attach the payload to a link, replacing the previous one.
 
         Parameters
         ----------
         mass : float
-            kg; 0 is none.
+            kg; 0 for none.
         com : array_like, shape (3,), default (0, 0, 0)
-            Centre of mass in axes of the link (m).
+            Centre of mass in link axes (m).
         inertia : array_like, shape (3, 3) or (6,), optional
-            About the centre of mass (kg m²); a point without it.
+            About the centre of mass (kg m²). Default: a point mass.
         link : str, optional
-            That of the tool without it.
+            Default: the link of the tool.
 
         Returns
         -------
@@ -300,7 +302,7 @@ class RobotBuilder:
         return self
 
     def gravity(self, g: ArrayLike) -> RobotBuilder:
-        """Set the acceleration of gravity in axes of the base, (3,) (m/s²); (0, 0, -9.81) without it."""
+        """Set the acceleration of gravity in base axes, (3,) (m/s²). Default: (0, 0, -9.81)."""
         self._keys["gravity"] = _numbers("g", g, (3,))
         return self
 
@@ -321,34 +323,37 @@ class RobotBuilder:
         parts: Optional[Literal["from-link", "uniform"]] = None,
         **dimensions: float,
     ) -> RobotBuilder:
-        """Let a link bend as a beam from its frame to its distal joint.
+        """Make a link flexible: a beam from its frame to its distal joint.
 
         Parameters
         ----------
         link : str
         section : {"box", "rectangle", "tube", "circle", "i_beam", "channel", "given"}
         material : str or dict, optional
-            ``"steel"``, ``"aluminium"``, ... or ``{"E": Pa, "nu": ratio, "rho": kg/m³}``; all sections but given ones need it.
+            ``"steel"``, ``"aluminium"``, ... or ``{"E": Pa, "nu": ratio, "rho": kg/m³}``; required
+            except for given sections.
         y_axis : array_like, shape (3,), optional
-            Direction of the section's y in axes of the link.
+            Direction of the section's y axis, in link axes.
         distal : str, optional
-            Joint at the far end; the only one after the link without it.
+            Joint at the far end. Default: the only joint after the link.
         model : {"lumped", "modal"}, optional
-            Rigid parts with springs between, or one body that bends in modes; ``"lumped"`` without it.
+            Rigid parts with springs between, or one body with modes. Default: ``"lumped"``.
         segments, modes : int, optional
-            How many parts, or modes.
+            Number of parts, or of modes.
         damping : float or dict, optional
-            Ratio to critical of each mode (0.03), or ``{"stiffness_beta": s}``, ``{"rayleigh": [1/s, s]}``.
+            Damping ratio of each mode (0.03), or ``{"stiffness_beta": s}``,
+            ``{"rayleigh": [1/s, s]}``.
         geometric_stiffening : bool, optional
-            Let loads and speeds change the stiffness of modal links.
+            Whether loads and speeds change the stiffness of modal links.
         mass : float, optional
-            Mass of the link in the place of its own (kg).
+            Mass of the link, overriding its own (kg).
         parts : {"from-link", "uniform"}, optional
-            Cut the link's own inertia, or spread its mass along the beam.
+            Cut the link's own inertia, or distribute its mass along the beam.
         **dimensions : float
-            Those of the section (m): ``width``, ``height``, ``wall``, ``outer_diameter``, ``diameter``, ``web``, ``flange``,
-            ``fillet``; of given ones ``EA``, ``EI_y``, ``EI_z``, ``GJ``, ``mass_per_length``, ...; also ``roll``, ``split``,
-            ``theory``, ``offset``.
+            Dimensions of the section (m): ``width``, ``height``, ``wall``, ``outer_diameter``,
+            ``diameter``, ``web``, ``flange``, ``fillet``; for given ones ``EA``, ``EI_y``,
+            ``EI_z``, ``GJ``, ``mass_per_length``, ...; also ``roll``, ``split``, ``theory``,
+            ``offset``.
 
         Returns
         -------
@@ -373,22 +378,25 @@ class RobotBuilder:
         damping: Union[float, dict[str, Any], None] = None,
         geometric_stiffening: Optional[bool] = None,
     ) -> RobotBuilder:
-        """Let a link bend as a ``.flex`` file of :func:`flexarm.reduce` or :func:`flexarm.import_link` says.
+        """Make a link flexible by a ``.flex`` file.
+
+        The file is written by :func:`flexarm.reduce` or :func:`flexarm.import_link`.
 
         Parameters
         ----------
         link : str
         file : path
         distal : str, optional
-            Joint at the far end; the only one after the link without it.
+            Joint at the far end. Default: the only joint after the link.
         model : {"lumped", "modal"}, optional
-            Rigid parts with springs between, or one body that bends in modes; ``"lumped"`` without it.
+            Rigid parts with springs between, or one body with modes. Default: ``"lumped"``.
         segments, modes, eigenmodes : int, optional
-            How many parts, fixed-interface modes, or own modes.
+            Number of parts, of fixed-interface modes, or of eigenmodes.
         damping : float or dict, optional
-            Ratio to critical of each mode (0.03), or ``{"stiffness_beta": s}``, ``{"rayleigh": [1/s, s]}``.
+            Damping ratio of each mode (0.03), or ``{"stiffness_beta": s}``,
+            ``{"rayleigh": [1/s, s]}``.
         geometric_stiffening : bool, optional
-            Let loads and speeds change the stiffness of modal links.
+            Whether loads and speeds change the stiffness of modal links.
 
         Returns
         -------
@@ -414,31 +422,35 @@ class RobotBuilder:
         servo: Optional[dict[str, Any]] = None,
         **gearbox: Any,
     ) -> RobotBuilder:
-        """Say how a joint is driven, in the place of what was said before; without it it follows the motion exactly.
+        """Set the drive of a joint, replacing an earlier one.
+
+        Without a drive, a joint follows the motion exactly.
 
         Parameters
         ----------
         joint : str
         kind : {"prescribed", "gearbox", "torque"}, optional
-            Exactly, through a spring, or by a servo; ``"gearbox"`` if there is a stiffness or a curve, without it.
+            Exactly, through a spring, or by a servo. Default: ``"gearbox"`` if there is a stiffness
+            or a curve.
         stiffness : float or array_like, shape (3,), (6,) or (6, 6), optional
-            Of the gearbox about the axis (N m/rad), about x, y, z, or of all directions.
+            Stiffness of the gearbox about the axis (N m/rad), about x, y, z, or of all directions.
         damping : float or array_like, shape (3,) or (6,), optional
-            To match (N m s/rad); 3 % modal without it.
+            Damping in the same form (N m s/rad). Default: 3 % modal.
         backlash : float, optional
-            Play to each side (rad).
+            Backlash to each side (rad).
         curve : array_like, shape (m, 2), optional
-            Points (rad, N m) in the place of stiffness and backlash.
+            Points (rad, N m), instead of stiffness and backlash.
         ratio : float, optional
-            Turns of the motor per turn of the joint (1).
+            Motor turns per joint turn (1).
         motor_inertia : float, optional
-            Of the rotor, on the motor's side (kg m²).
+            Rotor inertia on the motor side (kg m²).
         torque_limit : float, optional
-            Of a servo (N m).
+            Torque limit of a servo (N m).
         friction, servo : dict, optional
-            With the keys of a robot file: ``{"viscous": ..., "coulomb": ...}``, ``{"position_gain": ...}``.
+            With the keys of a robot file: ``{"viscous": ..., "coulomb": ...}``,
+            ``{"position_gain": ...}``.
         **gearbox
-            More of the gearbox: ``transmission_error``, ``hysteresis``.
+            Further keys of the gearbox: ``transmission_error``, ``hysteresis``.
 
         Returns
         -------
@@ -458,14 +470,14 @@ class RobotBuilder:
         return self._put("drive", "joint", plain(entry, "drive"))
 
     def add(self, key: str, **values: Any) -> RobotBuilder:
-        """Add an entry of a robot file by its keys: ``balancer``, ``loop``, ``controller_axis``; or a table, as ``mounting``.
+        """Add an entry or a table of a robot file by its keys.
 
         Parameters
         ----------
         key : str
-            Name of the list or table.
+            Name of the list (``balancer``, ``loop``, ``controller_axis``) or table (``mounting``).
         **values
-            Its keys; arrays are taken as lists. ``from`` is written ``from_``.
+            Its keys; arrays are converted to lists. ``from`` is written ``from_``.
 
         Returns
         -------
@@ -486,12 +498,12 @@ class RobotBuilder:
         return self
 
     def set(self, **keys: Any) -> RobotBuilder:
-        """Set keys of a robot file as they are, such as ``waive_inertia``, ``hold``, ``packages``; None takes one away.
+        """Set keys of a robot file as they are; None removes one.
 
         Parameters
         ----------
         **keys
-            Arrays are taken as lists.
+            Such as ``waive_inertia``, ``hold``, ``packages``; arrays are converted to lists.
 
         Returns
         -------
@@ -503,25 +515,25 @@ class RobotBuilder:
         return self
 
     def default_motion(self, file: _Path) -> RobotBuilder:
-        """Give the robot a motion of its own, for runs without one."""
+        """Set the default motion of the robot, for runs without a motion."""
         self._keys["default_trajectory"] = os.fspath(file)
         return self
 
     @property
     def keys(self) -> dict[str, Any]:
-        """What a robot file would have (dict)."""
+        """Return the contents of the robot file (dict)."""
         return json.loads(json_of(self._keys))  # type: ignore[no-any-return]
 
     @property
     def urdf(self) -> Optional[str]:
-        """Text of the URDF, if it is no file."""
+        """Text of the URDF, or None if it is a file."""
         if not self._links:
             return self._text
         name = quoteattr(self._keys.get("name", "robot"))
         return "\n".join([f"<robot name={name}>", *self._links, *self._joints, "</robot>"])
 
     def build(self) -> Robot:
-        """Make the robot.
+        """Create the robot.
 
         Returns
         -------
@@ -530,7 +542,7 @@ class RobotBuilder:
         Raises
         ------
         flexarm.InputError
-            With what was found and how to mend it.
+            With what was found and how to fix it.
         """
         from ._flexarm import robot
 
@@ -546,7 +558,7 @@ class RobotBuilder:
         return self._put("flexible_link", "link", plain({"link": link, **entry}, "flexible_link"))
 
     def _put(self, key: str, name: str, entry: dict[str, Any]) -> RobotBuilder:
-        """In the place of the entry of the same link or joint, or at the end."""
+        """Replace the entry of the same link or joint, or append it."""
         entries = self._keys.setdefault(key, [])
         for k, other in enumerate(entries):
             if other.get(name) == entry[name]:

@@ -1,4 +1,4 @@
-"""How objects are made again in another process."""
+"""Functions that recreate pickled objects in another process."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pictures with matplotlib; the axes are returned."""
+"""Plots with matplotlib; the axes are returned."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def _axes(ax: Any) -> Any:
 
 
 def run(run: Any, ax: Any, parts: bool) -> Any:
-    """TCP error over time."""
+    """Plot the TCP error over time."""
     import numpy as np
 
     ax = _axes(ax)
@@ -34,7 +34,7 @@ def run(run: Any, ax: Any, parts: bool) -> Any:
 
 
 def response(response: Any, ax: Any) -> Any:
-    """Magnitudes over frequency."""
+    """Plot magnitudes over frequency."""
     ax = _axes(ax)
     magnitude = response.magnitude
     for i, source in enumerate(response.inputs):

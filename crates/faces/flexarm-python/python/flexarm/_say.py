@@ -1,7 +1,7 @@
-"""What the command line says besides its answer, through ``logging``: the logger is ``"flexarm"``.
+"""Messages of long work through ``logging``; the logger is ``"flexarm"``.
 
-Caveats that warn are Python's ``warnings``; here are notes, steps of long work and files that were written (INFO), and runs that
-ended (DEBUG).
+Caveats of severity warning are Python ``warnings``. Logged are notes, steps of long work and
+written files (INFO), and finished runs (DEBUG).
 """
 
 from __future__ import annotations
@@ -11,18 +11,18 @@ from collections.abc import Iterable, Iterator
 from typing import Any
 
 logger = logging.getLogger("flexarm")
-# Nothing is printed unless the program that uses the package asks for it.
+# Nothing is printed unless the application configures logging.
 logger.addHandler(logging.NullHandler())
 
 
 def notes(caveats: Iterable[Any]) -> None:
-    """Caveats that only tell; each is ``record.caveat`` as well."""
+    """Log caveats of severity note; each is also available as ``record.caveat``."""
     for caveat in caveats:
         logger.info("note: %s", caveat.message, extra={"caveat": caveat})
 
 
 def step(what: str, number: int, of: int) -> None:
-    """A step of long work that begins."""
+    """Log the start of a step of long work."""
     logger.info("%s (%d of %d)", what, number, of)
 
 
@@ -38,24 +38,24 @@ def _paths(value: Any) -> Iterator[str]:
 
 
 def wrote(figures: dict[str, Any]) -> None:
-    """Files that an answer names."""
+    """Log the files that a result names."""
     told = {path: None for key in ("file", "page", "files") for path in _paths(figures.get(key))}
     for path in told:
         logger.info("wrote %s", path)
 
 
 def doubts(findings: Iterable[dict[str, Any]]) -> None:
-    """Findings about a robot that was just made."""
+    """Log findings about a newly created robot."""
     for finding in findings:
         logger.warning("%s: %s", finding["where"], finding["message"], extra={"finding": finding})
 
 
 def warnings(sentences: Iterable[str]) -> None:
-    """What is doubtful about files that were written for other programs."""
+    """Log doubts about files written for other programs."""
     for sentence in sentences:
         logger.warning("%s", sentence)
 
 
 def ran(run: str) -> None:
-    """A run that ended."""
+    """Log the end of a run."""
     logger.debug("ran %s", run)

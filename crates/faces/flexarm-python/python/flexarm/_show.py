@@ -1,4 +1,4 @@
-"""What notebooks and terminals show: tables, the viewer, a bar."""
+"""Output in notebooks and terminals: tables, the viewer, a progress bar."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any, Iterable, Optional, Tuple
 
 
 def shipped_tools() -> "list[str]":
-    """Names of the cutting tools that come with the package."""
+    """Names of the cutting tools included in the package."""
     from . import _SHARE
 
     return sorted(file.stem for file in (_SHARE / "robots/tools").glob("*.toml"))
@@ -77,7 +77,7 @@ def _in_notebook() -> bool:
 
 
 def run(run: Any) -> Optional[Any]:
-    """The recording of a run: in the notebook, or in the viewer."""
+    """Show the recording of a run in the notebook, or in the viewer."""
     file = run.files.get("rrd")
     if not file:
         raise ValueError("the run has no recording to show: simulate(..., output='folder') writes one")
@@ -99,7 +99,7 @@ def run(run: Any) -> Optional[Any]:
 
 
 class _Bar:
-    """A bar of tqdm that is told simulated and total time."""
+    """A tqdm bar that is called with simulated and total time."""
 
     def __init__(self, tqdm: Any) -> None:
         self._tqdm = tqdm
@@ -119,7 +119,7 @@ class _Bar:
 
 
 def progress_bar() -> Optional[_Bar]:
-    """A bar, if tqdm is there."""
+    """Return a progress bar if tqdm is installed."""
     try:
         from tqdm.auto import tqdm  # type: ignore[import-untyped,unused-ignore]
     except ImportError:

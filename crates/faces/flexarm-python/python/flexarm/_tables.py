@@ -1,4 +1,4 @@
-"""Columns to where people are."""
+"""Conversion of tables to pyarrow, pandas and polars."""
 
 from __future__ import annotations
 

@@ -1,7 +1,8 @@
-"""What goes wrong, by cause, and what is doubtful.
+"""Errors by cause, and caveats.
 
-``Error`` is above all; ``InputError`` means that the same call would fail again (it is a ``ValueError``), ``RunError`` that a run
-stopped or a result could not be written (a ``RuntimeError``). Messages say what was found, where, what is expected and how to mend it.
+``Error`` is the base class. ``InputError`` means that the same call would fail again (it is a
+``ValueError``), ``RunError`` that a run stopped or a result could not be written (a
+``RuntimeError``). Messages state what was found, where, what is expected and how to fix it.
 """
 
 from __future__ import annotations
@@ -10,47 +11,47 @@ from typing import Optional
 
 
 class Error(Exception):
-    """Anything that keeps an answer from being given."""
+    """Base class of all errors of flexarm."""
 
 
 class InputError(Error, ValueError):
-    """What was given makes no sense: files, values, places of results."""
+    """Invalid input: files, values, output locations."""
 
 
 class RunError(Error, RuntimeError):
-    """A run stopped on its way, or its results could not be written."""
+    """A run stopped early, or its results could not be written."""
 
 
 class FileError(InputError):
-    """A file or folder is not there, not readable, or taken."""
+    """A file or folder is missing, unreadable, or already exists."""
 
 
 class RobotError(InputError):
-    """Something in a robot file, a file of loads, a job or a link file; with line and column."""
+    """An error in a robot file, a file of loads, a job or a link file; with line and column."""
 
 
 class UrdfError(InputError):
-    """Something in the URDF, or links and joints that make no tree."""
+    """An error in the URDF, or links and joints that do not form a tree."""
 
 
 class MotionError(InputError):
-    """Something in a motion, a robot program or a path of the tool."""
+    """An error in a motion, a robot program or a TCP path."""
 
 
 class LimitsError(MotionError):
-    """The motion asks for more than the joints can do."""
+    """The motion exceeds joint limits."""
 
 
 class SettingError(InputError):
-    """A number or a word of a keyword argument that makes no sense."""
+    """An invalid number or word in a keyword argument."""
 
 
 class ModellingError(InputError):
-    """Links, drives or balancers that cannot be modelled as asked for."""
+    """Links, drives or balancers that cannot be modelled as requested."""
 
 
 class PoseError(InputError):
-    """Joint values that do not fit the robot, and poses without an answer."""
+    """Joint values that do not fit the robot, and poses without a solution."""
 
 
 class LoadError(InputError):
@@ -58,7 +59,7 @@ class LoadError(InputError):
 
 
 class IdentifyError(InputError):
-    """Measurements that tell nothing of the robot, or cannot be of it."""
+    """Measurements that contain no information on the robot, or contradict it."""
 
 
 class CompensateError(InputError):
@@ -66,19 +67,19 @@ class CompensateError(InputError):
 
 
 class MapError(InputError):
-    """A map that cannot be taken."""
+    """A map that cannot be computed."""
 
 
 class RecordingError(InputError):
-    """A recording that cannot be read, written or reported as asked for."""
+    """A recording that cannot be read, written or reported as requested."""
 
 
 class LinkError(InputError):
-    """A link that could not be made of a mesh or of matrices."""
+    """A link that could not be created from a mesh or from matrices."""
 
 
 class StepError(RunError):
-    """The simulation could not go on."""
+    """The simulation could not continue."""
 
 
 class WriteError(RunError):
@@ -86,29 +87,29 @@ class WriteError(RunError):
 
 
 class Stopped(RunError):
-    """An observer ended the run."""
+    """An observer stopped the run."""
 
 
 class Caveat(UserWarning):
-    """What is probably wrong with an input, or limits the worth of a result.
+    """A probable mistake in an input, or a limit of the validity of a result.
 
     Attributes
     ----------
     message : str
-        All of it in one sentence.
+        The whole message in one sentence.
     severity : str
-        ``"warning"`` or ``"note"``; notes are not warned of.
+        ``"warning"`` or ``"note"``; notes are not issued as warnings.
     code : str
-        Short, stable name of its kind.
+        Short, stable name of the kind of caveat.
     where : str
-        What it is about: a link, a joint, the payload, a file.
+        Subject: a link, a joint, the payload, a file.
     value, yardstick : float or None
-        What was found, and what it is compared with, in ``unit``.
+        Found value, and the value it is compared with, in ``unit``.
     unit : str
     likely : str
-        The slip that would explain it.
+        Mistake that would explain it.
     help : str
-        What to look at, or how to mend it.
+        What to check, or how to fix it.
     """
 
     def __init__(

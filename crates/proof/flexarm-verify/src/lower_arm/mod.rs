@@ -1,8 +1,8 @@
-//! A cast lower arm: from a mesh of tetrahedra to a link, each step against the mesh and against
+//! A cast lower arm: from a tetrahedral mesh to a link, each step compared with the mesh and with
 //! two other programs.
 //!
-//! `truth` has what the mesh and the other programs say, `study` and `parts` compute findings,
-//! `page` and `parts_page` say them.
+//! `truth` holds the results of the mesh and of the other programs, `study` and `parts` compute
+//! findings, `page` and `parts_page` write them up.
 
 mod page;
 mod parts;
@@ -35,22 +35,22 @@ const CHAINS: [usize; 3] = [3, 4, 8];
 const ALL_MODES: usize = 10;
 const AXES: [&str; 3] = ["x", "y", "z"];
 
-/// What the case finds.
+/// Findings of the case.
 struct Findings {
     about: About,
     flange_loads: FlangeLoads,
     weight: Weight,
     frequencies: Frequencies,
-    /// What needs the whole mesh; nothing in a quick run.
+    /// Findings that need the whole mesh; `None` in a quick run.
     whole: Option<Whole>,
 }
 
-/// The casting, and who judges it.
+/// The casting and the programs it is compared with.
 struct About {
     mass_kg: f64,
-    /// From A to B (m).
+    /// Distance from A to B (m).
     length_m: f64,
-    /// Programs, scripts and days of the stored results.
+    /// Programs, scripts and dates of the stored results.
     programs: String,
 }
 
@@ -76,7 +76,7 @@ impl About {
 impl Findings {
     fn new(bench: &Bench) -> Result<Self, Error> {
         let mut robot = bench.robot(ROBOT)?;
-        // The truths are those of the casting alone.
+        // The truths are those of the casting without the flange.
         for link in robot.rigid.links.iter_mut().filter(|link| link.name == "flange") {
             link.inertia = None;
         }
@@ -115,13 +115,13 @@ impl Findings {
         })
     }
 
-    /// What the truth is called in claims: the mesh itself, or what the link file keeps of it.
+    /// Name of the truth in claims: the mesh, or the matrices of the link file.
     fn truth_name(&self) -> &'static str {
         if self.whole.is_some() { "the mesh" } else { "matrices of the link file" }
     }
 }
 
-/// The case.
+/// Runs the case.
 pub(crate) fn case(bench: &Bench, _pace: &mut Pace<'_>) -> Result<Case, Error> {
     Ok(page::page(&Findings::new(bench)?))
 }

@@ -10,10 +10,10 @@ use crate::bench::{LOADS, SMALL_MOTION, compliance_error};
 use crate::compliance::{add_errors, claim_each};
 use crate::page::{Bound, Case, Figure, Table, bare_error, digits, error, fixed, listed, percent, plain, signed, word};
 
-/// First frequency of a bar in two parts over its true one, less one: case 1.
+/// Relative error of the first frequency of a bar in two parts: case 1.
 const BAR_IN_TWO_PARTS: f64 = 0.02;
-/// The wall of seat A (m); a finer mesh (degrees of freedom) and what it changes the compliance's
-/// diagonal by, least and most: `robots/lower_arm/README.md`.
+/// Wall thickness of seat A (m); degrees of freedom of a finer mesh; minimum and maximum relative
+/// change of the diagonal of the compliance with it: `robots/lower_arm/README.md`.
 const WALL_M: f64 = 0.026;
 const FINER_MESH: f64 = 484e3;
 const FINER_CHANGES: [f64; 2] = [0.002, 0.030];
@@ -52,7 +52,7 @@ fn about(found: &About, whole: Option<&Whole>) -> String {
     )
 }
 
-/// Six loads at B: other programs and every method against the mesh.
+/// Six loads at B: other programs and every method compared with the mesh.
 fn flange_loads(case: &mut Case, findings: &Findings) {
     case.heading("Six loads at the flange");
     let (found, by, whole) = (&findings.flange_loads, findings.truth_name(), findings.whole.is_some());
@@ -70,7 +70,7 @@ fn flange_loads(case: &mut Case, findings: &Findings) {
         add_errors(&mut table, truth, methods);
     }
     case.table(table);
-    // Other programs judge the mesh, the mesh judges the rest; a file does not judge itself.
+    // Other programs check the mesh, the mesh checks the rest; a file is not compared with itself.
     for program in programs {
         let text = format!("casting, loads at the flange, {by}");
         case.claim(text, &program.name, compliance_error(&program.C, truth), Bound::AtMost(1e-7));
@@ -195,7 +195,7 @@ fn frequency_figure(found: &Frequencies) -> Figure {
     }
 }
 
-/// Rigid ties against distributing ones.
+/// Rigid ties compared with distributing ones.
 fn ties(case: &mut Case, whole: &Whole) {
     case.heading("Rigid or distributing ties");
     let found: &Ties = &whole.ties;

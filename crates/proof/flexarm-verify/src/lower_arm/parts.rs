@@ -1,4 +1,4 @@
-//! Where the sag of chains ends as parts become short, and what it misses.
+//! Limit of the sag of chains as their parts become short, and the share of the sag that it misses.
 
 use flexarm_fem::ElasticSplit;
 use flexarm_fem::chain::Chain;
@@ -11,22 +11,22 @@ use crate::meshed::{Condensed, Meshed};
 
 /// Numbers of parts.
 pub(super) const COUNTS: [usize; 7] = [2, 3, 4, 8, 16, 32, 64];
-/// The last of them.
+/// The largest of them.
 pub(super) const MOST: usize = COUNTS[COUNTS.len() - 1];
-/// Frequencies that are compared.
+/// Number of frequencies compared.
 pub(super) const MODES: usize = 3;
-/// Where stretches of the casting end, over the way from A to B.
+/// Boundaries of the stretches of the casting, as fractions of the distance from A to B.
 pub(super) const CUTS: [f64; 2] = [0.2, 0.9];
 
-/// A chain of so many parts under weight along x, y, z; sizes of shifts of B over those of the
-/// mesh.
+/// A chain of `parts` parts under gravity along x, y, z; displacements of B relative to those of
+/// the mesh.
 pub(super) struct ChainError {
     pub(super) parts: usize,
     /// Mass of its first part (kg).
     pub(super) first_mass_kg: f64,
-    /// What the chain misses.
+    /// Missing share of the displacement.
     pub(super) missed: [f64; 3],
-    /// What the weight of the first part alone does in the mesh.
+    /// Displacement due to the weight of the first part only, in the mesh.
     pub(super) by_first_part: [f64; 3],
     /// Relative differences of frequencies.
     pub(super) hz_errors: Vec<f64>,
@@ -35,14 +35,15 @@ pub(super) struct ChainError {
 /// A stretch of the casting: the parts of the longest chain that begin in it.
 pub(super) struct Stretch {
     pub(super) name: String,
-    /// Beginning over the way from A to B.
+    /// Start, as a fraction of the distance from A to B.
     begin: f64,
     pub(super) mass_kg: f64,
-    /// What the chain misses of the shift by its weight, over the shift by all of the weight.
+    /// Missing displacement due to the weight of the stretch, over the displacement due to the
+    /// whole weight.
     pub(super) missed: [f64; 3],
 }
 
-/// Both.
+/// Chains of all lengths, and the stretches of the longest one.
 pub(super) struct LimitOfParts {
     pub(super) chains: Vec<ChainError>,
     pub(super) stretches: Vec<Stretch>,
@@ -56,45 +57,46 @@ impl LimitOfParts {
         Ok(Self { chains, stretches: subject.stretches(&made[made.len() - 1]) })
     }
 
-    /// What the longest chain misses along z.
+    /// Missing share of the longest chain along z.
     pub(super) fn missed_along(&self) -> f64 {
         self.chains.last().map_or(f64::NAN, |chain| chain.missed[2])
     }
 
-    /// What it misses along z of all that lies beyond the first of the [`CUTS`].
+    /// Missing share of the longest chain along z, summed over all stretches beyond the first of
+    /// the [`CUTS`].
     pub(super) fn missed_away_from_the_seat(&self) -> f64 {
         self.stretches.iter().filter(|stretch| stretch.begin >= CUTS[0]).map(|stretch| stretch.missed[2]).sum()
     }
 
-    /// What it misses across between the cuts, x or y.
+    /// Missing share of the longest chain between the cuts under transverse gravity; the larger of
+    /// x and y.
     pub(super) fn missed_across_the_body(&self) -> f64 {
         let body = self.stretches.iter().find(|stretch| stretch.begin == CUTS[0]);
         body.map_or(f64::NAN, |body| body.missed[0].max(body.missed[1]))
     }
 }
 
-/// What chains are held against.
+/// Mesh and truth with which chains are compared.
 struct Subject<'a> {
     condensed: &'a Condensed<'a>,
     truth: &'a Truth,
 }
 
 impl Subject<'_> {
-    /// Fraction of the way from A to B of a joint.
+    /// Position of a joint as a fraction of the distance from A to B.
     fn fraction(&self, joint: &ElasticSplit) -> f64 {
         let (p_A, p_B) = self.condensed.points();
         let along = p_B - p_A;
         (joint.X_LS.translation.vector - p_A).dot(&along) / along.norm_squared()
     }
 
-    /// Size of a shift of B under weight along an axis over that of the mesh under all of the
-    /// weight.
+    /// Displacement of B under gravity along an axis, over that of the mesh under the whole weight.
     fn size(&self, u: &Vector6<f64>, axis: usize) -> f64 {
         u.fixed_rows::<3>(0).norm() / self.truth.sag[axis].fixed_rows::<3>(0).norm()
     }
 
-    /// Motion of B of a chain under weight, in closed form: the weight of all parts beyond a joint
-    /// yields it.
+    /// Computes the motion of B of a chain under gravity in closed form: each joint deflects under
+    /// the weight of all parts beyond it.
     fn sag(&self, chain: &Chain, axis: usize) -> Vector6<f64> {
         let (_, p_B) = self.condensed.points();
         chain.sag(&p_B, &weight(axis)).unwrap_or_else(|| Vector6::repeat(f64::NAN))
@@ -126,7 +128,7 @@ impl Subject<'_> {
 
     fn stretch(&self, chain: &Chain, name: String, begin: f64, end: f64) -> Stretch {
         let joints: Vec<f64> = chain.joints.iter().map(|joint| self.fraction(joint)).collect();
-        // Part k lies between joint k - 1 and joint k.
+        // Part k is between joint k - 1 and joint k.
         let start = |k: usize| if k == 0 { -1.0 } else { joints[k - 1] };
         let inside: Vec<usize> = (0..chain.parts.len()).filter(|k| (begin..end).contains(&start(*k))).collect();
         let mut only = chain.clone();
@@ -152,8 +154,8 @@ fn weight(axis: usize) -> Vector3<f64> {
 mod tests {
     use super::*;
 
-    /// The first part and what lies below the cut are not beyond it; across, the larger of x and y
-    /// counts.
+    /// The first part and everything before the cut do not count as beyond it; in the transverse
+    /// directions the larger of x and y counts.
     #[test]
     fn what_is_missed_is_summed_beyond_the_seat_alone() {
         let stretch = |begin: f64, missed: [f64; 3]| Stretch { name: String::new(), begin, mass_kg: 1.0, missed };

@@ -1,4 +1,4 @@
-//! The page of the case: what parts cannot see.
+//! The page of the case: errors that lumped parts cannot avoid.
 
 use flexarm_draw::{CurveLook, Panel, PlotCurve};
 
@@ -6,7 +6,7 @@ use super::parts::{COUNTS, CUTS, ChainError, LimitOfParts, MODES, MOST};
 use super::{AXES, CHAINS};
 use crate::page::{Bound, Case, Figure, Table, error, fixed, percent, signed, word};
 
-/// Where the sag of chains ends as parts become short, and what it misses.
+/// Limit of the sag of chains as their parts become short, and the share of the sag that it misses.
 pub(super) fn limit_of_parts(case: &mut Case, found: &LimitOfParts) {
     case.heading("What parts cannot see");
     case.table(chain_table(&found.chains));

@@ -14,14 +14,14 @@ use crate::bench::{
 use crate::compliance::{Method, by_every_method};
 use crate::meshed::{Meshed, inverse};
 
-/// Step of what runs until it rests (s).
+/// Step size of the runs until rest (s).
 const SETTLING_STEP_S: f64 = 5e-4;
-/// Part of the usual load that is taken along the casting.
+/// Fraction of the usual load that is applied along the casting.
 pub(super) const AXIAL_PART: f64 = 0.1;
-/// Place of F_z in lists of loads.
+/// Index of F_z in lists of loads.
 const F_Z: usize = 2;
 
-/// Six loads at B: other programs and every method against the mesh.
+/// Six loads at B: other programs and every method compared with the mesh.
 pub(super) struct FlangeLoads {
     /// Compliance (m/N, rad/(N m), ...).
     pub(super) truth: Matrix6<f64>,
@@ -34,9 +34,9 @@ pub(super) struct FlangeLoads {
 /// The usual load along the casting, two parts.
 pub(super) struct AxialLoad {
     pub(super) force_n: f64,
-    /// How far it bends the casting sideways (m).
+    /// Sideways deflection of the casting (m).
     pub(super) sideways_m: f64,
-    /// Error of the response, which is geometry.
+    /// Error of the response, which is due to geometry.
     pub(super) error: f64,
 }
 
@@ -87,13 +87,13 @@ fn models() -> Vec<Model> {
     all.map(|((name, modelling), parts)| Model { name, parts, modelling }).collect()
 }
 
-/// Errors of the shift and of the rotation of B under weight along x, y, z, as vectors over their
-/// sizes.
+/// Relative errors of the translation and of the rotation of B under gravity along x, y, z, each as
+/// a vector norm.
 pub(super) type SagErrors = [[f64; 2]; 3];
 
 /// Own weight in three directions.
 pub(super) struct Weight {
-    /// Sizes of the shift (m) and of the rotation (rad) under weight along x, y, z.
+    /// Magnitudes of the translation (m) and of the rotation (rad) under gravity along x, y, z.
     pub(super) sizes: [[f64; 2]; 3],
     pub(super) programs: Vec<(&'static str, SagErrors)>,
     pub(super) models: Vec<(Model, SagErrors)>,
@@ -115,18 +115,19 @@ impl Weight {
         })
     }
 
-    /// Largest error of another program.
+    /// Maximum error of the other programs.
     pub(super) fn worst_program(&self) -> f64 {
         self.programs.iter().map(|(_, errors)| worst_sag(errors)).fold(0.0, larger)
     }
 
-    /// Largest error of modal links.
+    /// Maximum error of modal links.
     pub(super) fn worst_modal(&self) -> f64 {
         let modal = self.models.iter().filter(|(model, _)| model.parts.is_none());
         modal.map(|(_, errors)| worst_sag(errors)).fold(0.0, larger)
     }
 
-    /// Errors of the shift of so many parts under weight across (x or y, the larger) and along z.
+    /// Errors of the translation with `parts` parts under transverse gravity (the larger of x and
+    /// y) and along z.
     pub(super) fn across_and_along(&self, parts: usize) -> [f64; 2] {
         let found = self.models.iter().find(|(model, _)| model.parts == Some(parts));
         found.map_or([f64::NAN; 2], |(_, [x, y, z])| [larger(x[0], y[0]), z[0]])
@@ -165,17 +166,17 @@ impl Frequencies {
         })
     }
 
-    /// Mean error of the first two frequencies with so many parts.
+    /// Mean error of the first two frequencies with `parts` parts.
     pub(super) fn first_two(&self, parts: usize) -> f64 {
         let found = self.models.iter().find(|(model, ..)| model.parts == Some(parts));
         found.map_or(f64::NAN, |(_, errors, _)| 0.5 * (errors[0] + errors[1]))
     }
 }
 
-/// Frequencies that ties are judged by.
+/// Number of frequencies by which ties are compared.
 pub(super) const TIED_MODES: usize = 3;
 
-/// Seats with one pair of ties, over those of rigid ties, less one.
+/// Seats with one pair of ties, relative to rigid ties, minus one.
 pub(super) struct Tied {
     pub(super) ties: [Tie; 2],
     /// Diagonal of the compliance.
@@ -183,10 +184,10 @@ pub(super) struct Tied {
     pub(super) hz: Vec<f64>,
 }
 
-/// Rigid ties against distributing ones.
+/// Rigid ties compared with distributing ones.
 pub(super) struct Ties {
     pub(super) pairs: Vec<Tied>,
-    /// With distributing ties at both seats: name of another program, and its difference.
+    /// Name of another program and its difference, with distributing ties at both seats.
     pub(super) programs: Vec<(&'static str, f64)>,
 }
 
@@ -210,14 +211,14 @@ impl Ties {
         Ok(Self { pairs, programs: judged })
     }
 
-    /// The least that distributing ties at both seats add to an entry of the compliance's diagonal.
+    /// Minimum increase of the diagonal of the compliance by distributing ties at both seats.
     pub(super) fn softest(&self) -> f64 {
         let both = self.pairs.iter().filter(|tied| tied.ties == [Tie::Distributing; 2]);
         both.flat_map(|tied| tied.compliance).fold(f64::INFINITY, f64::min)
     }
 }
 
-/// Largest of the first `count` errors, all if there are no more.
+/// Maximum of the first `count` errors, at most [`MODES`].
 pub(super) fn worst_of(errors: &[f64], count: usize) -> f64 {
     errors.iter().take(count.min(MODES)).copied().worst()
 }
@@ -237,8 +238,8 @@ mod tests {
         }
     }
 
-    /// The modal links' worst is theirs, not that of two parts; a number of parts that is not there
-    /// is no number.
+    /// The maximum error of modal links does not include that of two parts; a number of parts
+    /// without a model gives NaN.
     #[test]
     fn errors_under_weight_are_those_of_their_models() {
         let weight = weight();

@@ -1,4 +1,4 @@
-//! What the mesh and the other programs say, with A held.
+//! Results of the mesh and of the other programs, with A held.
 
 use flexarm::Robot;
 use nalgebra::{Matrix6, Vector3, Vector6};
@@ -8,40 +8,40 @@ use crate::Error;
 use crate::bench::{Bench, Stored};
 use crate::meshed::{Condensed, inverse};
 
-/// Frequencies that are compared.
+/// Number of frequencies compared.
 pub(super) const MODES: usize = 6;
 
 /// Compliance, sag and frequencies, with A held.
 pub(super) struct Truth {
-    /// Motion of B per wrench on it (m/N, rad/(N m), ...).
+    /// Compliance at B (m/N, rad/(N m), ...).
     pub(super) C: Matrix6<f64>,
-    /// Motion of B under weight along x, y, z (m, rad).
+    /// Motion of B under gravity along x, y, z (m, rad).
     pub(super) sag: [Vector6<f64>; 3],
     pub(super) hz: Vec<f64>,
 }
 
 impl Truth {
-    /// By the whole mesh.
+    /// Computes them from the whole mesh.
     pub(super) fn new(condensed: &Condensed<'_>) -> Result<Self, Error> {
         let sag = [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| condensed.under_acceleration(&(G * axis)));
         Ok(Self { C: condensed.compliance()?, sag, hz: condensed.held_hz(MODES)? })
     }
 
-    /// From the condensed matrices of the link file, which have no more than a few modes.
+    /// Computes them from the condensed matrices of the link file, which have only a few modes.
     pub(super) fn filed(robot: &Robot, hz: Vec<f64>) -> Result<Self, Error> {
         let reduced = &robot.flexible[0].flexible.reduced;
         let element = reduced.details.as_ref().and_then(|details| details.superelement.as_ref());
         let element = element.ok_or(Error::NoCondensedMass)?;
         let C = inverse(&reduced.K_BB).ok_or(Error::SingularLink)?;
         let sag = [0, 1, 2].map(|axis| {
-            // Both interfaces move alike, and the mass says what that loads B with.
+            // Both interfaces accelerate alike; the mass matrix gives the resulting load at B.
             let load = element.M.column(axis) + element.M.column(6 + axis);
             C * Vector6::from_fn(|i, _| G * load[6 + i])
         });
         Ok(Self { C, sag, hz })
     }
 
-    /// Relative differences of another's frequencies.
+    /// Relative differences of given frequencies from the truth.
     pub(super) fn hz_errors(&self, hz: &[f64]) -> Vec<f64> {
         hz.iter().zip(&self.hz).map(|(f, truth)| f / truth - 1.0).collect()
     }
@@ -50,7 +50,7 @@ impl Truth {
 /// Another program on the same mesh.
 pub(super) struct Program {
     pub(super) name: &'static str,
-    /// Program, script and day.
+    /// Program, script and date.
     pub(super) provenance: String,
     pub(super) truth: Truth,
     /// Its compliance with both seats tied by the mean of their nodes.

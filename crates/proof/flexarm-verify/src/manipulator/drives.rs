@@ -1,4 +1,4 @@
-//! Links, drives, both; and the methods again with drives that yield.
+//! Elastic links, elastic drives, and both; then every method again with elastic drives.
 
 use flexarm::{ConstraintForm, DriveModel, LinkModel, Modelling, StepperKind};
 use nalgebra::Vector3;
@@ -9,12 +9,12 @@ use super::{ALL_MODES, DRIVES};
 use crate::Error;
 use crate::bench::{ALPHA, Bench, in_modes, in_parts, larger, modal, spook};
 
-/// Step of spring-damper (s).
+/// Step size of the spring-damper model (s).
 pub(super) const STEP_S: f64 = 1e-3;
-/// A finer one for compliant constraints (s).
+/// Finer step size for compliant constraints (s).
 const FINE_STEP_S: f64 = 1e-4;
 
-/// What yields on one motion.
+/// A run of one motion with one choice of elastic elements.
 pub(super) struct Flexibility {
     pub(super) motion: &'static str,
     pub(super) what: &'static str,
@@ -24,8 +24,8 @@ pub(super) struct Flexibility {
 /// Links, drives and both on every motion.
 pub(super) struct Flexibilities {
     pub(super) made: Vec<Flexibility>,
-    /// Sag of links and drives together less the sum of the two alone, over it, the worst of all
-    /// motions.
+    /// Sag of links and drives together minus the sum of the two separately, relative to it;
+    /// maximum over all motions.
     pub(super) sum_error: f64,
 }
 
@@ -53,8 +53,8 @@ impl Flexibilities {
     }
 }
 
-/// At rest compliances in series add: sag of both less the sum of the two alone, over it; nothing
-/// where there are no three.
+/// Relative difference between the sag of both and the sum of the two: at rest, compliances in
+/// series add. Zero if there are not three runs.
 fn sum_of_two(sags: &[Vector3<f64>]) -> f64 {
     match sags {
         [links, drives, both] => (links + drives - both).norm() / both.norm(),
@@ -62,19 +62,19 @@ fn sum_of_two(sags: &[Vector3<f64>]) -> f64 {
     }
 }
 
-/// Places of runs in [`ElasticDrives::made`].
+/// Indices of runs in [`ElasticDrives::made`].
 pub(super) const LINKS_ALONE: usize = 1;
 pub(super) const DRIVES_ALONE: usize = 2;
 pub(super) const TWO_PARTS: usize = 3;
-/// Those that are claimed to be close to the truth.
+/// Indices of the runs that are claimed to be close to the truth.
 pub(super) const CLAIMED: [usize; 3] = [3, 4, 6];
 
-/// Every method with drives that yield, on one motion.
+/// Every method with elastic drives, on one motion.
 pub(super) struct ElasticDrives {
     pub(super) motion: &'static str,
-    /// Largest deflection of the truth (m).
+    /// Maximum deflection of the truth (m).
     pub(super) peak_m: f64,
-    /// Its own distance from itself is none.
+    /// The truth itself, with zero error.
     pub(super) truth: Made,
     pub(super) made: Vec<Made>,
 }
@@ -105,7 +105,7 @@ struct Method {
     step_s: f64,
 }
 
-/// What yields one by one, then the methods.
+/// The elastic elements one by one, then the methods.
 fn list() -> Vec<Method> {
     let rigid = Modelling { links: LinkModel::Rigid, ..Modelling::default() };
     let nothing = Modelling { drives: DriveModel::Rigid, ..rigid };
@@ -134,7 +134,7 @@ fn list() -> Vec<Method> {
 mod tests {
     use super::*;
 
-    /// Truth by hand: 3 + 4 along one axis against 7 is none; against 8 one eighth.
+    /// Truth by hand: 3 + 4 along one axis against 7 gives no error, against 8 one eighth.
     #[test]
     fn sags_of_springs_in_series_add() {
         let sag = |z: f64| Vector3::new(0.0, 0.0, -z);
@@ -142,7 +142,7 @@ mod tests {
         assert_eq!(sum_of_two(&[sag(3.0), sag(4.0), sag(8.0)]), 0.125);
     }
 
-    /// The claims and the picture speak of runs by their places.
+    /// The claims and the picture refer to runs by index.
     #[test]
     fn the_methods_with_drives_are_where_the_claims_look_for_them() {
         let list = list();

@@ -7,10 +7,10 @@ use super::page::{curve, deflections, distances};
 use super::{AXES, DRIVES};
 use crate::page::{Bound, Case, Figure, Table, digits, fixed, plain, word};
 
-/// Frequencies of the table.
+/// Number of frequencies in the table.
 const MODES: usize = 4;
 
-/// Links, drives, both.
+/// Elastic links, elastic drives, and both.
 pub(super) fn which_flexibility(case: &mut Case, found: &Flexibilities) {
     case.heading("Which flexibility matters");
     case.text(format!(
@@ -44,7 +44,7 @@ pub(super) fn which_flexibility(case: &mut Case, found: &Flexibilities) {
     );
 }
 
-/// The methods again with drives that yield.
+/// Every method again with elastic drives.
 pub(super) fn elastic_drives(case: &mut Case, found: &ElasticDrives) {
     let ElasticDrives { motion, peak_m, truth, made } = found;
     case.heading(&format!("`trajectories/{motion}.toml`, links and drives"));

@@ -1,4 +1,4 @@
-//! The forearm's sag under its own weight, part by part: chain against mesh.
+//! Sag of the forearm under its own weight, part by part: chain compared with mesh.
 //!
 //! Under a unit force at B the mesh moves by `U`, and by reciprocity the sag of B is the sum of
 //! weight times `U`; the parts of a chain move rigidly. The difference is summed over the nodes of
@@ -18,18 +18,18 @@ use crate::meshed::Meshed;
 const DUCTILE_IRON: Material = Material { E: 169e9, nu: 0.275, rho: 7100.0, G: None };
 const MESH: &str = "robots/kr210/fe/link_3.msh.gz";
 const LINK: &str = "link_3";
-/// Parts of the chain that is looked at part by part.
+/// Number of parts of the chain that is analysed part by part.
 pub(super) const PARTS: usize = 8;
 
-/// Sag along an axis under weight along it, relative differences of chains from the mesh.
+/// Sag along an axis under gravity along it; relative differences of chains from the mesh.
 pub(super) struct AxisSag {
     /// One per chain.
     pub(super) chains: Vec<f64>,
-    /// Where the chain of [`PARTS`] loses it, part by part from A to B.
+    /// Contribution of each part of the chain of [`PARTS`] parts, from A to B.
     pub(super) by_part: Vec<f64>,
 }
 
-/// What is found.
+/// Findings on the forearm.
 pub(super) struct Forearm {
     /// Numbers of parts of the chains.
     pub(super) counts: Vec<usize>,
@@ -38,7 +38,7 @@ pub(super) struct Forearm {
 }
 
 impl Forearm {
-    /// Nothing if the robot has no such link.
+    /// Returns `None` if the robot has no such link.
     pub(super) fn new(bench: &Bench, robot: &Robot) -> Result<Option<Self>, Error> {
         let fe = Meshed::read_with(bench, MESH, UnitSystem::SI, DUCTILE_IRON, Quadrature::Exact)?;
         let Some(link) = robot.flexible.iter().map(|l| &l.flexible.reduced).find(|r| r.name == LINK) else {
@@ -58,12 +58,12 @@ impl Forearm {
 /// The mesh with A held.
 struct Casting<'a> {
     fe: &'a Meshed,
-    /// Shapes under unit loads at B.
+    /// Displacements under unit loads at B.
     U: &'a DMatrix<f64>,
-    /// Mass that each degree of freedom has along x, y, z (kg).
+    /// Mass of each degree of freedom along x, y, z (kg).
     weights: &'a DMatrix<f64>,
     B: Vector3<f64>,
-    /// From A towards B.
+    /// Direction from A to B.
     line: Vector3<f64>,
 }
 
@@ -80,7 +80,7 @@ impl Casting<'_> {
         found
     }
 
-    /// Sag of a chain over that of the mesh, less one; then its parts.
+    /// Relative error of the sag of a chain, and the contribution of each part.
     fn chain_sag(&self, chain: &Chain, axis: usize) -> (f64, Vec<f64>) {
         let joints = Joint::under_force(chain, &self.B, &Vector3::ith(axis, 1.0));
         let mut lost = vec![0.0; chain.parts.len()];
@@ -99,16 +99,16 @@ impl Casting<'_> {
     }
 }
 
-/// An elastic joint of a chain that yields.
+/// An elastic joint of a chain, deflected.
 struct Joint {
-    /// Its place (m).
+    /// Position (m).
     p: Vector3<f64>,
-    /// How it yields (m, rad).
+    /// Deflection (m, rad).
     yields: Vector6<f64>,
 }
 
 impl Joint {
-    /// Joints of a chain under a force at B.
+    /// Deflections of the joints of a chain under a force at B.
     fn under_force(chain: &Chain, B: &Vector3<f64>, force: &Vector3<f64>) -> Vec<Self> {
         let springs = chain.joints.iter().filter_map(|joint| {
             let C: Matrix6<f64> = joint.K_S.try_inverse()?;
@@ -121,7 +121,7 @@ impl Joint {
         yields.collect()
     }
 
-    /// How it moves a point beyond it (m).
+    /// Displacement of a point beyond the joint (m).
     fn moves(&self, p: &Vector3<f64>) -> Vector3<f64> {
         self.yields.fixed_rows::<3>(0) + self.yields.fixed_rows::<3>(3).into_owned().cross(&(p - self.p))
     }
@@ -131,8 +131,8 @@ impl Joint {
 mod tests {
     use super::*;
 
-    /// Truth by hand: a joint at x = 1 that shifts by 2 along y and turns by 0.1 about z moves the
-    /// point at x = 4 by 2.3 along y.
+    /// Truth by hand: a joint at x = 1 that translates by 2 along y and rotates by 0.1 about z
+    /// moves the point at x = 4 by 2.3 along y.
     #[test]
     fn a_joint_moves_what_lies_beyond_it_by_shift_and_lever() {
         let joint = Joint { p: Vector3::x(), yields: Vector6::new(0.0, 2.0, 0.0, 0.0, 0.0, 0.1) };

@@ -12,25 +12,25 @@ use crate::bench::{ALPHA, Bench, in_modes, in_parts, modal, parts, spook};
 
 const SOURCE: StepperKind =
     StepperKind::Spook(SpookSettings { form: ConstraintForm::Local, preset: SpookPreset::Source });
-/// Step of the stepper with error control, that of what it shows (s).
+/// Output step of the stepper with error control (s).
 pub(super) const SHOWN_STEP_S: f64 = 2e-3;
-/// The usual step and a fine one (s).
+/// The usual step size and a fine one (s).
 const STEP_S: f64 = 1e-3;
 pub(super) const FINE_STEP_S: f64 = 1e-4;
 
-/// Places of runs in [`Methods::made`].
+/// Indices of runs in [`Methods::made`].
 pub(super) const TWO_PARTS: usize = 0;
 pub(super) const EIGHT_PARTS: usize = 3;
 pub(super) const CONSTRAINTS: usize = 4;
 pub(super) const FINE_CONSTRAINTS: usize = 5;
 pub(super) const MODAL: usize = 10;
 
-/// What is found on one motion.
+/// Findings on one motion.
 pub(super) struct Methods {
     pub(super) motion: &'static str,
     /// Modal links with all modes by the stepper with error control.
     pub(super) truth: Run,
-    /// Its largest deflection (m).
+    /// Its maximum deflection (m).
     pub(super) peak_m: f64,
     pub(super) rigid: Run,
     pub(super) rigid_error: Sizes,
@@ -38,8 +38,8 @@ pub(super) struct Methods {
     pub(super) steps: Vec<StepErrors>,
 }
 
-/// Two parts with damping proportional to stiffness in all, at one step: largest distance of the
-/// tool from the stepper with error control, over the peak.
+/// Two parts with stiffness-proportional damping everywhere, at one step size: maximum distance of
+/// the TCP from the stepper with error control, over the peak.
 pub(super) struct StepErrors {
     pub(super) step_s: f64,
     /// Compliant constraints, local.
@@ -79,10 +79,10 @@ pub(super) fn reference() -> StepperKind {
     StepperKind::Reference(ReferenceSettings::new(TOLERANCE))
 }
 
-/// Links with their name, stepper with its own, step (s).
+/// Links with their name, name of the stepper, stepper, step size (s).
 type Method = ((String, Modelling), &'static str, StepperKind, f64);
 
-/// Every link model by the spring-damper, then compliant constraints, then modal links.
+/// Every link model with the spring-damper, then compliant constraints, then modal links.
 fn list() -> Vec<Method> {
     let mut list: Vec<Method> = Vec::new();
     list.extend([2, 3, 4, 8].map(|n| (in_parts(n), "spring-damper", ALPHA, STEP_S)));
@@ -102,8 +102,8 @@ fn list() -> Vec<Method> {
     list
 }
 
-/// SPOOK damps each spring in proportion to its stiffness; with such damping in both, only the
-/// steppers differ.
+/// Returns the robot with damping proportional to stiffness. SPOOK damps each spring in this way;
+/// with the same damping in both models, only the steppers differ.
 fn proportionally_damped(robot: &Robot, first_hz: f64) -> Robot {
     let mut robot = robot.clone();
     for link in &mut robot.flexible {
@@ -112,8 +112,8 @@ fn proportionally_damped(robot: &Robot, first_hz: f64) -> Robot {
     robot
 }
 
-/// Where the rest of compliant constraints comes from: same model, same damping, stepper with error
-/// control.
+/// Computes the remaining error of compliant constraints, compared with the stepper with error
+/// control on the same model with the same damping.
 fn step_errors(
     runs: &mut Runs<'_, '_>,
     robot: &Robot,
@@ -136,7 +136,7 @@ fn step_errors(
 mod tests {
     use super::*;
 
-    /// The claims speak of runs by their places.
+    /// The claims refer to runs by index.
     #[test]
     fn the_methods_are_where_the_claims_look_for_them() {
         let list = list();

@@ -1,8 +1,8 @@
-//! The whole manipulator in motion: link models and steppers against modal links, links against
-//! drives.
+//! The whole manipulator in motion: link models and steppers compared with modal links, links
+//! compared with drives.
 //!
-//! `runs` makes runs, `methods`, `pick`, `forearm` and `drives` compute findings, `page` and
-//! `drives_page` say them.
+//! `runs` performs the runs, `methods`, `pick`, `forearm` and `drives` compute findings, `page` and
+//! `drives_page` write them up.
 
 mod drives;
 mod drives_page;
@@ -28,22 +28,22 @@ use runs::Runs;
 const LINKS: &str = "robots/kr210/links.toml";
 const DRIVES: &str = "robots/kr210/robot.toml";
 const AXES: [&str; 3] = ["x", "y", "z"];
-/// Modes in the castings' files.
+/// Number of modes in the link files of the castings.
 const ALL_MODES: usize = 10;
 /// Tolerance of the stepper with error control.
 const TOLERANCE: f64 = 1e-8;
-/// Damping of each mode, over critical.
+/// Damping ratio of each mode.
 const DAMPING: f64 = 0.03;
 
-/// What the case finds.
+/// Findings of the case.
 struct Findings {
     /// One per motion.
     motions: Vec<Methods>,
-    /// Nothing in a quick run.
+    /// `None` in a quick run.
     pick: Option<Pick>,
     /// Lowest frequency of a casting with both ends held (Hz).
     held_hz: f64,
-    /// Nothing in a quick run.
+    /// `None` in a quick run.
     forearm: Option<Forearm>,
     flexibilities: Flexibilities,
     elastic_drives: ElasticDrives,
@@ -54,8 +54,8 @@ impl Findings {
         let robot = bench.robot(LINKS)?;
         let moves: &[&'static str] =
             if bench.quick { &["point_to_point"] } else { &["pick_and_place", "point_to_point", "large_moves"] };
-        // One motion of all methods weighs about 150 runs by generalised-alpha, a pick 55, the rest
-        // 80.
+        // One motion with all methods costs about 150 runs by generalised-alpha, a pick 55, the
+        // rest 80.
         let pick_weight = if bench.quick { 0.0 } else { 55.0 };
         let mut runs = Runs::new(pace, 150.0 * moves.len() as f64 + 80.0 + pick_weight);
         let motions = moves.iter().map(|&name| Methods::new(bench, &mut runs, &robot, name));
@@ -77,7 +77,7 @@ fn held_hz(robot: &Robot) -> f64 {
     elements.flat_map(|element| element.fixed_frequencies_hz()).reduce(f64::min).unwrap_or(f64::NAN)
 }
 
-/// The case.
+/// Runs the case.
 pub(crate) fn case(bench: &Bench, pace: &mut Pace<'_>) -> Result<Case, Error> {
     Ok(page::page(&Findings::new(bench, pace)?))
 }

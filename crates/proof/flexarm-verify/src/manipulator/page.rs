@@ -11,7 +11,7 @@ use super::{ALL_MODES, AXES, DAMPING, Findings, LINKS, TOLERANCE};
 use crate::bench::{in_modes, larger};
 use crate::page::{Bound, Case, Cell, Figure, Table, digits, error, fixed, listed, percent, plain, signed, word};
 
-/// Every so many samples are drawn: 4 ms, a seventh of the period of the fourth mode.
+/// Every second sample is drawn: 4 ms, a seventh of the period of the fourth mode.
 const DRAWN: usize = 2;
 /// Payload of the arm (kg): `robots/kr210/README.md`.
 const PAYLOAD_KG: f64 = 150.0;
@@ -42,13 +42,13 @@ pub(super) fn page(found: &Findings) -> Case {
     case
 }
 
-/// Largest deflections along x, y, z and in all, and sag at the start, in millimetres.
+/// Maximum deflections along x, y, z and in total, and sag at the start, in millimetres.
 pub(super) fn deflections(run: &Run, decimals: usize) -> impl Iterator<Item = Cell> {
     let [x, y, z, all] = run.peaks().listed();
     [x, y, z, all, run.sag_m].into_iter().map(move |u| fixed(1e3 * u, decimals))
 }
 
-/// Distances along x, y, z and in all.
+/// Distances along x, y, z and in total.
 pub(super) fn distances(error_of: Sizes) -> [Cell; 4] {
     error_of.listed().map(error)
 }
@@ -67,8 +67,8 @@ pub(super) fn curve(run: &Run, name: &str, look: CurveLook, axis: usize) -> Plot
 fn methods(case: &mut Case, found: &Methods) {
     case.heading(&format!("`trajectories/{}.toml`, links alone", found.motion));
     case.table(methods_table(found));
-    // Spring-damper and compliant constraints with two parts; the chain that closes what is left;
-    // the stepper alone.
+    // Spring-damper and compliant constraints with two parts; then the chain that closes the
+    // remaining gap; then the error of the stepper only.
     let bounds =
         [(TWO_PARTS, 0.01), (CONSTRAINTS, 0.01), (FINE_CONSTRAINTS, 0.01), (EIGHT_PARTS, 0.004), (MODAL, 2e-4)];
     for (k, bound) in bounds {
@@ -205,7 +205,7 @@ fn what_is_left(found: &Findings) -> String {
     )
 }
 
-/// The forearm's sag under its own weight, part by part.
+/// Sag of the forearm under its own weight, part by part.
 fn where_chains_stop(case: &mut Case, found: &Forearm, motions: &[Methods]) {
     let counts = listed(&found.counts);
     let caption = format!(

@@ -1,5 +1,5 @@
-//! The manipulator picks something up and sets it down: every stepper over payloads that change at
-//! once.
+//! The manipulator picks up a workpiece and sets it down: every stepper across sudden payload
+//! changes.
 
 use flexarm::{DriveModel, Modelling, Robot, RunOptions, Scenario, StepperKind};
 
@@ -11,35 +11,35 @@ use crate::bench::{ALPHA, Bench, in_parts, modal, parts};
 const MOTION: &str = "trajectories/pick_and_place.toml";
 pub(super) const LOADS: &str = "trajectories/pick_and_place.loads.toml";
 
-/// Links by one stepper.
+/// A link model with one stepper.
 pub(super) struct Picked {
     pub(super) links: String,
     pub(super) stepper: String,
     pub(super) explicit: bool,
     pub(super) run: Run,
-    /// Largest distance of the tool from that of the same links by the stepper with error control,
+    /// Maximum distance of the TCP from that of the same links by the stepper with error control,
     /// over its peak.
     pub(super) error: f64,
 }
 
-/// What is found.
+/// Findings on the pick.
 pub(super) struct Pick {
-    /// The gripper alone, and what it picks up (kg).
+    /// Masses of the gripper and of the workpiece (kg).
     pub(super) gripper_kg: f64,
     pub(super) workpiece_kg: f64,
-    /// When it is picked up and set down (s).
+    /// Times at which it is picked up and set down (s).
     pub(super) picked_s: f64,
     pub(super) placed_s: f64,
-    /// By the stepper with error control: links in two parts, and in static shapes.
+    /// Truths by the stepper with error control: links in two parts, and links with static shapes.
     pub(super) truths: [(String, Run); 2],
     pub(super) picked: Vec<Picked>,
 }
 
-/// Place of the run in [`Pick::picked`] that is drawn.
+/// Index in [`Pick::picked`] of the run that is drawn.
 pub(super) const DRAWN: usize = 1;
 
 impl Pick {
-    /// Steppers against the one with error control.
+    /// Compares the steppers with the one with error control.
     pub(super) fn new(bench: &Bench, runs: &mut Runs<'_, '_>, robot: &Robot) -> Result<Self, Error> {
         let scenario = Scenario::new(bench.motion(robot, MOTION)?).with_loads_file(bench.file(LOADS))?;
         let mut make = |links: Modelling, stepper: StepperKind, step_s: f64| {

@@ -1,4 +1,4 @@
-//! Runs of the manipulator, and what is kept of them.
+//! Runs of the manipulator, and the results kept of each.
 
 use std::ops::ControlFlow;
 
@@ -10,22 +10,22 @@ use crate::Pace;
 use crate::bench::larger;
 use crate::page::plain;
 
-/// How often the tool is seen (1/s).
+/// Sampling rate of the TCP (1/s).
 const SEEN_HZ: f64 = 500.0;
-/// The same as a time (ms).
+/// Sampling interval (ms).
 pub(super) const SEEN_EVERY_MS: f64 = 1e3 / SEEN_HZ;
 
-/// What is kept of a run.
+/// Results kept of a run.
 pub(super) struct Run {
     pub(super) times_s: Vec<f64>,
-    /// The flexible tool, world axes (m).
+    /// TCP of the flexible arm, world axes (m).
     pub(super) tool_m: Vec<Vector3<f64>>,
-    /// Flexible minus rigid tool (m).
+    /// Flexible minus rigid TCP (m).
     pub(super) deflection_m: Vec<Vector3<f64>>,
-    /// Root mean square of the deflection, and its size at rest at the start (m).
+    /// Root mean square of the deflection, and static deflection at the start (m).
     pub(super) rms_m: f64,
     pub(super) sag_m: f64,
-    /// At the start (Hz).
+    /// Natural frequencies at the start (Hz).
     pub(super) frequencies_hz: Vec<f64>,
     pub(super) duration_s: f64,
 }
@@ -45,12 +45,12 @@ impl Run {
         }
     }
 
-    /// Largest deflection (m).
+    /// Maximum deflection (m).
     pub(super) fn peaks(&self) -> Sizes {
         Sizes::largest(self.deflection_m.iter().copied())
     }
 
-    /// Largest distance of the tools of two runs (m).
+    /// Maximum distance between the TCPs of two runs (m).
     pub(super) fn apart(&self, other: &Self) -> Sizes {
         if self.tool_m.len() != other.tool_m.len() {
             return Sizes { all: f64::NAN, axes: [f64::NAN; 3] };
@@ -59,7 +59,7 @@ impl Run {
     }
 }
 
-/// Largest length of some vectors, and largest component along x, y, z.
+/// Maximum norm of some vectors, and maximum component along x, y, z.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Sizes {
     pub(super) all: f64,
@@ -74,12 +74,12 @@ impl Sizes {
         Self { all, axes: [x, y, z] }
     }
 
-    /// Over a length.
+    /// Divides by a length.
     pub(super) fn over(self, length: f64) -> Self {
         Self { all: self.all / length, axes: self.axes.map(|x| x / length) }
     }
 
-    /// x, y, z, then all.
+    /// Returns x, y, z, then the total.
     pub(super) fn listed(self) -> [f64; 4] {
         let [x, y, z] = self.axes;
         [x, y, z, self.all]
@@ -88,27 +88,27 @@ impl Sizes {
 
 /// A run by one method.
 pub(super) struct Made {
-    /// What its links are, and who stepped it with which step.
+    /// Name of the link model, and of the stepper with its step size.
     pub(super) links: String,
     pub(super) stepper: String,
     pub(super) run: Run,
-    /// Largest distance of the tool from that of the truth, over the truth's peak.
+    /// Maximum distance of the TCP from that of the truth, over the peak of the truth.
     pub(super) error: Sizes,
 }
 
 impl Made {
-    /// Links and stepper.
+    /// Returns the names of link model and stepper.
     pub(super) fn name(&self) -> String {
         format!("{}, {}", self.links, self.stepper)
     }
 }
 
-/// A stepper with its step, as it is called on the page.
+/// Name of a stepper with its step size, as printed on the page.
 pub(super) fn stepper_name(stepper: &str, step_s: f64) -> String {
     format!("{stepper}, {} ms", plain(1e3 * step_s))
 }
 
-/// Makes runs and tells how far it is.
+/// Performs runs and reports progress.
 pub(super) struct Runs<'a, 'p> {
     pace: &'a mut Pace<'p>,
     done: f64,
@@ -116,12 +116,12 @@ pub(super) struct Runs<'a, 'p> {
 }
 
 impl<'a, 'p> Runs<'a, 'p> {
-    /// * `all`: what all runs cost together, in runs by generalised-alpha.
+    /// * `all`: cost of all runs together, in runs by generalised-alpha.
     pub(super) fn new(pace: &'a mut Pace<'p>, all: f64) -> Self {
         Self { pace, done: 0.0, all }
     }
 
-    /// A motion and nothing else.
+    /// Runs a motion with default options.
     pub(super) fn make(
         &mut self,
         robot: &Robot,
@@ -133,7 +133,7 @@ impl<'a, 'p> Runs<'a, 'p> {
         self.make_with(robot, &motion.into(), &RunOptions { stepper, step_s, modelling, ..RunOptions::default() })
     }
 
-    /// With more than motion, links, drives and stepper of one's own.
+    /// Runs a scenario with its own options.
     pub(super) fn make_with(&mut self, robot: &Robot, scenario: &Scenario, options: &RunOptions) -> Result<Run, Error> {
         let options = RunOptions { log_rate_hz: SEEN_HZ, ..options.clone() };
         let weight = weight(options.stepper, options.step_s);
@@ -149,7 +149,7 @@ impl<'a, 'p> Runs<'a, 'p> {
     }
 }
 
-/// What a run costs, roughly, in runs by generalised-alpha.
+/// Approximate cost of a run, in runs by generalised-alpha.
 fn weight(stepper: StepperKind, step_s: f64) -> f64 {
     match stepper {
         StepperKind::Reference(_) => 20.0,
@@ -174,8 +174,8 @@ mod tests {
         }
     }
 
-    /// Truth by hand: (3, 4, 0) has the largest length, (0, 0, -4.5) the largest z; components peak
-    /// at their own instants.
+    /// Truth by hand: (3, 4, 0) has the largest norm, (0, 0, -4.5) the largest z; components peak
+    /// at different instants.
     #[test]
     fn each_direction_peaks_at_its_own_instant() {
         let peaks = run(&[[3.0, 4.0, 0.0], [0.0, 0.0, -4.5]]).peaks();

@@ -1,5 +1,5 @@
-//! Lowest frequencies with held motors: what the gears explain of the vibration that the recordings
-//! show, and what not.
+//! Lowest natural frequencies with held motors: the share of the recorded vibration that gear
+//! elasticity explains.
 
 use flexarm::{DriveModel, Modelling, Robot, Wrench};
 
@@ -7,15 +7,15 @@ use super::recording::WITH_ENCODER;
 use crate::Error;
 use crate::bench::{Bench, Worst};
 
-/// Stiffness of the gears of axes 1 to 3 in the source (N m/rad).
+/// Gear stiffness of axes 1 to 3 in the source (N m/rad).
 const SOURCE: [f64; WITH_ENCODER] = [4_577_800.0, 7_518_900.0, 4_099_900.0];
-/// Frequencies of these springs and rigid links at the home pose and 5 s into run 1, from the mass
-/// matrix of Pinocchio 3 (`pin.crba`, URDF with the load) without weight (Hz, two decimals).
+/// Frequencies of these springs with rigid links at the home pose and 5 s into run 1, from the mass
+/// matrix of Pinocchio 3 (`pin.crba`, URDF with the load) without gravity (Hz, two decimals).
 const PINOCCHIO_HZ: [[f64; 3]; 2] = [[12.10, 12.90, 24.76], [9.88, 13.39, 35.08]];
-/// Lowest vibration in the recordings while axis 1 moves, runs 1 and 3, where the link encoder
+/// Lowest vibration in the recordings while axis 1 moves, runs 1 and 3; there the link encoder
 /// moves five times as far as the motor (Hz).
 pub(super) const SEEN_HZ: [f64; 2] = [5.9, 6.3];
-/// A robot of the class whose wrist gears were identified.
+/// A robot of the same class whose wrist gears were identified.
 pub(super) const WRIST: &str = "robots/kr500_identified/robot.toml";
 
 /// One set of springs at both poses.
@@ -27,12 +27,12 @@ pub(super) struct Set {
 
 pub(super) struct Frequencies {
     pub(super) sets: Vec<Set>,
-    /// Largest relative difference of the first set to Pinocchio's mass matrix.
+    /// Maximum relative difference of the first set from Pinocchio's mass matrix.
     pub(super) error: f64,
 }
 
 impl Frequencies {
-    /// * `there`: where axes are 5 s into run 1 (rad).
+    /// * `there`: joint positions 5 s into run 1 (rad).
     pub(super) fn new(bench: &Bench, robot: &Robot, home: &[f64], there: &[f64]) -> Result<Self, Error> {
         let weightless = |mut robot: Robot| {
             robot.rigid.gravity.fill(0.0);
@@ -72,7 +72,7 @@ fn with_stiffness(robot: &Robot, stiffness: &[f64]) -> Robot {
     robot
 }
 
-/// The wrist's gears of another robot.
+/// Returns the robot with the wrist gears of another.
 fn with_wrist(robot: &Robot, other: &Robot) -> Robot {
     let mut robot = robot.clone();
     for (drive, other) in robot.drives.iter_mut().zip(&other.drives).skip(WITH_ENCODER) {

@@ -1,5 +1,5 @@
-//! What gives way: deflection of the gears in a run along the recorded motor positions against
-//! motor minus link encoder.
+//! Gear deflection in a simulation along the recorded motor positions, compared with motor minus
+//! link encoder.
 
 use std::sync::Arc;
 
@@ -11,30 +11,30 @@ use crate::Error;
 use crate::bench::{ALPHA, step_error};
 use flexarm_analysis::signal::{LowPass, delayed, least_squares, rest, rms};
 
-/// How much later than the motor's the link encoder's positions are recorded (s).
+/// Delay of the recorded link encoder positions relative to those of the motor (s).
 pub(super) const LATE_S: f64 = 3.0e-3;
-/// Both are compared up to here (Hz).
+/// Upper limit of the compared frequency band (Hz).
 pub(super) const COMPARED_HZ: f64 = 12.0;
-/// Periods per turn of the link encoders' ripple, axes 1 to 3, and lines beside them, where the
-/// encoder's mounting puts them.
+/// Periods of the link encoder ripple per turn, axes 1 to 3, and offsets of the side lines caused
+/// by the mounting of the encoder.
 pub(super) const RIPPLE: [f64; WITH_ENCODER] = [1010.0, 826.0, 678.0];
 const LINES: [f64; 7] = [-12.0, -8.0, -4.0, 0.0, 4.0, 8.0, 12.0];
-/// Gears that yield, motors along the motion.
+/// Elastic gears, with the motors following the motion.
 const ELASTIC: Modelling =
     Modelling { links: LinkModel::AsFiled, segments: None, modes: None, drives: DriveModel::Elastic };
-/// Steps of the simulation per sample.
+/// Simulation steps per sample.
 const STEPS: usize = 4;
 
-/// What is left of the measured deflection of one axis, RMS over all runs (rad).
+/// Residual of the measured deflection of one axis, RMS over all runs (rad).
 #[derive(Clone, Copy)]
 pub(super) struct Rest {
-    /// Offset of each run free, rigid gear.
+    /// Rigid gear, with a free offset per run.
     pub(super) rigid: f64,
-    /// With the simulated deflection.
+    /// With the simulated deflection subtracted.
     pub(super) spring: f64,
-    /// And the ripple of the encoder free.
+    /// Then with the encoder ripple free as well.
     pub(super) ripple: f64,
-    /// And one term of eccentricity of the encoder per turn.
+    /// Then with one term of encoder eccentricity per turn free as well.
     pub(super) eccentricity: f64,
 }
 
@@ -43,13 +43,13 @@ pub(super) struct Gears {
     /// Stiffness of the springs (N m/rad).
     pub(super) stiffness: Vec<f64>,
     /// Axes 2 and 3 in run 2: time (s), measured and simulated deflection without their means,
-    /// encoder errors taken off (rad).
+    /// encoder errors removed (rad).
     pub(super) time_s: Vec<f64>,
     pub(super) measured: Vec<Vec<f64>>,
     pub(super) simulated: Vec<Vec<f64>>,
 }
 
-/// Run of the picture.
+/// Run shown in the picture.
 pub(super) const SHOWN: usize = 2;
 
 impl Gears {
@@ -73,20 +73,20 @@ impl Gears {
     }
 }
 
-/// About the axis, of the gears with an encoder behind them.
+/// Stiffness about the axis, for the gears with a link encoder (N m/rad).
 fn stiffness(robot: &Robot) -> Result<Vec<f64>, Error> {
     let arm = robot.modelled(&ELASTIC)?.arm(Arc::new(Held(vec![0.0; AXES]))).map_err(step_error)?;
     Ok(arm.elements.iter().map(|element| element.K[(0, 0)]).take(WITH_ENCODER).collect())
 }
 
-/// The arm with elastic gears, motors along the smoothed recorded positions.
+/// The arm with elastic gears, its motors following the smoothed recorded positions.
 pub(super) fn arm_along(robot: &Robot, run: &Recording) -> Result<FlexibleArm, Error> {
     let rows: Vec<f64> = (0..run.time_s.len()).flat_map(|i| run.at(&run.q, i)).collect();
     let motion = Motion::from_samples(&run.time_s, &rows, robot)?;
     robot.modelled(&ELASTIC)?.arm(motion.prescribed()).map_err(step_error)
 }
 
-/// Motor minus link of each gear with an encoder, at every sample (rad).
+/// Motor minus link position of each gear with an encoder, at every sample (rad).
 fn simulated(robot: &Robot, run: &Recording) -> Result<Vec<Vec<f64>>, Error> {
     let arm = arm_along(robot, run)?;
     let first = arm.model.n_actuated();
@@ -100,21 +100,21 @@ fn simulated(robot: &Robot, run: &Recording) -> Result<Vec<Vec<f64>>, Error> {
             }
         }
         stepper.observe(&mut seen);
-        // The spring turns the link against the motor.
+        // The spring coordinate is link minus motor.
         bends.iter_mut().enumerate().for_each(|(axis, bends)| bends.push(-seen.q[first + axis]));
     }
     Ok(bends)
 }
 
-/// One axis, the compared samples of all runs one after the other.
+/// Compared samples of one axis, all runs concatenated.
 struct Stack {
     measured: Vec<f64>,
     simulated: Vec<f64>,
-    /// 1 in a run, 0 in the others.
+    /// One column per run: 1 in that run, 0 in the others.
     offsets: Vec<Vec<f64>>,
     ripple: Vec<Vec<f64>>,
     eccentricity: Vec<Vec<f64>>,
-    /// Samples of the run that is shown.
+    /// Range of samples of the run that is shown.
     shown: std::ops::Range<usize>,
 }
 
@@ -148,7 +148,7 @@ impl Stack {
         }
     }
 
-    /// What the measured deflection less the simulated one leaves when these columns are free.
+    /// Residual of measured minus simulated deflection after a least-squares fit of these columns.
     fn left(&self, columns: &[Vec<f64>]) -> Vec<f64> {
         let less: Vec<f64> = self.measured.iter().zip(&self.simulated).map(|(a, b)| a - b).collect();
         let factors = least_squares(columns, &less).unwrap_or_else(|| vec![f64::NAN; columns.len()]);
@@ -166,7 +166,8 @@ impl Stack {
         }
     }
 
-    /// Measured with the encoder's errors taken off, and simulated, both without their means.
+    /// Measured deflection with encoder errors removed, and simulated deflection, both without
+    /// their means.
     fn shown(&self) -> (Vec<f64>, Vec<f64>) {
         let columns = [&self.offsets[..], &self.ripple, &self.eccentricity].concat();
         let left = self.left(&columns);

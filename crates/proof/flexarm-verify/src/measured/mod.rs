@@ -1,8 +1,8 @@
-//! A measured robot: a KUKA KR 300 R2500 with 150 kg, motor and link encoders, against inverse
-//! dynamics, gears, servos and frequencies.
+//! A measured robot, a KUKA KR 300 R2500 with 150 kg and motor and link encoders, compared with
+//! inverse dynamics, gears, servos and frequencies.
 //!
 //! `recording` and `signal` prepare the recordings, `torques`, `gears`, `servo` and `frequencies`
-//! compute findings, `page` says them.
+//! compute findings, `page` writes them up.
 
 mod frequencies;
 mod gears;
@@ -24,16 +24,16 @@ use torques::Torques;
 
 const ROBOT: &str = "robots/kr300/robot.toml";
 
-/// What the case finds.
+/// Findings of the case.
 struct Findings {
     torques: Torques,
     gears: Gears,
-    /// Run 1.
+    /// Tracking in run 1.
     servos: Servos,
     frequencies: Frequencies,
 }
 
-/// The case.
+/// Runs the case.
 pub(crate) fn case(bench: &Bench, pace: &mut Pace<'_>) -> Result<Case, Error> {
     let robot = bench.robot(ROBOT)?;
     let runs: Vec<Recording> = (1..=RUNS).map(|k| Recording::new(bench, &robot, k)).collect::<Result<_, _>>()?;

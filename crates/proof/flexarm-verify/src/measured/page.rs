@@ -11,14 +11,14 @@ use super::{Findings, ROBOT};
 use crate::bench::Worst;
 use crate::page::{Bound, Case, Figure, Table, digits, fixed, listed, percent, plain, word};
 
-/// What a good rigid model leaves of the torques of axes 1 to 3 on the two runs that it was not
-/// fitted to.
+/// Bounds of the torque residual of a good rigid model, axes 1 to 3, on the two runs that were not
+/// used for the fit.
 const TORQUE_BOUNDS: [f64; WITH_ENCODER] = [0.11, 0.045, 0.031];
-/// What a spring of constant stiffness leaves of the deflection of axes 2 and 3 (rad).
+/// Bound of the deflection residual of axes 2 and 3 with springs of constant stiffness (rad).
 const DEFLECTION_BOUND: f64 = 40e-6;
-/// What a rigid gear leaves of them at least (rad).
+/// Minimum deflection residual of axes 2 and 3 with rigid gears (rad).
 const RIGID_GEAR: [f64; 2] = [80e-6, 100e-6];
-/// Frequencies are rounded to 0.01 Hz in the truth.
+/// Bound of the frequency error; the truth is rounded to 0.01 Hz.
 const FREQUENCY_BOUND: f64 = 2e-3;
 
 pub(super) fn page(found: &Findings) -> Case {
@@ -101,7 +101,7 @@ fn torque_figure(found: &Torques) -> Figure {
     }
 }
 
-/// Every third sample: curves of some hundred points.
+/// Keeps every third sample, so that curves have a few hundred points.
 fn thinned(x: &[f64]) -> Vec<f64> {
     x.iter().step_by(3).copied().collect()
 }

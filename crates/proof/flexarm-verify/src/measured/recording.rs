@@ -1,4 +1,4 @@
-//! The three recorded runs, smoothed as they are compared.
+//! The three recorded runs, smoothed for the comparison.
 
 use flexarm::Robot;
 use flexarm_fe_io::unpack_gzip;
@@ -7,38 +7,37 @@ use crate::Error;
 use crate::bench::Bench;
 use flexarm_analysis::signal::{LowPass, derivative};
 
-/// Axes of the robot, and those with an encoder behind the gear.
+/// Number of axes, and number of axes with an encoder behind the gear.
 pub(super) const AXES: usize = 6;
 pub(super) const WITH_ENCODER: usize = 3;
-/// Runs.
+/// Number of runs.
 pub(super) const RUNS: usize = 3;
 /// Time between samples (s).
 pub(super) const STEP_S: f64 = 0.004;
-/// Positions and torques are smoothed from here on (Hz).
+/// Cut-off frequency of the smoothing of positions and torques (Hz).
 pub(super) const SMOOTH_HZ: f64 = 10.0;
-/// What is left out at the start and the end (s): what smoothing does to the ends.
+/// Time left out at the start and the end because of the smoothing (s).
 pub(super) const EDGE_S: f64 = 0.4;
-/// Axes that are slower count as at rest (rad/s): a degree a second.
+/// Speed below which an axis counts as at rest (rad/s): one degree per second.
 pub(super) const MOVING: f64 = std::f64::consts::PI / 180.0;
 
-/// One run. One vector per axis, one entry per sample.
+/// One run: one vector per axis, one entry per sample.
 pub(super) struct Recording {
     pub(super) time_s: Vec<f64>,
     pub(super) reference: Vec<Vec<f64>>,
-    /// Motor over its ratio (rad).
+    /// Motor position over the gear ratio (rad).
     pub(super) motor: Vec<Vec<f64>>,
-    /// Behind the gear, axes 1 to 3 (rad).
+    /// Position behind the gear, axes 1 to 3 (rad).
     pub(super) link: Vec<Vec<f64>>,
-    /// Motor positions without what is faster than [`SMOOTH_HZ`], their speed and acceleration
-    /// (rad, s).
+    /// Motor positions low-passed at [`SMOOTH_HZ`], their velocity and acceleration (rad, s).
     pub(super) q: Vec<Vec<f64>>,
     pub(super) v: Vec<Vec<f64>>,
     pub(super) a: Vec<Vec<f64>>,
-    /// Torques on the joint's side likewise (N m).
+    /// Torques on the joint side, low-passed likewise (N m).
     pub(super) smooth_torque: Vec<Vec<f64>>,
 }
 
-/// Where a recording is, from the root.
+/// Path of a recording, relative to the root.
 pub(super) fn path(number: usize) -> String {
     format!("tests/verification/kr300/kr300_run_{number}.csv.gz")
 }
@@ -77,24 +76,24 @@ impl Recording {
         })
     }
 
-    /// Samples that are compared.
+    /// Range of samples that are compared.
     pub(super) fn seen(&self) -> std::ops::Range<usize> {
         let edge = (EDGE_S / STEP_S).round() as usize;
         edge..self.time_s.len().saturating_sub(edge + 1)
     }
 
-    /// Those of them in which an axis moves.
+    /// Compared samples in which an axis moves.
     pub(super) fn moving(&self, axis: usize) -> impl Iterator<Item = usize> + '_ {
         self.seen().filter(move |i| self.v[axis][*i].abs() > MOVING)
     }
 
-    /// All joints at one sample.
+    /// Values of all joints at one sample.
     pub(super) fn at(&self, of: &[Vec<f64>], sample: usize) -> Vec<f64> {
         of.iter().map(|axis| axis[sample]).collect()
     }
 }
 
-/// Columns of numbers under their names.
+/// Columns of numbers with their names.
 struct Table<'a> {
     names: Vec<&'a str>,
     rows: Vec<Vec<f64>>,

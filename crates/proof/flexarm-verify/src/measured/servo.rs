@@ -1,5 +1,5 @@
-//! Runs under servos along the recorded references: how far motors and links stay behind, as orders
-//! of magnitude.
+//! Simulations with servos along the recorded references: order of magnitude of the tracking error
+//! of motors and links.
 
 use std::sync::Arc;
 
@@ -11,16 +11,16 @@ use crate::Error;
 use crate::bench::{ALPHA, step_error};
 use flexarm_analysis::signal::rms;
 
-/// Steps of the simulation per sample.
+/// Simulation steps per sample.
 const STEPS: usize = 4;
 
-/// RMS of reference minus position per axis (rad): behind the gear where an encoder is, of the
-/// motor elsewhere.
+/// RMS of reference minus position per axis (rad): position behind the gear if there is an encoder,
+/// of the motor otherwise.
 pub(super) type Tracking = [f64; AXES];
 
 pub(super) struct Servos {
     pub(super) measured: Tracking,
-    /// With the torques of the rigid robot on the reference, and without.
+    /// With and without feed-forward of the torques of the rigid robot along the reference.
     pub(super) fed_forward: Tracking,
     pub(super) alone: Tracking,
 }
@@ -39,7 +39,7 @@ fn tracking(run: &Recording, position: impl Fn(usize, usize) -> f64) -> Tracking
     std::array::from_fn(|axis| rms(run.seen().map(|i| run.reference[axis][i] - position(axis, i))))
 }
 
-/// All axes by torque under the gains that robot files have by default.
+/// Simulates all axes under torque control with the default gains of robot files.
 fn simulated(robot: &Robot, run: &Recording, feed_forward: bool) -> Result<Tracking, Error> {
     let rows: Vec<f64> = (0..run.time_s.len()).flat_map(|i| run.at(&run.reference, i)).collect();
     let motion = Motion::from_samples(&run.time_s, &rows, robot)?;

@@ -1,4 +1,4 @@
-//! Inverse dynamics along the recorded motor positions against the recorded torques.
+//! Inverse dynamics along the recorded motor positions compared with the recorded torques.
 
 use flexarm::Robot;
 use flexarm_kinematics::{Data, Model, State, inverse_dynamics};
@@ -8,10 +8,10 @@ use super::recording::{AXES, Recording, SMOOTH_HZ, STEP_S};
 use crate::Error;
 use flexarm_analysis::signal::{LowPass, least_squares, rms};
 
-/// Speed over which the sign of friction changes (rad/s).
+/// Speed scale of the smoothed sign of friction (rad/s).
 pub(super) const SIGN_WIDTH: f64 = 0.004;
 
-/// What of the model is left out.
+/// Model variants with one element left out.
 pub(super) const VARIANTS: [(&str, Without); 3] = [
     ("whole model", Without { balancer: false, rotors: false }),
     ("without the counterbalance", Without { balancer: true, rotors: false }),
@@ -27,11 +27,11 @@ pub(super) struct Without {
 /// Friction of one axis: offset (N m), viscous (N m s/rad), Coulomb (N m).
 pub(super) type Friction = [f64; 3];
 
-/// What is found of the torques.
+/// Findings on the torques.
 pub(super) struct Torques {
-    /// From run 1 alone with the whole model; the others have the same.
+    /// Identified from run 1 with the whole model; the other variants use the same.
     pub(super) friction: Vec<Friction>,
-    /// By variant and run: per axis the RMS of the difference over that of the torque, while it
+    /// By variant and run: RMS of the difference over RMS of the torque per axis, while the axis
     /// moves.
     pub(super) errors: Vec<Vec<[f64; AXES]>>,
     /// Run 3: time (s), measured and computed torques of axes 1 to 3, smoothed (N m).
@@ -65,7 +65,7 @@ impl Torques {
     }
 }
 
-/// The rigid robot with its load.
+/// The rigid robot with its payload.
 fn model(robot: &Robot, without: Without) -> Result<Model, Error> {
     let mut robot = robot.clone();
     if without.balancer {
@@ -77,7 +77,7 @@ fn model(robot: &Robot, without: Without) -> Result<Model, Error> {
     Ok((*robot.rigid_model()?).clone())
 }
 
-/// Torques on the joints without friction, per axis (N m).
+/// Joint torques without friction, per axis (N m).
 pub(super) fn torques(model: &Model, run: &Recording) -> Vec<Vec<f64>> {
     let (mut data, mut state) = (Data::new(model), State::zeros(model));
     let mut torques = vec![Vec::new(); AXES];
@@ -91,13 +91,13 @@ pub(super) fn torques(model: &Model, run: &Recording) -> Vec<Vec<f64>> {
     torques
 }
 
-/// 1, speed, smoothed sign of the speed.
+/// Columns of the friction fit: 1, velocity, smoothed sign of the velocity.
 fn friction_columns(run: &Recording, axis: usize) -> [Vec<f64>; 3] {
     let sign: Vec<f64> = run.v[axis].iter().map(|v| (v / SIGN_WIDTH).tanh()).collect();
     [vec![1.0; sign.len()], run.v[axis].clone(), LowPass::new(SMOOTH_HZ, 1.0 / STEP_S).of(&sign)]
 }
 
-/// Friction of every axis from the samples of one run in which it moves.
+/// Fits the friction of every axis to the samples of one run in which it moves.
 fn fit(run: &Recording, bare: &[Vec<f64>]) -> Vec<Friction> {
     let axis = |axis: usize| {
         let all = friction_columns(run, axis);

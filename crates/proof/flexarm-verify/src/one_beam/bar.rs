@@ -1,5 +1,5 @@
-//! The bar of `robots/one_beam/README.md` in closed form: aluminium, its width along y, its height
-//! along z.
+//! Closed forms for the bar of `robots/one_beam/README.md`: aluminium, width along y, height along
+//! z.
 
 use crate::textbook::{Stiffness, rectangle_torsion};
 
@@ -12,11 +12,11 @@ const E: f64 = 70e9;
 const NU: f64 = 0.33;
 const RHO: f64 = 2700.0;
 
-/// Rotary inertia of the section, `rho I`, bending sideways and upwards (kg m).
+/// Rotary inertia of the section per length, `rho I`, for sideways and upward bending (kg m).
 const ROTARY: [f64; 2] =
     [RHO * HEIGHT_M * WIDTH_M * WIDTH_M * WIDTH_M / 12.0, RHO * WIDTH_M * HEIGHT_M * HEIGHT_M * HEIGHT_M / 12.0];
 
-/// After Euler and Bernoulli.
+/// Section stiffness and mass by Euler-Bernoulli theory.
 pub(super) fn bar() -> Stiffness {
     let (l, b, h) = (LENGTH_M, WIDTH_M, HEIGHT_M);
     let area = b * h;
@@ -25,15 +25,15 @@ pub(super) fn bar() -> Stiffness {
     Stiffness { l, EA: E * area, EI_y: bending(h, b), EI_z: bending(b, h), GJ, kGA: [f64::INFINITY; 2], mu: RHO * area }
 }
 
-/// The same with shear: Cowper's factor of a rectangle, 10(1 + nu)/(12 + 11 nu).
+/// The same with shear (Timoshenko), Cowper's factor of a rectangle, 10(1 + nu)/(12 + 11 nu).
 pub(super) fn bar_with_shear() -> Stiffness {
     let bar = bar();
     let kGA = 10.0 * (1.0 + NU) / (12.0 + 11.0 * NU) * bar.EA / (2.0 * (1.0 + NU));
     Stiffness { kGA: [kGA; 2], ..bar }
 }
 
-/// First frequencies with the rotary inertia of the section and a mass at the end (kg): sideways,
-/// upwards (Hz).
+/// First frequencies with the rotary inertia of the section and a point mass (kg) at the end:
+/// sideways, upwards (Hz).
 pub(super) fn bending_hz(point_mass: f64, count: usize) -> [Vec<f64>; 2] {
     let bar = bar();
     [(bar.EI_z, ROTARY[0]), (bar.EI_y, ROTARY[1])].map(|(EI, rotary)| bar.bending_hz(EI, rotary, point_mass, count))
@@ -56,8 +56,8 @@ mod tests {
         assert!((1e3 * bar.own_weight(9.81) - 0.145_300).abs() < 1e-6, "{}", bar.own_weight(9.81));
     }
 
-    /// Truth by hand: l/(k G A) = 0.8/(0.850928 * 26.3158e9 * 8e-4) = 0.04466 µm/N at the end
-    /// besides bending, along y and z alike.
+    /// Truth by hand: l/(k G A) = 0.8/(0.850928 * 26.3158e9 * 8e-4) = 0.04466 µm/N at the end in
+    /// addition to bending, the same along y and z.
     #[test]
     fn shear_adds_the_same_deflection_in_both_directions() {
         let (with, without) = (bar_with_shear().tip_compliance(), bar().tip_compliance());
@@ -67,8 +67,8 @@ mod tests {
         assert_eq!(with[(4, 4)], without[(4, 4)]);
     }
 
-    /// Truths: a ball and rotary inertia lower a frequency; twice as high is twice as fast, but for
-    /// rotary inertia.
+    /// Truths: a ball and rotary inertia lower a frequency; a bar twice as high has twice the
+    /// frequency, except for the effect of rotary inertia.
     #[test]
     fn a_ball_and_rotary_inertia_lower_the_frequencies() {
         let ([bare_side, bare_up], [side, up]) = (bending_hz(0.0, 2), bending_hz(BALL_KG, 2));

@@ -1,4 +1,4 @@
-//! Loads so large that geometry counts: where linear elasticity ends.
+//! Loads large enough for geometric nonlinearity: the limit of linear elasticity.
 
 use flexarm::{Modelling, Robot};
 use nalgebra::{Matrix6, Vector6};
@@ -10,21 +10,21 @@ use crate::bench::{Bench, Rig, Stored, in_parts, larger, modal, weightless};
 
 /// Numbers of parts of the links.
 const COUNTS: [usize; 4] = [2, 3, 5, 9];
-/// Places of the chains of two and of nine parts in lists of models.
+/// Indices of the chains of two and of nine parts in lists of models.
 const TWO: usize = 0;
 const NINE: usize = 3;
-/// Elastic rotation at which a run begins to warn (rad).
+/// Elastic rotation above which a run warns (rad).
 pub(super) const WARNING_RAD: f64 = 0.05;
-/// Height of the end over the length up to which nine parts are judged, as one over it.
+/// Reciprocal of the maximum height of the end, over the length, up to which nine parts are judged.
 pub(super) const JUDGED_UP_TO_L_OVER: u32 = 4;
 
 /// One force.
 pub(super) struct LargeLoad {
     pub(super) force_n: f64,
-    /// The elastica: height of the end and shortening, over the length.
+    /// Elastica: height of the end and shortening, over the length.
     pub(super) height_over_l: f64,
     pub(super) shortening_over_l: f64,
-    /// Rotation of the end of two parts (rad).
+    /// Rotation of the end with two parts (rad).
     pub(super) two_parts_rad: f64,
     /// Height of the end, relative differences from the elastica: linear theory, then every model.
     pub(super) linear_error: f64,
@@ -32,29 +32,29 @@ pub(super) struct LargeLoad {
     /// Height of the end (m) and engineering strain by nonlinear finite elements.
     pub(super) fe_height_m: f64,
     pub(super) fe_strain: f64,
-    /// Height of the end of the reduced link, relative differences from those: linear elements,
-    /// then every model.
+    /// Height of the end of the reduced link, relative differences from the nonlinear finite
+    /// elements: linear elements, then every model.
     pub(super) fe_linear_error: f64,
     pub(super) fe_errors: Vec<f64>,
-    /// Engineering strain of two parts.
+    /// Engineering strain with two parts.
     pub(super) two_parts_strain: f64,
 }
 
-/// All of them.
+/// Results of all forces.
 pub(super) struct LargeLoads {
-    /// Program, script and day of the stored results.
+    /// Program, script and date of the stored results.
     pub(super) provenance: String,
     pub(super) models: Vec<String>,
     pub(super) loads: Vec<LargeLoad>,
 }
 
-/// What bends: the link of beam theory and the one reduced from the mesh, both without weight, and
-/// their models.
+/// The links under test: the one of beam theory and the one reduced from the mesh, both without
+/// gravity, and their models.
 struct Subjects {
     robot: Robot,
     meshed: Robot,
     models: Vec<(String, Modelling)>,
-    /// Compliance of the end by linear finite elements.
+    /// Compliance of the end by linear finite elements (m/N, rad/(N m)).
     C: Matrix6<f64>,
 }
 
@@ -71,13 +71,13 @@ impl LargeLoads {
         Ok(Self { provenance: stored.provenance(), models, loads })
     }
 
-    /// Size of the error of two parts under the last load below the warning limit.
+    /// Absolute error of two parts under the last load below the warning limit.
     pub(super) fn at_the_warning_limit(&self) -> f64 {
         let below = self.loads.iter().rfind(|load| load.two_parts_rad <= WARNING_RAD);
         below.map_or(f64::NAN, |load| load.fe_errors[TWO].abs())
     }
 
-    /// Largest error of nine parts up to the height that is judged.
+    /// Maximum error of nine parts up to the height limit.
     pub(super) fn worst_of_nine(&self) -> f64 {
         let judged = self.loads.iter().filter(|load| load.height_over_l < 1.0 / f64::from(JUDGED_UP_TO_L_OVER));
         judged.map(|load| load.fe_errors[NINE].abs()).fold(0.0, larger)
@@ -85,14 +85,14 @@ impl LargeLoads {
 }
 
 impl LargeLoad {
-    /// * `k`: place of the load in the stored list.
+    /// * `k`: index of the load in the stored list.
     fn new(subjects: &Subjects, stored: &Stored, k: usize) -> Result<Self, Error> {
         let Subjects { robot, meshed, models, C } = subjects;
         let bar = bar();
         let force_n = stored.number(&format!("large_load/{k}/force_n"))?;
         let fe = stored.numbers(&format!("large_load/{k}/u_B"))?;
         let wrench = Vector6::new(0.0, 0.0, force_n, 0.0, 0.0, 0.0);
-        // Far beyond what the model is for, equilibrium may not be found.
+        // Far beyond the valid range of the model, there may be no equilibrium.
         let bent = |robot: &Robot, modelling: &Modelling| -> Result<Vector6<f64>, Error> {
             Ok(Rig::new(robot, modelling, None)?.statics(&wrench).unwrap_or(Vector6::repeat(f64::NAN)))
         };
@@ -116,8 +116,8 @@ impl LargeLoad {
     }
 }
 
-/// Change of the distance of the ends over it, where the end moves by `x` along the bar and by `z`
-/// across it (m).
+/// Relative change of the distance between the ends if the end moves by `x` along the bar and by
+/// `z` across it (m).
 fn engineering_strain(x: f64, z: f64) -> f64 {
     (LENGTH_M + x).hypot(z) / LENGTH_M - 1.0
 }
@@ -126,8 +126,8 @@ fn engineering_strain(x: f64, z: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// Truth by hand: the triangle 0.6, 0.8, 1.0 (its long side is the bar), a pure stretch, a turn
-    /// without any.
+    /// Truth by hand: the triangle 0.6, 0.8, 1.0 (its hypotenuse is the deformed bar), a pure
+    /// stretch, and a rotation without strain.
     #[test]
     fn the_engineering_strain_is_that_of_the_line_between_the_ends() {
         assert!((engineering_strain(0.0, 0.6) - 0.25).abs() < 1e-15);
@@ -151,7 +151,7 @@ mod tests {
         }
     }
 
-    /// A load whose equilibrium was not found is beyond every limit.
+    /// A load without an equilibrium is beyond every limit.
     #[test]
     fn limits_are_judged_below_them_and_not_beyond() {
         let loads =

@@ -1,4 +1,4 @@
-//! The bar as a mesh: own finite elements, CalculiX, beam theory, and the reduced link.
+//! The bar as a mesh: flexarm's finite elements, CalculiX, beam theory, and the reduced link.
 
 use flexarm::Robot;
 use flexarm_fem::UnitSystem;
@@ -15,31 +15,32 @@ use crate::compliance::{Method, by_every_method};
 use crate::meshed::Meshed;
 use crate::textbook::Stiffness;
 
-/// Elements along x, y and z, and compliance about x with elements half as large (rad/(N m)):
-/// `robots/one_beam/fe/README.md`.
+/// Number of elements along x, y and z; torsional compliance with elements half the size (rad/(N
+/// m)): `robots/one_beam/fe/README.md`.
 pub(super) const ELEMENTS: [usize; 3] = [40, 2, 2];
 const TORSION_OF_FINER_MESH: f64 = 409.989e-6;
-/// Places of the loaded sections (m).
+/// Positions of the loaded sections (m).
 const STATIONS_M: [f64; 3] = [0.2, 0.4, 0.6];
-/// Frequencies that are compared.
+/// Number of frequencies compared.
 pub(super) const MODES: usize = 4;
-/// Torsion in lists of loads.
+/// Index of torsion in lists of loads.
 const TORSION: usize = 3;
-/// Modes of the link file.
+/// Number of modes in the link file.
 const ALL_MODES: usize = 10;
 
-/// What is found on the mesh.
+/// Findings on the mesh.
 pub(super) struct BarMesh {
-    /// Program, script and day of the stored results.
+    /// Program, script and date of the stored results.
     pub(super) provenance: String,
-    /// Compliance of the end by own elements, and by CalculiX (m/N, rad/(N m)).
+    /// Compliance of the end by flexarm's elements and by CalculiX (m/N, rad/(N m)).
     pub(super) own: Matrix6<f64>,
     pub(super) calculix: Matrix6<f64>,
     pub(super) methods: Vec<Method>,
-    /// Beam theory over the own mesh, less one, load by load: Euler and Bernoulli, Timoshenko.
+    /// Relative error of beam theory with respect to flexarm's mesh, load by load: Euler-Bernoulli,
+    /// Timoshenko.
     pub(super) euler_errors: [f64; 6],
     pub(super) timoshenko_errors: [f64; 6],
-    /// What elements half as large add to the compliance in torsion, less one.
+    /// Relative change of the torsional compliance with elements half the size.
     pub(super) torsion_by_finer_mesh: f64,
     pub(super) stations: Vec<SectionLoad>,
     pub(super) weight: MeshWeight,
@@ -49,26 +50,26 @@ pub(super) struct BarMesh {
 pub(super) struct SectionLoad {
     pub(super) name: &'static str,
     pub(super) x_m: f64,
-    /// Deflection of that section and of the end, own mesh (m per N or N m).
+    /// Deflection of that section and of the end, flexarm's mesh (m per N or N m).
     pub(super) here: f64,
     pub(super) end: f64,
-    /// Largest difference of CalculiX over all sections and components.
+    /// Maximum difference of CalculiX over all sections and components.
     pub(super) calculix_error: f64,
-    /// Closed form over the own mesh, less one: that section, the end.
+    /// Relative error of the closed form with respect to flexarm's mesh: that section, the end.
     pub(super) closed_errors: [f64; 2],
 }
 
-/// The bar without the ball under its weight; frequencies with A held.
+/// The bar without the ball under its own weight; frequencies with A held.
 pub(super) struct MeshWeight {
     /// Sag along z and y by CalculiX (m), and its frequencies (Hz).
     pub(super) sag_m: [f64; 2],
     pub(super) hz: Vec<f64>,
-    /// Relative differences of the own mesh.
+    /// Relative differences of the frequencies of flexarm's mesh.
     pub(super) own_hz_errors: [f64; MODES],
     pub(super) models: Vec<MeshModel>,
 }
 
-/// A model of the reduced link; relative differences.
+/// A model of the reduced link, with relative differences.
 pub(super) struct MeshModel {
     pub(super) name: String,
     pub(super) modal: bool,
@@ -107,26 +108,26 @@ impl BarMesh {
         })
     }
 
-    /// Size of Timoshenko's error in torsion.
+    /// Absolute torsional error of Timoshenko theory.
     pub(super) fn torsion_error(&self) -> f64 {
         self.timoshenko_errors[TORSION].abs()
     }
 
-    /// His largest error in stretch and bending.
+    /// Maximum error of Timoshenko theory in stretch and bending.
     pub(super) fn bending_error(&self) -> f64 {
         let rest = (0..6).filter(|j| *j != TORSION).map(|j| self.timoshenko_errors[j].abs());
         rest.fold(0.0, larger)
     }
 
-    /// Largest difference of CalculiX under loads at sections.
+    /// Maximum difference of CalculiX under loads at sections.
     pub(super) fn worst_at_sections(&self) -> f64 {
         self.stations.iter().map(|load| load.calculix_error).fold(0.0, larger)
     }
 }
 
-/// Unit force along z and moment about y at each section.
+/// Applies a unit force along z and a unit moment about y at each section.
 ///
-/// * `C`: compliance over B, then the sections.
+/// * `C`: compliance over B and the sections, in this order.
 fn section_loads(C: &DMatrix<f64>, stored: &Stored) -> Result<Vec<SectionLoad>, Error> {
     let mut loads = Vec::new();
     for (k, x_m) in STATIONS_M.into_iter().enumerate() {
@@ -164,7 +165,7 @@ fn section_load(
     Ok(SectionLoad { name, x_m, here, end, calculix_error, closed_errors })
 }
 
-/// Place of a load in the stored list.
+/// Path of a load in the stored list.
 fn find_load(stored: &Stored, x: f64, load: &str) -> Result<String, Error> {
     let count = stored.at("station_loads")?.as_array().map_or(0, Vec::len);
     for k in 0..count {
@@ -195,7 +196,7 @@ impl MeshWeight {
                 robot.rigid.gravity = Vector3::from_fn(|i, _| if i == axis { -G } else { 0.0 });
                 *error = Rig::new(&robot, &modelling, None)?.statics(&Vector6::zeros())?[axis] / truth - 1.0;
             }
-            // The first four of the mesh bend it sideways and upwards by turns.
+            // The first four modes of the mesh are alternately sideways and upward bending.
             let [side, up] = Rig::new(&weightless(bare.clone()), &modelling, None)?.bending_hz();
             let found = [nth(&side, 0), nth(&up, 0), nth(&side, 1), nth(&up, 1)];
             let hz_errors = found.iter().zip(&hz).map(|(f, truth)| f / truth - 1.0).collect();
@@ -206,13 +207,13 @@ impl MeshWeight {
         Ok(Self { sag_m, hz, own_hz_errors, models })
     }
 
-    /// Largest error of the sag of modal links.
+    /// Maximum sag error of modal links.
     pub(super) fn modal_sag_error(&self) -> f64 {
         let modal = self.models.iter().filter(|model| model.modal);
         modal.flat_map(|model| model.sag_errors).map(f64::abs).fold(0.0, larger)
     }
 
-    /// Largest error of the frequencies of modal links with all modes.
+    /// Maximum frequency error of modal links with all modes.
     pub(super) fn all_modes_hz_error(&self) -> f64 {
         let model = self.models.iter().find(|model| model.name == in_modes(ALL_MODES).0);
         model.map_or(f64::NAN, |model| model.hz_errors.iter().copied().worst())

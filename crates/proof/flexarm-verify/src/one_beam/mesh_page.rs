@@ -9,10 +9,10 @@ use crate::bench::{LOADS, column_error, compliance_error};
 use crate::compliance::{add_errors, claim_each};
 use crate::page::{Bound, Case, Figure, Table, digits, error, fixed, percent, signed, word};
 
-/// Error of linear theory at the warning limit.
+/// Bound of the error of linear theory at the warning limit.
 const ERROR_AT_WARNING: f64 = 1e-3;
 
-/// The bar as a mesh: own finite elements, CalculiX, beam theory, and the reduced link.
+/// The bar as a mesh: flexarm's finite elements, CalculiX, beam theory, and the reduced link.
 pub(super) fn mesh(case: &mut Case, found: &BarMesh) {
     case.heading("The bar as a mesh");
     let [along, across, up] = ELEMENTS;
@@ -115,7 +115,7 @@ fn mesh_weight(case: &mut Case, found: &MeshWeight) {
     }
 }
 
-/// Where linear elasticity ends.
+/// Limit of linear elasticity.
 pub(super) fn large_loads(case: &mut Case, found: &LargeLoads) {
     case.heading("Large loads: where the model ends");
     case.table(beams_table(found));
@@ -138,7 +138,7 @@ pub(super) fn large_loads(case: &mut Case, found: &LargeLoads) {
     case.figure(large_figure(found));
 }
 
-/// The bar as beams, against the elastica.
+/// The bar as beams, compared with the elastica.
 fn beams_table(found: &LargeLoads) -> Table {
     let mut table = Table::new(
         "Force at the end that keeps its direction (upwards), the bar as beams; truth: the elastica, which bends as far as it likes and neither stretches nor shears. Error \
@@ -160,7 +160,7 @@ fn beams_table(found: &LargeLoads) -> Table {
     table
 }
 
-/// The bar as a mesh, against nonlinear finite elements.
+/// The bar as a mesh, compared with nonlinear finite elements.
 fn solids_table(found: &LargeLoads) -> Table {
     let caption = format!(
         "The same force on the bar from the mesh; truth: geometrically nonlinear finite elements (NLGEOM) on the same mesh, {}. Error of the height of the end. \

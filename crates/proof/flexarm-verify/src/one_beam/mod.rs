@@ -1,7 +1,7 @@
-//! One clamped beam: everything that has an answer on paper.
+//! One clamped beam: all results that have a closed form.
 //!
-//! `bar` has the closed forms, `study`, `motion`, `mesh` and `large_loads` compute findings, `page`
-//! and `mesh_page` say them.
+//! `bar` holds the closed forms, `study`, `motion`, `mesh` and `large_loads` compute findings,
+//! `page` and `mesh_page` write them up.
 
 mod bar;
 mod large_loads;
@@ -25,16 +25,16 @@ use motion::{SpinUp, Steps};
 use study::{EndLoads, Splits, Stations, Weight};
 
 const ROBOT: &str = "robots/one_beam/robot.toml";
-/// The same with the link reduced from a mesh.
+/// The same robot with its link reduced from a mesh.
 const MESHED: &str = "robots/one_beam/mesh.toml";
 /// The mesh.
 const MESH: &str = "robots/one_beam/fe/one_beam.msh";
-/// What CalculiX gives on it.
+/// Results of CalculiX on the mesh.
 const STORED: &str = "one_beam_calculix.json";
 /// Acceleration of gravity (m/s²).
 const G: f64 = 9.81;
 
-/// What the case finds.
+/// Findings of the case.
 struct Findings {
     end_loads: EndLoads,
     stations: Stations,
@@ -63,17 +63,17 @@ impl Findings {
     }
 }
 
-/// The case.
+/// Runs the case.
 pub(crate) fn case(bench: &Bench, _pace: &mut Pace<'_>) -> Result<Case, Error> {
     Ok(page::page(&Findings::new(bench)?))
 }
 
-/// A frequency of a list by its number; a model with few coordinates may not have it.
+/// The `k`-th frequency of a list; NaN if a model with few coordinates does not have it.
 fn nth(hz: &[f64], k: usize) -> f64 {
     hz.get(k).copied().unwrap_or(f64::NAN)
 }
 
-/// The robot with the ball taken off.
+/// Returns the robot without the ball.
 fn without_ball(robot: &Robot) -> Robot {
     let mut bare = robot.clone();
     for link in bare.rigid.links.iter_mut().filter(|link| link.name == "tip") {

@@ -1,4 +1,4 @@
-//! The bar in motion: error over the step, and a spin-up.
+//! The bar in motion: error as a function of the step size, and a spin-up.
 
 use std::sync::Arc;
 
@@ -10,33 +10,33 @@ use super::nth;
 use crate::Error;
 use crate::bench::{ALPHA, Rig, Worst, in_modes, in_parts, larger, parts, spook, tool_path};
 
-/// How long the bar rings (s).
+/// Duration of the ring-down (s).
 pub(super) const DURATION_S: f64 = 0.5;
-/// Damping of the first mode, over critical.
+/// Damping ratio of the first mode.
 pub(super) const DAMPING: f64 = 0.03;
 /// Tolerance of the stepper with error control.
 pub(super) const TOLERANCE: f64 = 1e-10;
-/// Errors are taken so often, a multiple of every step (s).
+/// Interval at which errors are sampled, a multiple of every step size (s).
 pub(super) const SEEN_EVERY_S: f64 = 10e-3;
-/// The truth is looked at more often, so that its peak is one (s).
+/// Shorter sampling interval of the truth, so that its peak is resolved (s).
 const TRUTH_EVERY_S: f64 = 5e-4;
-/// The step of the claims (s).
+/// Step size of the claims (s).
 pub(super) const CLAIMED_STEP_S: f64 = 1e-3;
 
-/// One stepper over the steps.
+/// One stepper at all step sizes.
 pub(super) struct Stepped {
     pub(super) name: &'static str,
     kind: StepperKind,
-    /// Largest distance of the end from the truth over its peak, one per step; not a number where
-    /// the stepper refuses the step.
+    /// Maximum distance of the end from the truth over its peak, one per step size; NaN if the
+    /// stepper refuses the step size.
     pub(super) errors: Vec<f64>,
 }
 
-/// Ring-down: error over the step.
+/// Ring-down: error as a function of the step size.
 pub(super) struct Steps {
-    /// First frequency upwards (Hz).
+    /// First frequency of upward bending (Hz).
     pub(super) first_hz: f64,
-    /// Largest deflection (m).
+    /// Maximum deflection (m).
     pub(super) peak_m: f64,
     pub(super) steps_s: Vec<f64>,
     pub(super) steppers: Vec<Stepped>,
@@ -44,7 +44,7 @@ pub(super) struct Steps {
 
 impl Steps {
     pub(super) fn new(robot: &Robot, quick: bool) -> Result<Self, Error> {
-        // The same damping for all: stiffness-proportional.
+        // Stiffness-proportional damping, the same for all steppers.
         let mut robot = robot.clone();
         let first_hz = nth(&Rig::new(&robot, &parts(2), None)?.bending_hz()[1], 0);
         let beta = 2.0 * DAMPING / (std::f64::consts::TAU * first_hz);
@@ -64,20 +64,20 @@ impl Steps {
         Ok(Self { first_hz, peak_m, steps_s, steppers })
     }
 
-    /// Error of a stepper at the step of the claims; not a number if it is none of the steps.
+    /// Error of a stepper at the step size of the claims; NaN if that step size was not run.
     pub(super) fn at_claimed_step(&self, stepper: &Stepped) -> f64 {
         self.steps_s.iter().position(|h| *h == CLAIMED_STEP_S).map_or(f64::NAN, |k| stepper.errors[k])
     }
 }
 
 impl Stepped {
-    /// Whether it is generalised-alpha.
+    /// Returns whether the stepper is generalised-alpha.
     pub(super) fn is_alpha(&self) -> bool {
         self.kind == ALPHA
     }
 
-    /// Whether its joints are compliant constraints in their exact form, in axes of the part or of
-    /// the world.
+    /// Returns whether the stepper is SPOOK in its exact form, with local or global constraint
+    /// axes.
     pub(super) fn is_spook(&self, form: ConstraintForm) -> bool {
         self.kind == spook(form)
     }
@@ -94,8 +94,8 @@ fn steppers() -> [(&'static str, StepperKind); 5] {
     ]
 }
 
-/// Largest distance of the end from the truth, over the peak; the explicit stepper refuses steps
-/// beyond its limit.
+/// Maximum distance of the end from the truth, over the peak. NaN for the explicit stepper beyond
+/// its stability limit, where it refuses the step size.
 fn step_error(rig: &Rig, kind: StepperKind, h: f64, truth: &[Vector3<f64>], peak_m: f64) -> Result<f64, Error> {
     match rig.path(kind, h, SEEN_EVERY_S, DURATION_S) {
         Ok(path) => Ok(path.iter().zip(truth).map(|(a, b)| (a - b).norm()).worst() / peak_m),
@@ -104,12 +104,12 @@ fn step_error(rig: &Rig, kind: StepperKind, h: f64, truth: &[Vector3<f64>], peak
     }
 }
 
-/// Speed at the end of the spin-up (rad/s), and how long it takes (s).
+/// Speed at the end of the spin-up (rad/s), and its duration (s).
 pub(super) const SPEED: f64 = 30.0;
 pub(super) const TIME_S: f64 = 1.0;
-/// Parts of the chain that is the truth.
+/// Number of parts of the chain that serves as truth.
 pub(super) const TRUE_PARTS: usize = 17;
-/// Step (s) and number of steps.
+/// Step size (s) and number of steps.
 pub(super) const SPIN_STEP_S: f64 = 5e-4;
 const SPIN_STEPS: usize = 2000;
 
@@ -118,15 +118,15 @@ pub(super) struct Spun {
     pub(super) name: String,
     /// Whether loads change its stiffness.
     pub(super) stiffening: bool,
-    /// Largest distance of the end from the truth, over the peak: in all, along the undeformed bar,
-    /// across it.
+    /// Maximum distance of the end from the truth, over the peak: in total, along the undeformed
+    /// bar, and across it.
     pub(super) errors: [f64; 3],
 }
 
-/// A spin-up: modal links, whose velocity terms are integrals over shapes, against chains of rigid
-/// bodies, which have none of them.
+/// Spin-up: modal links, whose velocity terms are integrals over shapes, compared with chains of
+/// rigid bodies, which do not use such integrals.
 pub(super) struct SpinUp {
-    /// Largest deflection of the truth (m).
+    /// Maximum deflection of the truth (m).
     pub(super) peak_m: f64,
     pub(super) models: Vec<Spun>,
 }
@@ -151,7 +151,7 @@ impl SpinUp {
     }
 }
 
-/// The joint from rest to [`SPEED`] in [`TIME_S`]: `q'' = (w/T)(1 - cos 2πt/T)`.
+/// Motion of the joint from rest to [`SPEED`] in [`TIME_S`]: `q'' = (w/T)(1 - cos 2πt/T)`.
 fn spin_up(t: f64, q: &mut [f64], qdot: &mut [f64], qddot: &mut [f64]) {
     let phase = std::f64::consts::TAU * t / TIME_S;
     let a = TIME_S / std::f64::consts::TAU;
@@ -160,8 +160,8 @@ fn spin_up(t: f64, q: &mut [f64], qdot: &mut [f64], qddot: &mut [f64]) {
     qddot[0] = SPEED / TIME_S * (1.0 - phase.cos());
 }
 
-/// Largest distance of two paths in all, along the undeformed bar (whose end goes along `rigid`),
-/// and across it (m).
+/// Maximum distance between two paths in total, along the undeformed bar (whose end follows
+/// `rigid`), and across it (m).
 fn apart(path: &[Vector3<f64>], truth: &[Vector3<f64>], rigid: &[Vector3<f64>]) -> [f64; 3] {
     let parted = path.iter().zip(truth).zip(rigid).map(|((a, b), r)| {
         let (d, along) = (a - b, r.normalize());
@@ -175,8 +175,8 @@ fn apart(path: &[Vector3<f64>], truth: &[Vector3<f64>], rigid: &[Vector3<f64>]) 
 mod tests {
     use super::*;
 
-    /// Truth: at T the speed is w and the angle w T/2; the derivatives are those of the angle by
-    /// central differences.
+    /// Truth: at T the speed is w and the angle is w T/2; the derivatives agree with central
+    /// differences of the angle.
     #[test]
     fn the_spin_up_ends_at_its_speed_without_acceleration() {
         let at = |t: f64| {
@@ -193,7 +193,7 @@ mod tests {
         }
     }
 
-    /// Truth by hand: (4, 3) off, bar along y: 3 along, 4 across, 5 in all.
+    /// Truth by hand: a difference of (4, 3) with the bar along y is 3 along, 4 across, 5 in total.
     #[test]
     fn a_distance_is_parted_along_and_across_the_bar() {
         let at = |x: f64, y: f64| vec![Vector3::new(x, y, 0.0)];

@@ -35,7 +35,7 @@ pub(super) fn page(found: &Findings) -> Case {
     case
 }
 
-/// Six end loads, each method against the closed form.
+/// Six end loads, each method compared with the closed form.
 fn end_loads(case: &mut Case, found: &EndLoads) {
     case.heading("Six loads at the end");
     let EndLoads { truth, with_shear, methods } = found;
@@ -56,7 +56,7 @@ fn end_loads(case: &mut Case, found: &EndLoads) {
     claim_each(case, "end loads", ("closed form", truth), methods, 1e-6);
 }
 
-/// Loads at stations along the bar, deflection and slope along it.
+/// Loads at stations along the bar; deflection and slope along it.
 fn stations(case: &mut Case, found: &Stations) {
     case.heading("Deflection and rotation along the beam, loads at stations");
     case.text(
@@ -97,7 +97,7 @@ fn stations(case: &mut Case, found: &Stations) {
     case.figure(along_figure(found));
 }
 
-/// A row for the deflection and one for the slope.
+/// Adds a row for the deflection and one for the slope.
 fn add_station(table: &mut Table, fraction: f64, load: StationLoad, place: &str, seen: &Deflection) {
     let load = if load == StationLoad::Force { "F_z" } else { "-M_y" };
     for (k, what) in [format!("w({place})"), format!("w'({place})")].into_iter().enumerate() {
@@ -130,7 +130,7 @@ fn along_figure(found: &Stations) -> Figure {
     }
 }
 
-/// Where the link is cut, and what happens without the coupling terms.
+/// Position of the joint, and the error without the coupling terms.
 fn splits(case: &mut Case, found: &Splits) {
     case.heading("Place of the joint, and coupling terms");
     let mut table = Table::new(
@@ -186,7 +186,7 @@ fn split_figure(found: &Splits) -> Figure {
     }
 }
 
-/// Sag under the bar's own weight and frequencies over the number of parts and modes.
+/// Sag under the bar's own weight and frequencies as functions of the number of parts and modes.
 fn weight(case: &mut Case, found: &Weight) {
     case.heading("Own weight and frequencies: how many parts, how many modes");
     let Weight { sag_m, side_hz, up_hz, models } = found;
@@ -224,7 +224,7 @@ fn weight(case: &mut Case, found: &Weight) {
     );
 }
 
-/// Ring-down: error over the step.
+/// Ring-down: error as a function of the step size.
 fn steps(case: &mut Case, found: &Steps) {
     case.heading("Step size");
     let damping = plain(100.0 * DAMPING);
@@ -254,7 +254,7 @@ fn steps(case: &mut Case, found: &Steps) {
          does not converge to this motion at all; the exact form does, with first order.",
     );
     let curves = found.steppers.iter().map(|stepper| {
-        // Local and global lie on each other here.
+        // The curves of the local and the global form coincide here.
         let dashed = stepper.is_spook(ConstraintForm::Global);
         PlotCurve {
             name: stepper.name.replace('`', ""),
@@ -273,7 +273,7 @@ fn steps(case: &mut Case, found: &Steps) {
     });
 }
 
-/// A spin-up.
+/// Spin-up.
 fn spin_up(case: &mut Case, found: &SpinUp) {
     case.heading("In fast motion");
     let caption = format!(

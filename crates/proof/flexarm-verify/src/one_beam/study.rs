@@ -1,4 +1,4 @@
-//! Loads, weight and frequencies of the bar by every method, against closed forms.
+//! Loads, gravity and frequencies of the bar by every method, compared with closed forms.
 
 use flexarm::Robot;
 use nalgebra::{Matrix6, Vector3, Vector6};
@@ -10,10 +10,10 @@ use crate::bench::{Rig, Worst, compliance_error, in_modes, in_parts, larger, par
 use crate::compliance::{Method, by_every_method};
 use crate::textbook::Stiffness;
 
-/// Step of what runs until it rests (s).
+/// Step size of the runs until rest (s).
 pub(super) const SETTLING_STEP_S: f64 = 2e-3;
 
-/// Six end loads, each method against the closed form.
+/// Six end loads, each method compared with the closed form.
 pub(super) struct EndLoads {
     /// Compliance of the end in closed form (m/N, rad/(N m)).
     pub(super) truth: Matrix6<f64>,
@@ -33,13 +33,14 @@ impl EndLoads {
 
 /// Numbers of parts of the links that are loaded at stations.
 pub(super) const COUNTS: [usize; 5] = [2, 3, 5, 9, 17];
-/// Those of them that are drawn.
+/// Numbers of parts that are drawn.
 const DRAWN_COUNTS: [usize; 3] = [2, 3, 5];
-/// Places of the loads over the length.
+/// Positions of the loads, as fractions of the length.
 const FRACTIONS: [f64; 4] = [0.3, 0.5, 0.75, 1.0];
-/// Force (N) or moment (N m) there; its size does not matter as long as the bar hardly bends.
+/// Force (N) or moment (N m) at a station; its magnitude is irrelevant as long as deflections are
+/// small.
 pub(super) const STATION_LOAD: f64 = 0.1;
-/// Pieces of the bar that are drawn.
+/// Number of intervals along the bar in the drawn curves.
 const PIECES: u32 = 400;
 
 /// A load at a station.
@@ -68,7 +69,7 @@ impl StationLoad {
     }
 }
 
-/// Deflection (m) and slope at one place under one load.
+/// Deflection (m) and slope at one position under one load.
 pub(super) struct Deflection {
     pub(super) closed: [f64; 2],
     /// Relative differences, one pair for each of the [`COUNTS`].
@@ -77,7 +78,7 @@ pub(super) struct Deflection {
 
 /// One load at one station.
 pub(super) struct Station {
-    /// Its place over the length.
+    /// Position, as a fraction of the length.
     pub(super) fraction: f64,
     pub(super) load: StationLoad,
     pub(super) at_load: Deflection,
@@ -87,16 +88,16 @@ pub(super) struct Station {
 /// Deflection (m) or slope along the bar under a force.
 pub(super) struct Along {
     pub(super) closed: Vec<f64>,
-    /// Number of parts and curve.
+    /// Number of parts, and the curve.
     pub(super) parts: Vec<(usize, Vec<f64>)>,
 }
 
 /// Loads at stations along the bar.
 pub(super) struct Stations {
     pub(super) stations: Vec<Station>,
-    /// Where the curves are seen (m).
+    /// Positions at which the curves are sampled (m).
     pub(super) places_m: Vec<f64>,
-    /// Deflection and slope under a force at the end, then at mid length.
+    /// Deflection and slope under a force at the end, then at half the length.
     pub(super) along: [Along; 4],
 }
 
@@ -119,7 +120,7 @@ impl Stations {
         Ok(Self { stations, places_m, along })
     }
 
-    /// Largest error of the end under loads at the end.
+    /// Maximum error of the end under loads at the end.
     pub(super) fn worst_at_the_end(&self) -> f64 {
         let loaded_there = self.stations.iter().filter(|station| station.fraction == 1.0);
         loaded_there.flat_map(|station| &station.at_end.errors).flatten().map(|e| e.abs()).fold(0.0, larger)
@@ -129,7 +130,7 @@ impl Stations {
 fn deflection(bar: &Stiffness, chains: &[Chain], load: StationLoad, a: f64, x: f64) -> Result<Deflection, Error> {
     let closed = load.closed(bar, a, x);
     let errors = chains.iter().map(|chain| {
-        // Deflection along z, and slope: a rotation about -y.
+        // Deflection along z, and slope as a rotation about -y.
         let u = chain.at(a).statics_at(&load.wrench(), &chain.at(x))?;
         Ok([u[2] / closed[0] - 1.0, -u[4] / closed[1] - 1.0])
     });
@@ -151,11 +152,11 @@ fn along(bar: &Stiffness, chains: &[Chain], places_m: &[f64], a: f64, k: usize) 
     Ok(Along { closed, parts: parts.collect::<Result<_, Error>>()? })
 }
 
-/// A bar in rigid parts.
+/// The bar as a chain of rigid parts.
 struct Chain {
     parts: usize,
     rig: Rig,
-    /// Body of each part with the place where it begins (m).
+    /// Body of each part, with the position at which it begins (m).
     bodies: Vec<(usize, f64)>,
 }
 
@@ -171,30 +172,30 @@ impl Chain {
         Ok(Self { parts: n, rig, bodies })
     }
 
-    /// A rig of the point of the bar at `x`.
+    /// Returns a rig that observes the point of the bar at `x`.
     fn at(&self, x: f64) -> Rig {
         let last = self.bodies.iter().rev().find(|(_, from)| *from <= x + 1e-12);
         self.rig.at_point(last.unwrap_or(&self.bodies[0]).0, Vector3::new(x, 0.0, 0.0))
     }
 }
 
-/// Places of the joint over the length.
+/// Positions of the joint, as fractions of the length.
 const SPLITS: [f64; 9] = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9];
 
-/// Two parts with the joint at one place; relative errors.
+/// Two parts with the joint at one position; relative errors.
 pub(super) struct Split {
     pub(super) fraction: f64,
-    /// Compliance of the end, with the full 6x6.
+    /// Compliance of the end with the full 6x6 stiffness.
     pub(super) coupled: f64,
-    /// The same with its diagonal alone.
+    /// Compliance of the end with only the diagonal of the stiffness.
     pub(super) uncoupled: f64,
-    /// Sag of the end under bar and ball.
+    /// Sag of the end under the weight of bar and ball.
     pub(super) sag: f64,
-    /// First frequency sideways and upwards.
+    /// First frequency of sideways and of upward bending.
     pub(super) hz: [f64; 2],
 }
 
-/// Where the link is cut, and what happens without the coupling terms.
+/// Position of the joint, and the error without the coupling terms.
 pub(super) struct Splits(pub(super) Vec<Split>);
 
 impl Splits {
@@ -207,12 +208,12 @@ impl Splits {
         Ok(Self(SPLITS.iter().map(split).collect::<Result<_, Error>>()?))
     }
 
-    /// Largest error of the full 6x6.
+    /// Maximum error with the full 6x6 stiffness.
     pub(super) fn worst_coupled(&self) -> f64 {
         self.0.iter().map(|split| split.coupled).fold(0.0, larger)
     }
 
-    /// Largest and least error of plain springs.
+    /// Maximum and minimum error with uncoupled springs.
     pub(super) fn uncoupled_range(&self) -> [f64; 2] {
         let errors = || self.0.iter().map(|split| split.uncoupled);
         [errors().worst(), errors().fold(f64::INFINITY, f64::min)]
@@ -244,27 +245,27 @@ impl Split {
     }
 }
 
-/// A link model of the bar without the ball; relative differences.
+/// A link model of the bar without the ball, with relative differences.
 pub(super) struct WeightModel {
     pub(super) name: String,
     pub(super) modal: bool,
     pub(super) elastic_coordinates: usize,
     pub(super) sag: f64,
-    /// First sideways, first upwards, second sideways, second upwards.
+    /// First sideways, first upward, second sideways, second upward bending mode.
     pub(super) hz: [f64; 4],
 }
 
-/// Sag under the bar's own weight and frequencies over the number of parts and modes.
+/// Sag under the bar's own weight and frequencies as functions of the number of parts and modes.
 pub(super) struct Weight {
-    /// In closed form.
+    /// Closed form (m).
     pub(super) sag_m: f64,
-    /// First two, sideways and upwards.
+    /// First two of sideways and of upward bending.
     pub(super) side_hz: Vec<f64>,
     pub(super) up_hz: Vec<f64>,
     pub(super) models: Vec<WeightModel>,
 }
 
-/// Numbers of modes of the modal links under weight.
+/// Numbers of modes of the modal links under gravity.
 const MODES: [usize; 4] = [0, 2, 6, 12];
 /// Name of modal links without modes.
 pub(super) const GUYAN: &str = "modal, no modes (Guyan)";
@@ -288,17 +289,17 @@ impl Weight {
         Ok(Self { sag_m, side_hz, up_hz, models })
     }
 
-    /// Size of the error of the sag with so many parts; not a number if there is no such model.
+    /// Absolute sag error with `n` parts; NaN if there is no such model.
     pub(super) fn sag_error(&self, n: usize) -> f64 {
         self.model(&in_parts(n).0).map_or(f64::NAN, |model| model.sag.abs())
     }
 
-    /// Largest error of the first `count` frequencies of the model of this name.
+    /// Maximum error of the first `count` frequencies of the named model.
     pub(super) fn worst_hz(&self, name: &str, count: usize) -> f64 {
         self.model(name).map_or(f64::NAN, |model| model.hz[..count].iter().copied().worst())
     }
 
-    /// Largest error of the sag of modal links.
+    /// Maximum sag error of modal links.
     pub(super) fn modal_sag_error(&self) -> f64 {
         self.models.iter().filter(|model| model.modal).map(|model| model.sag.abs()).fold(0.0, larger)
     }
@@ -308,8 +309,8 @@ impl Weight {
     }
 }
 
-/// Part of the peak by which a modal link misses the shortening of a bar that bends by `peak_m` at
-/// its end: `3/5 w²/l`.
+/// Error of a modal link due to the neglected shortening of a bar whose end deflects by `peak_m`,
+/// as a fraction of the peak: `3/5 w²/l`, over `w`.
 pub(super) fn shortening_over_peak(peak_m: f64) -> f64 {
     0.6 * peak_m / LENGTH_M
 }
@@ -318,8 +319,8 @@ pub(super) fn shortening_over_peak(peak_m: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// Truth: the shape x²(3l - x)/(2 l³) of a bar under an end force shortens by half the integral
-    /// of its squared slope, by Simpson's rule.
+    /// Truth: the deflected shape x²(3l - x)/(2 l³) under an end force shortens the bar by half the
+    /// integral of its squared slope, by Simpson's rule.
     #[test]
     fn a_bar_under_an_end_force_shortens_by_three_fifths_of_its_deflection_squared() {
         let (w, n) = (0.01, 200);
@@ -330,8 +331,8 @@ mod tests {
         assert!((shortening_over_peak(w) * w / shortening - 1.0).abs() < 1e-9, "{shortening}");
     }
 
-    /// Truth by hand: a moment bends with constant curvature, so its slope at l is M l/EI, wherever
-    /// beyond the load it is seen.
+    /// Truth by hand: a moment bends the bar with constant curvature, so the slope beyond the load
+    /// is M a/EI at every position.
     #[test]
     fn loads_at_stations_are_those_of_the_closed_form() {
         let bar = bar();

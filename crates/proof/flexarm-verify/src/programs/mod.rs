@@ -1,7 +1,7 @@
-//! The same arm and motion in other programs: stored results, and our curve of today against the
-//! stored truth.
+//! The same arm and motion in other programs: stored results, and the curve of this build compared
+//! with the stored truth.
 //!
-//! `today` and `stored` compute findings, `page` says them.
+//! `today` and `stored` compute findings, `page` writes them up.
 
 mod page;
 mod stored;
@@ -17,21 +17,21 @@ use today::Today;
 
 const STORED: &str = "other_programs.json";
 
-/// What the case finds.
+/// Findings of the case.
 struct Findings {
     about: About,
     today: Today,
-    /// Nothing if the stored file has not two motions.
+    /// `None` if the stored file does not have two motions.
     stored: Option<StoredRuns>,
 }
 
-/// Where the stored results come from.
+/// Origin of the stored results.
 struct About {
-    /// Names and versions.
+    /// Names and versions of the programs.
     programs: Vec<String>,
     date: String,
     machine: String,
-    /// Damping over stiffness (s).
+    /// Ratio of damping to stiffness (s).
     damping_s: f64,
 }
 
@@ -49,7 +49,7 @@ impl About {
     }
 }
 
-/// The case.
+/// Runs the case.
 pub(crate) fn case(bench: &Bench, _pace: &mut Pace<'_>) -> Result<Case, Error> {
     let stored = bench.stored(STORED)?;
     let about = About::new(&stored)?;

@@ -7,14 +7,14 @@ use super::today::{MOTION, ROUNDING_M, SEEN_HZ, Today};
 use super::{About, Findings};
 use crate::page::{Bound, Case, Cell, Figure, Table, digits, error, plain, word};
 
-/// Damping of the first mode, over critical, and tolerance of DOP853 in the stored truth:
+/// Damping ratio of the first mode, and tolerance of DOP853 in the stored truth:
 /// `tools/crosscheck/other_programs.py`.
 const DAMPING: f64 = 0.03;
 const STORED_TOLERANCE: f64 = 1e-12;
-/// How far converged curves may be apart, over the peak.
+/// Maximum distance between converged curves, over the peak.
 const CONVERGED: f64 = 1e-6;
-/// Exudyn's floating frame against modal links over the peak, as its marker is and with a structure
-/// ten times as stiff: `tools/crosscheck/exudyn_ffrf.py`.
+/// Error of Exudyn's floating frame with respect to modal links, over the peak: with its marker as
+/// it is, and with a structure ten times as stiff: `tools/crosscheck/exudyn_ffrf.py`.
 const FLOATING_FRAME_ERRORS: [f64; 2] = [5.6e-4, 3.3e-5];
 
 pub(super) fn page(found: &Findings) -> Case {
@@ -42,7 +42,7 @@ pub(super) fn page(found: &Findings) -> Case {
     case
 }
 
-/// What this build gives on this machine.
+/// Results of this build on this machine.
 fn today(case: &mut Case, found: &Today) {
     case.heading("This build against the stored truth");
     let caption = format!(
@@ -64,7 +64,7 @@ fn today(case: &mut Case, found: &Today) {
     case.table(table);
 }
 
-/// Everything that was stored, as one table and one picture.
+/// All stored results, as one table and one picture.
 fn stored_runs(case: &mut Case, found: &StoredRuns) {
     case.heading("Accuracy and cost, one run on one machine");
     let [first, second] = &found.motions;

@@ -1,4 +1,4 @@
-//! Everything that was stored of the other programs: accuracy and cost.
+//! Stored results of the other programs: accuracy and cost.
 
 use serde_json::Value;
 
@@ -8,29 +8,29 @@ use crate::bench::Stored;
 /// A motion of the stored runs.
 pub(super) struct StoredMotion {
     pub(super) name: String,
-    /// Largest deflection of the truth (m).
+    /// Maximum deflection of the truth (m).
     pub(super) peak_m: f64,
 }
 
-/// A run of a program; errors over the truth's peak deflection, nothing where it was not run.
+/// A run of a program; errors over the peak deflection of the truth, `None` if it was not run.
 pub(super) struct StoredRun {
     pub(super) program: String,
     pub(super) method: String,
     pub(super) step_s: Option<f64>,
-    /// On the first motion: in all, along x, y, z, root mean square.
+    /// On the first motion: in total, along x, y, z, root mean square.
     pub(super) error: Option<f64>,
     pub(super) axis_errors: [Option<f64>; 3],
     pub(super) rms_error: Option<f64>,
-    /// In all on the second motion.
+    /// In total on the second motion.
     pub(super) second_error: Option<f64>,
-    /// Processor time over simulated time.
+    /// CPU time over simulated time.
     pub(super) cpu: Option<f64>,
     pub(super) note: String,
-    /// Whether the curve was brought to no step from two runs.
+    /// Whether the curve was extrapolated to zero step size from two runs.
     extrapolated: bool,
 }
 
-/// Two motions, every program.
+/// Results of all programs on two motions.
 pub(super) struct StoredRuns {
     pub(super) motions: [StoredMotion; 2],
     pub(super) runs: Vec<StoredRun>,
@@ -45,7 +45,7 @@ impl StoredRuns {
 }
 
 impl StoredRuns {
-    /// Power of ten of the least error of another model on the first motion.
+    /// Minimum error of another model on the first motion, rounded down to a power of ten.
     pub(super) fn least_of_other_models(&self) -> f64 {
         let other = self.runs.iter().filter(|run| run.is_another_model());
         let least = other.filter_map(|run| run.error).reduce(f64::min).unwrap_or(f64::NAN);
@@ -69,7 +69,7 @@ fn runs(first: &Value, second: &Value) -> Vec<StoredRun> {
     let mut runs: Vec<StoredRun> = Vec::new();
     let mut last = String::new();
     for (k, row) in rows(first).iter().enumerate() {
-        // Both motions were run with the same list.
+        // Both motions were run with the same list of methods.
         let same = |other: &&Value| ["program", "method", "step_s"].iter().all(|key| other[*key] == row[*key]);
         let other = others.get(k).filter(same).cloned().unwrap_or(Value::Null);
         let run = StoredRun::new(row, &other, &last);
@@ -82,8 +82,8 @@ fn runs(first: &Value, second: &Value) -> Vec<StoredRun> {
 }
 
 impl StoredRun {
-    /// * `other`: the same run on the second motion. `last`: the method of the row above, which
-    ///   "the same" speaks of.
+    /// * `other`: the same run on the second motion. `last`: method of the previous row, to which
+    ///   "the same" refers.
     fn new(row: &Value, other: &Value, last: &str) -> Self {
         let method = text(&row["method"]);
         let how = method.strip_prefix("the same");
@@ -101,18 +101,19 @@ impl StoredRun {
         }
     }
 
-    /// Whether it is not the same model.
+    /// Returns whether the run uses another model.
     fn is_another_model(&self) -> bool {
         self.note.starts_with("another model")
     }
 
-    /// Curves brought to no step, or the finest of a method of high order: they must be one.
+    /// Returns whether the curve is converged: extrapolated to zero step size, or the finest run of
+    /// a high-order method. All such curves must coincide.
     pub(super) fn is_converged(&self) -> bool {
         let converged = self.extrapolated || self.method == "RK4" && self.step_s.is_some_and(|h| h < 2e-4);
         converged && !self.is_another_model() && self.program != "flexarm"
     }
 
-    /// Its name in the picture of error over cost, with both: nothing if it is not drawn.
+    /// Name and values in the picture of error over cost; `None` if the run is not drawn.
     pub(super) fn drawn(&self) -> Option<(String, [f64; 2])> {
         let (error, cpu) = (self.error?, self.cpu?);
         let wanted = self.step_s.is_some()
@@ -142,7 +143,7 @@ mod tests {
         let runs = runs(&first, &second);
         assert_eq!(runs[1].method, "Euler, to h = 0");
         assert!(runs[1].is_converged() && !runs[0].is_converged());
-        // A row of another method on the second motion is not taken for this one.
+        // A row of another method on the second motion must not be matched with this one.
         assert_eq!([runs[0].second_error, runs[1].second_error], [Some(2e-5), None]);
     }
 

@@ -1,4 +1,4 @@
-//! What this build gives on this machine.
+//! Results of this build on this machine.
 
 use std::path::Path;
 
@@ -13,36 +13,36 @@ use crate::bench::{ALPHA, Bench, Worst, larger, spook};
 const ROBOT: &str = "robots/kr210/links.toml";
 pub(super) const MOTION: &str = "pick_and_place";
 const CURVE: &str = "tests/verification/kr210_pick_and_place_pinocchio.csv";
-/// How often the stored curve was seen (1/s).
+/// Sampling rate of the stored curve (1/s).
 pub(super) const SEEN_HZ: f64 = 100.0;
-/// Half of the last digit of the stored curve (m).
+/// Half a unit of the last digit of the stored curve (m).
 pub(super) const ROUNDING_M: f64 = 0.5e-9;
 /// Tolerance of the stepper with error control.
 const TOLERANCE: f64 = 1e-9;
-/// The finest step of a quick run (s).
+/// Finest step size of a quick run (s).
 const QUICK_STEP_S: f64 = 2.5e-4;
 
 /// One stepper.
 pub(super) struct Stepped {
     pub(super) name: String,
     pub(super) step_s: f64,
-    /// What its error is claimed to be at most.
+    /// Claimed upper bound of its error.
     pub(super) bound: f64,
-    /// Largest distance of the tool from the truth over the peak: along x, y, z, and in all.
+    /// Maximum distance of the TCP from the truth over the peak: along x, y, z, and in total.
     pub(super) axis_errors: [f64; 3],
     pub(super) error: f64,
-    /// The same at the start.
+    /// The same distance at the start.
     pub(super) start_error: f64,
 }
 
-/// All of them.
+/// Results of all steppers.
 pub(super) struct Today {
-    /// Largest deflection of the truth (m).
+    /// Maximum deflection of the truth (m).
     pub(super) peak_m: f64,
     pub(super) steppers: Vec<Stepped>,
 }
 
-/// Name, stepper, step (s), bound.
+/// Name, stepper, step size (s), bound.
 type Method = (String, StepperKind, f64, f64);
 
 fn methods() -> [Method; 7] {
@@ -60,7 +60,7 @@ fn methods() -> [Method; 7] {
 }
 
 impl Today {
-    /// * `damping_s`: damping of the links over their stiffness, as in the other programs (s).
+    /// * `damping_s`: ratio of damping to stiffness of the links, as in the other programs (s).
     pub(super) fn new(bench: &Bench, damping_s: f64) -> Result<Self, Error> {
         let truth = Curve::read(&bench.root.join(CURVE))?;
         let mut robot = bench.robot(ROBOT)?;
@@ -108,7 +108,7 @@ impl Stepped {
 /// The stored truth.
 struct Curve {
     flexible: Vec<Vector3<f64>>,
-    /// Largest deflection (m).
+    /// Maximum deflection (m).
     peak: f64,
 }
 
@@ -119,7 +119,8 @@ impl Curve {
         curve.map_err(|what| flexarm::Error::File { path: path.to_owned(), what }.into())
     }
 
-    /// Rows of time, rigid and flexible tool, below a head; lines with `#` are notes.
+    /// Parses rows of time, rigid and flexible TCP, below a header; lines starting with `#` are
+    /// notes.
     fn parse(text: &str) -> Result<Self, String> {
         let rows = text.lines().filter(|line| !line.starts_with('#')).skip(1);
         let (mut flexible, mut peak) = (Vec::new(), 0.0f64);
@@ -140,7 +141,7 @@ impl Curve {
 mod tests {
     use super::*;
 
-    /// Truth by hand: the tools are (3, 4, 0) and (0, 0, 1) apart.
+    /// Truth by hand: the TCPs differ by (3, 4, 0) and (0, 0, 1).
     #[test]
     fn a_stored_curve_is_read_with_its_peak_and_refused_with_its_row() {
         let text = "# note\nt,x,y,z,a,b,c\n0, 1,1,1, 4,5,1\n1, 0,0,0, 0,0,1\n";

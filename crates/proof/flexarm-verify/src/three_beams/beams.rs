@@ -1,4 +1,4 @@
-//! The beams of `robots/three_beams/README.md` in closed form.
+//! Closed forms for the beams of `robots/three_beams/README.md`.
 
 use nalgebra::{Matrix3, Matrix6, Vector3};
 
@@ -12,16 +12,16 @@ const RHO: f64 = 2700.0;
 pub(super) const LENGTHS_M: [f64; 3] = [0.8, 0.6, 0.4];
 /// Mass at the tip (kg).
 pub(super) const BALL_KG: f64 = 1.0;
-/// Places of the beams in lists.
+/// Indices of the beams in lists.
 pub(super) const TUBE: usize = 0;
 pub(super) const BOX: usize = 1;
 pub(super) const RECTANGLE: usize = 2;
-/// Their names.
+/// Names of the beams.
 pub(super) const BEAMS: [&str; 3] = ["tube", "box", "rectangle"];
 
 /// Outer and inner radius of the tube (m).
 const TUBE_M: [f64; 2] = [0.03, 0.027];
-/// Width (y), height (z) and wall of the box (m).
+/// Width (y), height (z) and wall thickness of the box (m).
 const BOX_M: [f64; 3] = [0.03, 0.05, 0.003];
 /// Width (y) and height (z) of the rectangle (m).
 const RECTANGLE_M: [f64; 2] = [0.03, 0.02];
@@ -31,11 +31,11 @@ pub(super) struct Member {
     pub(super) section: Stiffness,
     /// Axes of the beam (along it, y, z of the section) as columns.
     pub(super) R: Matrix3<f64>,
-    /// Its far end.
+    /// Far end of the beam (m).
     pub(super) end: Vector3<f64>,
 }
 
-/// Place of the tip, world axes (m).
+/// Position of the tip, world axes (m).
 pub(super) fn tip() -> Vector3<f64> {
     let [up, forwards, sideways] = LENGTHS_M;
     Vector3::new(forwards, sideways, up)
@@ -53,8 +53,8 @@ pub(super) fn members() -> [Member; 3] {
 }
 
 impl Member {
-    /// What it adds to the compliance of the tip: as a cantilever in world axes, its end carried to
-    /// the tip by a lever.
+    /// Contribution of the beam to the compliance of the tip: as a cantilever in world axes, its
+    /// end moved to the tip by a lever.
     pub(super) fn at_tip(&self) -> Matrix6<f64> {
         at_lever(&turned(&self.section.tip_compliance(), &self.R), &(tip() - self.end))
     }
@@ -71,7 +71,7 @@ fn section(l: f64, area: f64, I: [f64; 2], J: f64, kA: [f64; 2]) -> Stiffness {
     Stiffness { l, EA: E * area, EI_y: E * I[0], EI_z: E * I[1], GJ: shear * J, kGA, mu: RHO * area }
 }
 
-/// Cowper's factor of the hollow circle.
+/// Tube, with Cowper's factor of the hollow circle.
 fn tube(l: f64) -> Stiffness {
     use std::f64::consts::PI;
     let [outer, inner] = TUBE_M;
@@ -83,7 +83,7 @@ fn tube(l: f64) -> Stiffness {
     section(l, area, [I; 2], 2.0 * I, [k * area; 2])
 }
 
-/// Bredt's torsion on the midline, Cowper's factor of the thin-walled box.
+/// Box, with Bredt's torsion on the midline and Cowper's factor of the thin-walled box.
 fn hollow_box(l: f64) -> Stiffness {
     let [b, h, t] = BOX_M;
     let (bi, hi) = (b - 2.0 * t, h - 2.0 * t);
@@ -93,14 +93,15 @@ fn hollow_box(l: f64) -> Stiffness {
     section(l, b * h - bi * hi, I, J, [shear_area(bm, hm, t), shear_area(hm, bm, t)])
 }
 
-/// Cowper's factor of the rectangle.
+/// Rectangle, with Cowper's factor.
 fn rectangle(l: f64) -> Stiffness {
     let [b, h] = RECTANGLE_M;
     let kA = bar_shear_factors().cowper * b * h;
     section(l, b * h, [b * h.powi(3) / 12.0, h * b.powi(3) / 12.0], rectangle_torsion(b, h), [kA; 2])
 }
 
-/// Area in shear of a thin-walled box after Cowper: walls of length `along` and `across` the force.
+/// Shear area of a thin-walled box after Cowper, with walls of length `along` and `across` the
+/// force.
 fn shear_area(along: f64, across: f64, wall: f64) -> f64 {
     let m = across / along;
     let still = 12.0 + m * (72.0 + m * (150.0 + 90.0 * m)) + 30.0 * m.powi(3) * (1.0 + m);
@@ -108,33 +109,33 @@ fn shear_area(along: f64, across: f64, wall: f64) -> f64 {
     20.0 * wall * (along + across) * (1.0 + NU) * (1.0 + 3.0 * m).powi(2) / (still + NU * poisson)
 }
 
-/// Shear factors of a section: by mean displacements (Cowper) and by work.
+/// Shear factors of a section: by mean displacements (Cowper), and by strain energy.
 pub(super) struct ShearFactors {
     pub(super) cowper: f64,
     pub(super) energy: f64,
 }
 
-/// Of a thin tube.
+/// Shear factors of a thin tube.
 pub(super) fn thin_tube_shear_factors() -> ShearFactors {
     ShearFactors { cowper: 2.0 * (1.0 + NU) / (4.0 + 3.0 * NU), energy: 0.5 }
 }
 
-/// Of a solid rectangle.
+/// Shear factors of a solid rectangle.
 pub(super) fn bar_shear_factors() -> ShearFactors {
     ShearFactors { cowper: 10.0 * (1.0 + NU) / (12.0 + 11.0 * NU), energy: 5.0 / 6.0 }
 }
 
-/// Saint-Venant's torsion constant of the box over Bredt's, less one.
+/// Relative difference of Saint-Venant's torsion constant of the box from Bredt's.
 ///
-/// * `cells`: grid cells over the wall.
+/// * `cells`: grid cells across the wall.
 pub(super) fn box_torsion_over_bredt(cells: usize) -> f64 {
     let [b, h, t] = BOX_M;
     let bredt = 2.0 * t * ((b - t) * (h - t)).powi(2) / (b + h - 2.0 * t);
     hollow_rectangle_torsion(b, h, t, cells) / bredt - 1.0
 }
 
-/// Area of the walls along a force on the box over its area in shear after Cowper, less one; along
-/// y and z.
+/// Relative difference of the area of the walls parallel to a force on the box from its shear area
+/// after Cowper; along y and z.
 pub(super) fn box_walls_over_cowper() -> [f64; 2] {
     let [b, h, t] = BOX_M;
     [2.0 * t * b / shear_area(b - t, h - t, t) - 1.0, 2.0 * t * h / shear_area(h - t, b - t, t) - 1.0]
@@ -145,7 +146,7 @@ mod tests {
     use super::*;
 
     /// Truth by hand: tube of 0.8 m with I = pi (30^4 - 27^4)/4 mm^4, box with I_y = (30 50^3 - 24
-    /// 44^3)/12 mm^4. A torque about z turns the tube by l/GJ, and the box and the rectangle bend
+    /// 44^3)/12 mm^4. A torque about z twists the tube by l/GJ, and the box and the rectangle bend
     /// about z.
     #[test]
     fn the_tip_turns_by_the_sum_of_what_each_beam_turns() {
@@ -155,15 +156,15 @@ mod tests {
         let by_hand = 0.8 / tube.GJ + 0.6 / hollow.EI_z + 0.4 / bar.EI_z;
         assert!((tip_compliance()[(5, 5)] / by_hand - 1.0).abs() < 1e-12);
         // A force along y at the tip only stretches the rectangle; the other two bend, and the tube
-        // twists by its lever of 0.6 m.
+        // twists because of its lever of 0.6 m.
         let stretch = 0.4 / bar.EA;
         assert!((members()[RECTANGLE].at_tip()[(1, 1)] / stretch - 1.0).abs() < 1e-12);
         let tube_alone = tube.tip_compliance()[(2, 2)] + 0.36 * 0.8 / tube.GJ;
         assert!((members()[TUBE].at_tip()[(1, 1)] / tube_alone - 1.0).abs() < 1e-12);
     }
 
-    /// Truth: the two factors of each section as the page has printed them, and Cowper's table:
-    /// 0.851 for a bar at nu = 0.33.
+    /// Truth: the two factors of each section as printed on the page, and Cowper's table: 0.851 for
+    /// a bar at nu = 0.33.
     #[test]
     fn shear_factors_by_displacement_are_above_those_by_work() {
         for (factors, cowper) in [(thin_tube_shear_factors(), 0.533_066), (bar_shear_factors(), 0.850_928)] {

@@ -1,7 +1,7 @@
 //! Three beams with right-angle corners: every load bends and twists some of them.
 //!
-//! `beams` has the closed forms, `study`, `sections`, `ring_down` and `whirl` compute findings,
-//! `page` says them.
+//! `beams` holds the closed forms, `study`, `sections`, `ring_down` and `whirl` compute findings,
+//! `page` writes them up.
 
 mod beams;
 mod page;
@@ -25,11 +25,11 @@ const MESH: &str = "robots/three_beams/mesh.toml";
 /// Acceleration of gravity (m/s²).
 const G: f64 = 9.81;
 
-/// What the case finds.
+/// Findings of the case.
 struct Findings {
     tip_loads: TipLoads,
     meshes: Meshes,
-    /// Nothing in a quick run.
+    /// `None` in a quick run.
     sections: Option<Sections>,
     ring_down: RingDown,
     whirl: Whirl,
@@ -49,7 +49,7 @@ impl Findings {
     }
 }
 
-/// The case.
+/// Runs the case.
 pub(crate) fn case(bench: &Bench, _pace: &mut Pace<'_>) -> Result<Case, Error> {
     Ok(page::page(&Findings::new(bench)?))
 }

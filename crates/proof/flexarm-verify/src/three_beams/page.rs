@@ -17,12 +17,12 @@ use crate::bench::{LOADS, PATH_DAMPING_S, SMALL_MOTION, column_error, compliance
 use crate::compliance::{add_errors, claim_each};
 use crate::page::{Bound, Case, Cell, Figure, Table, bare_error, digits, error, fixed, percent, plain, signed, word};
 
-/// Points of CalculiX's rule of integration along each axis of an element.
+/// Integration points of CalculiX along each axis of an element.
 const CALCULIX_POINTS: usize = 3;
-/// Elements around the tube (`robots/three_beams/fe/README.md`).
+/// Number of elements around the tube (`robots/three_beams/fe/README.md`).
 const AROUND_THE_TUBE: usize = 24;
-/// Every so many samples are drawn: ten curves per panel would hide each other, and a point every 2
-/// ms draws 100 Hz.
+/// Every second sample is drawn: ten curves per panel would hide each other, and a point every 2 ms
+/// resolves 100 Hz.
 const DRAWN: usize = 2;
 const AXES: [&str; 3] = ["x", "y", "z"];
 
@@ -45,7 +45,7 @@ pub(super) fn page(found: &Findings) -> Case {
     case
 }
 
-/// Six loads at the tip, each method against the closed form.
+/// Six loads at the tip, each method compared with the closed form.
 fn tip_loads(case: &mut Case, found: &TipLoads) {
     case.heading("Six loads at the tip");
     let TipLoads { truth, of_beams, methods } = found;
@@ -67,7 +67,7 @@ fn tip_loads(case: &mut Case, found: &TipLoads) {
     claim_each(case, "loads at the tip", ("closed form", truth), methods, 1e-7);
 }
 
-/// The same arm from meshes, against the mesh of the whole arm in two other programs.
+/// The same arm from meshes, compared with the mesh of the whole arm in two other programs.
 fn meshes(case: &mut Case, found: &Meshes) {
     case.heading("The same arm from meshes, against two other programs");
     case.text(format!(
@@ -112,7 +112,7 @@ fn meshes(case: &mut Case, found: &Meshes) {
     case.figure(frequency_figure(&found.models));
 }
 
-/// Sag under weight and frequencies of every model.
+/// Sag under gravity and frequencies of every model.
 fn sag_and_frequencies(found: &Meshes) -> Table {
     let (sag, hz) = (&found.ngsolve.sag, &found.ngsolve.hz);
     let caption = format!(
@@ -148,8 +148,8 @@ fn sag_and_frequencies(found: &Meshes) -> Table {
 }
 
 fn why_sag_and_frequencies(found: &Meshes) -> String {
-    // Modes in which the ball has most of the motion, and those in which the beams bend between
-    // their ends.
+    // Modes in which the ball has most of the kinetic energy, and modes in which the beams bend
+    // between their ends.
     let moving = found.ball_shares.iter().take_while(|share| **share > 0.5).count();
     let held: Vec<usize> = (0..found.held_shares.len()).filter(|k| found.held_shares[*k] > 0.1).collect();
     let two_parts = found.model("2 parts").map_or(&[][..], |model| &model.hz_errors);
@@ -181,7 +181,7 @@ fn frequency_figure(models: &[Model]) -> Figure {
     }
 }
 
-/// How far the sections of beam theory are from the meshes, beam by beam.
+/// Differences between the sections of beam theory and the meshes, beam by beam.
 fn sections(case: &mut Case, found: &Sections) {
     case.heading("Beam theory against the meshes");
     let mut ends = Table::new(
@@ -248,7 +248,7 @@ fn why_sections_differ(found: &Sections) -> String {
     )
 }
 
-/// Let go under gravity: what the stepper costs, and what the model.
+/// Ring-down under gravity: errors of the steppers and of the models.
 fn ring_down(case: &mut Case, found: &RingDown) {
     case.heading("Ring-down");
     let caption = format!(
@@ -288,7 +288,7 @@ fn ring_down(case: &mut Case, found: &RingDown) {
     case.figure(ring_down_figure(found));
 }
 
-/// Stepper and model of a run.
+/// Name of a run: stepper and model.
 fn run_name(found: &RingDown, run: &Run) -> String {
     format!("{}, {}", run.stepper, found.models[run.model].name)
 }
@@ -330,9 +330,9 @@ fn ring_down_figure(found: &RingDown) -> Figure {
     }
 }
 
-/// Why the models differ, and why compliant constraints do.
+/// Causes of the differences between models, and of the error of compliant constraints.
 fn causes(case: &mut Case, found: &RingDown) {
-    /// Frequencies of the table.
+    /// Number of frequencies in the table.
     const SHOWN: usize = 4;
     let Causes { sum_error, models, constraints } = &found.causes;
     let caption = format!(
@@ -372,7 +372,7 @@ fn causes(case: &mut Case, found: &RingDown) {
     );
 }
 
-/// * `shown`: frequencies of the table.
+/// * `shown`: number of frequencies in the table.
 fn why_they_differ(found: &Causes, shown: usize) -> String {
     let linear = found.models.iter().find(|causes| causes.model == LINEAR);
     let higher = linear.and_then(|causes| causes.hz_errors.iter().take(shown).copied().reduce(f64::max));
@@ -393,7 +393,7 @@ fn why_they_differ(found: &Causes, shown: usize) -> String {
     )
 }
 
-/// Ringing while it turns.
+/// Ringing during rotation.
 fn whirl(case: &mut Case, found: &Whirl) {
     /// Bounds, one per speed.
     const BOUNDS: [f64; 2] = [1.7e-3, 6e-3];

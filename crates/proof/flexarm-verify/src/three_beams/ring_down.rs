@@ -1,4 +1,4 @@
-//! Let go under gravity: what the stepper costs, what the model, and why.
+//! Ring-down under gravity: error of the stepper, error of the model, and their causes.
 
 use flexarm::{Robot, StepperKind};
 use flexarm_stepping::{Damping, ReferenceSettings};
@@ -7,57 +7,57 @@ use nalgebra::Vector3;
 use crate::Error;
 use crate::bench::{ALPHA, LUMPED, Rig, Worst, farthest, in_modes, in_parts, place};
 
-/// Modes of each modal link.
+/// Number of modes of each modal link.
 pub(super) const MODES: usize = 12;
-/// Damping of the first mode, over critical.
+/// Damping ratio of the first mode.
 pub(super) const DAMPING: f64 = 0.03;
 /// Tolerance of the stepper with error control.
 pub(super) const TOLERANCE: f64 = 1e-9;
-/// Modes in the sums that say why.
+/// Number of modes in the modal sums that explain the differences.
 pub(super) const SUMMED: usize = 6;
-/// The step of the picture and of the claims; the tip is seen as often (s).
+/// Step size of the picture and of the claims, and sampling interval of the tip (s).
 pub(super) const STEP_S: f64 = 1e-3;
-/// A finer one (s).
+/// A finer step size (s).
 const FINE_STEP_S: f64 = 1e-4;
 
-/// Places of the models in lists.
+/// Indices of the models in lists.
 const STIFFENED: usize = 0;
 pub(super) const LINEAR: usize = 1;
 pub(super) const TWO_PARTS: usize = 2;
 pub(super) const FIVE_PARTS: usize = 3;
 
-/// A link model: let go by the stepper with error control.
+/// A link model, released and integrated by the stepper with error control.
 pub(super) struct Model {
     pub(super) name: String,
     rig: Rig,
-    /// Way of the tip from its undeformed place, every [`STEP_S`] (m).
+    /// Displacement of the tip from its undeformed position, every [`STEP_S`] (m).
     pub(super) path: Vec<Vector3<f64>>,
 }
 
 /// A run by one stepper.
 pub(super) struct Run {
-    /// Place of its model in the list.
+    /// Index of its model in the list.
     pub(super) model: usize,
     pub(super) stepper: &'static str,
     /// Whether its joints are compliant constraints.
     pub(super) compliant: bool,
     pub(super) step_s: f64,
-    /// Largest distance of the tip from the truth, over the peak; then along x, y, z.
+    /// Maximum distance of the tip from the truth, over the peak: in total, then along x, y, z.
     pub(super) method_error: f64,
     pub(super) axis_errors: [f64; 3],
-    /// From its own model by the stepper with error control.
+    /// Maximum distance from its own model integrated by the stepper with error control.
     pub(super) stepper_error: f64,
     pub(super) path: Vec<Vector3<f64>>,
 }
 
-/// The study.
+/// Findings on the ring-down.
 pub(super) struct RingDown {
     pub(super) duration_s: f64,
-    /// First frequency of modal links (Hz).
+    /// First frequency of the modal links (Hz).
     pub(super) first_hz: f64,
-    /// Largest deflection of the truth (m).
+    /// Maximum deflection of the truth (m).
     pub(super) peak_m: f64,
-    /// The truth first.
+    /// The truth comes first.
     pub(super) models: Vec<Model>,
     pub(super) runs: Vec<Run>,
     pub(super) causes: Causes,
@@ -75,19 +75,20 @@ impl RingDown {
         Ok(Self { duration_s, first_hz, peak_m, models, runs, causes })
     }
 
-    /// Where the tip should be.
+    /// Returns the true path of the tip.
     pub(super) fn truth(&self) -> &[Vector3<f64>] {
         &self.models[STIFFENED].path
     }
 
-    /// Largest distance of a model from the truth, both by the stepper with error control, over the
+    /// Maximum distance of a model from the truth, both by the stepper with error control, over the
     /// peak.
     pub(super) fn model_error(&self, model: usize) -> f64 {
         farthest(&self.models[model].path, self.truth()) / self.peak_m
     }
 }
 
-/// The models with the same damping of the material for all: proportional to stiffness, `beta` (s).
+/// Builds the models, all with the same material damping, proportional to stiffness with factor
+/// `beta` (s).
 fn models(robot: &Robot, beta: f64, duration_s: f64) -> Result<Vec<Model>, Error> {
     let mut robot = robot.clone();
     for link in &mut robot.flexible {
@@ -114,7 +115,7 @@ fn models(robot: &Robot, beta: f64, duration_s: f64) -> Result<Vec<Model>, Error
     made.collect()
 }
 
-/// Every stepper.
+/// Runs every stepper.
 fn runs(models: &[Model], duration_s: f64, peak_m: f64, quick: bool) -> Result<Vec<Run>, Error> {
     let mut list = Vec::new();
     for step_s in [STEP_S, FINE_STEP_S].into_iter().take(if quick { 1 } else { 2 }) {
@@ -142,45 +143,46 @@ fn runs(models: &[Model], duration_s: f64, peak_m: f64, quick: bool) -> Result<V
     made.collect()
 }
 
-/// Why the models differ: frequencies and shares in the sag, each alone; and why compliant
-/// constraints do.
+/// Causes of the differences between models (frequencies and shares of the sag, each separately),
+/// and of the error of compliant constraints.
 ///
-/// All distances are largest ones over the peak.
+/// All distances are maxima over the peak.
 pub(super) struct Causes {
-    /// Of the truth from the sum of its modes.
+    /// Distance of the truth from the sum of its modes.
     pub(super) sum_error: f64,
-    /// One per model but the truth.
+    /// One per model except the truth.
     pub(super) models: Vec<ModelCauses>,
     pub(super) constraints: ConstraintCauses,
 }
 
-/// One model against the truth.
+/// Causes of the difference of one model from the truth.
 pub(super) struct ModelCauses {
-    /// Place of the model in the list.
+    /// Index of the model in the list.
     pub(super) model: usize,
     /// Relative differences of the frequencies of the summed modes.
     pub(super) hz_errors: Vec<f64>,
-    /// Of sums with its frequencies and the truth's shares, the other way round, and with both its
-    /// own.
+    /// Distances of modal sums with its frequencies and the truth's shares, with the truth's
+    /// frequencies and its shares, and with both its own.
     pub(super) by_frequencies: f64,
     pub(super) by_shares: f64,
     pub(super) by_both: f64,
-    /// Of the stepped motions.
+    /// Distance of the stepped motions.
     pub(super) stepped: f64,
-    /// What the sums do not explain of it.
+    /// Share that the modal sums do not explain.
     pub(super) unexplained: f64,
 }
 
-/// Compliant constraints, two parts, against the same model by the stepper with error control.
+/// Compliant constraints with two parts, compared with the same model by the stepper with error
+/// control.
 pub(super) struct ConstraintCauses {
     pub(super) stepped: f64,
-    /// By positions half a step ahead, in a sum of modes.
+    /// Distance due to positions half a step ahead, in a modal sum.
     pub(super) by_half_a_step: f64,
-    /// By the frequency of the recurrence.
+    /// Distance due to the frequency of the recurrence.
     pub(super) by_frequency: f64,
     pub(super) by_both: f64,
     pub(super) unexplained: f64,
-    /// Of the local form from the global one.
+    /// Distance of the local form from the global one.
     pub(super) local_from_global: f64,
 }
 
@@ -212,7 +214,8 @@ impl Causes {
 }
 
 impl ConstraintCauses {
-    /// `runs`: the first two by compliant constraints, local and global, with steps of [`STEP_S`].
+    /// `runs`: the first two are those by compliant constraints, local and global, with steps of
+    /// [`STEP_S`].
     fn new(two: &Model, runs: &[Run], beta: f64, peak_m: f64) -> Self {
         let [local, global] = [0, 1].map(|k| runs[k].path.as_slice());
         let times = Times { every_s: STEP_S, count: two.path.len() };
@@ -231,30 +234,30 @@ impl ConstraintCauses {
     }
 }
 
-/// Largest part of the distance of two stepped motions that is not the distance of two sums of
-/// modes (m).
+/// Maximum distance of two stepped motions that the difference of two modal sums does not explain
+/// (m).
 fn unexplained(stepped: [&[Vector3<f64>]; 2], sums: [&[Vector3<f64>]; 2]) -> f64 {
     let ([a, b], [c, d]) = (stepped, sums);
     (0..a.len()).map(|k| ((a[k] - b[k]) - (c[k] - d[k])).norm()).worst()
 }
 
-/// Instants from 0 on.
+/// Instants, starting at 0.
 struct Times {
     every_s: f64,
     count: usize,
 }
 
-/// A mode of an arm that swings about its sag.
+/// A mode of the arm, oscillating about the sag.
 struct Mode {
-    /// Angular frequency without damping (rad/s).
+    /// Undamped angular frequency (rad/s).
     omega: f64,
     /// Damping ratio.
     zeta: f64,
-    /// Its part in the sag of the tip (m).
+    /// Its contribution to the sag of the tip (m).
     sag: Vector3<f64>,
 }
 
-/// The arm as a sum of its lowest modes, and the rest of the sag.
+/// The arm as a sum of its lowest modes, and the remaining static sag.
 struct Ringing {
     modes: Vec<Mode>,
     rest: Vector3<f64>,
@@ -265,7 +268,7 @@ impl Ringing {
         let modes = &rig.arm.modes;
         let e = &modes.equilibrium;
         let at = |e: &nalgebra::DVector<f64>| place(&rig.arm, &rig.frame, e).translation.vector;
-        // The equilibrium in coordinates of the modes.
+        // Equilibrium in modal coordinates.
         let eta = modes.shapes.clone().lu().solve(e).unwrap_or_else(|| e * f64::NAN);
         let mode = |k: usize| Mode {
             omega: modes.omega[k],
@@ -277,9 +280,9 @@ impl Ringing {
         Self { rest: at(e) - rig.X_WF.translation.vector - sum, modes: kept }
     }
 
-    /// What compliant constraints make of it with steps of `h`, to second order:
+    /// Returns the modes as compliant constraints change them with steps of `h`, to second order:
     /// `ω (1 - ζ h ω/2 - (h ω)²/12)` from the recurrence of the theory page, section 4, on an
-    /// oscillator; the decay stays.
+    /// oscillator; the decay rate is unchanged.
     fn stepped(&self, h: f64) -> Self {
         let slower = |&Mode { omega, zeta, sag }: &Mode| {
             let factor = 1.0 - 0.5 * zeta * h * omega - (h * omega).powi(2) / 12.0;
@@ -288,8 +291,8 @@ impl Ringing {
         Self { modes: self.modes.iter().map(slower).collect(), rest: self.rest }
     }
 
-    /// Way of the tip, let go undeformed: with its frequencies and the parts in the sag of another,
-    /// ahead by some time (s).
+    /// Returns the path of the tip released undeformed: with the frequencies of `self` and the sag
+    /// contributions of `shapes`, ahead by `ahead_s` (s).
     fn path(&self, shapes: &Self, times: &Times, ahead_s: f64) -> Vec<Vector3<f64>> {
         let at = |t: f64| -> Vector3<f64> {
             let swing = self.modes.iter().zip(&shapes.modes).map(|(Mode { omega, zeta, .. }, Mode { sag, .. })| {
@@ -312,8 +315,9 @@ mod tests {
         Ringing { modes: vec![mode], rest: Vector3::new(0.0, 0.0, -2e-4) }
     }
 
-    /// Truth: the closed form of a damped oscillator let go: it starts at rest at the static rest
-    /// alone, passes its sag by exp(-pi z/sqrt(1-z²)) after half a period, and ends at the sag.
+    /// Truth: the closed form of a damped oscillator released at rest: it starts at the remaining
+    /// static sag, overshoots its sag by exp(-pi z/sqrt(1-z²)) after half a period, and ends at the
+    /// sag.
     #[test]
     fn a_mode_let_go_overshoots_its_sag_by_its_damping() {
         let ringing = one_mode();
@@ -325,8 +329,8 @@ mod tests {
         assert!((path[199].z + 1.2e-3).abs() < 1e-15, "{}", path[199].z);
     }
 
-    /// Truth by hand: h = 1 ms, 40 rad/s, damping 0.1: factor 1 - 0.002 - 0.0016/12; the decay zeta
-    /// omega is the same.
+    /// Truth by hand: h = 1 ms, 40 rad/s, damping ratio 0.1: factor 1 - 0.002 - 0.0016/12; the
+    /// decay rate zeta omega is the same.
     #[test]
     fn compliant_constraints_lower_the_frequency_and_keep_the_decay() {
         let slower = one_mode().stepped(1e-3);

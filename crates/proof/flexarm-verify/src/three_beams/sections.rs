@@ -1,4 +1,4 @@
-//! How far the sections of beam theory are from the meshes, beam by beam.
+//! Differences between the sections of beam theory and the meshes, beam by beam.
 
 use flexarm::Robot;
 use flexarm_fem::UnitSystem;
@@ -11,33 +11,33 @@ use crate::bench::{Bench, Worst, compliance_error, larger};
 use crate::meshed::{Condensed, Meshed, inverse};
 use crate::textbook::{Stiffness, at_lever, turned};
 
-/// As many as there are elements along each beam.
+/// Number of slices, equal to the number of elements along each beam.
 const SLICES: usize = 20;
-/// Layers of elements in the middle whose stiffness is taken.
+/// Number of element layers in the middle whose stiffness is evaluated.
 const LAYERS: usize = 2;
-/// Grid cells over the wall of the box for its torsion.
+/// Grid cells across the wall of the box for its torsion constant.
 const CELLS: usize = 12;
 /// The ties that are compared, in this order.
 pub(super) const TIES: [Tie; 2] = [Tie::Rigid, Tie::Distributing];
-/// Entries of a diagonal: stretch, and bending by moments.
+/// Indices of a diagonal: stretch, and bending by moments.
 const STRETCH_AND_BENDING: [usize; 3] = [0, 4, 5];
-/// Torsion.
+/// Index of torsion.
 pub(super) const TORSION: usize = 3;
 
-/// One beam: its mesh over beam theory, less one.
+/// One beam: relative differences of its mesh from beam theory.
 pub(super) struct Section {
-    /// Diagonal of the compliance of its end, axes of the beam, by each of the [`TIES`].
+    /// Diagonal of the compliance of its end, in the axes of the beam, with each of the [`TIES`].
     pub(super) end_errors: [[f64; 6]; 2],
     /// In the middle: EA, EI_y, EI_z, GJ, kGA_y, kGA_z; then the mass.
     pub(super) middle_errors: [f64; 7],
-    /// Compliance of the link file against the mesh reduced here.
+    /// Difference of the compliance of the link file from that of the mesh reduced here.
     pub(super) file_error: f64,
 }
 
-/// All three of them.
+/// All three beams.
 pub(super) struct Sections {
     pub(super) beams: [Section; 3],
-    /// Saint-Venant's torsion of the box over Bredt's, less one.
+    /// Relative difference of Saint-Venant's torsion constant of the box from Bredt's.
     pub(super) box_over_bredt: f64,
 }
 
@@ -47,17 +47,17 @@ impl Sections {
         Ok(Self { beams: [tube?, hollow?, bar?], box_over_bredt: box_torsion_over_bredt(CELLS) })
     }
 
-    /// Largest error of EA and EI in the middle.
+    /// Maximum error of EA and EI in the middle.
     pub(super) fn worst_in_the_middle(&self) -> f64 {
         self.beams.iter().map(|beam| beam.middle_errors[..3].iter().copied().worst()).fold(0.0, larger)
     }
 
-    /// Largest error of a link file.
+    /// Maximum error of a link file.
     pub(super) fn worst_file(&self) -> f64 {
         self.beams.iter().map(|beam| beam.file_error).fold(0.0, larger)
     }
 
-    /// How much stiffer rigid ties make the beams in stretch and bending, on average.
+    /// Mean increase in stretch and bending stiffness due to rigid ties.
     pub(super) fn stiffer_by_rigid_ties(&self) -> f64 {
         let errors = self.beams.iter().flat_map(|beam| STRETCH_AND_BENDING.map(|k| -beam.end_errors[0][k]));
         errors.sum::<f64>() / (self.beams.len() * STRETCH_AND_BENDING.len()) as f64
@@ -69,7 +69,7 @@ impl Section {
         let member = &members()[k];
         let reduced = &robot.flexible[k].flexible.reduced;
         let mesh = Meshed::read(bench, &format!("robots/three_beams/fe/beam_{}.msh.gz", k + 1), UnitSystem::SI)?;
-        // The first beam stands along z of its link, the others lie along x.
+        // The first beam is along z of its link, the others are along x.
         let R = if k == TUBE { member.R.transpose() } else { Matrix3::identity() };
         let p_B = reduced.X_LB.translation.vector;
         let [rigid, mean] = TIES.map(|tie| mesh.condensed([tie; 2], Vector3::zeros(), p_B));
@@ -89,7 +89,7 @@ impl Section {
     }
 }
 
-/// Stiffness of the layers in the middle and mass, over those of beam theory, less one.
+/// Relative differences from beam theory of the stiffness of the middle layers and of the mass.
 fn middle_errors(
     member: &Member,
     mesh: &Meshed,
@@ -102,7 +102,8 @@ fn middle_errors(
     let c = turned(&at_lever(&short, &(-0.5 * p_B)), R).diagonal();
     let d = LAYERS as f64 * member.section.l / SLICES as f64;
     let Stiffness { EA, EI_y, EI_z, GJ, kGA, mu, l } = member.section;
-    // The layers as a beam about their middle: l³/(12 EI) of bending besides shear.
+    // Treat the layers as a beam about their middle: subtract the bending share l³/(12 EI) from the
+    // shear compliance.
     let shear = |yields: f64, turns: f64, kGA: f64| d / (yields - d * d / 12.0 * turns) / kGA - 1.0;
     [
         d / c[0] / EA - 1.0,

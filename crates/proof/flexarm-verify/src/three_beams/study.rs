@@ -1,4 +1,5 @@
-//! Loads at the tip, and the same arm from meshes: what every method and two other programs give.
+//! Loads at the tip, and the same arm from meshes: results of every method and of two other
+//! programs.
 
 use flexarm::{Modelling, Robot};
 use flexarm_fem::element::Quadrature;
@@ -16,18 +17,18 @@ use crate::bench::{
 use crate::compliance::{Method, by_every_method};
 use crate::meshed::Meshed;
 
-/// Step of what runs until it rests (s).
+/// Step size of the runs until rest (s).
 const SETTLING_STEP_S: f64 = 2e-3;
 /// The mesh of the tube.
 const TUBE_MESH: &str = "robots/three_beams/fe/beam_1.msh.gz";
-/// Modes of the links that say how a mode is made: as many as the files have.
+/// Number of modes of the links used for the modal energy shares, all that the files have.
 pub(super) const ALL_MODES: usize = 10;
 
-/// Six loads at the tip, each method against the closed form.
+/// Six loads at the tip, each method compared with the closed form.
 pub(super) struct TipLoads {
     /// Compliance of the tip in closed form (m/N, rad/(N m)).
     pub(super) truth: Matrix6<f64>,
-    /// What tube, box and rectangle have in it.
+    /// Contributions of tube, box and rectangle.
     pub(super) of_beams: [Matrix6<f64>; 3],
     pub(super) methods: Vec<Method>,
 }
@@ -44,7 +45,7 @@ impl TipLoads {
 /// Sag of the tip (m, rad) under the weight of beams and ball, and frequencies (Hz), by one program
 /// on the mesh of the whole arm.
 pub(super) struct WholeMesh {
-    /// Program, script and day.
+    /// Program, script and date.
     pub(super) provenance: String,
     pub(super) C_tip: Matrix6<f64>,
     pub(super) sag: Vector6<f64>,
@@ -61,12 +62,12 @@ impl WholeMesh {
         })
     }
 
-    /// Errors of another's sag: shift and rotation as vectors, over their sizes.
+    /// Relative errors of a given sag: translation and rotation, each as a vector norm.
     fn sag_errors(&self, sag: &Vector6<f64>) -> [f64; 2] {
         shift_and_turn_errors(sag, &self.sag)
     }
 
-    /// Relative differences of another's frequencies.
+    /// Relative differences of given frequencies from these.
     fn hz_errors(&self, hz: &[f64]) -> Vec<f64> {
         hz.iter().zip(&self.hz).map(|(f, truth)| f / truth - 1.0).collect()
     }
@@ -77,28 +78,29 @@ pub(super) struct Model {
     pub(super) name: String,
     pub(super) modal: bool,
     pub(super) elastic_coordinates: usize,
-    /// Of the shift and of the rotation of the tip under weight.
+    /// Errors of the translation and of the rotation of the tip under gravity.
     pub(super) sag_errors: [f64; 2],
-    /// Relative differences, as many as the truth has.
+    /// Relative differences of the frequencies, one per frequency of the truth.
     pub(super) hz_errors: Vec<f64>,
 }
 
-/// The arm from meshes against NGSolve and CalculiX on the mesh of the whole arm.
+/// The arm from meshes, compared with NGSolve and CalculiX on the mesh of the whole arm.
 pub(super) struct Meshes {
     /// The truth.
     pub(super) ngsolve: WholeMesh,
     pub(super) calculix: WholeMesh,
     pub(super) methods: Vec<Method>,
-    /// Condition number of the tube's stiffness matrix, as its link file has it.
+    /// Condition number of the tube's stiffness matrix in its link file.
     pub(super) tube_condition: f64,
-    /// Change of the tube's compliance by CalculiX's rule of integration; nothing in a quick run.
+    /// Relative change of the tube's compliance with CalculiX's integration rule; `None` in a quick
+    /// run.
     pub(super) tube_rule_error: Option<f64>,
     pub(super) calculix_sag_errors: [f64; 2],
     pub(super) calculix_hz_errors: Vec<f64>,
     pub(super) models: Vec<Model>,
-    /// The ball's share of the kinetic energy of each mode, modal links with all modes.
+    /// Share of the ball in the kinetic energy of each mode, modal links with all modes.
     pub(super) ball_shares: Vec<f64>,
-    /// Share of each mode's strain energy in shapes whose ends are held, the same links.
+    /// Share of each mode's strain energy in shapes with held ends, same links.
     pub(super) held_shares: Vec<f64>,
 }
 
@@ -108,7 +110,7 @@ impl Meshes {
         let ngsolve = WholeMesh::read(&bench.stored("three_beams_ngsolve.json")?)?;
         let others = [in_parts(5), in_modes(0), in_modes(ALL_MODES)];
         let methods = by_every_method(robot, None, &small_loads(&ngsolve.C_tip), SETTLING_STEP_S, &others)?;
-        // Two more meshes to assemble.
+        // This assembles two more meshes.
         let tube_rule_error = if bench.quick { None } else { Some(tube_rule_error(bench, robot)?) };
         let lumped = [2, 3, 5].map(|n| (in_parts(n), false));
         let modal = [0, 5, ALL_MODES].map(|n| (in_modes(n), true));
@@ -142,29 +144,30 @@ impl Meshes {
         })
     }
 
-    /// The model of this name.
+    /// Returns the model of this name.
     pub(super) fn model(&self, name: &str) -> Option<&Model> {
         self.models.iter().find(|model| model.name == name)
     }
 
-    /// Error of the shift under weight of the model of this name; not a number if there is none.
+    /// Error of the translation under gravity of the named model; NaN if there is none.
     pub(super) fn shift_error(&self, name: &str) -> f64 {
         self.model(name).map_or(f64::NAN, |model| model.sag_errors[0])
     }
 
-    /// Largest error of the first `count` frequencies of the model of this name.
+    /// Maximum error of the first `count` frequencies of the named model.
     pub(super) fn worst_hz_error(&self, name: &str, count: usize) -> f64 {
         self.model(name).map_or(f64::NAN, |model| model.hz_errors.iter().take(count).copied().worst())
     }
 
-    /// Largest error of the sag of modal links.
+    /// Maximum sag error of modal links.
     pub(super) fn modal_sag_error(&self) -> f64 {
         let modal = self.models.iter().filter(|model| model.modal);
         modal.map(|model| model.sag_errors.into_iter().worst()).fold(0.0, larger)
     }
 }
 
-/// How far the tube's compliance by CalculiX's rule of integration is from the exact one.
+/// Relative difference of the tube's compliance with CalculiX's integration rule from the exact
+/// one.
 fn tube_rule_error(bench: &Bench, robot: &Robot) -> Result<f64, Error> {
     let by_rule = |quadrature: Quadrature| -> Result<Matrix6<f64>, Error> {
         let tube = Meshed::read_with(bench, TUBE_MESH, UnitSystem::SI, Material::ALUMINIUM, quadrature)?;
@@ -174,18 +177,18 @@ fn tube_rule_error(bench: &Bench, robot: &Robot) -> Result<f64, Error> {
     Ok(compliance_error(&by_rule(Quadrature::Calculix)?, &by_rule(Quadrature::Exact)?))
 }
 
-/// How much of the kinetic energy of each mode the ball has, its rotation left out.
+/// Share of the ball in the kinetic energy of each mode, without its rotation.
 fn ball_shares(rig: &Rig, count: usize) -> Vec<f64> {
     const SMALL: f64 = 1e-6;
     let shift = |k: usize| {
         let e = rig.arm.modes.shapes.column(k) * SMALL;
         (place(&rig.arm, &rig.frame, &e).translation.vector - rig.X_WF.translation.vector) / SMALL
     };
-    // Shapes have unit modal mass.
+    // Mode shapes have unit modal mass.
     (0..count).map(|k| BALL_KG * shift(k).norm_squared()).collect()
 }
 
-/// How much of the strain energy of each mode is in coordinates after the six of the end of each
+/// Share of the strain energy of each mode in the coordinates after the six end coordinates of each
 /// modal link.
 fn held_shares(rig: &Rig, count: usize) -> Vec<f64> {
     let K = rig.arm.stiffness();

@@ -1,5 +1,5 @@
-//! Ringing while it turns: modal links, whose velocity terms are integrals over shapes, against
-//! chains of rigid bodies.
+//! Ringing during rotation: modal links, whose velocity terms are integrals over shapes, compared
+//! with chains of rigid bodies.
 
 use std::sync::Arc;
 
@@ -9,11 +9,11 @@ use flexarm_stepping::MotionFn;
 use crate::Error;
 use crate::bench::{farthest, in_modes, in_parts, parts, tool_path};
 
-/// Speeds of the joint (rad/s).
+/// Angular velocities of the joint (rad/s).
 const SPEEDS: [f64; 2] = [7.5, 15.0];
-/// Parts of each beam in the chain that is the truth.
+/// Number of parts of each beam in the chain that serves as truth.
 pub(super) const TRUE_PARTS: usize = 9;
-/// Step (s) and number of steps.
+/// Step size (s) and number of steps.
 pub(super) const STEP_S: f64 = 1e-3;
 pub(super) const STEPS: usize = 500;
 
@@ -25,16 +25,16 @@ pub(super) struct Model {
     pub(super) stiffening: bool,
 }
 
-/// One speed.
+/// Results at one speed.
 pub(super) struct Turn {
     pub(super) speed_rad_s: f64,
-    /// Largest deflection of the chain that is the truth (m).
+    /// Maximum deflection of the chain that serves as truth (m).
     pub(super) peak_m: f64,
-    /// Largest distance of the tip from that chain's, over the peak, one per model.
+    /// Maximum distance of the tip from that of the chain, over the peak, one per model.
     pub(super) errors: Vec<f64>,
 }
 
-/// All speeds.
+/// Results at all speeds.
 pub(super) struct Whirl {
     pub(super) models: Vec<Model>,
     pub(super) turns: Vec<Turn>,

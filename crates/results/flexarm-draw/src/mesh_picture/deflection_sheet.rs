@@ -1,4 +1,4 @@
-//! The sheets on which one sees how the link bends: six unit loads at B, and modes with A held.
+//! The sheets of link deformations: six unit loads at B, and modes with A held.
 
 use nalgebra::{Point3, Vector3, Vector6};
 use rayon::prelude::*;
@@ -14,18 +14,18 @@ use super::{MeshPictures, PictureError, interface_sheet};
 
 /// Peak displacement in the picture, as a share of the size of the body.
 const SWING: f64 = 0.08;
-/// The loads of the sheet are this many newtons or newton metres.
+/// Magnitude of the loads of the sheet (N or N m).
 const LOAD: f64 = 1e3;
 /// Colour of load symbols.
 const LOAD_COLOR: Rgb = [214, 0, 110];
-/// Panels of a sheet.
+/// Number of panels of a sheet.
 const PANELS: usize = 6;
-/// Links that are so many times as long as high on the picture have two panels in a row, others
+/// Ratio of length to height in the picture above which there are two panels in a row, otherwise
 /// three.
 const LONG: f64 = 2.6;
-/// Colour of edges on the coloured body: seen on dark and on light.
+/// Colour of edges on the coloured body, visible on dark and on light.
 const EDGE: Rgb = [225, 228, 235];
-/// What is smaller than this share of the largest displacement is called zero.
+/// Displacements below this share of the maximum are labelled zero.
 const NOISE: f64 = 1e-6;
 
 /// One panel.
@@ -33,13 +33,13 @@ struct Panel {
     title: String,
     /// The line below the title.
     remark: String,
-    /// Displacement of every node; the unit is that of `scale_names`.
+    /// Displacement of every node, in the unit of `scale_names`.
     field: Vec<Vector3<f64>>,
-    /// Names of the ends and the middle of the colour bar.
+    /// Labels of the ends and the middle of the colour bar.
     scale_names: fn(f64) -> [String; 3],
-    /// Whether the field has a size, and is not a mode.
+    /// Whether the field has a magnitude, unlike a mode.
     has_size: bool,
-    /// Drawn at B after its displacement in the picture.
+    /// Load drawn at B, at its displaced position in the picture.
     load: Option<Load>,
 }
 
@@ -190,7 +190,7 @@ impl Panel {
     }
 }
 
-/// The load at B: an arrow for a force, an arrow around its axis for a moment.
+/// Draws the load at B: an arrow for a force, an arrow around its axis for a moment.
 fn symbol(pictures: &MeshPictures<'_>, load: &Load, scale: f64) -> Vec<Mark> {
     let Some(B) = pictures.interfaces.get(1) else { return Vec::new() };
     let at = B.X_LI.translation.vector + load.u_B * scale;

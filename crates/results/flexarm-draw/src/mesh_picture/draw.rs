@@ -1,17 +1,17 @@
-//! Drawing on an image: lines, text, boxes. Edges are smooth by their share of each pixel.
+//! Drawing on an image: lines, text, boxes. Edges are antialiased by pixel coverage.
 
 use noto_sans_mono_bitmap::{FontWeight, RasterHeight, RasterizedChar, get_raster, get_raster_width};
 
 use super::image::{Image, Rgb};
 
-/// Text of any size is scaled from this raster. Below: its height over the size of the text, and
-/// its row of the base line.
+/// Raster from which text of any size is scaled. Below: its height over the text size, and the row
+/// of its baseline.
 const RASTER: RasterHeight = RasterHeight::Size32;
 const RASTER_HEIGHT: f64 = 1.2;
 const BASE: f64 = 25.0;
 
-/// Calls with every pixel that a line of round ends covers:
-/// `(x, y, place along the line from 0 to 1, share)`.
+/// Calls with every pixel that a line with round ends covers:
+/// `(x, y, position along the line from 0 to 1, coverage)`.
 pub(super) fn cover_line(
     size: [usize; 2],
     from: [f64; 2],
@@ -28,11 +28,11 @@ pub(super) fn cover_line(
     };
     let (dx, dy) = (to[0] - from[0], to[1] - from[1]);
     let length2 = dx * dx + dy * dy;
-    // Thinner than a pixel: full width, less colour.
+    // Lines thinner than a pixel: full width, less opacity.
     let strength = width.min(1.0);
     let solid = radius.max(0.5);
     for y in range(1) {
-        // Of a long line only the stretch near this row.
+        // For a long line only the stretch near this row.
         let (mut low, mut high) = (range(0).start, range(0).end);
         if dy.abs() > 1e-9 {
             let row = y as f64 + 0.5 - from[1];
@@ -53,7 +53,7 @@ pub(super) fn cover_line(
     }
 }
 
-/// Where text stands against its anchor.
+/// Alignment of text relative to its anchor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Align {
     Left,
@@ -64,11 +64,11 @@ pub(crate) enum Align {
 /// Size and colour of text.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Style {
-    /// Pixels from one line of text to the next, about.
+    /// Approximate line spacing (pixels).
     pub(crate) size: f64,
     pub(crate) color: Rgb,
     pub(crate) bold: bool,
-    /// A rim of this colour, for text on pictures.
+    /// Colour of a rim, for text on pictures.
     pub(crate) halo: Option<Rgb>,
 }
 
@@ -95,12 +95,12 @@ impl Style {
     }
 }
 
-/// Width of a line of text, pixels.
+/// Returns the width of a line of text, pixels.
 pub(crate) fn text_width(text: &str, style: Style) -> f64 {
     (text.chars().count() * get_raster_width(style.weight(), RASTER)) as f64 * style.scale()
 }
 
-/// Returns the ink at a place of a glyph, from 0 to 1, linear between the middles of pixels.
+/// Returns the coverage at a point of a glyph, from 0 to 1, interpolated between pixel centres.
 fn ink(glyph: &RasterizedChar, x: f64, y: f64) -> f64 {
     let (x, y) = (x - 0.5, y - 0.5);
     let part = |dx: f64, dy: f64| {
@@ -113,7 +113,7 @@ fn ink(glyph: &RasterizedChar, x: f64, y: f64) -> f64 {
     part(0.0, 0.0) + part(1.0, 0.0) + part(0.0, 1.0) + part(1.0, 1.0)
 }
 
-/// Text in lines of at most `width` pixels, broken at spaces.
+/// Splits text at spaces into lines of at most `width` pixels.
 pub(super) fn wrap(text: &str, width: f64, style: Style) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for word in text.split_whitespace() {
@@ -129,14 +129,14 @@ pub(super) fn wrap(text: &str, width: f64, style: Style) -> Vec<String> {
 }
 
 impl Image {
-    /// A straight line with round ends.
+    /// Draws a straight line with round ends.
     pub(crate) fn line(&mut self, from: [f64; 2], to: [f64; 2], width: f64, color: Rgb, alpha: f64) {
         cover_line([self.width, self.height], from, to, width, |x, y, _, share| {
             self.blend(x, y, color, (alpha * share) as f32);
         });
     }
 
-    /// A filled box.
+    /// Fills a box.
     pub(crate) fn fill(&mut self, left: f64, top: f64, width: f64, height: f64, color: Rgb) {
         for y in top.max(0.0) as usize..((top + height).max(0.0) as usize).min(self.height) {
             for x in left.max(0.0) as usize..((left + width).max(0.0) as usize).min(self.width) {
@@ -145,7 +145,7 @@ impl Image {
         }
     }
 
-    /// One line of text; (`x`, `y`) is on its base line.
+    /// Draws one line of text; (`x`, `y`) is on its baseline.
     pub(crate) fn text(&mut self, text: &str, [x, y]: [f64; 2], align: Align, style: Style) {
         let start = match align {
             Align::Left => x,
@@ -161,7 +161,7 @@ impl Image {
         self.each_inked(text, [start, y], style, |image, [x, y], ink| image.blend(x, y, style.color, ink as f32));
     }
 
-    /// Calls with each pixel that text covers, and how much of it.
+    /// Calls with each pixel that text covers, and its coverage.
     fn each_inked(
         &mut self,
         text: &str,
@@ -188,7 +188,7 @@ impl Image {
         }
     }
 
-    /// An arrow on the picture: a line with a head of two strokes.
+    /// Draws an arrow on the picture: a line with a head of two lines.
     pub(crate) fn arrow(&mut self, from: [f64; 2], to: [f64; 2], width: f64, color: Rgb) {
         self.line(from, to, width, color, 1.0);
         let (dx, dy) = (to[0] - from[0], to[1] - from[1]);

@@ -1,4 +1,4 @@
-//! An image in memory and its way into a PNG file.
+//! An image in memory, and its encoding as PNG.
 
 /// Red, green, blue.
 pub use crate::palette::Rgb;
@@ -6,27 +6,27 @@ pub use crate::palette::Rgb;
 /// Pixels of a picture, four bytes each, row by row from the top left.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Image {
-    /// Pixels in a row.
+    /// Width in pixels.
     pub width: usize,
-    /// Rows.
+    /// Height in pixels.
     pub height: usize,
     /// Red, green, blue, alpha; `4 * width * height` bytes.
     pub rgba: Vec<u8>,
 }
 
 impl Image {
-    /// An image of one colour.
+    /// Creates an image of one colour.
     pub fn new(width: usize, height: usize, color: Rgb) -> Self {
         let [r, g, b] = color;
         Self { width, height, rgba: [r, g, b, 255].repeat(width * height) }
     }
 
-    /// An image with nothing on it: it is seen through.
+    /// Creates a fully transparent image.
     pub fn see_through(width: usize, height: usize) -> Self {
         Self { width, height, rgba: vec![0; 4 * width * height] }
     }
 
-    /// Colour of a pixel; black outside.
+    /// Returns the colour of a pixel; black outside.
     pub fn pixel(&self, x: usize, y: usize) -> Rgb {
         let at = 4 * (y * self.width + x);
         match self.rgba.get(at..at + 3) {
@@ -35,7 +35,7 @@ impl Image {
         }
     }
 
-    /// Lays `color` over a pixel; `alpha` 1 covers it. Outside nothing happens.
+    /// Blends `color` over a pixel; `alpha` 1 covers it. No effect outside.
     pub fn blend(&mut self, x: usize, y: usize, color: Rgb, alpha: f32) {
         if x >= self.width || y >= self.height {
             return;
@@ -51,7 +51,7 @@ impl Image {
         }
     }
 
-    /// Copies `other` with its top left corner at (`left`, `top`); what does not fit is left out.
+    /// Copies `other` with its top left corner at (`left`, `top`), clipped to this image.
     pub fn paste(&mut self, other: &Self, left: usize, top: usize) {
         let columns = other.width.min(self.width.saturating_sub(left));
         for y in 0..other.height.min(self.height.saturating_sub(top)) {
@@ -61,15 +61,16 @@ impl Image {
         }
     }
 
-    /// The image as a PNG file, without date or program name: same image, same bytes.
+    /// Encodes the image as a PNG file without date or program name: the same image gives the same
+    /// bytes.
     ///
     /// # Errors
-    /// An image without pixels, or of more than a PNG can hold.
+    /// If the image has no pixels, or more than a PNG can hold.
     pub fn to_png(&self) -> Result<Vec<u8>, String> {
         self.png(png::Compression::Balanced)
     }
 
-    /// The same with a quick compression, which takes more bytes.
+    /// The same with faster compression, which takes more bytes.
     pub(crate) fn to_png_quickly(&self) -> Result<Vec<u8>, String> {
         self.png(png::Compression::Fast)
     }

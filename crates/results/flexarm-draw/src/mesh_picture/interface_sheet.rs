@@ -1,4 +1,4 @@
-//! The sheet on which one sees what was tied and where the link is cut.
+//! The sheet of tied nodes and of the cut of the link.
 
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -17,7 +17,7 @@ use super::surface::Tied;
 use super::topology::feature_edges;
 use super::view::{LinkAxes, View, side_name};
 
-/// Most spokes drawn between a frame and its nodes.
+/// Maximum number of spokes drawn between a frame and its nodes.
 const SPOKES: usize = 40;
 /// Length of the axes of a frame, as a share of the size of the body.
 const TRIAD: f64 = 0.065;
@@ -32,7 +32,7 @@ pub(super) fn draw(pictures: &MeshPictures<'_>) -> Image {
 
     let axes = &pictures.axes;
     let first = best_side(axes, &tied);
-    // From opposite sides every flat face is seen once.
+    // From two opposite sides, every flat face is visible once.
     let sides = [(first, "seen from"), (-first, "the other side, from"), (-axes.across, "edge on, from")];
     let content = Content::new(pictures, &tied);
     let (width, height) = (WIDTH - LEGEND, (HEIGHT - HEAD) / sides.len());
@@ -52,7 +52,7 @@ pub(super) fn draw(pictures: &MeshPictures<'_>) -> Image {
     sheet
 }
 
-/// The tilted direction from which most of all tied faces is seen.
+/// Returns the tilted direction from which the largest area of tied faces is visible.
 pub(super) fn best_side(axes: &LinkAxes, tied: &[Tied]) -> Vector3<f64> {
     let (turn, tilt) = (28_f64.to_radians(), 26_f64.to_radians());
     let half = std::f64::consts::PI;
@@ -68,7 +68,7 @@ pub(super) fn best_side(axes: &LinkAxes, tied: &[Tied]) -> Vector3<f64> {
         (half + turn, -tilt),
     ] {
         let toward = axes.viewpoint(turn, tilt);
-        // The second interface counts a little more: it is the one that moves.
+        // The second interface has a slightly larger weight, since it is the one that moves.
         let seen =
             |(number, tied): (usize, &Tied)| (if number == 1 { 1.1 } else { 1.0 }) * tied.normal.dot(&toward).max(0.0);
         let seen: f64 = tied.iter().enumerate().map(seen).sum();
@@ -79,7 +79,7 @@ pub(super) fn best_side(axes: &LinkAxes, tied: &[Tied]) -> Vector3<f64> {
     best.1
 }
 
-/// What all views show.
+/// Content shared by all views.
 struct Content {
     colors: Vec<[Rgb; 2]>,
     /// Whether a triangle is tied.
@@ -121,7 +121,7 @@ impl Content {
             marks.push(line(from, to, 2.4, color::CUT, [1.0, 0.10]));
         }
         for (number, (interface, tied)) in pictures.interfaces.iter().zip(tied).enumerate() {
-            // Their rim also from the edge and from behind.
+            // Their rim is also visible from the edge and from behind.
             let of_faces = surface.triangles.iter().zip(&tied.triangles).filter(|(_, tied)| **tied);
             let rim = feature_edges(&surface.positions, &of_faces.map(|(t, _)| *t).collect::<Vec<_>>());
             marks.extend(sheet::edges(&surface.positions, &rim, 3.4, color::interface(number), [1.0, 0.22]));
@@ -173,7 +173,7 @@ impl Content {
                 let tip = interface.X_LI * nalgebra::Point3::from(Vector3::ith(k, 1.22 * length));
                 let [x, y, _] = view.project(&tip.coords);
                 let style = Style::new(13.0, color::axis(k)).bold().halo(color::PAPER);
-                // An axis that points to the viewer has no room for its letter.
+                // An axis that points at the viewer has no space for its letter.
                 let [x0, y0, _] = view.project(&interface.X_LI.translation.vector);
                 if (x - x0).hypot(y - y0) > 14.0 {
                     image.text(name, [x, y + 5.0], Align::Middle, style);
@@ -191,7 +191,7 @@ impl Content {
         image
     }
 
-    /// Edges of the elements, fainter the closer they lie.
+    /// Returns the edges of the elements, fainter for finer meshes.
     fn grid(&self, pictures: &MeshPictures<'_>, view: &View) -> Vec<Mark> {
         let surface = &pictures.surface;
         let length = |[a, b]: &[u32; 2]| (surface.positions[*a as usize] - surface.positions[*b as usize]).norm();
@@ -203,11 +203,11 @@ impl Content {
         sheet::edges(&surface.positions, &surface.grid, 0.7, color::INK, [alpha, 0.0]).collect()
     }
 
-    /// Tied nodes.
+    /// Returns the tied nodes.
     fn dots(&self, pictures: &MeshPictures<'_>, view: &View) -> Vec<Mark> {
         let mut marks = Vec::new();
         for (number, (interface, spacing)) in pictures.interfaces.iter().zip(&self.spacing).enumerate() {
-            // Without a tied face the nodes are all there is to see.
+            // Without a tied face, show only the nodes.
             if *spacing == f64::MAX {
                 let at = interface.nodes.iter().map(|node| pictures.mesh.nodes[*node as usize]);
                 let color = color::interface(number);
@@ -226,7 +226,7 @@ impl Content {
     }
 }
 
-/// Where the surface meets the cut plane.
+/// Returns the intersection of the surface with the cut plane.
 fn section(positions: &[Vector3<f64>], triangles: &[[u32; 3]], side: &[f64]) -> Vec<[Vector3<f64>; 2]> {
     let cut = |triangle: &[u32; 3]| {
         let mut ends = Vec::new();
@@ -242,7 +242,7 @@ fn section(positions: &[Vector3<f64>], triangles: &[[u32; 3]], side: &[f64]) -> 
     triangles.iter().filter_map(cut).collect()
 }
 
-/// A rectangle in the cut plane, a little larger than the section.
+/// Returns a rectangle in the cut plane, slightly larger than the section.
 fn glass(
     section: &[[Vector3<f64>; 2]],
     p_LS: &Vector3<f64>,
@@ -250,7 +250,7 @@ fn glass(
     axes: &LinkAxes,
     size: f64,
 ) -> Vec<Vector3<f64>> {
-    // Across the link, unless AB itself runs there.
+    // Across the link, unless AB has that direction.
     let level = |axis: Vector3<f64>| (axis - normal * normal.dot(&axis)).try_normalize(0.1);
     let side = level(axes.across).or_else(|| level(axes.along)).unwrap_or(axes.out);
     let other = normal.cross(&side);
@@ -267,7 +267,7 @@ fn glass(
     [(a, c), (b, c), (b, d), (a, d)].map(|(u, v)| p_LS + side * u + other * v).to_vec()
 }
 
-/// Some of the tied nodes, evenly around the frame.
+/// Selects some of the tied nodes, evenly around the frame.
 fn spokes(pictures: &MeshPictures<'_>, interface: &Interface, tied: &Tied) -> Vec<Vector3<f64>> {
     let origin = interface.X_LI.translation.vector;
     let axis = tied.normal.try_normalize(0.3).unwrap_or(pictures.axes.along);
@@ -286,7 +286,7 @@ fn spokes(pictures: &MeshPictures<'_>, interface: &Interface, tied: &Tied) -> Ve
     around.iter().step_by(step).map(|(_, node)| pictures.mesh.nodes[*node as usize]).collect()
 }
 
-/// A tie between frame and node: a line if rigid, dashes if distributing.
+/// Draws a tie between frame and node: a line if rigid, dashes if distributing.
 fn spoke(marks: &mut Vec<Mark>, from: Vector3<f64>, to: Vector3<f64>, tie: Tie, color: Rgb, size: f64) {
     let color = color::mix(color, color::INK, 0.40);
     let mut line = |from, to| marks.push(Mark::Line { from, to, width: 1.0, color, alpha: [0.65, 0.14] });
@@ -298,7 +298,7 @@ fn spoke(marks: &mut Vec<Mark>, from: Vector3<f64>, to: Vector3<f64>, tie: Tie, 
     (0..dashes).for_each(|k| line(at(k, 0.0), at(k, 0.5)));
 }
 
-/// Axes of a frame.
+/// Returns the axes of a frame.
 fn triad(X: &flexarm_fem::Pose, length: f64) -> Vec<Mark> {
     let origin = X.translation.vector;
     let axis = |k: usize| {
@@ -310,7 +310,7 @@ fn triad(X: &flexarm_fem::Pose, length: f64) -> Vec<Mark> {
     marks
 }
 
-/// A length of round size to measure by.
+/// Draws a scale bar of round length.
 fn ruler(image: &mut Image, view: &View) {
     let length = numbers::round_below(180.0 / view.scale);
     let (right, y) = (image.width as f64 - 24.0, image.height as f64 - 16.0);

@@ -1,4 +1,4 @@
-//! The words beside the views: what is tied how, where the cut is, what the parts weigh.
+//! The text next to the views: ties, position of the cut, masses of the parts.
 
 use flexarm_fem::reduction::Tie;
 
@@ -14,7 +14,7 @@ use super::view::side_name;
 /// Width of the legend, pixels.
 pub(super) const LEGEND: usize = 392;
 
-/// Writes line after line.
+/// Writes successive lines.
 struct Column<'a> {
     sheet: &'a mut Image,
     left: f64,
@@ -24,7 +24,7 @@ struct Column<'a> {
 impl Column<'_> {
     fn line(&mut self, text: &str, style: Style) {
         for line in wrap(text, WIDTH as f64 - self.left - 12.0, style) {
-            // A legend that is too long ends; it never runs off the sheet.
+            // A legend that is too long is truncated at the end of the sheet.
             if self.y > HEIGHT as f64 - 10.0 {
                 return;
             }
@@ -42,7 +42,7 @@ impl Column<'_> {
     }
 }
 
-/// Writes the legend down the right side of the sheet.
+/// Writes the legend on the right side of the sheet.
 pub(super) fn draw(sheet: &mut Image, pictures: &MeshPictures<'_>, tied: &[Tied]) {
     let (plain, faint, alert) =
         (Style::new(15.0, color::INK), Style::new(15.0, color::FAINT), Style::new(15.0, color::ALERT).bold());
@@ -101,7 +101,7 @@ pub(super) fn draw(sheet: &mut Image, pictures: &MeshPictures<'_>, tied: &[Tied]
     }
 }
 
-/// Flat or curved, and where it looks.
+/// Describes a tied face as flat or curved, and its direction.
 fn shape(tied: &Tied) -> String {
     if tied.normal.norm() > 0.999 {
         return format!("flat, facing {}", side_name(&tied.normal));

@@ -1,15 +1,16 @@
-//! Pictures of a mesh reduction: what was tied, where it is cut, how it bends.
+//! Pictures of a mesh reduction: tied faces, position of the cut, deformations.
 //!
 //! ```text
 //! interfaces.png   the body from three sides, tied faces in the colour of their interface, frames, cut plane
 //! unit_loads.png   deflection under 1 kN and 1 kN m at B in six panels, A held
 //! modes.png        the first six modes with A held, with the frequencies of the reduced models
 //! ```
-//! A reduction can be right in every number and still be that of the wrong faces; a person sees it
-//! at a glance. Start at [`write_pictures`]; [`MeshPictures`] gives the same as images in memory.
+//! A reduction can have consistent numbers and still use the wrong faces; a picture shows that at a
+//! glance. Start at [`write_pictures`]; [`MeshPictures`] gives the same as images in memory.
 //!
-//! Layers: [`scene`] draws triangles and knows no finite elements, the sheets turn a mesh and its
-//! reduction into scenes. The same input gives the same bytes. Nothing here needs a graphics card.
+//! Layers: [`scene`] draws triangles and has no concept of finite elements, the sheets convert a
+//! mesh and its reduction into scenes. The same input gives the same bytes. No graphics card is
+//! needed.
 //!
 //! Not here: the reduction itself ([`flexarm_fem::mesh_link`]), recordings of runs.
 
@@ -41,32 +42,32 @@ pub use view::View;
 use surface::Surface;
 use view::LinkAxes;
 
-/// Why there are no pictures.
+/// Reason why there are no pictures.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PictureError {
-    /// Nothing to draw.
+    /// A mesh without elements.
     #[error("the mesh has no elements, so there is nothing to draw")]
     EmptyMesh,
     /// No modes were computed.
     #[error("the reduction has no modes with A held; ask for at least one (judged_modes)")]
     NoModes,
-    /// Mesh and reduction do not belong together.
+    /// Mesh and reduction do not match.
     #[error("{what}: found {found}, the mesh needs {expected}; is this the reduction of another mesh?")]
     Mismatch {
-        /// What does not fit.
+        /// Mismatched quantity.
         what: String,
         /// Its size.
         found: usize,
-        /// The size that the mesh asks for.
+        /// Size required by the mesh.
         expected: usize,
     },
-    /// A position or displacement that is no number.
+    /// A position or displacement that is not finite.
     #[error("{what} of node index {node} is not finite")]
     NotFinite {
-        /// What it is.
+        /// Name of the quantity.
         what: &'static str,
-        /// Of which node.
+        /// Index of the node.
         node: usize,
     },
     /// The image does not fit into its file format.
@@ -74,17 +75,17 @@ pub enum PictureError {
     Encode {
         /// The file.
         path: PathBuf,
-        /// What the encoder said.
+        /// Error of the encoder.
         cause: String,
     },
-    /// The operating system refused.
+    /// An error of the operating system.
     #[error("{}: cannot {action}", path.display())]
     Io {
         /// The file or folder.
         path: PathBuf,
-        /// What was attempted.
+        /// Attempted action.
         action: &'static str,
-        /// Why it failed.
+        /// Cause.
         #[source]
         source: std::io::Error,
     },
@@ -102,7 +103,7 @@ pub struct MeshPictures<'a> {
 }
 
 impl<'a> MeshPictures<'a> {
-    /// Checks that the three belong together and finds the skin.
+    /// Checks that mesh, interfaces and reduction match, and extracts the skin.
     ///
     /// * `interfaces`: those of the reduction, proximal first.
     ///
@@ -149,17 +150,17 @@ impl<'a> MeshPictures<'a> {
         Ok(Self { mesh, interfaces, reduction, dofs, surface, axes })
     }
 
-    /// The sheet of interfaces and cut.
+    /// Renders the sheet of interfaces and cut.
     pub fn render_interfaces(&self) -> Image {
         interface_sheet::draw(self)
     }
 
-    /// The sheet of unit loads at B.
+    /// Renders the sheet of unit loads at B.
     pub fn render_unit_loads(&self) -> Image {
         deflection_sheet::unit_loads(self)
     }
 
-    /// The sheet of modes with A held.
+    /// Renders the sheet of modes with A held.
     ///
     /// # Errors
     /// [`PictureError::NoModes`].
@@ -167,7 +168,7 @@ impl<'a> MeshPictures<'a> {
         deflection_sheet::modes(self)
     }
 
-    /// A column of displacements as one vector per node; zero where a node has no element.
+    /// Converts a column of displacements to one vector per node; zero for nodes without elements.
     fn field(&self, columns: &DMatrix<f64>, column: usize) -> Vec<Vector3<f64>> {
         let at = |node: usize| {
             let dofs = self.dofs.of(node);
@@ -176,24 +177,24 @@ impl<'a> MeshPictures<'a> {
         (0..self.dofs.nodes()).map(at).collect()
     }
 
-    /// Largest displacement on the surface.
+    /// Maximum displacement on the surface.
     fn peak(&self, field: &[Vector3<f64>]) -> f64 {
         self.surface.nodes.iter().map(|node| field[*node as usize].norm()).fold(0.0, f64::max)
     }
 }
 
-/// Draws a reduction into `dir`: `interfaces.png`, `unit_loads.png`, and `modes.png` if it has
+/// Draws a reduction into `dir`: `interfaces.png`, `unit_loads.png`, and `modes.png` if there are
 /// modes.
 ///
-/// Makes the folder; files of these names are replaced. Takes well under a second per sheet for a
-/// skin of twenty thousand faces, in an optimised build.
+/// Creates the folder; existing files of these names are replaced. Takes well under a second per
+/// sheet for a skin of twenty thousand faces, in an optimised build.
 ///
 /// * `interfaces`: those of the reduction, proximal first.
 ///
 /// Returns the files written.
 ///
 /// # Errors
-/// [`PictureError`]; sheets before the one that failed stay.
+/// [`PictureError`]; sheets written before the failure are kept.
 pub fn write_pictures(
     dir: &Path,
     mesh: &Mesh,

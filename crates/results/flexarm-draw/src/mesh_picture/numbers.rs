@@ -1,8 +1,8 @@
-//! Numbers as people read them, units included.
+//! Readable numbers with units.
 
 use nalgebra::Vector3;
 
-/// A number with `digits` significant digits, without exponent.
+/// Formats a number with `digits` significant digits, without exponent.
 pub(super) fn significant(value: f64, digits: i32) -> String {
     if value == 0.0 || !value.is_finite() {
         return format!("{value}");
@@ -11,7 +11,7 @@ pub(super) fn significant(value: f64, digits: i32) -> String {
     format!("{value:.decimals$}")
 }
 
-/// Unit in which a length reads well, and its size in m.
+/// Returns a readable unit of a length, and its size in m.
 fn length_unit(size: f64) -> (&'static str, f64) {
     match size.abs() {
         x if x >= 10.0 => ("m", 1.0),
@@ -21,13 +21,14 @@ fn length_unit(size: f64) -> (&'static str, f64) {
     }
 }
 
-/// A displacement, m, in the unit that suits it.
+/// Formats a displacement, m, in a suitable unit.
 pub(super) fn displacement(value: f64) -> String {
     let (unit, size) = length_unit(value);
     format!("{} {unit}", significant(value / size, 3))
 }
 
-/// A displacement vector, m, in the unit of its largest component; zero if that is below `noise`.
+/// Formats a displacement vector, m, in the unit of its largest component; zero if that is below
+/// `noise`.
 pub(super) fn displacements(u: &Vector3<f64>, noise: f64) -> String {
     if u.amax() <= noise {
         return "0".into();
@@ -36,7 +37,7 @@ pub(super) fn displacements(u: &Vector3<f64>, noise: f64) -> String {
     format!("{} {unit}", triple(&(u / size), u.amax() / size))
 }
 
-/// A small rotation, rad, in mrad or µrad; zero if it is below `noise`.
+/// Formats a small rotation, rad, in mrad or µrad; zero if it is below `noise`.
 pub(super) fn rotations(theta: &Vector3<f64>, noise: f64) -> String {
     if theta.amax() <= noise {
         return "0".into();
@@ -45,34 +46,34 @@ pub(super) fn rotations(theta: &Vector3<f64>, noise: f64) -> String {
     format!("{} {unit}", triple(&(theta / size), theta.amax() / size))
 }
 
-/// Three numbers with as many decimals as the largest deserves.
+/// Formats three numbers with the number of decimals suited to the largest.
 fn triple(v: &Vector3<f64>, largest: f64) -> String {
     let decimals = if largest > 0.0 { (2 - largest.log10().floor() as i32).clamp(0, 6) as usize } else { 0 };
     let [x, y, z] = [v.x, v.y, v.z].map(|x| {
         let text = format!("{x:.decimals$}");
-        // What rounds to nothing has no sign.
+        // Print values that round to zero without a sign.
         if text.bytes().all(|b| matches!(b, b'-' | b'0' | b'.')) { text.replace('-', "") } else { text }
     });
     format!("({x}, {y}, {z})")
 }
 
-/// A position, m, in mm.
+/// Formats a position, m, in mm.
 pub(super) fn position(p: &Vector3<f64>) -> String {
     let [x, y, z] = [p.x, p.y, p.z].map(|x| (x * 1e4).round() / 10.0 + 0.0);
     format!("({x}, {y}, {z}) mm")
 }
 
-/// A distance, m, to 0.1 mm.
+/// Formats a distance, m, to 0.1 mm.
 pub(super) fn offset(value: f64) -> String {
     format!("{:.1} mm", value * 1e3)
 }
 
-/// An area, m², in cm².
+/// Formats an area, m², in cm².
 pub(super) fn area(value: f64) -> String {
     format!("{} cm²", significant(value * 1e4, 3))
 }
 
-/// The longest of 1, 2, 5, 10, ... that is not longer than `limit`.
+/// Returns the largest of 1, 2, 5, 10, ... that does not exceed `limit`.
 pub(super) fn round_below(limit: f64) -> f64 {
     let decade = 10_f64.powi(limit.log10().floor() as i32);
     [5.0, 2.0, 1.0].into_iter().map(|k| k * decade).find(|x| *x <= limit * (1.0 + 1e-12)).unwrap_or(decade)

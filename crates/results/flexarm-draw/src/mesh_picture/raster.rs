@@ -1,12 +1,14 @@
-//! Which samples of a picture a triangle covers.
+//! Rasterisation of triangles.
 
-/// A sample belongs to a triangle if none of its weights is below minus this.
+/// Tolerance of the weights: a sample belongs to a triangle if none of its weights is below minus
+/// this.
 const EDGE: f64 = 1e-9;
 
-/// Calls with each sample that a triangle covers: column, row and the weights of the corners. A
-/// weight is 1 at its own corner and 0 on the side across. A triangle without area covers nothing.
+/// Calls with each sample that a triangle covers: column, row and the barycentric weights of the
+/// corners. A weight is 1 at its own corner and 0 on the opposite side. A triangle without area
+/// covers nothing.
 ///
-/// * `corners`: column and row in samples, and a depth, which is not used. The middle of the first
+/// * `corners`: column and row in samples, and a depth, which is not used. The centre of the first
 ///   sample is at (0.5, 0.5).
 /// * `size`: columns and rows of the picture.
 pub(super) fn cover([a, b, c]: [[f64; 3]; 3], size: [usize; 2], mut call: impl FnMut(usize, usize, [f64; 3])) {
@@ -28,7 +30,7 @@ pub(super) fn cover([a, b, c]: [[f64; 3]; 3], size: [usize; 2], mut call: impl F
     };
     for row in middles(a[1].min(b[1]).min(c[1]), a[1].max(b[1]).max(c[1]), size[1]) {
         let y = row as f64 + 0.5;
-        // Each side bounds the columns of the row on its left or on its right.
+        // Each side bounds the columns of the row on the left or on the right.
         let (mut low, mut high) = (0.0_f64, size[0] as f64);
         for (weight, slope) in weights_at(0.0, y).into_iter().zip(per_column) {
             let bound = (-EDGE - weight) / slope;
@@ -50,8 +52,8 @@ pub(super) fn cover([a, b, c]: [[f64; 3]; 3], size: [usize; 2], mut call: impl F
 mod tests {
     use super::*;
 
-    /// Truth: the weighted corners are the sample; by the theorem of Pick a triangle of area 6 with
-    /// 8 samples on its sides has 3 inside.
+    /// Truth: the weighted corners give the sample; by Pick's theorem a triangle of area 6 with 8
+    /// samples on its sides has 3 inside.
     #[test]
     fn a_triangle_covers_the_samples_inside_and_on_its_sides_wherever_it_lies() {
         let size = [8, 6];

@@ -1,7 +1,7 @@
-//! A software renderer: triangles and marks in, an image out.
+//! A software renderer: draws triangles and marks into an image.
 //!
-//! Parallel projection, depth buffer, soft light from the upper left, four samples per pixel.
-//! Start at [`render`]. Not here: what the triangles are.
+//! Parallel projection, depth buffer, soft light from the upper left, four samples per pixel. Start
+//! at [`render`]. Not here: the meaning of the triangles.
 
 use nalgebra::Vector3;
 
@@ -14,36 +14,36 @@ use super::view::View;
 
 /// Samples per pixel in each direction.
 const FINE: usize = 2;
-/// A step in depth that gets an outline, as a share of the size of the scene.
+/// Depth step that gets an outline, as a share of the size of the scene.
 const OUTLINE: f64 = 0.02;
-/// How much ink an outline has.
+/// Opacity of an outline.
 const OUTLINE_INK: f64 = 0.65;
-/// What lies on the surface is lifted towards the viewer by this share of the size of the scene.
+/// Offset of marks on the surface towards the viewer, as a share of the size of the scene.
 const LIFT: f64 = 0.004;
 
-/// How the triangles are coloured.
+/// Colouring of the triangles.
 #[derive(Debug, Clone, Copy)]
 pub enum Paint<'a> {
-    /// Each triangle in a colour of its own, and another one where the value `side` of its points
-    /// is positive.
+    /// A colour for each triangle, and another one where the value `side` of its points is
+    /// positive.
     Faces {
         /// Colours of each triangle, for negative and for positive `side`.
         colors: &'a [[Rgb; 2]],
-        /// Triangles that are to be seen by their colour and take little shade.
+        /// Triangles that should be recognised by their colour and get little shading.
         bright: &'a [bool],
         /// One number per position.
         side: &'a [f64],
     },
-    /// By a number at each position over `peak`, in the scale of [`color::magnitude`].
+    /// Colour by a value at each position over `peak`, in the scale of [`color::magnitude`].
     Magnitude {
         /// One number per position.
         values: &'a [f64],
-        /// The number at the upper end of the scale.
+        /// Value at the upper end of the scale.
         peak: f64,
     },
 }
 
-/// What is drawn onto or around the triangles, in the order given.
+/// A mark on or around the triangles; marks are drawn in the given order.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Mark {
     /// A straight line.
@@ -52,45 +52,45 @@ pub enum Mark {
         from: Vector3<f64>,
         /// The other end.
         to: Vector3<f64>,
-        /// Pixels.
+        /// Width, pixels.
         width: f64,
         /// Colour.
         color: Rgb,
-        /// How much it covers where it is in front, and where it is behind the body; 0 to 1.
+        /// Opacity in front of and behind the body; 0 to 1.
         alpha: [f64; 2],
     },
     /// A disc that faces the viewer.
     Dot {
-        /// Its centre, m.
+        /// Centre, m.
         at: Vector3<f64>,
-        /// Pixels.
+        /// Diameter, pixels.
         diameter: f64,
         /// Colour.
         color: Rgb,
-        /// As for lines.
+        /// Opacity, as for lines.
         alpha: [f64; 2],
     },
     /// A flat convex polygon.
     Polygon {
-        /// Its corners in order, m.
+        /// Corners in order, m.
         corners: Vec<Vector3<f64>>,
         /// Colour.
         color: Rgb,
-        /// As for lines.
+        /// Opacity, as for lines.
         alpha: [f64; 2],
     },
 }
 
-/// What there is to see.
+/// Content of a picture.
 #[derive(Debug, Clone, Copy)]
 pub struct Scene<'a> {
     /// Positions, m, finite.
     pub positions: &'a [Vector3<f64>],
     /// Triangles, counter-clockwise from outside.
     pub triangles: &'a [[u32; 3]],
-    /// Colours of the triangles.
+    /// Colouring of the triangles.
     pub paint: Paint<'a>,
-    /// Everything else.
+    /// Marks.
     pub marks: &'a [Mark],
 }
 
@@ -103,23 +103,23 @@ pub fn render(scene: &Scene<'_>, view: &View, width: usize, height: usize) -> Im
     canvas.image()
 }
 
-/// The triangles of a scene as they cover what is under them: drawn once, laid over any ground.
+/// The triangles of a scene with their coverage: drawn once, blended over any background.
 pub struct Layer {
     width: usize,
     pixels: Vec<Cover>,
 }
 
-/// What covers a pixel.
+/// Coverage of a pixel.
 struct Cover {
-    /// Mean of the samples that are covered.
+    /// Mean colour of the covered samples.
     color: Rgb,
-    /// Share of the samples that are covered, and of those that the outline runs over.
+    /// Share of the covered samples, and of those on the outline.
     share: f32,
     outline: f32,
 }
 
 impl Layer {
-    /// Draws the triangles; marks are left out.
+    /// Draws the triangles without marks.
     pub fn new(scene: &Scene<'_>, view: &View, width: usize, height: usize) -> Self {
         let canvas = Canvas::new(scene, view, [width, height]);
         let cover = |pixel: usize| {
@@ -140,13 +140,13 @@ impl Layer {
         covered.map(|(k, cover)| (k % self.width, k / self.width, cover))
     }
 
-    /// Lays it over an image of its size. At an opacity of 1 that is what [`render`] draws without
-    /// marks, on any ground.
+    /// Blends it over an image of the same size. With an opacity of 1 this equals [`render`]
+    /// without marks, on any background.
     pub fn lay_over(&self, image: &mut Image, opacity: f32) {
         self.pixels().for_each(|(x, y, cover)| image.blend(x, y, cover.color, opacity * cover.share));
     }
 
-    /// Pixels that the outline of the triangles covers, and how much of them.
+    /// Returns the pixels that the outline of the triangles covers, and their coverage.
     pub fn outline(&self) -> impl Iterator<Item = (usize, usize, f32)> {
         self.pixels().map(|(x, y, cover)| (x, y, cover.outline)).filter(|(.., share)| *share > 0.0)
     }
@@ -158,9 +158,9 @@ struct Canvas {
     width: usize,
     height: usize,
     colors: Vec<Rgb>,
-    /// Nearness to the viewer, samples; [`NOTHING`] where there is nothing.
+    /// Depth towards the viewer, samples; [`NOTHING`] where there is nothing.
     depths: Vec<f32>,
-    /// Samples over which the outline of the body and of its limbs runs.
+    /// Samples on the outline of the body and of its limbs.
     outline: Vec<bool>,
     /// Size of the scene, samples.
     size: f64,
@@ -191,7 +191,7 @@ impl Canvas {
         canvas
     }
 
-    /// Of two triangles that are equally near the first counts.
+    /// Of two triangles at equal depth the first is kept.
     fn triangle(&mut self, scene: &Scene<'_>, number: usize, normals: &[Vector3<f64>; 3]) {
         let View { right, up, toward, .. } = self.view;
         let vertices = scene.triangles[number].map(|v| v as usize);
@@ -217,8 +217,8 @@ impl Canvas {
         });
     }
 
-    /// The outline runs where it goes down a long way behind a sample one or two samples on in any
-    /// direction.
+    /// Draws the outline: samples where the depth drops by a large step one or two samples away in
+    /// any direction.
     fn draw_outline(&mut self) {
         let step = (OUTLINE * self.size) as f32;
         for (x, y) in (0..self.height).flat_map(|y| (0..self.width).map(move |x| (x, y))) {
@@ -246,7 +246,7 @@ impl Canvas {
             Mark::Line { from, to, width, color, alpha } => self.line(from, to, width * fine, *color, *alpha),
             Mark::Dot { at, diameter, color, alpha } => {
                 let [x, y, depth] = self.view.project(at);
-                // Hidden or not as a whole, by what lies at its centre.
+                // Visibility of the whole dot is decided at its centre.
                 let front = !(x >= 0.0 && y >= 0.0 && x < self.width as f64 && y < self.height as f64)
                     || self.in_front(y as usize * self.width + x as usize, depth);
                 let alpha = alpha[usize::from(!front)];
@@ -288,14 +288,14 @@ impl Canvas {
         (depth + LIFT * self.size) as f32 >= self.depths[at]
     }
 
-    /// Places of the samples of a pixel.
+    /// Returns the indices of the samples of a pixel.
     fn samples_of(&self, pixel: usize) -> [usize; FINE * FINE] {
         let width = self.width / FINE;
         let (x, y) = (FINE * (pixel % width), FINE * (pixel / width));
         std::array::from_fn(|k| (y + k / FINE) * self.width + x + k % FINE)
     }
 
-    /// Mean of the samples of each pixel.
+    /// Averages the samples of each pixel.
     fn image(&self) -> Image {
         let mut image = Image::new(self.width / FINE, self.height / FINE, color::PAPER);
         for pixel in 0..image.width * image.height {
@@ -306,22 +306,22 @@ impl Canvas {
     }
 }
 
-/// Black for no colours.
+/// Mean colour; black for no colours.
 fn mean(colors: impl Iterator<Item = Rgb> + Clone) -> Rgb {
     let count = colors.clone().count().max(1);
     [0, 1, 2].map(|c| (colors.clone().map(|color| usize::from(color[c])).sum::<usize>() / count) as u8)
 }
 
-/// Light on a wall by its normal in axes of the picture: a key light from the upper left, one from
-/// the viewer.
+/// Brightness of a face by its normal in axes of the picture: a key light from the upper left, one
+/// from the viewer.
 fn brightness(right: f64, up: f64, toward: f64) -> f64 {
-    // A wall seen from behind is lit like one seen from the front.
+    // A face seen from behind is lit like one seen from the front.
     let sign = if toward < 0.0 { -1.0 } else { 1.0 };
     let key = (sign * (-0.40 * right + 0.58 * up + 0.71 * toward)).max(0.0);
     0.62 + 0.34 * key + 0.12 * toward.abs()
 }
 
-/// A colour under light; more than full light whitens.
+/// Applies light to a colour; more than full light whitens.
 fn lit(color: Rgb, light: f64) -> Rgb {
     if light <= 1.0 { color::mix([0; 3], color, light) } else { color::mix(color, [255; 3], light - 1.0) }
 }

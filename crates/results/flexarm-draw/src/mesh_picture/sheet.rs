@@ -1,4 +1,4 @@
-//! What the sheets have in common: their size, compass, colour bar and labels.
+//! Elements shared by the sheets: size, compass, colour bar and labels.
 
 use nalgebra::Vector3;
 
@@ -8,14 +8,14 @@ use super::image::{Image, Rgb};
 use super::scene::Mark;
 use super::view::View;
 
-/// Size of a sheet, pixels.
+/// Width of a sheet, pixels.
 pub(super) const WIDTH: usize = 1600;
 /// Height of a sheet, pixels.
 pub(super) const HEIGHT: usize = 900;
-/// Height of the heading.
+/// Height of the heading, pixels.
 pub(super) const HEAD: usize = 54;
 
-/// An empty sheet with its heading.
+/// Creates an empty sheet with its heading.
 pub(super) fn sheet(title: &str, remark: &str) -> Image {
     let mut sheet = Image::new(WIDTH, HEIGHT, color::PAPER);
     let bold = Style::new(24.0, color::INK).bold();
@@ -25,11 +25,11 @@ pub(super) fn sheet(title: &str, remark: &str) -> Image {
     sheet
 }
 
-/// Axes of the link frame in the lower left corner.
+/// Draws the axes of the link frame in the lower left corner.
 pub(super) fn compass(image: &mut Image, view: &View) {
     let length = 30.0;
     let origin = [46.0, image.height as f64 - 46.0];
-    // The axis that points away most first, so that nearer ones lie over it.
+    // Axes farther from the viewer are drawn first, so that nearer ones cover them.
     let mut order = [0, 1, 2];
     order.sort_by(|a, b| view.toward[*a].total_cmp(&view.toward[*b]));
     for k in order {
@@ -41,14 +41,14 @@ pub(super) fn compass(image: &mut Image, view: &View) {
     }
 }
 
-/// A name at a point of the link.
+/// Draws a name at a point of the link.
 pub(super) fn label(image: &mut Image, view: &View, at: &Vector3<f64>, text: &str, size: f64, color: Rgb) {
     let [x, y, _] = view.project(at);
     let style = Style::new(size, color).bold().halo(color::PAPER);
     image.text(text, [x + 0.45 * size, y - 0.5 * size], Align::Left, style);
 }
 
-/// The scale of magnitudes with its ends and middle named.
+/// Draws the colour scale of magnitudes with labels at its ends and middle.
 pub(super) fn color_bar(image: &mut Image, [left, top]: [f64; 2], width: f64, names: [&str; 3]) {
     let height = 11.0;
     for x in 0..width as usize {
@@ -62,12 +62,12 @@ pub(super) fn color_bar(image: &mut Image, [left, top]: [f64; 2], width: f64, na
     }
 }
 
-/// A swatch of colour in front of a line of text.
+/// Draws a colour swatch in front of a line of text.
 pub(super) fn swatch(image: &mut Image, [left, base]: [f64; 2], color: Rgb) {
     image.fill(left, base - 13.0, 15.0, 15.0, color);
 }
 
-/// Marks for edges.
+/// Returns marks for edges.
 pub(super) fn edges(
     positions: &[Vector3<f64>],
     edges: &[[u32; 2]],
@@ -81,7 +81,7 @@ pub(super) fn edges(
     })
 }
 
-/// Marks of an arrow in space: a shaft and a head of four strokes.
+/// Returns the marks of an arrow in space: a shaft and a head of four lines.
 pub(super) fn arrow(from: Vector3<f64>, to: Vector3<f64>, width: f64, color: Rgb, alpha: [f64; 2]) -> Vec<Mark> {
     let line = |from, to| Mark::Line { from, to, width, color, alpha };
     let along = to - from;

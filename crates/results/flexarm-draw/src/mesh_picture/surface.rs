@@ -1,4 +1,4 @@
-//! The drawable surface of a mesh, and which of its faces an interface ties.
+//! The drawable surface of a mesh, and the faces that an interface ties.
 
 use nalgebra::Vector3;
 
@@ -8,15 +8,15 @@ use flexarm_fem::reduction::Interface;
 
 use super::topology::{feature_edges, triangle_normals};
 
-/// Radius of the rods that stand for beam elements, as a share of the size of the mesh.
+/// Radius of the rods drawn for beam elements, as a share of the size of the mesh.
 const ROD: f64 = 0.008;
-/// Sides of such a rod.
+/// Number of sides of such a rod.
 const ROD_SIDES: u32 = 8;
 
-/// Skin of the solids, rods for the beams.
+/// Surface of a mesh: skin of the solids, rods for the beams.
 #[derive(Debug)]
 pub(super) struct Surface {
-    /// Undeformed, m.
+    /// Undeformed positions, m.
     pub(super) positions: Vec<Vector3<f64>>,
     /// Node of the mesh that each position moves with.
     pub(super) nodes: Vec<u32>,
@@ -25,33 +25,33 @@ pub(super) struct Surface {
     face_of: Vec<u32>,
     /// Corner and mid-side nodes of each face, nodes of the mesh.
     faces: Vec<(Vec<u32>, Vec<u32>)>,
-    /// Edges of the body.
+    /// Sharp edges of the body.
     pub(super) features: Vec<[u32; 2]>,
     /// Edges of the faces.
     pub(super) grid: Vec<[u32; 2]>,
-    /// Diagonal of the box around it, m.
+    /// Diagonal of the bounding box, m.
     pub(super) size: f64,
 }
 
-/// What an interface ties, as far as it is seen.
+/// Visible faces that an interface ties.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Tied {
-    /// Per triangle: whether it belongs to a tied face.
+    /// Whether each triangle belongs to a tied face.
     pub(super) triangles: Vec<bool>,
-    /// Faces of which every node is tied.
+    /// Number of faces with all nodes tied.
     pub(super) faces: usize,
-    /// Faces of which all corners, but not all mid-side nodes are tied.
+    /// Number of faces with all corners but not all mid-side nodes tied.
     pub(super) torn: usize,
-    /// m².
+    /// Area (m²).
     pub(super) area: f64,
-    /// Mean outward normal: of length one where the faces are flat, shorter where they are curved.
+    /// Mean outward normal: of unit length if the faces are flat, shorter if they are curved.
     pub(super) normal: Vector3<f64>,
-    /// Centre of the faces, m; of the nodes where there is no face.
+    /// Centre of the faces, m; of the nodes if there is no face.
     pub(super) centre: Vector3<f64>,
 }
 
 impl Surface {
-    /// `None` for a mesh without elements.
+    /// Returns `None` for a mesh without elements.
     pub(super) fn new(mesh: &Mesh) -> Option<Self> {
         let (low, high) = mesh.bounding_box()?;
         let skin = skin(mesh);
@@ -66,7 +66,7 @@ impl Surface {
         let (mut face_of, mut faces, mut grid) = (Vec::with_capacity(triangles.len()), Vec::new(), Vec::new());
         for (number, face) in (0..).zip(skin.faces()) {
             let (c, m) = (face.corners, face.midsides);
-            // As many as `Skin::triangles` makes.
+            // Same number as in `Skin::triangles`.
             let count = if m.is_empty() { c.len() - 2 } else { 2 * m.len() - 2 };
             face_of.extend(std::iter::repeat_n(number, count));
             faces.push((c.to_vec(), m.to_vec()));
@@ -96,7 +96,7 @@ impl Surface {
         Some(surface)
     }
 
-    /// A prism around a beam element; its ends move with the nodes.
+    /// Adds a prism around a beam element; its ends move with the nodes.
     fn rod(&mut self, mesh: &Mesh, from: u32, to: u32) {
         let [a, b] = [from, to].map(|node| mesh.nodes[node as usize]);
         let Some(along) = (b - a).try_normalize(0.0) else { return };
@@ -121,12 +121,12 @@ impl Surface {
         }
     }
 
-    /// Positions with a field of the mesh added, `scale` times.
+    /// Returns the positions displaced by `scale` times a field of the mesh.
     pub(super) fn deformed(&self, field: &[Vector3<f64>], scale: f64) -> Vec<Vector3<f64>> {
         self.positions.iter().zip(&self.nodes).map(|(p, node)| p + field[*node as usize] * scale).collect()
     }
 
-    /// What `interface` ties.
+    /// Returns the faces that `interface` ties.
     pub(super) fn tied(&self, mesh: &Mesh, interface: &Interface) -> Tied {
         let mut is_tied = vec![false; mesh.nodes.len()];
         for node in &interface.nodes {

@@ -1,12 +1,11 @@
-//! What makes a heap of triangles look like a body: normals that are smooth over curved walls,
-//! lines at edges.
+//! Shading data of triangles: smooth normals on curved faces, lines at edges.
 
 use nalgebra::Vector3;
 
-/// Walls that meet at less are drawn as one smooth wall, degrees.
+/// Angle below which adjacent faces are drawn as one smooth surface, degrees.
 const SMOOTH_DEG: f64 = 32.0;
 
-/// Normal and area of each triangle: unit outward, zero for a triangle without area.
+/// Unit outward normal and area of each triangle; zero normal for a triangle without area.
 pub(super) fn triangle_normals(positions: &[Vector3<f64>], triangles: &[[u32; 3]]) -> Vec<(Vector3<f64>, f64)> {
     let normal = |t: &[u32; 3]| {
         let [a, b, c] = t.map(|v| positions[v as usize]);
@@ -17,8 +16,8 @@ pub(super) fn triangle_normals(positions: &[Vector3<f64>], triangles: &[[u32; 3]
     triangles.iter().map(normal).collect()
 }
 
-/// Normals at the corners of triangles: the mean of the triangles around that belong to the same
-/// wall.
+/// Normals at the corners of triangles: mean over the surrounding triangles of the same smooth
+/// surface.
 pub(super) fn corner_normals(positions: &[Vector3<f64>], triangles: &[[u32; 3]]) -> Vec<[Vector3<f64>; 3]> {
     let normals = triangle_normals(positions, triangles);
     let mut starts = vec![0_u32; positions.len() + 1];

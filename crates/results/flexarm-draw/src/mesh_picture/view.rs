@@ -1,4 +1,4 @@
-//! From which side a link is seen, and where a point of it lands on the picture.
+//! Viewing direction of a link, and projection of its points onto the picture.
 
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 
@@ -13,13 +13,13 @@ pub struct View {
     pub toward: Vector3<f64>,
     /// Pixels per metre.
     pub scale: f64,
-    /// Where the origin lands, pixels from the top left.
+    /// Position of the origin, pixels from the top left.
     pub origin: [f64; 2],
 }
 
 impl View {
-    /// A view in which all `points` fill a box of the picture, `[left, top, width, height]` in
-    /// pixels.
+    /// Creates a view in which all `points` fit a box of the picture, `[left, top, width, height]`
+    /// in pixels.
     ///
     /// * `right`: direction that points to the right as far as `toward` allows.
     pub fn fit(
@@ -44,8 +44,8 @@ impl View {
         Self { right, up, toward, scale, origin }
     }
 
-    /// Place on the picture in pixels from the top left, and nearness to the viewer in the same
-    /// unit.
+    /// Projects a point: position in pixels from the top left, and depth towards the viewer in the
+    /// same unit.
     pub fn project(&self, p: &Vector3<f64>) -> [f64; 3] {
         [
             self.origin[0] + self.scale * self.right.dot(p),
@@ -55,19 +55,20 @@ impl View {
     }
 }
 
-/// Directions of a link for its pictures: along it, across it, and out of the plane of both.
+/// Directions of a link in its pictures: along it, across it, and out of the plane of both.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct LinkAxes {
     /// Along the longest extent, from A to B.
     pub(super) along: Vector3<f64>,
-    /// Along the second longest.
+    /// Along the second longest extent.
     pub(super) across: Vector3<f64>,
     /// `along x across`.
     pub(super) out: Vector3<f64>,
 }
 
 impl LinkAxes {
-    /// The link's own axes where it lies along one of them to 20 degrees, else its principal axes.
+    /// Uses the axes of the link if it is aligned with one of them to 20 degrees, else its
+    /// principal axes.
     pub(super) fn new(points: &[Vector3<f64>], p_AB: &Vector3<f64>) -> Self {
         let centre = points.iter().sum::<Vector3<f64>>() / points.len().max(1) as f64;
         let spread = points.iter().fold(Matrix3::zeros(), |sum, p| sum + (p - centre) * (p - centre).transpose());
@@ -95,16 +96,16 @@ impl LinkAxes {
         Self { along, across, out: along.cross(&across) }
     }
 
-    /// A direction to look from: `turn` about the vertical of the picture, then `tilt` above it,
+    /// Returns a viewing direction: `turn` about the vertical of the picture, then `tilt` above it,
     /// radians.
     ///
-    /// Positive `turn` shows the end of B.
+    /// A positive `turn` shows the end B.
     pub(super) fn viewpoint(&self, turn: f64, tilt: f64) -> Vector3<f64> {
         self.along * (turn.sin() * tilt.cos()) + self.across * tilt.sin() + self.out * (turn.cos() * tilt.cos())
     }
 }
 
-/// The link axis that points most to the viewer, such as `+y`.
+/// Returns the link axis closest to the direction to the viewer, such as `+y`.
 pub(super) fn side_name(direction: &Vector3<f64>) -> String {
     let axis = direction.iamax();
     format!("{}{}", if direction[axis] < 0.0 { '-' } else { '+' }, ["x", "y", "z"][axis])
