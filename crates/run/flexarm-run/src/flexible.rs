@@ -1,5 +1,4 @@
-//! A robot with its flexible links and elastic drives in place: which model each of them gets, and
-//! the arm that results.
+//! Robot with its flexible links and elastic drives: chooses a model for each and builds the arm.
 
 use std::collections::HashMap;
 use std::path::PathBuf;
@@ -28,55 +27,55 @@ use crate::options::{DriveModel, LinkModel, Modelling};
 use crate::robot::{Robot, tcp_frame};
 use flexarm_linkmaker::import::SECOND_ORDER_UNKNOWN;
 
-/// Springs along Euler angles are not the same seen from either end: a term of third order in the
-/// bending is left, which a chain of n parts divides by n only.
+/// Springs along Euler angles are not symmetric between the two ends: an error of third order in
+/// the deflection remains, which a chain of n parts only divides by n.
 const EULER_CHAIN: &str = "its chain has angles = \"euler-zyx\": where it bends about two axes or twists, its deflection \
                            converges with the number of parts, not with the square of it as with rotation vectors";
-/// Most fixed-interface modes of a link.
+/// Maximum number of fixed-interface modes of a link.
 const MOST_MODES: usize = 200;
-/// Fixed-interface modes of a beam link that does not say how many.
+/// Default number of fixed-interface modes of a beam link.
 const BEAM_MODES: usize = 6;
 
-/// A flexible link with what its models can be made from.
+/// Flexible link with the data from which its models are built.
 #[derive(Clone, Debug)]
 pub struct RobotLink {
     /// The link with its reduced model.
     pub flexible: FlexibleLink,
-    /// Its damping.
+    /// Damping of the link.
     pub damping: Damping,
-    /// Stiffness of the spring between its two parts, symmetric and positive definite, in the place
-    /// of its source's (N/m, N, N m/rad).
+    /// Stiffness of the spring between its two parts, symmetric and positive definite; replaces
+    /// that of the source (N/m, N, N m/rad).
     pub stiffness: Option<Matrix6<f64>>,
-    /// Factor on the stiffness of all its models.
+    /// Factor on the stiffness of all models of the link.
     pub stiffness_factor: f64,
-    /// Factors on the springs of a lumped link, direction by direction, beside that: K becomes
-    /// `S K S` with their roots on the diagonal of S.
+    /// Additional factors on the springs of a lumped link, one per direction: K becomes `S K S`,
+    /// where the diagonal of S holds their square roots.
     pub stiffness_factors: [f64; 6],
-    /// The beam that it is, if it is one.
+    /// Beam from which the link is built, if it is a beam.
     pub beam: Option<BeamLink>,
-    /// What the robot file asks for.
+    /// Choices made in the robot file.
     pub choices: LinkChoices,
 }
 
-/// What a robot file asks of a flexible link.
+/// Choices of a robot file for a flexible link.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LinkChoices {
-    /// Lumped or modal.
+    /// Link model: lumped or modal.
     pub model: LinkModel,
-    /// Rigid parts of a lumped link.
+    /// Number of rigid parts of a lumped link.
     pub segments: usize,
-    /// Fixed-interface modes of a modal link.
+    /// Number of fixed-interface modes of a modal link.
     pub modes: Option<usize>,
-    /// Own modes of a modal link instead.
+    /// Number of eigenmodes of a modal link, used instead of fixed-interface modes.
     pub eigenmodes: Option<usize>,
-    /// Whether loads change the stiffness.
+    /// Whether loads change the stiffness (geometric stiffening).
     pub geometric: bool,
-    /// Whether the file says whose mass the parts take; if not, they take that of the uniform beam
-    /// where the link's own cannot be cut.
+    /// Whether the file says whose mass the parts take; if not, the parts take that of the uniform
+    /// beam when the link's own mass cannot be cut.
     pub parts_asked: bool,
 }
 
-/// The key by which something was asked for.
+/// Key of the robot file that requested something unavailable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Asked {
     Model,
@@ -89,28 +88,28 @@ pub(crate) enum Asked {
 }
 
 impl RobotLink {
-    /// A spring of its lumped models with the factors.
+    /// Applies the stiffness factors to a spring of the lumped models.
     pub(crate) fn scaled(&self, K: &Matrix6<f64>) -> Matrix6<f64> {
         let root = self.stiffness_factors.map(f64::sqrt);
         let K = self.stiffness.as_ref().unwrap_or(K);
         Matrix6::from_fn(|i, j| root[i] * K[(i, j)] * root[j]) * self.stiffness_factor
     }
 
-    /// Whether its source can have its stiffness changed by loads as a modal link.
+    /// Whether the source provides geometric stiffening for a modal link.
     pub fn has_geometric(&self) -> bool {
         let stored = self.flexible.reduced.details.as_ref().and_then(|details| details.modal.as_ref());
         self.beam.is_some() || stored.is_some_and(|modal| modal.geometric.is_some())
     }
 
-    /// The model of the link; rigid links have none.
+    /// Returns the model of the link; rigid links have none.
     ///
     /// # Errors
-    /// A sentence about what the link's source does not have.
+    /// A message that names what the source of the link lacks.
     pub fn form(&self, modelling: &Modelling) -> Result<LinkForm, String> {
         self.form_or_key(modelling).map_err(|(_, message)| message)
     }
 
-    /// As [`Self::form`], with the key of the robot file that asks for what is not there.
+    /// As [`Self::form`], with the robot file key that requested what is missing.
     pub(crate) fn form_or_key(&self, modelling: &Modelling) -> Result<LinkForm, (Asked, String)> {
         let model = if modelling.links == LinkModel::AsFiled { self.choices.model } else { modelling.links };
         match model {
@@ -131,7 +130,7 @@ impl RobotLink {
         }
     }
 
-    /// Why its own stiffness fits no other model.
+    /// Returns the message that the link's own stiffness fits only the two-part model.
     fn one_spring(&self, has: &str) -> String {
         let name = &self.flexible.link;
         format!("link {name:?} {has}: its stiffness is that of the one spring between two rigid parts; leave it out")
@@ -221,52 +220,53 @@ impl RobotLink {
     }
 }
 
-/// A robot whose links bend, with its springs in coordinate order.
+/// Robot with flexible links; springs are in coordinate order.
 #[derive(Clone, Debug)]
 pub struct FlexibleRobot {
-    /// The tree.
+    /// Tree of the robot.
     pub model: Arc<Model>,
     /// Springs in coordinate order.
     pub springs: Vec<Spring>,
-    /// Owner of each spring.
+    /// Owner of each spring, in the same order.
     pub owners: Vec<Owner>,
-    /// The tool, on the body that carries it.
+    /// Frame of the TCP, on the body that carries it.
     pub tcp: Frame,
     /// Flexible links.
     pub spans: Vec<FlexibleSpan>,
-    /// How they are drawn bent, in the order of the spans.
+    /// Data for drawing the deflected links, in the order of the spans.
     pub bends: Vec<Bend>,
-    /// Its URDF.
+    /// Path of the URDF.
     pub(crate) path: PathBuf,
     /// The same robot with rigid links and without gearboxes.
     pub rigid: Arc<Model>,
-    /// Friction per actuated coordinate.
+    /// Friction of each actuated coordinate.
     friction: Vec<Friction>,
-    /// What gears do beside giving way.
+    /// Gear effects other than elasticity.
     pub(crate) gears: GearLaws,
-    /// Joints driven by torque: coordinate, servo, limit.
+    /// Torque-driven joints: coordinate, servo, torque limit.
     pub(crate) torque: Vec<(usize, ServoEntry, f64)>,
-    /// Doubts about the models of the links.
+    /// Caveats about the models of the links.
     pub doubts: Vec<Caveat>,
-    /// The springs under the base, as the last of the spans.
+    /// Index in `spans` of the springs under the base; they are the last span.
     pub(crate) mounting: Option<usize>,
-    /// How far its mass or its tool reaches, a yardstick (m).
+    /// Reach of the mass or of the TCP, used as a length scale (m).
     pub(crate) extent: f64,
-    /// Links that bend in modes though rigid parts are asked for, and why: sentences.
+    /// Messages about links modelled with modes although rigid parts were requested, with the
+    /// reason.
     pub modal_instead: Vec<String>,
 }
 
-/// What a spring belongs to.
+/// Owner of a spring.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Owner {
-    /// Flexible link, or mounting, of that number in [`FlexibleRobot::spans`].
+    /// Flexible link or mounting; index into [`FlexibleRobot::spans`].
     Link(usize),
-    /// Drive of that number, in [`Robot::drives`].
+    /// Drive; index into [`Robot::drives`].
     Drive(usize),
 }
 
 impl FlexibleRobot {
-    /// The arm that steppers take, driven along a motion.
+    /// Returns the arm for the steppers, driven along a motion.
     ///
     /// # Errors
     /// As [`FlexibleArm::new`] and [`FlexibleArm::with_servo`].
@@ -274,7 +274,7 @@ impl FlexibleRobot {
         self.arm_with(self.springs.clone(), motion)
     }
 
-    /// The same with other springs in the same places.
+    /// As [`Self::arm`], with other springs in the same places.
     pub(crate) fn arm_with(
         &self,
         springs: Vec<Spring>,
@@ -296,12 +296,13 @@ impl FlexibleRobot {
         arm.with_servo(Servo { sample_s: self.sample_s(), axes, rigid: self.rigid.clone() })
     }
 
-    /// Returns the law of a motor that moves several joints, if there is one.
+    /// Returns the coupling of motors that move several joints, if there is one.
     pub fn gear_coupling(&self) -> Option<&GearCoupling> {
         self.gears.coupling.as_ref()
     }
 
-    /// An error with the links that lack inertia, if that is the reason.
+    /// Wraps an error; if the mass matrix is singular, adds the names of the links that lack
+    /// inertia.
     pub fn explained(&self, source: StepError) -> Error {
         let light = match source {
             StepError::Singular { matrix: "mass matrix", .. } => self.without_inertia(),
@@ -313,10 +314,11 @@ impl FlexibleRobot {
         PoseError::WithoutInertia { path: self.path.clone(), source, links: light }.into()
     }
 
-    /// What gives way and carries no inertia in some direction: the rows of the mass matrix that
-    /// depend on earlier ones.
+    /// Names the elastic bodies and torque-driven joints without inertia in some direction: rows of
+    /// the mass matrix that depend linearly on earlier rows.
     fn without_inertia(&self) -> Vec<String> {
-        /// Squared share of a row that the rows before leave over.
+        /// Threshold for the pivot relative to the diagonal entry; below it a row counts as
+        /// dependent.
         const LEAST: f64 = 1e-13;
         let (model, n) = (&self.model, self.model.n_actuated());
         let M = mass_matrix(model, &mut Data::new(model), &DVector::zeros(model.nv())).clone();
@@ -346,8 +348,8 @@ impl FlexibleRobot {
         names
     }
 
-    /// Inertia that each torque-driven joint feels at once, all other free coordinates yielding:
-    /// `1 / (M_ff^-1)_ii`.
+    /// Inertia that each torque-driven joint sees when all other free coordinates are free to
+    /// accelerate: `1 / (M_ff^-1)_ii`.
     pub(crate) fn quick_inertia(&self, actuated: &DVector<f64>) -> Vec<f64> {
         self.quick_inertia_of(&self.model, actuated)
     }
@@ -362,24 +364,25 @@ impl FlexibleRobot {
         (0..self.torque.len()).map(|i| inverse.as_ref().map_or(0.0, |inverse| 1.0 / inverse[(i, i)])).collect()
     }
 
-    /// Doubts about the models of the links.
+    /// Returns the caveats about the models of the links.
     pub fn caveats(&self) -> Vec<Caveat> {
         let help = "write model = \"modal\" into the robot file";
         let instead = self.modal_instead.iter().map(|text| Caveat::said("third-interface", "links", text, help));
         self.doubts.iter().cloned().chain(instead).collect()
     }
 
-    /// Whether some joint is driven by torque.
+    /// Whether any joint is driven by torque.
     pub fn has_servo(&self) -> bool {
         !self.torque.is_empty()
     }
 
-    /// Coordinates of the joints driven by torque, with the largest torque of each (N m or N).
+    /// Returns the coordinates of the torque-driven joints, with the torque limit of each (N m or
+    /// N).
     pub fn servo_limits(&self) -> impl Iterator<Item = (usize, f64)> {
         self.torque.iter().map(|(coordinate, _, limit)| (*coordinate, *limit))
     }
 
-    /// A word for the models of the links.
+    /// Returns a name for the kind of link models: rigid, lumped, modal or mixed.
     pub fn links_model(&self) -> &'static str {
         let modal = self.model.elastic().iter().filter(|g| g.modal).count();
         match (self.spans.len() - usize::from(self.mounting.is_some()), modal) {
@@ -392,7 +395,7 @@ impl FlexibleRobot {
 }
 
 impl Robot {
-    /// The robot with its flexible links and drives as the file says.
+    /// Returns the robot with its flexible links and drives as the file asks.
     ///
     /// # Errors
     /// As [`Robot::modelled`].
@@ -400,7 +403,7 @@ impl Robot {
         self.modelled(&Modelling::default())
     }
 
-    /// The robot with all links rigid and all joints prescribed, as an arm without springs.
+    /// Returns the robot with all links rigid and all joints prescribed, as an arm without springs.
     ///
     /// # Errors
     /// [`Error::Model`].
@@ -408,11 +411,11 @@ impl Robot {
         self.modelled(&Modelling { links: LinkModel::Rigid, drives: DriveModel::Rigid, ..Modelling::default() })
     }
 
-    /// The robot with its links and drives modelled as asked for.
+    /// Returns the robot with its links and drives modelled as requested.
     ///
     /// # Errors
     /// [`Error::Modelling`] if a link or drive has no such model, [`Error::Model`] if the result is
-    /// no tree.
+    /// not a valid tree.
     pub fn modelled(&self, modelling: &Modelling) -> Result<FlexibleRobot, Error> {
         let ChosenLinks { links, doubts, modal_instead } = self.chosen_links(modelling)?;
         let mut substituted = substitute(&self.rigid, &links).map_err(ModellingError::from)?;
@@ -451,7 +454,7 @@ impl Robot {
         })
     }
 
-    /// Which model each flexible link gets.
+    /// Chooses the model of each flexible link.
     fn chosen_links(&self, modelling: &Modelling) -> Result<ChosenLinks, Error> {
         let mut chosen = ChosenLinks::default();
         let wanted = if modelling.links == LinkModel::Rigid { &[][..] } else { &self.flexible[..] };
@@ -464,7 +467,7 @@ impl Robot {
             chosen.doubts.extend(uncut.map(|text| Caveat::said("uniform-mass", "links", text, "")));
             chosen.links.push(flexible);
         }
-        // An option that nothing takes up is a mistake, not a wish.
+        // An option that applies to no link is an error.
         let modal = chosen.links.iter().filter(|link| matches!(link.form, LinkForm::Modal(_))).count();
         if let (Some(n), true) = (modelling.segments, modal == chosen.links.len()) {
             return Err(ModellingError::NoLumpedLink { segments: n, modal_instead: chosen.modal_instead }.into());
@@ -475,7 +478,7 @@ impl Robot {
         Ok(chosen)
     }
 
-    /// Puts the springs of the mounting under the base; links that are rigid stand on rigid ground.
+    /// Inserts the mounting springs under the base; with rigid links the ground is rigid too.
     fn insert_springs(
         &self,
         substituted: &mut Substituted,
@@ -492,7 +495,7 @@ impl Robot {
         Ok(Some(OwnedSpring { group, spring: Spring::from((name, spring.K_S, *damping)), owner }))
     }
 
-    /// Springs of the lumped links.
+    /// Returns the springs of the lumped links.
     fn lumped_springs(&self, substituted: &Substituted) -> Vec<OwnedSpring> {
         let springs = &substituted.springs;
         let mut owned = Vec::new();
@@ -514,7 +517,7 @@ impl Robot {
         owned
     }
 
-    /// Springs of the links that bend in modes.
+    /// Returns the springs of the modal links.
     fn modal_springs(&self, links: &[FlexibleLink], substituted: &Substituted) -> Vec<OwnedSpring> {
         let mut owned = Vec::new();
         for link in links {
@@ -530,7 +533,7 @@ impl Robot {
         owned
     }
 
-    /// Springs of the gearboxes.
+    /// Returns the springs of the gearboxes.
     fn gear_springs(&self, gears: &[GearSpring]) -> Vec<OwnedSpring> {
         let mut owned = Vec::new();
         for gear in gears {
@@ -548,7 +551,7 @@ impl Robot {
         owned
     }
 
-    /// What the gears of the drives do beside giving way, for springs of these owners.
+    /// Returns the gear effects other than elasticity, for springs with these owners.
     fn gear_laws(&self, model: &Model, owners: &[Owner]) -> GearLaws {
         let mut laws = GearLaws::default();
         let place = |joint: &str| model.coordinates()[..model.n_actuated()].iter().position(|c| c.joint == joint);
@@ -573,8 +576,8 @@ impl Robot {
         laws
     }
 
-    /// Friction of each actuated coordinate, and the joints that are driven by torque: coordinate,
-    /// servo, limit.
+    /// Returns the friction of each actuated coordinate, and the torque-driven joints as
+    /// coordinate, servo and torque limit.
     fn actuation(&self, model: &Model, drives: DriveModel) -> (Vec<Friction>, Vec<(usize, ServoEntry, f64)>) {
         let actuated = &model.coordinates()[..model.n_actuated()];
         let drive_of = |joint: &str| self.drives.iter().find(|d| d.joint == joint);
@@ -586,9 +589,9 @@ impl Robot {
         (friction, actuated.iter().enumerate().filter_map(servo).collect())
     }
 
-    /// The model of a link on this robot, and a sentence if it is another one than asked for: a
-    /// link with load on a third interface bends in modes, because rigid parts with springs know
-    /// two.
+    /// Returns the model of a link on this robot, and a message if it differs from the requested
+    /// one: a link loaded at a third interface becomes modal, because rigid parts with springs have
+    /// only two interfaces.
     pub(crate) fn form_of(&self, link: &RobotLink, modelling: &Modelling) -> Result<(LinkForm, Option<String>), Error> {
         let form = link.form(modelling).map_err(ModellingError::NoSuchModel)?;
         let branches =
@@ -607,8 +610,8 @@ impl Robot {
         Ok((modal, Some(format!("link {name:?} bends in modes (model = \"modal\"): {why}"))))
     }
 
-    /// Gives a beam that does not say whose mass it takes that of the uniform beam, if the link's
-    /// own cannot be cut; says so.
+    /// Uses the mass of a uniform beam if the file does not choose whose mass the parts take and
+    /// the link's own mass cannot be cut; returns a message in that case.
     fn uncut(&self, link: &RobotLink, flexible: &mut FlexibleLink) -> Option<String> {
         if link.choices.parts_asked {
             return None;
@@ -630,7 +633,7 @@ impl Robot {
     }
 }
 
-/// The flexible links with the model that each gets.
+/// Flexible links with the model chosen for each.
 #[derive(Default)]
 struct ChosenLinks {
     links: Vec<FlexibleLink>,
@@ -638,7 +641,7 @@ struct ChosenLinks {
     modal_instead: Vec<String>,
 }
 
-/// Doubts about a link in this form.
+/// Returns the caveats about a link in this form.
 fn doubts_of(link: &FlexibleLink, form: &LinkForm) -> Vec<Caveat> {
     let mut doubts = Vec::new();
     if matches!(form, LinkForm::Modal(modal) if !modal.has_second_order()) {
@@ -653,7 +656,7 @@ fn doubts_of(link: &FlexibleLink, form: &LinkForm) -> Vec<Caveat> {
     doubts
 }
 
-/// A spring with the group of elastic coordinates that it acts on
+/// Spring with the group of elastic coordinates it acts on
 /// ([`flexarm_kinematics::ElasticGroup::name`]).
 struct OwnedSpring {
     group: String,
@@ -661,7 +664,7 @@ struct OwnedSpring {
     owner: Owner,
 }
 
-/// Springs and their owners in the order of the model's elastic coordinates.
+/// Sorts springs and their owners into the order of the model's elastic coordinates.
 ///
 /// # Errors
 /// [`ModellingError::NoStiffness`] for a group without a spring.

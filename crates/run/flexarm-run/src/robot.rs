@@ -1,5 +1,5 @@
-//! A robot as loaded: URDF, payload, tool centre point and flexible links, ready to make models
-//! from.
+//! A loaded robot: URDF, payload, tool centre point and flexible links, from which models are
+//! built.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -24,60 +24,60 @@ use crate::mounting::{RobotMounting, add_mounting};
 use crate::ranges::not_finite;
 use crate::robot_file::{FlexibleLinkEntry, PayloadEntry, RobotFile, RobotFileError, Source, parse_robot_file};
 
-/// Name of the frame that is added for the tool centre point.
+/// Name of the frame added for the tool centre point.
 pub const TCP_FRAME: &str = "__tcp";
-/// Name of the link that is added for the payload.
+/// Name of the link added for the payload.
 pub const PAYLOAD_LINK: &str = "__payload";
 
-/// Choices at loading.
+/// Options for loading a robot.
 #[derive(Clone, Debug, Default)]
 pub struct LoadOptions {
-    /// Link to use as TCP instead of the file's.
+    /// Link to use as TCP instead of the one in the file.
     pub tcp: Option<String>,
-    /// For the URDF reader.
+    /// Options for the URDF reader.
     pub urdf: ReadOptions,
 }
 
-/// A mechanism with the model that was made of it last.
+/// Most recently built model, with the mechanism it was built from.
 type KeptModel = Arc<Mutex<Option<(Mechanism, Arc<Model>)>>>;
 
 /// A loaded robot.
 #[derive(Clone, Debug)]
 pub struct Robot {
-    /// Name.
+    /// Name of the robot.
     pub name: String,
-    /// The file that was loaded.
+    /// Path of the loaded file.
     pub path: PathBuf,
-    /// The description as it was read. Models are made of [`Self::rigid`], which has TCP, payload
-    /// and rotors besides.
+    /// Description as read. Models are built from [`Self::rigid`], which also contains the TCP,
+    /// payload and rotors.
     pub urdf: UrdfRobot,
     /// Path of the URDF.
     pub urdf_path: PathBuf,
-    /// URDF with TCP frame, payload and gravity: the rigid robot.
+    /// Rigid robot: the URDF with TCP frame, payload and gravity.
     pub rigid: Mechanism,
     /// Flexible links.
     pub flexible: Vec<RobotLink>,
-    /// What the base stands on, if it yields.
+    /// Elastic mounting of the base, if there is one.
     pub mounting: Option<RobotMounting>,
     /// Drives that the file tells about; all other joints are prescribed.
     pub drives: Vec<Drive>,
     /// Motors that move several joints.
     pub(crate) coupling: Option<RobotCoupling>,
-    /// Link that carries the TCP and pose of the TCP in it.
+    /// Link that carries the TCP, and the pose of the TCP in that link.
     pub tcp: (String, Pose),
-    /// Link that was asked for as the tool in the place of the file's.
+    /// Link requested as TCP instead of the one in the file.
     pub tcp_override: Option<String>,
-    /// Trajectory for runs without one.
+    /// Default trajectory, used by runs that name none.
     pub default_trajectory: Option<PathBuf>,
-    /// Where joints stay that a motion does not name (rad or m).
+    /// Positions of joints that a motion does not drive (rad or m).
     pub hold: Vec<(String, f64)>,
-    /// Things worth telling.
+    /// Warnings from loading.
     pub warnings: Vec<String>,
-    /// Axes that its controller counts otherwise than the joints.
+    /// Axes that the controller counts differently from the joints.
     pub controller: Vec<RobotAxis>,
-    /// What only the text of the file shows.
+    /// Caveats that can only be found in the text of the file.
     written: Vec<Caveat>,
-    /// The last tree of the rigid robot, with the mechanism that it is of.
+    /// Most recent tree of the rigid robot, with the mechanism it was built from.
     rigid_tree: KeptModel,
 }
 
@@ -85,12 +85,12 @@ impl Robot {
     /// Loads a `robot.toml`, a folder with one, or a bare `.urdf` or `.xacro`.
     ///
     /// # Errors
-    /// [`Error`] with file, place, what was found and how to mend it.
+    /// [`Error`] with the file, the location, the value found and how to fix it.
     pub fn load(path: impl AsRef<Path>) -> Result<Self, Error> {
         Self::load_with(path.as_ref(), &LoadOptions::default())
     }
 
-    /// As [`Robot::load`], with choices.
+    /// As [`Robot::load`], with options.
     ///
     /// # Errors
     /// As [`Robot::load`].
@@ -98,9 +98,10 @@ impl Robot {
         Self::load_modelled(path, options).map(|(robot, _)| robot)
     }
 
-    /// As [`Robot::load_with`], with its links and drives modelled as the file says
-    /// ([`Robot::flexible_robot`]): to check a robot is to do that, and
-    /// [`Arm::new`](crate::Arm::new) takes its result.
+    /// As [`Robot::load_with`], and also returns the robot with its links and drives modelled as
+    /// the file asks ([`Robot::flexible_robot`]).
+    ///
+    /// Loading already builds this model as a check; pass it to [`Arm::new`](crate::Arm::new).
     ///
     /// # Errors
     /// As [`Robot::load`].
@@ -151,9 +152,10 @@ impl Robot {
         Ok((robot, flexible))
     }
 
-    /// A robot of the text of a robot file, which may never have been one.
+    /// Builds a robot from the text of a robot file, which need not exist on disk.
     ///
-    /// * `path`: where it would be: paths in it are relative to its folder, messages name it.
+    /// * `path`: nominal path of the file; relative paths start from its folder, and messages quote
+    ///   it.
     ///
     /// # Errors
     /// As [`Robot::load`].
@@ -161,11 +163,11 @@ impl Robot {
         Self::of_text(path, text, options, &FileCache::default())
     }
 
-    /// As [`Robot::from_toml`], with the text of the URDF or xacro besides: nothing of both need be
-    /// a file.
+    /// As [`Robot::from_toml`], with the text of the URDF or xacro as well: neither needs to exist
+    /// as a file.
     ///
-    /// The `urdf` of the robot file is then the name that messages give it, and meshes are looked
-    /// for from its place.
+    /// The key `urdf` of the robot file then only gives the name quoted in messages and the
+    /// location from which meshes are searched.
     ///
     /// # Errors
     /// As [`Robot::load`].
@@ -173,12 +175,12 @@ impl Robot {
         Self::of_texts(path, text, Some(urdf), options, &FileCache::default()).map(|(robot, _)| robot)
     }
 
-    /// As [`Robot::from_toml`]; what the file names is read through the cache.
+    /// As [`Robot::from_toml`]; reads the files named in the text through the cache.
     pub fn of_text(path: &Path, text: &str, options: &LoadOptions, files: &FileCache) -> Result<Self, Error> {
         Self::of_texts(path, text, None, options, files).map(|(robot, _)| robot)
     }
 
-    /// The same, with the text of the description if there is one.
+    /// As [`Self::of_text`], optionally with the text of the description.
     fn of_texts(
         path: &Path,
         text: &str,
@@ -218,8 +220,8 @@ impl Robot {
         }
     }
 
-    /// Returns what the text of a robot file at `path` makes of a description that is read already,
-    /// with its links and drives modelled as the file says.
+    /// Builds a robot from the text of a robot file at `path` and a description that is already
+    /// read; also returns it with its links and drives modelled as the file asks.
     ///
     /// # Errors
     /// As [`Robot::load`].
@@ -233,7 +235,7 @@ impl Robot {
         Self::of_file(path, urdf_path, urdf, &file, &source, &LoadOptions::default(), &FileCache::default())
     }
 
-    /// What a robot file makes of a description that was read for it.
+    /// Builds a robot from a parsed robot file and its description.
     fn of_file(
         path: &Path,
         urdf_path: PathBuf,
@@ -257,7 +259,7 @@ impl Robot {
             keep(limit_effort(&mut rigid, joint, limit, source).map_err(Error::from), &mut faults);
         }
         let tcp = keep(tcp_of(file, source, &urdf, options), &mut faults);
-        // `robot.toml`, `.` and links to folders have no name to be read off the path.
+        // Paths such as `robot.toml`, `.` and links to folders do not contain the folder's name.
         let real_folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
         let real_folder = real_folder.canonicalize().unwrap_or_else(|_| real_folder.to_owned());
         let fallback_name =
@@ -332,8 +334,8 @@ impl Robot {
         self.rigid.joints.push(Joint::new("__tcp_joint", JointKind::Fixed, link, TCP_FRAME, X_LT));
         self.rigid.links.push(Link { name: TCP_FRAME.into(), inertia: None });
         self.warnings.extend(self.urdf.warnings_only().map(told));
-        // Faults that only show in the whole are put to the last flexible link: that is where a
-        // second entry stands.
+        // Errors of the model as a whole are reported at the last flexible link, where a duplicate
+        // entry would be.
         let last_flexible = file.and_then(|(f, s)| {
             let mounting = f.mounting.as_ref().map(Spanned::span);
             f.flexible_link.last().map(|e| e.link.span()).or(mounting).map(|span| (s, span))
@@ -356,8 +358,8 @@ impl Robot {
         }
     }
 
-    /// Gives a link that is a beam the mass that its entry says, with the centre and the radii of
-    /// gyration that it has.
+    /// Sets the mass of a beam link to the value in its entry, keeping its centre of mass and radii
+    /// of gyration.
     fn reweigh(&mut self, entry: &FlexibleLinkEntry, source: &Source) -> Result<(), RobotFileError> {
         let (Some(mass), name) = (&entry.mass, entry.link.get_ref()) else { return Ok(()) };
         let fail = |message: String| source.error(mass.span(), format!("link {name:?}: {message}"));
@@ -383,8 +385,8 @@ impl Robot {
         }
     }
 
-    /// Hangs the payload on its link, else on the file's TCP link, whatever other frame the user
-    /// looks at.
+    /// Attaches the payload to its link, or to the TCP link of the file; a TCP chosen by the user
+    /// does not matter here.
     fn add_payload(&mut self, entry: &Spanned<PayloadEntry>, tcp_link: &str, source: &Source) -> Result<(), Error> {
         let payload = entry.get_ref();
         let com = payload.com.unwrap_or_default();
@@ -417,8 +419,8 @@ impl Robot {
             let message = "payload inertia has a negative principal moment; the order is ixx iyy izz ixy ixz iyz";
             return Err(source.error(entry.span(), message).into());
         }
-        // Its frame is at its centre of mass: a cut through the link then leaves it on the side
-        // where it is.
+        // The payload frame is at its centre of mass, so a cut through the link assigns the payload
+        // to the correct side.
         let inertia = LinkInertia { mass, com: Vector3::zeros(), inertia_com };
         self.rigid.links.push(Link { name: PAYLOAD_LINK.into(), inertia: Some(inertia) });
         let joint = Joint::new("__payload_joint", JointKind::Fixed, link, PAYLOAD_LINK, pose(com, [0.0; 3]));
@@ -426,19 +428,20 @@ impl Robot {
         Ok(())
     }
 
-    /// Link that carries the tool centre point, and the pose of that point in the link, `X_LT`.
+    /// Returns the link that carries the tool centre point, and the pose `X_LT` of that point in
+    /// the link.
     pub fn tcp(&self) -> (&str, &Pose) {
         (&self.tcp.0, &self.tcp.1)
     }
 
-    /// The robot with another tool centre point; the payload stays where it is. Arms made of the
-    /// robot before keep theirs.
+    /// Replaces the tool centre point; the payload stays where it is. Arms built from the robot
+    /// earlier keep their TCP.
     ///
-    /// * `link`: of the robot; `X_LT`: pose of the point in its axes (m).
+    /// * `link`: link of the robot; `X_LT`: pose of the point in the link's axes (m).
     ///
     /// # Errors
-    /// [`Error::UnknownTcp`] for a link that is not there, [`Error::Value`] for a pose that is no
-    /// numbers.
+    /// [`Error::UnknownTcp`] if the robot has no such link, [`Error::Value`] if the pose is not
+    /// finite.
     pub fn with_tcp(mut self, link: &str, X_LT: Pose) -> Result<Self, Error> {
         let known = || self.rigid.links.iter().map(|l| l.name.clone()).filter(|name| !name.starts_with("__")).collect();
         if link.starts_with("__") || self.rigid.link(link).is_none() {
@@ -456,17 +459,18 @@ impl Robot {
         Ok(self)
     }
 
-    /// What the base stands on, if it yields.
+    /// Returns the elastic mounting of the base, if there is one.
     pub fn mounting(&self) -> Option<&RobotMounting> {
         self.mounting.as_ref()
     }
 
-    /// Motors that move several joints; their rotors are in [`Self::rigid`].
+    /// Returns the coupling of motors that move several joints; their rotors are in
+    /// [`Self::rigid`].
     pub fn coupling(&self) -> Option<&RobotCoupling> {
         self.coupling.as_ref()
     }
 
-    /// What is worth knowing about it before anything is computed.
+    /// Returns the caveats that are known before any computation.
     pub fn caveats(&self) -> Vec<Caveat> {
         let file = self.path.display().to_string();
         let of_urdf = |text: &&String| self.urdf.warnings_only().any(|w| **text == told(w));
@@ -488,7 +492,7 @@ impl Robot {
         caveats
     }
 
-    /// The rigid robot's tree.
+    /// Returns the tree of the rigid robot.
     ///
     /// # Errors
     /// [`Error::Model`].
@@ -506,13 +510,13 @@ impl Robot {
     }
 }
 
-/// The tool's frame in a tree of the robot.
+/// Returns the TCP frame in a tree of the robot.
 pub fn tcp_frame(model: &Model) -> Frame {
     model.frame(TCP_FRAME).expect("added when the robot was loaded").clone()
 }
 
-/// Angles as they were written, and materials that nothing uses: only the text of the file shows
-/// them.
+/// Returns caveats about angles as written and about unused materials, which only the text of the
+/// file shows.
 fn written_caveats(file: &RobotFile) -> Vec<Caveat> {
     let rpy = file.tcp.as_ref().and_then(|tcp| caveat::parts::angles("rpy of the TCP", &tcp.get_ref().rpy));
     let beams = file.flexible_link.iter().filter_map(|link| {
@@ -530,12 +534,12 @@ fn written_caveats(file: &RobotFile) -> Vec<Caveat> {
     rpy.into_iter().chain(beams).chain(unused).collect()
 }
 
-/// A finding with its place, as a sentence.
+/// Formats a finding with its location as a sentence.
 fn told(finding: &flexarm_urdf::Finding) -> String {
     format!("{}: {}", finding.location, finding.message)
 }
 
-/// How the file has missing masses estimated.
+/// Reads how missing masses are estimated.
 fn inertia_estimate(file: &RobotFile, source: &Source) -> Result<Option<InertiaEstimate>, RobotFileError> {
     let positive = |what: &str, value: &Spanned<f64>| match *value.get_ref() {
         x if x.is_finite() && x > 0.0 => Ok(x),
@@ -552,7 +556,7 @@ fn inertia_estimate(file: &RobotFile, source: &Source) -> Result<Option<InertiaE
     }
 }
 
-/// Lets a joint that turns slide along its axis, `lead` (m) in a turn.
+/// Turns a rotating joint into a helical one with `lead` metres per turn.
 fn make_helical(
     mechanism: &mut Mechanism,
     name: &str,
@@ -573,7 +577,7 @@ fn make_helical(
     Ok(())
 }
 
-/// Gives a joint another effort limit than the URDF's (N m or N).
+/// Replaces the effort limit of the URDF (N m or N).
 fn limit_effort(
     mechanism: &mut Mechanism,
     name: &str,
@@ -592,7 +596,7 @@ fn limit_effort(
     Ok(())
 }
 
-/// An entry of `[hold]`: a joint that moves by itself, within its limits.
+/// Checks an entry of `[hold]`: the joint must be independent and the value within its limits.
 fn held_joint(
     name: &str,
     value: &Spanned<f64>,
@@ -623,7 +627,7 @@ fn held_joint(
     Ok((name.to_owned(), at))
 }
 
-/// The text of an argument for a xacro file.
+/// Converts an argument for a xacro file to text.
 fn argument_text(name: &str, value: &Spanned<toml::Value>, source: &Source) -> Result<String, RobotFileError> {
     match value.get_ref() {
         toml::Value::String(text) => Ok(text.clone()),
@@ -666,7 +670,7 @@ fn tcp_of(file: &RobotFile, source: &Source, urdf: &UrdfRobot, options: &LoadOpt
     }
 }
 
-/// The value, or the fault put aside so that the next one is found too.
+/// Returns the value, or records the error so that later errors are found too.
 pub(crate) fn keep<T>(result: Result<T, Error>, faults: &mut Vec<Error>) -> Option<T> {
     result.map_err(|e| faults.push(e)).ok()
 }

@@ -1,4 +1,4 @@
-//! Path files: moves of the tool in TOML, told by a table `[path]`.
+//! Path files: TCP moves in TOML, recognised by the table `[path]`.
 //!
 //! Start at [`read_path_file`]. Docs: `docs/motions.md`.
 
@@ -20,7 +20,7 @@ use super::{Cell, Overrides, ToolPath};
 use crate::error::Error;
 use crate::robot_file::{RobotFileError, Source};
 
-/// The file as written.
+/// Path file as written.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct PathFile {
@@ -34,43 +34,44 @@ struct PathFile {
     program: Option<Spanned<ProgramTable>>,
 }
 
-/// `[program]`: a robot program in place of moves, with what it leaves open.
+/// `[program]`: a robot program instead of moves, with values for what the program leaves
+/// undefined.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct ProgramTable {
-    /// Beside this file.
+    /// Path of the program, relative to this file.
     file: Spanned<PathBuf>,
     /// Routine to start with.
     entry: Option<String>,
     /// Joint values at the start.
     start: Option<Vec<f64>>,
-    /// Names that the program leaves open, with values in its language.
+    /// Values of names that the program leaves undefined, in the program's language.
     #[serde(default)]
     given: BTreeMap<String, String>,
     #[serde(default)]
     waits_are_over: bool,
     endless_passes: Option<usize>,
-    /// G-code: how the tool stands in the work frame.
+    /// G-code: orientation of the tool in the work frame.
     rpy: Option<[f64; 3]>,
     quaternion: Option<[f64; 4]>,
-    /// G-code: A, B and C tilt the tool.
+    /// G-code: whether A, B and C tilt the tool.
     #[serde(default)]
     tilt: bool,
-    /// G-code: rapids are lines at this speed.
+    /// G-code: speed of rapids, which become straight lines.
     rapid: Option<f64>,
-    /// G-code: the tool centre point is the tip of the tool.
+    /// G-code: whether the tool centre point is the tip of the tool.
     #[serde(default)]
     tip_is_known: bool,
 }
 
-/// `[standard]`: a named motion in place of moves.
+/// `[standard]`: a named motion instead of moves.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct StandardTable {
     motion: Standard,
-    /// Of the cube, in the base.
+    /// Centre of the cube, in the base.
     centre: [f64; 3],
-    /// Of the cube, or diameter of the circles, or length of the moves.
+    /// Side of the cube, diameter of the circles, or length of the moves.
     side: Spanned<f64>,
     rpy: Option<[f64; 3]>,
     quaternion: Option<[f64; 4]>,
@@ -88,9 +89,9 @@ struct PathTable {
     angles: Spanned<String>,
     base: Option<Spanned<FrameTable>>,
     tool: Option<Spanned<FrameTable>>,
-    /// s.
+    /// Rise time of the accelerations (s).
     rise: Option<Spanned<f64>>,
-    /// What joints do that the path does not need.
+    /// Use of the joints that the path leaves free.
     redundancy: Option<Spanned<Redundancy>>,
     speed: Option<f64>,
     acceleration: Option<f64>,
@@ -118,7 +119,7 @@ struct FrameTable {
     quaternion: Option<[f64; 4]>,
 }
 
-/// One line of `[limits]`.
+/// One entry of `[limits]`.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct LimitsTable {
@@ -132,14 +133,14 @@ struct LimitsTable {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct MoveTable {
-    /// All joints to values.
+    /// Joint move to joint values.
     joints: Option<Spanned<Vec<f64>>>,
-    /// All joints to a pose of the tool.
+    /// Joint move to a TCP pose.
     joint_to: Option<Spanned<[f64; 3]>>,
     line: Option<Spanned<[f64; 3]>>,
     arc: Option<Spanned<[f64; 3]>>,
     spline: Option<Spanned<Vec<Vec<f64>>>>,
-    /// s.
+    /// Dwell time (s).
     dwell: Option<Spanned<f64>>,
     via: Option<Spanned<[f64; 3]>>,
     angle: Option<f64>,
@@ -158,12 +159,12 @@ struct MoveTable {
     blend: Option<f64>,
 }
 
-/// Longest time in which accelerations rise, s.
+/// Maximum rise time of accelerations (s).
 const LONGEST_RISE: f64 = 100.0;
-/// Work frames of G-code that stand in the base of the path.
+/// G-code work frames that are placed in the base of the path.
 const WORK_FRAMES: [&str; 6] = ["G54", "G55", "G56", "G57", "G58", "G59"];
 
-/// Is this text a path file and no list of waypoints?
+/// Returns whether the text is a path file rather than a list of waypoints.
 pub(crate) fn is_path_file(text: &str) -> bool {
     text.parse::<toml::Table>().is_ok_and(|table| table.contains_key("path"))
         || text.lines().any(|line| line.trim() == "[path]")
@@ -183,15 +184,15 @@ struct Reader<'a> {
     X_WB: Pose,
     X_FT: Option<Pose>,
     arm: &'a ProgramArm<'a>,
-    /// How the controller counts the axes of programs; the path file itself speaks of joints.
+    /// Axis convention of the controller for programs; the path file itself uses joint values.
     controller: Vec<ControllerAxis>,
 }
 
 /// Reads a path file and plans its motion.
 ///
 /// # Errors
-/// [`Error::RobotFile`] with line and column of what is wrong; [`Error::Path`] for what the arm
-/// cannot do.
+/// [`Error::RobotFile`] with line and column of an invalid entry; [`Error::Path`] if the arm cannot
+/// follow the path.
 pub(crate) fn read_path_file(
     path: &Path,
     text: &str,
@@ -243,7 +244,7 @@ pub(crate) fn read_path_file(
     ToolPath::plan(path, &program, &arm, &options(&file, &arm, units, &source)?, notes)
 }
 
-/// How the path is resolved.
+/// Returns the options for resolving the path.
 fn options(
     file: &PathFile,
     arm: &ProgramArm<'_>,
@@ -300,7 +301,7 @@ fn units(path: &PathTable, source: &Source) -> Result<Units, RobotFileError> {
     Ok(Units { length, angle })
 }
 
-/// `[limits]` by coordinate.
+/// Returns the limits of `[limits]` per coordinate.
 fn overrides(file: &PathFile, source: &Source, cell: &Cell<'_>, units: Units) -> Result<Overrides, RobotFileError> {
     let coordinates = cell.model.coordinates();
     let none = vec![None; cell.model.nv()];
@@ -343,7 +344,7 @@ fn frame_of(
     Ok(Pose::from_parts(Translation3::from(p), R.unwrap_or_else(Rotation3::identity)))
 }
 
-/// Fixed axes x, y, z (as in URDF), or w, x, y, z.
+/// Converts roll, pitch, yaw about fixed axes x, y, z (as in URDF) or a quaternion w, x, y, z.
 fn rotation(
     rpy: Option<[f64; 3]>,
     quaternion: Option<[f64; 4]>,
@@ -368,7 +369,7 @@ fn rotation(
 impl Reader<'_> {
     fn items(&self, moves: &[Spanned<MoveTable>]) -> Result<Vec<Item>, RobotFileError> {
         let mut items = Vec::new();
-        // Orientation of the tool in the base where the last move ended.
+        // Orientation of the tool in the base at the end of the last move.
         let mut R: Option<Rotation3<f64>> = None;
         for table in moves {
             let (line, _) = self.place(table);
@@ -390,7 +391,7 @@ impl Reader<'_> {
         (error.line, error.column)
     }
 
-    /// A move says one thing.
+    /// Checks that a move has exactly one kind.
     fn only_one(&self, table: &Spanned<MoveTable>) -> Result<(), RobotFileError> {
         let entry = table.get_ref();
         let said = [
@@ -492,7 +493,8 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// A robot program; what it says of speeds and frames goes before what this file says.
+    /// Plans a robot program; speeds and frames in the program take precedence over those in this
+    /// file.
     fn program(
         &self,
         table: &Spanned<ProgramTable>,
@@ -549,7 +551,7 @@ impl Reader<'_> {
         plan_program(&file, &bytes, &arm, &options, resolution, notes, &told)
     }
 
-    /// Speeds that the program leaves open.
+    /// Fills in the speeds that the program leaves open.
     fn fill(&self, program: &mut Program) {
         let common = self.speed(None);
         for item in &mut program.items {
@@ -593,7 +595,7 @@ impl Reader<'_> {
                 }
                 _ => Configuration::Nearest,
             };
-            // The halves of a circle go on into each other.
+            // The halves of a circle are joined without a stop.
             let passes = matches!(kind, MoveKind::Arc { .. }) && k + 1 < count;
             let blend = if passes { Blend::Pass } else { self.blend(None) };
             let statement = format!("step {k} of the standard motion");
@@ -603,13 +605,13 @@ impl Reader<'_> {
         Ok(steps.into_iter().enumerate().map(item).collect())
     }
 
-    /// Unit of a value of the controller's axis `k`.
+    /// Returns the unit of a value of the controller's axis `k`.
     fn joint_unit(&self, k: usize) -> f64 {
         let coordinate = self.arm.axes.get(k).map(|&k| &self.arm.model.coordinates()[k]);
         if coordinate.is_some_and(|c| c.kind == "prismatic") { self.units.length } else { self.units.angle }
     }
 
-    /// How the tool stands in the base at joint values.
+    /// Returns the orientation of the tool in the base at joint values.
     fn orientation_at(&self, values: &[f64], at: &Spanned<Vec<f64>>) -> Result<Rotation3<f64>, RobotFileError> {
         let axes = self.arm.axes.len();
         if values.len() != axes {
@@ -634,7 +636,7 @@ impl Reader<'_> {
         Move { line, statement: statement.to_owned(), kind, to, X_WB: self.X_WB, X_FT: self.X_FT, speed, blend }
     }
 
-    /// What a move says of its speed, else `[path]`.
+    /// Returns the speed of a move, with defaults from `[path]`.
     fn speed(&self, entry: Option<&MoveTable>) -> Speed {
         let (common, Units { length, angle }) = (self.common, self.units);
         let told = |of: fn(&MoveTable) -> Option<f64>| entry.and_then(of);
