@@ -14,13 +14,13 @@ use crate::robot::TCP_FRAME;
 pub struct AppliedLoad {
     /// `tcp`, or a link that moves.
     pub frame: String,
-    /// What acts at the frame's origin.
+    /// Wrench at the frame's origin.
     pub wrench: TimedWrench,
     /// When it begins (s), if it has a beginning.
     pub start_s: Option<f64>,
-    /// What is doubtful of how it is written.
+    /// Doubts about the entry of the load.
     pub(crate) doubts: Vec<Caveat>,
-    /// Where it is written, if a file was read.
+    /// Place in the file, if it was read from one.
     pub(crate) written: Option<Written>,
 }
 
@@ -30,7 +30,7 @@ impl AppliedLoad {
         Self { frame: frame.to_owned(), wrench, start_s: None, doubts: Vec::new(), written: None }
     }
 
-    /// The same, known to begin then (s): a load that begins after the run is told as a caveat.
+    /// The same, known to begin then (s): a load that begins after the run is reported as a caveat.
     #[must_use]
     pub fn starting_at(self, start_s: f64) -> Self {
         Self { start_s: Some(start_s), ..self }

@@ -17,9 +17,9 @@ use crate::robot::Robot;
 pub struct RobotBalancer {
     /// Unique name.
     pub name: String,
-    /// Where it acts.
+    /// Points of attack.
     pub ends: BalancerEnds,
-    /// How strong it is.
+    /// Force law.
     pub law: BalancerLaw,
 }
 
@@ -60,7 +60,7 @@ pub struct BalancerInfo {
     pub tension: f64,
     /// Its derivative by the length (N/m; N m/rad).
     pub stiffness: f64,
-    /// What it puts on each joint (N m or N), in coordinate order.
+    /// Torque or force on each joint (N m or N), in coordinate order.
     pub torque: Vec<f64>,
 }
 
@@ -101,7 +101,7 @@ impl Robot {
         Ok(())
     }
 
-    /// Frames for the two ends: fixed to their links, so that a link that bends carries each on the
+    /// Frames for the two ends: fixed to their links, so that a flexible link carries each on the
     /// part where it is.
     fn line(&mut self, name: &str, ends: &[(String, [f64; 3]); 2]) -> Result<BalancerSpan, BalancerError> {
         let name = name.to_owned();
@@ -156,7 +156,8 @@ pub(crate) fn at_pose(model: &Model, q: &DVector<f64>) -> Vec<BalancerInfo> {
     model.balancers().iter().map(info).collect()
 }
 
-/// What a balancer puts on each coordinate (N m or N), at the poses in `data` and its length there.
+/// Returns the torque of a balancer on each coordinate (N m or N), at the poses in `data` and its
+/// length there.
 fn torques(model: &Model, data: &Data, balancer: &PlacedBalancer, length: f64) -> Vec<f64> {
     let mut torque = vec![0.0; model.nv()];
     match &balancer.place {

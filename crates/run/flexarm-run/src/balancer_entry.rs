@@ -61,7 +61,7 @@ pub(crate) struct SpringEntry {
     pub free_length: Option<f64>,
     /// Angle, or place of a joint that slides, at which it has its preload (rad or m).
     pub free_angle: Option<f64>,
-    /// What it pulls there (N), or puts on the joint (N m).
+    /// Force there (N), or torque on the joint (N m).
     #[serde(default)]
     pub preload: f64,
 }
@@ -74,7 +74,7 @@ pub(crate) struct GasEntry {
     pub acts: Spanned<String>,
     /// At `length`, absolute (Pa).
     pub pressure: f64,
-    /// Of the gas at `length` (m³).
+    /// Volume of the gas at `length` (m³).
     pub volume: f64,
     /// Area that the pressure works on (m²).
     pub area: Option<f64>,
@@ -104,7 +104,7 @@ pub(crate) struct GasSpringEntry {
     pub force: f64,
     /// Extended length (m).
     pub length: f64,
-    /// How far it can be pressed together (m).
+    /// Maximum compression (m).
     pub stroke: f64,
     /// Force pressed together over force extended.
     pub progression: f64,
@@ -143,7 +143,7 @@ pub(crate) fn add_balancers(
     }
 }
 
-/// Where to point at when an entry as a whole is wrong.
+/// Place of an entry as a whole, for errors.
 fn place_of(entry: &Spanned<BalancerEntry>) -> Range<usize> {
     let inner = entry.get_ref();
     let joint = inner.joint.as_ref().map(Spanned::span);
@@ -219,7 +219,7 @@ impl<F: Fn(Range<usize>, String) -> RobotFileError> Law<'_, F> {
         self.number(at, key, value, value > 0.0, &format!("a positive number in {unit}"))
     }
 
-    /// What acts along a line only.
+    /// Refuses a key that applies to balancers along a line only.
     fn along_line(&self, at: &Range<usize>, what: &str) -> Result<(), RobotFileError> {
         match self.over_joint {
             true => Err((self.fail)(

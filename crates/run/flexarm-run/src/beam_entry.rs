@@ -19,9 +19,9 @@ pub(crate) struct BeamEntry {
     pub height: Option<f64>,
     /// Thickness (m).
     pub wall: Option<f64>,
-    /// Of tubes (m).
+    /// Outer diameter of a tube (m).
     pub outer_diameter: Option<f64>,
-    /// Of circles (m).
+    /// Diameter of a circle (m).
     pub diameter: Option<f64>,
     /// Thickness of the web of I-beams and channels (m).
     pub web: Option<f64>,
@@ -65,10 +65,10 @@ pub(crate) struct BeamEntry {
     /// From the line A-B to the beam, link axes (m).
     #[serde(default)]
     pub offset: [f64; 3],
-    /// Where the beam itself begins and ends, link axes (m); A and B if not given. Rigid arms lead
+    /// Ends of the beam, link axes (m); A and B if not given. Rigid arms lead
     /// from there to the joints.
     pub ends: Option<[[f64; 3]; 2]>,
-    /// Where the link is split, as a fraction of A-B.
+    /// Position of the split, as a fraction of A-B.
     #[serde(default = "half")]
     pub split: f64,
     /// from-link or uniform.

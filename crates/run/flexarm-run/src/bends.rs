@@ -1,4 +1,4 @@
-//! Where flexible links are drawn bent: stations along them, and what hangs on those.
+//! Stations along flexible links for drawing them deformed, and the links attached to the stations.
 
 use flexarm_flexlink::Substituted;
 use flexarm_kinematics::{Data, Frame, Model, Pose, forward_kinematics};
@@ -46,7 +46,8 @@ pub(crate) fn bends(substituted: &Substituted) -> Vec<Bend> {
     substituted.spans.iter().map(of_span).collect()
 }
 
-/// Stations in a model: what recordings are told once, and the frames that samples are made of.
+/// Stations in a model: their description for the header of recordings, and their frames for
+/// samples.
 pub(crate) fn stations(bends: &[Bend], model: &Model, links: &[LinkInfo]) -> (Vec<BendInfo>, Vec<Frame>) {
     let mut data = Data::new(model);
     forward_kinematics(model, &mut data, &DVector::zeros(model.nv()));

@@ -32,14 +32,14 @@ pub struct Finding {
     /// File and line, or joint or link.
     #[serde(rename = "where")]
     pub location: String,
-    /// What was found.
+    /// Value found.
     pub message: String,
-    /// How to mend it.
+    /// Remedy.
     pub help: String,
     /// Value that was found, if it is one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub value: Option<f64>,
-    /// What it was compared with.
+    /// Yardstick of the comparison.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub yardstick: Option<f64>,
     /// Unit of both.
@@ -99,7 +99,7 @@ pub fn check_with_loads(
     check_with_motion(robot, trajectory, &MotionOptions::default(), loads, options)
 }
 
-/// As [`check_with_loads`], with the topic of a bag or the columns of a table told.
+/// As [`check_with_loads`], with the topic of a bag or the columns of a table.
 pub fn check_with_motion(
     robot: &Path,
     trajectory: Option<&Path>,
@@ -128,7 +128,7 @@ pub fn check_with_motion(
             None
         }
         (Some(path), _) => check_motion(&robot, path, motion_options, &mut findings),
-        // Its own faults are told when it is asked for.
+        // Faults of the default motion are reported when it is used.
         (None, Some(own)) => robot.rigid_model().ok().and_then(|model| {
             let motion = crate::Motion::load(own, &robot).ok()?;
             let along = of_motion(&motion.name, &motion.trajectory, &model);
@@ -144,7 +144,7 @@ pub fn check_with_motion(
     findings
 }
 
-/// What is to be said of a file of loads.
+/// Adds the findings about a file of loads.
 fn check_loads(robot: &Robot, motion: Option<&Motion>, path: &Path, findings: &mut Vec<Finding>) {
     let Some(motion) = motion else {
         let message = "loads belong to a motion, which is missing or cannot be read";
@@ -165,8 +165,8 @@ fn check_loads(robot: &Robot, motion: Option<&Motion>, path: &Path, findings: &m
     }
 }
 
-/// What is wrong with a motion whose robot cannot be loaded; limits that the robot would give are
-/// not missed.
+/// Returns the error of a motion whose robot cannot be loaded; missing limits that the robot would
+/// give are no error.
 fn motion_without_robot(path: &Path, options: &MotionOptions) -> Option<Finding> {
     let file = MotionFile { path, joints: None, limits: &[], options, cell: None, text: None };
     let error = motion_formats::read(&file).err()?;
@@ -175,7 +175,7 @@ fn motion_without_robot(path: &Path, options: &MotionOptions) -> Option<Finding>
     (!follows).then(|| Finding::error("trajectory", path.display().to_string(), &error))
 }
 
-/// What kept a robot from being loaded, one finding per fault.
+/// Adds the errors of loading a robot, one finding per fault.
 fn load_findings(error: &Error, path: &Path, findings: &mut Vec<Finding>) {
     match error {
         Error::Several(errors) => errors.iter().for_each(|e| load_findings(e, path, findings)),

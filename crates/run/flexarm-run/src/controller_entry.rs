@@ -23,7 +23,7 @@ pub(crate) struct ControllerAxisEntry {
     pub zero_deg: Option<Spanned<f64>>,
     /// Joint of an axis before, which this one is measured against.
     pub relative_to: Option<Spanned<String>>,
-    /// What of that axis adds to the joint: -1 if not given.
+    /// Factor of that axis in the joint value; -1 if not given.
     pub factor: Option<Spanned<f64>>,
 }
 

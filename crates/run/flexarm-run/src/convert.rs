@@ -27,7 +27,7 @@ pub struct ConvertOptions {
     pub overwrite: bool,
 }
 
-/// What was converted.
+/// Source of the conversion.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct ConvertSummary {
     /// The recording that was read.
@@ -42,9 +42,9 @@ pub struct ConvertSummary {
     pub samples: u64,
     /// Time from the first to the last (s).
     pub duration_s: f64,
-    /// What did not come along: sentences.
+    /// Content that was not converted, as sentences.
     pub lost: Vec<String>,
-    /// Things worth telling, such as a broken end: sentences.
+    /// Warnings, such as a truncated end, as sentences.
     pub warnings: Vec<String>,
 }
 
@@ -61,7 +61,7 @@ pub fn convert(input: &Path, output: &Path, options: &ConvertOptions) -> Result<
     convert_until(input, output, options, &mut |_| ControlFlow::Continue(()))
 }
 
-/// As [`convert()`], until the callback breaks off; it is told the time that the conversion has
+/// As [`convert()`], until the callback breaks off; it receives the time that the conversion has
 /// come to (s).
 ///
 /// # Errors
@@ -200,7 +200,7 @@ pub(crate) fn same_file(a: &Path, b: &Path) -> bool {
     a.canonicalize().ok().zip(b.canonicalize().ok()).is_some_and(|(a, b)| a == b)
 }
 
-/// A file in a folder of its own beside the output, so that its name is nobody else's. The folder
+/// A file in a folder of its own beside the output, so that its name is unique. The folder
 /// goes away in the end.
 struct Partial {
     folder: PathBuf,

@@ -1,4 +1,4 @@
-//! How far the tool is off in many runs of one arm, on all cores and several runs at a time in
+//! TCP deflection in many runs of one arm, on all cores and several runs at a time in
 //! each.
 //!
 //! For studies: payload, motion, stiffness and damping vary, and of each run the deflection is
@@ -32,13 +32,13 @@ impl Variation {
         Self { scenario: scenario.into(), stiffness: 1.0, damping: 1.0 }
     }
 
-    /// The same with all springs so many times as stiff.
+    /// Returns the variation with the stiffness of all springs multiplied by a factor.
     #[must_use]
     pub fn with_stiffness(self, factor: f64) -> Self {
         Self { stiffness: factor, ..self }
     }
 
-    /// The same with so many times the damping.
+    /// Returns the variation with the damping multiplied by a factor.
     #[must_use]
     pub fn with_damping(self, factor: f64) -> Self {
         Self { damping: factor, ..self }

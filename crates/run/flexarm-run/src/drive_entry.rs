@@ -34,7 +34,7 @@ pub(crate) struct DriveEntry {
     pub gearbox: Option<Spanned<GearboxEntry>>,
     /// Friction between motor and base of the joint.
     pub friction: Option<Spanned<FrictionEntry>>,
-    /// Largest torque; the URDF's effort limit if not given (N m).
+    /// Maximum torque; the URDF's effort limit if not given (N m).
     pub torque_limit: Option<Spanned<f64>>,
     /// Controller of kind = torque.
     pub servo: Option<Spanned<ServoEntry>>,
@@ -68,7 +68,7 @@ pub(crate) struct GearboxEntry {
     /// Errors of the transmission, harmonic by harmonic.
     #[serde(default)]
     pub transmission_error: Vec<HarmonicEntry>,
-    /// Friction within, as catalogues tell it.
+    /// Internal friction, as given in catalogues.
     pub hysteresis: Option<HysteresisEntry>,
 }
 
@@ -120,7 +120,7 @@ pub struct ServoEntry {
     pub feed_forward: Option<bool>,
 }
 
-/// How a joint is driven.
+/// Kind of a drive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DriveKind {
     /// Exactly along the trajectory.
@@ -136,7 +136,7 @@ pub enum DriveKind {
 pub struct Drive {
     /// Joint.
     pub joint: String,
-    /// How it is driven.
+    /// Kind of the drive.
     pub kind: DriveKind,
     /// Turns of the motor per turn of the joint.
     pub(crate) ratio: f64,
@@ -150,7 +150,7 @@ pub struct Drive {
     pub friction: Friction,
     /// Its part of the transmitted torque.
     pub load_friction: f64,
-    /// Largest torque (N m).
+    /// Maximum torque (N m).
     pub torque_limit: f64,
     /// Servo as written.
     pub servo: ServoEntry,
@@ -188,7 +188,7 @@ pub struct GearDamping {
 }
 
 impl Drive {
-    /// How it is driven where drives are modelled so.
+    /// Kind of the drive where drives are modelled.
     pub(crate) fn kind_as(&self, drives: DriveModel) -> DriveKind {
         match drives {
             DriveModel::AsFiled => self.kind,
@@ -199,7 +199,7 @@ impl Drive {
         }
     }
 
-    /// Its gearbox, if it gives way where drives are modelled so.
+    /// Gearbox, if it is elastic where drives are modelled.
     pub(crate) fn gearbox_as(&self, drives: DriveModel) -> Option<Gearbox> {
         let gives_way = self.kind_as(drives) != DriveKind::Prescribed;
         self.gearbox.as_ref().filter(|_| gives_way).map(|(gearbox, _)| gearbox.clone())

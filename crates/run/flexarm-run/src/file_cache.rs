@@ -12,7 +12,7 @@ use flexarm_urdf::{ReadOptions, UrdfRobot, read_urdf};
 
 use crate::error::Error;
 
-/// What was read.
+/// Content that was read.
 #[derive(Debug, Default)]
 pub struct FileCache {
     /// By path and options.

@@ -21,9 +21,9 @@ const ARCSEC: f64 = std::f64::consts::PI / 648_000.0;
 const ARCMIN: f64 = 60.0 * ARCSEC;
 /// Sliders of a hysteresis that does not say how many.
 const SLIDERS: usize = 8;
-/// Most of them.
+/// Maximum number of sliders.
 const MOST_SLIDERS: i64 = 200;
-/// Part of the rated torque at which catalogues tell the lost motion.
+/// Part of the rated torque at which catalogues give the lost motion.
 const LOST_MOTION_AT: f64 = 0.03;
 
 /// A harmonic of a transmission error.
@@ -43,7 +43,7 @@ pub(crate) struct HarmonicEntry {
     pub phase: f64,
 }
 
-/// Hysteresis of a gear, by what catalogues tell.
+/// Hysteresis of a gear, from catalogue values.
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct HysteresisEntry {
@@ -319,7 +319,7 @@ impl Robot {
     }
 }
 
-/// What gears do beside giving way, in their places.
+/// Effects of gears other than elasticity, with their coordinates.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct GearLaws {
     pub(crate) transmission: Vec<TransmissionError>,
@@ -329,7 +329,7 @@ pub(crate) struct GearLaws {
 }
 
 impl GearLaws {
-    /// Of a drive whose joint has that coordinate and whose gearbox, if it gives way, is that
+    /// Effects of a drive whose joint has that coordinate and whose gearbox, if elastic, is that
     /// element.
     pub(crate) fn add(&mut self, drive: &Drive, coordinate: usize, element: Option<usize>) {
         if let (Some(element), Some((_, gear))) = (element, &drive.gearbox) {
@@ -347,7 +347,7 @@ impl GearLaws {
         }
     }
 
-    /// Puts them into an arm, springs so many times as stiff as they were.
+    /// Adds them to an arm whose springs are stiffer by a factor.
     pub(crate) fn put_into(
         &self,
         mut arm: FlexibleArm,

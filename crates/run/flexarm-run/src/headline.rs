@@ -1,4 +1,4 @@
-//! The first line of every result: how far the tool is off, what of it is sag, and what bends.
+//! First line of every result: peak TCP error, its static part, and its causes.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,15 +8,15 @@ use crate::summary::{Summary, TcpFigures};
 /// Errors below this are rounding (m).
 const NOTHING_M: f64 = 1e-12;
 
-/// What bends in a run.
+/// Flexible elements of a run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Bending {
     /// Names of the flexible links.
     pub links: Vec<String>,
-    /// Names of the joints whose gearboxes yield.
+    /// Names of the joints with elastic gearboxes.
     pub gearboxes: Vec<String>,
-    /// What the base stands on, if it yields.
+    /// Mounting of the base, if elastic.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mounting: Option<String>,
 }
@@ -28,7 +28,7 @@ impl Bending {
     }
 }
 
-/// What one link, one gearbox, the servos or the stepper have in the largest TCP error.
+/// Share of one link, one gearbox, the servos or the stepper in the peak TCP error.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct ShareFigures {
@@ -51,7 +51,8 @@ pub(crate) const SERVO: &str = "servo";
 /// Kind of what joints drift apart in the steps of a stepper in maximal coordinates.
 pub(crate) const STEPPER: &str = "stepper";
 
-/// The line for a run; `by_choice`: the robot has something that bends, and this run has it rigid.
+/// Returns the line for a run; `by_choice`: the robot has flexible elements that are rigid in this
+/// run.
 pub(crate) fn headline(summary: &Summary, by_choice: bool) -> String {
     let why_nothing = why_nothing(by_choice);
     let nothing = summary.bends.is_nothing();
@@ -134,7 +135,7 @@ fn parts(tcp: &TcpFigures) -> String {
     }
 }
 
-/// What counts on a path of the tool, before everything else.
+/// Returns the error across a TCP path.
 fn across(path: &PathFigures) -> String {
     let digits = digits(1e3 * path.across_peak_m);
     let mm = |x: f64| format!("{:.digits$}", 1e3 * x);
@@ -142,7 +143,7 @@ fn across(path: &PathFigures) -> String {
     format!("{peak} mm across the path, {left} with the workpiece shifted to fit; ")
 }
 
-/// Kinds of shares with their words, in the order in which they are told.
+/// Kinds of shares with their names, in order.
 const GROUPS: [(&str, &str); 5] = [
     (LINK, "links"),
     (GEARBOX, "gearboxes"),
@@ -184,7 +185,7 @@ mod tests {
         assert_eq!(rounded(&[1.4157, 4.6051], 6.0208, 2), ["1.42", "4.60"]);
         assert_eq!(rounded(&[-0.126, 1.135], 1.009, 2), ["-0.13", "1.14"]);
         assert_eq!(rounded(&[-0.001, 1.0], 0.999, 2), ["0.00", "1.00"]);
-        // What is no sum is not made one.
+        // Parts that do not add up are rounded separately.
         assert_eq!(rounded(&[1.0, 2.0], 5.0, 1), ["1.0", "2.0"]);
         assert!(rounded(&[], 1.0, 2).is_empty());
     }

@@ -1,8 +1,8 @@
-//! How pages without scripts begin.
+//! Head of pages without scripts.
 
 use flexarm_settings::written::markup;
 
-/// How the pages look.
+/// Style sheet of the pages.
 const STYLE: &str = "\
 body { font: 15px/1.5 system-ui, sans-serif; max-width: 64rem; margin: 2rem auto; padding: 0 1rem; color: #1c2530; background: #fff }
 table { border-collapse: collapse; margin: 1rem 0 } td, th { padding: .25rem .7rem; text-align: right; border-bottom: 1px solid #d8dee6 }

@@ -1,4 +1,4 @@
-//! What was loaded, and its kinematics and dynamics at one pose.
+//! Description of a loaded robot, with its kinematics and dynamics at one pose.
 
 use std::sync::Arc;
 
@@ -45,7 +45,7 @@ pub struct Inspection {
     pub velocity: Vec<f64>,
     /// 6 rows × one column per joint.
     pub jacobian: Vec<Vec<f64>>,
-    /// Of the rigid robot with its payload.
+    /// Mass matrix of the rigid robot with its payload.
     pub mass_matrix: Vec<Vec<f64>>,
     /// Forces that hold the pose, against gravity and balancers.
     pub gravity_torque: Vec<f64>,
@@ -61,9 +61,9 @@ pub struct Inspection {
     pub loops: Vec<LoopInfo>,
     /// Total mass (kg), payload and base included.
     pub mass_kg: f64,
-    /// What the caveats warn of, as sentences.
+    /// Warnings among the caveats, as sentences.
     pub warnings: Vec<String>,
-    /// What is probably wrong with the input.
+    /// Doubts about the input.
     pub caveats: Vec<Caveat>,
 }
 
@@ -103,7 +103,7 @@ pub struct LinkInfo {
 pub struct FlexibleInfo {
     /// Name.
     pub name: String,
-    /// Where its stiffness comes from.
+    /// Source of its stiffness.
     pub method: String,
     /// Distance of the interfaces (m).
     pub length_m: f64,
@@ -113,9 +113,9 @@ pub struct FlexibleInfo {
     pub stiffness: Vec<Vec<f64>>,
     /// lumped or modal.
     pub model: &'static str,
-    /// How many elastic coordinates it has.
+    /// Number of elastic coordinates.
     pub coordinates: usize,
-    /// Of a modal link: natural frequencies with A held, all of them (Hz).
+    /// All natural frequencies of a modal link with A held (Hz).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub modal_frequencies_hz: Option<Vec<f64>>,
 }
@@ -134,13 +134,13 @@ pub struct CouplingInfo {
 pub struct MountingInfo {
     /// Name.
     pub name: String,
-    /// Where they are, in the base link (m).
+    /// Position of the springs in the base link (m).
     pub position_m: [f64; 3],
     /// Their axes in the base link, w first.
     pub quaternion_wxyz: [f64; 4],
     /// Stiffness in their axes, 6×6, linear first.
     pub stiffness: Vec<Vec<f64>>,
-    /// What rides on them beside the base (kg).
+    /// Mass on the springs in addition to the base (kg).
     pub mass_kg: f64,
 }
 
@@ -241,7 +241,7 @@ pub fn inspect(robot: &Robot, at: Option<&[f64]>, velocity: Option<&[f64]>) -> R
         LinkInfo { name: l.name.clone(), mass_kg, com_m, inertia }
     });
     let flexible = Arc::new(robot.flexible_robot()?);
-    // What is inspected is the rigid robot, which yields nowhere.
+    // The rigid robot is inspected: it has no elastic element.
     let mut caveats = told(robot, &flexible, None, Use::Held(&q, &[0.0; 6]));
     caveats.retain(|caveat| caveat.code != "nothing-yields");
     let forms = robot.flexible.iter().map(|link| robot.form_of(link, &Modelling::default()).map(|(form, _)| form));

@@ -20,10 +20,10 @@ use crate::robot_file::{BeamEntry, DampingEntry, FlexibleLinkEntry, RobotFileErr
 /// Difference of mirrored entries, over the root of those on the diagonal, up to which a matrix is
 /// symmetric as written.
 const SYMMETRIC: f64 = 1e-9;
-/// Smallest eigenvalue of a stiffness with its diagonal scaled to one: below, rounding decides.
+/// Minimum eigenvalue of a stiffness scaled to a unit diagonal; below it, rounding dominates.
 const DEFINITE: f64 = 1e-12;
 
-/// Where the files of links are looked for, and who reads them.
+/// Folder and reader of link files.
 pub(crate) struct LinkHome<'a> {
     pub(crate) folder: &'a Path,
     pub(crate) files: &'a FileCache,
@@ -126,7 +126,7 @@ pub(crate) fn flexible_link(
     };
     let stiffness = entry.stiffness.as_ref().map(|given| matrix6(given, entry, source)).transpose()?;
     let link = RobotLink { flexible, damping, stiffness, stiffness_factor, stiffness_factors, beam, choices };
-    // What the file asks for must be there; overrides are looked at when they are used.
+    // Only the choice of the file is checked here; overrides are checked when they are used.
     link.form_or_key(&Modelling::default()).map_err(|(asked, message)| {
         let key = match asked {
             Asked::Model => None,

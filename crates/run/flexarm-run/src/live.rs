@@ -1,10 +1,10 @@
-//! An arm that is commanded while it moves: a controller, or somebody who learns one, gives targets
+//! An arm that is commanded while it moves: a controller, or a learning algorithm, gives targets
 //! period by period.
 //!
 //! A [`Motion`](crate::Motion) is known before a run; here only the target of the next control
-//! period is. Joints go from target to target: on cubics if velocities are told with the targets,
+//! period is. Joints go from target to target: on cubics if velocities are given with the targets,
 //! else on the parabola through the last three, whose acceleration is a period late, as that of any
-//! controller that is told positions alone. Drives do with them what they do in a run: exact joints
+//! controller that receives positions only. Drives treat them as in a run: exact joints
 //! are there, servos follow with their gains and lag.
 
 use std::sync::{Arc, PoisonError, RwLock};
@@ -31,7 +31,7 @@ struct Period {
     length: f64,
     q: [Vec<f64>; 2],
     qdot: [Vec<f64>; 2],
-    /// Second differences of the last three targets, where no velocities are told.
+    /// Second differences of the last three targets, without velocities.
     bend: Option<Vec<f64>>,
     /// The targets before those at the start.
     earlier: Vec<f64>,
@@ -144,7 +144,7 @@ impl Period {
         }
     }
 
-    /// The next one, to targets `q`, and velocities there if they are told.
+    /// Starts the next period, to targets `q`, with the velocities there if given.
     fn go_to(&mut self, begin: f64, q: &[f64], qdot: Option<&[f64]>) {
         self.begin = begin;
         self.earlier.copy_from_slice(&self.q[0]);
@@ -187,7 +187,7 @@ impl Live {
         Ok(())
     }
 
-    /// One control period, at whose end the joints are told to be at `q` (rad or m).
+    /// Advances by one control period, at whose end the joint targets are `q` (rad or m).
     ///
     /// * `qdot`: velocities there (rad/s or m/s); without them joints go on the parabola through
     ///   the last three targets.
@@ -266,7 +266,7 @@ impl Live {
         self.seen.X_WB[tcp.body] * tcp.X_BF
     }
 
-    /// Where a rigid arm with its joints at the last targets has the tool.
+    /// Returns the TCP pose of the rigid arm with its joints at the last targets.
     pub fn target_pose(&mut self) -> Pose {
         let period = self.targets.0.read().unwrap_or_else(PoisonError::into_inner);
         let (data, state) = &mut self.rigid;

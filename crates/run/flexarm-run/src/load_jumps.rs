@@ -1,4 +1,4 @@
-//! Where a load that is only known as a function of time jumps.
+//! Search for the jumps of a load that is given as a function of time.
 
 use flexarm_kinematics::Wrench;
 

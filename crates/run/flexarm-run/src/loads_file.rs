@@ -3,7 +3,7 @@
 //!
 //! A file of its own, because loads belong to a run and not to a robot. Start at `read_loads`. Not
 //! here: what the values do on a robot (`applied_load`, `payload`); they remember where they are
-//! written (`Written`), so that what is found wrong there is told with its place.
+//! written (`Written`), so that errors are reported with their place.
 
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
@@ -104,7 +104,7 @@ struct PayloadEntry {
 
 type WrenchFn = Arc<dyn Fn(f64) -> Wrench + Send + Sync>;
 
-/// Where a value is written: its entry as a whole, and what it says of frame or link and of
+/// Place of a value: its entry as a whole, and its keys for frame or link and for
 /// inertia.
 #[derive(Clone, Debug)]
 pub(crate) struct Written {
@@ -119,17 +119,17 @@ impl Written {
         Self { entry: place(None), frame: place(frame), inertia: place(inertia) }
     }
 
-    /// What is wrong with a value as a whole, at its place if it was read from a file.
+    /// Returns an error about a value as a whole, with its place if it was read from a file.
     pub(crate) fn entry(written: Option<&Self>, cause: impl Into<LoadError>) -> Error {
         Self::error(written.map(|written| &written.entry), cause.into())
     }
 
-    /// What is wrong with its frame or link.
+    /// Returns an error about its frame or link.
     pub(crate) fn frame(written: Option<&Self>, cause: impl Into<LoadError>) -> Error {
         Self::error(written.map(|written| &written.frame), cause.into())
     }
 
-    /// What is wrong with its inertia.
+    /// Returns an error about its inertia.
     pub(crate) fn inertia(written: Option<&Self>, cause: impl Into<LoadError>) -> Error {
         Self::error(written.map(|written| &written.inertia), cause.into())
     }
@@ -370,7 +370,7 @@ impl Reading<'_> {
     }
 }
 
-/// What an entry says; whether a robot can carry it shows on the robot.
+/// Returns the load of an entry; whether the robot has its frame is checked on the robot.
 fn payload(entry: &Spanned<PayloadEntry>, source: &Source) -> PayloadChange {
     let e = entry.get_ref();
     let [xx, yy, zz, xy, xz, yz] = e.inertia.as_ref().map_or([0.0; 6], |inertia| *inertia.get_ref());
@@ -411,17 +411,17 @@ fn stray_key(e: &LoadEntry, kind: &str) -> Option<(&'static str, &'static str)> 
     keys.iter().find(stray).map(|(key, _, kinds)| (*key, *kinds))
 }
 
-/// Nobody knows what is in an expression: the reference stepper looks at it as at a vibration of
+/// An expression may contain any frequency: the reference stepper treats it as a vibration of
 /// this period (s).
 pub(crate) const EXPRESSION_PERIOD: f64 = 5e-3;
 /// Longest expression (characters).
 const LONGEST_EXPRESSION: usize = 2000;
-/// Most harmonics of a milling force; beyond, each is nothing against the first.
+/// Maximum number of harmonics of a milling force; higher ones are negligible.
 const MOST_HARMONICS: u32 = 50;
-/// Most rows of a table whose times the reference stepper meets one by one.
+/// Maximum number of rows of a table at whose times the reference stepper stops.
 const MOST_ROWS: usize = 1000;
 
-/// Where a value stands, else its entry.
+/// Returns the place of a value, else that of its entry.
 fn span_or<T, E>(value: Option<&Spanned<T>>, entry: &Spanned<E>) -> Range<usize> {
     value.map_or(entry.span(), Spanned::span)
 }

@@ -18,11 +18,11 @@ use crate::robot_file::Source;
 pub(crate) struct LoopEntry {
     /// For messages; numbered if not given.
     pub name: Option<Spanned<String>>,
-    /// Where the pin is.
+    /// Position of the pin.
     pub pin: Spanned<EndEntry>,
     /// Its axis in axes of that link; that of the first dependent joint that turns if not given.
     pub axis: Option<Spanned<[f64; 3]>>,
-    /// Where the eye is that the pin goes through.
+    /// Position of the eye around the pin.
     pub eye: Spanned<EndEntry>,
     /// The joints that follow from the loop.
     pub dependent: Spanned<Vec<String>>,

@@ -57,7 +57,7 @@ pub struct DependentInfo {
     pub lower: Option<f64>,
     /// Highest position (rad or m).
     pub upper: Option<f64>,
-    /// Where it is (rad or m).
+    /// Its position (rad or m).
     pub q: f64,
 }
 
@@ -79,7 +79,7 @@ impl Robot {
         Ok(self)
     }
 
-    /// Frames for pin and eye: fixed to their links, so that a link that bends carries each on the
+    /// Frames for pin and eye: fixed to their links, so that a flexible link carries each on the
     /// part where it is.
     pub(crate) fn add_loop(&mut self, own: RobotLoop) -> Result<(), LoopError> {
         let RobotLoop { name, pin, axis, eye, dependent, at } = own;
@@ -174,9 +174,9 @@ pub(crate) fn at_pose(model: &Model, q: &DVector<f64>) -> Vec<LoopInfo> {
     model.loops().iter().enumerate().map(info).collect()
 }
 
-/// What the loops do in poses spread over the joint ranges.
+/// Closure of the loops in poses spread over the joint ranges.
 pub(crate) struct OverRanges {
-    /// Smallest transmission angle of each loop (rad), infinite if there was no pose.
+    /// Minimum transmission angle of each loop (rad), infinite without a pose.
     pub(crate) smallest: Vec<f64>,
     /// Parts of the poses in which each does not close.
     pub(crate) open: Vec<f64>,
@@ -218,9 +218,9 @@ pub(crate) fn check_pose(model: &Model, data: &mut Data, q: &DVector<f64>) -> Re
 /// Times at which a motion is looked at.
 const TIMES: usize = 1000;
 
-/// What the loops do along a motion of the rigid robot.
+/// Closure of the loops along a motion of the rigid robot.
 pub struct AlongMotion {
-    /// Smallest transmission angle of each loop (rad), and when (s).
+    /// Minimum transmission angle of each loop (rad), and its time (s).
     pub(crate) smallest: Vec<(f64, f64)>,
     /// Lowest and highest value of each dependent joint (rad or m).
     pub(crate) range: Vec<[f64; 2]>,

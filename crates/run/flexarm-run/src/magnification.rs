@@ -1,4 +1,4 @@
-//! How much larger than life a recording shows deflections, decided before the run.
+//! Magnification of deflections in a recording, chosen before the run.
 
 use flexarm_kinematics::{Frame, frame_jacobian};
 use flexarm_log::Trace;
@@ -13,18 +13,18 @@ const INSTANTS: u32 = 200;
 const PIECES: u32 = 64;
 /// Part of the arm's reach by which the tool's largest deflection is shown.
 const SHOWN: f64 = 0.15;
-/// Most that springs turn on the screen (rad).
+/// Maximum magnified rotation of a spring (rad).
 const LARGEST_TURN: f64 = 0.3;
-/// A load that strikes at once, or a start from undeformed springs, deflects twice as far as the
+/// A sudden load, or a start from undeformed springs, deflects twice as far as the
 /// same load at rest.
 const SUDDEN: f64 = 2.0;
 
 /// Deflections that a run will have, roughly.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Expected {
-    /// Of the tool (m).
+    /// Deflection of the TCP (m).
     pub(crate) tool_m: f64,
-    /// Of the spring that turns most (rad).
+    /// Maximum rotation of a spring (rad).
     pub(crate) turn_rad: f64,
     /// Distance of the tool from the base joint (m).
     pub(crate) reach_m: f64,
@@ -93,7 +93,7 @@ impl Expected {
         expected
     }
 
-    /// What two runs that are seen together have at most.
+    /// Returns the maximum of two runs that are shown together.
     pub(crate) fn or(self, other: Self) -> Self {
         let largest = |a: [f64; 3], b: [f64; 3], pick: fn(f64, f64) -> f64| [0, 1, 2].map(|c| pick(a[c], b[c]));
         let volume = match (self.volume, other.volume) {
@@ -108,7 +108,7 @@ impl Expected {
         }
     }
 
-    /// Factor on deflections with which they are seen: a round number, or 0 if nothing bends.
+    /// Factor on deflections with which they are seen: a round number, or 0 if nothing is flexible.
     pub(crate) fn magnification(&self) -> f64 {
         if !(self.tool_m > 0.0 && self.tool_m.is_finite()) {
             return 0.0;

@@ -21,17 +21,17 @@ use flexarm_settings::written::markdown;
 const SHOWN_HZ: f64 = 1.0;
 /// Samples per second.
 const RATE_HZ: f64 = 30.0;
-/// Part of the reach by which the tool moves unless told otherwise.
+/// Default amplitude of the TCP as a part of the reach.
 const PART_OF_REACH: f64 = 0.05;
 /// No elastic coordinate is shown larger than this (m, rad).
 const LARGEST: f64 = 0.5;
 
-/// How modes are shown.
+/// Options of a recording of modes.
 #[derive(Clone, Debug)]
 pub struct ModeMovie {
-    /// How long each mode swings (s); rounded up to whole swings.
+    /// Duration of each mode (s); rounded up to whole periods.
     pub seconds: f64,
-    /// How far the tool moves in a mode (m); a twentieth of the arm's reach without it.
+    /// Amplitude of the TCP in a mode (m); default a twentieth of the arm's reach.
     pub tool_motion_m: Option<f64>,
 }
 
@@ -109,7 +109,7 @@ pub fn record_modes(
     Ok(figures)
 }
 
-/// What a mode is called while it swings.
+/// Returns the label of a mode.
 fn name(k: usize, mode: &DampedMode) -> String {
     format!("mode {}: {:.2} Hz", k + 1, mode.frequency_hz())
 }
@@ -140,7 +140,7 @@ fn volume(posed: &Posed, motion_m: f64) -> [[f64; 3]; 2] {
     })
 }
 
-/// Largest distance of the tool from a joint.
+/// Returns the maximum distance of the TCP from a joint.
 fn reach(posed: &Posed) -> f64 {
     let (mut data, state) = posed.undeformed();
     forward_kinematics(&posed.arm.model, &mut data, &state.q);

@@ -23,7 +23,7 @@ pub struct ModeTable {
     pub robot: String,
     /// Joints that are locked, in coordinate order.
     pub joints: Vec<String>,
-    /// Where they are locked (rad or m).
+    /// Positions at which they are locked (rad or m).
     pub at: Vec<f64>,
     /// Joints that are not locked but under a servo, which counts as spring and damper here.
     pub driven: Vec<String>,
@@ -39,16 +39,16 @@ pub struct ModeTable {
     pub elements: Vec<String>,
     /// One entry per mode.
     pub modes: Vec<ModeFigures>,
-    /// How many modes there are; `modes` may be fewer.
+    /// Number of modes; `modes` may have fewer.
     pub total: usize,
     /// Parts of the static compliance that the modes above carry, per direction of the TCP; null
-    /// where it does not yield.
+    /// where it is rigid.
     pub compliance_covered: [Option<f64>; 6],
     /// Written files.
     pub files: Files,
-    /// What the caveats warn of, as sentences.
+    /// Warnings among the caveats, as sentences.
     pub warnings: Vec<String>,
-    /// What is probably wrong with the input, or limits the worth of the result.
+    /// Doubts about the input and limits of the result.
     pub caveats: Vec<Caveat>,
 }
 
@@ -70,11 +70,11 @@ pub struct ModeFigures {
     /// null at a node.
     pub effective_mass: [Option<f64>; 6],
     /// Part of the static compliance of the TCP in each direction that this mode carries; null
-    /// where it does not yield.
+    /// where it is rigid.
     pub compliance_share: [Option<f64>; 6],
     /// Share of each element in the strain energy.
     pub strain_energy: Vec<f64>,
-    /// How well the mode fits its equation (relative).
+    /// Relative residual of the eigenvalue equation.
     pub residual: f64,
 }
 

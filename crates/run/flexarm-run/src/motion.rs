@@ -26,13 +26,13 @@ pub struct Motion {
     pub violations: Vec<LimitViolation>,
     /// The slip that would explain positions beyond their limits; empty if none would.
     pub likely: &'static str,
-    /// Things worth telling.
+    /// Warnings.
     pub warnings: Vec<String>,
     /// Joints that the file does not name.
     pub held: Vec<HeldJoint>,
-    /// What became of each move, of a motion that is told by the path of the tool.
+    /// Result of planning each move of a TCP path.
     pub tool_path: Option<Arc<ToolPath>>,
-    /// What the file is, in words; empty for a motion that was made.
+    /// Description of the file; empty for a motion that was not read.
     pub format: String,
     /// The topic of a bag.
     pub topic: Option<String>,
@@ -40,7 +40,7 @@ pub struct Motion {
     pub samples: Option<usize>,
     /// Joints of messages that the robot does not have; they are left out.
     pub dropped: Vec<String>,
-    /// What was chosen, assumed and left out when the file was read.
+    /// Choices, assumptions and omissions of the reader.
     pub notes: Vec<Caveat>,
 }
 
@@ -49,7 +49,7 @@ pub struct Motion {
 pub struct HeldJoint {
     /// Its name.
     pub joint: String,
-    /// Where it stays, rad or m.
+    /// Its position, rad or m.
     pub at: f64,
     /// Whether the robot file says so.
     pub told: bool,
@@ -92,7 +92,7 @@ impl Motion {
         Self::load_with(path, robot, &MotionOptions::default())
     }
 
-    /// As [`Motion::load`], with the topic of a bag or the columns of a table told.
+    /// As [`Motion::load`], with the topic of a bag or the columns of a table.
     ///
     /// # Errors
     /// As [`Motion::load`], and for a topic or columns that are not there.
@@ -108,7 +108,7 @@ impl Motion {
         Self::read(path, &Cell { model: &model, tcp_link: Some(&robot.tcp.0), hold, controller }, options, text)
     }
 
-    /// As [`Motion::load`], for a model alone.
+    /// As [`Motion::load`], for a model without a robot.
     ///
     /// # Errors
     /// As [`Motion::load`].
@@ -238,15 +238,15 @@ impl Motion {
         Ok(Self { trajectory: Arc::new(trajectory), violations, warnings, ..self })
     }
 
-    /// What is worth knowing about it.
+    /// Returns notes about the motion.
     pub fn caveats(&self) -> Vec<Caveat> {
         let file = self.path.display().to_string();
         let told = self.warnings.iter().map(|text| Caveat::said("trajectory", &file, text, ""));
         self.notes.iter().cloned().chain(told).chain(self.held_note()).collect()
     }
 
-    /// Which joints stay where, if the file does not name all: a note where the robot file says so,
-    /// else a warning.
+    /// Reports joints that the file does not name: a note where the robot file gives their
+    /// position, else a warning.
     fn held_note(&self) -> Vec<Caveat> {
         let (told, assumed): (Vec<&HeldJoint>, Vec<&HeldJoint>) = self.held.iter().partition(|held| held.told);
         let file = self.path.display().to_string();

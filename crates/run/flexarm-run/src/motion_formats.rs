@@ -1,4 +1,4 @@
-//! Which formats of motions are read: one row each, recognised by content. A format more is a row
+//! Formats of motions: one row each, recognised by content. A new format is a row
 //! more.
 
 use std::io::Read;
@@ -19,19 +19,19 @@ use flexarm_programs::recognise;
 /// Bytes that a file is recognised by.
 const LOOKED_AT: u64 = 64 << 10;
 
-/// What is said about a motion file beside its path.
+/// Options for reading a motion file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MotionOptions {
-    /// The topic of a bag; without it one is chosen, and told.
+    /// Topic of a bag; without it one is chosen and reported.
     pub topic: Option<String>,
-    /// Which columns of a table are time and joints; without it their names say it.
+    /// Columns of a table with time and joints; without it they are found by their names.
     pub columns: Option<ColumnMap>,
 }
 
 /// A motion as it stands in its file.
 pub(crate) struct ReadMotion {
     pub(crate) trajectory: Trajectory,
-    /// What the file is, in words.
+    /// Description of the file.
     pub(crate) format: String,
     pub(crate) topic: Option<String>,
     /// Rows, messages or points; none for waypoints.
@@ -39,7 +39,7 @@ pub(crate) struct ReadMotion {
     /// Joints of the file that the robot does not have, where that is no error.
     pub(crate) dropped: Vec<String>,
     pub(crate) caveats: Vec<Caveat>,
-    /// What became of each move, of a motion that is told by the path of the tool.
+    /// Result of planning each move of a TCP path.
     pub(crate) tool_path: Option<ToolPath>,
 }
 
@@ -165,7 +165,7 @@ fn start_as_text(bytes: &[u8]) -> String {
     text.trim_start_matches('\u{feff}').to_owned()
 }
 
-/// What is said of a file that is nothing of the list.
+/// Returns the error for a file of no known format.
 fn unknown(head: &Head<'_>) -> String {
     let names: Vec<&str> = FORMATS.iter().map(|format| format.name).filter(|name| !name.is_empty()).collect();
     let found = match (head.bytes, head.text.lines().find(|line| !line.trim().is_empty())) {

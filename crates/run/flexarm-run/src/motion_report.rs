@@ -1,4 +1,4 @@
-//! What is in a motion: peaks against limits, torques of the rigid robot, the path of the tool,
+//! Report of a motion: peaks against limits, torques of the rigid robot, the TCP path,
 //! curves; and the motion in another format.
 
 use std::path::{Path, PathBuf};
@@ -32,7 +32,7 @@ const JERK_SLACK: f64 = 1e-3;
 pub struct MotionReport {
     /// The file.
     pub motion: String,
-    /// What it is, in words.
+    /// Description.
     pub format: String,
     /// Topic of a bag.
     pub topic: Option<String>,
@@ -44,7 +44,7 @@ pub struct MotionReport {
     pub held: Vec<String>,
     /// Joints of messages that the robot does not have, left out.
     pub dropped: Vec<String>,
-    /// How long it takes (s).
+    /// Duration (s).
     pub duration_s: f64,
     /// Rows, messages or points of the file; null for waypoints.
     pub samples: Option<usize>,
@@ -54,11 +54,11 @@ pub struct MotionReport {
     pub violations: Vec<MotionViolation>,
     /// Length of the path of the tool (m), with a robot.
     pub tcp_length_m: Option<f64>,
-    /// Largest speed of the tool (m/s), with a robot.
+    /// Maximum TCP speed (m/s), with a robot.
     pub tcp_speed_m_s: Option<f64>,
-    /// Things worth telling.
+    /// Warnings.
     pub warnings: Vec<String>,
-    /// What was chosen, and needs no attention.
+    /// Choices that need no attention.
     pub notes: Vec<String>,
     /// Files that were written.
     pub files: MotionFiles,
@@ -74,7 +74,7 @@ pub struct MotionPeak {
     pub joint: String,
     /// `rad`, `m`, or `rad or m` without a robot.
     pub unit: &'static str,
-    /// Least position.
+    /// Minimum position.
     pub lower: f64,
     /// When.
     pub lower_at_s: f64,
@@ -102,7 +102,7 @@ pub struct MotionPeak {
     pub jerk_at_s: f64,
     /// The limit: that of a path file.
     pub jerk_limit: Option<f64>,
-    /// Largest jump of the acceleration.
+    /// Maximum jump of the acceleration.
     pub acceleration_jump: f64,
     /// Torque or force of greatest magnitude that the rigid robot with its payload needs (N m, N),
     /// with a robot.
@@ -453,7 +453,7 @@ pub fn check_motion_outputs(outputs: &[PathBuf]) -> Result<(), Error> {
     outputs.iter().try_for_each(|output| Target::of_motion(output).map(|_| ()))
 }
 
-/// What a file is written as.
+/// Format of a written motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Target {
     Csv,

@@ -1,4 +1,4 @@
-//! What the base of a robot stands on: six springs, or a beam or mesh that bends. From the text to
+//! Mounting of a robot: six springs, or a flexible beam or mesh under its base; from the text to
 //! checked numbers.
 //!
 //! Springs are kept beside the rigid robot and put under the base when it is modelled
@@ -20,7 +20,7 @@ use crate::link_entry::{LinkHome, damping_of, flexible_link};
 use crate::robot::{Robot, check_finite, keep, pose};
 use crate::robot_file::{BeamEntry, DampingEntry, FlexibleLinkEntry, RobotFileError, Source};
 
-/// What the base stands on.
+/// Entry `[mounting]` of a robot file.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct MountingEntry {
@@ -32,7 +32,7 @@ pub(crate) struct MountingEntry {
     pub beam: Option<Spanned<BeamEntry>>,
     /// or a `.flex` file, relative to the robot file, whose interface B is the base.
     pub reduced: Option<Spanned<PathBuf>>,
-    /// Where the springs are, or the foot of the beam, in the base link (m).
+    /// Position of the springs, or of the foot of the beam, in the base link (m).
     pub xyz: Option<Spanned<[f64; 3]>>,
     /// Axes of the springs: roll, pitch, yaw in the base link (rad).
     pub rpy: Option<Spanned<[f64; 3]>>,
@@ -44,21 +44,21 @@ pub(crate) struct MountingEntry {
     pub com: Option<[f64; 3]>,
     /// `ixx iyy izz ixy ixz iyz` about its centre (kg m²).
     pub inertia: Option<[f64; 6]>,
-    /// Of beam and file: `lumped` or `modal`.
+    /// Model of a beam or file: `lumped` or `modal`.
     pub model: Option<Spanned<String>>,
-    /// Of beam and file: rigid parts.
+    /// Number of rigid parts of a beam or file.
     pub segments: Option<Spanned<i64>>,
-    /// Of beam and file: fixed-interface modes.
+    /// Number of fixed-interface modes of a beam or file.
     pub modes: Option<Spanned<i64>>,
 }
 
-/// What a robot stands on.
+/// Mounting of a robot.
 #[derive(Clone, Debug)]
 #[allow(clippy::large_enum_variant, reason = "one per robot, made once")]
 pub enum RobotMounting {
     /// Six springs, coupled or not.
     Springs {
-        /// Where they are and how stiff.
+        /// Position and stiffness of the springs.
         springs: Mounting,
         /// Their damping.
         damping: Damping,
@@ -188,8 +188,8 @@ fn stiffness6(given: &Spanned<Numbers>, source: &Source) -> Result<Matrix6<f64>,
     }
 }
 
-/// What rides on the springs beside the base. A base without mass needs to be told that nothing
-/// does.
+/// Returns the mass on the springs in addition to the base. A base without mass needs an explicit
+/// zero.
 fn riding_mass(
     robot: &Robot,
     given: &MountingEntry,
@@ -331,7 +331,7 @@ fn flexible_mounting(
 }
 
 impl Robot {
-    /// Whether the base stands on something that yields.
+    /// Whether the mounting is elastic.
     pub fn is_mounted(&self) -> bool {
         self.mounting.is_some()
     }

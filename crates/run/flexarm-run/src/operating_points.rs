@@ -144,7 +144,7 @@ fn answer(at: &mut OperatingPoint, rows: Rows<'_>, elastic: usize, wrench: &Wren
             let moved = tool - found.rigid_tcp_pose.translation.vector;
             rows.tcp_m[3 * k..][..3].copy_from_slice(tool.as_slice());
             rows.deflection_m[3 * k..][..3].copy_from_slice(moved.as_slice());
-            // Symmetric but for constant moments; rows first.
+            // Symmetric except under constant moments; row-major.
             rows.compliance[36 * k..][..36].copy_from_slice(found.compliance.transpose().as_slice());
             rows.frequencies_hz[elastic * k..][..elastic].copy_from_slice(&found.frequencies_hz);
         }

@@ -6,8 +6,7 @@ use std::path::PathBuf;
 use flexarm_log::RecordingFormat;
 use flexarm_stepping::StepperKind;
 
-/// How links are modelled: what is asked for. What a link then becomes on the tree is a
-/// [`flexarm_flexlink::LinkForm`].
+/// Requested model of the links. The result on the tree is a [`flexarm_flexlink::LinkForm`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum LinkModel {
     /// As the robot file says.
@@ -22,8 +21,7 @@ pub enum LinkModel {
 }
 
 impl LinkModel {
-    /// What can be asked for: the word of robot files, command line and recordings, and what it
-    /// means.
+    /// Choices: the word in robot files, on the command line and in recordings, and its meaning.
     pub const WORDS: [(&'static str, Self, &'static str); 3] = [
         ("rigid", Self::Rigid, "No link bends"),
         ("lumped", Self::Lumped, "Rigid parts with coupled 6x6 springs"),
@@ -41,7 +39,7 @@ impl LinkModel {
     }
 }
 
-/// How drives are modelled.
+/// Requested model of the drives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum DriveModel {
     /// As the robot file says.
@@ -49,14 +47,14 @@ pub enum DriveModel {
     AsFiled,
     /// All joints exactly along the trajectory, no springs.
     Rigid,
-    /// Gearboxes give way, motors exactly along the trajectory.
+    /// Elastic gearboxes, motors exactly on the trajectory.
     Elastic,
-    /// All joints by torque under servos, gearboxes give way.
+    /// All joints driven by servo torques through elastic gearboxes.
     Servo,
 }
 
 impl DriveModel {
-    /// What can be asked for: the word of command line and recordings, and what it means.
+    /// Choices: the word on the command line and in recordings, and its meaning.
     pub const WORDS: [(&'static str, Self, &'static str); 3] = [
         ("rigid", Self::Rigid, "Every joint exactly along the trajectory, no springs"),
         ("elastic", Self::Elastic, "Elastic gearboxes, motors exactly on the trajectory"),
@@ -69,7 +67,7 @@ impl DriveModel {
     }
 }
 
-/// How links and drives are modelled, where that differs from the robot file.
+/// Models of links and drives that differ from the robot file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Modelling {
     /// Links.
@@ -128,7 +126,7 @@ impl Default for RunOptions {
     }
 }
 
-/// Where recordings go, and which.
+/// Recordings to write, and their folder.
 #[derive(Clone, Debug)]
 pub struct Outputs {
     /// Folder; made if it is not there.
@@ -144,7 +142,7 @@ pub struct Outputs {
 
 impl Outputs {
     /// Into a folder, what a run writes without being asked to: every recording that this build can
-    /// write, but for tables that hold what the CSV does; no figures for papers.
+    /// write, except tables with the content of the CSV; no figures for papers.
     pub fn everything(folder: impl Into<PathBuf>) -> Self {
         let usual = |format: &RecordingFormat| format.info().by_default && format.is_built_in();
         Self {

@@ -10,16 +10,16 @@ use crate::error::{Error, PayloadError};
 use crate::loads_file::Written;
 use crate::robot::{PAYLOAD_LINK, Robot};
 
-/// What a link carries from an instant on, in the place of what was carried before.
+/// Change of the payload of a link at an instant; replaces the previous payload.
 #[derive(Clone, Debug)]
 pub struct PayloadChange {
     /// When (s).
     pub at_s: f64,
     /// The link that carries it; that of the robot's own payload, else that of the TCP, without it.
     pub link: Option<String>,
-    /// What it carries from then on, link axes; a mass of 0 is nothing.
+    /// Payload from then on, link axes; none for a mass of 0.
     pub carried: LinkInertia,
-    /// Where it is written, if a file was read.
+    /// Place in the file, if it was read from one.
     pub(crate) written: Option<Written>,
 }
 

@@ -29,9 +29,9 @@ pub struct Posed {
     pub tool: Frame,
     /// Actuated joints, in coordinate order.
     pub joints: Vec<String>,
-    /// Which of them slide.
+    /// Whether each of them is prismatic.
     pub prismatic: Vec<bool>,
-    /// Where they are.
+    /// Joint positions (rad or m).
     pub at: Vec<f64>,
     /// [`Robot::caveats`], if they are known.
     of_robot: Option<Arc<[Caveat]>>,
@@ -84,15 +84,15 @@ impl Posed {
         Ok(Self { tool: flexible.tcp.clone(), flexible, arm, joints, prismatic, at, of_robot: None })
     }
 
-    /// What is to be said of the robot and of the equilibrium that it is in, under a wrench on the
-    /// tool (world axes).
+    /// Returns the caveats about the robot and its equilibrium under a wrench at the TCP (world
+    /// axes).
     pub fn caveats_of(&self, robot: &Robot, linear: &Linear, wrench: &[f64; 6]) -> Vec<Caveat> {
         let mut caveats = told::of_model(robot, &self.flexible, self.of_robot.as_deref());
         caveats.extend(told::at_rest(robot, self, linear, wrench));
         once_each(caveats)
     }
 
-    /// Whether the pose is within the joint ranges, and whether anything yields.
+    /// Returns the caveats about joint ranges and about a robot without elastic elements.
     pub(crate) fn caveats(&self) -> Vec<Caveat> {
         let model = &self.arm.model;
         let mut caveats: Vec<Caveat> =
@@ -142,7 +142,7 @@ impl Posed {
         links.chain(efforts).chain(self.standing(robot, linear)).collect()
     }
 
-    /// What the arm does at rest.
+    /// Returns the caveats about the arm at rest.
     fn standing(&self, robot: &Robot, linear: &Linear) -> Vec<Caveat> {
         let moved = linear.X_WT.translation.vector - self.rigid_tool().translation.vector;
         let elastic = &linear.q.as_slice()[self.arm.model.n_actuated()..];

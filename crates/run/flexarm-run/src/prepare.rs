@@ -110,7 +110,7 @@ pub fn loaded(
     Ok((arm, load_caveats))
 }
 
-/// Most steps of a run: some hours.
+/// Maximum number of steps of a run: some hours.
 const MOST_STEPS: f64 = 1e9;
 /// Factors by which deflections can be shown.
 const MAGNIFICATIONS: std::ops::RangeInclusive<f64> = 1e-3..=1e6;

@@ -1,4 +1,4 @@
-//! What recordings of a run say once: header, meshes, files.
+//! Header, meshes and files of the recordings of a run.
 
 use std::fs::{File, TryLockError};
 use std::path::{Component, Path, PathBuf};
@@ -108,7 +108,7 @@ fn remove_figures(folder: &Path) -> Result<(), Error> {
     Ok(())
 }
 
-/// A folder that one run writes into; others are told. Where folders cannot be locked nobody is.
+/// Output folder, locked against other runs where the file system allows it.
 pub(crate) struct FolderLock(#[expect(dead_code, reason = "the lock lasts as long as the open folder")] Option<File>);
 
 impl FolderLock {
@@ -265,7 +265,7 @@ pub(crate) fn header(
     }
 }
 
-/// How the run was made, in groups of key-value pairs.
+/// Returns the settings of the run in groups of key-value pairs.
 fn metadata(
     robot: &Robot,
     scenario: &Scenario,
@@ -364,7 +364,7 @@ pub fn robot_header(robot: &Robot, arm: &FlexibleArm) -> RunHeader {
 }
 
 /// The URDF with the meshes that were found, of visual and of collision shapes, as `file://`
-/// references: viewers then find them without being told where the robot's folder is. Or with their
+/// references: viewers then need not know the robot's folder. Or with their
 /// contents as `data:` references.
 fn located_urdf(robot: &Robot, embed: bool) -> String {
     use base64::Engine as _;

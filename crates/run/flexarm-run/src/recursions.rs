@@ -30,7 +30,7 @@ pub struct Recursions {
     spaces: Mutex<Vec<Space>>,
 }
 
-/// What one thread needs.
+/// Workspace of one thread.
 struct Space {
     data: Data,
     state: State,
@@ -238,7 +238,7 @@ impl Recursions {
         chunks.try_for_each_init(|| Space::new(&self.model), |space, (chunk, out)| several(space, chunk * CHUNK, out))
     }
 
-    /// A workspace that nobody uses.
+    /// Returns a free workspace.
     fn take(&self) -> Space {
         let free = self.spaces.lock().unwrap_or_else(PoisonError::into_inner).pop();
         free.unwrap_or_else(|| Space::new(&self.model))

@@ -23,7 +23,7 @@ use crate::error::Error;
 
 pub use flexarm_linkmaker::reduce::*;
 
-/// What a job does not say.
+/// Defaults of a job.
 #[derive(Clone, Debug, Default)]
 pub struct ReduceOptions {
     /// For the reader of the URDF.

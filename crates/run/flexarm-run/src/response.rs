@@ -23,7 +23,7 @@ use crate::robot::Robot;
 
 /// Files of a response in its output folder: table, plot, figures.
 const RESPONSE_FILES: [&str; 3] = ["response.csv", "response.svg", "response.json"];
-/// Fewest and most points of a response.
+/// Allowed numbers of points of a response.
 const POINTS: std::ops::RangeInclusive<usize> = 2..=100_000;
 /// Highest frequency that makes sense (Hz).
 const HIGHEST_HZ: f64 = 1e6;
@@ -38,7 +38,7 @@ const UNDAMPED: f64 = 1e-6;
 const AXES: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
 const WRENCH: [&str; 6] = ["force-x", "force-y", "force-z", "torque-x", "torque-y", "torque-z"];
 
-/// What is asked of [`response`].
+/// Request of [`response`].
 #[derive(Clone, Debug)]
 pub struct ResponseRequest {
     /// `force-x` ... `torque-z` (on the TCP, world axes), or names of joints.
@@ -51,9 +51,9 @@ pub struct ResponseRequest {
     pub from_hz: Option<f64>,
     /// Highest frequency (Hz); twice the sixth mode without it.
     pub to_hz: Option<f64>,
-    /// How many frequencies; more are put in around the resonances.
+    /// Number of frequencies; more are added around resonances.
     pub points: usize,
-    /// How they are spaced.
+    /// Spacing of the frequencies.
     pub spacing: Spacing,
 }
 
@@ -79,9 +79,9 @@ pub struct Response {
     pub robot: String,
     /// Joints, in coordinate order.
     pub joints: Vec<String>,
-    /// Where they are held, or about where they move (rad or m).
+    /// Positions at which they are held, or about which they move (rad or m).
     pub at: Vec<f64>,
-    /// Which of them slide.
+    /// Whether each of them is prismatic.
     #[serde(skip)]
     pub slides: Vec<bool>,
     /// Link that carries the TCP.
@@ -100,9 +100,9 @@ pub struct Response {
     pub curves: Vec<ResponseCurve>,
     /// Written files.
     pub files: ResponseFiles,
-    /// What the caveats warn of, as sentences.
+    /// Warnings among the caveats, as sentences.
     pub warnings: Vec<String>,
-    /// What is probably wrong with the input, or limits the worth of the result.
+    /// Doubts about the input and limits of the result.
     pub caveats: Vec<Caveat>,
 }
 
@@ -121,17 +121,17 @@ pub struct ResponseCurve {
     pub peaks: Vec<PeakFigures>,
     /// Amplitude of the output per amplitude of the input, one per frequency.
     pub magnitude: Vec<f64>,
-    /// How far the output is ahead of the input (rad), one per frequency; steps of more than half a
-    /// turn are taken out.
+    /// Phase lead of the output (rad), one per frequency, unwrapped: steps of more than half a
+    /// turn are removed.
     pub phase_rad: Vec<f64>,
 }
 
 /// A resonance.
 #[derive(Clone, Debug, Serialize)]
 pub struct PeakFigures {
-    /// Where (Hz).
+    /// Frequency (Hz).
     pub frequency_hz: f64,
-    /// How high.
+    /// Magnitude.
     pub magnitude: f64,
     /// Phase there (rad).
     pub phase_rad: f64,
@@ -148,7 +148,7 @@ pub struct ResponseFiles {
     pub json: Option<String>,
 }
 
-/// Where a response goes.
+/// Output files of a response.
 #[derive(Clone, Debug)]
 pub struct ResponseOutputs {
     /// Folder; made if it is not there.
@@ -428,7 +428,7 @@ pub fn readable_unit(unit: &str) -> (String, f64) {
 /// Magnitude over frequency, a panel per unit, and phase of all curves below; the natural
 /// frequencies marked.
 fn plot(response: &Response) -> Result<String, PlotError> {
-    // What moves in the direction of its force has the colour of that axis.
+    // A curve in the direction of its force has the colour of that axis.
     let look = |c: &ResponseCurve| {
         let direction = WRENCH.iter().position(|word| *word == c.input);
         match direction.filter(|k| AXES[*k] == c.output) {
@@ -503,7 +503,7 @@ fn rounded(x: f64, decimals: i32) -> f64 {
 
 fn save(response: &mut Response, paths: Vec<PathBuf>) -> Result<(), Error> {
     let text = |k: usize| Some(paths[k].display().to_string());
-    // A robot that does not yield has no curve to draw.
+    // A rigid robot has no curve to draw.
     let picture = plot(response).map_err(|error| response.warnings.push(error.to_string())).ok();
     response.files = ResponseFiles { csv: text(0), plot: picture.as_ref().and(text(1)), json: text(2) };
     let json = serde_json::to_string_pretty(response).expect("plain numbers and strings") + "\n";

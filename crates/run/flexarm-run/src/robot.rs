@@ -59,7 +59,7 @@ pub struct Robot {
     pub flexible: Vec<RobotLink>,
     /// Elastic mounting of the base, if there is one.
     pub mounting: Option<RobotMounting>,
-    /// Drives that the file tells about; all other joints are prescribed.
+    /// Drives of the file; all other joints are prescribed.
     pub drives: Vec<Drive>,
     /// Motors that move several joints.
     pub(crate) coupling: Option<RobotCoupling>,

@@ -34,13 +34,13 @@ pub(crate) struct RobotFile {
     pub urdf: Spanned<PathBuf>,
     /// Tool centre point.
     pub tcp: Option<Spanned<TcpEntry>>,
-    /// What the tool carries.
+    /// Payload of the tool.
     pub payload: Option<Spanned<PayloadEntry>>,
     /// Acceleration of gravity in base axes (m/s²).
     pub gravity: Option<Spanned<[f64; 3]>>,
     /// Trajectory for `flexarm compare` without one, relative to the robot file.
     pub default_trajectory: Option<Spanned<PathBuf>>,
-    /// Where `package://` names lead.
+    /// Folders of `package://` names.
     #[serde(default)]
     pub packages: std::collections::BTreeMap<String, PathBuf>,
     /// Values of the arguments of a xacro file: text, numbers or true and false.
@@ -56,7 +56,7 @@ pub(crate) struct RobotFile {
     pub inertia_from_density: Option<Spanned<f64>>,
     /// Mass of all links without `<inertial>` together (kg), distributed by volume.
     pub inertia_from_total_mass: Option<Spanned<f64>>,
-    /// Where joints stay that a motion does not name (rad or m).
+    /// Positions of joints that a motion does not name (rad or m).
     #[serde(default)]
     pub hold: std::collections::BTreeMap<String, Spanned<f64>>,
     /// Effort limits in the place of the URDF's (N m or N); infinite where none is known.
@@ -65,12 +65,12 @@ pub(crate) struct RobotFile {
     /// Joints that slide as they turn: how far in a turn (m), right-handed threads positive.
     #[serde(default)]
     pub lead: std::collections::BTreeMap<String, Spanned<f64>>,
-    /// What the base stands on, if it yields.
+    /// Elastic mounting of the base.
     pub mounting: Option<Spanned<MountingEntry>>,
     /// Links that bend.
     #[serde(default)]
     pub flexible_link: Vec<FlexibleLinkEntry>,
-    /// How joints are driven.
+    /// Drives of the joints.
     #[serde(default)]
     pub drive: Vec<DriveEntry>,
     /// Motors that move several joints.
@@ -78,7 +78,7 @@ pub(crate) struct RobotFile {
     /// Springs, gas springs and counterbalances.
     #[serde(default)]
     pub balancer: Vec<Spanned<BalancerEntry>>,
-    /// How the controller counts its axes.
+    /// Axis conventions of the controller.
     #[serde(default)]
     pub controller_axis: Vec<ControllerAxisEntry>,
     /// Pins that close loops of links.
@@ -116,7 +116,7 @@ pub(crate) struct PayloadEntry {
     pub inertia: [f64; 6],
 }
 
-/// A link that bends.
+/// A flexible link.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct FlexibleLinkEntry {
@@ -142,7 +142,7 @@ pub(crate) struct FlexibleLinkEntry {
     pub geometric_stiffening: Option<Spanned<bool>>,
     /// Mass of a link that is a beam instead of the URDF's, its inertia in proportion (kg).
     pub mass: Option<Spanned<f64>>,
-    /// Factor on its stiffness, as measurements told; 1 if not given.
+    /// Factor on its stiffness, as identified; 1 if not given.
     pub stiffness_factor: Option<Spanned<f64>>,
     /// Stiffness of the spring between its two parts in the place of its source's, lumped links;
     /// 6x6, N/m, N, N m/rad.

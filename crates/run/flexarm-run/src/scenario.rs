@@ -1,4 +1,4 @@
-//! What happens to an arm in a run: where its joints go, what pulls at it, what it picks up and
+//! Scenario of a run: motion of the joints, loads, and payloads that the arm picks up and
 //! puts down, how it starts.
 //!
 //! A scenario is a value and knows no arm: the same one is run with many, and one arm, which does
@@ -41,15 +41,15 @@ use crate::robot::Robot;
 /// ```
 #[derive(Clone, Debug)]
 pub struct Scenario {
-    /// Where the joints go; it says when the run ends.
+    /// Motion of the joints; it gives the duration of the run.
     pub motion: Motion,
-    /// What pulls and pushes.
+    /// External loads.
     pub loads: Vec<AppliedLoad>,
-    /// What is picked up and put down, in any order.
+    /// Changes of the payload, in any order.
     pub payloads: Vec<PayloadChange>,
     /// Whether the springs carry the weight at the start.
     pub start: Start,
-    /// Where loads and payloads were read, for recordings.
+    /// File of loads and payloads, for recordings.
     pub loads_file: Option<PathBuf>,
 }
 
@@ -75,14 +75,14 @@ impl Scenario {
         Ok(self)
     }
 
-    /// The same with a load besides.
+    /// Adds a load.
     #[must_use]
     pub fn with_load(mut self, load: AppliedLoad) -> Self {
         self.loads.push(load);
         self
     }
 
-    /// The same with a change of payload besides.
+    /// Adds a change of payload.
     #[must_use]
     pub fn with_payload(mut self, change: PayloadChange) -> Self {
         self.payloads.push(change);
@@ -100,7 +100,7 @@ impl Scenario {
         self.motion.trajectory.duration()
     }
 
-    /// What acts on a model of the robot.
+    /// Loads on a model of the robot.
     ///
     /// # Errors
     /// [`Error::Load`], or [`Error::RobotFile`] with the place if the value was read from a file: a
@@ -172,6 +172,6 @@ pub struct Disturbances {
     pub loads: Vec<Load>,
     /// Changes of what bodies carry, by time.
     pub changes: Vec<InertiaChange>,
-    /// What does nothing, and what is heavier or farther away than the robot is likely to carry.
+    /// Adds caveats about loads without effect and about unlikely payloads.
     pub caveats: Vec<Caveat>,
 }

@@ -11,13 +11,13 @@ use crate::flexible::FlexibleRobot;
 /// Default gain of the position loop (1/s), bandwidth of the speed loop (1/s), integral over speed
 /// gain (1/s), sample (s).
 const SERVO: [f64; 4] = [20.0, 100.0, 20.0, 1e-3];
-/// Most of the quick inertia over the sampling time that a default velocity gain takes: 2 is where
+/// Maximum default velocity gain, in quick inertia over sampling time: 2 is where
 /// a sampled speed loop becomes unstable.
 const QUICK_GAIN: f64 = 0.4;
 
 /// Inertia that a joint under a servo feels (kg m² or kg).
 pub(crate) struct Felt {
-    /// Of the rigid robot.
+    /// Inertia of the rigid robot.
     inertia: f64,
     /// At once, all else yielding.
     quick: f64,
@@ -28,7 +28,7 @@ impl Felt {
     /// them is decided at `rule`.
     fn gains(&self, servo: &ServoEntry, sample_s: f64, rule: &Felt) -> [f64; 3] {
         let [position, bandwidth, integral, _] = SERVO;
-        // Between samples a motor feels only what follows it at once: the springs give way first.
+        // Between samples a motor feels only the inertia that is rigidly attached: springs deflect.
         let most = |felt: &Felt| QUICK_GAIN * felt.quick / sample_s;
         let yields = bandwidth * rule.inertia > most(rule);
         let fitting = |felt: &Felt| if yields { most(felt) } else { bandwidth * felt.inertia };
@@ -69,9 +69,9 @@ impl FlexibleRobot {
         self.torque.iter().zip(felt).map(axis).collect()
     }
 
-    /// How gains that are not given follow a change of the robot: `at` gives the tree, the rigid
-    /// robot's, and the joints' places where the motion begins, so many times changed; about no
-    /// change, per unit. None where they do not.
+    /// Returns the change of default gains with a change of the robot: `at` gives the tree, the
+    /// rigid robot's, and the joint positions at the start of the motion, for a factor of change;
+    /// about no change, per unit. None where they do not.
     ///
     /// * `step`: a change that is small.
     pub fn gain_slopes(&self, step: f64, at: impl Fn(f64) -> (Model, Model, DVector<f64>)) -> Vec<(usize, AxisSlope)> {

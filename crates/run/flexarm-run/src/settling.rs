@@ -3,7 +3,7 @@
 
 use crate::summary::TcpFigures;
 
-/// What became of the ringing at the stops of a run.
+/// Settling at the stops of a run.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Settling {
     /// There is no stop after a move.
@@ -27,7 +27,7 @@ pub enum Settling {
 }
 
 impl TcpFigures {
-    /// What became of the ringing at the stops.
+    /// Returns the settling at the stops.
     pub fn settling_state(&self) -> Settling {
         let of = self.holds.len();
         let Some(worst) = self.holds.iter().map(|hold| hold.settling_s.unwrap_or(0.0)).reduce(f64::max) else {
@@ -58,7 +58,7 @@ impl Settling {
         }
     }
 
-    /// What is to be said beside the time, or in its place; `band` such as "within 0.1 mm" or
+    /// Returns the note beside the settling time or in its place; `band` such as "within 0.1 mm" or
     /// empty.
     pub fn note(&self, band: &str) -> String {
         let band = if band.is_empty() { String::new() } else { format!(", {band}") };

@@ -25,9 +25,9 @@ pub(crate) struct StaticPart {
     tcp: Frame,
     /// Times between which the curve is smooth, ascending.
     breaks: Vec<f64>,
-    /// Moves: between them, and without loads, the curve stands still.
+    /// Moves: between them, and without loads, the curve is constant.
     moves: Vec<(f64, f64)>,
-    /// Of the logged samples (s): a finer grid tells nothing.
+    /// Interval of the logged samples (s), the finest useful grid.
     sample_s: f64,
     grid_s: f64,
     block: Block,
@@ -94,14 +94,14 @@ impl StaticPart {
         let intervals = ((end - start) / self.grid_s).ceil().max(1.0);
         let (intervals, end) = match intervals > MOST_INTERVALS as f64 {
             true => (MOST_INTERVALS, start + MOST_INTERVALS as f64 * self.grid_s),
-            // A cubic needs three; between samples there is nothing to be told.
+            // A cubic needs three; a grid finer than the samples adds nothing.
             false => ((intervals as usize).max(if end - start > 3.0 * self.sample_s { 3 } else { 1 }), end),
         };
         let mut values = Vec::with_capacity(intervals + 1);
         for k in 0..intervals {
             values.push(self.displacement(start + (end - start) * k as f64 / intervals as f64)?);
         }
-        // What happens at the end belongs to what follows.
+        // An event at the end belongs to the next interval.
         self.path.just_before(end).ok()?;
         values.push(self.path.displacement(&self.tcp));
         Some(Block { start, end, values })

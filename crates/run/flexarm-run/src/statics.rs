@@ -1,4 +1,4 @@
-//! Statics at a pose: where weight and a wrench at the tool take it, and how it yields to more.
+//! Statics at a pose: deflection under weight and a wrench at the TCP, and compliance there.
 
 use std::collections::BTreeMap;
 
@@ -22,7 +22,7 @@ pub struct Statics {
     pub robot: String,
     /// Joints that are held, in coordinate order.
     pub joints: Vec<String>,
-    /// Where they are held (rad or m).
+    /// Positions at which they are held (rad or m).
     pub at: Vec<f64>,
     /// Link that carries the TCP.
     pub tcp: String,
@@ -43,8 +43,8 @@ pub struct Statics {
     pub compliance: Vec<Vec<f64>>,
     /// Forces with which the drives hold the pose (N m or N).
     pub holding_torque: Vec<f64>,
-    /// Of motors that move several joints, behind their gears: `Cᵀ` times the holding torques of
-    /// these (N m or N).
+    /// Torques of motors that move several joints, behind their gears: `Cᵀ` times the holding
+    /// torques of these (N m or N).
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub motor_torque: BTreeMap<String, f64>,
     /// Flexible elements.
@@ -53,9 +53,9 @@ pub struct Statics {
     pub residual: f64,
     /// Written files.
     pub files: StaticsFiles,
-    /// What the caveats warn of, as sentences.
+    /// Warnings among the caveats, as sentences.
     pub warnings: Vec<String>,
-    /// What is probably wrong with the input, or limits the worth of the result.
+    /// Doubts about the input and limits of the result.
     pub caveats: Vec<Caveat>,
 }
 
@@ -66,7 +66,7 @@ pub struct ElementStatics {
     pub name: String,
     /// Elastic coordinates (m, rad), in the axes of the proximal part.
     pub deflection: Vec<f64>,
-    /// What its spring carries (N, N m).
+    /// Load of its spring (N, N m).
     pub load: Vec<f64>,
     /// Displacement of the TCP that it causes by itself, to first order (m).
     pub tcp_displacement_m: [f64; 3],
@@ -80,7 +80,7 @@ pub struct ElementStatics {
 /// locked.
 ///
 /// `at`: all actuated joints (rad or m), zero without it; `wrench` in world axes, constant while
-/// the arm yields.
+/// the arm deflects.
 ///
 /// # Errors
 /// [`Error::Pose`] for joint values that do not fit, [`Error::Step`] where there is no equilibrium.
@@ -155,7 +155,7 @@ fn statics_at(
     for ((name, range), energy_j) in loaded.elements.iter().zip(energies) {
         let (first, n) = (range.start, range.len());
         let deflection: DVector<f64> = loaded.equilibrium.rows(first, n).into_owned();
-        // Of a curved spring the tangent alone would not do.
+        // The tangent is not enough for a nonlinear spring.
         let load = springs.rows(first - loaded.driven, n);
         let moved = J.columns(first - loaded.driven, n) * &deflection;
         elements.push(ElementStatics {

@@ -25,7 +25,7 @@ const STATICS_FILES: [&str; 2] = ["statics.png", "statics.json"];
 #[cfg(feature = "png")]
 const WIDTH: usize = 2000;
 
-/// Where statics go.
+/// Output files of statics.
 #[derive(Clone, Debug)]
 pub struct StaticsOutputs {
     /// Folder; made if it is not there.
@@ -50,7 +50,7 @@ pub(crate) fn places(outputs: &StaticsOutputs) -> Result<[PathBuf; 2], Error> {
     Ok(paths)
 }
 
-/// Writes the files; what cannot be drawn is told.
+/// Writes the files; a picture that cannot be drawn becomes a warning.
 pub(crate) fn save(
     statics: &mut Statics,
     paths: [PathBuf; 2],
@@ -88,7 +88,7 @@ fn draw(_: &RunHeader, _: &Sample, _: &Statics, _: &[bool]) -> Result<Vec<u8>, S
     Err("this build has no pictures: it was made without the feature png".to_owned())
 }
 
-/// What the picture shows, in words.
+/// Returns the caption of the picture.
 #[cfg_attr(not(feature = "png"), allow(dead_code, reason = "only pictures have them"))]
 fn lines(s: &Statics, slides: &[bool]) -> Vec<String> {
     let size = |v: &[f64; 3]| v.iter().map(|x| x * x).sum::<f64>().sqrt();

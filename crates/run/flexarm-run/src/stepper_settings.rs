@@ -1,4 +1,4 @@
-//! Settings of a stepper in a summary: keys and values as its entry in the registry tells them, so
+//! Settings of a stepper in a summary: keys and values of its entry in the registry, so
 //! that a summary knows no stepper.
 
 use std::fmt;
@@ -36,7 +36,7 @@ impl fmt::Display for SettingValue {
 }
 
 impl StepperSettings {
-    /// What the stepper tells of itself.
+    /// Settings of the stepper.
     pub(crate) fn of(stepper: &StepperKind) -> Self {
         let value = |setting| match setting {
             StepperSetting::Flag(on) => SettingValue::Flag(on),
@@ -139,8 +139,8 @@ mod tests {
         }
     }
 
-    /// A summary of every stepper is read back as it was written; what a later version says besides
-    /// is passed over.
+    /// A summary of every stepper is read back as it was written; additional keys of a later
+    /// version are ignored.
     #[test]
     fn summaries_of_every_stepper_are_read_back() {
         for entry in flexarm_stepping::STEPPERS {

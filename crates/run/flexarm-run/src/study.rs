@@ -20,11 +20,11 @@ use flexarm_settings::written::{markdown, markdown_row};
 /// One run of a study.
 #[derive(Debug)]
 pub struct Variant {
-    /// What it is called in tables, plots and folders.
+    /// Name in tables, plots and folders.
     pub label: String,
     /// Its robot.
     pub robot: Robot,
-    /// What happens in it.
+    /// Scenario of the run.
     pub scenario: Scenario,
     /// Its choices.
     pub options: RunOptions,
@@ -64,7 +64,7 @@ pub fn compare_study(
         let label: &String = &variants[number].label;
         move |error: Error| Error::InStudy { label: label.clone(), source: Box::new(error) }
     };
-    // Minutes of running are not spent before something that could be told at once.
+    // All inputs are checked before the first run starts.
     let (mut expected, mut arms) = (Expected::default(), Vec::new());
     for (number, variant) in variants.iter().enumerate() {
         let arm = variant.robot.flexible(variant.options.modelling).map_err(named(number))?;
@@ -108,7 +108,7 @@ pub fn compare_study(
     Ok((summary, traces))
 }
 
-/// Most letters of a run's folder.
+/// Maximum length of the name of a run's folder (characters).
 const LONGEST_NAME: usize = 100;
 
 /// Names of the runs' folders: the labels, with letters that every file system takes.
@@ -144,8 +144,8 @@ pub(crate) fn of_one_robot(first: &Trace, other: &Trace) -> bool {
     (one_name && a.joints == b.joints) || on_one_motion(first, other)
 }
 
-/// How far the tool of a run is from that of the first, at the first's times; `None` for motions of
-/// other lengths and for other robots.
+/// Returns the distance of the TCP of a run from that of the first run, at the times of the first;
+/// `None` for motions of other lengths and for other robots.
 ///
 /// On one motion the places of the rigid tools are the same, so the errors are compared: they are
 /// small, and so is what is lost between the samples. Otherwise the places are.
@@ -237,8 +237,8 @@ fn between(rows: &[TraceRow], values: &[[f64; 3]], k: usize, t: f64) -> [f64; 3]
     })
 }
 
-/// The runs of a study side by side: a header, then a row for each run. Empty for a run that is
-/// alone.
+/// Returns the runs of a study side by side: a header, then a row for each run. Empty for a single
+/// run.
 pub fn study_rows(summary: &Summary) -> Vec<Vec<String>> {
     if summary.with.is_empty() {
         return Vec::new();
@@ -286,7 +286,7 @@ pub fn study_rows(summary: &Summary) -> Vec<Vec<String>> {
     rows
 }
 
-/// What the columns of [`study_rows`] mean that do not say it themselves.
+/// Meaning of the columns of [`study_rows`].
 pub const STUDY_NOTE: &str = "static: static deflection at the pose of the peak; dynamic: maximum of the rest; settling: at the stop that takes \
      longest; apart: maximum distance of the flexible TCP from that of the first run at the same time, also over the \
      first run's peak TCP error; not given between different robots";

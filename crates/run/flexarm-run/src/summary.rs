@@ -21,7 +21,7 @@ use crate::stepper_settings::StepperSettings;
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Summary {
-    /// How far the tool is off and what bends, in one sentence; empty where that is not known.
+    /// Peak TCP error and its causes in one sentence; empty if unknown.
     pub headline: String,
     /// Name of the robot.
     pub robot: String,
@@ -29,7 +29,7 @@ pub struct Summary {
     pub trajectory: String,
     /// rigid, lumped, modal or mixed.
     pub links_model: String,
-    /// What bends; nothing if the robot is rigid.
+    /// Flexible elements; empty if the robot is rigid.
     pub bends: Bending,
     /// "complete", or why the run stopped early.
     pub end: String,
@@ -48,33 +48,33 @@ pub struct Summary {
     /// Flexible against rigid tool centre point; absent for runs without the twin.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tcp: Option<TcpFigures>,
-    /// The error across the path; absent unless the motion is told by the path of the tool.
+    /// Error across the path; absent unless the motion is given as a TCP path.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub path: Option<PathFigures>,
     /// Natural frequencies at the start pose, drives locked (Hz).
     pub frequencies_hz: Vec<f64>,
     /// Flexible links.
     pub links: Vec<LinkFigures>,
-    /// Drives that give way.
+    /// Elastic drives.
     pub elastic_drives: Vec<DriveFigures>,
-    /// Where the energy went.
+    /// Energy balance.
     pub energy: EnergyFigures,
-    /// Largest force per drive (N m or N).
+    /// Maximum force of each drive (N m or N).
     pub drives: BTreeMap<String, f64>,
-    /// Largest torque per motor that moves several joints, behind its gear (N m or N), by the joint
-    /// of its drive.
+    /// Maximum torque of each motor that moves several joints, behind its gear (N m or N), by the
+    /// joint of its drive.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub motors: BTreeMap<String, f64>,
-    /// What [`Summary::caveats`] warn of, as sentences.
+    /// Warnings among [`Summary::caveats`], as sentences.
     pub warnings: Vec<String>,
-    /// What is probably wrong with the input, or limits the worth of the result.
+    /// Doubts about the input and limits of the result.
     pub caveats: Vec<Caveat>,
     /// Written files.
     pub files: Files,
-    /// What the run is called in a study.
+    /// Name of the run in a study.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub label: Option<String>,
-    /// How far its tool is from that of the first run of a study.
+    /// Distance of its TCP from that of the first run of a study.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub difference: Option<DifferenceFigures>,
     /// The other runs of a study.
@@ -82,7 +82,7 @@ pub struct Summary {
     pub with: Vec<Summary>,
     /// Beginning and end of each move (s).
     pub moves_s: Vec<[f64; 2]>,
-    /// Largest size of the TCP error in each of [`CURVE_PIECES`] equal pieces of the run (m), for
+    /// Maximum TCP error in each of [`CURVE_PIECES`] equal pieces of the run (m), for
     /// the terminal.
     #[serde(skip)]
     pub error_curve: Vec<f64>,
@@ -194,11 +194,11 @@ impl StepperFigures {
 pub struct LinkFigures {
     /// Name of the link.
     pub name: String,
-    /// Largest TCP displacement that its deflection alone causes (m).
+    /// Maximum TCP displacement caused by its deflection (m).
     pub peak_contribution_m: f64,
-    /// Largest change of the distance of its interfaces over that distance.
+    /// Maximum change of the distance between its interfaces over that distance.
     pub engineering_strain: f64,
-    /// Largest elastic rotation (rad).
+    /// Maximum elastic rotation (rad).
     pub peak_rotation_rad: f64,
 }
 
@@ -208,9 +208,9 @@ pub struct LinkFigures {
 pub struct DriveFigures {
     /// Name of the joint.
     pub joint: String,
-    /// Largest TCP displacement that its deflection alone causes (m).
+    /// Maximum TCP displacement caused by its deflection (m).
     pub peak_contribution_m: f64,
-    /// Largest deflection between motor and link (rad or m).
+    /// Maximum deflection between motor and link (rad or m).
     pub peak_deflection_rad: f64,
 }
 
@@ -222,9 +222,9 @@ pub struct EnergyFigures {
     /// Net work of the drives: [`EnergyFigures::drives_positive_j`] without
     /// [`EnergyFigures::drives_negative_j`] (J).
     pub drives_j: f64,
-    /// What the drives put in, each by itself while its power is positive (J).
+    /// Positive work of the drives: sum over the drives of the work at positive power (J).
     pub drives_positive_j: f64,
-    /// What they took out while it is negative, as a positive number (J).
+    /// Negative work of the drives, as a positive number (J).
     pub drives_negative_j: f64,
     /// Work of the external loads (J).
     pub loads_j: f64,
@@ -237,7 +237,7 @@ pub struct EnergyFigures {
     pub payload_j: f64,
     /// Gain of kinetic, gravitational and elastic energy (J).
     pub stored_j: f64,
-    /// Largest gap in the balance over the largest energy in it.
+    /// Maximum imbalance over the maximum energy in the balance.
     pub imbalance: f64,
 }
 
@@ -249,13 +249,13 @@ fn is_zero(x: &f64) -> bool {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct DifferenceFigures {
-    /// Largest distance (m).
+    /// Maximum distance (m).
     pub peak_m: f64,
     /// When (s).
     pub t_peak_s: f64,
     /// Root mean square of the distance (m).
     pub rms_m: f64,
-    /// Largest distance over the first run's largest TCP error.
+    /// Maximum distance over the first run's peak TCP error.
     pub of_peak_error: Option<f64>,
 }
 
@@ -263,7 +263,7 @@ pub struct DifferenceFigures {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct TcpFigures {
-    /// Largest distance (m).
+    /// Maximum distance (m).
     pub peak_m: f64,
     /// When (s).
     pub t_peak_s: f64,
@@ -273,24 +273,24 @@ pub struct TcpFigures {
     pub end_m: f64,
     /// Distance at rest at the start (m).
     pub static_sag_m: f64,
-    /// Part of `peak_m` that the arm would have standing still there, under weight and the loads of
-    /// the instant, along the direction of the error (m); null where the arm has no equilibrium on
-    /// its way.
+    /// Static part of `peak_m`: deflection of the arm at rest in that pose, under weight and the
+    /// loads of the instant, along the direction of the error (m); null where the arm has no
+    /// equilibrium on the motion.
     pub static_at_peak_m: Option<f64>,
     /// The rest of `peak_m`, from inertia and ringing (m); negative where the motion relieves the
     /// arm.
     pub dynamic_at_peak_m: Option<f64>,
-    /// Largest static part (m).
+    /// Maximum static part (m).
     pub static_peak_m: Option<f64>,
-    /// Largest dynamic part: error less static part (m).
+    /// Maximum dynamic part: error minus static part (m).
     pub dynamic_peak_m: Option<f64>,
     /// When (s).
     pub t_dynamic_peak_s: Option<f64>,
     /// Root mean square of the dynamic part (m).
     pub dynamic_rms_m: Option<f64>,
-    /// Who makes the largest error: along its direction, in the order of the recordings.
+    /// Contributions to the peak error along its direction, in the order of the recordings.
     pub shares_at_peak: Vec<ShareFigures>,
-    /// Largest angle (rad).
+    /// Maximum angle (rad).
     pub peak_rad: f64,
     /// Root mean square of the angle (rad).
     pub rms_rad: f64,
@@ -301,18 +301,18 @@ pub struct TcpFigures {
     pub settling: String,
     /// Half width of the band (m).
     pub settling_band_m: Option<f64>,
-    /// Largest excursion past the final value after a move (m).
+    /// Maximum excursion past the final value after a move (m).
     pub overshoot_m: f64,
     /// Strongest frequency of the error (Hz).
     pub dominant_hz: Option<f64>,
-    /// Largest components along, across and out of the path (m).
+    /// Maximum components along, across and out of the path (m).
     pub path_peak_m: [f64; 3],
-    /// Largest distance from the path while the robot moves (m): across and out of the path
+    /// Maximum distance from the path while the robot moves (m): across and out of the path
     /// together.
     pub path_accuracy_m: f64,
     /// Root mean square of that distance over the moves (m).
     pub path_rms_m: f64,
-    /// What happened at each stop.
+    /// Settling at each stop.
     pub holds: Vec<HoldFigures>,
     /// Poses at which the tool stops more than once.
     pub poses: Vec<PoseFigures>,
@@ -324,7 +324,7 @@ pub struct TcpFigures {
 pub struct PoseFigures {
     /// Place of the rigid tool, world axes (m).
     pub place_m: [f64; 3],
-    /// How often the tool stopped there.
+    /// Number of stops there.
     pub visits: usize,
     /// Distance of the mean place at the end of the stops from the rigid tool's (m): AP.
     pub accuracy_m: f64,
@@ -352,7 +352,7 @@ pub struct HoldFigures {
     /// Time from the beginning of the stop until the error stays within the band of its final value
     /// (s).
     pub settling_s: Option<f64>,
-    /// Largest excursion past the final value (m).
+    /// Maximum excursion past the final value (m).
     pub overshoot_m: f64,
     /// Strongest frequency (Hz).
     pub ringing_hz: Option<f64>,
@@ -475,7 +475,7 @@ impl Summary {
 /// Pieces of [`Summary::error_curve`], fewer for a run of fewer samples.
 pub const CURVE_PIECES: usize = 240;
 
-/// Largest error in each of [`CURVE_PIECES`] equal pieces of the run (m).
+/// Returns the maximum error in each of [`CURVE_PIECES`] equal pieces of the run (m).
 pub(crate) fn thinned(times: &[f64], errors: &[[f64; 6]]) -> Vec<f64> {
     let pieces = CURVE_PIECES.min(times.len());
     (0..pieces)

@@ -1,5 +1,4 @@
-//! Our own TOML files: each begins with `format = 1`, and what is wrong in it is told with its
-//! place.
+//! TOML files of this program: each begins with `format = 1`; errors have their place.
 
 use flexarm_files::Source;
 use serde::de::DeserializeOwned;

@@ -20,8 +20,8 @@ pub(crate) struct RigidTwin {
     pub(crate) velocity: Vector3<f64>,
     /// Acceleration of the TCP (m/s²).
     pub(crate) acceleration: Vector3<f64>,
-    /// What stands where, and how it moves, in [`Self::data`] and [`Self::J`]; `None` where other
-    /// functions were there last.
+    /// Model and state of the poses and velocities in [`Self::data`] and [`Self::J`]; `None` after
+    /// other functions used them.
     placed: Option<(Arc<Model>, State)>,
     /// All comes from it, if the tree is for it, with the inertias of this model; made at the first
     /// look.
@@ -54,7 +54,7 @@ impl RigidTwin {
         [self.velocity, self.acceleration]
     }
 
-    /// Where everything is and how it moves at time t, by the sums of [`RigidTwin::update`];
+    /// Computes poses and velocities at time t, by the sums of [`RigidTwin::update`];
     /// neither forces nor acceleration. While the joints rest it is what it was.
     pub(crate) fn place(&mut self, arm: &FlexibleArm, tcp: &Frame, t: f64) {
         arm.prescribed_state(t, &mut self.state, &mut self.qddot);

@@ -127,14 +127,14 @@ class _Bending(TypedDict):
     links: list[str]
     """Names of the flexible links."""
     gearboxes: list[str]
-    """Names of the joints whose gearboxes yield."""
+    """Names of the joints with elastic gearboxes."""
 
 
 class Bending(_Bending, total=False):
-    """What bends in a run."""
+    """Flexible elements of a run."""
 
     mounting: str | None
-    """What the base stands on, if it yields."""
+    """Mounting of the base, if elastic."""
 
 
 class _StepperFigures(TypedDict):
@@ -170,7 +170,7 @@ class StepperFigures(_StepperFigures, total=False):
 
 
 class ShareFigures(TypedDict):
-    """What one link, one gearbox, the servos or the stepper have in the largest TCP error."""
+    """Share of one link, one gearbox, the servos or the stepper in the peak TCP error."""
 
     name: str
     """Name of the link or joint."""
@@ -192,7 +192,7 @@ class HoldFigures(TypedDict):
     settling_s: float | None
     """Time from the beginning of the stop until the error stays within the band of its final value (s)."""
     overshoot_m: float
-    """Largest excursion past the final value (m)."""
+    """Maximum excursion past the final value (m)."""
     ringing_hz: float | None
     """Strongest frequency (Hz)."""
 
@@ -203,7 +203,7 @@ class PoseFigures(TypedDict):
     place_m: list[float]
     """Place of the rigid tool, world axes (m)."""
     visits: int
-    """How often the tool stopped there."""
+    """Number of stops there."""
     accuracy_m: float
     """Distance of the mean place at the end of the stops from the rigid tool's (m): AP."""
     repeatability_m: float
@@ -214,7 +214,7 @@ class TcpFigures(TypedDict):
     """Flexible against rigid tool centre point."""
 
     peak_m: float
-    """Largest distance (m)."""
+    """Maximum distance (m)."""
     t_peak_s: float
     """When (s)."""
     rms_m: float
@@ -224,21 +224,21 @@ class TcpFigures(TypedDict):
     static_sag_m: float
     """Distance at rest at the start (m)."""
     static_at_peak_m: float | None
-    """Part of `peak_m` that the arm would have standing still there, under weight and the loads of the instant, along the direction of the error (m); null where the arm has no equilibrium on its way."""
+    """Static part of `peak_m`: deflection of the arm at rest in that pose, under weight and the loads of the instant, along the direction of the error (m); null where the arm has no equilibrium on the motion."""
     dynamic_at_peak_m: float | None
     """The rest of `peak_m`, from inertia and ringing (m); negative where the motion relieves the arm."""
     static_peak_m: float | None
-    """Largest static part (m)."""
+    """Maximum static part (m)."""
     dynamic_peak_m: float | None
-    """Largest dynamic part: error less static part (m)."""
+    """Maximum dynamic part: error minus static part (m)."""
     t_dynamic_peak_s: float | None
     """When (s)."""
     dynamic_rms_m: float | None
     """Root mean square of the dynamic part (m)."""
     shares_at_peak: list[ShareFigures]
-    """Who makes the largest error: along its direction, in the order of the recordings."""
+    """Contributions to the peak error along its direction, in the order of the recordings."""
     peak_rad: float
-    """Largest angle (rad)."""
+    """Maximum angle (rad)."""
     rms_rad: float
     """Root mean square of the angle (rad)."""
     settling_s: float | None
@@ -248,17 +248,17 @@ class TcpFigures(TypedDict):
     settling_band_m: float | None
     """Half width of the band (m)."""
     overshoot_m: float
-    """Largest excursion past the final value after a move (m)."""
+    """Maximum excursion past the final value after a move (m)."""
     dominant_hz: float | None
     """Strongest frequency of the error (Hz)."""
     path_peak_m: list[float]
-    """Largest components along, across and out of the path (m)."""
+    """Maximum components along, across and out of the path (m)."""
     path_accuracy_m: float
-    """Largest distance from the path while the robot moves (m): across and out of the path together."""
+    """Maximum distance from the path while the robot moves (m): across and out of the path together."""
     path_rms_m: float
     """Root mean square of that distance over the moves (m)."""
     holds: list[HoldFigures]
-    """What happened at each stop."""
+    """Settling at each stop."""
     poses: list[PoseFigures]
     """Poses at which the tool stops more than once."""
 
@@ -309,11 +309,11 @@ class LinkFigures(TypedDict):
     name: str
     """Name of the link."""
     peak_contribution_m: float
-    """Largest TCP displacement that its deflection alone causes (m)."""
+    """Maximum TCP displacement caused by its deflection (m)."""
     engineering_strain: float
-    """Largest change of the distance of its interfaces over that distance."""
+    """Maximum change of the distance between its interfaces over that distance."""
     peak_rotation_rad: float
-    """Largest elastic rotation (rad)."""
+    """Maximum elastic rotation (rad)."""
 
 
 class DriveFigures(TypedDict):
@@ -322,9 +322,9 @@ class DriveFigures(TypedDict):
     joint: str
     """Name of the joint."""
     peak_contribution_m: float
-    """Largest TCP displacement that its deflection alone causes (m)."""
+    """Maximum TCP displacement caused by its deflection (m)."""
     peak_deflection_rad: float
-    """Largest deflection between motor and link (rad or m)."""
+    """Maximum deflection between motor and link (rad or m)."""
 
 
 class _EnergyFigures(TypedDict):
@@ -333,9 +333,9 @@ class _EnergyFigures(TypedDict):
     drives_j: float
     """Net work of the drives: EnergyFigures::drives_positive_j without EnergyFigures::drives_negative_j (J)."""
     drives_positive_j: float
-    """What the drives put in, each by itself while its power is positive (J)."""
+    """Positive work of the drives: sum over the drives of the work at positive power (J)."""
     drives_negative_j: float
-    """What they took out while it is negative, as a positive number (J)."""
+    """Negative work of the drives, as a positive number (J)."""
     loads_j: float
     """Work of the external loads (J)."""
     dissipated_j: float
@@ -345,7 +345,7 @@ class _EnergyFigures(TypedDict):
     stored_j: float
     """Gain of kinetic, gravitational and elastic energy (J)."""
     imbalance: float
-    """Largest gap in the balance over the largest energy in it."""
+    """Maximum imbalance over the maximum energy in the balance."""
 
 
 class EnergyFigures(_EnergyFigures, total=False):
@@ -356,26 +356,26 @@ class EnergyFigures(_EnergyFigures, total=False):
 
 
 class CaveatDict(TypedDict):
-    """One caveat. SI units."""
+    """Single caveat. SI units."""
 
     severity: Literal['warning', 'note']
-    """How much it weighs."""
+    """Severity."""
     code: str
-    """Short, stable name of its kind."""
+    """Short, stable identifier of its kind."""
     where: str
-    """What it is about: a link, a joint, the payload, a file."""
+    """Subject: a link, a joint, the payload, a file."""
     message: str
-    """All of it in one sentence."""
+    """Complete message in one sentence."""
     value: float | None
-    """What was found."""
+    """Value found."""
     yardstick: float | None
-    """What it is compared with."""
+    """Reference with which the value is compared."""
     unit: str
     """Unit of both."""
     likely: str
-    """The slip that would explain it, such as "about 1000 times: millimetres?"; empty if none does."""
+    """Likely mistake that explains the value, such as "about 1000 times: millimetres?"; empty if there is none."""
     help: str
-    """What to look at, or how to mend it."""
+    """Advice on what to check or how to fix it."""
 
 
 class _RunFiles(TypedDict):
@@ -414,13 +414,13 @@ class DifferenceFigures(TypedDict):
     """One run's flexible tool centre point against another's."""
 
     peak_m: float
-    """Largest distance (m)."""
+    """Maximum distance (m)."""
     t_peak_s: float
     """When (s)."""
     rms_m: float
     """Root mean square of the distance (m)."""
     of_peak_error: float | None
-    """Largest distance over the first run's largest TCP error."""
+    """Maximum distance over the first run's peak TCP error."""
 
 
 _RunSummaryWith = TypedDict("_RunSummaryWith", {"with": "list[RunSummary]"}, total=False)
@@ -430,7 +430,7 @@ class _RunSummary(_RunSummaryWith):
     """What is always there."""
 
     headline: str
-    """How far the tool is off and what bends, in one sentence; empty where that is not known."""
+    """Peak TCP error and its causes in one sentence; empty if unknown."""
     robot: str
     """Name of the robot."""
     trajectory: str
@@ -438,7 +438,7 @@ class _RunSummary(_RunSummaryWith):
     links_model: str
     """rigid, lumped, modal or mixed."""
     bends: Bending
-    """What bends; nothing if the robot is rigid."""
+    """Flexible elements; empty if the robot is rigid."""
     end: str
     """"complete", or why the run stopped early."""
     duration_s: float
@@ -460,15 +460,15 @@ class _RunSummary(_RunSummaryWith):
     links: list[LinkFigures]
     """Flexible links."""
     elastic_drives: list[DriveFigures]
-    """Drives that give way."""
+    """Elastic drives."""
     energy: EnergyFigures
-    """Where the energy went."""
+    """Energy balance."""
     drives: dict[str, float]
-    """Largest force per drive (N m or N)."""
+    """Maximum force of each drive (N m or N)."""
     warnings: list[str]
-    """What Summary::caveats warn of, as sentences."""
+    """Warnings among Summary::caveats, as sentences."""
     caveats: list[CaveatDict]
-    """What is probably wrong with the input, or limits the worth of the result."""
+    """Doubts about the input and limits of the result."""
     files: RunFiles
     """Written files."""
     moves_s: list[list[float]]
@@ -479,13 +479,13 @@ class RunSummary(_RunSummary, total=False):
     """Answer of `flexarm compare` and `flexarm run`. SI units.  `summary.json` is read back by `serde_json`; keys that a file of an older version lacks are their defaults."""
 
     path: PathFigures | None
-    """The error across the path; absent unless the motion is told by the path of the tool."""
+    """Error across the path; absent unless the motion is given as a TCP path."""
     motors: dict[str, float]
-    """Largest torque per motor that moves several joints, behind its gear (N m or N), by the joint of its drive."""
+    """Maximum torque of each motor that moves several joints, behind its gear (N m or N), by the joint of its drive."""
     label: str | None
-    """What the run is called in a study."""
+    """Name of the run in a study."""
     difference: DifferenceFigures | None
-    """How far its tool is from that of the first run of a study."""
+    """Distance of its TCP from that of the first run of a study."""
 
 
 class ElementStatics(TypedDict):
@@ -496,7 +496,7 @@ class ElementStatics(TypedDict):
     deflection: list[float]
     """Elastic coordinates (m, rad), in the axes of the proximal part."""
     load: list[float]
-    """What its spring carries (N, N m)."""
+    """Load of its spring (N, N m)."""
     tcp_displacement_m: list[float]
     """Displacement of the TCP that it causes by itself, to first order (m)."""
     tcp_rotation_rad: list[float]
@@ -522,7 +522,7 @@ class _StaticsDetails(TypedDict):
     joints: list[str]
     """Joints that are held, in coordinate order."""
     at: list[float]
-    """Where they are held (rad or m)."""
+    """Positions at which they are held (rad or m)."""
     tcp: str
     """Link that carries the TCP."""
     wrench: list[float]
@@ -548,16 +548,16 @@ class _StaticsDetails(TypedDict):
     files: StaticsFiles
     """Written files."""
     warnings: list[str]
-    """What the caveats warn of, as sentences."""
+    """Warnings among the caveats, as sentences."""
     caveats: list[CaveatDict]
-    """What is probably wrong with the input, or limits the worth of the result."""
+    """Doubts about the input and limits of the result."""
 
 
 class StaticsDetails(_StaticsDetails, total=False):
     """Answer of `flexarm statics`. SI units; world axes, at the TCP; six-vectors linear first."""
 
     motor_torque: dict[str, float]
-    """Of motors that move several joints, behind their gears: `Cᵀ` times the holding torques of these (N m or N)."""
+    """Torques of motors that move several joints, behind their gears: `Cᵀ` times the holding torques of these (N m or N)."""
 
 
 class ModeFigures(TypedDict):
@@ -576,11 +576,11 @@ class ModeFigures(TypedDict):
     effective_mass: list[float | None]
     """Mass (kg) at the TCP, moment of inertia (kg m²) for rotations, that moves like the mode; null at a node."""
     compliance_share: list[float | None]
-    """Part of the static compliance of the TCP in each direction that this mode carries; null where it does not yield."""
+    """Part of the static compliance of the TCP in each direction that this mode carries; null where it is rigid."""
     strain_energy: list[float]
     """Share of each element in the strain energy."""
     residual: float
-    """How well the mode fits its equation (relative)."""
+    """Relative residual of the eigenvalue equation."""
 
 
 class ModesSummary(TypedDict):
@@ -591,7 +591,7 @@ class ModesSummary(TypedDict):
     joints: list[str]
     """Joints that are locked, in coordinate order."""
     at: list[float]
-    """Where they are locked (rad or m)."""
+    """Positions at which they are locked (rad or m)."""
     driven: list[str]
     """Joints that are not locked but under a servo, which counts as spring and damper here."""
     tcp: str
@@ -607,24 +607,24 @@ class ModesSummary(TypedDict):
     modes: list[ModeFigures]
     """One entry per mode."""
     total: int
-    """How many modes there are; `modes` may be fewer."""
+    """Number of modes; `modes` may have fewer."""
     compliance_covered: list[float | None]
-    """Parts of the static compliance that the modes above carry, per direction of the TCP; null where it does not yield."""
+    """Parts of the static compliance that the modes above carry, per direction of the TCP; null where it is rigid."""
     files: RunFiles
     """Written files."""
     warnings: list[str]
-    """What the caveats warn of, as sentences."""
+    """Warnings among the caveats, as sentences."""
     caveats: list[CaveatDict]
-    """What is probably wrong with the input, or limits the worth of the result."""
+    """Doubts about the input and limits of the result."""
 
 
 class PeakFigures(TypedDict):
     """A resonance."""
 
     frequency_hz: float
-    """Where (Hz)."""
+    """Frequency (Hz)."""
     magnitude: float
-    """How high."""
+    """Magnitude."""
     phase_rad: float
     """Phase there (rad)."""
 
@@ -645,7 +645,7 @@ class ResponseCurve(TypedDict):
     magnitude: list[float]
     """Amplitude of the output per amplitude of the input, one per frequency."""
     phase_rad: list[float]
-    """How far the output is ahead of the input (rad), one per frequency; steps of more than half a turn are taken out."""
+    """Phase lead of the output (rad), one per frequency, unwrapped: steps of more than half a turn are removed."""
 
 
 class ResponseFiles(TypedDict):
@@ -667,7 +667,7 @@ class ResponseSummary(TypedDict):
     joints: list[str]
     """Joints, in coordinate order."""
     at: list[float]
-    """Where they are held, or about where they move (rad or m)."""
+    """Positions at which they are held, or about which they move (rad or m)."""
     tcp: str
     """Link that carries the TCP."""
     quantity: str
@@ -685,84 +685,84 @@ class ResponseSummary(TypedDict):
     files: ResponseFiles
     """Written files."""
     warnings: list[str]
-    """What the caveats warn of, as sentences."""
+    """Warnings among the caveats, as sentences."""
     caveats: list[CaveatDict]
-    """What is probably wrong with the input, or limits the worth of the result."""
+    """Doubts about the input and limits of the result."""
 
 
 class GridFigures(TypedDict):
-    """The grid of a map."""
+    """Grid of a map."""
 
     lower_m: list[float]
     """First place (m)."""
     upper_m: list[float]
     """Last place (m)."""
     spacing_m: float
-    """Distance of places (m)."""
+    """Spacing (m)."""
     count: list[int]
     """Number of places along x, y and z."""
     directions: int
-    """Directions of the tool at each."""
+    """Number of tool directions at each place."""
 
 
 class Spread(TypedDict):
-    """How the values of a quantity are spread over the poses."""
+    """Distribution of a quantity over the poses."""
 
     min: float
-    """Smallest."""
+    """Minimum."""
     max: float
-    """Largest."""
+    """Maximum."""
     mean: float
     """Mean."""
     quantiles: dict[str, float]
-    """Values below which 5, 25, 50, 75 and 95 % of the poses are, under `0.05` to `0.95`."""
+    """5, 25, 50, 75 and 95 % quantiles, under the keys `0.05` to `0.95`."""
 
 
 class MapPose(TypedDict):
-    """A pose of a map with all that it says."""
+    """A pose of a map with all its quantities."""
 
     row: int
-    """Number of its row."""
+    """Index of its row."""
     q: list[float]
     """Joints, in coordinate order (rad or m)."""
     place_m: list[float]
-    """Place of the rigid arm's tool (m, world)."""
+    """Position of the rigid arm's TCP (m, world)."""
     value: float
-    """Its value of the quantity by which the map compares."""
+    """Value of the quantity by which the map compares."""
     quantities: dict[str, float]
-    """All quantities."""
+    """Values of all quantities."""
 
 
 class Placement(TypedDict):
-    """The best place for a box."""
+    """Best placement of a box."""
 
     lower_m: list[float]
-    """Lowest corner of the places that it covers (m, world)."""
+    """Lower corner of the places covered (m, world)."""
     upper_m: list[float]
-    """Highest corner (m, world)."""
+    """Upper corner (m, world)."""
     centre_m: list[float]
     """Centre (m, world)."""
     worst: float
-    """The worst value in it, of the quantity by which the map compares."""
+    """Worst value in the box, of the quantity by which the map compares."""
     points: int
-    """Places of the map in it, all of which the tool reaches."""
+    """Number of places of the map in the box, all of them reachable."""
 
 
 class MapFiles(TypedDict):
     """Written files."""
 
     table: str | None
-    """Every pose."""
+    """Table of all poses."""
     page: str | None
-    """The page."""
+    """Page."""
     rrd: str | None
-    """The recording for the viewer."""
+    """Recording for the viewer."""
     json: str | None
-    """The figures."""
+    """Figures."""
 
 
 class MapSummary(TypedDict):
-    """Answer of `flexarm map`. SI units, world axes, at the TCP."""
+    """Result of `flexarm map`. SI units, world axes, at the TCP."""
 
     robot: str
     """Name of the robot."""
@@ -771,59 +771,59 @@ class MapSummary(TypedDict):
     joints: list[str]
     """Joints in coordinate order."""
     points: int
-    """Places, or poses in joints, that were asked for."""
+    """Number of places, or joint poses, requested."""
     reachable: int
-    """Those of them with at least one pose within the limits that carries its weight."""
+    """Number of these with at least one pose within the limits that has an equilibrium under gravity."""
     poses: int
-    """Poses that were answered; more than places where several directions or branches count."""
+    """Number of poses evaluated; larger than the number of places with several directions or branches."""
     failed: int
-    """Poses without an equilibrium."""
+    """Number of poses without an equilibrium."""
     grid: GridFigures | None
-    """The grid, of a map over places."""
+    """Grid, for a map over TCP positions."""
     wrench: list[float]
-    """Force (N) and moment (N m) on the TCP, besides weight."""
+    """Force (N) and moment (N m) on the TCP, in addition to gravity."""
     by: str
-    """Quantity by which best and worst are meant."""
+    """Quantity that defines best and worst."""
     quantities: dict[str, Spread]
-    """How each quantity is spread over the rows."""
+    """Distribution of each quantity over the rows."""
     worst: MapPose
     """The worst pose."""
     best: MapPose
     """The best pose."""
     placement: Placement | None
-    """Where the workpiece is best put; null without one, or if none of its places fits."""
+    """Best placement of the workpiece; null without a workpiece, or if it fits nowhere."""
     wall_s: float
-    """How long it took (s)."""
+    """Wall-clock time (s)."""
     file: str | None
-    """The table of all poses."""
+    """File with the table of all poses."""
     files: MapFiles
     """Written files."""
     warnings: list[str]
-    """What the caveats warn of, as sentences."""
+    """Messages of the caveats."""
     caveats: list[CaveatDict]
-    """What is probably wrong with the input, or limits the worth of the result."""
+    """Probable errors of the input, and limits of the result's validity."""
 
 
 class ErrorFigures(TypedDict):
-    """Error of the tool over a run."""
+    """Error of the TCP over a run."""
 
     peak_m: float
-    """Largest distance from the rigid arm's place (m)."""
+    """Maximum distance from the rigid arm's TCP (m)."""
     rms_m: float
-    """RMS of it (m)."""
+    """RMS distance (m)."""
     peak_rad: float
-    """Largest rotation from the rigid arm's (rad)."""
+    """Maximum rotation relative to the rigid arm's TCP (rad)."""
     end_m: float
     """Distance at the end (m)."""
 
 
 class JointChange(TypedDict):
-    """How far a joint is commanded away."""
+    """Change of a joint's commands."""
 
     joint: str
-    """Its name."""
+    """Name of the joint."""
     largest: float
-    """Largest change (rad or m)."""
+    """Maximum change (rad or m)."""
 
 
 class MotionViolation(TypedDict):
@@ -846,444 +846,444 @@ class MotionViolation(TypedDict):
 
 
 class ShapedModeFigures(TypedDict):
-    """A mode and what a shaper leaves of it."""
+    """A mode with its residual vibration."""
 
     frequency_hz: float
     """Natural frequency (Hz)."""
     damping_ratio: float
     """Damping ratio."""
     before_m: float
-    """Oscillation of the tool that the motion would leave, the largest within the band of the frequency (m)."""
+    """Residual vibration of the TCP without shaper, maximum within the band of the frequency (m)."""
     after_m: float
-    """The same with the shaper."""
+    """Residual vibration with the shaper (m)."""
 
 
 class ShaperFigures(TypedDict):
-    """A shaper as it was used."""
+    """Figures of a shaper in use."""
 
     kind: str
     """`zv`, `zvd` or `optimal`."""
     copies: list[list[float]]
-    """Delay (s) and part of each copy of the motion."""
+    """Delay (s) and amplitude of each copy of the motion."""
     modes: list[ShapedModeFigures]
-    """Modes at the end of the motion that it was made against, the one that would swing most first."""
+    """Modes at the end of the motion for which the shaper was designed, in order of decreasing vibration."""
 
 
 class PlantFigures(TypedDict):
-    """The commands on a plant that is not the model."""
+    """Result of the commands on a plant other than the model."""
 
     plant: str
-    """What is different."""
+    """Description of the plant."""
     before: ErrorFigures
-    """With the motion as it is."""
+    """Error of the unchanged motion."""
     after: ErrorFigures
-    """With the new commands."""
+    """Error with the new commands."""
 
 
 class LeftTarget(TypedDict):
-    """A target that stays as it was."""
+    """A target left unchanged."""
 
     line: int
     """Line of the move."""
     statement: str
-    """The move."""
+    """Statement of the move."""
     why: str
-    """Why."""
+    """Reason."""
     residual_m: float
-    """Distance of the flexible tool from its target at rest (m)."""
+    """Distance of the flexible TCP from its target at rest (m)."""
 
 
 class ProgramFigures(TypedDict):
-    """What became of the targets of a robot program."""
+    """Figures of the correction of a robot program."""
 
     files: list[str]
-    """The corrected program, and data lists that changed with it."""
+    """Paths of the corrected program and of the changed data lists."""
     targets: int
-    """Targets that moves end at; dwells and arcs of a told angle have none."""
+    """Number of targets at the ends of moves; dwells and arcs given by an angle have none."""
     corrected: int
-    """How many of them were replaced."""
+    """Number of targets replaced."""
     loaded: int
-    """At how many of them loads act, or another payload hangs than at the start."""
+    """Number of targets at which loads act or the payload differs from that at the start."""
     before_m: float
-    """Largest distance of the flexible tool from its target at rest, with the program as it was (m)."""
+    """Maximum distance of the flexible TCP from its target at rest, with the original program (m)."""
     residual_m: float
-    """The same of the replaced ones, with the program as it was written and read again (m)."""
+    """Maximum distance at the replaced targets, with the written program read again (m)."""
     residual_rad: float
-    """Largest rotation there (rad)."""
+    """Maximum rotation there (rad)."""
     left: list[LeftTarget]
-    """Those that stay as they were, the first of them."""
+    """Targets left unchanged; at most the first 20."""
 
 
 class Compensation(TypedDict):
-    """Answer of `flexarm compensate`."""
+    """Result of `flexarm compensate`."""
 
     robot: str
-    """The robot whose model found the commands."""
+    """Robot whose model was used to find the commands."""
     motion: str
-    """The motion."""
+    """File of the motion."""
     method: str
     """`dynamic` or `static`."""
     before: ErrorFigures
-    """Error with the motion as it is, on the plant."""
+    """Error of the unchanged motion, on the plant."""
     after: ErrorFigures
     """Error with the new commands, on the plant."""
     model_peaks_m: list[float]
-    """Peak after each iteration on the model itself, the first without any (m)."""
+    """Peak error on the model after each iteration; the first entry is without correction (m)."""
     iterations: int
-    """Iterations that were kept."""
+    """Number of iterations kept."""
     cutoff_hz: float | None
-    """Highest frequency that was corrected (Hz); null at rest."""
+    """Cutoff frequency of the correction (Hz); null for the static method."""
     changes: list[JointChange]
-    """Largest change of each joint (rad or m)."""
+    """Maximum change of each joint (rad or m)."""
     limits: list[MotionViolation]
-    """Limits that the new motion passes: positions, speeds and accelerations of the commands, torques of the run on the plant."""
+    """Limits that the new motion violates: positions, speeds and accelerations of the commands, torques of the run on the plant."""
     slowed: float
-    """How many times as long the motion takes so that limits are kept; 1 if it is as it was."""
+    """Factor by which the motion is slowed down to keep limits; 1 if unchanged."""
     shaper_delay_s: float
-    """How much longer the motion takes by its shaper (s)."""
+    """Time by which the shaper lengthens the motion (s)."""
     shaper: ShaperFigures | None
-    """The shaper, if there is one."""
+    """Shaper, if there is one."""
     plants: list[PlantFigures]
-    """The same commands on other plants."""
+    """Results of the same commands on other plants."""
     file: str | None
-    """The new motion (.csv)."""
+    """New motion (.csv)."""
     files: list[str]
-    """Further files of the new motion."""
+    """Additional files of the new motion."""
     recording: str | None
-    """The arm before and after (.rrd)."""
+    """Recording of the arm before and after (.rrd)."""
     program: ProgramFigures | None
-    """The robot program with corrected targets, of motions that were read from one (KRL, RAPID)."""
+    """Robot program with corrected targets, for motions read from a program (KRL, RAPID)."""
     page: str | None
-    """The page."""
+    """Page."""
     warnings: list[str]
-    """What the caveats warn of, as sentences."""
+    """Messages of the caveats."""
     caveats: list[CaveatDict]
-    """What is doubtful."""
+    """Caveats."""
 
 
 class ParameterSensitivity(TypedDict):
-    """What a change of one number does to the error."""
+    """Effect of a change of one parameter on the error."""
 
     name: str
-    """By the names of the robot file, of joints under servos `drive.JOINT.servo.` with their gains and `drive.JOINT.friction.` too; `motion.JOINT` for a shift of a joint, `tcp.x`, `.y` and `.z` for the place of the tool in its own axes."""
+    """Name as in the robot file; for servo-controlled joints also `drive.JOINT.servo.` with the gains and `drive.JOINT.friction.`; `motion.JOINT` for a shift of a joint, `tcp.x`, `.y` and `.z` for the position of the TCP in its own axes."""
     unit: str
-    """Its unit."""
+    """Unit of the parameter."""
     value: float
-    """Its value; 0 of a shift, 1 of what a servo feeds forward."""
+    """Value; 0 for a shift, 1 for an active feed-forward."""
     per: str
-    """Of which change of it the following are the effect: `1 %`, `1 % of the root of K_ii K_jj`, `1 kg`, `1 mrad` or `1 mm`. They are derivatives, times that."""
+    """Change to which the following effects refer: `1 %`, `1 % of the root of K_ii K_jj`, `1 kg`, `1 mrad` or `1 mm`. They are derivatives times that change."""
     peak_m: float
-    """Of the largest distance, at the time where it is (m)."""
+    """Effect on the maximum distance, at its time (m)."""
     rms_m: float
-    """Of the RMS distance (m)."""
+    """Effect on the RMS distance (m)."""
     peak_rad: float
-    """Of the largest angle (rad)."""
+    """Effect on the maximum angle (rad)."""
     rms_rad: float
-    """Of the RMS angle (rad)."""
+    """Effect on the RMS angle (rad)."""
 
 
 class Sensitivity(TypedDict):
-    """Answer of `flexarm sensitivity`."""
+    """Result of `flexarm sensitivity`."""
 
     robot: str
-    """The robot."""
+    """Name of the robot."""
     motion: str
-    """The motion."""
+    """File of the motion."""
     step_s: float
-    """Step (s), and how many."""
+    """Step size (s)."""
     steps: int
-    """Steps taken."""
+    """Number of steps."""
     peak_m: float
-    """Largest distance of the tool from the rigid one's (m)."""
+    """Maximum distance of the TCP from that of the rigid arm (m)."""
     t_peak_s: float
-    """When (s)."""
+    """Time of the maximum distance (s)."""
     rms_m: float
-    """Root of its mean square (m)."""
+    """RMS distance (m)."""
     peak_rad: float
-    """Largest angle (rad)."""
+    """Maximum angle (rad)."""
     rms_rad: float
-    """Root of its mean square (rad)."""
+    """RMS angle (rad)."""
     parameters: list[ParameterSensitivity]
-    """One per number of the robot, its tool and its motion; what the RMS depends on most comes first."""
+    """Sensitivities to the parameters of robot, tool and motion, in order of decreasing effect on the RMS distance."""
     table: str | None
-    """Error and derivatives over time."""
+    """File with error and derivatives over time."""
     warnings: list[str]
-    """What the caveats warn of, as sentences."""
+    """Messages of the caveats."""
     caveats: list[CaveatDict]
-    """What is doubtful."""
+    """Caveats."""
 
 
 class PoseParameter(TypedDict):
-    """What a change of one number does."""
+    """Effect of a change of one parameter."""
 
     name: str
-    """By the names of the robot file; `tcp.x`, `.y` and `.z` for the place of the tool in its own axes."""
+    """Name as in the robot file; `tcp.x`, `.y` and `.z` for the position of the TCP in its own axes."""
     unit: str
-    """Its unit."""
+    """Unit of the parameter."""
     value: float
-    """Its value."""
+    """Value of the parameter."""
     per: str
-    """Of which change of it the following are the effect: `1 %`, `1 % of the root of K_ii K_jj`, `1 kg` or `1 mm`. They are derivatives, times that."""
+    """Change to which the following effects refer: `1 %`, `1 % of the root of K_ii K_jj`, `1 kg` or `1 mm`. They are derivatives times that change."""
     tcp_m: list[float]
-    """Of the tool's place (m)."""
+    """Effect on the TCP position (m)."""
     tcp_rad: list[float]
-    """Of its attitude, a rotation vector (rad)."""
+    """Effect on the TCP orientation, as a rotation vector (rad)."""
     compliance: list[list[float]]
-    """Of the compliance."""
+    """Effect on the compliance."""
     frequencies_hz: list[float]
-    """Of the natural frequencies (Hz)."""
+    """Effect on the natural frequencies (Hz)."""
 
 
 class PoseSensitivity(TypedDict):
-    """Answer of `flexarm sensitivity --at`: drives locked, world axes, under the robot's own weight."""
+    """Result of `flexarm sensitivity --at`: drives locked, world axes, under gravity."""
 
     robot: str
-    """The robot."""
+    """Name of the robot."""
     joints: list[str]
     """Joints, in coordinate order."""
     at: list[float]
-    """Where they are held (rad or m)."""
+    """Positions at which they are held (rad or m)."""
     compliance: list[list[float]]
-    """Compliance of the tool, displacement (m, rad) per force (N) and moment (N m), 6×6."""
+    """Compliance at the TCP, displacement (m, rad) per force (N) and moment (N m), 6×6."""
     frequencies_hz: list[float]
     """Natural frequencies (Hz)."""
     parameters: list[PoseParameter]
-    """One per number of the robot."""
+    """Sensitivities to the parameters of the robot."""
     warnings: list[str]
-    """What the caveats warn of, as sentences."""
+    """Messages of the caveats."""
     caveats: list[CaveatDict]
-    """What is doubtful."""
+    """Caveats."""
 
 
 class FittedParameter(TypedDict):
-    """A number of the robot file as it was found."""
+    """Estimate of a number of the robot file."""
 
     name: str
-    """By the names of the robot file."""
+    """Name, as in the robot file."""
     unit: str
     """Unit of the values."""
     initial: float
-    """Before."""
+    """Initial value."""
     value: float
-    """Now; the initial value where the readings say nothing."""
+    """Estimated value; the initial value if the parameter is not identifiable."""
     std: float
-    """Standard deviation; not a number (null in JSON) where the readings do not tell it or the fit does not meet them."""
+    """Standard deviation; NaN (null in JSON) if the parameter is not identifiable or the model does not fit the readings."""
     interval: list[float]
-    """Where it lies in 95 of 100 cases; not numbers (nulls) without a deviation."""
+    """95 % confidence interval; NaN (nulls) where `std` is NaN."""
     identifiable: bool
-    """Whether the readings tell it."""
+    """Whether the readings determine the parameter."""
 
 
 class Weight(TypedDict):
-    """A parameter in a combination."""
+    """Parameter in a combination."""
 
     name: str
-    """Its name."""
+    """Name of the parameter."""
     weight: float
-    """Its weight, over the prior deviation."""
+    """Weight of the parameter over its prior deviation."""
 
 
 class Residual(TypedDict):
-    """RMS before and after."""
+    """RMS of the residuals before and after."""
 
     before: float
     """With the robot file as it is."""
     after: float
-    """With what was found."""
+    """With the estimated parameters."""
     unit: str
-    """`m`, `Hz`, or `std` where readings of several units are mixed."""
+    """`m`, `Hz`, or `std` where readings have different units."""
 
 
 class HeldOutFigures(TypedDict):
-    """RMS over readings that the fit had not seen."""
+    """RMS of cross-validation residuals."""
 
     folds: int
-    """Parts that were held out in turn."""
+    """Number of folds."""
     rms: float
-    """With the parameters fitted to the others."""
+    """With the parameters fitted to the other folds."""
     rms_before: float
     """With the robot file as it is."""
     unit: str
-    """As of the residual."""
+    """Unit, as in Residual."""
 
 
 class EncoderFigures(TypedDict):
-    """What recordings tell of a gear. SI units."""
+    """Result for one gear from recordings. SI units."""
 
     joint: str
-    """Joint."""
+    """Name of the joint."""
     stiffness: float
     """Stiffness (N m/rad, N/m)."""
     std: float
-    """Its standard deviation, by leaving out seconds of the recordings."""
+    """Standard deviation of the stiffness, by leaving out seconds of the recordings."""
     delay_s: float
-    """By how much the link's encoder is late (s)."""
+    """Delay of the link's encoder (s)."""
     r2: float
-    """Share of the deflection, without offsets and delay, that the torque explains."""
+    """Share of the deflection, without offsets and delay, that the torque explains (R²)."""
     unseen_r2: list[float]
-    """The same of each run by the others (of each half, with one run)."""
+    """R² of each run predicted from the others (of each half if there is one run)."""
     without_each: list[float]
-    """Stiffness without each run."""
+    """Stiffness estimated without each run."""
     deflection_rms: float
     """RMS of the deflection without offsets and delay (rad, m)."""
     rest_rms: float
-    """RMS of what is left of it."""
+    """RMS of the unexplained deflection (rad, m)."""
     noise_rms: float
-    """RMS of the noise of both instruments below `below`, from the noise that is faster (rad, m)."""
+    """RMS of the noise of both encoders below the cut-off frequency, extrapolated from the noise at higher frequencies (rad, m)."""
     told: bool
-    """Whether the recordings tell the gear: most of an unseen run follows, and no run decides alone."""
+    """Whether the recordings determine the stiffness (GearEstimate::is_told)."""
 
 
 class Suspicious(TypedDict):
-    """A reading that argues against the rest."""
+    """Reading that contradicts the others."""
 
     reading: str
-    """Which reading and number of it."""
+    """Name of the reading and of the number in it."""
     measured: float
-    """Measured (SI)."""
+    """Measured value (SI)."""
     expected: float
-    """Expected with what was found."""
+    """Value predicted with the estimated parameters (SI)."""
     normalised: float
-    """Difference over what its scatter would be."""
+    """Residual over its own standard deviation after the fit."""
 
 
 class ShapeFigures(TypedDict):
-    """A measured shape against the arm's mode that is most like it."""
+    """Measured mode shape and the most similar mode of the arm."""
 
     reading: str
-    """Which reading."""
+    """Name of the reading."""
     mode: int
-    """The mode, from 1, with what was found."""
+    """Number of the mode, from 1, with the estimated parameters."""
     assurance_before: float
-    """Modal assurance criterion with the robot file as it is, from 0 to 1."""
+    """Modal assurance criterion with the robot file as it is (0 to 1)."""
     assurance: float
-    """The same with what was found."""
+    """Modal assurance criterion with the estimated parameters (0 to 1)."""
 
 
 class FoundFrame(TypedDict):
-    """Where an instrument stands."""
+    """Pose of an instrument."""
 
     name: str
-    """Its name."""
+    """Name of the instrument."""
     xyz: list[float]
-    """In the world (m)."""
+    """Position in the world (m)."""
     rpy: list[float]
     """Roll, pitch, yaw (rad)."""
 
 
 class FoundPoint(TypedDict):
-    """Where a target is."""
+    """Position of a target."""
 
     name: str
-    """Its name."""
+    """Name of the target."""
     xyz: list[float]
-    """In tool axes (m)."""
+    """Position in tool axes (m)."""
 
 
 class Identification(TypedDict):
-    """Answer of `flexarm identify`."""
+    """Result of `flexarm identify`."""
 
     robot: str
-    """The robot."""
+    """Robot."""
     measurements: str
-    """The file of measurements."""
+    """File of measurements."""
     readings: int
-    """How many readings, and numbers in them."""
+    """Number of readings."""
     numbers: int
-    """Numbers that were measured."""
+    """Number of measured numbers."""
     parameters: list[FittedParameter]
-    """What was fitted."""
+    """Fitted parameters."""
     correlation: list[list[float]]
     """Correlation of the parameters, row after row."""
     untold: list[list[Weight]]
-    """Combinations that the readings do not tell."""
+    """Combinations that the readings do not determine."""
     residual: Residual
     """RMS of the residuals."""
     held_out: HeldOutFigures | None
-    """RMS over readings that the fit had not seen; null with fewer than two readings."""
+    """RMS of cross-validation residuals; null with fewer than two readings."""
     misfit: float | None
-    """How many times larger than its declared deviation the scatter is, where chance does not explain it; else null."""
+    """Ratio of the scatter to the declared one if chance does not explain it; otherwise null."""
     deviations_known: bool
-    """Whether the deviations of the readings were given; if not, the scatter tells them."""
+    """Whether the deviations of the readings were given; if not, they are estimated from the scatter."""
     encoders: list[EncoderFigures]
-    """Gears of which motor and link were recorded."""
+    """Gears with recorded positions of motor and link."""
     suspicious: list[Suspicious]
-    """Readings that argue against the rest, the worst first."""
+    """Readings that contradict the others, worst first."""
     shapes: list[ShapeFigures]
-    """Measured shapes of modes against those of the arm."""
+    """Measured mode shapes compared with those of the arm."""
     instruments: list[FoundFrame]
-    """Unknown instruments as found, in the world."""
+    """Estimated poses of unknown instruments, in the world."""
     targets: list[FoundPoint]
-    """Unknown targets as found, tool axes (m)."""
+    """Estimated positions of unknown targets in tool axes (m)."""
     iterations: int
-    """Iterations."""
+    """Number of iterations."""
     converged: bool
-    """Whether the search ended by itself, at a fit that meets the readings."""
+    """Whether the search converged to a solution that fits the readings."""
     file: str | None
-    """The new robot file."""
+    """New robot file."""
     page: str | None
-    """The page."""
+    """Path of the page."""
     caveats: list[CaveatDict]
-    """What is doubtful, of the robot as well."""
+    """Caveats about the identification and the robot."""
     warnings: list[str]
-    """The sentences of the caveats that warn."""
+    """Sentences of the caveats that are warnings."""
 
 
 class PlannedReading(TypedDict):
-    """A pose and a load."""
+    """Pose and load of a planned reading."""
 
     joints: list[float]
-    """Joints (rad or m)."""
+    """Joint values (rad or m)."""
     force: list[float]
     """Force on the tool, world axes (N)."""
     at: list[float]
-    """Where it acts, tool axes (m)."""
+    """Point of application of the force, tool axes (m)."""
     point: list[float]
-    """What is watched, tool axes (m)."""
+    """Measured point, tool axes (m)."""
     direction: list[float] | None
-    """Direction of the gauge, world axes; null where all three numbers are read."""
+    """Direction of the gauge, world axes; null if all three components are measured."""
     expected_m: list[float]
-    """Displacement of the point to expect with the robot file as it is (m)."""
+    """Predicted displacement of the point with the robot file as it is (m)."""
 
 
 class ExpectedParameter(TypedDict):
-    """What to expect of a parameter."""
+    """Expected uncertainty of a parameter."""
 
     name: str
-    """Its name."""
+    """Name."""
     unit: str
-    """Its unit."""
+    """Unit."""
     initial: float
-    """Now."""
+    """Present value."""
     std: float
     """Standard deviation after the measurement."""
 
 
 class MeasurementPlan(TypedDict):
-    """Answer of `flexarm identify --plan N`."""
+    """Result of `flexarm identify --plan N`."""
 
     robot: str
-    """The robot."""
+    """Robot."""
     joints: list[str]
-    """Joints, in the order of the poses."""
+    """Joints, in the order of the pose values."""
     poses: list[PlannedReading]
-    """What to measure, the most telling first."""
+    """Planned readings, most informative first."""
     parameters: list[ExpectedParameter]
-    """What to expect of each parameter."""
+    """Expected uncertainty of each parameter."""
     work_std_m: float | None
-    """Deviation of the tool's displacement where the work is done, largest over these poses and axes (m); null without them."""
+    """Maximum standard deviation of the tool's displacement over the poses of the work and the axes (m); null without such poses."""
     gain_over_first: float
-    """How much more the plan tells than the same number of the candidates as they come: half the logarithm of the ratio of the determinants, over the number of parameters; 0.69 is half the deviation."""
+    """Gain in information over the same number of candidates in their given order: half the logarithm of the ratio of the determinants, divided by the number of parameters. 0.69 corresponds to half the standard deviation."""
     candidates: int
-    """How many poses were candidates."""
+    """Number of candidate poses."""
     file: str | None
-    """The files to fill in."""
+    """File of measurements to fill in."""
     table: str | None
-    """The table among them."""
+    """Table to fill in."""
     caveats: list[CaveatDict]
-    """What is doubtful of the robot, as `check` says it."""
+    """Caveats about the robot, as from `check`."""
     warnings: list[str]
-    """The sentences of those that warn."""
+    """Sentences of the caveats that are warnings."""
 
 
 class _LobePoint(TypedDict):
@@ -1292,62 +1292,62 @@ class _LobePoint(TypedDict):
     spindle_rpm: float
     """Spindle speed (1/min)."""
     depth_m: float | None
-    """Depth above which the cut chatters (m); null if it does not, up to the deepest that was looked at."""
+    """Depth above which the cut chatters (m); null if it is stable up to the maximum depth."""
     chatter_hz: float | None
-    """Frequency at which the tip then swings most (Hz)."""
+    """Frequency of the largest component of the tip's motion at the limit (Hz)."""
     kind: str | None
-    """hopf (a frequency of its own) or flip (every second tooth cuts the same)."""
+    """Type of bifurcation: `hopf` (independent frequency) or `flip` (period of two teeth)."""
     zero_order_depth_m: float | None
     """Limit of the zero-order solution, for comparison (m)."""
     pose: int
-    """Which pose it is of."""
+    """Index of the pose."""
 
 
 class LobePoint(_LobePoint, total=False):
-    """A limit."""
+    """Stability limit."""
 
     unstable_m: list[list[float]]
-    """All unstable ranges of depth (m), if asked for."""
+    """All unstable ranges of depth (m), if requested."""
 
 
 class PoseLobes(TypedDict):
     """Limits at one pose."""
 
     at: list[float]
-    """Joints (rad or m)."""
+    """Joint values (rad or m)."""
     time_s: float | None
-    """When the motion is there (s)."""
+    """Time of the pose in the motion (s)."""
     feed: list[float]
     """Direction of the feed, world axes."""
     axis: list[float]
-    """From the spindle to the tip, world axes."""
+    """Direction from the spindle to the tip, world axes."""
     frequencies_hz: list[float]
     """Lowest natural frequencies of arm and tool (Hz)."""
     compliance: list[float]
-    """Compliance at rest along the feed, across it, and along the tool (m/N)."""
+    """Static compliance along the feed, across it, and along the tool's axis (m/N)."""
     stable_below_m: float | None
-    """Lowest limit (m); null if nothing chatters."""
+    """Minimum limit over all speeds (m); null if the cut never chatters."""
     stable_below_at_rpm: float | None
-    """Its speed (1/min)."""
+    """Speed of this limit (1/min)."""
     depth_m: list[float | None]
     """Limit at each speed (m)."""
 
 
 class LobesFiles(TypedDict):
-    """Written files; null where none was written."""
+    """Output files; null for files that were not written."""
 
     csv: str | None
     """Table."""
     plot: str | None
     """Diagram."""
     page: str | None
-    """Page for the browser."""
+    """HTML page."""
     json: str | None
-    """This answer."""
+    """Result as JSON."""
 
 
 class Lobes(TypedDict):
-    """Answer of `flexarm lobes`. SI units, speeds in 1/min."""
+    """Result of `flexarm lobes`. SI units, spindle speeds in 1/min."""
 
     robot: str
     """Name of the robot."""
@@ -1356,71 +1356,71 @@ class Lobes(TypedDict):
     joints: list[str]
     """Joints, in coordinate order."""
     method: str
-    """floquet or zero-order."""
+    """Method: `floquet` or `zero-order`."""
     deepest_m: float
-    """Deepest cut that was looked at (m)."""
+    """Maximum depth of cut in the search (m)."""
     points: list[LobePoint]
-    """One per speed: the smallest limit over all poses."""
+    """Minimum limit over all poses, one per speed."""
     stable_below_m: float | None
-    """Below this depth the cut is stable at every speed that was asked for (m); null if nothing chatters."""
+    """Depth below which the cut is stable at every speed (m); null if it never chatters."""
     stable_below_at_rpm: float | None
-    """Speed of that limit (1/min)."""
+    """Speed of this limit (1/min)."""
     best_rpm: float
-    """The speed with the deepest stable cut (1/min), and that (m); the deepest that was looked at where nothing chatters."""
+    """Speed with the maximum stable depth of cut (1/min)."""
     best_depth_m: float
-    """Its depth (m)."""
+    """Maximum stable depth of cut at this speed (m); Self::deepest_m if it does not chatter."""
     poses: list[PoseLobes]
-    """What was found at each pose."""
+    """Limits at each pose."""
     left_out: int
-    """Places of the motion that were left out: the tool stands still there, or moves along its axis."""
+    """Number of poses of the motion that are left out: the tool is at rest or moves along its axis."""
     file: str | None
-    """The table; null if nothing was written."""
+    """Path of the table; null if nothing was written."""
     files: LobesFiles
-    """Written files."""
+    """Output files."""
     warnings: list[str]
-    """What the caveats warn of, as sentences."""
+    """Sentences of the caveats that are warnings."""
     caveats: list[CaveatDict]
-    """What is probably wrong with the input, or limits the worth of the result."""
+    """Caveats about the input and the validity of the result."""
 
 
 _ParameterFiguresAs = TypedDict("_ParameterFiguresAs", {"as": "Literal['value', 'factor', 'offset']"}, total=True)
 
 
 class ParameterFigures(_ParameterFiguresAs):
-    """A parameter."""
+    """Figures of a parameter."""
 
     name: str
-    """Its name."""
+    """Name."""
     range: list[float] | None
-    """Least and largest value; null of words."""
+    """Minimum and maximum; null if not numeric."""
 
 
 class IndexFigures(TypedDict):
     """Sobol indices of a parameter."""
 
     parameter: str
-    """The parameter."""
+    """Name of the parameter."""
     first: float
-    """Part of the variance that it makes by itself."""
+    """First-order index: share of the variance due to the parameter by itself."""
     first_interval: list[float]
-    """Where that lies in 95 of 100 cases."""
+    """95 % confidence interval of `first`."""
     total: float
-    """Part that it makes with others too."""
+    """Total index: share of the variance including interactions."""
     total_interval: list[float]
-    """Likewise."""
+    """95 % confidence interval of `total`."""
 
 
 class MetricFigures(TypedDict):
-    """A metric over all runs that were done."""
+    """Figures of a metric over all successful runs."""
 
     name: str
-    """Its name."""
+    """Name."""
     count: int
-    """Runs that have it."""
+    """Number of runs with a value."""
     min: float | None
-    """Least."""
+    """Minimum."""
     max: float | None
-    """Largest."""
+    """Maximum."""
     mean: float | None
     """Mean."""
     std: float | None
@@ -1428,176 +1428,176 @@ class MetricFigures(TypedDict):
     quantiles: list[float] | None
     """Quantiles 0.05, 0.5 and 0.95."""
     shares: dict[str, float | None]
-    """Part of its variance that each parameter makes by itself (correlation ratio); null of words and where nothing varies."""
+    """Share of the variance that each parameter explains by itself (correlation ratio); null if the parameter is not numeric or nothing varies."""
     matters: list[str]
-    """The parameters that matter, the strongest first: listed ones with an effect, and drawn ones whose effect stands out of chance."""
+    """Parameters that matter, strongest first: listed ones with an effect, and random ones whose effect chance does not explain."""
     chance: float | None
-    """Part of the scatter of the draws that the strongest of the drawn parameters would have by chance in 1 of 100 studies; null where nothing is drawn."""
+    """Share of the variance due to random sampling that the strongest random parameter would explain by chance in 1 of 100 studies; null if nothing is random."""
     better: Literal['lower', 'higher'] | None
-    """What is better of it; null if neither the study nor its expression nor its name tells."""
+    """Preferred direction; null if neither study, expression nor name determines it."""
     sobol: list[IndexFigures]
-    """Sobol indices of the parameters that were drawn by Saltelli's design; empty otherwise."""
+    """Sobol indices of the parameters in a Saltelli design; empty otherwise."""
 
 
 class FailureFigures(TypedDict):
-    """A reason why runs failed."""
+    """Reason of failed runs."""
 
     reason: str
-    """The reason."""
+    """Reason."""
     runs: int
-    """Runs."""
+    """Number of runs."""
     first: int
-    """The first of them."""
+    """Number of the first of these runs."""
 
 
 class Replay(TypedDict):
-    """The files of a run, and its options; a face makes a command of them."""
+    """Files and options of a run, from which an interface builds a command."""
 
     robot: str
     """Robot file."""
     motion: str | None
-    """Motion; none where the robot file names it."""
+    """Motion; `None` if the robot file names it."""
     loads: str | None
-    """Loads."""
+    """File of loads."""
     options: list[list[float | str | bool | str]]
-    """Options by their words."""
+    """Options by key."""
 
 
 class BestRun(TypedDict):
-    """The best run by a metric."""
+    """Best run by a metric."""
 
     run: int
-    """Its number."""
+    """Number of the run."""
     metric: str
-    """What is least or highest in it."""
+    """Name of the metric."""
     better: Literal['lower', 'higher']
-    """Which of both: lower where it is not known what is better."""
+    """Direction of the optimum; lower if the preferred direction is unknown."""
     value: float
-    """How much that is."""
+    """Value of the metric."""
     parameters: dict[str, float | str | bool]
-    """Values of its parameters."""
+    """Values of the parameters."""
     metrics: dict[str, float | None]
-    """Its metrics."""
+    """Values of the metrics."""
     files: Replay | None
-    """Its files, ready to be run; null where none are written."""
+    """Files of the run, ready to use; null if none are written."""
     command: str | None
-    """The command that runs it."""
+    """Command that repeats the run."""
 
 
 class ParetoRun(TypedDict):
-    """A run of the front."""
+    """Pareto-optimal run."""
 
     run: int
-    """Its number."""
+    """Number of the run."""
     values: list[float]
-    """Both metrics."""
+    """Values of both metrics."""
 
 
 class ParetoFigures(TypedDict):
-    """Runs that no other beats in two metrics."""
+    """Pareto-optimal runs of two metrics."""
 
     metrics: list[str]
-    """Both."""
+    """Names of the metrics."""
     better: list[Literal['lower', 'higher']]
-    """What is better of each: lower where that is not known."""
+    """Preferred directions; lower if unknown."""
     runs: list[ParetoRun]
-    """By the first metric."""
+    """Runs, sorted by the first metric."""
 
 
 class MinimiseFigures(TypedDict):
-    """How a search went."""
+    """Progress and result of a search."""
 
     metric: str
-    """What is to be least."""
+    """Metric to minimise."""
     constraints: list[str]
-    """What must hold."""
+    """Constraints."""
     kept: bool
-    """Whether the best run keeps them all."""
+    """Whether the best run satisfies all constraints."""
     settled: bool
-    """Whether the search ended by itself: its points hardly differed any more."""
+    """Whether the search converged, that is, its points hardly differ."""
     generations: int
-    """Generations."""
+    """Number of generations."""
     start: float | None
-    """What the files give before anything is looked for; null if that run failed."""
+    """Value at the start of the search; null if that run failed."""
     start_kept: bool
-    """Whether that keeps the constraints."""
+    """Whether the run at the start satisfies the constraints."""
     progress: list[float | None]
-    """Least value so far that keeps the constraints, after each generation; null before there is one."""
+    """Minimum so far of the runs that satisfy the constraints, after each generation; null before there is one."""
 
 
 class CaveatFigures(TypedDict):
-    """A caveat, and the runs that it concerns. It is that of the run in which it is worst."""
+    """Caveat with the runs it concerns, represented by the worst of them."""
 
     severity: Literal['warning', 'note']
-    """How much it weighs."""
+    """Severity."""
     code: str
-    """Short, stable name of its kind."""
+    """Short, stable identifier of its kind."""
     where: str
-    """What it is about: a link, a joint, the payload, a file."""
+    """Subject: a link, a joint, the payload, a file."""
     message: str
-    """All of it in one sentence."""
+    """Complete message in one sentence."""
     value: float | None
-    """What was found."""
+    """Value found."""
     yardstick: float | None
-    """What it is compared with."""
+    """Reference with which the value is compared."""
     unit: str
     """Unit of both."""
     likely: str
-    """The slip that would explain it, such as "about 1000 times: millimetres?"; empty if none does."""
+    """Likely mistake that explains the value, such as "about 1000 times: millimetres?"; empty if there is none."""
     help: str
-    """What to look at, or how to mend it."""
+    """Advice on what to check or how to fix it."""
     runs: int
-    """Runs of which it is said."""
+    """Number of runs with this caveat."""
     worst_run: int
-    """The run with the worst value."""
+    """Number of the run with the worst value."""
 
 
 class SweepSummary(TypedDict):
-    """Answer of `flexarm sweep`."""
+    """Result of `flexarm sweep`."""
 
     study: str
     """Name of the study."""
     runs: int
-    """Runs of the study."""
+    """Number of runs of the study."""
     done: int
-    """Runs that gave a result."""
+    """Number of successful runs."""
     failed: int
-    """Runs that failed."""
+    """Number of failed runs."""
     shard: str | None
-    """The part of the runs that was run, as `number/of`; null for all."""
+    """Shard that was computed, as `number/of`; null for all runs."""
     wall_s: float
     """Wall-clock time (s)."""
     cpu_s: float
     """Processor time, all threads (s)."""
     file: str
-    """The table of all runs, or the folder of a shard."""
+    """Path of the table of all runs, or of the folder of a shard."""
     page: str | None
-    """The page."""
+    """Path of the page."""
     parameters: list[ParameterFigures]
-    """What is varied."""
+    """Varied parameters."""
     metrics: list[MetricFigures]
-    """What came out."""
+    """Metrics."""
     failures: list[FailureFigures]
-    """Why runs failed, the most frequent first."""
+    """Reasons of failed runs, most frequent first."""
     best: BestRun | None
-    """The best run; null if none was done."""
+    """Best run; null if no run succeeded."""
     pareto: ParetoFigures | None
-    """The runs that no other beats in two metrics; null with one metric."""
+    """Pareto-optimal runs of two metrics; null with one metric."""
     minimise: MinimiseFigures | None
-    """How the search went, if one was made."""
+    """Figures of the search, if this is one."""
     warnings: list[str]
-    """The sentences of the caveats that warn, each once, with the number of runs that it concerns."""
+    """Sentences of the caveats that are warnings, each once, with the number of affected runs."""
     caveats: list[CaveatFigures]
-    """What `check` and `compare` would say of the runs, each caveat once with its worst value, warnings first."""
+    """Caveats as from `check` and `compare`, each once with its worst value, warnings first."""
     doubles: int
-    """Runs that several shards had, with the same result; they count once."""
+    """Number of runs that several shards contain with the same result; they count once."""
 
 
 class MaterialFigures(TypedDict):
     """A material, SI."""
 
     text: str
-    """Preset and constants for people."""
+    """Preset and constants as text."""
     E: float
     """Young's modulus (Pa)."""
     nu: float
@@ -1610,12 +1610,12 @@ _RegionFiguresFrom = TypedDict("_RegionFiguresFrom", {"from": "str"}, total=True
 
 
 class RegionFigures(_RegionFiguresFrom):
-    """A region with the material that was used."""
+    """A region with the material in use."""
 
     region: str
     """Name of the region."""
     material: MaterialFigures
-    """Its material."""
+    """Material of the region."""
 
 
 class InterfaceFigures(TypedDict):
@@ -1624,19 +1624,19 @@ class InterfaceFigures(TypedDict):
     name: str
     """Name."""
     selector: str
-    """Which nodes were asked for."""
+    """Selection of the nodes."""
     nodes: int
-    """How many these are."""
+    """Number of nodes."""
     tie: str
-    """rigid or distributing."""
+    """Tie: rigid or distributing."""
     position_m: list[float]
-    """Position of its frame."""
+    """Position of the frame."""
     rpy_rad: list[float]
-    """Roll, pitch, yaw of its frame."""
+    """Roll, pitch, yaw of the frame."""
     centroid_m: list[float]
-    """Mean of its nodes."""
+    """Mean position of the nodes."""
     extent_m: list[float]
-    """Size of the box around its nodes."""
+    """Size of the bounding box of the nodes."""
 
 
 class PartFigures(TypedDict):
@@ -1656,198 +1656,198 @@ class ChainFigures(TypedDict):
     parts: int
     """Number of parts."""
     frequencies_hz: list[float]
-    """Natural frequencies with A held and B free (Hz), as many as the mesh's."""
+    """Natural frequencies with A held and B free (Hz), at most as many as checked against the mesh."""
 
 
 class ModalFigures(TypedDict):
-    """A modal link: `model = "modal"` of a robot file."""
+    """Figures of a modal link: `model = "modal"` of a robot file."""
 
     coordinates: int
-    """Shape coordinates: six per interface but A, then modes."""
+    """Number of generalised coordinates: six per interface except A, then modes."""
     interfaces: list[str]
-    """Interfaces but A, distal first."""
+    """Interfaces except A, distal first."""
     mass_kg: float
-    """Mass, without bodies that ride on the link."""
+    """Mass, without attached bodies."""
     second_order: bool
-    """Whether the integrals of second order are known."""
+    """Whether the second-order integrals are known."""
     geometric: bool
-    """Whether stiffness by load is there (`geometric_stiffening = true` of a robot file)."""
+    """Whether the geometric stiffness is stored (`geometric_stiffening = true` of a robot file)."""
     frequencies_hz: list[float]
-    """Natural frequencies with A held, all of them (Hz)."""
+    """All natural frequencies with A held (Hz)."""
 
 
 class ReduceModeFigures(TypedDict):
     """One mode with A held and B free; errors are relative to the mesh."""
 
     mesh_hz: float
-    """Of the mesh (Hz)."""
+    """Frequency of the mesh (Hz)."""
     reduced_hz: float | None
-    """Of the reduced matrices with their modes, Craig-Bampton (Hz)."""
+    """Frequency of the reduced matrices with their modes, Craig-Bampton (Hz)."""
     reduced_error: float | None
-    """Its error."""
+    """Relative error of the Craig-Bampton frequency."""
     guyan_hz: float | None
-    """Of the reduced matrices without modes, Guyan (Hz)."""
+    """Frequency of the reduced matrices without modes, Guyan (Hz)."""
     guyan_error: float | None
-    """Its error."""
+    """Relative error of the Guyan frequency."""
     lumped_hz: float | None
-    """Of the two rigid parts (Hz)."""
+    """Frequency of the two rigid parts (Hz)."""
     lumped_error: float | None
-    """Its error."""
+    """Relative error of the frequency of the two parts."""
 
 
 class CheckFigures(TypedDict):
-    """What was checked."""
+    """Results of the checks."""
 
     symmetry: float
-    """Largest relative asymmetry of the reduced stiffness as computed."""
+    """Maximum relative asymmetry of the reduced stiffness as computed."""
     rigid_body_residual: float
-    """Largest relative force under rigid motion of all interfaces."""
+    """Maximum relative force under rigid-body motion of all interfaces."""
     mass_error: float
-    """Relative difference of the mass in the reduced matrix from that of the mesh."""
+    """Relative difference between the mass in the reduced matrix and that of the mesh."""
     com_error_m: float
-    """The same of the centre of mass (m)."""
+    """Difference of the centres of mass (m)."""
     inertia_error: float
-    """The same of the inertia, relative."""
+    """Relative difference of the inertias."""
     block_identity: float
-    """Disagreement of `K_AA`, `K_AB` with `K_BB`."""
+    """Residual of the identity between `K_AA`, `K_AB` and `K_BB`."""
     zero_modes: int
-    """Modes of the free reduced link without frequency; six are right."""
+    """Number of zero-frequency modes of the free reduced link; must be six."""
     min_eigenvalue: float
-    """Smallest eigenvalue of `K_BB`, scaled to a unit diagonal."""
+    """Minimum eigenvalue of `K_BB`, scaled to a unit diagonal."""
     condition: float
-    """Condition number of the stiffness of the free nodes, estimated."""
+    """Estimated condition number of the stiffness of the free nodes."""
     mode_residual: float
-    """Largest residual of the kept modes."""
+    """Maximum residual of the kept modes."""
     jacobian_at_points: float
-    """Smallest Jacobian at an integration point over the mean of its element."""
+    """Minimum Jacobian at an integration point, relative to the mean of its element."""
     jacobian_at_nodes: float
-    """Smallest Jacobian at a node over the mean of its element."""
+    """Minimum Jacobian at a node, relative to the mean of its element."""
     worst_element: int
-    """Number in the file of the element with the latter."""
+    """Number in the file of the element with the minimum Jacobian at a node."""
     smallest_fullness: float
-    """Smallest volume of an element over that of the best shape with edges of the same length."""
+    """Minimum volume of an element, relative to that of the best shape with edges of the same length."""
     largest_offset: float
-    """Largest distance of a mid-side node from the middle of its edge, over the length of the edge."""
+    """Maximum distance of a mid-side node from the middle of its edge, relative to the length of the edge."""
     order_ratio: float | None
-    """Compliance at B with elements of second order over that of the mesh, the component farthest from one; null for elements of second order."""
+    """Ratio of the compliance at B with second-order elements to that of the mesh, for the component with the ratio farthest from one; null for second-order elements."""
     order_ratios: list[float] | None
-    """The same along x y z rx ry rz."""
+    """Ratios of all components, along x y z rx ry rz."""
 
 
 class SolverFigures(TypedDict):
-    """The linear algebra."""
+    """Figures of the linear solver."""
 
     unknowns: int
-    """Unknowns of the factor."""
+    """Number of unknowns of the factorisation."""
     matrix_entries: int
-    """Entries of the lower triangle of the matrix."""
+    """Number of stored entries of the lower triangle of the matrix."""
     factor_entries: int
-    """Entries of its factor."""
+    """Number of stored entries of the factor."""
     ordering: str
-    """amd or nested: the order that was used."""
+    """Ordering used: amd or nested."""
     right_hand_sides: int
-    """Right-hand sides solved in all."""
+    """Total number of right-hand sides solved."""
 
 
 class PhaseFigures(TypedDict):
     """Time of each step (s)."""
 
     read_s: float
-    """Reading the mesh, choosing nodes."""
+    """Reading of the mesh and selection of nodes."""
     assembly_s: float
-    """Element matrices."""
+    """Element matrices and assembly."""
     factorisation_s: float
-    """Cholesky factor and static shapes."""
+    """Cholesky factorisation and static shapes."""
     modes_s: float
     """Fixed-interface modes, and those of the mesh with A held."""
     parts_s: float
-    """Parts, chains, checks."""
+    """Rigid parts, chains and checks."""
 
 
 class ReduceFiles(TypedDict):
     """Written files; null where none was written."""
 
     flex: str | None
-    """The link file, for `reduced = "..."` of a robot file."""
+    """Link file, for `reduced = "..."` of a robot file."""
     entry: str | None
-    """The entry of a robot file that uses it, as TOML."""
+    """Entry for a robot file that uses the link, as TOML."""
     job: str | None
-    """The job, complete, to run again."""
+    """Complete job, to run it again."""
     summary: str | None
-    """These figures."""
+    """Summary file."""
     report: str | None
-    """These figures for people."""
+    """Report."""
     pictures: list[str]
-    """What is tied, how the link bends, its modes; empty without the feature `png`."""
+    """Pictures of the ties, the deflections and the modes; empty without the feature `png`."""
 
 
 class ReduceSummary(TypedDict):
-    """Answer of `flexarm reduce`."""
+    """Result of `flexarm reduce`."""
 
     link: str
     """Name of the link."""
     mesh: str
     """The mesh file."""
     format: str
-    """Its format."""
+    """Format of the mesh file."""
     units: str
-    """Its units."""
+    """Units of the mesh."""
     method: str
-    """How: "guyan" or "craig-bampton, 10 modes"."""
+    """Method: "guyan" or "craig-bampton, 10 modes"."""
     quadrature: str
-    """exact or calculix."""
+    """Quadrature: exact or calculix."""
     materials: list[RegionFigures]
     """Material of each region."""
     nodes: int
-    """Nodes of the mesh."""
+    """Number of nodes of the mesh."""
     elements: int
-    """Its elements."""
+    """Number of elements."""
     dofs: int
-    """Its degrees of freedom."""
+    """Number of degrees of freedom."""
     interfaces: list[InterfaceFigures]
     """Interfaces, proximal first."""
     mass_kg: float
     """Mass of the whole link."""
     com_m: list[float]
-    """Its centre of mass."""
+    """Centre of mass."""
     inertia: list[list[float]]
-    """Its inertia about the centre of mass, 3×3 (kg m²)."""
+    """Inertia about the centre of mass, 3×3 (kg m²)."""
     stiffness: list[list[float]]
     """Stiffness at B with A held, 6×6, linear first (N/m, N/rad; N m/m, N m/rad)."""
     compliance: list[list[float]]
-    """Its inverse: displacement of B per unit load at B."""
+    """Inverse of the stiffness: displacement of B per unit load at B."""
     split_m: list[float]
-    """Where the elastic joint of the two parts sits."""
+    """Position of the elastic joint between the two parts."""
     parts: list[PartFigures]
     """The two rigid parts, proximal first."""
     attached: list[PartFigures]
-    """Bodies that ride on the link without being in the mesh; they are in `parts`, not in `mass_kg`."""
+    """Bodies attached to the link that are not in the mesh; included in `parts`, not in `mass_kg`."""
     chains: list[ChainFigures]
-    """Chains of more parts that the link file holds."""
+    """Chains of more parts in the link file."""
     frequencies_hz: list[float]
     """Natural frequencies of the mesh with A held and B free (Hz)."""
     fixed_interface_hz: list[float]
-    """Frequencies of the mesh with all interfaces held: the modes that were kept (Hz)."""
+    """Frequencies of the kept modes: those of the mesh with all interfaces held (Hz)."""
     modal: ModalFigures | None
-    """The modal link in the link file."""
+    """Modal link in the link file."""
     modes: list[ReduceModeFigures]
     """Modes with A held, of the mesh and of the reduced models."""
     checks: CheckFigures
-    """What was checked."""
+    """Results of the checks."""
     solver: SolverFigures
-    """The linear algebra."""
+    """Figures of the linear solver."""
     phases: PhaseFigures
     """Time of each step (s)."""
     wall_s: float
-    """Wall-clock time without the writing of files (s)."""
+    """Wall-clock time, excluding the writing of files (s)."""
     cpu_s: float
     """Processor time, all threads (s)."""
     peak_rss_bytes: int | None
-    """Largest memory of the process so far; null where the system does not tell."""
+    """Peak memory of the process so far; null where the system does not report it."""
     warnings: list[str]
-    """Things worth telling."""
+    """Warnings."""
     caveats: list[CaveatDict]
-    """The same with code, value and yardstick."""
+    """The same warnings with code, value and reference value."""
     files: ReduceFiles
     """Written files."""
 
@@ -1861,11 +1861,11 @@ class ImportInterface(_ImportInterfaceFrom):
     name: str
     """Name."""
     rows: str
-    """Its rows or nodes in the file."""
+    """Rows or nodes in the file."""
     position_m: list[float]
-    """Position of its frame."""
+    """Position of the frame."""
     rpy_rad: list[float]
-    """Roll, pitch, yaw of its frame."""
+    """Roll, pitch, yaw of the frame."""
 
 
 class ImportPart(TypedDict):
@@ -1880,107 +1880,107 @@ class ImportPart(TypedDict):
 
 
 class ImportChecks(TypedDict):
-    """What was checked; relative unless the key has a unit."""
+    """Results of the checks; relative unless the key has a unit."""
 
     symmetry: float
-    """Largest asymmetry of the matrices in the file."""
+    """Maximum asymmetry of the matrices in the file."""
     rigid_body_residual: float
-    """Force under rigid motion."""
+    """Residual force under rigid-body motion."""
     mass_error: float | None
-    """Mass along x, y, z and that of the link, largest difference; null without a mass matrix."""
+    """Maximum relative difference between the masses along x, y, z and that of the link; null without a mass matrix."""
     block_identity: float
-    """Disagreement of the blocks of the stiffness."""
+    """Residual of the identity between the blocks of the stiffness."""
     min_eigenvalue: float
-    """Smallest eigenvalue of the stiffness, scaled to a unit diagonal."""
+    """Minimum eigenvalue of the stiffness, scaled to a unit diagonal."""
     condition: float
-    """Its condition number."""
+    """Condition number of the scaled stiffness."""
 
 
 class ImportFiles(TypedDict):
     """Written files; null where none was written."""
 
     flex: str | None
-    """The link file, for `reduced = "..."` of a robot file."""
+    """Link file, for `reduced = "..."` of a robot file."""
     entry: str | None
-    """The entry of a robot file that uses it, as TOML."""
+    """Entry for a robot file that uses the link, as TOML."""
     summary: str | None
-    """These figures."""
+    """Summary file."""
     report: str | None
-    """These figures for people."""
+    """Report."""
 
 
 class ImportSummary(TypedDict):
-    """Answer of `flexarm import`."""
+    """Result of `flexarm import`."""
 
     link: str
     """Name of the link."""
     sources: list[str]
-    """Files that were given."""
+    """Input files."""
     format: str
-    """Their format."""
+    """Format of the files."""
     units: str
-    """Their units."""
+    """Units of the files."""
     method: str
-    """"reduced matrices", "craig-bampton, 10 modes", ..."""
+    """Method: "reduced matrices", "craig-bampton, 10 modes", ..."""
     rows: int
-    """Rows of the stiffness in the file."""
+    """Number of rows of the stiffness in the file."""
     interfaces: list[ImportInterface]
     """Interfaces, proximal first."""
     mass_kg: float
     """Mass of the whole link."""
     com_m: list[float]
-    """Its centre of mass."""
+    """Centre of mass."""
     inertia: list[list[float]]
-    """Its inertia about the centre of mass, 3×3 (kg m²)."""
+    """Inertia about the centre of mass, 3×3 (kg m²)."""
     stiffness: list[list[float]]
     """Stiffness at B with A held, 6×6, linear first (N/m, N/rad; N m/m, N m/rad)."""
     compliance: list[list[float]]
-    """Its inverse."""
+    """Inverse of the stiffness."""
     split_m: list[float]
-    """Where the elastic joint of the two parts sits."""
+    """Position of the elastic joint between the two parts."""
     parts: list[ImportPart]
     """The two rigid parts, proximal first."""
     frequencies_hz: list[float]
-    """Natural frequencies with A held and B free (Hz); empty without mass of matrices or modes."""
+    """Natural frequencies with A held and B free (Hz); empty without a mass matrix or modes."""
     lumped_frequencies_hz: list[float]
-    """The same of the two rigid parts with their joint (Hz)."""
+    """Natural frequencies of the two rigid parts with their joint (Hz)."""
     fixed_interface_hz: list[float]
     """Frequencies of the fixed-interface modes in the matrices (Hz)."""
     modal: ModalFigures | None
-    """The modal link that the file holds or gives; null where it cannot be one."""
+    """Modal link in the file or computed from it; null where there is none."""
     checks: ImportChecks
-    """What was checked."""
+    """Results of the checks."""
     wall_s: float
-    """Wall-clock time without the writing of files (s)."""
+    """Wall-clock time, excluding the writing of files (s)."""
     cpu_s: float
     """Processor time, all threads (s)."""
     peak_rss_bytes: int | None
-    """Largest memory of the process so far; null where the system does not tell."""
+    """Peak memory of the process so far; null where the system does not report it."""
     warnings: list[str]
-    """Things worth telling."""
+    """Warnings."""
     caveats: list[CaveatDict]
-    """The same with code, value and yardstick."""
+    """The same warnings with code, value and reference value."""
     files: ImportFiles
     """Written files."""
 
 
 class ExportChecks(TypedDict):
-    """Differences between the link and the files as read back, and the checks of the link itself."""
+    """Differences between the link and the files read back, and the checks of the link itself."""
 
     symmetry: float
-    """Asymmetry of the stiffness of the link's source."""
+    """Asymmetry of the stiffness from which the link was made."""
     rigid_body_residual: float | None
-    """Force under rigid motion; null where the source was a 6×6."""
+    """Residual force under rigid-body motion; null where the source was a 6×6 matrix."""
     mass_error: float | None
-    """Largest difference of the mass, relative to `sqrt(m_ii m_jj)`; null without mass."""
+    """Maximum difference of the mass, relative to `sqrt(m_ii m_jj)`; null without mass."""
     stiffness_error: float
-    """Largest difference of the stiffness, relative to `sqrt(k_ii k_jj)`."""
+    """Maximum difference of the stiffness, relative to `sqrt(k_ii k_jj)`."""
     integrals_error: float | None
-    """Largest difference of the mass integrals of a modal link; null in other formats."""
+    """Maximum difference of the mass integrals of a modal link; null in other formats."""
 
 
 class ExportSummary(TypedDict):
-    """Answer of `flexarm export`; SI units, link axes."""
+    """Result of `flexarm export`; SI units, link axes."""
 
     link: str
     """Name of the link."""
@@ -1989,29 +1989,29 @@ class ExportSummary(TypedDict):
     units: str
     """Units of the files."""
     rows: int
-    """Rows of the matrices."""
+    """Number of rows of the matrices."""
     modes: int
-    """How many of them are modal coordinates."""
+    """Number of modal coordinates among the rows."""
     map: str
-    """The map with which `flexarm import` reads the files."""
+    """Map with which `flexarm import` reads the files."""
     mass_kg: float
     """Mass of the whole link."""
     com_m: list[float]
-    """Its centre of mass."""
+    """Centre of mass."""
     inertia: list[list[float]]
-    """Its inertia about the centre of mass, 3×3 (kg m²)."""
+    """Inertia about the centre of mass, 3×3 (kg m²)."""
     stiffness: list[list[float]]
     """Stiffness at B with A held, 6×6."""
     frequencies_hz: list[float]
     """Natural frequencies of the matrices with A held (Hz); empty without mass."""
     checks: ExportChecks
-    """What was checked."""
+    """Results of the checks."""
     wall_s: float
     """Wall-clock time (s)."""
     peak_rss_bytes: int | None
-    """Largest memory of the process so far; null where the system does not tell."""
+    """Peak memory of the process so far; null where the system does not report it."""
     warnings: list[str]
-    """Things worth telling."""
+    """Warnings."""
     files: list[str]
     """Written files."""
 
@@ -2052,7 +2052,7 @@ class _FlexibleInfo(TypedDict):
     name: str
     """Name."""
     method: str
-    """Where its stiffness comes from."""
+    """Source of its stiffness."""
     length_m: float
     """Distance of the interfaces (m)."""
     parts_kg: list[float]
@@ -2062,14 +2062,14 @@ class _FlexibleInfo(TypedDict):
     model: str
     """lumped or modal."""
     coordinates: int
-    """How many elastic coordinates it has."""
+    """Number of elastic coordinates."""
 
 
 class FlexibleInfo(_FlexibleInfo, total=False):
     """A flexible link."""
 
     modal_frequencies_hz: list[float] | None
-    """Of a modal link: natural frequencies with A held, all of them (Hz)."""
+    """All natural frequencies of a modal link with A held (Hz)."""
 
 
 class MountingInfo(TypedDict):
@@ -2078,13 +2078,13 @@ class MountingInfo(TypedDict):
     name: str
     """Name."""
     position_m: list[float]
-    """Where they are, in the base link (m)."""
+    """Position of the springs in the base link (m)."""
     quaternion_wxyz: list[float]
     """Their axes in the base link, w first."""
     stiffness: list[list[float]]
     """Stiffness in their axes, 6×6, linear first."""
     mass_kg: float
-    """What rides on them beside the base (kg)."""
+    """Mass on the springs in addition to the base (kg)."""
 
 
 class CouplingInfo(TypedDict):
@@ -2121,7 +2121,7 @@ class BalancerInfo(TypedDict):
     stiffness: float
     """Its derivative by the length (N/m; N m/rad)."""
     torque: list[float]
-    """What it puts on each joint (N m or N), in coordinate order."""
+    """Torque or force on each joint (N m or N), in coordinate order."""
 
 
 class DependentInfo(TypedDict):
@@ -2136,7 +2136,7 @@ class DependentInfo(TypedDict):
     upper: float | None
     """Highest position (rad or m)."""
     q: float
-    """Where it is (rad or m)."""
+    """Its position (rad or m)."""
 
 
 class LoopInfo(TypedDict):
@@ -2172,7 +2172,7 @@ class _Inspection(TypedDict):
     jacobian: list[list[float]]
     """6 rows × one column per joint."""
     mass_matrix: list[list[float]]
-    """Of the rigid robot with its payload."""
+    """Mass matrix of the rigid robot with its payload."""
     gravity_torque: list[float]
     """Forces that hold the pose, against gravity and balancers."""
     bias: list[float]
@@ -2182,9 +2182,9 @@ class _Inspection(TypedDict):
     mass_kg: float
     """Total mass (kg), payload and base included."""
     warnings: list[str]
-    """What the caveats warn of, as sentences."""
+    """Warnings among the caveats, as sentences."""
     caveats: list[CaveatDict]
-    """What is probably wrong with the input."""
+    """Doubts about the input."""
 
 
 class Inspection(_Inspection, total=False):
@@ -2210,9 +2210,9 @@ class _Finding(TypedDict):
     where: str
     """File and line, or joint or link."""
     message: str
-    """What was found."""
+    """Value found."""
     help: str
-    """How to mend it."""
+    """Remedy."""
 
 
 class Finding(_Finding, total=False):
@@ -2221,7 +2221,7 @@ class Finding(_Finding, total=False):
     value: float | None
     """Value that was found, if it is one."""
     yardstick: float | None
-    """What it was compared with."""
+    """Yardstick of the comparison."""
     unit: str
     """Unit of both."""
     likely: str
@@ -2232,98 +2232,98 @@ class NewJoint(TypedDict):
     """A joint of the arm; limits are null where there are none."""
 
     name: str
-    """Its name."""
+    """Name."""
     type: str
-    """Word of the URDF for its kind."""
+    """Joint type in the URDF."""
     lower: float | None
-    """Least position (rad or m)."""
+    """Minimum position (rad or m)."""
     upper: float | None
-    """Greatest position."""
+    """Maximum position (rad or m)."""
     velocity: float | None
     """Speed limit (rad/s or m/s)."""
     effort: float | None
     """Effort limit of the description (N m or N)."""
     effort_fault: str | None
-    """What is wrong with the effort limit, in words; null if nothing."""
+    """Fault of the effort limit, as text; null if none."""
     weight_torque: float
-    """Largest torque of weight over the workspace, with payload (N m or N)."""
+    """Maximum gravity torque over the workspace, with payload (N m or N)."""
     needed_torque: float
-    """The same with that of coming to full speed in 0.35 s."""
+    """Gravity torque plus the torque to accelerate to full speed in 0.35 s (N m or N)."""
 
 
 class NewHeld(TypedDict):
     """A joint that is held."""
 
     joint: str
-    """Its name."""
+    """Name."""
     at: float
-    """Where (rad or m)."""
+    """Position at which it is held (rad or m)."""
     why: str
-    """Why."""
+    """Reason."""
 
 
 class NewLink(TypedDict):
     """A link of the arm. Lengths in m."""
 
     name: str
-    """Its name."""
+    """Name."""
     distal: str
-    """Joint at its far end."""
+    """Joint at its distal end."""
     length: float
-    """From its frame to that joint, or of its body where the frames do not run along it."""
+    """Distance from its frame to that joint; length of its body where the frames do not run along it."""
     mass: float | None
     """Mass (kg)."""
     section: str | None
-    """`box`, `tube`, `rectangle`, `circle`; null if none is proposed."""
+    """One of `box`, `tube`, `rectangle`, `circle`; null if none is proposed."""
     width: float | None
-    """Along y of the section; the diameter of round ones."""
+    """Size along y of the section; diameter of round ones."""
     height: float | None
-    """Along z of the section."""
+    """Size along z of the section."""
     wall: float | None
-    """Thickness of the wall; null for solid ones."""
+    """Wall thickness; null for solid ones."""
     wall_of_half_mass: float | None
-    """Thickness if only half of the mass is wall."""
+    """Wall thickness if only half of the mass is in the wall."""
     material: str | None
     """Name of the material."""
     y_axis: list[float] | None
     """Direction of the section's y in link axes."""
     offset: list[float] | None
-    """From the line between the joints to the beam, link axes."""
+    """Offset from the line between the joints to the beam, link axes."""
     ends: list[list[float]] | None
-    """Where the beam itself begins and ends, link axes; null from the link's frame to the distal joint."""
+    """End points of the beam, link axes; null if it runs from the link's frame to the distal joint."""
     taper: float | None
-    """Largest over smallest outer width along the beam."""
+    """Ratio of maximum to minimum outer size along the beam."""
     open_cuts: float | None
-    """Part of the cuts through the mesh whose outline was not closed: there its convex hull counts."""
+    """Fraction of the cuts through the mesh with an open outline, for which the convex hull is used."""
     reason: str | None
-    """Why no section is proposed."""
+    """Reason why no section is proposed."""
     assumed: bool
-    """Whether section and material are assumed: always, where there are some."""
+    """Whether section and material are assumed: always, if there are any."""
 
 
 class NewDrive(TypedDict):
-    """A drive that is proposed."""
+    """A proposed drive."""
 
     joint: str
-    """Its joint."""
+    """Joint of the drive."""
     stiffness: float
     """Torsional stiffness at the joint (N m/rad)."""
     low: float
-    """Lowest that the class shows."""
+    """Minimum of the gear class (N m/rad)."""
     high: float
-    """Highest that the class shows."""
+    """Maximum of the gear class (N m/rad)."""
     rated_torque: float
     """Rated torque of the class (N m)."""
     damping_ratio: float
     """Damping ratio."""
     source: str
-    """Where the stiffness and its range come from."""
+    """Source of the stiffness and its range."""
     assumed: bool
-    """Always."""
+    """Whether it is assumed: always."""
 
 
 class NewPayload(TypedDict):
-    """What the tool carries."""
+    """Payload of the arm."""
 
     mass: float
     """Mass (kg)."""
@@ -2334,14 +2334,14 @@ class NewPayload(TypedDict):
 
 
 class Assumption(TypedDict):
-    """Something that was assumed."""
+    """An assumption."""
 
     about: str
-    """What it is about: a joint, a link, the payload."""
+    """Subject: a joint, a link, the payload."""
     text: str
-    """What was assumed."""
+    """The assumption made."""
     mend: str
-    """How to know better."""
+    """Way to replace it by a fact."""
 
 
 class MotionPeak(TypedDict):
@@ -2352,7 +2352,7 @@ class MotionPeak(TypedDict):
     unit: str
     """`rad`, `m`, or `rad or m` without a robot."""
     lower: float
-    """Least position."""
+    """Minimum position."""
     lower_at_s: float
     """When."""
     lower_limit: float | None
@@ -2380,7 +2380,7 @@ class MotionPeak(TypedDict):
     jerk_limit: float | None
     """The limit: that of a path file."""
     acceleration_jump: float
-    """Largest jump of the acceleration."""
+    """Maximum jump of the acceleration."""
     torque: float | None
     """Torque or force of greatest magnitude that the rigid robot with its payload needs (N m, N), with a robot."""
     torque_at_s: float | None
@@ -2390,51 +2390,51 @@ class MotionPeak(TypedDict):
 
 
 class NewRobot(TypedDict):
-    """Answer of `flexarm new`."""
+    """Result of `flexarm new`."""
 
     robot: str
-    """The robot file."""
+    """Robot file."""
     motion: str
-    """The sample motion."""
+    """Sample motion file."""
     urdf: str
-    """The description that the robot file refers to."""
+    """Description that the robot file refers to."""
     name: str
     """Name of the robot."""
     placed: str
-    """Whether the description was copied, and from where, in words."""
+    """Whether and from where the description was copied, as text."""
     base: str
-    """Link at which the arm begins."""
+    """Base link of the arm."""
     tool: str
-    """Link that is the tool."""
+    """Tool link."""
     chain: list[str]
     """Links from the base to the tool."""
     joints: list[NewJoint]
     """Joints of the arm, in the order of the description."""
     held: list[NewHeld]
-    """Joints that stay where they are."""
+    """Joints that are held."""
     links: list[NewLink]
     """Links of the arm, with a section where one is proposed."""
     drives: list[NewDrive]
     """Proposed drives."""
     payload: NewPayload
-    """What the tool carries."""
+    """Payload."""
     reach_m: float
-    """Largest distance of the tool from the first joint in the poses that were looked at (m)."""
+    """Maximum distance of the TCP from the first joint in the sampled poses (m)."""
     moving_mass_kg: float
-    """Mass that the joints of the arm move, without payload (kg)."""
+    """Mass moved by the joints of the arm, without payload (kg)."""
     assumptions: list[Assumption]
-    """Everything that was assumed."""
+    """All assumptions."""
     questions: list[str]
-    """What to ask of the maker, or to measure."""
+    """Questions for the manufacturer, or quantities to measure."""
     duration_s: float
-    """How long the sample motion takes (s)."""
+    """Duration of the sample motion (s)."""
     peaks: list[MotionPeak]
-    """Its largest values against the limits."""
+    """Peaks of the motion against the limits."""
     violations: list[str]
-    """Limits that it passes, in words: those of effort that the arm cannot keep at all."""
+    """Limits violated by the motion, as sentences; only effort limits that the arm cannot keep at all."""
     findings: list[Finding]
-    """What `check` finds in the result."""
+    """Findings of `check` in the result."""
     files: list[str]
-    """Files that were written."""
+    """Written files."""
     summary: RunSummary | None
-    """The first run, if there was one."""
+    """Summary of the first run, if there was one."""
