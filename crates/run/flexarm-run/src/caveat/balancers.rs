@@ -8,7 +8,7 @@ use super::size::spread_poses;
 use super::slip::{EFFORT, slip};
 use super::{Caveat, kinds};
 
-/// Largest torque of a balancer over the largest torque of weight: note, warning.
+/// Maximum torque of a balancer over the maximum gravity torque: note, warning.
 const STRONG: [f64; 2] = [3.0, 10.0];
 /// Torque of its joint with a balancer over that without it (RMS).
 const RAISED: f64 = 1.1;
@@ -71,10 +71,10 @@ fn lengths(model: &Model, number: usize) -> Lengths {
     })
 }
 
-/// What one balancer does to the joint on which it acts most, over poses spread over the joint
+/// Effect of one balancer on its main joint, over poses spread over the joint
 /// ranges (N m or N).
 struct Alone {
-    /// Largest torque of its own.
+    /// Maximum torque of the balancer.
     torque: f64,
     /// RMS torque that holds the arm with it.
     with: f64,
@@ -90,7 +90,7 @@ fn alone(mechanism: &Mechanism, bare: &Model, number: usize) -> Alone {
     let mut torques = |q: DVector<f64>| {
         (gravity_forces(&alone, &mut data, &q).clone(), gravity_forces(bare, &mut data_bare, &q).clone())
     };
-    // Where its gas has no room there is no torque.
+    // Poses in which its gas has no volume are skipped.
     let all: Vec<_> =
         spread_poses(bare).map(&mut torques).filter(|(with, _)| with.iter().all(|x| x.is_finite())).collect();
     let own = |k: usize| all.iter().map(|(with, without)| (with[k] - without[k]).abs()).fold(0.0, f64::max);

@@ -1,4 +1,4 @@
-//! Where tool and payload sit on the chain of links, and which joints of it yield.
+//! Position of tool and payload on the chain of links, and its elastic joints.
 
 use flexarm_kinematics::{Joint, Mechanism};
 
@@ -11,7 +11,7 @@ use crate::robot::{PAYLOAD_LINK, Robot};
 const HALF_TURN: f64 = 3.0;
 /// Part of the arm's reach and of its mass behind a link from which on it is no gripper.
 const ARM_LIKE: f64 = 0.2;
-/// Joints of an arm in which one that does not yield is odd.
+/// Number of joints of an arm from which a single rigid one is unusual.
 const FEWEST: usize = 3;
 
 /// All of them about a loaded robot.
@@ -62,9 +62,9 @@ fn carrier<'m>(mechanism: &'m Mechanism, link: &'m str) -> &'m str {
     body
 }
 
-/// What is behind a body, seen from the base.
+/// Subtree outboard of a body.
 struct Behind {
-    /// How far it reaches from there (m).
+    /// Its reach (m).
     reach: f64,
     /// Whether it is a part of the arm, and no gripper.
     is_arm: bool,
@@ -111,7 +111,7 @@ fn stiff_joints(robot: &Robot) -> Vec<Caveat> {
         link = &joint.parent;
     }
     let elastic = chain.iter().filter(|(_, yields)| *yields).count();
-    // Leaving out the last joints of a wrist is usual, unless it is one alone.
+    // Rigid last joints of a wrist are usual, unless it is a single one.
     let outermost = chain.iter().position(|(_, yields)| *yields).unwrap_or(0);
     let first = if outermost == 1 { 0 } else { outermost };
     let odd: Vec<&Joint> = chain[first..].iter().rev().filter(|(_, yields)| !yields).map(|(joint, _)| *joint).collect();

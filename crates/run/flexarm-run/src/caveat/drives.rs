@@ -236,12 +236,12 @@ pub(crate) fn speed_loop(joint: &str, gain: f64, sample_s: f64, inertia: f64) ->
     (inertia > 0.0 && gain > most).then(|| kinds::VELOCITY_GAIN.found(format!("joint {joint:?}"), gain, most))
 }
 
-/// How far the spring of a drive has turned (rad) or moved (m): under weight, or in motion (`times`
+/// Deflection of the spring of a drive (rad or m): under weight, or in motion (`times`
 /// 2).
 pub(crate) fn give(drive: &Drive, effort: f64, rotation: f64, translation: f64, times: f64) -> Vec<Caveat> {
     let [unusual, wrong] = SAGS[usize::from(effort <= STRONG)].map(|limit| times * limit);
     let mut caveats = Vec::new();
-    // What weak drives do in motion is what they are made for.
+    // Soft drives may deflect in motion.
     let judged = effort > STRONG || times <= 1.0;
     if judged && rotation > unusual {
         let caveat = kinds::GEAR_ROTATION.found(name(drive), rotation, unusual);

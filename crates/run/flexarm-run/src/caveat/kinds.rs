@@ -1,4 +1,4 @@
-//! The catalogue of caveats: code, sentence, unit and help. `docs/caveats.md` tells the source of
+//! Catalogue of caveats: code, sentence, unit and help. `docs/caveats.md` gives the source of
 //! each yardstick.
 
 use super::CaveatKind;
@@ -115,7 +115,7 @@ pub(crate) const MANY_TURNS: CaveatKind = CaveatKind::warning(
     "give the pose in rad",
 );
 
-// What the files say of the robot.
+// Files of the robot.
 
 /// An angle of more than a turn.
 pub(crate) const ANGLE: CaveatKind = CaveatKind::warning(
@@ -493,7 +493,7 @@ pub(crate) const VELOCITY_GAIN: CaveatKind = CaveatKind::warning(
     "lower it, sample faster, or give motor_inertia",
 );
 
-/// A joint that does not yield among ones that do.
+/// A rigid joint among elastic ones.
 pub(crate) const STIFF_JOINT: CaveatKind = CaveatKind::warning(
     "stiff-joint",
     "{where} does not yield, {value} of {yardstick} joints of the arm do",

@@ -37,7 +37,7 @@ pub(crate) const BALANCER_CURVE: CaveatKind = CaveatKind::note(
     "",
     "add points, in m or rad",
 );
-/// A loop that was assembled elsewhere than told.
+/// A loop that is assembled in another configuration than given.
 pub(crate) const LOOP_ASSEMBLED: CaveatKind = CaveatKind::warning(
     "loop-assembled",
     "{where} closes with its dependent joints {value} rad or m from where it is told to be assembled (told above {yardstick})",

@@ -28,10 +28,10 @@ const THICK: f64 = 3.0;
 const SLENDER: RangeInclusive<f64> = 5e-4..=1.0;
 /// Torsional over bending stiffness.
 const TORSION: RangeInclusive<f64> = 1e-3..=1e3;
-/// What an eccentric shear centre may add to the bending of a tip.
+/// Allowed contribution of an eccentric shear centre to the deflection of a tip.
 const TWIST: f64 = 0.01;
 /// Wall over width (diameter) of a hollow section: note, warning. Eurocode 3 (EN 1993-1-1, table
-/// 5.2) has flat walls buckle before they yield below 1/42, round ones below 1/90.
+/// 5.2) lets flat walls buckle before yielding below 1/42, round ones below 1/90.
 const THIN: [f64; 2] = [1.0 / 42.0, 1.0 / 90.0];
 /// Damping that is taken where none is given.
 pub(super) const USUAL_DAMPING: f64 = 0.03;
@@ -155,7 +155,7 @@ fn section(name: &str, beam: &BeamLink) -> Vec<Caveat> {
     caveats
 }
 
-/// Where the shear centre is not the centroid: the twist that a force at the tip would add there,
+/// For a shear centre off the centroid: the twist that a force at the tip would add there,
 /// against its bending.
 ///
 /// ```text
@@ -168,7 +168,7 @@ fn shear_centre(name: &str, beam: &BeamLink, bar: &Bar) -> Option<Caveat> {
 }
 
 /// A wall that is far too thin for its width, and an outer size that is half or twice what the
-/// link's inertia tells.
+/// link's inertia gives.
 fn sizes(name: &str, beam: &BeamLink, own: Option<&LinkInertia>) -> Vec<Caveat> {
     let mut caveats = Vec::new();
     let (width, wall) = match beam.section {
@@ -187,7 +187,7 @@ fn sizes(name: &str, beam: &BeamLink, own: Option<&LinkInertia>) -> Vec<Caveat> 
     if beam.section.largest_size().is_none() {
         return caveats;
     }
-    // Of a link that is the beam and nothing else, both its mass and its inertia tell the size.
+    // If the link is nothing but the beam, both its mass and its inertia give its size.
     let axis = beam.X_LB.translation.vector.normalize();
     let of_link = (axis.dot(&(own.inertia_com * axis)) / own.mass).sqrt();
     let of_section = ((bar.EI_y + bar.EI_z) / bar.EA).sqrt();

@@ -9,7 +9,7 @@ use crate::loops::{along_motion, over_ranges};
 /// Transmission angle: note below the first, warning below the second (rad). At 10 degrees a rod
 /// carries six times the force.
 const TRANSMISSION: [f64; 2] = [0.698_131_700_797_731_8, 0.174_532_925_199_432_95];
-/// Dependent joints away from where the loop was told to be assembled (rad or m).
+/// Distance of dependent joints from the given assembly of the loop (rad or m).
 const ASSEMBLED: f64 = 1e-6;
 /// Part of the poses in the joint ranges in which a loop does not close.
 const OPEN: f64 = 0.02;
@@ -42,7 +42,7 @@ pub(crate) fn of_loops(rigid: &Model) -> Vec<Caveat> {
     caveats
 }
 
-/// What they do along a motion that does not tear them apart.
+/// Returns caveats about the loops along a motion in which they stay closed.
 pub(crate) fn of_motion(trajectory: &Trajectory, rigid: &Model) -> Vec<Caveat> {
     if rigid.loops().is_empty() {
         return Vec::new();

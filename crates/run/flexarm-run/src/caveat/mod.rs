@@ -1,9 +1,9 @@
 //! Caveats about robots and runs: what is probably wrong with an input, or limits the worth of a
 //! result, as values.
 //!
-//! Every command that uses a robot says the same of it ([`told()`]); runs and statics add what they
-//! find themselves. Each sentence is made in one place ([`CaveatKind::found`]). Start at `kinds`,
-//! the catalogue; `docs/caveats.md` lists it with the source of each yardstick.
+//! Every command that uses a robot reports the same caveats ([`told()`]); runs and statics add what
+//! they find themselves. Each sentence is made in one place ([`CaveatKind::found`]). Start at
+//! `kinds`, the catalogue; `docs/caveats.md` lists it with the source of each yardstick.
 //!
 //! Not here: what makes a model impossible. That is an [`crate::Error`].
 

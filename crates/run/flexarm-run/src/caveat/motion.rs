@@ -16,14 +16,14 @@ const TIMES: usize = 200;
 const HASTE: f64 = 10.0;
 /// Part of the speed limit that a motion in s uses.
 const SLOW: f64 = 2e-3;
-/// Largest travel that is worth a motion (rad).
+/// Minimum travel of a motion (rad).
 const SMALL: f64 = 0.02;
 /// Force over the weight of the arm, moment over its weight at full length: note, warning.
 const HEAVY: [f64; 2] = [2.0, 10.0];
 /// (m/s²)
 const EARTH: f64 = 9.81;
 
-/// What the rigid robot needs and uses along a motion.
+/// Torques and ranges of the rigid robot along a motion.
 pub(crate) fn of_motion(name: &str, trajectory: &Trajectory, model: &Model) -> Vec<Caveat> {
     let n = model.nv();
     let (mut data, mut state, mut a) = (Data::new(model), State::zeros(model), DVector::zeros(n));
@@ -77,8 +77,8 @@ pub(crate) fn degrees(violations: &[LimitViolation], model: &Model) -> &'static 
     if any && all { "about 57 times: degrees?" } else { "" }
 }
 
-/// Largest force and moment of the loads of a run, against weight and size of the arm with its
-/// payload.
+/// Checks the maximum force and moment of the loads of a run against weight and size of the arm
+/// with its payload.
 pub(crate) fn of_loads(loads: &[Load], duration: f64, size: &Size) -> Vec<Caveat> {
     let mut caveats = Vec::new();
     for load in loads {

@@ -1,4 +1,4 @@
-//! What the files say of tool, payload, gravity, masses and limits, against the size of the robot
+//! Tool, payload, gravity, masses and limits of the files, against the size of the robot
 //! itself.
 
 use flexarm_kinematics::{Joint, Link, LinkInertia, Mechanism, Model};
@@ -17,7 +17,7 @@ const FAR: (f64, f64) = (1.5, 2.0);
 const LONGEST: f64 = 100.0;
 /// A joint this many times farther from its parent than all others of the chain together.
 const ODD_DISTANCE: f64 = 20.0;
-/// Largest angle that anyone writes into a file in rad: a turn.
+/// Maximum plausible angle in rad in a file: one turn.
 const TURN: f64 = std::f64::consts::TAU;
 /// Payload over mass of the robot: heavier than that is not lifted, unusual.
 const PAYLOAD_SHARE: (f64, f64) = (3.0, 1.0);
@@ -141,7 +141,7 @@ fn tilted(message: String) -> Caveat {
     Caveat { unit: "m/s2".into(), ..Caveat::said("gravity-direction", "gravity", message, help) }.as_note()
 }
 
-/// What the tool carries; `inertia.com` in the axes of the link that carries it.
+/// Payload; `inertia.com` in the axes of the link that carries it.
 pub(crate) fn payload(what: &str, inertia: &LinkInertia, size: &Size, weighs: bool) -> Vec<Caveat> {
     let mut caveats: Vec<Caveat> = far(what, inertia.com.norm(), size).into_iter().collect();
     if inertia.mass <= 0.0 {

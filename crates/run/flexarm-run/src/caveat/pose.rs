@@ -24,7 +24,7 @@ pub(crate) struct Standing<'a> {
     pub(crate) arm: &'a FlexibleArm,
     /// Its elastic coordinates.
     pub(crate) elastic: &'a [f64],
-    /// How far its TCP is from where it would be without deflections (m).
+    /// Deflection of its TCP (m).
     pub(crate) sag_m: f64,
 }
 

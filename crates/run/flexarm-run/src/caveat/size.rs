@@ -1,4 +1,4 @@
-//! How large and heavy a robot is: the yardsticks that it brings along itself.
+//! Size and mass of a robot, as yardsticks.
 
 use std::collections::HashMap;
 
@@ -12,7 +12,7 @@ const POSES: u32 = 32;
 pub struct Size {
     /// Distance from the base along the chain, per link (m).
     distances: HashMap<String, f64>,
-    /// How far its mass reaches from the base: joint distances, mass centres and radii of gyration
+    /// Reach of its mass from the base: joint distances, mass centres and radii of gyration
     /// (m).
     pub(crate) extent: f64,
     /// Mass (kg).
@@ -49,13 +49,13 @@ impl Size {
         self.distances.get(link).copied().unwrap_or(0.0)
     }
 
-    /// What hangs on a link reaches at most so far from it (m).
+    /// Maximum reach of the subtree of a link (m).
     pub(crate) fn beyond(&self, link: &str) -> f64 {
         (self.extent - self.at(link)).max(0.0)
     }
 }
 
-/// Largest radius of gyration of a body (m).
+/// Returns the maximum radius of gyration of a body (m).
 pub(crate) fn gyration(inertia: &LinkInertia) -> f64 {
     let largest = inertia.inertia_com.symmetric_eigenvalues().max();
     (largest.max(0.0) / inertia.mass).sqrt()
@@ -66,7 +66,7 @@ pub(crate) fn least_density(inertia: &LinkInertia) -> f64 {
     flexarm_linkmaker::yardsticks::least_density(inertia.mass, &inertia.inertia_com)
 }
 
-/// Largest torque of weight and balancers that each joint of the rigid robot carries in poses
+/// Returns the maximum torque of weight and balancers on each joint of the rigid robot in poses
 /// spread over the joint ranges (N m or N).
 pub(crate) fn weight_carried(model: &Model) -> DVector<f64> {
     let mut data = Data::new(model);

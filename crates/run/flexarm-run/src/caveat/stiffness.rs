@@ -63,7 +63,7 @@ fn copied(link: &RobotLink) -> Option<String> {
     sources.iter().find_map(of)
 }
 
-/// Smallest and largest stiffness over that of another matrix in any direction.
+/// Returns minimum and maximum stiffness over that of another matrix in any direction.
 fn ratios(K: &Matrix6<f64>, other: &Matrix6<f64>) -> Option<[f64; 2]> {
     let L = other.cholesky()?.l();
     let half = L.solve_lower_triangular(K)?;
@@ -73,7 +73,7 @@ fn ratios(K: &Matrix6<f64>, other: &Matrix6<f64>) -> Option<[f64; 2]> {
     both.iter().all(|x| x.is_finite() && *x > 0.0).then_some(both)
 }
 
-/// Largest coupling term over the root of its diagonal terms.
+/// Returns the maximum coupling term over the root of its diagonal terms.
 fn coupling(K: &Matrix6<f64>) -> f64 {
     let root: Vector6<f64> = K.diagonal().map(f64::sqrt);
     let scaled = Matrix6::from_fn(|i, j| if i == j { 0.0 } else { K[(i, j)] / (root[i] * root[j]) });

@@ -1,4 +1,4 @@
-//! What every command says of the robot, motion and loads that it is given.
+//! Caveats that every command reports about its robot, motion and loads.
 
 use std::sync::Arc;
 
@@ -16,7 +16,7 @@ use crate::posed::Posed;
 use crate::robot::Robot;
 use crate::scenario::Scenario;
 
-/// What a command does with a robot.
+/// Use of a robot by a command.
 #[derive(Clone, Copy)]
 pub enum Use<'a> {
     /// Holds it at a pose (rad or m) with a wrench on the tool (world axes; N, N m).
@@ -56,20 +56,20 @@ pub fn told(robot: &Robot, flexible: &Arc<FlexibleRobot>, of_robot: Option<&[Cav
     once_each(caveats)
 }
 
-/// As [`told()`], of a robot as its file models it, for commands that compute nothing of its links
+/// As [`told()`], for a robot as its file models it and commands that compute nothing of its links
 /// and drives.
 pub(crate) fn of_robot(robot: &Robot) -> Result<Vec<Caveat>, Error> {
     Ok(told(robot, &Arc::new(robot.flexible_robot()?), None, Use::Any))
 }
 
-/// Of the files of a robot, and of its links and drives as they are modelled.
+/// Returns the caveats about the files of a robot, and about its links and drives as modelled.
 pub(crate) fn of_model(robot: &Robot, flexible: &FlexibleRobot, of_robot: Option<&[Caveat]>) -> Vec<Caveat> {
     let mut caveats = of_robot.map_or_else(|| robot.caveats(), <[Caveat]>::to_vec);
     caveats.extend(flexible.caveats());
     caveats
 }
 
-/// Of a motion on a robot.
+/// Returns the caveats about a motion on a robot.
 pub fn of_motion(motion: &Motion, rigid: &Model) -> Vec<Caveat> {
     let mut caveats = motion.caveats();
     let passed = |v: &LimitViolation| Caveat::said("joint-limit", &v.joint, format!("joint limit: {v}"), "");
@@ -78,15 +78,15 @@ pub fn of_motion(motion: &Motion, rigid: &Model) -> Vec<Caveat> {
     caveats
 }
 
-/// Of the loads and payloads of a scenario. Those that do not fit the robot are an error of the
-/// command.
+/// Returns the caveats about the loads and payloads of a scenario. Those that do not fit the robot
+/// are an error of the command.
 fn of_scenario(robot: &Robot, scenario: &Scenario, flexible: &FlexibleRobot) -> Vec<Caveat> {
     let Ok(acting) = scenario.acting_on(robot, &flexible.model) else { return Vec::new() };
     let loads = motion::of_loads(&acting.loads, scenario.duration_s(), &Size::of(&robot.rigid));
     acting.caveats.into_iter().chain(loads).collect()
 }
 
-/// Of the arm at rest at a pose, under a wrench on the tool.
+/// Returns the caveats about the arm at rest at a pose, under a wrench at the TCP.
 pub(crate) fn at_rest(robot: &Robot, posed: &Posed, linear: &Linear, wrench: &[f64; 6]) -> Vec<Caveat> {
     let mut caveats = posed.caveats();
     caveats.extend(motion::of_wrench(wrench, &Size::of(&robot.rigid)));
@@ -94,7 +94,7 @@ pub(crate) fn at_rest(robot: &Robot, posed: &Posed, linear: &Linear, wrench: &[f
     caveats
 }
 
-/// Where a robot stands to be looked at: where the motion begins, else in the middle of its joint
+/// Returns the pose for checks: the start of the motion, else the middle of the joint
 /// ranges (rad or m).
 pub(crate) fn standing_pose(robot: &Robot, motion: Option<&Motion>) -> Result<Vec<f64>, Error> {
     let model = robot.rigid_model()?;

@@ -9,21 +9,21 @@ use flexarm_stepping::{StepperKind, error_of_a_period};
 use super::slip::{self, slip};
 use super::{Caveat, CaveatKind, kinds};
 
-/// Largest elastic rotation for which the linear elastic model is taken to hold (rad).
+/// Maximum elastic rotation of the linear elastic model (rad).
 const ROTATION_LIMIT: f64 = 0.05;
-/// Largest engineering strain of a flexible link.
+/// Maximum engineering strain of a flexible link.
 const STRAIN_LIMIT: f64 = 1e-3;
-/// Largest gap in the energy balance.
+/// Maximum imbalance of the energy.
 const IMBALANCE_LIMIT: f64 = 0.02;
-/// Fewest samples in a period of the first mode.
+/// Minimum number of samples in a period of the first mode.
 const SAMPLES_PER_PERIOD: f64 = 10.0;
-/// Largest error of a swing of the first mode within a period, over its amplitude.
+/// Maximum error of the first mode within a period, over its amplitude.
 const PERIOD_ERROR: f64 = 0.05;
-/// Largest part of the TCP error that joints may drift apart.
+/// Maximum part of the TCP error that may be constraint drift.
 const DRIFT: f64 = 0.01;
 /// Wider settling bands are slips (m).
 const WIDE_BAND: f64 = 0.01;
-/// Fewest steps in the longest move.
+/// Minimum number of steps in the longest move.
 const STEPS_PER_MOVE: f64 = 50.0;
 
 /// A flexible link whose far end turned by so much (rad), with so much engineering strain.
@@ -89,12 +89,12 @@ pub(crate) fn sampling(first_hz: f64, logged_hz: f64) -> Option<Caveat> {
 /// Steps (s) against the first mode (Hz, damping ratio), by what the stepper makes of an
 /// oscillation like it.
 pub(crate) fn step(kind: StepperKind, step_s: f64, first_hz: f64, ratio: f64) -> Option<Caveat> {
-    // What hardly swings has no period.
+    // A nearly critically damped mode has no period.
     let error = if ratio < 0.9 { error_of_a_period(kind, step_s * TAU * first_hz, ratio) } else { 0.0 };
     (error > PERIOD_ERROR).then(|| kinds::COARSE_STEP.found("run", 100.0 * error, 100.0 * PERIOD_ERROR))
 }
 
-/// What the steps of a stepper in maximal coordinates leave of its joints, as a part of the largest
+/// Constraint drift of a stepper in maximal coordinates, as a part of the peak
 /// TCP error.
 pub(crate) fn drift(stepper: &str, part: f64) -> Option<Caveat> {
     (part > DRIFT).then(|| kinds::JOINT_DRIFT.found(format!("the steps of {stepper}"), 100.0 * part, 100.0 * DRIFT))

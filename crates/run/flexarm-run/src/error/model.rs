@@ -20,7 +20,7 @@ pub enum ModellingError {
     Branch {
         /// The link.
         link: String,
-        /// What hangs on which interface.
+        /// Attached bodies and their interfaces.
         why: String,
         /// Why it cannot bend in modes.
         instead: String,
@@ -143,7 +143,7 @@ pub enum BalancerError {
         length: f64,
         /// `above` or `below`.
         beyond: &'static str,
-        /// Where the room ends (m).
+        /// End of the room (m).
         end: f64,
     },
     /// Both ends at one place.
@@ -190,7 +190,7 @@ pub enum LoopError {
     NotFinite {
         /// The loop.
         name: String,
-        /// Of what.
+        /// Quantity.
         what: String,
         /// The entry.
         value: f64,
@@ -200,7 +200,7 @@ pub enum LoopError {
     BadAxis {
         /// The loop.
         name: String,
-        /// What was given.
+        /// Given value.
         axis: [f64; 3],
     },
     /// None to take the axis from.
@@ -211,12 +211,12 @@ pub enum LoopError {
         /// The loop.
         name: String,
     },
-    /// What the tree says of it.
+    /// Error of the tree.
     #[error("loop {name:?}: {what}")]
     Unfit {
         /// The loop.
         name: String,
-        /// What is wrong.
+        /// Fault.
         what: String,
     },
     /// A joint with a motor.
@@ -306,7 +306,7 @@ pub enum PoseError {
         /// Movable joints of the robot.
         joints: usize,
     },
-    /// What moves and has no inertia about some axis.
+    /// Body without inertia about some axis.
     #[error(
         "{}: {source}: {} lacks inertia about some axis, with all that it carries; give the links <inertial> with mass \
          and inertia, have them estimated (inertia_from_density in the robot file), or let nothing give way before them",
@@ -318,7 +318,7 @@ pub enum PoseError {
         path: PathBuf,
         /// The matrix that is singular.
         source: StepError,
-        /// What gives way and carries no inertia.
+        /// Elastic coordinate that carries no inertia.
         links: Vec<String>,
     },
     /// The linear structure at the pose.
@@ -438,7 +438,7 @@ pub enum PayloadError {
         /// Links that move.
         known: Vec<String>,
     },
-    /// A link that bends.
+    /// A flexible link.
     #[error(
         "payload link {link:?} bends, so that it is not clear how the payload rides on it: name a link beyond it, of {beyond:?}"
     )]

@@ -9,7 +9,7 @@ use flexarm_settings::Setting;
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RecordingError {
-    /// A file name that does not tell a format.
+    /// A file name of no known format.
     #[error(
         "{}: the name has {}, expected one of {}: rename the file{}",
         path.display(), ending(path), endings(), or_say(*setting)
@@ -17,7 +17,7 @@ pub enum RecordingError {
     UnknownEnding {
         /// The file.
         path: PathBuf,
-        /// The setting that tells the format whatever the name is.
+        /// Setting that chooses the format independently of the name.
         setting: Option<Setting>,
     },
     /// A format that was left out when the program was built.
@@ -67,7 +67,7 @@ fn or_say(setting: Option<Setting>) -> String {
     setting.map_or_else(String::new, |setting| format!(" or give its format with {setting}"))
 }
 
-/// Runs of a study that cannot be told apart, or have no place.
+/// Runs of a study with equal or unusable labels.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum StudyError {
@@ -99,7 +99,7 @@ pub enum StudyError {
         label: String,
         /// Letters of the folder's name.
         letters: usize,
-        /// Most letters.
+        /// Maximum length (characters).
         most: usize,
     },
 }

@@ -12,7 +12,7 @@ pub enum ValueError {
     /// A number that is none.
     #[error("{what} has the entry {found}, expected finite numbers")]
     NotFinite {
-        /// Of what.
+        /// Quantity.
         what: &'static str,
         /// The entry.
         found: f64,
@@ -32,7 +32,7 @@ pub enum ValueError {
     /// The factor of a parameter, which must be positive.
     #[error("the factor of the {what} must be positive, found {found}")]
     Factor {
-        /// Of which parameter.
+        /// Parameter.
         what: &'static str,
         /// The factor.
         found: f64,
@@ -45,9 +45,9 @@ pub enum ValueError {
     MagnificationRange {
         /// The factor.
         found: f64,
-        /// Smallest one.
+        /// Minimum.
         least: f64,
-        /// Largest one.
+        /// Maximum.
         most: f64,
     },
     /// A motion that ends within the first step.
@@ -78,16 +78,16 @@ pub enum ValueError {
         step_s: f64,
         /// Duration of the motion (s).
         duration_s: f64,
-        /// Most steps of a run.
+        /// Maximum number of steps of a run.
         most: f64,
     },
     /// The time within which corners are rounded, which must be positive.
     #[error("corners are rounded within a positive time, found {0} s: try 0.02")]
     CornerTime(f64),
-    /// How long a mode swings in a recording, which must be positive and below 1000 s.
+    /// Duration of a mode in a recording; must be positive and below 1000 s.
     #[error("{setting} must be positive and below 1000, found {0} s", setting = Setting::Seconds)]
     Seconds(f64),
-    /// How far the tool swings in a recording of modes, which must be positive and below 1000 m.
+    /// Amplitude of the TCP in a recording of modes; must be positive and below 1000 m.
     #[error("{setting} must be positive and below 1000, found {0} m", setting = Setting::ToolMotion)]
     ToolMotion(f64),
     /// Points of a response.
@@ -136,7 +136,7 @@ pub enum ValueError {
     NoParameter {
         /// The name or pattern.
         pattern: String,
-        /// What there is.
+        /// Available names.
         names: Vec<String>,
     },
 }

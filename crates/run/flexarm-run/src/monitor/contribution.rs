@@ -1,5 +1,5 @@
-//! Who moves the tool how far: flexible links, elastic drives, and what servos leave of the way to
-//! go.
+//! Contributions to the TCP displacement: of flexible links, elastic drives, and of servos that
+//! leave a part of the way to go.
 //!
 //! ```text
 //! u_T = J_e e        first order: columns of the twin's Jacobian that belong to the deflections e
@@ -65,7 +65,7 @@ impl Contributions {
         &self.moved
     }
 
-    /// Largest displacement by each.
+    /// Maximum displacement by each.
     pub(crate) fn result(&self) -> &[ContributionPeak] {
         self.peaks.peaks()
     }

@@ -1,4 +1,4 @@
-//! How far the gearboxes of elastic drives give way.
+//! Deflection of the gearboxes of elastic drives.
 
 use flexarm_stepping::FlexibleArm;
 use nalgebra::DVector;
@@ -9,7 +9,7 @@ use crate::flexible::{FlexibleRobot, Owner};
 pub(crate) struct Deflections {
     /// First coordinate, number of coordinates, and drive of each spring.
     springs: Vec<(usize, usize, usize)>,
-    /// Largest deflection per drive (rad or m).
+    /// Maximum deflection of each drive (rad or m).
     largest: Vec<f64>,
 }
 
@@ -32,7 +32,7 @@ impl Deflections {
         }
     }
 
-    /// Largest deflection per drive (rad or m); 0 for those that do not give way.
+    /// Returns the maximum deflection of each drive (rad or m); 0 for rigid ones.
     pub(crate) fn result(&self) -> &[f64] {
         &self.largest
     }

@@ -1,12 +1,12 @@
-//! What the drives must supply: the largest force of each, when it first passed its limit, how
-//! often a servo was at its own.
+//! Required forces of the drives: the maximum of each, the time at which it first passed its limit,
+//! how often a servo was at its own.
 
 use flexarm_stepping::{FlexibleArm, Observation};
 
-/// What was seen of one drive.
+/// Maximum of one drive.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct DriveLoad {
-    /// Largest force (N m or N).
+    /// Maximum force (N m or N).
     pub(crate) peak: f64,
     /// When it first was beyond the joint's limit (s).
     pub(crate) over_since_s: Option<f64>,
@@ -17,7 +17,7 @@ pub(crate) struct DriveLoad {
 /// Limits of one drive (N m or N).
 struct Limits {
     joint: f64,
-    /// Of the servo, if it has one.
+    /// Torque limit of the servo, if it has one.
     servo: Option<f64>,
 }
 

@@ -9,7 +9,7 @@ use crate::summary::EnergyFigures;
 
 /// Watches the energy.
 pub(crate) struct Energy {
-    /// What the arm carried at the sample before.
+    /// Payload at the previous sample.
     model: Arc<Model>,
     book: EnergyBook,
 }
@@ -56,15 +56,15 @@ struct EnergyBook {
     before: Option<(f64, [f64; 3])>,
     /// Drives, loads, dissipation (J).
     work: [f64; 3],
-    /// What the drives put in and what they took out, each drive by itself (J).
+    /// Positive and negative work, summed drive by drive (J).
     gross: [f64; 2],
     /// Power of each drive at the sample before (W).
     drives: Vec<f64>,
-    /// Largest gap between what is stored and what was supplied, and largest change of what is
+    /// Maximum difference between stored and supplied energy, and maximum change of what is
     /// stored (J).
     gap: f64,
     swing: f64,
-    /// Largest sum of the sizes of its parts (J).
+    /// Maximum sum of the magnitudes of its parts (J).
     size: f64,
     struck: f64,
     /// Taken by the hysteresis of gears up to the last sample, and before the first one (J).
@@ -74,7 +74,7 @@ struct EnergyBook {
 }
 
 impl EnergyBook {
-    /// What the hysteresis of gears has taken so far (J), before the sample is added.
+    /// Sets the energy dissipated by hysteresis so far (J), before the sample is added.
     fn lose(&mut self, work: f64) {
         let [last, before] = &mut self.hysteresis;
         match self.first {
@@ -100,7 +100,7 @@ impl EnergyBook {
         } else {
             self.drives.extend(drives);
         }
-        // A blow at the start is in the energy of the first sample.
+        // An impulse at the start is in the energy of the first sample.
         let struck = if self.first.is_some() { impulse_work - self.struck } else { 0.0 };
         self.work[0] += struck;
         self.gross[0] += struck.max(0.0);
@@ -181,7 +181,7 @@ mod tests {
         }
         assert!(payload[1] == 0.0 && payload[2] == payload[3] && payload[4].abs() < 1e-12);
         assert!((payload[2] / truth - 1.0).abs() < 1e-9, "{} {truth}", payload[2]);
-        // Who carries it from the start has it already.
+        // A payload from the start is counted already.
         let mut energy = Energy::new(&model);
         seen.model.clone_from(&carrying);
         energy.update(&seen);

@@ -1,4 +1,4 @@
-//! What is watched in a run: one file per thing, each a struct that is shown every logged sample
+//! Monitors of a run: one file each, with a struct that receives every logged sample
 //! (`update`) and says at the end, or at any time before, what it has seen (`result`).
 //!
 //! A monitor sees the arm as the stepper shows it ([`Observation`]) beside the rigid twin, and
@@ -37,7 +37,7 @@ pub(crate) struct Monitors {
     pub(crate) deflections: Deflections,
     pub(crate) drive_loads: DriveLoads,
     pub(crate) energy: Energy,
-    /// For motions that are told by the path of the tool.
+    /// Monitor for motions that are given as a TCP path.
     pub(crate) tool_path: Option<ToolPathMonitor>,
 }
 

@@ -1,4 +1,4 @@
-//! How far the flexible links are from the small deformations that their models assume.
+//! Deformation of the flexible links against the small deformations that their models assume.
 //!
 //! ```text
 //! ε = (|p_AB| - l)/l        θ = |log((R_AB undeformed)ᵀ R_AB)|            A, B: interfaces of the link, l: their distance
@@ -10,12 +10,12 @@ use nalgebra::Rotation3;
 
 use crate::flexible::FlexibleRobot;
 
-/// What was seen of one link.
+/// Maxima of one link.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct LinkStrain {
-    /// Largest change of the distance of its interfaces over that distance.
+    /// Maximum change of the distance between its interfaces over that distance.
     pub(crate) strain: f64,
-    /// Largest rotation of its far interface against the near one (rad).
+    /// Maximum rotation of its far interface against the near one (rad).
     pub(crate) rotation: f64,
 }
 

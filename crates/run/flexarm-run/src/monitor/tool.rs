@@ -1,4 +1,4 @@
-//! How far the tool is from that of the rigid twin, at every sample and in figures.
+//! Distance of the TCP from that of the rigid twin, at every sample and in figures.
 
 use flexarm_analysis::{ErrorSample, LongRecord, PathFrame, tcp_error};
 use flexarm_kinematics::{Frame, Pose};
@@ -10,9 +10,9 @@ use crate::twin::RigidTwin;
 
 /// The tool at one sample.
 pub(crate) struct ToolError {
-    /// Where the twin has it.
+    /// TCP pose of the twin.
     pub(crate) X_rigid: Pose,
-    /// Where the arm has it.
+    /// TCP pose of the arm.
     pub(crate) X_flexible: Pose,
     /// Translation (m) and rotation vector (rad), world axes.
     pub(crate) error: [f64; 6],
@@ -25,7 +25,7 @@ pub(crate) struct ToolError {
 /// Watches the tool.
 pub(crate) struct ToolMonitor {
     path: PathFrame,
-    /// `None` if nobody wants to know the static part.
+    /// `None` if the static part is not wanted.
     static_part: Option<StaticPart>,
     record: LongRecord,
 }

@@ -1,4 +1,4 @@
-//! The error across the path of a motion that is told by the path of the tool, move by move.
+//! Error across the path of a motion that is given as a TCP path, move by move.
 //!
 //! Terms as in ISO 9283, of one run in place of many: path accuracy is the largest distance across
 //! the path; the corner overshoot is how far the tool swings on along the old direction behind a
@@ -15,14 +15,14 @@ use crate::tool_path::ToolPath;
 
 /// Slower than this the tool has no direction, m/s.
 const REST: f64 = 1e-5;
-/// Most points that are kept for a picture.
+/// Maximum number of points kept for a picture.
 const MOST_POINTS: usize = 8192;
 
-/// What a motion along a path of the tool has of errors across it.
+/// Errors across the path of a motion along a TCP path.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct PathFigures {
-    /// Largest distance from the path on moves of the tool (m), and when (s).
+    /// Maximum distance from the path on Cartesian moves (m), and its time (s).
     pub across_peak_m: f64,
     /// See there.
     pub t_across_peak_s: f64,
@@ -31,12 +31,12 @@ pub struct PathFigures {
     /// Middle of the box that the error stays in on those moves: by how much a workpiece would be
     /// moved (m, world axes).
     pub offset_m: [f64; 3],
-    /// What is left then, at most (m): half the diagonal of the box.
+    /// Maximum remaining distance (m): half the diagonal of the box.
     pub left_m: f64,
-    /// How far the tool swings on behind a corner, beyond its static deflection (m); 0 without a
+    /// Overshoot of the TCP behind a corner, beyond its static deflection (m); 0 without a
     /// corner.
     pub corner_overshoot_m: f64,
-    /// Move by move, those of the tool alone.
+    /// Cartesian moves, one by one.
     pub moves: Vec<PathMoveFigures>,
     /// Points of the path with the error there, some thousands of them: rigid tool and error (m,
     /// world axes). Not in files.
@@ -50,11 +50,11 @@ pub struct PathFigures {
 pub struct PathMoveFigures {
     /// Line of the program or file.
     pub line: usize,
-    /// What stands there.
+    /// Word of the program.
     pub statement: String,
     /// First and last moment (s).
     pub span_s: [f64; 2],
-    /// Largest distance from the path (m).
+    /// Maximum distance from the path (m).
     pub across_peak_m: f64,
     /// Root mean square of it (m).
     pub across_rms_m: f64,

@@ -18,7 +18,7 @@ use crate::summary::{StepperFigures, Summary, TcpFigures};
 /// Choices of a report.
 #[derive(Clone, Debug, Default)]
 pub struct ReportOptions {
-    /// Where the page goes; beside the (first) recording, under the name `report.html`, without it.
+    /// Output file; `report.html` beside the (first) recording without it.
     pub output: Option<PathBuf>,
     /// Write a folder with figures for papers beside the page.
     pub figures: bool,
@@ -26,7 +26,7 @@ pub struct ReportOptions {
     pub overwrite: bool,
 }
 
-/// What was written.
+/// Written files.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct ReportFiles {
     /// Recordings that were read.
@@ -35,7 +35,7 @@ pub struct ReportFiles {
     pub report: String,
     /// Folder with figures.
     pub figures: Option<String>,
-    /// Things worth telling: sentences.
+    /// Warnings, as sentences.
     pub warnings: Vec<String>,
 }
 
@@ -54,7 +54,7 @@ struct Input {
 /// study gives the page of the study.
 ///
 /// Figures are those that the recording holds. If it holds none (a table, a killed run), those of
-/// the tool are computed from its curves, and what curves cannot tell is left out.
+/// the tool are computed from its curves, and other figures are left out.
 ///
 /// # Errors
 /// As [`read_run`]; [`Error::File`] for a folder without a recording; [`Error::Taken`];
@@ -178,7 +178,7 @@ fn in_folder(folder: &Path) -> Option<PathBuf> {
         .map(|format| (format, folder.join(format.info().file_name)))
         .filter(|(_, path)| path.is_file())
         .collect();
-    // What this program cannot read is no reason to fail while there is something that it can.
+    // Unreadable recordings are no error while at least one can be read.
     let readable = there.iter().find(|(format, _)| format.is_built_in());
     readable.or(there.first()).map(|(_, path)| path.clone())
 }
@@ -190,7 +190,7 @@ fn study(folder: &Path) -> Option<Summary> {
     (!summary.with.is_empty()).then_some(summary)
 }
 
-/// The first run of a study with the others; runs without a recording are told and left out.
+/// The first run of a study with the others; runs without a recording are reported and left out.
 fn runs_of(folder: &Path, mut study: Summary, first: Vec<Input>, warnings: &mut Vec<String>) -> Vec<Input> {
     let others = std::mem::take(&mut study.with);
     let mut runs: Vec<Input> =
@@ -253,7 +253,7 @@ fn computed(trace: &Trace) -> Summary {
         tcp = tcp.map(|tcp| tcp.with_parts(&parts));
     }
     if let Some(tcp) = tcp.as_mut().filter(|_| moves.is_empty()) {
-        // Where the ringing cannot be told from the motion it has no frequency.
+        // Without known moves the ringing cannot be separated from the motion and has no frequency.
         (tcp.dominant_hz, tcp.settling_s) = (None, None);
     }
     let named = |name: &str, otherwise: &str| if name.is_empty() { otherwise.to_owned() } else { name.to_owned() };

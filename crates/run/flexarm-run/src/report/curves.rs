@@ -5,18 +5,18 @@ use flexarm_log::{CurveQuantity, Trace};
 
 use crate::summary::Summary;
 
-/// Most points of a curve that is seen at once.
+/// Maximum number of points of a curve that is shown at once.
 const MOST_POINTS: usize = 3000;
-/// Most numbers of a plot with many curves.
+/// Maximum number of values of a plot with many curves.
 const MOST_NUMBERS: usize = 24_000;
-/// Most points of curves behind a selector.
+/// Maximum number of points of curves behind a selector.
 const MOST_DETAIL: usize = 1000;
 /// Amplitudes below this share of the largest one end the shown part of a spectrum.
 const QUIET: f64 = 1e-3;
 
 const WHOLE_RUN: &str = "whole run";
 
-/// Most stops of which a spectrum is shown.
+/// Maximum number of stops with a spectrum.
 const MOST_STOPS: usize = 8;
 
 /// A plot: curves over a common axis, or several such sets to choose from.
@@ -26,7 +26,7 @@ pub(super) struct Plot {
     pub(super) id: &'static str,
     pub(super) section: &'static str,
     pub(super) title: &'static str,
-    /// What is to be known to read it.
+    /// Explanation of the plot.
     pub(super) note: String,
     pub(super) x_label: &'static str,
     pub(super) x_unit: &'static str,
@@ -68,7 +68,7 @@ pub(super) struct Curve {
     pub(super) y: Vec<f64>,
 }
 
-/// How a curve is drawn.
+/// Style of a curve.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Kind {
     #[default]
@@ -79,7 +79,7 @@ pub(super) enum Kind {
     Dashed,
     /// Along the axis x (0), y (1) or z (2) of the world: in its colour.
     Axis(usize),
-    /// Of a link, spring or joint with the colour of this number.
+    /// Curve of a link, spring or joint in the colour of this number.
     Part(usize),
 }
 
@@ -258,7 +258,7 @@ fn amplitudes(errors: &[(f64, [f64; 3])]) -> Option<(Vec<f64>, Vec<Curve>)> {
     if largest <= 0.0 {
         return None;
     }
-    // Zero has no place on a logarithmic axis, and nobody looks six decades below the peak.
+    // A logarithmic axis has no zero; it ends six decades below the peak.
     let seen = |a: f64| a.max(1e-6 * largest);
     let mut curves =
         vec![Curve { name: "all axes".into(), kind: Kind::Total, y: total.into_iter().map(seen).collect() }];
@@ -284,12 +284,12 @@ fn spectrum(summary: &Summary, trace: &Trace) -> Option<Plot> {
         let curves = curves.into_iter().map(|c| Curve { y: c.y[range.clone()].to_vec(), ..c });
         Table::new(hz[range.clone()].to_vec(), curves.collect(), MOST_POINTS)
     };
-    // A long run has every sample of its beginning alone.
+    // A long run keeps every sample at its beginning only.
     let end_s = errors.last().map_or(0.0, |(time_s, _)| *time_s);
     let is_whole = errors.len() as u64 == trace.samples();
     let name = if is_whole { WHOLE_RUN.to_owned() } else { format!("first {end_s:.4} s") };
     let mut views = vec![PlotView { name, tables: vec![shown(&hz, curves)], ..PlotView::default() }];
-    // Without the motion in it the ringing stands alone.
+    // Without the motion only the ringing remains.
     let holds = summary.tcp.iter().flat_map(|tcp| &tcp.holds).take(MOST_STOPS).enumerate();
     let holds = holds.filter(|(_, hold)| is_whole || hold.end_s <= end_s);
     let stops = holds.filter_map(|(k, hold)| {

@@ -32,7 +32,7 @@ use self::shares::{Part, part_shares, share_numbers};
 pub use again::{ReportFiles, ReportOptions, report};
 pub use html::{ReportRun, html};
 
-/// What a run is called where it is alone.
+/// Label of a single run.
 fn title(summary: &Summary) -> String {
     match summary.trajectory.as_str() {
         "" => summary.robot.clone(),
@@ -125,19 +125,19 @@ pub struct FigureGroup {
 /// A figure in readable units.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Figure {
-    /// What it is.
+    /// Name.
     pub name: String,
     /// The number; empty if there is none.
     pub value: String,
     /// Its unit.
     pub unit: &'static str,
-    /// What else is to be said.
+    /// Note.
     pub note: String,
-    /// How much it matters.
+    /// Importance.
     pub weight: Weight,
 }
 
-/// How much a figure matters.
+/// Importance of a figure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Weight {
     /// One of many.

@@ -66,7 +66,7 @@ fn plane(points: impl Iterator<Item = Vector3<f64>>) -> [Vector3<f64>; 2] {
     [widest, normal.cross(&widest)]
 }
 
-/// What an axis of the plan is called.
+/// Returns the label of an axis of the plan.
 fn named(axis: &Vector3<f64>) -> String {
     let largest = axis.iamax();
     if axis[largest].abs() > 0.999 {

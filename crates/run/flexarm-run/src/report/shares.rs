@@ -1,10 +1,10 @@
-//! Who has which share in the largest TCP error: what table and page tell of links, drives, servos
+//! Shares of the peak TCP error for table and page: of links, drives, servos
 //! and stepper.
 
 use crate::headline::{self, rounded};
 use crate::summary::{DriveFigures, LinkFigures, Summary};
 
-/// What one part of the arm has in the largest TCP error, with its own figures.
+/// Share of one part of the arm in the peak TCP error, with its own figures.
 pub(super) struct PartShare<'a> {
     /// Name of the link or joint, or of the stepper.
     pub(super) name: &'a str,
@@ -12,7 +12,7 @@ pub(super) struct PartShare<'a> {
     pub(super) kind: &'a str,
     /// Part of the largest TCP error along its direction (m), where that is known.
     pub(super) at_peak_m: Option<f64>,
-    /// Largest TCP displacement that it causes at any time (m).
+    /// Maximum TCP displacement that it causes at any time (m).
     pub(super) largest_m: Option<f64>,
     /// The rest of its figures.
     pub(super) part: Part<'a>,

@@ -1,4 +1,4 @@
-//! What can be said of a run before its first step, for single runs and for studies of many.
+//! Caveats about a run before its first step, for single runs and for studies of many.
 
 use flexarm_kinematics::State;
 use flexarm_stepping::{FlexibleArm, StepRule, StepperKind};

@@ -1,4 +1,4 @@
-//! What happened when in a run, for recordings and reports.
+//! Events of a run, for recordings and reports.
 
 use flexarm_analysis::TcpMetrics;
 use flexarm_log::{Event, EventKind};
@@ -6,7 +6,7 @@ use flexarm_log::{Event, EventKind};
 use super::RunLoop;
 
 impl RunLoop<'_> {
-    /// What happened when, in order of time, as far as the run came.
+    /// Returns the events in order of time, up to the end of the run.
     pub(super) fn events(&self, metrics: Option<&TcpMetrics>) -> Vec<Event> {
         let mut events = Vec::new();
         let mut add = |time_s: f64, kind: EventKind, text: String| events.push(Event { time_s, kind, text });
@@ -37,7 +37,7 @@ impl RunLoop<'_> {
         let mut jumps: Vec<f64> = self.arm.load_jumps().collect();
         jumps.sort_by(f64::total_cmp);
         jumps.dedup();
-        // A table or a milling load has a corner at every row; a list of those tells nobody
+        // A table or a milling load has a corner at every row; a list of those is not useful:
         // anything.
         const MOST_JUMPS: usize = 20;
         for t in jumps.iter().take(if jumps.len() <= MOST_JUMPS { MOST_JUMPS } else { 1 }) {

@@ -92,7 +92,7 @@ impl RunLoop<'_> {
         }
     }
 
-    /// What each contributor has in the largest error, along its direction.
+    /// Returns the share of each contributor in the peak error, along its direction.
     fn shares_at_peak(&self) -> Vec<ShareFigures> {
         let (along, rest) = self.at_peak.along(&self.tcp);
         let mut places = vec![0.0; self.monitors.contributions.moved().len()];
@@ -112,7 +112,7 @@ impl RunLoop<'_> {
         shares.chain(of_stepper).collect()
     }
 
-    /// What is probably wrong with the input, and whether the models held in what was seen so far.
+    /// Returns the caveats about the input and about the range of the models so far.
     fn caveats(&self, summary: &Summary, sag_m: f64, mut caveats: Vec<Caveat>) -> Vec<Caveat> {
         let (robot, flexible, arm, motion, options) =
             (self.robot, self.flexible, &*self.arm, self.motion, self.options);
@@ -133,7 +133,7 @@ impl RunLoop<'_> {
         caveats
     }
 
-    /// How far gearboxes give way.
+    /// Returns the deflections of the gearboxes.
     fn drive_caveats(&self) -> Vec<Caveat> {
         let coordinates = self.arm.model.coordinates();
         let drives = self.robot.drives.iter().zip(self.monitors.deflections.result()).enumerate();

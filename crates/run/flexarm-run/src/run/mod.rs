@@ -46,7 +46,7 @@ use crate::twin::RigidTwin;
 pub use before::BeforeRun;
 pub use figures::static_sag;
 
-/// What servos leave of the way to go, among the contributors to the TCP error.
+/// Name of the following error of servos among the contributors to the TCP error.
 const FOLLOWING_ERROR: &str = "following error";
 
 /// Part of the first natural frequency at the start below which the arm does not ring anywhere on
@@ -56,7 +56,7 @@ const RINGING_FROM: f64 = 0.5;
 /// Coordinates times steps between two looks at the progress callback: a stop must not wait for
 /// many large steps.
 const POLL_EVERY: usize = 2000;
-/// Most steps between two looks.
+/// Maximum number of steps between two calls of the callback.
 const RAREST_POLL: usize = 64;
 
 /// Called with simulated and total time (s); breaking off stops the run with readable files.
@@ -151,7 +151,7 @@ pub(crate) fn simulate(
     }
     let own = || match detail {
         Detail::Curves => Expected::of(&arm, &flexible.tcp, scenario.duration_s(), scenario.start),
-        // How far things are shown enlarged is asked by nobody but recordings.
+        // Only recordings need the magnification.
         _ => Expected::default(),
     };
     let shares_scale = expected.is_some();
@@ -217,9 +217,9 @@ pub(crate) fn simulate(
     Ok(Run { summary, columns: columns.unwrap_or_default(), trace: run.trace })
 }
 
-/// The error to tell, if the run or the writing of its result failed. What stopped the run is the
-/// news: after a full disk, closing fails again. But nobody must be told of a log that is not
-/// there.
+/// Returns the error to report, if the run or the writing of its result failed. The reason of the
+/// stop comes first news: after a full disk, closing fails again. But nobody must be told of a log
+/// that is not there.
 fn how_it_ended(end: Result<(), Error>, reported: Result<(), Error>) -> Result<(), Error> {
     match (end, reported) {
         (Err(Error::Interrupted { .. }), Err(lost)) => Err(lost),
@@ -228,7 +228,7 @@ fn how_it_ended(end: Result<(), Error>, reported: Result<(), Error>) -> Result<(
     }
 }
 
-/// What recordings are told at the end. Timings stay out of it: recordings of the same run are the
+/// Returns the result for recordings. It has no timings: recordings of the same run are the
 /// same bytes.
 fn result(summary: &Summary, events: Vec<Event>) -> RunResult {
     let timeless =
@@ -247,7 +247,7 @@ fn result(summary: &Summary, events: Vec<Event>) -> RunResult {
     }
 }
 
-/// Who moves the tool.
+/// Contributors to the TCP displacement.
 struct Contributor {
     /// Place among all displacements: links, then drives, then what servos leave.
     place: usize,
@@ -288,7 +288,7 @@ struct RunLoop<'a> {
     bends: Vec<BendInfo>,
     contributors: Vec<Contributor>,
     at_peak: AtPeak,
-    /// Largest torque per motor that moves several joints.
+    /// Returns the maximum torque of each motor that moves several joints.
     motors: std::collections::BTreeMap<String, f64>,
     detail: Detail,
     /// Steps between two samples, and all.
@@ -378,7 +378,7 @@ impl<'a> RunLoop<'a> {
         if !Arc::ptr_eq(&self.arm.model, &self.seen.model) {
             Arc::make_mut(&mut self.arm).model.clone_from(&self.seen.model);
         }
-        // What its drives must supply stands in samples alone.
+        // The required forces of its drives are in samples only.
         match self.detail {
             Detail::Figures => self.twin.place(&self.arm, &self.tcp, self.seen.t),
             _ => self.twin.update(&self.arm, &self.tcp, self.seen.t),

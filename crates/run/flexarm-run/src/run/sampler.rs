@@ -1,4 +1,4 @@
-//! What recordings, curves and observers are shown of an instant of a run: one [`Sample`], filled
+//! State of a run at one instant for recordings, curves and observers: one [`Sample`], filled
 //! again and again.
 
 use flexarm_kinematics::{AxisMotion, Frame, JointMotion};
@@ -10,7 +10,7 @@ use crate::monitor::tool::ToolError;
 use crate::robot::Robot;
 use crate::twin::RigidTwin;
 
-/// What of an arm stands in a sample.
+/// Elements of an arm in a sample.
 pub(super) struct Sampler {
     link_frames: Vec<Frame>,
     /// Places along the flexible links.
@@ -100,7 +100,7 @@ fn place(deflection: &mut [f64; 6], load: &mut [f64; 6], motion: AxisMotion, e: 
     }
 }
 
-/// What the springs of gearboxes add to the motor's angle at the link.
+/// Deflections of the gearbox springs, which add to the motor's angle at the link.
 fn link_side_angles(robot: &Robot, flexible: &FlexibleRobot) -> Vec<(usize, usize, f64)> {
     let mut angles = Vec::new();
     for (group, owner) in flexible.model.elastic().iter().zip(&flexible.owners) {

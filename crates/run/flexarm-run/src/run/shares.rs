@@ -1,4 +1,4 @@
-//! Who makes the largest TCP error: what each link, gearbox and servo has in it.
+//! Shares of each link, gearbox and servo in the peak TCP error.
 //!
 //! ```text
 //! x_flexible - x_rigid = ∫ J(q(s)) Δq ds,   q(s) = q_rigid + s Δq,   s from 0 to 1        (1)
@@ -40,8 +40,8 @@ impl AtPeak {
         }
     }
 
-    /// What each coordinate has in the error, along its direction (m), and what no coordinate has:
-    /// steppers in maximal coordinates let joints drift apart.
+    /// Returns the share of each coordinate in the error, along its direction (m), and the
+    /// remainder: steppers in maximal coordinates let joints drift apart.
     pub(super) fn along(&self, tcp: &Frame) -> (Vec<f64>, f64) {
         let Some(model) = &self.model else { return (Vec::new(), 0.0) };
         let (mut data, mut J) = (Data::new(model), Matrix6xX::zeros(model.nv()));

@@ -1,4 +1,4 @@
-//! Motions told by the path of the tool: a program of moves and a robot become joints over time.
+//! Motions given as a TCP path: a program of moves and a robot become joints over time.
 //!
 //! `file` reads our own path files; robot programs come as a [`Program`] from elsewhere. Both end
 //! in `ToolPath::plan`.
@@ -30,9 +30,9 @@ pub(crate) use program::read_robot_program;
 const TO_TOP_SPEED: f64 = 0.4;
 /// Acceleration of a joint whose speed is not limited either, rad/s² or m/s².
 const ACCELERATION: f64 = 10.0;
-/// Least singular value below which a path passes near a singular pose, m/rad.
+/// Minimum singular value below which a path passes near a singular pose, m/rad.
 const NEAR_SINGULAR: f64 = 0.02;
-/// Notes of one kind that are told one by one.
+/// Number of notes of one kind that are listed one by one.
 const TOLD: usize = 4;
 /// The link that ROS gives the axes of the controller's flange, and the one of its base.
 const FLANGE: &str = "tool0";
@@ -47,13 +47,13 @@ pub struct ToolPath {
     pub(crate) file: String,
     /// Bounds of jerks that the motion keeps, by joint, rad/s³ or m/s³.
     pub(crate) jerks: Vec<(String, f64)>,
-    /// Things worth telling.
+    /// Warnings.
     pub(crate) warnings: Vec<String>,
     /// Things that may be known anyway.
     pub(crate) notes: Vec<String>,
 }
 
-/// What is known of the robot beside its model.
+/// Data of the robot in addition to its model.
 #[derive(Clone, Copy)]
 pub struct Cell<'a> {
     /// Rigid robot.
@@ -66,10 +66,10 @@ pub struct Cell<'a> {
     pub controller: &'a [RobotAxis],
 }
 
-/// What was taken of the robot for want of better knowledge, as sentences.
+/// Assumptions about the robot, as sentences.
 #[derive(Debug, Clone, Default)]
 pub struct Assumed {
-    /// Where tools stand; of no account where a path has none of its own.
+    /// Tool frames; unused where a path has none of its own.
     pub(crate) flange: Option<String>,
     pub(crate) accelerations: Option<String>,
 }
@@ -112,7 +112,7 @@ impl<'a> Cell<'a> {
         (flange, X_FT, note)
     }
 
-    /// Where the controller's world stands in that of the model: its link `base`, if that does not
+    /// Returns the controller's world in that of the model: its link `base`, if that does not
     /// move.
     fn world(&self) -> Pose {
         let base = self.model.frame(BASE).filter(|frame| frame.body == 0);
@@ -129,7 +129,7 @@ impl<'a> Cell<'a> {
         })
     }
 
-    /// How the controller counts these axes; empty where it counts the joints.
+    /// Axis conventions of the controller; empty where they are those of the joints.
     pub fn controller_axes(&self, axes: &[usize]) -> Vec<ControllerAxis> {
         let place = |joint: &str| axes.iter().position(|&k| self.model.coordinates()[k].joint == joint);
         let axis = |&k: &usize| {
@@ -217,12 +217,12 @@ impl ToolPath {
         Ok((planned.trajectory, Self { moves: planned.moves, file, jerks, warnings, notes }))
     }
 
-    /// Bound of a joint's jerk, rad/s³ or m/s³, if one was told.
+    /// Bound of a joint's jerk, rad/s³ or m/s³, if given.
     pub(crate) fn jerk_of(&self, joint: &str) -> Option<f64> {
         self.jerks.iter().find(|(name, _)| name == joint).map(|(_, jerk)| *jerk)
     }
 
-    /// What is worth knowing.
+    /// Notes.
     pub(crate) fn caveats(&self) -> Vec<Caveat> {
         let said = |text: &String| Caveat::said("tool-path", &self.file, format!("{}: {text}", self.file), "");
         let notes = self.notes.iter().map(|text| said(text).as_note());

@@ -49,7 +49,7 @@ pub fn program_text(
     Ok(read_program_text(path, bytes, &options).map_err(Box::new)?)
 }
 
-/// Reads a program with what is told beside it, and plans it.
+/// Reads a program with its options, and plans it.
 pub(super) fn plan_program(
     path: &Path,
     bytes: &[u8],
@@ -67,7 +67,7 @@ pub(super) fn plan_program(
     ToolPath::plan(path, &program, arm, resolution, warnings)
 }
 
-/// What the axes of the program are, in words.
+/// Returns a description of the axes of the program.
 fn taken_as(arm: &ProgramArm<'_>) -> String {
     let joint = |&k: &usize| arm.model.coordinates()[k].joint.as_str();
     let joints: Vec<&str> = arm.axes.iter().map(joint).collect();

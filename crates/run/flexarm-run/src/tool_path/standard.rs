@@ -20,7 +20,7 @@ const SMALL: f64 = 0.1;
 /// Rest at each pose, s.
 const REST: f64 = 1.0;
 
-/// Which motion.
+/// Kind of the motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub(super) enum Standard {

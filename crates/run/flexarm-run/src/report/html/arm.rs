@@ -86,7 +86,7 @@ fn triad(axes: &[[f64; 2]; 3]) -> String {
     out + "</svg>"
 }
 
-/// What the pictures of a run mean: colours, magnification, ghost and arrow.
+/// Legend of the pictures of a run: colours, magnification, ghost and arrow.
 fn picture_key(header: &RunHeader) -> String {
     let factor = if header.magnification > 0.0 { header.magnification } else { 1.0 };
     let how = match factor {

@@ -1,4 +1,4 @@
-//! What the plots of the page are made of.
+//! Data of the plots of the page.
 
 use flexarm_log::EventKind;
 
@@ -8,7 +8,7 @@ use super::number::{push_short, short};
 use crate::report::curves::{Kind, Plot, overlays};
 use flexarm_settings::written::markup;
 
-/// What of the samples the plots do not show, if there is something.
+/// Returns a note about samples that the plots leave out, if any.
 pub(super) fn thinning(runs: &[ReportRun<'_>], drawn: &[Vec<Plot>]) -> String {
     let mut sentences = Vec::new();
     let mut tables = drawn.iter().flatten().flat_map(|plot| &plot.views).flat_map(|view| &view.tables);
@@ -32,7 +32,7 @@ pub(super) fn thinning(runs: &[ReportRun<'_>], drawn: &[Vec<Plot>]) -> String {
     }
 }
 
-/// What the plots are made of, as JSON that may stand in a script element.
+/// Returns the data of the plots as JSON for a script element.
 pub(super) fn data(runs: &[ReportRun<'_>], drawn: &[Vec<Plot>]) -> String {
     let list = |items: Vec<String>| format!("[{}]", items.join(","));
     let run = |(run, drawn): (&ReportRun<'_>, &Vec<Plot>)| {

@@ -77,7 +77,7 @@ pub(super) fn tiles(run: &ReportRun<'_>) -> String {
     out + "</section>\n"
 }
 
-/// What the drives put in and took out.
+/// Returns positive and negative work of the drives.
 fn gross(e: &EnergyFigures) -> String {
     format!("+{} −{} J", number(e.drives_positive_j, 4), number(e.drives_negative_j, 4))
 }
@@ -118,7 +118,7 @@ const COMPARED: [Compared; 18] = [
 /// The figure that is a word where there is no number.
 const SETTLING: &str = "settling time";
 
-/// What stands in the place of a figure that a run does not have.
+/// Text in the place of a missing figure.
 pub(super) fn without_number(s: &Summary, figure: &str) -> String {
     match moving(s).filter(|_| [SETTLING, STABILISATION].contains(&figure)) {
         Some(tcp) => tcp.settling_state().short().to_owned(),

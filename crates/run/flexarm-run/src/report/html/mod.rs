@@ -1,7 +1,7 @@
 //! The report as one page that loads nothing: style, behaviour, data and pictures are written into
 //! it.
 //!
-//! The same runs give the same bytes, but for the paragraph with the id `timings`. Start at
+//! The same runs give the same bytes, except the paragraph with the id `timings`. Start at
 //! [`html`]. Rooms: the largest figures and the comparison of runs (`figures`), the arm (`arm`),
 //! tables (`tables`), what the plots are made of (`data`). Not here: what is plotted (`curves`),
 //! how the arm is drawn (`picture`), how plots behave (`assets/report.js`).
@@ -165,7 +165,7 @@ fn heading(title: &str, runs: &[ReportRun<'_>], body: &str) -> String {
     )
 }
 
-/// What bends and how far, a line for each run.
+/// Returns the headline of each run.
 fn headlines(runs: &[ReportRun<'_>]) -> String {
     let line = |run: &ReportRun<'_>| {
         let who = if runs.len() > 1 { format!("{}: ", run.label) } else { String::new() };
@@ -253,7 +253,7 @@ fn inputs(run: &ReportRun<'_>, named: bool) -> String {
     )
 }
 
-/// What depends on the machine and the day, in one place.
+/// Returns the paragraph of timings, which depend on machine and time.
 fn timings(runs: &[ReportRun<'_>]) -> String {
     let text = |run: &ReportRun<'_>| {
         let s = run.summary;

@@ -15,10 +15,10 @@ use crate::report::shares::{Part, part_shares, share_numbers};
 use crate::summary::Summary;
 use flexarm_settings::written::markup;
 
-/// Most moves of the tool in the table of the page.
+/// Maximum number of Cartesian moves in the table of the page.
 const MOST_MOVES: usize = 200;
 
-/// The plan of the tool's path and its moves, of a motion that is told by it.
+/// Returns the plan of a TCP path and its moves.
 pub(super) fn tool_path(run: &ReportRun<'_>) -> String {
     let Some(path) = &run.summary.path else { return String::new() };
     let mut out = "<section class=\"block\"><h2>Across the path of the tool</h2>\n".to_owned();
@@ -67,7 +67,7 @@ pub(super) fn tool_path(run: &ReportRun<'_>) -> String {
     out + "</section>\n"
 }
 
-/// Most poses with several stops that a page lists.
+/// Maximum number of poses with several stops on a page.
 const MOST_POSES: usize = 50;
 
 /// A row of the ISO table: name, meaning, unit, value.
@@ -131,7 +131,8 @@ pub(super) fn iso_table(runs: &[ReportRun<'_>]) -> String {
     let band = first.filter(|first| bands.all(|band| band.as_ref() == Some(first)));
     let band = band.unwrap_or_else(|| "within the settling band".into());
     for (name, meaning, unit, value) in ISO {
-        // What is not known is no row; what there is not, such as the end of a ringing, is.
+        // An unknown figure has no row; a figure without a value, such as the end of a ringing, has
+        // one.
         let known = |run: &ReportRun<'_>| run.summary.knows_moves() || value(run.summary).is_some();
         if !runs.iter().any(known) {
             continue;
