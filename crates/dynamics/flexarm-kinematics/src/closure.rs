@@ -877,7 +877,7 @@ pub(crate) fn draft_loops<'m>(
         let Some(ready) = ready else {
             let names: Vec<&str> = drafts.iter().map(|d| d.closure.name.as_str()).collect();
             let what = format!(
-                "the loops {names:?} rest on each other in a circle: each must close once those before it have; choose other dependent joints"
+                "the loops {names:?} depend on each other in a circle: each must close once those before it have; choose other dependent joints"
             );
             return Err(bad(drafts[0].closure, what));
         };
@@ -1026,7 +1026,7 @@ fn dependent_bodies(
             let leader = &mimic.joint;
             return Err(bad(
                 closure,
-                format!("joint {name:?} mimics {leader:?}: take the mimic out, the loop says where it is"),
+                format!("joint {name:?} mimics {leader:?}: remove the mimic: its position follows from the loop"),
             ));
         }
         if let Some(follower) = mechanism.joints.iter().find(|j| j.mimic.as_ref().is_some_and(|m| m.joint == *name)) {
@@ -1076,7 +1076,7 @@ pub(crate) fn assemble(model: &mut Model, mechanism: &Mechanism) -> Result<(), M
             let other = &model.loops[open].name;
             return Err(bad(
                 closure,
-                format!("loop {other:?}, on which it rests, does not close there: give start values in at"),
+                format!("loop {other:?}, on which it depends, does not close there: give start values in at"),
             ));
         }
         q[nv + 2 * k..nv + 2 * k + 2].copy_from_slice(&wanted);
@@ -1126,7 +1126,9 @@ fn start_values(model: &Model, closure: &LoopClosure) -> Result<Vec<f64>, ModelE
             None => {
                 return Err(bad(
                     closure,
-                    format!("at names joint {name:?}, which is no joint that moves by itself or follows from a loop"),
+                    format!(
+                        "at names joint {name:?}, which is neither an independent joint nor one that follows from a loop"
+                    ),
                 ));
             }
         }

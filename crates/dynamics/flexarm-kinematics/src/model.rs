@@ -244,8 +244,7 @@ pub enum ModelError {
     },
     /// A body on a spring has no mass, so its motion is undetermined.
     #[error(
-        "link {link:?} gives way (joint {joint:?}) and has mass {mass} kg with all that it carries: give it a positive mass, \
-         or let nothing give way before it"
+        "link {link:?} is elastic (joint {joint:?}) and has mass {mass} kg with all that it carries: give it a positive mass, or keep everything before it rigid"
     )]
     NoMass {
         /// The link.
@@ -284,7 +283,7 @@ pub enum ModelError {
         joint: String,
     },
     /// A modal link is inconsistent with the tree.
-    #[error("link {link:?} bends in modes, but {what} is wrong")]
+    #[error("link {link:?} is modal, but {what} is wrong")]
     BadModal {
         /// The link.
         link: String,
@@ -606,7 +605,7 @@ impl<'a> Builder<'a> {
                 return Err(ModelError::BadModal { link: link.name.clone(), what });
             }
             if self.bodies[body].modal.is_some() || X_BL != Pose::identity() {
-                let what = "its place in a body that bends in modes already";
+                let what = "its position in a body that is modal already";
                 return Err(ModelError::BadModal { link: link.name.clone(), what });
             }
             self.bodies[body].modal = Some(self.modal.len());

@@ -13,7 +13,7 @@ pub(crate) const DEAD_POINT_RAD: f64 = 0.01;
 pub enum StepError {
     /// The state left the plausible range.
     #[error(
-        "the simulation diverged at t = {t:.6} s (step {h:e} s): {what}; try a smaller {}; a motion so fast that the links cannot hold it also ends like this",
+        "the simulation diverged at t = {t:.6} s (step {h:e} s): {what}; try a smaller {}; a motion too fast for the links has the same effect",
         Setting::Step
     )]
     Diverged {
@@ -104,7 +104,7 @@ pub enum StepError {
         largest_s: f64,
     },
     /// The derivative of a run is not available.
-    #[error("derivatives of a run are not known with {what}: {mend}")]
+    #[error("derivatives of a run are not available with {what}: {mend}")]
     NoSlopes {
         /// Feature that prevents it.
         what: &'static str,
@@ -116,7 +116,7 @@ pub enum StepError {
     Setup(String),
     /// A stepper in maximal coordinates was given links with modal coordinates.
     #[error(
-        "spook works in maximal coordinates and does not know links that bend in modes ({} lumped would do): use generalized-alpha",
+        "spook works in maximal coordinates and does not support modal links ({} lumped would do): use generalized-alpha",
         Setting::Links
     )]
     ModalLinks,

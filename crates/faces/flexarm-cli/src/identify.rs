@@ -180,7 +180,7 @@ fn text(found: &Identification) -> String {
     );
     if let Some(held) = &found.held_out {
         out += &format!(
-            "readings that the fit had not seen: {} {unit} (before {})\n",
+            "readings held out of the fit: {} {unit} (before {})\n",
             number(factor * held.rms),
             number(factor * held.rms_before)
         );
@@ -197,7 +197,7 @@ fn text(found: &Identification) -> String {
             1e6 * gear.deflection_rms,
             1e6 * gear.noise_rms,
             unseen.join(", "),
-            if gear.told { "" } else { ": not told" }
+            if gear.told { "" } else { ": not determined" }
         );
     }
     for shape in &found.shapes {
@@ -208,11 +208,11 @@ fn text(found: &Identification) -> String {
     }
     for combination in &found.untold {
         let parts: Vec<String> = combination.iter().map(|w| format!("{:+.2} {}", w.weight, w.name)).collect();
-        out += &format!("not told: {}\n", parts.join(" "));
+        out += &format!("not determined: {}\n", parts.join(" "));
     }
     for s in &found.suspicious {
         out += &format!(
-            "argues against the rest: {}, measured {}, expected {} ({:.1} deviations)\n",
+            "contradicts the others: {}, measured {}, expected {} ({:.1} deviations)\n",
             s.reading,
             number(s.measured),
             number(s.expected),
@@ -221,7 +221,7 @@ fn text(found: &Identification) -> String {
     }
     for frame in &found.instruments {
         let [x, y, z] = frame.xyz;
-        out += &format!("instrument {} stands at {x:.5}, {y:.5}, {z:.5} m\n", frame.name);
+        out += &format!("instrument {} at {x:.5}, {y:.5}, {z:.5} m\n", frame.name);
     }
     for point in &found.targets {
         let [x, y, z] = point.xyz;

@@ -171,9 +171,9 @@ fn cut_text(c: &CutRun) -> String {
         c.scatter_per_feed
     );
     if let Some(hz) = c.swing_hz {
-        out += &format!("it swings most at {hz:.1} Hz\n");
+        out += &format!("strongest vibration at {hz:.1} Hz\n");
     }
-    out += &format!("largest displacement {:.4} mm, largest force {:.0} N\n", 1e3 * c.peak_m, c.peak_n);
+    out += &format!("maximum displacement {:.4} mm, maximum force {:.0} N\n", 1e3 * c.peak_m, c.peak_n);
     for (what, path) in [("CSV", &c.file), ("plot", &c.plot)] {
         if let Some(path) = path {
             out += &format!("{what:<7} {path}\n");
@@ -281,7 +281,7 @@ fn poses(found: &Lobes) -> String {
     right(&mut t);
     let left_out = match found.left_out {
         0 => String::new(),
-        n => format!("{n} places are left out: the tool stands still there, or moves along its axis\n"),
+        n => format!("{n} places are left out: the tool is at rest there, or moves along its axis\n"),
     };
     format!("\n{}{left_out}", lines(&t))
 }

@@ -36,14 +36,14 @@ fn a_run_names_the_flags_that_mend_it() {
     let named = format!("step=2e-3,name={long}");
     let too_long =
         format!("the label {long:?} has 120 letters, at most 100 make a folder: give its --with a short name=...");
-    let not_lumped = "3 segments are asked for, but no link of the robot is lumped: add --links lumped";
+    let not_lumped = "3 segments are requested, but no link of the robot is lumped: add --links lumped";
     refused(
         &place,
         &COMPARE,
         &[
             (
                 &["--stepper", "spook", "--links", "modal"],
-                "spook works in maximal coordinates and does not know links that bend in modes (--links lumped would do): use \
+                "spook works in maximal coordinates and does not support modal links (--links lumped would do): use \
              generalized-alpha",
             ),
             (&["--magnify", "0"], "the factor of deflections (--magnify) must be positive, found 0 times"),
@@ -63,7 +63,7 @@ fn a_run_names_the_flags_that_mend_it() {
             (&["--links", "modal", "--segments", "3"], not_lumped),
             (
                 &["--links", "lumped", "--modes", "3"],
-                "3 modes are asked for, but no link of the robot is modal: add --links modal",
+                "3 modes are requested, but no link of the robot is modal: add --links modal",
             ),
             (
                 &["--with", "step=2e-3,name=a", "--with", "step=3e-3,name=a"],
@@ -105,8 +105,7 @@ fn caveats_of_a_run_name_the_flags_in_every_place() {
         assert_eq!(summary["caveats"][0]["message"], warning);
         assert!(summary["caveats"][0].get("settings").is_none());
         let energy = summary["warnings"][1].as_str().unwrap();
-        let end =
-            "the samples are too far apart (--log-rate), the step too coarse (--step), or the stepper damps by itself";
+        let end = "the samples are too far apart (--log-rate), the step too coarse (--step), or the stepper has numerical damping";
         assert!(energy.ends_with(end), "{energy}");
     }
     let coarse = place.flexarm(&[&COMPARE[..], &["--force", "--step", "0.02", "--log-rate", "50"]].concat());

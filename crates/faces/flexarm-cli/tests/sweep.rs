@@ -136,7 +136,7 @@ fn a_study_stops_within_half_a_second_in_the_middle_of_a_run_which_does_not_coun
             let (took, answer) = &stopped[stopped.len() - 1];
             assert!(*took < Duration::from_millis(500), "{name}, {signal}: {took:?}");
             assert_eq!((answer.code, answer.out.as_str()), (1, ""), "{name}: {}", answer.err);
-            answer.says(&["stopped after 0 of 2 runs", "goes on from there"]);
+            answer.says(&["stopped after 0 of 2 runs", "continues from there"]);
             assert!(!place.path("out/runs.parquet").exists() && !place.path("out/sweep.json").exists());
             assert_eq!(place.read("out/parts/1-of-1.journal"), b"", "{name}");
         }

@@ -204,7 +204,7 @@ pub(crate) fn compensate<'py>(
     Ok(PyCompensated {
         motion: Py::new(py, PyMotion::made(motion, robot))?,
         curves: found.curves.iter().flatten().copied().collect(),
-        headline: format!("{}: largest error {before:.4} mm before, {after:.4} mm after", found.motion),
+        headline: format!("{}: peak error {before:.4} mm before, {after:.4} mm after", found.motion),
         figures: {
             let caveats = found.caveats.clone();
             Figures::of(found, &caveats)

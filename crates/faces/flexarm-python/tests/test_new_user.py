@@ -62,7 +62,7 @@ def notebook(tmp_path_factory: pytest.TempPathFactory) -> "Iterator[Notebook]":
 
 def test_the_first_ten_lines_work_in_an_empty_folder(notebook: Notebook) -> None:
     assert "((501,), (501, 3), (6, 6), (51, 6, 6))" in notebook.run(TEN_LINES)
-    assert "largest TCP error" in notebook.run("display(run)") and "joint_6" in notebook.run("display(arm.robot)")
+    assert "peak TCP error" in notebook.run("display(run)") and "joint_6" in notebook.run("display(arm.robot)")
 
 
 @pytest.mark.parametrize(

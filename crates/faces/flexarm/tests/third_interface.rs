@@ -108,7 +108,7 @@ fn a_camera_on_a_third_interface_bends_the_link_as_in_closed_form_whatever_model
         }
         let robot = place.robot(at, 1.0, "").unwrap();
         let told = statics(&robot, &Modelling::default(), None, [0.0; 6]).unwrap().warnings.join("\n");
-        for word in ["\"boom\"", "bends in modes", "\"bolts\"", "\"bracket\""] {
+        for word in ["\"boom\"", "is modal", "\"bolts\"", "\"bracket\""] {
             assert!(told.contains(word), "{word}: {told}");
         }
         let findings = check(&place.0.join("robot.toml"), None, &LoadOptions::default());

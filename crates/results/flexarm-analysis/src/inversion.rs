@@ -101,7 +101,7 @@ impl Node {
 #[non_exhaustive]
 pub enum InversionError {
     /// At some instant the joints cannot move the TCP in any of the selected directions.
-    #[error("at {t_s:.3} s the joints cannot move the tool in any direction asked for")]
+    #[error("at {t_s:.3} s the joints cannot move the tool in any requested direction")]
     Singular {
         /// Time (s).
         t_s: f64,

@@ -72,7 +72,7 @@ fn axis(
             Some(meant) => format!("did you mean {meant:?}?"),
             None => format!("it has {:?}", names().collect::<Vec<_>>()),
         };
-        fail(span, format!("the robot has no joint {name:?} that moves by itself; {meant}"))
+        fail(span, format!("the robot has no joint {name:?} that moves independently; {meant}"))
     };
     if !free(name) {
         return Err(unknown(name, entry.joint.span()));

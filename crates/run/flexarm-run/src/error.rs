@@ -237,7 +237,7 @@ fn assumed(notes: &[String]) -> String {
     if lines.is_empty() {
         lines
     } else {
-        format!("\nwhat was assumed of the program (a path file with [program] tells more):{lines}")
+        format!("\nassumptions about the program (a path file with [program] can state them):{lines}")
     }
 }
 

@@ -120,7 +120,7 @@ impl RobotLink {
                 );
                 Err((Asked::Directions, message))
             }
-            LinkModel::Modal if self.stiffness.is_some() => Err((Asked::Stiffness, self.one_spring("bends in modes"))),
+            LinkModel::Modal if self.stiffness.is_some() => Err((Asked::Stiffness, self.one_spring("modal body"))),
             LinkModel::Modal => self.modal(modelling).map(|modal| LinkForm::Modal(Arc::new(modal))),
             _ => match modelling.segments.unwrap_or(self.choices.segments) {
                 2 => Ok(LinkForm::TwoParts),
@@ -165,7 +165,7 @@ impl RobotLink {
     fn modal(&self, modelling: &Modelling) -> Result<ModalLink, (Asked, String)> {
         let name = &self.flexible.link;
         let fail =
-            |asked: Asked| move |e: flexarm_fem::FemError| (asked, format!("link {name:?} cannot bend in modes: {e}"));
+            |asked: Asked| move |e: flexarm_fem::FemError| (asked, format!("link {name:?} cannot be modal: {e}"));
         let wanted = modelling.modes.or(self.choices.modes);
         if let Some(modes) = wanted.filter(|modes| *modes > MOST_MODES) {
             let message = format!(
@@ -190,7 +190,7 @@ impl RobotLink {
                 };
                 let link = stored.or_else(condensed).ok_or_else(|| {
                     let message = format!(
-                        "link {name:?} cannot bend in modes: its .flex file has no mass over interfaces and modes; reduce \
+                        "link {name:?} cannot be modal: its .flex file has no mass over interfaces and modes; reduce \
                          the mesh again with this version, or use model = \"lumped\""
                     );
                     (Asked::Model, message)
@@ -199,7 +199,7 @@ impl RobotLink {
                 match wanted {
                     Some(n) if n < all => link.truncated(n).map_err(fail(Asked::Modes))?,
                     Some(n) if n > all => {
-                        let message = format!("link {name:?}: {n} modes are asked for, its .flex file has {all}");
+                        let message = format!("link {name:?}: {n} modes are requested, its .flex file has {all}");
                         return Err((Asked::Modes, message));
                     }
                     _ => link,
@@ -339,7 +339,7 @@ impl FlexibleRobot {
             let name = match group.map(|k| self.owners[k]) {
                 Some(Owner::Link(k)) => format!("link {:?}", self.spans[k].link),
                 Some(Owner::Drive(_)) => format!("link {:?}", model.bodies()[model.coordinates()[row].body].name),
-                None => format!("what joint {:?} moves by torque", model.coordinates()[row].joint),
+                None => format!("the body of the torque-driven joint {:?}", model.coordinates()[row].joint),
             };
             if !names.contains(&name) {
                 names.push(name);
@@ -598,16 +598,15 @@ impl Robot {
             if matches!(form, LinkForm::Modal(_)) { Vec::new() } else { branch_joints(&self.rigid, &link.flexible) };
         let Some(BranchJoint { joint, interface }) = branches.first() else { return Ok((form, None)) };
         let name = &link.flexible.link;
-        let why = format!(
-            "joint {joint:?} hangs on its interface {interface:?}, and rigid parts with springs know its two ends alone"
-        );
+        let why =
+            format!("joint {joint:?} is on its interface {interface:?}, and a lumped link has only two interfaces");
         let modelling = Modelling { links: LinkModel::Modal, ..*modelling };
         let modal = link.form(&modelling).map_err(|instead| ModellingError::Branch {
             link: name.clone(),
             why: why.clone(),
             instead,
         })?;
-        Ok((modal, Some(format!("link {name:?} bends in modes (model = \"modal\"): {why}"))))
+        Ok((modal, Some(format!("link {name:?} is modal (model = \"modal\"): {why}"))))
     }
 
     /// Uses the mass of a uniform beam if the file does not choose whose mass the parts take and
@@ -627,7 +626,7 @@ impl Robot {
             self.rigid.link(&name).and_then(|link| link.inertia).map_or_else(Vector3::zeros, |inertia| inertia.com);
         Some(format!(
             "link {name:?}: the URDF's inertia cannot be spread along the beam ({source}); its parts have the URDF's mass as a \
-             uniform beam instead, whose centre of mass is {:.4} m from the URDF's; parts = \"uniform\" says that this is meant",
+             uniform beam instead, whose centre of mass is {:.4} m from the URDF's; set parts = \"uniform\" if this is intended",
             (middle - own).norm()
         ))
     }

@@ -171,8 +171,7 @@ pub(crate) fn hysteresis(
             let (torque, half) = (LOST_MOTION_AT * rated, 0.5 * lost);
             if half <= torque / stiffness {
                 return fail(format!(
-                    "has a lost motion of {lost:e} rad, less than the {:e} rad by which the stiffness gives way at 3 % of the rated torque to either \
-                     side: check both, or leave lost_motion out",
+                    "has a lost motion of {lost:e} rad, less than the {:e} rad of elastic deflection at 3 % of the rated torque to either side: check both, or leave lost_motion out",
                     2.0 * torque / stiffness
                 ));
             }
@@ -298,14 +297,15 @@ fn gears_fit(robot: &Robot, joints: &[String]) -> Result<(), String> {
         }
         if gear.hysteresis.is_some() || !gear.transmission.is_empty() {
             return Err(format!(
-                "the gearbox of joint {joint:?} has a transmission error or hysteresis, which coupled gears do not know"
+                "the gearbox of joint {joint:?} has a transmission error or hysteresis, which coupled gears do not support"
             ));
         }
     }
     match drives.iter().flatten().find(|d| d.load_friction > 0.0) {
-        Some(drive) => {
-            Err(format!("the friction of joint {:?} grows with its load, which coupled gears do not know", drive.joint))
-        }
+        Some(drive) => Err(format!(
+            "the friction of joint {:?} grows with its load, which coupled gears do not support",
+            drive.joint
+        )),
         None => Ok(()),
     }
 }

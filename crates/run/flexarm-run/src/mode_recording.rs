@@ -118,8 +118,7 @@ fn name(k: usize, mode: &DampedMode) -> String {
 fn list(robot: &str, shown: &[DampedMode], start: impl Fn(usize) -> f64) -> String {
     let robot = markdown(robot);
     let mut text = format!(
-        "# Modes of {robot}\n\nShapes have no size: each is drawn as large as can be seen and swings once a second, whatever its \
-         frequency. The ghost is the rigid robot.\n\n| mode | frequency | damping | shown from |\n| --- | --- | --- | --- |\n"
+        "# Modes of {robot}\n\nShapes have no amplitude: each is scaled to be visible and oscillates once a second, independent of its frequency. The ghost is the rigid robot.\n\n| mode | frequency | damping | shown from |\n| --- | --- | --- | --- |\n"
     );
     for (k, mode) in shown.iter().enumerate() {
         let (hz, damping) = (mode.frequency_hz(), 100.0 * mode.damping_ratio());

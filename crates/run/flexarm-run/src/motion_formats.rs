@@ -261,7 +261,7 @@ fn along((trajectory, tool_path): (Trajectory, ToolPath), format: String) -> Rea
 /// The robot, without which the path of a tool is no motion of joints.
 fn robot_of<'a>(file: &MotionFile<'a>) -> Result<&'a Cell<'a>, Error> {
     file.cell.ok_or_else(|| {
-        let what = "this is told by what the tool does: tell the robot as well, whose joints follow it".into();
+        let what = "this file gives a TCP path: give the robot as well, whose joints follow it".into();
         Error::File { path: file.path.to_owned(), what }
     })
 }
@@ -320,7 +320,7 @@ fn no_topic(file: &MotionFile<'_>, what: &str) -> Result<(), Error> {
         None => Ok(()),
         Some(topic) => {
             let what = format!(
-                "{} {topic:?} was asked for, and the file is {what}, which has no topics; leave it out",
+                "{} {topic:?} was requested, but the file is {what}, which has no topics; leave it out",
                 Setting::Topic
             );
             Err(Error::File { path: file.path.to_owned(), what })
@@ -332,7 +332,7 @@ fn no_columns(file: &MotionFile<'_>, what: &str) -> Result<(), Error> {
     if file.options.columns.is_none() {
         return Ok(());
     }
-    let what = format!("{} tells the columns of a table, and the file is {what}; leave it out", Setting::Columns);
+    let what = format!("{} names the columns of a table, but the file is {what}; leave it out", Setting::Columns);
     Err(Error::File { path: file.path.to_owned(), what })
 }
 

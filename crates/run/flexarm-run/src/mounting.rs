@@ -176,14 +176,14 @@ fn stiffness6(given: &Spanned<Numbers>, source: &Source) -> Result<Matrix6<f64>,
     let K = (K + K.transpose()) * 0.5;
     if let Some(weak) = K.diagonal().iter().find(|k| **k <= 0.0) {
         return Err(fail(format!(
-            "has {weak} on its diagonal, expected positive numbers: leave what is rigid very stiff"
+            "has {weak} on its diagonal, expected positive numbers: make rigid directions very stiff"
         )));
     }
     let scaled = Matrix6::from_fn(|i, j| K[(i, j)] / (K[(i, i)] * K[(j, j)]).sqrt());
     match scaled.symmetric_eigenvalues().min() {
         least if least > 1e-12 => Ok(K),
         least => Err(fail(format!(
-            "the 6x6 matrix is not positive definite (smallest eigenvalue {least:.1e} with ones on the diagonal): in some direction it holds nothing"
+            "the 6x6 matrix is not positive definite (smallest eigenvalue {least:.1e} with ones on the diagonal): some direction has no stiffness"
         ))),
     }
 }
@@ -205,8 +205,7 @@ fn riding_mass(
         let base = base_link(&robot.rigid, "mounting").map_err(|e| source.error(entry.span(), e.to_string()))?;
         if !base_has_mass(robot, &base.name) {
             let message = format!(
-                "mounting: base link {:?} has no mass of its own (no <inertial>), so that what swings on the springs is not known: give \
-                 mass, com and inertia of pedestal and base, or mass = 0.0 if nothing else rides on the springs",
+                "mounting: base link {:?} has no mass of its own (no <inertial>), so that the mass on the springs is unknown: give mass, com and inertia of pedestal and base, or mass = 0.0 if there is nothing else on the springs",
                 base.name
             );
             return Err(source.error(entry.span(), message).into());
@@ -276,7 +275,7 @@ fn flexible_mounting(
         (Some(_), Some(xyz)) => {
             return Err(fail(
                 xyz.span(),
-                "the .flex file says where it meets the base (its interface B): leave xyz out",
+                "the .flex file gives the position of the base (its interface B): leave xyz out",
             ));
         }
         (Some(file), None) => {

@@ -23,9 +23,9 @@ pub enum LinkModel {
 impl LinkModel {
     /// Choices: the word in robot files, on the command line and in recordings, and its meaning.
     pub const WORDS: [(&'static str, Self, &'static str); 3] = [
-        ("rigid", Self::Rigid, "No link bends"),
+        ("rigid", Self::Rigid, "All links rigid"),
         ("lumped", Self::Lumped, "Rigid parts with coupled 6x6 springs"),
-        ("modal", Self::Modal, "Bodies that bend in modes (floating frame, Craig-Bampton)"),
+        ("modal", Self::Modal, "Modal bodies (floating frame, Craig-Bampton)"),
     ];
 
     /// The model of that word.

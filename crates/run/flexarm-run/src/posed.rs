@@ -98,7 +98,8 @@ impl Posed {
         let mut caveats: Vec<Caveat> =
             validity::outside_limits(&model.coordinates()[..model.n_actuated()], &self.at).collect();
         if self.flexible.springs.is_empty() {
-            let message = "the robot has no flexible link and no elastic drive: it does not yield and does not vibrate";
+            let message =
+                "the robot has no flexible link and no elastic drive: it does not deflect and does not vibrate";
             caveats.push(Caveat::said(
                 "nothing-yields",
                 "robot",

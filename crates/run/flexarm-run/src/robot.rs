@@ -616,7 +616,7 @@ fn held_joint(
         let meant = closest(name, names.iter().copied());
         let meant =
             meant.map_or_else(|| format!("its joints are {names:?}"), |meant| format!("did you mean {meant:?}?"));
-        let message = format!("hold: {name:?} is no joint of the robot that moves by itself; {meant}");
+        let message = format!("hold: {name:?} is no joint of the robot that moves independently; {meant}");
         return Err(source.error(value.span(), message));
     };
     let (lower, upper) = (joint.limits.lower, joint.limits.upper);

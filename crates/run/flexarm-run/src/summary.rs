@@ -408,7 +408,7 @@ impl TcpFigures {
         const NOTHING_M: f64 = 1e-9;
         match self.dynamic_peak_m.unwrap_or(self.peak_m) < NOTHING_M {
             true => "nothing oscillates",
-            false => "no line stands out of the spectrum",
+            false => "no dominant line in the spectrum",
         }
     }
 

@@ -89,7 +89,7 @@ pub enum SweepError {
         second: PathBuf,
     },
     /// The user stopped the study.
-    #[error("stopped after {done} of {runs} runs; they are kept in {}, the same command goes on from there", folder.display())]
+    #[error("stopped after {done} of {runs} runs; they are kept in {}, the same command continues from there", folder.display())]
     Stopped {
         /// Number of finished runs.
         done: usize,

@@ -149,7 +149,7 @@ impl Method for ReferenceSettings {
 
     fn start(&self, arm: Arc<FlexibleArm>, h: f64, e: &DVector<f64>) -> Result<Box<dyn Stepper>, StepError> {
         if !arm.hysteresis.is_empty() {
-            let text = "the reference stepper has continuous equations and does not know the hysteresis of gears: use \
+            let text = "the reference stepper needs continuous equations and does not support hysteresis of gears: use \
                         sdirk3 or rk4 with a small step";
             return Err(StepError::Setup(text.into()));
         }

@@ -25,7 +25,7 @@ const EXAMPLES: &str = "\
 Examples:
   The least mass with the peak error kept, as the study's [minimise] says it:
       flexarm sweep sections.toml --minimise
-  All runs of a study on all cores, into out/payload_speed; the same command goes on after a stop:
+  All runs of a study on all cores, into out/payload_speed; the same command continues after a stop:
       flexarm sweep payload_speed.toml
   A quarter of them here, the others elsewhere, and all of them joined:
       flexarm sweep payload_speed.toml --shard 1/4 -o shard1
@@ -290,7 +290,7 @@ fn strongest(metric: &MetricFigures) -> String {
             let share = metric.shares.get(name).copied().flatten().unwrap_or(f64::NAN);
             format!("{name} ({:.0} %)", 100.0 * share)
         }
-        (None, Some(std)) if std > 0.0 && metric.chance.is_some() => "nothing that stands out of chance".into(),
+        (None, Some(std)) if std > 0.0 && metric.chance.is_some() => "no significant effect".into(),
         _ => String::new(),
     }
 }

@@ -59,7 +59,7 @@ def run_html(run: Any) -> str:
     ]
     if tcp:
         rows += [
-            ("largest TCP error", f"{1e3 * tcp['peak_m']:.4f} mm"),
+            ("peak TCP error", f"{1e3 * tcp['peak_m']:.4f} mm"),
             ("RMS", f"{1e3 * tcp['rms_m']:.4f} mm"),
             ("at the end", f"{1e3 * tcp['end_m']:.4f} mm"),
         ]

@@ -80,12 +80,16 @@ impl Channels {
         let trees = "flexible robot with stations along its bent links; rigid twin below rigid/; magnified arm below magnified/";
         let tf = add("/tf", "tf2_msgs/TFMessage", trees)?;
         let tf_static = add("/tf_static", "tf2_msgs/TFMessage", "base and fixed links, once")?;
-        let joint_states = add("/joint_states", JOINTS, "flexible robot; effort is what the drives must supply")?;
+        let joint_states = add("/joint_states", JOINTS, "flexible robot; effort is the required force of the drives")?;
         let tcp_flexible = add("/tcp/flexible", POSE, "tool centre point of the flexible robot")?;
         let rigid = match header.has_rigid {
             false => None,
             true => Some(RigidChannels {
-                joint_states: add("/rigid/joint_states", JOINTS, "rigid twin; effort is what the drives must supply")?,
+                joint_states: add(
+                    "/rigid/joint_states",
+                    JOINTS,
+                    "rigid twin; effort is the required force of the drives",
+                )?,
                 tcp: add("/tcp/rigid", POSE, "tool centre point of the rigid twin")?,
                 error: add(
                     "/tcp/error",
@@ -129,7 +133,7 @@ impl Channels {
             !header.contributors.is_empty(),
             "/tcp/contributions",
             ARRAY,
-            "displacement of the TCP that each flexible link or drive causes alone, world axes [m]",
+            "displacement of the TCP caused by each flexible link or drive, world axes [m]",
         )?;
         let what = "surfaces of the links in their frames: flexible as in the URDF, rigid twin as a ghost, magnified arm in blue";
         let surfaces = add_if(!header.meshes.is_empty(), "/markers", MARKERS, what)?;
@@ -138,7 +142,7 @@ impl Channels {
         let error = add_if(is_magnified(header), "/markers/error", MARKERS, &what)?;
         let solver = add("/solver", ARRAY, "stepper")?;
         let energy = add("/energy", ARRAY, "energies of the flexible robot [J]")?;
-        let what = "what happened when; name = kind; written at the end of the run, with the times of the events";
+        let what = "events; name = kind; written at the end of the run, with the times of the events";
         let events = add("/events", "rcl_interfaces/Log", what)?;
         let paths = add("/markers/path", MARKERS, "paths of the tool so far, each second")?;
         let markers = MarkerChannels { surfaces, paths, error };

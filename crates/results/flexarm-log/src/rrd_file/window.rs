@@ -68,7 +68,7 @@ pub(crate) fn window(header: &RunHeader, seat: &Seat, labels: &[String]) -> Part
 
 /// Lays out mode shapes: the robot, the current caption, and the list of all.
 fn shapes(root: &EntityPath) -> Part {
-    let title = "Shapes without a size (colour: how far a place moves, grey not at all, red most)";
+    let title = "Shapes without amplitude (colour: displacement, from grey, zero, to red, maximum)";
     let scene = Part::scene(title, root.clone(), vec![format!("+ {root}/**")]);
     let right = vec![(1.0, Part::text("Now", path(["caption"]))), (4.0, Part::text("All", path(["summary"])))];
     Part::Row(vec![(3.0, scene), (2.0, Part::Column(right))])

@@ -73,7 +73,7 @@ pub(crate) const WIDE_BAND: CaveatKind = CaveatKind::warning(
 /// A settling band as wide as the error.
 pub(crate) const BAND_BEYOND_ERROR: CaveatKind = CaveatKind::warning(
     "band-beyond-error",
-    "the settling band of {value} m is wider than the largest TCP error of {yardstick} m: the tool counts as settled at all times; \
+    "the settling band of {value} m is wider than the peak TCP error of {yardstick} m: the tool counts as settled at all times; \
      narrow {settling_band_m}",
     "m",
     "a tenth of the error shows when the ringing is over",
@@ -89,7 +89,7 @@ pub(crate) const LONG_STEP: CaveatKind = CaveatKind::warning(
 pub(crate) const ENERGY_OPEN: CaveatKind = CaveatKind::warning(
     "energy-open",
     "the energy balance is open by {value} % of the energy in it: the samples are too far apart ({log_rate_hz}), the step too \
-     coarse ({step_s}), or the stepper damps by itself",
+     coarse ({step_s}), or the stepper has numerical damping",
     "%",
     "halve the step and compare",
 );
@@ -141,14 +141,14 @@ pub(crate) const JOINT_DISTANCE: CaveatKind = CaveatKind::warning(
 /// An arm larger than any.
 pub(crate) const SIZE: CaveatKind = CaveatKind::warning(
     "size",
-    "{where} reaches {value} m, the largest ever built less than {yardstick} m",
+    "{where} reaches {value} m; the largest arms built reach less than {yardstick} m",
     "m",
     "lengths of a URDF are in m",
 );
 /// Radius of gyration larger than the arm.
 pub(crate) const INERTIA: CaveatKind = CaveatKind::warning(
     "inertia",
-    "{where} has a radius of gyration of {value} m, all mass of the arm lies within {yardstick} m",
+    "{where} has a radius of gyration of {value} m; all mass of the arm is within {yardstick} m",
     "m",
     "check mass (kg), inertia (kg m2) and lengths (m) of the URDF",
 );
@@ -176,8 +176,7 @@ pub(crate) const MOUNTING_TILT: CaveatKind = CaveatKind::warning(
 /// Hysteresis where linear figures are asked for.
 pub(crate) const HYSTERESIS_LINEAR: CaveatKind = CaveatKind::note(
     "hysteresis-linear",
-    "{where} has hysteresis of {value} rad: at rest it stands on the curve of first loading, which after a motion it may miss by half of that; \
-     frequencies, responses and compliance are those of motions so small that nothing slips",
+    "{where} has hysteresis of {value} rad: statics use the curve of first loading, from which the deflection after a motion may differ by half of that; frequencies, responses and compliance are those of motions without slip",
     "rad",
     "run a motion that comes to the pose as the robot does",
 );
@@ -186,21 +185,21 @@ pub(crate) const HYSTERESIS_LOSS: CaveatKind = CaveatKind::warning(
     "hysteresis-loss",
     "{where} has a hysteresis loss of {value} rad, gears of robots less than {yardstick} rad",
     "rad",
-    "catalogues tell 1 arcmin, which is 2.9e-4 rad: write loss_arcmin",
+    "catalogues give 1 arcmin, which is 2.9e-4 rad: write loss_arcmin",
 );
 /// Transmission error as written.
 pub(crate) const TRANSMISSION_ERROR: CaveatKind = CaveatKind::warning(
     "transmission-error",
     "{where} has a transmission error of {value} rad, gears of robots less than {yardstick} rad",
     "rad",
-    "catalogues tell arc seconds, of which one is 4.8e-6 rad: write amplitude_arcsec",
+    "catalogues give arc seconds, one of which is 4.8e-6 rad: write amplitude_arcsec",
 );
 /// Ripple against the step.
 pub(crate) const RIPPLE_STEP: CaveatKind = CaveatKind::warning(
     "ripple-step",
-    "the ripple of the gear of {where} has {value} steps a period at the largest speed, less than {yardstick}: lower {step_s}",
+    "the ripple of the gear of {where} has {value} steps a period at the maximum speed, less than {yardstick}: lower {step_s}",
     "",
-    "a step of second order needs a dozen steps in a period to meet its amplitude",
+    "a stepper of second order needs a dozen steps in a period for the right amplitude",
 );
 /// Friction under load as written.
 pub(crate) const LOAD_FRICTION: CaveatKind = CaveatKind::warning(
@@ -226,7 +225,7 @@ pub(crate) const PAYLOAD_MASS: CaveatKind = CaveatKind::warning(
 /// A heavy point.
 pub(crate) const POINT_PAYLOAD: CaveatKind = CaveatKind::note(
     "point-payload",
-    "{where} of {value} kg is a point: it has no inertia of its own (told above {yardstick} kg)",
+    "{where} of {value} kg is a point: it has no inertia of its own (reported above {yardstick} kg)",
     "kg",
     "give inertia about its centre of mass if the tool turns fast",
 );
@@ -261,7 +260,7 @@ pub(crate) const JOINT_RANGE: CaveatKind = CaveatKind::warning(
 /// Effort limits far beyond the weight.
 pub(crate) const EFFORT_LIMIT: CaveatKind = CaveatKind::warning(
     "effort-limit",
-    "{where} has an effort limit of {value} N m, of weight it has to carry {yardstick} at most",
+    "{where} has an effort limit of {value} N m; its gravity torque is up to {yardstick} N m",
     "N m",
     "limits of a URDF are in N m and N; too small a mass has the same effect",
 );
@@ -283,7 +282,7 @@ pub(crate) const TCP_FIXED: CaveatKind = CaveatKind::warning(
 /// A TCP behind which the arm goes on.
 pub(crate) const TCP_INSIDE: CaveatKind = CaveatKind::warning(
     "tcp-link",
-    "{where}: the arm goes on {value} m behind it, of {yardstick} m in all",
+    "{where}: the arm continues {value} m beyond it, of {yardstick} m in all",
     "m",
     "the TCP is on the last link of the arm, such as tool0 or flange",
 );
@@ -297,7 +296,7 @@ pub(crate) const PAYLOAD_FIXED: CaveatKind = CaveatKind::warning(
 /// A payload behind which the arm goes on.
 pub(crate) const PAYLOAD_INSIDE: CaveatKind = CaveatKind::warning(
     "payload-link",
-    "{where}: the arm goes on {value} m behind it, of {yardstick} m in all",
+    "{where}: the arm continues {value} m beyond it, of {yardstick} m in all",
     "m",
     "the payload is on the link of the TCP, where it is without link",
 );
@@ -314,14 +313,14 @@ pub(crate) const LINK_STIFFNESS: CaveatKind = CaveatKind::warning(
 /// Stiffness without coupling.
 pub(crate) const LINK_COUPLING: CaveatKind = CaveatKind::warning(
     "link-stiffness",
-    "the stiffness given for {where} has no coupling terms, its beam or .flex file has some of {value} of the diagonal (told above {yardstick})",
+    "the stiffness given for {where} has no coupling terms, its beam or .flex file has some of {value} of the diagonal (reported above {yardstick})",
     "",
     "give all 36 numbers of the spring between the two parts, as flexarm inspect shows them",
 );
 /// Stiffness against mass.
 pub(crate) const LINK_SOUND: CaveatKind = CaveatKind::warning(
     "link-stiffness",
-    "by stiffness and mass of {where} sound runs along it with {value} m/s, along links of robots with 300 to 6000 m/s (told beyond {yardstick})",
+    "stiffness and mass of {where} give a wave speed of {value} m/s along it; links of robots have 300 to 6000 m/s (reported beyond {yardstick})",
     "m/s",
     "no material is stiffer for its mass: check units of stiffness (N/m, N m/rad) and mass (kg)",
 );
@@ -342,7 +341,7 @@ pub(crate) const SECTION_SIZE: CaveatKind = CaveatKind::warning(
 /// No damping at all.
 pub(crate) const NO_DAMPING: CaveatKind = CaveatKind::warning(
     "no-damping",
-    "{where} has a damping of {value}: what swings goes on for ever (jointed structures have {yardstick} of critical)",
+    "{where} has a damping of {value}: vibrations do not decay (jointed structures have {yardstick} of critical)",
     "",
     "leave damping out for 3 per cent",
 );
@@ -392,8 +391,7 @@ pub(crate) const TORSION: CaveatKind = CaveatKind::warning(
 /// Channels, which bend and twist about different lines.
 pub(crate) const SHEAR_CENTRE: CaveatKind = CaveatKind::warning(
     "shear-centre",
-    "the shear centre of {where} lies {value} m beside its centroid: a side force through the centroid would twist it by more than \
-     1 % of its bending ({yardstick} m would), which its beam leaves out",
+    "the shear centre of {where} is {value} m from its centroid: a side force through the centroid twists it by more than 1 % of its bending (limit {yardstick} m), which the beam model leaves out",
     "m",
     "beams bend and twist about the centroid: reduce a mesh of the link, or bend the section in the plane of its flanges only",
 );
@@ -460,14 +458,14 @@ pub(crate) const RATIO: CaveatKind = CaveatKind::warning(
 /// Rotor.
 pub(crate) const ROTOR: CaveatKind = CaveatKind::warning(
     "rotor",
-    "the rotor of {where} has {value} kg m2 as seen from the joint, no joint moves more than {yardstick} kg m2 of the arm",
+    "the rotor of {where} has {value} kg m2 on the joint's side; no joint moves more than {yardstick} kg m2 of the arm",
     "kg m2",
     "motor_inertia is in kg m2 on the motor's side; the ratio counts squared",
 );
 /// Friction.
 pub(crate) const FRICTION: CaveatKind = CaveatKind::warning(
     "friction",
-    "friction of {where} takes {value} N m, its effort limit is {yardstick}",
+    "friction of {where} is {value} N m; its effort limit is {yardstick}",
     "N m",
     "coulomb in N m and viscous in N m s/rad on the joint's side",
 );
@@ -496,7 +494,7 @@ pub(crate) const VELOCITY_GAIN: CaveatKind = CaveatKind::warning(
 /// A rigid joint among elastic ones.
 pub(crate) const STIFF_JOINT: CaveatKind = CaveatKind::warning(
     "stiff-joint",
-    "{where} does not yield, {value} of {yardstick} joints of the arm do",
+    "{where} is rigid, {value} of {yardstick} joints of the arm are elastic",
     "",
     "give its drive a gearbox with its stiffness; leaving out the last joints of a wrist is usual",
 );
@@ -541,7 +539,7 @@ pub(crate) const FAST_MODE: CaveatKind = CaveatKind::warning(
 /// Damping of the first mode.
 pub(crate) const DAMPED_MODE: CaveatKind = CaveatKind::warning(
     "damped-mode",
-    "{where} has a damping ratio of {value}, from {yardstick} on it does not swing at all",
+    "{where} has a damping ratio of {value}; from {yardstick} on it does not oscillate",
     "",
     "arms have 0.01 to 0.1: check damping of links and gearboxes",
 );

@@ -12,9 +12,9 @@ pub(crate) const MOTION_EFFORT: CaveatKind = CaveatKind::warning(
 /// A balancer that carries far more than the arm weighs.
 pub(crate) const BALANCER_STRONG: CaveatKind = CaveatKind::warning(
     "balancer-strong",
-    "{where} puts up to {value} N m (or N) on a joint, told above three times what the weight of the arm does ({yardstick})",
+    "{where} puts up to {value} N m (or N) on a joint (reported above three times the gravity torque of the arm, {yardstick})",
     "N m",
-    "a balancer carries about what the arm weighs: check rate, pressure, area and ends (N/m, Pa, m2, m)",
+    "a balancer carries about the weight of the arm: check rate, pressure, area and ends (N/m, Pa, m2, m)",
 );
 /// A balancer that carries nothing.
 pub(crate) const BALANCER_WEAK: CaveatKind = CaveatKind::note(
@@ -40,28 +40,28 @@ pub(crate) const BALANCER_CURVE: CaveatKind = CaveatKind::note(
 /// A loop that is assembled in another configuration than given.
 pub(crate) const LOOP_ASSEMBLED: CaveatKind = CaveatKind::warning(
     "loop-assembled",
-    "{where} closes with its dependent joints {value} rad or m from where it is told to be assembled (told above {yardstick})",
+    "{where} closes with its dependent joints {value} rad or m from the given assembly (reported above {yardstick})",
     "rad or m",
     "check the points of pin and eye and the lengths of the bars, or give the values in at",
 );
 /// Poses within the joint ranges in which a loop does not close.
 pub(crate) const LOOP_RANGE: CaveatKind = CaveatKind::warning(
     "loop-range",
-    "{where} does not close in {value} % of the poses within the ranges of the driving joints (told above {yardstick} %): such poses are refused",
+    "{where} does not close in {value} % of the poses within the ranges of the driving joints (reported above {yardstick} %): such poses are refused",
     "%",
-    "limits of the driving joints say where they may be each for itself; check the lengths of the bars",
+    "limits of the driving joints hold for each joint separately; check the lengths of the bars",
 );
 /// A small transmission angle within the joint ranges.
 pub(crate) const LOOP_REACH: CaveatKind = CaveatKind::warning(
     "loop-transmission",
-    "{where} has transmission angles down to {value} deg within the joint ranges (told below {yardstick})",
+    "{where} has transmission angles down to {value} deg within the joint ranges (reported below {yardstick})",
     "deg",
     "limits of the dependent joints keep poses out that the machine does not reach",
 );
 /// A small transmission angle along a motion.
 pub(crate) const LOOP_TRANSMISSION: CaveatKind = CaveatKind::warning(
     "loop-transmission",
-    "{where} comes to a transmission angle of {value} deg along the motion (told below {yardstick}): forces in its bars grow as 1/sin of it",
+    "{where} reaches a transmission angle of {value} deg along the motion (reported below {yardstick}): forces in its bars grow as 1/sin of it",
     "deg",
     "keep the motion away from the dead point, where the bars lie in a line",
 );
@@ -75,14 +75,14 @@ pub(crate) const LOOP_LIMIT: CaveatKind = CaveatKind::warning(
 /// A motion much slower than the robot.
 pub(crate) const SLOW_MOTION: CaveatKind = CaveatKind::note(
     "slow-motion",
-    "{where} never uses more than {value} of a joint's speed limit (told below {yardstick})",
+    "{where} never uses more than {value} of a joint's speed limit (reported below {yardstick})",
     "",
     "times are in s",
 );
 /// A motion that hardly moves.
 pub(crate) const SMALL_MOTION: CaveatKind = CaveatKind::note(
     "small-motion",
-    "{where} turns no joint by more than {value} rad (told below {yardstick})",
+    "{where} turns no joint by more than {value} rad (reported below {yardstick})",
     "rad",
     "is the unit of the angles right?",
 );
@@ -96,21 +96,21 @@ pub(crate) const LOAD: CaveatKind = CaveatKind::warning(
 /// A moment against what the drives have.
 pub(crate) const MOMENT: CaveatKind = CaveatKind::warning(
     "load",
-    "{where} is {value} N m, what the arm weighs makes {yardstick} N m at its full length",
+    "{where} is {value} N m; the weight of the arm makes {yardstick} N m at its full length",
     "N m",
     "forces are in N, moments in N m",
 );
 /// More samples than steps.
 pub(crate) const LOG_RATE: CaveatKind = CaveatKind::warning(
     "log-rate",
-    "{value} samples a second are asked for, there are {yardstick} steps a second: every step is logged, no more",
+    "{value} samples a second are requested, but there are {yardstick} steps a second: every step is logged",
     "1/s",
     "lower the step or the log rate",
 );
 /// Loads that go on long after the run.
 pub(crate) const LOAD_TIME: CaveatKind = CaveatKind::warning(
     "load-time",
-    "{where} goes on until {value} s, the run ends at {yardstick} s",
+    "{where} lasts until {value} s; the run ends at {yardstick} s",
     "s",
     "times of loads are in s",
 );

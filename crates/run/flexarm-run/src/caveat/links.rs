@@ -63,7 +63,7 @@ fn geometric(name: &str, link: &RobotLink) -> Option<Caveat> {
     let (message, help) = match (link.choices.model, link.has_geometric()) {
         _ if !link.choices.geometric => return None,
         (_, false) => (
-            format!("{name}: geometric_stiffening is asked for, but its .flex file has no stiffness by load"),
+            format!("{name}: geometric_stiffening is requested, but its .flex file has no geometric stiffness"),
             format!("make it with flexarm reduce {}", Setting::Geometric),
         ),
         (LinkModel::Modal, true) => return None,

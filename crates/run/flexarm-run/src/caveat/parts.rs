@@ -123,7 +123,7 @@ pub(crate) fn gravity(g: &Vector3<f64>) -> Option<Caveat> {
         Some((_, "")) if g.z < -0.99 * size => None,
         Some((_, "")) => {
             let way = if g.z > 0.99 * size { "upwards: the arm hangs from a ceiling" } else { "not along -z" };
-            let message = format!("gravity points {way}, as seen from the base");
+            let message = format!("gravity points {way} in the axes of the base");
             Some(Caveat { value: Some(g.z), yardstick: Some(-9.81), ..tilted(message) })
         }
         Some((_, words)) => Some(kinds::GRAVITY.found("gravity", size, 9.81).likely(*words).as_note()),

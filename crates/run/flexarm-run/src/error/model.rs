@@ -26,7 +26,7 @@ pub enum ModellingError {
         instead: String,
     },
     /// A number of segments, and no lumped link that takes it.
-    #[error("{segments} segments are asked for, but no link of the robot is lumped: {}", lumped_remedy(modal_instead))]
+    #[error("{segments} segments are requested, but no link of the robot is lumped: {}", lumped_remedy(modal_instead))]
     NoLumpedLink {
         /// Segments asked for.
         segments: usize,
@@ -34,7 +34,7 @@ pub enum ModellingError {
         modal_instead: Vec<String>,
     },
     /// A number of modes, and no modal link that takes it.
-    #[error("{modes} modes are asked for, but no link of the robot is modal: add {} modal", Setting::Links)]
+    #[error("{modes} modes are requested, but no link of the robot is modal: add {} modal", Setting::Links)]
     NoModalLink {
         /// Modes asked for.
         modes: usize,
@@ -229,8 +229,7 @@ pub enum LoopError {
     },
     /// The bars do not reach each other.
     #[error(
-        "loop {name:?} does not close there: its links do not reach each other; keep the driving joints within what its bars allow, or check \
-         their lengths"
+        "loop {name:?} does not close there: its links do not reach each other; keep the driving joints within the range of its bars, or check their lengths"
     )]
     Open {
         /// The loop.
@@ -309,7 +308,7 @@ pub enum PoseError {
     /// Body without inertia about some axis.
     #[error(
         "{}: {source}: {} lacks inertia about some axis, with all that it carries; give the links <inertial> with mass \
-         and inertia, have them estimated (inertia_from_density in the robot file), or let nothing give way before them",
+         and inertia, have them estimated (inertia_from_density in the robot file), or keep everything before them rigid",
         path.display(),
         links.join(", ")
     )]
@@ -326,7 +325,7 @@ pub enum PoseError {
     Linear(#[source] LinearError),
     /// Figures that overflowed: masses, lengths or joint values of 1e200.
     #[error(
-        "{what} are no finite numbers: a mass, a length, a stiffness, a force or a joint value is far too large or too small"
+        "{what} are not finite: a mass, a length, a stiffness, a force or a joint value is far too large or too small"
     )]
     Overflow {
         /// The figures.
@@ -440,7 +439,7 @@ pub enum PayloadError {
     },
     /// A flexible link.
     #[error(
-        "payload link {link:?} bends, so that it is not clear how the payload rides on it: name a link beyond it, of {beyond:?}"
+        "payload link {link:?} is flexible, so that the position of the payload on it is not defined: name a link beyond it, of {beyond:?}"
     )]
     Bends {
         /// The link.

@@ -224,7 +224,7 @@ fn path_over_time(trace: &Trace) -> Plot {
     Plot {
         y_label: "deviation",
         y_unit: "mm",
-        note: "Axes of the rigid tool's path: along it, and two across that turn no more than the path makes them (the normal begins on the inside of the first bend).".into(),
+        note: "Axes of the rigid tool's path: along it, and two across with minimum rotation (the normal begins on the inside of the first bend).".into(),
         views: one_view(Table::new(trace.curve_times(), path_curves(trace), MOST_POINTS)),
         ..over_time("path_time", TOOL, "Deviation in path axes over time")
     }
@@ -338,7 +338,7 @@ fn contributions(trace: &Trace) -> Option<Plot> {
         y_label: "TCP displacement",
         y_unit: "mm",
         wide: true,
-        note: "TCP displacement that the deflection of one link or drive alone causes (first order).".into(),
+        note: "TCP displacement caused by the deflection of one link or drive (first order).".into(),
         views,
         ..over_time("contributions", PARTS, "Who moves the tool")
     })
@@ -434,7 +434,7 @@ fn torques(trace: &Trace) -> Plot {
     } else {
         "N m or N"
     };
-    let note = "What the drives supply; choose a joint to see it beside the rigid twin.".to_owned();
+    let note = "Forces of the drives; choose a joint to compare it with the rigid twin.".to_owned();
     let y_label = if none_slides { "torque" } else { "drive force" };
     Plot { y_label, y_unit, note, views, ..over_time("torques", DRIVES, "Joint torques") }
 }

@@ -15,7 +15,7 @@ impl RunLoop<'_> {
             add(m.end, EventKind::MoveEnd, format!("move {} ends", k + 1));
         }
         if let Some(metrics) = metrics {
-            add(metrics.t_peak_s, EventKind::Peak, format!("largest TCP error: {:.3} mm", 1e3 * metrics.peak_m));
+            add(metrics.t_peak_s, EventKind::Peak, format!("peak TCP error: {:.3} mm", 1e3 * metrics.peak_m));
             for hold in &metrics.holds {
                 if let Some(settling) = hold.settling_s {
                     let band = 1e3 * self.options.settling_band_m;

@@ -445,7 +445,8 @@ impl Reader<'_> {
         let quaternion = entry.quaternion.as_ref().map(|q| *q.get_ref());
         let told = rotation(entry.rpy, quaternion, self.units).map_err(|m| self.source.error(table.span(), m))?;
         let turned = told.or(*R).ok_or_else(|| {
-            let message = "how the tool stands is not known yet: give rpy or quaternion, or begin with a move joints";
+            let message =
+                "the orientation of the tool is not known yet: give rpy or quaternion, or begin with a move joints";
             self.source.error(table.span(), message)
         })?;
         *R = Some(turned);
@@ -478,7 +479,8 @@ impl Reader<'_> {
                 }
             };
             let turned = turned.ok_or_else(|| {
-                self.source.error(points.span(), "how the tool stands is not known yet: give points of six values")
+                self.source
+                    .error(points.span(), "the orientation of the tool is not known yet: give points of six values")
             })?;
             *R = Some(turned);
             let p = Vector3::new(point[0], point[1], point[2]) * self.units.length;

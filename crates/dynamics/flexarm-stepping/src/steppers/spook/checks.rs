@@ -22,7 +22,7 @@ pub(super) fn check_known(arm: &FlexibleArm) -> Result<(), StepError> {
         _ if arm.model.has_modal() => Err(StepError::ModalLinks),
         None => Ok(()),
         Some((_, what)) => Err(StepError::Setup(format!(
-            "spook works in maximal coordinates and does not know {what}: use generalized-alpha"
+            "spook works in maximal coordinates and does not support {what}: use generalized-alpha"
         ))),
     }
 }

@@ -17,7 +17,7 @@ use flexarm_settings::written::markup;
 const PICTURE_WIDTH: usize = 810;
 
 pub(super) fn arm_pictures(runs: &[ReportRun<'_>]) -> String {
-    let mut out = "<section id=\"arm\" class=\"block\"><h2>The arm at its largest error</h2>\n".to_owned();
+    let mut out = "<section id=\"arm\" class=\"block\"><h2>The arm at its peak error</h2>\n".to_owned();
     let with_twin: Vec<_> = runs.iter().filter(|run| run.trace.header.has_rigid).collect();
     if with_twin.is_empty() {
         return String::new();

@@ -14,8 +14,7 @@ pub(super) fn thinning(runs: &[ReportRun<'_>], drawn: &[Vec<Plot>]) -> String {
     let mut tables = drawn.iter().flatten().flat_map(|plot| &plot.views).flat_map(|view| &view.tables);
     if tables.any(|table| table.is_thinned) {
         sentences.push(
-            "Plots of many samples are thinned: of equal pieces of a curve the smallest and the largest value are kept, so \
-             that peaks stay. Recordings have every sample."
+            "Plots of many samples are thinned: the minimum and the maximum of equal pieces of a curve are kept, so that peaks remain. Recordings have every sample."
                 .to_owned(),
         );
     }
@@ -23,7 +22,7 @@ pub(super) fn thinning(runs: &[ReportRun<'_>], drawn: &[Vec<Plot>]) -> String {
         let (size, all) = (run.trace.samples_per_block(), run.trace.samples());
         let label = markup(run.label);
         sentences.push(format!(
-            "{label}: curves are the smallest and the largest value of each {size} of the run's {all} samples."
+            "{label}: curves are the minimum and the maximum of each {size} of the run's {all} samples."
         ));
     }
     match sentences.is_empty() {

@@ -169,7 +169,7 @@ pub(super) fn comparison(runs: &[ReportRun<'_>]) -> String {
     out += &row("links", "", runs.iter().map(|run| or_none(&run.summary.links_model)).collect());
     out += &row("stepper", "", runs.iter().map(|run| or_none(&method(run.summary, "").unwrap_or_default())).collect());
     let apart = match runs.iter().any(|run| run.summary.difference.is_some()) {
-        true => " Apart: largest distance of the flexible TCP from that of the first run at the same time.",
+        true => " Apart: maximum distance of the flexible TCP from that of the first run at the same time.",
         false => "",
     };
     out += "</tbody></table></div><p class=\"note\">";
@@ -180,7 +180,7 @@ pub(super) fn comparison(runs: &[ReportRun<'_>]) -> String {
     let others: Vec<String> = others.collect();
     if !others.is_empty() {
         let (first, others) = (markup(runs[0].label), others.join(", "));
-        let _ = write!(out, " Another robot than that of {first}, so that no differences are told: {others}.");
+        let _ = write!(out, " Another robot than that of {first}, so that there are no differences: {others}.");
     }
     out + apart + "</p></section>\n"
 }

@@ -86,29 +86,29 @@ const ISO: [Iso; 8] = [
     ("RMS distance from the path", "of the same, over the samples of the moves", "mm", |s| {
         moving(s).map(|t| 1e3 * t.path_rms_m)
     }),
-    ("Lag along the path", "largest deviation along the path, whole run", "mm", |s| {
+    ("Lag along the path", "maximum deviation along the path, whole run", "mm", |s| {
         s.tcp.as_ref().map(|t| 1e3 * t.path_peak_m[0])
     }),
     (
         "Position overshoot (OV)",
-        "largest excursion past the place of rest, in the direction of approach, over all stops",
+        "maximum excursion past the final value, in the direction of approach, over all stops",
         "mm",
         |s| moving(s).map(|t| 1e3 * t.overshoot_m),
     ),
     (
         STABILISATION,
-        "from the end of a commanded move until the tool stays BAND of its place of rest, at the stop that takes longest",
+        "from the end of a commanded move until the TCP stays BAND of its final value, at the stop that takes longest",
         "s",
         |s| moving(s).and_then(|t| t.settling_state().time_s()),
     ),
-    ("Pose accuracy (AP)", "largest distance from the rigid tool at rest, over all stops", "mm", |s| {
+    ("Pose accuracy (AP)", "maximum distance from the rigid TCP at rest, over all stops", "mm", |s| {
         let rests = moving(s)?.holds.iter().map(|hold| 1e3 * hold.final_m);
         rests.reduce(f64::max)
     }),
     ("Pose repeatability (RP)", "scatter of the places at the end of repeated stops, at the worst pose", "mm", |s| {
         moving(s)?.poses.iter().map(|pose| 1e3 * pose.repeatability_m).reduce(f64::max)
     }),
-    ("Static sag", "distance from the rigid tool at rest at the start", "mm", |s| {
+    ("Static sag", "distance from the rigid TCP at rest at the start", "mm", |s| {
         s.tcp.as_ref().map(|t| 1e3 * t.static_sag_m)
     }),
 ];
@@ -228,8 +228,8 @@ pub(super) fn parts_tables(s: &Summary, of: &str) -> String {
         "name",
         "kind",
         "share of the peak (mm)",
-        "largest by itself (mm)",
-        "largest rotation (mrad)",
+        "maximum (mm)",
+        "maximum rotation (mrad)",
         "change of length (relative)",
     ];
     let mut out = table(&format!("Flexible links and drives{of}"), &head, &rows);
@@ -253,7 +253,7 @@ pub(super) fn parts_tables(s: &Summary, of: &str) -> String {
     let energies: Vec<_> =
         energies.iter().map(|(name, x, unit)| vec![(*name).to_owned(), number(*x, 4), (*unit).to_owned()]).collect();
     out += "<div class=\"columns\">\n";
-    out += &table(&format!("Largest forces of the drives{of}"), &["joint", "N m, or N if it slides"], &forces);
+    out += &table(&format!("Maximum forces of the drives{of}"), &["joint", "N m, or N if it slides"], &forces);
     out += &table(&format!("Natural frequencies at the start{of}"), &["mode", "Hz"], &frequencies);
     out += &table(&format!("Energy over the run{of}"), &["what", "value", "unit"], &energies);
     out + "</div>\n"
