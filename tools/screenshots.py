@@ -24,6 +24,7 @@ import time
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 # Picture: arguments of flexarm, file in its output folder, seconds of playback before the shot.
 RERUN = {
+    "arm": (["compare"], "run.rrd", 1.0),
     "recording": (["compare"], "run.rrd", 6.5),
     "mcap": (["compare"], "run.mcap", 6.5),
     "study": (
@@ -32,6 +33,9 @@ RERUN = {
         6.5,
     ),
 }
+# The moving picture of the README, and the part of the window that it shows.
+ANIMATED = "arm"
+CROP = (0.0, 0.03, 1.0, 0.498)
 REPORTS = {
     "report": ["compare"],
     "report_study": RERUN["study"][0],
@@ -44,15 +48,19 @@ def free_port():
         return s.getsockname()[1]
 
 
-def viewer_picture(file, out, seconds):
-    """Takes a picture of the Rerun viewer `seconds` after it was opened."""
+def viewer_pictures(file, out, seconds, frames=1, every=0.0):
+    """Saves what the Rerun viewer shows `seconds` after it was opened, then `every` seconds more.
+
+    Returns the files `out`/0.png, ... and the time between the first and the last (s).
+    """
     from rerun.experimental import ViewerClient
 
     port = free_port()
     viewer = shutil.which("rerun", path=f"{pathlib.Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}")
     command = [viewer, "--headless", "--bind", "127.0.0.1", "--port", str(port), "--window-size", "1600x1000", str(file)]
-    # A separate process group: the wrapper of the Python package does not forward signals.
+    # A process group of its own: the wrapper of the Python package does not pass signals on.
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
+    files = [out / f"{k}.png" for k in range(frames)]
     try:
         client, deadline = None, time.monotonic() + 60
         while client is None:
@@ -63,18 +71,37 @@ def viewer_picture(file, out, seconds):
                     raise
                 time.sleep(0.3)
         time.sleep(seconds)
-        client.save_screenshot(str(out))
-        # The viewer writes the file after drawing.
+        begin = time.monotonic()
+        for k, shot in enumerate(files):
+            time.sleep(max(0.0, begin + k * every - time.monotonic()))
+            client.save_screenshot(str(shot))
+        took = time.monotonic() - begin
+        # The viewer writes when it has drawn.
         size, deadline = -1, time.monotonic() + 30
         while time.monotonic() < deadline:
             time.sleep(0.5)
-            now = out.stat().st_size if out.exists() else 0
+            now = sum(shot.stat().st_size for shot in files if shot.exists())
             if now > 0 and now == size:
                 break
             size = now
     finally:
         os.killpg(process.pid, signal.SIGKILL)
         process.wait()
+    return [shot for shot in files if shot.exists()], took
+
+
+def animation(file, out, scratch, seconds):
+    """The views of the arm and of the TCP error over a run of ten seconds, as a moving picture."""
+    from PIL import Image
+
+    shots, took = viewer_pictures(file, scratch, seconds, frames=36, every=0.28)
+    pictures = [Image.open(shot).convert("RGB") for shot in shots]
+    # Without the panels at the sides, the top and the bottom of the window.
+    wide, high = pictures[0].size
+    box = tuple(round(x) for x in (CROP[0] * wide, CROP[1] * high, CROP[2] * wide, CROP[3] * high))
+    pictures = [picture.crop(box).resize((900, round(900 * (box[3] - box[1]) / (box[2] - box[0])))) for picture in pictures]
+    duration = round(1e3 * took / max(1, len(pictures) - 1))
+    pictures[0].save(out, save_all=True, append_images=pictures[1:], duration=duration, loop=0, quality=60, method=6)
 
 
 def smaller(picture):
@@ -127,10 +154,15 @@ def main():
         for name, (command, file, seconds) in RERUN.items():
             if not (wanted(name) and with_rerun):
                 continue
-            out = arguments.out / f"{name}.png"
+            out = arguments.out / f"{name}.{'webp' if name == ANIMATED else 'png'}"
             try:
-                viewer_picture(run(command) / file, out, seconds)
-                smaller(out)
+                shots = pathlib.Path(scratch) / f"shots_{name}"
+                shots.mkdir()
+                if name == ANIMATED:
+                    animation(run(command) / file, out, shots, seconds)
+                else:
+                    shutil.copyfile(viewer_pictures(run(command) / file, shots, seconds)[0][0], out)
+                    smaller(out)
                 print(f"{out}: {out.stat().st_size} bytes")
             except Exception as error:
                 print(f"{name}: no picture: {error}", file=sys.stderr)

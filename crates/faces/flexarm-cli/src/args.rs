@@ -24,9 +24,61 @@ use crate::sweep::SweepArgs;
 use crate::verify::VerifyArgs;
 use crate::view::ViewArgs;
 
+/// Help of the program without a command; a line for every command.
+const HELP: &str = "\
+{about}
+
+{usage-heading} {usage}
+
+Start:
+  flexarm compare                             the shipped arm and its report
+  flexarm new my_arm.urdf --payload 8         a robot file from a URDF
+  flexarm compare my_arm my_motion.csv        your arm on your motion
+
+Runs:
+  compare      Run the flexible robot beside its rigid twin: TCP error, report
+  run          Run one model along a motion and log it
+  report       Write the HTML report of recorded runs
+  convert      Write a recording in another format
+  view         Open a recording in the Rerun viewer
+
+Robots and motions:
+  new          Create a robot file, a motion and a first run from a URDF or xacro
+  check        List all problems of a robot and a motion
+  inspect      Show a robot with its kinematics and dynamics at a pose
+  motion       Show a motion against the limits of a robot, convert it
+  format       Print the page of a file format
+
+One pose:
+  statics      Equilibrium under weight and load, compliance of the TCP
+  modes        Natural frequencies, damping and shapes
+  response     Frequency response of the TCP
+  lobes        Depth of cut without chatter over the spindle speed
+
+Studies:
+  map          Sag, stiffness and frequencies over the workspace
+  sweep        Many runs with varied payloads, stiffness, speeds, options
+  sensitivity  Derivatives of the TCP error by every parameter
+  identify     Stiffness from measurements; poses worth measuring
+  compensate   Motion with which the TCP follows the rigid one's
+
+Flexible links:
+  reduce       Create a flexible link from a finite element mesh
+  import       Create a flexible link from matrices of another program
+  export       Write the matrices of a flexible link for another program
+
+Program:
+  verify       Run the case studies against their truths
+  completions  Print a shell completion script
+  man          Print the manual page
+  help         Print the help of a command
+
+{options}
+";
+
 /// Computes how far the links' flexibility moves a robot's tool from where the rigid model puts it
 #[derive(Debug, Parser)]
-#[command(name = "flexarm", version, arg_required_else_help = true)]
+#[command(name = "flexarm", version, arg_required_else_help = true, help_template = HELP)]
 pub(crate) struct Cli {
     #[command(subcommand)]
     pub(crate) command: Command,
@@ -430,4 +482,20 @@ fn parse_start_time(text: &str) -> Result<u64, String> {
         return Err(format!("expected seconds from 0 (1970) to {LATEST_S} (2038), found {seconds}"));
     }
     Ok((seconds * 1e9).round() as u64)
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::{Cli, HELP};
+
+    #[test]
+    fn the_help_has_a_line_of_at_most_80_columns_for_every_command() {
+        for command in Cli::command().get_subcommands() {
+            let line = format!("\n  {:<13}", command.get_name());
+            assert_eq!(HELP.matches(&line).count(), 1, "{}", command.get_name());
+        }
+        assert!(HELP.lines().all(|line| line.len() <= 80));
+    }
 }
