@@ -217,7 +217,7 @@ fn tables_take_a_map_of_columns_in_every_command_that_takes_a_motion() {
     );
     place.refused(
         &["motion", "swing.toml", "robot.toml", "--columns", "t=a"],
-        &["--columns tells the columns of a table"],
+        &["--columns names the columns of a table"],
     );
     place.refused(&["motion", "trace.txt", "--topic", "/joint_states"], &["a table, which has no topics"]);
 }

@@ -293,7 +293,7 @@ fn the_band_of_settling_and_the_models_are_named() {
         &RunOptions { settling_band_m: 2.5e-4, ..RunOptions::default() },
         None,
     ));
-    assert!(page.contains("tool stays within 0.25 mm of its place of rest"));
+    assert!(page.contains("TCP stays within 0.25 mm of its final value"));
     assert!(page.contains("<dt>settling_band_m</dt><dd>0.00025</dd>"));
     assert!(page.contains("<dt>drives</dt><dd>as the robot file says</dd>"));
     let (_, inputs) = page.split_once("id=\"inputs\"").unwrap();

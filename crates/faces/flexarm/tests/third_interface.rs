@@ -136,7 +136,7 @@ fn without_masses_for_modes_a_third_interface_is_refused() {
     // More modes than available: the modal link cannot be built, and the lumped one is no
     // alternative.
     let error = place.robot(0.7, 3.0, "modes = 5\n").unwrap_err().to_string();
-    for word in ["\"boom\"", "\"bolts\"", "\"bracket\"", "two ends"] {
+    for word in ["\"boom\"", "\"bolts\"", "\"bracket\"", "two interfaces"] {
         assert!(error.contains(word), "{word}: {error}");
     }
 }

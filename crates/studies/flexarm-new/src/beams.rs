@@ -578,7 +578,7 @@ mod tests {
         let frames = candidate(20.0, std::slice::from_ref(&mesh), aside).unwrap_err();
         assert!(frames.contains("are not along the link"), "{frames}");
         let short = Pose::from_parts(Translation3::new(0.1, 0.0, 0.0), Rotation3::identity());
-        assert!(candidate(20.0, &[mesh], short).unwrap_err().contains("stout"));
+        assert!(candidate(20.0, &[mesh], short).unwrap_err().contains("not slender"));
         let wide = Geometry::Sphere { radius: 0.2 }.triangles().unwrap();
         assert!(candidate(2.0, &[wide], short).is_err());
     }
