@@ -520,7 +520,7 @@ fn steppers_agree_on_the_reference_arm_with_modal_links() {
     let refusal =
         new_stepper(StepperKind::Spook(SpookSettings::default()), arm.clone(), 1e-3, Start::Equilibrium).err();
     let text = refusal.expect("refused").to_string();
-    assert!(text.contains("modes") && text.contains("generalized-alpha"), "{text}");
+    assert!(text.contains("modal links") && text.contains("generalized-alpha"), "{text}");
 }
 
 /// Returns the lumped reference arm with single-axis gearboxes at axes 2 and 3.
