@@ -159,8 +159,8 @@ fn html(answer: &Lobes, picture: Option<&str>) -> String {
     let _ = match (answer.stable_below_m, answer.stable_below_at_rpm) {
         (Some(depth), Some(rpm)) => writeln!(
             page,
-            "<p>Stable at every speed below <b>{} mm</b> (limit at {rpm:.0} 1/min); maximum limit at <b>{:.0} \
-             1/min</b>: {} mm.</p>",
+            "<p>Stable at every speed below <b>{} mm</b> (limit at {rpm:.0} 1/min); \
+             maximum limit at <b>{:.0} 1/min</b>: {} mm.</p>",
             rounded_down(1e3 * depth, 3),
             answer.best_rpm,
             rounded_down(1e3 * answer.best_depth_m, 3)

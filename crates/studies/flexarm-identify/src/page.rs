@@ -108,8 +108,8 @@ fn suspicious(answer: &Identification) -> String {
         return String::new();
     }
     let mut out = String::from(
-        "<h2>Suspected outliers</h2>\n<table><tr><th>reading</th><th>measured</th><th>expected</th><th>residual \
-         [standard deviations]</th></tr>\n",
+        "<h2>Suspected outliers</h2>\n<table><tr><th>reading</th><th>measured</th><th>expected</th>\
+         <th>residual [standard deviations]</th></tr>\n",
     );
     for s in &answer.suspicious {
         let _ = writeln!(

@@ -387,10 +387,10 @@ fn job(answer: &MeasurementPlan, request: &PlanRequest) -> String {
     let what = if request.points.is_empty() { "the TCP" } else { "the point px, py, pz (mm, tool axes)" };
     let lever = if request.levers.is_empty() { "" } else { ", which acts at ax, ay, az (mm, tool axes)" };
     format!(
-        "# Measurements of {}: {} readings, planned by flexarm identify.\n# Fill in {read} of displacements.csv (mm, \
-         {how}): displacement of {what} from no load to the force{lever}.\n# Then: flexarm identify ROBOT \
-         measurements.toml\nformat = 1\nlength = \"mm\"\nangle = \"deg\"\n{fit}\n[[displacement]]\nfile = \
-         \"displacements.csv\"\nstd = {}\n",
+        "# Measurements of {}: {} readings, planned by flexarm identify.\n\
+         # Fill in {read} of displacements.csv (mm, {how}): displacement of {what} from no load to the force{lever}.\n\
+         # Then: flexarm identify ROBOT measurements.toml\n\
+         format = 1\nlength = \"mm\"\nangle = \"deg\"\n{fit}\n[[displacement]]\nfile = \"displacements.csv\"\nstd = {}\n",
         answer.robot,
         answer.poses.len(),
         1e3 * request.std_m

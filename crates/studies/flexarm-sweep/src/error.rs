@@ -27,8 +27,10 @@ pub enum SweepError {
         differs: String,
     },
     /// A folder to be merged belongs to another study than the first.
-    #[error("{} is not a shard of the study in {}: {differs} differs; leave it out, or run it again with the same \
-             files", folder.display(), first.display())]
+    #[error(
+        "{} is not a shard of the study in {}: {differs} differs; leave it out, or run it again with the same files",
+        folder.display(), first.display()
+    )]
     ForeignShard {
         /// Folder.
         folder: PathBuf,
@@ -80,8 +82,11 @@ pub enum SweepError {
         shards: Option<usize>,
     },
     /// Two shards contain a run with different results.
-    #[error("run {run} has different results in {} and {}: one of them is from another version of the program or from \
-             other files", first.display(), second.display())]
+    #[error(
+        "run {run} has different results in {} and {}: one of them is from another version of the program or from \
+         other files",
+        first.display(), second.display()
+    )]
     Twice {
         /// Number of the run.
         run: usize,

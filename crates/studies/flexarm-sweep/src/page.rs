@@ -309,8 +309,8 @@ fn cells(values: &[f64]) -> (Vec<String>, Vec<Option<usize>>) {
 
 fn figures(summary: &SweepSummary) -> String {
     let mut out = String::from(
-        "<h2>Results</h2>\n<table><tr><th>metric</th><th>runs</th><th>minimum</th><th>5 %</th><th>median</th><th>95 \
-         %</th><th>maximum</th><th>mean</th><th>std</th></tr>\n",
+        "<h2>Results</h2>\n<table><tr><th>metric</th><th>runs</th><th>minimum</th><th>5 %</th><th>median</th>\
+         <th>95 %</th><th>maximum</th><th>mean</th><th>std</th></tr>\n",
     );
     for metric in &summary.metrics {
         let cell = |x: Option<f64>| x.map_or_else(|| "-".to_owned(), number);
