@@ -164,7 +164,9 @@ fn a_parameter_without_effect_is_not_named_with_twenty_draws() {
         assert!((0.46..0.47).contains(&chance), "{chance}");
         let page = place.text(&format!("{out}/report.html"));
         assert!(
-            page.contains("f1_hz: link.bar.beam.width. Not told from chance: motion.speed (which may explain"),
+            page.contains(
+                "f1_hz: link.bar.beam.width. Not distinguishable from chance: motion.speed (chance may explain"
+            ),
             "{page}"
         );
     }
@@ -193,7 +195,7 @@ fn the_best_run_and_the_front_have_high_frequencies_and_small_errors() {
     let found = place.json(&["sweep", "study.toml", "-o", "low"]);
     assert_eq!(found["best"]["value"], found["metrics"][0]["min"]);
     place.write("study.toml", STUDY.to_owned() + "\n[better]\nf2 = \"lower\"\n");
-    place.refused(&["sweep", "study.toml", "-o", "x"], &["\"f2\" is no metric"]);
+    place.refused(&["sweep", "study.toml", "-o", "x"], &["\"f2\" is not a metric"]);
     place.write("study.toml", STUDY.to_owned() + "\n[better]\nf1_hz = \"more\"\n");
     place.refused(&["sweep", "study.toml", "-o", "x"], &["f1_hz", "\"more\"", "\"lower\" or \"higher\""]);
 }
@@ -295,9 +297,12 @@ fn shards_are_planned_run_and_joined_by_a_shell() {
     let lacking = place.flexarm(&["sweep", "merge", "study.toml", "part", "-o", "joined"]);
     assert_eq!(lacking.code, 1);
     lacking.says(&["133 of 200 runs are missing", "shard 1/3 (all 67)", "shard 3/3 (all 66)"]);
-    place.refused(&["sweep", "merge", "study.toml", "nothing"], &["nothing holds no study"]);
+    place.refused(&["sweep", "merge", "study.toml", "nothing"], &["nothing contains no study.json"]);
     place.write("study.toml", common::with(STUDY, "count = 25", "count = 26"));
-    place.refused(&["sweep", "study.toml", "-o", "whole"], &["another study", "200 runs and 208", "--force"]);
+    place.refused(
+        &["sweep", "study.toml", "-o", "whole"],
+        &["another study", "the number of runs (200 and 208)", "--force"],
+    );
 }
 
 /// Truth: the minimum-width beam has exactly the required first frequency.
@@ -330,7 +335,7 @@ fn the_least_width_of_a_beam_has_the_frequency_that_must_hold() {
     let again = place.json(&words);
     assert_eq!(again["best"], found["best"]);
     place.refused(&["sweep", "study.toml", "--minimise", "-o", "x"], &["[minimise]"]);
-    place.refused(&["sweep", "study.toml", "--minimise", "weight", "-o", "x"], &["\"weight\" is no metric"]);
+    place.refused(&["sweep", "study.toml", "--minimise", "weight", "-o", "x"], &["\"weight\" is not a metric"]);
 }
 
 #[test]

@@ -309,5 +309,5 @@ values = [0.6, 0.8, 1.0]
     again = flexarm.sweep(study, tmp_path / "out")
     assert again["done"] == 3
     study.write_text(study.read_text().replace("motion.speed", "motion.sped"))
-    with pytest.raises(flexarm.InputError, match="leads nowhere"):
+    with pytest.raises(flexarm.InputError, match="matches no entry"):
         flexarm.sweep(study, tmp_path / "other")

@@ -217,7 +217,7 @@ fn gearboxes_alone_do_not_pass_for_an_arm_whose_links_bend() {
         right.residual.after, wrong.residual.after, wrong.misfit
     );
     assert!(right.misfit.is_none() && wrong.misfit.is_some_and(|factor| factor > 2.0));
-    assert!(wrong.caveats.iter().any(|caveat| caveat.message.contains("lacks something that gives way")));
+    assert!(wrong.caveats.iter().any(|caveat| caveat.message.contains("lacks a flexible part")));
     assert!(w > 2.0 * r, "{w} {r}");
     std::fs::remove_dir_all(folder).unwrap();
 }
@@ -233,7 +233,7 @@ fn a_plan_tells_more_than_as_many_poses_as_they_come_and_its_table_is_read_when_
     let job = folder.join("measurements.toml");
     // Not filled in yet.
     let error = identify_robot(&robot, &job, &IdentifyRequest::default()).unwrap_err().to_string();
-    assert!(error.contains("displacements.csv line 2: nothing was measured"), "{error}");
+    assert!(error.contains("displacements.csv line 2: there is no measured value"), "{error}");
     let empty = std::fs::read_to_string(folder.join("displacements.csv")).unwrap();
     let mut lines = empty.lines();
     let mut filled = lines.next().unwrap().to_owned() + "\n";
@@ -274,14 +274,14 @@ fn what_is_wrong_in_a_file_of_measurements_is_said_with_its_place() {
     fails("format = 1\n", "there is no reading");
     fails("format = 1\nlength = \"inch\"\n", "job.toml:2:10: length = \"inch\" is not known");
     fails(&format!("format = 1\n[[displacement]]\n{q}\nvalue = 0.1\nload = {{ mass = 3 }}\n"), "add direction");
-    fails(&format!("format = 1\n[[displacement]]\n{q}\nvalue = [0, 0, 1e-4]\n"), "the same: nothing moves");
+    fails(&format!("format = 1\n[[displacement]]\n{q}\nvalue = [0, 0, 1e-4]\n"), "are equal: there is no displacement");
     fails("format = 1\n[[displacement]]\njoints = [0, -60, 60]\n", "3 joint values, the robot has 6");
     fails("format = 1\n[[displacement]]\njoints = [0, -90, 90, 0, 0, 0]\n", "is angle = \"deg\" missing?");
     fails(&format!("format = 1\n[[place]]\n{q}\nvalue = [1, 2, 3]\n"), "add [instrument.NAME]");
     fails(&format!("format = 1\n[[frequency]]\n{q}\nhz = [5.0]\nmodes = [9]\nstd = 0.1\n"), "the model has 6 modes");
     fails(
         &format!("format = 1\nfit = [\"payload.mass\"]\n[[frequency]]\n{q}\nhz = [5.0]\nstd = 0.1\n"),
-        "no parameter of this robot is called",
+        "no parameter of this robot matches",
     );
     let two = format!(
         "format = 1\n[[frequency]]\n{q}\nhz = [5.0]\nstd = 0.1\n[[displacement]]\n{q}\nvalue = [0, 0, -1e-4]\nload = {{ mass = 10 }}\n"

@@ -122,7 +122,7 @@ fn the_coupling_of_shear_and_bending_is_found_and_written_into_the_robot_file() 
     // Both names of an entry are accepted; an additional factor would duplicate it.
     let request = IdentifyRequest { fit: vec![name, "link.link_2.*".into()], ..IdentifyRequest::default() };
     let error = identify_robot(&first, &place.0.join("job.toml"), &request).unwrap_err().to_string();
-    assert!(error.contains("say the same twice") && error.contains("link.link_2.stiffness_factor"), "{error}");
+    assert!(error.contains("describe the same stiffness") && error.contains("link.link_2.stiffness_factor"), "{error}");
 }
 
 /// Truth: a robot file with a changed entry, by statics; compared with the derivative of the entry
@@ -224,7 +224,7 @@ fn a_tool_that_is_elsewhere_is_found_from_places_and_written_into_the_robot_file
     assert!(new.tcp().0 == link && apart < 2e-7 && turned < 2e-7, "{apart:e} {turned:e}");
     // A tool chosen instead of the file's cannot be written into the file.
     let error = identify_robot(&moved, &place.0.join("job.toml"), &IdentifyRequest::default()).unwrap_err().to_string();
-    assert!(error.contains("chosen in its place"), "{error}");
+    assert!(error.contains("chosen as the TCP at loading"), "{error}");
 }
 
 /// Truth: the same tool in the robot file.

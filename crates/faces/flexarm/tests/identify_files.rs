@@ -167,7 +167,7 @@ fn displacements_in_the_axes_of_an_instrument_are_refused_without_it_and_met_wit
             assert!(frame.rpy.iter().zip(rpy).all(|(a, b)| (a - b).abs() < 1.5e-2), "{:?}", frame.rpy);
         }
         let page = std::fs::read_to_string(place.folder.join("out/identification.html")).unwrap();
-        assert!(page.contains("Instrument tracker") && page.contains("Residuals of displacements (mm)"));
+        assert!(page.contains("Instrument tracker") && page.contains("Residuals of displacements [mm]"));
         assert!(!page.contains("measured and expected"));
     }
 }
@@ -250,7 +250,7 @@ fn inertia_of_loads_and_relative_deviations_of_frequencies_count() {
         let error = place.identify(&job(load, std)).unwrap_err().to_string();
         assert!(error.contains(part), "{error}");
     };
-    refused("load = { mass = 50, inertia = [20, 1, 1, 0, 0, 0] }", "std = 0.1", "which no body has");
+    refused("load = { mass = 50, inertia = [20, 1, 1, 0, 0, 0] }", "std = 0.1", "which are not physical");
     refused("load = { inertia = [1, 1, 1, 0, 0, 0] }", "std = 0.1", "no mass");
     refused("", "std = 0.1\nstd_relative = 0.01", "keep one of them");
 }

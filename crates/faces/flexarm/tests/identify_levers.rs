@@ -230,5 +230,5 @@ fn a_plan_with_levers_tells_the_last_gearbox_and_its_table_with_gauges_is_read_a
         assert!((p.value / p.initial - 1.0).abs() < 0.02, "{}: {} {}", p.name, p.value, p.initial);
     }
     let none = PlanRequest { directions: vec![[0.0; 3]], ..PlanRequest::new(3) };
-    assert!(plan_measurements(&robot, &none).unwrap_err().to_string().contains("has no length"));
+    assert!(plan_measurements(&robot, &none).unwrap_err().to_string().contains("has zero length"));
 }

@@ -246,8 +246,8 @@ fn tables_and_universal_files_of_one_test_tell_the_same() {
         (["xyz = [0, 0, 0]", "link = \"lnk\""], &["no moving link \"lnk\"", "link_2"]),
         (["std = 0.01", "std = 0.01\nunit = \"m/N\""], &["times as large", "unit"]),
         (["std = 0.01", "std = 0.01\nunit = \"kg\""], &["unit = \"kg\" is not known", "m/s2/N"]),
-        (["std = 0.01", "std = 0.01\nfrom = 1000.0"], &["no value from 1000"]),
-        (["std = 0.01", "std = 0.01\nwatched = \"3\""], &["tells nodes and directions itself"]),
+        (["std = 0.01", "std = 0.01\nfrom = 1000.0"], &["no nonzero value from 1000"]),
+        (["std = 0.01", "std = 0.01\nwatched = \"3\""], &["contains nodes and directions"]),
     ] {
         let path = place.write("wrong.toml", with("text.uff").replace(change[0], change[1]));
         let error = identify_robot(&robot, &path, &IdentifyRequest::default()).unwrap_err().to_string();

@@ -274,9 +274,9 @@ fn a_wrong_tool_is_told_with_its_place() {
         ("diameter = 20.0", "diameter = -20.0", "expected a positive number"),
         ("helix = 30.0", "helix = 95.0", "expected 0 to 80"),
         ("kind = \"down\"", "kind = \"sideways\"", "use \"up\", \"down\""),
-        ("ae = 5.0", "ae = 25.0", "above 0 to 1"),
+        ("ae = 5.0", "ae = 25.0", "above 0, at most 1"),
         ("ae = 5.0", "ap = 5.0", "unknown field"),
-        ("from = 2000.0", "from = 20000.0", "expected a range"),
+        ("from = 2000.0", "from = 20000.0", "to must be greater than from"),
         ("axis = [0.0, 0.0, 1.0]", "axis = [0.0, 0.0, 0.0]", "not all zero"),
         ("direction = \"radial\"", "direction = \"sideways\"", "use \"radial\""),
         ("stiffness = 1.5e7", "stiffness = 1.5e7\nmass = 2.0", "not both"),
@@ -296,9 +296,9 @@ fn a_wrong_tool_is_told_with_its_place() {
             .to_string()
     };
     let along = good.replace("feed = [1.0, 0.0, 0.0]", "feed = [0.0, 0.0, 1.0]");
-    assert!(fails(&along, Modelling::default()).contains("along the tool's axis"));
+    assert!(fails(&along, Modelling::default()).contains("parallel to the tool axis"));
     let bare = &good[..good.find("[[mode]]").unwrap()];
-    assert!(fails(bare, rigid()).contains("nothing yields"));
+    assert!(fails(bare, rigid()).contains("nothing is elastic"));
     let stopped = lobes(
         &robot,
         &folder.tool(&good).unwrap(),

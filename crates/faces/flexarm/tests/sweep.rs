@@ -176,7 +176,7 @@ fn shards_that_are_missing_twice_there_or_of_another_study_are_told() {
     study(&place, &other).unwrap().run(&request, &mut go_on).unwrap();
     let foreign = join(&["1", "2", "3", "other"], "c").unwrap_err();
     assert!(matches!(foreign.external(), Some(SweepError::ForeignShard { .. })), "{foreign}");
-    assert!(foreign.to_string().contains("24 runs and 21"), "{foreign}");
+    assert!(foreign.to_string().contains("the number of runs (24 and 21)"), "{foreign}");
     let into = study(&place, &text).unwrap().run(&request, &mut go_on).unwrap_err();
     assert!(matches!(into.external(), Some(SweepError::Foreign { .. })), "{into}");
     // A conflicting result.
@@ -199,7 +199,9 @@ fn a_study_whose_points_were_drawn_differently_is_not_resumed() {
     let manifest = place.join("out/study.json");
     let known: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(&manifest).unwrap()).unwrap();
     let is_drawn = |input: &serde_json::Value| input[0] == "the drawn points";
-    for (forget, said) in [(false, "the content of the drawn points"), (true, "the drawn points, which only one has")] {
+    for (forget, said) in
+        [(false, "the content of the drawn points"), (true, "the drawn points, which only one study has")]
+    {
         let mut other = known.clone();
         other["fingerprint"] = "0".into();
         let inputs = other["inputs"].as_array_mut().unwrap();
@@ -295,18 +297,18 @@ fn what_is_wrong_in_a_study_is_told_with_line_and_what_is_near() {
     fails(&parameter("path = \"payload.mass\"\nfrom = 1.0"), &["study.toml:4:", "from = ... and to = ..."]);
     fails(
         &parameter("path = \"paylod.mass\"\nvalues = [1.0]"),
-        &["study.toml:4:1", "leads nowhere", "did you mean \"payload.mass\"?"],
+        &["study.toml:4:1", "matches no entry", "did you mean \"payload.mass\"?"],
     );
-    fails(&parameter("path = \"link.lnk_2.damping.modal\"\nvalues = [0.1]"), &["leads nowhere", "link_2"]);
-    fails(&parameter("path = \"payload.mass\"\nvalues = [1.0]\ndistribution = \"normal\""), &["takes no values"]);
+    fails(&parameter("path = \"link.lnk_2.damping.modal\"\nvalues = [0.1]"), &["matches no entry", "link_2"]);
+    fails(&parameter("path = \"payload.mass\"\nvalues = [1.0]\ndistribution = \"normal\""), &["does not allow values"]);
     fails(&parameter("path = \"payload.mass\"\ndistribution = \"normal\"\nmean = 1.0\nstd = 0.1"), &["[sample]"]);
     fails(&parameter("path = \"options.stp\"\nvalues = [1.0]"), &["there is no option \"stp\"", "step"]);
-    fails(&parameter("path = \"motion.speed\"\nvalues = [0.0]"), &["a speed of 0"]);
+    fails(&parameter("path = \"motion.speed\"\nvalues = [0.0]"), &["speed 0, expected a positive number"]);
     fails(&parameter("path = \"robot\"\nvalues = [\"nothing_of_this_name\"]"), &["nothing_of_this_name"]);
     fails(&parameter("path = \"payload.mass\"\nas = \"factor\"\nvalues = [\"a\"]"), &["must be a number"]);
     fails("metrics = [\"tcp.peak\"]\n", &["study.toml:4:12", "is not in the summary", "tcp.peak_m"]);
     fails("metrics = [\"tcp.peak_m\"]\nmetric = 1\n", &["unknown field `metric`"]);
-    fails("[sample]\ncount = 4\n", &["nothing to draw"]);
+    fails("[sample]\ncount = 4\n", &["[sample] has no effect"]);
     let linked = "[[parameter]]\npath = \"payload.mass\"\nlinked = \"a\"\nvalues = [1.0, 2.0]\n\
                   [[parameter]]\npath = \"motion.speed\"\nlinked = \"a\"\nvalues = [1.0]\n";
     fails(linked, &["has 1 values and is linked to \"payload.mass\", which has 2"]);
@@ -382,7 +384,7 @@ fn a_parameter_that_follows_from_another_changes_the_mass_of_the_arm() {
     }
     let wrong = text.replace("(wall - 0.014)", "(wal - 0.014)");
     let told = study(&place, &wrong).err().unwrap().to_string();
-    assert!(told.contains("no parameter before this one") && told.contains("wall"), "{told}");
+    assert!(told.contains("not a parameter defined before this one") && told.contains("wall"), "{told}");
     std::fs::remove_dir_all(&place).unwrap();
 }
 

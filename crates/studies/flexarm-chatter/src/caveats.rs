@@ -14,7 +14,7 @@ const TOOL_DIAMETER: CaveatKind = CaveatKind::warning(
     "tool-diameter",
     "the cutter of {where} has a diameter of {value} m, the usual range ends at {yardstick} m",
     "m",
-    "check diameter and lengths of the tool's file",
+    "check diameter and lengths in the tool file",
 );
 /// Natural frequency of a tool's mode outside the usual range.
 const TOOL_FREQUENCY: CaveatKind = CaveatKind::warning(

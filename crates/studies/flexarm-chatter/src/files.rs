@@ -77,7 +77,7 @@ fn plot(answer: &Lobes, tool: &CuttingTool) -> Result<String, PlotError> {
             curves.extend(stretches(&name, CurveLook::Plain, &x, &y));
         }
     }
-    curves.extend(stretches("limit of depth", CurveLook::Total, &x, &limit));
+    curves.extend(stretches("stability limit", CurveLook::Total, &x, &limit));
     if answer.method == "floquet" {
         curves.extend(stretches("zero-order solution", CurveLook::Dashed, &x, &depths(&|p| p.zero_order_depth_m)));
     }
@@ -92,19 +92,19 @@ fn plot(answer: &Lobes, tool: &CuttingTool) -> Result<String, PlotError> {
             y: of.iter().map(|p| p.chatter_hz.unwrap_or(f64::NAN)).collect(),
         }
     };
-    let chatter = [chatter("hopf", "chatter"), chatter("flip", "chatter, period doubled")];
+    let chatter = [chatter("hopf", "chatter"), chatter("flip", "chatter (period doubling)")];
     let hz = || chatter.iter().flat_map(|c| c.y.iter().copied());
     let far_apart = hz().fold(0.0, f64::max) > WIDE * hz().fold(f64::INFINITY, f64::min);
     let panels = [
         Panel { label: "depth of cut [mm]".into(), logarithmic, legend: true, curves },
         Panel {
-            label: "chatter [Hz]".into(),
+            label: "chatter frequency [Hz]".into(),
             logarithmic: far_apart,
             legend: true,
             curves: chatter.into_iter().filter(|c| !c.x.is_empty()).collect(),
         },
     ];
-    let title = format!("{}: limits of depth of {}", answer.robot, answer.tool);
+    let title = format!("{}: stability lobes of {}", answer.robot, answer.tool);
     LinePlot {
         title: &title,
         notes: &notes(answer, tool),
@@ -147,7 +147,7 @@ fn notes(answer: &Lobes, tool: &CuttingTool) -> Vec<String> {
     );
     let n = answer.poses.len();
     let place = if n > 1 {
-        format!("the lowest limit over {n} places of the motion")
+        format!("minimum limit over {n} poses of the motion")
     } else {
         format!("at {}", answer.pose_in_words)
     };
@@ -159,23 +159,22 @@ fn html(answer: &Lobes, picture: Option<&str>) -> String {
     let _ = match (answer.stable_below_m, answer.stable_below_at_rpm) {
         (Some(depth), Some(rpm)) => writeln!(
             page,
-            "<p>Stable at every speed below <b>{} mm</b> (at {rpm:.0} 1/min); deepest at <b>{:.0} 1/min</b>: {} mm.</p>",
+            "<p>Stable at every speed below <b>{} mm</b> (limit at {rpm:.0} 1/min); \
+             maximum limit at <b>{:.0} 1/min</b>: {} mm.</p>",
             rounded_down(1e3 * depth, 3),
             answer.best_rpm,
             rounded_down(1e3 * answer.best_depth_m, 3)
         ),
-        _ => writeln!(
-            page,
-            "<p>No chatter up to {} mm at any of the speeds.</p>",
-            rounded_down(1e3 * answer.deepest_m, 2)
-        ),
+        _ => writeln!(page, "<p>No chatter up to {} mm at any speed.</p>", rounded_down(1e3 * answer.deepest_m, 2)),
     };
     for caveat in &answer.caveats {
         let _ = writeln!(page, "<p class=\"no\">{}</p>", markup(&caveat.message));
     }
     page += picture.unwrap_or_default();
-    page += "<h2>Poses</h2>\n<table><tr><th>time (s)</th><th>lowest limit (mm)</th><th>at (1/min)</th>\
-             <th>along the feed (&micro;m/N)</th><th>across</th><th>along the tool</th><th>first frequencies (Hz)</th></tr>\n";
+    page += "<h2>Poses</h2>\n<table><tr><th>time [s]</th><th>minimum limit [mm]</th>\
+             <th>spindle speed [1/min]</th><th>compliance along the feed [&micro;m/N]</th>\
+             <th>across the feed [&micro;m/N]</th><th>along the tool axis [&micro;m/N]</th>\
+             <th>first natural frequencies [Hz]</th></tr>\n";
     for pose in &answer.poses {
         let number = |x: Option<f64>, scale: f64, digits: usize| {
             x.map_or_else(|| "-".into(), |x| format!("{:.digits$}", scale * x))
@@ -191,8 +190,8 @@ fn html(answer: &Lobes, picture: Option<&str>) -> String {
             hz.join(", ")
         );
     }
-    page += "</table>\n<p>Linear about the pose, drives held: play and friction of gears, damping by the flank of the tooth at low speed and what bends \
-             in the workpiece are not in it.</p>\n</body></html>\n";
+    page += "</table>\n<p>Linearised about the pose with the drives locked. Not modelled: backlash and friction of \
+             the gears, process damping at low speed, flexibility of the workpiece.</p>\n</body></html>\n";
     page
 }
 
@@ -235,7 +234,7 @@ fn cut_plot(answer: &CutRun) -> Result<String, PlotError> {
         let (x, y) = swing(f);
         PlotCurve { name: name.into(), look: CurveLook::Axis(axis), x, y }
     };
-    let names = ["along the feed", "across", "along the tool"];
+    let names = ["along the feed", "across the feed", "along the tool axis"];
     let panel = |label: &str, legend: bool, f: &dyn Fn(usize, usize) -> f64| Panel {
         label: label.into(),
         logarithmic: false,
@@ -257,7 +256,9 @@ fn cut_plot(answer: &CutRun) -> Result<String, PlotError> {
         answer.spindle_rpm,
         1e3 * answer.depth_m
     );
-    let notes =
-        [format!("{limit}; from tooth to tooth the tip differs by {:.2e} mm at the end", 1e3 * answer.scatter_m)];
+    let notes = [format!(
+        "{limit}; standard deviation of the tip displacement between tooth periods at the end: {:.2e} mm",
+        1e3 * answer.scatter_m
+    )];
     LinePlot { title: &title, notes: &notes, x_label: "time [s]", panels: &panels, ..LinePlot::default() }.svg()
 }

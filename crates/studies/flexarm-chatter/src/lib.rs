@@ -174,7 +174,14 @@ pub struct LobesFiles {
 #[non_exhaustive]
 pub enum LobesError {
     /// Error of the structure or the cut.
-    #[error("{place}: {source}{}", if matches!(source, ChatterError::Undamped { .. }) { "; give the links and drives of the robot damping" } else { "" })]
+    #[error(
+        "{place}: {source}{}",
+        if matches!(source, ChatterError::Undamped { .. }) {
+            "; add damping to the links and drives of the robot"
+        } else {
+            ""
+        }
+    )]
     Chatter {
         /// Description of the pose.
         place: String,
@@ -183,19 +190,18 @@ pub enum LobesError {
     },
     /// Neither the arm nor the tool is flexible.
     #[error(
-        "nothing yields: the robot has no flexible link and no elastic drive, and the tool no mode and no measured response"
+        "nothing is elastic: the robot has no flexible link and no elastic drive, and the tool has no mode and no \
+         measured response"
     )]
     NothingYields,
     /// The feed is parallel to the tool's axis.
-    #[error("the feed is along the tool's axis: give the tool a feed across its axis (feed = [...] in [tool])")]
+    #[error("the feed is parallel to the tool axis: set a feed direction across the axis (feed = [...] in [tool])")]
     FeedAlongAxis,
     /// The feed is unknown.
-    #[error(
-        "the motion never moves the tool across its axis: there is no feed; give the tool one (feed = [...] in [tool])"
-    )]
+    #[error("the motion never moves the tool across its axis: set the feed direction (feed = [...] in [tool])")]
     NoFeed,
     /// Too few poses along the motion.
-    #[error("{found} places along the motion: expected {least} or more")]
+    #[error("{found} poses along the motion: expected at least {least}")]
     Places {
         /// Requested number.
         found: usize,
@@ -204,17 +210,20 @@ pub enum LobesError {
     },
     /// The method needs modes, but the tool has a measured response.
     #[error(
-        "the tool has a measured response, which tells modes only when one is fitted: the limits are those of the zero-order solution; ranges and runs need [[mode]] entries"
+        "the tool has a measured response and no modes: only the limits of the zero-order solution are available; \
+         unstable ranges and simulations need [[mode]] entries"
     )]
     MeasuredTool,
     /// The maximum depth is not a positive number.
-    #[error("the deepest cut is {found} m, expected a positive number")]
+    #[error("the maximum depth of cut is {found} m, expected a positive number")]
     Deepest {
         /// Value found (m).
         found: f64,
     },
     /// The simulation would take too many steps.
-    #[error("the run would take {steps} steps, at most {most}: ask for a shorter one, or fewer steps per tooth")]
+    #[error(
+        "the simulation needs {steps} steps, the maximum is {most}: use a shorter duration or fewer steps per tooth"
+    )]
     Long {
         /// Number of steps.
         steps: usize,
@@ -292,7 +301,8 @@ pub fn lobes(
     answer.caveats = caveat::once_each(std::mem::take(&mut answer.caveats));
     answer.caveats.extend(caveats::tool_caveats(tool));
     if tool.measured.is_some() && !request.zero_order {
-        let message = "the tool has a measured response: the limits are those of the zero-order solution, which does not see period doubling";
+        let message = "the tool has a measured response: the limits are those of the zero-order solution, which does \
+                       not include period doubling";
         answer.caveats.push(Caveat::said(
             "zero-order",
             "tool",
@@ -357,7 +367,7 @@ fn check_deepest(depth_m: f64) -> Result<(), Error> {
     if !(depth_m.is_finite() && depth_m > 0.0) {
         return Err(LobesError::Deepest { found: depth_m }.into());
     }
-    Quantity::LENGTH.check("the deepest cut", depth_m).map_err(ValueError::from)?;
+    Quantity::LENGTH.check("the maximum depth of cut", depth_m).map_err(ValueError::from)?;
     Ok(())
 }
 

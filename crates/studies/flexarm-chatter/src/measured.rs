@@ -40,18 +40,20 @@ impl MeasuredResponse {
         }
         let hz = table.column("frequency_hz").ok_or_else(|| fail("there is no column frequency_hz".into()))?;
         if table.column("xx_re").is_none() && table.column("yy_re").is_none() {
-            return Err(fail("there is neither a column xx_re nor yy_re (m/N): across the tool one is needed".into()));
+            return Err(fail(
+                "there is neither a column xx_re nor yy_re (m/N): a response across the tool axis is needed".into(),
+            ));
         }
         for (k, row) in table.rows.iter().enumerate() {
             if let Some(column) = row.iter().position(|x| !x.is_finite()) {
                 let line = table.lines[k];
-                return Err(fail(format!("line {line}: column {:?} has no finite number", table.names[column])));
+                return Err(fail(format!("line {line}: column {:?} is not a finite number", table.names[column])));
             }
         }
         let omega: Vec<f64> = table.rows.iter().map(|row| TAU * row[hz]).collect();
         let ascending = omega.windows(2).all(|pair| pair[0] < pair[1]);
         if omega.len() < 3 || !ascending || omega[0] <= 0.0 {
-            return Err(fail("expected three or more frequencies, above 0 and ascending".into()));
+            return Err(fail("expected at least three frequencies, positive and ascending".into()));
         }
         let mut values = vec![Matrix3::zeros(); omega.len()];
         for (entry, i, j) in ENTRIES {

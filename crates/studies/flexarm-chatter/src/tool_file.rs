@@ -322,7 +322,8 @@ impl Reader<'_> {
         // and below 1e10 N/m² for hard alloys.
         if !(1e6..1e11).contains(&coefficients.tangential) {
             let message = format!(
-                "the tangential coefficient is {:.3e} N/m2; materials have 1e7 to 1e10: is the unit right (pressures = \"N/mm2\")?",
+                "the tangential coefficient is {:.3e} N/m2; usual values are 1e7 to 1e10: is the unit right \
+                 (pressures = \"N/mm2\")?",
                 coefficients.tangential
             );
             return Err(self.error(e.coefficients.span(), message));
@@ -335,7 +336,7 @@ impl Reader<'_> {
         let kind = e.kind.get_ref().as_str();
         let stray =
             |names: &[(&str, Option<Range<usize>>)]| match names.iter().find_map(|(n, s)| Some((*n, s.clone()?))) {
-                Some((name, span)) => Err(self.error(span, format!("kind = {kind:?} takes no {name}"))),
+                Some((name, span)) => Err(self.error(span, format!("kind = {kind:?} does not allow {name}"))),
                 None => Ok(()),
             };
         let (ae, immersion) = (e.ae.as_ref().map(Spanned::span), e.immersion.as_ref().map(Spanned::span));
@@ -374,7 +375,7 @@ impl Reader<'_> {
         if part.is_finite() && part > 0.0 && part <= 1.0 {
             return Ok(part);
         }
-        Err(self.error(span, format!("the radial depth is {part:.4} diameters, expected above 0 to 1")))
+        Err(self.error(span, format!("the radial depth is {part:.4} diameters, expected above 0, at most 1")))
     }
 
     fn angles(&self, e: &EngagementEntry, place: Range<usize>) -> Result<Engagement, Error> {
@@ -386,7 +387,8 @@ impl Reader<'_> {
         let sound = (0.0..turn).contains(&entry) && exit > entry && exit <= entry + turn * (1.0 + 1e-9);
         if !sound {
             let message = format!(
-                "the teeth cut from {:.2} to {:.2} degrees, expected an entry of 0 to below 360 and an exit above it by at most 360",
+                "the teeth cut from {:.2} to {:.2} degrees: expected an entry from 0 to below 360, and an exit above \
+                 the entry by at most 360",
                 entry.to_degrees(),
                 exit.to_degrees()
             );
@@ -412,7 +414,8 @@ impl Reader<'_> {
                 let (low, high) = (speed("from", from)?, speed("to", to)?);
                 let points = e.points.as_ref().map_or(POINTS, |points| *points.get_ref());
                 if high <= low {
-                    return Err(self.error(to.span(), format!("speeds from {low} to {high} 1/min: expected a range")));
+                    return Err(self
+                        .error(to.span(), format!("speeds from {low} to {high} 1/min: to must be greater than from")));
                 }
                 if !(2..=MOST_POINTS).contains(&points) {
                     let span = e.points.as_ref().map_or(entry.span(), Spanned::span);
@@ -420,10 +423,10 @@ impl Reader<'_> {
                 }
                 Ok((0..points).map(|k| low + (high - low) * k as f64 / (points - 1) as f64).collect())
             }
-            _ => {
-                Err(self
-                    .error(entry.span(), "the speeds are a list rpm = [...], or from = ..., to = ..., points = ..."))
-            }
+            _ => Err(self.error(
+                entry.span(),
+                "give the speeds as a list rpm = [...], or as from = ..., to = ..., points = ...",
+            )),
         }
     }
 
@@ -447,7 +450,7 @@ impl Reader<'_> {
                 Ok(Some(if world { Direction::World(direction) } else { Direction::Tcp(direction) }))
             }
             (None, Some(axes)) => {
-                Err(self.error(axes.span(), format!("{its_axes} tells nothing without {what} = [...]")))
+                Err(self.error(axes.span(), format!("{its_axes} has no effect without {what} = [...]")))
             }
             (None, None) => Ok(None),
         }
@@ -481,7 +484,9 @@ impl Reader<'_> {
                 self.told(entry.span(), Quantity::MASS.check("the mass of the mode", stiffness / (omega * omega)))?
             }
             (Some(_), Some(both)) => {
-                return Err(self.error(both.span(), "give mass or stiffness, not both: the frequency tells the other"));
+                return Err(
+                    self.error(both.span(), "give mass or stiffness, not both: the other follows from the frequency")
+                );
             }
             (None, None) => {
                 return Err(self.error(entry.span(), "a mode needs mass = ... (kg) or stiffness = ... (N/m)"));

@@ -236,20 +236,21 @@ fn described(input: &MeasurementInput, found: &Identified) -> Vec<String> {
         let said = deviation(&|kind| match kind {
             ReadingKind::InstrumentAt { instrument, std, std_rotation, .. } if *instrument == k => {
                 let place = std.map(|std| format!("{:.3} mm and ", 1e3 * std)).unwrap_or_default();
-                Some(format!(", known to {place}{:.3} mrad", 1e3 * std_rotation))
+                Some(format!(", prior standard deviation {place}{:.3} mrad", 1e3 * std_rotation))
             }
             _ => None,
         });
         match &input.measurements.instruments[k] {
             Instrument::Axes(_) => {
-                format!(
-                    "Instrument {name}: its axes are found to be turned by {turn} degrees (roll, pitch, yaw){said}."
-                )
+                format!("Instrument {name}: orientation {turn} degrees (roll, pitch, yaw; found){said}.")
             }
             given => {
                 let how = if matches!(given, Instrument::Known(_)) { "given" } else { "found" };
                 let at = millimetres(&X_WI.translation.vector);
-                format!("Instrument {name}: stands at {at} in the world, turned by {turn} degrees ({how}){said}.")
+                format!(
+                    "Instrument {name}: position {at} in the world, orientation {turn} degrees (roll, pitch, yaw; \
+                     {how}){said}."
+                )
             }
         }
     });
@@ -257,11 +258,11 @@ fn described(input: &MeasurementInput, found: &Identified) -> Vec<String> {
         let how = if matches!(input.measurements.targets[k], Target::Known(_)) { "given" } else { "found" };
         let said = deviation(&|kind| match kind {
             ReadingKind::TargetAt { target, std, .. } if *target == k => {
-                Some(format!(", known to {:.3} mm", 1e3 * std))
+                Some(format!(", prior standard deviation {:.3} mm", 1e3 * std))
             }
             _ => None,
         });
-        format!("Target {name}: at {} from the TCP in its axes ({how}){said}.", millimetres(&found.targets[k]))
+        format!("Target {name}: position {} in TCP axes ({how}){said}.", millimetres(&found.targets[k]))
     });
     instruments.chain(targets).collect()
 }

@@ -22,7 +22,8 @@ pub(super) fn chosen(arm: &Arm, input: &MeasurementInput, fit: &[String]) -> Res
     if all.is_empty() {
         return Err(IdentifyFileError::NothingGives.into());
     }
-    let unknown = |pattern: &str| format!("no parameter of this robot is called {pattern:?}; they are {:?}", names());
+    let unknown =
+        |pattern: &str| format!("no parameter of this robot matches {pattern:?}; its parameters are {:?}", names());
     let placed = |place: &RobotFileError, text: String| Error::from(RobotFileError { message: text, ..place.clone() });
     for (pattern, place) in input.fit.iter().chain(&input.keep) {
         if !all.iter().any(|c| parameters::fits(pattern, &c.parameter.name)) {
@@ -55,11 +56,15 @@ pub(super) fn chosen(arm: &Arm, input: &MeasurementInput, fit: &[String]) -> Res
     }
     for (name, uncertainty, place) in &input.known {
         let Some(candidate) = chosen.iter_mut().find(|c| c.parameter.name == *name) else {
-            return Err(placed(place, format!("{name:?} is not fitted; fitted are {:?}", names())));
+            return Err(placed(
+                place,
+                format!("{name:?} is not fitted; the parameters of this robot are {:?}", names()),
+            ));
         };
         let logarithmic = candidate.parameter.is_logarithmic();
         if logarithmic && *uncertainty <= 1.0 {
-            let text = "of a stiffness or a damping the uncertainty is a factor above 1: 1.5 for half as much again either way";
+            let text = "the uncertainty of a stiffness or damping is a factor above 1: 1.5 means up to 1.5 times \
+                        larger or smaller";
             return Err(placed(place, text.into()));
         }
         let unit = match candidate.parameter.unit.as_str() {

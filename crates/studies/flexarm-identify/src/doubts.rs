@@ -13,18 +13,19 @@ use flexarm_run::caveat::CaveatKind;
 /// Measured displacements differ in magnitude from those of the robot.
 const LOAD_UNIT: CaveatKind = CaveatKind::warning(
     "load-unit",
-    "displacements under {where} are {value} times those of the robot as it is, beyond {yardstick} times either way: loads or the first \
-     guess of the stiffnesses are wrong",
+    "measured displacements under {where} are {value} times the predicted ones, a difference by more than a factor of \
+     {yardstick}: loads or initial stiffnesses are wrong",
     "",
     "force is in the file's unit of force, mass in kg: a weight of 100 kg is mass = 100, or a force of 981 N",
 );
 /// The residual of an encoder exceeds its noise.
 const ENCODER_RESIDUAL: CaveatKind = CaveatKind::warning(
     "encoder-rest",
-    "{where}: {value} rad (or m) of the deflection do not follow from the torque, the instruments' noise is {yardstick}: the stiffness \
-     may be off by more than its deviation",
+    "{where}: {value} rad (or m) of the deflection are not explained by the torque, the noise of the encoders is \
+     {yardstick}: the error of the stiffness may exceed its standard deviation",
     "rad",
-    "give the measured torque, lower `below`, or look at friction, masses, errors of the transmission and neighbouring links that bend",
+    "give the measured torque, lower `below`, or check friction, masses, transmission errors and flexible \
+     neighbouring links",
 );
 
 /// Ratio of measured to predicted displacements above which an initial stiffness is not a plausible
@@ -43,40 +44,40 @@ pub(super) fn caveats(found: &Identified) -> Vec<Caveat> {
     let mut caveats = Vec::new();
     if let Some(factor) = found.misfit {
         let results = match found.parameters.iter().all(|p| p.std.is_nan()) {
-            true => "the fit does not meet the readings, and its results have no deviations",
-            false => "the deviations of the results are enlarged by that",
+            true => "the fit does not reproduce the readings, and its results have no standard deviations",
+            false => "the standard deviations of the results are scaled by this factor",
         };
         let text = format!(
-            "the readings scatter {factor:.1} times as much as their deviations say: the model lacks something that gives way, \
-             loads or frames are wrong, or the deviations are too small; {results}"
+            "the residuals are {factor:.1} times as large as the standard deviations of the readings: the model lacks \
+             a flexible part, loads or frames are wrong, or the standard deviations are too small; {results}"
         );
         caveats.push(Caveat::said(
             "misfit",
             "measurements",
             text,
-            "free more parameters, look at the largest residuals",
+            "fit more parameters, and check the largest residuals",
         ));
     }
     for parameter in found.parameters.iter().filter(|p| !p.identifiable) {
-        let text = format!("{} does not follow from these readings: it stays where it was", parameter.name);
+        let text = format!("these readings do not determine {}: it keeps its initial value", parameter.name);
         caveats.push(Caveat::said(
             "not-identifiable",
             "measurements",
             text,
-            "measure where it counts: a plan says where",
+            "add readings at the poses of a measurement plan",
         ));
     }
     if let Some(held) = found.held_out.as_ref().filter(|held| held.rms > held.rms_initial) {
         let text = format!(
-            "readings that the fit had not seen are met worse than with the robot file as it is ({:.2} against {:.2} deviations): \
-             there are too many parameters for these readings",
+            "the fit predicts held-out readings worse than the unchanged robot file ({:.2} against {:.2} standard \
+             deviations): there are too many parameters for these readings",
             held.rms, held.rms_initial
         );
         caveats.push(Caveat::said("over-fitted", "measurements", text, "fit fewer parameters or measure more poses"));
     }
     if !found.solution.converged && found.misfit.is_none() {
-        let text = "the search did not settle: take the values with care";
-        caveats.push(Caveat::said("not-converged", "measurements", text, "a better first guess helps"));
+        let text = "the fit did not converge: its values may be inaccurate";
+        caveats.push(Caveat::said("not-converged", "measurements", text, "use better initial values"));
     }
     caveats
 }
@@ -89,10 +90,10 @@ pub(super) fn gear_caveat(robot: &Robot) -> Option<Caveat> {
     let joints: Vec<&str> = robot.drives.iter().filter(has).map(|drive| drive.joint.as_str()).collect();
     (!joints.is_empty()).then(|| {
         let text = format!(
-            "hysteresis and transmission errors of {} are not in the fit: gears are springs there",
+            "the fit ignores hysteresis and transmission errors of {}: it models gears as springs",
             joints.join(", ")
         );
-        Caveat::said("gear-laws", "measurements", text, "load from the same side every time").as_note()
+        Caveat::said("gear-laws", "measurements", text, "apply every load from the same side").as_note()
     })
 }
 
@@ -158,10 +159,10 @@ pub(super) fn frame_caveat(answer: &Identification) -> Option<Caveat> {
     let left = rms(metres.iter().map(|k| answer.compared[*k].after - answer.compared[*k].measured));
     (left > FRAME_RATIO * spread).then(|| {
         let text = format!(
-            "the places are {:.1} mm (RMS) from those of the robot wherever the instrument stands: joint values, their order, senses or \
-             units, or the targets are not those of this robot",
+            "the places differ by {:.1} mm (RMS) from those of the robot for every pose of the instrument: joint \
+             values, their order, signs or units, or the targets are not those of this robot",
             1e3 * left
         );
-        Caveat::said("frames", "measurements", text, "compare one pose by hand with what the robot model says (inspect)")
+        Caveat::said("frames", "measurements", text, "compare one pose by hand with the robot model (inspect)")
     })
 }

@@ -114,12 +114,12 @@ pub(super) fn told(arm: &Arm, input: &MeasurementInput, chosen: &[Candidate]) ->
             continue;
         }
         let Some(parameter) = gearbox_of(chosen, joint) else {
-            let text = format!("joint {joint:?} has an encoder, but no gearbox with one stiffness that is to be found");
+            let text = format!("joint {joint:?} has an encoder, but no gearbox with a single stiffness to fit");
             return Err(RobotFileError { message: text, ..first.place.clone() }.into());
         };
         let Some(gear) = gear_stiffness(&own) else {
             let text =
-                format!("joint {joint:?}: the recordings are too short (2 s at least), or its torque does not change");
+                format!("joint {joint:?}: the recordings are too short (minimum 2 s), or its torque does not change");
             return Err(RobotFileError { message: text, ..first.place.clone() }.into());
         };
         found.push(EncoderFigures::of(joint, gear, parameter, noise(&runs, k), &steps(&runs, k)));
@@ -175,7 +175,7 @@ fn told_of_coupled(
     if let Some(k) = seen.iter().find(|k| !runs.iter().all(|r| has(r, **k))) {
         let joint = &coupling.joints[*k];
         return Err(format!(
-            "joint {joint:?} has coupled gears and an encoder in some recordings only: give it in all of them"
+            "joint {joint:?} has coupled gears, and only some recordings contain its encoder: give it in all of them"
         ));
     }
     let shown = |motor: &usize| seen.iter().any(|i| coupling.C[(*i, *motor)] != 0.0);
@@ -185,7 +185,7 @@ fn told_of_coupled(
         .collect();
     if unknown.is_empty() {
         let names: Vec<&String> = seen.iter().map(|k| &coupling.joints[*k]).collect();
-        return Err(format!("joints {names:?} have encoders, but none of the gearboxes that they show is to be found"));
+        return Err(format!("joints {names:?} have encoders, but none of the gearboxes that they measure is fitted"));
     }
     let is_unknown = |motor: usize| unknown.iter().any(|(own, _)| *own == motor);
     let outputs = |run: &Smooth<'_>| -> Option<Vec<CoupledOutput>> {
@@ -220,8 +220,8 @@ fn told_of_coupled(
     let names = || unknown.iter().map(|(motor, _)| &coupling.joints[*motor]).collect::<Vec<_>>();
     let gears = coupled_gear_stiffness(&all_runs).ok_or_else(|| {
         format!(
-            "the recordings do not tell the coupled gears of {:?} apart: too short (2 s at least), torques that do not change or go together; \
-             record more encoders, or keep some of these stiffnesses",
+            "the recordings do not separate the coupled gears of {:?}: they are too short (minimum 2 s), or the \
+             torques are constant or proportional; record more encoders, or keep some of these stiffnesses",
             names()
         )
     })?;
@@ -266,8 +266,8 @@ impl<'a> Smooth<'a> {
         let edge = (edge_s / step_s).round() as usize;
         if below_hz <= 0.0 || below_hz >= 0.4 / step_s || n < 2 * edge + 3 {
             let text = format!(
-                "{n} samples of {step_s} s: below = {below_hz} Hz must lie under two fifths of the sampling rate, and something must be \
-                 left between the edges of {edge_s} s"
+                "{n} samples of {step_s} s: below = {below_hz} Hz must be less than 0.4 times the sampling rate, and \
+                 the recording must be longer than two edges of {edge_s} s"
             );
             return Err(RobotFileError { message: text, ..recording.place.clone() }.into());
         }

@@ -12,8 +12,8 @@ use flexarm_run::Error;
 pub enum IdentifyFileError {
     /// The robot is rigid.
     #[error(
-        "the robot has no flexible link and no elastic drive: there is no stiffness to find; add [[flexible_link]] or [[drive]] \
-         entries with a first guess"
+        "the robot has no flexible link and no elastic drive: there is no stiffness to identify; add \
+         [[flexible_link]] or [[drive]] entries with initial values"
     )]
     NothingGives,
     /// Unknown name of a parameter.
@@ -23,7 +23,7 @@ pub enum IdentifyFileError {
         text: String,
     },
     /// An entry of a matrix and a factor on the same matrix.
-    #[error("{entry} and {factor} say the same twice: fit one of them and keep the other")]
+    #[error("{entry} and {factor} describe the same stiffness: fit one of them and keep the other")]
     Twice {
         /// Name of the entry.
         entry: String,
@@ -31,7 +31,10 @@ pub enum IdentifyFileError {
         factor: String,
     },
     /// The tool is not that of the robot file.
-    #[error("{name} is that of the robot file, and link {link:?} was chosen in its place at loading: leave that out")]
+    #[error(
+        "{name} describes the tool of the robot file, but link {link:?} was chosen as the TCP at loading: do not \
+         choose it"
+    )]
     OtherTool {
         /// Name of the parameter.
         name: String,
@@ -40,8 +43,8 @@ pub enum IdentifyFileError {
     },
     /// A node is on a tool whose pose is unknown.
     #[error(
-        "{reading} is seen or hit at a node on the tool, which {name} would move: give the node the link on which the sensor sits, and its \
-         place there"
+        "{reading} is measured or excited at a node on the tool, which {name} would move: define the node on the link \
+         that carries the sensor, with its position there"
     )]
     ToolNode {
         /// Name of the parameter.
@@ -50,15 +53,15 @@ pub enum IdentifyFileError {
         reading: String,
     },
     /// All parameters are kept.
-    #[error("nothing is left to fit: of {known:?} all are kept")]
+    #[error("there is no parameter to fit: all of {known:?} are kept")]
     NothingFitted {
         /// Names of the parameters.
         known: Vec<String>,
     },
     /// Displacements or distances differ from the model by orders of magnitude.
     #[error(
-        "the measured {what} are {ratio:.3e} times as large as those of the robot as it is: no robot is that far from its description. \
-         The file says length = {length:?}; {help}"
+        "the measured {what} are {ratio:.3e} times as large as those of the robot model, which is implausible. The \
+         file has length = {length:?}; {help}"
     )]
     Units {
         /// Quantity: displacements, or distances between positions.
@@ -72,7 +75,8 @@ pub enum IdentifyFileError {
     },
     /// A measured point does not move.
     #[error(
-        "{reading}: the arm as it is does not move there along that direction, or cannot be hit so: look at nodes, their links and directions"
+        "{reading}: in the model the arm does not move there in that direction, or cannot be excited so: check nodes, \
+         their links and directions"
     )]
     Still {
         /// Name of the reading.
@@ -80,8 +84,9 @@ pub enum IdentifyFileError {
     },
     /// A response differs from the model by orders of magnitude.
     #[error(
-        "{reading}: the measured response is {ratio:.3e} times as large as that of the robot as it is: no robot is that far from its \
-         description; look at unit, at what was measured (displacement, velocity, acceleration), at nodes and directions"
+        "{reading}: the measured response is {ratio:.3e} times as large as that of the robot model, which is \
+         implausible; check the unit, the measured quantity (displacement, velocity, acceleration), nodes and \
+         directions"
     )]
     ResponseUnits {
         /// Name of the reading.
@@ -90,7 +95,7 @@ pub enum IdentifyFileError {
         ratio: f64,
     },
     /// The model does not have a measured mode.
-    #[error("{reading}: mode {mode} is asked for, the model has {modes} modes")]
+    #[error("{reading}: mode {mode} does not exist, the model has {modes} modes")]
     NoMode {
         /// Name of the reading.
         reading: String,
@@ -100,15 +105,15 @@ pub enum IdentifyFileError {
         modes: usize,
     },
     /// The recordings do not determine the stiffness of any gear.
-    #[error("the recordings of {joints:?} tell no stiffness: deflection and torque do not go together")]
+    #[error("the recordings of {joints:?} do not determine a stiffness: deflection and torque are not correlated")]
     NoGear {
         /// Names of the joints.
         joints: Vec<String>,
     },
     /// The joint values are in another order.
     #[error(
-        "the readings do not fit the robot's joints in their order {joints:?} ({:.0} % of them is left without a cause), but they do if the \
-         values are those of {likely:?} ({:.0} %): is the order of `joints`, or are the names of the columns, another one?",
+        "the readings do not fit the robot with the joint order {joints:?} (residual {:.0} %), but they do with the \
+         order {likely:?} (residual {:.0} %): check the order of `joints`, or the names of the columns",
         100.0 * rest, 100.0 * mended
     )]
     JointOrder {
@@ -123,9 +128,10 @@ pub enum IdentifyFileError {
     },
     /// The displacements are in other axes.
     #[error(
-        "the displacements do not fit the robot in world axes ({:.0} % of them is left without a cause), but they do in axes that are \
-         turned by rpy = [{:.1}, {:.1}, {:.1}] degrees ({:.0} %): are they in the axes of the instrument? Then add an instrument, \
-         [instrument.NAME], and instrument = \"NAME\" to [[displacement]]: with rpy as it stands, or without, and its axes are found",
+        "the displacements do not fit the robot in world axes (residual {:.0} %), but they do in axes that are turned \
+         by rpy = [{:.1}, {:.1}, {:.1}] degrees (residual {:.0} %): are they in the axes of the instrument? Then add \
+         an instrument, [instrument.NAME], and instrument = \"NAME\" to [[displacement]]: with this rpy, or without \
+         rpy to fit it",
         100.0 * rest, rpy_deg[0], rpy_deg[1], rpy_deg[2], 100.0 * mended
     )]
     Axes {
@@ -173,8 +179,14 @@ pub(super) fn of_names(input: &MeasurementInput) -> impl Fn(IdentifyError) -> Er
         let text = error.to_string();
         let named = input.instruments.iter().enumerate().fold(text, |text, (k, name)| {
             text.replace(&format!("instrument {k}:"), &format!("instrument {name:?}:"))
-                .replace(&format!("where instrument {k} stands"), &format!("where instrument {name:?} stands"))
-                .replace(&format!("how instrument {k} is turned"), &format!("how instrument {name:?} is turned"))
+                .replace(
+                    &format!("the pose of instrument {k} in the world"),
+                    &format!("the pose of instrument {name:?} in the world"),
+                )
+                .replace(
+                    &format!("the orientation of instrument {k} in the world"),
+                    &format!("the orientation of instrument {name:?} in the world"),
+                )
         });
         IdentifyFileError::Fit(named).into()
     }

@@ -54,8 +54,8 @@ fn readable(unit: &str) -> (&'static str, f64) {
         "m" => ("mm", 1e3),
         "rad" => ("mrad", 1e3),
         "Hz" => ("Hz", 1.0),
-        "ln" => ("of the logarithm", 1.0),
-        "1" => ("parts of the shape", 1.0),
+        "ln" => ("log units", 1.0),
+        "1" => ("relative to the shape", 1.0),
         "m/N" => ("mm/kN", 1e6),
         "m/(s N)" => ("m/(s N)", 1.0),
         "m/(s2 N)" => ("m/(s² N)", 1.0),
@@ -71,7 +71,7 @@ fn headline(answer: &Identification) -> String {
         factor * answer.residual.after
     );
     if let Some(held) = &answer.held_out {
-        let _ = write!(out, "; of readings that the fit had not seen {:.4} {unit}", factor * held.rms);
+        let _ = write!(out, "; of held-out readings {:.4} {unit}", factor * held.rms);
     }
     out + ".</p>\n"
 }
@@ -83,7 +83,7 @@ fn parameters(answer: &Identification) -> String {
     for p in &answer.parameters {
         let (class, value) = match p.identifiable {
             true => ("", number(p.value)),
-            false => (" class=\"no\"", "not told: as before".to_owned()),
+            false => (" class=\"no\"", "not identifiable: initial value".to_owned()),
         };
         let _ = writeln!(
             out,
@@ -98,7 +98,7 @@ fn parameters(answer: &Identification) -> String {
     out += "</table>\n";
     for combination in &answer.untold {
         let parts: Vec<String> = combination.iter().map(|w| format!("{:+.2} {}", w.weight, markup(&w.name))).collect();
-        let _ = writeln!(out, "<p class=\"note\">Not told by the readings: {}</p>", parts.join(" "));
+        let _ = writeln!(out, "<p class=\"note\">Not determined by the readings: {}</p>", parts.join(" "));
     }
     out
 }
@@ -108,7 +108,8 @@ fn suspicious(answer: &Identification) -> String {
         return String::new();
     }
     let mut out = String::from(
-        "<h2>Readings that argue against the rest</h2>\n<table><tr><th>reading</th><th>measured</th><th>expected</th><th>in deviations</th></tr>\n",
+        "<h2>Suspected outliers</h2>\n<table><tr><th>reading</th><th>measured</th><th>expected</th>\
+         <th>residual [standard deviations]</th></tr>\n",
     );
     for s in &answer.suspicious {
         let _ = writeln!(
@@ -134,8 +135,8 @@ fn residuals(kind: &str, unit: &str, of: &[&Compared]) -> String {
         y: of.iter().map(|c| factor * (c.measured - value(c))).collect(),
     };
     let curves = vec![curve("before", |c| c.before), curve("after", |c| c.after)];
-    let panel = Panel { label: format!("residual ({name})"), logarithmic: false, legend: true, curves };
-    picture(&format!("Residuals of {kind} ({name})"), "number", &[panel])
+    let panel = Panel { label: format!("residual [{name}]"), logarithmic: false, legend: true, curves };
+    picture(&format!("Residuals of {kind} [{name}]"), "number", &[panel])
 }
 
 /// Plots the magnitude of a frequency response: measured, and of the model before and after.
@@ -144,9 +145,9 @@ fn response_plot(response: &ResponseCurves) -> String {
     let curves = ["measured", "model before", "model after"].into_iter().zip(looks).zip(&response.magnitude);
     let curves =
         curves.map(|((name, look), y)| PlotCurve { name: name.into(), look, x: response.hz.clone(), y: y.clone() });
-    let label = format!("magnitude ({})", response.unit);
+    let label = format!("magnitude [{}]", response.unit);
     let panel = Panel { label, logarithmic: true, legend: true, curves: curves.collect() };
-    picture(&format!("Response: {}", response.name), "frequency (Hz)", &[panel])
+    picture(&format!("Response: {}", response.name), "frequency [Hz]", &[panel])
 }
 
 /// Plots the deflection of a gear over time: measured, and predicted from its torque.
@@ -159,14 +160,12 @@ fn encoder_plot(gear: &EncoderFigures) -> String {
             x: (0..y.len()).step_by(every).map(|k| step_s * k as f64).collect(),
             y: y.iter().step_by(every).map(|y| 1e3 * y).collect(),
         };
-        let curves = vec![
-            curve("measured", CurveLook::Dots, measured),
-            curve("torque over stiffness", CurveLook::Plain, expected),
-        ];
-        Panel { label: format!("run {} (1e-3 rad, m)", number + 1), logarithmic: false, legend: number == 0, curves }
+        let curves =
+            vec![curve("measured", CurveLook::Dots, measured), curve("torque / stiffness", CurveLook::Plain, expected)];
+        Panel { label: format!("run {} [1e-3 rad, m]", number + 1), logarithmic: false, legend: number == 0, curves }
     };
     let panels: Vec<Panel> = gear.curves.iter().zip(&gear.steps_s).enumerate().map(panel).collect();
-    picture(&format!("Deflection of the gear of {}", gear.joint), "time (s)", &panels)
+    picture(&format!("Deflection of the gear of {}", gear.joint), "time [s]", &panels)
 }
 
 /// Returns a heading with its plot; nothing if there are no finite values.

@@ -164,7 +164,7 @@ impl PlanRequest {
     /// Returns the reason why the request is invalid, as a sentence.
     fn fault(&self) -> Option<String> {
         if self.count == 0 || self.forces.is_empty() || !(self.std_m > 0.0 && self.std_m.is_finite()) {
-            return Some("a plan needs at least one reading, one force and a positive deviation".into());
+            return Some("a plan needs at least one reading, one force and a positive standard deviation".into());
         }
         for (what, rows) in
             [("force", &self.forces), ("lever", &self.levers), ("point", &self.points), ("direction", &self.directions)]
@@ -174,12 +174,10 @@ impl PlanRequest {
             }
         }
         if let Some(force) = self.forces.iter().find(|force| Vector3::from(**force).norm() < 1e-9) {
-            return Some(format!(
-                "the force {force:?} is zero: nothing moves under it; give some of its numbers a size (N)"
-            ));
+            return Some(format!("the force {force:?} is zero and causes no displacement: give a nonzero force (N)"));
         }
         let none = self.directions.iter().find(|d| Vector3::from(**d).norm() < 1e-9);
-        none.map(|d| format!("the direction {d:?} of a gauge has no length"))
+        none.map(|d| format!("the direction {d:?} of a gauge has zero length"))
     }
 }
 
@@ -390,7 +388,7 @@ fn job(answer: &MeasurementPlan, request: &PlanRequest) -> String {
     let lever = if request.levers.is_empty() { "" } else { ", which acts at ax, ay, az (mm, tool axes)" };
     format!(
         "# Measurements of {}: {} readings, planned by flexarm identify.\n\
-         # Fill in {read} of displacements.csv (mm, {how}): how far {what} moves from no load to the force{lever}.\n\
+         # Fill in {read} of displacements.csv (mm, {how}): displacement of {what} from no load to the force{lever}.\n\
          # Then: flexarm identify ROBOT measurements.toml\n\
          format = 1\nlength = \"mm\"\nangle = \"deg\"\n{fit}\n[[displacement]]\nfile = \"displacements.csv\"\nstd = {}\n",
         answer.robot,

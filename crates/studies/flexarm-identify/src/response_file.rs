@@ -151,8 +151,10 @@ impl Reader<'_> {
             let kept = self.kept(&curve, e)?;
             let columns = kept.iter().all(|(.., std)| std.is_some());
             if e.std.is_some() && columns {
-                return Err(self
-                    .error(span.clone(), format!("{}: std stands in the table and here: leave one out", curve.name)));
+                return Err(self.error(
+                    span.clone(),
+                    format!("{}: std is given both in the table and here: remove one of them", curve.name),
+                ));
             }
             let point = |(hz, value, std): &Point| {
                 let std = std.unwrap_or(own);
@@ -183,11 +185,11 @@ impl Reader<'_> {
         match kept.len() {
             0 => Err(self.error(
                 e.file.span(),
-                format!("{}: no value from {from} to {to} Hz is above zero: look at from and to", curve.name),
+                format!("{}: no nonzero value from {from} to {to} Hz: check from and to", curve.name),
             )),
             n if n > MOST_POINTS => Err(self.error(
                 e.file.span(),
-                format!("{}: {n} frequencies, at most {MOST_POINTS} are taken: use from, to and every", curve.name),
+                format!("{}: {n} frequencies, the maximum is {MOST_POINTS}: use from, to and every", curve.name),
             )),
             _ => Ok(kept),
         }
@@ -220,9 +222,10 @@ impl Reader<'_> {
             _ => return Err(fail("expected the columns re and im, or magnitude and phase".into())),
         };
         let Some(unit) = &e.unit else {
-            return Err(
-                self.error(e.file.span(), "a table needs unit = \"m/s2/N\" or another: what was measured per force")
-            );
+            return Err(self.error(
+                e.file.span(),
+                "a table needs the unit of the measured quantity per force, such as unit = \"m/s2/N\"",
+            ));
         };
         let (answer, factor) = self.unit(unit)?;
         let mut values = Vec::with_capacity(table.rows.len());
@@ -231,17 +234,22 @@ impl Reader<'_> {
             let std = column("std").map(|k| row[k]);
             let bad = |x: f64| !x.is_finite();
             if bad(f) || bad(a) || bad(b) || f < 0.0 || std.is_some_and(|std| bad(std) || std <= 0.0) {
-                return Err(fail(format!("line {line}: expected numbers, hz of 0 or above and std above 0")));
+                return Err(fail(format!("line {line}: expected finite numbers, hz >= 0 and std > 0")));
             }
             let value = if pair.2 { Complex::from_polar(a, b * self.units.angle) } else { Complex::new(a, b) };
             values.push((f, value * factor, std));
         }
         let of = |node: &Option<Spanned<String>>, direction: &Option<Spanned<Direction>>, what: &str| {
             let Some(direction) = direction else {
-                return Err(self.error(e.file.span(), format!("a table needs {what}_direction = \"x\" or another")));
+                return Err(
+                    self.error(e.file.span(), format!("a table needs a direction, such as {what}_direction = \"x\""))
+                );
             };
             let vector = direction.get_ref().vector().ok_or_else(|| {
-                self.error(direction.span(), "a direction is \"x\", \"-y\" and so on, or three numbers with a length")
+                self.error(
+                    direction.span(),
+                    "expected a direction: \"x\", \"-y\" and so on, or three numbers that are not all zero",
+                )
             })?;
             Ok((node.as_ref().map(|node| node.get_ref().clone()), vector))
         };
@@ -259,14 +267,12 @@ impl Reader<'_> {
         let fail = |what: String| Error::File { path: path.to_owned(), what };
         let size = path.metadata().map_or(0, |there| there.len());
         if size > LARGEST {
-            return Err(fail(format!("{size} bytes, at most {LARGEST} are read")));
+            return Err(fail(format!("the file has {size} bytes, the maximum is {LARGEST}")));
         }
         let bytes = std::fs::read(path).map_err(|error| fail(error.to_string()))?;
         let told = [&e.watched, &e.hit].into_iter().flatten().next();
         if let Some(node) = told {
-            return Err(
-                self.error(node.span(), "a universal file tells nodes and directions itself: leave them out here")
-            );
+            return Err(self.error(node.span(), "a universal file contains nodes and directions: remove them here"));
         }
         let functions = read_functions(&bytes).map_err(&fail)?;
         let one = |function: &UffFunction| {
@@ -277,14 +283,20 @@ impl Reader<'_> {
                     let what = &function.unit;
                     self.error(
                         e.file.span(),
-                        format!("{name}: the file does not say what was measured (label {what:?}): add unit = \"m/s2/N\" or another"),
+                        format!(
+                            "{name}: the file does not define the measured quantity (label {what:?}): add its unit, \
+                             such as unit = \"m/s2/N\""
+                        ),
                     )
                 })?,
             };
             let direction = |code: i64| match code {
                 1..=3 => Ok(Vector3::ith(code as usize - 1, 1.0)),
                 -3..=-1 => Ok(Vector3::ith(code.unsigned_abs() as usize - 1, -1.0)),
-                _ => Err(fail(format!("line {}: direction {code}; 1 to 3 and -1 to -3 are x, y, z", function.line))),
+                _ => Err(fail(format!(
+                    "line {}: direction {code}: expected 1 to 3 or -1 to -3 for x, y, z",
+                    function.line
+                ))),
             };
             let place = |(node, code): (i64, i64)| Ok::<_, Error>((Some(node.to_string()), direction(code)?));
             Ok(Curve {
@@ -309,19 +321,19 @@ impl Reader<'_> {
         let (names, directions, amplitudes) = (e.nodes.get_ref(), e.directions.get_ref(), e.amplitudes.get_ref());
         if names.len() != directions.len() || names.len() != amplitudes.len() || names.len() < 2 {
             let (a, b, c) = (names.len(), directions.len(), amplitudes.len());
-            let text = format!("{a} nodes, {b} directions, {c} amplitudes: expected as many of each, two at least");
+            let text = format!("{a} nodes, {b} directions, {c} amplitudes: expected equal numbers of at least two");
             return Err(self.error(span, text));
         }
         let amplitudes = DVector::from_column_slice(amplitudes);
         if !(amplitudes.norm().is_finite() && amplitudes.norm() > 0.0) {
-            return Err(self.error(e.amplitudes.span(), "amplitudes are finite numbers, not all zero"));
+            return Err(self.error(e.amplitudes.span(), "amplitudes: expected finite numbers that are not all zero"));
         }
         let q = self.joints(&e.joints)?;
         let probe = |(name, direction): (&String, &Direction)| {
             let vector = direction.vector().ok_or_else(|| {
                 self.error(
                     e.directions.span(),
-                    "a direction is \"x\", \"-y\" and so on, or three numbers with a length",
+                    "expected a direction: \"x\", \"-y\" and so on, or three numbers that are not all zero",
                 )
             })?;
             self.probe(nodes, &(Some(name.clone()), vector), &q, &span)
@@ -349,7 +361,7 @@ impl Reader<'_> {
             let known: Vec<&String> = nodes.keys().collect();
             self.error(
                 span.clone(),
-                format!("there is no [node.{name}]; there are {known:?}: add it with link and xyz"),
+                format!("there is no [node.{name}]; the file has {known:?}: add it with link and xyz"),
             )
         })?;
         let NodeEntry { link, xyz, axes } = node.get_ref();
@@ -366,7 +378,7 @@ impl Reader<'_> {
             }
         };
         if xyz.iter().any(|x| !x.is_finite()) {
-            return Err(self.error(node.span(), "xyz takes finite numbers"));
+            return Err(self.error(node.span(), "xyz: expected finite numbers"));
         }
         let at = Translation3::from(Vector3::from(*xyz) * self.units.length);
         let frame = Frame { X_BF: frame.X_BF * Pose::from_parts(at, Rotation3::identity()), ..frame };

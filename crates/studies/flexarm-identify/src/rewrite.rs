@@ -64,8 +64,9 @@ pub(super) fn rewritten(
                 let damping = entry.get_mut("damping").and_then(Item::as_table_like_mut);
                 match damping.and_then(|damping| damping.iter_mut().next().map(|(_, value)| value)) {
                     Some(value) => {
-                        let value =
-                            value.as_value_mut().ok_or_else(|| format!("the damping of link {link:?} is no number"))?;
+                        let value = value
+                            .as_value_mut()
+                            .ok_or_else(|| format!("the damping of link {link:?} is not a number"))?;
                         put_damping(value, parameter);
                     }
                     None => {
@@ -79,7 +80,7 @@ pub(super) fn rewritten(
             Written::LinkEntry { link, row, column, K } => {
                 let entry = named(&mut file, "flexible_link", "link", link)?;
                 put_entry(entry, (*row, *column), K, rounded(parameter.value, parameter.std))
-                    .ok_or_else(|| format!("the stiffness of link {link:?} is no 6x6 matrix"))?;
+                    .ok_or_else(|| format!("the stiffness of link {link:?} is not a 6x6 matrix"))?;
                 told.push((format!("link {link}"), parameter));
             }
             Written::Tool { .. } => told.push(("tcp".into(), parameter)),
@@ -105,12 +106,12 @@ pub(super) fn rewritten(
 
 /// Returns the header comment that lists the identified values.
 fn comments(told: &[(String, &Found)]) -> String {
-    let mut out = String::from("# Identified by flexarm identify: value, standard deviation, value before.\n");
+    let mut out = String::from("# Identified by flexarm identify: value, standard deviation, previous value.\n");
     for (_, p) in told {
         let Found { name, unit, value, std, initial, .. } = p;
         let deviation = match std.is_finite() {
             true => format!("+- {} {unit}", rounded(*std, *std)),
-            false => format!("{unit} (the fit does not meet the readings: no deviation)"),
+            false => format!("{unit} (the fit does not reproduce the readings: no standard deviation)"),
         };
         out += &format!("#   {name} = {} {deviation}, was {initial}\n", rounded(*value, *std));
     }
@@ -207,7 +208,7 @@ fn put_tool(file: &mut DocumentMut, found: &[(Found, Written)], tool: (&str, &Po
         let link = [("link", Value::from(tool.0))].into_iter().collect::<InlineTable>();
         file.insert("tcp", toml_edit::value(link));
     }
-    let entry = file.get_mut("tcp").and_then(Item::as_table_like_mut).ok_or("tcp is no table")?;
+    let entry = file.get_mut("tcp").and_then(Item::as_table_like_mut).ok_or("tcp is not a table")?;
     // Rounded to 0.1 µm and 0.1 µrad.
     let list = |values: [f64; 3]| values.map(|x| (x * 1e7).round() / 1e7).into_iter().collect::<Array>();
     entry.insert("xyz", toml_edit::value(list(X_LT.translation.vector.into())));

@@ -67,7 +67,7 @@ pub(super) fn read_functions(bytes: &[u8]) -> Result<Vec<UffFunction>, String> {
         }
     }
     match (sets, found.is_empty()) {
-        (0, _) => Err("this is no universal file: it has no dataset between lines of -1".into()),
+        (0, _) => Err("this is not a universal file: it has no dataset between lines of -1".into()),
         (_, true) => Err("the file has no frequency response (dataset 58 with function type 4)".into()),
         _ => Ok(found),
     }
@@ -93,7 +93,7 @@ impl Lines<'_> {
 
     fn expect(&mut self, what: &str) -> Result<String, String> {
         let line = self.line + 1;
-        self.next().ok_or_else(|| format!("line {line}: the file ends where {what} is expected"))
+        self.next().ok_or_else(|| format!("line {line}: the file ends, expected {what}"))
     }
 }
 
@@ -159,7 +159,7 @@ fn function(
         return Err(format!("line {place}: expected form, number and spacing of the values, found {line:?}"));
     };
     if !(0.0..=MOST as f64).contains(&count) || count.fract() != 0.0 {
-        return Err(format!("line {place}: {count} values are announced, expected up to {MOST}"));
+        return Err(format!("line {place}: the number of values is {count}, expected a whole number up to {MOST}"));
     }
     reader.expect("the abscissa")?;
     let line = reader.expect("the ordinate")?;
@@ -172,7 +172,7 @@ fn function(
         4 => (false, true),
         5 => (true, false),
         6 => (true, true),
-        other => return Err(format!("line {place}: form {other} of values is not known; 2, 4, 5 and 6 are")),
+        other => return Err(format!("line {place}: form {other} of values is not known; use 2, 4, 5 or 6")),
     };
     let even = spacing == 1.0;
     let per_value = usize::from(!even) + 1 + usize::from(complex);
@@ -190,7 +190,7 @@ fn function(
     };
     let values: Vec<(f64, Complex<f64>)> = numbers.chunks_exact(per_value).enumerate().map(value).collect();
     if values.iter().any(|(hz, H)| !(hz.is_finite() && H.re.is_finite() && H.im.is_finite())) {
-        return Err(format!("line {start}: a value of this function is no number"));
+        return Err(format!("line {start}: a value of this function is not finite"));
     }
     let (response, reference) = ((node, direction), (other, other_direction));
     Ok(Some(UffFunction { line: start, response, reference, ordinate, unit, per_si, values }))
@@ -202,7 +202,7 @@ fn text_to_numbers(reader: &mut Lines<'_>, wanted: usize, place: usize) -> Resul
         let line = reader.expect("a value")?;
         if line.trim() == "-1" {
             return Err(format!(
-                "line {}: {} values of {wanted} that line {place} announces",
+                "line {}: found {} of the {wanted} values announced in line {place}",
                 reader.line,
                 numbers.len()
             ));
@@ -323,8 +323,8 @@ mod tests {
         let cut = dataset(&head(1, 96), 6, 1, &little);
         assert!(read_functions(&cut).unwrap_err().contains("announced"));
         let short = dataset("58", 5, 1, b"  1.5 2.5");
-        assert!(read_functions(&short).unwrap_err().contains("2 values of 6"));
-        assert!(read_functions(b"solid x").unwrap_err().contains("no universal file"));
+        assert!(read_functions(&short).unwrap_err().contains("2 of the 6 values"));
+        assert!(read_functions(b"solid x").unwrap_err().contains("not a universal file"));
         assert!(read_functions(b"    -1\n    151\nx\n    -1\n").unwrap_err().contains("no frequency response"));
     }
 

@@ -87,8 +87,8 @@ fn told_ratio(what: &'static str, measured: f64, expected: f64, input: &Measurem
         *size != input.length_m && (0.1..=10.0).contains(&other)
     });
     let help = match better {
-        Some((name, _)) => format!("with length = {name:?} they would be of the same size"),
-        None => "look at units, loads and the first guess of the stiffness".into(),
+        Some((name, _)) => format!("with length = {name:?} they would agree in magnitude"),
+        None => "check units, loads and the initial stiffnesses".into(),
     };
     Err(IdentifyFileError::Units { what, ratio, length: input.length, help }.into())
 }

@@ -113,7 +113,7 @@ impl Design {
         let sample = Sample::new(file.method, drawn.len(), file.count, file.seed).ok_or_else(|| {
             let most = file.method.most_dimensions();
             let message = format!(
-                "{} parameters are drawn, this method takes {most}: use latin-hypercube or random",
+                "{} random parameters, the maximum of this method is {most}: use latin-hypercube or random",
                 drawn.len()
             );
             fail(&file.sample_place, message)
@@ -125,7 +125,7 @@ impl Design {
             let place = columns.first().map_or(&file.sample_place, |column| &column.place);
             return Err(fail(
                 place,
-                format!("the study has more than {MOST_RUNS} runs: fewer values, or a sample instead of a grid"),
+                format!("the study has more than {MOST_RUNS} runs: use fewer values, or a sample instead of a grid"),
             ));
         };
         Ok(Self { columns, sizes, directions, drawn, derived, sample, runs: runs as usize })
@@ -212,7 +212,7 @@ fn derived(columns: &[Column]) -> Result<Vec<(usize, Formula)>, RobotFileError> 
         let vocabulary = Vocabulary { parameters: &parameters, metrics: &[], summary: &serde_json::Value::Null };
         let formula = Formula::parse(text, &vocabulary).map_err(fail)?;
         if !formula.is_of_parameters() {
-            return Err(fail(format!("expression {text:?}: only parameters before it are known here")));
+            return Err(fail(format!("expression {text:?}: only parameters defined before it are allowed")));
         }
         found.push((k, formula));
     }

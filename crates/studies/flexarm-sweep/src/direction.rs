@@ -45,7 +45,7 @@ impl Better {
     /// Returns `least` or `highest`.
     pub fn most(self) -> &'static str {
         match self {
-            Self::Lower => "least",
+            Self::Lower => "lowest",
             Self::Higher => "highest",
         }
     }

@@ -27,7 +27,10 @@ pub enum SweepError {
         differs: String,
     },
     /// A folder to be merged belongs to another study than the first.
-    #[error("{} is no shard of the study in {}: {differs} differs; leave it out, or run it again with the same files", folder.display(), first.display())]
+    #[error(
+        "{} is not a shard of the study in {}: {differs} differs; leave it out, or run it again with the same files",
+        folder.display(), first.display()
+    )]
     ForeignShard {
         /// Folder.
         folder: PathBuf,
@@ -37,7 +40,7 @@ pub enum SweepError {
         differs: String,
     },
     /// The folder contains no study.
-    #[error("{} holds no study: there is no study.json in it; give the folder that a run of the study wrote into", folder.display())]
+    #[error("{} contains no study.json: give the output folder of a study", folder.display())]
     NoStudy {
         /// Folder.
         folder: PathBuf,
@@ -79,7 +82,11 @@ pub enum SweepError {
         shards: Option<usize>,
     },
     /// Two shards contain a run with different results.
-    #[error("run {run} is there twice with different results, in {} and {}: one of them was made by another program or of other files", first.display(), second.display())]
+    #[error(
+        "run {run} has different results in {} and {}: one of them is from another version of the program or from \
+         other files",
+        first.display(), second.display()
+    )]
     Twice {
         /// Number of the run.
         run: usize,
@@ -89,7 +96,10 @@ pub enum SweepError {
         second: PathBuf,
     },
     /// The user stopped the study.
-    #[error("stopped after {done} of {runs} runs; they are kept in {}, the same command continues from there", folder.display())]
+    #[error(
+        "stopped after {done} of {runs} runs; they are stored in {}, and the same command continues from there",
+        folder.display()
+    )]
     Stopped {
         /// Number of finished runs.
         done: usize,

@@ -245,7 +245,7 @@ fn option(
         Some(known) => Ok((key.to_owned(), known, place)),
         None => {
             let found = value.get_ref().type_str();
-            let message = format!("options.{key} is a {found}, expected a number, a word, true or false");
+            let message = format!("options.{key} is a {found}, expected a number, a string, true or false");
             Err(RobotFileError { message, ..place })
         }
     }
@@ -259,13 +259,13 @@ fn sample(
     let Some(entry) = entry else {
         if drawn {
             let message =
-                "a parameter has a distribution: say how many points are drawn, [sample] with count = 100 for instance";
+                "a parameter has a distribution: set the number of samples with [sample], for instance count = 100";
             return Err(source.error(0..0, message));
         }
         return Ok((SampleMethod::Random, 1, 0, source.error(0..0, "")));
     };
     if !drawn {
-        let message = "[sample] has nothing to draw: no parameter has a distribution";
+        let message = "[sample] has no effect: no parameter has a distribution";
         return Err(source.error(entry.span(), message));
     }
     let sample = entry.get_ref();
@@ -323,12 +323,12 @@ fn parameter(entry: &Spanned<ParameterToml>, source: &Source) -> Result<Paramete
     let (values, bounds) = values(own, source, &fail)?;
     let Placed { place, .. } = Placed { text: String::new(), place: source.error(entry.span(), "") };
     if own.each && own.name.is_some() {
-        return Err(fail(
-            "each = true makes several parameters, which have the names of their places: leave name out".into(),
-        ));
+        return Err(fail("each = true creates several parameters, named by their paths: remove name".into()));
     }
     if own.linked.is_some() && !matches!(values, Values::Levels(_)) {
-        return Err(fail("linked is for values that are listed; give several paths to draw one value for all".into()));
+        return Err(fail(
+            "linked needs listed values; to sample one value for several paths, use paths = [...]".into(),
+        ));
     }
     let (each, linked) = (own.each, own.linked.clone());
     let name = own.name.as_ref().map(|name| name.get_ref().clone());
@@ -341,7 +341,7 @@ fn values(
     source: &Source,
     fail: &dyn Fn(String) -> RobotFileError,
 ) -> Result<(Values, Option<(f64, f64)>), RobotFileError> {
-    const ONE: &str = "give it one of values = [...], from and to, distribution = \"...\" or expression = \"...\"";
+    const ONE: &str = "give exactly one of values = [...], from and to, distribution = \"...\" or expression = \"...\"";
     let has_range = own.from.is_some() || own.to.is_some() || own.count.is_some();
     if let Some(expression) = &own.expression {
         return match own.values.is_none() && !has_range && own.distribution.is_none() {
@@ -353,15 +353,14 @@ fn values(
         (Some(list), false, word) => {
             let known: Option<Vec<ParameterValue>> = list.get_ref().iter().map(ParameterValue::of).collect();
             let known = known.filter(|known| !known.is_empty()).ok_or_else(|| {
-                source.error(
-                    list.span(),
-                    "values: expected a list of finite numbers, of words or files, or of true and false",
-                )
+                source.error(list.span(), "values: expected a list of finite numbers, of strings, or of true and false")
             })?;
             match word.as_ref().map(|word| word.get_ref().as_str()) {
                 None => Ok((Values::Levels(known), None)),
                 Some("choice") => Ok((Values::Choice(known), None)),
-                Some(other) => Err(fail(format!("distribution = {other:?} takes no values; \"choice\" does"))),
+                Some(other) => {
+                    Err(fail(format!("distribution = {other:?} does not allow values; only \"choice\" does")))
+                }
             }
         }
         (None, true, None) => range(own, source, fail),
@@ -433,7 +432,7 @@ fn distribution(
         }
     };
     if let Some((key, _)) = numbers.iter().find(|(key, value)| value.is_some() && !taken.contains(key)) {
-        return Err(fail(format!("distribution = {word:?} does not take {key}; it takes {}", taken.join(", "))));
+        return Err(fail(format!("distribution = {word:?} has no key {key}; its keys are {}", taken.join(", "))));
     }
     let number = |key: &str| match numbers.iter().find(|(known, _)| *known == key) {
         Some((_, Some(x))) if x.is_finite() => Ok(*x),
@@ -442,7 +441,7 @@ fn distribution(
     };
     let ordered = |low: f64, high: f64| match low < high {
         true => Ok(()),
-        false => Err(fail(format!("low = {low} must lie below high = {high}"))),
+        false => Err(fail(format!("low = {low} must be less than high = {high}"))),
     };
     let positive = |what: &str, x: f64| match x > 0.0 {
         true => Ok(x),
@@ -466,7 +465,7 @@ fn distribution(
             let (low, mode, high) = (number("low")?, number("mode")?, number("high")?);
             ordered(low, high)?;
             if !(low..=high).contains(&mode) {
-                return Err(fail(format!("mode = {mode} must lie between low = {low} and high = {high}")));
+                return Err(fail(format!("mode = {mode} must be between low = {low} and high = {high}")));
             }
             Distribution::Triangular { low, mode, high }
         }
@@ -478,11 +477,11 @@ fn table_of_runs(path: &Path, place: &RobotFileError) -> Result<Vec<ParameterEnt
     let table = flexarm_files::NumberTable::read(path)?;
     let fail = |what: String| Error::File { path: path.to_owned(), what };
     if table.rows.is_empty() {
-        return Err(fail("the table has no rows: one for each run is expected".into()));
+        return Err(fail("the table has no rows: expected one for each run".into()));
     }
     let column = |(k, name): (usize, &String)| {
         let value = |(row, line): (&Vec<f64>, &usize)| match row[k].is_nan() {
-            true => Err(fail(format!("line {line}, column {name:?}: the cell is empty, a number is expected"))),
+            true => Err(fail(format!("line {line}, column {name:?}: the cell is empty, expected a number"))),
             false => Ok(ParameterValue::Number(row[k])),
         };
         let levels = table.rows.iter().zip(&table.lines).map(value).collect::<Result<Vec<_>, Error>>()?;

@@ -432,7 +432,7 @@ fn check_names(file: &StudyFile, metrics: &[Metric]) -> Result<(), RobotFileErro
     for (name, place) in best.chain(pareto).chain(better) {
         if !metrics.iter().any(|metric| metric.name == *name) {
             let known: Vec<&str> = metrics.iter().map(|metric| metric.name.as_str()).collect();
-            let message = format!("{name:?} is no metric of the study; they are {}", known.join(", "));
+            let message = format!("{name:?} is not a metric of the study; its metrics are {}", known.join(", "));
             return Err(RobotFileError { message, ..place.clone() });
         }
     }
@@ -453,7 +453,7 @@ fn columns(file: &StudyFile, workshop: &Workshop) -> Result<Vec<Column>, RobotFi
                 |message: String| RobotFileError { message: format!("parameter {message}"), ..entry.place.clone() };
             let places = workshop.expanded(path).map_err(fail)?;
             if places.is_empty() {
-                return Err(fail(format!("{path:?} leads nowhere")));
+                return Err(fail(format!("{path:?} matches no entry")));
             }
             columns.extend(places.into_iter().map(|place| Column::of(entry, place.clone(), vec![place])));
         }

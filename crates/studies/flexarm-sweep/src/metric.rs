@@ -207,7 +207,7 @@ pub(super) fn values(metrics: &[Metric], parameters: &[ParameterValue], facts: &
 /// Parses an expression, with a variable in place of each path.
 fn expression_of(text: &str, known: &Vocabulary<'_>) -> Result<(FlatEx<f64>, Vec<Variable>), String> {
     if text.len() > LONGEST {
-        return Err(format!("the expression has {} letters, at most {LONGEST} are read", text.len()));
+        return Err(format!("the expression has {} bytes, the maximum is {LONGEST}", text.len()));
     }
     let mut plain = String::new();
     let mut words: Vec<String> = Vec::new();
@@ -298,7 +298,7 @@ fn variable(word: &str, known: &Vocabulary<'_>) -> Result<Variable, String> {
     }
     let path: Vec<String> = word.replace('[', ".").replace(']', "").split('.').map(str::to_owned).collect();
     if path.len() == 1 && OF_THE_MACHINE.contains(&word) {
-        return Err(format!("{word} depends on the machine and the hour: it is no metric of a study"));
+        return Err(format!("{word} depends on the machine and its load: it cannot be a metric of a study"));
     }
     let quick = quick(&path);
     match (quick, find(known.summary, &path)) {
@@ -306,9 +306,9 @@ fn variable(word: &str, known: &Vocabulary<'_>) -> Result<Variable, String> {
         (_, Some(Value::Null | Value::Number(_) | Value::Bool(_))) => Ok(Variable::Fact(path, quick)),
         (_, found) => {
             let what = match found {
-                Some(Value::String(_)) => "is a text, a number is expected",
-                Some(_) => "has several parts, a number is expected",
-                None if known.summary.is_null() => "is no parameter before this one",
+                Some(Value::String(_)) => "is a string, expected a number",
+                Some(_) => "has several entries, expected a number",
+                None if known.summary.is_null() => "is not a parameter defined before this one",
                 None => "is not in the summary of a run",
             };
             let mut all = Vec::new();
@@ -372,7 +372,7 @@ impl Constraint {
         let (left, right, turned) = match (text.split_once("<="), text.split_once(">=")) {
             (Some((left, right)), None) => (left, right, false),
             (None, Some((left, right))) => (left, right, true),
-            _ => return Err(format!("constraint {text:?}: expected metric <= number, or >=")),
+            _ => return Err(format!("constraint {text:?}: expected metric <= number, or metric >= number")),
         };
         let (left, right) = (Formula::parse(left.trim(), known)?, Formula::parse(right.trim(), known)?);
         let (less, more) = if turned { (right, left) } else { (left, right) };
@@ -452,8 +452,8 @@ mod tests {
     fn what_no_run_has_is_told_with_what_is_near() {
         let told = value("tcp.peak").unwrap_err();
         assert!(told.contains("\"tcp.peak\" is not in the summary") && told.contains("tcp.peak_m"), "{told}");
-        assert!(value("tcp.settling").unwrap_err().contains("is a text"));
-        assert!(value("tcp").unwrap_err().contains("several parts"));
+        assert!(value("tcp.settling").unwrap_err().contains("is a string"));
+        assert!(value("tcp").unwrap_err().contains("several entries"));
         assert!(value("wall_s").unwrap_err().contains("depends on the machine"));
         assert!(value("tcp.peak_m +* 2").is_err() && value("= 2").is_err() && value("").is_err());
         assert!(value("payload.mass = tcp.peak_m").unwrap_err().contains("taken"));

@@ -221,15 +221,15 @@ impl Sweep {
         let place = |name: &str| self.metrics.iter().position(|metric| metric.name == name);
         let names = || self.metrics().join(", ");
         match (&search.metric, &self.file.minimise) {
-            (Some(name), _) => {
-                place(name).ok_or_else(|| fail(format!("{name:?} is no metric of the study; they are {}", names())))
-            }
+            (Some(name), _) => place(name)
+                .ok_or_else(|| fail(format!("{name:?} is not a metric of the study; its metrics are {}", names()))),
             (None, Some(entry)) => place(&entry.metric.text).ok_or_else(|| {
-                let message = format!("{:?} is no metric of the study; they are {}", entry.metric.text, names());
+                let message =
+                    format!("{:?} is not a metric of the study; its metrics are {}", entry.metric.text, names());
                 RobotFileError { message, ..entry.metric.place.clone() }.into()
             }),
             (None, None) => {
-                Err(fail("the study says nothing that is to be least: add [minimise] with metric = \"...\"".into()))
+                Err(fail("the study has no metric to minimise: add [minimise] with metric = \"...\"".into()))
             }
         }
     }
@@ -251,9 +251,7 @@ impl Sweep {
             }
         }
         match found.is_empty() {
-            true => {
-                Err(SweepError::Minimise { what: "the study has no parameter that could be looked for".into() }.into())
-            }
+            true => Err(SweepError::Minimise { what: "the study has no parameter to optimise".into() }.into()),
             false => Ok(found),
         }
     }
@@ -350,7 +348,7 @@ impl Sweep {
         let constraints: Vec<&str> = self.constraints.iter().map(|c| c.text.as_str()).collect();
         let text = format!("{} minimise {} {}", manifest.fingerprint, self.metrics[goal].text, constraints.join("; "));
         manifest.fingerprint = fingerprint(text.as_bytes());
-        manifest.inputs.push(("what is to be least and must hold".into(), fingerprint(text.as_bytes())));
+        manifest.inputs.push(("objective and constraints".into(), fingerprint(text.as_bytes())));
         manifest
     }
 

@@ -130,7 +130,7 @@ fn truth(key: &str, value: &ParameterValue) -> Result<bool, String> {
 fn word<'a>(key: &str, value: &'a ParameterValue) -> Result<&'a str, String> {
     match value {
         ParameterValue::Text(word) => Ok(word),
-        _ => Err(format!("options.{key} = {value}: expected a word")),
+        _ => Err(format!("options.{key} = {value}: expected a string")),
     }
 }
 

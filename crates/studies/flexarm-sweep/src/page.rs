@@ -65,8 +65,8 @@ impl Sweep {
         let column = &self.design.columns[parameter];
         match column.role {
             Role::Value => (column.name.clone(), 1.0),
-            Role::Factor => (format!("{} (% of the file)", column.name), 100.0),
-            Role::Offset => (format!("{} (added to the file)", column.name), 1.0),
+            Role::Factor => (format!("{} (% of the value in the file)", column.name), 100.0),
+            Role::Offset => (format!("{} (added to the value in the file)", column.name), 1.0),
         }
     }
 
@@ -95,20 +95,26 @@ impl Sweep {
             }
             let name = markup(&metric.name);
             let _ = match ranking.matter.is_empty() {
-                true => write!(out, "<p>{name}: no parameter stands out."),
+                true => write!(out, "<p>{name}: no parameter has a significant effect."),
                 false => write!(out, "<p>{name}: {}.", names(&mut ranking.matter.iter().map(|(p, _)| *p))),
             };
             if let Some(chance) = ranking.chance.filter(|_| !ranking.untold.is_empty()) {
                 let untold = names(&mut ranking.untold.iter().copied());
                 let reach = match chance < 1.0 {
-                    true => format!("which may explain {:.0} % of the scatter of so few draws", 100.0 * chance),
-                    false => "the draws are too few to tell any effect".to_owned(),
+                    true => format!(
+                        "chance may explain {:.0} % of the variance with this number of samples",
+                        100.0 * chance
+                    ),
+                    false => "the number of samples is too small to detect any effect".to_owned(),
                 };
-                let _ = write!(out, " Not told from chance: {untold} ({reach}; more draws show smaller effects).");
+                let _ = write!(
+                    out,
+                    " Not distinguishable from chance: {untold} ({reach}; more samples resolve smaller effects)."
+                );
             }
             out += "</p>\n";
         }
-        headed("Parameters that matter, the strongest first", out)
+        headed("Influential parameters, strongest first", out)
     }
 
     fn heat_maps(&self, columns: &Columns, rankings: &[Ranking]) -> String {
@@ -141,7 +147,7 @@ impl Sweep {
             };
             let _ = writeln!(out, "<div>{}</div>", map.svg());
         }
-        headed("Heat maps of parameters that matter", out)
+        headed("Heat maps of the influential parameters", out)
     }
 
     fn main_effects(&self, columns: &Columns, rankings: &[Ranking]) -> String {
@@ -159,7 +165,7 @@ impl Sweep {
             }
         }
         let picture = if rows.is_empty() { String::new() } else { format!("<div>{}</div>\n", effects(&rows)) };
-        headed("Main effects (means with their standard errors, the strongest first)", picture)
+        headed("Main effects (means with standard errors, strongest first)", picture)
     }
 
     fn pareto_plot(&self, summary: &SweepSummary, columns: &Columns) -> String {
@@ -196,7 +202,10 @@ impl Sweep {
         let assumed = [a, b].into_iter().filter(|k| self.metrics[*k].better.is_none());
         for name in assumed.map(|k| &self.metrics[k].name) {
             let name = markup(name);
-            let _ = writeln!(out, "<p>{name} is taken to be better if lower: better in the study says otherwise.</p>");
+            let _ = writeln!(
+                out,
+                "<p>Lower values of {name} are assumed to be better; set better in the study to change this.</p>"
+            );
         }
         headed("Pareto front: no other run is better in both", out)
     }
@@ -223,7 +232,11 @@ impl Sweep {
         }
         out += "</table>\n";
         if let Some(command) = &best.command {
-            let _ = writeln!(out, "<p>Again, with recordings and report:</p>\n<pre>{}</pre>", markup(command));
+            let _ = writeln!(
+                out,
+                "<p>Command that repeats this run with recordings and report:</p>\n<pre>{}</pre>",
+                markup(command)
+            );
         }
         out
     }
@@ -246,7 +259,7 @@ impl Sweep {
             return String::new();
         }
         let columns: Vec<(&str, &[f64])> = named.iter().map(|(name, values)| (&name[..], &values[..])).collect();
-        let what = "Scatter matrix (above the diagonal the correlation of the ranks)";
+        let what = "Scatter matrix (rank correlations above the diagonal)";
         headed(what, format!("<div>{}</div>\n", scatter_matrix(&columns)))
     }
 }
@@ -296,7 +309,8 @@ fn cells(values: &[f64]) -> (Vec<String>, Vec<Option<usize>>) {
 
 fn figures(summary: &SweepSummary) -> String {
     let mut out = String::from(
-        "<h2>Results</h2>\n<table><tr><th>metric</th><th>runs</th><th>least</th><th>5 %</th><th>median</th><th>95 %</th><th>largest</th><th>mean</th><th>std</th></tr>\n",
+        "<h2>Results</h2>\n<table><tr><th>metric</th><th>runs</th><th>minimum</th><th>5 %</th><th>median</th>\
+         <th>95 %</th><th>maximum</th><th>mean</th><th>std</th></tr>\n",
     );
     for metric in &summary.metrics {
         let cell = |x: Option<f64>| x.map_or_else(|| "-".to_owned(), number);
@@ -321,21 +335,21 @@ fn figures(summary: &SweepSummary) -> String {
 /// Describes the progress and result of a search.
 fn search(summary: &SweepSummary) -> String {
     let Some(found) = &summary.minimise else { return String::new() };
-    let kept = if found.start_kept { "keeps" } else { "does not keep" };
+    let kept = if found.start_kept { "satisfies" } else { "violates" };
     let start = found.start.map_or_else(String::new, |start| {
-        format!(" The files as they are give {} and the run {kept} what must hold.", number(start))
+        format!(" The run of the unchanged files gives {} and {kept} the constraints.", number(start))
     });
     let constraints = match found.constraints.is_empty() {
         true => String::new(),
-        false => format!(" under {}", markup(&found.constraints.join(", "))),
+        false => format!(" subject to {}", markup(&found.constraints.join(", "))),
     };
     let end = match (found.kept, found.settled) {
-        (false, _) => "no run kept what must hold",
-        (true, true) => "the search ended by itself",
-        (true, false) => "the search ended with its runs: more might find less",
+        (false, _) => "no run satisfied the constraints",
+        (true, true) => "the search converged",
+        (true, false) => "the search reached its maximum number of runs: more runs may find a lower value",
     };
     let mut out = format!(
-        "<h2>Least {}{constraints}</h2>\n<p>{} generations, {end}.{start}</p>\n",
+        "<h2>Minimum of {}{constraints}</h2>\n<p>{} generations, {end}.{start}</p>\n",
         markup(&found.metric),
         found.generations
     );
@@ -343,7 +357,7 @@ fn search(summary: &SweepSummary) -> String {
     let (x, y): (Vec<f64>, Vec<f64>) = known.unzip();
     let curves = vec![PlotCurve { name: found.metric.clone(), look: CurveLook::Marked, x, y }];
     let panels = [Panel { label: found.metric.clone(), logarithmic: false, legend: false, curves }];
-    let title = "Least value so far that keeps what must hold";
+    let title = "Minimum so far that satisfies the constraints";
     let plot = LinePlot { title, x_label: "generation", panels: &panels, ..LinePlot::default() };
     out += &plot.svg().map(|svg| format!("<div>{svg}</div>\n")).unwrap_or_default();
     out
@@ -363,8 +377,8 @@ fn sensitivities(summary: &SweepSummary) -> String {
                 ],
             })
             .collect();
-        let title = format!("{}: parts of its variance", metric.name);
-        let _ = writeln!(out, "<div>{}</div>", bar_pairs(&title, ["by itself (first)", "with others (total)"], &pairs));
+        let title = format!("{}: shares of the variance", metric.name);
+        let _ = writeln!(out, "<div>{}</div>", bar_pairs(&title, ["first-order index", "total index"], &pairs));
     }
     headed("Sobol indices with 95 % intervals", out)
 }

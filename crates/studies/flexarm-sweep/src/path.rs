@@ -223,9 +223,9 @@ pub(super) fn near(path: &str, known: &[String]) -> String {
     let told: Vec<String> = others.iter().map(|other| format!("{other:?}")).collect();
     match (meant, told.is_empty()) {
         (Some(meant), true) => format!("did you mean {meant:?}?"),
-        (Some(meant), false) => format!("did you mean {meant:?}? there are also {}", told.join(", ")),
-        (None, true) => "it has none".into(),
-        (None, false) => format!("near it are {}", told.join(", ")),
+        (Some(meant), false) => format!("did you mean {meant:?}? similar names are {}", told.join(", ")),
+        (None, true) => "there are none".into(),
+        (None, false) => format!("similar names are {}", told.join(", ")),
     }
 }
 

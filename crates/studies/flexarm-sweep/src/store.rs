@@ -63,20 +63,20 @@ impl Manifest {
     pub(super) fn differs(&self, other: &Self) -> String {
         let mut told = Vec::new();
         if self.runs != other.runs {
-            told.push(format!("{} runs and {}", self.runs, other.runs));
+            told.push(format!("the number of runs ({} and {})", self.runs, other.runs));
         }
         for (name, print) in &self.inputs {
             match other.inputs.iter().find(|(known, _)| known == name) {
                 Some((_, known)) if known != print => told.push(format!("the content of {name}")),
-                None => told.push(format!("{name}, which only one has")),
+                None => told.push(format!("{name}, which only one study has")),
                 _ => {}
             }
         }
         let is_new = |name: &String| self.inputs.iter().all(|(known, _)| known != name);
         let new = other.inputs.iter().map(|(name, _)| name).filter(|name| is_new(name));
-        told.extend(new.map(|name| format!("{name}, which only one has")));
+        told.extend(new.map(|name| format!("{name}, which only one study has")));
         if self.flexarm != other.flexarm {
-            told.push(format!("versions {} and {} of the program", self.flexarm, other.flexarm));
+            told.push(format!("the version of the program ({} and {})", self.flexarm, other.flexarm));
         }
         if told.is_empty() {
             told.push("the names of its files".into());
@@ -191,13 +191,13 @@ impl Collected {
         let broken = |what: String| SweepError::Broken { path: path.to_owned(), what };
         let table = table::read(path).map_err(|error| match error {
             Error::Log(LogError::NotARecording { found, .. }) => {
-                broken(format!("found {found}: remove the file, its runs are then run again")).into()
+                broken(format!("found {found}: remove the file to repeat its runs")).into()
             }
             other => other,
         })?;
         let print = table.texts.iter().find(|(key, _)| key == "flexarm.fingerprint").map(|(_, print)| print.as_str());
         if print != Some(&manifest.fingerprint) {
-            return Err(broken("is of another study; take it out of the folder".into()).into());
+            return Err(broken("belongs to another study; remove it from the folder".into()).into());
         }
         let Some(DataValues::Whole(runs)) = table.column("run") else {
             return Err(broken("has no column \"run\"".into()).into());
@@ -224,7 +224,7 @@ impl Collected {
                 None => Ok(metrics.iter().map(|values| values[row]).collect()),
             };
             let run = usize::try_from(*run).ok().filter(|run| *run < manifest.runs);
-            let run = run.ok_or_else(|| broken(format!("has a run that is not from 0 to {}", manifest.runs - 1)))?;
+            let run = run.ok_or_else(|| broken(format!("has a run number outside 0 to {}", manifest.runs - 1)))?;
             let told = caveats[row].as_deref().map(Arc::from);
             self.add(Answer { run, result, told }, file)?;
         }
@@ -293,7 +293,7 @@ fn read_journal(path: &Path, manifest: &Manifest) -> Result<(Vec<Answer>, u64), 
         let broken = || SweepError::Broken {
             path: path.to_owned(),
             what: format!(
-                "line {} is not as a run was written; remove the line, or the file to run its part again",
+                "line {} is not a valid result; remove the line, or remove the file to repeat its runs",
                 answers.len() + 1
             ),
         };
@@ -346,7 +346,7 @@ impl Store {
                 clear(folder)?;
             }
         } else if folder.join(RUNS).exists() || folder.join(PARTS).exists() {
-            let what = "is there without study.json: choose another folder".into();
+            let what = "exists without study.json: choose another folder".into();
             return Err(SweepError::Broken { path: folder.join(RUNS), what }.into());
         }
         let parts = folder.join(PARTS);
@@ -436,11 +436,10 @@ pub(super) fn known_manifest(folder: &Path) -> Result<Option<Manifest>, Error> {
         return Ok(None);
     }
     let broken = |what: String| SweepError::Broken { path: path.clone(), what };
-    let manifest: Manifest = serde_json::from_str(&read_text(&path)?).map_err(|error| {
-        broken(format!("is not as a study wrote it ({error}): remove the folder, or choose another one"))
-    })?;
+    let manifest: Manifest = serde_json::from_str(&read_text(&path)?)
+        .map_err(|error| broken(format!("is not a valid study ({error}): remove the folder, or choose another one")))?;
     if manifest.format != 1 {
-        return Err(broken(format!("is of format {}, this program reads format 1", manifest.format)).into());
+        return Err(broken(format!("has format {}, this program reads format 1", manifest.format)).into());
     }
     Ok(Some(manifest))
 }

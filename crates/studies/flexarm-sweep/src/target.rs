@@ -40,9 +40,7 @@ impl Target {
     /// A sentence about an invalid path.
     pub(super) fn parse(path: &str, jobs: &[String]) -> Result<Self, String> {
         let all = segments(path).ok_or_else(|| {
-            format!(
-                "{path:?} is no path: expected names with dots between them, such as drive.joint_2.gearbox.stiffness"
-            )
+            format!("{path:?} is not a path: expected names separated by dots, such as drive.joint_2.gearbox.stiffness")
         })?;
         let word = |k: usize| match all.get(k) {
             Some(Segment::Key(key)) => key.as_str(),
@@ -54,7 +52,7 @@ impl Target {
             ("loads", 1) => Ok(Self::File(Which::Loads)),
             ("motion", 2) if word(1) == "speed" => Ok(Self::Speed),
             ("options", 2) => Ok(Self::Option(word(1).to_owned())),
-            ("options", _) => Err(format!("{path:?}: options have one word, such as options.step")),
+            ("options", _) => Err(format!("{path:?}: an option has one name, such as options.step")),
             ("motion", _) => Ok(Self::Entry(Which::Motion, all[1..].to_vec())),
             ("loads", _) => Ok(Self::Entry(Which::Loads, all[1..].to_vec())),
             ("reduce", 3..) => match jobs.iter().position(|link| link == word(1)) {
@@ -105,7 +103,7 @@ pub(super) fn edits(
 ) -> Result<Vec<Edit>, String> {
     let found = places(root, path);
     if found.is_empty() {
-        return Err(format!("{text:?} leads nowhere; {}", near(text, &leaves(root))));
+        return Err(format!("{text:?} matches no entry; {}", near(text, &leaves(root))));
     }
     let edit = |place: Place| {
         let before = known.iter().rev().find(|edit| edit.place == place).and_then(|edit| plain(&edit.value));
@@ -114,16 +112,17 @@ pub(super) fn edits(
             (Role::Value, ..) => written(value, old),
             (_, Some(x), Some(old)) => {
                 let change: &dyn Fn(f64) -> f64 = if role == Role::Factor { &move |y| y * x } else { &move |y| y + x };
-                changed(old, change)
-                    .ok_or_else(|| format!("{text:?}: {} is no number, and has no factor or offset", place.name))?
+                changed(old, change).ok_or_else(|| {
+                    format!("{text:?}: {} is not a number: a factor or offset does not apply", place.name)
+                })?
             }
             (_, Some(_), None) => {
                 let name = &place.name;
                 return Err(format!(
-                    "{text:?}: {name} is not in the file: a factor or offset needs a number to change"
+                    "{text:?}: {name} is not in the file: a factor or offset needs an existing number"
                 ));
             }
-            (_, None, _) => return Err(format!("{text:?}: as a factor or offset {value:?} must be a number")),
+            (_, None, _) => return Err(format!("{text:?}: factor or offset {value:?} must be a number")),
         };
         Ok(Edit { place, value })
     };

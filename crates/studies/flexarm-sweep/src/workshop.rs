@@ -217,7 +217,8 @@ impl Workshop {
             path = path.join("robot.toml");
         }
         if !path.exists() {
-            let message = format!("there is no file {word:?} beside the study, and nothing shipped of this name");
+            let message =
+                format!("there is no file {word:?} in the folder of the study, and no shipped file with this name");
             return Err(RobotFileError { message, ..place.clone() }.into());
         }
         self.read(&path, place)?;
@@ -294,15 +295,15 @@ impl Workshop {
             match target {
                 Target::File(which) => match value {
                     ParameterValue::Text(word) => self.call(*which, word, file, finders, &column.place)?,
-                    other => return Err(fail(format!("{text:?}: {other} is no name of a file")).into()),
+                    other => return Err(fail(format!("{text:?}: {other} is not a file name")).into()),
                 },
                 Target::Speed if !value.number().is_some_and(|x| x > 0.0) => {
-                    return Err(fail(format!("{text:?}: a speed of {value}, expected positive numbers")).into());
+                    return Err(fail(format!("{text:?}: speed {value}, expected a positive number")).into());
                 }
                 Target::Speed => {}
                 Target::Option(key) => {
                     if column.role != Role::Value {
-                        return Err(fail(format!("{text:?}: options take values, no factors or offsets")).into());
+                        return Err(fail(format!("{text:?}: an option takes a value, not a factor or offset")).into());
                     }
                     self.options.clone().set(key, value).map_err(|message| fail(format!("{text:?}: {message}")))?;
                 }
@@ -382,7 +383,7 @@ impl Workshop {
     ) -> Result<Vec<Edit>, String> {
         match self.texts.get(file).and_then(|file| file.parsed.as_ref()) {
             Some((root, _)) => edits(root, path, text, role, value, known),
-            None => Err(format!("{text:?}: {} is not TOML, it has no keys", file.display())),
+            None => Err(format!("{text:?}: {} is not a TOML file and has no keys", file.display())),
         }
     }
 

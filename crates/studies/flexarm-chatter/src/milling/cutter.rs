@@ -109,17 +109,17 @@ impl Cutter {
                 "the lead angle (rad)",
                 self.lead,
                 self.lead > 0.0 && self.lead <= FRAC_PI_2 + 1e-9,
-                "above 0 to a right angle",
+                "above 0, at most pi/2",
             ),
             ("the tangential coefficient (N/m2)", tangential, positive(tangential), "above 0"),
-            ("the radial coefficient (N/m2)", radial, radial.is_finite(), "a number"),
-            ("the axial coefficient (N/m2)", axial, axial.is_finite(), "a number"),
-            ("the entry angle (rad)", entry, (-TAU..=TAU).contains(&entry), "within a turn"),
+            ("the radial coefficient (N/m2)", radial, radial.is_finite(), "a finite number"),
+            ("the axial coefficient (N/m2)", axial, axial.is_finite(), "a finite number"),
+            ("the entry angle (rad)", entry, (-TAU..=TAU).contains(&entry), "-2 pi to 2 pi"),
             (
                 "the exit angle (rad)",
                 exit,
                 exit > entry && exit <= entry + TAU * (1.0 + 1e-12),
-                "above the entry by at most a turn",
+                "above the entry angle by at most 2 pi",
             ),
         ];
         match rules.into_iter().find(|rule| !rule.2) {

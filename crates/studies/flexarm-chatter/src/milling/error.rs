@@ -48,15 +48,15 @@ pub enum ChatterError {
         what: &'static str,
     },
     /// An eigenvalue iteration does not converge.
-    #[error("the eigenvalues of {what} were not found: the iteration does not end")]
+    #[error("the eigenvalue iteration for {what} does not converge")]
     NotConverged {
         /// Description of the matrix.
         what: &'static str,
     },
     /// A tooth period contains too many oscillations.
     #[error(
-        "at {rpm:.0} rpm a tooth period holds too many oscillations: {unknowns} unknowns, at most {most}; ask for a higher spindle speed, \
-         or leave out modes that do not matter"
+        "at {rpm:.0} rpm a tooth period contains too many oscillations: {unknowns} unknowns, the maximum is {most}; \
+         use a higher spindle speed, or remove modes with no influence"
     )]
     TooSlow {
         /// Spindle speed (1/min).
@@ -68,7 +68,8 @@ pub enum ChatterError {
     },
     /// The poles do not reproduce the frequency response of the structure.
     #[error(
-        "the modes give the frequency response of the structure to {found:.1e} only, expected {allowed:.0e}: are two modes the same?"
+        "the modes reproduce the frequency response of the structure with a relative error of {found:.1e}, expected \
+         at most {allowed:.0e}: are two modes equal?"
     )]
     NotModal {
         /// Relative difference.

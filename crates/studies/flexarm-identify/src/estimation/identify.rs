@@ -118,7 +118,8 @@ pub enum IdentifyError {
     },
     /// Too few measured places for an instrument.
     #[error(
-        "instrument {instrument}: where it stands follows from at least three measured places that are not on one line, found {places}"
+        "instrument {instrument}: its pose requires at least three measured places that are not on one line, found \
+         {places}"
     )]
     Instrument {
         /// Number of the instrument.
@@ -128,8 +129,8 @@ pub enum IdentifyError {
     },
     /// Too few displacements to find the axes of an instrument.
     #[error(
-        "instrument {instrument}: its axes follow from displacements with all three components along at least two directions, found \
-         {displacements}; add such readings, or say how it is turned"
+        "instrument {instrument}: its axes require displacements with all three components along at least two \
+         directions, found {displacements}; add such readings, or give its orientation"
     )]
     Axes {
         /// Number of the instrument.
@@ -141,14 +142,18 @@ pub enum IdentifyError {
     #[error(transparent)]
     Model(#[from] NoAnswer),
     /// The readings do not determine an unknown of the measurement.
-    #[error("the readings do not tell {what}: move the arm into more different poses, above all turn the tool")]
+    #[error(
+        "the readings do not determine {what}: measure at more different poses, in particular with different \
+         orientations of the tool"
+    )]
     Untold {
         /// Description of the unknown.
         what: String,
     },
     /// The scatter cannot be estimated, because there are as many unknowns as numbers.
     #[error(
-        "the {rows} numbers have no standard deviation and there are as many unknowns: nothing scatters; give a deviation or measure more"
+        "the {rows} numbers have no standard deviation and there are as many unknowns: the scatter cannot be \
+         estimated; give a standard deviation or measure more"
     )]
     NoScatter {
         /// Number of measured numbers.
@@ -156,7 +161,8 @@ pub enum IdentifyError {
     },
     /// A value is not finite.
     #[error(
-        "a residual or a derivative is not a number: a value, a deviation or an uncertainty is out of all proportion"
+        "a residual or a derivative is not finite: a value, a standard deviation or an uncertainty is too large or \
+         too small"
     )]
     NotFinite,
 }
@@ -326,12 +332,12 @@ fn own_name(measurements: &Measurements, number: usize) -> String {
         first += instrument.unknowns();
         if number < first {
             return match instrument {
-                Instrument::Axes(_) => format!("how instrument {k} is turned"),
-                _ => format!("where instrument {k} stands"),
+                Instrument::Axes(_) => format!("the orientation of instrument {k} in the world"),
+                _ => format!("the pose of instrument {k} in the world"),
             };
         }
     }
-    "where a target is on the tool".to_owned()
+    "the position of a target on the tool".to_owned()
 }
 
 /// Returns the measurements with each unknown instrument at its best fit to the arm with its

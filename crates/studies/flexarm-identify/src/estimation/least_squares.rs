@@ -119,10 +119,10 @@ pub enum SolveError<E> {
     #[error(transparent)]
     Model(E),
     /// The residuals do not determine an unknown of the measurement.
-    #[error("the measurements do not tell the unknown {0} that belongs to them alone")]
+    #[error("the measurements do not determine their own unknown {0}")]
     Nuisance(usize),
     /// A residual or derivative is not finite.
-    #[error("a residual or a derivative is not a number")]
+    #[error("a residual or a derivative is not finite")]
     NotFinite,
 }
 

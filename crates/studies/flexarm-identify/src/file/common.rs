@@ -119,7 +119,8 @@ impl Reader<'_> {
                 true => Ok(q),
                 false => {
                     let help = if *slides { "length = \"mm\"" } else { "angle = \"deg\"" };
-                    let message = format!("joint {name:?} at {value}: more than any joint does; is {help} missing?");
+                    let message =
+                        format!("joint {name:?} at {value}: outside the range of any joint; is {help} missing?");
                     Err(self.error(span.clone(), message))
                 }
             }
@@ -143,8 +144,8 @@ impl Reader<'_> {
         let (largest, sum) = (moments.max(), moments.sum());
         if moments.min() < -1e-9 * largest.abs() || largest > (sum - largest) * (1.0 + 1e-6) + 1e-12 {
             let text = format!(
-                "a load has the principal moments of inertia {:.4?} kg m2, which no body has: none is negative, none larger than the sum \
-                 of the two others",
+                "a load has the principal moments of inertia {:.4?} kg m2, which are not physical: no moment may be \
+                 negative or exceed the sum of the two others",
                 moments.as_slice()
             );
             return Err(self.error(span.clone(), text));
@@ -207,7 +208,7 @@ impl Reader<'_> {
     /// Returns the error for an empty cell where a number is required.
     pub(super) fn empty(&self, row: &TableRow<'_>, file: &Spanned<PathBuf>, name: &str) -> Error {
         let line = row.table.lines[row.row];
-        let text = format!("{} line {line}: {name} is empty: a number is needed", file.get_ref().display());
+        let text = format!("{} line {line}: {name} is empty, expected a number", file.get_ref().display());
         self.error(file.span(), text)
     }
 

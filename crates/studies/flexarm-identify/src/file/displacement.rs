@@ -138,15 +138,16 @@ impl Reader<'_> {
             (Some(Measured::One(value)), Some(direction)) => {
                 let d = Vector3::from(*direction.get_ref());
                 let d = d.try_normalize(1e-9).filter(|v| v.iter().all(|x| x.is_finite()));
-                let d = d.ok_or_else(|| self.error(direction.span(), "direction has no length"))?;
+                let d = d.ok_or_else(|| self.error(direction.span(), "direction has zero length"))?;
                 rows.push(Row { of: along(d), value: value * self.units.length, std: sigma });
             }
             (Some(Measured::One(_)), None) => {
-                let text = "one number is measured along a direction: add direction = [x, y, z] in world axes, or in those of its instrument";
+                let text = "a single value needs its direction: add direction = [x, y, z] in world axes, or in those \
+                            of its instrument";
                 return Err(self.error(span, text));
             }
             (Some(Measured::Three(_)), Some(direction)) => {
-                let text = "three numbers are along x, y and z: leave direction out";
+                let text = "three numbers are components along x, y and z: remove direction";
                 return Err(self.error(direction.span(), text));
             }
             (Some(Measured::Three(d)), None) => rows.extend(
@@ -156,13 +157,13 @@ impl Reader<'_> {
             ),
             (None, _) if rotation.is_some() => {}
             (None, _) => {
-                return Err(self.error(span, format!("{name}: nothing was measured: add value = [dx, dy, dz]")));
+                return Err(self.error(span, format!("{name}: there is no measured value: add value = [dx, dy, dz]")));
             }
         }
         if let Some(turn) = rotation {
             let given = std_rotation.is_some();
             if given != std.is_some() && value.is_some() {
-                let text = "displacements and rotations have units of their own: give std and std_rotation";
+                let text = "displacements and rotations have different units: give both std and std_rotation";
                 return Err(self.error(span, text));
             }
             let sigma = self.std(std_rotation.as_ref(), self.units.angle)?;
@@ -177,7 +178,9 @@ impl Reader<'_> {
         }
         let (before, after) = (self.load(&e.before, &span)?, self.load(&load, &span)?);
         if before == after {
-            return Err(self.error(span, format!("{name}: the loads before and after are the same: nothing moves")));
+            return Err(
+                self.error(span, format!("{name}: the loads before and after are equal: there is no displacement"))
+            );
         }
         let point = Vector3::from(point) * self.units.length;
         let kind = ReadingKind::Displacement { before, after, point, rows };

@@ -47,8 +47,10 @@ impl Reader<'_> {
             }
             let deviation = std.as_ref().or(std_rotation.as_ref());
             if let (Some(std), None, None) = (deviation, xyz, rpy) {
-                let text =
-                    format!("instrument {name:?} is unknown, and has a deviation: give xyz and rpy, or leave it out");
+                let text = format!(
+                    "instrument {name:?} has a standard deviation but no pose: give xyz and rpy, or remove the \
+                     standard deviation"
+                );
                 return Err(self.error(std.span(), text));
             }
             let [r, p, y] = rpy.unwrap_or_default().map(|angle| angle * self.units.angle);
@@ -63,7 +65,7 @@ impl Reader<'_> {
                 return Err(self.error(entry.span(), format!("found {bad}, expected finite numbers")));
             }
             if let (true, Some(std)) = (*unknown, std) {
-                let text = format!("target {name:?} is unknown, and has a deviation: keep one of them");
+                let text = format!("target {name:?} is unknown and has a standard deviation: remove one of them");
                 return Err(self.error(std.span(), text));
             }
             self.targets.push(name.clone());

@@ -28,11 +28,14 @@ impl Reader<'_> {
         let modes: Vec<usize> = e.modes.as_ref().map_or_else(|| (1..=hz.len()).collect(), |m| m.get_ref().clone());
         if modes.len() != hz.len() || modes.contains(&0) {
             let at = e.modes.as_ref().map_or(span, Spanned::span);
-            let message = format!("modes = {modes:?} for {} frequencies: one number each, 1 is the lowest", hz.len());
+            let message = format!(
+                "modes = {modes:?} for {} frequencies: expected one mode number for each, 1 is the lowest",
+                hz.len()
+            );
             return Err(self.error(at, message));
         }
         if hz.is_empty() || hz.iter().any(|f| !(f.is_finite() && *f > 0.0)) {
-            return Err(self.error(e.hz.span(), "hz takes positive frequencies"));
+            return Err(self.error(e.hz.span(), "hz: expected positive frequencies"));
         }
         if let (Some(_), Some(relative)) = (&e.std, &e.std_relative) {
             return Err(

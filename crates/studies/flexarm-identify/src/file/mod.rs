@@ -253,14 +253,14 @@ impl Reader<'_> {
             // Encoder recordings have standard deviations of their own, so the other readings need
             // them too.
             None if recordings => {
-                Err(self.error(first.2.clone(), "std is missing: readings beside [[encoders]] need one"))
+                Err(self.error(first.2.clone(), "std is missing: with [[encoders]] all other readings need one"))
             }
             None if first.0 == "displacement and rotation" => {
                 Err(self.error(first.2.clone(), "displacements and rotations together need std and std_rotation"))
             }
             None => Ok(false),
             Some((_, _, span)) => {
-                let text = "std is missing: readings of several kinds, or some with a std, all need one";
+                let text = "std is missing: all readings need one if they are of several kinds or some have one";
                 Err(self.error(span.clone(), text))
             }
         }

@@ -83,7 +83,7 @@ impl Reader<'_> {
     ) -> Result<usize, Error> {
         match given {
             Some(name) => known.iter().position(|k| k == name.get_ref()).ok_or_else(|| {
-                let message = format!("there is no [{what}.{}]; there are {known:?}", name.get_ref());
+                let message = format!("there is no [{what}.{}]; the file has {known:?}", name.get_ref());
                 self.error(name.span(), message)
             }),
             None if known.len() == 1 => Ok(0),

@@ -82,7 +82,7 @@ impl Reader<'_> {
         let step_s = even_step(&time).ok_or_else(|| {
             self.error(
                 e.time.span(),
-                format!("the times of {} are not evenly spaced, or fewer than three", path.display()),
+                format!("the times of {} are not evenly spaced, or there are fewer than three", path.display()),
             )
         })?;
         let Units { length, angle, force } = self.units;
@@ -111,11 +111,11 @@ impl Reader<'_> {
         let positive = |value: &Option<Spanned<f64>>, what: &str, default: f64| match value {
             None => Ok(default),
             Some(x) if x.get_ref().is_finite() && *x.get_ref() >= 0.0 => Ok(*x.get_ref()),
-            Some(x) => Err(self.error(x.span(), format!("{what} is {}, expected a number of 0 or above", x.get_ref()))),
+            Some(x) => Err(self.error(x.span(), format!("{what} is {}, expected a non-negative number", x.get_ref()))),
         };
         let link = of(&e.link, false, [angle, length])?;
         if link.iter().all(Option::is_none) {
-            return Err(self.error(e.link.span(), "no joint has an encoder behind its gear"));
+            return Err(self.error(e.link.span(), "no joint has an encoder on the link side of its gear"));
         }
         let mut motor: Vec<Vec<f64>> = of(&e.motor, true, [angle, length])?.into_iter().flatten().collect();
         self.behind_coupling(e, &mut motor)?;
@@ -160,8 +160,9 @@ impl Reader<'_> {
             }
             None => {
                 let text = format!(
-                    "the gears of {:?} are coupled: say whether motor has the angles of the motors behind their gears (positions = \"motors\") \
-                     or the joints that the controller makes of them (positions = \"joints\")",
+                    "the gears of {:?} are coupled: state whether motor contains the motor positions after their \
+                     gears (positions = \"motors\") or the joint positions that the controller computes from them \
+                     (positions = \"joints\")",
                     coupling.joints
                 );
                 return Err(self.error(e.motor.span(), text));

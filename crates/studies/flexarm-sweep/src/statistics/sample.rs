@@ -22,9 +22,9 @@ pub enum SampleMethod {
 impl SampleMethod {
     /// Words for the methods in files, and their meaning.
     pub const WORDS: [(&'static str, Self, &'static str); 4] = [
-        ("random", Self::Random, "each point by itself"),
-        ("latin-hypercube", Self::LatinHypercube, "every interval of each parameter once"),
-        ("sobol", Self::Sobol, "Sobol's sequence, shifted at random"),
+        ("random", Self::Random, "independent random points"),
+        ("latin-hypercube", Self::LatinHypercube, "one point in every interval of each parameter"),
+        ("sobol", Self::Sobol, "Sobol sequence with a random shift"),
         ("saltelli", Self::Saltelli, "count times (parameters + 2) points for Sobol indices"),
     ];
 
