@@ -1,4 +1,4 @@
-//! Loads as values: what programs apply where people write a file of loads.
+//! Loads as values, for programs that do not use a loads file.
 
 use flexarm_kinematics::{Frame, Model, Wrench};
 use flexarm_settings::Quantity;
@@ -16,41 +16,41 @@ pub struct AppliedLoad {
     pub frame: String,
     /// Wrench at the frame's origin.
     pub wrench: TimedWrench,
-    /// When it begins (s), if it has a beginning.
+    /// Start time (s), if there is one.
     pub start_s: Option<f64>,
-    /// Doubts about the entry of the load.
+    /// Caveats about the load as written.
     pub(crate) doubts: Vec<Caveat>,
-    /// Place in the file, if it was read from one.
+    /// Location in the file, if read from one.
     pub(crate) written: Option<Written>,
 }
 
 impl AppliedLoad {
-    /// A wrench at the origin of a frame: `tcp`, or a link that moves.
+    /// Returns a load with a wrench at the origin of a frame: `tcp`, or a link that moves.
     pub fn new(frame: &str, wrench: TimedWrench) -> Self {
         Self { frame: frame.to_owned(), wrench, start_s: None, doubts: Vec::new(), written: None }
     }
 
-    /// The same, known to begin then (s): a load that begins after the run is reported as a caveat.
+    /// Sets the start time (s); a load that starts after the run gives a caveat.
     #[must_use]
     pub fn starting_at(self, start_s: f64) -> Self {
         Self { start_s: Some(start_s), ..self }
     }
 
-    /// A wrench in world axes that stays the same from `start_s` to `end_s` (s) and is zero before
-    /// and after.
+    /// Returns a constant wrench in world axes from `start_s` to `end_s` (s), zero before and
+    /// after.
     pub fn during(frame: &str, F_W: Wrench, start_s: f64, end_s: f64) -> Self {
         let wrench = TimedWrench::new(move |t| if t >= start_s && t <= end_s { F_W } else { Wrench::zeros() });
         Self::new(frame, wrench.with_jumps(vec![start_s, end_s])).starting_at(start_s)
     }
 
-    /// A wrench in world axes that is linear between samples and zero before and after them.
+    /// Returns a wrench in world axes that is linear between samples and zero outside them.
     ///
     /// * `t`: n times (s), increasing; at least two.
     /// * `F`: n wrenches.
     ///
     /// # Errors
-    /// [`Error::Load`] for fewer than two samples, other numbers of them, and times that do not
-    /// increase.
+    /// [`Error::Load`] for fewer than two samples, different numbers of times and wrenches, and
+    /// times that do not increase.
     pub fn sampled(frame: &str, t: &[f64], F: &[Wrench]) -> Result<Self, Error> {
         if t.len() != F.len() || t.len() < 2 || t.windows(2).any(|pair| pair[1].is_nan() || pair[1] <= pair[0]) {
             return Err(LoadError::Samples { times: t.len(), wrenches: F.len() }.into());
@@ -72,7 +72,7 @@ impl AppliedLoad {
         Ok(Self::new(frame, TimedWrench::new(wrench).with_jumps(times)).starting_at(start_s))
     }
 
-    /// On a model, up to the end of a run (s).
+    /// Returns the load on a model, up to the end of a run (s).
     pub(crate) fn on(&self, model: &Model, duration_s: f64) -> Result<Load, Error> {
         let frame = frame_of(&self.frame, model).filter(|frame| frame.body > 0).ok_or_else(|| {
             let known = moving_links(model).into_iter().map(str::to_owned).collect();
@@ -88,13 +88,13 @@ impl AppliedLoad {
     }
 }
 
-/// Names of the links that move, for messages.
+/// Returns the names of the links that move, for messages.
 pub fn moving_links(model: &Model) -> Vec<&str> {
     let named = model.frames().iter().filter(|f| f.body > 0 && !f.name.starts_with("__"));
     named.map(|f| f.name.as_str()).collect()
 }
 
-/// The frame of this name; `tcp` is that of the tool.
+/// Returns the frame with this name; `tcp` is the TCP frame.
 pub(crate) fn frame_of<'m>(name: &str, model: &'m Model) -> Option<&'m Frame> {
     model.frame(if name == "tcp" { TCP_FRAME } else { name })
 }

@@ -1,7 +1,7 @@
-//! A flexible robot, built once and asked often: runs with columns, operating points.
+//! A flexible robot, built once and used for many runs and operating points.
 //!
-//! [`Robot::flexible`] does what costs (substitution, modes); what it returns is immutable, `Send`
-//! and `Sync`, and shared by threads. Each query takes numbers and a workspace of its own.
+//! [`Robot::flexible`] does the costly work (substitution, modes). Its result is immutable, `Send`
+//! and `Sync`, and shared by threads. Each query uses numbers and a workspace of its own.
 
 use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex};
@@ -22,64 +22,64 @@ use crate::summary::Summary;
 /// Joint positions of the last start (rad or m), with the arm at rest there.
 type LastStart = Arc<Mutex<Option<(Vec<f64>, Arc<FlexibleArm>)>>>;
 
-/// A robot with its flexible links and drives in place.
+/// A robot with its flexible links and drives modelled.
 #[derive(Clone)]
 pub struct Arm {
     robot: Arc<Robot>,
     modelling: Modelling,
     flexible: Arc<FlexibleRobot>,
-    /// [`Robot::caveats`].
+    /// Result of [`Robot::caveats`].
     caveats: Arc<[Caveat]>,
-    /// Joint values at which the last motion began, and the arm in equilibrium there.
+    /// Joint values at the start of the last motion, and the arm in equilibrium there.
     pub(crate) last_start: LastStart,
 }
 
 /// Results of a run.
 #[derive(Clone, Debug)]
 pub struct Run {
-    /// The figures, as in `summary.json`.
+    /// Figures, as in `summary.json`.
     pub summary: Summary,
-    /// The signals; empty unless the request keeps [`Keep::Columns`](crate::Keep::Columns).
+    /// Signals; empty unless the request keeps [`Keep::Columns`](crate::Keep::Columns).
     pub columns: Columns,
-    /// The curves, thinned if the run is long; empty unless the request keeps
+    /// Curves, thinned for long runs; empty unless the request keeps
     /// [`Keep::Curves`](crate::Keep::Curves) or writes recordings.
     pub trace: Trace,
 }
 
 impl Run {
-    /// Times of the samples (s).
+    /// Returns the times of the samples (s).
     pub fn time_s(&self) -> &[f64] {
         self.values("time")
     }
 
-    /// TCP error, flexible minus rigid, world axes (m): three numbers per sample. Empty without the
-    /// rigid twin.
+    /// Returns the TCP error, flexible minus rigid, world axes (m): three values per sample. Empty
+    /// without the rigid twin.
     pub fn error_world_m(&self) -> &[f64] {
         self.values("error_world")
     }
 
-    /// Numbers of a signal, rows after each other; empty if there is none of this name.
-    /// [`Columns::columns`] lists them.
+    /// Returns the values of a signal, row by row; empty if there is no signal with this name.
+    /// [`Columns::columns`] lists the names.
     pub fn values(&self, name: &str) -> &[f64] {
         self.columns.column(name).map_or(&[], |column| &column.values)
     }
 }
 
 impl Robot {
-    /// Returns the robot with its links and drives modelled as asked for.
+    /// Returns the robot with its links and drives modelled as requested.
     ///
-    /// Cost: reading of modes, substitution; milliseconds.
+    /// Cost: a few milliseconds for reading modes and substitution.
     ///
     /// # Errors
     /// [`Error::Modelling`] if a link or drive has no such model, [`Error::Model`] if the result is
-    /// no tree.
+    /// not a valid tree.
     pub fn flexible(&self, modelling: Modelling) -> Result<Arm, Error> {
         Ok(Arm::new(self.clone(), modelling, self.modelled(&modelling)?))
     }
 }
 
 impl Arm {
-    /// Returns the arm of a robot that is modelled already.
+    /// Returns the arm of a robot that is already modelled.
     ///
     /// * `flexible`: result of [`Robot::modelled`] with the same `modelling`.
     pub fn new(robot: Robot, modelling: Modelling, flexible: FlexibleRobot) -> Self {
@@ -87,22 +87,22 @@ impl Arm {
         Self { robot: Arc::new(robot), modelling, flexible: Arc::new(flexible), caveats, last_start: Arc::default() }
     }
 
-    /// Returns the robot that the arm was made of.
+    /// Returns the robot from which the arm was built.
     pub fn robot(&self) -> &Robot {
         &self.robot
     }
 
-    /// Returns tree, springs and drives, shared.
+    /// Returns the shared tree, springs and drives.
     pub fn flexible(&self) -> &Arc<FlexibleRobot> {
         &self.flexible
     }
 
-    /// Returns [`Robot::caveats`], found once.
+    /// Returns [`Robot::caveats`], computed once.
     pub fn robot_caveats(&self) -> Arc<[Caveat]> {
         self.caveats.clone()
     }
 
-    /// Returns the caveats of the robot as it is modelled, and of what a command does with it.
+    /// Returns the caveats about the robot as modelled, and about its use by a command.
     pub fn caveats(&self, used: Use<'_>) -> Vec<Caveat> {
         told(&self.robot, &self.flexible, Some(&self.caveats), used)
     }
@@ -118,23 +118,23 @@ impl Arm {
         model.coordinates()[..model.n_actuated()].iter().map(|coordinate| coordinate.joint.as_str())
     }
 
-    /// Runs a motion (`&motion`), or a motion with loads, payloads and a start of its own
-    /// (`&scenario`), and returns figures and columns. The modelling of `options` is not used.
+    /// Runs a motion (`&motion`), or a motion with loads, payloads and a start condition
+    /// (`&scenario`), and returns figures and columns. The modelling in `options` is ignored.
     ///
     /// # Errors
-    /// [`Error`]; [`Error::fault`] says whether input or run is to blame.
+    /// [`Error`]; [`Error::fault`] returns whether the input or the run is at fault.
     pub fn simulate(&self, scenario: impl Into<Scenario>, options: &RunOptions) -> Result<Run, Error> {
         self.simulate_with(scenario, options, RunRequest::default())
     }
 
-    /// As [`Arm::simulate`], with recordings, an observer, progress or less to keep as `request`
-    /// says.
+    /// As [`Arm::simulate`], with recordings, an observer, progress or fewer signals kept,
+    /// according to `request`.
     ///
-    /// Everything about the input is checked before the first file is made. If the run stops early,
-    /// the recordings are closed so that every reader takes them.
+    /// The whole input is checked before the first file is created. If the run stops early, the
+    /// recordings are closed such that every reader accepts them.
     ///
     /// # Errors
-    /// As [`Arm::simulate`]; [`Error::Interrupted`] if observer or progress break off.
+    /// As [`Arm::simulate`]; [`Error::Interrupted`] if observer or progress breaks.
     pub fn simulate_with(
         &self,
         scenario: impl Into<Scenario>,
@@ -145,11 +145,11 @@ impl Arm {
         run::simulate(self, &scenario.into(), &options, request)
     }
 
-    /// Runs all scenarios on all cores; each has the bits of [`Arm::simulate`], for every number of
-    /// threads. As soon as `stop` returns true, runs that are not done end with
+    /// Runs all scenarios on all cores. Results are bitwise identical to [`Arm::simulate`], for any
+    /// number of threads. Once `stop` returns true, unfinished runs end with
     /// [`Error::Interrupted`].
     ///
-    /// Threads are those of `rayon`'s pool. A run that fails does not stop the others.
+    /// Uses the thread pool of `rayon`. A failed run does not stop the others.
     pub fn simulate_batch(
         &self,
         scenarios: &[Scenario],
@@ -163,15 +163,15 @@ impl Arm {
         scenarios.par_iter().map(one).collect()
     }
 
-    /// A workspace for equilibria, compliances and frequencies at any number of poses.
+    /// Returns a workspace for equilibria, compliances and frequencies at any number of poses.
     ///
     /// # Errors
-    /// [`Error::Step`] if a spring is not positive definite, or the arm cannot carry its weight at
-    /// the middle of its joint ranges.
+    /// [`Error::Step`] if a spring is not positive definite, or the arm has no equilibrium under
+    /// gravity at the middle of its joint ranges.
     pub fn operating_point(&self) -> Result<OperatingPoint, Error> {
         let flexible = self.flexible();
         let model = &flexible.model;
-        // Any pose will do; this one is within the limits.
+        // Any pose within the limits is suitable.
         let middle = |lower: f64, upper: f64| match (lower.is_finite(), upper.is_finite()) {
             (true, true) => 0.5 * (lower + upper),
             (false, false) => 0.0,

@@ -1,4 +1,4 @@
-//! Balancers as values: springs, gas springs and counterbalances of a robot, and where they can
+//! Balancers: springs, gas springs and counterbalances of a robot, and the poses in which they can
 //! act.
 
 use flexarm_kinematics::{
@@ -12,35 +12,35 @@ use serde::Serialize;
 use crate::error::BalancerError;
 use crate::robot::Robot;
 
-/// A balancer to put on a robot ([`Robot::with_balancer`]).
+/// A balancer to add to a robot ([`Robot::with_balancer`]).
 #[derive(Clone, Debug, PartialEq)]
 pub struct RobotBalancer {
     /// Unique name.
     pub name: String,
-    /// Points of attack.
+    /// Points or joint on which it acts.
     pub ends: BalancerEnds,
     /// Force law.
     pub law: BalancerLaw,
 }
 
-/// Between what a balancer acts.
+/// Points or joint between which a balancer acts.
 #[derive(Clone, Debug, PartialEq)]
 pub enum BalancerEnds {
     /// Along the line between two points: link, and point in link axes (m).
     Points([(String, [f64; 3]); 2]),
-    /// Over the joint of this name.
+    /// Over the joint with this name.
     Joint(String),
 }
 
 impl RobotBalancer {
-    /// Along the line between two points, each in the axes of its link (m). The law is over their
-    /// distance (m, N).
+    /// Returns a balancer along the line between two points, each in the axes of its link (m). The
+    /// law is a function of their distance (m, N).
     pub fn between(name: &str, from: (&str, [f64; 3]), to: (&str, [f64; 3]), law: BalancerLaw) -> Self {
         let ends = BalancerEnds::Points([from, to].map(|(link, p)| (link.to_owned(), p)));
         Self { name: name.to_owned(), ends, law }
     }
 
-    /// Over a joint. The law is over its value (rad, N m; m, N).
+    /// Returns a balancer over a joint. The law is a function of the joint value (rad, N m; m, N).
     pub fn over_joint(name: &str, joint: &str, law: BalancerLaw) -> Self {
         Self { name: name.to_owned(), ends: BalancerEnds::Joint(joint.to_owned()), law }
     }
@@ -54,22 +54,22 @@ pub struct BalancerInfo {
     /// `line` or `joint`.
     #[serde(rename = "type")]
     pub kind: &'static str,
-    /// Length of a line (m), or value of the joint (rad or m).
+    /// Length of the line (m), or value of the joint (rad or m).
     pub length: f64,
-    /// Tension: what draws the ends together, or the joint to lower values (N; N m or N).
+    /// Tension, which pulls the ends together or the joint to lower values (N; N m or N).
     pub tension: f64,
-    /// Its derivative by the length (N/m; N m/rad).
+    /// Derivative of the tension with respect to the length (N/m; N m/rad).
     pub stiffness: f64,
-    /// Torque or force on each joint (N m or N), in coordinate order.
+    /// Generalised force on each joint (N m or N), in coordinate order.
     pub torque: Vec<f64>,
 }
 
 impl Robot {
-    /// The same robot with a balancer more.
+    /// Adds a balancer to the robot.
     ///
     /// # Errors
-    /// [`BalancerError`]: links and joints that are not there, two ends that do not move against each other, numbers that are
-    /// none, a name that is taken.
+    /// [`BalancerError`] for unknown links and joints, two ends that do not move relative to each
+    /// other, values that are not finite, and a duplicate name.
     pub fn with_balancer(mut self, balancer: RobotBalancer) -> Result<Self, BalancerError> {
         self.add_balancer(balancer)?;
         Ok(self)
@@ -101,8 +101,8 @@ impl Robot {
         Ok(())
     }
 
-    /// Frames for the two ends: fixed to their links, so that a flexible link carries each on the
-    /// part where it is.
+    /// Adds frames for the two ends. They are fixed to their links, so that on a flexible link each
+    /// moves with the part it is on.
     fn line(&mut self, name: &str, ends: &[(String, [f64; 3]); 2]) -> Result<BalancerSpan, BalancerError> {
         let name = name.to_owned();
         for (link, p) in ends {
@@ -129,7 +129,7 @@ impl Robot {
     }
 }
 
-/// The first link inward on whose joint a link moves.
+/// Returns the link at the inner end of the chain of fixed joints that carries a link.
 fn carrier<'m>(mechanism: &'m Mechanism, link: &'m str) -> &'m str {
     let mut at = link;
     while let Some(joint) = mechanism.joints.iter().find(|j| j.child == at && j.kind == JointKind::Fixed) {
@@ -138,7 +138,7 @@ fn carrier<'m>(mechanism: &'m Mechanism, link: &'m str) -> &'m str {
     at
 }
 
-/// Balancers of the rigid robot at joint values (rad or m).
+/// Returns the balancers of the rigid robot at joint values (rad or m).
 pub(crate) fn at_pose(model: &Model, q: &DVector<f64>) -> Vec<BalancerInfo> {
     let mut data = Data::new(model);
     forward_kinematics(model, &mut data, q);
@@ -156,7 +156,7 @@ pub(crate) fn at_pose(model: &Model, q: &DVector<f64>) -> Vec<BalancerInfo> {
     model.balancers().iter().map(info).collect()
 }
 
-/// Returns the torque of a balancer on each coordinate (N m or N), at the poses in `data` and its
+/// Generalised force of a balancer on each coordinate (N m or N), for the poses in `data` and its
 /// length there.
 fn torques(model: &Model, data: &Data, balancer: &PlacedBalancer, length: f64) -> Vec<f64> {
     let mut torque = vec![0.0; model.nv()];
@@ -180,10 +180,10 @@ fn torques(model: &Model, data: &Data, balancer: &PlacedBalancer, length: f64) -
     torque
 }
 
-/// The first balancer that cannot be where these joint values (rad or m) put it.
+/// Checks that every balancer is within its range at these joint values (rad or m).
 ///
 /// # Errors
-/// [`BalancerError::NoRoom`] and [`BalancerError::NoLength`].
+/// [`BalancerError::NoRoom`] and [`BalancerError::NoLength`], for the first balancer that is not.
 pub(crate) fn check_pose(model: &Model, data: &mut Data, q: &DVector<f64>) -> Result<(), BalancerError> {
     if model.balancers().is_empty() {
         return Ok(());
@@ -208,10 +208,10 @@ pub(crate) fn check_pose(model: &Model, data: &mut Data, q: &DVector<f64>) -> Re
     Ok(())
 }
 
-/// Times at which a motion is looked at.
+/// Number of time intervals at which a motion is checked.
 const TIMES: usize = 1000;
 
-/// As [`check_pose`] along a motion of the rigid robot.
+/// As [`check_pose`], along a motion of the rigid robot.
 ///
 /// # Errors
 /// [`BalancerError::AlongMotion`].

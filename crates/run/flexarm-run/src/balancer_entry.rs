@@ -1,4 +1,4 @@
-//! Balancers of a robot file: from the text to checked numbers.
+//! Balancer entries of a robot file: from the text to checked values.
 
 use std::f64::consts::PI;
 use std::ops::{Range, RangeInclusive};
@@ -12,31 +12,31 @@ use crate::error::Error;
 use crate::robot::Robot;
 use crate::robot_file::{RobotFileError, Source};
 
-/// Exponents of gases: isothermal to beyond the adiabatic one of a gas of single atoms, compressed
-/// hard.
+/// Polytropic exponents of gases: from isothermal to beyond the adiabatic exponent of a monatomic
+/// gas at high pressure.
 const EXPONENT: RangeInclusive<f64> = 1.0..=2.0;
 
-/// A spring, a gas spring or a counterbalance: between two points, or over one joint.
+/// A spring, gas spring or counterbalance, between two points or over one joint.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct BalancerEntry {
-    /// For messages; made from what it acts on if not given.
+    /// Name for messages; `balancer_1` and so on by default.
     pub name: Option<Spanned<String>>,
-    /// One end.
+    /// First end.
     pub from: Option<Spanned<EndEntry>>,
-    /// The other one.
+    /// Second end.
     pub to: Option<Spanned<EndEntry>>,
-    /// Instead of the ends: the joint over which it acts.
+    /// Joint over which the balancer acts, instead of two ends.
     pub joint: Option<Spanned<String>>,
-    /// A straight spring.
+    /// Linear spring.
     pub spring: Option<Spanned<SpringEntry>>,
-    /// A gas under a piston.
+    /// Gas cylinder with piston.
     pub gas: Option<Spanned<GasEntry>>,
-    /// A gas spring by its data sheet.
+    /// Gas spring, by the values of its data sheet.
     pub gas_spring: Option<Spanned<GasSpringEntry>>,
-    /// A sine over a joint.
+    /// Torque that is a sine of the joint angle.
     pub sine: Option<Spanned<SineEntry>>,
-    /// Points: (m, N) that pulls, or (rad, N m) on the joint.
+    /// Points of a force curve: (m, N), positive in tension, or (rad, N m) on the joint.
     pub curve: Option<Spanned<Vec<[f64; 2]>>>,
 }
 
@@ -44,50 +44,50 @@ pub(crate) struct BalancerEntry {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct EndEntry {
-    /// Link of the URDF.
+    /// Name of the URDF link.
     pub link: Spanned<String>,
     /// Point in link axes (m).
     #[serde(default)]
     pub xyz: [f64; 3],
 }
 
-/// A straight spring.
+/// Linear spring.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct SpringEntry {
-    /// (N/m; N m/rad over a joint).
+    /// Spring rate (N/m; N m/rad over a joint).
     pub rate: f64,
-    /// Length at which it has its preload (m).
+    /// Length at which the force is the preload (m).
     pub free_length: Option<f64>,
-    /// Angle, or place of a joint that slides, at which it has its preload (rad or m).
+    /// Angle, or position of a prismatic joint, at which the force is the preload (rad or m).
     pub free_angle: Option<f64>,
-    /// Force there (N), or torque on the joint (N m).
+    /// Tension (N) or joint torque (N m) at that length or angle.
     #[serde(default)]
     pub preload: f64,
 }
 
-/// A gas under a piston.
+/// Gas cylinder with piston.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct GasEntry {
     /// `pull` or `push`.
     pub acts: Spanned<String>,
-    /// At `length`, absolute (Pa).
+    /// Absolute pressure at `length` (Pa).
     pub pressure: f64,
     /// Volume of the gas at `length` (m³).
     pub volume: f64,
-    /// Area that the pressure works on (m²).
+    /// Effective piston area (m²).
     pub area: Option<f64>,
-    /// Or the diameter of the piston (m),
+    /// Diameter of the piston, instead of the area (m).
     pub piston_diameter: Option<f64>,
-    /// and of the rod on the side of the pressure (m).
+    /// Diameter of the rod on the pressure side (m).
     pub rod_diameter: Option<f64>,
-    /// Length to which pressure and volume belong (m).
+    /// Length to which pressure and volume refer (m).
     pub length: f64,
-    /// n in `p V^n`.
+    /// Polytropic exponent n in `p V^n`.
     #[serde(default = "isothermal")]
     pub exponent: f64,
-    /// On the other side of the piston (Pa).
+    /// Pressure on the other side of the piston (Pa).
     #[serde(default)]
     pub ambient_pressure: f64,
 }
@@ -96,34 +96,34 @@ fn isothermal() -> f64 {
     1.0
 }
 
-/// A gas spring by its data sheet.
+/// Gas spring, by the values of its data sheet.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct GasSpringEntry {
-    /// Pushing force of the extended spring (N).
+    /// Force when extended, pushing (N).
     pub force: f64,
     /// Extended length (m).
     pub length: f64,
-    /// Maximum compression (m).
+    /// Stroke (m).
     pub stroke: f64,
-    /// Force pressed together over force extended.
+    /// Ratio of the force when compressed to the force when extended.
     pub progression: f64,
-    /// n in `p V^n`.
+    /// Polytropic exponent n in `p V^n`.
     #[serde(default = "isothermal")]
     pub exponent: f64,
 }
 
-/// `torque sin(q - zero)` on a joint.
+/// Torque `torque sin(q - zero)` on a joint.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct SineEntry {
-    /// (N m).
+    /// Amplitude (N m).
     pub torque: f64,
-    /// (rad).
+    /// Angle of zero torque (rad).
     pub zero: f64,
 }
 
-/// Puts the balancers of a file on a robot; faults are put aside so that all are found.
+/// Adds the balancers of a file to a robot; collects the errors so that all are found.
 pub(crate) fn add_balancers(
     robot: &mut Robot,
     entries: &[Spanned<BalancerEntry>],
@@ -143,7 +143,7 @@ pub(crate) fn add_balancers(
     }
 }
 
-/// Place of an entry as a whole, for errors.
+/// Location for errors about the entry as a whole.
 fn place_of(entry: &Spanned<BalancerEntry>) -> Range<usize> {
     let inner = entry.get_ref();
     let joint = inner.joint.as_ref().map(Spanned::span);
@@ -193,14 +193,14 @@ fn balancer(
     }
 }
 
-/// From entries to laws.
+/// Converts entries to force laws.
 struct Law<'a, F> {
     over_joint: bool,
     fail: &'a F,
 }
 
 impl<F: Fn(Range<usize>, String) -> RobotFileError> Law<'_, F> {
-    /// A number with a condition on it.
+    /// Checks a number against a condition.
     fn number(
         &self,
         at: &Range<usize>,
@@ -219,7 +219,7 @@ impl<F: Fn(Range<usize>, String) -> RobotFileError> Law<'_, F> {
         self.number(at, key, value, value > 0.0, &format!("a positive number in {unit}"))
     }
 
-    /// Refuses a key that applies to balancers along a line only.
+    /// Rejects a law that only acts along a line if the balancer acts over a joint.
     fn along_line(&self, at: &Range<usize>, what: &str) -> Result<(), RobotFileError> {
         match self.over_joint {
             true => Err((self.fail)(
@@ -240,7 +240,8 @@ impl<F: Fn(Range<usize>, String) -> RobotFileError> Law<'_, F> {
             (Some(length), None, false) => {
                 (self.number(&at, "free_length", length, length >= 0.0, "0 or a positive length in m")?, 1.0)
             }
-            // The preload is what acts on the joint, the tension of the law what holds against it.
+            // The preload acts on the joint; the law gives the tension, which has the opposite
+            // sign.
             (None, Some(angle), true) => {
                 (self.number(&at, "free_angle", angle, true, "an angle in rad (m where the joint slides)")?, -1.0)
             }
@@ -307,7 +308,7 @@ impl<F: Fn(Range<usize>, String) -> RobotFileError> Law<'_, F> {
         self.number(at, "exponent", exponent, EXPONENT.contains(&exponent), &expected)
     }
 
-    /// `progression = (1 - slope stroke)^-n`.
+    /// Converts data-sheet values using `progression = (1 - slope stroke)^-n`.
     fn gas_spring(&self, entry: &Spanned<GasSpringEntry>) -> Result<BalancerLaw, RobotFileError> {
         let (at, gas) = (entry.span(), entry.get_ref());
         self.along_line(&at, "gas_spring")?;

@@ -1,35 +1,35 @@
-//! A `beam = { ... }` entry: its keys, and the section and material that they make.
+//! A `beam = { ... }` entry: its keys, and the section and material built from them.
 //!
-//! Which lengths a shape takes is said once, in [`Section::SHAPES`].
+//! [`Section::SHAPES`] lists the lengths that each shape takes.
 
 use flexarm_fem::{Bar, Material, Section};
 use serde::Deserialize;
 
 use crate::robot_file::MaterialEntry;
 
-/// A closed-form beam from the link's frame to the distal joint.
+/// Closed-form beam from the link's frame to the distal joint.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct BeamEntry {
-    /// box, rectangle, tube, circle, i_beam, channel or given.
+    /// `box`, `rectangle`, `tube`, `circle`, `i_beam`, `channel` or `given`.
     pub section: String,
-    /// Along section axis y (m).
+    /// Width along section axis y (m).
     pub width: Option<f64>,
-    /// Along section axis z (m).
+    /// Height along section axis z (m).
     pub height: Option<f64>,
-    /// Thickness (m).
+    /// Wall thickness (m).
     pub wall: Option<f64>,
-    /// Outer diameter of a tube (m).
+    /// Outer diameter of tubes (m).
     pub outer_diameter: Option<f64>,
-    /// Diameter of a circle (m).
+    /// Diameter of circles (m).
     pub diameter: Option<f64>,
-    /// Thickness of the web of I-beams and channels (m).
+    /// Web thickness of I-beams and channels (m).
     pub web: Option<f64>,
-    /// Thickness of their flanges (m).
+    /// Flange thickness of I-beams and channels (m).
     pub flange: Option<f64>,
-    /// Radius between both (m); 0 if not given.
+    /// Fillet radius between web and flange (m); 0 by default.
     pub fillet: Option<f64>,
-    /// Stretching stiffness (N).
+    /// Axial stiffness (N).
     #[serde(rename = "EA")]
     pub ea: Option<f64>,
     /// Bending stiffness about y (N m²).
@@ -47,31 +47,31 @@ pub(crate) struct BeamEntry {
     /// Shear stiffness along z (N).
     #[serde(rename = "kGA_z")]
     pub kga_z: Option<f64>,
-    /// For given sections (kg/m).
+    /// Mass per length of given sections (kg/m).
     pub mass_per_length: Option<f64>,
-    /// Rotary inertia about y, `rho I_y`, for given sections (kg m).
+    /// Rotary inertia about y, `rho I_y`, of given sections (kg m).
     pub rotary_y: Option<f64>,
-    /// Rotary inertia about z, for given sections (kg m).
+    /// Rotary inertia about z of given sections (kg m).
     pub rotary_z: Option<f64>,
-    /// A name or elastic constants.
+    /// Name of a material, or its elastic constants.
     pub material: Option<MaterialEntry>,
-    /// euler-bernoulli or timoshenko.
+    /// `euler-bernoulli` or `timoshenko`.
     pub theory: Option<String>,
-    /// Direction of the section's y axis in link axes; chosen if not given.
+    /// Direction of the section's y axis in link axes; chosen automatically by default.
     pub y_axis: Option<[f64; 3]>,
-    /// Turn of the section about the beam (rad).
+    /// Rotation of the section about the beam (rad).
     #[serde(default)]
     pub roll: f64,
-    /// From the line A-B to the beam, link axes (m).
+    /// Offset of the beam from the line A-B, link axes (m).
     #[serde(default)]
     pub offset: [f64; 3],
-    /// Ends of the beam, link axes (m); A and B if not given. Rigid arms lead
-    /// from there to the joints.
+    /// Ends of the beam itself, link axes (m); A and B by default. Rigid arms connect them to the
+    /// joints.
     pub ends: Option<[[f64; 3]; 2]>,
     /// Position of the split, as a fraction of A-B.
     #[serde(default = "half")]
     pub split: f64,
-    /// from-link or uniform.
+    /// `from-link` or `uniform`.
     pub parts: Option<String>,
 }
 
@@ -79,12 +79,12 @@ fn half() -> f64 {
     0.5
 }
 
-/// The section by its stiffness instead of a shape.
+/// Section given by its stiffness instead of a shape.
 const GIVEN: &str = "given";
 const GIVEN_KEYS: &[&str] = &["EA", "EI_y", "EI_z", "GJ", "kGA_y", "kGA_z", "mass_per_length", "rotary_y", "rotary_z"];
 
 impl BeamEntry {
-    /// Every number that describes a section, by its key.
+    /// Returns all numbers that describe a section, by key.
     fn section_numbers(&self) -> [(&'static str, Option<f64>); 17] {
         [
             ("width", self.width),
@@ -116,12 +116,12 @@ impl BeamEntry {
     }
 }
 
-/// Section and material; messages say which key is missing or too much.
+/// Builds section and material; messages name missing and superfluous keys.
 pub(crate) fn beam_section(beam: &BeamEntry) -> Result<(Section, Material), String> {
     let material = match &beam.material {
         Some(MaterialEntry::Named(name)) => Material::named(name).map_err(|e| e.to_string())?,
         Some(MaterialEntry::Given(m)) => Material::isotropic(m.young, m.nu, m.rho),
-        // A given section carries its own stiffness.
+        // A given section contains its own stiffness.
         None if beam.section == GIVEN => Material::STEEL,
         None => return Err("material is missing: a name such as \"steel\" or { E = ..., nu = ..., rho = ... }".into()),
     };
@@ -132,7 +132,7 @@ pub(crate) fn beam_section(beam: &BeamEntry) -> Result<(Section, Material), Stri
     Ok((section, material))
 }
 
-/// The section and the keys that it takes.
+/// Builds the section, and returns the keys that it takes.
 fn section(beam: &BeamEntry) -> Result<(Section, &'static [&'static str]), String> {
     if beam.section == GIVEN {
         let bar = Bar {

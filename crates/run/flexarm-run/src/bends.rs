@@ -1,4 +1,4 @@
-//! Stations along flexible links for drawing them deformed, and the links attached to the stations.
+//! Drawing of deflected links: stations along each flexible link, and the links attached to them.
 
 use flexarm_flexlink::Substituted;
 use flexarm_kinematics::{Data, Frame, Model, Pose, forward_kinematics};
@@ -10,14 +10,14 @@ use nalgebra::{DVector, Translation3, Vector3};
 pub struct Bend {
     /// Name of the link.
     pub link: String,
-    /// Links of the model that the stations are fixed to, with their undeformed places in the
+    /// Links of the model that carry the stations, with the stations' undeformed positions in the
     /// flexible link (m).
     pub stations: Vec<(String, Vector3<f64>)>,
-    /// Links of the URDF that hang on a station.
+    /// Links of the URDF attached to a station.
     pub carries: Vec<(String, usize)>,
 }
 
-/// One per span of the substitution.
+/// Returns one entry per span of the substitution.
 pub(crate) fn bends(substituted: &Substituted) -> Vec<Bend> {
     let mechanism = &substituted.mechanism;
     let of_span = |span: &flexarm_flexlink::FlexibleSpan| {
@@ -27,8 +27,8 @@ pub(crate) fn bends(substituted: &Substituted) -> Vec<Bend> {
             let middle = 0.5 * (pair[0].X_LS.translation.vector + pair[1].X_LS.translation.vector);
             stations.push((pair[0].distal_link.clone(), middle));
         }
-        // Undeformed, the distal part has its frame at the last joint; of a modal link it is
-        // interface B itself.
+        // Undeformed, the frame of the distal part is at the last joint; for a modal link it is at
+        // interface B.
         let X_LD = match joints.last() {
             Some(joint) => joint.X_LS,
             None => {
@@ -46,7 +46,7 @@ pub(crate) fn bends(substituted: &Substituted) -> Vec<Bend> {
     substituted.spans.iter().map(of_span).collect()
 }
 
-/// Stations in a model: their description for the header of recordings, and their frames for
+/// Returns the stations in a model: the constant data for recordings, and the frames evaluated for
 /// samples.
 pub(crate) fn stations(bends: &[Bend], model: &Model, links: &[LinkInfo]) -> (Vec<BendInfo>, Vec<Frame>) {
     let mut data = Data::new(model);

@@ -1,4 +1,4 @@
-//! Lint: everything that can be said about a robot and a trajectory, not only the first thing.
+//! Checks a robot and a trajectory and collects all findings.
 
 use std::path::Path;
 
@@ -22,30 +22,30 @@ use crate::posed::Posed;
 use crate::robot::{LoadOptions, Robot};
 use crate::scenario::Scenario;
 
-/// One thing found.
+/// A finding.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Finding {
-    /// error, warning or note.
+    /// `error`, `warning` or `note`.
     pub severity: &'static str,
     /// Short, stable name of the kind of finding.
     pub code: String,
     /// File and line, or joint or link.
     #[serde(rename = "where")]
     pub location: String,
-    /// Value found.
+    /// Message.
     pub message: String,
-    /// Remedy.
+    /// Suggested fix.
     pub help: String,
-    /// Value that was found, if it is one.
+    /// Value that was found, if it is a number.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub value: Option<f64>,
-    /// Yardstick of the comparison.
+    /// Threshold or reference for the value.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub yardstick: Option<f64>,
     /// Unit of both.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub unit: String,
-    /// The slip that would explain it.
+    /// Unit error or other mistake that would explain the value.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub likely: String,
 }
@@ -59,7 +59,7 @@ impl Finding {
         Self { severity: "note", code: code.into(), location, message, ..Self::default() }
     }
 
-    /// A caveat about something in a file.
+    /// Returns a finding for a caveat about something in a file.
     fn caveat(file: &Path, caveat: Caveat) -> Self {
         let severity = caveat.severity.word();
         let prefix = format!("{}: ", file.display());
@@ -81,15 +81,16 @@ impl From<&UrdfFinding> for Finding {
     }
 }
 
-/// All findings about a robot, and about a trajectory on it.
+/// Returns all findings about a robot, and about a trajectory on it.
 ///
-/// Never fails: what cannot be loaded is a finding of severity `error`. The robot is held where the
-/// trajectory begins, else its default trajectory, else in the middle of its joint ranges.
+/// Never fails: anything that cannot be loaded is a finding of severity `error`. The robot is
+/// checked at the start of the trajectory, or of its default trajectory, or else in the middle of
+/// its joint ranges.
 pub fn check(robot: &Path, trajectory: Option<&Path>, options: &LoadOptions) -> Vec<Finding> {
     check_with_loads(robot, trajectory, None, options)
 }
 
-/// As [`check()`], and about the loads that a file puts on the robot during the trajectory.
+/// As [`check()`], and also checks the loads of a file that act during the trajectory.
 pub fn check_with_loads(
     robot: &Path,
     trajectory: Option<&Path>,
@@ -99,7 +100,7 @@ pub fn check_with_loads(
     check_with_motion(robot, trajectory, &MotionOptions::default(), loads, options)
 }
 
-/// As [`check_with_loads`], with the topic of a bag or the columns of a table.
+/// As [`check_with_loads`], with a given topic of a bag or given columns of a table.
 pub fn check_with_motion(
     robot: &Path,
     trajectory: Option<&Path>,
@@ -128,7 +129,7 @@ pub fn check_with_motion(
             None
         }
         (Some(path), _) => check_motion(&robot, path, motion_options, &mut findings),
-        // Faults of the default motion are reported when it is used.
+        // Errors of the default trajectory are only reported when it is checked itself.
         (None, Some(own)) => robot.rigid_model().ok().and_then(|model| {
             let motion = crate::Motion::load(own, &robot).ok()?;
             let along = of_motion(&motion.name, &motion.trajectory, &model);
@@ -144,7 +145,7 @@ pub fn check_with_motion(
     findings
 }
 
-/// Adds the findings about a file of loads.
+/// Adds the findings about a loads file.
 fn check_loads(robot: &Robot, motion: Option<&Motion>, path: &Path, findings: &mut Vec<Finding>) {
     let Some(motion) = motion else {
         let message = "loads belong to a motion, which is missing or cannot be read";
@@ -165,8 +166,8 @@ fn check_loads(robot: &Robot, motion: Option<&Motion>, path: &Path, findings: &m
     }
 }
 
-/// Returns the error of a motion whose robot cannot be loaded; missing limits that the robot would
-/// give are no error.
+/// Returns the error of a motion whose robot cannot be loaded; limits that the robot would provide
+/// do not count as missing.
 fn motion_without_robot(path: &Path, options: &MotionOptions) -> Option<Finding> {
     let file = MotionFile { path, joints: None, limits: &[], options, cell: None, text: None };
     let error = motion_formats::read(&file).err()?;
@@ -175,7 +176,7 @@ fn motion_without_robot(path: &Path, options: &MotionOptions) -> Option<Finding>
     (!follows).then(|| Finding::error("trajectory", path.display().to_string(), &error))
 }
 
-/// Adds the errors of loading a robot, one finding per fault.
+/// Adds one finding per error that prevented loading the robot.
 fn load_findings(error: &Error, path: &Path, findings: &mut Vec<Finding>) {
     match error {
         Error::Several(errors) => errors.iter().for_each(|e| load_findings(e, path, findings)),
@@ -221,7 +222,7 @@ fn check_flexible(robot: &Robot, motion: Option<&Motion>, findings: &mut Vec<Fin
     }
 }
 
-/// The motion, if it can be used, with its findings.
+/// Returns the motion, if usable, and adds its findings.
 fn check_motion(robot: &Robot, path: &Path, options: &MotionOptions, findings: &mut Vec<Finding>) -> Option<Motion> {
     let file = || path.display().to_string();
     match crate::Motion::load_with(path, robot, options) {

@@ -1,5 +1,5 @@
-//! `[[controller_axis]]` of a robot file: how the robot's controller counts its axes, where it does
-//! otherwise than the description.
+//! `[[controller_axis]]` of a robot file: axis conventions of the robot's controller that differ
+//! from the description.
 
 use flexarm_kinematics::{JointKind, Mechanism};
 use flexarm_urdf::closest;
@@ -9,25 +9,25 @@ use toml::Spanned;
 use crate::error::Error;
 use crate::robot_file::{RobotFileError, Source};
 
-/// An entry as written.
+/// Entry as written.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct ControllerAxisEntry {
     /// Joint of the URDF.
     pub joint: Spanned<String>,
-    /// 1 or -1.
+    /// Sense of rotation relative to the joint: 1 or -1.
     pub sense: Option<Spanned<i64>>,
-    /// Value of the joint where the axis is at zero (rad or m).
+    /// Joint value at which the axis is zero (rad or m).
     pub zero: Option<Spanned<f64>>,
     /// The same in degrees.
     pub zero_deg: Option<Spanned<f64>>,
-    /// Joint of an axis before, which this one is measured against.
+    /// Joint of an earlier axis relative to which this one is measured.
     pub relative_to: Option<Spanned<String>>,
-    /// Factor of that axis in the joint value; -1 if not given.
+    /// Factor with which that axis adds to the joint; -1 by default.
     pub factor: Option<Spanned<f64>>,
 }
 
-/// An axis of the controller: `joint = zero + sense axis + factor axis_other`.
+/// Axis of the controller: `joint = zero + sense axis + factor axis_other`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RobotAxis {
     pub(crate) joint: String,
@@ -37,7 +37,7 @@ pub struct RobotAxis {
     pub(crate) relative: Option<(String, f64)>,
 }
 
-/// All entries; what is wrong with some goes to the faults.
+/// Checks all entries; collects errors in `faults`.
 pub(crate) fn controller_axes(
     entries: &[ControllerAxisEntry],
     mechanism: &Mechanism,

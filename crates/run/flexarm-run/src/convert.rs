@@ -1,4 +1,4 @@
-//! Recordings from one format to another, and back into memory.
+//! Conversion of recordings between formats, and reading them into memory.
 
 use std::ffi::OsString;
 use std::io::ErrorKind;
@@ -11,38 +11,38 @@ use serde::Serialize;
 
 use crate::error::{Error, RecordingError};
 
-/// Samples between two looks at the callback.
+/// Number of samples between two calls of the callback.
 const POLL_EVERY: u64 = 1000;
-/// Provisional names that are tried.
+/// Maximum number of provisional names that are tried.
 const MOST_NAMES: u32 = 1000;
 
-/// Choices of a conversion.
+/// Options of a conversion.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ConvertOptions {
-    /// Format of the input, whatever its name ends with.
+    /// Format of the input, regardless of its extension.
     pub from: Option<RecordingFormat>,
-    /// Format of the output, whatever its name ends with.
+    /// Format of the output, regardless of its extension.
     pub to: Option<RecordingFormat>,
-    /// Overwrite the output.
+    /// Whether to overwrite an existing output.
     pub overwrite: bool,
 }
 
-/// Source of the conversion.
+/// Summary of a conversion.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct ConvertSummary {
-    /// The recording that was read.
+    /// Path of the input.
     pub input: String,
-    /// The one that was written.
+    /// Path of the output.
     pub output: String,
-    /// Ending of the input's format, such as mcap or csv.
+    /// Extension of the input's format, such as mcap or csv.
     pub from: &'static str,
-    /// The same of the output.
+    /// Extension of the output's format.
     pub to: &'static str,
-    /// Instants.
+    /// Number of samples.
     pub samples: u64,
-    /// Time from the first to the last (s).
+    /// Time from the first to the last sample (s).
     pub duration_s: f64,
-    /// Content that was not converted, as sentences.
+    /// Content that was lost, as sentences.
     pub lost: Vec<String>,
     /// Warnings, such as a truncated end, as sentences.
     pub warnings: Vec<String>,
@@ -50,22 +50,23 @@ pub struct ConvertSummary {
 
 /// Writes the run of a recording as a recording of another format.
 ///
-/// The output comes into being under another name and is renamed at the end: whatever goes wrong,
-/// it is there whole or not at all, and what was there before stays until then.
+/// The output is written under a provisional name and renamed at the end: it is either complete or
+/// absent, and an existing file stays until then.
 ///
 /// # Errors
-/// [`Error::Recording`] if a format is not known or input and output are one file; [`Error::File`]
-/// if the input is not there or the output is and may not be overwritten; [`Error::Log`] for what
-/// the files say.
+/// [`Error::Recording`] if a format is not known or input and output are the same file;
+/// [`Error::File`] if the input does not exist, or the output exists and may not be overwritten;
+/// [`Error::Log`] for errors in the files.
 pub fn convert(input: &Path, output: &Path, options: &ConvertOptions) -> Result<ConvertSummary, Error> {
     convert_until(input, output, options, &mut |_| ControlFlow::Continue(()))
 }
 
-/// As [`convert()`], until the callback breaks off; it receives the time that the conversion has
-/// come to (s).
+/// As [`convert()`], until the callback breaks; its argument is the recording time reached so far
+/// (s).
 ///
 /// # Errors
-/// As [`convert()`]; [`Error::Interrupted`] when broken off, and there is no output then.
+/// As [`convert()`]; [`Error::Interrupted`] if the callback breaks, in which case no output is
+/// left.
 pub fn convert_until(
     input: &Path,
     output: &Path,
@@ -84,9 +85,9 @@ pub fn convert_until(
         return Err(Error::Interrupted { t: 0.0, partial: false });
     }
     let mut partial = Partial::of(output)?;
-    // Overwrites nothing: its file is a new one under a provisional name.
+    // The file is new, under a provisional name, so nothing is overwritten.
     let mut recorder = crate::record::recorder(to, &partial.path, CreateOptions::default())?;
-    // Messages name the file that was asked for.
+    // Messages name the requested file.
     let hidden = partial.folder.clone();
     let named = |error: LogError| error.with_path_for(&hidden, output);
     recorder.begin(source.header()).map_err(named)?;
@@ -127,18 +128,18 @@ pub fn convert_until(
     })
 }
 
-/// A recording of which nothing can be shown; `why` is what its reader says about it.
+/// Error for a recording without samples; `why` is the reader's explanation.
 pub(crate) fn no_sample(path: &Path, why: Option<&String>) -> Error {
     let mend = why.cloned().unwrap_or_else(|| "the run that should write it recorded nothing".into());
     let (path, found, expected) = (path.to_owned(), "no sample".into(), "at least one".into());
     LogError::NotARecording { path, found, expected, mend }.into()
 }
 
-/// Reads a recording into memory: its summary, if it holds one (MCAP and tables with texts), its
-/// curves, and sentences about what is missing.
+/// Reads a recording into memory: its summary, if it contains one (MCAP and tables with texts), its
+/// curves, and messages about missing parts.
 ///
-/// What the format does not hold is NaN or empty ([`flexarm_log::RunSource::missing`]); a broken
-/// end is no error here, but one of the sentences.
+/// Quantities that the format does not contain are NaN or empty
+/// ([`flexarm_log::RunSource::missing`]); a truncated end is not an error but gives a message.
 ///
 /// # Errors
 /// As [`convert()`].
@@ -163,10 +164,10 @@ pub fn read_run(path: &Path) -> Result<(Option<serde_json::Value>, Trace, Vec<St
     Ok((summary, trace, told))
 }
 
-/// The formats of recordings by their words.
+/// Returns the recording format with this name.
 ///
 /// # Errors
-/// Which words there are.
+/// A message with the valid names.
 pub fn parse_recording_format(word: &str) -> Result<RecordingFormat, String> {
     RecordingFormat::from_word(word).ok_or_else(|| format!("expected one of {}", words()))
 }
@@ -200,8 +201,8 @@ pub(crate) fn same_file(a: &Path, b: &Path) -> bool {
     a.canonicalize().ok().zip(b.canonicalize().ok()).is_some_and(|(a, b)| a == b)
 }
 
-/// A file in a folder of its own beside the output, so that its name is unique. The folder
-/// goes away in the end.
+/// File in a folder of its own next to the output, so that its name is unique. The folder is
+/// removed at the end.
 struct Partial {
     folder: PathBuf,
     path: PathBuf,
@@ -231,6 +232,6 @@ impl Partial {
 
 impl Drop for Partial {
     fn drop(&mut self) {
-        let _ = std::fs::remove_dir_all(&self.folder); // what cannot be removed stays; the error that led here is told
+        let _ = std::fs::remove_dir_all(&self.folder); // best effort
     }
 }

@@ -1,8 +1,7 @@
-//! TCP deflection in many runs of one arm, on all cores and several runs at a time in
-//! each.
+//! TCP deflections in many runs of one arm, on all cores and with several runs at a time on each.
 //!
-//! For studies: payload, motion, stiffness and damping vary, and of each run the deflection is
-//! wanted, not recordings, drives or settling; these are [`Arm::simulate_batch`]'s. Start at
+//! For studies in which payload, motion, stiffness and damping vary and only the deflection is
+//! needed. For recordings, drives or settling use [`Arm::simulate_batch`]. Start at
 //! [`Arm::deflections`].
 
 use flexarm_stepping::{Batch, BatchRun, FlexibleArm, Spring, StepError, ToolDeflection};
@@ -14,31 +13,31 @@ use crate::options::RunOptions;
 use crate::prepare::{loaded, runnable};
 use crate::scenario::Scenario;
 
-/// One run of [`Arm::deflections`]: what happens, and what is different in the arm.
+/// One run of [`Arm::deflections`]: scenario and changes to the arm.
 #[derive(Clone, Debug)]
 pub struct Variation {
-    /// Motion, loads, payloads, start. A payload that is attached at 0 is carried from the start.
+    /// Motion, loads, payloads, start. A payload attached at 0 is carried from the start.
     pub scenario: Scenario,
-    /// Factor of all stiffnesses.
+    /// Factor on all stiffnesses.
     pub stiffness: f64,
-    /// Factor of all damping: ratios, coefficients, dampers. What is in proportion to the stiffness
-    /// follows that as well.
+    /// Factor on all damping: ratios, coefficients, dampers. Stiffness-proportional damping also
+    /// follows the stiffness factor.
     pub damping: f64,
 }
 
 impl Variation {
-    /// The arm as it is.
+    /// Returns a variation of the unchanged arm.
     pub fn new(scenario: impl Into<Scenario>) -> Self {
         Self { scenario: scenario.into(), stiffness: 1.0, damping: 1.0 }
     }
 
-    /// Returns the variation with the stiffness of all springs multiplied by a factor.
+    /// Sets the factor on all stiffnesses.
     #[must_use]
     pub fn with_stiffness(self, factor: f64) -> Self {
         Self { stiffness: factor, ..self }
     }
 
-    /// Returns the variation with the damping multiplied by a factor.
+    /// Sets the factor on all damping.
     #[must_use]
     pub fn with_damping(self, factor: f64) -> Self {
         Self { damping: factor, ..self }
@@ -46,21 +45,19 @@ impl Variation {
 }
 
 impl Arm {
-    /// Peak, RMS and final deflection of the tool in each run; with `keep_samples` also after every
-    /// step.
+    /// Computes peak, RMS and final TCP deflection of each run; with `keep_samples` also the
+    /// deflection after every step.
     ///
-    /// Figures are taken at the start and at the end of every step, not at the log rate. Runs of
-    /// one tree (same links and joints, whatever their inertias, stiffness, damping and motion) go
-    /// four at a time through the vector instructions of processors with AVX2, eight at a time
-    /// through those of AVX-512; loads, torque-driven joints, curved springs, motions with corners
-    /// and other steppers than generalised-alpha take a run out of that. The numbers are the same
-    /// to the last bit in any company, order and number of threads. A run that fails does not stop
-    /// the others. As soon as `stop` returns true, runs that have not begun end with
-    /// [`Error::Interrupted`].
+    /// Figures are evaluated at the start and at the end of every step, not at the log rate. Runs
+    /// of the same tree (same links and joints, whatever their inertias, stiffness, damping and
+    /// motion) are processed four at a time with AVX2 vector instructions, eight at a time with
+    /// AVX-512. Loads, torque-driven joints, curved springs, motions with corners and steppers
+    /// other than generalised-alpha exclude a run from this. Results are bitwise identical for any
+    /// grouping, order and number of threads. A failed run does not stop the others. Once `stop`
+    /// returns true, runs that have not started end with [`Error::Interrupted`].
     ///
     /// # Errors
-    /// Of each run its own: as [`Arm::simulate`]; [`ValueError::Factor`] unless both factors are
-    /// positive.
+    /// Per run: as [`Arm::simulate`]; [`ValueError::Factor`] unless both factors are positive.
     pub fn deflections(
         &self,
         runs: &[Variation],
@@ -68,7 +65,7 @@ impl Arm {
         keep_samples: bool,
         stop: &(dyn Fn() -> bool + Sync),
     ) -> Vec<Result<ToolDeflection, Error>> {
-        // Side by side go runs that last about equally long.
+        // Runs of similar duration are grouped.
         let mut order: Vec<usize> = (0..runs.len()).collect();
         order.sort_by(|a, b| runs[*a].scenario.duration_s().total_cmp(&runs[*b].scenario.duration_s()));
         let found = order.par_chunks(Batch::most_side_by_side()).flat_map_iter(|numbers| {
@@ -84,7 +81,7 @@ impl Arm {
         found.into_iter().map(|(_, result)| result).collect()
     }
 
-    /// A few runs, on this thread.
+    /// Processes a few runs on this thread.
     fn deflections_of(
         &self,
         runs: &[&Variation],
@@ -111,7 +108,7 @@ impl Arm {
             tool: flexible.tcp.clone(),
             keep_samples,
         };
-        // Starts rarely differ.
+        // The start conditions are usually the same.
         let one = starts.windows(2).all(|pair| pair[0] == pair[1]);
         let found: Vec<Result<ToolDeflection, StepError>> = match starts.first() {
             Some(start) if one => batch(*start).run(&going),
@@ -121,7 +118,7 @@ impl Arm {
         results.into_iter().filter_map(|result| result.or_else(|| found.next())).collect()
     }
 
-    /// The arm of a run.
+    /// Returns the arm of a run, with its factors and loads.
     fn varied(&self, run: &Variation, options: &RunOptions) -> Result<FlexibleArm, Error> {
         let Variation { scenario, stiffness, damping } = run;
         for (what, found) in [("stiffness", *stiffness), ("damping", *damping)] {
@@ -139,7 +136,7 @@ impl Arm {
     }
 }
 
-/// A spring with other figures.
+/// Returns a spring with scaled stiffness and damping.
 fn scaled(spring: &Spring, stiffness: f64, damping: f64) -> Spring {
     Spring {
         name: spring.name.clone(),

@@ -1,5 +1,5 @@
-//! Drives of a robot file: gearbox springs, rotors, friction and servos, from the text to checked
-//! numbers.
+//! Drive entries of a robot file: gearbox springs, rotors, friction and servos, from the text to
+//! checked values.
 
 use std::ops::Range;
 
@@ -15,40 +15,40 @@ use crate::gear_entry::{GearHysteresis, HarmonicEntry, HysteresisEntry, harmonic
 use crate::options::DriveModel;
 use crate::robot_file::{RobotFileError, Source};
 
-/// Shortest time between two samples of a servo (s): each is an event of the run.
+/// Minimum sampling period of a servo (s); each sample is an event of the run.
 const SHORTEST_SAMPLE: f64 = 1e-6;
 
-/// Drive of a joint. Quantities are on the joint's side of the gear unless they say otherwise.
+/// Drive of a joint. Quantities are on the joint's side of the gear unless stated otherwise.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct DriveEntry {
     /// Joint of the URDF.
     pub joint: Spanned<String>,
-    /// prescribed, gearbox or torque.
+    /// `prescribed`, `gearbox` or `torque`.
     pub kind: Spanned<String>,
-    /// Turns of the motor per turn of the joint; 1 if not given. Its sign does not matter here.
+    /// Turns of the motor per turn of the joint; 1 by default. The sign does not matter here.
     pub ratio: Option<Spanned<f64>>,
     /// Inertia of the rotor, on the motor's side (kg m²).
     pub motor_inertia: Option<Spanned<f64>>,
     /// Spring between motor and link.
     pub gearbox: Option<Spanned<GearboxEntry>>,
-    /// Friction between motor and base of the joint.
+    /// Friction between the motor and the base of the joint.
     pub friction: Option<Spanned<FrictionEntry>>,
-    /// Maximum torque; the URDF's effort limit if not given (N m).
+    /// Torque limit; the URDF's effort limit by default (N m).
     pub torque_limit: Option<Spanned<f64>>,
-    /// Controller of kind = torque.
+    /// Controller for `kind = "torque"`.
     pub servo: Option<Spanned<ServoEntry>>,
 }
 
-/// A number, a list of them or a matrix.
+/// A number, a list of numbers or a matrix.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(untagged, expecting = "expected a number, a list of 3 or 6 numbers, or a 6x6 matrix")]
 pub(crate) enum Numbers {
-    /// One.
+    /// Single number.
     One(f64),
-    /// Several.
+    /// List.
     Many(Vec<f64>),
-    /// Rows.
+    /// Matrix by rows.
     Matrix(Vec<Vec<f64>>),
 }
 
@@ -56,19 +56,19 @@ pub(crate) enum Numbers {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct GearboxEntry {
-    /// About the axis (N m/rad); or about x, y, z of the joint frame; or for its three translations
-    /// and rotations; or 6x6.
+    /// Stiffness about the axis (N m/rad); or about x, y, z of the joint frame; or for its three
+    /// translations and rotations; or a 6x6 matrix.
     pub stiffness: Option<Numbers>,
-    /// Likewise, without the 6x6 (N m s/rad); 3 % modal if not given.
+    /// Damping in the same forms except 6x6 (N m s/rad); 3 % modal damping by default.
     pub damping: Option<Numbers>,
-    /// Play to each side (rad).
+    /// Backlash to each side (rad).
     pub backlash: Option<f64>,
-    /// Instead of a stiffness: points (deflection, torque).
+    /// Torque curve instead of a stiffness: points (deflection, torque).
     pub curve: Option<Vec<[f64; 2]>>,
-    /// Errors of the transmission, harmonic by harmonic.
+    /// Harmonics of the transmission error.
     #[serde(default)]
     pub transmission_error: Vec<HarmonicEntry>,
-    /// Internal friction, as given in catalogues.
+    /// Internal friction, in catalogue terms.
     pub hysteresis: Option<HysteresisEntry>,
 }
 
@@ -76,22 +76,22 @@ pub(crate) struct GearboxEntry {
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct FrictionEntry {
-    /// (N m s/rad).
+    /// Viscous friction (N m s/rad).
     #[serde(default)]
     pub viscous: f64,
-    /// (N m).
+    /// Coulomb friction (N m).
     #[serde(default)]
     pub coulomb: f64,
-    /// Beyond Coulomb's at standstill (N m).
+    /// Static friction in excess of Coulomb friction (N m).
     #[serde(default)]
     pub stribeck: f64,
-    /// (rad/s).
+    /// Stribeck velocity (rad/s).
     #[serde(default = "stribeck_velocity")]
     pub stribeck_velocity: f64,
-    /// Speed over which the sign changes (rad/s).
+    /// Velocity over which the friction changes sign (rad/s).
     #[serde(default = "regularisation")]
     pub regularisation: f64,
-    /// Friction over transmitted torque.
+    /// Friction divided by transmitted torque.
     #[serde(default)]
     pub load: f64,
 }
@@ -108,67 +108,68 @@ fn regularisation() -> f64 {
 #[derive(Clone, Copy, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ServoEntry {
-    /// Position loop (1/s); 20 if not given.
+    /// Gain of the position loop (1/s); 20 by default.
     pub position_gain: Option<f64>,
-    /// Speed loop (N m s/rad); inertia times 100/s if not given.
+    /// Gain of the velocity loop (N m s/rad); inertia times 100/s by default.
     pub velocity_gain: Option<f64>,
-    /// Speed loop's integral (N m/rad); 20/s times the velocity gain if not given.
+    /// Integral gain of the velocity loop (N m/rad); 20/s times the velocity gain by default.
     pub integral_gain: Option<f64>,
-    /// Time between samples (s); 1 ms if not given, the same for all axes.
+    /// Sampling period (s); 1 ms by default, the same for all axes.
     pub sample_s: Option<f64>,
-    /// Add the rigid robot's torques on the reference motion.
+    /// Whether to add the rigid robot's torques along the reference motion.
     pub feed_forward: Option<bool>,
 }
 
-/// Kind of a drive.
+/// Kind of actuation of a joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DriveKind {
-    /// Exactly along the trajectory.
+    /// The joint follows the trajectory exactly.
     Prescribed,
-    /// The motor exactly along the trajectory, a spring to the link.
+    /// The motor follows the trajectory exactly and moves the link through a spring.
     Gearbox,
-    /// The motor by torque, under a servo; a spring to the link if there is one.
+    /// The motor is driven by torque under a servo, through a spring to the link if there is one.
     Torque,
 }
 
-/// A drive, checked.
+/// Checked drive of a joint.
 #[derive(Clone, Debug)]
 pub struct Drive {
     /// Joint.
     pub joint: String,
-    /// Kind of the drive.
+    /// Kind of actuation.
     pub kind: DriveKind,
     /// Turns of the motor per turn of the joint.
     pub(crate) ratio: f64,
-    /// Inertia of the rotor seen from the joint (kg m²).
+    /// Rotor inertia reflected to the joint (kg m²).
     pub(crate) armature: f64,
-    /// Spring of the gearbox.
+    /// Spring of the gearbox, with its damping and curve.
     pub gearbox: Option<(Gearbox, GearDamping)>,
-    /// Its play to each side (rad or m).
+    /// Backlash of the gearbox to each side (rad or m).
     pub backlash: f64,
     /// Friction.
     pub friction: Friction,
-    /// Its part of the transmitted torque.
+    /// Load-dependent friction as a fraction of the transmitted torque.
     pub load_friction: f64,
-    /// Maximum torque (N m).
+    /// Torque limit (N m).
     pub torque_limit: f64,
-    /// Servo as written.
+    /// Servo settings as written.
     pub servo: ServoEntry,
 }
 
 impl Drive {
-    /// Turns of the motor per turn of the joint.
+    /// Returns the turns of the motor per turn of the joint.
     pub fn ratio(&self) -> f64 {
         self.ratio
     }
 
-    /// Inertia of the rotor seen from the joint (kg m²); models have it from
-    /// [`crate::Robot::rigid`], where the joint has it too.
+    /// Returns the rotor inertia reflected to the joint (kg m²). Models take it from the joint in
+    /// [`crate::Robot::rigid`], which has it too.
     pub fn armature(&self) -> f64 {
         self.armature
     }
 
-    /// Play of the gearbox to each side (rad or m); its curve has it.
+    /// Returns the backlash of the gearbox to each side (rad or m), which its torque curve
+    /// includes.
     pub fn backlash(&self) -> f64 {
         self.backlash
     }
@@ -177,18 +178,18 @@ impl Drive {
 /// Damping and curve of a gearbox's springs.
 #[derive(Clone, Debug)]
 pub struct GearDamping {
-    /// Damping per coordinate; none: 3 % modal.
+    /// Damping per coordinate; None means 3 % modal damping.
     pub dampers: Option<Vec<f64>>,
     /// Torque curve of the axis.
     pub curve: Option<TorqueCurve>,
-    /// Errors of the transmission.
+    /// Harmonics of the transmission error.
     pub transmission: Vec<Harmonic>,
-    /// Friction within.
+    /// Internal friction.
     pub hysteresis: Option<GearHysteresis>,
 }
 
 impl Drive {
-    /// Kind of the drive where drives are modelled.
+    /// Returns the kind of actuation under this drive model.
     pub(crate) fn kind_as(&self, drives: DriveModel) -> DriveKind {
         match drives {
             DriveModel::AsFiled => self.kind,
@@ -199,7 +200,7 @@ impl Drive {
         }
     }
 
-    /// Gearbox, if it is elastic where drives are modelled.
+    /// Returns the gearbox if it is elastic under this drive model.
     pub(crate) fn gearbox_as(&self, drives: DriveModel) -> Option<Gearbox> {
         let gives_way = self.kind_as(drives) != DriveKind::Prescribed;
         self.gearbox.as_ref().filter(|_| gives_way).map(|(gearbox, _)| gearbox.clone())
@@ -207,7 +208,7 @@ impl Drive {
 }
 
 impl GearDamping {
-    /// Damping of the gearbox's spring of that number with so many coordinates.
+    /// Returns the damping of the gearbox spring number `component`, which has `size` coordinates.
     pub fn of(&self, component: usize, size: usize) -> Damping {
         match &self.dampers {
             None => Damping::Modal(0.03),
@@ -217,7 +218,7 @@ impl GearDamping {
     }
 }
 
-/// Checks all drives; faults are put aside so that all are found.
+/// Checks all drives; collects the errors so that all are found.
 pub(crate) fn drives(
     entries: &[DriveEntry],
     mechanism: &Mechanism,

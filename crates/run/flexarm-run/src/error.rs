@@ -1,9 +1,9 @@
-//! One error type for the faces: what went wrong, by cause and with the numbers, and whether the
-//! input or the run is to blame.
+//! Common error type of the user interfaces: causes with their values, and whether the input or the
+//! run is at fault.
 //!
-//! Settings in the messages are values ([`Setting`]) that each face names in its own words
-//! ([`flexarm_settings::name_settings`]). What a face makes of an error, such as the number that
-//! its process ends with, is its own.
+//! Settings in the messages are values ([`Setting`]) that each interface names in its own terms
+//! ([`flexarm_settings::name_settings`]). The treatment of an error, such as the exit code of a
+//! process, is up to the interface.
 
 mod model;
 mod recording;
@@ -22,147 +22,147 @@ pub use model::{BalancerError, ChannelError, LoadError, LoopError, ModellingErro
 pub use recording::{RecordingError, StudyError};
 pub use value::ValueError;
 
-/// Anything that keeps an answer from being given.
+/// Any error that prevents a result.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// A file or folder that was asked for is not there or not readable.
+    /// A requested file or folder does not exist or is not readable.
     #[error("{}: {what}", path.display())]
     File {
-        /// The path.
+        /// Path.
         path: PathBuf,
-        /// What is wrong and how to mend it.
+        /// Description of the problem and how to fix it.
         what: String,
     },
-    /// A run of a study.
+    /// A run of a study failed.
     #[error("run {label:?} of the study: {source}")]
     InStudy {
-        /// Its label.
+        /// Label of the run.
         label: String,
-        /// Why.
+        /// Cause.
         source: Box<Error>,
     },
-    /// Something in the robot file, a file of loads or a job file.
+    /// The robot file, a loads file or a job file has an error.
     #[error(transparent)]
     RobotFile(#[from] RobotFileError),
-    /// Several faults of one robot file or job.
+    /// A robot file or job has several errors.
     #[error("{}", .0.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))]
     Several(Vec<Error>),
-    /// Something in the URDF.
+    /// The URDF has an error.
     #[error(transparent)]
     Urdf(#[from] flexarm_urdf::UrdfError),
-    /// The links and joints make no tree.
+    /// Links and joints do not form a valid tree.
     #[error("{}: {source}", path.display())]
     Model {
-        /// The URDF.
+        /// Path of the URDF.
         path: PathBuf,
-        /// Why.
+        /// Cause.
         source: Box<flexarm_kinematics::ModelError>,
     },
-    /// A reduced-link file.
+    /// A reduced-link file has an error.
     #[error(transparent)]
     Flex(#[from] Box<flexarm_fem::FlexFileError>),
-    /// A result could not be written.
+    /// A result cannot be written.
     #[error("{}: cannot be written: {source}", path.display())]
     Write {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Why.
+        /// Cause.
         source: std::io::Error,
     },
-    /// Something in the trajectory.
+    /// The trajectory has an error.
     #[error(transparent)]
     Trajectory(#[from] flexarm_trajectory::TrajectoryError),
-    /// A robot program that cannot be read.
+    /// A robot program cannot be read.
     #[error(transparent)]
     Program(#[from] Box<flexarm_programs::ProgramError>),
-    /// A path of the tool that the arm cannot follow.
+    /// The arm cannot follow a TCP path.
     #[error("{}: {source}{}", path.display(), assumed(notes))]
     Path {
-        /// The motion.
+        /// Path of the motion.
         path: PathBuf,
-        /// Where and why.
+        /// Location and cause.
         source: Box<flexarm_path::PathError>,
-        /// What was assumed before.
+        /// Assumptions made before.
         notes: Vec<String>,
     },
-    /// Something in a motion of another program.
+    /// A motion file of another program has an error.
     #[error(transparent)]
     Motion(#[from] flexarm_motion_io::MotionError),
-    /// The trajectory asks for more than the joints can do.
+    /// The trajectory exceeds joint limits.
     #[error(
         "{}: the trajectory passes {} joint limits:\n  {}\nslow it down, change it, or go on anyway with {}",
         path.display(), violations.len(), violations.join("\n  "), Setting::IgnoreLimits
     )]
     Limits {
-        /// The trajectory.
+        /// Path of the trajectory.
         path: PathBuf,
-        /// One line each.
+        /// Violations, one line each.
         violations: Vec<String>,
     },
-    /// A place of a result that is taken.
+    /// The path of a result already exists.
     #[error("{}", flexarm_files::taken(path, place, *movable))]
     Taken {
-        /// What is there.
+        /// Existing path.
         path: PathBuf,
-        /// What another one of is to be chosen: `place` or `folder`.
+        /// Kind of path to choose instead: `place` or `folder`.
         place: &'static str,
-        /// Whether [`Setting::Output`] chooses it.
+        /// Whether [`Setting::Output`] selects it.
         movable: bool,
     },
-    /// A number of an option that makes no sense.
+    /// An option has an invalid value.
     #[error(transparent)]
     Value(#[from] ValueError),
-    /// Links and drives that cannot be modelled as asked for.
+    /// Links or drives cannot be modelled as requested.
     #[error(transparent)]
     Modelling(#[from] ModellingError),
-    /// Joint values that do not fit the robot, and poses without an answer.
+    /// Joint values do not fit the robot, or a pose has no solution.
     #[error(transparent)]
     Pose(#[from] PoseError),
-    /// A balancer that does not fit the robot, or a pose of it.
+    /// A balancer does not fit the robot or a pose.
     #[error(transparent)]
     Balancer(#[from] BalancerError),
-    /// A closed loop that does not fit the robot, or a pose in which it does not close.
+    /// A closed loop does not fit the robot, or does not close at a pose.
     #[error(transparent)]
     Loop(#[from] LoopError),
-    /// Inputs and outputs of a frequency response.
+    /// Inputs or outputs of a frequency response are invalid.
     #[error(transparent)]
     Channel(#[from] ChannelError),
-    /// A load as values.
+    /// A load has invalid values.
     #[error(transparent)]
     Load(#[from] LoadError),
-    /// The runs of a study.
+    /// The runs of a study are invalid.
     #[error(transparent)]
     Study(#[from] StudyError),
-    /// A recording that cannot be read, written or reported as asked for.
+    /// A recording cannot be read, written or reported as requested.
     #[error(transparent)]
     Recording(#[from] RecordingError),
-    /// A robot none of whose links could be the tool.
+    /// No link of the robot can be the TCP.
     #[error(
         "the robot has no link that could be the TCP: {}",
         if *in_file { "add tcp = { link = ... }".to_owned() } else { format!("use {}", Setting::Tcp) }
     )]
     NoTcp {
-        /// Whether it comes from a robot file, which can name one.
+        /// Whether the robot comes from a robot file, which can name a TCP.
         in_file: bool,
     },
-    /// A tool on a link that is not there.
+    /// The requested TCP link does not exist.
     #[error("TCP frame {link:?} is not a link of the robot; its links are {known:?}")]
     UnknownTcp {
-        /// The link.
+        /// Requested link.
         link: String,
-        /// The links of the robot.
+        /// Links of the robot.
         known: Vec<String>,
     },
-    /// The simulation could not start or stopped.
+    /// The simulation could not start, or it stopped.
     #[error("{source}{}", if *partial { "; the log up to there is complete and readable" } else { "" })]
     Step {
-        /// Why.
+        /// Cause.
         source: flexarm_stepping::StepError,
         /// Whether files were written up to the stop.
         partial: bool,
     },
-    /// The user stopped it.
+    /// The user stopped the run.
     #[error("stopped at t = {t:.3} s{}", if *partial { "; the log up to there is complete and readable" } else { "" })]
     Interrupted {
         /// Simulated time (s).
@@ -170,11 +170,11 @@ pub enum Error {
         /// Whether files were written up to the stop.
         partial: bool,
     },
-    /// A recording could not be written.
+    /// A recording cannot be written.
     #[error(transparent)]
     Log(#[from] flexarm_log::LogError),
-    /// A link that could not be made of a mesh or of matrices, or not exported. Files, jobs and
-    /// `.flex` files have the variants above, whoever finds what is wrong with them.
+    /// A link cannot be built from a mesh or matrices, or cannot be exported. Errors in files, jobs
+    /// and `.flex` files are the variants above, whichever crate finds them.
     #[error(transparent)]
     Link(LinkError),
     /// An error of a study, or of another crate that builds on this one.
@@ -185,7 +185,7 @@ pub enum Error {
 /// An error of a crate that builds on this one; its `From` for [`Error`] wraps it in
 /// [`Error::External`].
 pub trait ExternalError: std::error::Error + Send + Sync + 'static {
-    /// Returns whether the input or the run is to blame.
+    /// Returns whether the input or the run is at fault.
     fn fault(&self) -> Fault {
         Fault::Input
     }
@@ -209,14 +209,14 @@ impl Error {
         }
     }
 
-    /// Whether the input or the run is to blame.
+    /// Returns whether the input or the run is at fault.
     pub fn fault(&self) -> Fault {
         use flexarm_log::LogError;
         use flexarm_stepping::StepError;
         match self {
             Self::Step { source, partial } => match source {
                 StepError::Setup(_) | StepError::ModalLinks | StepError::UnstableStep { .. } => Fault::Input,
-                // At the start it is the input, later the run.
+                // A singular matrix at the start is due to the input, later to the run.
                 StepError::Singular { t, .. } if !partial && *t == 0.0 => Fault::Input,
                 _ => Fault::Run,
             },
@@ -231,7 +231,7 @@ impl Error {
     }
 }
 
-/// Assumptions that may be the reason, below the reason itself.
+/// Formats assumptions that may be the cause, to be printed below the error.
 fn assumed(notes: &[String]) -> String {
     let lines: String = notes.iter().map(|note| format!("\n  {note}")).collect();
     if lines.is_empty() {

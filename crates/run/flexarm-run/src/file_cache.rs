@@ -1,7 +1,7 @@
-//! Files that robots are made of, read once: for programs that make many robots of nearly the same
-//! file.
+//! Cache of the files from which robots are built, for programs that build many robots from nearly
+//! the same file.
 //!
-//! A file that changes while a cache lives is not read again.
+//! A file that changes during the lifetime of a cache is not read again.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -12,7 +12,7 @@ use flexarm_urdf::{ReadOptions, UrdfRobot, read_urdf};
 
 use crate::error::Error;
 
-/// Content that was read.
+/// Files already read.
 #[derive(Debug, Default)]
 pub struct FileCache {
     /// By path and options.
@@ -21,7 +21,7 @@ pub struct FileCache {
 }
 
 impl FileCache {
-    /// A description.
+    /// Reads a description, or returns the cached one.
     ///
     /// # Errors
     /// As [`read_urdf`].
@@ -36,7 +36,7 @@ impl FileCache {
         Ok((*read).clone())
     }
 
-    /// A reduced link.
+    /// Reads a reduced link, or returns the cached one.
     ///
     /// # Errors
     /// As [`read_flex`].

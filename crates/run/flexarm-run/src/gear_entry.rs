@@ -1,4 +1,4 @@
-//! Gears of a robot file beyond their stiffness: transmission error, hysteresis, and gears that
+//! Gear entries of a robot file beyond stiffness: transmission error, hysteresis, and gears that
 //! move several joints.
 
 use std::collections::BTreeMap;
@@ -16,52 +16,51 @@ use crate::drive_entry::Drive;
 use crate::robot::Robot;
 use crate::robot_file::{RobotFileError, Source};
 
-/// Radians in an arc second and in an arc minute.
+/// One arc second (rad).
 const ARCSEC: f64 = std::f64::consts::PI / 648_000.0;
 const ARCMIN: f64 = 60.0 * ARCSEC;
-/// Sliders of a hysteresis that does not say how many.
+/// Default number of sliders of a hysteresis.
 const SLIDERS: usize = 8;
 /// Maximum number of sliders.
 const MOST_SLIDERS: i64 = 200;
-/// Part of the rated torque at which catalogues give the lost motion.
+/// Fraction of the rated torque at which catalogues give the lost motion.
 const LOST_MOTION_AT: f64 = 0.03;
 
 /// A harmonic of a transmission error.
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct HarmonicEntry {
-    /// On the joint's side, half of peak to peak (rad).
+    /// Amplitude on the joint's side, half of peak to peak (rad).
     pub amplitude: Option<f64>,
-    /// The same in arc seconds.
+    /// Amplitude (arc seconds).
     pub amplitude_arcsec: Option<f64>,
-    /// Cycles in a turn of the motor.
+    /// Cycles per turn of the motor.
     pub per_motor_turn: Option<f64>,
-    /// Or cycles in a turn of the joint.
+    /// Cycles per turn of the joint.
     pub per_joint_turn: Option<f64>,
-    /// At joint value zero (rad).
+    /// Phase at joint value zero (rad).
     #[serde(default)]
     pub phase: f64,
 }
 
-/// Hysteresis of a gear, from catalogue values.
+/// Hysteresis of a gear in catalogue terms.
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct HysteresisEntry {
-    /// Width of the loop without torque, after both directions were loaded (rad).
+    /// Width of the loop at zero torque, after loading in both directions (rad).
     pub loss: Option<f64>,
     /// The same in arc minutes.
     pub loss_arcmin: Option<f64>,
-    /// Width between the middles of the loop at 3 % of the rated torque to either side (rad); by
-    /// the stiffness if not given.
+    /// Distance between the mid-points of the loop at ±3 % of the rated torque (rad); follows from
+    /// the stiffness by default.
     pub lost_motion: Option<f64>,
     /// The same in arc minutes.
     pub lost_motion_arcmin: Option<f64>,
-    /// Torque to which the lost motion belongs (N m).
+    /// Rated torque to which the lost motion refers (N m).
     pub rated_torque: Option<f64>,
-    /// Deflection of first loading over which all friction has come to slip (rad); half the loss if
-    /// not given.
+    /// Deflection of first loading at which all friction slips (rad); half the loss by default.
     pub reach: Option<f64>,
-    /// Sliders that it is made of.
+    /// Number of sliders in the model.
     pub sliders: Option<i64>,
 }
 
@@ -69,35 +68,35 @@ pub(crate) struct HysteresisEntry {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct CouplingEntry {
-    /// The joints; motor k is that of the drive of joint k.
+    /// Joints; motor k is that of the drive of joint k.
     pub joints: Spanned<Vec<String>>,
-    /// C of `q_joints = C q_motors`, motors behind their gears; rows are joints.
+    /// Matrix C of `q_joints = C q_motors`, with motor angles after their gears; one row per joint.
     pub matrix: Spanned<Vec<Vec<f64>>>,
 }
 
 /// Checked coupling of joints.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RobotCoupling {
-    /// The joints, as many as motors.
+    /// Coupled joints, one motor each.
     pub joints: Vec<String>,
-    /// C of `q_joints = C q_motors`.
+    /// Matrix C of `q_joints = C q_motors`.
     pub C: DMatrix<f64>,
-    /// Its inverse.
+    /// Inverse of `C`.
     pub C_inverse: DMatrix<f64>,
 }
 
-/// Friction and elastic part of a hysteresis, before it has its place.
+/// Friction and elastic part of a hysteresis, before it is assigned to an element.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GearHysteresis {
-    /// Without the friction.
+    /// Elastic part, without friction.
     pub elastic: TorqueCurve,
-    /// The friction.
+    /// Friction part.
     pub sliders: Vec<Slider>,
-    /// Width of the loop without torque (rad).
+    /// Width of the loop at zero torque (rad).
     pub loss: f64,
 }
 
-/// A value in rad, or in another unit under another key; exactly one of them.
+/// Reads a value in rad, or in another unit under another key; at most one may be given.
 fn one_of(keys: [(&str, Option<f64>); 2], unit: f64) -> Result<Option<f64>, String> {
     let [(own, value), (other, scaled)] = keys;
     let found = match (value, scaled) {
@@ -112,10 +111,10 @@ fn one_of(keys: [(&str, Option<f64>); 2], unit: f64) -> Result<Option<f64>, Stri
     }
 }
 
-/// Harmonics of a gear whose motor turns `ratio` times in a turn of the joint.
+/// Reads the harmonics of a gear whose motor makes `ratio` turns per turn of the joint.
 ///
 /// # Errors
-/// A sentence about what is missing or no number.
+/// A message about a missing or invalid value.
 pub(crate) fn harmonics(entries: &[HarmonicEntry], ratio: Option<f64>) -> Result<Vec<Harmonic>, String> {
     let harmonic = |entry: &HarmonicEntry| {
         let keys = [("amplitude", entry.amplitude), ("amplitude_arcsec", entry.amplitude_arcsec)];
@@ -138,13 +137,13 @@ pub(crate) fn harmonics(entries: &[HarmonicEntry], ratio: Option<f64>) -> Result
     entries.iter().map(told).collect()
 }
 
-/// Hysteresis around a spring of that curve.
+/// Builds the hysteresis of a spring with this curve.
 ///
-/// The friction of all sliders is the torque of the elastic part at half the loss: with all of them
-/// slipping, the branches of the loop cross zero torque there.
+/// The total friction of the sliders equals the torque of the elastic part at half the loss: with
+/// all sliders slipping, the branches of the loop cross zero torque there.
 ///
 /// # Errors
-/// A sentence about what is missing, no number, or does not fit the stiffness.
+/// A message about a value that is missing, invalid or inconsistent with the stiffness.
 pub(crate) fn hysteresis(
     entry: &HysteresisEntry,
     stiffness: f64,
@@ -175,9 +174,9 @@ pub(crate) fn hysteresis(
                     2.0 * torque / stiffness
                 ));
             }
-            // On either branch of the loop the elastic part is half its width away from the middle:
-            // it must be soft as far as that and half the lost motion beyond, so that the middle
-            // line has the lost motion whatever the width.
+            // On either branch of the loop the elastic part is offset by half the loop width. It
+            // must be soft up to that offset plus half the lost motion, so that the middle line
+            // shows the lost motion whatever the width.
             let (slope, soft) = (torque / half, half + 0.5 * loss);
             let (edge, far) = (slope * soft, soft + 1.0);
             let end = edge + stiffness;
@@ -206,7 +205,7 @@ pub(crate) fn hysteresis(
     Ok(GearHysteresis { elastic, sliders: Hysteresis::even_sliders(friction, reach, sliders), loss })
 }
 
-/// Checks a coupling and puts the rotors of its motors on the joints.
+/// Checks a coupling and distributes the rotor inertias of its motors to the joints.
 ///
 /// # Errors
 /// [`RobotFileError`] with line and column.
@@ -264,7 +263,7 @@ pub(crate) fn coupling(
         return fail(entry.joints.span(), message);
     }
 
-    // Rotors turn with several joints.
+    // Each rotor turns with several joints.
     let armature: Vec<f64> =
         joints.iter().map(|name| robot.drives.iter().find(|d| d.joint == *name).map_or(0.0, |d| d.armature)).collect();
     let rotors = GearCoupling::on_joints(&C_inverse, &armature);
@@ -278,7 +277,7 @@ pub(crate) fn coupling(
     Ok(RobotCoupling { joints: joints.clone(), C, C_inverse })
 }
 
-/// Whether the drives of coupled joints are what a coupling knows.
+/// Checks that the drives of coupled joints are supported by a coupling.
 fn gears_fit(robot: &Robot, joints: &[String]) -> Result<(), String> {
     let drives: Vec<Option<&Drive>> =
         joints.iter().map(|name| robot.drives.iter().find(|d| d.joint == *name)).collect();
@@ -311,15 +310,15 @@ fn gears_fit(robot: &Robot, joints: &[String]) -> Result<(), String> {
 }
 
 impl Robot {
-    /// Torques of the motors that move several joints, behind their gears, for those of all joints;
-    /// by the name of the drive.
+    /// Converts joint torques to the torques of the motors that move several joints, after their
+    /// gears; keyed by the joint of the drive.
     pub(crate) fn motor_torques(&self, arm: &FlexibleArm, tau: &[f64]) -> BTreeMap<String, f64> {
         let (Some(robot), Some(arm)) = (&self.coupling, &arm.coupling) else { return BTreeMap::new() };
         robot.joints.iter().cloned().zip(arm.motor_torques(tau)).collect()
     }
 }
 
-/// Effects of gears other than elasticity, with their coordinates.
+/// Gear effects other than elasticity, assigned to their elements.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct GearLaws {
     pub(crate) transmission: Vec<TransmissionError>,
@@ -329,7 +328,7 @@ pub(crate) struct GearLaws {
 }
 
 impl GearLaws {
-    /// Effects of a drive whose joint has that coordinate and whose gearbox, if elastic, is that
+    /// Adds those of a drive whose joint has this coordinate and whose gearbox, if elastic, is this
     /// element.
     pub(crate) fn add(&mut self, drive: &Drive, coordinate: usize, element: Option<usize>) {
         if let (Some(element), Some((_, gear))) = (element, &drive.gearbox) {
@@ -347,7 +346,7 @@ impl GearLaws {
         }
     }
 
-    /// Adds them to an arm whose springs are stiffer by a factor.
+    /// Adds them to an arm; `stiffer` is the stiffness factor of each element.
     pub(crate) fn put_into(
         &self,
         mut arm: FlexibleArm,
@@ -380,10 +379,10 @@ mod tests {
         toml::from_str(text).unwrap()
     }
 
-    /// The middle line and the width of the loop at a torque, by bisection on the branches of a
-    /// cycle up to `far`.
+    /// Middle line and width of the loop at a torque, by bisection on the branches of a cycle
+    /// between ±`far`.
     fn branches(law: &GearHysteresis, far: f64, torque: f64) -> (f64, f64) {
-        // A branch after a reversal at ±far: Masing, sliders at ±reach going back.
+        // Branch after a reversal at ±far (Masing): sliders at ±reach unload.
         let branch = |side: f64, d: f64| {
             let slid = |s: &Slider| s.stiffness * side * (s.reach - (far - side * d)).max(-s.reach);
             law.elastic.torque(d) + law.sliders.iter().map(slid).sum::<f64>()
@@ -400,8 +399,8 @@ mod tests {
         (0.5 * (down + up), (down - up).abs())
     }
 
-    /// Truth: what the catalogue's words mean. A gear of 1.1 N m/arcsec class (typical figures of a
-    /// cycloidal gear: 1 arcmin of hysteresis, 1 arcmin of lost motion at 3 % of 1570 N m) shows
+    /// Truth: definitions of the catalogue values. A gear of the 1.1 N m/arcsec class (typical of
+    /// cycloidal gears: 1 arcmin of hysteresis, 1 arcmin of lost motion at 3 % of 1570 N m) shows
     /// them on its own loop, cycled to the rated torque.
     #[test]
     fn the_loop_of_a_gear_has_the_width_and_the_lost_motion_of_its_catalogue() {
@@ -415,7 +414,7 @@ mod tests {
         let [low, high] = [-0.03, 0.03].map(|part| branches(&law, far, part * 1570.0).0);
         let off = (high - low) / (0.8 * ARCMIN) - 1.0;
         assert!(off.abs() < 1e-6, "{off:e}");
-        // Without lost motion the loop is as wide at any torque that is far from the ends.
+        // Without lost motion the loop has the same width at every torque far from the ends.
         let plain = hysteresis(&entry("loss = 2e-4\nreach = 5e-5\nsliders = 3"), stiffness, None).unwrap();
         for torque in [-300.0, 0.0, 300.0] {
             assert!((branches(&plain, 2e-3, torque).1 - 2e-4).abs() < 1e-12);

@@ -1,14 +1,14 @@
-//! First line of every result: peak TCP error, its static part, and its causes.
+//! Headline of every result: the TCP error, its static part, and the main contributors.
 
 use serde::{Deserialize, Serialize};
 
 use crate::monitor::tool_path::PathFigures;
 use crate::summary::{Summary, TcpFigures};
 
-/// Errors below this are rounding (m).
+/// Errors below this are round-off (m).
 const NOTHING_M: f64 = 1e-12;
 
-/// Flexible elements of a run.
+/// Elastic parts of a robot in a run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Bending {
@@ -16,27 +16,27 @@ pub struct Bending {
     pub links: Vec<String>,
     /// Names of the joints with elastic gearboxes.
     pub gearboxes: Vec<String>,
-    /// Mounting of the base, if elastic.
+    /// Name of the elastic mounting, if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mounting: Option<String>,
 }
 
 impl Bending {
-    /// Whether nothing does.
+    /// Whether nothing is elastic.
     pub fn is_nothing(&self) -> bool {
         self.links.is_empty() && self.gearboxes.is_empty() && self.mounting.is_none()
     }
 }
 
-/// Share of one link, one gearbox, the servos or the stepper in the peak TCP error.
+/// Contribution of one link, gearbox, the servos or the stepper to the maximum TCP error.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct ShareFigures {
     /// Name of the link or joint.
     pub name: String,
-    /// link, gearbox, servo, mounting or stepper.
+    /// `link`, `gearbox`, `servo`, `mounting` or `stepper`.
     pub kind: String,
-    /// Part of the error along its direction (m): all shares together make the error.
+    /// Contribution along the direction of the error (m); all contributions add up to the error.
     pub along_m: f64,
 }
 
@@ -44,15 +44,15 @@ pub struct ShareFigures {
 pub(crate) const LINK: &str = "link";
 /// Kind of an elastic gearbox.
 pub(crate) const GEARBOX: &str = "gearbox";
-/// Kind of what the base stands on.
+/// Kind of the elastic mounting.
 pub(crate) const MOUNTING: &str = "mounting";
-/// Kind of what servos leave of the way to go.
+/// Kind of the following error of the servos.
 pub(crate) const SERVO: &str = "servo";
-/// Kind of what joints drift apart in the steps of a stepper in maximal coordinates.
+/// Kind of the joint drift of a stepper in maximal coordinates.
 pub(crate) const STEPPER: &str = "stepper";
 
-/// Returns the line for a run; `by_choice`: the robot has flexible elements that are rigid in this
-/// run.
+/// Returns the headline of a run; `by_choice`: whether the robot has elastic parts that this run
+/// treats as rigid.
 pub(crate) fn headline(summary: &Summary, by_choice: bool) -> String {
     let why_nothing = why_nothing(by_choice);
     let nothing = summary.bends.is_nothing();
@@ -70,7 +70,7 @@ pub(crate) fn headline(summary: &Summary, by_choice: bool) -> String {
     }
 }
 
-/// Why nothing bends, and what to do about it.
+/// Explains why nothing is elastic, and how to change it.
 fn why_nothing(by_choice: bool) -> &'static str {
     match by_choice {
         true => "links and drives are rigid as chosen for this run",
@@ -96,16 +96,15 @@ fn what_bends(bends: &Bending) -> String {
     format!("flexible: {}", kinds.join("; "))
 }
 
-/// Digits behind the point with which a length shows three figures.
+/// Number of decimals that shows a length (mm) to three significant figures.
 pub(crate) fn digits(size_mm: f64) -> usize {
     if size_mm > 0.0 { (2.0 - size_mm.log10().floor()).clamp(1.0, 9.0) as usize } else { 2 }
 }
 
-/// The parts of a whole as numbers with so many digits behind the point that add up to the rounded
-/// whole.
+/// Rounds the parts of a whole to `digits` decimals such that they add up to the rounded whole.
 ///
-/// Each is rounded down or up, those with the largest remainders up. Parts that do not make the
-/// whole, to rounding, are rounded each by itself.
+/// Each part is rounded down or up, those with the largest remainders up. Parts that do not add up
+/// to the whole, to within rounding, are rounded individually.
 pub(crate) fn rounded(parts: &[f64], whole: f64, digits: usize) -> Vec<String> {
     let unit = 10f64.powi(-(digits as i32));
     let mut units: Vec<f64> = parts.iter().map(|part| (part / unit).floor()).collect();
@@ -117,7 +116,7 @@ pub(crate) fn rounded(parts: &[f64], whole: f64, digits: usize) -> Vec<String> {
     } else {
         units = parts.iter().map(|part| (part / unit).round()).collect();
     }
-    // Nothing is gained by -0.
+    // Avoids -0.
     units.iter().map(|units| format!("{:.digits$}", units * unit + 0.0)).collect()
 }
 
@@ -135,7 +134,7 @@ fn parts(tcp: &TcpFigures) -> String {
     }
 }
 
-/// Returns the error across a TCP path.
+/// Figures of a TCP path, which come first in the headline.
 fn across(path: &PathFigures) -> String {
     let digits = digits(1e3 * path.across_peak_m);
     let mm = |x: f64| format!("{:.digits$}", 1e3 * x);
@@ -143,7 +142,7 @@ fn across(path: &PathFigures) -> String {
     format!("{peak} mm across the path, {left} with the workpiece shifted to fit; ")
 }
 
-/// Kinds of shares with their names, in order.
+/// Kinds of contributions with their names, in the order of the headline.
 const GROUPS: [(&str, &str); 5] = [
     (LINK, "links"),
     (GEARBOX, "gearboxes"),
@@ -185,7 +184,7 @@ mod tests {
         assert_eq!(rounded(&[1.4157, 4.6051], 6.0208, 2), ["1.42", "4.60"]);
         assert_eq!(rounded(&[-0.126, 1.135], 1.009, 2), ["-0.13", "1.14"]);
         assert_eq!(rounded(&[-0.001, 1.0], 0.999, 2), ["0.00", "1.00"]);
-        // Parts that do not add up are rounded separately.
+        // Parts that do not add up stay as they are.
         assert_eq!(rounded(&[1.0, 2.0], 5.0, 1), ["1.0", "2.0"]);
         assert!(rounded(&[], 1.0, 2).is_empty());
     }

@@ -1,8 +1,8 @@
-//! Head of pages without scripts.
+//! Header of HTML pages without scripts.
 
 use flexarm_settings::written::markup;
 
-/// Style sheet of the pages.
+/// Common style of the pages.
 const STYLE: &str = "\
 body { font: 15px/1.5 system-ui, sans-serif; max-width: 64rem; margin: 2rem auto; padding: 0 1rem; color: #1c2530; background: #fff }
 table { border-collapse: collapse; margin: 1rem 0 } td, th { padding: .25rem .7rem; text-align: right; border-bottom: 1px solid #d8dee6 }
@@ -11,10 +11,10 @@ td:first-child, th:first-child { text-align: left } .no { color: #9a5b00 } .note
 pre { background: #f3f5f8; padding: .7rem; overflow-x: auto }
 ";
 
-/// The beginning of a page, up to its heading.
+/// Returns the beginning of a page, up to its heading.
 ///
 /// * `title`: plain text.
-/// * `style`: what the page has beside the common style.
+/// * `style`: additional style of the page.
 pub fn opening(title: &str, style: &str) -> String {
     let title = markup(title);
     format!(

@@ -1,4 +1,4 @@
-//! Description of a loaded robot, with its kinematics and dynamics at one pose.
+//! Summary of the loaded robot, with its kinematics and dynamics at one pose.
 
 use std::sync::Arc;
 
@@ -19,8 +19,7 @@ use crate::options::Modelling;
 use crate::posed::all_finite;
 use crate::robot::{Robot, tcp_frame};
 
-/// Answer of `flexarm inspect`. SI units; the Jacobian's rows are linear first, world axes, at the
-/// TCP.
+/// Result of `flexarm inspect`. SI units; Jacobian at the TCP in world axes, linear rows first.
 #[derive(Clone, Debug, Serialize)]
 pub struct Inspection {
     /// Name of the robot.
@@ -34,36 +33,36 @@ pub struct Inspection {
     /// Springs under the base; a beam or a mesh there is one of the flexible links.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mounting: Option<MountingInfo>,
-    /// Motors that move several joints.
+    /// Coupling of motors that move several joints.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub coupling: Option<CouplingInfo>,
     /// Tool centre point at the pose.
     pub tcp: TcpInfo,
-    /// Pose asked for, in the order of `joints`.
+    /// Requested pose, in the order of `joints`.
     pub q: Vec<f64>,
-    /// Velocity asked for.
+    /// Requested joint velocities.
     pub velocity: Vec<f64>,
-    /// 6 rows × one column per joint.
+    /// Jacobian: 6 rows, one column per joint.
     pub jacobian: Vec<Vec<f64>>,
     /// Mass matrix of the rigid robot with its payload.
     pub mass_matrix: Vec<Vec<f64>>,
-    /// Forces that hold the pose, against gravity and balancers.
+    /// Joint torques or forces that hold the pose, against gravity and balancers.
     pub gravity_torque: Vec<f64>,
-    /// `τ = M q̈ + bias`: gravity with centrifugal and Coriolis forces.
+    /// Bias torques in `τ = M q̈ + bias`: gravity, centrifugal and Coriolis forces.
     pub bias: Vec<f64>,
-    /// `bias - gravity_torque`.
+    /// Centrifugal and Coriolis torques: `bias - gravity_torque`.
     pub coriolis: Vec<f64>,
-    /// Balancers at the pose; `gravity_torque` and `bias` have them in.
+    /// Balancers at the pose; `gravity_torque` and `bias` include them.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub balancers: Vec<BalancerInfo>,
-    /// Closed loops at the pose; their dependent joints are none of `joints`.
+    /// Closed loops at the pose; `joints` does not contain their dependent joints.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub loops: Vec<LoopInfo>,
-    /// Total mass (kg), payload and base included.
+    /// Total mass (kg), including payload and base.
     pub mass_kg: f64,
     /// Warnings among the caveats, as sentences.
     pub warnings: Vec<String>,
-    /// Doubts about the input.
+    /// Probable errors in the input.
     pub caveats: Vec<Caveat>,
 }
 
@@ -72,16 +71,16 @@ pub struct Inspection {
 pub struct JointInfo {
     /// Name.
     pub name: String,
-    /// revolute, continuous, prismatic.
+    /// `revolute`, `continuous` or `prismatic`.
     #[serde(rename = "type")]
     pub kind: &'static str,
-    /// Lowest position (rad or m).
+    /// Minimum position (rad or m).
     pub lower: Option<f64>,
-    /// Highest position (rad or m).
+    /// Maximum position (rad or m).
     pub upper: Option<f64>,
-    /// Highest speed.
+    /// Maximum speed (rad/s or m/s).
     pub velocity: Option<f64>,
-    /// Highest force.
+    /// Maximum torque or force (N m or N).
     pub effort: Option<f64>,
 }
 
@@ -90,7 +89,7 @@ pub struct JointInfo {
 pub struct LinkInfo {
     /// Name.
     pub name: String,
-    /// Mass (kg); 0 for a mere frame.
+    /// Mass (kg); 0 for a frame without inertia.
     pub mass_kg: f64,
     /// Centre of mass in link axes (m).
     pub com_m: [f64; 3],
@@ -103,29 +102,29 @@ pub struct LinkInfo {
 pub struct FlexibleInfo {
     /// Name.
     pub name: String,
-    /// Source of its stiffness.
+    /// Method by which its stiffness was obtained.
     pub method: String,
-    /// Distance of the interfaces (m).
+    /// Distance between the interfaces (m).
     pub length_m: f64,
-    /// Masses of the two parts (kg).
+    /// Masses of the rigid parts (kg).
     pub parts_kg: Vec<f64>,
     /// Stiffness at the split, 6×6, linear first.
     pub stiffness: Vec<Vec<f64>>,
-    /// lumped or modal.
+    /// `lumped` or `modal`.
     pub model: &'static str,
     /// Number of elastic coordinates.
     pub coordinates: usize,
-    /// All natural frequencies of a modal link with A held (Hz).
+    /// Natural frequencies of a modal link with interface A held, all of them (Hz).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub modal_frequencies_hz: Option<Vec<f64>>,
 }
 
-/// Motors that move several joints.
+/// Coupling of motors that move several joints.
 #[derive(Clone, Debug, Serialize)]
 pub struct CouplingInfo {
-    /// The joints.
+    /// Coupled joints.
     pub joints: Vec<String>,
-    /// C of `q_joints = C q_motors`, motors behind their gears.
+    /// Matrix C of `q_joints = C q_motors`, with motor angles after their gears.
     pub matrix: Vec<Vec<f64>>,
 }
 
@@ -134,13 +133,13 @@ pub struct CouplingInfo {
 pub struct MountingInfo {
     /// Name.
     pub name: String,
-    /// Position of the springs in the base link (m).
+    /// Position in the base link (m).
     pub position_m: [f64; 3],
-    /// Their axes in the base link, w first.
+    /// Orientation in the base link, w first.
     pub quaternion_wxyz: [f64; 4],
-    /// Stiffness in their axes, 6×6, linear first.
+    /// Stiffness in the axes of the springs, 6×6, linear first.
     pub stiffness: Vec<Vec<f64>>,
-    /// Mass on the springs in addition to the base (kg).
+    /// Mass carried in addition to the base (kg).
     pub mass_kg: f64,
 }
 
@@ -165,7 +164,7 @@ pub struct TcpInfo {
     pub link: String,
     /// Position (m).
     pub position_m: [f64; 3],
-    /// Attitude, w first.
+    /// Orientation, w first.
     pub quaternion_wxyz: [f64; 4],
 }
 
@@ -177,10 +176,10 @@ fn rows(M: &DMatrix<f64>) -> Vec<Vec<f64>> {
     M.row_iter().map(|r| r.iter().copied().collect()).collect()
 }
 
-/// Values of all actuated joints; zeros without any.
+/// Returns the values of all actuated joints; zeros by default.
 ///
 /// # Errors
-/// [`Error::Pose`] for another number of them, and for values that are no finite numbers.
+/// [`Error::Pose`] for a wrong number of values, and for values that are not finite.
 pub fn joint_values(values: Option<&[f64]>, joints: &[&str]) -> Result<Vec<f64>, Error> {
     let Some(values) = values else { return Ok(vec![0.0; joints.len()]) };
     if values.len() != joints.len() {
@@ -196,8 +195,8 @@ pub fn joint_values(values: Option<&[f64]>, joints: &[&str]) -> Result<Vec<f64>,
     }
 }
 
-/// The rigid robot (with payload) at a pose; `at` (rad or m) and `velocity` of all actuated joints,
-/// zero without.
+/// Inspects the rigid robot (with payload) at a pose. `at` (rad or m) and `velocity` are for all
+/// actuated joints, zero by default.
 ///
 /// # Errors
 /// [`Error::Pose`] for joint values that do not fit.
@@ -241,7 +240,7 @@ pub fn inspect(robot: &Robot, at: Option<&[f64]>, velocity: Option<&[f64]>) -> R
         LinkInfo { name: l.name.clone(), mass_kg, com_m, inertia }
     });
     let flexible = Arc::new(robot.flexible_robot()?);
-    // The rigid robot is inspected: it has no elastic element.
+    // Only the rigid robot is inspected, so the caveat about missing elasticity does not apply.
     let mut caveats = told(robot, &flexible, None, Use::Held(&q, &[0.0; 6]));
     caveats.retain(|caveat| caveat.code != "nothing-yields");
     let forms = robot.flexible.iter().map(|link| robot.form_of(link, &Modelling::default()).map(|(form, _)| form));

@@ -10,10 +10,10 @@
 //! # Ok::<(), flexarm_run::Error>(())
 //! ```
 //!
-//! [`Robot::load`] reads, [`Robot::flexible`] puts links and drives in place, [`Arm::simulate`]
-//! runs a [`Motion`] or a [`Scenario`]. [`statics()`], [`modes()`] and [`response()`] answer for
-//! one pose, [`Arm::operating_point`] for many; [`mod@reduce`] makes a flexible link of a mesh.
-//! Studies stand on this crate. The crate `flexarm` passes it on with them, under one name.
+//! [`Robot::load`] reads, [`Robot::flexible`] models links and drives, [`Arm::simulate`] runs a
+//! [`Motion`] or a [`Scenario`]. [`statics()`], [`modes()`] and [`response()`] compute results at
+//! one pose, [`Arm::operating_point`] at many; [`mod@reduce`] converts a mesh to a flexible link.
+//! The study crates build on this crate; the crate `flexarm` re-exports all of them.
 #![allow(non_snake_case, reason = "monogram notation: X_WL, K_S; see docs/references.md")]
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 

@@ -1,4 +1,4 @@
-//! Flexible links of a robot file: from the text to reduced links with their choices.
+//! Flexible link entries of a robot file: from the text to reduced links with their options.
 
 use std::path::Path;
 
@@ -17,13 +17,13 @@ use crate::options::{LinkModel, Modelling};
 use crate::robot::keep;
 use crate::robot_file::{BeamEntry, DampingEntry, FlexibleLinkEntry, RobotFileError, Source};
 
-/// Difference of mirrored entries, over the root of those on the diagonal, up to which a matrix is
-/// symmetric as written.
+/// Tolerance for a symmetric matrix: difference of mirrored entries, relative to the geometric mean
+/// of the diagonal entries.
 const SYMMETRIC: f64 = 1e-9;
-/// Minimum eigenvalue of a stiffness scaled to a unit diagonal; below it, rounding dominates.
+/// Minimum eigenvalue of a stiffness scaled to unit diagonal; below it round-off decides.
 const DEFINITE: f64 = 1e-12;
 
-/// Folder and reader of link files.
+/// Folder in which the files of links are searched, and the cache that reads them.
 pub(crate) struct LinkHome<'a> {
     pub(crate) folder: &'a Path,
     pub(crate) files: &'a FileCache,
@@ -126,7 +126,7 @@ pub(crate) fn flexible_link(
     };
     let stiffness = entry.stiffness.as_ref().map(|given| matrix6(given, entry, source)).transpose()?;
     let link = RobotLink { flexible, damping, stiffness, stiffness_factor, stiffness_factors, beam, choices };
-    // Only the choice of the file is checked here; overrides are checked when they are used.
+    // The requested model must exist; overrides are checked when they are used.
     link.form_or_key(&Modelling::default()).map_err(|(asked, message)| {
         let key = match asked {
             Asked::Model => None,
@@ -142,7 +142,7 @@ pub(crate) fn flexible_link(
     Ok(link)
 }
 
-/// The stiffness of a spring as the file has it: symmetric and positive definite.
+/// Reads the stiffness of a spring; it must be symmetric and positive definite.
 fn matrix6(
     given: &Spanned<Vec<Vec<f64>>>,
     entry: &FlexibleLinkEntry,
@@ -251,8 +251,8 @@ fn beam_link(
         };
         return Err(fail(text.into()));
     }
-    // Any direction across the beam will do if none is asked for: the axis that it is farthest
-    // from.
+    // By default any direction across the beam is suitable; uses the coordinate axis most
+    // perpendicular to the beam.
     let y_axis = beam.y_axis.map(Vector3::from).unwrap_or_else(|| {
         let k = axis.abs().imin();
         Vector3::from_fn(|i, _| if i == k { 1.0 } else { 0.0 })
@@ -274,7 +274,7 @@ fn beam_link(
     link.X_LB = X_LB;
     link.theory = theory;
     link.split_fraction = beam.split;
-    // The link's own mass spread along the beam; the section's where the URDF gives none.
+    // The link's own mass spread along the beam, or that of the section if the URDF gives none.
     link.mass = own.map(|own| own.mass);
     let reduced = link.reduce().map_err(|e| fail(e.to_string()))?;
     Ok((reduced, parts, Some(link)))

@@ -1,11 +1,11 @@
-//! An arm that is commanded while it moves: a controller, or a learning algorithm, gives targets
-//! period by period.
+//! An arm commanded during the simulation: a controller or a learning agent supplies targets period
+//! by period.
 //!
 //! A [`Motion`](crate::Motion) is known before a run; here only the target of the next control
-//! period is. Joints go from target to target: on cubics if velocities are given with the targets,
-//! else on the parabola through the last three, whose acceleration is a period late, as that of any
-//! controller that receives positions only. Drives treat them as in a run: exact joints
-//! are there, servos follow with their gains and lag.
+//! period is known. Joints move between targets on cubics if target velocities are given. Otherwise
+//! they follow the parabola through the last three targets, whose acceleration lags by one period,
+//! as in any controller that receives positions only. Drives respond as in a run: prescribed joints
+//! follow exactly, servos with their gains and lag.
 
 use std::sync::{Arc, PoisonError, RwLock};
 
@@ -20,24 +20,24 @@ use crate::inspect::joint_values;
 use crate::options::RunOptions;
 use crate::robot::tcp_frame;
 
-/// Steps of a control period must add up to it within this part of a step.
+/// Tolerance for the control period to be a whole number of steps (in steps).
 const WHOLE: f64 = 1e-6;
 
 /// Targets at the start and the end of a control period.
 #[derive(Debug)]
 struct Period {
-    /// When it begins (s), and how long it lasts (s).
+    /// Start and length of the period (s).
     begin: f64,
     length: f64,
     q: [Vec<f64>; 2],
     qdot: [Vec<f64>; 2],
-    /// Second differences of the last three targets, without velocities.
+    /// Second differences of the last three targets, if no velocities are given.
     bend: Option<Vec<f64>>,
-    /// The targets before those at the start.
+    /// Targets one period before those at the start.
     earlier: Vec<f64>,
 }
 
-/// The way from target to target.
+/// Motion between the targets.
 struct Targets(RwLock<Period>);
 
 impl PrescribedMotion for Targets {
@@ -53,7 +53,7 @@ impl PrescribedMotion for Targets {
             }
             return;
         }
-        // Cubic Hermite polynomials over 0..1.
+        // Cubic Hermite polynomials on 0..1.
         for k in 0..q.len() {
             let (q0, q1, v0, v1) = (period.q[0][k], period.q[1][k], period.qdot[0][k], period.qdot[1][k]);
             let (rise, a, b) = (q1 - q0, h * v0, h * v1);
@@ -65,7 +65,7 @@ impl PrescribedMotion for Targets {
     }
 }
 
-/// An arm under way, commanded period by period.
+/// A running arm, commanded period by period.
 pub struct Live {
     flexible: Arc<FlexibleRobot>,
     arm: FlexibleArm,
@@ -80,15 +80,15 @@ pub struct Live {
 }
 
 impl Arm {
-    /// The arm at rest at a pose, in equilibrium under its weight, to be commanded every `period_s`
-    /// (s).
+    /// Returns the arm at rest at a pose, in static equilibrium under gravity, to be commanded
+    /// every `period_s` (s).
     ///
-    /// * `at`: all actuated joints (rad or m), zero without it.
-    /// * `options`: stepper and step count; the period is a whole number of steps.
+    /// * `at`: values of all actuated joints (rad or m), zero by default.
+    /// * `options`: stepper and step size; the period must be a whole number of steps.
     ///
     /// # Errors
-    /// [`Error::Pose`] for joint values that do not fit, [`Error::Value`] for a step or a period
-    /// that is not positive or not a whole number of steps, [`Error::Step`] where there is no
+    /// [`Error::Pose`] for joint values that do not fit, [`Error::Value`] for a step size or a
+    /// period that is not positive or not a whole number of steps, [`Error::Step`] if there is no
     /// equilibrium.
     pub fn live(&self, at: Option<&[f64]>, period_s: f64, options: &RunOptions) -> Result<Live, Error> {
         let names: Vec<&str> = self.joints().collect();
@@ -144,7 +144,7 @@ impl Period {
         }
     }
 
-    /// Starts the next period, to targets `q`, with the velocities there if given.
+    /// Starts the next period, towards targets `q` and, if given, target velocities.
     fn go_to(&mut self, begin: f64, q: &[f64], qdot: Option<&[f64]>) {
         self.begin = begin;
         self.earlier.copy_from_slice(&self.q[0]);
@@ -174,7 +174,7 @@ fn stepper(flexible: &FlexibleRobot, arm: &FlexibleArm, options: &RunOptions) ->
 }
 
 impl Live {
-    /// To rest at a pose at time 0 again.
+    /// Resets the arm to rest at a pose at time 0.
     ///
     /// # Errors
     /// As [`Arm::live`].
@@ -187,15 +187,15 @@ impl Live {
         Ok(())
     }
 
-    /// Advances by one control period, at whose end the joint targets are `q` (rad or m).
+    /// Simulates one control period, at whose end the target of the joints is `q` (rad or m).
     ///
-    /// * `qdot`: velocities there (rad/s or m/s); without them joints go on the parabola through
-    ///   the last three targets.
-    /// * `wrench`: what pulls at the tool meanwhile, world axes (N, N m).
+    /// * `qdot`: target velocities (rad/s or m/s); without them the joints follow the parabola
+    ///   through the last three targets.
+    /// * `wrench`: wrench on the TCP during the period, world axes (N, N m).
     ///
     /// # Errors
-    /// [`Error::Pose`] for other numbers of values and values that are no numbers, [`Error::Step`]
-    /// if the step fails.
+    /// [`Error::Pose`] for a wrong number of values and for values that are not finite,
+    /// [`Error::Step`] if the step fails.
     pub fn step(&mut self, q: &[f64], qdot: Option<&[f64]>, wrench: &Wrench) -> Result<(), Error> {
         self.check(q)?;
         qdot.map_or(Ok(()), |qdot| self.check(qdot))?;
@@ -218,7 +218,7 @@ impl Live {
         joint_values(at, &self.names())
     }
 
-    /// Without allocation unless something is wrong.
+    /// Checks values; allocates only on failure.
     fn check(&self, values: &[f64]) -> Result<(), Error> {
         match values.len() == self.flexible.model.n_actuated() && values.iter().all(|x| x.is_finite()) {
             true => Ok(()),
@@ -230,37 +230,37 @@ impl Live {
         self.stepper.observe(&mut self.seen);
     }
 
-    /// Time (s).
+    /// Returns the time (s).
     pub fn time_s(&self) -> f64 {
         self.seen.t
     }
 
-    /// Length of a control period (s).
+    /// Returns the length of a control period (s).
     pub fn period_s(&self) -> f64 {
         self.period_s
     }
 
-    /// Joints, as they are (rad or m): behind their targets under servos.
+    /// Returns the actual joint positions (rad or m); under servos they lag behind their targets.
     pub fn position(&self) -> &[f64] {
         &self.seen.q.as_slice()[..self.flexible.model.n_actuated()]
     }
 
-    /// Their velocities.
+    /// Returns the joint velocities (rad/s or m/s).
     pub fn velocity(&self) -> &[f64] {
         &self.seen.qdot.as_slice()[..self.flexible.model.n_actuated()]
     }
 
-    /// Forces of the drives (N m or N).
+    /// Returns the torques or forces of the drives (N m or N).
     pub fn effort(&self) -> &[f64] {
         self.seen.drive.as_slice()
     }
 
-    /// Elastic coordinates.
+    /// Returns the elastic coordinates.
     pub fn deflection(&self) -> &[f64] {
         &self.seen.q.as_slice()[self.flexible.model.n_actuated()..]
     }
 
-    /// The tool in the world.
+    /// Returns the TCP pose in the world.
     pub fn tcp_pose(&self) -> Pose {
         let tcp = &self.flexible.tcp;
         self.seen.X_WB[tcp.body] * tcp.X_BF

@@ -1,23 +1,23 @@
-//! Search for the jumps of a load that is given as a function of time.
+//! Detection of jumps in a load that is only known as a function of time.
 
 use flexarm_kinematics::Wrench;
 
-/// Intervals that are looked at one by one; a jump back within one of them is not seen.
+/// Number of intervals that are checked; a jump and its reversal within one of them are not found.
 const INTERVALS: u32 = 5000;
-/// Changes below this part of the largest load are none.
+/// Relative size of a change below which it does not count as a jump.
 const SMALLEST: f64 = 1e-9;
-/// A jump keeps this part of the change of its interval when that is halved,
+/// Minimum fraction of an interval's change that a jump keeps when the interval is halved.
 const KEPT: f64 = 0.1;
-/// which is looked at after so many halvings already: a curve has lost it by then.
+/// Number of halvings before the first check; the change of a smooth curve has decayed by then.
 const FIRST_LOOK: u32 = 8;
 
-/// The times of jumps between `start` and `end` (s), to the last place, at most one per five
-/// thousandth of it.
+/// Returns the times of jumps between `start` and `end` (s), to machine precision, at most one per
+/// interval.
 pub(crate) fn jumps_of(wrench: &(dyn Fn(f64) -> Wrench + Send + Sync), start: f64, end: f64) -> Vec<f64> {
     if start >= end {
         return Vec::new();
     }
-    // Between the ends, where it begins and ends at the latest.
+    // Clamped to the given range.
     let inner = |k: u32| (start + (end - start) * f64::from(k) / f64::from(INTERVALS)).clamp(start, end);
     let change = |a: f64, b: f64| (wrench(b).to_vector() - wrench(a).to_vector()).amax();
     let size = (0..=INTERVALS).map(|k| wrench(inner(k)).to_vector().amax()).fold(0.0, f64::max);

@@ -1,9 +1,9 @@
-//! A file of loads and payloads (`--loads FILE.toml`), read into the values of a
+//! Files of loads and payloads (`--loads FILE.toml`), read into the values of a
 //! [`Scenario`](crate::Scenario).
 //!
-//! A file of its own, because loads belong to a run and not to a robot. Start at `read_loads`. Not
-//! here: what the values do on a robot (`applied_load`, `payload`); they remember where they are
-//! written (`Written`), so that errors are reported with their place.
+//! Loads have a file of their own because they belong to a run and not to a robot. Start at
+//! `read_loads`. Not here: the effect of the values on a robot (`applied_load`, `payload`). The
+//! values keep their location in the file (`Written`), so that later errors can name it.
 
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
@@ -27,7 +27,7 @@ use crate::ranges::OF_LOADS;
 use crate::robot_file::{RobotFileError, Source};
 use crate::toml_file::parsed;
 
-/// The file as written.
+/// Loads file as written.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct LoadsFile {
@@ -41,43 +41,43 @@ struct LoadsFile {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct LoadEntry {
-    /// tcp, or a link.
+    /// `tcp` or a link name.
     frame: Option<Spanned<String>>,
-    /// world or frame.
+    /// `world` or `frame`.
     axes: Option<Spanned<String>>,
-    /// step, impulse, sine, sweep, milling, table or expression.
+    /// `step`, `impulse`, `sine`, `sweep`, `milling`, `table` or `expression`.
     kind: Spanned<String>,
-    /// When it begins (s).
+    /// Start time (s).
     #[serde(default)]
     start: f64,
-    /// When it ends (s); the end of the run if not given.
+    /// End time (s); the end of the run by default.
     end: Option<Spanned<f64>>,
-    /// Size of the force (N).
+    /// Force amplitude (N).
     #[serde(default)]
     force: [f64; 3],
-    /// Size of the moment (N m).
+    /// Moment amplitude (N m).
     #[serde(default)]
     torque: [f64; 3],
-    /// sine (Hz).
+    /// sine: frequency (Hz).
     frequency: Option<Spanned<f64>>,
-    /// sine (rad).
+    /// sine: phase (rad).
     #[serde(default)]
     phase: f64,
-    /// sweep: first frequency (Hz).
+    /// sweep: start frequency (Hz).
     from: Option<Spanned<f64>>,
-    /// sweep: last frequency (Hz).
+    /// sweep: end frequency (Hz).
     to: Option<Spanned<f64>>,
-    /// impulse: length of the half sine (s); force is then the impulse (N s).
+    /// impulse: duration of the half sine (s); `force` is then the impulse (N s).
     duration: Option<Spanned<f64>>,
-    /// milling: cutting edges.
+    /// milling: number of cutting edges.
     teeth: Option<u32>,
-    /// milling: turns per minute.
+    /// milling: spindle speed (rev/min).
     spindle_rpm: Option<Spanned<f64>>,
-    /// milling: harmonics of the tooth frequency beside the mean; 3 if not given.
+    /// milling: number of harmonics of the tooth frequency in addition to the mean; 3 by default.
     harmonics: Option<u32>,
     /// table: CSV with time, fx, fy, fz and optionally tx, ty, tz (s, N, N m).
     file: Option<Spanned<PathBuf>>,
-    /// expression: in t (s), for fx, fy, fz, tx, ty, tz.
+    /// expression: functions of t (s), for fx, fy, fz, tx, ty, tz.
     fx: Option<Spanned<String>>,
     fy: Option<Spanned<String>>,
     fz: Option<Spanned<String>>,
@@ -89,11 +89,11 @@ struct LoadEntry {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct PayloadEntry {
-    /// When (s).
+    /// Time of the change (s).
     at: f64,
-    /// Mass from then on, in the place of what was carried before (kg); 0 drops it.
+    /// New mass (kg), which replaces the mass carried before; 0 drops it.
     mass: f64,
-    /// Link that carries it; that of the robot's payload, else of the TCP.
+    /// Link that carries the payload; by default that of the robot's payload, or else of the TCP.
     link: Option<Spanned<String>>,
     /// Centre of mass in link axes (m).
     #[serde(default)]
@@ -104,8 +104,7 @@ struct PayloadEntry {
 
 type WrenchFn = Arc<dyn Fn(f64) -> Wrench + Send + Sync>;
 
-/// Place of a value: its entry as a whole, and its keys for frame or link and for
-/// inertia.
+/// Location of a value in the file: its entry, its frame or link, and its inertia.
 #[derive(Clone, Debug)]
 pub(crate) struct Written {
     entry: RobotFileError,
@@ -119,17 +118,17 @@ impl Written {
         Self { entry: place(None), frame: place(frame), inertia: place(inertia) }
     }
 
-    /// Returns an error about a value as a whole, with its place if it was read from a file.
+    /// Error about the value as a whole, with its location if it was read from a file.
     pub(crate) fn entry(written: Option<&Self>, cause: impl Into<LoadError>) -> Error {
         Self::error(written.map(|written| &written.entry), cause.into())
     }
 
-    /// Returns an error about its frame or link.
+    /// Error about the frame or link.
     pub(crate) fn frame(written: Option<&Self>, cause: impl Into<LoadError>) -> Error {
         Self::error(written.map(|written| &written.frame), cause.into())
     }
 
-    /// Returns an error about its inertia.
+    /// Error about the inertia.
     pub(crate) fn inertia(written: Option<&Self>, cause: impl Into<LoadError>) -> Error {
         Self::error(written.map(|written| &written.inertia), cause.into())
     }
@@ -142,15 +141,15 @@ impl Written {
     }
 }
 
-/// Reads a file of loads for a run that ends at `duration` (s).
+/// Reads a loads file for a run that ends at `duration` (s).
 ///
 /// # Errors
-/// [`Error`] with file, place, what was found and what was expected.
+/// [`Error`] with file, location, the value found and the expected one.
 pub(crate) fn read_loads(path: &Path, duration: f64) -> Result<(Vec<AppliedLoad>, Vec<PayloadChange>), Error> {
     parse_loads(&read_text(path)?, path, duration)
 }
 
-/// As `read_loads`, of the text of the file.
+/// As `read_loads`, from the text of the file.
 pub fn parse_loads(text: &str, path: &Path, duration: f64) -> Result<(Vec<AppliedLoad>, Vec<PayloadChange>), Error> {
     let source = Source::new(path, text, "loads");
     let file: LoadsFile = parsed(text, &source, OF_LOADS, |file: &LoadsFile| &file.format)?;
@@ -200,7 +199,8 @@ fn axes(entry: &Spanned<LoadEntry>, source: &Source) -> Result<LoadAxes, RobotFi
     }
 }
 
-/// Angles that look like degrees: the phase of a sine, arguments of sin and cos in expressions.
+/// Caveats about angles that look like degrees: the phase of a sine, arguments of sin and cos in
+/// expressions.
 fn doubts(e: &LoadEntry) -> Vec<Caveat> {
     let parts = [&e.fx, &e.fy, &e.fz, &e.tx, &e.ty, &e.tz];
     let sines = parts.into_iter().flatten().flat_map(|text| sines(text.get_ref()));
@@ -208,8 +208,8 @@ fn doubts(e: &LoadEntry) -> Vec<Caveat> {
     caveat::loads::of_phase(e.phase).into_iter().chain(doubtful).collect()
 }
 
-/// Sines and cosines of an expression whose argument is linear in t: text, rate (1/s) and value at
-/// zero.
+/// Sines and cosines of an expression whose argument is linear in t, as text, rate (1/s) and value
+/// at t = 0.
 fn sines(text: &str) -> Vec<(String, f64, f64)> {
     let starts = ["sin", "cos"].into_iter().flat_map(|name| text.match_indices(name).map(|(at, _)| at));
     let one = |at: usize| {
@@ -231,7 +231,7 @@ fn sines(text: &str) -> Vec<(String, f64, f64)> {
     starts.filter_map(one).collect()
 }
 
-/// When a load ends at the latest, and when the file says that it does (s).
+/// Returns the latest end of a load (s), and the end given in the file, if any (s).
 fn end(entry: &Spanned<LoadEntry>, duration: f64, source: &Source) -> Result<(f64, Option<f64>), RobotFileError> {
     let e = entry.get_ref();
     let last = e.end.as_ref().map(|end| *end.get_ref());
@@ -247,16 +247,16 @@ fn end(entry: &Spanned<LoadEntry>, duration: f64, source: &Source) -> Result<(f6
     Ok((end, last))
 }
 
-/// A load over time.
+/// Load as a function of time.
 struct Curve {
     value: WrenchFn,
-    /// Times at which it bends or jumps, beside its beginning and end (s).
+    /// Times of kinks and jumps, except start and end (s).
     bends: Vec<f64>,
-    /// Shortest period in it (s).
+    /// Shortest period in the load (s).
     period: f64,
 }
 
-/// An entry that is being read, with the time in which it acts (s).
+/// Entry being read, with the time interval in which it acts (s).
 struct Reading<'a> {
     entry: &'a Spanned<LoadEntry>,
     source: &'a Source,
@@ -306,10 +306,10 @@ impl Reading<'_> {
         Curve { value: Arc::new(value), bends, period }
     }
 
-    /// Half a sine of area 1.
+    /// Half sine of area 1.
     fn impulse(&self) -> Result<Curve, RobotFileError> {
         let d = self.needs(self.entry.get_ref().duration.as_ref(), "duration")?;
-        // It is zero at both its ends: a solver must also see its middle.
+        // The pulse is zero at both ends; extra breakpoints make the stepper resolve its middle.
         let bends = [0.137, 0.5, 0.863, 1.0].iter().map(|s| self.start + s * d).collect();
         let factor = move |t: f64| if t < d { 0.5 * PI / d * (PI * t / d).sin() } else { 0.0 };
         Ok(self.scaled(bends, f64::INFINITY, factor))
@@ -341,7 +341,7 @@ impl Reading<'_> {
         if harmonics > MOST_HARMONICS {
             return Err(fail(format!("harmonics = {harmonics}: expected at most {MOST_HARMONICS}")));
         }
-        // Mean 1, harmonics that halve: the shape of an intermittent cut.
+        // Mean 1 plus harmonics of halving amplitude, shaped like an intermittent cut.
         let factor = move |t: f64| {
             1.0 + (1..=harmonics)
                 .map(|k| 0.5f64.powi(k as i32 - 1) * (TAU * f64::from(k) * tooth * t).sin())
@@ -370,7 +370,7 @@ impl Reading<'_> {
     }
 }
 
-/// Returns the load of an entry; whether the robot has its frame is checked on the robot.
+/// Converts an entry; whether the robot can carry the payload is checked later.
 fn payload(entry: &Spanned<PayloadEntry>, source: &Source) -> PayloadChange {
     let e = entry.get_ref();
     let [xx, yy, zz, xy, xz, yz] = e.inertia.as_ref().map_or([0.0; 6], |inertia| *inertia.get_ref());
@@ -384,7 +384,7 @@ fn payload(entry: &Spanned<PayloadEntry>, source: &Source) -> PayloadChange {
     }
 }
 
-/// A key that the kind of load would not use, and the kinds that would.
+/// Returns a key that this kind of load does not use, with the kinds that do.
 fn stray_key(e: &LoadEntry, kind: &str) -> Option<(&'static str, &'static str)> {
     let sized = "step, impulse, sine, sweep and milling";
     let keys = [
@@ -411,22 +411,21 @@ fn stray_key(e: &LoadEntry, kind: &str) -> Option<(&'static str, &'static str)> 
     keys.iter().find(stray).map(|(key, _, kinds)| (*key, *kinds))
 }
 
-/// An expression may contain any frequency: the reference stepper treats it as a vibration of
-/// this period (s).
+/// Assumed period of an expression, whose content is unknown, for the reference stepper (s).
 pub(crate) const EXPRESSION_PERIOD: f64 = 5e-3;
-/// Longest expression (characters).
+/// Maximum length of an expression (characters).
 const LONGEST_EXPRESSION: usize = 2000;
 /// Maximum number of harmonics of a milling force; higher ones are negligible.
 const MOST_HARMONICS: u32 = 50;
-/// Maximum number of rows of a table at whose times the reference stepper stops.
+/// Maximum number of table rows at whose times the reference stepper stops.
 const MOST_ROWS: usize = 1000;
 
-/// Returns the place of a value, else that of its entry.
+/// Location of a value, or else of its entry.
 fn span_or<T, E>(value: Option<&Spanned<T>>, entry: &Spanned<E>) -> Range<usize> {
     value.map_or(entry.span(), Spanned::span)
 }
 
-/// Linear between the rows of a CSV, zero outside; with the times at which it bends.
+/// Reads a CSV table: linear between rows, zero outside; also returns the times of its kinks.
 fn table(path: &Path) -> Result<(WrenchFn, Vec<f64>), Error> {
     let fail = |what: String| Error::File { path: path.to_owned(), what };
     let text = read_text(path)?;
@@ -483,7 +482,7 @@ fn table(path: &Path) -> Result<(WrenchFn, Vec<f64>), Error> {
     Ok((wrench, bends))
 }
 
-/// A part of an expression, and whether it changes with time.
+/// Component of an expression, and whether it depends on time.
 type Part = Option<(FlatEx<f64>, bool)>;
 
 fn expression(e: &LoadEntry, source: &Source, (start, end): (f64, f64)) -> Result<WrenchFn, Error> {
@@ -508,8 +507,8 @@ fn expression(e: &LoadEntry, source: &Source, (start, end): (f64, f64)) -> Resul
     }))
 }
 
-/// One component, in t (s), which is a number at the beginning, in the middle and at the end of the
-/// time in which it acts.
+/// Parses one component, a function of t (s), and checks that it is finite at the start, the middle
+/// and the end of its time interval.
 fn part(
     entry: &Spanned<String>,
     source: &Source,

@@ -1,4 +1,4 @@
-//! Closed loops of a robot file: from the text to a checked tree.
+//! Closed loop entries of a robot file: from the text to a checked tree.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -16,22 +16,23 @@ use crate::robot_file::Source;
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct LoopEntry {
-    /// For messages; numbered if not given.
+    /// Name for messages; numbered by default.
     pub name: Option<Spanned<String>>,
-    /// Position of the pin.
+    /// Link and position of the pin.
     pub pin: Spanned<EndEntry>,
-    /// Its axis in axes of that link; that of the first dependent joint that turns if not given.
+    /// Axis of the pin in the axes of that link; by default that of the first revolute dependent
+    /// joint.
     pub axis: Option<Spanned<[f64; 3]>>,
-    /// Position of the eye around the pin.
+    /// Link and position of the eye through which the pin passes.
     pub eye: Spanned<EndEntry>,
-    /// The joints that follow from the loop.
+    /// Joints that depend on the loop.
     pub dependent: Spanned<Vec<String>>,
-    /// Joint values near which it is assembled (rad or m).
+    /// Joint values near which the loop is assembled (rad or m).
     #[serde(default)]
     pub at: BTreeMap<String, Spanned<f64>>,
 }
 
-/// Puts the loops of a file on a robot; faults are put aside so that all are found.
+/// Adds the loops of a file to a robot; collects the errors so that all are found.
 pub(crate) fn add_loops(robot: &mut Robot, entries: &[Spanned<LoopEntry>], source: &Source, faults: &mut Vec<Error>) {
     let before = faults.len();
     let mut places: Vec<(String, Range<usize>)> = Vec::new();
@@ -62,7 +63,7 @@ pub(crate) fn add_loops(robot: &mut Robot, entries: &[Spanned<LoopEntry>], sourc
             Ok(()) => places.push((name, place)),
         }
     }
-    // Loops may rest on each other: they are checked together.
+    // Loops may depend on each other, so they are checked together.
     if faults.len() == before
         && let Err(fault) = robot.check_loops()
     {

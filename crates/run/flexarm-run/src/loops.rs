@@ -1,5 +1,5 @@
-//! Closed loops as values: the pins that close the bars of a robot, where they can be, and how well
-//! they hand on force.
+//! Closed loops: the pins that close the kinematic loops of a robot, the poses in which they close,
+//! and their transmission angles.
 
 use flexarm_kinematics::{
     Data, Joint, JointKind, Link, LoopClosure, Mechanism, Model, ModelError, Pose, forward_kinematics,
@@ -12,22 +12,22 @@ use crate::caveat::size::spread_poses;
 use crate::error::LoopError;
 use crate::robot::Robot;
 
-/// A loop to put on a robot ([`Robot::with_loops`]): a pin on one link goes through an eye of
-/// another one.
+/// A loop to add to a robot ([`Robot::with_loops`]): a pin on one link passes through an eye on
+/// another.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RobotLoop {
     /// Unique name.
     pub name: String,
-    /// Link that carries the pin, and a point on its axis in link axes (m).
+    /// Link that carries the pin, and a point on the pin's axis in link axes (m).
     pub pin: (String, [f64; 3]),
-    /// Axis of the pin in axes of that link; that of the first dependent joint that turns if not
-    /// given.
+    /// Axis of the pin in the axes of that link; by default that of the first revolute dependent
+    /// joint.
     pub axis: Option<[f64; 3]>,
-    /// Link that has the eye, and its place in link axes (m).
+    /// Link that carries the eye, and the eye's position in link axes (m).
     pub eye: (String, [f64; 3]),
-    /// The two joints of the loop that follow from the others.
+    /// The two joints of the loop that depend on the others.
     pub dependent: [String; 2],
-    /// Joint values near which it is assembled (rad or m); 0 for joints that are not named.
+    /// Joint values near which the loop is assembled (rad or m); 0 for joints not listed.
     pub at: Vec<(String, f64)>,
 }
 
@@ -36,12 +36,12 @@ pub struct RobotLoop {
 pub struct LoopInfo {
     /// Name.
     pub name: String,
-    /// The joints that follow from it.
+    /// Dependent joints.
     pub dependent: Vec<DependentInfo>,
-    /// Transmission angle (rad, at most a right angle).
+    /// Transmission angle (rad, at most π/2).
     pub transmission_angle: f64,
-    /// The smallest one in poses spread over the joint ranges, without those that limits of
-    /// dependent joints exclude.
+    /// Minimum transmission angle over poses spread over the joint ranges, except those excluded by
+    /// limits of dependent joints.
     pub smallest_transmission_angle: Option<f64>,
 }
 
@@ -50,23 +50,24 @@ pub struct LoopInfo {
 pub struct DependentInfo {
     /// Name.
     pub name: String,
-    /// revolute, continuous, prismatic.
+    /// `revolute`, `continuous` or `prismatic`.
     #[serde(rename = "type")]
     pub kind: &'static str,
-    /// Lowest position (rad or m).
+    /// Minimum position (rad or m).
     pub lower: Option<f64>,
-    /// Highest position (rad or m).
+    /// Maximum position (rad or m).
     pub upper: Option<f64>,
-    /// Its position (rad or m).
+    /// Position (rad or m).
     pub q: f64,
 }
 
 impl Robot {
-    /// The same robot with closed loops more.
+    /// Adds closed loops to the robot.
     ///
     /// # Errors
-    /// [`LoopError`]: links and joints that are not there, numbers that are none, a name that is taken, loops that are not planar, do
-    /// not close or are at a dead point where they are assembled, and joints that have a drive.
+    /// [`LoopError`] for unknown links and joints, values that are not finite, a duplicate name,
+    /// loops that are not planar, do not close or are at a dead point where they are assembled, and
+    /// joints that have a drive.
     pub fn with_loops(mut self, loops: Vec<RobotLoop>) -> Result<Self, LoopError> {
         for own in loops {
             self.add_loop(own)?;
@@ -79,8 +80,8 @@ impl Robot {
         Ok(self)
     }
 
-    /// Frames for pin and eye: fixed to their links, so that a flexible link carries each on the
-    /// part where it is.
+    /// Adds a loop. The frames of pin and eye are fixed to their links, so that on a flexible link
+    /// each moves with the part it is on.
     pub(crate) fn add_loop(&mut self, own: RobotLoop) -> Result<(), LoopError> {
         let RobotLoop { name, pin, axis, eye, dependent, at } = own;
         if self.rigid.loops.iter().any(|other| other.name == name) {
@@ -113,7 +114,7 @@ impl Robot {
         Ok(())
     }
 
-    /// Whether all loops close.
+    /// Checks that all loops close.
     pub(crate) fn check_loops(&self) -> Result<(), LoopError> {
         match Model::new(&self.rigid) {
             Err(ModelError::BadLoop { name, what }) => Err(LoopError::Unfit { name, what }),
@@ -122,12 +123,12 @@ impl Robot {
     }
 }
 
-/// The loop that a joint follows from.
+/// Returns the name of the loop that determines a dependent joint.
 pub(crate) fn owner<'m>(mechanism: &'m Mechanism, joint: &str) -> Option<&'m str> {
     mechanism.loops.iter().find(|l| l.dependent.iter().any(|d| d == joint)).map(|l| l.name.as_str())
 }
 
-/// Axis of the first of the joints that turns, in axes of a link, all joints at zero.
+/// Axis of the first revolute one of the joints, in the axes of a link, with all joints at zero.
 fn axis_of_joint(mechanism: &Mechanism, link: &str, joints: &[String; 2]) -> Option<Unit<Vector3<f64>>> {
     let turning = joints.iter().filter_map(|name| mechanism.joint(name)).find(|joint| joint.kind.turns())?;
     let axis = turning.kind.axis_motion()?.axis();
@@ -136,7 +137,7 @@ fn axis_of_joint(mechanism: &Mechanism, link: &str, joints: &[String; 2]) -> Opt
     Unit::try_new(link.inverse() * (at * axis), 1e-9)
 }
 
-/// Attitude of a link with all joints at zero; none where the joints make no tree.
+/// Orientation of a link with all joints at zero; None if the joints do not form a tree.
 fn rotation_at_zero(mechanism: &Mechanism, link: &str) -> Option<Rotation3<f64>> {
     let (mut at, mut R) = (link, Rotation3::identity());
     for _ in 0..=mechanism.joints.len() {
@@ -152,7 +153,7 @@ fn finite(x: f64) -> Option<f64> {
     x.is_finite().then_some(x)
 }
 
-/// Loops of the rigid robot at joint values (rad or m).
+/// Returns the loops of the rigid robot at joint values (rad or m).
 pub(crate) fn at_pose(model: &Model, q: &DVector<f64>) -> Vec<LoopInfo> {
     if model.loops().is_empty() {
         return Vec::new();
@@ -174,15 +175,16 @@ pub(crate) fn at_pose(model: &Model, q: &DVector<f64>) -> Vec<LoopInfo> {
     model.loops().iter().enumerate().map(info).collect()
 }
 
-/// Closure of the loops in poses spread over the joint ranges.
+/// Behaviour of the loops in poses spread over the joint ranges.
 pub(crate) struct OverRanges {
-    /// Minimum transmission angle of each loop (rad), infinite without a pose.
+    /// Minimum transmission angle of each loop (rad); infinite if no pose counted.
     pub(crate) smallest: Vec<f64>,
-    /// Parts of the poses in which each does not close.
+    /// Fraction of the poses in which each loop does not close.
     pub(crate) open: Vec<f64>,
 }
 
-/// Poses that a limit of a dependent joint excludes do not count.
+/// Evaluates the loops over the joint ranges; poses excluded by limits of dependent joints do not
+/// count for the angles.
 pub(crate) fn over_ranges(model: &Model) -> OverRanges {
     let (n, mut data) = (model.loops().len(), Data::new(model));
     let (mut smallest, mut open, mut poses) = (vec![f64::INFINITY; n], vec![0.0; n], 0.0);
@@ -203,10 +205,10 @@ pub(crate) fn over_ranges(model: &Model) -> OverRanges {
     OverRanges { smallest, open }
 }
 
-/// The first loop that does not close at these joint values (rad or m).
+/// Checks that all loops close at these joint values (rad or m).
 ///
 /// # Errors
-/// [`LoopError::Open`].
+/// [`LoopError::Open`] with the first loop that does not close.
 pub(crate) fn check_pose(model: &Model, data: &mut Data, q: &DVector<f64>) -> Result<(), LoopError> {
     if model.loops().is_empty() {
         return Ok(());
@@ -215,19 +217,19 @@ pub(crate) fn check_pose(model: &Model, data: &mut Data, q: &DVector<f64>) -> Re
     data.open_loop().map_or(Ok(()), |k| Err(LoopError::Open { name: model.loops()[k].name.clone() }))
 }
 
-/// Times at which a motion is looked at.
+/// Number of time intervals at which a motion is checked.
 const TIMES: usize = 1000;
 
-/// Closure of the loops along a motion of the rigid robot.
+/// Behaviour of the loops along a motion of the rigid robot.
 pub struct AlongMotion {
     /// Minimum transmission angle of each loop (rad), and its time (s).
     pub(crate) smallest: Vec<(f64, f64)>,
-    /// Lowest and highest value of each dependent joint (rad or m).
+    /// Minimum and maximum of each dependent joint (rad or m).
     pub(crate) range: Vec<[f64; 2]>,
 }
 
-/// Follows a motion; loops must close and may not pass a dead point, where the bars could go on in
-/// two ways.
+/// Follows a motion and checks that the loops close and do not pass a dead point, where the
+/// assembly mode is ambiguous.
 ///
 /// # Errors
 /// [`LoopError::AlongMotion`].
@@ -241,7 +243,7 @@ pub fn along_motion(model: &Model, trajectory: &Trajectory) -> Result<AlongMotio
         return Ok(seen);
     }
     let (mut data, mut q, mut v, mut a) = (Data::new(model), DVector::zeros(n), vec![0.0; n], vec![0.0; n]);
-    // Angles of the last two times.
+    // Angles at the last two times.
     let mut before: Vec<[f64; 2]> = vec![[f64::NAN; 2]; loops];
     for i in 0..=TIMES {
         let t = trajectory.duration() * i as f64 / TIMES as f64;
@@ -249,7 +251,7 @@ pub fn along_motion(model: &Model, trajectory: &Trajectory) -> Result<AlongMotio
         let at = |source| LoopError::AlongMotion { t, source: Box::new(source) };
         check_pose(model, &mut data, &q).map_err(at)?;
         for (k, angle) in data.transmission_angles().iter().copied().enumerate() {
-            // An angle that would have come below zero and rises again has been there.
+            // An angle whose extrapolation is below zero but which rises again has passed zero.
             let [last_but_one, last] = before[k];
             if 2.0 * last - last_but_one <= 0.0 && angle > 0.0 && last < 0.2 {
                 return Err(at(LoopError::DeadPoint { name: model.loops()[k].name.clone() }));

@@ -7,48 +7,48 @@ use nalgebra::{Matrix6xX, Vector3, Vector6};
 
 use crate::twin::RigidTwin;
 
-/// Instants at which the deflection is estimated.
+/// Number of time intervals at which the deflection is estimated.
 const INSTANTS: u32 = 200;
-/// Values of a load of which its mean is made.
+/// Number of values averaged for the mean of a load.
 const PIECES: u32 = 64;
-/// Part of the arm's reach by which the tool's largest deflection is shown.
+/// Maximum displayed TCP deflection relative to the arm's reach.
 const SHOWN: f64 = 0.15;
-/// Maximum magnified rotation of a spring (rad).
+/// Maximum displayed rotation of springs (rad).
 const LARGEST_TURN: f64 = 0.3;
-/// A sudden load, or a start from undeformed springs, deflects twice as far as the
-/// same load at rest.
+/// Dynamic factor of a suddenly applied load, or of a start with undeformed springs, relative to
+/// the static deflection.
 const SUDDEN: f64 = 2.0;
 
-/// Deflections that a run will have, roughly.
+/// Rough estimate of the deflections in a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Expected {
     /// Deflection of the TCP (m).
     pub(crate) tool_m: f64,
     /// Maximum rotation of a spring (rad).
     pub(crate) turn_rad: f64,
-    /// Distance of the tool from the base joint (m).
+    /// Reach of the arm (m).
     pub(crate) reach_m: f64,
-    /// Lowest and highest corner of the box around all bodies and the tool at all times (m, world).
+    /// Corners of the bounding box of all bodies and the TCP at all times (m, world).
     pub(crate) volume: Option<[[f64; 3]; 2]>,
 }
 
 impl Expected {
-    /// Springs under weight and rigid motion, without their own dynamics: `e = -K^-1 tau_e` with
-    /// the loads that hold the elastic coordinates of the rigid twin at zero.
+    /// Estimates the deflections under gravity and rigid motion without the springs' dynamics:
+    /// `e = -K^-1 tau_e` with the forces that hold the elastic coordinates of the rigid twin at
+    /// zero.
     pub(crate) fn of(arm: &FlexibleArm, tcp: &Frame, duration: f64, start: Start) -> Self {
         let mut twin = RigidTwin::new(arm);
         let mut J = Matrix6xX::zeros(arm.model.nv());
         let mut expected = Self::default();
-        // A start from undeformed springs doubles everything, below.
+        // A start with undeformed springs doubles everything below.
         let sudden = if start == Start::Undeformed { 1.0 } else { SUDDEN };
-        // What acts for a short time only acts on the arm as its mean over half a period of the
-        // first mode.
+        // A short load acts through its mean over half a period of the first mode.
         let window = 0.5 / arm.modes.frequencies_hz().first().copied().unwrap_or(f64::INFINITY).max(1e-3);
         let jumps = arm.load_jumps().map(|t| t + 0.5 * window).take(INSTANTS as usize);
         let evenly = (0..=INSTANTS).map(|k| duration * f64::from(k) / f64::from(INSTANTS));
         for t in evenly.chain(jumps.filter(|t| *t < duration)) {
             twin.update(arm, tcp, t);
-            // Loads relieve what holds the elastic coordinates.
+            // Loads reduce the forces that hold the elastic coordinates.
             for load in &arm.loads {
                 let frame = Frame { name: String::new(), body: load.body, X_BF: load.X_BF };
                 frame_jacobian(&arm.model, &twin.data, &frame, &mut J);
@@ -93,7 +93,7 @@ impl Expected {
         expected
     }
 
-    /// Returns the maximum of two runs that are shown together.
+    /// Returns the maxima of two runs that are shown together.
     pub(crate) fn or(self, other: Self) -> Self {
         let largest = |a: [f64; 3], b: [f64; 3], pick: fn(f64, f64) -> f64| [0, 1, 2].map(|c| pick(a[c], b[c]));
         let volume = match (self.volume, other.volume) {
@@ -108,7 +108,7 @@ impl Expected {
         }
     }
 
-    /// Factor on deflections with which they are seen: a round number, or 0 if nothing is flexible.
+    /// Returns the factor on displayed deflections: a round number, or 0 if nothing is elastic.
     pub(crate) fn magnification(&self) -> f64 {
         if !(self.tool_m > 0.0 && self.tool_m.is_finite()) {
             return 0.0;
@@ -117,14 +117,14 @@ impl Expected {
         round_down(wanted).max(1.0)
     }
 
-    /// Deviation for the last colour of the scale (m).
+    /// Returns the deviation at the end of the colour scale (m).
     pub(crate) fn color_scale_m(&self) -> f64 {
         end_of_scale(self.tool_m)
     }
 }
 
-/// Has the scale of colours of pictures end with the largest TCP error of runs that are shown
-/// together: before a run it is a guess.
+/// Sets the end of the pictures' colour scale to the maximum TCP error of the runs shown together;
+/// before a run it is an estimate.
 pub(crate) fn fit_color_scale<'a>(traces: impl IntoIterator<Item = &'a mut Trace>) {
     let mut traces: Vec<&mut Trace> = traces.into_iter().filter(|trace| trace.header.color_scale_m > 0.0).collect();
     let peak_m = |trace: &&mut Trace| Vector3::from_row_slice(&trace.peak.error_world[..3]).norm();
@@ -134,23 +134,23 @@ pub(crate) fn fit_color_scale<'a>(traces: impl IntoIterator<Item = &'a mut Trace
     }
 }
 
-/// The next of 1, 2, 5 times a power of ten that is not larger.
+/// Largest of 1, 2, 5 times a power of ten that does not exceed `x`.
 fn round_down(x: f64) -> f64 {
     let decade = 10f64.powf(x.log10().floor());
     [5.0, 2.0, 1.0].into_iter().map(|k| k * decade).find(|y| *y <= x * (1.0 + 1e-9)).unwrap_or(decade)
 }
 
-/// A round number that is not smaller, and larger by at most a third; 0 of 0.
+/// Smallest round number not below `x`, larger by at most a third; 0 for 0.
 fn end_of_scale(x: f64) -> f64 {
     next_of(&[1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0], x)
 }
 
-/// The next of 1, 2, 5 times a power of ten that is not smaller; 0 of 0.
+/// Smallest of 1, 2, 5 times a power of ten not below `x`; 0 for 0.
 pub(crate) fn round_up(x: f64) -> f64 {
     next_of(&[1.0, 2.0, 5.0, 10.0], x)
 }
 
-/// The next of these times a power of ten that is not smaller; 0 of 0.
+/// Smallest of these steps times a power of ten not below `x`; 0 for 0.
 fn next_of(steps: &[f64], x: f64) -> f64 {
     if !(x > 0.0 && x.is_finite()) {
         return 0.0;

@@ -1,5 +1,5 @@
-//! Modes as a recording: each swings for a few seconds after another, slowly and large enough to
-//! see.
+//! Modes as a recording: each mode oscillates for a few seconds, one after another, slowly and with
+//! a visible amplitude.
 
 use flexarm_analysis::{DampedMode, tcp_error};
 use flexarm_kinematics::{Frame, forward_kinematics};
@@ -17,21 +17,21 @@ use crate::record::{link_frames, recorders, robot_header};
 use crate::robot::Robot;
 use flexarm_settings::written::markdown;
 
-/// Swings per second on the screen, whatever the frequency of the mode.
+/// Oscillations per second on the screen, independent of the mode's frequency.
 const SHOWN_HZ: f64 = 1.0;
 /// Samples per second.
 const RATE_HZ: f64 = 30.0;
-/// Default amplitude of the TCP as a part of the reach.
+/// Default TCP amplitude relative to the reach.
 const PART_OF_REACH: f64 = 0.05;
-/// No elastic coordinate is shown larger than this (m, rad).
+/// Maximum displayed amplitude of an elastic coordinate (m, rad).
 const LARGEST: f64 = 0.5;
 
-/// Options of a recording of modes.
+/// Display options of modes.
 #[derive(Clone, Debug)]
 pub struct ModeMovie {
-    /// Duration of each mode (s); rounded up to whole periods.
+    /// Duration of each mode (s), rounded up to whole oscillations.
     pub seconds: f64,
-    /// Amplitude of the TCP in a mode (m); default a twentieth of the arm's reach.
+    /// TCP amplitude in each mode (m); a twentieth of the arm's reach by default.
     pub tool_motion_m: Option<f64>,
 }
 
@@ -41,8 +41,8 @@ impl Default for ModeMovie {
     }
 }
 
-/// As [`crate::modes()`], and writes a recording in which the modes swing one after another about
-/// the static pose, beside the rigid robot at rest.
+/// As [`crate::modes()`], and writes a recording in which the modes oscillate one after another
+/// about the static equilibrium, next to the rigid robot at rest.
 ///
 /// # Errors
 /// As [`crate::modes()`]; [`Error::Pose`] for a robot without modes, [`Error::Value`],
@@ -109,12 +109,12 @@ pub fn record_modes(
     Ok(figures)
 }
 
-/// Returns the label of a mode.
+/// Caption of a mode.
 fn name(k: usize, mode: &DampedMode) -> String {
     format!("mode {}: {:.2} Hz", k + 1, mode.frequency_hz())
 }
 
-/// The modes as a table of Markdown.
+/// Markdown table of the modes.
 fn list(robot: &str, shown: &[DampedMode], start: impl Fn(usize) -> f64) -> String {
     let robot = markdown(robot);
     let mut text = format!(
@@ -127,7 +127,7 @@ fn list(robot: &str, shown: &[DampedMode], start: impl Fn(usize) -> f64) -> Stri
     text
 }
 
-/// Box around all bodies and the tool, with room for the tool's motion (m).
+/// Bounding box of all bodies and the TCP, enlarged by the TCP amplitude (m).
 fn volume(posed: &Posed, motion_m: f64) -> [[f64; 3]; 2] {
     let (mut data, state) = posed.undeformed();
     forward_kinematics(&posed.arm.model, &mut data, &state.q);
@@ -139,7 +139,7 @@ fn volume(posed: &Posed, motion_m: f64) -> [[f64; 3]; 2] {
     })
 }
 
-/// Returns the maximum distance of the TCP from a joint.
+/// Maximum distance of the TCP from a joint (m).
 fn reach(posed: &Posed) -> f64 {
     let (mut data, state) = posed.undeformed();
     forward_kinematics(&posed.arm.model, &mut data, &state.q);
@@ -147,8 +147,7 @@ fn reach(posed: &Posed) -> f64 {
     data.X_WB.iter().skip(1).map(|X| (X.translation.vector - tool).norm()).fold(0.0, f64::max)
 }
 
-/// Factor on the shape of unit modal mass with which the tool moves so far, or the largest that can
-/// be looked at.
+/// Factor on the shape of unit modal mass for the requested TCP amplitude, limited by [`LARGEST`].
 fn magnification(mode: &DampedMode, linear: &Linear, motion_m: f64) -> f64 {
     let tool = flexarm_analysis::mode_outputs(mode, &crate::modes::tool_map(linear));
     let tool = tool.rows(0, 3).iter().map(|x| x.norm_sqr()).sum::<f64>().sqrt();
@@ -156,7 +155,7 @@ fn magnification(mode: &DampedMode, linear: &Linear, motion_m: f64) -> f64 {
     (motion_m / tool).min(LARGEST / largest)
 }
 
-/// The robot with any elastic coordinates, as samples.
+/// Produces samples of the robot for given elastic coordinates.
 struct Stage<'a> {
     posed: &'a Posed,
     linear: &'a Linear,

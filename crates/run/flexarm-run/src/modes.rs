@@ -1,5 +1,5 @@
-//! Natural modes at a pose, drives locked or under their servos: frequencies, damping, what the
-//! tool does in them and which link bends.
+//! Natural modes at a pose, with drives locked or under their servos: frequencies, damping, TCP
+//! motion and strain energy of the links.
 
 use flexarm_analysis::{
     DampedMode, LinearError, compliance_parts, damped_modes, effective_mass, mode_outputs, strain_energy_shares,
@@ -16,22 +16,22 @@ use crate::posed::{Posed, step_error};
 use crate::robot::Robot;
 use crate::summary::Files;
 
-/// Answer of `flexarm modes`. SI units; world axes, at the TCP; six-vectors linear first.
+/// Result of `flexarm modes`. SI units; world axes, at the TCP; six-vectors linear first.
 #[derive(Clone, Debug, Serialize)]
 pub struct ModeTable {
     /// Name of the robot.
     pub robot: String,
-    /// Joints that are locked, in coordinate order.
+    /// Locked joints, in coordinate order.
     pub joints: Vec<String>,
     /// Positions at which they are locked (rad or m).
     pub at: Vec<f64>,
-    /// Joints that are not locked but under a servo, which counts as spring and damper here.
+    /// Joints under a servo instead of locked; the servo acts as spring and damper here.
     pub driven: Vec<String>,
     /// Link that carries the TCP.
     pub tcp: String,
     /// Natural frequencies `|λ| / 2π` (Hz), ascending.
     pub frequencies_hz: Vec<f64>,
-    /// Frequencies without the dampers (Hz), ascending, as many.
+    /// Undamped frequencies (Hz), ascending, the same number.
     pub undamped_frequencies_hz: Vec<f64>,
     /// Damping ratios `-Re λ / |λ|`.
     pub damping_ratio: Vec<f64>,
@@ -39,38 +39,36 @@ pub struct ModeTable {
     pub elements: Vec<String>,
     /// One entry per mode.
     pub modes: Vec<ModeFigures>,
-    /// Number of modes; `modes` may have fewer.
+    /// Total number of modes; `modes` may contain fewer.
     pub total: usize,
-    /// Parts of the static compliance that the modes above carry, per direction of the TCP; null
-    /// where it is rigid.
+    /// Fraction of the static compliance covered by the listed modes, per TCP direction; null where
+    /// the compliance is zero.
     pub compliance_covered: [Option<f64>; 6],
     /// Written files.
     pub files: Files,
     /// Warnings among the caveats, as sentences.
     pub warnings: Vec<String>,
-    /// Doubts about the input and limits of the result.
+    /// Probable errors in the input, and limits of the result's validity.
     pub caveats: Vec<Caveat>,
 }
 
-/// One mode.
+/// Figures of one mode.
 #[derive(Clone, Debug, Serialize)]
 pub struct ModeFigures {
     /// Natural frequency (Hz).
     pub frequency_hz: f64,
-    /// Frequency of the decaying oscillation (Hz).
+    /// Damped frequency (Hz).
     pub damped_frequency_hz: f64,
     /// Damping ratio.
     pub damping_ratio: f64,
-    /// Motion of the TCP in the mode scaled to unit modal mass (1/sqrt(kg), rad/sqrt(kg m²) ...),
-    /// real part.
+    /// TCP motion in the mode at unit modal mass (1/sqrt(kg), rad/sqrt(kg m²) ...), real part.
     pub tcp: [f64; 6],
-    /// Imaginary part; zero where the damping is proportional.
+    /// Imaginary part; zero for proportional damping.
     pub tcp_imaginary: [f64; 6],
-    /// Mass (kg) at the TCP, moment of inertia (kg m²) for rotations, that moves like the mode;
-    /// null at a node.
+    /// Effective mass at the TCP (kg), or moment of inertia for rotations (kg m²); null at a node.
     pub effective_mass: [Option<f64>; 6],
-    /// Part of the static compliance of the TCP in each direction that this mode carries; null
-    /// where it is rigid.
+    /// Fraction of the static compliance of the TCP carried by this mode, per direction; null where
+    /// the compliance is zero.
     pub compliance_share: [Option<f64>; 6],
     /// Share of each element in the strain energy.
     pub strain_energy: Vec<f64>,
@@ -78,7 +76,7 @@ pub struct ModeFigures {
     pub residual: f64,
 }
 
-/// An effective mass above this is that of a node (kg, kg m²).
+/// Effective mass above which the TCP is at a node (kg, kg m²).
 const NODE: f64 = 1e12;
 
 impl ModeFigures {
@@ -101,7 +99,7 @@ impl ModeFigures {
     }
 }
 
-/// Twist of the tool per rate of the free coordinates.
+/// Jacobian of the TCP twist with respect to the rates of the free coordinates.
 pub(crate) fn tool_map(linear: &Linear) -> DMatrix<f64> {
     DMatrix::from_fn(6, linear.J.ncols(), |i, j| linear.J[(i, j)])
 }
@@ -115,7 +113,7 @@ fn share(part: f64, whole: f64) -> Option<f64> {
     (whole > 0.0).then(|| part / whole)
 }
 
-/// All damped modes of a linear structure.
+/// Computes all damped modes of a linearised structure.
 pub(crate) fn modes_of(linear: &Linear) -> Result<Vec<DampedMode>, Error> {
     let K = (&linear.K + linear.K.transpose()) * 0.5;
     damped_modes(&linear.M, &linear.D, &K).map_err(linear_error)
@@ -125,18 +123,19 @@ pub(crate) fn linear_error(error: LinearError) -> Error {
     PoseError::Linear(error).into()
 }
 
-/// The lowest `count` modes of the flexible robot at a pose, under its weight, drives locked.
+/// Computes the lowest `count` modes of the flexible robot at a pose, about its static equilibrium,
+/// with the drives locked.
 ///
-/// `at`: all actuated joints (rad or m), zero without it.
+/// `at`: values of all actuated joints (rad or m), zero by default.
 ///
 /// # Errors
-/// [`Error::Pose`] for joint values that do not fit, [`Error::Step`] where there is no equilibrium.
+/// [`Error::Pose`] for joint values that do not fit, [`Error::Step`] if there is no equilibrium.
 pub fn modes(robot: &Robot, modelling: &Modelling, at: Option<&[f64]>, count: usize) -> Result<ModeTable, Error> {
     lowest(robot, Posed::new(robot, modelling, at)?, count)
 }
 
 impl Arm {
-    /// As [`modes()`], of an arm whose links and drives are in place.
+    /// As [`modes()`], for an arm that is already modelled.
     ///
     /// # Errors
     /// As [`modes()`].
@@ -151,8 +150,8 @@ fn lowest(robot: &Robot, posed: Posed, count: usize) -> Result<ModeTable, Error>
     table(robot, posed, &linear, &all, count)
 }
 
-/// Frequencies without the dampers (Hz): those that are not in proportion move the others. With
-/// locked drives the figures of a map at this pose, to the last bit.
+/// Computes the undamped frequencies (Hz), from which non-proportional damping shifts the damped
+/// ones. With locked drives they equal those of a map at this pose bit for bit.
 fn undamped_frequencies(posed: &Posed, linear: &Linear) -> Result<Vec<f64>, Error> {
     if linear.driven == 0 {
         return Ok(posed.operating_point(&[0.0; 6])?.frequencies_hz().to_vec());
@@ -161,7 +160,7 @@ fn undamped_frequencies(posed: &Posed, linear: &Linear) -> Result<Vec<f64>, Erro
     Ok(undamped.map_err(linear_error)?.iter().map(DampedMode::frequency_hz).collect())
 }
 
-/// Figures of the modes.
+/// Computes the figures of the modes.
 pub(crate) fn table(
     robot: &Robot,
     posed: Posed,
@@ -169,8 +168,8 @@ pub(crate) fn table(
     all: &[DampedMode],
     count: usize,
 ) -> Result<ModeTable, Error> {
-    // Modes under servos share the compliance of springs and servos; where a motor is held by
-    // nothing there is none.
+    // Under servos the modes share the compliance of springs and servos; it does not exist if a
+    // motor is free.
     let compliance = match linear.driven {
         0 => linear.compliance().map_err(step_error)?.diagonal(),
         _ => linear.yielding_compliance().map_or_else(Vector6::zeros, |C| C.diagonal()),

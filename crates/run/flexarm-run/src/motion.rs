@@ -1,4 +1,4 @@
-//! Trajectories for a robot: joints in coordinate order, checked against its limits.
+//! Trajectories of a robot: joints in coordinate order, checked against its limits.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -13,45 +13,45 @@ use crate::motion_formats::{self, MotionFile, MotionOptions, ReadMotion, refuse_
 use crate::robot::Robot;
 use crate::tool_path::{Cell, ToolPath};
 
-/// A trajectory whose joints are the model's actuated coordinates.
+/// Trajectory whose joints are the model's actuated coordinates.
 #[derive(Clone, Debug)]
 pub struct Motion {
     /// Name for logs.
     pub name: String,
-    /// The file.
+    /// Path of the file.
     pub path: PathBuf,
-    /// The curves, in coordinate order.
+    /// Trajectory, in coordinate order.
     pub trajectory: Arc<Trajectory>,
-    /// Limits that it passes.
+    /// Exceeded limits.
     pub violations: Vec<LimitViolation>,
-    /// The slip that would explain positions beyond their limits; empty if none would.
+    /// Unit error that would explain positions beyond their limits; empty if there is none.
     pub likely: &'static str,
     /// Warnings.
     pub warnings: Vec<String>,
-    /// Joints that the file does not name.
+    /// Joints that the file does not contain.
     pub held: Vec<HeldJoint>,
-    /// Result of planning each move of a TCP path.
+    /// Planned moves, if the motion is given as a TCP path.
     pub tool_path: Option<Arc<ToolPath>>,
-    /// Description of the file; empty for a motion that was not read.
+    /// Description of the file's format; empty for a computed motion.
     pub format: String,
-    /// The topic of a bag.
+    /// Topic, if the file is a bag.
     pub topic: Option<String>,
-    /// Rows, messages or points of the file; none for waypoints.
+    /// Number of rows, messages or points in the file; None for waypoints.
     pub samples: Option<usize>,
-    /// Joints of messages that the robot does not have; they are left out.
+    /// Joints in the file that the robot does not have; they are ignored.
     pub dropped: Vec<String>,
-    /// Choices, assumptions and omissions of the reader.
+    /// Choices, assumptions and omissions made when reading the file.
     pub notes: Vec<Caveat>,
 }
 
-/// A joint that a motion does not name.
+/// Joint that the motion does not contain.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeldJoint {
-    /// Its name.
+    /// Joint name.
     pub joint: String,
-    /// Its position, rad or m.
+    /// Position at which it is held (rad or m).
     pub at: f64,
-    /// Whether the robot file says so.
+    /// Whether the position is given in the robot file.
     pub told: bool,
 }
 
@@ -69,7 +69,7 @@ impl PrescribedMotion for Along {
     }
 }
 
-/// Positions and speeds that the joints may have.
+/// Returns the position and velocity limits of the joints.
 pub fn limits(model: &Model) -> Vec<JointLimits> {
     let actuated = &model.coordinates()[..model.n_actuated()];
     let limits = actuated.iter().map(|c| JointLimits {
@@ -82,26 +82,27 @@ pub fn limits(model: &Model) -> Vec<JointLimits> {
 }
 
 impl Motion {
-    /// Reads a motion file for a robot, of any format that `docs/motions.md` has. A joint that it
-    /// does not name stays where the robot file says, else at zero, or at the limit nearest to it.
+    /// Reads a motion file for a robot, in any format of `docs/motions.md`. Joints it does not
+    /// contain are held at the position in the robot file, or else at zero or the limit closest to
+    /// zero.
     ///
     /// # Errors
-    /// [`Error::File`], [`Error::Trajectory`] or [`Error::Motion`]: format, units, times, joints
-    /// that the robot does not have; [`Error::Model`].
+    /// [`Error::File`], [`Error::Trajectory`] or [`Error::Motion`] for an invalid format, units,
+    /// times, or joints that the robot does not have; [`Error::Model`].
     pub fn load(path: impl AsRef<Path>, robot: &Robot) -> Result<Self, Error> {
         Self::load_with(path, robot, &MotionOptions::default())
     }
 
-    /// As [`Motion::load`], with the topic of a bag or the columns of a table.
+    /// As [`Motion::load`], with a given topic of a bag or given columns of a table.
     ///
     /// # Errors
-    /// As [`Motion::load`], and for a topic or columns that are not there.
+    /// As [`Motion::load`], and if the topic or the columns do not exist.
     pub fn load_with(path: impl AsRef<Path>, robot: &Robot, options: &MotionOptions) -> Result<Self, Error> {
         Self::load_text(path.as_ref(), None, robot, options)
     }
 
-    /// As [`Motion::load_with`], with a text in the place of the one that the file has, if it is
-    /// waypoints or a path of the tool.
+    /// As [`Motion::load_with`], with a text instead of the file's content, for waypoints and TCP
+    /// paths.
     pub fn load_text(path: &Path, text: Option<&str>, robot: &Robot, options: &MotionOptions) -> Result<Self, Error> {
         let model = robot.rigid_model()?;
         let Robot { hold, controller, .. } = robot;
@@ -116,14 +117,14 @@ impl Motion {
         Self::read(path, &Cell { model, tcp_link: None, hold: &[], controller: &[] }, &MotionOptions::default(), None)
     }
 
-    /// The motion through sampled positions, by a spline as through the rows of a CSV file.
+    /// Interpolates sampled positions by a spline, as for the rows of a CSV file.
     ///
-    /// * `t`: n times (s), increasing; the first becomes 0.
-    /// * `q`: n rows of all actuated joints in coordinate order, one after the other (rad or m).
+    /// * `t`: n times (s), increasing; shifted so that the first is 0.
+    /// * `q`: n rows of all actuated joints in coordinate order, row by row (rad or m).
     ///
     /// # Errors
-    /// [`Error::Pose`] for another number of values, [`Error::Trajectory`] for values that are no
-    /// numbers or times that do not increase; [`Error::Model`].
+    /// [`Error::Pose`] for a wrong number of values, [`Error::Trajectory`] for values that are not
+    /// finite or times that do not increase; [`Error::Model`].
     pub fn from_samples(t: &[f64], q: &[f64], robot: &Robot) -> Result<Self, Error> {
         let model = robot.rigid_model()?;
         let actuated = &model.coordinates()[..model.n_actuated()];
@@ -142,9 +143,9 @@ impl Motion {
         Self::along(samples.interpolate()?, "samples", robot)
     }
 
-    /// A motion along a trajectory that was made, not read: splines, plans of moves.
+    /// Returns the motion along a computed trajectory, such as a spline or a plan of moves.
     ///
-    /// * `name`: for logs and messages.
+    /// * `name`: name for logs and messages.
     ///
     /// # Errors
     /// [`Error::File`] for joints that the robot does not have; [`Error::Model`].
@@ -208,26 +209,24 @@ impl Motion {
         })
     }
 
-    /// The same motion in `factor` times the time, rests too.
+    /// Scales the duration of the motion by `factor`, including pauses.
     ///
     /// # Errors
-    /// [`Error::Trajectory`] unless `factor` is positive, and if numbers become too extreme.
+    /// [`Error::Trajectory`] unless `factor` is positive, and if values overflow.
     pub fn scaled(self, factor: f64, model: &Model) -> Result<Self, Error> {
         let trajectory = self.trajectory.scaled(factor)?;
         let warnings = warnings(&trajectory, &self.path);
         let limits = limits(model);
         let violations = trajectory.check_limits(&limits);
         let likely = caveat::motion::degrees(&violations, model);
-        // What was planned of each move holds at its own speed.
+        // The planned moves are valid only at their own speed.
         Ok(Self { trajectory: Arc::new(trajectory), violations, likely, warnings, tool_path: None, ..self })
     }
 
-    /// The same motion with each corner, where a velocity jumps, replaced by a blend that lasts
-    /// `seconds`.
+    /// Replaces each corner, where a velocity jumps, by a blend of duration `seconds`.
     ///
     /// # Errors
-    /// [`Error::Value`] unless `seconds` is positive, [`Error::Trajectory`] if numbers become too
-    /// extreme.
+    /// [`Error::Value`] unless `seconds` is positive, [`Error::Trajectory`] if values overflow.
     pub fn with_rounded_corners(self, seconds: f64, model: &Model) -> Result<Self, Error> {
         if !(seconds > 0.0 && seconds.is_finite()) {
             return Err(ValueError::CornerTime(seconds).into());
@@ -238,15 +237,15 @@ impl Motion {
         Ok(Self { trajectory: Arc::new(trajectory), violations, warnings, ..self })
     }
 
-    /// Returns notes about the motion.
+    /// Returns the caveats about the motion.
     pub fn caveats(&self) -> Vec<Caveat> {
         let file = self.path.display().to_string();
         let told = self.warnings.iter().map(|text| Caveat::said("trajectory", &file, text, ""));
         self.notes.iter().cloned().chain(told).chain(self.held_note()).collect()
     }
 
-    /// Reports joints that the file does not name: a note where the robot file gives their
-    /// position, else a warning.
+    /// Caveats about held joints: a note for positions given in the robot file, a warning for
+    /// assumed ones.
     fn held_note(&self) -> Vec<Caveat> {
         let (told, assumed): (Vec<&HeldJoint>, Vec<&HeldJoint>) = self.held.iter().partition(|held| held.told);
         let file = self.path.display().to_string();
@@ -262,13 +261,13 @@ impl Motion {
         assumed.into_iter().chain(told).collect()
     }
 
-    /// For steppers.
+    /// Returns the motion in the form that steppers use.
     pub fn prescribed(&self) -> Arc<dyn PrescribedMotion> {
         Arc::new(Along(self.trajectory.clone()))
     }
 }
 
-/// A motion must move joints that there are, and at least one of them.
+/// Checks that the motion moves only joints that the robot has.
 fn check_joints(path: &Path, moved: &[String], joints: &[&str], dependent: &[&str]) -> Result<(), Error> {
     refuse_dependent(path, moved, joints, dependent)?;
     let unknown: Vec<String> = moved.iter().filter(|name| !joints.contains(&name.as_str())).cloned().collect();

@@ -1,5 +1,5 @@
-//! Formats of motions: one row each, recognised by content. A new format is a row
-//! more.
+//! Table of the motion formats that can be read, one row each, recognised by content. A new format
+//! needs only a new row.
 
 use std::io::Read;
 use std::path::Path;
@@ -16,72 +16,72 @@ use crate::error::Error;
 use crate::tool_path::{Cell, ToolPath, is_path_file, read_path_file, read_robot_program};
 use flexarm_programs::recognise;
 
-/// Bytes that a file is recognised by.
+/// Number of bytes used to recognise a file.
 const LOOKED_AT: u64 = 64 << 10;
 
 /// Options for reading a motion file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MotionOptions {
-    /// Topic of a bag; without it one is chosen and reported.
+    /// Topic of a bag; by default one is chosen and reported.
     pub topic: Option<String>,
-    /// Columns of a table with time and joints; without it they are found by their names.
+    /// Columns of a table that hold time and joints; by default their names decide.
     pub columns: Option<ColumnMap>,
 }
 
-/// A motion as it stands in its file.
+/// Motion as read from its file.
 pub(crate) struct ReadMotion {
     pub(crate) trajectory: Trajectory,
-    /// Description of the file.
+    /// Description of the format.
     pub(crate) format: String,
     pub(crate) topic: Option<String>,
-    /// Rows, messages or points; none for waypoints.
+    /// Number of rows, messages or points; None for waypoints.
     pub(crate) samples: Option<usize>,
-    /// Joints of the file that the robot does not have, where that is no error.
+    /// Joints of the file that the robot does not have, if that is not an error.
     pub(crate) dropped: Vec<String>,
     pub(crate) caveats: Vec<Caveat>,
-    /// Result of planning each move of a TCP path.
+    /// Planned TCP path, if the motion is given as one.
     pub(crate) tool_path: Option<ToolPath>,
 }
 
-/// The beginning of a file.
+/// Beginning of a file.
 pub(crate) struct Head<'a> {
-    /// Ending of its name in small letters.
+    /// File extension in lower case.
     pub(crate) ending: &'a str,
     pub(crate) bytes: &'a [u8],
-    /// The same as text, as far as it is UTF-8; empty for bytes.
+    /// The bytes as text, as far as they are UTF-8; empty for binary data.
     pub(crate) text: &'a str,
     pub(crate) is_folder: bool,
 }
 
-/// A file that is to be read, for whom, and what was said about it.
+/// File to be read, with the robot and the options.
 pub(crate) struct MotionFile<'a> {
     pub(crate) path: &'a Path,
-    /// Joints of the robot; none if it is not known.
+    /// Joints of the robot; None if it is not known.
     pub(crate) joints: Option<&'a [KnownJoint<'a>]>,
     pub(crate) limits: &'a [(&'a str, JointLimits)],
     pub(crate) options: &'a MotionOptions,
-    /// The robot that follows a path of its tool; none if it is not known.
+    /// Robot that follows a TCP path; None if it is not known.
     pub(crate) cell: Option<&'a Cell<'a>>,
-    /// A text in the place of the one that the file has.
+    /// Text to use instead of the file's own.
     pub(crate) text: Option<&'a str>,
 }
 
 impl MotionFile<'_> {
-    /// The text of a file of text.
+    /// Returns the text of a text file.
     fn text(&self) -> Result<String, Error> {
         self.text.map_or_else(|| Ok(text_of_file(self.path)?), |text| Ok(text.to_owned()))
     }
 }
 
-/// A format of motions.
+/// Motion format.
 pub(crate) struct MotionFormat {
-    /// For the list of what is read.
+    /// Name in the list of readable formats.
     pub(crate) name: &'static str,
     pub(crate) recognises: fn(&Head<'_>) -> bool,
     pub(crate) read: fn(&MotionFile<'_>) -> Result<ReadMotion, Error>,
 }
 
-/// Asked one after another: what has a mark of its own first, tables last.
+/// Tried in order: formats with an unambiguous signature first, tables last.
 const FORMATS: [MotionFormat; 11] = [
     MotionFormat { name: "folders of rosbag2", recognises: |head| head.is_folder, read: |file| bag(file, read_folder) },
     MotionFormat {
@@ -121,7 +121,8 @@ const FORMATS: [MotionFormat; 11] = [
         read: messages,
     },
     MotionFormat { name: "samples (CSV) and other tables", recognises: is_table, read: table },
-    // A name that ends so asks for its own messages when nothing in the file can be recognised.
+    // A file with the extension .csv gets the error messages of tables even if its content is not
+    // recognised.
     MotionFormat { name: "", recognises: |head| head.ending == "csv", read: table },
 ];
 
@@ -154,7 +155,7 @@ fn unreadable(path: &Path, source: std::io::Error) -> Error {
     flexarm_trajectory::TrajectoryError::Read { path: path.to_owned(), source }.into()
 }
 
-/// The text at the beginning of a file, up to the first byte that is none.
+/// Returns the text at the beginning of a file, up to the first byte that is not text.
 fn start_as_text(bytes: &[u8]) -> String {
     let is_utf16 = bytes.starts_with(&[0xFF, 0xFE]) || bytes.starts_with(&[0xFE, 0xFF]);
     let whole = &bytes[..bytes.len() - usize::from(is_utf16) * (bytes.len() % 2)];
@@ -165,7 +166,7 @@ fn start_as_text(bytes: &[u8]) -> String {
     text.trim_start_matches('\u{feff}').to_owned()
 }
 
-/// Returns the error for a file of no known format.
+/// Message for a file of unknown format.
 fn unknown(head: &Head<'_>) -> String {
     let names: Vec<&str> = FORMATS.iter().map(|format| format.name).filter(|name| !name.is_empty()).collect();
     let found = match (head.bytes, head.text.lines().find(|line| !line.trim().is_empty())) {
@@ -183,7 +184,8 @@ fn unknown(head: &Head<'_>) -> String {
 // recognition
 
 fn is_toml(head: &Head<'_>) -> bool {
-    // Programs assign to names as well: a list of joints holds texts, a format is a number.
+    // Programs also assign to names; in TOML the list of joints contains strings and the format is
+    // a number.
     let is_key = |line: &str| match line.split_once('=').map(|(key, value)| (key.trim(), value.trim())) {
         Some(("format", value)) => value.starts_with(|c: char| c.is_ascii_digit()),
         Some(("joints", value)) => value.trim_start_matches('[').trim_start().starts_with(['"', '\'']),
@@ -192,7 +194,8 @@ fn is_toml(head: &Head<'_>) -> bool {
     head.ending == "toml" || head.text.lines().any(is_key)
 }
 
-/// A program by its content; a table or text of messages is none, whatever its lines look like.
+/// Whether the content is a robot program; tables and message texts are excluded whatever their
+/// lines look like.
 fn is_program(head: &Head<'_>) -> bool {
     let other = ["yaml", "yml", "json", "csv"].contains(&head.ending) || looks_like_messages(head.text);
     !other && recognise(head.bytes, &format!("x.{}", head.ending)).is_some()
@@ -202,7 +205,7 @@ fn is_message(head: &Head<'_>) -> bool {
     ["yaml", "yml", "json"].contains(&head.ending) || looks_like_messages(head.text)
 }
 
-/// Whether some line is mostly numbers, several of them.
+/// Whether some line consists mostly of numbers, at least two.
 fn is_table(head: &Head<'_>) -> bool {
     let of_numbers = |line: &str| {
         let fields = |separators: &[char]| -> (usize, usize) {
@@ -258,7 +261,7 @@ fn along((trajectory, tool_path): (Trajectory, ToolPath), format: String) -> Rea
     ReadMotion { trajectory, format, topic: None, samples, dropped: Vec::new(), caveats, tool_path: Some(tool_path) }
 }
 
-/// The robot, without which the path of a tool is no motion of joints.
+/// Returns the robot; a TCP path without one does not determine a joint motion.
 fn robot_of<'a>(file: &MotionFile<'a>) -> Result<&'a Cell<'a>, Error> {
     file.cell.ok_or_else(|| {
         let what = "this file gives a TCP path: give the robot as well, whose joints follow it".into();
@@ -336,8 +339,7 @@ fn no_columns(file: &MotionFile<'_>, what: &str) -> Result<(), Error> {
     Err(Error::File { path: file.path.to_owned(), what })
 }
 
-/// Joints that the robot does not have, each with the one that may be meant.
-/// Refuses joints that follow from closed loops.
+/// Rejects a motion of joints that follow from closed loops.
 pub(crate) fn refuse_dependent(
     path: &Path,
     moved: &[String],

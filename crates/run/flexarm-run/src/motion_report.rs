@@ -1,5 +1,5 @@
-//! Report of a motion: peaks against limits, torques of the rigid robot, the TCP path,
-//! curves; and the motion in another format.
+//! Report on a motion: peaks and limits, torques of the rigid robot, TCP path and curves; also
+//! converts the motion to other formats.
 
 use std::path::{Path, PathBuf};
 
@@ -18,146 +18,146 @@ use crate::motion::Motion;
 use crate::motion_formats::{self, MotionFile, MotionOptions, ReadMotion};
 use crate::robot::{Robot, tcp_frame};
 
-/// Times, evenly spaced, at which torques and the place of the tool are looked at; even.
+/// Number of equal time intervals at which torques and TCP positions are evaluated; even.
 const TIMES: usize = 4000;
-/// Points of the curves.
+/// Number of intervals of the curves.
 const CURVE_POINTS: usize = 600;
-/// A torque counts as over its limit beyond this part of it.
+/// Relative tolerance on a torque limit.
 const SLACK: f64 = 1e-9;
-/// A jerk likewise: the planner keeps it to this.
+/// Relative tolerance on a jerk limit, to which the planner keeps it.
 const JERK_SLACK: f64 = 1e-3;
 
-/// Answer of `flexarm motion`. SI units; angles in rad.
+/// Result of `flexarm motion`. SI units; angles in rad.
 #[derive(Clone, Debug, Serialize)]
 pub struct MotionReport {
-    /// The file.
+    /// Path of the motion file.
     pub motion: String,
-    /// Description.
+    /// Description of the format.
     pub format: String,
-    /// Topic of a bag.
+    /// Topic, if the file is a bag.
     pub topic: Option<String>,
     /// Name of the robot, if one was given.
     pub robot: Option<String>,
-    /// Joints: those of the robot in coordinate order, without a robot those of the file.
+    /// Joints: those of the robot in coordinate order; without a robot, those of the file.
     pub joints: Vec<String>,
-    /// Joints of the robot that the file does not name, held.
+    /// Joints of the robot that the file does not contain; they are held.
     pub held: Vec<String>,
-    /// Joints of messages that the robot does not have, left out.
+    /// Joints in the file that the robot does not have; they are ignored.
     pub dropped: Vec<String>,
     /// Duration (s).
     pub duration_s: f64,
-    /// Rows, messages or points of the file; null for waypoints.
+    /// Number of rows, messages or points in the file; null for waypoints.
     pub samples: Option<usize>,
-    /// The largest values of each joint.
+    /// Extreme values of each joint.
     pub peaks: Vec<MotionPeak>,
-    /// Limits that are passed, with a robot.
+    /// Exceeded limits, with a robot.
     pub violations: Vec<MotionViolation>,
-    /// Length of the path of the tool (m), with a robot.
+    /// Length of the TCP path (m), with a robot.
     pub tcp_length_m: Option<f64>,
     /// Maximum TCP speed (m/s), with a robot.
     pub tcp_speed_m_s: Option<f64>,
     /// Warnings.
     pub warnings: Vec<String>,
-    /// Choices that need no attention.
+    /// Notes on automatic choices that need no attention.
     pub notes: Vec<String>,
-    /// Files that were written.
+    /// Written files.
     pub files: MotionFiles,
     /// Positions over time, for drawing.
     #[serde(skip)]
     pub curves: Vec<MotionCurve>,
 }
 
-/// The largest values of a joint, with their times (s); limits are null where there are none.
+/// Extreme values of a joint, with their times (s); limits are null where there are none.
 #[derive(Clone, Debug, Serialize)]
 pub struct MotionPeak {
-    /// Its name.
+    /// Joint name.
     pub joint: String,
     /// `rad`, `m`, or `rad or m` without a robot.
     pub unit: &'static str,
     /// Minimum position.
     pub lower: f64,
-    /// When.
+    /// Time of the minimum (s).
     pub lower_at_s: f64,
-    /// The limit.
+    /// Lower limit.
     pub lower_limit: Option<f64>,
-    /// Greatest position.
+    /// Maximum position.
     pub upper: f64,
-    /// When.
+    /// Time of the maximum (s).
     pub upper_at_s: f64,
-    /// The limit.
+    /// Upper limit.
     pub upper_limit: Option<f64>,
-    /// Speed of greatest magnitude, with its sign.
+    /// Velocity of largest magnitude, signed.
     pub speed: f64,
-    /// When.
+    /// Time of the peak velocity (s).
     pub speed_at_s: f64,
-    /// The limit.
+    /// Velocity limit.
     pub speed_limit: Option<f64>,
-    /// Acceleration of greatest magnitude.
+    /// Acceleration of largest magnitude, signed.
     pub acceleration: f64,
-    /// When.
+    /// Time of the peak acceleration (s).
     pub acceleration_at_s: f64,
-    /// Jerk of greatest magnitude, jumps of the acceleration apart.
+    /// Jerk of largest magnitude, excluding jumps of the acceleration.
     pub jerk: f64,
-    /// When.
+    /// Time of the peak jerk (s).
     pub jerk_at_s: f64,
-    /// The limit: that of a path file.
+    /// Jerk limit of a path file.
     pub jerk_limit: Option<f64>,
     /// Maximum jump of the acceleration.
     pub acceleration_jump: f64,
-    /// Torque or force of greatest magnitude that the rigid robot with its payload needs (N m, N),
+    /// Torque or force of largest magnitude that the rigid robot with its payload needs (N m, N),
     /// with a robot.
     pub torque: Option<f64>,
-    /// When.
+    /// Time of the peak torque (s).
     pub torque_at_s: Option<f64>,
-    /// The limit.
+    /// Effort limit.
     pub torque_limit: Option<f64>,
 }
 
-/// A limit that is passed.
+/// An exceeded limit.
 #[derive(Clone, Debug, Serialize)]
 pub struct MotionViolation {
-    /// Joint.
+    /// Joint name.
     pub joint: String,
-    /// lower, upper, velocity, jerk or effort.
+    /// `lower`, `upper`, `velocity`, `acceleration`, `jerk` or `effort`.
     pub kind: &'static str,
-    /// When it is worst (s).
+    /// Time of the largest excess (s).
     pub time_s: f64,
-    /// When it is passed first (s).
+    /// Time at which the limit is first exceeded (s).
     pub since_s: f64,
-    /// The worst value.
+    /// Value at the largest excess.
     pub value: f64,
-    /// The limit.
+    /// Limit.
     pub limit: f64,
-    /// All of it in one sentence.
+    /// The violation as a sentence.
     pub message: String,
 }
 
-/// Files that were written.
+/// Written files.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct MotionFiles {
-    /// The motion in other formats.
+    /// Motion files in other formats.
     pub motions: Vec<String>,
-    /// Curves.
+    /// Plots of the curves.
     pub plots: Vec<String>,
 }
 
-/// A joint over time.
+/// Position of a joint over time.
 #[derive(Clone, Debug)]
 pub struct MotionCurve {
-    /// Joint.
+    /// Joint name.
     pub joint: String,
-    /// rad or m, at equal distances in time from 0 to the end.
+    /// Positions (rad or m) at equal time intervals from start to end.
     pub position: Vec<f64>,
 }
 
-/// Looks at a motion, on a robot if one is given, and writes it in the formats that the endings of
-/// `outputs` ask for: `.csv`, `.toml`, `.yaml` (`.yml`), `.json`, and `.svg` for curves.
+/// Reports on a motion, on a robot if one is given, and writes it in the formats given by the
+/// extensions of `outputs`: `.csv`, `.toml`, `.yaml` (`.yml`), `.json`, and `.svg` for curves.
 ///
-/// * `rate_hz`: rows or points per second of what is written.
+/// * `rate_hz`: rows or points per second in the written files.
 ///
 /// # Errors
-/// As [`Motion::load_with`]; [`Error::File`] for an ending that is not known, [`Error::Taken`] and
-/// [`Error::Write`]; [`Error::Trajectory`] for a rate that makes no sense.
+/// As [`Motion::load_with`]; [`Error::File`] for an unknown extension, [`Error::Taken`] and
+/// [`Error::Write`]; [`Error::Trajectory`] for an invalid rate.
 pub fn motion_report(
     path: &Path,
     robot: Option<&Robot>,
@@ -186,7 +186,7 @@ pub fn motion_report(
     Ok(report)
 }
 
-/// A motion without a robot.
+/// Reports on a motion without a robot.
 fn alone(path: &Path, options: &MotionOptions) -> Result<(MotionReport, Trajectory, Torques), Error> {
     let file = MotionFile { path, joints: None, limits: &[], options, cell: None, text: None };
     let ReadMotion { trajectory, format, topic, samples, dropped, caveats, .. } = motion_formats::read(&file)?;
@@ -215,7 +215,7 @@ fn alone(path: &Path, options: &MotionOptions) -> Result<(MotionReport, Trajecto
     Ok((report, trajectory, Torques::default()))
 }
 
-/// Sentences of warnings and of notes.
+/// Splits caveats into the messages of warnings and of notes.
 fn told(caveats: &[caveat::Caveat], own: Vec<String>) -> (Vec<String>, Vec<String>) {
     let (notes, warnings): (Vec<_>, Vec<_>) =
         caveats.iter().partition(|caveat| caveat.severity == caveat::Severity::Note);
@@ -233,7 +233,7 @@ fn on_robot(path: &Path, robot: &Robot, options: &MotionOptions) -> Result<(Moti
     crate::loops::along_motion(&model, &trajectory)?;
     let torques = torques(&trajectory, &model);
     let mut caveats = caveat::told::of_robot(robot)?;
-    let violations = |caveat: &caveat::Caveat| caveat.code == "joint-limit"; // told as `violations`
+    let violations = |caveat: &caveat::Caveat| caveat.code == "joint-limit"; // in `violations`
     caveats.extend(caveat::told::of_motion(&motion, &model).into_iter().filter(|caveat| !violations(caveat)));
     let (warnings, notes) = told(&caveats, Vec::new());
 
@@ -301,7 +301,7 @@ fn of_joint(peak: &JointPeak, unit: &'static str, limits: &JointLimits) -> Motio
     }
 }
 
-/// Returns a violated limit with its joint and time.
+/// Converts a violated limit of a trajectory.
 pub fn of_limit(violation: &flexarm_trajectory::LimitViolation) -> MotionViolation {
     let kind = match violation.kind {
         LimitKind::Lower => "lower",
@@ -320,7 +320,7 @@ pub fn of_limit(violation: &flexarm_trajectory::LimitViolation) -> MotionViolati
     }
 }
 
-/// A jerk beyond its limit.
+/// Returns a violation if the peak jerk exceeds its limit.
 fn of_jerk(peak: &JointPeak, limit: f64) -> Option<MotionViolation> {
     let Extreme { time_s, value } = peak.jerk;
     let message = format!(
@@ -339,7 +339,7 @@ fn of_jerk(peak: &JointPeak, limit: f64) -> Option<MotionViolation> {
     })
 }
 
-/// Torques of the rigid robot at equal distances in time.
+/// Torques of the rigid robot over time.
 #[derive(Default)]
 struct Torques {
     times: Vec<f64>,
@@ -347,7 +347,8 @@ struct Torques {
     values: Vec<Vec<f64>>,
 }
 
-/// τ = M(q) q̈ + bias(q, q̇) along the motion, and at each knot where the acceleration jumps.
+/// τ = M(q) q̈ + bias(q, q̇) at equal time intervals along the motion, and at each kink where the
+/// acceleration jumps.
 fn torques(trajectory: &Trajectory, model: &Model) -> Torques {
     let n = model.nv();
     let (mut data, mut state, mut a) = (Data::new(model), State::zeros(model), DVector::zeros(n));
@@ -380,7 +381,7 @@ impl Torques {
     }
 }
 
-/// A torque or force beyond its limit; `of`: whose it is.
+/// Returns a violation if a torque or force exceeds its limit; `of` names its source.
 pub fn of_effort(joint: &str, worst: &Extreme, since_s: f64, limit: f64, of: &str) -> Option<MotionViolation> {
     let Extreme { time_s, value } = *worst;
     if value.abs() <= limit * (1.0 + SLACK) || limit.is_nan() {
@@ -393,8 +394,8 @@ pub fn of_effort(joint: &str, worst: &Extreme, since_s: f64, limit: f64, of: &st
     Some(MotionViolation { joint: joint.to_owned(), kind: "effort", time_s, since_s, value, limit, message })
 }
 
-/// Length of the path of the tool (m) and its largest speed (m/s), from chords; what they leave out
-/// of the length is taken from chords of twice the step (error of the fourth order in the step).
+/// Length of the TCP path (m) and maximum TCP speed (m/s), from chords. The length is extrapolated
+/// from chords of one and two steps (error of fourth order in the step).
 fn way_of_tool(trajectory: &Trajectory, model: &Model) -> (f64, f64) {
     let (mut data, tcp) = (Data::new(model), tcp_frame(model));
     let n = model.nv();
@@ -423,7 +424,7 @@ fn curves(trajectory: &Trajectory) -> Vec<MotionCurve> {
     trajectory.joints().iter().enumerate().map(curve).collect()
 }
 
-/// Times, positions and velocities at equal distances.
+/// Times, positions and velocities at equal time intervals.
 fn sampled(trajectory: &Trajectory, points: usize) -> Vec<(f64, Vec<f64>, Vec<f64>)> {
     let n = trajectory.joints().len();
     let mut a = vec![0.0; n];
@@ -436,8 +437,8 @@ fn sampled(trajectory: &Trajectory, points: usize) -> Vec<(f64, Vec<f64>, Vec<f6
     (0..=points).map(at).collect()
 }
 
-/// A motion in the formats that the endings of files ask for: `.csv`, `.toml`, `.yaml` (`.yml`),
-/// `.json`.
+/// Converts a motion to the formats given by the file extensions: `.csv`, `.toml`, `.yaml`
+/// (`.yml`), `.json`.
 pub fn motion_texts(
     outputs: &[PathBuf],
     trajectory: &Trajectory,
@@ -448,12 +449,12 @@ pub fn motion_texts(
     outputs.iter().map(written).collect()
 }
 
-/// Refuses files whose endings ask for no motion.
+/// Rejects files whose extension is not a motion format.
 pub fn check_motion_outputs(outputs: &[PathBuf]) -> Result<(), Error> {
     outputs.iter().try_for_each(|output| Target::of_motion(output).map(|_| ()))
 }
 
-/// Format of a written motion.
+/// Format of a written file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Target {
     Csv,
@@ -463,7 +464,7 @@ enum Target {
 }
 
 impl Target {
-    /// By the ending of its name.
+    /// Chooses the format by the file extension.
     fn of(path: &Path) -> Result<Self, Error> {
         let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase()).unwrap_or_default();
         match ending.as_str() {
@@ -483,7 +484,7 @@ impl Target {
         }
     }
 
-    /// The same of what holds a motion.
+    /// As [`Self::of`], for motion formats only.
     fn of_motion(path: &Path) -> Result<Self, Error> {
         match Self::of(path)? {
             Self::Plot => {
@@ -507,7 +508,7 @@ impl Target {
         }
     }
 
-    /// The text of a motion; of a plot there is none.
+    /// Returns the text of a motion; empty for a plot.
     fn motion(self, trajectory: &Trajectory, rate_hz: f64) -> Result<String, Error> {
         match self {
             Self::Csv => {
@@ -525,7 +526,7 @@ impl Target {
     }
 }
 
-/// Positions, speeds and torques over time: a panel for each unit.
+/// Plots positions, velocities and torques over time, one panel per unit.
 fn plot(report: &MotionReport, trajectory: &Trajectory, torques: &Torques) -> Result<String, Error> {
     let sampled = sampled(trajectory, 2 * CURVE_POINTS);
     let x: Vec<f64> = sampled.iter().map(|(t, ..)| *t).collect();

@@ -1,9 +1,9 @@
-//! Mounting of a robot: six springs, or a flexible beam or mesh under its base; from the text to
-//! checked numbers.
+//! Elastic mounting of a robot's base: six springs, or a flexible beam or mesh. From the text to
+//! checked values.
 //!
-//! Springs are kept beside the rigid robot and put under the base when it is modelled
+//! Springs are stored with the rigid robot and inserted under the base when the robot is modelled
 //! ([`RobotMounting::Springs`]). A beam or a mesh becomes a flexible link between the ground and
-//! the base like any other ([`RobotMounting::Link`]).
+//! the base, like any other ([`RobotMounting::Link`]).
 
 use std::path::PathBuf;
 
@@ -20,58 +20,60 @@ use crate::link_entry::{LinkHome, damping_of, flexible_link};
 use crate::robot::{Robot, check_finite, keep, pose};
 use crate::robot_file::{BeamEntry, DampingEntry, FlexibleLinkEntry, RobotFileError, Source};
 
-/// Entry `[mounting]` of a robot file.
+/// `[mounting]` of a robot file: what supports the base.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct MountingEntry {
-    /// Name for results; `mounting` if not given.
+    /// Name used in results; `mounting` by default.
     pub name: Option<Spanned<String>>,
-    /// Six springs along and about the axes of their frame (N/m, N m/rad), or a 6x6 matrix.
+    /// Six stiffnesses along and about the axes of the springs' frame (N/m, N m/rad), or a 6x6
+    /// matrix.
     pub stiffness: Option<Spanned<Numbers>>,
-    /// Or a flexible link: a beam from its foot to the base,
+    /// Beam from its foot to the base, instead of springs.
     pub beam: Option<Spanned<BeamEntry>>,
-    /// or a `.flex` file, relative to the robot file, whose interface B is the base.
+    /// Reduced mesh instead of springs: a `.flex` file, relative to the robot file, whose interface
+    /// B is the base.
     pub reduced: Option<Spanned<PathBuf>>,
     /// Position of the springs, or of the foot of the beam, in the base link (m).
     pub xyz: Option<Spanned<[f64; 3]>>,
     /// Axes of the springs: roll, pitch, yaw in the base link (rad).
     pub rpy: Option<Spanned<[f64; 3]>>,
-    /// Damping; 3 % modal if not given.
+    /// Damping; 3 % modal damping by default.
     pub damping: Option<Spanned<DampingEntry>>,
-    /// Mass that rides on the springs beside the base (kg).
+    /// Mass carried by the springs in addition to the base (kg).
     pub mass: Option<Spanned<f64>>,
-    /// Its centre in the axes of the springs (m).
+    /// Centre of mass in the axes of the springs (m).
     pub com: Option<[f64; 3]>,
-    /// `ixx iyy izz ixy ixz iyz` about its centre (kg m²).
+    /// `ixx iyy izz ixy ixz iyz` about the centre of mass (kg m²).
     pub inertia: Option<[f64; 6]>,
-    /// Model of a beam or file: `lumped` or `modal`.
+    /// Model of a beam or mesh: `lumped` or `modal`.
     pub model: Option<Spanned<String>>,
-    /// Number of rigid parts of a beam or file.
+    /// Number of rigid parts of a beam or mesh.
     pub segments: Option<Spanned<i64>>,
-    /// Number of fixed-interface modes of a beam or file.
+    /// Number of fixed-interface modes of a beam or mesh.
     pub modes: Option<Spanned<i64>>,
 }
 
-/// Mounting of a robot.
+/// Elastic mounting of a robot's base.
 #[derive(Clone, Debug)]
 #[allow(clippy::large_enum_variant, reason = "one per robot, made once")]
 pub enum RobotMounting {
-    /// Six springs, coupled or not.
+    /// Six springs, possibly coupled.
     Springs {
-        /// Position and stiffness of the springs.
+        /// Frame and stiffness of the springs.
         springs: Mounting,
-        /// Their damping.
+        /// Damping of the springs.
         damping: Damping,
     },
-    /// A flexible link of that name between ground and base.
+    /// Flexible link between ground and base.
     Link {
-        /// Its name, one of [`Robot::flexible`].
+        /// Name of the link in [`Robot::flexible`].
         name: String,
     },
 }
 
 impl RobotMounting {
-    /// Its name in results.
+    /// Returns the name used in results.
     pub fn name(&self) -> &str {
         match self {
             Self::Springs { springs, .. } => &springs.name,
@@ -80,7 +82,7 @@ impl RobotMounting {
     }
 }
 
-/// Puts the mounting of a robot file under the robot; faults are put aside.
+/// Adds the mounting of a robot file to the robot; collects errors in `faults`.
 pub(crate) fn add_mounting(
     robot: &mut Robot,
     entry: &Spanned<MountingEntry>,
@@ -140,14 +142,14 @@ fn mounting(
     }
 }
 
-/// Keys that only a flexible link has, as far as they are given.
+/// Returns the first given key that only a flexible link has.
 fn link_keys(given: &MountingEntry) -> Option<(&'static str, std::ops::Range<usize>)> {
     let model = given.model.as_ref().map(|key| ("model", key.span()));
     let segments = given.segments.as_ref().map(|key| ("segments", key.span()));
     model.or(segments).or(given.modes.as_ref().map(|key| ("modes", key.span())))
 }
 
-/// Six values on the diagonal, or a symmetric positive definite 6x6.
+/// Reads six diagonal values or a symmetric positive definite 6x6 matrix.
 fn stiffness6(given: &Spanned<Numbers>, source: &Source) -> Result<Matrix6<f64>, RobotFileError> {
     let fail = |message: String| source.error(given.span(), format!("mounting stiffness: {message}"));
     let K =
@@ -188,8 +190,8 @@ fn stiffness6(given: &Spanned<Numbers>, source: &Source) -> Result<Matrix6<f64>,
     }
 }
 
-/// Returns the mass on the springs in addition to the base. A base without mass needs an explicit
-/// zero.
+/// Reads the mass carried by the springs in addition to the base. If the base has no mass, the
+/// entry must give one, or `mass = 0.0` explicitly.
 fn riding_mass(
     robot: &Robot,
     given: &MountingEntry,
@@ -231,21 +233,22 @@ fn riding_mass(
     Ok((kg > 0.0).then(|| LinkInertia { mass: kg, com: Vector3::from(com), inertia_com }))
 }
 
-/// Whether the base link, or a link that is fixed to it, has mass.
+/// Whether the base link, or a link fixed to it, has mass.
 fn base_has_mass(robot: &Robot, base: &str) -> bool {
     let own = robot.rigid.link(base).and_then(|link| link.inertia).is_some_and(|inertia| inertia.mass > 0.0);
     let mut fixed = robot.rigid.child_joints(base).filter(|joint| joint.kind == JointKind::Fixed);
     own || fixed.any(|joint| base_has_mass(robot, &joint.child))
 }
 
-/// There is no link of the URDF whose mass a beam below the base could take.
+/// Uses the beam's own mass by default: the URDF has no link below the base whose mass it could
+/// take.
 fn with_own_mass(beam: &Spanned<BeamEntry>) -> Spanned<BeamEntry> {
     let mut own = beam.clone();
     own.get_mut().parts.get_or_insert_with(|| "uniform".to_owned());
     own
 }
 
-/// A beam or a reduced mesh between the ground and the base.
+/// Builds a flexible link, from a beam or a reduced mesh, between the ground and the base.
 fn flexible_mounting(
     robot: &mut Robot,
     entry: &Spanned<MountingEntry>,
@@ -298,7 +301,7 @@ fn flexible_mounting(
         }
     };
     let base = base_link(&robot.rigid, &name).map_err(|e| source.error(entry.span(), e.to_string()))?.name.clone();
-    // The base stays where it is, at the origin of the world.
+    // The base keeps its pose at the origin of the world.
     let (ground, joint) = (format!("{name}__ground"), format!("{name}__base"));
     let rigid = &mut robot.rigid;
     rigid.links.push(Link { name: ground.clone(), inertia: None });
@@ -330,23 +333,23 @@ fn flexible_mounting(
 }
 
 impl Robot {
-    /// Whether the mounting is elastic.
+    /// Whether the base has an elastic mounting.
     pub fn is_mounted(&self) -> bool {
         self.mounting.is_some()
     }
 
-    /// Whether that is the name of what the base stands on.
+    /// Whether the elastic mounting has this name.
     pub fn stands_on(&self, name: &str) -> bool {
         self.mounting.as_ref().is_some_and(|mounting| mounting.name() == name)
     }
 
-    /// The same robot on six springs.
+    /// Puts the robot on six springs.
     ///
-    /// * `springs`: their frame in the base link, their stiffness there, and the mass that rides on
-    ///   them beside the base.
+    /// * `springs`: their frame in the base link, their stiffness in that frame, and the mass they
+    ///   carry in addition to the base.
     ///
     /// # Errors
-    /// [`Error::Modelling`] if the stiffness holds nothing or the name is that of a link,
+    /// [`Error::Modelling`] if the stiffness is singular or the name is that of a link,
     /// [`Error::Pose`] and others as [`Robot::modelled`].
     pub fn with_mounting(mut self, springs: Mounting, damping: Damping) -> Result<Self, Error> {
         self.mounting = Some(RobotMounting::Springs { springs, damping });

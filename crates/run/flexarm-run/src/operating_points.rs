@@ -7,40 +7,39 @@ use rayon::prelude::*;
 use crate::arm::Arm;
 use crate::error::Error;
 
-/// Poses that one workspace answers one after another.
+/// Number of poses per workspace.
 const CHUNK: usize = 256;
 
-/// Answers at m poses, each a contiguous array, pose after pose; world axes at the tool point,
-/// linear first. Poses without an equilibrium have NaN everywhere.
+/// Results at m poses, each quantity a contiguous array, pose by pose; world axes at the TCP,
+/// linear first. Poses without an equilibrium contain NaN.
 #[derive(Clone, Debug, Default)]
 pub struct OperatingPoints {
-    /// Place of the tool, m×3 (m).
+    /// TCP position, m×3 (m).
     pub tcp_m: Vec<f64>,
-    /// The same minus that of the rigid twin, m×3 (m).
+    /// TCP position minus that of the rigid twin, m×3 (m).
     pub deflection_m: Vec<f64>,
-    /// Displacement of the tool per wrench on it, drives locked, m×6×6 (m/N, rad/N; m/(N m), rad/(N
-    /// m)).
+    /// Compliance of the TCP with the drives locked, m×6×6 (m/N, rad/N; m/(N m), rad/(N m)).
     pub compliance: Vec<f64>,
     /// Natural frequencies, ascending, m×n with the n elastic coordinates of the arm (Hz).
     pub frequencies_hz: Vec<f64>,
-    /// Poses without an answer, and why.
+    /// Poses without a solution, and the cause.
     pub failures: Vec<(usize, StepError)>,
-    /// n.
+    /// Number n of elastic coordinates.
     elastic: usize,
 }
 
 impl OperatingPoints {
-    /// Number of poses.
+    /// Returns the number of poses.
     pub fn len(&self) -> usize {
         self.tcp_m.len() / 3
     }
 
-    /// Whether there is none.
+    /// Whether there are no poses.
     pub fn is_empty(&self) -> bool {
         self.tcp_m.is_empty()
     }
 
-    /// Number of frequencies of a pose.
+    /// Returns the number of frequencies per pose.
     pub fn frequencies(&self) -> usize {
         self.elastic
     }
@@ -58,7 +57,7 @@ impl OperatingPoints {
     }
 }
 
-/// The rows of a chunk of poses.
+/// Results for a chunk of poses.
 struct Rows<'a> {
     first: usize,
     poses: &'a [f64],
@@ -69,24 +68,24 @@ struct Rows<'a> {
 }
 
 impl Arm {
-    /// Static equilibrium, compliance and frequencies at each pose under weight and a wrench on the
-    /// tool, on all cores.
+    /// Computes static equilibrium, compliance and frequencies at each pose under gravity and a
+    /// wrench at the TCP, on all cores.
     ///
-    /// * `poses`: m×n, the n actuated joints in coordinate order, pose after pose (rad or m).
-    /// * `wrench`: force and moment on the tool at its origin, world axes (N, N m).
+    /// * `poses`: m×n, the n actuated joints in coordinate order, pose by pose (rad or m).
+    /// * `wrench`: force and moment at the TCP, world axes (N, N m).
     ///
-    /// Cost: about 4.9 us of one core a pose with twelve elastic coordinates, where four go side by
-    /// side. Threads are those of `rayon`'s pool.
+    /// Cost: about 4.9 µs of one core per pose with twelve elastic coordinates, where four poses
+    /// are processed together. Uses the thread pool of `rayon`.
     ///
     /// # Errors
-    /// [`Error::Step`] with [`StepError::Setup`] if the number of values is no multiple of that of
-    /// the joints, and as [`Arm::operating_point`]. A pose without equilibrium is no error, see
-    /// [`OperatingPoints::failures`].
+    /// [`Error::Step`] with [`StepError::Setup`] if the number of values is not a multiple of the
+    /// number of joints, and as [`Arm::operating_point`]. A pose without equilibrium is not an
+    /// error, see [`OperatingPoints::failures`].
     pub fn operating_points(&self, poses: &[f64], wrench: &Wrench) -> Result<OperatingPoints, Error> {
         self.operating_points_until(poses, wrench, &|| false)
     }
 
-    /// As [`Arm::operating_points`]; nothing is begun any more as soon as `stop` says so.
+    /// As [`Arm::operating_points`]; starts no further work once `stop` returns true.
     ///
     /// # Errors
     /// As [`Arm::operating_points`]; [`Error::Interrupted`].
@@ -103,7 +102,7 @@ impl Arm {
         }
         let start = self.operating_point()?;
         let elastic = self.flexible().model.n_elastic();
-        // Chunks of nothing are none: a rigid arm gets a column that is dropped again.
+        // Empty chunks would end the iteration: a rigid arm gets one column, dropped later.
         let mut found = OperatingPoints::with_room(poses.len() / joints, elastic.max(1));
         let rows = found
             .tcp_m
@@ -133,7 +132,7 @@ impl Arm {
     }
 }
 
-/// Fills the rows of a chunk; what fails.
+/// Fills in the results of a chunk; returns the failures.
 fn answer(at: &mut OperatingPoint, rows: Rows<'_>, elastic: usize, wrench: &Wrench) -> Vec<(usize, StepError)> {
     let mut failures = Vec::new();
     let asked = Asked { compliance: true, frequencies: true, ..Asked::default() };
@@ -144,7 +143,7 @@ fn answer(at: &mut OperatingPoint, rows: Rows<'_>, elastic: usize, wrench: &Wren
             let moved = tool - found.rigid_tcp_pose.translation.vector;
             rows.tcp_m[3 * k..][..3].copy_from_slice(tool.as_slice());
             rows.deflection_m[3 * k..][..3].copy_from_slice(moved.as_slice());
-            // Symmetric except under constant moments; row-major.
+            // Row-major; the compliance is symmetric except under constant moments.
             rows.compliance[36 * k..][..36].copy_from_slice(found.compliance.transpose().as_slice());
             rows.frequencies_hz[elastic * k..][..elastic].copy_from_slice(&found.frequencies_hz);
         }

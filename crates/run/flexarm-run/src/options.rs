@@ -1,4 +1,4 @@
-//! Choices of a run, with defaults that work.
+//! Options of a run, with usable defaults.
 
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -6,105 +6,107 @@ use std::path::PathBuf;
 use flexarm_log::RecordingFormat;
 use flexarm_stepping::StepperKind;
 
-/// Requested model of the links. The result on the tree is a [`flexarm_flexlink::LinkForm`].
+/// Requested model of the links. The model of a link in the tree is a
+/// [`flexarm_flexlink::LinkForm`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum LinkModel {
-    /// As the robot file says.
+    /// As in the robot file.
     #[default]
     AsFiled,
-    /// All rigid.
+    /// All links rigid.
     Rigid,
     /// Flexible links as rigid parts with 6×6 springs.
     Lumped,
-    /// Flexible links as bodies that bend in modes.
+    /// Flexible links as modal bodies.
     Modal,
 }
 
 impl LinkModel {
-    /// Choices: the word in robot files, on the command line and in recordings, and its meaning.
+    /// Models that can be requested: name in robot files, command line and recordings, and
+    /// description.
     pub const WORDS: [(&'static str, Self, &'static str); 3] = [
         ("rigid", Self::Rigid, "All links rigid"),
         ("lumped", Self::Lumped, "Rigid parts with coupled 6x6 springs"),
         ("modal", Self::Modal, "Modal bodies (floating frame, Craig-Bampton)"),
     ];
 
-    /// The model of that word.
+    /// Returns the model with this name.
     pub fn from_word(word: &str) -> Option<Self> {
         Self::WORDS.iter().find(|(known, ..)| *known == word).map(|(_, model, _)| *model)
     }
 
-    /// Its word; none where the robot file decides.
+    /// Returns the name; None if the robot file decides.
     pub fn word(self) -> Option<&'static str> {
         Self::WORDS.iter().find(|(_, model, _)| *model == self).map(|(word, ..)| *word)
     }
 }
 
-/// Requested model of the drives.
+/// Model of the drives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum DriveModel {
-    /// As the robot file says.
+    /// As in the robot file.
     #[default]
     AsFiled,
-    /// All joints exactly along the trajectory, no springs.
+    /// All joints follow the trajectory exactly, no springs.
     Rigid,
-    /// Elastic gearboxes, motors exactly on the trajectory.
+    /// Elastic gearboxes; motors follow the trajectory exactly.
     Elastic,
-    /// All joints driven by servo torques through elastic gearboxes.
+    /// All joints are driven by torque under servos; elastic gearboxes.
     Servo,
 }
 
 impl DriveModel {
-    /// Choices: the word on the command line and in recordings, and its meaning.
+    /// Models that can be requested: name on the command line and in recordings, and description.
     pub const WORDS: [(&'static str, Self, &'static str); 3] = [
         ("rigid", Self::Rigid, "Every joint exactly along the trajectory, no springs"),
         ("elastic", Self::Elastic, "Elastic gearboxes, motors exactly on the trajectory"),
         ("servo", Self::Servo, "Motors by torque under servos"),
     ];
 
-    /// Its word; none where the robot file decides.
+    /// Returns the name; None if the robot file decides.
     pub fn word(self) -> Option<&'static str> {
         Self::WORDS.iter().find(|(_, model, _)| *model == self).map(|(word, ..)| *word)
     }
 }
 
-/// Models of links and drives that differ from the robot file.
+/// Models of links and drives that override the robot file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Modelling {
-    /// Links.
+    /// Model of the links.
     pub links: LinkModel,
-    /// Drives.
+    /// Model of the drives.
     pub drives: DriveModel,
-    /// Number of rigid parts of lumped links, instead of the file's.
+    /// Number of rigid parts of lumped links, overrides the file.
     pub segments: Option<usize>,
-    /// Number of fixed-interface modes of modal links, instead of the file's.
+    /// Number of fixed-interface modes of modal links, overrides the file.
     pub modes: Option<usize>,
 }
 
-/// Choices of a run: how it is stepped, logged and measured. What happens in it is the
+/// Options for stepping, logging and measuring a run. The run itself is described by the
 /// [`Scenario`](crate::Scenario).
 #[derive(Clone, Debug)]
 pub struct RunOptions {
     /// Time stepper.
     pub stepper: StepperKind,
-    /// Step (s).
+    /// Step size (s).
     pub step_s: f64,
     /// Link and drive models.
     pub modelling: Modelling,
-    /// Logged samples per second; the nearest whole number of steps is used.
+    /// Logged samples per second; rounded to a whole number of steps per sample.
     pub log_rate_hz: f64,
-    /// Run although the trajectory passes joint limits; they become warnings.
+    /// Whether to run although the trajectory exceeds joint limits; violations become warnings.
     pub ignore_limits: bool,
-    /// Log and measure against the rigid twin.
+    /// Whether to log the rigid twin and measure against it.
     pub with_twin: bool,
-    /// Band of the settling time (m).
+    /// Half width of the settling band (m).
     pub settling_band_m: f64,
-    /// Factor by which recordings and pictures show deflections; chosen for the run without it.
+    /// Magnification of deflections in recordings and pictures; chosen for the run by default.
     pub magnification: Option<f64>,
-    /// When the run begins in recordings whose times have a date (ns since 1970);
-    /// [`flexarm_log::START_NS`] without it.
+    /// Start of the run in recordings whose times have a date (ns since 1970);
+    /// [`flexarm_log::START_NS`] by default.
     pub start_ns: Option<u64>,
-    /// Put mesh files into the robot description of recordings, instead of where they are on this
-    /// machine.
+    /// Whether to embed mesh files in the robot description of recordings, instead of referring to
+    /// their location on this machine.
     pub embed_meshes: bool,
 }
 
@@ -126,23 +128,23 @@ impl Default for RunOptions {
     }
 }
 
-/// Recordings to write, and their folder.
+/// Output folder and formats of the recordings.
 #[derive(Clone, Debug)]
 pub struct Outputs {
-    /// Folder; made if it is not there.
+    /// Output folder; created if it does not exist.
     pub folder: PathBuf,
-    /// Overwrite what is there.
+    /// Whether existing files are overwritten.
     pub overwrite: bool,
-    /// Formats of the recordings, one file each. Each must be one that this build can write
+    /// Formats of the recordings, one file each. This build must support each of them
     /// ([`RecordingFormat::is_built_in`]).
     pub recordings: BTreeSet<RecordingFormat>,
-    /// Write a folder `figures` with plots and pictures for papers.
+    /// Whether to write a folder `figures` with plots and pictures for papers.
     pub figures: bool,
 }
 
 impl Outputs {
-    /// Into a folder, what a run writes without being asked to: every recording that this build can
-    /// write, except tables with the content of the CSV; no figures for papers.
+    /// Returns the default outputs in a folder: every recording supported by this build except
+    /// tables with the same content as the CSV; no figures for papers.
     pub fn everything(folder: impl Into<PathBuf>) -> Self {
         let usual = |format: &RecordingFormat| format.info().by_default && format.is_built_in();
         Self {
@@ -153,14 +155,14 @@ impl Outputs {
         }
     }
 
-    /// The same with a recording of this format too.
+    /// Adds a recording of this format.
     #[must_use]
     pub fn with(mut self, format: RecordingFormat) -> Self {
         self.recordings.insert(format);
         self
     }
 
-    /// The same without a recording of this format.
+    /// Removes the recording of this format.
     #[must_use]
     pub fn without(mut self, format: RecordingFormat) -> Self {
         self.recordings.remove(&format);

@@ -10,49 +10,49 @@ use crate::error::{Error, PayloadError};
 use crate::loads_file::Written;
 use crate::robot::{PAYLOAD_LINK, Robot};
 
-/// Change of the payload of a link at an instant; replaces the previous payload.
+/// New payload of a link from a given time on, which replaces the previous one.
 #[derive(Clone, Debug)]
 pub struct PayloadChange {
-    /// When (s).
+    /// Time of the change (s).
     pub at_s: f64,
-    /// The link that carries it; that of the robot's own payload, else that of the TCP, without it.
+    /// Carrying link; by default that of the robot's own payload, or else of the TCP.
     pub link: Option<String>,
-    /// Payload from then on, link axes; none for a mass of 0.
+    /// New payload in link axes; a mass of 0 means none.
     pub carried: LinkInertia,
-    /// Place in the file, if it was read from one.
+    /// Location in the file, if read from one.
     pub(crate) written: Option<Written>,
 }
 
 impl PayloadChange {
-    /// A payload is picked up.
+    /// Returns a change that picks up a payload.
     ///
-    /// * `at_s`: when (s). `mass`: kg. `com`: `p_LoLcm_L`, its centre of mass in the carrying link
+    /// * `at_s`: time (s). `mass`: kg. `com`: `p_LoLcm_L`, its centre of mass in the carrying link
     ///   L (m).
     pub fn attach(at_s: f64, mass: f64, com: Vector3<f64>) -> Self {
         let carried = LinkInertia { mass, com, inertia_com: Matrix3::zeros() };
         Self { at_s, link: None, carried, written: None }
     }
 
-    /// Whatever is carried is put down; `at_s`: when (s).
+    /// Returns a change that puts down the payload; `at_s`: time (s).
     pub fn release(at_s: f64) -> Self {
         Self::attach(at_s, 0.0, Vector3::zeros())
     }
 
-    /// The same with an inertia about its centre of mass, link axes (kg m²); without one it is a
-    /// point.
+    /// Sets the inertia about the centre of mass, link axes (kg m²); without it the payload is a
+    /// point mass.
     #[must_use]
     pub fn with_inertia(mut self, inertia_com: Matrix3<f64>) -> Self {
         self.carried.inertia_com = inertia_com;
         self
     }
 
-    /// The same on a link of this name.
+    /// Sets the carrying link.
     #[must_use]
     pub fn on_link(self, link: &str) -> Self {
         Self { link: Some(link.to_owned()), ..self }
     }
 
-    /// On a model of the robot; `earlier`: changes before it.
+    /// Returns the change on a model of the robot; `earlier`: preceding changes.
     pub(crate) fn on(&self, robot: &Robot, model: &Model, earlier: &[InertiaChange]) -> Result<InertiaChange, Error> {
         let fail = |cause: PayloadError| Written::entry(self.written.as_ref(), cause);
         let LinkInertia { mass, com, inertia_com } = &self.carried;
@@ -83,7 +83,7 @@ impl PayloadChange {
         Ok(InertiaChange { t: self.at_s, body, inertia })
     }
 
-    /// The link that carries it, its body, and its frame there.
+    /// Returns the carrying link, its body, and its frame on the body.
     fn carrier(&self, robot: &Robot, model: &Model) -> Result<(String, usize, Pose), Error> {
         let fail = |cause: PayloadError| Written::frame(self.written.as_ref(), cause);
         let own = || robot.rigid.joints.iter().find(|j| j.child == PAYLOAD_LINK).map(|j| j.parent.clone());
@@ -100,8 +100,8 @@ impl PayloadChange {
     }
 }
 
-/// A body without what it carries at the start; `None` if the robot's own payload rides on another
-/// body.
+/// Returns the inertia of a body without its initial payload; `None` if the robot's own payload is
+/// on another body.
 fn without_payload(robot: &Robot, model: &Model, body: usize) -> Option<SpatialInertia> {
     let inertia = model.bodies()[body].inertia;
     let at_start = robot.rigid.link(PAYLOAD_LINK).and_then(|l| l.inertia);

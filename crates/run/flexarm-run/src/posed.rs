@@ -1,4 +1,4 @@
-//! A robot held at a pose: what statics, modes and frequency response begin with.
+//! A robot held at a pose: starting point of statics, modes and frequency response.
 
 use std::sync::Arc;
 
@@ -21,28 +21,28 @@ use crate::robot::Robot;
 
 /// Flexible arm with its drives locked at a pose.
 pub struct Posed {
-    /// Links and drives as modelled.
+    /// Robot with its links and drives as modelled.
     pub flexible: Arc<FlexibleRobot>,
-    /// The arm with its drives locked.
+    /// Arm with its drives locked.
     pub arm: FlexibleArm,
     /// Frame of the TCP.
     pub tool: Frame,
     /// Actuated joints, in coordinate order.
     pub joints: Vec<String>,
-    /// Whether each of them is prismatic.
+    /// Whether each joint is prismatic.
     pub prismatic: Vec<bool>,
-    /// Joint positions (rad or m).
+    /// Joint values (rad or m).
     pub at: Vec<f64>,
-    /// [`Robot::caveats`], if they are known.
+    /// Result of [`Robot::caveats`], if already known.
     of_robot: Option<Arc<[Caveat]>>,
 }
 
-/// A step error of a command that takes no step.
+/// Wraps a step error of a command that takes no steps.
 pub fn step_error(source: StepError) -> Error {
     Error::Step { source, partial: false }
 }
 
-/// Checks force and moment on the tool, six numbers.
+/// Checks a force and moment on the TCP (six values).
 pub fn check_wrench(wrench: &[f64]) -> Result<(), ValueError> {
     let force = Quantity::FORCE.check_all("the force at the tool", wrench.iter().take(3));
     let torque = Quantity::TORQUE.check_all("the torque at the tool", wrench.iter().skip(3));
@@ -50,7 +50,7 @@ pub fn check_wrench(wrench: &[f64]) -> Result<(), ValueError> {
 }
 
 impl Posed {
-    /// `at`: all actuated joints (rad or m), zero without it.
+    /// Poses a robot; `at`: values of all actuated joints (rad or m), zero by default.
     pub fn new(robot: &Robot, modelling: &Modelling, at: Option<&[f64]>) -> Result<Self, Error> {
         let model = robot.rigid_model()?;
         let names: Vec<&str> = model.coordinates().iter().map(|c| c.joint.as_str()).collect();
@@ -58,13 +58,13 @@ impl Posed {
         Self::held(robot, modelling, at)
     }
 
-    /// `at` in coordinate order (rad or m).
+    /// As [`Self::new`], with `at` in coordinate order (rad or m).
     pub(crate) fn held(robot: &Robot, modelling: &Modelling, at: Vec<f64>) -> Result<Self, Error> {
         Self::with(Arc::new(robot.modelled(modelling)?), at)
     }
 
-    /// An arm, its links and drives in place already; `at`: all actuated joints (rad or m), zero
-    /// without it.
+    /// Poses an arm that is already modelled; `at`: values of all actuated joints (rad or m), zero
+    /// by default.
     pub fn on(arm: &Arm, at: Option<&[f64]>) -> Result<Self, Error> {
         let flexible = arm.flexible().clone();
         let names: Vec<&str> = flexible.rigid.coordinates().iter().map(|c| c.joint.as_str()).collect();
@@ -72,7 +72,7 @@ impl Posed {
         Ok(Self { of_robot: Some(arm.robot_caveats()), ..Self::with(flexible, at)? })
     }
 
-    /// A robot whose links and drives are in place; `at` in coordinate order (rad or m).
+    /// Poses a robot that is already modelled; `at` in coordinate order (rad or m).
     pub fn with(flexible: Arc<FlexibleRobot>, at: Vec<f64>) -> Result<Self, Error> {
         loops::check_pose(&flexible.rigid, &mut Data::new(&flexible.rigid), &DVector::from_column_slice(&at))?;
         balancer::check_pose(&flexible.rigid, &mut Data::new(&flexible.rigid), &DVector::from_column_slice(&at))?;
@@ -84,7 +84,7 @@ impl Posed {
         Ok(Self { tool: flexible.tcp.clone(), flexible, arm, joints, prismatic, at, of_robot: None })
     }
 
-    /// Returns the caveats about the robot and its equilibrium under a wrench at the TCP (world
+    /// Returns the caveats about the robot and its equilibrium under a wrench on the TCP (world
     /// axes).
     pub fn caveats_of(&self, robot: &Robot, linear: &Linear, wrench: &[f64; 6]) -> Vec<Caveat> {
         let mut caveats = told::of_model(robot, &self.flexible, self.of_robot.as_deref());
@@ -92,7 +92,7 @@ impl Posed {
         once_each(caveats)
     }
 
-    /// Returns the caveats about joint ranges and about a robot without elastic elements.
+    /// Checks whether the pose is within the joint ranges, and whether anything is elastic.
     pub(crate) fn caveats(&self) -> Vec<Caveat> {
         let model = &self.arm.model;
         let mut caveats: Vec<Caveat> =
@@ -110,15 +110,15 @@ impl Posed {
         caveats
     }
 
-    /// The linear structure about the equilibrium under weight and a wrench at the TCP (world
-    /// axes).
+    /// Linearises about the static equilibrium under gravity and a wrench at the TCP (world axes).
     pub fn linear(&self, wrench: &Vector6<f64>) -> Result<Linear, Error> {
         let F = Wrench::new(wrench.fixed_rows::<3>(0).into(), wrench.fixed_rows::<3>(3).into());
         check_wrench(wrench.as_slice())?;
         linearise(&self.arm, &self.tool, &F, 0.0).map_err(|error| self.flexible.explained(error))
     }
 
-    /// The equilibrium under weight and a wrench at the TCP (world axes), as maps take it.
+    /// Returns the static equilibrium under gravity and a wrench at the TCP (world axes), as used
+    /// by maps.
     pub(crate) fn operating_point(&self, wrench: &[f64; 6]) -> Result<OperatingPoint, Error> {
         let [fx, fy, fz, tx, ty, tz] = *wrench;
         let mut at = OperatingPoint::new(self.arm.clone(), self.tool.clone());
@@ -127,14 +127,15 @@ impl Posed {
         Ok(at)
     }
 
-    /// The tool with every elastic coordinate at zero.
+    /// Returns the TCP pose with all elastic coordinates at zero.
     pub(crate) fn rigid_tool(&self) -> Pose {
         let (mut data, state) = self.undeformed();
         forward_kinematics(&self.arm.model, &mut data, &state.q);
         data.X_WF(&self.tool)
     }
 
-    /// Whether the models hold at an equilibrium: deflections of links, forces of drives.
+    /// Checks whether the models are valid at an equilibrium: deflections of links, torques of
+    /// drives.
     pub(crate) fn validity(&self, robot: &Robot, linear: &Linear) -> Vec<Caveat> {
         let links = self.flexible.spans.iter().zip(strains(&self.flexible, &self.arm, &linear.q));
         let links = links.flat_map(|(span, (strain, rotation))| validity::link(&span.link, rotation, strain));
@@ -151,21 +152,20 @@ impl Posed {
         Standing { robot, flexible, arm, elastic, sag_m: moved.norm() }.caveats()
     }
 
-    /// Joints at the pose, elastic coordinates zero.
+    /// State with the joints at the pose and the elastic coordinates at zero.
     pub(crate) fn undeformed(&self) -> (Data, State) {
         undeformed(&self.arm)
     }
 }
 
-/// Joints where the motion begins, elastic coordinates zero.
+/// State with the joints at the start of the motion and the elastic coordinates at zero.
 fn undeformed(arm: &FlexibleArm) -> (Data, State) {
     let mut state = State::zeros(&arm.model);
     arm.prescribed_state(0.0, &mut state, &mut DVector::zeros(arm.model.nv()));
     (Data::new(&arm.model), state)
 }
 
-/// Engineering strain of each flexible link, and how far its far end has turned (rad), with all
-/// coordinates at `q`.
+/// Engineering strain of each flexible link and rotation of its far end (rad), at coordinates `q`.
 pub(crate) fn strains(flexible: &FlexibleRobot, arm: &FlexibleArm, q: &DVector<f64>) -> Vec<(f64, f64)> {
     let model = &arm.model;
     let (mut data, straight) = undeformed(arm);
@@ -187,24 +187,24 @@ pub(crate) fn strains(flexible: &FlexibleRobot, arm: &FlexibleArm, q: &DVector<f
 }
 
 impl Arm {
-    /// Mass, damping and stiffness about the equilibrium at a pose under weight and a wrench at the
-    /// tool, and how the tool follows the free coordinates.
+    /// Returns mass, damping and stiffness about the static equilibrium at a pose under gravity and
+    /// a wrench at the TCP, and the Jacobian of the TCP with respect to the free coordinates.
     ///
-    /// * `at`: all actuated joints (rad or m), zero without it.
-    /// * `wrench`: force and moment on the tool at its origin, world axes (N, N m).
+    /// * `at`: values of all actuated joints (rad or m), zero by default.
+    /// * `wrench`: force and moment at the TCP, world axes (N, N m).
     ///
     /// # Errors
-    /// [`Error::Pose`] for joint values that do not fit, [`Error::Step`] where there is no
+    /// [`Error::Pose`] for joint values that do not fit, [`Error::Step`] if there is no
     /// equilibrium.
     pub fn linearise(&self, at: Option<&[f64]>, wrench: [f64; 6]) -> Result<Linear, Error> {
         Posed::on(self, at)?.linear(&wrench.into())
     }
 }
 
-/// Figures of an answer, which must be numbers.
+/// Checks that the figures of a result are finite.
 ///
 /// # Errors
-/// [`Error::Pose`]: masses, lengths or joint values of 1e200 overflow on the way.
+/// [`Error::Pose`] if they are not: masses, lengths or joint values of 1e200 overflow.
 pub(crate) fn all_finite<'a>(what: &str, values: impl IntoIterator<Item = &'a f64>) -> Result<(), Error> {
     match values.into_iter().all(|x| x.is_finite()) {
         true => Ok(()),

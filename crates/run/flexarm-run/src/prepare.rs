@@ -1,4 +1,4 @@
-//! The input of a run, checked before its first step.
+//! Checks the input of a run before its first step.
 
 use std::sync::{Arc, PoisonError};
 
@@ -18,7 +18,7 @@ use crate::options::RunOptions;
 use crate::robot::Robot;
 use crate::scenario::Scenario;
 
-/// A run whose input makes sense.
+/// A run whose input has been checked.
 pub(crate) struct Checked {
     pub(crate) arm: Arc<FlexibleArm>,
     pub(crate) stepper: Box<dyn Stepper>,
@@ -26,11 +26,11 @@ pub(crate) struct Checked {
 }
 
 impl Arm {
-    /// Returns the arm at the start of a scenario, with its loads and payloads, and the caveats of
-    /// the loads.
+    /// Returns the arm at the start of a scenario, with its loads and payloads, and the caveats
+    /// about the loads.
     ///
     /// # Errors
-    /// Everything about the input that can be found before a stepper is made.
+    /// All errors in the input that can be found before a stepper is built.
     pub fn at_start(&self, scenario: &Scenario, options: &RunOptions) -> Result<(FlexibleArm, Vec<Caveat>), Error> {
         let (motion, flexible) = (&scenario.motion, self.flexible());
         runnable(motion, options)?;
@@ -40,8 +40,8 @@ impl Arm {
         loaded(self.robot(), scenario, options, arm)
     }
 
-    /// As [`FlexibleRobot::arm`](crate::FlexibleRobot::arm). The last one is kept for motions that
-    /// begin at the same joint values: modes and damping depend on nothing else of a motion.
+    /// As [`FlexibleRobot::arm`](crate::FlexibleRobot::arm). Reuses the last arm if the motion
+    /// starts at the same joint values, since modes and damping depend on nothing else.
     fn in_equilibrium(&self, motion: Arc<dyn PrescribedMotion>) -> Result<FlexibleArm, StepError> {
         let n = self.flexible().model.n_actuated();
         let (mut q, mut v, mut a) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
@@ -55,7 +55,7 @@ impl Arm {
         Ok(arm)
     }
 
-    /// Checks everything about the input of a run and makes its stepper.
+    /// Checks the whole input of a run and builds its stepper.
     pub(crate) fn checked(&self, scenario: &Scenario, options: &RunOptions) -> Result<Checked, Error> {
         let (arm, load_caveats) = self.at_start(scenario, options)?;
         let arm = Arc::new(arm);
@@ -67,14 +67,14 @@ impl Arm {
     /// Returns an estimate of the deflections of a run.
     ///
     /// # Errors
-    /// As [`Arm::simulate`], as far as they are known before the first step.
+    /// As [`Arm::simulate`], as far as errors are found before the first step.
     pub fn expected(&self, scenario: &Scenario, options: &RunOptions) -> Result<Expected, Error> {
         let arm = self.checked(scenario, options)?.arm;
         Ok(Expected::of(&arm, &self.flexible().tcp, scenario.duration_s(), scenario.start))
     }
 }
 
-/// Whether a motion keeps the joints' limits, and the options make sense with it.
+/// Checks that a motion respects the joint limits, and that the options are valid for it.
 pub fn runnable(motion: &Motion, options: &RunOptions) -> Result<(), Error> {
     if !motion.violations.is_empty() && !options.ignore_limits {
         let mut violations: Vec<String> = motion.violations.iter().map(ToString::to_string).collect();
@@ -86,7 +86,7 @@ pub fn runnable(motion: &Motion, options: &RunOptions) -> Result<(), Error> {
     check_options(motion, options)
 }
 
-/// The arm with the loads and payloads of a scenario, and what is to be said of them.
+/// Returns the arm with the loads and payloads of a scenario, and the caveats about them.
 pub fn loaded(
     robot: &Robot,
     scenario: &Scenario,
@@ -110,12 +110,12 @@ pub fn loaded(
     Ok((arm, load_caveats))
 }
 
-/// Maximum number of steps of a run: some hours.
+/// Maximum number of steps of a run (some hours).
 const MOST_STEPS: f64 = 1e9;
-/// Factors by which deflections can be shown.
+/// Range of the magnification of deflections.
 const MAGNIFICATIONS: std::ops::RangeInclusive<f64> = 1e-3..=1e6;
 
-/// Numbers must make sense, and step and duration make a run that comes to an end.
+/// Checks that the options are valid, and that step size and duration give a finite run.
 fn check_options(motion: &Motion, options: &RunOptions) -> Result<(), Error> {
     let positive =
         |x: f64, otherwise: fn(f64) -> ValueError| if x.is_finite() && x > 0.0 { Ok(()) } else { Err(otherwise(x)) };
@@ -138,16 +138,16 @@ fn check_options(motion: &Motion, options: &RunOptions) -> Result<(), Error> {
     Ok(())
 }
 
-/// Steps that a period of a load must last to be met well.
+/// Minimum number of steps per period of a load for sufficient accuracy.
 const STEPS_PER_LOAD: f64 = 8.0;
 
-/// Steps that a short load is cut into: the trapezoidal rule has half a sine to 0.14 %.
+/// Number of steps within a short load: the trapezoidal rule integrates half a sine to 0.14 %.
 const STEPS_OF_SHORT_LOAD: u32 = 24;
 
-/// Bends at which steps end within it; there may be as many as a table has rows.
+/// Maximum number of kinks at which steps end; a table can have one per row.
 const MOST_BENDS: usize = 100;
 
-/// Has steps end within a load that lasts so few of them that it would not act as the file says.
+/// Adds stops within a load that is too short for the step size to resolve.
 fn stop_within(load: &mut Load, h: f64) {
     let (first, last) = load.wrench.jumps.iter().fold((f64::INFINITY, 0.0f64), |(a, b), t| (a.min(*t), b.max(*t)));
     let lasts = last - first;
@@ -158,7 +158,7 @@ fn stop_within(load: &mut Load, h: f64) {
     }
 }
 
-/// Loads that swing so fast that they do not act as the file says.
+/// Caveats about loads whose period the step size does not resolve.
 fn fast_loads(loads: &[Load], h: f64) -> Vec<Caveat> {
     let fast = |load: &Load| {
         let period = load.wrench.period;

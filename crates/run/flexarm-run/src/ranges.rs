@@ -1,4 +1,4 @@
-//! Ranges of the numbers of our own TOML files, by their keys.
+//! Ranges of the numbers in flexarm's TOML files, by key.
 
 use std::ops::Range;
 
@@ -6,8 +6,7 @@ use flexarm_settings::{OutOfRange, Quantity};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// Quantity of a key; of the key in one table alone if that is named before it, as in
-/// `payload.mass`.
+/// Quantity of each key; a prefix restricts it to one table, as in `payload.mass`.
 pub(crate) type Ranges = &'static [(&'static str, Quantity)];
 
 /// Keys of a robot file.
@@ -61,7 +60,7 @@ pub(crate) const OF_ROBOT: Ranges = &[
     ("hold", Quantity::JOINT),
 ];
 
-/// Keys of a file of loads.
+/// Keys of a loads file.
 pub(crate) const OF_LOADS: Ranges = &[
     ("mass", Quantity::MASS),
     ("com", Quantity::LENGTH),
@@ -79,16 +78,16 @@ pub(crate) const OF_LOADS: Ranges = &[
     ("spindle_rpm", Quantity::SPEED),
 ];
 
-/// The first finite number outside of its range, with its place and what is wrong. Numbers of other
-/// keys are only not huge.
+/// Returns the first finite number outside its range, with its location and a message. Numbers of
+/// other keys only have an upper bound on their magnitude.
 ///
 /// * `text`: of a file that has been read as TOML.
 pub(crate) fn outside(text: &str, ranges: Ranges) -> Option<(Range<usize>, String)> {
     first(text, &|name, number| if number.is_finite() { check(name, number, ranges) } else { Ok(number) })
 }
 
-/// The first number that is not finite, likewise: of keys that say themselves what they expect it
-/// is refused before. An effort limit of `inf` is none.
+/// Returns the first number that is not finite, with its location and a message. Keys with checks
+/// of their own have been rejected before. An effort limit of `inf` is allowed.
 pub(crate) fn not_finite(text: &str) -> Option<(Range<usize>, String)> {
     let unlimited = |name: &str, number: f64| number == f64::INFINITY && name.starts_with("effort_limit.");
     let finite = |name: &str, number: f64| number.is_finite() || unlimited(name, number);
@@ -109,7 +108,7 @@ fn in_table(table: &DeTable<'_>, name: &str, check: Check<'_>) -> Option<(Range<
     })
 }
 
-/// * `name`: the keys on the way, joined by dots.
+/// * `name`: path of the keys, joined by dots.
 fn in_value(value: &Spanned<DeValue<'_>>, name: &str, check: Check<'_>) -> Option<(Range<usize>, String)> {
     let number: f64 = match value.get_ref() {
         DeValue::Table(table) => return in_table(table, name, check),
@@ -122,7 +121,7 @@ fn in_value(value: &Spanned<DeValue<'_>>, name: &str, check: Check<'_>) -> Optio
 }
 
 fn check(name: &str, number: f64, ranges: Ranges) -> Result<f64, OutOfRange> {
-    // A table whose keys are names of joints has one quantity.
+    // A table whose keys are joint names has one quantity.
     let own = |key: &str| {
         let within = name.strip_suffix(key).is_some_and(|rest| rest.is_empty() || rest.ends_with('.'));
         within || name.strip_prefix(key).is_some_and(|rest| rest.starts_with('.') && !rest[1..].contains('.'))

@@ -1,4 +1,4 @@
-//! Header, meshes and files of the recordings of a run.
+//! Constant parts of a run's recordings: header, meshes, files.
 
 use std::fs::{File, TryLockError};
 use std::path::{Component, Path, PathBuf};
@@ -21,15 +21,14 @@ use flexarm_settings::written::{markdown, markdown_code, markdown_row};
 pub(crate) struct Recordings {
     pub(crate) set: RecorderSet,
     pub(crate) names: Files,
-    /// Folders that were made for them.
+    /// Folders created for them.
     folders: Undo,
-    /// The folder is this run's as long as they are there.
+    /// Lock that reserves the folder for this run.
     held: Option<FolderLock>,
 }
 
 impl Recordings {
-    /// Makes the files. If one cannot be made, none is left, nor is a folder that was made for
-    /// them.
+    /// Creates the files. On failure no file and no newly created folder remains.
     pub(crate) fn begin(&mut self, header: &RunHeader) -> Result<(), Error> {
         self.set.begin(header)?;
         self.folders.keep();
@@ -37,28 +36,28 @@ impl Recordings {
     }
 }
 
-/// Names of the files that a run writes into its folder, recordings first.
+/// Returns the names of the files that a run writes into its folder, recordings first.
 pub(crate) fn files_of_a_run() -> impl Iterator<Item = &'static str> {
     let recordings = RecordingFormat::ALL.into_iter().map(|format| format.info().file_name);
     let [foxglove, plotjuggler] = LAYOUT_FILES;
     recordings.chain(["report.html", "report.md", "summary.json", STUDY_FILE, FIGURES_FOLDER, foxglove, plotjuggler])
 }
 
-/// Layouts of viewers beside `run.mcap`: Foxglove, PlotJuggler.
+/// Viewer layouts written next to `run.mcap`: Foxglove, PlotJuggler.
 const LAYOUT_FILES: [&str; 2] = ["run.foxglove.json", "run.plotjuggler.xml"];
 
 /// Recording of all runs of a study.
 pub(crate) const STUDY_FILE: &str = "study.rrd";
 
-/// Folder with figures for papers, in the output folder.
+/// Folder for figures for papers, within the output folder.
 pub(crate) const FIGURES_FOLDER: &str = "figures";
 
-/// An error if the folder has files of an earlier run that may not be replaced.
+/// Returns an error if the folder contains files of an earlier run that may not be replaced.
 pub(crate) fn refuse_to_overwrite(outputs: &Outputs) -> Result<(), Error> {
     refuse_others(outputs, &[])
 }
 
-/// The same, whatever is there under the names in `ours`.
+/// As [`refuse_to_overwrite`], but ignores files named in `ours`.
 fn refuse_others(outputs: &Outputs, ours: &[&str]) -> Result<(), Error> {
     let files = files_of_a_run().filter(|file| !ours.contains(file));
     let mut files = files.map(|file| outputs.folder.join(file));
@@ -68,12 +67,12 @@ fn refuse_others(outputs: &Outputs, ours: &[&str]) -> Result<(), Error> {
     }
 }
 
-/// Removes what an earlier run left that this one does not write: beside the new files it would be
-/// taken for its own.
+/// Removes files of an earlier run that this run does not overwrite, so that they are not mistaken
+/// for its own.
 fn remove_leftovers(outputs: &Outputs, ours: &[&str]) -> Result<(), Error> {
     for file in files_of_a_run().filter(|file| !ours.contains(file)) {
         let path = outputs.folder.join(file);
-        // Neither folders nor links were written by a run.
+        // A run writes neither folders nor links under these names.
         if path.symlink_metadata().is_ok_and(|there| there.is_file()) {
             std::fs::remove_file(&path)
                 .map_err(|e| Error::File { what: format!("is of an earlier run and cannot be removed: {e}"), path })?;
@@ -82,8 +81,8 @@ fn remove_leftovers(outputs: &Outputs, ours: &[&str]) -> Result<(), Error> {
     remove_figures(&outputs.folder.join(FIGURES_FOLDER))
 }
 
-/// Removes the figures of an earlier run, and their folder if nothing else is in it: drawings
-/// beside their data of the same name, and pictures of the arm.
+/// Removes the figures of an earlier run: drawings with a data file of the same name, and pictures
+/// of the arm; removes the folder too if it is then empty.
 fn remove_figures(folder: &Path) -> Result<(), Error> {
     if !folder.symlink_metadata().is_ok_and(|there| there.is_dir()) {
         return Ok(());
@@ -103,16 +102,17 @@ fn remove_figures(folder: &Path) -> Result<(), Error> {
     for path in old.iter().filter(|path| path.symlink_metadata().is_ok_and(|there| there.is_file())) {
         std::fs::remove_file(path).map_err(fail)?;
     }
-    // One that is not empty stays.
+    // A folder that is not empty stays.
     let _ = std::fs::remove_dir(folder);
     Ok(())
 }
 
-/// Output folder, locked against other runs where the file system allows it.
+/// Lock on an output folder, held by the run that writes into it. Has no effect on file systems
+/// without locks.
 pub(crate) struct FolderLock(#[expect(dead_code, reason = "the lock lasts as long as the open folder")] Option<File>);
 
 impl FolderLock {
-    /// None while another run has it.
+    /// Locks the folder; returns None if another run holds the lock.
     fn take(folder: &Path) -> Option<Self> {
         let opened = File::open(folder).ok();
         match opened.as_ref().map(File::try_lock) {
@@ -122,10 +122,10 @@ impl FolderLock {
     }
 }
 
-/// A recorder of this format.
+/// Returns a recorder for this format.
 ///
 /// # Errors
-/// [`RecordingError::WithoutFormat`] if this build has none.
+/// [`RecordingError::WithoutFormat`] if this build does not support the format.
 pub(crate) fn recorder(
     format: RecordingFormat,
     path: impl Into<PathBuf>,
@@ -134,8 +134,8 @@ pub(crate) fn recorder(
     format.recorder(path, options).ok_or_else(|| RecordingError::WithoutFormat { format }.into())
 }
 
-/// Recorders for the outputs; refuses to overwrite before anything is made. `in_study`: the
-/// recording of the study is being written too.
+/// Returns recorders for the outputs; refuses to overwrite before anything is created. `in_study`:
+/// whether the recording of the study is being written too.
 pub(crate) fn recorders(outputs: Option<&Outputs>, in_study: bool) -> Result<Recordings, Error> {
     let mut recordings =
         Recordings { set: RecorderSet::new(), names: Files::default(), folders: Undo::default(), held: None };
@@ -166,7 +166,7 @@ pub(crate) fn recorders(outputs: Option<&Outputs>, in_study: bool) -> Result<Rec
             "is a file; the results need a folder: choose another place, or move the file away".into(),
         ));
     }
-    // Nothing is removed before all that is to come in its place can be written.
+    // Old files are removed only after all new files have been found writable.
     recordings.set.check()?;
     recordings.folders.make(&outputs.folder).map_err(|e| unusable(format!("the output folder cannot be made: {e}")))?;
     let held = FolderLock::take(&outputs.folder).ok_or_else(|| {
@@ -179,7 +179,7 @@ pub(crate) fn recorders(outputs: Option<&Outputs>, in_study: bool) -> Result<Rec
     Ok(recordings)
 }
 
-/// Writes the layouts with which viewers open the MCAP recording, if there is one.
+/// Writes viewer layouts for the MCAP recording, if there is one.
 #[cfg(feature = "mcap")]
 pub(crate) fn write_layouts(files: &Files, header: &RunHeader) -> Result<(), Error> {
     type Layout = fn(&RunHeader) -> String;
@@ -191,13 +191,13 @@ pub(crate) fn write_layouts(files: &Files, header: &RunHeader) -> Result<(), Err
     Ok(flexarm_files::write_all(&there.collect::<Vec<_>>())?)
 }
 
-/// There is none without the feature `mcap`.
+/// Without the feature `mcap` there are no layouts.
 #[cfg(not(feature = "mcap"))]
 pub(crate) fn write_layouts(_: &Files, _: &RunHeader) -> Result<(), Error> {
     Ok(())
 }
 
-/// Links of the URDF, parents before children.
+/// Returns the links of the URDF, parents before children.
 pub(crate) fn ordered_links(robot: &Robot) -> Vec<LinkInfo> {
     let mechanism = &robot.urdf.mechanism;
     let base = mechanism.links.iter().find(|l| mechanism.joints.iter().all(|j| j.child != l.name));
@@ -209,7 +209,7 @@ pub(crate) fn ordered_links(robot: &Robot) -> Vec<LinkInfo> {
         links.extend(mechanism.child_joints(&name).map(|j| LinkInfo {
             name: j.child.clone(),
             parent: Some(next),
-            // A fixed joint at the far end of a flexible link moves against the link's frame.
+            // A fixed joint at the far end of a flexible link moves relative to the link's frame.
             fixed: j.kind == JointKind::Fixed
                 && robot.flexible.iter().all(|f| f.flexible.link != name)
                 && !(next == 0 && robot.is_mounted()),
@@ -219,17 +219,17 @@ pub(crate) fn ordered_links(robot: &Robot) -> Vec<LinkInfo> {
     links
 }
 
-/// Frames of the URDF's links in the model, in the order of the header.
+/// Returns the frames of the URDF's links in the model, in the order of the header.
 pub fn link_frames(robot: &Robot, model: &Model) -> Vec<Frame> {
     let links = ordered_links(robot);
     links.iter().map(|l| model.frame(&l.name).expect("all links are frames").clone()).collect()
 }
 
-/// A model that was not chosen for the run.
+/// Label of a model choice left to the robot file.
 const AS_FILED: &str = "as the robot file says";
 
-/// A path for people: without `folder/..` in it. The file system is not asked, so that the answer
-/// is the same anywhere.
+/// Formats a path without `folder/..`. Does not access the file system, so the result does not
+/// depend on the machine.
 pub fn straight(path: &Path) -> String {
     let mut parts: Vec<Component<'_>> = Vec::new();
     for part in path.components() {
@@ -243,7 +243,7 @@ pub fn straight(path: &Path) -> String {
     parts.iter().collect::<PathBuf>().display().to_string()
 }
 
-/// Everything about a run that does not change.
+/// Builds the header of a run: everything that does not change over time.
 pub(crate) fn header(
     robot: &Robot,
     scenario: &Scenario,
@@ -265,7 +265,7 @@ pub(crate) fn header(
     }
 }
 
-/// Returns the settings of the run in groups of key-value pairs.
+/// Settings and inputs of the run, in groups of key-value pairs.
 fn metadata(
     robot: &Robot,
     scenario: &Scenario,
@@ -323,12 +323,12 @@ fn metadata(
     ]
 }
 
-/// The part of a header that names the signals.
+/// Header with the links and the names of the signals.
 pub(crate) fn signals(robot: &Robot, arm: &FlexibleArm) -> RunHeader {
     RunHeader { links: ordered_links(robot), ..names_of_signals(robot, arm) }
 }
 
-/// Names of joints, springs and tool: what columns are called after.
+/// Header with the names of joints, springs and TCP, used for column names.
 pub(crate) fn names_of_signals(robot: &Robot, arm: &FlexibleArm) -> RunHeader {
     let actuated = &arm.model.coordinates()[..arm.model.n_actuated()];
     RunHeader {
@@ -341,7 +341,7 @@ pub(crate) fn names_of_signals(robot: &Robot, arm: &FlexibleArm) -> RunHeader {
     }
 }
 
-/// The part of a header that the robot alone decides.
+/// Header without the data of a particular run.
 pub fn robot_header(robot: &Robot, arm: &FlexibleArm) -> RunHeader {
     let header = signals(robot, arm);
     let read = |name: &str, media_type: &str, path: &std::path::Path| {
@@ -351,8 +351,7 @@ pub fn robot_header(robot: &Robot, arm: &FlexibleArm) -> RunHeader {
     if robot.path != robot.urdf_path {
         attachments.extend(read("robot.toml", "application/toml", &robot.path));
     }
-    // The recorder attaches the files of what is drawn; those of collision shapes belong to the
-    // robot too.
+    // The recorder attaches the mesh files of visuals; those of collision shapes are attached here.
     let drawn = |path: &Path| {
         robot.urdf.visuals.iter().any(|v| matches!(&v.geometry, Geometry::Mesh { path: Some(p), .. } if p == path))
     };
@@ -363,9 +362,9 @@ pub fn robot_header(robot: &Robot, arm: &FlexibleArm) -> RunHeader {
     RunHeader { urdf: located_urdf(robot, false), meshes: meshes(robot, &header.links), attachments, ..header }
 }
 
-/// The URDF with the meshes that were found, of visual and of collision shapes, as `file://`
-/// references: viewers then need not know the robot's folder. Or with their
-/// contents as `data:` references.
+/// Returns the URDF with all meshes found, of visuals and collision shapes, as `file://`
+/// references, so that viewers find them without knowing the robot's folder; with `embed`, as
+/// `data:` references that contain them.
 fn located_urdf(robot: &Robot, embed: bool) -> String {
     use base64::Engine as _;
     let mut text = robot.urdf.text.clone();
@@ -410,8 +409,7 @@ fn description(
     text
 }
 
-/// Visuals as triangles in link axes; those that cannot be read are left out (the URDF reader has
-/// warned).
+/// Visuals as triangles in link axes; skips those that cannot be read (the URDF reader warns).
 fn meshes(robot: &Robot, links: &[LinkInfo]) -> Vec<LinkMesh> {
     let mut meshes = Vec::new();
     for (i, visual) in robot.urdf.visuals.iter().enumerate() {
@@ -434,7 +432,7 @@ fn meshes(robot: &Robot, links: &[LinkInfo]) -> Vec<LinkMesh> {
             file,
         };
         let mut mesh = if own_normals { mesh } else { mesh.with_creases() };
-        // Two visuals of a link may have one name.
+        // Two visuals of a link may have the same name.
         let named = |name: &str| meshes.iter().any(|other: &LinkMesh| other.link == link && other.name == name);
         if named(&mesh.name) {
             mesh.name = (2..).map(|n| format!("{}_{n}", mesh.name)).find(|name| !named(name)).unwrap_or_default();

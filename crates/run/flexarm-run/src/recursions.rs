@@ -1,8 +1,9 @@
-//! The recursions of a tree on plain numbers: one state, or many, row after row and on all cores.
+//! Recursive algorithms of a tree on plain arrays: one state, or many states, row by row on all
+//! cores.
 //!
-//! For programs that bring arrays of their own. A tree is that of the rigid robot
+//! For programs with arrays of their own. The tree is that of the rigid robot
 //! ([`Robot::recursions`]) or of an arm with its elastic coordinates after the actuated ones
-//! ([`Arm::recursions`]). Springs, dampers and friction are none of it.
+//! ([`Arm::recursions`]). Springs, dampers and friction are not included.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -19,9 +20,9 @@ use crate::error::{Error, LoadError, PoseError};
 use crate::loops;
 use crate::robot::Robot;
 
-/// Rows from which on threads share the work: below, waking them costs more.
+/// Number of rows above which threads share the work; below, waking them costs more.
 const MANY: usize = 256;
-/// Rows that a thread takes at a time.
+/// Number of rows per task of a thread.
 const CHUNK: usize = 64;
 
 /// A tree with workspaces for its recursions, shared by threads.
@@ -53,7 +54,7 @@ impl Space {
 }
 
 impl Robot {
-    /// The recursions of the rigid robot with its payload.
+    /// Returns the recursions of the rigid robot with its payload.
     ///
     /// # Errors
     /// [`Error::Model`].
@@ -63,27 +64,27 @@ impl Robot {
 }
 
 impl Arm {
-    /// The recursions of the tree with its elastic coordinates.
+    /// Returns the recursions of the tree with its elastic coordinates.
     pub fn recursions(&self) -> Recursions {
         Recursions::new(self.flexible().model.clone())
     }
 }
 
 impl Recursions {
-    /// Those of a tree.
+    /// Creates the recursions of a tree.
     pub fn new(model: Arc<Model>) -> Self {
         Self { model, spaces: Mutex::default() }
     }
 
-    /// The tree.
+    /// Returns the tree.
     pub fn model(&self) -> &Model {
         &self.model
     }
 
-    /// The frame of this name, a link or `tcp`.
+    /// Returns the frame with this name: a link or `tcp`.
     ///
     /// # Errors
-    /// [`Error::Load`] with the links that there are.
+    /// [`Error::Load`] with the available links.
     pub fn frame(&self, name: &str) -> Result<Frame, Error> {
         let frames = || self.model.frames().iter().filter(|frame| !frame.name.starts_with("__"));
         let unknown = || LoadError::UnknownFrame {
@@ -93,13 +94,13 @@ impl Recursions {
         frame_of(name, &self.model).cloned().ok_or_else(|| unknown().into())
     }
 
-    /// Generalised forces `τ = M q̈ + bias` of m motions, m×n (N m or N).
+    /// Computes generalised forces `τ = M q̈ + bias` of m motions, m×n (N m or N).
     ///
     /// * `q`, `qdot`, `qddot`: m×n, all coordinates of the tree.
     ///
     /// # Errors
-    /// [`Error::Pose`] if the arrays do not have m rows of n numbers, [`Error::Loop`] where a loop
-    /// does not close.
+    /// [`Error::Pose`] if the arrays do not have m rows of n values, [`Error::Loop`] if a loop does
+    /// not close.
     pub fn inverse_dynamics(&self, q: &[f64], qdot: &[f64], qddot: &[f64], tau: &mut [f64]) -> Result<(), Error> {
         let n = self.model.nv();
         self.rows([q, qdot, qddot], tau, n, |space, [q, qdot, qddot], tau| {
@@ -110,7 +111,8 @@ impl Recursions {
         })
     }
 
-    /// Forces at zero acceleration: gravity, balancers, centrifugal and Coriolis forces, m×n.
+    /// Computes forces at zero acceleration: gravity, balancers, centrifugal and Coriolis forces,
+    /// m×n.
     ///
     /// # Errors
     /// As [`Recursions::inverse_dynamics`].
@@ -123,7 +125,7 @@ impl Recursions {
         })
     }
 
-    /// Forces that hold m poses against gravity and balancers, m×n.
+    /// Computes forces that hold m poses against gravity and balancers, m×n.
     ///
     /// # Errors
     /// As [`Recursions::inverse_dynamics`].
@@ -135,7 +137,7 @@ impl Recursions {
         })
     }
 
-    /// Mass matrices, m×n×n.
+    /// Computes mass matrices, m×n×n.
     ///
     /// # Errors
     /// As [`Recursions::inverse_dynamics`].
@@ -143,12 +145,12 @@ impl Recursions {
         let n = self.model.nv();
         self.rows([q], M, n * n, |space, [q], M| {
             space.state.q.copy_from_slice(q);
-            // Symmetric: rows are columns.
+            // The matrix is symmetric, so row-major equals column-major.
             M.copy_from_slice(mass_matrix(&self.model, &mut space.data, &space.state.q).as_slice());
         })
     }
 
-    /// Accelerations for generalised forces, all coordinates free, m×n.
+    /// Computes accelerations for given generalised forces with all coordinates free, m×n.
     ///
     /// # Errors
     /// As [`Recursions::inverse_dynamics`].
@@ -163,7 +165,7 @@ impl Recursions {
         })
     }
 
-    /// Jacobians of a frame, world axes at its origin, linear rows first, m×6×n.
+    /// Computes Jacobians of a frame, world axes at its origin, linear rows first, m×6×n.
     ///
     /// # Errors
     /// As [`Recursions::inverse_dynamics`].
@@ -179,7 +181,7 @@ impl Recursions {
         })
     }
 
-    /// Poses of a frame in the world as homogeneous matrices, m×4×4.
+    /// Computes poses of a frame in the world as homogeneous matrices, m×4×4.
     ///
     /// # Errors
     /// As [`Recursions::inverse_dynamics`].
@@ -191,7 +193,7 @@ impl Recursions {
         })
     }
 
-    /// Centres of mass in the world, m×3 (m).
+    /// Computes centres of mass in the world, m×3 (m).
     ///
     /// # Errors
     /// As [`Recursions::inverse_dynamics`].
@@ -203,7 +205,7 @@ impl Recursions {
         })
     }
 
-    /// One answer of `width` numbers for each row of the inputs; the first input is the pose.
+    /// Computes `width` values for each row of the inputs; the first input is the pose.
     fn rows<const K: usize>(
         &self,
         inputs: [&[f64]; K],
@@ -238,7 +240,7 @@ impl Recursions {
         chunks.try_for_each_init(|| Space::new(&self.model), |space, (chunk, out)| several(space, chunk * CHUNK, out))
     }
 
-    /// Returns a free workspace.
+    /// Takes an unused workspace, or creates one.
     fn take(&self) -> Space {
         let free = self.spaces.lock().unwrap_or_else(PoisonError::into_inner).pop();
         free.unwrap_or_else(|| Space::new(&self.model))

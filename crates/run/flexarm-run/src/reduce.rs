@@ -1,4 +1,4 @@
-//! From a mesh to a flexible link with its files: what `flexarm reduce` does.
+//! Reduction of a mesh to a flexible link with its files, as in `flexarm reduce`.
 //!
 //! ```no_run
 //! use flexarm_run::reduce::{ReduceJob, ReduceOptions, ReduceOutputs, reduce};
@@ -11,7 +11,7 @@
 //! ```
 //!
 //! Not here: jobs, interfaces, figures and files (`flexarm-linkmaker`). A job may name a robot
-//! whose joints are at the interfaces; that robot is read here.
+//! whose joints define the interfaces; that robot is read here.
 
 use flexarm_fem::RigidPart;
 use flexarm_flexlink::{SubstitutionError, distal_joint};
@@ -23,20 +23,19 @@ use crate::error::Error;
 
 pub use flexarm_linkmaker::reduce::*;
 
-/// Defaults of a job.
+/// Options that are not part of a job.
 #[derive(Clone, Debug, Default)]
 pub struct ReduceOptions {
-    /// For the reader of the URDF.
+    /// Options for the URDF reader.
     pub urdf: ReadOptions,
 }
 
 /// Reduces a mesh to a link and writes the files.
 ///
-/// Everything that can be checked is checked before the work starts; nothing is written if it
-/// fails.
+/// All checks that are possible come before the work starts; if it fails, nothing is written.
 ///
 /// # Errors
-/// [`Error`]; several faults of a job come together. See [`Error::fault`].
+/// [`Error`]; several errors of a job are reported together. See [`Error::fault`].
 pub fn reduce(
     job: &ReduceJob,
     options: &ReduceOptions,
@@ -48,11 +47,11 @@ pub fn reduce(
     Ok(reduction.finish(robot.as_ref(), progress)?)
 }
 
-/// The link of a robot with the joints on it, for [`Reduction::finish`].
+/// Returns the link of a robot with the joints on it, for [`Reduction::finish`].
 ///
 /// # Errors
-/// [`Error::Urdf`]; [`Error::File`] for a link that is not there, and for one whose joint at B is
-/// not clear or not there.
+/// [`Error::Urdf`]; [`Error::File`] if the link does not exist, or if its joint at B is ambiguous
+/// or missing.
 pub fn urdf_link(entry: &UrdfEntry, options: &ReadOptions) -> Result<UrdfLink, Error> {
     let mechanism = read_urdf(&entry.file, options)?.mechanism;
     let X_LB = distal_joint(&mechanism, &entry.link, entry.joint.as_deref()).map(|joint| joint.X_PJ);

@@ -1,5 +1,5 @@
-//! Frequency response at a pose, drives locked or shaken: what the TCP does per newton on it or per
-//! radian of a joint.
+//! Frequency response at a pose, with the drives locked or a joint excited: TCP motion per newton
+//! at the TCP or per radian of a joint.
 
 use std::path::PathBuf;
 
@@ -23,35 +23,35 @@ use crate::robot::Robot;
 
 /// Files of a response in its output folder: table, plot, figures.
 const RESPONSE_FILES: [&str; 3] = ["response.csv", "response.svg", "response.json"];
-/// Allowed numbers of points of a response.
+/// Allowed number of points of a response.
 const POINTS: std::ops::RangeInclusive<usize> = 2..=100_000;
-/// Highest frequency that makes sense (Hz).
+/// Maximum frequency (Hz).
 const HIGHEST_HZ: f64 = 1e6;
-/// A curve below this part of the largest of its unit is rounding.
+/// A curve below this fraction of the largest with the same unit is round-off.
 const NOTHING: f64 = 1e-12;
-/// Curves are drawn within this part of their height.
+/// Relative accuracy with which the curves are resolved.
 const RESOLUTION: f64 = 0.01;
-/// Natural frequencies that a plot lists.
+/// Maximum number of natural frequencies listed in a plot.
 const LISTED: usize = 8;
-/// Below this damping ratio a resonance is as good as undamped.
+/// A resonance with a damping ratio below this counts as undamped.
 const UNDAMPED: f64 = 1e-6;
 const AXES: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
 const WRENCH: [&str; 6] = ["force-x", "force-y", "force-z", "torque-x", "torque-y", "torque-z"];
 
-/// Request of [`response`].
+/// Request for [`response`].
 #[derive(Clone, Debug)]
 pub struct ResponseRequest {
-    /// `force-x` ... `torque-z` (on the TCP, world axes), or names of joints.
+    /// Inputs: `force-x` ... `torque-z` (on the TCP, world axes), or names of joints.
     pub inputs: Vec<String>,
-    /// `x`, `y`, `z`, `rx`, `ry`, `rz` of the TCP, world axes.
+    /// Outputs: `x`, `y`, `z`, `rx`, `ry`, `rz` of the TCP, world axes.
     pub outputs: Vec<String>,
-    /// Displacement, velocity or acceleration of the outputs.
+    /// Whether the outputs are displacements, velocities or accelerations.
     pub quantity: Quantity,
-    /// Lowest frequency (Hz); a tenth of the first mode without it.
+    /// Lowest frequency (Hz); a tenth of the first natural frequency by default.
     pub from_hz: Option<f64>,
-    /// Highest frequency (Hz); twice the sixth mode without it.
+    /// Highest frequency (Hz); twice the sixth natural frequency by default.
     pub to_hz: Option<f64>,
-    /// Number of frequencies; more are added around resonances.
+    /// Number of frequencies; more are added around the resonances.
     pub points: usize,
     /// Spacing of the frequencies.
     pub spacing: Spacing,
@@ -72,57 +72,56 @@ impl Default for ResponseRequest {
     }
 }
 
-/// Answer of `flexarm response`. SI units.
+/// Result of `flexarm response`. SI units.
 #[derive(Clone, Debug, Serialize)]
 pub struct Response {
     /// Name of the robot.
     pub robot: String,
     /// Joints, in coordinate order.
     pub joints: Vec<String>,
-    /// Positions at which they are held, or about which they move (rad or m).
+    /// Positions at which the joints are held, or about which they move (rad or m).
     pub at: Vec<f64>,
-    /// Whether each of them is prismatic.
+    /// Whether each joint is prismatic.
     #[serde(skip)]
     pub slides: Vec<bool>,
     /// Link that carries the TCP.
     pub tcp: String,
-    /// displacement, velocity or acceleration.
+    /// `displacement`, `velocity` or `acceleration`.
     pub quantity: &'static str,
-    /// Natural frequencies of the modes (Hz), all.
+    /// Natural frequencies of all modes (Hz).
     pub frequencies_hz: Vec<f64>,
-    /// Their damping ratios.
+    /// Damping ratios of the modes.
     pub damping_ratio: Vec<f64>,
     /// Frequencies of the curves (Hz).
     pub frequency_hz: Vec<f64>,
-    /// Whether they are spaced by equal ratios.
+    /// Whether the frequencies are logarithmically spaced.
     pub logarithmic: bool,
-    /// One per input and output.
+    /// One curve per pair of input and output.
     pub curves: Vec<ResponseCurve>,
     /// Written files.
     pub files: ResponseFiles,
     /// Warnings among the caveats, as sentences.
     pub warnings: Vec<String>,
-    /// Doubts about the input and limits of the result.
+    /// Probable errors in the input, and limits of the result's validity.
     pub caveats: Vec<Caveat>,
 }
 
 /// Response of one output to one input.
 #[derive(Clone, Debug, Serialize)]
 pub struct ResponseCurve {
-    /// Word of the input.
+    /// Name of the input.
     pub input: String,
-    /// Word of the output.
+    /// Name of the output.
     pub output: String,
     /// Unit of the magnitude.
     pub unit: String,
-    /// Response at rest, with its sign; null where it is infinite.
+    /// Static response, signed; null where it is infinite.
     pub at_rest: Option<f64>,
-    /// Resonances within the frequencies, the highest first.
+    /// Resonances within the frequency range, the highest first.
     pub peaks: Vec<PeakFigures>,
-    /// Amplitude of the output per amplitude of the input, one per frequency.
+    /// Amplitude ratio of output to input, one per frequency.
     pub magnitude: Vec<f64>,
-    /// Phase lead of the output (rad), one per frequency, unwrapped: steps of more than half a
-    /// turn are removed.
+    /// Phase lead of the output over the input (rad), one per frequency; unwrapped.
     pub phase_rad: Vec<f64>,
 }
 
@@ -133,7 +132,7 @@ pub struct PeakFigures {
     pub frequency_hz: f64,
     /// Magnitude.
     pub magnitude: f64,
-    /// Phase there (rad).
+    /// Phase (rad).
     pub phase_rad: f64,
 }
 
@@ -142,22 +141,22 @@ pub struct PeakFigures {
 pub struct ResponseFiles {
     /// Table.
     pub csv: Option<String>,
-    /// Magnitude and phase as a picture.
+    /// Plot of magnitude and phase.
     pub plot: Option<String>,
-    /// This answer.
+    /// This result as JSON.
     pub json: Option<String>,
 }
 
-/// Output files of a response.
+/// Output location of a response.
 #[derive(Clone, Debug)]
 pub struct ResponseOutputs {
-    /// Folder; made if it is not there.
+    /// Output folder; created if it does not exist.
     pub folder: PathBuf,
-    /// Overwrite what is there.
+    /// Whether existing files are overwritten.
     pub overwrite: bool,
 }
 
-/// A column of the input or output side: its word, its unit, and the letter for names of columns.
+/// Input or output channel: its name, its unit, its index and whether it is a joint.
 struct Channel {
     word: String,
     unit: &'static str,
@@ -165,14 +164,14 @@ struct Channel {
     joint: bool,
 }
 
-/// Frequency response of the flexible robot at a pose, about its equilibrium under weight, other
-/// drives locked.
+/// Computes the frequency response of the flexible robot at a pose, linearised about its static
+/// equilibrium under gravity, with the other drives locked.
 ///
-/// `at`: all actuated joints (rad or m), zero without it.
+/// `at`: values of all actuated joints (rad or m); zero by default.
 ///
 /// # Errors
-/// [`Error::Channel`] and [`Error::Value`] for words and numbers that make no sense,
-/// [`Error::Step`] where there is no equilibrium, [`Error::File`] and [`Error::Write`] for files.
+/// [`Error::Channel`] and [`Error::Value`] for invalid channel names and values, [`Error::Step`] if
+/// there is no equilibrium, [`Error::File`] and [`Error::Write`] for files.
 pub fn response(
     robot: &Robot,
     modelling: &Modelling,
@@ -184,7 +183,7 @@ pub fn response(
 }
 
 impl Arm {
-    /// As [`response()`], of an arm whose links and drives are in place; nothing is written.
+    /// As [`response()`], for an arm that is already modelled; writes no files.
     ///
     /// # Errors
     /// As [`response()`].
@@ -215,18 +214,19 @@ fn response_at(
     let (from, to) = range(request, &frequencies_hz)?;
     let system = system(&linear, &inputs, &channels);
 
-    // One solution per frequency serves all curves; an undamped resonance has none and is left out.
+    // One solution per frequency serves all curves; it does not exist at an undamped resonance,
+    // which is left out.
     let resonances: Vec<(f64, f64)> = frequencies_hz.iter().copied().zip(damping_ratio.iter().copied()).collect();
     let grid = with_resonances(&frequency_grid(from, to, request.points, request.spacing), &resonances);
     let displacement = |hz: f64| system.response(std::f64::consts::TAU * hz).ok();
     let factor = |hz: f64| request.quantity.factor(std::f64::consts::TAU * hz);
     let answer = |hz: f64| displacement(hz).map(|H| H * factor(hz));
-    // All quantities have the same frequencies.
+    // All quantities use the same frequencies, those that resolve the displacement.
     let (frequency_hz, answers) = resolved_response(&grid, displacement, RESOLUTION);
     let answers: Vec<DMatrix<Complex<f64>>> = frequency_hz.iter().zip(answers).map(|(hz, H)| H * factor(*hz)).collect();
     system.check().map_err(linear_error)?;
 
-    // A curve that is nothing beside the others of its unit has no peaks but rounding.
+    // A curve that is negligible among those of its unit has only round-off peaks.
     let size = |i: usize, j: usize| answers.iter().map(|H| H[(i, j)].norm()).fold(0.0, f64::max);
     let largest = |unit: &str, other: &dyn Fn(usize, usize) -> String| {
         let all = (0..channels.len()).flat_map(|i| (0..inputs.len()).map(move |j| (i, j)));
@@ -288,7 +288,7 @@ fn response_at(
     Ok(response)
 }
 
-/// Lowest and highest frequency, asked for or after the modes.
+/// Lowest and highest frequency, as requested or derived from the modes.
 fn range(request: &ResponseRequest, modes_hz: &[f64]) -> Result<(f64, f64), Error> {
     let first = modes_hz.iter().find(|f| **f > 0.0);
     let from = request.from_hz.unwrap_or_else(|| first.map_or(1.0, |f| 0.1 * f));
@@ -342,8 +342,8 @@ fn once(channels: Vec<Channel>, side: &'static str) -> Result<Vec<Channel>, Erro
     Ok(channels)
 }
 
-/// A wrench acts by `Jᵀ`; a joint by the inertia and weight that it moves, and moves the tool
-/// directly.
+/// A wrench acts through `Jᵀ`. A joint acts through the inertia, damping and stiffness coupled to
+/// it, and also moves the TCP directly.
 fn system(linear: &Linear, inputs: &[Channel], outputs: &[Channel]) -> LinearSystem {
     let n = linear.M.nrows();
     let J = tool_map(linear);
@@ -381,7 +381,7 @@ fn unit(output: &Channel, input: &Channel, quantity: Quantity) -> String {
     format!("{}{rate}/{}", output.unit, input.unit)
 }
 
-/// Angles without steps of more than half a turn.
+/// Unwraps angles: removes steps of more than half a turn.
 fn unwrapped(angles: impl Iterator<Item = f64>) -> Vec<f64> {
     use std::f64::consts::TAU;
     let mut last = None;
@@ -394,7 +394,8 @@ fn unwrapped(angles: impl Iterator<Item = f64>) -> Vec<f64> {
         .collect()
 }
 
-/// The response as a table: frequency, then magnitude and phase of each curve, units in the names.
+/// Returns the response as a table: frequency, then magnitude and phase of each curve, with units
+/// in the column names.
 fn csv(response: &Response) -> String {
     let mut text = "frequency_hz".to_owned();
     for c in &response.curves {
@@ -414,21 +415,21 @@ fn csv(response: &Response) -> String {
     text
 }
 
-/// A unit as people say it, and how many of it make one of the SI unit: `m/N` is 1e6 `µm/N`.
+/// Returns a display unit and the factor from the SI unit to it: `m/N` becomes `µm/N` with 1e6.
 #[must_use]
 pub fn readable_unit(unit: &str) -> (String, f64) {
     let (of, per) = unit.rsplit_once('/').unwrap_or((unit, ""));
-    // Displacements of a tool for a joint's are of one size.
+    // TCP displacements per joint displacement are of order one.
     if ["rad", "m"].contains(&per) {
         return (unit.to_owned(), 1.0);
     }
     (format!("µ{of}/{per}").replace("s2", "s²").replace("Nm", "N m"), 1e6)
 }
 
-/// Magnitude over frequency, a panel per unit, and phase of all curves below; the natural
-/// frequencies marked.
+/// Plots magnitude over frequency with one panel per unit, and the phase of all curves below; marks
+/// the natural frequencies.
 fn plot(response: &Response) -> Result<String, PlotError> {
-    // A curve in the direction of its force has the colour of that axis.
+    // Motion in the direction of its force has the colour of that axis.
     let look = |c: &ResponseCurve| {
         let direction = WRENCH.iter().position(|word| *word == c.input);
         match direction.filter(|k| AXES[*k] == c.output) {
@@ -473,7 +474,7 @@ fn plot(response: &Response) -> Result<String, PlotError> {
     plot.svg()
 }
 
-/// The pose and the natural frequencies, in words.
+/// The pose and the natural frequencies as text.
 fn notes(response: &Response, marks: &[(f64, String)]) -> Vec<String> {
     let named: Vec<String> =
         marks.iter().take(LISTED).map(|(hz, name)| format!("{name} {}", rounded(*hz, 2))).collect();
@@ -485,7 +486,7 @@ fn notes(response: &Response, marks: &[(f64, String)]) -> Vec<String> {
     notes
 }
 
-/// Joints and where they are, in degrees or millimetres.
+/// Formats joint positions in degrees or millimetres.
 pub fn pose_in_words(joints: &[String], at: &[f64], slides: &[bool]) -> String {
     let joint = |((joint, q), slides): ((&String, &f64), &bool)| match slides {
         true => format!("{joint} {} mm", rounded(1e3 * q, 1)),
@@ -494,10 +495,10 @@ pub fn pose_in_words(joints: &[String], at: &[f64], slides: &[bool]) -> String {
     joints.iter().zip(at).zip(slides).map(joint).collect::<Vec<_>>().join(", ")
 }
 
-/// A number with so many decimals at most.
+/// Rounds a number to `decimals` decimals.
 fn rounded(x: f64, decimals: i32) -> f64 {
     let unit = 10f64.powi(decimals);
-    // Nothing is gained by -0.
+    // Avoids -0.
     (x * unit).round() / unit + 0.0
 }
 

@@ -38,7 +38,7 @@ pub struct LoadOptions {
     pub urdf: ReadOptions,
 }
 
-/// Most recently built model, with the mechanism it was built from.
+/// Last model built, with the mechanism it was built from.
 type KeptModel = Arc<Mutex<Option<(Mechanism, Arc<Model>)>>>;
 
 /// A loaded robot.
@@ -59,7 +59,7 @@ pub struct Robot {
     pub flexible: Vec<RobotLink>,
     /// Elastic mounting of the base, if there is one.
     pub mounting: Option<RobotMounting>,
-    /// Drives of the file; all other joints are prescribed.
+    /// Drives given in the robot file; all other joints are prescribed.
     pub drives: Vec<Drive>,
     /// Motors that move several joints.
     pub(crate) coupling: Option<RobotCoupling>,
@@ -77,7 +77,7 @@ pub struct Robot {
     pub controller: Vec<RobotAxis>,
     /// Caveats that can only be found in the text of the file.
     written: Vec<Caveat>,
-    /// Most recent tree of the rigid robot, with the mechanism it was built from.
+    /// Last tree of the rigid robot, with the mechanism it was built from.
     rigid_tree: KeptModel,
 }
 

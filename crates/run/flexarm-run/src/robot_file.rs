@@ -1,7 +1,6 @@
-//! The robot file `robot.toml`: what it may say, read into plain structs. [`crate::Robot`] makes
-//! sense of it.
+//! The robot file `robot.toml`, read into plain structs. [`crate::Robot`] interprets them.
 //!
-//! Unknown keys are refused, so that a misspelt one is never ignored. Units are SI; angles in rad.
+//! Unknown keys are rejected, so that a misspelt key is never ignored. Units are SI; angles in rad.
 
 use std::path::{Path, PathBuf};
 
@@ -22,13 +21,13 @@ use crate::mounting::MountingEntry;
 use crate::ranges::OF_ROBOT;
 use crate::toml_file::parsed;
 
-/// The file as written.
+/// Robot file as written.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct RobotFile {
     /// Version of the format: 1.
     pub format: Spanned<i64>,
-    /// Name for logs; the folder's name if not given.
+    /// Name for logs; the name of the folder by default.
     pub name: Option<String>,
     /// URDF or xacro file, relative to the robot file.
     pub urdf: Spanned<PathBuf>,
@@ -38,36 +37,36 @@ pub(crate) struct RobotFile {
     pub payload: Option<Spanned<PayloadEntry>>,
     /// Acceleration of gravity in base axes (m/s²).
     pub gravity: Option<Spanned<[f64; 3]>>,
-    /// Trajectory for `flexarm compare` without one, relative to the robot file.
+    /// Default trajectory of `flexarm compare`, relative to the robot file.
     pub default_trajectory: Option<Spanned<PathBuf>>,
     /// Folders of `package://` names.
     #[serde(default)]
     pub packages: std::collections::BTreeMap<String, PathBuf>,
-    /// Values of the arguments of a xacro file: text, numbers or true and false.
+    /// Values of the arguments of a xacro file: text, numbers, or true and false.
     #[serde(default)]
     pub args: std::collections::BTreeMap<String, Spanned<toml::Value>>,
-    /// Links whose inertia may be one that no body has (published data sometimes do).
+    /// Links whose inertia may be unphysical (as published data sometimes are).
     #[serde(default)]
     pub waive_inertia: Vec<String>,
-    /// Links whose `<inertial>` counts as not written: masses that only hold a place.
+    /// Links whose `<inertial>` is ignored because it is only a placeholder.
     #[serde(default)]
     pub discard_inertia: Vec<String>,
-    /// Density for links without `<inertial>` (kg/m³): masses from their meshes.
+    /// Density of links without `<inertial>` (kg/m³), for masses from their meshes.
     pub inertia_from_density: Option<Spanned<f64>>,
-    /// Mass of all links without `<inertial>` together (kg), distributed by volume.
+    /// Total mass of all links without `<inertial>` (kg), distributed by volume.
     pub inertia_from_total_mass: Option<Spanned<f64>>,
-    /// Positions of joints that a motion does not name (rad or m).
+    /// Positions of joints that a motion does not drive (rad or m).
     #[serde(default)]
     pub hold: std::collections::BTreeMap<String, Spanned<f64>>,
-    /// Effort limits in the place of the URDF's (N m or N); infinite where none is known.
+    /// Effort limits that replace the URDF's (N m or N); infinite if unknown.
     #[serde(default)]
     pub effort_limit: std::collections::BTreeMap<String, Spanned<f64>>,
-    /// Joints that slide as they turn: how far in a turn (m), right-handed threads positive.
+    /// Helical joints: lead per turn (m), positive for right-handed threads.
     #[serde(default)]
     pub lead: std::collections::BTreeMap<String, Spanned<f64>>,
     /// Elastic mounting of the base.
     pub mounting: Option<Spanned<MountingEntry>>,
-    /// Links that bend.
+    /// Flexible links.
     #[serde(default)]
     pub flexible_link: Vec<FlexibleLinkEntry>,
     /// Drives of the joints.
@@ -81,7 +80,7 @@ pub(crate) struct RobotFile {
     /// Axis conventions of the controller.
     #[serde(default)]
     pub controller_axis: Vec<ControllerAxisEntry>,
-    /// Pins that close loops of links.
+    /// Pins that close kinematic loops.
     #[serde(default)]
     #[serde(rename = "loop")]
     pub loops: Vec<Spanned<LoopEntry>>,
@@ -105,18 +104,18 @@ pub(crate) struct TcpEntry {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct PayloadEntry {
-    /// Link that carries it; that of the TCP if not given.
+    /// Link that carries it; the TCP link by default.
     pub link: Option<Spanned<String>>,
     /// Mass (kg).
     pub mass: Spanned<f64>,
-    /// Centre of mass in link axes (m); must be there unless the mass is 0.
+    /// Centre of mass in link axes (m); required unless the mass is 0.
     pub com: Option<[f64; 3]>,
     /// `ixx iyy izz ixy ixz iyz` about the centre of mass (kg m²).
     #[serde(default)]
     pub inertia: [f64; 6],
 }
 
-/// A flexible link.
+/// Flexible link.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct FlexibleLinkEntry {
@@ -126,34 +125,33 @@ pub(crate) struct FlexibleLinkEntry {
     pub distal: Option<Spanned<String>>,
     /// `.flex` file, relative to the robot file.
     pub reduced: Option<Spanned<PathBuf>>,
-    /// Or a beam.
+    /// Beam, instead of a `.flex` file.
     pub beam: Option<Spanned<BeamEntry>>,
     /// `lumped` or `modal`.
     pub model: Option<Spanned<String>>,
-    /// Number of rigid parts of a lumped link; 2 if not given.
+    /// Number of rigid parts of a lumped link; 2 by default.
     pub segments: Option<Spanned<i64>>,
-    /// Number of fixed-interface modes of a modal link, beside those of its interfaces; all that
-    /// the .flex file has, 6 of a beam.
+    /// Number of fixed-interface modes of a modal link, in addition to those of its interfaces; by
+    /// default all in the `.flex` file, or 6 for a beam.
     pub modes: Option<Spanned<i64>>,
-    /// Modal: use the link's own modes with A held instead of interface displacements, only as many
-    /// as given.
+    /// Modal: use this number of eigenmodes with A held instead of interface displacements.
     pub eigenmodes: Option<Spanned<i64>>,
-    /// Modal: let loads change the stiffness; false if not given.
+    /// Modal: whether loads change the stiffness (geometric stiffening); false by default.
     pub geometric_stiffening: Option<Spanned<bool>>,
-    /// Mass of a link that is a beam instead of the URDF's, its inertia in proportion (kg).
+    /// Mass of a beam link (kg), replaces the URDF's; its inertia is scaled in proportion.
     pub mass: Option<Spanned<f64>>,
-    /// Factor on its stiffness, as identified; 1 if not given.
+    /// Factor on its stiffness, for instance from measurements; 1 by default.
     pub stiffness_factor: Option<Spanned<f64>>,
-    /// Stiffness of the spring between its two parts in the place of its source's, lumped links;
-    /// 6x6, N/m, N, N m/rad.
+    /// Lumped: stiffness of the spring between the two parts, replaces that of its source; 6x6,
+    /// N/m, N, N m/rad.
     pub stiffness: Option<Spanned<Vec<Vec<f64>>>>,
-    /// Factors on the six directions of its springs beside that, lumped links; 1 if not given.
+    /// Lumped: additional factors on the six directions of its springs; 1 by default.
     pub stiffness_factors: Option<Spanned<Vec<f64>>>,
-    /// Damping; 3 % modal if not given.
+    /// Damping; 3 % modal damping by default.
     pub damping: Option<Spanned<DampingEntry>>,
     /// `rotation-vector` or `euler-zyx`.
     pub angles: Option<Spanned<String>>,
-    /// `false` drops the coupling terms, only to show what that costs.
+    /// `false` drops the coupling terms, only to show their effect.
     #[serde(default = "yes")]
     pub coupling: bool,
 }
@@ -162,11 +160,11 @@ fn yes() -> bool {
     true
 }
 
-/// One of the ways to damp.
+/// Damping, in one of these forms.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct DampingEntry {
-    /// Ratio to critical, per mode.
+    /// Damping ratio of each mode.
     pub modal: Option<f64>,
     /// `D = beta K` (s).
     pub stiffness_beta: Option<f64>,
@@ -177,7 +175,7 @@ pub(crate) struct DampingEntry {
 /// Reads the text of a robot file.
 ///
 /// # Errors
-/// [`RobotFileError`] with line and column for anything that is not the format.
+/// [`RobotFileError`] with line and column for anything that does not follow the format.
 pub(crate) fn parse_robot_file(text: &str, path: &Path) -> Result<(RobotFile, Source), RobotFileError> {
     let source = Source::new(path, text, "robot");
     let file: RobotFile = parsed(text, &source, OF_ROBOT, |file: &RobotFile| &file.format)?;

@@ -1,10 +1,9 @@
-//! Scenario of a run: motion of the joints, loads, and payloads that the arm picks up and
-//! puts down, how it starts.
+//! Scenario of a run: joint motion, loads, changes of payload, and start condition.
 //!
-//! A scenario is a value and knows no arm: the same one is run with many, and one arm, which does
-//! not change, takes many. A file of loads fills the same values that a program makes, so that both
-//! are checked and act in one way ([`Scenario::acting_on`]). Not here: how a run is stepped and
-//! recorded ([`crate::RunOptions`]).
+//! A scenario is a value independent of any arm: it can be run with many arms, and an arm, which
+//! does not change, runs many scenarios. A loads file fills the same values as a program, so both
+//! are checked and act in the same way ([`Scenario::acting_on`]). Not here: stepping and recording
+//! of a run ([`crate::RunOptions`]).
 
 use std::path::{Path, PathBuf};
 
@@ -22,12 +21,11 @@ use crate::robot::Robot;
 
 /// Motion, loads, changes of payload and start of a run.
 ///
-/// A value that knows no arm: the same scenario is run with many arms, and an arm takes many. A
-/// file of loads fills the same values as a program.
+/// A value independent of any arm: the same scenario is run with many arms, and an arm runs many
+/// scenarios. A loads file fills the same values as a program.
 ///
 /// ```no_run
-/// use flexarm_kinematics::Wrench;
-/// use flexarm_run::{AppliedLoad, Modelling, Motion, PayloadChange, Robot, RunOptions, Scenario};
+/// use flexarm_run::{AppliedLoad, Modelling, Motion, PayloadChange, Robot, RunOptions, Scenario, Wrench};
 ///
 /// let robot = Robot::load("robots/kr210")?;
 /// let motion = Motion::load("trajectories/pick_and_place.toml", &robot)?;
@@ -41,32 +39,32 @@ use crate::robot::Robot;
 /// ```
 #[derive(Clone, Debug)]
 pub struct Scenario {
-    /// Motion of the joints; it gives the duration of the run.
+    /// Motion of the joints; its duration is that of the run.
     pub motion: Motion,
     /// External loads.
     pub loads: Vec<AppliedLoad>,
-    /// Changes of the payload, in any order.
+    /// Changes of payload, in any order.
     pub payloads: Vec<PayloadChange>,
     /// Whether the springs carry the weight at the start.
     pub start: Start,
-    /// File of loads and payloads, for recordings.
+    /// File from which loads and payloads were read, for recordings.
     pub loads_file: Option<PathBuf>,
 }
 
 impl Scenario {
-    /// A motion and nothing else, from the equilibrium.
+    /// Returns a scenario with a motion only, starting from the equilibrium.
     pub fn new(motion: Motion) -> Self {
         Self { motion, loads: Vec::new(), payloads: Vec::new(), start: Start::default(), loads_file: None }
     }
 
-    /// The same with the loads and payloads of a file besides; `docs/loads.md` describes it.
+    /// Adds the loads and payloads of a file; `docs/loads.md` describes the format.
     ///
-    /// What has no end in the file ends with the motion. Whether its frames and links are there
-    /// shows on a robot.
+    /// Loads without an end in the file end with the motion. Frames and links are checked later, on
+    /// a robot.
     ///
     /// # Errors
-    /// [`Error::File`] if it cannot be read, [`Error::RobotFile`] with line and column for what is
-    /// not the format, and for numbers and expressions that make no load.
+    /// [`Error::File`] if the file cannot be read, [`Error::RobotFile`] with line and column for
+    /// format errors and for invalid numbers and expressions.
     pub fn with_loads_file(mut self, path: impl AsRef<Path>) -> Result<Self, Error> {
         let (loads, payloads) = read_loads(path.as_ref(), self.duration_s())?;
         self.loads.extend(loads);
@@ -89,30 +87,30 @@ impl Scenario {
         self
     }
 
-    /// The same from another start.
+    /// Replaces the start condition.
     #[must_use]
     pub fn with_start(self, start: Start) -> Self {
         Self { start, ..self }
     }
 
-    /// When the run ends (s).
+    /// Returns the duration of the run (s).
     pub fn duration_s(&self) -> f64 {
         self.motion.trajectory.duration()
     }
 
-    /// Loads on a model of the robot.
+    /// Returns the loads and payload changes on a model of the robot.
     ///
     /// # Errors
-    /// [`Error::Load`], or [`Error::RobotFile`] with the place if the value was read from a file: a
-    /// load on a frame, or a payload on a link, that the model does not move; a payload whose link
-    /// bends, without a mass or with an inertia that no body has; payloads on two bodies.
+    /// [`Error::Load`], or [`Error::RobotFile`] with the location if the value was read from a
+    /// file: a load on a frame, or a payload on a link, that the model does not move; a payload on
+    /// a flexible link, without a mass or with an unphysical inertia; payloads on two bodies.
     pub fn acting_on(&self, robot: &Robot, model: &Model) -> Result<Disturbances, Error> {
         let duration = self.duration_s();
         let mut acting = Disturbances::default();
         for load in &self.loads {
             acting.loads.push(load.on(model, duration)?);
             acting.caveats.extend(load.doubts.iter().cloned());
-            // A table, samples or an impulse; other loads may go on for as long as they like.
+            // Tables, samples and impulses have a definite end; other loads may continue.
             if load.wrench.jumps.len() > 2 {
                 let last = load.wrench.jumps.iter().fold(0.0, |last: f64, t| last.max(*t));
                 acting.caveats.extend(loads::of_end(last, duration));
@@ -152,14 +150,14 @@ impl From<Motion> for Scenario {
 }
 
 impl From<&Motion> for Scenario {
-    /// As [`Scenario::new`]; the curves of the motion are shared, not copied.
+    /// As [`Scenario::new`]; the trajectory of the motion is shared, not copied.
     fn from(motion: &Motion) -> Self {
         Self::new(motion.clone())
     }
 }
 
 impl From<&Self> for Scenario {
-    /// A copy; the curves of motion and loads are shared.
+    /// Returns a copy; the trajectory and the loads are shared.
     fn from(scenario: &Self) -> Self {
         scenario.clone()
     }
@@ -170,8 +168,9 @@ impl From<&Self> for Scenario {
 pub struct Disturbances {
     /// Loads.
     pub loads: Vec<Load>,
-    /// Changes of what bodies carry, by time.
+    /// Changes of payload on bodies, by time.
     pub changes: Vec<InertiaChange>,
-    /// Adds caveats about loads without effect and about unlikely payloads.
+    /// Caveats about values without effect, and about payloads that are implausibly heavy or far
+    /// away.
     pub caveats: Vec<Caveat>,
 }

@@ -1,5 +1,5 @@
-//! Gains of servos that a robot file leaves out: such as fit the inertia at the start, and how they
-//! follow it.
+//! Default gains of servos: values that suit the inertia at the start, and their derivatives with
+//! respect to changes of the robot.
 
 use flexarm_kinematics::{Data, Model, mass_matrix};
 use flexarm_stepping::{AxisSlope, ServoAxis};
@@ -8,32 +8,33 @@ use nalgebra::DVector;
 use crate::drive_entry::ServoEntry;
 use crate::flexible::FlexibleRobot;
 
-/// Default gain of the position loop (1/s), bandwidth of the speed loop (1/s), integral over speed
-/// gain (1/s), sample (s).
+/// Default gain of the position loop (1/s), bandwidth of the velocity loop (1/s), ratio of integral
+/// to velocity gain (1/s), sampling period (s).
 const SERVO: [f64; 4] = [20.0, 100.0, 20.0, 1e-3];
-/// Maximum default velocity gain, in quick inertia over sampling time: 2 is where
-/// a sampled speed loop becomes unstable.
+/// Maximum default velocity gain relative to the quick inertia divided by the sampling period; a
+/// sampled velocity loop becomes unstable at 2.
 const QUICK_GAIN: f64 = 0.4;
 
-/// Inertia that a joint under a servo feels (kg m² or kg).
+/// Inertia seen by a joint under a servo (kg m² or kg).
 pub(crate) struct Felt {
     /// Inertia of the rigid robot.
     inertia: f64,
-    /// At once, all else yielding.
+    /// High-frequency inertia: with all other free coordinates free to accelerate.
     quick: f64,
 }
 
 impl Felt {
-    /// Gains of position, speed and integral: as given, else such as fit. Which of two rules limits
-    /// them is decided at `rule`.
+    /// Returns the gains of position, velocity and integral: as given, or suitable defaults. `rule`
+    /// decides which of the two rules limits them.
     fn gains(&self, servo: &ServoEntry, sample_s: f64, rule: &Felt) -> [f64; 3] {
         let [position, bandwidth, integral, _] = SERVO;
-        // Between samples a motor feels only the inertia that is rigidly attached: springs deflect.
+        // Between samples a motor only feels the inertia rigidly attached to it, because the
+        // springs deflect.
         let most = |felt: &Felt| QUICK_GAIN * felt.quick / sample_s;
         let yields = bandwidth * rule.inertia > most(rule);
         let fitting = |felt: &Felt| if yields { most(felt) } else { bandwidth * felt.inertia };
         let velocity = |felt: &Felt| servo.velocity_gain.unwrap_or_else(|| fitting(felt));
-        // The outer loops must be slower than the speed loop within them.
+        // The outer loops must be slower than the velocity loop inside them.
         let slower = |felt: &Felt| 0.25 * velocity(felt) / felt.inertia;
         let limited = |gain: f64| servo.velocity_gain.is_none() && gain > slower(rule);
         let inner = |gain: f64| if limited(gain) { slower(self) } else { gain };
@@ -44,20 +45,20 @@ impl Felt {
 }
 
 impl FlexibleRobot {
-    /// Time between two samples of the servos (s).
+    /// Returns the sampling period of the servos (s).
     pub(crate) fn sample_s(&self) -> f64 {
         self.torque.iter().find_map(|(_, servo, _)| servo.sample_s).unwrap_or(SERVO[3])
     }
 
-    /// Inertia of the rigid robot that each joint under a servo moves with the joints at `q`, and
-    /// what it feels at once.
+    /// Returns, for each joint under a servo, the inertia of the rigid robot with the joints at `q`
+    /// and the high-frequency inertia.
     pub(crate) fn inertias_felt(&self, model: &Model, rigid: &Model, q: &DVector<f64>) -> Vec<Felt> {
         let M = mass_matrix(rigid, &mut Data::new(rigid), q).clone();
         let felt = |((k, ..), quick): (&(usize, ServoEntry, f64), f64)| Felt { inertia: M[(*k, *k)], quick };
         self.torque.iter().zip(self.quick_inertia_of(model, q)).map(felt).collect()
     }
 
-    /// Servos of joints that feel these inertias.
+    /// Returns the servos of joints with these inertias.
     pub(crate) fn servo_axes(&self, felt: &[Felt]) -> Vec<ServoAxis> {
         let sample_s = self.sample_s();
         let axis = |((coordinate, servo, limit), felt): (&(usize, ServoEntry, f64), &Felt)| {
@@ -69,18 +70,19 @@ impl FlexibleRobot {
         self.torque.iter().zip(felt).map(axis).collect()
     }
 
-    /// Returns the change of default gains with a change of the robot: `at` gives the tree, the
-    /// rigid robot's, and the joint positions at the start of the motion, for a factor of change;
-    /// about no change, per unit. None where they do not.
+    /// Derivatives of the default gains with respect to a change of the robot, at zero change. `at`
+    /// returns, for a given change, the tree, the tree of the rigid robot, and the joint values at
+    /// the start of the motion. Given gains have zero slope.
     ///
-    /// * `step`: a change that is small.
+    /// * `step`: small change for the finite differences.
     pub fn gain_slopes(&self, step: f64, at: impl Fn(f64) -> (Model, Model, DVector<f64>)) -> Vec<(usize, AxisSlope)> {
         let felt = |x: f64| {
             let (model, rigid, q) = at(x);
             self.inertias_felt(&model, &rigid, &q)
         };
         let here = felt(0.0);
-        // Central differences of fourth order; which of two rules holds is decided once.
+        // Fourth-order central differences; the choice between the two rules is made once, at zero
+        // change.
         let stencil =
             [(-2.0, 1.0), (-1.0, -8.0), (1.0, 8.0), (2.0, -1.0)].map(|(k, c)| (felt(k * step), c / (12.0 * step)));
         let mut slopes = Vec::new();

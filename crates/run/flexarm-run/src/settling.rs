@@ -1,5 +1,5 @@
-//! When the tool has settled, in words: the stop that takes longest counts, and one that does not
-//! settle is the news.
+//! Settling of the TCP in words: the slowest stop counts, and stops without settling are reported
+//! first.
 
 use crate::summary::TcpFigures;
 
@@ -8,18 +8,18 @@ use crate::summary::TcpFigures;
 pub enum Settling {
     /// There is no stop after a move.
     NoStop,
-    /// It dies away at every stop.
+    /// The TCP settles at every stop.
     Settled {
-        /// After the longest of these times (s).
+        /// Maximum settling time (s).
         after_s: f64,
-        /// At that stop, counted from 1; not known for runs of which the stops are not.
+        /// Number of that stop, from 1; None for runs whose stops are not known.
         stop: Option<usize>,
         /// Number of stops.
         of: usize,
     },
-    /// At some stops the tool still is outside the band at the end.
+    /// At some stops the TCP is still outside the band at the end.
     NotSettled {
-        /// These stops, counted from 1, and how long each lasts (s).
+        /// Numbers of these stops, from 1, and the duration of each (s).
         stops: Vec<(usize, f64)>,
         /// Number of stops.
         of: usize,
@@ -44,12 +44,12 @@ impl TcpFigures {
 }
 
 impl Settling {
-    /// The time, if there is one (s).
+    /// Returns the settling time, if there is one (s).
     pub fn time_s(&self) -> Option<f64> {
         if let Self::Settled { after_s, .. } = self { Some(*after_s) } else { None }
     }
 
-    /// Two words for a cell of a table without a number.
+    /// Short text for a table cell without a number.
     pub fn short(&self) -> &'static str {
         match self {
             Self::NoStop => "no stop",
@@ -58,8 +58,7 @@ impl Settling {
         }
     }
 
-    /// Returns the note beside the settling time or in its place; `band` such as "within 0.1 mm" or
-    /// empty.
+    /// Returns a note to accompany or replace the time; `band` such as "within 0.1 mm", or empty.
     pub fn note(&self, band: &str) -> String {
         let band = if band.is_empty() { String::new() } else { format!(", {band}") };
         match self {
@@ -76,7 +75,7 @@ impl Settling {
         }
     }
 
-    /// The whole answer in words.
+    /// Returns the complete result in words.
     pub(crate) fn words(&self, band: &str) -> String {
         match self.time_s() {
             Some(s) => format!("settled after {s:.3} s, {}", self.note(band)),
@@ -85,7 +84,7 @@ impl Settling {
     }
 }
 
-/// A band in words, such as "within 0.1 mm".
+/// Describes a band, such as "within 0.1 mm".
 pub(crate) fn within(band_m: f64) -> String {
     let mm: f64 = format!("{:.2e}", 1e3 * band_m).parse().unwrap_or(1e3 * band_m);
     format!("within {mm} mm")

@@ -1,9 +1,9 @@
-//! The static part of the TCP error: how far the tool would be off if the arm stood still wherever
-//! its motion is.
+//! Static part of the TCP error: the deflection if the arm were at rest at each point of its
+//! motion.
 //!
-//! Drives at their commanded places, springs in balance with weight and with the loads of the
-//! instant, no inertia force. The curve is smooth between the instants at which something jumps: it
-//! is computed on a grid and interpolated by cubics.
+//! The drives are at their commanded positions and the springs in equilibrium with gravity and the
+//! current loads, without inertia forces. The curve is smooth between the times of jumps: it is
+//! computed on a grid and interpolated by cubics.
 
 use std::sync::Arc;
 
@@ -11,35 +11,35 @@ use flexarm_kinematics::Frame;
 use flexarm_stepping::{FlexibleArm, StaticPath};
 use nalgebra::Vector3;
 
-/// Time between two equilibria along a motion (s): a cubic through four of them is good to a
+/// Time between two equilibria along a motion (s); a cubic through four of them is accurate to a
 /// thousandth of a millimetre.
 const GRID_S: f64 = 0.02;
-/// Equilibria per shortest period of a load.
+/// Number of equilibria per shortest period of a load.
 const PER_PERIOD: f64 = 16.0;
-/// Intervals of the grid that are computed at once.
+/// Maximum number of grid intervals that are computed together.
 const MOST_INTERVALS: usize = 64;
 
-/// Follows the static part for times in ascending order.
+/// Evaluates the static part at ascending times.
 pub(crate) struct StaticPart {
     path: StaticPath,
     tcp: Frame,
     /// Times between which the curve is smooth, ascending.
     breaks: Vec<f64>,
-    /// Moves: between them, and without loads, the curve is constant.
+    /// Moves; between them, and without loads, the curve is constant.
     moves: Vec<(f64, f64)>,
-    /// Interval of the logged samples (s), the finest useful grid.
+    /// Sampling interval (s); a finer grid adds nothing.
     sample_s: f64,
     grid_s: f64,
     block: Block,
     failed: bool,
 }
 
-/// A stretch of the grid.
+/// Section of the grid.
 #[derive(Default)]
 struct Block {
     start: f64,
     end: f64,
-    /// At evenly spaced times from start to end; a single one stands for all times.
+    /// Values at equal time intervals from start to end; a single value holds at all times.
     values: Vec<Vector3<f64>>,
 }
 
@@ -70,8 +70,8 @@ impl StaticPart {
         }
     }
 
-    /// Displacement of the tool at `t` (m, world axes), not before the last time asked for; `None`
-    /// where the arm has no equilibrium.
+    /// Returns the TCP displacement at `t` (m, world axes); `t` must not decrease between calls.
+    /// `None` if the arm has no equilibrium.
     pub(crate) fn at(&mut self, t: f64) -> Option<[f64; 3]> {
         while !self.failed && (self.block.values.is_empty() || t >= self.block.end) {
             let start = self.block.end;
@@ -85,7 +85,7 @@ impl StaticPart {
         (!self.failed).then(|| self.block.at(t).into())
     }
 
-    /// The grid from `start` on, at most to `end`.
+    /// Computes the grid from `start`, at most to `end`.
     fn next_block(&mut self, start: f64, end: f64) -> Option<Block> {
         let moving = self.moves.iter().any(|&(from, to)| from < end && start < to);
         if end.is_infinite() || !(moving || self.is_loaded()) {
@@ -94,14 +94,14 @@ impl StaticPart {
         let intervals = ((end - start) / self.grid_s).ceil().max(1.0);
         let (intervals, end) = match intervals > MOST_INTERVALS as f64 {
             true => (MOST_INTERVALS, start + MOST_INTERVALS as f64 * self.grid_s),
-            // A cubic needs three; a grid finer than the samples adds nothing.
+            // A cubic needs three intervals; fewer if the section is shorter than three samples.
             false => ((intervals as usize).max(if end - start > 3.0 * self.sample_s { 3 } else { 1 }), end),
         };
         let mut values = Vec::with_capacity(intervals + 1);
         for k in 0..intervals {
             values.push(self.displacement(start + (end - start) * k as f64 / intervals as f64)?);
         }
-        // An event at the end belongs to the next interval.
+        // A jump at the end belongs to the next section.
         self.path.just_before(end).ok()?;
         values.push(self.path.displacement(&self.tcp));
         Some(Block { start, end, values })
@@ -118,7 +118,7 @@ impl StaticPart {
 }
 
 impl Block {
-    /// The polynomial through the four values around `t`, or as many as there are.
+    /// Evaluates the polynomial through the four values around `t`, or fewer if there are fewer.
     fn at(&self, t: f64) -> Vector3<f64> {
         let intervals = self.values.len() - 1;
         if intervals == 0 {

@@ -1,4 +1,5 @@
-//! Statics at a pose: deflection under weight and a wrench at the TCP, and compliance there.
+//! Statics at a pose: static deflection under gravity and a wrench at the TCP, and the compliance
+//! there.
 
 use std::collections::BTreeMap;
 
@@ -15,47 +16,47 @@ use crate::posed::{Posed, all_finite};
 use crate::robot::Robot;
 use crate::statics_picture::{self, StaticsFiles, StaticsOutputs};
 
-/// Answer of `flexarm statics`. SI units; world axes, at the TCP; six-vectors linear first.
+/// Result of `flexarm statics`. SI units; world axes, at the TCP; six-vectors linear first.
 #[derive(Clone, Debug, Serialize)]
 pub struct Statics {
     /// Name of the robot.
     pub robot: String,
-    /// Joints that are held, in coordinate order.
+    /// Held joints, in coordinate order.
     pub joints: Vec<String>,
     /// Positions at which they are held (rad or m).
     pub at: Vec<f64>,
     /// Link that carries the TCP.
     pub tcp: String,
-    /// Force (N) and moment (N m) on the TCP, besides weight.
+    /// Force (N) and moment (N m) on the TCP, in addition to gravity.
     pub wrench: [f64; 6],
-    /// TCP of the rigid robot (m).
+    /// TCP position of the rigid robot (m).
     pub tcp_position_m: [f64; 3],
-    /// From the rigid TCP to the flexible one, under weight and wrench (m).
+    /// Displacement of the flexible TCP from the rigid one, under gravity and wrench (m).
     pub tcp_displacement_m: [f64; 3],
-    /// The same as a rotation vector (rad).
+    /// Rotation of the flexible TCP from the rigid one, as a rotation vector (rad).
     pub tcp_rotation_rad: [f64; 3],
-    /// The part of weight alone (m).
+    /// Displacement under gravity only (m).
     pub sag_m: [f64; 3],
-    /// The same as a rotation vector (rad).
+    /// Rotation under gravity only, as a rotation vector (rad).
     pub sag_rad: [f64; 3],
-    /// Displacement of the TCP per wrench at the equilibrium, drives locked, 6×6 (m/N, rad/N; m/(N
-    /// m), rad/(N m)).
+    /// Compliance of the TCP at the equilibrium with the drives locked, 6×6 (m/N, rad/N; m/(N m),
+    /// rad/(N m)).
     pub compliance: Vec<Vec<f64>>,
-    /// Forces with which the drives hold the pose (N m or N).
+    /// Torques or forces with which the drives hold the pose (N m or N).
     pub holding_torque: Vec<f64>,
-    /// Torques of motors that move several joints, behind their gears: `Cᵀ` times the holding
-    /// torques of these (N m or N).
+    /// Torques of motors that move several joints, after their gears: `Cᵀ` times the holding
+    /// torques of these joints (N m or N).
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub motor_torque: BTreeMap<String, f64>,
-    /// Flexible elements.
+    /// Elastic elements.
     pub elements: Vec<ElementStatics>,
-    /// Unbalanced force over the largest force.
+    /// Residual force relative to the largest force.
     pub residual: f64,
     /// Written files.
     pub files: StaticsFiles,
     /// Warnings among the caveats, as sentences.
     pub warnings: Vec<String>,
-    /// Doubts about the input and limits of the result.
+    /// Probable errors in the input, and limits of the result's validity.
     pub caveats: Vec<Caveat>,
 }
 
@@ -68,28 +69,28 @@ pub struct ElementStatics {
     pub deflection: Vec<f64>,
     /// Load of its spring (N, N m).
     pub load: Vec<f64>,
-    /// Displacement of the TCP that it causes by itself, to first order (m).
+    /// TCP displacement caused by this element alone, to first order (m).
     pub tcp_displacement_m: [f64; 3],
-    /// Rotation of the TCP that it causes by itself (rad).
+    /// TCP rotation caused by this element alone (rad).
     pub tcp_rotation_rad: [f64; 3],
-    /// Energy in it (J).
+    /// Elastic energy (J).
     pub energy_j: f64,
 }
 
-/// Equilibrium of the flexible robot at a pose under its weight and a wrench at the TCP, drives
-/// locked.
+/// Computes the equilibrium of the flexible robot at a pose under gravity and a wrench at the TCP,
+/// with the drives locked.
 ///
-/// `at`: all actuated joints (rad or m), zero without it; `wrench` in world axes, constant while
-/// the arm deflects.
+/// `at`: values of all actuated joints (rad or m), zero by default; `wrench`: in world axes, not
+/// rotating with the deflection.
 ///
 /// # Errors
-/// [`Error::Pose`] for joint values that do not fit, [`Error::Step`] where there is no equilibrium.
+/// [`Error::Pose`] for joint values that do not fit, [`Error::Step`] if there is no equilibrium.
 pub fn statics(robot: &Robot, modelling: &Modelling, at: Option<&[f64]>, wrench: [f64; 6]) -> Result<Statics, Error> {
     statics_of(robot, modelling, at, wrench, None)
 }
 
-/// As [`statics()`], and writes the answer and a picture of the arm, its deflections magnified
-/// beside the rigid arm.
+/// As [`statics()`], and writes the result and a picture of the arm with magnified deflections next
+/// to the rigid arm.
 ///
 /// # Errors
 /// As [`statics()`]; [`Error::File`] and [`Error::Write`] for files.
@@ -115,7 +116,7 @@ fn statics_of(
 }
 
 impl Arm {
-    /// As [`statics()`], of an arm whose links and drives are in place.
+    /// As [`statics()`], for an arm that is already modelled.
     ///
     /// # Errors
     /// As [`statics()`].
@@ -132,7 +133,7 @@ fn statics_at(
 ) -> Result<Statics, Error> {
     let X_rigid = posed.rigid_tool();
     let loaded = posed.linear(&wrench.into())?;
-    // The figures of a map at this pose, to the last bit.
+    // Identical bit for bit to the figures of a map at this pose.
     let sag = tcp_error(&X_rigid, &posed.operating_point(&[0.0; 6])?.tcp_pose());
     let mut at = posed.operating_point(&wrench)?;
     let displacement = tcp_error(&X_rigid, &at.tcp_pose());
@@ -142,7 +143,8 @@ fn statics_at(
     all_finite("the compliances", &C)?;
     all_finite("the holding torques", &loaded.holding)?;
 
-    // To first order each element's share is its deflection by the Jacobian of the rigid pose.
+    // To first order each element's contribution is its deflection times the Jacobian at the rigid
+    // pose.
     let model = &posed.arm.model;
     let (mut data, state) = posed.undeformed();
     forward_kinematics(model, &mut data, &state.q);
@@ -155,7 +157,7 @@ fn statics_at(
     for ((name, range), energy_j) in loaded.elements.iter().zip(energies) {
         let (first, n) = (range.start, range.len());
         let deflection: DVector<f64> = loaded.equilibrium.rows(first, n).into_owned();
-        // The tangent is not enough for a nonlinear spring.
+        // For a nonlinear spring the tangent stiffness is not sufficient.
         let load = springs.rows(first - loaded.driven, n);
         let moved = J.columns(first - loaded.driven, n) * &deflection;
         elements.push(ElementStatics {

@@ -1,5 +1,5 @@
-//! Statics as files: the arm at its equilibrium beside the rigid one, with the compliance of its
-//! tool, and the figures.
+//! Statics as files: a picture of the arm at its equilibrium next to the rigid one, with the TCP
+//! compliance, and the figures.
 
 use std::path::PathBuf;
 
@@ -25,32 +25,33 @@ const STATICS_FILES: [&str; 2] = ["statics.png", "statics.json"];
 #[cfg(feature = "png")]
 const WIDTH: usize = 2000;
 
-/// Output files of statics.
+/// Output location of statics.
 #[derive(Clone, Debug)]
 pub struct StaticsOutputs {
-    /// Folder; made if it is not there.
+    /// Output folder; created if it does not exist.
     pub folder: PathBuf,
-    /// Overwrite what is there.
+    /// Whether existing files are overwritten.
     pub overwrite: bool,
 }
 
 /// Written files; null where none was written.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct StaticsFiles {
-    /// The arm, deflections magnified beside the rigid one, and the ellipsoid of its compliance.
+    /// Picture of the arm with magnified deflections next to the rigid one, and its compliance
+    /// ellipsoid.
     pub picture: Option<String>,
-    /// This answer.
+    /// This result as JSON.
     pub json: Option<String>,
 }
 
-/// Places of the files, free or to be overwritten.
+/// Returns the paths of the files after checking that they may be written.
 pub(crate) fn places(outputs: &StaticsOutputs) -> Result<[PathBuf; 2], Error> {
     let paths = STATICS_FILES.map(|name| outputs.folder.join(name));
     check_free(&paths, outputs.overwrite)?;
     Ok(paths)
 }
 
-/// Writes the files; a picture that cannot be drawn becomes a warning.
+/// Writes the files; a failed picture gives a warning.
 pub(crate) fn save(
     statics: &mut Statics,
     paths: [PathBuf; 2],
@@ -88,7 +89,7 @@ fn draw(_: &RunHeader, _: &Sample, _: &Statics, _: &[bool]) -> Result<Vec<u8>, S
     Err("this build has no pictures: it was made without the feature png".to_owned())
 }
 
-/// Returns the caption of the picture.
+/// Text lines of the picture.
 #[cfg_attr(not(feature = "png"), allow(dead_code, reason = "only pictures have them"))]
 fn lines(s: &Statics, slides: &[bool]) -> Vec<String> {
     let size = |v: &[f64; 3]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
@@ -109,7 +110,7 @@ fn lines(s: &Statics, slides: &[bool]) -> Vec<String> {
     lines
 }
 
-/// The arm with its springs bent, beside the rigid one.
+/// Sample of the deflected arm next to the rigid one.
 fn scene(robot: &Robot, posed: &Posed, loaded: &Linear) -> (RunHeader, Sample) {
     let model = &posed.arm.model;
     let mut header = robot_header(robot, &posed.arm);

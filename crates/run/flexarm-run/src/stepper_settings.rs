@@ -1,5 +1,5 @@
-//! Settings of a stepper in a summary: keys and values of its entry in the registry, so
-//! that a summary knows no stepper.
+//! Stepper settings in a summary: keys and values as given by the stepper's registry entry, so that
+//! the summary does not depend on any stepper.
 
 use std::fmt;
 
@@ -8,8 +8,7 @@ use serde::de::{IgnoredAny, MapAccess, Visitor};
 use serde::ser::SerializeMap;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// Settings under their keys, in the order of the registry. In JSON they are keys of the object
-/// around them.
+/// Settings by key, in the order of the registry. In JSON they are keys of the enclosing object.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct StepperSettings(pub Vec<(String, SettingValue)>);
 
@@ -17,11 +16,11 @@ pub struct StepperSettings(pub Vec<(String, SettingValue)>);
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum SettingValue {
-    /// On or off.
+    /// Boolean.
     Flag(bool),
-    /// A number.
+    /// Number.
     Number(f64),
-    /// One of several words.
+    /// One of several names.
     Word(String),
 }
 
@@ -36,7 +35,7 @@ impl fmt::Display for SettingValue {
 }
 
 impl StepperSettings {
-    /// Settings of the stepper.
+    /// Returns the settings of a stepper.
     pub(crate) fn of(stepper: &StepperKind) -> Self {
         let value = |setting| match setting {
             StepperSetting::Flag(on) => SettingValue::Flag(on),
@@ -46,13 +45,13 @@ impl StepperSettings {
         Self(stepper.settings().into_iter().map(|(key, setting)| (key.to_owned(), value(setting))).collect())
     }
 
-    /// The setting of that key, if the stepper has it.
+    /// Returns the setting with this key, if the stepper has it.
     pub fn get(&self, key: &str) -> Option<&SettingValue> {
         self.0.iter().find(|(own, _)| own == key).map(|(_, value)| value)
     }
 }
 
-/// The keys of all steppers, each stepper's in its order.
+/// Returns the keys of all steppers, each in the order of its stepper.
 fn known_keys() -> Vec<&'static str> {
     let options = StepperOptions::default();
     STEPPERS.iter().flat_map(|entry| (entry.with)(&options).settings()).map(|(key, _)| key).collect()
@@ -72,7 +71,7 @@ impl<'de> Deserialize<'de> for StepperSettings {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         struct Settings;
 
-        /// A key of another kind belongs to a file of another version.
+        /// Values of other types come from files of other versions.
         #[derive(Deserialize)]
         #[serde(untagged)]
         enum Known {
@@ -94,7 +93,7 @@ impl<'de> Deserialize<'de> for StepperSettings {
                         settings.push((key, value));
                     }
                 }
-                // A reader of JSON may give the keys in another order.
+                // A JSON reader may return the keys in another order.
                 let order = known_keys();
                 settings.sort_by_key(|(key, _)| order.iter().position(|known| known == key).unwrap_or(order.len()));
                 Ok(StepperSettings(settings))
@@ -118,7 +117,7 @@ mod tests {
         serde_json::to_string(&StepperFigures::new(&options, counts)).expect("plain values")
     }
 
-    /// Truth: the keys as summaries of version 0.1 have them, in their order.
+    /// Truth: keys and order in summaries of version 0.1.
     #[test]
     fn summaries_keep_their_keys() {
         let with = |settings: &str, name: &str| {
@@ -139,8 +138,8 @@ mod tests {
         }
     }
 
-    /// A summary of every stepper is read back as it was written; additional keys of a later
-    /// version are ignored.
+    /// Summaries of every stepper are read back as written; additions of later versions are
+    /// ignored.
     #[test]
     fn summaries_of_every_stepper_are_read_back() {
         for entry in flexarm_stepping::STEPPERS {

@@ -1,4 +1,4 @@
-//! Several runs compared: robots, link models, steppers or trajectories side by side, in one
+//! Comparison of several runs: robots, link models, steppers or trajectories side by side, in one
 //! recording and one report.
 
 use std::collections::BTreeSet;
@@ -20,21 +20,21 @@ use flexarm_settings::written::{markdown, markdown_row};
 /// One run of a study.
 #[derive(Debug)]
 pub struct Variant {
-    /// Name in tables, plots and folders.
+    /// Label in tables, plots and folder names.
     pub label: String,
-    /// Its robot.
+    /// Robot of the run.
     pub robot: Robot,
     /// Scenario of the run.
     pub scenario: Scenario,
-    /// Its choices.
+    /// Options of the run.
     pub options: RunOptions,
 }
 
-/// Runs all variants, the first being the one the others are compared with.
+/// Runs all variants and compares them with the first.
 ///
-/// The first run's files are those of [`Arm::simulate_with`](crate::Arm::simulate_with); each of
-/// the others has a folder of its own below. All together are in `study.rrd` and in the report. The
-/// answer is the first run's summary with the others in [`Summary::with`].
+/// The first run's files are those of [`Arm::simulate_with`](crate::Arm::simulate_with); each other
+/// run has its own subfolder. `study.rrd` and the report contain all runs. Returns the first run's
+/// summary, with the others in [`Summary::with`], and the traces.
 ///
 /// # Errors
 /// As [`Arm::simulate_with`](crate::Arm::simulate_with), with the label of the run that failed;
@@ -55,7 +55,7 @@ pub fn compare_study(
     let own_outputs = |number: usize| {
         outputs.map(|outputs| match number {
             0 => outputs.clone(),
-            // The viewer gets all of them in one recording.
+            // The viewer gets all runs in one recording.
             _ => Outputs { folder: outputs.folder.join(&folders[number]), ..outputs.clone() }
                 .without(RecordingFormat::Rrd),
         })
@@ -64,7 +64,8 @@ pub fn compare_study(
         let label: &String = &variants[number].label;
         move |error: Error| Error::InStudy { label: label.clone(), source: Box::new(error) }
     };
-    // All inputs are checked before the first run starts.
+    // All checks that need no simulation come first, so that errors appear before minutes of
+    // running.
     let (mut expected, mut arms) = (Expected::default(), Vec::new());
     for (number, variant) in variants.iter().enumerate() {
         let arm = variant.robot.flexible(variant.options.modelling).map_err(named(number))?;
@@ -80,7 +81,8 @@ pub fn compare_study(
         if number > 0 {
             options = RunOptions { magnification: main.options.magnification, ..variant.options.clone() };
         }
-        // All arms are magnified and coloured alike, or they could not be compared by eye.
+        // All arms have the same magnification and colour scale, so that they can be compared by
+        // eye.
         let request = RunRequest {
             outputs: own.as_ref(),
             progress: Some(&mut |t: f64, _: f64| progress(before + t, total)),
@@ -108,10 +110,11 @@ pub fn compare_study(
     Ok((summary, traces))
 }
 
-/// Maximum length of the name of a run's folder (characters).
+/// Maximum length of a run's folder name.
 const LONGEST_NAME: usize = 100;
 
-/// Names of the runs' folders: the labels, with letters that every file system takes.
+/// Returns the names of the runs' folders: the labels, restricted to characters that every file
+/// system accepts.
 fn folders(variants: &[Variant]) -> Result<Vec<String>, StudyError> {
     let mut taken = BTreeSet::new();
     let mut names = Vec::new();
@@ -136,19 +139,19 @@ fn folders(variants: &[Variant]) -> Result<Vec<String>, StudyError> {
     Ok(names)
 }
 
-/// Whether two runs are of one robot: of one name and with the same joints, or with their rigid
-/// tools in the same places. Differences between other runs say nothing.
+/// Whether two runs are of one robot: the same name and joints, or rigid TCPs at the same
+/// positions. Differences between other runs are meaningless.
 pub(crate) fn of_one_robot(first: &Trace, other: &Trace) -> bool {
     let (a, b) = (&first.header, &other.header);
     let one_name = a.robot == b.robot || a.robot.is_empty() || b.robot.is_empty();
     (one_name && a.joints == b.joints) || on_one_motion(first, other)
 }
 
-/// Returns the distance of the TCP of a run from that of the first run, at the times of the first;
-/// `None` for motions of other lengths and for other robots.
+/// Distance of a run's TCP from that of the first run, at the first run's times; `None` for motions
+/// of different duration and for other robots.
 ///
-/// On one motion the places of the rigid tools are the same, so the errors are compared: they are
-/// small, and so is what is lost between the samples. Otherwise the places are.
+/// On the same motion the rigid TCPs coincide, so the errors are compared: they are small, and so
+/// is the interpolation error between samples. Otherwise the positions are compared.
 pub(crate) fn difference(first: &Trace, other: &Trace) -> Option<DifferenceFigures> {
     if !of_one_robot(first, other) {
         return None;
@@ -186,7 +189,7 @@ pub(crate) fn difference(first: &Trace, other: &Trace) -> Option<DifferenceFigur
     })
 }
 
-/// Whether the rigid tools are at the same places at the times that both runs have.
+/// Whether the rigid TCPs are at the same positions at the common times of both runs.
 fn on_one_motion(first: &Trace, other: &Trace) -> bool {
     if !(first.header.has_rigid && other.header.has_rigid) {
         return false;
@@ -204,18 +207,18 @@ fn on_one_motion(first: &Trace, other: &Trace) -> bool {
         }
         common += 1;
     }
-    // The start alone is common to many motions.
+    // Many motions have the start in common.
     common > 1 || first.header.trajectory == other.header.trajectory
 }
 
-/// Times nearer than this are one (s).
+/// Tolerance for equal times (s).
 const SAME_TIME: f64 = 1e-10;
-/// Places nearer than this are one (m): those of rigid tools that differ by rounding, and by the
-/// time of a sample.
+/// Tolerance for equal positions (m): rigid TCPs that differ by round-off, including that of the
+/// sample times.
 const SAME_PLACE: f64 = 1e-9;
 
-/// Values at `t` between the samples k and k + 1: a cubic with the slopes of the chords across
-/// their neighbours.
+/// Interpolates at `t` between the samples k and k + 1: a cubic whose slopes are those of the
+/// chords between the neighbours.
 fn between(rows: &[TraceRow], values: &[[f64; 3]], k: usize, t: f64) -> [f64; 3] {
     let last = rows.len() - 1;
     let next = (k + 1).min(last);
@@ -231,14 +234,13 @@ fn between(rows: &[TraceRow], values: &[[f64; 3]], k: usize, t: f64) -> [f64; 3]
     std::array::from_fn(|c| {
         let (p, q) = (values[k][c], values[next][c]);
         let (m, n) = (span * slope(k, c), span * slope(next, c));
-        // Written so that the samples themselves are met exactly.
+        // This form reproduces the samples exactly.
         let bend = (m - (q - p)) * (1.0 - x) - (n - (q - p)) * x;
         p + x * (q - p) + x * (1.0 - x) * bend
     })
 }
 
-/// Returns the runs of a study side by side: a header, then a row for each run. Empty for a single
-/// run.
+/// Table of the runs of a study: a header, then one row per run. Empty for a single run.
 pub fn study_rows(summary: &Summary) -> Vec<Vec<String>> {
     if summary.with.is_empty() {
         return Vec::new();
@@ -286,7 +288,7 @@ pub fn study_rows(summary: &Summary) -> Vec<Vec<String>> {
     rows
 }
 
-/// Meaning of the columns of [`study_rows`].
+/// Explanation of the columns of [`study_rows`] that need one.
 pub const STUDY_NOTE: &str = "static: static deflection at the pose of the peak; dynamic: maximum of the rest; settling: at the stop that takes \
      longest; apart: maximum distance of the flexible TCP from that of the first run at the same time, also over the \
      first run's peak TCP error; not given between different robots";
@@ -296,11 +298,11 @@ fn study_markdown(summary: &Summary) -> String {
     format!("# Study of {}\n\n", markdown(&summary.robot)) + &table(summary)
 }
 
-/// The runs side by side as a Markdown table.
+/// Table of the runs in Markdown.
 pub(crate) fn table(summary: &Summary) -> String {
     let mut page = String::new();
     for (k, row) in study_rows(summary).iter().enumerate() {
-        // Times of this machine stay out of recordings.
+        // Recordings contain no timings of this machine.
         let cells = &row[..row.len() - 1];
         page += &markdown_row(cells);
         if k == 0 {
@@ -315,7 +317,7 @@ pub(crate) fn table(summary: &Summary) -> String {
     page + "\n"
 }
 
-/// The recording of all runs, if this build and the outputs have one.
+/// Recording of all runs, if this build and the outputs include one.
 struct StudyRecording {
     #[cfg(feature = "rerun")]
     study: Option<(PathBuf, flexarm_log::RrdStudy)>,

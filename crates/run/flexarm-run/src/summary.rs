@@ -14,28 +14,28 @@ use crate::options::RunOptions;
 use crate::settling::within;
 use crate::stepper_settings::StepperSettings;
 
-/// Answer of `flexarm compare` and `flexarm run`. SI units.
+/// Result of `flexarm compare` and `flexarm run`. SI units.
 ///
-/// `summary.json` is read back by `serde_json`; keys that a file of an older version lacks are
+/// `summary.json` can be read back with `serde_json`; keys missing in files of older versions take
 /// their defaults.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Summary {
-    /// Peak TCP error and its causes in one sentence; empty if unknown.
+    /// TCP error and its main causes in one sentence; empty if they are not known.
     pub headline: String,
     /// Name of the robot.
     pub robot: String,
     /// Name of the trajectory.
     pub trajectory: String,
-    /// rigid, lumped, modal or mixed.
+    /// `rigid`, `lumped`, `modal` or `mixed`.
     pub links_model: String,
-    /// Flexible elements; empty if the robot is rigid.
+    /// Elastic parts of the robot; none if it is rigid.
     pub bends: Bending,
-    /// "complete", or why the run stopped early.
+    /// `complete`, or the reason why the run stopped early.
     pub end: String,
     /// Simulated time (s).
     pub duration_s: f64,
-    /// Stepper with its work.
+    /// Stepper and its work.
     pub stepper: StepperFigures,
     /// Wall-clock time of the run, recordings included (s).
     pub wall_s: f64,
@@ -59,19 +59,19 @@ pub struct Summary {
     pub elastic_drives: Vec<DriveFigures>,
     /// Energy balance.
     pub energy: EnergyFigures,
-    /// Maximum force of each drive (N m or N).
+    /// Maximum torque or force of each drive (N m or N).
     pub drives: BTreeMap<String, f64>,
-    /// Maximum torque of each motor that moves several joints, behind its gear (N m or N), by the
+    /// Maximum torque of each motor that moves several joints, after its gear (N m or N), by the
     /// joint of its drive.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub motors: BTreeMap<String, f64>,
     /// Warnings among [`Summary::caveats`], as sentences.
     pub warnings: Vec<String>,
-    /// Doubts about the input and limits of the result.
+    /// Probable errors in the input, and limits of the result's validity.
     pub caveats: Vec<Caveat>,
     /// Written files.
     pub files: Files,
-    /// Name of the run in a study.
+    /// Label of the run in a study.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub label: Option<String>,
     /// Distance of its TCP from that of the first run of a study.
@@ -80,14 +80,14 @@ pub struct Summary {
     /// The other runs of a study.
     #[serde(skip_serializing_if = "Vec::is_empty", default)]
     pub with: Vec<Summary>,
-    /// Beginning and end of each move (s).
+    /// Start and end of each move (s).
     pub moves_s: Vec<[f64; 2]>,
-    /// Maximum TCP error in each of [`CURVE_PIECES`] equal pieces of the run (m), for
-    /// the terminal.
+    /// Maximum TCP error in each of [`CURVE_PIECES`] equal pieces of the run (m), for the terminal.
     #[serde(skip)]
     pub error_curve: Vec<f64>,
-    /// Computed from curves alone: nothing is known of energies, forces, frequencies, the stepper's
-    /// work and the end of the run, and of moves only what [`Summary::moves_s`] says.
+    /// Whether the summary was computed from curves only: energies, forces, frequencies, the
+    /// stepper's work and the end of the run are then unknown, and of the moves only
+    /// [`Summary::moves_s`] is known.
     #[serde(skip)]
     pub computed: bool,
 }
@@ -99,39 +99,38 @@ pub struct Files {
     /// Recordings.
     #[serde(flatten)]
     pub recordings: RecordingFiles,
-    /// Report: a page for the browser, with plots and pictures.
+    /// Report: an HTML page with plots and pictures.
     pub report: Option<String>,
     /// Rerun recording of all runs of a study.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub study: Option<String>,
-    /// The figures of the report as Markdown.
+    /// Figures of the report as Markdown.
     pub report_md: Option<String>,
     /// Folder with figures for papers.
     pub figures: Option<String>,
-    /// Layout with which Foxglove opens the MCAP recording.
+    /// Foxglove layout for the MCAP recording.
     pub foxglove_layout: Option<String>,
-    /// The same for PlotJuggler.
+    /// PlotJuggler layout for the MCAP recording.
     pub plotjuggler_layout: Option<String>,
 }
 
-/// Names of the recordings of a run, by format. In JSON a key for each: the ending of the format's
-/// files.
+/// Names of the recordings of a run, by format. In JSON each has the file extension of its format
+/// as key.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct RecordingFiles(BTreeMap<RecordingFormat, String>);
 
-/// Formats whose key is in every summary, null where none was written; others are there where they
-/// were written.
+/// Formats with a key in every summary, null if not written; other formats appear only if written.
 const ALWAYS_TOLD: [RecordingFormat; 4] =
     [RecordingFormat::Mcap, RecordingFormat::Rrd, RecordingFormat::Csv, RecordingFormat::Parquet];
 
 impl RecordingFiles {
-    /// The recording of this format.
+    /// Returns the recording of this format.
     #[must_use]
     pub fn get(&self, format: RecordingFormat) -> Option<&str> {
         self.0.get(&format).map(String::as_str)
     }
 
-    /// All that there are, in the order of the formats.
+    /// Returns all recordings, in the order of the formats.
     pub fn iter(&self) -> impl Iterator<Item = (RecordingFormat, &str)> {
         self.0.iter().map(|(format, file)| (*format, file.as_str()))
     }
@@ -151,7 +150,7 @@ impl Serialize for RecordingFiles {
 }
 
 impl<'de> Deserialize<'de> for RecordingFiles {
-    /// Passes over keys that are no formats, among them those of the other files.
+    /// Ignores keys that are not formats, such as those of other files.
     fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let keys = BTreeMap::<String, serde_json::Value>::deserialize(deserializer)?;
         let file = |format: RecordingFormat| Some((format, keys.get(format.extension())?.as_str()?.to_owned()));
@@ -163,19 +162,19 @@ impl<'de> Deserialize<'de> for RecordingFiles {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct StepperFigures {
-    /// Word of the command line.
+    /// Name on the command line.
     pub name: String,
-    /// Step (s).
+    /// Step size (s).
     pub h_s: f64,
-    /// Settings of its own, each under its key: `rho_inf`, `dispersion_correction`
+    /// Settings of the stepper, each under its key: `rho_inf`, `dispersion_correction`
     /// (generalised-alpha), `form`, `preset` (SPOOK), `rtol`, `method` (reference).
     #[serde(flatten)]
     pub settings: StepperSettings,
-    /// Steps taken.
+    /// Number of steps.
     pub steps: u64,
-    /// Evaluations of the equations of motion.
+    /// Number of evaluations of the equations of motion.
     pub evaluations: u64,
-    /// Factorisations.
+    /// Number of factorisations.
     pub factorisations: u64,
 }
 
@@ -188,56 +187,56 @@ impl StepperFigures {
     }
 }
 
-/// A flexible link's share.
+/// Figures of a flexible link.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct LinkFigures {
     /// Name of the link.
     pub name: String,
-    /// Maximum TCP displacement caused by its deflection (m).
+    /// Maximum TCP displacement caused by its deflection alone (m).
     pub peak_contribution_m: f64,
-    /// Maximum change of the distance between its interfaces over that distance.
+    /// Maximum change of the distance between its interfaces, relative to that distance.
     pub engineering_strain: f64,
     /// Maximum elastic rotation (rad).
     pub peak_rotation_rad: f64,
 }
 
-/// An elastic drive's share.
+/// Figures of an elastic drive.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct DriveFigures {
     /// Name of the joint.
     pub joint: String,
-    /// Maximum TCP displacement caused by its deflection (m).
+    /// Maximum TCP displacement caused by its deflection alone (m).
     pub peak_contribution_m: f64,
     /// Maximum deflection between motor and link (rad or m).
     pub peak_deflection_rad: f64,
 }
 
-/// Energy over the run, from the logged samples (trapezoidal rule: a low log rate shows as
+/// Energy balance of the run, from the logged samples (trapezoidal rule: a low log rate causes an
 /// imbalance).
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct EnergyFigures {
-    /// Net work of the drives: [`EnergyFigures::drives_positive_j`] without
+    /// Net work of the drives: [`EnergyFigures::drives_positive_j`] minus
     /// [`EnergyFigures::drives_negative_j`] (J).
     pub drives_j: f64,
-    /// Positive work of the drives: sum over the drives of the work at positive power (J).
+    /// Work of each drive while its power is positive, summed (J).
     pub drives_positive_j: f64,
-    /// Negative work of the drives, as a positive number (J).
+    /// Work absorbed by each drive while its power is negative, summed, as a positive number (J).
     pub drives_negative_j: f64,
     /// Work of the external loads (J).
     pub loads_j: f64,
-    /// Taken away by dampers and friction (J).
+    /// Energy dissipated by dampers and friction (J).
     pub dissipated_j: f64,
-    /// The part of it that the hysteresis of gears took (J).
+    /// Part of the dissipated energy due to gear hysteresis (J).
     #[serde(skip_serializing_if = "is_zero")]
     pub hysteresis_j: f64,
-    /// Came with payloads that were picked, went with those that were dropped (J).
+    /// Energy added with payloads picked up, less that removed with payloads dropped (J).
     pub payload_j: f64,
-    /// Gain of kinetic, gravitational and elastic energy (J).
+    /// Increase of kinetic, gravitational and elastic energy (J).
     pub stored_j: f64,
-    /// Maximum imbalance over the maximum energy in the balance.
+    /// Maximum error of the balance relative to the largest energy in it.
     pub imbalance: f64,
 }
 
@@ -245,17 +244,17 @@ fn is_zero(x: &f64) -> bool {
     *x == 0.0
 }
 
-/// One run's flexible tool centre point against another's.
+/// Distance of one run's flexible TCP from another's.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct DifferenceFigures {
     /// Maximum distance (m).
     pub peak_m: f64,
-    /// When (s).
+    /// Time of the maximum (s).
     pub t_peak_s: f64,
     /// Root mean square of the distance (m).
     pub rms_m: f64,
-    /// Maximum distance over the first run's peak TCP error.
+    /// Maximum distance relative to the first run's maximum TCP error.
     pub of_peak_error: Option<f64>,
 }
 
@@ -265,70 +264,70 @@ pub struct DifferenceFigures {
 pub struct TcpFigures {
     /// Maximum distance (m).
     pub peak_m: f64,
-    /// When (s).
+    /// Time of the maximum (s).
     pub t_peak_s: f64,
     /// Root mean square of the distance (m).
     pub rms_m: f64,
     /// Distance at the end (m).
     pub end_m: f64,
-    /// Distance at rest at the start (m).
+    /// Static deflection at the start (m).
     pub static_sag_m: f64,
-    /// Static part of `peak_m`: deflection of the arm at rest in that pose, under weight and the
-    /// loads of the instant, along the direction of the error (m); null where the arm has no
-    /// equilibrium on the motion.
+    /// Static part of `peak_m`, along the direction of the error (m): deflection at rest in that
+    /// pose under gravity and the loads at that time; null if the arm has no equilibrium somewhere
+    /// on its path.
     pub static_at_peak_m: Option<f64>,
-    /// The rest of `peak_m`, from inertia and ringing (m); negative where the motion relieves the
-    /// arm.
+    /// Dynamic part of `peak_m`, from inertia and vibration (m); negative where the motion unloads
+    /// the arm.
     pub dynamic_at_peak_m: Option<f64>,
     /// Maximum static part (m).
     pub static_peak_m: Option<f64>,
     /// Maximum dynamic part: error minus static part (m).
     pub dynamic_peak_m: Option<f64>,
-    /// When (s).
+    /// Time of the maximum dynamic part (s).
     pub t_dynamic_peak_s: Option<f64>,
     /// Root mean square of the dynamic part (m).
     pub dynamic_rms_m: Option<f64>,
-    /// Contributions to the peak error along its direction, in the order of the recordings.
+    /// Contributions to the maximum error along its direction, in the order of the recordings.
     pub shares_at_peak: Vec<ShareFigures>,
-    /// Maximum angle (rad).
+    /// Maximum rotation error (rad).
     pub peak_rad: f64,
-    /// Root mean square of the angle (rad).
+    /// Root mean square of the rotation error (rad).
     pub rms_rad: f64,
-    /// Time from the end of a move until the error stays within the band of its final value (s), at
-    /// the stop that takes longest; null if the tool does not settle at some stop.
+    /// Settling time (s): time from the end of a move until the error stays within the band around
+    /// its final value, at the slowest stop; null if the TCP does not settle at some stop.
     pub settling_s: Option<f64>,
-    /// The same in words: after which time, or at which stops the tool has not settled.
+    /// Settling in words: the settling time, or the stops at which the TCP has not settled.
     pub settling: String,
-    /// Half width of the band (m).
+    /// Half width of the settling band (m).
     pub settling_band_m: Option<f64>,
-    /// Maximum excursion past the final value after a move (m).
+    /// Maximum overshoot beyond the final value after a move (m).
     pub overshoot_m: f64,
-    /// Strongest frequency of the error (Hz).
+    /// Dominant frequency of the error (Hz).
     pub dominant_hz: Option<f64>,
     /// Maximum components along, across and out of the path (m).
     pub path_peak_m: [f64; 3],
-    /// Maximum distance from the path while the robot moves (m): across and out of the path
-    /// together.
+    /// Maximum distance from the path while the robot moves (m), combining the components across
+    /// and out of the path.
     pub path_accuracy_m: f64,
-    /// Root mean square of that distance over the moves (m).
+    /// Root mean square of the distance from the path over the moves (m).
     pub path_rms_m: f64,
-    /// Settling at each stop.
+    /// Figures of each stop.
     pub holds: Vec<HoldFigures>,
-    /// Poses at which the tool stops more than once.
+    /// Poses at which the TCP stops more than once.
     pub poses: Vec<PoseFigures>,
 }
 
-/// Accuracy and repeatability at a pose, in the sense of ISO 9283.
+/// Accuracy and repeatability at a pose, as defined in ISO 9283.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct PoseFigures {
-    /// Place of the rigid tool, world axes (m).
+    /// TCP position of the rigid robot, world axes (m).
     pub place_m: [f64; 3],
     /// Number of stops there.
     pub visits: usize,
-    /// Distance of the mean place at the end of the stops from the rigid tool's (m): AP.
+    /// Distance of the mean position at the end of the stops from the rigid robot's (m): AP.
     pub accuracy_m: f64,
-    /// Mean distance of the places from their mean and three standard deviations (m): RP.
+    /// Mean distance of the positions from their mean plus three standard deviations (m): RP.
     pub repeatability_m: f64,
 }
 
@@ -339,22 +338,22 @@ impl From<&RepeatedPose> for PoseFigures {
     }
 }
 
-/// A stop: from the end of a move to the beginning of the next one or the end of the run.
+/// A stop: from the end of a move to the start of the next one, or to the end of the run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct HoldFigures {
-    /// Beginning (s).
+    /// Start (s).
     pub start_s: f64,
     /// End (s).
     pub end_s: f64,
-    /// Distance at which the tool comes to rest (m).
+    /// Error when the TCP comes to rest (m).
     pub final_m: f64,
-    /// Time from the beginning of the stop until the error stays within the band of its final value
+    /// Time from the start of the stop until the error stays within the band around its final value
     /// (s).
     pub settling_s: Option<f64>,
-    /// Maximum excursion past the final value (m).
+    /// Maximum overshoot beyond the final value (m).
     pub overshoot_m: f64,
-    /// Strongest frequency (Hz).
+    /// Dominant frequency (Hz).
     pub ringing_hz: Option<f64>,
 }
 
@@ -395,16 +394,16 @@ impl From<&TcpMetrics> for TcpFigures {
 }
 
 impl TcpFigures {
-    /// With the words for settling into a band (m).
+    /// Adds the text about settling into a band (m).
     pub(crate) fn with_band(mut self, band_m: f64) -> Self {
         self.settling = self.settling_state().words(&within(band_m));
         self.settling_band_m = Some(band_m);
         self
     }
 
-    /// Why there is no dominant frequency.
+    /// Reason why there is no dominant frequency.
     pub(crate) fn no_line(&self) -> &'static str {
-        /// Less than this is rounding (m).
+        /// Errors below this are round-off (m).
         const NOTHING_M: f64 = 1e-9;
         match self.dynamic_peak_m.unwrap_or(self.peak_m) < NOTHING_M {
             true => "nothing oscillates",
@@ -412,7 +411,7 @@ impl TcpFigures {
         }
     }
 
-    /// With static and dynamic part.
+    /// Adds static and dynamic part.
     pub(crate) fn with_parts(self, parts: &ErrorParts) -> Self {
         Self {
             static_at_peak_m: Some(parts.static_at_peak_m),
@@ -427,12 +426,12 @@ impl TcpFigures {
 }
 
 impl Summary {
-    /// Whether figures about moves and stops mean something.
+    /// Whether figures about moves and stops are available.
     pub(crate) fn knows_moves(&self) -> bool {
         !self.computed || !self.moves_s.is_empty()
     }
 
-    /// Label and value pairs for recordings.
+    /// Pairs of label and value for recordings.
     pub fn labelled(&self) -> Vec<(String, String)> {
         let mut rows = vec![
             ("robot".to_owned(), self.robot.clone()),
@@ -472,10 +471,10 @@ impl Summary {
     }
 }
 
-/// Pieces of [`Summary::error_curve`], fewer for a run of fewer samples.
+/// Number of pieces of [`Summary::error_curve`]; fewer if the run has fewer samples.
 pub const CURVE_PIECES: usize = 240;
 
-/// Returns the maximum error in each of [`CURVE_PIECES`] equal pieces of the run (m).
+/// Maximum error in each of [`CURVE_PIECES`] equal pieces of the run (m).
 pub(crate) fn thinned(times: &[f64], errors: &[[f64; 6]]) -> Vec<f64> {
     let pieces = CURVE_PIECES.min(times.len());
     (0..pieces)

@@ -1,4 +1,5 @@
-//! TOML files of this program: each begins with `format = 1`; errors have their place.
+//! Reading of flexarm's own TOML files: each begins with `format = 1`, and errors name their
+//! location.
 
 use flexarm_files::Source;
 use serde::de::DeserializeOwned;
@@ -7,13 +8,13 @@ use toml::Spanned;
 use crate::ranges::{Ranges, not_finite, outside};
 use crate::robot_file::RobotFileError;
 
-/// The content of a file.
+/// Reads the content of a file.
 ///
 /// * `ranges`: of its numbers.
-/// * `format`: where its version stands.
+/// * `format`: accessor of the format version.
 ///
 /// # Errors
-/// [`RobotFileError`] with line and column for anything that is not the format.
+/// [`RobotFileError`] with line and column for anything that does not follow the format.
 pub fn parsed<T: DeserializeOwned>(
     text: &str,
     source: &Source,
@@ -36,7 +37,8 @@ pub fn parsed<T: DeserializeOwned>(
         let message = format!("format is {found}, this program reads format 1: change it or update flexarm");
         return Err(source.error(version.span(), message));
     }
-    // Files with ranges of their own say for each key what it is; the others are only read here.
+    // Readers of files with ranges reject non-finite numbers key by key; for others it is done
+    // here.
     let unknown = if ranges.is_empty() { not_finite(text) } else { None };
     match outside(text, ranges).or(unknown) {
         Some((span, message)) => Err(source.error(span, message)),

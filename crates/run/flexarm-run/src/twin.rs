@@ -1,4 +1,4 @@
-//! The rigid twin: the same robot on the same motion with every elastic coordinate held at zero.
+//! The rigid twin: the same robot on the same motion with all elastic coordinates held at zero.
 
 use std::sync::Arc;
 
@@ -20,11 +20,11 @@ pub(crate) struct RigidTwin {
     pub(crate) velocity: Vector3<f64>,
     /// Acceleration of the TCP (m/s²).
     pub(crate) acceleration: Vector3<f64>,
-    /// Model and state of the poses and velocities in [`Self::data`] and [`Self::J`]; `None` after
-    /// other functions used them.
+    /// Model and state to which [`Self::data`] and [`Self::J`] belong; `None` if other functions
+    /// used them last.
     placed: Option<(Arc<Model>, State)>,
-    /// All comes from it, if the tree is for it, with the inertias of this model; made at the first
-    /// look.
+    /// Observer that computes all quantities in one pass, if it supports the tree, and the model
+    /// whose inertias it has; created at first use.
     observer: Option<(Arc<Model>, Option<Lent<Observer>>)>,
 }
 
@@ -43,8 +43,8 @@ impl RigidTwin {
         }
     }
 
-    /// Velocity and acceleration of the TCP at time t; zero, and nothing computed, while all joints
-    /// stand still.
+    /// Velocity and acceleration of the TCP at time t; zero, without any computation, while all
+    /// joints are at rest.
     pub(crate) fn rates(&mut self, arm: &FlexibleArm, tcp: &Frame, t: f64) -> [Vector3<f64>; 2] {
         arm.prescribed_state(t, &mut self.state, &mut self.qddot);
         if self.state.qdot.iter().all(|rate| *rate == 0.0) {
@@ -54,8 +54,8 @@ impl RigidTwin {
         [self.velocity, self.acceleration]
     }
 
-    /// Computes poses and velocities at time t, by the sums of [`RigidTwin::update`];
-    /// neither forces nor acceleration. While the joints rest it is what it was.
+    /// Computes poses and velocities at time t with the same operations as [`RigidTwin::update`],
+    /// but neither forces nor accelerations. Does nothing while the joints are at rest.
     pub(crate) fn place(&mut self, arm: &FlexibleArm, tcp: &Frame, t: f64) {
         arm.prescribed_state(t, &mut self.state, &mut self.qddot);
         if let Some((model, state)) = &mut self.placed {
@@ -76,7 +76,7 @@ impl RigidTwin {
         self.velocity = frame_twist(&self.data, tcp).linear;
     }
 
-    /// Everything at time t; `data.tau` holds the torques that the drives must supply.
+    /// Computes everything at time t; `data.tau` holds the torques that the drives must supply.
     pub(crate) fn update(&mut self, arm: &FlexibleArm, tcp: &Frame, t: f64) {
         self.placed = None;
         let model = &arm.model;
@@ -88,20 +88,20 @@ impl RigidTwin {
         world_poses(model, &mut self.data);
         frame_jacobian(model, &self.data, tcp, &mut self.J);
         self.velocity = frame_twist(&self.data, tcp).linear;
-        // Acceleration of the point: spatial acceleration + w × v, gravity taken out again.
+        // Acceleration of the point: spatial acceleration plus ω × v, without the gravity term.
         let V = self.data.V[tcp.body].at_child(&tcp.X_BF);
         let A = self.data.A[tcp.body].at_child(&tcp.X_BF);
         let R = self.data.X_WB[tcp.body].rotation * tcp.X_BF.rotation;
         self.acceleration = R * (A.linear + V.angular.cross(&V.linear)) + model.gravity;
     }
 
-    /// Poses in the world, Jacobian and velocity of the tool, with forces its acceleration as well,
-    /// from one pass; false where the tree is not for it.
+    /// Computes world poses, Jacobian and TCP velocity in one pass, and with forces also the TCP
+    /// acceleration; returns false if the observer does not support the tree.
     fn look(&mut self, arm: &FlexibleArm, tcp: &Frame, with_forces: bool) -> bool {
         let (model, data) = (&arm.model, &mut *self.data);
         let Self { state, qddot, observer, .. } = self;
         let (weighed, observer) = observer.get_or_insert_with(|| {
-            // What the Jacobian needs of springs, which stay as they are.
+            // Initialises the spring data that the Jacobian needs; they do not change.
             forward_kinematics(model, data, &state.q);
             (model.clone(), if tcp.body > 0 { arm.lend_observer() } else { None })
         });

@@ -131,25 +131,25 @@ class _Bending(TypedDict):
 
 
 class Bending(_Bending, total=False):
-    """Flexible elements of a run."""
+    """Elastic parts of a robot in a run."""
 
     mounting: str | None
-    """Mounting of the base, if elastic."""
+    """Name of the elastic mounting, if there is one."""
 
 
 class _StepperFigures(TypedDict):
     """What is always there."""
 
     name: str
-    """Word of the command line."""
+    """Name on the command line."""
     h_s: float
-    """Step (s)."""
+    """Step size (s)."""
     steps: int
-    """Steps taken."""
+    """Number of steps."""
     evaluations: int
-    """Evaluations of the equations of motion."""
+    """Number of evaluations of the equations of motion."""
     factorisations: int
-    """Factorisations."""
+    """Number of factorisations."""
 
 
 class StepperFigures(_StepperFigures, total=False):
@@ -170,44 +170,44 @@ class StepperFigures(_StepperFigures, total=False):
 
 
 class ShareFigures(TypedDict):
-    """Share of one link, one gearbox, the servos or the stepper in the peak TCP error."""
+    """Contribution of one link, gearbox, the servos or the stepper to the maximum TCP error."""
 
     name: str
     """Name of the link or joint."""
     kind: str
-    """link, gearbox, servo, mounting or stepper."""
+    """`link`, `gearbox`, `servo`, `mounting` or `stepper`."""
     along_m: float
-    """Part of the error along its direction (m): all shares together make the error."""
+    """Contribution along the direction of the error (m); all contributions add up to the error."""
 
 
 class HoldFigures(TypedDict):
-    """A stop: from the end of a move to the beginning of the next one or the end of the run."""
+    """A stop: from the end of a move to the start of the next one, or to the end of the run."""
 
     start_s: float
-    """Beginning (s)."""
+    """Start (s)."""
     end_s: float
     """End (s)."""
     final_m: float
-    """Distance at which the tool comes to rest (m)."""
+    """Error when the TCP comes to rest (m)."""
     settling_s: float | None
-    """Time from the beginning of the stop until the error stays within the band of its final value (s)."""
+    """Time from the start of the stop until the error stays within the band around its final value (s)."""
     overshoot_m: float
-    """Maximum excursion past the final value (m)."""
+    """Maximum overshoot beyond the final value (m)."""
     ringing_hz: float | None
-    """Strongest frequency (Hz)."""
+    """Dominant frequency (Hz)."""
 
 
 class PoseFigures(TypedDict):
-    """Accuracy and repeatability at a pose, in the sense of ISO 9283."""
+    """Accuracy and repeatability at a pose, as defined in ISO 9283."""
 
     place_m: list[float]
-    """Place of the rigid tool, world axes (m)."""
+    """TCP position of the rigid robot, world axes (m)."""
     visits: int
     """Number of stops there."""
     accuracy_m: float
-    """Distance of the mean place at the end of the stops from the rigid tool's (m): AP."""
+    """Distance of the mean position at the end of the stops from the rigid robot's (m): AP."""
     repeatability_m: float
-    """Mean distance of the places from their mean and three standard deviations (m): RP."""
+    """Mean distance of the positions from their mean plus three standard deviations (m): RP."""
 
 
 class TcpFigures(TypedDict):
@@ -216,113 +216,113 @@ class TcpFigures(TypedDict):
     peak_m: float
     """Maximum distance (m)."""
     t_peak_s: float
-    """When (s)."""
+    """Time of the maximum (s)."""
     rms_m: float
     """Root mean square of the distance (m)."""
     end_m: float
     """Distance at the end (m)."""
     static_sag_m: float
-    """Distance at rest at the start (m)."""
+    """Static deflection at the start (m)."""
     static_at_peak_m: float | None
-    """Static part of `peak_m`: deflection of the arm at rest in that pose, under weight and the loads of the instant, along the direction of the error (m); null where the arm has no equilibrium on the motion."""
+    """Static part of `peak_m`, along the direction of the error (m): deflection at rest in that pose under gravity and the loads at that time; null if the arm has no equilibrium somewhere on its path."""
     dynamic_at_peak_m: float | None
-    """The rest of `peak_m`, from inertia and ringing (m); negative where the motion relieves the arm."""
+    """Dynamic part of `peak_m`, from inertia and vibration (m); negative where the motion unloads the arm."""
     static_peak_m: float | None
     """Maximum static part (m)."""
     dynamic_peak_m: float | None
     """Maximum dynamic part: error minus static part (m)."""
     t_dynamic_peak_s: float | None
-    """When (s)."""
+    """Time of the maximum dynamic part (s)."""
     dynamic_rms_m: float | None
     """Root mean square of the dynamic part (m)."""
     shares_at_peak: list[ShareFigures]
-    """Contributions to the peak error along its direction, in the order of the recordings."""
+    """Contributions to the maximum error along its direction, in the order of the recordings."""
     peak_rad: float
-    """Maximum angle (rad)."""
+    """Maximum rotation error (rad)."""
     rms_rad: float
-    """Root mean square of the angle (rad)."""
+    """Root mean square of the rotation error (rad)."""
     settling_s: float | None
-    """Time from the end of a move until the error stays within the band of its final value (s), at the stop that takes longest; null if the tool does not settle at some stop."""
+    """Settling time (s): time from the end of a move until the error stays within the band around its final value, at the slowest stop; null if the TCP does not settle at some stop."""
     settling: str
-    """The same in words: after which time, or at which stops the tool has not settled."""
+    """Settling in words: the settling time, or the stops at which the TCP has not settled."""
     settling_band_m: float | None
-    """Half width of the band (m)."""
+    """Half width of the settling band (m)."""
     overshoot_m: float
-    """Maximum excursion past the final value after a move (m)."""
+    """Maximum overshoot beyond the final value after a move (m)."""
     dominant_hz: float | None
-    """Strongest frequency of the error (Hz)."""
+    """Dominant frequency of the error (Hz)."""
     path_peak_m: list[float]
     """Maximum components along, across and out of the path (m)."""
     path_accuracy_m: float
-    """Maximum distance from the path while the robot moves (m): across and out of the path together."""
+    """Maximum distance from the path while the robot moves (m), combining the components across and out of the path."""
     path_rms_m: float
-    """Root mean square of that distance over the moves (m)."""
+    """Root mean square of the distance from the path over the moves (m)."""
     holds: list[HoldFigures]
-    """Settling at each stop."""
+    """Figures of each stop."""
     poses: list[PoseFigures]
-    """Poses at which the tool stops more than once."""
+    """Poses at which the TCP stops more than once."""
 
 
 class PathMoveFigures(TypedDict):
-    """One move of the tool."""
+    """Figures of one TCP move."""
 
     line: int
-    """Line of the program or file."""
+    """Line number in the program or file."""
     statement: str
-    """What stands there."""
+    """Statement in that line."""
     span_s: list[float]
-    """First and last moment (s)."""
+    """Start and end time (s)."""
     across_peak_m: float
-    """Largest distance from the path (m)."""
+    """Maximum distance from the path (m)."""
     across_rms_m: float
-    """Root mean square of it (m)."""
+    """Root mean square of the distance (m)."""
     corner_overshoot_m: float
-    """Swing along the direction of the move before, beyond the static deflection (m)."""
+    """Overshoot along the direction of the previous move, beyond the static deflection (m)."""
     programmed_m_s: float | None
     """Programmed speed (m/s)."""
     top_m_s: float | None
-    """Greatest speed (m/s)."""
+    """Maximum speed (m/s)."""
 
 
 class PathFigures(TypedDict):
-    """What a motion along a path of the tool has of errors across it."""
+    """Errors across the path of a motion given as a TCP path."""
 
     across_peak_m: float
-    """Largest distance from the path on moves of the tool (m), and when (s)."""
+    """Maximum distance from the path on TCP moves (m)."""
     t_across_peak_s: float
-    """See there."""
+    """Time of this maximum (s)."""
     across_rms_m: float
-    """Root mean square of that distance over the samples of those moves (m)."""
+    """Root mean square of the distance over the samples of those moves (m)."""
     offset_m: list[float]
-    """Middle of the box that the error stays in on those moves: by how much a workpiece would be moved (m, world axes)."""
+    """Centre of the bounding box of the error on those moves: offset by which a workpiece would be moved (m, world axes)."""
     left_m: float
-    """What is left then, at most (m): half the diagonal of the box."""
+    """Bound on the error that remains after the offset (m): half the diagonal of the box."""
     corner_overshoot_m: float
-    """How far the tool swings on behind a corner, beyond its static deflection (m); 0 without a corner."""
+    """Overshoot after a corner, beyond the static deflection (m); 0 without a corner."""
     moves: list[PathMoveFigures]
-    """Move by move, those of the tool alone."""
+    """Figures of each TCP move."""
 
 
 class LinkFigures(TypedDict):
-    """A flexible link's share."""
+    """Figures of a flexible link."""
 
     name: str
     """Name of the link."""
     peak_contribution_m: float
-    """Maximum TCP displacement caused by its deflection (m)."""
+    """Maximum TCP displacement caused by its deflection alone (m)."""
     engineering_strain: float
-    """Maximum change of the distance between its interfaces over that distance."""
+    """Maximum change of the distance between its interfaces, relative to that distance."""
     peak_rotation_rad: float
     """Maximum elastic rotation (rad)."""
 
 
 class DriveFigures(TypedDict):
-    """An elastic drive's share."""
+    """Figures of an elastic drive."""
 
     joint: str
     """Name of the joint."""
     peak_contribution_m: float
-    """Maximum TCP displacement caused by its deflection (m)."""
+    """Maximum TCP displacement caused by its deflection alone (m)."""
     peak_deflection_rad: float
     """Maximum deflection between motor and link (rad or m)."""
 
@@ -331,28 +331,28 @@ class _EnergyFigures(TypedDict):
     """What is always there."""
 
     drives_j: float
-    """Net work of the drives: EnergyFigures::drives_positive_j without EnergyFigures::drives_negative_j (J)."""
+    """Net work of the drives: EnergyFigures::drives_positive_j minus EnergyFigures::drives_negative_j (J)."""
     drives_positive_j: float
-    """Positive work of the drives: sum over the drives of the work at positive power (J)."""
+    """Work of each drive while its power is positive, summed (J)."""
     drives_negative_j: float
-    """Negative work of the drives, as a positive number (J)."""
+    """Work absorbed by each drive while its power is negative, summed, as a positive number (J)."""
     loads_j: float
     """Work of the external loads (J)."""
     dissipated_j: float
-    """Taken away by dampers and friction (J)."""
+    """Energy dissipated by dampers and friction (J)."""
     payload_j: float
-    """Came with payloads that were picked, went with those that were dropped (J)."""
+    """Energy added with payloads picked up, less that removed with payloads dropped (J)."""
     stored_j: float
-    """Gain of kinetic, gravitational and elastic energy (J)."""
+    """Increase of kinetic, gravitational and elastic energy (J)."""
     imbalance: float
-    """Maximum imbalance over the maximum energy in the balance."""
+    """Maximum error of the balance relative to the largest energy in it."""
 
 
 class EnergyFigures(_EnergyFigures, total=False):
-    """Energy over the run, from the logged samples (trapezoidal rule: a low log rate shows as imbalance)."""
+    """Energy balance of the run, from the logged samples (trapezoidal rule: a low log rate causes an imbalance)."""
 
     hysteresis_j: float
-    """The part of it that the hysteresis of gears took (J)."""
+    """Part of the dissipated energy due to gear hysteresis (J)."""
 
 
 class CaveatDict(TypedDict):
@@ -390,15 +390,15 @@ class _RunFiles(TypedDict):
     parquet: str | None
     """Recording (parquet), if it was written."""
     report: str | None
-    """Report: a page for the browser, with plots and pictures."""
+    """Report: an HTML page with plots and pictures."""
     report_md: str | None
-    """The figures of the report as Markdown."""
+    """Figures of the report as Markdown."""
     figures: str | None
     """Folder with figures for papers."""
     foxglove_layout: str | None
-    """Layout with which Foxglove opens the MCAP recording."""
+    """Foxglove layout for the MCAP recording."""
     plotjuggler_layout: str | None
-    """The same for PlotJuggler."""
+    """PlotJuggler layout for the MCAP recording."""
 
 
 class RunFiles(_RunFiles, total=False):
@@ -411,16 +411,16 @@ class RunFiles(_RunFiles, total=False):
 
 
 class DifferenceFigures(TypedDict):
-    """One run's flexible tool centre point against another's."""
+    """Distance of one run's flexible TCP from another's."""
 
     peak_m: float
     """Maximum distance (m)."""
     t_peak_s: float
-    """When (s)."""
+    """Time of the maximum (s)."""
     rms_m: float
     """Root mean square of the distance (m)."""
     of_peak_error: float | None
-    """Maximum distance over the first run's peak TCP error."""
+    """Maximum distance relative to the first run's maximum TCP error."""
 
 
 _RunSummaryWith = TypedDict("_RunSummaryWith", {"with": "list[RunSummary]"}, total=False)
@@ -430,21 +430,21 @@ class _RunSummary(_RunSummaryWith):
     """What is always there."""
 
     headline: str
-    """Peak TCP error and its causes in one sentence; empty if unknown."""
+    """TCP error and its main causes in one sentence; empty if they are not known."""
     robot: str
     """Name of the robot."""
     trajectory: str
     """Name of the trajectory."""
     links_model: str
-    """rigid, lumped, modal or mixed."""
+    """`rigid`, `lumped`, `modal` or `mixed`."""
     bends: Bending
-    """Flexible elements; empty if the robot is rigid."""
+    """Elastic parts of the robot; none if it is rigid."""
     end: str
-    """"complete", or why the run stopped early."""
+    """`complete`, or the reason why the run stopped early."""
     duration_s: float
     """Simulated time (s)."""
     stepper: StepperFigures
-    """Stepper with its work."""
+    """Stepper and its work."""
     wall_s: float
     """Wall-clock time of the run, recordings included (s)."""
     real_time_factor: float
@@ -464,26 +464,26 @@ class _RunSummary(_RunSummaryWith):
     energy: EnergyFigures
     """Energy balance."""
     drives: dict[str, float]
-    """Maximum force of each drive (N m or N)."""
+    """Maximum torque or force of each drive (N m or N)."""
     warnings: list[str]
     """Warnings among Summary::caveats, as sentences."""
     caveats: list[CaveatDict]
-    """Doubts about the input and limits of the result."""
+    """Probable errors in the input, and limits of the result's validity."""
     files: RunFiles
     """Written files."""
     moves_s: list[list[float]]
-    """Beginning and end of each move (s)."""
+    """Start and end of each move (s)."""
 
 
 class RunSummary(_RunSummary, total=False):
-    """Answer of `flexarm compare` and `flexarm run`. SI units.  `summary.json` is read back by `serde_json`; keys that a file of an older version lacks are their defaults."""
+    """Result of `flexarm compare` and `flexarm run`. SI units.  `summary.json` can be read back with `serde_json`; keys missing in files of older versions take their defaults."""
 
     path: PathFigures | None
     """Error across the path; absent unless the motion is given as a TCP path."""
     motors: dict[str, float]
-    """Maximum torque of each motor that moves several joints, behind its gear (N m or N), by the joint of its drive."""
+    """Maximum torque of each motor that moves several joints, after its gear (N m or N), by the joint of its drive."""
     label: str | None
-    """Name of the run in a study."""
+    """Label of the run in a study."""
     difference: DifferenceFigures | None
     """Distance of its TCP from that of the first run of a study."""
 
@@ -498,20 +498,20 @@ class ElementStatics(TypedDict):
     load: list[float]
     """Load of its spring (N, N m)."""
     tcp_displacement_m: list[float]
-    """Displacement of the TCP that it causes by itself, to first order (m)."""
+    """TCP displacement caused by this element alone, to first order (m)."""
     tcp_rotation_rad: list[float]
-    """Rotation of the TCP that it causes by itself (rad)."""
+    """TCP rotation caused by this element alone (rad)."""
     energy_j: float
-    """Energy in it (J)."""
+    """Elastic energy (J)."""
 
 
 class StaticsFiles(TypedDict):
     """Written files; null where none was written."""
 
     picture: str | None
-    """The arm, deflections magnified beside the rigid one, and the ellipsoid of its compliance."""
+    """Picture of the arm with magnified deflections next to the rigid one, and its compliance ellipsoid."""
     json: str | None
-    """This answer."""
+    """This result as JSON."""
 
 
 class _StaticsDetails(TypedDict):
@@ -520,63 +520,63 @@ class _StaticsDetails(TypedDict):
     robot: str
     """Name of the robot."""
     joints: list[str]
-    """Joints that are held, in coordinate order."""
+    """Held joints, in coordinate order."""
     at: list[float]
     """Positions at which they are held (rad or m)."""
     tcp: str
     """Link that carries the TCP."""
     wrench: list[float]
-    """Force (N) and moment (N m) on the TCP, besides weight."""
+    """Force (N) and moment (N m) on the TCP, in addition to gravity."""
     tcp_position_m: list[float]
-    """TCP of the rigid robot (m)."""
+    """TCP position of the rigid robot (m)."""
     tcp_displacement_m: list[float]
-    """From the rigid TCP to the flexible one, under weight and wrench (m)."""
+    """Displacement of the flexible TCP from the rigid one, under gravity and wrench (m)."""
     tcp_rotation_rad: list[float]
-    """The same as a rotation vector (rad)."""
+    """Rotation of the flexible TCP from the rigid one, as a rotation vector (rad)."""
     sag_m: list[float]
-    """The part of weight alone (m)."""
+    """Displacement under gravity only (m)."""
     sag_rad: list[float]
-    """The same as a rotation vector (rad)."""
+    """Rotation under gravity only, as a rotation vector (rad)."""
     compliance: list[list[float]]
-    """Displacement of the TCP per wrench at the equilibrium, drives locked, 6×6 (m/N, rad/N; m/(N m), rad/(N m))."""
+    """Compliance of the TCP at the equilibrium with the drives locked, 6×6 (m/N, rad/N; m/(N m), rad/(N m))."""
     holding_torque: list[float]
-    """Forces with which the drives hold the pose (N m or N)."""
+    """Torques or forces with which the drives hold the pose (N m or N)."""
     elements: list[ElementStatics]
-    """Flexible elements."""
+    """Elastic elements."""
     residual: float
-    """Unbalanced force over the largest force."""
+    """Residual force relative to the largest force."""
     files: StaticsFiles
     """Written files."""
     warnings: list[str]
     """Warnings among the caveats, as sentences."""
     caveats: list[CaveatDict]
-    """Doubts about the input and limits of the result."""
+    """Probable errors in the input, and limits of the result's validity."""
 
 
 class StaticsDetails(_StaticsDetails, total=False):
-    """Answer of `flexarm statics`. SI units; world axes, at the TCP; six-vectors linear first."""
+    """Result of `flexarm statics`. SI units; world axes, at the TCP; six-vectors linear first."""
 
     motor_torque: dict[str, float]
-    """Torques of motors that move several joints, behind their gears: `Cᵀ` times the holding torques of these (N m or N)."""
+    """Torques of motors that move several joints, after their gears: `Cᵀ` times the holding torques of these joints (N m or N)."""
 
 
 class ModeFigures(TypedDict):
-    """One mode."""
+    """Figures of one mode."""
 
     frequency_hz: float
     """Natural frequency (Hz)."""
     damped_frequency_hz: float
-    """Frequency of the decaying oscillation (Hz)."""
+    """Damped frequency (Hz)."""
     damping_ratio: float
     """Damping ratio."""
     tcp: list[float]
-    """Motion of the TCP in the mode scaled to unit modal mass (1/sqrt(kg), rad/sqrt(kg m²) ...), real part."""
+    """TCP motion in the mode at unit modal mass (1/sqrt(kg), rad/sqrt(kg m²) ...), real part."""
     tcp_imaginary: list[float]
-    """Imaginary part; zero where the damping is proportional."""
+    """Imaginary part; zero for proportional damping."""
     effective_mass: list[float | None]
-    """Mass (kg) at the TCP, moment of inertia (kg m²) for rotations, that moves like the mode; null at a node."""
+    """Effective mass at the TCP (kg), or moment of inertia for rotations (kg m²); null at a node."""
     compliance_share: list[float | None]
-    """Part of the static compliance of the TCP in each direction that this mode carries; null where it is rigid."""
+    """Fraction of the static compliance of the TCP carried by this mode, per direction; null where the compliance is zero."""
     strain_energy: list[float]
     """Share of each element in the strain energy."""
     residual: float
@@ -584,22 +584,22 @@ class ModeFigures(TypedDict):
 
 
 class ModesSummary(TypedDict):
-    """Answer of `flexarm modes`. SI units; world axes, at the TCP; six-vectors linear first."""
+    """Result of `flexarm modes`. SI units; world axes, at the TCP; six-vectors linear first."""
 
     robot: str
     """Name of the robot."""
     joints: list[str]
-    """Joints that are locked, in coordinate order."""
+    """Locked joints, in coordinate order."""
     at: list[float]
     """Positions at which they are locked (rad or m)."""
     driven: list[str]
-    """Joints that are not locked but under a servo, which counts as spring and damper here."""
+    """Joints under a servo instead of locked; the servo acts as spring and damper here."""
     tcp: str
     """Link that carries the TCP."""
     frequencies_hz: list[float]
     """Natural frequencies `|λ| / 2π` (Hz), ascending."""
     undamped_frequencies_hz: list[float]
-    """Frequencies without the dampers (Hz), ascending, as many."""
+    """Undamped frequencies (Hz), ascending, the same number."""
     damping_ratio: list[float]
     """Damping ratios `-Re λ / |λ|`."""
     elements: list[str]
@@ -607,15 +607,15 @@ class ModesSummary(TypedDict):
     modes: list[ModeFigures]
     """One entry per mode."""
     total: int
-    """Number of modes; `modes` may have fewer."""
+    """Total number of modes; `modes` may contain fewer."""
     compliance_covered: list[float | None]
-    """Parts of the static compliance that the modes above carry, per direction of the TCP; null where it is rigid."""
+    """Fraction of the static compliance covered by the listed modes, per TCP direction; null where the compliance is zero."""
     files: RunFiles
     """Written files."""
     warnings: list[str]
     """Warnings among the caveats, as sentences."""
     caveats: list[CaveatDict]
-    """Doubts about the input and limits of the result."""
+    """Probable errors in the input, and limits of the result's validity."""
 
 
 class PeakFigures(TypedDict):
@@ -626,26 +626,26 @@ class PeakFigures(TypedDict):
     magnitude: float
     """Magnitude."""
     phase_rad: float
-    """Phase there (rad)."""
+    """Phase (rad)."""
 
 
 class ResponseCurve(TypedDict):
     """Response of one output to one input."""
 
     input: str
-    """Word of the input."""
+    """Name of the input."""
     output: str
-    """Word of the output."""
+    """Name of the output."""
     unit: str
     """Unit of the magnitude."""
     at_rest: float | None
-    """Response at rest, with its sign; null where it is infinite."""
+    """Static response, signed; null where it is infinite."""
     peaks: list[PeakFigures]
-    """Resonances within the frequencies, the highest first."""
+    """Resonances within the frequency range, the highest first."""
     magnitude: list[float]
-    """Amplitude of the output per amplitude of the input, one per frequency."""
+    """Amplitude ratio of output to input, one per frequency."""
     phase_rad: list[float]
-    """Phase lead of the output (rad), one per frequency, unwrapped: steps of more than half a turn are removed."""
+    """Phase lead of the output over the input (rad), one per frequency; unwrapped."""
 
 
 class ResponseFiles(TypedDict):
@@ -654,40 +654,40 @@ class ResponseFiles(TypedDict):
     csv: str | None
     """Table."""
     plot: str | None
-    """Magnitude and phase as a picture."""
+    """Plot of magnitude and phase."""
     json: str | None
-    """This answer."""
+    """This result as JSON."""
 
 
 class ResponseSummary(TypedDict):
-    """Answer of `flexarm response`. SI units."""
+    """Result of `flexarm response`. SI units."""
 
     robot: str
     """Name of the robot."""
     joints: list[str]
     """Joints, in coordinate order."""
     at: list[float]
-    """Positions at which they are held, or about which they move (rad or m)."""
+    """Positions at which the joints are held, or about which they move (rad or m)."""
     tcp: str
     """Link that carries the TCP."""
     quantity: str
-    """displacement, velocity or acceleration."""
+    """`displacement`, `velocity` or `acceleration`."""
     frequencies_hz: list[float]
-    """Natural frequencies of the modes (Hz), all."""
+    """Natural frequencies of all modes (Hz)."""
     damping_ratio: list[float]
-    """Their damping ratios."""
+    """Damping ratios of the modes."""
     frequency_hz: list[float]
     """Frequencies of the curves (Hz)."""
     logarithmic: bool
-    """Whether they are spaced by equal ratios."""
+    """Whether the frequencies are logarithmically spaced."""
     curves: list[ResponseCurve]
-    """One per input and output."""
+    """One curve per pair of input and output."""
     files: ResponseFiles
     """Written files."""
     warnings: list[str]
     """Warnings among the caveats, as sentences."""
     caveats: list[CaveatDict]
-    """Doubts about the input and limits of the result."""
+    """Probable errors in the input, and limits of the result's validity."""
 
 
 class GridFigures(TypedDict):
@@ -827,22 +827,22 @@ class JointChange(TypedDict):
 
 
 class MotionViolation(TypedDict):
-    """A limit that is passed."""
+    """An exceeded limit."""
 
     joint: str
-    """Joint."""
+    """Joint name."""
     kind: str
-    """lower, upper, velocity, jerk or effort."""
+    """`lower`, `upper`, `velocity`, `acceleration`, `jerk` or `effort`."""
     time_s: float
-    """When it is worst (s)."""
+    """Time of the largest excess (s)."""
     since_s: float
-    """When it is passed first (s)."""
+    """Time at which the limit is first exceeded (s)."""
     value: float
-    """The worst value."""
+    """Value at the largest excess."""
     limit: float
-    """The limit."""
+    """Limit."""
     message: str
-    """All of it in one sentence."""
+    """The violation as a sentence."""
 
 
 class ShapedModeFigures(TypedDict):
@@ -2022,15 +2022,15 @@ class JointInfo(TypedDict):
     name: str
     """Name."""
     type: str
-    """revolute, continuous, prismatic."""
+    """`revolute`, `continuous` or `prismatic`."""
     lower: float | None
-    """Lowest position (rad or m)."""
+    """Minimum position (rad or m)."""
     upper: float | None
-    """Highest position (rad or m)."""
+    """Maximum position (rad or m)."""
     velocity: float | None
-    """Highest speed."""
+    """Maximum speed (rad/s or m/s)."""
     effort: float | None
-    """Highest force."""
+    """Maximum torque or force (N m or N)."""
 
 
 class LinkInfo(TypedDict):
@@ -2039,7 +2039,7 @@ class LinkInfo(TypedDict):
     name: str
     """Name."""
     mass_kg: float
-    """Mass (kg); 0 for a mere frame."""
+    """Mass (kg); 0 for a frame without inertia."""
     com_m: list[float]
     """Centre of mass in link axes (m)."""
     inertia: list[float]
@@ -2052,15 +2052,15 @@ class _FlexibleInfo(TypedDict):
     name: str
     """Name."""
     method: str
-    """Source of its stiffness."""
+    """Method by which its stiffness was obtained."""
     length_m: float
-    """Distance of the interfaces (m)."""
+    """Distance between the interfaces (m)."""
     parts_kg: list[float]
-    """Masses of the two parts (kg)."""
+    """Masses of the rigid parts (kg)."""
     stiffness: list[list[float]]
     """Stiffness at the split, 6×6, linear first."""
     model: str
-    """lumped or modal."""
+    """`lumped` or `modal`."""
     coordinates: int
     """Number of elastic coordinates."""
 
@@ -2069,7 +2069,7 @@ class FlexibleInfo(_FlexibleInfo, total=False):
     """A flexible link."""
 
     modal_frequencies_hz: list[float] | None
-    """All natural frequencies of a modal link with A held (Hz)."""
+    """Natural frequencies of a modal link with interface A held, all of them (Hz)."""
 
 
 class MountingInfo(TypedDict):
@@ -2078,22 +2078,22 @@ class MountingInfo(TypedDict):
     name: str
     """Name."""
     position_m: list[float]
-    """Position of the springs in the base link (m)."""
+    """Position in the base link (m)."""
     quaternion_wxyz: list[float]
-    """Their axes in the base link, w first."""
+    """Orientation in the base link, w first."""
     stiffness: list[list[float]]
-    """Stiffness in their axes, 6×6, linear first."""
+    """Stiffness in the axes of the springs, 6×6, linear first."""
     mass_kg: float
-    """Mass on the springs in addition to the base (kg)."""
+    """Mass carried in addition to the base (kg)."""
 
 
 class CouplingInfo(TypedDict):
-    """Motors that move several joints."""
+    """Coupling of motors that move several joints."""
 
     joints: list[str]
-    """The joints."""
+    """Coupled joints."""
     matrix: list[list[float]]
-    """C of `q_joints = C q_motors`, motors behind their gears."""
+    """Matrix C of `q_joints = C q_motors`, with motor angles after their gears."""
 
 
 class TcpInfo(TypedDict):
@@ -2104,7 +2104,7 @@ class TcpInfo(TypedDict):
     position_m: list[float]
     """Position (m)."""
     quaternion_wxyz: list[float]
-    """Attitude, w first."""
+    """Orientation, w first."""
 
 
 class BalancerInfo(TypedDict):
@@ -2115,13 +2115,13 @@ class BalancerInfo(TypedDict):
     type: str
     """`line` or `joint`."""
     length: float
-    """Length of a line (m), or value of the joint (rad or m)."""
+    """Length of the line (m), or value of the joint (rad or m)."""
     tension: float
-    """Tension: what draws the ends together, or the joint to lower values (N; N m or N)."""
+    """Tension, which pulls the ends together or the joint to lower values (N; N m or N)."""
     stiffness: float
-    """Its derivative by the length (N/m; N m/rad)."""
+    """Derivative of the tension with respect to the length (N/m; N m/rad)."""
     torque: list[float]
-    """Torque or force on each joint (N m or N), in coordinate order."""
+    """Generalised force on each joint (N m or N), in coordinate order."""
 
 
 class DependentInfo(TypedDict):
@@ -2130,13 +2130,13 @@ class DependentInfo(TypedDict):
     name: str
     """Name."""
     type: str
-    """revolute, continuous, prismatic."""
+    """`revolute`, `continuous` or `prismatic`."""
     lower: float | None
-    """Lowest position (rad or m)."""
+    """Minimum position (rad or m)."""
     upper: float | None
-    """Highest position (rad or m)."""
+    """Maximum position (rad or m)."""
     q: float
-    """Its position (rad or m)."""
+    """Position (rad or m)."""
 
 
 class LoopInfo(TypedDict):
@@ -2145,11 +2145,11 @@ class LoopInfo(TypedDict):
     name: str
     """Name."""
     dependent: list[DependentInfo]
-    """The joints that follow from it."""
+    """Dependent joints."""
     transmission_angle: float
-    """Transmission angle (rad, at most a right angle)."""
+    """Transmission angle (rad, at most π/2)."""
     smallest_transmission_angle: float | None
-    """The smallest one in poses spread over the joint ranges, without those that limits of dependent joints exclude."""
+    """Minimum transmission angle over poses spread over the joint ranges, except those excluded by limits of dependent joints."""
 
 
 class _Inspection(TypedDict):
@@ -2166,66 +2166,66 @@ class _Inspection(TypedDict):
     tcp: TcpInfo
     """Tool centre point at the pose."""
     q: list[float]
-    """Pose asked for, in the order of `joints`."""
+    """Requested pose, in the order of `joints`."""
     velocity: list[float]
-    """Velocity asked for."""
+    """Requested joint velocities."""
     jacobian: list[list[float]]
-    """6 rows × one column per joint."""
+    """Jacobian: 6 rows, one column per joint."""
     mass_matrix: list[list[float]]
     """Mass matrix of the rigid robot with its payload."""
     gravity_torque: list[float]
-    """Forces that hold the pose, against gravity and balancers."""
+    """Joint torques or forces that hold the pose, against gravity and balancers."""
     bias: list[float]
-    """`τ = M q̈ + bias`: gravity with centrifugal and Coriolis forces."""
+    """Bias torques in `τ = M q̈ + bias`: gravity, centrifugal and Coriolis forces."""
     coriolis: list[float]
-    """`bias - gravity_torque`."""
+    """Centrifugal and Coriolis torques: `bias - gravity_torque`."""
     mass_kg: float
-    """Total mass (kg), payload and base included."""
+    """Total mass (kg), including payload and base."""
     warnings: list[str]
     """Warnings among the caveats, as sentences."""
     caveats: list[CaveatDict]
-    """Doubts about the input."""
+    """Probable errors in the input."""
 
 
 class Inspection(_Inspection, total=False):
-    """Answer of `flexarm inspect`. SI units; the Jacobian's rows are linear first, world axes, at the TCP."""
+    """Result of `flexarm inspect`. SI units; Jacobian at the TCP in world axes, linear rows first."""
 
     mounting: MountingInfo | None
     """Springs under the base; a beam or a mesh there is one of the flexible links."""
     coupling: CouplingInfo | None
-    """Motors that move several joints."""
+    """Coupling of motors that move several joints."""
     balancers: list[BalancerInfo]
-    """Balancers at the pose; `gravity_torque` and `bias` have them in."""
+    """Balancers at the pose; `gravity_torque` and `bias` include them."""
     loops: list[LoopInfo]
-    """Closed loops at the pose; their dependent joints are none of `joints`."""
+    """Closed loops at the pose; `joints` does not contain their dependent joints."""
 
 
 class _Finding(TypedDict):
     """What is always there."""
 
     severity: str
-    """error, warning or note."""
+    """`error`, `warning` or `note`."""
     code: str
     """Short, stable name of the kind of finding."""
     where: str
     """File and line, or joint or link."""
     message: str
-    """Value found."""
+    """Message."""
     help: str
-    """Remedy."""
+    """Suggested fix."""
 
 
 class Finding(_Finding, total=False):
-    """One thing found."""
+    """A finding."""
 
     value: float | None
-    """Value that was found, if it is one."""
+    """Value that was found, if it is a number."""
     yardstick: float | None
-    """Yardstick of the comparison."""
+    """Threshold or reference for the value."""
     unit: str
     """Unit of both."""
     likely: str
-    """The slip that would explain it."""
+    """Unit error or other mistake that would explain the value."""
 
 
 class NewJoint(TypedDict):
@@ -2345,48 +2345,48 @@ class Assumption(TypedDict):
 
 
 class MotionPeak(TypedDict):
-    """The largest values of a joint, with their times (s); limits are null where there are none."""
+    """Extreme values of a joint, with their times (s); limits are null where there are none."""
 
     joint: str
-    """Its name."""
+    """Joint name."""
     unit: str
     """`rad`, `m`, or `rad or m` without a robot."""
     lower: float
     """Minimum position."""
     lower_at_s: float
-    """When."""
+    """Time of the minimum (s)."""
     lower_limit: float | None
-    """The limit."""
+    """Lower limit."""
     upper: float
-    """Greatest position."""
+    """Maximum position."""
     upper_at_s: float
-    """When."""
+    """Time of the maximum (s)."""
     upper_limit: float | None
-    """The limit."""
+    """Upper limit."""
     speed: float
-    """Speed of greatest magnitude, with its sign."""
+    """Velocity of largest magnitude, signed."""
     speed_at_s: float
-    """When."""
+    """Time of the peak velocity (s)."""
     speed_limit: float | None
-    """The limit."""
+    """Velocity limit."""
     acceleration: float
-    """Acceleration of greatest magnitude."""
+    """Acceleration of largest magnitude, signed."""
     acceleration_at_s: float
-    """When."""
+    """Time of the peak acceleration (s)."""
     jerk: float
-    """Jerk of greatest magnitude, jumps of the acceleration apart."""
+    """Jerk of largest magnitude, excluding jumps of the acceleration."""
     jerk_at_s: float
-    """When."""
+    """Time of the peak jerk (s)."""
     jerk_limit: float | None
-    """The limit: that of a path file."""
+    """Jerk limit of a path file."""
     acceleration_jump: float
     """Maximum jump of the acceleration."""
     torque: float | None
-    """Torque or force of greatest magnitude that the rigid robot with its payload needs (N m, N), with a robot."""
+    """Torque or force of largest magnitude that the rigid robot with its payload needs (N m, N), with a robot."""
     torque_at_s: float | None
-    """When."""
+    """Time of the peak torque (s)."""
     torque_limit: float | None
-    """The limit."""
+    """Effort limit."""
 
 
 class NewRobot(TypedDict):

@@ -1,4 +1,4 @@
-//! Balancers against the weight that they are to carry, and against the room that they have over
+//! Caveats about balancers relative to the weight they carry, and about their range of length over
 //! the joint ranges.
 
 use flexarm_kinematics::{BalancerLaw, Data, Mechanism, Model, forward_kinematics, gravity_forces};
@@ -8,14 +8,14 @@ use super::size::spread_poses;
 use super::slip::{EFFORT, slip};
 use super::{Caveat, kinds};
 
-/// Maximum torque of a balancer over the maximum gravity torque: note, warning.
+/// Maximum balancer torque relative to the maximum gravity torque: note, warning.
 const STRONG: [f64; 2] = [3.0, 10.0];
-/// Torque of its joint with a balancer over that without it (RMS).
+/// Maximum ratio of the joint torque with a balancer to that without (RMS).
 const RAISED: f64 = 1.1;
-/// The same of one that carries nothing.
+/// Minimum balancer torque relative to the maximum gravity torque.
 const WEAK: f64 = 1e-3;
 
-/// All of them over poses spread over the joint ranges.
+/// Returns all of these caveats, over poses spread over the joint ranges.
 pub(crate) fn of_balancers(mechanism: &Mechanism, rigid: &Model) -> Vec<Caveat> {
     if rigid.balancers().is_empty() {
         return Vec::new();
@@ -55,7 +55,7 @@ pub(crate) fn of_balancers(mechanism: &Mechanism, rigid: &Model) -> Vec<Caveat> 
     caveats
 }
 
-/// Shortest and longest that a balancer gets.
+/// Minimum and maximum length of a balancer.
 struct Lengths {
     least: f64,
     most: f64,
@@ -71,14 +71,14 @@ fn lengths(model: &Model, number: usize) -> Lengths {
     })
 }
 
-/// Effect of one balancer on its main joint, over poses spread over the joint
+/// Effect of one balancer on the joint on which it acts most, over poses spread over the joint
 /// ranges (N m or N).
 struct Alone {
     /// Maximum torque of the balancer.
     torque: f64,
-    /// RMS torque that holds the arm with it.
+    /// RMS holding torque with this balancer.
     with: f64,
-    /// The same without any balancer.
+    /// RMS holding torque without any balancer.
     without: f64,
 }
 
@@ -90,7 +90,7 @@ fn alone(mechanism: &Mechanism, bare: &Model, number: usize) -> Alone {
     let mut torques = |q: DVector<f64>| {
         (gravity_forces(&alone, &mut data, &q).clone(), gravity_forces(bare, &mut data_bare, &q).clone())
     };
-    // Poses in which its gas has no volume are skipped.
+    // Poses beyond the range of a gas balancer are left out: there is no torque.
     let all: Vec<_> =
         spread_poses(bare).map(&mut torques).filter(|(with, _)| with.iter().all(|x| x.is_finite())).collect();
     let own = |k: usize| all.iter().map(|(with, without)| (with[k] - without[k]).abs()).fold(0.0, f64::max);

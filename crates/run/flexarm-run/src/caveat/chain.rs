@@ -1,4 +1,4 @@
-//! Position of tool and payload on the chain of links, and its elastic joints.
+//! Caveats about the links that carry TCP and payload, and about rigid joints among elastic ones.
 
 use flexarm_kinematics::{Joint, Mechanism};
 
@@ -7,14 +7,14 @@ use super::{Caveat, CaveatKind, kinds};
 use crate::drive_entry::{Drive, DriveKind};
 use crate::robot::{PAYLOAD_LINK, Robot};
 
-/// Joints of fingers have less range than this, joints of arms more (rad).
+/// Joint range that separates fingers (less) from arm joints (more) (rad).
 const HALF_TURN: f64 = 3.0;
-/// Part of the arm's reach and of its mass behind a link from which on it is no gripper.
+/// Fraction of the arm's reach or mass beyond a link above which that part is not a gripper.
 const ARM_LIKE: f64 = 0.2;
-/// Number of joints of an arm from which a single rigid one is unusual.
+/// Minimum number of joints for the check of rigid joints.
 const FEWEST: usize = 3;
 
-/// All of them about a loaded robot.
+/// Returns all of these caveats about a loaded robot.
 pub(crate) fn of_chain(robot: &Robot, size: &Size) -> Vec<Caveat> {
     let mut caveats: Vec<Caveat> =
         of_place(robot, size, "the TCP", &robot.tcp.0, [&kinds::TCP_FIXED, &kinds::TCP_INSIDE]).into_iter().collect();
@@ -25,13 +25,13 @@ pub(crate) fn of_chain(robot: &Robot, size: &Size) -> Vec<Caveat> {
     caveats
 }
 
-/// A payload on a link behind which the arm goes on.
+/// Checks for a payload on a link beyond which the arm continues.
 pub(crate) fn of_payload(robot: &Robot, size: &Size, what: &str, link: &str) -> Option<Caveat> {
     of_place(robot, size, what, link, [&kinds::PAYLOAD_FIXED, &kinds::PAYLOAD_INSIDE])
 }
 
-/// Something that belongs to the end of the arm, on a link. Kinds: where no joint moves the link,
-/// where the arm goes on behind it.
+/// Checks the link of something that belongs to the end of the arm. Kinds of caveats: no joint
+/// moves the link; the arm continues beyond it.
 fn of_place(robot: &Robot, size: &Size, what: &str, link: &str, [fixed, inside]: [&CaveatKind; 2]) -> Option<Caveat> {
     let mechanism = &robot.urdf.mechanism;
     let location = format!("{what} on link {link:?}");
@@ -44,7 +44,7 @@ fn of_place(robot: &Robot, size: &Size, what: &str, link: &str, [fixed, inside]:
     behind.is_arm.then(|| inside.found(location, behind.reach, size.extent))
 }
 
-/// Joints that move by themselves: not fixed, not held, not following others.
+/// Returns the independent joints: not fixed, not held, not dependent.
 fn moving(robot: &Robot) -> Vec<String> {
     let Ok(model) = robot.rigid_model() else { return Vec::new() };
     let held = |name: &str| robot.hold.iter().any(|(held, _)| held == name);
@@ -52,7 +52,7 @@ fn moving(robot: &Robot) -> Vec<String> {
     moves.map(|c| c.joint.clone()).collect()
 }
 
-/// The link of the same body that is nearest to the base.
+/// Returns the link of the same rigid body that is nearest to the base.
 fn carrier<'m>(mechanism: &'m Mechanism, link: &'m str) -> &'m str {
     let parent = |link: &str| mechanism.joints.iter().find(|joint| joint.child == link);
     let mut body = link;
@@ -62,17 +62,17 @@ fn carrier<'m>(mechanism: &'m Mechanism, link: &'m str) -> &'m str {
     body
 }
 
-/// Subtree outboard of a body.
+/// Part of the robot beyond a body, seen from the base.
 struct Behind {
-    /// Its reach (m).
+    /// Its reach from there (m).
     reach: f64,
-    /// Whether it is a part of the arm, and no gripper.
+    /// Whether it is part of the arm rather than a gripper.
     is_arm: bool,
 }
 
 impl Behind {
     fn of(mechanism: &Mechanism, moving: &[String], size: &Size, body: &str) -> Self {
-        // Links with whether a joint that moves is between them and the body.
+        // Links, and whether a moving joint is between each and the body.
         let mut open = vec![(body, false)];
         let (mut reach, mut mass, mut turns, mut branches) = (0.0f64, 0.0, false, 0);
         while let Some((link, moved)) = open.pop() {
@@ -95,7 +95,7 @@ impl Behind {
     }
 }
 
-/// Joints that do not yield where almost all others of the arm do, or with ones that yield on both
+/// Finds rigid joints where most others of the arm are elastic, or with elastic joints on both
 /// sides.
 fn stiff_joints(robot: &Robot) -> Vec<Caveat> {
     let elastic = |drive: &Drive| drive.kind != DriveKind::Prescribed && drive.gearbox.is_some();
@@ -111,7 +111,7 @@ fn stiff_joints(robot: &Robot) -> Vec<Caveat> {
         link = &joint.parent;
     }
     let elastic = chain.iter().filter(|(_, yields)| *yields).count();
-    // Rigid last joints of a wrist are usual, unless it is a single one.
+    // Rigid last wrist joints are usual, unless there is only one.
     let outermost = chain.iter().position(|(_, yields)| *yields).unwrap_or(0);
     let first = if outermost == 1 { 0 } else { outermost };
     let odd: Vec<&Joint> = chain[first..].iter().rev().filter(|(_, yields)| !yields).map(|(joint, _)| *joint).collect();

@@ -1,5 +1,5 @@
-//! Drives of a robot file: gear stiffness against effort limit, play, ratio, rotor, friction,
-//! gains.
+//! Caveats about the drives of a robot file: gear stiffness relative to the effort limit, backlash,
+//! ratio, rotor, friction, gains.
 
 use std::ops::RangeInclusive;
 
@@ -12,48 +12,50 @@ use super::slip::{self, slip};
 use super::{Caveat, kinds};
 use crate::drive_entry::{Drive, DriveKind};
 
-/// Drives above this (N m) are geared stiffly; springs are put into weaker ones on purpose.
+/// Effort limit above which drives have stiff gears (N m); weaker drives may contain springs on
+/// purpose.
 const STRONG: f64 = 150.0;
 /// Rotation of a strong gear under its effort limit (rad): note, warning. Reducers have 1e-3 at
 /// rated torque, 5e-3 at peak.
 const TURNED: [f64; 2] = [0.01, 0.08];
-/// The same of weak drives, springs in series included.
+/// As [`TURNED`], for weak drives, including series-elastic ones.
 const TURNED_WEAK: [f64; 2] = [0.3, 3.0];
-/// A note this many times beyond its yardstick names the slip too.
+/// A note above this multiple of its threshold also names the probable unit error.
 const HINTED: f64 = 3.0;
-/// Rotation of a strong gear over the median of the other strong gears of its robot: gears of
-/// shipped robots have up to 7.5, one of them half as stiff up to 15, and most of them in N m/deg
-/// more than that.
+/// Maximum ratio of a strong gear's rotation to the median of the robot's other strong gears:
+/// shipped robots have up to 7.5, up to 15 if one gear is half as stiff, and most exceed it if one
+/// gear is given in N m/deg.
 const ODD: f64 = 16.0;
-/// The same of gears that are too stiff: note, warning.
+/// Rotation below which gears are too stiff (rad): note, warning.
 const RIGID: [f64; 2] = [1e-4, 1e-5];
-/// Elastic rotation of gears under weight: note, warning; strong drives, weak ones (rad).
+/// Elastic rotation of gears under gravity (rad): note, warning; for strong drives and weak ones.
 const SAGS: [[f64; 2]; 2] = [[0.01, 0.05], [0.05, 0.15]];
-/// Elastic translation of a gear's bearings (m).
+/// Maximum elastic translation of a gear's bearings (m).
 const BEARING: f64 = 5e-3;
-/// Translational stiffness over rotational stiffness gives the lever of a bearing (m).
+/// Lever of a bearing (m): square root of rotational over translational stiffness.
 const LEVER: RangeInclusive<f64> = 1e-3..=1.0;
-/// Play to each side: note, warning (rad).
+/// Backlash to each side (rad): note, warning.
 const PLAY: [f64; 2] = [0.01, 0.05];
-/// Transmission error: small strain wave gears have 2 arcmin (rad).
+/// Maximum transmission error (rad); small strain wave gears have 2 arcmin.
 const TRANSMISSION_ERROR: f64 = 1e-3;
-/// Loss by hysteresis: small strain wave gears have 3 arcmin, belts more (rad).
+/// Maximum hysteresis loss (rad); small strain wave gears have 3 arcmin, belts more.
 const HYSTERESIS_LOSS: f64 = 3e-3;
-/// Friction over transmitted torque: even small strain wave gears pass on two thirds.
+/// Maximum friction divided by transmitted torque; even small strain wave gears transmit two
+/// thirds.
 const LOAD_FRICTION: f64 = 0.5;
-/// Turns of the motor per turn of the joint.
+/// Range of the turns of the motor per turn of the joint.
 const RATIO: RangeInclusive<f64> = 1.0..=5000.0;
-/// Inertia of a rotor over the largest inertia that a joint moves.
+/// Maximum reflected rotor inertia, relative to the largest inertia moved by a joint.
 const ROTOR: f64 = 10.0;
-/// Time between samples of a servo (s).
+/// Range of the sampling period of a servo (s).
 const SAMPLE: RangeInclusive<f64> = 1e-6..=0.05;
-/// Position loops are slower than this (1/s).
+/// Maximum gain of a position loop (1/s).
 const POSITION_GAIN: f64 = 1000.0;
-/// Velocity gain times sampling time over the inertia felt at once: a sampled speed loop is stable
-/// below it.
+/// Stability limit of a sampled velocity loop: velocity gain times sampling period divided by the
+/// high-frequency inertia.
 const STABLE: f64 = 2.0;
 
-/// All of them about the drives as they are written.
+/// Returns all caveats about the drives as written.
 pub(crate) fn of_drives(drives: &[Drive], mechanism: &Mechanism, rigid: &Model) -> Vec<Caveat> {
     let mut caveats = Vec::new();
     let heaviest = inertia_moved(rigid);
@@ -89,7 +91,7 @@ fn name(drive: &Drive) -> String {
     format!("joint {:?}", drive.joint)
 }
 
-/// Stiffness about the axis (N m/rad), and along translations (N/m) where there are some.
+/// Returns the stiffness about the axis (N m/rad), and along translations (N/m) if there is one.
 fn stiffness(drive: &Drive) -> Option<(f64, Option<f64>)> {
     match &drive.gearbox.as_ref()?.0.stiffness {
         GearStiffness::Axis(k) => Some((*k, None)),
@@ -101,8 +103,8 @@ fn stiffness(drive: &Drive) -> Option<(f64, Option<f64>)> {
     }
 }
 
-/// Median rotation under their effort limits of the other strong gears (rad); none of a weak one,
-/// or without two others.
+/// Returns the median rotation of the other strong gears under their effort limits (rad); None for
+/// a weak gear, or with fewer than two others.
 fn others_turn(drive: &Drive, drives: &[Drive], mechanism: &Mechanism) -> Option<f64> {
     let turns = |drive: &Drive| {
         let joint = mechanism.joints.iter().find(|j| j.name == drive.joint && !j.kind.slides())?;
@@ -115,7 +117,8 @@ fn others_turn(drive: &Drive, drives: &[Drive], mechanism: &Mechanism) -> Option
     (others.len() >= 2).then(|| 0.5 * (others[others.len() / 2] + others[(others.len() - 1) / 2]))
 }
 
-/// Stiffness, damping and play of a gearbox; `others`: what the other gears of the robot turn by.
+/// Checks stiffness, damping and backlash of a gearbox; `others`: median rotation of the robot's
+/// other gears (rad).
 fn gear(drive: &Drive, effort: f64, others: Option<f64>) -> Vec<Caveat> {
     let (Some((k, along)), Some((_, gear))) = (stiffness(drive), &drive.gearbox) else { return Vec::new() };
     let mut caveats = Vec::new();
@@ -156,7 +159,7 @@ fn gear(drive: &Drive, effort: f64, others: Option<f64>) -> Vec<Caveat> {
     caveats
 }
 
-/// Transmission error and hysteresis.
+/// Checks transmission error and hysteresis.
 fn errors(drive: &Drive) -> Vec<Caveat> {
     let Some((_, gear)) = &drive.gearbox else { return Vec::new() };
     let mut caveats = Vec::new();
@@ -176,7 +179,7 @@ fn errors(drive: &Drive) -> Vec<Caveat> {
     caveats
 }
 
-/// Ratio and rotor.
+/// Checks ratio and rotor.
 fn motor(drive: &Drive, heaviest: f64) -> Vec<Caveat> {
     let mut caveats = Vec::new();
     let ratio = drive.ratio.abs();
@@ -196,7 +199,7 @@ fn motor(drive: &Drive, heaviest: f64) -> Vec<Caveat> {
     caveats
 }
 
-/// Friction that eats up the drive.
+/// Checks whether friction exceeds the effort limit.
 fn friction(drive: &Drive, effort: f64, speed: f64) -> Option<Caveat> {
     let f = &drive.friction;
     let viscous = if speed.is_finite() { f.viscous * speed } else { 0.0 };
@@ -212,7 +215,7 @@ fn friction(drive: &Drive, effort: f64, speed: f64) -> Option<Caveat> {
     })
 }
 
-/// Sampling and position gain of a servo.
+/// Checks sampling and position gain of a servo.
 fn servo(drive: &Drive) -> Vec<Caveat> {
     let mut caveats = Vec::new();
     if drive.kind != DriveKind::Torque {
@@ -229,19 +232,19 @@ fn servo(drive: &Drive) -> Vec<Caveat> {
     caveats
 }
 
-/// A velocity gain that the sampled loop does not bear: `inertia` is what the motor feels at once
-/// (kg m²).
+/// Checks whether a velocity gain makes the sampled loop unstable; `inertia` is the
+/// high-frequency inertia (kg m²).
 pub(crate) fn speed_loop(joint: &str, gain: f64, sample_s: f64, inertia: f64) -> Option<Caveat> {
     let most = STABLE * inertia / sample_s;
     (inertia > 0.0 && gain > most).then(|| kinds::VELOCITY_GAIN.found(format!("joint {joint:?}"), gain, most))
 }
 
-/// Deflection of the spring of a drive (rad or m): under weight, or in motion (`times`
-/// 2).
+/// Checks the deflection of a drive's spring, in rotation (rad) and translation (m); `times` scales
+/// the limits: 1 under gravity, 2 in motion.
 pub(crate) fn give(drive: &Drive, effort: f64, rotation: f64, translation: f64, times: f64) -> Vec<Caveat> {
     let [unusual, wrong] = SAGS[usize::from(effort <= STRONG)].map(|limit| times * limit);
     let mut caveats = Vec::new();
-    // Soft drives may deflect in motion.
+    // Weak drives may deflect in motion by design.
     let judged = effort > STRONG || times <= 1.0;
     if judged && rotation > unusual {
         let caveat = kinds::GEAR_ROTATION.found(name(drive), rotation, unusual);

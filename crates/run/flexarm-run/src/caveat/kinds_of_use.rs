@@ -1,127 +1,127 @@
-//! The catalogue of caveats about motions, loads, balancers and closed loops.
+//! Catalogue of caveats about motions, loads, balancers and closed loops.
 
 use super::CaveatKind;
 
-/// Effort along a motion.
+/// A joint exceeds its effort limit along a motion.
 pub(crate) const MOTION_EFFORT: CaveatKind = CaveatKind::warning(
     "motion-effort",
     "{where} needs up to {value} N m (or N) along the motion, its limit is {yardstick}",
     "N m",
     "slow the motion down; check masses, payload, unit and time of the motion",
 );
-/// A balancer that carries far more than the arm weighs.
+/// A balancer is far stronger than the weight of the arm.
 pub(crate) const BALANCER_STRONG: CaveatKind = CaveatKind::warning(
     "balancer-strong",
     "{where} puts up to {value} N m (or N) on a joint (reported above three times the gravity torque of the arm, {yardstick})",
     "N m",
     "a balancer carries about the weight of the arm: check rate, pressure, area and ends (N/m, Pa, m2, m)",
 );
-/// A balancer that carries nothing.
+/// A balancer is negligibly weak.
 pub(crate) const BALANCER_WEAK: CaveatKind = CaveatKind::note(
     "balancer-weak",
     "{where} puts at most {value} N m (or N) on a joint, told below a thousandth of what the weight of the arm does ({yardstick})",
     "N m",
     "check its ends and its force: units are m, N/m and Pa",
 );
-/// A gas that has no room in a part of the joint ranges.
+/// A gas balancer exceeds its stroke in part of the joint ranges.
 pub(crate) const BALANCER_ROOM: CaveatKind = CaveatKind::warning(
     "balancer-room",
     "{where} gets {value} m long within the joint ranges, its gas has room up to {yardstick} m: poses beyond are refused",
     "m",
     "check ends, volume, area and the length to which they belong, or the joint ranges",
 );
-/// A curve that does not cover what is asked of it.
+/// A force curve does not cover the joint ranges.
 pub(crate) const BALANCER_CURVE: CaveatKind = CaveatKind::note(
     "balancer-curve",
     "{where} is at {value} within the joint ranges, its curve ends at {yardstick}: it goes straight on from there",
     "",
     "add points, in m or rad",
 );
-/// A loop that is assembled in another configuration than given.
+/// A loop is assembled away from the given joint values.
 pub(crate) const LOOP_ASSEMBLED: CaveatKind = CaveatKind::warning(
     "loop-assembled",
     "{where} closes with its dependent joints {value} rad or m from the given assembly (reported above {yardstick})",
     "rad or m",
     "check the points of pin and eye and the lengths of the bars, or give the values in at",
 );
-/// Poses within the joint ranges in which a loop does not close.
+/// A loop does not close in some poses within the joint ranges.
 pub(crate) const LOOP_RANGE: CaveatKind = CaveatKind::warning(
     "loop-range",
     "{where} does not close in {value} % of the poses within the ranges of the driving joints (reported above {yardstick} %): such poses are refused",
     "%",
     "limits of the driving joints hold for each joint separately; check the lengths of the bars",
 );
-/// A small transmission angle within the joint ranges.
+/// The transmission angle is small within the joint ranges.
 pub(crate) const LOOP_REACH: CaveatKind = CaveatKind::warning(
     "loop-transmission",
     "{where} has transmission angles down to {value} deg within the joint ranges (reported below {yardstick})",
     "deg",
     "limits of the dependent joints keep poses out that the machine does not reach",
 );
-/// A small transmission angle along a motion.
+/// The transmission angle is small along a motion.
 pub(crate) const LOOP_TRANSMISSION: CaveatKind = CaveatKind::warning(
     "loop-transmission",
     "{where} reaches a transmission angle of {value} deg along the motion (reported below {yardstick}): forces in its bars grow as 1/sin of it",
     "deg",
     "keep the motion away from the dead point, where the bars lie in a line",
 );
-/// A dependent joint beyond its limit.
+/// A dependent joint exceeds its limit.
 pub(crate) const LOOP_LIMIT: CaveatKind = CaveatKind::warning(
     "loop-limit",
     "{where}, which follows from a loop, comes to {value} along the motion, its limit is {yardstick}",
     "",
     "keep the driving joints nearer to each other, or correct the limit of the URDF",
 );
-/// A motion much slower than the robot.
+/// A motion is much slower than the robot.
 pub(crate) const SLOW_MOTION: CaveatKind = CaveatKind::note(
     "slow-motion",
     "{where} never uses more than {value} of a joint's speed limit (reported below {yardstick})",
     "",
     "times are in s",
 );
-/// A motion that hardly moves.
+/// A motion hardly moves the joints.
 pub(crate) const SMALL_MOTION: CaveatKind = CaveatKind::note(
     "small-motion",
     "{where} turns no joint by more than {value} rad (reported below {yardstick})",
     "rad",
     "is the unit of the angles right?",
 );
-/// A load against what the arm weighs and drives.
+/// A force is large relative to the weight of the arm.
 pub(crate) const LOAD: CaveatKind = CaveatKind::warning(
     "load",
     "{where} is {value} N, the arm with its payload weighs {yardstick} N on earth",
     "N",
     "forces are in N, moments in N m",
 );
-/// A moment against what the drives have.
+/// A moment is large relative to the weight of the arm at full length.
 pub(crate) const MOMENT: CaveatKind = CaveatKind::warning(
     "load",
     "{where} is {value} N m; the weight of the arm makes {yardstick} N m at its full length",
     "N m",
     "forces are in N, moments in N m",
 );
-/// More samples than steps.
+/// The log rate exceeds the number of steps per second.
 pub(crate) const LOG_RATE: CaveatKind = CaveatKind::warning(
     "log-rate",
     "{value} samples a second are requested, but there are {yardstick} steps a second: every step is logged",
     "1/s",
     "lower the step or the log rate",
 );
-/// Loads that go on long after the run.
+/// A load continues long after the end of the run.
 pub(crate) const LOAD_TIME: CaveatKind = CaveatKind::warning(
     "load-time",
     "{where} lasts until {value} s; the run ends at {yardstick} s",
     "s",
     "times of loads are in s",
 );
-/// A sine of degrees.
+/// The argument of a sine is probably in degrees.
 pub(crate) const LOAD_DEGREES: CaveatKind = CaveatKind::warning(
     "load-degrees",
     "{where} swings with {value} Hz, with degrees it would be {yardstick} Hz",
     "Hz",
     "angles of sin and cos are in rad: write 2*pi*3*t",
 );
-/// A balancer that pulls the wrong way.
+/// A balancer increases the joint's holding torque.
 pub(crate) const BALANCER_SIDE: CaveatKind = CaveatKind::warning(
     "balancer-side",
     "{where}: with it the joint that it acts on needs {value} N m (or N) over the joint ranges (RMS), without it {yardstick}",

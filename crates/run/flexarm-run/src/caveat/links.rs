@@ -1,4 +1,5 @@
-//! Beams and damping of a robot file: material, section against length, mass against the section's.
+//! Caveats about beams and damping in a robot file: material, section relative to length, mass
+//! relative to the section's.
 
 use std::ops::RangeInclusive;
 
@@ -14,35 +15,35 @@ use crate::mounting::RobotMounting;
 use crate::options::LinkModel;
 use crate::robot::Robot;
 
-/// Young's modulus from polymers to diamond (Pa).
+/// Range of Young's modulus, from polymers to diamond (Pa).
 const YOUNG: RangeInclusive<f64> = 1e8..=1.3e12;
-/// Density from foam to osmium (kg/m³).
+/// Range of density, from foam to osmium (kg/m³).
 const RHO: RangeInclusive<f64> = 20.0..=22_600.0;
-/// Poisson's ratio of what robots are made of; rubber has almost 0.5, foams that get thicker when
-/// pulled have less than 0.
+/// Range of Poisson's ratio of structural materials; rubber has almost 0.5, auxetic foams less than
+/// 0.
 const NU: RangeInclusive<f64> = 0.0..=0.495;
-/// A section is at most this many times as thick as the beam is long.
+/// Maximum thickness of a section relative to the beam's length.
 const THICK: f64 = 3.0;
-/// Radius of gyration of a section over the length of the beam: thinner are wires, thicker no
-/// beams.
+/// Range of a section's radius of gyration relative to the beam's length: from wires to bodies too
+/// thick for a beam.
 const SLENDER: RangeInclusive<f64> = 5e-4..=1.0;
-/// Torsional over bending stiffness.
+/// Range of torsional stiffness relative to bending stiffness.
 const TORSION: RangeInclusive<f64> = 1e-3..=1e3;
-/// Allowed contribution of an eccentric shear centre to the deflection of a tip.
+/// Maximum tip deflection due to an eccentric shear centre, relative to that of bending.
 const TWIST: f64 = 0.01;
-/// Wall over width (diameter) of a hollow section: note, warning. Eurocode 3 (EN 1993-1-1, table
-/// 5.2) lets flat walls buckle before yielding below 1/42, round ones below 1/90.
+/// Wall thickness relative to the width (diameter) of a hollow section: note, warning. By Eurocode
+/// 3 (EN 1993-1-1, table 5.2) flat walls buckle before yielding below 1/42, round ones below 1/90.
 const THIN: [f64; 2] = [1.0 / 42.0, 1.0 / 90.0];
-/// Damping that is taken where none is given.
+/// Default damping ratio.
 pub(super) const USUAL_DAMPING: f64 = 0.03;
-/// Mass of the link over that of its section.
+/// Range of the link's mass relative to that of its section.
 const MASS: RangeInclusive<f64> = 0.02..=50.0;
-/// Damping ratios of joined structures are at most this.
+/// Maximum damping ratio of jointed structures.
 const RATIO: f64 = 0.2;
-/// `D = beta K` with a larger beta creeps (s).
+/// Maximum beta in `D = beta K` (s); above it the link creeps instead of vibrating.
 pub(crate) const CREEP: f64 = 0.05;
 
-/// All of them about a link. `own`: its inertia by the URDF.
+/// Returns all of these caveats about a link. `own`: its inertia in the URDF.
 pub(crate) fn of_link(link: &RobotLink, own: Option<&LinkInertia>) -> Vec<Caveat> {
     let name = format!("link {:?}", link.flexible.link);
     let mut caveats: Vec<Caveat> = damping(&name, &link.damping).into_iter().collect();
@@ -58,7 +59,7 @@ pub(crate) fn of_link(link: &RobotLink, own: Option<&LinkInertia>) -> Vec<Caveat
     caveats
 }
 
-/// A link that is asked to stiffen by load and cannot.
+/// Checks whether requested geometric stiffening is available for the link.
 fn geometric(name: &str, link: &RobotLink) -> Option<Caveat> {
     let (message, help) = match (link.choices.model, link.has_geometric()) {
         _ if !link.choices.geometric => return None,
@@ -75,11 +76,11 @@ fn geometric(name: &str, link: &RobotLink) -> Option<Caveat> {
     Some(Caveat::said("geometric-stiffening", name, message, &help))
 }
 
-/// Sink (m) of a base under the weight of the whole robot, and tilt (rad) under that weight at a
-/// lever of 1 m: cast pedestals and anchored plates stay below a tenth of it.
+/// Maximum sink (m) of the base under the weight of the whole robot, and maximum tilt (rad) under
+/// that weight at a lever of 1 m: cast pedestals and anchored plates stay below a tenth of it.
 const SINKS: [f64; 2] = [1e-3, 5e-3];
 
-/// Springs under the base.
+/// Checks the springs under the base.
 pub(crate) fn of_mounting(robot: &Robot) -> Vec<Caveat> {
     let Some(RobotMounting::Springs { springs, damping: damped }) = &robot.mounting else { return Vec::new() };
     let name = format!("mounting {:?}", springs.name);
@@ -94,7 +95,7 @@ pub(crate) fn of_mounting(robot: &Robot) -> Vec<Caveat> {
             slip(sink, &(1e-7..=SINKS[0]), &[(1e3, "stiffness in kN/m or N/mm"), (1e6, "stiffness in kN/mm")], 1.0);
         caveats.push(kinds::MOUNTING_SINK.found(&name, sink, SINKS[0]).likely(likely));
     }
-    // At a lever of 1 m.
+    // Moment of the weight at a lever of 1 m.
     let tilt = weight / least(3);
     if tilt > SINKS[1] {
         let likely =
@@ -104,7 +105,7 @@ pub(crate) fn of_mounting(robot: &Robot) -> Vec<Caveat> {
     caveats
 }
 
-/// Elastic constants and density.
+/// Checks elastic constants and density.
 fn material(name: &str, material: &Material) -> impl Iterator<Item = Caveat> {
     let young = outside(&kinds::MODULUS, name, material.E, &YOUNG, slip::MODULUS);
     let rho = outside(&kinds::MATERIAL_DENSITY, name, material.rho, &RHO, slip::DENSITY);
@@ -112,7 +113,7 @@ fn material(name: &str, material: &Material) -> impl Iterator<Item = Caveat> {
     young.into_iter().chain(rho).chain(nu)
 }
 
-/// A value outside its range, against the nearer end of it.
+/// Returns a caveat if a value is outside its range, with the nearer end as threshold.
 fn outside(
     kind: &CaveatKind,
     name: &str,
@@ -124,7 +125,7 @@ fn outside(
     (!range.contains(&value)).then(|| kind.found(name, value, end).likely(slip(value, range, factors, 1.0)))
 }
 
-/// Section against the length of the beam, and its mass against the link's.
+/// Checks the section relative to the beam's length, and its mass relative to the link's.
 fn section(name: &str, beam: &BeamLink) -> Vec<Caveat> {
     let mut caveats = Vec::new();
     let length = beam.length;
@@ -155,8 +156,8 @@ fn section(name: &str, beam: &BeamLink) -> Vec<Caveat> {
     caveats
 }
 
-/// For a shear centre off the centroid: the twist that a force at the tip would add there,
-/// against its bending.
+/// Checks the offset of the shear centre from the centroid: the deflection it adds by twist under a
+/// tip force, relative to bending.
 ///
 /// ```text
 /// F e² l/GJ < 0.01 F l³/(3 EI_y)      e_max = l √(0.01 GJ/(3 EI_y))
@@ -167,8 +168,8 @@ fn shear_centre(name: &str, beam: &BeamLink, bar: &Bar) -> Option<Caveat> {
     (e > most).then(|| kinds::SHEAR_CENTRE.found(name, e, most))
 }
 
-/// A wall that is far too thin for its width, and an outer size that is half or twice what the
-/// link's inertia gives.
+/// Checks for a wall that is too thin for its width, and for an outer size that is half or twice
+/// that indicated by the link's inertia.
 fn sizes(name: &str, beam: &BeamLink, own: Option<&LinkInertia>) -> Vec<Caveat> {
     let mut caveats = Vec::new();
     let (width, wall) = match beam.section {
@@ -187,12 +188,12 @@ fn sizes(name: &str, beam: &BeamLink, own: Option<&LinkInertia>) -> Vec<Caveat> 
     if beam.section.largest_size().is_none() {
         return caveats;
     }
-    // If the link is nothing but the beam, both its mass and its inertia give its size.
+    // For a link that consists only of the beam, both mass and inertia indicate the size.
     let axis = beam.X_LB.translation.vector.normalize();
     let of_link = (axis.dot(&(own.inertia_com * axis)) / own.mass).sqrt();
     let of_section = ((bar.EI_y + bar.EI_z) / bar.EA).sqrt();
     let (size, mass) = (of_link / of_section, own.mass / (bar.mass_per_length * beam.length));
-    // A wall that stays as it is makes the mass go with the size, a solid section with its square.
+    // The mass grows with the size for a constant wall, and with its square for a solid section.
     let fits = |factor: f64| {
         let power = mass.ln() / factor.ln();
         (size / factor - 1.0).abs() < 0.15 && (0.85..=2.3).contains(&power)
@@ -206,7 +207,7 @@ fn sizes(name: &str, beam: &BeamLink, own: Option<&LinkInertia>) -> Vec<Caveat> 
     caveats
 }
 
-/// Damping as it is written; what it does to the first mode is looked at where the arm stands.
+/// Checks damping as written; its effect on the first mode is checked at the pose.
 fn damping(name: &str, damping: &Damping) -> Option<Caveat> {
     match damping {
         Damping::Modal(0.0) | Damping::StiffnessProportional(0.0) | Damping::Rayleigh(0.0, 0.0) => {

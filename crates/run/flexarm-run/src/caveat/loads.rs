@@ -1,16 +1,16 @@
-//! Loads as they are written: times against the run, angles in degrees.
+//! Caveats about loads as written: times relative to the run, angles in degrees.
 
 use std::f64::consts::TAU;
 
 use super::slip::slip;
 use super::{Caveat, kinds, parts};
 
-/// A load that goes on this many times as long as the run: note, warning.
+/// Duration of a load relative to that of the run: note, warning.
 const LONG: [f64; 2] = [2.0, 10.0];
 /// Angular rates of sines in degrees are multiples of this (a quarter of a turn).
 const QUARTER: f64 = 90.0;
 
-/// The last time of a table or an impulse (s) against the end of the run.
+/// Checks the last time of a table or an impulse (s) against the end of the run.
 pub(crate) fn of_end(last: f64, duration: f64) -> Option<Caveat> {
     let caveat = || kinds::LOAD_TIME.found("a load", last, duration);
     let likely = || slip(last, &(0.01 * duration..=1.5 * duration), &[(1e3, "milliseconds")], 1.0);
@@ -21,13 +21,13 @@ pub(crate) fn of_end(last: f64, duration: f64) -> Option<Caveat> {
     }
 }
 
-/// The phase of a sine (rad).
+/// Checks the phase of a sine (rad).
 pub(crate) fn of_phase(phase: f64) -> Option<Caveat> {
     parts::angles("the phase of a load", &[phase])
 }
 
-/// The argument of a sine or cosine as it goes with time: `rate` (rad/s) and its value at zero
-/// (rad).
+/// Checks the argument of a sine or cosine that is linear in time: `rate` (rad/s) and its value at
+/// zero (rad).
 pub(crate) fn of_sine(text: &str, rate: f64, phase: f64) -> Option<Caveat> {
     let quarters = rate.abs() / QUARTER;
     let whole = quarters > 0.5 && (quarters - quarters.round()).abs() < 1e-9;

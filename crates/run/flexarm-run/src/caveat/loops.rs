@@ -1,4 +1,4 @@
-//! Closed loops: how well they hand on force, over the joint ranges and along a motion.
+//! Caveats about closed loops: transmission angles over the joint ranges and along a motion.
 
 use flexarm_kinematics::Model;
 use flexarm_trajectory::Trajectory;
@@ -9,16 +9,16 @@ use crate::loops::{along_motion, over_ranges};
 /// Transmission angle: note below the first, warning below the second (rad). At 10 degrees a rod
 /// carries six times the force.
 const TRANSMISSION: [f64; 2] = [0.698_131_700_797_731_8, 0.174_532_925_199_432_95];
-/// Distance of dependent joints from the given assembly of the loop (rad or m).
+/// Maximum distance of the dependent joints from the given assembly values (rad or m).
 const ASSEMBLED: f64 = 1e-6;
-/// Part of the poses in the joint ranges in which a loop does not close.
+/// Maximum fraction of poses in the joint ranges in which a loop does not close.
 const OPEN: f64 = 0.02;
 
 fn name_of(name: &str) -> String {
     format!("loop {name:?}")
 }
 
-/// All loops of the rigid robot over poses spread over the joint ranges.
+/// Checks all loops of the rigid robot over poses spread over the joint ranges.
 pub(crate) fn of_loops(rigid: &Model) -> Vec<Caveat> {
     if rigid.loops().is_empty() {
         return Vec::new();
@@ -42,7 +42,7 @@ pub(crate) fn of_loops(rigid: &Model) -> Vec<Caveat> {
     caveats
 }
 
-/// Returns caveats about the loops along a motion in which they stay closed.
+/// Checks the loops along a motion on which they close.
 pub(crate) fn of_motion(trajectory: &Trajectory, rigid: &Model) -> Vec<Caveat> {
     if rigid.loops().is_empty() {
         return Vec::new();

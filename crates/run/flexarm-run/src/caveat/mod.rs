@@ -1,11 +1,11 @@
-//! Caveats about robots and runs: what is probably wrong with an input, or limits the worth of a
-//! result, as values.
+//! Caveats about robots and runs as values: probable errors in an input, and limits of a result's
+//! validity.
 //!
-//! Every command that uses a robot reports the same caveats ([`told()`]); runs and statics add what
-//! they find themselves. Each sentence is made in one place ([`CaveatKind::found`]). Start at
-//! `kinds`, the catalogue; `docs/caveats.md` lists it with the source of each yardstick.
+//! Every command that uses a robot reports the same caveats about it ([`told()`]); runs and statics
+//! add their own. Each message is built in one place ([`CaveatKind::found`]). Start at `kinds`, the
+//! catalogue; `docs/caveats.md` lists it with the source of each threshold.
 //!
-//! Not here: what makes a model impossible. That is an [`crate::Error`].
+//! Not here: inputs that make a model impossible, which are an [`crate::Error`].
 
 pub(crate) mod balancers;
 pub(crate) mod chain;
@@ -41,7 +41,7 @@ mod tests {
         let advice = format!("raise {} or lower {}", Setting::LogRate, Setting::Step);
         assert!(caveat.message.ends_with(&advice), "{}", caveat.message);
         assert!(!caveat.message.contains(['{', '}']), "{}", caveat.message);
-        // The values are for programs in the process; files and texts hold the sentence.
+        // The values are for programs in the process; files and texts contain the message.
         assert!(serde_json::to_value(&caveat).unwrap().get("settings").is_none());
         assert!(kinds::EFFORT.found("joint 1", 3.0, 2.0).settings.is_empty());
     }

@@ -1,4 +1,4 @@
-//! A motion against the robot that is to follow it, and loads against the robot that is to bear
+//! Caveats about a motion on the robot that follows it, and about loads on the robot that carries
 //! them.
 
 use flexarm_kinematics::{Data, Model, State, inverse_dynamics};
@@ -10,20 +10,21 @@ use super::size::Size;
 use super::slip::{self, DEGREES, slip};
 use super::{Caveat, kinds};
 
-/// Times at which a motion and its loads are looked at.
+/// Number of time intervals at which a motion and its loads are checked.
 const TIMES: usize = 200;
-/// Torque of the rigid robot over the effort limit: above it the motion is not for this robot.
+/// Ratio of rigid-robot torque to effort limit above which the motion does not suit this robot.
 const HASTE: f64 = 10.0;
-/// Part of the speed limit that a motion in s uses.
+/// Fraction of the speed limit below which a motion may be given in other time units.
 const SLOW: f64 = 2e-3;
-/// Minimum travel of a motion (rad).
+/// Minimum plausible travel of a motion (rad).
 const SMALL: f64 = 0.02;
-/// Force over the weight of the arm, moment over its weight at full length: note, warning.
+/// Force relative to the arm's weight, or moment relative to its weight at full length: note,
+/// warning.
 const HEAVY: [f64; 2] = [2.0, 10.0];
-/// (m/s²)
+/// Gravity on earth (m/s²).
 const EARTH: f64 = 9.81;
 
-/// Torques and ranges of the rigid robot along a motion.
+/// Checks the torques and speeds of the rigid robot along a motion.
 pub(crate) fn of_motion(name: &str, trajectory: &Trajectory, model: &Model) -> Vec<Caveat> {
     let n = model.nv();
     let (mut data, mut state, mut a) = (Data::new(model), State::zeros(model), DVector::zeros(n));
@@ -63,7 +64,7 @@ pub(crate) fn of_motion(name: &str, trajectory: &Trajectory, model: &Model) -> V
     caveats
 }
 
-/// Whether angles beyond their limits would lie within them if they were degrees.
+/// Checks whether positions beyond their limits would be within them if they were in degrees.
 pub(crate) fn degrees(violations: &[LimitViolation], model: &Model) -> &'static str {
     let beyond = violations.iter().filter(|v| matches!(v.kind, LimitKind::Lower | LimitKind::Upper));
     let mends = |v: &LimitViolation| {
@@ -77,8 +78,8 @@ pub(crate) fn degrees(violations: &[LimitViolation], model: &Model) -> &'static 
     if any && all { "about 57 times: degrees?" } else { "" }
 }
 
-/// Checks the maximum force and moment of the loads of a run against weight and size of the arm
-/// with its payload.
+/// Checks the maximum force and moment of a run's loads against weight and size of the arm with its
+/// payload.
 pub(crate) fn of_loads(loads: &[Load], duration: f64, size: &Size) -> Vec<Caveat> {
     let mut caveats = Vec::new();
     for load in loads {
@@ -94,13 +95,13 @@ pub(crate) fn of_loads(loads: &[Load], duration: f64, size: &Size) -> Vec<Caveat
     caveats
 }
 
-/// A constant wrench on the tool, against weight and size of the arm with its payload.
+/// Checks a constant wrench on the TCP against weight and size of the arm with its payload.
 pub fn of_wrench(wrench: &[f64; 6], size: &Size) -> Vec<Caveat> {
     let norm = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>().sqrt();
     heavy(norm(&wrench[..3]), norm(&wrench[3..]), size)
 }
 
-/// A force (N) and a moment (N m) that are far more than the arm weighs.
+/// Checks a force (N) and a moment (N m) against the weight of the arm.
 fn heavy(force: f64, moment: f64, size: &Size) -> Vec<Caveat> {
     let judged = |kind: &super::CaveatKind, what: &str, value: f64, yardstick: f64| {
         let caveat = kind.found(what, value, yardstick);

@@ -1,5 +1,4 @@
-//! Tool, payload, gravity, masses and limits of the files, against the size of the robot
-//! itself.
+//! Caveats about TCP, payload, gravity, masses and limits, judged by the size of the robot.
 
 use flexarm_kinematics::{Joint, Link, LinkInertia, Mechanism, Model};
 use flexarm_linkmaker::yardsticks::OSMIUM;
@@ -10,31 +9,31 @@ use super::slip::{self, slip};
 use super::{Caveat, kinds};
 use crate::robot::{PAYLOAD_LINK, Robot};
 
-/// A tool or payload this many times the robot's size away, and this far at least (m), is not held
-/// by it.
+/// Distance of a TCP or payload from its link that is out of reach: multiple of the robot's size,
+/// and minimum (m).
 const FAR: (f64, f64) = (1.5, 2.0);
-/// Arms longer than this have not been built (m): concrete pumps reach 70 m.
+/// Maximum length of an arm (m); concrete pumps reach 70 m.
 const LONGEST: f64 = 100.0;
-/// A joint this many times farther from its parent than all others of the chain together.
+/// Maximum distance of a joint from its parent, relative to that of all other joints together.
 const ODD_DISTANCE: f64 = 20.0;
-/// Maximum plausible angle in rad in a file: one turn.
+/// Maximum plausible angle in a file (rad): one turn.
 const TURN: f64 = std::f64::consts::TAU;
-/// Payload over mass of the robot: heavier than that is not lifted, unusual.
+/// Payload mass relative to the robot's mass: implausible, unusual.
 const PAYLOAD_SHARE: (f64, f64) = (3.0, 1.0);
-/// The same in orbit: the arm of the space shuttle moved 70 times its mass.
+/// Factor on the same without gravity: the arm of the space shuttle moved 70 times its mass.
 const WEIGHTLESS: f64 = 30.0;
-/// Payloads above this are no points (kg).
+/// Mass above which a payload is not a point mass (kg).
 const POINT_MASS: f64 = 10.0;
-/// Joints faster than this (rad/s), with tips faster than that (m/s), are in degrees per second.
+/// Joint speed (rad/s) and tip speed (m/s) above which limits are probably in degrees per second.
 const FAST: (f64, f64) = (30.0, 120.0);
-/// Effort limits are this many times the largest torque of weight at most.
+/// Maximum effort limit relative to the largest gravity torque.
 const STRONG: f64 = 300.0;
-/// Effort limits accelerate the tip by at most so much (m/s²).
+/// Maximum tip acceleration from an effort limit (m/s²).
 const TIP_ACCELERATION: f64 = 5e4;
-/// Weight on moon, Mars and earth (m/s²) and how far a file may be from it.
+/// Gravity on the moon, on Mars and on earth (m/s²).
 const GRAVITIES: [(f64, &str); 3] = [(1.62, "on the moon"), (3.71, "on Mars"), (9.81, "")];
 
-/// All of them about a loaded robot.
+/// Returns all of these caveats about a loaded robot.
 pub(crate) fn of_robot(robot: &Robot) -> Vec<Caveat> {
     let mechanism = &robot.urdf.mechanism;
     let size = Size::of(mechanism);
@@ -57,21 +56,22 @@ pub(crate) fn of_robot(robot: &Robot) -> Vec<Caveat> {
     caveats
 }
 
-/// Angles of a file that are more than a turn (rad).
+/// Checks for angles of more than a turn (rad).
 pub(crate) fn angles(of: &str, values: &[f64]) -> Option<Caveat> {
     let largest = values.iter().fold(0.0f64, |m, x| m.max(x.abs()));
     let caveat = || kinds::ANGLE.found(of, largest, TURN);
     (largest > TURN + 1e-9).then(|| caveat().likely(slip(largest, &(0.0..=TURN), slip::ANGLE, 1.0)))
 }
 
-/// Something that sits farther from its link than the robot is large.
+/// Checks for a distance from the link larger than the size of the robot.
 fn far(what: &str, distance: f64, size: &Size) -> Option<Caveat> {
     let limit = (FAR.0 * size.extent).max(FAR.1);
     let caveat = || kinds::FAR.found(what, distance, size.extent);
     (distance > limit).then(|| caveat().likely(slip(distance, &(0.0..=limit), slip::LENGTH, 1.0)))
 }
 
-/// Joints farther apart than any arm is long, or than the rest of this arm allows.
+/// Checks for joints farther apart than any real arm is long, or than the rest of this arm
+/// suggests.
 fn distances<'a>(mechanism: &'a Mechanism, size: &'a Size) -> impl Iterator<Item = Caveat> + 'a {
     let length = |j: &Joint| j.X_PJ.translation.vector.norm();
     let all: f64 = mechanism.joints.iter().map(length).sum();
@@ -87,7 +87,8 @@ fn distances<'a>(mechanism: &'a Mechanism, size: &'a Size) -> impl Iterator<Item
     odd.chain(long)
 }
 
-/// Masses and inertias: radius of gyration against the arm, density against the heaviest metal.
+/// Checks masses and inertias: radius of gyration against the size of the arm, density against that
+/// of osmium.
 fn bodies(mechanism: &Mechanism, size: &Size) -> Vec<Caveat> {
     let with_mass = || {
         let of = |l: &Link| l.inertia.filter(|i| i.mass > 0.0).map(|i| (l.name.clone(), i));
@@ -95,7 +96,7 @@ fn bodies(mechanism: &Mechanism, size: &Size) -> Vec<Caveat> {
     };
     let far_out = with_mass().map(|(name, i)| size.at(&name) + i.com.norm()).fold(0.0, f64::max);
     let mut caveats = Vec::new();
-    // The worst link stands for all: a unit is wrong in a whole file.
+    // Only the worst link is reported: a wrong unit usually applies to the whole file.
     let widest = with_mass().map(|(name, i)| (gyration(&i), name)).max_by(|a, b| a.0.total_cmp(&b.0));
     let room = if far_out > 0.0 { 2.0 * far_out } else { LONGEST };
     if let Some((radius, name)) = widest.filter(|(radius, _)| *radius > room) {
@@ -107,14 +108,14 @@ fn bodies(mechanism: &Mechanism, size: &Size) -> Vec<Caveat> {
     if let Some((name, inertia)) = dense.iter().max_by(|a, b| a.1.mass.total_cmp(&b.1.mass)) {
         let density = least_density(inertia);
         let caveat = kinds::DENSITY.found(format!("link {name:?}"), density, OSMIUM);
-        // A few points among bodies are a way to write what is not known.
+        // A few point masses among bodies are an accepted placeholder for unknown inertias.
         let likely = slip(density, &(20.0..=OSMIUM), slip::MASS, 1.0);
         caveats.push(if share > 0.5 { caveat.likely(likely) } else { caveat.as_note() });
     }
     caveats
 }
 
-/// Acceleration of gravity: on earth, elsewhere, or nowhere; upright or not.
+/// Checks the magnitude and the direction of gravity.
 pub(crate) fn gravity(g: &Vector3<f64>) -> Option<Caveat> {
     let size = g.norm();
     let near = |(place, _): &&(f64, &str)| (size / place - 1.0).abs() < 0.03;
@@ -141,7 +142,7 @@ fn tilted(message: String) -> Caveat {
     Caveat { unit: "m/s2".into(), ..Caveat::said("gravity-direction", "gravity", message, help) }.as_note()
 }
 
-/// Payload; `inertia.com` in the axes of the link that carries it.
+/// Checks a payload; `inertia.com` is in the axes of the link that carries it.
 pub(crate) fn payload(what: &str, inertia: &LinkInertia, size: &Size, weighs: bool) -> Vec<Caveat> {
     let mut caveats: Vec<Caveat> = far(what, inertia.com.norm(), size).into_iter().collect();
     if inertia.mass <= 0.0 {
@@ -175,7 +176,7 @@ pub(crate) fn payload(what: &str, inertia: &LinkInertia, size: &Size, weighs: bo
     caveats
 }
 
-/// Speeds and ranges that look like degrees.
+/// Checks for speeds and ranges that look like degrees.
 fn joint_limits(mechanism: &Mechanism, size: &Size) -> Vec<Caveat> {
     let turning: Vec<&Joint> = mechanism.joints.iter().filter(|j| j.kind.turns()).collect();
     let fast = turning.iter().filter(|j| j.limits.velocity.is_finite() && j.limits.velocity > FAST.0).map(|joint| {
@@ -195,15 +196,15 @@ fn joint_limits(mechanism: &Mechanism, size: &Size) -> Vec<Caveat> {
     fast.chain(ranges).collect()
 }
 
-/// Torques below this part of the arm's weight times its reach are none.
+/// Gravity torques below this fraction of the arm's weight times its reach count as zero.
 const NO_WEIGHT: f64 = 1e-4;
 
-/// Effort limits far beyond what the arm weighs and what its inertia asks for.
+/// Checks for effort limits far above the gravity and inertia torques of the arm.
 fn strong_drives(model: &Model, size: &Size) -> Option<Caveat> {
     let weight = weight_carried(model);
     let most = weight.iter().fold(0.0f64, |m, w| m.max(*w));
-    // A joint that hardly leaves the horizontal carries what its axis is off, no weight to measure
-    // a drive by.
+    // A joint with a nearly vertical axis only carries the gravity torque due to its misalignment,
+    // which is no measure for a drive.
     let some = NO_WEIGHT * size.mass * model.gravity.norm() * size.extent;
     let limited = |k: &usize| model.coordinates()[*k].limits.effort.is_finite();
     let effort = |k: usize| model.coordinates()[k].limits.effort;
@@ -215,7 +216,7 @@ fn strong_drives(model: &Model, size: &Size) -> Option<Caveat> {
         let caveat = || kinds::EFFORT_LIMIT.found(joint(k), effort(k), weight[k]);
         return (ratio > STRONG).then(|| caveat().likely(slip(ratio, &(0.5..=100.0), slip::EFFORT, 1.0)));
     }
-    // Nothing weighs on a joint: by what it could accelerate.
+    // Without a gravity torque the limit is judged by the acceleration it could cause.
     let inertia = inertia_moved(model);
     let heaviest = joints.into_iter().max_by(|a, b| inertia[*a].total_cmp(&inertia[*b]))?;
     let acceleration = effort(heaviest) / inertia[heaviest] * size.extent;

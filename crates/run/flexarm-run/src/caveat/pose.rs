@@ -1,4 +1,4 @@
-//! The arm at rest in a pose: how far it sags, how it would swing, what its gears give.
+//! Caveats about the arm at rest in a pose: sag, first natural frequency, deflection of gears.
 
 use flexarm_stepping::FlexibleArm;
 
@@ -7,12 +7,12 @@ use super::{Caveat, kinds};
 use crate::flexible::{FlexibleRobot, Owner};
 use crate::robot::Robot;
 
-/// Sag of the TCP over the size of the arm: note, warning.
+/// TCP sag relative to the size of the arm: note, warning.
 const SAG: [f64; 2] = [0.03, 0.1];
-/// First frequency below which an arm with gears is unusual, any arm is wrong (Hz).
+/// First natural frequency below which an arm with gears is unusual, and below which any arm is
+/// wrong (Hz).
 const SLOW: [f64; 2] = [3.0, 0.02];
-/// First frequency times size: above the speed of sound in steel and aluminium nothing swings so
-/// fast (m/s).
+/// Maximum of first natural frequency times size (m/s): the speed of sound in steel and aluminium.
 const SOUND: f64 = 5100.0;
 /// Damping ratio of the first mode: note, warning.
 const DAMPED: [f64; 2] = [0.2, 0.5];
@@ -22,14 +22,14 @@ pub(crate) struct Standing<'a> {
     pub(crate) robot: &'a Robot,
     pub(crate) flexible: &'a FlexibleRobot,
     pub(crate) arm: &'a FlexibleArm,
-    /// Its elastic coordinates.
+    /// Elastic coordinates.
     pub(crate) elastic: &'a [f64],
-    /// Deflection of its TCP (m).
+    /// Static TCP deflection (m).
     pub(crate) sag_m: f64,
 }
 
 impl Standing<'_> {
-    /// All of them.
+    /// Returns all of these caveats.
     pub(crate) fn caveats(&self) -> Vec<Caveat> {
         let extent = self.flexible.extent;
         let mut caveats = self.gears();
@@ -57,13 +57,13 @@ impl Standing<'_> {
                 (_, true) => (norm(e), 0.0),
                 _ => (0.0, norm(e)),
             };
-            // Play is no deflection.
+            // Backlash is not deflection.
             caveats.extend(give(drive, effort, (turned - drive.backlash).max(0.0), along, 1.0));
         }
         caveats
     }
 
-    /// Frequency and damping of the first mode.
+    /// Checks frequency and damping of the first mode.
     fn first_mode(&self, extent: f64) -> Vec<Caveat> {
         let modes = &self.arm.modes;
         let Some(omega) = modes.omega.first() else { return Vec::new() };

@@ -1,19 +1,18 @@
-//! Size and mass of a robot, as yardsticks.
+//! Size and mass of a robot, from which its own thresholds follow.
 
 use std::collections::HashMap;
 
 use flexarm_kinematics::{Data, LinkInertia, Mechanism, Model, gravity_forces, mass_matrix};
 use nalgebra::DVector;
 
-/// Poses at which torques of weight are looked at.
+/// Number of poses at which gravity torques are evaluated.
 const POSES: u32 = 32;
 
 /// Size of a robot, without its payload and tool.
 pub struct Size {
     /// Distance from the base along the chain, per link (m).
     distances: HashMap<String, f64>,
-    /// Reach of its mass from the base: joint distances, mass centres and radii of gyration
-    /// (m).
+    /// Reach of the mass from the base: joint distances, mass centres and radii of gyration (m).
     pub(crate) extent: f64,
     /// Mass (kg).
     pub(crate) mass: f64,
@@ -44,36 +43,36 @@ impl Size {
         size
     }
 
-    /// Distance of a link from the base along the chain (m).
+    /// Returns the distance of a link from the base along the chain (m).
     pub(crate) fn at(&self, link: &str) -> f64 {
         self.distances.get(link).copied().unwrap_or(0.0)
     }
 
-    /// Maximum reach of the subtree of a link (m).
+    /// Returns the maximum reach beyond a link (m).
     pub(crate) fn beyond(&self, link: &str) -> f64 {
         (self.extent - self.at(link)).max(0.0)
     }
 }
 
-/// Returns the maximum radius of gyration of a body (m).
+/// Maximum radius of gyration of a body (m).
 pub(crate) fn gyration(inertia: &LinkInertia) -> f64 {
     let largest = inertia.inertia_com.symmetric_eigenvalues().max();
     (largest.max(0.0) / inertia.mass).sqrt()
 }
 
-/// Density that a body of this mass and inertia has at least (kg/m³).
+/// Minimum density of a body with this mass and inertia (kg/m³).
 pub(crate) fn least_density(inertia: &LinkInertia) -> f64 {
     flexarm_linkmaker::yardsticks::least_density(inertia.mass, &inertia.inertia_com)
 }
 
-/// Returns the maximum torque of weight and balancers on each joint of the rigid robot in poses
-/// spread over the joint ranges (N m or N).
+/// Maximum gravity and balancer torque of each joint of the rigid robot, over poses spread over the
+/// joint ranges (N m or N).
 pub(crate) fn weight_carried(model: &Model) -> DVector<f64> {
     let mut data = Data::new(model);
     let mut weight = DVector::zeros(model.nv());
     for q in spread_poses(model) {
         let torques = gravity_forces(model, &mut data, &q).abs();
-        // A balancer may have no room there, which has a caveat of its own.
+        // A balancer may be out of range there, which has a caveat of its own.
         if torques.iter().all(|torque| torque.is_finite()) {
             weight = weight.sup(&torques);
         }
@@ -81,14 +80,14 @@ pub(crate) fn weight_carried(model: &Model) -> DVector<f64> {
     weight
 }
 
-/// Inertia that each joint moves in the middle of the ranges, rotors included (kg m² or kg).
+/// Inertia moved by each joint in the middle of the ranges, including rotors (kg m² or kg).
 pub(crate) fn inertia_moved(model: &Model) -> DVector<f64> {
     let limits = |k: usize| &model.coordinates()[k].limits;
     let q = DVector::from_fn(model.nv(), |k, _| middle(limits(k).lower, limits(k).upper));
     mass_matrix(model, &mut Data::new(model), &q).diagonal()
 }
 
-/// Poses spread over the joint ranges (rad or m); open ranges count from -3 to 3.
+/// Returns poses spread over the joint ranges (rad or m); unlimited ranges are taken as -3 to 3.
 pub(crate) fn spread_poses(model: &Model) -> impl Iterator<Item = DVector<f64>> + '_ {
     let place = |pose: u32, k: usize| {
         let limits = &model.coordinates()[k].limits;
@@ -99,12 +98,12 @@ pub(crate) fn spread_poses(model: &Model) -> impl Iterator<Item = DVector<f64>> 
     (1..=POSES).map(move |pose| DVector::from_fn(model.nv(), |k, _| place(pose, k)))
 }
 
-/// Middle of a joint range; of an open one what is nearest to zero.
+/// Middle of a joint range; for an open range the value nearest to zero.
 pub(crate) fn middle(lower: f64, upper: f64) -> f64 {
     if lower.is_finite() && upper.is_finite() { 0.5 * (lower + upper) } else { 0.0f64.max(lower).min(upper) }
 }
 
-/// Entry of Halton's sequence in the base that belongs to a coordinate, between 0 and 1.
+/// Entry of the Halton sequence in the base assigned to a coordinate, between 0 and 1.
 pub fn halton(mut index: u32, coordinate: usize) -> f64 {
     const PRIMES: [u32; 8] = [2, 3, 5, 7, 11, 13, 17, 19];
     let base = PRIMES[coordinate % PRIMES.len()];

@@ -1,5 +1,5 @@
-//! Stiffness of links: what a robot file gives against the beam or `.flex` file that it takes the
-//! place of, and against mass.
+//! Caveats about the stiffness of links: values in a robot file compared with the beam or `.flex`
+//! file that they replace, and with the mass.
 
 use flexarm_linkmaker::yardsticks::{SOUND, sound_speed};
 use nalgebra::{Matrix6, Vector6};
@@ -8,27 +8,27 @@ use super::slip::{self, slip};
 use super::{Caveat, kinds};
 use crate::flexible::RobotLink;
 
-/// Measured links are at most this many times as stiff, or as soft, as their beam or mesh in any
+/// Maximum stiffness ratio, or inverse ratio, of measured links to their beam or mesh in any
 /// direction.
 const MEASURED: f64 = 3.0;
-/// Coupling terms over the root of their diagonal terms: below, they do not matter.
+/// Coupling term relative to the geometric mean of its diagonal terms below which it is negligible.
 const COUPLED: f64 = 0.1;
-/// Two matrices that differ by less than this are the same.
+/// Relative difference below which two matrices count as equal.
 const SAME: f64 = 0.02;
-/// Slowest sound along a link of a robot by its stiffness and mass (m/s): castings with drives on
-/// them have 300.
+/// Minimum speed of sound along a robot link by its stiffness and mass (m/s); castings with drives
+/// on them have 300.
 const SLOWEST: f64 = 50.0;
 /// Factors of matrices in other units.
 const UNITS: &[slip::Factor] = &[(1e3, "N mm or m N"), (1e-3, "kN or N/mm"), (1e6, "mN"), (1e-6, "MN")];
 
-/// All of them about a link with two interfaces.
+/// Returns all of these caveats about a link with two interfaces.
 pub(crate) fn of_stiffness(name: &str, link: &RobotLink) -> Vec<Caveat> {
     let mut caveats: Vec<Caveat> = given(name, link).into_iter().collect();
     caveats.extend(sound(name, link));
     caveats
 }
 
-/// The stiffness that counts in two parts against that of the source.
+/// Compares the two-part stiffness with that of the source.
 fn given(name: &str, link: &RobotLink) -> Option<Caveat> {
     let source = link.flexible.reduced.split.K_S;
     let own = link.scaled(&source);
@@ -44,7 +44,7 @@ fn given(name: &str, link: &RobotLink) -> Option<Caveat> {
         .then(|| kinds::LINK_COUPLING.found(name, coupling, COUPLED).likely("its diagonal alone?"))
 }
 
-/// The matrix of which the given one is a copy, if it is one.
+/// Returns the name of the matrix that the given one copies, if there is one.
 fn copied(link: &RobotLink) -> Option<String> {
     let given = link.stiffness?;
     let reduced = &link.flexible.reduced;
@@ -63,7 +63,7 @@ fn copied(link: &RobotLink) -> Option<String> {
     sources.iter().find_map(of)
 }
 
-/// Returns minimum and maximum stiffness over that of another matrix in any direction.
+/// Minimum and maximum ratio of a stiffness to another over all directions.
 fn ratios(K: &Matrix6<f64>, other: &Matrix6<f64>) -> Option<[f64; 2]> {
     let L = other.cholesky()?.l();
     let half = L.solve_lower_triangular(K)?;
@@ -73,18 +73,18 @@ fn ratios(K: &Matrix6<f64>, other: &Matrix6<f64>) -> Option<[f64; 2]> {
     both.iter().all(|x| x.is_finite() && *x > 0.0).then_some(both)
 }
 
-/// Returns the maximum coupling term over the root of its diagonal terms.
+/// Maximum coupling term relative to the geometric mean of its diagonal terms.
 fn coupling(K: &Matrix6<f64>) -> f64 {
     let root: Vector6<f64> = K.diagonal().map(f64::sqrt);
     let scaled = Matrix6::from_fn(|i, j| if i == j { 0.0 } else { K[(i, j)] / (root[i] * root[j]) });
     scaled.amax()
 }
 
-/// Speed of sound along the link by its stiffness and mass.
+/// Checks the speed of sound along the link by its stiffness and mass.
 fn sound(name: &str, link: &RobotLink) -> Option<Caveat> {
     let reduced = &link.flexible.reduced;
     let apart = (reduced.X_LB.translation.vector - reduced.X_LA.translation.vector).norm();
-    // The interfaces of a beam are the frames of joints, which may coincide.
+    // The interfaces of a beam are joint frames, which may coincide.
     let length = link.beam.as_ref().map_or(apart, |beam| beam.length);
     let mass = reduced.proximal.mass + reduced.distal.mass;
     let speed = sound_speed(&link.scaled(&reduced.split.K_S), length, mass).filter(|speed| *speed > 0.0)?;

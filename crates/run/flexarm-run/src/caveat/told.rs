@@ -19,18 +19,19 @@ use crate::scenario::Scenario;
 /// Use of a robot by a command.
 #[derive(Clone, Copy)]
 pub enum Use<'a> {
-    /// Holds it at a pose (rad or m) with a wrench on the tool (world axes; N, N m).
+    /// Holds it at a pose (rad or m) with a wrench on the TCP (world axes; N, N m).
     Held(&'a [f64], &'a [f64; 6]),
     /// Moves it along a motion with its loads.
     Along(&'a Scenario),
-    /// Neither: the robot is looked at where its own motion begins, else in the middle of its joint
-    /// ranges.
+    /// Neither: the robot is checked at the start of its own motion, or else in the middle of its
+    /// joint ranges.
     Any,
 }
 
-/// All caveats about a robot as it is modelled and about what a command does with it, each once.
+/// Returns all caveats about a robot as modelled and about its use by a command, without
+/// duplicates.
 ///
-/// * `of_robot`: [`Robot::caveats`], if they are known.
+/// * `of_robot`: result of [`Robot::caveats`], if already known.
 pub fn told(robot: &Robot, flexible: &Arc<FlexibleRobot>, of_robot: Option<&[Caveat]>, used: Use<'_>) -> Vec<Caveat> {
     let mut caveats = of_model(robot, flexible, of_robot);
     let (pose, wrench) = match used {
@@ -56,13 +57,13 @@ pub fn told(robot: &Robot, flexible: &Arc<FlexibleRobot>, of_robot: Option<&[Cav
     once_each(caveats)
 }
 
-/// As [`told()`], for a robot as its file models it and commands that compute nothing of its links
-/// and drives.
+/// As [`told()`], for a robot as modelled by its file, in commands that compute nothing with its
+/// links and drives.
 pub(crate) fn of_robot(robot: &Robot) -> Result<Vec<Caveat>, Error> {
     Ok(told(robot, &Arc::new(robot.flexible_robot()?), None, Use::Any))
 }
 
-/// Returns the caveats about the files of a robot, and about its links and drives as modelled.
+/// Returns the caveats about a robot's files, and about its links and drives as modelled.
 pub(crate) fn of_model(robot: &Robot, flexible: &FlexibleRobot, of_robot: Option<&[Caveat]>) -> Vec<Caveat> {
     let mut caveats = of_robot.map_or_else(|| robot.caveats(), <[Caveat]>::to_vec);
     caveats.extend(flexible.caveats());
@@ -79,14 +80,14 @@ pub fn of_motion(motion: &Motion, rigid: &Model) -> Vec<Caveat> {
 }
 
 /// Returns the caveats about the loads and payloads of a scenario. Those that do not fit the robot
-/// are an error of the command.
+/// are an error of the command instead.
 fn of_scenario(robot: &Robot, scenario: &Scenario, flexible: &FlexibleRobot) -> Vec<Caveat> {
     let Ok(acting) = scenario.acting_on(robot, &flexible.model) else { return Vec::new() };
     let loads = motion::of_loads(&acting.loads, scenario.duration_s(), &Size::of(&robot.rigid));
     acting.caveats.into_iter().chain(loads).collect()
 }
 
-/// Returns the caveats about the arm at rest at a pose, under a wrench at the TCP.
+/// Returns the caveats about the arm at rest at a pose, under a wrench on the TCP.
 pub(crate) fn at_rest(robot: &Robot, posed: &Posed, linear: &Linear, wrench: &[f64; 6]) -> Vec<Caveat> {
     let mut caveats = posed.caveats();
     caveats.extend(motion::of_wrench(wrench, &Size::of(&robot.rigid)));
@@ -94,8 +95,8 @@ pub(crate) fn at_rest(robot: &Robot, posed: &Posed, linear: &Linear, wrench: &[f
     caveats
 }
 
-/// Returns the pose for checks: the start of the motion, else the middle of the joint
-/// ranges (rad or m).
+/// Returns the pose at which a robot is checked: the start of the motion, or else the middle of its
+/// joint ranges (rad or m).
 pub(crate) fn standing_pose(robot: &Robot, motion: Option<&Motion>) -> Result<Vec<f64>, Error> {
     let model = robot.rigid_model()?;
     let actuated = &model.coordinates()[..model.n_actuated()];

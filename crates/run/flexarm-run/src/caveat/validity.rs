@@ -1,5 +1,5 @@
-//! Whether the models hold: deflections, strains, forces of drives, sampling. For runs, statics and
-//! `check` alike.
+//! Validity of the models: deflections, strains, drive torques, sampling. Used by runs, statics and
+//! `check`.
 
 use std::f64::consts::TAU;
 
@@ -9,24 +9,24 @@ use flexarm_stepping::{StepperKind, error_of_a_period};
 use super::slip::{self, slip};
 use super::{Caveat, CaveatKind, kinds};
 
-/// Maximum elastic rotation of the linear elastic model (rad).
+/// Maximum elastic rotation for which the linear elastic model is assumed valid (rad).
 const ROTATION_LIMIT: f64 = 0.05;
 /// Maximum engineering strain of a flexible link.
 const STRAIN_LIMIT: f64 = 1e-3;
-/// Maximum imbalance of the energy.
+/// Maximum relative gap in the energy balance.
 const IMBALANCE_LIMIT: f64 = 0.02;
-/// Minimum number of samples in a period of the first mode.
+/// Minimum number of samples per period of the first mode.
 const SAMPLES_PER_PERIOD: f64 = 10.0;
-/// Maximum error of the first mode within a period, over its amplitude.
+/// Maximum error of the first mode within a period, relative to its amplitude.
 const PERIOD_ERROR: f64 = 0.05;
-/// Maximum part of the TCP error that may be constraint drift.
+/// Maximum share of joint drift in the TCP error.
 const DRIFT: f64 = 0.01;
-/// Wider settling bands are slips (m).
+/// Maximum plausible settling band (m).
 const WIDE_BAND: f64 = 0.01;
 /// Minimum number of steps in the longest move.
 const STEPS_PER_MOVE: f64 = 50.0;
 
-/// A flexible link whose far end turned by so much (rad), with so much engineering strain.
+/// Checks the rotation of a flexible link's far end (rad) and its engineering strain.
 pub(crate) fn link(name: &str, rotation: f64, strain: f64) -> impl Iterator<Item = Caveat> {
     let link = format!("link {name:?}");
     let bent = (rotation > ROTATION_LIMIT).then(|| kinds::LARGE_DEFORMATION.found(&link, rotation, ROTATION_LIMIT));
@@ -34,7 +34,7 @@ pub(crate) fn link(name: &str, rotation: f64, strain: f64) -> impl Iterator<Item
     bent.into_iter().chain(strained)
 }
 
-/// Drives that need more than they have, in coordinate order: [`kinds::EFFORT`] or
+/// Checks for drives that exceed their effort limits, in coordinate order: [`kinds::EFFORT`] or
 /// [`kinds::HOLDING`].
 pub(crate) fn efforts<'a>(
     kind: &'a CaveatKind,
@@ -47,14 +47,14 @@ pub(crate) fn efforts<'a>(
     coordinates.iter().zip(needed).filter(over).map(told)
 }
 
-/// A limited joint further than this outside its range may have been given in degrees: times its
-/// limit, and at least (rad).
+/// Excess of a joint value over its limit beyond which it may be in degrees: multiple of the limit,
+/// and minimum (rad).
 const LIKE_DEGREES: (f64, f64) = (1.25, std::f64::consts::PI);
-/// A joint without limits that turns further than this may have been (rad): two turns.
+/// Value of a joint without limits beyond which it may be in degrees (rad): two turns.
 const MANY_TURNS: f64 = 4.0 * std::f64::consts::PI;
 
-/// Whether the value of a joint that turns was probably meant in degrees: in degrees it lies in the
-/// range, in radians far outside.
+/// Whether the value of a revolute joint was probably meant in degrees: as degrees it is within the
+/// range, as radians far outside.
 fn like_degrees(c: &Coordinate, q: f64) -> bool {
     let (lower, upper) = (c.limits.lower, c.limits.upper);
     let limit = if q < 0.0 { lower } else { upper };
@@ -62,7 +62,7 @@ fn like_degrees(c: &Coordinate, q: f64) -> bool {
     c.kind != "prismatic" && q.abs() > far && (lower..=upper).contains(&q.to_radians())
 }
 
-/// Joints outside their range at a pose, and joints without a range at many turns.
+/// Checks for joints outside their range at a pose, and for joints without a range at many turns.
 pub fn outside_limits<'a>(coordinates: &'a [Coordinate], q: &'a [f64]) -> impl Iterator<Item = Caveat> + 'a {
     coordinates.iter().zip(q).filter_map(|(c, q)| {
         let (lower, upper) = (c.limits.lower, c.limits.upper);
@@ -81,27 +81,27 @@ pub fn outside_limits<'a>(coordinates: &'a [Coordinate], q: &'a [f64]) -> impl I
     })
 }
 
-/// Samples against the first mode (Hz).
+/// Checks the sample rate against the first mode (Hz).
 pub(crate) fn sampling(first_hz: f64, logged_hz: f64) -> Option<Caveat> {
     (logged_hz < SAMPLES_PER_PERIOD * first_hz).then(|| kinds::FEW_SAMPLES.found("run", logged_hz, first_hz))
 }
 
-/// Steps (s) against the first mode (Hz, damping ratio), by what the stepper makes of an
-/// oscillation like it.
+/// Checks the step size (s) against the first mode (Hz, damping ratio), by the stepper's error on
+/// such an oscillation.
 pub(crate) fn step(kind: StepperKind, step_s: f64, first_hz: f64, ratio: f64) -> Option<Caveat> {
-    // A nearly critically damped mode has no period.
+    // A nearly overdamped mode has no period.
     let error = if ratio < 0.9 { error_of_a_period(kind, step_s * TAU * first_hz, ratio) } else { 0.0 };
     (error > PERIOD_ERROR).then(|| kinds::COARSE_STEP.found("run", 100.0 * error, 100.0 * PERIOD_ERROR))
 }
 
-/// Constraint drift of a stepper in maximal coordinates, as a part of the peak
-/// TCP error.
+/// Checks the joint drift of a stepper in maximal coordinates, as a fraction of the maximum TCP
+/// error.
 pub(crate) fn drift(stepper: &str, part: f64) -> Option<Caveat> {
     (part > DRIFT).then(|| kinds::JOINT_DRIFT.found(format!("the steps of {stepper}"), 100.0 * part, 100.0 * DRIFT))
 }
 
-/// A settling band (m) against what robots are specified by and against the largest TCP error (m).
-/// The usual band is only noted.
+/// Checks a settling band (m) against usual robot specifications and against the maximum TCP error
+/// (m). For the default band it gives only a note.
 pub(crate) fn band(band_m: f64, peak_m: f64, usual_m: f64) -> Option<Caveat> {
     let likely = || slip(band_m, &(1e-6..=WIDE_BAND), slip::LENGTH, 1.0);
     if band_m > WIDE_BAND {
@@ -111,14 +111,14 @@ pub(crate) fn band(band_m: f64, peak_m: f64, usual_m: f64) -> Option<Caveat> {
     (peak_m > 0.0 && band_m > peak_m).then(|| if band_m == usual_m { beyond.as_note() } else { beyond })
 }
 
-/// A step that cuts even the longest move of a motion into few parts.
+/// Checks for a step size that divides even the longest move into few steps.
 pub(crate) fn long_step(step_s: f64, moves_s: impl Iterator<Item = f64>) -> Option<Caveat> {
     let most = moves_s.fold(0.0, f64::max) / STEPS_PER_MOVE;
     let likely = || slip(step_s, &(1e-6..=most), &[(1e3, "milliseconds")], 1.0);
     (most > 0.0 && step_s > most * (1.0 + 1e-9)).then(|| kinds::LONG_STEP.found("run", step_s, most).likely(likely()))
 }
 
-/// Gap of the energy balance, as a part of the energy in it.
+/// Checks the gap of the energy balance, relative to the energy in it.
 pub(crate) fn energy(imbalance: f64) -> Option<Caveat> {
     let open = imbalance > IMBALANCE_LIMIT;
     open.then(|| kinds::ENERGY_OPEN.found("run", 100.0 * imbalance, 100.0 * IMBALANCE_LIMIT))

@@ -1,4 +1,4 @@
-//! Models that a robot cannot have, and poses that cannot be answered.
+//! Errors about models that a robot cannot have, and about poses without a solution.
 
 use std::path::PathBuf;
 
@@ -7,51 +7,50 @@ use flexarm_flexlink::{GearboxError, MountingError, SubstitutionError};
 use flexarm_settings::{OutOfRange, Setting};
 use flexarm_stepping::StepError;
 
-/// Links and drives that cannot be modelled as asked for.
+/// Link or drive that cannot be modelled as requested.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ModellingError {
-    /// A link that does not have the model asked for; the sentence names the link and what is
-    /// missing.
+    /// A link does not have the requested model; the message names the link and what is missing.
     #[error("{0}")]
     NoSuchModel(String),
-    /// A link with load on a third interface that cannot bend in modes either.
+    /// A link with load on a third interface cannot be modelled with modes either.
     #[error("link {link:?}: {why}; {instead}")]
     Branch {
-        /// The link.
+        /// Name of the link.
         link: String,
-        /// Attached bodies and their interfaces.
+        /// Joint on the third interface.
         why: String,
-        /// Why it cannot bend in modes.
+        /// Reason why the link cannot be modal.
         instead: String,
     },
-    /// A number of segments, and no lumped link that takes it.
+    /// A number of segments is requested, but no link is lumped.
     #[error("{segments} segments are requested, but no link of the robot is lumped: {}", lumped_remedy(modal_instead))]
     NoLumpedLink {
-        /// Segments asked for.
+        /// Requested number of segments.
         segments: usize,
-        /// Links that are modal although lumped was asked for, each with the reason.
+        /// Links that are modal although lumped was requested, each with the reason.
         modal_instead: Vec<String>,
     },
-    /// A number of modes, and no modal link that takes it.
+    /// A number of modes is requested, but no link is modal.
     #[error("{modes} modes are requested, but no link of the robot is modal: add {} modal", Setting::Links)]
     NoModalLink {
-        /// Modes asked for.
+        /// Requested number of modes.
         modes: usize,
     },
-    /// The substitution of the links.
+    /// Substitution of the links failed.
     #[error(transparent)]
     Substitution(#[from] SubstitutionError),
-    /// The springs of the gearboxes.
+    /// Insertion of the gearbox springs failed.
     #[error(transparent)]
     Gearbox(#[from] GearboxError),
-    /// The springs under the base.
+    /// Insertion of the springs under the base failed.
     #[error(transparent)]
     Mounting(#[from] MountingError),
-    /// An elastic joint that the substitution made and that no link owns.
+    /// An elastic joint of the substituted model belongs to no link.
     #[error("elastic joint {joint:?} has no stiffness")]
     NoStiffness {
-        /// The joint.
+        /// Name of the joint.
         joint: String,
     },
 }
@@ -60,75 +59,75 @@ fn lumped_remedy(modal_instead: &[String]) -> String {
     if modal_instead.is_empty() { format!("add {} lumped", Setting::Links) } else { modal_instead.join("; ") }
 }
 
-/// Balancers that do not fit the robot, and poses in which they cannot be.
+/// Balancer that does not fit the robot, or pose outside its range.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum BalancerError {
-    /// Two of one name.
+    /// Two balancers have the same name.
     #[error("balancer {name:?} is there twice: give each a name of its own")]
     Twice {
-        /// The name.
+        /// Name of the balancers.
         name: String,
     },
-    /// No such link.
+    /// The link does not exist.
     #[error("balancer {name:?}: {link:?} is not a link of the robot; its links are {known:?}")]
     UnknownLink {
-        /// The balancer.
+        /// Name of the balancer.
         name: String,
-        /// The link asked for.
+        /// Requested link.
         link: String,
-        /// The links there are.
+        /// Links of the robot.
         known: Vec<String>,
     },
-    /// A point that is no place.
+    /// A point is not finite.
     #[error("balancer {name:?}: its point on link {link:?} has the entry {value}, expected finite numbers in m")]
     NotFinite {
-        /// The balancer.
+        /// Name of the balancer.
         name: String,
-        /// The link.
+        /// Link of the point.
         link: String,
-        /// The entry.
+        /// Invalid coordinate.
         value: f64,
     },
-    /// Both ends on one rigid body.
+    /// Both ends are on one rigid body.
     #[error(
         "balancer {name:?}: no joint moves link {second:?} against link {first:?}, so it does nothing: put its ends on links with a joint \
          between them"
     )]
     SameBody {
-        /// The balancer.
+        /// Name of the balancer.
         name: String,
-        /// One link.
+        /// Link of the first end.
         first: String,
-        /// The other one.
+        /// Link of the second end.
         second: String,
     },
-    /// No such joint.
+    /// The joint does not exist.
     #[error("balancer {name:?}: the robot has no movable joint {joint:?}; it has {known:?}")]
     UnknownJoint {
-        /// The balancer.
+        /// Name of the balancer.
         name: String,
-        /// The joint asked for.
+        /// Requested joint.
         joint: String,
-        /// The joints that move.
+        /// Movable joints of the robot.
         known: Vec<String>,
     },
-    /// A joint that a closed loop moves.
+    /// The joint depends on a closed loop.
     #[error("balancer {name:?}: joint {joint:?} follows from a loop, {own:?}: give its two ends, from and to, instead")]
     Dependent {
-        /// The balancer.
+        /// Name of the balancer.
         name: String,
-        /// The joint.
+        /// Name of the joint.
         joint: String,
-        /// The loop.
+        /// Name of the loop.
         own: String,
     },
-    /// A sine over a slide.
+    /// A sine is given for a prismatic joint.
     #[error("balancer {name:?}: a sine is a torque over an angle, but joint {joint:?} slides: use spring or curve")]
     Slides {
-        /// The balancer.
+        /// Name of the balancer.
         name: String,
-        /// The joint.
+        /// Name of the joint.
         joint: String,
     },
     /// The piston is beyond the end of its cylinder.
@@ -137,125 +136,125 @@ pub enum BalancerError {
          and the length to which these belong"
     )]
     NoRoom {
-        /// The balancer.
+        /// Name of the balancer.
         name: String,
-        /// Its length (m).
+        /// Length of the balancer (m).
         length: f64,
         /// `above` or `below`.
         beyond: &'static str,
-        /// End of the room (m).
+        /// Limit of the length (m).
         end: f64,
     },
-    /// Both ends at one place.
+    /// Both ends are at the same position.
     #[error(
         "both ends of balancer {name:?} are at the same place there, so that its force has no direction: move an end"
     )]
     NoLength {
-        /// The balancer.
+        /// Name of the balancer.
         name: String,
     },
-    /// One of these during a motion.
+    /// One of these errors occurs during a motion.
     #[error("at t = {t:.3} s: {source}")]
     AlongMotion {
-        /// When (s).
+        /// Time (s).
         t: f64,
-        /// Why.
+        /// Cause.
         #[source]
         source: Box<BalancerError>,
     },
 }
 
-/// Closed loops that do not fit the robot, and poses in which they do not close.
+/// Closed loop that does not fit the robot, or pose in which it does not close.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LoopError {
-    /// Two of one name.
+    /// Two loops have the same name.
     #[error("loop {name:?} is there twice: give each a name of its own")]
     Twice {
-        /// The name.
+        /// Name of the loops.
         name: String,
     },
-    /// No such link.
+    /// The link does not exist.
     #[error("loop {name:?}: {link:?} is not a link of the robot; its links are {known:?}")]
     UnknownLink {
-        /// The loop.
+        /// Name of the loop.
         name: String,
-        /// The link asked for.
+        /// Requested link.
         link: String,
-        /// The links there are.
+        /// Links of the robot.
         known: Vec<String>,
     },
-    /// A number that is none.
+    /// A value is not finite.
     #[error("loop {name:?}: {what} has the entry {value}, expected finite numbers")]
     NotFinite {
-        /// The loop.
+        /// Name of the loop.
         name: String,
-        /// Quantity.
+        /// Name of the quantity.
         what: String,
-        /// The entry.
+        /// Invalid value.
         value: f64,
     },
-    /// An axis without direction.
+    /// The axis has no direction.
     #[error("loop {name:?}: axis is {axis:?}, expected the direction of the pin in axes of its link")]
     BadAxis {
-        /// The loop.
+        /// Name of the loop.
         name: String,
-        /// Given value.
+        /// Given axis.
         axis: [f64; 3],
     },
-    /// None to take the axis from.
+    /// No axis is given, and no dependent joint turns from which it could be taken.
     #[error(
         "loop {name:?}: none of its dependent joints turns, so that its pin needs an axis: give axis = [x, y, z] in axes of the pin's link"
     )]
     NoAxis {
-        /// The loop.
+        /// Name of the loop.
         name: String,
     },
-    /// Error of the tree.
+    /// The kinematic tree rejects the loop.
     #[error("loop {name:?}: {what}")]
     Unfit {
-        /// The loop.
+        /// Name of the loop.
         name: String,
-        /// Fault.
+        /// Cause.
         what: String,
     },
-    /// A joint with a motor.
+    /// A dependent joint has a drive.
     #[error("loop {name:?}: joint {joint:?} has a drive and follows from the loop: only one of both moves it")]
     Driven {
-        /// The loop.
+        /// Name of the loop.
         name: String,
-        /// The joint.
+        /// Name of the joint.
         joint: String,
     },
-    /// The bars do not reach each other.
+    /// The loop cannot be closed: its links do not reach each other.
     #[error(
         "loop {name:?} does not close there: its links do not reach each other; keep the driving joints within the range of its bars, or check their lengths"
     )]
     Open {
-        /// The loop.
+        /// Name of the loop.
         name: String,
     },
-    /// Bars in a line.
+    /// The loop passes a dead point: its links are in line.
     #[error(
         "loop {name:?} passes its dead point there: its links lie in a line, and they could go on in two ways; keep the motion away from it"
     )]
     DeadPoint {
-        /// The loop.
+        /// Name of the loop.
         name: String,
     },
-    /// One of these during a motion.
+    /// One of these errors occurs during a motion.
     #[error("at t = {t:.3} s: {source}")]
     AlongMotion {
-        /// When (s).
+        /// Time (s).
         t: f64,
-        /// Why.
+        /// Cause.
         #[source]
         source: Box<LoopError>,
     },
 }
 
 impl LoopError {
-    /// The loop.
+    /// Returns the name of the loop.
     pub fn name(&self) -> &str {
         match self {
             Self::Twice { name }
@@ -272,40 +271,40 @@ impl LoopError {
     }
 }
 
-/// Joint values that do not fit the robot, and poses without an answer.
+/// Joint values that do not fit the robot, or pose without a solution.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PoseError {
-    /// Another number of joint values than there are movable joints.
+    /// The number of joint values differs from the number of movable joints.
     #[error("{found} joint values given, the robot has {} movable joints: {joints:?}", joints.len())]
     Count {
-        /// Values given.
+        /// Number of values given.
         found: usize,
-        /// The movable joints in coordinate order.
+        /// Movable joints in coordinate order.
         joints: Vec<String>,
     },
-    /// A joint value that is no number.
+    /// A joint value is not finite.
     #[error("joint {joint:?} at {value} is at no finite number")]
     NotFinite {
-        /// The joint.
+        /// Name of the joint.
         joint: String,
         /// Its value (rad or m).
         value: f64,
     },
-    /// Samples of a motion that do not fill all times and joints.
+    /// The number of samples of a motion does not match times and joints.
     #[error(
         "{found} joint values are given for {times} times; the robot has {joints} joints, so {} are expected",
         joints * times
     )]
     Samples {
-        /// Values given.
+        /// Number of values given.
         found: usize,
-        /// Times given.
+        /// Number of times given.
         times: usize,
-        /// Movable joints of the robot.
+        /// Number of movable joints of the robot.
         joints: usize,
     },
-    /// Body without inertia about some axis.
+    /// A moving body has no inertia about some axis.
     #[error(
         "{}: {source}: {} lacks inertia about some axis, with all that it carries; give the links <inertial> with mass \
          and inertia, have them estimated (inertia_from_density in the robot file), or keep everything before them rigid",
@@ -313,138 +312,138 @@ pub enum PoseError {
         links.join(", ")
     )]
     WithoutInertia {
-        /// The URDF.
+        /// Path of the URDF.
         path: PathBuf,
-        /// The matrix that is singular.
+        /// Error that reports the singular matrix.
         source: StepError,
-        /// Elastic coordinate that carries no inertia.
+        /// Elastic bodies and joints without inertia.
         links: Vec<String>,
     },
-    /// The linear structure at the pose.
+    /// The linearised model at the pose is invalid.
     #[error("the linear model at this pose: {0}")]
     Linear(#[source] LinearError),
-    /// Figures that overflowed: masses, lengths or joint values of 1e200.
+    /// Results overflow, for example with masses, lengths or joint values of 1e200.
     #[error(
         "{what} are not finite: a mass, a length, a stiffness, a force or a joint value is far too large or too small"
     )]
     Overflow {
-        /// The figures.
+        /// Names of the results.
         what: String,
     },
-    /// Modes are to be recorded of a robot that has none.
+    /// Modes cannot be recorded because the robot has none.
     #[error("the robot has no flexible link, so there are no modes to record")]
     NoModes,
 }
 
-/// Inputs and outputs of a frequency response that make no sense.
+/// Invalid inputs or outputs of a frequency response.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ChannelError {
-    /// An input that is neither a force at the tool nor a joint.
+    /// The input is neither a force at the TCP nor a joint.
     #[error("input {word:?} is not known; inputs are {forces:?} and the joints {joints:?}")]
     UnknownInput {
-        /// The word.
+        /// Given name.
         word: String,
-        /// Forces and moments at the tool.
+        /// Forces and moments at the TCP.
         forces: &'static [&'static str],
         /// Joints of the robot.
         joints: Vec<String>,
     },
-    /// An output that is no axis of the tool.
+    /// The output is not an axis of the TCP.
     #[error("output {word:?} is not known; outputs are {axes:?} (the folder is {})", Setting::Output)]
     UnknownOutput {
-        /// The word.
+        /// Given name.
         word: String,
-        /// The axes.
+        /// Axes of the TCP.
         axes: &'static [&'static str],
     },
-    /// No input, or no output.
+    /// No input or no output is given.
     #[error("no {side} is given")]
     Missing {
         /// `input` or `output`.
         side: &'static str,
     },
-    /// The same one twice.
+    /// An input or output is given twice.
     #[error("{side} {word:?} is given twice")]
     Twice {
         /// `input` or `output`.
         side: &'static str,
-        /// The word.
+        /// Given name.
         word: String,
     },
 }
 
-/// A load as values that makes no sense.
+/// Load with invalid values.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LoadError {
-    /// Samples that are no function of time.
+    /// The samples are not a function of time.
     #[error(
         "a load needs at least two samples, one wrench for each time, and times that increase; found {times} times and \
          {wrenches} wrenches"
     )]
     Samples {
-        /// Times given.
+        /// Number of times given.
         times: usize,
-        /// Wrenches given.
+        /// Number of wrenches given.
         wrenches: usize,
     },
-    /// A frame that is neither the tool nor a link that moves.
+    /// The frame is neither the TCP nor a moving link.
     #[error("load on frame {frame:?}: expected \"tcp\" or a link that moves, of {known:?}")]
     UnknownFrame {
-        /// The frame.
+        /// Given frame.
         frame: String,
-        /// Links that move.
+        /// Moving links.
         known: Vec<String>,
     },
-    /// A number of a size that no load has.
+    /// A value is outside the range of plausible loads.
     #[error(transparent)]
     OutOfRange(#[from] OutOfRange),
-    /// A change of what a link carries.
+    /// A change of payload is invalid.
     #[error(transparent)]
     Payload(#[from] PayloadError),
 }
 
-/// Changes of payload that a robot cannot have.
+/// Invalid change of payload.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PayloadError {
-    /// A time, mass or other number that is negative or not finite.
+    /// A time, mass or other number is negative or not finite.
     #[error("a payload needs a time and a mass of at least 0, and finite numbers")]
     Numbers,
-    /// An inertia that no body has.
+    /// The inertia is not physical.
     #[error("payload inertia has a negative principal moment; the order is ixx iyy izz ixy ixz iyz")]
     NegativeMoment,
-    /// A link that is not the one of the robot's own payload, which would stay where it is.
+    /// The link is not that of the robot's own payload, which would stay where it is.
     #[error("the robot's own payload does not ride on link {link:?}: give that link")]
     OtherLink {
-        /// The link.
+        /// Given link.
         link: String,
     },
-    /// Two links that carry in one run.
+    /// Two bodies carry payloads in one run.
     #[error("payloads on two bodies ({first:?} and {second:?}): one changes in a run")]
     TwoBodies {
-        /// The body of an earlier change.
+        /// Body of an earlier change.
         first: String,
-        /// The link of this one.
+        /// Link of this change.
         second: String,
     },
-    /// A link that does not move or is not there.
+    /// The link does not exist or does not move.
     #[error("payload link {link:?}: expected a link that moves, of {known:?}")]
     UnknownLink {
-        /// The link.
+        /// Given link.
         link: String,
-        /// Links that move.
+        /// Moving links.
         known: Vec<String>,
     },
-    /// A flexible link.
+    /// The link is flexible.
     #[error(
         "payload link {link:?} is flexible, so that the position of the payload on it is not defined: name a link beyond it, of {beyond:?}"
     )]
     Bends {
-        /// The link.
+        /// Given link.
         link: String,
-        /// Links that hang on it.
+        /// Links attached to it.
         beyond: Vec<String>,
     },
 }

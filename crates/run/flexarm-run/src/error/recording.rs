@@ -1,56 +1,56 @@
-//! Recordings, studies and reports that cannot be made of what is given.
+//! Errors about recordings, studies and reports.
 
 use std::path::PathBuf;
 
 use flexarm_log::RecordingFormat;
 use flexarm_settings::Setting;
 
-/// A recording that cannot be read, written or reported as asked for.
+/// A recording cannot be read, written or reported as requested.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RecordingError {
-    /// A file name of no known format.
+    /// The file name does not identify a format.
     #[error(
         "{}: the name has {}, expected one of {}: rename the file{}",
         path.display(), ending(path), endings(), or_say(*setting)
     )]
     UnknownEnding {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Setting that chooses the format independently of the name.
+        /// Setting that gives the format regardless of the name.
         setting: Option<Setting>,
     },
-    /// A format that was left out when the program was built.
+    /// The program was built without this format.
     #[error("{}: this program was built without {format}; use a build with it", path.display())]
     NotBuiltIn {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Its format.
+        /// Format of the file.
         format: RecordingFormat,
     },
-    /// A recording is wanted of a program that was built without its format.
+    /// A recording is requested in a format without which the program was built.
     #[error("this program was built without {format}; use a build with it")]
     WithoutFormat {
-        /// The format.
+        /// Requested format.
         format: RecordingFormat,
     },
-    /// A conversion of a file into itself.
+    /// Input and output of a conversion are the same file.
     #[error("{} is input and output: give the output another name", path.display())]
     SameFile {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
     },
-    /// A report that would replace what it is made of.
+    /// A report would replace a recording from which it is made.
     #[error(
         "{} is a recording and the page to be written: give the page another name with {}",
         path.display(),
         Setting::Output
     )]
     PageOverRecording {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
     },
-    /// A report of nothing.
+    /// No recording is given for a report.
     #[error("give at least one recording, or the folder of a run")]
     NothingToReport,
 }
@@ -67,39 +67,39 @@ fn or_say(setting: Option<Setting>) -> String {
     setting.map_or_else(String::new, |setting| format!(" or give its format with {setting}"))
 }
 
-/// Runs of a study with equal or unusable labels.
+/// Runs of a study with invalid labels.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum StudyError {
-    /// A study without runs.
+    /// The study has no runs.
     #[error("a study needs at least one run")]
     Empty,
-    /// A label that is empty, or another run's.
+    /// A label is empty, or used twice.
     #[error(
         "the label {label:?} names two runs of the study, or none: give each {} a name=... of its own",
         Setting::Variant
     )]
     LabelTwice {
-        /// The label.
+        /// Label.
         label: String,
     },
-    /// A label that is the name of a file of the study.
+    /// A label is the name of a file of the study.
     #[error("the label {label:?} is the name of a file of the study: give its {} another name=...", Setting::Variant)]
     LabelOfFile {
-        /// The label.
+        /// Label.
         label: String,
     },
-    /// A label that is too long for the name of a folder.
+    /// A label is too long for a folder name.
     #[error(
         "the label {label:?} has {letters} letters, at most {most} make a folder: give its {} a short name=...",
         Setting::Variant
     )]
     LongLabel {
-        /// The label.
+        /// Label.
         label: String,
-        /// Letters of the folder's name.
+        /// Length of the folder name.
         letters: usize,
-        /// Maximum length (characters).
+        /// Maximum length.
         most: usize,
     },
 }

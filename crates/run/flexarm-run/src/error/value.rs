@@ -1,72 +1,72 @@
-//! Numbers of options that make no sense, each with the number and what is expected.
+//! Errors about invalid option values, each with the value and what is expected.
 
 use flexarm_settings::{OutOfRange, Setting};
 
-/// A number of a run or a response that makes no sense.
+/// An invalid value of an option.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ValueError {
-    /// The step, which must be positive.
+    /// The step size is not positive.
     #[error("{setting}: the step must be positive, found {0} s", setting = Setting::Step)]
     Step(f64),
-    /// A number that is none.
+    /// A value is not finite.
     #[error("{what} has the entry {found}, expected finite numbers")]
     NotFinite {
-        /// Quantity.
+        /// Name of the quantity.
         what: &'static str,
-        /// The entry.
+        /// Invalid value.
         found: f64,
     },
-    /// A number of a size that no robot has.
+    /// A value is outside the range of plausible robots.
     #[error(transparent)]
     OutOfRange(#[from] OutOfRange),
-    /// The log rate, which must be positive.
+    /// The log rate is not positive.
     #[error("{setting}: the log rate must be positive, found {0} Hz", setting = Setting::LogRate)]
     LogRate(f64),
-    /// The settling band, which must be positive.
+    /// The settling band is not positive.
     #[error("{setting}: the settling band must be positive, found {0} m", setting = Setting::SettlingBand)]
     SettlingBand(f64),
-    /// The factor of deflections, which must be positive.
+    /// The magnification of deflections is not positive.
     #[error("the factor of deflections ({setting}) must be positive, found {0} times", setting = Setting::Magnification)]
     Magnification(f64),
-    /// The factor of a parameter, which must be positive.
+    /// The factor of a parameter is not positive.
     #[error("the factor of the {what} must be positive, found {found}")]
     Factor {
-        /// Parameter.
+        /// Name of the parameter.
         what: &'static str,
-        /// The factor.
+        /// Given factor.
         found: f64,
     },
-    /// A factor of deflections that no picture can have.
+    /// The magnification of deflections is outside the displayable range.
     #[error(
         "the factor of deflections ({}) is {found:e}: expected one from {least} to {most}, 1 shows them as they are",
         Setting::Magnification
     )]
     MagnificationRange {
-        /// The factor.
+        /// Given factor.
         found: f64,
         /// Minimum.
         least: f64,
         /// Maximum.
         most: f64,
     },
-    /// A motion that ends within the first step.
+    /// The motion ends within the first step.
     #[error("the step ({} {step_s} s) is longer than the motion ({duration_s} s)", Setting::Step)]
     StepBeyondMotion {
-        /// Step (s).
+        /// Step size (s).
         step_s: f64,
         /// Duration of the motion (s).
         duration_s: f64,
     },
-    /// A control period that is no whole number of steps.
+    /// The control period is not a whole number of steps.
     #[error("a control period of {period_s} s is not a whole number of steps ({} {step_s} s)", Setting::Step)]
     Period {
         /// Period (s).
         period_s: f64,
-        /// Step (s).
+        /// Step size (s).
         step_s: f64,
     },
-    /// A run that would not come to an end.
+    /// The run would take too many steps.
     #[error(
         "{duration_s} s in steps of {step_s:e} s make {:.1e} steps, at most {most:.0e} are taken: raise {} or cut the \
          trajectory",
@@ -74,67 +74,66 @@ pub enum ValueError {
         Setting::Step
     )]
     TooManySteps {
-        /// Step (s).
+        /// Step size (s).
         step_s: f64,
         /// Duration of the motion (s).
         duration_s: f64,
-        /// Maximum number of steps of a run.
+        /// Maximum number of steps.
         most: f64,
     },
-    /// The time within which corners are rounded, which must be positive.
+    /// The blend time of rounded corners is not positive.
     #[error("corners are rounded within a positive time, found {0} s: try 0.02")]
     CornerTime(f64),
-    /// Duration of a mode in a recording; must be positive and below 1000 s.
+    /// The duration of each mode in a recording is not positive and below 1000 s.
     #[error("{setting} must be positive and below 1000, found {0} s", setting = Setting::Seconds)]
     Seconds(f64),
-    /// Amplitude of the TCP in a recording of modes; must be positive and below 1000 m.
+    /// The TCP amplitude in a recording of modes is not positive and below 1000 m.
     #[error("{setting} must be positive and below 1000, found {0} m", setting = Setting::ToolMotion)]
     ToolMotion(f64),
-    /// Points of a response.
+    /// The number of points of a response is out of range.
     #[error("{} must lie between {least} and {most}, found {found}", Setting::Points)]
     Points {
-        /// Points asked for.
+        /// Given number of points.
         found: usize,
-        /// Fewest.
+        /// Minimum.
         least: usize,
-        /// Most.
+        /// Maximum.
         most: usize,
     },
-    /// The lowest frequency of a response, which must not be negative, and not zero on a
-    /// logarithmic axis.
+    /// The lowest frequency of a response is negative, or zero on a logarithmic axis.
     #[error("{} must be {}, found {found} Hz", Setting::LowestFrequency, lowest(*logarithmic))]
     LowestFrequency {
-        /// The frequency (Hz).
+        /// Given frequency (Hz).
         found: f64,
         /// Whether the axis is logarithmic.
         logarithmic: bool,
     },
-    /// The highest frequency of a response.
+    /// The highest frequency of a response is out of range.
     #[error(
         "{} must lie above {} ({lowest} Hz) and below 1e6 Hz, found {found} Hz",
         Setting::HighestFrequency,
         Setting::LowestFrequency
     )]
     HighestFrequency {
-        /// The frequency (Hz).
+        /// Given frequency (Hz).
         found: f64,
-        /// The lowest frequency (Hz).
+        /// Lowest frequency (Hz).
         lowest: f64,
     },
-    /// A rigid robot, whose tool has no error that could depend on anything.
+    /// The robot is rigid, so its TCP has no error that could depend on a parameter.
     #[error(
         "the robot has no flexible link and no elastic drive: its tool is where the rigid arm has it, and nothing changes that; add \
          [[flexible_link]] or [[drive]] entries"
     )]
     NothingYields,
-    /// A name of which no number of the robot is called.
+    /// No parameter of the robot has this name.
     #[error(
         "no parameter is called {pattern:?}: expected some of {}, * for anything; an entry of a lumped link's 6x6 is \
          link.LINK.stiffness[i][j], i and j from 0 to 5",
         names.join(", ")
     )]
     NoParameter {
-        /// The name or pattern.
+        /// Given name or pattern.
         pattern: String,
         /// Available names.
         names: Vec<String>,

@@ -1,5 +1,5 @@
-//! Contributions to the TCP displacement: of flexible links, elastic drives, and of servos that
-//! leave a part of the way to go.
+//! TCP displacement caused by each contributor: flexible links, elastic drives, and the following
+//! error of servos.
 //!
 //! ```text
 //! u_T = J_e e        first order: columns of the twin's Jacobian that belong to the deflections e
@@ -12,11 +12,11 @@ use nalgebra::Vector6;
 use crate::flexible::{FlexibleRobot, Owner};
 use crate::twin::RigidTwin;
 
-/// Watches all that moves the tool: links, then drives, then what servos leave.
+/// Monitors all contributors: links, then drives, then the following error.
 pub(crate) struct Contributions {
-    /// Place of each elastic element.
+    /// Contributor index of each elastic element.
     places: Vec<usize>,
-    /// Displacement of the tool by each at the last sample: m and rad, world axes.
+    /// TCP displacement by each contributor at the last sample: m and rad, world axes.
     moved: Vec<Vector6<f64>>,
     peaks: ContributionPeaks,
 }
@@ -35,15 +35,14 @@ impl Contributions {
     pub(crate) fn update(&mut self, seen: &Observation, twin: &RigidTwin, arm: &FlexibleArm) {
         self.moved.fill(Vector6::zeros());
         for (element, place) in arm.elements.iter().zip(&self.places) {
-            // Column by column: a product of views whose sizes are known at run time takes three
-            // times as long.
+            // Column by column: a product of dynamically sized views takes three times as long.
             let mut displacement = Vector6::zeros();
             for k in element.coordinate..element.coordinate + element.size {
                 displacement += twin.J.column(k) * seen.q[k];
             }
             self.moved[*place] += displacement;
         }
-        // Motors under servos are not where the trajectory wants them.
+        // Following error: motors under servos deviate from the trajectory.
         if let Some(following) = self.moved.last_mut() {
             for &k in &arm.torque_driven {
                 *following += twin.J.column(k) * (seen.q[k] - twin.state.q[k]);
@@ -54,18 +53,18 @@ impl Contributions {
         }
     }
 
-    /// Place of the one to whom a coordinate belongs; motors are with what servos leave.
+    /// Returns the contributor index of a coordinate; motors belong to the following error.
     pub(crate) fn place_of(&self, coordinate: usize, arm: &FlexibleArm) -> usize {
         let within = |e: &ElasticElement| (e.coordinate..e.coordinate + e.size).contains(&coordinate);
         arm.elements.iter().position(within).map_or(self.moved.len() - 1, |k| self.places[k])
     }
 
-    /// Displacements of the tool at the last sample (m, rad, world axes).
+    /// Returns the TCP displacements at the last sample (m, rad, world axes).
     pub(crate) fn moved(&self) -> &[Vector6<f64>] {
         &self.moved
     }
 
-    /// Maximum displacement by each.
+    /// Returns the maximum displacement by each contributor.
     pub(crate) fn result(&self) -> &[ContributionPeak] {
         self.peaks.peaks()
     }

@@ -1,15 +1,15 @@
-//! Deflection of the gearboxes of elastic drives.
+//! Deflections of the gearboxes of elastic drives.
 
 use flexarm_stepping::FlexibleArm;
 use nalgebra::DVector;
 
 use crate::flexible::{FlexibleRobot, Owner};
 
-/// Watches the springs between motors and links.
+/// Monitors the springs between motors and links.
 pub(crate) struct Deflections {
     /// First coordinate, number of coordinates, and drive of each spring.
     springs: Vec<(usize, usize, usize)>,
-    /// Maximum deflection of each drive (rad or m).
+    /// Maximum deflection per drive (rad or m).
     largest: Vec<f64>,
 }
 
@@ -26,13 +26,13 @@ impl Deflections {
     pub(crate) fn update(&mut self, q: &DVector<f64>) {
         for &(first, size, drive) in &self.springs {
             let e = q.rows(first, size);
-            // Of six, the rotations.
+            // For springs with six coordinates only the rotations count.
             let deflection = if size == 6 { e.rows(3, 3).norm() } else { e.norm() };
             self.largest[drive] = self.largest[drive].max(deflection);
         }
     }
 
-    /// Returns the maximum deflection of each drive (rad or m); 0 for rigid ones.
+    /// Returns the maximum deflection per drive (rad or m); 0 for rigid ones.
     pub(crate) fn result(&self) -> &[f64] {
         &self.largest
     }

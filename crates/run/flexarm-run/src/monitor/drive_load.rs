@@ -1,27 +1,27 @@
-//! Required forces of the drives: the maximum of each, the time at which it first passed its limit,
-//! how often a servo was at its own.
+//! Loads of the drives: maximum force of each, time at which it first exceeded its limit, and
+//! number of samples with a saturated servo.
 
 use flexarm_stepping::{FlexibleArm, Observation};
 
-/// Maximum of one drive.
+/// Figures of one drive.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct DriveLoad {
-    /// Maximum force (N m or N).
+    /// Maximum torque or force (N m or N).
     pub(crate) peak: f64,
-    /// When it first was beyond the joint's limit (s).
+    /// Time at which it first exceeded the joint's limit (s).
     pub(crate) over_since_s: Option<f64>,
-    /// Samples in which its servo was at its limit.
+    /// Number of samples in which its servo was at its limit.
     pub(crate) at_limit: usize,
 }
 
 /// Limits of one drive (N m or N).
 struct Limits {
     joint: f64,
-    /// Torque limit of the servo, if it has one.
+    /// Limit of the servo, if there is one.
     servo: Option<f64>,
 }
 
-/// Watches the drives, in the order of the actuated coordinates.
+/// Monitors the drives, in the order of the actuated coordinates.
 pub(crate) struct DriveLoads {
     limits: Vec<Limits>,
     seen: Vec<DriveLoad>,
@@ -42,7 +42,7 @@ impl DriveLoads {
         self.add(seen.t, seen.drive.as_slice());
     }
 
-    /// Forces of all drives at time `t` (s).
+    /// Adds the torques or forces of all drives at time `t` (s).
     fn add(&mut self, t: f64, forces: &[f64]) {
         for ((load, limits), force) in self.seen.iter_mut().zip(&self.limits).zip(forces) {
             load.peak = load.peak.max(force.abs());
@@ -53,7 +53,7 @@ impl DriveLoads {
         }
     }
 
-    /// One entry per drive.
+    /// Returns one entry per drive.
     pub(crate) fn result(&self) -> &[DriveLoad] {
         &self.seen
     }

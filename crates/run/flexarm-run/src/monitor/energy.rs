@@ -1,4 +1,4 @@
-//! The energy balance of a run: what drives and loads put in, what dampers took, what is stored.
+//! Energy balance of a run: work of drives and loads, dissipation, stored energy.
 
 use std::sync::Arc;
 
@@ -7,22 +7,22 @@ use flexarm_stepping::Observation;
 
 use crate::summary::EnergyFigures;
 
-/// Watches the energy.
+/// Monitors the energy.
 pub(crate) struct Energy {
-    /// Payload at the previous sample.
+    /// Model at the previous sample, with its payload.
     model: Arc<Model>,
     book: EnergyBook,
 }
 
 impl Energy {
-    /// `model`: the arm at the start.
+    /// `model`: that of the arm at the start.
     pub(crate) fn new(model: &Arc<Model>) -> Self {
         Self { model: model.clone(), book: EnergyBook::default() }
     }
 
     pub(crate) fn update(&mut self, seen: &Observation) {
         if !Arc::ptr_eq(&self.model, &seen.model) {
-            // At the start the arm carries it already.
+            // A payload present at the start is not exchanged.
             if self.book.first.is_some() {
                 self.book.exchanged += mechanical_energy(&seen.model, seen) - mechanical_energy(&self.model, seen);
             }
@@ -38,43 +38,42 @@ impl Energy {
     }
 }
 
-/// Kinetic and gravitational energy (J) of a state, with what the model carries.
+/// Kinetic and gravitational energy (J) of a state, including the model's payload.
 fn mechanical_energy(model: &Model, seen: &Observation) -> f64 {
     let mut data = Data::new(model);
     let state = State { q: seen.q.clone(), qdot: seen.qdot.clone() };
     kinetic_energy(model, &mut data, &state) + potential_energy(model, &mut data, &state.q)
 }
 
-/// An energy that changes by less than this part of its size rests: what is left is rounding.
+/// Relative energy change below which the change counts as round-off.
 const REST: f64 = 1e-9;
 
-/// Work that goes in and out between samples, by the trapezoidal rule.
+/// Work between samples by the trapezoidal rule.
 #[derive(Default)]
 struct EnergyBook {
     first: Option<f64>,
     last: f64,
     before: Option<(f64, [f64; 3])>,
-    /// Drives, loads, dissipation (J).
+    /// Work of drives, work of loads, dissipation (J).
     work: [f64; 3],
-    /// Positive and negative work, summed drive by drive (J).
+    /// Positive and negative work of the drives, summed over each drive (J).
     gross: [f64; 2],
-    /// Power of each drive at the sample before (W).
+    /// Power of each drive at the previous sample (W).
     drives: Vec<f64>,
-    /// Maximum difference between stored and supplied energy, and maximum change of what is
-    /// stored (J).
+    /// Maximum gap between stored and supplied energy, and maximum change of the stored energy (J).
     gap: f64,
     swing: f64,
-    /// Maximum sum of the magnitudes of its parts (J).
+    /// Maximum sum of the magnitudes of the parts of the energy (J).
     size: f64,
     struck: f64,
-    /// Taken by the hysteresis of gears up to the last sample, and before the first one (J).
+    /// Dissipation by gear hysteresis up to the last sample, and before the first one (J).
     hysteresis: [f64; 2],
-    /// Energy that came or went with a payload (J).
+    /// Energy exchanged with payloads (J).
     exchanged: f64,
 }
 
 impl EnergyBook {
-    /// Sets the energy dissipated by hysteresis so far (J), before the sample is added.
+    /// Adds the total dissipation by gear hysteresis so far (J); call before adding the sample.
     fn lose(&mut self, work: f64) {
         let [last, before] = &mut self.hysteresis;
         match self.first {
@@ -84,8 +83,9 @@ impl EnergyBook {
         *last = work;
     }
 
-    /// Adds a sample. `power`: of drives, loads, dissipation; `impulse_work`: work of the drives so
-    /// far that is in no power, where velocities jumped (J); `drives`: power of each drive (W).
+    /// Adds a sample. `power`: of drives, loads, dissipation (W); `impulse_work`: cumulative work
+    /// of the drives at velocity jumps, which is in no power (J); `drives`: power of each drive
+    /// (W).
     fn add(&mut self, t: f64, energy: [f64; 3], power: [f64; 3], impulse_work: f64, drives: impl Iterator<Item = f64>) {
         if let Some((t_before, p)) = self.before {
             for c in 0..3 {
@@ -100,7 +100,7 @@ impl EnergyBook {
         } else {
             self.drives.extend(drives);
         }
-        // An impulse at the start is in the energy of the first sample.
+        // An impulse at the start is contained in the energy of the first sample.
         let struck = if self.first.is_some() { impulse_work - self.struck } else { 0.0 };
         self.work[0] += struck;
         self.gross[0] += struck.max(0.0);
@@ -130,8 +130,8 @@ impl EnergyBook {
     }
 }
 
-/// Work of a power that goes from one value to another along a straight line: where it is positive,
-/// and where it is negative, both as positive numbers.
+/// Positive and negative work, both as positive numbers, of a power that varies linearly between
+/// two values.
 fn parts(time: f64, from: f64, to: f64) -> [f64; 2] {
     let whole = 0.5 * time * (from + to);
     if from * to >= 0.0 {
@@ -148,8 +148,8 @@ mod tests {
     use flexarm_kinematics::{LinkInertia, forward_kinematics};
     use flexarm_stepping::{FlexibleArm, Spring};
 
-    /// Truth: a mass m that is picked up at p with the velocity v brings `m v²/2 - m g·p`, and
-    /// takes it along when it is put down; v by differences of p.
+    /// Truth: a mass m picked up at p with velocity v adds `m v²/2 - m g·p`, and removes it when
+    /// put down; v from differences of p.
     #[test]
     fn a_payload_brings_its_energy_and_takes_it_along() {
         let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../..");
@@ -181,28 +181,28 @@ mod tests {
         }
         assert!(payload[1] == 0.0 && payload[2] == payload[3] && payload[4].abs() < 1e-12);
         assert!((payload[2] / truth - 1.0).abs() < 1e-9, "{} {truth}", payload[2]);
-        // A payload from the start is counted already.
+        // A payload carried from the start adds nothing.
         let mut energy = Energy::new(&model);
         seen.model.clone_from(&carrying);
         energy.update(&seen);
         assert_eq!(energy.result().payload_j, 0.0);
     }
 
-    /// Truth: the integral of `A sin t` over a turn is 2 A - 2 A, of each drive by itself.
-    /// Identity: what is put in without what is taken out is the net work.
+    /// Truth: the integral of `A sin t` over a turn is 2 A - 2 A, for each drive. Identity:
+    /// positive minus negative work is the net work.
     #[test]
     fn drives_that_give_back_what_they_took_have_no_net_work_and_much_gross_work() {
         let mut book = EnergyBook::default();
         let n = 1000;
         for k in 0..=n {
             let t = f64::from(k) / f64::from(n) * std::f64::consts::TAU;
-            // The second brakes while the first drives: together they do nothing at any time.
+            // The second drive brakes while the first drives: their sum is zero at all times.
             let drives = [3.0 * t.sin(), -3.0 * t.sin()];
             book.add(t, [0.0; 3], [drives.iter().sum(), 0.0, 0.0], 0.0, drives.into_iter());
         }
         let figures = book.figures();
         assert!(figures.drives_j.abs() < 1e-12, "{}", figures.drives_j);
-        // Measured 3.9e-5 too little: the trapezoidal rule on a thousand samples.
+        // Measured 3.9e-5 too little: error of the trapezoidal rule with a thousand samples.
         assert!((figures.drives_positive_j - 12.0).abs() < 1e-4, "{}", figures.drives_positive_j);
         assert!((figures.drives_negative_j - 12.0).abs() < 1e-4, "{}", figures.drives_negative_j);
         assert_eq!(parts(2.0, -1.0, 3.0), [2.25, 0.25]);

@@ -1,9 +1,9 @@
-//! Monitors of a run: one file each, with a struct that receives every logged sample
-//! (`update`) and says at the end, or at any time before, what it has seen (`result`).
+//! Monitors of a run: one file per quantity, each a struct that receives every logged sample
+//! (`update`) and returns its figures at any time (`result`).
 //!
-//! A monitor sees the arm as the stepper shows it ([`Observation`]) beside the rigid twin, and
-//! keeps sums and largest values, no curves. Not here: samples for recordings (`run::sampler`),
-//! sentences about what was seen (`caveat`).
+//! A monitor receives the arm as observed by the stepper ([`Observation`]) and the rigid twin, and
+//! keeps sums and maxima, no curves. Not here: samples for recordings (`run::sampler`), messages
+//! about the figures (`caveat`).
 
 pub(crate) mod contribution;
 pub(crate) mod deflection;
@@ -37,12 +37,13 @@ pub(crate) struct Monitors {
     pub(crate) deflections: Deflections,
     pub(crate) drive_loads: DriveLoads,
     pub(crate) energy: Energy,
-    /// Monitor for motions that are given as a TCP path.
+    /// For motions given as TCP paths.
     pub(crate) tool_path: Option<ToolPathMonitor>,
 }
 
 impl Monitors {
-    /// For an arm of a robot with `n_drives` drives; `tool` has its own needs.
+    /// Creates the monitors for an arm of a robot with `n_drives` drives; `tool` is built
+    /// separately.
     pub(crate) fn new(arm: &FlexibleArm, flexible: &FlexibleRobot, n_drives: usize, tool: ToolMonitor) -> Self {
         Self {
             tool,
@@ -55,13 +56,13 @@ impl Monitors {
         }
     }
 
-    /// The same, with an eye on the path of the tool.
+    /// Adds a monitor of the TCP path.
     #[must_use]
     pub(crate) fn along(self, path: Option<Arc<ToolPath>>) -> Self {
         Self { tool_path: path.map(ToolPathMonitor::new), ..self }
     }
 
-    /// Shows a sample to all; the error of the tool in it.
+    /// Passes a sample to all monitors; returns its TCP error.
     pub(crate) fn update(&mut self, seen: &Observation, twin: &RigidTwin, arm: &FlexibleArm, tcp: &Frame) -> ToolError {
         self.drive_loads.update(seen);
         self.contributions.update(seen, twin, arm);

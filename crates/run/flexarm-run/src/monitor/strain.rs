@@ -1,8 +1,10 @@
-//! Deformation of the flexible links against the small deformations that their models assume.
+//! Strain and rotation of the flexible links, to check the small deformations that their models
+//! assume.
 //!
 //! ```text
-//! ε = (|p_AB| - l)/l        θ = |log((R_AB undeformed)ᵀ R_AB)|            A, B: interfaces of the link, l: their distance
+//! ε = (|p_AB| - l)/l        θ = |log((R_AB undeformed)ᵀ R_AB)|
 //! ```
+//! A, B: interfaces of the link; l: their distance.
 
 use flexarm_analysis::engineering_strain;
 use flexarm_kinematics::{Frame, Model, Pose, rotation_vector};
@@ -10,16 +12,16 @@ use nalgebra::Rotation3;
 
 use crate::flexible::FlexibleRobot;
 
-/// Maxima of one link.
+/// Figures of one link.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct LinkStrain {
-    /// Maximum change of the distance between its interfaces over that distance.
+    /// Maximum change of the distance between its interfaces, relative to that distance.
     pub(crate) strain: f64,
-    /// Maximum rotation of its far interface against the near one (rad).
+    /// Maximum rotation of its far interface relative to the near one (rad).
     pub(crate) rotation: f64,
 }
 
-/// An interface of a link on its body.
+/// Interface of a link on its body.
 struct Interface {
     body: usize,
     X_BI: Pose,
@@ -35,17 +37,17 @@ impl Interface {
     }
 }
 
-/// A link between its two interfaces.
+/// Link between its two interfaces.
 struct Span {
     near: Interface,
     far: Interface,
-    /// Distance of the interfaces (m).
+    /// Distance between the interfaces (m).
     length: f64,
-    /// Attitude of the far interface in the near one, undeformed; from the first sample.
+    /// Undeformed orientation of the far interface in the near one; set at the first sample.
     R_AE: Option<Rotation3<f64>>,
 }
 
-/// Watches the flexible links, in the order of [`FlexibleRobot::spans`].
+/// Monitors the flexible links, in the order of [`FlexibleRobot::spans`].
 pub(crate) struct Strains {
     spans: Vec<Span>,
     largest: Vec<LinkStrain>,
@@ -63,14 +65,14 @@ impl Strains {
         Self { spans: spans.collect(), largest: vec![LinkStrain::default(); flexible.spans.len()] }
     }
 
-    /// * `X_WB`: poses of all bodies in the world; `rigid`: those of the rigid twin, in which a
-    ///   link always is as it is undeformed.
+    /// * `X_WB`: poses of all bodies in the world; `rigid`: those of the rigid twin, whose links
+    ///   are undeformed.
     pub(crate) fn update(&mut self, X_WB: &[Pose], rigid: &[Pose]) {
         for (span, largest) in self.spans.iter_mut().zip(&mut self.largest) {
             let (X_WA, X_WE) = (span.near.pose(X_WB), span.far.pose(X_WB));
             let distance = (X_WE.translation.vector - X_WA.translation.vector).norm();
             let strain = engineering_strain(distance - span.length, span.length).map_or(0.0, f64::abs);
-            // Both ends have the attitude that they have undeformed, up to the bending.
+            // Relative rotation of the ends, less the undeformed one.
             let Span { near, far, R_AE, .. } = span;
             let R_AE = R_AE.get_or_insert_with(|| near.pose(rigid).rotation.inverse() * far.pose(rigid).rotation);
             let turn = R_AE.inverse() * (X_WA.rotation.inverse() * X_WE.rotation);
@@ -79,7 +81,7 @@ impl Strains {
         }
     }
 
-    /// One entry per link.
+    /// Returns one entry per link.
     pub(crate) fn result(&self) -> &[LinkStrain] {
         &self.largest
     }
@@ -90,8 +92,8 @@ mod tests {
     use super::*;
     use nalgebra::Vector3;
 
-    /// Truth: a link of 2 m whose far end moves by 1 mm along it and turns by 0.02 rad; the whole
-    /// arm turned and moved is the same link.
+    /// Truth: a link of 2 m whose far end moves by 1 mm along it and rotates by 0.02 rad; a rigid
+    /// motion of the whole arm changes nothing.
     #[test]
     fn strain_and_rotation_are_those_of_the_link_wherever_the_arm_is() {
         let on = |body: usize, X_FI: Pose| {

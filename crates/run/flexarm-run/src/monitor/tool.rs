@@ -1,4 +1,4 @@
-//! Distance of the TCP from that of the rigid twin, at every sample and in figures.
+//! TCP error relative to the rigid twin, at every sample and as figures.
 
 use flexarm_analysis::{ErrorSample, LongRecord, PathFrame, tcp_error};
 use flexarm_kinematics::{Frame, Pose};
@@ -8,11 +8,11 @@ use nalgebra::Vector3;
 use crate::static_part::StaticPart;
 use crate::twin::RigidTwin;
 
-/// The tool at one sample.
+/// The TCP at one sample.
 pub(crate) struct ToolError {
-    /// TCP pose of the twin.
+    /// TCP pose of the rigid twin.
     pub(crate) X_rigid: Pose,
-    /// TCP pose of the arm.
+    /// TCP pose of the flexible arm.
     pub(crate) X_flexible: Pose,
     /// Translation (m) and rotation vector (rad), world axes.
     pub(crate) error: [f64; 6],
@@ -22,10 +22,10 @@ pub(crate) struct ToolError {
     pub(crate) static_m: [f64; 3],
 }
 
-/// Watches the tool.
+/// Monitors the TCP.
 pub(crate) struct ToolMonitor {
     path: PathFrame,
-    /// `None` if the static part is not wanted.
+    /// `None` if the static part is not needed.
     static_part: Option<StaticPart>,
     record: LongRecord,
 }
@@ -42,7 +42,7 @@ impl ToolMonitor {
         self.add(seen.t, X_rigid, X_flexible, &twin.velocity)
     }
 
-    /// * `velocity`: of the rigid tool (m/s, world axes), which gives the path its direction.
+    /// * `velocity`: of the rigid TCP (m/s, world axes), which gives the direction of the path.
     fn add(&mut self, t: f64, X_rigid: Pose, X_flexible: Pose, velocity: &Vector3<f64>) -> ToolError {
         let error = tcp_error(&X_rigid, &X_flexible);
         self.path = self.path.next(velocity);
@@ -61,7 +61,7 @@ impl ToolMonitor {
         ToolError { X_rigid, X_flexible, error, path_error, static_m }
     }
 
-    /// The error of all samples so far, from which its figures are made.
+    /// Returns the recorded errors of all samples so far.
     pub(crate) fn result(&self) -> &LongRecord {
         &self.record
     }
@@ -72,7 +72,8 @@ mod tests {
     use super::*;
     use flexarm_analysis::MetricSettings;
 
-    /// Truth: a tool that moves along y at 1 m/s, a millimetre ahead of its twin and two beside it.
+    /// Truth: a TCP that moves along y at 1 m/s, one millimetre ahead of its twin and two
+    /// millimetres beside it.
     #[test]
     fn what_is_ahead_and_what_is_beside_the_path_are_told_apart() {
         let speed = Vector3::y();

@@ -1,9 +1,9 @@
-//! Error across the path of a motion that is given as a TCP path, move by move.
+//! Error across the path, move by move, for a motion given as a TCP path.
 //!
-//! Terms as in ISO 9283, of one run in place of many: path accuracy is the largest distance across
-//! the path; the corner overshoot is how far the tool swings on along the old direction behind a
-//! corner. A workpiece is often set where the tool really is; what is left then is bounded by half
-//! the diagonal of the box that the error vector stays in.
+//! Terms as in ISO 9283, for one run instead of many: path accuracy is the maximum distance across
+//! the path; corner overshoot is the TCP motion along the old direction after a corner. A workpiece
+//! is often placed where the TCP actually is; the remaining error is bounded by half the diagonal
+//! of the bounding box of the error vector.
 
 use std::sync::Arc;
 
@@ -13,56 +13,55 @@ use serde::{Deserialize, Serialize};
 use crate::monitor::tool::ToolError;
 use crate::tool_path::ToolPath;
 
-/// Slower than this the tool has no direction, m/s.
+/// Speed below which the TCP has no direction, m/s.
 const REST: f64 = 1e-5;
 /// Maximum number of points kept for a picture.
 const MOST_POINTS: usize = 8192;
 
-/// Errors across the path of a motion along a TCP path.
+/// Errors across the path of a motion given as a TCP path.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct PathFigures {
-    /// Maximum distance from the path on Cartesian moves (m), and its time (s).
+    /// Maximum distance from the path on TCP moves (m).
     pub across_peak_m: f64,
-    /// See there.
+    /// Time of this maximum (s).
     pub t_across_peak_s: f64,
-    /// Root mean square of that distance over the samples of those moves (m).
+    /// Root mean square of the distance over the samples of those moves (m).
     pub across_rms_m: f64,
-    /// Middle of the box that the error stays in on those moves: by how much a workpiece would be
+    /// Centre of the bounding box of the error on those moves: offset by which a workpiece would be
     /// moved (m, world axes).
     pub offset_m: [f64; 3],
-    /// Maximum remaining distance (m): half the diagonal of the box.
+    /// Bound on the error that remains after the offset (m): half the diagonal of the box.
     pub left_m: f64,
-    /// Overshoot of the TCP behind a corner, beyond its static deflection (m); 0 without a
-    /// corner.
+    /// Overshoot after a corner, beyond the static deflection (m); 0 without a corner.
     pub corner_overshoot_m: f64,
-    /// Cartesian moves, one by one.
+    /// Figures of each TCP move.
     pub moves: Vec<PathMoveFigures>,
-    /// Points of the path with the error there, some thousands of them: rigid tool and error (m,
-    /// world axes). Not in files.
+    /// Up to a few thousand points of the path: position of the rigid TCP and the error there (m,
+    /// world axes). Not written to files.
     #[serde(skip)]
     pub points: Vec<[f64; 6]>,
 }
 
-/// One move of the tool.
+/// Figures of one TCP move.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct PathMoveFigures {
-    /// Line of the program or file.
+    /// Line number in the program or file.
     pub line: usize,
-    /// Word of the program.
+    /// Statement in that line.
     pub statement: String,
-    /// First and last moment (s).
+    /// Start and end time (s).
     pub span_s: [f64; 2],
     /// Maximum distance from the path (m).
     pub across_peak_m: f64,
-    /// Root mean square of it (m).
+    /// Root mean square of the distance (m).
     pub across_rms_m: f64,
-    /// Swing along the direction of the move before, beyond the static deflection (m).
+    /// Overshoot along the direction of the previous move, beyond the static deflection (m).
     pub corner_overshoot_m: f64,
     /// Programmed speed (m/s).
     pub programmed_m_s: Option<f64>,
-    /// Greatest speed (m/s).
+    /// Maximum speed (m/s).
     pub top_m_s: Option<f64>,
 }
 
@@ -76,18 +75,18 @@ struct Sums {
     overshoot: f64,
 }
 
-/// Watches the error across the path.
+/// Monitors the error across the path.
 pub(crate) struct ToolPathMonitor {
     path: Arc<ToolPath>,
     sums: Vec<Sums>,
-    /// First move that has not ended.
+    /// Index of the current move, the first that has not ended.
     now: usize,
-    /// Direction of the rigid tool in the move before, world axes.
+    /// Direction of the rigid TCP in the previous move, world axes.
     before: Vector3<f64>,
     direction: Vector3<f64>,
     low: Vector3<f64>,
     high: Vector3<f64>,
-    /// Every so many samples a point is kept.
+    /// Number of samples per stored point.
     every: usize,
     seen: usize,
     points: Vec<[f64; 6]>,
@@ -111,7 +110,7 @@ impl ToolPathMonitor {
         }
     }
 
-    /// * `velocity`: of the rigid tool (m/s, world axes).
+    /// * `velocity`: of the rigid TCP (m/s, world axes).
     pub(crate) fn update(&mut self, t: f64, tool: &ToolError, velocity: &Vector3<f64>) {
         let moves = &self.path.moves;
         while self.now + 1 < moves.len() && t > moves[self.now].span_s[1] {
@@ -138,14 +137,15 @@ impl ToolPathMonitor {
         }
         let swing = error - Vector3::from(tool.static_m);
         let on = swing.dot(&self.before);
-        // Only across the new direction: along it, it is a lead and not an overshoot.
+        // Only for a change of direction: along the new direction it is a lead and not an
+        // overshoot.
         let turned = 1.0 - self.before.dot(&self.direction).powi(2).min(1.0);
         if on.is_finite() && turned > 0.1 {
             sums.overshoot = sums.overshoot.max(on);
         }
     }
 
-    /// Keeps a point now and then: every second of them goes when there are too many.
+    /// Stores every `every`-th point; drops every second one when there are too many.
     fn keep(&mut self, p: Vector3<f64>, e: Vector3<f64>) {
         if self.seen.is_multiple_of(self.every) {
             self.points.push([p.x, p.y, p.z, e.x, e.y, e.z]);
@@ -161,7 +161,7 @@ impl ToolPathMonitor {
         }
     }
 
-    /// Figures of what was seen so far; nothing without a sample on a move of the tool.
+    /// Returns the figures so far; None without a sample on a TCP move.
     pub(crate) fn result(&self) -> Option<PathFigures> {
         let samples: usize = self.sums.iter().map(|sums| sums.samples).sum();
         let peak = self.sums.iter().max_by(|a, b| a.peak.total_cmp(&b.peak)).filter(|_| samples > 0)?;
@@ -210,8 +210,8 @@ mod tests {
         }
     }
 
-    /// Truth: a tool that goes along x for a second, then along y, with a sag of 2 mm and a swing
-    /// along x of 1 mm behind the corner.
+    /// Truth: a TCP that moves along x for a second, then along y, with a sag of 2 mm and an
+    /// overshoot along x of 1 mm after the corner.
     #[test]
     fn sag_is_an_offset_and_a_swing_behind_the_corner_an_overshoot() {
         let path = ToolPath {

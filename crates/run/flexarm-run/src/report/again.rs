@@ -1,4 +1,4 @@
-//! The report of a run that has been recorded.
+//! Report of a recorded run.
 
 use std::path::{Path, PathBuf};
 
@@ -15,14 +15,14 @@ use crate::magnification::fit_color_scale;
 use crate::stepper_settings::{SettingValue, StepperSettings};
 use crate::summary::{StepperFigures, Summary, TcpFigures};
 
-/// Choices of a report.
+/// Options of a report.
 #[derive(Clone, Debug, Default)]
 pub struct ReportOptions {
-    /// Output file; `report.html` beside the (first) recording without it.
+    /// Path of the page; by default `report.html` next to the first recording.
     pub output: Option<PathBuf>,
-    /// Write a folder with figures for papers beside the page.
+    /// Whether to write a folder with figures for papers next to the page.
     pub figures: bool,
-    /// Overwrite what is there.
+    /// Whether existing files are overwritten.
     pub overwrite: bool,
 }
 
@@ -31,7 +31,7 @@ pub struct ReportOptions {
 pub struct ReportFiles {
     /// Recordings that were read.
     pub inputs: Vec<String>,
-    /// The page.
+    /// Path of the page.
     pub report: String,
     /// Folder with figures.
     pub figures: Option<String>,
@@ -39,26 +39,25 @@ pub struct ReportFiles {
     pub warnings: Vec<String>,
 }
 
-/// The trajectory of a recording that names none, for readers of tables.
+/// Trajectory name that table readers use if the recording has none.
 const UNKNOWN: &str = "unknown";
 
-/// A recording to be read.
+/// Recording to be read.
 struct Input {
     path: PathBuf,
-    /// Its figures, if they are known from elsewhere: those of the recording lack what a study
-    /// adds.
+    /// Summary from the study, if known; the one in the recording lacks what the study adds.
     of_study: Option<Summary>,
 }
 
-/// Makes the report of one recording, or one page in which several are compared. The folder of a
-/// study gives the page of the study.
+/// Makes the report of one recording, or one page that compares several. The folder of a study
+/// gives the page of the study.
 ///
-/// Figures are those that the recording holds. If it holds none (a table, a killed run), those of
-/// the tool are computed from its curves, and other figures are left out.
+/// The figures are those stored in the recording. If there are none (a table, a killed run), the
+/// TCP figures are computed from the curves, and the others are left out.
 ///
 /// # Errors
 /// As [`read_run`]; [`Error::File`] for a folder without a recording; [`Error::Taken`];
-/// [`Error::Recording`] if the page would replace a recording that it is made of.
+/// [`Error::Recording`] if the page would replace one of its own recordings.
 pub fn report(recordings: &[PathBuf], options: &ReportOptions) -> Result<ReportFiles, Error> {
     let mut warnings = Vec::new();
     let mut inputs = Vec::new();
@@ -98,7 +97,7 @@ pub fn report(recordings: &[PathBuf], options: &ReportOptions) -> Result<ReportF
     })
 }
 
-/// Label, figures and curves of each recording.
+/// Reads label, figures and curves of each recording.
 fn read_all(inputs: &[Input], warnings: &mut Vec<String>) -> Result<Vec<(String, Summary, Trace)>, Error> {
     let mut runs: Vec<(String, Summary, Trace)> = Vec::new();
     for Input { path, of_study } in inputs {
@@ -107,7 +106,7 @@ fn read_all(inputs: &[Input], warnings: &mut Vec<String>) -> Result<Vec<(String,
             return Err(no_sample(path, told.last()));
         }
         let name = format!("{}: ", path.display());
-        // Some sentences name the file already.
+        // Some messages already name the file.
         let named = |sentence: String| if sentence.starts_with(&name) { sentence } else { name.clone() + &sentence };
         warnings.extend(told.into_iter().map(named));
         let stored = of_study.clone().or_else(|| json.and_then(|json| serde_json::from_value::<Summary>(json).ok()));
@@ -119,7 +118,7 @@ fn read_all(inputs: &[Input], warnings: &mut Vec<String>) -> Result<Vec<(String,
             ));
             computed(&trace)
         });
-        // Results of older versions do not say how wide the band was; their recordings do.
+        // Results of older versions lack the settling band; the header of their recordings has it.
         if let Some(tcp) = summary.tcp.as_mut().filter(|tcp| tcp.settling_band_m.is_none()) {
             tcp.settling_band_m = settling_band_m(&trace.header);
         }
@@ -136,7 +135,7 @@ fn read_all(inputs: &[Input], warnings: &mut Vec<String>) -> Result<Vec<(String,
     Ok(runs)
 }
 
-/// Refuses places that are taken, before anything is read at length or written.
+/// Checks that the output paths are free, before anything is read in full or written.
 fn check_places(inputs: &[Input], page: &Path, folder: &Path, options: &ReportOptions) -> Result<(), Error> {
     if let Some(input) = inputs.iter().find(|input| same_file(&input.path, page)) {
         return Err(RecordingError::PageOverRecording { path: input.path.clone() }.into());
@@ -171,26 +170,27 @@ fn recording(path: &Path) -> Result<PathBuf, Error> {
     }
 }
 
-/// The recording in the folder of a run that holds most.
+/// Returns the most complete recording in the folder of a run.
 fn in_folder(folder: &Path) -> Option<PathBuf> {
     let there: Vec<(RecordingFormat, PathBuf)> = RecordingFormat::read_back()
         .into_iter()
         .map(|format| (format, folder.join(format.info().file_name)))
         .filter(|(_, path)| path.is_file())
         .collect();
-    // Unreadable recordings are no error while at least one can be read.
+    // An unreadable format must not cause a failure if a readable recording exists.
     let readable = there.iter().find(|(format, _)| format.is_built_in());
     readable.or(there.first()).map(|(_, path)| path.clone())
 }
 
-/// The summary of a folder, if it is one of several runs.
+/// Returns the summary in a folder if it is that of a study.
 fn study(folder: &Path) -> Option<Summary> {
     let bytes = std::fs::read(folder.join("summary.json")).ok()?;
     let summary: Summary = serde_json::from_slice(&bytes).ok()?;
     (!summary.with.is_empty()).then_some(summary)
 }
 
-/// The first run of a study with the others; runs without a recording are reported and left out.
+/// Returns the first run of a study and the others; runs without a recording are left out with a
+/// warning.
 fn runs_of(folder: &Path, mut study: Summary, first: Vec<Input>, warnings: &mut Vec<String>) -> Vec<Input> {
     let others = std::mem::take(&mut study.with);
     let mut runs: Vec<Input> =
@@ -207,24 +207,24 @@ fn runs_of(folder: &Path, mut study: Summary, first: Vec<Input>, warnings: &mut 
     runs
 }
 
-/// Name of the folder of a study's run, as the study makes it of the label.
+/// Returns the folder name of a study's run, derived from the label as when it was written.
 fn folder_name(label: &str) -> String {
     label.chars().map(|c| if c.is_ascii_alphanumeric() || "-_.=".contains(c) { c } else { '_' }).collect()
 }
 
-/// A value of the metadata.
+/// Returns a value of the metadata.
 pub(super) fn told<'a>(header: &'a RunHeader, group: &str, key: &str) -> Option<&'a str> {
     let (_, rows) = header.metadata.iter().find(|(name, _)| name == group)?;
     let (_, value) = rows.iter().find(|(name, _)| name == key)?;
     Some(value.as_str()).filter(|value| !value.is_empty())
 }
 
-/// Half width of the band in which the tool counts as settled (m), as a recording has it: text.
+/// Half width of the settling band (m), from the text in a recording.
 fn settling_band_m(header: &RunHeader) -> Option<f64> {
     told(header, "flexarm.run", "settling_band_m")?.parse().ok()
 }
 
-/// The figures that curves alone give.
+/// Computes the figures that follow from curves only.
 fn computed(trace: &Trace) -> Summary {
     let header = &trace.header;
     let rows: Vec<_> = trace.rows.iter().filter(|row| row.error_world.iter().all(|x| x.is_finite())).collect();
@@ -253,7 +253,8 @@ fn computed(trace: &Trace) -> Summary {
         tcp = tcp.map(|tcp| tcp.with_parts(&parts));
     }
     if let Some(tcp) = tcp.as_mut().filter(|_| moves.is_empty()) {
-        // Without known moves the ringing cannot be separated from the motion and has no frequency.
+        // Without known moves, vibration cannot be separated from the motion, so there is no
+        // frequency.
         (tcp.dominant_hz, tcp.settling_s) = (None, None);
     }
     let named = |name: &str, otherwise: &str| if name.is_empty() { otherwise.to_owned() } else { name.to_owned() };

@@ -1,43 +1,43 @@
-//! The data of the plots: curves of a run, in readable units, thinned so that peaks stay.
+//! Data of the plots: curves of a run in readable units, thinned such that peaks remain.
 
 use flexarm_analysis::amplitude_spectrum;
 use flexarm_log::{CurveQuantity, Trace};
 
 use crate::summary::Summary;
 
-/// Maximum number of points of a curve that is shown at once.
+/// Maximum number of points of a curve that is always shown.
 const MOST_POINTS: usize = 3000;
 /// Maximum number of values of a plot with many curves.
 const MOST_NUMBERS: usize = 24_000;
 /// Maximum number of points of curves behind a selector.
 const MOST_DETAIL: usize = 1000;
-/// Amplitudes below this share of the largest one end the shown part of a spectrum.
+/// A spectrum is shown up to the last amplitude above this share of its maximum.
 const QUIET: f64 = 1e-3;
 
 const WHOLE_RUN: &str = "whole run";
 
-/// Maximum number of stops with a spectrum.
+/// Maximum number of stops whose spectra are shown.
 const MOST_STOPS: usize = 8;
 
 /// A plot: curves over a common axis, or several such sets to choose from.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Plot {
-    /// For links and file names.
+    /// Used in links and file names.
     pub(super) id: &'static str,
     pub(super) section: &'static str,
     pub(super) title: &'static str,
-    /// Explanation of the plot.
+    /// Text that explains the plot.
     pub(super) note: String,
     pub(super) x_label: &'static str,
     pub(super) x_unit: &'static str,
     pub(super) y_label: &'static str,
     pub(super) y_unit: &'static str,
-    /// Time plots share cursor and zoom.
+    /// Whether the x axis is time; such plots share cursor and zoom.
     pub(super) over_time: bool,
     pub(super) logarithmic: bool,
-    /// Across the whole page.
+    /// Whether the plot takes the full width of the page.
     pub(super) wide: bool,
-    /// Lines across the plot with their names.
+    /// Vertical lines in the plot: x value and name.
     pub(super) marks: Vec<(f64, String)>,
     pub(super) views: Vec<PlotView>,
 }
@@ -46,18 +46,18 @@ pub(super) struct Plot {
 #[derive(Clone, Debug, Default)]
 pub(super) struct PlotView {
     pub(super) name: String,
-    /// Unit of its curves, if it is not that of the plot.
+    /// Unit of its curves if it differs from the plot's.
     pub(super) y_unit: &'static str,
-    /// One per run: curves with an axis of their own.
+    /// One table per run: curves with their own x axis.
     pub(super) tables: Vec<Table>,
 }
 
-/// Curves with common places.
+/// Curves over common x values.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Table {
     pub(super) x: Vec<f64>,
     pub(super) curves: Vec<Curve>,
-    /// Whether there were more points.
+    /// Whether points were removed.
     pub(super) is_thinned: bool,
 }
 
@@ -73,13 +73,13 @@ pub(super) struct Curve {
 pub(super) enum Kind {
     #[default]
     Plain,
-    /// The size of others.
+    /// Magnitude of a vector whose components are the other curves.
     Total,
-    /// The rigid twin, with which others are compared.
+    /// Rigid twin, the reference for the other curves.
     Dashed,
-    /// Along the axis x (0), y (1) or z (2) of the world: in its colour.
+    /// Along the world axis x (0), y (1) or z (2), drawn in its colour.
     Axis(usize),
-    /// Curve of a link, spring or joint in the colour of this number.
+    /// Link, spring or joint, drawn in the colour with this number.
     Part(usize),
 }
 
@@ -99,8 +99,8 @@ impl Table {
     }
 }
 
-/// Indices, ascending, of at most about `most` points of curves with a common axis: first and last,
-/// and of each of equal pieces the smallest and the largest value of every curve.
+/// Returns ascending indices of at most about `most` points of curves with a common axis: the first
+/// and last point, and the minimum and maximum of every curve in each of equal pieces.
 pub(super) fn thinned(curves: &[&[f64]], length: usize, most: usize) -> Vec<usize> {
     if length <= most || curves.is_empty() {
         return (0..length).collect();
@@ -121,7 +121,7 @@ pub(super) fn thinned(curves: &[&[f64]], length: usize, most: usize) -> Vec<usiz
     keep
 }
 
-/// A curve of a run, in the unit that is `scale` times smaller.
+/// Returns a curve of a run, multiplied by `scale`.
 fn curve(trace: &Trace, name: impl Into<String>, kind: Kind, scale: f64, of: CurveQuantity) -> Curve {
     let mut y = trace.curve(of);
     y.iter_mut().for_each(|y| *y *= scale);
@@ -138,7 +138,8 @@ fn norm(v: &[f64]) -> f64 {
     v.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
-/// All plots of a run. Empty lists (a robot without elements, a run without a twin) give no plot.
+/// Returns all plots of a run. Empty lists (a robot without elements, a run without a twin) give no
+/// plot.
 pub(super) fn plots(summary: &Summary, trace: &Trace) -> Vec<Plot> {
     let mut plots = Vec::new();
     if trace.rows.is_empty() {
@@ -189,7 +190,7 @@ fn error(trace: &Trace) -> Plot {
     }
 }
 
-/// Sizes of the error and of its two parts.
+/// Magnitudes of the error and of its static and dynamic part.
 fn static_and_dynamic(trace: &Trace) -> PlotView {
     let curves = vec![
         curve(trace, "size", Kind::Total, 1e3, CurveQuantity::ErrorSize),
@@ -245,7 +246,7 @@ fn path_over_length(trace: &Trace) -> Plot {
     }
 }
 
-/// Amplitudes over frequency of a stretch of the run: all axes together, then each.
+/// Amplitude spectrum of a section of the run: all axes together, then each axis.
 fn amplitudes(errors: &[(f64, [f64; 3])]) -> Option<(Vec<f64>, Vec<Curve>)> {
     let times: Vec<f64> = errors.iter().map(|(time_s, _)| *time_s).collect();
     let signal: Vec<[f64; 3]> = errors.iter().map(|(_, error)| error.map(|part| 1e3 * part)).collect();
@@ -258,7 +259,8 @@ fn amplitudes(errors: &[(f64, [f64; 3])]) -> Option<(Vec<f64>, Vec<Curve>)> {
     if largest <= 0.0 {
         return None;
     }
-    // A logarithmic axis has no zero; it ends six decades below the peak.
+    // Zero cannot be drawn on a logarithmic axis; amplitudes are cut off six decades below the
+    // peak.
     let seen = |a: f64| a.max(1e-6 * largest);
     let mut curves =
         vec![Curve { name: "all axes".into(), kind: Kind::Total, y: total.into_iter().map(seen).collect() }];
@@ -273,7 +275,8 @@ fn amplitudes(errors: &[(f64, [f64; 3])]) -> Option<(Vec<f64>, Vec<Curve>)> {
 fn spectrum(summary: &Summary, trace: &Trace) -> Option<Plot> {
     let errors = trace.beginning();
     let (hz, curves) = amplitudes(&errors)?;
-    // Up to where it is quiet, with the first natural frequencies in any case.
+    // Shows the range up to the last significant amplitude, and at least the first natural
+    // frequencies.
     let total = &curves[0].y;
     let largest = total.iter().copied().fold(0.0, f64::max);
     let loud = total.iter().rposition(|a| *a > QUIET * largest).map_or(0.0, |k| hz[k]);
@@ -284,12 +287,12 @@ fn spectrum(summary: &Summary, trace: &Trace) -> Option<Plot> {
         let curves = curves.into_iter().map(|c| Curve { y: c.y[range.clone()].to_vec(), ..c });
         Table::new(hz[range.clone()].to_vec(), curves.collect(), MOST_POINTS)
     };
-    // A long run keeps every sample at its beginning only.
+    // In a long run only the beginning is stored at the full sample rate.
     let end_s = errors.last().map_or(0.0, |(time_s, _)| *time_s);
     let is_whole = errors.len() as u64 == trace.samples();
     let name = if is_whole { WHOLE_RUN.to_owned() } else { format!("first {end_s:.4} s") };
     let mut views = vec![PlotView { name, tables: vec![shown(&hz, curves)], ..PlotView::default() }];
-    // Without the motion only the ringing remains.
+    // At stops the spectrum shows the vibration without the motion.
     let holds = summary.tcp.iter().flat_map(|tcp| &tcp.holds).take(MOST_STOPS).enumerate();
     let holds = holds.filter(|(_, hold)| is_whole || hold.end_s <= end_s);
     let stops = holds.filter_map(|(k, hold)| {
@@ -344,7 +347,7 @@ fn contributions(trace: &Trace) -> Option<Plot> {
     })
 }
 
-/// Loads and deflections: sizes of all elements, and the components of each.
+/// Plots of loads and deflections: magnitudes of all elements, and the components of each.
 fn elements(summary: &Summary, trace: &Trace) -> Vec<Plot> {
     let names = &trace.header.elements;
     if names.is_empty() {
@@ -399,8 +402,8 @@ fn elements(summary: &Summary, trace: &Trace) -> Vec<Plot> {
     plots.into_iter().filter(|plot| !is_zero(plot)).collect()
 }
 
-/// Whether all curves of a plot are zero everywhere: springs of one kind alone leave the plots of
-/// the others so.
+/// Whether all curves of a plot are zero everywhere, as in translation plots of an arm with
+/// rotational springs only.
 fn is_zero(plot: &Plot) -> bool {
     let tables = plot.views.iter().flat_map(|view| &view.tables);
     tables.flat_map(|table| &table.curves).flat_map(|curve| &curve.y).all(|y| *y == 0.0)
@@ -475,7 +478,7 @@ fn energy(trace: &Trace) -> Plot {
     }
 }
 
-/// The plots in which runs are laid over each other: one curve per run.
+/// Returns the plots that overlay several runs, one curve per run.
 pub(super) fn overlays(runs: &[(&str, &Summary, &Trace)]) -> Vec<Plot> {
     let only = |plot: Plot, wanted: &str, label: &str| {
         let mut tables = plot.views.into_iter().flat_map(|view| view.tables);
@@ -510,7 +513,7 @@ pub(super) fn overlays(runs: &[(&str, &Summary, &Trace)]) -> Vec<Plot> {
         overlaid(size, "size", &|_, trace| Some(error(trace))),
         overlaid(lateral, "distance from the path", &|_, trace| Some(path_over_length(trace))),
     ];
-    // A rigid run has none.
+    // A rigid run has no spectrum.
     if let Some(plot) = with_twin.iter().find_map(|(_, summary, trace)| spectrum(summary, trace)) {
         let plot = Plot { id: "all_spectrum", ..plot };
         plots.push(overlaid(plot, "all axes", &spectrum));

@@ -1,5 +1,5 @@
-//! A folder of figures for papers: every plot of the page as SVG in the width of a column, with its
-//! data as CSV, and pictures of the arm at print size.
+//! Folder of figures for papers: every plot of the page as SVG at column width, with its data as
+//! CSV, and pictures of the arm at print resolution.
 
 use std::path::{Path, PathBuf};
 
@@ -13,7 +13,7 @@ use super::picture::printed;
 use crate::error::Error;
 use crate::summary::Summary;
 
-/// Width of the pictures of the arm (pixels): 300 a inch across both columns of a paper.
+/// Width of the pictures of the arm (pixels): 300 per inch across both columns of a paper.
 const PICTURE_WIDTH: usize = 1800;
 
 /// Writes the folder. Plots without a finite value, and pictures that cannot be drawn, are left
@@ -40,7 +40,7 @@ pub(super) fn write(folder: &Path, summary: &Summary, trace: &Trace) -> Result<(
     Ok(write_all(&files)?)
 }
 
-/// Beginnings and ends of the moves (s).
+/// Returns start and end of each move (s).
 fn moves(trace: &Trace) -> Vec<(f64, f64)> {
     let mut moves = Vec::new();
     for event in trace.events() {
@@ -77,8 +77,8 @@ fn svg(plot: &Plot, view: &PlotView, bands: &[(f64, f64)]) -> Result<String, fle
     paper_plot(&format!("{} ({})", plot.x_label, plot.x_unit), &[panel], bands)
 }
 
-/// The data of a plot: a column per curve, units in the names; sets of curves with axes of their
-/// own beside each other.
+/// Returns the data of a plot: one column per curve, units in the names; sets of curves with their
+/// own x axes are side by side.
 fn csv(plot: &Plot, view: &PlotView) -> String {
     let plain = |unit: &str| unit.replace('°', "deg").replace(' ', "_");
     let name = |text: &str, unit: &str| csv_field(&format!("{}_{}", text.replace(' ', "_"), plain(unit)));

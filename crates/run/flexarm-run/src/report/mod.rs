@@ -1,9 +1,8 @@
-//! The report of a run: a page for the browser, its figures as Markdown and JSON, figures for
-//! papers.
+//! Report of a run: an HTML page, its figures as Markdown and JSON, and figures for papers.
 //!
-//! Start at [`html`]; what a person wants to see in numbers is in [`figure_groups`], which page,
-//! Markdown and the terminal share. `curves` makes the data of the plots, `picture` has the arm
-//! drawn, `figures` writes the folder for papers.
+//! Start at [`html`]. [`figure_groups`] selects the figures for the reader; page, Markdown and
+//! terminal share them. `curves` provides the data of the plots, `picture` renders the arm,
+//! `figures` writes the folder for papers.
 
 mod again;
 mod curves;
@@ -32,7 +31,7 @@ use self::shares::{Part, part_shares, share_numbers};
 pub use again::{ReportFiles, ReportOptions, report};
 pub use html::{ReportRun, html};
 
-/// Label of a single run.
+/// Title of a report of a single run.
 fn title(summary: &Summary) -> String {
     match summary.trajectory.as_str() {
         "" => summary.robot.clone(),
@@ -40,12 +39,12 @@ fn title(summary: &Summary) -> String {
     }
 }
 
-/// The report of a run.
+/// Returns the report of a run.
 pub(crate) fn page(summary: &Summary, trace: &Trace) -> String {
     html(&[ReportRun { label: &title(summary), summary, trace }])
 }
 
-/// Writes the report, figures and `summary.json` into the output folder.
+/// Writes the report, the figures and `summary.json` into the output folder.
 pub(crate) fn write(outputs: &Outputs, summary: &Summary, trace: &Trace, page: &str) -> Result<(), Error> {
     write_page(outputs, summary, page)?;
     match outputs.figures {
@@ -54,8 +53,8 @@ pub(crate) fn write(outputs: &Outputs, summary: &Summary, trace: &Trace, page: &
     }
 }
 
-/// Writes report and `summary.json` of several runs into the output folder; the summary has all but
-/// the first within.
+/// Writes the report and `summary.json` of several runs into the output folder; `summary` is that
+/// of the first run and contains the others.
 pub(crate) fn write_study(outputs: &Outputs, summary: &Summary, traces: &[(String, Trace)]) -> Result<(), Error> {
     let summaries = std::iter::once(summary).chain(&summary.with);
     let runs: Vec<ReportRun<'_>> =
@@ -69,13 +68,13 @@ fn write_page(outputs: &Outputs, summary: &Summary, page: &str) -> Result<(), Er
     Ok(write_all(&files.map(|(name, text)| (outputs.folder.join(name), text)))?)
 }
 
-/// The figures for people without what depends on the machine and its load.
+/// Returns the figures for the reader without those that depend on the machine and its load.
 pub(crate) fn timeless_rows(summary: &Summary) -> Vec<(String, String)> {
     let of_run: Vec<String> = run_figures(summary).into_iter().map(|figure| figure.name).collect();
     rows(summary).into_iter().filter(|(name, _)| !of_run.contains(name)).collect()
 }
 
-/// The summary as a page of Markdown.
+/// Returns the summary as a Markdown page.
 pub fn markdown(summary: &Summary) -> String {
     let mut page = format!("# {} on {}\n\n", markdown_text(&summary.robot), markdown_text(&summary.trajectory));
     if !summary.headline.is_empty() {
@@ -98,7 +97,7 @@ pub fn markdown(summary: &Summary) -> String {
     page
 }
 
-/// The figures that a person wants to see, with readable units, in one column.
+/// Returns the figures for the reader in readable units, without groups.
 pub fn rows(summary: &Summary) -> Vec<(String, String)> {
     let text = |row: Figure| {
         let parts = [row.value.as_str(), row.unit].into_iter().filter(|part| !part.is_empty());
@@ -113,12 +112,12 @@ pub fn rows(summary: &Summary) -> Vec<(String, String)> {
     figure_groups(summary).into_iter().flat_map(|group| group.rows).map(text).collect()
 }
 
-/// Figures that belong together.
+/// Group of figures.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FigureGroup {
     /// Heading.
     pub title: &'static str,
-    /// In the order to be shown.
+    /// Figures in display order.
     pub rows: Vec<Figure>,
 }
 
@@ -127,11 +126,11 @@ pub struct FigureGroup {
 pub struct Figure {
     /// Name.
     pub name: String,
-    /// The number; empty if there is none.
+    /// Formatted value; empty if there is none.
     pub value: String,
-    /// Its unit.
+    /// Unit.
     pub unit: &'static str,
-    /// Note.
+    /// Additional text.
     pub note: String,
     /// Importance.
     pub weight: Weight,
@@ -140,11 +139,11 @@ pub struct Figure {
 /// Importance of a figure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Weight {
-    /// One of many.
+    /// Ordinary figure.
     Plain,
-    /// The answer.
+    /// Main result.
     Headline,
-    /// Something is wrong.
+    /// Sign of a problem.
     Alert,
 }
 
@@ -154,8 +153,8 @@ impl Figure {
     }
 }
 
-/// The figures of a run in groups: what the tool does, what links and drives contribute, how the
-/// run went.
+/// Returns the figures of a run in groups: TCP, contributions of links and drives, and the run
+/// itself.
 pub fn figure_groups(summary: &Summary) -> Vec<FigureGroup> {
     let groups = [
         FigureGroup { title: "TCP", rows: tool_figures(summary) },
@@ -165,7 +164,7 @@ pub fn figure_groups(summary: &Summary) -> Vec<FigureGroup> {
     groups.into_iter().filter(|group| !group.rows.is_empty()).collect()
 }
 
-/// Digits behind the point of lengths in mm.
+/// Number of decimals of lengths in mm.
 const MM_DIGITS: usize = 4;
 
 fn mm(x: f64) -> String {

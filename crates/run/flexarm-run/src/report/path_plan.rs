@@ -1,23 +1,23 @@
-//! The path of the tool in its plane, with the error across it enlarged.
+//! Plan of the TCP path with the magnified error across it.
 
 use flexarm_draw::{CurveLook, Panel, PlotCurve, plan_plot};
 use nalgebra::{Matrix3, Vector3};
 
 use crate::monitor::tool_path::PathFigures;
 
-/// The largest error is drawn as this part of the size of the path.
+/// Displayed size of the maximum error, relative to the size of the path.
 const SHOWN: f64 = 0.06;
 
-/// The plan and what it shows; nothing where there is no path to draw.
+/// Plan of a TCP path.
 pub(crate) struct PathPlan {
-    /// SVG.
+    /// Drawing as SVG.
     pub(crate) svg: String,
-    /// By how much errors are enlarged.
+    /// Magnification of the errors.
     pub(crate) factor: f64,
 }
 
-/// Draws the path in the plane in which it lies best, and beside it the tool with its errors, less
-/// the offset of the workpiece.
+/// Draws the path in its best-fit plane, and the TCP with its magnified errors minus the offset of
+/// the workpiece; None if there is no path to draw.
 pub(crate) fn path_plan(figures: &PathFigures) -> Option<PathPlan> {
     let split = |row: &[f64; 6]| (Vector3::new(row[0], row[1], row[2]), Vector3::new(row[3], row[4], row[5]));
     let points: Vec<(Vector3<f64>, Vector3<f64>)> = figures.points.iter().map(split).collect();
@@ -50,14 +50,14 @@ pub(crate) fn path_plan(figures: &PathFigures) -> Option<PathPlan> {
     Some(PathPlan { svg, factor })
 }
 
-/// Two world axes if the points lie square to the third, else the two directions in which they
-/// spread most.
+/// Two world axes if the points are perpendicular to the third, otherwise the two directions of
+/// largest spread.
 fn plane(points: impl Iterator<Item = Vector3<f64>>) -> [Vector3<f64>; 2] {
     let spread: Matrix3<f64> = points.map(|p| p * p.transpose()).sum();
     let eigen = spread.symmetric_eigen();
     let normal: Vector3<f64> = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into();
     let flattest = normal.iamax();
-    // Within five degrees of a world axis the plan keeps the others.
+    // Within five degrees of a world axis, the other two world axes are used.
     if normal[flattest].abs() > 0.996 {
         let axes = [[1, 2], [0, 2], [0, 1]][flattest];
         return axes.map(|k| Vector3::ith(k, 1.0));
@@ -66,7 +66,7 @@ fn plane(points: impl Iterator<Item = Vector3<f64>>) -> [Vector3<f64>; 2] {
     [widest, normal.cross(&widest)]
 }
 
-/// Returns the label of an axis of the plan.
+/// Name of an axis of the plan.
 fn named(axis: &Vector3<f64>) -> String {
     let largest = axis.iamax();
     if axis[largest].abs() > 0.999 {
@@ -75,7 +75,7 @@ fn named(axis: &Vector3<f64>) -> String {
     format!("along ({:.2}, {:.2}, {:.2})", axis.x, axis.y, axis.z)
 }
 
-/// 1, 2 or 5 times a power of ten, not above `x`.
+/// Largest of 1, 2 or 5 times a power of ten that does not exceed `x`.
 fn rounded(x: f64) -> f64 {
     let power = 10f64.powf(x.log10().floor());
     let digit = x / power;

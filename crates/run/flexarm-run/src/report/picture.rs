@@ -1,23 +1,23 @@
-//! The arm at the instant of the largest error, from two sides.
+//! The arm at the time of the maximum error, from two sides.
 
 use flexarm_log::Trace;
 
-/// A picture for the page, which says beside it what is in it.
+/// A picture for the page, which adds caption and key.
 pub(super) struct Picture {
-    /// For the caption.
+    /// Title for the caption.
     pub(super) title: &'static str,
-    /// PNG file without a ground, and where x, y and z point on it (right and up); or why there is
-    /// none.
+    /// PNG without background, and the projected directions of x, y and z (right and up); or the
+    /// reason why there is none.
     pub(super) drawn: Result<(Vec<u8>, [[f64; 2]; 3]), String>,
 }
 
-/// Height of a picture of this width.
+/// Height of a picture with this width.
 #[cfg(feature = "png")]
 const fn height(width: usize) -> usize {
     width * 7 / 9
 }
 
-/// Both pictures; `width` in pixels.
+/// Returns both pictures; `width` in pixels.
 #[cfg(feature = "png")]
 pub(super) fn pictures(trace: &Trace, width: usize) -> Vec<Picture> {
     use flexarm_draw::{ArmSide, arm_pictures};
@@ -32,15 +32,15 @@ pub(super) fn pictures(trace: &Trace, width: usize) -> Vec<Picture> {
     }
 }
 
-/// Without the feature `png` there are none, and the reason is said.
+/// Without the feature `png` there are no pictures; returns the reason.
 #[cfg(not(feature = "png"))]
 pub(super) fn pictures(_trace: &Trace, _width: usize) -> Vec<Picture> {
     let drawn = Err("this build has no pictures: it was made without the feature png".to_owned());
     vec![Picture { title: "", drawn }]
 }
 
-/// Both pictures for paper, with their scales, by the names of their files. Those that cannot be
-/// drawn are left out.
+/// Returns both pictures for papers, with their scales, by file name. Those that cannot be drawn
+/// are left out.
 #[cfg(feature = "png")]
 pub(super) fn printed(trace: &Trace, width: usize) -> Vec<(&'static str, Vec<u8>)> {
     use flexarm_draw::{ArmSide, arm_png};
@@ -49,19 +49,19 @@ pub(super) fn printed(trace: &Trace, width: usize) -> Vec<(&'static str, Vec<u8>
     all.into_iter().flatten().collect()
 }
 
-/// Without the feature `png` there are none.
+/// Without the feature `png` there are no pictures.
 #[cfg(not(feature = "png"))]
 pub(super) fn printed(_trace: &Trace, _width: usize) -> Vec<(&'static str, Vec<u8>)> {
     Vec::new()
 }
 
-/// Colours of a deviation from 0 to the end of the scale, as they are on the arm.
+/// Colours of a deviation from 0 to the end of the scale, as drawn on the arm.
 #[cfg(feature = "png")]
 pub(super) fn scale_colors() -> Vec<flexarm_draw::palette::Rgb> {
     (0..=12).map(|k| flexarm_draw::arm_color(f64::from(k) / 12.0)).collect()
 }
 
-/// None where nothing is drawn.
+/// Empty without pictures.
 #[cfg(not(feature = "png"))]
 pub(super) fn scale_colors() -> Vec<flexarm_draw::palette::Rgb> {
     Vec::new()

@@ -1,24 +1,24 @@
-//! Shares of the peak TCP error for table and page: of links, drives, servos
-//! and stepper.
+//! Contributions to the maximum TCP error of links, drives, servos and stepper, for tables and
+//! page.
 
 use crate::headline::{self, rounded};
 use crate::summary::{DriveFigures, LinkFigures, Summary};
 
-/// Share of one part of the arm in the peak TCP error, with its own figures.
+/// Contribution of one part of the arm to the maximum TCP error, with its own figures.
 pub(super) struct PartShare<'a> {
     /// Name of the link or joint, or of the stepper.
     pub(super) name: &'a str,
-    /// As in [`crate::ShareFigures`].
+    /// Kind, as in [`crate::ShareFigures`].
     pub(super) kind: &'a str,
-    /// Part of the largest TCP error along its direction (m), where that is known.
+    /// Contribution along the direction of the maximum TCP error (m), if known.
     pub(super) at_peak_m: Option<f64>,
     /// Maximum TCP displacement that it causes at any time (m).
     pub(super) largest_m: Option<f64>,
-    /// The rest of its figures.
+    /// Further figures of the part.
     pub(super) part: Part<'a>,
 }
 
-/// The part of the arm that a share belongs to.
+/// Part of the arm to which a contribution belongs.
 pub(super) enum Part<'a> {
     Link(&'a LinkFigures),
     Drive(&'a DriveFigures),
@@ -26,7 +26,8 @@ pub(super) enum Part<'a> {
     None,
 }
 
-/// Links, drives, and what else has a share in the largest TCP error; the shares add up to it.
+/// Returns links, drives and all other contributors to the maximum TCP error; the contributions add
+/// up to it.
 pub(super) fn part_shares(summary: &Summary) -> Vec<PartShare<'_>> {
     let shares = summary.tcp.as_ref().map_or(&[][..], |tcp| &tcp.shares_at_peak);
     let known = |name: &str, kinds: &[&str]| {
@@ -60,8 +61,8 @@ pub(super) fn part_shares(summary: &Summary) -> Vec<PartShare<'_>> {
     links.chain(drives).chain(others).collect()
 }
 
-/// The shares of all parts in mm, as numbers that add up to the peak as it is shown; those that are
-/// not known are `None`.
+/// Formats the contributions of all parts in mm such that they add up to the displayed peak; `None`
+/// for those that are not known.
 pub(super) fn share_numbers(summary: &Summary, shares: &[PartShare<'_>], digits: usize) -> Vec<Option<String>> {
     let known: Vec<f64> = shares.iter().filter_map(|share| Some(1e3 * share.at_peak_m?)).collect();
     let peak = summary.tcp.as_ref().map_or(f64::NAN, |tcp| 1e3 * tcp.peak_m);

@@ -1,4 +1,4 @@
-//! Caveats about a run before its first step, for single runs and for studies of many.
+//! Caveats before the first step, for single runs and for studies.
 
 use flexarm_kinematics::State;
 use flexarm_stepping::{FlexibleArm, StepRule, StepperKind};
@@ -13,29 +13,29 @@ use crate::options::RunOptions;
 use crate::posed::strains;
 use crate::robot::Robot;
 
-/// Steps in a period of a gear's ripple with which a step of second order meets its amplitude
-/// within a few per cent.
+/// Minimum number of steps per period of a gear's ripple, for which a second-order stepper has an
+/// amplitude error of a few per cent.
 const RIPPLE_STEPS: f64 = 12.0;
 
-/// A run that is ready to go.
+/// A run that is ready to start.
 pub struct BeforeRun<'a> {
-    /// As described.
+    /// Robot as described.
     pub robot: &'a Robot,
-    /// With links and drives modelled.
+    /// Robot with its links and drives modelled.
     pub flexible: &'a FlexibleRobot,
-    /// At the start, with its loads.
+    /// Arm at the start, with its loads.
     pub arm: &'a FlexibleArm,
-    /// The motion.
+    /// Motion.
     pub motion: &'a Motion,
-    /// Steps and stepper.
+    /// Stepper and step size.
     pub options: &'a RunOptions,
 }
 
 impl BeforeRun<'_> {
-    /// Caveats about the models of the links, the motion, the arm at rest where it begins, steps
-    /// and stepper.
+    /// Returns caveats about the models of the links, the motion, the arm at rest at the start, the
+    /// step size and the stepper.
     ///
-    /// * `sag_m`: how far the TCP is off at rest (m).
+    /// * `sag_m`: static TCP deflection (m).
     pub(crate) fn caveats(&self, sag_m: f64) -> Vec<Caveat> {
         let Self { robot, flexible, arm, motion, options } = *self;
         let mut caveats = flexible.caveats();
@@ -62,8 +62,8 @@ impl BeforeRun<'_> {
         caveats
     }
 
-    /// As `caveats`, for a study that keeps no samples: links are looked at where they rest, and
-    /// torques of the rigid robot beyond a limit warn.
+    /// As `caveats`, for a study that keeps no samples: checks the links at rest, and turns
+    /// torques of the rigid robot above a limit into warnings.
     pub fn caveats_of_study(&self, sag_m: f64) -> Vec<Caveat> {
         let warns = |caveat: Caveat| match caveat.code == kinds::MOTION_EFFORT.code {
             true => Caveat { severity: Severity::Warning, ..caveat },
@@ -72,7 +72,7 @@ impl BeforeRun<'_> {
         self.caveats(sag_m).into_iter().map(warns).chain(self.links_at_rest()).collect()
     }
 
-    /// Links that bend too far at rest.
+    /// Checks for links that deflect too far at rest.
     fn links_at_rest(&self) -> Vec<Caveat> {
         let (arm, model) = (self.arm, &self.arm.model);
         let mut state = State::zeros(model);
@@ -83,7 +83,7 @@ impl BeforeRun<'_> {
         links.flat_map(|(span, (strain, rotation))| validity::link(&span.link, rotation, strain)).collect()
     }
 
-    /// Damping that a stepper cannot take as it is.
+    /// Reports damping that the stepper must approximate.
     fn spook(&self) -> Option<Caveat> {
         let changes = matches!(self.options.stepper, StepperKind::Spook(_)) && !self.arm.proportional;
         changes.then(|| {
@@ -97,8 +97,8 @@ impl BeforeRun<'_> {
         })
     }
 
-    /// Ripple of a gear that is faster than the steps follow, at the largest speed of a thousand
-    /// instants of the motion.
+    /// Checks whether the steps resolve the ripple of gears, at the maximum speed over a thousand
+    /// points of the motion.
     fn ripple(&self) -> Option<Caveat> {
         let (arm, model, duration) = (self.arm, &self.arm.model, self.motion.trajectory.duration());
         if arm.transmission.is_empty() || self.options.stepper.entry().steps == StepRule::ByErrorControl {

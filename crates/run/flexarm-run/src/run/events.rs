@@ -6,7 +6,7 @@ use flexarm_log::{Event, EventKind};
 use super::RunLoop;
 
 impl RunLoop<'_> {
-    /// Returns the events in order of time, up to the end of the run.
+    /// Returns the events up to the end of the run, ordered by time.
     pub(super) fn events(&self, metrics: Option<&TcpMetrics>) -> Vec<Event> {
         let mut events = Vec::new();
         let mut add = |time_s: f64, kind: EventKind, text: String| events.push(Event { time_s, kind, text });
@@ -37,8 +37,7 @@ impl RunLoop<'_> {
         let mut jumps: Vec<f64> = self.arm.load_jumps().collect();
         jumps.sort_by(f64::total_cmp);
         jumps.dedup();
-        // A table or a milling load has a corner at every row; a list of those is not useful:
-        // anything.
+        // Tables and milling loads have a kink at every row; a list of those is of no use.
         const MOST_JUMPS: usize = 20;
         for t in jumps.iter().take(if jumps.len() <= MOST_JUMPS { MOST_JUMPS } else { 1 }) {
             add(*t, EventKind::Load, "an external load changes".into());

@@ -1,4 +1,4 @@
-//! The figures of a run, from what its monitors have seen, and whether its models held.
+//! Computes the figures of a run from its monitors, and checks whether its models are valid.
 
 use flexarm_analysis::TcpMetrics;
 use flexarm_kinematics::{Frame, State, forward_kinematics};
@@ -14,9 +14,9 @@ use crate::options::RunOptions;
 use crate::summary::{CURVE_PIECES, DriveFigures, LinkFigures, StepperFigures, Summary, TcpFigures};
 
 impl RunLoop<'_> {
-    /// Figures of what was seen so far; `robot_caveats` stand before those of the run.
+    /// Returns the figures so far; `robot_caveats` come before those of the run.
     pub(super) fn summary(&self, robot_caveats: Vec<Caveat>) -> (Summary, Vec<Event>) {
-        // A run that stopped at once has nothing to measure.
+        // A run that stopped immediately has no metrics.
         let metrics = self.monitors.tool.result().metrics().ok();
         let metrics = metrics.as_ref().filter(|_| self.options.with_twin);
         let (links, elastic_drives) = (self.link_figures(), self.drive_figures());
@@ -92,7 +92,7 @@ impl RunLoop<'_> {
         }
     }
 
-    /// Returns the share of each contributor in the peak error, along its direction.
+    /// Contribution of each contributor to the maximum error, along the error's direction.
     fn shares_at_peak(&self) -> Vec<ShareFigures> {
         let (along, rest) = self.at_peak.along(&self.tcp);
         let mut places = vec![0.0; self.monitors.contributions.moved().len()];
@@ -112,7 +112,7 @@ impl RunLoop<'_> {
         shares.chain(of_stepper).collect()
     }
 
-    /// Returns the caveats about the input and about the range of the models so far.
+    /// Caveats about the input and the validity of the models in the run so far.
     fn caveats(&self, summary: &Summary, sag_m: f64, mut caveats: Vec<Caveat>) -> Vec<Caveat> {
         let (robot, flexible, arm, motion, options) =
             (self.robot, self.flexible, &*self.arm, self.motion, self.options);
@@ -133,7 +133,7 @@ impl RunLoop<'_> {
         caveats
     }
 
-    /// Returns the deflections of the gearboxes.
+    /// Caveats about gearbox deflections.
     fn drive_caveats(&self) -> Vec<Caveat> {
         let coordinates = self.arm.model.coordinates();
         let drives = self.robot.drives.iter().zip(self.monitors.deflections.result()).enumerate();
@@ -148,7 +148,7 @@ impl RunLoop<'_> {
         found.collect()
     }
 
-    /// Forces of drives against their limits.
+    /// Caveats about drive torques and forces that exceed their limits.
     fn effort_caveats(&self) -> Vec<Caveat> {
         let (coordinates, loads) = (self.arm.model.coordinates(), self.monitors.drive_loads.result());
         let peaks: Vec<f64> = loads.iter().map(|load| load.peak).collect();
@@ -161,7 +161,7 @@ impl RunLoop<'_> {
     }
 }
 
-/// TCP error with the drives at rest in their first position, also for runs that start undeformed
+/// TCP error with the drives at rest in their initial position, also for runs that start undeformed
 /// (m).
 pub fn static_sag(arm: &FlexibleArm, tcp: &Frame) -> f64 {
     let model = &arm.model;

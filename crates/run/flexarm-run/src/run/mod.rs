@@ -1,9 +1,9 @@
-//! The main job: rigid and flexible run along one motion, logged while it goes on, measured at the
-//! end.
+//! Runs the rigid and the flexible arm along one motion, logs the samples and computes the figures
+//! at the end.
 //!
-//! `RunLoop::go` takes the steps of the arm and of its rigid twin, updates `Monitors`, and passes
-//! samples to recorders, curves and observer. Figures of what was seen are in `figures`, what
-//! happened when in `events`.
+//! `RunLoop::go` steps the arm and its rigid twin, updates `Monitors`, and passes samples to
+//! recorders, curves and observer. `figures` computes the figures from the monitors, `events` the
+//! list of events.
 
 mod before;
 mod events;
@@ -46,56 +46,57 @@ use crate::twin::RigidTwin;
 pub use before::BeforeRun;
 pub use figures::static_sag;
 
-/// Name of the following error of servos among the contributors to the TCP error.
+/// Name of the servo following error among the contributors to the TCP error.
 const FOLLOWING_ERROR: &str = "following error";
 
-/// Part of the first natural frequency at the start below which the arm does not ring anywhere on
-/// its way.
+/// Fraction of the first natural frequency at the start; the arm is assumed to have no natural
+/// frequency below it anywhere along the motion.
 const RINGING_FROM: f64 = 0.5;
 
-/// Coordinates times steps between two looks at the progress callback: a stop must not wait for
-/// many large steps.
+/// Coordinates times steps between two calls of the progress callback, so that large models react
+/// to a stop soon.
 const POLL_EVERY: usize = 2000;
-/// Maximum number of steps between two calls of the callback.
+/// Maximum number of steps between two calls.
 const RAREST_POLL: usize = 64;
 
-/// Called with simulated and total time (s); breaking off stops the run with readable files.
+/// Called with simulated and total time (s); breaking stops the run and leaves readable files.
 pub type Progress<'a> = dyn FnMut(f64, f64) -> ControlFlow<()> + 'a;
 
-/// Called with each logged sample; breaking off stops the run.
+/// Called with each logged sample; breaking stops the run.
 pub type SampleObserver<'a> = dyn FnMut(&Sample) -> ControlFlow<()> + 'a;
 
-/// Signals that a run keeps besides its figures.
+/// Signals kept by a run in addition to its figures.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Keep {
-    /// Nothing: the fastest.
+    /// None; fastest.
     Figures,
-    /// Every logged sample as columns.
+    /// All logged samples as columns.
     #[default]
     Columns,
-    /// The curves of the report, thinned if the run is long.
+    /// Curves of the report, thinned for long runs.
     Curves,
 }
 
-/// Results of a run, and callbacks while it goes on.
+/// Requested results of a run, and callbacks during the run.
 #[derive(Default)]
 pub struct RunRequest<'a> {
-    /// Signals that are kept.
+    /// Signals to keep.
     pub keep: Keep,
     /// Recordings and report to write.
     pub outputs: Option<&'a Outputs>,
     /// Called with each logged sample.
     pub observer: Option<&'a mut SampleObserver<'a>>,
-    /// Called now and then while the run goes on.
+    /// Called at intervals during the run.
     pub progress: Option<&'a mut Progress<'a>>,
-    /// Recorders besides those of `outputs`.
+    /// Recorders in addition to those of `outputs`.
     pub recorders: Vec<Box<dyn Recorder>>,
-    /// Deflections of all runs that are shown together, for one magnification and colour scale.
+    /// Expected deflections of all runs that are shown together, for a common magnification and
+    /// colour scale.
     pub expected: Option<Expected>,
 }
 
 impl RunRequest<'_> {
-    /// Returns a request that keeps these signals, without files and callbacks.
+    /// Returns a request that keeps these signals, without files or callbacks.
     pub fn keeping(keep: Keep) -> Self {
         Self { keep, ..Self::default() }
     }
@@ -106,11 +107,11 @@ impl RunRequest<'_> {
 enum Detail {
     /// Figures of the summary.
     Figures,
-    /// The signals of [`flexarm_log::Columns`].
+    /// Signals of [`flexarm_log::Columns`].
     Columns,
     /// Whole samples.
     Samples,
-    /// Curves, and all that recordings say of a run.
+    /// Curves, and all contents of recordings.
     Curves,
 }
 
@@ -126,10 +127,11 @@ impl Detail {
     }
 }
 
-/// Samples from which on a run takes a little longer at its end, for less memory.
+/// Number of samples above which the page is made after the recordings are closed, which saves
+/// memory but takes a little longer.
 const LONG_RUN: u64 = 100_000;
 
-/// Runs a scenario; `options` with the arm's own modelling.
+/// Runs a scenario; the modelling in `options` must be the arm's own.
 pub(crate) fn simulate(
     built: &Arm,
     scenario: &Scenario,
@@ -145,7 +147,7 @@ pub(crate) fn simulate(
     let mut to_the_end = |_, _| ControlFlow::Continue(());
     let progress = progress.unwrap_or(&mut to_the_end);
 
-    // Before the first file is made, so that a stop during the preparation leaves none.
+    // Polls before the first file is created, so that a stop during preparation leaves no files.
     if progress(0.0, scenario.duration_s()).is_break() {
         return Err(Error::Interrupted { t: 0.0, partial: false });
     }
@@ -204,8 +206,8 @@ pub(crate) fn simulate(
     summary.cpu_s_per_simulated_s = summary.cpu_s / summary.duration_s.max(1e-9);
     summary.files = files.names.clone();
     run.trace.finish(if detail < Detail::Curves { RunResult::default() } else { result(&summary, events) });
-    // The page is made while the recordings are closed, of long runs afterwards: each takes memory,
-    // the page what they leave.
+    // In short runs the page is made while the recordings are being closed, in long runs
+    // afterwards, because both need memory.
     files.set.begin_to_finish(&run.trace.result);
     let make_page = || outputs.map(|_| crate::report::page(&summary, &run.trace));
     let early = if run.trace.samples() < LONG_RUN { make_page() } else { None };
@@ -217,9 +219,9 @@ pub(crate) fn simulate(
     Ok(Run { summary, columns: columns.unwrap_or_default(), trace: run.trace })
 }
 
-/// Returns the error to report, if the run or the writing of its result failed. The reason of the
-/// stop comes first news: after a full disk, closing fails again. But nobody must be told of a log
-/// that is not there.
+/// Chooses the error to return if the run or the writing of its results failed. The error that
+/// stopped the run comes first, because after a full disk, closing fails as well; but it must not
+/// refer to a log that does not exist.
 fn how_it_ended(end: Result<(), Error>, reported: Result<(), Error>) -> Result<(), Error> {
     match (end, reported) {
         (Err(Error::Interrupted { .. }), Err(lost)) => Err(lost),
@@ -228,8 +230,8 @@ fn how_it_ended(end: Result<(), Error>, reported: Result<(), Error>) -> Result<(
     }
 }
 
-/// Returns the result for recordings. It has no timings: recordings of the same run are the
-/// same bytes.
+/// Result for the recordings. It contains no timings, so recordings of the same run are identical
+/// byte for byte.
 fn result(summary: &Summary, events: Vec<Event>) -> RunResult {
     let timeless =
         Summary { wall_s: 0.0, cpu_s: 0.0, real_time_factor: 0.0, cpu_s_per_simulated_s: 0.0, ..summary.clone() };
@@ -247,15 +249,15 @@ fn result(summary: &Summary, events: Vec<Event>) -> RunResult {
     }
 }
 
-/// Contributors to the TCP displacement.
+/// Part of the robot that contributes to the TCP error.
 struct Contributor {
-    /// Place among all displacements: links, then drives, then what servos leave.
+    /// Index among all displacements: links, then drives, then the following error.
     place: usize,
     name: String,
     kind: &'static str,
 }
 
-/// Flexible links, elastic drives and what servos leave.
+/// Lists the flexible links, the elastic drives and the following error of the servos.
 fn contributors(robot: &Robot, flexible: &FlexibleRobot, arm: &FlexibleArm) -> Vec<Contributor> {
     let (n_links, n_drives) = (flexible.spans.len(), robot.drives.len());
     let drives = robot.drives.iter().enumerate().filter(|(k, _)| flexible.owners.contains(&Owner::Drive(*k)));
@@ -268,13 +270,13 @@ fn contributors(robot: &Robot, flexible: &FlexibleRobot, arm: &FlexibleArm) -> V
     contributors.map(|(place, name, kind)| Contributor { place, name, kind }).collect()
 }
 
-/// A run under way: the stepper with the arm, the twin beside it, and who watches.
+/// State of a run in progress: the stepper with the arm, the rigid twin, and the monitors.
 struct RunLoop<'a> {
     robot: &'a Robot,
     motion: &'a Motion,
     options: &'a RunOptions,
     flexible: &'a FlexibleRobot,
-    /// The model is that of the last sample, with what it carries then.
+    /// Arm whose model is that of the last sample, including its current payload.
     arm: Arc<FlexibleArm>,
     stepper: Box<dyn Stepper>,
     tcp: Frame,
@@ -283,15 +285,15 @@ struct RunLoop<'a> {
     monitors: Monitors,
     sampler: Sampler,
     sample: Sample,
-    /// The curves so far, and the sample of the largest error.
+    /// Curves so far, and the sample with the maximum error.
     trace: Trace,
     bends: Vec<BendInfo>,
     contributors: Vec<Contributor>,
     at_peak: AtPeak,
-    /// Returns the maximum torque of each motor that moves several joints.
+    /// Maximum torque of each motor that moves several joints.
     motors: std::collections::BTreeMap<String, f64>,
     detail: Detail,
-    /// Steps between two samples, and all.
+    /// Number of steps between two samples, and in total.
     every: u64,
     last: u64,
 }
@@ -341,7 +343,7 @@ impl<'a> RunLoop<'a> {
         }
     }
 
-    /// Steps to the end, logging on the way.
+    /// Steps to the end and logs on the way.
     fn go(
         &mut self,
         files: &mut RecorderSet,
@@ -370,15 +372,15 @@ impl<'a> RunLoop<'a> {
         Ok(())
     }
 
-    /// Compares with the twin, shows the monitors what there is, and fills the sample as far as it
-    /// is wanted.
+    /// Compares with the twin, updates the monitors, and fills the sample to the requested level of
+    /// detail.
     fn observe(&mut self, step: u64) {
         self.stepper.observe(&mut self.seen);
-        // The twin carries what the arm carries.
+        // The twin carries the same payload as the arm.
         if !Arc::ptr_eq(&self.arm.model, &self.seen.model) {
             Arc::make_mut(&mut self.arm).model.clone_from(&self.seen.model);
         }
-        // The required forces of its drives are in samples only.
+        // The torques of the twin are needed only in samples.
         match self.detail {
             Detail::Figures => self.twin.place(&self.arm, &self.tcp, self.seen.t),
             _ => self.twin.update(&self.arm, &self.tcp, self.seen.t),
@@ -406,12 +408,12 @@ impl<'a> RunLoop<'a> {
     }
 }
 
-/// Steps from one logged sample to the next.
+/// Returns the number of steps between two logged samples.
 pub fn steps_per_sample(options: &RunOptions) -> u64 {
     ((1.0 / (options.log_rate_hz * options.step_s)).round() as u64).max(1)
 }
 
-/// For a run whose samples are `sample_s` apart (s).
+/// Builds the TCP monitor of a run with sampling interval `sample_s` (s).
 fn tool_monitor(
     arm: &Arc<FlexibleArm>,
     tcp: &Frame,
@@ -420,7 +422,7 @@ fn tool_monitor(
     options: &RunOptions,
     sample_s: f64,
 ) -> ToolMonitor {
-    // Before the first motion the path axes are those of its beginning.
+    // Before the first motion, the path axes are those at its start.
     let (trajectory, duration) = (&motion.trajectory, motion.trajectory.duration());
     let mut still_until = 0.0;
     let instants = (0..=1000).map(|k| duration * f64::from(k) * 1e-3).filter(|t| {
@@ -431,8 +433,7 @@ fn tool_monitor(
     });
     let path = PathFrame::before(instants.map(|t| twin.rates(arm, tcp, t)));
     let static_part = options.with_twin.then(|| StaticPart::new(arm, tcp, moves(motion), duration, sample_s));
-    // Stops come to rest where the static part is, unless servos bring the joints elsewhere or a
-    // load moves it.
+    // The arm settles at the static part, unless servos move the joints or loads act.
     let rests_there = arm.torque_driven.is_empty() && arm.loads.is_empty();
     let first_hz = arm.modes.frequencies_hz().first().copied().unwrap_or(0.0);
     let settings = MetricSettings { settling_band_m: options.settling_band_m, lowest_hz: RINGING_FROM * first_hz };
@@ -440,7 +441,7 @@ fn tool_monitor(
     ToolMonitor::new(path, static_part, record.with_room((duration / sample_s) as usize + 2))
 }
 
-/// Start and end of each move (s).
+/// Returns the start and end of each move (s).
 fn moves(motion: &Motion) -> Vec<(f64, f64)> {
     motion.trajectory.moves().iter().map(|m| (m.start, m.end)).collect()
 }

@@ -1,5 +1,5 @@
-//! State of a run at one instant for recordings, curves and observers: one [`Sample`], filled
-//! again and again.
+//! Fills the [`Sample`] of a time step for recordings, curves and observers; the same sample is
+//! reused.
 
 use flexarm_kinematics::{AxisMotion, Frame, JointMotion};
 use flexarm_log::{ElasticSample, EnergySample, Sample};
@@ -10,10 +10,10 @@ use crate::monitor::tool::ToolError;
 use crate::robot::Robot;
 use crate::twin::RigidTwin;
 
-/// Elements of an arm in a sample.
+/// Frames and coordinates of an arm that go into a sample.
 pub(super) struct Sampler {
     link_frames: Vec<Frame>,
-    /// Places along the flexible links.
+    /// Stations along the flexible links.
     stations: Vec<Frame>,
     /// Link-side angle of a joint: actuated coordinate, elastic coordinate, weight.
     angles: Vec<(usize, usize, f64)>,
@@ -24,7 +24,7 @@ impl Sampler {
         Self { link_frames, stations, angles: link_side_angles(robot, flexible) }
     }
 
-    /// The arm beside its twin.
+    /// Fills in the arm and its twin.
     pub(super) fn fill(&self, sample: &mut Sample, seen: &Observation, twin: &RigidTwin, tool: &ToolError) {
         sample.time_s = seen.t;
         sample.error_world = tool.error;
@@ -71,7 +71,7 @@ impl Sampler {
     }
 }
 
-/// Deflection and load of each spring, along the axes of its joint.
+/// Fills in deflection and load of each spring, along the axes of its joint.
 pub(super) fn fill_elastic(sample: &mut Sample, seen: &Observation, arm: &FlexibleArm) {
     sample.elastic.resize(arm.elements.len(), ElasticSample::default());
     for (k, element) in arm.elements.iter().enumerate() {
@@ -85,7 +85,7 @@ pub(super) fn fill_elastic(sample: &mut Sample, seen: &Observation, arm: &Flexib
     }
 }
 
-/// Puts one deflection and its load along the axis of its joint.
+/// Distributes one deflection and its load along the axis of its joint.
 fn place(deflection: &mut [f64; 6], load: &mut [f64; 6], motion: AxisMotion, e: f64) {
     let (torque, axis, first) = (load[0], motion.axis(), if motion.slides() { 0 } else { 3 });
     let slides_as_it_turns = !motion.slides() && motion.travel() > 0.0;
@@ -100,7 +100,7 @@ fn place(deflection: &mut [f64; 6], load: &mut [f64; 6], motion: AxisMotion, e: 
     }
 }
 
-/// Deflections of the gearbox springs, which add to the motor's angle at the link.
+/// Contributions of gearbox springs to the link-side angle, in addition to the motor's angle.
 fn link_side_angles(robot: &Robot, flexible: &FlexibleRobot) -> Vec<(usize, usize, f64)> {
     let mut angles = Vec::new();
     for (group, owner) in flexible.model.elastic().iter().zip(&flexible.owners) {

@@ -1,10 +1,10 @@
-//! Shares of each link, gearbox and servo in the peak TCP error.
+//! Contributions of each link, gearbox and servo to the maximum TCP error.
 //!
 //! ```text
 //! x_flexible - x_rigid = ∫ J(q(s)) Δq ds,   q(s) = q_rigid + s Δq,   s from 0 to 1        (1)
 //! ```
-//! A coordinate has its own term of `J Δq`, so the terms of all coordinates together are the error.
-//! Three points of Gauss's rule leave an error of seventh order in Δq.
+//! Each coordinate has its own term in `J Δq`, so the terms of all coordinates add up to the error.
+//! Three-point Gauss quadrature has an error of seventh order in Δq.
 
 use std::sync::Arc;
 
@@ -14,11 +14,11 @@ use nalgebra::{DVector, Matrix6xX, Vector3};
 
 use crate::twin::RigidTwin;
 
-/// Places and weights of Gauss's rule between 0 and 1.
+/// Nodes and weights of Gauss quadrature on 0..1.
 const GAUSS: [(f64, f64); 3] =
     [(0.112_701_665_379_258_3, 5.0 / 18.0), (0.5, 4.0 / 9.0), (0.887_298_334_620_741_7, 5.0 / 18.0)];
 
-/// The coordinates at the largest TCP error so far.
+/// Coordinates at the maximum TCP error so far.
 #[derive(Default)]
 pub(super) struct AtPeak {
     size_m: f64,
@@ -29,7 +29,7 @@ pub(super) struct AtPeak {
 }
 
 impl AtPeak {
-    /// Takes an instant if its error is the largest so far; of equal ones the first counts.
+    /// Stores the sample if its error is the largest so far; the first of equal ones is kept.
     pub(super) fn update(&mut self, error: &[f64; 6], seen: &Observation, twin: &RigidTwin) {
         let error = Vector3::from_row_slice(&error[..3]);
         if error.norm() > self.size_m {
@@ -40,8 +40,8 @@ impl AtPeak {
         }
     }
 
-    /// Returns the share of each coordinate in the error, along its direction (m), and the
-    /// remainder: steppers in maximal coordinates let joints drift apart.
+    /// Returns the contribution of each coordinate along the direction of the error (m), and the
+    /// remainder due to no coordinate: joint drift of steppers in maximal coordinates.
     pub(super) fn along(&self, tcp: &Frame) -> (Vec<f64>, f64) {
         let Some(model) = &self.model else { return (Vec::new(), 0.0) };
         let (mut data, mut J) = (Data::new(model), Matrix6xX::zeros(model.nv()));

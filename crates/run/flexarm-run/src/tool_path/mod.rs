@@ -1,7 +1,7 @@
-//! Motions given as a TCP path: a program of moves and a robot become joints over time.
+//! Motions given as TCP paths: a program of moves and a robot become joint trajectories.
 //!
-//! `file` reads our own path files; robot programs come as a [`Program`] from elsewhere. Both end
-//! in `ToolPath::plan`.
+//! `file` reads flexarm's own path files; robot programs are read elsewhere into a [`Program`].
+//! Both end in `ToolPath::plan`.
 
 mod file;
 mod program;
@@ -26,50 +26,50 @@ pub(crate) use file::{is_path_file, read_path_file};
 pub use program::program_text;
 pub(crate) use program::read_robot_program;
 
-/// A joint reaches its top speed in this time where nothing is known of its acceleration, s.
+/// Assumed time for a joint to reach its top speed if its acceleration is not known, s.
 const TO_TOP_SPEED: f64 = 0.4;
-/// Acceleration of a joint whose speed is not limited either, rad/s² or m/s².
+/// Assumed acceleration of a joint without a speed limit, rad/s² or m/s².
 const ACCELERATION: f64 = 10.0;
-/// Minimum singular value below which a path passes near a singular pose, m/rad.
+/// Smallest singular value below which a path counts as near-singular, m/rad.
 const NEAR_SINGULAR: f64 = 0.02;
-/// Number of notes of one kind that are listed one by one.
+/// Maximum number of notes of one kind that are listed individually.
 const TOLD: usize = 4;
-/// The link that ROS gives the axes of the controller's flange, and the one of its base.
+/// ROS name of the link at the controller's flange.
 const FLANGE: &str = "tool0";
 const BASE: &str = "base";
 
-/// A motion of the tool with what became of each move.
+/// TCP motion with the planned moves.
 #[derive(Debug, Clone)]
 pub struct ToolPath {
-    /// Move by move.
+    /// Planned moves in order.
     pub moves: Vec<PlannedMove>,
-    /// The file.
+    /// Path of the file.
     pub(crate) file: String,
-    /// Bounds of jerks that the motion keeps, by joint, rad/s³ or m/s³.
+    /// Jerk limits kept by the motion, by joint, rad/s³ or m/s³.
     pub(crate) jerks: Vec<(String, f64)>,
     /// Warnings.
     pub(crate) warnings: Vec<String>,
-    /// Things that may be known anyway.
+    /// Notes.
     pub(crate) notes: Vec<String>,
 }
 
-/// Data of the robot in addition to its model.
+/// Robot data needed for planning.
 #[derive(Clone, Copy)]
 pub struct Cell<'a> {
     /// Rigid robot.
     pub model: &'a Model,
     /// Link that carries the tool centre point.
     pub tcp_link: Option<&'a str>,
-    /// Joints that stay, and where.
+    /// Held joints and their positions.
     pub hold: &'a [(String, f64)],
-    /// Axes that the controller counts otherwise than the joints.
+    /// Axes that the controller counts differently from the joints.
     pub controller: &'a [RobotAxis],
 }
 
-/// Assumptions about the robot, as sentences.
+/// Assumptions made where data are missing, as sentences.
 #[derive(Debug, Clone, Default)]
 pub struct Assumed {
-    /// Tool frames; unused where a path has none of its own.
+    /// Link on which tools are assumed to be mounted; irrelevant if a path has no tool of its own.
     pub(crate) flange: Option<String>,
     pub(crate) accelerations: Option<String>,
 }
@@ -80,7 +80,7 @@ impl Assumed {
     }
 }
 
-/// Changes to what the robot's description says of its joints.
+/// Overrides of the joint limits in the robot's description.
 #[derive(Debug, Clone, Default)]
 pub struct Overrides {
     pub(crate) velocities: Vec<Option<f64>>,
@@ -90,8 +90,8 @@ pub struct Overrides {
 }
 
 impl<'a> Cell<'a> {
-    /// The flange of the controller, the robot's own tool on it, and a note if a link had to be
-    /// chosen.
+    /// Returns the flange frame of the controller, the robot's TCP in it, and a note if a link had
+    /// to be chosen.
     fn flange(&self) -> (Frame, Pose, Option<String>) {
         let tcp = tcp_frame(self.model);
         let named = |name: &str| self.model.frame(name).filter(|frame| frame.body == tcp.body).cloned();
@@ -112,14 +112,13 @@ impl<'a> Cell<'a> {
         (flange, X_FT, note)
     }
 
-    /// Returns the controller's world in that of the model: its link `base`, if that does not
-    /// move.
+    /// Pose of the controller's world in the model's: that of the link `base` if it does not move.
     fn world(&self) -> Pose {
         let base = self.model.frame(BASE).filter(|frame| frame.body == 0);
         base.map_or_else(Pose::identity, |frame| frame.X_BF)
     }
 
-    /// All coordinates before the program.
+    /// Coordinates at rest before the program.
     fn rest(&self) -> DVector<f64> {
         let coordinates = self.model.coordinates();
         DVector::from_fn(self.model.nv(), |k, _| {
@@ -129,7 +128,8 @@ impl<'a> Cell<'a> {
         })
     }
 
-    /// Axis conventions of the controller; empty where they are those of the joints.
+    /// Returns the controller's convention for these axes; empty if it counts the joints as they
+    /// are.
     pub fn controller_axes(&self, axes: &[usize]) -> Vec<ControllerAxis> {
         let place = |joint: &str| axes.iter().position(|&k| self.model.coordinates()[k].joint == joint);
         let axis = |&k: &usize| {
@@ -143,7 +143,7 @@ impl<'a> Cell<'a> {
         if self.controller.is_empty() { Vec::new() } else { axes.iter().map(axis).collect() }
     }
 
-    /// The arm as the program's controller sees it.
+    /// Returns the arm as seen by the program's controller.
     pub fn arm(&self, overrides: &Overrides) -> (ProgramArm<'a>, Assumed) {
         let (flange, X_FT, flange_note) = self.flange();
         let mut assumed = false;
@@ -176,7 +176,7 @@ impl<'a> Cell<'a> {
 }
 
 impl ToolPath {
-    /// Joints over time for a program; `warnings` are what was found before.
+    /// Plans the joint trajectory of a program; `warnings` are those found earlier.
     pub(crate) fn plan(
         file: &Path,
         program: &Program,
@@ -217,12 +217,12 @@ impl ToolPath {
         Ok((planned.trajectory, Self { moves: planned.moves, file, jerks, warnings, notes }))
     }
 
-    /// Bound of a joint's jerk, rad/s³ or m/s³, if given.
+    /// Returns the jerk limit of a joint, rad/s³ or m/s³, if one is given.
     pub(crate) fn jerk_of(&self, joint: &str) -> Option<f64> {
         self.jerks.iter().find(|(name, _)| name == joint).map(|(_, jerk)| *jerk)
     }
 
-    /// Notes.
+    /// Returns the caveats about the path.
     pub(crate) fn caveats(&self) -> Vec<Caveat> {
         let said = |text: &String| Caveat::said("tool-path", &self.file, format!("{}: {text}", self.file), "");
         let notes = self.notes.iter().map(|text| said(text).as_note());
@@ -235,7 +235,7 @@ fn noted(note: &Note) -> String {
     format!("{place}{}", note.text)
 }
 
-/// The first few of a list, and how many are left out.
+/// Returns the first few of a list, and the number of those left out.
 fn first_of(mut notes: Vec<String>) -> Vec<String> {
     let more = notes.len().saturating_sub(TOLD);
     if more > 0 {
@@ -245,7 +245,7 @@ fn first_of(mut notes: Vec<String>) -> Vec<String> {
     notes
 }
 
-/// A tool of the program that is not the robot's: the error is measured at the robot's.
+/// Warns if the program's tool differs from the robot's, at which the error is measured.
 fn tool_warning(program: &Program, arm: &ProgramArm<'_>) -> Option<String> {
     use flexarm_path::program::Item;
     let other = program.items.iter().find_map(|item| match item {

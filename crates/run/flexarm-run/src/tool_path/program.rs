@@ -11,11 +11,11 @@ use flexarm_trajectory::Trajectory;
 use super::{Cell, Overrides, ToolPath};
 use crate::error::Error;
 
-/// Reads a robot program and plans its motion; the name of its language beside it.
+/// Reads a robot program and plans its motion; also returns the name of its language.
 ///
 /// # Errors
-/// [`Error::Program`] for what cannot be read, with line and statement; [`Error::Path`] for what
-/// the arm cannot do.
+/// [`Error::Program`] with line and statement if the program cannot be read; [`Error::Path`] if the
+/// arm cannot follow it.
 pub(crate) fn read_robot_program(
     path: &Path,
     cell: &Cell<'_>,
@@ -36,7 +36,7 @@ pub(crate) fn read_robot_program(
     Ok((planned, recognise(&bytes, &name).map_or("", |language| language.name())))
 }
 
-/// A program with the places of its targets; further files of it in the place of those on the disk.
+/// Reads a program with the locations of its targets; `companions` replace further files on disk.
 pub fn program_text(
     path: &Path,
     bytes: &[u8],
@@ -49,7 +49,7 @@ pub fn program_text(
     Ok(read_program_text(path, bytes, &options).map_err(Box::new)?)
 }
 
-/// Reads a program with its options, and plans it.
+/// Reads a program with the given options, and plans it.
 pub(super) fn plan_program(
     path: &Path,
     bytes: &[u8],
@@ -67,7 +67,7 @@ pub(super) fn plan_program(
     ToolPath::plan(path, &program, arm, resolution, warnings)
 }
 
-/// Returns a description of the axes of the program.
+/// Describes how the program's axes relate to the joints.
 fn taken_as(arm: &ProgramArm<'_>) -> String {
     let joint = |&k: &usize| arm.model.coordinates()[k].joint.as_str();
     let joints: Vec<&str> = arm.axes.iter().map(joint).collect();
@@ -92,7 +92,7 @@ fn taken_as(arm: &ProgramArm<'_>) -> String {
     format!("axes of the program become joints as the robot file says, in degrees: {}", axes.join(", "))
 }
 
-/// The flange in the controller's world at axis values.
+/// Returns the flange pose in the controller's world at axis values.
 fn flange_at(arm: &ProgramArm<'_>, values: &[f64]) -> Option<Pose> {
     if values.len() > arm.axes.len() {
         return None;

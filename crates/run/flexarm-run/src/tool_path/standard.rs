@@ -1,10 +1,10 @@
-//! Named motions of standards within a cube of the workspace, as moves of the tool.
+//! Standard motions within a cube of the workspace, as TCP moves.
 //!
-//! * Poses and paths after ISO 9283: the test plane holds two opposite edges of the cube along y
-//!   and its diagonal in x and z; pose P1 is its centre, P2 to P5 lie at 80 % of the way to its
-//!   corners, the square path runs through P2 to P5 with sharp corners, the circles have diameters
-//!   of 80 % and 10 % of the side.
-//! * Circles in the three planes of the cube, there and back, after ISO 230-4.
+//! * Poses and paths after ISO 9283: the test plane contains two opposite edges of the cube along y
+//!   and a diagonal in x and z; pose P1 is its centre, P2 to P5 are at 80 % of the distance to its
+//!   corners, the square path connects P2 to P5 with sharp corners, the circles have diameters of
+//!   80 % and 10 % of the side.
+//! * Circles in the three coordinate planes of the cube, in both directions, after ISO 230-4.
 //! * Settling: short moves along each axis, each followed by a rest.
 
 use flexarm_kinematics::Pose;
@@ -12,39 +12,39 @@ use flexarm_path::program::MoveKind;
 use nalgebra::{Rotation3, Translation3, Vector3};
 use serde::Deserialize;
 
-/// Part of the way from the centre to a corner at which the poses lie.
+/// Distance of the poses from the centre, as a fraction of that of the corners.
 const TOWARDS_CORNER: f64 = 0.8;
-/// Diameters of the circles of the path test, of the side of the cube.
+/// Diameters of the circles of the path test relative to the side of the cube.
 const LARGE: f64 = 0.8;
 const SMALL: f64 = 0.1;
-/// Rest at each pose, s.
+/// Rest time at each pose, s.
 const REST: f64 = 1.0;
 
-/// Kind of the motion.
+/// Standard motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub(super) enum Standard {
-    /// P1 to P5, a rest at each.
+    /// P1 to P5, with a rest at each.
     Iso9283Poses,
     /// The square and two circles in the test plane.
     Iso9283Paths,
-    /// Circles in the planes xy, yz and zx, in both senses.
+    /// Circles in the planes xy, yz and zx, in both directions.
     Circularity,
-    /// Moves along x, y and z, a rest after each.
+    /// Moves along x, y and z, with a rest after each.
     Settle,
 }
 
 /// One step of a standard motion.
 #[allow(clippy::large_enum_variant, reason = "a few dozen of them, made once")]
 pub(super) enum Step {
-    /// To a pose of the tool in the base.
+    /// Move to a TCP pose in the base.
     To(MoveKind, Pose),
-    /// s.
+    /// Rest (s).
     Rest(f64),
 }
 
 impl Standard {
-    /// The steps in a cube; `repeats` cycles.
+    /// Returns the steps of `repeats` cycles in a cube.
     pub(super) fn steps(self, centre: Vector3<f64>, side: f64, R: Rotation3<f64>, repeats: usize) -> Vec<Step> {
         let pose = |p: Vector3<f64>| Pose::from_parts(Translation3::from(p), R);
         let joint = |p: Vector3<f64>| Step::To(MoveKind::Joint, pose(p));
@@ -86,7 +86,7 @@ impl Standard {
     }
 }
 
-/// A line to the circle, once round by two halves without a stop between them, and a stop.
+/// A line to the circle, one turn in two halves without a stop between them, and a stop.
 fn circle(c: Vector3<f64>, r: f64, u: Vector3<f64>, v: Vector3<f64>, pose: &dyn Fn(Vector3<f64>) -> Pose) -> [Step; 3] {
     let half = |via: Vector3<f64>, to: Vector3<f64>| {
         let kind = MoveKind::Arc { via: c + via * r, via_rotation: None, angle: None, turns_with_path: false };
@@ -99,7 +99,7 @@ fn circle(c: Vector3<f64>, r: f64, u: Vector3<f64>, v: Vector3<f64>, pose: &dyn 
 mod tests {
     use super::*;
 
-    /// Truth: the standard's plane and distances, by hand for a cube of 1 m around the origin.
+    /// Truth: plane and distances of the standard, by hand for a cube of 1 m around the origin.
     #[test]
     fn poses_lie_in_the_test_plane_at_four_fifths_of_the_way_to_its_corners() {
         let steps = Standard::Iso9283Poses.steps(Vector3::zeros(), 1.0, Rotation3::identity(), 2);

@@ -1,4 +1,4 @@
-//! The arm at the instant of the largest error, with what there is to know beside it.
+//! The arm at the time of the maximum error, with the key of the pictures.
 
 use std::fmt::Write as _;
 
@@ -12,8 +12,8 @@ use super::number::{number, short};
 use crate::report::picture::{pictures, scale_colors};
 use flexarm_settings::written::markup;
 
-/// Width of the pictures of the arm (pixels): more than the page shows, whose two pictures stand
-/// beside each other.
+/// Width of the pictures of the arm (pixels), larger than displayed on the page, where two are side
+/// by side.
 const PICTURE_WIDTH: usize = 810;
 
 pub(super) fn arm_pictures(runs: &[ReportRun<'_>]) -> String {
@@ -67,7 +67,7 @@ pub(super) fn arm_pictures(runs: &[ReportRun<'_>]) -> String {
     out + "</section>\n"
 }
 
-/// The axes of the world as they lie in a picture; those that point at the viewer are left out.
+/// World axes as projected in a picture; leaves out those that point at the viewer.
 fn triad(axes: &[[f64; 2]; 3]) -> String {
     const LENGTH: f64 = 24.0;
     let mut out = "<svg class=\"triad\" viewBox=\"-40 -40 80 80\" aria-hidden=\"true\">".to_owned();
@@ -86,7 +86,7 @@ fn triad(axes: &[[f64; 2]; 3]) -> String {
     out + "</svg>"
 }
 
-/// Legend of the pictures of a run: colours, magnification, ghost and arrow.
+/// Key of the pictures: colours, magnification, rigid arm and error arrow.
 fn picture_key(header: &RunHeader) -> String {
     let factor = if header.magnification > 0.0 { header.magnification } else { 1.0 };
     let how = match factor {

@@ -8,7 +8,7 @@ use super::number::{push_short, short};
 use crate::report::curves::{Kind, Plot, overlays};
 use flexarm_settings::written::markup;
 
-/// Returns a note about samples that the plots leave out, if any.
+/// Explains which samples the plots leave out, if any.
 pub(super) fn thinning(runs: &[ReportRun<'_>], drawn: &[Vec<Plot>]) -> String {
     let mut sentences = Vec::new();
     let mut tables = drawn.iter().flatten().flat_map(|plot| &plot.views).flat_map(|view| &view.tables);
@@ -31,7 +31,7 @@ pub(super) fn thinning(runs: &[ReportRun<'_>], drawn: &[Vec<Plot>]) -> String {
     }
 }
 
-/// Returns the data of the plots as JSON for a script element.
+/// Returns the data of the plots as JSON that is safe inside a script element.
 pub(super) fn data(runs: &[ReportRun<'_>], drawn: &[Vec<Plot>]) -> String {
     let list = |items: Vec<String>| format!("[{}]", items.join(","));
     let run = |(run, drawn): (&ReportRun<'_>, &Vec<Plot>)| {
@@ -53,11 +53,11 @@ pub(super) fn data(runs: &[ReportRun<'_>], drawn: &[Vec<Plot>]) -> String {
     let overlays = if runs.len() > 1 { overlays(&several) } else { Vec::new() };
     let overlays = list(overlays.iter().map(json_plot).collect());
     let json = format!("{{\"runs\":{},\"overlays\":{overlays}}}", list(runs.iter().zip(drawn).map(run).collect()));
-    // No text in it can end the script element or begin a comment.
+    // Without `<`, no text can end the script element or begin a comment.
     json.replace('<', "\\u003c")
 }
 
-/// Text as JSON, with escapes for the control characters that JSON leaves as they are.
+/// Formats text as JSON, and also escapes control characters that JSON leaves unescaped.
 fn json_text(text: &str) -> String {
     let json = serde_json::to_string(text).expect("text is JSON");
     let escaped = |c: char| if c.is_control() { format!("\\u{:04x}", u32::from(c)) } else { c.to_string() };

@@ -1,4 +1,4 @@
-//! The figures of a run as tiles, those of several side by side.
+//! Figures of a single run as tiles, and of several runs as a table.
 
 use std::fmt::Write as _;
 
@@ -11,15 +11,15 @@ use crate::study::of_one_robot;
 use crate::summary::{EnergyFigures, Summary, TcpFigures};
 use flexarm_settings::written::markup;
 
-/// Errors below this are rounding (m).
+/// Errors below this are round-off (m).
 const NOTHING_M: f64 = 1e-12;
 
-/// The settling band of a run in words, such as "within 0.1 mm".
+/// Describes the settling band of a run, such as "within 0.1 mm".
 pub(super) fn within(run: &ReportRun<'_>) -> Option<String> {
     run.summary.tcp.as_ref()?.settling_band_m.map(crate::settling::within)
 }
 
-/// Whether the tool never leaves its rigid twin.
+/// Whether the TCP coincides with that of the rigid twin throughout.
 pub(super) fn lies_on_twin(run: &ReportRun<'_>) -> bool {
     run.summary.tcp.as_ref().is_some_and(|tcp| tcp.peak_m < NOTHING_M)
 }
@@ -77,21 +77,20 @@ pub(super) fn tiles(run: &ReportRun<'_>) -> String {
     out + "</section>\n"
 }
 
-/// Returns positive and negative work of the drives.
+/// Work supplied and absorbed by the drives.
 fn gross(e: &EnergyFigures) -> String {
     format!("+{} −{} J", number(e.drives_positive_j, 4), number(e.drives_negative_j, 4))
 }
 
-/// A figure of the comparison: name, unit, and its value of a run.
+/// Row of the comparison: name, unit, and value for a run.
 type Compared = (&'static str, &'static str, fn(&Summary) -> Option<f64>);
 
-/// The figures of the tool that mean nothing unless the moves are known.
+/// TCP figures, if the moves on which they depend are known.
 pub(super) fn moving(s: &Summary) -> Option<&TcpFigures> {
     s.tcp.as_ref().filter(|_| s.knows_moves())
 }
 
-/// Units of figures of which a change in per cent says something; a time or an energy has no
-/// natural zero.
+/// Units for which a relative change is shown; times and energies have no natural zero.
 const RELATIVE: [&str; 3] = ["mm", "mrad", "Hz"];
 
 const COMPARED: [Compared; 18] = [
@@ -115,10 +114,10 @@ const COMPARED: [Compared; 18] = [
     ("work put in by the drives", "J", |s| (!s.computed).then_some(s.energy.drives_positive_j)),
 ];
 
-/// The figure that is a word where there is no number.
+/// Figure that is shown as text if it has no value.
 const SETTLING: &str = "settling time";
 
-/// Text in the place of a missing figure.
+/// Text for a figure that a run does not have.
 pub(super) fn without_number(s: &Summary, figure: &str) -> String {
     match moving(s).filter(|_| [SETTLING, STABILISATION].contains(&figure)) {
         Some(tcp) => tcp.settling_state().short().to_owned(),
@@ -126,7 +125,7 @@ pub(super) fn without_number(s: &Summary, figure: &str) -> String {
     }
 }
 
-/// The name of a figure that is a difference already.
+/// Figure that is itself a difference.
 const APART: &str = "apart from the first run";
 
 pub(super) fn comparison(runs: &[ReportRun<'_>]) -> String {

@@ -1,10 +1,9 @@
-//! The report as one page that loads nothing: style, behaviour, data and pictures are written into
-//! it.
+//! The report as one self-contained HTML page: style, scripts, data and pictures are embedded.
 //!
-//! The same runs give the same bytes, except the paragraph with the id `timings`. Start at
-//! [`html`]. Rooms: the largest figures and the comparison of runs (`figures`), the arm (`arm`),
-//! tables (`tables`), what the plots are made of (`data`). Not here: what is plotted (`curves`),
-//! how the arm is drawn (`picture`), how plots behave (`assets/report.js`).
+//! The same runs give identical bytes except for the paragraph with the id `timings`. Start at
+//! [`html`]. Modules: main figures and comparison of runs (`figures`), the arm (`arm`), tables
+//! (`tables`), data of the plots (`data`). Not here: the selection of curves (`curves`), the
+//! rendering of the arm (`picture`), the behaviour of plots (`assets/report.js`).
 
 mod arm;
 mod data;
@@ -40,18 +39,18 @@ const UPLOT_LICENSE: &str = include_str!("../../../assets/uplot/LICENSE");
 
 const UPLOT_VERSION: &str = "1.6.32";
 
-/// A run in a report.
+/// Run shown in a report.
 #[derive(Clone, Copy, Debug)]
 pub struct ReportRun<'a> {
-    /// Name of the run, where there are several.
+    /// Name of the run, used if there are several.
     pub label: &'a str,
-    /// Its figures.
+    /// Figures of the run.
     pub summary: &'a Summary,
-    /// Its curves.
+    /// Curves of the run.
     pub trace: &'a Trace,
 }
 
-/// The report of one run, or of several beside each other: the first is the main one.
+/// Returns the report of one run, or of several side by side with the first as the main one.
 #[must_use]
 pub fn html(runs: &[ReportRun<'_>]) -> String {
     let Some(main) = runs.first() else {
@@ -61,8 +60,8 @@ pub fn html(runs: &[ReportRun<'_>]) -> String {
         [run] => super::title(run.summary),
         _ => format!("{} runs: {}", runs.len(), runs.iter().map(|run| run.label).collect::<Vec<_>>().join(", ")),
     };
-    // The banner of the minified file names an address; licence and origin stand in a comment of
-    // this page.
+    // The banner of the minified file contains a URL; licence and origin are given in a comment of
+    // this page instead.
     let uplot = UPLOT.split_once("*/").map_or(UPLOT, |(_, code)| code);
     let mut page = String::new();
     let _ = write!(
@@ -75,7 +74,7 @@ pub fn html(runs: &[ReportRun<'_>]) -> String {
         markup(&title),
         colors()
     );
-    // The arm is drawn while the plots are written.
+    // The arm is rendered while the plots are written.
     let (arm, drawn, data) = std::thread::scope(|scope| {
         let arm = scope.spawn(|| arm_pictures(runs));
         let drawn: Vec<Vec<Plot>> = runs.iter().map(|run| plots(run.summary, run.trace)).collect();
@@ -96,8 +95,8 @@ pub fn html(runs: &[ReportRun<'_>]) -> String {
     page
 }
 
-/// The colours of curves as variables of the style: `--c0` and so on, `--x`, `--y`, `--z`,
-/// `--rigid`, dark where the reader wants it dark; and under `--paper-...` for print.
+/// Colours of the curves as CSS variables: `--c0` and so on, `--x`, `--y`, `--z`, `--rigid`, with a
+/// dark variant for dark colour schemes; and as `--paper-...` for print.
 fn colors() -> String {
     let list = |prefix: &str, ground: Ground| {
         let series = (0..palette::SERIES_LENGTH).map(|k| (format!("c{k}"), palette::series(k, ground)));
@@ -135,7 +134,7 @@ fn body(main: &ReportRun<'_>, runs: &[ReportRun<'_>], arm: &str, thinning: &str)
     body + &timings(runs)
 }
 
-/// Parts of the page that can be gone to: name of the link, place.
+/// Navigation targets of the page: text of the link, id.
 const PLACES: [(&str, &str); 5] =
     [("Figures", "summary"), ("Arm", "arm"), ("Plots", "plots"), ("Tables", "tables"), ("Inputs", "inputs")];
 
@@ -154,7 +153,7 @@ fn heading(title: &str, runs: &[ReportRun<'_>], body: &str) -> String {
     }
     facts.push(format!("flexarm {}", env!("CARGO_PKG_VERSION")));
     let facts: Vec<String> = facts.iter().map(|fact| format!("<span>{}</span>", markup(fact))).collect();
-    // Names of runs are escaped: none can look like a place.
+    // Names of runs are escaped and cannot be mistaken for an id attribute.
     let there = PLACES.iter().filter(|(_, id)| body.contains(&format!("id=\"{id}\"")));
     let links: String = there.map(|(name, id)| format!("<a href=\"#{id}\">{name}</a>")).collect();
     format!(
@@ -165,7 +164,7 @@ fn heading(title: &str, runs: &[ReportRun<'_>], body: &str) -> String {
     )
 }
 
-/// Returns the headline of each run.
+/// Returns the headlines, one line per run.
 fn headlines(runs: &[ReportRun<'_>]) -> String {
     let line = |run: &ReportRun<'_>| {
         let who = if runs.len() > 1 { format!("{}: ", run.label) } else { String::new() };
@@ -174,7 +173,7 @@ fn headlines(runs: &[ReportRun<'_>]) -> String {
     runs.iter().filter(|run| !run.summary.headline.is_empty()).map(line).collect()
 }
 
-/// Stepper and step, as far as they are known.
+/// Describes stepper and step size, as far as known.
 fn method(s: &Summary, before: &str) -> Option<String> {
     let step = (s.stepper.h_s > 0.0).then(|| format!("{before}{} ms", number(1e3 * s.stepper.h_s, 4)));
     let name = Some(s.stepper.name.clone()).filter(|name| !name.is_empty());
@@ -182,7 +181,7 @@ fn method(s: &Summary, before: &str) -> Option<String> {
     (!known.is_empty()).then(|| known.join(", "))
 }
 
-/// Why a run stopped, and its warnings.
+/// Returns the reason for an early stop, and the warnings.
 fn troubles(run: &ReportRun<'_>, named: bool) -> String {
     let s = run.summary;
     let who = if named { format!("{}: ", markup(run.label)) } else { String::new() };
@@ -236,7 +235,7 @@ fn inputs(run: &ReportRun<'_>, named: bool) -> String {
     rows.push(row("evaluations", count(step.evaluations)));
     rows.push(row("factorisations", count(step.factorisations)));
     group("stepper", &rows);
-    // File names alone: the same run in another folder is the same page.
+    // File names without folders, so that the page does not depend on the folder.
     let f = &s.files;
     let pages = [&f.report, &f.report_md].into_iter().flatten().map(String::as_str);
     let names: Vec<String> = pages
@@ -253,7 +252,7 @@ fn inputs(run: &ReportRun<'_>, named: bool) -> String {
     )
 }
 
-/// Returns the paragraph of timings, which depend on machine and time.
+/// Collects everything that depends on the machine and the date.
 fn timings(runs: &[ReportRun<'_>]) -> String {
     let text = |run: &ReportRun<'_>| {
         let s = run.summary;
@@ -266,7 +265,7 @@ fn timings(runs: &[ReportRun<'_>]) -> String {
             1e3 * s.cpu_s_per_simulated_s
         ))
     };
-    // Recordings hold no times of the machine.
+    // Recordings contain no timings of the machine.
     let lines: Vec<String> = runs.iter().filter(|run| run.summary.wall_s > 0.0).map(text).collect();
     if lines.is_empty() {
         return String::new();

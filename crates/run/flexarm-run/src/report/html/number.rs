@@ -1,18 +1,18 @@
-//! Numbers as people read them.
+//! Number formatting for readers.
 
-/// A number with so many significant digits, without needless zeros.
+/// Formats a number with `digits` significant digits, without trailing zeros.
 pub(super) fn number(x: f64, digits: usize) -> String {
     if !x.is_finite() {
         return "–".into();
     }
     let x: f64 = format!("{x:.*e}", digits - 1).parse().unwrap_or(x);
-    // Nothing is gained by -0.
+    // Avoids -0.
     let x = if x == 0.0 { 0.0 } else { x };
     let (plain, scientific) = (format!("{x}"), format!("{x:e}"));
     if x == 0.0 || (1e-3..1e7).contains(&x.abs()) { plain } else { scientific }
 }
 
-/// A number that keeps its digits, so that a row of tiles looks even.
+/// Formats a number with trailing zeros, so that a row of tiles looks uniform.
 pub(super) fn fixed(x: f64) -> String {
     let digits = match x.abs() {
         a if a >= 100.0 => 1,
@@ -23,17 +23,17 @@ pub(super) fn fixed(x: f64) -> String {
     format!("{x:.digits$}")
 }
 
-/// Sizes below are nothing.
+/// Magnitudes below this are written as zero.
 const SMALLEST: f64 = 1e-300;
 
-/// With more digits the standard library is asked, and also where a number lies so near to the
-/// middle of two that rounding of the scaled one could choose the other (in units of the last
-/// digit).
+/// Maximum number of digits for the fast path. With more digits, or where the scaled number is so
+/// close to a rounding boundary (in units of the last digit) that round-off could decide, the
+/// standard library is used.
 const MOST_SCALED: usize = 9;
 const NEAR_MIDDLE: f64 = 1e-4;
 
-/// Significant digits of a number above zero as a whole number, and the power of ten of the first
-/// of them.
+/// Returns the significant digits of a positive number as an integer, and the power of ten of the
+/// first digit.
 fn rounded(x: f64, digits: usize) -> (u64, i32) {
     scaled(x, digits).unwrap_or_else(|| {
         let written = format!("{x:.*e}", digits - 1);
@@ -42,10 +42,10 @@ fn rounded(x: f64, digits: usize) -> (u64, i32) {
     })
 }
 
-/// As [`rounded`], from the number times a power of ten; none where that could be wrong.
+/// As [`rounded`], from the number times a power of ten; None where that could be wrong.
 fn scaled(x: f64, digits: usize) -> Option<(u64, i32)> {
     let least = 10_u64.pow((digits - 1) as u32);
-    // At most one off, which is seen.
+    // Wrong by at most one, which is corrected below.
     let mut exponent = x.log10().floor() as i32;
     if digits > MOST_SCALED || exponent.abs() > 250 {
         return None;
@@ -73,8 +73,8 @@ fn scaled(x: f64, digits: usize) -> Option<(u64, i32)> {
     }
 }
 
-/// Adds the shorter form of a number with so many significant digits, at most fifteen; null if it
-/// is none.
+/// Appends the shorter form of a number with `digits` significant digits, at most fifteen; null if
+/// it is not finite.
 pub(super) fn push_short(text: &mut String, x: f64, digits: usize) {
     if !x.is_finite() {
         text.push_str("null");
@@ -95,7 +95,7 @@ pub(super) fn push_short(text: &mut String, x: f64, digits: usize) {
     let written = std::str::from_utf8(&letters[start..]).unwrap_or("0").trim_end_matches('0');
     let (first, rest) = written.split_at(1);
     text.push_str(if x < 0.0 { "-" } else { "" });
-    // Letters of `0.000123`, `12300`, `12.3` and of `1.23e-4`.
+    // Lengths of `0.000123`, `12300`, `12.3` and of `1.23e-4`.
     let places = exponent.unsigned_abs() as usize;
     let plain = match exponent {
         ..0 => 1 + 1 + (places - 1) + 1 + rest.len(),
@@ -104,7 +104,7 @@ pub(super) fn push_short(text: &mut String, x: f64, digits: usize) {
     };
     let point = usize::from(!rest.is_empty());
     let scientific = 1 + point + rest.len() + 1 + usize::from(exponent < 0) + places.max(1).ilog10() as usize + 1;
-    let zeros = |count: usize| &"000000000000000"[..count]; // beyond that the other form is shorter
+    let zeros = |count: usize| &"000000000000000"[..count]; // longer runs use the other form
     if scientific < plain {
         let sign = if exponent < 0 { "e-" } else { "e" };
         [first, &"."[..point], rest, sign].into_iter().for_each(|part| text.push_str(part));
@@ -118,7 +118,7 @@ pub(super) fn push_short(text: &mut String, x: f64, digits: usize) {
     }
 }
 
-/// Adds a whole number below a thousand.
+/// Appends an integer below one thousand.
 fn push_digits(text: &mut String, number: usize) {
     let digit = |unit: usize| char::from(b'0' + (number / unit % 10) as u8);
     for unit in [100, 10, 1].into_iter().filter(|unit| number >= *unit || *unit == 1) {
@@ -126,7 +126,7 @@ fn push_digits(text: &mut String, number: usize) {
     }
 }
 
-/// The shorter form of a number with so many significant digits; null if it is none.
+/// Returns the shorter form of a number with `digits` significant digits; null if it is not finite.
 pub(super) fn short(x: f64, digits: usize) -> String {
     let mut text = String::new();
     push_short(&mut text, x, digits);
@@ -137,7 +137,7 @@ pub(super) fn short(x: f64, digits: usize) -> String {
 mod tests {
     use super::*;
 
-    /// Truth: the number that the digits mean, written in both ways by the standard library.
+    /// Truth: the value of the digits, and both forms as written by the standard library.
     #[test]
     fn a_number_is_written_in_the_shorter_of_both_forms() {
         let check = |x: f64, digits: usize| {
@@ -165,7 +165,7 @@ mod tests {
         for x in [0.0, -0.0, 1.0, -1.0, 10.0, 99999.6, 1e15, 1.1e-300, 1.5e300, -120.0, 0.001, 0.01, 1000.0] {
             check(x, 5);
         }
-        // Middles of two numbers and their neighbours, and powers of ten and theirs.
+        // Midpoints between two numbers and their neighbours, powers of ten and their neighbours.
         for k in 0..20_000_i32 {
             let middle = (f64::from(10_000 + 4 * k) + 0.5) * 10f64.powi(k % 25 - 12);
             let ten = 10f64.powi(k % 600 - 300);

@@ -1,5 +1,4 @@
-//! Tables of the page: the path of the tool, the terms of ISO 9283, stops, links, drives and
-//! energies.
+//! Tables of the page: TCP path, ISO 9283 figures, stops, links, drives and energies.
 
 use std::fmt::Write as _;
 
@@ -15,10 +14,10 @@ use crate::report::shares::{Part, part_shares, share_numbers};
 use crate::summary::Summary;
 use flexarm_settings::written::markup;
 
-/// Maximum number of Cartesian moves in the table of the page.
+/// Maximum number of moves in the table of the page.
 const MOST_MOVES: usize = 200;
 
-/// Returns the plan of a TCP path and its moves.
+/// Returns the plan of the TCP path and its moves, if the motion is given as one.
 pub(super) fn tool_path(run: &ReportRun<'_>) -> String {
     let Some(path) = &run.summary.path else { return String::new() };
     let mut out = "<section class=\"block\"><h2>Across the path of the tool</h2>\n".to_owned();
@@ -67,13 +66,13 @@ pub(super) fn tool_path(run: &ReportRun<'_>) -> String {
     out + "</section>\n"
 }
 
-/// Maximum number of poses with several stops on a page.
+/// Maximum number of poses with several stops in the table of the page.
 const MOST_POSES: usize = 50;
 
-/// A row of the ISO table: name, meaning, unit, value.
+/// Row of the ISO table: name, meaning, unit, value.
 type Iso = (&'static str, &'static str, &'static str, fn(&Summary) -> Option<f64>);
 
-/// The name of the settling time in the standard.
+/// Name of the settling time in the standard.
 pub(super) const STABILISATION: &str = "Position stabilisation time";
 
 const ISO: [Iso; 8] = [
@@ -131,8 +130,8 @@ pub(super) fn iso_table(runs: &[ReportRun<'_>]) -> String {
     let band = first.filter(|first| bands.all(|band| band.as_ref() == Some(first)));
     let band = band.unwrap_or_else(|| "within the settling band".into());
     for (name, meaning, unit, value) in ISO {
-        // An unknown figure has no row; a figure without a value, such as the end of a ringing, has
-        // one.
+        // Figures that are unknown give no row; figures that do not exist, such as a settling time
+        // without settling, do.
         let known = |run: &ReportRun<'_>| run.summary.knows_moves() || value(run.summary).is_some();
         if !runs.iter().any(known) {
             continue;
@@ -148,7 +147,7 @@ pub(super) fn iso_table(runs: &[ReportRun<'_>]) -> String {
     out + "</tbody></table></div></section>\n"
 }
 
-/// A table with a heading (as HTML); cells that are numbers are set to the right.
+/// Returns a table with a heading (HTML); columns of numbers are right-aligned.
 fn table(title: &str, head: &[&str], rows: &[Vec<String>]) -> String {
     if rows.is_empty() {
         return String::new();
@@ -207,7 +206,7 @@ pub(super) fn stops_table(s: &Summary, of: &str) -> String {
 pub(super) fn parts_tables(s: &Summary, of: &str) -> String {
     let shares = part_shares(s);
     let peak_mm = s.tcp.as_ref().map_or(0.0, |tcp| 1e3 * tcp.peak_m);
-    // One more than the headline has.
+    // One decimal more than in the headline.
     let digits = headline::digits(peak_mm) + 1;
     let none = || "–".to_owned();
     let rows = shares.iter().zip(share_numbers(s, &shares, digits)).map(|(share, at_peak)| {
