@@ -43,7 +43,7 @@ Runs:
   view         Open a recording in the Rerun viewer
 
 Robots and motions:
-  new          Create a robot file, a motion and a first run from a URDF or xacro
+  new          Create a robot file, a motion and a first run from a URDF
   check        List all problems of a robot and a motion
   inspect      Show a robot with its kinematics and dynamics at a pose
   motion       Show a motion against the limits of a robot, convert it
