@@ -301,12 +301,12 @@ fn study_markdown(summary: &Summary) -> String {
 /// Table of the runs in Markdown.
 pub(crate) fn table(summary: &Summary) -> String {
     let mut page = String::new();
-    for (k, row) in study_rows(summary).iter().enumerate() {
-        // Recordings contain no timings of this machine.
-        let cells = &row[..row.len() - 1];
-        page += &markdown_row(cells);
+    let runs = study_rows(summary);
+    // A row per figure: a recording's window is narrow. It contains no timings of this machine.
+    for k in 0..runs.first().map_or(0, |head| head.len() - 1) {
+        page += &markdown_row(&runs.iter().map(|run| run[k].clone()).collect::<Vec<_>>());
         if k == 0 {
-            page += &format!("|{}\n", " --- |".repeat(cells.len()));
+            page += &format!("|{}\n", " --- |".repeat(runs.len()));
         }
     }
     page += &format!("\n{STUDY_NOTE}.\n");

@@ -237,9 +237,10 @@ fn result(summary: &Summary, events: Vec<Event>) -> RunResult {
         Summary { wall_s: 0.0, cpu_s: 0.0, real_time_factor: 0.0, cpu_s_per_simulated_s: 0.0, ..summary.clone() };
     let timeless = Summary { files: Files::default(), ..timeless };
     let json = serde_json::to_string_pretty(&timeless).expect("plain numbers and strings") + "\n";
+    let headline = Some(("result".to_owned(), timeless.headline.clone())).filter(|(_, line)| !line.is_empty());
     RunResult {
         figures: summary.labelled(),
-        readable: crate::report::timeless_rows(&timeless),
+        readable: headline.into_iter().chain(crate::report::timeless_rows(&timeless)).collect(),
         events,
         attachments: vec![Attachment {
             name: "summary.json".into(),
