@@ -25,7 +25,8 @@ use crate::robot::Robot;
 /// scenarios. A loads file fills the same values as a program.
 ///
 /// ```no_run
-/// use flexarm_run::{AppliedLoad, Modelling, Motion, PayloadChange, Robot, RunOptions, Scenario, Wrench};
+/// use flexarm_kinematics::Wrench;
+/// use flexarm_run::{AppliedLoad, Modelling, Motion, PayloadChange, Robot, RunOptions, Scenario};
 ///
 /// let robot = Robot::load("robots/kr210")?;
 /// let motion = Motion::load("trajectories/pick_and_place.toml", &robot)?;
