@@ -38,8 +38,8 @@ pub struct CaveatKind {
     pub code: &'static str,
     /// Default severity.
     pub severity: Severity,
-    /// Message template with `{where}`, `{value}` and `{yardstick}`, and settings by their keys,
-    /// such as `{step_s}`.
+    /// Message template with `{where}`, `{value}`, `{yardstick}` and `{unit}`, and settings by
+    /// their keys, such as `{step_s}`.
     pub says: &'static str,
     /// Unit of value and reference; empty for dimensionless numbers.
     pub unit: &'static str,
@@ -90,6 +90,11 @@ impl CaveatKind {
         Self { code, severity: Severity::Note, says, unit, help }
     }
 
+    /// Returns the kind for values of another unit.
+    pub const fn with_unit(self, unit: &'static str) -> Self {
+        Self { unit, ..self }
+    }
+
     /// Creates the caveat for a subject with its value and reference.
     pub fn found(&self, location: impl Into<String>, value: f64, yardstick: f64) -> Caveat {
         let location = location.into();
@@ -99,7 +104,8 @@ impl CaveatKind {
         let message = (settings.iter().fold(self.says.to_owned(), named))
             .replace("{where}", &location)
             .replace("{value}", &figure(value))
-            .replace("{yardstick}", &figure(yardstick));
+            .replace("{yardstick}", &figure(yardstick))
+            .replace("{unit}", self.unit);
         Caveat {
             severity: self.severity,
             code: self.code.into(),

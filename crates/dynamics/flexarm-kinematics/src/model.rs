@@ -194,6 +194,23 @@ pub struct Coordinate {
     pub kind: &'static str,
 }
 
+impl Coordinate {
+    /// Whether the joint is prismatic: its value is a length.
+    pub fn slides(&self) -> bool {
+        self.kind == "prismatic"
+    }
+
+    /// Unit of the value: m or rad.
+    pub fn unit(&self) -> &'static str {
+        if self.slides() { "m" } else { "rad" }
+    }
+
+    /// Unit of the effort: N or N m.
+    pub fn effort_unit(&self) -> &'static str {
+        if self.slides() { "N" } else { "N m" }
+    }
+}
+
 /// Maximum number of independent coordinates of a model.
 pub const MOST_COORDINATES: usize = 600;
 

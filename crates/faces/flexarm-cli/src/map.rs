@@ -180,7 +180,7 @@ fn joint_range(text: &str, robot: &Robot) -> Result<JointRange, Failure> {
     let (joint, rest) = text.rsplit_once('=').ok_or_else(wrong)?;
     let parts: Vec<&str> = rest.split(':').map(str::trim).collect();
     let [from, to, points] = parts[..] else { return Err(wrong()) };
-    let slides = robot.rigid_model()?.coordinates().iter().any(|c| c.joint == joint.trim() && c.kind == "prismatic");
+    let slides = robot.rigid_model()?.coordinates().iter().any(|c| c.joint == joint.trim() && c.slides());
     if slides && (from.ends_with("deg") || to.ends_with("deg")) {
         return Err(Failure::Usage(format!("--over {text:?}: joint {:?} slides; give it in m", joint.trim())));
     }

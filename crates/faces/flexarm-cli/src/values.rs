@@ -85,7 +85,7 @@ pub(crate) fn joint_values(text: Option<&str>, robot: &Robot) -> Result<Option<V
     let Some(text) = text else { return Ok(None) };
     let model = robot.rigid_model()?;
     let joints: Vec<(&str, bool)> =
-        model.coordinates().iter().map(|c| (c.joint.as_str(), c.kind == "prismatic")).collect();
+        model.coordinates().iter().map(|c| (c.joint.as_str(), c.slides())).collect();
     parse_joint_values(text, &joints).map(Some)
 }
 

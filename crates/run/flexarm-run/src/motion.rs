@@ -158,7 +158,7 @@ impl Motion {
         let actuated = &model.coordinates()[..model.n_actuated()];
         let named: Vec<(&str, JointLimits)> = actuated.iter().map(|c| c.joint.as_str()).zip(limits(model)).collect();
         let joints: Vec<KnownJoint<'_>> =
-            actuated.iter().map(|c| KnownJoint { name: &c.joint, is_prismatic: c.kind == "prismatic" }).collect();
+            actuated.iter().map(|c| KnownJoint { name: &c.joint, is_prismatic: c.slides() }).collect();
         let file = MotionFile { path, joints: Some(&joints), limits: &named, options, cell: Some(cell), text };
         let read = motion_formats::read(&file)?;
         let ReadMotion { trajectory, format, topic, samples, dropped, caveats, tool_path } = read;

@@ -245,7 +245,7 @@ fn on_robot(path: &Path, robot: &Robot, options: &MotionOptions) -> Result<(Moti
         let limits = JointLimits { lower, upper, velocity, acceleration: None };
         let worst = torques.peak(k);
         let (torque, torque_at_s) = (Some(worst.value), Some(worst.time_s));
-        let unit = if c.kind == "prismatic" { "m" } else { "rad" };
+        let unit = c.unit();
         let own = of_joint(peak, unit, &limits);
         let jerk_limit = motion.tool_path.as_ref().and_then(|path| path.jerk_of(&c.joint));
         violations.extend(jerk_limit.and_then(|limit| of_jerk(peak, limit)));

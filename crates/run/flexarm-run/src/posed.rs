@@ -79,7 +79,7 @@ impl Posed {
         let model = flexible.model.clone();
         let actuated = &model.coordinates()[..model.n_actuated()];
         let joints: Vec<String> = actuated.iter().map(|c| c.joint.clone()).collect();
-        let prismatic = actuated.iter().map(|c| c.kind == "prismatic").collect();
+        let prismatic = actuated.iter().map(|c| c.slides()).collect();
         let arm = flexible.arm(Arc::new(Held(at.clone()))).map_err(|error| flexible.explained(error))?;
         Ok(Self { tool: flexible.tcp.clone(), flexible, arm, joints, prismatic, at, of_robot: None })
     }

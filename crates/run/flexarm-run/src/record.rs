@@ -334,7 +334,7 @@ pub(crate) fn names_of_signals(robot: &Robot, arm: &FlexibleArm) -> RunHeader {
     RunHeader {
         robot: robot.name.clone(),
         joints: actuated.iter().map(|c| c.joint.clone()).collect(),
-        prismatic: actuated.iter().map(|c| c.kind == "prismatic").collect(),
+        prismatic: actuated.iter().map(|c| c.slides()).collect(),
         elements: arm.elements.iter().map(|e| e.name.clone()).collect(),
         tcp: robot.tcp.0.clone(),
         ..RunHeader::default()

@@ -209,8 +209,18 @@ pub struct DriveFigures {
     pub joint: String,
     /// Maximum TCP displacement caused by its deflection alone (m).
     pub peak_contribution_m: f64,
-    /// Maximum deflection between motor and link (rad or m).
+    /// Maximum deflection between motor and link (rad; m if the joint is prismatic).
     pub peak_deflection_rad: f64,
+    /// Whether the joint is prismatic.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub slides: bool,
+}
+
+impl DriveFigures {
+    /// Unit of the maximum deflection as reports show it, in thousandths of the stored one.
+    pub(crate) fn shown_unit(&self) -> &'static str {
+        if self.slides { "mm" } else { "mrad" }
+    }
 }
 
 /// Energy balance of the run, from the logged samples (trapezoidal rule: a low log rate causes an

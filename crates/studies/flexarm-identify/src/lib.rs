@@ -155,7 +155,7 @@ pub fn identify_robot(robot: &Robot, measurements: &Path, request: &IdentifyRequ
 fn joints_of(arm: &Arm) -> Vec<(String, bool)> {
     let model = &arm.flexible().model;
     let actuated = &model.coordinates()[..model.n_actuated()];
-    actuated.iter().map(|c| (c.joint.clone(), c.kind == "prismatic")).collect()
+    actuated.iter().map(|c| (c.joint.clone(), c.slides())).collect()
 }
 
 /// Output files.

@@ -75,7 +75,7 @@ pub(crate) fn candidates(robot: &Robot, flexible: &FlexibleRobot) -> Vec<Candida
         if damping.curve.is_some() && drive.backlash == 0.0 {
             continue;
         }
-        let slides = flexible.model.coordinates().iter().any(|c| c.joint == drive.joint && c.kind == "prismatic");
+        let slides = flexible.model.coordinates().iter().any(|c| c.joint == drive.joint && c.slides());
         found.extend(gearbox_parameters(&drive.joint, &gearbox.stiffness, &springs, slides));
         found.extend(gearbox_damping(&drive.joint, damping.dampers.as_deref().unwrap_or_default(), &springs, slides));
     }

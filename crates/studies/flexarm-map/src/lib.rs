@@ -245,7 +245,7 @@ pub fn map(
     let at = arm.operating_point()?;
     let model = &*arm.flexible().rigid;
     let actuated = &model.coordinates()[..model.n_actuated()];
-    let joints: Vec<(String, bool)> = actuated.iter().map(|c| (c.joint.clone(), c.kind == "prismatic")).collect();
+    let joints: Vec<(String, bool)> = actuated.iter().map(|c| (c.joint.clone(), c.slides())).collect();
     let loaded = request.wrench != [0.0; 6];
     let (frequencies, listed) = (request.frequencies.unwrap_or(3), matches!(request.region, MapRegion::Poses(_)));
     let layout = Layout::new(at.arm(), &joints, loaded, frequencies, request.tool.as_ref(), listed);

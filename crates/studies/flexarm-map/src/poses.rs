@@ -42,7 +42,7 @@ struct PosesFile {
 pub fn read_poses(path: impl AsRef<Path>, robot: &Robot, at: Option<&[f64]>) -> Result<Vec<Vec<f64>>, Error> {
     let (path, model) = (path.as_ref(), robot.rigid_model()?);
     let actuated = &model.coordinates()[..model.n_actuated()];
-    let joints: Vec<(&str, bool)> = actuated.iter().map(|c| (c.joint.as_str(), c.kind == "prismatic")).collect();
+    let joints: Vec<(&str, bool)> = actuated.iter().map(|c| (c.joint.as_str(), c.slides())).collect();
     let names: Vec<&str> = joints.iter().map(|(name, _)| *name).collect();
     let home = joint_values(at, &names)?;
     let list = List { joints: &joints, home };

@@ -36,7 +36,7 @@ pub(super) fn add_controllers(arm: &Arm, scenario: &Scenario, all: &mut Vec<Name
     let Some(servo) = &unloaded.servo else { return Ok(()) };
     for (number, axis) in servo.axes.iter().enumerate() {
         let joint = &unloaded.model.coordinates()[axis.coordinate];
-        let slides = joint.kind == "prismatic";
+        let slides = joint.slides();
         all.extend(friction_of(&unloaded, axis.coordinate, &joint.joint, slides));
         all.extend(gains_of(axis, number, &joint.joint, slides));
     }

@@ -195,7 +195,7 @@ fn run_parameters(arm: &Arm, scenario: &Scenario, asked: &[String]) -> Result<Ve
     let mut all: Vec<Named> = numbers(arm, asked).into_iter().filter(there).map(of_arm).collect();
     let model = &arm.flexible().model;
     for (k, coordinate) in model.coordinates()[..model.n_actuated()].iter().enumerate() {
-        let slides = coordinate.kind == "prismatic";
+        let slides = coordinate.slides();
         let (unit, per) = if slides { ("m", "1 mm") } else { ("rad", "1 mrad") };
         let name = format!("motion.{}", coordinate.joint);
         let parameter = RunParameter::Joint(k);

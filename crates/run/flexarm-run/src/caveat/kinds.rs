@@ -21,14 +21,14 @@ pub(crate) const LARGE_STRAIN: CaveatKind = CaveatKind::warning(
 /// A drive needs more than its effort limit during a run.
 pub(crate) const EFFORT: CaveatKind = CaveatKind::warning(
     "effort",
-    "{where} needs {value} N m (or N), its limit is {yardstick}: the real drive would not follow",
+    "{where} needs {value} {unit}, its limit is {yardstick}: the real drive would not follow",
     "N m",
     "check masses, payload, loads and the effort limit of the URDF",
 );
 /// A drive needs more than its effort limit to hold a pose.
 pub(crate) const HOLDING: CaveatKind = CaveatKind::warning(
     "effort",
-    "{where} needs {value} N m (or N) to hold the pose, its limit is {yardstick}",
+    "{where} needs {value} {unit} to hold the pose, its limit is {yardstick}",
     "N m",
     "check masses, payload, loads and the effort limit of the URDF",
 );
@@ -103,7 +103,7 @@ pub(crate) const UNDAMPED: CaveatKind = CaveatKind::warning(
 /// A joint is outside its limits at a pose.
 pub(crate) const OUTSIDE_LIMITS: CaveatKind = CaveatKind::warning(
     "outside-limits",
-    "{where} at {value} is outside its limits",
+    "{where} at {value} {unit} is outside its limits",
     "rad",
     "choose a pose that the robot can take",
 );
@@ -260,7 +260,7 @@ pub(crate) const JOINT_RANGE: CaveatKind = CaveatKind::warning(
 /// The effort limit is far above the gravity load.
 pub(crate) const EFFORT_LIMIT: CaveatKind = CaveatKind::warning(
     "effort-limit",
-    "{where} has an effort limit of {value} N m; its gravity torque is up to {yardstick} N m",
+    "{where} has an effort limit of {value} {unit}; gravity loads it with up to {yardstick} {unit}",
     "N m",
     "limits of a URDF are in N m and N; too small a mass has the same effect",
 );

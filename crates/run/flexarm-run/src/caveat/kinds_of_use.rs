@@ -5,7 +5,7 @@ use super::CaveatKind;
 /// A joint exceeds its effort limit along a motion.
 pub(crate) const MOTION_EFFORT: CaveatKind = CaveatKind::warning(
     "motion-effort",
-    "{where} needs up to {value} N m (or N) along the motion, its limit is {yardstick}",
+    "{where} needs up to {value} {unit} along the motion, its limit is {yardstick}",
     "N m",
     "slow the motion down; check masses, payload, unit and time of the motion",
 );

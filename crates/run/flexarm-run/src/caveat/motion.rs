@@ -43,13 +43,14 @@ pub(crate) fn of_motion(name: &str, trajectory: &Trajectory, model: &Model) -> V
     let mut caveats = super::loops::of_motion(trajectory, model);
     for (c, torque) in model.coordinates().iter().zip(&torque) {
         if *torque > c.limits.effort {
-            let caveat = kinds::MOTION_EFFORT.found(format!("joint {:?}", c.joint), *torque, c.limits.effort);
+            let caveat = kinds::MOTION_EFFORT.with_unit(c.effort_unit());
+            let caveat = caveat.found(format!("joint {:?}", c.joint), *torque, c.limits.effort);
             caveats.push(if *torque > HASTE * c.limits.effort { caveat } else { caveat.as_note() });
         }
     }
     let used = model.coordinates().iter().zip(&speed).filter(|(c, _)| c.limits.velocity.is_finite());
     let used = used.map(|(c, v)| v / c.limits.velocity).fold(0.0, f64::max);
-    let turns = model.coordinates().iter().zip(&range).filter(|(c, _)| c.kind != "prismatic");
+    let turns = model.coordinates().iter().zip(&range).filter(|(c, _)| !c.slides());
     let travel = turns.map(|(_, [low, high])| high - low).fold(0.0, f64::max);
     let still = range.iter().all(|[low, high]| high == low);
     if !still && used > 0.0 && used < SLOW {
@@ -71,7 +72,7 @@ pub(crate) fn degrees(violations: &[LimitViolation], model: &Model) -> &'static 
         let joint = model.coordinates().iter().find(|c| c.joint == v.joint);
         let value = v.value / DEGREES;
         v.value.abs() > std::f64::consts::TAU
-            && joint.is_some_and(|c| c.kind != "prismatic" && (c.limits.lower..=c.limits.upper).contains(&value))
+            && joint.is_some_and(|c| !c.slides() && (c.limits.lower..=c.limits.upper).contains(&value))
     };
     let (mut any, mut all) = (false, true);
     beyond.for_each(|v| (any, all) = (true, all && mends(v)));

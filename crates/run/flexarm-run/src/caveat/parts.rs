@@ -212,8 +212,9 @@ fn strong_drives(model: &Model, size: &Size) -> Option<Caveat> {
     let least = joints.iter().filter(|k| weight[**k] > 0.05 * most && weight[**k] > some);
     let least = least.map(|k| (effort(*k) / weight[*k], *k)).min_by(|a, b| a.0.total_cmp(&b.0));
     let joint = |k: usize| format!("joint {:?}", model.coordinates()[k].joint);
+    let unit = |k: usize| model.coordinates()[k].effort_unit();
     if let Some((ratio, k)) = least {
-        let caveat = || kinds::EFFORT_LIMIT.found(joint(k), effort(k), weight[k]);
+        let caveat = || kinds::EFFORT_LIMIT.with_unit(unit(k)).found(joint(k), effort(k), weight[k]);
         return (ratio > STRONG).then(|| caveat().likely(slip(ratio, &(0.5..=100.0), slip::EFFORT, 1.0)));
     }
     // Without a gravity torque the limit is judged by the acceleration it could cause.
@@ -221,7 +222,7 @@ fn strong_drives(model: &Model, size: &Size) -> Option<Caveat> {
     let heaviest = joints.into_iter().max_by(|a, b| inertia[*a].total_cmp(&inertia[*b]))?;
     let acceleration = effort(heaviest) / inertia[heaviest] * size.extent;
     let caveat = || kinds::TIP_ACCELERATION.found(joint(heaviest), acceleration, TIP_ACCELERATION);
-    let turns = model.coordinates()[heaviest].kind != "prismatic";
+    let turns = !model.coordinates()[heaviest].slides();
     (turns && acceleration.is_finite() && acceleration > TIP_ACCELERATION)
         .then(|| caveat().likely(slip(acceleration, &(0.1..=TIP_ACCELERATION), slip::EFFORT, 1.0)))
 }

@@ -42,9 +42,10 @@ pub(crate) fn efforts<'a>(
     needed: &'a [f64],
 ) -> impl Iterator<Item = Caveat> + 'a {
     let over = |(c, torque): &(&Coordinate, &f64)| torque.abs() > c.limits.effort;
-    let told =
-        |(c, torque): (&Coordinate, &f64)| kind.found(format!("joint {:?}", c.joint), torque.abs(), c.limits.effort);
-    coordinates.iter().zip(needed).filter(over).map(told)
+    let caveat = |(c, torque): (&Coordinate, &f64)| {
+        kind.with_unit(c.effort_unit()).found(format!("joint {:?}", c.joint), torque.abs(), c.limits.effort)
+    };
+    coordinates.iter().zip(needed).filter(over).map(caveat)
 }
 
 /// Excess of a joint value over its limit beyond which it may be in degrees: multiple of the limit,
@@ -59,7 +60,7 @@ fn like_degrees(c: &Coordinate, q: f64) -> bool {
     let (lower, upper) = (c.limits.lower, c.limits.upper);
     let limit = if q < 0.0 { lower } else { upper };
     let far = if limit.is_finite() { (LIKE_DEGREES.0 * limit.abs()).max(LIKE_DEGREES.1) } else { MANY_TURNS };
-    c.kind != "prismatic" && q.abs() > far && (lower..=upper).contains(&q.to_radians())
+    !c.slides() && q.abs() > far && (lower..=upper).contains(&q.to_radians())
 }
 
 /// Checks for joints outside their range at a pose, and for joints without a range at many turns.
@@ -70,7 +71,8 @@ pub fn outside_limits<'a>(coordinates: &'a [Coordinate], q: &'a [f64]) -> impl I
         let degrees =
             if like_degrees(c, *q) { format!("degrees? {q}deg is {:.4} rad", q.to_radians()) } else { String::new() };
         if *q < lower || *q > upper {
-            let mut caveat = kinds::OUTSIDE_LIMITS.found(joint, *q, if *q < lower { lower } else { upper });
+            let caveat = kinds::OUTSIDE_LIMITS.with_unit(c.unit());
+            let mut caveat = caveat.found(joint, *q, if *q < lower { lower } else { upper });
             caveat.message += &format!(" {lower} to {upper}");
             Some(caveat.likely(degrees))
         } else if !degrees.is_empty() {

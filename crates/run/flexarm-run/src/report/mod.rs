@@ -241,7 +241,7 @@ fn part_figures(summary: &Summary) -> Vec<Figure> {
                 (format!("link {}", share.name), format!("; strain {strain:.1e}, bending angle {turn} mrad"))
             }
             Part::Drive(drive) => {
-                let turns = format!("; deflection {} mrad", mm(drive.peak_deflection_rad));
+                let turns = format!("; deflection {} {}", mm(drive.peak_deflection_rad), drive.shown_unit());
                 (format!("drive {}", share.name), turns)
             }
             Part::None if share.kind == headline::STEPPER => ("constraint drift".to_owned(), String::new()),

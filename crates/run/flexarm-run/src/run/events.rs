@@ -29,8 +29,8 @@ impl RunLoop<'_> {
         }
         for (c, load) in self.arm.model.coordinates().iter().zip(self.monitors.drive_loads.result()) {
             if let Some(since) = load.over_since_s {
-                let text =
-                    format!("joint {:?} needs more than its limit of {:.0} N m (or N)", c.joint, c.limits.effort);
+                let (limit, unit) = (c.limits.effort, c.effort_unit());
+                let text = format!("joint {:?} needs more than its limit of {limit:.0} {unit}", c.joint);
                 add(since, EventKind::Limit, text);
             }
         }

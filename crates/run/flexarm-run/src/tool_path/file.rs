@@ -266,7 +266,7 @@ fn options(
             Redundancy::Posture(values) if values.len() == arm.axes.len() && check_axes(values).is_ok() => {
                 let mut posture = arm.rest.clone();
                 for (value, &k) in values.iter().zip(&arm.axes) {
-                    let slides = arm.model.coordinates()[k].kind == "prismatic";
+                    let slides = arm.model.coordinates()[k].slides();
                     posture[k] = value * if slides { units.length } else { units.angle };
                 }
                 Some(NullSpaceRule::NearestTo(posture))
@@ -313,7 +313,7 @@ fn overrides(file: &PathFile, source: &Source, cell: &Cell<'_>, units: Units) ->
             let message = format!("the robot has no joint {:?}; its joints are {}", joint.get_ref(), names.join(", "));
             return Err(source.error(joint.span(), message));
         };
-        let unit = if coordinates[k].kind == "prismatic" { units.length } else { units.angle };
+        let unit = if coordinates[k].slides() { units.length } else { units.angle };
         let value = |key: &str, value: &Option<Spanned<f64>>, factor: f64| match value {
             Some(value) if check_rate("", "", value.get_ref() * factor).is_err() => {
                 let (joint, found) = (joint.get_ref(), value.get_ref());
@@ -610,7 +610,7 @@ impl Reader<'_> {
     /// Returns the unit of a value of the controller's axis `k`.
     fn joint_unit(&self, k: usize) -> f64 {
         let coordinate = self.arm.axes.get(k).map(|&k| &self.arm.model.coordinates()[k]);
-        if coordinate.is_some_and(|c| c.kind == "prismatic") { self.units.length } else { self.units.angle }
+        if coordinate.is_some_and(|c| c.slides()) { self.units.length } else { self.units.angle }
     }
 
     /// Returns the orientation of the tool in the base at joint values.

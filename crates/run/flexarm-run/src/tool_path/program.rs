@@ -78,7 +78,7 @@ fn taken_as(arm: &ProgramArm<'_>) -> String {
         );
     }
     let axis = |(n, axis): (usize, &ControllerAxis)| {
-        let unit = if arm.model.coordinates()[arm.axes[n]].kind == "prismatic" { 1.0 } else { 1f64.to_degrees() };
+        let unit = if arm.model.coordinates()[arm.axes[n]].slides() { 1.0 } else { 1f64.to_degrees() };
         let mut words = format!("{} = {}A{}", joints[n], if axis.sense < 0.0 { "-" } else { "" }, n + 1);
         if axis.zero != 0.0 {
             words += &format!(" {} {:.4}", if axis.zero < 0.0 { "-" } else { "+" }, (unit * axis.zero).abs());

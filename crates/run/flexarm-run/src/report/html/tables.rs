@@ -212,7 +212,10 @@ pub(super) fn parts_tables(s: &Summary, of: &str) -> String {
     let rows = shares.iter().zip(share_numbers(s, &shares, digits)).map(|(share, at_peak)| {
         let (turn, strain) = match share.part {
             Part::Link(link) => (number(1e3 * link.peak_rotation_rad, 4), number(link.engineering_strain, 3)),
-            Part::Drive(drive) => (number(1e3 * drive.peak_deflection_rad, 4), none()),
+            Part::Drive(drive) => {
+                let unit = if drive.slides { " mm" } else { "" };
+                (number(1e3 * drive.peak_deflection_rad, 4) + unit, none())
+            }
             Part::None => (none(), none()),
         };
         let largest = share.largest_m.map_or_else(none, |x| number(1e3 * x, 4));
@@ -228,7 +231,7 @@ pub(super) fn parts_tables(s: &Summary, of: &str) -> String {
         "kind",
         "share of the peak (mm)",
         "maximum (mm)",
-        "maximum rotation (mrad)",
+        "maximum deflection (mrad)",
         "change of length (relative)",
     ];
     let mut out = table(&format!("Flexible links and drives{of}"), &head, &rows);
