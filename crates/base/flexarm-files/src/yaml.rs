@@ -46,7 +46,7 @@ pub struct YamlError {
 
 /// Node with its anchor, size and nesting depth.
 #[derive(Clone)]
-struct Counted<'t> {
+struct SizedNode<'t> {
     node: YamlNode<'t>,
     anchor: usize,
     size: usize,
@@ -66,7 +66,7 @@ pub fn read_yaml<'t, E: From<YamlError>>(
     most: usize,
     mut take: impl FnMut(YamlNode<'t>) -> Result<(), E>,
 ) -> Result<(), E> {
-    let (mut open, mut anchors, mut count) = (Vec::<Counted<'_>>::new(), HashMap::<usize, Counted<'_>>::new(), 0);
+    let (mut open, mut anchors, mut count) = (Vec::<SizedNode<'_>>::new(), HashMap::<usize, SizedNode<'_>>::new(), 0);
     for event in Parser::new_from_str(text) {
         let (event, span) = event.map_err(|error| {
             let (line, column) = (error.marker().line(), error.marker().col() + 1);
@@ -74,14 +74,14 @@ pub fn read_yaml<'t, E: From<YamlError>>(
         })?;
         let line = span.start.line();
         let fail = |message: String| E::from(YamlError { line, message });
-        let new = |value, anchor| Counted { node: YamlNode { line, value }, anchor, size: 1, height: 0 };
+        let new = |value, anchor| SizedNode { node: YamlNode { line, value }, anchor, size: 1, height: 0 };
         let mut done = None;
         match event {
             Event::Scalar(text, style, anchor, tag) => {
                 let (is_plain, tag) = (style == ScalarStyle::Plain, tag.map(|tag| tag.suffix.clone()));
                 let size = 1 + text.len() / 32;
                 count += size;
-                done = Some(Counted { size, ..new(YamlValue::Scalar { text, is_plain, tag }, anchor) });
+                done = Some(SizedNode { size, ..new(YamlValue::Scalar { text, is_plain, tag }, anchor) });
             }
             Event::SequenceStart(anchor, _) => open.push(new(YamlValue::List(Vec::new()), anchor)),
             Event::MappingStart(anchor, _) => open.push(new(YamlValue::Map(Vec::new()), anchor)),
@@ -93,7 +93,7 @@ pub fn read_yaml<'t, E: From<YamlError>>(
                 let named = anchors.get(&anchor);
                 let named = named.ok_or_else(|| fail("an alias stands inside of what it names".to_owned()))?;
                 count += named.size;
-                done = Some(Counted { anchor: 0, ..named.clone() });
+                done = Some(SizedNode { anchor: 0, ..named.clone() });
             }
             Event::DocumentEnd => anchors.clear(),
             _ => {}

@@ -129,7 +129,7 @@ impl CaveatKind {
 
 impl Caveat {
     /// Creates a caveat without a value, from a complete message.
-    pub fn said(code: &str, location: impl Into<String>, message: impl Into<String>, help: &str) -> Self {
+    pub fn from_message(code: &str, location: impl Into<String>, message: impl Into<String>, help: &str) -> Self {
         Self {
             code: code.into(),
             location: location.into(),
@@ -236,8 +236,8 @@ mod tests {
         let kept = once_each(vec![found("a", 0.1), found("b", 0.2), found("a", 0.3)]);
         assert_eq!(kept, [found("a", 0.3), found("b", 0.2)]);
         // Caveats without a value are distinct unless they are equal.
-        let said = |text: &str| Caveat::said("file", "x", text, "");
-        assert_eq!(once_each(vec![said("one"), said("two"), said("one")]), [said("one"), said("two")]);
+        let caveat = |text: &str| Caveat::from_message("file", "x", text, "");
+        assert_eq!(once_each(vec![caveat("one"), caveat("two"), caveat("one")]), [caveat("one"), caveat("two")]);
     }
 
     #[test]

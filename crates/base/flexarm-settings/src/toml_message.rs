@@ -16,13 +16,13 @@ pub fn without_types(message: &str) -> String {
         None => message,
     };
     let message = message.replace("invalid type: map", "invalid type: table").replace("expected a map", TABLE);
-    let message = ["f64", "f32"].iter().fold(message, |text, kind| said(&text, kind, "a number"));
+    let message = ["f64", "f32"].iter().fold(message, |text, kind| expected_type(&text, kind, "a number"));
     let whole = ["i64", "i32", "u64", "u32", "u16", "u8", "usize"];
-    suggested(&whole.iter().fold(message, |text, kind| said(&text, kind, "a whole number")))
+    suggested(&whole.iter().fold(message, |text, kind| expected_type(&text, kind, "a whole number")))
 }
 
 /// The message with a type of numbers that is expected in words.
-fn said(message: &str, kind: &str, words: &str) -> String {
+fn expected_type(message: &str, kind: &str, words: &str) -> String {
     let expected = format!("expected {kind}");
     match message.split_once(&expected) {
         Some((before, after)) if !after.starts_with(char::is_alphanumeric) => {

@@ -50,7 +50,7 @@ pub fn mass_matrix_at_poses(model: &Model, data: &mut Data) {
 /// Body rotated to the axes of the first body of its arm: the child of the base, or the base itself
 /// if it is a modal body.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Turned<T: Scalar> {
+pub(crate) struct RotatedBody<T: Scalar> {
     /// Rotation from body axes to these axes.
     R: Matrix3<T>,
     /// Position of Bo relative to the parent's origin.
@@ -61,7 +61,7 @@ pub(crate) struct Turned<T: Scalar> {
     S: ElasticSubspace<T>,
 }
 
-impl<T: Real> Turned<T> {
+impl<T: Real> RotatedBody<T> {
     /// Identity rotation and zero offset.
     pub(crate) fn identity() -> Self {
         let one = Matrix3::identity();
@@ -427,7 +427,7 @@ impl<'m, T: Real> Lower<'m, T> {
 
     /// Writes `Sᵀ F` of the joint of `body` into one column; F is about Bo of that body.
     #[inline(always)]
-    fn meet(&mut self, model: &Model, body: &Body, own: &Turned<T>, column: usize, F: &Wrench<T>) {
+    fn meet(&mut self, model: &Model, body: &Body, own: &RotatedBody<T>, column: usize, F: &Wrench<T>) {
         let row = body.coordinate;
         match &body.motion {
             JointMotion::Axis(motion) => {
@@ -452,7 +452,7 @@ impl<'m, T: Real> Lower<'m, T> {
 
     /// [`Self::meet`] for the six columns of an elastic joint.
     #[inline(always)]
-    fn meet_six(&mut self, model: &Model, body: &Body, own: &Turned<T>, column: usize, F: &SixWrenches<T>) {
+    fn meet_six(&mut self, model: &Model, body: &Body, own: &RotatedBody<T>, column: usize, F: &SixWrenches<T>) {
         let row = body.coordinate;
         match &body.motion {
             JointMotion::Axis(motion) => {

@@ -10,7 +10,7 @@ use nalgebra::{DMatrix, DVector, Isometry, Matrix3, Rotation3, Scalar, Translati
 
 use crate::axis_motion::AxisMotion;
 use crate::closure::LoopData;
-use crate::crba::{SixWrenches, Turned};
+use crate::crba::{RotatedBody, SixWrenches};
 use crate::modal::ModalData;
 use crate::model::{Body, Frame, JointMotion, Model};
 
@@ -65,7 +65,7 @@ pub struct Data<T: Scalar = f64> {
     pub(crate) bias: Vec<Twist<T>>,
     pub(crate) composite: Vec<SpatialInertia<T>>,
     /// Bodies in the axes of the mass matrix recursion, and the wrenches of its columns.
-    pub(crate) turned: Vec<Turned<T>>,
+    pub(crate) turned: Vec<RotatedBody<T>>,
     pub(crate) single: Vec<Wrench<T>>,
     pub(crate) six: Vec<SixWrenches<T>>,
     pub(crate) articulated: Vec<ArticulatedInertia>,
@@ -108,7 +108,7 @@ impl<T: Real> Data<T> {
             elastic: vec![ElasticSubspace { L: Matrix3::identity(), B: Matrix3::identity() }; n],
             bias: vec![zero; n],
             composite: vec![SpatialInertia::lift(&SpatialInertia::zeros()); n],
-            turned: vec![Turned::identity(); n],
+            turned: vec![RotatedBody::identity(); n],
             single: vec![Wrench::zeros(); model.single.len()],
             six: vec![SixWrenches::zeros(); model.six.len()],
             articulated: vec![ArticulatedInertia::from_rigid(&SpatialInertia::zeros()); n],

@@ -59,7 +59,7 @@ const KERNELS: [(&str, Kernel); 13] = [
     }),
     ("pose_among_many", |times| {
         let (mut at, poses) = poses(times);
-        let asked = Asked { compliance: true, frequencies: true, jacobian: false };
+        let asked = PoseOutputs { compliance: true, frequencies: true, jacobian: false };
         at.solve_each(&poses, &Wrench::zeros(), asked, |_, answer| {
             black_box(answer.unwrap());
         });

@@ -450,7 +450,7 @@ fn stiffness_of(n: usize, values: &[f64]) -> Vec<f64> {
 
 /// Slider state of one gear at the end of the last step.
 #[derive(Clone, Debug)]
-struct Slipped {
+struct SliderState {
     delta: f64,
     s: Vec<f64>,
 }
@@ -467,7 +467,7 @@ pub(crate) struct GearState {
     damper: DVector<f64>,
     /// Friction per actuated coordinate.
     pub(crate) friction: Vec<f64>,
-    slipped: Vec<Slipped>,
+    slipped: Vec<SliderState>,
     /// Energy lost to hysteresis so far (J).
     pub(crate) lost: f64,
 }
@@ -476,7 +476,7 @@ impl GearState {
     /// Creates the state if the arm has gear laws.
     pub(crate) fn of(arm: &FlexibleArm) -> Option<Box<Self>> {
         let zeros = DVector::zeros(arm.n_elastic_coordinates());
-        let slipped = |law: &Hysteresis| Slipped { delta: 0.0, s: vec![0.0; law.sliders.len()] };
+        let slipped = |law: &Hysteresis| SliderState { delta: 0.0, s: vec![0.0; law.sliders.len()] };
         arm.has_gear_laws().then(|| {
             Box::new(Self {
                 delta: zeros.clone(),
@@ -549,12 +549,12 @@ impl GearState {
 
     /// Reports each slider of each law: its number, its elastic coordinate, and its stiffness (0
     /// while it slips).
-    pub(crate) fn stuck(&self, arm: &FlexibleArm, mut tell: impl FnMut(usize, usize, f64)) {
+    pub(crate) fn stuck(&self, arm: &FlexibleArm, mut report: impl FnMut(usize, usize, f64)) {
         let mut number = 0;
         for (law, slipped) in arm.hysteresis.iter().zip(&self.slipped) {
             let k = arm.offset(&arm.elements[law.element]);
             for (s, slider) in slipped.at(law, self.delta[k]) {
-                tell(number, k, if s.abs() < slider.reach { slider.stiffness } else { 0.0 });
+                report(number, k, if s.abs() < slider.reach { slider.stiffness } else { 0.0 });
                 number += 1;
             }
         }
@@ -600,7 +600,7 @@ impl GearState {
     }
 }
 
-impl Slipped {
+impl SliderState {
     /// Returns the deflections of the sliders with the gear at deflection `delta`.
     fn at<'a>(&'a self, law: &'a Hysteresis, delta: f64) -> impl Iterator<Item = (f64, &'a Slider)> + 'a {
         let way = delta - self.delta;
@@ -662,7 +662,7 @@ mod tests {
             assert!((eight.loss(amplitude) - masing).abs() < 1e-12, "{amplitude} {masing}");
             // The slider state that follows a closed cycle loses the same energy, after a first
             // loading.
-            let mut slipped = Slipped { delta: 0.0, s: vec![0.0; 8] };
+            let mut slipped = SliderState { delta: 0.0, s: vec![0.0; 8] };
             slipped.advance(&eight, amplitude);
             let lost: f64 = [-amplitude, amplitude].iter().map(|d| slipped.advance(&eight, *d)).sum();
             assert!((lost - masing).abs() < 1e-12, "{lost} {masing}");

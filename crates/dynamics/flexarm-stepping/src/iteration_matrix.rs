@@ -20,14 +20,14 @@ use crate::tree_matrix::TreeInverse;
 /// `J^-1`, or the inverse of `J = M + (c_D D + c_K K) (1 + s M^-1 K)`.
 #[derive(Clone, Debug)]
 pub(crate) struct IterationMatrix {
-    pub(crate) way: Way,
+    pub(crate) way: MatrixForm,
     /// Factor s, if any.
     s: Option<f64>,
 }
 
 /// Form of the matrix.
 #[derive(Clone, Debug)]
-pub(crate) enum Way {
+pub(crate) enum MatrixForm {
     /// Dense inverse; the caller applies s.
     Dense(DenseInverse),
     /// Elimination along the tree, including s.
@@ -79,7 +79,7 @@ impl DenseInverse {
 impl IterationMatrix {
     /// Creates the matrix; the number of coordinates is that of the system read first.
     pub(crate) fn new() -> Self {
-        Self { way: Way::Tree(TreeInverse::default()), s: None }
+        Self { way: MatrixForm::Tree(TreeInverse::default()), s: None }
     }
 
     /// Reads M and `c_D D + c_K K` at the configuration of the last residual of the system; `s` as
@@ -87,19 +87,19 @@ impl IterationMatrix {
     pub(crate) fn read(&mut self, system: &mut impl SecondOrderSystem, c_D: f64, c_K: f64, s: Option<f64>) {
         self.s = s;
         // A system whose matrices were dense once keeps dense matrices.
-        if let Way::Tree(tree) = &mut self.way {
+        if let MatrixForm::Tree(tree) = &mut self.way {
             if system.along_tree(c_D, c_K, &mut tree.matrices) {
                 return;
             }
-            self.way = Way::Modes(Box::default());
+            self.way = MatrixForm::Modes(Box::default());
         }
-        if let Way::Modes(modes) = &mut self.way {
+        if let MatrixForm::Modes(modes) = &mut self.way {
             if system.with_modes(c_D, c_K, &mut modes.matrices) {
                 return;
             }
-            self.way = Way::Dense(DenseInverse::new(system.dimension()));
+            self.way = MatrixForm::Dense(DenseInverse::new(system.dimension()));
         }
-        if let Way::Dense(dense) = &mut self.way {
+        if let MatrixForm::Dense(dense) = &mut self.way {
             dense.read(system, c_D, c_K);
         }
     }
@@ -110,18 +110,18 @@ impl IterationMatrix {
     /// [`StepError::Singular`] if J, or along a tree M, is not positive definite.
     pub(crate) fn invert(&mut self, t: f64) -> Result<(), StepError> {
         match &mut self.way {
-            Way::Dense(dense) => dense.invert(t),
-            Way::Tree(tree) => tree.factor(self.s, t),
-            Way::Modes(modes) => modes.factor(self.s, t),
+            MatrixForm::Dense(dense) => dense.invert(t),
+            MatrixForm::Tree(tree) => tree.factor(self.s, t),
+            MatrixForm::Modes(modes) => modes.factor(self.s, t),
         }
     }
 
     /// Replaces `r` by `d = J^-1 r`; returns `|d|`.
     pub(crate) fn solve(&mut self, r: &mut DVector<f64>) -> f64 {
         match &mut self.way {
-            Way::Dense(dense) => dense.solve(r),
-            Way::Tree(tree) => tree.solve(r),
-            Way::Modes(modes) => modes.solve(r),
+            MatrixForm::Dense(dense) => dense.solve(r),
+            MatrixForm::Tree(tree) => tree.solve(r),
+            MatrixForm::Modes(modes) => modes.solve(r),
         }
         norm(r.as_slice())
     }

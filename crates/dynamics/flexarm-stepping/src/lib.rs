@@ -77,7 +77,7 @@ pub use mode_matrix::ModeMatrices;
 pub use modes::{Modes, modes_at};
 pub use motion::{Held, MotionFn, PrescribedMotion};
 pub use observation::Observation;
-pub use operating_point::{Asked, OperatingPoint, PoseAnswer};
+pub use operating_point::{OperatingPoint, PoseAnswer, PoseOutputs};
 pub use reduced::ReducedArm;
 pub use run_slopes::{
     AxisSlope, Direction, ErrorSlopes, RunSlopes, SlopesRequest, SpringSlope, TorqueLimited, equilibrium_slopes,
@@ -90,4 +90,4 @@ pub use stepper::{Counts, Start, Stepper};
 pub use steppers::*;
 pub use system::SecondOrderSystem;
 pub use tree_matrix::{TreeMatrices, TreeNode};
-pub use workspaces::{Lent, Workspaces};
+pub use workspaces::{PooledWorkspace, Workspaces};

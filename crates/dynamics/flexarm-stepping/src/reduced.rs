@@ -26,7 +26,7 @@ use crate::mode_matrix::ModeMatrices;
 use crate::servo::ServoState;
 use crate::system::SecondOrderSystem;
 use crate::tree_matrix::TreeMatrices;
-use crate::workspaces::Lent;
+use crate::workspaces::PooledWorkspace;
 
 /// Maximum number of fixed-point passes for accelerations with load-dependent (geometric)
 /// stiffness.
@@ -35,7 +35,7 @@ const GEOMETRIC_PASSES: usize = 12;
 /// A flexible arm as a second-order system; see the module documentation.
 pub struct ReducedArm {
     pub(crate) arm: Arc<FlexibleArm>,
-    pub(crate) data: Lent<Data>,
+    pub(crate) data: PooledWorkspace<Data>,
     pub(crate) state: State,
     pub(crate) qddot: DVector<f64>,
     pub(crate) tau: DVector<f64>,
@@ -64,10 +64,10 @@ pub struct ReducedArm {
     modes: Option<HeldModes>,
     /// Equations of motion of the free coordinates only, if these suffice and the tree is
     /// supported.
-    points: Option<Lent<FreeForces>>,
+    points: Option<PooledWorkspace<FreeForces>>,
     poses: Poses,
     /// Workspace of observations, if supported for this tree; created at the first observation.
-    observer: Option<Option<Lent<Observer>>>,
+    observer: Option<Option<PooledWorkspace<Observer>>>,
 }
 
 /// Location of the poses of the current state.

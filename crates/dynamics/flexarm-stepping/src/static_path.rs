@@ -15,7 +15,7 @@ use crate::error::StepError;
 use crate::events::EventQueue;
 use crate::reduced::add_geometric_forces;
 use crate::statics::{add_spring_forces, static_equilibrium, tangent_stiffness, with_curves};
-use crate::workspaces::Lent;
+use crate::workspaces::PooledWorkspace;
 
 /// Relative correction that ends the search: the next correction would be at least ten times
 /// smaller.
@@ -38,9 +38,9 @@ pub(crate) fn before(t: f64) -> f64 {
 pub struct StaticPath {
     arm: Arc<FlexibleArm>,
     events: EventQueue,
-    data: Lent<Data>,
+    data: PooledWorkspace<Data>,
     /// Static forces on the springs only, if supported for this tree.
-    points: Option<Lent<FreeForces>>,
+    points: Option<PooledWorkspace<FreeForces>>,
     /// Drives at the last time, springs at `e`.
     state: State,
     qddot: DVector<f64>,
@@ -210,7 +210,7 @@ impl StaticPath {
 }
 
 /// Applies a change of inertia to the arm.
-fn carry(arm: &mut Arc<FlexibleArm>, points: &mut Option<Lent<FreeForces>>, change: &InertiaChange) {
+fn carry(arm: &mut Arc<FlexibleArm>, points: &mut Option<PooledWorkspace<FreeForces>>, change: &InertiaChange) {
     let arm = Arc::make_mut(arm);
     arm.model = Arc::new(arm.model.with_inertia(change.body, change.inertia));
     if let Some(points) = points {

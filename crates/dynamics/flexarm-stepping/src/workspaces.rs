@@ -14,22 +14,22 @@ use flexarm_kinematics::{Data, FreeForces, Model, Observer, Roles};
 use crate::arm::FlexibleArm;
 
 /// Pool of unused workspaces.
-type Shelf<T> = Arc<Mutex<Vec<T>>>;
+type Pool<T> = Arc<Mutex<Vec<T>>>;
 
 /// Workspaces that are currently unused.
 #[derive(Clone)]
 pub struct Workspaces {
     /// Model for which they were made.
     model: Arc<Model>,
-    data: Shelf<Data>,
-    points: Shelf<FreeForces>,
-    observers: Shelf<Observer>,
+    data: Pool<Data>,
+    points: Pool<FreeForces>,
+    observers: Pool<Observer>,
 }
 
 impl Workspaces {
     /// Creates an empty pool.
     pub(crate) fn of(model: &Arc<Model>) -> Self {
-        Self { model: model.clone(), data: Shelf::default(), points: Shelf::default(), observers: Shelf::default() }
+        Self { model: model.clone(), data: Pool::default(), points: Pool::default(), observers: Pool::default() }
     }
 
     /// Returns whether they belong to this same model and carry no state between uses.
@@ -44,39 +44,40 @@ impl Workspaces {
 impl FlexibleArm {
     /// Returns a workspace for recursions over the tree, without external wrenches: a returned one
     /// or a new one.
-    pub fn lend_data(&self) -> Lent<Data> {
+    pub fn lend_data(&self) -> PooledWorkspace<Data> {
         let shelf = self.workspaces.are_for(&self.model).then_some(&self.workspaces.data);
-        let mut lent = Lent::from(shelf, || Some(Data::new(&self.model))).expect("there are always new ones");
+        let mut lent =
+            PooledWorkspace::from(shelf, || Some(Data::new(&self.model))).expect("there are always new ones");
         lent.clear_external_wrenches();
         lent
     }
 
     /// Returns an observer workspace in the same way; `None` if [`Observer::new`] supports no such
     /// tree.
-    pub fn lend_observer(&self) -> Option<Lent<Observer>> {
+    pub fn lend_observer(&self) -> Option<PooledWorkspace<Observer>> {
         let shelf = self.workspaces.are_for(&self.model).then_some(&self.workspaces.observers);
-        Lent::from(shelf, || Observer::new(&self.model))
+        PooledWorkspace::from(shelf, || Observer::new(&self.model))
     }
 
     /// Returns a workspace of [`FreeForces::new`] in the same way.
-    pub(crate) fn lend_points(&self, roles: &Roles) -> Option<Lent<FreeForces>> {
+    pub(crate) fn lend_points(&self, roles: &Roles) -> Option<PooledWorkspace<FreeForces>> {
         // Only if all free coordinates are elastic: the joints driven by torque may differ between
         // copies.
         let held = roles.free_coordinates().first().is_none_or(|first| *first >= self.model.n_actuated());
         let shelf = (held && self.workspaces.are_for(&self.model)).then_some(&self.workspaces.points);
-        Lent::from(shelf, || FreeForces::new(&*self.model, roles))
+        PooledWorkspace::from(shelf, || FreeForces::new(&*self.model, roles))
     }
 }
 
 /// A borrowed workspace; dropping it returns it to the pool.
-pub struct Lent<T> {
+pub struct PooledWorkspace<T> {
     /// `Some` until it is returned.
     it: Option<T>,
-    shelf: Option<Shelf<T>>,
+    shelf: Option<Pool<T>>,
 }
 
-impl<T> Lent<T> {
-    fn from(shelf: Option<&Shelf<T>>, make: impl FnOnce() -> Option<T>) -> Option<Self> {
+impl<T> PooledWorkspace<T> {
+    fn from(shelf: Option<&Pool<T>>, make: impl FnOnce() -> Option<T>) -> Option<Self> {
         let used = shelf.and_then(|shelf| shelf.lock().unwrap_or_else(PoisonError::into_inner).pop());
         let it = used.or_else(make)?;
         Some(Self { it: Some(it), shelf: shelf.cloned() })
@@ -88,7 +89,7 @@ impl<T> Lent<T> {
     }
 }
 
-impl<T> Deref for Lent<T> {
+impl<T> Deref for PooledWorkspace<T> {
     type Target = T;
 
     #[inline]
@@ -97,14 +98,14 @@ impl<T> Deref for Lent<T> {
     }
 }
 
-impl<T> DerefMut for Lent<T> {
+impl<T> DerefMut for PooledWorkspace<T> {
     #[inline]
     fn deref_mut(&mut self) -> &mut T {
         self.it.as_mut().expect("it is given back at the end alone")
     }
 }
 
-impl<T> Drop for Lent<T> {
+impl<T> Drop for PooledWorkspace<T> {
     fn drop(&mut self) {
         // After a panic the contents are undefined: drop the workspace.
         if let (Some(it), Some(shelf), false) = (self.it.take(), &self.shelf, std::thread::panicking()) {

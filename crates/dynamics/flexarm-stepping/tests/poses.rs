@@ -9,7 +9,7 @@ use flexarm_stepping::*;
 use flexarm_testkit::reference_arm;
 use nalgebra::Vector3;
 
-const ALL: Asked = Asked { jacobian: true, compliance: true, frequencies: true };
+const ALL: PoseOutputs = PoseOutputs { jacobian: true, compliance: true, frequencies: true };
 
 /// Returns the reference arm with its springs scaled by `stiffness`.
 fn point(stiffness: f64) -> OperatingPoint {
@@ -87,7 +87,7 @@ fn half_a_pose_and_a_broken_load_have_their_errors() {
     let mut at = point(1.0);
     let joints = at.arm().model.n_actuated();
     let mut told = Vec::new();
-    at.solve_each(&vec![0.1; 5 * joints + 1], &Wrench::zeros(), Asked::default(), |_, answer| {
+    at.solve_each(&vec![0.1; 5 * joints + 1], &Wrench::zeros(), PoseOutputs::default(), |_, answer| {
         told.push(answer.map(|_| ()).map_err(|error| error.to_string()));
     });
     assert!(told.len() == 6 && told[..5].iter().all(Result::is_ok), "{told:?}");

@@ -18,9 +18,9 @@ use crate::{answer, load_options, shipped, to_json};
 
 const EXAMPLES: &str = "\
 Examples:
-  Twelve poses that tell the gearboxes best, with a table to fill in, in a new folder of out/:
+  Twelve poses that determine the gearboxes best, with a table to fill in, in a new folder of out/:
       flexarm identify kr210_identified --plan 12 --std 0.00003
-  The stiffness that the filled table tells, a new robot file and a page:
+  The stiffness identified from the filled table, a new robot file and a page:
       flexarm identify kr210_identified out/kr210_identified_plan-001/measurements.toml
   Only two of the parameters, figures alone:
       flexarm identify kr210_identified measurements.toml --fit 'drive.joint_2.*' --fit 'drive.joint_3.*' --no-files
@@ -162,7 +162,7 @@ fn text(found: &Identification) -> String {
         let (value, part) = match p.identifiable {
             true if p.std.is_nan() => (number(p.value), "no fit".to_owned()),
             true => (number(p.value), part_of(p.std, p.value, p.initial)),
-            false => ("not told".to_owned(), String::new()),
+            false => ("undetermined".to_owned(), String::new()),
         };
         t.add_row(vec![p.name.clone(), number(p.initial), value, deviation(p.std), part, p.unit.clone()]);
     }

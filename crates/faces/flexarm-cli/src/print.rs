@@ -231,9 +231,9 @@ pub(crate) fn findings(findings: &[Finding]) -> String {
     let line = |f: &Finding| format!("{}[{}] {}: {}", f.severity, f.code, f.location, f.message);
     let lines: Vec<String> = findings.iter().map(line).collect();
     let mut out = String::new();
-    for told in gathered(&lines) {
-        out += &format!("{}\n", message(&told));
-        let first = lines.iter().position(|line| told.starts_with(line.as_str()));
+    for line_text in gathered(&lines) {
+        out += &format!("{}\n", message(&line_text));
+        let first = lines.iter().position(|line| line_text.starts_with(line.as_str()));
         if let Some(help) = first.map(|k| &findings[k].help).filter(|help| !help.is_empty()) {
             out += &format!("    help: {}\n", message(help));
         }

@@ -14,7 +14,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use crate::args::Cli;
 use crate::failure::Failure;
-use crate::reduce_args::{Named, OrderingName, PlaceWord, QuadratureName, ReduceArgs};
+use crate::reduce_args::{NamedValue, OrderingName, PlaceWord, QuadratureName, ReduceArgs};
 use crate::shipped::OutputFolder;
 use crate::{answer, print, to_json};
 
@@ -67,7 +67,7 @@ fn flags(args: &ReduceArgs) -> Result<ReduceJob, Failure> {
         urdf: urdf.map(|(file, link)| UrdfEntry { file, link, joint: args.joint.clone(), rest: args.rest }),
         ..ReduceJob::default()
     };
-    for Named { name, value } in &args.materials {
+    for NamedValue { name, value } in &args.materials {
         match name {
             Some(region) => {
                 job.materials.insert(region.clone(), *value);
@@ -75,12 +75,12 @@ fn flags(args: &ReduceArgs) -> Result<ReduceJob, Failure> {
             None => once(&mut job.material, *value, "--material")?,
         }
     }
-    for (Named { name, value }, letter) in args.interfaces.iter().zip('A'..='Z') {
+    for (NamedValue { name, value }, letter) in args.interfaces.iter().zip('A'..='Z') {
         let name = name.clone().unwrap_or_else(|| letter.to_string());
         once(&mut entry(&mut job, &name).select, value.clone(), &format!("--interface {name}=..."))?;
         entry(&mut job, &name).place = "command line".into();
     }
-    for Named { name, value } in &args.at {
+    for NamedValue { name, value } in &args.at {
         let Some(name) = name else {
             let text = "--at needs the name of an interface: --at A=x,y,z, --at A=centroid or --at A=joint:NAME";
             return Err(Failure::Usage(text.into()));
@@ -95,7 +95,7 @@ fn flags(args: &ReduceArgs) -> Result<ReduceJob, Failure> {
             PlaceWord::Frame(frame) => (own.xyz, own.rpy) = (Some(frame.xyz), Some(frame.rpy)),
         }
     }
-    for Named { name, value } in &args.ties {
+    for NamedValue { name, value } in &args.ties {
         match name {
             Some(name) => once(&mut entry(&mut job, name).tie, value.0, &format!("--tie {name}=..."))?,
             None => once(&mut job.tie, value.0, "--tie")?,

@@ -48,20 +48,20 @@ pub(crate) struct ReduceArgs {
     pub(crate) units: Option<Units>,
     /// steel, aluminium, cast_iron, ductile_iron or E,nu,rho in SI; of one region with REGION= (may
     /// be repeated)
-    #[arg(long = "material", value_name = "[REGION=]MATERIAL", value_parser = Named::<MaterialChoice>::parse, help_heading = "Mesh")]
-    pub(crate) materials: Vec<Named<MaterialChoice>>,
+    #[arg(long = "material", value_name = "[REGION=]MATERIAL", value_parser = NamedValue::<MaterialChoice>::parse, help_heading = "Mesh")]
+    pub(crate) materials: Vec<NamedValue<MaterialChoice>>,
     /// Nodes of an interface, the proximal one first (repeat); named A, B, C in order unless NAME
     /// is given
-    #[arg(long = "interface", value_name = "[NAME=]SELECTOR", value_parser = Named::<NodeSelector>::parse, help_heading = "Interfaces")]
-    pub(crate) interfaces: Vec<Named<NodeSelector>>,
+    #[arg(long = "interface", value_name = "[NAME=]SELECTOR", value_parser = NamedValue::<NodeSelector>::parse, help_heading = "Interfaces")]
+    pub(crate) interfaces: Vec<NamedValue<NodeSelector>>,
     /// Frame of an interface in the link frame: x,y,z or x,y,z,roll,pitch,yaw (unit of the mesh,
     /// rad), centroid, or joint:NAME with --urdf (repeat)
-    #[arg(long, value_name = "NAME=PLACE", value_parser = Named::<PlaceWord>::parse, help_heading = "Interfaces")]
-    pub(crate) at: Vec<Named<PlaceWord>>,
+    #[arg(long, value_name = "NAME=PLACE", value_parser = NamedValue::<PlaceWord>::parse, help_heading = "Interfaces")]
+    pub(crate) at: Vec<NamedValue<PlaceWord>>,
     /// rigid or distributing, for all interfaces or for one with NAME= (may be repeated) [default:
     /// rigid]
-    #[arg(long = "tie", value_name = "[NAME=]TIE", value_parser = Named::<TieWord>::parse, help_heading = "Interfaces")]
-    pub(crate) ties: Vec<Named<TieWord>>,
+    #[arg(long = "tie", value_name = "[NAME=]TIE", value_parser = NamedValue::<TieWord>::parse, help_heading = "Interfaces")]
+    pub(crate) ties: Vec<NamedValue<TieWord>>,
     /// URDF or xacro whose joints define the interfaces: A at the origin of the link, B at that of
     /// the next joint
     #[arg(long, value_name = "FILE", requires = "link", help_heading = "Mesh")]
@@ -135,12 +135,12 @@ pub(crate) struct ReduceArgs {
 
 /// `NAME=VALUE`, or a value without a name.
 #[derive(Clone, Debug)]
-pub(crate) struct Named<T> {
+pub(crate) struct NamedValue<T> {
     pub(crate) name: Option<String>,
     pub(crate) value: T,
 }
 
-impl<T: FromStr<Err: ToString>> Named<T> {
+impl<T: FromStr<Err: ToString>> NamedValue<T> {
     fn parse(text: &str) -> Result<Self, String> {
         // An = inside quotes or brackets is part of the value.
         let name = text.split_once('=').filter(|(name, _)| !name.contains(['"', '(']));

@@ -84,8 +84,7 @@ pub(crate) fn pose(text: Option<&str>, robot: &Robot) -> Result<Option<Vec<f64>>
 pub(crate) fn joint_values(text: Option<&str>, robot: &Robot) -> Result<Option<Vec<f64>>, Failure> {
     let Some(text) = text else { return Ok(None) };
     let model = robot.rigid_model()?;
-    let joints: Vec<(&str, bool)> =
-        model.coordinates().iter().map(|c| (c.joint.as_str(), c.slides())).collect();
+    let joints: Vec<(&str, bool)> = model.coordinates().iter().map(|c| (c.joint.as_str(), c.slides())).collect();
     parse_joint_values(text, &joints).map(Some)
 }
 

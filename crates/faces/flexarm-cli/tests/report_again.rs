@@ -89,7 +89,7 @@ fn the_page_of_a_killed_run_names_its_stepper_and_what_is_missing() {
     let bytes = place.read("result/run.mcap");
     place.write("killed.mcap", &bytes[..bytes.len() * 2 / 3]);
     let answer = place.json(&["report", "killed.mcap", "-o", "killed.html"]);
-    assert!(answer["warnings"].as_array().unwrap().len() > 1, "the broken end is told: {answer}");
+    assert!(answer["warnings"].as_array().unwrap().len() > 1, "the broken end is reported: {answer}");
     let page = place.text("killed.html");
     let (text, _) = page.split_once("<script type").unwrap();
     assert!(text.contains("End not known") && !text.contains("Stopped early"));

@@ -117,7 +117,7 @@ impl PyStatics {
     fn details<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let (arm, q, wrench) = self.asked.as_ref().ok_or_else(|| only_for_one("details"))?;
         let found = py.detach(|| arm.get().arm.statics(Some(q), *wrench)).or_raise()?;
-        caveat::tell(py, &found.caveats)?;
+        caveat::issue(py, &found.caveats)?;
         plain(py, &found)
     }
 

@@ -277,7 +277,7 @@ impl PyArm {
         if outputs.is_some() {
             caveat::say(py, "wrote", (run.summary(py)?,))?;
         }
-        caveat::tell(py, &caveats)?;
+        caveat::issue(py, &caveats)?;
         Ok(run)
     }
 
@@ -472,7 +472,7 @@ impl PyArm {
     ) -> PyResult<PyModes> {
         let q = self.pose(q)?;
         let table = py.detach(|| self.arm.modes(q.as_deref(), count)).or_raise()?;
-        caveat::tell(py, &table.caveats)?;
+        caveat::issue(py, &table.caveats)?;
         Ok(modes(table))
     }
 
@@ -513,7 +513,7 @@ impl PyArm {
         let request = ResponseArgs { inputs, outputs, quantity, from_hz, to_hz, points, spacing }.request()?;
         let q = self.pose(q)?;
         let found = py.detach(|| self.arm.response(q.as_deref(), &request)).or_raise()?;
-        caveat::tell(py, &found.caveats)?;
+        caveat::issue(py, &found.caveats)?;
         Ok(response(found, &request))
     }
 

@@ -26,25 +26,25 @@ pub(crate) fn list<'py>(py: Python<'py>, caveats: &[Caveat]) -> PyResult<Bound<'
 }
 
 /// Issues caveats of severity warning as Python warnings at the caller's line; logs the others.
-pub(crate) fn tell(py: Python<'_>, caveats: &[Caveat]) -> PyResult<()> {
-    let (told, notes): (Vec<Caveat>, Vec<Caveat>) = caveats.iter().cloned().partition(Caveat::warns);
+pub(crate) fn issue(py: Python<'_>, caveats: &[Caveat]) -> PyResult<()> {
+    let (warnings, notes): (Vec<Caveat>, Vec<Caveat>) = caveats.iter().cloned().partition(Caveat::warns);
     if !notes.is_empty() {
         say(py, "notes", (list(py, &notes)?,))?;
     }
-    if told.is_empty() {
+    if warnings.is_empty() {
         return Ok(());
     }
     let warn = py.import("warnings")?.getattr("warn")?;
     let level = PyDict::new(py);
     level.set_item("stacklevel", 1)?;
     // Caveats of one kind become one warning, with the fields of the first.
-    let texts: Vec<String> = told.iter().map(|caveat| caveat.message.clone()).collect();
+    let texts: Vec<String> = warnings.iter().map(|caveat| caveat.message.clone()).collect();
     let of = |text: String| {
-        let first = told.iter().find(|caveat| text.starts_with(&caveat.message));
+        let first = warnings.iter().find(|caveat| text.starts_with(&caveat.message));
         Caveat { message: text, ..first.cloned().unwrap_or_default() }
     };
-    let told: Vec<Caveat> = gathered(&texts).into_iter().map(of).collect();
-    for caveat in list(py, &told)? {
+    let warnings: Vec<Caveat> = gathered(&texts).into_iter().map(of).collect();
+    for caveat in list(py, &warnings)? {
         warn.call((caveat,), Some(&level))?;
     }
     Ok(())
@@ -68,6 +68,6 @@ pub(crate) fn answer<'py>(
 ) -> PyResult<Bound<'py, PyAny>> {
     let figures = plain(py, found)?;
     say(py, "wrote", (&figures,))?;
-    tell(py, caveats)?;
+    issue(py, caveats)?;
     Ok(figures)
 }

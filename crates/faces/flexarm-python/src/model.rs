@@ -70,8 +70,8 @@ impl PyModel {
         let (rows, m) = (first.rows, first.len());
         for (name, other) in names.iter().zip(found.iter().flatten()) {
             if other.rows != rows {
-                let told = |rows: Option<usize>| rows.map_or("one row".to_owned(), |m| format!("{m} rows"));
-                let (own, first) = (told(other.rows), told(rows));
+                let text = |rows: Option<usize>| rows.map_or("one row".to_owned(), |m| format!("{m} rows"));
+                let (own, first) = (text(other.rows), text(rows));
                 let message = format!("{name} has {own}, {} has {first}: expected the same", names[0]);
                 return Err(pyo3::exceptions::PyValueError::new_err(message));
             }

@@ -192,13 +192,13 @@ fn of_keys(error: PyErr, py: Python<'_>, path: &Path) -> PyErr {
     let (message, place) = (value.to_string(), format!("{}:", path.display()));
     let mut parts = message.split(&place);
     let first = parts.next().unwrap_or_default().to_owned();
-    let told = parts.fold(first, |told, part| {
+    let text = parts.fold(first, |text, part| {
         let rest = part.trim_start_matches(|c: char| c.is_ascii_digit() || c == ':').trim_start();
-        format!("{told}keys: {rest}")
+        format!("{text}keys: {rest}")
     });
-    match told == message {
+    match text == message {
         true => error,
-        false => PyErr::from_type(error.get_type(py), told),
+        false => PyErr::from_type(error.get_type(py), text),
     }
 }
 

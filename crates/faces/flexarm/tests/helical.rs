@@ -118,13 +118,13 @@ fn every_stepper_runs_a_robot_with_a_helical_joint() {
 #[test]
 fn a_lead_is_refused_where_nothing_turns_and_without_a_length() {
     let place = Place::new("refused");
-    let said = |lead: &str| {
+    let message = |lead: &str| {
         let text = ROBOT.replace("lead = { quill = 0.05 }", lead);
         place.robot(&text).map(|_| "loaded").unwrap_err().to_string()
     };
-    let slides = said("lead = { lift = 0.05 }");
+    let slides = message("lead = { lift = 0.05 }");
     assert!(slides.contains("lift") && slides.contains("quill"), "{slides}");
-    let zero = said("lead = { quill = 0.0 }");
+    let zero = message("lead = { quill = 0.0 }");
     assert!(zero.contains("metres per turn"), "{zero}");
-    assert!(said("lead = { quill = nan }").contains("NaN"));
+    assert!(message("lead = { quill = nan }").contains("NaN"));
 }

@@ -128,8 +128,8 @@ fn loads_and_payloads_by_value_are_those_of_the_file() {
     assert!(worst < 1e-12, "{worst:e}"); // measured 6e-17
     assert!(AppliedLoad::sampled("tcp", &[0.2, 0.2], &[F; 2]).is_err());
     let elsewhere = applied(AppliedLoad::during("nowhere", F, 0.2, 0.7));
-    let said = |scenario: &Scenario| arm.simulate(scenario, &RunOptions::default()).unwrap_err().to_string();
-    assert!(said(&elsewhere).contains("\"nowhere\": expected \"tcp\""));
+    let refused = |scenario: &Scenario| arm.simulate(scenario, &RunOptions::default()).unwrap_err().to_string();
+    assert!(refused(&elsewhere).contains("\"nowhere\": expected \"tcp\""));
 
     // A payload is attached and released again; the corresponding energy is in the balance.
     let text = "[[payload]]\nat = 0.3\nmass = 0.4\ncom = [0.0, 0.1, 0.0]\ninertia = [2e-3, 3e-3, 4e-3, 1e-4, 0.0, 0.0]\n\
@@ -142,7 +142,7 @@ fn loads_and_payloads_by_value_are_those_of_the_file() {
     assert_eq!(by_file.summary.energy, by_value.summary.energy);
     assert!(by_value.summary.energy.payload_j.abs() > 1e-3, "{:?}", by_value.summary.energy);
     let nowhere = Scenario::from(&motion).with_payload(PayloadChange::release(0.8).on_link("nowhere"));
-    assert!(said(&nowhere).starts_with("payload link \"nowhere\": expected a link that moves"));
+    assert!(refused(&nowhere).starts_with("payload link \"nowhere\": expected a link that moves"));
     // Same caveats: a load after the end has no effect in either form.
     let late = applied(AppliedLoad::during("tcp", F, 90.0, 91.0));
     assert!(run(&late).summary.warnings.iter().any(|warning| warning.contains("it does nothing")));

@@ -159,7 +159,7 @@ fn job(mesh: &Path) -> ReduceJob {
 }
 
 /// All messages about a mesh: the error, or the warnings.
-fn said(deck: &str, change: impl Fn(&mut ReduceJob)) -> Vec<String> {
+fn messages(deck: &str, change: impl Fn(&mut ReduceJob)) -> Vec<String> {
     let folder = Folder::new();
     let path = folder.0.join("bar.inp");
     std::fs::write(&path, deck).unwrap();
@@ -184,7 +184,7 @@ fn said(deck: &str, change: impl Fn(&mut ReduceJob)) -> Vec<String> {
 fn sound_meshes_of_every_kind_reduce_without_a_false_alarm() {
     let mut checked = 0;
     let mut see = |what: String, deck: String, change: &dyn Fn(&mut ReduceJob)| {
-        let said = said(&deck, change);
+        let said = messages(&deck, change);
         assert!(said.is_empty(), "{what}: {said:?}");
         checked += 1;
     };
@@ -392,7 +392,7 @@ fn every_spoilt_mesh_is_refused_or_told_with_the_word_that_helps() {
     let total = faults.len();
     let mut missed = Vec::new();
     for (what, deck, change, word) in faults {
-        let said = said(&deck, change);
+        let said = messages(&deck, change);
         if said.is_empty() || !said.iter().any(|sentence| sentence.contains(word)) {
             missed.push(format!("{what}: {said:?}"));
         }
@@ -465,7 +465,7 @@ fn c3d8i_keeps_its_incompatible_modes_under_the_rules_of_calculix() {
         1,
     );
     let both = both.replacen("99, 1, 2, 3, 4, 5, 6, 7, 8", &twin_brick(), 1);
-    let said = said(&both, |job| job.quadrature = Some(QuadratureChoice::Calculix));
+    let said = messages(&both, |job| job.quadrature = Some(QuadratureChoice::Calculix));
     assert!(said.iter().any(|sentence| sentence.contains("C3D8I as well as C3D8")), "{said:?}");
 }
 

@@ -2,8 +2,8 @@
 
 #![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
 
+use flexarm_fe_io::mesh::{FilePosition, MeshErrorKind as Kind, ReadOptions, parse_mesh};
 use flexarm_fe_io::mesh::{MeshError, MeshFile};
-use flexarm_fe_io::mesh::{MeshErrorKind as Kind, Place, ReadOptions, parse_mesh};
 use flexarm_fem::mesh::BeamProperties;
 use flexarm_fem::{BeamTheory, ElementKind, Section};
 use nalgebra::Vector3;
@@ -129,7 +129,7 @@ fn impossible_nodes_are_refused_with_their_line() {
         ("3 0 1 0", "-3 0 1 0", Kind::Syntax, 8),
     ] {
         let error = read(&good.replacen(from, to, 1)).unwrap_err();
-        assert_eq!((error.kind, error.place), (kind, Place::Line(line)), "{error}");
+        assert_eq!((error.kind, error.place), (kind, FilePosition::Line(line)), "{error}");
     }
     // Fortran exponents and Windows line ends are accepted.
     let odd = good.replacen("3 0 1 0", "3 0 1.0D+00 0", 1).replace('\n', "\r\n");

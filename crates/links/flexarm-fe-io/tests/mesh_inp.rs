@@ -3,8 +3,8 @@
 
 #![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
 
+use flexarm_fe_io::mesh::{FilePosition, MeshErrorKind as Kind, ReadOptions, parse_mesh};
 use flexarm_fe_io::mesh::{MeshError, MeshFile};
-use flexarm_fe_io::mesh::{MeshErrorKind as Kind, Place, ReadOptions, parse_mesh};
 use flexarm_fem::mesh::BeamProperties;
 use flexarm_fem::{BeamTheory, ElementKind, Section};
 use nalgebra::Vector3;
@@ -208,7 +208,7 @@ fn what_cannot_be_read_is_refused_with_line_and_advice() {
         ("*SOLID SECTION, ELSET=cub, MATERIAL=m\n", Kind::Missing, 13, "one of: cube"),
     ] {
         let error = cube_and(more).unwrap_err();
-        assert_eq!((error.kind, error.place), (kind, Place::Line(line)), "{more}{error}");
+        assert_eq!((error.kind, error.place), (kind, FilePosition::Line(line)), "{more}{error}");
         assert!(error.to_string().contains(word), "{error}");
     }
     for (more, kind, word) in [

@@ -17,7 +17,7 @@ pub struct Doubt {
 
 impl Doubt {
     /// Creates a warning without a number.
-    pub fn said(code: &'static str, message: impl Into<String>) -> Self {
+    pub fn from_message(code: &'static str, message: impl Into<String>) -> Self {
         Self { code, message: message.into(), value: None, yardstick: None }
     }
 

@@ -122,7 +122,7 @@ pub fn link_from_superelement(
     let frames = LinkFrames::new(element.interfaces[0].X_LI, element.interfaces[1].X_LI);
     let mut doubts = Vec::new();
     let (p, said) = split_point(&frames, &K12, plan.split, &|_| true);
-    doubts.extend(said.map(|said| Doubt::said("split", said)));
+    doubts.extend(said.map(|said| Doubt::from_message("split", said)));
     let frames = frames.with_split(Pose::translation(p.x, p.y, p.z));
 
     let whole = match &plan.masses {
@@ -138,7 +138,7 @@ pub fn link_from_superelement(
     let parts = match &plan.masses {
         PartMasses::Given(parts) => parts.clone(),
         _ => {
-            doubts.push(Doubt::said(
+            doubts.push(Doubt::from_message(
                 "halves",
                 "the masses of the two parts are the halves of a uniform bar with the mass, centre of mass and \
                  inertia of the link: a matrix does not say where the mass sits; give the parts if they are known",
@@ -150,7 +150,7 @@ pub fn link_from_superelement(
     let held_frequencies_hz = if has_mass { element.frequencies_hz(&[0]) } else { Vec::new() };
     if has_mass && held_frequencies_hz.is_empty() {
         let said = "the mass matrix is not positive definite: no frequencies, the modal link cannot be used";
-        doubts.push(Doubt::said("mass", said));
+        doubts.push(Doubt::from_message("mass", said));
     }
     if has_mass && let PartMasses::Given(_) | PartMasses::Whole(_) = plan.masses {
         let found = condensed_body(&element).mass;
@@ -164,7 +164,7 @@ pub fn link_from_superelement(
     if has_mass {
         link.details = Some(Box::new(LinkDetails { superelement: Some(element), ..LinkDetails::default() }));
     }
-    doubts.extend(link.warnings(&plan.limits).into_iter().map(|said| Doubt::said("gate", said)));
+    doubts.extend(link.warnings(&plan.limits).into_iter().map(|said| Doubt::from_message("gate", said)));
     Ok(MatrixReduction { link, whole, held_frequencies_hz, lumped_frequencies_hz, doubts })
 }
 

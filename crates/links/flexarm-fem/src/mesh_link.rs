@@ -295,7 +295,7 @@ pub fn reduce_mesh(
         modal: Some(modal),
         gate: Some(gate),
     }));
-    doubts.extend(link.warnings(&plan.limits).into_iter().map(|said| Doubt::said("gate", said)));
+    doubts.extend(link.warnings(&plan.limits).into_iter().map(|said| Doubt::from_message("gate", said)));
     let stress_solves = if plan.geometric { 12 } else { 0 };
     let solves = fixed_modes.solves + held_modes.solves + condensation.figures().static_solves + stress_solves;
     let solver = condensation.figures();
@@ -350,7 +350,7 @@ fn suspicious(mesh: &Mesh, bodies: &Bodies) -> Vec<Doubt> {
         .iter()
         .take(3)
         .map(|hinge| format!("{hinge}: they turn against each other there; {JOIN} if they are one part"))
-        .map(|said| Doubt::said("hinge", said))
+        .map(|said| Doubt::from_message("hinge", said))
         .collect();
     let found = coincident(mesh, mesh.coincidence());
     if let Some([first, _]) = found.pairs.first() {
@@ -419,7 +419,7 @@ fn split(
         }
     };
     let (p_LS, said) = split_point(&frames, K12, at, &|p| parts(p).is_ok());
-    doubts.extend(said.map(|said| Doubt::said("split", said)));
+    doubts.extend(said.map(|said| Doubt::from_message("split", said)));
     let parts = parts(p_LS).map_err(|source| MeshLinkError::Split { p: p_LS.into(), source })?;
     Ok((frames.with_split(Pose::translation(p_LS.x, p_LS.y, p_LS.z)), parts))
 }

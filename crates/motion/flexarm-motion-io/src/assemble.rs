@@ -5,7 +5,7 @@ use flexarm_settings::Caveat;
 use flexarm_trajectory::{JointSamples, SampleError, Samples, Trajectory, TrajectoryError};
 
 use crate::collect::{Received, Series, Topic, names_in_words};
-use crate::error::{Problem, Trouble};
+use crate::error::{PlacedProblem, Problem};
 use crate::message::Point;
 
 /// Stamps that go back by at most this are sorted (s).
@@ -45,8 +45,8 @@ pub(crate) struct Assembled {
 ///
 /// * `file`: file name for caveats.
 /// * `has_clock`: whether the times of reception are known.
-pub(crate) fn assemble(topic: Topic, file: &str, has_clock: bool) -> Result<Assembled, Trouble> {
-    let mut told = Told { file, caveats: Vec::new() };
+pub(crate) fn assemble(topic: Topic, file: &str, has_clock: bool) -> Result<Assembled, PlacedProblem> {
+    let mut told = FileCaveats { file, caveats: Vec::new() };
     let mut lines = if topic.received.is_empty() {
         states(topic, has_clock, &mut told)?
     } else {
@@ -57,7 +57,7 @@ pub(crate) fn assemble(topic: Topic, file: &str, has_clock: bool) -> Result<Asse
     let last = lines.iter().filter_map(|line| line.t.last()).fold(f64::NEG_INFINITY, |last, t| last.max(*t));
     if last <= first || lines.is_empty() {
         let found = samples.min(1);
-        return Err(Trouble::from(TrajectoryError::Samples(SampleError::TooFew { found })));
+        return Err(PlacedProblem::from(TrajectoryError::Samples(SampleError::TooFew { found })));
     }
     lines.iter_mut().for_each(|line| line.reach(first, last));
     tell_ends(&lines, first, last, &mut told);
@@ -67,18 +67,18 @@ pub(crate) fn assemble(topic: Topic, file: &str, has_clock: bool) -> Result<Asse
 }
 
 /// Collects caveats about one file.
-struct Told<'a> {
+struct FileCaveats<'a> {
     file: &'a str,
     caveats: Vec<Caveat>,
 }
 
-impl Told<'_> {
+impl FileCaveats<'_> {
     fn warn(&mut self, code: &str, message: &str, help: &str) {
-        self.caveats.push(Caveat::said(code, self.file, format!("{}: {message}", self.file), help));
+        self.caveats.push(Caveat::from_message(code, self.file, format!("{}: {message}", self.file), help));
     }
 
     fn note(&mut self, code: &str, message: &str) {
-        self.caveats.push(Caveat::said(code, self.file, format!("{}: {message}", self.file), "").as_note());
+        self.caveats.push(Caveat::from_message(code, self.file, format!("{}: {message}", self.file), "").as_note());
     }
 }
 
@@ -148,7 +148,7 @@ impl Line {
 
 /// Warns about joints that start later or end earlier than others by more than two of their own
 /// steps.
-fn tell_ends(lines: &[Line], first: f64, last: f64, told: &mut Told<'_>) {
+fn tell_ends(lines: &[Line], first: f64, last: f64, told: &mut FileCaveats<'_>) {
     let mut late = Vec::new();
     for line in lines.iter().filter(|line| line.t.len() > 1) {
         let (begin, end) = (line.t[0], line.t[line.t.len() - 1]);
@@ -158,12 +158,12 @@ fn tell_ends(lines: &[Line], first: f64, last: f64, told: &mut Told<'_>) {
         }
     }
     if !late.is_empty() {
-        let what = format!("joints that are not told all the time are held before and after: {}", late.join(", "));
+        let what = format!("joints that are not recorded all the time are held before and after: {}", late.join(", "));
         told.warn("motion-ends", &what, "cut the recording to the time that all joints share");
     }
     let once: Vec<String> = lines.iter().filter(|line| line.t.len() == 1).map(|line| line.joint.clone()).collect();
     if !once.is_empty() {
-        told.note("motion-ends", &format!("told only once, and held there: {}", names_in_words(&once)));
+        told.note("motion-ends", &format!("recorded only once, and held there: {}", names_in_words(&once)));
     }
 }
 
@@ -171,7 +171,7 @@ fn tell_ends(lines: &[Line], first: f64, last: f64, told: &mut Told<'_>) {
 // states
 
 /// Lines of joints from their states.
-fn states(mut topic: Topic, has_clock: bool, told: &mut Told<'_>) -> Result<Vec<Line>, Trouble> {
+fn states(mut topic: Topic, has_clock: bool, told: &mut FileCaveats<'_>) -> Result<Vec<Line>, PlacedProblem> {
     let count: usize = topic.series.iter().map(|series| series.position.len()).sum();
     if topic.without_position > 0 {
         let what = format!("{} of {} messages have no positions and are left out", topic.without_position, topic.count);
@@ -188,7 +188,7 @@ fn states(mut topic: Topic, has_clock: bool, told: &mut Told<'_>) -> Result<Vec<
     }
     topic.series.retain(|series| !series.position.is_empty());
     if topic.series.is_empty() {
-        return Err(Trouble::new(Problem::NoPositions));
+        return Err(PlacedProblem::new(Problem::NoPositions));
     }
     if not_finite > 0 {
         let what =
@@ -282,7 +282,7 @@ impl Series {
 }
 
 /// Whether the times of reception are used instead of the stamps; a caveat gives the choice.
-fn clock(series: &[Series], has_clock: bool, told: &mut Told<'_>) -> Result<bool, Trouble> {
+fn clock(series: &[Series], has_clock: bool, told: &mut FileCaveats<'_>) -> Result<bool, PlacedProblem> {
     let total: usize = series.iter().map(|series| series.stamp_ns.len()).sum();
     let unset: usize = series.iter().map(|series| series.stamp_ns.iter().filter(|stamp| **stamp == 0).count()).sum();
     let mut back: Option<(f64, usize, &str)> = None;
@@ -321,9 +321,9 @@ fn clock(series: &[Series], has_clock: bool, told: &mut Told<'_>) -> Result<bool
             told.warn("motion-clock", &format!("times are those of reception: {why}"), "");
             Ok(true)
         }
-        (_, false, _) if unset == total && total > series.len() => Err(Trouble::new(Problem::NoStamps)),
+        (_, false, _) if unset == total && total > series.len() => Err(PlacedProblem::new(Problem::NoStamps)),
         (_, false, Some((seconds, number, joint))) => {
-            Err(Trouble::new(Problem::StampsJumpBack { seconds, number, joint: joint.to_owned() }))
+            Err(PlacedProblem::new(Problem::StampsJumpBack { seconds, number, joint: joint.to_owned() }))
         }
         (Some(why), false, None) => {
             told.warn("motion-clock", &format!("{why}; there is no other time to go by"), "");
@@ -334,7 +334,7 @@ fn clock(series: &[Series], has_clock: bool, told: &mut Told<'_>) -> Result<bool
 
 /// Discards velocities that do not match the slopes of the positions, since drivers without
 /// velocities send zeros.
-fn judge_velocities(lines: &mut [Line], told: &mut Told<'_>) {
+fn judge_velocities(lines: &mut [Line], told: &mut FileCaveats<'_>) {
     let (mut foreign, mut partial) = (Vec::new(), Vec::new());
     for line in lines.iter_mut().filter(|line| line.t.len() > 1) {
         let known = line.v.iter().filter(|v| v.is_finite()).count();
@@ -369,7 +369,7 @@ fn judge_velocities(lines: &mut [Line], told: &mut Told<'_>) {
     tell_partial(&partial, told);
 }
 
-fn tell_partial(partial: &[String], told: &mut Told<'_>) {
+fn tell_partial(partial: &[String], told: &mut FileCaveats<'_>) {
     if !partial.is_empty() {
         let what = format!("rates that are not numbers at every sample are not used: {}", partial.join(", "));
         told.warn("motion-velocities", &what, "");
@@ -381,7 +381,7 @@ fn tell_partial(partial: &[String], told: &mut Told<'_>) {
 
 /// Lines of joints from the points of trajectories. Each message begins at its stamp, otherwise at
 /// its reception, otherwise after the previous one, and replaces the remainder of the previous one.
-fn plans(topic: Topic, has_clock: bool, told: &mut Told<'_>) -> Result<Vec<Line>, Trouble> {
+fn plans(topic: Topic, has_clock: bool, told: &mut FileCaveats<'_>) -> Result<Vec<Line>, PlacedProblem> {
     let mut lines: Vec<Line> =
         topic.series.iter().map(|series| Line { joint: series.joint.clone(), ..Line::default() }).collect();
     let messages: Vec<&Received> =
@@ -398,7 +398,7 @@ fn plans(topic: Topic, has_clock: bool, told: &mut Told<'_>) -> Result<Vec<Line>
         if begin < 0.0 {
             let joint = message.trajectories.first().and_then(|points| points.joints.first());
             let (seconds, joint) = (-begin, joint.map_or_else(String::new, |joint| joint.to_string()));
-            return Err(Trouble::new(Problem::StampsJumpBack { seconds, number: k + 1, joint }));
+            return Err(PlacedProblem::new(Problem::StampsJumpBack { seconds, number: k + 1, joint }));
         }
         if k == 0 {
             put_start(message, &mut lines, told);
@@ -425,7 +425,7 @@ fn plans(topic: Topic, has_clock: bool, told: &mut Told<'_>) -> Result<Vec<Line>
 
 /// Adds the position of the robot before the first point, if it is given and the first point is
 /// later.
-fn put_start(message: &Received, lines: &mut [Line], told: &mut Told<'_>) {
+fn put_start(message: &Received, lines: &mut [Line], told: &mut FileCaveats<'_>) {
     let Some(points) = message.trajectories.iter().find(|points| !points.points.is_empty()) else { return };
     let first = points.points.first().map_or(0.0, |point| point.time_s);
     if first <= 0.0 {
@@ -493,7 +493,7 @@ impl Line {
         }
     }
 
-    fn append(&mut self, from: f64, points: &[Point], column: usize, number: usize) -> Result<(), Trouble> {
+    fn append(&mut self, from: f64, points: &[Point], column: usize, number: usize) -> Result<(), PlacedProblem> {
         for point in points {
             let t = from + point.time_s;
             let (q, last) = (point.position[column], self.t.last().copied());
@@ -502,7 +502,7 @@ impl Line {
                 let previous = self.q[self.q.len() - 1];
                 if (previous - q).abs() > MEET {
                     let (joint, this) = (self.joint.clone(), q);
-                    return Err(Trouble::new(Problem::SegmentGap { number, joint, this, previous }));
+                    return Err(PlacedProblem::new(Problem::SegmentGap { number, joint, this, previous }));
                 }
                 continue;
             }
@@ -513,7 +513,7 @@ impl Line {
     }
 }
 
-fn tell_plan(messages: &[&Received], by_stamp: bool, has_clock: bool, segments: usize, told: &mut Told<'_>) {
+fn tell_plan(messages: &[&Received], by_stamp: bool, has_clock: bool, segments: usize, told: &mut FileCaveats<'_>) {
     if messages.len() > 1 {
         let begin = match (by_stamp, has_clock) {
             (true, _) => "its header stamp",
@@ -531,7 +531,7 @@ fn tell_plan(messages: &[&Received], by_stamp: bool, has_clock: bool, segments: 
 }
 
 /// Chooses the rates of the points that are used.
-fn judge_plan(lines: &mut [Line], told: &mut Told<'_>) {
+fn judge_plan(lines: &mut [Line], told: &mut FileCaveats<'_>) {
     let mut partial = Vec::new();
     let mut without = true;
     for line in lines {

@@ -6,7 +6,7 @@ use std::rc::Rc;
 use crate::Request;
 use crate::cdr::{Encoding, decode};
 use crate::definition::{Definitions, plain_name};
-use crate::error::{Problem, Trouble, list};
+use crate::error::{PlacedProblem, Problem, list};
 use crate::message::{Message, Points, State, motion_of};
 use crate::value::Node;
 
@@ -59,7 +59,7 @@ pub(crate) struct Topic {
     /// Number of states whose velocities are not one per joint.
     pub(crate) odd_rates: usize,
     /// Problem with one of its messages.
-    pub(crate) trouble: Option<Trouble>,
+    pub(crate) trouble: Option<PlacedProblem>,
 }
 
 /// All topics of a file.
@@ -104,7 +104,7 @@ impl<'a> Collector<'a> {
     ///
     /// # Errors
     /// [`Problem::TooManyNumbers`].
-    pub(crate) fn bytes(&mut self, index: usize, log_ns: i64, bytes: &[u8]) -> Result<(), Trouble> {
+    pub(crate) fn bytes(&mut self, index: usize, log_ns: i64, bytes: &[u8]) -> Result<(), PlacedProblem> {
         let Some(topic) = self.topics.get_mut(index) else { return Ok(()) };
         topic.count += 1;
         if !self.wants(index) {
@@ -116,7 +116,7 @@ impl<'a> Collector<'a> {
             Ok(node) => self.node(index, log_ns, &node),
             Err(what) => {
                 let message = topic.message.clone();
-                Err(Trouble::new(Problem::Message { message, what }))
+                Err(PlacedProblem::new(Problem::Message { message, what }))
             }
         };
         let topic = &mut self.topics[index];
@@ -124,7 +124,7 @@ impl<'a> Collector<'a> {
             topic.trouble = Some(trouble.in_message(&topic.name, topic.count));
         }
         if self.positions > MOST_POSITIONS {
-            return Err(Trouble::new(Problem::TooManyNumbers { most: MOST_POSITIONS }));
+            return Err(PlacedProblem::new(Problem::TooManyNumbers { most: MOST_POSITIONS }));
         }
         Ok(())
     }
@@ -133,7 +133,7 @@ impl<'a> Collector<'a> {
     ///
     /// # Errors
     /// A problem with its motion.
-    pub(crate) fn node(&mut self, index: usize, log_ns: i64, node: &Node) -> Result<(), Trouble> {
+    pub(crate) fn node(&mut self, index: usize, log_ns: i64, node: &Node) -> Result<(), PlacedProblem> {
         let topic = &mut self.topics[index];
         match motion_of(node)? {
             None => {}
@@ -156,7 +156,7 @@ impl<'a> Collector<'a> {
     /// # Errors
     /// [`Problem::NoTopic`], [`Problem::Topic`], a problem with a message of the topic, or
     /// [`Problem::NoJoint`].
-    pub(crate) fn choose(mut self) -> Result<(Topic, Vec<String>), Trouble> {
+    pub(crate) fn choose(mut self) -> Result<(Topic, Vec<String>), PlacedProblem> {
         let all: Vec<String> = self.topics.iter().map(Topic::described).collect();
         let readable = |topics: &[Topic]| -> Vec<String> {
             topics.iter().filter(|topic| topic.has_motion()).map(Topic::described).collect()
@@ -167,7 +167,7 @@ impl<'a> Collector<'a> {
                 self.topics.iter().filter(|topic| topic.reader.is_some()).map(Topic::described).collect();
             let fail = |what: &str| {
                 let (asked, what) = (asked.to_owned(), what.to_owned());
-                Err(Trouble::new(Problem::Topic { asked, what, readable: joined(&others) }))
+                Err(PlacedProblem::new(Problem::Topic { asked, what, readable: joined(&others) }))
             };
             match self.topics.iter().find(asked_for) {
                 None => return fail("is not in the file"),
@@ -194,7 +194,7 @@ impl<'a> Collector<'a> {
             (topic.has_motion(), rank(topic), usize::MAX - i)
         });
         let Some(best) = best else {
-            return Err(Trouble::new(Problem::NoTopic { found: joined(&all) }));
+            return Err(PlacedProblem::new(Problem::NoTopic { found: joined(&all) }));
         };
         let mut topic = self.topics.swap_remove(best);
         if let Some(trouble) = topic.trouble.take() {
@@ -205,7 +205,7 @@ impl<'a> Collector<'a> {
             names.extend(self.topics.into_iter().flat_map(|topic| topic.foreign));
             names.sort();
             names.dedup();
-            return Err(Trouble::new(match names.is_empty() {
+            return Err(PlacedProblem::new(match names.is_empty() {
                 true => Problem::NoPositions,
                 false => Problem::NoJoint { names },
             }));
@@ -249,7 +249,7 @@ impl Topic {
     }
 
     /// Keeps the values of the requested joints and returns their number.
-    fn state(&mut self, log_ns: i64, mut state: State, wanted: Option<&[&str]>) -> Result<usize, Trouble> {
+    fn state(&mut self, log_ns: i64, mut state: State, wanted: Option<&[&str]>) -> Result<usize, PlacedProblem> {
         let places: Vec<Option<usize>> = state.joints.iter().map(|joint| self.place(joint, wanted)).collect();
         // Errors in the states of other devices, such as a gripper, are ignored.
         if places.iter().all(Option::is_none) {

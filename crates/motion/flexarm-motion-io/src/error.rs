@@ -24,7 +24,7 @@ pub enum MotionError {
         /// File name, or the caller's name for the text.
         origin: String,
         /// Place in the file.
-        place: Place,
+        place: FilePosition,
         /// The problem.
         problem: Box<Problem>,
     },
@@ -33,7 +33,7 @@ pub enum MotionError {
 /// Place of a problem in a file.
 #[derive(Debug, Clone, PartialEq, Default)]
 #[non_exhaustive]
-pub enum Place {
+pub enum FilePosition {
     /// The file as a whole.
     #[default]
     Whole,
@@ -48,7 +48,7 @@ pub enum Place {
     },
 }
 
-impl fmt::Display for Place {
+impl fmt::Display for FilePosition {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Whole => Ok(()),
@@ -278,26 +278,26 @@ pub(crate) fn list(names: &[String]) -> String {
 
 /// A problem with its place, before the file name is known.
 #[derive(Debug)]
-pub(crate) struct Trouble {
-    pub(crate) place: Place,
+pub(crate) struct PlacedProblem {
+    pub(crate) place: FilePosition,
     pub(crate) problem: Box<Problem>,
 }
 
-impl Trouble {
+impl PlacedProblem {
     pub(crate) fn new(problem: Problem) -> Self {
-        Self { place: Place::Whole, problem: Box::new(problem) }
+        Self { place: FilePosition::Whole, problem: Box::new(problem) }
     }
 
     /// A problem at a line of text; 0 means no line.
     pub(crate) fn at(line: u32, problem: Problem) -> Self {
-        let place = if line > 0 { Place::Line(line as usize) } else { Place::Whole };
+        let place = if line > 0 { FilePosition::Line(line as usize) } else { FilePosition::Whole };
         Self { place, problem: Box::new(problem) }
     }
 
     /// Sets the place to a message unless a place is set already.
     pub(crate) fn in_message(mut self, topic: &str, number: usize) -> Self {
-        if self.place == Place::Whole {
-            self.place = Place::Message { topic: topic.to_owned(), number };
+        if self.place == FilePosition::Whole {
+            self.place = FilePosition::Message { topic: topic.to_owned(), number };
         }
         self
     }
@@ -307,7 +307,7 @@ impl Trouble {
     }
 }
 
-impl From<TrajectoryError> for Trouble {
+impl From<TrajectoryError> for PlacedProblem {
     fn from(error: TrajectoryError) -> Self {
         Self::new(Problem::Trajectory(error))
     }

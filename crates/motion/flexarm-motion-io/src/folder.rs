@@ -8,7 +8,7 @@ use flexarm_settings::Caveat;
 
 use crate::assemble::assemble;
 use crate::collect::{Collector, names_in_words};
-use crate::error::{MotionError, Problem, Trouble};
+use crate::error::{MotionError, PlacedProblem, Problem};
 use crate::unpack::{Inside, ZSTD_MAGIC, look_inside};
 use crate::value::{Node, Value};
 use crate::{MessageMotion, Request, mcap, rosbag, sqlite, yaml};
@@ -65,7 +65,7 @@ fn files_of(folder: &Path) -> Result<Vec<PathBuf>, MotionError> {
             found
         }
     };
-    let not_a_bag = |what: String| Err(Trouble::new(Problem::NotABag { what }).of(&origin));
+    let not_a_bag = |what: String| Err(PlacedProblem::new(Problem::NotABag { what }).of(&origin));
     let first = files.first().map(|file| stem(file));
     let other = files.iter().find(|file| Some(stem(file)) != first);
     match files.iter().find(|file| !file.is_file()) {
@@ -129,7 +129,7 @@ pub(crate) fn read_files(files: &[PathBuf], bag: &Path, request: &Request<'_>) -
             }
         } else {
             let what = "it is neither MCAP nor a database of rosbag2, by its first bytes".to_owned();
-            return Err(Trouble::new(Problem::NotRead { what }).of(&origin));
+            return Err(PlacedProblem::new(Problem::NotRead { what }).of(&origin));
         };
         broken.extend(ended.map(|why| (origin, why)));
     }
@@ -143,18 +143,19 @@ fn finish(
     broken: &[(String, String)],
 ) -> Result<MessageMotion, MotionError> {
     let was_asked = collector.asked();
-    let cut = |trouble: Trouble| match (broken.first(), &*trouble.problem) {
+    let cut = |trouble: PlacedProblem| match (broken.first(), &*trouble.problem) {
         // The reason for the missing motion is more important.
-        (Some((_, why)), Problem::NoTopic { .. }) => {
-            Trouble::new(Problem::Container { container: "bag", what: format!("{why}, and there is no motion before") })
-        }
+        (Some((_, why)), Problem::NoTopic { .. }) => PlacedProblem::new(Problem::Container {
+            container: "bag",
+            what: format!("{why}, and there is no motion before"),
+        }),
         _ => trouble,
     };
     let (topic, others) = collector.choose().map_err(|trouble| cut(trouble).of(shown))?;
     let mut caveats: Vec<Caveat> = Vec::new();
     for (file, why) in broken {
         let message = format!("{file}: {why}; it is read up to there ({} messages on {})", topic.count, topic.name);
-        caveats.push(Caveat::said("motion-cut", file, message, "recover it, or record it again"));
+        caveats.push(Caveat::from_message("motion-cut", file, message, "recover it, or record it again"));
     }
     if !was_asked {
         caveats.push(chosen(&topic.described(), &others, shown));
@@ -173,19 +174,20 @@ fn chosen(taken: &str, others: &[String], shown: &str) -> Caveat {
     use flexarm_settings::Setting;
     if others.is_empty() {
         let message = format!("{shown}: the motion is that of {taken}, the only topic that has one");
-        return Caveat::said("motion-topic", shown, message, "").as_note();
+        return Caveat::from_message("motion-topic", shown, message, "").as_note();
     }
     let message = format!(
         "{shown}: the motion is that of {taken}; others have one too: {}; {} chooses",
         others.join(", "),
         Setting::Topic
     );
-    Caveat::said("motion-topic", shown, message, "").mended_by(&[Setting::Topic])
+    Caveat::from_message("motion-topic", shown, message, "").mended_by(&[Setting::Topic])
 }
 
 /// Caveat about dropped joints.
 pub(crate) fn dropped_note(dropped: &[String], shown: &str) -> Option<Caveat> {
     let message = format!("{shown}: joints that the robot does not move are left out: {}", names_in_words(dropped));
-    let caveat = Caveat::said("motion-dropped-joints", shown, message, "a gripper is one; a joint of the arm is not");
+    let caveat =
+        Caveat::from_message("motion-dropped-joints", shown, message, "a gripper is one; a joint of the arm is not");
     (!dropped.is_empty()).then_some(caveat)
 }

@@ -33,7 +33,7 @@
 //! Units: rad, rad/s, rad/s², m, s, as in ROS. Not here: robots; the caller gives the robot's
 //! joints ([`Request`]).
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test"))]
-#![allow(rustdoc::private_intra_doc_links, reason = "the page tells how the modules work together")]
+#![allow(rustdoc::private_intra_doc_links, reason = "the page describes how the modules work together")]
 
 mod assemble;
 mod cdr;
@@ -52,7 +52,7 @@ mod value;
 mod write;
 mod yaml;
 
-pub use error::{MotionError, Place, Problem};
+pub use error::{FilePosition, MotionError, Problem};
 pub use folder::read_folder;
 pub use folder::{SQLITE_MAGIC, read_db3};
 pub use mcap::{MCAP_MAGIC, read_mcap};

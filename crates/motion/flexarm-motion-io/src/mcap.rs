@@ -16,7 +16,7 @@ use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::{McapError, McapResult};
 
 use crate::collect::Collector;
-use crate::error::{MotionError, Trouble};
+use crate::error::{MotionError, PlacedProblem};
 use crate::{MessageMotion, Request};
 
 /// First bytes of an MCAP file.
@@ -43,14 +43,14 @@ pub(crate) fn collect_file(path: &Path, into: &mut Collector<'_>) -> Result<Opti
 }
 
 /// Collects the messages of a file. Returns the reason if it ends prematurely.
-pub(crate) fn collect(mut file: impl Read, into: &mut Collector<'_>) -> Result<Option<String>, Trouble> {
+pub(crate) fn collect(mut file: impl Read, into: &mut Collector<'_>) -> Result<Option<String>, PlacedProblem> {
     let options = LinearReaderOptions::default()
         .with_skip_end_magic(true)
         .with_prevalidate_chunk_crcs(true) // a damaged chunk is dropped as a whole
         .with_record_length_limit(MOST_BYTES);
     let mut reader = LinearReader::new_with_options(options);
     reader.add_decompressor(Lz4::default()).expect("it has a name");
-    let mut known = Known::default();
+    let mut known = SchemasAndChannels::default();
     while let Some(event) = reader.next_event() {
         let cut = match event {
             Ok(LinearReadEvent::ReadRequest(_)) => match file.read(reader.insert(READ_BYTES)) {
@@ -123,16 +123,16 @@ impl Decompressor for Lz4 {
 
 /// Schemas and channels read so far.
 #[derive(Default)]
-struct Known {
+struct SchemasAndChannels {
     /// Name, encoding and text of each schema.
     schemas: HashMap<u16, [String; 3]>,
     /// Topic index of each channel.
     channels: HashMap<u16, usize>,
 }
 
-impl Known {
+impl SchemasAndChannels {
     /// Processes a record. Returns a description of the problem, if any.
-    fn record(&mut self, kind: u8, body: &[u8], into: &mut Collector<'_>) -> Result<Option<String>, Trouble> {
+    fn record(&mut self, kind: u8, body: &[u8], into: &mut Collector<'_>) -> Result<Option<String>, PlacedProblem> {
         let done = match kind {
             op::SCHEMA => self.schema(body),
             op::CHANNEL => self.channel(body, into),

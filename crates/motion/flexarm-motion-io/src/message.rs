@@ -3,7 +3,7 @@
 
 use std::rc::Rc;
 
-use crate::error::{Problem, Trouble};
+use crate::error::{PlacedProblem, Problem};
 use crate::value::{Node, Value};
 
 /// Maximum depth of a motion in a message.
@@ -61,8 +61,8 @@ const CONTROLLER: [&str; 4] = ["reference", "desired", "feedback", "actual"];
 /// Returns the motion of a message, if any.
 ///
 /// # Errors
-/// [`Trouble`] for an invalid motion.
-pub(crate) fn motion_of(node: &Node) -> Result<Option<Message>, Trouble> {
+/// [`PlacedProblem`] for an invalid motion.
+pub(crate) fn motion_of(node: &Node) -> Result<Option<Message>, PlacedProblem> {
     if let (Some(names), Some(_)) = (node.get("name"), node.get("position")) {
         return state(node, names, node, "position").map(|state| Some(Message::State(state)));
     }
@@ -96,7 +96,7 @@ fn set_point(node: &Node) -> Option<&'static str> {
 }
 
 /// Searches for tables with `joint_names` and `points`.
-fn trajectories(node: &Node, depth: usize, found: &mut Vec<Points>) -> Result<(), Trouble> {
+fn trajectories(node: &Node, depth: usize, found: &mut Vec<Points>) -> Result<(), PlacedProblem> {
     if depth > DEEPEST {
         return Ok(());
     }
@@ -118,7 +118,7 @@ fn trajectories(node: &Node, depth: usize, found: &mut Vec<Points>) -> Result<()
     }
 }
 
-fn points(node: &Node, names: &Node, list: &Node) -> Result<Points, Trouble> {
+fn points(node: &Node, names: &Node, list: &Node) -> Result<Points, PlacedProblem> {
     let joints = names_of(names, "joint_names")?;
     let items: &[Node] = match &list.value {
         Value::List(items) => items,
@@ -129,7 +129,7 @@ fn points(node: &Node, names: &Node, list: &Node) -> Result<Points, Trouble> {
     let mut found: Vec<Point> = Vec::with_capacity(items.len());
     for (i, item) in items.iter().enumerate() {
         let of = || format!("point {}", i + 1);
-        let missing = |key, expected| Trouble::at(item.line, Problem::MissingKey { of: of(), key, expected });
+        let missing = |key, expected| PlacedProblem::at(item.line, Problem::MissingKey { of: of(), key, expected });
         let positions = item.get("positions").or_else(|| item.get("position"));
         let positions = positions.ok_or_else(|| missing("positions", "expected a position for each joint"))?;
         let time = item.get("time_from_start");
@@ -148,12 +148,12 @@ fn points(node: &Node, names: &Node, list: &Node) -> Result<Points, Trouble> {
         check_lengths(item, i + 1, joints.len(), &columns)?;
         if let Some(k) = point.position.iter().position(|value| !value.is_finite()) {
             let (joint, value) = (joints[k].to_string(), point.position[k]);
-            return Err(Trouble::at(item.line, Problem::NotFinite { joint, point: i + 1, value }));
+            return Err(PlacedProblem::at(item.line, Problem::NotFinite { joint, point: i + 1, value }));
         }
         let previous = found.last().map_or(f64::NEG_INFINITY, |last| last.time_s);
         if !(point.time_s > previous && point.time_s.is_finite()) {
             let this = point.time_s;
-            return Err(Trouble::at(item.line, Problem::PointTimes { point: i + 1, this, previous }));
+            return Err(PlacedProblem::at(item.line, Problem::PointTimes { point: i + 1, this, previous }));
         }
         found.push(point);
     }
@@ -162,7 +162,7 @@ fn points(node: &Node, names: &Node, list: &Node) -> Result<Points, Trouble> {
 
 /// State of the joints named in `names`; `values` has position and velocity, or positions and
 /// velocities.
-fn state(node: &Node, names: &Node, values: &Node, of: &'static str) -> Result<State, Trouble> {
+fn state(node: &Node, names: &Node, values: &Node, of: &'static str) -> Result<State, PlacedProblem> {
     let plural = matches!(of, "reference" | "desired" | "feedback" | "actual");
     let (position, velocity, acceleration) =
         if plural { ("positions", "velocities", "accelerations") } else { ("position", "velocity", "acceleration") };
@@ -184,11 +184,11 @@ impl State {
     ///
     /// # Errors
     /// [`Problem::Lengths`].
-    pub(crate) fn check(&mut self) -> Result<bool, Trouble> {
+    pub(crate) fn check(&mut self) -> Result<bool, PlacedProblem> {
         let (found, expected) = (self.position.len(), self.joints.len());
         if found != 0 && found != expected {
             let (key, hint, point) = ("position".to_owned(), "", None);
-            return Err(Trouble::at(self.line, Problem::Lengths { key, found, expected, hint, point }));
+            return Err(PlacedProblem::at(self.line, Problem::Lengths { key, found, expected, hint, point }));
         }
         let mut is_odd = false;
         for rates in [&mut self.velocity, &mut self.acceleration] {
@@ -201,24 +201,29 @@ impl State {
     }
 }
 
-fn check_lengths(item: &Node, point: usize, joints: usize, columns: &[(&str, &Vec<f64>, bool)]) -> Result<(), Trouble> {
+fn check_lengths(
+    item: &Node,
+    point: usize,
+    joints: usize,
+    columns: &[(&str, &Vec<f64>, bool)],
+) -> Result<(), PlacedProblem> {
     for (key, values, needed) in columns {
         if values.len() != joints && (*needed || !values.is_empty()) {
             let hint = if values.is_empty() { ": a trajectory without positions is not read" } else { "" };
             let (key, found) = ((*key).to_owned(), values.len());
             let problem = Problem::Lengths { key, found, expected: joints, hint, point: Some(point) };
-            return Err(Trouble::at(item.line, problem));
+            return Err(PlacedProblem::at(item.line, problem));
         }
     }
     Ok(())
 }
 
-fn names_of(node: &Node, key: &str) -> Result<Vec<Rc<str>>, Trouble> {
+fn names_of(node: &Node, key: &str) -> Result<Vec<Rc<str>>, PlacedProblem> {
     let wrong = || wrong(key, node, "a list of names of joints");
     let names: Vec<Rc<str>> = match &node.value {
         Value::List(items) => {
             let name = |item: &Node| match &item.value {
-                Value::Text(text) if &**text == "..." => Err(Trouble::at(item.line, Problem::ShortenedArray)),
+                Value::Text(text) if &**text == "..." => Err(PlacedProblem::at(item.line, Problem::ShortenedArray)),
                 Value::Text(text) => Ok(text.clone()),
                 Value::Whole(whole) => Ok(whole.to_string().into()),
                 _ => Err(wrong()),
@@ -232,18 +237,18 @@ fn names_of(node: &Node, key: &str) -> Result<Vec<Rc<str>>, Trouble> {
     let mut sorted: Vec<&str> = names.iter().map(|name| &**name).collect();
     sorted.sort_unstable();
     match sorted.windows(2).find(|pair| pair[0] == pair[1]) {
-        Some(pair) => Err(Trouble::at(node.line, Problem::RepeatedJoint { joint: pair[0].to_owned() })),
+        Some(pair) => Err(PlacedProblem::at(node.line, Problem::RepeatedJoint { joint: pair[0].to_owned() })),
         None => Ok(names),
     }
 }
 
-fn numbers(node: &Node, key: &str) -> Result<Vec<f64>, Trouble> {
+fn numbers(node: &Node, key: &str) -> Result<Vec<f64>, PlacedProblem> {
     match &node.value {
         Value::Numbers(numbers) => Ok(numbers.clone()),
         Value::Null => Ok(Vec::new()),
         Value::List(items) => {
             let number = |item: &Node| match &item.value {
-                Value::Text(text) if &**text == "..." => Err(Trouble::at(item.line, Problem::ShortenedArray)),
+                Value::Text(text) if &**text == "..." => Err(PlacedProblem::at(item.line, Problem::ShortenedArray)),
                 // JSON has no literal for NaN.
                 Value::Null => Ok(f64::NAN),
                 _ => item.number().ok_or_else(|| wrong(key, item, "numbers alone")),
@@ -262,16 +267,16 @@ fn numbers(node: &Node, key: &str) -> Result<Vec<f64>, Trouble> {
 }
 
 /// Optional list of numbers.
-fn rates(node: &Node, key: &str) -> Result<Vec<f64>, Trouble> {
+fn rates(node: &Node, key: &str) -> Result<Vec<f64>, PlacedProblem> {
     node.get(key).map_or(Ok(Vec::new()), |values| numbers(values, key))
 }
 
-fn wrong(key: &str, node: &Node, expected: &'static str) -> Trouble {
-    Trouble::at(node.line, Problem::Value { key: key.to_owned(), found: node.in_words(), expected })
+fn wrong(key: &str, node: &Node, expected: &'static str) -> PlacedProblem {
+    PlacedProblem::at(node.line, Problem::Value { key: key.to_owned(), found: node.in_words(), expected })
 }
 
 /// `header.stamp` in ns since 1970; 0 if missing.
-fn stamp_ns(node: &Node) -> Result<i64, Trouble> {
+fn stamp_ns(node: &Node) -> Result<i64, PlacedProblem> {
     let Some(stamp) = node.get("header").and_then(|header| header.get("stamp")) else { return Ok(0) };
     match (whole_ns(stamp), &stamp.value) {
         (Some(ns), _) => Ok(ns),
@@ -286,7 +291,7 @@ fn stamp_ns(node: &Node) -> Result<i64, Trouble> {
 }
 
 /// Duration in s, given as seconds and nanoseconds or as one number.
-fn duration_s(node: &Node) -> Result<f64, Trouble> {
+fn duration_s(node: &Node) -> Result<f64, PlacedProblem> {
     match (whole_ns(node), node.number()) {
         (Some(ns), _) => Ok(ns as f64 / 1e9),
         (None, Some(seconds)) => Ok(seconds),

@@ -3,18 +3,18 @@
 use std::path::Path;
 
 use crate::collect::Collector;
-use crate::error::{MotionError, Problem, Trouble};
+use crate::error::{MotionError, PlacedProblem, Problem};
 
 pub(crate) fn collect_file(path: &Path, _: &mut Collector<'_>) -> Result<Option<String>, MotionError> {
     Err(refused().of(&path.display().to_string()))
 }
 
-pub(crate) fn collect_bytes(_: Vec<u8>, _: &mut Collector<'_>) -> Result<Option<String>, Trouble> {
+pub(crate) fn collect_bytes(_: Vec<u8>, _: &mut Collector<'_>) -> Result<Option<String>, PlacedProblem> {
     Err(refused())
 }
 
-fn refused() -> Trouble {
+fn refused() -> PlacedProblem {
     let what = "it is a SQLite bag, which this build does not read: build flexarm with the feature sqlite, install the Python \
                 package, which reads it, or make an MCAP of it with ros2 bag convert";
-    Trouble::new(Problem::NotRead { what: what.to_owned() })
+    PlacedProblem::new(Problem::NotRead { what: what.to_owned() })
 }

@@ -11,7 +11,7 @@ use std::io::{BufReader, Read};
 use std::path::Path;
 
 use crate::collect::Collector;
-use crate::error::{MotionError, Problem, Trouble};
+use crate::error::{MotionError, PlacedProblem, Problem};
 use crate::unpack::{MOST_BYTES, Packing, unpacked};
 use crate::{MessageMotion, Request};
 
@@ -41,12 +41,12 @@ pub(crate) fn collect_file(path: &Path, into: &mut Collector<'_>) -> Result<Opti
         .map_err(|trouble| trouble.of(&path.display().to_string()))
 }
 
-fn container(what: String) -> Trouble {
-    Trouble::new(Problem::Container { container: "bag of ROS 1", what })
+fn container(what: String) -> PlacedProblem {
+    PlacedProblem::new(Problem::Container { container: "bag of ROS 1", what })
 }
 
 /// Collects the messages of a bag; returns the reason if it ends prematurely.
-fn collect(mut file: impl Read, into: &mut Collector<'_>) -> Result<Option<String>, Trouble> {
+fn collect(mut file: impl Read, into: &mut Collector<'_>) -> Result<Option<String>, PlacedProblem> {
     let mut version = [0; VERSION.len()];
     if file.read_exact(&mut version).is_err() || version != VERSION {
         let found = String::from_utf8_lossy(&version).trim_end().to_owned();
@@ -92,7 +92,7 @@ enum Part {
     End,
 }
 
-fn part(file: &mut impl Read, most: u64) -> Result<Part, Trouble> {
+fn part(file: &mut impl Read, most: u64) -> Result<Part, PlacedProblem> {
     let mut length = Vec::new();
     let failed = |error: std::io::Error| container(format!("it cannot be read on ({error})"));
     file.take(4).read_to_end(&mut length).map_err(failed)?;
@@ -159,7 +159,12 @@ struct Connections(HashMap<u32, usize>);
 
 impl Connections {
     /// Reads the records of a chunk, as far as possible.
-    fn chunk(&mut self, head: &Head<'_>, packed: &[u8], into: &mut Collector<'_>) -> Result<Option<String>, Trouble> {
+    fn chunk(
+        &mut self,
+        head: &Head<'_>,
+        packed: &[u8],
+        into: &mut Collector<'_>,
+    ) -> Result<Option<String>, PlacedProblem> {
         let (records, broken) = match head.text("compression").as_deref() {
             None | Some("none") => (packed.to_vec(), None),
             Some("bz2") => unpacked(Packing::Bzip2, packed),
@@ -184,7 +189,12 @@ impl Connections {
     }
 
     /// Processes a record outside or inside a chunk; returns a description of the problem, if any.
-    fn record(&mut self, head: &Head<'_>, data: &[u8], into: &mut Collector<'_>) -> Result<Option<String>, Trouble> {
+    fn record(
+        &mut self,
+        head: &Head<'_>,
+        data: &[u8],
+        into: &mut Collector<'_>,
+    ) -> Result<Option<String>, PlacedProblem> {
         let done = match head.op {
             CONNECTION => self.connection(head, data, into),
             MESSAGE => return self.message(head, data, into),
@@ -203,7 +213,7 @@ impl Connections {
         Some(())
     }
 
-    fn message(&self, head: &Head<'_>, data: &[u8], into: &mut Collector<'_>) -> Result<Option<String>, Trouble> {
+    fn message(&self, head: &Head<'_>, data: &[u8], into: &mut Collector<'_>) -> Result<Option<String>, PlacedProblem> {
         let time = head.fields.get(&b"time"[..]).and_then(|bytes| <[u8; 8]>::try_from(*bytes).ok());
         let (Some(connection), Some([a, b, c, d, e, f, g, h])) = (head.number("conn"), time) else {
             return Ok(Some("damaged: a message does not say where it belongs".to_owned()));

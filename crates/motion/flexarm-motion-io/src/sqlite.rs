@@ -9,7 +9,7 @@ use std::path::Path;
 use rusqlite::{Connection, OpenFlags};
 
 use crate::collect::Collector;
-use crate::error::{MotionError, Problem, Trouble};
+use crate::error::{MotionError, PlacedProblem, Problem};
 use crate::unpack::{Packing, ZSTD_MAGIC, unpacked};
 
 pub(crate) fn collect_file(path: &Path, into: &mut Collector<'_>) -> Result<Option<String>, MotionError> {
@@ -33,7 +33,7 @@ pub(crate) fn collect_file(path: &Path, into: &mut Collector<'_>) -> Result<Opti
 }
 
 /// Collects from a database that was decompressed into memory.
-pub(crate) fn collect_bytes(mut bytes: Vec<u8>, into: &mut Collector<'_>) -> Result<Option<String>, Trouble> {
+pub(crate) fn collect_bytes(mut bytes: Vec<u8>, into: &mut Collector<'_>) -> Result<Option<String>, PlacedProblem> {
     // There is no log file in memory: format version 2 (with a log) is read as version 1.
     for at in [18, 19] {
         if let Some(version) = bytes.get_mut(at) {
@@ -56,11 +56,11 @@ fn escaped(letter: char) -> String {
     }
 }
 
-fn failed(error: &rusqlite::Error) -> Trouble {
-    Trouble::new(Problem::Container { container: "SQLite file", what: error.to_string() })
+fn failed(error: &rusqlite::Error) -> PlacedProblem {
+    PlacedProblem::new(Problem::Container { container: "SQLite file", what: error.to_string() })
 }
 
-fn collect(database: &Connection, into: &mut Collector<'_>) -> Result<Option<String>, Trouble> {
+fn collect(database: &Connection, into: &mut Collector<'_>) -> Result<Option<String>, PlacedProblem> {
     let tables = names_of_tables(database).map_err(|error| failed(&error))?;
     let has = |table: &str| tables.iter().any(|name| name == table);
     if !has("topics") || !has("messages") {
@@ -68,7 +68,7 @@ fn collect(database: &Connection, into: &mut Collector<'_>) -> Result<Option<Str
             "it has no tables `topics` and `messages`, so it is no bag of rosbag2; its tables are {}",
             if tables.is_empty() { "none".to_owned() } else { tables.join(", ") }
         );
-        return Err(Trouble::new(Problem::Container { container: "SQLite file", what }));
+        return Err(PlacedProblem::new(Problem::Container { container: "SQLite file", what }));
     }
     let definitions = match has("message_definitions") {
         true => definitions(database).unwrap_or_default(),
@@ -111,7 +111,7 @@ fn messages(
     database: &Connection,
     places: &HashMap<i64, usize>,
     into: &mut Collector<'_>,
-) -> Result<Option<String>, Trouble> {
+) -> Result<Option<String>, PlacedProblem> {
     let query = database.prepare("SELECT topic_id, timestamp, data FROM messages ORDER BY id");
     let mut query = query.map_err(|error| failed(&error))?;
     let mut rows = query.query([]).map_err(|error| failed(&error))?;

@@ -4,7 +4,7 @@ use flexarm_settings::Caveat;
 
 use crate::assemble::assemble;
 use crate::collect::Collector;
-use crate::error::{MotionError, Problem, Trouble};
+use crate::error::{MotionError, PlacedProblem, Problem};
 use crate::folder::dropped_note;
 use crate::value::{Node, Value};
 use crate::{MessageMotion, Request, yaml};
@@ -53,13 +53,13 @@ pub fn read_text(text: &str, origin: &str, request: &Request<'_>) -> Result<Mess
     read(text.trim_start_matches('\u{feff}'), origin, request).map_err(|trouble| trouble.of(origin))
 }
 
-fn read(text: &str, origin: &str, request: &Request<'_>) -> Result<MessageMotion, Trouble> {
+fn read(text: &str, origin: &str, request: &Request<'_>) -> Result<MessageMotion, PlacedProblem> {
     if let Some(asked) = request.topic {
-        return Err(Trouble::new(Problem::TopicOfText { asked: asked.to_owned() }));
+        return Err(PlacedProblem::new(Problem::TopicOfText { asked: asked.to_owned() }));
     }
     if text.len() > LONGEST {
         let mend = "record a bag instead, or cut it";
-        return Err(Trouble::new(Problem::TooLarge { most: LONGEST as u64, mend }));
+        return Err(PlacedProblem::new(Problem::TooLarge { most: LONGEST as u64, mend }));
     }
     let mut collector = Collector::new(*request);
     let topic = collector.topic("text", "", "", None);
@@ -88,10 +88,10 @@ fn read(text: &str, origin: &str, request: &Request<'_>) -> Result<MessageMotion
         }
         let message =
             format!("{origin}: the last of {documents} documents is not whole and is left out ({})", trouble.problem);
-        caveats.push(Caveat::said("motion-cut", origin, message, ""));
+        caveats.push(Caveat::from_message("motion-cut", origin, message, ""));
     }
     if !collector.topics[topic].has_something() {
-        return Err(Trouble::new(Problem::NoMessage { found: keys }));
+        return Err(PlacedProblem::new(Problem::NoMessage { found: keys }));
     }
     let (topic, _) = collector.choose()?;
     let dropped = topic.foreign.clone();

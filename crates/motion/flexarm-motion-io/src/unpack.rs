@@ -3,7 +3,7 @@
 use std::io::{BufReader, Read};
 use std::path::Path;
 
-use crate::error::{MotionError, Problem, Trouble};
+use crate::error::{MotionError, PlacedProblem, Problem};
 use crate::{MessageMotion, Request, mcap};
 
 /// First bytes of zstd data.
@@ -81,13 +81,13 @@ pub(crate) fn look_inside(path: &Path) -> Result<Inside, MotionError> {
     if !head.starts_with(crate::SQLITE_MAGIC) {
         let what =
             "what is packed in it is neither MCAP nor a database of rosbag2; unpack it to see what it is".to_owned();
-        return Err(Trouble::new(Problem::NotRead { what }).of(&origin));
+        return Err(PlacedProblem::new(Problem::NotRead { what }).of(&origin));
     }
     let mut bytes = Vec::new();
     whole.take(MOST_BYTES + 1).read_to_end(&mut bytes).map_err(failed)?;
     if bytes.len() as u64 > MOST_BYTES {
         let problem = Problem::TooLarge { most: MOST_BYTES, mend: "unpack it with zstd -d" };
-        return Err(Trouble::new(problem).of(&origin));
+        return Err(PlacedProblem::new(problem).of(&origin));
     }
     Ok(Inside::Database(bytes))
 }

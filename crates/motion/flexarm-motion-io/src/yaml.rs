@@ -6,20 +6,23 @@ use std::rc::Rc;
 
 use flexarm_files::{YamlError, YamlNode, YamlValue, read_yaml};
 
-use crate::error::{Problem, Trouble};
+use crate::error::{PlacedProblem, Problem};
 use crate::value::{Node, Value};
 
 /// Maximum number of values of a text, with those behind aliases counted each time.
 const MOST_VALUES: usize = 20_000_000;
 
 /// Calls `take` with each document in turn, so that a long recording is not in memory twice.
-pub(crate) fn documents(text: &str, take: &mut dyn FnMut(Node) -> Result<(), Trouble>) -> Result<(), Trouble> {
+pub(crate) fn documents(
+    text: &str,
+    take: &mut dyn FnMut(Node) -> Result<(), PlacedProblem>,
+) -> Result<(), PlacedProblem> {
     // There are few keys, which occur often; they are shared.
     let mut keys = HashMap::new();
     read_yaml(text, MOST_VALUES, |root| take(node(root, &mut keys)))
 }
 
-impl From<YamlError> for Trouble {
+impl From<YamlError> for PlacedProblem {
     fn from(YamlError { line, message }: YamlError) -> Self {
         Self::at(u32::try_from(line).unwrap_or(0), Problem::NotYaml { message })
     }

@@ -167,7 +167,7 @@ fn why_none(arm: &AnalyticArm, counted: &ControllerAxes, solutions: &Solutions, 
     others.dedup();
     match others.is_empty() {
         true => {
-            "its branch cannot be told of this arm: it has no spherical wrist behind parallel axes 2 and 3".to_owned()
+            "its branch is not defined for this arm: it has no spherical wrist behind parallel axes 2 and 3".to_owned()
         }
         false => format!(
             "the branch that it names ({}) has no solution within the joint limits; there are {}",
@@ -178,9 +178,9 @@ fn why_none(arm: &AnalyticArm, counted: &ControllerAxes, solutions: &Solutions, 
 }
 
 fn named(selection: &Selection) -> String {
-    let told = |bits: Option<u8>| bits.map_or_else(|| "any".to_owned(), |bits| bits.to_string());
+    let text = |bits: Option<u8>| bits.map_or_else(|| "any".to_owned(), |bits| bits.to_string());
     match selection {
-        Selection::Kuka { status, turn } => format!("S {}, T {}", told(*status), told(*turn)),
+        Selection::Kuka { status, turn } => format!("S {}, T {}", text(*status), text(*turn)),
         Selection::Abb { quadrants: [a, b, c], cfx } => format!("[{a}, {b}, {c}, {cfx}]"),
         _ => "in words".to_owned(),
     }

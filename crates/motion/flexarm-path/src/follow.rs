@@ -8,7 +8,7 @@
 //! Newton's method; steps are halved where the two differ too much, so that the branch of the
 //! inverse kinematics is kept. An arm with fewer than six joints follows the paths that it can
 //! follow (least squares, then a check). For an arm with more than six joints, joints are held
-//! until six are left, or move according to [`ToolWay::guided`].
+//! until six are left, or move according to [`FrameCurve::guided`].
 //!
 //! Start at [`Follower::start`], then [`Follower::advance`].
 
@@ -67,7 +67,7 @@ impl GuidedJoint {
 
 /// A curve with the frame of the arm that follows it.
 #[derive(Debug, Clone)]
-pub struct ToolWay {
+pub struct FrameCurve {
     /// The curve.
     pub curve: Box<ToolCurve>,
     /// Frame that follows the curve.
@@ -76,7 +76,7 @@ pub struct ToolWay {
     pub guided: Vec<GuidedJoint>,
 }
 
-impl ToolWay {
+impl FrameCurve {
     /// With all redundant joints held.
     pub fn new(curve: ToolCurve, frame: Frame) -> Self {
         Self { curve: Box::new(curve), frame, guided: Vec::new() }
@@ -214,7 +214,7 @@ impl<'m> Follower<'m> {
     }
 
     /// Joint values and derivatives at `s` of a path, from nearby values.
-    fn jet(&mut self, way: &ToolWay, s: f64, near: &DVector<f64>) -> Option<JointJet> {
+    fn jet(&mut self, way: &FrameCurve, s: f64, near: &DVector<f64>) -> Option<JointJet> {
         let tool = way.curve.at(s);
         let mut q = near.clone();
         for (k, [value, ..]) in way.guides(s) {
@@ -272,7 +272,7 @@ impl<'m> Follower<'m> {
     ///
     /// # Errors
     /// [`Blocked`] if the pose is not reached near these values, or the arm is singular there.
-    pub fn start(&mut self, way: &ToolWay, s: f64, q: &DVector<f64>) -> Result<JointJet, Blocked> {
+    pub fn start(&mut self, way: &FrameCurve, s: f64, q: &DVector<f64>) -> Result<JointJet, Blocked> {
         self.jet(way, s, q).ok_or_else(|| self.blocked(s, q))
     }
 
@@ -280,7 +280,7 @@ impl<'m> Follower<'m> {
     ///
     /// # Errors
     /// [`Blocked`] if the arm cannot reach that far on this branch, or passes a singular pose.
-    pub fn advance(&mut self, way: &ToolWay, from: f64, at: &JointJet, to: f64) -> Result<JointJet, Blocked> {
+    pub fn advance(&mut self, way: &FrameCurve, from: f64, at: &JointJet, to: f64) -> Result<JointJet, Blocked> {
         let shortest = SHORTEST * way.curve.length().max((to - from).abs());
         let (mut s, mut jet, mut h) = (from, at.clone(), to - from);
         while s != to {
@@ -335,7 +335,7 @@ mod tests {
         let X0 = pose_at(&model, &frame, &q);
         let turned = Rotation3::new(Vector3::new(0.2, -0.3, 0.1)) * X0.rotation;
         let X1 = Pose::from_parts(Translation3::from(X0.translation.vector + Vector3::new(0.1, -0.2, 0.1)), turned);
-        let line = ToolWay::new(ToolCurve::line(&X0, &X1), frame.clone());
+        let line = FrameCurve::new(ToolCurve::line(&X0, &X1), frame.clone());
         let mut follower = Follower::new(&model, &frame, &q, None);
         let start = follower.start(&line, 0.0, &q).unwrap();
         let end = follower.advance(&line, 0.0, &start, line.curve.length()).unwrap();
@@ -355,7 +355,7 @@ mod tests {
         let X0 = pose_at(&model, &frame, &q);
         let far = X0.translation.vector + X0.translation.vector.normalize() * 20.0;
         let line = ToolCurve::line(&X0, &Pose::from_parts(Translation3::from(far), X0.rotation));
-        let line = ToolWay::new(line, frame.clone());
+        let line = FrameCurve::new(line, frame.clone());
         let mut follower = Follower::new(&model, &frame, &q, None);
         let start = follower.start(&line, 0.0, &q).unwrap();
         let blocked = follower.advance(&line, 0.0, &start, line.curve.length()).unwrap_err();

@@ -6,7 +6,7 @@ use nalgebra::{DVector, Vector3, Vector6};
 
 use crate::branch::{Branches, NoBranch};
 use crate::curve::{ToolCurve, ToolJet};
-use crate::follow::{Blocked, Follower, GuidedJoint, JointJet, ToolWay};
+use crate::follow::{Blocked, Follower, FrameCurve, GuidedJoint, JointJet};
 use crate::plan::{PathError, PathOptions, ProgramArm};
 use crate::program::{Blend, Item, Move, MoveKind, Target};
 
@@ -25,9 +25,9 @@ const SMALLEST_PART: f64 = 1e-6;
 
 /// Path of a leg, over a parameter in metres.
 #[derive(Debug, Clone)]
-pub(crate) enum Way {
+pub(crate) enum LegPath {
     /// A frame of the arm follows a curve.
-    Tool(ToolWay),
+    Tool(FrameCurve),
     /// Straight line in joint space: `q0 + d s`.
     Joints { q0: DVector<f64>, d: DVector<f64> },
     /// The quintic between two joint jets.
@@ -39,7 +39,7 @@ pub(crate) enum Way {
 pub(crate) struct Leg {
     /// The move.
     pub(crate) of: Move,
-    pub(crate) way: Way,
+    pub(crate) way: LegPath,
     pub(crate) length: f64,
     pub(crate) q0: DVector<f64>,
     pub(crate) q1: DVector<f64>,
@@ -195,13 +195,13 @@ impl<'m> Legs<'m> {
             return Ok(None);
         }
         let q0 = start.q.clone();
-        let mut way = ToolWay::new(curve, frame);
+        let mut way = FrameCurve::new(curve, frame);
         let mut q1 = self.end_of(&way, &q0).map_err(|blocked| blocked_error(of, &way.curve, blocked))?;
         if let Some((guided, q)) = self.guided(of, &way, &q0, &q1) {
             (way.guided, q1) = (guided, q);
         }
         start.q.copy_from(&q1);
-        Ok(Some(Leg { of: of.clone(), way: Way::Tool(way), length, q0, q1, smooth: false }))
+        Ok(Some(Leg { of: of.clone(), way: LegPath::Tool(way), length, q0, q1, smooth: false }))
     }
 
     /// Inserts values of the controller's axes into the vector of all coordinates.
@@ -238,7 +238,7 @@ impl<'m> Legs<'m> {
             return Ok(None);
         }
         let length = self.travel(&frame, &q0, &step).max(JOINT_LENGTH * step.amax());
-        let way = Way::Joints { q0: q0.clone(), d: step / length };
+        let way = LegPath::Joints { q0: q0.clone(), d: step / length };
         Ok(Some(Leg { of: of.clone(), way, length, q0, q1, smooth: false }))
     }
 
@@ -254,7 +254,7 @@ impl<'m> Legs<'m> {
     }
 
     /// Joints at the end of a path.
-    fn end_of(&mut self, way: &ToolWay, q0: &DVector<f64>) -> Result<DVector<f64>, Blocked> {
+    fn end_of(&mut self, way: &FrameCurve, q0: &DVector<f64>) -> Result<DVector<f64>, Blocked> {
         let follower = self.follower(&way.frame, q0);
         let begun = follower.start(way, 0.0, q0)?;
         Ok(follower.advance(way, 0.0, &begun, way.curve.length())?.q)
@@ -266,7 +266,7 @@ impl<'m> Legs<'m> {
     fn guided(
         &mut self,
         of: &Move,
-        way: &ToolWay,
+        way: &FrameCurve,
         q0: &DVector<f64>,
         q1: &DVector<f64>,
     ) -> Option<(Vec<GuidedJoint>, DVector<f64>)> {
@@ -287,7 +287,7 @@ impl<'m> Legs<'m> {
                 let to = q0[k] + part * (wanted[k] - q0[k]);
                 GuidedJoint { k, from: [q0[k], 0.0, 0.0], to: [to, 0.0, 0.0] }
             };
-            let trial = ToolWay { guided: left_over.iter().map(joint).collect(), ..way.clone() };
+            let trial = FrameCurve { guided: left_over.iter().map(joint).collect(), ..way.clone() };
             if let Ok(q) = self.end_of(&trial, q0) {
                 return Some((trial.guided, q));
             }

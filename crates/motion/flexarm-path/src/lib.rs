@@ -25,7 +25,7 @@ mod targets;
 pub use flexarm_trajectory::{jerk_law, time_law};
 
 pub use curve::{ArcError, TURN_LENGTH, ToolCurve, ToolJet};
-pub use follow::{Blocked, Follower, GuidedJoint, JointJet, ToolWay, coordinates_of};
+pub use follow::{Blocked, Follower, FrameCurve, GuidedJoint, JointJet, coordinates_of};
 pub use plan::{
     ControllerAxis, JointBounds, PathError, PathOptions, Planned, PlannedMove, ProgramArm, Slowed, SlowedBy, plan,
 };

@@ -5,7 +5,7 @@ use flexarm_kinematics::{Data, State, inverse_dynamics};
 use nalgebra::{DVector, Vector3, Vector6};
 
 use crate::curve::ToolJet;
-use crate::jerk_law::{JerkBound, Place};
+use crate::jerk_law::{JerkBound, PathBounds};
 use crate::plan::{JointBounds, ProgramArm, SlowedBy};
 use crate::route::{Piece, Route, Station};
 use crate::time_law::{Bound, Law, PathPoint};
@@ -28,7 +28,7 @@ pub(crate) struct Cap {
 }
 
 /// Bounds of all stations, programmed speeds, and the tightest limits of the robot.
-pub(crate) struct Limited {
+pub(crate) struct LimitedPath {
     pub(crate) points: Vec<PathPoint>,
     pub(crate) programmed: Vec<f64>,
     pub(crate) caps: Vec<Option<Cap>>,
@@ -45,7 +45,7 @@ pub(crate) struct Limits<'a> {
 }
 
 /// Joints and tool at a place, with derivatives by the parameter.
-struct There<'a> {
+struct PathState<'a> {
     q: &'a DVector<f64>,
     d: &'a DVector<f64>,
     dd: &'a DVector<f64>,
@@ -62,7 +62,7 @@ impl<'a> Limits<'a> {
     }
 
     /// Bounds at all stations; a station between two pieces has the bounds of both.
-    pub(crate) fn at_stations(&mut self) -> Limited {
+    pub(crate) fn at_stations(&mut self) -> LimitedPath {
         let route = self.route;
         let n = route.stations.len();
         let mut points: Vec<PathPoint> = route
@@ -80,13 +80,13 @@ impl<'a> Limits<'a> {
                 let dd = if k == first { after } else { before };
                 let ddd = self.rise.map(|_| route.joints(if k == first { k } else { k - 1 }, *s).1);
                 let tool = piece.tool.get(k - first).map(|tool| [tool.V, tool.A]);
-                let there = There { q, d, dd, ddd, tool, travel: piece.travel.get(k - first).copied() };
+                let there = PathState { q, d, dd, ddd, tool, travel: piece.travel.get(k - first).copied() };
                 let point = &mut points[k];
                 let mut at = AtStation { point, programmed: &mut programmed[k], cap: &mut caps[k], jerks: &mut jerks };
                 self.collect(piece, &there, &mut at);
             }
         }
-        Limited { points, programmed, caps }
+        LimitedPath { points, programmed, caps }
     }
 
     /// Adds points between the stations, so that short routes have many.
@@ -97,7 +97,7 @@ impl<'a> Limits<'a> {
             points.push(pair[0].clone());
             for i in 1..parts {
                 let s = pair[0].s + (pair[1].s - pair[0].s) * i as f64 / parts as f64;
-                let Place { x_max, bounds, .. } = self.at(k, s);
+                let PathBounds { x_max, bounds, .. } = self.at(k, s);
                 points.push(PathPoint { s, x_max, bounds });
             }
         }
@@ -133,7 +133,7 @@ impl<'a> Limits<'a> {
     }
 
     /// Bounds at a parameter of the interval between station `k` and the next.
-    pub(crate) fn at(&mut self, k: usize, s: f64) -> Place {
+    pub(crate) fn at(&mut self, k: usize, s: f64) -> PathBounds {
         let piece = &self.route.pieces[self.route.pieces.partition_point(|piece| piece.stations[1] <= k)];
         let (jet, ddd) = self.route.joints(k, s);
         let [a, b] = [k, k + 1].map(|k| self.route.stations[k].s);
@@ -142,15 +142,15 @@ impl<'a> Limits<'a> {
             (!piece.tool.is_empty()).then(|| cubic(&piece.tool[k - first], &piece.tool[k + 1 - first], b - a, s - a));
         let travel = piece.travel.get(k - first).zip(piece.travel.get(k + 1 - first));
         let travel = travel.map(|(from, to)| from + (to - from) * (s - a) / (b - a));
-        let there = There { q: &jet.q, d: &jet.d, dd: &jet.dd, ddd: Some(ddd), tool, travel };
+        let there = PathState { q: &jet.q, d: &jet.d, dd: &jet.dd, ddd: Some(ddd), tool, travel };
         let mut point = PathPoint { s, x_max: f64::INFINITY, bounds: Vec::new() };
         let (mut programmed, mut cap, mut jerks) = (f64::INFINITY, None, Vec::new());
         let mut at = AtStation { point: &mut point, programmed: &mut programmed, cap: &mut cap, jerks: &mut jerks };
         self.collect(piece, &there, &mut at);
-        Place { x_max: point.x_max, bounds: point.bounds, jerks }
+        PathBounds { x_max: point.x_max, bounds: point.bounds, jerks }
     }
 
-    fn collect(&mut self, piece: &Piece, there: &There<'_>, at: &mut AtStation<'_>) {
+    fn collect(&mut self, piece: &Piece, there: &PathState<'_>, at: &mut AtStation<'_>) {
         for (joint, bounds) in self.arm.bounds.iter().enumerate() {
             let name = || self.arm.model.coordinates()[joint].joint.clone();
             at.joint(there.d[joint], there.dd[joint], bounds, piece, &name);
@@ -284,7 +284,7 @@ impl Torques {
         Self { data: Data::new(model), state: State::zeros(model), zero: DVector::zeros(model.nv()) }
     }
 
-    fn add(&mut self, arm: &ProgramArm<'_>, there: &There<'_>, at: &mut AtStation<'_>) {
+    fn add(&mut self, arm: &ProgramArm<'_>, there: &PathState<'_>, at: &mut AtStation<'_>) {
         self.state.q.copy_from(there.q);
         self.state.qdot.fill(0.0);
         let weight = inverse_dynamics(arm.model, &mut self.data, &self.state, &self.zero).clone();

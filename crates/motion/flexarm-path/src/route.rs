@@ -4,9 +4,9 @@ use flexarm_spatial::{Pose, rotation_vector};
 use nalgebra::{DVector, Vector3};
 
 use crate::curve::{TURN_LENGTH, ToolCurve, ToolJet};
-use crate::follow::{Follower, GuidedJoint, JointJet, ToolWay};
+use crate::follow::{Follower, FrameCurve, GuidedJoint, JointJet};
 use crate::jerk_bounded::has_jerks;
-use crate::legs::{Leg, Legs, Way, blocked_error};
+use crate::legs::{Leg, LegPath, Legs, blocked_error};
 use crate::plan::{PathError, PathOptions};
 use crate::program::{Blend, Speed};
 
@@ -82,7 +82,7 @@ enum Corner {
 struct Stretch {
     leg: usize,
     is_blend: bool,
-    way: Way,
+    way: LegPath,
     range: [f64; 2],
     speed: Speed,
 }
@@ -147,7 +147,7 @@ impl Route {
     fn add(&mut self, owner: &mut Legs<'_>, stretch: Stretch) -> Result<(), PathError> {
         let options = owner.options.clone();
         let (points, tool, sigma) = match &stretch.way {
-            Way::Tool(way) => {
+            LegPath::Tool(way) => {
                 let near =
                     self.stations.last().map_or_else(|| self.legs[stretch.leg].q0.clone(), |last| last.q.clone());
                 let follower = owner.follower(&way.frame, &near);
@@ -160,7 +160,7 @@ impl Route {
             _ => (straight(&stretch.way, stretch.range, &options), Vec::new(), None),
         };
         let travel = match (&stretch.way, stretch.speed.linear_m_s) {
-            (Way::Tool(_), _) | (_, None) => Vec::new(),
+            (LegPath::Tool(_), _) | (_, None) => Vec::new(),
             (_, Some(_)) => travel(owner, &self.legs[stretch.leg], &points),
         };
         let origin = self.stations.last().map_or(0.0, |last| last.s) - stretch.range[0];
@@ -200,7 +200,7 @@ fn corner(a: &Leg, b: &Leg, jerks: bool) -> Corner {
     if a.of.blend == Blend::Stop {
         return Corner::Stop("the program stops here");
     }
-    if let (Way::Tool(way), Way::Tool(next)) = (&a.way, &b.way)
+    if let (LegPath::Tool(way), LegPath::Tool(next)) = (&a.way, &b.way)
         && way.frame.X_BF == next.frame.X_BF
     {
         let (end, start) = (way.curve.at(a.length), next.curve.at(0.0));
@@ -250,7 +250,7 @@ fn blend_reach(owner: &mut Legs<'_>, a: &Leg, b: &Leg) -> [f64; 2] {
 fn leave(owner: &mut Legs<'_>, leg: &Leg, distance: f64, at_end: bool) -> f64 {
     // Where the tool only turns, its angle from the corner counts as a length.
     let travels = match &leg.way {
-        Way::Tool(way) => way.curve.at(0.0).V.fixed_rows::<3>(0).norm() > 0.0,
+        LegPath::Tool(way) => way.curve.at(0.0).V.fixed_rows::<3>(0).norm() > 0.0,
         _ => true,
     };
     from_corner(owner, leg, distance, at_end, |X, corner| match travels {
@@ -273,7 +273,7 @@ fn from_corner(owner: &mut Legs<'_>, leg: &Leg, most: f64, at_end: bool, away: i
     let place = |s: f64| if at_end { leg.length - s } else { s };
     let frame = owner.tool_frame(&leg.of);
     let mut pose = |s: f64| match &leg.way {
-        Way::Tool(way) => way.curve.at(place(s)).X,
+        LegPath::Tool(way) => way.curve.at(place(s)).X,
         way => owner.pose(&frame, &joint_jet(way, leg.length, place(s)).q),
     };
     let corner = pose(0.0);
@@ -308,16 +308,16 @@ fn stretches(owner: &mut Legs<'_>, legs: &[Leg], taken: &[[f64; 2]]) -> Result<V
         }
         let length = out + into;
         let way = match (&leg.way, &next.way) {
-            (Way::Tool(way), Way::Tool(other)) if way.frame.X_BF == other.frame.X_BF => {
+            (LegPath::Tool(way), LegPath::Tool(other)) if way.frame.X_BF == other.frame.X_BF => {
                 let (a, b) = (way.curve.at(leg.length - out), other.curve.at(into));
                 let curve = ToolCurve::between(&a, &b, length);
                 let guided = guided_between((way, leg.length - out), (other, into), &leg.q1);
-                Way::Tool(ToolWay { guided, ..ToolWay::new(curve, way.frame.clone()) })
+                LegPath::Tool(FrameCurve { guided, ..FrameCurve::new(curve, way.frame.clone()) })
             }
             _ => {
                 let from = joints_at(owner, leg, leg.length - out, true)?;
                 let to = joints_at(owner, next, into, false)?;
-                Way::Bridge { from, to }
+                LegPath::Bridge { from, to }
             }
         };
         let speed = slower(&leg.of.speed, &next.of.speed);
@@ -328,8 +328,8 @@ fn stretches(owner: &mut Legs<'_>, legs: &[Leg], taken: &[[f64; 2]]) -> Result<V
 
 /// Guided joints on a blend, interpolated between their states at both ends; `corner`: joint values
 /// where both paths meet.
-fn guided_between(a: (&ToolWay, f64), b: (&ToolWay, f64), corner: &DVector<f64>) -> Vec<GuidedJoint> {
-    let at = |(way, s): (&ToolWay, f64), k: usize| {
+fn guided_between(a: (&FrameCurve, f64), b: (&FrameCurve, f64), corner: &DVector<f64>) -> Vec<GuidedJoint> {
+    let at = |(way, s): (&FrameCurve, f64), k: usize| {
         let found = way.guided.iter().find(|joint| joint.k == k);
         found.map_or([corner[k], 0.0, 0.0], |joint| joint.at(way.curve.length(), s))
     };
@@ -342,7 +342,7 @@ fn guided_between(a: (&ToolWay, f64), b: (&ToolWay, f64), corner: &DVector<f64>)
 /// Joints on a leg at a parameter, by continuation from its end or its start.
 fn joints_at(owner: &mut Legs<'_>, leg: &Leg, s: f64, from_end: bool) -> Result<JointJet, PathError> {
     match &leg.way {
-        Way::Tool(way) => {
+        LegPath::Tool(way) => {
             let (origin, q) = if from_end { (leg.length, &leg.q1) } else { (0.0, &leg.q0) };
             let follower = owner.follower(&way.frame, q);
             let found = follower.start(way, origin, q).and_then(|jet| follower.advance(way, origin, &jet, s));
@@ -352,11 +352,11 @@ fn joints_at(owner: &mut Legs<'_>, leg: &Leg, s: f64, from_end: bool) -> Result<
     }
 }
 
-fn joint_jet(way: &Way, length: f64, s: f64) -> JointJet {
+fn joint_jet(way: &LegPath, length: f64, s: f64) -> JointJet {
     match way {
-        Way::Bridge { from, to } => between(from, to, length, s).0,
-        Way::Joints { q0, d } => JointJet { q: q0 + d * s, d: d.clone(), dd: DVector::zeros(d.len()) },
-        Way::Tool(_) => unreachable!("a tool's way has no joints of its own"),
+        LegPath::Bridge { from, to } => between(from, to, length, s).0,
+        LegPath::Joints { q0, d } => JointJet { q: q0 + d * s, d: d.clone(), dd: DVector::zeros(d.len()) },
+        LegPath::Tool(_) => unreachable!("a tool's way has no joints of its own"),
     }
 }
 
@@ -400,7 +400,7 @@ fn intervals(length: f64, options: &PathOptions) -> usize {
 }
 
 /// Points of a path in joint space.
-fn straight(way: &Way, [from, to]: [f64; 2], options: &PathOptions) -> Vec<(f64, JointJet)> {
+fn straight(way: &LegPath, [from, to]: [f64; 2], options: &PathOptions) -> Vec<(f64, JointJet)> {
     let n = intervals(to - from, options);
     let at = |k: usize| from + (to - from) * k as f64 / n as f64;
     (0..=n).map(|k| (at(k), joint_jet(way, to, at(k)))).collect()
@@ -412,7 +412,7 @@ type Walked = (Vec<(f64, JointJet)>, (f64, f64));
 /// and the minimum singular value with its parameter.
 fn walk(
     follower: &mut Follower<'_>,
-    way: &ToolWay,
+    way: &FrameCurve,
     [from, to]: [f64; 2],
     near: &DVector<f64>,
     options: &PathOptions,
@@ -439,7 +439,7 @@ fn walk(
 /// Inserts points between two others until the quintics follow the curve at the midpoints.
 fn refine(
     follower: &mut Follower<'_>,
-    way: &ToolWay,
+    way: &FrameCurve,
     a: &(f64, JointJet),
     b: &(f64, JointJet),
     chord: f64,

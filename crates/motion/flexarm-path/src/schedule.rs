@@ -6,7 +6,7 @@ use nalgebra::DVector;
 use crate::averaged::kept;
 use crate::follow::JointJet;
 use crate::jerk_bounded::{JerkBounded, has_jerks};
-use crate::limits::{Cap, Limited, Limits};
+use crate::limits::{Cap, LimitedPath, Limits};
 use crate::plan::{JointBounds, PathError, PathOptions, PlannedMove, ProgramArm, Slowed, SlowedBy, through};
 use crate::route::{Route, Station, between};
 use crate::time_law::{Law, LawError, Progress};
@@ -111,7 +111,7 @@ impl<'r> Schedule<'r> {
         }
         let rise = has_jerks(arm).then_some(options.rise_s);
         let mut limits = Limits::new(route, arm, rise);
-        let Limited { points, programmed, caps } = limits.at_stations();
+        let LimitedPath { points, programmed, caps } = limits.at_stations();
         let points = if rise.is_none() { limits.divided(&points) } else { points };
         let law = match rise {
             None => kept(&points, route, options.rise_s).map(|(law, stretch)| {
@@ -148,7 +148,7 @@ impl<'r> Schedule<'r> {
         let (wanted, least) = (told.iter().sum::<f64>(), self.duration());
         if wanted < least * (1.0 - SLACK) {
             let why = format!(
-                "a duration of {wanted} s is told, the limits of the robot and the rise of its accelerations ask for {least:.4} s or more"
+                "a duration of {wanted} s is given, but the limits of the robot and the rise of its accelerations require at least {least:.4} s"
             );
             return Err(fail(why));
         }

@@ -5,7 +5,7 @@
 
 use std::path::Path;
 
-use flexarm_path::jerk_law::{JerkBound, Place, QuinticLaw, least_time_with_jerks};
+use flexarm_path::jerk_law::{JerkBound, PathBounds, QuinticLaw, least_time_with_jerks};
 use flexarm_path::time_law::{Bound, Law, PathPoint, least_time};
 use serde_json::Value;
 
@@ -23,12 +23,12 @@ fn numbers(value: &Value) -> Vec<f64> {
 type Joint = [f64; 3];
 
 /// Bounds at a place, from three derivatives of each joint.
-fn place(rates: &[[f64; 3]], joints: &[Joint]) -> Place {
+fn place(rates: &[[f64; 3]], joints: &[Joint]) -> PathBounds {
     let each = || rates.iter().zip(joints);
     let x_max = each().map(|(r, most)| (most[0] / r[0]).powi(2)).fold(f64::INFINITY, f64::min);
     let bounds = each().map(|(r, most)| Bound { a: r[0], b: r[1], low: -most[1], high: most[1] }).collect();
     let jerks = each().map(|(r, most)| JerkBound { a: r[0], b: 3.0 * r[1], c: r[2], most: most[2] }).collect();
-    Place { x_max, bounds, jerks }
+    PathBounds { x_max, bounds, jerks }
 }
 
 /// Time-optimal law of a path over 0 to 1, from derivatives at a parameter of an interval between
@@ -36,7 +36,7 @@ fn place(rates: &[[f64; 3]], joints: &[Joint]) -> Place {
 fn fastest(stations: &[f64], joints: &[Joint], rates: &dyn Fn(usize, f64) -> Vec<[f64; 3]>) -> QuinticLaw {
     let last = stations.len() - 2;
     let point = |(k, s): (usize, &f64)| {
-        let Place { x_max, bounds, .. } = place(&rates(k.min(last), *s), joints);
+        let PathBounds { x_max, bounds, .. } = place(&rates(k.min(last), *s), joints);
         PathPoint { s: *s, x_max, bounds }
     };
     let points: Vec<PathPoint> = stations.iter().enumerate().map(point).collect();

@@ -138,8 +138,9 @@ impl ProgramText {
 
     fn edits_of(&self, item: usize, target: &NewTarget, via: Option<&Vector3<f64>>) -> Result<Edits, &'static str> {
         let sources = self.sources.get(item).ok_or("there is no such move")?;
-        let source =
-            sources.target.ok_or("its target is computed, relative or the end of a told angle, not a literal")?;
+        let source = sources
+            .target
+            .ok_or("its target is computed, relative or the end of an arc given by its angle, not a literal")?;
         let mut edits = self.literal(source, target)?;
         if let Some(via) = via {
             let source = sources.via.ok_or("its auxiliary point is no literal")?;

@@ -141,7 +141,7 @@ fn a_relative_move_from_joint_values_uses_the_kinematics_that_are_given() {
     let text =
         "DEF r()\n$TOOL={X 0,Y 0,Z 100,A 0,B 0,C 0}\nPTP {A1 90,A2 0,A3 0,A4 0,A5 0,A6 0}\nLIN_REL {X 50}\nEND\n";
     let refused = read_text("r.src", text, &ReadOptions::default()).unwrap_err();
-    assert!(refused.starts_with("r.src:4:9: `{X 50}`: what is not told stays"), "{refused}");
+    assert!(refused.starts_with("r.src:4:9: `{X 50}`: what is not given stays"), "{refused}");
     // An arm of one metre that rotates about z.
     let forward = |q: &[f64]| -> Option<Pose> {
         Some(at_mm(1000.0 * q[0].cos(), 1000.0 * q[0].sin(), 0.0, euler_product(q[0].to_degrees(), 0.0, 0.0)))
@@ -176,7 +176,7 @@ fn statements_that_cannot_be_run_are_named_with_place_and_remedy() {
         ),
         (
             "PTP {X 1,Y 2,Z 3,A 0,B 0,C 0}\nPTP {A1 10}",
-            "axis 2 stays or moves on, but the position before was not told in axis values",
+            "axis 2 stays or moves on, but the position before was not given in axis values",
         ),
         ("$VEL_AXIS[2]=50\nPTP {A1 10}", "$VEL_AXIS[] differs between the axes"),
         (

@@ -106,7 +106,9 @@ fn statements_that_cannot_be_run_are_named_with_place_and_remedy() {
     let two = "def a():\n movej([0,0,0,0,0,0])\nend\ndef b():\n movej([0,0,0,0,0,0])\nend\n";
     let error = read_text("t.script", two, &ReadOptions::default()).unwrap_err();
     assert!(
-        error.contains("the file has the definitions `a`, `b` and calls none: tell with which the program starts"),
+        error.contains(
+            "the file has the definitions `a`, `b` and calls none: name the one with which the program starts"
+        ),
         "{error}"
     );
     let options = ReadOptions { entry: Some("b".into()), ..ReadOptions::default() };

@@ -2,7 +2,7 @@
 //! of a cubic spline within its bounds.
 #![allow(non_snake_case, reason = "letters of the formulas")]
 
-use crate::jerk_law::{Place, QuinticLaw};
+use crate::jerk_law::{PathBounds, QuinticLaw};
 use crate::time_law::Progress;
 
 /// Factor by which the weight of the barrier decreases.
@@ -25,7 +25,7 @@ const GAUSS: [(f64, f64); 3] =
 pub(crate) fn improved(
     law: &QuinticLaw,
     gap: [f64; 2],
-    place: &mut dyn FnMut(usize, f64) -> Place,
+    place: &mut dyn FnMut(usize, f64) -> PathBounds,
 ) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
     let problem = Problem::new(law, place);
     let n = law.t.len();
@@ -137,7 +137,7 @@ struct Problem {
 type Banded = Vec<[f64; 4]>;
 
 impl Problem {
-    fn new(law: &QuinticLaw, place: &mut dyn FnMut(usize, f64) -> Place) -> Self {
+    fn new(law: &QuinticLaw, place: &mut dyn FnMut(usize, f64) -> PathBounds) -> Self {
         let spline = Spline::new(&law.t);
         let mut problem = Self { spline, linear: Vec::new(), third: Vec::new(), times: Vec::new() };
         for k in 0..law.t.len() - 1 {
@@ -155,7 +155,7 @@ impl Problem {
     }
 
     /// Adds the bounds at one place of interval `i`.
-    fn keep(&mut self, i: usize, theta: f64, at: &Progress, place: &Place) {
+    fn keep(&mut self, i: usize, theta: f64, at: &Progress, place: &PathBounds) {
         let [y, u, w] = self.spline.at(i, theta);
         let (v, x) = (at.v, at.v * at.v);
         let form = |on_w: f64, on_u: f64, on_y: f64| [0, 1, 2, 3].map(|n| on_w * w[n] + on_u * u[n] + on_y * y[n]);

@@ -23,7 +23,7 @@
 use crate::error::{FileError, TrajectoryError};
 use crate::problem::{Problem, SampleError};
 use crate::spline::{JointSamples, Samples, not_increasing};
-use crate::trajectory::{ToldUnit, Trajectory};
+use crate::trajectory::{StatedUnit, Trajectory};
 use crate::warning::Warning;
 
 /// A joint position above this (two turns) in a file without a unit is probably in degrees.
@@ -114,7 +114,7 @@ fn parse(text: &str) -> Result<Trajectory, Located> {
 
     let samples = assemble(&header, &rows, &units)?;
     let trajectory = samples.interpolate().map_err(|error| placed(error, &samples, &header, &rows))?;
-    let told = samples.joints.iter().filter_map(|joint| units.told(&joint.name)).collect();
+    let told = samples.joints.iter().filter_map(|joint| units.stated_unit(&joint.name)).collect();
     let trajectory = with_doubts(trajectory, &samples, &units).with_told_units(told);
     Ok(if repeated > 0 { trajectory.with_note(Warning::RepeatedRows { count: repeated }) } else { trajectory })
 }
@@ -308,11 +308,11 @@ impl Units {
     }
 
     /// Unit stated for a joint.
-    fn told(&self, joint: &str) -> Option<ToldUnit> {
-        let told = |is_length: bool, line: usize| ToldUnit { joint: joint.to_owned(), is_length, line };
+    fn stated_unit(&self, joint: &str) -> Option<StatedUnit> {
+        let unit = |is_length: bool, line: usize| StatedUnit { joint: joint.to_owned(), is_length, line };
         match self.metres.iter().find(|(_, name)| name == joint) {
-            Some((line, _)) => Some(told(true, *line)),
-            None => (self.degrees == Some(true)).then(|| told(false, self.line)),
+            Some((line, _)) => Some(unit(true, *line)),
+            None => (self.degrees == Some(true)).then(|| unit(false, self.line)),
         }
     }
 

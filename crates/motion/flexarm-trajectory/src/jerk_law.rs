@@ -40,7 +40,7 @@ pub struct JerkBound {
 
 /// Bounds at one place of a path.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Place {
+pub struct PathBounds {
     /// Maximum squared speed; infinite if only the bounds below apply.
     pub x_max: f64,
     /// Linear bounds.
@@ -49,7 +49,7 @@ pub struct Place {
     pub jerks: Vec<JerkBound>,
 }
 
-impl Place {
+impl PathBounds {
     /// Tightens the bounds for a run that passes them by the given factors of speed: `linear` for
     /// the bounds without jerk, `jerk` for those of jerk.
     #[must_use]
@@ -140,7 +140,7 @@ pub fn least_time_with_jerks(
     law: &Law,
     stations: &[f64],
     rise: f64,
-    place: &mut dyn FnMut(usize, f64) -> Place,
+    place: &mut dyn FnMut(usize, f64) -> PathBounds,
 ) -> QuinticLaw {
     let step = |duration: f64| (rise / OF_RISE).min(duration / LEAST).max(duration / MOST);
     let mut law = QuinticLaw::along(law, stations, ROUNDS[0].0 * step(law.duration()));
@@ -283,7 +283,7 @@ impl QuinticLaw {
     /// the places at which [`QuinticLaw::improved`] enforces them; at most 1 where it keeps them.
     ///
     /// * `place`: bounds at a parameter of interval `k`.
-    pub fn slowing(&self, place: &mut dyn FnMut(usize, f64) -> Place) -> Vec<[f64; 2]> {
+    pub fn slowing(&self, place: &mut dyn FnMut(usize, f64) -> PathBounds) -> Vec<[f64; 2]> {
         let mut of = |k: usize, parts: usize| {
             let h = (self.t[k + 1] - self.t[k]) / parts as f64;
             let at = (0..=parts).map(|i| self.within(k, h * i as f64));
@@ -304,7 +304,7 @@ impl QuinticLaw {
     /// * `place`: bounds at a parameter of interval `k`; rest must be admissible everywhere.
     /// * `gap`: relative gap to the optimal duration at the start and at the end of the search.
     #[must_use]
-    pub fn improved(&self, gap: [f64; 2], place: &mut dyn FnMut(usize, f64) -> Place) -> Self {
+    pub fn improved(&self, gap: [f64; 2], place: &mut dyn FnMut(usize, f64) -> PathBounds) -> Self {
         let (t, v, a) = barrier::improved(self, gap, place);
         Self { t, s: self.s.clone(), v, a }
     }
@@ -370,7 +370,7 @@ mod tests {
             (2.0, [1.0, 5.0, 1000.0]),
         ];
         for (length, [v, a, j]) in cases {
-            let mut place = |_: usize, _: f64| Place {
+            let mut place = |_: usize, _: f64| PathBounds {
                 x_max: v * v,
                 bounds: vec![Bound { a: 1.0, b: 0.0, low: -a, high: a }],
                 jerks: vec![JerkBound { a: 1.0, b: 0.0, c: 0.0, most: j }],
@@ -395,7 +395,7 @@ mod tests {
         let [v, a, j] = [0.8, 2.0, 10.0];
         let mut place = |_: usize, s: f64| {
             let rate = 1.0 + 2.0 * s;
-            Place {
+            PathBounds {
                 x_max: (v / rate).powi(2),
                 bounds: vec![Bound { a: rate, b: 2.0, low: -a, high: a }],
                 jerks: vec![JerkBound { a: rate, b: 6.0, c: 0.0, most: j }],

@@ -3,7 +3,7 @@
 //! The path is the natural cubic spline through the points over chord length; [`crate::jerk_law`]
 //! computes the time law.
 
-use crate::jerk_law::{JerkBound, Place, least_time_with_jerks};
+use crate::jerk_law::{JerkBound, PathBounds, least_time_with_jerks};
 use crate::plan::MotionLimits;
 use crate::polynomial::Piece;
 use crate::spline::natural_spline;
@@ -57,8 +57,8 @@ impl<'a> JointPath<'a> {
     }
 
     /// Bounds at a place; a joint that does not move there adds none.
-    fn place(&self, interval: usize, s: f64) -> Place {
-        let mut place = Place { x_max: f64::INFINITY, ..Place::default() };
+    fn place(&self, interval: usize, s: f64) -> PathBounds {
+        let mut place = PathBounds { x_max: f64::INFINITY, ..PathBounds::default() };
         for ([_, d, dd, ddd], limit) in self.at(interval, s).zip(self.limits) {
             if [d, dd, ddd] == [0.0; 3] {
                 continue;
@@ -79,7 +79,7 @@ impl<'a> JointPath<'a> {
         let mut stations: Vec<f64> = (0..intervals).flat_map(|k| (0..parts).map(move |i| part(k, i))).collect();
         stations.push(self.s[intervals]);
         let point = |(k, s): (usize, &f64)| {
-            let Place { x_max, bounds, .. } = self.place((k / parts).min(intervals - 1), *s);
+            let PathBounds { x_max, bounds, .. } = self.place((k / parts).min(intervals - 1), *s);
             PathPoint { s: *s, x_max, bounds }
         };
         let points: Vec<PathPoint> = stations.iter().enumerate().map(point).collect();

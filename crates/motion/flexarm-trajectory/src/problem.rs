@@ -194,7 +194,7 @@ pub enum Problem {
     },
     /// Several time columns recognised.
     #[error(
-        "the columns {} are all times; tell which one counts: {} t=<column>,<joint>=<column>",
+        "the columns {} are all times; name the one that counts: {} t=<column>,<joint>=<column>",
         list(columns),
         Setting::Columns
     )]

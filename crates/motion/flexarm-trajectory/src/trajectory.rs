@@ -31,12 +31,12 @@ pub struct Trajectory {
     /// Notes of the reader or planner; see [`Trajectory::warnings`].
     notes: Vec<Warning>,
     /// Units that the file states for its joints.
-    told: Vec<ToldUnit>,
+    told: Vec<StatedUnit>,
 }
 
 /// Unit that a file states for a joint: degrees, or metres.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct ToldUnit {
+pub(crate) struct StatedUnit {
     pub(crate) joint: String,
     pub(crate) is_length: bool,
     /// Line of the statement, from 1.
@@ -368,10 +368,10 @@ impl Trajectory {
     /// [`TrajectoryError::File`] for a prismatic joint whose values were read as degrees, and for a
     /// revolute one whose values were read as metres.
     pub fn check_units(&self, origin: &str, joints: &[KnownJoint<'_>]) -> Result<(), TrajectoryError> {
-        let contradicts = |told: &ToldUnit| {
+        let contradicts = |told: &StatedUnit| {
             joints.iter().any(|joint| joint.name == told.joint && joint.is_prismatic != told.is_length)
         };
-        let Some(ToldUnit { joint, is_length, line }) = self.told.iter().find(|told| contradicts(told)) else {
+        let Some(StatedUnit { joint, is_length, line }) = self.told.iter().find(|told| contradicts(told)) else {
             return Ok(());
         };
         let problem = Problem::UnitOfJoint { joint: joint.clone(), is_length: *is_length };
@@ -379,7 +379,7 @@ impl Trajectory {
         Err(Box::new(FileError { origin, line: Some(*line), column: None, problem, more_lines }).into())
     }
 
-    pub(crate) fn with_told_units(self, told: Vec<ToldUnit>) -> Self {
+    pub(crate) fn with_told_units(self, told: Vec<StatedUnit>) -> Self {
         Self { told, ..self }
     }
 

@@ -12,7 +12,7 @@ use crate::limits::JointLimits;
 use crate::plan::{MotionLimits, Plan, PlannedMove, Profile};
 use crate::polynomial::FARTHEST;
 use crate::problem::Problem;
-use crate::trajectory::{LONGEST, ToldUnit};
+use crate::trajectory::{LONGEST, StatedUnit};
 use crate::waypoints_toml::{FileToml, LawToml, MoveToml, ProfileToml, Values};
 
 /// Default rounding of trapezoids.
@@ -106,13 +106,13 @@ pub(crate) fn told_units(
     metres: &[Spanned<String>],
     joints: &Spanned<Vec<Spanned<String>>>,
     line: impl Fn(usize) -> usize,
-) -> Vec<ToldUnit> {
+) -> Vec<StatedUnit> {
     let told = |name: &Spanned<String>| {
         let joint = name.get_ref().clone();
         match metres.iter().find(|entry| *entry.get_ref() == joint) {
-            Some(entry) => Some(ToldUnit { joint, is_length: true, line: line(entry.span().start) }),
+            Some(entry) => Some(StatedUnit { joint, is_length: true, line: line(entry.span().start) }),
             None if unit.get_ref() == "deg" => {
-                Some(ToldUnit { joint, is_length: false, line: line(unit.span().start) })
+                Some(StatedUnit { joint, is_length: false, line: line(unit.span().start) })
             }
             None => None,
         }

@@ -243,7 +243,7 @@ fn what_a_table_leaves_open_is_refused_with_its_place() {
         ("a;joint_1[deg]\n0;1\n1;2\n", "f, line 1: no column of the header \"a\", \"joint_1[deg]\" is a time"),
         (
             "t;time;joint_1[deg]\n0;0;1\n1;1;2\n",
-            "f, line 1: the columns \"t\", \"time\" are all times; tell which one counts: columns t=<column>",
+            "f, line 1: the columns \"t\", \"time\" are all times; name the one that counts: columns t=<column>",
         ),
         (
             "t[s];x;y\n0;1;1\n1;2;2\n",

@@ -336,11 +336,11 @@ mod tests {
 
     #[test]
     fn numbers_that_make_no_shaper_are_named() {
-        let told = |modes: &[ShapedMode], delay, band| Shaper::optimal(modes, delay, band).unwrap_err().to_string();
-        assert!(told(&[], 0.1, 0.1).contains("at least one"));
-        assert!(told(&[mode(7.0, 0.0)], -0.1, 0.1).contains("positive time"));
-        assert!(told(&[mode(7.0, 0.0)], 0.1, 0.7).contains("from 0 to 0.5"));
-        assert!(told(&[mode(7.0, 1.2)], 0.1, 0.1).contains("below 1"));
-        assert!(told(&[mode(700.0, 0.1)], 1.0, 0.1).contains("at most 25"));
+        let message = |modes: &[ShapedMode], delay, band| Shaper::optimal(modes, delay, band).unwrap_err().to_string();
+        assert!(message(&[], 0.1, 0.1).contains("at least one"));
+        assert!(message(&[mode(7.0, 0.0)], -0.1, 0.1).contains("positive time"));
+        assert!(message(&[mode(7.0, 0.0)], 0.1, 0.7).contains("from 0 to 0.5"));
+        assert!(message(&[mode(7.0, 1.2)], 0.1, 0.1).contains("below 1"));
+        assert!(message(&[mode(700.0, 0.1)], 1.0, 0.1).contains("at most 25"));
     }
 }

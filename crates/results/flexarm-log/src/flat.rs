@@ -25,12 +25,12 @@ pub fn flat_columns(columns: &Columns) -> Vec<(String, Vec<f64>)> {
 }
 
 /// Signal, and index of the number within it, that make up a column.
-struct Place {
+struct ColumnSource {
     signal: &'static str,
     number: usize,
 }
 
-impl Place {
+impl ColumnSource {
     fn numbers(&self, columns: &Columns) -> Vec<f64> {
         let Some(column) = columns.column(self.signal) else { return Vec::new() };
         column.values.iter().skip(self.number).step_by(column.width.max(1)).copied().collect()
@@ -38,10 +38,10 @@ impl Place {
 }
 
 /// Returns the places in the order of [`table::columns`].
-fn places(columns: &Columns, has_rigid: bool) -> Vec<Place> {
+fn places(columns: &Columns, has_rigid: bool) -> Vec<ColumnSource> {
     let mut places = Vec::new();
     let mut take = |signal, numbers: std::ops::Range<usize>| {
-        places.extend(numbers.map(|number| Place { signal, number }));
+        places.extend(numbers.map(|number| ColumnSource { signal, number }));
     };
     take("time", 0..1);
     if has_rigid {

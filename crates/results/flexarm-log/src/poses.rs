@@ -9,7 +9,7 @@ const EVERY_NS: u64 = 5_000_000;
 
 /// Reasons to write the poses of a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Shown {
+pub(crate) struct PoseReasons {
     /// Whether a pose is due.
     pub(crate) due: bool,
     /// Whether the error exceeds that of all previous samples.
@@ -28,7 +28,7 @@ pub(crate) struct PoseClock {
 impl PoseClock {
     /// Takes a sample at a time since the start of the run (ns). Without a rigid twin (`has_rigid`)
     /// there is no error.
-    pub(crate) fn take(&mut self, since_start_ns: u64, sample: &Sample, has_rigid: bool) -> Shown {
+    pub(crate) fn take(&mut self, since_start_ns: u64, sample: &Sample, has_rigid: bool) -> PoseReasons {
         let due = self.last_ns.is_none_or(|last| since_start_ns.saturating_sub(last) >= EVERY_NS);
         if due {
             self.last_ns = Some(since_start_ns);
@@ -38,7 +38,7 @@ impl PoseClock {
         if new_peak {
             self.largest_m = Some(error_m);
         }
-        Shown { due, new_peak }
+        PoseReasons { due, new_peak }
     }
 }
 
@@ -53,7 +53,7 @@ mod tests {
     #[test]
     fn of_fast_samples_two_hundred_a_second_are_shown_and_those_with_a_larger_error_than_before() {
         let mut clock = PoseClock::default();
-        let shown: Vec<Shown> = (0..=20_u64)
+        let shown: Vec<PoseReasons> = (0..=20_u64)
             .map(|ms| {
                 let error = if ms < 8 { 1e-3 * ms as f64 } else { 0.0 };
                 let sample = Sample { error_world: [error, 0.0, 0.0, 1.0, 1.0, 1.0], ..Sample::default() };
@@ -61,7 +61,7 @@ mod tests {
             })
             .collect();
         let which =
-            |of: &dyn Fn(&Shown) -> bool| -> Vec<usize> { (0..shown.len()).filter(|k| of(&shown[*k])).collect() };
+            |of: &dyn Fn(&PoseReasons) -> bool| -> Vec<usize> { (0..shown.len()).filter(|k| of(&shown[*k])).collect() };
         assert_eq!(which(&|shown| shown.due), [0, 5, 10, 15, 20]);
         assert_eq!(which(&|shown| shown.new_peak), [0, 1, 2, 3, 4, 5, 6, 7]);
     }

@@ -134,7 +134,7 @@ fn a_recorder_that_fails_on_its_thread_is_told_and_the_others_have_all_samples()
             if let Err(error) = set.record(&synthetic::sample(samples % synthetic::SAMPLES)) {
                 break error;
             }
-            assert!(samples < 1_000_000, "nothing is told");
+            assert!(samples < 1_000_000, "nothing is reported");
         };
         assert!(matches!(told, LogError::Io { .. }), "{told}");
         if finished {

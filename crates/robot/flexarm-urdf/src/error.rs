@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use flexarm_settings::Setting;
 
-use crate::finding::{Finding, Place, Severity};
+use crate::finding::{Finding, Severity, TextPosition};
 
 /// Error of reading a robot description.
 #[derive(Debug, thiserror::Error)]
@@ -70,7 +70,7 @@ fn listed(issues: &[Issue]) -> String {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct XacroError {
     /// Place of the element.
-    pub place: Place,
+    pub place: TextPosition,
     /// Description of the problem.
     pub message: String,
     /// Remedy; may be empty.
@@ -100,7 +100,7 @@ impl std::error::Error for XacroError {}
 #[derive(Clone, Debug, PartialEq)]
 pub struct Issue {
     /// Place of the fault.
-    pub place: Place,
+    pub place: TextPosition,
     /// The fault.
     pub problem: Problem,
 }

@@ -14,7 +14,7 @@ use flexarm_kinematics::{LinkInertia, SpatialInertia, moment_floor};
 use nalgebra::{Matrix3, Vector3};
 
 use crate::error::Problem;
-use crate::finding::Place;
+use crate::finding::TextPosition;
 use crate::mesh::MassProperties;
 use crate::raw::{RawInertial, RawRobot};
 use crate::read::{InertiaEstimate, ReadOptions};
@@ -158,7 +158,7 @@ fn check_moments(
 
 /// Warns about joints that move no mass, whose inertia is missing in the results. Many such joints
 /// give one warning.
-fn tell_massless(robot: &RawRobot, massless: Vec<(Place, Problem)>, report: &mut Report) {
+fn tell_massless(robot: &RawRobot, massless: Vec<(TextPosition, Problem)>, report: &mut Report) {
     const MOST: usize = 3;
     if massless.len() <= MOST {
         for (place, problem) in massless {
@@ -187,7 +187,7 @@ fn check_body(
     failures: &[Option<String>],
     options: &ReadOptions,
     report: &mut Report,
-) -> Option<(Place, Problem)> {
+) -> Option<(TextPosition, Problem)> {
     let joint = body.moved_by.map(|j| robot.joints[j].urdf.name.clone())?;
     let root = &robot.links[body.root];
     let link = root.name.clone();

@@ -7,7 +7,7 @@ use nalgebra::{Rotation3, Translation3, Unit, Vector3};
 use urdf_rs::JointType;
 
 use crate::error::Problem;
-use crate::finding::Place;
+use crate::finding::TextPosition;
 use crate::raw::{RawJoint, RawRobot};
 use crate::report::Report;
 use flexarm_settings::closest;
@@ -112,7 +112,7 @@ fn axis(raw: &RawJoint, report: &mut Report) -> Unit<Vector3<f64>> {
     unit
 }
 
-fn limits(raw: &RawJoint, place: &Place, report: &mut Report) -> Limits {
+fn limits(raw: &RawJoint, place: &TextPosition, report: &mut Report) -> Limits {
     let (name, limit) = (&raw.urdf.name, &raw.urdf.limit);
     let mut limits = Limits::NONE;
     if raw.urdf.joint_type != JointType::Continuous {

@@ -66,7 +66,7 @@ mod xacro;
 mod xml;
 
 pub use error::{Issue, Problem, UrdfError, XacroError};
-pub use finding::{Finding, Place, Severity};
+pub use finding::{Finding, Severity, TextPosition};
 pub use flexarm_settings::closest;
 pub use geometry::{Geometry, Visual};
 pub use mesh::{

@@ -3,7 +3,7 @@
 //!
 //! Start at [`lint`]. The values of a robot come from `urdf_rs`. It drops words of a vector that
 //! are not numbers, treats a missing `<inertial>` as zeros, stops at the first fault and has no
-//! line numbers. The lint reports such faults with their places. It then writes a [`Plain`] text
+//! line numbers. The lint reports such faults with their places. It then writes a [`PlainUrdf`] text
 //! with the elements and attributes that a mechanism needs, as they are in the file, without
 //! prefixes and with only the first of each element that may occur once. This has three reasons:
 //!
@@ -18,7 +18,7 @@
 //!   plain text has the default or omits the element. A `<collision>` with a fault is omitted.
 //!
 //! The model takes four things from the tree that `urdf_rs::Robot` does not contain: the places of
-//! elements and whether they exist ([`Mark`]), the transmissions, the version (a bound that URDF
+//! elements and whether they exist ([`OriginMark`]), the transmissions, the version (a bound that URDF
 //! 1.2 leaves open is written as infinite, as `urdf_rs` does itself), and `quat_xyzw`, which
 //! `urdf_rs` converts to angles that are wrong by up to 0.3 degrees near a pitch of 90.
 //!
@@ -30,7 +30,7 @@ use nalgebra::{Quaternion, UnitQuaternion};
 use roxmltree::Node;
 
 use crate::error::Problem;
-use crate::finding::Place;
+use crate::finding::TextPosition;
 use crate::read::Transmission;
 use crate::report::Report;
 use crate::xml::{Lines, escaped};
@@ -72,17 +72,17 @@ const JOINT_CHILDREN: [&str; 11] = [
 ];
 
 /// Text for `urdf_rs`, and a mark for each of its links and joints, in the same order.
-pub(crate) struct Plain {
+pub(crate) struct PlainUrdf {
     pub(crate) text: String,
-    pub(crate) place: Place,
+    pub(crate) place: TextPosition,
     pub(crate) links: Vec<LinkMarks>,
     pub(crate) joints: Vec<JointMarks>,
     pub(crate) transmissions: Vec<Transmission>,
 }
 
 /// Marks of an element that may have an `<origin>`.
-pub(crate) struct Mark {
-    pub(crate) place: Place,
+pub(crate) struct OriginMark {
+    pub(crate) place: TextPosition,
     /// Rotation of `<origin>` if it is not given by `rpy`: from a quaternion, or the identity if
     /// there is no origin.
     pub(crate) quaternion: Option<UnitQuaternion<f64>>,
@@ -92,18 +92,18 @@ pub(crate) struct Mark {
 
 /// Elements of a link in the tree; `None` if an element does not exist.
 pub(crate) struct LinkMarks {
-    pub(crate) place: Place,
-    pub(crate) inertial: Option<Mark>,
-    pub(crate) visuals: Vec<Mark>,
-    pub(crate) collisions: Vec<Mark>,
+    pub(crate) place: TextPosition,
+    pub(crate) inertial: Option<OriginMark>,
+    pub(crate) visuals: Vec<OriginMark>,
+    pub(crate) collisions: Vec<OriginMark>,
 }
 
 /// Elements of a joint in the tree; `None` if an element does not exist.
 pub(crate) struct JointMarks {
-    pub(crate) joint: Mark,
-    pub(crate) axis: Option<Place>,
-    pub(crate) limit: Option<Place>,
-    pub(crate) mimic: Option<Place>,
+    pub(crate) joint: OriginMark,
+    pub(crate) axis: Option<TextPosition>,
+    pub(crate) limit: Option<TextPosition>,
+    pub(crate) mimic: Option<TextPosition>,
 }
 
 /// Kind of value of an attribute.
@@ -165,7 +165,7 @@ type Attribute = (&'static str, Kind, Missing);
 
 /// Reports the faults of everything below `<robot>`. Returns `None` if the root is another element,
 /// or there are too many links and joints.
-pub(crate) fn lint(root: Node<'_, '_>, lines: &Lines<'_>, report: &mut Report) -> Option<Plain> {
+pub(crate) fn lint(root: Node<'_, '_>, lines: &Lines<'_>, report: &mut Report) -> Option<PlainUrdf> {
     let place = lines.of(root);
     if root.tag_name().name() != "robot" {
         report.error(&place, Problem::NotUrdf { root: root.tag_name().name().to_owned() });
@@ -204,7 +204,7 @@ struct Lint<'a, 't> {
 }
 
 impl Lint<'_, '_> {
-    fn robot(mut self, root: Node<'_, '_>, place: Place) -> Plain {
+    fn robot(mut self, root: Node<'_, '_>, place: TextPosition) -> PlainUrdf {
         let (mut links, mut joints, mut transmissions) = (Vec::new(), Vec::new(), Vec::new());
         let name = root.attribute("name").unwrap_or("");
         if name.is_empty() {
@@ -223,7 +223,7 @@ impl Lint<'_, '_> {
             self.owner.replace_range(.., "the robot");
         }
         self.end("robot");
-        Plain { text: self.text, place, links, joints, transmissions }
+        PlainUrdf { text: self.text, place, links, joints, transmissions }
     }
 
     fn link(&mut self, node: Node<'_, '_>) -> Option<LinkMarks> {
@@ -245,7 +245,7 @@ impl Lint<'_, '_> {
         Some(LinkMarks { place: self.lines.of(node), inertial, visuals, collisions })
     }
 
-    fn inertial(&mut self, node: Node<'_, '_>) -> Mark {
+    fn inertial(&mut self, node: Node<'_, '_>) -> OriginMark {
         let faults = self.report.issues.len();
         self.start("inertial", &[]);
         let quaternion = self.origin(node);
@@ -253,12 +253,12 @@ impl Lint<'_, '_> {
         let moment = |name| (name, Numbers(1), Fault);
         self.child(node, "inertia", true, &["ixx", "ixy", "ixz", "iyy", "iyz", "izz"].map(moment));
         self.end("inertial");
-        Mark { place: self.lines.of(node), quaternion, faulty: self.report.issues.len() > faults }
+        OriginMark { place: self.lines.of(node), quaternion, faulty: self.report.issues.len() > faults }
     }
 
     /// Writes a `<visual>` or `<collision>`. Omits one that cannot be drawn, and a collision with
     /// any fault.
-    fn shape(&mut self, node: Node<'_, '_>) -> Option<Mark> {
+    fn shape(&mut self, node: Node<'_, '_>) -> Option<OriginMark> {
         let (faults, start, tag) = (self.report.issues.len(), self.text.len(), node.tag_name().name());
         let name = node.attribute("name").map(|name| ("name", name));
         self.start(tag, name.as_slice());
@@ -268,7 +268,7 @@ impl Lint<'_, '_> {
             self.material(material);
         }
         self.end(tag);
-        let mark = Mark { place: self.lines.of(node), quaternion, faulty: self.report.issues.len() > faults };
+        let mark = OriginMark { place: self.lines.of(node), quaternion, faulty: self.report.issues.len() > faults };
         if !drawn || (mark.faulty && tag == "collision") {
             self.text.truncate(start);
             return None;
@@ -343,7 +343,7 @@ impl Lint<'_, '_> {
         self.child(node, "dynamics", false, &dynamics);
         self.end("joint");
         let faulty = self.report.issues.len() > faults;
-        let joint = Mark { place: self.lines.of(node), quaternion, faulty };
+        let joint = OriginMark { place: self.lines.of(node), quaternion, faulty };
         Some(JointMarks { joint, axis, limit, mimic })
     }
 
@@ -389,7 +389,13 @@ impl Lint<'_, '_> {
 
     /// Writes the first child of this name and returns its place. A missing required child is
     /// written with zeros.
-    fn child(&mut self, node: Node<'_, '_>, name: &'static str, must: bool, attributes: &[Attribute]) -> Option<Place> {
+    fn child(
+        &mut self,
+        node: Node<'_, '_>,
+        name: &'static str,
+        must: bool,
+        attributes: &[Attribute],
+    ) -> Option<TextPosition> {
         let found = if must { self.needed(node, name) } else { named(node, name) };
         if let Some(child) = found {
             self.element(child, &format!("{}, <{name}>", self.owner), attributes);

@@ -12,15 +12,15 @@ use roxmltree::Node;
 use urdf_rs::JointType;
 
 use crate::error::Problem;
-use crate::finding::Place;
-use crate::lint::{JointMarks, Mark, Plain, lint};
+use crate::finding::TextPosition;
+use crate::lint::{JointMarks, OriginMark, PlainUrdf, lint};
 use crate::read::Transmission;
 use crate::report::Report;
 use crate::xml::Lines;
 
 pub(crate) struct RawRobot {
     pub(crate) name: String,
-    pub(crate) place: Place,
+    pub(crate) place: TextPosition,
     /// Macros defined in a file that calls none of them.
     pub(crate) idle_macros: Vec<String>,
     pub(crate) links: Vec<RawLink>,
@@ -32,7 +32,7 @@ pub(crate) struct RawRobot {
 
 pub(crate) struct RawLink {
     pub(crate) name: String,
-    pub(crate) place: Place,
+    pub(crate) place: TextPosition,
     pub(crate) inertial: Option<RawInertial>,
     pub(crate) visuals: Vec<RawVisual>,
     /// Shapes of readable `<collision>` elements; faults of others are not reported.
@@ -41,7 +41,7 @@ pub(crate) struct RawLink {
 
 /// Mass and inertia about the centre of mass, in axes I; `X_LI` as written.
 pub(crate) struct RawInertial {
-    pub(crate) place: Place,
+    pub(crate) place: TextPosition,
     pub(crate) X_LI: Pose,
     pub(crate) mass: f64,
     pub(crate) inertia_I: Matrix3<f64>,
@@ -50,7 +50,7 @@ pub(crate) struct RawInertial {
 }
 
 pub(crate) struct RawVisual {
-    pub(crate) place: Place,
+    pub(crate) place: TextPosition,
     pub(crate) X_LV: Pose,
     /// Visual, or a collision converted to a visual without material.
     pub(crate) urdf: urdf_rs::Visual,
@@ -59,13 +59,13 @@ pub(crate) struct RawVisual {
 pub(crate) struct RawJoint {
     pub(crate) urdf: urdf_rs::Joint,
     pub(crate) X_PJ: Pose,
-    pub(crate) place: Place,
+    pub(crate) place: TextPosition,
     /// Place of `<axis>`; `None` if it is missing and `urdf` has the default.
-    pub(crate) axis: Option<Place>,
+    pub(crate) axis: Option<TextPosition>,
     /// Place of `<limit>`; `None` if it is missing and `urdf` has zeros.
-    pub(crate) limit: Option<Place>,
+    pub(crate) limit: Option<TextPosition>,
     /// Place of `<mimic>`, or of the joint if there is none.
-    pub(crate) mimic: Place,
+    pub(crate) mimic: TextPosition,
     /// Whether some part could not be read; disables further checks.
     pub(crate) faulty: bool,
 }
@@ -89,7 +89,7 @@ pub(crate) fn read_robot(root: Node<'_, '_>, lines: &Lines<'_>, report: &mut Rep
 }
 
 impl RawRobot {
-    fn new(urdf: urdf_rs::Robot, plain: Plain) -> Self {
+    fn new(urdf: urdf_rs::Robot, plain: PlainUrdf) -> Self {
         // A material may be defined inside a visual and used by name elsewhere.
         let of_visuals = urdf.links.iter().flat_map(|l| &l.visual).filter_map(|v| v.material.as_ref()).rev();
         let all = of_visuals.chain(&urdf.materials);
@@ -125,7 +125,7 @@ impl RawRobot {
 }
 
 impl RawInertial {
-    fn new(urdf: &urdf_rs::Inertial, mark: Mark) -> Self {
+    fn new(urdf: &urdf_rs::Inertial, mark: OriginMark) -> Self {
         let i = &urdf.inertia;
         let inertia_I = Matrix3::new(i.ixx, i.ixy, i.ixz, i.ixy, i.iyy, i.iyz, i.ixz, i.iyz, i.izz);
         let X_LI = pose(&urdf.origin, &mark);
@@ -133,12 +133,12 @@ impl RawInertial {
     }
 }
 
-fn shapes(urdf: impl Iterator<Item = urdf_rs::Visual>, marks: Vec<Mark>) -> Vec<RawVisual> {
+fn shapes(urdf: impl Iterator<Item = urdf_rs::Visual>, marks: Vec<OriginMark>) -> Vec<RawVisual> {
     urdf.zip(marks).map(|(urdf, mark)| RawVisual { X_LV: pose(&urdf.origin, &mark), place: mark.place, urdf }).collect()
 }
 
 /// Returns the pose of `<origin xyz rpy>`: R = Rz(yaw) Ry(pitch) Rx(roll).
-fn pose(origin: &urdf_rs::Pose, mark: &Mark) -> Pose {
+fn pose(origin: &urdf_rs::Pose, mark: &OriginMark) -> Pose {
     let [roll, pitch, yaw] = *origin.rpy;
     let rotation = match mark.quaternion {
         Some(quaternion) => quaternion.to_rotation_matrix(),

@@ -1,7 +1,7 @@
 //! Collects the findings of the checks, so that all faults are reported together.
 
 use crate::error::{Issue, Problem};
-use crate::finding::{Finding, Place, Severity};
+use crate::finding::{Finding, Severity, TextPosition};
 
 /// Faults, warnings and notes about one file.
 #[derive(Default)]
@@ -13,19 +13,25 @@ pub(crate) struct Report {
 }
 
 impl Report {
-    pub(crate) fn error(&mut self, place: &Place, problem: Problem) {
+    pub(crate) fn error(&mut self, place: &TextPosition, problem: Problem) {
         self.issues.push(Issue { place: place.clone(), problem });
     }
 
-    pub(crate) fn warning(&mut self, place: &Place, code: &'static str, message: String, help: impl Into<String>) {
+    pub(crate) fn warning(
+        &mut self,
+        place: &TextPosition,
+        code: &'static str,
+        message: String,
+        help: impl Into<String>,
+    ) {
         self.remark(Severity::Warning, place, code, message, help.into());
     }
 
-    pub(crate) fn note(&mut self, place: &Place, code: &'static str, message: String, help: impl Into<String>) {
+    pub(crate) fn note(&mut self, place: &TextPosition, code: &'static str, message: String, help: impl Into<String>) {
         self.remark(Severity::Note, place, code, message, help.into());
     }
 
-    fn remark(&mut self, severity: Severity, place: &Place, code: &'static str, message: String, help: String) {
+    fn remark(&mut self, severity: Severity, place: &TextPosition, code: &'static str, message: String, help: String) {
         let location = format!("{}:{}", place.file.display(), place.line);
         self.remarks.push((place.line, Finding { severity, code, location, message, help }));
     }

@@ -7,7 +7,7 @@ use flexarm_kinematics::Pose;
 use nalgebra::{Point3, Vector3};
 use urdf_rs::Geometry as Shape;
 
-use crate::finding::Place;
+use crate::finding::TextPosition;
 use crate::geometry::{Geometry, Visual};
 use crate::mesh::{MassProperties, TriangleMesh, UpAxis, load_with_remarks};
 use crate::raw::{RawRobot, RawVisual, color};
@@ -120,7 +120,7 @@ pub(crate) fn unknown(robot: &RawRobot) -> Vec<LinkShape> {
     robot.links.iter().map(|_| unknown()).collect()
 }
 
-fn check_size(link: &str, place: &Place, bounds: Option<(Vector3<f64>, Vector3<f64>)>, report: &mut Report) {
+fn check_size(link: &str, place: &TextPosition, bounds: Option<(Vector3<f64>, Vector3<f64>)>, report: &mut Report) {
     let Some((low, high)) = bounds else { return };
     let size = (high - low).norm();
     if size > LARGE {
@@ -145,7 +145,7 @@ impl Meshes {
     fn look_into(
         &mut self,
         visual: &Visual,
-        place: &Place,
+        place: &TextPosition,
         report: &mut Report,
     ) -> Result<(Bounds, MassProperties), String> {
         let (low_V, high_V, properties) = match &visual.geometry {
@@ -176,7 +176,7 @@ impl Meshes {
         path: &Path,
         up_axis: UpAxis,
         link: &str,
-        place: &Place,
+        place: &TextPosition,
         report: &mut Report,
     ) -> &Result<TriangleMesh, String> {
         self.loaded.entry(path.to_owned()).or_insert_with(|| match load_with_remarks(path, up_axis) {

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use roxmltree::{Document, Error, Node};
 
 use crate::error::{Issue, Problem};
-use crate::finding::Place;
+use crate::finding::TextPosition;
 
 /// Start offsets of all lines, to convert byte offsets to places without scanning the text each
 /// time.
@@ -16,7 +16,7 @@ pub(crate) struct Lines<'t> {
     text: &'t str,
     starts: Vec<usize>,
     /// Origin of each line, if the text was generated from other files.
-    origins: &'t [Place],
+    origins: &'t [TextPosition],
 }
 
 impl<'t> Lines<'t> {
@@ -26,27 +26,27 @@ impl<'t> Lines<'t> {
     }
 
     /// Sets the origins of the lines of a generated text.
-    pub(crate) fn with_origins(self, origins: &'t [Place]) -> Self {
+    pub(crate) fn with_origins(self, origins: &'t [TextPosition]) -> Self {
         Self { origins, ..self }
     }
 
     /// The place of a byte offset.
-    pub(crate) fn place(&self, offset: usize) -> Place {
+    pub(crate) fn place(&self, offset: usize) -> TextPosition {
         let row = self.starts.partition_point(|&start| start <= offset) - 1;
         if let Some(origin) = self.origins.get(row) {
             return origin.clone();
         }
         let before = self.text.get(self.starts[row]..offset).unwrap_or("");
-        Place { file: self.file.clone(), line: row as u32 + 1, column: before.chars().count() as u32 + 1 }
+        TextPosition { file: self.file.clone(), line: row as u32 + 1, column: before.chars().count() as u32 + 1 }
     }
 
     /// The place of the start tag of an element.
-    pub(crate) fn of(&self, node: Node<'_, '_>) -> Place {
+    pub(crate) fn of(&self, node: Node<'_, '_>) -> TextPosition {
         self.place(node.range().start)
     }
 
     /// Place after the last character that is not white space: the end of a truncated file.
-    fn end(&self) -> Place {
+    fn end(&self) -> TextPosition {
         self.place(self.text.trim_end().len())
     }
 }
@@ -129,7 +129,7 @@ fn describe(text: &str, lines: &Lines<'_>, error: &Error) -> Issue {
     }
 }
 
-fn issue(place: Place, found: impl Into<String>, expected: impl Into<String>) -> Issue {
+fn issue(place: TextPosition, found: impl Into<String>, expected: impl Into<String>) -> Issue {
     Issue { place, problem: Problem::Malformed { found: found.into(), expected: expected.into() } }
 }
 
@@ -138,7 +138,7 @@ fn shown(byte: u8) -> String {
 }
 
 /// Place of an error, if it has one.
-fn position(lines: &Lines<'_>, error: &Error) -> Option<Place> {
+fn position(lines: &Lines<'_>, error: &Error) -> Option<TextPosition> {
     let without = matches!(
         error,
         Error::NoRootNode
@@ -150,7 +150,7 @@ fn position(lines: &Lines<'_>, error: &Error) -> Option<Place> {
             | Error::UnexpectedEndOfStream
     );
     let pos = error.pos();
-    (!without).then(|| Place { file: lines.file.clone(), line: pos.row, column: pos.col })
+    (!without).then(|| TextPosition { file: lines.file.clone(), line: pos.row, column: pos.col })
 }
 
 /// Whether the text ends within a tag, as truncated files usually do.

@@ -6,7 +6,7 @@ use flexarm_stepping::{Load, TimedWrench};
 
 use crate::caveat::Caveat;
 use crate::error::{Error, LoadError};
-use crate::loads_file::Written;
+use crate::loads_file::LoadLocation;
 use crate::robot::TCP_FRAME;
 
 /// A wrench on a frame of the robot as a function of time.
@@ -21,7 +21,7 @@ pub struct AppliedLoad {
     /// Caveats about the load as written.
     pub(crate) doubts: Vec<Caveat>,
     /// Location in the file, if read from one.
-    pub(crate) written: Option<Written>,
+    pub(crate) written: Option<LoadLocation>,
 }
 
 impl AppliedLoad {
@@ -76,13 +76,13 @@ impl AppliedLoad {
     pub(crate) fn on(&self, model: &Model, duration_s: f64) -> Result<Load, Error> {
         let frame = frame_of(&self.frame, model).filter(|frame| frame.body > 0).ok_or_else(|| {
             let known = moving_links(model).into_iter().map(str::to_owned).collect();
-            Written::frame(self.written.as_ref(), LoadError::UnknownFrame { frame: self.frame.clone(), known })
+            LoadLocation::frame(self.written.as_ref(), LoadError::UnknownFrame { frame: self.frame.clone(), known })
         })?;
         let jumps: Vec<f64> = self.wrench.jumps.iter().copied().filter(|t| *t <= duration_s).collect();
         for F in jumps.iter().map(|t| (self.wrench.value)(*t)) {
             let force = Quantity::FORCE.check_all("the force of a load", &F.force);
             let torque = Quantity::TORQUE.check_all("the torque of a load", &F.torque);
-            force.and(torque).map_err(|cause| Written::entry(self.written.as_ref(), cause))?;
+            force.and(torque).map_err(|cause| LoadLocation::entry(self.written.as_ref(), cause))?;
         }
         Ok(Load { body: frame.body, X_BF: frame.X_BF, wrench: self.wrench.clone().with_jumps(jumps) })
     }

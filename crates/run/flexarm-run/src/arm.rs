@@ -10,7 +10,7 @@ use flexarm_log::{Columns, Trace};
 use flexarm_stepping::{FlexibleArm, Held, OperatingPoint};
 use rayon::prelude::*;
 
-use crate::caveat::{Caveat, Use, told};
+use crate::caveat::{Caveat, Use, of_use};
 use crate::error::Error;
 use crate::flexible::FlexibleRobot;
 use crate::options::{Modelling, RunOptions};
@@ -104,7 +104,7 @@ impl Arm {
 
     /// Returns the caveats about the robot as modelled, and about its use by a command.
     pub fn caveats(&self, used: Use<'_>) -> Vec<Caveat> {
-        told(&self.robot, &self.flexible, Some(&self.caveats), used)
+        of_use(&self.robot, &self.flexible, Some(&self.caveats), used)
     }
 
     /// Returns how links and drives are modelled.

@@ -9,8 +9,8 @@ use serde::Serialize;
 
 use crate::balancer;
 use crate::caveat::motion::of_motion;
+use crate::caveat::of_use::standing_pose;
 use crate::caveat::size::Size;
-use crate::caveat::told::standing_pose;
 use crate::caveat::{self, Caveat};
 use crate::drive_entry::DriveKind;
 use crate::error::Error;
@@ -160,8 +160,8 @@ fn check_loads(robot: &Robot, motion: Option<&Motion>, path: &Path, findings: &m
         Ok(acting) => {
             let duration = motion.trajectory.duration();
             let heavy = caveat::motion::of_loads(&acting.loads, duration, &Size::of(&robot.rigid));
-            let told = acting.caveats.into_iter().chain(heavy);
-            findings.extend(told.map(|caveat| Finding::caveat(path, caveat)));
+            let caveats = acting.caveats.into_iter().chain(heavy);
+            findings.extend(caveats.map(|caveat| Finding::caveat(path, caveat)));
         }
     }
 }
@@ -216,8 +216,8 @@ fn check_flexible(robot: &Robot, motion: Option<&Motion>, findings: &mut Vec<Fin
                 let message = format!("first frequencies {words} {:.2?} Hz", &hz[..hz.len().min(4)]);
                 findings.push(Finding::note("modes", file, message));
             }
-            let told = posed.flexible.caveats().into_iter().chain(posed.validity(robot, &linear));
-            findings.extend(told.map(|caveat| Finding::caveat(&robot.path, caveat)));
+            let caveats = posed.flexible.caveats().into_iter().chain(posed.validity(robot, &linear));
+            findings.extend(caveats.map(|caveat| Finding::caveat(&robot.path, caveat)));
         }
     }
 }
@@ -241,8 +241,8 @@ fn check_motion(robot: &Robot, path: &Path, options: &MotionOptions, findings: &
             let room = robot.rigid_model().map(|model| balancer::check_motion(&model, &motion.trajectory));
             findings.extend(room.ok().and_then(Result::err).map(|e| Finding::error("balancer", file(), &e)));
             let along = robot.rigid_model().map(|model| of_motion(&motion.name, &motion.trajectory, &model));
-            let told = motion.caveats().into_iter().chain(along.unwrap_or_default());
-            findings.extend(told.map(|caveat| Finding::caveat(path, caveat)));
+            let caveats = motion.caveats().into_iter().chain(along.unwrap_or_default());
+            findings.extend(caveats.map(|caveat| Finding::caveat(path, caveat)));
             Some(motion)
         }
     }

@@ -153,15 +153,15 @@ pub fn read_run(path: &Path) -> Result<(Option<serde_json::Value>, Trace, Vec<St
     let summary = result.attachments.iter().find(|file| file.name == "summary.json");
     let summary = summary.and_then(|file| serde_json::from_slice(&file.bytes).ok());
     trace.finish(result);
-    let mut told = [source.missing(), source.warnings()].concat();
+    let mut warnings = [source.missing(), source.warnings()].concat();
     if trace.stride() > 1 {
-        told.push(format!(
+        warnings.push(format!(
             "of its {} samples one of every {} is kept for figures that the recording does not hold",
             trace.samples(),
             trace.stride()
         ));
     }
-    Ok((summary, trace, told))
+    Ok((summary, trace, warnings))
 }
 
 /// Returns the recording format with this name.

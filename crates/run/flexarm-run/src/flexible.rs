@@ -77,7 +77,7 @@ pub struct LinkChoices {
 
 /// Key of the robot file that requested something unavailable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Asked {
+pub(crate) enum RequestedKey {
     Model,
     Segments,
     Modes,
@@ -110,7 +110,7 @@ impl RobotLink {
     }
 
     /// As [`Self::form`], with the robot file key that requested what is missing.
-    pub(crate) fn form_or_key(&self, modelling: &Modelling) -> Result<LinkForm, (Asked, String)> {
+    pub(crate) fn form_or_key(&self, modelling: &Modelling) -> Result<LinkForm, (RequestedKey, String)> {
         let model = if modelling.links == LinkModel::AsFiled { self.choices.model } else { modelling.links };
         match model {
             LinkModel::Modal if self.stiffness_factors != [1.0; 6] => {
@@ -118,14 +118,18 @@ impl RobotLink {
                 let message = format!(
                     "link {name:?}: stiffness_factors are those of the springs of a lumped link; a modal link has one stiffness_factor"
                 );
-                Err((Asked::Directions, message))
+                Err((RequestedKey::Directions, message))
             }
-            LinkModel::Modal if self.stiffness.is_some() => Err((Asked::Stiffness, self.one_spring("modal body"))),
+            LinkModel::Modal if self.stiffness.is_some() => {
+                Err((RequestedKey::Stiffness, self.one_spring("modal body")))
+            }
             LinkModel::Modal => self.modal(modelling).map(|modal| LinkForm::Modal(Arc::new(modal))),
             _ => match modelling.segments.unwrap_or(self.choices.segments) {
                 2 => Ok(LinkForm::TwoParts),
-                n if self.stiffness.is_some() => Err((Asked::Stiffness, self.one_spring(&format!("has {n} parts")))),
-                n => self.lumped(n).map_err(|message| (Asked::Segments, message)),
+                n if self.stiffness.is_some() => {
+                    Err((RequestedKey::Stiffness, self.one_spring(&format!("has {n} parts"))))
+                }
+                n => self.lumped(n).map_err(|message| (RequestedKey::Segments, message)),
             },
         }
     }
@@ -162,45 +166,46 @@ impl RobotLink {
         })
     }
 
-    fn modal(&self, modelling: &Modelling) -> Result<ModalLink, (Asked, String)> {
+    fn modal(&self, modelling: &Modelling) -> Result<ModalLink, (RequestedKey, String)> {
         let name = &self.flexible.link;
-        let fail =
-            |asked: Asked| move |e: flexarm_fem::FemError| (asked, format!("link {name:?} cannot be modal: {e}"));
+        let fail = |asked: RequestedKey| {
+            move |e: flexarm_fem::FemError| (asked, format!("link {name:?} cannot be modal: {e}"))
+        };
         let wanted = modelling.modes.or(self.choices.modes);
         if let Some(modes) = wanted.filter(|modes| *modes > MOST_MODES) {
             let message = format!(
                 "link {name:?}: {modes} modes are asked for, at most {MOST_MODES} are taken: the work of a step grows with the cube of their \
                  number, and those beyond the first dozen are far above what a drive or a tool excites"
             );
-            return Err((Asked::Modes, message));
+            return Err((RequestedKey::Modes, message));
         }
         let full = match &self.beam {
             Some(beam) => {
                 let modes = wanted.unwrap_or(BEAM_MODES);
                 let options = ModalOptions { modes, geometric: self.choices.geometric, ..ModalOptions::default() };
                 beam.modal_with(&ModalOptions { elements: options.elements.max(4 * modes), ..options })
-                    .map_err(fail(Asked::Modes))?
+                    .map_err(fail(RequestedKey::Modes))?
             }
             None => {
                 let details = self.flexible.reduced.details.as_ref();
                 let stored = details.and_then(|details| details.modal.clone()).map(Ok);
                 let condensed = || {
                     let element = details?.superelement.as_ref()?;
-                    Some(ModalLink::from_superelement(name, element).map_err(fail(Asked::Model)))
+                    Some(ModalLink::from_superelement(name, element).map_err(fail(RequestedKey::Model)))
                 };
                 let link = stored.or_else(condensed).ok_or_else(|| {
                     let message = format!(
                         "link {name:?} cannot be modal: its .flex file has no mass over interfaces and modes; reduce \
                          the mesh again with this version, or use model = \"lumped\""
                     );
-                    (Asked::Model, message)
+                    (RequestedKey::Model, message)
                 })??;
                 let all = link.coordinates().saturating_sub(6 * link.interfaces.len());
                 match wanted {
-                    Some(n) if n < all => link.truncated(n).map_err(fail(Asked::Modes))?,
+                    Some(n) if n < all => link.truncated(n).map_err(fail(RequestedKey::Modes))?,
                     Some(n) if n > all => {
                         let message = format!("link {name:?}: {n} modes are requested, its .flex file has {all}");
-                        return Err((Asked::Modes, message));
+                        return Err((RequestedKey::Modes, message));
                     }
                     _ => link,
                 }
@@ -211,10 +216,10 @@ impl RobotLink {
                 "link {name:?}: geometric_stiffening needs a beam, or a .flex file made with flexarm reduce {}",
                 Setting::Geometric
             );
-            return Err((Asked::Geometric, message));
+            return Err((RequestedKey::Geometric, message));
         }
         match self.choices.eigenmodes {
-            Some(keep) => full.orthogonalised(Some(keep)).map_err(fail(Asked::Eigenmodes)),
+            Some(keep) => full.orthogonalised(Some(keep)).map_err(fail(RequestedKey::Eigenmodes)),
             None => Ok(full),
         }
     }
@@ -367,7 +372,8 @@ impl FlexibleRobot {
     /// Returns the caveats about the models of the links.
     pub fn caveats(&self) -> Vec<Caveat> {
         let help = "write model = \"modal\" into the robot file";
-        let instead = self.modal_instead.iter().map(|text| Caveat::said("third-interface", "links", text, help));
+        let instead =
+            self.modal_instead.iter().map(|text| Caveat::from_message("third-interface", "links", text, help));
         self.doubts.iter().cloned().chain(instead).collect()
     }
 
@@ -464,7 +470,7 @@ impl Robot {
             chosen.doubts.extend(doubts_of(&link.flexible, &form));
             let mut flexible = FlexibleLink { form, ..link.flexible.clone() };
             let uncut = self.uncut(link, &mut flexible);
-            chosen.doubts.extend(uncut.map(|text| Caveat::said("uniform-mass", "links", text, "")));
+            chosen.doubts.extend(uncut.map(|text| Caveat::from_message("uniform-mass", "links", text, "")));
             chosen.links.push(flexible);
         }
         // An option that applies to no link is an error.
@@ -646,11 +652,11 @@ fn doubts_of(link: &FlexibleLink, form: &LinkForm) -> Vec<Caveat> {
     if matches!(form, LinkForm::Modal(modal) if !modal.has_second_order()) {
         let text = format!("link {:?}: {SECOND_ORDER_UNKNOWN}", link.link);
         let help = "reduce the mesh itself (flexarm reduce) to have them";
-        doubts.push(Caveat::said("second-order-unknown", "links", text, help));
+        doubts.push(Caveat::from_message("second-order-unknown", "links", text, help));
     }
     if matches!(form, LinkForm::Chain(_)) && link.angles == ElasticAngles::EulerZyx {
         let text = format!("link {:?}: {EULER_CHAIN}", link.link);
-        doubts.push(Caveat::said("euler-chain", "links", text, "leave angles away: rotation vectors"));
+        doubts.push(Caveat::from_message("euler-chain", "links", text, "leave angles away: rotation vectors"));
     }
     doubts
 }

@@ -133,8 +133,8 @@ pub(crate) fn harmonics(entries: &[HarmonicEntry], ratio: Option<f64>) -> Result
         }
         Ok(Harmonic { amplitude, cycles, phase: entry.phase })
     };
-    let told = |entry: &HarmonicEntry| harmonic(entry).map_err(|fault| format!("transmission_error {fault}"));
-    entries.iter().map(told).collect()
+    let checked = |entry: &HarmonicEntry| harmonic(entry).map_err(|fault| format!("transmission_error {fault}"));
+    entries.iter().map(checked).collect()
 }
 
 /// Builds the hysteresis of a spring with this curve.

@@ -159,10 +159,10 @@ fn shares(tcp: &TcpFigures) -> String {
     let groups: Vec<_> = groups.into_iter().filter(|(.., shares)| !shares.is_empty()).collect();
     let sums: Vec<f64> =
         groups.iter().map(|(.., shares)| 1e3 * shares.iter().map(|share| share.along_m).sum::<f64>()).collect();
-    let told = groups.iter().zip(rounded(&sums, 1e3 * tcp.peak_m, digits));
-    let told =
-        told.filter(|((kind, ..), sum)| *kind != STEPPER || sum.contains(|c: char| c.is_ascii_digit() && c != '0'));
-    let told = told.map(|((kind, word, shares), sum)| {
+    let parts = groups.iter().zip(rounded(&sums, 1e3 * tcp.peak_m, digits));
+    let parts =
+        parts.filter(|((kind, ..), sum)| *kind != STEPPER || sum.contains(|c: char| c.is_ascii_digit() && c != '0'));
+    let parts = parts.map(|((kind, word, shares), sum)| {
         let most = most.filter(|most| most.kind == *kind && [LINK, GEARBOX].contains(kind));
         let most = most.map_or_else(String::new, |most| match shares.len() {
             1 => format!(" ({})", most.name),
@@ -170,7 +170,7 @@ fn shares(tcp: &TcpFigures) -> String {
         });
         format!("{word} {sum}{most}")
     });
-    told.collect::<Vec<_>>().join(", ")
+    parts.collect::<Vec<_>>().join(", ")
 }
 
 #[cfg(test)]

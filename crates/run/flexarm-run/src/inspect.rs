@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, Matrix6xX, UnitQuaternion};
 use serde::Serialize;
 
 use crate::balancer::{self, BalancerInfo};
-use crate::caveat::{self, Caveat, Use, told};
+use crate::caveat::{self, Caveat, Use, of_use};
 use crate::error::{Error, PoseError, ValueError};
 use crate::loops::{self, LoopInfo};
 use crate::mounting::RobotMounting;
@@ -241,7 +241,7 @@ pub fn inspect(robot: &Robot, at: Option<&[f64]>, velocity: Option<&[f64]>) -> R
     });
     let flexible = Arc::new(robot.flexible_robot()?);
     // Only the rigid robot is inspected, so the caveat about missing elasticity does not apply.
-    let mut caveats = told(robot, &flexible, None, Use::Held(&q, &[0.0; 6]));
+    let mut caveats = of_use(robot, &flexible, None, Use::Held(&q, &[0.0; 6]));
     caveats.retain(|caveat| caveat.code != "nothing-yields");
     let forms = robot.flexible.iter().map(|link| robot.form_of(link, &Modelling::default()).map(|(form, _)| form));
     let forms = forms.collect::<Result<Vec<_>, _>>()?;

@@ -12,7 +12,7 @@ use toml::Spanned;
 use crate::beam_entry::beam_section;
 use crate::error::Error;
 use crate::file_cache::FileCache;
-use crate::flexible::{Asked, LinkChoices, RobotLink};
+use crate::flexible::{LinkChoices, RequestedKey, RobotLink};
 use crate::options::{LinkModel, Modelling};
 use crate::robot::keep;
 use crate::robot_file::{BeamEntry, DampingEntry, FlexibleLinkEntry, RobotFileError, Source};
@@ -129,13 +129,13 @@ pub(crate) fn flexible_link(
     // The requested model must exist; overrides are checked when they are used.
     link.form_or_key(&Modelling::default()).map_err(|(asked, message)| {
         let key = match asked {
-            Asked::Model => None,
-            Asked::Segments => entry.segments.as_ref().map(Spanned::span),
-            Asked::Modes => entry.modes.as_ref().map(Spanned::span),
-            Asked::Eigenmodes => entry.eigenmodes.as_ref().map(Spanned::span),
-            Asked::Geometric => entry.geometric_stiffening.as_ref().map(Spanned::span),
-            Asked::Stiffness => entry.stiffness.as_ref().map(Spanned::span),
-            Asked::Directions => entry.stiffness_factors.as_ref().map(Spanned::span),
+            RequestedKey::Model => None,
+            RequestedKey::Segments => entry.segments.as_ref().map(Spanned::span),
+            RequestedKey::Modes => entry.modes.as_ref().map(Spanned::span),
+            RequestedKey::Eigenmodes => entry.eigenmodes.as_ref().map(Spanned::span),
+            RequestedKey::Geometric => entry.geometric_stiffening.as_ref().map(Spanned::span),
+            RequestedKey::Stiffness => entry.stiffness.as_ref().map(Spanned::span),
+            RequestedKey::Directions => entry.stiffness_factors.as_ref().map(Spanned::span),
         };
         at(key.or(entry.model.as_ref().map(Spanned::span)).unwrap_or(entry.link.span()), message)
     })?;

@@ -3,7 +3,7 @@
 //!
 //! Loads have a file of their own because they belong to a run and not to a robot. Start at
 //! `read_loads`. Not here: the effect of the values on a robot (`applied_load`, `payload`). The
-//! values keep their location in the file (`Written`), so that later errors can name it.
+//! values keep their location in the file (`LoadLocation`), so that later errors can name it.
 
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
@@ -106,13 +106,13 @@ type WrenchFn = Arc<dyn Fn(f64) -> Wrench + Send + Sync>;
 
 /// Location of a value in the file: its entry, its frame or link, and its inertia.
 #[derive(Clone, Debug)]
-pub(crate) struct Written {
+pub(crate) struct LoadLocation {
     entry: RobotFileError,
     frame: RobotFileError,
     inertia: RobotFileError,
 }
 
-impl Written {
+impl LoadLocation {
     fn new(source: &Source, entry: Range<usize>, frame: Option<Range<usize>>, inertia: Option<Range<usize>>) -> Self {
         let place = |span: Option<Range<usize>>| source.error(span.unwrap_or_else(|| entry.clone()), "");
         Self { entry: place(None), frame: place(frame), inertia: place(inertia) }
@@ -181,7 +181,7 @@ fn load(entry: &Spanned<LoadEntry>, folder: &Path, duration: f64, source: &Sourc
     let Curve { value, bends, period } = Reading { entry, source, start: e.start, end }.curve(folder, duration)?;
     let jumps = [e.start].into_iter().chain(last).chain(bends).collect();
     let name = e.frame.as_ref().map_or("tcp", |frame| frame.get_ref());
-    let written = Written::new(source, entry.span(), e.frame.as_ref().map(Spanned::span), None);
+    let written = LoadLocation::new(source, entry.span(), e.frame.as_ref().map(Spanned::span), None);
     let load =
         AppliedLoad::new(name, TimedWrench { axes, value, jumps, stops: Vec::new(), period }).starting_at(e.start);
     Ok(AppliedLoad { written: Some(written), doubts: doubts(e), ..load })
@@ -380,7 +380,7 @@ fn payload(entry: &Spanned<PayloadEntry>, source: &Source) -> PayloadChange {
         at_s: e.at,
         link: e.link.as_ref().map(|link| link.get_ref().clone()),
         carried: LinkInertia { mass: e.mass, com: e.com.into(), inertia_com },
-        written: Some(Written::new(source, entry.span(), link, inertia)),
+        written: Some(LoadLocation::new(source, entry.span(), link, inertia)),
     }
 }
 

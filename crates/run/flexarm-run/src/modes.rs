@@ -178,11 +178,11 @@ pub(crate) fn table(
     let worst = all.iter().map(|mode| mode.residual).fold(0.0, f64::max);
     if worst > 1e-6 {
         let message = format!("a mode has a relative residual of {worst:.1e}: its figures are inaccurate");
-        caveats.push(Caveat::said("inexact-mode", "modes", message, ""));
+        caveats.push(Caveat::from_message("inexact-mode", "modes", message, ""));
     }
     if all.iter().any(|mode| mode.eigenvalue.re > 1e-9 * mode.eigenvalue.norm()) {
         let message = "a mode grows: the arm is not stable at this pose";
-        caveats.push(Caveat::said("unstable", "modes", message, "check the gains of the servos"));
+        caveats.push(Caveat::from_message("unstable", "modes", message, "check the gains of the servos"));
     }
     let modes: Vec<ModeFigures> =
         all.iter().take(count).map(|mode| ModeFigures::new(mode, linear, &compliance)).collect();

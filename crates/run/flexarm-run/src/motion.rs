@@ -55,9 +55,9 @@ pub struct HeldJoint {
     pub told: bool,
 }
 
-struct Along(Arc<Trajectory>);
+struct AlongTrajectory(Arc<Trajectory>);
 
-impl PrescribedMotion for Along {
+impl PrescribedMotion for AlongTrajectory {
     fn sample(&self, t: f64, q: &mut [f64], qdot: &mut [f64], qddot: &mut [f64]) {
         self.0.sample(t, q, qdot, qddot);
     }
@@ -240,7 +240,7 @@ impl Motion {
     /// Returns the caveats about the motion.
     pub fn caveats(&self) -> Vec<Caveat> {
         let file = self.path.display().to_string();
-        let told = self.warnings.iter().map(|text| Caveat::said("trajectory", &file, text, ""));
+        let told = self.warnings.iter().map(|text| Caveat::from_message("trajectory", &file, text, ""));
         self.notes.iter().cloned().chain(told).chain(self.held_note()).collect()
     }
 
@@ -249,21 +249,21 @@ impl Motion {
     fn held_note(&self) -> Vec<Caveat> {
         let (told, assumed): (Vec<&HeldJoint>, Vec<&HeldJoint>) = self.held.iter().partition(|held| held.told);
         let file = self.path.display().to_string();
-        let said = |held: &[&HeldJoint], end: &str| {
+        let note = |held: &[&HeldJoint], end: &str| {
             let places: Vec<String> = held.iter().map(|held| format!("{:?} at {}", held.joint, held.at)).collect();
             let places = places.join(", ");
             let message = format!("{file}: joints that the motion does not name are held: {places}{end}");
-            Caveat::said("held-joints", &file, message, "name them in the motion to move them")
+            Caveat::from_message("held-joints", &file, message, "name them in the motion to move them")
         };
         let assumed =
-            (!assumed.is_empty()).then(|| said(&assumed, " ([hold] in the robot file says where, in rad or m)"));
-        let told = (!told.is_empty()).then(|| said(&told, "").as_note());
+            (!assumed.is_empty()).then(|| note(&assumed, " ([hold] in the robot file says where, in rad or m)"));
+        let told = (!told.is_empty()).then(|| note(&told, "").as_note());
         assumed.into_iter().chain(told).collect()
     }
 
     /// Returns the motion in the form that steppers use.
     pub fn prescribed(&self) -> Arc<dyn PrescribedMotion> {
-        Arc::new(Along(self.trajectory.clone()))
+        Arc::new(AlongTrajectory(self.trajectory.clone()))
     }
 }
 

@@ -191,7 +191,7 @@ fn alone(path: &Path, options: &MotionOptions) -> Result<(MotionReport, Trajecto
     let file = MotionFile { path, joints: None, limits: &[], options, cell: None, text: None };
     let ReadMotion { trajectory, format, topic, samples, dropped, caveats, .. } = motion_formats::read(&file)?;
     let own = trajectory.warnings().iter().map(|warning| format!("{}: {warning}", path.display())).collect();
-    let (warnings, notes) = told(&caveats, own);
+    let (warnings, notes) = messages(&caveats, own);
     let peaks = trajectory.peak().iter().map(|peak| of_joint(peak, "rad or m", &JointLimits::UNLIMITED)).collect();
     let report = MotionReport {
         motion: path.display().to_string(),
@@ -216,7 +216,7 @@ fn alone(path: &Path, options: &MotionOptions) -> Result<(MotionReport, Trajecto
 }
 
 /// Splits caveats into the messages of warnings and of notes.
-fn told(caveats: &[caveat::Caveat], own: Vec<String>) -> (Vec<String>, Vec<String>) {
+fn messages(caveats: &[caveat::Caveat], own: Vec<String>) -> (Vec<String>, Vec<String>) {
     let (notes, warnings): (Vec<_>, Vec<_>) =
         caveats.iter().partition(|caveat| caveat.severity == caveat::Severity::Note);
     let text = |caveats: Vec<&caveat::Caveat>| caveats.into_iter().map(|c| c.message.clone()).collect::<Vec<_>>();
@@ -232,10 +232,10 @@ fn on_robot(path: &Path, robot: &Robot, options: &MotionOptions) -> Result<(Moti
     let actuated = &model.coordinates()[..model.n_actuated()];
     crate::loops::along_motion(&model, &trajectory)?;
     let torques = torques(&trajectory, &model);
-    let mut caveats = caveat::told::of_robot(robot)?;
+    let mut caveats = caveat::of_use::of_robot(robot)?;
     let violations = |caveat: &caveat::Caveat| caveat.code == "joint-limit"; // in `violations`
-    caveats.extend(caveat::told::of_motion(&motion, &model).into_iter().filter(|caveat| !violations(caveat)));
-    let (warnings, notes) = told(&caveats, Vec::new());
+    caveats.extend(caveat::of_use::of_motion(&motion, &model).into_iter().filter(|caveat| !violations(caveat)));
+    let (warnings, notes) = messages(&caveats, Vec::new());
 
     let limit = |x: f64| x.is_finite().then_some(x);
     let mut peaks = Vec::new();

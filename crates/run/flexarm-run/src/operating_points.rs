@@ -1,7 +1,7 @@
 //! Equilibrium, compliance and frequencies at any number of poses, on all cores.
 
 use flexarm_kinematics::Wrench;
-use flexarm_stepping::{Asked, OperatingPoint, StepError};
+use flexarm_stepping::{OperatingPoint, PoseOutputs, StepError};
 use rayon::prelude::*;
 
 use crate::arm::Arm;
@@ -135,7 +135,7 @@ impl Arm {
 /// Fills in the results of a chunk; returns the failures.
 fn answer(at: &mut OperatingPoint, rows: Rows<'_>, elastic: usize, wrench: &Wrench) -> Vec<(usize, StepError)> {
     let mut failures = Vec::new();
-    let asked = Asked { compliance: true, frequencies: true, ..Asked::default() };
+    let asked = PoseOutputs { compliance: true, frequencies: true, ..PoseOutputs::default() };
     at.solve_each(rows.poses, wrench, asked, |k, answer| match answer {
         Err(error) => failures.push((rows.first + k, error)),
         Ok(found) => {

@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::applied_load::moving_links;
 use crate::error::{Error, PayloadError};
-use crate::loads_file::Written;
+use crate::loads_file::LoadLocation;
 use crate::robot::{PAYLOAD_LINK, Robot};
 
 /// New payload of a link from a given time on, which replaces the previous one.
@@ -20,7 +20,7 @@ pub struct PayloadChange {
     /// New payload in link axes; a mass of 0 means none.
     pub carried: LinkInertia,
     /// Location in the file, if read from one.
-    pub(crate) written: Option<Written>,
+    pub(crate) written: Option<LoadLocation>,
 }
 
 impl PayloadChange {
@@ -54,7 +54,7 @@ impl PayloadChange {
 
     /// Returns the change on a model of the robot; `earlier`: preceding changes.
     pub(crate) fn on(&self, robot: &Robot, model: &Model, earlier: &[InertiaChange]) -> Result<InertiaChange, Error> {
-        let fail = |cause: PayloadError| Written::entry(self.written.as_ref(), cause);
+        let fail = |cause: PayloadError| LoadLocation::entry(self.written.as_ref(), cause);
         let LinkInertia { mass, com, inertia_com } = &self.carried;
         let mut numbers = [self.at_s, *mass].into_iter().chain(com.iter().copied()).chain(inertia_com.iter().copied());
         if numbers.any(|x| !x.is_finite()) || *mass < 0.0 || self.at_s < 0.0 {
@@ -66,10 +66,13 @@ impl PayloadChange {
             Quantity::LENGTH.check_all("the centre of mass of the payload", com),
             Quantity::INERTIA.check_all("the inertia of the payload", inertia_com),
         ];
-        ranges.into_iter().collect::<Result<(), _>>().map_err(|cause| Written::entry(self.written.as_ref(), cause))?;
+        ranges
+            .into_iter()
+            .collect::<Result<(), _>>()
+            .map_err(|cause| LoadLocation::entry(self.written.as_ref(), cause))?;
         let (link, body, X_BF) = self.carrier(robot, model)?;
         if inertia_com.symmetric_eigenvalues().min() < -1e-9 * inertia_com.norm() {
-            return Err(Written::inertia(self.written.as_ref(), PayloadError::NegativeMoment));
+            return Err(LoadLocation::inertia(self.written.as_ref(), PayloadError::NegativeMoment));
         }
         let mut inertia =
             without_payload(robot, model, body).ok_or_else(|| fail(PayloadError::OtherLink { link: link.clone() }))?;
@@ -85,7 +88,7 @@ impl PayloadChange {
 
     /// Returns the carrying link, its body, and its frame on the body.
     fn carrier(&self, robot: &Robot, model: &Model) -> Result<(String, usize, Pose), Error> {
-        let fail = |cause: PayloadError| Written::frame(self.written.as_ref(), cause);
+        let fail = |cause: PayloadError| LoadLocation::frame(self.written.as_ref(), cause);
         let own = || robot.rigid.joints.iter().find(|j| j.child == PAYLOAD_LINK).map(|j| j.parent.clone());
         let link = self.link.clone().or_else(own).unwrap_or_else(|| robot.tcp.0.clone());
         let frame = model.frame(&link).filter(|f| f.body > 0).ok_or_else(|| {

@@ -10,8 +10,8 @@ use nalgebra::{DVector, Vector6};
 
 use crate::arm::Arm;
 use crate::balancer;
-use crate::caveat::pose::Standing;
-use crate::caveat::{Caveat, kinds, once_each, told, validity};
+use crate::caveat::pose::ArmAtRest;
+use crate::caveat::{Caveat, kinds, of_use, once_each, validity};
 use crate::error::{Error, PoseError, ValueError};
 use crate::flexible::FlexibleRobot;
 use crate::inspect::joint_values;
@@ -87,8 +87,8 @@ impl Posed {
     /// Returns the caveats about the robot and its equilibrium under a wrench on the TCP (world
     /// axes).
     pub fn caveats_of(&self, robot: &Robot, linear: &Linear, wrench: &[f64; 6]) -> Vec<Caveat> {
-        let mut caveats = told::of_model(robot, &self.flexible, self.of_robot.as_deref());
-        caveats.extend(told::at_rest(robot, self, linear, wrench));
+        let mut caveats = of_use::of_model(robot, &self.flexible, self.of_robot.as_deref());
+        caveats.extend(of_use::at_rest(robot, self, linear, wrench));
         once_each(caveats)
     }
 
@@ -100,7 +100,7 @@ impl Posed {
         if self.flexible.springs.is_empty() {
             let message =
                 "the robot has no flexible link and no elastic drive: it does not deflect and does not vibrate";
-            caveats.push(Caveat::said(
+            caveats.push(Caveat::from_message(
                 "nothing-yields",
                 "robot",
                 message,
@@ -149,7 +149,7 @@ impl Posed {
         let moved = linear.X_WT.translation.vector - self.rigid_tool().translation.vector;
         let elastic = &linear.q.as_slice()[self.arm.model.n_actuated()..];
         let (flexible, arm) = (&self.flexible, &self.arm);
-        Standing { robot, flexible, arm, elastic, sag_m: moved.norm() }.caveats()
+        ArmAtRest { robot, flexible, arm, elastic, sag_m: moved.norm() }.caveats()
     }
 
     /// State with the joints at the pose and the elastic coordinates at zero.

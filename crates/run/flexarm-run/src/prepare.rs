@@ -169,6 +169,7 @@ fn fast_loads(loads: &[Load], h: f64) -> Vec<Caveat> {
             format!("a load of {hz:.1} Hz has {steps:.1} steps per period: it does not act as written; lower {step}")
         })
     };
-    let told = |text: String| Caveat::said("short-load", "loads", text, "lower the step").mended_by(&[Setting::Step]);
-    loads.iter().filter_map(|load| fast(load).map(told)).collect()
+    let caveat =
+        |text: String| Caveat::from_message("short-load", "loads", text, "lower the step").mended_by(&[Setting::Step]);
+    loads.iter().filter_map(|load| fast(load).map(caveat)).collect()
 }

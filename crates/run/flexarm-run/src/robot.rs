@@ -333,7 +333,7 @@ impl Robot {
         }
         self.rigid.joints.push(Joint::new("__tcp_joint", JointKind::Fixed, link, TCP_FRAME, X_LT));
         self.rigid.links.push(Link { name: TCP_FRAME.into(), inertia: None });
-        self.warnings.extend(self.urdf.warnings_only().map(told));
+        self.warnings.extend(self.urdf.warnings_only().map(finding_text));
         // Errors of the model as a whole are reported at the last flexible link, where a duplicate
         // entry would be.
         let last_flexible = file.and_then(|(f, s)| {
@@ -404,7 +404,8 @@ impl Robot {
         }
         if mass == 0.0 {
             let help = "leave the payload out if there is none";
-            let none = Caveat::said("no-payload", "the payload", "the payload has 0 kg: it counts as none", help);
+            let none =
+                Caveat::from_message("no-payload", "the payload", "the payload has 0 kg: it counts as none", help);
             self.written.push(none.as_note());
             return Ok(());
         }
@@ -473,11 +474,12 @@ impl Robot {
     /// Returns the caveats that are known before any computation.
     pub fn caveats(&self) -> Vec<Caveat> {
         let file = self.path.display().to_string();
-        let of_urdf = |text: &&String| self.urdf.warnings_only().any(|w| **text == told(w));
+        let of_urdf = |text: &&String| self.urdf.warnings_only().any(|w| **text == finding_text(w));
         let own = self.warnings.iter().filter(|text| !of_urdf(text));
-        let own = own.map(|text| Caveat::said("flexible-link", &file, text, "compare both sources"));
+        let own = own.map(|text| Caveat::from_message("flexible-link", &file, text, "compare both sources"));
         let of_description = |caveat| Caveat { of_description: true, ..caveat };
-        let urdf = self.urdf.warnings_only().map(|w| Caveat::said(w.code, &w.location, told(w), &w.help));
+        let urdf =
+            self.urdf.warnings_only().map(|w| Caveat::from_message(w.code, &w.location, finding_text(w), &w.help));
         let urdf = urdf.map(of_description);
         let mut caveats: Vec<Caveat> = own.chain(urdf).chain(self.written.iter().cloned()).collect();
         caveats.extend(caveat::parts::of_robot(self));
@@ -529,13 +531,13 @@ fn written_caveats(file: &RobotFile) -> Vec<Caveat> {
     let unused = unused.map(|link| {
         let name = link.link.get_ref();
         let message = format!("the material of link {name:?} has no effect: its section is given by its stiffness");
-        Caveat::said("no-effect", format!("link {name:?}"), message, "leave it out").as_note()
+        Caveat::from_message("no-effect", format!("link {name:?}"), message, "leave it out").as_note()
     });
     rpy.into_iter().chain(beams).chain(unused).collect()
 }
 
 /// Formats a finding with its location as a sentence.
-fn told(finding: &flexarm_urdf::Finding) -> String {
+fn finding_text(finding: &flexarm_urdf::Finding) -> String {
     format!("{}: {}", finding.location, finding.message)
 }
 

@@ -118,7 +118,7 @@ impl Scenario {
             }
             if let Some(start) = load.start_s.filter(|start| *start >= duration) {
                 let text = format!("a load starts at {start} s, the run ends at {duration} s: it does nothing");
-                acting.caveats.push(Caveat::said("no-effect", "loads", text, "move it into the run"));
+                acting.caveats.push(Caveat::from_message("no-effect", "loads", text, "move it into the run"));
             }
         }
         let size = Size::of(&robot.urdf.mechanism);
@@ -136,7 +136,7 @@ impl Scenario {
             }
             if at > duration {
                 let text = format!("the payload changes at {at} s, the run ends at {duration} s: it stays as it is");
-                acting.caveats.push(Caveat::said("no-effect", "loads", text, "move it into the run"));
+                acting.caveats.push(Caveat::from_message("no-effect", "loads", text, "move it into the run"));
             }
         }
         Ok(acting)

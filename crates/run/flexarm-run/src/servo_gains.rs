@@ -16,26 +16,26 @@ const SERVO: [f64; 4] = [20.0, 100.0, 20.0, 1e-3];
 const QUICK_GAIN: f64 = 0.4;
 
 /// Inertia seen by a joint under a servo (kg m² or kg).
-pub(crate) struct Felt {
+pub(crate) struct ServoInertia {
     /// Inertia of the rigid robot.
     inertia: f64,
     /// High-frequency inertia: with all other free coordinates free to accelerate.
     quick: f64,
 }
 
-impl Felt {
+impl ServoInertia {
     /// Returns the gains of position, velocity and integral: as given, or suitable defaults. `rule`
     /// decides which of the two rules limits them.
-    fn gains(&self, servo: &ServoEntry, sample_s: f64, rule: &Felt) -> [f64; 3] {
+    fn gains(&self, servo: &ServoEntry, sample_s: f64, rule: &ServoInertia) -> [f64; 3] {
         let [position, bandwidth, integral, _] = SERVO;
         // Between samples a motor only feels the inertia rigidly attached to it, because the
         // springs deflect.
-        let most = |felt: &Felt| QUICK_GAIN * felt.quick / sample_s;
+        let most = |felt: &ServoInertia| QUICK_GAIN * felt.quick / sample_s;
         let yields = bandwidth * rule.inertia > most(rule);
-        let fitting = |felt: &Felt| if yields { most(felt) } else { bandwidth * felt.inertia };
-        let velocity = |felt: &Felt| servo.velocity_gain.unwrap_or_else(|| fitting(felt));
+        let fitting = |felt: &ServoInertia| if yields { most(felt) } else { bandwidth * felt.inertia };
+        let velocity = |felt: &ServoInertia| servo.velocity_gain.unwrap_or_else(|| fitting(felt));
         // The outer loops must be slower than the velocity loop inside them.
-        let slower = |felt: &Felt| 0.25 * velocity(felt) / felt.inertia;
+        let slower = |felt: &ServoInertia| 0.25 * velocity(felt) / felt.inertia;
         let limited = |gain: f64| servo.velocity_gain.is_none() && gain > slower(rule);
         let inner = |gain: f64| if limited(gain) { slower(self) } else { gain };
         let velocity_gain = velocity(self);
@@ -52,16 +52,16 @@ impl FlexibleRobot {
 
     /// Returns, for each joint under a servo, the inertia of the rigid robot with the joints at `q`
     /// and the high-frequency inertia.
-    pub(crate) fn inertias_felt(&self, model: &Model, rigid: &Model, q: &DVector<f64>) -> Vec<Felt> {
+    pub(crate) fn inertias_felt(&self, model: &Model, rigid: &Model, q: &DVector<f64>) -> Vec<ServoInertia> {
         let M = mass_matrix(rigid, &mut Data::new(rigid), q).clone();
-        let felt = |((k, ..), quick): (&(usize, ServoEntry, f64), f64)| Felt { inertia: M[(*k, *k)], quick };
+        let felt = |((k, ..), quick): (&(usize, ServoEntry, f64), f64)| ServoInertia { inertia: M[(*k, *k)], quick };
         self.torque.iter().zip(self.quick_inertia_of(model, q)).map(felt).collect()
     }
 
     /// Returns the servos of joints with these inertias.
-    pub(crate) fn servo_axes(&self, felt: &[Felt]) -> Vec<ServoAxis> {
+    pub(crate) fn servo_axes(&self, felt: &[ServoInertia]) -> Vec<ServoAxis> {
         let sample_s = self.sample_s();
-        let axis = |((coordinate, servo, limit), felt): (&(usize, ServoEntry, f64), &Felt)| {
+        let axis = |((coordinate, servo, limit), felt): (&(usize, ServoEntry, f64), &ServoInertia)| {
             let [position_gain, velocity_gain, integral_gain] = felt.gains(servo, sample_s, felt);
             let (coordinate, limit) = (*coordinate, *limit);
             let feed_forward = servo.feed_forward.unwrap_or(true);

@@ -74,7 +74,7 @@ impl<'de> Deserialize<'de> for StepperSettings {
         /// Values of other types come from files of other versions.
         #[derive(Deserialize)]
         #[serde(untagged)]
-        enum Known {
+        enum MaybeValue {
             Value(SettingValue),
             Other(IgnoredAny),
         }
@@ -88,8 +88,8 @@ impl<'de> Deserialize<'de> for StepperSettings {
 
             fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<StepperSettings, A::Error> {
                 let mut settings = Vec::new();
-                while let Some((key, value)) = map.next_entry::<String, Known>()? {
-                    if let Known::Value(value) = value {
+                while let Some((key, value)) = map.next_entry::<String, MaybeValue>()? {
+                    if let MaybeValue::Value(value) = value {
                         settings.push((key, value));
                     }
                 }

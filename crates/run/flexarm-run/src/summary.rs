@@ -143,8 +143,8 @@ impl RecordingFiles {
 
 impl Serialize for RecordingFiles {
     fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let told = |format: &RecordingFormat| ALWAYS_TOLD.contains(format) || self.get(*format).is_some();
-        let formats = RecordingFormat::ALL.into_iter().filter(told);
+        let listed = |format: &RecordingFormat| ALWAYS_TOLD.contains(format) || self.get(*format).is_some();
+        let formats = RecordingFormat::ALL.into_iter().filter(listed);
         serializer.collect_map(formats.map(|format| (format.extension(), self.get(format))))
     }
 }

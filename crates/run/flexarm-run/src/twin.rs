@@ -6,12 +6,12 @@ use flexarm_kinematics::{
     Data, Frame, Model, Motions, Observer, State, forward_kinematics, forward_kinematics_velocity, frame_jacobian,
     frame_twist, inverse_dynamics, world_poses,
 };
-use flexarm_stepping::{FlexibleArm, Lent};
+use flexarm_stepping::{FlexibleArm, PooledWorkspace};
 use nalgebra::{DVector, Matrix6xX, Vector3};
 
 /// Kinematics and required torques of the rigid twin at one time.
 pub(crate) struct RigidTwin {
-    pub(crate) data: Lent<Data>,
+    pub(crate) data: PooledWorkspace<Data>,
     pub(crate) state: State,
     qddot: DVector<f64>,
     /// Jacobian of the TCP, world axes.
@@ -25,7 +25,7 @@ pub(crate) struct RigidTwin {
     placed: Option<(Arc<Model>, State)>,
     /// Observer that computes all quantities in one pass, if it supports the tree, and the model
     /// whose inertias it has; created at first use.
-    observer: Option<(Arc<Model>, Option<Lent<Observer>>)>,
+    observer: Option<(Arc<Model>, Option<PooledWorkspace<Observer>>)>,
 }
 
 impl RigidTwin {

@@ -18,7 +18,7 @@ use flexarm_stepping::TimedWrench;
 use nalgebra::{Matrix3, Vector3};
 use serde::Serialize;
 
-use super::place::Place;
+use super::place::CutPose;
 use super::tool_file::CuttingTool;
 use super::{LobesError, caveats, files};
 use flexarm_run::AppliedLoad;
@@ -149,7 +149,7 @@ pub fn cut(robot: &Robot, tool: &CuttingTool, at: Option<&[f64]>, request: &CutR
     let paths = request.output.as_ref().map(|folder| files::CUT_NAMES.map(|name| folder.join(name)));
     check_free(paths.as_ref().map_or(&[], |paths| paths.as_slice()), request.overwrite)?;
 
-    let place = Place::at(robot, &request.modelling, tool, at)?;
+    let place = CutPose::at(robot, &request.modelling, tool, at)?;
     let chatter = |source| Error::from(LobesError::Chatter { place: place.words(), source });
     let spindle = TAU * request.spindle_rpm / 60.0;
     let limit =
@@ -171,7 +171,7 @@ pub fn cut(robot: &Robot, tool: &CuttingTool, at: Option<&[f64]>, request: &CutR
     answer.limit_m = limit.as_ref().map(|limit| limit.depth);
     answer.limit_hz = limit.map(|limit| limit.chatter_hz);
     answer.curves = curves;
-    answer.caveats = place.told(robot);
+    answer.caveats = place.caveats(robot);
     answer.caveats.extend(caveats::tool_caveats(tool));
     answer.warnings = caveat::warnings(&answer.caveats);
     if let Some(paths) = paths {
@@ -184,7 +184,7 @@ pub fn cut(robot: &Robot, tool: &CuttingTool, at: Option<&[f64]>, request: &CutR
 fn run(
     robot: &Robot,
     tool: &CuttingTool,
-    place: &Place,
+    place: &CutPose,
     request: &CutRequest,
     work: RegenerativeCut,
     cut: &Cut,
@@ -241,7 +241,7 @@ struct Follower {
 }
 
 impl Follower {
-    fn new(tool: &CuttingTool, place: &Place, work: RegenerativeCut, next: Arc<Mutex<Next>>, step_s: f64) -> Self {
+    fn new(tool: &CuttingTool, place: &CutPose, work: RegenerativeCut, next: Arc<Mutex<Next>>, step_s: f64) -> Self {
         let zero = Vector3::zeros();
         Self {
             work,

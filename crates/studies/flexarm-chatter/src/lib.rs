@@ -33,7 +33,7 @@ use flexarm_run::Motion;
 use flexarm_run::Robot;
 use flexarm_run::ValueError;
 use flexarm_run::caveat;
-use flexarm_run::caveat::told;
+use flexarm_run::caveat::of_use;
 
 pub use crate::milling::{ChatterError, Simulated};
 pub use caveats::tool_caveats;
@@ -41,7 +41,7 @@ pub use cut::{CutRequest, CutRun, cut};
 pub use files::rounded_down;
 pub use tool_file::CuttingTool;
 
-use place::Place;
+use place::CutPose;
 
 /// Poses at which the tool cuts.
 #[derive(Clone, Debug)]
@@ -277,8 +277,8 @@ pub fn lobes(
     check_free(paths.as_ref().map_or(&[], |paths| paths.as_slice()), request.overwrite)?;
 
     let (places, left_out) = match place {
-        CuttingPlace::At(at) => (vec![Place::at(robot, &request.modelling, tool, *at)?], 0),
-        CuttingPlace::Along(motion, n) => Place::along(robot, &request.modelling, tool, motion, *n)?,
+        CuttingPlace::At(at) => (vec![CutPose::at(robot, &request.modelling, tool, *at)?], 0),
+        CuttingPlace::Along(motion, n) => CutPose::along(robot, &request.modelling, tool, motion, *n)?,
     };
     let zero_order = request.zero_order || tool.measured.is_some();
     let (speeds, done) = (tool.rpm.len(), AtomicUsize::new(0));
@@ -295,15 +295,15 @@ pub fn lobes(
     answer.method = if zero_order { "zero-order" } else { "floquet" };
     answer.left_out = left_out;
     if let CuttingPlace::Along(motion, _) = place {
-        answer.caveats = told::of_motion(motion, &*robot.rigid_model()?);
+        answer.caveats = of_use::of_motion(motion, &*robot.rigid_model()?);
     }
-    answer.caveats.extend(places.iter().flat_map(|place| place.told(robot)));
+    answer.caveats.extend(places.iter().flat_map(|place| place.caveats(robot)));
     answer.caveats = caveat::once_each(std::mem::take(&mut answer.caveats));
     answer.caveats.extend(caveats::tool_caveats(tool));
     if tool.measured.is_some() && !request.zero_order {
         let message = "the tool has a measured response: the limits are those of the zero-order solution, which does \
                        not include period doubling";
-        answer.caveats.push(Caveat::said(
+        answer.caveats.push(Caveat::from_message(
             "zero-order",
             "tool",
             message,
@@ -318,7 +318,7 @@ pub fn lobes(
 }
 
 fn point(
-    place: &Place,
+    place: &CutPose,
     tool: &CuttingTool,
     rpm: f64,
     deepest_m: f64,
@@ -386,7 +386,7 @@ pub fn lowest_limit(
     q: &[f64],
 ) -> Result<f64, Error> {
     check_speeds(&tool.rpm)?;
-    let place = match Place::at(robot, modelling, tool, Some(q)) {
+    let place = match CutPose::at(robot, modelling, tool, Some(q)) {
         Err(error) if error.external() == Some(&LobesError::FeedAlongAxis) => return Ok(f64::NAN),
         other => other?,
     };
@@ -405,7 +405,7 @@ fn lower<'p>(a: &'p LobePoint, b: &'p LobePoint) -> &'p LobePoint {
     if depth(b) < depth(a) { b } else { a }
 }
 
-fn assembled(robot: &Robot, tool: &CuttingTool, places: &[Place], all: &[LobePoint], deepest_m: f64) -> Lobes {
+fn assembled(robot: &Robot, tool: &CuttingTool, places: &[CutPose], all: &[LobePoint], deepest_m: f64) -> Lobes {
     let speeds = tool.rpm.len();
     let of_pose = |k: usize| &all[k * speeds..(k + 1) * speeds];
     let lowest = |points: &[LobePoint]| points.iter().reduce(lower).filter(|p| p.depth_m.is_some()).cloned();
@@ -440,7 +440,7 @@ fn assembled(robot: &Robot, tool: &CuttingTool, places: &[Place], all: &[LobePoi
         best_depth_m: best.map_or(0.0, |p| p.depth_m.unwrap_or(deepest_m)),
         points,
         poses: poses.collect(),
-        pose_in_words: places.first().map_or_else(String::new, Place::words),
+        pose_in_words: places.first().map_or_else(String::new, CutPose::words),
         left_out: 0,
         file: None,
         files: LobesFiles::default(),

@@ -30,10 +30,10 @@ const ALONG_AXIS: f64 = 0.05;
 /// Time difference for the direction of the feed (s).
 const INSTANT: f64 = 1e-4;
 /// Maximum number of reported natural frequencies.
-const TOLD: usize = 6;
+const MAX_FREQUENCIES: usize = 6;
 
 /// One pose with the axes of the cut: x along the feed, z from the tip to the spindle.
-pub(super) struct Place {
+pub(super) struct CutPose {
     posed: Posed,
     linear: Linear,
     pub(super) time_s: Option<f64>,
@@ -51,7 +51,7 @@ pub(super) struct Place {
     pub(super) band: Vec<f64>,
 }
 
-impl Place {
+impl CutPose {
     /// Returns the place at a pose.
     pub(super) fn at(
         robot: &Robot,
@@ -170,7 +170,7 @@ impl Place {
         let oscillate = self.structure.poles().iter().filter(|p| p.value.im > 0.0);
         let mut hz: Vec<f64> = oscillate.map(|p| p.value.norm() / TAU).collect();
         hz.sort_by(f64::total_cmp);
-        hz.truncate(TOLD);
+        hz.truncate(MAX_FREQUENCIES);
         hz
     }
 
@@ -202,7 +202,7 @@ impl Place {
     }
 
     /// Returns the caveats about the robot and its pose.
-    pub(super) fn told(&self, robot: &Robot) -> Vec<Caveat> {
+    pub(super) fn caveats(&self, robot: &Robot) -> Vec<Caveat> {
         self.posed.caveats_of(robot, &self.linear, &[0.0; 6])
     }
 }

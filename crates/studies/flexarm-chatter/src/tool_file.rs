@@ -406,7 +406,7 @@ impl Reader<'_> {
                 if rpm.is_empty() || !ascending || rpm.len() > MOST_POINTS || rpm[0] <= 0.0 {
                     return Err(self.error(list.span(), "rpm must be positive, ascending speeds (1/min)"));
                 }
-                self.told(list.span(), Quantity::SPEED.check_all("rpm", rpm))?;
+                self.located(list.span(), Quantity::SPEED.check_all("rpm", rpm))?;
                 Ok(rpm.clone())
             }
             (None, Some(from), Some(to)) => {
@@ -476,12 +476,12 @@ impl Reader<'_> {
             (Some(mass), None) => {
                 let mass = self.positive("mass", mass, 1.0, Quantity::MASS)?;
                 let stiffness = Quantity::TOOL_STIFFNESS.check("the stiffness of the mode", mass * omega * omega);
-                self.told(entry.span(), stiffness)?;
+                self.located(entry.span(), stiffness)?;
                 mass
             }
             (None, Some(stiffness)) => {
                 let stiffness = self.positive("stiffness", stiffness, 1.0, Quantity::TOOL_STIFFNESS)?;
-                self.told(entry.span(), Quantity::MASS.check("the mass of the mode", stiffness / (omega * omega)))?
+                self.located(entry.span(), Quantity::MASS.check("the mass of the mode", stiffness / (omega * omega)))?
             }
             (Some(_), Some(both)) => {
                 return Err(
@@ -509,7 +509,7 @@ impl Reader<'_> {
     /// Returns a positive number in SI units.
     fn positive(&self, what: &str, value: &Spanned<f64>, unit: f64, quantity: Quantity) -> Result<f64, Error> {
         match unit * *value.get_ref() {
-            x if x > 0.0 || x.is_nan() => self.told(value.span(), quantity.check(what, x)),
+            x if x > 0.0 || x.is_nan() => self.located(value.span(), quantity.check(what, x)),
             _ => Err(self.error(value.span(), format!("{what} = {}: expected a positive number", value.get_ref()))),
         }
     }
@@ -517,10 +517,10 @@ impl Reader<'_> {
     /// Returns a point (m).
     fn point(&self, what: &str, value: &Spanned<[f64; 3]>) -> Result<Vector3<f64>, Error> {
         let point = Vector3::from(*value.get_ref()) * self.length;
-        self.told(value.span(), Quantity::LENGTH.check_all(what, &point)).map(|()| point)
+        self.located(value.span(), Quantity::LENGTH.check_all(what, &point)).map(|()| point)
     }
 
-    fn told<T>(&self, span: Range<usize>, checked: Result<T, OutOfRange>) -> Result<T, Error> {
+    fn located<T>(&self, span: Range<usize>, checked: Result<T, OutOfRange>) -> Result<T, Error> {
         checked.map_err(|outside| self.error(span, outside.to_string()))
     }
 

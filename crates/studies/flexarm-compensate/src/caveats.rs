@@ -23,7 +23,7 @@ fn singular_caveat((t_s, directions): (f64, usize), asked: usize) -> Option<Cave
             "at {t_s:.2} s the joints can move the TCP in only {directions} of the {asked} requested directions (a \
              singular pose, or too few joints): the others are corrected little or not at all"
         );
-        Caveat::said(
+        Caveat::from_message(
             "singular",
             "compensation",
             text,
@@ -43,7 +43,7 @@ fn quick_caveat(answer: &Compensation, quicker: f64) -> Option<Caveat> {
             100.0 * least / first,
             100.0 * quicker
         );
-        Caveat::said("too-quick", "compensation", text, "make the motion slower or its accelerations smoother")
+        Caveat::from_message("too-quick", "compensation", text, "make the motion slower or its accelerations smoother")
     })
 }
 
@@ -64,7 +64,7 @@ fn discarded_caveat(answer: &Compensation, discarded: &[Discarded]) -> Option<Ca
     (!named.is_empty()).then(|| {
         let text =
             format!("iterations that increase the RMS error on the model are discarded: {}; {kept}", named.join(", "));
-        let caveat = Caveat::said(
+        let caveat = Caveat::from_message(
             "discarded",
             "compensation",
             text,
@@ -87,7 +87,7 @@ pub(super) fn of_servos(plant: &Arm, efforts: &[Extreme]) -> Option<Caveat> {
             "servos are at their torque limits: {}: the error due to the missing torque is not corrected",
             named.join(", ")
         );
-        Caveat::said("servo-limit", "compensation", text, "slow the motion down where it is fastest")
+        Caveat::from_message("servo-limit", "compensation", text, "slow the motion down where it is fastest")
     })
 }
 
@@ -106,7 +106,7 @@ pub(super) fn of(
     let worse: Vec<&str> = limits::worse(&answer.limits, own).map(|limit| limit.message.as_str()).collect();
     if !worse.is_empty() {
         let text = format!("the new commands exceed limits that the original motion satisfies: {}", worse.join("; "));
-        caveats.push(Caveat::said("limits", "compensation", text, "slow the motion down a little"));
+        caveats.push(Caveat::from_message("limits", "compensation", text, "slow the motion down a little"));
     }
     let untold: Vec<&str> = robot
         .drives
@@ -119,7 +119,9 @@ pub(super) fn of(
             "errors due to backlash and friction of {} are not corrected: they depend on the direction of approach",
             untold.join(", ")
         );
-        caveats.push(Caveat::said("play", "compensation", text, "approach every point from the same side").as_note());
+        caveats.push(
+            Caveat::from_message("play", "compensation", text, "approach every point from the same side").as_note(),
+        );
     }
     // Shaping alone (a single peak, that of the start) is not meant to reduce the error.
     let corrected = answer.model_peaks_m.len() != 1;
@@ -129,7 +131,7 @@ pub(super) fn of(
             1e3 * answer.after.peak_m,
             1e3 * answer.before.peak_m
         );
-        caveats.push(Caveat::said(
+        caveats.push(Caveat::from_message(
             "little-gained",
             "compensation",
             text,

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use flexarm_files::{check_free, write_all};
 
 use super::program::{self, Corrected, ProgramFigures};
-use super::{CompensateRequest, Compensation, Found, SAMPLE_S, page};
+use super::{CompensateRequest, Compensation, MotionPair, SAMPLE_S, page};
 use flexarm_run::Arm;
 use flexarm_run::Caveat;
 use flexarm_run::Error;
@@ -54,13 +54,13 @@ impl Files {
         answer: &mut Compensation,
     ) -> Option<Corrected> {
         let place = self.program.as_ref()?;
-        let mut said = |text: String, help: &str| {
-            answer.caveats.push(Caveat::said("program", "compensation", text, help));
+        let mut warn = |text: String, help: &str| {
+            answer.caveats.push(Caveat::from_message("program", "compensation", text, help));
         };
         let (corrected, uncovered) = match program::corrected(robot, arm, scenario, request, place) {
             Ok(found) => found,
             Err(error) => {
-                said(format!("the program was not corrected: {error}"), "use the motion instead");
+                warn(format!("the program was not corrected: {error}"), "use the motion instead");
                 return None;
             }
         };
@@ -73,13 +73,13 @@ impl Files {
                 first.statement,
                 first.why
             );
-            said(text, "write targets as literals");
+            warn(text, "write targets as literals");
         }
         if *residual_m > WRITTEN_WITHIN_M {
             let text = format!("the corrected program misses a target by {:.4} mm", 1e3 * residual_m);
-            said(text, "a move depends on a target that was not corrected");
+            warn(text, "a move depends on a target that was not corrected");
         }
-        uncovered.into_iter().for_each(|text| said(text, "use the motion instead if that matters"));
+        uncovered.into_iter().for_each(|text| warn(text, "use the motion instead if that matters"));
         Some(corrected)
     }
 
@@ -88,7 +88,7 @@ impl Files {
         &self,
         answer: &mut Compensation,
         arm: &Arm,
-        found: &Found,
+        found: &MotionPair,
         program: Option<Corrected>,
         request: &CompensateRequest,
     ) -> Result<(), Error> {

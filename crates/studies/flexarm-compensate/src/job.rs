@@ -54,7 +54,7 @@ pub(super) struct Job<'a> {
 }
 
 /// Result of a run.
-pub(super) struct Seen {
+pub(super) struct RunResult {
     /// Displacement of the TCP from its desired pose, 6×N, world axes.
     pub(super) error: DMatrix<f64>,
     /// Maximum torque or force of each drive.
@@ -180,12 +180,12 @@ impl<'a> Job<'a> {
     }
 
     /// Runs a motion on an arm, with the loads of the scenario.
-    pub(super) fn seen(&self, arm: &Arm, run: &RunOptions, motion: &Motion) -> Result<Seen, Error> {
+    pub(super) fn seen(&self, arm: &Arm, run: &RunOptions, motion: &Motion) -> Result<RunResult, Error> {
         self.seen_until(arm, run, motion, 0)
     }
 
     /// Runs a motion that is held at its end for `beyond` more samples.
-    fn seen_until(&self, arm: &Arm, run: &RunOptions, motion: &Motion, beyond: usize) -> Result<Seen, Error> {
+    fn seen_until(&self, arm: &Arm, run: &RunOptions, motion: &Motion, beyond: usize) -> Result<RunResult, Error> {
         let options =
             RunOptions { log_rate_hz: 1.0 / self.step_s(), with_twin: false, ignore_limits: true, ..run.clone() };
         let mut progress = |_, _| if (self.stop)() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
@@ -216,7 +216,7 @@ impl<'a> Job<'a> {
                 if value.abs() > worst.value.abs() { Extreme { time_s, value } } else { worst }
             })
         };
-        Ok(Seen { error, efforts: (0..m).map(worst).collect() })
+        Ok(RunResult { error, efforts: (0..m).map(worst).collect() })
     }
 
     /// Returns the TCP error on the model with changed joint positions, including `beyond` samples

@@ -4,7 +4,7 @@ use flexarm_flexlink::GearStiffness;
 use flexarm_trajectory::Extreme;
 use rayon::prelude::*;
 
-use super::job::{Job, Seen, distances};
+use super::job::{Job, RunResult, distances};
 use super::{CompensateError, CompensateRequest, ErrorFigures, PlantFigures};
 use flexarm_run::Arm;
 use flexarm_run::DriveModel;
@@ -16,7 +16,7 @@ use flexarm_run::Robot;
 use flexarm_run::RunOptions;
 
 /// Result of commands on a plant.
-pub(super) struct Judged {
+pub(super) struct PlantResult {
     pub(super) figures: ErrorFigures,
     /// Distance between flexible and desired TCP at each sample (m).
     pub(super) distance: Vec<f64>,
@@ -45,8 +45,8 @@ impl Judge {
         Ok(judge)
     }
 
-    pub(super) fn figures(&self, job: &Job<'_>, motion: &Motion) -> Result<Judged, Error> {
-        let Seen { error, efforts } = job.seen(&self.arm, &self.run, motion)?;
+    pub(super) fn figures(&self, job: &Job<'_>, motion: &Motion) -> Result<PlantResult, Error> {
+        let RunResult { error, efforts } = job.seen(&self.arm, &self.run, motion)?;
         let distance = distances(&error);
         let turns = error.column_iter().map(|e| e.rows(3, 3).norm()).fold(0.0, f64::max);
         let figures = ErrorFigures {
@@ -55,7 +55,7 @@ impl Judge {
             peak_rad: turns,
             end_m: distance.last().copied().unwrap_or(0.0),
         };
-        Ok(Judged { figures, distance, efforts })
+        Ok(PlantResult { figures, distance, efforts })
     }
 }
 

@@ -263,7 +263,7 @@ pub fn compensate_motion_until(
 
 /// The motions before and after, for files.
 #[cfg_attr(not(feature = "rerun"), expect(dead_code, reason = "for recordings alone"))]
-struct Found {
+struct MotionPair {
     /// Requested scenario, slowed and shaped.
     scenario: Scenario,
     /// New motion.
@@ -277,7 +277,7 @@ fn attempt(
     scenario: &Scenario,
     request: &CompensateRequest,
     stop: Stop<'_>,
-) -> Result<(Compensation, Found, Vec<MotionViolation>), Error> {
+) -> Result<(Compensation, MotionPair, Vec<MotionViolation>), Error> {
     let (motion, shaper) = match request.shaper {
         Some(shaping) => shaped(arm, scenario, shaping).map(|(motion, figures)| (motion, Some(figures)))?,
         None => (scenario.motion.clone(), None),
@@ -330,7 +330,7 @@ fn attempt(
     answer.caveats = caveats::of(&answer, &own, robot, &found, job.rows.len());
     answer.caveats.extend(caveats::of_servos(&judge.arm, &after.efforts));
     let motion = found.motion;
-    Ok((answer, Found { scenario, motion }, own))
+    Ok((answer, MotionPair { scenario, motion }, own))
 }
 
 fn check(scenario: &Scenario, request: &CompensateRequest, arm: &Arm) -> Result<(), CompensateError> {

@@ -2,7 +2,7 @@
 
 use flexarm_trajectory::{Extreme, JointLimits};
 
-use super::{CompensateError, CompensateRequest, Compensation, Found, Stop, attempt};
+use super::{CompensateError, CompensateRequest, Compensation, MotionPair, Stop, attempt};
 use flexarm_run::Arm;
 use flexarm_run::Caveat;
 use flexarm_run::Error;
@@ -75,7 +75,7 @@ pub(super) fn kept(
     scenario: &Scenario,
     request: &CompensateRequest,
     stop: Stop<'_>,
-) -> Result<(Compensation, Found), Error> {
+) -> Result<(Compensation, MotionPair), Error> {
     let mut scenario = scenario.clone();
     let mut slowed = 1.0;
     for _ in 0..MOST_TIMES {
@@ -84,7 +84,7 @@ pub(super) fn kept(
         if slowed > 1.0 {
             let text = format!("the motion is slowed down by a factor of {slowed:.4} to satisfy joint limits");
             let help = "allow violations (`limits` = tell), or slow the motion down where it is fastest";
-            answer.caveats.push(Caveat::said("slowed", "compensation", text, help));
+            answer.caveats.push(Caveat::from_message("slowed", "compensation", text, help));
         }
         let worse: Vec<MotionViolation> = worse(&answer.limits, &own).cloned().collect();
         if worse.is_empty() || request.limits == LimitRule::Tell {

@@ -125,15 +125,15 @@ pub(super) fn corrected(
     let understood = |bytes: &[u8], others: Vec<(PathBuf, Vec<u8>)>| -> Result<Understood, Error> {
         let text = program_text(path, bytes, &controller, others)?;
         let places = target_joints(&text.program, &controller, &PathOptions::default());
-        let told = |source| Error::Path { path: path.clone(), source: Box::new(source), notes: Vec::new() };
-        Ok(Understood { places: places.map_err(told)?, text })
+        let notes = |source| Error::Path { path: path.clone(), source: Box::new(source), notes: Vec::new() };
+        Ok(Understood { places: places.map_err(notes)?, text })
     };
     let old = understood(&flexarm_trajectory::bytes_of_file(path)?, Vec::new())?;
     let stops = stops(&old, scenario);
     let rests = stops.iter().map(|stop| stop.rest_s).collect();
     let rest = AtRest::new(arm, &controller, scenario, request, rests)?;
 
-    let found: Vec<Result<Told, String>> = stops.par_iter().map(|stop| rest.target(stop)).collect();
+    let found: Vec<Result<TargetValues, String>> = stops.par_iter().map(|stop| rest.target(stop)).collect();
     let mut left: Vec<(usize, String)> = Vec::new();
     let mut targets = Vec::new();
     for (stop, found) in stops.iter().zip(found) {
@@ -221,43 +221,43 @@ fn judged(
 
 /// Lists, as sentences, the effects of loads and servos that the targets do not cover.
 fn uncovered(rest: &AtRest<'_>, stops: &[Stop<'_>], scenario: &Scenario) -> Vec<String> {
-    let mut told = Vec::new();
+    let mut notes = Vec::new();
     if rest.sags {
-        told.push(
+        notes.push(
             "servos without integral action have a steady-state error: the targets of the program do not correct it"
                 .to_owned(),
         );
     }
     if !rest.is_loaded() {
-        return told;
+        return notes;
     }
     if scenario.motion.tool_path.is_none() {
-        told.push(
+        notes.push(
             "the times at which the motion reaches its targets are unknown: the loads at the start are used".to_owned(),
         );
     }
-    told.push(
+    notes.push(
         "the program does not correct for loads between the targets: each target is corrected for the loads that \
          act while the arm is there"
             .to_owned(),
     );
     let passed = stops.iter().filter(|stop| stop.rest_s[1] <= stop.rest_s[0] && rest.acts(stop.rest_s)).count();
     if passed > 0 {
-        told.push(format!(
+        notes.push(format!(
             "targets passed without a stop: {passed}; they are corrected for the loads at the time of passing"
         ));
     }
     let changing = stops.iter().filter_map(|stop| Some((rest.change(stop.rest_s)?, stop.of.line)));
     let changing: Vec<(f64, usize)> = changing.filter(|(change, _)| *change > CHANGES).collect();
     if let Some((worst, line)) = changing.iter().max_by(|a, b| a.0.total_cmp(&b.0)) {
-        told.push(format!(
+        notes.push(format!(
             "at {} targets the loads change while the arm is there, most in line {line} (up to {:.0} % of the \
              maximum from the mean): the correction uses the mean load",
             changing.len(),
             100.0 * worst
         ));
     }
-    told
+    notes
 }
 
 /// Returns the path of a file of the program in the output folder.
@@ -271,7 +271,7 @@ fn plain(name: &str) -> String {
 }
 
 /// New values for a target, and for an auxiliary point.
-type Told = (NewTarget, Option<Vector3<f64>>);
+type TargetValues = (NewTarget, Option<Vector3<f64>>);
 
 /// The arm at rest: the rigid arm of the controller and the flexible one.
 struct AtRest<'a> {
@@ -376,7 +376,7 @@ impl<'a> AtRest<'a> {
     }
 
     /// Computes the new values of a target, and of an auxiliary point.
-    fn target(&self, stop: &Stop<'_>) -> Result<Told, String> {
+    fn target(&self, stop: &Stop<'_>) -> Result<TargetValues, String> {
         let (of, q) = (stop.of, stop.q);
         let target = match target_at(self.arm, of, &self.joints(stop, q)?) {
             Target::Joints(values) => NewTarget::Joints(values),

@@ -7,7 +7,7 @@ use flexarm_analysis::{PathFrame, tcp_error};
 use flexarm_log::{LogError, Recorder, RunHeader, RunResult, Sample, TwinSample};
 use nalgebra::Vector3;
 
-use super::{CompensateRequest, Compensation, Found};
+use super::{CompensateRequest, Compensation, MotionPair};
 use flexarm_run::Arm;
 use flexarm_run::Error;
 use flexarm_run::RunOptions;
@@ -24,7 +24,7 @@ pub(super) fn record(
     path: &Path,
     answer: &Compensation,
     arm: &Arm,
-    found: &Found,
+    found: &MotionPair,
     request: &CompensateRequest,
 ) -> Result<(), Error> {
     let options = flexarm_log::CreateOptions::default().with_overwrite(request.overwrite);

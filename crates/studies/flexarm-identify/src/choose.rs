@@ -4,7 +4,7 @@ use crate::estimation::{Probe, Reading, ReadingKind};
 
 use super::error::IdentifyFileError;
 use super::file::MeasurementInput;
-use super::parameters::{self, Written};
+use super::parameters::{self, ParameterLocation};
 use flexarm_run::Arm;
 use flexarm_run::Error;
 use flexarm_run::Robot;
@@ -81,13 +81,13 @@ pub(super) fn chosen(arm: &Arm, input: &MeasurementInput, fit: &[String]) -> Res
 fn said_twice(chosen: &[parameters::Candidate]) -> Option<(String, String)> {
     let factor_of = |own: &str| {
         let factors = chosen.iter().filter(|c| match &c.written {
-            Written::Link { link } | Written::LinkDirection { link, .. } => link == own,
+            ParameterLocation::Link { link } | ParameterLocation::LinkDirection { link, .. } => link == own,
             _ => false,
         });
         factors.map(|c| c.parameter.name.clone()).next()
     };
     chosen.iter().find_map(|c| match &c.written {
-        Written::LinkEntry { link, .. } => Some((c.parameter.name.clone(), factor_of(link)?)),
+        ParameterLocation::LinkEntry { link, .. } => Some((c.parameter.name.clone(), factor_of(link)?)),
         _ => None,
     })
 }
@@ -99,7 +99,7 @@ pub(super) fn check_tool(
     chosen: &[parameters::Candidate],
     input: &MeasurementInput,
 ) -> Result<(), Error> {
-    let Some(tool) = chosen.iter().find(|c| matches!(c.written, Written::Tool { .. })) else { return Ok(()) };
+    let Some(tool) = chosen.iter().find(|c| matches!(c.written, ParameterLocation::Tool { .. })) else { return Ok(()) };
     if let Some(link) = &robot.tcp_override {
         return Err(IdentifyFileError::OtherTool { name: tool.parameter.name.clone(), link: link.clone() }.into());
     }

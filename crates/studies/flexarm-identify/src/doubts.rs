@@ -51,7 +51,7 @@ pub(super) fn caveats(found: &Identified) -> Vec<Caveat> {
             "the residuals are {factor:.1} times as large as the standard deviations of the readings: the model lacks \
              a flexible part, loads or frames are wrong, or the standard deviations are too small; {results}"
         );
-        caveats.push(Caveat::said(
+        caveats.push(Caveat::from_message(
             "misfit",
             "measurements",
             text,
@@ -60,7 +60,7 @@ pub(super) fn caveats(found: &Identified) -> Vec<Caveat> {
     }
     for parameter in found.parameters.iter().filter(|p| !p.identifiable) {
         let text = format!("these readings do not determine {}: it keeps its initial value", parameter.name);
-        caveats.push(Caveat::said(
+        caveats.push(Caveat::from_message(
             "not-identifiable",
             "measurements",
             text,
@@ -73,11 +73,16 @@ pub(super) fn caveats(found: &Identified) -> Vec<Caveat> {
              deviations): there are too many parameters for these readings",
             held.rms, held.rms_initial
         );
-        caveats.push(Caveat::said("over-fitted", "measurements", text, "fit fewer parameters or measure more poses"));
+        caveats.push(Caveat::from_message(
+            "over-fitted",
+            "measurements",
+            text,
+            "fit fewer parameters or measure more poses",
+        ));
     }
     if !found.solution.converged && found.misfit.is_none() {
         let text = "the fit did not converge: its values may be inaccurate";
-        caveats.push(Caveat::said("not-converged", "measurements", text, "use better initial values"));
+        caveats.push(Caveat::from_message("not-converged", "measurements", text, "use better initial values"));
     }
     caveats
 }
@@ -93,7 +98,7 @@ pub(super) fn gear_caveat(robot: &Robot) -> Option<Caveat> {
             "the fit ignores hysteresis and transmission errors of {}: it models gears as springs",
             joints.join(", ")
         );
-        Caveat::said("gear-laws", "measurements", text, "apply every load from the same side").as_note()
+        Caveat::from_message("gear-laws", "measurements", text, "apply every load from the same side").as_note()
     })
 }
 
@@ -163,6 +168,6 @@ pub(super) fn frame_caveat(answer: &Identification) -> Option<Caveat> {
              values, their order, signs or units, or the targets are not those of this robot",
             1e3 * left
         );
-        Caveat::said("frames", "measurements", text, "compare one pose by hand with the robot model (inspect)")
+        Caveat::from_message("frames", "measurements", text, "compare one pose by hand with the robot model (inspect)")
     })
 }

@@ -10,7 +10,7 @@ use nalgebra::DVector;
 use serde::Serialize;
 
 use super::file::{EncoderRecording, MeasurementInput};
-use super::parameters::{Candidate, Written, candidates};
+use super::parameters::{Candidate, ParameterLocation, candidates};
 use flexarm_run::Arm;
 use flexarm_run::Error;
 use flexarm_run::RobotCoupling;
@@ -92,7 +92,11 @@ impl EncoderFigures {
 }
 
 /// Estimates the stiffness of each gear with an encoder on its link side.
-pub(super) fn told(arm: &Arm, input: &MeasurementInput, chosen: &[Candidate]) -> Result<Vec<EncoderFigures>, Error> {
+pub(super) fn encoder_figures(
+    arm: &Arm,
+    input: &MeasurementInput,
+    chosen: &[Candidate],
+) -> Result<Vec<EncoderFigures>, Error> {
     let Some(first) = input.recordings.first() else { return Ok(Vec::new()) };
     let model = link_side(&arm.robot().rigid)
         .map_err(|source| Error::Model { path: arm.robot().urdf_path.clone(), source: Box::new(source) })?;
@@ -146,7 +150,8 @@ fn noise(runs: &[Smooth<'_>], joint: usize) -> f64 {
 
 /// Returns the parameter for a gearbox with one stiffness.
 fn gearbox_of<'a>(of: &'a [Candidate], joint: &str) -> Option<&'a Parameter> {
-    let is_it = |c: &&Candidate| matches!(&c.written, Written::Gearbox { joint: own, entry: None } if own == joint);
+    let is_it =
+        |c: &&Candidate| matches!(&c.written, ParameterLocation::Gearbox { joint: own, entry: None } if own == joint);
     of.iter().find(is_it).map(|c| &c.parameter)
 }
 

@@ -31,7 +31,7 @@ use self::choose::{check_tool, chosen};
 use self::doubts::{encoder_caveats, frame_caveat, gear_caveat, load_caveats};
 use self::error::{of_names, of_slip};
 use self::file::{Cell, MeasurementInput};
-use self::parameters::Written;
+use self::parameters::ParameterLocation;
 use self::units::{check_modes, check_units};
 use flexarm_run::Arm;
 use flexarm_run::Error;
@@ -110,7 +110,7 @@ pub fn identify_robot(robot: &Robot, measurements: &Path, request: &IdentifyRequ
     let joints = joints_of(&arm);
     let mut input = file::read(measurements, &Cell { joints: &joints, arm: &arm })?;
     let chosen = chosen(&arm, &input, &request.fit)?;
-    let encoders = encoders::told(&arm, &input, &chosen)?;
+    let encoders = encoders::encoder_figures(&arm, &input, &chosen)?;
     input.measurements.readings.extend(encoders.iter().filter_map(EncoderFigures::reading));
     if input.measurements.readings.is_empty() {
         return Err(
@@ -178,14 +178,15 @@ impl Targets {
         found: &Identified,
         answer: &mut Identification,
     ) -> Result<(), Error> {
-        let told = found.parameters.iter().zip(chosen).filter(|(p, _)| p.identifiable);
-        let told: Vec<(Found, Written)> = told.map(|(p, c)| (p.clone(), c.written.clone())).collect();
+        let identified = found.parameters.iter().zip(chosen).filter(|(p, _)| p.identifiable);
+        let identified: Vec<(ParameterEstimate, ParameterLocation)> =
+            identified.map(|(p, c)| (p.clone(), c.written.clone())).collect();
         let text = flexarm_files::read_text(&robot.path)?;
         let home = robot.path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
         let folder = self.robot.parent().unwrap_or(Path::new("."));
         // Relative paths from the new file need its folder to exist.
         std::fs::create_dir_all(folder).map_err(|source| Error::Write { path: folder.to_owned(), source })?;
-        let new = rewrite::rewritten(&text, &told, robot.tcp(), home, folder)
+        let new = rewrite::rewritten(&text, &identified, robot.tcp(), home, folder)
             .map_err(|what| Error::File { path: robot.path.clone(), what })?;
         (answer.file, answer.page) = (Some(self.robot.display().to_string()), Some(self.page.display().to_string()));
         let page = page::html(answer);

@@ -15,7 +15,7 @@
 //! | `link.LINK.damping` | modal ratio, `stiffness_beta` (s), or a factor on `rayleigh` |
 //! | `payload.mass` | mass of the payload (kg), its centre of mass fixed |
 
-use crate::estimation::{Effect, Parameter, Place, Plant};
+use crate::estimation::{Effect, Parameter, Plant, SpringPart};
 use flexarm_flexlink::GearStiffness;
 use flexarm_kinematics::SpatialInertia;
 use flexarm_stepping::Damping;
@@ -34,7 +34,7 @@ const DIRECTIONS: &str = "stiffness_factors";
 
 /// Location of a parameter in the robot file.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Written {
+pub(crate) enum ParameterLocation {
     /// `[[drive]]` of the joint: stiffness of its gearbox, or one of its entries.
     Gearbox { joint: String, entry: Option<usize> },
     /// `[[drive]]` of the joint: damping of its gearbox, or one of its entries.
@@ -59,7 +59,7 @@ pub(crate) enum Written {
 #[derive(Clone, Debug)]
 pub(crate) struct Candidate {
     pub(crate) parameter: Parameter,
-    pub(crate) written: Written,
+    pub(crate) written: ParameterLocation,
 }
 
 /// Returns all parameters of an arm, in the order of drives, links, tool and payload.
@@ -86,9 +86,9 @@ pub(crate) fn candidates(robot: &Robot, flexible: &FlexibleRobot) -> Vec<Candida
             continue;
         }
         let Some(link) = robot.flexible.iter().find(|link| link.flexible.link == span.link) else { continue };
-        let places = springs.iter().map(|spring| Place { spring: *spring, coordinate: None }).collect();
+        let places = springs.iter().map(|spring| SpringPart { spring: *spring, coordinate: None }).collect();
         let name = format!("link.{}.stiffness_factor", span.link);
-        let written = Written::Link { link: span.link.clone() };
+        let written = ParameterLocation::Link { link: span.link.clone() };
         found.push(stiffness(name, "1", link.stiffness_factor, places, written));
         let groups = flexible.model.elastic();
         if springs.iter().all(|spring| groups[*spring].size == 6 && !groups[*spring].modal) {
@@ -104,7 +104,7 @@ pub(crate) fn candidates(robot: &Robot, flexible: &FlexibleRobot) -> Vec<Candida
         };
         if initial > 0.0 {
             let name = format!("link.{}.damping", span.link);
-            let written = Written::LinkDamping { link: span.link.clone() };
+            let written = ParameterLocation::LinkDamping { link: span.link.clone() };
             found.push(Candidate::new(name, unit, initial, Effect::Damping(springs.clone()), written));
         }
     }
@@ -112,7 +112,7 @@ pub(crate) fn candidates(robot: &Robot, flexible: &FlexibleRobot) -> Vec<Candida
         let mass = robot.rigid.link(PAYLOAD_LINK).and_then(|link| link.inertia).map_or(0.0, |inertia| inertia.mass);
         let per_kg = SpatialInertia::from_com(1.0, &Vector3::zeros(), &Matrix3::zeros()).at_parent(&frame.X_BF);
         let effect = Effect::Mass { body: frame.body, per_kg };
-        found.push(Candidate::new("payload.mass".into(), "kg", mass, effect, Written::Payload));
+        found.push(Candidate::new("payload.mass".into(), "kg", mass, effect, ParameterLocation::Payload));
     }
     if !found.is_empty() {
         found.extend(tool_parameters());
@@ -121,14 +121,14 @@ pub(crate) fn candidates(robot: &Robot, flexible: &FlexibleRobot) -> Vec<Candida
 }
 
 impl Candidate {
-    fn new(name: String, unit: &str, initial: f64, effect: Effect, written: Written) -> Self {
+    fn new(name: String, unit: &str, initial: f64, effect: Effect, written: ParameterLocation) -> Self {
         let mut parameter = Parameter { name, unit: unit.into(), initial, prior: 1.0, effect };
         parameter.prior = parameter.reference();
         Self { parameter, written }
     }
 }
 
-fn stiffness(name: String, unit: &str, initial: f64, places: Vec<Place>, written: Written) -> Candidate {
+fn stiffness(name: String, unit: &str, initial: f64, places: Vec<SpringPart>, written: ParameterLocation) -> Candidate {
     Candidate::new(name, unit, initial, Effect::Stiffness(places), written)
 }
 
@@ -146,7 +146,13 @@ fn gearbox_damping(joint: &str, dampers: &[f64], springs: &[usize], slides: bool
             [_] => Effect::Damping(vec![spring]),
             _ => Effect::Damper { spring, coordinate },
         };
-        Candidate::new(name, unit, *initial, effect, Written::GearboxDamping { joint: joint.to_owned(), entry })
+        Candidate::new(
+            name,
+            unit,
+            *initial,
+            effect,
+            ParameterLocation::GearboxDamping { joint: joint.to_owned(), entry },
+        )
     };
     dampers.iter().enumerate().filter(|(_, d)| **d > 0.0).map(damper).collect()
 }
@@ -159,8 +165,8 @@ fn link_directions<'a>(
     springs: &'a [usize],
 ) -> impl Iterator<Item = Candidate> + 'a {
     factors.iter().enumerate().map(move |(entry, factor)| {
-        let places = springs.iter().map(|spring| Place { spring: *spring, coordinate: Some(entry) }).collect();
-        let written = Written::LinkDirection { link: link.to_owned(), entry };
+        let places = springs.iter().map(|spring| SpringPart { spring: *spring, coordinate: Some(entry) }).collect();
+        let written = ParameterLocation::LinkDirection { link: link.to_owned(), entry };
         stiffness(format!("link.{link}.{DIRECTIONS}[{entry}]"), "1", *factor, places, written)
     })
 }
@@ -184,7 +190,7 @@ fn link_entries(link: &RobotLink, spring: usize, flexible: &FlexibleRobot) -> Ve
         };
         let size = (K[(row, row)] * K[(column, column)]).sqrt();
         let effect = Effect::Entry { spring, row, column, factor: factor(row, column), size };
-        let written = Written::LinkEntry { link: name.clone(), row, column, K: Box::new(K) };
+        let written = ParameterLocation::LinkEntry { link: name.clone(), row, column, K: Box::new(K) };
         Candidate::new(format!("link.{name}.stiffness[{row}][{column}]"), unit, K[(row, column)], effect, written)
     };
     (0..6).flat_map(|row| (row..6).map(move |column| (row, column))).map(|(row, column)| entry(row, column)).collect()
@@ -194,15 +200,15 @@ fn link_entries(link: &RobotLink, spring: usize, flexible: &FlexibleRobot) -> Ve
 fn tool_parameters() -> impl Iterator<Item = Candidate> {
     ["x", "y", "z", "rx", "ry", "rz"].into_iter().enumerate().map(|(axis, name)| {
         let unit = if axis < 3 { "m" } else { "rad" };
-        Candidate::new(format!("tcp.{name}"), unit, 0.0, Effect::Tool(axis), Written::Tool { axis })
+        Candidate::new(format!("tcp.{name}"), unit, 0.0, Effect::Tool(axis), ParameterLocation::Tool { axis })
     })
 }
 
 fn gearbox_parameters(joint: &str, K: &GearStiffness, springs: &[usize], slides: bool) -> Vec<Candidate> {
     let name = format!("drive.{joint}.gearbox.stiffness");
     let about = if slides { "N/m" } else { "N m/rad" };
-    let written = |entry| Written::Gearbox { joint: joint.to_owned(), entry };
-    let whole = |spring| vec![Place { spring, coordinate: None }];
+    let written = |entry| ParameterLocation::Gearbox { joint: joint.to_owned(), entry };
+    let whole = |spring| vec![SpringPart { spring, coordinate: None }];
     match (K, springs) {
         (GearStiffness::Axis(k), [spring]) => vec![stiffness(name, about, *k, whole(*spring), written(None))],
         (GearStiffness::Tilting(k), [_, _, _]) => {
@@ -213,14 +219,14 @@ fn gearbox_parameters(joint: &str, K: &GearStiffness, springs: &[usize], slides:
         (GearStiffness::Full(K), [spring]) if is_diagonal(K) => {
             let entry = |i: usize| {
                 let unit = if i < 3 { "N/m" } else { "N m/rad" };
-                let place = vec![Place { spring: *spring, coordinate: Some(i) }];
+                let place = vec![SpringPart { spring: *spring, coordinate: Some(i) }];
                 stiffness(format!("{name}[{i}]"), unit, K[(i, i)], place, written(Some(i)))
             };
             (0..6).map(entry).collect()
         }
         // Full matrix: one factor on all entries.
         _ => {
-            let places = springs.iter().map(|spring| Place { spring: *spring, coordinate: None }).collect();
+            let places = springs.iter().map(|spring| SpringPart { spring: *spring, coordinate: None }).collect();
             vec![stiffness(name, "1", 1.0, places, written(None))]
         }
     }
@@ -237,8 +243,14 @@ fn mounting_parameters(robot: &Robot, springs: &[usize]) -> Vec<Candidate> {
     }
     let entry = |i: usize| {
         let unit = if i < 3 { "N/m" } else { "N m/rad" };
-        let place = vec![Place { spring: *spring, coordinate: Some(i) }];
-        stiffness(format!("mounting.stiffness[{i}]"), unit, mounting.K_S[(i, i)], place, Written::Mounting { entry: i })
+        let place = vec![SpringPart { spring: *spring, coordinate: Some(i) }];
+        stiffness(
+            format!("mounting.stiffness[{i}]"),
+            unit,
+            mounting.K_S[(i, i)],
+            place,
+            ParameterLocation::Mounting { entry: i },
+        )
     };
     (0..6).map(entry).collect()
 }

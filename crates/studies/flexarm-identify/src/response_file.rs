@@ -270,8 +270,8 @@ impl Reader<'_> {
             return Err(fail(format!("the file has {size} bytes, the maximum is {LARGEST}")));
         }
         let bytes = std::fs::read(path).map_err(|error| fail(error.to_string()))?;
-        let told = [&e.watched, &e.hit].into_iter().flatten().next();
-        if let Some(node) = told {
+        let given = [&e.watched, &e.hit].into_iter().flatten().next();
+        if let Some(node) = given {
             return Err(self.error(node.span(), "a universal file contains nodes and directions: remove them here"));
         }
         let functions = read_functions(&bytes).map_err(&fail)?;

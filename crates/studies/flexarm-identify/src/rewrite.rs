@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
-use crate::estimation::Found;
+use crate::estimation::ParameterEstimate;
 use flexarm_kinematics::Pose;
 use nalgebra::{Matrix6, Rotation3, Translation3, Vector3};
 use toml_edit::{Array, DocumentMut, InlineTable, Item, Table, TableLike, Value};
 
-use super::parameters::Written;
+use super::parameters::ParameterLocation;
 
 /// Returns the text of the robot file with the identified values; each is listed in a comment with
 /// its standard deviation.
@@ -20,30 +20,30 @@ use super::parameters::Written;
 /// A sentence that names the missing entry.
 pub(super) fn rewritten(
     text: &str,
-    found: &[(Found, Written)],
+    found: &[(ParameterEstimate, ParameterLocation)],
     tool: (&str, &Pose),
     home: &Path,
     to: &Path,
 ) -> Result<String, String> {
     let mut file: DocumentMut = text.parse().map_err(|error: toml_edit::TomlError| error.to_string())?;
-    let mut told: Vec<(String, &Found)> = Vec::new();
+    let mut changes: Vec<(String, &ParameterEstimate)> = Vec::new();
     for (parameter, written) in found {
         match written {
-            Written::Gearbox { joint, entry } => {
+            ParameterLocation::Gearbox { joint, entry } => {
                 let drive = named(&mut file, "drive", "joint", joint)?;
                 let gearbox = drive.get_mut("gearbox").and_then(Item::as_table_like_mut);
                 let stiffness = gearbox.and_then(|gearbox| gearbox.get_mut("stiffness"));
                 let stiffness =
                     stiffness.ok_or_else(|| format!("the drive of joint {joint:?} has no gearbox.stiffness"))?;
                 put_stiffness(stiffness, *entry, parameter)?;
-                told.push((format!("drive of {joint}"), parameter));
+                changes.push((format!("drive of {joint}"), parameter));
             }
-            Written::Link { link } => {
+            ParameterLocation::Link { link } => {
                 let entry = named(&mut file, "flexible_link", "link", link)?;
                 entry.insert("stiffness_factor", toml_edit::value(rounded(parameter.value, parameter.std)));
-                told.push((format!("link {link}"), parameter));
+                changes.push((format!("link {link}"), parameter));
             }
-            Written::LinkDirection { link, entry: number } => {
+            ParameterLocation::LinkDirection { link, entry: number } => {
                 let entry = named(&mut file, "flexible_link", "link", link)?;
                 if entry.get("stiffness_factors").is_none() {
                     let ones: toml_edit::Array = [1.0; 6].into_iter().collect();
@@ -53,13 +53,13 @@ pub(super) fn rewritten(
                 let old = factors.and_then(|factors| factors.get_mut(*number));
                 let old = old.ok_or_else(|| format!("link {link:?} has no stiffness_factors[{number}]"))?;
                 replace(old, rounded(parameter.value, parameter.std));
-                told.push((format!("link {link}"), parameter));
+                changes.push((format!("link {link}"), parameter));
             }
-            Written::GearboxDamping { joint, entry } => {
+            ParameterLocation::GearboxDamping { joint, entry } => {
                 put_gear_damping(named(&mut file, "drive", "joint", joint)?, joint, *entry, parameter)?;
-                told.push((format!("drive of {joint}"), parameter));
+                changes.push((format!("drive of {joint}"), parameter));
             }
-            Written::LinkDamping { link } => {
+            ParameterLocation::LinkDamping { link } => {
                 let entry = named(&mut file, "flexible_link", "link", link)?;
                 let damping = entry.get_mut("damping").and_then(Item::as_table_like_mut);
                 match damping.and_then(|damping| damping.iter_mut().next().map(|(_, value)| value)) {
@@ -75,25 +75,25 @@ pub(super) fn rewritten(
                         entry.insert("damping", toml_edit::value(modal));
                     }
                 }
-                told.push((format!("link {link}"), parameter));
+                changes.push((format!("link {link}"), parameter));
             }
-            Written::LinkEntry { link, row, column, K } => {
+            ParameterLocation::LinkEntry { link, row, column, K } => {
                 let entry = named(&mut file, "flexible_link", "link", link)?;
                 put_entry(entry, (*row, *column), K, rounded(parameter.value, parameter.std))
                     .ok_or_else(|| format!("the stiffness of link {link:?} is not a 6x6 matrix"))?;
-                told.push((format!("link {link}"), parameter));
+                changes.push((format!("link {link}"), parameter));
             }
-            Written::Tool { .. } => told.push(("tcp".into(), parameter)),
-            Written::Mounting { entry } => {
+            ParameterLocation::Tool { .. } => changes.push(("tcp".into(), parameter)),
+            ParameterLocation::Mounting { entry } => {
                 let mounting = file.get_mut("mounting").and_then(Item::as_table_like_mut);
                 let stiffness = mounting.and_then(|mounting| mounting.get_mut("stiffness"));
                 put_stiffness(stiffness.ok_or("there is no mounting.stiffness")?, Some(*entry), parameter)?;
-                told.push(("mounting".into(), parameter));
+                changes.push(("mounting".into(), parameter));
             }
-            Written::Payload => {
+            ParameterLocation::Payload => {
                 let payload = file.get_mut("payload").and_then(Item::as_table_like_mut).ok_or("there is no payload")?;
                 payload.insert("mass", toml_edit::value(rounded(parameter.value, parameter.std)));
-                told.push(("payload".into(), parameter));
+                changes.push(("payload".into(), parameter));
             }
         }
     }
@@ -101,14 +101,14 @@ pub(super) fn rewritten(
     if home != to {
         moved_paths(&mut file, home, to);
     }
-    Ok(comments(&told) + &file.to_string())
+    Ok(comments(&changes) + &file.to_string())
 }
 
 /// Returns the header comment that lists the identified values.
-fn comments(told: &[(String, &Found)]) -> String {
+fn comments(changes: &[(String, &ParameterEstimate)]) -> String {
     let mut out = String::from("# Identified by flexarm identify: value, standard deviation, previous value.\n");
-    for (_, p) in told {
-        let Found { name, unit, value, std, initial, .. } = p;
+    for (_, p) in changes {
+        let ParameterEstimate { name, unit, value, std, initial, .. } = p;
         let deviation = match std.is_finite() {
             true => format!("+- {} {unit}", rounded(*std, *std)),
             false => format!("{unit} (the fit does not reproduce the readings: no standard deviation)"),
@@ -154,7 +154,7 @@ fn named<'a>(file: &'a mut DocumentMut, list: &str, key: &str, name: &str) -> Re
     }
 }
 
-fn put_stiffness(item: &mut Item, entry: Option<usize>, found: &Found) -> Result<(), String> {
+fn put_stiffness(item: &mut Item, entry: Option<usize>, found: &ParameterEstimate) -> Result<(), String> {
     let Some(value) = item.as_value_mut() else { return Err("gearbox.stiffness is not a number or a list".into()) };
     let number = rounded(found.value, found.std);
     match (value, entry) {
@@ -192,10 +192,14 @@ fn put_entry(link: &mut dyn TableLike, place: (usize, usize), K: &Matrix6<f64>, 
 }
 
 /// Writes the pose of the tool, moved and rotated about its own axes by the identified values.
-fn put_tool(file: &mut DocumentMut, found: &[(Found, Written)], tool: (&str, &Pose)) -> Result<(), String> {
+fn put_tool(
+    file: &mut DocumentMut,
+    found: &[(ParameterEstimate, ParameterLocation)],
+    tool: (&str, &Pose),
+) -> Result<(), String> {
     let mut shift = [0.0; 6];
     for (parameter, written) in found {
-        if let Written::Tool { axis } = written {
+        if let ParameterLocation::Tool { axis } = written {
             shift[*axis] = parameter.value;
         }
     }
@@ -220,7 +224,12 @@ fn put_tool(file: &mut DocumentMut, found: &[(Found, Written)], tool: (&str, &Po
 }
 
 /// Sets the damping of a gearbox, or one entry of it.
-fn put_gear_damping(drive: &mut dyn TableLike, joint: &str, entry: Option<usize>, found: &Found) -> Result<(), String> {
+fn put_gear_damping(
+    drive: &mut dyn TableLike,
+    joint: &str,
+    entry: Option<usize>,
+    found: &ParameterEstimate,
+) -> Result<(), String> {
     let gearbox = drive.get_mut("gearbox").and_then(Item::as_table_like_mut);
     let damping = gearbox.and_then(|gearbox| gearbox.get_mut("damping")).and_then(Item::as_value_mut);
     let damping = damping.ok_or_else(|| format!("the drive of joint {joint:?} has no gearbox.damping"))?;
@@ -236,7 +245,7 @@ fn put_gear_damping(drive: &mut dyn TableLike, joint: &str, entry: Option<usize>
 
 /// Sets a number to the new value; scales the entries of a longer list by the ratio of new to
 /// initial.
-fn put_damping(item: &mut Value, found: &Found) {
+fn put_damping(item: &mut Value, found: &ParameterEstimate) {
     let factor = found.value / found.initial;
     match item {
         Value::Array(list) if list.len() == 1 => {
@@ -300,9 +309,9 @@ fn relative(path: &Path, from: &Path) -> std::path::PathBuf {
 mod tests {
     use super::*;
 
-    fn found(name: &str, initial: f64, value: f64, std: f64) -> Found {
+    fn found(name: &str, initial: f64, value: f64, std: f64) -> ParameterEstimate {
         let (name, unit) = (name.to_owned(), "N m/rad".to_owned());
-        Found { name, unit, initial, value, std, interval: [0.0, 0.0], identifiable: true }
+        ParameterEstimate { name, unit, initial, value, std, interval: [0.0, 0.0], identifiable: true }
     }
 
     #[test]
@@ -310,12 +319,12 @@ mod tests {
         let text = "format = 1 # version\nurdf = \"a.urdf\"\n\n[[drive]]\njoint = \"j1\"\nkind = \"gearbox\"\n\
                     gearbox = { stiffness = 1.0e6, damping = 3.0 } # maker\n\n[[drive]]\njoint = \"j2\"\nkind = \"gearbox\"\n\
                     [drive.gearbox]\nstiffness = [1.0, 2.0, 3.0] # three\n\n[[flexible_link]]\nlink = \"arm\" # bends\n";
-        let gear = |joint: &str, entry| Written::Gearbox { joint: joint.into(), entry };
+        let gear = |joint: &str, entry| ParameterLocation::Gearbox { joint: joint.into(), entry };
         let all = [
             (found("a", 1e6, 1.234567e6, 2.0e3), gear("j1", None)),
             (found("b", 2.0, 2.51234, 0.02), gear("j2", Some(1))),
-            (found("c", 1.0, 0.87654321, 0.01), Written::Link { link: "arm".into() }),
-            (found("d", 1.0, 1.2345, 0.01), Written::LinkDirection { link: "arm".into(), entry: 4 }),
+            (found("c", 1.0, 0.87654321, 0.01), ParameterLocation::Link { link: "arm".into() }),
+            (found("d", 1.0, 1.2345, 0.01), ParameterLocation::LinkDirection { link: "arm".into(), entry: 4 }),
         ];
         let here = Path::new(".");
         let new = rewritten(text, &all, ("tool", &Pose::identity()), here, here).unwrap();

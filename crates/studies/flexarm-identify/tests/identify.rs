@@ -24,7 +24,7 @@ fn plant() -> Plant {
 }
 
 fn stiffness(name: &str, spring: usize, coordinate: Option<usize>) -> Parameter {
-    let effect = Effect::Stiffness(vec![Place { spring, coordinate }]);
+    let effect = Effect::Stiffness(vec![SpringPart { spring, coordinate }]);
     Parameter { name: name.into(), unit: "1".into(), initial: 1.0, prior: 2f64.ln(), effect }
 }
 

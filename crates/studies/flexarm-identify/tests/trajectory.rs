@@ -41,7 +41,7 @@ fn parameters(plant: &Plant) -> Vec<RunParameter> {
         let (name, unit) = (name.into(), "1".into());
         RunParameter::Arm(Parameter { name, unit, initial: 1.0, prior: 0.7, effect })
     };
-    let stiffness = |spring, coordinate| Effect::Stiffness(vec![Place { spring, coordinate }]);
+    let stiffness = |spring, coordinate| Effect::Stiffness(vec![SpringPart { spring, coordinate }]);
     let per_kg = SpatialInertia::from_com(1.0, &Vector3::new(0.1, -0.05, 0.2), &(Matrix3::identity() * 0.02));
     let K = &plant.springs[1].K;
     let size = (K[(1, 1)] * K[(5, 5)]).sqrt();
@@ -49,7 +49,7 @@ fn parameters(plant: &Plant) -> Vec<RunParameter> {
         of("shear with bending", Effect::Entry { spring: 1, row: 1, column: 5, factor: size, size: 1.0 }),
         of("lower", stiffness(0, None)),
         of("upper about y", stiffness(1, Some(4))),
-        of("both", Effect::Stiffness([0, 1].map(|spring| Place { spring, coordinate: None }).to_vec())),
+        of("both", Effect::Stiffness([0, 1].map(|spring| SpringPart { spring, coordinate: None }).to_vec())),
         of("modal damping", Effect::Damping(vec![0])),
         of("Rayleigh damping", Effect::Damping(vec![1])),
         of("mass", Effect::Mass { body: plant.tool.body, per_kg }),

@@ -3,7 +3,7 @@
 
 use flexarm_analysis::tcp_error;
 use flexarm_kinematics::Wrench;
-use flexarm_stepping::{Asked, OperatingPoint, PoseAnswer};
+use flexarm_stepping::{OperatingPoint, PoseAnswer, PoseOutputs};
 use nalgebra::{Matrix3, Matrix6, Vector3};
 
 use super::columns::{HEAD, Layout, MOST_FREQUENCIES};
@@ -23,12 +23,12 @@ pub(super) struct Seat {
 
 /// Sag and frequencies of a pose under gravity only.
 #[derive(Clone, Copy)]
-struct Weighed {
+struct GravityResult {
     sag: [f64; 6],
     hz: [f64; MOST_FREQUENCIES],
 }
 
-impl Weighed {
+impl GravityResult {
     fn new(found: &PoseAnswer, layout: &Layout) -> Self {
         let mut hz = [f64::NAN; MOST_FREQUENCIES];
         hz[..layout.frequencies].copy_from_slice(&found.frequencies_hz[..layout.frequencies]);
@@ -79,25 +79,25 @@ impl<'a> Evaluator<'a> {
     pub(super) fn push(&mut self, poses: &[f64], seats: &[Seat], rows: &mut Vec<f64>, mut failed: impl FnMut(Error)) {
         let Self { at, layout, wrench, cut } = self;
         let (joints, loaded) = (layout.joints, layout.loaded);
-        let mut push = |k: usize, weighed: &Weighed, found: &PoseAnswer| -> Result<(), Error> {
+        let mut push = |k: usize, weighed: &GravityResult, found: &PoseAnswer| -> Result<(), Error> {
             let q = &poses[k * joints..][..joints];
             let depth = cut.map(|cut| cut.lowest_limit(q)).transpose()?;
             push_row(layout, q, seats[k], weighed, found, depth, rows);
             Ok(())
         };
         // Frequencies are computed under gravity only, compliance and contributions under the load.
-        let under_weight = Asked { frequencies: layout.frequencies > 0, compliance: !loaded, jacobian: !loaded };
+        let under_weight = PoseOutputs { frequencies: layout.frequencies > 0, compliance: !loaded, jacobian: !loaded };
         if !loaded {
             return at.solve_each(poses, &Wrench::zeros(), under_weight, |k, answer| match answer {
-                Ok(found) => push(k, &Weighed::new(found, layout), found).unwrap_or_else(&mut failed),
+                Ok(found) => push(k, &GravityResult::new(found, layout), found).unwrap_or_else(&mut failed),
                 Err(error) => failed(posed::step_error(error)),
             });
         }
         let mut weighed = Vec::with_capacity(seats.len());
         at.solve_each(poses, &Wrench::zeros(), under_weight, |_, answer| {
-            weighed.push(answer.map(|found| Weighed::new(found, layout)));
+            weighed.push(answer.map(|found| GravityResult::new(found, layout)));
         });
-        let under_load = Asked { frequencies: false, compliance: true, jacobian: true };
+        let under_load = PoseOutputs { frequencies: false, compliance: true, jacobian: true };
         let mut weighed = weighed.into_iter();
         at.solve_each(poses, wrench, under_load, |k, answer| match (weighed.next(), answer) {
             (Some(Ok(weighed)), Ok(found)) => push(k, &weighed, found).unwrap_or_else(&mut failed),
@@ -111,7 +111,7 @@ fn push_row(
     layout: &Layout,
     q: &[f64],
     seat: Seat,
-    weighed: &Weighed,
+    weighed: &GravityResult,
     found: &PoseAnswer,
     depth: Option<f64>,
     rows: &mut Vec<f64>,

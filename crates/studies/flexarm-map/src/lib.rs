@@ -56,7 +56,7 @@ use self::columns::Layout;
 use self::evaluate::{Cut, Evaluator};
 use self::finder::Finder;
 use self::region::{MOST_QUERIES, round_number};
-use self::take::{Choice, Places, PoseOf, Taken, take};
+use self::take::{Choice, Evaluation, Places, PoseOf, take};
 use flexarm_chatter::{CuttingTool, LobesError, lowest_limit};
 use flexarm_run::Arm;
 use flexarm_run::Caveat;
@@ -346,7 +346,7 @@ fn region_of<'m>(
             if !finder.is_closed() {
                 let message = "the arm has no closed-form inverse kinematics: poses are found by search, which is \
                                slow and may miss branches, and places near the workspace boundary";
-                caveats.push(Caveat::said("searched-poses", "map", message, "map the arm over joint values"));
+                caveats.push(Caveat::from_message("searched-poses", "map", message, "map the arm over joint values"));
             }
             let bounds = workspace.bounds.unwrap_or_else(|| reach(model));
             let edge = (0..3).map(|c| bounds[1][c] - bounds[0][c]).fold(0.0, f64::max);
@@ -402,7 +402,7 @@ fn joint_region<'m>(ranges: &'m [JointRange], model: &Model, near: &[f64]) -> Re
         if first.min(*last) < limits.lower || first.max(*last) > limits.upper {
             let (lower, upper) = (limits.lower, limits.upper);
             let message = format!("the map moves joint {joint:?} beyond its limits {lower} to {upper}");
-            caveats.push(Caveat::said("outside-limits", joint, message, "reduce the range of the joint"));
+            caveats.push(Caveat::from_message("outside-limits", joint, message, "reduce the range of the joint"));
         }
         numbers.push(k);
         poses *= *points as f64;
@@ -470,7 +470,7 @@ fn summed_up(
     arm: &Arm,
     request: &MapRequest,
     table: MapTable,
-    taken: &Taken,
+    taken: &Evaluation,
     by: usize,
     grid: Option<&Grid>,
     directions: usize,
@@ -496,7 +496,7 @@ fn summed_up(
             "{} of {} poses have no equilibrium and are left out; at the first: {first}",
             taken.failed, taken.poses
         );
-        caveats.push(Caveat::said("no-equilibrium", "map", message, "analyse one of them with statics"));
+        caveats.push(Caveat::from_message("no-equilibrium", "map", message, "analyse one of them with statics"));
     }
     let mut placement = None;
     if let (Some(edges), Some(grid)) = (request.workpiece_m, grid) {
@@ -510,7 +510,7 @@ fn summed_up(
             let message = format!(
                 "the workpiece of {edges:?} m does not fit anywhere on the grid with all its places within reach"
             );
-            caveats.push(Caveat::said(
+            caveats.push(Caveat::from_message(
                 "no-placement",
                 "map",
                 message,
@@ -573,7 +573,7 @@ fn one_place(found: &Map) -> Option<Caveat> {
         _ => return None,
     };
     let help = "map more places: a larger box, a smaller spacing or more joint values; for a single pose use statics";
-    Some(Caveat::said("one-place", "map", message, help))
+    Some(Caveat::from_message("one-place", "map", message, help))
 }
 
 /// Returns caveats about the worst pose, where the deflections are largest.

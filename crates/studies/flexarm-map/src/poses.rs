@@ -145,7 +145,7 @@ pub(super) fn region<'m>(poses: &'m [Vec<f64>], model: &Model) -> Result<(Region
         if count > 0 {
             let (lower, upper) = (c.limits.lower, c.limits.upper);
             let message = format!("{count} poses have joint {:?} beyond its limits {lower} to {upper}", c.joint);
-            caveats.push(Caveat::said("outside-limits", &c.joint, message, "check the units of the list"));
+            caveats.push(Caveat::from_message("outside-limits", &c.joint, message, "check the units of the list"));
         }
     }
     for pose in poses {

@@ -50,7 +50,7 @@ impl Places<'_> {
 
 /// Results of the evaluation.
 #[derive(Default)]
-pub(super) struct Taken {
+pub(super) struct Evaluation {
     /// Rows in the order of the places.
     pub(super) rows: Vec<f64>,
     /// Number of places with at least one row.
@@ -63,7 +63,7 @@ pub(super) struct Taken {
     pub(super) first_failure: Option<String>,
 }
 
-impl Taken {
+impl Evaluation {
     fn add(&mut self, other: Self) {
         self.rows.extend(other.rows);
         self.reachable += other.reachable;
@@ -91,8 +91,8 @@ pub(super) fn take(
     evaluator: &Evaluator<'_>,
     choice: &Choice<'_>,
     go_on: &mut dyn FnMut(f64, f64) -> ControlFlow<()>,
-) -> Result<Taken, MapError> {
-    let (all, mut taken) = (places.count(), Taken::default());
+) -> Result<Evaluation, MapError> {
+    let (all, mut taken) = (places.count(), Evaluation::default());
     let [chunk, block] = if evaluator.is_slow() { SLOW } else { [CHUNK, BLOCK] };
     for first in (0..all).step_by(block) {
         if go_on(first as f64, all as f64).is_break() {
@@ -101,7 +101,7 @@ pub(super) fn take(
         let last = (first + block).min(all);
         let chunks: Vec<usize> = (first..last).step_by(chunk).collect();
         let worker = Worker::new(places, evaluator, choice);
-        let parts: Vec<Taken> = chunks
+        let parts: Vec<Evaluation> = chunks
             .into_par_iter()
             .map_with(worker, |worker, from| worker.chunk(from, (from + chunk).min(last)))
             .collect();
@@ -141,8 +141,8 @@ impl<'a> Worker<'a> {
         Self { places, finder, evaluator, choice, branches, waiting, seats: Vec::new(), rows: Vec::new() }
     }
 
-    fn chunk(&mut self, from: usize, to: usize) -> Taken {
-        let mut taken = Taken::default();
+    fn chunk(&mut self, from: usize, to: usize) -> Evaluation {
+        let mut taken = Evaluation::default();
         for place in from..to {
             match self.places {
                 Places::Grid { grid, rotations, finder, keep_out_m } => {
@@ -178,7 +178,7 @@ impl<'a> Worker<'a> {
     }
 
     /// Evaluates all waiting poses, and keeps the selected rows of each place.
-    fn answer(&mut self, taken: &mut Taken) {
+    fn answer(&mut self, taken: &mut Evaluation) {
         taken.poses += self.seats.len();
         let mut rows = std::mem::take(&mut self.rows);
         self.evaluator.push(&self.waiting, &self.seats, &mut rows, |error| {

@@ -27,30 +27,30 @@ pub(crate) fn of(link: &Candidate<'_>) -> Option<[Vector3<f64>; 2]> {
     let (middle, along) = rolls.map_or((middle, along), |(at, axis)| (at + axis * axis.dot(&(middle - at)), axis));
     let places = || link.meshes.iter().flat_map(|m| &m.positions).map(|p| (vector(p) - middle).dot(&along));
     let (low, high) = (places().fold(f64::INFINITY, f64::min), places().fold(f64::NEG_INFINITY, f64::max));
-    let [a, b] = joints.map(|(at, axis)| Place::of(at - middle, axis, &along));
+    let [a, b] = joints.map(|(at, axis)| AxisPosition::of(at - middle, axis, &along));
     let nearer = |s: f64| if s - low < high - s { low } else { high };
     let farther = |s: f64| if s - low < high - s { high } else { low };
     let [a, b] = match (a, b) {
-        (Place::Across(a), Place::Across(b)) => [a, b],
-        (Place::Across(a), Place::Along(_)) => [a, farther(a)],
-        (Place::Along(_), Place::Across(b)) => [farther(b), b],
+        (AxisPosition::Across(a), AxisPosition::Across(b)) => [a, b],
+        (AxisPosition::Across(a), AxisPosition::Along(_)) => [a, farther(a)],
+        (AxisPosition::Along(_), AxisPosition::Across(b)) => [farther(b), b],
         // A straight tube between two roll joints: the frames determine the order of the ends.
-        (Place::Along(a), Place::Along(b)) if a < b => [low, high],
-        (Place::Along(a), Place::Along(b)) if a > b => [high, low],
-        (Place::Along(a), Place::Along(_)) => [farther(a), nearer(a)],
+        (AxisPosition::Along(a), AxisPosition::Along(b)) if a < b => [low, high],
+        (AxisPosition::Along(a), AxisPosition::Along(b)) if a > b => [high, low],
+        (AxisPosition::Along(a), AxisPosition::Along(_)) => [farther(a), nearer(a)],
     };
     Some([a, b].map(|s| middle + along * s.clamp(low, high)))
 }
 
 /// Position of a joint along the body (m).
-enum Place {
+enum AxisPosition {
     /// Point where its axis crosses the body.
     Across(f64),
     /// Position of its frame; its axis is parallel to the body.
     Along(f64),
 }
 
-impl Place {
+impl AxisPosition {
     /// * `point`: a point on the joint axis, relative to the middle of the body.
     fn of(point: Vector3<f64>, axis: Option<Vector3<f64>>, along: &Vector3<f64>) -> Self {
         let s = point.dot(along);

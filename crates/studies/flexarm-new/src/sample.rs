@@ -61,7 +61,7 @@ fn rounded(axis: &Axis, value: f64) -> f64 {
 }
 
 /// Conditions on the poses of the motion.
-struct Wish {
+struct PoseConditions {
     /// Minimum height of all frames (m).
     floor: f64,
     /// Minimum distance of the TCP from the z axis of the world (m).
@@ -69,7 +69,7 @@ struct Wish {
     torque: bool,
 }
 
-impl Wish {
+impl PoseConditions {
     fn holds(&self, pose: &Posed, axes: &[Axis]) -> bool {
         let strong = |axis: &Axis| !axis.effort.is_finite() || pose.weight[axis.k] <= WEIGHT * axis.effort;
         pose.lowest >= self.floor && pose.tool.xy().norm() >= self.radius && (!self.torque || axes.iter().all(strong))
@@ -94,10 +94,10 @@ pub(crate) fn sample_motion(model: &Model, workspace: &Workspace, axes: &[Axis])
     let all_low = poses.iter().map(|p| p.lowest).fold(f64::INFINITY, f64::min);
     let still = still_height(model, &mut data, workspace);
     let wishes = [
-        Wish { floor: still - 0.02 * reach, radius: 0.3 * reach, torque: true },
-        Wish { floor: still - 0.3 * reach, radius: 0.2 * reach, torque: true },
-        Wish { floor: all_low - 1.0, radius: 0.0, torque: true },
-        Wish { floor: all_low - 1.0, radius: 0.0, torque: false },
+        PoseConditions { floor: still - 0.02 * reach, radius: 0.3 * reach, torque: true },
+        PoseConditions { floor: still - 0.3 * reach, radius: 0.2 * reach, torque: true },
+        PoseConditions { floor: all_low - 1.0, radius: 0.0, torque: true },
+        PoseConditions { floor: all_low - 1.0, radius: 0.0, torque: false },
     ];
     let mut motion = SampleMotion::default();
     let (mut rests, mut wish) = (Vec::new(), 0);
@@ -143,7 +143,7 @@ fn still_height(model: &Model, data: &mut Data, workspace: &Workspace) -> f64 {
 
 /// Chooses the pose closest to the middle of the ranges, then repeatedly the one whose TCP is
 /// farthest from all previous ones.
-fn choose(model: &Model, data: &mut Data, poses: &[Posed], axes: &[Axis], wish: &Wish) -> Vec<Posed> {
+fn choose(model: &Model, data: &mut Data, poses: &[Posed], axes: &[Axis], wish: &PoseConditions) -> Vec<Posed> {
     let away = |pose: &Posed| -> f64 {
         let part =
             |axis: &Axis| (pose.q[axis.k] - 0.5 * (axis.range[0] + axis.range[1])) / (axis.range[1] - axis.range[0]);

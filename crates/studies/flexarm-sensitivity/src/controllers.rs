@@ -6,7 +6,7 @@ use flexarm_kinematics::{Model, SpatialInertia};
 use flexarm_stepping::{AxisSlope, FlexibleArm, Friction, RunSlopes, ServoAxis};
 use nalgebra::DVector;
 
-use super::Named;
+use super::NamedParameter;
 use flexarm_run::Arm;
 use flexarm_run::Caveat;
 use flexarm_run::Error;
@@ -20,7 +20,7 @@ const JOINT_STEP: f64 = 2e-3;
 
 /// Adds friction and gains of servo-controlled joints, and accounts for the controllers' reaction
 /// to masses and motions.
-pub(super) fn add_controllers(arm: &Arm, scenario: &Scenario, all: &mut Vec<Named>) -> Result<(), Error> {
+pub(super) fn add_controllers(arm: &Arm, scenario: &Scenario, all: &mut Vec<NamedParameter>) -> Result<(), Error> {
     let flexible = arm.flexible();
     if !flexible.has_servo() {
         return Ok(());
@@ -45,7 +45,7 @@ pub(super) fn add_controllers(arm: &Arm, scenario: &Scenario, all: &mut Vec<Name
 
 /// Makes the controllers follow a mass or a motion parameter: the rigid model of the feed-forward
 /// carries the mass too, and gains not set in the robot file follow the inertia at the start.
-fn follow(arm: &Arm, named: &mut Named, start: &DVector<f64>) {
+fn follow(arm: &Arm, named: &mut NamedParameter, start: &DVector<f64>) {
     let flexible = arm.flexible();
     let (mut fed_forward, gains) = (
         Vec::new(),
@@ -77,7 +77,7 @@ fn follow(arm: &Arm, named: &mut Named, start: &DVector<f64>) {
 /// Returns caveats about servos that reached their limits in a differentiated run.
 pub(super) fn limited(arm: &Arm, found: &RunSlopes) -> Vec<Caveat> {
     let joints: Vec<&str> = arm.joints().collect();
-    let told = |own: &flexarm_stepping::TorqueLimited| {
+    let caveat = |own: &flexarm_stepping::TorqueLimited| {
         let joint = joints[own.coordinate];
         let text = format!(
             "the servo of joint {joint:?} is at its torque limit in {} samples, first at {:.4} s: the derivatives \
@@ -85,9 +85,14 @@ pub(super) fn limited(arm: &Arm, found: &RunSlopes) -> Vec<Caveat> {
              jumps",
             own.samples, own.first_s
         );
-        Caveat::said("servo-limit", format!("joint {joint:?}"), text, "slow the motion down where it is fastest")
+        Caveat::from_message(
+            "servo-limit",
+            format!("joint {joint:?}"),
+            text,
+            "slow the motion down where it is fastest",
+        )
     };
-    found.limited.iter().map(told).collect()
+    found.limited.iter().map(caveat).collect()
 }
 /// Returns the body of the rigid robot's payload, and the inertia of a kilogram there.
 fn rigid_mass(rigid: &Model) -> Option<(usize, SpatialInertia)> {
@@ -108,14 +113,14 @@ fn carrying(model: &Model, body: usize, per_kg: &SpatialInertia, kg: f64) -> Mod
 }
 
 /// Returns the nonzero friction parameters of a joint, each per 1 % of its value.
-fn friction_of(arm: &FlexibleArm, coordinate: usize, joint: &str, slides: bool) -> Vec<Named> {
+fn friction_of(arm: &FlexibleArm, coordinate: usize, joint: &str, slides: bool) -> Vec<NamedParameter> {
     let Some(law) = arm.friction.get(coordinate) else { return Vec::new() };
     let [torque, damping, speed] = if slides { ["N", "N s/m", "m/s"] } else { ["N m", "N m s/rad", "rad/s"] };
     let none = Friction { viscous: 0.0, coulomb: 0.0, stribeck: 0.0, stribeck_velocity: 0.0, regularisation: 0.0 };
     let mut found = Vec::new();
     let mut add = |key: &str, unit: &str, value: f64, by: Friction, acts: bool| {
         if value != 0.0 && acts {
-            found.push(Named {
+            found.push(NamedParameter {
                 name: format!("drive.{joint}.friction.{key}"),
                 unit: unit.into(),
                 value,
@@ -137,7 +142,7 @@ fn friction_of(arm: &FlexibleArm, coordinate: usize, joint: &str, slides: bool) 
 }
 
 /// Returns the nonzero gains and the feed-forward of a servo, each per 1 % of its value.
-fn gains_of(axis: &ServoAxis, number: usize, joint: &str, slides: bool) -> Vec<Named> {
+fn gains_of(axis: &ServoAxis, number: usize, joint: &str, slides: bool) -> Vec<NamedParameter> {
     let (damping, stiffness) = if slides { ("N s/m", "N/m") } else { ("N m s/rad", "N m/rad") };
     let ahead = f64::from(u8::from(axis.feed_forward));
     let none = AxisSlope::default();
@@ -147,7 +152,7 @@ fn gains_of(axis: &ServoAxis, number: usize, joint: &str, slides: bool) -> Vec<N
         ("integral_gain", stiffness, axis.integral_gain, AxisSlope { integral_gain: axis.integral_gain, ..none }),
         ("feed_forward", "1", ahead, AxisSlope { feed_forward: ahead, ..none }),
     ];
-    let named = |(key, unit, value, by): (&str, &str, f64, AxisSlope)| Named {
+    let named = |(key, unit, value, by): (&str, &str, f64, AxisSlope)| NamedParameter {
         name: format!("drive.{joint}.servo.{key}"),
         unit: unit.into(),
         value,

@@ -111,7 +111,7 @@ pub struct ParameterSensitivity {
 }
 
 /// A parameter with its name, and the change for which results are reported.
-struct Named {
+struct NamedParameter {
     name: String,
     unit: String,
     value: f64,
@@ -183,28 +183,28 @@ fn numbers(arm: &Arm, asked: &[String]) -> Vec<Parameter> {
 }
 
 /// Returns all parameters by which the error along a motion is differentiated.
-fn run_parameters(arm: &Arm, scenario: &Scenario, asked: &[String]) -> Result<Vec<Named>, Error> {
+fn run_parameters(arm: &Arm, scenario: &Scenario, asked: &[String]) -> Result<Vec<NamedParameter>, Error> {
     let of_arm = |parameter: Parameter| {
         let (per, scale) = change_of(&parameter);
         let Parameter { name, unit, initial: value, .. } = parameter.clone();
-        Named { name, unit, value, per, scale, parameter: RunParameter::Arm(parameter) }
+        NamedParameter { name, unit, value, per, scale, parameter: RunParameter::Arm(parameter) }
     };
     // A payload replaced at the start has no effect.
     let gone = scenario.payloads.iter().any(|payload| payload.at_s <= SAME_TIME);
     let there = |own: &Parameter| !(gone && matches!(own.effect, Effect::Mass { .. }));
-    let mut all: Vec<Named> = numbers(arm, asked).into_iter().filter(there).map(of_arm).collect();
+    let mut all: Vec<NamedParameter> = numbers(arm, asked).into_iter().filter(there).map(of_arm).collect();
     let model = &arm.flexible().model;
     for (k, coordinate) in model.coordinates()[..model.n_actuated()].iter().enumerate() {
         let slides = coordinate.slides();
         let (unit, per) = if slides { ("m", "1 mm") } else { ("rad", "1 mrad") };
         let name = format!("motion.{}", coordinate.joint);
         let parameter = RunParameter::Joint(k);
-        all.push(Named { name, unit: unit.into(), value: 0.0, per, scale: 1e-3, parameter });
+        all.push(NamedParameter { name, unit: unit.into(), value: 0.0, per, scale: 1e-3, parameter });
     }
     for (k, axis) in ["x", "y", "z"].into_iter().enumerate() {
         let (name, unit) = (format!("tcp.{axis}"), "m".into());
         let parameter = RunParameter::Tool(Vector3::ith(k, 1.0));
-        all.push(Named { name, unit, value: 0.0, per: "1 mm", scale: 1e-3, parameter });
+        all.push(NamedParameter { name, unit, value: 0.0, per: "1 mm", scale: 1e-3, parameter });
     }
     add_controllers(arm, scenario, &mut all)?;
     Ok(all)
@@ -233,7 +233,7 @@ pub fn sensitivity(
         write_all(&[(path.clone(), table(&named, &found))])?;
     }
     let (position, rotation) = (&found.position, &found.rotation);
-    let of = |(k, own): (usize, Named)| ParameterSensitivity {
+    let of = |(k, own): (usize, NamedParameter)| ParameterSensitivity {
         name: own.name,
         unit: own.unit,
         value: own.value,
@@ -286,7 +286,7 @@ fn change_of(parameter: &Parameter) -> (&'static str, f64) {
 
 /// Returns the table of error and derivatives after every step: six columns each, world axes, m and
 /// rad, for the reported changes of the parameters.
-fn table(named: &[Named], found: &RunSlopes) -> String {
+fn table(named: &[NamedParameter], found: &RunSlopes) -> String {
     const AXES: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
     let mut text = String::from("time_s");
     let names = std::iter::once("error").chain(named.iter().map(|own| own.name.as_str()));

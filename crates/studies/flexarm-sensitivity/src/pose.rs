@@ -85,18 +85,19 @@ pub fn pose_sensitivity(
     let at = joint_values(at, &names)?;
     let all: Vec<Parameter> = numbers(&arm, parameters);
     let still = |parameter: &Parameter| !matches!(parameter.effect, Effect::Damping(_) | Effect::Damper { .. });
-    let all = all.into_iter().filter(still).map(Asked::Arm).chain((0..3).map(Asked::Tool)).collect();
-    slopes(robot, &arm, joints, at, chosen(all, parameters, Asked::name)?)
+    let all =
+        all.into_iter().filter(still).map(PoseParameterKind::Arm).chain((0..3).map(PoseParameterKind::Tool)).collect();
+    slopes(robot, &arm, joints, at, chosen(all, parameters, PoseParameterKind::name)?)
 }
 
 /// A requested parameter.
-enum Asked {
+enum PoseParameterKind {
     Arm(Parameter),
     /// Position of the TCP along one of its axes.
     Tool(usize),
 }
 
-impl Asked {
+impl PoseParameterKind {
     fn name(&self) -> &str {
         match self {
             Self::Arm(parameter) => &parameter.name,
@@ -118,7 +119,7 @@ fn of_tool(axis: usize, X_WT: &Pose, C: &Matrix6<f64>, modes: usize) -> PosePara
     moved.fixed_view_mut::<3, 3>(0, 3).copy_from(&turned);
     let half = moved * C;
     PoseParameter {
-        name: Asked::Tool(axis).name().to_owned(),
+        name: PoseParameterKind::Tool(axis).name().to_owned(),
         unit: "m".to_owned(),
         value: 0.0,
         per: "1 mm",
@@ -138,15 +139,15 @@ fn slopes(
     arm: &Arm,
     joints: Vec<String>,
     at: Vec<f64>,
-    asked: Vec<Asked>,
+    asked: Vec<PoseParameterKind>,
 ) -> Result<PoseSensitivity, Error> {
     let explained = |error| arm.flexible().explained(error);
     let none = Wrench::zeros();
     let mut point = arm.operating_point()?;
     point.solve(&at, &none).map_err(explained)?;
-    let of_arm = |asked: &Asked| match asked {
-        Asked::Arm(parameter) => Some(parameter.clone()),
-        Asked::Tool(_) => None,
+    let of_arm = |asked: &PoseParameterKind| match asked {
+        PoseParameterKind::Arm(parameter) => Some(parameter.clone()),
+        PoseParameterKind::Tool(_) => None,
     };
     let all: Vec<Parameter> = asked.iter().filter_map(of_arm).collect();
     let tool = tool_slopes(&mut point, &all).map_err(explained)?;
@@ -169,8 +170,8 @@ fn slopes(
     let C = point.compliance();
     let modes = frequencies.hz.len();
     let of_tools = asked.iter().filter_map(|asked| match asked {
-        Asked::Arm(_) => None,
-        Asked::Tool(axis) => Some(of_tool(*axis, &point.tcp_pose(), &C, modes)),
+        PoseParameterKind::Arm(_) => None,
+        PoseParameterKind::Tool(axis) => Some(of_tool(*axis, &point.tcp_pose(), &C, modes)),
     });
     let caveats = arm.caveats(Use::Held(&at, &[0.0; 6]));
     Ok(PoseSensitivity {

@@ -12,9 +12,9 @@ use flexarm_stepping::{Batch, BatchRun, Start, ToolDeflection};
 
 use super::Sweep;
 use super::metric::{self, Facts, Quick, SummaryFacts};
-use super::told::{Told, told};
+use super::run_caveats::{CaveatText, stored_caveats};
 use super::value::ParameterValue;
-use super::workshop::Ready;
+use super::workshop::PreparedRun;
 use flexarm_run::Caveat;
 use flexarm_run::Error;
 use flexarm_run::run::BeforeRun;
@@ -29,19 +29,19 @@ pub(super) struct Answer {
     /// Values of the metrics, or the reason of the failure.
     pub(super) result: Result<Vec<f64>, String>,
     /// Caveats.
-    pub(super) told: Told,
+    pub(super) stored: CaveatText,
 }
 
 /// Values of the metrics, and relative violation of each constraint.
-pub(super) type Judgement = (Vec<f64>, Vec<f64>);
+pub(super) type MetricValues = (Vec<f64>, Vec<f64>);
 
 /// Callback with the index of the point, the result of its run, and the caveats.
-pub(super) type Tell<'a> = dyn FnMut(usize, Result<Judgement, Error>, Told) + 'a;
+pub(super) type OnResult<'a> = dyn FnMut(usize, Result<MetricValues, Error>, CaveatText) + 'a;
 
 /// Run without a full summary.
 struct QuickRun {
     place: usize,
-    told: Told,
+    stored: CaveatText,
     run: BatchRun,
     tool: flexarm_kinematics::Frame,
     start: Start,
@@ -105,23 +105,23 @@ impl QuickFacts {
 }
 
 impl Sweep {
-    /// Computes some runs, one group after the other; calls `tell` with each result.
-    pub(super) fn evaluate(&self, runs: &[usize], stop: &AtomicBool, tell: &mut dyn FnMut(Answer)) {
+    /// Computes some runs, one group after the other; calls `on_result` with each result.
+    pub(super) fn evaluate(&self, runs: &[usize], stop: &AtomicBool, on_result: &mut dyn FnMut(Answer)) {
         let points: Vec<(usize, Vec<ParameterValue>)> =
             runs.iter().map(|run| (*run, self.design.values(*run))).collect();
-        self.evaluate_points(&points, stop, &mut |place, result, told| {
+        self.evaluate_points(&points, stop, &mut |place, result, stored| {
             let result = result.map(|(metrics, _)| metrics).map_err(|error| self.workshop.reason(&error));
-            tell(Answer { run: points[place].0, result, told });
+            on_result(Answer { run: points[place].0, result, stored });
         });
     }
 
-    /// Computes runs with given parameter values; calls `tell` with their metrics and their
+    /// Computes runs with given parameter values; calls `on_result` with their metrics and their
     /// violation of each constraint of the study.
     pub(super) fn evaluate_points(
         &self,
         points: &[(usize, Vec<ParameterValue>)],
         stop: &AtomicBool,
-        tell: &mut Tell<'_>,
+        on_result: &mut OnResult<'_>,
     ) {
         let answered = |place: usize, facts: &dyn Facts| {
             let values = metric::values(&self.metrics, &points[place].1, facts);
@@ -136,7 +136,9 @@ impl Sweep {
                 let mut caveats = Vec::new();
                 match self.whole(values, stop, &mut caveats) {
                     Err(Error::Interrupted { .. }) => return,
-                    result => tell(place, result.map(|facts| answered(place, &facts)), self.told(caveats)),
+                    result => {
+                        on_result(place, result.map(|facts| answered(place, &facts)), self.stored_caveats(caveats))
+                    }
                 }
             }
             return;
@@ -148,10 +150,10 @@ impl Sweep {
             }
             let mut caveats = Vec::new();
             let run = self.quick_run(place, values, &mut caveats);
-            let told = self.told(caveats);
+            let stored = self.stored_caveats(caveats);
             match run {
-                Ok(run) => going.push(QuickRun { told, ..run }),
-                Err(error) => tell(place, Err(error), told),
+                Ok(run) => going.push(QuickRun { stored, ..run }),
+                Err(error) => on_result(place, Err(error), stored),
             }
         }
         // Runs of similar duration are computed together.
@@ -173,15 +175,15 @@ impl Sweep {
                 for (own, result) in few.iter().zip(batch.run(&runs)) {
                     let result = result.map_err(|error| own.flexible.explained(error));
                     let result = result.map(|d| answered(own.place, &own.facts.clone().of(&d, &own.options)));
-                    tell(own.place, result, own.told.clone());
+                    on_result(own.place, result, own.stored.clone());
                 }
             }
         }
     }
 
     /// Returns the caveats of a run in their stored form.
-    fn told(&self, caveats: Vec<Caveat>) -> Told {
-        told(caveats, &|text| self.workshop.plain(text))
+    fn stored_caveats(&self, caveats: Vec<Caveat>) -> CaveatText {
+        stored_caveats(caveats, &|text| self.workshop.plain(text))
     }
 
     /// Computes a run with its full summary. `caveats` receives its caveats, also if it fails.
@@ -191,7 +193,7 @@ impl Sweep {
         stop: &AtomicBool,
         caveats: &mut Vec<Caveat>,
     ) -> Result<SummaryFacts, Error> {
-        let Ready { built, scenario, options } = self.workshop.ready(values)?;
+        let PreparedRun { built, scenario, options } = self.workshop.ready(values)?;
         caveats.extend_from_slice(&built.arm.robot_caveats());
         let mut go_on =
             |_, _| if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
@@ -205,7 +207,7 @@ impl Sweep {
     /// Prepares a run to be computed together with others. `caveats` receives the caveats known
     /// before its first step, also if it fails.
     fn quick_run(&self, place: usize, values: &[ParameterValue], caveats: &mut Vec<Caveat>) -> Result<QuickRun, Error> {
-        let Ready { built, scenario, options } = self.workshop.ready(values)?;
+        let PreparedRun { built, scenario, options } = self.workshop.ready(values)?;
         caveats.extend_from_slice(&built.arm.robot_caveats());
         let flexible = built.arm.flexible().clone();
         let (arm, of_loads) = built.arm.at_start(&scenario, &options)?;
@@ -226,7 +228,7 @@ impl Sweep {
         caveats.extend(of_loads);
         let run = BatchRun { arm, duration_s: scenario.duration_s() };
         let (tool, start) = (flexible.tcp.clone(), scenario.start);
-        Ok(QuickRun { place, told: None, run, tool, start, options, facts, flexible })
+        Ok(QuickRun { place, stored: None, run, tool, start, options, facts, flexible })
     }
 }
 

@@ -25,11 +25,11 @@ mod ranking;
 mod recent;
 mod replay;
 mod results;
+mod run_caveats;
 pub mod statistics;
 mod store;
 mod table;
 mod target;
-mod told;
 mod value;
 mod workshop;
 
@@ -66,8 +66,8 @@ pub use self::replay::Replay;
 pub use self::results::{
     BestRun, FailureFigures, IndexFigures, MetricFigures, ParameterFigures, ParetoFigures, ParetoRun, SweepSummary,
 };
+pub use self::run_caveats::CaveatFigures;
 pub use self::store::Shard;
-pub use self::told::CaveatFigures;
 pub use self::value::ParameterValue;
 
 /// Default metrics of a study.
@@ -292,12 +292,12 @@ impl Sweep {
     ) -> Result<bool, Error> {
         let (stop, next) = (AtomicBool::new(false), AtomicUsize::new(0));
         let window = if self.quick { (todo.len() / (8 * threads)).clamp(4, WINDOW) } else { 1 };
-        let (tell, told) = channel();
+        let (sender, receiver) = channel();
         let mut done = 0;
         let mut failed = None;
         std::thread::scope(|scope| {
             for _ in 0..threads {
-                let (tell, stop, next) = (tell.clone(), &stop, &next);
+                let (sender, stop, next) = (sender.clone(), &stop, &next);
                 scope.spawn(move || {
                     loop {
                         let start = next.fetch_add(window, Ordering::Relaxed);
@@ -306,14 +306,14 @@ impl Sweep {
                         }
                         let few = &todo[start..(start + window).min(todo.len())];
                         self.evaluate(few, stop, &mut |answer| {
-                            let _ = tell.send(answer); // the receiver is gone if the run was stopped
+                            let _ = sender.send(answer); // the receiver is gone if the run was stopped
                         });
                     }
                 });
             }
-            drop(tell);
+            drop(sender);
             loop {
-                match told.recv_timeout(LOOK) {
+                match receiver.recv_timeout(LOOK) {
                     Ok(answer) if failed.is_none() => match keep(answer) {
                         Ok(()) => done += 1,
                         Err(error) => {

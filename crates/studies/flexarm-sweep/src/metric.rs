@@ -450,8 +450,8 @@ mod tests {
 
     #[test]
     fn what_no_run_has_is_told_with_what_is_near() {
-        let told = value("tcp.peak").unwrap_err();
-        assert!(told.contains("\"tcp.peak\" is not in the summary") && told.contains("tcp.peak_m"), "{told}");
+        let message = value("tcp.peak").unwrap_err();
+        assert!(message.contains("\"tcp.peak\" is not in the summary") && message.contains("tcp.peak_m"), "{message}");
         assert!(value("tcp.settling").unwrap_err().contains("is a string"));
         assert!(value("tcp").unwrap_err().contains("several entries"));
         assert!(value("wall_s").unwrap_err().contains("depends on the machine"));

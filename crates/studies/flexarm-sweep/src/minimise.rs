@@ -14,18 +14,18 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Instant;
 
-use crate::statistics::{Judged, LeastSearch};
+use crate::statistics::{LeastSearch, SearchResult};
 use flexarm_log::CreateOptions;
 use serde::{Deserialize, Serialize};
 
 use super::direction::Better;
 use super::error::SweepError;
-use super::evaluate::{Answer, Judgement};
+use super::evaluate::{Answer, MetricValues};
 use super::file::{Role, Values};
 use super::metric::{Constraint, Vocabulary};
 use super::results::SweepSummary;
+use super::run_caveats::CaveatText;
 use super::store::{Manifest, RUNS, STUDY, known_manifest};
-use super::told::Told;
 use super::value::ParameterValue;
 use super::{LOOK, PAGE, Sweep, SweepProgress, SweepRequest, fingerprint, table};
 use flexarm_run::Error;
@@ -80,12 +80,12 @@ struct Line(Vec<f64>, Option<String>, Vec<Option<f64>>, Vec<Option<f64>>, #[serd
 #[derive(Clone)]
 struct Outcome {
     /// Metrics and violations, or the reason why there are none.
-    result: Result<Judgement, String>,
-    told: Told,
+    result: Result<MetricValues, String>,
+    stored: CaveatText,
 }
 
 /// Variable of the search.
-struct Varied {
+struct SearchVariable {
     column: usize,
     low: f64,
     high: f64,
@@ -93,19 +93,19 @@ struct Varied {
 
 /// Points tried, in order, with their results.
 #[derive(Default)]
-struct Tried {
+struct TriedPoints {
     values: Vec<Vec<ParameterValue>>,
     outcomes: Vec<Outcome>,
 }
 
-fn judged(outcome: &Outcome, goal: usize) -> Judged {
+fn judged(outcome: &Outcome, goal: usize) -> SearchResult {
     match &outcome.result {
-        Ok((metrics, passed)) => Judged { value: metrics[goal], violation: passed.iter().sum() },
-        Err(_) => Judged { value: f64::NAN, violation: f64::NAN },
+        Ok((metrics, passed)) => SearchResult { value: metrics[goal], violation: passed.iter().sum() },
+        Err(_) => SearchResult { value: f64::NAN, violation: f64::NAN },
     }
 }
 
-impl Tried {
+impl TriedPoints {
     /// Returns the index of the best point.
     fn best(&self, goal: usize) -> Option<usize> {
         (0..self.outcomes.len()).reduce(|best, k| {
@@ -130,10 +130,10 @@ impl Journal {
         let mut known = HashMap::new();
         let mut whole = 0;
         for line in text.split_inclusive(|byte| *byte == b'\n').filter(|line| line.ends_with(b"\n")) {
-            let Ok(Line(values, reason, metrics, passed, told)) = serde_json::from_slice(line) else { break };
+            let Ok(Line(values, reason, metrics, passed, stored)) = serde_json::from_slice(line) else { break };
             let number = |list: Vec<Option<f64>>| list.into_iter().map(|x| x.unwrap_or(f64::NAN)).collect::<Vec<f64>>();
             let result = reason.map_or_else(|| Ok((number(metrics), number(passed))), Err);
-            known.insert(key(&values), Outcome { result, told: told.map(Arc::from) });
+            known.insert(key(&values), Outcome { result, stored: stored.map(Arc::from) });
             whole += line.len() as u64;
         }
         let file = OpenOptions::new().create(true).truncate(false).write(true).open(&path).map_err(failed)?;
@@ -144,10 +144,10 @@ impl Journal {
 
     fn keep(&mut self, values: &[f64], outcome: &Outcome) -> Result<(), Error> {
         let list = |list: &[f64]| list.iter().map(|x| x.is_finite().then_some(*x)).collect();
-        let told = outcome.told.as_deref().map(str::to_owned);
+        let stored = outcome.stored.as_deref().map(str::to_owned);
         let line = match &outcome.result {
-            Ok((metrics, passed)) => Line(values.to_vec(), None, list(metrics), list(passed), told),
-            Err(reason) => Line(values.to_vec(), Some(reason.clone()), Vec::new(), Vec::new(), told),
+            Ok((metrics, passed)) => Line(values.to_vec(), None, list(metrics), list(passed), stored),
+            Err(reason) => Line(values.to_vec(), Some(reason.clone()), Vec::new(), Vec::new(), stored),
         };
         let text = serde_json::to_string(&line).expect("plain numbers and strings") + "\n";
         self.file.write_all(text.as_bytes()).map_err(|source| Error::Write { path: self.path.clone(), source })?;
@@ -187,7 +187,7 @@ impl Sweep {
 
         let start: Vec<f64> = varied.iter().map(|v| self.start(v)).collect();
         let mut least = LeastSearch::new(&start, seed);
-        let (mut tried, mut figures) = (Tried::default(), MinimiseFigures::default());
+        let (mut tried, mut figures) = (TriedPoints::default(), MinimiseFigures::default());
         while tried.values.len() < most && !least.is_settled() {
             let points: Vec<Vec<ParameterValue>> = least.ask().iter().map(|p| self.point(&varied, p)).collect();
             let done = tried.values.len();
@@ -201,7 +201,7 @@ impl Sweep {
             tried.values.extend(points);
             tried.outcomes.extend(outcomes);
             let best = tried.best(goal).map(|k| judged(&tried.outcomes[k], goal));
-            figures.progress.push(best.filter(Judged::keeps).map(|best| best.value));
+            figures.progress.push(best.filter(SearchResult::keeps).map(|best| best.value));
         }
         figures.generations = figures.progress.len();
         figures.settled = least.is_settled();
@@ -235,12 +235,12 @@ impl Sweep {
     }
 
     /// Returns the variables of the search.
-    fn varied(&self) -> Result<Vec<Varied>, Error> {
+    fn varied(&self) -> Result<Vec<SearchVariable>, Error> {
         let mut found = Vec::new();
         for (column, own) in self.design.columns.iter().enumerate() {
             match (&own.values, own.bounds) {
                 (Values::Derived(_), _) => {}
-                (_, Some((low, high))) if low < high => found.push(Varied { column, low, high }),
+                (_, Some((low, high))) if low < high => found.push(SearchVariable { column, low, high }),
                 _ => {
                     let message = format!(
                         "parameter {:?} has no bounds: a search needs from and to, or a distribution with low and high",
@@ -258,7 +258,7 @@ impl Sweep {
 
     /// Returns the start of a variable as a fraction of its range: the present value in the files
     /// if it is in the range, otherwise the middle.
-    fn start(&self, varied: &Varied) -> f64 {
+    fn start(&self, varied: &SearchVariable) -> f64 {
         let own = &self.design.columns[varied.column];
         let now = self.workshop.current(varied.column).filter(|_| own.role != Role::Offset || varied.low <= 0.0);
         now.map(|x| (x - varied.low) / (varied.high - varied.low))
@@ -267,7 +267,7 @@ impl Sweep {
     }
 
     /// Returns the values of all parameters at a point of the search.
-    fn point(&self, varied: &[Varied], parts: &[f64]) -> Vec<ParameterValue> {
+    fn point(&self, varied: &[SearchVariable], parts: &[f64]) -> Vec<ParameterValue> {
         let mut values = vec![ParameterValue::Whole(0); self.design.columns.len()];
         for (own, part) in varied.iter().zip(parts) {
             values[own.column] = ParameterValue::Number(own.low + (own.high - own.low) * part);
@@ -280,7 +280,7 @@ impl Sweep {
     fn generation(
         &self,
         points: &[Vec<ParameterValue>],
-        varied: &[Varied],
+        varied: &[SearchVariable],
         request: &SweepRequest,
         journal: &mut Journal,
         progress: &mut dyn FnMut(usize) -> ControlFlow<()>,
@@ -299,11 +299,11 @@ impl Sweep {
         let threads = request.threads.unwrap_or_else(rayon::current_num_threads).max(1);
         let few = todo.len().div_ceil(threads).clamp(1, FEW);
         let (stop, next) = (AtomicBool::new(false), AtomicUsize::new(0));
-        let (tell, told) = channel();
+        let (sender, receiver) = channel();
         let mut failed = None;
         std::thread::scope(|scope| {
             for _ in 0..threads {
-                let (tell, todo, stop, next) = (tell.clone(), &todo, &stop, &next);
+                let (sender, todo, stop, next) = (sender.clone(), &todo, &stop, &next);
                 scope.spawn(move || {
                     loop {
                         let start = next.fetch_add(few, Ordering::Relaxed);
@@ -311,16 +311,16 @@ impl Sweep {
                             break;
                         }
                         let some = &todo[start..(start + few).min(todo.len())];
-                        self.evaluate_points(some, stop, &mut |place, result, told| {
+                        self.evaluate_points(some, stop, &mut |place, result, stored| {
                             let result = result.map_err(|error| self.workshop.reason(&error));
-                            let _ = tell.send((some[place].0, Outcome { result, told }));
+                            let _ = sender.send((some[place].0, Outcome { result, stored }));
                         });
                     }
                 });
             }
-            drop(tell);
+            drop(sender);
             loop {
-                match told.recv_timeout(LOOK) {
+                match receiver.recv_timeout(LOOK) {
                     Ok((k, outcome)) => {
                         if let Err(error) = journal.keep(&numbers(&points[k]), &outcome) {
                             failed.get_or_insert(error);
@@ -372,7 +372,7 @@ impl Sweep {
     /// Writes table, page and figures of the points tried.
     fn search_summary(
         &self,
-        tried: &Tried,
+        tried: &TriedPoints,
         goal: usize,
         figures: MinimiseFigures,
         manifest: &Manifest,
@@ -383,7 +383,7 @@ impl Sweep {
         let answer = |(run, outcome): (usize, &Outcome)| Answer {
             run,
             result: outcome.result.as_ref().map(|(metrics, _)| metrics.clone()).map_err(Clone::clone),
-            told: outcome.told.clone(),
+            stored: outcome.stored.clone(),
         };
         let answers: Vec<Answer> = tried.outcomes.iter().enumerate().map(answer).collect();
         let path = folder.join(RUNS);

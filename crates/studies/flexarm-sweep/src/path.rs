@@ -2,7 +2,7 @@
 //! `mounting.stiffness[2]`, `drive.*.gearbox`.
 //!
 //! A list entry is identified by its `joint`, `link` or `name`, or by its index from 0; `*` matches
-//! all. A path resolved in a file is a [`Place`], which changes one value in the text of the file
+//! all. A path resolved in a file is a [`ValueLocation`], which changes one value in the text of the file
 //! and keeps everything else as written.
 
 use flexarm_urdf::closest;
@@ -35,7 +35,7 @@ enum Step {
 
 /// Location of a value, present or not.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Place {
+pub(super) struct ValueLocation {
     steps: Vec<Step>,
     /// Path that resolves to this location, with the names of list entries.
     pub(super) name: String,
@@ -77,14 +77,14 @@ pub(super) fn segments(text: &str) -> Option<Vec<Segment>> {
 
 /// Returns all locations that a path matches in a file; empty if there are none. The last keys may
 /// be new in an existing table.
-pub(super) fn places(root: &toml::Value, path: &[Segment]) -> Vec<Place> {
+pub(super) fn places(root: &toml::Value, path: &[Segment]) -> Vec<ValueLocation> {
     let mut found = Vec::new();
-    let start = Place { steps: Vec::new(), name: String::new(), is_there: true };
+    let start = ValueLocation { steps: Vec::new(), name: String::new(), is_there: true };
     follow(root, path, start, &mut found);
     found
 }
 
-fn follow(value: &toml::Value, path: &[Segment], so_far: Place, found: &mut Vec<Place>) {
+fn follow(value: &toml::Value, path: &[Segment], so_far: ValueLocation, found: &mut Vec<ValueLocation>) {
     let Some((segment, rest)) = path.split_first() else {
         found.push(so_far);
         return;
@@ -115,11 +115,11 @@ fn follow(value: &toml::Value, path: &[Segment], so_far: Place, found: &mut Vec<
 }
 
 /// Returns the location of a new value in an existing table.
-fn new_place(path: &[Segment], so_far: Place) -> Option<Place> {
+fn new_place(path: &[Segment], so_far: ValueLocation) -> Option<ValueLocation> {
     if so_far.steps.is_empty() {
         return None;
     }
-    path.iter().try_fold(Place { is_there: false, ..so_far }, |place, segment| match segment {
+    path.iter().try_fold(ValueLocation { is_there: false, ..so_far }, |place, segment| match segment {
         Segment::Key(key) => Some(place.with_key(key)),
         _ => None,
     })
@@ -134,7 +134,7 @@ fn name_of(entry: &toml::Value) -> Option<&String> {
     })
 }
 
-impl Place {
+impl ValueLocation {
     fn with(&self, step: Step, name: &str) -> Self {
         let mut steps = self.steps.clone();
         steps.push(step);
@@ -194,11 +194,11 @@ fn quoted(key: &str) -> String {
 /// Returns all paths of a file that lead to a number, a text, or a list of these.
 pub(super) fn leaves(root: &toml::Value) -> Vec<String> {
     let mut found = Vec::new();
-    collect(root, &Place { steps: Vec::new(), name: String::new(), is_there: true }, &mut found);
+    collect(root, &ValueLocation { steps: Vec::new(), name: String::new(), is_there: true }, &mut found);
     found
 }
 
-fn collect(value: &toml::Value, place: &Place, found: &mut Vec<String>) {
+fn collect(value: &toml::Value, place: &ValueLocation, found: &mut Vec<String>) {
     match value {
         toml::Value::Table(table) => {
             table.iter().for_each(|(key, inner)| collect(inner, &place.with_key(key), found));
@@ -220,12 +220,12 @@ pub(super) fn near(path: &str, known: &[String]) -> String {
     let mut others: Vec<&String> =
         known.iter().filter(|other| alike(other) == most && meant.as_ref() != Some(*other)).collect();
     others.truncate(MOST_TOLD);
-    let told: Vec<String> = others.iter().map(|other| format!("{other:?}")).collect();
-    match (meant, told.is_empty()) {
+    let listed: Vec<String> = others.iter().map(|other| format!("{other:?}")).collect();
+    match (meant, listed.is_empty()) {
         (Some(meant), true) => format!("did you mean {meant:?}?"),
-        (Some(meant), false) => format!("did you mean {meant:?}? similar names are {}", told.join(", ")),
+        (Some(meant), false) => format!("did you mean {meant:?}? similar names are {}", listed.join(", ")),
         (None, true) => "there are none".into(),
-        (None, false) => format!("similar names are {}", told.join(", ")),
+        (None, false) => format!("similar names are {}", listed.join(", ")),
     }
 }
 
@@ -318,7 +318,7 @@ mod tests {
     #[test]
     fn a_path_that_leads_nowhere_is_told_with_those_that_are_near() {
         let root: toml::Value = toml::from_str(FILE).unwrap();
-        let told = near("drive.j2.gearbox.stifness", &leaves(&root));
-        assert!(told.contains("did you mean \"drive.j2.gearbox.stiffness\"?"), "{told}");
+        let listed = near("drive.j2.gearbox.stifness", &leaves(&root));
+        assert!(listed.contains("did you mean \"drive.j2.gearbox.stiffness\"?"), "{listed}");
     }
 }

@@ -11,8 +11,8 @@ use super::evaluate::Answer;
 use super::file::Role;
 use super::minimise::MinimiseFigures;
 use super::replay::Replay;
+use super::run_caveats::{self, CaveatFigures};
 use super::store::Collected;
-use super::told::{self, CaveatFigures};
 use super::value::ParameterValue;
 
 /// Result of `flexarm sweep`.
@@ -219,7 +219,7 @@ impl Sweep {
     ) -> (SweepSummary, Columns) {
         let columns = self.columns(answers, of_design);
         let failed = answers.iter().filter(|(answer, _)| answer.result.is_err()).count();
-        let caveats = told::figures(answers.iter().map(|(answer, _)| *answer));
+        let caveats = run_caveats::figures(answers.iter().map(|(answer, _)| *answer));
         let summary = SweepSummary {
             study: self.file.name.clone(),
             runs: self.runs(),
@@ -228,7 +228,7 @@ impl Sweep {
             parameters: self.parameter_figures(&columns),
             metrics: self.metric_figures(&columns),
             failures: failures(answers),
-            warnings: told::warnings(&caveats, answers.len()),
+            warnings: run_caveats::warnings(&caveats, answers.len()),
             caveats,
             best: self.best(answers, &columns),
             pareto: self.pareto(&columns),

@@ -61,27 +61,27 @@ pub(super) struct Manifest {
 impl Manifest {
     /// Returns the differences from another study, in words.
     pub(super) fn differs(&self, other: &Self) -> String {
-        let mut told = Vec::new();
+        let mut differences = Vec::new();
         if self.runs != other.runs {
-            told.push(format!("the number of runs ({} and {})", self.runs, other.runs));
+            differences.push(format!("the number of runs ({} and {})", self.runs, other.runs));
         }
         for (name, print) in &self.inputs {
             match other.inputs.iter().find(|(known, _)| known == name) {
-                Some((_, known)) if known != print => told.push(format!("the content of {name}")),
-                None => told.push(format!("{name}, which only one study has")),
+                Some((_, known)) if known != print => differences.push(format!("the content of {name}")),
+                None => differences.push(format!("{name}, which only one study has")),
                 _ => {}
             }
         }
         let is_new = |name: &String| self.inputs.iter().all(|(known, _)| known != name);
         let new = other.inputs.iter().map(|(name, _)| name).filter(|name| is_new(name));
-        told.extend(new.map(|name| format!("{name}, which only one study has")));
+        differences.extend(new.map(|name| format!("{name}, which only one study has")));
         if self.flexarm != other.flexarm {
-            told.push(format!("the version of the program ({} and {})", self.flexarm, other.flexarm));
+            differences.push(format!("the version of the program ({} and {})", self.flexarm, other.flexarm));
         }
-        if told.is_empty() {
-            told.push("the names of its files".into());
+        if differences.is_empty() {
+            differences.push("the names of its files".into());
         }
-        told.join(", ")
+        differences.join(", ")
     }
 }
 
@@ -130,9 +130,9 @@ struct Line(usize, Option<String>, Vec<Option<f64>>, #[serde(default)] Option<St
 impl Collected {
     /// Makes a result share the text of its caveats with equal ones.
     pub(super) fn share(&mut self, answer: &mut Answer) {
-        let Some(text) = &answer.told else { return };
+        let Some(text) = &answer.stored else { return };
         match self.texts.get(text) {
-            Some(known) => answer.told = Some(known.clone()),
+            Some(known) => answer.stored = Some(known.clone()),
             None => _ = self.texts.insert(text.clone()),
         }
     }
@@ -225,8 +225,8 @@ impl Collected {
             };
             let run = usize::try_from(*run).ok().filter(|run| *run < manifest.runs);
             let run = run.ok_or_else(|| broken(format!("has a run number outside 0 to {}", manifest.runs - 1)))?;
-            let told = caveats[row].as_deref().map(Arc::from);
-            self.add(Answer { run, result, told }, file)?;
+            let stored = caveats[row].as_deref().map(Arc::from);
+            self.add(Answer { run, result, stored }, file)?;
         }
         Ok(())
     }
@@ -244,11 +244,11 @@ impl Collected {
                 all[run % of] += 1;
                 lacking[run % of] += usize::from(!self.answers.contains_key(&run));
             }
-            let told = |k: usize| match lacking[k] == all[k] {
+            let text = |k: usize| match lacking[k] == all[k] {
                 true => format!("shard {}/{of} (all {})", k + 1, all[k]),
                 false => format!("shard {}/{of} ({} of {})", k + 1, lacking[k], all[k]),
             };
-            let lacking: Vec<String> = (0..of).filter(|k| lacking[*k] > 0).map(told).collect();
+            let lacking: Vec<String> = (0..of).filter(|k| lacking[*k] > 0).map(text).collect();
             which = shortened(&lacking);
         }
         if which.is_empty() {
@@ -297,12 +297,12 @@ fn read_journal(path: &Path, manifest: &Manifest) -> Result<(Vec<Answer>, u64), 
                 answers.len() + 1
             ),
         };
-        let Line(run, reason, metrics, told) = serde_json::from_slice(line).map_err(|_| broken())?;
+        let Line(run, reason, metrics, stored) = serde_json::from_slice(line).map_err(|_| broken())?;
         if run >= manifest.runs || reason.is_none() && metrics.len() != manifest.metrics.len() {
             return Err(broken().into());
         }
         let numbers = metrics.into_iter().map(|x| x.unwrap_or(f64::NAN)).collect();
-        answers.push(Answer { run, result: reason.map_or(Ok(numbers), Err), told: told.map(Arc::from) });
+        answers.push(Answer { run, result: reason.map_or(Ok(numbers), Err), stored: stored.map(Arc::from) });
         whole += line.len() as u64;
     }
     Ok((answers, whole))
@@ -380,7 +380,7 @@ impl Store {
             Ok(values) => (None, values.iter().map(|x| x.is_finite().then_some(*x)).collect()),
             Err(reason) => (Some(reason.clone()), Vec::new()),
         };
-        let line = Line(answer.run, reason, metrics, answer.told.as_deref().map(str::to_owned));
+        let line = Line(answer.run, reason, metrics, answer.stored.as_deref().map(str::to_owned));
         let line = serde_json::to_string(&line).expect("plain numbers and strings") + "\n";
         let failed = |source| Error::Write { path: self.journal_path.clone(), source };
         self.journal.write_all(line.as_bytes()).map_err(failed)?;
@@ -499,8 +499,8 @@ impl Sweep {
         }
         let reasons = answers.iter().map(|answer| answer.result.as_ref().err().cloned()).collect();
         columns.push(DataColumn::new("reason", DataValues::Text(reasons)));
-        let told = answers.iter().map(|answer| answer.told.as_deref().map(str::to_owned)).collect();
-        columns.push(DataColumn::new(CAVEATS, DataValues::Text(told)));
+        let stored = answers.iter().map(|answer| answer.stored.as_deref().map(str::to_owned)).collect();
+        columns.push(DataColumn::new(CAVEATS, DataValues::Text(stored)));
         let metrics: Vec<String> = self.metrics.iter().map(|metric| metric.text.clone()).collect();
         let texts = [
             ("flexarm.study", manifest.study.clone()),

@@ -2,12 +2,12 @@
 //! reduced link.
 
 use super::file::Role;
-use super::path::{Place, Segment, changed, leaves, near, places, segments, written};
+use super::path::{Segment, ValueLocation, changed, leaves, near, places, segments, written};
 use super::value::ParameterValue;
 
 /// File that contains a value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub(super) enum Which {
+pub(super) enum TargetFile {
     /// Robot file.
     Robot,
     /// Motion file.
@@ -22,13 +22,13 @@ pub(super) enum Which {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Target {
     /// Choice of the robot, motion or loads.
-    File(Which),
+    File(TargetFile),
     /// Speed of the motion, relative to the file.
     Speed,
     /// Option, by name.
     Option(String),
     /// Values in a file.
-    Entry(Which, Vec<Segment>),
+    Entry(TargetFile, Vec<Segment>),
 }
 
 impl Target {
@@ -47,23 +47,23 @@ impl Target {
             _ => "",
         };
         match (word(0), all.len()) {
-            ("robot", 1) => Ok(Self::File(Which::Robot)),
-            ("motion", 1) => Ok(Self::File(Which::Motion)),
-            ("loads", 1) => Ok(Self::File(Which::Loads)),
+            ("robot", 1) => Ok(Self::File(TargetFile::Robot)),
+            ("motion", 1) => Ok(Self::File(TargetFile::Motion)),
+            ("loads", 1) => Ok(Self::File(TargetFile::Loads)),
             ("motion", 2) if word(1) == "speed" => Ok(Self::Speed),
             ("options", 2) => Ok(Self::Option(word(1).to_owned())),
             ("options", _) => Err(format!("{path:?}: an option has one name, such as options.step")),
-            ("motion", _) => Ok(Self::Entry(Which::Motion, all[1..].to_vec())),
-            ("loads", _) => Ok(Self::Entry(Which::Loads, all[1..].to_vec())),
+            ("motion", _) => Ok(Self::Entry(TargetFile::Motion, all[1..].to_vec())),
+            ("loads", _) => Ok(Self::Entry(TargetFile::Loads, all[1..].to_vec())),
             ("reduce", 3..) => match jobs.iter().position(|link| link == word(1)) {
-                Some(job) => Ok(Self::Entry(Which::Job(job), all[2..].to_vec())),
+                Some(job) => Ok(Self::Entry(TargetFile::Job(job), all[2..].to_vec())),
                 None => Err(format!(
                     "{path:?}: the study names no job for link {:?}; add {0} = \"job.toml\" to [reduce]",
                     word(1)
                 )),
             },
-            ("robot", _) => Ok(Self::Entry(Which::Robot, of_robot(all[1..].to_vec()))),
-            _ => Ok(Self::Entry(Which::Robot, of_robot(all))),
+            ("robot", _) => Ok(Self::Entry(TargetFile::Robot, of_robot(all[1..].to_vec()))),
+            _ => Ok(Self::Entry(TargetFile::Robot, of_robot(all))),
         }
     }
 }
@@ -82,7 +82,7 @@ fn of_robot(mut path: Vec<Segment>) -> Vec<Segment> {
 /// Change of one value in a file.
 #[derive(Clone, Debug)]
 pub(super) struct Edit {
-    pub(super) place: Place,
+    pub(super) place: ValueLocation,
     pub(super) value: toml_edit::Value,
 }
 
@@ -105,7 +105,7 @@ pub(super) fn edits(
     if found.is_empty() {
         return Err(format!("{text:?} matches no entry; {}", near(text, &leaves(root))));
     }
-    let edit = |place: Place| {
+    let edit = |place: ValueLocation| {
         let before = known.iter().rev().find(|edit| edit.place == place).and_then(|edit| plain(&edit.value));
         let old = before.as_ref().or(place.value(root));
         let value = match (role, value.number(), old) {

@@ -16,7 +16,7 @@ use super::file::{Role, StudyFile};
 use super::options::StudyOptions;
 use super::path::{Segment, places, segments};
 use super::recent::Recent;
-use super::target::{Edit, Target, Which, edits};
+use super::target::{Edit, Target, TargetFile, edits};
 use super::value::ParameterValue;
 use super::{Finders, fingerprint};
 use flexarm_run::Arm;
@@ -58,7 +58,7 @@ pub(super) struct Built {
 }
 
 /// Run that is ready to simulate.
-pub(super) struct Ready {
+pub(super) struct PreparedRun {
     pub(super) built: Arc<Built>,
     pub(super) scenario: Scenario,
     pub(super) options: RunOptions,
@@ -76,7 +76,7 @@ pub(super) struct RunFiles {
 }
 
 /// Files and options of a run.
-struct Chosen {
+struct RunInputs {
     robot: PathBuf,
     motion: Option<PathBuf>,
     loads: Option<PathBuf>,
@@ -90,7 +90,7 @@ pub(super) struct Workshop {
     files: FileCache,
     texts: BTreeMap<PathBuf, TextFile>,
     /// Paths of the files that the study refers to by name.
-    called: BTreeMap<(Which, String), PathBuf>,
+    called: BTreeMap<(TargetFile, String), PathBuf>,
     robot: String,
     motion: Option<String>,
     loads: Option<String>,
@@ -136,9 +136,9 @@ impl Workshop {
             links_folder: PathBuf::from("links"),
         };
         let named = [
-            (Which::Robot, Some(&file.robot)),
-            (Which::Motion, file.motion.as_ref()),
-            (Which::Loads, file.loads.as_ref()),
+            (TargetFile::Robot, Some(&file.robot)),
+            (TargetFile::Motion, file.motion.as_ref()),
+            (TargetFile::Loads, file.loads.as_ref()),
         ];
         for (which, named) in named {
             if let Some(named) = named {
@@ -188,7 +188,7 @@ impl Workshop {
 
     /// Returns the robot that the study names.
     pub(super) fn base_robot(&self) -> Result<Robot, Error> {
-        let path = &self.called[&(Which::Robot, self.robot.clone())];
+        let path = &self.called[&(TargetFile::Robot, self.robot.clone())];
         let text = &self.texts[path].text;
         self.robot_of(path, text)
     }
@@ -201,7 +201,7 @@ impl Workshop {
     /// Finds a file that the study refers to by name, and reads it.
     fn call(
         &mut self,
-        which: Which,
+        which: TargetFile,
         word: &str,
         file: &StudyFile,
         finders: &Finders,
@@ -210,10 +210,10 @@ impl Workshop {
         let beside = file.path.parent().unwrap_or(Path::new(".")).join(word);
         let mut path = match (beside.exists(), which) {
             (true, _) => beside,
-            (false, Which::Robot) => (finders.robot)(Path::new(word)),
+            (false, TargetFile::Robot) => (finders.robot)(Path::new(word)),
             (false, _) => (finders.motion)(Path::new(word)),
         };
-        if path.is_dir() && which == Which::Robot {
+        if path.is_dir() && which == TargetFile::Robot {
             path = path.join("robot.toml");
         }
         if !path.exists() {
@@ -222,7 +222,7 @@ impl Workshop {
             return Err(RobotFileError { message, ..place.clone() }.into());
         }
         self.read(&path, place)?;
-        if let (Which::Robot, None, Some(own)) = (which, &self.motion, self.own_motion(&path)) {
+        if let (TargetFile::Robot, None, Some(own)) = (which, &self.motion, self.own_motion(&path)) {
             self.read(&own, place)?;
         }
         self.called.insert((which, word.to_owned()), path);
@@ -319,15 +319,15 @@ impl Workshop {
     }
 
     /// Returns the path of a file that the study names.
-    pub(super) fn base_path(&self, which: Which) -> Option<PathBuf> {
+    pub(super) fn base_path(&self, which: TargetFile) -> Option<PathBuf> {
         let word = match which {
-            Which::Robot => Some(&self.robot),
-            Which::Motion => self.motion.as_ref(),
-            Which::Loads => self.loads.as_ref(),
-            Which::Job(number) => return Some(self.jobs[number].1.clone()),
+            TargetFile::Robot => Some(&self.robot),
+            TargetFile::Motion => self.motion.as_ref(),
+            TargetFile::Loads => self.loads.as_ref(),
+            TargetFile::Job(number) => return Some(self.jobs[number].1.clone()),
         };
         match (which, word) {
-            (Which::Motion, None) => self.own_motion(self.called.get(&(Which::Robot, self.robot.clone()))?),
+            (TargetFile::Motion, None) => self.own_motion(self.called.get(&(TargetFile::Robot, self.robot.clone()))?),
             (_, word) => self.called.get(&(which, word?.clone())).cloned(),
         }
     }
@@ -338,10 +338,10 @@ impl Workshop {
         let jobs: Vec<String> = self.jobs.iter().map(|(link, _)| link.clone()).collect();
         let Target::Entry(which, path) = Target::parse(text, &jobs)? else { return Ok(vec![text.to_owned()]) };
         let before = match which {
-            Which::Robot => String::new(),
-            Which::Motion => "motion.".into(),
-            Which::Loads => "loads.".into(),
-            Which::Job(number) => format!("reduce.{}.", self.jobs[number].0),
+            TargetFile::Robot => String::new(),
+            TargetFile::Motion => "motion.".into(),
+            TargetFile::Loads => "loads.".into(),
+            TargetFile::Job(number) => format!("reduce.{}.", self.jobs[number].0),
         };
         let file = self.base_path(which).ok_or_else(|| format!("{text:?}: the study names no file of this kind"))?;
         let Some((root, _)) = &self.texts[&file].parsed else { return Ok(vec![text.to_owned()]) };
@@ -408,23 +408,23 @@ impl Workshop {
     /// # Errors
     /// The reason why the run cannot start.
     pub(super) fn run_files(&self, values: &[ParameterValue]) -> Result<(RunFiles, StudyOptions, bool), Error> {
-        let Chosen { robot, motion, loads, options, given, speed } = self.chosen(values)?;
+        let RunInputs { robot, motion, loads, options, given, speed } = self.chosen(values)?;
         let mut changes = self.changes(values, &robot, motion.as_deref(), loads.as_deref())?;
         self.reduce_again(&robot, &mut changes)?;
-        let of = |which: Which| changes.get(&which).map_or(&[][..], Vec::as_slice);
-        let moves = of(Which::Robot).iter().any(|edit| {
+        let of = |which: TargetFile| changes.get(&which).map_or(&[][..], Vec::as_slice);
+        let moves = of(TargetFile::Robot).iter().any(|edit| {
             let first = segments(&edit.place.name).and_then(|path| path.into_iter().next());
             first.is_none_or(|first| !matches!(first, Segment::Key(key) if NOT_OF_THE_MOTION.contains(&key.as_str())))
         });
-        let text = self.changed(&robot, of(Which::Robot));
+        let text = self.changed(&robot, of(TargetFile::Robot));
         let files = RunFiles {
             robot: (robot, text),
             motion: motion.map(|path| {
-                let text = (!of(Which::Motion).is_empty()).then(|| self.changed(&path, of(Which::Motion)));
+                let text = (!of(TargetFile::Motion).is_empty()).then(|| self.changed(&path, of(TargetFile::Motion)));
                 (path, text)
             }),
             loads: loads.map(|path| {
-                let text = self.changed(&path, of(Which::Loads));
+                let text = self.changed(&path, of(TargetFile::Loads));
                 (path, text)
             }),
             options: given,
@@ -434,7 +434,7 @@ impl Workshop {
     }
 
     /// Returns the files and options of a run.
-    fn chosen(&self, values: &[ParameterValue]) -> Result<Chosen, Error> {
+    fn chosen(&self, values: &[ParameterValue]) -> Result<RunInputs, Error> {
         let mut words = [Some(self.robot.clone()), self.motion.clone(), self.loads.clone()];
         let (mut options, mut given) = (self.options.clone(), self.given_options.clone());
         let mut speed: Option<f64> = None;
@@ -460,13 +460,13 @@ impl Workshop {
                 }
             }
         }
-        let path_of = |which: Which| {
+        let path_of = |which: TargetFile| {
             let word = words[word_place(which)].clone()?;
             self.called.get(&(which, word)).cloned()
         };
-        let robot = path_of(Which::Robot).unwrap_or_default();
-        let motion = path_of(Which::Motion).or_else(|| self.own_motion(&robot));
-        Ok(Chosen { motion, loads: path_of(Which::Loads), robot, options, given, speed })
+        let robot = path_of(TargetFile::Robot).unwrap_or_default();
+        let motion = path_of(TargetFile::Motion).or_else(|| self.own_motion(&robot));
+        Ok(RunInputs { motion, loads: path_of(TargetFile::Loads), robot, options, given, speed })
     }
 
     /// Returns the edits that the values make in each file.
@@ -476,17 +476,17 @@ impl Workshop {
         robot: &Path,
         motion: Option<&Path>,
         loads: Option<&Path>,
-    ) -> Result<BTreeMap<Which, Vec<Edit>>, Error> {
+    ) -> Result<BTreeMap<TargetFile, Vec<Edit>>, Error> {
         let failed = |what: String| Error::from(super::SweepError::Run(what));
-        let mut changes: BTreeMap<Which, Vec<Edit>> = BTreeMap::new();
+        let mut changes: BTreeMap<TargetFile, Vec<Edit>> = BTreeMap::new();
         for ((targets, role), value) in self.targets.iter().zip(&self.roles).zip(values) {
             for (target, text) in targets {
                 let Target::Entry(which, path) = target else { continue };
                 let file = match which {
-                    Which::Robot => Some(robot),
-                    Which::Motion => motion,
-                    Which::Loads => loads,
-                    Which::Job(number) => Some(self.jobs[*number].1.as_path()),
+                    TargetFile::Robot => Some(robot),
+                    TargetFile::Motion => motion,
+                    TargetFile::Loads => loads,
+                    TargetFile::Job(number) => Some(self.jobs[*number].1.as_path()),
                 };
                 let file = file.ok_or_else(|| failed(format!("{text}: the run has no such file")))?;
                 let known = changes.entry(*which).or_default();
@@ -498,15 +498,15 @@ impl Workshop {
     }
 
     /// Recomputes the reduced links whose jobs changed, and refers to them in the robot file.
-    fn reduce_again(&self, robot: &Path, changes: &mut BTreeMap<Which, Vec<Edit>>) -> Result<(), Error> {
+    fn reduce_again(&self, robot: &Path, changes: &mut BTreeMap<TargetFile, Vec<Edit>>) -> Result<(), Error> {
         for (number, (link, job)) in self.jobs.iter().enumerate() {
-            let Some(edits) = changes.remove(&Which::Job(number)) else { continue };
+            let Some(edits) = changes.remove(&TargetFile::Job(number)) else { continue };
             let flex = self.reduced_link(link, job, &self.changed(job, &edits))?;
             let path = ["flexible_link", link, "reduced"].map(|key| Segment::Key(key.to_owned()));
             let value = ParameterValue::Text(flex.display().to_string());
             let edits = self.entry_edits(robot, &path, &format!("link.{link}.reduced"), Role::Value, &value, &[]);
             let edits = edits.map_err(super::SweepError::Run)?;
-            changes.entry(Which::Robot).or_default().extend(edits);
+            changes.entry(TargetFile::Robot).or_default().extend(edits);
         }
         Ok(())
     }
@@ -515,7 +515,7 @@ impl Workshop {
     ///
     /// # Errors
     /// The reason why it cannot start: values that are invalid for a robot, a missing motion.
-    pub(super) fn ready(&self, values: &[ParameterValue]) -> Result<Ready, Error> {
+    pub(super) fn ready(&self, values: &[ParameterValue]) -> Result<PreparedRun, Error> {
         let (files, options, robot_moves) = self.run_files(values)?;
         let run = options.run();
         let built = self.built(&files.robot, run.modelling)?;
@@ -525,7 +525,7 @@ impl Workshop {
             let (loads, payloads) = parse_loads(text, path, scenario.duration_s())?;
             (scenario.loads, scenario.payloads, scenario.loads_file) = (loads, payloads, Some(path.clone()));
         }
-        Ok(Ready { built, scenario, options: run })
+        Ok(PreparedRun { built, scenario, options: run })
     }
 
     fn robot_of(&self, path: &Path, text: &str) -> Result<Robot, Error> {
@@ -613,10 +613,10 @@ fn mass(robot: &Robot, flexible: &FlexibleRobot) -> f64 {
 }
 
 /// Returns the index of a file in the list of robot, motion and loads.
-fn word_place(which: Which) -> usize {
+fn word_place(which: TargetFile) -> usize {
     match which {
-        Which::Robot | Which::Job(_) => 0,
-        Which::Motion => 1,
-        Which::Loads => 2,
+        TargetFile::Robot | TargetFile::Job(_) => 0,
+        TargetFile::Motion => 1,
+        TargetFile::Loads => 2,
     }
 }

@@ -27,13 +27,13 @@ pub enum PositionForm {
 
 /// Joint angles (rad), and whether one of them is free.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Three {
+pub(crate) struct ThreeAngles {
     pub(crate) q: [f64; 3],
     pub(crate) free: bool,
 }
 
 /// At most four solutions: roots of a quartic, or two times two roots.
-pub(crate) type Threes = List<Three, 8>;
+pub(crate) type Threes = List<ThreeAngles, 8>;
 
 /// Finds all angles with `E_1 E_2 E_3 c = p`; if there are none, angles that miss.
 ///
@@ -47,7 +47,7 @@ pub(crate) fn place(
     hint: &[f64; 3],
     reach: f64,
 ) -> Threes {
-    let mut found = Threes::new(Three { q: [0.0; 3], free: false });
+    let mut found = Threes::new(ThreeAngles { q: [0.0; 3], free: false });
     let forward = Task { axes: *axes, c: *c, p: *p, hint: *hint, reach };
     match form {
         PositionForm::Intersecting12 => forward.intersecting(&mut found),
@@ -111,7 +111,7 @@ impl Task {
         for &q3 in third.angles() {
             let c = s3.at(q3).point(&self.c);
             for two in two_bars(s1, s2, &c, &self.p, [self.hint[0], self.hint[1]], self.reach).as_slice() {
-                found.push(Three { q: [two.q[0], two.q[1], q3], free: third.free || two.free });
+                found.push(ThreeAngles { q: [two.q[0], two.q[1], q3], free: third.free || two.free });
             }
         }
     }
@@ -160,13 +160,13 @@ impl Task {
         let (angle, size) = angle_about(&self.axes[0].h, w, p);
         let on_axis = size <= ROUNDING * self.reach;
         let q1 = if on_axis { self.hint[0] } else { angle };
-        found.push(Three { q: [q1, q2, q3], free: free || on_axis });
+        found.push(ThreeAngles { q: [q1, q2, q3], free: free || on_axis });
     }
 }
 
 /// Two angles (rad), and whether one of them is free.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Two {
+pub(crate) struct TwoAngles {
     pub(crate) q: [f64; 2],
     pub(crate) free: bool,
 }
@@ -179,8 +179,8 @@ pub(crate) fn two_bars(
     p: &Vector3<f64>,
     hint: [f64; 2],
     reach: f64,
-) -> List<Two, 2> {
-    let mut found = List::new(Two { q: [0.0; 2], free: false });
+) -> List<TwoAngles, 2> {
+    let mut found = List::new(TwoAngles { q: [0.0; 2], free: false });
     let flat = |v: Vector3<f64>| v - first.h * first.h.dot(&v);
     let (d, v, p) = (flat(second.o - first.o), flat(c - second.o), flat(p - first.o));
     let (k, a, b) = dot_turned(&d, &second.h, &v);
@@ -190,7 +190,7 @@ pub(crate) fn two_bars(
         let w = d + second.at(qb).vector(&v);
         let (angle, size) = angle_about(&first.h, &w, &p);
         let folded = size <= ROUNDING * reach;
-        found.push(Two { q: [if folded { hint[0] } else { angle }, qb], free: roots.free || folded });
+        found.push(TwoAngles { q: [if folded { hint[0] } else { angle }, qb], free: roots.free || folded });
     }
     found
 }

@@ -180,7 +180,7 @@ impl AnalyticArm {
         if smallest < 1e-7 {
             return Err(NoAnalyticIk::Deficient { frame: frame.name.clone(), smallest });
         }
-        let Found { class, kernel, reversed, deviation } = recognise(&chain, &frame.name)?;
+        let RecognisedArm { class, kernel, reversed, deviation } = recognise(&chain, &frame.name)?;
         let limits = joints.map(|k| (model.coordinates()[k].limits.lower, model.coordinates()[k].limits.upper));
         let sides = Sides::new(&kernel, reversed, -model.gravity);
         Ok(Self { chain, kernel, class, reversed, deviation, joints: *joints, limits, sides })
@@ -275,7 +275,7 @@ fn dexterity(chain: &Chain) -> f64 {
     positions.iter().map(of).fold(0.0, f64::max)
 }
 
-struct Found {
+struct RecognisedArm {
     class: ArmClass,
     kernel: Kernel,
     reversed: bool,
@@ -283,13 +283,13 @@ struct Found {
 }
 
 /// Returns the first matching class, simplest first.
-fn recognise(chain: &Chain, frame: &str) -> Result<Found, NoAnalyticIk> {
+fn recognise(chain: &Chain, frame: &str) -> Result<RecognisedArm, NoAnalyticIk> {
     let from_tool = Lines::new(chain, true);
     let from_base = Lines::new(chain, false);
     for lines in [&from_base, &from_tool] {
         if let Some((kernel, form, deviation)) = lines.wrist() {
             let class = if lines.reversed { ArmClass::SphericalShoulder(form) } else { ArmClass::SphericalWrist(form) };
-            return Ok(Found { class, kernel, reversed: lines.reversed, deviation });
+            return Ok(RecognisedArm { class, kernel, reversed: lines.reversed, deviation });
         }
     }
     for start in [1, 0] {
@@ -297,7 +297,7 @@ fn recognise(chain: &Chain, frame: &str) -> Result<Found, NoAnalyticIk> {
             if let Some((kernel, meeting, deviation)) = lines.three_parallel(start) {
                 let first = if lines.reversed { 4 - start } else { start + 1 };
                 let class = ArmClass::ThreeParallel { first, meeting };
-                return Ok(Found { class, kernel, reversed: lines.reversed, deviation });
+                return Ok(RecognisedArm { class, kernel, reversed: lines.reversed, deviation });
             }
         }
     }

@@ -27,7 +27,7 @@ pub(super) struct Composites<T: Real> {
     /// Composite bodies, one per node.
     bodies: Vec<Composite<T>>,
     /// Wrenches carried inward, up to three columns each.
-    threes: Vec<Three<T>>,
+    threes: Vec<ColumnGroup<T>>,
     /// Whether some pairs of coordinates contribute nothing, or more than once.
     sums: bool,
 }
@@ -46,21 +46,21 @@ struct Composite<T: Real> {
     /// Parent, if it is a loading body.
     parent: Option<usize>,
     /// First column of its joint, if the joint is free.
-    own: Option<Place>,
+    own: Option<ColumnIndex>,
     /// Groups of columns in its subtree.
     threes: Range<usize>,
 }
 
 /// Location of a column: group and lane.
 #[derive(Clone, Copy, Debug)]
-struct Place {
+struct ColumnIndex {
     three: usize,
     lane: usize,
 }
 
 /// Wrenches of up to three columns with successive rows in M.
 #[derive(Clone, Debug)]
-struct Three<T: Real> {
+struct ColumnGroup<T: Real> {
     row: usize,
     count: usize,
     /// `Fᵀ`: one row per wrench, one column per component.
@@ -71,7 +71,12 @@ struct Three<T: Real> {
 /// Allocates columns for a joint. A single-DoF joint shares the group of the next free joint
 /// inward, if that group is the last one, ends with that joint and has room.
 #[inline(always)]
-fn place_columns<T: Real>(threes: &mut Vec<Three<T>>, inner: Option<Place>, row: usize, size: usize) -> Place {
+fn place_columns<T: Real>(
+    threes: &mut Vec<ColumnGroup<T>>,
+    inner: Option<ColumnIndex>,
+    row: usize,
+    size: usize,
+) -> ColumnIndex {
     if let (Some(inner), Some(last), 1) = (inner, threes.len().checked_sub(1), size)
         && inner.three == last
         && inner.lane + 1 == threes[last].count
@@ -79,11 +84,11 @@ fn place_columns<T: Real>(threes: &mut Vec<Three<T>>, inner: Option<Place>, row:
         && threes[last].row + threes[last].count == row
     {
         threes[last].count += 1;
-        return Place { lane: inner.lane + 1, ..inner };
+        return ColumnIndex { lane: inner.lane + 1, ..inner };
     }
-    let first = Place { three: threes.len(), lane: 0 };
+    let first = ColumnIndex { three: threes.len(), lane: 0 };
     for row in (row..row + size).step_by(3) {
-        threes.push(Three { row, count: size.min(3), force: Matrix3::zeros(), torque: Matrix3::zeros() });
+        threes.push(ColumnGroup { row, count: size.min(3), force: Matrix3::zeros(), torque: Matrix3::zeros() });
     }
     first
 }
@@ -96,7 +101,7 @@ impl<T: Real> Composites<T> {
         let zero = Vector3::zeros();
         let parent = |i: usize| nodes[i].parent.filter(|parent| nodes[*parent].part == Part::Loading);
         let mut bodies: Vec<Composite<T>> = Vec::with_capacity(nodes.len());
-        let mut threes: Vec<Three<T>> = Vec::new();
+        let mut threes: Vec<ColumnGroup<T>> = Vec::new();
         let (mut columns, mut branches) = (0, false);
         for (i, node) in nodes.iter().enumerate() {
             let is_beside = |j: usize| j != i && nodes[j].part == Part::Loading && parent(j) == parent(i);
@@ -182,7 +187,7 @@ impl<T: Real> Composite<T> {
         &self,
         node: &Node<T>,
         base: &Matrix3<T>,
-        outward: &mut [Three<T>],
+        outward: &mut [ColumnGroup<T>],
         at: Column,
         M: &mut Entries<'_, T, SUMS>,
     ) {
@@ -227,7 +232,7 @@ impl<T: Real> Composite<T> {
         &self,
         node: &Node<T>,
         base: &Matrix3<T>,
-        outward: &mut [Three<T>],
+        outward: &mut [ColumnGroup<T>],
         row: usize,
         M: &mut Entries<'_, T, SUMS>,
     ) {
@@ -289,7 +294,7 @@ struct Column {
     row: usize,
 }
 
-impl<T: Real> Three<T> {
+impl<T: Real> ColumnGroup<T> {
     /// Sets all wrenches to zero.
     #[inline(always)]
     fn clear(&mut self) {
@@ -349,7 +354,7 @@ impl<T: Real, const SUMS: bool> Entries<'_, T, SUMS> {
     /// Writes the entries of a column within its own group: the diagonal and the columns outward of
     /// it.
     #[inline(always)]
-    fn put_own(&mut self, row: usize, three: &Three<T>, lane: usize, products: &Vector3<T>) {
+    fn put_own(&mut self, row: usize, three: &ColumnGroup<T>, lane: usize, products: &Vector3<T>) {
         self.put_one(row, row, products[lane]);
         for k in lane + 1..three.count {
             self.put(row, three.row + k, products[k]);
@@ -358,7 +363,7 @@ impl<T: Real, const SUMS: bool> Entries<'_, T, SUMS> {
 
     /// Writes the entries of a row for another group of columns.
     #[inline(always)]
-    fn put_row(&mut self, row: usize, three: &Three<T>, products: &Vector3<T>) {
+    fn put_row(&mut self, row: usize, three: &ColumnGroup<T>, products: &Vector3<T>) {
         if SUMS || three.count < 3 {
             for k in 0..three.count {
                 self.put(row, three.row + k, products[k]);
@@ -372,7 +377,7 @@ impl<T: Real, const SUMS: bool> Entries<'_, T, SUMS> {
 
     /// Writes the entries of three columns of an elastic joint, with these axes, for another group.
     #[inline(always)]
-    fn put_three(&mut self, row: usize, three: &Three<T>, axes: &Matrix3<T>, wrenches: &Matrix3<T>) {
+    fn put_three(&mut self, row: usize, three: &ColumnGroup<T>, axes: &Matrix3<T>, wrenches: &Matrix3<T>) {
         let a = mul(wrenches, &column(axes, 0));
         let b = mul(wrenches, &column(axes, 1));
         let c = mul(wrenches, &column(axes, 2));

@@ -15,7 +15,7 @@ const LANES: usize = 8;
 
 /// Optional outputs per pose, in addition to the equilibrium; see [`OperatingPoint::solve_each`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Asked {
+pub struct PoseOutputs {
     /// Whether the Jacobian of the elastic coordinates is computed.
     pub jacobian: bool,
     /// Whether the compliance of the tool is computed.
@@ -72,7 +72,7 @@ impl OperatingPoint {
         &mut self,
         poses: &[f64],
         F_T_W: &Wrench,
-        asked: Asked,
+        asked: PoseOutputs,
         mut seen: impl FnMut(usize, Result<&PoseAnswer, StepError>),
     ) {
         let joints = self.arm.model.n_actuated().max(1);
@@ -89,7 +89,7 @@ impl OperatingPoint {
         &mut self,
         q: &[f64],
         F_T_W: &Wrench,
-        asked: Asked,
+        asked: PoseOutputs,
         answer: &'a mut PoseAnswer,
     ) -> Result<&'a PoseAnswer, StepError> {
         self.solve(q, F_T_W)?;
@@ -116,7 +116,7 @@ impl OperatingPoint {
         &mut self,
         poses: &[f64],
         F_T_W: &Wrench,
-        asked: Asked,
+        asked: PoseOutputs,
         answers: &mut [PoseAnswer],
         seen: &mut dyn FnMut(usize, Result<&PoseAnswer, StepError>),
     ) -> usize {
@@ -134,7 +134,7 @@ impl OperatingPoint {
         &mut self,
         _poses: &[f64],
         _F_T_W: &Wrench,
-        _asked: Asked,
+        _asked: PoseOutputs,
         _answers: &mut [PoseAnswer],
         _seen: &mut dyn FnMut(usize, Result<&PoseAnswer, StepError>),
     ) -> usize {
@@ -148,7 +148,7 @@ struct InLanes<'a> {
     point: &'a mut OperatingPoint,
     poses: &'a [f64],
     F_T_W: &'a Wrench,
-    asked: Asked,
+    asked: PoseOutputs,
     /// One per lane.
     answers: &'a mut [PoseAnswer],
     seen: &'a mut dyn FnMut(usize, Result<&PoseAnswer, StepError>),

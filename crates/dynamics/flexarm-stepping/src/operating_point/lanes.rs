@@ -11,7 +11,7 @@ use flexarm_kinematics::lanes::{
 use flexarm_kinematics::{Data, Frame, Pose, Real, StaticTangent, Wrench};
 use nalgebra::DMatrix;
 
-use super::each::{Asked, PoseAnswer};
+use super::each::{PoseAnswer, PoseOutputs};
 use super::tangent::{Tangent, to_hertz};
 use super::{MOST_ITERATIONS, OperatingPoint, SLOW, settled};
 use crate::arm::FlexibleArm;
@@ -183,7 +183,7 @@ impl<T: Real> LanePoints<T> {
 
     /// Computes the requested outputs of all lanes, one answer each.
     #[inline(always)]
-    pub(super) fn answer(&mut self, asked: Asked, answers: &mut [PoseAnswer]) {
+    pub(super) fn answer(&mut self, asked: PoseOutputs, answers: &mut [PoseAnswer]) {
         let joints = self.q.len() - self.r.len();
         let zeros = [[T::zero(); 6]; 6];
         let C = if asked.compliance { self.tangent.compliance(&self.J[6 * joints..]) } else { zeros };

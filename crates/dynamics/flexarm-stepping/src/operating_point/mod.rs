@@ -24,7 +24,7 @@ use crate::dense::Factor;
 use crate::error::StepError;
 use crate::motion::Held;
 use crate::statics::{MOST_HALVINGS, StaticSlopes, add_spring_forces, static_equilibrium, static_forces};
-pub use each::{Asked, PoseAnswer};
+pub use each::{PoseAnswer, PoseOutputs};
 use tangent::{Tangent, to_hertz};
 
 /// Accepted unbalanced force relative to the largest force.

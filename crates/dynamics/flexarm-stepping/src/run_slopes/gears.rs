@@ -17,7 +17,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::arm::FlexibleArm;
 use crate::gear::GearState;
 use crate::run_slopes::Direction;
-use crate::run_slopes::tangent::{Look, add_columns, add_springs, place};
+use crate::run_slopes::tangent::{LinearisationPoint, add_columns, add_springs, place};
 
 /// Tangent at the current state; n elastic coordinates.
 pub(super) struct GearSlopes {
@@ -124,7 +124,7 @@ impl GearSlopes {
     /// coordinates.
     pub(super) fn add_explicit(
         &self,
-        at: &Look<'_>,
+        at: &LinearisationPoint<'_>,
         gears: &GearState,
         (number, direction): (usize, &Direction),
         room: &mut DVector<f64>,

@@ -23,12 +23,12 @@ use crate::events::Change;
 use crate::gear::GearState;
 use crate::implicit::ImplicitStep;
 use crate::integrator::{Integrator, check_deflection};
-use crate::iteration_matrix::Way;
+use crate::iteration_matrix::MatrixForm;
 use crate::reduced::ReducedArm;
 use crate::run_slopes::columns::add_product;
 use crate::run_slopes::lu::Lu;
 use crate::run_slopes::servo::ServoSlopes;
-use crate::run_slopes::tangent::{Look, Tangent, add_columns, put};
+use crate::run_slopes::tangent::{LinearisationPoint, Tangent, add_columns, put};
 use crate::run_slopes::{Direction, SlopesRequest, TorqueLimited};
 use crate::steppers::{Coefficients, GeneralizedAlpha};
 
@@ -239,7 +239,7 @@ impl<'a> Recurrence<'a> {
         let mut rhs = DMatrix::zeros(p, n);
         let mut own = vec![0.0; driven + n];
         let place: Vec<f64> = vec![0.0; driven].into_iter().chain(e.iter().copied()).collect();
-        let at = Look {
+        let at = LinearisationPoint {
             arm,
             data: &data,
             x: &place,
@@ -281,7 +281,7 @@ impl<'a> Recurrence<'a> {
         system.evaluate(0.0, &now.x, &now.v, &at_rest);
         tangent.compute(&system.arm, 0.0, &system.data, &system.state, &system.qddot, system.gears.as_deref());
         mass_matrix_at_poses(&system.arm.model, &mut system.data);
-        let at = Look::at(system, now);
+        let at = LinearisationPoint::at(system, now);
         for (p, direction) in directions.iter().enumerate() {
             own.fill(0.0);
             tangent.add_explicit(&at, (p, direction), room, own);
@@ -328,7 +328,7 @@ impl<'a> Recurrence<'a> {
         let Self { system, integrator, tangent, directions, joints, rhs, room, own, servo, .. } = self;
         let now = Integrator::current(integrator);
         rhs.fill(0.0);
-        let at = Look::at(system, now);
+        let at = LinearisationPoint::at(system, now);
         for (k, direction) in directions.iter().enumerate() {
             own.fill(0.0);
             tangent.add_explicit(&at, (k, direction), room, own);
@@ -459,7 +459,7 @@ impl<'a> Recurrence<'a> {
         }
         self.integrator.advance_to(&mut self.system, stop)?;
         let newton = ImplicitStep::newton(&self.integrator);
-        let dense = matches!(newton.matrix.way, Way::Dense(_));
+        let dense = matches!(newton.matrix.way, MatrixForm::Dense(_));
         if newton.dt != dt || (newton.last().0 > MOST_ITERATIONS && !dense) {
             let what = "a step that does not converge at once";
             return Err(StepError::NoSlopes { what, mend: "take a smaller step" });

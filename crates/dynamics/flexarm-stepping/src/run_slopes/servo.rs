@@ -91,7 +91,7 @@ impl ServoSlopes {
         for (i, axis) in servo.servo.axes.iter().enumerate() {
             let (k, seen) = (axis.coordinate, servo.last[i]);
             if seen.limited {
-                self.tell(t, k);
+                self.count_limited(t, k);
             }
             for (p, direction) in directions.iter().enumerate() {
                 let mut by = direction.axis(i);
@@ -113,7 +113,7 @@ impl ServoSlopes {
         true
     }
 
-    fn tell(&mut self, t: f64, coordinate: usize) {
+    fn count_limited(&mut self, t: f64, coordinate: usize) {
         match self.limited.iter_mut().find(|known| known.coordinate == coordinate) {
             Some(known) => known.samples += 1,
             None => self.limited.push(TorqueLimited { coordinate, samples: 1, first_s: t }),

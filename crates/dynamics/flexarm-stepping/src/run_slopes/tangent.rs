@@ -39,7 +39,7 @@ pub(super) struct Tangent {
 }
 
 /// State of a run at which its equations are differentiated.
-pub(super) struct Look<'a> {
+pub(super) struct LinearisationPoint<'a> {
     pub(super) arm: &'a FlexibleArm,
     pub(super) data: &'a Data,
     /// Free coordinates and rates.
@@ -53,7 +53,7 @@ pub(super) struct Look<'a> {
     pub(super) changes: usize,
 }
 
-impl<'a> Look<'a> {
+impl<'a> LinearisationPoint<'a> {
     /// Returns the state of an integrator at which the system was last evaluated.
     pub(super) fn at(system: &'a ReducedArm, now: &'a Current) -> Self {
         Self {
@@ -160,7 +160,7 @@ impl Tangent {
     /// [`Tangent::compute`], without the contributions of joint motion and controllers.
     pub(super) fn add_explicit(
         &mut self,
-        at: &Look<'_>,
+        at: &LinearisationPoint<'_>,
         (number, direction): (usize, &Direction),
         room: &mut DVector<f64>,
         to: &mut [f64],

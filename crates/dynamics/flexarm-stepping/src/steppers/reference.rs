@@ -172,14 +172,14 @@ type V = NalgebraVec<f64>;
 type Lu = NalgebraLU<f64>;
 
 /// State from which the next run of the solver continues.
-enum Kept {
+enum SolverStart {
     /// Time and `[x; v]`, without history.
     Start(f64, Vec<f64>),
     Bdf(BdfState<V>),
     RungeKutta(RkState<V>),
 }
 
-impl Kept {
+impl SolverStart {
     /// Returns the time that the solver has reached (s).
     fn time(&self) -> f64 {
         match self {
@@ -195,7 +195,7 @@ pub struct Reference {
     settings: ReferenceSettings,
     /// Time, positions, velocities and accelerations.
     pub now: Current,
-    kept: Kept,
+    kept: SolverStart,
     /// `[x; v]` at the points after the current time that the solver has passed.
     ahead: VecDeque<Vec<f64>>,
     /// Times of restarts, ascending.
@@ -229,7 +229,7 @@ impl Reference {
     ) -> Result<Self, StepError> {
         settings.check()?;
         let now = Current::new(system, t0, h, x, v)?;
-        let kept = Kept::Start(t0, together(&now.x, &now.v));
+        let kept = SolverStart::Start(t0, together(&now.x, &now.v));
         Ok(Self {
             settings,
             now,
@@ -279,7 +279,7 @@ impl Reference {
     /// Discards the solution of the solver beyond the current time.
     fn start_again(&mut self) {
         self.ahead.clear();
-        self.kept = Kept::Start(self.now.grid.time(), together(&self.now.x, &self.now.v));
+        self.kept = SolverStart::Start(self.now.grid.time(), together(&self.now.x, &self.now.v));
     }
 
     /// Returns the distance from `t` below which times are equal (s).
@@ -296,7 +296,7 @@ impl Reference {
                     self.start_again();
                     return Err(error);
                 };
-                self.kept = Kept::Start(self.next_point() - self.now.grid.step_size(), last);
+                self.kept = SolverStart::Start(self.next_point() - self.now.grid.step_size(), last);
             }
         }
         let y = self.ahead.pop_front().unwrap_or_default();
@@ -313,7 +313,7 @@ impl Reference {
             }
         }
         let y = match &self.kept {
-            Kept::Start(_, y) => y.clone(),
+            SolverStart::Start(_, y) => y.clone(),
             _ => together(&self.now.x, &self.now.v),
         };
         self.arrive(system, t, &y)?;
@@ -336,7 +336,7 @@ impl Reference {
     /// Runs a solver on the system, continuing from the kept state.
     fn advance(&mut self, system: &mut impl SecondOrderSystem) -> Result<(), StepError> {
         let start = self.kept.time();
-        let kept = std::mem::replace(&mut self.kept, Kept::Start(start, Vec::new()));
+        let kept = std::mem::replace(&mut self.kept, SolverStart::Start(start, Vec::new()));
         // The system is evaluated strictly between two restarts.
         let passed = self.restarts.partition_point(|t| *t <= start);
         let from = if passed > 0 { self.restarts[passed - 1].next_up() } else { f64::NEG_INFINITY };
@@ -353,18 +353,18 @@ impl Reference {
     /// Builds problem and solver around the equations and runs it.
     fn solve<S: SecondOrderSystem>(
         &mut self,
-        kept: Kept,
+        kept: SolverStart,
         stop: f64,
         equations: &RefCell<FirstOrder<'_, S>>,
-    ) -> Result<Kept, StepError> {
+    ) -> Result<SolverStart, StepError> {
         let n = self.now.x.len();
         let (start, h) = (kept.time(), self.now.grid.step_size());
         let fault = |error: DiffsolError| gave_up(start, h, &error);
         let (y0, bdf, runge_kutta) = match kept {
-            Kept::Start(_, y) => (y, None, None),
+            SolverStart::Start(_, y) => (y, None, None),
             // The problem requires an initial value, but the kept state has its own.
-            Kept::Bdf(state) => (vec![0.0; 2 * n], Some(state), None),
-            Kept::RungeKutta(state) => (vec![0.0; 2 * n], None, Some(state)),
+            SolverStart::Bdf(state) => (vec![0.0; 2 * n], Some(state), None),
+            SolverStart::RungeKutta(state) => (vec![0.0; 2 * n], None, Some(state)),
         };
         let ReferenceSettings { rtol, atol, method } = self.settings;
         let problem = OdeBuilder::<NalgebraMat<f64>>::new()
@@ -384,17 +384,17 @@ impl Reference {
             ReferenceMethod::Bdf => {
                 let state = bdf.map_or_else(|| problem.bdf_state::<Lu>(), Ok);
                 let solver = state.and_then(|state| problem.bdf_solver::<Lu>(state)).map_err(fault)?;
-                self.run(solver, stop, RUN, Kept::Bdf)
+                self.run(solver, stop, RUN, SolverStart::Bdf)
             }
             ReferenceMethod::Esdirk34 => {
                 let state = runge_kutta.map_or_else(|| problem.rk_state(&Tableau::esdirk34()), Ok);
                 let solver = state.and_then(|state| problem.esdirk34_solver::<Lu>(state)).map_err(fault)?;
-                self.run(solver, stop, RUN, Kept::RungeKutta)
+                self.run(solver, stop, RUN, SolverStart::RungeKutta)
             }
             ReferenceMethod::Tsit45 => {
                 let state = runge_kutta.map_or_else(|| problem.rk_state(&Tableau::tsit45()), Ok);
                 let solver = state.and_then(|state| problem.tsit45_solver(state)).map_err(fault)?;
-                self.run(solver, stop, 1, Kept::RungeKutta)
+                self.run(solver, stop, 1, SolverStart::RungeKutta)
             }
         }
     }
@@ -406,8 +406,8 @@ impl Reference {
         mut solver: S,
         stop: f64,
         least: u64,
-        keep: fn(S::State) -> Kept,
-    ) -> Result<Kept, StepError>
+        keep: fn(S::State) -> SolverStart,
+    ) -> Result<SolverStart, StepError>
     where
         E: OdeEquations<T = f64, V = V> + 'p,
         S: OdeSolverMethod<'p, E>,
@@ -430,7 +430,7 @@ impl Reference {
 
     /// Takes one step of the solver and queues the points in it. At a restart it returns the state
     /// from which the next run starts.
-    fn solver_step<'p, E, S>(&mut self, solver: &mut S, stop: f64) -> Result<Option<Kept>, StepError>
+    fn solver_step<'p, E, S>(&mut self, solver: &mut S, stop: f64) -> Result<Option<SolverStart>, StepError>
     where
         E: OdeEquations<T = f64, V = V> + 'p,
         S: OdeSolverMethod<'p, E>,
@@ -462,7 +462,7 @@ impl Reference {
             solver.interpolate_inplace(self.next_point().min(solver.state().t), &mut y).map_err(fault)?;
             self.ahead.push_back(y.inner().as_slice().to_vec());
         }
-        Ok(restart.then(|| Kept::Start(stop, solver.state().y.inner().as_slice().to_vec())))
+        Ok(restart.then(|| SolverStart::Start(stop, solver.state().y.inner().as_slice().to_vec())))
     }
 }
 

@@ -10,7 +10,7 @@ use super::matrix::{DofLabel, LabelledMatrix, Storage, Triplets};
 use super::text::{Text, shown, words};
 
 /// Lines with data, without comments and empty lines.
-fn data<'a>(text: &Text<'a>) -> impl Iterator<Item = (super::error::Place<'a>, &'a str)> + use<'a> {
+fn data<'a>(text: &Text<'a>) -> impl Iterator<Item = (super::error::ErrorPosition<'a>, &'a str)> + use<'a> {
     text.lines().filter(|(_, line)| !line.starts_with("**") && !line.trim().is_empty())
 }
 

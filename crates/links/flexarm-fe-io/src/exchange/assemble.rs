@@ -14,7 +14,7 @@
 use nalgebra::DMatrix;
 
 use super::diagnose::diagnose_substructure;
-use super::error::{ExchangeError, ExchangeErrorKind, Place};
+use super::error::{ErrorPosition, ExchangeError, ExchangeErrorKind};
 use super::interface::{InterfaceMap, propose_map};
 use super::matrix::{Entries, ImportedMatrices, LabelledMatrix};
 use flexarm_fem::units::UnitSystem;
@@ -48,7 +48,7 @@ pub fn assemble_interfaces(
     map: Option<&InterfaceMap>,
     units: Option<&UnitSystem>,
 ) -> Result<InterfaceMatrices, ExchangeError> {
-    let place = Place::file(&imported.origin);
+    let place = ErrorPosition::file(&imported.origin);
     let sidecar = imported.sidecar.as_ref();
     let map = map.cloned().or_else(|| Some(sidecar?.map())).filter(|map| !map.interfaces.is_empty());
     let map = map.ok_or_else(|| ask_for_map(imported))?;
@@ -111,7 +111,13 @@ fn check_modes(
         let help = "if these rows are modal coordinates, add modal=#13-22 to the map; a full model must first be \
                     reduced to its interfaces";
         let expected = "fixed-interface modes, which have no stiffness with other rows";
-        return Err(Place::file(&imported.origin).fail(ExchangeErrorKind::Interface, "rows", found, expected, help));
+        return Err(ErrorPosition::file(&imported.origin).fail(
+            ExchangeErrorKind::Interface,
+            "rows",
+            found,
+            expected,
+            help,
+        ));
     }
     Ok(())
 }
@@ -126,5 +132,5 @@ fn ask_for_map(imported: &ImportedMatrices) -> ExchangeError {
     let nodes: std::collections::BTreeSet<i64> = rows.iter().filter_map(|label| label.node).collect();
     let found = format!("{} rows of {} nodes and nothing about interfaces", rows.len(), nodes.len());
     let expected = "which rows are interface A and which B";
-    Place::file(&imported.origin).fail(ExchangeErrorKind::Ambiguous, "interfaces", found, expected, help)
+    ErrorPosition::file(&imported.origin).fail(ExchangeErrorKind::Ambiguous, "interfaces", found, expected, help)
 }

@@ -1,13 +1,13 @@
 //! Nastran bulk data: joins physical lines in small, large or free field into entries.
 
-use super::error::{ExchangeError, ExchangeErrorKind, Place};
+use super::error::{ErrorPosition, ExchangeError, ExchangeErrorKind};
 use super::text::{Text, shown};
 
 /// Entry with all its continuation lines.
 #[derive(Debug)]
 pub(super) struct Card<'a> {
     /// Place of the first line.
-    pub(super) place: Place<'a>,
+    pub(super) place: ErrorPosition<'a>,
     /// Keyword without `*`, upper case.
     pub(super) keyword: String,
     /// Data fields after the keyword with their line numbers: eight per line, four in large field.
@@ -21,9 +21,9 @@ impl<'a> Card<'a> {
     }
 
     /// Place of field `i`.
-    pub(super) fn place_of(&self, i: usize) -> Place<'a> {
+    pub(super) fn place_of(&self, i: usize) -> ErrorPosition<'a> {
         let line = self.fields.get(i).map(|(_, line)| *line).or(self.place.line);
-        Place { line, ..self.place }
+        ErrorPosition { line, ..self.place }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::error::{ExchangeError, ExchangeErrorKind, Place};
+use super::error::{ErrorPosition, ExchangeError, ExchangeErrorKind};
 use super::matrix::ImportedMatrices;
 use super::recognise::MatrixFormat;
 
@@ -52,7 +52,7 @@ pub fn diagnose_substructure(
         "was the matrix not condensed, or do the rows belong to other interfaces?"
     };
     let expected = "a free structure whose interfaces feel each other";
-    Err(Place::file(&imported.origin).fail(ExchangeErrorKind::Defective, "stiffness", found, expected, help))
+    Err(ErrorPosition::file(&imported.origin).fail(ExchangeErrorKind::Defective, "stiffness", found, expected, help))
 }
 
 /// Maximum `|k_ij| / sqrt(|k_ii k_jj|)` between an interface and the others; 0 only if all are

@@ -10,7 +10,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use nalgebra::Vector3;
 
 use super::cards::{Card, cards};
-use super::error::{ExchangeError, ExchangeErrorKind, Place};
+use super::error::{ErrorPosition, ExchangeError, ExchangeErrorKind};
 use super::matrix::{DofLabel, LabelledMatrix, Storage, Triplets};
 use super::text::{Text, shown};
 
@@ -26,8 +26,8 @@ struct RawMatrix<'a> {
     name: String,
     /// IFO 2 or 9: rows and columns have different meanings even if their numbers are the same.
     is_rectangular: bool,
-    header: Place<'a>,
-    entries: Vec<(DofLabel, DofLabel, f64, Place<'a>)>,
+    header: ErrorPosition<'a>,
+    entries: Vec<(DofLabel, DofLabel, f64, ErrorPosition<'a>)>,
 }
 
 /// Reads all matrices that can be a stiffness or a mass; others are named in the warnings.
@@ -107,7 +107,7 @@ fn parse_column<'a>(card: &Card<'a>, matrix: &mut RawMatrix<'a>) -> Result<(), E
     Ok(())
 }
 
-fn label(place: &Place<'_>, what: &str, node: &str, dof: &str) -> Result<DofLabel, ExchangeError> {
+fn label(place: &ErrorPosition<'_>, what: &str, node: &str, dof: &str) -> Result<DofLabel, ExchangeError> {
     let node = place.integer(what, node)?;
     let component = match dof {
         "" => Some(0),

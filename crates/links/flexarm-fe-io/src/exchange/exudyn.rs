@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use hdf5_pure::File;
 use nalgebra::Vector3;
 
-use super::error::{ExchangeError, ExchangeErrorKind, Place};
+use super::error::{ErrorPosition, ExchangeError, ExchangeErrorKind};
 use super::matrix::{DofLabel, LabelledMatrix, Storage, Triplets};
 use super::text::LARGEST_UNPACKED;
 use crate::unpack::allowed_unpacked;
@@ -27,12 +27,12 @@ struct Reader<'a> {
     size: usize,
     /// Remaining number of bytes that may be read; several names may refer to the same data.
     left: Cell<u64>,
-    place: Place<'a>,
+    place: ErrorPosition<'a>,
 }
 
 /// Reads the matrices, positions and node sets.
 pub(super) fn parse(bytes: &[u8], origin: &str) -> Result<Exudyn, ExchangeError> {
-    let place = Place::file(origin);
+    let place = ErrorPosition::file(origin);
     let syntax = |error: hdf5_pure::Error| {
         place.fail(ExchangeErrorKind::Syntax, "file", error.to_string(), "HDF5", "is the file cut off?")
     };
@@ -159,7 +159,7 @@ mod tests {
             file: File::from_bytes(bytes.clone()).unwrap(),
             size: bytes.len(),
             left: Cell::new(left),
-            place: Place::file("t.hdf5"),
+            place: ErrorPosition::file("t.hdf5"),
         };
         let read = reader(1600);
         assert_eq!((read.reals("numbers").unwrap().len(), read.integers("short").unwrap().len()), (100, 100));
@@ -175,7 +175,7 @@ mod tests {
         let bytes = builder.finish().unwrap();
         let file = File::from_bytes(bytes).unwrap();
         // A valid file of 800 bytes of numbers, with a wrong file size.
-        let small = Reader { file, size: 0, left: Cell::new(LARGEST_UNPACKED), place: Place::file("t.hdf5") };
+        let small = Reader { file, size: 0, left: Cell::new(LARGEST_UNPACKED), place: ErrorPosition::file("t.hdf5") };
         assert!(small.reals("numbers").unwrap_err().to_string().contains("than the file can hold"));
     }
 }

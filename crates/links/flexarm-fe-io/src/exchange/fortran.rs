@@ -1,6 +1,6 @@
 //! Fortran edit descriptors: `(8I10)`, `(1P,3E25.16)`, `1P5D16.9`, and fields of such formats.
 
-use super::error::{ExchangeError, ExchangeErrorKind, Place};
+use super::error::{ErrorPosition, ExchangeError, ExchangeErrorKind};
 use super::text::shown;
 
 /// Repeated fields of equal width.
@@ -11,7 +11,7 @@ pub(super) struct Format {
 }
 
 /// Parses the last descriptor of a format.
-pub(super) fn parse_format(text: &str, place: &Place<'_>) -> Result<Format, ExchangeError> {
+pub(super) fn parse_format(text: &str, place: &ErrorPosition<'_>) -> Result<Format, ExchangeError> {
     let upper = text.to_ascii_uppercase();
     let width = upper.rfind(['I', 'E', 'D', 'F', 'G']).and_then(|letter| {
         let digits: String = upper[letter + 1..].chars().take_while(char::is_ascii_digit).collect();
@@ -41,9 +41,9 @@ mod tests {
     fn formats_give_their_width() {
         for (text, width) in [("(8I10)", 10), ("(3E25.16)", 25), ("1P,3E23.16", 23), ("(1P5D16.9)", 16), ("5e16.9", 16)]
         {
-            assert_eq!(parse_format(text, &Place::file("t")).unwrap().width, width, "{text}");
+            assert_eq!(parse_format(text, &ErrorPosition::file("t")).unwrap().width, width, "{text}");
         }
-        assert!(parse_format("(A8)", &Place::file("t")).is_err());
+        assert!(parse_format("(A8)", &ErrorPosition::file("t")).is_err());
         let fields: Vec<_> = Format { width: 5 }.fields("-1.0-2.00-3.000  ").collect();
         assert_eq!(fields, ["-1.0-", "2.00-", "3.000"]);
     }

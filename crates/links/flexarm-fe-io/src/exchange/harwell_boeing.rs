@@ -1,6 +1,6 @@
 //! Harwell-Boeing as written by ANSYS `HBMAT`: `RSA` (lower triangle by columns) and `RUA`.
 
-use super::error::{ExchangeError, ExchangeErrorKind, Place};
+use super::error::{ErrorPosition, ExchangeError, ExchangeErrorKind};
 use super::fortran::{Format, parse_format};
 use super::matrix::{LabelledMatrix, Storage, Triplets};
 use super::text::{Text, shown, words};
@@ -30,7 +30,7 @@ pub(super) fn parse(text: Text<'_>) -> Result<LabelledMatrix, ExchangeError> {
 
     // Three lists, each starting on a new line.
     let mut list =
-        |what: &'static str, format: Format, count: usize| -> Result<Vec<(Place<'_>, &str)>, ExchangeError> {
+        |what: &'static str, format: Format, count: usize| -> Result<Vec<(ErrorPosition<'_>, &str)>, ExchangeError> {
             let mut fields = Vec::new();
             while fields.len() < count {
                 let Some((place, line)) = lines.next() else {
@@ -70,7 +70,7 @@ pub(super) fn parse(text: Text<'_>) -> Result<LabelledMatrix, ExchangeError> {
 }
 
 /// Numbers of rows and entries of a real, symmetric or unsymmetric, assembled matrix.
-fn parse_kind(place: &Place<'_>, line: &str) -> Result<(usize, usize), ExchangeError> {
+fn parse_kind(place: &ErrorPosition<'_>, line: &str) -> Result<(usize, usize), ExchangeError> {
     let mut words = words(line);
     let kind = place.word("type", &mut words)?;
     if !matches!(kind.to_ascii_uppercase().as_str(), "RSA" | "RUA") {

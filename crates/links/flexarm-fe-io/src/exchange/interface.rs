@@ -12,7 +12,7 @@ use std::collections::{BTreeMap, HashMap};
 use std::fmt;
 use std::str::FromStr;
 
-use super::error::{ExchangeError, ExchangeErrorKind, Place};
+use super::error::{ErrorPosition, ExchangeError, ExchangeErrorKind};
 use super::matrix::{DofLabel, LabelledMatrix};
 
 /// Name of a map in messages.
@@ -60,7 +60,7 @@ pub struct InterfaceMap {
 }
 
 fn wrong(element: impl Into<Box<str>>, found: impl Into<Box<str>>, expected: &str, help: &str) -> ExchangeError {
-    Place::file(ORIGIN).fail(ExchangeErrorKind::Interface, element, found, expected, help)
+    ErrorPosition::file(ORIGIN).fail(ExchangeErrorKind::Interface, element, found, expected, help)
 }
 
 impl Interface {
@@ -188,7 +188,13 @@ impl InterfaceMap {
                 let help = "a full model must first be reduced to its interfaces; if these rows are modal \
                             coordinates, add modal=... to the map";
                 let expected = "interfaces and modal coordinates only";
-                return Err(Place::file(origin).fail(ExchangeErrorKind::Interface, "rows", found, expected, help));
+                return Err(ErrorPosition::file(origin).fail(
+                    ExchangeErrorKind::Interface,
+                    "rows",
+                    found,
+                    expected,
+                    help,
+                ));
             }
             modal.push(row);
         }

@@ -6,7 +6,7 @@ use std::fmt;
 use flexarm_spatial::Pose;
 use nalgebra::{DMatrix, Vector3};
 
-use super::error::{ExchangeError, ExchangeErrorKind, Place};
+use super::error::{ErrorPosition, ExchangeError, ExchangeErrorKind};
 use super::recognise::MatrixFormat;
 use super::sidecar::Sidecar;
 
@@ -188,7 +188,7 @@ pub(super) enum Storage {
 
 impl Triplets {
     /// Adds an entry, rows and columns from 0; `place` is only for messages.
-    pub(super) fn push(&mut self, row: usize, column: usize, value: f64, place: &Place<'_>) {
+    pub(super) fn push(&mut self, row: usize, column: usize, value: f64, place: &ErrorPosition<'_>) {
         let line = place.line.unwrap_or(0) as u32;
         self.entries.push(Triplet { row: row as u32, column: column as u32, line, value });
     }
@@ -204,7 +204,7 @@ impl Triplets {
 
     /// Labels for rows without information in the file; an error if there are too few entries for
     /// `n` rows.
-    pub(super) fn unlabelled(&self, n: usize, place: &Place<'_>) -> Result<Vec<DofLabel>, ExchangeError> {
+    pub(super) fn unlabelled(&self, n: usize, place: &ErrorPosition<'_>) -> Result<Vec<DofLabel>, ExchangeError> {
         if n == 0 || (n > LARGEST_DENSE && n > 8 * self.len()) {
             let found = format!("{n} rows, but {} entries", self.len());
             let help = "a stiffness has an entry in every row; is this another file?";
@@ -286,7 +286,7 @@ fn common_value(
     let element = format!("entry ({}, {}) of {name}, rows {} and {}", row + 1, column + 1, rows[row], rows[column]);
     let line = Some(last.line as usize).filter(|line| *line > 0);
     let what = if mirrored.is_some() { "mirrored entries" } else { "the entry twice" };
-    Err(Place { origin, line }.fail(
+    Err(ErrorPosition { origin, line }.fail(
         ExchangeErrorKind::Unequal,
         element,
         format!("{what}: {:e} (line {}) and {:e}", first.value, first.line, last.value),
@@ -306,7 +306,7 @@ pub(super) fn reordered(matrix: &LabelledMatrix, rows: &[DofLabel]) -> Option<La
     let target: Option<Vec<usize>> = matrix.rows.iter().map(|label| places.get(label).copied()).collect();
     let target = target?;
     let mut moved = Triplets::default();
-    let nowhere = Place::file("");
+    let nowhere = ErrorPosition::file("");
     for (row, column, value) in matrix.to_sparse().triplets() {
         moved.push(target[row], target[column], value, &nowhere);
     }

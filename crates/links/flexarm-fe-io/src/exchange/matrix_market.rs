@@ -7,7 +7,7 @@
 
 use nalgebra::DMatrix;
 
-use super::error::{ExchangeError, ExchangeErrorKind, Place};
+use super::error::{ErrorPosition, ExchangeError, ExchangeErrorKind};
 use super::matrix::{LabelledMatrix, Storage, Triplets};
 use super::text::{Text, shown, words};
 
@@ -87,12 +87,12 @@ fn size_of_array(rows: usize, symmetry: Symmetry) -> usize {
     }
 }
 
-fn cut_off(place: &Place<'_>) -> ExchangeError {
+fn cut_off(place: &ErrorPosition<'_>) -> ExchangeError {
     place.fail(ExchangeErrorKind::Syntax, "header", "the end of the file", "a header and a line with the size", "")
 }
 
 /// Parses whether the layout is an array, and the symmetry.
-fn parse_banner(place: &Place<'_>, banner: &str) -> Result<(bool, Symmetry), ExchangeError> {
+fn parse_banner(place: &ErrorPosition<'_>, banner: &str) -> Result<(bool, Symmetry), ExchangeError> {
     let lower = banner.to_ascii_lowercase();
     let words: Vec<_> = words(lower.trim_start_matches('\u{feff}')).collect();
     let [_, "matrix", layout, field, symmetry] = words[..] else {

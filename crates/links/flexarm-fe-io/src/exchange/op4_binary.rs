@@ -1,6 +1,6 @@
 //! Nastran OUTPUT4 binary: Fortran records, little or big endian, dense or sparse, BIGMAT or not.
 
-use super::error::{ExchangeError, ExchangeErrorKind, Place};
+use super::error::{ErrorPosition, ExchangeError, ExchangeErrorKind};
 use super::matrix::{LabelledMatrix, Triplets};
 use super::op4_text::Header;
 
@@ -24,7 +24,7 @@ pub(super) fn parse(bytes: &[u8], origin: &str) -> Result<Vec<LabelledMatrix>, E
         }
         let numbers = [0, 1, 2, 3].map(|i| i64::from(records.integer(head, i)));
         let name = String::from_utf8_lossy(&head[16..24]).trim().to_owned();
-        let header = Header::new(&name, numbers, &Place::file(origin))?;
+        let header = Header::new(&name, numbers, &ErrorPosition::file(origin))?;
         let mut triplets = Triplets::default();
         while records.column(&header, &mut triplets)? {}
         matrices.extend(header.finish(triplets, origin)?);
@@ -36,7 +36,13 @@ impl<'a> Records<'a> {
     fn fail(&self, what: &str, found: impl Into<Box<str>>, expected: &str) -> ExchangeError {
         let element = format!("{what} before byte {}", self.at);
         let kind = ExchangeErrorKind::Syntax;
-        Place::file(self.origin).fail(kind, element, found, expected, "is the file cut off, or was it copied as text?")
+        ErrorPosition::file(self.origin).fail(
+            kind,
+            element,
+            found,
+            expected,
+            "is the file cut off, or was it copied as text?",
+        )
     }
 
     fn word(&self, bytes: &[u8], i: usize) -> [u8; 4] {
@@ -145,7 +151,7 @@ impl<'a> Records<'a> {
             let found = format!("{} bytes at row {row}", data.len());
             return Err(self.fail("values", found, "whole numbers of rows of the matrix"));
         }
-        let place = Place::file(self.origin);
+        let place = ErrorPosition::file(self.origin);
         for (i, bytes) in data.chunks_exact(size).enumerate() {
             let value = self.number(bytes, header.is_double);
             if !value.is_finite() {

@@ -7,7 +7,7 @@
 
 use nalgebra::DMatrix;
 
-use super::error::{ExchangeError, ExchangeErrorKind, Place};
+use super::error::{ErrorPosition, ExchangeError, ExchangeErrorKind};
 use super::fortran::{Format, parse_format};
 use super::matrix::{LabelledMatrix, Storage, Triplets};
 use super::text::{Text, shown, words};
@@ -29,7 +29,7 @@ impl Header {
     pub(super) fn new(
         name: &str,
         [columns, rows, _form, kind]: [i64; 4],
-        place: &Place<'_>,
+        place: &ErrorPosition<'_>,
     ) -> Result<Self, ExchangeError> {
         let element = format!("OP4 matrix {name}");
         let refuse = |found: String, expected: &str| {
@@ -53,7 +53,7 @@ impl Header {
         if self.rows != self.columns {
             return Ok(None);
         }
-        let rows = triplets.unlabelled(self.rows, &Place::file(origin))?;
+        let rows = triplets.unlabelled(self.rows, &ErrorPosition::file(origin))?;
         triplets.symmetric(&self.name, origin, rows, Storage::BySize).map(Some)
     }
 
@@ -106,7 +106,7 @@ fn is_header(line: &str) -> bool {
         && name.is_some_and(|c| c.starts_with(|c: char| c.is_ascii_alphabetic()))
 }
 
-fn begin(place: &Place<'_>, head: &str, line: &str) -> Result<Reading, ExchangeError> {
+fn begin(place: &ErrorPosition<'_>, head: &str, line: &str) -> Result<Reading, ExchangeError> {
     let mut numbers = [0; 4];
     for (i, number) in numbers.iter_mut().enumerate() {
         *number = place.integer("header", head.get(8 * i..8 * i + 8).unwrap_or(""))?;
@@ -127,7 +127,7 @@ fn begin(place: &Place<'_>, head: &str, line: &str) -> Result<Reading, ExchangeE
 impl Reading {
     /// Reads the header of a column (three integers) or of a string of a sparse column (one or
     /// two).
-    fn integers(&mut self, place: &Place<'_>, line: &str) -> Result<(), ExchangeError> {
+    fn integers(&mut self, place: &ErrorPosition<'_>, line: &str) -> Result<(), ExchangeError> {
         self.check_count(place)?;
         let numbers = words(line).map(|word| place.integer("column", word)).collect::<Result<Vec<_>, _>>()?;
         let (row, promised) = match numbers[..] {
@@ -159,7 +159,7 @@ impl Reading {
         Ok(())
     }
 
-    fn values(&mut self, place: &Place<'_>, line: &str) -> Result<(), ExchangeError> {
+    fn values(&mut self, place: &ErrorPosition<'_>, line: &str) -> Result<(), ExchangeError> {
         for field in self.format.fields(line) {
             let value = place.number("entry", field)?;
             let row = self.row + self.count;
@@ -179,7 +179,7 @@ impl Reading {
     }
 
     /// Checks the number of values; a double may count as one word or two.
-    fn check_count(&self, place: &Place<'_>) -> Result<(), ExchangeError> {
+    fn check_count(&self, place: &ErrorPosition<'_>) -> Result<(), ExchangeError> {
         let halves = self.header.is_double && 2 * self.count == self.promised;
         if self.count == self.promised || halves || self.column == self.header.columns + 1 {
             return Ok(());
@@ -190,7 +190,7 @@ impl Reading {
         Err(place.fail(ExchangeErrorKind::WrongSize, element, found, expected, "is the file cut off?"))
     }
 
-    fn finish(self, place: &Place<'_>, origin: &str) -> Result<Option<LabelledMatrix>, ExchangeError> {
+    fn finish(self, place: &ErrorPosition<'_>, origin: &str) -> Result<Option<LabelledMatrix>, ExchangeError> {
         self.check_count(place)?;
         if self.column != self.header.columns + 1 {
             let found = format!("the end after column {}", self.column);

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use flexarm_spatial::Pose;
 use nalgebra::Vector3;
 
-use super::error::{ExchangeError, ExchangeErrorKind, Place};
+use super::error::{ErrorPosition, ExchangeError, ExchangeErrorKind};
 use super::matrix::{DofLabel, ImportedMatrices, LabelledMatrix, Storage, reordered};
 use super::recognise::{MatrixFormat, recognise};
 use super::sidecar::Sidecar;
@@ -68,7 +68,13 @@ impl InputFile {
     pub fn open(path: impl AsRef<Path>) -> Result<Self, ExchangeError> {
         let origin = path.as_ref().display().to_string();
         let refuse = |error: std::io::Error| {
-            Place::file(&origin).fail(ExchangeErrorKind::Unreadable, "file", error.to_string(), "a readable file", "")
+            ErrorPosition::file(&origin).fail(
+                ExchangeErrorKind::Unreadable,
+                "file",
+                error.to_string(),
+                "a readable file",
+                "",
+            )
         };
         let bytes = read_file(path.as_ref(), LARGEST_UNPACKED).map_err(refuse)?;
         Ok(Self { origin, bytes, role: None })
@@ -91,7 +97,7 @@ pub(super) struct Candidate {
 
 /// Combined contents of all files.
 #[derive(Debug, Default)]
-struct Found {
+struct CombinedFiles {
     candidates: Vec<Candidate>,
     labels: Option<(String, Vec<DofLabel>)>,
     positions: BTreeMap<i64, Vector3<f64>>,
@@ -258,7 +264,7 @@ fn wanted_by(file: &InputFile) -> Result<Vec<(PathBuf, Option<MatrixRole>)>, Exc
 /// # Errors
 /// As [`read_matrices`].
 pub fn parse_matrices(files: &[InputFile], names: &MatrixNames) -> Result<ImportedMatrices, ExchangeError> {
-    let mut found = Found::default();
+    let mut found = CombinedFiles::default();
     for file in files {
         parse_file(file, &mut found)?;
     }
@@ -266,9 +272,9 @@ pub fn parse_matrices(files: &[InputFile], names: &MatrixNames) -> Result<Import
     choose(found, names, origin)
 }
 
-fn parse_file(file: &InputFile, found: &mut Found) -> Result<(), ExchangeError> {
+fn parse_file(file: &InputFile, found: &mut CombinedFiles) -> Result<(), ExchangeError> {
     let origin = file.origin.as_str();
-    let place = Place::file(origin);
+    let place = ErrorPosition::file(origin);
     let Some(format) = recognise(&file.bytes) else {
         let help = ".mtx of Adams and Altair, .mnf, .sub, .h3d and .npz cannot be read: export text, such as DMIG or \
                     Matrix Market";
@@ -316,7 +322,7 @@ fn parse_file(file: &InputFile, found: &mut Found) -> Result<(), ExchangeError> 
         MatrixFormat::ExudynHdf5 => {
             let (found, expected) = ("HDF5", "a format that this build reads");
             let help = "build flexarm with the feature hdf5, or install the Python package, which reads it";
-            return Err(Place::file(origin).fail(ExchangeErrorKind::Syntax, "file", found, expected, help));
+            return Err(ErrorPosition::file(origin).fail(ExchangeErrorKind::Syntax, "file", found, expected, help));
         }
         #[cfg(feature = "hdf5")]
         MatrixFormat::ExudynHdf5 => {
@@ -389,14 +395,14 @@ fn role_by_letter(name: &str) -> Option<MatrixRole> {
 }
 
 /// Selects stiffness and mass and gives them the same rows.
-fn choose(mut found: Found, names: &MatrixNames, origin: &str) -> Result<ImportedMatrices, ExchangeError> {
+fn choose(mut found: CombinedFiles, names: &MatrixNames, origin: &str) -> Result<ImportedMatrices, ExchangeError> {
     for (name, role) in [(&names.stiffness, MatrixRole::Stiffness), (&names.mass, MatrixRole::Mass)] {
         let Some(name) = name else { continue };
         let is_named = |candidate: &Candidate| candidate.matrix.name.eq_ignore_ascii_case(name);
         if !found.candidates.iter().any(is_named) {
             let (found, expected) = (format!("{name:?}"), format!("one of {}", list(&found.candidates)));
             let element = format!("name of the {}", role.name());
-            return Err(Place::file(origin).fail(ExchangeErrorKind::Missing, element, found, expected, ""));
+            return Err(ErrorPosition::file(origin).fail(ExchangeErrorKind::Missing, element, found, expected, ""));
         }
         for candidate in &mut found.candidates {
             if is_named(candidate) {
@@ -416,7 +422,7 @@ fn choose(mut found: Found, names: &MatrixNames, origin: &str) -> Result<Importe
         if found.candidates.iter().filter(fits).count() > 1 {
             let help = format!("name the {}, or give its file alone", role.name());
             let kind = ExchangeErrorKind::Ambiguous;
-            return Err(Place::file(origin).fail(kind, role.name(), all.clone(), "one matrix", help));
+            return Err(ErrorPosition::file(origin).fail(kind, role.name(), all.clone(), "one matrix", help));
         }
         let place = found.candidates.iter().position(|candidate| candidate.role == Some(role));
         Ok(place.map(|i| found.candidates.swap_remove(i)))
@@ -425,7 +431,13 @@ fn choose(mut found: Found, names: &MatrixNames, origin: &str) -> Result<Importe
     let Some(stiffness) = stiffness else {
         let help = "say which matrix is the stiffness";
         let nothing = if all.is_empty() { "no matrix".to_owned() } else { all };
-        return Err(Place::file(origin).fail(ExchangeErrorKind::Missing, "stiffness", nothing, "a stiffness", help));
+        return Err(ErrorPosition::file(origin).fail(
+            ExchangeErrorKind::Missing,
+            "stiffness",
+            nothing,
+            "a stiffness",
+            help,
+        ));
     };
 
     let Candidate { format, origin, matrix: mut K, .. } = stiffness;
@@ -439,7 +451,7 @@ fn choose(mut found: Found, names: &MatrixNames, origin: &str) -> Result<Importe
         let (aligned_K, aligned_M) = aligned(&K, mass, &origin)?;
         (K, M) = (aligned_K, Some(aligned_M));
     }
-    let Found { positions, node_sets, frames, sidecar, warnings, .. } = found;
+    let CombinedFiles { positions, node_sets, frames, sidecar, warnings, .. } = found;
     Ok(ImportedMatrices { format, origin, stiffness: K, mass: M, positions, node_sets, frames, sidecar, warnings })
 }
 
@@ -452,7 +464,13 @@ fn apply_labels(matrix: &mut LabelledMatrix, labels: &[DofLabel], from: &str) ->
     if labels.len() != matrix.size() {
         let (found, expected) = (format!("{} rows", labels.len()), format!("{}, as the matrix has", matrix.size()));
         let help = "do the files belong to the same calculation?";
-        return Err(Place::file(from).fail(ExchangeErrorKind::WrongSize, "list of rows", found, expected, help));
+        return Err(ErrorPosition::file(from).fail(
+            ExchangeErrorKind::WrongSize,
+            "list of rows",
+            found,
+            expected,
+            help,
+        ));
     }
     matrix.rows = labels.to_vec();
     Ok(())
@@ -470,7 +488,7 @@ fn aligned(
     let refuse = || {
         let found = format!("{} rows of stiffness, {} rows of mass", K.size(), M.size());
         let help = "do the files belong to the same calculation?";
-        Place::file(origin).fail(ExchangeErrorKind::WrongSize, "rows", found, "the same rows", help)
+        ErrorPosition::file(origin).fail(ExchangeErrorKind::WrongSize, "rows", found, "the same rows", help)
     };
     let unique = |matrix: &LabelledMatrix| {
         matrix.is_labelled() && matrix.rows.iter().collect::<HashSet<_>>().len() == matrix.size()

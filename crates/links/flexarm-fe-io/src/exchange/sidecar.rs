@@ -96,7 +96,7 @@ fn no_rotation() -> [[f64; 3]; 3] {
 pub(super) fn parse(text: Text<'_>) -> Result<Sidecar, ExchangeError> {
     let syntax = |error: toml::de::Error| {
         let line = error.span().map(|span| text.text.get(..span.start).unwrap_or("").matches('\n').count() + 1);
-        let place = super::error::Place { line, ..text.file() };
+        let place = super::error::ErrorPosition { line, ..text.file() };
         let expected = "the keys format, version, stiffness, mass, units, [[interface]] with name, rows, xyz, rotation";
         place.fail(ExchangeErrorKind::Syntax, "sidecar", error.message(), expected, "")
     };

@@ -11,7 +11,7 @@ use super::matrix::{LabelledMatrix, Storage, Triplets};
 use super::text::{Text, words};
 
 /// Lines with numbers, without comments.
-fn rows<'a>(text: &Text<'a>) -> impl Iterator<Item = (super::error::Place<'a>, &'a str)> + use<'a> {
+fn rows<'a>(text: &Text<'a>) -> impl Iterator<Item = (super::error::ErrorPosition<'a>, &'a str)> + use<'a> {
     text.lines().filter(|(_, line)| !line.trim().is_empty() && !line.starts_with(['#', '%']))
 }
 

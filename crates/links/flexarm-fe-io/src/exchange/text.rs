@@ -5,7 +5,7 @@ use std::io::Read;
 
 use flate2::read::MultiGzDecoder;
 
-use super::error::{ExchangeError, ExchangeErrorKind, Place};
+use super::error::{ErrorPosition, ExchangeError, ExchangeErrorKind};
 use crate::unpack::{is_gzip, unpacked};
 
 /// Maximum unpacked size, bytes; a full model of 300 000 unknowns takes half of it.
@@ -17,9 +17,9 @@ pub(super) fn unpack<'b>(bytes: &'b [u8], origin: &str) -> Result<Cow<'b, [u8]>,
         return Ok(Cow::Borrowed(bytes));
     }
     let unpacked = unpacked(bytes, LARGEST_UNPACKED);
-    unpacked
-        .map(Cow::Owned)
-        .map_err(|e| Place::file(origin).fail(ExchangeErrorKind::Unreadable, "gzip data", e.found, e.expected, e.help))
+    unpacked.map(Cow::Owned).map_err(|e| {
+        ErrorPosition::file(origin).fail(ExchangeErrorKind::Unreadable, "gzip data", e.found, e.expected, e.help)
+    })
 }
 
 /// Returns the first bytes, unpacked; an unpacking error ends the result silently.
@@ -45,14 +45,14 @@ impl<'a> Text<'a> {
         Self { origin, text }
     }
 
-    pub(super) fn file(&self) -> Place<'a> {
-        Place::file(self.origin)
+    pub(super) fn file(&self) -> ErrorPosition<'a> {
+        ErrorPosition::file(self.origin)
     }
 
     /// Iterates over all lines with their places, without line ends.
-    pub(super) fn lines(&self) -> impl Iterator<Item = (Place<'a>, &'a str)> + use<'a> {
+    pub(super) fn lines(&self) -> impl Iterator<Item = (ErrorPosition<'a>, &'a str)> + use<'a> {
         let origin = self.origin;
-        self.text.lines().enumerate().map(move |(i, line)| (Place::line(origin, i + 1), line))
+        self.text.lines().enumerate().map(move |(i, line)| (ErrorPosition::line(origin, i + 1), line))
     }
 }
 
@@ -81,7 +81,7 @@ pub(super) fn real(text: &str) -> Option<f64> {
     mended.parse().ok()
 }
 
-impl Place<'_> {
+impl ErrorPosition<'_> {
     /// Parses a finite number.
     pub(super) fn number(&self, element: &str, text: &str) -> Result<f64, ExchangeError> {
         match real(text) {

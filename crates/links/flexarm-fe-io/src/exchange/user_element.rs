@@ -5,7 +5,7 @@
 
 use nalgebra::DMatrix;
 
-use super::error::{ExchangeError, ExchangeErrorKind, Place};
+use super::error::{ErrorPosition, ExchangeError, ExchangeErrorKind};
 use super::matrix::{DofLabel, LabelledMatrix, Storage, Triplets};
 use super::read::MatrixRole;
 use super::text::{Text, shown, words};
@@ -32,8 +32,8 @@ struct Raw<'a> {
 
 struct RawMatrix<'a> {
     role: MatrixRole,
-    place: Place<'a>,
-    values: Vec<(Place<'a>, f64)>,
+    place: ErrorPosition<'a>,
+    values: Vec<(ErrorPosition<'a>, f64)>,
 }
 
 /// Reads the stiffness, the mass, or both.
@@ -87,7 +87,7 @@ fn scan(text: Text<'_>) -> Result<Raw<'_>, ExchangeError> {
     Ok(raw)
 }
 
-fn scan_keyword<'a>(raw: &mut Raw<'a>, place: &Place<'a>, line: &str) -> Result<Block, ExchangeError> {
+fn scan_keyword<'a>(raw: &mut Raw<'a>, place: &ErrorPosition<'a>, line: &str) -> Result<Block, ExchangeError> {
     let upper: String = line.to_ascii_uppercase().replace(' ', "");
     let mut parts = upper.trim().split(',');
     let keyword = parts.next().unwrap_or_default();
@@ -120,7 +120,7 @@ fn scan_keyword<'a>(raw: &mut Raw<'a>, place: &Place<'a>, line: &str) -> Result<
 
 /// `dof, dof, ...` of the first node, then `position, dof, dof, ...`; each is valid for the nodes
 /// that follow.
-fn scan_components(raw: &mut Raw<'_>, place: &Place<'_>, line: &str) -> Result<(), ExchangeError> {
+fn scan_components(raw: &mut Raw<'_>, place: &ErrorPosition<'_>, line: &str) -> Result<(), ExchangeError> {
     let mut numbers = Vec::new();
     for word in words(line) {
         numbers.push(place.integer("degree of freedom", word)?);

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, HashMap};
 
 use nalgebra::Vector3;
 
-use super::error::{MeshError, MeshErrorKind as Kind, Place};
+use super::error::{FilePosition, MeshError, MeshErrorKind as Kind};
 use super::ids::IdIndex;
 use super::source::Source;
 use flexarm_fem::mesh::corner_count;
@@ -74,7 +74,7 @@ impl Draft {
     pub(super) fn index_nodes(&self, src: &Source) -> Result<IdIndex, MeshError> {
         if self.nodes.len() >= u32::MAX as usize {
             let found = format!("{} nodes", self.nodes.len());
-            return Err(src.error_in(Kind::TooLarge, Place::File, "mesh", found, "fewer than 4294967295 nodes"));
+            return Err(src.error_in(Kind::TooLarge, FilePosition::File, "mesh", found, "fewer than 4294967295 nodes"));
         }
         if let Some(k) = self.nodes.iter().position(|p| !p.iter().all(|x| x.is_finite())) {
             let (element, found) = (format!("node {}", self.node_ids[k]), format!("{:?}", self.nodes[k].as_slice()));
@@ -101,7 +101,7 @@ impl Draft {
             blocks.push(resolve(src, index, block)?);
         }
         if blocks.is_empty() {
-            let error = src.error_in(Kind::Missing, Place::File, "mesh", "no volume elements", "at least one");
+            let error = src.error_in(Kind::Missing, FilePosition::File, "mesh", "no volume elements", "at least one");
             return Err(error.help("was only the surface meshed, or are the volumes in no physical group?"));
         }
         refuse_twins(src, &self.blocks, &blocks)?;

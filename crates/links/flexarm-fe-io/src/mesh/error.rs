@@ -34,7 +34,7 @@ pub enum MeshErrorKind {
 
 /// Position in the file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Place {
+pub enum FilePosition {
     /// The file as a whole.
     File,
     /// Line of a text file, from 1.
@@ -53,7 +53,7 @@ pub struct MeshError {
     /// File, or the name given to the bytes.
     pub origin: Box<str>,
     /// Line or byte.
-    pub place: Place,
+    pub place: FilePosition,
     /// Element of the file, such as `element 17` or `*NSET INTERFACE_A`.
     pub element: Box<str>,
     /// Text or value found.
@@ -73,7 +73,7 @@ impl MeshError {
     }
 }
 
-impl fmt::Display for Place {
+impl fmt::Display for FilePosition {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::File => Ok(()),

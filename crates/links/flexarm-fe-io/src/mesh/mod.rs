@@ -13,5 +13,5 @@ mod inp;
 mod read;
 mod source;
 
-pub use error::{MeshError, MeshErrorKind, Place};
+pub use error::{FilePosition, MeshError, MeshErrorKind};
 pub use read::{MeshFile, ReadOptions, parse_mesh, read_mesh};

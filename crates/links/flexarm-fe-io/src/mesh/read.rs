@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use super::error::{MeshError, MeshErrorKind as Kind, Place};
+use super::error::{FilePosition, MeshError, MeshErrorKind as Kind};
 use super::source::{Source, shown};
 use flexarm_fem::mesh::{BeamProperties, Mesh};
 
@@ -62,7 +62,7 @@ pub fn read_mesh(path: impl AsRef<Path>, options: &ReadOptions) -> Result<MeshFi
     let origin = path.display().to_string();
     let src = Source { bytes: &[], origin: &origin, binary: false };
     let unreadable = |error: std::io::Error| {
-        src.error_in(Kind::Unreadable, Place::File, "file", error.to_string(), "a file that can be read")
+        src.error_in(Kind::Unreadable, FilePosition::File, "file", error.to_string(), "a file that can be read")
     };
     let bytes = read_file(path, LARGEST).map_err(unreadable)?;
     parse_mesh(&bytes, &origin, options)
@@ -77,7 +77,7 @@ pub fn parse_mesh(bytes: &[u8], origin: &str, options: &ReadOptions) -> Result<M
     if is_gzip(bytes) {
         let unpacked = unpacked(bytes, LARGEST).map_err(|e| {
             let kind = if e.too_large { Kind::TooLarge } else { Kind::Unreadable };
-            src.error_in(kind, Place::File, "gzip", e.found, e.expected).help(e.help)
+            src.error_in(kind, FilePosition::File, "gzip", e.found, e.expected).help(e.help)
         })?;
         return parse_plain(&Source { bytes: &unpacked, ..src }, options);
     }
@@ -88,7 +88,7 @@ fn parse_plain(src: &Source, options: &ReadOptions) -> Result<MeshFile, MeshErro
     let text = src.bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(src.bytes).trim_ascii_start();
     if let Some((name, help)) = foreign(text) {
         let expected = "Gmsh .msh (2.2, 4.1), or .inp of CalculiX or Abaqus";
-        return Err(src.error_in(Kind::Format, Place::File, "format", name, expected).help(help));
+        return Err(src.error_in(Kind::Format, FilePosition::File, "format", name, expected).help(help));
     }
     match text.first() {
         Some(b'$') => gmsh::parse(src, options),
@@ -96,10 +96,10 @@ fn parse_plain(src: &Source, options: &ReadOptions) -> Result<MeshFile, MeshErro
         Some(_) => {
             let first_line = text.split(|byte| matches!(byte, b'\n' | b'\r')).next().unwrap_or(text);
             let expected = "$MeshFormat (Gmsh .msh) or a line with * (CalculiX or Abaqus .inp)";
-            let error = src.error_in(Kind::Format, Place::File, "format", shown(first_line), expected);
+            let error = src.error_in(Kind::Format, FilePosition::File, "format", shown(first_line), expected);
             Err(error.help("geometry such as STEP or STL must be meshed first, for example with Gmsh"))
         }
-        None => Err(src.error_in(Kind::Truncated, Place::File, "file", "nothing", "a mesh")),
+        None => Err(src.error_in(Kind::Truncated, FilePosition::File, "file", "nothing", "a mesh")),
     }
 }
 

@@ -2,7 +2,7 @@
 //!
 //! Readers only keep byte offsets; a line number is computed when a message needs it.
 
-use super::error::{MeshError, MeshErrorKind, Place};
+use super::error::{FilePosition, MeshError, MeshErrorKind};
 
 /// Contents of the whole file.
 #[derive(Clone, Copy)]
@@ -27,9 +27,9 @@ impl Source<'_> {
     ) -> MeshError {
         let offset = offset.min(self.bytes.len());
         let place = if self.binary {
-            Place::Byte(offset)
+            FilePosition::Byte(offset)
         } else {
-            Place::Line(1 + self.bytes[..offset].iter().filter(|byte| **byte == b'\n').count())
+            FilePosition::Line(1 + self.bytes[..offset].iter().filter(|byte| **byte == b'\n').count())
         };
         self.error_in(kind, place, element, found, expected)
     }
@@ -38,7 +38,7 @@ impl Source<'_> {
     pub(super) fn error_in(
         &self,
         kind: MeshErrorKind,
-        place: Place,
+        place: FilePosition,
         element: impl Into<Box<str>>,
         found: impl Into<Box<str>>,
         expected: impl Into<Box<str>>,

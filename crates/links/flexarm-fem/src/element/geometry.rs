@@ -16,7 +16,7 @@ const NODE_SLACK: f64 = 1e-12;
 
 /// Place of an inversion in an element; both numbers count from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Place {
+pub enum InversionPoint {
     /// Gauss point of the stiffness or mass.
     GaussPoint(usize),
     /// Node of the element.
@@ -31,14 +31,14 @@ pub struct InvertedElement {
     /// Determinant of the Jacobian there, m³; zero, negative or NaN.
     pub det: f64,
     /// Place of the determinant.
-    pub place: Place,
+    pub place: InversionPoint,
 }
 
 impl fmt::Display for InvertedElement {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (place, number) = match self.place {
-            Place::GaussPoint(number) => ("Gauss point", number + 1),
-            Place::Node(number) => ("node", number + 1),
+            InversionPoint::GaussPoint(number) => ("Gauss point", number + 1),
+            InversionPoint::Node(number) => ("node", number + 1),
         };
         let name = self.kind.name();
         write!(f, "{name} is inverted: det J is {:.3e} m3 at its {place} {number}, it must be positive", self.det)
@@ -214,7 +214,7 @@ impl Jacobian {
         if jacobian.det > 0.0 {
             return Ok(jacobian);
         }
-        Err(InvertedElement { kind, det: jacobian.det, place: Place::GaussPoint(point) })
+        Err(InvertedElement { kind, det: jacobian.det, place: InversionPoint::GaussPoint(point) })
     }
 
     /// Writes `dN_i/dx_a` of all nodes to `gradient[a * stride + i]`.
@@ -237,7 +237,7 @@ pub(crate) fn check_nodes(kind: ElementKind, nodes: &Nodes, largest_det: f64) ->
     let table = &tables(kind).nodes;
     for (number, (_, det)) in dets(table, nodes).enumerate() {
         if !(det >= -NODE_SLACK * largest_det) {
-            return Err(InvertedElement { kind, det, place: Place::Node(number) });
+            return Err(InvertedElement { kind, det, place: InversionPoint::Node(number) });
         }
     }
     Ok(())

@@ -21,7 +21,7 @@ mod solid;
 mod tests;
 
 pub use elasticity::{check_solid_material, stress_strain};
-pub use geometry::{InvertedElement, JacobianRange, Place, jacobian_range};
+pub use geometry::{InversionPoint, InvertedElement, JacobianRange, jacobian_range};
 #[cfg(test)]
 pub(crate) use quadrature::gauss_jacobi;
 pub(crate) use quadrature::{TetRule, tet_points};

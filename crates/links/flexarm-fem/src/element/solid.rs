@@ -191,7 +191,7 @@ fn centre_of_brick(kind: ElementKind, n: usize, nodes: &Nodes) -> Result<Jacobia
     }
     // The determinant at the centre is close to the mean of eight positive ones, so only NaN or a
     // badly folded element gets here.
-    Err(InvertedElement { kind, det: centre.det, place: super::geometry::Place::GaussPoint(0) })
+    Err(InvertedElement { kind, det: centre.det, place: super::geometry::InversionPoint::GaussPoint(0) })
 }
 
 /// Gradients of the modes `1 - xi_c²`, mapped by the Jacobian at the centre.

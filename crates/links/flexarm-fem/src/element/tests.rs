@@ -342,7 +342,7 @@ fn an_element_turned_over_at_a_node_is_reported_there() {
     x[4].x = 0.2499;
     let mut workspace = ElementWorkspace::new();
     let at_node = workspace.stiffness_and_mass(Tet10, &x, &STEEL, Quadrature::Exact).unwrap_err();
-    assert_eq!(at_node.place, Place::Node(0));
+    assert_eq!(at_node.place, InversionPoint::Node(0));
     assert!((at_node.det + 4e-4).abs() < 1e-14, "{at_node}"); // 4 x_4 - 1, measured 4e-17
     let range = jacobian_range(Tet10, &x);
     assert!(range.node == 0 && range.min_node < 0.0 && range.min_gauss > 0.0);
@@ -352,7 +352,7 @@ fn an_element_turned_over_at_a_node_is_reported_there() {
     workspace.stiffness_and_mass(Tet10, &x, &STEEL, Quadrature::Calculix).unwrap();
     x[4].x = -0.8;
     let at_point = workspace.stiffness_and_mass(Tet10, &x, &STEEL, Quadrature::Calculix).unwrap_err();
-    assert!(matches!(at_point.place, Place::GaussPoint(_)) && at_point.det < 0.0);
+    assert!(matches!(at_point.place, InversionPoint::GaussPoint(_)) && at_point.det < 0.0);
 }
 
 #[test]

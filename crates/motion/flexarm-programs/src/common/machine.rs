@@ -341,7 +341,7 @@ impl<'a, D: Dialect> Machine<'a, D> {
             Some(_) => Ok(()),
             None => fail(
                 span,
-                "this loop does not end: tell how often it is to be run (`endless_passes`), or write a loop that counts",
+                "this loop does not end: say how often it is to be run (`endless_passes`), or write a loop that counts",
             ),
         }
     }

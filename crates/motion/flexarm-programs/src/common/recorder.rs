@@ -15,11 +15,11 @@ pub(crate) struct Recorder<'a> {
     sources: Vec<Sources>,
     /// The same for the next move.
     pub(crate) next: Sources,
-    notes: Vec<Told>,
+    notes: Vec<RepeatedNote>,
     moves: usize,
     /// Values of external axes, and the lines where they were first given.
     external: [Option<(f64, usize)>; 6],
-    place: Place,
+    place: RobotPosition,
 }
 
 /// Spans of the literals of a move's target and of the auxiliary point of its circle.
@@ -36,7 +36,7 @@ pub(crate) struct Recorded {
 }
 
 /// A note that is given once, with all its lines.
-struct Told {
+struct RepeatedNote {
     text: String,
     file: usize,
     lines: Vec<usize>,
@@ -48,7 +48,7 @@ const LINES_OF_A_NOTE: usize = 8;
 
 /// Position of the robot after the moves so far.
 #[allow(clippy::large_enum_variant, reason = "there is one of it")]
-enum Place {
+enum RobotPosition {
     /// No move was made, or its end is known only from kinematics.
     Unknown,
     Joints(Vec<f64>),
@@ -61,7 +61,7 @@ enum Place {
 
 impl<'a> Recorder<'a> {
     pub(crate) fn new(options: &'a ReadOptions<'a>, texts: Vec<Text>) -> Self {
-        let place = options.start.as_ref().map_or(Place::Unknown, |start| Place::Joints(start.clone()));
+        let place = options.start.as_ref().map_or(RobotPosition::Unknown, |start| RobotPosition::Joints(start.clone()));
         Self {
             options,
             texts,
@@ -95,14 +95,16 @@ impl<'a> Recorder<'a> {
                     }
                 }
             }
-            None => self.notes.push(Told { text: text.to_owned(), file: span.file, lines: vec![line], times: 1 }),
+            None => {
+                self.notes.push(RepeatedNote { text: text.to_owned(), file: span.file, lines: vec![line], times: 1 })
+            }
         }
     }
 
     /// Adds a note about the program as a whole.
     pub(crate) fn note_all(&mut self, text: &str) {
         if !self.notes.iter().any(|told| told.text == text) {
-            self.notes.push(Told { text: text.to_owned(), file: 0, lines: Vec::new(), times: 0 });
+            self.notes.push(RepeatedNote { text: text.to_owned(), file: 0, lines: Vec::new(), times: 0 });
         }
     }
 
@@ -163,9 +165,9 @@ impl<'a> Recorder<'a> {
         step.line = self.line(span);
         step.statement = self.excerpt(span);
         self.place = match (&step.to, &step.kind) {
-            (_, MoveKind::Arc { angle: Some(_), .. }) => Place::Unknown,
-            (Target::Joints(joints), _) => Place::Joints(joints.clone()),
-            (Target::Pose { X_BT, .. }, _) => Place::Tool { X_WB: step.X_WB, X_FT: step.X_FT, X_BT: *X_BT },
+            (_, MoveKind::Arc { angle: Some(_), .. }) => RobotPosition::Unknown,
+            (Target::Joints(joints), _) => RobotPosition::Joints(joints.clone()),
+            (Target::Pose { X_BT, .. }, _) => RobotPosition::Tool { X_WB: step.X_WB, X_FT: step.X_FT, X_BT: *X_BT },
         };
         self.items.push(Item::Move(step));
         self.sources.push(std::mem::take(&mut self.next));
@@ -174,7 +176,7 @@ impl<'a> Recorder<'a> {
 
     /// Sets the position to `X_BT`, regardless of the last target.
     pub(crate) fn now_at(&mut self, X_WB: Pose, X_FT: Option<Pose>, X_BT: Pose) {
-        self.place = Place::Tool { X_WB, X_FT, X_BT };
+        self.place = RobotPosition::Tool { X_WB, X_FT, X_BT };
     }
 
     /// Checks the external axes of a target (`None`: not given); they must not move.
@@ -198,7 +200,7 @@ impl<'a> Recorder<'a> {
         }
         if values.iter().flatten().any(|value| *value != 0.0) {
             self.note(
-                "external axes stand still at the values that the targets tell; the base frame is not moved by them",
+                "external axes stand still at the values that the targets give; the base frame is not moved by them",
                 span,
             );
         }
@@ -208,7 +210,7 @@ impl<'a> Recorder<'a> {
     /// Joint values at the end of the last move, if its target was given in joint values.
     pub(crate) fn joints(&self) -> Option<&[f64]> {
         match &self.place {
-            Place::Joints(joints) => Some(joints),
+            RobotPosition::Joints(joints) => Some(joints),
             _ => None,
         }
     }
@@ -218,23 +220,23 @@ impl<'a> Recorder<'a> {
         let unknown = |why: &str| Fail {
             span,
             message: format!(
-                "what is not told stays, but {why}: write all coordinates of the target, or move to a full pose before"
+                "what is not given stays, but {why}: write all coordinates of the target, or move to a full pose before"
             ),
         };
         match &self.place {
-            Place::Unknown => Err(unknown("where the robot is before this move is not known")),
-            Place::Joints(joints) => {
+            RobotPosition::Unknown => Err(unknown("where the robot is before this move is not known")),
+            RobotPosition::Joints(joints) => {
                 let forward = self.options.forward.and_then(|forward| forward(joints));
                 let Some(X_WF) = forward else {
                     return Err(unknown(
-                        "the position before was told in joint values, and the robot's kinematics were not given",
+                        "the position before was given in joint values, and the robot's kinematics were not given",
                     ));
                 };
                 Ok(X_WB.inverse()
                     * X_WF
                     * self.tool(X_FT).ok_or_else(|| unknown("the tool of the robot is not known"))?)
             }
-            Place::Tool { X_WB: X_WB0, X_FT: X_FT0, X_BT: X_B0T0 } => {
+            RobotPosition::Tool { X_WB: X_WB0, X_FT: X_FT0, X_BT: X_B0T0 } => {
                 if X_FT0 == X_FT {
                     // The frames are unchanged, which avoids rounding.
                     return Ok(if X_WB0 == X_WB { *X_B0T0 } else { X_WB.inverse() * X_WB0 * X_B0T0 });
@@ -267,7 +269,7 @@ impl<'a> Recorder<'a> {
     }
 }
 
-impl Told {
+impl RepeatedNote {
     fn as_note(&self, texts: &[Text]) -> Note {
         if self.lines.is_empty() {
             return Note { line: None, text: self.text.clone() };

@@ -108,17 +108,17 @@ impl Gcode<'_> {
     fn centre_of_offsets(&self, start: Vector3<f64>, values: &Values, span: Span) -> Result<[f64; 2]> {
         let [u, v, _] = self.plane.axes();
         let letters = ['I', 'J', 'K'];
-        let told = |axis: usize| values.get(&letters[axis]).map(|(value, _)| value * self.unit);
-        if told(u).is_none() && told(v).is_none() {
+        let given = |axis: usize| values.get(&letters[axis]).map(|(value, _)| value * self.unit);
+        if given(u).is_none() && given(v).is_none() {
             return fail(span, format!("an arc needs its centre ({} or {}) or its radius (R)", letters[u], letters[v]));
         }
         if self.absolute_centres {
-            let (Some(a), Some(b)) = (told(u), told(v)) else {
+            let (Some(a), Some(b)) = (given(u), given(v)) else {
                 return fail(span, "absolute centres (G90.1) need both coordinates of the plane");
             };
             return Ok([a, b]);
         }
-        Ok([start[u] + told(u).unwrap_or(0.0), start[v] + told(v).unwrap_or(0.0)])
+        Ok([start[u] + given(u).unwrap_or(0.0), start[v] + given(v).unwrap_or(0.0)])
     }
 
     /// Centre in the plane from R: the shorter arc, or the longer one for a negative R.

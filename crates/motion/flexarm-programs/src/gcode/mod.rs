@@ -296,7 +296,7 @@ impl<'a> Gcode<'a> {
             let p = now.inverse() * (before * nalgebra::Point3::new(x, y, z));
             self.at = [Some(p.x), Some(p.y), Some(p.z)];
         } else if before != now {
-            return fail(span, "the work frame changes before the position is known: tell X, Y and Z first");
+            return fail(span, "the work frame changes before the position is known: give X, Y and Z first");
         }
         Ok(())
     }
@@ -381,7 +381,7 @@ impl<'a> Gcode<'a> {
             match self.at[k] {
                 Some(at) => offset[k] += at - value * self.unit,
                 None if !self.has_moved => self.at[k] = Some(value * self.unit),
-                None => return fail(span, "G92 tells a coordinate that is not known before: move there first"),
+                None => return fail(span, "G92 sets a coordinate that is not known before: move there first"),
             }
         }
         self.shift(offset);
@@ -588,9 +588,9 @@ impl<'a> Gcode<'a> {
     /// Sets unknown coordinates to 0, with a note.
     fn settled(&mut self, goal: [Option<f64>; 3], span: Span) -> Vector3<f64> {
         for (value, text) in goal.iter().zip([
-            "X is not told before this move: 0 of the work frame is taken",
-            "Y is not told before this move: 0 of the work frame is taken",
-            "Z is not told before this move: 0 of the work frame is taken",
+            "X is not given before this move: 0 of the work frame is taken",
+            "Y is not given before this move: 0 of the work frame is taken",
+            "Z is not given before this move: 0 of the work frame is taken",
         ]) {
             if value.is_none() {
                 self.recorder.note(text, span);

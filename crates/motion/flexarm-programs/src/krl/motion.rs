@@ -219,7 +219,7 @@ fn target(
         return joints(machine, context, axes, at);
     }
     if frame.iter().all(Option::is_none) && external.iter().all(Option::is_none) {
-        return fail(at, "the target tells no coordinate: X, Y, Z, A, B, C or A1 to A6 are expected");
+        return fail(at, "the target gives no coordinate: X, Y, Z, A, B, C or A1 to A6 are expected");
     }
     let X_BT = pose(machine, context, frame, at)?;
     Ok(Target::Pose { X_BT, configuration: configuration(record, at)? })
@@ -242,7 +242,7 @@ fn joints(machine: &mut Krls<'_>, context: &Context, axes: [Option<f64>; 6], spa
             _ => {
                 return fail(
                     span,
-                    format!("axis {} stays or moves on, but the position before was not told in axis values: write A1 to A6 of a PTP", k + 1),
+                    format!("axis {} stays or moves on, but the position before was not given in axis values: write A1 to A6 of a PTP", k + 1),
                 );
             }
         });

@@ -587,18 +587,18 @@ fn act_frames(machine: &mut Krls<'_>, span: Span) -> Result<()> {
 
 fn ptp_data(machine: &mut Krls<'_>, arguments: &[Argument], command: &str, span: Span) -> Result<()> {
     let pdat = record_of(machine.global("pdat_act"));
-    let told = |name: &str| pdat.get(name).filter(|value| !matches!(value, Value::Nothing)).cloned();
-    let speed = if command == "ptp_params" { Some(machine.argument(arguments, 1, span)?.0) } else { told("vel") };
+    let given = |name: &str| pdat.get(name).filter(|value| !matches!(value, Value::Nothing)).cloned();
+    let speed = if command == "ptp_params" { Some(machine.argument(arguments, 1, span)?.0) } else { given("vel") };
     if let Some(percent) = speed {
         let percent = percent.number(span)?;
         set_axes(machine, "$vel_axis", percent);
     }
-    if let Some(percent) = told("acc") {
+    if let Some(percent) = given("acc") {
         let percent = percent.number(span)?;
         set_axes(machine, "$acc_axis", percent);
     }
-    if let Some(distance) = told("apo_dist") {
-        let in_mm = matches!(told("apo_mode"), Some(Value::Word(mode)) if &*mode == "cdis");
+    if let Some(distance) = given("apo_dist") {
+        let in_mm = matches!(given("apo_mode"), Some(Value::Word(mode)) if &*mode == "cdis");
         set_part(machine, "$apo", if in_mm { "cdis" } else { "cptp" }, distance);
     }
     Ok(())
@@ -606,21 +606,21 @@ fn ptp_data(machine: &mut Krls<'_>, arguments: &[Argument], command: &str, span:
 
 fn cp_data(machine: &mut Krls<'_>, arguments: &[Argument], command: &str, span: Span) -> Result<()> {
     let ldat = record_of(machine.global("ldat_act"));
-    let told = |name: &str| ldat.get(name).filter(|value| !matches!(value, Value::Nothing)).cloned();
-    let speed = if command == "cp_params" { Some(machine.argument(arguments, 1, span)?.0) } else { told("vel") };
+    let given = |name: &str| ldat.get(name).filter(|value| !matches!(value, Value::Nothing)).cloned();
+    let speed = if command == "cp_params" { Some(machine.argument(arguments, 1, span)?.0) } else { given("vel") };
     if let Some(speed) = speed {
         let speed = speed.number(span)?;
         set_path_speed(machine, speed, span)?;
     }
-    if let Some(percent) = told("acc") {
+    if let Some(percent) = given("acc") {
         let percent = percent.number(span)?;
         let value = path_acceleration(machine, percent, span)?;
         set_part(machine, "$acc", "cp", value);
     }
-    if let Some(distance) = told("apo_dist") {
+    if let Some(distance) = given("apo_dist") {
         set_part(machine, "$apo", "cdis", distance);
     }
-    if let Some(kind @ Value::Word(_)) = told("ori_typ") {
+    if let Some(kind @ Value::Word(_)) = given("ori_typ") {
         machine.set_global("$ori_type", kind);
     }
     Ok(())

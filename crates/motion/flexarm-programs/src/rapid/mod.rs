@@ -86,7 +86,7 @@ pub(crate) fn read(texts: &mut Vec<Text>, options: &ReadOptions<'_>) -> Result<R
                 if names.is_empty() { "it has no routines".into() } else { format!("it has {}", names.join(", ")) };
             return fail(
                 Span::default(),
-                format!("there is no routine `{entry}` with which the program starts; {hint}: tell one (`entry`)"),
+                format!("there is no routine `{entry}` with which the program starts; {hint}: name one (`entry`)"),
             );
         }
     };

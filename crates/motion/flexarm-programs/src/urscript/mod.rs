@@ -68,7 +68,7 @@ pub(crate) fn read(texts: &mut Vec<Text>, options: &ReadOptions<'_>) -> Result<R
         return fail(
             Span::default(),
             format!(
-                "the file has the definitions {} and calls none: tell with which the program starts (`entry`)",
+                "the file has the definitions {} and calls none: name the one with which the program starts (`entry`)",
                 names.join(", ")
             ),
         );

@@ -42,7 +42,7 @@ struct Findings {
     weight: Weight,
     frequencies: Frequencies,
     /// Findings that need the whole mesh; `None` in a quick run.
-    whole: Option<Whole>,
+    whole: Option<MeshResult>,
 }
 
 /// The casting and the programs it is compared with.
@@ -55,7 +55,7 @@ struct About {
 }
 
 /// Findings on the whole mesh.
-struct Whole {
+struct MeshResult {
     degrees_of_freedom: usize,
     limit_of_parts: LimitOfParts,
     ties: Ties,
@@ -91,7 +91,7 @@ impl Findings {
         let (p_A, p_B) = (reduced.X_LA.translation.vector, reduced.X_LB.translation.vector);
         let condensed = mesh.condensed([Tie::Rigid; 2], p_A, p_B)?;
         let truth = Truth::new(&condensed)?;
-        let whole = Whole {
+        let whole = MeshResult {
             degrees_of_freedom: mesh.size(),
             limit_of_parts: LimitOfParts::new(&mesh, &condensed, &truth)?,
             ties: Ties::new(&mesh, [p_A, p_B], &truth, &programs)?,
@@ -104,7 +104,7 @@ impl Findings {
         truth: &Truth,
         programs: &[Program; 2],
         about: About,
-        whole: Option<Whole>,
+        whole: Option<MeshResult>,
     ) -> Result<Self, Error> {
         Ok(Self {
             about,

@@ -5,7 +5,7 @@ use flexarm_draw::{CurveLook, Panel, PlotCurve};
 use super::parts_page::limit_of_parts;
 use super::study::{AXIAL_PART, FlangeLoads, Frequencies, TIED_MODES, Ties, Weight, worst_of};
 use super::truth::MODES;
-use super::{AXES, About, CHAINS, Findings, G, Whole};
+use super::{AXES, About, CHAINS, Findings, G, MeshResult};
 use crate::bench::{LOADS, SMALL_MOTION, compliance_error};
 use crate::compliance::{add_errors, claim_each};
 use crate::page::{Bound, Case, Figure, Table, bare_error, digits, error, fixed, listed, percent, plain, signed, word};
@@ -33,7 +33,7 @@ pub(super) fn page(found: &Findings) -> Case {
     case
 }
 
-fn about(found: &About, whole: Option<&Whole>) -> String {
+fn about(found: &About, whole: Option<&MeshResult>) -> String {
     let About { mass_kg, length_m, programs } = found;
     let truth = match whole {
         None => format!(
@@ -196,7 +196,7 @@ fn frequency_figure(found: &Frequencies) -> Figure {
 }
 
 /// Rigid ties compared with distributing ones.
-fn ties(case: &mut Case, whole: &Whole) {
+fn ties(case: &mut Case, whole: &MeshResult) {
     case.heading("Rigid or distributing ties");
     let found: &Ties = &whole.ties;
     let mut table = Table::new(

@@ -4,7 +4,7 @@ use flexarm::{ConstraintForm, DriveModel, LinkModel, Modelling, StepperKind};
 use nalgebra::Vector3;
 
 use super::methods::{SHOWN_STEP_S, reference};
-use super::runs::{Made, Run, Runs, stepper_name};
+use super::runs::{MethodRun, Run, Runs, stepper_name};
 use super::{ALL_MODES, DRIVES};
 use crate::Error;
 use crate::bench::{ALPHA, Bench, in_modes, in_parts, larger, modal, spook};
@@ -75,8 +75,8 @@ pub(super) struct ElasticDrives {
     /// Maximum deflection of the truth (m).
     pub(super) peak_m: f64,
     /// The truth itself, with zero error.
-    pub(super) truth: Made,
-    pub(super) made: Vec<Made>,
+    pub(super) truth: MethodRun,
+    pub(super) made: Vec<MethodRun>,
 }
 
 impl ElasticDrives {
@@ -88,12 +88,12 @@ impl ElasticDrives {
         let made = list().into_iter().map(|method| {
             let run = runs.make(&robot, &motion, method.modelling, method.kind, method.step_s)?;
             let error = run.apart(&truth).over(peak_m);
-            Ok(Made { links: method.links, stepper: method.stepper, run, error })
+            Ok(MethodRun { links: method.links, stepper: method.stepper, run, error })
         });
         let made = made.collect::<Result<_, Error>>()?;
         let (links, stepper) = (in_modes(ALL_MODES).0, "error control (truth)".to_owned());
         let error = truth.apart(&truth).over(peak_m);
-        Ok(Self { motion: name, peak_m, truth: Made { links, stepper, run: truth, error }, made })
+        Ok(Self { motion: name, peak_m, truth: MethodRun { links, stepper, run: truth, error }, made })
     }
 }
 

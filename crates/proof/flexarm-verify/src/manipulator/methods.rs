@@ -5,7 +5,7 @@ use flexarm::{
 };
 use flexarm_stepping::Damping;
 
-use super::runs::{Made, Run, Runs, Sizes, stepper_name};
+use super::runs::{MethodRun, Run, Runs, Sizes, stepper_name};
 use super::{ALL_MODES, DAMPING, TOLERANCE};
 use crate::Error;
 use crate::bench::{ALPHA, Bench, in_modes, in_parts, modal, parts, spook};
@@ -34,7 +34,7 @@ pub(super) struct Methods {
     pub(super) peak_m: f64,
     pub(super) rigid: Run,
     pub(super) rigid_error: Sizes,
-    pub(super) made: Vec<Made>,
+    pub(super) made: Vec<MethodRun>,
     pub(super) steps: Vec<StepErrors>,
 }
 
@@ -63,7 +63,7 @@ impl Methods {
         let made = list().into_iter().map(|((links, modelling), stepper, kind, step_s)| {
             let run = runs.make(robot, &motion, modelling, kind, step_s)?;
             let error = run.apart(&truth).over(peak_m);
-            Ok(Made { links, stepper: stepper_name(stepper, step_s), run, error })
+            Ok(MethodRun { links, stepper: stepper_name(stepper, step_s), run, error })
         });
         let made = made.collect::<Result<_, Error>>()?;
         let proportional = proportionally_damped(robot, truth.frequencies_hz[0]);

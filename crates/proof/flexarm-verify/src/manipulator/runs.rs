@@ -87,7 +87,7 @@ impl Sizes {
 }
 
 /// A run by one method.
-pub(super) struct Made {
+pub(super) struct MethodRun {
     /// Name of the link model, and of the stepper with its step size.
     pub(super) links: String,
     pub(super) stepper: String,
@@ -96,7 +96,7 @@ pub(super) struct Made {
     pub(super) error: Sizes,
 }
 
-impl Made {
+impl MethodRun {
     /// Returns the names of link model and stepper.
     pub(super) fn name(&self) -> String {
         format!("{}, {}", self.links, self.stepper)

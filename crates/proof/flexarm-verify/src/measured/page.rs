@@ -76,7 +76,7 @@ fn torques(case: &mut Case, found: &Torques) {
         table.rows.push([word(format!("A{}", axis + 1))].into_iter().chain(cells).collect());
     }
     case.table(table);
-    case.text("What is left of axis 1 looks like inertia that is missing: the source gives the load none of its own. The wrist's axes have friction that no run tells from another. At rest friction takes any value up to its limit, which no formula in the speed knows: hence the first second of the curves.");
+    case.text("What is left of axis 1 looks like inertia that is missing: the source gives the load none of its own. The wrist's axes have friction that no run separates from another. At rest friction takes any value up to its limit, which no formula in the speed knows: hence the first second of the curves.");
     case.figure(torque_figure(found));
 }
 

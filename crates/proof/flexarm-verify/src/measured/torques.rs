@@ -35,10 +35,10 @@ pub(super) struct Torques {
     /// moves.
     pub(super) errors: Vec<Vec<[f64; AXES]>>,
     /// Run 3: time (s), measured and computed torques of axes 1 to 3, smoothed (N m).
-    pub(super) shown: Shown,
+    pub(super) shown: TorqueCurves,
 }
 
-pub(super) struct Shown {
+pub(super) struct TorqueCurves {
     pub(super) time_s: Vec<f64>,
     pub(super) measured: Vec<Vec<f64>>,
     pub(super) computed: Vec<Vec<f64>>,
@@ -60,7 +60,7 @@ impl Torques {
                 shown = runs.last().zip(full.last()).map(|(run, full)| shown_of(run, full));
             }
         }
-        let shown = shown.unwrap_or(Shown { time_s: Vec::new(), measured: Vec::new(), computed: Vec::new() });
+        let shown = shown.unwrap_or(TorqueCurves { time_s: Vec::new(), measured: Vec::new(), computed: Vec::new() });
         Ok(Self { friction, errors, shown })
     }
 }
@@ -128,9 +128,9 @@ fn relative(run: &Recording, computed: &[Vec<f64>]) -> [f64; AXES] {
     })
 }
 
-fn shown_of(run: &Recording, computed: &[Vec<f64>]) -> Shown {
+fn shown_of(run: &Recording, computed: &[Vec<f64>]) -> TorqueCurves {
     let seen = |x: &[f64]| x[run.seen()].to_vec();
-    Shown {
+    TorqueCurves {
         time_s: seen(&run.time_s),
         measured: run.smooth_torque.iter().take(3).map(|x| seen(x)).collect(),
         computed: computed.iter().take(3).map(|x| seen(x)).collect(),

@@ -6,7 +6,7 @@ use flexarm_kinematics::Pose;
 use super::beat::Beat;
 use super::bent::BentLink;
 use super::messages::Transform;
-use crate::poses::{PoseClock, Shown};
+use crate::poses::{PoseClock, PoseReasons};
 use crate::{LinkInfo, RunHeader, Sample, TwinSample};
 use flexarm_draw::Magnifier;
 
@@ -118,7 +118,7 @@ impl Frames {
     /// Advances to a sample; computes the magnified arm if an animation frame is due. Returns
     /// whether the sample's poses are to be written.
     pub(crate) fn advance(&mut self, since_start_ns: u64, sample: &Sample) -> bool {
-        let Shown { due, new_peak } = self.clock.take(since_start_ns, sample, self.has_rigid);
+        let PoseReasons { due, new_peak } = self.clock.take(since_start_ns, sample, self.has_rigid);
         self.shown = due || new_peak;
         self.due = due && self.pictures.due(since_start_ns);
         self.kept = false;

@@ -5,7 +5,7 @@ use rerun::{Color, EntityPath, TimeColumn};
 use super::colors::{axis, component, faint, series, total};
 use super::path;
 use super::stream::{Result, RrdStream};
-use super::tracks::{ScalarTrack, Seen};
+use super::tracks::{CurveExtent, ScalarTrack};
 use crate::poses::size;
 use crate::{RunHeader, Sample};
 
@@ -137,7 +137,7 @@ impl Curves {
     }
 
     /// Returns path, envelope and names of each group of curves.
-    pub(crate) fn seen(&self) -> impl Iterator<Item = Seen> + '_ {
+    pub(crate) fn seen(&self) -> impl Iterator<Item = CurveExtent> + '_ {
         self.error.iter().chain(&self.causes).map(ScalarTrack::seen)
     }
 }

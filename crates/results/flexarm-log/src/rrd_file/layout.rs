@@ -15,7 +15,7 @@ use rerun::external::re_sdk_types::blueprint::datatypes::{TextLogColumn, TextLog
 use rerun::{AsComponents, EntityPath};
 
 use super::eye::Eye;
-use super::tracks::Seen;
+use super::tracks::CurveExtent;
 use crate::plot_room::{Corner, arrange};
 
 const VIEW_3D: &str = "3D";
@@ -99,10 +99,10 @@ pub(crate) struct PlotPlace {
 
 /// Returns, for each plot, an axis that shows all its curves with labels, and a corner where the
 /// legend hides no curve.
-pub(crate) fn rooms(plots: &[PlotPlace], seen: &[Seen]) -> Entities {
+pub(crate) fn rooms(plots: &[PlotPlace], seen: &[CurveExtent]) -> Entities {
     let mut entities: Entities = Vec::new();
     for plot in plots {
-        let own: Vec<&Seen> = seen.iter().filter(|seen| seen.path.starts_with(&plot.origin)).collect();
+        let own: Vec<&CurveExtent> = seen.iter().filter(|seen| seen.path.starts_with(&plot.origin)).collect();
         let names: Vec<usize> = own.iter().flat_map(|seen| seen.names.iter().copied()).collect();
         let envelopes: Vec<_> = own.iter().map(|seen| &seen.envelope).collect();
         let Some(room) = arrange(&envelopes, &names) else { continue };

@@ -24,7 +24,7 @@ use rerun::{EntityPath, TextDocument, ViewCoordinates};
 use self::layout::{Part, PlotPlace};
 use self::run::{RunTracks, Seat};
 use self::stream::{Result, RrdStream, StreamError};
-use self::tracks::{SIM_TIME, Seen};
+use self::tracks::{CurveExtent, SIM_TIME};
 use crate::create::FlushClock;
 use crate::file_recorder::{FileRecorder, OpenFile};
 use crate::shape::Shape;
@@ -133,7 +133,7 @@ pub(crate) struct Store {
     flush: FlushClock,
     /// Plots of the layout, once it is written, and the curves of all finished runs.
     plots: Vec<PlotPlace>,
-    seen: Vec<Seen>,
+    seen: Vec<CurveExtent>,
 }
 
 impl Store {

@@ -28,7 +28,7 @@ pub(crate) enum Paint {
 
 /// Place and appearance of a robot in the recording.
 #[derive(Clone, Debug)]
-pub(crate) struct Look {
+pub(crate) struct RobotAppearance {
     /// Parent entity of its links.
     pub(crate) root: EntityPath,
     pub(crate) paint: Paint,
@@ -44,7 +44,7 @@ pub(crate) struct Look {
 
 /// Frames and surfaces of a robot.
 pub(crate) struct RobotTracks {
-    look: Look,
+    look: RobotAppearance,
     links: Vec<(usize, PoseTrack)>,
     tcp: PoseTrack,
     bent: Vec<BentTracks>,
@@ -74,7 +74,7 @@ const TINTS: usize = 32;
 
 impl RobotTracks {
     /// Creates the tracks of a robot; writes its constant data.
-    pub(crate) fn new(header: &RunHeader, look: Look, stream: &RrdStream) -> Result<Self> {
+    pub(crate) fn new(header: &RunHeader, look: RobotAppearance, stream: &RrdStream) -> Result<Self> {
         let at = |what: &str| look.root.join(&path([what]));
         let pairs = header.links.iter().enumerate();
         let pairs = pairs.filter_map(|(child, link)| Some((child, link.parent?))).collect();
@@ -263,7 +263,7 @@ fn plain(mesh: &LinkMesh) -> Mesh3D {
 }
 
 impl BentTracks {
-    fn push(&mut self, when: Instant, twin: &TwinSample, sample: &Sample, look: &Look) {
+    fn push(&mut self, when: Instant, twin: &TwinSample, sample: &Sample, look: &RobotAppearance) {
         let (first, count) = self.stations;
         let shown = stations_in_link(twin, self.link, first, count);
         let line = self.middle.line();

@@ -9,11 +9,11 @@ use super::colors::{self, ColorScale};
 use super::curves::Curves;
 use super::eye::{Eye, eye};
 use super::path;
-use super::robot::{Look, Paint, RobotTracks};
+use super::robot::{Paint, RobotAppearance, RobotTracks};
 use super::stream::{Result, RrdStream};
-use super::tracks::{ArrowTrack, Instant, PathTrack, SIM_TIME, Seen, Times, Track, point};
+use super::tracks::{ArrowTrack, CurveExtent, Instant, PathTrack, SIM_TIME, Times, Track, point};
 use crate::plot_room::Envelope;
-use crate::poses::{PoseClock, Shown, size};
+use crate::poses::{PoseClock, PoseReasons, size};
 use crate::{Event, EventKind, RunHeader, RunResult, Sample, TwinSample};
 use flexarm_draw::Magnifier;
 
@@ -128,7 +128,7 @@ impl RunTracks {
         let robot = |name: &str, paint: Paint, bends: bool, tolerance_m: f64, quantum_m: f32| {
             // At true scale bending is hardly visible; a surface for every frame would be wasteful.
             let every_ns = if quantum_m > 0.0 { 10_000_000 } else { 100_000_000 };
-            let look = Look { root: at(name), paint, bends, tolerance_m, every_ns, quantum_m };
+            let look = RobotAppearance { root: at(name), paint, bends, tolerance_m, every_ns, quantum_m };
             RobotTracks::new(header, look, stream).map(Some)
         };
         let with_magnified = header.has_rigid && header.magnification > 0.0;
@@ -252,7 +252,7 @@ impl RunTracks {
         }
         let error = size(&sample.error_world[..3]);
         let has_error = !self.shapes && self.rigid.is_some();
-        let Shown { due, new_peak } = self.clock.take(when.0.unsigned_abs(), sample, has_error);
+        let PoseReasons { due, new_peak } = self.clock.take(when.0.unsigned_abs(), sample, has_error);
         if self.magnified.is_some() && (due || new_peak) {
             self.magnifier.magnify(sample, &mut self.enlarged);
         }
@@ -311,11 +311,11 @@ impl RunTracks {
     }
 
     /// Returns path, envelope and names of each group of curves.
-    pub(crate) fn seen(&self) -> Vec<Seen> {
-        let mut seen: Vec<Seen> = self.curves.iter().chain(&self.study_curves).flat_map(Curves::seen).collect();
+    pub(crate) fn seen(&self) -> Vec<CurveExtent> {
+        let mut seen: Vec<CurveExtent> = self.curves.iter().chain(&self.study_curves).flat_map(Curves::seen).collect();
         if let (Some((error, when, _)), Some(_)) = (&self.peak, &self.curves) {
             let names = vec![peak_label(*error, *when).chars().count()];
-            seen.push(Seen { path: path(["plots", "tcp_error", "peak"]), envelope: Envelope::default(), names });
+            seen.push(CurveExtent { path: path(["plots", "tcp_error", "peak"]), envelope: Envelope::default(), names });
         }
         seen
     }

@@ -287,7 +287,7 @@ impl Track for SkeletonTrack {
 
 /// Data about curves needed to choose range and legend of a plot.
 #[derive(Clone, Debug)]
-pub(crate) struct Seen {
+pub(crate) struct CurveExtent {
     pub(crate) path: EntityPath,
     pub(crate) envelope: Envelope,
     /// Number of letters of each name.
@@ -322,9 +322,9 @@ impl ScalarTrack {
         debug_assert!(self.values.len().is_multiple_of(self.names.len().max(1)), "{}: a value per curve", self.path);
     }
 
-    pub(crate) fn seen(&self) -> Seen {
+    pub(crate) fn seen(&self) -> CurveExtent {
         let names = self.names.iter().map(|name| name.chars().count()).collect();
-        Seen { path: self.path.clone(), envelope: self.envelope.clone(), names }
+        CurveExtent { path: self.path.clone(), envelope: self.envelope.clone(), names }
     }
 
     /// Writes names and colours of the curves.

@@ -7,7 +7,7 @@ use std::rc::Rc;
 use roxmltree::{Document, NodeType};
 
 use crate::error::Issue;
-use crate::finding::Place;
+use crate::finding::TextPosition;
 use crate::xml;
 
 /// Maximum nesting depth of elements.
@@ -27,8 +27,8 @@ impl At {
         Self { file: file.clone(), line: 1, column: 1 }
     }
 
-    pub(crate) fn place(&self) -> Place {
-        Place { file: self.file.to_path_buf(), line: self.line, column: self.column }
+    pub(crate) fn place(&self) -> TextPosition {
+        TextPosition { file: self.file.to_path_buf(), line: self.line, column: self.column }
     }
 }
 
@@ -125,20 +125,20 @@ fn element(document: &Document<'_>, node: roxmltree::Node<'_, '_>, lines: &xml::
 }
 
 /// A document as text, and the origin of each of its lines.
-pub(crate) struct Written {
+pub(crate) struct ExpandedText {
     pub(crate) text: String,
     pub(crate) origins: Vec<At>,
 }
 
 /// Writes an element with one line per tag. `namespaces` are declared at the root.
-pub(crate) fn write(root: &Element, namespaces: &[(String, String)]) -> Written {
+pub(crate) fn write(root: &Element, namespaces: &[(String, String)]) -> ExpandedText {
     let first = root.at.clone();
-    let mut out = Written { text: "<?xml version=\"1.0\"?>\n".to_owned(), origins: vec![first] };
+    let mut out = ExpandedText { text: "<?xml version=\"1.0\"?>\n".to_owned(), origins: vec![first] };
     write_element(root, namespaces, 0, &mut out);
     out
 }
 
-impl Written {
+impl ExpandedText {
     fn line(&mut self, depth: usize, text: &str, at: &At) {
         self.text.extend(std::iter::repeat_n("  ", depth));
         self.text.push_str(text);
@@ -148,7 +148,7 @@ impl Written {
     }
 }
 
-fn write_element(element: &Element, namespaces: &[(String, String)], depth: usize, out: &mut Written) {
+fn write_element(element: &Element, namespaces: &[(String, String)], depth: usize, out: &mut ExpandedText) {
     let mut tag = format!("<{}", element.name);
     for (name, value) in element.attributes.iter().chain(namespaces) {
         tag.push_str(&format!(" {name}=\"{}\"", xml::escaped(value, true)));

@@ -5,7 +5,7 @@ use std::collections::{HashMap, HashSet};
 use std::rc::Rc;
 
 use super::document::{At, Element};
-use super::expression::Trouble;
+use super::expression::ExpressionError;
 use super::expression::value::Value;
 use super::scope::{Scope, Table};
 use super::{Content, Interpreter, Outcome};
@@ -82,7 +82,7 @@ impl Interpreter<'_> {
         let name = name.strip_prefix("xacro:").unwrap_or(name);
         let at = &element.at;
         if name == "call" || name.contains('.') {
-            let trouble = Trouble::new(format!("a macro cannot have the name {name:?}"));
+            let trouble = ExpressionError::new(format!("a macro cannot have the name {name:?}"));
             return Err(self.fault(at, trouble.help("dots are for namespaces, \"call\" is an element of xacro")));
         }
         let parameters = parameters(element.attribute("params").unwrap_or_default());
@@ -103,7 +103,7 @@ impl Interpreter<'_> {
         };
         let (inner_macros, inner_scope, called) = self.resolve(&name, macros, scope, at)?;
         if self.calls.len() >= MOST_CALLS {
-            let trouble = Trouble::new(format!("macros call each other more than {MOST_CALLS} deep"));
+            let trouble = ExpressionError::new(format!("macros call each other more than {MOST_CALLS} deep"));
             return Err(self.fault(at, trouble.help("does a macro call itself without an end?")));
         }
         self.called_macros.insert(called.name.clone());
@@ -150,14 +150,15 @@ impl Interpreter<'_> {
         for parameter in wanted {
             let Some(block) = blocks.next() else {
                 let name = parameter.name.trim_start_matches('*');
-                let trouble = Trouble::new(format!("the macro {:?} needs a block for {name:?}", called.name));
+                let trouble = ExpressionError::new(format!("the macro {:?} needs a block for {name:?}", called.name));
                 return Err(self.fault(at, trouble.help("put an element inside of the call")));
             };
             local.define(&parameter.name, Value::Block(block.clone()));
         }
         match blocks.next() {
             Some(block) => {
-                let trouble = Trouble::new(format!("the macro {:?} takes no block <{}>", called.name, block.name));
+                let trouble =
+                    ExpressionError::new(format!("the macro {:?} takes no block <{}>", called.name, block.name));
                 Err(self.fault(at, trouble.help("remove it, or add a parameter *name to the macro")))
             }
             None => Ok(()),
@@ -194,7 +195,8 @@ impl Interpreter<'_> {
         if missing.is_empty() {
             return Ok(());
         }
-        let trouble = Trouble::new(format!("the macro {:?} is called without {}", called.name, missing.join(", ")));
+        let trouble =
+            ExpressionError::new(format!("the macro {:?} is called without {}", called.name, missing.join(", ")));
         Err(self.fault(at, trouble.help("give it as an attribute of the call")))
     }
 
@@ -221,7 +223,7 @@ impl Interpreter<'_> {
         }
         let found = macros_there.clone().and_then(|m| m.find(name));
         let (Some(macros_there), Some(found)) = (macros_there, found) else {
-            let trouble = Trouble::new(format!("there is no macro {full:?}"));
+            let trouble = ExpressionError::new(format!("there is no macro {full:?}"));
             let known = macros.names();
             return Err(self.fault(
                 at,
@@ -235,9 +237,9 @@ impl Interpreter<'_> {
     }
 }
 
-fn unknown_parameter(called: &Macro, name: &str) -> Trouble {
+fn unknown_parameter(called: &Macro, name: &str) -> ExpressionError {
     let known: Vec<&str> = called.parameters.iter().map(|p| p.name.as_str()).collect();
-    let trouble = Trouble::new(format!("the macro {:?} has no parameter {name:?}", called.name));
+    let trouble = ExpressionError::new(format!("the macro {:?} has no parameter {name:?}", called.name));
     match closest(name, known.iter().copied()) {
         Some(meant) => trouble.help(format!("did you mean {meant:?}?")),
         None => trouble.help(format!("its parameters are {}", known.join(", "))),

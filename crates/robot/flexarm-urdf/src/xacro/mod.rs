@@ -29,11 +29,11 @@ use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
 use document::{At, Node};
-use expression::Trouble;
+use expression::ExpressionError;
 use expression::value::{Value, int_of};
 
 use crate::error::XacroError;
-use crate::finding::{Finding, Place, Severity};
+use crate::finding::{Finding, Severity, TextPosition};
 use crate::resolve::Resolver;
 use crate::{Issue, UrdfError, xml};
 use flexarm_settings::closest;
@@ -56,7 +56,7 @@ const STACK: usize = 256 << 20;
 pub(crate) struct Expanded {
     pub(crate) text: String,
     /// Origin of each line of the text.
-    pub(crate) origins: Vec<Place>,
+    pub(crate) origins: Vec<TextPosition>,
     /// Messages of `xacro.warning` etc., and doubts about the arguments.
     pub(crate) remarks: Vec<Finding>,
     /// Macros that are defined but not called, if the document has nothing else.
@@ -186,29 +186,30 @@ impl<'a> Interpreter<'a> {
     }
 
     /// Charges work, and fails if the limit is exceeded.
-    fn charge(&mut self, work: usize) -> Result<(), Trouble> {
+    fn charge(&mut self, work: usize) -> Result<(), ExpressionError> {
         self.work = self.work.saturating_add(work);
         if self.work <= MOST_WORK {
             return Ok(());
         }
-        Err(Trouble::new("the file makes too much: more than 100 million letters were looked at or written")
+        Err(ExpressionError::new("the file makes too much: more than 100 million letters were looked at or written")
             .help("does a macro call itself without an end, or a list grow with every call?"))
     }
 
     /// Enters one nesting level; the caller leaves it.
-    fn deeper(&mut self) -> Result<(), Trouble> {
+    fn deeper(&mut self) -> Result<(), ExpressionError> {
         self.depth += 1;
         if self.depth <= MOST_DEPTH {
             return Ok(());
         }
-        Err(Trouble::new("macros, files and properties use each other too deeply")
+        Err(ExpressionError::new("macros, files and properties use each other too deeply")
             .help("does one of them use itself without an end?"))
     }
 
     /// Reads a file that the document refers to.
-    fn read(&mut self, path: &Path) -> Result<String, Trouble> {
+    fn read(&mut self, path: &Path) -> Result<String, ExpressionError> {
         let failed = |what: String| {
-            Trouble::new(format!("{} cannot be read: {what}", path.display())).help("correct the path, or the package")
+            ExpressionError::new(format!("{} cannot be read: {what}", path.display()))
+                .help("correct the path, or the package")
         };
         let meta = std::fs::metadata(path).map_err(|e| failed(e.to_string()))?;
         if !meta.is_file() {
@@ -219,11 +220,11 @@ impl<'a> Interpreter<'a> {
         }
         self.charge(meta.len() as usize)?;
         let bytes = std::fs::read(path).map_err(|e| failed(e.to_string()))?;
-        xml::decode(bytes, path).map_err(|issue| Trouble::new(issue.to_string()))
+        xml::decode(bytes, path).map_err(|issue| ExpressionError::new(issue.to_string()))
     }
 
     /// Creates an error at a place, with the enclosing calls and files.
-    fn fault(&self, at: &At, trouble: Trouble) -> Box<XacroError> {
+    fn fault(&self, at: &At, trouble: ExpressionError) -> Box<XacroError> {
         let calls = self.calls.iter().rev().map(|(name, at)| format!("in the macro {name:?}, called at {at}"));
         let outer = self.files[..self.files.len().saturating_sub(1)].iter().rev();
         let files = outer.map(|file| format!("included from {}", file.display()));

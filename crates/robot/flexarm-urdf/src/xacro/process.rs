@@ -5,7 +5,7 @@ use std::rc::Rc;
 
 use super::document::{At, Element, Node, parse};
 use super::expression::value::Value;
-use super::expression::{Trouble, is_built_in};
+use super::expression::{ExpressionError, is_built_in};
 use super::macros::Macros;
 use super::scope::{self, Scope, Table};
 use super::{Content, ELEMENT, Interpreter, MOST_FILES, Outcome, boolean};
@@ -115,7 +115,7 @@ impl Interpreter<'_> {
     /// A required attribute.
     pub(super) fn required<'e>(&mut self, element: &'e Element, name: &str) -> Outcome<&'e str> {
         element.attribute(name).ok_or_else(|| {
-            let trouble = Trouble::new(format!("<{}> has no attribute {name:?}", element.name));
+            let trouble = ExpressionError::new(format!("<{}> has no attribute {name:?}", element.name));
             self.fault(&element.at, trouble.help(format!("add {name}=\"...\"")))
         })
     }
@@ -125,7 +125,7 @@ impl Interpreter<'_> {
         let raw = self.required(element, name)?.to_owned();
         let text = self.shown_text(&raw, scope).map_err(|e| self.fault(&element.at, e))?;
         if text.is_empty() && name != "value" {
-            let trouble = Trouble::new(format!("<{}>: the attribute {name:?} is empty", element.name));
+            let trouble = ExpressionError::new(format!("<{}>: the attribute {name:?} is empty", element.name));
             return Err(self.fault(&element.at, trouble));
         }
         Ok(text)
@@ -163,14 +163,16 @@ impl Interpreter<'_> {
         let mut name = self.attribute_text(element, "name", scope)?;
         if !scope::is_name(&name) || name.starts_with("__") {
             let help = "a name starts with a letter, has letters, digits and _, and is no word of Python";
-            return Err(self.fault(at, Trouble::new(format!("{name:?} cannot be the name of a property")).help(help)));
+            return Err(
+                self.fault(at, ExpressionError::new(format!("{name:?} cannot be the name of a property")).help(help))
+            );
         }
         self.expect_attributes(element, &["name", "value", "default", "remove", "scope", "lazy_eval"]);
         let (mut value, default) = (element.attribute("value"), element.attribute("default"));
         let remove = self.flag(element, "remove", false, scope)?;
         if usize::from(value.is_some()) + usize::from(default.is_some()) + usize::from(remove) > 1 {
             let message = format!("the property {name:?} has more than one of value, default and remove");
-            return Err(self.fault(at, Trouble::new(message).help("keep one of them")));
+            return Err(self.fault(at, ExpressionError::new(message).help("keep one of them")));
         }
         if remove && scope.contains(&name) {
             scope.remove(&name);
@@ -243,7 +245,7 @@ impl Interpreter<'_> {
             content.nodes.push(Node::Element(Rc::new(done)));
             return Ok(content.nodes);
         }
-        let trouble = Trouble::new(format!("there is no block {name:?}"));
+        let trouble = ExpressionError::new(format!("there is no block {name:?}"));
         let help = "it needs a parameter *name of the macro, or a <xacro:property name=\"...\"> with elements inside";
         Err(self.fault(at, trouble.help(help)))
     }
@@ -276,7 +278,7 @@ impl Interpreter<'_> {
 
     fn included(&mut self, path: &Path, at: &At, macros: &Rc<Macros>, scope: &Scope) -> Outcome<Vec<Node>> {
         if self.files.len() >= MOST_FILES {
-            let trouble = Trouble::new(format!("files include each other more than {MOST_FILES} deep"));
+            let trouble = ExpressionError::new(format!("files include each other more than {MOST_FILES} deep"));
             return Err(self.fault(at, trouble.help("does a file include itself?")));
         }
         let text = self.read(path).map_err(|e| self.fault(at, e))?;
@@ -336,8 +338,9 @@ impl Interpreter<'_> {
     }
 }
 
-fn not_boolean(text: &str, value: &Value) -> Trouble {
-    let trouble = Trouble::new(format!("the condition {text:?} is {}, which is neither true nor false", value.repr()));
+fn not_boolean(text: &str, value: &Value) -> ExpressionError {
+    let trouble =
+        ExpressionError::new(format!("the condition {text:?} is {}, which is neither true nor false", value.repr()));
     trouble.help("expected are true, false, a number or a comparison; texts are compared as ${x == 'a'}")
 }
 

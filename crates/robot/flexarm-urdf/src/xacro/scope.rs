@@ -9,7 +9,7 @@ use std::rc::Rc;
 
 use super::document::At;
 use super::expression::value::{Value, float_of, int_of};
-use super::expression::{KEYWORDS, Trouble};
+use super::expression::{ExpressionError, KEYWORDS};
 use super::{Interpreter, boolean};
 
 pub(crate) type Scope = Rc<Table>;
@@ -133,7 +133,7 @@ pub(crate) fn is_name(name: &str) -> bool {
 
 impl Interpreter<'_> {
     /// Value of a name in a scope; a text is evaluated now, in the table that holds it.
-    pub(crate) fn property(&mut self, scope: &Scope, name: &str) -> Result<Option<Value>, Trouble> {
+    pub(crate) fn property(&mut self, scope: &Scope, name: &str) -> Result<Option<Value>, ExpressionError> {
         let mut table = scope;
         let entry = loop {
             self.charge(1)?;
@@ -147,7 +147,7 @@ impl Interpreter<'_> {
         };
         match entry.state {
             State::Known => Ok(Some(entry.value)),
-            State::Evaluating => Err(Trouble::new(format!("the property {name:?} is defined by itself"))
+            State::Evaluating => Err(ExpressionError::new(format!("the property {name:?} is defined by itself"))
                 .help("give it another name, or write lazy_eval=\"false\" to use the value that it had before")),
             State::Unevaluated => {
                 table.put(name, entry.value.clone(), State::Evaluating, entry.at.clone());

@@ -7,7 +7,7 @@ use flexarm_settings::Setting;
 
 use super::Interpreter;
 use super::expression::value::{Value, float_of, int_of};
-use super::expression::{Trouble, shortened};
+use super::expression::{ExpressionError, shortened};
 use super::scope::Table;
 use flexarm_settings::closest;
 
@@ -15,7 +15,7 @@ const COMMANDS: [&str; 7] = ["arg", "find", "env", "optenv", "eval", "dirname", 
 
 impl Interpreter<'_> {
     /// Evaluates the text between `$(` and `)`.
-    pub(crate) fn substitution(&mut self, inner: &str) -> Result<String, Trouble> {
+    pub(crate) fn substitution(&mut self, inner: &str) -> Result<String, ExpressionError> {
         if let Some(expression) = inner.strip_prefix("eval ") {
             return self.eval(expression);
         }
@@ -25,49 +25,49 @@ impl Interpreter<'_> {
             ["find", package] => self.package(package)?.display().to_string(),
             ["env", name] => std::env::var(name).map_err(|_| {
                 let message = format!("the environment variable {name} is not set");
-                Trouble::new(message).help("set it, or write $(optenv NAME default) in the file")
+                ExpressionError::new(message).help("set it, or write $(optenv NAME default) in the file")
             })?,
             ["optenv", name, default @ ..] => std::env::var(name).unwrap_or_else(|_| default.join(" ")),
             ["dirname"] => shown(self.here().parent()),
             ["cwd"] => shown(std::env::current_dir().ok().as_deref()),
             [command, ..] if !COMMANDS.contains(command) => {
-                let trouble = Trouble::new(format!("$({}) is not known", shortened(inner)));
+                let trouble = ExpressionError::new(format!("$({}) is not known", shortened(inner)));
                 return Err(match closest(command, COMMANDS) {
                     Some(meant) => trouble.help(format!("did you mean $({meant} ...)?")),
                     None => trouble.help(format!("known are {}", COMMANDS.join(", "))),
                 });
             }
-            _ => return Err(Trouble::new(format!("$({}) needs one name", shortened(inner)))),
+            _ => return Err(ExpressionError::new(format!("$({}) needs one name", shortened(inner)))),
         };
         self.charge(text.len())?;
         Ok(text)
     }
 
     /// Value of an argument of the document.
-    pub(crate) fn argument(&mut self, name: &str) -> Result<String, Trouble> {
+    pub(crate) fn argument(&mut self, name: &str) -> Result<String, ExpressionError> {
         self.used_arguments.insert(name.to_owned());
         self.arguments.get(name).cloned().ok_or_else(|| {
             let setting = Setting::Argument;
             let help =
                 format!("give it with {setting} {name}=VALUE, or by args = {{ {name} = ... }} in the robot file");
-            Trouble::new(format!("the argument {name:?} has no value")).help(help)
+            ExpressionError::new(format!("the argument {name:?} has no value")).help(help)
         })
     }
 
     /// Folder of a package.
-    fn package(&mut self, name: &str) -> Result<PathBuf, Trouble> {
+    fn package(&mut self, name: &str) -> Result<PathBuf, ExpressionError> {
         if let Some(folder) = self.packages.get(name) {
             return Ok(folder.clone());
         }
         let found = self.resolver.find_package(name, self.files.last().and_then(|f| f.parent()));
-        let folder = found.map_err(|missing| Trouble::new(missing.reason).help(missing.help))?;
+        let folder = found.map_err(|missing| ExpressionError::new(missing.reason).help(missing.help))?;
         self.packages.insert(name.to_owned(), folder.clone());
         Ok(folder)
     }
 
     /// Evaluates `$(eval ...)`: arguments are variables, converted to numbers if they look like
     /// numbers.
-    fn eval(&mut self, expression: &str) -> Result<String, Trouble> {
+    fn eval(&mut self, expression: &str) -> Result<String, ExpressionError> {
         let scope = Table::root();
         for (name, value) in &self.arguments {
             scope.define(name, typed(value));

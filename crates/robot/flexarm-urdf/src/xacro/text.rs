@@ -2,7 +2,7 @@
 
 use super::Interpreter;
 use super::expression::value::Value;
-use super::expression::{Trouble, shortened};
+use super::expression::{ExpressionError, shortened};
 use super::scope::Scope;
 
 /// Piece of a text.
@@ -17,7 +17,7 @@ enum Piece<'t> {
 
 /// Splits a text: an expression ends at the first `}`, a substitution at the first `)`; `$${`
 /// escapes `${`.
-fn pieces(text: &str) -> Result<Vec<Piece<'_>>, Trouble> {
+fn pieces(text: &str) -> Result<Vec<Piece<'_>>, ExpressionError> {
     let mut found = Vec::new();
     let mut rest = text;
     while !rest.is_empty() {
@@ -30,7 +30,7 @@ fn pieces(text: &str) -> Result<Vec<Piece<'_>>, Trouble> {
             let (open, close) = if rest.starts_with("${") { ('{', '}') } else { ('(', ')') };
             let end = rest.find(close).ok_or_else(|| {
                 let message = format!("{:?} has no closing {close:?}", shortened(rest));
-                Trouble::new(message).help(format!("close it, or write $${open} for ${open} itself"))
+                ExpressionError::new(message).help(format!("close it, or write $${open} for ${open} itself"))
             })?;
             let inner = &rest[2..end];
             found.push(if open == '{' { Piece::Expression(inner) } else { Piece::Substitution(inner) });
@@ -48,7 +48,7 @@ fn pieces(text: &str) -> Result<Vec<Piece<'_>>, Trouble> {
 
 impl Interpreter<'_> {
     /// Value of a text: that of its only piece, or all pieces concatenated.
-    pub(crate) fn text(&mut self, text: &str, scope: &Scope) -> Result<Value, Trouble> {
+    pub(crate) fn text(&mut self, text: &str, scope: &Scope) -> Result<Value, ExpressionError> {
         self.charge(text.len())?;
         if !text.contains('$') {
             return Ok(Value::text(text));
@@ -60,7 +60,7 @@ impl Interpreter<'_> {
         let mut joined = String::new();
         for piece in &pieces {
             let shown = match self.piece(piece, scope)? {
-                Value::Block(_) => return Err(Trouble::new("a block of XML cannot stand in a text")),
+                Value::Block(_) => return Err(ExpressionError::new("a block of XML cannot stand in a text")),
                 value => self.shown(&value)?,
             };
             self.charge(shown.len())?;
@@ -69,7 +69,7 @@ impl Interpreter<'_> {
         Ok(Value::text(joined))
     }
 
-    fn piece(&mut self, piece: &Piece<'_>, scope: &Scope) -> Result<Value, Trouble> {
+    fn piece(&mut self, piece: &Piece<'_>, scope: &Scope) -> Result<Value, ExpressionError> {
         match piece {
             Piece::Plain(text) => Ok(Value::text(text)),
             // The inner text may contain pieces itself.
@@ -85,12 +85,12 @@ impl Interpreter<'_> {
     }
 
     /// Value of a text, converted to text.
-    pub(crate) fn shown_text(&mut self, text: &str, scope: &Scope) -> Result<String, Trouble> {
+    pub(crate) fn shown_text(&mut self, text: &str, scope: &Scope) -> Result<String, ExpressionError> {
         let value = self.text(text, scope)?;
         self.shown(&value)
     }
 
-    fn inner(&mut self, text: &str, scope: &Scope) -> Result<String, Trouble> {
+    fn inner(&mut self, text: &str, scope: &Scope) -> Result<String, ExpressionError> {
         self.deeper()?;
         let shown = self.shown_text(text, scope)?;
         self.depth -= 1;

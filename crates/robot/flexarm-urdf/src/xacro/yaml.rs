@@ -6,7 +6,7 @@ use std::rc::Rc;
 use flexarm_files::{YamlError, YamlNode, YamlValue, read_yaml};
 
 use super::Interpreter;
-use super::expression::Trouble;
+use super::expression::ExpressionError;
 use super::expression::unique;
 use super::expression::value::{Value, float_of, lookup};
 use super::scope::Table;
@@ -25,7 +25,7 @@ const UNITS: [(&str, f64); 6] = [
 
 impl Interpreter<'_> {
     /// Content of a YAML file; its path is relative to the file being read.
-    pub(crate) fn load_yaml(&mut self, path: &str) -> Result<Value, Trouble> {
+    pub(crate) fn load_yaml(&mut self, path: &str) -> Result<Value, ExpressionError> {
         let path = self.beside(path);
         let text = self.read(&path)?;
         let shown = path.display().to_string();
@@ -36,11 +36,11 @@ impl Interpreter<'_> {
         value
     }
 
-    fn yaml(&mut self, text: &str) -> Result<Value, Trouble> {
+    fn yaml(&mut self, text: &str) -> Result<Value, ExpressionError> {
         let mut root = None;
         read_yaml(text, MOST_VALUES, |node| {
             if root.is_some() {
-                return Err(Trouble::new("a second document, expected one"));
+                return Err(ExpressionError::new("a second document, expected one"));
             }
             root = Some(self.value(node)?);
             Ok(())
@@ -48,9 +48,9 @@ impl Interpreter<'_> {
         Ok(root.unwrap_or(Value::None))
     }
 
-    fn value(&mut self, YamlNode { line, value }: YamlNode<'_>) -> Result<Value, Trouble> {
+    fn value(&mut self, YamlNode { line, value }: YamlNode<'_>) -> Result<Value, ExpressionError> {
         self.charge(64)?;
-        let within = |trouble: Trouble| trouble.within(format!("line {line}"));
+        let within = |trouble: ExpressionError| trouble.within(format!("line {line}"));
         match value {
             YamlValue::Scalar { text, is_plain: true, tag: None } => Ok(plain(&text)),
             YamlValue::Scalar { text, tag: None, .. } => Ok(Value::text(&text)),
@@ -66,7 +66,7 @@ impl Interpreter<'_> {
     }
 
     /// Builds a dictionary from alternating keys and values. The content of `<<` precedes the rest.
-    fn dictionary(&mut self, values: Vec<Value>) -> Result<Value, Trouble> {
+    fn dictionary(&mut self, values: Vec<Value>) -> Result<Value, ExpressionError> {
         let (mut pairs, mut merged) = (Vec::new(), Vec::new());
         let mut values = values.into_iter();
         while let (Some(key), Some(value)) = (values.next(), values.next()) {
@@ -76,7 +76,7 @@ impl Interpreter<'_> {
             }
             let sources = if let Value::List(items) = &value { items.to_vec() } else { vec![value] };
             for source in sources {
-                let Value::Dict(items) = source else { return Err(Trouble::new("<< needs a dictionary")) };
+                let Value::Dict(items) = source else { return Err(ExpressionError::new("<< needs a dictionary")) };
                 self.charge(64 * items.len() * (1 + merged.len() / 8))?;
                 let new: Vec<_> = items.iter().filter(|(k, _)| lookup(&merged, k).is_none()).cloned().collect();
                 merged.extend(new);
@@ -88,7 +88,7 @@ impl Interpreter<'_> {
         Ok(Value::Dict(Rc::new(unique(merged))))
     }
 
-    fn tagged(&mut self, text: &str, tag: &str) -> Result<Value, Trouble> {
+    fn tagged(&mut self, text: &str, tag: &str) -> Result<Value, ExpressionError> {
         if let Some((_, factor)) = UNITS.iter().find(|(unit, _)| *unit == tag) {
             let value = self.expression(text, &Table::root())?;
             let number = match &value {
@@ -96,19 +96,21 @@ impl Interpreter<'_> {
                 value => value.as_float(),
             };
             let number =
-                number.ok_or_else(|| Trouble::new(format!("!{tag} needs a number, found {}", value.repr())))?;
+                number.ok_or_else(|| ExpressionError::new(format!("!{tag} needs a number, found {}", value.repr())))?;
             return Ok(Value::Float(number * factor));
         }
         match tag {
             "str" | "!" => Ok(Value::text(text)),
-            "float" => float_of(text).map(Value::Float).ok_or_else(|| Trouble::new(format!("{text:?} is no number"))),
+            "float" => {
+                float_of(text).map(Value::Float).ok_or_else(|| ExpressionError::new(format!("{text:?} is no number")))
+            }
             "int" | "bool" | "null" => Ok(plain(text)),
-            other => Err(Trouble::new(format!("the tag {other:?} is not known"))),
+            other => Err(ExpressionError::new(format!("the tag {other:?} is not known"))),
         }
     }
 }
 
-impl From<YamlError> for Trouble {
+impl From<YamlError> for ExpressionError {
     fn from(YamlError { line, message }: YamlError) -> Self {
         Self::new(format!("line {line}: it is not YAML: {message}"))
     }

@@ -148,8 +148,8 @@ impl ImportSummary {
         let gate = &link.checks;
         let masses = parts.element.as_ref().map(masses_along_axes);
         let mass_error = masses.map(|m| m.iter().map(|m| (m / whole.mass - 1.0).abs()).fold(0.0, f64::max));
-        let said = |code: &'static str, sentence: &str| Doubt::said(code, sentence);
-        let mut all: Vec<Doubt> = parts.warnings.iter().map(|sentence| said("matrix-file", sentence)).collect();
+        let doubt = |code: &'static str, sentence: &str| Doubt::from_message(code, sentence);
+        let mut all: Vec<Doubt> = parts.warnings.iter().map(|sentence| doubt("matrix-file", sentence)).collect();
         all.extend(doubts.iter().cloned());
         if let (Some(error), Some(m)) = (mass_error, masses)
             && (error.is_nan() || error > MASS_ERROR)
@@ -166,7 +166,7 @@ impl ImportSummary {
             let element = details.and_then(|details| details.superelement.as_ref())?;
             let link = ModalLink::from_superelement(&link.name, element).ok()?;
             if !link.has_second_order() {
-                all.push(said("second-order", SECOND_ORDER_UNKNOWN));
+                all.push(doubt("second-order", SECOND_ORDER_UNKNOWN));
             }
             Some(ModalFigures::from(&link))
         });

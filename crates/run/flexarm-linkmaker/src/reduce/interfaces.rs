@@ -14,7 +14,7 @@ use crate::LinkError;
 
 /// An interface of the mesh with its figures for the report. Link axes, m.
 #[derive(Clone, Debug)]
-pub(super) struct Chosen {
+pub(super) struct SelectedInterface {
     pub(super) interface: Interface,
     pub(super) selector: NodeSelector,
     pub(super) centroid: Vector3<f64>,
@@ -25,7 +25,7 @@ pub(super) struct Chosen {
     pub(super) chosen_nodes: usize,
 }
 
-impl Chosen {
+impl SelectedInterface {
     /// Returns warnings about nodes that do not form a seat: corners without mid-side nodes, edges,
     /// nodes inside.
     pub(super) fn seat_doubts(&self) -> Vec<String> {
@@ -65,7 +65,7 @@ impl Chosen {
 }
 
 /// The mesh with the link frame in which the user gives positions.
-pub(super) struct Place<'a> {
+pub(super) struct MeshFrame<'a> {
     /// Mesh in its own frame (m).
     pub(super) mesh: &'a Mesh,
     /// Unit of length of the mesh (m); 1 if unknown.
@@ -81,7 +81,7 @@ pub(super) fn pose(frame: &FrameEntry, unit: f64) -> Pose {
     Pose::from_parts(Translation3::from(position), Rotation3::from_euler_angles(roll, pitch, yaw))
 }
 
-impl Place<'_> {
+impl MeshFrame<'_> {
     /// Centroid and extent of some nodes along the link axes (m).
     pub(super) fn middle_and_extent(&self, nodes: &[u32]) -> (Vector3<f64>, Vector3<f64>) {
         let points = || nodes.iter().map(|node| self.X_LM * nalgebra::Point3::from(self.mesh.nodes[*node as usize]));
@@ -118,7 +118,11 @@ impl Place<'_> {
     }
 
     /// Returns nodes and frames of all interfaces, or all errors.
-    pub(super) fn choose(&self, job: &ReduceJob, robot: Option<&UrdfLink>) -> Result<Vec<Chosen>, Vec<LinkError>> {
+    pub(super) fn choose(
+        &self,
+        job: &ReduceJob,
+        robot: Option<&UrdfLink>,
+    ) -> Result<Vec<SelectedInterface>, Vec<LinkError>> {
         let (mut chosen, mut faults) = (Vec::new(), Vec::new());
         if job.interface.len() < 2 {
             let found = job.interface.len();
@@ -148,7 +152,7 @@ impl Place<'_> {
         entry: &InterfaceEntry,
         robot: Option<&UrdfLink>,
         surface: &Surface,
-    ) -> Result<Chosen, LinkError> {
+    ) -> Result<SelectedInterface, LinkError> {
         let name = entry.name.clone().unwrap_or_default();
         let place = if entry.place.is_empty() { job.mesh.display().to_string() } else { entry.place.clone() };
         let fail = |what: String| LinkError::Interface { place: place.clone(), interface: name.clone(), what };
@@ -199,7 +203,7 @@ impl Place<'_> {
         };
         let tie = entry.tie.or(job.tie).unwrap_or(Tie::Rigid);
         let interface = Interface { name, X_LI, nodes, tie };
-        Ok(Chosen { interface, selector: selector.clone(), centroid, extent, seat, chosen_nodes })
+        Ok(SelectedInterface { interface, selector: selector.clone(), centroid, extent, seat, chosen_nodes })
     }
 
     fn no_position(&self, name: &str, nodes: usize, centroid: &Vector3<f64>) -> String {
@@ -216,7 +220,7 @@ impl Place<'_> {
     }
 
     /// Returns warnings about positions that suggest a wrong unit or frame.
-    pub(super) fn doubts(&self, chosen: &[Chosen]) -> Vec<String> {
+    pub(super) fn doubts(&self, chosen: &[SelectedInterface]) -> Vec<String> {
         let size = self.mesh.bounding_box().map_or(0.0, |(low, high)| (high - low).norm());
         let mut doubts = Vec::new();
         for one in chosen {

@@ -9,7 +9,7 @@ use flexarm_fem::mesh::connected_parts;
 use nalgebra::Vector3;
 use serde::Serialize;
 
-use super::interfaces::Place;
+use super::interfaces::MeshFrame;
 use super::summary::MaterialFigures;
 
 /// Result of `flexarm reduce --list`. Lengths are in the unit of the mesh file; sets are in the
@@ -75,7 +75,7 @@ pub struct SetListing {
 }
 
 impl MeshListing {
-    pub(super) fn new(path: &Path, file: &MeshFile, units: Option<String>, place: &Place<'_>) -> Self {
+    pub(super) fn new(path: &Path, file: &MeshFile, units: Option<String>, place: &MeshFrame<'_>) -> Self {
         let mesh: &Mesh = &file.mesh;
         let mut element_kinds = BTreeMap::new();
         for block in &mesh.blocks {
@@ -115,7 +115,7 @@ impl MeshListing {
 }
 
 impl SetListing {
-    pub(super) fn new(name: &str, nodes: &[u32], place: &Place<'_>) -> Self {
+    pub(super) fn new(name: &str, nodes: &[u32], place: &MeshFrame<'_>) -> Self {
         let (centroid, extent) = place.middle_and_extent(nodes);
         Self {
             name: name.to_owned(),

@@ -44,7 +44,7 @@ use flexarm_spatial::Pose;
 use crate::robot_entry::robot_entry;
 use crate::{JobError, LinkError};
 use files::Paths;
-use interfaces::Place;
+use interfaces::MeshFrame;
 use prepare::{Prepared, failed, prepare, read};
 use summary::summary_of;
 
@@ -171,7 +171,7 @@ pub fn list_mesh(job: &ReduceJob) -> Result<MeshListing, LinkError> {
     let file = read_mesh(&job.mesh, &read).map_err(Box::new)?;
     let unit = read.units.length;
     let X_LM = job.mesh_frame.map_or_else(Pose::identity, |frame| interfaces::pose(&frame, unit));
-    let place = Place { mesh: &file.mesh, unit, X_LM };
+    let place = MeshFrame { mesh: &file.mesh, unit, X_LM };
     let mut listing = MeshListing::new(&job.mesh, &file, job.units.map(|units| units.name()), &place);
     for entry in &job.interface {
         let Some(selector) = &entry.select else { continue };

@@ -13,7 +13,7 @@ use flexarm_settings::Setting;
 use flexarm_spatial::Pose;
 use nalgebra::Vector3;
 
-use super::interfaces::{Chosen, Place, pose};
+use super::interfaces::{MeshFrame, SelectedInterface, pose};
 use super::job::ReduceJob;
 use super::summary::{MaterialFigures, RegionFigures};
 use super::urdf_link::UrdfLink;
@@ -27,7 +27,7 @@ pub(super) struct Prepared {
     /// Mesh in link axes, with the materials of the job.
     pub(super) file: MeshFile,
     pub(super) units: UnitSystem,
-    pub(super) chosen: Vec<Chosen>,
+    pub(super) chosen: Vec<SelectedInterface>,
     pub(super) materials: Vec<RegionFigures>,
     pub(super) doubts: Vec<Doubt>,
 }
@@ -73,7 +73,7 @@ pub(super) fn prepare(
     // The reader's warning about a deck without sections does not apply if the job has the
     // material.
     warnings.retain(|said| !said.contains("hence without a material") || materials.is_empty());
-    let place = Place { mesh: &file.mesh, unit: units.length, X_LM };
+    let place = MeshFrame { mesh: &file.mesh, unit: units.length, X_LM };
     let chosen = place.choose(job, robot).unwrap_or_else(|more| {
         faults.extend(more);
         Vec::new()
@@ -89,11 +89,11 @@ pub(super) fn prepare(
     if !faults.is_empty() {
         return Err(LinkError::of_all(faults));
     }
-    let said = |code: &'static str| move |sentence: String| Doubt::said(code, sentence);
-    let mut doubts: Vec<Doubt> = warnings.into_iter().map(said("mesh-file")).collect();
-    doubts.extend(chosen.iter().flat_map(Chosen::seat_doubts).map(said("interface-nodes")));
-    doubts.extend(place.doubts(&chosen).into_iter().map(said("interface-frame")));
-    doubts.extend(material_doubts(&file, units, &materials).into_iter().map(said("material")));
+    let doubt = |code: &'static str| move |sentence: String| Doubt::from_message(code, sentence);
+    let mut doubts: Vec<Doubt> = warnings.into_iter().map(doubt("mesh-file")).collect();
+    doubts.extend(chosen.iter().flat_map(SelectedInterface::seat_doubts).map(doubt("interface-nodes")));
+    doubts.extend(place.doubts(&chosen).into_iter().map(doubt("interface-frame")));
+    doubts.extend(material_doubts(&file, units, &materials).into_iter().map(doubt("material")));
     let mut plan = plan(job, &file, units, &chosen, &materials);
     plan.assembly.quadrature = quadrature(job, &file)?;
     file.mesh = file.mesh.transformed(&X_LM);
@@ -210,7 +210,7 @@ fn plan(
     job: &ReduceJob,
     file: &MeshFile,
     units: UnitSystem,
-    chosen: &[Chosen],
+    chosen: &[SelectedInterface],
     materials: &[RegionFigures],
 ) -> LinkPlan {
     let modes = match (job.modes, job.modes_up_to_hz) {

@@ -11,7 +11,7 @@ use nalgebra::{Matrix3, Matrix6};
 use serde::Serialize;
 
 use super::JUDGED_MODES;
-use super::interfaces::Chosen;
+use super::interfaces::SelectedInterface;
 use super::job::ReduceJob;
 use super::prepare::quadrature_name;
 use super::words::described;
@@ -334,14 +334,14 @@ pub(super) fn summary_of(
     plan: &LinkPlan,
     file: &MeshFile,
     units: UnitSystem,
-    chosen: &[Chosen],
+    chosen: &[SelectedInterface],
     materials: Vec<RegionFigures>,
     reduction: &MeshReduction,
 ) -> ReduceSummary {
     let link = &reduction.link;
     let details = link.details.as_deref();
     let gate = details.and_then(|details| details.gate.as_ref());
-    let interface = |one: &Chosen| {
+    let interface = |one: &SelectedInterface| {
         let X = &one.interface.X_LI;
         let (roll, pitch, yaw) = X.rotation.euler_angles();
         InterfaceFigures {
@@ -433,15 +433,16 @@ pub(super) fn summary_of(
 
 /// Returns warnings about interfaces that extend over a large share of the distance between the two
 /// farthest ones; `nodes` is the number of nodes of the mesh.
-fn spreads(chosen: &[Chosen], nodes: usize) -> Vec<Doubt> {
-    let place = |one: &Chosen| one.interface.X_LI.translation.vector;
+fn spreads(chosen: &[SelectedInterface], nodes: usize) -> Vec<Doubt> {
+    let place = |one: &SelectedInterface| one.interface.X_LI.translation.vector;
     let pairs = chosen.iter().enumerate().flat_map(|(k, a)| chosen[..k].iter().map(move |b| place(a) - place(b)));
     let Some(line) = pairs.max_by(|a, b| a.norm().total_cmp(&b.norm())) else { return Vec::new() };
     let length = line.norm();
     // Extent of the bounding box along the line; the edges of the box are along the axes.
-    let along = |one: &Chosen| one.extent.dot(&(line / length).abs());
-    let share = |one: &Chosen| one.interface.nodes.len() as f64 / nodes as f64;
-    let judged = |one: &Chosen| yardsticks::of_interface(&one.interface.name, along(one) / length, share(one));
+    let along = |one: &SelectedInterface| one.extent.dot(&(line / length).abs());
+    let share = |one: &SelectedInterface| one.interface.nodes.len() as f64 / nodes as f64;
+    let judged =
+        |one: &SelectedInterface| yardsticks::of_interface(&one.interface.name, along(one) / length, share(one));
     chosen.iter().filter_map(judged).collect()
 }
 
@@ -480,7 +481,12 @@ pub(crate) fn doubted(link: &str, doubt: Doubt) -> Caveat {
     let Doubt { code, message, value, yardstick } = doubt;
     let finite = |x: Option<f64>| x.filter(|x| x.is_finite());
     let settings = if code == COARSE_MODES { vec![Setting::Modes] } else { Vec::new() };
-    Caveat { value: finite(value), yardstick: finite(yardstick), settings, ..Caveat::said(code, link, message, "") }
+    Caveat {
+        value: finite(value),
+        yardstick: finite(yardstick),
+        settings,
+        ..Caveat::from_message(code, link, message, "")
+    }
 }
 
 fn rows3(M: &Matrix3<f64>) -> [[f64; 3]; 3] {

@@ -42,14 +42,15 @@ pub(crate) fn of_balancers(mechanism: &Mechanism, rigid: &Model) -> Vec<Caveat> 
         let alone = alone(mechanism, &bare, k);
         let torque = alone.torque;
         if weight > 0.0 && torque > STRONG[0] * weight {
-            let caveat = kinds::BALANCER_STRONG.found(&name, torque, STRONG[0] * weight);
+            let caveat = kinds::BALANCER_STRONG.with_unit(alone.unit).found(&name, torque, STRONG[0] * weight);
             let likely = slip(torque, &(0.01 * weight..=STRONG[0] * weight), EFFORT, 1.0);
             caveats.push(if torque > STRONG[1] * weight { caveat.likely(likely) } else { caveat.as_note() });
         } else if torque < WEAK * weight {
-            caveats.push(kinds::BALANCER_WEAK.found(&name, torque, WEAK * weight));
+            caveats.push(kinds::BALANCER_WEAK.with_unit(alone.unit).found(&name, torque, WEAK * weight));
         }
         if weight > 0.0 && alone.with > RAISED * alone.without {
-            caveats.push(kinds::BALANCER_SIDE.found(&name, alone.with, alone.without).likely("on the wrong side?"));
+            let caveat = kinds::BALANCER_SIDE.with_unit(alone.unit).found(&name, alone.with, alone.without);
+            caveats.push(caveat.likely("on the wrong side?"));
         }
     }
     caveats
@@ -72,18 +73,20 @@ fn lengths(model: &Model, number: usize) -> Lengths {
 }
 
 /// Effect of one balancer on the joint on which it acts most, over poses spread over the joint
-/// ranges (N m or N).
-struct Alone {
+/// ranges.
+struct BalancerEffect {
     /// Maximum torque of the balancer.
     torque: f64,
     /// RMS holding torque with this balancer.
     with: f64,
     /// RMS holding torque without any balancer.
     without: f64,
+    /// Unit of all three.
+    unit: &'static str,
 }
 
-fn alone(mechanism: &Mechanism, bare: &Model, number: usize) -> Alone {
-    let mut found = Alone { torque: 0.0, with: 0.0, without: 0.0 };
+fn alone(mechanism: &Mechanism, bare: &Model, number: usize) -> BalancerEffect {
+    let mut found = BalancerEffect { torque: 0.0, with: 0.0, without: 0.0, unit: "N m" };
     let alone = Mechanism { balancers: vec![mechanism.balancers[number].clone()], ..mechanism.clone() };
     let Ok(alone) = Model::new(&alone) else { return found };
     let (mut data, mut data_bare) = (Data::new(&alone), Data::new(bare));
@@ -96,6 +99,7 @@ fn alone(mechanism: &Mechanism, bare: &Model, number: usize) -> Alone {
     let own = |k: usize| all.iter().map(|(with, without)| (with[k] - without[k]).abs()).fold(0.0, f64::max);
     let Some(joint) = (0..bare.nv()).max_by(|a, b| own(*a).total_cmp(&own(*b))) else { return found };
     found.torque = own(joint);
+    found.unit = bare.coordinates()[joint].effort_unit();
     let rms = |squares: f64| (squares / all.len().max(1) as f64).sqrt();
     found.with = rms(all.iter().map(|(with, _)| with[joint].powi(2)).sum());
     found.without = rms(all.iter().map(|(_, without)| without[joint].powi(2)).sum());

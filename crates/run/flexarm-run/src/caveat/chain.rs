@@ -40,7 +40,7 @@ fn of_place(robot: &Robot, size: &Size, what: &str, link: &str, [fixed, inside]:
     if !mechanism.joints.iter().any(|joint| joint.child == body) {
         return (!moving.is_empty()).then(|| fixed.found(location, 0.0, moving.len() as f64));
     }
-    let behind = Behind::of(mechanism, &moving, size, body);
+    let behind = DistalPart::of(mechanism, &moving, size, body);
     behind.is_arm.then(|| inside.found(location, behind.reach, size.extent))
 }
 
@@ -63,14 +63,14 @@ fn carrier<'m>(mechanism: &'m Mechanism, link: &'m str) -> &'m str {
 }
 
 /// Part of the robot beyond a body, seen from the base.
-struct Behind {
+struct DistalPart {
     /// Its reach from there (m).
     reach: f64,
     /// Whether it is part of the arm rather than a gripper.
     is_arm: bool,
 }
 
-impl Behind {
+impl DistalPart {
     fn of(mechanism: &Mechanism, moving: &[String], size: &Size, body: &str) -> Self {
         // Links, and whether a moving joint is between each and the body.
         let mut open = vec![(body, false)];
@@ -119,6 +119,6 @@ fn stiff_joints(robot: &Robot) -> Vec<Caveat> {
         return Vec::new();
     }
     let all = chain.len() as f64;
-    let told = |joint: &Joint| kinds::STIFF_JOINT.found(format!("joint {:?}", joint.name), elastic as f64, all);
-    odd.into_iter().map(told).collect()
+    let caveat = |joint: &Joint| kinds::STIFF_JOINT.found(format!("joint {:?}", joint.name), elastic as f64, all);
+    odd.into_iter().map(caveat).collect()
 }

@@ -12,14 +12,14 @@ pub(crate) const MOTION_EFFORT: CaveatKind = CaveatKind::warning(
 /// A balancer is far stronger than the weight of the arm.
 pub(crate) const BALANCER_STRONG: CaveatKind = CaveatKind::warning(
     "balancer-strong",
-    "{where} puts up to {value} N m (or N) on a joint (reported above three times the gravity torque of the arm, {yardstick})",
+    "{where} puts up to {value} {unit} on a joint, more than three times the gravity torque of the arm ({yardstick} {unit})",
     "N m",
     "a balancer carries about the weight of the arm: check rate, pressure, area and ends (N/m, Pa, m2, m)",
 );
 /// A balancer is negligibly weak.
 pub(crate) const BALANCER_WEAK: CaveatKind = CaveatKind::note(
     "balancer-weak",
-    "{where} puts at most {value} N m (or N) on a joint, told below a thousandth of what the weight of the arm does ({yardstick})",
+    "{where} puts at most {value} {unit} on a joint, less than a thousandth of the gravity torque of the arm ({yardstick} {unit})",
     "N m",
     "check its ends and its force: units are m, N/m and Pa",
 );
@@ -124,7 +124,7 @@ pub(crate) const LOAD_DEGREES: CaveatKind = CaveatKind::warning(
 /// A balancer increases the joint's holding torque.
 pub(crate) const BALANCER_SIDE: CaveatKind = CaveatKind::warning(
     "balancer-side",
-    "{where}: with it the joint that it acts on needs {value} N m (or N) over the joint ranges (RMS), without it {yardstick}",
+    "{where}: with it the joint that it acts on needs {value} {unit} over the joint ranges (RMS), without it {yardstick} {unit}",
     "N m",
     "a balancer takes weight off the motor: check on which side of the joint its ends are, and its sense",
 );

@@ -73,7 +73,7 @@ fn geometric(name: &str, link: &RobotLink) -> Option<Caveat> {
             format!("add model = \"modal\", or run with {} modal", Setting::Links),
         ),
     };
-    Some(Caveat::said("geometric-stiffening", name, message, &help))
+    Some(Caveat::from_message("geometric-stiffening", name, message, &help))
 }
 
 /// Maximum sink (m) of the base under the weight of the whole robot, and maximum tilt (rad) under

@@ -1,7 +1,7 @@
 //! Caveats about robots and runs as values: probable errors in an input, and limits of a result's
 //! validity.
 //!
-//! Every command that uses a robot reports the same caveats about it ([`told()`]); runs and statics
+//! Every command that uses a robot reports the same caveats about it ([`of_use()`]); runs and statics
 //! add their own. Each message is built in one place ([`CaveatKind::found`]). Start at `kinds`, the
 //! catalogue; `docs/caveats.md` lists it with the source of each threshold.
 //!
@@ -16,17 +16,17 @@ pub(crate) mod links;
 pub(crate) mod loads;
 pub(crate) mod loops;
 pub mod motion;
+pub mod of_use;
 pub(crate) mod parts;
 pub(crate) mod pose;
 pub mod size;
 pub mod slip;
 pub(crate) mod stiffness;
-pub mod told;
 pub mod validity;
 
 pub use flexarm_settings::caveat::{Caveat, Severity};
 pub use flexarm_settings::caveat::{CaveatKind, once_each, warnings};
-pub use told::{Use, told};
+pub use of_use::{Use, of_use};
 
 #[cfg(test)]
 mod tests {

@@ -139,7 +139,7 @@ pub(crate) fn gravity(g: &Vector3<f64>) -> Option<Caveat> {
 
 fn tilted(message: String) -> Caveat {
     let help = "right for a robot on a wall, a ceiling or a slope; else turn gravity over";
-    Caveat { unit: "m/s2".into(), ..Caveat::said("gravity-direction", "gravity", message, help) }.as_note()
+    Caveat { unit: "m/s2".into(), ..Caveat::from_message("gravity-direction", "gravity", message, help) }.as_note()
 }
 
 /// Checks a payload; `inertia.com` is in the axes of the link that carries it.

@@ -18,7 +18,7 @@ const SOUND: f64 = 5100.0;
 const DAMPED: [f64; 2] = [0.2, 0.5];
 
 /// An arm at rest.
-pub(crate) struct Standing<'a> {
+pub(crate) struct ArmAtRest<'a> {
     pub(crate) robot: &'a Robot,
     pub(crate) flexible: &'a FlexibleRobot,
     pub(crate) arm: &'a FlexibleArm,
@@ -28,7 +28,7 @@ pub(crate) struct Standing<'a> {
     pub(crate) sag_m: f64,
 }
 
-impl Standing<'_> {
+impl ArmAtRest<'_> {
     /// Returns all of these caveats.
     pub(crate) fn caveats(&self) -> Vec<Caveat> {
         let extent = self.flexible.extent;

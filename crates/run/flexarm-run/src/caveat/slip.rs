@@ -33,11 +33,11 @@ pub(crate) const INERTIA: &[Factor] = &[(1e4, "kg cm2"), (1e6, "kg mm2"), (1e9, 
 /// gyration and its inertia.
 pub fn slip(value: f64, plausible: &RangeInclusive<f64>, factors: &[Factor], power: f64) -> String {
     let mends = |(factor, _): &&Factor| plausible.contains(&(value / factor.powf(power)));
-    factors.iter().find(mends).map(|(factor, words)| told(*factor, words)).unwrap_or_default()
+    factors.iter().find(mends).map(|(factor, words)| slip_text(*factor, words)).unwrap_or_default()
 }
 
 /// Formats a mistake, such as "about 57 times: degrees?".
-fn told(factor: f64, words: &str) -> String {
+fn slip_text(factor: f64, words: &str) -> String {
     let times = if factor >= 1.0 { factor } else { 1.0 / factor };
     let digits = if times < 1e4 { format!("{times:.0}") } else { format!("{times:.0e}") };
     let way = if factor >= 1.0 { "times" } else { "times too small" };

@@ -101,14 +101,14 @@ pub fn report(recordings: &[PathBuf], options: &ReportOptions) -> Result<ReportF
 fn read_all(inputs: &[Input], warnings: &mut Vec<String>) -> Result<Vec<(String, Summary, Trace)>, Error> {
     let mut runs: Vec<(String, Summary, Trace)> = Vec::new();
     for Input { path, of_study } in inputs {
-        let (json, trace, told) = read_run(path)?;
+        let (json, trace, warned) = read_run(path)?;
         if trace.rows.is_empty() {
-            return Err(no_sample(path, told.last()));
+            return Err(no_sample(path, warned.last()));
         }
         let name = format!("{}: ", path.display());
         // Some messages already name the file.
         let named = |sentence: String| if sentence.starts_with(&name) { sentence } else { name.clone() + &sentence };
-        warnings.extend(told.into_iter().map(named));
+        warnings.extend(warned.into_iter().map(named));
         let stored = of_study.clone().or_else(|| json.and_then(|json| serde_json::from_value::<Summary>(json).ok()));
         let mut summary = stored.unwrap_or_else(|| {
             warnings.push(format!(
@@ -213,7 +213,7 @@ fn folder_name(label: &str) -> String {
 }
 
 /// Returns a value of the metadata.
-pub(super) fn told<'a>(header: &'a RunHeader, group: &str, key: &str) -> Option<&'a str> {
+pub(super) fn metadata_value<'a>(header: &'a RunHeader, group: &str, key: &str) -> Option<&'a str> {
     let (_, rows) = header.metadata.iter().find(|(name, _)| name == group)?;
     let (_, value) = rows.iter().find(|(name, _)| name == key)?;
     Some(value.as_str()).filter(|value| !value.is_empty())
@@ -221,7 +221,7 @@ pub(super) fn told<'a>(header: &'a RunHeader, group: &str, key: &str) -> Option<
 
 /// Half width of the settling band (m), from the text in a recording.
 fn settling_band_m(header: &RunHeader) -> Option<f64> {
-    told(header, "flexarm.run", "settling_band_m")?.parse().ok()
+    metadata_value(header, "flexarm.run", "settling_band_m")?.parse().ok()
 }
 
 /// Computes the figures that follow from curves only.
@@ -258,7 +258,7 @@ fn computed(trace: &Trace) -> Summary {
         (tcp.dominant_hz, tcp.settling_s) = (None, None);
     }
     let named = |name: &str, otherwise: &str| if name.is_empty() { otherwise.to_owned() } else { name.to_owned() };
-    let run = |key: &str| told(header, "flexarm.run", key);
+    let run = |key: &str| metadata_value(header, "flexarm.run", key);
     let flexible = if header.elements.is_empty() { "" } else { "flexible" };
     let robot = run("robot").unwrap_or(&header.robot);
     let trajectory = run("trajectory").unwrap_or(&header.trajectory);
@@ -266,7 +266,7 @@ fn computed(trace: &Trace) -> Summary {
     Summary {
         robot: named(robot, "recorded run"),
         trajectory: if trajectory == UNKNOWN { String::new() } else { trajectory.to_owned() },
-        links_model: told(header, "flexarm.model", "links").unwrap_or(flexible).to_owned(),
+        links_model: metadata_value(header, "flexarm.model", "links").unwrap_or(flexible).to_owned(),
         stepper: StepperFigures {
             name: run("stepper").unwrap_or_default().to_owned(),
             h_s: run("step_s").and_then(|h| h.parse().ok()).unwrap_or(header.step_s),

@@ -5,8 +5,8 @@ use flexarm_stepping::{FlexibleArm, StepRule, StepperKind};
 use nalgebra::DVector;
 
 use super::steps_per_sample;
-use crate::caveat::pose::Standing;
-use crate::caveat::{Caveat, Severity, kinds, told, validity};
+use crate::caveat::pose::ArmAtRest;
+use crate::caveat::{Caveat, Severity, kinds, of_use, validity};
 use crate::flexible::FlexibleRobot;
 use crate::motion::Motion;
 use crate::options::RunOptions;
@@ -39,9 +39,9 @@ impl BeforeRun<'_> {
     pub(crate) fn caveats(&self, sag_m: f64) -> Vec<Caveat> {
         let Self { robot, flexible, arm, motion, options } = *self;
         let mut caveats = flexible.caveats();
-        caveats.extend(told::of_motion(motion, &flexible.rigid));
+        caveats.extend(of_use::of_motion(motion, &flexible.rigid));
         let elastic = arm.modes.equilibrium.as_slice();
-        caveats.extend(Standing { robot, flexible, arm, elastic, sag_m }.caveats());
+        caveats.extend(ArmAtRest { robot, flexible, arm, elastic, sag_m }.caveats());
         if let Some(first) = arm.modes.frequencies_hz().first() {
             let logged_hz = 1.0 / (steps_per_sample(options) as f64 * options.step_s);
             caveats.extend(validity::sampling(*first, logged_hz));
@@ -57,7 +57,7 @@ impl BeforeRun<'_> {
         caveats.extend(self.ripple());
         if motion.trajectory.initial_speed() > 1e-6 {
             let message = "the motion starts at speed: the first ringing is an artefact of the sudden start";
-            caveats.push(Caveat::said("starts-moving", "run", message, ""));
+            caveats.push(Caveat::from_message("starts-moving", "run", message, ""));
         }
         caveats
     }
@@ -93,7 +93,7 @@ impl BeforeRun<'_> {
                  exact for the first mode",
                 betas.join(", ")
             );
-            Caveat::said("spook-damping", "run", message, "")
+            Caveat::from_message("spook-damping", "run", message, "")
         })
     }
 

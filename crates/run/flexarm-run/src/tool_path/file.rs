@@ -259,8 +259,8 @@ fn options(
         }
         options.rise_s = *rise.get_ref();
     }
-    if let Some(told) = &file.path.redundancy {
-        options.rule = match told.get_ref() {
+    if let Some(given) = &file.path.redundancy {
+        options.rule = match given.get_ref() {
             Redundancy::Word(word) if word == "hold" => None,
             Redundancy::Word(word) if word == "away-from-limits" => Some(NullSpaceRule::AwayFromLimits),
             Redundancy::Posture(values) if values.len() == arm.axes.len() && check_axes(values).is_ok() => {
@@ -280,7 +280,7 @@ fn options(
                     "redundancy is {found}: expected \"hold\", \"away-from-limits\" or {} joint values to stay near to",
                     arm.axes.len()
                 );
-                return Err(source.error(told.span(), message));
+                return Err(source.error(given.span(), message));
             }
         };
     }
@@ -443,8 +443,8 @@ impl Reader<'_> {
                 .error(table.span(), "a move needs one of joints, joint_to, line, arc, spline, dwell"));
         };
         let quaternion = entry.quaternion.as_ref().map(|q| *q.get_ref());
-        let told = rotation(entry.rpy, quaternion, self.units).map_err(|m| self.source.error(table.span(), m))?;
-        let turned = told.or(*R).ok_or_else(|| {
+        let given = rotation(entry.rpy, quaternion, self.units).map_err(|m| self.source.error(table.span(), m))?;
+        let turned = given.or(*R).ok_or_else(|| {
             let message =
                 "the orientation of the tool is not known yet: give rpy or quaternion, or begin with a move joints";
             self.source.error(table.span(), message)
@@ -549,8 +549,8 @@ impl Reader<'_> {
             arm.starts_at_rest = true;
         }
         arm.X_FT = self.X_FT.unwrap_or(arm.X_FT);
-        let told = |program: &mut Program| self.fill(program);
-        plan_program(&file, &bytes, &arm, &options, resolution, notes, &told)
+        let given = |program: &mut Program| self.fill(program);
+        plan_program(&file, &bytes, &arm, &options, resolution, notes, &given)
     }
 
     /// Fills in the speeds that the program leaves open.
@@ -574,7 +574,7 @@ impl Reader<'_> {
         let entry = table.get_ref();
         let (line, _) = self.place(table);
         let R = rotation(entry.rpy, entry.quaternion, self.units).map_err(|m| self.source.error(table.span(), m))?;
-        let R = R.ok_or_else(|| self.source.error(table.span(), "tell how the tool stands: rpy or quaternion"))?;
+        let R = R.ok_or_else(|| self.source.error(table.span(), "give the tool's orientation: rpy or quaternion"))?;
         let side = *entry.side.get_ref() * self.units.length;
         if !(side > 0.0 && side.is_finite()) {
             let message = format!("side is {}, it must be a positive length", entry.side.get_ref());
@@ -641,23 +641,23 @@ impl Reader<'_> {
     /// Returns the speed of a move, with defaults from `[path]`.
     fn speed(&self, entry: Option<&MoveTable>) -> Speed {
         let (common, Units { length, angle }) = (self.common, self.units);
-        let told = |of: fn(&MoveTable) -> Option<f64>| entry.and_then(of);
+        let given = |of: fn(&MoveTable) -> Option<f64>| entry.and_then(of);
         Speed {
-            linear_m_s: told(|e| e.speed).or(common.speed).map(|v| v * length),
-            linear_m_s2: told(|e| e.acceleration).or(common.acceleration).map(|v| v * length),
-            linear_m_s3: told(|e| e.jerk).or(common.jerk).map(|v| v * length),
-            angular_rad_s: told(|e| e.turning).or(common.turning).map(|v| v * angle),
-            angular_rad_s2: told(|e| e.turning_acceleration).or(common.turning_acceleration).map(|v| v * angle),
-            joint_fraction: told(|e| e.joint_speed).or(common.joint_speed),
-            joint_acceleration_fraction: told(|e| e.joint_acceleration).or(common.joint_acceleration),
+            linear_m_s: given(|e| e.speed).or(common.speed).map(|v| v * length),
+            linear_m_s2: given(|e| e.acceleration).or(common.acceleration).map(|v| v * length),
+            linear_m_s3: given(|e| e.jerk).or(common.jerk).map(|v| v * length),
+            angular_rad_s: given(|e| e.turning).or(common.turning).map(|v| v * angle),
+            angular_rad_s2: given(|e| e.turning_acceleration).or(common.turning_acceleration).map(|v| v * angle),
+            joint_fraction: given(|e| e.joint_speed).or(common.joint_speed),
+            joint_acceleration_fraction: given(|e| e.joint_acceleration).or(common.joint_acceleration),
             joint_rad_s: None,
             joint_rad_s2: None,
-            duration_s: told(|e| e.duration),
+            duration_s: given(|e| e.duration),
         }
     }
 
-    fn blend(&self, told: Option<f64>) -> Blend {
-        match told.or(self.common.blend) {
+    fn blend(&self, given: Option<f64>) -> Blend {
+        match given.or(self.common.blend) {
             None | Some(0.0) => Blend::Stop,
             Some(distance) => Blend::Distance(distance * self.units.length),
         }

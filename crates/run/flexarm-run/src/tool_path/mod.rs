@@ -123,8 +123,8 @@ impl<'a> Cell<'a> {
         let coordinates = self.model.coordinates();
         DVector::from_fn(self.model.nv(), |k, _| {
             let c = &coordinates[k];
-            let told = self.hold.iter().find(|(joint, _)| *joint == c.joint).map(|(_, value)| *value);
-            told.unwrap_or(0.0f64.max(c.limits.lower).min(c.limits.upper))
+            let given = self.hold.iter().find(|(joint, _)| *joint == c.joint).map(|(_, value)| *value);
+            given.unwrap_or(0.0f64.max(c.limits.lower).min(c.limits.upper))
         })
     }
 
@@ -133,11 +133,11 @@ impl<'a> Cell<'a> {
     pub fn controller_axes(&self, axes: &[usize]) -> Vec<ControllerAxis> {
         let place = |joint: &str| axes.iter().position(|&k| self.model.coordinates()[k].joint == joint);
         let axis = |&k: &usize| {
-            let told = self.controller.iter().find(|axis| axis.joint == self.model.coordinates()[k].joint);
-            told.map_or(ControllerAxis::SAME, |told| {
-                let relative = told.relative.as_ref();
+            let given = self.controller.iter().find(|axis| axis.joint == self.model.coordinates()[k].joint);
+            given.map_or(ControllerAxis::SAME, |given| {
+                let relative = given.relative.as_ref();
                 let relative = relative.and_then(|(joint, factor)| Some((place(joint)?, *factor)));
-                ControllerAxis { sense: told.sense, zero: told.zero, relative }
+                ControllerAxis { sense: given.sense, zero: given.zero, relative }
             })
         };
         if self.controller.is_empty() { Vec::new() } else { axes.iter().map(axis).collect() }
@@ -224,9 +224,10 @@ impl ToolPath {
 
     /// Returns the caveats about the path.
     pub(crate) fn caveats(&self) -> Vec<Caveat> {
-        let said = |text: &String| Caveat::said("tool-path", &self.file, format!("{}: {text}", self.file), "");
-        let notes = self.notes.iter().map(|text| said(text).as_note());
-        self.warnings.iter().map(said).chain(notes).collect()
+        let caveat =
+            |text: &String| Caveat::from_message("tool-path", &self.file, format!("{}: {text}", self.file), "");
+        let notes = self.notes.iter().map(|text| caveat(text).as_note());
+        self.warnings.iter().map(caveat).chain(notes).collect()
     }
 }
 

@@ -173,21 +173,21 @@ impl Normal {
     pub(crate) fn solved(&self, needed: usize) -> Option<Vec<f64>> {
         let n = self.zy.len();
         let scales = self.sizes.each_ref().map(|sizes| sizes.map(f64::sqrt));
-        let told: Vec<usize> = (0..n).filter(|k| scales.iter().all(|scale| scale[*k] > 0.0)).collect();
-        if (0..needed).any(|k| !told.contains(&k)) {
+        let determined: Vec<usize> = (0..n).filter(|k| scales.iter().all(|scale| scale[*k] > 0.0)).collect();
+        if (0..needed).any(|k| !determined.contains(&k)) {
             return None;
         }
-        let unit = DMatrix::from_fn(told.len(), told.len(), |i, j| {
-            self.zx[(told[i], told[j])] / (scales[1][told[i]] * scales[0][told[j]])
+        let unit = DMatrix::from_fn(determined.len(), determined.len(), |i, j| {
+            self.zx[(determined[i], determined[j])] / (scales[1][determined[i]] * scales[0][determined[j]])
         });
-        let right = DVector::from_fn(told.len(), |i, _| self.zy[told[i]] / scales[1][told[i]]);
+        let right = DVector::from_fn(determined.len(), |i, _| self.zy[determined[i]] / scales[1][determined[i]]);
         let svd = unit.svd(true, true);
         if svd.singular_values.min() <= DEPENDENT {
             return None;
         }
         let found = svd.solve(&right, 0.0).ok()?;
         let mut values = vec![0.0; n];
-        told.iter().zip(found.iter()).for_each(|(k, x)| values[*k] = x / scales[0][*k]);
+        determined.iter().zip(found.iter()).for_each(|(k, x)| values[*k] = x / scales[0][*k]);
         Some(values)
     }
 }

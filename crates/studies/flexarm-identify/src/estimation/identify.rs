@@ -44,7 +44,7 @@ impl Default for IdentifyOptions {
 
 /// Estimate of one parameter.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Found {
+pub struct ParameterEstimate {
     /// Name, as in the robot file.
     pub name: String,
     /// Unit of the values.
@@ -79,7 +79,7 @@ pub struct HeldOut {
 #[derive(Clone, Debug)]
 pub struct Identified {
     /// Estimates, one per parameter, in order.
-    pub parameters: Vec<Found>,
+    pub parameters: Vec<ParameterEstimate>,
     /// Correlation matrix of the parameters' coordinates, p×p.
     pub correlation: DMatrix<f64>,
     /// Combinations that the readings do not determine: parameter and weight, largest weight first.
@@ -193,7 +193,7 @@ pub fn identify(
         None => searched(plant, parameters, &measurements, options)?,
     };
     let held_out = held_out(plant, parameters, &measurements, options, &solution, &before)?;
-    let mut found = told(parameters, &measurements, options, solution, before, held_out);
+    let mut found = summarise(parameters, &measurements, options, solution, before, held_out);
     // Back to units of the given deviations.
     found.solution.residuals *= scatter;
     found.before.iter_mut().for_each(|r| *r *= scatter);
@@ -201,7 +201,8 @@ pub fn identify(
         held.residuals.iter_mut().for_each(|r| *r *= scatter);
         (held.rms, held.rms_initial) = (held.rms * scatter, held.rms_initial * scatter);
     }
-    let sound = |p: &Found| p.value.is_finite() && (p.std.is_nan() || p.interval.iter().all(|x| x.is_finite()));
+    let sound =
+        |p: &ParameterEstimate| p.value.is_finite() && (p.std.is_nan() || p.interval.iter().all(|x| x.is_finite()));
     match found.parameters.iter().all(sound) {
         true => Ok(found),
         false => Err(IdentifyError::NotFinite),
@@ -494,7 +495,7 @@ fn chi_square_bound(freedom: usize) -> f64 {
     (1.0 - nine + MISFIT_QUANTILE * nine.sqrt()).powi(3)
 }
 
-fn told(
+fn summarise(
     parameters: &[Parameter],
     measurements: &Measurements,
     options: &IdentifyOptions,
@@ -518,7 +519,7 @@ fn told(
         // determine them less well, hence the second condition.
         let identifiable = share(k) <= UNTOLD && spread <= parameter.reference();
         let (x, std) = (solution.unknowns[k], if identifiable && fits { spread * scatter } else { f64::NAN });
-        Found {
+        ParameterEstimate {
             name: parameter.name.clone(),
             unit: parameter.unit.clone(),
             initial: parameter.initial,
@@ -528,7 +529,7 @@ fn told(
             identifiable,
         }
     });
-    let found: Vec<Found> = found.collect();
+    let found: Vec<ParameterEstimate> = found.collect();
     let C = &solution.covariance;
     let correlation = DMatrix::from_fn(p, p, |i, j| C[(i, j)] / (C[(i, i)] * C[(j, j)]).sqrt());
     let untold = (solution.identified..p).map(|j| {

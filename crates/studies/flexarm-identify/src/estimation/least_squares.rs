@@ -151,7 +151,7 @@ pub fn solve<P: Residuals>(
     // Phase 1: all parameters are regularised by the prior.
     let held = descend(problem, &DMatrix::identity(n, n), start.clone(), Some(&prior), search)?;
     // Phase 2: without the prior, along the identified directions.
-    let known = Known::of(&held, &prior)?;
+    let known = Identifiability::of(&held, &prior)?;
     let begin = known.projected(&held.unknowns, &prior);
     let basis = known.basis(&prior, n);
     let mut found = descend(problem, &basis, begin, None, search)?;
@@ -250,13 +250,13 @@ fn descend<P: Residuals>(
 }
 
 /// Directions of the parameters, sorted by how well the data determine them.
-struct Known {
+struct Identifiability {
     directions: DMatrix<f64>,
     gains: Vec<f64>,
     identified: usize,
 }
 
-impl Known {
+impl Identifiability {
     fn of<E>(descent: &Descent, prior: &DVector<f64>) -> Result<Self, SolveError<E>> {
         let p = prior.len();
         if p == 0 {
@@ -325,7 +325,7 @@ fn orthonormal(A: &DMatrix<f64>) -> Result<DMatrix<f64>, usize> {
     (0..A.ncols()).find(|k| !is_own(*k)).map_or(Ok(Q), Err)
 }
 
-fn finish(found: Descent, known: Known, basis: &DMatrix<f64>, prior: &DVector<f64>, loss: Loss) -> Solution {
+fn finish(found: Descent, known: Identifiability, basis: &DMatrix<f64>, prior: &DVector<f64>, loss: Loss) -> Solution {
     let (m, p) = (found.residuals.len(), prior.len());
     let columns = basis.ncols();
     let root = found.weights.map(f64::sqrt);

@@ -24,10 +24,10 @@ mod trajectory;
 
 pub use coupled_gears::{CoupledOutput, coupled_gear_stiffness};
 pub use encoders::{GearEstimate, GearRun, gear_stiffness};
-pub use identify::{Found, HeldOut, Identified, IdentifyError, IdentifyOptions, identify};
+pub use identify::{HeldOut, Identified, IdentifyError, IdentifyOptions, ParameterEstimate, identify};
 pub use least_squares::{Loss, Residuals, Search, Solution, SolveError, solve};
 pub use measurement::{MeasuredArm, NoAnswer};
-pub use parameter::{Effect, Parameter, Place, Plant};
+pub use parameter::{Effect, Parameter, Plant, SpringPart};
 pub use plan::{Candidate, Plan, PlanOptions, plan};
 pub use reading::{
     Component, Form, Instrument, LoadCase, MeasuredResponse, MeasuredShape, Measurements, Reading, ReadingKind, Row,

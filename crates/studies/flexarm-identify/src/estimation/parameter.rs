@@ -22,7 +22,7 @@ pub struct Plant {
 
 /// Spring, or one of its coordinates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Place {
+pub struct SpringPart {
     /// Number of the spring.
     pub spring: usize,
     /// One of its coordinates; all of them if `None`.
@@ -34,7 +34,7 @@ pub struct Place {
 pub enum Effect {
     /// Factor on the stiffness of springs. For one coordinate of a spring, K becomes `S K S` with
     /// `√factor` there, so that K stays symmetric and positive definite.
-    Stiffness(Vec<Place>),
+    Stiffness(Vec<SpringPart>),
     /// Entry of a spring's matrix and its mirror image. The search coordinate is the change of the
     /// parameter's value, and the entry changes by `factor` times that. The matrix must stay
     /// positive definite: otherwise the arm has no solution, and the search rejects the step. Not

@@ -68,9 +68,9 @@ pub fn likely_slip(
         _ => false,
     });
     let found = (!springs.is_empty() && moved.rows() >= 3 * springs.len()).then(|| {
-        let rest = |order: &[usize]| Some(Moved::of(plant, &springs, &ordered(&moved, order))?.rest());
+        let rest = |order: &[usize]| Some(Displacements::of(plant, &springs, &ordered(&moved, order))?.rest());
         let whole = moved.readings.iter().all(|reading| reading.rows() == 3);
-        let axes = || Moved::of(plant, &springs, &moved).filter(|_| whole)?.turned();
+        let axes = || Displacements::of(plant, &springs, &moved).filter(|_| whole)?.turned();
         among(rest, axes, slides, 0)
     });
     let placed = some_of(measurements, |kind| matches!(kind, ReadingKind::Place { .. }));
@@ -149,12 +149,12 @@ fn best_order(
 }
 
 /// Displacements, and their derivatives with respect to each compliance, over their deviations.
-struct Moved {
+struct Displacements {
     A: DMatrix<f64>,
     b: DVector<f64>,
 }
 
-impl Moved {
+impl Displacements {
     fn of(plant: &Plant, springs: &[Parameter], measurements: &Measurements) -> Option<Self> {
         let arm = MeasuredArm { plant, parameters: springs, measurements };
         let mut J = DMatrix::zeros(0, 0);

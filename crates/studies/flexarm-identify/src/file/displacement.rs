@@ -55,7 +55,7 @@ enum Measured {
 }
 
 /// Displacement in the units of the file.
-struct Said {
+struct FileDisplacement {
     name: String,
     q: Vec<f64>,
     load: LoadEntry,
@@ -97,13 +97,13 @@ impl Reader<'_> {
                     let direction = self.table_direction(&at, file)?.or_else(|| e.direction.clone());
                     let point =
                         at.all(["px", "py", "pz"]).map_err(|name| self.empty(&at, file, &name))?.unwrap_or(e.point);
-                    let said = Said { name, q, load, point, value, direction, rotation, std, std_rotation };
+                    let said = FileDisplacement { name, q, load, point, value, direction, rotation, std, std_rotation };
                     self.moved(entry, said)?;
                 }
                 Ok(())
             }
             (None, Some(joints)) => {
-                let said = Said {
+                let said = FileDisplacement {
                     name: format!("displacement {}", number + 1),
                     q: self.joints(joints)?,
                     load: e.load,
@@ -123,9 +123,9 @@ impl Reader<'_> {
     }
 
     /// Adds one displacement.
-    fn moved(&mut self, entry: &Spanned<DisplacementEntry>, said: Said) -> Result<(), Error> {
+    fn moved(&mut self, entry: &Spanned<DisplacementEntry>, said: FileDisplacement) -> Result<(), Error> {
         let (e, span) = (entry.get_ref(), entry.span());
-        let Said { name, q, load, point, value, direction, rotation, std, std_rotation } = said;
+        let FileDisplacement { name, q, load, point, value, direction, rotation, std, std_rotation } = said;
         let mut rows = Vec::new();
         let sigma = self.std(std.as_ref(), self.units.length)?;
         let instrument =

@@ -164,7 +164,7 @@ pub(super) fn read(path: &Path, cell: &Cell<'_>) -> Result<MeasurementInput, Err
     reader.settle_frames(&file.instrument, &file.target)?;
     let recordings = file.encoders.iter().map(|entry| reader.encoders(entry)).collect::<Result<Vec<_>, Error>>()?;
     let deviations_known = reader.deviations(!recordings.is_empty())?;
-    let told =
+    let given =
         |list: &[Spanned<String>]| list.iter().map(|p| (p.get_ref().clone(), source.error(p.span(), ""))).collect();
     let positive = |value: &Spanned<f64>, least: f64| match *value.get_ref() {
         x if x.is_finite() && x > least => Ok(x),
@@ -179,8 +179,8 @@ pub(super) fn read(path: &Path, cell: &Cell<'_>) -> Result<MeasurementInput, Err
         targets: reader.targets,
         measurements: reader.measurements,
         recordings,
-        fit: told(&file.fit),
-        keep: told(&file.keep),
+        fit: given(&file.fit),
+        keep: given(&file.keep),
         uncertainty: file.uncertainty.as_ref().map(|value| positive(value, 1.0)).transpose()?,
         known: known.collect::<Result<_, RobotFileError>>()?,
         loss: loss(&file.loss, &source)?,

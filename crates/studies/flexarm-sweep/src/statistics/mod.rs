@@ -35,4 +35,4 @@ pub use distribution::Distribution;
 pub use effects::{EffectGroup, Grouping, MainEffect, Spread, main_effect, pareto_front, spread};
 pub use indices::{SobolIndex, sobol_indices};
 pub use sample::{Sample, SampleMethod, grid_levels};
-pub use search::{Judged, LeastSearch};
+pub use search::{LeastSearch, SearchResult};

@@ -19,14 +19,14 @@ use crate::statistics::random::stream;
 
 /// Evaluation of a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Judged {
+pub struct SearchResult {
     /// Value to minimise; NaN if the evaluation failed.
     pub value: f64,
     /// Sum of the relative constraint violations; 0 if all constraints hold.
     pub violation: f64,
 }
 
-impl Judged {
+impl SearchResult {
     /// Whether the constraints hold.
     pub fn keeps(&self) -> bool {
         self.value.is_finite() && self.violation <= 0.0
@@ -104,7 +104,7 @@ impl LeastSearch {
     }
 
     /// Updates the search with the evaluations of the requested points, in their order.
-    pub fn tell(&mut self, judged: &[Judged]) {
+    pub fn tell(&mut self, judged: &[SearchResult]) {
         let n = self.mean.len() as f64;
         let order = self.ranked(judged);
         // Weighted recombination of the better half of the points.
@@ -157,12 +157,13 @@ impl LeastSearch {
 
     /// Sorts the points from best to worst by value plus penalty; points whose evaluation failed
     /// are last.
-    fn ranked(&mut self, judged: &[Judged]) -> Vec<usize> {
-        let tried: Vec<&Judged> = judged.iter().filter(|j| j.value.is_finite() && j.violation.is_finite()).collect();
+    fn ranked(&mut self, judged: &[SearchResult]) -> Vec<usize> {
+        let tried: Vec<&SearchResult> =
+            judged.iter().filter(|j| j.value.is_finite() && j.violation.is_finite()).collect();
         let violating = tried.iter().filter(|j| !j.keeps()).count();
         let penalty = match self.penalty {
             None => {
-                let range = |f: fn(&Judged) -> f64| {
+                let range = |f: fn(&SearchResult) -> f64| {
                     let all = || tried.iter().map(|j| f(j));
                     all().fold(f64::NEG_INFINITY, f64::max) - all().fold(f64::INFINITY, f64::min)
                 };
@@ -209,13 +210,13 @@ mod tests {
     use super::*;
 
     /// Returns the best point, its evaluation, and the number of evaluations.
-    fn least(start: &[f64], most: usize, f: impl Fn(&[f64]) -> Judged) -> (Vec<f64>, Judged, usize) {
+    fn least(start: &[f64], most: usize, f: impl Fn(&[f64]) -> SearchResult) -> (Vec<f64>, SearchResult, usize) {
         let mut search = LeastSearch::new(start, 1);
-        let mut best: Option<(Vec<f64>, Judged)> = None;
+        let mut best: Option<(Vec<f64>, SearchResult)> = None;
         let mut tried = 0;
         while tried < most && !search.is_settled() {
             let points = search.ask();
-            let judged: Vec<Judged> = points.iter().map(|p| f(p)).collect();
+            let judged: Vec<SearchResult> = points.iter().map(|p| f(p)).collect();
             for (p, j) in points.into_iter().zip(&judged) {
                 if best.as_ref().is_none_or(|(_, known)| j.beats(known)) {
                     best = Some((p, *j));
@@ -228,8 +229,8 @@ mod tests {
         (point, judged, tried)
     }
 
-    fn free(value: f64) -> Judged {
-        Judged { value, violation: 0.0 }
+    fn free(value: f64) -> SearchResult {
+        SearchResult { value, violation: 0.0 }
     }
 
     /// Truth: the position of the minimum.
@@ -251,7 +252,7 @@ mod tests {
         let c = 6.0;
         let f = |x: &[f64]| {
             let (a, b) = (0.1 + 0.9 * x[0], 0.1 + 0.9 * x[1]);
-            Judged { value: a + 2.0 * b, violation: ((1.0 / a + 1.0 / b) / c - 1.0).max(0.0) }
+            SearchResult { value: a + 2.0 * b, violation: ((1.0 / a + 1.0 / b) / c - 1.0).max(0.0) }
         };
         let b = (1.0 + 0.5f64.sqrt()) / c;
         let expected = (2.0f64.sqrt() + 2.0) * b;
@@ -277,8 +278,8 @@ mod tests {
         let f = |x: &[f64]| free(if x[0] > 0.6 { f64::NAN } else { -x[0] });
         let (x, judged, _) = least(&[0.3], 600, f);
         assert!((x[0] - 0.6).abs() < 1e-4 && judged.keeps(), "{x:?}");
-        let failed = Judged { value: f64::NAN, violation: 0.0 };
-        let off = Judged { value: 1.0, violation: 0.5 };
+        let failed = SearchResult { value: f64::NAN, violation: 0.0 };
+        let off = SearchResult { value: 1.0, violation: 0.5 };
         assert!(off.beats(&failed) && free(5.0).beats(&off) && !failed.beats(&failed));
     }
 

@@ -14,7 +14,7 @@ use nalgebra::{DMatrix, DVector};
 use super::loops::Shifted;
 use crate::dense::{congruence_quickly, product_of_numbers, quickly, solve_quickly};
 use crate::error::StepError;
-use crate::iteration_matrix::{IterationMatrix, Way};
+use crate::iteration_matrix::{IterationMatrix, MatrixForm};
 use crate::system::SecondOrderSystem;
 
 /// The correction for one step size. Allocates at its creation and for its first matrix only.
@@ -80,7 +80,7 @@ impl DispersionCorrection {
         t: f64,
         kept: bool,
     ) -> Result<(), StepError> {
-        let Way::Dense(matrix) = &mut matrix.way else { return Ok(()) };
+        let MatrixForm::Dense(matrix) = &mut matrix.way else { return Ok(()) };
         let Self { c_h2, K, M_inverse_K, room: [factor, turned, product], shift, .. } = self;
         let (c_h2, n) = (*c_h2, shift.len());
         if K.nrows() != n {
@@ -117,9 +117,9 @@ impl DispersionCorrection {
         x_tilde: &mut DVector<f64>,
     ) {
         match &mut matrix.way {
-            Way::Tree(tree) => return tree.correct(acceleration, x_tilde),
-            Way::Modes(modes) => return modes.correct(acceleration, x_tilde),
-            Way::Dense(_) => {}
+            MatrixForm::Tree(tree) => return tree.correct(acceleration, x_tilde),
+            MatrixForm::Modes(modes) => return modes.correct(acceleration, x_tilde),
+            MatrixForm::Dense(_) => {}
         }
         self.shift_by(acceleration);
         let (a, shift) = (acceleration.as_slice(), self.shift.as_slice());
@@ -130,9 +130,9 @@ impl DispersionCorrection {
     /// change of x̃ beyond d itself: a factor and a vector, whose product is `c h² M^-1 K d`.
     pub(super) fn shift<'a>(&'a mut self, matrix: &'a IterationMatrix, d: &DVector<f64>) -> (f64, &'a DVector<f64>) {
         match &matrix.way {
-            Way::Tree(tree) => return (1.0, tree.shift()),
-            Way::Modes(modes) => return (1.0, modes.shift()),
-            Way::Dense(_) => {}
+            MatrixForm::Tree(tree) => return (1.0, tree.shift()),
+            MatrixForm::Modes(modes) => return (1.0, modes.shift()),
+            MatrixForm::Dense(_) => {}
         }
         self.shift_by(d);
         (self.c_h2, &self.shift)

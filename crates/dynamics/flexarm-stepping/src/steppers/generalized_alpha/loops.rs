@@ -7,7 +7,7 @@ use crate::dense::{Loops, largest_of_numbers};
 use crate::implicit::Sizes;
 
 /// Computes x⁺ and v⁺ from x, v, a, x̃ and x̃⁺.
-pub(super) struct Place<'a> {
+pub(super) struct UpdatePositions<'a> {
     pub(super) coefficients: Coefficients,
     pub(super) h: f64,
     /// x, v, a, x̃.
@@ -17,7 +17,7 @@ pub(super) struct Place<'a> {
     pub(super) to: [&'a mut [f64]; 2],
 }
 
-impl Loops for Place<'_> {
+impl Loops for UpdatePositions<'_> {
     #[inline(always)]
     fn run(self) {
         let Self { coefficients, h, now, x_tilde_new, to: [x_new, v_new] } = self;
@@ -115,14 +115,14 @@ impl Loops for Extrapolate<'_> {
 }
 
 /// Replaces a by a⁺.
-pub(super) struct Remember<'a> {
+pub(super) struct UpdateAccelerations<'a> {
     pub(super) coefficients: Coefficients,
     pub(super) a: &'a mut [f64],
     pub(super) x_tilde: &'a [f64],
     pub(super) x_tilde_new: &'a [f64],
 }
 
-impl Loops for Remember<'_> {
+impl Loops for UpdateAccelerations<'_> {
     #[inline(always)]
     fn run(self) {
         for ((a, x_tilde), new) in self.a.iter_mut().zip(self.x_tilde).zip(self.x_tilde_new) {

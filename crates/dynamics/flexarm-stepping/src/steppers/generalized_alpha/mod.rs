@@ -52,7 +52,7 @@ use crate::dense::quickly;
 use crate::error::StepError;
 use crate::implicit::{ImplicitStep, Newton, Search, Sizes};
 use crate::integrator::{Current, ReducedStepper};
-use crate::iteration_matrix::Way;
+use crate::iteration_matrix::MatrixForm;
 use crate::stepper::Stepper;
 use crate::steppers::{Method, StepRule, StepperEntry, StepperKind, StepperSetting};
 use crate::system::SecondOrderSystem;
@@ -341,7 +341,9 @@ impl GeneralizedAlpha {
             correction.correct(system, matrix, t, kept)?;
         }
         matrix.invert(t)?;
-        if let (Some(course), Some(correction), Way::Dense(dense)) = (&mut self.course, &self.correction, &matrix.way) {
+        if let (Some(course), Some(correction), MatrixForm::Dense(dense)) =
+            (&mut self.course, &self.correction, &matrix.way)
+        {
             if !self.newton.same_course {
                 course.forget();
             }
@@ -353,7 +355,7 @@ impl GeneralizedAlpha {
 
     /// Adds the extrapolated change of the matrices for the next step, if enabled.
     fn follow(&mut self) {
-        if let (Some(course), Some(correction), Way::Dense(dense)) =
+        if let (Some(course), Some(correction), MatrixForm::Dense(dense)) =
             (&mut self.course, &mut self.correction, &mut self.newton.matrix.way)
         {
             let (change, _) = course.step();
@@ -369,7 +371,7 @@ impl GeneralizedAlpha {
             Some(correction) => correction.corrected(&mut self.newton.matrix, &self.trial, &mut self.x_tilde_new),
             None => self.x_tilde_new.copy_from(&self.trial),
         }
-        quickly(loops::Place {
+        quickly(loops::UpdatePositions {
             coefficients: self.coefficients,
             h,
             now: [self.now.x.as_slice(), self.now.v.as_slice(), self.a.as_slice(), self.x_tilde.as_slice()],
@@ -400,7 +402,7 @@ impl GeneralizedAlpha {
 
     /// Accepts the trial values as the state at `t`.
     fn accept(&mut self, t: f64) {
-        quickly(loops::Remember {
+        quickly(loops::UpdateAccelerations {
             coefficients: self.coefficients,
             a: self.a.as_mut_slice(),
             x_tilde: self.x_tilde.as_slice(),

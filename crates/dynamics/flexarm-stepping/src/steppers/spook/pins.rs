@@ -31,7 +31,7 @@ struct Row {
 }
 
 /// Velocities and impulses of the tree.
-pub(super) type Found = (Vec<Vector6<f64>>, Vec<Vector6<f64>>);
+pub(super) type TreeVelocities = (Vec<Vector6<f64>>, Vec<Vector6<f64>>);
 
 /// All pins of an arm, with workspace.
 pub(super) struct Pins {
@@ -39,7 +39,7 @@ pub(super) struct Pins {
     /// Bodies of each row.
     bodies: Vec<[usize; 2]>,
     /// Response of the tree to a unit impulse of each row.
-    columns: Vec<Found>,
+    columns: Vec<TreeVelocities>,
     A: DMatrix<f64>,
     mu: DVector<f64>,
 }
@@ -113,7 +113,7 @@ impl Pins {
         (v, lambda): (&mut [Vector6<f64>], &mut [Vector6<f64>]),
         before: &[BodyState],
         [h, upsilon, sigma]: [f64; 3],
-        mut open: impl FnMut([(usize, Vector6<f64>); 2], &mut Found) -> Result<(), E>,
+        mut open: impl FnMut([(usize, Vector6<f64>); 2], &mut TreeVelocities) -> Result<(), E>,
     ) -> Result<Option<()>, E> {
         // Columns of Z = K^-1 Gᵀ.
         let count = self.rows.len();

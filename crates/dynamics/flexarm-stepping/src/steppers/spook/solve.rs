@@ -297,7 +297,7 @@ impl Sigma {
 
 /// A joint with everything outward of it eliminated: `S^-1` and `S^-1 ŝ`.
 #[derive(Clone, Copy, Debug)]
-struct Held {
+struct EliminatedJoint {
     S_inverse: Symmetric,
     y: Vector6<f64>,
     /// For a joint with a free line: `a / σᵀa`, and the part of ε that is independent of the
@@ -305,7 +305,7 @@ struct Held {
     free: Option<(Vector6<f64>, f64)>,
 }
 
-impl Held {
+impl EliminatedJoint {
     /// Frees the line σ by (5).
     fn freed(self, line: &Vector6<f64>) -> Option<Self> {
         let Self { S_inverse, y, .. } = self;
@@ -329,13 +329,13 @@ pub(super) struct TreeSolver {
     pub(super) b: Vec<Vector6<f64>>,
     /// Right-hand sides s of the joints.
     pub(super) s: Vec<Vector6<f64>>,
-    joints: Vec<Held>,
+    joints: Vec<EliminatedJoint>,
 }
 
 impl TreeSolver {
     pub(super) fn new(parent: Vec<usize>) -> Self {
         let (n, zero) = (parent.len(), Vector6::zeros());
-        let joints = vec![Held { S_inverse: Symmetric::zeros(), y: zero, free: None }; n];
+        let joints = vec![EliminatedJoint { S_inverse: Symmetric::zeros(), y: zero, free: None }; n];
         Self { parent, M: vec![Symmetric::zeros(); n], b: vec![zero; n], s: vec![zero; n], joints }
     }
 
@@ -357,11 +357,11 @@ impl TreeSolver {
         for i in (1..n).rev() {
             let (M, b) = rows[i].G.in_rows(&self.M[i], &self.b[i]);
             let (S_inverse, y) = sigma[i].hold(&M, &b, &self.s[i]).ok_or(i)?;
-            let mut held = Held { S_inverse, y, free: None };
+            let mut held = EliminatedJoint { S_inverse, y, free: None };
             if let Sigma::Free(_) = sigma[i] {
                 held = held.freed(&rows[i].S).ok_or(i)?;
             }
-            let Held { S_inverse, y, .. } = held;
+            let EliminatedJoint { S_inverse, y, .. } = held;
             let p = self.parent[i];
             if p > 0 {
                 let (M, b) = rows[i].G.on_parent(&S_inverse, &y);
@@ -373,7 +373,7 @@ impl TreeSolver {
         // Outward pass: impulses and velocities.
         v[0] = Vector6::zeros();
         for i in 1..n {
-            let Held { S_inverse, y, free } = &self.joints[i];
+            let EliminatedJoint { S_inverse, y, free } = &self.joints[i];
             let moved = rows[i].G.of_parent(&v[self.parent[i]]);
             lambda[i] = y - S_inverse.times(&moved);
             let mut u = self.s[i] - sigma[i].times(&lambda[i]) - moved;

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, Matrix3};
 
 use super::{Sid, SidMatrix};
-use crate::exchange::error::{ExchangeError, ExchangeErrorKind, Place};
+use crate::exchange::error::{ErrorPosition, ExchangeError, ExchangeErrorKind};
 
 /// Order of the columns of `Gr` and `Ge`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -126,7 +126,13 @@ impl Sid {
                 let found = format!("numbers that fit neither order: {residual:.1e} of J1");
                 let expected = format!("an identity with J1 that holds to {FITS:.0e}");
                 let help = "is J given without its first order, or with products of the other sign?";
-                return Err(Place::file(origin).fail(ExchangeErrorKind::Ambiguous, name, found, expected, help));
+                return Err(ErrorPosition::file(origin).fail(
+                    ExchangeErrorKind::Ambiguous,
+                    name,
+                    found,
+                    expected,
+                    help,
+                ));
             }
         }
         Ok(SidConventions {

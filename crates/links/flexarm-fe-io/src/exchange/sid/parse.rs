@@ -4,7 +4,7 @@ use std::iter::Peekable;
 use std::path::Path;
 
 use super::{BODY_BLOCKS, NODE_BLOCKS, Sid, SidMatrix, SidNode};
-use crate::exchange::error::{ExchangeError, ExchangeErrorKind, Place};
+use crate::exchange::error::{ErrorPosition, ExchangeError, ExchangeErrorKind};
 use crate::exchange::text::{Text, shown, unpack, words};
 
 /// Maximum number of shape coordinates; larger sizes are errors.
@@ -26,7 +26,7 @@ pub fn read_sid(path: impl AsRef<Path>) -> Result<Sid, ExchangeError> {
 }
 
 /// One line: a keyword, or `key = value`.
-type Line<'a> = (Place<'a>, &'a str, Option<&'a str>);
+type Line<'a> = (ErrorPosition<'a>, &'a str, Option<&'a str>);
 
 /// Cursor over the remaining lines.
 struct Cursor<'a, I: Iterator<Item = Line<'a>>> {
@@ -75,7 +75,7 @@ impl<'a, I: Iterator<Item = Line<'a>>> Cursor<'a, I> {
     fn next(&mut self, expected: &str) -> Result<Line<'a>, ExchangeError> {
         self.lines.next().ok_or_else(|| {
             let help = "is the file cut off?";
-            Place::file(self.origin).fail(ExchangeErrorKind::Syntax, "file", "its end", expected, help)
+            ErrorPosition::file(self.origin).fail(ExchangeErrorKind::Syntax, "file", "its end", expected, help)
         })
     }
 
@@ -109,7 +109,7 @@ impl<'a, I: Iterator<Item = Line<'a>>> Cursor<'a, I> {
         if sid.modes.len() != promised {
             let found = format!("{} lines ielastq", sid.modes.len());
             let kind = ExchangeErrorKind::WrongSize;
-            return Err(Place::file(self.origin).fail(
+            return Err(ErrorPosition::file(self.origin).fail(
                 kind,
                 "refmod",
                 found,
@@ -135,7 +135,7 @@ impl<'a, I: Iterator<Item = Line<'a>>> Cursor<'a, I> {
         Ok(())
     }
 
-    fn node(&mut self, place: Place<'a>, id: i64, nq: usize) -> Result<SidNode, ExchangeError> {
+    fn node(&mut self, place: ErrorPosition<'a>, id: i64, nq: usize) -> Result<SidNode, ExchangeError> {
         let mut rframe = String::new();
         let mut found: [Option<SidMatrix>; 5] = Default::default();
         while !self.take("end node") {
@@ -190,11 +190,17 @@ impl<'a, I: Iterator<Item = Line<'a>>> Cursor<'a, I> {
         }
         let found = format!("no {}", missing.join(", "));
         let kind = ExchangeErrorKind::Missing;
-        Err(Place::file(self.origin).fail(kind, "modal", found, "all matrices of the body", "is the file cut off?"))
+        Err(ErrorPosition::file(self.origin).fail(
+            kind,
+            "modal",
+            found,
+            "all matrices of the body",
+            "is the file cut off?",
+        ))
     }
 
     /// Reads a matrix up to `end <name>`.
-    fn matrix(&mut self, head: Place<'a>, name: &str, nq: usize) -> Result<SidMatrix, ExchangeError> {
+    fn matrix(&mut self, head: ErrorPosition<'a>, name: &str, nq: usize) -> Result<SidMatrix, ExchangeError> {
         let mut matrix = SidMatrix::default();
         let end = format!("end {name}");
         let mut last = head;
@@ -261,7 +267,13 @@ impl<'a, I: Iterator<Item = Line<'a>>> Cursor<'a, I> {
 }
 
 /// Reads an entry `m0( i, j) = v` or `m1( i, k, j) = v`.
-fn entry(matrix: &mut SidMatrix, place: &Place<'_>, name: &str, key: &str, value: &str) -> Result<(), ExchangeError> {
+fn entry(
+    matrix: &mut SidMatrix,
+    place: &ErrorPosition<'_>,
+    name: &str,
+    key: &str,
+    value: &str,
+) -> Result<(), ExchangeError> {
     let expected = format!("m0( i, j), m1( i, k, j) or end {name}");
     let Some((kind, indices)) = key.strip_suffix(')').and_then(|key| key.split_once('(')) else {
         return Err(unexpected(place, key, &expected));
@@ -296,7 +308,7 @@ fn entry(matrix: &mut SidMatrix, place: &Place<'_>, name: &str, key: &str, value
 }
 
 /// Parses a count with an upper limit.
-fn count(place: &Place<'_>, what: &str, text: &str, most: usize) -> Result<usize, ExchangeError> {
+fn count(place: &ErrorPosition<'_>, what: &str, text: &str, most: usize) -> Result<usize, ExchangeError> {
     match usize::try_from(place.integer(what, text)?) {
         Ok(count) if count <= most => Ok(count),
         _ => Err(place.fail(ExchangeErrorKind::Syntax, what, shown(text), format!("0 to {most}"), "")),
@@ -308,6 +320,6 @@ fn same(key: &str, word: &str) -> bool {
     key.split_whitespace().map(str::to_ascii_lowercase).eq(word.split_whitespace().map(str::to_ascii_lowercase))
 }
 
-fn unexpected(place: &Place<'_>, key: &str, expected: &str) -> ExchangeError {
+fn unexpected(place: &ErrorPosition<'_>, key: &str, expected: &str) -> ExchangeError {
     place.fail(ExchangeErrorKind::Syntax, "line", shown(key), expected, "")
 }

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use super::reader::Reader;
 use super::shapes::{Shape, advice, shape};
 use crate::mesh::draft::Draft;
-use crate::mesh::error::{MeshError, MeshErrorKind as Kind, Place};
+use crate::mesh::error::{FilePosition, MeshError, MeshErrorKind as Kind};
 use crate::mesh::ids::IdIndex;
 use crate::mesh::read::ReadOptions;
 use crate::mesh::source::{Source, shown};
@@ -215,7 +215,13 @@ impl Collector {
             let Some((_, set)) = curves().find(|(key, _)| self.name(**key) == *group) else {
                 let element = format!("beam group {group:?}");
                 let expected = format!("a physical curve: {}", listed(curves().map(|(key, _)| self.name(*key))));
-                return Err(src.error_in(Kind::Missing, Place::File, element, "no such physical curve", expected));
+                return Err(src.error_in(
+                    Kind::Missing,
+                    FilePosition::File,
+                    element,
+                    "no such physical curve",
+                    expected,
+                ));
             };
             if let Some(at) = set.bent_line {
                 let element = format!("beam group {group:?}");

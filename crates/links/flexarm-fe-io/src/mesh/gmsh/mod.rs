@@ -9,7 +9,7 @@ mod msh4;
 mod reader;
 mod shapes;
 
-use super::error::{MeshError, MeshErrorKind as Kind, Place};
+use super::error::{FilePosition, MeshError, MeshErrorKind as Kind};
 use super::read::{MeshFile, ReadOptions};
 use super::source::{Source, shown};
 use collector::Collector;
@@ -52,7 +52,7 @@ pub(super) fn parse(src: &Source, options: &ReadOptions) -> Result<MeshFile, Mes
     }
 
     let Some(header) = header else {
-        return Err(src.error_in(Kind::Format, Place::File, "format", "no $MeshFormat", "a Gmsh mesh"));
+        return Err(src.error_in(Kind::Format, FilePosition::File, "format", "no $MeshFormat", "a Gmsh mesh"));
     };
     let src = reader.src;
     let (mesh, warnings) = collector.finish(&src, options)?;

@@ -18,7 +18,7 @@ use flexarm_fem::spelling::listed;
 const NONE: u32 = u32::MAX;
 
 /// Node set with its name.
-type Named = (String, Vec<u32>);
+type NamedNodeSet = (String, Vec<u32>);
 
 impl Deck<'_> {
     /// Builds the mesh and checks it.
@@ -165,7 +165,7 @@ impl Deck<'_> {
         elements: &IdIndex,
         elsets: &[Vec<u32>],
         budget: &mut Budget,
-    ) -> Result<Vec<Named>, MeshError> {
+    ) -> Result<Vec<NamedNodeSet>, MeshError> {
         let src = self.lines.src;
         let mut own = Vec::with_capacity(self.nsets.list.len());
         for set in &self.nsets.list {

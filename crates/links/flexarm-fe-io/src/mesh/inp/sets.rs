@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use super::lines::{Line, fields, squeezed, unquoted};
-use crate::mesh::error::{MeshError, MeshErrorKind as Kind, Place};
+use crate::mesh::error::{FilePosition, MeshError, MeshErrorKind as Kind};
 use crate::mesh::ids::IdIndex;
 use crate::mesh::source::{Source, parse_u64, shown};
 use flexarm_fem::spelling::listed;
@@ -205,5 +205,5 @@ fn tidy(members: &mut Vec<u32>, before: usize) {
 
 /// Creates an error for an unknown name, without a position in the file.
 pub(super) fn unknown(src: &Source, element: String, found: String, known: String) -> MeshError {
-    src.error_in(Kind::Missing, Place::File, element, found, known)
+    src.error_in(Kind::Missing, FilePosition::File, element, found, known)
 }

@@ -16,7 +16,7 @@ const OWN_GROUPS: [&str; 3] = ["flexarm.recording", "flexarm.units", "flexarm.re
 
 /// Contents of a file other than its samples.
 #[derive(Default)]
-pub(super) struct Found {
+pub(super) struct FileContents {
     library: String,
     topics: BTreeMap<u16, String>,
     pub(super) metadata: Vec<(String, BTreeMap<String, String>)>,
@@ -33,7 +33,7 @@ pub(super) struct Found {
     sequence: Option<u32>,
 }
 
-impl Found {
+impl FileContents {
     pub(super) fn take(&mut self, record: Record<'_>) {
         match record {
             Record::Header(header) => self.library = header.library,

@@ -17,7 +17,7 @@ pub(super) fn pose([x, y, z, qx, qy, qz, qw]: [f64; 7]) -> Pose {
 /// Trees of frames: converts transforms between neighbours to poses in the world.
 pub(super) struct Frames {
     /// Places by frame name.
-    places: HashMap<String, Place>,
+    places: HashMap<String, FrameOwner>,
     parents: Vec<Option<usize>>,
     /// Last transform of each link of the flexible robot and of the rigid twin, and of each
     /// station.
@@ -28,7 +28,7 @@ pub(super) struct Frames {
 }
 
 #[derive(Clone, Copy)]
-enum Place {
+enum FrameOwner {
     Link { twin: usize, link: usize },
     Station(usize),
 }
@@ -37,16 +37,16 @@ impl Frames {
     pub(super) fn of(header: &RunHeader) -> Self {
         let mut places = HashMap::new();
         for (link, info) in header.links.iter().enumerate() {
-            places.insert(info.name.clone(), Place::Link { twin: 0, link });
+            places.insert(info.name.clone(), FrameOwner::Link { twin: 0, link });
             if header.has_rigid {
-                places.insert(format!("rigid/{}", info.name), Place::Link { twin: 1, link });
+                places.insert(format!("rigid/{}", info.name), FrameOwner::Link { twin: 1, link });
             }
         }
         let mut X_LS = Vec::new();
         for bend in &header.bends {
             let link = &header.links[bend.link].name;
             for k in 0..bend.X_LS.len() {
-                places.insert(format!("{link}/station_{k}"), Place::Station(X_LS.len()));
+                places.insert(format!("{link}/station_{k}"), FrameOwner::Station(X_LS.len()));
                 X_LS.push((bend.link, Pose::identity()));
             }
         }
@@ -65,8 +65,8 @@ impl Frames {
         for (_, child, X) in transforms {
             let X = pose(X);
             match self.places.get(child) {
-                Some(&Place::Link { twin, link }) => self.X_PL[twin][link] = X,
-                Some(&Place::Station(k)) => {
+                Some(&FrameOwner::Link { twin, link }) => self.X_PL[twin][link] = X,
+                Some(&FrameOwner::Station(k)) => {
                     self.X_LS[k].1 = X;
                     self.stations_seen = true;
                 }

@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 use mcap::records::Record;
 
 use self::assembly::{Assembly, Topic};
-use self::found::Found;
+use self::found::FileContents;
 use self::walk::{Flow, walk};
 use super::{broken_end, not_a_recording};
 use crate::{LogError, RunHeader, RunResult, RunSource, Sample, run_json};
@@ -35,7 +35,7 @@ pub(crate) struct McapRun {
 
 impl McapRun {
     pub(crate) fn open(path: &Path) -> Result<Self, LogError> {
-        let mut found = Found::default();
+        let mut found = FileContents::default();
         let broken = walk(path, &mut |record| {
             found.take(record);
             Ok(if found.samples > 1 { Flow::Stop } else { Flow::On })
@@ -92,7 +92,7 @@ impl RunSource for McapRun {
         self.warnings.clear();
         let path = &self.path;
         let mut assembly = Assembly::new(&self.header, self.epoch_ns);
-        let mut found = Found::default();
+        let mut found = FileContents::default();
         let (mut count, mut last_s) = (0_u64, 0.0);
         let topics = &self.topics;
         let mut give = |assembly: &Assembly| -> Result<(), LogError> {

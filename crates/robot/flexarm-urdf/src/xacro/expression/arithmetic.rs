@@ -4,10 +4,10 @@ use std::cmp::Ordering;
 use std::rc::Rc;
 
 use super::value::{Value, lookup};
-use super::{Trouble, methods};
+use super::{ExpressionError, methods};
 
-fn not_defined(sign: &str, left: &Value, right: &Value) -> Trouble {
-    let trouble = Trouble::new(format!("{sign} is not defined between {} and {}", left.kind(), right.kind()));
+fn not_defined(sign: &str, left: &Value, right: &Value) -> ExpressionError {
+    let trouble = ExpressionError::new(format!("{sign} is not defined between {} and {}", left.kind(), right.kind()));
     match (left, right) {
         (Value::Str(text), _) | (_, Value::Str(text)) => {
             trouble.help(format!("{:?} is a text: convert it with float() or str()", super::shortened(text)))
@@ -16,18 +16,18 @@ fn not_defined(sign: &str, left: &Value, right: &Value) -> Trouble {
     }
 }
 
-fn too_large() -> Trouble {
-    Trouble::new("a whole number above 1e38 is not computed").help("use decimals, such as 10.0 instead of 10")
+fn too_large() -> ExpressionError {
+    ExpressionError::new("a whole number above 1e38 is not computed").help("use decimals, such as 10.0 instead of 10")
 }
 
-pub(super) fn unary(sign: &str, operand: &Value) -> Result<Value, Trouble> {
+pub(super) fn unary(sign: &str, operand: &Value) -> Result<Value, ExpressionError> {
     Ok(match (sign, operand) {
         ("not", operand) => Value::Bool(!operand.is_true()),
         ("-", Value::Float(x)) => Value::Float(-x),
         ("+", Value::Float(x)) => Value::Float(*x),
         (sign, operand) => {
             let i = operand.as_int().ok_or_else(|| {
-                Trouble::new(format!("{sign} is not defined for {}", operand.kind())).help("is it a text?")
+                ExpressionError::new(format!("{sign} is not defined for {}", operand.kind())).help("is it a text?")
             })?;
             match sign {
                 "-" => Value::Int(i.checked_neg().ok_or_else(too_large)?),
@@ -43,8 +43,8 @@ pub(super) fn binary(
     sign: &str,
     left: &Value,
     right: &Value,
-    charge: &mut dyn FnMut(usize) -> Result<(), Trouble>,
-) -> Result<Value, Trouble> {
+    charge: &mut dyn FnMut(usize) -> Result<(), ExpressionError>,
+) -> Result<Value, ExpressionError> {
     match (sign, left, right) {
         ("+", Value::Str(a), Value::Str(b)) => {
             charge(a.len() + b.len())?;
@@ -80,7 +80,11 @@ pub(super) fn binary(
     }
 }
 
-fn repeat(value: &Value, times: i128, charge: &mut dyn FnMut(usize) -> Result<(), Trouble>) -> Result<Value, Trouble> {
+fn repeat(
+    value: &Value,
+    times: i128,
+    charge: &mut dyn FnMut(usize) -> Result<(), ExpressionError>,
+) -> Result<Value, ExpressionError> {
     let times = usize::try_from(times.max(0)).unwrap_or(usize::MAX);
     charge(value.size().saturating_mul(times))?;
     let copies = |items: &[Value]| std::iter::repeat_n(items, times).flatten().cloned().collect::<Vec<_>>();
@@ -92,9 +96,9 @@ fn repeat(value: &Value, times: i128, charge: &mut dyn FnMut(usize) -> Result<()
     })
 }
 
-fn whole(sign: &str, a: i128, b: i128) -> Result<Value, Trouble> {
-    let by_zero = || Trouble::new("division by zero");
-    let shift = |b: i128| u32::try_from(b).map_err(|_| Trouble::new(format!("shift by {b}")));
+fn whole(sign: &str, a: i128, b: i128) -> Result<Value, ExpressionError> {
+    let by_zero = || ExpressionError::new("division by zero");
+    let shift = |b: i128| u32::try_from(b).map_err(|_| ExpressionError::new(format!("shift by {b}")));
     let value = match sign {
         "+" => a.checked_add(b),
         "-" => a.checked_sub(b),
@@ -121,17 +125,17 @@ fn whole(sign: &str, a: i128, b: i128) -> Result<Value, Trouble> {
         "&" => Some(a & b),
         "|" => Some(a | b),
         "^" => Some(a ^ b),
-        _ => return Err(Trouble::new(format!("{sign} is not known"))),
+        _ => return Err(ExpressionError::new(format!("{sign} is not known"))),
     };
     value.map(Value::Int).ok_or_else(too_large)
 }
 
 /// Float arithmetic; `None` if floats do not have the operator.
-fn decimal(sign: &str, a: f64, b: f64) -> Option<Result<Value, Trouble>> {
+fn decimal(sign: &str, a: f64, b: f64) -> Option<Result<Value, ExpressionError>> {
     let by_zero = matches!(sign, "/" | "//" | "%") && b == 0.0;
     let pole = sign == "**" && a == 0.0 && b < 0.0;
     if by_zero || pole {
-        return Some(Err(Trouble::new("division by zero")));
+        return Some(Err(ExpressionError::new("division by zero")));
     }
     let value = match sign {
         "+" => a + b,
@@ -144,10 +148,10 @@ fn decimal(sign: &str, a: f64, b: f64) -> Option<Result<Value, Trouble>> {
         _ => return None,
     };
     if sign == "**" && value.is_nan() && !a.is_nan() && !b.is_nan() {
-        return Some(Err(Trouble::new(format!("{a} ** {b} is not a real number"))));
+        return Some(Err(ExpressionError::new(format!("{a} ** {b} is not a real number"))));
     }
     if sign == "**" && value.is_infinite() && a.is_finite() && b.is_finite() {
-        return Some(Err(Trouble::new(format!("{a} ** {b} is too large"))));
+        return Some(Err(ExpressionError::new(format!("{a} ** {b} is too large"))));
     }
     Some(Ok(Value::Float(value)))
 }
@@ -171,7 +175,7 @@ pub(super) fn floor_division(a: f64, b: f64) -> (f64, f64) {
     (floored, remainder)
 }
 
-pub(super) fn compare(sign: &str, left: &Value, right: &Value) -> Result<bool, Trouble> {
+pub(super) fn compare(sign: &str, left: &Value, right: &Value) -> Result<bool, ExpressionError> {
     let order = |left: &Value, right: &Value| {
         let numbers = left.as_float().is_some() && right.as_float().is_some();
         match left.order(right) {
@@ -191,7 +195,7 @@ pub(super) fn compare(sign: &str, left: &Value, right: &Value) -> Result<bool, T
     })
 }
 
-fn contains(container: &Value, item: &Value) -> Result<bool, Trouble> {
+fn contains(container: &Value, item: &Value) -> Result<bool, ExpressionError> {
     match (container, item) {
         (Value::Str(text), Value::Str(part)) => Ok(text.contains(&**part)),
         (Value::List(items) | Value::Tuple(items), item) => Ok(items.iter().any(|i| i.equals(item))),

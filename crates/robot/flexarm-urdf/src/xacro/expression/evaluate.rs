@@ -8,11 +8,11 @@ use super::functions::named_value;
 use super::methods::{index, slice};
 use super::parse::{Clause, Expr};
 use super::value::{Value, lookup};
-use super::{Interpreter, Scope, Trouble};
+use super::{ExpressionError, Interpreter, Scope};
 use flexarm_settings::closest;
 
 impl Interpreter<'_> {
-    pub(super) fn evaluate(&mut self, tree: &Expr, scope: &Scope) -> Result<Value, Trouble> {
+    pub(super) fn evaluate(&mut self, tree: &Expr, scope: &Scope) -> Result<Value, ExpressionError> {
         self.charge(16)?;
         self.deeper()?;
         let value = self.evaluate_here(tree, scope)?;
@@ -20,7 +20,7 @@ impl Interpreter<'_> {
         Ok(value)
     }
 
-    fn evaluate_here(&mut self, tree: &Expr, scope: &Scope) -> Result<Value, Trouble> {
+    fn evaluate_here(&mut self, tree: &Expr, scope: &Scope) -> Result<Value, ExpressionError> {
         Ok(match tree {
             Expr::Const(constant) => constant.value(),
             Expr::Name(name) => return self.name(name, scope),
@@ -79,7 +79,9 @@ impl Interpreter<'_> {
                     let value = part.as_ref().map(|part| self.evaluate(part, scope)).transpose()?;
                     *bound = match value {
                         None | Some(Value::None) => None,
-                        Some(value) => Some(value.as_int().ok_or_else(|| Trouble::new("a slice needs whole numbers"))?),
+                        Some(value) => {
+                            Some(value.as_int().ok_or_else(|| ExpressionError::new("a slice needs whole numbers"))?)
+                        }
                     };
                 }
                 self.charge(owner.size())?;
@@ -95,7 +97,7 @@ impl Interpreter<'_> {
 
     /// Charges a value with all its elements before it is printed or compared: lists may share
     /// their elements, and be much larger than their memory.
-    pub(crate) fn charge_whole(&mut self, value: &Value) -> Result<(), Trouble> {
+    pub(crate) fn charge_whole(&mut self, value: &Value) -> Result<(), ExpressionError> {
         self.charge(value.size())?;
         match value {
             Value::List(items) | Value::Tuple(items) => items.iter().try_for_each(|item| self.charge_whole(item)),
@@ -108,17 +110,17 @@ impl Interpreter<'_> {
     }
 
     /// Converts a value to text.
-    pub(crate) fn shown(&mut self, value: &Value) -> Result<String, Trouble> {
+    pub(crate) fn shown(&mut self, value: &Value) -> Result<String, ExpressionError> {
         self.charge_whole(value)?;
         Ok(value.shown())
     }
 
-    fn all(&mut self, trees: &[Expr], scope: &Scope) -> Result<Vec<Value>, Trouble> {
+    fn all(&mut self, trees: &[Expr], scope: &Scope) -> Result<Vec<Value>, ExpressionError> {
         trees.iter().map(|tree| self.evaluate(tree, scope)).collect()
     }
 
     /// First value with the truth value `wanted`, otherwise the last one: `and`, `or`.
-    fn until(&mut self, terms: &[Expr], scope: &Scope, wanted: bool) -> Result<Value, Trouble> {
+    fn until(&mut self, terms: &[Expr], scope: &Scope, wanted: bool) -> Result<Value, ExpressionError> {
         let mut value = Value::Bool(!wanted);
         for term in terms {
             value = self.evaluate(term, scope)?;
@@ -130,13 +132,13 @@ impl Interpreter<'_> {
     }
 
     /// Looks up a property, otherwise a built-in name.
-    fn name(&mut self, name: &str, scope: &Scope) -> Result<Value, Trouble> {
+    fn name(&mut self, name: &str, scope: &Scope) -> Result<Value, ExpressionError> {
         if let Some(value) = self.property(scope, name)? {
             return Ok(value);
         }
         named_value(name).ok_or_else(|| {
             let known = scope.names();
-            let trouble = Trouble::new(format!("the name {name:?} is not defined"));
+            let trouble = ExpressionError::new(format!("the name {name:?} is not defined"));
             match closest(name, known.iter().map(String::as_str)) {
                 Some(meant) => trouble.help(format!("did you mean {meant:?}?")),
                 None => trouble.help("define it with <xacro:property> before it is used, or put quotes around a text"),
@@ -144,7 +146,7 @@ impl Interpreter<'_> {
         })
     }
 
-    fn attribute(&mut self, owner: &Value, name: &str) -> Result<Value, Trouble> {
+    fn attribute(&mut self, owner: &Value, name: &str) -> Result<Value, ExpressionError> {
         match owner {
             Value::Dict(items) => {
                 self.charge(owner.size())?;
@@ -152,10 +154,10 @@ impl Interpreter<'_> {
             }
             Value::Namespace(table) => self
                 .property(table, name)?
-                .ok_or_else(|| Trouble::new(format!("the namespace has no property {name:?}"))),
+                .ok_or_else(|| ExpressionError::new(format!("the namespace has no property {name:?}"))),
             Value::Module(module) => named_value(name)
-                .ok_or_else(|| Trouble::new(format!("there is no {module}.{name}")).help("is it misspelt?")),
-            other => Err(Trouble::new(format!("a {} has no attribute {name:?}", other.kind()))),
+                .ok_or_else(|| ExpressionError::new(format!("there is no {module}.{name}")).help("is it misspelt?")),
+            other => Err(ExpressionError::new(format!("a {} has no attribute {name:?}", other.kind()))),
         }
     }
 
@@ -165,7 +167,7 @@ impl Interpreter<'_> {
         arguments: &[Expr],
         named: &[(String, Expr)],
         scope: &Scope,
-    ) -> Result<Value, Trouble> {
+    ) -> Result<Value, ExpressionError> {
         // A method call, unless the owner is a module or a namespace.
         let method = match function {
             Expr::Attribute(owner, name) => match self.evaluate(owner, scope)? {
@@ -185,7 +187,7 @@ impl Interpreter<'_> {
         }
         let value = match (callee, method) {
             (Some(Value::Function(name)), _) => self.call(name, &arguments, by_name, scope)?,
-            (Some(other), _) => return Err(Trouble::new(format!("a {} cannot be called", other.kind()))),
+            (Some(other), _) => return Err(ExpressionError::new(format!("a {} cannot be called", other.kind()))),
             (None, Some((owner, name))) => {
                 self.charge_whole(&owner)?;
                 super::methods::call(&owner, name, &arguments, &by_name)?
@@ -202,7 +204,7 @@ impl Interpreter<'_> {
         clauses: &[Clause],
         scope: &Scope,
         found: &mut Vec<Value>,
-    ) -> Result<(), Trouble> {
+    ) -> Result<(), ExpressionError> {
         let Some((clause, inner)) = clauses.split_first() else {
             let value = self.evaluate(item, scope)?;
             self.charge(32 + value.size())?;
@@ -218,7 +220,7 @@ impl Interpreter<'_> {
                     let values = elements(&value)?;
                     if values.len() != names.len() {
                         let message = format!("{} names for {} values", names.len(), values.len());
-                        return Err(Trouble::new(message));
+                        return Err(ExpressionError::new(message));
                     }
                     names.iter().zip(values).for_each(|(name, value)| local.define(name, value));
                 }
@@ -236,9 +238,9 @@ impl Interpreter<'_> {
     }
 }
 
-fn missing_key(items: &[(Value, Value)], name: &str) -> Trouble {
+fn missing_key(items: &[(Value, Value)], name: &str) -> ExpressionError {
     let keys: Vec<String> = items.iter().map(|(k, _)| k.shown()).collect();
-    let trouble = Trouble::new(format!("the dictionary has no key {name:?}"));
+    let trouble = ExpressionError::new(format!("the dictionary has no key {name:?}"));
     match closest(name, keys.iter().map(String::as_str)) {
         Some(meant) => trouble.help(format!("did you mean {meant:?}?")),
         None => trouble.help(format!("its keys are {}", super::shortened(&keys.join(", ")))),
@@ -246,12 +248,12 @@ fn missing_key(items: &[(Value, Value)], name: &str) -> Trouble {
 }
 
 /// Elements that a loop over the value visits.
-pub(super) fn elements(value: &Value) -> Result<Vec<Value>, Trouble> {
+pub(super) fn elements(value: &Value) -> Result<Vec<Value>, ExpressionError> {
     Ok(match value {
         Value::List(items) | Value::Tuple(items) => items.to_vec(),
         Value::Dict(items) => items.iter().map(|(k, _)| k.clone()).collect(),
         Value::Str(text) => text.chars().map(|c| Value::text(c.to_string())).collect(),
-        other => return Err(Trouble::new(format!("a {} has no elements", other.kind()))),
+        other => return Err(ExpressionError::new(format!("a {} has no elements", other.kind()))),
     })
 }
 

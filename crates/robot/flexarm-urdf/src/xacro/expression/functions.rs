@@ -6,7 +6,7 @@ use std::rc::Rc;
 use super::arithmetic::{binary, floor_division};
 use super::evaluate::{elements, unique};
 use super::value::{Value, float_of, float_repr, int_of};
-use super::{Interpreter, Scope, Trouble};
+use super::{ExpressionError, Interpreter, Scope};
 
 /// Functions by their names without module.
 const FUNCTIONS: [&str; 68] = [
@@ -109,24 +109,26 @@ impl Interpreter<'_> {
         arguments: &[Value],
         named: Vec<(String, Value)>,
         _scope: &Scope,
-    ) -> Result<Value, Trouble> {
+    ) -> Result<Value, ExpressionError> {
         let text = |i: usize| arguments.get(i).map(Value::shown).unwrap_or_default();
-        let said = || arguments.iter().map(Value::shown).collect::<Vec<_>>().join(" ");
+        let message = || arguments.iter().map(Value::shown).collect::<Vec<_>>().join(" ");
         match (name, arguments) {
             ("load_yaml", [_]) => return self.load_yaml(&text(0)),
             ("abs_filename", [_]) => return Ok(Value::text(self.beside(&text(0)).display().to_string())),
             ("arg", [_]) => return self.argument(&text(0)).map(Value::text),
             ("dotify", [dict]) => return Ok(dict.clone()),
-            ("message", _) => self.remark(crate::Severity::Note, "xacro-message", said(), ""),
-            ("warning", _) => self.remark(crate::Severity::Warning, "xacro-warning", said(), ""),
-            ("error", _) => self.remark(crate::Severity::Warning, "xacro-error", said(), ""),
+            ("message", _) => self.remark(crate::Severity::Note, "xacro-message", message(), ""),
+            ("warning", _) => self.remark(crate::Severity::Warning, "xacro-warning", message(), ""),
+            ("error", _) => self.remark(crate::Severity::Warning, "xacro-error", message(), ""),
             ("print_location", _) => {}
-            ("fatal", _) => return Err(Trouble::new(said()).help("the file itself stops here: see what it asks for")),
+            ("fatal", _) => {
+                return Err(ExpressionError::new(message()).help("the file itself stops here: see what it asks for"));
+            }
             ("range", _) => return self.range(arguments),
             ("dict", _) => return dict(arguments, named),
             _ => {
                 if let Some((key, _)) = named.first().filter(|_| name != "sorted") {
-                    return Err(Trouble::new(format!("{name}() takes no argument {key:?} here")));
+                    return Err(ExpressionError::new(format!("{name}() takes no argument {key:?} here")));
                 }
                 return plain(name, arguments);
             }
@@ -134,13 +136,13 @@ impl Interpreter<'_> {
         Ok(Value::text(""))
     }
 
-    fn range(&mut self, arguments: &[Value]) -> Result<Value, Trouble> {
+    fn range(&mut self, arguments: &[Value]) -> Result<Value, ExpressionError> {
         let bounds: Option<Vec<i128>> = arguments.iter().map(Value::as_int).collect();
         let (start, end, step) = match bounds.as_deref() {
             Some([end]) => (0, *end, 1),
             Some([start, end]) => (*start, *end, 1),
             Some([start, end, step]) if *step != 0 => (*start, *end, *step),
-            _ => return Err(Trouble::new("range() takes one to three whole numbers")),
+            _ => return Err(ExpressionError::new("range() takes one to three whole numbers")),
         };
         let span = if step > 0 { end.saturating_sub(start) } else { start.saturating_sub(end) };
         let count = if span <= 0 { 0 } else { (span - 1) / step.saturating_abs() + 1 };
@@ -150,32 +152,32 @@ impl Interpreter<'_> {
     }
 }
 
-fn dict(arguments: &[Value], named: Vec<(String, Value)>) -> Result<Value, Trouble> {
+fn dict(arguments: &[Value], named: Vec<(String, Value)>) -> Result<Value, ExpressionError> {
     let mut pairs = match arguments {
         [] => Vec::new(),
         [Value::Dict(items)] => items.to_vec(),
         [other] => {
             let pair = |value: Value| match &elements(&value)?[..] {
                 [key, value] => Ok((key.clone(), value.clone())),
-                _ => Err(Trouble::new("dict() takes pairs")),
+                _ => Err(ExpressionError::new("dict() takes pairs")),
             };
             elements(other)?.into_iter().map(pair).collect::<Result<_, _>>()?
         }
-        _ => return Err(Trouble::new("dict() takes at most one argument without a name")),
+        _ => return Err(ExpressionError::new("dict() takes at most one argument without a name")),
     };
     pairs.extend(named.into_iter().map(|(key, value)| (Value::text(key), value)));
     Ok(Value::Dict(Rc::new(unique(pairs))))
 }
 
 /// A function that depends only on its arguments.
-fn plain(name: &str, arguments: &[Value]) -> Result<Value, Trouble> {
+fn plain(name: &str, arguments: &[Value]) -> Result<Value, ExpressionError> {
     let numbers: Option<Vec<f64>> = arguments.iter().map(Value::as_float).collect();
     if let Some(value) = numbers.as_deref().and_then(|numbers| of_numbers(name, numbers)) {
         return value.map(Value::Float).map_err(|domain| domain.within(format!("{name}()")));
     }
     let wrong = || {
         let kinds: Vec<&str> = arguments.iter().map(Value::kind).collect();
-        Trouble::new(format!("{name}() does not take {} ({})", arguments.len(), kinds.join(", ")))
+        ExpressionError::new(format!("{name}() does not take {} ({})", arguments.len(), kinds.join(", ")))
     };
     Ok(match (name, arguments) {
         ("floor", [x]) => rounded(x, f64::floor).ok_or_else(wrong)?,
@@ -228,7 +230,7 @@ fn plain(name: &str, arguments: &[Value]) -> Result<Value, Trouble> {
             _ => {
                 let (a, b) = (a.as_float().ok_or_else(wrong)?, b.as_float().ok_or_else(wrong)?);
                 if b == 0.0 {
-                    return Err(Trouble::new("division by zero"));
+                    return Err(ExpressionError::new("division by zero"));
                 }
                 let (quotient, remainder) = floor_division(a, b);
                 Value::Tuple(Rc::new(vec![Value::Float(quotient), Value::Float(remainder)]))
@@ -239,7 +241,7 @@ fn plain(name: &str, arguments: &[Value]) -> Result<Value, Trouble> {
 }
 
 /// Functions of sequences; `None` if there is no such function.
-fn of_elements(name: &str, arguments: &[Value]) -> Option<Result<Value, Trouble>> {
+fn of_elements(name: &str, arguments: &[Value]) -> Option<Result<Value, ExpressionError>> {
     let value = match (name, arguments) {
         ("min" | "max", arguments) => extreme(name, arguments),
         ("list", []) => Ok(Value::list(Vec::new())),
@@ -276,31 +278,31 @@ fn of_elements(name: &str, arguments: &[Value]) -> Option<Result<Value, Trouble>
     Some(value)
 }
 
-fn sorted(mut items: Vec<Value>) -> Result<Value, Trouble> {
+fn sorted(mut items: Vec<Value>) -> Result<Value, ExpressionError> {
     if let Some(pair) = items.windows(2).find(|pair| pair[0].order(&pair[1]).is_none()) {
-        return Err(Trouble::new(format!("{} and {} have no order", pair[0].repr(), pair[1].repr())));
+        return Err(ExpressionError::new(format!("{} and {} have no order", pair[0].repr(), pair[1].repr())));
     }
     items.sort_by(|a, b| a.order(b).unwrap_or(std::cmp::Ordering::Equal));
     Ok(Value::list(items))
 }
 
-fn extreme(name: &str, arguments: &[Value]) -> Result<Value, Trouble> {
+fn extreme(name: &str, arguments: &[Value]) -> Result<Value, ExpressionError> {
     let items = if let [items] = arguments { elements(items)? } else { arguments.to_vec() };
     let wanted = if name == "min" { std::cmp::Ordering::Less } else { std::cmp::Ordering::Greater };
     let mut items = items.into_iter();
-    let mut best = items.next().ok_or_else(|| Trouble::new(format!("{name}() of nothing")))?;
+    let mut best = items.next().ok_or_else(|| ExpressionError::new(format!("{name}() of nothing")))?;
     for item in items {
         match item.order(&best) {
             Some(order) if order == wanted => best = item,
             Some(_) => {}
-            None => return Err(Trouble::new(format!("{} and {} have no order", item.repr(), best.repr()))),
+            None => return Err(ExpressionError::new(format!("{} and {} have no order", item.repr(), best.repr()))),
         }
     }
     Ok(best)
 }
 
-fn not_number(what: &str, text: &str) -> Trouble {
-    Trouble::new(format!("{text:?} is not a {what}"))
+fn not_number(what: &str, text: &str) -> ExpressionError {
+    ExpressionError::new(format!("{text:?} is not a {what}"))
 }
 
 /// Rounds a float to an integer by a rule; integers are unchanged.
@@ -331,7 +333,7 @@ fn round_to(x: &Value, digits: &Value) -> Option<Value> {
 }
 
 /// Functions of real numbers; `None` if there is no such function with this number of arguments.
-fn of_numbers(name: &str, arguments: &[f64]) -> Option<Result<f64, Trouble>> {
+fn of_numbers(name: &str, arguments: &[f64]) -> Option<Result<f64, ExpressionError>> {
     let value = match (name, arguments) {
         ("sin", [x]) => x.sin(),
         ("cos", [x]) => x.cos(),
@@ -362,5 +364,5 @@ fn of_numbers(name: &str, arguments: &[f64]) -> Option<Result<f64, Trouble>> {
     };
     let defined = !value.is_nan() || arguments.iter().any(|x| x.is_nan());
     let shown = || arguments.iter().map(|x| float_repr(*x)).collect::<Vec<_>>().join(", ");
-    Some(if defined { Ok(value) } else { Err(Trouble::new(format!("not defined for {}", shown()))) })
+    Some(if defined { Ok(value) } else { Err(ExpressionError::new(format!("not defined for {}", shown()))) })
 }

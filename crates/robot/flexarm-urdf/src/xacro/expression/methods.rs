@@ -2,16 +2,16 @@
 
 use std::rc::Rc;
 
-use super::Trouble;
+use super::ExpressionError;
 use super::value::{Value, float_repr, lookup};
 
 /// `value[key]`
-pub(super) fn index(owner: &Value, key: &Value) -> Result<Value, Trouble> {
+pub(super) fn index(owner: &Value, key: &Value) -> Result<Value, ExpressionError> {
     let position = |length: usize| {
-        let i = key.as_int().ok_or_else(|| Trouble::new(format!("{} is not an index", key.repr())))?;
+        let i = key.as_int().ok_or_else(|| ExpressionError::new(format!("{} is not an index", key.repr())))?;
         let at = if i < 0 { i + length as i128 } else { i };
         usize::try_from(at).ok().filter(|at| *at < length).ok_or_else(|| {
-            Trouble::new(format!("the index {i} is outside of a {} with {length} elements", owner.kind()))
+            ExpressionError::new(format!("the index {i} is outside of a {} with {length} elements", owner.kind()))
         })
     };
     match owner {
@@ -23,18 +23,18 @@ pub(super) fn index(owner: &Value, key: &Value) -> Result<Value, Trouble> {
         Value::Dict(items) => lookup(items, key).cloned().ok_or_else(|| {
             let keys: Vec<String> = items.iter().map(|(k, _)| k.repr()).collect();
             let help = format!("its keys are {}", super::shortened(&keys.join(", ")));
-            Trouble::new(format!("the dictionary has no key {}", key.repr())).help(help)
+            ExpressionError::new(format!("the dictionary has no key {}", key.repr())).help(help)
         }),
-        other => Err(Trouble::new(format!("a {} has no elements", other.kind()))
+        other => Err(ExpressionError::new(format!("a {} has no elements", other.kind()))
             .help("is it a text that should have been loaded from a file?")),
     }
 }
 
 /// `value[start:end:step]`
-pub(super) fn slice(owner: &Value, [start, end, step]: [Option<i128>; 3]) -> Result<Value, Trouble> {
+pub(super) fn slice(owner: &Value, [start, end, step]: [Option<i128>; 3]) -> Result<Value, ExpressionError> {
     let step = step.unwrap_or(1);
     if step == 0 {
-        return Err(Trouble::new("the step of a slice is 0"));
+        return Err(ExpressionError::new("the step of a slice is 0"));
     }
     let picked = |length: usize| -> Vec<usize> {
         let n = length as i128;
@@ -60,7 +60,7 @@ pub(super) fn slice(owner: &Value, [start, end, step]: [Option<i128>; 3]) -> Res
             let letters: Vec<char> = text.chars().collect();
             Value::text(picked(letters.len()).into_iter().map(|i| letters[i]).collect::<String>())
         }
-        other => return Err(Trouble::new(format!("a {} cannot be sliced", other.kind()))),
+        other => return Err(ExpressionError::new(format!("a {} cannot be sliced", other.kind()))),
     })
 }
 
@@ -70,14 +70,14 @@ pub(super) fn call(
     name: &str,
     arguments: &[Value],
     named: &[(String, Value)],
-) -> Result<Value, Trouble> {
+) -> Result<Value, ExpressionError> {
     let method = match owner {
         Value::Str(text) if name == "format" => return format(text, arguments, named).map(Value::text),
         Value::Str(text) => of_text(text, name, arguments)?,
         Value::List(items) | Value::Tuple(items) => match (name, arguments) {
             ("index", [item]) => {
                 let found = items.iter().position(|i| i.equals(item));
-                let found = found.ok_or_else(|| Trouble::new(format!("{} is not in the list", item.repr())))?;
+                let found = found.ok_or_else(|| ExpressionError::new(format!("{} is not in the list", item.repr())))?;
                 Some(Value::Int(found as i128))
             }
             ("count", [item]) => Some(Value::Int(items.iter().filter(|i| i.equals(item)).count() as i128)),
@@ -97,11 +97,11 @@ pub(super) fn call(
         _ => None,
     };
     method.ok_or_else(|| {
-        Trouble::new(format!("{}.{name}() with {} arguments is not known", owner.kind(), arguments.len()))
+        ExpressionError::new(format!("{}.{name}() with {} arguments is not known", owner.kind(), arguments.len()))
     })
 }
 
-fn of_text(text: &str, name: &str, arguments: &[Value]) -> Result<Option<Value>, Trouble> {
+fn of_text(text: &str, name: &str, arguments: &[Value]) -> Result<Option<Value>, ExpressionError> {
     let texts: Vec<&str> =
         arguments.iter().map_while(|a| if let Value::Str(s) = a { Some(&**s) } else { None }).collect();
     let all_texts = texts.len() == arguments.len();
@@ -111,10 +111,11 @@ fn of_text(text: &str, name: &str, arguments: &[Value]) -> Result<Option<Value>,
             let parts = super::evaluate::elements(&arguments[0])?;
             let parts: Option<Vec<_>> =
                 parts.iter().map(|p| if let Value::Str(s) = p { Some(s.to_string()) } else { None }).collect();
-            Value::text(parts.ok_or_else(|| Trouble::new("join() takes texts"))?.join(text))
+            Value::text(parts.ok_or_else(|| ExpressionError::new("join() takes texts"))?.join(text))
         }
         ("split", [separator]) if arguments.len() == 2 && !separator.is_empty() => {
-            let most = arguments[1].as_int().ok_or_else(|| Trouble::new("split() takes a text and a whole number"))?;
+            let most =
+                arguments[1].as_int().ok_or_else(|| ExpressionError::new("split() takes a text and a whole number"))?;
             let parts = text.splitn(usize::try_from(most + 1).unwrap_or(usize::MAX), *separator);
             Value::list(parts.map(Value::text).collect())
         }
@@ -138,7 +139,7 @@ fn of_text(text: &str, name: &str, arguments: &[Value]) -> Result<Option<Value>,
         ("splitlines", []) => Value::list(text.lines().map(Value::text).collect()),
         ("replace", [from, to]) => {
             if from.is_empty() {
-                return Err(Trouble::new("replace() of an empty text"));
+                return Err(ExpressionError::new("replace() of an empty text"));
             }
             Value::text(text.replace(from, to))
         }
@@ -175,7 +176,7 @@ fn title(text: &str) -> String {
 }
 
 /// Evaluates `text.format(...)`: `{}`, `{0}`, `{name}`, each with `:spec`.
-fn format(text: &str, arguments: &[Value], named: &[(String, Value)]) -> Result<String, Trouble> {
+fn format(text: &str, arguments: &[Value], named: &[(String, Value)]) -> Result<String, ExpressionError> {
     let mut out = String::new();
     let (mut rest, mut next) = (text, 0);
     while let Some(at) = rest.find(['{', '}']) {
@@ -186,7 +187,7 @@ fn format(text: &str, arguments: &[Value], named: &[(String, Value)]) -> Result<
             continue;
         }
         let field = rest[at..].strip_prefix('{').and_then(|field| field.split_once('}'));
-        let (field, after) = field.ok_or_else(|| Trouble::new("format(): a bracket { or } stands alone"))?;
+        let (field, after) = field.ok_or_else(|| ExpressionError::new("format(): a bracket { or } stands alone"))?;
         let (name, spec) = field.split_once(':').unwrap_or((field, ""));
         let value = if name.is_empty() {
             next += 1;
@@ -196,7 +197,7 @@ fn format(text: &str, arguments: &[Value], named: &[(String, Value)]) -> Result<
         } else {
             named.iter().find(|(n, _)| n == name).map(|(_, v)| v)
         };
-        let value = value.ok_or_else(|| Trouble::new(format!("format(): there is nothing for {{{field}}}")))?;
+        let value = value.ok_or_else(|| ExpressionError::new(format!("format(): there is nothing for {{{field}}}")))?;
         out.push_str(&formatted(value, spec)?);
         rest = after;
     }
@@ -205,7 +206,7 @@ fn format(text: &str, arguments: &[Value], named: &[(String, Value)]) -> Result<
 }
 
 /// `format % values`
-pub(super) fn percent(format: &str, values: &Value) -> Result<Value, Trouble> {
+pub(super) fn percent(format: &str, values: &Value) -> Result<Value, ExpressionError> {
     let values = if let Value::Tuple(items) = values { items.to_vec() } else { vec![values.clone()] };
     let mut values = values.into_iter();
     let mut out = String::new();
@@ -219,8 +220,9 @@ pub(super) fn percent(format: &str, values: &Value) -> Result<Value, Trouble> {
             continue;
         }
         let end = rest.find(|c: char| c.is_ascii_alphabetic());
-        let end = end.ok_or_else(|| Trouble::new("a % in a format has no letter behind it"))?;
-        let value = values.next().ok_or_else(|| Trouble::new("there are fewer values than the format asks for"))?;
+        let end = end.ok_or_else(|| ExpressionError::new("a % in a format has no letter behind it"))?;
+        let value =
+            values.next().ok_or_else(|| ExpressionError::new("there are fewer values than the format asks for"))?;
         let kind = match &rest[end..=end] {
             "i" | "u" => "d",
             kind => kind,
@@ -230,14 +232,14 @@ pub(super) fn percent(format: &str, values: &Value) -> Result<Value, Trouble> {
     }
     out.push_str(rest);
     match values.next() {
-        Some(_) => Err(Trouble::new("there are more values than the format asks for")),
+        Some(_) => Err(ExpressionError::new("there are more values than the format asks for")),
         None => Ok(Value::text(out)),
     }
 }
 
 /// Formats one value by a spec such as `.3f`, `04d`, `>8`, `s`.
-fn formatted(value: &Value, spec: &str) -> Result<String, Trouble> {
-    let bad = || Trouble::new(format!("the format {spec:?} does not fit {}", value.repr()));
+fn formatted(value: &Value, spec: &str) -> Result<String, ExpressionError> {
+    let bad = || ExpressionError::new(format!("the format {spec:?} does not fit {}", value.repr()));
     if spec.is_empty() {
         return Ok(value.shown());
     }

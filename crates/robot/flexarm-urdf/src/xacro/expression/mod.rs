@@ -23,12 +23,12 @@ use super::scope::Scope;
 
 /// An error in an expression; the place is added where the element is known.
 #[derive(Debug)]
-pub(crate) struct Trouble {
+pub(crate) struct ExpressionError {
     pub(crate) message: String,
     pub(crate) help: String,
 }
 
-impl Trouble {
+impl ExpressionError {
     pub(crate) fn new(message: impl Into<String>) -> Self {
         Self { message: message.into(), help: String::new() }
     }
@@ -47,7 +47,7 @@ impl Trouble {
 
 impl Interpreter<'_> {
     /// Evaluates the text of an expression.
-    pub(crate) fn expression(&mut self, text: &str, scope: &Scope) -> Result<Value, Trouble> {
+    pub(crate) fn expression(&mut self, text: &str, scope: &Scope) -> Result<Value, ExpressionError> {
         self.charge(8 * text.len())?;
         let value = parse::parse(text).and_then(|tree| self.evaluate(&tree, scope));
         value.map_err(|trouble| trouble.within(format!("${{{}}}", shortened(text))))

@@ -1,6 +1,6 @@
 //! Parser from tokens to a tree by precedence, with Python's rules.
 
-use super::Trouble;
+use super::ExpressionError;
 use super::token::{Token, tokens};
 use super::value::Value;
 
@@ -78,13 +78,16 @@ pub(crate) const KEYWORDS: [&str; 35] = [
     "not", "or", "pass", "raise", "return", "try", "while", "with", "yield",
 ];
 
-pub(super) fn parse(text: &str) -> Result<Expr, Trouble> {
+pub(super) fn parse(text: &str) -> Result<Expr, ExpressionError> {
     let tokens = tokens(text)?;
     if tokens.is_empty() {
-        return Err(Trouble::new("the expression is empty"));
+        return Err(ExpressionError::new("the expression is empty"));
     }
     if tokens.len() > MOST_TOKENS {
-        return Err(Trouble::new(format!("the expression has {} words, at most {MOST_TOKENS} are read", tokens.len())));
+        return Err(ExpressionError::new(format!(
+            "the expression has {} words, at most {MOST_TOKENS} are read",
+            tokens.len()
+        )));
     }
     let mut parser = Parser { tokens, at: 0, nested: 0 };
     let tree = parser.list_or_one()?;
@@ -103,10 +106,10 @@ struct Parser {
     nested: usize,
 }
 
-fn unexpected(token: Option<&Token>) -> Trouble {
+fn unexpected(token: Option<&Token>) -> ExpressionError {
     match token {
-        None => Trouble::new("the expression ends too early"),
-        Some(Token::Name(name)) if name == "lambda" => Trouble::new("lambda is not read in expressions"),
+        None => ExpressionError::new("the expression ends too early"),
+        Some(Token::Name(name)) if name == "lambda" => ExpressionError::new("lambda is not read in expressions"),
         Some(token) => {
             let shown = match token {
                 Token::Name(name) => name.clone(),
@@ -115,7 +118,7 @@ fn unexpected(token: Option<&Token>) -> Trouble {
                 Token::Text(text) => format!("{text:?}"),
                 Token::Sign(sign) => (*sign).to_owned(),
             };
-            Trouble::new(format!("{shown} is not expected here"))
+            ExpressionError::new(format!("{shown} is not expected here"))
         }
     }
 }
@@ -160,15 +163,15 @@ impl Parser {
         found
     }
 
-    fn need_sign(&mut self, sign: &str) -> Result<(), Trouble> {
+    fn need_sign(&mut self, sign: &str) -> Result<(), ExpressionError> {
         if self.take_sign(sign) {
             return Ok(());
         }
         let found = unexpected(self.peek());
-        Err(Trouble::new(format!("{}; expected {sign:?}", found.message)))
+        Err(ExpressionError::new(format!("{}; expected {sign:?}", found.message)))
     }
 
-    fn name(&mut self) -> Result<String, Trouble> {
+    fn name(&mut self) -> Result<String, ExpressionError> {
         match self.peek() {
             Some(Token::Name(name)) if !KEYWORDS.contains(&name.as_str()) => {
                 let name = name.clone();
@@ -180,7 +183,7 @@ impl Parser {
     }
 
     /// Parses `a` or `a, b`: a tuple needs no brackets.
-    fn list_or_one(&mut self) -> Result<Expr, Trouble> {
+    fn list_or_one(&mut self) -> Result<Expr, ExpressionError> {
         let first = self.expression()?;
         if !self.is_sign(",") {
             return Ok(first);
@@ -196,17 +199,17 @@ impl Parser {
     }
 
     /// Parses `a if b else c`.
-    fn expression(&mut self) -> Result<Expr, Trouble> {
+    fn expression(&mut self) -> Result<Expr, ExpressionError> {
         self.nested += 1;
         if self.nested > MOST_NESTED {
-            return Err(Trouble::new(format!("the expression is nested more than {MOST_NESTED} deep")));
+            return Err(ExpressionError::new(format!("the expression is nested more than {MOST_NESTED} deep")));
         }
         let then = self.disjunction()?;
         let tree = if self.take_word("if") {
             let condition = Box::new(self.disjunction()?);
             if !self.take_word("else") {
                 let found = unexpected(self.peek());
-                return Err(Trouble::new(format!("{}; expected else", found.message)));
+                return Err(ExpressionError::new(format!("{}; expected else", found.message)));
             }
             let otherwise = Box::new(self.expression()?);
             Expr::If { condition, then: Box::new(then), otherwise }
@@ -217,7 +220,7 @@ impl Parser {
         Ok(tree)
     }
 
-    fn disjunction(&mut self) -> Result<Expr, Trouble> {
+    fn disjunction(&mut self) -> Result<Expr, ExpressionError> {
         let mut terms = vec![self.conjunction()?];
         while self.take_word("or") {
             terms.push(self.conjunction()?);
@@ -225,7 +228,7 @@ impl Parser {
         Ok(if terms.len() == 1 { terms.remove(0) } else { Expr::Or(terms) })
     }
 
-    fn conjunction(&mut self) -> Result<Expr, Trouble> {
+    fn conjunction(&mut self) -> Result<Expr, ExpressionError> {
         let mut terms = vec![self.negation()?];
         while self.take_word("and") {
             terms.push(self.negation()?);
@@ -233,7 +236,7 @@ impl Parser {
         Ok(if terms.len() == 1 { terms.remove(0) } else { Expr::And(terms) })
     }
 
-    fn negation(&mut self) -> Result<Expr, Trouble> {
+    fn negation(&mut self) -> Result<Expr, ExpressionError> {
         let mut negations = 0;
         while self.take_word("not") {
             negations += 1;
@@ -246,7 +249,7 @@ impl Parser {
         })
     }
 
-    fn comparison(&mut self) -> Result<Expr, Trouble> {
+    fn comparison(&mut self) -> Result<Expr, ExpressionError> {
         let first = self.binary(1)?;
         let mut rest = Vec::new();
         loop {
@@ -271,7 +274,7 @@ impl Parser {
     }
 
     /// Parses operators of at least this power, left-associative.
-    fn binary(&mut self, least: u8) -> Result<Expr, Trouble> {
+    fn binary(&mut self, least: u8) -> Result<Expr, ExpressionError> {
         let mut left = self.unary()?;
         while let Some(Token::Sign(sign)) = self.peek() {
             let (sign, Some(power)) = (*sign, power(sign)) else { break };
@@ -285,12 +288,12 @@ impl Parser {
         Ok(left)
     }
 
-    fn unary(&mut self) -> Result<Expr, Trouble> {
+    fn unary(&mut self) -> Result<Expr, ExpressionError> {
         for sign in ["-", "+", "~"] {
             if self.take_sign(sign) {
                 self.nested += 1;
                 if self.nested > MOST_NESTED {
-                    return Err(Trouble::new(format!("the expression is nested more than {MOST_NESTED} deep")));
+                    return Err(ExpressionError::new(format!("the expression is nested more than {MOST_NESTED} deep")));
                 }
                 let tree = Expr::Unary(sign, Box::new(self.unary()?));
                 self.nested -= 1;
@@ -302,7 +305,7 @@ impl Parser {
             // Right-associative; binds more strongly than a sign on its left, but not on its right.
             self.nested += 1;
             if self.nested > MOST_NESTED {
-                return Err(Trouble::new(format!("the expression is nested more than {MOST_NESTED} deep")));
+                return Err(ExpressionError::new(format!("the expression is nested more than {MOST_NESTED} deep")));
             }
             let exponent = self.unary()?;
             self.nested -= 1;
@@ -312,7 +315,7 @@ impl Parser {
     }
 
     /// Parses an atom followed by calls, attributes and indices.
-    fn primary(&mut self) -> Result<Expr, Trouble> {
+    fn primary(&mut self) -> Result<Expr, ExpressionError> {
         let mut tree = self.atom()?;
         loop {
             if self.take_sign(".") {
@@ -328,7 +331,7 @@ impl Parser {
         }
     }
 
-    fn arguments(&mut self) -> Result<Arguments, Trouble> {
+    fn arguments(&mut self) -> Result<Arguments, ExpressionError> {
         let (mut arguments, mut named) = (Vec::new(), Vec::new());
         while !self.take_sign(")") {
             let is_named = matches!(self.tokens.get(self.at + 1), Some(Token::Sign("=")));
@@ -351,7 +354,7 @@ impl Parser {
         Ok((arguments, named))
     }
 
-    fn subscript(&mut self, tree: Expr) -> Result<Expr, Trouble> {
+    fn subscript(&mut self, tree: Expr) -> Result<Expr, ExpressionError> {
         let mut parts: [Option<Box<Expr>>; 3] = [None, None, None];
         let mut colons = 0;
         loop {
@@ -361,7 +364,7 @@ impl Parser {
             if self.take_sign(":") {
                 colons += 1;
                 if colons > 2 {
-                    return Err(Trouble::new("a slice has at most two colons"));
+                    return Err(ExpressionError::new("a slice has at most two colons"));
                 }
                 continue;
             }
@@ -372,12 +375,12 @@ impl Parser {
         }
         match (colons, parts) {
             (0, [Some(index), None, None]) => Ok(Expr::Index(Box::new(tree), index)),
-            (0, _) => Err(Trouble::new("an index is missing between [ and ]")),
+            (0, _) => Err(ExpressionError::new("an index is missing between [ and ]")),
             (_, parts) => Ok(Expr::Slice(Box::new(tree), parts)),
         }
     }
 
-    fn clauses(&mut self) -> Result<Vec<Clause>, Trouble> {
+    fn clauses(&mut self) -> Result<Vec<Clause>, ExpressionError> {
         let mut clauses = Vec::new();
         while self.take_word("for") {
             let bracket = self.take_sign("(");
@@ -401,7 +404,7 @@ impl Parser {
         Ok(clauses)
     }
 
-    fn atom(&mut self) -> Result<Expr, Trouble> {
+    fn atom(&mut self) -> Result<Expr, ExpressionError> {
         let Some(token) = self.peek().cloned() else { return Err(unexpected(None)) };
         match token {
             Token::Int(i) => self.constant(Constant::Int(i)),
@@ -446,12 +449,12 @@ impl Parser {
         }
     }
 
-    fn constant(&mut self, constant: Constant) -> Result<Expr, Trouble> {
+    fn constant(&mut self, constant: Constant) -> Result<Expr, ExpressionError> {
         self.at += 1;
         Ok(Expr::Const(constant))
     }
 
-    fn list(&mut self) -> Result<Expr, Trouble> {
+    fn list(&mut self) -> Result<Expr, ExpressionError> {
         let mut items = Vec::new();
         while !self.take_sign("]") {
             let item = self.expression()?;
@@ -468,7 +471,7 @@ impl Parser {
         Ok(Expr::List(items))
     }
 
-    fn dict(&mut self) -> Result<Expr, Trouble> {
+    fn dict(&mut self) -> Result<Expr, ExpressionError> {
         let mut items = Vec::new();
         while !self.take_sign("}") {
             let key = self.expression()?;

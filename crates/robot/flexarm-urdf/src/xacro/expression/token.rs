@@ -1,6 +1,6 @@
 //! Splits the text of an expression into tokens.
 
-use super::Trouble;
+use super::ExpressionError;
 
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Token {
@@ -18,7 +18,7 @@ const SIGNS: [&str; 31] = [
     ".", "<", ">", "=", "&", "|", "^", "~", "!", ";",
 ];
 
-pub(super) fn tokens(text: &str) -> Result<Vec<Token>, Trouble> {
+pub(super) fn tokens(text: &str) -> Result<Vec<Token>, ExpressionError> {
     let mut found = Vec::new();
     let mut rest = text.trim_start();
     while let Some(first) = rest.chars().next() {
@@ -30,8 +30,11 @@ pub(super) fn tokens(text: &str) -> Result<Vec<Token>, Trouble> {
                 ("r" | "R", Some('"' | '\'')) => string(rest, end, true)?,
                 ("u" | "U", Some('"' | '\'')) => string(rest, end, false)?,
                 ("f" | "F" | "b" | "B" | "rb" | "br" | "fr" | "rf", Some('"' | '\'')) => {
-                    return Err(Trouble::new(format!("strings with the prefix {:?} are not read", &rest[..end]))
-                        .help("write the text with + and str()"));
+                    return Err(ExpressionError::new(format!(
+                        "strings with the prefix {:?} are not read",
+                        &rest[..end]
+                    ))
+                    .help("write the text with + and str()"));
                 }
                 (name, _) => (Token::Name(name.to_owned()), end),
             }
@@ -40,7 +43,7 @@ pub(super) fn tokens(text: &str) -> Result<Vec<Token>, Trouble> {
         } else if let Some(sign) = SIGNS.iter().find(|sign| rest.starts_with(**sign)) {
             (Token::Sign(sign), sign.len())
         } else {
-            return Err(Trouble::new(format!("the character {first:?} has no meaning in an expression")));
+            return Err(ExpressionError::new(format!("the character {first:?} has no meaning in an expression")));
         };
         found.push(token);
         rest = rest[length..].trim_start();
@@ -52,8 +55,8 @@ fn digit_at(text: &str, at: usize) -> bool {
     text.as_bytes().get(at).is_some_and(u8::is_ascii_digit)
 }
 
-fn number(text: &str) -> Result<(Token, usize), Trouble> {
-    let bad = |end: usize| Trouble::new(format!("{:?} is not a number that can be used", &text[..end]));
+fn number(text: &str) -> Result<(Token, usize), ExpressionError> {
+    let bad = |end: usize| ExpressionError::new(format!("{:?} is not a number that can be used", &text[..end]));
     let radix = match text.get(..2).map(str::to_ascii_lowercase).as_deref() {
         Some("0x") => Some(16),
         Some("0o") => Some(8),
@@ -91,7 +94,9 @@ fn number(text: &str) -> Result<(Token, usize), Trouble> {
     if whole {
         // Python rejects 012, which could be meant as an octal number.
         if digits.len() > 1 && digits.starts_with('0') && digits.bytes().any(|b| b != b'0') {
-            return Err(Trouble::new(format!("the number {digits} starts with 0")).help("remove the leading zeros"));
+            return Err(
+                ExpressionError::new(format!("the number {digits} starts with 0")).help("remove the leading zeros")
+            );
         }
         return Ok((Token::Int(digits.parse().map_err(|_| bad(end))?), end));
     }
@@ -99,7 +104,7 @@ fn number(text: &str) -> Result<(Token, usize), Trouble> {
 }
 
 /// Reads a string that starts after `prefix` bytes, with escapes resolved unless it is raw.
-fn string(text: &str, prefix: usize, raw: bool) -> Result<(Token, usize), Trouble> {
+fn string(text: &str, prefix: usize, raw: bool) -> Result<(Token, usize), ExpressionError> {
     let body = &text[prefix..];
     let quote = if body.starts_with("'''") || body.starts_with("\"\"\"") { &body[..3] } else { &body[..1] };
     let mut out = String::new();
@@ -125,5 +130,5 @@ fn string(text: &str, prefix: usize, raw: bool) -> Result<(Token, usize), Troubl
             other => out.extend(['\\', other]),
         }
     }
-    Err(Trouble::new("a string has no closing quote").help(format!("close it with {quote}")))
+    Err(ExpressionError::new("a string has no closing quote").help(format!("close it with {quote}")))
 }

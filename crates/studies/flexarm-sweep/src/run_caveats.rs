@@ -11,7 +11,7 @@ use flexarm_run::Severity;
 use flexarm_run::caveat::once_each;
 
 /// Caveats of a run as JSON; `None` if there are none. Runs with equal caveats share one text.
-pub(super) type Told = Option<Arc<str>>;
+pub(super) type CaveatText = Option<Arc<str>>;
 
 /// Caveat with the runs it concerns, represented by the worst of them.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -26,7 +26,7 @@ pub struct CaveatFigures {
 }
 
 /// Serialises the caveats of a run; `plain` removes parts of a text that depend on the machine.
-pub(super) fn told(caveats: Vec<Caveat>, plain: &dyn Fn(String) -> String) -> Told {
+pub(super) fn stored_caveats(caveats: Vec<Caveat>, plain: &dyn Fn(String) -> String) -> CaveatText {
     if caveats.is_empty() {
         return None;
     }
@@ -40,7 +40,7 @@ pub(super) fn figures<'a>(answers: impl Iterator<Item = &'a Answer>) -> Vec<Cave
     let mut read: HashMap<&str, Vec<Caveat>> = HashMap::new();
     let mut found: BTreeMap<(String, String, String), CaveatFigures> = BTreeMap::new();
     for answer in answers {
-        let Some(text) = &answer.told else { continue };
+        let Some(text) = &answer.stored else { continue };
         let caveats = read.entry(text).or_insert_with(|| serde_json::from_str(text).unwrap_or_default());
         for caveat in caveats.iter() {
             let new = || CaveatFigures { caveat: caveat.clone(), runs: 0, worst_run: answer.run };
@@ -87,7 +87,7 @@ fn badness(caveat: &Caveat) -> f64 {
 
 /// Returns the sentences of the warnings, with the number of runs they concern.
 pub(super) fn warnings(caveats: &[CaveatFigures], runs: usize) -> Vec<String> {
-    let told = |figures: &CaveatFigures| {
+    let stored = |figures: &CaveatFigures| {
         let CaveatFigures { caveat, runs: own, worst_run } = figures;
         let all = own == &runs;
         let which = match (all, caveat.value) {
@@ -98,7 +98,7 @@ pub(super) fn warnings(caveats: &[CaveatFigures], runs: usize) -> Vec<String> {
         };
         format!("{} ({which})", caveat.message)
     };
-    caveats.iter().filter(|figures| figures.caveat.severity == Severity::Warning).map(told).collect()
+    caveats.iter().filter(|figures| figures.caveat.severity == Severity::Warning).map(stored).collect()
 }
 
 #[cfg(test)]
@@ -112,15 +112,16 @@ mod tests {
     const SAG: CaveatKind = CaveatKind::warning("sag", "{where} sags by {value}, {yardstick}", "m", "");
 
     fn answer(run: usize, caveats: Vec<Caveat>) -> Answer {
-        Answer { run, result: Ok(Vec::new()), told: told(caveats, &|text| text.replace("/home/me/", "")) }
+        Answer { run, result: Ok(Vec::new()), stored: stored_caveats(caveats, &|text| text.replace("/home/me/", "")) }
     }
 
     #[test]
     fn a_caveat_of_many_runs_is_said_once_with_its_worst_value_and_how_often() {
         let effort = |x: f64| EFFORT.found("joint 2", x, 100.0);
         let slow = |hz: f64| SLOW_MODE.found("the arm", hz, 3.0).as_note();
-        let file =
-            |n: u32| Caveat::said("trajectory", "/home/me/a.csv", format!("/home/me/a.csv: {n} rows repeat"), "");
+        let file = |n: u32| {
+            Caveat::from_message("trajectory", "/home/me/a.csv", format!("/home/me/a.csv: {n} rows repeat"), "")
+        };
         let answers = [
             answer(0, vec![effort(120.0), slow(2.0)]),
             answer(1, vec![effort(150.0), slow(1.0), file(2)]),
@@ -137,7 +138,7 @@ mod tests {
         assert_eq!(said.len(), 3);
         assert!(said[0].ends_with("(3 of 5 runs; worst in run 1)") && said[0].contains("150"), "{said:?}");
         assert_eq!(said[2], "a.csv: 2 rows repeat (2 of 5 runs, the first is run 1)");
-        assert_eq!(answers[4].told, None);
+        assert_eq!(answers[4].stored, None);
     }
 
     #[test]

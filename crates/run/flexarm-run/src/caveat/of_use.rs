@@ -32,7 +32,7 @@ pub enum Use<'a> {
 /// duplicates.
 ///
 /// * `of_robot`: result of [`Robot::caveats`], if already known.
-pub fn told(robot: &Robot, flexible: &Arc<FlexibleRobot>, of_robot: Option<&[Caveat]>, used: Use<'_>) -> Vec<Caveat> {
+pub fn of_use(robot: &Robot, flexible: &Arc<FlexibleRobot>, of_robot: Option<&[Caveat]>, used: Use<'_>) -> Vec<Caveat> {
     let mut caveats = of_model(robot, flexible, of_robot);
     let (pose, wrench) = match used {
         Use::Held(at, wrench) => (Ok(at.to_vec()), *wrench),
@@ -52,15 +52,15 @@ pub fn told(robot: &Robot, flexible: &Arc<FlexibleRobot>, of_robot: Option<&[Cav
         Ok(at_rest(robot, &posed, &linear, &wrench))
     });
     caveats.extend(standing.unwrap_or_else(|error| {
-        vec![Caveat::said("no-equilibrium", "robot", error.to_string(), "check stiffness, masses and units")]
+        vec![Caveat::from_message("no-equilibrium", "robot", error.to_string(), "check stiffness, masses and units")]
     }));
     once_each(caveats)
 }
 
-/// As [`told()`], for a robot as modelled by its file, in commands that compute nothing with its
+/// As [`of_use()`], for a robot as modelled by its file, in commands that compute nothing with its
 /// links and drives.
 pub(crate) fn of_robot(robot: &Robot) -> Result<Vec<Caveat>, Error> {
-    Ok(told(robot, &Arc::new(robot.flexible_robot()?), None, Use::Any))
+    Ok(of_use(robot, &Arc::new(robot.flexible_robot()?), None, Use::Any))
 }
 
 /// Returns the caveats about a robot's files, and about its links and drives as modelled.
@@ -73,7 +73,7 @@ pub(crate) fn of_model(robot: &Robot, flexible: &FlexibleRobot, of_robot: Option
 /// Returns the caveats about a motion on a robot.
 pub fn of_motion(motion: &Motion, rigid: &Model) -> Vec<Caveat> {
     let mut caveats = motion.caveats();
-    let passed = |v: &LimitViolation| Caveat::said("joint-limit", &v.joint, format!("joint limit: {v}"), "");
+    let passed = |v: &LimitViolation| Caveat::from_message("joint-limit", &v.joint, format!("joint limit: {v}"), "");
     caveats.extend(motion.violations.iter().map(passed));
     caveats.extend(motion::of_motion(&motion.name, &motion.trajectory, rigid));
     caveats
