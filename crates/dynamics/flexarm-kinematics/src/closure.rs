@@ -216,6 +216,33 @@ impl LoopData {
             self.qddot[nv..].iter_mut().zip(&self.rates.gamma).for_each(|(a, gamma)| *a += gamma);
         }
     }
+
+    /// Adds the pin forces to the joint wrenches of the opened tree; uses up the efforts `τ_d`.
+    ///
+    /// A force f on the eye, and -f on the pin, relieves the dependent joints: `J_dᵀ f = τ_d` (f in
+    /// the axes of the pin). A pin also loads the dependent joints of earlier loops, so that the
+    /// last loop comes first.
+    fn add_pin_forces(&mut self, model: &Model, data: &mut Data) {
+        let Self { solved, rates, tau, .. } = self;
+        for (k, loop_) in model.loops.iter().enumerate().rev() {
+            let tau_d = Vector2::new(tau[loop_.first], tau[loop_.first + 1]);
+            let f = solved.inverse[k].transpose() * tau_d;
+            for &j in loop_.moved_by.iter().filter(|j| **j >= solved.nv) {
+                tau[j] -= solved.J[k][j].dot(&f);
+            }
+            loop_.place_chains(model, data, &mut rates.X);
+            let (A, p_B) = loop_.ends_at(&rates.X);
+            let force = A.rotation * Vector3::new(f.x, f.y, 0.0);
+            for (chain, sign) in loop_.chains.iter().zip([1.0, -1.0]) {
+                for &i in chain {
+                    let R = rates.X[i].rotation.inverse().matrix() * sign;
+                    let moment = (p_B - rates.X[i].translation.vector).cross(&force);
+                    data.F[i].force += R * force;
+                    data.F[i].torque += R * moment;
+                }
+            }
+        }
+    }
 }
 
 impl Solved {
@@ -686,6 +713,7 @@ pub(crate) fn inverse_dynamics(model: &Model, data: &mut Data, q: &[f64], qdot: 
         for (row, tau_d) in loops.solved.T.chunks_exact(nv.max(1)).zip(&loops.tau.as_slice()[nv..]) {
             data.tau.iter_mut().zip(row).for_each(|(tau, t)| *tau += t * tau_d);
         }
+        loops.add_pin_forces(model, data);
     });
 }
 

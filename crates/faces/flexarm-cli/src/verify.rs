@@ -16,13 +16,13 @@ use crate::{Bar, Cli, answer, shipped, signals};
 
 #[derive(Debug, Args)]
 pub(crate) struct VerifyArgs {
-    /// Cases to run: one-beam, three-beams, lower-arm, manipulator, programs [default: all]
+    /// Cases to run: one-beam, three-beams, lower-arm, manipulator, programs, measured, benchmarks
+    /// [default: all]
     pub(crate) cases: Vec<String>,
     /// Leave out slow parts
     #[arg(long)]
     pub(crate) quick: bool,
-    /// Folder with robots, trajectories and tests/verification [default: here, else where the
-    /// program was built]
+    /// Folder with robots, trajectories and tests [default: here, else where the program was built]
     #[arg(long, value_name = "DIR")]
     pub(crate) data: Option<PathBuf>,
     /// Folder for verification.md, its pictures and verification.json [default: a new one in out]

@@ -22,6 +22,7 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
 pub mod bench;
+mod benchmarks;
 pub mod check;
 mod compliance;
 mod error;
@@ -48,13 +49,14 @@ pub use files::{PAGE, VerificationFiles, differences_from};
 type Entry = (&'static str, f64, fn(&Bench, &mut Pace<'_>) -> Result<Case, Error>);
 
 /// The cases, in the order of the page.
-const CASES: [Entry; 6] = [
+const CASES: [Entry; 7] = [
     ("one-beam", 1.0, one_beam::case),
     ("three-beams", 5.0, three_beams::case),
     ("lower-arm", 5.0, lower_arm::case),
     ("manipulator", 45.0, manipulator::case),
     ("programs", 3.0, programs::case),
     ("measured", 3.0, measured::case),
+    ("benchmarks", 8.0, benchmarks::case),
 ];
 
 /// Names of the cases.

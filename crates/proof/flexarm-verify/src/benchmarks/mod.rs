@@ -1,0 +1,94 @@
+//! Benchmarks of flexible multibody systems in large motion, from `tests/benchmarks`: two-link arms
+//! of slender beams, and Simeon's slider crank.
+//!
+//! `two_link` and `slider_crank` compute findings, `page` writes them up.
+
+mod page;
+mod slider_crank;
+mod two_link;
+
+use std::path::Path;
+
+use flexarm::{Keep, Modelling, Motion, Robot, RunOptions, RunRequest, StepperKind, Trace};
+use flexarm_files::NumberTable;
+use nalgebra::Vector2;
+
+use crate::Error;
+use crate::Pace;
+use crate::bench::{ALPHA, Bench};
+use crate::page::Case;
+
+use slider_crank::SliderCrank;
+use two_link::TwoLink;
+
+/// Folder of the benchmarks.
+const FOLDER: &str = "tests/benchmarks";
+
+/// Findings of the case.
+struct Findings {
+    two_link: TwoLink,
+    slider_crank: SliderCrank,
+}
+
+/// Runs the case.
+pub(crate) fn case(bench: &Bench, pace: &mut Pace<'_>) -> Result<Case, Error> {
+    let two_link = TwoLink::new(bench, &mut |share| pace.at(0.7 * share))?;
+    let slider_crank = SliderCrank::new(bench, &mut |share| pace.at(0.7 + 0.3 * share))?;
+    Ok(page::page(&Findings { two_link, slider_crank }))
+}
+
+/// A link model, with its name on the page.
+struct Method {
+    name: String,
+    modelling: Modelling,
+    /// Whether loads change the stiffness of modal links.
+    stiffening: bool,
+}
+
+impl Method {
+    fn new((name, modelling): (String, Modelling)) -> Self {
+        Self { name, modelling, stiffening: false }
+    }
+
+    fn stiffening((name, modelling): (String, Modelling)) -> Self {
+        Self { name: format!("{name}, stiffness by load"), modelling, stiffening: true }
+    }
+
+    /// Runs a motion by generalised-alpha and returns the samples.
+    ///
+    /// * `step_s`: step size (s).
+    /// * `rate_hz`: samples per second.
+    fn run(&self, robot: &Robot, motion: &Motion, step_s: f64, rate_hz: f64) -> Result<Trace, Error> {
+        let mut robot = robot.clone();
+        for link in &mut robot.flexible {
+            link.choices.geometric = self.stiffening;
+        }
+        let stepper: StepperKind = ALPHA;
+        let modelling = self.modelling;
+        let options = RunOptions { stepper, step_s, modelling, log_rate_hz: rate_hz, ..RunOptions::default() };
+        let request = RunRequest::keeping(Keep::Curves);
+        Ok(robot.flexible(modelling)?.simulate_with(motion, &options, request)?.trace)
+    }
+}
+
+/// Reads columns of a table; the first one is the time.
+fn columns<const N: usize>(path: &Path, names: [&str; N]) -> Result<Vec<[f64; N]>, Error> {
+    let table = NumberTable::read(path)?;
+    let missing = |name: &str| flexarm::Error::File { path: path.to_owned(), what: format!("has no column {name:?}") };
+    let mut columns = [0; N];
+    for (column, name) in columns.iter_mut().zip(names) {
+        *column = table.column(name).ok_or_else(|| missing(name))?;
+    }
+    Ok(table.rows.iter().map(|row| columns.map(|column| row[column])).collect())
+}
+
+/// Checks that a run has the samples of its truth.
+fn same_times(times: impl Iterator<Item = f64>, truth: impl Iterator<Item = f64>) -> bool {
+    let (times, truth): (Vec<f64>, Vec<f64>) = (times.collect(), truth.collect());
+    times.len() == truth.len() && times.iter().zip(&truth).all(|(a, b)| (a - b).abs() < 1e-9)
+}
+
+/// Returns x and y of a position (m).
+fn in_plane(position: [f64; 3]) -> Vector2<f64> {
+    Vector2::new(position[0], position[1])
+}
