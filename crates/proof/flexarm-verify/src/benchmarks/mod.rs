@@ -9,13 +9,13 @@ mod two_link;
 
 use std::path::Path;
 
-use flexarm::{Keep, Modelling, Motion, Robot, RunOptions, RunRequest, StepperKind, Trace};
+use flexarm::{ConstraintForm, Keep, Modelling, Motion, Robot, RunOptions, RunRequest, StepperKind, Trace};
 use flexarm_files::NumberTable;
 use nalgebra::Vector2;
 
 use crate::Error;
 use crate::Pace;
-use crate::bench::{ALPHA, Bench};
+use crate::bench::{ALPHA, Bench, spook};
 use crate::page::Case;
 
 use slider_crank::SliderCrank;
@@ -43,18 +43,25 @@ struct Method {
     modelling: Modelling,
     /// Whether loads change the stiffness of modal links.
     stiffening: bool,
+    stepper: StepperKind,
 }
 
 impl Method {
     fn new((name, modelling): (String, Modelling)) -> Self {
-        Self { name, modelling, stiffening: false }
+        Self { name, modelling, stiffening: false, stepper: ALPHA }
     }
 
     fn stiffening((name, modelling): (String, Modelling)) -> Self {
-        Self { name: format!("{name}, stiffness by load"), modelling, stiffening: true }
+        Self { name: format!("{name}, stiffness by load"), stiffening: true, ..Self::new((name, modelling)) }
     }
 
-    /// Runs a motion by generalised-alpha and returns the samples.
+    /// Rigid parts with compliant constraints.
+    fn spook((name, modelling): (String, Modelling)) -> Self {
+        let stepper = spook(ConstraintForm::Local);
+        Self { name: format!("{name}, compliant constraints"), stepper, ..Self::new((name, modelling)) }
+    }
+
+    /// Runs a motion and returns the samples.
     ///
     /// * `step_s`: step size (s).
     /// * `rate_hz`: samples per second.
@@ -63,8 +70,7 @@ impl Method {
         for link in &mut robot.flexible {
             link.choices.geometric = self.stiffening;
         }
-        let stepper: StepperKind = ALPHA;
-        let modelling = self.modelling;
+        let (stepper, modelling) = (self.stepper, self.modelling);
         let options = RunOptions { stepper, step_s, modelling, log_rate_hz: rate_hz, ..RunOptions::default() };
         let request = RunRequest::keeping(Keep::Curves);
         Ok(robot.flexible(modelling)?.simulate_with(motion, &options, request)?.trace)

@@ -2,7 +2,7 @@
 
 use flexarm_draw::{CurveLook, Panel, PlotCurve};
 
-use super::slider_crank::{CHAIN, LINEAR_ROD, STIFFENED_ROD, SliderCrank};
+use super::slider_crank::{CHAIN, LINEAR_ROD, SPOOK, STIFFENED_ROD, SliderCrank};
 use super::two_link::{LINEAR, MODES, PARTS, STIFFENED, TwoLink};
 use super::{FOLDER, Findings, slider_crank, two_link};
 use crate::bench::Worst;
@@ -123,8 +123,12 @@ fn slider_crank(case: &mut Case, found: &SliderCrank) {
     let text = "slider of the slider crank, 8 parts per half, over the rod's length";
     case.claim(text, EXACT_ROD, chain.slider_m[0] / 0.3, Bound::AtMost(1e-5));
     case.claim("rod's deflection in the middle, the same", EXACT_ROD, chain.middle[0], Bound::AtMost(0.01));
+    let constrained = &found.runs[SPOOK];
+    let text = "slider with compliant constraints, over the rod's length";
+    case.claim(text, EXACT_ROD, constrained.slider_m[0] / 0.3, Bound::AtMost(1e-5));
+    case.claim("rod's deflection with compliant constraints", EXACT_ROD, constrained.middle[0], Bound::AtMost(0.01));
     let [plain_modal, stiffened] = [LINEAR_ROD, STIFFENED_ROD].map(|k| found.runs[k].middle[0]);
-    let text = "the same, modal links with stiffness by load";
+    let text = "rod's deflection, modal links with stiffness by load";
     case.claim(text, EXACT_ROD, stiffened, Bound::AtMost(0.01));
     case.claim("the same without stiffness by load", EXACT_ROD, plain_modal, Bound::AtLeast(0.03));
     case.text(

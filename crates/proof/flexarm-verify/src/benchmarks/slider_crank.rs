@@ -41,11 +41,12 @@ pub(super) struct SliderCrank {
     pub(super) runs: Vec<Run>,
 }
 
-/// Indices in the list of runs: the finest chain, and modal links without and with stiffness by
-/// load.
+/// Indices in the list of runs: the finest chain, modal links without and with stiffness by load,
+/// and the chain with compliant constraints.
 pub(super) const CHAIN: usize = PARTS.len() - 1;
 pub(super) const LINEAR_ROD: usize = PARTS.len();
 pub(super) const STIFFENED_ROD: usize = PARTS.len() + 1;
+pub(super) const SPOOK: usize = PARTS.len() + 2;
 
 impl SliderCrank {
     pub(super) fn new(bench: &Bench, progress: &mut dyn FnMut(f64) -> Result<(), Error>) -> Result<Self, Error> {
@@ -64,8 +65,9 @@ impl SliderCrank {
         let methods = PARTS.map(|n| Method::new(in_parts(n)));
         let modal = [Method::new(in_modes(MODES)), Method::stiffening(in_modes(MODES))];
         let mut runs = Vec::new();
-        for (k, method) in methods.into_iter().chain(modal).enumerate() {
-            progress(k as f64 / 4.0)?;
+        let methods = methods.into_iter().chain(modal).chain([Method::spook(in_parts(PARTS[1]))]);
+        for (k, method) in methods.enumerate() {
+            progress(k as f64 / 5.0)?;
             let middle = method.run(&robot, &motion, STEP_S, RATE_HZ)?;
             let slider = method.run(&slider_robot, &motion, STEP_S, RATE_HZ)?;
             let comparable = same_times(middle.rows.iter().map(|row| row.time_s), truth.iter().map(|row| row[0]));
