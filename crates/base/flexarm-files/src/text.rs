@@ -29,7 +29,7 @@ pub fn read_text(path: &Path) -> Result<String, FileError> {
     let mut text = String::new();
     let size = std::fs::File::open(path).and_then(|file| file.take(LARGEST + 1).read_to_string(&mut text));
     if size.map_err(unreadable)? as u64 > LARGEST {
-        return Err(fail(format!("has more than {LARGEST} bytes, which is more than is read")));
+        return Err(fail(format!("has more than {LARGEST} bytes, the limit")));
     }
     Ok(text)
 }
@@ -42,7 +42,7 @@ pub struct TextFileError {
     pub path: PathBuf,
     /// Line, from 1.
     pub line: usize,
-    /// Column, from 1.
+    /// Column, from 1, in characters.
     pub column: usize,
     /// Message: what was found, what was expected, and the remedy.
     pub message: String,
@@ -70,7 +70,7 @@ impl Source {
     pub fn error(&self, span: std::ops::Range<usize>, message: impl Into<String>) -> TextFileError {
         let before = self.text.get(..span.start).unwrap_or(&self.text);
         let line = before.matches('\n').count() + 1;
-        let column = before.len() - before.rfind('\n').map_or(0, |i| i + 1) + 1;
+        let column = before.chars().rev().take_while(|c| *c != '\n').count() + 1;
         TextFileError { path: self.path.clone(), line, column, message: message.into(), page: self.page }
     }
 
@@ -78,5 +78,19 @@ impl Source {
     /// Rust types.
     pub fn unread(&self, span: Option<std::ops::Range<usize>>, message: &str) -> TextFileError {
         self.error(span.unwrap_or(0..0), flexarm_settings::without_types(message))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_count_characters_also_behind_letters_outside_of_ascii() {
+        let text = "a = 1\nname = \"größe µ\", x = 2\n";
+        let source = Source::new(Path::new("f.toml"), text, "robot");
+        let at = text.find('x').unwrap_or_default();
+        let error = source.error(at..at + 1, "no");
+        assert_eq!((error.line, error.column), (2, 19));
     }
 }

@@ -91,7 +91,7 @@ pub fn read_yaml<'t, E: From<YamlError>>(
             }
             Event::Alias(anchor) => {
                 let named = anchors.get(&anchor);
-                let named = named.ok_or_else(|| fail("an alias stands inside of what it names".to_owned()))?;
+                let named = named.ok_or_else(|| fail("an alias refers to a node that contains it".to_owned()))?;
                 count += named.size;
                 done = Some(SizedNode { anchor: 0, ..named.clone() });
             }
@@ -158,7 +158,7 @@ mod tests {
         let deep = fails(&chain(MOST_NESTED), 10_000);
         assert_eq!((deep.line, deep.message.contains("nested more than 40 deep")), (41, true), "{deep:?}");
         assert!(fails(&chain(30), 200).message.contains("more than 200 numbers"));
-        assert!(fails("a: &a [*a]", 100).message.contains("an alias stands inside"));
+        assert!(fails("a: &a [*a]", 100).message.contains("an alias refers to"));
         assert_eq!(fails("a: [1, 2\nb: }", 100).line, 2);
     }
 }

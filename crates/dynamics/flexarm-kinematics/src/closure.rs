@@ -1210,7 +1210,7 @@ fn check_alive(model: &Model, closure: &LoopClosure, k: usize, q: &[f64]) -> Res
     let dead = solved.open == Some(k) || flattest.is_nan() || flattest < DEAD_RAD;
     if dead {
         let what = format!(
-            "it is assembled at a dead point, where its links lie in a line and {:?} and {:?} do not follow from the pin: give values in at \
+            "it is assembled at a dead point, where its links are collinear and {:?} and {:?} do not follow from the pin: give values in at \
              away from it, or choose other dependent joints",
             closure.dependent[0], closure.dependent[1]
         );

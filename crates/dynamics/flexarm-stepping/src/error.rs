@@ -62,7 +62,7 @@ pub enum StepError {
     },
     /// A closed loop is at a dead point, or its links do not reach each other.
     #[error(
-        "loop {name:?} does not close beyond t = {t:.6} s: its links lie in a line there, or do not reach each other; keep the driving joints \
+        "loop {name:?} does not close beyond t = {t:.6} s: its links are collinear there, or do not reach each other; keep the driving joints \
          away from this dead point, or check the lengths of its links"
     )]
     OpenLoop {

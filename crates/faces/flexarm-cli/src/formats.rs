@@ -75,7 +75,7 @@ pub(crate) fn outputs(args: &RunArgs, folder: PathBuf) -> Result<Outputs, Failur
     let also = args.also.iter().map(|&format| (format, format!("--also {}", format.extension())));
     for (format, flag) in parquet.into_iter().chain(also) {
         if !format.is_built_in() {
-            return Err(Failure::Usage(format!("this program was built without {format}: leave {flag} out")));
+            return Err(Failure::Usage(format!("this program was built without {format}: omit {flag}")));
         }
         outputs = outputs.with(format);
     }

@@ -62,7 +62,7 @@ pub(crate) fn parts<'a>(main: &'a RunArgs, line: &[OsString]) -> Result<Vec<Part
                 return Err(usage(format!("{key} holds for the whole study and cannot differ between its runs")));
             }
             if ["help", "version"].contains(&key) {
-                return Err(usage(format!("{key} is no option of a run")));
+                return Err(usage(format!("{key} is not an option of a run")));
             }
             if key == "name" {
                 label = Some(value.to_owned());

@@ -85,7 +85,7 @@ fn a_run_names_the_flags_that_mend_it() {
     unstable.says(&["rk4 with step 1e-2 s is unstable here", "; use --step or --stepper generalized-alpha\n"]);
     place.write("fast.toml", SWING.replace("60.0", "175.0"));
     let fast = place.refused(&["compare", "robot.toml", "fast.toml", "-o", "result"], &[]);
-    fast.says(&["\nslow it down, change it, or go on anyway with --ignore-limits\n"]);
+    fast.says(&["\nslow it down, change it, or run it anyway with --ignore-limits\n"]);
     place.write("result/run.csv", "of an earlier run");
     let taken = "result/run.csv: exists already and is not overwritten: choose another folder with -o or give --force";
     refused(&place, &COMPARE, &[(&[], taken)]);

@@ -342,8 +342,8 @@ mod bad_loads_files {
         refused(&load("kind = \"expression\""), "kind", &["needs some of fx"]);
         refused(&load("kind = \"expression\"\nfx = \"2*(t\""), "fx", &["2*(t"]);
         refused(&load("kind = \"expression\"\nfx = \"2*x\""), "fx", &["\"x\"", "only t"]);
-        refused(&load("kind = \"expression\"\nfx = \"1/0\""), "fx", &["no finite number"]);
-        refused(&load("kind = \"expression\"\nfx = \"ln(t)\""), "fx", &["no finite number at t = 0 s"]);
+        refused(&load("kind = \"expression\"\nfx = \"1/0\""), "fx", &["not a finite number"]);
+        refused(&load("kind = \"expression\"\nfx = \"ln(t)\""), "fx", &["not a finite number at t = 0 s"]);
     }
 
     /// Of two columns with the same name the last used to win silently.

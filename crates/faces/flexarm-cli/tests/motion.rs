@@ -252,7 +252,7 @@ fn files_are_recognised_by_content_and_what_is_none_is_refused_with_the_list() {
     place.write("letter.txt", "Dear Sir,\nthis is no motion.\n");
     place.refused(
         &["motion", "letter.txt"],
-        &["this is no motion that can be read", "Dear Sir", "bags as MCAP", "waypoints (TOML)", "tables"],
+        &["this is not a readable motion", "Dear Sir", "bags as MCAP", "waypoints (TOML)", "tables"],
     );
     std::fs::copy(fixture("states_bz2.bag"), place.path("ros1.log")).unwrap();
     assert_eq!(place.json(&["motion", "ros1.log"])["format"], "bag of ROS 1, sensor_msgs/JointState");
@@ -261,7 +261,7 @@ fn files_are_recognised_by_content_and_what_is_none_is_refused_with_the_list() {
     place.write("nothing.yaml", "a: 1\n");
     place.refused(&["motion", "nothing.yaml"], &["there is no motion in the text", "joint_names"]);
     place.write("folder/x.txt", "1");
-    place.refused(&["motion", "folder"], &["the folder is no bag of rosbag2"]);
+    place.refused(&["motion", "folder"], &["the folder is not a rosbag2 bag"]);
     let bag = fixture("both.mcap");
     let bag = bag.to_str().unwrap();
     place.refused(&["motion", bag, "--topic", "/x"], &["--topic", "/x", "is not in the file", "/joint_states"]);

@@ -635,5 +635,5 @@ impl PyArm {
 
 /// Error of results that exist only for a single pose.
 pub(crate) fn only_for_one(what: &str) -> PyErr {
-    PyRuntimeError::new_err(format!("{what} is there for a single pose: ask for one"))
+    PyRuntimeError::new_err(format!("{what} is available for a single pose only"))
 }

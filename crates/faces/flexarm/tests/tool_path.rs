@@ -217,7 +217,7 @@ fn what_is_wrong_is_told_with_its_place_and_the_remedy() {
         (format!("{head}{start}[[move]]\nlin = [1, 2, 3]\n"), "unknown field `lin`"),
         (format!("{head}[[move]]\nline = [1700, 0, 1300]\n"), "orientation of the tool is not known"),
         (format!("{head}[[move]]\nline = [1700, 0, 1300]\nrpy = [0, 90, 0]\n"), "begins with a move of the tool"),
-        (format!("{head}{start}[[move]]\nline = [9000, 0, 1300]\n"), "the arm cannot go on beyond"),
+        (format!("{head}{start}[[move]]\nline = [9000, 0, 1300]\n"), "the arm cannot continue beyond"),
         (format!("{head}{start}[[move]]\njoint_to = [9000, 0, 1300]\n"), "out of reach by about"),
         (format!("{head}[[move]]\njoints = [0, -60, 90]\n"), "3 values for the 6 joints"),
         (

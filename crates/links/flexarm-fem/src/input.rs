@@ -18,7 +18,7 @@ pub fn read_file(path: &Path, largest: u64) -> std::io::Result<Vec<u8>> {
     // One byte more than allowed, to detect a larger file.
     File::open(path)?.take(largest + 1).read_to_end(&mut bytes)?;
     if bytes.len() as u64 > largest {
-        let what = format!("more than {largest} bytes, which is more than is read");
+        let what = format!("more than {largest} bytes, the limit");
         return Err(std::io::Error::new(std::io::ErrorKind::FileTooLarge, what));
     }
     Ok(bytes)

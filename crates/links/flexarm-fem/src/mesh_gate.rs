@@ -245,8 +245,7 @@ impl ElementQuality {
         let (value, usual) = (self.largest_offset, MeshGate::LARGEST_OFFSET);
         if value > usual {
             let said = format!(
-                "a mid-side node of element {} stands {value:.2} of the length of its edge from the middle of it, usual is \
-                 below {usual}: is it in the wrong place, or the mesh too coarse for the curve?",
+                "a mid-side node of element {} is off the middle of its edge by {value:.2} of the edge's length, usually below {usual}: is it in the wrong place, or the mesh too coarse for the curve?",
                 self.bent_element
             );
             doubts.push(Doubt::found("mid-side-node", value, usual, said));

@@ -357,8 +357,7 @@ fn suspicious(mesh: &Mesh, bodies: &Bodies) -> Vec<Doubt> {
         let p = mesh.nodes[*first as usize];
         let faces = if found.faces > 0 { format!(", {} faces lie on each other", found.faces) } else { String::new() };
         let said = format!(
-            "{} pair(s) of nodes lie in one place without being one node{faces} (first: node {} at {:.6}, {:.6}, {:.6} m): a \
-             crack, through which no force goes; merge coincident nodes (Coherence in Gmsh, or merge in the reduction) if \
+            "{} pair(s) of nodes lie in one place without being one node{faces} (first: node {} at {:.6}, {:.6}, {:.6} m): a crack, which transmits no force; merge coincident nodes (Coherence in Gmsh, or merge in the reduction) if \
              the body is whole",
             found.pairs.len(),
             mesh.node_ids[*first as usize],

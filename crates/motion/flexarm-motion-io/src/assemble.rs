@@ -191,8 +191,7 @@ fn states(mut topic: Topic, has_clock: bool, told: &mut FileCaveats<'_>) -> Resu
         return Err(PlacedProblem::new(Problem::NoPositions));
     }
     if not_finite > 0 {
-        let what =
-            format!("{not_finite} of {count} positions are no numbers and are left out; the curves pass over them");
+        let what = format!("{not_finite} of {count} positions are not numbers and are skipped; the curves bridge them");
         told.warn("motion-positions", &what, "look at the recording: a robot that is not connected says so");
     }
     let use_log = clock(&topic.series, has_clock, told)?;
@@ -521,7 +520,7 @@ fn tell_plan(messages: &[&Received], by_stamp: bool, has_clock: bool, segments: 
             (false, false) => "the end of the one before (nothing says when they were sent)",
         };
         let what = format!(
-            "{} trajectories: each begins at {begin} and takes the place of what is left of the one before",
+            "{} trajectories: each begins at {begin} and replaces the rest of the previous one",
             messages.len()
         );
         told.warn("motion-messages", &what, "");

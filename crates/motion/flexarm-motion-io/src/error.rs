@@ -69,13 +69,13 @@ pub enum Problem {
         message: String,
     },
     /// Too many values for memory.
-    #[error("more than {most} numbers, which is more than is read; cut the recording, or leave out samples")]
+    #[error("more than {most} numbers, the limit; cut the recording, or leave out samples")]
     TooManyNumbers {
         /// Maximum number of values.
         most: usize,
     },
     /// The file is too large.
-    #[error("more than {most} bytes, which is more than is read of such a file; {mend}")]
+    #[error("more than {most} bytes, the limit for such a file; {mend}")]
     TooLarge {
         /// Maximum number of bytes.
         most: u64,
@@ -232,7 +232,7 @@ pub enum Problem {
         readable: String,
     },
     /// Topic requested from a text, which has no topics.
-    #[error("a topic was asked for ({} {asked:?}), and a text of messages has none; leave it out", Setting::Topic)]
+    #[error("a topic was requested ({} {asked:?}), but a text of messages has none; leave it out", Setting::Topic)]
     TopicOfText {
         /// Topic requested.
         asked: String,
@@ -244,10 +244,10 @@ pub enum Problem {
         names: Vec<String>,
     },
     /// No usable sample.
-    #[error("there is no position that is a number; was the robot connected when this was recorded?")]
+    #[error("no position is a number; was the robot connected when this was recorded?")]
     NoPositions,
     /// Folder that is not a bag.
-    #[error("the folder is no bag of rosbag2: {what}; expected metadata.yaml and files *.mcap or *.db3 in it")]
+    #[error("the folder is not a rosbag2 bag: {what}; expected metadata.yaml and files *.mcap or *.db3 in it")]
     NotABag {
         /// Missing item.
         what: String,

@@ -83,7 +83,7 @@ fn in_words(error: McapError) -> String {
         McapError::UnsupportedCompression(other) => {
             format!("a chunk is packed by {other:?}; read are zstd, lz4 and none")
         }
-        McapError::DecompressionError(what) => format!("what is packed in it is damaged or not whole ({what})"),
+        McapError::DecompressionError(what) => format!("its compressed content is damaged or incomplete ({what})"),
         other => format!("damaged: {other}"),
     }
 }

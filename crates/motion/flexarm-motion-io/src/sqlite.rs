@@ -65,7 +65,7 @@ fn collect(database: &Connection, into: &mut Collector<'_>) -> Result<Option<Str
     let has = |table: &str| tables.iter().any(|name| name == table);
     if !has("topics") || !has("messages") {
         let what = format!(
-            "it has no tables `topics` and `messages`, so it is no bag of rosbag2; its tables are {}",
+            "it has no tables `topics` and `messages`, so it is not a rosbag2 bag; its tables are {}",
             if tables.is_empty() { "none".to_owned() } else { tables.join(", ") }
         );
         return Err(PlacedProblem::new(Problem::Container { container: "SQLite file", what }));

@@ -23,7 +23,7 @@ pub(crate) fn unpacked(packing: Packing, bytes: &[u8]) -> (Vec<u8>, Option<Strin
         Packing::Lz4 => lz4_flex::frame::FrameDecoder::new(bytes).take(MOST_BYTES + 1).read_to_end(&mut out),
     };
     let broken = match result {
-        Err(error) => Some(format!("what is packed in it is damaged or not whole ({error})")),
+        Err(error) => Some(format!("its compressed content is damaged or incomplete ({error})")),
         Ok(_) if out.len() as u64 > MOST_BYTES => Some(format!("it unpacks to more than {MOST_BYTES} bytes")),
         Ok(_) => None,
     };
@@ -80,7 +80,7 @@ pub(crate) fn look_inside(path: &Path) -> Result<Inside, MotionError> {
     let origin = path.display().to_string();
     if !head.starts_with(crate::SQLITE_MAGIC) {
         let what =
-            "what is packed in it is neither MCAP nor a database of rosbag2; unpack it to see what it is".to_owned();
+            "its compressed content is neither MCAP nor a rosbag2 database; decompress it to see what it is".to_owned();
         return Err(PlacedProblem::new(Problem::NotRead { what }).of(&origin));
     }
     let mut bytes = Vec::new();

@@ -363,7 +363,7 @@ fn repeated_stamps_disorder_and_positions_that_are_no_numbers_are_left_out_and_t
     let said = told(&motion).join("\n");
     assert!(said.contains("1 samples have the time of the one before"), "{said}");
     assert!(said.contains("1 samples came out of order"), "{said}");
-    assert!(said.contains("1 of 25 positions are no numbers"), "{said}");
+    assert!(said.contains("1 of 25 positions are not numbers"), "{said}");
 }
 
 #[test]
@@ -593,8 +593,8 @@ fn sizes_that_a_bag_makes_up_are_refused() {
         (record(5, 200 << 20, b"bytes"), "its end is missing"),
         (record(3, long_text.len() as u64, &long_text), "a record ends within a value"),
         (chunk("zstd", 1 << 40, b"bytes"), "to have 1099511627776 bytes, at most 268435456 are read at once"),
-        (chunk("lz4", 1 << 20, b"bytes"), "what is packed in it is damaged or not whole"),
-        (chunk("zstd", 1 << 20, b"bytes"), "what is packed in it is damaged or not whole"),
+        (chunk("lz4", 1 << 20, b"bytes"), "its compressed content is damaged or incomplete"),
+        (chunk("zstd", 1 << 20, b"bytes"), "its compressed content is damaged or incomplete"),
         (chunk("brotli", 1 << 20, b"bytes"), "a chunk is packed by \"brotli\"; read are zstd, lz4 and none"),
     ];
     for (bytes, expected) in cases {

@@ -407,8 +407,7 @@ pub(crate) fn blocked_error(of: &Move, curve: &ToolCurve, blocked: Blocked) -> P
         format!("the arm has too few joints to follow this path with its orientation beyond {place}")
     } else {
         format!(
-            "the arm cannot go on beyond {place}: it is out of reach or at a singular pose, where joint {:?} would have to move \
-             without bound (least singular value {:.1e} m/rad): move the path or the workpiece, or go there by a joint move",
+            "the arm cannot continue beyond {place}: it is out of reach or at a singular pose, where joint {:?} would have to move without bound (minimum singular value {:.1e} m/rad): move the path or the workpiece, or go there by a joint move",
             blocked.joint, blocked.sigma
         )
     };

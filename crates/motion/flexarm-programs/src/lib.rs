@@ -55,7 +55,7 @@ pub use rewrite::{NewTarget, ProgramText, Rewritten, read_program_text};
 #[non_exhaustive]
 pub enum ProgramError {
     /// No language was recognised.
-    #[error("{}: this is no robot program that can be read: KUKA KRL, ABB RAPID, URScript and G-code are; if it is one of them, name it (`language`)", path.display())]
+    #[error("{}: this is not a readable robot program: KUKA KRL, ABB RAPID, URScript and G-code are read; if it is one of them, name it (`language`)", path.display())]
     Unknown {
         /// The file.
         path: PathBuf,

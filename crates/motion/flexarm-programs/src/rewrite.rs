@@ -143,7 +143,7 @@ impl ProgramText {
             .ok_or("its target is computed, relative or the end of an arc given by its angle, not a literal")?;
         let mut edits = self.literal(source, target)?;
         if let Some(via) = via {
-            let source = sources.via.ok_or("its auxiliary point is no literal")?;
+            let source = sources.via.ok_or("its auxiliary point is not a literal")?;
             edits.extend(self.point(source, via)?);
         }
         Ok(edits)
@@ -151,26 +151,26 @@ impl ProgramText {
 
     /// Parses the literal at a place; spans are relative to its file.
     fn parsed(&self, source: Span) -> Result<Expr, &'static str> {
-        let text = self.texts.get(source.file).ok_or("its target stands in no file")?;
+        let text = self.texts.get(source.file).ok_or("its target is in no file")?;
         let name = text.path.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
         // The last text holds the given values.
         if source.file + 1 == self.texts.len() && self.texts.len() > 1 {
             return Err("its target was given beside the files");
         }
         if name == CONFIGURATION {
-            return Err("its target stands in the controller's own data");
+            return Err("its target is in the controller's own data");
         }
         let (syntax, spelling) = match self.language {
             Language::Krl => (Syntax::Krl, &krl::SPELLING),
             _ => (Syntax::Rapid, &rapid::SPELLING),
         };
-        let literal = text.text.get(source.start..source.end).ok_or("its target stands in no file")?;
-        let mut lexemes = tokens(literal, source.file, spelling).map_err(|_| "its target is no literal")?;
+        let literal = text.text.get(source.start..source.end).ok_or("its target is in no file")?;
+        let mut lexemes = tokens(literal, source.file, spelling).map_err(|_| "its target is not a literal")?;
         for lexeme in &mut lexemes {
             lexeme.span.start += source.start;
             lexeme.span.end += source.start;
         }
-        Parser::new(syntax, lexemes).expression().map_err(|_| "its target is no literal")
+        Parser::new(syntax, lexemes).expression().map_err(|_| "its target is not a literal")
     }
 
     fn literal(&self, source: Span, target: &NewTarget) -> Result<Edits, &'static str> {
@@ -219,7 +219,7 @@ impl ProgramText {
                     put_list(&mut edits, parts.get(2), &[*a, *b, *c, *cfx].map(f64::from), 0)?;
                 }
             }
-            _ => return Err("its target is no literal"),
+            _ => return Err("its target is not a literal"),
         }
         Ok(edits)
     }
@@ -235,7 +235,7 @@ impl ProgramText {
                 }
             }
             Kind::List(parts) => put_list(&mut edits, parts.first(), p.as_slice(), DIGITS[0])?,
-            _ => return Err("its auxiliary point is no literal"),
+            _ => return Err("its auxiliary point is not a literal"),
         }
         Ok(edits)
     }
@@ -324,7 +324,7 @@ fn put_field(
 }
 
 fn put_list(edits: &mut Edits, list: Option<&Expr>, values: &[f64], digits: usize) -> Result<(), &'static str> {
-    let Some(Expr { kind: Kind::List(old), .. }) = list else { return Err("a part of its target is no literal") };
+    let Some(Expr { kind: Kind::List(old), .. }) = list else { return Err("a part of its target is not a literal") };
     if old.len() < values.len() {
         return Err("its target has too few numbers");
     }

@@ -195,7 +195,7 @@ fn codes_that_cannot_be_run_are_named_with_place_and_remedy() {
         ("O100 sub", "subroutines and loops (O words) are not read"),
         ("G1 A30", "rotary axes are not read as they are"),
         ("G1 U3", "the axis U is not read"),
-        ("G12 X3", "this code is not known here"),
+        ("G12 X3", "this code is unknown"),
         ("G4", "G4 needs its time"),
         ("G1 Xa", "a number is expected behind the letter"),
         ("G1 F0 X3", "the feed is 0: it must be above 0"),

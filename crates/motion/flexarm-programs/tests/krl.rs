@@ -141,7 +141,7 @@ fn a_relative_move_from_joint_values_uses_the_kinematics_that_are_given() {
     let text =
         "DEF r()\n$TOOL={X 0,Y 0,Z 100,A 0,B 0,C 0}\nPTP {A1 90,A2 0,A3 0,A4 0,A5 0,A6 0}\nLIN_REL {X 50}\nEND\n";
     let refused = read_text("r.src", text, &ReadOptions::default()).unwrap_err();
-    assert!(refused.starts_with("r.src:4:9: `{X 50}`: what is not given stays"), "{refused}");
+    assert!(refused.starts_with("r.src:4:9: `{X 50}`: coordinates that are not given stay"), "{refused}");
     // An arm of one metre that rotates about z.
     let forward = |q: &[f64]| -> Option<Pose> {
         Some(at_mm(1000.0 * q[0].cos(), 1000.0 * q[0].sin(), 0.0, euler_product(q[0].to_degrees(), 0.0, 0.0)))
@@ -184,7 +184,7 @@ fn statements_that_cannot_be_run_are_named_with_place_and_remedy() {
             "a relative turn by B or C in the base is understood in two ways",
         ),
         ("PTP_SPLINE\nSPL {X 1}\nENDSPLINE", "splines of joint moves (PTP_SPLINE) are not read"),
-        ("SPL {X 1,Y 2,Z 3,A 0,B 0,C 0}", "SPL stands in a SPLINE block only"),
+        ("SPL {X 1,Y 2,Z 3,A 0,B 0,C 0}", "SPL is allowed in a SPLINE block only"),
         ("PTP XHOME9", "depends on `XHOME9`, in `$config.dat` (`companions`), which only the controller knows"),
         ("IF TRUE THEN\nPTP {A1 5}", "t.src:3:1: `IF`: this block does not end: `ENDIF` is missing"),
         ("x = 1 / 0", "`1 / 0`: a division by 0"),

@@ -108,7 +108,7 @@ fn statements_that_cannot_be_run_are_named_with_place_and_remedy() {
             "MoveL [[600,0,7],[1,0,0,0],[0,0,0,0],[5,9E9,9E9,9E9,9E9,9E9]], v100, fine, tool0;\nMoveL [[600,0,7],[1,0,0,0],[0,0,0,0],[9,9E9,9E9,9E9,9E9,9E9]], v100, fine, tool0;",
             "external axis 1 moves, from 5 (line 4) to 9",
         ),
-        ("SearchL di1, p1, p2, v100, tool0;", "this instruction changes the motion by what is not in the program"),
+        ("SearchL di1, p1, p2, v100, tool0;", "this instruction changes the motion by data outside the program"),
         ("GOTO there;", "jumps (GOTO) are not read"),
         ("%\"proc\"%;", "calls by a text (%...%) are not read"),
         ("Weld 3;", "`Weld 3`: the instruction or routine `weld` is not known here"),

@@ -84,7 +84,7 @@ fn statements_that_cannot_be_run_are_named_with_place_and_remedy() {
             "movel(get_actual_tcp_pose())",
             "t.script:3:9: `get_actual_tcp_pose()`: depends on `get_actual_tcp_pose(...)`",
         ),
-        ("servoj([0,0,0,0,0,0])", "`servoj([0,0,0,0,0,0])`: `servoj` moves the robot by what is not in the program"),
+        ("servoj([0,0,0,0,0,0])", "`servoj([0,0,0,0,0,0])`: `servoj` moves the robot by data outside the program"),
         ("while True:\n movej([0,0,0,0,0,1])\nend", "t.script:3:3: `while True:`: this loop does not end"),
         ("if get_digital_in(1):\n movej([0,0,0,0,0,1])\nend", "`get_digital_in(1)`: depends on `get_digital_in(...)`"),
         ("movej([0,0,0,0,0])", "a list of 6 joint values in rad is expected, found 5"),

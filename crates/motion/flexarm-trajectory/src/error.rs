@@ -161,7 +161,7 @@ fn mismatch(missing: &[String], unknown: &[String]) -> String {
         text += &format!("unknown {}; ", list(unknown));
     }
     if text.is_empty() {
-        text += "a joint is asked for twice; ";
+        text += "a joint is requested twice; ";
     }
     text
 }

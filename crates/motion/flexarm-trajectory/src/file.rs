@@ -46,7 +46,7 @@ fn read(path: &Path) -> std::io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     File::open(path)?.take(LARGEST + 1).read_to_end(&mut bytes)?;
     if bytes.len() as u64 > LARGEST {
-        let what = format!("more than {LARGEST} bytes, which is more than is read; leave out rows or digits");
+        let what = format!("more than {LARGEST} bytes, the limit; leave out rows or digits");
         return Err(Error::new(ErrorKind::FileTooLarge, what));
     }
     Ok(bytes)

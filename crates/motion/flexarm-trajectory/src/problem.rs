@@ -65,7 +65,7 @@ pub enum Problem {
     },
     /// Too many values for memory.
     #[error(
-        "more than {most} numbers, which is more than is read (an hour of six joints at 1 kHz has 25 million); leave out rows: splines pass between them"
+        "more than {most} numbers, the limit (an hour of six joints at 1 kHz has 25 million); leave out rows: splines pass between them"
     )]
     TooManyNumbers {
         /// Maximum number of values.
@@ -151,8 +151,7 @@ pub enum Problem {
     },
     /// Commas both as column separators and as decimal separators.
     #[error(
-        "the row has {found} fields, the header {expected}: twice as many, as if numbers had decimal commas between commas, \
-         which nobody can tell apart; export the table with semicolons, or with points in numbers"
+        "the row has {found} fields, the header {expected}: twice as many, as if numbers had decimal commas between commas, which is ambiguous; export the table with semicolons, or with points in numbers"
     )]
     DecimalCommas {
         /// Number of fields in the row.

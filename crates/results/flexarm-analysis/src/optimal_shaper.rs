@@ -55,7 +55,7 @@ pub enum ShaperError {
     },
     /// A delay of too many periods of the fastest mode.
     #[error(
-        "a delay of {delay_s} s is {periods:.0} periods of the quickest mode, at most {most} are searched: ask for less delay, or for fewer modes"
+        "a delay of {delay_s} s is {periods:.0} periods of the quickest mode, at most {most} are searched: choose a shorter delay or fewer modes"
     )]
     Long {
         /// Requested delay (s).
@@ -66,7 +66,7 @@ pub enum ShaperError {
         most: f64,
     },
     /// The solver found no minimum.
-    #[error("no shaper is found for a delay of {delay_s} s: ask for another delay, or for fewer modes")]
+    #[error("no shaper is found for a delay of {delay_s} s: choose another delay or fewer modes")]
     Unsolved {
         /// Requested delay (s).
         delay_s: f64,

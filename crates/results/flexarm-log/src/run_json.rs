@@ -307,7 +307,7 @@ pub(crate) mod meshes {
             total.filter(|total| *total / 100_000 <= block.len()).ok_or("its counts of corners are too large")?;
         let bytes = zstd::bulk::decompress(block, total).map_err(|error| error.to_string())?;
         if bytes.len() != total {
-            return Err(format!("it has {} bytes, the list of meshes asks for {total}", bytes.len()));
+            return Err(format!("it has {} bytes, the list of meshes requires {total}", bytes.len()));
         }
         let mut words = bytes.chunks_exact(4).map(|word| [word[0], word[1], word[2], word[3]]);
         let mut word = || words.next().unwrap_or_default();

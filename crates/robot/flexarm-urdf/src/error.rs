@@ -222,7 +222,7 @@ pub enum Problem {
     )]
     TriangleInequality { link: String, moments: [f64; 3], excess: f64 },
     /// A density or total mass for the estimate of inertias that is not positive.
-    #[error("inertia from meshes was asked for with {what} {value}, expected a positive number")]
+    #[error("inertia from meshes was requested with {what} {value}, expected a positive number")]
     BadEstimate { what: &'static str, value: f64 },
 }
 
@@ -301,7 +301,7 @@ impl Problem {
                 None => "types are fixed, revolute, continuous and prismatic".into(),
             },
             Self::UnsupportedJoint { kind, .. } => match kind.as_str() {
-                "floating" => "the base stands still here: make the joint fixed, or replace it by three prismatic and \
+                "floating" => "the base is fixed here: make the joint fixed, or replace it by three prismatic and \
                                three revolute joints in series"
                     .into(),
                 "planar" => "replace it by two prismatic and one continuous joint in series".into(),
@@ -313,7 +313,7 @@ impl Problem {
             }
             Self::MissingLimit { .. } => "add <limit lower=\"..\" upper=\"..\" effort=\"..\" velocity=\"..\"/>".into(),
             Self::LimitsReversed { .. } => "exchange lower and upper; angles are in radians".into(),
-            Self::NegativeLimit { .. } => "limits of speed and effort are magnitudes; 0 stands for unknown".into(),
+            Self::NegativeLimit { .. } => "limits of speed and effort are magnitudes; 0 means unknown".into(),
             Self::ZeroAxis { .. } => "write the axis as a unit vector, such as xyz=\"0 0 1\"".into(),
             Self::MimicCycle { .. } => "let one of them go without <mimic>".into(),
             Self::NegativeMass { .. } => "correct the sign; a counterweight has positive mass too".into(),

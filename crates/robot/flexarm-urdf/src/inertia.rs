@@ -224,7 +224,8 @@ fn check_body(
     let thin = thin.into_iter().find(|&i| !options.waive.contains(&robot.links[i].name))?;
     let name = &robot.links[thin].name;
     if robot.links[thin].inertial.as_ref().is_some_and(|raw| raw.mass > 0.0) {
-        let message = format!("link {name:?} has mass and no inertia about some axis: it counts as a point or a rod");
+        let message =
+            format!("link {name:?} has mass and no inertia about some axis: it is treated as a point or a rod");
         report.warning(place(thin), "point-mass", message, "give the inertia about the centre of mass");
     }
     None

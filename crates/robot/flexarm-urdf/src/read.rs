@@ -201,7 +201,7 @@ fn parse(text: &str, path: &Path, options: &ReadOptions) -> (Result<UrdfRobot, U
     let resolver = resolver(path, options);
     if !(xacro::is_xacro(path) || xacro::has_xacro(text)) {
         if let Some((name, _)) = options.arguments.first() {
-            let message = format!("the argument {name:?} has no effect: the file is no xacro");
+            let message = format!("the argument {name:?} has no effect: the file is not a xacro file");
             report.warning(&xml::Lines::new(path, text).place(0), "unused-argument", message, "remove it");
         }
         let result = parse_expanded(text, xml::Lines::new(path, text), &[], &resolver, options, &mut report);

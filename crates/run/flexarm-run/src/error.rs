@@ -91,7 +91,7 @@ pub enum Error {
     Motion(#[from] flexarm_motion_io::MotionError),
     /// The trajectory exceeds joint limits.
     #[error(
-        "{}: the trajectory passes {} joint limits:\n  {}\nslow it down, change it, or go on anyway with {}",
+        "{}: the trajectory passes {} joint limits:\n  {}\nslow it down, change it, or run it anyway with {}",
         path.display(), violations.len(), violations.join("\n  "), Setting::IgnoreLimits
     )]
     Limits {

@@ -174,7 +174,7 @@ impl RobotLink {
         let wanted = modelling.modes.or(self.choices.modes);
         if let Some(modes) = wanted.filter(|modes| *modes > MOST_MODES) {
             let message = format!(
-                "link {name:?}: {modes} modes are asked for, at most {MOST_MODES} are taken: the work of a step grows with the cube of their \
+                "link {name:?}: {modes} modes are requested, at most {MOST_MODES} are allowed: the work of a step grows with the cube of their \
                  number, and those beyond the first dozen are far above what a drive or a tool excites"
             );
             return Err((RequestedKey::Modes, message));

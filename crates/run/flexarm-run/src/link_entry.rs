@@ -244,7 +244,7 @@ fn beam_link(
     let length = axis.norm();
     if !(length.is_finite() && length >= 1e-6) {
         let text = match beam.ends {
-            Some(_) => "its ends lie at one place: a beam needs a length",
+            Some(_) => "its ends coincide: a beam needs a length",
             None => {
                 "its distal joint lies at the link's origin: a beam needs a length, or ends = [[x, y, z], [x, y, z]]"
             }

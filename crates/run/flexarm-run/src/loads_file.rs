@@ -532,7 +532,7 @@ fn part(
     for t in [start.max(0.0), 0.5 * (start.max(0.0) + end), end] {
         let probe = parsed.eval(if timed { std::slice::from_ref(&t) } else { &[] });
         if !probe.is_ok_and(|x: f64| x.is_finite()) {
-            return Err(fail(format!("expression {text:?} is no finite number at t = {t} s")));
+            return Err(fail(format!("expression {text:?} is not a finite number at t = {t} s")));
         }
     }
     Ok((parsed, timed))

@@ -177,7 +177,7 @@ fn unknown(head: &Head<'_>) -> String {
         (_, Some(line)) => format!("it begins with {:?}", line.chars().take(40).collect::<String>()),
         (_, None) => "it has no text".to_owned(),
     };
-    format!("this is no motion that can be read: {found}; read are {}; rename or convert the file", names.join(", "))
+    format!("this is not a readable motion: {found}; readable are {}; rename or convert the file", names.join(", "))
 }
 
 // -------------------------------------------------------------------------------------------------------------

@@ -404,8 +404,7 @@ impl Robot {
         }
         if mass == 0.0 {
             let help = "leave the payload out if there is none";
-            let none =
-                Caveat::from_message("no-payload", "the payload", "the payload has 0 kg: it counts as none", help);
+            let none = Caveat::from_message("no-payload", "the payload", "the payload has 0 kg: it is ignored", help);
             self.written.push(none.as_note());
             return Ok(());
         }
@@ -618,7 +617,7 @@ fn held_joint(
         let meant = closest(name, names.iter().copied());
         let meant =
             meant.map_or_else(|| format!("its joints are {names:?}"), |meant| format!("did you mean {meant:?}?"));
-        let message = format!("hold: {name:?} is no joint of the robot that moves independently; {meant}");
+        let message = format!("hold: {name:?} is not an independent joint of the robot; {meant}");
         return Err(source.error(value.span(), message));
     };
     let (lower, upper) = (joint.limits.lower, joint.limits.upper);

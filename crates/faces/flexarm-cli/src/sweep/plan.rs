@@ -171,7 +171,7 @@ impl Plan<'_> {
         let (n, cores) = (args.shards, args.cores);
         let job = format!(
             "#!/bin/bash\n#SBATCH --job-name={name}\n#SBATCH --array=1-{n}\n#SBATCH --cpus-per-task={cores}\n#SBATCH --requeue\n\
-             #SBATCH --open-mode=append\n#SBATCH --output={name}-%a.log\n# A task that is requeued goes on where it was. Set time, memory \
+             #SBATCH --open-mode=append\n#SBATCH --output={name}-%a.log\n# A task that is requeued continues where it stopped. Set time, memory \
              and partition as your cluster asks for.\nexec {}\n",
             self.shard("\"$SLURM_ARRAY_TASK_ID\"")
         );

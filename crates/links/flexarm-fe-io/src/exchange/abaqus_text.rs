@@ -39,7 +39,7 @@ pub(super) fn parse_labelled(text: Text<'_>) -> Result<(LabelledMatrix, Option<S
     let warning = internal.last().map(|last| {
         format!(
             "{} rows have negative node numbers ({last}, ...): internal unknowns of Abaqus (Lagrange multipliers of \
-             ties, hybrid elements, or modal coordinates of a substructure); they stand last",
+             ties, hybrid elements, or modal coordinates of a substructure); they come last",
             internal.len()
         )
     });

@@ -49,7 +49,7 @@ pub fn diagnose_substructure(
          matrices with *FREQUENCY, SOLVER=MATRIXSTORAGE and import .sti, .mas and .dof, or reduce the mesh itself \
          with `flexarm reduce`"
     } else {
-        "was the matrix not condensed, or do the rows belong to other interfaces?"
+        "is the matrix not condensed, or are the rows those of other interfaces?"
     };
     let expected = "a free structure whose interfaces feel each other";
     Err(ErrorPosition::file(&imported.origin).fail(ExchangeErrorKind::Defective, "stiffness", found, expected, help))

@@ -55,8 +55,7 @@ pub enum ReductionError {
     },
     /// An interface after the first can move without force.
     #[error(
-        "interface number {} can move without force while the first one is held ({direction}): do the two stand on the same \
-         part of the model, and is that part connected in more than a point or a line?", interface + 1
+        "interface number {} can move without force while the first one is held ({direction}): are the two on the same part of the model, and is that part connected in more than a point or a line?", interface + 1
     )]
     FreeInterface {
         /// Number of the interface, from 0.

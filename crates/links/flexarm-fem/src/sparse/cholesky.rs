@@ -162,7 +162,7 @@ fn supernodes(symbolic: &SymbolicCholesky<u32>) -> Option<&SymbolicSupernodalCho
     match symbolic.raw() {
         SymbolicCholeskyRaw::Supernodal(raw) => Some(raw),
         SymbolicCholeskyRaw::Simplicial(_) if symbolic.nrows() == 0 => None,
-        SymbolicCholeskyRaw::Simplicial(_) => unreachable!("factors by blocks were asked for"),
+        SymbolicCholeskyRaw::Simplicial(_) => unreachable!("a supernodal factor was requested"),
     }
 }
 

@@ -595,7 +595,7 @@ impl<'a, D: Dialect> Machine<'a, D> {
         }
         match slot {
             Value::Pose(pose) if index < 6 => Ok(Some(&mut pose[index])),
-            Value::Pose(_) => fail(span, format!("{at} is no index of a pose: they go from 0 to 5")),
+            Value::Pose(_) => fail(span, format!("{at} is not an index of a pose: expected 0 to 5")),
             _ => Ok(None),
         }
     }
@@ -838,7 +838,7 @@ fn part_of<'v>(value: &'v mut Value, part: &Part, first: i64, span: Span) -> Res
         Part::Index(at) => {
             let index = usize::try_from(at - first).ok().filter(|index| *index < LARGEST);
             let Some(index) = index else {
-                return fail(span, format!("{at} is no index: it must be from {first} to {LARGEST}"));
+                return fail(span, format!("{at} is not an index: expected {first} to {LARGEST}"));
             };
             if matches!(value, Value::Nothing) {
                 *value = Value::list(Vec::new());

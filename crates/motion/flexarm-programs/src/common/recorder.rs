@@ -200,7 +200,7 @@ impl<'a> Recorder<'a> {
         }
         if values.iter().flatten().any(|value| *value != 0.0) {
             self.note(
-                "external axes stand still at the values that the targets give; the base frame is not moved by them",
+                "external axes stay at the values that the targets give; the base frame is not moved by them",
                 span,
             );
         }
@@ -220,7 +220,7 @@ impl<'a> Recorder<'a> {
         let unknown = |why: &str| Fail {
             span,
             message: format!(
-                "what is not given stays, but {why}: write all coordinates of the target, or move to a full pose before"
+                "coordinates that are not given stay, but {why}: write all coordinates of the target, or move to a full pose before"
             ),
         };
         match &self.place {

@@ -79,7 +79,10 @@ pub(crate) fn read(texts: &mut [Text], options: &ReadOptions<'_>) -> Result<Reco
         match value.trim().parse() {
             Ok(number) => parameters.set(name.trim_start_matches('#'), number),
             Err(_) => {
-                return fail(Span::default(), format!("the option `given` has {name} = {value}, which is no number"));
+                return fail(
+                    Span::default(),
+                    format!("the option `given` has {name} = {value}, which is not a number"),
+                );
             }
         }
     }
@@ -103,7 +106,7 @@ pub(crate) fn read(texts: &mut [Text], options: &ReadOptions<'_>) -> Result<Reco
         let Some((first, last)) = words.words.first().zip(words.words.last()) else { continue };
         let span = first.span.to(last.span);
         if words.is_optional {
-            program.recorder.note("lines that begin with / (which a switch leaves out) are run", span);
+            program.recorder.note("lines that begin with / (block skip) are run", span);
         }
         if program.block(&words, span)? {
             is_over = true;
@@ -158,7 +161,7 @@ impl<'a> Gcode<'a> {
                 .note_all("no place of the work frame (G54) was given: its zero is where the controller's world is");
         }
         self.recorder.note_all(
-            "the tool's orientation is given by options, by itself its axis points against the work frame's z",
+            "the tool's orientation comes from the options; by default its axis points against the work frame's z",
         );
     }
 
@@ -189,7 +192,7 @@ impl<'a> Gcode<'a> {
                         return fail(*span, format!("{letter} is {value:e}, expected -{LARGEST:e} to {LARGEST:e}"));
                     }
                     if values.insert(*letter, (*value, *span)).is_some() {
-                        return fail(*span, format!("the letter {letter} stands twice in this line"));
+                        return fail(*span, format!("the letter {letter} occurs twice in this line"));
                     }
                 }
             }
@@ -216,7 +219,7 @@ impl<'a> Gcode<'a> {
             20 | 300 => *is_over = true,
             0 | 10 | 600 => {
                 *stops = true;
-                self.recorder.note("stops for the operator (M0, M1) go on at once", span);
+                self.recorder.note("stops for the operator (M0, M1) are ignored", span);
             }
             60 => {
                 *stops = true;
@@ -662,7 +665,7 @@ fn refused(code: i32) -> String {
         380..=385 => "probing depends on what the tool touches: take the line out",
         330 | 331 | 320 => "threads that follow the spindle are not read",
         70 | 80 => "lathe modes (G7, G8) are not read",
-        _ => "this code is not known here, so what it does to the motion is not either: take it out",
+        _ => "this code is unknown, and so is its effect on the motion: remove it",
     }
     .into()
 }

@@ -86,7 +86,7 @@ pub(crate) fn read(texts: &mut Vec<Text>, options: &ReadOptions<'_>) -> Result<R
                 return fail(routine.span, hint);
             }
             match machine.run(&routine.body)? {
-                Flow::Leave | Flow::Again => return fail(routine.span, "EXIT stands outside of a loop"),
+                Flow::Leave | Flow::Again => return fail(routine.span, "EXIT is outside a loop"),
                 _ => {}
             }
             name.to_string()

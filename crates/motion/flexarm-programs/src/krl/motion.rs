@@ -138,7 +138,7 @@ fn make(machine: &mut Krls<'_>, word: &str, arguments: &[Argument], span: Span) 
             (MoveKind::Line, oriented(machine, &context, to, None, span)?)
         }
         "spl" if machine.dialect.in_spline => (MoveKind::Spline, target(machine, &context, arguments, 0, span)?),
-        "spl" => return fail(span, "SPL stands in a SPLINE block only: put SPLINE before and ENDSPLINE behind it"),
+        "spl" => return fail(span, "SPL is allowed in a SPLINE block only: put SPLINE before and ENDSPLINE after it"),
         _ => arc(machine, &context, arguments, span)?,
     };
     if !is_joint && matches!(to, Target::Joints(_)) {

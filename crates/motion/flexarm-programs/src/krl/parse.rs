@@ -321,9 +321,9 @@ fn simple(parser: &mut Parser, word: &str) -> Result<Vec<Action>> {
             let value = if *parser.peek() == Token::Line { None } else { Some(parser.expression()?) };
             Ok(vec![Action::Return(value)])
         }
-        "halt" => still(parser, "HALT waits for the operator: the program goes on at once"),
+        "halt" => still(parser, "HALT waits for the operator: the program continues at once"),
         "continue" => still(parser, "the advance run is not simulated"),
-        "trigger" => still(parser, "what is switched on the path (TRIGGER) is not simulated"),
+        "trigger" => still(parser, "switching on the path (TRIGGER) is not simulated"),
         "anout" | "anin" | "digin" | "pulse" => still(parser, "inputs and outputs are not simulated"),
         "confirm" | "cwrite" | "cread" | "copen" | "cclose" | "swrite" | "sread" | "on_error_proceed" => {
             still(parser, "messages and channels are not simulated")

@@ -174,7 +174,7 @@ impl Dialect for Rapid {
             "waitrob" => machine.recorder.stop(),
             "stop" | "break" => {
                 machine.recorder.stop();
-                machine.recorder.note("the program stops for the operator: it goes on at once", span);
+                machine.recorder.note("the program stops for the operator: it continues at once", span);
             }
             "exitcycle" => return Ok(Flow::Halt),
             "incr" | "decr" | "add" | "clear" => count(machine, name, arguments, span)?,
@@ -277,7 +277,7 @@ fn still_words(name: &str) -> &'static str {
         "connect" | "idelete" | "ienable" | "idisable" | "iwatch" | "isleep" | "isignaldi" | "isignaldo" | "itimer" => {
             "interrupts are not simulated: none comes"
         }
-        "triggio" | "triggequip" | "triggint" => "what is switched on the path is not simulated",
+        "triggio" | "triggequip" | "triggint" => "switching on the path is not simulated",
         "actunit" | "deactunit" => "mechanical units beside the robot are not simulated",
         _ => "messages, files, clocks and monitoring are not simulated",
     }

@@ -104,7 +104,7 @@ pub(super) fn motion(machine: &mut Rapids<'_>, name: &str, arguments: &[Argument
     if name.ends_with("sync") {
         machine.recorder.note("routines that are called on the path (MoveLSync and the like) are not run", span);
     } else if !matches!(name, "moveabsj" | "movej" | "movel" | "movec") {
-        machine.recorder.note("what is switched on the path is not simulated", span);
+        machine.recorder.note("switching on the path is not simulated", span);
     }
     let (X_WO, X_FT) = frames(machine, arguments, places.tool, span)?;
     let X_WB = X_WO * machine.dialect.settings.displacement;
@@ -193,7 +193,7 @@ fn tool_frame(machine: &mut Rapids<'_>, value: Value, span: Span) -> Result<Pose
     if !flag(&tool, "robhold", span)? {
         return fail(
             span,
-            "this tool stands in the room and the robot carries the work piece (robhold FALSE), which is not read",
+            "this tool is stationary and the robot carries the work piece (robhold FALSE), which is not supported",
         );
     }
     let load = part(machine, &tool, "tload", "loaddata", span)?;
@@ -392,7 +392,7 @@ pub(super) fn setting(machine: &mut Rapids<'_>, name: &str, arguments: &[Argumen
             }
             return fail(
                 span,
-                "this instruction changes the motion by what is not in the program, which is not simulated: take it out",
+                "this instruction changes the motion by data outside the program, which is not simulated: remove it",
             );
         }
         "syncmoveoff" => {}

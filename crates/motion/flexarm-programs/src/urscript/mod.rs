@@ -112,7 +112,7 @@ impl Dialect for UrScript {
                 return fail(
                     span,
                     format!(
-                        "`{name}` moves the robot by what is not in the program (sensors, measured positions, a stream of set points), which is not simulated: write movej, movel, movep or movec"
+                        "`{name}` moves the robot by data outside the program (sensors, measured positions, a stream of set points), which is not simulated: write movej, movel, movep or movec"
                     ),
                 );
             }

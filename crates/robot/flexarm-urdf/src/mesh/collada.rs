@@ -118,8 +118,7 @@ fn asset_transform(root: Node<'_, '_>, up_axis: UpAxis, remarks: &mut Vec<String
     };
     if up != "Z_UP" {
         remarks.push(format!(
-            "{up} is turned to z up; RViz and Gazebo ignore the up axis: compare pictures, and ignore it too if the \
-             mesh stands wrong"
+            "{up} is turned to z up; RViz and Gazebo ignore the up axis: compare pictures, and ignore it too if the mesh is oriented wrongly"
         ));
     }
     (R * meter).to_homogeneous()

@@ -179,7 +179,7 @@ impl<'a> Interpreter<'a> {
                 severity: Severity::Warning,
                 code: "unused-argument",
                 location: format!("{}:1", path.display()),
-                message: format!("the argument {name:?} is given and nothing in the file asks for it"),
+                message: format!("the argument {name:?} is given, but nothing in the file uses it"),
                 help,
             });
         }

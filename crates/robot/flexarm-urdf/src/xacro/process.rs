@@ -162,7 +162,7 @@ impl Interpreter<'_> {
         let at = &element.at;
         let mut name = self.attribute_text(element, "name", scope)?;
         if !scope::is_name(&name) || name.starts_with("__") {
-            let help = "a name starts with a letter, has letters, digits and _, and is no word of Python";
+            let help = "a name starts with a letter, has letters, digits and _, and is not a Python keyword";
             return Err(
                 self.fault(at, ExpressionError::new(format!("{name:?} cannot be the name of a property")).help(help))
             );

@@ -60,7 +60,7 @@ impl Interpreter<'_> {
         let mut joined = String::new();
         for piece in &pieces {
             let shown = match self.piece(piece, scope)? {
-                Value::Block(_) => return Err(ExpressionError::new("a block of XML cannot stand in a text")),
+                Value::Block(_) => return Err(ExpressionError::new("a block of XML cannot be part of a text")),
                 value => self.shown(&value)?,
             };
             self.charge(shown.len())?;

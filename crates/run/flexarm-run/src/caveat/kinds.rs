@@ -329,7 +329,7 @@ pub(crate) const WALL: CaveatKind = CaveatKind::warning(
     "wall",
     "the wall of {where} is {value} of its width, walls of arms are more than {yardstick}",
     "",
-    "thinner walls buckle before they bear anything; wall is in m",
+    "thinner walls buckle before they carry any load; wall is in m",
 );
 /// The outer size of a section does not match the inertia of the link.
 pub(crate) const SECTION_SIZE: CaveatKind = CaveatKind::warning(

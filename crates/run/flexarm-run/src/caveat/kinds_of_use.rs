@@ -63,12 +63,12 @@ pub(crate) const LOOP_TRANSMISSION: CaveatKind = CaveatKind::warning(
     "loop-transmission",
     "{where} reaches a transmission angle of {value} deg along the motion (reported below {yardstick}): forces in its bars grow as 1/sin of it",
     "deg",
-    "keep the motion away from the dead point, where the bars lie in a line",
+    "keep the motion away from the dead point, where the bars are collinear",
 );
 /// A dependent joint exceeds its limit.
 pub(crate) const LOOP_LIMIT: CaveatKind = CaveatKind::warning(
     "loop-limit",
-    "{where}, which follows from a loop, comes to {value} along the motion, its limit is {yardstick}",
+    "{where}, which follows from a loop, reaches {value} along the motion, its limit is {yardstick}",
     "",
     "keep the driving joints nearer to each other, or correct the limit of the URDF",
 );

@@ -64,7 +64,7 @@ fn lumped_remedy(modal_instead: &[String]) -> String {
 #[non_exhaustive]
 pub enum BalancerError {
     /// Two balancers have the same name.
-    #[error("balancer {name:?} is there twice: give each a name of its own")]
+    #[error("balancer {name:?} is defined twice: names must be unique")]
     Twice {
         /// Name of the balancers.
         name: String,
@@ -169,7 +169,7 @@ pub enum BalancerError {
 #[non_exhaustive]
 pub enum LoopError {
     /// Two loops have the same name.
-    #[error("loop {name:?} is there twice: give each a name of its own")]
+    #[error("loop {name:?} is defined twice: names must be unique")]
     Twice {
         /// Name of the loops.
         name: String,
@@ -236,7 +236,7 @@ pub enum LoopError {
     },
     /// The loop passes a dead point: its links are in line.
     #[error(
-        "loop {name:?} passes its dead point there: its links lie in a line, and they could go on in two ways; keep the motion away from it"
+        "loop {name:?} passes its dead point there: its links are collinear and could continue in two ways; keep the motion away from it"
     )]
     DeadPoint {
         /// Name of the loop.

@@ -99,14 +99,15 @@ impl<'a> Cell<'a> {
             (Some(flange), _) => (flange, None),
             (None, Some(link)) => {
                 let note = format!(
-                    "tools of the program are taken to stand on link {:?}: the robot has no link {FLANGE:?}",
+                    "tools of the program are assumed to be mounted on link {:?}: the robot has no link {FLANGE:?}",
                     link.name
                 );
                 (link, Some(note))
             }
-            (None, None) => {
-                (tcp.clone(), Some("tools of the program are taken to stand on the tool centre point".to_owned()))
-            }
+            (None, None) => (
+                tcp.clone(),
+                Some("tools of the program are assumed to be mounted on the tool centre point".to_owned()),
+            ),
         };
         let X_FT = flange.X_BF.inverse() * tcp.X_BF;
         (flange, X_FT, note)
@@ -194,7 +195,7 @@ impl ToolPath {
         if !held.is_empty() {
             let what = match options.rule {
                 None => "stay while the tool follows its path (redundancy of a path file chooses otherwise)",
-                Some(_) => "move by themselves, towards the posture that is asked for",
+                Some(_) => "move redundantly, towards the requested posture",
             };
             warnings.push(format!("the arm has more joints than the path needs: {held} {what}"));
         }

@@ -274,7 +274,7 @@ impl Deck<'_> {
             for element in members {
                 let found = |text: &str| src.error(Kind::Unsupported, *at, what(), text, "a face S1 to S6 of a solid");
                 let Class::Solid(kind) = self.class(*element as usize) else {
-                    return Err(found("a face of an element that is no solid"));
+                    return Err(found("a face of an element that is not a solid"));
                 };
                 let faces = face_nodes(kind);
                 let places = face.and_then(|face| faces.get(usize::from(face)));

@@ -122,7 +122,7 @@ impl Interpreter<'_> {
             ("error", _) => self.remark(crate::Severity::Warning, "xacro-error", message(), ""),
             ("print_location", _) => {}
             ("fatal", _) => {
-                return Err(ExpressionError::new(message()).help("the file itself stops here: see what it asks for"));
+                return Err(ExpressionError::new(message()).help("the file itself stops here: see what it requires"));
             }
             ("range", _) => return self.range(arguments),
             ("dict", _) => return dict(arguments, named),

@@ -187,7 +187,7 @@ fn format(text: &str, arguments: &[Value], named: &[(String, Value)]) -> Result<
             continue;
         }
         let field = rest[at..].strip_prefix('{').and_then(|field| field.split_once('}'));
-        let (field, after) = field.ok_or_else(|| ExpressionError::new("format(): a bracket { or } stands alone"))?;
+        let (field, after) = field.ok_or_else(|| ExpressionError::new("format(): a bracket { or } is unpaired"))?;
         let (name, spec) = field.split_once(':').unwrap_or((field, ""));
         let value = if name.is_empty() {
             next += 1;
@@ -222,7 +222,7 @@ pub(super) fn percent(format: &str, values: &Value) -> Result<Value, ExpressionE
         let end = rest.find(|c: char| c.is_ascii_alphabetic());
         let end = end.ok_or_else(|| ExpressionError::new("a % in a format has no letter behind it"))?;
         let value =
-            values.next().ok_or_else(|| ExpressionError::new("there are fewer values than the format asks for"))?;
+            values.next().ok_or_else(|| ExpressionError::new("there are fewer values than the format requires"))?;
         let kind = match &rest[end..=end] {
             "i" | "u" => "d",
             kind => kind,
@@ -232,7 +232,7 @@ pub(super) fn percent(format: &str, values: &Value) -> Result<Value, ExpressionE
     }
     out.push_str(rest);
     match values.next() {
-        Some(_) => Err(ExpressionError::new("there are more values than the format asks for")),
+        Some(_) => Err(ExpressionError::new("there are more values than the format requires")),
         None => Ok(Value::text(out)),
     }
 }
