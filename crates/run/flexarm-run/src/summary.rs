@@ -212,7 +212,6 @@ pub struct DriveFigures {
     /// Maximum deflection between motor and link (rad; m if the joint is prismatic).
     pub peak_deflection_rad: f64,
     /// Whether the joint is prismatic.
-    #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub slides: bool,
 }
 

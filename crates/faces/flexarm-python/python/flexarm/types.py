@@ -324,7 +324,9 @@ class DriveFigures(TypedDict):
     peak_contribution_m: float
     """Maximum TCP displacement caused by its deflection alone (m)."""
     peak_deflection_rad: float
-    """Maximum deflection between motor and link (rad or m)."""
+    """Maximum deflection between motor and link (rad; m if the joint is prismatic)."""
+    slides: bool
+    """Whether the joint is prismatic."""
 
 
 class _EnergyFigures(TypedDict):
