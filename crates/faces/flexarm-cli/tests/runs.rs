@@ -302,6 +302,29 @@ mod run {
         assert!(table.names.contains(&"swing_position_m".to_owned()), "{:?}", table.names);
     }
 
+    /// Truth: `m g / k` of a carriage of 10 kg on a vertical slide, 0.0981 mm. Its figures are in mm,
+    /// its efforts in N.
+    #[test]
+    fn an_elastic_drive_of_a_slide_gives_by_its_weight_in_millimetres() {
+        let place = Place::new();
+        let urdf = r#"<robot name="lift"><link name="base"/>
+            <link name="carriage"><inertial><mass value="10"/>
+              <inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+            <joint name="lift" type="prismatic"><parent link="base"/><child link="carriage"/><axis xyz="0 0 1"/>
+              <limit lower="0" upper="1" effort="90" velocity="1"/></joint></robot>"#;
+        place.write("lift.urdf", urdf);
+        let drive = "[[drive]]\njoint = \"lift\"\nkind = \"gearbox\"\ngearbox = { stiffness = 1e6, damping = 1e3 }\n";
+        place.write("lift.toml", format!("format = 1\nurdf = \"lift.urdf\"\ntcp = {{ link = \"carriage\" }}\n{drive}"));
+        place.write("up.csv", "t[s],lift[m]\n0,0.1\n0.5,0.1\n1,0.1\n");
+        let summary = place.json(&["compare", "lift.toml", "up.csv", "--no-files"]);
+        let figures = &summary["elastic_drives"][0];
+        near(number(figures, "peak_deflection_rad"), 10.0 * 9.81 / 1e6, 1e-4);
+        assert_eq!(figures["slides"], Value::Bool(true));
+        let said = place.flexarm(&["compare", "lift.toml", "up.csv", "--no-files"]);
+        assert!(said.out.contains("deflection 0.0981 mm"), "{}", said.out);
+        assert!(said.err.contains("\"lift\" needs 98.1 N, its limit is 90"), "{}", said.err);
+    }
+
     /// A load beyond the cut of a flexible link deflects it as much as the same load on the next
     /// link.
     #[test]
