@@ -119,7 +119,7 @@ fn known(
     let meant = closest(&given.to_string_lossy(), names.iter().map(String::as_str));
     let meant = meant.map_or_else(String::new, |name| format!("did you mean {name:?}? "));
     let what = format!(
-        "there is neither a file nor a shipped {kind} of this name; {meant}shipped are {}; or {advice}",
+        "there is no such file and no such {kind} among the shipped ones; {meant}shipped are {}; or {advice}",
         names.join(", ")
     );
     Err(Error::File { path, what })

@@ -34,7 +34,7 @@ fn joints_that_a_motion_does_not_name_are_held_and_told() {
     for (entry, pieces) in [
         ("grip = 0.3", ["\"grip\"", "0.01 to 0.05"]),
         ("gripp = 0.03", ["\"gripp\"", "did you mean \"grip\"?"]),
-        ("weld = 0.0", ["\"weld\"", "moves independently"]),
+        ("weld = 0.0", ["\"weld\"", "is not an independent joint"]),
     ] {
         let text = place.text("robot.toml").replace("grip = 0.03", entry);
         place.write("other.toml", text);

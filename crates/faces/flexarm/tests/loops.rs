@@ -226,7 +226,7 @@ fn what_no_loop_is_is_refused_with_its_place_and_what_is_expected() {
             "does not close where its driving joints are at the start",
         ),
         ("xyz = [0.0, 0.0, 1.28]", "xyz = [0.0, nan, 1.28]", "expected finite numbers"),
-        ("name = \"level of the plate\"", "name = \"drive of the upper arm\"", "is there twice"),
+        ("name = \"level of the plate\"", "name = \"drive of the upper arm\"", "is defined twice"),
         ("joint = \"joint_3\"", "joint = \"elbow\"", "follows from loop \"drive of the upper arm\": nothing drives it"),
         ("[[loop]]", "[hold]\nelbow = 0.1\n\n[[loop]]", "hold the joints that drive the loop"),
         ("[[loop]]", "[lead]\nelbow = 0.1\n\n[[loop]]", "is helical"),
