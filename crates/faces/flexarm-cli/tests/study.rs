@@ -85,8 +85,8 @@ fn bad_runs_of_a_study_are_named_before_anything_runs() {
     refused("robot=nowhere.toml", &["nowhere.toml", "robot=nowhere.toml"]);
     refused("trajectory=nowhere.csv,name=lost", &["nowhere.csv", "lost"]);
     refused("step=-1", &["step=-1", "positive"]);
-    refused("help", &["help", "no option"]);
-    refused("version", &["version", "no option"]);
+    refused("help", &["help", "not an option"]);
+    refused("version", &["version", "not an option"]);
     for name in ["run.csv", "Summary.json", "figures", "study.rrd"] {
         refused(&format!("links=modal,name={name}"), &[name, "name="]);
     }
