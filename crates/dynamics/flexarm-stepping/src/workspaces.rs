@@ -45,9 +45,8 @@ impl FlexibleArm {
     /// Returns a workspace for recursions over the tree, without external wrenches: a returned one
     /// or a new one.
     pub fn lend_data(&self) -> PooledWorkspace<Data> {
-        let shelf = self.workspaces.are_for(&self.model).then_some(&self.workspaces.data);
-        let mut lent =
-            PooledWorkspace::from(shelf, || Some(Data::new(&self.model))).expect("there are always new ones");
+        let pool = self.workspaces.are_for(&self.model).then_some(&self.workspaces.data);
+        let mut lent = PooledWorkspace::from(pool, || Some(Data::new(&self.model))).expect("there are always new ones");
         lent.clear_external_wrenches();
         lent
     }
@@ -55,8 +54,8 @@ impl FlexibleArm {
     /// Returns an observer workspace in the same way; `None` if [`Observer::new`] supports no such
     /// tree.
     pub fn lend_observer(&self) -> Option<PooledWorkspace<Observer>> {
-        let shelf = self.workspaces.are_for(&self.model).then_some(&self.workspaces.observers);
-        PooledWorkspace::from(shelf, || Observer::new(&self.model))
+        let pool = self.workspaces.are_for(&self.model).then_some(&self.workspaces.observers);
+        PooledWorkspace::from(pool, || Observer::new(&self.model))
     }
 
     /// Returns a workspace of [`FreeForces::new`] in the same way.
@@ -64,8 +63,8 @@ impl FlexibleArm {
         // Only if all free coordinates are elastic: the joints driven by torque may differ between
         // copies.
         let held = roles.free_coordinates().first().is_none_or(|first| *first >= self.model.n_actuated());
-        let shelf = (held && self.workspaces.are_for(&self.model)).then_some(&self.workspaces.points);
-        PooledWorkspace::from(shelf, || FreeForces::new(&*self.model, roles))
+        let pool = (held && self.workspaces.are_for(&self.model)).then_some(&self.workspaces.points);
+        PooledWorkspace::from(pool, || FreeForces::new(&*self.model, roles))
     }
 }
 
@@ -73,19 +72,19 @@ impl FlexibleArm {
 pub struct PooledWorkspace<T> {
     /// `Some` until it is returned.
     it: Option<T>,
-    shelf: Option<Pool<T>>,
+    pool: Option<Pool<T>>,
 }
 
 impl<T> PooledWorkspace<T> {
-    fn from(shelf: Option<&Pool<T>>, make: impl FnOnce() -> Option<T>) -> Option<Self> {
-        let used = shelf.and_then(|shelf| shelf.lock().unwrap_or_else(PoisonError::into_inner).pop());
+    fn from(pool: Option<&Pool<T>>, make: impl FnOnce() -> Option<T>) -> Option<Self> {
+        let used = pool.and_then(|pool| pool.lock().unwrap_or_else(PoisonError::into_inner).pop());
         let it = used.or_else(make)?;
-        Some(Self { it: Some(it), shelf: shelf.cloned() })
+        Some(Self { it: Some(it), pool: pool.cloned() })
     }
 
     /// Keeps the workspace out of the pool, because its contents no longer match the arm.
     pub fn keep(&mut self) {
-        self.shelf = None;
+        self.pool = None;
     }
 }
 
@@ -108,8 +107,8 @@ impl<T> DerefMut for PooledWorkspace<T> {
 impl<T> Drop for PooledWorkspace<T> {
     fn drop(&mut self) {
         // After a panic the contents are undefined: drop the workspace.
-        if let (Some(it), Some(shelf), false) = (self.it.take(), &self.shelf, std::thread::panicking()) {
-            shelf.lock().unwrap_or_else(PoisonError::into_inner).push(it);
+        if let (Some(it), Some(pool), false) = (self.it.take(), &self.pool, std::thread::panicking()) {
+            pool.lock().unwrap_or_else(PoisonError::into_inner).push(it);
         }
     }
 }

@@ -379,7 +379,7 @@ fn the_case_studies_name_their_flags() {
             (
                 &["one-beam", "--no-files", "--data", "."],
                 "./robots/one_beam/robot.toml: there is no such file; the case studies need robots, trajectories and \
-             tests/verification of a checkout of the project: give its folder (--data)",
+             tests of a checkout of the project: give its folder (--data)",
             ),
         ],
     );

@@ -305,7 +305,7 @@ mod run {
     /// Truth: `m g / k` of a carriage of 10 kg on a vertical slide, 0.0981 mm. Its figures are in mm,
     /// its efforts in N.
     #[test]
-    fn an_elastic_drive_of_a_slide_gives_by_its_weight_in_millimetres() {
+    fn the_deflection_of_an_elastic_slide_is_in_millimetres_and_its_effort_in_newtons() {
         let place = Place::new();
         let urdf = r#"<robot name="lift"><link name="base"/>
             <link name="carriage"><inertial><mass value="10"/>

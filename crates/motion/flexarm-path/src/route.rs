@@ -356,7 +356,7 @@ fn joint_jet(way: &LegPath, length: f64, s: f64) -> JointJet {
     match way {
         LegPath::Bridge { from, to } => between(from, to, length, s).0,
         LegPath::Joints { q0, d } => JointJet { q: q0 + d * s, d: d.clone(), dd: DVector::zeros(d.len()) },
-        LegPath::Tool(_) => unreachable!("a tool's way has no joints of its own"),
+        LegPath::Tool(_) => unreachable!("a path of a frame has no joints"),
     }
 }
 

@@ -34,7 +34,7 @@ impl Bench {
     pub fn robot(&self, file: &str) -> Result<Robot, Error> {
         let path = self.root.join(file);
         if !path.is_file() {
-            let what = "there is no such file; the case studies need robots, trajectories and tests/verification of a checkout of the \
+            let what = "there is no such file; the case studies need robots, trajectories and tests of a checkout of the \
                         project: give its folder";
             return Err(flexarm::Error::File { path, what: format!("{what} ({})", Setting::Data) }.into());
         }

@@ -125,8 +125,8 @@ pub(super) fn corrected(
     let understood = |bytes: &[u8], others: Vec<(PathBuf, Vec<u8>)>| -> Result<Understood, Error> {
         let text = program_text(path, bytes, &controller, others)?;
         let places = target_joints(&text.program, &controller, &PathOptions::default());
-        let notes = |source| Error::Path { path: path.clone(), source: Box::new(source), notes: Vec::new() };
-        Ok(Understood { places: places.map_err(notes)?, text })
+        let failed = |source| Error::Path { path: path.clone(), source: Box::new(source), notes: Vec::new() };
+        Ok(Understood { places: places.map_err(failed)?, text })
     };
     let old = understood(&flexarm_trajectory::bytes_of_file(path)?, Vec::new())?;
     let stops = stops(&old, scenario);

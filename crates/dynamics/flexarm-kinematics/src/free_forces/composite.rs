@@ -27,7 +27,7 @@ pub(super) struct Composites<T: Real> {
     /// Composite bodies, one per node.
     bodies: Vec<Composite<T>>,
     /// Wrenches carried inward, up to three columns each.
-    threes: Vec<ColumnGroup<T>>,
+    groups: Vec<ColumnGroup<T>>,
     /// Whether some pairs of coordinates contribute nothing, or more than once.
     sums: bool,
 }
@@ -48,13 +48,13 @@ struct Composite<T: Real> {
     /// First column of its joint, if the joint is free.
     own: Option<ColumnIndex>,
     /// Groups of columns in its subtree.
-    threes: Range<usize>,
+    groups: Range<usize>,
 }
 
 /// Location of a column: group and lane.
 #[derive(Clone, Copy, Debug)]
 struct ColumnIndex {
-    three: usize,
+    group: usize,
     lane: usize,
 }
 
@@ -72,23 +72,23 @@ struct ColumnGroup<T: Real> {
 /// inward, if that group is the last one, ends with that joint and has room.
 #[inline(always)]
 fn place_columns<T: Real>(
-    threes: &mut Vec<ColumnGroup<T>>,
+    groups: &mut Vec<ColumnGroup<T>>,
     inner: Option<ColumnIndex>,
     row: usize,
     size: usize,
 ) -> ColumnIndex {
-    if let (Some(inner), Some(last), 1) = (inner, threes.len().checked_sub(1), size)
-        && inner.three == last
-        && inner.lane + 1 == threes[last].count
-        && threes[last].count < 3
-        && threes[last].row + threes[last].count == row
+    if let (Some(inner), Some(last), 1) = (inner, groups.len().checked_sub(1), size)
+        && inner.group == last
+        && inner.lane + 1 == groups[last].count
+        && groups[last].count < 3
+        && groups[last].row + groups[last].count == row
     {
-        threes[last].count += 1;
+        groups[last].count += 1;
         return ColumnIndex { lane: inner.lane + 1, ..inner };
     }
-    let first = ColumnIndex { three: threes.len(), lane: 0 };
+    let first = ColumnIndex { group: groups.len(), lane: 0 };
     for row in (row..row + size).step_by(3) {
-        threes.push(ColumnGroup { row, count: size.min(3), force: Matrix3::zeros(), torque: Matrix3::zeros() });
+        groups.push(ColumnGroup { row, count: size.min(3), force: Matrix3::zeros(), torque: Matrix3::zeros() });
     }
     first
 }
@@ -101,7 +101,7 @@ impl<T: Real> Composites<T> {
         let zero = Vector3::zeros();
         let parent = |i: usize| nodes[i].parent.filter(|parent| nodes[*parent].part == Part::Loading);
         let mut bodies: Vec<Composite<T>> = Vec::with_capacity(nodes.len());
-        let mut threes: Vec<ColumnGroup<T>> = Vec::new();
+        let mut groups: Vec<ColumnGroup<T>> = Vec::new();
         let (mut columns, mut branches) = (0, false);
         for (i, node) in nodes.iter().enumerate() {
             let is_beside = |j: usize| j != i && nodes[j].part == Part::Loading && parent(j) == parent(i);
@@ -114,24 +114,24 @@ impl<T: Real> Composites<T> {
                 r: zero,
                 parent: parent(i),
                 own: None,
-                threes: 0..0,
+                groups: 0..0,
             };
             if let Some(row) = node.row {
                 let mut carriers = std::iter::successors(body.parent, |carrier| bodies[*carrier].parent);
                 let inner = carriers.find_map(|carrier| bodies[carrier].own);
-                let own = place_columns(&mut threes, inner, row, node.size());
+                let own = place_columns(&mut groups, inner, row, node.size());
                 columns += node.size();
-                (body.own, body.threes) = (Some(own), own.three..threes.len());
+                (body.own, body.groups) = (Some(own), own.group..groups.len());
                 let mut carrier = body.parent;
                 while let Some(carrying) = carrier.map(|body| &mut bodies[body]) {
-                    let first = if carrying.threes.is_empty() { own.three } else { carrying.threes.start };
-                    carrying.threes = first..threes.len();
+                    let first = if carrying.groups.is_empty() { own.group } else { carrying.groups.start };
+                    carrying.groups = first..groups.len();
                     carrier = carrying.parent;
                 }
             }
             bodies.push(body);
         }
-        Self { bodies, threes, sums: branches || columns != n }
+        Self { bodies, groups, sums: branches || columns != n }
     }
 
     /// Initialises the bodies with their own inertias, rotated to the common axes.
@@ -164,15 +164,15 @@ impl<T: Real> Composites<T> {
                     Some(parent) => parent.R,
                     None => transposed(&node.R),
                 };
-                let outward = &mut self.threes[own.three..body.threes.end];
+                let outward = &mut self.groups[own.group..body.groups.end];
                 match node.joint {
                     NodeJoint::Elastic { .. } => body.elastic(node, &base, outward, row, M),
                     _ => body.single(node, &base, outward, Column { lane: own.lane, row }, M),
                 }
             }
             if let Some(parent) = parent {
-                for three in &mut self.threes[body.threes.clone()] {
-                    three.carry(&body.r);
+                for group in &mut self.groups[body.groups.clone()] {
+                    group.carry(&body.r);
                 }
                 parent.take(body);
             }
@@ -211,17 +211,17 @@ impl<T: Real> Composite<T> {
             slides = scaled(&mul(base, &lift(along)), ratio);
             own.add(at.lane, &scaled(&slides, self.mass), &cross(&self.h, &slides));
         }
-        for (number, three) in outward.iter().enumerate() {
+        for (number, group) in outward.iter().enumerate() {
             let mut products = zero;
             if axis.is_some() {
-                products = mul(&three.torque, &turns);
+                products = mul(&group.torque, &turns);
             }
             if along.is_some() {
-                products = add(&products, &mul(&three.force, &slides));
+                products = add(&products, &mul(&group.force, &slides));
             }
             match number {
-                0 => M.put_own(at.row, three, at.lane, &products),
-                _ => M.put_row(at.row, three, &products),
+                0 => M.put_own(at.row, group, at.lane, &products),
+                _ => M.put_row(at.row, group, &products),
             }
         }
     }
@@ -258,15 +258,15 @@ impl<T: Real> Composite<T> {
             own[c] = self.mass;
             M.put_own(row + c, &outward[0], c, &own.into());
         }
-        for three in &outward[1..] {
-            M.put_three(row, three, &L, &three.force);
+        for group in &outward[1..] {
+            M.put_three(row, group, &L, &group.force);
         }
         let (own, others) = (&outward[1], &outward[2..]);
         for c in 0..3 {
             M.put_own(row + 3 + c, own, c, &mul(&own.torque, &column(&B, c)));
         }
-        for three in others {
-            M.put_three(row + 3, three, &B, &three.torque);
+        for group in others {
+            M.put_three(row + 3, group, &B, &group.torque);
         }
     }
 
@@ -354,36 +354,36 @@ impl<T: Real, const SUMS: bool> Entries<'_, T, SUMS> {
     /// Writes the entries of a column within its own group: the diagonal and the columns outward of
     /// it.
     #[inline(always)]
-    fn put_own(&mut self, row: usize, three: &ColumnGroup<T>, lane: usize, products: &Vector3<T>) {
+    fn put_own(&mut self, row: usize, group: &ColumnGroup<T>, lane: usize, products: &Vector3<T>) {
         self.put_one(row, row, products[lane]);
-        for k in lane + 1..three.count {
-            self.put(row, three.row + k, products[k]);
+        for k in lane + 1..group.count {
+            self.put(row, group.row + k, products[k]);
         }
     }
 
     /// Writes the entries of a row for another group of columns.
     #[inline(always)]
-    fn put_row(&mut self, row: usize, three: &ColumnGroup<T>, products: &Vector3<T>) {
-        if SUMS || three.count < 3 {
-            for k in 0..three.count {
-                self.put(row, three.row + k, products[k]);
+    fn put_row(&mut self, row: usize, group: &ColumnGroup<T>, products: &Vector3<T>) {
+        if SUMS || group.count < 3 {
+            for k in 0..group.count {
+                self.put(row, group.row + k, products[k]);
             }
             return;
         }
-        self.M[row * self.n + three.row..][..3].copy_from_slice(products.as_slice());
-        let [x, y, z] = self.three_columns(three.row);
+        self.M[row * self.n + group.row..][..3].copy_from_slice(products.as_slice());
+        let [x, y, z] = self.three_columns(group.row);
         (x[row], y[row], z[row]) = (products.x, products.y, products.z);
     }
 
     /// Writes the entries of three columns of an elastic joint, with these axes, for another group.
     #[inline(always)]
-    fn put_three(&mut self, row: usize, three: &ColumnGroup<T>, axes: &Matrix3<T>, wrenches: &Matrix3<T>) {
+    fn put_three(&mut self, row: usize, group: &ColumnGroup<T>, axes: &Matrix3<T>, wrenches: &Matrix3<T>) {
         let a = mul(wrenches, &column(axes, 0));
         let b = mul(wrenches, &column(axes, 1));
         let c = mul(wrenches, &column(axes, 2));
-        let other = three.row;
-        if SUMS || three.count < 3 {
-            for k in 0..three.count {
+        let other = group.row;
+        if SUMS || group.count < 3 {
+            for k in 0..group.count {
                 self.put(row, other + k, a[k]);
                 self.put(row + 1, other + k, b[k]);
                 self.put(row + 2, other + k, c[k]);

@@ -71,18 +71,13 @@ fn two_link_arms(case: &mut Case, found: &TwoLink) {
 
 fn spin_figure(found: &TwoLink) -> Figure {
     let panels = found.runs.iter().filter(|run| run.name.starts_with("spin")).map(|run| {
-        let curve = |name: &str, look, y: &[f64]| PlotCurve {
-            name: name.into(),
-            look,
-            x: run.time_s.clone(),
-            y: y.iter().map(|m| 1e3 * m).collect(),
-        };
-        let shown = [0, LINEAR, STIFFENED].map(|k| curve(&found.methods[k], CurveLook::Plain, &run.found_m[k]));
-        // Modal links without stiffness by load leave the picture.
-        let highest = 2e3 * run.peak_m;
-        let fits = |curve: &PlotCurve| !curve.y.is_empty() && curve.y.iter().all(|y| *y < highest);
-        let curves = [curve("truth", CurveLook::Total, &run.truth_m)].into_iter().chain(shown.into_iter().filter(fits));
-        Panel { label: format!("{} [mm]", run.name), logarithmic: false, legend: true, curves: curves.collect() }
+        let curve = |name: &str, look, y: &[f64]| millimetres(name, look, run.time_s.clone(), y);
+        let mut curves = vec![curve("truth", CurveLook::Total, &run.truth_m)];
+        // A method that was left out has no samples.
+        for k in [0, LINEAR, STIFFENED].into_iter().filter(|k| !run.found_m[*k].is_empty()) {
+            curves.push(curve(&found.methods[k], CurveLook::Plain, &run.found_m[k]));
+        }
+        Panel { label: format!("{} [mm]", run.name), logarithmic: false, legend: true, curves }
     });
     Figure {
         name: "benchmarks-spin".into(),
@@ -133,8 +128,7 @@ fn slider_crank(case: &mut Case, found: &SliderCrank) {
     case.claim("the same without stiffness by load", EXACT_ROD, plain_modal, Bound::AtLeast(0.03));
     case.text(
         "Chains carry the rod's axial force by themselves; modal links need stiffness by load for it, which includes \
-         the force of the loop's pin. Their frame is clamped at the near end, and \
-         the far end moves along a straight line there, not on an arc: the chord gets longer by half the squared \
+         the force of the loop's pin. Their frame is clamped at the near end, and the far end moves along a straight line there, not on an arc: the chord gets longer by half the squared \
          slope. This second-order displacement is not in them; it is what is left in the slider's position, also \
          with stiffness by load.",
     );
@@ -142,12 +136,8 @@ fn slider_crank(case: &mut Case, found: &SliderCrank) {
 }
 
 fn rod_figure(found: &SliderCrank) -> Figure {
-    let curve = |name: &str, look, y: &[f64]| PlotCurve {
-        name: name.into(),
-        look,
-        x: found.time_s.iter().map(|t| 1e3 * t).collect(),
-        y: y.iter().map(|m| 1e3 * m).collect(),
-    };
+    let time_ms: Vec<f64> = found.time_s.iter().map(|t| 1e3 * t).collect();
+    let curve = |name: &str, look, y: &[f64]| millimetres(name, look, time_ms.clone(), y);
     let curves = vec![
         curve("exact", CurveLook::Total, &found.truth_m[0]),
         curve("linear", CurveLook::Plain, &found.truth_m[1]),
@@ -160,4 +150,9 @@ fn rod_figure(found: &SliderCrank) -> Figure {
         logarithmic_x: false,
         panels: vec![Panel { label: "deflection [mm]".into(), logarithmic: false, legend: true, curves }],
     }
+}
+
+/// A curve of lengths in metres, drawn in millimetres.
+fn millimetres(name: &str, look: CurveLook, x: Vec<f64>, y: &[f64]) -> PlotCurve {
+    PlotCurve { name: name.into(), look, x, y: y.iter().map(|m| 1e3 * m).collect() }
 }

@@ -62,12 +62,12 @@ impl SliderCrank {
         let (slider_truth, truth_m) = ([column(1), column(3)], [column(2), column(4)]);
         let peak_m = [0, 1].map(|k| truth_m[k].iter().copied().worst());
         let crank: Vec<Vector2<f64>> = truth.iter().map(|row| crank_pin(&motion.trajectory, row[0])).collect();
-        let methods = PARTS.map(|n| Method::new(in_parts(n)));
-        let modal = [Method::new(in_modes(MODES)), Method::stiffening(in_modes(MODES))];
-        let mut runs = Vec::new();
-        let methods = methods.into_iter().chain(modal).chain([Method::spook(in_parts(PARTS[1]))]);
-        for (k, method) in methods.enumerate() {
-            progress(k as f64 / 5.0)?;
+        let mut methods: Vec<Method> = PARTS.iter().map(|n| Method::new(in_parts(*n))).collect();
+        methods.extend([Method::new(in_modes(MODES)), Method::stiffening(in_modes(MODES))]);
+        methods.push(Method::spook(in_parts(PARTS[1])));
+        let (mut runs, count) = (Vec::new(), methods.len());
+        for (k, method) in methods.into_iter().enumerate() {
+            progress(k as f64 / count as f64)?;
             let middle = method.run(&robot, &motion, STEP_S, RATE_HZ)?;
             let slider = method.run(&slider_robot, &motion, STEP_S, RATE_HZ)?;
             let comparable = same_times(middle.rows.iter().map(|row| row.time_s), truth.iter().map(|row| row[0]));
