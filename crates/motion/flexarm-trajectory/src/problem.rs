@@ -203,7 +203,7 @@ pub enum Problem {
     },
     /// No column matches a joint.
     #[error(
-        "no column of the header {} is a joint: the joints are {}; rename the columns, or tell which they are: {} \
+        "no column of the header {} is a joint: the joints are {}; rename the columns, or name them: {} \
          <joint>=<column>",
         list(found),
         list(joints),
