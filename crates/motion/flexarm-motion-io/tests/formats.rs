@@ -142,7 +142,7 @@ fn bags_of_ros_1_that_are_cut_off_are_read_up_to_there() {
                 }
                 Err(error) => {
                     let said = error.to_string();
-                    assert!(said.contains("end is missing") || said.contains("not whole"), "{name} {part}: {said}");
+                    assert!(said.contains("end is missing") || said.contains("incomplete"), "{name} {part}: {said}");
                 }
             }
         }
