@@ -190,7 +190,7 @@ fn codes_that_cannot_be_run_are_named_with_place_and_remedy() {
         ("G2 X10 R3", "the radius 3.0000 mm is less than half of the way of 10.0000 mm"),
         ("G2 R5", "an arc with a radius ends where it begins"),
         ("G1 G0 X3", "two codes of one line contradict each other"),
-        ("G1 X3 X4", "the letter X stands twice"),
+        ("G1 X3 X4", "the letter X occurs twice"),
         ("G1 X#7", "the parameter #7 has no value"),
         ("O100 sub", "subroutines and loops (O words) are not read"),
         ("G1 A30", "rotary axes are not read as they are"),
