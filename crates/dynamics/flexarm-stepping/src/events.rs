@@ -46,6 +46,7 @@ pub(crate) const SLOW: f64 = 0.01;
 const MOST_CUTS: u32 = 7;
 
 /// Velocities and accelerations of the actuated joints at the start of a step.
+#[derive(Clone)]
 pub(crate) struct StepStart {
     /// Time (s); NaN if unknown.
     time: f64,
@@ -81,6 +82,7 @@ pub(crate) enum Change {
 }
 
 /// Pending and past events of a run. Times that differ by less than [`SAME_TIME`] are equal.
+#[derive(Clone)]
 pub(crate) struct EventQueue {
     /// Times of jumps of loads and prescribed velocities and of other stops of loads, ascending,
     /// and the number of them that are over.

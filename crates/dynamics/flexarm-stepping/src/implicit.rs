@@ -275,7 +275,7 @@ impl Search {
 }
 
 /// Method-specific part of an implicit [`Integrator`]; the rest is common.
-pub(crate) trait ImplicitStep: Send {
+pub(crate) trait ImplicitStep: Clone + Send {
     /// [`Integrator::MOTION_RULE`].
     const MOTION_RULE: &'static [(f64, f64)];
 
@@ -328,6 +328,10 @@ impl<M: ImplicitStep> Integrator for M {
 
     fn counts(&self) -> Counts {
         self.newton().counts(ImplicitStep::current(self).grid.steps())
+    }
+
+    fn copy(&self) -> Option<Self> {
+        Some(self.clone())
     }
 
     fn last_iteration(&self) -> (usize, f64) {

@@ -170,6 +170,14 @@ pub trait Integrator: Send {
         (0, 0.0)
     }
 
+    /// Returns a copy with the same state; `None` if the integrator cannot be copied.
+    fn copy(&self) -> Option<Self>
+    where
+        Self: Sized,
+    {
+        None
+    }
+
     /// Advances to the next grid time.
     ///
     /// # Errors
@@ -200,6 +208,7 @@ pub trait Integrator: Send {
 }
 
 /// Stepper of an arm in reduced coordinates; its steps also end at events.
+#[derive(Clone)]
 pub(crate) struct ReducedStepper<I> {
     pub(crate) system: ReducedArm,
     pub(crate) integrator: I,
@@ -221,7 +230,7 @@ impl<I: Integrator> ReducedStepper<I> {
     }
 }
 
-impl<I: Integrator> Stepper for ReducedStepper<I> {
+impl<I: Integrator + 'static> Stepper for ReducedStepper<I> {
     fn time(&self) -> f64 {
         self.integrator.time()
     }
@@ -268,6 +277,17 @@ impl<I: Integrator> Stepper for ReducedStepper<I> {
 
     fn last_iteration(&self) -> (usize, f64) {
         self.integrator.last_iteration()
+    }
+
+    fn add_torques(&mut self) {
+        let t = self.integrator.time();
+        if let Some(servo) = &mut self.system.servo {
+            servo.add(t, &self.system.arm);
+        }
+    }
+
+    fn copy(&self) -> Option<Box<dyn Stepper>> {
+        Some(Box::new(Self { system: self.system.clone(), integrator: self.integrator.copy()? }))
     }
 }
 

@@ -33,6 +33,7 @@ use crate::workspaces::PooledWorkspace;
 const GEOMETRIC_PASSES: usize = 12;
 
 /// A flexible arm as a second-order system; see the module documentation.
+#[derive(Clone)]
 pub struct ReducedArm {
     pub(crate) arm: Arc<FlexibleArm>,
     pub(crate) data: PooledWorkspace<Data>,

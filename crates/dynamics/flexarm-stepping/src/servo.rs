@@ -28,12 +28,15 @@ pub(crate) struct AxisSample {
 }
 
 /// State of a [`Servo`] in a run.
+#[derive(Clone)]
 pub(crate) struct ServoState {
     pub(crate) servo: Arc<Servo>,
     friction: Vec<Friction>,
     load_friction: Vec<LoadFriction>,
     /// Torque held until the next sample, one per axis.
     pub(crate) torque: Vec<f64>,
+    /// The same before the limit, without the torque that the motion adds.
+    own: Vec<f64>,
     /// Integral part of the torque.
     integral: Vec<f64>,
     /// Whether the next sample initialises the integrals such that the torques stay unchanged.
@@ -53,6 +56,7 @@ impl ServoState {
             friction: arm.friction.clone(),
             load_friction: arm.load_friction.clone(),
             torque: vec![0.0; n],
+            own: vec![0.0; n],
             integral: vec![0.0; n],
             fresh: false,
             data: Data::new(&servo.rigid),
@@ -96,6 +100,13 @@ impl ServoState {
         self.fresh = true;
     }
 
+    /// Updates the torques after a change of those that the motion adds, at time `t`.
+    pub(crate) fn add(&mut self, t: f64, arm: &FlexibleArm) {
+        for ((torque, own), axis) in self.torque.iter_mut().zip(&self.own).zip(&self.servo.axes) {
+            *torque = (own + arm.motion.added_torque(t, axis.coordinate)).clamp(-axis.limit, axis.limit);
+        }
+    }
+
     /// Computes the sample at time `t`.
     pub(crate) fn sample(&mut self, t: f64, arm: &FlexibleArm, x: &[f64], v: &[f64]) {
         self.update_reference(t, arm);
@@ -105,14 +116,15 @@ impl ServoState {
             let lag = self.reference.q[k] - x[axis];
             let wanted = self.reference.qdot[k] + a.position_gain * lag;
             let error = wanted - v[axis];
-            let ahead = self.feed_forward(axis);
+            let (ahead, added) = (self.feed_forward(axis), arm.motion.added_torque(t, k));
             // Without integral action the load is not compensated: the joint sags until the gains
             // balance it.
             let filled = self.fresh && a.integral_gain > 0.0;
             if filled {
-                self.integral[axis] = self.torque[axis] - ahead - a.velocity_gain * error;
+                self.integral[axis] = self.torque[axis] - ahead - added - a.velocity_gain * error;
             }
-            let unlimited = a.velocity_gain * error + self.integral[axis] + ahead;
+            self.own[axis] = a.velocity_gain * error + self.integral[axis] + ahead;
+            let unlimited = self.own[axis] + added;
             self.torque[axis] = unlimited.clamp(-a.limit, a.limit);
             // Anti-windup: at the limit the integral changes only away from it.
             let limited = unlimited != self.torque[axis];

@@ -48,6 +48,16 @@ pub trait Stepper: Send {
     fn last_iteration(&self) -> (usize, f64) {
         (0, 0.0)
     }
+
+    /// Applies a change of the torques that the motion adds from now on
+    /// ([`PrescribedMotion::added_torque`](crate::PrescribedMotion::added_torque)).
+    fn add_torques(&mut self) {}
+
+    /// Returns a copy that goes on from the current state with the same bits; `None` if the solver
+    /// cannot be copied.
+    fn copy(&self) -> Option<Box<dyn Stepper>> {
+        None
+    }
 }
 
 /// Bound on elastic coordinates (m, rad): larger values are not a deflection of a link.

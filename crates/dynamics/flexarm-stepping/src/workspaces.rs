@@ -88,6 +88,12 @@ impl<T> PooledWorkspace<T> {
     }
 }
 
+impl<T: Clone> Clone for PooledWorkspace<T> {
+    fn clone(&self) -> Self {
+        Self { it: self.it.clone(), pool: self.pool.clone() }
+    }
+}
+
 impl<T> Deref for PooledWorkspace<T> {
     type Target = T;
 

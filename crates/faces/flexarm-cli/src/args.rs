@@ -9,6 +9,7 @@ use flexarm::{DriveModel, LinkModel, Modelling, RecordingFormat, STEPPERS, Stepp
 use crate::compensate::CompensateArgs;
 use crate::convert::ConvertArgs;
 use crate::exchange_args::{ExportArgs, ImportArgs};
+use crate::fmu::ExportFmuArgs;
 use crate::formats;
 use crate::identify::IdentifyArgs;
 use crate::later::Later;
@@ -66,6 +67,9 @@ Flexible links:
   reduce       Create a flexible link from a finite element mesh
   import       Create a flexible link from matrices of another program
   export       Write the matrices of a flexible link for another program
+
+Other programs:
+  export-fmu   Write the arm as an FMU, a plant for control programs
 
 Program:
   verify       Run the case studies against their truths
@@ -139,6 +143,12 @@ pub(crate) enum Command {
     Import(Later<ImportArgs>),
     /// Write the matrices of a flexible link for another FE program
     Export(Later<ExportArgs>),
+    /// Write the arm as an FMU, a plant for control programs
+    ///
+    /// The FMU (FMI 3.0 or 2.0, co-simulation) holds the robot, its links, drives and payload. Its
+    /// inputs are joint targets, motor torques and a wrench on the TCP; its outputs are encoders,
+    /// drive torques, the TCP and its error.
+    ExportFmu(Later<ExportFmuArgs>),
     /// Run the case studies against their truths and write the page of results
     Verify(Later<VerifyArgs>),
     /// Open a recording in the Rerun viewer
@@ -382,7 +392,7 @@ pub(crate) struct CheckArgs {
 }
 
 /// Parser for the names of the registered steppers, with their help.
-fn stepper_words() -> impl TypedValueParser<Value = &'static StepperEntry> {
+pub(crate) fn stepper_words() -> impl TypedValueParser<Value = &'static StepperEntry> {
     let help = |entry: &StepperEntry| format!("{}; step {} ms", entry.help, 1e3 * entry.default_step_s);
     let words = STEPPERS.map(|entry| PossibleValue::new(entry.name).help(help(entry)).aliases(entry.aliases));
     PossibleValuesParser::new(words).map(|word| {

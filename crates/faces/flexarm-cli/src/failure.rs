@@ -18,6 +18,8 @@ pub(crate) enum Failure {
     Library(flexarm::Error),
     /// An error of the case studies.
     Verify(flexarm_verify::Error),
+    /// An error of a plant for other programs.
+    Plant(flexarm_fmu::PlantError),
 }
 
 impl From<flexarm::Error> for Failure {
@@ -29,6 +31,15 @@ impl From<flexarm::Error> for Failure {
 impl From<flexarm::LinkError> for Failure {
     fn from(error: flexarm::LinkError) -> Self {
         Self::Library(error.into())
+    }
+}
+
+impl From<flexarm_fmu::PlantError> for Failure {
+    fn from(error: flexarm_fmu::PlantError) -> Self {
+        match error {
+            flexarm_fmu::PlantError::Robot(error) => Self::Library(error),
+            other => Self::Plant(other),
+        }
     }
 }
 
@@ -48,6 +59,7 @@ impl std::fmt::Display for Failure {
             Self::InStudy { label, source } => write!(f, "run {label:?} of the study: {source}"),
             Self::Library(error) => error.fmt(f),
             Self::Verify(error) => error.fmt(f),
+            Self::Plant(error) => error.fmt(f),
         }
     }
 }
@@ -59,6 +71,7 @@ impl std::error::Error for Failure {
             Self::InStudy { source, .. } => Some(source),
             Self::Library(error) => error.source(),
             Self::Verify(error) => error.source(),
+            Self::Plant(error) => error.source(),
         }
     }
 }
@@ -71,6 +84,7 @@ impl Failure {
             Self::InStudy { source, .. } => return source.exit_code(),
             Self::Library(error) => error.fault(),
             Self::Verify(error) => error.fault(),
+            Self::Plant(_) => Fault::Input,
         };
         ExitCode::from(match fault {
             Fault::Input => 2,

@@ -12,6 +12,7 @@ mod exchange;
 mod exchange_args;
 mod failure;
 mod flags;
+mod fmu;
 mod formats;
 mod identify;
 mod later;
@@ -196,6 +197,7 @@ fn command(cli: &Cli, line: &[OsString]) -> Result<ExitCode, Failure> {
         Command::Reduce(args) => reduce::run(cli, args),
         Command::Import(args) => exchange::import(cli, args),
         Command::Export(args) => exchange::export(cli, args),
+        Command::ExportFmu(args) => fmu::run(cli, args),
         Command::Verify(args) => verify::run(cli, args),
         Command::View(args) => view::run(cli, args),
         Command::Format { page } => {

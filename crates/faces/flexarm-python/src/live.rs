@@ -2,7 +2,7 @@
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use flexarm::Live;
+use flexarm::{Command, Live};
 use pyo3::prelude::*;
 
 use crate::arrays::{array, numbers};
@@ -63,7 +63,8 @@ impl PyLive {
         let q = numbers("q", q, &[(self.n, "joints")], false)?;
         let velocity = velocity.map(|v| numbers("velocity", v, &[(self.n, "joints")], false)).transpose()?;
         let F = as_wrench(self::wrench(wrench)?);
-        self.lock().step(q.values(), velocity.as_ref().map(|v| v.values()), &F).or_raise()
+        let qdot = velocity.as_ref().map(|v| v.values());
+        self.lock().step(&Command { q: q.values(), qdot, wrench: F, ..Command::default() }).or_raise()
     }
 
     /// Resets to rest at a pose at time 0.

@@ -10,8 +10,8 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use flexarm::{
-    Arm, DriveModel, Error, LinkModel, Modelling, Motion, Outputs, RecordingFormat, Recursions, ResponseRequest, Robot,
-    RunOptions, RunRequest, Scenario, Variation, Wrench, flat_columns,
+    Arm, Command, DriveModel, Error, LinkModel, Live, LiveOptions, Modelling, Motion, Outputs, RecordingFormat,
+    Recursions, ResponseRequest, Robot, RunOptions, RunRequest, Scenario, Servos, Variation, Wrench, flat_columns,
 };
 
 const POSE: [f64; 6] = [0.0, -1.2, 1.5, 0.0, 0.4, 0.0];
@@ -112,7 +112,7 @@ fn off(arm: &Arm, motion: &Motion, period_s: f64, with_velocities: bool) -> f64 
     let mut largest = 0.0_f64;
     for (k, t) in run.time_s().iter().enumerate().skip(1) {
         motion.trajectory.sample(*t, &mut q, &mut v, &mut a);
-        live.step(&q, with_velocities.then_some(&v), &Wrench::zeros()).unwrap();
+        live.step(&Command { q: &q, qdot: with_velocities.then_some(&v), ..Command::default() }).unwrap();
         let tool = live.tcp_pose().translation.vector;
         let distance = (0..3).map(|c| (tool[c] - place[3 * k + c]).powi(2)).sum::<f64>().sqrt();
         largest = largest.max(distance);
@@ -152,15 +152,102 @@ fn a_live_arm_refuses_what_makes_no_sense_and_starts_again() {
     assert!(matches!(arm.live(None, 1.5e-3, &options), Err(Error::Value(_))));
     assert!(matches!(arm.live(Some(&[0.0; 3]), 1e-3, &options), Err(Error::Pose(_))));
     let mut live = arm.live(None, 2e-3, &options).unwrap();
-    assert!(matches!(live.step(&[f64::NAN; 6], None, &Wrench::zeros()), Err(Error::Pose(_))));
+    assert!(matches!(live.step(&Command { q: &[f64::NAN; 6], ..Command::default() }), Err(Error::Pose(_))));
     let begin = live.tcp_pose();
     for k in 1..=50 {
-        live.step(&[1e-3 * f64::from(k); 6], None, &Wrench::zeros()).unwrap();
+        live.step(&Command { q: &[1e-3 * f64::from(k); 6], ..Command::default() }).unwrap();
     }
     assert!((live.time_s() - 0.1).abs() < 1e-12);
     assert!(live.position()[0] > 0.0 && live.position()[0] < 0.05, "servos lag: {}", live.position()[0]);
     live.reset(None).unwrap();
     assert_eq!((live.time_s(), live.tcp_pose()), (0.0, begin));
+}
+
+/// Follows a circle of two joints for `steps` periods of 1 ms; returns the TCP positions.
+fn circle(live: &mut Live, from: &[f64], steps: std::ops::Range<u32>) -> Vec<[f64; 3]> {
+    let mut positions = Vec::new();
+    for k in steps {
+        let s = 0.02 * f64::from(k + 1);
+        let mut q = from.to_vec();
+        q[0] += 0.1 * (1.0 - s.cos());
+        q[1] += 0.05 * (s - s.sin());
+        live.step(&Command { q: &q, ..Command::default() }).unwrap();
+        positions.push(live.tcp_pose().translation.vector.into());
+    }
+    positions
+}
+
+#[test]
+fn a_live_arm_returns_to_a_state_and_repeats_what_followed_bit_for_bit() {
+    let backlash = robot("palletiser").flexible(Modelling::default()).unwrap();
+    let servo = Modelling { drives: DriveModel::Servo, links: LinkModel::Modal, ..Modelling::default() };
+    let arms = [backlash, robot("reference_arm").flexible(servo).unwrap(), robot("kr300").flexible(servo).unwrap()];
+    for arm in arms {
+        let from = vec![0.1; arm.joints().count()];
+        let mut live = arm.live(Some(&from), 1e-3, &RunOptions::default()).unwrap();
+        circle(&mut live, &from, 0..100);
+        let state = live.state().unwrap();
+        let first = circle(&mut live, &from, 100..200);
+        live.restore(&state).unwrap();
+        assert_eq!(first, circle(&mut live, &from, 100..200));
+        live.restore(&state).unwrap();
+        assert_eq!(first, circle(&mut live, &from, 100..200), "a state can be used again");
+        let mut other = arm.live(Some(&from), 1e-3, &RunOptions::default()).unwrap();
+        assert!(matches!(other.restore(&state), Err(Error::Value(_))));
+    }
+}
+
+#[test]
+fn motors_with_the_torques_of_servos_move_as_under_servos() {
+    let servo = Modelling { drives: DriveModel::Servo, ..Modelling::default() };
+    let arm = robot("reference_arm").flexible(servo).unwrap();
+    let (options, from) = (RunOptions::default(), vec![0.1; 6]);
+    let mut closed = arm.live(Some(&from), 1e-3, &options).unwrap();
+    let mut open = arm
+        .live_with(Some(&from), 1e-3, &options, &LiveOptions { servos: Servos::Open, ..LiveOptions::default() })
+        .unwrap();
+    assert_eq!(closed.effort(), open.effort(), "the first torques hold the pose");
+    let mut largest = 0.0_f64;
+    for k in 0..300 {
+        let torque = closed.effort().to_vec();
+        circle(&mut closed, &from, k..k + 1);
+        open.step(&Command { q: &from, torque: Some(&torque), ..Command::default() }).unwrap();
+        let both = closed.position().iter().zip(open.position());
+        largest = largest.max(both.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max));
+    }
+    let moved = (closed.position()[0] - 0.1).abs();
+    println!("motors differ by {largest:.1e} rad of {moved:.1e}");
+    assert!(moved > 0.05 && largest <= 1e-9, "{largest:e}");
+    // Without torques the arm falls.
+    open.step(&Command { q: &from, ..Command::default() }).unwrap();
+    assert_eq!(open.effort(), [0.0; 6]);
+}
+
+#[test]
+fn control_periods_of_any_whole_number_of_steps_can_follow_each_other() {
+    let arm = robot("kr210").flexible(Modelling::default()).unwrap();
+    let options = RunOptions { step_s: 1e-3, ..RunOptions::default() };
+    // Constant accelerations: the parabolas are exact whatever the periods.
+    let at = |t: f64| POSE.map(|q| q + 0.2 * t * t);
+    let tip = |lengths: &[f64]| {
+        let mut live = arm.live(Some(&POSE), 1e-3, &options).unwrap();
+        for _ in 0..10 {
+            live.step(&Command { q: &at(live.time_s() + 1e-3), ..Command::default() }).unwrap();
+        }
+        while live.time_s() < 0.4 - 1e-9 {
+            for length in lengths {
+                let q = at(live.time_s() + length);
+                live.advance(*length, &Command { q: &q, ..Command::default() }).unwrap();
+            }
+        }
+        live.tcp_pose().translation.vector
+    };
+    let (even, uneven) = (tip(&[1e-3]), tip(&[1e-3, 7e-3, 2e-3, 3e-3]));
+    let apart = (even - uneven).norm();
+    println!("{apart:.1e} m apart");
+    assert!(apart <= 1e-9, "{apart:e}");
+    let mut live = arm.live(None, 1e-3, &options).unwrap();
+    assert!(matches!(live.advance(1.5e-3, &Command { q: &POSE, ..Command::default() }), Err(Error::Value(_))));
 }
 
 #[test]

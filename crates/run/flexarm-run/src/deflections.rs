@@ -9,6 +9,7 @@ use rayon::prelude::*;
 
 use crate::arm::Arm;
 use crate::error::{Error, ValueError};
+use crate::flexible::FlexibleRobot;
 use crate::options::RunOptions;
 use crate::prepare::{loaded, runnable};
 use crate::scenario::Scenario;
@@ -120,19 +121,26 @@ impl Arm {
 
     /// Returns the arm of a run, with its factors and loads.
     fn varied(&self, run: &Variation, options: &RunOptions) -> Result<FlexibleArm, Error> {
-        let Variation { scenario, stiffness, damping } = run;
-        for (what, found) in [("stiffness", *stiffness), ("damping", *damping)] {
-            if !(found > 0.0 && found.is_finite()) {
-                return Err(ValueError::Factor { what, found }.into());
-            }
-        }
-        runnable(&scenario.motion, options)?;
+        let scenario = &run.scenario;
         let flexible = self.flexible();
+        let springs = flexible.scaled_springs(run.stiffness, run.damping)?;
+        runnable(&scenario.motion, options)?;
         crate::loops::along_motion(&flexible.rigid, &scenario.motion.trajectory)?;
-        let springs = flexible.springs.iter().map(|spring| scaled(spring, *stiffness, *damping)).collect();
         let arm =
             flexible.arm_with(springs, scenario.motion.prescribed()).map_err(|error| flexible.explained(error))?;
         Ok(loaded(self.robot(), scenario, options, arm)?.0)
+    }
+}
+
+impl FlexibleRobot {
+    /// Returns the springs with scaled stiffness and damping.
+    pub(crate) fn scaled_springs(&self, stiffness: f64, damping: f64) -> Result<Vec<Spring>, ValueError> {
+        for (what, found) in [("stiffness", stiffness), ("damping", damping)] {
+            if !(found > 0.0 && found.is_finite()) {
+                return Err(ValueError::Factor { what, found });
+            }
+        }
+        Ok(self.springs.iter().map(|spring| scaled(spring, stiffness, damping)).collect())
     }
 }
 

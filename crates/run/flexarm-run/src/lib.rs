@@ -94,7 +94,7 @@ pub use flexible::{FlexibleRobot, LinkChoices, Owner, RobotLink};
 pub use gear_entry::{GearHysteresis, RobotCoupling};
 pub use headline::{Bending, ShareFigures};
 pub use inspect::{CouplingInfo, FlexibleInfo, Inspection, JointInfo, LinkInfo, MountingInfo, TcpInfo, inspect};
-pub use live::Live;
+pub use live::{Command, Live, LiveOptions, LiveState, Servos};
 pub use loops::{DependentInfo, LoopInfo, RobotLoop};
 pub use mode_recording::{ModeMovie, record_modes};
 pub use modes::{ModeFigures, ModeTable, modes};

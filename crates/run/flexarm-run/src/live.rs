@@ -10,8 +10,11 @@
 use std::sync::{Arc, PoisonError, RwLock};
 
 use flexarm_kinematics::{Data, Pose, State, Wrench, forward_kinematics};
-use flexarm_stepping::{FlexibleArm, Load, Observation, PrescribedMotion, Start, Stepper, TimedWrench, new_stepper};
-use nalgebra::DVector;
+use flexarm_kinematics::{forward_kinematics_velocity, frame_twist};
+use flexarm_stepping::{
+    FlexibleArm, Load, Observation, PrescribedMotion, Start, StepRule, Stepper, TimedWrench, new_stepper,
+};
+use nalgebra::{DVector, Vector6};
 
 use crate::arm::Arm;
 use crate::error::{Error, ValueError};
@@ -19,22 +22,77 @@ use crate::flexible::FlexibleRobot;
 use crate::inspect::joint_values;
 use crate::options::RunOptions;
 use crate::robot::tcp_frame;
+use crate::run::link_side_angles;
 
 /// Tolerance for the control period to be a whole number of steps (in steps).
 const WHOLE: f64 = 1e-6;
 
+/// What the arm gets for one control period.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Command<'a> {
+    /// Targets of the joints at the end of the period, all joints (rad or m).
+    pub q: &'a [f64],
+    /// Target velocities there (rad/s or m/s). Without them the joints follow the parabola through
+    /// the last three targets.
+    pub qdot: Option<&'a [f64]>,
+    /// Torques that are added to those of the servos, all joints, at the joint (N m or N). Zero if
+    /// left out.
+    pub torque: Option<&'a [f64]>,
+    /// Wrench on the TCP, world axes (N, N m).
+    pub wrench: Wrench,
+}
+
+/// Whether servos close their loops.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Servos {
+    /// Servos follow the targets.
+    #[default]
+    Closed,
+    /// Servos have no gains and no feed-forward: motors get the torques of the commands alone.
+    Open,
+}
+
+/// What a live arm has of its own, beside its robot.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LiveOptions {
+    /// Whether servos close their loops.
+    pub servos: Servos,
+    /// Factor on all stiffnesses, as in [`Variation`](crate::Variation).
+    pub stiffness: f64,
+    /// Factor on all damping, as in [`Variation`](crate::Variation).
+    pub damping: f64,
+}
+
+impl Default for LiveOptions {
+    fn default() -> Self {
+        Self { servos: Servos::Closed, stiffness: 1.0, damping: 1.0 }
+    }
+}
+
+/// State of a [`Live`], for [`Live::restore`].
+pub struct LiveState {
+    targets: Arc<Targets>,
+    period: Period,
+    push: Wrench,
+    stepper: Box<dyn Stepper>,
+    seen: Observation,
+}
+
 /// Targets at the start and the end of a control period.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct Period {
     /// Start and length of the period (s).
     begin: f64,
     length: f64,
     q: [Vec<f64>; 2],
     qdot: [Vec<f64>; 2],
-    /// Second differences of the last three targets, if no velocities are given.
+    /// Second derivatives of the parabola times the squared length, if no velocities are given.
     bend: Option<Vec<f64>>,
-    /// Targets one period before those at the start.
+    /// Targets at the start of the period before, and its length (s).
     earlier: Vec<f64>,
+    earlier_length: f64,
+    /// Torques added to those of the servos (N m or N).
+    torque: Vec<f64>,
 }
 
 /// Motion between the targets.
@@ -63,20 +121,28 @@ impl PrescribedMotion for Targets {
             qddot[k] = (2.0 * c2 + s * 6.0 * c3) / (h * h);
         }
     }
+
+    fn added_torque(&self, _t: f64, coordinate: usize) -> f64 {
+        self.0.read().unwrap_or_else(PoisonError::into_inner).torque[coordinate]
+    }
 }
 
 /// A running arm, commanded period by period.
 pub struct Live {
     flexible: Arc<FlexibleRobot>,
     arm: FlexibleArm,
+    servos: Servos,
     options: RunOptions,
     period_s: f64,
-    steps: usize,
     targets: Arc<Targets>,
     push: Arc<RwLock<Wrench>>,
     stepper: Box<dyn Stepper>,
     seen: Observation,
+    /// Workspaces for the poses of the rigid and for the velocities of the flexible arm.
     rigid: (Data, State),
+    moving: (Data, State),
+    /// Result of [`link_side_angles`].
+    link_sides: Vec<(usize, usize, f64)>,
 }
 
 impl Arm {
@@ -91,43 +157,74 @@ impl Arm {
     /// period that is not positive or not a whole number of steps, [`Error::Step`] if there is no
     /// equilibrium.
     pub fn live(&self, at: Option<&[f64]>, period_s: f64, options: &RunOptions) -> Result<Live, Error> {
+        self.live_with(at, period_s, options, &LiveOptions::default())
+    }
+
+    /// As [`Arm::live`], with options. With open servos the first torques are those that hold the
+    /// pose.
+    ///
+    /// # Errors
+    /// As [`Arm::live`]; [`Error::Value`] for open servos if no joint is driven by torque, and for
+    /// factors that are not positive.
+    pub fn live_with(
+        &self,
+        at: Option<&[f64]>,
+        period_s: f64,
+        options: &RunOptions,
+        own: &LiveOptions,
+    ) -> Result<Live, Error> {
+        let LiveOptions { servos, stiffness, damping } = *own;
+        if servos == Servos::Open && !self.flexible().has_servo() {
+            return Err(ValueError::NoServo.into());
+        }
+        if options.stepper.entry().steps == StepRule::ByErrorControl {
+            return Err(ValueError::RunsAhead(options.stepper.name()).into());
+        }
         let names: Vec<&str> = self.joints().collect();
         let at = joint_values(at, &names)?;
         let step_s = options.step_s;
         if !(step_s.is_finite() && step_s > 0.0) {
             return Err(ValueError::Step(step_s).into());
         }
-        let steps = (period_s / step_s).round();
-        if !((1.0..1e9).contains(&steps) && (period_s / step_s - steps).abs() <= WHOLE) {
-            return Err(ValueError::Period { period_s, step_s }.into());
-        }
+        whole_steps(period_s, step_s)?;
         let flexible = self.flexible().clone();
         let targets = Arc::new(Targets(RwLock::new(Period::at_rest(&at, period_s))));
         let push = Arc::new(RwLock::new(Wrench::zeros()));
-        let arm = flexible.arm(targets.clone()).map_err(|error| flexible.explained(error))?;
+        let springs = flexible.scaled_springs(stiffness, damping)?;
+        let arm = flexible.arm_with(springs, targets.clone()).map_err(|error| flexible.explained(error))?;
         let at_tool = {
             let push = push.clone();
             let wrench = move |_: f64| *push.read().unwrap_or_else(PoisonError::into_inner);
             Load { body: flexible.tcp.body, X_BF: flexible.tcp.X_BF, wrench: TimedWrench::new(wrench) }
         };
         let arm = arm.with_timed_loads(vec![at_tool]).map_err(|source| Error::Step { source, partial: false })?;
-        let stepper = stepper(&flexible, &arm, options)?;
-        let rigid = (Data::new(&flexible.rigid), State::zeros(&flexible.rigid));
         let seen = Observation::new(&arm);
+        let stepper = started(&flexible, &arm, options, servos, &targets)?;
         let mut live = Live {
-            flexible,
+            servos,
             options: options.clone(),
             period_s,
-            steps: steps as usize,
             targets,
             push,
             stepper,
             seen,
-            rigid,
+            rigid: (Data::new(&flexible.rigid), State::zeros(&flexible.rigid)),
+            moving: (Data::new(&flexible.model), State::zeros(&flexible.model)),
+            link_sides: link_side_angles(self.robot(), &flexible),
+            flexible,
             arm,
         };
         live.look();
         Ok(live)
+    }
+}
+
+/// Returns the number of steps in a control period (s).
+fn whole_steps(period_s: f64, step_s: f64) -> Result<usize, ValueError> {
+    let steps = (period_s / step_s).round();
+    match (1.0..1e9).contains(&steps) && (period_s / step_s - steps).abs() <= WHOLE {
+        true => Ok(steps as usize),
+        false => Err(ValueError::Period { period_s, step_s }),
     }
 }
 
@@ -138,39 +235,62 @@ impl Period {
             begin: 0.0,
             length,
             q: [q.to_vec(), q.to_vec()],
-            qdot: [still.clone(), still],
+            qdot: [still.clone(), still.clone()],
             bend: None,
             earlier: q.to_vec(),
+            earlier_length: length,
+            torque: still,
         }
     }
 
-    /// Starts the next period, towards targets `q` and, if given, target velocities.
-    fn go_to(&mut self, begin: f64, q: &[f64], qdot: Option<&[f64]>) {
+    /// Starts the next period, of this length (s).
+    fn go_to(&mut self, begin: f64, length: f64, command: &Command<'_>) {
         self.begin = begin;
         self.earlier.copy_from_slice(&self.q[0]);
+        (self.earlier_length, self.length) = (self.length, length);
         self.q.swap(0, 1);
         self.qdot.swap(0, 1);
-        self.q[1].copy_from_slice(q);
-        match qdot {
-            Some(qdot) => {
-                self.qdot[1].copy_from_slice(qdot);
-                self.bend = None;
-            }
-            None => {
-                let mut bend = self.bend.take().unwrap_or_else(|| vec![0.0; q.len()]);
-                for k in 0..q.len() {
-                    bend[k] = q[k] - 2.0 * self.q[0][k] + self.earlier[k];
-                    self.qdot[1][k] = (q[k] - self.q[0][k] + 0.5 * bend[k]) / self.length;
-                }
-                self.bend = Some(bend);
-            }
+        self.q[1].copy_from_slice(command.q);
+        match command.torque {
+            Some(torque) => self.torque.copy_from_slice(torque),
+            None => self.torque.fill(0.0),
         }
+        if let Some(qdot) = command.qdot {
+            self.qdot[1].copy_from_slice(qdot);
+            self.bend = None;
+            return;
+        }
+        let mut bend = self.bend.take().unwrap_or_else(|| vec![0.0; command.q.len()]);
+        // Second divided difference of three targets; ratio and share are 1 for equal periods.
+        let (ratio, share) = (length / self.earlier_length, 2.0 * length / (length + self.earlier_length));
+        for k in 0..bend.len() {
+            let rise = command.q[k] - self.q[0][k];
+            bend[k] = share * (rise - ratio * (self.q[0][k] - self.earlier[k]));
+            self.qdot[1][k] = (rise + 0.5 * bend[k]) / length;
+        }
+        self.bend = Some(bend);
     }
 }
 
-fn stepper(flexible: &FlexibleRobot, arm: &FlexibleArm, options: &RunOptions) -> Result<Box<dyn Stepper>, Error> {
-    new_stepper(options.stepper, arm.clone(), options.step_s, Start::Equilibrium)
-        .map_err(|error| flexible.explained(error))
+/// Returns the stepper of the arm at rest at the targets.
+fn started(
+    flexible: &FlexibleRobot,
+    arm: &FlexibleArm,
+    options: &RunOptions,
+    servos: Servos,
+    targets: &Targets,
+) -> Result<Box<dyn Stepper>, Error> {
+    let start = |arm: FlexibleArm| {
+        new_stepper(options.stepper, arm, options.step_s, Start::Equilibrium).map_err(|error| flexible.explained(error))
+    };
+    let mut stepper = start(arm.clone())?;
+    if servos == Servos::Open {
+        let mut seen = Observation::new(arm);
+        stepper.observe(&mut seen);
+        targets.0.write().unwrap_or_else(PoisonError::into_inner).torque.copy_from_slice(seen.drive.as_slice());
+        stepper = start(arm.with_servo_opened())?;
+    }
+    Ok(stepper)
 }
 
 impl Live {
@@ -182,30 +302,72 @@ impl Live {
         let at = self.checked(at)?;
         *self.targets.0.write().unwrap_or_else(PoisonError::into_inner) = Period::at_rest(&at, self.period_s);
         *self.push.write().unwrap_or_else(PoisonError::into_inner) = Wrench::zeros();
-        self.stepper = stepper(&self.flexible, &self.arm, &self.options)?;
+        self.stepper = started(&self.flexible, &self.arm, &self.options, self.servos, &self.targets)?;
         self.look();
         Ok(())
     }
 
-    /// Simulates one control period, at whose end the target of the joints is `q` (rad or m).
-    ///
-    /// * `qdot`: target velocities (rad/s or m/s); without them the joints follow the parabola
-    ///   through the last three targets.
-    /// * `wrench`: wrench on the TCP during the period, world axes (N, N m).
+    /// Simulates one control period.
     ///
     /// # Errors
     /// [`Error::Pose`] for a wrong number of values and for values that are not finite,
-    /// [`Error::Step`] if the step fails.
-    pub fn step(&mut self, q: &[f64], qdot: Option<&[f64]>, wrench: &Wrench) -> Result<(), Error> {
-        self.check(q)?;
-        qdot.map_or(Ok(()), |qdot| self.check(qdot))?;
+    /// [`Error::Value`] for a wrench that is not finite, [`Error::Step`] if the step fails.
+    pub fn step(&mut self, command: &Command<'_>) -> Result<(), Error> {
+        self.advance(self.period_s, command)
+    }
+
+    /// As [`Live::step`], with a control period of another length (s), a whole number of steps.
+    ///
+    /// # Errors
+    /// As [`Live::step`]; [`Error::Value`] for a length that is not a whole number of steps.
+    pub fn advance(&mut self, length_s: f64, command: &Command<'_>) -> Result<(), Error> {
+        let steps = whole_steps(length_s, self.options.step_s)?;
+        self.check(command.q)?;
+        for values in [command.qdot, command.torque].into_iter().flatten() {
+            self.check(values)?;
+        }
+        let F = &command.wrench;
+        if let Some(&found) = F.force.iter().chain(F.torque.iter()).find(|value| !value.is_finite()) {
+            return Err(ValueError::NotFinite { what: "the wrench", found }.into());
+        }
         let begin = self.stepper.time();
-        self.targets.0.write().unwrap_or_else(PoisonError::into_inner).go_to(begin, q, qdot);
-        *self.push.write().unwrap_or_else(PoisonError::into_inner) = *wrench;
-        for _ in 0..self.steps {
+        self.targets.0.write().unwrap_or_else(PoisonError::into_inner).go_to(begin, length_s, command);
+        *self.push.write().unwrap_or_else(PoisonError::into_inner) = command.wrench;
+        self.stepper.add_torques();
+        for _ in 0..steps {
             self.stepper.step().map_err(|source| Error::Step { source, partial: false })?;
         }
         self.look();
+        Ok(())
+    }
+
+    /// Returns a copy of the current state.
+    ///
+    /// # Errors
+    /// [`Error::Value`] if the stepper cannot be copied; those of [`Arm::live`] can.
+    pub fn state(&self) -> Result<LiveState, Error> {
+        let stepper = self.stepper.copy().ok_or(ValueError::RunsAhead(self.options.stepper.name()))?;
+        Ok(LiveState {
+            targets: self.targets.clone(),
+            period: self.targets.0.read().unwrap_or_else(PoisonError::into_inner).clone(),
+            push: *self.push.read().unwrap_or_else(PoisonError::into_inner),
+            stepper,
+            seen: self.seen.clone(),
+        })
+    }
+
+    /// Returns to a state of this arm; what follows has the same bits as then.
+    ///
+    /// # Errors
+    /// [`Error::Value`] for a state of another [`Live`].
+    pub fn restore(&mut self, state: &LiveState) -> Result<(), Error> {
+        if !Arc::ptr_eq(&self.targets, &state.targets) {
+            return Err(ValueError::OtherState.into());
+        }
+        self.stepper = state.stepper.copy().ok_or(ValueError::RunsAhead(self.options.stepper.name()))?;
+        self.targets.0.write().unwrap_or_else(PoisonError::into_inner).clone_from(&state.period);
+        *self.push.write().unwrap_or_else(PoisonError::into_inner) = state.push;
+        self.seen.clone_from(&state.seen);
         Ok(())
     }
 
@@ -255,6 +417,24 @@ impl Live {
         self.seen.drive.as_slice()
     }
 
+    /// Returns the joint positions at the links: with the deflections of the gearboxes (rad or m).
+    pub fn link_position(&self) -> Vec<f64> {
+        self.at_links(self.seen.q.as_slice())
+    }
+
+    /// Returns the joint velocities at the links (rad/s or m/s).
+    pub fn link_velocity(&self) -> Vec<f64> {
+        self.at_links(self.seen.qdot.as_slice())
+    }
+
+    fn at_links(&self, values: &[f64]) -> Vec<f64> {
+        let mut at_links = values[..self.flexible.model.n_actuated()].to_vec();
+        for &(joint, coordinate, share) in &self.link_sides {
+            at_links[joint] += share * values[coordinate];
+        }
+        at_links
+    }
+
     /// Returns the elastic coordinates.
     pub fn deflection(&self) -> &[f64] {
         &self.seen.q.as_slice()[self.flexible.model.n_actuated()..]
@@ -264,6 +444,16 @@ impl Live {
     pub fn tcp_pose(&self) -> Pose {
         let tcp = &self.flexible.tcp;
         self.seen.X_WB[tcp.body] * tcp.X_BF
+    }
+
+    /// Returns the velocity of the TCP: linear, then angular, world axes (m/s, rad/s).
+    pub fn tcp_velocity(&mut self) -> Vector6<f64> {
+        let (data, state) = &mut self.moving;
+        state.q.copy_from(&self.seen.q);
+        state.qdot.copy_from(&self.seen.qdot);
+        forward_kinematics_velocity(&self.flexible.model, data, state);
+        let V = frame_twist(data, &self.flexible.tcp);
+        Vector6::from_iterator(V.linear.iter().chain(V.angular.iter()).copied())
     }
 
     /// Returns the TCP pose of the rigid arm with its joints at the last targets.

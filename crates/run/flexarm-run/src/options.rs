@@ -63,6 +63,11 @@ impl DriveModel {
         ("servo", Self::Servo, "Motors by torque under servos"),
     ];
 
+    /// Returns the model with this name.
+    pub fn from_word(word: &str) -> Option<Self> {
+        Self::WORDS.iter().find(|(known, ..)| *known == word).map(|(_, model, _)| *model)
+    }
+
     /// Returns the name; None if the robot file decides.
     pub fn word(self) -> Option<&'static str> {
         Self::WORDS.iter().find(|(_, model, _)| *model == self).map(|(word, ..)| *word)

@@ -64,6 +64,7 @@ impl Method for ExtrapolatedAlpha {
 }
 
 /// The two runs and their extrapolated state.
+#[derive(Clone)]
 struct Extrapolated {
     coarse: ReducedStepper<GeneralizedAlpha>,
     fine: ReducedStepper<GeneralizedAlpha>,
@@ -122,5 +123,14 @@ impl Stepper for Extrapolated {
     fn last_iteration(&self) -> (usize, f64) {
         let (coarse, fine) = (self.coarse.last_iteration(), self.fine.last_iteration());
         (coarse.0.max(fine.0), coarse.1.max(fine.1))
+    }
+
+    fn add_torques(&mut self) {
+        self.coarse.add_torques();
+        self.fine.add_torques();
+    }
+
+    fn copy(&self) -> Option<Box<dyn Stepper>> {
+        Some(Box::new(self.clone()))
     }
 }

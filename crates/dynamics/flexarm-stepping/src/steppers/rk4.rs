@@ -105,6 +105,10 @@ impl Integrator for Rk4 {
         Counts { steps: self.now.grid.steps(), evaluations: 4 * self.now.grid.steps(), factorisations: 0 }
     }
 
+    fn copy(&self) -> Option<Self> {
+        Some(self.clone())
+    }
+
     fn advance_to(&mut self, system: &mut impl SecondOrderSystem, t_new: f64) -> Result<(), StepError> {
         let t = self.now.grid.time();
         let h = t_new - t;

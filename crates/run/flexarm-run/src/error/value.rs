@@ -66,6 +66,15 @@ pub enum ValueError {
         /// Step size (s).
         step_s: f64,
     },
+    /// Open servos are asked of an arm without servos.
+    #[error("open servos need joints that are driven by torque: model the drives as servos")]
+    NoServo,
+    /// A stepper with step size control is asked of an arm that is commanded while it moves.
+    #[error("the stepper {0} runs ahead of the commands; use one with a fixed step size")]
+    RunsAhead(&'static str),
+    /// A state belongs to another arm.
+    #[error("the state belongs to another arm; a state returns only to the arm from which it was taken")]
+    OtherState,
     /// The run would take too many steps.
     #[error(
         "{duration_s} s in steps of {step_s:e} s make {:.1e} steps, at most {most:.0e} are taken: raise {} or cut the \

@@ -37,6 +37,7 @@ use crate::prepare::Checked;
 use crate::record::{header, link_frames, names_of_signals, ordered_links, recorders, signals, write_layouts};
 use crate::robot::Robot;
 use crate::run::sampler::Sampler;
+pub(crate) use crate::run::sampler::link_side_angles;
 use crate::run::shares::AtPeak;
 use crate::scenario::Scenario;
 use crate::static_part::StaticPart;

@@ -101,7 +101,7 @@ fn place(deflection: &mut [f64; 6], load: &mut [f64; 6], motion: AxisMotion, e: 
 }
 
 /// Contributions of gearbox springs to the link-side angle, in addition to the motor's angle.
-fn link_side_angles(robot: &Robot, flexible: &FlexibleRobot) -> Vec<(usize, usize, f64)> {
+pub(crate) fn link_side_angles(robot: &Robot, flexible: &FlexibleRobot) -> Vec<(usize, usize, f64)> {
     let mut angles = Vec::new();
     for (group, owner) in flexible.model.elastic().iter().zip(&flexible.owners) {
         let Owner::Drive(drive) = owner else { continue };

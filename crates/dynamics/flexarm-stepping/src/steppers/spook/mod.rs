@@ -164,6 +164,7 @@ impl Sampled {
 }
 
 /// The stepper; see the module documentation.
+#[derive(Clone)]
 pub struct Spook {
     arm: FlexibleArm,
     h: f64,
@@ -321,6 +322,10 @@ impl Stepper for Spook {
 
     fn counts(&self) -> Counts {
         Counts { steps: self.steps, evaluations: self.steps, factorisations: self.steps }
+    }
+
+    fn copy(&self) -> Option<Box<dyn Stepper>> {
+        Some(Box::new(self.clone()))
     }
 }
 

@@ -34,6 +34,7 @@ struct Row {
 pub(super) type TreeVelocities = (Vec<Vector6<f64>>, Vec<Vector6<f64>>);
 
 /// All pins of an arm, with workspace.
+#[derive(Clone)]
 pub(super) struct Pins {
     rows: Vec<Row>,
     /// Bodies of each row.

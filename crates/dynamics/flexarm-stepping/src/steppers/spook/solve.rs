@@ -323,6 +323,7 @@ impl EliminatedJoint {
 }
 
 /// Workspaces of the elimination.
+#[derive(Clone)]
 pub(super) struct TreeSolver {
     parent: Vec<usize>,
     pub(super) M: Vec<Symmetric>,

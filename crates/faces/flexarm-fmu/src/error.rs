@@ -1,0 +1,82 @@
+//! Errors of plants and FMUs.
+
+use std::path::PathBuf;
+
+use crate::variables::Kind;
+
+/// Why a plant refuses.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum PlantError {
+    /// The robot cannot be loaded, started or stepped.
+    #[error(transparent)]
+    Robot(#[from] flexarm::Error),
+    /// Files exist or cannot be written.
+    #[error(transparent)]
+    Written(#[from] flexarm::FileError),
+    /// There is no variable with this reference.
+    #[error("there is no variable with the reference {0}")]
+    Reference(usize),
+    /// A variable has another type.
+    #[error("{name} is a {}", match kind { Kind::Real => "number", Kind::Boolean => "truth value" })]
+    Kind {
+        /// Name of the variable.
+        name: String,
+        /// Its type.
+        kind: Kind,
+    },
+    /// A variable is computed.
+    #[error("{0} is computed and cannot be set; parameters and inputs can")]
+    NotSettable(String),
+    /// A parameter is set after the start.
+    #[error("{0}: the arm has started; set parameters before, or reset the arm")]
+    Started(String),
+    /// The plant is not started.
+    #[error("the arm has not started: exit the initialisation first")]
+    NotStarted,
+    /// A value is not finite.
+    #[error("{name} = {found}: expected a finite number")]
+    NotFinite {
+        /// Name of the variable.
+        name: String,
+        /// Value.
+        found: f64,
+    },
+    /// A step has no positive length.
+    #[error("the communication step is {0} s: expected a positive length")]
+    Length(f64),
+    /// The caller is at another time.
+    #[error("the communication step starts at {given_s} s, the arm is at {own_s} s")]
+    Time {
+        /// Time of the caller (s).
+        given_s: f64,
+        /// Time of the plant (s).
+        own_s: f64,
+    },
+    /// A file cannot be read or written.
+    #[error("{}: {what}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        what: String,
+    },
+    /// A function is called out of order.
+    #[error("{function} cannot be called {phase}")]
+    Order {
+        /// Name of the function.
+        function: &'static str,
+        /// When it was called.
+        phase: &'static str,
+    },
+    /// The token of the importer is not that of the FMU.
+    #[error(
+        "the token {given:?} is not that of this FMU, {own:?}: its description and its resources do not belong together"
+    )]
+    Token {
+        /// Given token.
+        given: String,
+        /// Token in the resources.
+        own: String,
+    },
+}

@@ -1,0 +1,269 @@
+//! The interface of `include/flexarm.h`.
+
+use std::cell::RefCell;
+use std::ffi::{CString, c_char, c_int};
+use std::path::Path;
+use std::ptr;
+
+use flexarm::{DriveModel, LinkModel, Modelling};
+
+use super::{array, array_mut, guarded, message, string, text_of};
+use crate::error::PlantError;
+use crate::plant::{Plant, PlantSettings, PlantState};
+use crate::variables::{Causality, Kind};
+
+thread_local! {
+    /// Message of the last error of this thread.
+    static ERROR: RefCell<CString> = RefCell::default();
+}
+
+/// A plant with the names of its variables as C strings.
+pub struct Handle {
+    plant: Plant,
+    names: Vec<CString>,
+    units: Vec<CString>,
+}
+
+fn failed(text: &str) {
+    ERROR.with(|error| *error.borrow_mut() = message(text));
+}
+
+/// Runs a function; returns 0, or -1 after keeping the message.
+///
+/// # Safety
+/// `plant` is null or a plant that is not freed.
+unsafe fn call(plant: *mut Handle, work: impl FnOnce(&mut Handle) -> Result<(), PlantError>) -> c_int {
+    // SAFETY: as promised by the caller.
+    let Some(plant) = (unsafe { plant.as_mut() }) else {
+        failed("the plant is a null pointer");
+        return -1;
+    };
+    match guarded(|| work(plant)) {
+        Some(Ok(())) => 0,
+        Some(Err(error)) => {
+            failed(&text_of(&error));
+            -1
+        }
+        None => {
+            failed("the library failed; please report it");
+            -1
+        }
+    }
+}
+
+const NULL: PlantError = PlantError::Order { function: "a function", phase: "with a null pointer" };
+
+#[unsafe(no_mangle)]
+extern "C" fn flexarm_version() -> *const c_char {
+    const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), "\0");
+    VERSION.as_ptr().cast()
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn flexarm_error() -> *const c_char {
+    ERROR.with(|error| error.borrow().as_ptr())
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn flexarm_open(
+    robot: *const c_char,
+    links: *const c_char,
+    drives: *const c_char,
+    step_s: f64,
+    pose: *const f64,
+    n_pose: usize,
+) -> *mut Handle {
+    // SAFETY: the caller passes strings and an array of this length, or null.
+    let made = guarded(|| unsafe { opened(robot, [links, drives], step_s, array(pose, n_pose)) });
+    match made {
+        Some(Ok(handle)) => Box::into_raw(Box::new(handle)),
+        Some(Err(text)) => {
+            failed(&text);
+            ptr::null_mut()
+        }
+        None => {
+            failed("the library failed; please report it");
+            ptr::null_mut()
+        }
+    }
+}
+
+/// # Safety
+/// Strings are null or end with zero.
+unsafe fn opened(
+    robot: *const c_char,
+    models: [*const c_char; 2],
+    step_s: f64,
+    pose: Option<&[f64]>,
+) -> Result<Handle, String> {
+    // SAFETY: as promised by the caller.
+    let (robot, [links, drives]) = unsafe { (string(robot), models.map(|model| string(model))) };
+    let robot = robot.ok_or("robot: expected a path as UTF-8")?;
+    let unknown = |what: &str, word: &str, known: String| format!("{what} = {word:?}: expected one of {known}");
+    let known = |words: [(&str, &str); 3]| words.map(|(word, _)| word).join(", ");
+    let links = match links {
+        None => LinkModel::AsFiled,
+        Some(word) => LinkModel::from_word(word)
+            .ok_or_else(|| unknown("links", word, known(LinkModel::WORDS.map(|(word, _, text)| (word, text)))))?,
+    };
+    let drives = match drives {
+        None => DriveModel::AsFiled,
+        Some(word) => DriveModel::from_word(word)
+            .ok_or_else(|| unknown("drives", word, known(DriveModel::WORDS.map(|(word, _, text)| (word, text)))))?,
+    };
+    let settings = PlantSettings {
+        modelling: Modelling { links, drives, ..Modelling::default() },
+        step_s: (step_s != 0.0).then_some(step_s),
+        pose: pose.filter(|pose| !pose.is_empty()).map(<[f64]>::to_vec),
+        ..PlantSettings::default()
+    };
+    let plant = Plant::new(Path::new(robot), &settings).map_err(|error| text_of(&error))?;
+    let names = plant.variables().iter().map(|variable| message(&variable.name)).collect();
+    let units = plant.variables().iter().map(|variable| message(variable.unit)).collect();
+    Ok(Handle { plant, names, units })
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn flexarm_free(plant: *mut Handle) {
+    if !plant.is_null() {
+        // SAFETY: the caller frees a plant once.
+        let plant = unsafe { Box::from_raw(plant) };
+        guarded(|| drop(plant));
+    }
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn flexarm_count(plant: *const Handle) -> usize {
+    // SAFETY: the caller passes a plant or null.
+    unsafe { plant.as_ref() }.map_or(0, |handle| handle.names.len())
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn flexarm_find(plant: *const Handle, name: *const c_char) -> c_int {
+    // SAFETY: the caller passes a plant and a string, or null.
+    let (plant, name) = unsafe { (plant.as_ref(), string(name)) };
+    let found = plant.zip(name).and_then(|(handle, name)| handle.plant.find(name));
+    found.and_then(|reference| c_int::try_from(reference).ok()).unwrap_or_else(|| {
+        failed(&format!("there is no variable {:?}", name.unwrap_or_default()));
+        -1
+    })
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn flexarm_name(plant: *const Handle, reference: u32) -> *const c_char {
+    // SAFETY: the caller passes a plant or null.
+    let text = unsafe { plant.as_ref() }.and_then(|handle| handle.names.get(reference as usize));
+    text.map_or(ptr::null(), |text| text.as_ptr())
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn flexarm_unit(plant: *const Handle, reference: u32) -> *const c_char {
+    // SAFETY: the caller passes a plant or null.
+    let text = unsafe { plant.as_ref() }.and_then(|handle| handle.units.get(reference as usize));
+    text.map_or(ptr::null(), |text| text.as_ptr())
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn flexarm_causality(plant: *const Handle, reference: u32) -> c_int {
+    // SAFETY: the caller passes a plant or null.
+    let plant = unsafe { plant.as_ref() };
+    match plant.and_then(|handle| handle.plant.variables().get(reference as usize)).map(|own| own.causality) {
+        Some(Causality::Independent) => 0,
+        Some(Causality::Parameter) => 1,
+        Some(Causality::Input) => 2,
+        Some(Causality::Output) => 3,
+        None => -1,
+    }
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn flexarm_set(plant: *mut Handle, references: *const u32, values: *const f64, n: usize) -> c_int {
+    // SAFETY: the caller passes a plant and arrays of this length, or null.
+    unsafe {
+        call(plant, |handle| {
+            let (references, values) = (array(references, n).ok_or(NULL)?, array(values, n).ok_or(NULL)?);
+            references.iter().zip(values).try_for_each(|(&reference, &value)| {
+                let reference = reference as usize;
+                match handle.plant.variables().get(reference).map(|variable| variable.kind) {
+                    Some(Kind::Boolean) => handle.plant.set_flag(reference, value != 0.0),
+                    _ => handle.plant.set(reference, value),
+                }
+            })
+        })
+    }
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn flexarm_get(plant: *mut Handle, references: *const u32, values: *mut f64, n: usize) -> c_int {
+    // SAFETY: the caller passes a plant and arrays of this length, or null.
+    unsafe {
+        call(plant, |handle| {
+            let (references, values) = (array(references, n).ok_or(NULL)?, array_mut(values, n).ok_or(NULL)?);
+            references.iter().zip(values).try_for_each(|(&reference, value)| {
+                let reference = reference as usize;
+                *value = match handle.plant.variables().get(reference).map(|variable| variable.kind) {
+                    Some(Kind::Boolean) => f64::from(handle.plant.get_flag(reference)?),
+                    _ => handle.plant.get(reference)?,
+                };
+                Ok(())
+            })
+        })
+    }
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn flexarm_start(plant: *mut Handle, begin_s: f64) -> c_int {
+    // SAFETY: the caller passes a plant or null.
+    unsafe { call(plant, |handle| handle.plant.start(begin_s)) }
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn flexarm_step(plant: *mut Handle, length_s: f64) -> c_int {
+    // SAFETY: the caller passes a plant or null.
+    unsafe { call(plant, |handle| handle.plant.step(handle.plant.time_s(), length_s)) }
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn flexarm_time(plant: *const Handle) -> f64 {
+    // SAFETY: the caller passes a plant or null.
+    unsafe { plant.as_ref() }.map_or(f64::NAN, |handle| handle.plant.time_s())
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn flexarm_reset(plant: *mut Handle) -> c_int {
+    // SAFETY: the caller passes a plant or null.
+    unsafe {
+        call(plant, |handle| {
+            handle.plant.reset();
+            Ok(())
+        })
+    }
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn flexarm_state(plant: *mut Handle) -> *mut PlantState {
+    let mut state = ptr::null_mut();
+    // SAFETY: the caller passes a plant or null.
+    unsafe {
+        call(plant, |handle| {
+            state = Box::into_raw(Box::new(handle.plant.state()?));
+            Ok(())
+        });
+    }
+    state
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn flexarm_restore(plant: *mut Handle, state: *const PlantState) -> c_int {
+    // SAFETY: the caller passes a plant and a state of it, or null.
+    unsafe { call(plant, |handle| handle.plant.restore(state.as_ref().ok_or(NULL)?)) }
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn flexarm_free_state(state: *mut PlantState) {
+    if !state.is_null() {
+        // SAFETY: the caller frees a state once.
+        let state = unsafe { Box::from_raw(state) };
+        guarded(|| drop(state));
+    }
+}

@@ -1,0 +1,398 @@
+//! FMI 2.0, co-simulation.
+
+use std::ffi::{CString, c_char, c_int, c_uint, c_void};
+use std::path::PathBuf;
+use std::ptr;
+
+use super::{array, array_mut, guarded, message, string, text_of};
+use crate::error::PlantError;
+use crate::instance::{Instance, InstanceState};
+
+type Status = c_int;
+const OK: Status = 0;
+const DISCARD: Status = 2;
+const ERROR: Status = 3;
+/// `fmi2CoSimulation`.
+const CO_SIMULATION: c_int = 1;
+/// `fmi2LastSuccessfulTime`.
+const LAST_SUCCESSFUL_TIME: c_int = 2;
+
+type Logger = Option<unsafe extern "C" fn(*mut c_void, *const c_char, Status, *const c_char, *const c_char, ...)>;
+
+/// `fmi2CallbackFunctions`.
+#[repr(C)]
+struct Callbacks {
+    logger: Logger,
+    allocate: *const c_void,
+    free: *const c_void,
+    step_finished: *const c_void,
+    environment: *mut c_void,
+}
+
+/// An instance with its logger.
+struct Component {
+    instance: Instance,
+    log: Log,
+}
+
+/// Logger with what it is called with.
+struct Log {
+    logger: Logger,
+    environment: *mut c_void,
+    name: CString,
+}
+
+impl Log {
+    fn write(&self, text: &str) {
+        if let Some(logger) = self.logger {
+            let text = message(text);
+            // SAFETY: the importer gave logger and environment for each other. The message is an
+            // argument and no format.
+            unsafe {
+                let [category, format] = [c"logStatusError", c"%s"].map(|text| text.as_ptr());
+                logger(self.environment, self.name.as_ptr(), ERROR, category, format, text.as_ptr());
+            }
+        }
+    }
+}
+
+/// Runs a function of an instance.
+///
+/// # Safety
+/// `component` is null or an instance that is not freed.
+unsafe fn call(component: *mut c_void, work: impl FnOnce(&mut Instance) -> Result<(), PlantError>) -> Status {
+    // SAFETY: as promised by the caller.
+    let Some(component) = (unsafe { component.cast::<Component>().as_mut() }) else { return ERROR };
+    match guarded(|| work(&mut component.instance)) {
+        Some(Ok(())) => OK,
+        Some(Err(error)) => {
+            component.log.write(&text_of(&error));
+            ERROR
+        }
+        None => {
+            component.log.write("the library failed; please report it");
+            ERROR
+        }
+    }
+}
+
+const NULL: PlantError = PlantError::Order { function: "a function", phase: "with a null pointer" };
+
+/// Writes functions that this kind of FMU does not have: they return an error.
+macro_rules! without {
+    ($($name:ident($($argument:ty),*);)*) => {$(
+        #[unsafe(no_mangle)]
+        extern "C" fn $name(component: *mut c_void $(, _: $argument)*) -> Status {
+            let missing = PlantError::Order { function: stringify!($name), phase: "of this FMU" };
+            // SAFETY: the importer passes an instance or null.
+            unsafe { call(component, |_| Err(missing)) }
+        }
+    )*};
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2GetTypesPlatform() -> *const c_char {
+    c"default".as_ptr()
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2GetVersion() -> *const c_char {
+    c"2.0".as_ptr()
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2SetDebugLogging(component: *mut c_void, _: c_int, _: usize, _: *const *const c_char) -> Status {
+    // SAFETY: the importer passes an instance or null.
+    unsafe { call(component, |_| Ok(())) }
+}
+
+/// Returns the folder of a `file:` address; other texts are taken as paths.
+fn folder(location: &str) -> PathBuf {
+    let Some(rest) = location.strip_prefix("file:") else { return location.into() };
+    // file:///path, file:/path and file://localhost/path.
+    let path = match rest.strip_prefix("//") {
+        Some(rest) => rest.find('/').map_or("/", |slash| &rest[slash..]),
+        None => rest,
+    };
+    let bytes = path.as_bytes();
+    let (mut plain, mut k) = (Vec::with_capacity(bytes.len()), 0);
+    while k < bytes.len() {
+        let code = (bytes[k] == b'%').then(|| path.get(k + 1..k + 3)).flatten();
+        match code.and_then(|code| u8::from_str_radix(code, 16).ok()) {
+            Some(byte) => {
+                plain.push(byte);
+                k += 3;
+            }
+            None => {
+                plain.push(bytes[k]);
+                k += 1;
+            }
+        }
+    }
+    let plain = String::from_utf8_lossy(&plain).into_owned();
+    // file:///C:/folder
+    let drive = plain.as_bytes().get(2) == Some(&b':') && cfg!(windows);
+    PathBuf::from(if drive { plain[1..].to_owned() } else { plain })
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2Instantiate(
+    name: *const c_char,
+    kind: c_int,
+    guid: *const c_char,
+    location: *const c_char,
+    callbacks: *const Callbacks,
+    _visible: c_int,
+    _logging: c_int,
+) -> *mut c_void {
+    // SAFETY: the importer passes strings and callbacks, or null.
+    let (name, guid, location, callbacks) =
+        unsafe { (string(name), string(guid), string(location), callbacks.as_ref()) };
+    let (logger, environment) = callbacks.map_or((None, ptr::null_mut()), |own| (own.logger, own.environment));
+    let log = Log { logger, environment, name: message(name.unwrap_or_default()) };
+    if kind != CO_SIMULATION {
+        log.write("this FMU is for co-simulation");
+        return ptr::null_mut();
+    }
+    let (Some(guid), Some(location)) = (guid, location) else {
+        log.write("GUID and location of the resources are needed as UTF-8");
+        return ptr::null_mut();
+    };
+    match guarded(|| Instance::new(&folder(location), guid)) {
+        Some(Ok(instance)) => Box::into_raw(Box::new(Component { instance, log })).cast(),
+        Some(Err(error)) => {
+            log.write(&text_of(&error));
+            ptr::null_mut()
+        }
+        None => {
+            log.write("the library failed; please report it");
+            ptr::null_mut()
+        }
+    }
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2FreeInstance(component: *mut c_void) {
+    if !component.is_null() {
+        // SAFETY: the importer frees an instance once.
+        let component = unsafe { Box::from_raw(component.cast::<Component>()) };
+        guarded(|| drop(component));
+    }
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2SetupExperiment(component: *mut c_void, _: c_int, _: f64, begin_s: f64, _: c_int, _: f64) -> Status {
+    // SAFETY: the importer passes an instance or null.
+    unsafe { call(component, |instance| instance.set_begin(begin_s)) }
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2EnterInitializationMode(component: *mut c_void) -> Status {
+    // SAFETY: the importer passes an instance or null.
+    unsafe { call(component, Instance::enter_initialisation) }
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2ExitInitializationMode(component: *mut c_void) -> Status {
+    // SAFETY: the importer passes an instance or null.
+    unsafe { call(component, Instance::exit_initialisation) }
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2Terminate(component: *mut c_void) -> Status {
+    // SAFETY: the importer passes an instance or null.
+    unsafe { call(component, Instance::terminate) }
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2Reset(component: *mut c_void) -> Status {
+    // SAFETY: the importer passes an instance or null.
+    unsafe {
+        call(component, |instance| {
+            instance.reset();
+            Ok(())
+        })
+    }
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2GetReal(component: *mut c_void, references: *const c_uint, n: usize, values: *mut f64) -> Status {
+    // SAFETY: the importer passes an instance and arrays of this length, or null.
+    unsafe {
+        call(component, |instance| {
+            let (references, values) = (array(references, n).ok_or(NULL)?, array_mut(values, n).ok_or(NULL)?);
+            references.iter().zip(values).try_for_each(|(&reference, value)| {
+                *value = instance.get(reference)?;
+                Ok(())
+            })
+        })
+    }
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2SetReal(component: *mut c_void, references: *const c_uint, n: usize, values: *const f64) -> Status {
+    // SAFETY: the importer passes an instance and arrays of this length, or null.
+    unsafe {
+        call(component, |instance| {
+            let (references, values) = (array(references, n).ok_or(NULL)?, array(values, n).ok_or(NULL)?);
+            references.iter().zip(values).try_for_each(|(&reference, &value)| instance.set(reference, value))
+        })
+    }
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2GetBoolean(
+    component: *mut c_void,
+    references: *const c_uint,
+    n: usize,
+    values: *mut c_int,
+) -> Status {
+    // SAFETY: the importer passes an instance and arrays of this length, or null.
+    unsafe {
+        call(component, |instance| {
+            let (references, values) = (array(references, n).ok_or(NULL)?, array_mut(values, n).ok_or(NULL)?);
+            references.iter().zip(values).try_for_each(|(&reference, value)| {
+                *value = instance.get_flag(reference)?.into();
+                Ok(())
+            })
+        })
+    }
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2SetBoolean(
+    component: *mut c_void,
+    references: *const c_uint,
+    n: usize,
+    values: *const c_int,
+) -> Status {
+    // SAFETY: the importer passes an instance and arrays of this length, or null.
+    unsafe {
+        call(component, |instance| {
+            let (references, values) = (array(references, n).ok_or(NULL)?, array(values, n).ok_or(NULL)?);
+            references.iter().zip(values).try_for_each(|(&reference, &value)| instance.set_flag(reference, value != 0))
+        })
+    }
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2GetFMUstate(component: *mut c_void, state: *mut *mut c_void) -> Status {
+    // SAFETY: the importer passes an instance and a place for the state, or null.
+    unsafe {
+        call(component, |instance| {
+            let place = state.as_mut().ok_or(NULL)?;
+            let new = instance.state()?;
+            // A state that is given is used again.
+            match place.cast::<InstanceState>().as_mut() {
+                Some(old) => *old = new,
+                None => *place = Box::into_raw(Box::new(new)).cast(),
+            }
+            Ok(())
+        })
+    }
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2SetFMUstate(component: *mut c_void, state: *mut c_void) -> Status {
+    // SAFETY: the importer passes an instance and a state of it, or null.
+    unsafe { call(component, |instance| instance.restore(state.cast::<InstanceState>().as_ref().ok_or(NULL)?)) }
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2FreeFMUstate(component: *mut c_void, state: *mut *mut c_void) -> Status {
+    // SAFETY: the importer passes an instance and a place with a state that is not freed, or null.
+    unsafe {
+        call(component, |_| {
+            if let Some(place) = state.as_mut() {
+                if !place.is_null() {
+                    drop(Box::from_raw(place.cast::<InstanceState>()));
+                    *place = ptr::null_mut();
+                }
+            }
+            Ok(())
+        })
+    }
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2DoStep(component: *mut c_void, from_s: f64, length_s: f64, _no_return: c_int) -> Status {
+    // SAFETY: the importer passes an instance or null.
+    unsafe { call(component, |instance| instance.step(from_s, length_s)) }
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2GetRealStatus(component: *mut c_void, kind: c_int, value: *mut f64) -> Status {
+    // SAFETY: the importer passes an instance and a place for the value, or null.
+    unsafe {
+        call(component, |instance| {
+            let place = value.as_mut().ok_or(NULL)?;
+            match kind {
+                LAST_SUCCESSFUL_TIME => *place = instance.time_s(),
+                _ => return Err(PlantError::Order { function: "fmi2GetRealStatus", phase: "for this kind of status" }),
+            }
+            Ok(())
+        })
+    }
+}
+
+/// Steps are never pending: no other status is known.
+macro_rules! discarded {
+    ($($name:ident($value:ty);)*) => {$(
+        #[unsafe(no_mangle)]
+        extern "C" fn $name(_: *mut c_void, _: c_int, _: *mut $value) -> Status {
+            DISCARD
+        }
+    )*};
+}
+
+discarded! {
+    fmi2GetStatus(Status);
+    fmi2GetIntegerStatus(c_int);
+    fmi2GetBooleanStatus(c_int);
+    fmi2GetStringStatus(*const c_char);
+}
+
+type Refs = *const c_uint;
+type Out<T> = *mut T;
+without! {
+    fmi2GetInteger(Refs, usize, Out<c_int>);
+    fmi2SetInteger(Refs, usize, *const c_int);
+    fmi2GetString(Refs, usize, Out<*const c_char>);
+    fmi2SetString(Refs, usize, *const *const c_char);
+    fmi2SerializedFMUstateSize(*mut c_void, Out<usize>);
+    fmi2SerializeFMUstate(*mut c_void, Out<c_char>, usize);
+    fmi2DeSerializeFMUstate(*const c_char, usize, Out<*mut c_void>);
+    fmi2GetDirectionalDerivative(Refs, usize, Refs, usize, *const f64, Out<f64>);
+    fmi2SetRealInputDerivatives(Refs, usize, *const c_int, *const f64);
+    fmi2GetRealOutputDerivatives(Refs, usize, *const c_int, Out<f64>);
+    fmi2CancelStep();
+    fmi2EnterEventMode();
+    fmi2NewDiscreteStates(*mut c_void);
+    fmi2EnterContinuousTimeMode();
+    fmi2CompletedIntegratorStep(c_int, Out<c_int>, Out<c_int>);
+    fmi2SetTime(f64);
+    fmi2SetContinuousStates(*const f64, usize);
+    fmi2GetDerivatives(Out<f64>, usize);
+    fmi2GetEventIndicators(Out<f64>, usize);
+    fmi2GetContinuousStates(Out<f64>, usize);
+    fmi2GetNominalsOfContinuousStates(Out<f64>, usize);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn resources_are_found_by_every_form_of_their_address() {
+        for (location, path) in [
+            ("file:///tmp/a%20b/r", "/tmp/a b/r"),
+            ("file:/tmp/r", "/tmp/r"),
+            ("file://localhost/tmp/r", "/tmp/r"),
+            ("/tmp/r", "/tmp/r"),
+            ("file:///tmp/100%", "/tmp/100%"),
+            ("file:///tmp/%C3%BC", "/tmp/ü"),
+        ] {
+            assert_eq!(folder(location), PathBuf::from(path), "{location}");
+        }
+    }
+}

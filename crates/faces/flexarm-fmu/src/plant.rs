@@ -1,0 +1,401 @@
+//! An arm with named inputs and outputs, stepped by another program.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use flexarm::{
+    Arm, Command, Live, LiveOptions, LiveState, LoadOptions, Modelling, Pose, Robot, RunOptions, Servos, StepperKind,
+    Wrench,
+};
+use nalgebra::UnitQuaternion;
+use toml_edit::DocumentMut;
+
+use crate::error::PlantError;
+use crate::variables::{Causality, Kind, Meaning, Starts, Variable, variables};
+
+/// Tolerance for a communication step to be a whole number of solver steps (in steps).
+const WHOLE: f64 = 1e-6;
+/// Tolerance between the time of the caller and that of the plant (in communication steps).
+const SAME_TIME: f64 = 1e-3;
+
+/// How a plant is made of a robot.
+#[derive(Clone, Debug)]
+pub struct PlantSettings {
+    /// Options for loading the robot.
+    pub load: LoadOptions,
+    /// Models of links and drives.
+    pub modelling: Modelling,
+    /// Stepper; one with a fixed step size.
+    pub stepper: StepperKind,
+    /// Step size (s); the default of the stepper if `None`.
+    pub step_s: Option<f64>,
+    /// Joint positions at the start (rad or m); zero if `None`.
+    pub pose: Option<Vec<f64>>,
+}
+
+impl Default for PlantSettings {
+    fn default() -> Self {
+        let (load, modelling) = (LoadOptions::default(), Modelling::default());
+        Self { load, modelling, stepper: StepperKind::default(), step_s: None, pose: None }
+    }
+}
+
+/// An arm with its variables. It is made, gets parameters and inputs, is started, and then steps.
+pub struct Plant {
+    path: PathBuf,
+    settings: PlantSettings,
+    /// The arm as filed, shared by copies and kept when a parameter changes the robot.
+    arm: Arm,
+    variables: Arc<[Variable]>,
+    /// Value of each variable; 1 is true.
+    values: Vec<f64>,
+    live: Option<Live>,
+    /// Parameters and inputs for which the outputs before the start are computed.
+    previewed: Option<Vec<f64>>,
+    /// Time of the caller at the start (s).
+    begin_s: f64,
+    steps: u64,
+}
+
+/// State of a plant that is started.
+pub struct PlantState {
+    live: LiveState,
+    values: Vec<f64>,
+    begin_s: f64,
+    steps: u64,
+}
+
+impl Plant {
+    /// Makes a plant of a robot file or URDF.
+    ///
+    /// # Errors
+    /// [`PlantError::Robot`] if the robot cannot be loaded or has no equilibrium at the first pose.
+    pub fn new(path: &Path, settings: &PlantSettings) -> Result<Self, PlantError> {
+        let robot = Robot::load_with(path, &settings.load)?;
+        let arm = robot.flexible(settings.modelling)?;
+        let options = options(settings, None);
+        let live = arm.live(settings.pose.as_deref(), options.step_s, &options)?;
+        let starts = Starts {
+            pose: live.position(),
+            step_s: options.step_s,
+            payload: filed_payload(&robot)?.map(|(_, mass)| mass),
+            holding: live.effort(),
+        };
+        let variables: Arc<[Variable]> = variables(&arm, &starts).into();
+        let values = variables.iter().map(|variable| variable.start.unwrap_or(0.0)).collect();
+        let (path, settings) = (robot.path, settings.clone());
+        let (live, previewed) = (Some(live), None);
+        let mut plant = Self { path, settings, arm, variables, values, live, previewed, begin_s: 0.0, steps: 0 };
+        plant.update();
+        plant.live = None;
+        plant.previewed = Some(plant.settable());
+        Ok(plant)
+    }
+
+    /// Returns the variables; the position of a variable is its reference.
+    pub fn variables(&self) -> &[Variable] {
+        &self.variables
+    }
+
+    /// Returns the arm.
+    pub fn arm(&self) -> &Arm {
+        &self.arm
+    }
+
+    /// Returns the reference of a variable.
+    pub fn find(&self, name: &str) -> Option<usize> {
+        self.variables.iter().position(|variable| variable.name == name)
+    }
+
+    /// Returns whether the plant is started.
+    pub fn is_started(&self) -> bool {
+        self.live.is_some()
+    }
+
+    /// Returns the time (s).
+    pub fn time_s(&self) -> f64 {
+        self.begin_s + self.live.as_ref().map_or(0.0, Live::time_s)
+    }
+
+    fn variable(&self, reference: usize, kind: Kind) -> Result<&Variable, PlantError> {
+        let variable = self.variables.get(reference).ok_or(PlantError::Reference(reference))?;
+        if variable.kind != kind {
+            return Err(PlantError::Kind { name: variable.name.clone(), kind: variable.kind });
+        }
+        Ok(variable)
+    }
+
+    /// Returns a number.
+    ///
+    /// # Errors
+    /// [`PlantError::Reference`], [`PlantError::Kind`].
+    pub fn get(&self, reference: usize) -> Result<f64, PlantError> {
+        self.variable(reference, Kind::Real)?;
+        Ok(self.values[reference])
+    }
+
+    /// Returns a truth value.
+    ///
+    /// # Errors
+    /// As [`Plant::get`].
+    pub fn get_flag(&self, reference: usize) -> Result<bool, PlantError> {
+        self.variable(reference, Kind::Boolean)?;
+        Ok(self.values[reference] != 0.0)
+    }
+
+    /// Sets a number: a parameter before the start, an input at any time.
+    ///
+    /// # Errors
+    /// [`PlantError::Reference`], [`PlantError::Kind`], [`PlantError::NotSettable`],
+    /// [`PlantError::NotFinite`].
+    pub fn set(&mut self, reference: usize, value: f64) -> Result<(), PlantError> {
+        self.set_value(reference, Kind::Real, value)
+    }
+
+    /// Sets a truth value.
+    ///
+    /// # Errors
+    /// As [`Plant::set`].
+    pub fn set_flag(&mut self, reference: usize, value: bool) -> Result<(), PlantError> {
+        self.set_value(reference, Kind::Boolean, f64::from(value))
+    }
+
+    fn set_value(&mut self, reference: usize, kind: Kind, value: f64) -> Result<(), PlantError> {
+        let variable = self.variable(reference, kind)?;
+        let name = || variable.name.clone();
+        match variable.causality {
+            Causality::Input => {}
+            Causality::Parameter if !self.is_started() => {}
+            Causality::Parameter => return Err(PlantError::Started(name())),
+            Causality::Output | Causality::Independent => return Err(PlantError::NotSettable(name())),
+        }
+        if !value.is_finite() {
+            return Err(PlantError::NotFinite { name: name(), found: value });
+        }
+        self.values[reference] = value;
+        Ok(())
+    }
+
+    /// Returns the value of every variable.
+    pub(crate) fn values(&self) -> &[f64] {
+        &self.values
+    }
+
+    /// Returns to parameters and inputs of before the start.
+    pub(crate) fn return_to(&mut self, values: &[f64]) {
+        self.live = None;
+        self.values.copy_from_slice(values);
+    }
+
+    /// Computes the outputs that a start would give, without starting.
+    pub(crate) fn preview(&mut self, begin_s: f64) -> Result<(), PlantError> {
+        if self.previewed.as_ref() == Some(&self.settable()) {
+            return Ok(());
+        }
+        let settable = self.settable();
+        self.start(begin_s)?;
+        self.live = None;
+        self.previewed = Some(settable);
+        Ok(())
+    }
+
+    /// Returns the values of parameters and inputs.
+    fn settable(&self) -> Vec<f64> {
+        let both = self.values.iter().zip(self.variables.iter());
+        both.filter(|(_, variable)| variable.start.is_some()).map(|(value, _)| *value).collect()
+    }
+
+    /// Starts the arm at rest at the target positions, at time `begin_s` (s) of the caller.
+    ///
+    /// # Errors
+    /// [`PlantError::Robot`] for parameters without sense, [`PlantError::Started`].
+    pub fn start(&mut self, begin_s: f64) -> Result<(), PlantError> {
+        if self.is_started() {
+            return Err(PlantError::Started("start".into()));
+        }
+        if !begin_s.is_finite() {
+            return Err(PlantError::NotFinite { name: "start time".into(), found: begin_s });
+        }
+        (self.begin_s, self.steps) = (begin_s, 0);
+        self.live = Some(self.begun(None)?);
+        self.update();
+        Ok(())
+    }
+
+    /// Returns the arm at rest at the targets.
+    ///
+    /// * `step_s`: step size instead of that of the parameter (s).
+    fn begun(&self, step_s: Option<f64>) -> Result<Live, PlantError> {
+        let step_s = step_s.unwrap_or(self.parameter(Meaning::Step, 0.0));
+        let options = options(&self.settings, Some(step_s));
+        let own = LiveOptions {
+            servos: if self.parameter(Meaning::OpenServos, 0.0) == 0.0 { Servos::Closed } else { Servos::Open },
+            stiffness: self.parameter(Meaning::StiffnessFactor, 1.0),
+            damping: self.parameter(Meaning::DampingFactor, 1.0),
+        };
+        let pose = self.all(Meaning::TargetPosition);
+        Ok(self.loaded()?.live_with(Some(&pose), step_s, &options, &own)?)
+    }
+
+    /// Returns the arm with the payload of the parameter.
+    fn loaded(&self) -> Result<Arm, PlantError> {
+        let filed = self.variables.iter().find(|variable| variable.meaning == Meaning::PayloadMass);
+        let Some(start) = filed.and_then(|variable| variable.start) else { return Ok(self.arm.clone()) };
+        let mass = self.parameter(Meaning::PayloadMass, start);
+        if mass == start {
+            return Ok(self.arm.clone());
+        }
+        let Some((mut text, _)) = filed_payload(self.arm.robot())? else { return Ok(self.arm.clone()) };
+        let payload = &mut text["payload"];
+        payload["mass"] = toml_edit::value(mass);
+        if let Some(inertia) = payload.get_mut("inertia").and_then(|inertia| inertia.as_array_mut()) {
+            for moment in inertia.iter_mut() {
+                let filed = moment.as_float().or_else(|| moment.as_integer().map(|whole| whole as f64));
+                *moment = (filed.unwrap_or(0.0) * mass / start).into();
+            }
+        }
+        let robot = Robot::from_toml(&text.to_string(), &self.path, &self.settings.load)?;
+        Ok(robot.flexible(self.settings.modelling)?)
+    }
+
+    /// Returns the value of a parameter; `default` if the plant has none such.
+    fn parameter(&self, meaning: Meaning, default: f64) -> f64 {
+        let place = self.variables.iter().position(|variable| variable.meaning == meaning);
+        place.map_or(default, |reference| self.values[reference])
+    }
+
+    /// Returns the values of an input of all joints; zero where a joint has none.
+    fn all(&self, meaning: impl Fn(usize) -> Meaning) -> Vec<f64> {
+        (0..self.arm.joints().count()).map(|k| self.parameter(meaning(k), 0.0)).collect()
+    }
+
+    /// Simulates one communication step with the inputs as they are.
+    ///
+    /// The first step chooses a shorter solver step if its length is no multiple of the parameter
+    /// `step`.
+    ///
+    /// # Errors
+    /// [`PlantError::NotStarted`]; [`PlantError::Time`] if `from_s` is not the time of the plant;
+    /// [`PlantError::Robot`] for a length that is no multiple of the solver step, and for a step
+    /// that fails.
+    pub fn step(&mut self, from_s: f64, length_s: f64) -> Result<(), PlantError> {
+        let own_s = self.time_s();
+        if self.live.is_none() {
+            return Err(PlantError::NotStarted);
+        }
+        if !(length_s.is_finite() && length_s > 0.0) {
+            return Err(PlantError::Length(length_s));
+        }
+        if !((from_s - own_s).abs() <= SAME_TIME * length_s) {
+            return Err(PlantError::Time { given_s: from_s, own_s });
+        }
+        if self.steps == 0 {
+            let step_s = self.parameter(Meaning::Step, 0.0);
+            let count = length_s / step_s;
+            if (count - count.round()).abs() > WHOLE || count < 0.5 {
+                self.live = Some(self.begun(Some(length_s / count.ceil().max(1.0)))?);
+            }
+        }
+        let (q, qdot, torque) =
+            (self.all(Meaning::TargetPosition), self.all(Meaning::TargetVelocity), self.all(Meaning::Torque));
+        let F: [f64; 6] = std::array::from_fn(|k| self.parameter(Meaning::Wrench(k), 0.0));
+        let mut wrench = Wrench::zeros();
+        wrench.force.copy_from_slice(&F[..3]);
+        wrench.torque.copy_from_slice(&F[3..]);
+        let with_velocity = self.parameter(Meaning::UseTargetVelocity, 0.0) != 0.0;
+        let command = Command { q: &q, qdot: with_velocity.then_some(&qdot[..]), torque: Some(&torque), wrench };
+        if let Some(live) = &mut self.live {
+            live.advance(length_s, &command)?;
+        }
+        self.steps += 1;
+        self.update();
+        Ok(())
+    }
+
+    /// Returns a copy of the state of a started plant.
+    ///
+    /// # Errors
+    /// [`PlantError::NotStarted`].
+    pub fn state(&self) -> Result<PlantState, PlantError> {
+        let live = self.live.as_ref().ok_or(PlantError::NotStarted)?.state()?;
+        Ok(PlantState { live, values: self.values.clone(), begin_s: self.begin_s, steps: self.steps })
+    }
+
+    /// Returns to a state of this plant, taken since it was started.
+    ///
+    /// # Errors
+    /// [`PlantError::NotStarted`]; [`PlantError::Robot`] for a state of another plant or of before
+    /// a reset.
+    pub fn restore(&mut self, state: &PlantState) -> Result<(), PlantError> {
+        self.live.as_mut().ok_or(PlantError::NotStarted)?.restore(&state.live)?;
+        self.values.clone_from(&state.values);
+        (self.begin_s, self.steps) = (state.begin_s, state.steps);
+        Ok(())
+    }
+
+    /// Returns to the state in which the plant was made: not started, with all start values.
+    pub fn reset(&mut self) {
+        self.live = None;
+        for (value, variable) in self.values.iter_mut().zip(self.variables.iter()) {
+            if let Some(start) = variable.start {
+                *value = start;
+            }
+        }
+    }
+
+    /// Computes the outputs.
+    fn update(&mut self) {
+        let time_s = self.time_s();
+        let Some(live) = &mut self.live else { return };
+        let (link_position, link_velocity) = (live.link_position(), live.link_velocity());
+        let (tcp, rigid, V) = (live.tcp_pose(), live.target_pose(), live.tcp_velocity());
+        let error = tcp.translation.vector - rigid.translation.vector;
+        let turned = (tcp.rotation * rigid.rotation.inverse()).scaled_axis();
+        let (own, of_rigid) = (quaternion(&tcp), quaternion(&rigid));
+        for (value, variable) in self.values.iter_mut().zip(self.variables.iter()) {
+            *value = match variable.meaning {
+                Meaning::Time => time_s,
+                Meaning::MotorPosition(k) => live.position()[k],
+                Meaning::MotorVelocity(k) => live.velocity()[k],
+                Meaning::LinkPosition(k) => link_position[k],
+                Meaning::LinkVelocity(k) => link_velocity[k],
+                Meaning::Effort(k) => live.effort()[k],
+                Meaning::TcpPosition(k) => tcp.translation.vector[k],
+                Meaning::TcpQuaternion(k) => own[k],
+                Meaning::TcpVelocity(k) => V[k],
+                Meaning::RigidPosition(k) => rigid.translation.vector[k],
+                Meaning::RigidQuaternion(k) => of_rigid[k],
+                Meaning::Error(k) => error[k],
+                Meaning::ErrorLength => error.norm(),
+                Meaning::RotationError(k) => turned[k],
+                _ => continue,
+            };
+        }
+    }
+}
+
+/// Returns w, x, y, z of the orientation, w not negative.
+fn quaternion(pose: &Pose) -> [f64; 4] {
+    let q = UnitQuaternion::from_rotation_matrix(&pose.rotation);
+    let sign = if q.w < 0.0 { -1.0 } else { 1.0 };
+    [q.w, q.i, q.j, q.k].map(|part| sign * part)
+}
+
+fn options(settings: &PlantSettings, step_s: Option<f64>) -> RunOptions {
+    let stepper = settings.stepper;
+    let step_s = step_s.or(settings.step_s).unwrap_or(stepper.entry().default_step_s);
+    RunOptions { stepper, step_s, modelling: settings.modelling, ..RunOptions::default() }
+}
+
+/// Returns the robot file and the mass of its payload (kg), if it has one with a mass.
+fn filed_payload(robot: &Robot) -> Result<Option<(DocumentMut, f64)>, PlantError> {
+    if robot.path.extension().is_none_or(|ending| ending != "toml") {
+        return Ok(None);
+    }
+    let unreadable = |what: String| PlantError::File { path: robot.path.clone(), what };
+    let text = std::fs::read_to_string(&robot.path).map_err(|error| unreadable(error.to_string()))?;
+    let document: DocumentMut = text.parse().map_err(|error: toml_edit::TomlError| unreadable(error.to_string()))?;
+    let mass = document.get("payload").and_then(|payload| payload.get("mass"));
+    let mass = mass.and_then(|mass| mass.as_float().or_else(|| mass.as_integer().map(|whole| whole as f64)));
+    Ok(mass.filter(|mass| *mass > 0.0).map(|mass| (document, mass)))
+}

@@ -1,0 +1,263 @@
+//! Variables of a plant: names, units, causality, start values.
+//!
+//! A variable is found by its reference, the position in the list. Names are structured as FMI asks:
+//! `joint.joint_1.target_position`, `tcp.position.x`.
+
+use std::fmt::Write as _;
+
+use flexarm::Arm;
+
+/// Axes of vectors.
+const AXES: [&str; 3] = ["x", "y", "z"];
+
+/// Direction of a variable.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Causality {
+    /// Time.
+    Independent,
+    /// Set before the start.
+    Parameter,
+    /// Set between steps.
+    Input,
+    /// Computed.
+    Output,
+}
+
+/// Type of a variable.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// 64-bit number.
+    Real,
+    /// True or false.
+    Boolean,
+}
+
+/// Meaning of a variable; numbers are joints or components.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Meaning {
+    Time,
+    Step,
+    StiffnessFactor,
+    DampingFactor,
+    PayloadMass,
+    UseTargetVelocity,
+    OpenServos,
+    TargetPosition(usize),
+    TargetVelocity(usize),
+    Torque(usize),
+    Wrench(usize),
+    MotorPosition(usize),
+    MotorVelocity(usize),
+    LinkPosition(usize),
+    LinkVelocity(usize),
+    Effort(usize),
+    TcpPosition(usize),
+    TcpQuaternion(usize),
+    TcpVelocity(usize),
+    RigidPosition(usize),
+    RigidQuaternion(usize),
+    Error(usize),
+    ErrorLength,
+    RotationError(usize),
+}
+
+/// A variable of a plant.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Variable {
+    /// Structured name.
+    pub name: String,
+    /// One sentence.
+    pub description: String,
+    /// Unit of a number, as in [`UNITS`].
+    pub unit: &'static str,
+    /// Type.
+    pub kind: Kind,
+    /// Direction.
+    pub causality: Causality,
+    /// Start value of parameters and inputs; 1 is true.
+    pub start: Option<f64>,
+    pub(crate) meaning: Meaning,
+}
+
+/// Units with their exponents of kg, m, s and rad.
+pub const UNITS: [(&str, [i32; 4]); 9] = [
+    ("1", [0, 0, 0, 0]),
+    ("s", [0, 0, 1, 0]),
+    ("kg", [1, 0, 0, 0]),
+    ("m", [0, 1, 0, 0]),
+    ("m/s", [0, 1, -1, 0]),
+    ("rad", [0, 0, 0, 1]),
+    ("rad/s", [0, 0, -1, 1]),
+    ("N", [1, 1, -2, 0]),
+    ("N.m", [1, 2, -2, 0]),
+];
+
+/// Returns a name of a joint as a part of a structured name: quoted unless it is an identifier.
+fn part(name: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || c == '_';
+    if name.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_') && name.chars().all(plain) {
+        return name.to_owned();
+    }
+    let mut quoted = String::from("'");
+    for c in name.chars() {
+        match c {
+            '\'' | '\\' => {
+                quoted.push('\\');
+                quoted.push(c);
+            }
+            c if c.is_ascii_graphic() || c == ' ' => quoted.push(c),
+            // Only ASCII is allowed between quotes.
+            c => {
+                let _ = write!(quoted, "u{:x}", u32::from(c));
+            }
+        }
+    }
+    quoted + "'"
+}
+
+/// Start values that differ from arm to arm.
+pub(crate) struct Starts<'a> {
+    /// Joint positions (rad or m).
+    pub(crate) pose: &'a [f64],
+    /// Step size (s).
+    pub(crate) step_s: f64,
+    /// Mass of the payload (kg), if the robot file has one that can be changed.
+    pub(crate) payload: Option<f64>,
+    /// Torques that hold the pose (N m or N).
+    pub(crate) holding: &'a [f64],
+}
+
+/// Returns the variables of an arm.
+pub(crate) fn variables(arm: &Arm, starts: &Starts<'_>) -> Vec<Variable> {
+    let mut list = List(Vec::new());
+    list.parameters(starts);
+    if arm.flexible().has_servo() {
+        list.add(
+            Causality::Parameter,
+            "open_servos",
+            "Motors get the inputs torque alone, without the servos of the arm",
+            "",
+            Some(0.0),
+            Meaning::OpenServos,
+        );
+    }
+    let model = &arm.flexible().model;
+    let driven: Vec<usize> = arm.flexible().servo_limits().map(|(coordinate, _)| coordinate).collect();
+    for (k, coordinate) in model.coordinates()[..model.n_actuated()].iter().enumerate() {
+        let slides = coordinate.slides();
+        let [position, velocity, effort] = if slides { ["m", "m/s", "N"] } else { ["rad", "rad/s", "N.m"] };
+        let of_joint = |what: &str| format!("joint.{}.{what}", part(&coordinate.joint));
+        let (input, output) = (Causality::Input, Causality::Output);
+        let start = starts.pose.get(k).copied().unwrap_or(0.0);
+        let holding = starts.holding.get(k).copied().unwrap_or(0.0);
+        let text = "Target at the end of the communication step; the arm starts at rest there";
+        list.add(input, of_joint("target_position"), text, position, Some(start), Meaning::TargetPosition(k));
+        let text = "Target velocity at the end of the communication step, used with use_target_velocity";
+        list.add(input, of_joint("target_velocity"), text, velocity, Some(0.0), Meaning::TargetVelocity(k));
+        if driven.contains(&k) {
+            let text = format!(
+                "Torque or force at the joint, added to that of the servo; {holding:.6} {effort} hold the first pose"
+            );
+            list.add(input, of_joint("torque"), text, effort, Some(0.0), Meaning::Torque(k));
+        }
+        let outputs = [
+            ("motor_position", "Position of the motor, at the joint", position, Meaning::MotorPosition(k)),
+            ("motor_velocity", "Velocity of the motor, at the joint", velocity, Meaning::MotorVelocity(k)),
+            ("link_position", "Position of the link behind the gearbox", position, Meaning::LinkPosition(k)),
+            ("link_velocity", "Velocity of the link behind the gearbox", velocity, Meaning::LinkVelocity(k)),
+            ("effort", "Torque or force of the drive, at the joint", effort, Meaning::Effort(k)),
+        ];
+        for (what, text, unit, meaning) in outputs {
+            list.add(output, of_joint(what), text, unit, None, meaning);
+        }
+    }
+    list.tcp();
+    list.0
+}
+
+struct List(Vec<Variable>);
+
+impl List {
+    fn add(
+        &mut self,
+        causality: Causality,
+        name: impl Into<String>,
+        description: impl Into<String>,
+        unit: &'static str,
+        start: Option<f64>,
+        meaning: Meaning,
+    ) {
+        let kind = match meaning {
+            Meaning::UseTargetVelocity | Meaning::OpenServos => Kind::Boolean,
+            _ => Kind::Real,
+        };
+        let (name, description) = (name.into(), description.into());
+        self.0.push(Variable { name, description, unit, kind, causality, start, meaning });
+    }
+
+    fn parameters(&mut self, starts: &Starts<'_>) {
+        self.add(Causality::Independent, "time", "Time", "s", None, Meaning::Time);
+        let parameter = Causality::Parameter;
+        let text = "Step size of the solver; shorter where communication steps are no multiples of it";
+        self.add(parameter, "step", text, "s", Some(starts.step_s), Meaning::Step);
+        let text = "Factor on the stiffness of all links and gearboxes";
+        self.add(parameter, "stiffness_factor", text, "1", Some(1.0), Meaning::StiffnessFactor);
+        let text = "Factor on the damping of all links and gearboxes";
+        self.add(parameter, "damping_factor", text, "1", Some(1.0), Meaning::DampingFactor);
+        if let Some(mass) = starts.payload {
+            self.add(parameter, "payload.mass", "Mass of the payload", "kg", Some(mass), Meaning::PayloadMass);
+        }
+        let text = "Whether the inputs target_velocity are used; without them joints follow the parabola through \
+                    the last three targets";
+        self.add(parameter, "use_target_velocity", text, "", Some(0.0), Meaning::UseTargetVelocity);
+    }
+
+    fn tcp(&mut self) {
+        for (i, (part, unit)) in [("force", "N"), ("torque", "N.m")].into_iter().enumerate() {
+            for (k, axis) in AXES.iter().enumerate() {
+                let (name, text) = (format!("tcp.{part}.{axis}"), format!("External {part} on the TCP, world axes"));
+                self.add(Causality::Input, name, text, unit, Some(0.0), Meaning::Wrench(3 * i + k));
+            }
+        }
+        let output = Causality::Output;
+        let vector = |list: &mut Self, name: &str, text: &str, unit, meaning: &dyn Fn(usize) -> Meaning| {
+            for (k, axis) in AXES.iter().enumerate() {
+                list.add(output, format!("{name}.{axis}"), text, unit, None, meaning(k));
+            }
+        };
+        let quaternion = |list: &mut Self, name: &str, text: &str, meaning: &dyn Fn(usize) -> Meaning| {
+            for (k, part) in ["w", "x", "y", "z"].into_iter().enumerate() {
+                list.add(output, format!("{name}.{part}"), text, "1", None, meaning(k));
+            }
+        };
+        vector(self, "tcp.position", "Position of the TCP, world", "m", &Meaning::TcpPosition);
+        let text = "Orientation of the TCP, unit quaternion with w >= 0";
+        quaternion(self, "tcp.orientation", text, &Meaning::TcpQuaternion);
+        vector(self, "tcp.velocity", "Velocity of the TCP, world axes", "m/s", &Meaning::TcpVelocity);
+        let text = "Angular velocity of the TCP, world axes";
+        vector(self, "tcp.angular_velocity", text, "rad/s", &|k| Meaning::TcpVelocity(3 + k));
+        let text = "Position of the TCP of the rigid arm with its joints at the targets";
+        vector(self, "rigid_tcp.position", text, "m", &Meaning::RigidPosition);
+        let text = "Orientation of the TCP of the rigid arm, unit quaternion with w >= 0";
+        quaternion(self, "rigid_tcp.orientation", text, &Meaning::RigidQuaternion);
+        let text = "TCP error: position less that of the rigid arm, world axes";
+        vector(self, "tcp_error.position", text, "m", &Meaning::Error);
+        let text = "Length of the TCP error";
+        self.add(output, "tcp_error.length", text, "m", None, Meaning::ErrorLength);
+        let text = "Rotation vector from the rigid to the flexible TCP, world axes";
+        vector(self, "tcp_error.rotation", text, "rad", &Meaning::RotationError);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_that_are_no_identifiers_are_quoted() {
+        assert_eq!(part("joint_1"), "joint_1");
+        assert_eq!(part("1st joint"), "'1st joint'");
+        assert_eq!(part("a'b\\c"), "'a\\'b\\\\c'");
+        assert_eq!(part("gelenk-ü"), "'gelenk-ufc'");
+    }
+}
