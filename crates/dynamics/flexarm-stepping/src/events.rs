@@ -174,6 +174,7 @@ impl EventQueue {
 }
 
 /// Evenly spaced samples, starting at 0.
+#[derive(Clone)]
 struct SampleClock {
     sample_s: f64,
     /// Number of the next sample.

@@ -114,7 +114,7 @@ impl Failure {
         match self {
             Self::InStudy { source, .. } => source.page(),
             Self::Library(error) => page_of(error),
-            Self::Usage(_) | Self::Verify(_) => None,
+            Self::Usage(_) | Self::Verify(_) | Self::Plant(_) => None,
         }
     }
 }

@@ -18,7 +18,7 @@ thread_local! {
 }
 
 /// A plant with the names of its variables as C strings.
-pub struct Handle {
+pub(super) struct Handle {
     plant: Plant,
     names: Vec<CString>,
     units: Vec<CString>,

@@ -1,0 +1,312 @@
+//! Plants against the arm that is commanded directly, and their FMUs.
+#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
+#![allow(clippy::print_stdout, reason = "measured errors beside their bounds")]
+
+use std::path::{Path, PathBuf};
+
+use flexarm::{Command, DriveModel, LinkModel, LiveOptions, Modelling, Robot, RunOptions, Servos, Wrench};
+use flexarm_fmu::{
+    About, Causality, Fmi, FmuJob, Kind, Plant, PlantError, PlantSettings, description, export_fmu, open_resources,
+};
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(3).unwrap().to_owned()
+}
+
+fn robot(name: &str) -> PathBuf {
+    root().join("robots").join(name).join("robot.toml")
+}
+
+fn settings(links: LinkModel, drives: DriveModel) -> PlantSettings {
+    PlantSettings { modelling: Modelling { links, drives, ..Modelling::default() }, ..PlantSettings::default() }
+}
+
+/// Targets of a smooth swing of all joints that starts at rest.
+fn targets(from: &[f64], t: f64) -> (Vec<f64>, Vec<f64>) {
+    let swing = |k: usize| (0.05 + 0.01 * k as f64, 3.0 + k as f64);
+    let q = from.iter().enumerate().map(|(k, q)| q + swing(k).0 * (1.0 - (swing(k).1 * t).cos()));
+    let qdot = from.iter().enumerate().map(|(k, _)| swing(k).0 * swing(k).1 * (swing(k).1 * t).sin());
+    (q.collect(), qdot.collect())
+}
+
+/// References of a variable of every joint that has it.
+fn of_joints(plant: &Plant, what: &str) -> Vec<usize> {
+    let ending = format!(".{what}");
+    let names = plant.variables().iter().enumerate();
+    names.filter(|(_, v)| v.name.starts_with("joint.") && v.name.ends_with(&ending)).map(|(k, _)| k).collect()
+}
+
+fn values(plant: &Plant, names: &[&str]) -> Vec<f64> {
+    names.iter().map(|name| plant.get(plant.find(name).unwrap()).unwrap()).collect()
+}
+
+const TCP: [&str; 3] = ["tcp.position.x", "tcp.position.y", "tcp.position.z"];
+const ERROR: [&str; 3] = ["tcp_error.position.x", "tcp_error.position.y", "tcp_error.position.z"];
+
+#[test]
+fn a_plant_has_the_bits_of_the_arm_that_is_commanded_directly() {
+    let cases = [
+        ("kr210", LinkModel::AsFiled, DriveModel::AsFiled),
+        ("kr300", LinkModel::Modal, DriveModel::Servo),
+        ("reference_arm", LinkModel::Lumped, DriveModel::Servo),
+        ("palletiser", LinkModel::AsFiled, DriveModel::AsFiled),
+        ("manutec_r3", LinkModel::AsFiled, DriveModel::Elastic),
+    ];
+    for (name, links, drives) in cases {
+        let settings = settings(links, drives);
+        let mut plant = Plant::new(&robot(name), &settings).unwrap();
+        let arm = Robot::load(robot(name)).unwrap().flexible(settings.modelling).unwrap();
+        let from = vec![0.1; arm.joints().count()];
+        let options = RunOptions { modelling: settings.modelling, ..RunOptions::default() };
+        let mut live = arm.live(Some(&from), 1e-3, &options).unwrap();
+        let (q_in, v_in) = (of_joints(&plant, "target_position"), of_joints(&plant, "target_velocity"));
+        q_in.iter().for_each(|&k| plant.set(k, 0.1).unwrap());
+        plant.set_flag(plant.find("use_target_velocity").unwrap(), true).unwrap();
+        let push = plant.find("tcp.force.z").unwrap();
+        plant.start(0.0).unwrap();
+        for k in 0..500 {
+            let t = 2e-3 * f64::from(k + 1);
+            let (q, qdot) = targets(&from, t);
+            let force = if k > 200 { -50.0 } else { 0.0 };
+            for (k, reference) in q_in.iter().enumerate() {
+                plant.set(*reference, q[k]).unwrap();
+                plant.set(v_in[k], qdot[k]).unwrap();
+            }
+            plant.set(push, force).unwrap();
+            plant.step(plant.time_s(), 2e-3).unwrap();
+            let mut wrench = Wrench::zeros();
+            wrench.force.z = force;
+            live.advance(2e-3, &Command { q: &q, qdot: Some(&qdot), torque: None, wrench }).unwrap();
+        }
+        let tcp = live.tcp_pose().translation.vector;
+        assert_eq!(values(&plant, &TCP), tcp.as_slice(), "{name}");
+        let error = tcp - live.target_pose().translation.vector;
+        assert_eq!(values(&plant, &ERROR), error.as_slice(), "{name}");
+        let motors: Vec<f64> =
+            of_joints(&plant, "motor_position").iter().map(|&reference| plant.get(reference).unwrap()).collect();
+        assert_eq!(motors, live.position(), "{name}");
+        let efforts: Vec<f64> = of_joints(&plant, "effort").iter().map(|&k| plant.get(k).unwrap()).collect();
+        assert_eq!(efforts, live.effort(), "{name}");
+    }
+}
+
+#[test]
+fn the_velocity_of_the_tcp_is_the_slope_of_its_position() {
+    let mut plant = Plant::new(&robot("kr300"), &settings(LinkModel::Lumped, DriveModel::Elastic)).unwrap();
+    let q_in = of_joints(&plant, "target_position");
+    let speed = ["tcp.velocity.x", "tcp.velocity.y", "tcp.velocity.z"];
+    plant.start(0.0).unwrap();
+    let (h, mut history) = (1e-3, Vec::new());
+    for k in 0..400 {
+        let (q, _) = targets(&vec![0.0; q_in.len()], h * f64::from(k + 1));
+        q_in.iter().zip(q).for_each(|(&reference, q)| plant.set(reference, q).unwrap());
+        plant.step(plant.time_s(), h).unwrap();
+        history.push((values(&plant, &TCP), values(&plant, &speed)));
+    }
+    let largest = history.iter().flat_map(|(_, v)| v).fold(0.0_f64, |m, v| m.max(v.abs()));
+    let off = history.windows(3).flat_map(|w| {
+        (0..3).map(|c| ((w[2].0[c] - w[0].0[c]) / (2.0 * h) - w[1].1[c]).abs()).collect::<Vec<_>>()
+    });
+    let off = off.fold(0.0, f64::max) / largest;
+    println!("slope of the position off by {off:.1e} of the largest velocity");
+    assert!(off < 2e-4, "{off:e}");
+}
+
+#[test]
+fn links_lag_behind_motors_by_torque_over_stiffness() {
+    // joint_2 of the arm bears the weight: the deflection is torque over stiffness.
+    let mut plant = Plant::new(&robot("abb_three_mass"), &PlantSettings::default()).unwrap();
+    let torque = plant.find("tcp.torque.z").unwrap();
+    plant.set(torque, 0.5).unwrap();
+    plant.start(0.0).unwrap();
+    for k in 0..40_000 {
+        plant.step(1e-3 * f64::from(k), 1e-3).unwrap();
+    }
+    let [motor, link] = ["joint.joint_1.motor_position", "joint.joint_1.link_position"];
+    let e = values(&plant, &[link])[0] - values(&plant, &[motor])[0];
+    let truth = 0.5 / 20.592_698_274_307_99;
+    println!("deflection {e:.9} rad, torque over stiffness {truth:.9} rad");
+    assert!((e / truth - 1.0).abs() < 1e-6, "{e} {truth}");
+}
+
+#[test]
+fn a_payload_twice_as_heavy_sags_as_the_robot_file_with_it() {
+    let text = std::fs::read_to_string(robot("kr210")).unwrap();
+    let mut plant = Plant::new(&robot("kr210"), &PlantSettings::default()).unwrap();
+    let reference = plant.find("payload.mass").unwrap();
+    let mass = plant.get(reference).unwrap();
+    let filed = values(&plant, &ERROR);
+    plant.set(reference, 2.0 * mass).unwrap();
+    plant.start(0.0).unwrap();
+    let heavier = values(&plant, &ERROR);
+    assert_ne!(filed, heavier);
+    let mut document: toml_edit::DocumentMut = text.parse().unwrap();
+    document["payload"]["mass"] = toml_edit::value(2.0 * mass);
+    let edited = Robot::from_toml(&document.to_string(), &robot("kr210"), &Default::default()).unwrap();
+    let live = edited.flexible(Modelling::default()).unwrap().live(None, 1e-3, &RunOptions::default()).unwrap();
+    let tcp = live.tcp_pose().translation.vector;
+    assert_eq!(values(&plant, &TCP), tcp.as_slice(), "the static sag does not depend on the payload's inertia");
+}
+
+#[test]
+fn states_resets_and_open_servos_do_what_they_say() {
+    let settings = settings(LinkModel::Modal, DriveModel::Servo);
+    let mut plant = Plant::new(&robot("reference_arm"), &settings).unwrap();
+    let first = values(&plant, &TCP);
+    let swing = |plant: &mut Plant, steps: std::ops::Range<u32>| {
+        let q_in = of_joints(plant, "target_position");
+        for k in steps {
+            let (q, _) = targets(&vec![0.0; q_in.len()], 1e-3 * f64::from(k + 1));
+            q_in.iter().zip(q).for_each(|(&reference, q)| plant.set(reference, q).unwrap());
+            plant.step(plant.time_s(), 1e-3).unwrap();
+        }
+        values(plant, &TCP)
+    };
+    plant.start(0.0).unwrap();
+    swing(&mut plant, 0..100);
+    let state = plant.state().unwrap();
+    let end = swing(&mut plant, 100..200);
+    plant.restore(&state).unwrap();
+    assert_eq!(end, swing(&mut plant, 100..200));
+    plant.reset();
+    plant.start(0.0).unwrap();
+    assert_eq!(first, values(&plant, &TCP));
+    assert_eq!(end, swing(&mut plant, 0..200));
+
+    // Under open servos the torques alone move the arm, as the library does it.
+    plant.reset();
+    plant.set_flag(plant.find("open_servos").unwrap(), true).unwrap();
+    plant.start(0.0).unwrap();
+    let torques = of_joints(&plant, "torque");
+    let arm = Robot::load(robot("reference_arm")).unwrap().flexible(settings.modelling).unwrap();
+    let own = LiveOptions { servos: Servos::Open, ..LiveOptions::default() };
+    let mut live = arm.live_with(None, 1e-3, &RunOptions::default(), &own).unwrap();
+    let given = [30.0, -20.0, 10.0, 1.0, -1.0, 0.5];
+    torques.iter().zip(given).for_each(|(&reference, torque)| plant.set(reference, torque).unwrap());
+    for _ in 0..100 {
+        plant.step(plant.time_s(), 1e-3).unwrap();
+        live.step(&Command { q: &[0.0; 6], torque: Some(&given), ..Command::default() }).unwrap();
+    }
+    assert_eq!(values(&plant, &TCP), live.tcp_pose().translation.vector.as_slice());
+    assert_ne!(values(&plant, &TCP), first);
+}
+
+#[test]
+fn shorter_communication_steps_converge() {
+    let tip = |length: f64| {
+        let mut plant = Plant::new(&robot("kr210"), &PlantSettings::default()).unwrap();
+        let q_in = of_joints(&plant, "target_position");
+        plant.start(0.0).unwrap();
+        let steps = (0.4 / length).round() as u32;
+        for k in 0..steps {
+            let (q, _) = targets(&vec![0.0; q_in.len()], length * f64::from(k + 1));
+            q_in.iter().zip(q).for_each(|(&reference, q)| plant.set(reference, q).unwrap());
+            plant.step(plant.time_s(), length).unwrap();
+        }
+        values(&plant, &TCP)
+    };
+    // 0.1 ms is shorter than the solver step, 2.5 ms is no multiple of it.
+    let best = tip(1e-4);
+    let apart = |length: f64| tip(length).iter().zip(&best).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
+    let [coarse, middle, fine] = [1e-2, 2.5e-3, 5e-4].map(apart);
+    println!("{coarse:.1e}, {middle:.1e}, {fine:.1e} m from 0.1 ms");
+    assert!(fine < 0.5 * middle && middle < 0.5 * coarse && fine < 2e-5, "{coarse:e} {middle:e} {fine:e}");
+}
+
+#[test]
+fn what_makes_no_sense_is_refused_with_its_name_and_changes_nothing() {
+    let mut plant = Plant::new(&robot("one_beam"), &PlantSettings::default()).unwrap();
+    let (target, error) = (of_joints(&plant, "target_position")[0], plant.find("tcp_error.length").unwrap());
+    assert!(matches!(plant.step(0.0, 1e-3), Err(PlantError::NotStarted)));
+    assert!(matches!(plant.set(target, f64::NAN), Err(PlantError::NotFinite { .. })));
+    assert!(matches!(plant.set(error, 1.0), Err(PlantError::NotSettable(name)) if name == "tcp_error.length"));
+    assert!(matches!(plant.get(100_000), Err(PlantError::Reference(100_000))));
+    assert!(matches!(plant.get_flag(target), Err(PlantError::Kind { .. })));
+    plant.start(2.0).unwrap();
+    assert!(matches!(plant.start(2.0), Err(PlantError::Started(_))));
+    let step = plant.find("step").unwrap();
+    assert!(matches!(plant.set(step, 1e-3), Err(PlantError::Started(name)) if name == "step"));
+    assert!(matches!(plant.step(0.0, 1e-3), Err(PlantError::Time { .. })));
+    assert!(matches!(plant.step(2.0, -1e-3), Err(PlantError::Length(_))));
+    plant.step(2.0, 1e-3).unwrap();
+    assert!(matches!(plant.step(2.001, 1.5e-3), Err(PlantError::Robot(_))));
+    plant.step(2.001, 1e-3).unwrap();
+    assert!((plant.time_s() - 2.002).abs() < 1e-12);
+    let missing = Plant::new(Path::new("no_such_robot.toml"), &PlantSettings::default());
+    assert!(matches!(missing, Err(PlantError::Robot(_))));
+}
+
+#[test]
+fn descriptions_name_every_variable_once_with_unit_and_start() {
+    let plant = Plant::new(&robot("kr300"), &settings(LinkModel::AsFiled, DriveModel::Servo)).unwrap();
+    let mut names: Vec<&str> = plant.variables().iter().map(|variable| variable.name.as_str()).collect();
+    names.sort_unstable();
+    names.dedup();
+    assert_eq!(names.len(), plant.variables().len());
+    for variable in plant.variables() {
+        assert_eq!(variable.unit.is_empty(), variable.kind == Kind::Boolean, "{}", variable.name);
+        let settable = matches!(variable.causality, Causality::Parameter | Causality::Input);
+        assert_eq!(variable.start.is_some(), settable, "{}", variable.name);
+    }
+    let about = About { name: "a <robot> & \"more\"", token: "{0}", step_s: 1e-3 };
+    for (fmi, element) in [(Fmi::V2, "<ScalarVariable "), (Fmi::V3, "<Float64 ")] {
+        let text = String::from_utf8(description(fmi, &about, plant.variables()).unwrap()).unwrap();
+        assert!(text.contains("a &lt;robot&gt; &amp; &quot;more&quot;"), "{text}");
+        let numbers = plant.variables().iter().filter(|v| v.kind == Kind::Real || fmi == Fmi::V2).count();
+        assert_eq!(text.matches(element).count(), numbers);
+    }
+}
+
+/// Unpacks a zip file.
+fn unpacked(file: &Path, into: &Path) {
+    let mut zip = zip::ZipArchive::new(std::fs::File::open(file).unwrap()).unwrap();
+    zip.extract(into).unwrap();
+}
+
+fn token_of(folder: &Path) -> String {
+    let text = std::fs::read_to_string(folder.join("modelDescription.xml")).unwrap();
+    let (_, rest) = text.split_once("instantiationToken=\"").unwrap();
+    rest.split_once('"').unwrap().0.to_owned()
+}
+
+#[test]
+fn the_resources_of_an_fmu_are_the_arm_wherever_they_are() {
+    let folder = std::env::temp_dir().join(format!("flexarm fmu {}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let library = folder.join("library");
+    std::fs::write(&library, "in place of a library").unwrap();
+    let urdf = root().join("tests/golden/ur10_like.urdf");
+    for (path, drives) in [
+        (robot("kr210"), DriveModel::AsFiled),
+        (robot("lower_arm"), DriveModel::AsFiled),
+        (robot("reference_arm"), DriveModel::Servo),
+        (robot("palletiser"), DriveModel::AsFiled),
+        (urdf, DriveModel::AsFiled),
+    ] {
+        let settings = settings(LinkModel::AsFiled, drives);
+        let plant = Plant::new(&path, &settings).unwrap();
+        let output = folder.join("arm.fmu");
+        let job = FmuJob { robot: path, settings, fmi: Fmi::V3, library: library.clone(), output, overwrite: true };
+        let summary = export_fmu(&job).unwrap();
+        assert_eq!(summary.meshes, 0, "{}", summary.robot);
+        let own = folder.join("unpacked");
+        unpacked(&job.output, &own);
+        let token = token_of(&own);
+        let mut again = open_resources(&own.join("resources"), &token).unwrap();
+        assert_eq!(plant.variables(), again.variables());
+        assert_eq!(values(&plant, &TCP), values(&again, &TCP));
+        again.start(0.0).unwrap();
+        again.step(0.0, 0.01).unwrap();
+        let text = std::fs::read_to_string(own.join("resources/robot.toml")).unwrap();
+        assert!(!text.contains("../") && !text.contains(".."), "{text}");
+        assert!(matches!(open_resources(&own.join("resources"), "{other}"), Err(PlantError::Token { .. })));
+        std::fs::remove_file(own.join("resources/robot.urdf")).unwrap();
+        assert!(matches!(open_resources(&own.join("resources"), &token), Err(PlantError::Robot(_))));
+        std::fs::write(own.join("resources/plant.json"), "{").unwrap();
+        assert!(matches!(open_resources(&own.join("resources"), &token), Err(PlantError::File { .. })));
+        std::fs::remove_dir_all(&own).unwrap();
+        let kept = FmuJob { overwrite: false, ..job };
+        assert!(matches!(export_fmu(&kept), Err(PlantError::Written(_))));
+    }
+    std::fs::remove_dir_all(&folder).unwrap();
+}
