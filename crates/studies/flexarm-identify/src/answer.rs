@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use crate::estimation::{
-    Form, Identified, Instrument, MeasuredArm, Measurements, Parameter, Plant, Reading, ReadingKind, Target,
+    Form, Identified, Instrument, MeasuredArm, Measurements, Parameter, ParameterEstimate, Plant, Reading, ReadingKind,
+    Target,
 };
 use flexarm_kinematics::Pose;
 use nalgebra::{DVector, Vector3};
@@ -97,6 +98,13 @@ pub struct FittedParameter {
     pub interval: [f64; 2],
     /// Whether the readings determine the parameter.
     pub identifiable: bool,
+}
+
+impl FittedParameter {
+    fn of(found: &ParameterEstimate) -> Self {
+        let ParameterEstimate { name, unit, initial, value, std, interval, identifiable } = found.clone();
+        Self { name, unit, initial, value, std, interval, identifiable }
+    }
 }
 
 /// Parameter in a combination.
@@ -344,6 +352,38 @@ pub(super) fn rms(values: impl ExactSizeIterator<Item = f64>) -> f64 {
     (values.map(|x| x * x).sum::<f64>() / n).sqrt()
 }
 
+/// Returns each measured number with its predictions.
+fn compared(plant: &Plant, measurements: &Measurements, found: &Identified) -> Vec<Compared> {
+    let deviations: Vec<f64> = measurements.readings.iter().flat_map(Reading::deviations).collect();
+    let observed = MeasuredArm { plant, parameters: &[], measurements }.observed();
+    let kinds: Vec<&str> = measurements.readings.iter().flat_map(|r| vec![kind_of(r); r.rows()]).collect();
+    let one = |(k, (name, unit)): (usize, (String, &'static str))| Compared {
+        name,
+        unit,
+        kind: kinds[k],
+        measured: observed[k],
+        before: observed[k] + found.before[k] * deviations[k],
+        after: observed[k] + found.solution.residuals[k] * deviations[k],
+        std: deviations[k],
+    };
+    numbers(measurements).into_iter().enumerate().map(one).collect()
+}
+
+/// Returns the RMS of the residuals of all readings, and of those that cross-validation predicts.
+fn residuals(found: &Identified, compared: &[Compared]) -> (Residual, Option<HeldOutFigures>) {
+    let one_unit = compared.windows(2).all(|pair| pair[0].unit == pair[1].unit);
+    let unit = if one_unit { compared[0].unit } else { "std" };
+    let in_unit = |r: f64, k: usize| if one_unit { r * compared[k].std } else { r };
+    let all = |residuals: &[f64]| rms(residuals.iter().enumerate().map(|(k, r)| in_unit(*r, k)));
+    let held_out = found.held_out.as_ref().map(|held| {
+        let seen: Vec<usize> = (0..held.residuals.len()).filter(|k| held.residuals[*k].is_finite()).collect();
+        let of = |values: &[f64]| rms(seen.iter().map(|k| in_unit(values[*k], *k)));
+        HeldOutFigures { folds: held.folds, rms: of(&held.residuals), rms_before: of(&found.before), unit }
+    });
+    let after = all(found.solution.residuals.as_slice());
+    (Residual { before: all(&found.before), after, unit }, held_out)
+}
+
 pub(super) fn answer(
     robot: &Robot,
     path: &Path,
@@ -353,31 +393,8 @@ pub(super) fn answer(
     found: &Identified,
 ) -> Result<Identification, Error> {
     let measurements = &input.measurements;
-    let names = numbers(measurements);
-    let deviations: Vec<f64> = measurements.readings.iter().flat_map(Reading::deviations).collect();
-    let observed = MeasuredArm { plant, parameters: &[], measurements }.observed();
-    let one_unit = names.windows(2).all(|pair| pair[0].1 == pair[1].1);
-    let unit = if one_unit { names[0].1 } else { "std" };
-    let in_unit = |r: f64, k: usize| if one_unit { r * deviations[k] } else { r };
-    let of = |residuals: &[f64]| rms(residuals.iter().enumerate().map(|(k, r)| in_unit(*r, k)));
-    let residuals = found.solution.residuals.as_slice();
-    let kinds: Vec<&str> = measurements.readings.iter().flat_map(|r| vec![kind_of(r); r.rows()]).collect();
-    let compared: Vec<Compared> = (0..names.len())
-        .map(|k| Compared {
-            name: names[k].0.clone(),
-            unit: names[k].1,
-            kind: kinds[k],
-            measured: observed[k],
-            before: observed[k] + found.before[k] * deviations[k],
-            after: observed[k] + residuals[k] * deviations[k],
-            std: deviations[k],
-        })
-        .collect();
-    let held_out = found.held_out.as_ref().map(|held| {
-        let seen: Vec<usize> = (0..held.residuals.len()).filter(|k| held.residuals[*k].is_finite()).collect();
-        let of = |values: &[f64]| rms(seen.iter().map(|k| in_unit(values[*k], *k)));
-        HeldOutFigures { folds: held.folds, rms: of(&held.residuals), rms_before: of(&found.before), unit }
-    });
+    let compared = compared(plant, measurements, found);
+    let (residual, held_out) = residuals(found, &compared);
     let suspicious = found.suspicious.iter().take(MOST_SUSPICIOUS).map(|k| Suspicious {
         reading: compared[*k].name.clone(),
         measured: compared[*k].measured,
@@ -387,25 +404,16 @@ pub(super) fn answer(
     let weights = |combination: &Vec<(usize, f64)>| {
         combination.iter().map(|(k, weight)| Weight { name: fitted[*k].name.clone(), weight: *weight }).collect()
     };
-    let parameters = found.parameters.iter().map(|p| FittedParameter {
-        name: p.name.clone(),
-        unit: p.unit.clone(),
-        initial: p.initial,
-        value: p.value,
-        std: p.std,
-        interval: p.interval,
-        identifiable: p.identifiable,
-    });
     let p = fitted.len();
     Ok(Identification {
         robot: robot.name.clone(),
         measurements: path.display().to_string(),
         readings: measurements.readings.len(),
-        numbers: names.len(),
-        parameters: parameters.collect(),
+        numbers: compared.len(),
+        parameters: found.parameters.iter().map(FittedParameter::of).collect(),
         correlation: (0..p).map(|i| (0..p).map(|j| found.correlation[(i, j)]).collect()).collect(),
         untold: found.untold.iter().map(weights).collect(),
-        residual: Residual { before: of(&found.before), after: of(residuals), unit },
+        residual,
         held_out,
         misfit: found.misfit,
         deviations_known: input.deviations_known,

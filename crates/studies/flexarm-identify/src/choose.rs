@@ -2,37 +2,21 @@
 
 use crate::estimation::{Probe, Reading, ReadingKind};
 
-use super::error::IdentifyFileError;
+use super::error::{IdentifyFileError, at_place};
 use super::file::MeasurementInput;
-use super::parameters::{self, ParameterLocation};
+use super::parameters::{self, Candidate, ParameterLocation};
 use flexarm_run::Arm;
 use flexarm_run::Error;
 use flexarm_run::Robot;
-use flexarm_run::RobotFileError;
 use flexarm_run::TCP_FRAME;
 
 /// Returns the parameters that the file or the request selects, in the robot's order.
-pub(super) fn chosen(arm: &Arm, input: &MeasurementInput, fit: &[String]) -> Result<Vec<parameters::Candidate>, Error> {
+pub(super) fn chosen(arm: &Arm, input: &MeasurementInput, fit: &[String]) -> Result<Vec<Candidate>, Error> {
     let all = parameters::candidates(arm.robot(), arm.flexible());
-    // Only the first entry of each matrix is listed.
-    let names = || {
-        let all = all.iter().map(|c| c.parameter.name.clone());
-        all.filter(|name| !parameters::is_entry(name) || name.ends_with("[0][0]")).collect::<Vec<_>>()
-    };
     if all.is_empty() {
         return Err(IdentifyFileError::NothingGives.into());
     }
-    let unknown =
-        |pattern: &str| format!("no parameter of this robot matches {pattern:?}; its parameters are {:?}", names());
-    let placed = |place: &RobotFileError, text: String| Error::from(RobotFileError { message: text, ..place.clone() });
-    for (pattern, place) in input.fit.iter().chain(&input.keep) {
-        if !all.iter().any(|c| parameters::fits(pattern, &c.parameter.name)) {
-            return Err(placed(place, unknown(pattern)));
-        }
-    }
-    if let Some(pattern) = fit.iter().find(|p| !all.iter().any(|c| parameters::fits(p, &c.parameter.name))) {
-        return Err(IdentifyFileError::UnknownParameter { text: unknown(pattern) }.into());
-    }
+    check_patterns(&all, input, fit)?;
     let wanted = |name: &str| match (fit.is_empty(), input.fit.is_empty()) {
         (false, _) => fit.iter().any(|p| parameters::asks_for(p, name)),
         (true, false) => input.fit.iter().any(|(p, _)| parameters::asks_for(p, name)),
@@ -43,12 +27,38 @@ pub(super) fn chosen(arm: &Arm, input: &MeasurementInput, fit: &[String]) -> Res
     let mut chosen: Vec<_> = all.clone();
     chosen.retain(|c| wanted(&c.parameter.name) && !kept(&c.parameter.name));
     if chosen.is_empty() {
-        return Err(IdentifyFileError::NothingFitted { known: names() }.into());
+        return Err(IdentifyFileError::NothingFitted { known: listed(&all) }.into());
     }
     if let Some((entry, factor)) = said_twice(&chosen) {
         return Err(IdentifyFileError::Twice { entry, factor }.into());
     }
-    for candidate in &mut chosen {
+    set_priors(&mut chosen, input, &all)?;
+    Ok(chosen)
+}
+
+/// Returns the names of parameters for messages; of each matrix only the first entry is listed.
+fn listed(all: &[Candidate]) -> Vec<String> {
+    let all = all.iter().map(|c| c.parameter.name.clone());
+    all.filter(|name| !parameters::is_entry(name) || name.ends_with("[0][0]")).collect()
+}
+
+/// Checks that each pattern of the file and of the request matches a parameter.
+fn check_patterns(all: &[Candidate], input: &MeasurementInput, fit: &[String]) -> Result<(), Error> {
+    let matches = |pattern: &str| all.iter().any(|c| parameters::fits(pattern, &c.parameter.name));
+    let unknown =
+        |pattern: &str| format!("no parameter of this robot matches {pattern:?}; its parameters are {:?}", listed(all));
+    if let Some((pattern, place)) = input.fit.iter().chain(&input.keep).find(|(pattern, _)| !matches(pattern)) {
+        return Err(at_place(place, unknown(pattern)));
+    }
+    match fit.iter().find(|pattern| !matches(pattern)) {
+        Some(pattern) => Err(IdentifyFileError::UnknownParameter { text: unknown(pattern) }.into()),
+        None => Ok(()),
+    }
+}
+
+/// Sets the prior deviations of the parameters to the uncertainties of the file.
+fn set_priors(chosen: &mut [Candidate], input: &MeasurementInput, all: &[Candidate]) -> Result<(), Error> {
+    for candidate in chosen.iter_mut() {
         let logarithmic = candidate.parameter.is_logarithmic();
         if let Some(factor) = input.uncertainty.filter(|_| logarithmic) {
             candidate.parameter.prior = factor.ln();
@@ -56,16 +66,14 @@ pub(super) fn chosen(arm: &Arm, input: &MeasurementInput, fit: &[String]) -> Res
     }
     for (name, uncertainty, place) in &input.known {
         let Some(candidate) = chosen.iter_mut().find(|c| c.parameter.name == *name) else {
-            return Err(placed(
-                place,
-                format!("{name:?} is not fitted; the parameters of this robot are {:?}", names()),
-            ));
+            let text = format!("{name:?} is not fitted; the parameters of this robot are {:?}", listed(all));
+            return Err(at_place(place, text));
         };
         let logarithmic = candidate.parameter.is_logarithmic();
         if logarithmic && *uncertainty <= 1.0 {
             let text = "the uncertainty of a stiffness or damping is a factor above 1: 1.5 means up to 1.5 times \
                         larger or smaller";
-            return Err(placed(place, text.into()));
+            return Err(at_place(place, text));
         }
         let unit = match candidate.parameter.unit.as_str() {
             "m" => input.length_m,
@@ -74,11 +82,11 @@ pub(super) fn chosen(arm: &Arm, input: &MeasurementInput, fit: &[String]) -> Res
         };
         candidate.parameter.prior = if logarithmic { uncertainty.ln() } else { *uncertainty * unit };
     }
-    Ok(chosen)
+    Ok(())
 }
 
 /// Finds a fitted entry of a link's matrix together with a fitted factor on the same matrix.
-fn said_twice(chosen: &[parameters::Candidate]) -> Option<(String, String)> {
+fn said_twice(chosen: &[Candidate]) -> Option<(String, String)> {
     let factor_of = |own: &str| {
         let factors = chosen.iter().filter(|c| match &c.written {
             ParameterLocation::Link { link } | ParameterLocation::LinkDirection { link, .. } => link == own,
@@ -94,11 +102,7 @@ fn said_twice(chosen: &[parameters::Candidate]) -> Option<(String, String)> {
 
 /// Checks that the pose of the tool can be identified from these readings and written to the robot
 /// file.
-pub(super) fn check_tool(
-    robot: &Robot,
-    chosen: &[parameters::Candidate],
-    input: &MeasurementInput,
-) -> Result<(), Error> {
+pub(super) fn check_tool(robot: &Robot, chosen: &[Candidate], input: &MeasurementInput) -> Result<(), Error> {
     let Some(tool) = chosen.iter().find(|c| matches!(c.written, ParameterLocation::Tool { .. })) else { return Ok(()) };
     if let Some(link) = &robot.tcp_override {
         return Err(IdentifyFileError::OtherTool { name: tool.parameter.name.clone(), link: link.clone() }.into());

@@ -9,12 +9,12 @@ use flexarm_kinematics::{Data, Mechanism, Model, State, inverse_dynamics};
 use nalgebra::DVector;
 use serde::Serialize;
 
+use super::error::at_place;
 use super::file::{EncoderRecording, MeasurementInput};
 use super::parameters::{Candidate, ParameterLocation, candidates};
 use flexarm_run::Arm;
 use flexarm_run::Error;
 use flexarm_run::RobotCoupling;
-use flexarm_run::RobotFileError;
 
 /// Result for one gear from recordings. SI units.
 #[derive(Clone, Debug, Serialize)]
@@ -119,19 +119,19 @@ pub(super) fn encoder_figures(
         }
         let Some(parameter) = gearbox_of(chosen, joint) else {
             let text = format!("joint {joint:?} has an encoder, but no gearbox with a single stiffness to fit");
-            return Err(RobotFileError { message: text, ..first.place.clone() }.into());
+            return Err(at_place(&first.place, text));
         };
         let Some(gear) = gear_stiffness(&own) else {
             let text =
                 format!("joint {joint:?}: the recordings are too short (minimum 2 s), or its torque does not change");
-            return Err(RobotFileError { message: text, ..first.place.clone() }.into());
+            return Err(at_place(&first.place, text));
         };
         found.push(EncoderFigures::of(joint, gear, parameter, noise(&runs, k), &steps(&runs, k)));
     }
-    if let Some(coupling) = coupling {
-        let recorded = Recorded { runs: &runs, joints: &joints };
-        let fail = |message: String| RobotFileError { message, ..first.place.clone() };
-        found.extend(told_of_coupled(&recorded, coupling, chosen, &all).map_err(fail)?);
+    if let Some(coupling) = coupling
+        && let Some(gears) = CoupledGears::of(&runs, &joints, coupling, chosen, &all)?
+    {
+        found.extend(gears.figures()?);
     }
     Ok(found)
 }
@@ -155,88 +155,110 @@ fn gearbox_of<'a>(of: &'a [Candidate], joint: &str) -> Option<&'a Parameter> {
     of.iter().find(is_it).map(|c| &c.parameter)
 }
 
-/// Recordings, and the joints in the robot's order.
-struct Recorded<'a> {
+/// Recordings of gears whose motors move several joints.
+struct CoupledGears<'a> {
     runs: &'a [Smooth<'a>],
-    joints: &'a [String],
+    coupling: &'a RobotCoupling,
+    /// Parameters of all springs, with the stiffness of the robot file.
+    all: &'a [Candidate],
+    /// Coupled joints in the robot's order of joints.
+    places: Vec<usize>,
+    /// Coupled joints with an encoder on the link side.
+    seen: Vec<usize>,
+    /// Motors whose springs are to be identified.
+    unknown: Vec<(usize, &'a Parameter)>,
 }
 
-/// Estimates the springs of motors that move several joints. Springs that are not to be identified
-/// keep the stiffness of the robot file.
-fn told_of_coupled(
-    recorded: &Recorded<'_>,
-    coupling: &RobotCoupling,
-    chosen: &[Candidate],
-    all: &[Candidate],
-) -> Result<Vec<EncoderFigures>, String> {
-    let Recorded { runs, joints } = recorded;
-    let place = |joint: &String| joints.iter().position(|own| own == joint);
-    let places: Vec<usize> = coupling.joints.iter().filter_map(place).collect();
-    let has = |run: &Smooth<'_>, k: usize| run.recording.link[places[k]].is_some();
-    let seen: Vec<usize> = (0..places.len()).filter(|k| runs.iter().any(|r| has(r, *k))).collect();
-    if seen.is_empty() {
-        return Ok(Vec::new());
+impl<'a> CoupledGears<'a> {
+    /// Returns what the recordings show of the coupled gears; `None` without an encoder on their
+    /// link sides.
+    fn of(
+        runs: &'a [Smooth<'a>],
+        joints: &[String],
+        coupling: &'a RobotCoupling,
+        chosen: &'a [Candidate],
+        all: &'a [Candidate],
+    ) -> Result<Option<Self>, Error> {
+        let place = |joint: &String| joints.iter().position(|own| own == joint);
+        let places: Vec<usize> = coupling.joints.iter().filter_map(place).collect();
+        let has = |run: &Smooth<'_>, k: usize| run.recording.link[places[k]].is_some();
+        let seen: Vec<usize> = (0..places.len()).filter(|k| runs.iter().any(|r| has(r, *k))).collect();
+        if seen.is_empty() {
+            return Ok(None);
+        }
+        let file = &runs[0].recording.place;
+        if let Some(k) = seen.iter().find(|k| !runs.iter().all(|r| has(r, **k))) {
+            let joint = &coupling.joints[*k];
+            let text = format!(
+                "joint {joint:?} has coupled gears, and only some recordings contain its encoder: give it in all of \
+                 them"
+            );
+            return Err(at_place(file, text));
+        }
+        let shown = |motor: &usize| seen.iter().any(|i| coupling.C[(*i, *motor)] != 0.0);
+        let unknown: Vec<(usize, &Parameter)> = (0..places.len())
+            .filter(shown)
+            .filter_map(|motor| Some((motor, gearbox_of(chosen, &coupling.joints[motor])?)))
+            .collect();
+        if unknown.is_empty() {
+            let names: Vec<&String> = seen.iter().map(|k| &coupling.joints[*k]).collect();
+            let text = format!("joints {names:?} have encoders, but none of the gearboxes that they measure is fitted");
+            return Err(at_place(file, text));
+        }
+        Ok(Some(Self { runs, coupling, all, places, seen, unknown }))
     }
-    if let Some(k) = seen.iter().find(|k| !runs.iter().all(|r| has(r, **k))) {
-        let joint = &coupling.joints[*k];
-        return Err(format!(
-            "joint {joint:?} has coupled gears, and only some recordings contain its encoder: give it in all of them"
-        ));
+
+    /// Returns the deflection of a joint per compliance of a motor's spring, `C_im Σ_j C_jm τ_j`,
+    /// over time.
+    fn per_compliance(&self, run: &Smooth<'_>, torque: &[Vec<f64>], i: usize, motor: usize) -> Vec<f64> {
+        let C = &self.coupling.C;
+        let of = |s: usize| self.places.iter().enumerate().map(|(j, k)| C[(j, motor)] * torque[*k][s]).sum::<f64>();
+        run.seen.clone().map(|s| C[(i, motor)] * of(s)).collect()
     }
-    let shown = |motor: &usize| seen.iter().any(|i| coupling.C[(*i, *motor)] != 0.0);
-    let unknown: Vec<(usize, &Parameter)> = (0..places.len())
-        .filter(shown)
-        .filter_map(|motor| Some((motor, gearbox_of(chosen, &coupling.joints[motor])?)))
-        .collect();
-    if unknown.is_empty() {
-        let names: Vec<&String> = seen.iter().map(|k| &coupling.joints[*k]).collect();
-        return Err(format!("joints {names:?} have encoders, but none of the gearboxes that they measure is fitted"));
-    }
-    let is_unknown = |motor: usize| unknown.iter().any(|(own, _)| *own == motor);
-    let outputs = |run: &Smooth<'_>| -> Option<Vec<CoupledOutput>> {
-        let one = |i: &usize| {
-            let mut gear = run.gear(places[*i])?;
-            let part_of = |torque: &[Vec<f64>], motor: usize| -> Vec<f64> {
-                let of = |s: usize| {
-                    places.iter().enumerate().map(|(j, k)| coupling.C[(j, motor)] * torque[*k][s]).sum::<f64>()
-                };
-                run.seen.clone().map(|s| coupling.C[(*i, motor)] * of(s)).collect()
-            };
-            let part = |motor: usize| part_of(&run.torque, motor);
-            for motor in (0..places.len()).filter(|motor| !is_unknown(*motor)) {
-                // Subtracts the deflection of springs with known stiffness; rigid gears do not
-                // deflect.
-                let Some(known) = gearbox_of(all, &coupling.joints[motor]) else { continue };
-                gear.deflection.iter_mut().zip(part(motor)).for_each(|(d, torque)| *d -= torque / known.initial);
-            }
-            let torques = unknown.iter().map(|(motor, _)| part(*motor)).collect();
-            let instruments = unknown.iter().map(|(motor, _)| part_of(&run.instrument, *motor)).collect();
-            Some(CoupledOutput {
-                deflection: gear.deflection,
-                rate: gear.rate,
-                deflection_rate: gear.deflection_rate,
-                torques,
-                instruments,
-            })
+
+    /// Returns the deflection of a joint that the springs to be identified cause. Springs that are
+    /// not to be identified keep the stiffness of the robot file; rigid gears do not deflect.
+    fn output(&self, run: &Smooth<'_>, i: usize) -> Option<CoupledOutput> {
+        let mut gear = run.gear(self.places[i])?;
+        let is_unknown = |motor: usize| self.unknown.iter().any(|(own, _)| *own == motor);
+        for motor in (0..self.places.len()).filter(|motor| !is_unknown(*motor)) {
+            let Some(known) = gearbox_of(self.all, &self.coupling.joints[motor]) else { continue };
+            let part = self.per_compliance(run, &run.torque, i, motor);
+            gear.deflection.iter_mut().zip(part).for_each(|(d, torque)| *d -= torque / known.initial);
+        }
+        let parts = |torque: &[Vec<f64>]| {
+            self.unknown.iter().map(|(motor, _)| self.per_compliance(run, torque, i, *motor)).collect()
         };
-        seen.iter().map(one).collect()
-    };
-    let all_runs: Vec<Vec<CoupledOutput>> = runs.iter().filter_map(outputs).collect();
-    let names = || unknown.iter().map(|(motor, _)| &coupling.joints[*motor]).collect::<Vec<_>>();
-    let gears = coupled_gear_stiffness(&all_runs).ok_or_else(|| {
-        format!(
-            "the recordings do not separate the coupled gears of {:?}: they are too short (minimum 2 s), or the \
-             torques are constant or proportional; record more encoders, or keep some of these stiffnesses",
-            names()
-        )
-    })?;
-    let squares = seen.iter().map(|k| noise(runs, places[*k]).powi(2));
-    let noise = (squares.sum::<f64>() / seen.len() as f64).sqrt();
-    let steps = steps(runs, places[seen[0]]);
-    let figure = |((motor, parameter), gear): (&(usize, &Parameter), GearEstimate)| {
-        EncoderFigures::of(&coupling.joints[*motor], gear, parameter, noise, &steps)
-    };
-    Ok(unknown.iter().zip(gears).map(figure).collect())
+        Some(CoupledOutput {
+            torques: parts(&run.torque),
+            instruments: parts(&run.instrument),
+            deflection: gear.deflection,
+            rate: gear.rate,
+            deflection_rate: gear.deflection_rate,
+        })
+    }
+
+    /// Estimates the springs of the motors.
+    fn figures(&self) -> Result<Vec<EncoderFigures>, Error> {
+        let outputs = |run: &Smooth<'_>| self.seen.iter().map(|i| self.output(run, *i)).collect();
+        let all_runs: Vec<Vec<CoupledOutput>> = self.runs.iter().filter_map(outputs).collect();
+        let name = |motor: usize| &self.coupling.joints[motor];
+        let gears = coupled_gear_stiffness(&all_runs).ok_or_else(|| {
+            let names: Vec<&String> = self.unknown.iter().map(|(motor, _)| name(*motor)).collect();
+            let text = format!(
+                "the recordings do not separate the coupled gears of {names:?}: they are too short (minimum 2 s), or \
+                 the torques are constant or proportional; record more encoders, or keep some of these stiffnesses"
+            );
+            at_place(&self.runs[0].recording.place, text)
+        })?;
+        let squares = self.seen.iter().map(|k| noise(self.runs, self.places[*k]).powi(2));
+        let noise = (squares.sum::<f64>() / self.seen.len() as f64).sqrt();
+        let steps = steps(self.runs, self.places[self.seen[0]]);
+        let figure = |((motor, parameter), gear): (&(usize, &Parameter), GearEstimate)| {
+            EncoderFigures::of(name(*motor), gear, parameter, noise, &steps)
+        };
+        Ok(self.unknown.iter().zip(gears).map(figure).collect())
+    }
 }
 
 /// Returns the rigid robot without its rotors; its inverse dynamics give the torques through the
@@ -274,7 +296,7 @@ impl<'a> Smooth<'a> {
                 "{n} samples of {step_s} s: below = {below_hz} Hz must be less than 0.4 times the sampling rate, and \
                  the recording must be longer than two edges of {edge_s} s"
             );
-            return Err(RobotFileError { message: text, ..recording.place.clone() }.into());
+            return Err(at_place(&recording.place, text));
         }
         let low = LowPass::new(below_hz, 1.0 / step_s);
         let motor: Vec<Vec<f64>> = recording.motor.iter().map(|q| low.of(q)).collect();

@@ -5,6 +5,7 @@ use flexarm_run::ExternalError;
 
 use super::file::MeasurementInput;
 use flexarm_run::Error;
+use flexarm_run::RobotFileError;
 
 /// Reason why measurements cannot be used for an identification.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -154,6 +155,11 @@ impl From<IdentifyFileError> for flexarm_run::Error {
 }
 
 impl ExternalError for IdentifyFileError {}
+
+/// Returns an error at a place of the file of measurements.
+pub(super) fn at_place(place: &RobotFileError, message: impl Into<String>) -> Error {
+    RobotFileError { message: message.into(), ..place.clone() }.into()
+}
 
 /// Returns the error for a mistake that explains the readings.
 pub(super) fn of_slip(found: FoundSlip, joints: &[(String, bool)]) -> Error {

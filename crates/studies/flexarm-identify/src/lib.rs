@@ -187,7 +187,7 @@ impl Targets {
         // Relative paths from the new file need its folder to exist.
         std::fs::create_dir_all(folder).map_err(|source| Error::Write { path: folder.to_owned(), source })?;
         let new = rewrite::rewritten(&text, &identified, robot.tcp(), home, folder)
-            .map_err(|what| Error::File { path: robot.path.clone(), what })?;
+            .map_err(|error| Error::File { path: robot.path.clone(), what: error.to_string() })?;
         (answer.file, answer.page) = (Some(self.robot.display().to_string()), Some(self.page.display().to_string()));
         let page = page::html(answer);
         write_all(&[(self.robot, new), (self.page, page)])?;

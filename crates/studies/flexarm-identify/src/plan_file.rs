@@ -233,13 +233,7 @@ pub fn plan_measurements(robot: &Robot, request: &PlanRequest) -> Result<Measure
     };
     let plant = plant(&arm);
     let options = PlanOptions { count: request.count, purpose, repeat: false };
-    let failed = |error: crate::estimation::NoAnswer| IdentifyFileError::Fit(error.to_string());
-    let best = plan(&plant, &fitted, &candidates, &options).map_err(failed)?;
-    if best.chosen.len() < request.count {
-        let text = format!("only {} of {} readings are possible at these poses", best.chosen.len(), request.count);
-        return Err(IdentifyFileError::Fit(text).into());
-    }
-    let first = plan(&plant, &fitted, &candidates[..request.count.min(candidates.len())], &options).map_err(failed)?;
+    let [best, first] = plans(&plant, &fitted, &candidates, &options)?;
     let caveats = arm.caveats(Use::Any);
     let mut answer = MeasurementPlan {
         warnings: warnings(&caveats),
@@ -260,6 +254,24 @@ pub fn plan_measurements(robot: &Robot, request: &PlanRequest) -> Result<Measure
         (answer.file, answer.table) = (Some(file.display().to_string()), Some(table.display().to_string()));
     }
     Ok(answer)
+}
+
+/// Returns the best plan, and the one with the same number of candidates in their given order.
+fn plans(
+    plant: &Plant,
+    fitted: &[Parameter],
+    candidates: &[Candidate],
+    options: &PlanOptions,
+) -> Result<[Plan; 2], Error> {
+    let plan_of = |candidates: &[Candidate]| {
+        plan(plant, fitted, candidates, options).map_err(|error| IdentifyFileError::Fit(error.to_string()))
+    };
+    let best = plan_of(candidates)?;
+    if best.chosen.len() < options.count {
+        let text = format!("only {} of {} readings are possible at these poses", best.chosen.len(), options.count);
+        return Err(IdentifyFileError::Fit(text).into());
+    }
+    Ok([best, plan_of(&candidates[..options.count.min(candidates.len())])?])
 }
 
 fn expected((parameter, std): (&Parameter, &f64)) -> ExpectedParameter {

@@ -274,7 +274,7 @@ impl Reader<'_> {
         if let Some(node) = given {
             return Err(self.error(node.span(), "a universal file contains nodes and directions: remove them here"));
         }
-        let functions = read_functions(&bytes).map_err(&fail)?;
+        let functions = read_functions(&bytes).map_err(|error| fail(error.to_string()))?;
         let one = |function: &UffFunction| {
             let name = format!("{} line {}", e.file.get_ref().display(), function.line);
             let (answer, factor) = match &e.unit {

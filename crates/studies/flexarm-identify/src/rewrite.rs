@@ -9,106 +9,99 @@ use toml_edit::{Array, DocumentMut, InlineTable, Item, Table, TableLike, Value};
 
 use super::parameters::ParameterLocation;
 
+/// Reason why identified values cannot be written to a robot file.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum RewriteError {
+    #[error("{0}")]
+    Syntax(#[from] toml_edit::TomlError),
+    #[error("there is no [[{list}]] with {key} = {name:?}")]
+    NoTable { list: &'static str, key: &'static str, name: String },
+    #[error("there is no {0}")]
+    Missing(&'static str),
+    #[error("the drive of joint {joint:?} has no gearbox.{key}")]
+    NoGearbox { joint: String, key: &'static str },
+    #[error("link {link:?} has no stiffness_factors[{entry}]")]
+    NoFactor { link: String, entry: usize },
+    #[error("{list} has no entry {entry}")]
+    NoEntry { list: String, entry: usize },
+    #[error("{what} is not {expected}")]
+    Form { what: String, expected: &'static str },
+}
+
 /// Returns the text of the robot file with the identified values; each is listed in a comment with
 /// its standard deviation.
 ///
 /// * `tool`: link of the tool and its present pose in the link.
 /// * `home`: folder of the old file; `to`: folder of the new file. Relative paths in the file are
 ///   rewritten if they differ.
-///
-/// # Errors
-/// A sentence that names the missing entry.
 pub(super) fn rewritten(
     text: &str,
     found: &[(ParameterEstimate, ParameterLocation)],
     tool: (&str, &Pose),
     home: &Path,
     to: &Path,
-) -> Result<String, String> {
-    let mut file: DocumentMut = text.parse().map_err(|error: toml_edit::TomlError| error.to_string())?;
-    let mut changes: Vec<(String, &ParameterEstimate)> = Vec::new();
+) -> Result<String, RewriteError> {
+    let mut file: DocumentMut = text.parse()?;
     for (parameter, written) in found {
-        match written {
-            ParameterLocation::Gearbox { joint, entry } => {
-                let drive = named(&mut file, "drive", "joint", joint)?;
-                let gearbox = drive.get_mut("gearbox").and_then(Item::as_table_like_mut);
-                let stiffness = gearbox.and_then(|gearbox| gearbox.get_mut("stiffness"));
-                let stiffness =
-                    stiffness.ok_or_else(|| format!("the drive of joint {joint:?} has no gearbox.stiffness"))?;
-                put_stiffness(stiffness, *entry, parameter)?;
-                changes.push((format!("drive of {joint}"), parameter));
-            }
-            ParameterLocation::Link { link } => {
-                let entry = named(&mut file, "flexible_link", "link", link)?;
-                entry.insert("stiffness_factor", toml_edit::value(rounded(parameter.value, parameter.std)));
-                changes.push((format!("link {link}"), parameter));
-            }
-            ParameterLocation::LinkDirection { link, entry: number } => {
-                let entry = named(&mut file, "flexible_link", "link", link)?;
-                if entry.get("stiffness_factors").is_none() {
-                    let ones: toml_edit::Array = [1.0; 6].into_iter().collect();
-                    entry.insert("stiffness_factors", toml_edit::value(ones));
-                }
-                let factors = entry.get_mut("stiffness_factors").and_then(Item::as_array_mut);
-                let old = factors.and_then(|factors| factors.get_mut(*number));
-                let old = old.ok_or_else(|| format!("link {link:?} has no stiffness_factors[{number}]"))?;
-                replace(old, rounded(parameter.value, parameter.std));
-                changes.push((format!("link {link}"), parameter));
-            }
-            ParameterLocation::GearboxDamping { joint, entry } => {
-                put_gear_damping(named(&mut file, "drive", "joint", joint)?, joint, *entry, parameter)?;
-                changes.push((format!("drive of {joint}"), parameter));
-            }
-            ParameterLocation::LinkDamping { link } => {
-                let entry = named(&mut file, "flexible_link", "link", link)?;
-                let damping = entry.get_mut("damping").and_then(Item::as_table_like_mut);
-                match damping.and_then(|damping| damping.iter_mut().next().map(|(_, value)| value)) {
-                    Some(value) => {
-                        let value = value
-                            .as_value_mut()
-                            .ok_or_else(|| format!("the damping of link {link:?} is not a number"))?;
-                        put_damping(value, parameter);
-                    }
-                    None => {
-                        let mut modal = toml_edit::InlineTable::new();
-                        modal.insert("modal", rounded(parameter.value, parameter.std).into());
-                        entry.insert("damping", toml_edit::value(modal));
-                    }
-                }
-                changes.push((format!("link {link}"), parameter));
-            }
-            ParameterLocation::LinkEntry { link, row, column, K } => {
-                let entry = named(&mut file, "flexible_link", "link", link)?;
-                put_entry(entry, (*row, *column), K, rounded(parameter.value, parameter.std))
-                    .ok_or_else(|| format!("the stiffness of link {link:?} is not a 6x6 matrix"))?;
-                changes.push((format!("link {link}"), parameter));
-            }
-            ParameterLocation::Tool { .. } => changes.push(("tcp".into(), parameter)),
-            ParameterLocation::Mounting { entry } => {
-                let mounting = file.get_mut("mounting").and_then(Item::as_table_like_mut);
-                let stiffness = mounting.and_then(|mounting| mounting.get_mut("stiffness"));
-                put_stiffness(stiffness.ok_or("there is no mounting.stiffness")?, Some(*entry), parameter)?;
-                changes.push(("mounting".into(), parameter));
-            }
-            ParameterLocation::Payload => {
-                let payload = file.get_mut("payload").and_then(Item::as_table_like_mut).ok_or("there is no payload")?;
-                payload.insert("mass", toml_edit::value(rounded(parameter.value, parameter.std)));
-                changes.push(("payload".into(), parameter));
-            }
-        }
+        put(&mut file, parameter, written)?;
     }
     put_tool(&mut file, found, tool)?;
     if home != to {
         moved_paths(&mut file, home, to);
     }
-    Ok(comments(&changes) + &file.to_string())
+    Ok(comments(found) + &file.to_string())
+}
+
+/// Writes one value to its place; the pose of the tool is left to [`put_tool`].
+fn put(file: &mut DocumentMut, found: &ParameterEstimate, written: &ParameterLocation) -> Result<(), RewriteError> {
+    let number = rounded(found.value, found.std);
+    match written {
+        ParameterLocation::Gearbox { joint, entry } => {
+            let drive = named(file, "drive", "joint", joint)?;
+            let gearbox = drive.get_mut("gearbox").and_then(Item::as_table_like_mut);
+            let stiffness = gearbox.and_then(|gearbox| gearbox.get_mut("stiffness"));
+            let missing = || RewriteError::NoGearbox { joint: joint.clone(), key: "stiffness" };
+            put_stiffness(stiffness.ok_or_else(missing)?, *entry, found)
+        }
+        ParameterLocation::GearboxDamping { joint, entry } => {
+            put_gear_damping(named(file, "drive", "joint", joint)?, joint, *entry, found)
+        }
+        ParameterLocation::Link { link } => {
+            named(file, "flexible_link", "link", link)?.insert("stiffness_factor", toml_edit::value(number));
+            Ok(())
+        }
+        ParameterLocation::LinkDirection { link, entry } => {
+            put_link_direction(named(file, "flexible_link", "link", link)?, *entry, number)
+                .ok_or_else(|| RewriteError::NoFactor { link: link.clone(), entry: *entry })
+        }
+        ParameterLocation::LinkDamping { link } => {
+            put_link_damping(named(file, "flexible_link", "link", link)?, link, found)
+        }
+        ParameterLocation::LinkEntry { link, row, column, K } => {
+            let entry = named(file, "flexible_link", "link", link)?;
+            put_entry(entry, (*row, *column), K, number).ok_or_else(|| RewriteError::Form {
+                what: format!("the stiffness of link {link:?}"),
+                expected: "a 6x6 matrix",
+            })
+        }
+        ParameterLocation::Tool { .. } => Ok(()),
+        ParameterLocation::Mounting { entry } => {
+            let mounting = file.get_mut("mounting").and_then(Item::as_table_like_mut);
+            let stiffness = mounting.and_then(|mounting| mounting.get_mut("stiffness"));
+            put_stiffness(stiffness.ok_or(RewriteError::Missing("mounting.stiffness"))?, Some(*entry), found)
+        }
+        ParameterLocation::Payload => {
+            let payload = file.get_mut("payload").and_then(Item::as_table_like_mut);
+            payload.ok_or(RewriteError::Missing("payload"))?.insert("mass", toml_edit::value(number));
+            Ok(())
+        }
+    }
 }
 
 /// Returns the header comment that lists the identified values.
-fn comments(changes: &[(String, &ParameterEstimate)]) -> String {
+fn comments(found: &[(ParameterEstimate, ParameterLocation)]) -> String {
     let mut out = String::from("# Identified by flexarm identify: value, standard deviation, previous value.\n");
-    for (_, p) in changes {
-        let ParameterEstimate { name, unit, value, std, initial, .. } = p;
+    for (ParameterEstimate { name, unit, value, std, initial, .. }, _) in found {
         let deviation = match std.is_finite() {
             true => format!("+- {} {unit}", rounded(*std, *std)),
             false => format!("{unit} (the fit does not reproduce the readings: no standard deviation)"),
@@ -135,8 +128,13 @@ fn rounded(value: f64, std: f64) -> f64 {
 }
 
 /// Returns the entry with a given name in an array of tables.
-fn named<'a>(file: &'a mut DocumentMut, list: &str, key: &str, name: &str) -> Result<&'a mut dyn TableLike, String> {
-    let missing = || format!("there is no [[{list}]] with {key} = {name:?}");
+fn named<'a>(
+    file: &'a mut DocumentMut,
+    list: &'static str,
+    key: &'static str,
+    name: &str,
+) -> Result<&'a mut dyn TableLike, RewriteError> {
+    let missing = || RewriteError::NoTable { list, key, name: name.to_owned() };
     let is_it = |table: &dyn TableLike| table.get(key).and_then(Item::as_str) == Some(name);
     match file.get_mut(list) {
         Some(Item::ArrayOfTables(tables)) => tables
@@ -154,12 +152,14 @@ fn named<'a>(file: &'a mut DocumentMut, list: &str, key: &str, name: &str) -> Re
     }
 }
 
-fn put_stiffness(item: &mut Item, entry: Option<usize>, found: &ParameterEstimate) -> Result<(), String> {
-    let Some(value) = item.as_value_mut() else { return Err("gearbox.stiffness is not a number or a list".into()) };
+fn put_stiffness(item: &mut Item, entry: Option<usize>, found: &ParameterEstimate) -> Result<(), RewriteError> {
+    let what = || "gearbox.stiffness".to_owned();
+    let value =
+        item.as_value_mut().ok_or_else(|| RewriteError::Form { what: what(), expected: "a number or a list" })?;
     let number = rounded(found.value, found.std);
     match (value, entry) {
         (Value::Array(list), Some(k)) => {
-            let old = list.get_mut(k).ok_or_else(|| format!("gearbox.stiffness has no entry {k}"))?;
+            let old = list.get_mut(k).ok_or_else(|| RewriteError::NoEntry { list: what(), entry: k })?;
             replace(old, number);
         }
         // Full matrix: scales every entry by the factor.
@@ -170,6 +170,33 @@ fn put_stiffness(item: &mut Item, entry: Option<usize>, found: &ParameterEstimat
             }
         }
         (value, _) => replace(value, number),
+    }
+    Ok(())
+}
+
+/// Sets an entry of a link's `stiffness_factors`. A missing list is written as ones first.
+fn put_link_direction(link: &mut dyn TableLike, entry: usize, number: f64) -> Option<()> {
+    if link.get("stiffness_factors").is_none() {
+        let ones: Array = [1.0; 6].into_iter().collect();
+        link.insert("stiffness_factors", toml_edit::value(ones));
+    }
+    replace(link.get_mut("stiffness_factors").and_then(Item::as_array_mut)?.get_mut(entry)?, number);
+    Some(())
+}
+
+/// Sets the damping of a link, as modal damping if it has none.
+fn put_link_damping(link: &mut dyn TableLike, name: &str, found: &ParameterEstimate) -> Result<(), RewriteError> {
+    let damping = link.get_mut("damping").and_then(Item::as_table_like_mut);
+    match damping.and_then(|damping| damping.iter_mut().next().map(|(_, value)| value)) {
+        Some(value) => {
+            let not_one = || RewriteError::Form { what: format!("the damping of link {name:?}"), expected: "a number" };
+            put_damping(value.as_value_mut().ok_or_else(not_one)?, found);
+        }
+        None => {
+            let mut modal = InlineTable::new();
+            modal.insert("modal", rounded(found.value, found.std).into());
+            link.insert("damping", toml_edit::value(modal));
+        }
     }
     Ok(())
 }
@@ -196,7 +223,7 @@ fn put_tool(
     file: &mut DocumentMut,
     found: &[(ParameterEstimate, ParameterLocation)],
     tool: (&str, &Pose),
-) -> Result<(), String> {
+) -> Result<(), RewriteError> {
     let mut shift = [0.0; 6];
     for (parameter, written) in found {
         if let ParameterLocation::Tool { axis } = written {
@@ -212,7 +239,8 @@ fn put_tool(
         let link = [("link", Value::from(tool.0))].into_iter().collect::<InlineTable>();
         file.insert("tcp", toml_edit::value(link));
     }
-    let entry = file.get_mut("tcp").and_then(Item::as_table_like_mut).ok_or("tcp is not a table")?;
+    let entry = file.get_mut("tcp").and_then(Item::as_table_like_mut);
+    let entry = entry.ok_or_else(|| RewriteError::Form { what: "tcp".into(), expected: "a table" })?;
     // Rounded to 0.1 µm and 0.1 µrad.
     let list = |values: [f64; 3]| values.map(|x| (x * 1e7).round() / 1e7).into_iter().collect::<Array>();
     entry.insert("xyz", toml_edit::value(list(X_LT.translation.vector.into())));
@@ -229,13 +257,15 @@ fn put_gear_damping(
     joint: &str,
     entry: Option<usize>,
     found: &ParameterEstimate,
-) -> Result<(), String> {
+) -> Result<(), RewriteError> {
     let gearbox = drive.get_mut("gearbox").and_then(Item::as_table_like_mut);
     let damping = gearbox.and_then(|gearbox| gearbox.get_mut("damping")).and_then(Item::as_value_mut);
-    let damping = damping.ok_or_else(|| format!("the drive of joint {joint:?} has no gearbox.damping"))?;
+    let missing = || RewriteError::NoGearbox { joint: joint.to_owned(), key: "damping" };
+    let damping = damping.ok_or_else(missing)?;
     match (damping, entry) {
         (Value::Array(list), Some(k)) => {
-            let old = list.get_mut(k).ok_or_else(|| format!("gearbox.damping of {joint:?} has no entry {k}"))?;
+            let missing = || RewriteError::NoEntry { list: format!("gearbox.damping of {joint:?}"), entry: k };
+            let old = list.get_mut(k).ok_or_else(missing)?;
             replace(old, rounded(found.value, found.std));
         }
         (damping, _) => put_damping(damping, found),

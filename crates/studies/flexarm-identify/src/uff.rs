@@ -32,11 +32,35 @@ pub(super) struct UffFunction {
     pub(super) values: Vec<(f64, Complex<f64>)>,
 }
 
+/// Reason why a file cannot be read, with the line.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum UffError {
+    #[error("this is not a universal file: it has no dataset between lines of -1")]
+    NotUniversal,
+    #[error("the file has no frequency response (dataset 58 with function type 4)")]
+    NoResponse,
+    #[error("line {line}: the file ends, expected {expected}")]
+    Ends { line: usize, expected: &'static str },
+    #[error("line {line}: expected {expected}, found {found:?}")]
+    Unexpected { line: usize, expected: &'static str, found: String },
+    #[error("line {line}: expected `58b`, byte order (1 or 2), number format (2), lines and bytes; found {found:?}")]
+    Binary { line: usize, found: String },
+    #[error("line {line}: the number of values is {count}, expected a whole number up to {MOST}")]
+    Count { line: usize, count: f64 },
+    #[error("line {line}: form {form} of values is not known; use 2, 4, 5 or 6")]
+    Form { line: usize, form: i64 },
+    #[error("line {line}: found {found} of the {wanted} values announced in line {head}")]
+    Short { line: usize, found: usize, wanted: usize, head: usize },
+    #[error(
+        "line {line}: {wanted} numbers of {size} bytes are announced; the dataset has {dataset} bytes, the file {file}"
+    )]
+    Bytes { line: usize, wanted: usize, size: usize, dataset: usize, file: usize },
+    #[error("line {line}: a value of this function is not finite")]
+    NotFinite { line: usize },
+}
+
 /// Reads all frequency responses of a file.
-///
-/// # Errors
-/// A sentence with the line that cannot be read.
-pub(super) fn read_functions(bytes: &[u8]) -> Result<Vec<UffFunction>, String> {
+pub(super) fn read_functions(bytes: &[u8]) -> Result<Vec<UffFunction>, UffError> {
     let mut reader = Lines { bytes, at: 0, line: 0 };
     let (mut found, mut per_si, mut sets) = (Vec::new(), None, 0);
     while let Some(line) = reader.next() {
@@ -51,9 +75,8 @@ pub(super) fn read_functions(bytes: &[u8]) -> Result<Vec<UffFunction>, String> {
             Some("58") => found.extend(function(&mut reader, start, None, per_si)?),
             Some("58b") => {
                 let numbers: Vec<&str> = words.collect();
-                let binary = Binary::of(&numbers).ok_or_else(|| {
-                    format!("line {start}: expected `58b`, byte order (1 or 2), number format (2), lines and bytes; found {kind:?}")
-                })?;
+                let binary =
+                    Binary::of(&numbers).ok_or_else(|| UffError::Binary { line: start, found: kind.clone() })?;
                 found.extend(function(&mut reader, start, Some(binary), per_si)?);
             }
             Some("164") => per_si = Some(units(&mut reader)?),
@@ -67,8 +90,8 @@ pub(super) fn read_functions(bytes: &[u8]) -> Result<Vec<UffFunction>, String> {
         }
     }
     match (sets, found.is_empty()) {
-        (0, _) => Err("this is not a universal file: it has no dataset between lines of -1".into()),
-        (_, true) => Err("the file has no frequency response (dataset 58 with function type 4)".into()),
+        (0, _) => Err(UffError::NotUniversal),
+        (_, true) => Err(UffError::NoResponse),
         _ => Ok(found),
     }
 }
@@ -91,9 +114,14 @@ impl Lines<'_> {
         )
     }
 
-    fn expect(&mut self, what: &str) -> Result<String, String> {
+    fn expect(&mut self, expected: &'static str) -> Result<String, UffError> {
         let line = self.line + 1;
-        self.next().ok_or_else(|| format!("line {line}: the file ends, expected {what}"))
+        self.next().ok_or(UffError::Ends { line, expected })
+    }
+
+    /// Returns the error for the line read last, or for a word of it.
+    fn unexpected(&self, expected: &'static str, found: String) -> UffError {
+        UffError::Unexpected { line: self.line, expected, found }
     }
 }
 
@@ -113,13 +141,13 @@ impl Binary {
 }
 
 /// Reads the factors from SI to the units of the file: length, force.
-fn units(reader: &mut Lines<'_>) -> Result<[f64; 2], String> {
+fn units(reader: &mut Lines<'_>) -> Result<[f64; 2], UffError> {
     reader.expect("the code of the units")?;
     let line = reader.expect("factors of the units")?;
     let factors: Option<Vec<f64>> = line.split_whitespace().map(number).collect();
     match factors.as_deref() {
         Some([length, force, ..]) if *length > 0.0 && *force > 0.0 => Ok([*length, *force]),
-        _ => Err(format!("line {}: expected factors of length and force above 0, found {line:?}", reader.line)),
+        _ => Err(reader.unexpected("factors of length and force above 0", line)),
     }
 }
 
@@ -133,84 +161,103 @@ fn part(line: &str, from: usize, to: usize) -> String {
     line.chars().skip(from).take(to - from).collect::<String>().trim().to_owned()
 }
 
+/// Form of the values of a function.
+struct ValueForm {
+    /// Line of the form.
+    line: usize,
+    /// 2 real, 4 real in double precision, 5 complex, 6 complex in double precision.
+    code: i64,
+    count: usize,
+    /// First abscissa and spacing; `None` if each value has an abscissa of its own.
+    even: Option<(f64, f64)>,
+}
+
+impl ValueForm {
+    fn read(reader: &mut Lines<'_>) -> Result<Self, UffError> {
+        let text = reader.expect("form of the values")?;
+        let line = reader.line;
+        let words: Vec<Option<f64>> = text.split_whitespace().map(number).collect();
+        let word = |k: usize| words.get(k).copied().flatten();
+        let (Some(form), Some(count), Some(spacing), Some(first), Some(step)) =
+            (word(0), word(1), word(2), word(3), word(4))
+        else {
+            return Err(reader.unexpected("form, number and spacing of the values", text));
+        };
+        if !(0.0..=MOST as f64).contains(&count) || count.fract() != 0.0 {
+            return Err(UffError::Count { line, count });
+        }
+        let even = (spacing == 1.0).then_some((first, step));
+        Ok(Self { line, code: form as i64, count: count as usize, even })
+    }
+
+    fn is_complex(&self) -> bool {
+        matches!(self.code, 5 | 6)
+    }
+
+    fn is_double(&self) -> bool {
+        matches!(self.code, 4 | 6)
+    }
+
+    /// Returns how many numbers the file has for each value.
+    fn per_value(&self) -> usize {
+        usize::from(self.even.is_none()) + 1 + usize::from(self.is_complex())
+    }
+}
+
 fn function(
     reader: &mut Lines<'_>,
     start: usize,
     binary: Option<Binary>,
     per_si: Option<[f64; 2]>,
-) -> Result<Option<UffFunction>, String> {
+) -> Result<Option<UffFunction>, UffError> {
     for _ in 0..5 {
         reader.expect("the name of a function")?;
     }
     let line = reader.expect("kind and places of a function")?;
-    let place = reader.line;
     let whole = |from: usize, to: usize| part(&line, from, to).parse::<i64>().ok();
     let fields = (whole(0, 5), whole(41, 51), whole(51, 55), whole(66, 76), whole(76, 80));
     let (Some(kind), Some(node), Some(direction), Some(other), Some(other_direction)) = fields else {
-        return Err(format!("line {place}: expected kind, nodes and directions in their columns, found {line:?}"));
+        return Err(reader.unexpected("kind, nodes and directions in their columns", line));
     };
-    let line = reader.expect("form of the values")?;
-    let place = reader.line;
-    let words: Vec<Option<f64>> = line.split_whitespace().map(number).collect();
-    let form = |k: usize| words.get(k).copied().flatten();
-    let (Some(form_of_values), Some(count), Some(spacing), Some(first), Some(step)) =
-        (form(0), form(1), form(2), form(3), form(4))
-    else {
-        return Err(format!("line {place}: expected form, number and spacing of the values, found {line:?}"));
-    };
-    if !(0.0..=MOST as f64).contains(&count) || count.fract() != 0.0 {
-        return Err(format!("line {place}: the number of values is {count}, expected a whole number up to {MOST}"));
-    }
+    let form = ValueForm::read(reader)?;
     reader.expect("the abscissa")?;
     let line = reader.expect("the ordinate")?;
     let ordinate = part(&line, 0, 10).parse::<i64>().unwrap_or(0);
     let unit = part(&line, 47, 67);
     reader.expect("the denominator")?;
     reader.expect("the third axis")?;
-    let (complex, double) = match form_of_values as i64 {
-        2 => (false, false),
-        4 => (false, true),
-        5 => (true, false),
-        6 => (true, true),
-        other => return Err(format!("line {place}: form {other} of values is not known; use 2, 4, 5 or 6")),
-    };
-    let even = spacing == 1.0;
-    let per_value = usize::from(!even) + 1 + usize::from(complex);
-    let wanted = count as usize * per_value;
+    if !matches!(form.code, 2 | 4 | 5 | 6) {
+        return Err(UffError::Form { line: form.line, form: form.code });
+    }
     let numbers = match binary {
-        Some(binary) => bytes_to_numbers(reader, &binary, double, wanted, place)?,
-        None => text_to_numbers(reader, wanted, place)?,
+        Some(binary) => bytes_to_numbers(reader, &binary, &form)?,
+        None => text_to_numbers(reader, &form)?,
     };
-    if kind != RESPONSE || !complex {
+    if kind != RESPONSE || !form.is_complex() {
         return Ok(None);
     }
-    let value = |(k, row): (usize, &[f64])| match even {
-        true => (first + step * k as f64, Complex::new(row[0], row[1])),
-        false => (row[0], Complex::new(row[1], row[2])),
+    let value = |(k, row): (usize, &[f64])| match form.even {
+        Some((first, step)) => (first + step * k as f64, Complex::new(row[0], row[1])),
+        None => (row[0], Complex::new(row[1], row[2])),
     };
-    let values: Vec<(f64, Complex<f64>)> = numbers.chunks_exact(per_value).enumerate().map(value).collect();
+    let values: Vec<(f64, Complex<f64>)> = numbers.chunks_exact(form.per_value()).enumerate().map(value).collect();
     if values.iter().any(|(hz, H)| !(hz.is_finite() && H.re.is_finite() && H.im.is_finite())) {
-        return Err(format!("line {start}: a value of this function is not finite"));
+        return Err(UffError::NotFinite { line: start });
     }
     let (response, reference) = ((node, direction), (other, other_direction));
     Ok(Some(UffFunction { line: start, response, reference, ordinate, unit, per_si, values }))
 }
 
-fn text_to_numbers(reader: &mut Lines<'_>, wanted: usize, place: usize) -> Result<Vec<f64>, String> {
+fn text_to_numbers(reader: &mut Lines<'_>, form: &ValueForm) -> Result<Vec<f64>, UffError> {
+    let wanted = form.count * form.per_value();
     let mut numbers = Vec::new();
     while numbers.len() < wanted {
         let line = reader.expect("a value")?;
         if line.trim() == "-1" {
-            return Err(format!(
-                "line {}: found {} of the {wanted} values announced in line {place}",
-                reader.line,
-                numbers.len()
-            ));
+            return Err(UffError::Short { line: reader.line, found: numbers.len(), wanted, head: form.line });
         }
         for word in fields(&line) {
-            let value =
-                number(&word).ok_or_else(|| format!("line {}: expected a number, found {word:?}", reader.line))?;
-            numbers.push(value);
+            numbers.push(number(&word).ok_or_else(|| reader.unexpected("a number", word))?);
         }
     }
     numbers.truncate(wanted);
@@ -237,21 +284,13 @@ fn fields(line: &str) -> Vec<String> {
     words
 }
 
-fn bytes_to_numbers(
-    reader: &mut Lines<'_>,
-    binary: &Binary,
-    double: bool,
-    wanted: usize,
-    place: usize,
-) -> Result<Vec<f64>, String> {
-    let size = if double { 8 } else { 4 };
+fn bytes_to_numbers(reader: &mut Lines<'_>, binary: &Binary, form: &ValueForm) -> Result<Vec<f64>, UffError> {
+    let wanted = form.count * form.per_value();
+    let size = if form.is_double() { 8 } else { 4 };
     let bytes = reader.bytes.get(reader.at..).unwrap_or_default();
     if binary.bytes != wanted * size || bytes.len() < binary.bytes {
-        return Err(format!(
-            "line {place}: {wanted} numbers of {size} bytes are announced; the dataset has {} bytes, the file {}",
-            binary.bytes,
-            bytes.len()
-        ));
+        let (dataset, file) = (binary.bytes, bytes.len());
+        return Err(UffError::Bytes { line: form.line, wanted, size, dataset, file });
     }
     let value = |chunk: &[u8]| {
         let mut own = [0u8; 8];
@@ -259,7 +298,7 @@ fn bytes_to_numbers(
         if !binary.little {
             own[..size].reverse();
         }
-        match double {
+        match form.is_double() {
             true => f64::from_le_bytes(own),
             false => f64::from(f32::from_le_bytes([own[0], own[1], own[2], own[3]])),
         }
@@ -321,11 +360,13 @@ mod tests {
             }
         }
         let cut = dataset(&head(1, 96), 6, 1, &little);
-        assert!(read_functions(&cut).unwrap_err().contains("announced"));
+        assert!(read_functions(&cut).unwrap_err().to_string().contains("announced"));
         let short = dataset("58", 5, 1, b"  1.5 2.5");
-        assert!(read_functions(&short).unwrap_err().contains("2 of the 6 values"));
-        assert!(read_functions(b"solid x").unwrap_err().contains("not a universal file"));
-        assert!(read_functions(b"    -1\n    151\nx\n    -1\n").unwrap_err().contains("no frequency response"));
+        assert!(read_functions(&short).unwrap_err().to_string().contains("2 of the 6 values"));
+        assert!(read_functions(b"solid x").unwrap_err().to_string().contains("not a universal file"));
+        assert!(
+            read_functions(b"    -1\n    151\nx\n    -1\n").unwrap_err().to_string().contains("no frequency response")
+        );
     }
 
     #[test]

@@ -11,7 +11,7 @@ mod parse;
 mod system;
 
 use std::collections::HashSet;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
 use crate::common::machine::{Flow, Machine};
@@ -33,20 +33,8 @@ const LEVELS_OF_A_BACKUP: usize = 4;
 
 pub(crate) fn read(texts: &mut Vec<Text>, options: &ReadOptions<'_>) -> Result<Recorded> {
     let mut unit = parse::parse(&texts[0], 0)?;
-    let mut data = Vec::new();
     let path = texts[0].path.clone();
-    for (companion, bytes) in &options.companions {
-        data.push(add(texts, companion, bytes)?);
-    }
-    if options.find_companions {
-        let taken = options.companions.iter().map(|(path, _)| path.clone()).collect::<Vec<_>>();
-        if let Some((found, bytes)) = beside(&path, &stem(&path), "dat").filter(|(found, _)| !taken.contains(found)) {
-            data.push(add(texts, &found, &bytes)?);
-        }
-        if let Some((found, bytes)) = configuration(&path).filter(|(found, _)| !taken.contains(found)) {
-            data.insert(0, add(texts, &found, &bytes)?);
-        }
-    }
+    let mut data = companions(texts, &path, options)?;
     let entry = entry(&unit, options)?;
     for further in data.iter_mut() {
         unit.routines.append(&mut further.routines);
@@ -73,22 +61,7 @@ pub(crate) fn read(texts: &mut Vec<Text>, options: &ReadOptions<'_>) -> Result<R
     }
     let name = match &entry {
         Some(name) => {
-            let Some(routine) = machine.routines.get(name).cloned() else {
-                return fail(Span::default(), format!("there is no routine `{name}` in this file"));
-            };
-            if let Some(parameter) =
-                routine.parameters.iter().find(|parameter| !machine.globals.contains_key(&parameter.name))
-            {
-                let hint = format!(
-                    "`{}` needs a value for `{}`: give it as an option (`given`)",
-                    routine.name, parameter.name
-                );
-                return fail(routine.span, hint);
-            }
-            match machine.run(&routine.body)? {
-                Flow::Leave | Flow::Again => return fail(routine.span, "EXIT is outside a loop"),
-                _ => {}
-            }
+            run_routine(&mut machine, name)?;
             name.to_string()
         }
         None => {
@@ -97,6 +70,40 @@ pub(crate) fn read(texts: &mut Vec<Text>, options: &ReadOptions<'_>) -> Result<R
         }
     };
     Ok(machine.recorder.finish(&name))
+}
+
+/// Adds the files given with the program, its data list, and the controller's `$config.dat`.
+fn companions(texts: &mut Vec<Text>, path: &Path, options: &ReadOptions<'_>) -> Result<Vec<Unit>> {
+    let mut data = Vec::new();
+    for (companion, bytes) in &options.companions {
+        data.push(add(texts, companion, bytes)?);
+    }
+    if options.find_companions {
+        let is_new = |(found, _): &(PathBuf, Vec<u8>)| options.companions.iter().all(|(path, _)| path != found);
+        if let Some((found, bytes)) = beside(path, &stem(path), "dat").filter(is_new) {
+            data.push(add(texts, &found, &bytes)?);
+        }
+        if let Some((found, bytes)) = configuration(path).filter(is_new) {
+            data.insert(0, add(texts, &found, &bytes)?);
+        }
+    }
+    Ok(data)
+}
+
+/// Runs the routine with which the program starts.
+fn run_routine(machine: &mut Machine<'_, Krl>, name: &Rc<str>) -> Result<()> {
+    let Some(routine) = machine.routines.get(name).cloned() else {
+        return fail(Span::default(), format!("there is no routine `{name}` in this file"));
+    };
+    if let Some(parameter) = routine.parameters.iter().find(|parameter| !machine.globals.contains_key(&parameter.name))
+    {
+        let hint = format!("`{}` needs a value for `{}`: give it as an option (`given`)", routine.name, parameter.name);
+        return fail(routine.span, hint);
+    }
+    match machine.run(&routine.body)? {
+        Flow::Leave | Flow::Again => fail(routine.span, "EXIT is outside a loop"),
+        _ => Ok(()),
+    }
 }
 
 fn stem(path: &Path) -> String {
@@ -110,14 +117,13 @@ fn add(texts: &mut Vec<Text>, path: &Path, bytes: &[u8]) -> Result<Unit> {
 }
 
 /// Finds a file in the folder of the program, ignoring the case of its name.
-fn beside(path: &Path, stem: &str, ending: &str) -> Option<(std::path::PathBuf, Vec<u8>)> {
+fn beside(path: &Path, stem: &str, ending: &str) -> Option<(PathBuf, Vec<u8>)> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let wanted = format!("{stem}.{ending}").to_lowercase();
     let mut found: Vec<_> = std::fs::read_dir(folder).ok()?.flatten().map(|entry| entry.path()).collect();
     found.sort();
-    let is_wanted = |candidate: &std::path::PathBuf| {
-        candidate.file_name().is_some_and(|name| name.to_string_lossy().to_lowercase() == wanted)
-    };
+    let is_wanted =
+        |candidate: &PathBuf| candidate.file_name().is_some_and(|name| name.to_string_lossy().to_lowercase() == wanted);
     let file = found.into_iter().find(is_wanted)?;
     let bytes = std::fs::read(&file).ok()?;
     Some((file, bytes))
@@ -125,7 +131,7 @@ fn beside(path: &Path, stem: &str, ending: &str) -> Option<(std::path::PathBuf, 
 
 /// Finds `$config.dat` of the controller in a backup: in `System` next to a folder that contains
 /// the program.
-fn configuration(path: &Path) -> Option<(std::path::PathBuf, Vec<u8>)> {
+fn configuration(path: &Path) -> Option<(PathBuf, Vec<u8>)> {
     let folders = path.ancestors().skip(1).take(LEVELS_OF_A_BACKUP);
     folders
         .flat_map(|folder| [folder.join("x"), folder.join("System/x")])

@@ -184,75 +184,10 @@ impl Dialect for Krl {
     }
 
     fn function(machine: &mut Krls<'_>, name: &str, arguments: &[Argument], span: Span) -> Result<Value> {
-        match name {
-            "stool2" => {
-                let (value, at) = machine.argument(arguments, 0, span)?;
-                let number = part(&value, "tool_no", at)?.count(at)?;
-                return tool_data(machine, number, at);
-            }
-            "sbase" => {
-                let number = machine.number(arguments, 0, span)? as i64;
-                return base_data(machine, number, span);
-            }
-            "svel_joint" | "sipo_mode" => return machine.argument(arguments, 0, span).map(|(value, _)| value),
-            "sacc_joint" => return data(machine, arguments, 0, "acc", span),
-            "sori_typ" => {
-                let (value, at) = machine.argument(arguments, 0, span)?;
-                return part(&value, "ori_typ", at).or(Ok(Value::Word("var".into())));
-            }
-            "sapo_ptp" | "sapo" => {
-                let distance = data(machine, arguments, 0, "apo_dist", span)?;
-                let mut apo = record_of(machine.global("$apo"));
-                apo.set("cdis", distance.clone());
-                apo.set("cptp", distance);
-                return Ok(Value::Record(Rc::new(apo)));
-            }
-            "svel_cp" => {
-                let mut speed = record_of(machine.global("$vel"));
-                speed.set("cp", Value::Number(machine.number(arguments, 0, span)?));
-                return Ok(Value::Record(Rc::new(speed)));
-            }
-            "sacc_cp" => {
-                let percent = data(machine, arguments, 0, "acc", span)?.number(span)?;
-                let mut acceleration = record_of(machine.global("$acc"));
-                acceleration.set("cp", path_acceleration(machine, percent, span)?);
-                return Ok(Value::Record(Rc::new(acceleration)));
-            }
-            "sload" | "sgear_jerk" | "sjerk" | "use_cm_pro_values" => return Ok(Value::Nothing),
-            _ => {}
+        match inline_form(machine, name, arguments, span)? {
+            Some(value) => Ok(value),
+            None => mathematics(machine, name, arguments, span),
         }
-        let mut numbers = Vec::new();
-        for (k, argument) in arguments.iter().enumerate() {
-            let Some(expression) = &argument.value else { continue };
-            match machine.value(expression)? {
-                Value::Outside(what) => return Ok(Value::Outside(what)),
-                value if is_numeric(name) => numbers.push(value.number(argument.span)?),
-                _ if k > 0 => {}
-                value => numbers.push(value.number(argument.span).unwrap_or(f64::NAN)),
-            }
-        }
-        let at = |k: usize| match numbers.get(k) {
-            Some(number) => Ok(*number),
-            None => fail(span, format!("`{name}` misses argument {}", k + 1)),
-        };
-        Ok(Value::Number(match name {
-            "abs" => at(0)?.abs(),
-            "sqrt" => at(0)?.sqrt(),
-            "sin" => at(0)?.to_radians().sin(),
-            "cos" => at(0)?.to_radians().cos(),
-            "tan" => at(0)?.to_radians().tan(),
-            "acos" => at(0)?.acos().to_degrees(),
-            "asin" => at(0)?.asin().to_degrees(),
-            "atan2" => at(0)?.atan2(at(1)?).to_degrees(),
-            "round" => return Ok(Value::Whole(at(0)?.round() as i64)),
-            "trunc" => return Ok(Value::Whole(at(0)?.trunc() as i64)),
-            "inv_pos" => {
-                let (value, at) = machine.argument(arguments, 0, span)?;
-                let Some(parts) = frame_of(&value, at)? else { return fail(at, "a frame is expected") };
-                return Ok(frame_value(mm_deg_zyx(&pose_zyx_mm_deg(parts).inverse())));
-            }
-            _ => return Ok(Value::Outside(format!("`{name}(...)`").into())),
-        }))
     }
 
     fn instruction(machine: &mut Krls<'_>, name: &str, arguments: &[Argument], span: Span) -> Result<Flow> {
@@ -450,6 +385,83 @@ pub(super) fn tool_data(machine: &mut Krls<'_>, number: i64, span: Span) -> Resu
     let text = format!("TOOL_DATA[{number}] is not in the files: the robot's own tool centre point is taken");
     machine.recorder.note(&text, span);
     Ok(Value::Nothing)
+}
+
+/// Functions of the inline forms; `None` if the name is not one of them.
+fn inline_form(machine: &mut Krls<'_>, name: &str, arguments: &[Argument], span: Span) -> Result<Option<Value>> {
+    Ok(Some(match name {
+        "stool2" => {
+            let (value, at) = machine.argument(arguments, 0, span)?;
+            let number = part(&value, "tool_no", at)?.count(at)?;
+            tool_data(machine, number, at)?
+        }
+        "sbase" => {
+            let number = machine.number(arguments, 0, span)? as i64;
+            base_data(machine, number, span)?
+        }
+        "svel_joint" | "sipo_mode" => machine.argument(arguments, 0, span)?.0,
+        "sacc_joint" => data(machine, arguments, 0, "acc", span)?,
+        "sori_typ" => {
+            let (value, at) = machine.argument(arguments, 0, span)?;
+            part(&value, "ori_typ", at).unwrap_or(Value::Word("var".into()))
+        }
+        "sapo_ptp" | "sapo" => {
+            let distance = data(machine, arguments, 0, "apo_dist", span)?;
+            let mut apo = record_of(machine.global("$apo"));
+            apo.set("cdis", distance.clone());
+            apo.set("cptp", distance);
+            Value::Record(Rc::new(apo))
+        }
+        "svel_cp" => {
+            let mut speed = record_of(machine.global("$vel"));
+            speed.set("cp", Value::Number(machine.number(arguments, 0, span)?));
+            Value::Record(Rc::new(speed))
+        }
+        "sacc_cp" => {
+            let percent = data(machine, arguments, 0, "acc", span)?.number(span)?;
+            let mut acceleration = record_of(machine.global("$acc"));
+            acceleration.set("cp", path_acceleration(machine, percent, span)?);
+            Value::Record(Rc::new(acceleration))
+        }
+        "sload" | "sgear_jerk" | "sjerk" | "use_cm_pro_values" => Value::Nothing,
+        _ => return Ok(None),
+    }))
+}
+
+/// Functions of numbers and frames.
+fn mathematics(machine: &mut Krls<'_>, name: &str, arguments: &[Argument], span: Span) -> Result<Value> {
+    let mut numbers = Vec::new();
+    for (k, argument) in arguments.iter().enumerate() {
+        let Some(expression) = &argument.value else { continue };
+        match machine.value(expression)? {
+            Value::Outside(what) => return Ok(Value::Outside(what)),
+            value if is_numeric(name) => numbers.push(value.number(argument.span)?),
+            _ if k > 0 => {}
+            value => numbers.push(value.number(argument.span).unwrap_or(f64::NAN)),
+        }
+    }
+    let at = |k: usize| match numbers.get(k) {
+        Some(number) => Ok(*number),
+        None => fail(span, format!("`{name}` misses argument {}", k + 1)),
+    };
+    Ok(Value::Number(match name {
+        "abs" => at(0)?.abs(),
+        "sqrt" => at(0)?.sqrt(),
+        "sin" => at(0)?.to_radians().sin(),
+        "cos" => at(0)?.to_radians().cos(),
+        "tan" => at(0)?.to_radians().tan(),
+        "acos" => at(0)?.acos().to_degrees(),
+        "asin" => at(0)?.asin().to_degrees(),
+        "atan2" => at(0)?.atan2(at(1)?).to_degrees(),
+        "round" => return Ok(Value::Whole(at(0)?.round() as i64)),
+        "trunc" => return Ok(Value::Whole(at(0)?.trunc() as i64)),
+        "inv_pos" => {
+            let (value, at) = machine.argument(arguments, 0, span)?;
+            let Some(parts) = frame_of(&value, at)? else { return fail(at, "a frame is expected") };
+            return Ok(frame_value(mm_deg_zyx(&pose_zyx_mm_deg(parts).inverse())));
+        }
+        _ => return Ok(Value::Outside(format!("`{name}(...)`").into())),
+    }))
 }
 
 /// `BASE_DATA[n]`.

@@ -116,6 +116,9 @@ pub(super) fn function(machine: &mut Rapids<'_>, name: &str, arguments: &[Argume
             value => values.push(value),
         }
     }
+    if let Some(value) = target_function(machine, name, &values, arguments, span)? {
+        return Ok(value);
+    }
     match geometry(machine, name, &values, arguments, span)? {
         Some(value) => Ok(value),
         None => mathematics(name, &values, arguments, machine, span),
@@ -129,8 +132,8 @@ fn argument<'v>(values: &'v [Value], k: usize, name: &str, span: Span) -> Result
     }
 }
 
-/// Functions of targets and frames; `None` if the name is not one of them.
-fn geometry(
+/// Functions of targets; `None` if the name is not one of them.
+fn target_function(
     machine: &mut Rapids<'_>,
     name: &str,
     values: &[Value],
@@ -138,8 +141,8 @@ fn geometry(
     span: Span,
 ) -> Result<Option<Value>> {
     let at = |k: usize| argument(values, k, name, span);
-    let offset = |first: usize| -> Result<Vector3<f64>> {
-        Ok(Vector3::new(at(first)?.number(span)?, at(first + 1)?.number(span)?, at(first + 2)?.number(span)?))
+    let offset = || -> Result<Vector3<f64>> {
+        Ok(Vector3::new(at(1)?.number(span)?, at(2)?.number(span)?, at(3)?.number(span)?))
     };
     let angle = |machine: &mut Rapids<'_>, name: &str| -> Result<f64> {
         match machine.named(arguments, name)? {
@@ -151,7 +154,7 @@ fn geometry(
         "offs" => {
             let target = typed(machine, "robtarget", at(0)?.clone(), span)?;
             let mut X = pose_mm(&target, span)?;
-            X.translation.vector += offset(1)?;
+            X.translation.vector += offset()?;
             moved(&target, &X)
         }
         "reltool" => {
@@ -161,9 +164,34 @@ fn geometry(
             let turn = Rotation3::from_axis_angle(&Vector3::x_axis(), x)
                 * Rotation3::from_axis_angle(&Vector3::y_axis(), y)
                 * Rotation3::from_axis_angle(&Vector3::z_axis(), z);
-            let X = pose_mm(&target, span)? * Pose::from_parts(offset(1)?.into(), turn);
+            let X = pose_mm(&target, span)? * Pose::from_parts(offset()?.into(), turn);
             moved(&target, &X)
         }
+        "cjointt" => match machine.recorder.joints() {
+            Some(joints) => {
+                let axes = joints.iter().take(6).map(|joint| Value::Number(joint.to_degrees())).collect();
+                let target = Value::list(vec![Value::list(axes), Value::list(vec![Value::Number(9e9); 6])]);
+                types::coerce(&Default::default(), "jointtarget", target, span, 0)?
+            }
+            None => Value::Outside("`CJointT()`".into()),
+        },
+        "crobt" | "cpos" => super::motion::current_target(machine, name, arguments, span)?,
+        _ => return Ok(None),
+    }))
+}
+
+/// Functions of frames and vectors; `None` if the name is not one of them.
+fn geometry(
+    machine: &mut Rapids<'_>,
+    name: &str,
+    values: &[Value],
+    arguments: &[Argument],
+    span: Span,
+) -> Result<Option<Value>> {
+    let at = |k: usize| argument(values, k, name, span);
+    let vector = |k: usize| position(Some(at(k)?), span);
+    let is_given = |name: &str| arguments.iter().any(|argument| argument.name.as_deref() == Some(name));
+    Ok(Some(match name {
         "posemult" => {
             let (a, b) = (typed(machine, "pose", at(0)?.clone(), span)?, typed(machine, "pose", at(1)?.clone(), span)?);
             pose_value(&(pose_mm(&a, span)? * pose_mm(&b, span)?))
@@ -171,7 +199,7 @@ fn geometry(
         "poseinv" => pose_value(&pose_mm(&*typed(machine, "pose", at(0)?.clone(), span)?, span)?.inverse()),
         "posevect" => {
             let X = pose_mm(&*typed(machine, "pose", at(0)?.clone(), span)?, span)?;
-            position_value(X * nalgebra::Point3::from(position(Some(at(1)?), span)?) - nalgebra::Point3::origin())
+            position_value(X * nalgebra::Point3::from(vector(1)?) - nalgebra::Point3::origin())
         }
         "orientzyx" => {
             let [z, y, x] = [at(0)?.number(span)?, at(1)?.number(span)?, at(2)?.number(span)?].map(f64::to_radians);
@@ -179,9 +207,7 @@ fn geometry(
         }
         "eulerzyx" => {
             let angles = angles_zyx(&rotation(Some(at(0)?), span)?).map(f64::to_degrees);
-            let axis =
-                ["z", "y", "x"].iter().position(|axis| arguments.iter().any(|a| a.name.as_deref() == Some(axis)));
-            match axis {
+            match ["z", "y", "x"].iter().position(|axis| is_given(axis)) {
                 Some(axis) => Value::Number(angles[axis]),
                 None => return fail(span, "EulerZYX needs \\X, \\Y or \\Z"),
             }
@@ -195,25 +221,10 @@ fn geometry(
                 None => return fail(span, "this quaternion cannot be made one of length 1"),
             }
         }
-        "defframe" if !arguments.iter().any(|a| a.name.as_deref() == Some("origin")) => def_frame(machine, &at, span)?,
-        "distance" => Value::Number((position(Some(at(0)?), span)? - position(Some(at(1)?), span)?).norm()),
-        "vectmagn" => Value::Number(position(Some(at(0)?), span)?.norm()),
-        "dotprod" => Value::Number(position(Some(at(0)?), span)?.dot(&position(Some(at(1)?), span)?)),
-        "cjointt" => match machine.recorder.joints() {
-            Some(joints) => {
-                let axes = joints.iter().take(6).map(|joint| Value::Number(joint.to_degrees())).collect();
-                let external = Value::list(vec![Value::Number(9e9); 6]);
-                types::coerce(
-                    &Default::default(),
-                    "jointtarget",
-                    Value::list(vec![Value::list(axes), external]),
-                    span,
-                    0,
-                )?
-            }
-            None => Value::Outside("`CJointT()`".into()),
-        },
-        "crobt" | "cpos" => super::motion::current_target(machine, name, arguments, span)?,
+        "defframe" if !is_given("origin") => def_frame(machine, &at, span)?,
+        "distance" => Value::Number((vector(0)? - vector(1)?).norm()),
+        "vectmagn" => Value::Number(vector(0)?.norm()),
+        "dotprod" => Value::Number(vector(0)?.dot(&vector(1)?)),
         _ => return Ok(None),
     }))
 }

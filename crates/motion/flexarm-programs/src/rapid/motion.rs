@@ -385,16 +385,13 @@ pub(super) fn setting(machine: &mut Rapids<'_>, name: &str, arguments: &[Argumen
         "pathresol" | "sim" => machine.recorder.note("the resolution of the controller's path is not simulated", span),
         "softact" | "pdispon" | "eoffson" | "eoffsset" | "searchl" | "searchc" | "searchj" | "moveextj"
         | "stopmove" | "startmove" | "storepath" | "restopath" | "corrcon" | "corrwrite" | "contactl"
-        | "egmrunjoint" | "egmrunpose" | "syncmoveon" | "load" => {
-            if matches!(name, "syncmoveon") {
-                machine.recorder.note("moves in step with other robots (\\ID) are run alone", span);
-                return Ok(true);
-            }
+        | "egmrunjoint" | "egmrunpose" | "load" => {
             return fail(
                 span,
                 "this instruction changes the motion by data outside the program, which is not simulated: remove it",
             );
         }
+        "syncmoveon" => machine.recorder.note("moves in step with other robots (\\ID) are run alone", span),
         "syncmoveoff" => {}
         _ => return Ok(false),
     }

@@ -250,19 +250,21 @@ fn statement(parser: &mut Parser) -> Result<Statement> {
     }
 }
 
+/// Consumes the end word of a block that began at `start`.
+fn end(parser: &mut Parser, word: &str, start: Span) -> Result<()> {
+    if parser.take_word(word) {
+        parser.take_symbol(";");
+        return Ok(());
+    }
+    fail(start, format!("this block does not end: `{}` is missing", word.to_uppercase()))
+}
+
 /// Parses a block and consumes its end word.
 fn structure(parser: &mut Parser, word: &str) -> Result<Option<Action>> {
     let start = parser.span();
     if parser.is_symbol_ahead(1, ":=") {
         return Ok(None);
     }
-    let end = |parser: &mut Parser, word: &str, start: Span| {
-        if parser.take_word(word) {
-            parser.take_symbol(";");
-            return Ok(());
-        }
-        fail(start, format!("this block does not end: `{}` is missing", word.to_uppercase()))
-    };
     let action = match word {
         "if" => {
             parser.advance();
@@ -303,31 +305,33 @@ fn structure(parser: &mut Parser, word: &str) -> Result<Option<Action>> {
             end(parser, "endfor", start)?;
             Action::For { name, from, to, step, body }
         }
-        "test" => {
-            parser.advance();
-            let subject = parser.expression()?;
-            let ends = ["case", "default", "endtest"];
-            let (mut cases, mut otherwise) = (Vec::new(), Vec::new());
-            loop {
-                if parser.take_word("case") {
-                    let mut labels = vec![parser.expression()?];
-                    while parser.take_symbol(",") {
-                        labels.push(parser.expression()?);
-                    }
-                    parser.expect_symbol(":")?;
-                    cases.push((labels, block(parser, &ends)?));
-                } else if parser.take_word("default") {
-                    parser.expect_symbol(":")?;
-                    otherwise = block(parser, &ends)?;
-                } else {
-                    end(parser, "endtest", start)?;
-                    break Action::Switch { subject, cases, otherwise };
-                }
-            }
-        }
+        "test" => test(parser)?,
         _ => return Ok(None),
     };
     Ok(Some(action))
+}
+
+fn test(parser: &mut Parser) -> Result<Action> {
+    let start = parser.advance().span;
+    let subject = parser.expression()?;
+    let ends = ["case", "default", "endtest"];
+    let (mut cases, mut otherwise) = (Vec::new(), Vec::new());
+    loop {
+        if parser.take_word("case") {
+            let mut labels = vec![parser.expression()?];
+            while parser.take_symbol(",") {
+                labels.push(parser.expression()?);
+            }
+            parser.expect_symbol(":")?;
+            cases.push((labels, block(parser, &ends)?));
+        } else if parser.take_word("default") {
+            parser.expect_symbol(":")?;
+            otherwise = block(parser, &ends)?;
+        } else {
+            end(parser, "endtest", start)?;
+            return Ok(Action::Switch { subject, cases, otherwise });
+        }
+    }
 }
 
 /// Parses a statement up to its semicolon, which is not consumed.

@@ -114,68 +114,56 @@ fn numbers(values: &[f64]) -> Value {
 pub(super) fn predefined(name: &str) -> Option<(&'static str, Value)> {
     let no_turn = || numbers(&[1.0, 0.0, 0.0, 0.0]);
     let no_pose = || Value::list(vec![numbers(&[0.0; 3]), no_turn()]);
-    match name {
-        "fine" => return Some(("zonedata", zone(true, [0.0; 6]))),
-        "z0" => return Some(("zonedata", zone(false, [0.3, 0.3, 0.3, 0.03, 0.3, 0.03]))),
-        "tool0" => {
-            let zero = Value::Number(0.0);
-            let load = Value::list(vec![
-                Value::Number(0.001),
-                numbers(&[0.0, 0.0, 0.001]),
-                no_turn(),
-                zero.clone(),
-                zero.clone(),
-                zero,
-            ]);
-            return Some(("tooldata", Value::list(vec![Value::Flag(true), no_pose(), load])));
-        }
+    let load = || {
+        let zero = Value::Number(0.0);
+        let com = numbers(&[0.0, 0.0, 0.001]);
+        Value::list(vec![Value::Number(0.001), com, no_turn(), zero.clone(), zero.clone(), zero])
+    };
+    Some(match name {
+        "fine" => ("zonedata", zone(true, [0.0; 6])),
+        "z0" => ("zonedata", zone(false, [0.3, 0.3, 0.3, 0.03, 0.3, 0.03])),
+        "tool0" => ("tooldata", Value::list(vec![Value::Flag(true), no_pose(), load()])),
         "wobj0" => {
             let parts = vec![Value::Flag(false), Value::Flag(true), Value::text(""), no_pose(), no_pose()];
-            return Some(("wobjdata", Value::list(parts)));
+            ("wobjdata", Value::list(parts))
         }
-        "load0" => {
-            let zero = Value::Number(0.0);
-            let parts =
-                vec![Value::Number(0.001), numbers(&[0.0, 0.0, 0.001]), no_turn(), zero.clone(), zero.clone(), zero];
-            return Some(("loaddata", Value::list(parts)));
-        }
-        "vmax" => return Some(("speeddata", numbers(&[5000.0, 500.0, 5000.0, 1000.0]))),
-        "pi" => return Some(("num", Value::Number(std::f64::consts::PI))),
-        "high" | "edge" => return Some(("num", Value::Number(1.0))),
-        "low" => return Some(("num", Value::Number(0.0))),
-        _ => {}
-    }
-    let number = |prefix: &str| name.strip_prefix(prefix)?.parse::<u32>().ok();
-    if let Some(speed) = number("vrot") {
-        return [1, 2, 5, 10, 20, 50, 100]
-            .contains(&speed)
-            .then(|| ("speeddata", numbers(&[0.0, 0.0, 0.0, f64::from(speed)])));
-    }
-    if let Some(speed) = number("vlin") {
-        return [10, 20, 50, 100, 200, 500, 1000]
-            .contains(&speed)
-            .then(|| ("speeddata", numbers(&[0.0, 0.0, f64::from(speed), 0.0])));
-    }
+        "load0" => ("loaddata", load()),
+        "vmax" => ("speeddata", numbers(&[5000.0, 500.0, 5000.0, 1000.0])),
+        "pi" => ("num", Value::Number(std::f64::consts::PI)),
+        "high" | "edge" => ("num", Value::Number(1.0)),
+        "low" => ("num", Value::Number(0.0)),
+        _ => return numbered(name),
+    })
+}
+
+/// Predefined speeds and zones with a number in their name, such as `v100` and `z10`.
+fn numbered(name: &str) -> Option<(&'static str, Value)> {
     const SPEEDS: [u32; 25] = [
         5, 10, 20, 30, 40, 50, 60, 80, 100, 150, 200, 300, 400, 500, 600, 800, 1000, 1500, 2000, 2500, 3000, 4000,
         5000, 6000, 7000,
     ];
-    if let Some(speed) = number("v").filter(|speed| SPEEDS.contains(speed)) {
-        return Some(("speeddata", numbers(&[f64::from(speed), 500.0, 5000.0, 1000.0])));
-    }
     const ZONES: [u32; 13] = [1, 5, 10, 15, 20, 30, 40, 50, 60, 80, 100, 150, 200];
-    if let Some(zone_tcp) = number("z").filter(|zone| ZONES.contains(zone)) {
-        let (tcp, other) = (f64::from(zone_tcp), if zone_tcp == 1 { 1.0 } else { 1.5 * f64::from(zone_tcp) });
-        let other = if zone_tcp == 5 {
-            8.0
-        } else if zone_tcp == 15 {
-            23.0
-        } else {
-            other
-        };
-        return Some(("zonedata", zone(false, [tcp, other, other, other / 10.0, other, other / 10.0])));
+    let number = |prefix: &str, known: &[u32]| {
+        let number = name.strip_prefix(prefix)?.parse::<u32>().ok()?;
+        known.contains(&number).then_some(f64::from(number))
+    };
+    if let Some(speed) = number("vrot", &[1, 2, 5, 10, 20, 50, 100]) {
+        return Some(("speeddata", numbers(&[0.0, 0.0, 0.0, speed])));
     }
-    None
+    if let Some(speed) = number("vlin", &[10, 20, 50, 100, 200, 500, 1000]) {
+        return Some(("speeddata", numbers(&[0.0, 0.0, speed, 0.0])));
+    }
+    if let Some(speed) = number("v", &SPEEDS) {
+        return Some(("speeddata", numbers(&[speed, 500.0, 5000.0, 1000.0])));
+    }
+    let tcp = number("z", &ZONES)?;
+    let other = match tcp as u32 {
+        1 => 1.0,
+        5 => 8.0,
+        15 => 23.0,
+        _ => 1.5 * tcp,
+    };
+    Some(("zonedata", zone(false, [tcp, other, other, other / 10.0, other, other / 10.0])))
 }
 
 fn zone(fine: bool, values: [f64; 6]) -> Value {

@@ -65,35 +65,77 @@ pub(super) fn function(machine: &mut UrScripts<'_>, name: &str, arguments: &[Arg
         return inverse(&values, span);
     }
     let values: Vec<Value> = values.into_iter().map(|(_, value)| value).collect();
+    if let Some(value) = state(machine, name, &values, span)? {
+        return Ok(value);
+    }
     let at = |k: usize| match values.get(k) {
         Some(value) => Ok(value),
         None => fail(span, format!("`{name}` misses argument {}", k + 1)),
     };
-    let number = |k: usize| at(k)?.number(span);
-    let place = |k: usize| Ok(pose_rotation_vector(pose(at(k)?, span)?));
-    let as_pose = |X: Pose| Value::Pose(rotation_vector_of(&X));
-    Ok(match name {
-        "pose_trans" => as_pose(place(0)? * place(1)?),
-        "pose_inv" => as_pose(place(0)?.inverse()),
+    if let Some(value) = geometry(name, at, span)? {
+        return Ok(value);
+    }
+    match list_or_text(name, at, span)? {
+        Some(value) => Ok(value),
+        None => mathematics(name, |k| at(k)?.number(span)),
+    }
+}
+
+fn pose_value(X: &Pose) -> Value {
+    Value::Pose(rotation_vector_of(X))
+}
+
+/// Functions of the robot's state and kinematics; `None` if the name is not one of them.
+fn state(machine: &mut UrScripts<'_>, name: &str, values: &[Value], span: Span) -> Result<Option<Value>> {
+    let (value, outside) = match name {
+        "get_forward_kin" => {
+            let joints = match values.first() {
+                Some(value) => Some(value.numbers(span)?),
+                None => machine.recorder.joints().map(<[f64]>::to_vec),
+            };
+            let pose = joints.and_then(|joints| super::forward_value(machine, &joints));
+            (pose, "`get_forward_kin`, the kinematics of the robot")
+        }
+        "get_target_joint_positions" => {
+            let joints = machine.recorder.joints();
+            let list = joints.map(|joints| Value::list(joints.iter().map(|joint| Value::Number(*joint)).collect()));
+            (list, "`get_target_joint_positions()`")
+        }
+        "get_target_tcp_pose" => {
+            let X_FT = machine.dialect.X_FT;
+            let X_WT = machine.recorder.pose(&Pose::identity(), &X_FT, span).ok();
+            (X_WT.as_ref().map(pose_value), "`get_target_tcp_pose()`")
+        }
+        _ => return Ok(None),
+    };
+    Ok(Some(value.unwrap_or_else(|| Value::Outside(outside.into()))))
+}
+
+/// Functions of poses and rotations; `None` if the name is not one of them.
+fn geometry<'v>(name: &str, at: impl Fn(usize) -> Result<&'v Value>, span: Span) -> Result<Option<Value>> {
+    let place = |k: usize| -> Result<Pose> { Ok(pose_rotation_vector(pose(at(k)?, span)?)) };
+    Ok(Some(match name {
+        "pose_trans" => pose_value(&(place(0)? * place(1)?)),
+        "pose_inv" => pose_value(&place(0)?.inverse()),
         // Positions are added, rotations are composed.
         "pose_add" => {
-            let (a, b): (Pose, Pose) = (place(0)?, place(1)?);
-            as_pose(Pose::from_parts((a.translation.vector + b.translation.vector).into(), a.rotation * b.rotation))
+            let (a, b) = (place(0)?, place(1)?);
+            let p = a.translation.vector + b.translation.vector;
+            pose_value(&Pose::from_parts(p.into(), a.rotation * b.rotation))
         }
         "pose_sub" => {
-            let (a, b): (Pose, Pose) = (place(0)?, place(1)?);
-            as_pose(Pose::from_parts(
-                (a.translation.vector - b.translation.vector).into(),
-                a.rotation * b.rotation.inverse(),
-            ))
+            let (a, b) = (place(0)?, place(1)?);
+            let p = a.translation.vector - b.translation.vector;
+            pose_value(&Pose::from_parts(p.into(), a.rotation * b.rotation.inverse()))
         }
         "interpolate_pose" => {
-            let (a, b, part): (Pose, Pose, f64) = (place(0)?, place(1)?, number(2)?);
+            let (a, b, part) = (place(0)?, place(1)?, at(2)?.number(span)?);
             let turn = Rotation3::new((a.rotation.inverse() * b.rotation).scaled_axis() * part);
-            as_pose(Pose::from_parts(a.translation.vector.lerp(&b.translation.vector, part).into(), a.rotation * turn))
+            let p = a.translation.vector.lerp(&b.translation.vector, part);
+            pose_value(&Pose::from_parts(p.into(), a.rotation * turn))
         }
         "point_dist" | "pose_dist" => {
-            let (a, b): (Pose, Pose) = (place(0)?, place(1)?);
+            let (a, b) = (place(0)?, place(1)?);
             Value::Number((a.translation.vector - b.translation.vector).norm())
         }
         "rpy2rotvec" => {
@@ -110,27 +152,13 @@ pub(super) fn function(machine: &mut UrScripts<'_>, name: &str, arguments: &[Arg
             let [yaw, pitch, roll] = angles_zyx(&Rotation3::new(nalgebra::Vector3::new(*x, *y, *z)));
             Value::list([roll, pitch, yaw].map(Value::Number).to_vec())
         }
-        "get_forward_kin" => {
-            let joints = match values.first() {
-                Some(value) => Some(value.numbers(span)?),
-                None => machine.recorder.joints().map(<[f64]>::to_vec),
-            };
-            match joints.and_then(|joints| super::forward_value(machine, &joints)) {
-                Some(value) => value,
-                None => Value::Outside("`get_forward_kin`, the kinematics of the robot".into()),
-            }
-        }
-        "get_target_joint_positions" => match machine.recorder.joints() {
-            Some(joints) => Value::list(joints.iter().map(|joint| Value::Number(*joint)).collect()),
-            None => Value::Outside("`get_target_joint_positions()`".into()),
-        },
-        "get_target_tcp_pose" => {
-            let X_FT = machine.dialect.X_FT;
-            match machine.recorder.pose(&Pose::identity(), &X_FT, span) {
-                Ok(X_WT) => as_pose(X_WT),
-                Err(_) => Value::Outside("`get_target_tcp_pose()`".into()),
-            }
-        }
+        _ => return Ok(None),
+    }))
+}
+
+/// Functions of lists and texts; `None` if the name is not one of them.
+fn list_or_text<'v>(name: &str, at: impl Fn(usize) -> Result<&'v Value>, span: Span) -> Result<Option<Value>> {
+    Ok(Some(match name {
         "length" => match at(0)? {
             Value::List(values) => Value::Number(values.len() as f64),
             Value::Pose(_) => Value::Number(6.0),
@@ -161,8 +189,8 @@ pub(super) fn function(machine: &mut UrScripts<'_>, name: &str, arguments: &[Arg
             let length = numbers.iter().map(|part| part * part).sum::<f64>().sqrt();
             Value::list(numbers.iter().map(|part| Value::Number(part / length)).collect())
         }
-        _ => return mathematics(name, number),
-    })
+        _ => return Ok(None),
+    }))
 }
 
 fn mathematics(name: &str, number: impl Fn(usize) -> Result<f64>) -> Result<Value> {

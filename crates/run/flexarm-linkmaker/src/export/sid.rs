@@ -14,22 +14,12 @@ use super::{ExportChecks, ExportFormat, ExportJob, ExportSummary, difference, no
 use crate::{LinkError, stamp};
 
 pub(super) fn export(job: &ExportJob, link: &ReducedLink, started: Instant) -> Result<ExportSummary, LinkError> {
-    let details = link.details.as_deref();
-    let Some(modal) = details.and_then(|details| details.modal.as_ref()) else {
+    let Some(modal) = link.details.as_deref().and_then(|details| details.modal.as_ref()) else {
         let what = "has no [modal] section, which SID requires: reduce the mesh again with this version (flexarm \
                     reduce), or export its matrices in another format";
         return Err(LinkError::file(&job.link, what));
     };
-    let mut warnings = Vec::new();
-    let riding: f64 = details.map_or(0.0, |details| details.attached.iter().map(|body| body.mass).sum());
-    if riding > 0.0 {
-        warnings
-            .push(format!("attached bodies of {riding:.4} kg are not in the SID, which contains only the link itself"));
-    }
-    if !modal.has_second_order() {
-        warnings.push(crate::import::SECOND_ORDER_UNKNOWN.into());
-    }
-
+    let mut warnings = omissions(link, modal);
     let count = modal.interfaces.len() + 1;
     let ids = if job.nodes.is_empty() { (1..=count as i64).collect() } else { nodes(job, count)? };
     let mut sid = sid_of_modal_link(modal);
@@ -49,19 +39,9 @@ pub(super) fn export(job: &ExportJob, link: &ReducedLink, started: Instant) -> R
     ];
     let paths: Vec<PathBuf> = texts.iter().map(|(path, _)| path.clone()).collect();
     check_free(&paths, job.overwrite)?;
-
-    // Read the text back with the code of every import before writing any file: data that cannot be
-    // read leave no file.
-    let origin = paths[0].display().to_string();
-    let back = parse_sid(&texts[0].1, &origin).map_err(Box::new)?.in_units(&job.units, &UnitSystem::SI);
-    let back = modal_link_held_at(&link.name, &back, ids[0]).map_err(Box::new)?;
-    let (stiffness_error, mass_error) = (difference(&modal.K, &back.K), difference(&modal.M, &back.M));
-    let integrals_error = integrals(modal, &back);
-    for (what, error) in [("stiffness", stiffness_error), ("mass", mass_error), ("integrals", integrals_error)] {
-        if error.is_nan() || error > ExportFormat::Sid.digits() {
-            warnings.push(format!("the exported {what}, read back, differs by {error:.1e} (relative to its diagonal)"));
-        }
-    }
+    // Checked before any file is written: data that cannot be read leave no file.
+    let [stiffness_error, mass_error, integrals_error] =
+        read_back(job, &link.name, modal, &texts[0], ids[0], &mut warnings)?;
     write_all(&texts)?;
     let whole = modal.rigid();
     Ok(ExportSummary {
@@ -88,6 +68,43 @@ pub(super) fn export(job: &ExportJob, link: &ReducedLink, started: Instant) -> R
         warnings,
         files: paths.iter().map(|path| path.display().to_string()).collect(),
     })
+}
+
+/// Returns warnings about what a SID does not contain.
+fn omissions(link: &ReducedLink, modal: &ModalLink) -> Vec<String> {
+    let mut warnings = Vec::new();
+    let attached = link.details.iter().flat_map(|details| &details.attached);
+    let riding: f64 = attached.map(|body| body.mass).sum();
+    if riding > 0.0 {
+        warnings
+            .push(format!("attached bodies of {riding:.4} kg are not in the SID, which contains only the link itself"));
+    }
+    if !modal.has_second_order() {
+        warnings.push(crate::import::SECOND_ORDER_UNKNOWN.into());
+    }
+    warnings
+}
+
+/// Reads an exported text with the code of every import. Returns the relative differences of
+/// stiffness, mass and mass integrals, and warns about large ones.
+fn read_back(
+    job: &ExportJob,
+    link: &str,
+    modal: &ModalLink,
+    (path, text): &(PathBuf, String),
+    first: i64,
+    warnings: &mut Vec<String>,
+) -> Result<[f64; 3], LinkError> {
+    let back = parse_sid(text, &path.display().to_string()).map_err(Box::new)?;
+    let back = back.in_units(&job.units, &UnitSystem::SI);
+    let back = modal_link_held_at(link, &back, first).map_err(Box::new)?;
+    let errors = [difference(&modal.K, &back.K), difference(&modal.M, &back.M), integrals(modal, &back)];
+    for (what, error) in ["stiffness", "mass", "integrals"].iter().zip(errors) {
+        if error.is_nan() || error > ExportFormat::Sid.digits() {
+            warnings.push(format!("the exported {what}, read back, differs by {error:.1e} (relative to its diagonal)"));
+        }
+    }
+    Ok(errors)
 }
 
 /// Maximum difference of the mass integrals, relative to the magnitudes given by mass, inertia and

@@ -123,19 +123,7 @@ pub(super) fn reduce(
             let Some(points) = nodes.iter().map(position).collect::<Option<Vec<_>>>() else {
                 return Err(refuse("not every node has a position".into()));
             };
-            let index: HashMap<i64, u32> = nodes.iter().enumerate().map(|(i, node)| (*node, i as u32)).collect();
-            let mut interfaces = Vec::new();
-            for ((name, choice), frame) in list.iter().zip(&target.frames) {
-                let chosen =
-                    chosen_nodes(imported, choice).map_err(|what| refuse(format!("interface {name}: {what}")))?;
-                let mut nodes: Vec<u32> = chosen.iter().filter_map(|node| index.get(node).copied()).collect();
-                nodes.sort_unstable();
-                nodes.dedup();
-                // The reduction with ties works in matrix axes.
-                let p = target.R_LM.transpose() * frame.X_LI.translation.vector;
-                let X_LI = flexarm_spatial::Pose::translation(p.x, p.y, p.z);
-                interfaces.push(Interface { name: name.clone(), X_LI, nodes, tie: Tie::Rigid });
-            }
+            let interfaces = tied(imported, list, &nodes, &target)?;
             let is_turn = vec![false; rows.len()];
             let K = to_si(&imported.stiffness, target.units, &is_turn, false);
             let M = to_si(mass, target.units, &is_turn, true);
@@ -146,6 +134,27 @@ pub(super) fn reduce(
             Ok(condensation.superelement(frames, &modes))
         }
     }
+}
+
+/// Returns the interfaces, in matrix axes, that are tied rigidly to the chosen ones of all nodes.
+fn tied(
+    imported: &ImportedMatrices,
+    list: &[(String, NodeChoice)],
+    all: &[i64],
+    target: &Target<'_>,
+) -> Result<Vec<Interface>, LinkError> {
+    let index: HashMap<i64, u32> = all.iter().enumerate().map(|(i, node)| (*node, i as u32)).collect();
+    let interface = |((name, choice), frame): (&(String, NodeChoice), &InterfaceFrame)| {
+        let chosen = chosen_nodes(imported, choice)
+            .map_err(|what| LinkError::file(&imported.origin, format!("interface {name}: {what}")))?;
+        let mut nodes: Vec<u32> = chosen.iter().filter_map(|node| index.get(node).copied()).collect();
+        nodes.sort_unstable();
+        nodes.dedup();
+        let p = target.R_LM.transpose() * frame.X_LI.translation.vector;
+        let X_LI = flexarm_spatial::Pose::translation(p.x, p.y, p.z);
+        Ok(Interface { name: name.clone(), X_LI, nodes, tie: Tie::Rigid })
+    };
+    list.iter().zip(&target.frames).map(interface).collect()
 }
 
 /// Returns the rows of the interfaces, six each.

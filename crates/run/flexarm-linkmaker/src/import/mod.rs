@@ -178,130 +178,179 @@ fn expect_format(job: &ImportJob, found: MatrixFormat, origin: &str) -> Result<(
     }
 }
 
+/// What an import needs beside the matrices, from the job or else from the files.
+struct Layout {
+    units: UnitSystem,
+    map: ImportMap,
+    placed: Vec<Placed>,
+    /// Whether the matrices are those of a model that is not reduced yet.
+    is_full: bool,
+}
+
+impl Layout {
+    /// Collects the data; all missing ones are in one error.
+    fn of(
+        job: &ImportJob,
+        imported: &ImportedMatrices,
+        R_LM: &Rotation3<f64>,
+        warnings: &mut Vec<String>,
+    ) -> Result<Self, LinkError> {
+        let sidecar = imported.sidecar.as_ref();
+        let units = job.units.or(sidecar.map(|sidecar| sidecar.units));
+        if let (Some(given), Some(sidecar)) = (job.units, sidecar)
+            && given != sidecar.units
+        {
+            warnings.push(format!(
+                "the units are {} in the sidecar and {given} from {Caller}; the latter are used",
+                sidecar.units
+            ));
+        }
+        let from_sidecar = || sidecar.map(|sidecar| ImportMap::Rows(sidecar.map()));
+        let map = job.map.clone().or_else(from_sidecar).filter(|map| !map.entries().is_empty());
+        let is_full =
+            matches!(map, Some(ImportMap::Nodes(_))) || full::is_full(imported, map.as_ref().and_then(ImportMap::rows));
+
+        let mut faults = Vec::new();
+        if units.is_none() {
+            faults.push(file_error(imported, no_units()));
+        }
+        if map.is_none() {
+            faults.push(file_error(imported, no_map(imported, is_full)));
+        }
+        let placed = map.as_ref().map(|map| place(job, imported, map, R_LM, warnings)).transpose();
+        let placed = placed.unwrap_or_else(|fault| {
+            faults.push(fault);
+            None
+        });
+        if map.is_none() && imported.positions.is_empty() && imported.frames.is_empty() && job.at.is_empty() {
+            let names = propose_map_of(&imported.stiffness).filter(|_| !is_full);
+            let names = names.map_or_else(
+                || vec!["A".into(), "B".into()],
+                |map| map.interfaces.iter().map(|interface| interface.name.clone()).collect(),
+            );
+            faults.push(file_error(imported, no_place(imported, None, &names)));
+        }
+        match (units, map, placed) {
+            (Some(units), Some(map), Some(placed)) if faults.is_empty() => Ok(Self { units, map, placed, is_full }),
+            _ => Err(LinkError::of_all(faults)),
+        }
+    }
+
+    /// Returns the link axes at each interface, in m.
+    fn frames(&self) -> Vec<InterfaceFrame> {
+        let frame = |p: &Placed| {
+            let X_LI = Pose::from_parts(Translation3::from(p.xyz * self.units.length), p.rotation);
+            InterfaceFrame { name: p.name.clone(), X_LI, tie: None }
+        };
+        self.placed.iter().map(frame).collect()
+    }
+
+    fn interfaces(&self) -> Vec<ImportInterface> {
+        let interface = |(p, (_, rows)): (&Placed, (String, String))| ImportInterface {
+            name: p.name.clone(),
+            rows,
+            position_m: (p.xyz * self.units.length).into(),
+            rpy_rad: p.rotation.euler_angles().into(),
+            from: p.from,
+        };
+        self.placed.iter().zip(self.map.entries()).map(interface).collect()
+    }
+}
+
+/// Returns the request for the units.
+fn no_units() -> String {
+    format!(
+        "the units of the file are not declared: {units} LENGTH-MASS-TIME, such as {units} m-kg-s (N, Pa) or {units} \
+         mm-t-s (N, MPa); matrix files do not contain them",
+        units = Setting::Units
+    )
+}
+
+/// Returns the request for the rows of the interfaces, with those implied by the matrix itself.
+fn no_map(imported: &ImportedMatrices, is_full: bool) -> String {
+    let proposal = match propose_map_of(&imported.stiffness).filter(|_| !is_full) {
+        Some(map) => {
+            let rows = imported.stiffness.rows.len();
+            let unnumbered = imported.stiffness.rows.iter().all(|label| label.node.is_none());
+            let modal = match unnumbered && map.modal.is_empty() && map.interfaces.len() > 2 {
+                true => {
+                    format!(
+                        ", or, if modes follow two interfaces, {} \"A=#1-6,B=#7-12,modal=#13-{rows}\"",
+                        Setting::Map
+                    )
+                }
+                false => String::new(),
+            };
+            format!("if the proximal interface comes first: {} \"{map}\"{modal}", Setting::Map)
+        }
+        None if is_full => full::propose(imported),
+        None => format!("give {}, such as A=1001,B=1002 or A=#1-6,B=#7-12", Setting::Map),
+    };
+    format!("the rows of interfaces A and B are not specified: {proposal}")
+}
+
+/// Reduced matrices of a link.
+struct Reduced {
+    /// In matrix axes, with frames in link axes.
+    element: Superelement,
+    has_mass: bool,
+    asymmetry: f64,
+}
+
+/// Reduces full matrices, or assembles reduced ones.
+fn reduced(
+    job: &ImportJob,
+    imported: &ImportedMatrices,
+    layout: &Layout,
+    R_LM: &Rotation3<f64>,
+    warnings: &mut Vec<String>,
+) -> Result<Reduced, LinkError> {
+    let (units, interfaces) = (layout.units, layout.frames());
+    if layout.is_full {
+        let modes = job.modes.unwrap_or(MODES);
+        let target = full::Target { units, frames: interfaces, R_LM: R_LM.matrix(), modes };
+        let element = full::reduce(imported, &layout.map, target)?;
+        return Ok(Reduced { element, has_mass: true, asymmetry: imported.stiffness.asymmetry });
+    }
+    if job.modes.is_some() {
+        let modes = Setting::Modes;
+        warnings.push(format!("{modes} applies only to full models; these matrices are already reduced"));
+    }
+    let reduced = assemble_interfaces(imported, layout.map.rows(), Some(&units)).map_err(Box::new)?;
+    let (has_mass, n) = (reduced.M.is_some(), reduced.K.nrows());
+    let M = reduced.M.unwrap_or_else(|| DMatrix::zeros(n, n));
+    Ok(Reduced { element: Superelement { interfaces, K: reduced.K, M }, has_mass, asymmetry: reduced.asymmetry })
+}
+
 /// Imports all formats that have a stiffness over physical coordinates.
 fn matrices(job: &ImportJob, name: &str) -> Result<(MatrixReduction, Parts), LinkError> {
     let imported = read(job).map_err(Box::new)?;
     expect_format(job, imported.format, &imported.origin)?;
-    let sidecar = imported.sidecar.as_ref();
     let mut warnings = imported.warnings.clone();
-    let units = job.units.or(sidecar.map(|sidecar| sidecar.units));
-    if let (Some(given), Some(sidecar)) = (job.units, sidecar)
-        && given != sidecar.units
-    {
-        warnings.push(format!(
-            "the units are {} in the sidecar and {given} from {Caller}; the latter are used",
-            sidecar.units
-        ));
-    }
-    let from_sidecar = || sidecar.map(|sidecar| ImportMap::Rows(sidecar.map()));
-    let map = job.map.clone().or_else(from_sidecar).filter(|map| !map.entries().is_empty());
-    let rows_of = |map: &ImportMap| match map {
-        ImportMap::Rows(map) => Some(map.clone()),
-        ImportMap::Nodes(_) => None,
-    };
-    let is_full =
-        matches!(map, Some(ImportMap::Nodes(_))) || full::is_full(&imported, map.as_ref().and_then(rows_of).as_ref());
-
-    let mut faults = Vec::new();
-    if units.is_none() {
-        let what = format!(
-            "the units of the file are not declared: {units} LENGTH-MASS-TIME, such as {units} m-kg-s (N, Pa) or \
-             {units} mm-t-s (N, MPa); matrix files do not contain them",
-            units = Setting::Units
-        );
-        faults.push(file_error(&imported, what));
-    }
-    if map.is_none() {
-        let proposal = if is_full {
-            full::propose(&imported)
-        } else {
-            match propose_map_of(&imported.stiffness) {
-                Some(map) => {
-                    let unnumbered = imported.stiffness.rows.iter().all(|label| label.node.is_none());
-                    let rows = imported.stiffness.rows.len();
-                    let modal = match unnumbered && map.modal.is_empty() && map.interfaces.len() > 2 {
-                        true => format!(
-                            ", or, if modes follow two interfaces, {} \"A=#1-6,B=#7-12,modal=#13-{rows}\"",
-                            Setting::Map
-                        ),
-                        false => String::new(),
-                    };
-                    format!("if the proximal interface comes first: {} \"{map}\"{modal}", Setting::Map)
-                }
-                None => format!("give {}, such as A=1001,B=1002 or A=#1-6,B=#7-12", Setting::Map),
-            }
-        };
-        faults.push(file_error(&imported, format!("the rows of interfaces A and B are not specified: {proposal}")));
-    }
     let R_LM = rotation(&job.axes_rpy);
-    let placed = map.as_ref().map(|map| place(job, &imported, map, &R_LM, &mut warnings)).transpose();
-    let placed = placed.unwrap_or_else(|fault| {
-        faults.push(fault);
-        None
-    });
-    if map.is_none() && imported.positions.is_empty() && imported.frames.is_empty() && job.at.is_empty() {
-        let names = propose_map_of(&imported.stiffness).filter(|_| !is_full);
-        let names = names.map_or_else(
-            || vec!["A".into(), "B".into()],
-            |map| map.interfaces.iter().map(|interface| interface.name.clone()).collect(),
-        );
-        faults.push(file_error(&imported, no_place(&imported, None, &names)));
-    }
-    let (Some(units), Some(map), Some(placed)) = (units, map, placed) else { return Err(LinkError::of_all(faults)) };
-    if !faults.is_empty() {
-        return Err(LinkError::of_all(faults));
-    }
-
-    let frames: Vec<InterfaceFrame> = placed
-        .iter()
-        .map(|p| {
-            let X_LI = Pose::from_parts(Translation3::from(p.xyz * units.length), p.rotation);
-            InterfaceFrame { name: p.name.clone(), X_LI, tie: None }
-        })
-        .collect();
-    let (element, has_mass, asymmetry) = if is_full {
-        let target =
-            full::Target { units, frames: frames.clone(), R_LM: R_LM.matrix(), modes: job.modes.unwrap_or(MODES) };
-        (full::reduce(&imported, &map, target)?, true, imported.stiffness.asymmetry)
-    } else {
-        if job.modes.is_some() {
-            let modes = Setting::Modes;
-            warnings.push(format!("{modes} applies only to full models; these matrices are already reduced"));
-        }
-        let rows = rows_of(&map);
-        let reduced = assemble_interfaces(&imported, rows.as_ref(), Some(&units)).map_err(Box::new)?;
-        let (has_mass, n) = (reduced.M.is_some(), reduced.K.nrows());
-        let M = reduced.M.unwrap_or_else(|| DMatrix::zeros(n, n));
-        (Superelement { interfaces: frames, K: reduced.K, M }, has_mass, reduced.asymmetry)
-    };
+    let layout = Layout::of(job, &imported, &R_LM, &mut warnings)?;
+    let Reduced { element, has_mass, asymmetry } = reduced(job, &imported, &layout, &R_LM, &mut warnings)?;
     let element = turned(element, R_LM.matrix());
     let modes = element.modes();
-    let method = match (is_full, modes) {
+    let method = match (layout.is_full, modes) {
         (true, 0) => "guyan".into(),
         (true, _) => format!("craig-bampton, {modes} modes"),
         (false, 0) => "reduced matrices".into(),
         (false, _) => format!("reduced matrices with {modes} modes"),
     };
-    let plan = plan(job, name, units, &imported.origin, &format!("{method}, {}", imported.format.name()));
+    let plan = plan(job, name, layout.units, &imported.origin, &format!("{method}, {}", imported.format.name()));
     let checked = if has_mass { Some(element.clone()) } else { None };
     let reduction = link_from_superelement(element, has_mass, &plan).map_err(|source| {
         let path = imported.origin.clone().into();
         LinkError::Import { path, source: Box::new(source) }
     })?;
-    let interfaces = placed.iter().zip(map.entries()).map(|(p, (_, rows))| summary::ImportInterface {
-        name: p.name.clone(),
-        rows,
-        position_m: (p.xyz * units.length).into(),
-        rpy_rad: p.rotation.euler_angles().into(),
-        from: p.from,
-    });
     let parts = Parts {
         files: job.files.iter().chain(&job.mass_file).map(|path| path.display().to_string()).collect(),
         format: imported.format.name().to_string(),
-        units: units.name(),
+        units: layout.units.name(),
         method,
         rows: imported.stiffness.size(),
-        interfaces: interfaces.collect(),
+        interfaces: layout.interfaces(),
         asymmetry,
         element: checked,
         warnings,

@@ -20,30 +20,9 @@ use super::{ImportJob, SECOND_ORDER_UNKNOWN, plan, rotation};
 use crate::{ImportError, LinkError};
 
 pub(super) fn import(job: &ImportJob, file: &InputFile, name: &str) -> Result<(MatrixReduction, Parts), LinkError> {
-    let refuse = |what: String| LinkError::file(&file.origin, what);
     let sid = parse_sid(&String::from_utf8_lossy(&file.bytes), &file.origin).map_err(Box::new)?;
     let ids: Vec<i64> = sid.nodes.iter().map(|node| node.id).collect();
-    let mut faults = Vec::new();
-    if job.units.is_none() {
-        let units = Setting::Units;
-        faults.push(refuse(format!("the units of the file are not declared: {units} m-kg-s is usual for SID")));
-    }
-    let nodes = match &job.map {
-        Some(map) => named_nodes(map, &ids),
-        None => {
-            let (first, last) = (ids.first().copied().unwrap_or(1), ids.last().copied().unwrap_or(2));
-            let setting = Setting::Map;
-            Err(format!(
-                "the nodes of interfaces A and B are not specified; the SID has nodes {ids:?}: {setting} \
-                 \"A={first},B={last}\""
-            ))
-        }
-    };
-    let nodes = nodes.map_err(|what| faults.push(refuse(what))).ok();
-    let (Some(units), Some(nodes)) = (job.units, nodes) else { return Err(LinkError::of_all(faults)) };
-    if let Some(at) = job.at.first() {
-        return Err(ImportError::FrameOfSid { interface: at.name.clone() }.into());
-    }
+    let (units, nodes) = layout(job, &file.origin, &ids)?;
     let mut warnings = Vec::new();
     if job.modes.is_some() {
         warnings.push(format!("{} applies only to full models; all modes of a SID are kept", Setting::Modes));
@@ -60,15 +39,11 @@ pub(super) fn import(job: &ImportJob, file: &InputFile, name: &str) -> Result<(M
     let places: Vec<Pose> = (0..nodes.len()).map(place).collect();
     let p = |k: usize| places[k].translation.vector;
     let frame = |k: usize| InterfaceFrame { name: nodes[k].0.clone(), X_LI: places[k], tie: None };
-    let C = compliance(&sid, nodes[0].1, nodes[1].1, &R_LM, &(p(1) - p(0))).map_err(refuse)?;
-    let K_BB = C.try_inverse().ok_or_else(|| refuse("the compliance at B is singular".into()))?;
-    let K_BB = (K_BB + K_BB.transpose()) * 0.5;
-    let K = free_stiffness(&K_BB, &(p(1) - p(0)));
+    let K = static_stiffness(&sid, [nodes[0].1, nodes[1].1], &R_LM, &(p(1) - p(0)))
+        .map_err(|what| LinkError::file(&file.origin, what))?;
     let element = Superelement { interfaces: vec![frame(0), frame(1)], K, M: DMatrix::zeros(12, 12) };
-    let method = match &modal {
-        Some(_) => format!("modal link of {} modes", sid.nq()),
-        None => format!("static part of {} modes", sid.nq()),
-    };
+    let kind = if modal.is_some() { "modal link" } else { "static part" };
+    let method = format!("{kind} of {} modes", sid.nq());
     let mut plan = plan(job, name, units, &file.origin, &format!("{method}, SID"));
     if plan.masses == PartMasses::FromMatrix {
         plan.masses = PartMasses::Whole(body(&sid, &R_LM));
@@ -76,14 +51,7 @@ pub(super) fn import(job: &ImportJob, file: &InputFile, name: &str) -> Result<(M
     let failed = |source| LinkError::Import { path: file.origin.clone().into(), source: Box::new(source) };
     let mut reduction = link_from_superelement(element, false, &plan).map_err(failed)?;
     if let Some(modal) = modal {
-        if (modal.mass / reduction.whole.mass - 1.0).abs() > 0.01 {
-            warnings.push(format!(
-                "the modal link has the mass of the SID, {:.6} kg; the given masses of the parts sum to {:.6} kg",
-                modal.mass, reduction.whole.mass
-            ));
-        }
-        reduction.held_frequencies_hz = modal.held_frequencies_hz();
-        reduction.link.details = Some(Box::new(LinkDetails { modal: Some(modal), ..LinkDetails::default() }));
+        add_modal(&mut reduction, modal, &mut warnings);
     }
     let interfaces = (0..nodes.len()).map(|k| ImportInterface {
         name: nodes[k].0.clone(),
@@ -104,6 +72,57 @@ pub(super) fn import(job: &ImportJob, file: &InputFile, name: &str) -> Result<(M
         warnings,
     };
     Ok((reduction, parts))
+}
+
+/// Returns the units of the file, and names and indices of the nodes, proximal and distal first.
+fn layout(job: &ImportJob, origin: &str, ids: &[i64]) -> Result<(UnitSystem, Vec<(String, usize)>), LinkError> {
+    let refuse = |what: String| LinkError::file(origin, what);
+    let mut faults = Vec::new();
+    if job.units.is_none() {
+        let units = Setting::Units;
+        faults.push(refuse(format!("the units of the file are not declared: {units} m-kg-s is usual for SID")));
+    }
+    let nodes = match &job.map {
+        Some(map) => named_nodes(map, ids),
+        None => {
+            let (first, last) = (ids.first().copied().unwrap_or(1), ids.last().copied().unwrap_or(2));
+            let setting = Setting::Map;
+            Err(format!(
+                "the nodes of interfaces A and B are not specified; the SID has nodes {ids:?}: {setting} \
+                 \"A={first},B={last}\""
+            ))
+        }
+    };
+    let nodes = nodes.map_err(|what| faults.push(refuse(what))).ok();
+    let (Some(units), Some(nodes)) = (job.units, nodes) else { return Err(LinkError::of_all(faults)) };
+    match job.at.first() {
+        Some(at) => Err(ImportError::FrameOfSid { interface: at.name.clone() }.into()),
+        None => Ok((units, nodes)),
+    }
+}
+
+/// Computes the stiffness of the free body over the motions of nodes A and B, in link axes.
+fn static_stiffness(
+    sid: &Sid,
+    nodes: [usize; 2],
+    R_LM: &Rotation3<f64>,
+    p_AB: &Vector3<f64>,
+) -> Result<DMatrix<f64>, String> {
+    let K_BB = compliance(sid, nodes, R_LM, p_AB)?.try_inverse().ok_or("the compliance at B is singular")?;
+    let K_BB = (K_BB + K_BB.transpose()) * 0.5;
+    Ok(free_stiffness(&K_BB, p_AB))
+}
+
+/// Adds a modal link to the link of two parts; warns if their masses differ.
+fn add_modal(reduction: &mut MatrixReduction, modal: ModalLink, warnings: &mut Vec<String>) {
+    let (own, given) = (modal.mass, reduction.whole.mass);
+    if (own / given - 1.0).abs() > 0.01 {
+        warnings.push(format!(
+            "the modal link has the mass of the SID, {own:.6} kg; the given masses of the parts sum to {given:.6} kg"
+        ));
+    }
+    reduction.held_frequencies_hz = modal.held_frequencies_hz();
+    reduction.link.details = Some(Box::new(LinkDetails { modal: Some(modal), ..LinkDetails::default() }));
 }
 
 /// Returns the modal link with the mapped nodes as its interfaces; `None` with a warning if the
@@ -182,8 +201,7 @@ fn named_nodes(map: &ImportMap, ids: &[i64]) -> Result<Vec<(String, usize)>, Str
 /// Computes `C_BB` in link axes.
 fn compliance(
     sid: &Sid,
-    a: usize,
-    b: usize,
+    [a, b]: [usize; 2],
     R_LM: &Rotation3<f64>,
     p_AB: &Vector3<f64>,
 ) -> Result<Matrix6<f64>, String> {

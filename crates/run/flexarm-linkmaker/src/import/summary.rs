@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use flexarm_fem::matrix_link::MatrixReduction;
 use flexarm_fem::reduction::Superelement;
-use flexarm_fem::{Doubt, GateLimits, ModalLink, RigidPart};
+use flexarm_fem::{Doubt, GateLimits, ModalLink, ReducedLink, RigidPart};
 use flexarm_settings::{Caveat, written};
 use nalgebra::{DMatrix, Matrix3, Matrix6};
 use serde::Serialize;
@@ -144,32 +144,12 @@ const MASS_ERROR: f64 = 1e-6;
 
 impl ImportSummary {
     pub(super) fn new(reduction: &MatrixReduction, parts: Parts) -> Self {
-        let MatrixReduction { link, whole, held_frequencies_hz, lumped_frequencies_hz, doubts } = reduction;
+        let MatrixReduction { link, whole, held_frequencies_hz, lumped_frequencies_hz, .. } = reduction;
         let gate = &link.checks;
         let masses = parts.element.as_ref().map(masses_along_axes);
         let mass_error = masses.map(|m| m.iter().map(|m| (m / whole.mass - 1.0).abs()).fold(0.0, f64::max));
-        let doubt = |code: &'static str, sentence: &str| Doubt::from_message(code, sentence);
-        let mut all: Vec<Doubt> = parts.warnings.iter().map(|sentence| doubt("matrix-file", sentence)).collect();
-        all.extend(doubts.iter().cloned());
-        if let (Some(error), Some(m)) = (mass_error, masses)
-            && (error.is_nan() || error > MASS_ERROR)
-        {
-            let sentence = format!("the mass matrix has {:.6}, {:.6}, {:.6} kg along x, y, z", m[0], m[1], m[2]);
-            all.push(Doubt::found("mass", error, MASS_ERROR, sentence));
-        }
-        all.extend(crate::yardsticks::of_link(link, whole));
-        let first = held_frequencies_hz.first().zip(lumped_frequencies_hz.first());
-        all.extend(coarse("the matrices", first.map(|(hz, lumped)| lumped / hz - 1.0), None));
-        let details = link.details.as_deref();
-        let stored = details.and_then(|details| details.modal.as_ref()).map(ModalFigures::from);
-        let modal = stored.or_else(|| {
-            let element = details.and_then(|details| details.superelement.as_ref())?;
-            let link = ModalLink::from_superelement(&link.name, element).ok()?;
-            if !link.has_second_order() {
-                all.push(doubt("second-order", SECOND_ORDER_UNKNOWN));
-            }
-            Some(ModalFigures::from(&link))
-        });
+        let mut all = doubts(reduction, &parts.warnings, mass_error.zip(masses));
+        let modal = modal_figures(link, &mut all);
         let list =
             |part: &RigidPart| ImportPart { mass_kg: part.mass, com_m: part.com.into(), inertia: rows3(&part.inertia) };
         Self {
@@ -209,6 +189,37 @@ impl ImportSummary {
     }
 }
 
+/// Returns the doubts about the files and the link.
+///
+/// * `mass`: relative error of the masses along x, y, z, and the masses (kg).
+fn doubts(reduction: &MatrixReduction, warnings: &[String], mass: Option<(f64, [f64; 3])>) -> Vec<Doubt> {
+    let MatrixReduction { link, whole, held_frequencies_hz, lumped_frequencies_hz, doubts } = reduction;
+    let mut all: Vec<Doubt> = warnings.iter().map(|sentence| Doubt::from_message("matrix-file", sentence)).collect();
+    all.extend(doubts.iter().cloned());
+    if let Some((error, m)) = mass.filter(|(error, _)| error.is_nan() || *error > MASS_ERROR) {
+        let sentence = format!("the mass matrix has {:.6}, {:.6}, {:.6} kg along x, y, z", m[0], m[1], m[2]);
+        all.push(Doubt::found("mass", error, MASS_ERROR, sentence));
+    }
+    all.extend(crate::yardsticks::of_link(link, whole));
+    let first = held_frequencies_hz.first().zip(lumped_frequencies_hz.first());
+    all.extend(coarse("the matrices", first.map(|(hz, lumped)| lumped / hz - 1.0), None));
+    all
+}
+
+/// Returns the figures of the modal link, stored or made of the superelement; adds a doubt about
+/// the latter if its second-order terms are unknown.
+fn modal_figures(link: &ReducedLink, doubts: &mut Vec<Doubt>) -> Option<ModalFigures> {
+    let details = link.details.as_deref()?;
+    if let Some(stored) = &details.modal {
+        return Some(ModalFigures::from(stored));
+    }
+    let modal = ModalLink::from_superelement(&link.name, details.superelement.as_ref()?).ok()?;
+    if !modal.has_second_order() {
+        doubts.push(Doubt::from_message("second-order", SECOND_ORDER_UNKNOWN));
+    }
+    Some(ModalFigures::from(&modal))
+}
+
 /// Returns the mass under a translation of all interfaces along x, y, z.
 fn masses_along_axes(element: &Superelement) -> [f64; 3] {
     let n = element.boundary();
@@ -243,7 +254,34 @@ pub fn tables(summary: &ImportSummary) -> Vec<ReportTable> {
         vec!["displacement of B under 1 kN".into(), soft(0), soft(1), soft(2), "mm".into()],
         vec!["rotation of B under 1 kN m".into(), soft(3), soft(4), soft(5), "mrad".into()],
     ];
-    let c = &summary.checks;
+    let count = summary.frequencies_hz.len().max(summary.lumped_frequencies_hz.len());
+    let hz = |list: &[f64], k: usize| list.get(k).map_or_else(|| "-".into(), |x| format!("{x:.2}"));
+    let frequencies = (0..count)
+        .map(|k| vec![(k + 1).to_string(), hz(&summary.frequencies_hz, k), hz(&summary.lumped_frequencies_hz, k)])
+        .collect();
+    let mut tables = vec![
+        table(
+            "interfaces (m, rad, link frame)",
+            &["interface", "rows", "position", "roll, pitch, yaw", "from"],
+            interfaces,
+        ),
+        table(
+            "mass",
+            &["", "mass [kg]", "centre of mass [m]", "ixx, iyy, izz, ixy, ixz, iyz about it [kg m2]"],
+            masses,
+        ),
+        table("deflection of B along the load, A held", &["", "x", "y", "z", ""], softness),
+        matrix_table("stiffness K_BB at B, A held (N/m, N/rad; N m/m, N m/rad)", &summary.stiffness),
+        matrix_table("compliance C_BB at B, A held (m/N, m/(N m); rad/N, rad/(N m))", &summary.compliance),
+        table("checks", &["", "measured", "usual", ""], check_rows(&summary.checks)),
+        table("natural frequencies, A held, B free (Hz)", &["mode", "matrices", "two parts"], frequencies),
+    ];
+    tables.extend(summary.modal.as_ref().map(modal_table));
+    tables
+}
+
+/// Returns the checks with their usual values.
+fn check_rows(c: &ImportChecks) -> Vec<Vec<String>> {
     let limits = GateLimits::default();
     let below = |name: &str, value: f64, usual: f64| {
         let mark = if value <= usual { "ok" } else { "warn" };
@@ -262,38 +300,16 @@ pub fn tables(summary: &ImportSummary) -> Vec<ReportTable> {
         Some(error) => below("mass along x, y, z against the link", error, MASS_ERROR),
         None => vec!["mass".into(), "-".into(), "no mass matrix".into(), "-".into()],
     });
-    let count = summary.frequencies_hz.len().max(summary.lumped_frequencies_hz.len());
-    let hz = |list: &[f64], k: usize| list.get(k).map_or_else(|| "-".into(), |x| format!("{x:.2}"));
-    let frequencies = (0..count)
-        .map(|k| vec![(k + 1).to_string(), hz(&summary.frequencies_hz, k), hz(&summary.lumped_frequencies_hz, k)])
-        .collect();
+    checks
+}
+
+fn matrix_table(title: &'static str, M: &[[f64; 6]; 6]) -> ReportTable {
     let names = ["x", "y", "z", "rx", "ry", "rz"];
-    let matrix = |title, M: &[[f64; 6]; 6]| {
-        let row = |(row, name): (&[f64; 6], &str)| {
-            std::iter::once(name.to_owned()).chain(row.iter().map(|x| format!("{x:.6e}"))).collect()
-        };
-        let header: Vec<&str> = std::iter::once("").chain(names).collect();
-        ReportTable::new(title, &header, M.iter().zip(names).map(row).collect()).on_page()
+    let row = |(row, name): (&[f64; 6], &str)| {
+        std::iter::once(name.to_owned()).chain(row.iter().map(|x| format!("{x:.6e}"))).collect()
     };
-    let mut tables = vec![
-        table(
-            "interfaces (m, rad, link frame)",
-            &["interface", "rows", "position", "roll, pitch, yaw", "from"],
-            interfaces,
-        ),
-        table(
-            "mass",
-            &["", "mass [kg]", "centre of mass [m]", "ixx, iyy, izz, ixy, ixz, iyz about it [kg m2]"],
-            masses,
-        ),
-        table("deflection of B along the load, A held", &["", "x", "y", "z", ""], softness),
-        matrix("stiffness K_BB at B, A held (N/m, N/rad; N m/m, N m/rad)", &summary.stiffness),
-        matrix("compliance C_BB at B, A held (m/N, m/(N m); rad/N, rad/(N m))", &summary.compliance),
-        table("checks", &["", "measured", "usual", ""], checks),
-        table("natural frequencies, A held, B free (Hz)", &["mode", "matrices", "two parts"], frequencies),
-    ];
-    tables.extend(summary.modal.as_ref().map(modal_table));
-    tables
+    let header: Vec<&str> = std::iter::once("").chain(names).collect();
+    ReportTable::new(title, &header, M.iter().zip(names).map(row).collect()).on_page()
 }
 
 /// Returns the figures as a Markdown page.

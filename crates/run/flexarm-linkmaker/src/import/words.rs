@@ -94,6 +94,13 @@ impl ImportMap {
             Self::Nodes(list) => list.iter().map(|(name, choice)| (name.clone(), choice.to_string())).collect(),
         }
     }
+
+    pub(super) fn rows(&self) -> Option<&InterfaceMap> {
+        match self {
+            Self::Rows(map) => Some(map),
+            Self::Nodes(_) => None,
+        }
+    }
 }
 
 /// Splits at commas outside brackets.

@@ -206,6 +206,13 @@ fn differ(a: &Material, b: &Material) -> bool {
     [(a.E, b.E), (a.nu, b.nu), (a.rho, b.rho)].into_iter().any(|(a, b)| (a - b).abs() > 1e-6 * a.abs().max(b.abs()))
 }
 
+fn wanted_modes(job: &ReduceJob) -> ModesWanted {
+    match (job.modes, job.modes_up_to_hz) {
+        (_, Some(hz)) => ModesWanted::Below { omega2: (std::f64::consts::TAU * hz).powi(2), at_most: MOST_MODES },
+        (modes, None) => ModesWanted::Count(modes.unwrap_or(MODES)),
+    }
+}
+
 fn plan(
     job: &ReduceJob,
     file: &MeshFile,
@@ -213,10 +220,6 @@ fn plan(
     chosen: &[SelectedInterface],
     materials: &[RegionFigures],
 ) -> LinkPlan {
-    let modes = match (job.modes, job.modes_up_to_hz) {
-        (_, Some(hz)) => ModesWanted::Below { omega2: (std::f64::consts::TAU * hz).powi(2), at_most: MOST_MODES },
-        (modes, None) => ModesWanted::Count(modes.unwrap_or(MODES)),
-    };
     let split = match job.split.unwrap_or_default() {
         SplitChoice::ElasticCentre => SplitAt::ElasticCentre,
         SplitChoice::Mid => SplitAt::MidLength,
@@ -228,6 +231,29 @@ fn plan(
         OrderingChoice::Amd => Ordering::MinimumDegree,
         OrderingChoice::Nested => Ordering::NestedDissection,
     };
+    LinkPlan {
+        name: job.link_name(),
+        interfaces: chosen.iter().map(|one| one.interface.clone()).collect(),
+        assembly: AssemblyOptions::default(),
+        condensation: CondensationOptions { ordering },
+        modes: wanted_modes(job),
+        split,
+        chains: job.chains.clone().unwrap_or_default(),
+        attached: Vec::new(),
+        geometric: job.geometric.unwrap_or(false),
+        judged_modes: JUDGED_MODES,
+        limits: GateLimits::default(),
+        provenance: provenance(job, file, units, chosen, materials),
+    }
+}
+
+fn provenance(
+    job: &ReduceJob,
+    file: &MeshFile,
+    units: UnitSystem,
+    chosen: &[SelectedInterface],
+    materials: &[RegionFigures],
+) -> Provenance {
     let ties: Vec<&str> = chosen.iter().map(|one| one.interface.tie.name()).collect();
     let tie = match ties.as_slice() {
         [first, rest @ ..] if rest.iter().all(|tie| tie == first) => (*first).to_owned(),
@@ -239,9 +265,9 @@ fn plan(
     };
     let materials: Vec<String> = materials.iter().map(|m| format!("{}: {}", m.region, m.material.text)).collect();
     let mesh = job.mesh.file_name().unwrap_or_default().to_string_lossy();
-    let provenance = Provenance {
+    Provenance {
         source: format!("{mesh} ({})", file.format),
-        method: match modes {
+        method: match wanted_modes(job) {
             ModesWanted::Count(0) => "guyan".into(),
             _ => "craig-bampton".into(),
         },
@@ -255,20 +281,6 @@ fn plan(
             quadrature_name(job),
             if job.geometric == Some(true) { "; geometric stiffness" } else { "" }
         ),
-    };
-    LinkPlan {
-        name: job.link_name(),
-        interfaces: chosen.iter().map(|one| one.interface.clone()).collect(),
-        assembly: AssemblyOptions::default(),
-        condensation: CondensationOptions { ordering },
-        modes,
-        split,
-        chains: job.chains.clone().unwrap_or_default(),
-        attached: Vec::new(),
-        geometric: job.geometric.unwrap_or(false),
-        judged_modes: JUDGED_MODES,
-        limits: GateLimits::default(),
-        provenance,
     }
 }
 

@@ -4,7 +4,7 @@ use flexarm_fe_io::mesh::MeshFile;
 use flexarm_fem::chain::Chain;
 use flexarm_fem::mesh_gate::ModeCheck;
 use flexarm_fem::sparse::Ordering;
-use flexarm_fem::{Doubt, LinkPlan, Material, MeshReduction, ModalLink, RigidPart, UnitSystem};
+use flexarm_fem::{Doubt, LinkPlan, Material, MeshGate, MeshReduction, ModalLink, ReducedLink, RigidPart, UnitSystem};
 use flexarm_settings::Setting;
 use flexarm_settings::caveat::{self, Caveat};
 use nalgebra::{Matrix3, Matrix6};
@@ -124,6 +124,23 @@ pub struct InterfaceFigures {
     pub centroid_m: [f64; 3],
     /// Size of the bounding box of the nodes.
     pub extent_m: [f64; 3],
+}
+
+impl From<&SelectedInterface> for InterfaceFigures {
+    fn from(one: &SelectedInterface) -> Self {
+        let X = &one.interface.X_LI;
+        let (roll, pitch, yaw) = X.rotation.euler_angles();
+        Self {
+            name: one.interface.name.clone(),
+            selector: one.selector.to_string(),
+            nodes: one.interface.nodes.len(),
+            tie: one.interface.tie.name(),
+            position_m: X.translation.vector.into(),
+            rpy_rad: [roll, pitch, yaw],
+            centroid_m: one.centroid.into(),
+            extent_m: one.extent.into(),
+        }
+    }
 }
 
 /// A region with the material in use.
@@ -298,6 +315,30 @@ pub struct CheckFigures {
     pub order_ratios: Option<[f64; 6]>,
 }
 
+impl CheckFigures {
+    fn of(gate: &MeshGate, link: &ReducedLink) -> Self {
+        Self {
+            symmetry: gate.asymmetry,
+            rigid_body_residual: gate.rigid_body_residual,
+            mass_error: gate.mass_error,
+            com_error_m: gate.com_error_m,
+            inertia_error: gate.inertia_error,
+            block_identity: gate.block_identity,
+            zero_modes: gate.zero_modes,
+            min_eigenvalue: link.checks.min_eigenvalue,
+            condition: gate.condition,
+            mode_residual: gate.mode_residual,
+            jacobian_at_points: gate.quality.smallest_at_points,
+            jacobian_at_nodes: gate.quality.smallest_at_nodes,
+            worst_element: gate.quality.worst_element,
+            smallest_fullness: gate.quality.smallest_fullness,
+            largest_offset: gate.quality.largest_offset,
+            order_ratio: gate.order.map(|order| order.worst()),
+            order_ratios: gate.order.map(|order| order.compliance_ratio),
+        }
+    }
+}
+
 /// Figures of the linear solver.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct SolverFigures {
@@ -311,6 +352,19 @@ pub struct SolverFigures {
     pub ordering: &'static str,
     /// Total number of right-hand sides solved.
     pub right_hand_sides: usize,
+}
+
+impl From<&MeshReduction> for SolverFigures {
+    fn from(reduction: &MeshReduction) -> Self {
+        let factor = reduction.solver.factor;
+        Self {
+            unknowns: factor.size,
+            matrix_entries: factor.matrix_entries,
+            factor_entries: factor.factor_entries,
+            ordering: if factor.ordering == Ordering::MinimumDegree { "amd" } else { "nested" },
+            right_hand_sides: reduction.solves,
+        }
+    }
 }
 
 /// Time of each step (s).
@@ -341,48 +395,13 @@ pub(super) fn summary_of(
     let link = &reduction.link;
     let details = link.details.as_deref();
     let gate = details.and_then(|details| details.gate.as_ref());
-    let interface = |one: &SelectedInterface| {
-        let X = &one.interface.X_LI;
-        let (roll, pitch, yaw) = X.rotation.euler_angles();
-        InterfaceFigures {
-            name: one.interface.name.clone(),
-            selector: one.selector.to_string(),
-            nodes: one.interface.nodes.len(),
-            tie: one.interface.tie.name(),
-            position_m: X.translation.vector.into(),
-            rpy_rad: [roll, pitch, yaw],
-            centroid_m: one.centroid.into(),
-            extent_m: one.extent.into(),
-        }
-    };
-    let checks = gate.map_or_else(CheckFigures::default, |gate| CheckFigures {
-        symmetry: gate.asymmetry,
-        rigid_body_residual: gate.rigid_body_residual,
-        mass_error: gate.mass_error,
-        com_error_m: gate.com_error_m,
-        inertia_error: gate.inertia_error,
-        block_identity: gate.block_identity,
-        zero_modes: gate.zero_modes,
-        min_eigenvalue: link.checks.min_eigenvalue,
-        condition: gate.condition,
-        mode_residual: gate.mode_residual,
-        jacobian_at_points: gate.quality.smallest_at_points,
-        jacobian_at_nodes: gate.quality.smallest_at_nodes,
-        worst_element: gate.quality.worst_element,
-        smallest_fullness: gate.quality.smallest_fullness,
-        largest_offset: gate.quality.largest_offset,
-        order_ratio: gate.order.map(|order| order.worst()),
-        order_ratios: gate.order.map(|order| order.compliance_ratio),
-    });
     let modes: Vec<_> = gate.map_or_else(Vec::new, |gate| gate.modes.iter().map(ModeFigures::from).collect());
-    let coarse =
-        modes.first().map_or_else(Vec::new, |first| coarse("the mesh", first.lumped_error, first.reduced_error));
-    let own = yardsticks::of_link(link, &reduction.whole);
-    let doubts =
-        reduction.doubts.iter().cloned().chain(coarse).chain(own).chain(spreads(chosen, file.mesh.nodes.len()));
-    let caveats: Vec<Caveat> = doubts.map(|doubt| doubted(&link.name, doubt)).collect();
+    let mut doubts = reduction.doubts.clone();
+    doubts.extend(modes.first().iter().flat_map(|m| coarse("the mesh", m.lumped_error, m.reduced_error)));
+    doubts.extend(yardsticks::of_link(link, &reduction.whole));
+    doubts.extend(spreads(chosen, file.mesh.nodes.len()));
+    let caveats: Vec<Caveat> = doubts.into_iter().map(|doubt| doubted(&link.name, doubt)).collect();
     let kept = reduction.fixed_modes.len();
-    let factor = reduction.solver.factor;
     ReduceSummary {
         link: link.name.clone(),
         mesh: job.mesh.display().to_string(),
@@ -398,7 +417,7 @@ pub(super) fn summary_of(
         nodes: file.mesh.nodes.len(),
         elements: file.mesh.element_count(),
         dofs: reduction.solver.dofs,
-        interfaces: chosen.iter().map(interface).collect(),
+        interfaces: chosen.iter().map(InterfaceFigures::from).collect(),
         mass_kg: reduction.whole.mass,
         com_m: reduction.whole.com.into(),
         inertia: rows3(&reduction.whole.inertia),
@@ -413,14 +432,8 @@ pub(super) fn summary_of(
         fixed_interface_hz: reduction.fixed_modes.frequencies_hz(),
         modal: details.and_then(|details| details.modal.as_ref()).map(ModalFigures::from),
         modes,
-        checks,
-        solver: SolverFigures {
-            unknowns: factor.size,
-            matrix_entries: factor.matrix_entries,
-            factor_entries: factor.factor_entries,
-            ordering: if factor.ordering == Ordering::MinimumDegree { "amd" } else { "nested" },
-            right_hand_sides: reduction.solves,
-        },
+        checks: gate.map(|gate| CheckFigures::of(gate, link)).unwrap_or_default(),
+        solver: SolverFigures::from(reduction),
         phases: PhaseFigures::default(),
         wall_s: 0.0,
         cpu_s: 0.0,

@@ -495,6 +495,42 @@ fn chi_square_bound(freedom: usize) -> f64 {
     (1.0 - nine + MISFIT_QUANTILE * nine.sqrt()).powi(3)
 }
 
+/// Returns the estimates of the parameters.
+///
+/// * `scatter`: ratio of the deviations to those of the solution; NaN if the model does not fit.
+fn estimates(parameters: &[Parameter], solution: &Solution, scatter: f64) -> Vec<ParameterEstimate> {
+    let V = solution.directions.columns(0, solution.identified);
+    let share = |k: usize| 1.0 - V.row(k).norm_squared();
+    let estimate = |(k, parameter): (usize, &Parameter)| {
+        let spread = solution.covariance[(k, k)].sqrt();
+        // The search judges directions before the prior is dropped; at the solution the data may
+        // determine them less well, hence the second condition.
+        let identifiable = share(k) <= UNTOLD && spread <= parameter.reference();
+        let (x, std) = (solution.unknowns[k], if identifiable { spread * scatter } else { f64::NAN });
+        ParameterEstimate {
+            name: parameter.name.clone(),
+            unit: parameter.unit.clone(),
+            initial: parameter.initial,
+            value: if identifiable { parameter.value(x) } else { parameter.initial },
+            std: parameter.deviation(x, std),
+            interval: parameter.interval(x, std, 1.96),
+            identifiable,
+        }
+    };
+    parameters.iter().enumerate().map(estimate).collect()
+}
+
+/// Returns the directions that are not identified as parameters and weights, largest weight first.
+fn untold(solution: &Solution) -> Vec<Vec<(usize, f64)>> {
+    let combination = |j: usize| {
+        let column = solution.directions.column(j);
+        let mut parts: Vec<(usize, f64)> = column.iter().copied().enumerate().filter(|(_, w)| w.abs() > 0.2).collect();
+        parts.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
+        parts
+    };
+    (solution.identified..solution.directions.ncols()).map(combination).collect()
+}
+
 fn summarise(
     parameters: &[Parameter],
     measurements: &Measurements,
@@ -511,57 +547,25 @@ fn summarise(
         false => f64::INFINITY,
     };
     let fits = misfit.is_none_or(|factor| factor <= NO_FIT);
-    let V = solution.directions.columns(0, solution.identified);
-    let share = |k: usize| 1.0 - V.row(k).norm_squared();
-    let found = parameters.iter().enumerate().map(|(k, parameter)| {
-        let spread = solution.covariance[(k, k)].sqrt();
-        // The search judges directions before the prior is dropped; at the solution the data may
-        // determine them less well, hence the second condition.
-        let identifiable = share(k) <= UNTOLD && spread <= parameter.reference();
-        let (x, std) = (solution.unknowns[k], if identifiable && fits { spread * scatter } else { f64::NAN });
-        ParameterEstimate {
-            name: parameter.name.clone(),
-            unit: parameter.unit.clone(),
-            initial: parameter.initial,
-            value: if identifiable { parameter.value(x) } else { parameter.initial },
-            std: parameter.deviation(x, std),
-            interval: parameter.interval(x, std, 1.96),
-            identifiable,
-        }
-    });
-    let found: Vec<ParameterEstimate> = found.collect();
+    solution.converged &= fits;
     let C = &solution.covariance;
     let correlation = DMatrix::from_fn(p, p, |i, j| C[(i, j)] / (C[(i, i)] * C[(j, j)]).sqrt());
-    let untold = (solution.identified..p).map(|j| {
-        let column = solution.directions.column(j);
-        let mut parts: Vec<(usize, f64)> = column.iter().copied().enumerate().filter(|(_, w)| w.abs() > 0.2).collect();
-        parts.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
-        parts
-    });
-    let untold = untold.collect();
-    let normalised: Vec<f64> = solution
-        .residuals
-        .iter()
-        .zip(solution.leverages.iter())
-        .map(|(r, h)| r / (scatter * (1.0 - h).max(1e-6).sqrt()))
-        .collect();
+    let over_own = |(r, h): (&f64, &f64)| r / (scatter * (1.0 - h).max(1e-6).sqrt());
+    let normalised: Vec<f64> = solution.residuals.iter().zip(solution.leverages.iter()).map(over_own).collect();
     let mut suspicious: Vec<usize> = (0..normalised.len()).filter(|k| normalised[*k].abs() > SUSPICIOUS).collect();
     suspicious.sort_by(|a, b| normalised[*b].abs().total_cmp(&normalised[*a].abs()));
-    solution.converged &= fits;
     let own = &solution.unknowns.as_slice()[p..];
-    let instruments = (0..measurements.instruments.len()).map(|k| measurements.instrument(k, own).0).collect();
-    let targets = (0..measurements.targets.len()).map(|k| measurements.target(k, own).0).collect();
     Identified {
-        parameters: found,
+        parameters: estimates(parameters, &solution, if fits { scatter } else { f64::NAN }),
         correlation,
-        untold,
+        untold: untold(&solution),
         before,
         normalised,
         suspicious,
         misfit,
         held_out,
-        instruments,
-        targets,
+        instruments: (0..measurements.instruments.len()).map(|k| measurements.instrument(k, own).0).collect(),
+        targets: (0..measurements.targets.len()).map(|k| measurements.target(k, own).0).collect(),
         solution,
     }
 }

@@ -149,12 +149,13 @@ pub fn solve<P: Residuals>(
     let prior = DVector::from_column_slice(prior);
     let n = start.len();
     // Phase 1: all parameters are regularised by the prior.
-    let held = descend(problem, &DMatrix::identity(n, n), start.clone(), Some(&prior), search)?;
+    let free = DMatrix::identity(n, n);
+    let held = descend(&Slope { problem, basis: &free, prior: Some(&prior), search }, start.clone())?;
     // Phase 2: without the prior, along the identified directions.
     let known = Identifiability::of(&held, &prior)?;
     let begin = known.projected(&held.unknowns, &prior);
     let basis = known.basis(&prior, n);
-    let mut found = descend(problem, &basis, begin, None, search)?;
+    let mut found = descend(&Slope { problem, basis: &basis, prior: None, search }, begin)?;
     found.iterations += held.iterations;
     Ok(finish(found, known, &basis, &prior, search.loss))
 }
@@ -169,83 +170,114 @@ struct Descent {
     converged: bool,
 }
 
-/// Runs the Levenberg-Marquardt method along the columns of `basis`. The weights of the loss are
-/// updated in every iteration.
-fn descend<P: Residuals>(
-    problem: &P,
-    basis: &DMatrix<f64>,
-    start: DVector<f64>,
-    prior: Option<&DVector<f64>>,
-    search: &Search,
-) -> Result<Descent, SolveError<P::Error>> {
-    let weights_of = |r: &DVector<f64>| r.map(|r| search.loss.weight(r));
-    let held = |x: &DVector<f64>| prior.map_or(0.0, |p| p.iter().zip(x.iter()).map(|(p, x)| (x / p).powi(2)).sum());
-    let cost_of =
-        |r: &DVector<f64>, x: &DVector<f64>| -> f64 { r.iter().map(|r| search.loss.cost(*r)).sum::<f64>() + held(x) };
-    let mut J = DMatrix::zeros(0, 0);
-    let mut x = start;
-    let mut r = problem.evaluate(&x, Some(&mut J)).map_err(SolveError::Model)?;
-    let mut cost = cost_of(&r, &x);
-    if !cost.is_finite() || J.iter().any(|x| !x.is_finite()) {
-        return Err(SolveError::NotFinite);
+/// Search along the columns of a basis, with or without a prior.
+struct Slope<'a, P> {
+    problem: &'a P,
+    basis: &'a DMatrix<f64>,
+    prior: Option<&'a DVector<f64>>,
+    search: &'a Search,
+}
+
+impl<P: Residuals> Slope<'_, P> {
+    fn weights(&self, r: &DVector<f64>) -> DVector<f64> {
+        r.map(|r| self.search.loss.weight(r))
     }
-    let (mut damping, mut iterations, mut converged) = (1e-4, 0, basis.ncols() == 0);
-    while iterations < search.most_iterations && !converged {
-        iterations += 1;
-        let w = weights_of(&r);
-        // Normal equations of the weighted problem in coordinates along the basis.
-        let B = &J * basis;
+
+    /// Returns twice the cost of the residuals and of the distance from the prior.
+    fn cost(&self, r: &DVector<f64>, x: &DVector<f64>) -> f64 {
+        let held = self.prior.map_or(0.0, |p| p.iter().zip(x.iter()).map(|(p, x)| (x / p).powi(2)).sum());
+        r.iter().map(|r| self.search.loss.cost(*r)).sum::<f64>() + held
+    }
+
+    /// Evaluates residuals, derivatives and cost.
+    fn evaluate(&self, x: &DVector<f64>, J: &mut DMatrix<f64>) -> Result<(DVector<f64>, f64), SolveError<P::Error>> {
+        let r = self.problem.evaluate(x, Some(&mut *J)).map_err(SolveError::Model)?;
+        let cost = self.cost(&r, x);
+        match J.iter().all(|x| x.is_finite()) {
+            true => Ok((r, cost)),
+            false => Err(SolveError::NotFinite),
+        }
+    }
+
+    /// Returns matrix and right-hand side of the normal equations of the weighted problem in
+    /// coordinates along the basis.
+    fn normal_equations(&self, x: &DVector<f64>, r: &DVector<f64>, J: &DMatrix<f64>) -> (DMatrix<f64>, DVector<f64>) {
+        let w = self.weights(r);
+        let B = J * self.basis;
         let weighted = DMatrix::from_fn(B.nrows(), B.ncols(), |i, j| w[i] * B[(i, j)]);
         let mut normal = B.tr_mul(&weighted);
-        let mut gradient = weighted.tr_mul(&r);
-        if let Some(prior) = prior {
+        let mut gradient = weighted.tr_mul(r);
+        if let Some(prior) = self.prior {
             for (k, p) in prior.iter().enumerate() {
                 normal[(k, k)] += 1.0 / (p * p);
                 gradient[k] += x[k] / (p * p);
             }
         }
+        (normal, gradient)
+    }
+
+    /// Increases the damping until a step does not increase the cost. Returns the new unknowns if
+    /// there are any, and whether the last step was below the tolerance.
+    fn damped_step(
+        &self,
+        x: &DVector<f64>,
+        cost: f64,
+        (normal, gradient): &(DMatrix<f64>, DVector<f64>),
+        damping: &mut f64,
+    ) -> (Option<DVector<f64>>, bool) {
         let diagonal = normal.diagonal();
-        // Increases the damping until a step does not increase the cost.
-        let mut better = false;
         for _ in 0..12 {
             let mut damped = normal.clone();
             for (k, d) in diagonal.iter().enumerate() {
-                damped[(k, k)] += damping * d.max(f64::MIN_POSITIVE);
+                damped[(k, k)] += *damping * d.max(f64::MIN_POSITIVE);
             }
             let Some(factor) = damped.cholesky() else {
-                damping = (damping * 10.0).max(1e-10);
+                *damping = (*damping * 10.0).max(1e-10);
                 continue;
             };
-            let step = factor.solve(&gradient);
-            let moved = &x - basis * &step;
-            let tried = problem.evaluate(&moved, None);
+            let step = factor.solve(gradient);
+            let moved = x - self.basis * &step;
+            let tried = self.problem.evaluate(&moved, None);
             let size = step.iter().zip(diagonal.iter()).map(|(s, d)| s.abs() * d.sqrt()).fold(0.0, f64::max);
+            let settled = size <= self.search.tolerance;
             match tried {
-                Ok(found) if cost_of(&found, &moved) <= cost * (1.0 + 1e-14) => {
-                    converged = size <= search.tolerance;
-                    (x, better) = (moved, true);
-                    damping = (damping * 0.1).max(1e-12);
-                    break;
+                Ok(found) if self.cost(&found, &moved) <= cost * (1.0 + 1e-14) => {
+                    *damping = (*damping * 0.1).max(1e-12);
+                    return (Some(moved), settled);
                 }
                 // Converged to rounding.
-                _ if size <= search.tolerance => {
-                    converged = true;
-                    break;
-                }
-                _ => damping = (damping * 10.0).max(1e-10),
+                _ if settled => return (None, true),
+                _ => *damping = (*damping * 10.0).max(1e-10),
             }
         }
-        if better {
-            r = problem.evaluate(&x, Some(&mut J)).map_err(SolveError::Model)?;
-            cost = cost_of(&r, &x);
-            if J.iter().any(|x| !x.is_finite()) {
-                return Err(SolveError::NotFinite);
+        (None, false)
+    }
+}
+
+/// Runs the Levenberg-Marquardt method. The weights of the loss are updated in every iteration.
+fn descend<P: Residuals>(slope: &Slope<'_, P>, start: DVector<f64>) -> Result<Descent, SolveError<P::Error>> {
+    let mut J = DMatrix::zeros(0, 0);
+    let mut x = start;
+    let (mut r, mut cost) = slope.evaluate(&x, &mut J)?;
+    if !cost.is_finite() {
+        return Err(SolveError::NotFinite);
+    }
+    let (mut damping, mut iterations, mut converged) = (1e-4, 0, slope.basis.ncols() == 0);
+    while iterations < slope.search.most_iterations && !converged {
+        iterations += 1;
+        let equations = slope.normal_equations(&x, &r, &J);
+        let (better, settled) = slope.damped_step(&x, cost, &equations, &mut damping);
+        converged = settled;
+        match better {
+            Some(better) => {
+                x = better;
+                (r, cost) = slope.evaluate(&x, &mut J)?;
             }
-        } else if !converged {
-            break;
+            None if !converged => break,
+            None => {}
         }
     }
-    let weights = weights_of(&r);
+    let weights = slope.weights(&r);
     Ok(Descent { unknowns: x, residuals: r, weights, J, iterations, converged })
 }
 

@@ -1,5 +1,6 @@
 //! Displacements from one load to another.
 
+use std::ops::Range;
 use std::path::PathBuf;
 
 use crate::estimation::{Component, Reading, ReadingKind, Row};
@@ -71,6 +72,9 @@ struct FileDisplacement {
 const COLUMNS: [&str; 15] =
     ["px", "py", "pz", "dx", "dy", "dz", "rx", "ry", "rz", "d", "ux", "uy", "uz", "std", "std_rotation"];
 
+/// Axes of the measured components.
+const AXES: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+
 impl Reader<'_> {
     pub(super) fn displacement(&mut self, number: usize, entry: &Spanned<DisplacementEntry>) -> Result<(), Error> {
         let e = entry.get_ref();
@@ -125,54 +129,13 @@ impl Reader<'_> {
     /// Adds one displacement.
     fn moved(&mut self, entry: &Spanned<DisplacementEntry>, said: FileDisplacement) -> Result<(), Error> {
         let (e, span) = (entry.get_ref(), entry.span());
-        let FileDisplacement { name, q, load, point, value, direction, rotation, std, std_rotation } = said;
-        let mut rows = Vec::new();
-        let sigma = self.std(std.as_ref(), self.units.length)?;
+        let sigma = self.std(said.std.as_ref(), self.units.length)?;
         let instrument =
             e.instrument.as_ref().map(|name| self.chosen("instrument", Some(name), &self.instruments, &span));
         let instrument = instrument.transpose()?;
-        let along = |d: Vector3<f64>| instrument.map_or(Component::Along(d), |k| Component::AlongSeen(k, d));
-        let about = |d: Vector3<f64>| instrument.map_or(Component::About(d), |k| Component::AboutSeen(k, d));
-        let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
-        match (value, &direction) {
-            (Some(Measured::One(value)), Some(direction)) => {
-                let d = Vector3::from(*direction.get_ref());
-                let d = d.try_normalize(1e-9).filter(|v| v.iter().all(|x| x.is_finite()));
-                let d = d.ok_or_else(|| self.error(direction.span(), "direction has zero length"))?;
-                rows.push(Row { of: along(d), value: value * self.units.length, std: sigma });
-            }
-            (Some(Measured::One(_)), None) => {
-                let text = "a single value needs its direction: add direction = [x, y, z] in world axes, or in those \
-                            of its instrument";
-                return Err(self.error(span, text));
-            }
-            (Some(Measured::Three(_)), Some(direction)) => {
-                let text = "three numbers are components along x, y and z: remove direction";
-                return Err(self.error(direction.span(), text));
-            }
-            (Some(Measured::Three(d)), None) => rows.extend(
-                axes.iter()
-                    .zip(d)
-                    .filter_map(|(axis, d)| Some(Row { of: along(*axis), value: d? * self.units.length, std: sigma })),
-            ),
-            (None, _) if rotation.is_some() => {}
-            (None, _) => {
-                return Err(self.error(span, format!("{name}: there is no measured value: add value = [dx, dy, dz]")));
-            }
-        }
-        if let Some(turn) = rotation {
-            let given = std_rotation.is_some();
-            if given != std.is_some() && value.is_some() {
-                let text = "displacements and rotations have different units: give both std and std_rotation";
-                return Err(self.error(span, text));
-            }
-            let sigma = self.std(std_rotation.as_ref(), self.units.angle)?;
-            rows.extend(
-                axes.iter()
-                    .zip(turn)
-                    .filter_map(|(axis, d)| Some(Row { of: about(*axis), value: d? * self.units.angle, std: sigma })),
-            );
-        }
+        let mut rows = self.translations(&said, instrument, sigma, &span)?;
+        rows.extend(self.rotations(&said, instrument, &span)?);
+        let FileDisplacement { name, q, load, point, value, rotation, std, std_rotation, .. } = said;
         if let Some(bad) = rows.iter().find(|row| !row.value.is_finite()) {
             return Err(self.error(span, format!("{name}: found {}, expected a finite number", bad.value)));
         }
@@ -188,5 +151,65 @@ impl Reader<'_> {
         self.given.push((what, std.is_some() || (value.is_none() && std_rotation.is_some()), span));
         self.measurements.readings.push(Reading { name, q, kind });
         Ok(())
+    }
+
+    /// Returns the measured translations: one along a direction, or the measured components.
+    fn translations(
+        &self,
+        said: &FileDisplacement,
+        instrument: Option<usize>,
+        std: f64,
+        span: &Range<usize>,
+    ) -> Result<Vec<Row<Component>>, Error> {
+        let row = |d: Vector3<f64>, value: f64| {
+            let of = instrument.map_or(Component::Along(d), |k| Component::AlongSeen(k, d));
+            Row { of, value: value * self.units.length, std }
+        };
+        match (said.value, &said.direction) {
+            (Some(Measured::One(value)), Some(direction)) => {
+                let d = Vector3::from(*direction.get_ref());
+                let d = d.try_normalize(1e-9).filter(|v| v.iter().all(|x| x.is_finite()));
+                let d = d.ok_or_else(|| self.error(direction.span(), "direction has zero length"))?;
+                Ok(vec![row(d, value)])
+            }
+            (Some(Measured::One(_)), None) => {
+                let text = "a single value needs its direction: add direction = [x, y, z] in world axes, or in those \
+                            of its instrument";
+                Err(self.error(span.clone(), text))
+            }
+            (Some(Measured::Three(_)), Some(direction)) => {
+                let text = "three numbers are components along x, y and z: remove direction";
+                Err(self.error(direction.span(), text))
+            }
+            (Some(Measured::Three(d)), None) => {
+                Ok(AXES.into_iter().zip(d).filter_map(|(axis, d)| Some(row(axis.into(), d?))).collect())
+            }
+            (None, _) if said.rotation.is_some() => Ok(Vec::new()),
+            (None, _) => {
+                let text = format!("{}: there is no measured value: add value = [dx, dy, dz]", said.name);
+                Err(self.error(span.clone(), text))
+            }
+        }
+    }
+
+    /// Returns the measured rotations.
+    fn rotations(
+        &self,
+        said: &FileDisplacement,
+        instrument: Option<usize>,
+        span: &Range<usize>,
+    ) -> Result<Vec<Row<Component>>, Error> {
+        let Some(turn) = said.rotation else { return Ok(Vec::new()) };
+        if said.std_rotation.is_some() != said.std.is_some() && said.value.is_some() {
+            let text = "displacements and rotations have different units: give both std and std_rotation";
+            return Err(self.error(span.clone(), text));
+        }
+        let std = self.std(said.std_rotation.as_ref(), self.units.angle)?;
+        let row = |(axis, angle): ([f64; 3], Option<f64>)| {
+            let d = Vector3::from(axis);
+            let of = instrument.map_or(Component::About(d), |k| Component::AboutSeen(k, d));
+            Some(Row { of, value: angle? * self.units.angle, std })
+        };
+        Ok(AXES.into_iter().zip(turn).filter_map(row).collect())
     }
 }

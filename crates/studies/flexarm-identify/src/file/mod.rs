@@ -145,34 +145,14 @@ pub(super) fn read(path: &Path, cell: &Cell<'_>) -> Result<MeasurementInput, Err
         measurements: Measurements::default(),
         given: Vec::new(),
     };
-    reader.frames(&file.instrument, &file.target)?;
-    for (k, entry) in file.displacement.iter().enumerate() {
-        reader.displacement(k, entry)?;
-    }
-    for (k, entry) in file.place.iter().enumerate() {
-        reader.place(k, entry)?;
-    }
-    for (k, entry) in file.frequency.iter().enumerate() {
-        reader.frequency(k, entry)?;
-    }
-    for entry in &file.response {
-        reader.response(&file.node, entry)?;
-    }
-    for (k, entry) in file.shape.iter().enumerate() {
-        reader.shape(&file.node, k, entry)?;
-    }
-    reader.settle_frames(&file.instrument, &file.target)?;
+    reader.readings(&file)?;
     let recordings = file.encoders.iter().map(|entry| reader.encoders(entry)).collect::<Result<Vec<_>, Error>>()?;
     let deviations_known = reader.deviations(!recordings.is_empty())?;
     let given =
         |list: &[Spanned<String>]| list.iter().map(|p| (p.get_ref().clone(), source.error(p.span(), ""))).collect();
-    let positive = |value: &Spanned<f64>, least: f64| match *value.get_ref() {
-        x if x.is_finite() && x > least => Ok(x),
-        x => Err(source.error(value.span(), format!("uncertainty is {x}, expected a number above {least}"))),
-    };
     let known = file.parameter.iter().map(|entry| {
         let place = source.error(entry.name.span(), "");
-        Ok((entry.name.get_ref().clone(), positive(&entry.uncertainty, 0.0)?, place))
+        Ok((entry.name.get_ref().clone(), uncertainty(&entry.uncertainty, 0.0, &source)?, place))
     });
     Ok(MeasurementInput {
         instruments: reader.instruments,
@@ -181,7 +161,7 @@ pub(super) fn read(path: &Path, cell: &Cell<'_>) -> Result<MeasurementInput, Err
         recordings,
         fit: given(&file.fit),
         keep: given(&file.keep),
-        uncertainty: file.uncertainty.as_ref().map(|value| positive(value, 1.0)).transpose()?,
+        uncertainty: file.uncertainty.as_ref().map(|value| uncertainty(value, 1.0, &source)).transpose()?,
         known: known.collect::<Result<_, RobotFileError>>()?,
         loss: loss(&file.loss, &source)?,
         deviations_known,
@@ -189,6 +169,14 @@ pub(super) fn read(path: &Path, cell: &Cell<'_>) -> Result<MeasurementInput, Err
         length_m,
         angle_rad: units.angle,
     })
+}
+
+/// Returns an uncertainty above a minimum.
+fn uncertainty(value: &Spanned<f64>, above: f64, source: &Source) -> Result<f64, RobotFileError> {
+    match *value.get_ref() {
+        x if x.is_finite() && x > above => Ok(x),
+        x => Err(source.error(value.span(), format!("uncertainty is {x}, expected a number above {above}"))),
+    }
 }
 
 fn unit(
@@ -233,6 +221,27 @@ pub(super) struct Reader<'a> {
 impl Reader<'_> {
     pub(super) fn error(&self, span: Range<usize>, message: impl Into<String>) -> Error {
         self.source.error(span, message).into()
+    }
+
+    /// Adds all readings of the file, with their instruments and targets.
+    fn readings(&mut self, file: &MeasurementFile) -> Result<(), Error> {
+        self.frames(&file.instrument, &file.target)?;
+        for (k, entry) in file.displacement.iter().enumerate() {
+            self.displacement(k, entry)?;
+        }
+        for (k, entry) in file.place.iter().enumerate() {
+            self.place(k, entry)?;
+        }
+        for (k, entry) in file.frequency.iter().enumerate() {
+            self.frequency(k, entry)?;
+        }
+        for entry in &file.response {
+            self.response(&file.node, entry)?;
+        }
+        for (k, entry) in file.shape.iter().enumerate() {
+            self.shape(&file.node, k, entry)?;
+        }
+        self.settle_frames(&file.instrument, &file.target)
     }
 
     /// Whether standard deviations are given. All readings must give one or none; all must if kinds

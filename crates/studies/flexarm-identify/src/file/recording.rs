@@ -56,85 +56,6 @@ const EDGE_S: f64 = 0.4;
 /// Maximum relative deviation of a time step from the mean.
 const UNEVEN: f64 = 0.01;
 
-impl Reader<'_> {
-    pub(super) fn encoders(&self, entry: &Spanned<EncodersEntry>) -> Result<EncoderRecording, Error> {
-        let e = entry.get_ref();
-        let path = self.folder.join(e.file.get_ref());
-        if !path.is_file() {
-            let message = format!("file = {:?}: there is no file {}", e.file.get_ref(), path.display());
-            return Err(self.error(e.file.span(), message));
-        }
-        let table = NumberTable::read(&path)?;
-        let column = |name: &str, span: Range<usize>| -> Result<Vec<f64>, Error> {
-            let k = table.column(name).ok_or_else(|| {
-                self.error(span.clone(), format!("{} has no column {name:?}; it has {:?}", path.display(), table.names))
-            })?;
-            let values: Vec<f64> = table.rows.iter().map(|row| row[k]).collect();
-            match values.iter().position(|x| !x.is_finite()) {
-                Some(row) => {
-                    let line = table.lines[row];
-                    Err(self.error(span, format!("{} line {line}: column {name:?} is empty", path.display())))
-                }
-                None => Ok(values),
-            }
-        };
-        let time = column(e.time.get_ref(), e.time.span())?;
-        let step_s = even_step(&time).ok_or_else(|| {
-            self.error(
-                e.time.span(),
-                format!("the times of {} are not evenly spaced, or there are fewer than three", path.display()),
-            )
-        })?;
-        let Units { length, angle, force } = self.units;
-        let of = |map: &Spanned<BTreeMap<String, String>>,
-                  needed: bool,
-                  units: [f64; 2]|
-         -> Result<Vec<Option<Vec<f64>>>, Error> {
-            let names: Vec<&str> = self.cell.joints.iter().map(|(name, _)| name.as_str()).collect();
-            if let Some(stray) = map.get_ref().keys().find(|name| !names.contains(&name.as_str())) {
-                return Err(
-                    self.error(map.span(), format!("the robot has no joint {stray:?}; its joints are {names:?}"))
-                );
-            }
-            let one = |(name, slides): &(String, bool)| match map.get_ref().get(name) {
-                Some(own) => {
-                    let factor = units[usize::from(*slides)];
-                    Ok(Some(column(own, map.span())?.into_iter().map(|x| x * factor).collect()))
-                }
-                None if needed => {
-                    Err(self.error(map.span(), format!("joint {name:?} has no column: the torques need all joints")))
-                }
-                None => Ok(None),
-            };
-            self.cell.joints.iter().map(one).collect()
-        };
-        let positive = |value: &Option<Spanned<f64>>, what: &str, default: f64| match value {
-            None => Ok(default),
-            Some(x) if x.get_ref().is_finite() && *x.get_ref() >= 0.0 => Ok(*x.get_ref()),
-            Some(x) => Err(self.error(x.span(), format!("{what} is {}, expected a non-negative number", x.get_ref()))),
-        };
-        let link = of(&e.link, false, [angle, length])?;
-        if link.iter().all(Option::is_none) {
-            return Err(self.error(e.link.span(), "no joint has an encoder on the link side of its gear"));
-        }
-        let mut motor: Vec<Vec<f64>> = of(&e.motor, true, [angle, length])?.into_iter().flatten().collect();
-        self.behind_coupling(e, &mut motor)?;
-        let torque = match &e.torque {
-            Some(torque) => of(torque, false, [force * length, force])?,
-            None => vec![None; motor.len()],
-        };
-        Ok(EncoderRecording {
-            place: self.source.error(entry.span(), ""),
-            step_s,
-            motor,
-            link,
-            torque,
-            below_hz: positive(&e.below, "below", BELOW_HZ)?,
-            edge_s: positive(&e.edge, "edge", EDGE_S)?,
-        })
-    }
-}
-
 /// Returns the step of evenly spaced times (s); `None` if they are not even.
 fn even_step(time: &[f64]) -> Option<f64> {
     let n = time.len();
@@ -146,7 +67,103 @@ fn even_step(time: &[f64]) -> Option<f64> {
     (step > 0.0 && even).then_some(step)
 }
 
+/// Table of a recording.
+struct RecordingTable<'a> {
+    reader: &'a Reader<'a>,
+    path: PathBuf,
+    table: NumberTable,
+}
+
+impl RecordingTable<'_> {
+    /// Returns a column, all of whose cells must have a value.
+    fn column(&self, name: &str, span: Range<usize>) -> Result<Vec<f64>, Error> {
+        let Self { reader, path, table } = self;
+        let k = table.column(name).ok_or_else(|| {
+            reader.error(span.clone(), format!("{} has no column {name:?}; it has {:?}", path.display(), table.names))
+        })?;
+        let values: Vec<f64> = table.rows.iter().map(|row| row[k]).collect();
+        match values.iter().position(|x| !x.is_finite()) {
+            Some(row) => {
+                let line = table.lines[row];
+                Err(reader.error(span, format!("{} line {line}: column {name:?} is empty", path.display())))
+            }
+            None => Ok(values),
+        }
+    }
+
+    /// Returns the columns of the joints in SI units.
+    ///
+    /// * `needed`: whether each joint must have a column.
+    /// * `units`: units for joints that turn and for joints that slide.
+    fn joints(
+        &self,
+        map: &Spanned<BTreeMap<String, String>>,
+        needed: bool,
+        units: [f64; 2],
+    ) -> Result<Vec<Option<Vec<f64>>>, Error> {
+        let joints = self.reader.cell.joints;
+        let fault = |message: String| self.reader.error(map.span(), message);
+        let names: Vec<&str> = joints.iter().map(|(name, _)| name.as_str()).collect();
+        if let Some(stray) = map.get_ref().keys().find(|name| !names.contains(&name.as_str())) {
+            return Err(fault(format!("the robot has no joint {stray:?}; its joints are {names:?}")));
+        }
+        let one = |(name, slides): &(String, bool)| match map.get_ref().get(name) {
+            Some(own) => {
+                let factor = units[usize::from(*slides)];
+                Ok(Some(self.column(own, map.span())?.into_iter().map(|x| x * factor).collect()))
+            }
+            None if needed => Err(fault(format!("joint {name:?} has no column: the torques need all joints"))),
+            None => Ok(None),
+        };
+        joints.iter().map(one).collect()
+    }
+}
+
 impl Reader<'_> {
+    pub(super) fn encoders(&self, entry: &Spanned<EncodersEntry>) -> Result<EncoderRecording, Error> {
+        let e = entry.get_ref();
+        let path = self.folder.join(e.file.get_ref());
+        if !path.is_file() {
+            let message = format!("file = {:?}: there is no file {}", e.file.get_ref(), path.display());
+            return Err(self.error(e.file.span(), message));
+        }
+        let table = RecordingTable { reader: self, table: NumberTable::read(&path)?, path };
+        let time = table.column(e.time.get_ref(), e.time.span())?;
+        let step_s = even_step(&time).ok_or_else(|| {
+            let path = table.path.display();
+            let text = format!("the times of {path} are not evenly spaced, or there are fewer than three");
+            self.error(e.time.span(), text)
+        })?;
+        let Units { length, angle, force } = self.units;
+        let link = table.joints(&e.link, false, [angle, length])?;
+        if link.iter().all(Option::is_none) {
+            return Err(self.error(e.link.span(), "no joint has an encoder on the link side of its gear"));
+        }
+        let mut motor: Vec<Vec<f64>> = table.joints(&e.motor, true, [angle, length])?.into_iter().flatten().collect();
+        self.behind_coupling(e, &mut motor)?;
+        let torque = match &e.torque {
+            Some(torque) => table.joints(torque, false, [force * length, force])?,
+            None => vec![None; motor.len()],
+        };
+        Ok(EncoderRecording {
+            place: self.source.error(entry.span(), ""),
+            step_s,
+            motor,
+            link,
+            torque,
+            below_hz: self.non_negative(&e.below, "below", BELOW_HZ)?,
+            edge_s: self.non_negative(&e.edge, "edge", EDGE_S)?,
+        })
+    }
+
+    fn non_negative(&self, value: &Option<Spanned<f64>>, what: &str, default: f64) -> Result<f64, Error> {
+        match value {
+            None => Ok(default),
+            Some(x) if x.get_ref().is_finite() && *x.get_ref() >= 0.0 => Ok(*x.get_ref()),
+            Some(x) => Err(self.error(x.span(), format!("{what} is {}, expected a non-negative number", x.get_ref()))),
+        }
+    }
+
     /// Computes joint positions from motors that move several joints, `q = C q_m`; joint positions
     /// from the controller are left unchanged.
     fn behind_coupling(&self, e: &EncodersEntry, motor: &mut [Vec<f64>]) -> Result<(), Error> {
