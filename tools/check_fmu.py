@@ -43,7 +43,9 @@ class Importer:
         self.description = fmpy.read_model_description(self.folder)
         self.is_3 = self.description.fmiVersion.startswith("3")
         self.references = {v.name: v.valueReference for v in self.description.modelVariables}
-        self.targets = [r for name, r in self.references.items() if name.endswith(".target_position")]
+        targets = [v for v in self.description.modelVariables if v.name.endswith(".target_position")]
+        self.targets = [v.valueReference for v in targets]
+        self.pose = [float(v.start) for v in targets]
         tcp = [f"tcp.position.{axis}" for axis in "xyz"] + [f"tcp_error.position.{axis}" for axis in "xyz"]
         self.outputs = [self.references[name] for name in tcp]
 
@@ -78,7 +80,7 @@ class Importer:
 
         for k in range(first, last):
             s = 4.0 * (k + 1) * PERIOD
-            self.set(instance, [0.05 * (1 - math.cos(s)) * (1 + 0.1 * j) for j in range(len(self.targets))])
+            self.set(instance, [q + 0.05 * (1 - math.cos(s)) * (1 + 0.1 * j) for j, q in enumerate(self.pose)])
             self.step(instance, k)
         return self.get(instance)
 

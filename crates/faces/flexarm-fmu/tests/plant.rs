@@ -104,9 +104,9 @@ fn the_velocity_of_the_tcp_is_the_slope_of_its_position() {
         history.push((values(&plant, &TCP), values(&plant, &speed)));
     }
     let largest = history.iter().flat_map(|(_, v)| v).fold(0.0_f64, |m, v| m.max(v.abs()));
-    let off = history.windows(3).flat_map(|w| {
-        (0..3).map(|c| ((w[2].0[c] - w[0].0[c]) / (2.0 * h) - w[1].1[c]).abs()).collect::<Vec<_>>()
-    });
+    let off = history
+        .windows(3)
+        .flat_map(|w| (0..3).map(|c| ((w[2].0[c] - w[0].0[c]) / (2.0 * h) - w[1].1[c]).abs()).collect::<Vec<_>>());
     let off = off.fold(0.0, f64::max) / largest;
     println!("slope of the position off by {off:.1e} of the largest velocity");
     assert!(off < 2e-4, "{off:e}");
@@ -298,7 +298,10 @@ fn the_resources_of_an_fmu_are_the_arm_wherever_they_are() {
         again.start(0.0).unwrap();
         again.step(0.0, 0.01).unwrap();
         let text = std::fs::read_to_string(own.join("resources/robot.toml")).unwrap();
-        assert!(!text.contains("../") && !text.contains(".."), "{text}");
+        let document: toml_edit::DocumentMut = text.parse().unwrap();
+        let values = document.iter().map(|(_, item)| item.to_string()).collect::<Vec<_>>();
+        let is_outside = |value: &String| value.lines().any(|line| line.split('#').next().unwrap().contains(".."));
+        assert!(!values.iter().any(is_outside), "{text}");
         assert!(matches!(open_resources(&own.join("resources"), "{other}"), Err(PlantError::Token { .. })));
         std::fs::remove_file(own.join("resources/robot.urdf")).unwrap();
         assert!(matches!(open_resources(&own.join("resources"), &token), Err(PlantError::Robot(_))));
