@@ -41,7 +41,7 @@ OWNERS = {  # outside crate: folders that may name it
 }
 LARGEST_CYCLE = 3
 CYCLES = {  # crate: files in its largest cycle of imports, to be reduced
-    "flexarm-cli": 22, "flexarm-fe-io": 5, "flexarm-fem": 5, "flexarm-identify": 8, "flexarm-kinematics": 12, "flexarm-log": 4,
+    "flexarm-fe-io": 5, "flexarm-fem": 5, "flexarm-identify": 8, "flexarm-kinematics": 12, "flexarm-log": 4,
     "flexarm-motion-io": 5, "flexarm-new": 4, "flexarm-path": 9, "flexarm-python": 13, "flexarm-run": 16, "flexarm-stepping": 9,
     "flexarm-sweep": 5, "flexarm-trajectory": 7, "flexarm-urdf": 7,
 }
@@ -325,7 +325,7 @@ def self_test():
         ("upwards", found({"flexarm-kinematics": ["flexarm-fem"]}), "flexarm-kinematics (dynamics): dependency on flexarm-fem (links)"),
         ("upwards in tests", found({"flexarm-kinematics": ["dev:flexarm"]}), None),
         ("a study on the facade", found({"flexarm-map": ["flexarm"]}), "flexarm-map (studies): dependency on flexarm (faces)"),
-        ("a face below the facade", found({"flexarm-cli": ["flexarm-log"]}), "it uses flexarm and flexarm-verify alone"),
+        ("a face below the facade", found({"flexarm-cli": ["flexarm-log"]}), "it uses flexarm and flexarm-fmu and flexarm-verify alone"),
         ("testkit in the product", found({"flexarm-stepping": ["flexarm-testkit"]}), "dev-dependencies only"),
         ("mcap below", found({"flexarm-stepping": ["mcap"]}), "dependency on mcap: only motion and results may name it"),
         ("rerun in a face", found({"flexarm-cli": ["flexarm", "rerun"]}), "dependency on rerun: only results"),

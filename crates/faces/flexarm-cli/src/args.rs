@@ -3,170 +3,15 @@
 use std::path::PathBuf;
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use clap::{Args, Parser, Subcommand, ValueEnum};
-use flexarm::{DriveModel, LinkModel, Modelling, RecordingFormat, STEPPERS, StepperEntry};
+use clap::{Args, ValueEnum};
+use flexarm::{
+    DriveModel, InertiaEstimate, LinkModel, LoadOptions, Modelling, ReadOptions, RecordingFormat, STEPPERS,
+    StepperEntry,
+};
 
-use crate::compensate::CompensateArgs;
-use crate::convert::ConvertArgs;
-use crate::exchange_args::{ExportArgs, ImportArgs};
-use crate::fmu::ExportFmuArgs;
+use crate::failure::Failure;
 use crate::formats;
-use crate::identify::IdentifyArgs;
-use crate::later::Later;
-use crate::lobes::LobesArgs;
-use crate::map::MapArgs;
-use crate::motion::{MotionArgs, MotionInputArgs};
-use crate::new::NewArgs;
-use crate::posed_args::{ModesArgs, ResponseArgs, StaticsArgs};
-use crate::reduce_args::ReduceArgs;
-use crate::report::ReportArgs;
-use crate::sensitivity::SensitivityArgs;
-use crate::sweep::SweepArgs;
-use crate::verify::VerifyArgs;
-use crate::view::ViewArgs;
-
-/// Help of the program without a command; a line for every command.
-const HELP: &str = "\
-{about}
-
-{usage-heading} {usage}
-
-Start:
-  flexarm compare                             the shipped arm and its report
-  flexarm new my_arm.urdf --payload 8         a robot file from a URDF
-  flexarm compare my_arm my_motion.csv        your arm on your motion
-
-Runs:
-  compare      Run the flexible robot beside its rigid twin: TCP error, report
-  run          Run one model along a motion and log it
-  report       Write the HTML report of recorded runs
-  convert      Write a recording in another format
-  view         Open a recording in the Rerun viewer
-
-Robots and motions:
-  new          Create a robot file, a motion and a first run from a URDF
-  check        List all problems of a robot and a motion
-  inspect      Show a robot with its kinematics and dynamics at a pose
-  motion       Show a motion against the limits of a robot, convert it
-  format       Print the page of a file format
-
-One pose:
-  statics      Equilibrium under weight and load, compliance of the TCP
-  modes        Natural frequencies, damping and shapes
-  response     Frequency response of the TCP
-  lobes        Depth of cut without chatter over the spindle speed
-
-Studies:
-  map          Sag, stiffness and frequencies over the workspace
-  sweep        Many runs with varied payloads, stiffness, speeds, options
-  sensitivity  Derivatives of the TCP error by every parameter
-  identify     Stiffness from measurements; poses worth measuring
-  compensate   Motion with which the TCP follows the rigid one's
-
-Flexible links:
-  reduce       Create a flexible link from a finite element mesh
-  import       Create a flexible link from matrices of another program
-  export       Write the matrices of a flexible link for another program
-
-Other programs:
-  export-fmu   Write the arm as an FMU, a plant for control programs
-
-Program:
-  verify       Run the case studies against their truths
-  completions  Print a shell completion script
-  man          Print the manual page
-  help         Print the help of a command
-
-{options}
-";
-
-/// Computes how far the links' flexibility moves a robot's tool from where the rigid model puts it
-#[derive(Debug, Parser)]
-#[command(name = "flexarm", version, arg_required_else_help = true, help_template = HELP)]
-pub(crate) struct Cli {
-    #[command(subcommand)]
-    pub(crate) command: Command,
-    /// Print one JSON object on standard output and nothing else
-    #[arg(long, global = true, help_heading = "Terminal")]
-    pub(crate) json: bool,
-    /// Hide the progress bar and all messages except errors
-    #[arg(long, short, global = true, help_heading = "Terminal")]
-    pub(crate) quiet: bool,
-}
-
-#[derive(Debug, Subcommand)]
-pub(crate) enum Command {
-    /// Run the flexible robot and its rigid twin, log both, measure the TCP error
-    ///
-    /// Without arguments: the shipped industrial arm on its pick-and-place cycle.
-    Compare(Later<RunArgs>),
-    /// Run one model along a trajectory and log it
-    Run(Later<RunArgs>),
-    /// Show what was loaded, and kinematics and dynamics at a pose
-    Inspect(Later<InspectArgs>),
-    /// Check a robot and a trajectory and list all problems
-    Check(Later<CheckArgs>),
-    /// Create a robot file, a sample motion and a first run from a URDF or xacro file
-    New(Later<NewArgs>),
-    /// Show the contents of a motion, check it against a robot's limits, and convert it to other
-    /// formats
-    Motion(Later<MotionArgs>),
-    /// Identify a robot's stiffness from measurements, and plan the poses to measure
-    Identify(Later<IdentifyArgs>),
-    /// Find the motion with which the flexible arm's TCP follows the rigid one's, and evaluate it
-    /// on other plants
-    Compensate(Later<CompensateArgs>),
-    /// Derivatives of the TCP error along a motion with respect to all parameters of the robot,
-    /// from one run
-    Sensitivity(Later<SensitivityArgs>),
-    /// Sag, stiffness and frequencies over the workspace, over joints or along a motion, and where
-    /// to put a workpiece
-    Map(Later<MapArgs>),
-    /// Run a study: many runs with varied payloads, stiffness, speeds, options; tables,
-    /// sensitivities, shards
-    Sweep(Box<SweepArgs>),
-    /// Equilibrium under gravity and load at a pose, and the compliance of the TCP
-    Statics(Later<StaticsArgs>),
-    /// Natural frequencies, damping and shapes at a pose, drives locked
-    Modes(Later<ModesArgs>),
-    /// Frequency response of the TCP to forces on it and to motions of joints
-    Response(Later<ResponseArgs>),
-    /// Limits of depth of cut for chatter of a cutting tool on the arm, over the spindle speed
-    Lobes(Later<LobesArgs>),
-    /// Write the HTML report of recorded runs
-    Report(Later<ReportArgs>),
-    #[command(about = formats::about_convert())]
-    Convert(Later<ConvertArgs>),
-    /// Create a flexible link from a finite element mesh, with checks
-    Reduce(Later<ReduceArgs>),
-    /// Create a flexible link from matrices of another FE program
-    Import(Later<ImportArgs>),
-    /// Write the matrices of a flexible link for another FE program
-    Export(Later<ExportArgs>),
-    /// Write the arm as an FMU, a plant for control programs
-    ///
-    /// The FMU (FMI 3.0 or 2.0, co-simulation) holds the robot, its links, drives and payload. Its
-    /// inputs are joint targets, motor torques and a wrench on the TCP; its outputs are encoders,
-    /// drive torques, the TCP and its error.
-    ExportFmu(Later<ExportFmuArgs>),
-    /// Run the case studies against their truths and write the page of results
-    Verify(Later<VerifyArgs>),
-    /// Open a recording in the Rerun viewer
-    View(Later<ViewArgs>),
-    /// Print the page of a file format: keys, units, defaults, examples
-    Format {
-        /// Format to describe
-        #[arg(value_enum)]
-        page: PageName,
-    },
-    /// Print a shell completion script
-    Completions {
-        /// Shell to complete for
-        shell: clap_complete::Shell,
-    },
-    /// Print the manual page (roff)
-    Man,
-}
+use crate::motion::MotionInputArgs;
 
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Robot")]
@@ -195,6 +40,43 @@ pub(crate) struct RobotArgs {
     /// Estimate missing inertias from the meshes, scaled to this total mass (kg)
     #[arg(long, hide_short_help = true, value_name = "KG", allow_hyphen_values = true)]
     pub(crate) inertia_from_total_mass: Option<f64>,
+}
+
+impl RobotArgs {
+    /// Returns the options for loading a robot.
+    pub(crate) fn options(&self) -> Result<LoadOptions, Failure> {
+        let mut urdf = ReadOptions { search_paths: flexarm::search_paths_from_environment(), ..ReadOptions::default() };
+        for package in &self.packages {
+            let (name, folder) = package
+                .split_once('=')
+                .ok_or_else(|| Failure::Usage(format!("--package {package:?}: expected NAME=FOLDER")))?;
+            urdf.packages.push((name.to_owned(), folder.into()));
+        }
+        for argument in &self.arguments {
+            // ROS writes NAME:=VALUE.
+            let (name, value) = argument
+                .split_once(":=")
+                .or_else(|| argument.split_once('='))
+                .filter(|(name, _)| !name.trim().is_empty())
+                .ok_or_else(|| Failure::Usage(format!("--arg {argument:?}: expected NAME=VALUE")))?;
+            urdf.arguments.push((name.trim().to_owned(), value.to_owned()));
+        }
+        let positive = |x: f64, what: &str| {
+            if x.is_finite() && x > 0.0 {
+                Ok(x)
+            } else {
+                Err(Failure::Usage(format!("{what} must be positive, found {x}")))
+            }
+        };
+        if let Some(density) = self.inertia_from_density {
+            urdf.inertia_from_mesh = Some(InertiaEstimate::Density(positive(density, "--inertia-from-density")?));
+        }
+        if let Some(mass) = self.inertia_from_total_mass {
+            urdf.inertia_from_mesh = Some(InertiaEstimate::TotalMass(positive(mass, "--inertia-from-total-mass")?));
+        }
+        urdf.waive.extend(self.waive_inertia.iter().cloned());
+        Ok(LoadOptions { tcp: self.tcp.clone(), urdf })
+    }
 }
 
 /// Model choices for links and drives.
@@ -492,20 +374,4 @@ fn parse_start_time(text: &str) -> Result<u64, String> {
         return Err(format!("expected seconds from 0 (1970) to {LATEST_S} (2038), found {seconds}"));
     }
     Ok((seconds * 1e9).round() as u64)
-}
-
-#[cfg(test)]
-mod tests {
-    use clap::CommandFactory;
-
-    use super::{Cli, HELP};
-
-    #[test]
-    fn the_help_has_a_line_of_at_most_80_columns_for_every_command() {
-        for command in Cli::command().get_subcommands() {
-            let line = format!("\n  {:<13}", command.get_name());
-            assert_eq!(HELP.matches(&line).count(), 1, "{}", command.get_name());
-        }
-        assert!(HELP.lines().all(|line| line.len() <= 80));
-    }
 }

@@ -10,12 +10,13 @@ use flexarm::compensate::{
 };
 use flexarm::{Motion, Robot, RunOptions, Scenario};
 
-use crate::args::{Cli, ModellingArgs, RobotArgs};
+use crate::args::{ModellingArgs, RobotArgs};
 use crate::failure::Failure;
 use crate::motion::MotionInputArgs;
 use crate::print::{lines, table};
+use crate::shipped;
 use crate::shipped::OutputFolder;
-use crate::{answer, load_options, shipped, to_json};
+use crate::terminal::{Terminal, answer, to_json};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -160,8 +161,8 @@ fn shaping(args: &CompensateArgs) -> Result<Option<Shaping>, Failure> {
     }))
 }
 
-pub(crate) fn run(cli: &Cli, args: &CompensateArgs) -> Result<ExitCode, Failure> {
-    let robot = Robot::load_with(&shipped::robot(Some(&args.robot))?, &load_options(&args.load)?)?;
+pub(crate) fn run(terminal: &Terminal, args: &CompensateArgs) -> Result<ExitCode, Failure> {
+    let robot = Robot::load_with(&shipped::robot(Some(&args.robot))?, &args.load.options()?)?;
     let motion = match (&args.motion, &robot.default_trajectory) {
         (Some(given), _) => shipped::trajectory(given)?,
         (None, Some(own)) => own.clone(),
@@ -170,7 +171,7 @@ pub(crate) fn run(cli: &Cli, args: &CompensateArgs) -> Result<ExitCode, Failure>
     let motion = Motion::load_with(&motion, &robot, &args.input.options())?;
     let plant = match &args.plant {
         Some(given) => {
-            let plant = Robot::load_with(&shipped::robot(Some(given))?, &load_options(&args.load)?)?;
+            let plant = Robot::load_with(&shipped::robot(Some(given))?, &args.load.options()?)?;
             Some((plant.name.clone(), plant))
         }
         None => None,
@@ -205,8 +206,8 @@ pub(crate) fn run(cli: &Cli, args: &CompensateArgs) -> Result<ExitCode, Failure>
         scenario = scenario.with_loads_file(loads)?;
     }
     let found = compensate_motion(&robot, scenario, &request)?;
-    crate::print::caveats(cli, &found.caveats);
-    answer(cli, || to_json(&found), || text(&found));
+    crate::print::caveats(terminal, &found.caveats);
+    answer(terminal, || to_json(&found), || text(&found));
     Ok(ExitCode::SUCCESS)
 }
 

@@ -6,9 +6,9 @@ use std::process::ExitCode;
 use clap::Args;
 use flexarm::{ConvertOptions, ConvertSummary, RecordingFormat, parse_recording_format};
 
-use crate::args::Cli;
 use crate::failure::Failure;
 use crate::formats;
+use crate::terminal::{Terminal, answer, to_json};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -38,12 +38,12 @@ pub(crate) struct ConvertArgs {
     pub(crate) force: bool,
 }
 
-pub(crate) fn run(cli: &Cli, args: &ConvertArgs) -> Result<ExitCode, Failure> {
+pub(crate) fn run(terminal: &Terminal, args: &ConvertArgs) -> Result<ExitCode, Failure> {
     let options = ConvertOptions { from: args.from, to: args.to, overwrite: args.force };
     let mut stop = crate::signals::stop_when_asked();
     let summary = flexarm::convert_until(&args.input, &args.output, &options, &mut |_| stop())?;
-    crate::print::warnings(cli, &summary.warnings);
-    crate::answer(cli, || crate::to_json(&summary), || text(&summary));
+    crate::print::warnings(terminal, &summary.warnings);
+    answer(terminal, || to_json(&summary), || text(&summary));
     Ok(ExitCode::SUCCESS)
 }
 

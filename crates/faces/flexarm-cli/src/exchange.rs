@@ -5,25 +5,25 @@ use std::process::ExitCode;
 use flexarm::export::{ExportFormat, ExportJob};
 use flexarm::import::{ImportFormat, ImportJob, ImportOutputs, Names, PartMasses, RigidPart, parse_inertia, triple};
 
-use crate::args::Cli;
 use crate::exchange_args::{ExportArgs, ExportFormatName, ImportArgs, ImportFormatName};
 use crate::failure::Failure;
+use crate::print;
 use crate::shipped::OutputFolder;
-use crate::{answer, print, to_json};
+use crate::terminal::{Terminal, answer, to_json};
 
-pub(crate) fn import(cli: &Cli, args: &ImportArgs) -> Result<ExitCode, Failure> {
+pub(crate) fn import(terminal: &Terminal, args: &ImportArgs) -> Result<ExitCode, Failure> {
     let job = import_job(args)?;
     let in_folder = args.output.is_some() || args.flex.is_none();
     let folder = OutputFolder::of(args.output.as_deref(), &job.link_name(), in_folder && !args.no_files)?;
     let outputs = ImportOutputs { folder: folder.path(), flex: args.flex.clone(), overwrite: args.force };
     let outputs = (!args.no_files).then_some(outputs);
     let summary = flexarm::import::import(&job, outputs.as_ref())?;
-    print::warnings(cli, &summary.warnings);
-    answer(cli, || to_json(&summary), || print::imported(&summary));
+    print::warnings(terminal, &summary.warnings);
+    answer(terminal, || to_json(&summary), || print::imported(&summary));
     Ok(ExitCode::SUCCESS)
 }
 
-pub(crate) fn export(cli: &Cli, args: &ExportArgs) -> Result<ExitCode, Failure> {
+pub(crate) fn export(terminal: &Terminal, args: &ExportArgs) -> Result<ExitCode, Failure> {
     let stem = args.link.file_stem().unwrap_or_default().to_string_lossy();
     let folder = OutputFolder::of(args.output.as_deref(), &stem, true)?;
     let job = ExportJob {
@@ -42,8 +42,8 @@ pub(crate) fn export(cli: &Cli, args: &ExportArgs) -> Result<ExitCode, Failure> 
         overwrite: args.force,
     };
     let summary = flexarm::export::export(&job)?;
-    print::warnings(cli, &summary.warnings);
-    answer(cli, || to_json(&summary), || print::exported(&summary));
+    print::warnings(terminal, &summary.warnings);
+    answer(terminal, || to_json(&summary), || print::exported(&summary));
     Ok(ExitCode::SUCCESS)
 }
 

@@ -74,7 +74,7 @@ mod tests {
     use clap::CommandFactory;
 
     use super::*;
-    use crate::args::Cli;
+    use crate::commands::Cli;
 
     #[test]
     fn every_setting_that_a_message_names_is_a_flag_of_some_command() {

@@ -7,10 +7,11 @@ use clap::{Args, ValueEnum};
 use flexarm::{Robot, STEPPERS, StepRule, StepperEntry, StepperOptions};
 use flexarm_fmu::{Fmi, FmuJob, FmuSummary, PlantSettings, export_fmu};
 
-use crate::args::{Cli, stepper_words};
+use crate::args::stepper_words;
 use crate::failure::Failure;
 use crate::posed_args::PoseArgs;
-use crate::{answer, load_options, shipped, to_json, values};
+use crate::terminal::{Terminal, answer, to_json};
+use crate::{shipped, values};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -54,12 +55,12 @@ pub(crate) struct ExportFmuArgs {
     pub(crate) library: Option<PathBuf>,
 }
 
-pub(crate) fn run(cli: &Cli, args: &ExportFmuArgs) -> Result<ExitCode, Failure> {
+pub(crate) fn run(terminal: &Terminal, args: &ExportFmuArgs) -> Result<ExitCode, Failure> {
     if args.stepper.steps == StepRule::ByErrorControl {
         let text = format!("--stepper {}: an FMU needs a stepper with a fixed step size", args.stepper.name);
         return Err(Failure::Usage(text));
     }
-    let (path, load) = (shipped::robot(Some(&args.pose.robot))?, load_options(&args.pose.load)?);
+    let (path, load) = (shipped::robot(Some(&args.pose.robot))?, args.pose.load.options()?);
     let robot = Robot::load_with(&path, &load)?;
     let settings = PlantSettings {
         load,
@@ -76,7 +77,7 @@ pub(crate) fn run(cli: &Cli, args: &ExportFmuArgs) -> Result<ExitCode, Failure> 
     let output = args.output.clone().unwrap_or_else(|| format!("{}.fmu", file_stem(&robot.name)).into());
     let job = FmuJob { robot: path, settings, fmi, library, output, overwrite: args.force };
     let summary = export_fmu(&job)?;
-    answer(cli, || to_json(&summary), || text(&summary));
+    answer(terminal, || to_json(&summary), || text(&summary));
     Ok(ExitCode::SUCCESS)
 }
 

@@ -87,7 +87,7 @@ mod tests {
     use clap::CommandFactory;
 
     use super::*;
-    use crate::args::Cli;
+    use crate::commands::Cli;
 
     /// Truth: the sentences in the help texts.
     #[test]

@@ -10,11 +10,12 @@ use flexarm::identify::{
     Identification, IdentifyRequest, MeasurementPlan, PlanRequest, identify_robot, plan_measurements,
 };
 
-use crate::args::{Cli, ModellingArgs, RobotArgs};
+use crate::args::{ModellingArgs, RobotArgs};
 use crate::failure::Failure;
 use crate::print::{lines, table};
+use crate::shipped;
 use crate::shipped::OutputFolder;
-use crate::{answer, load_options, shipped, to_json};
+use crate::terminal::{Terminal, answer, to_json};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -88,10 +89,10 @@ pub(crate) struct IdentifyArgs {
     pub(crate) force: bool,
 }
 
-pub(crate) fn run(cli: &Cli, args: &IdentifyArgs) -> Result<ExitCode, Failure> {
-    let robot = Robot::load_with(&shipped::robot(Some(&args.robot))?, &load_options(&args.load)?)?;
+pub(crate) fn run(terminal: &Terminal, args: &IdentifyArgs) -> Result<ExitCode, Failure> {
+    let robot = Robot::load_with(&shipped::robot(Some(&args.robot))?, &args.load.options()?)?;
     match (args.plan, &args.measurements) {
-        (Some(count), _) => plan(cli, args, &robot, count),
+        (Some(count), _) => plan(terminal, args, &robot, count),
         (None, Some(measurements)) => {
             let folder =
                 OutputFolder::of(args.output.as_deref(), &format!("{}_identified", robot.name), !args.no_files)?;
@@ -102,8 +103,8 @@ pub(crate) fn run(cli: &Cli, args: &IdentifyArgs) -> Result<ExitCode, Failure> {
                 overwrite: args.force,
             };
             let found = identify_robot(&robot, measurements, &request)?;
-            crate::print::caveats(cli, &found.caveats);
-            answer(cli, || to_json(&found), || text(&found));
+            crate::print::caveats(terminal, &found.caveats);
+            answer(terminal, || to_json(&found), || text(&found));
             Ok(ExitCode::SUCCESS)
         }
         (None, None) => Err(Failure::Usage("give a file of measurements, or --plan N".into())),
@@ -119,7 +120,7 @@ fn threes(flag: &str, what: &str, texts: &[String]) -> Result<Vec<[f64; 3]>, Fai
     texts.iter().map(of).collect()
 }
 
-fn plan(cli: &Cli, args: &IdentifyArgs, robot: &Robot, count: usize) -> Result<ExitCode, Failure> {
+fn plan(terminal: &Terminal, args: &IdentifyArgs, robot: &Robot, count: usize) -> Result<ExitCode, Failure> {
     let folder = OutputFolder::of(args.output.as_deref(), &format!("{}_plan", robot.name), !args.no_files)?;
     let forces = threes("--pull", "a force of three numbers", &args.forces)?;
     let mut request = PlanRequest {
@@ -139,8 +140,8 @@ fn plan(cli: &Cli, args: &IdentifyArgs, robot: &Robot, count: usize) -> Result<E
         request.forces = forces;
     }
     let found = plan_measurements(robot, &request)?;
-    crate::print::warnings(cli, &found.warnings);
-    answer(cli, || to_json(&found), || plan_text(&found));
+    crate::print::warnings(terminal, &found.warnings);
+    answer(terminal, || to_json(&found), || plan_text(&found));
     Ok(ExitCode::SUCCESS)
 }
 

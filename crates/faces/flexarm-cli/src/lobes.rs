@@ -11,12 +11,12 @@ use flexarm::lobes::{
 use flexarm::{Motion, Robot};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use crate::args::Cli;
 use crate::failure::Failure;
 use crate::posed_args::PoseArgs;
 use crate::print::{lines, table};
 use crate::shipped::OutputFolder;
-use crate::{answer, load_options, shipped, to_json, values};
+use crate::terminal::{Terminal, answer, to_json};
+use crate::{shipped, values};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -86,12 +86,12 @@ pub(crate) fn cutting_tool(given: &Path, rpm: &[f64]) -> Result<CuttingTool, Fai
     Ok(if rpm.is_empty() { tool } else { tool.at_speeds(rpm.to_vec()) })
 }
 
-pub(crate) fn run(cli: &Cli, args: &LobesArgs) -> Result<ExitCode, Failure> {
-    let robot = Robot::load_with(&shipped::robot(Some(&args.pose.robot))?, &load_options(&args.pose.load)?)?;
+pub(crate) fn run(terminal: &Terminal, args: &LobesArgs) -> Result<ExitCode, Failure> {
+    let robot = Robot::load_with(&shipped::robot(Some(&args.pose.robot))?, &args.pose.load.options()?)?;
     let tool = cutting_tool(&args.tool, &args.rpm)?;
     let at = values::pose(args.pose.at.as_deref(), &robot)?;
     if let Some(words) = &args.cut {
-        return follow(cli, args, words, &robot, &tool, at.as_deref());
+        return follow(terminal, args, words, &robot, &tool, at.as_deref());
     }
     let motion = args.along.as_deref().map(shipped::trajectory).transpose()?;
     let motion = motion.map(|path| Motion::load(path, &robot)).transpose()?;
@@ -108,7 +108,7 @@ pub(crate) fn run(cli: &Cli, args: &LobesArgs) -> Result<ExitCode, Failure> {
         output: folder.path(),
         overwrite: args.force,
     };
-    let bar = progress(cli);
+    let bar = progress(terminal);
     let found = lobes(&robot, &tool, &place, &request, &|done, all| {
         bar.set_length(all as u64);
         bar.set_position(done as u64);
@@ -116,14 +116,14 @@ pub(crate) fn run(cli: &Cli, args: &LobesArgs) -> Result<ExitCode, Failure> {
     });
     bar.finish_and_clear();
     let found = found?;
-    crate::print::caveats(cli, &found.caveats);
-    answer(cli, || to_json(&found), || text(&found));
+    crate::print::caveats(terminal, &found.caveats);
+    answer(terminal, || to_json(&found), || text(&found));
     Ok(ExitCode::SUCCESS)
 }
 
 /// Simulates one cut over time.
 fn follow(
-    cli: &Cli,
+    terminal: &Terminal,
     args: &LobesArgs,
     words: &str,
     robot: &Robot,
@@ -145,8 +145,8 @@ fn follow(
         overwrite: args.force,
     };
     let found = cut(robot, tool, at, &request)?;
-    crate::print::caveats(cli, &found.caveats);
-    answer(cli, || to_json(&found), || cut_text(&found));
+    crate::print::caveats(terminal, &found.caveats);
+    answer(terminal, || to_json(&found), || cut_text(&found));
     Ok(ExitCode::SUCCESS)
 }
 
@@ -183,8 +183,9 @@ fn cut_text(c: &CutRun) -> String {
 }
 
 /// Progress bar over the limits found; only on a terminal.
-fn progress(cli: &Cli) -> ProgressBar {
-    let target = if cli.quiet || cli.json { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
+fn progress(terminal: &Terminal) -> ProgressBar {
+    let target =
+        if terminal.quiet || terminal.json { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
     let style = ProgressStyle::with_template("{bar:40} {pos} of {len} limits, {eta} left");
     let bar = ProgressBar::with_draw_target(Some(1), target);
     bar.with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))

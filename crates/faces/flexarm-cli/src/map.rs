@@ -12,13 +12,14 @@ use flexarm::map::{
 use flexarm::reduce::numbers;
 use flexarm::{Motion, Robot};
 
-use crate::args::{Cli, ModellingArgs, RobotArgs};
+use crate::args::{ModellingArgs, RobotArgs};
 use crate::failure::Failure;
 use crate::lobes::cutting_tool;
 use crate::motion::MotionInputArgs;
 use crate::print::{lines, table};
 use crate::shipped::OutputFolder;
-use crate::{Bar, answer, load_options, shipped, signals, to_json, values};
+use crate::terminal::{Bar, Terminal, answer, to_json};
+use crate::{shipped, signals, values};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -218,8 +219,8 @@ fn region(args: &MapArgs, robot: &Robot) -> Result<MapRegion, Failure> {
     Ok(MapRegion::Workspace(WorkspaceGrid { bounds, spacing_m: args.grid, keep_out_m: args.keep_out, tool }))
 }
 
-pub(crate) fn run(cli: &Cli, args: &MapArgs) -> Result<ExitCode, Failure> {
-    let robot = Robot::load_with(&shipped::robot(Some(&args.robot))?, &load_options(&args.load)?)?;
+pub(crate) fn run(terminal: &Terminal, args: &MapArgs) -> Result<ExitCode, Failure> {
+    let robot = Robot::load_with(&shipped::robot(Some(&args.robot))?, &args.load.options()?)?;
     let region = region(args, &robot)?;
     let workpiece_m = args.workpiece.as_deref().map(|text| three("--workpiece", text, " (m)")).transpose()?;
     let wrench = args.wrench.as_deref().map_or(Ok([0.0; 6]), |text| values::wrench("--wrench", text))?;
@@ -243,15 +244,15 @@ pub(crate) fn run(cli: &Cli, args: &MapArgs) -> Result<ExitCode, Failure> {
         output: folder.path(),
         overwrite: args.force,
     };
-    let (mut stop, mut bar) = (signals::stop_when_asked(), Bar::new(cli));
+    let (mut stop, mut bar) = (signals::stop_when_asked(), Bar::new(terminal));
     let found = map(&robot, &request, &mut |done, all| {
         bar.show_as(done, all, || format!("{done:.0} of {all:.0} places"));
         stop()
     });
     bar.clear();
     let found = found?;
-    crate::print::caveats(cli, &found.caveats);
-    answer(cli, || to_json(&found), || text(&found));
+    crate::print::caveats(terminal, &found.caveats);
+    answer(terminal, || to_json(&found), || text(&found));
     Ok(ExitCode::SUCCESS)
 }
 

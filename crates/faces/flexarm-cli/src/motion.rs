@@ -7,10 +7,11 @@ use clap::Args;
 use comfy_table::CellAlignment;
 use flexarm::{ColumnMap, MotionCurve, MotionOptions, MotionPeak, MotionReport, Robot};
 
-use crate::args::{Cli, RobotArgs};
+use crate::args::RobotArgs;
 use crate::failure::Failure;
 use crate::print::{lines, table};
-use crate::{answer, load_options, shipped, to_json};
+use crate::shipped;
+use crate::terminal::{Terminal, answer, to_json};
 
 /// Width of a curve in the terminal (characters).
 const WIDTH: usize = 60;
@@ -62,7 +63,7 @@ pub(crate) struct MotionArgs {
     pub(crate) force: bool,
 }
 
-pub(crate) fn run(cli: &Cli, args: &MotionArgs) -> Result<ExitCode, Failure> {
+pub(crate) fn run(terminal: &Terminal, args: &MotionArgs) -> Result<ExitCode, Failure> {
     let mut outputs = args.output.clone();
     if let Some(svg) = &args.svg {
         let is_svg = svg.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("svg"));
@@ -72,14 +73,14 @@ pub(crate) fn run(cli: &Cli, args: &MotionArgs) -> Result<ExitCode, Failure> {
         outputs.push(svg.clone());
     }
     let robot = match &args.robot {
-        Some(given) => Some(Robot::load_with(&shipped::robot(Some(given))?, &load_options(&args.load)?)?),
+        Some(given) => Some(Robot::load_with(&shipped::robot(Some(given))?, &args.load.options()?)?),
         None => None,
     };
     let motion = shipped::trajectory(&args.motion)?;
     let options = args.input.options();
     let report = flexarm::motion_report(&motion, robot.as_ref(), &options, &outputs, args.rate, args.force)?;
-    crate::print::warnings(cli, &report.warnings);
-    answer(cli, || to_json(&report), || text(&report));
+    crate::print::warnings(terminal, &report.warnings);
+    answer(terminal, || to_json(&report), || text(&report));
     Ok(ExitCode::SUCCESS)
 }
 

@@ -11,10 +11,11 @@ use flexarm::{
     gathered,
 };
 
-use crate::args::{Cli, RobotArgs};
+use crate::args::RobotArgs;
 use crate::failure::Failure;
 use crate::print::{lines, table, warnings};
-use crate::{Bar, answer_styled, load_options, signals, summary_table, to_json};
+use crate::terminal::{Bar, Terminal, answer_styled, to_json};
+use crate::{signals, summary_table};
 
 #[derive(Clone, Debug, Args)]
 pub(crate) struct NewArgs {
@@ -84,7 +85,7 @@ impl NewArgs {
             inertia_from_density: self.density,
             inertia_from_total_mass: self.mass,
         };
-        let LoadOptions { urdf, .. } = load_options(&robot)?;
+        let LoadOptions { urdf, .. } = robot.options()?;
         let (base, tool, joints) = (self.base.clone(), self.tool.clone(), self.joints.clone());
         Ok(NewOptions { base, tool, joints, payload_kg: self.payload, urdf })
     }
@@ -106,29 +107,29 @@ impl NewArgs {
     }
 }
 
-pub(crate) fn run(cli: &Cli, args: &NewArgs) -> Result<ExitCode, Failure> {
+pub(crate) fn run(terminal: &Terminal, args: &NewArgs) -> Result<ExitCode, Failure> {
     let options = args.options()?;
     let folder = args.folder(&options.urdf);
     let mut made = flexarm::new_robot(&args.urdf, &folder, args.force, &options)?;
     if !args.no_run {
-        made.summary = Some(Box::new(first_run(cli, &made, &folder, args.force)?));
+        made.summary = Some(Box::new(first_run(terminal, &made, &folder, args.force)?));
     }
     let findings = made.findings.iter().filter(|f| f.severity != "note");
-    warnings(cli, &findings.map(|f| format!("{}: {}", f.location, f.message)).collect::<Vec<_>>());
-    answer_styled(cli, || to_json(&made), || text(&made));
+    warnings(terminal, &findings.map(|f| format!("{}: {}", f.location, f.message)).collect::<Vec<_>>());
+    answer_styled(terminal, || to_json(&made), || text(&made));
     let wrong = made.findings.iter().any(|f| f.severity == "error");
     Ok(if wrong { ExitCode::from(1) } else { ExitCode::SUCCESS })
 }
 
 /// Runs the flexible arm and its rigid twin on the sample motion, with a report in the folder
 /// `first_run`.
-fn first_run(cli: &Cli, made: &NewRobot, folder: &Path, overwrite: bool) -> Result<Summary, Failure> {
+fn first_run(terminal: &Terminal, made: &NewRobot, folder: &Path, overwrite: bool) -> Result<Summary, Failure> {
     let robot = Robot::load(&made.robot)?;
     let motion = Motion::load(&made.motion, &robot)?;
     let options = RunOptions::default();
     let outputs = Outputs { overwrite, ..Outputs::everything(folder.join("first_run")) };
     let mut stop = signals::stop_when_asked();
-    let mut bar = Bar::new(cli);
+    let mut bar = Bar::new(terminal);
     let mut progress = |t: f64, total: f64| {
         bar.show(t, total);
         stop()

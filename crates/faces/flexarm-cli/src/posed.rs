@@ -9,12 +9,12 @@ use flexarm::{
     StaticsOutputs,
 };
 
-use crate::args::Cli;
 use crate::failure::Failure;
 use crate::posed_args::{ModesArgs, PoseArgs, QuantityName, ResponseArgs, SpacingName, StaticsArgs};
 use crate::print::{caveats, filled, lines, table};
 use crate::shipped::OutputFolder;
-use crate::{answer, load_options, shipped, to_json, values};
+use crate::terminal::{Terminal, answer, to_json};
+use crate::{shipped, values};
 
 /// Names of the directions at the TCP.
 const AXES: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
@@ -24,10 +24,10 @@ const SHOWN_PEAKS: usize = 3;
 const MODES_SIDE_BY_SIDE: usize = 8;
 
 fn load(pose: &PoseArgs) -> Result<Robot, Failure> {
-    Ok(Robot::load_with(&shipped::robot(Some(&pose.robot))?, &load_options(&pose.load)?)?)
+    Ok(Robot::load_with(&shipped::robot(Some(&pose.robot))?, &pose.load.options()?)?)
 }
 
-pub(crate) fn statics(cli: &Cli, args: &StaticsArgs) -> Result<ExitCode, Failure> {
+pub(crate) fn statics(terminal: &Terminal, args: &StaticsArgs) -> Result<ExitCode, Failure> {
     let wrench = args.wrench.as_deref().map_or(Ok([0.0; 6]), |text| values::wrench("--wrench", text))?;
     let (robot, modelling) = (load(&args.pose)?, args.pose.modelling.modelling());
     let at = values::pose(args.pose.at.as_deref(), &robot)?;
@@ -39,12 +39,12 @@ pub(crate) fn statics(cli: &Cli, args: &StaticsArgs) -> Result<ExitCode, Failure
         }
         None => flexarm::statics(&robot, &modelling, at, wrench)?,
     };
-    caveats(cli, &found.caveats);
-    answer(cli, || to_json(&found), || statics_text(&found));
+    caveats(terminal, &found.caveats);
+    answer(terminal, || to_json(&found), || statics_text(&found));
     Ok(ExitCode::SUCCESS)
 }
 
-pub(crate) fn modes(cli: &Cli, args: &ModesArgs) -> Result<ExitCode, Failure> {
+pub(crate) fn modes(terminal: &Terminal, args: &ModesArgs) -> Result<ExitCode, Failure> {
     if args.count == 0 {
         return Err(Failure::Usage("--count must be at least 1".into()));
     }
@@ -60,12 +60,12 @@ pub(crate) fn modes(cli: &Cli, args: &ModesArgs) -> Result<ExitCode, Failure> {
         }
         None => flexarm::modes(&robot, &modelling, at, args.count)?,
     };
-    caveats(cli, &found.caveats);
-    answer(cli, || to_json(&found), || modes_text(&found));
+    caveats(terminal, &found.caveats);
+    answer(terminal, || to_json(&found), || modes_text(&found));
     Ok(ExitCode::SUCCESS)
 }
 
-pub(crate) fn response(cli: &Cli, args: &ResponseArgs) -> Result<ExitCode, Failure> {
+pub(crate) fn response(terminal: &Terminal, args: &ResponseArgs) -> Result<ExitCode, Failure> {
     let robot = load(&args.pose)?;
     let trimmed = |words: &[String]| words.iter().map(|w| w.trim().to_owned()).collect();
     let request = ResponseRequest {
@@ -91,8 +91,8 @@ pub(crate) fn response(cli: &Cli, args: &ResponseArgs) -> Result<ExitCode, Failu
         &request,
         outputs.as_ref(),
     )?;
-    caveats(cli, &found.caveats);
-    answer(cli, || to_json(&found), || response_text(&found));
+    caveats(terminal, &found.caveats);
+    answer(terminal, || to_json(&found), || response_text(&found));
     Ok(ExitCode::SUCCESS)
 }
 

@@ -2,12 +2,11 @@
 
 use std::ops::{Deref, DerefMut};
 
+use crate::terminal::Terminal;
 use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
 use flexarm::reduce::{MeshListing, ReduceSummary, ReportTable, SetListing};
 use flexarm::written::{message, one_line};
 use flexarm::{Caveat, Finding, Inspection, gathered};
-
-use crate::args::Cli;
 
 /// Maximum length of a name in a table (characters).
 const LONGEST_NAME: usize = 60;
@@ -382,15 +381,15 @@ pub(crate) fn complaint(word: &str, text: &str) {
 }
 
 /// Prints warnings to standard error, those of one kind merged, unless `--quiet` is set.
-pub(crate) fn warnings(cli: &Cli, texts: &[String]) {
-    if !cli.quiet {
+pub(crate) fn warnings(terminal: &Terminal, texts: &[String]) {
+    if !terminal.quiet {
         gathered(texts).iter().for_each(|text| warning(text));
     }
 }
 
 /// Prints the warnings among the caveats. Those of the robot description are summarised in one
 /// line; `check` and `new` list them in full.
-pub(crate) fn caveats(cli: &Cli, caveats: &[Caveat]) {
+pub(crate) fn caveats(terminal: &Terminal, caveats: &[Caveat]) {
     let (of_description, own): (Vec<&Caveat>, Vec<&Caveat>) =
         caveats.iter().filter(|caveat| caveat.warns()).partition(|caveat| caveat.of_description);
     let mut texts: Vec<String> = own.into_iter().map(|caveat| caveat.message.clone()).collect();
@@ -402,7 +401,7 @@ pub(crate) fn caveats(cli: &Cli, caveats: &[Caveat]) {
             texts.insert(0, text);
         }
     }
-    warnings(cli, &texts);
+    warnings(terminal, &texts);
 }
 
 #[cfg(test)]

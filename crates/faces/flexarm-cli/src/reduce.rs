@@ -12,18 +12,18 @@ use flexarm::reduce::{
 };
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use crate::args::Cli;
 use crate::failure::Failure;
+use crate::print;
 use crate::reduce_args::{NamedValue, OrderingName, PlaceWord, QuadratureName, ReduceArgs};
 use crate::shipped::OutputFolder;
-use crate::{answer, print, to_json};
+use crate::terminal::{Terminal, answer, to_json};
 
-pub(crate) fn run(cli: &Cli, args: &ReduceArgs) -> Result<ExitCode, Failure> {
+pub(crate) fn run(terminal: &Terminal, args: &ReduceArgs) -> Result<ExitCode, Failure> {
     let mut job = ReduceJob::load(&args.mesh)?;
     job.put_over(flags(args)?);
     if args.list {
         let listing = flexarm::reduce::list_mesh(&job)?;
-        answer(cli, || to_json(&listing), || print::listing(&listing));
+        answer(terminal, || to_json(&listing), || print::listing(&listing));
         return Ok(ExitCode::SUCCESS);
     }
     let in_folder = args.output.is_some() || args.flex.is_none();
@@ -33,12 +33,12 @@ pub(crate) fn run(cli: &Cli, args: &ReduceArgs) -> Result<ExitCode, Failure> {
     let mut options = ReduceOptions::default();
     options.urdf.search_paths = flexarm::search_paths_from_environment();
 
-    let steps = Steps::new(cli);
+    let steps = Steps::new(terminal);
     let result = flexarm::reduce::reduce(&job, &options, outputs.as_ref(), &mut |step| steps.show(step));
     steps.clear();
     let summary = result?;
-    print::warnings(cli, &summary.warnings);
-    answer(cli, || to_json(&summary), || print::reduction(&summary));
+    print::warnings(terminal, &summary.warnings);
+    answer(terminal, || to_json(&summary), || print::reduction(&summary));
     Ok(ExitCode::SUCCESS)
 }
 
@@ -129,11 +129,11 @@ struct Steps {
 }
 
 impl Steps {
-    fn new(cli: &Cli) -> Self {
+    fn new(terminal: &Terminal) -> Self {
         let style = ProgressStyle::with_template("{spinner} {pos}/{len} {msg}, {elapsed}");
         let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::hidden())
             .with_style(style.unwrap_or_else(|_| ProgressStyle::default_spinner()));
-        let wanted = !cli.quiet && std::io::stderr().is_terminal();
+        let wanted = !terminal.quiet && std::io::stderr().is_terminal();
         let waiting = wanted.then(|| {
             let (sender, receiver) = channel();
             let shown = bar.clone();

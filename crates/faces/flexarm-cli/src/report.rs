@@ -6,8 +6,8 @@ use std::process::ExitCode;
 use clap::Args;
 use flexarm::{ReportFiles, ReportOptions};
 
-use crate::args::Cli;
 use crate::failure::Failure;
+use crate::terminal::{Terminal, answer, to_json};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -32,11 +32,11 @@ pub(crate) struct ReportArgs {
     pub(crate) force: bool,
 }
 
-pub(crate) fn run(cli: &Cli, args: &ReportArgs) -> Result<ExitCode, Failure> {
+pub(crate) fn run(terminal: &Terminal, args: &ReportArgs) -> Result<ExitCode, Failure> {
     let options = ReportOptions { output: args.output.clone(), figures: args.figures, overwrite: args.force };
     let files = flexarm::report(&args.recordings, &options)?;
-    crate::print::warnings(cli, &files.warnings);
-    crate::answer(cli, || crate::to_json(&files), || text(&files));
+    crate::print::warnings(terminal, &files.warnings);
+    answer(terminal, || to_json(&files), || text(&files));
     Ok(ExitCode::SUCCESS)
 }
 

@@ -9,11 +9,12 @@ use comfy_table::CellAlignment;
 use flexarm::sensitivity::{PoseSensitivity, Sensitivity, SensitivityRequest, pose_sensitivity, sensitivity};
 use flexarm::{Motion, Robot, RunOptions, Scenario};
 
-use crate::args::{Cli, ModellingArgs, RobotArgs};
+use crate::args::{ModellingArgs, RobotArgs};
 use crate::failure::Failure;
 use crate::motion::MotionInputArgs;
 use crate::print::{lines, table};
-use crate::{answer, load_options, shipped, to_json, values};
+use crate::terminal::{Terminal, answer, to_json};
+use crate::{shipped, values};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -67,13 +68,13 @@ pub(crate) struct SensitivityArgs {
     pub(crate) force: bool,
 }
 
-pub(crate) fn run(cli: &Cli, args: &SensitivityArgs) -> Result<ExitCode, Failure> {
-    let robot = Robot::load_with(&shipped::robot(Some(&args.robot))?, &load_options(&args.load)?)?;
+pub(crate) fn run(terminal: &Terminal, args: &SensitivityArgs) -> Result<ExitCode, Failure> {
+    let robot = Robot::load_with(&shipped::robot(Some(&args.robot))?, &args.load.options()?)?;
     if args.at.is_some() {
         let at = values::joint_values(args.at.as_deref(), &robot)?;
         let found = pose_sensitivity(&robot, args.modelling.modelling(), at.as_deref(), &args.by)?;
-        crate::print::caveats(cli, &found.caveats);
-        answer(cli, || to_json(&found), || pose_text(&found));
+        crate::print::caveats(terminal, &found.caveats);
+        answer(terminal, || to_json(&found), || pose_text(&found));
         return Ok(ExitCode::SUCCESS);
     }
     let motion = match (&args.motion, &robot.default_trajectory) {
@@ -98,8 +99,8 @@ pub(crate) fn run(cli: &Cli, args: &SensitivityArgs) -> Result<ExitCode, Failure
         overwrite: args.force,
     };
     let found = sensitivity(&robot, scenario, &request)?;
-    crate::print::caveats(cli, &found.caveats);
-    answer(cli, || to_json(&found), || text(&found));
+    crate::print::caveats(terminal, &found.caveats);
+    answer(terminal, || to_json(&found), || text(&found));
     Ok(ExitCode::SUCCESS)
 }
 

@@ -6,7 +6,8 @@ use std::ffi::OsString;
 use clap::{CommandFactory, FromArgMatches};
 use flexarm::{Caveat, Summary};
 
-use crate::args::{Cli, Command, RunArgs};
+use crate::args::RunArgs;
+use crate::commands::{Cli, Command};
 use crate::failure::Failure;
 
 /// A run of a study: its label, and the arguments it would have on its own command line.

@@ -12,7 +12,8 @@ use serde_json::json;
 
 use crate::failure::Failure;
 use crate::shipped::OutputFolder;
-use crate::{Bar, Cli, answer, shipped, signals};
+use crate::terminal::{Bar, Terminal, answer};
+use crate::{shipped, signals};
 
 #[derive(Debug, Args)]
 pub(crate) struct VerifyArgs {
@@ -43,7 +44,7 @@ pub(crate) struct VerifyArgs {
 /// Maximum number of differences shown.
 const SHOWN: usize = 20;
 
-pub(crate) fn run(cli: &Cli, args: &VerifyArgs) -> Result<ExitCode, Failure> {
+pub(crate) fn run(terminal: &Terminal, args: &VerifyArgs) -> Result<ExitCode, Failure> {
     let stored = args.check.as_ref().map(|path| {
         let what = |e| Error::File { path: path.clone(), what: format!("the stored page cannot be read: {e}") };
         std::fs::read_to_string(path).map_err(what)
@@ -55,7 +56,7 @@ pub(crate) fn run(cli: &Cli, args: &VerifyArgs) -> Result<ExitCode, Failure> {
     let bench = Bench { root: args.data.clone().unwrap_or_else(shipped::checkout), quick: args.quick };
 
     let started = Instant::now();
-    let (mut stop, mut bar) = (signals::stop_when_asked(), Bar::new(cli));
+    let (mut stop, mut bar) = (signals::stop_when_asked(), Bar::new(terminal));
     let result = verify(&bench, &args.cases, &mut |share, name| {
         bar.show_as(share, 1.0, || format!("case {name}"));
         stop()
@@ -89,7 +90,7 @@ pub(crate) fn run(cli: &Cli, args: &VerifyArgs) -> Result<ExitCode, Failure> {
         })
         .to_string()
     };
-    answer(cli, json, || {
+    answer(terminal, json, || {
         text(&verification, &changed.iter().map(line).collect::<Vec<_>>(), args, page.as_deref(), wall_s)
     });
     Ok(if verification.passed && changed.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(1) })

@@ -9,10 +9,9 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use flexarm::Error;
 
-use crate::args::Cli;
 use crate::failure::Failure;
 use crate::print::{complaint, warning};
-use crate::{answer, to_json};
+use crate::terminal::{Terminal, answer, to_json};
 
 /// Viewer version for which this program writes `.rrd` files.
 const WRITTEN_FOR: &str = "0.36";
@@ -30,10 +29,10 @@ pub(crate) struct ViewArgs {
     pub(crate) wait: bool,
 }
 
-pub(crate) fn run(cli: &Cli, args: &ViewArgs) -> Result<ExitCode, Failure> {
+pub(crate) fn run(terminal: &Terminal, args: &ViewArgs) -> Result<ExitCode, Failure> {
     let file = recording(&args.file)?;
     match ending(&file).as_str() {
-        "html" | "htm" => Ok(browse(cli, &file)),
+        "html" | "htm" => Ok(browse(terminal, &file)),
         kind => {
             let Some(viewer) = Viewer::find() else {
                 return Ok(failed(&format!(
@@ -42,14 +41,14 @@ pub(crate) fn run(cli: &Cli, args: &ViewArgs) -> Result<ExitCode, Failure> {
                      recording with Foxglove (https://foxglove.dev) or PlotJuggler"
                 )));
             };
-            if kind == "rrd" && !viewer.version.starts_with(&format!("{WRITTEN_FOR}.")) && !cli.quiet {
+            if kind == "rrd" && !viewer.version.starts_with(&format!("{WRITTEN_FOR}.")) && !terminal.quiet {
                 warning(&format!(
                     ".rrd files are written for Rerun {WRITTEN_FOR}, the viewer here is {}: if it cannot show the file, \
                      `pip install rerun-sdk=={WANTED}` or view the .mcap recording",
                     viewer.version
                 ));
             }
-            Ok(show(cli, &file, &viewer, args.wait))
+            Ok(show(terminal, &file, &viewer, args.wait))
         }
     }
 }
@@ -119,7 +118,7 @@ fn is_version(word: &str) -> bool {
 }
 
 /// Starts the viewer, and watches it for a moment or waits until it is closed.
-fn show(cli: &Cli, file: &Path, viewer: &Viewer, wait: bool) -> ExitCode {
+fn show(terminal: &Terminal, file: &Path, viewer: &Viewer, wait: bool) -> ExitCode {
     // Error output of a viewer that cannot start. A pipe would break when this program ends.
     let log = std::env::temp_dir().join(format!("flexarm-view-{}.log", std::process::id()));
     let mut command = command(viewer.words);
@@ -147,7 +146,7 @@ fn show(cli: &Cli, file: &Path, viewer: &Viewer, wait: bool) -> ExitCode {
         Some(_) => "handed to the viewer that is open already, by".to_owned(),
         None => format!("open in process {} of", child.id()),
     };
-    answer(cli, json, || format!("{}: {how} `{}` {}\n", file.display(), viewer.name(), viewer.version));
+    answer(terminal, json, || format!("{}: {how} `{}` {}\n", file.display(), viewer.name(), viewer.version));
     if wait && ended.is_none() {
         return match child.wait() {
             Ok(status) if status.success() => ExitCode::SUCCESS,
@@ -187,7 +186,7 @@ fn last_lines(text: &str) -> String {
 }
 
 /// Opens a report in the browser; if none can be started, prints which file to open.
-fn browse(cli: &Cli, file: &Path) -> ExitCode {
+fn browse(terminal: &Terminal, file: &Path) -> ExitCode {
     let path = file.canonicalize().unwrap_or_else(|_| file.to_owned());
     let mut opener = Command::new("xdg-open");
     opener.arg(&path).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
@@ -201,7 +200,7 @@ fn browse(cli: &Cli, file: &Path) -> ExitCode {
             "file": file.display().to_string(), "viewer": viewer, "version": null, "pid": pid.filter(|_| opened),
         }))
     };
-    answer(cli, json, || match opened {
+    answer(terminal, json, || match opened {
         true => format!("{}: opened with xdg-open\n", file.display()),
         false => format!("{}: a report for a browser; open file://{}\n", file.display(), path.display()),
     });

@@ -16,10 +16,10 @@ use flexarm::sweep::{
 };
 
 use self::plan::PlanArgs;
-use crate::args::Cli;
 use crate::failure::Failure;
 use crate::print::{lines, table, warning};
-use crate::{Bar, answer, shipped, signals, to_json};
+use crate::terminal::{Bar, Terminal, answer, to_json};
+use crate::{shipped, signals};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -108,23 +108,23 @@ fn parse_shard(text: &str) -> Result<Shard, String> {
 /// Shipped robots and motions by their names.
 const FINDERS: Finders = Finders { robot: shipped::robot_file, motion: shipped::trajectory_file };
 
-pub(crate) fn run(cli: &Cli, args: &SweepArgs) -> Result<ExitCode, Failure> {
+pub(crate) fn run(terminal: &Terminal, args: &SweepArgs) -> Result<ExitCode, Failure> {
     match (&args.command, &args.run.study) {
-        (Some(SweepCommand::Plan(args)), _) => plan::run(cli, args),
+        (Some(SweepCommand::Plan(args)), _) => plan::run(terminal, args),
         (Some(SweepCommand::Merge(args)), _) => {
             let sweep = Sweep::load(&args.study, &FINDERS)?;
             let output = args.output.clone().unwrap_or_else(|| args.folders[0].clone());
             let summary = merge(&sweep, &args.folders, &output, args.force, Some(command))?;
-            warn(cli, &summary);
-            answer(cli, || to_json(&summary), || text(&summary));
+            warn(terminal, &summary);
+            answer(terminal, || to_json(&summary), || text(&summary));
             Ok(ExitCode::SUCCESS)
         }
-        (None, Some(study)) => sweep(cli, &args.run, study),
+        (None, Some(study)) => sweep(terminal, &args.run, study),
         (None, None) => Err(Failure::Usage("give the file of a study".into())),
     }
 }
 
-fn sweep(cli: &Cli, args: &SweepRunArgs, study: &Path) -> Result<ExitCode, Failure> {
+fn sweep(terminal: &Terminal, args: &SweepRunArgs, study: &Path) -> Result<ExitCode, Failure> {
     let mut sweep = Sweep::load(study, &FINDERS)?;
     let ending = if args.minimise.is_some() { "_least" } else { "" };
     let request = SweepRequest {
@@ -135,7 +135,7 @@ fn sweep(cli: &Cli, args: &SweepRunArgs, study: &Path) -> Result<ExitCode, Failu
         command: Some(command),
     };
     let mut stop = signals::stop_when_asked();
-    let mut bar = Bar::new(cli);
+    let mut bar = Bar::new(terminal);
     // Every finished run is in a file: nothing is lost if the process ends during another one.
     let counts = Arc::new([AtomicUsize::new(0), AtomicUsize::new(0)]);
     let (seen, folder) = (counts.clone(), request.output.clone());
@@ -165,14 +165,14 @@ fn sweep(cli: &Cli, args: &SweepRunArgs, study: &Path) -> Result<ExitCode, Failu
     drop(watch);
     bar.clear();
     let summary = result?;
-    warn(cli, &summary);
-    answer(cli, || to_json(&summary), || text(&summary));
+    warn(terminal, &summary);
+    answer(terminal, || to_json(&summary), || text(&summary));
     // Some runs of a study may fail; the study fails only if no run succeeds.
     Ok(if summary.failed > 0 && summary.done == 0 { ExitCode::FAILURE } else { ExitCode::SUCCESS })
 }
 
-fn warn(cli: &Cli, summary: &SweepSummary) {
-    if !cli.quiet {
+fn warn(terminal: &Terminal, summary: &SweepSummary) {
+    if !terminal.quiet {
         summary.warnings.iter().for_each(|text| warning(text));
     }
 }

@@ -13,9 +13,8 @@ use flexarm::sweep::{Sweep, SweepError, write_files};
 use serde::Serialize;
 
 use super::{FINDERS, clean};
-use crate::args::Cli;
 use crate::failure::Failure;
-use crate::{answer, to_json};
+use crate::terminal::{Terminal, answer, to_json};
 
 #[derive(Debug, Args)]
 pub(crate) struct PlanArgs {
@@ -89,7 +88,7 @@ struct PlanSummary {
     files: Vec<String>,
 }
 
-pub(crate) fn run(cli: &Cli, args: &PlanArgs) -> Result<ExitCode, Failure> {
+pub(crate) fn run(terminal: &Terminal, args: &PlanArgs) -> Result<ExitCode, Failure> {
     let sweep = Sweep::load(&args.study, &FINDERS)?;
     let runs = sweep.runs();
     if args.shards as usize > runs {
@@ -130,7 +129,7 @@ pub(crate) fn run(cli: &Cli, args: &PlanArgs) -> Result<ExitCode, Failure> {
         merge: if joins { String::new() } else { plan.merge() },
         files: files.iter().map(|(path, _)| path.display().to_string()).collect(),
     };
-    answer(cli, || to_json(&summary), || text(&summary));
+    answer(terminal, || to_json(&summary), || text(&summary));
     Ok(ExitCode::SUCCESS)
 }
 

@@ -1,0 +1,128 @@
+//! `flexarm run` and `compare`: from flags to runs.
+
+use std::ffi::OsString;
+use std::process::ExitCode;
+
+use flexarm::{
+    AlphaSettings, Arm, ConstraintForm, FlexibleRobot, Keep, Modelling, ReferenceMethod, ReferenceSettings, Robot,
+    RunOptions, RunRequest, Scenario, SpookPreset, SpookSettings, Start, StepperOptions, Variant,
+};
+
+use crate::args::{FormName, MethodName, PresetName, RunArgs, StartName};
+use crate::failure::Failure;
+use crate::shipped::OutputFolder;
+use crate::terminal::{Bar, Terminal, answer_styled, to_json};
+use crate::{formats, print, shipped, signals, study, summary_table};
+
+/// `line`: the command line as given.
+pub(crate) fn run(
+    terminal: &Terminal,
+    args: &RunArgs,
+    with_twin: bool,
+    line: &[OsString],
+) -> Result<ExitCode, Failure> {
+    if !with_twin && !args.with.is_empty() {
+        return Err(Failure::Usage("--with belongs to compare: run has one run only".into()));
+    }
+    let parts = study::parts(args, line)?;
+    let variants = parts.iter().map(|part| {
+        variant(part.label.clone(), &part.args, with_twin).map_err(|error| match parts.len() {
+            1 => error,
+            _ => Failure::InStudy { label: part.label.clone(), source: Box::new(error) },
+        })
+    });
+    let (variants, mut as_filed): (Vec<Variant>, Vec<FlexibleRobot>) =
+        variants.collect::<Result<Vec<_>, Failure>>()?.into_iter().unzip();
+    let Some(Variant { robot, scenario, options, .. }) = variants.first() else {
+        return Err(Failure::Usage("there is nothing to run".into()));
+    };
+    let stem = format!("{}-{}", robot.name, scenario.motion.name);
+    let folder = OutputFolder::of(args.output.as_deref(), &stem, !args.no_files)?;
+    let outputs = folder.path().map(|folder| formats::outputs(args, folder)).transpose()?;
+
+    let mut stop = signals::stop_when_asked();
+    let mut bar = Bar::new(terminal);
+    let mut progress = |t: f64, total: f64| {
+        bar.show(t, total);
+        stop()
+    };
+    let as_filed = as_filed.pop().filter(|_| options.modelling == Modelling::default());
+    let result = if variants.len() == 1 {
+        let arm = match as_filed {
+            Some(flexible) => Ok(Arm::new(robot.clone(), options.modelling, flexible)),
+            None => robot.flexible(options.modelling),
+        };
+        let request = RunRequest {
+            outputs: outputs.as_ref(),
+            progress: Some(&mut progress),
+            ..RunRequest::keeping(Keep::Figures)
+        };
+        arm.and_then(|arm| arm.simulate_with(scenario, options, request)).map(|run| run.summary)
+    } else {
+        flexarm::compare_study(&variants, outputs.as_ref(), &mut progress).map(|(summary, _)| summary)
+    };
+    bar.clear();
+    let summary = result?;
+    print::caveats(terminal, &study::caveats(&summary));
+    answer_styled(terminal, || to_json(&summary), || summary_table::summary(&summary, summary_table::terminal_width()));
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Returns robot, motion and options of a run, and the robot modelled as its file specifies.
+fn variant(label: String, args: &RunArgs, with_twin: bool) -> Result<(Variant, FlexibleRobot), Failure> {
+    let (robot, as_filed) = Robot::load_modelled(&shipped::robot(args.robot.as_deref())?, &args.load.options()?)?;
+    let trajectory = match (&args.trajectory, &robot.default_trajectory) {
+        (Some(given), _) => shipped::trajectory(given)?,
+        (None, Some(own)) => own.clone(),
+        (None, None) => {
+            let text = "the robot has no default_trajectory: give a .csv or .toml trajectory after the robot";
+            return Err(Failure::Usage(text.into()));
+        }
+    };
+    let motion =
+        flexarm::Motion::load_with(&trajectory, &robot, &args.motion.options()).map_err(|error| match error {
+            flexarm::Error::File { path, what } if args.trajectory.is_none() => {
+                let what = format!("{what} (it is the default_trajectory of {})", robot.path.display());
+                flexarm::Error::File { path, what }
+            }
+            other => other,
+        })?;
+    let motion = match args.round_corners {
+        Some(seconds) => motion.with_rounded_corners(seconds, &*robot.rigid_model()?)?,
+        None => motion,
+    };
+    let start = if args.from_rest == StartName::Equilibrium { Start::Equilibrium } else { Start::Undeformed };
+    let scenario = Scenario::new(motion).with_start(start);
+    let scenario = args.loads.iter().try_fold(scenario, |scenario, path| scenario.with_loads_file(path))?;
+    Ok((Variant { label, robot, scenario, options: run_options(args, with_twin) }, as_filed))
+}
+
+fn run_options(args: &RunArgs, with_twin: bool) -> RunOptions {
+    let stepper_options = StepperOptions {
+        alpha: AlphaSettings { rho: args.rho_inf, dispersion_correction: !args.no_dispersion_correction },
+        spook: SpookSettings {
+            form: if args.spook_form == FormName::Local { ConstraintForm::Local } else { ConstraintForm::Global },
+            preset: if args.spook_preset == PresetName::Exact { SpookPreset::Exact } else { SpookPreset::Source },
+        },
+        reference: ReferenceSettings {
+            method: match args.reference_method {
+                MethodName::Bdf => ReferenceMethod::Bdf,
+                MethodName::Esdirk34 => ReferenceMethod::Esdirk34,
+                MethodName::Tsit45 => ReferenceMethod::Tsit45,
+            },
+            ..ReferenceSettings::new(args.rtol)
+        },
+    };
+    RunOptions {
+        stepper: (args.stepper.with)(&stepper_options),
+        step_s: args.step.unwrap_or(args.stepper.default_step_s),
+        modelling: args.modelling.modelling(),
+        log_rate_hz: args.log_rate,
+        ignore_limits: args.ignore_limits,
+        with_twin,
+        settling_band_m: args.settling_band,
+        magnification: args.magnify,
+        start_ns: args.start_time,
+        embed_meshes: args.embed_meshes,
+    }
+}

@@ -1,0 +1,99 @@
+//! What a command prints: answers for people or in JSON, progress.
+
+use std::io::{IsTerminal, Write};
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+
+use clap::Args;
+use flexarm::written::visible;
+use indicatif::{ProgressBar, ProgressStyle};
+
+use crate::print;
+
+/// Options of all commands.
+#[derive(Debug, Args)]
+pub(crate) struct Terminal {
+    /// Print one JSON object on standard output and nothing else
+    #[arg(long, global = true, help_heading = "Terminal")]
+    pub(crate) json: bool,
+    /// Hide the progress bar and all messages except errors
+    #[arg(long, short, global = true, help_heading = "Terminal")]
+    pub(crate) quiet: bool,
+}
+
+/// Prints text for people or JSON for programs, with control characters escaped; a closed pipe is
+/// not an error.
+pub(crate) fn answer(terminal: &Terminal, json: impl FnOnce() -> String, text: impl FnOnce() -> String) {
+    answer_styled(terminal, json, || print::plain_zeros(&visible(&text())));
+}
+
+/// The same for styled text, whose names are already [`visible`].
+pub(crate) fn answer_styled(terminal: &Terminal, json: impl FnOnce() -> String, text: impl FnOnce() -> String) {
+    let out = if terminal.json { visible_json(&json()) + "\n" } else { text() };
+    // Colours go only to terminals, and not if NO_COLOR is set.
+    let mut stdout = anstream::stdout().lock();
+    match stdout.write_all(out.as_bytes()).and_then(|()| stdout.flush()) {
+        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
+            // A lost answer must not look like success.
+            print::complaint("error", &format!("standard output cannot be written: {error}"));
+            std::process::exit(1);
+        }
+        _ => {}
+    }
+}
+
+/// Escapes the control characters that the JSON writer leaves; they occur only in strings.
+fn visible_json(text: &str) -> String {
+    let is_left = |c: &char| ('\u{7f}'..='\u{9f}').contains(c);
+    let escaped = |c: char| if is_left(&c) { format!("\\u{:04x}", u32::from(c)) } else { c.to_string() };
+    if text.chars().any(|c| is_left(&c)) { text.chars().map(escaped).collect() } else { text.to_owned() }
+}
+
+/// Prints text generated in memory; in JSON under the given key.
+pub(crate) fn written(terminal: &Terminal, key: &str, bytes: Vec<u8>) -> ExitCode {
+    let text = String::from_utf8_lossy(&bytes);
+    answer(terminal, || to_json(&serde_json::json!({ key: text })), || text.to_string());
+    ExitCode::SUCCESS
+}
+
+pub(crate) fn to_json(value: &impl serde::Serialize) -> String {
+    serde_json::to_string(value).expect("plain numbers and strings")
+}
+
+/// A progress bar that appears only on a terminal and only for runs longer than two seconds.
+pub(crate) struct Bar {
+    bar: Option<ProgressBar>,
+    wanted: bool,
+    started: Instant,
+}
+
+impl Bar {
+    pub(crate) fn new(terminal: &Terminal) -> Self {
+        Self { bar: None, wanted: !terminal.quiet && std::io::stderr().is_terminal(), started: Instant::now() }
+    }
+
+    pub(crate) fn show(&mut self, t: f64, total: f64) {
+        self.show_as(t, total, || format!("{t:.2} of {total:.2} s simulated"));
+    }
+
+    pub(crate) fn show_as(&mut self, t: f64, total: f64, message: impl FnOnce() -> String) {
+        if !self.wanted {
+            return;
+        }
+        if self.bar.is_none() && self.started.elapsed() > Duration::from_secs(1) && t < 0.5 * total {
+            let style = ProgressStyle::with_template("{msg} {wide_bar} {percent}% {eta} left");
+            let bar = ProgressBar::new(1000).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+            self.bar = Some(bar);
+        }
+        if let Some(bar) = &self.bar {
+            bar.set_message(message());
+            bar.set_position((1000.0 * t / total.max(1e-9)) as u64);
+        }
+    }
+
+    pub(crate) fn clear(&self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+}
