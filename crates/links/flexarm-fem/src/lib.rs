@@ -66,6 +66,7 @@ pub mod rigid_part;
 pub mod section;
 pub mod sparse;
 pub mod spelling;
+pub mod stress;
 #[cfg(test)]
 pub(crate) mod test_mesh;
 pub mod units;

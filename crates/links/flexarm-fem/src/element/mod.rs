@@ -20,6 +20,7 @@ mod solid;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use elasticity::lame;
 pub use elasticity::{check_solid_material, stress_strain};
 pub use geometry::{InversionPoint, InvertedElement, JacobianRange, jacobian_range};
 #[cfg(test)]
@@ -28,3 +29,4 @@ pub(crate) use quadrature::{TetRule, tet_points};
 pub use rules::{Point, Purpose, Quadrature, for_each_point};
 pub use shape::{edges, reference_nodes, reference_volume, shape_functions};
 pub use solid::ElementWorkspace;
+pub(crate) use solid::mode_gradients_at;

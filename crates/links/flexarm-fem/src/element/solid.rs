@@ -1,6 +1,6 @@
 //! Stiffness and mass of one solid element.
 
-use nalgebra::Vector3;
+use nalgebra::{SMatrix, Vector3};
 
 use super::elasticity::lame;
 use super::geometry::{Geometry, InvertedElement, Jacobian, Nodes, check_nodes};
@@ -86,6 +86,27 @@ impl ElementWorkspace {
             (ElementKind::Wedge15, _) => self.compute::<15, 45>(kind, &nodes, material, rule),
             (ElementKind::Beam2, _) => no_beam(),
         }
+    }
+
+    /// Returns the amplitudes of the incompatible modes of a HEX8 per nodal displacement: three
+    /// components of the mode `1 - r²`, then of `1 - s²` and `1 - t²`. Stiffness and mass are not
+    /// valid afterwards.
+    ///
+    /// # Errors
+    /// [`InvertedElement`] at a Gauss point.
+    pub(crate) fn mode_amplitudes(
+        &mut self,
+        x: &[Vector3<f64>],
+        material: &Material,
+        rule: Quadrature,
+    ) -> Result<SMatrix<f64, 9, 24>, InvertedElement> {
+        let nodes = Nodes::new(ElementKind::Hex8, x);
+        self.n = nodes.n;
+        self.compute::<8, 33>(ElementKind::Hex8, &nodes, material, rule)?;
+        let entry = |i: usize, j: usize| self.stiffness[i * 33 + j];
+        let own = SMatrix::<f64, 9, 9>::from_fn(|i, j| entry(24 + i, 24 + j));
+        let across = SMatrix::<f64, 9, 24>::from_fn(|i, j| -entry(24 + i, j));
+        Ok(own.cholesky().map_or_else(SMatrix::zeros, |factor| factor.solve(&across)))
     }
 
     /// Stiffness, 3n × 3n by rows, N/m; DoF `ux uy uz` of the first node, then of the second, ...
@@ -202,6 +223,18 @@ fn mode_gradients(centre: &Jacobian, det: f64, xi: [f64; 3], m: usize, g: &mut [
             g[a * m + m - 3 + c] = scale * xi[c] * centre.inverse[c][a];
         }
     }
+}
+
+/// Returns the gradients of the three incompatible modes of a HEX8 at `xi`.
+pub(crate) fn mode_gradients_at(x: &[Vector3<f64>], xi: [f64; 3]) -> [Vector3<f64>; 3] {
+    let nodes = Nodes::new(ElementKind::Hex8, x);
+    let table = Table::new(ElementKind::Hex8, &[(xi, 0.0)]);
+    let det = Jacobian::new(8, table.dN(0), &nodes.x).det;
+    let mut g = [0.0; 9];
+    if let Ok(centre) = centre_of_brick(ElementKind::Hex8, 8, &nodes) {
+        mode_gradients(&centre, det, xi, 3, &mut g);
+    }
+    std::array::from_fn(|c| Vector3::new(g[c], g[3 + c], g[6 + c]))
 }
 
 /// Adds `Σ_p w_p g_p g_pᵀ` to the upper triangle (and to a few entries of the lower one).

@@ -45,13 +45,13 @@ use nalgebra::{DMatrix, Matrix3, Vector3};
 use super::source::{BeamElement, ModalSource};
 use super::{GeometricStiffness, axial, symmetric};
 use crate::beam::gauss4;
-use crate::element::{Purpose, for_each_point};
+use crate::element::{Purpose, for_each_point, lame};
 use crate::reduction::Tie;
 use crate::sparse::add_product;
 
 /// Number of acceleration fields of the floating frame: three linear, three angular, six
 /// centrifugal.
-const FIELDS: usize = 12;
+pub(super) const FIELDS: usize = 12;
 
 /// Acceleration field that is linear in position: `a = A s + b`.
 struct Field {
@@ -90,26 +90,10 @@ pub(super) fn geometric_stiffness(
     shapes: &DMatrix<f64>,
 ) -> GeometricStiffness {
     let model = source.condensation.model();
-    let wrenches = source.condensation.unit_load_shapes();
-    let loads = FIELDS + wrenches.ncols();
-
-    // Inertia forces on the DoF; those of beams also per element, for the internal forces.
-    let mut F = solid_forces(source);
     let beam_forces: Vec<_> = beams.iter().map(element_forces).collect();
-    for (beam, forces) in beams.iter().zip(&beam_forces) {
-        for (i, dof) in beam.dofs.iter().enumerate() {
-            let corner = i / 3 * 3;
-            for j in 0..FIELDS {
-                let turned = beam.R * forces.fixed_view::<3, 1>(corner, j);
-                F[(*dof, j)] += turned[i - corner];
-            }
-        }
-    }
-    let mut U = DMatrix::zeros(model.size(), loads);
-    let mut under_inertia = F.clone();
-    source.condensation.solve_held(&mut under_inertia);
-    U.columns_mut(0, FIELDS).copy_from(&under_inertia);
-    U.columns_mut(FIELDS, loads - FIELDS).copy_from(&wrenches);
+    let F = inertia_forces(source, beams, &beam_forces);
+    let U = displacements(source, &F);
+    let loads = U.ncols();
 
     let n = shapes.ncols();
     let mut G = vec![DMatrix::zeros(n, n); loads];
@@ -131,6 +115,41 @@ pub(super) fn geometric_stiffness(
         centrifugal: std::array::from_fn(|_| next()),
         interface: (1..source.interfaces.len()).map(|_| std::array::from_fn(|_| next())).collect(),
     }
+}
+
+/// Displacements of all DoF with A clamped under the inertia loads, then under unit wrenches on the
+/// interfaces after the first.
+pub(super) fn displacements_under_loads(source: &ModalSource<'_>) -> DMatrix<f64> {
+    let beams = source.beams();
+    let beam_forces: Vec<_> = beams.iter().map(element_forces).collect();
+    displacements(source, &inertia_forces(source, &beams, &beam_forces))
+}
+
+fn displacements(source: &ModalSource<'_>, F: &DMatrix<f64>) -> DMatrix<f64> {
+    let wrenches = source.condensation.unit_load_shapes();
+    let mut U = DMatrix::zeros(F.nrows(), FIELDS + wrenches.ncols());
+    let mut under_inertia = F.clone();
+    source.condensation.solve_held(&mut under_inertia);
+    U.columns_mut(0, FIELDS).copy_from(&under_inertia);
+    U.columns_mut(FIELDS, wrenches.ncols()).copy_from(&wrenches);
+    U
+}
+
+/// Inertia forces on the DoF.
+///
+/// * `beam_forces`: those of each beam element, beam axes, for the internal forces.
+fn inertia_forces(source: &ModalSource<'_>, beams: &[BeamElement], beam_forces: &[DMatrix<f64>]) -> DMatrix<f64> {
+    let mut F = solid_forces(source);
+    for (beam, forces) in beams.iter().zip(beam_forces) {
+        for (i, dof) in beam.dofs.iter().enumerate() {
+            let corner = i / 3 * 3;
+            for j in 0..FIELDS {
+                let turned = beam.R * forces.fixed_view::<3, 1>(corner, j);
+                F[(*dof, j)] += turned[i - corner];
+            }
+        }
+    }
+    F
 }
 
 /// `-∫ Nᵀ a dm` over the solids; the nodal interpolation of a linear field is exact.
@@ -172,8 +191,7 @@ fn add_solids(source: &ModalSource<'_>, U: &DMatrix<f64>, shapes: &DMatrix<f64>,
     let (n, loads) = (shapes.ncols(), U.ncols());
     for block in source.mesh.blocks.iter().filter(|block| !block.kind.is_beam()) {
         let material = &source.materials[block.region];
-        let mu = material.shear_modulus();
-        let lambda = material.E * material.nu / ((1.0 + material.nu) * (1.0 - 2.0 * material.nu));
+        let (lambda, mu) = lame(material);
         for nodes in block.elements() {
             let x: Vec<_> = nodes.iter().map(|node| source.mesh.nodes[*node as usize]).collect();
             let dof = |i: usize| model.dofs.of(nodes[i] as usize).start;

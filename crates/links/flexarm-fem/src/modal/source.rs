@@ -139,6 +139,18 @@ impl ModalSource<'_> {
         }
     }
 
+    /// Displacements of all DoF with A clamped: under unit wrenches on the interfaces after the
+    /// first, under the inertia loads, and in the fixed-interface modes.
+    pub(crate) fn displacements(&self) -> DMatrix<f64> {
+        let (under_loads, modes) = (geometric::displacements_under_loads(self), &self.fixed_modes.shapes);
+        let wrenches = under_loads.ncols() - geometric::FIELDS;
+        let mut U = DMatrix::zeros(under_loads.nrows(), under_loads.ncols() + modes.ncols());
+        U.columns_mut(0, wrenches).copy_from(&under_loads.columns(geometric::FIELDS, wrenches));
+        U.columns_mut(wrenches, geometric::FIELDS).copy_from(&under_loads.columns(0, geometric::FIELDS));
+        U.columns_mut(under_loads.ncols(), modes.ncols()).copy_from(modes);
+        U
+    }
+
     /// Displacements of all DoF per coordinate, A clamped.
     pub(super) fn shapes(&self) -> DMatrix<f64> {
         let (T, modes) = (self.condensation.shapes(), &self.fixed_modes.shapes);
@@ -159,7 +171,7 @@ impl ModalSource<'_> {
         self.interfaces[1..].iter().enumerate().map(one).collect()
     }
 
-    fn beams(&self) -> Vec<BeamElement> {
+    pub(super) fn beams(&self) -> Vec<BeamElement> {
         let model = self.condensation.model();
         let mut beams = Vec::new();
         for block in self.mesh.blocks.iter().filter(|block| block.kind.is_beam()) {

@@ -319,6 +319,11 @@ impl<'m> Condensation<'m> {
         }
     }
 
+    /// Compliance of the interfaces after the first, which is clamped; six rows per interface.
+    pub fn tip(&self) -> &DMatrix<f64> {
+        &self.tip
+    }
+
     /// Model that was reduced.
     pub fn model(&self) -> &FeModel {
         self.model

@@ -1,0 +1,165 @@
+//! Stress against closed forms and energies.
+#![allow(clippy::print_stderr, reason = "tables of measured errors, shown with --nocapture")]
+
+use flexarm_spatial::Pose;
+use nalgebra::{Rotation3, Vector3};
+
+use super::*;
+use crate::element::Quadrature;
+use crate::material::Material;
+use crate::mesh::{ElementKind, Mesh};
+use crate::modal::ModalSource;
+use crate::model::{AssemblyOptions, FeModel};
+use crate::reduction::{Condensation, Interface, InterfaceFrame, Tie};
+use crate::sparse::ModesWanted;
+use crate::test_mesh::cube;
+
+/// Bar along x with its interfaces at both ends.
+struct Bar {
+    mesh: Mesh,
+    interfaces: Vec<Interface>,
+    material: Material,
+    quadrature: Quadrature,
+}
+
+impl Bar {
+    fn new(kind: ElementKind, divisions: [usize; 3], [l, w, h]: [f64; 3]) -> Self {
+        let size = |u: Vector3<f64>| Vector3::new(u.x * l, (u.y - 0.5) * w, (u.z - 0.5) * h);
+        let mesh = cube(kind, divisions, true, size);
+        let near = |x: f64| -> Vec<u32> {
+            let nodes = mesh.nodes.iter().enumerate().filter(|(_, p)| (p.x - x).abs() < 1e-9);
+            nodes.map(|(k, _)| k as u32).collect()
+        };
+        let interface = |name: &str, x: f64| Interface {
+            name: name.into(),
+            X_LI: Pose::from_parts(Vector3::new(x, 0.0, 0.0).into(), Rotation3::identity()),
+            nodes: near(x),
+            tie: Tie::Rigid,
+        };
+        let interfaces = vec![interface("a", 0.0), interface("b", l)];
+        // Without lateral contraction a rigid interface does not disturb the stress of a bar.
+        Self { mesh, interfaces, material: Material { nu: 0.0, ..Material::STEEL }, quadrature: Quadrature::Exact }
+    }
+
+    /// Calls `work` with the reduced mesh and its modal link.
+    fn reduced<R>(&self, modes: usize, work: impl FnOnce(&ModalSource<'_>) -> R) -> R {
+        let options = AssemblyOptions { quadrature: self.quadrature, material: Some(self.material) };
+        let model = FeModel::assemble(&self.mesh, &options).unwrap();
+        let condensation = Condensation::new(&model, &self.interfaces, Default::default()).unwrap();
+        let fixed_modes = condensation.fixed_modes(ModesWanted::Count(modes)).unwrap();
+        let frame = |i: &Interface| InterfaceFrame { name: i.name.clone(), X_LI: i.X_LI, tie: Some(i.tie) };
+        let superelement = condensation.superelement(self.interfaces.iter().map(frame).collect(), &fixed_modes);
+        work(&ModalSource {
+            mesh: &self.mesh,
+            materials: &[self.material],
+            quadrature: self.quadrature,
+            condensation: &condensation,
+            interfaces: &self.interfaces,
+            fixed_modes: &fixed_modes,
+            superelement: &superelement,
+        })
+    }
+}
+
+const SOLIDS: [ElementKind; 6] = [
+    ElementKind::Tet4,
+    ElementKind::Tet10,
+    ElementKind::Hex8,
+    ElementKind::Hex20,
+    ElementKind::Wedge6,
+    ElementKind::Wedge15,
+];
+
+/// Truth: force over area.
+#[test]
+fn a_bar_under_tension_has_force_over_area_at_every_node_of_every_element() {
+    for kind in SOLIDS {
+        let bar = Bar::new(kind, [4, 2, 2], [1.0, 0.1, 0.05]);
+        let fields = bar.reduced(0, |source| source.stress_fields("bar"));
+        let worst = (0..fields.seats.len()).map(|k| {
+            let own: [f64; 6] = std::array::from_fn(|c| f64::from(fields.stress[(6 * k + c, 0)]));
+            let off = [own[0] / 200.0 - 1.0, own[1] / 200.0, own[2] / 200.0, own[3] / 200.0];
+            off.into_iter().fold(0.0, |worst: f64, off| worst.max(off.abs()))
+        });
+        let worst = worst.fold(0.0, f64::max);
+        eprintln!("{}: {worst:.1e}", kind.name());
+        assert!(worst < 2e-7, "{kind:?}: {worst:e}"); // single precision
+    }
+}
+
+/// Truth: bending stress M z / I of a cantilever with a tip force, at half its length.
+#[test]
+fn a_cantilever_under_a_tip_force_has_the_bending_stress_of_beam_theory() {
+    let [l, w, h] = [1.0, 0.05, 0.1];
+    for (kind, bound) in [
+        (ElementKind::Tet10, 2e-2),
+        (ElementKind::Hex8, 2e-2),
+        (ElementKind::Hex20, 1e-3),
+        (ElementKind::Wedge15, 1e-3),
+    ] {
+        let bar = Bar::new(kind, [20, 2, 4], [l, w, h]);
+        let fields = bar.reduced(0, |source| source.stress_fields("bar"));
+        let sigma = 0.5 * l * (0.5 * h) / (w * h.powi(3) / 12.0);
+        let at = |p: &Vector3<f64>| (p.x - 0.5 * l).abs() < 1e-9 && (p.z.abs() - 0.5 * h).abs() < 1e-9;
+        let mut worst = 0.0_f64;
+        for (k, seat) in fields.seats.iter().enumerate().filter(|(_, seat)| at(&seat.position)) {
+            let own = f64::from(fields.stress[(6 * k, 2)]);
+            worst = worst.max((own / sigma + seat.position.z.signum()).abs());
+        }
+        eprintln!("{}: {worst:.1e}", kind.name());
+        assert!(worst < bound && worst > 0.0, "{kind:?}: {worst:e}");
+    }
+}
+
+/// Truth: σ = ρ ω² (l² - x²)/2 of a bar that rotates about z through its clamped end, without
+/// lateral contraction.
+#[test]
+fn a_rotating_bar_bears_its_own_centrifugal_load() {
+    let bar = Bar::new(ElementKind::Hex20, [10, 1, 1], [1.0, 0.02, 0.02]);
+    let fields = bar.reduced(0, |source| source.stress_fields("bar"));
+    let omega_zz = 6 + 6 + 2; // wrenches, linear and angular accelerations, xx, yy
+    let top = 0.5 * bar.material.rho;
+    let off = fields.seats.iter().enumerate().map(|(k, seat)| {
+        let x = seat.position.x;
+        (f64::from(fields.stress[(6 * k, omega_zz)]) - top * (1.0 - x * x)).abs() / top
+    });
+    let off = off.fold(0.0, f64::max);
+    eprintln!("{off:.1e}");
+    assert!(off < 4e-3, "{off:e}"); // a quadratic within each element, at its ends
+}
+
+/// Truth: the energy of the amplitudes, half ηᵀ K η.
+#[test]
+fn the_energy_of_the_stress_is_that_of_the_amplitudes() {
+    for kind in [ElementKind::Tet10, ElementKind::Hex8, ElementKind::Hex20] {
+        let mut bar = Bar::new(kind, [6, 2, 2], [0.4, 0.1, 0.05]);
+        bar.material = Material::ALUMINIUM;
+        let (largest, smallest) = bar.reduced(4, |source| {
+            let model = source.condensation.model();
+            let (T, modes) = (source.condensation.shapes(), &source.fixed_modes.shapes);
+            let eta = [1e-4, -2e-4, 3e-4, 1e-3, 2e-3, -1e-3, 1e-5, 2e-5, -1e-5, 3e-5];
+            let mut u = nalgebra::DMatrix::zeros(T.nrows(), 1);
+            for (k, eta) in eta.iter().enumerate() {
+                let column = if k < 6 { T.column(6 + k) } else { modes.column(k - 6) };
+                u.column_mut(0).axpy(*eta, &column, 1.0);
+            }
+            let (materials, quadrature) = (source.materials, source.quadrature);
+            let recovery = StressRecovery { mesh: source.mesh, model, materials, quadrature };
+            let (E, nu) = (materials[0].E, materials[0].nu);
+            let mut energy = 0.0;
+            recovery.for_each_point(&u, |point| {
+                let [xx, yy, zz, xy, yz, zx] = point.stress[0];
+                let normal = xx * xx + yy * yy + zz * zz - 2.0 * nu * (xx * yy + yy * zz + zz * xx);
+                let shear = 2.0 * (1.0 + nu) * (xy * xy + yz * yz + zx * zx);
+                energy += 0.5 * point.weight * (normal + shear) / E;
+            });
+            let K = source.superelement.K.view((6, 6), (10, 10)).into_owned();
+            let eta = nalgebra::DVector::from_row_slice(&eta);
+            let truth = 0.5 * (eta.transpose() * K * &eta)[(0, 0)];
+            (energy, truth)
+        });
+        let off = (largest / smallest - 1.0).abs();
+        eprintln!("{}: {off:.1e}", kind.name());
+        assert!(off < 1e-9, "{kind:?}: {off:e}");
+    }
+}
