@@ -141,7 +141,7 @@ impl ModalSource<'_> {
 
     /// Displacements of all DoF with A clamped: under unit wrenches on the interfaces after the
     /// first, under the inertia loads, and in the fixed-interface modes.
-    pub(crate) fn displacements(&self) -> DMatrix<f64> {
+    pub fn displacements(&self) -> DMatrix<f64> {
         let (under_loads, modes) = (geometric::displacements_under_loads(self), &self.fixed_modes.shapes);
         let wrenches = under_loads.ncols() - geometric::FIELDS;
         let mut U = DMatrix::zeros(under_loads.nrows(), under_loads.ncols() + modes.ncols());
