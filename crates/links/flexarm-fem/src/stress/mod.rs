@@ -19,9 +19,11 @@
 //! Meth. Eng.* 10.
 
 mod fields;
+mod file;
 mod recovery;
 #[cfg(test)]
 mod tests;
 
 pub use fields::{INERTIA_LOADS, StressFields, StressSeat};
+pub use file::{parse_stress, write_stress};
 pub use recovery::{NodalPlace, StressPoint, StressRecovery, von_mises};

@@ -163,3 +163,24 @@ fn the_energy_of_the_stress_is_that_of_the_amplitudes() {
         assert!(off < 1e-9, "{kind:?}: {off:e}");
     }
 }
+
+#[test]
+fn a_stress_file_returns_what_was_written_and_refuses_damage() {
+    let bar = Bar::new(ElementKind::Tet10, [2, 1, 1], [0.4, 0.1, 0.05]);
+    let fields = bar.reduced(2, |source| source.stress_fields("bar"));
+    let bytes = write_stress(&fields);
+    assert_eq!(bytes, write_stress(&fields));
+    assert_eq!(parse_stress(&bytes).unwrap(), fields);
+    for length in [0, 7, 100, bytes.len() / 2, bytes.len() - 1] {
+        assert!(parse_stress(&bytes[..length]).is_err(), "{length}");
+    }
+    let text = String::from_utf8_lossy(&bytes).into_owned();
+    assert!(text.contains("flexarm stress 1"));
+    let newer: Vec<u8> = {
+        let mut bytes = bytes.clone();
+        let at = bytes.windows(16).position(|word| word == b"flexarm stress 1").unwrap();
+        bytes[at + 15] = b'9';
+        bytes
+    };
+    assert!(parse_stress(&newer).unwrap_err().contains("flexarm stress 9"));
+}
