@@ -20,6 +20,8 @@ pub struct Observation {
     pub q: DVector<f64>,
     /// Their velocities.
     pub qdot: DVector<f64>,
+    /// Their accelerations; NaN if the stepper has none.
+    pub qddot: DVector<f64>,
     /// Poses of all bodies in the world.
     pub X_WB: Vec<Pose>,
     /// Torques or forces of the drives, per actuated coordinate.
@@ -49,6 +51,7 @@ impl Observation {
             model: model.clone(),
             q: DVector::zeros(model.nv()),
             qdot: DVector::zeros(model.nv()),
+            qddot: DVector::zeros(model.nv()),
             X_WB: vec![Pose::identity(); model.bodies().len()],
             drive: DVector::zeros(model.n_actuated()),
             load: vec![Vector6::zeros(); arm.elements.len()],
@@ -77,6 +80,7 @@ pub(crate) fn observe_reduced(
     out.model.clone_from(&arm.model);
     out.q.copy_from(&state.q);
     out.qdot.copy_from(&state.qdot);
+    out.qddot.copy_from(&system.qddot);
 
     // Drives: inverse dynamics of prescribed joints, held torques of controlled joints.
     out.drive.copy_from(&data.tau.rows(0, n));

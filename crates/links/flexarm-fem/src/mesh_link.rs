@@ -30,6 +30,7 @@ use crate::reduction::{
 };
 use crate::rigid_part::RigidPart;
 use crate::sparse::{Modes, ModesError, ModesWanted};
+use crate::stress::{INERTIA_LOADS, StressFields};
 
 /// Position of the elastic joint of the two-part link.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -70,6 +71,9 @@ pub struct LinkPlan {
     /// Whether to compute the geometric stiffness of the modal link; 12 more solves and a pass over
     /// all elements.
     pub geometric: bool,
+    /// Whether to compute the stress at the nodes of the surface; 12 more solves and a pass over all
+    /// elements.
+    pub stress: bool,
     /// Number of modes with A clamped against which the reduced models are checked.
     pub judged_modes: usize,
     /// Limits of the gate.
@@ -97,6 +101,8 @@ pub struct MeshReduction {
     pub bare_chains: Vec<Chain>,
     /// Total number of right-hand sides solved.
     pub solves: usize,
+    /// Stress at the nodes of the surface, if requested.
+    pub stress: Option<StressFields>,
     /// Warnings about accepted but suspicious input.
     pub doubts: Vec<Doubt>,
 }
@@ -287,6 +293,7 @@ pub fn reduce_mesh(
         fixed_modes: &fixed_modes,
         superelement: &superelement,
     };
+    let stress = plan.stress.then(|| modal.stress_fields(&plan.name));
     let modal = modal.modal_link(&plan.name, plan.geometric);
     link.details = Some(Box::new(LinkDetails {
         superelement: Some(superelement),
@@ -296,10 +303,10 @@ pub fn reduce_mesh(
         gate: Some(gate),
     }));
     doubts.extend(link.warnings(&plan.limits).into_iter().map(|said| Doubt::from_message("gate", said)));
-    let stress_solves = if plan.geometric { 12 } else { 0 };
-    let solves = fixed_modes.solves + held_modes.solves + condensation.figures().static_solves + stress_solves;
+    let inertia_solves = [plan.geometric, plan.stress].into_iter().filter(|wanted| *wanted).count() * INERTIA_LOADS;
+    let solves = fixed_modes.solves + held_modes.solves + condensation.figures().static_solves + inertia_solves;
     let solver = condensation.figures();
-    Ok(MeshReduction { link, whole, solver, unit_loads, fixed_modes, held_modes, bare_chains, solves, doubts })
+    Ok(MeshReduction { link, whole, solver, unit_loads, fixed_modes, held_modes, bare_chains, solves, stress, doubts })
 }
 
 /// Hint for removing a hinge.

@@ -43,6 +43,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         chains: Vec::new(),
         attached: Vec::new(),
         geometric: false,
+        stress: false,
         judged_modes: 6,
         limits: GateLimits::default(),
         provenance: Provenance::default(),

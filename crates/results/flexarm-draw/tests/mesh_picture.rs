@@ -105,6 +105,7 @@ fn reduce(mesh: &Mesh, interfaces: &[Interface]) -> MeshReduction {
         chains: Vec::new(),
         attached: Vec::new(),
         geometric: false,
+        stress: false,
         judged_modes: 4,
         limits: GateLimits::default(),
         provenance: Provenance::default(),

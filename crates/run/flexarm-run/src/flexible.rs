@@ -55,6 +55,8 @@ pub struct RobotLink {
     pub beam: Option<BeamLink>,
     /// Choices made in the robot file.
     pub choices: LinkChoices,
+    /// File of its stress fields, beside that of the reduced link.
+    pub stress: Option<PathBuf>,
 }
 
 /// Choices of a robot file for a flexible link.

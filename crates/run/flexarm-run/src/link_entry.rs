@@ -125,7 +125,9 @@ pub(crate) fn flexible_link(
         },
     };
     let stiffness = entry.stiffness.as_ref().map(|given| matrix6(given, entry, source)).transpose()?;
-    let link = RobotLink { flexible, damping, stiffness, stiffness_factor, stiffness_factors, beam, choices };
+    let stress = entry.reduced.as_ref().map(|file| home.folder.join(file.get_ref()).with_extension(STRESS_FILE));
+    let stress = stress.filter(|file| file.is_file());
+    let link = RobotLink { flexible, damping, stiffness, stiffness_factor, stiffness_factors, beam, choices, stress };
     // The requested model must exist; overrides are checked when they are used.
     link.form_or_key(&Modelling::default()).map_err(|(asked, message)| {
         let key = match asked {

@@ -54,14 +54,14 @@ use crate::sparse::add_product;
 pub(super) const FIELDS: usize = 12;
 
 /// Acceleration field that is linear in position: `a = A s + b`.
-struct Field {
-    A: Matrix3<f64>,
-    b: Vector3<f64>,
+pub(crate) struct Field {
+    pub(crate) A: Matrix3<f64>,
+    pub(crate) b: Vector3<f64>,
 }
 
 impl Field {
     /// Unit field `i` of [`FIELDS`].
-    fn unit(i: usize) -> Self {
+    pub(crate) fn unit(i: usize) -> Self {
         let e = |a: usize| Vector3::ith(a, 1.0);
         let (zero, none) = (Matrix3::zeros(), Vector3::zeros());
         match i {

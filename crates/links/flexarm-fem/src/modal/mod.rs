@@ -44,6 +44,7 @@ use crate::error::FemError;
 use crate::reduction::{generalised_frequencies, spd_inverse};
 use crate::rigid_part::RigidPart;
 
+pub(crate) use geometric::Field;
 pub use source::ModalSource;
 
 /// Interface of a modal link, with its shape matrix.

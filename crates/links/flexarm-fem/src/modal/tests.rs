@@ -289,6 +289,7 @@ fn a_condensed_matrix_tells_everything_of_first_order() {
         chains: Vec::new(),
         attached: Vec::new(),
         geometric: true,
+        stress: false,
         judged_modes: 4,
         limits: crate::GateLimits::default(),
         provenance: Provenance::default(),

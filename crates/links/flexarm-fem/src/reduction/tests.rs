@@ -64,6 +64,7 @@ fn plan(interfaces: Vec<Interface>, material: Material, modes: usize) -> LinkPla
         chains: Vec::new(),
         attached: Vec::new(),
         geometric: false,
+        stress: false,
         judged_modes: 6,
         limits: crate::GateLimits::default(),
         provenance: Provenance::default(),

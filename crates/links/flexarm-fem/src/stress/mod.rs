@@ -20,10 +20,12 @@
 
 mod fields;
 mod file;
+mod map;
 mod recovery;
 #[cfg(test)]
 mod tests;
 
 pub use fields::{INERTIA_LOADS, StressFields, StressSeat};
 pub use file::{parse_stress, write_stress};
+pub use map::{StressMap, inertia_loads};
 pub use recovery::{NodalPlace, StressPoint, StressRecovery, von_mises};

@@ -2,15 +2,18 @@
 #![allow(clippy::print_stderr, reason = "tables of measured errors, shown with --nocapture")]
 
 use flexarm_spatial::Pose;
-use nalgebra::{Rotation3, Vector3};
+use nalgebra::{DVector, Rotation3, Vector3};
 
 use super::*;
 use crate::element::Quadrature;
 use crate::material::Material;
 use crate::mesh::{ElementKind, Mesh};
-use crate::modal::ModalSource;
+use crate::mesh_link::{LinkPlan, SplitAt, reduce_mesh};
+use crate::modal::{ModalLink, ModalSource};
 use crate::model::{AssemblyOptions, FeModel};
+use crate::reduced::ElasticSplit;
 use crate::reduction::{Condensation, Interface, InterfaceFrame, Tie};
+use crate::rigid_part::RigidPart;
 use crate::sparse::ModesWanted;
 use crate::test_mesh::cube;
 
@@ -183,4 +186,88 @@ fn a_stress_file_returns_what_was_written_and_refuses_damage() {
         bytes
     };
     assert!(parse_stress(&newer).unwrap_err().contains("flexarm stress 9"));
+}
+
+/// Truth: the field of the mesh. A link at rest in an accelerated frame has the deflection of its
+/// model, here by the mass matrix of the modal link and by Newton's law for rigid parts; its stress
+/// does not depend on the model.
+#[test]
+fn the_stress_of_a_link_at_rest_does_not_depend_on_its_model() {
+    let mut bar = Bar::new(ElementKind::Tet10, [8, 2, 2], [0.6, 0.1, 0.05]);
+    bar.material = Material::ALUMINIUM;
+    let plan = LinkPlan {
+        name: "bar".into(),
+        interfaces: bar.interfaces.clone(),
+        assembly: AssemblyOptions { quadrature: bar.quadrature, material: Some(bar.material) },
+        condensation: Default::default(),
+        modes: ModesWanted::Count(6),
+        split: SplitAt::Fraction(0.4),
+        chains: vec![4],
+        attached: Vec::new(),
+        geometric: false,
+        stress: true,
+        judged_modes: 6,
+        limits: Default::default(),
+        provenance: Default::default(),
+    };
+    let reduction = reduce_mesh(&bar.mesh, &plan, &mut |_| {}).unwrap();
+    let (fields, link) = (reduction.stress.unwrap(), reduction.link);
+    let details = link.details.as_ref().unwrap();
+    let (a, alpha) = (Vector3::new(1.0, -2.0, 9.81), Vector3::new(5.0, 30.0, -8.0));
+    let loads = inertia_loads(&a, &alpha, &Vector3::zeros());
+    let column = |numbers: &[f64]| DVector::from_iterator(numbers.len(), numbers.iter().map(|number| *number as f32));
+    let whole = fields.stress.columns(6, INERTIA_LOADS) * column(&loads);
+
+    let of_modal = |modal: &ModalLink| {
+        let n = modal.coordinates();
+        let frame = DVector::from_row_slice(&[a.x, a.y, a.z, alpha.x, alpha.y, alpha.z]);
+        let force = -(modal.mass_matrix().view((6, 0), (n, 6)) * frame);
+        modal.K.clone().cholesky().unwrap().solve(&force)
+    };
+    let of_parts = |joints: &[ElasticSplit], parts: &[RigidPart]| {
+        let deflections = joints.iter().enumerate().flat_map(|(k, joint)| {
+            let p = joint.X_LS.translation.vector;
+            let mut F = nalgebra::Vector6::zeros();
+            for part in &parts[k + 1..] {
+                let force = -(a + alpha.cross(&part.com)) * part.mass;
+                let torque = (part.com - p).cross(&force) - part.inertia * alpha;
+                let R = joint.X_LS.rotation.inverse();
+                let (force, torque) = (R * force, R * torque);
+                F += nalgebra::Vector6::new(force.x, force.y, force.z, torque.x, torque.y, torque.z);
+            }
+            let e = joint.K_S.cholesky().unwrap().solve(&F);
+            e.iter().copied().collect::<Vec<_>>()
+        });
+        DVector::from_vec(deflections.collect())
+    };
+    let modal = details.modal.as_ref().unwrap();
+    let (few, chain) = (modal.truncated(2).unwrap(), &details.chains[0]);
+    let two = (std::slice::from_ref(&link.split), [link.proximal, link.distal]);
+    let cases = [
+        ("six modes", fields.modal_map(modal, 1.0).unwrap(), of_modal(modal)),
+        ("two modes", fields.modal_map(&few, 1.0).unwrap(), of_modal(&few)),
+        ("two parts", fields.chain_map(two.0, &two.1, 1.0).unwrap(), of_parts(two.0, &two.1)),
+        (
+            "four parts",
+            fields.chain_map(&chain.joints, &chain.parts, 1.0).unwrap(),
+            of_parts(&chain.joints, &chain.parts),
+        ),
+    ];
+    for (name, map, q) in cases {
+        let mut amplitudes = Vec::new();
+        map.append(q.as_slice(), &loads, &mut amplitudes);
+        let own = map.stress() * DVector::from_vec(amplitudes);
+        let off = (&own - &whole).amax() / whole.amax();
+        eprintln!("{name}: {off:.1e} of the largest stress");
+        assert!(off < 1e-5, "{name}: {off:e}");
+    }
+    // Twice the stiffness halves the deflection and leaves the stress.
+    let map = fields.modal_map(modal, 2.0).unwrap();
+    let mut amplitudes = Vec::new();
+    map.append((of_modal(modal) * 0.5).as_slice(), &loads, &mut amplitudes);
+    let off = (map.stress() * DVector::from_vec(amplitudes) - &whole).amax() / whole.amax();
+    assert!(off < 1e-5, "{off:e}");
+    let other =
+        Bar::new(ElementKind::Tet10, [8, 2, 2], [0.6, 0.1, 0.06]).reduced(2, |source| source.stress_fields("x"));
+    assert!(other.chain_map(two.0, &two.1, 1.0).unwrap_err().contains("another link"));
 }

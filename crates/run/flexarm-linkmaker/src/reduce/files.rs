@@ -6,6 +6,9 @@ use flexarm_files::{FileError, check_free, file_stem, write_all};
 
 use super::job::ReduceJob;
 
+/// Extension of the stress file beside a link file.
+pub(crate) const STRESS: &str = "stress";
+
 /// Paths of the results.
 #[derive(Clone, Debug, Default)]
 pub struct ReduceOutputs {
@@ -22,6 +25,8 @@ pub struct ReduceOutputs {
 pub(super) struct Paths {
     pub(super) folder: Option<Folder>,
     pub(super) flex: Option<PathBuf>,
+    /// Whether a stress file is written beside each link file.
+    with_stress: bool,
     overwrite: bool,
 }
 
@@ -41,13 +46,19 @@ impl Paths {
         self.flex.as_deref().or(self.folder.as_ref().map(|folder| folder.flex.as_path()))
     }
 
+    /// Returns the stress files, one beside each link file.
+    pub(super) fn stress(&self) -> Vec<PathBuf> {
+        let links = self.folder.iter().map(|folder| &folder.flex).chain(&self.flex);
+        links.filter(|_| self.with_stress).map(|flex| flex.with_extension(STRESS)).collect()
+    }
+
     /// Returns the paths of a reduction, after checking that they are free or may be overwritten.
     ///
     /// # Errors
     /// [`FileError::Taken`] for an existing file, [`FileError::Unusable`] for a folder in the place
     /// of a file.
-    pub(super) fn new(outputs: &ReduceOutputs, link: &str) -> Result<Self, FileError> {
-        let file = file_stem(link);
+    pub(super) fn new(outputs: &ReduceOutputs, job: &ReduceJob) -> Result<Self, FileError> {
+        let file = file_stem(&job.link_name());
         let folder = outputs.folder.as_ref().map(|path| Folder {
             flex: path.join(format!("{file}.flex")),
             job: path.join("reduce.toml"),
@@ -59,7 +70,8 @@ impl Paths {
         let whole = |path: &Path| std::path::absolute(path).map(|path| normal(&path)).ok();
         let in_folder = folder.as_ref().and_then(|folder| whole(&folder.flex));
         let flex = outputs.flex.clone().filter(|path| in_folder.is_none() || whole(path) != in_folder);
-        let paths = Self { folder, flex, overwrite: outputs.overwrite };
+        let with_stress = job.stress == Some(true);
+        let paths = Self { folder, flex, with_stress, overwrite: outputs.overwrite };
         paths.check()?;
         Ok(paths)
     }
@@ -68,7 +80,7 @@ impl Paths {
         let pictures = |f: &Folder| ["interfaces.png", "unit_loads.png", "modes.png"].map(|name| f.path.join(name));
         let texts = |f: &Folder| [&f.flex, &f.job, &f.summary, &f.report].map(Clone::clone);
         let in_folder = self.folder.iter().flat_map(|f| texts(f).into_iter().chain(pictures(f)));
-        in_folder.chain(self.flex.clone()).collect()
+        in_folder.chain(self.flex.clone()).chain(self.stress()).collect()
     }
 
     fn check(&self) -> Result<(), FileError> {

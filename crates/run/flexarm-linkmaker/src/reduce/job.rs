@@ -71,6 +71,9 @@ pub struct ReduceJob {
     /// `geometric_stiffening = true` of a robot file needs.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub geometric: Option<bool>,
+    /// Whether to store the stress at the nodes of the surface, in a file beside the link file.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stress: Option<bool>,
     /// Distance below which nodes are merged, unit of the mesh; closes seams and cracks.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub merge: Option<f64>,
@@ -233,6 +236,7 @@ impl ReduceJob {
         put(&mut self.split, flags.split);
         put(&mut self.chains, flags.chains);
         put(&mut self.geometric, flags.geometric);
+        put(&mut self.stress, flags.stress);
         put(&mut self.merge, flags.merge);
         put(&mut self.quadrature, flags.quadrature);
         put(&mut self.ordering, flags.ordering);

@@ -37,6 +37,7 @@ use cpu_time::ProcessTime;
 use flexarm_fe_io::mesh::{MeshFile, ReadOptions};
 use flexarm_fe_io::read_mesh;
 use flexarm_fem::mesh_link::ReductionStep;
+use flexarm_fem::stress::write_stress;
 use flexarm_fem::{UnitSystem, reduce_mesh, write_flex};
 use flexarm_settings::caveat;
 use flexarm_spatial::Pose;
@@ -110,7 +111,7 @@ impl Reduction {
         let (started, cpu) = (Instant::now(), ProcessTime::now());
         progress(ReduceProgress { step: "reading the mesh", number: 1, of: STEPS });
         let job = with_defaults(job)?;
-        let paths = outputs.map(|outputs| Paths::new(outputs, &job.link_name())).transpose()?;
+        let paths = outputs.map(|outputs| Paths::new(outputs, &job)).transpose()?;
         let mesh = read(&job)?;
         Ok(Self { job, paths, mesh, started, cpu })
     }
@@ -152,7 +153,10 @@ impl Reduction {
         summary.peak_rss_bytes = crate::stamp::peak_rss_bytes();
         if let Some(paths) = paths {
             let pictures = if paths.folder.is_some() { pictures(&file.mesh, &plan, &reduction)? } else { Vec::new() };
-            write(&job, &paths, &write_flex(&reduction.link), &pictures, &mut summary)?;
+            let stress = reduction.stress.as_ref().map(write_stress);
+            let contents =
+                Contents { flex: &write_flex(&reduction.link), stress: stress.as_deref(), pictures: &pictures };
+            write(&job, &paths, &contents, &mut summary)?;
             // Set after writing: the files must not depend on their location.
             let distal = robot.and_then(UrdfLink::distal_joint);
             let link = robot.map_or(&summary.link, |robot| &robot.name);
@@ -211,6 +215,7 @@ fn with_defaults(job: &ReduceJob) -> Result<ReduceJob, JobError> {
         return Err(JobError::ChainParts(*parts));
     }
     job.geometric.get_or_insert(false);
+    job.stress.get_or_insert(false);
     job.tie.get_or_insert(Tie::Rigid);
     job.split.get_or_insert(SplitChoice::ElasticCentre);
     job.quadrature.get_or_insert(QuadratureChoice::Exact);
@@ -256,15 +261,23 @@ fn pictures(
     Ok(Vec::new())
 }
 
+/// Contents of files made of the link.
+struct Contents<'a> {
+    flex: &'a str,
+    stress: Option<&'a [u8]>,
+    pictures: &'a [(&'static str, Vec<u8>)],
+}
+
 fn write(
     job: &ReduceJob,
     paths: &Paths,
-    flex: &str,
-    pictures: &[(&'static str, Vec<u8>)],
+    contents: &Contents<'_>,
     summary: &mut ReduceSummary,
 ) -> Result<(), LinkError> {
+    let Contents { flex, stress, pictures } = *contents;
     let text = |path: &std::path::Path| Some(path.display().to_string());
     summary.files.flex = paths.flex().and_then(text);
+    summary.files.stress = paths.stress().first().and_then(|path| text(path));
     let (mut job_text, mut json, mut page) = (String::new(), String::new(), String::new());
     if let Some(folder) = &paths.folder {
         summary.files.job = text(&folder.job);
@@ -287,5 +300,6 @@ fn write(
         files.extend(pictures.iter().map(|(name, png)| (folder.path.join(name), png.as_slice())));
     }
     files.extend(paths.flex.clone().map(|path| (path, flex.as_bytes())));
+    files.extend(stress.iter().flat_map(|stress| paths.stress().into_iter().map(|path| (path, *stress))));
     Ok(paths.write(&files)?)
 }

@@ -241,6 +241,7 @@ fn plan(
         chains: job.chains.clone().unwrap_or_default(),
         attached: Vec::new(),
         geometric: job.geometric.unwrap_or(false),
+        stress: job.stress.unwrap_or(false),
         judged_modes: JUDGED_MODES,
         limits: GateLimits::default(),
         provenance: provenance(job, file, units, chosen, materials),

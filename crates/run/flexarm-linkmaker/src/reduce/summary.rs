@@ -93,6 +93,8 @@ pub struct ReduceSummary {
 pub struct ReduceFiles {
     /// Link file, for `reduced = "..."` of a robot file.
     pub flex: Option<String>,
+    /// Stress at the nodes of the surface, beside the link file; null unless requested.
+    pub stress: Option<String>,
     /// Entry for a robot file that uses the link, as TOML.
     pub entry: Option<String>,
     /// Complete job, to run it again.

@@ -10,6 +10,7 @@ pub(crate) mod deflection;
 pub(crate) mod drive_load;
 pub(crate) mod energy;
 pub(crate) mod strain;
+pub(crate) mod stress;
 pub(crate) mod tool;
 pub(crate) mod tool_path;
 

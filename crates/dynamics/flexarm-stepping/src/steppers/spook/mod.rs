@@ -299,6 +299,7 @@ impl Stepper for Spook {
         out.model.clone_from(&self.arm.model);
         out.q.rows_mut(0, n).copy_from(&self.now.q);
         out.qdot.rows_mut(0, n).copy_from(&self.now.qdot);
+        out.qddot.fill(f64::NAN);
         let (mut kinetic, mut potential) = self.observe_bodies(out);
         for i in 1..self.bodies.len() {
             // Mean force over the last step; before the first step, over that step.

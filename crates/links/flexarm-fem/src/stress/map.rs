@@ -1,0 +1,189 @@
+//! Stress of a link in the coordinates of its model.
+//!
+//! ```text
+//! σ = S_w w + S_m η_m + Σ a_j (S_a,j - S_w w_j - S_m η_j),     [w; η_m] = A q
+//! ```
+//! w is the wrench at the interfaces that the deflection q of the model stands for, `w_j`, `η_j` the
+//! model's own static response to the inertia load j. So the stress is that of the mesh under every
+//! static load, whatever the model of the link, and the deflection adds its dynamics.
+
+use nalgebra::{DMatrix, DVector, Matrix6, Vector3, Vector6};
+
+use super::fields::{INERTIA_LOADS, StressFields};
+use crate::modal::{Field, ModalLink, axial};
+use crate::reduced::ElasticSplit;
+use crate::rigid_part::RigidPart;
+
+/// Largest relative difference between the compliance of a link and that of its fields.
+const SAME_LINK: f64 = 1e-3;
+
+/// Linear map from the coordinates of a link's model to stress.
+#[derive(Debug, Clone)]
+pub struct StressMap {
+    /// Amplitudes by coordinates of the model.
+    A: DMatrix<f64>,
+    /// Stress by amplitudes and inertia loads, Pa; six rows per seat.
+    stress: DMatrix<f32>,
+}
+
+/// Returns the inertia loads of a link.
+///
+/// * `a`: acceleration of Lo minus gravity (m/s²); `alpha`, `omega`: angular acceleration and
+///   velocity (rad/s², rad/s); all in link axes.
+pub fn inertia_loads(a: &Vector3<f64>, alpha: &Vector3<f64>, omega: &Vector3<f64>) -> [f64; INERTIA_LOADS] {
+    let w = omega;
+    [a.x, a.y, a.z, alpha.x, alpha.y, alpha.z, w.x * w.x, w.y * w.y, w.z * w.z, w.x * w.y, w.x * w.z, w.y * w.z]
+}
+
+impl StressMap {
+    /// Number of amplitudes and inertia loads.
+    pub fn columns(&self) -> usize {
+        self.stress.ncols()
+    }
+
+    /// Stress by amplitudes and inertia loads, Pa; six rows per seat.
+    pub fn stress(&self) -> &DMatrix<f32> {
+        &self.stress
+    }
+
+    /// Appends the amplitudes and inertia loads at coordinates q.
+    pub fn append(&self, q: &[f64], loads: &[f64; INERTIA_LOADS], to: &mut Vec<f32>) {
+        for row in self.A.row_iter() {
+            to.push(row.iter().zip(q).map(|(a, q)| a * q).sum::<f64>() as f32);
+        }
+        to.extend(loads.iter().map(|load| *load as f32));
+    }
+}
+
+impl StressFields {
+    /// Returns the map for a modal link in coordinates of Craig and Bampton.
+    ///
+    /// * `factor`: factor on its stiffness.
+    ///
+    /// # Errors
+    /// A message if the link is another one, or has other coordinates.
+    pub fn modal_map(&self, link: &ModalLink, factor: f64) -> Result<StressMap, String> {
+        let wrenches = self.compliance.nrows();
+        let modes = link.coordinates().saturating_sub(wrenches);
+        if !link.is_craig_bampton() || 6 * link.interfaces.len() != wrenches || modes > self.frequencies_hz.len() {
+            return Err(format!(
+                "stress is stored for {} interfaces and {} fixed-interface modes, which are not the coordinates of the \
+                 modal link: leave out eigenmodes, or create the link again with --stress",
+                wrenches / 6,
+                self.frequencies_hz.len()
+            ));
+        }
+        let n = link.coordinates();
+        let K_cc = link.K.view((0, 0), (wrenches, wrenches)).into_owned();
+        self.check(&K_cc)?;
+        let mut A = DMatrix::identity(n, n);
+        A.view_mut((0, 0), (wrenches, wrenches)).copy_from(&(K_cc * factor));
+        let K = (&link.K * factor).cholesky().ok_or("the stiffness of the modal link is not positive definite")?;
+        let own: Vec<DVector<f64>> = (0..INERTIA_LOADS).map(|j| &A * K.solve(&modal_force(link, j))).collect();
+        let columns: Vec<usize> = (0..wrenches).chain((0..modes).map(|k| wrenches + INERTIA_LOADS + k)).collect();
+        // A mode stresses a link that is stiffer by a factor more by this factor.
+        let factors: Vec<f64> = (0..n).map(|k| if k < wrenches { 1.0 } else { factor }).collect();
+        Ok(self.map(A, &columns, &factors, &own))
+    }
+
+    /// Returns the map for a chain of rigid parts and elastic joints.
+    ///
+    /// * `joints`, `parts`: proximal first, one more part than joints, without attached bodies.
+    ///
+    /// # Errors
+    /// A message if the link is another one.
+    pub fn chain_map(&self, joints: &[ElasticSplit], parts: &[RigidPart], factor: f64) -> Result<StressMap, String> {
+        let p_LB = self.poses[1].translation.vector;
+        let displacement = |joint: &ElasticSplit| {
+            let (R, r) = (joint.X_LS.rotation.matrix(), p_LB - joint.X_LS.translation.vector);
+            let mut X = Matrix6::zeros();
+            X.fixed_view_mut::<3, 3>(0, 0).copy_from(R);
+            X.fixed_view_mut::<3, 3>(3, 3).copy_from(R);
+            X.fixed_view_mut::<3, 3>(0, 3).copy_from(&(-r.cross_matrix() * R));
+            X
+        };
+        let X: Vec<Matrix6<f64>> = joints.iter().map(displacement).collect();
+        let inverse = |K: &Matrix6<f64>| K.try_inverse().ok_or("the stiffness of a joint is singular");
+        let C: Vec<Matrix6<f64>> = joints.iter().map(|joint| inverse(&joint.K_S)).collect::<Result<_, _>>()?;
+        let at_B: Matrix6<f64> = X.iter().zip(&C).map(|(X, C)| X * C * X.transpose()).sum();
+        let K_B = inverse(&at_B)?;
+        self.check(&DMatrix::from_column_slice(6, 6, K_B.as_slice()))?;
+        let mut A = DMatrix::zeros(6, 6 * joints.len());
+        for (k, X) in X.iter().enumerate() {
+            A.fixed_view_mut::<6, 6>(0, 6 * k).copy_from(&(K_B * X * factor));
+        }
+        let own = (0..INERTIA_LOADS).map(|j| {
+            let mut q = DVector::zeros(6 * joints.len());
+            for (k, joint) in joints.iter().enumerate() {
+                let F = parts[k + 1..].iter().map(|part| part_load(part, j, &joint.X_LS.translation.vector)).sum();
+                let Rt = joint.X_LS.rotation.matrix().transpose();
+                let F: Vector6<f64> = F;
+                let mut turned = Vector6::zeros();
+                turned.fixed_rows_mut::<3>(0).copy_from(&(Rt * F.fixed_rows::<3>(0)));
+                turned.fixed_rows_mut::<3>(3).copy_from(&(Rt * F.fixed_rows::<3>(3)));
+                q.fixed_rows_mut::<6>(6 * k).copy_from(&(C[k] * turned / factor));
+            }
+            &A * q
+        });
+        let own: Vec<DVector<f64>> = own.collect();
+        Ok(self.map(A, &[0, 1, 2, 3, 4, 5], &[1.0; 6], &own))
+    }
+
+    /// * `columns`: field of each amplitude, with its factor; `own`: amplitudes of the model under
+    ///   each inertia load.
+    fn map(&self, A: DMatrix<f64>, columns: &[usize], factors: &[f64], own: &[DVector<f64>]) -> StressMap {
+        let (rows, n) = (self.stress.nrows(), columns.len());
+        let wrenches = self.compliance.nrows();
+        let mut stress = DMatrix::zeros(rows, n + INERTIA_LOADS);
+        for (k, (column, factor)) in columns.iter().zip(factors).enumerate() {
+            stress.set_column(k, &(self.stress.column(*column) * *factor as f32));
+        }
+        for (j, own) in own.iter().enumerate() {
+            for row in 0..rows {
+                let held: f64 = (0..n).map(|k| f64::from(stress[(row, k)]) * own[k]).sum();
+                stress[(row, n + j)] = (f64::from(self.stress[(row, wrenches + j)]) - held) as f32;
+            }
+        }
+        StressMap { A, stress }
+    }
+
+    /// Compares the stiffness of interfaces with that of the fields.
+    fn check(&self, K: &DMatrix<f64>) -> Result<(), String> {
+        let n = K.nrows();
+        let product = self.compliance.view((0, 0), (n, n)) * K;
+        let scale = |i: usize, j: usize| (self.compliance[(j, j)] / self.compliance[(i, i)]).sqrt();
+        let off = (0..n * n).map(|at| (at / n, at % n)).map(|(i, j)| {
+            let unit = if i == j { 1.0 } else { 0.0 };
+            ((product[(i, j)] - unit) * scale(i, j)).abs()
+        });
+        let off = off.fold(0.0, f64::max);
+        if off <= SAME_LINK {
+            return Ok(());
+        }
+        Err(format!(
+            "the stress file belongs to another link: stiffness times its compliance differs from 1 by {off:.1e}; create \
+             both together with flexarm reduce --stress"
+        ))
+    }
+}
+
+/// Generalised force of inertia load j on a modal link.
+fn modal_force(link: &ModalLink, j: usize) -> DVector<f64> {
+    let field = Field::unit(j);
+    DVector::from_iterator(
+        link.coordinates(),
+        (0..link.coordinates()).map(|k| {
+            // ∫ φ·(A s + b) dm, with P[a, b] = ∫ s_a φ_b dm
+            -(link.C_t.column(k).dot(&field.b) + (field.A * link.P[k]).trace())
+        }),
+    )
+}
+
+/// Wrench of inertia load j on a rigid part about a point, link axes.
+fn part_load(part: &RigidPart, j: usize, about: &Vector3<f64>) -> Vector6<f64> {
+    let field = Field::unit(j);
+    let D = nalgebra::Matrix3::identity() * (0.5 * part.inertia.trace()) - part.inertia;
+    let force = -(field.A * part.com + field.b) * part.mass;
+    let torque = (part.com - about).cross(&force) - axial(&(D * field.A.transpose()));
+    Vector6::new(force.x, force.y, force.z, torque.x, torque.y, torque.z)
+}
