@@ -53,6 +53,7 @@ fn flags(args: &ReduceArgs) -> Result<ReduceJob, Failure> {
         split: args.split,
         chains: args.chains.clone(),
         geometric: args.geometric.then_some(true),
+        stress: args.stress.then_some(true),
         merge: args.merge,
         quadrature: args.quadrature.map(|name| match name {
             QuadratureName::Exact => QuadratureChoice::Exact,

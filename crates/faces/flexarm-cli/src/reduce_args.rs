@@ -106,6 +106,10 @@ pub(crate) struct ReduceArgs {
     /// geometric_stiffening = true of a robot file
     #[arg(long, help_heading = "Reduction", hide_short_help = true)]
     pub(crate) geometric: bool,
+    /// Store the stress at the nodes of the surface beside the link file, as NAME.stress (12 more
+    /// solves): runs then report the largest stress of the link
+    #[arg(long, help_heading = "Reduction")]
+    pub(crate) stress: bool,
     /// Merge nodes closer to each other than this (unit of the mesh), to close seams and cracks
     #[arg(long, value_name = "DISTANCE", allow_hyphen_values = true)]
     pub(crate) merge: Option<f64>,

@@ -49,6 +49,11 @@ impl RigidPart {
         Self { mass, com, inertia: about_com(self) + about_com(other) }
     }
 
+    /// Removes another part that this one contains.
+    pub fn less(&self, other: &Self) -> Self {
+        self.merged(&Self { mass: -other.mass, com: other.com, inertia: -other.inertia })
+    }
+
     /// Scales the part to the mass `mass` with its shape unchanged.
     pub fn with_mass(&self, mass: f64) -> Self {
         let inertia = self.inertia * (mass / self.mass);

@@ -123,7 +123,7 @@ pub use statics_picture::{StaticsFiles, StaticsOutputs};
 pub use stepper_settings::{SettingValue, StepperSettings};
 pub use study::{STUDY_NOTE, Variant, compare_study, study_rows};
 pub use summary::{
-    CURVE_PIECES, DifferenceFigures, Files, HoldFigures, LinkFigures, PoseFigures, RecordingFiles, StepperFigures,
-    Summary, TcpFigures,
+    CURVE_PIECES, DifferenceFigures, Files, HoldFigures, LinkFigures, LinkStressFigures, PoseFigures, RecordingFiles,
+    StepperFigures, StressPlaceFigures, Summary, TcpFigures,
 };
 pub use tool_path::ToolPath;

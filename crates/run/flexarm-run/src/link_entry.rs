@@ -16,6 +16,7 @@ use crate::flexible::{LinkChoices, RequestedKey, RobotLink};
 use crate::options::{LinkModel, Modelling};
 use crate::robot::keep;
 use crate::robot_file::{BeamEntry, DampingEntry, FlexibleLinkEntry, RobotFileError, Source};
+use flexarm_linkmaker::reduce::STRESS_FILE;
 
 /// Tolerance for a symmetric matrix: difference of mirrored entries, relative to the geometric mean
 /// of the diagonal entries.

@@ -55,6 +55,9 @@ pub struct Summary {
     pub frequencies_hz: Vec<f64>,
     /// Flexible links.
     pub links: Vec<LinkFigures>,
+    /// Stress of the links whose stress fields are stored.
+    #[serde(skip_serializing_if = "Vec::is_empty", default)]
+    pub stress: Vec<LinkStressFigures>,
     /// Elastic drives.
     pub elastic_drives: Vec<DriveFigures>,
     /// Energy balance.
@@ -199,6 +202,40 @@ pub struct LinkFigures {
     pub engineering_strain: f64,
     /// Maximum elastic rotation (rad).
     pub peak_rotation_rad: f64,
+}
+
+/// Stress of a flexible link during a run.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct LinkStressFigures {
+    /// Name of the link.
+    pub name: String,
+    /// Number of nodes of its surface.
+    pub nodes: usize,
+    /// Number of nodes that are not judged, because a rigid tie is near.
+    pub left_out: usize,
+    /// Distance from tied nodes that is left out (m).
+    pub clear_of_ties_m: f64,
+    /// Places of the largest stress, the worst first.
+    pub worst: Vec<StressPlaceFigures>,
+}
+
+/// Maximum stress at a node of the surface.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct StressPlaceFigures {
+    /// Number of the node in the mesh.
+    pub node: u64,
+    /// Its position in the link frame (m).
+    pub position_m: [f64; 3],
+    /// Time of the maximum (s).
+    pub t_s: f64,
+    /// Von Mises stress (Pa).
+    pub von_mises_pa: f64,
+    /// Stress over yield strength; null for a material whose strength is not known.
+    pub of_yield: Option<f64>,
+    /// Material with its class; null if it is none of the presets.
+    pub material: Option<String>,
 }
 
 /// Figures of an elastic drive.

@@ -89,10 +89,16 @@ impl StressFields {
     /// Returns the map for a chain of rigid parts and elastic joints.
     ///
     /// * `joints`, `parts`: proximal first, one more part than joints, without attached bodies.
+    /// * `springs`: stiffness of the joints in use, which may differ from that of the source.
     ///
     /// # Errors
     /// A message if the link is another one.
-    pub fn chain_map(&self, joints: &[ElasticSplit], parts: &[RigidPart], factor: f64) -> Result<StressMap, String> {
+    pub fn chain_map(
+        &self,
+        joints: &[ElasticSplit],
+        parts: &[RigidPart],
+        springs: &[Matrix6<f64>],
+    ) -> Result<StressMap, String> {
         let p_LB = self.poses[1].translation.vector;
         let displacement = |joint: &ElasticSplit| {
             let (R, r) = (joint.X_LS.rotation.matrix(), p_LB - joint.X_LS.translation.vector);
@@ -104,13 +110,17 @@ impl StressFields {
         };
         let X: Vec<Matrix6<f64>> = joints.iter().map(displacement).collect();
         let inverse = |K: &Matrix6<f64>| K.try_inverse().ok_or("the stiffness of a joint is singular");
-        let C: Vec<Matrix6<f64>> = joints.iter().map(|joint| inverse(&joint.K_S)).collect::<Result<_, _>>()?;
-        let at_B: Matrix6<f64> = X.iter().zip(&C).map(|(X, C)| X * C * X.transpose()).sum();
-        let K_B = inverse(&at_B)?;
-        self.check(&DMatrix::from_column_slice(6, 6, K_B.as_slice()))?;
+        let at_B = |springs: &mut dyn Iterator<Item = &Matrix6<f64>>| {
+            let C: Vec<Matrix6<f64>> = springs.map(inverse).collect::<Result<_, _>>()?;
+            let at_B: Matrix6<f64> = X.iter().zip(&C).map(|(X, C)| X * C * X.transpose()).sum();
+            Ok::<_, String>((C, inverse(&at_B)?))
+        };
+        let (_, nominal) = at_B(&mut joints.iter().map(|joint| &joint.K_S))?;
+        self.check(&DMatrix::from_column_slice(6, 6, nominal.as_slice()))?;
+        let (C, K_B) = at_B(&mut springs.iter())?;
         let mut A = DMatrix::zeros(6, 6 * joints.len());
         for (k, X) in X.iter().enumerate() {
-            A.fixed_view_mut::<6, 6>(0, 6 * k).copy_from(&(K_B * X * factor));
+            A.fixed_view_mut::<6, 6>(0, 6 * k).copy_from(&(K_B * X));
         }
         let own = (0..INERTIA_LOADS).map(|j| {
             let mut q = DVector::zeros(6 * joints.len());
@@ -121,7 +131,7 @@ impl StressFields {
                 let mut turned = Vector6::zeros();
                 turned.fixed_rows_mut::<3>(0).copy_from(&(Rt * F.fixed_rows::<3>(0)));
                 turned.fixed_rows_mut::<3>(3).copy_from(&(Rt * F.fixed_rows::<3>(3)));
-                q.fixed_rows_mut::<6>(6 * k).copy_from(&(C[k] * turned / factor));
+                q.fixed_rows_mut::<6>(6 * k).copy_from(&(C[k] * turned));
             }
             &A * q
         });

@@ -7,7 +7,7 @@ use flexarm_files::{FileError, check_free, file_stem, write_all};
 use super::job::ReduceJob;
 
 /// Extension of the stress file beside a link file.
-pub(crate) const STRESS: &str = "stress";
+pub const STRESS_FILE: &str = "stress";
 
 /// Paths of the results.
 #[derive(Clone, Debug, Default)]
@@ -49,7 +49,7 @@ impl Paths {
     /// Returns the stress files, one beside each link file.
     pub(super) fn stress(&self) -> Vec<PathBuf> {
         let links = self.folder.iter().map(|folder| &folder.flex).chain(&self.flex);
-        links.filter(|_| self.with_stress).map(|flex| flex.with_extension(STRESS)).collect()
+        links.filter(|_| self.with_stress).map(|flex| flex.with_extension(STRESS_FILE)).collect()
     }
 
     /// Returns the paths of a reduction, after checking that they are free or may be overwritten.

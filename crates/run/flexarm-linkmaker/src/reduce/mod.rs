@@ -49,7 +49,7 @@ use interfaces::MeshFrame;
 use prepare::{Prepared, failed, prepare, read};
 use summary::summary_of;
 
-pub use files::ReduceOutputs;
+pub use files::{ReduceOutputs, STRESS_FILE};
 pub use flexarm_fem::reduction::Tie;
 pub use flexarm_fem::{NodeSelector, UnitSystem as Units};
 pub use job::{FrameEntry, InterfaceEntry, ReduceJob, UrdfEntry};

@@ -18,6 +18,20 @@ pub(crate) const LARGE_STRAIN: CaveatKind = CaveatKind::warning(
     "",
     "metals yield at 1e-3 to 5e-3: check stiffness, loads and units",
 );
+/// The stress of a link exceeds the strength of its material.
+pub(crate) const STRESS: CaveatKind = CaveatKind::warning(
+    "stress",
+    "{where} bears {value} MPa, the strength of its material is {yardstick} MPa",
+    "MPa",
+    "check payload and motion, the strength of the real material, and the mesh at this place",
+);
+/// The stepper does not give accelerations.
+pub(crate) const NO_STRESS: CaveatKind = CaveatKind::note(
+    "no-stress",
+    "{where} gives no accelerations: the stress of the links is not computed",
+    "",
+    "use another stepper for the stress",
+);
 /// A drive needs more than its effort limit during a run.
 pub(crate) const EFFORT: CaveatKind = CaveatKind::warning(
     "effort",

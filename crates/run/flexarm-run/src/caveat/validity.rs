@@ -8,6 +8,7 @@ use flexarm_stepping::{StepperKind, error_of_a_period};
 
 use super::slip::{self, slip};
 use super::{Caveat, CaveatKind, kinds};
+use crate::summary::LinkStressFigures;
 
 /// Maximum elastic rotation for which the linear elastic model is assumed valid (rad).
 const ROTATION_LIMIT: f64 = 0.05;
@@ -32,6 +33,16 @@ pub(crate) fn link(name: &str, rotation: f64, strain: f64) -> impl Iterator<Item
     let bent = (rotation > ROTATION_LIMIT).then(|| kinds::LARGE_DEFORMATION.found(&link, rotation, ROTATION_LIMIT));
     let strained = (strain > STRAIN_LIMIT).then(|| kinds::LARGE_STRAIN.found(&link, strain, STRAIN_LIMIT));
     bent.into_iter().chain(strained)
+}
+
+/// Checks for stress beyond the strength of the material: [`kinds::STRESS`].
+pub(crate) fn stress(links: &[LinkStressFigures]) -> impl Iterator<Item = Caveat> {
+    links.iter().filter_map(|link| {
+        let place = link.worst.first()?;
+        let strength = place.von_mises_pa / place.of_yield.filter(|share| *share > 1.0)?;
+        let at = format!("link {:?}, node {}", link.name, place.node);
+        Some(kinds::STRESS.found(at, 1e-6 * place.von_mises_pa, 1e-6 * strength))
+    })
 }
 
 /// Checks for drives that exceed their effort limits, in coordinate order: [`kinds::EFFORT`] or

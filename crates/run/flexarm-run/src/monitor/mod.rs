@@ -25,6 +25,7 @@ use crate::monitor::deflection::Deflections;
 use crate::monitor::drive_load::DriveLoads;
 use crate::monitor::energy::Energy;
 use crate::monitor::strain::Strains;
+use crate::monitor::stress::StressMonitor;
 use crate::monitor::tool::{ToolError, ToolMonitor};
 use crate::monitor::tool_path::ToolPathMonitor;
 use crate::tool_path::ToolPath;
@@ -38,6 +39,8 @@ pub(crate) struct Monitors {
     pub(crate) deflections: Deflections,
     pub(crate) drive_loads: DriveLoads,
     pub(crate) energy: Energy,
+    /// For links with stress fields.
+    pub(crate) stress: Option<StressMonitor>,
     /// For motions given as TCP paths.
     pub(crate) tool_path: Option<ToolPathMonitor>,
 }
@@ -53,6 +56,7 @@ impl Monitors {
             deflections: Deflections::new(arm, flexible, n_drives),
             drive_loads: DriveLoads::new(arm),
             energy: Energy::new(&arm.model),
+            stress: None,
             tool_path: None,
         }
     }
@@ -63,6 +67,12 @@ impl Monitors {
         Self { tool_path: path.map(ToolPathMonitor::new), ..self }
     }
 
+    /// Adds a monitor of stress.
+    #[must_use]
+    pub(crate) fn with_stress(self, stress: Option<StressMonitor>) -> Self {
+        Self { stress, ..self }
+    }
+
     /// Passes a sample to all monitors; returns its TCP error.
     pub(crate) fn update(&mut self, seen: &Observation, twin: &RigidTwin, arm: &FlexibleArm, tcp: &Frame) -> ToolError {
         self.drive_loads.update(seen);
@@ -70,6 +80,9 @@ impl Monitors {
         self.strains.update(&seen.X_WB, &twin.data.X_WB);
         self.deflections.update(&seen.q);
         self.energy.update(seen);
+        if let Some(stress) = &mut self.stress {
+            stress.update(seen);
+        }
         let tool = self.tool.update(seen, twin, tcp);
         if let Some(path) = &mut self.tool_path {
             path.update(seen.t, &tool, &twin.velocity);

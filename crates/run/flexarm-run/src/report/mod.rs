@@ -24,7 +24,7 @@ use crate::headline::{self, rounded};
 use crate::options::Outputs;
 use crate::record::FIGURES_FOLDER;
 use crate::settling::within;
-use crate::summary::Summary;
+use crate::summary::{LinkStressFigures, Summary};
 
 use self::shares::{Part, part_shares, share_numbers};
 
@@ -159,6 +159,7 @@ pub fn figure_groups(summary: &Summary) -> Vec<FigureGroup> {
     let groups = [
         FigureGroup { title: "TCP", rows: tool_figures(summary) },
         FigureGroup { title: "links and drives", rows: part_figures(summary) },
+        FigureGroup { title: "stress", rows: stress_figures(summary) },
         FigureGroup { title: "run", rows: run_figures(summary) },
     ];
     groups.into_iter().filter(|group| !group.rows.is_empty()).collect()
@@ -169,6 +170,22 @@ const MM_DIGITS: usize = 4;
 
 fn mm(x: f64) -> String {
     format!("{:.MM_DIGITS$}", 1e3 * x)
+}
+
+fn stress_figures(summary: &Summary) -> Vec<Figure> {
+    let row = |link: &LinkStressFigures| {
+        let place = link.worst.first()?;
+        let [x, y, z] = place.position_m.map(|x| format!("{:.0}", 1e3 * x));
+        let at = format!("von Mises, node {} at ({x}, {y}, {z}) mm of the link, {:.3} s", place.node, place.t_s);
+        let note = match (place.of_yield, &place.material) {
+            (Some(share), Some(material)) => format!("{:.0} % of the strength ({material}); {at}", 100.0 * share),
+            _ => at,
+        };
+        let figure = Figure::new(link.name.clone(), format!("{:.2}", 1e-6 * place.von_mises_pa), "MPa", note);
+        let beyond = place.of_yield.is_some_and(|share| share > 1.0);
+        Some(Figure { weight: if beyond { Weight::Alert } else { Weight::Plain }, ..figure })
+    };
+    summary.stress.iter().filter_map(row).collect()
 }
 
 fn tool_figures(summary: &Summary) -> Vec<Figure> {

@@ -10,6 +10,7 @@ use super::{Detail, RunLoop, moves};
 use crate::caveat::{Caveat, drives, kinds, validity};
 use crate::flexible::Owner;
 use crate::headline::{self, Bending, ShareFigures};
+use crate::monitor::stress::StressMonitor;
 use crate::options::RunOptions;
 use crate::summary::{CURVE_PIECES, DriveFigures, LinkFigures, StepperFigures, Summary, TcpFigures};
 
@@ -47,6 +48,7 @@ impl RunLoop<'_> {
             moves_s: moves(self.motion).iter().map(|&(start, end)| [start, end]).collect(),
             error_curve: self.monitors.tool.result().largest_errors(CURVE_PIECES),
             links,
+            stress: self.monitors.stress.as_ref().map_or_else(Vec::new, StressMonitor::result),
             elastic_drives,
             ..Summary::default()
         };
@@ -128,6 +130,10 @@ impl RunLoop<'_> {
         }
         for link in &summary.links {
             caveats.extend(validity::link(&link.name, link.peak_rotation_rad, link.engineering_strain));
+        }
+        caveats.extend(validity::stress(&summary.stress));
+        if self.monitors.stress.as_ref().is_some_and(StressMonitor::is_blind) {
+            caveats.push(kinds::NO_STRESS.found(format!("stepper {}", self.options.stepper.name()), 0.0, 0.0));
         }
         caveats.extend(validity::energy(self.monitors.energy.result().imbalance));
         caveats.extend(self.effort_caveats());

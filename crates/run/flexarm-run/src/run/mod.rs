@@ -30,6 +30,7 @@ use crate::flexible::{FlexibleRobot, Owner};
 use crate::headline;
 use crate::magnification::{Expected, fit_color_scale};
 use crate::monitor::Monitors;
+use crate::monitor::stress::StressMonitor;
 use crate::monitor::tool::ToolMonitor;
 use crate::motion::Motion;
 use crate::options::{Outputs, RunOptions};
@@ -159,7 +160,9 @@ pub(crate) fn simulate(
     };
     let shares_scale = expected.is_some();
     let expected = expected.unwrap_or_else(own);
+    let stress = StressMonitor::new(robot, flexible, &arm, &options.modelling)?;
     let mut run = RunLoop::new(robot, &scenario.motion, options, flexible, arm, stepper, detail);
+    run.monitors = run.monitors.with_stress(stress);
     let mut files = recorders(outputs, !more.is_empty())?;
     files.set.extend(more);
     let mut head = match detail {

@@ -1,0 +1,234 @@
+//! Stress of the flexible links whose stress fields are stored beside their reduced links.
+//!
+//! The monitor keeps the amplitudes of the fields at every logged sample; [`StressMonitor::result`]
+//! finds the maxima over the run for every node of the surface.
+
+use flexarm_fem::stress::{StressFields, StressMap, StressSeat, inertia_loads, parse_stress};
+use flexarm_fem::{Material, ReducedLink, RigidPart};
+use flexarm_flexlink::LinkForm;
+use flexarm_kinematics::{Data, Frame, State, inverse_dynamics};
+use flexarm_stepping::{FlexibleArm, Observation, PooledWorkspace};
+use nalgebra::DMatrix;
+
+use crate::error::Error;
+use crate::flexible::{FlexibleRobot, Owner, RobotLink};
+use crate::options::Modelling;
+use crate::robot::Robot;
+use crate::summary::{LinkStressFigures, StressPlaceFigures};
+
+/// Seats this close to a tied node are left out, as a fraction of the distance between the
+/// interfaces: the stress beside a rigid tie is that of the tie.
+const NEAR_TIE: f64 = 0.05;
+/// Minimum distance between the worst places, as the same fraction.
+const APART: f64 = 0.05;
+/// Number of worst places per link.
+const PLACES: usize = 5;
+/// Samples and seats evaluated together.
+const SAMPLES: usize = 128;
+const SEATS: usize = 512;
+
+/// Monitors the stress of links.
+pub(crate) struct StressMonitor {
+    links: Vec<LinkStress>,
+    data: PooledWorkspace<Data>,
+    state: State,
+    times: Vec<f64>,
+}
+
+/// A link with its map from coordinates to stress.
+struct LinkStress {
+    name: String,
+    fields: StressFields,
+    map: StressMap,
+    /// Coordinates of its elements in the model: first one and number.
+    elements: Vec<(usize, usize)>,
+    /// Link frame on its body.
+    frame: Frame,
+    /// Distance between its interfaces (m).
+    length: f64,
+    /// Amplitudes and loads of all samples.
+    amplitudes: Vec<f32>,
+}
+
+impl StressMonitor {
+    /// Returns the monitor, or `None` if no link has stress fields.
+    ///
+    /// # Errors
+    /// [`Error::File`] for a stress file that is damaged or belongs to another link.
+    pub(crate) fn new(
+        robot: &Robot,
+        flexible: &FlexibleRobot,
+        arm: &FlexibleArm,
+        modelling: &Modelling,
+    ) -> Result<Option<Self>, Error> {
+        let mut links = Vec::new();
+        for (k, link) in robot.flexible.iter().enumerate().filter(|(_, link)| link.stress.is_some()) {
+            let span = &flexible.spans[k];
+            let owned = arm.elements.iter().zip(&flexible.owners).filter(|(_, owner)| **owner == Owner::Link(k));
+            let elements: Vec<_> = owned.map(|(element, _)| (element.coordinate, element.size)).collect();
+            let Some(file) = link.stress.as_ref().filter(|_| !elements.is_empty()) else { continue };
+            let fail = |what: String| Error::File { path: file.clone(), what };
+            let bytes = std::fs::read(file).map_err(|error| fail(error.to_string()))?;
+            let fields = parse_stress(&bytes).map_err(fail)?;
+            let map = map_of(link, &fields, modelling).map_err(fail)?;
+            let frame = arm.model.frame(&span.link).expect("a link of the substitution").clone();
+            let (name, length) = (span.link.clone(), span.length);
+            links.push(LinkStress { name, fields, map, elements, frame, length, amplitudes: Vec::new() });
+        }
+        if links.is_empty() {
+            return Ok(None);
+        }
+        let (data, state) = (arm.lend_data(), State::zeros(&arm.model));
+        Ok(Some(Self { links, data, state, times: Vec::new() }))
+    }
+
+    /// Adds a sample; one without accelerations is left out.
+    pub(crate) fn update(&mut self, seen: &Observation) {
+        if seen.qddot.iter().any(|a| a.is_nan()) {
+            return;
+        }
+        self.times.push(seen.t);
+        self.state.q.copy_from(&seen.q);
+        self.state.qdot.copy_from(&seen.qdot);
+        inverse_dynamics(&seen.model, &mut self.data, &self.state, &seen.qddot);
+        let mut q = Vec::new();
+        for link in &mut self.links {
+            // A holds spatial accelerations minus gravity; ω × v makes them those of the point.
+            let V = self.data.V[link.frame.body].at_child(&link.frame.X_BF);
+            let A = self.data.A[link.frame.body].at_child(&link.frame.X_BF);
+            let a = A.linear + V.angular.cross(&V.linear);
+            q.clear();
+            for &(first, size) in &link.elements {
+                q.extend_from_slice(&seen.q.as_slice()[first..first + size]);
+            }
+            link.map.append(&q, &inertia_loads(&a, &A.angular, &V.angular), &mut link.amplitudes);
+        }
+    }
+
+    /// Returns the worst places of each link.
+    pub(crate) fn result(&self) -> Vec<LinkStressFigures> {
+        self.links.iter().filter(|_| !self.times.is_empty()).map(|link| link.figures(&self.times)).collect()
+    }
+
+    /// Whether the stepper gave no accelerations, so that there is no stress.
+    pub(crate) fn is_blind(&self) -> bool {
+        self.times.is_empty()
+    }
+}
+
+/// Returns the map for the model of the link.
+fn map_of(link: &RobotLink, fields: &StressFields, modelling: &Modelling) -> Result<StressMap, String> {
+    let reduced = &link.flexible.reduced;
+    let (joints, parts) = match link.form(modelling)? {
+        LinkForm::Modal(modal) => return fields.modal_map(&modal, link.stiffness_factor),
+        LinkForm::TwoParts => (vec![reduced.split.clone()], vec![reduced.proximal, reduced.distal]),
+        LinkForm::Chain(chain) => (chain.joints, chain.parts),
+    };
+    let springs: Vec<_> = joints.iter().map(|joint| link.scaled(&joint.K_S)).collect();
+    fields.chain_map(&joints, &without_attached(reduced, parts), &springs)
+}
+
+/// Returns the parts without the bodies attached to the link, whose loads act at its interfaces.
+fn without_attached(reduced: &ReducedLink, mut parts: Vec<RigidPart>) -> Vec<RigidPart> {
+    let along = reduced.X_LB.translation.vector - reduced.X_LA.translation.vector;
+    for body in reduced.details.iter().flat_map(|details| &details.attached) {
+        let is_beyond = (body.com - reduced.split.X_LS.translation.vector).dot(&along) > 0.0;
+        let end = if is_beyond { parts.last_mut() } else { parts.first_mut() };
+        if let Some(end) = end {
+            *end = end.less(body);
+        }
+    }
+    parts
+}
+
+impl LinkStress {
+    /// Returns the worst places over the run.
+    fn figures(&self, times: &[f64]) -> LinkStressFigures {
+        let columns = self.map.columns();
+        let amplitudes = DMatrix::from_column_slice(columns, times.len(), &self.amplitudes);
+        let peaks = self.peaks(&amplitudes);
+        let clear = NEAR_TIE * self.length;
+        let is_judged = |seat: &StressSeat| seat.from_tie >= clear;
+        let mut order: Vec<usize> = (0..peaks.len()).filter(|k| is_judged(&self.fields.seats[*k])).collect();
+        let left_out = peaks.len() - order.len();
+        order.sort_by(|a, b| peaks[*b].0.total_cmp(&peaks[*a].0));
+        let mut worst: Vec<usize> = Vec::new();
+        for k in order {
+            let p = self.fields.seats[k].position;
+            let is_new = |other: &usize| (p - self.fields.seats[*other].position).norm() > APART * self.length;
+            if worst.iter().all(is_new) {
+                worst.push(k);
+            }
+            if worst.len() == PLACES {
+                break;
+            }
+        }
+        let place = |k: usize| {
+            let seat = &self.fields.seats[k];
+            let (stress, sample) = peaks[k];
+            let strength = strength_of(&self.fields.materials[seat.material]);
+            StressPlaceFigures {
+                node: seat.node,
+                position_m: seat.position.into(),
+                t_s: times[sample],
+                von_mises_pa: f64::from(stress),
+                of_yield: strength.map(|(_, strength)| f64::from(stress) / strength),
+                material: strength.map(|(name, _)| name.to_owned()),
+            }
+        };
+        LinkStressFigures {
+            name: self.name.clone(),
+            nodes: peaks.len(),
+            left_out,
+            clear_of_ties_m: clear,
+            worst: worst.into_iter().map(place).collect(),
+        }
+    }
+
+    /// Returns the maximum von Mises stress of each seat (Pa) with its sample.
+    fn peaks(&self, amplitudes: &DMatrix<f32>) -> Vec<(f32, usize)> {
+        let stress = self.map.stress();
+        let mut peaks = vec![(0.0_f32, 0_usize); self.fields.seats.len()];
+        let mut product = DMatrix::zeros(6 * SEATS, SAMPLES);
+        for (block, peaks) in peaks.chunks_mut(SEATS).enumerate() {
+            let own = stress.rows(6 * SEATS * block, 6 * peaks.len());
+            for first in (0..amplitudes.ncols()).step_by(SAMPLES) {
+                let count = SAMPLES.min(amplitudes.ncols() - first);
+                let mut product = product.view_mut((0, 0), (own.nrows(), count));
+                product.gemm(1.0, &own, &amplitudes.columns(first, count), 0.0);
+                for (sample, column) in product.column_iter().enumerate() {
+                    let seats = column.as_slice().as_chunks::<6>().0;
+                    for (peak, stress) in peaks.iter_mut().zip(seats) {
+                        let square = von_mises_squared(stress);
+                        if square > peak.0 {
+                            *peak = (square, first + sample);
+                        }
+                    }
+                }
+            }
+        }
+        peaks.iter_mut().for_each(|(square, _)| *square = square.sqrt());
+        peaks
+    }
+}
+
+/// Square of the von Mises stress.
+fn von_mises_squared([xx, yy, zz, xy, yz, zx]: &[f32; 6]) -> f32 {
+    let (a, b, c) = (xx - yy, yy - zz, zz - xx);
+    0.5 * (a * a + b * b + c * c) + 3.0 * (xy * xy + yz * yz + zx * zx)
+}
+
+/// Returns the name and the yield strength (Pa) of a known material; for grey iron the tensile
+/// strength, as it does not yield.
+fn strength_of(material: &Material) -> Option<(&'static str, f64)> {
+    STRENGTHS.into_iter().find_map(|(name, known, strength)| (known == *material).then_some((name, strength)))
+}
+
+/// Strengths of the least class that the presets name: S235 (EN 10025-2), EN AW-6082 T6 (EN 1999-1-1,
+/// table 3.2b), EN-GJL-250 (EN 1561), EN-GJS-400-15 (EN 1563).
+const STRENGTHS: [(&str, Material, f64); 4] = [
+    ("steel, S235", Material::STEEL, 235e6),
+    ("aluminium, 6082 T6", Material::ALUMINIUM, 250e6),
+    ("grey iron, EN-GJL-250, tensile", Material::CAST_IRON, 250e6),
+    ("ductile iron, EN-GJS-400-15", Material::DUCTILE_IRON, 250e6),
+];
