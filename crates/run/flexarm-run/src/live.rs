@@ -265,10 +265,10 @@ impl Period {
         let mut bend = self.bend.take().unwrap_or_else(|| vec![0.0; command.q.len()]);
         // Second divided difference of three targets; ratio and share are 1 for equal periods.
         let (ratio, share) = (length / self.earlier_length, 2.0 * length / (length + self.earlier_length));
-        for k in 0..bend.len() {
+        for (k, bend) in bend.iter_mut().enumerate() {
             let rise = command.q[k] - self.q[0][k];
-            bend[k] = share * (rise - ratio * (self.q[0][k] - self.earlier[k]));
-            self.qdot[1][k] = (rise + 0.5 * bend[k]) / length;
+            *bend = share * (rise - ratio * (self.q[0][k] - self.earlier[k]));
+            self.qdot[1][k] = (rise + 0.5 * *bend) / length;
         }
         self.bend = Some(bend);
         jumps
