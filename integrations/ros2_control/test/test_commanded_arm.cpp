@@ -75,11 +75,17 @@ Settings settings(Given given, const std::string & robot = "kr210", double perio
   return settings_of(given, period);
 }
 
-std::vector<std::string> six(const std::string & prefix = "")
+Settings with_open_servos()
+{
+  return settings({{"drives", "servo"}, {"command_mode", "effort"}}, "kr300");
+}
+
+/// Names of six joints.
+std::vector<std::string> six(const std::string & name = "joint_")
 {
   std::vector<std::string> joints;
   for (int k = 1; k <= 6; ++k) {
-    joints.push_back(prefix + "joint_" + std::to_string(k));
+    joints.push_back(name + std::to_string(k));
   }
   return joints;
 }
@@ -208,14 +214,16 @@ void velocities_and_positions_with_velocities_arrive_at_the_same_place()
     by_position.advance(period_s);
     by_velocity.advance(period_s);
   }
-  // The trapezoid of the velocities is off by h^2 / 12 (v'(end) - v'(0)) = 1.6e-7 rad at most.
   below("end off 0.1 rad by position (rad)", std::abs(by_position.state(0).position - 0.1), 1e-12);
-  below("end off 0.1 rad by velocity (rad)", std::abs(by_velocity.state(0).position - 0.1), 1e-6);
+  // The velocities are integrated by the trapezoidal rule: h^2 / 12 (v'(0.5 s) - v'(0)).
+  const double off = -period_s * period_s / 12.0 * 0.4 * pi * pi;
+  const double found = by_velocity.state(0).position - 0.1;
+  below("end off that of the trapezoidal rule (relative)", std::abs(found / off - 1.0), 1e-3);
 }
 
 void servos_follow_and_an_effort_is_added_to_theirs()
 {
-  CommandedArm arm(settings({{"drives", "servo"}}), six());
+  CommandedArm arm(settings({{"drives", "servo"}}, "kr300"), six("joint_a"));
   arm.start(std::vector<double>(6, 0.0));
   for (int k = 1; k <= 1000; ++k) {
     auto command = ramp(k * period_s);
@@ -236,7 +244,7 @@ void servos_follow_and_an_effort_is_added_to_theirs()
 
 void open_servos_hold_until_a_torque_moves_them()
 {
-  CommandedArm arm(settings({{"drives", "servo"}, {"command_mode", "effort"}}), six());
+  CommandedArm arm(with_open_servos(), six("joint_a"));
   const auto error = arm.watch("tcp_error.length");
   arm.start({0.0, -1.0, 1.2, 0.0, 0.5, 0.0});
   const double sag = arm.output(error);
@@ -256,26 +264,26 @@ void open_servos_hold_until_a_torque_moves_them()
   }
   const auto state = arm.state(0);
   holds("joint 1 turns", state.position > 0.01 && state.velocity > 0.1);
-  below("TCP error while it turns over the sag", arm.output(error) / sag, 10.0);
+  below("TCP error while it turns over the sag", arm.output(error) / sag, 2.0);
 }
 
-/// An integral controller in effort mode: the interface closes a loop around the arm.
+/// Joint 1 turns about the vertical, so a controller without integral part gets it to its target.
 void a_controller_closes_the_loop()
 {
-  CommandedArm arm(settings({{"drives", "servo"}, {"command_mode", "effort"}}), six());
+  CommandedArm arm(with_open_servos(), six("joint_a"));
   arm.start(std::vector<double>(6, 0.0));
   std::vector<double> held;
   for (std::size_t k = 0; k < 6; ++k) {
     held.push_back(arm.held(k).effort);
   }
-  const std::vector<double> stiffness = {4e4, 4e4, 2e4, 2e3, 2e3, 5e2};
+  const std::vector<double> stiffness = {4e5, 4e5, 2e5, 2e4, 2e4, 1e4};
   for (int i = 1; i <= 2000; ++i) {
     for (std::size_t k = 0; k < 6; ++k) {
       const auto target = k == 0 ? ramp(i * period_s) : JointCommand{0.0, 0.0, 0.0};
       const auto state = arm.state(k);
       JointCommand command;
       command.effort = held[k] + stiffness[k] * (target.position - state.position) +
-        0.2 * stiffness[k] * (target.velocity - state.velocity);
+        0.1 * stiffness[k] * (target.velocity - state.velocity);
       arm.command(k, command);
     }
     arm.advance(period_s);
@@ -347,7 +355,7 @@ void what_makes_no_sense_is_refused_with_a_remedy()
       arm.command(0, command);
       arm.advance(period_s);
     });
-  CommandedArm prefixed(settings({{"prefix", "left_"}}), six("left_"));
+  CommandedArm prefixed(settings({{"prefix", "left_"}}), six("left_joint_"));
   holds("a prefix is taken off", true);
   holds(
     "names are quoted as in the plant",
