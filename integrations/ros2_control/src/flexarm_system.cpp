@@ -108,7 +108,7 @@ FlexarmSystem::CallbackReturn FlexarmSystem::on_init(
       }
     }
   } catch (const std::exception & error) {
-    RCLCPP_FATAL(get_logger(), "%s: %s", info_.name.c_str(), error.what());
+    RCLCPP_FATAL(get_logger(), "%s", error.what());
     return CallbackReturn::ERROR;
   }
   return CallbackReturn::SUCCESS;
@@ -171,7 +171,7 @@ FlexarmSystem::CallbackReturn FlexarmSystem::on_configure(const State & /*previo
     hold();
     publish();
   } catch (const std::exception & error) {
-    RCLCPP_ERROR(get_logger(), "%s: %s", settings_.robot.c_str(), error.what());
+    RCLCPP_ERROR(get_logger(), "%s", error.what());
     drop();
     return CallbackReturn::FAILURE;
   }
@@ -219,12 +219,12 @@ void FlexarmSystem::find_interfaces()
   }
 }
 
-/// Sets all commands to those that change nothing.
+/// Holds the arm and shows it in the command interfaces.
 void FlexarmSystem::hold()
 {
+  arm_->hold();
   for (std::size_t k = 0; k < commands_.size(); ++k) {
-    commands_[k] = arm_->held(k);
-    arm_->command(k, commands_[k]);
+    commands_[k] = arm_->commanded(k);
   }
   for (const auto & order : joint_orders_) {
     std::ignore = set_command(order.handle, commands_[order.joint].*order.number, true);
@@ -339,8 +339,11 @@ return_type FlexarmSystem::write(const rclcpp::Time & /*time*/, const rclcpp::Du
       commands_[order.joint].*order.number = value;
     }
   }
-  for (std::size_t k = 0; k < commands_.size(); ++k) {
-    arm_->command(k, commands_[k]);
+  try {
+    arm_->command(commands_);
+  } catch (const std::exception & error) {
+    RCLCPP_ERROR(get_logger(), "%s", error.what());
+    return return_type::ERROR;
   }
   for (const auto & order : gpio_orders_) {
     double value = std::numeric_limits<double>::quiet_NaN();

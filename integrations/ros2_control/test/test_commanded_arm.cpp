@@ -90,6 +90,14 @@ std::vector<std::string> six(const std::string & name = "joint_")
   return joints;
 }
 
+/// Commands to six joints of which only the first has one.
+std::vector<JointCommand> first(const JointCommand & command)
+{
+  std::vector<JointCommand> commands(6);
+  commands[0] = command;
+  return commands;
+}
+
 /// A smooth move of joint 1 by 0.1 rad in 0.5 s: position and velocity at a time.
 JointCommand ramp(double t)
 {
@@ -133,7 +141,7 @@ void the_arm_has_the_bits_of_the_c_interface()
   for (int k = 1; k <= 1000; ++k) {
     JointCommand command;
     command.position = ramp(k * period_s).position;
-    arm.command(0, command);
+    arm.command(first(command));
     arm.advance(period_s);
     apart = std::max(apart, std::abs(arm.output(error) - truth[k - 1]));
     largest = std::max(largest, truth[k - 1]);
@@ -176,15 +184,37 @@ void the_clock_keeps_what_is_no_whole_step()
   }
   below("arm off the controller's time (s)", apart, 0.5e-3 + 1e-9);
 
-  CommandedArm fixed(settings({{"clock", "fixed"}}), six());
-  fixed.start(std::vector<double>(6, 0.0));
-  for (int k = 0; k < 100; ++k) {
-    fixed.advance(k % 2 ? 0.4e-3 : 1.7e-3);
-  }
-  below("fixed clock off 100 periods (s)", std::abs(fixed.time_s() - 0.1), 1e-12);
-
   const double left_out = arm.advance(5.0);
   below("time left out of 5 s less the longest 0.1 s (s)", std::abs(left_out - 4.9), 1e-12);
+}
+
+/// A controller whose cycle comes early and late samples its motion at the times that it measures.
+void uneven_periods_do_not_shake_the_arm()
+{
+  for (const std::string mode : {"position", "position_velocity", "velocity"}) {
+    CommandedArm even(settings({{"command_mode", mode}}), six());
+    CommandedArm uneven(settings({{"command_mode", mode}}), six());
+    const auto error = even.watch("tcp_error.position.y");
+    uneven.watch("tcp_error.position.y");
+    even.start(std::vector<double>(6, 0.0));
+    uneven.start(std::vector<double>(6, 0.0));
+    double late_s = 0.0;
+    double apart = 0.0;
+    double largest = 0.0;
+    for (int k = 1; k <= 1000; ++k) {
+      even.advance(period_s);
+      even.command(first(ramp(k * period_s)));
+      // Up to 0.2 ms early and late.
+      const double before_s = late_s;
+      late_s = 0.2e-3 * std::sin(2.1 * k);
+      uneven.advance(period_s + late_s - before_s);
+      uneven.command(first(ramp(k * period_s + late_s)));
+      apart = std::max(apart, std::abs(uneven.output(error) - even.output(error)));
+      largest = std::max(largest, std::abs(even.output(error)));
+    }
+    std::printf("  largest %.4f mm, apart %.6f mm\n", 1e3 * largest, 1e3 * apart);
+    below(mode + ": TCP errors apart over the largest", apart / largest, 5e-3);
+  }
 }
 
 void the_step_divides_the_period()
@@ -207,10 +237,10 @@ void velocities_and_positions_with_velocities_arrive_at_the_same_place()
   }
   for (int k = 1; k <= 600; ++k) {
     const auto command = ramp(k * period_s);
-    by_position.command(0, command);
+    by_position.command(first(command));
     JointCommand velocity;
     velocity.velocity = command.velocity;
-    by_velocity.command(0, velocity);
+    by_velocity.command(first(velocity));
     by_position.advance(period_s);
     by_velocity.advance(period_s);
   }
@@ -228,14 +258,14 @@ void servos_follow_and_an_effort_is_added_to_theirs()
   for (int k = 1; k <= 1000; ++k) {
     auto command = ramp(k * period_s);
     command.effort = 0.0;
-    arm.command(0, command);
+    arm.command(first(command));
     arm.advance(period_s);
   }
   const double still = arm.state(0).position;
   below("servo off its target after 1 s (rad)", std::abs(still - 0.1), 1e-3);
   JointCommand pushed;
   pushed.effort = 500.0;
-  arm.command(0, pushed);
+  arm.command(first(pushed));
   for (int k = 0; k < 20; ++k) {
     arm.advance(period_s);
   }
@@ -248,7 +278,7 @@ void open_servos_hold_until_a_torque_moves_them()
   const auto error = arm.watch("tcp_error.length");
   arm.start({0.0, -1.0, 1.2, 0.0, 0.5, 0.0});
   const double sag = arm.output(error);
-  const double holding = arm.held(1).effort;
+  const double holding = arm.commanded(1).effort;
   holds("joint 2 is held by a torque", std::abs(holding) > 100.0);
   for (int k = 0; k < 100; ++k) {
     arm.advance(period_s);
@@ -258,7 +288,7 @@ void open_servos_hold_until_a_torque_moves_them()
   // A torque on the vertical axis alone turns it; the TCP error stays one of elasticity.
   JointCommand turn;
   turn.effort = 2000.0;
-  arm.command(0, turn);
+  arm.command(first(turn));
   for (int k = 0; k < 300; ++k) {
     arm.advance(period_s);
   }
@@ -274,9 +304,10 @@ void a_controller_closes_the_loop()
   arm.start(std::vector<double>(6, 0.0));
   std::vector<double> held;
   for (std::size_t k = 0; k < 6; ++k) {
-    held.push_back(arm.held(k).effort);
+    held.push_back(arm.commanded(k).effort);
   }
   const std::vector<double> stiffness = {4e5, 4e5, 2e5, 2e4, 2e4, 1e4};
+  std::vector<JointCommand> commands(6);
   for (int i = 1; i <= 2000; ++i) {
     for (std::size_t k = 0; k < 6; ++k) {
       const auto target = k == 0 ? ramp(i * period_s) : JointCommand{0.0, 0.0, 0.0};
@@ -284,8 +315,9 @@ void a_controller_closes_the_loop()
       JointCommand command;
       command.effort = held[k] + stiffness[k] * (target.position - state.position) +
         0.1 * stiffness[k] * (target.velocity - state.velocity);
-      arm.command(k, command);
+      commands[k] = command;
     }
+    arm.command(commands);
     arm.advance(period_s);
   }
   below("joint 1 off 0.1 rad (rad)", std::abs(arm.state(0).position - 0.1), 1e-3);
@@ -320,8 +352,6 @@ void what_makes_no_sense_is_refused_with_a_remedy()
     "comma for a point", {"step", "0,001"}, [] {settings({{"step", "0,001"}});});
   refused("period", {"max_period"}, [] {settings({{"max_period", "0"}});});
   refused(
-    "rate not known", {"clock"}, [] {settings({{"clock", "fixed"}}, "kr210", 0.0);});
-  refused(
     "unknown parameter", {"stifness_factor", "stiffness_factor", "payload.mass"},
     [] {CommandedArm(settings({{"stifness_factor", "2"}}), six());});
   refused(
@@ -347,13 +377,12 @@ void what_makes_no_sense_is_refused_with_a_remedy()
     "input of a joint", {"joint.joint_1.torque", "tcp.force.x"},
     [] {CommandedArm arm(settings({}), six()); arm.drive("joint.joint_1.torque");});
   refused(
-    "infinite target", {"joint.joint_1.target_position"}, [] {
+    "infinite command", {"joint_1", "infinity"}, [] {
       CommandedArm arm(settings({}), six());
       arm.start(std::vector<double>(6, 0.0));
       JointCommand command;
       command.position = INFINITY;
-      arm.command(0, command);
-      arm.advance(period_s);
+      arm.command(first(command));
     });
   CommandedArm prefixed(settings({{"prefix", "left_"}}), six("left_joint_"));
   holds("a prefix is taken off", true);
@@ -373,6 +402,7 @@ int main(int count, char ** arguments)
     {"the arm has the bits of the C interface", the_arm_has_the_bits_of_the_c_interface},
     {"a still arm sags and stays", a_still_arm_sags_and_stays},
     {"the clock keeps what is no whole step", the_clock_keeps_what_is_no_whole_step},
+    {"uneven periods do not shake the arm", uneven_periods_do_not_shake_the_arm},
     {"the step divides the period", the_step_divides_the_period},
     {"velocities and positions with velocities arrive at the same place",
       velocities_and_positions_with_velocities_arrive_at_the_same_place},

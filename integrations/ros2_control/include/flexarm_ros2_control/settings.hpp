@@ -25,13 +25,6 @@ enum class CommandMode
   effort              ///< torques of the motors, servos open
 };
 
-/// What the length of a step is.
-enum class Clock
-{
-  measured,  ///< the period that ros2_control measured
-  fixed      ///< the nominal period of the component
-};
-
 /// How an arm is made and stepped.
 struct Settings
 {
@@ -39,7 +32,6 @@ struct Settings
   std::string links;
   std::string drives;
   CommandMode mode = CommandMode::position;
-  Clock clock = Clock::measured;
   /// Nominal period (s); 0 if it is not known.
   double period_s = 0.0;
   /// Longest time that one read simulates (s).
@@ -86,20 +78,6 @@ inline Settings settings_of(
     {"position_velocity", CommandMode::position_velocity},
     {"velocity", CommandMode::velocity},
     {"effort", CommandMode::effort}};
-  static const std::map<std::string, Clock> clocks = {
-    {"measured", Clock::measured}, {"fixed", Clock::fixed}};
-  const auto chosen = [](const auto & known, const auto & name, const auto & word) {
-      const auto found = known.find(word);
-      if (found != known.end()) {
-        return found->second;
-      }
-      std::string words;
-      for (const auto & entry : known) {
-        words += (words.empty() ? "" : ", ") + entry.first;
-      }
-      throw ArmError(name + " = \"" + word + "\": expected one of " + words);
-    };
-
   Settings settings;
   settings.period_s = period_s;
   for (const auto & [name, text] : given) {
@@ -112,9 +90,12 @@ inline Settings settings_of(
     } else if (name == "prefix") {
       settings.prefix = text;
     } else if (name == "command_mode") {
-      settings.mode = chosen(modes, name, text);
-    } else if (name == "clock") {
-      settings.clock = chosen(clocks, name, text);
+      const auto mode = modes.find(text);
+      if (mode == modes.end()) {
+        throw ArmError(
+          name + " = \"" + text + "\": expected position, position_velocity, velocity or effort");
+      }
+      settings.mode = mode->second;
     } else if (name == "max_period") {
       settings.longest_s = number(name, text);
     } else if (name == "open_servos" || name == "use_target_velocity") {
@@ -130,9 +111,6 @@ inline Settings settings_of(
   if (!(settings.longest_s > 0.0)) {
     throw ArmError(
       "max_period = " + std::to_string(settings.longest_s) + " s: expected more than 0");
-  }
-  if (settings.clock == Clock::fixed && !(period_s > 0.0)) {
-    throw ArmError("clock = \"fixed\" needs the rate of the component, which is not known");
   }
   return settings;
 }
