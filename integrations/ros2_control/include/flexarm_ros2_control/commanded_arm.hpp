@@ -211,7 +211,7 @@ private:
       slope = new_slope;
     }
 
-    /// Change of the parabola in `lead_s` after the last value; `interval_s` is since the second last.
+    /// Change of the parabola in `lead_s` after the last value, `interval_s` after the one before.
     double ahead(double lead_s, double interval_s) const
     {
       return lead_s * (slope + (lead_s + interval_s) * bend);
