@@ -244,7 +244,8 @@ private:
     for (const auto & [name, value] : settings_.parameters) {
       const auto found = plant_.find(name, FLEXARM_PARAMETER);
       if (!found) {
-        throw ArmError(unknown("hardware parameter or parameter", name, FLEXARM_PARAMETER));
+        throw ArmError(
+          unknown("hardware parameter", name, FLEXARM_PARAMETER) + ", the plugin " + own_names);
       }
       plant_.set(*found, value);
     }

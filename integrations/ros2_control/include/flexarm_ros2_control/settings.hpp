@@ -25,6 +25,9 @@ enum class CommandMode
   effort              ///< torques of the motors, servos open
 };
 
+/// Names of the parameters that are not those of the plant.
+constexpr const char * own_names = "robot links drives prefix command_mode max_period";
+
 /// How an arm is made and stepped.
 struct Settings
 {
