@@ -454,7 +454,8 @@ class MuJoCo:
     settings = ("A chain of rigid parts with hinges and springs (4 to 16 hinges per bar), whose end moves under a load "
                 "as that of Timoshenko's beam; `implicitfast` and `RK4`, with steps near the limit of stability and "
                 "shorter ones. The integrator `discrete` is stable with longer steps, but of first order, and needs "
-                "more time for the same error. Not for the crank, as constraints are soft.")
+                "more time for the same error. Shear is right for loads at the ends only. Not for the crank, as "
+                "constraints are soft.")
 
     def __init__(self):
         import mujoco
@@ -560,7 +561,7 @@ class Pinocchio:
     MODEL = "hinged parts"
     settings = ("The same chain (4 to 32 hinges per bar); accelerations from `crba` and `rnea` in Python, steps by SciPy's "
                 "`Radau` with the Jacobian of `computeRNEADerivatives` and relative tolerances of 1e-2 to 1e-4 instead of "
-                "steps. Explicit methods (`DOP853`, `RK45`) took 4 to 20 times as long. Most of the time is Python's and "
+                "steps. Explicit methods (`DOP853`, `RK45`) took 5 to 60 times as long. Most of the time is Python's and "
                 "SciPy's. Not for the crank, as SciPy has no stepper for loops.")
 
     def __init__(self):

@@ -33,8 +33,8 @@ TARGET = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
 PROGRAMS = (Flexarm, Exudyn, MuJoCo, Pinocchio)
 # Runs that take longer are not repeated (CPU s).
 SHORT = 5.0
-# Errors that the tables ask for.
-BOUNDS = (3e-2, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4)
+# Errors that the tables ask for: relative ones, and those of the slider (m).
+BOUNDS = {"error": (3e-2, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4), "slider_m": (1e-5, 3e-6, 1e-6, 3e-7, 1e-7, 3e-8)}
 
 
 # --------------------------------------------------------------------------------------------------
@@ -160,19 +160,24 @@ def seconds(x):
     return f"{x:.3f}" if x < 0.1 else f"{x:.2f}" if x < 10 else f"{x:.0f}"
 
 
-def sure(line, lines):
+def bound_text(measure, bound):
+    """A bound as text."""
+    return percent(bound) if measure == "error" else f"{1e6 * bound:g} µm"
+
+
+def sure(line, lines, measure):
     """The largest error of a line and of all finer lines of its model and stepper: what is left if
     errors of model, elements and steps do not cancel each other."""
     kind = [line[name] for name in ("program", "case", "model", "stepper")]
-    return max(other["error"] for other in lines if "failed" not in other
+    return max(other[measure] for other in lines if "failed" not in other
                and [other[name] for name in ("program", "case", "model", "stepper")] == kind
                and other["size"] >= line["size"] and other["step"] <= line["step"])
 
 
-def fastest(found, case, program, bound):
-    """The cheapest line of a program and model with a sure error of at most `bound`."""
+def fastest(found, case, program, measure, bound):
+    """The cheapest line of a program and model whose sure `measure` is at most `bound`."""
     good = [line for line in found["lines"] if line["case"] == case and "failed" not in line
-            and (line["program"], line["model"]) == program and sure(line, found["lines"]) <= bound]
+            and (line["program"], line["model"]) == program and sure(line, found["lines"], measure) <= bound]
     return min(good, key=lambda line: line["cpu_s"], default=None)
 
 
@@ -186,10 +191,13 @@ def models(found, case):
     return list(dict.fromkeys((line["program"], line["model"]) for line in found["lines"] if line["case"] == case))
 
 
-def time_table(found, case):
+def time_table(found, case, measure="error"):
     """Shortest time of each program and model by error, with size and step."""
-    text = f"| {case} | {' | '.join(percent(bound) for bound in BOUNDS)} |\n" + "| --- " * (1 + len(BOUNDS)) + "|\n"
-    table = {name: [fastest(found, case, name, bound) for bound in BOUNDS] for name in models(found, case)}
+    bounds = BOUNDS[measure]
+    title = {"error": case if case != CRANK else f"{case}, deflection", "slider_m": f"{case}, slider"}[measure]
+    text = f"| {title} | {' | '.join(bound_text(measure, bound) for bound in bounds)} |\n"
+    text += "| --- " * (1 + len(bounds)) + "|\n"
+    table = {name: [fastest(found, case, name, measure, bound) for bound in bounds] for name in models(found, case)}
     ahead = [min((line["cpu_s"] for line in column if line), default=None) for column in zip(*table.values())]
     for (program, model), row in table.items():
         cells = []
@@ -205,18 +213,19 @@ def time_table(found, case):
 
 def convergence_table(found):
     """Errors with the shortest step that works, from the smallest to the largest size."""
-    cases = [*TWO_LINK, CRANK]
-    text = f"| model, sizes | {' | '.join(cases)} |\n" + "| --- " * (1 + len(cases)) + "|\n"
+    columns = [(case, case, "error", 1e2) for case in TWO_LINK]
+    columns += [("deflection", CRANK, "error", 1e2), ("slider (µm)", CRANK, "slider_m", 1e6)]
+    text = f"| model, sizes | {' | '.join(column[0] for column in columns)} |\n" + "| --- " * (1 + len(columns)) + "|\n"
     for program, model in models(found, TWO_LINK[0]):
         series = [line for line in found["lines"] if (line["program"], line["model"]) == (program, model)]
         sizes = sorted({line["size"] for line in series})
         row = []
-        for case in cases:
+        for _, case, measure, unit in columns:
             errors = []
             for size in sizes:
-                fine = [line for line in series if line["case"] == case and line["size"] == size and "failed" not in line]
-                finest = min(fine, key=lambda line: (line["step"], line["error"]), default=None)
-                errors.append(f"{100 * finest['error']:.2g}" if finest else "-")
+                works = [line for line in series if line["case"] == case and line["size"] == size and "failed" not in line]
+                finest = min(works, key=lambda line: (line["step"], line["error"]), default=None)
+                errors.append(f"{unit * finest[measure]:.2g}" if finest else "-")
             row.append(", ".join(errors) if any(error != "-" for error in errors) else "-")
         text += f"| {program}, {model}, {', '.join(map(str, sizes))} | {' | '.join(row)} |\n"
     return text
@@ -230,8 +239,9 @@ def markdown(found):
         text += f"* **{name}**: {found['settings'][name]}\n"
     for name, reason in found["skipped"].items():
         text += f"* **{name}**: skipped ({reason}).\n"
-    text += "\nProcessor time (s) for an error of at most ..., with the size and the step that need it:\n\n"
+    text += "\nProcessor time (s) for an error of at most the head of the column, with size and step:\n\n"
     text += "\n".join(time_table(found, case) for case in [*TWO_LINK, CRANK])
+    text += "\n" + time_table(found, CRANK, "slider_m")
     text += "\nError (%) with the shortest step that works, by size:\n\n" + convergence_table(found)
     return text
 
