@@ -279,11 +279,12 @@ impl<I: Integrator + 'static> Stepper for ReducedStepper<I> {
         self.integrator.last_iteration()
     }
 
-    fn add_torques(&mut self) {
+    fn restart(&mut self) -> Result<(), StepError> {
         let t = self.integrator.time();
         if let Some(servo) = &mut self.system.servo {
             servo.add(t, &self.system.arm);
         }
+        self.integrator.restart(&mut self.system)
     }
 
     fn copy(&self) -> Option<Box<dyn Stepper>> {

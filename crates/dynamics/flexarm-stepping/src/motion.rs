@@ -13,7 +13,7 @@ pub trait PrescribedMotion: Send + Sync {
 
     /// Returns the torque that is added to that of the servo of an actuated coordinate at `t` (s),
     /// at the joint (N m or N). Read at each sample of the servos and by
-    /// [`Stepper::add_torques`](crate::Stepper::add_torques).
+    /// [`Stepper::restart`](crate::Stepper::restart).
     fn added_torque(&self, _t: f64, _coordinate: usize) -> f64 {
         0.0
     }

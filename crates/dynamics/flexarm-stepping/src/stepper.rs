@@ -49,9 +49,14 @@ pub trait Stepper: Send {
         (0, 0.0)
     }
 
-    /// Applies a change of the torques that the motion adds from now on
-    /// ([`PrescribedMotion::added_torque`](crate::PrescribedMotion::added_torque)).
-    fn add_torques(&mut self) {}
+    /// Continues from the current state after a jump of loads or of the torques that the motion
+    /// adds ([`PrescribedMotion::added_torque`](crate::PrescribedMotion::added_torque)).
+    ///
+    /// # Errors
+    /// [`StepError::Singular`] if the acceleration cannot be computed.
+    fn restart(&mut self) -> Result<(), StepError> {
+        Ok(())
+    }
 
     /// Returns a copy that goes on from the current state with the same bits; `None` if the solver
     /// cannot be copied.

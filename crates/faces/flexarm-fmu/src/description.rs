@@ -50,7 +50,7 @@ pub fn description(fmi: Fmi, about: &About<'_>, variables: &[Variable]) -> io::R
     ]);
     root.write_inner_content(|xml| {
         co_simulation(xml, fmi)?;
-        xml.create_element("UnitDefinitions").write_inner_content(|xml| units(xml))?;
+        xml.create_element("UnitDefinitions").write_inner_content(units)?;
         let step = about.step_s.to_string();
         xml.create_element("DefaultExperiment")
             .with_attributes([("startTime", "0"), ("stopTime", "1"), ("stepSize", &step)])

@@ -286,7 +286,8 @@ impl Plant {
         if !(length_s.is_finite() && length_s > 0.0) {
             return Err(PlantError::Length(length_s));
         }
-        if !((from_s - own_s).abs() <= SAME_TIME * length_s) {
+        let is_same = (from_s - own_s).abs() <= SAME_TIME * length_s;
+        if !is_same {
             return Err(PlantError::Time { given_s: from_s, own_s });
         }
         if self.steps == 0 {

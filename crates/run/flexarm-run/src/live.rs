@@ -243,32 +243,35 @@ impl Period {
         }
     }
 
-    /// Starts the next period, of this length (s).
-    fn go_to(&mut self, begin: f64, length: f64, command: &Command<'_>) {
+    /// Starts the next period, of this length (s). Returns whether the added torques jump.
+    fn go_to(&mut self, begin: f64, length: f64, command: &Command<'_>) -> bool {
         self.begin = begin;
         self.earlier.copy_from_slice(&self.q[0]);
         (self.earlier_length, self.length) = (self.length, length);
         self.q.swap(0, 1);
         self.qdot.swap(0, 1);
         self.q[1].copy_from_slice(command.q);
-        match command.torque {
-            Some(torque) => self.torque.copy_from_slice(torque),
-            None => self.torque.fill(0.0),
+        let mut jumps = false;
+        for (k, own) in self.torque.iter_mut().enumerate() {
+            let torque = command.torque.map_or(0.0, |torque| torque[k]);
+            jumps |= *own != torque;
+            *own = torque;
         }
         if let Some(qdot) = command.qdot {
             self.qdot[1].copy_from_slice(qdot);
             self.bend = None;
-            return;
+            return jumps;
         }
         let mut bend = self.bend.take().unwrap_or_else(|| vec![0.0; command.q.len()]);
         // Second divided difference of three targets; ratio and share are 1 for equal periods.
         let (ratio, share) = (length / self.earlier_length, 2.0 * length / (length + self.earlier_length));
-        for k in 0..bend.len() {
+        for (k, bend) in bend.iter_mut().enumerate() {
             let rise = command.q[k] - self.q[0][k];
-            bend[k] = share * (rise - ratio * (self.q[0][k] - self.earlier[k]));
-            self.qdot[1][k] = (rise + 0.5 * bend[k]) / length;
+            *bend = share * (rise - ratio * (self.q[0][k] - self.earlier[k]));
+            self.qdot[1][k] = (rise + 0.5 * *bend) / length;
         }
         self.bend = Some(bend);
+        jumps
     }
 }
 
@@ -331,9 +334,16 @@ impl Live {
             return Err(ValueError::NotFinite { what: "the wrench", found }.into());
         }
         let begin = self.stepper.time();
-        self.targets.0.write().unwrap_or_else(PoisonError::into_inner).go_to(begin, length_s, command);
-        *self.push.write().unwrap_or_else(PoisonError::into_inner) = command.wrench;
-        self.stepper.add_torques();
+        let jumps = {
+            let mut period = self.targets.0.write().unwrap_or_else(PoisonError::into_inner);
+            let mut push = self.push.write().unwrap_or_else(PoisonError::into_inner);
+            let pulls = *push != command.wrench;
+            *push = command.wrench;
+            period.go_to(begin, length_s, command) || pulls
+        };
+        if jumps {
+            self.stepper.restart().map_err(|source| Error::Step { source, partial: false })?;
+        }
         for _ in 0..steps {
             self.stepper.step().map_err(|source| Error::Step { source, partial: false })?;
         }

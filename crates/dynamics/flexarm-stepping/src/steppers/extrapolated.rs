@@ -125,9 +125,9 @@ impl Stepper for Extrapolated {
         (coarse.0.max(fine.0), coarse.1.max(fine.1))
     }
 
-    fn add_torques(&mut self) {
-        self.coarse.add_torques();
-        self.fine.add_torques();
+    fn restart(&mut self) -> Result<(), StepError> {
+        self.coarse.restart()?;
+        self.fine.restart()
     }
 
     fn copy(&self) -> Option<Box<dyn Stepper>> {

@@ -303,11 +303,9 @@ extern "C" fn fmi2FreeFMUstate(component: *mut c_void, state: *mut *mut c_void) 
     // SAFETY: the importer passes an instance and a place with a state that is not freed, or null.
     unsafe {
         call(component, |_| {
-            if let Some(place) = state.as_mut() {
-                if !place.is_null() {
-                    drop(Box::from_raw(place.cast::<InstanceState>()));
-                    *place = ptr::null_mut();
-                }
+            if let Some(place) = state.as_mut().filter(|place| !place.is_null()) {
+                drop(Box::from_raw(place.cast::<InstanceState>()));
+                *place = ptr::null_mut();
             }
             Ok(())
         })
