@@ -53,6 +53,7 @@
 mod contributions;
 mod damped_modes;
 mod error_parts;
+mod fatigue;
 mod hold;
 mod inversion;
 mod linear_system;
@@ -73,6 +74,7 @@ mod vibration;
 pub use contributions::{ContributionPeak, ContributionPeaks, engineering_strain, tcp_displacement};
 pub use damped_modes::{DampedMode, damped_modes};
 pub use error_parts::{ErrorParts, error_parts};
+pub use fatigue::{FatigueCycle, SnCurve, rainflow, rainflow_repeating};
 pub use flexarm_kinematics::{Pose, rotation_vector};
 pub use hold::HoldMetrics;
 pub use inversion::{Inversion, InversionError, Node};

@@ -236,6 +236,9 @@ pub struct StressPlaceFigures {
     pub of_yield: Option<f64>,
     /// Material with its class; null if it is none of the presets.
     pub material: Option<String>,
+    /// Fatigue damage of the motion if it is repeated without end; the life is 1 over it in motions.
+    /// Null for an unknown material.
+    pub damage: Option<f64>,
 }
 
 /// Figures of an elastic drive.

@@ -93,7 +93,7 @@ pub fn write_stress(fields: &StressFields) -> Vec<u8> {
 /// # Errors
 /// A message with what was found and expected.
 pub fn parse_stress(bytes: &[u8]) -> Result<StressFields, String> {
-    let help = "create it again with flexarm reduce --stress";
+    let help = "reduce the mesh again, with its stress";
     let fail = |what: String| format!("{what}; {help}");
     let (_, header) = SafeTensors::read_metadata(bytes).map_err(|error| fail(format!("not a stress file: {error}")))?;
     let about = header.metadata().as_ref().and_then(|about| about.get(KEY));

@@ -68,7 +68,7 @@ impl StressFields {
         if !link.is_craig_bampton() || 6 * link.interfaces.len() != wrenches || modes > self.frequencies_hz.len() {
             return Err(format!(
                 "stress is stored for {} interfaces and {} fixed-interface modes, which are not the coordinates of the \
-                 modal link: leave out eigenmodes, or create the link again with --stress",
+                 modal link: leave out eigenmodes, or reduce the mesh again, with its stress",
                 wrenches / 6,
                 self.frequencies_hz.len()
             ));
@@ -171,8 +171,8 @@ impl StressFields {
             return Ok(());
         }
         Err(format!(
-            "the stress file belongs to another link: stiffness times its compliance differs from 1 by {off:.1e}; create \
-             both together with flexarm reduce --stress"
+            "the stress file belongs to another link: stiffness times its compliance differs from 1 by {off:.1e}; reduce \
+             the mesh again, with its stress"
         ))
     }
 }

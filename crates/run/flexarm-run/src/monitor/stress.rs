@@ -3,12 +3,13 @@
 //! The monitor keeps the amplitudes of the fields at every logged sample; [`StressMonitor::result`]
 //! finds the maxima over the run for every node of the surface.
 
-use flexarm_fem::stress::{StressFields, StressMap, StressSeat, inertia_loads, parse_stress};
+use flexarm_analysis::{SnCurve, rainflow_repeating};
+use flexarm_fem::stress::{StressFields, StressMap, StressSeat, inertia_loads, parse_stress, von_mises};
 use flexarm_fem::{Material, ReducedLink, RigidPart};
 use flexarm_flexlink::LinkForm;
 use flexarm_kinematics::{Data, Frame, State, inverse_dynamics};
 use flexarm_stepping::{FlexibleArm, Observation, PooledWorkspace};
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, Matrix3};
 
 use crate::error::Error;
 use crate::flexible::{FlexibleRobot, Owner, RobotLink};
@@ -121,7 +122,7 @@ fn map_of(link: &RobotLink, fields: &StressFields, modelling: &Modelling) -> Res
     let reduced = &link.flexible.reduced;
     let (joints, parts) = match link.form(modelling)? {
         LinkForm::Modal(modal) => return fields.modal_map(&modal, link.stiffness_factor),
-        LinkForm::TwoParts => (vec![reduced.split.clone()], vec![reduced.proximal, reduced.distal]),
+        LinkForm::TwoParts => (vec![reduced.split.clone()], vec![reduced.proximal.clone(), reduced.distal.clone()]),
         LinkForm::Chain(chain) => (chain.joints, chain.parts),
     };
     let springs: Vec<_> = joints.iter().map(|joint| link.scaled(&joint.K_S)).collect();
@@ -167,13 +168,18 @@ impl LinkStress {
             let seat = &self.fields.seats[k];
             let (stress, sample) = peaks[k];
             let strength = strength_of(&self.fields.materials[seat.material]);
+            let damage = |strength: &Strength| {
+                let history = self.signed_history(k, &amplitudes);
+                strength.curve().damage(&rainflow_repeating(&history))
+            };
             StressPlaceFigures {
                 node: seat.node,
                 position_m: seat.position.into(),
                 t_s: times[sample],
                 von_mises_pa: f64::from(stress),
-                of_yield: strength.map(|(_, strength)| f64::from(stress) / strength),
-                material: strength.map(|(name, _)| name.to_owned()),
+                of_yield: strength.map(|strength| f64::from(stress) / strength.yield_pa),
+                material: strength.map(|strength| strength.name.to_owned()),
+                damage: strength.map(damage),
             }
         };
         LinkStressFigures {
@@ -183,6 +189,18 @@ impl LinkStress {
             clear_of_ties_m: clear,
             worst: worst.into_iter().map(place).collect(),
         }
+    }
+
+    /// Returns the von Mises stress of a seat over the run (Pa), with the sign of the principal
+    /// stress of the largest magnitude.
+    fn signed_history(&self, seat: usize, amplitudes: &DMatrix<f32>) -> Vec<f64> {
+        let own = self.map.stress().rows(6 * seat, 6) * amplitudes;
+        let signed = own.column_iter().map(|column| {
+            let [xx, yy, zz, xy, yz, zx] = [0, 1, 2, 3, 4, 5].map(|c| f64::from(column[c]));
+            let principal = Matrix3::new(xx, xy, zx, xy, yy, yz, zx, yz, zz).symmetric_eigenvalues();
+            von_mises([xx, yy, zz, xy, yz, zx]).copysign(principal.max() + principal.min())
+        });
+        signed.collect()
     }
 
     /// Returns the maximum von Mises stress of each seat (Pa) with its sample.
@@ -218,17 +236,42 @@ fn von_mises_squared([xx, yy, zz, xy, yz, zx]: &[f32; 6]) -> f32 {
     0.5 * (a * a + b * b + c * c) + 3.0 * (xy * xy + yz * yz + zx * zx)
 }
 
-/// Returns the name and the yield strength (Pa) of a known material; for grey iron the tensile
-/// strength, as it does not yield.
-fn strength_of(material: &Material) -> Option<(&'static str, f64)> {
-    STRENGTHS.into_iter().find_map(|(name, known, strength)| (known == *material).then_some((name, strength)))
+/// Strength of a material.
+#[derive(Clone, Copy)]
+struct Strength {
+    /// Material with its class.
+    name: &'static str,
+    material: Material,
+    /// Yield strength; of grey iron, which does not yield, the tensile strength (Pa).
+    yield_pa: f64,
+    tensile_pa: f64,
+    /// Fatigue strength for reversed stress over the tensile strength.
+    fatigue: f64,
 }
 
-/// Strengths of the least class that the presets name: S235 (EN 10025-2), EN AW-6082 T6 (EN 1999-1-1,
-/// table 3.2b), EN-GJL-250 (EN 1561), EN-GJS-400-15 (EN 1563).
-const STRENGTHS: [(&str, Material, f64); 4] = [
-    ("steel, S235", Material::STEEL, 235e6),
-    ("aluminium, 6082 T6", Material::ALUMINIUM, 250e6),
-    ("grey iron, EN-GJL-250, tensile", Material::CAST_IRON, 250e6),
-    ("ductile iron, EN-GJS-400-15", Material::DUCTILE_IRON, 250e6),
+impl Strength {
+    /// S-N curve of parts that are not welded: knee at 1e6 cycles, slope 5 (FKM guideline, 6th
+    /// edition, 4.4.3), for a probability of survival of 97.5 %, without surface and size effects.
+    fn curve(&self) -> SnCurve {
+        SnCurve { amplitude_pa: self.fatigue * self.tensile_pa, cycles: 1e6, slope: 5.0, tensile_pa: self.tensile_pa }
+    }
+}
+
+fn strength_of(material: &Material) -> Option<&'static Strength> {
+    STRENGTHS.iter().find(|strength| strength.material == *material)
+}
+
+/// Strengths of the least class that the presets name: EN 10025-2, EN 1999-1-1 (table 3.2b), EN
+/// 1561, EN 1563; ratios of fatigue to tensile strength: FKM guideline, table 4.2.1.
+static STRENGTHS: [Strength; 4] = [
+    Strength { name: "S235", material: Material::STEEL, yield_pa: 235e6, tensile_pa: 360e6, fatigue: 0.45 },
+    Strength { name: "EN AW-6082 T6", material: Material::ALUMINIUM, yield_pa: 250e6, tensile_pa: 290e6, fatigue: 0.3 },
+    Strength { name: "EN-GJL-250", material: Material::CAST_IRON, yield_pa: 250e6, tensile_pa: 250e6, fatigue: 0.3 },
+    Strength {
+        name: "EN-GJS-400",
+        material: Material::DUCTILE_IRON,
+        yield_pa: 250e6,
+        tensile_pa: 400e6,
+        fatigue: 0.34,
+    },
 ];

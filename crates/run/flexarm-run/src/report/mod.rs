@@ -172,13 +172,22 @@ fn mm(x: f64) -> String {
     format!("{:.MM_DIGITS$}", 1e3 * x)
 }
 
+/// Number of motions beyond which a life is not given as a number.
+const ENDLESS: f64 = 1e12;
+
 fn stress_figures(summary: &Summary) -> Vec<Figure> {
     let row = |link: &LinkStressFigures| {
         let place = link.worst.first()?;
         let [x, y, z] = place.position_m.map(|x| format!("{:.0}", 1e3 * x));
         let at = format!("von Mises, node {} at ({x}, {y}, {z}) mm of the link, {:.3} s", place.node, place.t_s);
         let note = match (place.of_yield, &place.material) {
-            (Some(share), Some(material)) => format!("{:.0} % of the strength ({material}); {at}", 100.0 * share),
+            (Some(share), Some(material)) => {
+                let life = place.damage.filter(|damage| *damage > 1.0 / ENDLESS).map_or_else(
+                    || "life beyond 1e12 motions".to_owned(),
+                    |damage| format!("life {:.1e} motions", 1.0 / damage),
+                );
+                format!("{:.1} % of the yield strength of {material}, {life}; {at}", 100.0 * share)
+            }
             _ => at,
         };
         let figure = Figure::new(link.name.clone(), format!("{:.2}", 1e-6 * place.von_mises_pa), "MPa", note);
