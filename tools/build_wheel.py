@@ -36,7 +36,7 @@ OLDEST_GLIBC = "2.28"
 #: Packages that the tests require, and optional ones; tests without an optional package are
 #: skipped.
 NEEDED = ["numpy", "pytest"]
-OTHERS = ["matplotlib", "pandas", "polars", "pyarrow", "pin", "mypy", "pyright[nodejs]", "nbclient", "nbformat", "ipykernel"]
+OTHERS = ["matplotlib", "scipy", "pandas", "polars", "pyarrow", "pin", "mypy", "pyright[nodejs]", "nbclient", "nbformat", "ipykernel"]
 NO_NETWORK = 3
 
 

@@ -1,7 +1,7 @@
 """A servo-controlled flexible arm behind ``step(targets)``, as in Gymnasium and MuJoCo, at 1 kHz.
 
-Prints the real-time factor. The interface is that of Gymnasium (``reset``, ``step`` with five
-results); with Gymnasium installed, wrap or subclass it.
+Prints the real-time factor. ``reset`` and ``step`` return what those of ``gymnasium.Env`` do;
+Gymnasium is not required.
 """
 
 from __future__ import annotations
@@ -61,11 +61,11 @@ def main(seconds: float = 2.0) -> None:
         # Half a second to the goal, smoothly; then the arm rings and settles.
         s = min(1.0, (k + 1) * env.live.period / 0.5)
         targets = start + (end - start) * s**3 * (10.0 - 15.0 * s + 6.0 * s * s)
-        _, _, _, _, told = env.step(targets)
-        distance[k] = told["distance"]
+        _, _, _, _, info = env.step(targets)
+        distance[k] = info["distance"]
     spent = time.perf_counter() - begin
     print(f"{steps} steps at {1 / env.live.period:.0f} Hz: {seconds / spent:.1f} times real time")
-    print(f"at the goal {1e3 * distance[-1]:.2f} mm away, {1e3 * distance[round(0.5 / env.live.period)]:.2f} mm when the motion ends")
+    print(f"distance from the goal: {1e3 * distance[-1]:.2f} mm at the end, {1e3 * distance[round(0.5 / env.live.period)]:.2f} mm when the motion ends")
 
 
 if __name__ == "__main__":

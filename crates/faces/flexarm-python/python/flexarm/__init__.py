@@ -6,11 +6,11 @@
 >>> run.error.shape[1]
 3
 
-:func:`load` reads a robot, :meth:`Robot.flexible` adds flexible links and drives. The resulting
-:class:`Arm` is used with numpy arrays: :meth:`Arm.simulate`, :meth:`Arm.statics`,
-:meth:`Arm.modes`, :meth:`Arm.response`, :meth:`Arm.linearise`. SI units; six-vectors are linear
-first. Errors are of the class :class:`flexarm.Error`, warnings about doubtful inputs or results of
-the class :class:`flexarm.Caveat`.
+:func:`load` reads a robot, :meth:`Robot.flexible` adds flexible links and drives. The methods of
+the resulting :class:`Arm` take and return numpy arrays: :meth:`Arm.simulate`, :meth:`Arm.statics`,
+:meth:`Arm.modes`, :meth:`Arm.response`, :meth:`Arm.linearise`. Quantities are in SI units;
+six-vectors have the linear part first. Errors derive from :class:`flexarm.Error`. Probable mistakes
+in an input and limits of a result are warnings of the class :class:`flexarm.Caveat`.
 """
 
 from pathlib import Path as _Path

@@ -8,8 +8,7 @@ def main() -> int:
     """Run the command line of this process."""
     from . import _flexarm
 
-    # The command owns the process: Ctrl-C ends it wherever the command does not handle it, as in
-    # any other program.
+    # Without Python's handler, Ctrl-C ends the process unless the command handles it.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     sys.stdout.flush()
     return _flexarm.run_command(["flexarm", *sys.argv[1:]])

@@ -1,4 +1,4 @@
-"""Robots from values: the contents of a URDF and of a robot file, by calls."""
+"""Building robots in code: the contents of a URDF and of a robot file."""
 
 from __future__ import annotations
 
@@ -81,11 +81,10 @@ def _inertia(value: Optional[ArrayLike]) -> Optional[list[float]]:
 
 
 class RobotBuilder:
-    """Builder of a robot: links and joints, or a URDF; then tool, payload, flexible links, drives.
+    """Builds a robot from links and joints or a URDF, with tool, payload, flexible links, drives.
 
-    Every call returns the builder; :meth:`build` creates the robot and reports inconsistencies.
-    Entries without a call of their own are added by :meth:`add` with the keys of a robot file,
-    which ``flexarm format robot`` prints.
+    Every method returns the builder, :meth:`build` the robot. Entries of a robot file that have no
+    method of their own are added with :meth:`add`; ``flexarm format robot`` lists their keys.
 
     Parameters
     ----------
@@ -198,8 +197,8 @@ class RobotBuilder:
         if _number("mass", mass) != 0.0:
             xyz = _text(_numbers("com", com, (3,)))
             entries = zip(("ixx", "iyy", "izz", "ixy", "ixz", "iyz"), _inertia(inertia) or [0.0] * 6)
-            told = " ".join(f'{key}="{value!r}"' for key, value in entries)
-            inner = f'<inertial><origin xyz="{xyz}"/><mass value="{float(mass)!r}"/><inertia {told}/></inertial>'
+            body = " ".join(f'{key}="{value!r}"' for key, value in entries)
+            inner = f'<inertial><origin xyz="{xyz}"/><mass value="{float(mass)!r}"/><inertia {body}/></inertial>'
         self._links.append(f"<link name={quoteattr(name)}>{inner}</link>")
         return self
 
@@ -337,7 +336,7 @@ class RobotBuilder:
         distal : str, optional
             Joint at the far end. Default: the only joint after the link.
         model : {"lumped", "modal"}, optional
-            Rigid parts with springs between, or one body with modes. Default: ``"lumped"``.
+            Rigid parts joined by springs, or one body with modes. Default: ``"lumped"``.
         segments, modes : int, optional
             Number of parts, or of modes.
         damping : float or dict, optional
@@ -389,7 +388,7 @@ class RobotBuilder:
         distal : str, optional
             Joint at the far end. Default: the only joint after the link.
         model : {"lumped", "modal"}, optional
-            Rigid parts with springs between, or one body with modes. Default: ``"lumped"``.
+            Rigid parts joined by springs, or one body with modes. Default: ``"lumped"``.
         segments, modes, eigenmodes : int, optional
             Number of parts, of fixed-interface modes, or of eigenmodes.
         damping : float or dict, optional
@@ -430,8 +429,9 @@ class RobotBuilder:
         ----------
         joint : str
         kind : {"prescribed", "gearbox", "torque"}, optional
-            Exactly, through a spring, or by a servo. Default: ``"gearbox"`` if there is a stiffness
-            or a curve.
+            The joint follows the motion exactly; the motor follows it and a spring drives the link;
+            or a servo drives the motor. Default: ``"gearbox"`` if there is a stiffness or a curve,
+            otherwise ``"prescribed"``.
         stiffness : float or array_like, shape (3,), (6,) or (6, 6), optional
             Stiffness of the gearbox about the axis (N m/rad), about x, y, z, or of all directions.
         damping : float or array_like, shape (3,) or (6,), optional
@@ -477,7 +477,7 @@ class RobotBuilder:
         key : str
             Name of the list (``balancer``, ``loop``, ``controller_axis``) or table (``mounting``).
         **values
-            Its keys; arrays are converted to lists. ``from`` is written ``from_``.
+            Keys of the entry; arrays are converted to lists. ``from`` is written ``from_``.
 
         Returns
         -------
@@ -498,12 +498,12 @@ class RobotBuilder:
         return self
 
     def set(self, **keys: Any) -> RobotBuilder:
-        """Set keys of a robot file as they are; None removes one.
+        """Set top-level keys of a robot file; None removes a key.
 
         Parameters
         ----------
         **keys
-            Such as ``waive_inertia``, ``hold``, ``packages``; arrays are converted to lists.
+            For example ``waive_inertia``, ``hold``, ``packages``; arrays are converted to lists.
 
         Returns
         -------
@@ -526,7 +526,7 @@ class RobotBuilder:
 
     @property
     def urdf(self) -> Optional[str]:
-        """Text of the URDF, or None if it is a file."""
+        """Text of the URDF (str), or None if the URDF is a file."""
         if not self._links:
             return self._text
         name = quoteattr(self._keys.get("name", "robot"))
@@ -542,7 +542,7 @@ class RobotBuilder:
         Raises
         ------
         flexarm.InputError
-            With what was found and how to fix it.
+            If the robot is inconsistent; the message states the cause and how to fix it.
         """
         from ._flexarm import robot
 

@@ -1,7 +1,7 @@
-"""Messages of long work through ``logging``; the logger is ``"flexarm"``.
+"""Messages to the logger ``"flexarm"``.
 
-Caveats of severity warning are Python ``warnings``. Logged are notes, steps of long work and
-written files (INFO), and finished runs (DEBUG).
+Notes, steps of long calls and written files are logged at INFO, finished runs at DEBUG, findings
+about a new robot at WARNING. Caveats of severity warning are Python warnings instead.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ def notes(caveats: Iterable[Any]) -> None:
 
 
 def step(what: str, number: int, of: int) -> None:
-    """Log the start of a step of long work."""
+    """Log the start of a step of a long call."""
     logger.info("%s (%d of %d)", what, number, of)
 
 
@@ -38,9 +38,9 @@ def _paths(value: Any) -> Iterator[str]:
 
 
 def wrote(figures: dict[str, Any]) -> None:
-    """Log the files that a result names."""
-    told = {path: None for key in ("file", "page", "files") for path in _paths(figures.get(key))}
-    for path in told:
+    """Log the files listed in a result."""
+    paths = {path: None for key in ("file", "page", "files") for path in _paths(figures.get(key))}
+    for path in paths:
         logger.info("wrote %s", path)
 
 
@@ -51,7 +51,7 @@ def doubts(findings: Iterable[dict[str, Any]]) -> None:
 
 
 def warnings(sentences: Iterable[str]) -> None:
-    """Log doubts about files written for other programs."""
+    """Log warnings about files written for other programs."""
     for sentence in sentences:
         logger.warning("%s", sentence)
 
