@@ -432,14 +432,23 @@ impl FlexibleArm {
     /// Returns the same derivative without load-dependent friction; the slope of each motor is at
     /// least `least`.
     pub(crate) fn unloaded_friction_slope(&self, row: usize, column: usize, rates: &[f64], least: f64) -> f64 {
-        let own = |k: usize, rate: f64| self.friction.get(k).map_or(0.0, |f| f.slope(rate).max(least));
+        let rate = |k: usize| match self.coupling.as_ref().and_then(|coupling| Some((coupling, coupling.place(k)?))) {
+            Some((coupling, motor)) => coupling.motor_rate(motor, rates),
+            None => rates[k],
+        };
+        self.over_joints(row, column, |k| self.friction.get(k).map_or(0.0, |f| f.slope(rate(k)).max(least)))
+    }
+
+    /// Returns an entry of the damping over joints that has `of_motor` for the motor of each
+    /// coordinate: diagonal but for motors that move several joints.
+    pub(crate) fn over_joints(&self, row: usize, column: usize, of_motor: impl Fn(usize) -> f64) -> f64 {
         let places = self.coupling.as_ref().and_then(|c| Some((c, c.place(row)?, c.place(column)?)));
         if let Some((coupling, i, j)) = places {
             let C = &coupling.C_inverse;
             let motors = coupling.coordinates.iter().enumerate();
-            return motors.map(|(m, k)| C[(m, i)] * own(*k, coupling.motor_rate(m, rates)) * C[(m, j)]).sum();
+            return motors.map(|(m, k)| C[(m, i)] * of_motor(*k) * C[(m, j)]).sum();
         }
-        if row == column { own(row, rates[row]) } else { 0.0 }
+        if row == column { of_motor(row) } else { 0.0 }
     }
 }
 

@@ -210,7 +210,11 @@ impl Linear {
         for (i, axis) in servo.axes.iter().enumerate() {
             let (position, rate) = (axis.velocity_gain * axis.position_gain, axis.velocity_gain);
             self.K[(i, i)] += position;
-            self.D[(i, i)] += rate + viscous(&arm.friction, axis.coordinate);
+            self.D[(i, i)] += rate;
+            for (j, other) in servo.axes.iter().enumerate() {
+                let of_motor = |k: usize| viscous(&arm.friction, k);
+                self.D[(i, j)] += arm.over_joints(axis.coordinate, other.coordinate, of_motor);
+            }
             self.K_a[(i, axis.coordinate)] -= position;
             self.D_a[(i, axis.coordinate)] -= rate;
             for k in 0..m {

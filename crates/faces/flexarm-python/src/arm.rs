@@ -3,7 +3,9 @@
 use std::collections::HashMap;
 use std::sync::{Mutex, OnceLock, PoisonError};
 
-use flexarm::{Arm, Error, OperatingPoint, Outputs, RecordingFormat, RunOptions, RunRequest, Scenario};
+use flexarm::{
+    Arm, Error, LiveOptions, OperatingPoint, Outputs, RecordingFormat, RunOptions, RunRequest, Scenario, Servos,
+};
 use pyo3::exceptions::{PyRuntimeError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PyTuple};
@@ -552,11 +554,17 @@ impl PyArm {
     ///     Time step (s). Default: that of the stepper: 1e-3, for spook and rk4 1e-4.
     /// stepper, stepper_options
     ///     As for :meth:`simulate`.
+    /// servos : {"closed", "open"}
+    ///     Whether the servos act; open ones leave the motors to the torques of :meth:`Live.step`.
+    /// stiffness, damping : float, default 1
+    ///     Factors on the stiffness and damping of all links and gearboxes.
     ///
     /// Returns
     /// -------
     /// Live
-    #[pyo3(signature = (q=None, *, period=1e-3, step=None, stepper=None, stepper_options=None))]
+    #[pyo3(signature = (q=None, *, period=1e-3, step=None, stepper=None, stepper_options=None, servos="closed",
+        stiffness=1.0, damping=1.0))]
+    #[allow(clippy::too_many_arguments, reason = "keywords in Python")]
     fn live(
         &self,
         q: Option<&Bound<'_, PyAny>>,
@@ -564,9 +572,18 @@ impl PyArm {
         step: Option<f64>,
         stepper: Option<&str>,
         stepper_options: Option<&Bound<'_, PyDict>>,
+        servos: &str,
+        stiffness: f64,
+        damping: f64,
     ) -> PyResult<PyLive> {
         let options = run_options(step, stepper, stepper_options)?;
-        let live = self.arm.live(self.pose(q)?.as_deref(), period, &options).or_raise()?;
+        let servos = match servos {
+            "closed" => Servos::Closed,
+            "open" => Servos::Open,
+            other => return Err(PyValueError::new_err(format!("servos = {other:?}: expected \"closed\" or \"open\""))),
+        };
+        let own = LiveOptions { servos, stiffness, damping };
+        let live = self.arm.live_with(self.pose(q)?.as_deref(), period, &options, &own).or_raise()?;
         Ok(PyLive::new(live, self.n()))
     }
 

@@ -56,7 +56,7 @@ mod _flexarm {
     #[pymodule_export]
     use crate::links::{export_link, import_link, reduce};
     #[pymodule_export]
-    use crate::live::PyLive;
+    use crate::live::{PyLive, PyLiveState};
     #[pymodule_export]
     use crate::lobes::lobes;
     #[pymodule_export]

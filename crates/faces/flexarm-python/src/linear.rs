@@ -9,8 +9,9 @@ use crate::parts::{Parts, Pickled};
 
 /// Linear system about an equilibrium, with k free coordinates and n joints.
 ///
-/// Free coordinates are joints driven by torque, then elastic coordinates. World axes at the TCP,
-/// linear first. Created by :meth:`Arm.linearise`.
+/// ``M ẍ + D ẋ + K x = Jᵀ F - M_a q̈ - D_a q̇ - K_a q`` with the free coordinates x, the commands q of
+/// the joints, and the wrench F on the TCP. Free coordinates are joints driven by torque, then elastic
+/// coordinates. World axes at the TCP, linear first. Created by :meth:`Arm.linearise`.
 ///
 /// Examples
 /// --------
@@ -90,6 +91,14 @@ impl PyLinear {
 #[pymethods]
 #[expect(non_snake_case, reason = "the names of the matrices")]
 impl PyLinear {
+    /// Returns the matrices (A, B, C, D) of the state space, for ``scipy.signal`` and ``control``.
+    ///
+    /// State: x, q, ẋ, q̇. Inputs: accelerations q̈ of the commands (n), wrench on the TCP (6). Outputs:
+    /// displacement of the TCP (6).
+    fn state_space<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        slf.py().import("flexarm._linear")?.call_method1("state_space", (slf,))
+    }
+
     /// Mass matrix, (k, k).
     #[getter]
     fn M<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
@@ -114,7 +123,7 @@ impl PyLinear {
         Self::matrix(slf, |own| &own.J)
     }
 
-    /// Forces on the free coordinates per command acceleration, (k, n).
+    /// Forces against the free coordinates per command acceleration, (k, n).
     #[getter]
     fn M_a<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         Self::matrix(slf, |own| &own.M_a)

@@ -2,7 +2,7 @@
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use flexarm::{Command, Live};
+use flexarm::{Command, Live, LiveState};
 use pyo3::prelude::*;
 
 use crate::arrays::{array, numbers};
@@ -40,6 +40,17 @@ impl PyLive {
     }
 }
 
+/// State of a :class:`Live`. Created by :meth:`Live.state`.
+#[pyclass(frozen, name = "LiveState", module = "flexarm")]
+pub(crate) struct PyLiveState(Mutex<LiveState>);
+
+#[pymethods]
+impl PyLiveState {
+    fn __reduce__(&self) -> PyResult<()> {
+        Err(pyo3::exceptions::PyTypeError::new_err("a LiveState belongs to its Live and cannot be pickled"))
+    }
+}
+
 #[pymethods]
 impl PyLive {
     /// Advances one control period, at whose end the joint targets are ``q``.
@@ -52,19 +63,41 @@ impl PyLive {
     ///     Target velocities. Default: those of the parabola through the last three targets; the
     ///     feed-forward of servos is then one period late.
     /// wrench : array_like, shape (3,) or (6,), optional
-    ///     Wrench on the tool during the period, world axes (N, N m).
-    #[pyo3(signature = (q, velocity=None, wrench=None))]
+    ///     Wrench on the TCP during the period, world axes (N, N m).
+    /// torque : array_like, shape (n,), optional
+    ///     Torques or forces of the motors during the period, at the joints (N m or N), added to those
+    ///     of the servos; alone with ``servos="open"``. Default: zero.
+    /// period : float, optional
+    ///     Length of this period (s), a whole number of steps. Default: :attr:`period`.
+    #[pyo3(signature = (q, velocity=None, wrench=None, torque=None, period=None))]
     fn step(
         &self,
         q: &Bound<'_, PyAny>,
         velocity: Option<&Bound<'_, PyAny>>,
         wrench: Option<&Bound<'_, PyAny>>,
+        torque: Option<&Bound<'_, PyAny>>,
+        period: Option<f64>,
     ) -> PyResult<()> {
         let q = numbers("q", q, &[(self.n, "joints")], false)?;
-        let velocity = velocity.map(|v| numbers("velocity", v, &[(self.n, "joints")], false)).transpose()?;
-        let F = as_wrench(self::wrench(wrench)?);
-        let qdot = velocity.as_ref().map(|v| v.values());
-        self.lock().step(&Command { q: q.values(), qdot, wrench: F, ..Command::default() }).or_raise()
+        let of_joints = |name, values: Option<_>| {
+            values.map(|values| numbers(name, values, &[(self.n, "joints")], false)).transpose()
+        };
+        let (velocity, torque) = (of_joints("velocity", velocity)?, of_joints("torque", torque)?);
+        let wrench = as_wrench(self::wrench(wrench)?);
+        let (qdot, torque) = (velocity.as_ref().map(|v| v.values()), torque.as_ref().map(|v| v.values()));
+        let mut live = self.lock();
+        let period = period.unwrap_or(live.period_s());
+        live.advance(period, &Command { q: q.values(), qdot, torque, wrench }).or_raise()
+    }
+
+    /// Returns a copy of the state, for :meth:`restore`.
+    fn state(&self) -> PyResult<PyLiveState> {
+        Ok(PyLiveState(Mutex::new(self.lock().state().or_raise()?)))
+    }
+
+    /// Returns to a state of this arm; what follows has the same bits as then.
+    fn restore(&self, state: &PyLiveState) -> PyResult<()> {
+        self.lock().restore(&state.0.lock().unwrap_or_else(PoisonError::into_inner)).or_raise()
     }
 
     /// Resets to rest at a pose at time 0.
@@ -101,6 +134,18 @@ impl PyLive {
     #[getter]
     fn velocity<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         Self::vector(py, self.lock().velocity().to_vec())
+    }
+
+    /// Joint positions behind the gearboxes (rad or m), (n,), as encoders on the links read them.
+    #[getter]
+    fn link_position<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        Self::vector(py, self.lock().link_position())
+    }
+
+    /// Joint velocities behind the gearboxes, (n,).
+    #[getter]
+    fn link_velocity<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        Self::vector(py, self.lock().link_velocity())
     }
 
     /// Drive forces (N m or N), (n,).

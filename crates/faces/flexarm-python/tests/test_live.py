@@ -68,3 +68,57 @@ def test_servos_follow_a_ramp_and_settle() -> None:
     for _ in range(2000):
         live.step(target)
     np.testing.assert_allclose(live.position, target, atol=1e-4)  # the integrals are slow
+
+
+def test_a_state_repeats_what_followed_and_periods_may_differ() -> None:
+    live = flexarm.load("kr210").flexible().live(POSE)
+    target = np.array(POSE)
+
+    def move() -> np.ndarray:
+        for period in (1e-3, 3e-3, 2e-3):
+            target[0] += 0.01
+            live.step(target, period=period)
+        return live.tcp_pose
+
+    state = live.state()
+    first = move()
+    live.restore(state)
+    target[:] = POSE
+    np.testing.assert_array_equal(move(), first)
+    assert live.time == pytest.approx(0.006)
+    with pytest.raises(ValueError):
+        flexarm.load("kr210").flexible().live(POSE).restore(state)
+
+
+def test_open_servos_leave_the_motors_to_torques_and_links_follow_through_the_gears() -> None:
+    arm = flexarm.load("reference_arm").flexible(drives="servo")
+    live = arm.live(POSE, servos="open")
+    holding = live.effort
+    for _ in range(100):
+        live.step(POSE, torque=holding)
+    np.testing.assert_allclose(live.position, POSE, atol=1e-6)
+    twist = live.link_position - live.position
+    assert 1e-6 < abs(twist).max() < 1e-2
+    np.testing.assert_allclose(live.link_velocity, 0.0, atol=1e-3)
+    live.step(POSE)
+    np.testing.assert_array_equal(live.effort, np.zeros(6))
+    softer = arm.live(POSE, stiffness=0.5)
+    np.testing.assert_allclose(softer.link_position - softer.position, 2 * twist, rtol=0.05, atol=1e-7)
+    with pytest.raises(ValueError, match="servos"):
+        arm.live(POSE, servos="off")
+
+
+def test_the_state_space_has_the_modes_and_the_compliance_of_the_arm(arm: flexarm.Arm) -> None:
+    linear = arm.linearise(WORKING_POSE)
+    A, B, C, D = linear.state_space()
+    poles = np.linalg.eigvals(A)
+    found = np.sort(np.abs(poles[poles.imag > 1.0])) / (2 * np.pi)
+    modes = arm.modes(WORKING_POSE)
+    np.testing.assert_allclose(found[:3], modes.frequencies[:3], rtol=0.02)
+    k, n = linear.M_a.shape
+    size = k + n
+    # At rest under a wrench: 0 = A z + B u for the free coordinates.
+    free = np.r_[0:k]
+    z = np.linalg.solve(A[np.ix_(size + free, free)], -B[size + free, n:])
+    np.testing.assert_allclose(C[:, :k] @ z, linear.compliance, rtol=1e-9)
+    assert not D.any()
