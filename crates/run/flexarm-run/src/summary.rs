@@ -216,6 +216,12 @@ pub struct LinkStressFigures {
     pub left_out: usize,
     /// Distance from tied nodes that is left out (m).
     pub clear_of_ties_m: f64,
+    /// Maximum von Mises stress (Pa).
+    pub peak_pa: f64,
+    /// The same over the yield strength; null for a material whose strength is not known.
+    pub of_yield: Option<f64>,
+    /// Largest fatigue damage of one motion among the worst places; null as above.
+    pub damage: Option<f64>,
     /// Places of the largest stress, the worst first.
     pub worst: Vec<StressPlaceFigures>,
 }

@@ -52,6 +52,7 @@ __all__ = [
     "LeftTarget",
     "LinkFigures",
     "LinkInfo",
+    "LinkStressFigures",
     "LobePoint",
     "Lobes",
     "LobesFiles",
@@ -113,6 +114,7 @@ __all__ = [
     "StaticsDetails",
     "StaticsFiles",
     "StepperFigures",
+    "StressPlaceFigures",
     "Suspicious",
     "SweepSummary",
     "TcpFigures",
@@ -316,6 +318,46 @@ class LinkFigures(TypedDict):
     """Maximum elastic rotation (rad)."""
 
 
+class StressPlaceFigures(TypedDict):
+    """Maximum stress at a node of the surface."""
+
+    node: int
+    """Number of the node in the mesh."""
+    position_m: list[float]
+    """Its position in the link frame (m)."""
+    t_s: float
+    """Time of the maximum (s)."""
+    von_mises_pa: float
+    """Von Mises stress (Pa)."""
+    of_yield: float | None
+    """Stress over yield strength; null for a material whose strength is not known."""
+    material: str | None
+    """Material with its class; null if it is none of the presets."""
+    damage: float | None
+    """Fatigue damage of the motion if it is repeated without end; the life is 1 over it in motions. Null for an unknown material."""
+
+
+class LinkStressFigures(TypedDict):
+    """Stress of a flexible link during a run."""
+
+    name: str
+    """Name of the link."""
+    nodes: int
+    """Number of nodes of its surface."""
+    left_out: int
+    """Number of nodes that are not judged, because a rigid tie is near."""
+    clear_of_ties_m: float
+    """Distance from tied nodes that is left out (m)."""
+    peak_pa: float
+    """Maximum von Mises stress (Pa)."""
+    of_yield: float | None
+    """The same over the yield strength; null for a material whose strength is not known."""
+    damage: float | None
+    """Largest fatigue damage of one motion among the worst places; null as above."""
+    worst: list[StressPlaceFigures]
+    """Places of the largest stress, the worst first."""
+
+
 class DriveFigures(TypedDict):
     """Figures of an elastic drive."""
 
@@ -482,6 +524,8 @@ class RunSummary(_RunSummary, total=False):
 
     path: PathFigures | None
     """Error across the path; absent unless the motion is given as a TCP path."""
+    stress: list[LinkStressFigures]
+    """Stress of the links whose stress fields are stored."""
     motors: dict[str, float]
     """Maximum torque of each motor that moves several joints, after its gear (N m or N), by the joint of its drive."""
     label: str | None
@@ -1771,6 +1815,8 @@ class ReduceFiles(TypedDict):
 
     flex: str | None
     """Link file, for `reduced = "..."` of a robot file."""
+    stress: str | None
+    """Stress at the nodes of the surface, beside the link file; null unless requested."""
     entry: str | None
     """Entry for a robot file that uses the link, as TOML."""
     job: str | None

@@ -182,12 +182,16 @@ impl LinkStress {
                 damage: strength.map(damage),
             }
         };
+        let worst: Vec<StressPlaceFigures> = worst.into_iter().map(place).collect();
         LinkStressFigures {
             name: self.name.clone(),
             nodes: peaks.len(),
             left_out,
             clear_of_ties_m: clear,
-            worst: worst.into_iter().map(place).collect(),
+            peak_pa: worst.first().map_or(0.0, |place| place.von_mises_pa),
+            of_yield: worst.first().and_then(|place| place.of_yield),
+            damage: worst.iter().filter_map(|place| place.damage).reduce(f64::max),
+            worst,
         }
     }
 
