@@ -62,7 +62,7 @@ impl Better {
 /// Numbers of a run without a preferred direction.
 const NEUTRAL: [&str; 4] = ["t_peak_s", "t_dynamic_peak_s", "dominant_hz", "visits"];
 /// Sections of a summary with values that should be low: errors, deflections, torques.
-const LOW: [&str; 6] = ["tcp", "path", "links", "elastic_drives", "drives", "motors"];
+const LOW: [&str; 7] = ["tcp", "path", "links", "stress", "elastic_drives", "drives", "motors"];
 
 /// Returns the preferred direction of a number of the run, by its path.
 pub(super) fn of_fact(path: &[String]) -> Option<Better> {

@@ -51,6 +51,7 @@ use self::workshop::Workshop;
 use flexarm_run::Error;
 use flexarm_run::FlexibleRobot;
 use flexarm_run::LinkFigures;
+use flexarm_run::LinkStressFigures;
 use flexarm_run::PathFigures;
 use flexarm_run::Robot;
 use flexarm_run::RobotFileError;
@@ -468,6 +469,13 @@ fn parameter_names(design: &Design) -> Vec<Option<String>> {
 /// Returns an example of a summary with all names that a run of the robot can have.
 fn skeleton(robot: &Robot, flexible: &FlexibleRobot) -> Summary {
     let links = flexible.spans.iter().map(|span| LinkFigures { name: span.link.clone(), ..LinkFigures::default() });
+    let stressed = robot.flexible.iter().filter(|link| link.stress.is_some());
+    let stress = stressed.map(|link| LinkStressFigures {
+        name: link.flexible.link.clone(),
+        of_yield: Some(0.0),
+        damage: Some(0.0),
+        ..LinkStressFigures::default()
+    });
     let elastic = robot.drives.iter().filter(|drive| drive.gearbox.is_some());
     let elastic = elastic.map(|drive| DriveFigures { joint: drive.joint.clone(), ..DriveFigures::default() });
     let drives: BTreeMap<String, f64> =
@@ -476,6 +484,7 @@ fn skeleton(robot: &Robot, flexible: &FlexibleRobot) -> Summary {
         tcp: Some(TcpFigures::default()),
         path: Some(PathFigures::default()),
         links: links.collect(),
+        stress: stress.collect(),
         elastic_drives: elastic.collect(),
         frequencies_hz: vec![0.0; flexible.model.nv() - flexible.model.n_actuated()],
         drives,

@@ -9,7 +9,7 @@ use flexarm_fem::{Material, ReducedLink, RigidPart};
 use flexarm_flexlink::LinkForm;
 use flexarm_kinematics::{Data, Frame, State, inverse_dynamics};
 use flexarm_stepping::{FlexibleArm, Observation, PooledWorkspace};
-use nalgebra::{DMatrix, Matrix3};
+use nalgebra::{DMatrix, DVector, Matrix3};
 
 use crate::error::Error;
 use crate::flexible::{FlexibleRobot, Owner, RobotLink};
@@ -24,6 +24,8 @@ const NEAR_TIE: f64 = 0.05;
 const APART: f64 = 0.05;
 /// Number of worst places per link.
 const PLACES: usize = 5;
+/// Stress by which the polyline of the amplitudes may be off, over that of the largest amplitude.
+const POLYLINE: f32 = 2e-3;
 /// Samples and seats evaluated together.
 const SAMPLES: usize = 128;
 const SEATS: usize = 512;
@@ -147,12 +149,13 @@ impl LinkStress {
     fn figures(&self, times: &[f64]) -> LinkStressFigures {
         let columns = self.map.columns();
         let amplitudes = DMatrix::from_column_slice(columns, times.len(), &self.amplitudes);
-        let peaks = self.peaks(&amplitudes);
+        let corners = self.corners(&amplitudes);
+        let peaks = self.peaks(&amplitudes.select_columns(&corners));
         let clear = NEAR_TIE * self.length;
         let is_judged = |seat: &StressSeat| seat.from_tie >= clear;
         let mut order: Vec<usize> = (0..peaks.len()).filter(|k| is_judged(&self.fields.seats[*k])).collect();
         let left_out = peaks.len() - order.len();
-        order.sort_by(|a, b| peaks[*b].0.total_cmp(&peaks[*a].0));
+        order.sort_by(|a, b| peaks[*b].total_cmp(&peaks[*a]));
         let mut worst: Vec<usize> = Vec::new();
         for k in order {
             let p = self.fields.seats[k].position;
@@ -166,18 +169,18 @@ impl LinkStress {
         }
         let place = |k: usize| {
             let seat = &self.fields.seats[k];
-            let (stress, sample) = peaks[k];
+            let history = self.signed_history(k, &amplitudes);
+            let sample = (0..history.len()).max_by(|a, b| history[*a].abs().total_cmp(&history[*b].abs()));
+            let sample = sample.unwrap_or(0);
+            let stress = history[sample].abs();
             let strength = strength_of(&self.fields.materials[seat.material]);
-            let damage = |strength: &Strength| {
-                let history = self.signed_history(k, &amplitudes);
-                strength.curve().damage(&rainflow_repeating(&history))
-            };
+            let damage = |strength: &Strength| strength.curve().damage(&rainflow_repeating(&history));
             StressPlaceFigures {
                 node: seat.node,
                 position_m: seat.position.into(),
                 t_s: times[sample],
-                von_mises_pa: f64::from(stress),
-                of_yield: strength.map(|strength| f64::from(stress) / strength.yield_pa),
+                von_mises_pa: stress,
+                of_yield: strength.map(|strength| stress / strength.yield_pa),
                 material: strength.map(|strength| strength.name.to_owned()),
                 damage: strength.map(damage),
             }
@@ -207,10 +210,41 @@ impl LinkStress {
         signed.collect()
     }
 
-    /// Returns the maximum von Mises stress of each seat (Pa) with its sample.
-    fn peaks(&self, amplitudes: &DMatrix<f32>) -> Vec<(f32, usize)> {
+    /// Returns the samples at the corners of a polyline that is close to the amplitudes.
+    ///
+    /// The von Mises stress is a convex function of the amplitudes: on a straight line it is nowhere
+    /// larger than at both ends. So the samples in between are not needed to find the worst nodes;
+    /// the stress is off by [`POLYLINE`] at most.
+    fn corners(&self, amplitudes: &DMatrix<f32>) -> Vec<usize> {
         let stress = self.map.stress();
-        let mut peaks = vec![(0.0_f32, 0_usize); self.fields.seats.len()];
+        // Largest stress per unit of each amplitude: bounds the stress of a difference.
+        let units = stress.column_iter().map(|column| {
+            let seats = column.as_slice().as_chunks::<6>().0;
+            seats.iter().map(von_mises_squared).fold(0.0, f32::max).sqrt()
+        });
+        let scaled = DMatrix::from_diagonal(&DVector::from_iterator(stress.ncols(), units)) * amplitudes;
+        let allowed = POLYLINE * scaled.amax();
+        let (mut corners, mut pieces) = (vec![0], vec![(0, amplitudes.ncols() - 1)]);
+        while let Some((first, last)) = pieces.pop() {
+            let (start, slope) = (scaled.column(first), scaled.column(last) - scaled.column(first));
+            let off = |k: usize| {
+                let share = (k - first) as f32 / (last - first) as f32;
+                (scaled.column(k) - start - &slope * share).lp_norm(1)
+            };
+            let farthest = (first + 1..last).map(|k| (k, off(k))).max_by(|a, b| a.1.total_cmp(&b.1));
+            match farthest {
+                Some((k, off)) if off > allowed => pieces.extend([(k, last), (first, k)]),
+                _ => corners.push(last),
+            }
+        }
+        corners.dedup();
+        corners
+    }
+
+    /// Returns the maximum von Mises stress of each seat (Pa).
+    fn peaks(&self, amplitudes: &DMatrix<f32>) -> Vec<f32> {
+        let stress = self.map.stress();
+        let mut peaks = vec![0.0_f32; self.fields.seats.len()];
         let mut product = DMatrix::zeros(6 * SEATS, SAMPLES);
         for (block, peaks) in peaks.chunks_mut(SEATS).enumerate() {
             let own = stress.rows(6 * SEATS * block, 6 * peaks.len());
@@ -218,18 +252,15 @@ impl LinkStress {
                 let count = SAMPLES.min(amplitudes.ncols() - first);
                 let mut product = product.view_mut((0, 0), (own.nrows(), count));
                 product.gemm(1.0, &own, &amplitudes.columns(first, count), 0.0);
-                for (sample, column) in product.column_iter().enumerate() {
+                for column in product.column_iter() {
                     let seats = column.as_slice().as_chunks::<6>().0;
                     for (peak, stress) in peaks.iter_mut().zip(seats) {
-                        let square = von_mises_squared(stress);
-                        if square > peak.0 {
-                            *peak = (square, first + sample);
-                        }
+                        *peak = peak.max(von_mises_squared(stress));
                     }
                 }
             }
         }
-        peaks.iter_mut().for_each(|(square, _)| *square = square.sqrt());
+        peaks.iter_mut().for_each(|square| *square = square.sqrt());
         peaks
     }
 }
