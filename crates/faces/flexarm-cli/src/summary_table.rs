@@ -91,7 +91,7 @@ fn files(f: &Files) -> String {
     let mut recordings: Vec<(RecordingFormat, &str)> = f.recordings.iter().collect();
     recordings.sort_by_key(|(format, _)| format.info().holds != Holds::Pictures);
     let recordings = recordings.iter().map(|(format, path)| (format.info().name, Some(*path)));
-    let pages = [("report", f.report.as_deref()), ("study", f.study.as_deref())];
+    let pages = [("report", f.report.as_deref()), ("stress", f.stress.as_deref()), ("study", f.study.as_deref())];
     let files = pages.into_iter().chain(recordings).chain([("figures", f.figures.as_deref())]);
     let mut files = files.filter_map(|(what, path)| path.map(|path| (what, path))).peekable();
     if files.peek().is_some() {

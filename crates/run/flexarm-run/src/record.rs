@@ -40,7 +40,8 @@ impl Recordings {
 pub(crate) fn files_of_a_run() -> impl Iterator<Item = &'static str> {
     let recordings = RecordingFormat::ALL.into_iter().map(|format| format.info().file_name);
     let [foxglove, plotjuggler] = LAYOUT_FILES;
-    recordings.chain(["report.html", "report.md", "summary.json", STUDY_FILE, FIGURES_FOLDER, foxglove, plotjuggler])
+    let pages = ["report.html", "report.md", "summary.json", STUDY_FILE, FIGURES_FOLDER, STRESS_PICTURE];
+    recordings.chain(pages).chain([foxglove, plotjuggler])
 }
 
 /// Viewer layouts written next to `run.mcap`: Foxglove, PlotJuggler.
@@ -48,6 +49,9 @@ const LAYOUT_FILES: [&str; 2] = ["run.foxglove.json", "run.plotjuggler.xml"];
 
 /// Recording of all runs of a study.
 pub(crate) const STUDY_FILE: &str = "study.rrd";
+
+/// Picture of the stress of the links.
+pub(crate) const STRESS_PICTURE: &str = "stress.png";
 
 /// Folder for figures for papers, within the output folder.
 pub(crate) const FIGURES_FOLDER: &str = "figures";

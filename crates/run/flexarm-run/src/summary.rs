@@ -111,6 +111,9 @@ pub struct Files {
     pub report_md: Option<String>,
     /// Folder with figures for papers.
     pub figures: Option<String>,
+    /// Picture of the stress of the links.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub stress: Option<String>,
     /// Foxglove layout for the MCAP recording.
     pub foxglove_layout: Option<String>,
     /// PlotJuggler layout for the MCAP recording.

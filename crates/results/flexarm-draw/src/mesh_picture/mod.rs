@@ -24,6 +24,7 @@ mod numbers;
 mod raster;
 pub mod scene;
 mod sheet;
+mod stress_sheet;
 mod surface;
 mod topology;
 mod view;
@@ -37,6 +38,7 @@ use flexarm_fem::reduction::Interface;
 use flexarm_fem::{Mesh, MeshReduction};
 
 pub use image::{Image, Rgb};
+pub use stress_sheet::{StressPicture, stress_sheet};
 pub use view::View;
 
 use surface::Surface;

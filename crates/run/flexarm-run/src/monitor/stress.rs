@@ -4,7 +4,9 @@
 //! finds the maxima over the run for every node of the surface.
 
 use flexarm_analysis::{SnCurve, rainflow_repeating};
-use flexarm_fem::stress::{StressFields, StressMap, StressSeat, inertia_loads, parse_stress, von_mises};
+#[cfg(feature = "png")]
+use flexarm_draw::mesh_picture::{Image, StressPicture, stress_sheet};
+use flexarm_fem::stress::{StressFields, StressMap, inertia_loads, parse_stress, von_mises};
 use flexarm_fem::{Material, ReducedLink, RigidPart};
 use flexarm_flexlink::LinkForm;
 use flexarm_kinematics::{Data, Frame, State, inverse_dynamics};
@@ -113,6 +115,25 @@ impl StressMonitor {
         self.links.iter().filter(|_| !self.times.is_empty()).map(|link| link.figures(&self.times)).collect()
     }
 
+    /// Returns a picture of the stress of every link, as PNG; `None` without samples.
+    #[cfg(feature = "png")]
+    pub(crate) fn picture(&self) -> Option<Vec<u8>> {
+        let sheets: Vec<Image> = self.links.iter().filter(|_| !self.times.is_empty()).map(LinkStress::sheet).collect();
+        let first = sheets.first()?;
+        let (width, height) = (first.width(), first.height());
+        let mut whole = Image::new(width, height * sheets.len(), [255; 3]);
+        for (number, sheet) in sheets.iter().enumerate() {
+            whole.paste(sheet, 0, number * height);
+        }
+        whole.to_png().ok()
+    }
+
+    /// Without the feature `png` there is no picture.
+    #[cfg(not(feature = "png"))]
+    pub(crate) fn picture(&self) -> Option<Vec<u8>> {
+        None
+    }
+
     /// Whether the stepper gave no accelerations, so that there is no stress.
     pub(crate) fn is_blind(&self) -> bool {
         self.times.is_empty()
@@ -145,16 +166,38 @@ fn without_attached(reduced: &ReducedLink, mut parts: Vec<RigidPart>) -> Vec<Rig
 }
 
 impl LinkStress {
-    /// Returns the worst places over the run.
-    fn figures(&self, times: &[f64]) -> LinkStressFigures {
+    fn amplitudes(&self) -> DMatrix<f32> {
         let columns = self.map.columns();
-        let amplitudes = DMatrix::from_column_slice(columns, times.len(), &self.amplitudes);
-        let corners = self.corners(&amplitudes);
-        let peaks = self.peaks(&amplitudes.select_columns(&corners));
+        DMatrix::from_column_slice(columns, self.amplitudes.len() / columns, &self.amplitudes)
+    }
+
+    /// Draws the largest stress of every node.
+    #[cfg(feature = "png")]
+    fn sheet(&self) -> Image {
+        let amplitudes = self.amplitudes();
+        let peaks = self.peaks(&amplitudes.select_columns(&self.corners(&amplitudes)));
+        let positions: Vec<_> = self.fields.seats.iter().map(|seat| seat.position).collect();
+        let [X_LA, X_LB] = [0, 1].map(|k| self.fields.poses[k].translation.vector);
+        stress_sheet(&StressPicture {
+            link: &self.name,
+            remark: "the numbers are those of the worst places in summary.json",
+            positions: &positions,
+            triangles: &self.fields.triangles,
+            stress: &peaks.iter().map(|stress| f64::from(*stress)).collect::<Vec<_>>(),
+            worst: &self.worst(&peaks),
+            along: X_LB - X_LA,
+        })
+    }
+
+    /// Returns the seats that are judged: those that are not near a tied node.
+    fn judged(&self) -> Vec<usize> {
         let clear = NEAR_TIE * self.length;
-        let is_judged = |seat: &StressSeat| seat.from_tie >= clear;
-        let mut order: Vec<usize> = (0..peaks.len()).filter(|k| is_judged(&self.fields.seats[*k])).collect();
-        let left_out = peaks.len() - order.len();
+        (0..self.fields.seats.len()).filter(|k| self.fields.seats[*k].from_tie >= clear).collect()
+    }
+
+    /// Returns the worst seats, which are apart from each other.
+    fn worst(&self, peaks: &[f32]) -> Vec<usize> {
+        let mut order = self.judged();
         order.sort_by(|a, b| peaks[*b].total_cmp(&peaks[*a]));
         let mut worst: Vec<usize> = Vec::new();
         for k in order {
@@ -167,6 +210,13 @@ impl LinkStress {
                 break;
             }
         }
+        worst
+    }
+
+    /// Returns the worst places over the run.
+    fn figures(&self, times: &[f64]) -> LinkStressFigures {
+        let amplitudes = self.amplitudes();
+        let peaks = self.peaks(&amplitudes.select_columns(&self.corners(&amplitudes)));
         let place = |k: usize| {
             let seat = &self.fields.seats[k];
             let history = self.signed_history(k, &amplitudes);
@@ -185,12 +235,12 @@ impl LinkStress {
                 damage: strength.map(damage),
             }
         };
-        let worst: Vec<StressPlaceFigures> = worst.into_iter().map(place).collect();
+        let worst: Vec<StressPlaceFigures> = self.worst(&peaks).into_iter().map(place).collect();
         LinkStressFigures {
             name: self.name.clone(),
             nodes: peaks.len(),
-            left_out,
-            clear_of_ties_m: clear,
+            left_out: peaks.len() - self.judged().len(),
+            clear_of_ties_m: NEAR_TIE * self.length,
             peak_pa: worst.first().map_or(0.0, |place| place.von_mises_pa),
             of_yield: worst.first().and_then(|place| place.of_yield),
             damage: worst.iter().filter_map(|place| place.damage).reduce(f64::max),

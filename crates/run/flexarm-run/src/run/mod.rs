@@ -35,7 +35,9 @@ use crate::monitor::tool::ToolMonitor;
 use crate::motion::Motion;
 use crate::options::{Outputs, RunOptions};
 use crate::prepare::Checked;
-use crate::record::{header, link_frames, names_of_signals, ordered_links, recorders, signals, write_layouts};
+use crate::record::{
+    STRESS_PICTURE, header, link_frames, names_of_signals, ordered_links, recorders, signals, write_layouts,
+};
 use crate::robot::Robot;
 use crate::run::sampler::Sampler;
 pub(crate) use crate::run::sampler::link_side_angles;
@@ -208,6 +210,11 @@ pub(crate) fn simulate(
     summary.cpu_s = cpu.elapsed().as_secs_f64();
     summary.real_time_factor = summary.duration_s / summary.wall_s.max(1e-9);
     summary.cpu_s_per_simulated_s = summary.cpu_s / summary.duration_s.max(1e-9);
+    if let Some((outputs, picture)) = outputs.zip(run.monitors.stress.as_ref().and_then(StressMonitor::picture)) {
+        let path = outputs.folder.join(STRESS_PICTURE);
+        files.names.stress = Some(path.display().to_string());
+        flexarm_files::write_all(&[(path, picture)])?;
+    }
     summary.files = files.names.clone();
     run.trace.finish(if detail < Detail::Curves { RunResult::default() } else { result(&summary, events) });
     // In short runs the page is made while the recordings are being closed, in long runs

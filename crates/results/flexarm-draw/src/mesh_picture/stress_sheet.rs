@@ -1,0 +1,125 @@
+//! The sheet of a link's stress: both sides, coloured by the von Mises stress.
+
+use nalgebra::Vector3;
+
+use super::color;
+use super::draw::{Align, Style};
+use super::image::Image;
+use super::numbers;
+use super::scene::{Mark, Paint, Scene, render};
+use super::sheet::{self, HEAD, HEIGHT, WIDTH};
+use super::topology::{feature_edges, triangle_normals};
+use super::view::{LinkAxes, View};
+
+/// Stress on the surface of a link.
+#[derive(Debug, Clone, Copy)]
+pub struct StressPicture<'a> {
+    /// Name of the link.
+    pub link: &'a str,
+    /// Text on the right of the heading.
+    pub remark: &'a str,
+    /// Nodes of the surface, link axes, m.
+    pub positions: &'a [Vector3<f64>],
+    /// Triangles, as indices into the positions.
+    pub triangles: &'a [[u32; 3]],
+    /// Von Mises stress of each node, Pa.
+    pub stress: &'a [f64],
+    /// Worst nodes, with numbers in the picture; the stress of the first one is the end of the scale.
+    pub worst: &'a [usize],
+    /// From interface A to B.
+    pub along: Vector3<f64>,
+}
+
+/// Draws the side on which the worst node is, and the opposite one.
+pub fn stress_sheet(picture: &StressPicture<'_>) -> Image {
+    let title = format!("{}: largest von Mises stress of the run", picture.link);
+    let mut sheet = sheet::sheet(&title, picture.remark);
+    let axes = LinkAxes::new(picture.positions, &picture.along);
+    let toward = side_of_worst(picture, &axes);
+    let edges = feature_edges(picture.positions, picture.triangles);
+    let height = (HEIGHT - HEAD) / 2;
+    for (row, toward) in [toward, -toward].into_iter().enumerate() {
+        let panel = panel(picture, &edges, toward, &axes, [WIDTH, height]);
+        sheet.paste(&panel, 0, HEAD + row * height);
+    }
+    sheet.fill(0.0, (HEAD + height) as f64, WIDTH as f64, 1.0, color::RULE);
+    sheet
+}
+
+/// Direction across the link from which the worst node is seen.
+fn side_of_worst(picture: &StressPicture<'_>, axes: &LinkAxes) -> Vector3<f64> {
+    let normals = triangle_normals(picture.positions, picture.triangles);
+    let worst = picture.worst.first().map_or(u32::MAX, |node| *node as u32);
+    let at_worst = picture.triangles.iter().zip(&normals).filter(|(corners, _)| corners.contains(&worst));
+    let normal: Vector3<f64> = at_worst.map(|(_, (normal, area))| normal * *area).sum();
+    let across = normal - axes.along * axes.along.dot(&normal);
+    across.try_normalize(1e-12).unwrap_or(axes.out)
+}
+
+fn panel(
+    picture: &StressPicture<'_>,
+    edges: &[[u32; 2]],
+    toward: Vector3<f64>,
+    axes: &LinkAxes,
+    [width, height]: [usize; 2],
+) -> Image {
+    let peak = picture.worst.first().map_or(0.0, |node| picture.stress[*node]);
+    let mut marks: Vec<Mark> = sheet::edges(picture.positions, edges, 1.0, color::FAINT, [0.5, 0.0]).collect();
+    let dots = picture.worst.iter().map(|node| Mark::Dot {
+        at: picture.positions[*node],
+        diameter: 9.0,
+        color: color::INK,
+        alpha: [0.9, 0.0],
+    });
+    marks.extend(dots);
+    let frame = [110.0, 24.0, width as f64 - 150.0, height as f64 - 82.0];
+    let view = View::fit(toward, axes.along, picture.positions.iter().copied(), frame);
+    let paint = Paint::Magnitude { values: picture.stress, peak: if peak > 0.0 { peak } else { 1.0 } };
+    let scene = Scene { positions: picture.positions, triangles: picture.triangles, paint, marks: &marks };
+    let mut image = render(&scene, &view, width, height);
+    for (number, node) in picture.worst.iter().enumerate() {
+        let text = format!("{} {} MPa", number + 1, numbers::significant(1e-6 * picture.stress[*node], 3));
+        sheet::label(&mut image, &view, &picture.positions[*node], &text, 15.0, color::INK);
+    }
+    sheet::compass(&mut image, &view);
+    let megapascals = |stress: f64| format!("{} MPa", numbers::significant(1e-6 * stress, 3));
+    let names = ["0".to_owned(), megapascals(0.5 * peak), megapascals(peak)];
+    let bar = [width as f64 - 300.0, height as f64 - 44.0];
+    sheet::color_bar(&mut image, bar, 250.0, names.each_ref().map(String::as_str));
+    let text = "nodes near tied ones are not judged";
+    let style = Style::new(13.0, color::FAINT);
+    image.text(text, [width as f64 - 320.0, height as f64 - 33.0], Align::Right, style);
+    image
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The worst node of a box is seen on the first panel, and the end of the scale is its stress.
+    #[test]
+    fn the_worst_place_is_on_the_first_side() {
+        let corner = |k: u32| {
+            let bit = |b: u32| f64::from(k >> b & 1);
+            Vector3::new(bit(0), 0.2 * bit(1), 0.1 * bit(2))
+        };
+        let positions: Vec<Vector3<f64>> = (0..8).map(corner).collect();
+        // z = 0.1 and z = 0 faces of the box.
+        let triangles = [[4, 5, 7], [4, 7, 6], [0, 3, 1], [0, 2, 3]];
+        let stress = [1e6, 2e6, 3e6, 4e6, 5e6, 6e6, 7e6, 8e6];
+        let picture = StressPicture {
+            link: "box",
+            remark: "",
+            positions: &positions,
+            triangles: &triangles,
+            stress: &stress,
+            worst: &[7, 4],
+            along: Vector3::x(),
+        };
+        let axes = LinkAxes::new(&positions, &Vector3::x());
+        assert!(side_of_worst(&picture, &axes).z > 0.9);
+        let image = stress_sheet(&picture);
+        assert!(!image.to_png().unwrap().is_empty());
+        assert_eq!(image.to_png().unwrap(), stress_sheet(&picture).to_png().unwrap());
+    }
+}
