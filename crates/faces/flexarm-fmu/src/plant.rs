@@ -80,6 +80,7 @@ impl Plant {
             step_s: options.step_s,
             payload: filed_payload(&robot)?.map(|(_, mass)| mass),
             holding: live.effort(),
+            has_acceleration: !settings.stepper.entry().maximal,
         };
         let variables: Arc<[Variable]> = variables(&arm, &starts).into();
         let values = variables.iter().map(|variable| variable.start.unwrap_or(0.0)).collect();
@@ -350,6 +351,7 @@ impl Plant {
         let Some(live) = &mut self.live else { return };
         let (link_position, link_velocity) = (live.link_position(), live.link_velocity());
         let (tcp, rigid, V) = (live.tcp_pose(), live.target_pose(), live.tcp_velocity());
+        let a = live.tcp_acceleration();
         let error = tcp.translation.vector - rigid.translation.vector;
         let turned = (tcp.rotation * rigid.rotation.inverse()).scaled_axis();
         let (own, of_rigid) = (quaternion(&tcp), quaternion(&rigid));
@@ -364,6 +366,7 @@ impl Plant {
                 Meaning::TcpPosition(k) => tcp.translation.vector[k],
                 Meaning::TcpQuaternion(k) => own[k],
                 Meaning::TcpVelocity(k) => V[k],
+                Meaning::TcpAcceleration(k) => a[k],
                 Meaning::RigidPosition(k) => rigid.translation.vector[k],
                 Meaning::RigidQuaternion(k) => of_rigid[k],
                 Meaning::Error(k) => error[k],

@@ -54,6 +54,7 @@ pub(crate) enum Meaning {
     TcpPosition(usize),
     TcpQuaternion(usize),
     TcpVelocity(usize),
+    TcpAcceleration(usize),
     RigidPosition(usize),
     RigidQuaternion(usize),
     Error(usize),
@@ -80,12 +81,13 @@ pub struct Variable {
 }
 
 /// Units with their exponents of kg, m, s and rad.
-pub const UNITS: [(&str, [i32; 4]); 9] = [
+pub const UNITS: [(&str, [i32; 4]); 10] = [
     ("1", [0, 0, 0, 0]),
     ("s", [0, 0, 1, 0]),
     ("kg", [1, 0, 0, 0]),
     ("m", [0, 1, 0, 0]),
     ("m/s", [0, 1, -1, 0]),
+    ("m/s2", [0, 1, -2, 0]),
     ("rad", [0, 0, 0, 1]),
     ("rad/s", [0, 0, -1, 1]),
     ("N", [1, 1, -2, 0]),
@@ -125,6 +127,8 @@ pub(crate) struct Starts<'a> {
     pub(crate) payload: Option<f64>,
     /// Torques that hold the pose (N m or N).
     pub(crate) holding: &'a [f64],
+    /// Whether the stepper gives accelerations.
+    pub(crate) has_acceleration: bool,
 }
 
 /// Returns the variables of an arm.
@@ -171,7 +175,7 @@ pub(crate) fn variables(arm: &Arm, starts: &Starts<'_>) -> Vec<Variable> {
             list.add(output, of_joint(what), text, unit, None, meaning);
         }
     }
-    list.tcp();
+    list.tcp(starts.has_acceleration);
     list.0
 }
 
@@ -212,7 +216,7 @@ impl List {
         self.add(parameter, "use_target_velocity", text, "", Some(0.0), Meaning::UseTargetVelocity);
     }
 
-    fn tcp(&mut self) {
+    fn tcp(&mut self, has_acceleration: bool) {
         for (i, (part, unit)) in [("force", "N"), ("torque", "N.m")].into_iter().enumerate() {
             for (k, axis) in AXES.iter().enumerate() {
                 let (name, text) = (format!("tcp.{part}.{axis}"), format!("External {part} on the TCP, world axes"));
@@ -236,6 +240,10 @@ impl List {
         vector(self, "tcp.velocity", "Velocity of the TCP, world axes", "m/s", &Meaning::TcpVelocity);
         let text = "Angular velocity of the TCP, world axes";
         vector(self, "tcp.angular_velocity", text, "rad/s", &|k| Meaning::TcpVelocity(3 + k));
+        if has_acceleration {
+            let text = "Acceleration of the TCP, world axes";
+            vector(self, "tcp.acceleration", text, "m/s2", &Meaning::TcpAcceleration);
+        }
         let text = "Position of the TCP of the rigid arm with its joints at the targets";
         vector(self, "rigid_tcp.position", text, "m", &Meaning::RigidPosition);
         let text = "Orientation of the TCP of the rigid arm, unit quaternion with w >= 0";

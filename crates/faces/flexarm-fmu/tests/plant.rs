@@ -91,25 +91,29 @@ fn a_plant_has_the_bits_of_the_arm_that_is_commanded_directly() {
 }
 
 #[test]
-fn the_velocity_of_the_tcp_is_the_slope_of_its_position() {
+fn velocity_and_acceleration_of_the_tcp_are_slopes_of_its_position_and_velocity() {
     let mut plant = Plant::new(&robot("kr300"), &settings(LinkModel::Lumped, DriveModel::Elastic)).unwrap();
     let q_in = of_joints(&plant, "target_position");
     let speed = ["tcp.velocity.x", "tcp.velocity.y", "tcp.velocity.z"];
+    let acceleration = ["tcp.acceleration.x", "tcp.acceleration.y", "tcp.acceleration.z"];
     plant.start(0.0).unwrap();
     let (h, mut history) = (1e-3, Vec::new());
     for k in 0..400 {
         let (q, _) = targets(&vec![0.0; q_in.len()], h * f64::from(k + 1));
         q_in.iter().zip(q).for_each(|(&reference, q)| plant.set(reference, q).unwrap());
         plant.step(plant.time_s(), h).unwrap();
-        history.push((values(&plant, &TCP), values(&plant, &speed)));
+        history.push([values(&plant, &TCP), values(&plant, &speed), values(&plant, &acceleration)]);
     }
-    let largest = history.iter().flat_map(|(_, v)| v).fold(0.0_f64, |m, v| m.max(v.abs()));
-    let off = history
-        .windows(3)
-        .flat_map(|w| (0..3).map(|c| ((w[2].0[c] - w[0].0[c]) / (2.0 * h) - w[1].1[c]).abs()).collect::<Vec<_>>());
-    let off = off.fold(0.0, f64::max) / largest;
-    println!("slope of the position off by {off:.1e} of the largest velocity");
-    assert!(off < 2e-4, "{off:e}");
+    for (order, bound) in [(1, 2e-4), (2, 5e-3)] {
+        let largest = history.iter().flat_map(|row| &row[order]).fold(0.0_f64, |m, v| m.max(v.abs()));
+        let off = history.windows(3).flat_map(|w| {
+            let slope = |c: usize| (w[2][order - 1][c] - w[0][order - 1][c]) / (2.0 * h);
+            (0..3).map(|c| (slope(c) - w[1][order][c]).abs()).collect::<Vec<_>>()
+        });
+        let off = off.fold(0.0, f64::max) / largest;
+        println!("derivative {order} off by {off:.1e} of the largest");
+        assert!(off < bound, "{off:e}");
+    }
 }
 
 #[test]

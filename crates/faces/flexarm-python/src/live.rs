@@ -166,6 +166,12 @@ impl PyLive {
         homogeneous(py, &self.lock().tcp_pose())
     }
 
+    /// Acceleration of the TCP, world axes (m/s²), (3,); NaN with spook.
+    #[getter]
+    fn tcp_acceleration<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        Self::vector(py, self.lock().tcp_acceleration().as_slice().to_vec())
+    }
+
     /// TCP pose of a rigid arm with its joints at the last targets, (4, 4).
     #[getter]
     fn target_pose<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {

@@ -9,12 +9,13 @@
 
 use std::sync::{Arc, PoisonError, RwLock};
 
-use flexarm_kinematics::{Data, Pose, State, Wrench, forward_kinematics};
-use flexarm_kinematics::{forward_kinematics_velocity, frame_twist};
+use flexarm_kinematics::{
+    Data, Pose, State, Wrench, forward_kinematics, forward_kinematics_velocity, frame_twist, inverse_dynamics,
+};
 use flexarm_stepping::{
     FlexibleArm, Load, Observation, PrescribedMotion, Start, StepRule, Stepper, TimedWrench, new_stepper,
 };
-use nalgebra::{DVector, Vector6};
+use nalgebra::{DVector, Vector3, Vector6};
 
 use crate::arm::Arm;
 use crate::error::{Error, ValueError};
@@ -464,6 +465,20 @@ impl Live {
         forward_kinematics_velocity(&self.flexible.model, data, state);
         let V = frame_twist(data, &self.flexible.tcp);
         Vector6::from_iterator(V.linear.iter().chain(V.angular.iter()).copied())
+    }
+
+    /// Returns the acceleration of the TCP, world axes (m/s²); NaN with a stepper that has no
+    /// accelerations.
+    pub fn tcp_acceleration(&mut self) -> Vector3<f64> {
+        let (model, tcp) = (&self.flexible.model, &self.flexible.tcp);
+        let (data, state) = &mut self.moving;
+        state.q.copy_from(&self.seen.q);
+        state.qdot.copy_from(&self.seen.qdot);
+        inverse_dynamics(model, data, state, &self.seen.qddot);
+        // Spatial acceleration plus ω × v, without the gravity term.
+        let (V, A) = (data.V[tcp.body].at_child(&tcp.X_BF), data.A[tcp.body].at_child(&tcp.X_BF));
+        let R = self.seen.X_WB[tcp.body].rotation * tcp.X_BF.rotation;
+        R * (A.linear + V.angular.cross(&V.linear)) + model.gravity
     }
 
     /// Returns the TCP pose of the rigid arm with its joints at the last targets.

@@ -120,7 +120,7 @@ impl StressMonitor {
     pub(crate) fn picture(&self) -> Option<Vec<u8>> {
         let sheets: Vec<Image> = self.links.iter().filter(|_| !self.times.is_empty()).map(LinkStress::sheet).collect();
         let first = sheets.first()?;
-        let (width, height) = (first.width(), first.height());
+        let (width, height) = (first.width, first.height);
         let mut whole = Image::new(width, height * sheets.len(), [255; 3]);
         for (number, sheet) in sheets.iter().enumerate() {
             whole.paste(sheet, 0, number * height);
