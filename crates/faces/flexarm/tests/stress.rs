@@ -110,18 +110,18 @@ fn a_held_link_has_the_stress_of_its_weight_whatever_its_model() {
 fn a_swung_link_bears_its_inertia_and_that_of_its_load() {
     let arm = Arm::new("swung");
     let fields = arm.fields();
-    // A slow oscillation about the vertical: at the turns acceleration and weight add up.
-    let (top, w) = (0.6, 5.0);
-    let motion = |t: f64| top * (1.0 - (w * t).cos());
+    // Accelerations grow from zero, so that the link does not ring: 0.8 Hz against its 34 Hz.
+    let (size, w) = (0.2, 5.0);
+    let motion = |t: f64| size * (w * t - (w * t).sin());
     for (name, modelling) in models() {
         let summary = arm.run(motion, 1.2, modelling);
         let link = &summary.stress[0];
         let worst = &link.worst[0];
         let t = worst.t_s;
-        let state = [motion(t), top * w * (w * t).sin(), top * w * w * (w * t).cos()];
+        let state = [motion(t), size * w * (1.0 - (w * t).cos()), size * w * w * (w * t).sin()];
         let off = worst.von_mises_pa / by_hand(&fields, link.clear_of_ties_m, state) - 1.0;
         println!("{name}: {:.3} MPa at {t:.3} s, off by {off:.1e}", 1e-6 * worst.von_mises_pa);
-        assert!(off.abs() < 0.03, "{name}: {off:e}"); // vibration at 34 Hz under a motion of 0.8 Hz
+        assert!(off.abs() < 0.02, "{name}: {off:e}");
         let damage = worst.damage.unwrap();
         assert!(damage > 0.0 && damage < 1e-9, "{damage:e}");
     }
