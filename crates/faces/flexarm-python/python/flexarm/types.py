@@ -452,6 +452,8 @@ class RunFiles(_RunFiles, total=False):
     """Recording (arrow), if it was written."""
     study: str | None
     """Rerun recording of all runs of a study."""
+    stress: str | None
+    """Picture of the stress of the links."""
 
 
 class DifferenceFigures(TypedDict):
