@@ -33,9 +33,10 @@ def lump(name, mass, inertia, size):
             f'    <visual><geometry><box size="{size:g} {size:g} {size:g}"/></geometry></visual>\n  </link>\n')
 
 
-def joint(name, kind, parent, child, x=0.0, rest=""):
+def joint(name, kind, parent, child, x=0.0, rest="", turn=0.0):
+    rpy = f' rpy="0 0 {turn:.15g}"' if turn else ""
     return (f'  <joint name="{name}" type="{kind}">\n    <parent link="{parent}"/><child link="{child}"/>'
-            f'<origin xyz="{x:.12g} 0 0"/>{rest}\n  </joint>\n')
+            f'<origin xyz="{x:.12g} 0 0"{rpy}/>{rest}\n  </joint>\n')
 
 
 def hinge(name, parent, child, x=0.0):
@@ -46,14 +47,18 @@ def urdf(name, parts):
     return f'<?xml version="1.0"?>\n<robot name="{name}">\n  <link name="base"/>\n{"".join(parts)}</robot>\n'
 
 
-def flexible(link, distal, width, height, material, theory, rest):
+def rectangle(width, height, material, theory="timoshenko"):
+    return f'section = "rectangle", width = {width}, height = {height}, material = {material}, theory = "{theory}"'
+
+
+def flexible(link, distal, section, rest, y_axis="[0.0, 0.0, 1.0]"):
     return f"""
 [[flexible_link]]
 link = "{link}"
 distal = "{distal}"
 {rest}
 damping = {{ modal = 0.0 }}
-beam = {{ section = "rectangle", width = {width}, height = {height}, material = {material}, theory = "{theory}", y_axis = [0.0, 0.0, 1.0], parts = "uniform" }}
+beam = {{ {section}, y_axis = {y_axis}, parts = "uniform" }}
 """
 
 
@@ -74,7 +79,7 @@ gravity = [0.0, 0.0, 0.0]
 default_trajectory = "slew.toml"
 """
     for k in (1, 2):
-        robot += flexible(f"link_{k}", f"end_{k}", width, height, material, "timoshenko", 'model = "lumped"\nsegments = 16')
+        robot += flexible(f"link_{k}", f"end_{k}", rectangle(width, height, material), 'model = "lumped"\nsegments = 16')
     return {f"two_link/{name}.urdf": urdf(name, parts), f"two_link/{name}.toml": robot}
 
 
@@ -143,14 +148,78 @@ eye = { link = "rod_end", xyz = [0.0, 0.0, 0.0] }
 dependent = ["rod", "slide"]
 """
     for link, distal in (("rod_a", "middle_joint"), ("rod_b", "end_joint")):
-        robot += flexible(link, distal, side, side, material, "euler-bernoulli", 'model = "lumped"\nsegments = 8')
+        robot += flexible(link, distal, rectangle(side, side, material, "euler-bernoulli"), 'model = "lumped"\nsegments = 8')
     rows = [(k / 1e4, *speed_up(150.0, 0.05, k / 1e4)) for k in range(1001)]
     return {"slider_crank/slider_crank.urdf": urdf("slider_crank", parts), "slider_crank/slider_crank.toml": robot,
             "slider_crank/ramp.csv": table(["crank"], rows)}
 
 
+def cantilever(name, what, tip, rest=""):
+    return f"""# {what}: see ../README.md.
+format = 1
+name = "{name}"
+urdf = "{name}.urdf"
+tcp = {{ link = "{tip}" }}
+gravity = [0.0, 0.0, 0.0]
+{rest}"""
+
+
+def arc(n, rest='model = "lumped"\nsegments = 2'):
+    """Bathe's arc of 45 degrees and 100 in, along +y and towards +x, as chords: n straight links."""
+    inch, psi = 0.0254, 4.4482216152605 / 0.0254**2
+    step = math.pi / 4 / n
+    length, side, E, G = 2 * 100 * inch * math.sin(step / 2), inch, 1e7 * psi, 5e6 * psi
+    A, I = side**2, side**4 / 12
+    section = (f'section = "given", EA = {E * A:.12g}, EI_y = {E * I:.12g}, EI_z = {E * I:.12g}, GJ = {2 * G * I:.12g}, '
+               f'kGA_y = {5 / 6 * G * A:.12g}, kGA_z = {5 / 6 * G * A:.12g}, '
+               f'mass_per_length = {2700 * A:.12g}, rotary_y = {2700 * I:.12g}, rotary_z = {2700 * I:.12g}')
+    name, parts, robot = f"arc_{n}", [], ""
+    for k in range(1, n + 1):
+        turn = math.pi / 2 - step / 2 if k == 1 else -step
+        parent = "base" if k == 1 else f"node_{k - 1}"
+        kind, axis = ("continuous", '<axis xyz="0 0 1"/>') if k == 1 else ("fixed", "")
+        parts += [joint(f"joint_{k}", kind, parent, f"link_{k}", 0.0, axis, turn), bar(f"link_{k}", 2700 * A * length, length, side, side),
+                  joint(f"end_{k}", "fixed", f"link_{k}", f"node_{k}", length), f'  <link name="node_{k}"/>\n']
+        robot += flexible(f"link_{k}", f"end_{k}", section, rest)
+    head = cantilever(name, f"Bathe's curved cantilever in {n} straight links", f"node_{n}")
+    return {f"large_beams/{name}.urdf": urdf(name, parts), f"large_beams/{name}.toml": head + robot}
+
+
+def straight(name, what, length, mass, sides, section, rest, motion=""):
+    """A cantilever along x on a joint about z; `sides` along y and z."""
+    parts = [hinge("root", "base", "beam"), bar("beam", mass, length, *sides), joint("end", "fixed", "beam", "tip", length), '  <link name="tip"/>\n']
+    robot = cantilever(name, what, "tip", motion) + flexible("beam", "end", section, rest, "[0.0, 1.0, 0.0]")
+    return {f"large_beams/{name}.urdf": urdf(name, parts), f"large_beams/{name}.toml": robot}
+
+
+def princeton(rest='model = "lumped"\nsegments = 16'):
+    """Dowell and Traybar's beam, its height along y."""
+    height, width, rho = 12.3777e-3, 3.2024e-3, 2800.0
+    section = rectangle(height, width, "{ E = 71.7e9, nu = 0.31, rho = 2800.0 }")
+    return straight("princeton", "The Princeton beam", 0.508, rho * 0.508 * height * width, (height, width), section, rest)
+
+
+def spin_up(rest='model = "lumped"\nsegments = 16'):
+    """Simo and Vu-Quoc's beam; a square of this side has its mass, inertia, EA and EI."""
+    side = math.sqrt(6e-3)
+    section = ('section = "given", EA = 2.8e7, EI_y = 1.4e4, EI_z = 1.4e4, GJ = 1.4e4, kGA_y = 1e7, kGA_z = 1e7, '
+               'mass_per_length = 1.2, rotary_y = 6e-4, rotary_z = 6e-4')
+    return straight("spin_up", "The spin-up manoeuvre", 10.0, 12.0, (side, side), section, rest, 'default_trajectory = "spin_up.csv"\n')
+
+
+def spin_up_motion():
+    """`psi = 6/15 (t^2/2 + (15/2pi)^2 (cos(2 pi t/15) - 1))` rad to 15 s, then 6 rad/s."""
+    def psi(t, omega=6.0, T=15.0):
+        w = 2 * math.pi / T
+        if t >= T:
+            return omega * (t - T / 2), omega, 0.0
+        return omega / T * (t * t / 2 + (math.cos(w * t) - 1) / w**2), omega / T * (t - math.sin(w * t) / w), omega / T * (1 - math.cos(w * t))
+    return table(["root"], [(k / 10, *psi(k / 10)) for k in range(201)])
+
+
 def files():
-    made = {"two_link/slew.toml": SLEW, "two_link/spin.csv": spin(), **slider_crank()}
+    made = {"two_link/slew.toml": SLEW, "two_link/spin.csv": spin(), **slider_crank(), **arc(16), **princeton(), **spin_up()}
+    made["large_beams/spin_up.csv"] = spin_up_motion()
     for height in (30, 20, 10):
         made.update(two_link(height))
     return made
