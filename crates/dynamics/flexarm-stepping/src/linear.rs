@@ -30,6 +30,8 @@ use crate::statics::{
 const TOLERANCE: f64 = 1e-13;
 /// Maximum number of Newton iterations.
 const MOST_ITERATIONS: usize = 30;
+/// Minimum step of the wrench, as a share of it.
+const SMALLEST_LOAD_STEP: f64 = 1.0 / 128.0;
 
 /// Linear model about a static pose with n free coordinates (joints driven by torque, then elastic
 /// ones) and m joints. Tool quantities are in world axes at the tool point, linear part first.
@@ -347,11 +349,38 @@ impl Statics<'_> {
         StepError::Singular { matrix: "static stiffness (with the effect of weight and load)", t: self.t }
     }
 
-    /// Solves `K e + p(e) = 0` by Newton's method, starting from the equilibrium under weight.
+    /// Returns the equilibrium, found from that under weight at once or, where that fails, with the
+    /// wrench rising in steps.
     fn equilibrium(&self, data: &mut Data) -> Result<Equilibrium, StepError> {
+        let under_weight = static_equilibrium(self.arm, self.t)?;
+        match self.equilibrium_from(data, under_weight.clone()) {
+            Err(StepError::Singular { .. } | StepError::NoEquilibrium { .. }) if self.F_T_W != Wrench::zeros() => {
+                self.in_load_steps(data, under_weight)
+            }
+            found => found,
+        }
+    }
+
+    /// Raises the wrench in steps, each from the equilibrium of the one before.
+    fn in_load_steps(&self, data: &mut Data, mut e: DVector<f64>) -> Result<Equilibrium, StepError> {
+        let (mut share, mut step) = (0.0_f64, 0.25);
+        loop {
+            let next = (share + step).min(1.0);
+            let F_T_W = Wrench::new(self.F_T_W.force * next, self.F_T_W.torque * next);
+            match (Self { F_T_W, ..*self }).equilibrium_from(data, e.clone()) {
+                Ok(found) if next == 1.0 => return Ok(found),
+                Ok(found) => (e, share, step) = (found.e, next, 1.5 * step),
+                Err(error) if step < SMALLEST_LOAD_STEP => return Err(error),
+                Err(_) => step *= 0.5,
+            }
+        }
+    }
+
+    /// Solves `K e + p(e) = 0` by Newton's method from elastic coordinates.
+    fn equilibrium_from(&self, data: &mut Data, mut e: DVector<f64>) -> Result<Equilibrium, StepError> {
         let Self { arm, t, .. } = *self;
         let (m, ne) = (arm.model.n_actuated(), arm.model.n_elastic());
-        let (at_rest, mut e) = (arm.stiffness(), static_equilibrium(arm, t)?);
+        let at_rest = arm.stiffness();
         let (mut residual, mut iterations, mut buckled) = (f64::INFINITY, 0, false);
         loop {
             let q = all_coordinates(arm, t, &e);

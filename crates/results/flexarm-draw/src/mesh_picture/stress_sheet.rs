@@ -35,37 +35,47 @@ pub fn stress_sheet(picture: &StressPicture<'_>) -> Image {
     let title = format!("{}: largest von Mises stress of the run", picture.link);
     let mut sheet = sheet::sheet(&title, picture.remark);
     let axes = LinkAxes::new(picture.positions, &picture.along);
-    let toward = side_of_worst(picture, &axes);
+    let normals: Vec<_> = picture.worst.iter().map(|node| normal_at(picture, *node)).collect();
+    let toward = side_of_worst(&normals, &axes);
     let edges = feature_edges(picture.positions, picture.triangles);
     let height = (HEIGHT - HEAD) / 2;
     for (row, toward) in [toward, -toward].into_iter().enumerate() {
-        let panel = panel(picture, &edges, toward, &axes, [WIDTH, height]);
+        let faces = |(node, normal): (&usize, &Vector3<f64>)| (normal.dot(&toward) > 0.0).then_some(*node);
+        let seen: Vec<(usize, usize)> =
+            picture.worst.iter().zip(&normals).enumerate().filter_map(|(k, pair)| Some((k, faces(pair)?))).collect();
+        let panel = panel(picture, &edges, &seen, &axes, toward, [WIDTH, height]);
         sheet.paste(&panel, 0, HEAD + row * height);
     }
     sheet.fill(0.0, (HEAD + height) as f64, WIDTH as f64, 1.0, color::RULE);
     sheet
 }
 
+/// Outward direction at a node.
+fn normal_at(picture: &StressPicture<'_>, node: usize) -> Vector3<f64> {
+    let around: Vec<[u32; 3]> =
+        picture.triangles.iter().copied().filter(|corners| corners.contains(&(node as u32))).collect();
+    triangle_normals(picture.positions, &around).iter().map(|(normal, area)| normal * *area).sum()
+}
+
 /// Direction across the link from which the worst node is seen.
-fn side_of_worst(picture: &StressPicture<'_>, axes: &LinkAxes) -> Vector3<f64> {
-    let normals = triangle_normals(picture.positions, picture.triangles);
-    let worst = picture.worst.first().map_or(u32::MAX, |node| *node as u32);
-    let at_worst = picture.triangles.iter().zip(&normals).filter(|(corners, _)| corners.contains(&worst));
-    let normal: Vector3<f64> = at_worst.map(|(_, (normal, area))| normal * *area).sum();
+fn side_of_worst(normals: &[Vector3<f64>], axes: &LinkAxes) -> Vector3<f64> {
+    let normal = normals.first().copied().unwrap_or_default();
     let across = normal - axes.along * axes.along.dot(&normal);
     across.try_normalize(1e-12).unwrap_or(axes.out)
 }
 
+/// * `seen`: number and node of the worst places that face the viewer.
 fn panel(
     picture: &StressPicture<'_>,
     edges: &[[u32; 2]],
-    toward: Vector3<f64>,
+    seen: &[(usize, usize)],
     axes: &LinkAxes,
+    toward: Vector3<f64>,
     [width, height]: [usize; 2],
 ) -> Image {
     let peak = picture.worst.first().map_or(0.0, |node| picture.stress[*node]);
     let mut marks: Vec<Mark> = sheet::edges(picture.positions, edges, 1.0, color::FAINT, [0.5, 0.0]).collect();
-    let dots = picture.worst.iter().map(|node| Mark::Dot {
+    let dots = seen.iter().map(|(_, node)| Mark::Dot {
         at: picture.positions[*node],
         diameter: 9.0,
         color: color::INK,
@@ -77,7 +87,7 @@ fn panel(
     let paint = Paint::Magnitude { values: picture.stress, peak: if peak > 0.0 { peak } else { 1.0 } };
     let scene = Scene { positions: picture.positions, triangles: picture.triangles, paint, marks: &marks };
     let mut image = render(&scene, &view, width, height);
-    for (number, node) in picture.worst.iter().enumerate() {
+    for (number, node) in seen {
         let text = format!("{} {} MPa", number + 1, numbers::significant(1e-6 * picture.stress[*node], 3));
         sheet::label(&mut image, &view, &picture.positions[*node], &text, 15.0, color::INK);
     }
@@ -117,7 +127,7 @@ mod tests {
             along: Vector3::x(),
         };
         let axes = LinkAxes::new(&positions, &Vector3::x());
-        assert!(side_of_worst(&picture, &axes).z > 0.9);
+        assert!(side_of_worst(&[normal_at(&picture, 7)], &axes).z > 0.9);
         let image = stress_sheet(&picture);
         assert!(!image.to_png().unwrap().is_empty());
         assert_eq!(image.to_png().unwrap(), stress_sheet(&picture).to_png().unwrap());
