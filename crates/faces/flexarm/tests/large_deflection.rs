@@ -7,35 +7,43 @@ use std::path::Path;
 use flexarm::{Modelling, Robot};
 
 /// Tip of an elastica of unit length under a dead force across it, `alpha = F l²/EI`: along the beam
-/// and across. Shooting for `θ'' = -alpha cos θ`, `θ(0) = 0`, `θ'(1) = 0`.
+/// and across.
+///
+/// `θ'² = 2 alpha (sin θ_1 - sin θ)` with the slope θ_1 of the tip; `θ = θ_1 - v²` makes the integrals
+/// over the beam regular. θ_1 is the one for which the length is 1.
 fn elastica(alpha: f64) -> [f64; 2] {
-    let shot = |bend: f64| {
-        let (n, mut state) = (20_000, [0.0, bend, 0.0, 0.0]);
-        let h = 1.0 / f64::from(n);
-        let rate = |s: &[f64; 4]| [s[1], -alpha * s[0].cos(), s[0].cos(), s[0].sin()];
-        let moved = |s: &[f64; 4], by: f64, k: &[f64; 4]| std::array::from_fn(|i| s[i] + by * k[i]);
-        for _ in 0..n {
-            let a = rate(&state);
-            let b = rate(&moved(&state, 0.5 * h, &a));
-            let c = rate(&moved(&state, 0.5 * h, &b));
-            let d = rate(&moved(&state, h, &c));
-            state = std::array::from_fn(|i| state[i] + h / 6.0 * (a[i] + 2.0 * b[i] + 2.0 * c[i] + d[i]));
+    // Length, and the tip's place along and across, for a tip that is `short` of a right angle.
+    let integrals = |short: f64| {
+        let tip = std::f64::consts::FRAC_PI_2 - short;
+        let (n, end) = (40_000, tip.sqrt());
+        let h = end / f64::from(n);
+        let mut sums = [0.0; 3];
+        for k in 0..=n {
+            let v = h * f64::from(k);
+            let theta = tip - v * v;
+            // sin θ_1 - sin θ without cancellation.
+            let fall = 2.0 * (0.5 * v * v).sin() * (tip - 0.5 * v * v).cos();
+            let ds =
+                if k == 0 { 2.0 / (2.0 * alpha * tip.cos()).sqrt() } else { 2.0 * v / (2.0 * alpha * fall).sqrt() };
+            let weight = h / 3.0 * if k == 0 || k == n { 1.0 } else { f64::from(2 + 2 * (k % 2)) };
+            for (sum, factor) in sums.iter_mut().zip([1.0, theta.cos(), theta.sin()]) {
+                *sum += weight * ds * factor;
+            }
         }
-        state
+        sums
     };
-    // The tip turns by less than a right angle: θ'(0)² = 2 alpha sin θ(1).
-    let (mut low, mut high) = (0.0, (2.0 * alpha).sqrt());
-    for _ in 0..200 {
+    let (mut low, mut high) = (-30.0_f64, 1.5_f64.ln());
+    for _ in 0..100 {
         let middle = 0.5 * (low + high);
-        let tip = shot(middle);
-        if tip[1] > 0.0 || tip[0] > std::f64::consts::FRAC_PI_2 {
-            high = middle;
-        } else {
+        // The closer to a right angle, the longer the beam.
+        if integrals(middle.exp())[0] > 1.0 {
             low = middle;
+        } else {
+            high = middle;
         }
     }
-    let tip = shot(low);
-    [tip[2], tip[3]]
+    let [_, along, across] = integrals(low.exp());
+    [along, across]
 }
 
 /// Truth: the elastica. Newton's iteration from the straight beam does not reach the larger loads.

@@ -148,11 +148,15 @@ impl StressFields {
         for (k, (column, factor)) in columns.iter().zip(factors).enumerate() {
             stress.set_column(k, &(self.stress.column(*column) * *factor as f32));
         }
+        let mut residual = vec![0.0_f64; rows];
         for (j, own) in own.iter().enumerate() {
-            for row in 0..rows {
-                let held: f64 = (0..n).map(|k| f64::from(stress[(row, k)]) * own[k]).sum();
-                stress[(row, n + j)] = (f64::from(self.stress[(row, wrenches + j)]) - held) as f32;
+            let of_mesh = self.stress.column(wrenches + j);
+            residual.iter_mut().zip(of_mesh.iter()).for_each(|(residual, stress)| *residual = f64::from(*stress));
+            for (k, own) in own.iter().enumerate() {
+                let held = stress.column(k);
+                residual.iter_mut().zip(held.iter()).for_each(|(residual, held)| *residual -= own * f64::from(*held));
             }
+            stress.column_mut(n + j).iter_mut().zip(&residual).for_each(|(stress, residual)| *stress = *residual as f32);
         }
         StressMap { A, stress }
     }
