@@ -156,7 +156,11 @@ impl StressFields {
                 let held = stress.column(k);
                 residual.iter_mut().zip(held.iter()).for_each(|(residual, held)| *residual -= own * f64::from(*held));
             }
-            stress.column_mut(n + j).iter_mut().zip(&residual).for_each(|(stress, residual)| *stress = *residual as f32);
+            stress
+                .column_mut(n + j)
+                .iter_mut()
+                .zip(&residual)
+                .for_each(|(stress, residual)| *stress = *residual as f32);
         }
         StressMap { A, stress }
     }

@@ -11,6 +11,9 @@ use super::sheet::{self, HEAD, HEIGHT, WIDTH};
 use super::topology::{feature_edges, triangle_normals};
 use super::view::{LinkAxes, View};
 
+/// Distance of a node from the surface when its visibility is found, over the length of the link.
+const LIFT: f64 = 2e-3;
+
 /// Stress on the surface of a link.
 #[derive(Debug, Clone, Copy)]
 pub struct StressPicture<'a> {
@@ -35,14 +38,12 @@ pub fn stress_sheet(picture: &StressPicture<'_>) -> Image {
     let title = format!("{}: largest von Mises stress of the run", picture.link);
     let mut sheet = sheet::sheet(&title, picture.remark);
     let axes = LinkAxes::new(picture.positions, &picture.along);
-    let normals: Vec<_> = picture.worst.iter().map(|node| normal_at(picture, *node)).collect();
-    let toward = side_of_worst(&normals, &axes);
+    let toward = side_of_worst(picture, &axes);
     let edges = feature_edges(picture.positions, picture.triangles);
     let height = (HEIGHT - HEAD) / 2;
     for (row, toward) in [toward, -toward].into_iter().enumerate() {
-        let faces = |(node, normal): (&usize, &Vector3<f64>)| (normal.dot(&toward) > 0.0).then_some(*node);
-        let seen: Vec<(usize, usize)> =
-            picture.worst.iter().zip(&normals).enumerate().filter_map(|(k, pair)| Some((k, faces(pair)?))).collect();
+        let places = picture.worst.iter().copied().enumerate();
+        let seen: Vec<(usize, usize)> = places.filter(|(_, node)| is_visible(picture, *node, &toward)).collect();
         let panel = panel(picture, &edges, &seen, &axes, toward, [WIDTH, height]);
         sheet.paste(&panel, 0, HEAD + row * height);
     }
@@ -50,16 +51,26 @@ pub fn stress_sheet(picture: &StressPicture<'_>) -> Image {
     sheet
 }
 
-/// Outward direction at a node.
-fn normal_at(picture: &StressPicture<'_>, node: usize) -> Vector3<f64> {
-    let around: Vec<[u32; 3]> =
-        picture.triangles.iter().copied().filter(|corners| corners.contains(&(node as u32))).collect();
-    triangle_normals(picture.positions, &around).iter().map(|(normal, area)| normal * *area).sum()
+/// Whether no triangle is between a node and the viewer.
+fn is_visible(picture: &StressPicture<'_>, node: usize, toward: &Vector3<f64>) -> bool {
+    let start = picture.positions[node] + toward * (LIFT * picture.along.norm());
+    let hides = |corners: &[u32; 3]| {
+        let [a, b, c] = corners.map(|corner| picture.positions[corner as usize] - start);
+        // The ray passes the triangle if it is on the same side of all three edges.
+        let sides = [(a, b), (b, c), (c, a)].map(|(from, to)| from.cross(&to).dot(toward));
+        let is_through = sides.iter().all(|side| *side > 0.0) || sides.iter().all(|side| *side < 0.0);
+        let normal = (b - a).cross(&(c - a));
+        is_through && a.dot(&normal) / toward.dot(&normal) > 0.0
+    };
+    !picture.triangles.iter().any(hides)
 }
 
 /// Direction across the link from which the worst node is seen.
-fn side_of_worst(normals: &[Vector3<f64>], axes: &LinkAxes) -> Vector3<f64> {
-    let normal = normals.first().copied().unwrap_or_default();
+fn side_of_worst(picture: &StressPicture<'_>, axes: &LinkAxes) -> Vector3<f64> {
+    let worst = picture.worst.first().map_or(u32::MAX, |node| *node as u32);
+    let around: Vec<[u32; 3]> = picture.triangles.iter().copied().filter(|corners| corners.contains(&worst)).collect();
+    let normals = triangle_normals(picture.positions, &around);
+    let normal: Vector3<f64> = normals.iter().map(|(normal, area)| normal * *area).sum();
     let across = normal - axes.along * axes.along.dot(&normal);
     across.try_normalize(1e-12).unwrap_or(axes.out)
 }
@@ -127,7 +138,9 @@ mod tests {
             along: Vector3::x(),
         };
         let axes = LinkAxes::new(&positions, &Vector3::x());
-        assert!(side_of_worst(&[normal_at(&picture, 7)], &axes).z > 0.9);
+        assert!(side_of_worst(&picture, &axes).z > 0.9);
+        let seen = [7, 4, 0].map(|node| is_visible(&picture, node, &Vector3::new(0.3, 0.05, 1.0).normalize()));
+        assert_eq!(seen, [true, true, false]);
         let image = stress_sheet(&picture);
         assert!(!image.to_png().unwrap().is_empty());
         assert_eq!(image.to_png().unwrap(), stress_sheet(&picture).to_png().unwrap());
