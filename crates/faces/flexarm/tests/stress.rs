@@ -51,7 +51,7 @@ impl Arm {
         let motion = Motion::from_samples(&times, &angles, &robot).unwrap();
         let options = RunOptions { modelling, ..RunOptions::default() };
         let arm = robot.flexible(modelling).unwrap();
-        arm.simulate(&Scenario::new(motion), &options).unwrap().summary
+        arm.simulate(Scenario::new(motion), &options).unwrap().summary
     }
 }
 
