@@ -91,7 +91,7 @@ def test_a_state_repeats_what_followed_and_periods_may_differ() -> None:
 
 
 def test_open_servos_leave_the_motors_to_torques_and_links_follow_through_the_gears() -> None:
-    arm = flexarm.load("reference_arm").flexible(drives="servo")
+    arm = flexarm.load("kr300").flexible(drives="servo")
     live = arm.live(POSE, servos="open")
     holding = live.effort
     for _ in range(100):
