@@ -986,14 +986,15 @@ def made_targets(run, folder):
     """Targets with files written by the program: link files, exported matrices, recordings."""
     for name, content in {"beam.urdf": BOX, "robot.toml": ROBOT, "motion.toml": MOTION, "bar.inp": bar_inp(), "job.toml": JOB}.items():
         write(folder / name, content)
-    run(["reduce", "job.toml", "--flex", "bar.flex", "--quiet"])
-    flex = (folder / "bar.flex").read_bytes()
+    run(["reduce", "job.toml", "--flex", "bar.flex", "--stress", "--quiet"])
+    flex, stress = [(folder / name).read_bytes() for name in ("bar.flex", "bar.stress")]
     export = lambda word: ["export", "bar.flex", "--format", word, "--units", "mm-t-s", "-o", "matrices"]
     targets = []
     for model in ("lumped", "modal"):
         files = {"beam.urdf": BOX, "motion.toml": MOTION, "bar.flex": flex, "robot.toml": ROBOT_FLEX.replace("MODEL", model)}
         commands = [["statics", "robot.toml", "--json"], COMPARE, ["export", "bar.flex", "--format", "sid", "--units", "mm-t-s", "-o", "out", "--force", "--json"]]
         targets.append(Target(f"flex-{model}", "bar.flex", files, commands, True))
+        targets.append(Target(f"stress-{model}", "bar.stress", {**files, "bar.stress": stress}, [COMPARE], True))
     nodes, at = ["--map", "A=1001,B=1002"], ["--at", "A=0,0,0", "--at", "B=800,0,0"]
     rows = ["--map", "A=#1-6,B=#7-12,modal=#13-16"]
     for word, change, words in (

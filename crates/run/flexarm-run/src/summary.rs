@@ -246,7 +246,7 @@ pub struct StressPlaceFigures {
     /// Material with its class; null if it is none of the presets.
     pub material: Option<String>,
     /// Fatigue damage of the motion if it is repeated without end; the life is 1 over it in motions.
-    /// Null for an unknown material.
+    /// 1 if the link does not survive the first motion, null for an unknown material.
     pub damage: Option<f64>,
 }
 

@@ -334,7 +334,7 @@ class StressPlaceFigures(TypedDict):
     material: str | None
     """Material with its class; null if it is none of the presets."""
     damage: float | None
-    """Fatigue damage of the motion if it is repeated without end; the life is 1 over it in motions. Null for an unknown material."""
+    """Fatigue damage of the motion if it is repeated without end; the life is 1 over it in motions. 1 if the link does not survive the first motion, null for an unknown material."""
 
 
 class LinkStressFigures(TypedDict):

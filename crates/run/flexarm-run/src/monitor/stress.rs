@@ -224,7 +224,7 @@ impl LinkStress {
             let sample = sample.unwrap_or(0);
             let stress = history[sample].abs();
             let strength = strength_of(&self.fields.materials[seat.material]);
-            let damage = |strength: &Strength| strength.curve().damage(&rainflow_repeating(&history));
+            let damage = |strength: &Strength| strength.curve().damage(&rainflow_repeating(&history)).min(1.0);
             StressPlaceFigures {
                 node: seat.node,
                 position_m: seat.position.into(),
