@@ -26,6 +26,8 @@ use crate::material::Material;
 
 /// Format with its version.
 const FORMAT: &str = "flexarm stress 1";
+/// Bound of a stress per unit (Pa): modes of metal parts have 1e11 to 1e13.
+const LARGEST: f32 = 1e15;
 /// Key of the metadata.
 const KEY: &str = "flexarm";
 
@@ -133,8 +135,11 @@ pub fn parse_stress(bytes: &[u8]) -> Result<StressFields, String> {
     let single = |word: &[u8]| f32::from_le_bytes([word[0], word[1], word[2], word[3]]);
     let stress: Vec<f32> = stress.data().chunks_exact(4).map(single).collect();
     let finite = |numbers: &[f64]| numbers.iter().all(|number| number.is_finite());
-    if !stress.iter().all(|stress| stress.is_finite()) || !positions.iter().all(|p| finite(p)) || !finite(&compliance) {
-        return Err(fail("a number is not finite".to_owned()));
+    if !stress.iter().all(|stress| stress.abs() < LARGEST)
+        || !positions.iter().all(|p| finite(p))
+        || !finite(&compliance)
+    {
+        return Err(fail(format!("a number is not finite, or a stress beyond {LARGEST:e} Pa per unit")));
     }
     let seat = |k: usize| StressSeat {
         node: nodes[k],
