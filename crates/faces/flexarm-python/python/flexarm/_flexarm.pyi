@@ -26,6 +26,7 @@ __all__ = [
     "Deflections",
     "Linear",
     "Live",
+    "LiveState",
     "Load",
     "Map",
     "Model",
