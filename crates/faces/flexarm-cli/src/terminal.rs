@@ -1,4 +1,4 @@
-//! What a command prints: answers for people or in JSON, progress.
+//! Output of a command: text or JSON, progress.
 
 use std::io::{IsTerminal, Write};
 use std::process::ExitCode;

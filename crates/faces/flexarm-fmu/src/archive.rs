@@ -48,7 +48,7 @@ struct Filed {
 pub struct FmuJob {
     /// Robot file or URDF.
     pub robot: PathBuf,
-    /// How the plant is made.
+    /// Settings of the plant.
     pub settings: PlantSettings,
     /// Version of the standard.
     pub fmi: Fmi,
@@ -60,7 +60,7 @@ pub struct FmuJob {
     pub overwrite: bool,
 }
 
-/// What was written.
+/// Summary of the file.
 #[derive(Clone, Debug, Serialize)]
 #[non_exhaustive]
 pub struct FmuSummary {

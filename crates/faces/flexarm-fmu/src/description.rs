@@ -19,7 +19,7 @@ pub enum Fmi {
 /// Name of the library in an FMU, and identifier of the model.
 pub const MODEL_IDENTIFIER: &str = "flexarm";
 
-/// What a description says of the whole model.
+/// Data of the whole model in a description.
 #[derive(Clone, Copy, Debug)]
 pub struct About<'a> {
     /// Name of the robot.

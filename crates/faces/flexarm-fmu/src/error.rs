@@ -58,7 +58,7 @@ pub enum PlantError {
     File {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// Cause.
         what: String,
     },
     /// A function is called out of order.

@@ -6,7 +6,7 @@ use crate::archive::open_resources;
 use crate::error::PlantError;
 use crate::plant::{Plant, PlantState};
 
-/// Where an instance is in its life.
+/// Phase of an instance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Phase {
     Instantiated,
@@ -81,7 +81,7 @@ impl Instance {
     pub(crate) fn step(&mut self, from_s: f64, length_s: f64) -> Result<(), PlantError> {
         self.expect("a step", &[Phase::Step])?;
         let done = self.plant.step(from_s, length_s);
-        // What is wrong with a call leaves the arm as it was.
+        // A wrong call leaves the arm as it was.
         let kept = matches!(done, Ok(()) | Err(PlantError::Time { .. } | PlantError::Length(_)));
         if !kept && !matches!(&done, Err(PlantError::Robot(flexarm::Error::Value(_)))) {
             self.phase = Phase::Failed;

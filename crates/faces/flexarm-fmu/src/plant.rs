@@ -18,7 +18,7 @@ const WHOLE: f64 = 1e-6;
 /// Tolerance between the time of the caller and that of the plant (in communication steps).
 const SAME_TIME: f64 = 1e-3;
 
-/// How a plant is made of a robot.
+/// Settings for making a plant of a robot.
 #[derive(Clone, Debug)]
 pub struct PlantSettings {
     /// Options for loading the robot.

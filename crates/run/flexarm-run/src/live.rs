@@ -28,7 +28,7 @@ use crate::run::link_side_angles;
 /// Tolerance for the control period to be a whole number of steps (in steps).
 const WHOLE: f64 = 1e-6;
 
-/// What the arm gets for one control period.
+/// Command for one control period.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Command<'a> {
     /// Targets of the joints at the end of the period, all joints (rad or m).
@@ -53,7 +53,7 @@ pub enum Servos {
     Open,
 }
 
-/// What a live arm has of its own, beside its robot.
+/// Options of a live arm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LiveOptions {
     /// Whether servos close their loops.

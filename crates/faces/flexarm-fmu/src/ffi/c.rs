@@ -7,7 +7,7 @@ use std::ptr;
 
 use flexarm::{DriveModel, LinkModel, Modelling};
 
-use super::{array, array_mut, guarded, message, string, text_of};
+use super::{NULL, array, array_mut, guarded, message, string, text_of};
 use crate::error::PlantError;
 use crate::plant::{Plant, PlantSettings, PlantState};
 use crate::variables::{Causality, Kind};
@@ -50,8 +50,6 @@ unsafe fn call(plant: *mut Handle, work: impl FnOnce(&mut Handle) -> Result<(), 
         }
     }
 }
-
-const NULL: PlantError = PlantError::Order { function: "a function", phase: "with a null pointer" };
 
 #[unsafe(no_mangle)]
 extern "C" fn flexarm_version() -> *const c_char {

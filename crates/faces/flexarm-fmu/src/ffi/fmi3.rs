@@ -4,7 +4,7 @@ use std::ffi::{c_char, c_int, c_void};
 use std::path::Path;
 use std::ptr;
 
-use super::{array, array_mut, guarded, message, string, text_of};
+use super::{NULL, array, array_mut, free_state, guarded, message, put_state, string, text_of};
 use crate::error::PlantError;
 use crate::instance::{Instance, InstanceState};
 
@@ -54,8 +54,6 @@ unsafe fn call(component: *mut c_void, work: impl FnOnce(&mut Instance) -> Resul
         }
     }
 }
-
-const NULL: PlantError = PlantError::Order { function: "a function", phase: "with a null pointer" };
 
 /// Writes functions that this kind of FMU does not have: they return an error.
 macro_rules! without {
@@ -288,18 +286,7 @@ fn lengths(references: usize, values: usize) -> Result<(), PlantError> {
 #[unsafe(no_mangle)]
 extern "C" fn fmi3GetFMUState(component: *mut c_void, state: *mut *mut c_void) -> Status {
     // SAFETY: the importer passes an instance and a place for the state, or null.
-    unsafe {
-        call(component, |instance| {
-            let place = state.as_mut().ok_or(NULL)?;
-            let new = instance.state()?;
-            // A state that is given is used again.
-            match place.cast::<InstanceState>().as_mut() {
-                Some(old) => *old = new,
-                None => *place = Box::into_raw(Box::new(new)).cast(),
-            }
-            Ok(())
-        })
-    }
+    unsafe { call(component, |instance| put_state(state, instance.state()?)) }
 }
 
 #[unsafe(no_mangle)]
@@ -311,15 +298,7 @@ extern "C" fn fmi3SetFMUState(component: *mut c_void, state: *mut c_void) -> Sta
 #[unsafe(no_mangle)]
 extern "C" fn fmi3FreeFMUState(component: *mut c_void, state: *mut *mut c_void) -> Status {
     // SAFETY: the importer passes an instance and a place with a state that is not freed, or null.
-    unsafe {
-        call(component, |_| {
-            if let Some(place) = state.as_mut().filter(|place| !place.is_null()) {
-                drop(Box::from_raw(place.cast::<InstanceState>()));
-                *place = ptr::null_mut();
-            }
-            Ok(())
-        })
-    }
+    unsafe { call(component, |_| free_state(state)) }
 }
 
 #[unsafe(no_mangle)]

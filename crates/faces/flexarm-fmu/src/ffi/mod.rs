@@ -8,10 +8,14 @@ mod c;
 mod fmi2;
 mod fmi3;
 
-use std::ffi::{CStr, CString, c_char};
+use std::ffi::{CStr, CString, c_char, c_void};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use crate::error::PlantError;
+use crate::instance::InstanceState;
+
+/// Error for a null pointer where an object or an array is needed.
+const NULL: PlantError = PlantError::Order { function: "a function", phase: "with a null pointer" };
 
 /// Runs a function; a panic becomes `None`.
 fn guarded<T>(work: impl FnOnce() -> T) -> Option<T> {
@@ -51,6 +55,35 @@ unsafe fn array_mut<'a, T>(values: *mut T, count: usize) -> Option<&'a mut [T]> 
         // SAFETY: as promised by the caller.
         _ => Some(unsafe { std::slice::from_raw_parts_mut(values, count) }),
     }
+}
+
+/// Writes a state to its place; a state that is there is used again.
+///
+/// # Safety
+/// `place` is null or has null or a state of [`put_state`] that is not freed.
+unsafe fn put_state(place: *mut *mut c_void, new: InstanceState) -> Result<(), PlantError> {
+    // SAFETY: as promised by the caller.
+    let place = unsafe { place.as_mut() }.ok_or(NULL)?;
+    // SAFETY: as promised by the caller.
+    match unsafe { place.cast::<InstanceState>().as_mut() } {
+        Some(old) => *old = new,
+        None => *place = Box::into_raw(Box::new(new)).cast(),
+    }
+    Ok(())
+}
+
+/// Frees the state of a place and writes null there.
+///
+/// # Safety
+/// As [`put_state`].
+unsafe fn free_state(place: *mut *mut c_void) -> Result<(), PlantError> {
+    // SAFETY: as promised by the caller.
+    if let Some(place) = unsafe { place.as_mut() }.filter(|place| !place.is_null()) {
+        // SAFETY: as promised by the caller.
+        drop(unsafe { Box::from_raw(place.cast::<InstanceState>()) });
+        *place = std::ptr::null_mut();
+    }
+    Ok(())
 }
 
 /// Returns a message as a C string.

@@ -255,7 +255,7 @@ impl Extrapolation {
         });
         debug_assert!(visited.is_ok(), "the reference element is inverted");
         let at_points = DMatrix::from_row_slice(rows.len() / n, n, &rows);
-        // Smallest solution where points are fewer than corners (constant in TET4, along the axis of
+        // Solution of minimum norm where points are fewer than corners (constant in TET4, along the axis of
         // WEDGE6); it exists for every matrix.
         let corners = at_points.pseudo_inverse(1e-10).unwrap_or_else(|_| DMatrix::zeros(n, rows.len() / n));
         let midsides = if kind.nodes() > n { edges(kind) } else { &[] };
