@@ -12,7 +12,7 @@ use flexarm_kinematics::{AxisMotion, Data, JointMotion, Model, SpatialInertia, S
 use nalgebra::{DMatrix, DVector, Matrix6};
 
 use crate::dense::{self, Loops, quickly};
-use crate::drive::{Friction, ServoAxis, TorqueCurve};
+use crate::drive::{Friction, ServoAxis, SpringCurve};
 use crate::error::StepError;
 use crate::events::SAME_TIME;
 use crate::gear::{GearCoupling, Hysteresis, LoadFriction, TransmissionError};
@@ -30,8 +30,8 @@ pub struct Spring {
     pub K: DMatrix<f64>,
     /// Damping.
     pub damping: Damping,
-    /// Torque over deflection if the spring is nonlinear; only for a single coordinate.
-    pub curve: Option<TorqueCurve>,
+    /// Law of the spring if it is nonlinear; only for a single coordinate.
+    pub curve: Option<SpringCurve>,
     /// Load-dependent stiffness (geometric stiffening); only for modal bodies.
     pub geometric: Option<Arc<GeometricStiffness>>,
 }
@@ -79,16 +79,16 @@ pub struct ElasticElement {
     /// Damping.
     pub damping: Damping,
     /// See [`Spring::curve`].
-    pub curve: Option<TorqueCurve>,
+    pub curve: Option<SpringCurve>,
     /// See [`Spring::geometric`].
     pub geometric: Option<Arc<GeometricStiffness>>,
 }
 
 impl ElasticElement {
-    /// Returns the stored energy (J) at the coordinates `e`.
-    pub fn energy(&self, e: &[f64]) -> f64 {
+    /// Returns the stored energy (J) at its coordinates `e` with the joints at `q`.
+    pub fn energy(&self, e: &[f64], q: &[f64]) -> f64 {
         match &self.curve {
-            Some(curve) => curve.energy(e[0]),
+            Some(curve) => curve.energy(e[0], q),
             None => {
                 let columns = self.K.as_slice().chunks_exact(self.size);
                 let row = |column: &[f64]| -> f64 { column.iter().zip(e).map(|(k, e)| k * e).sum() };
@@ -97,19 +97,12 @@ impl ElasticElement {
         }
     }
 
-    /// Returns the elastic force (N, N m) at the coordinates `e`: `K e`, or the torque of the
+    /// Adds the elastic force (N, N m) with the joints at `q`: `f += K e`, or the torque of the
     /// curve.
-    pub fn spring_force(&self, e: &[f64]) -> DVector<f64> {
-        let mut f = DVector::zeros(e.len());
-        self.add_spring_force(e, f.as_mut_slice());
-        f
-    }
-
-    /// Adds the elastic force: `f += K e`, or the torque of the curve.
     #[inline]
-    pub(crate) fn add_spring_force(&self, e: &[f64], f: &mut [f64]) {
+    pub(crate) fn add_spring_force(&self, e: &[f64], q: &[f64], f: &mut [f64]) {
         match &self.curve {
-            Some(curve) => f[0] += curve.torque(e[0]),
+            Some(curve) => f[0] += curve.torque(e[0], q),
             None => add_product(&self.K, e, f),
         }
     }
@@ -419,12 +412,12 @@ impl FlexibleArm {
         element.coordinate - self.model.n_actuated()
     }
 
-    /// Returns the elastic energy (J) at elastic coordinates `e`, without transmission errors and
+    /// Returns the elastic energy (J) at all coordinates `q`, without transmission errors and
     /// losses of sliders.
-    pub fn elastic_energy(&self, e: &[f64]) -> f64 {
-        let own: f64 =
-            self.elements.iter().map(|element| element.energy(&e[self.offset(element)..][..element.size])).sum();
-        self.cross_stiffness.iter().fold(own, |sum, &(i, j, k)| sum + k * e[i] * e[j])
+    pub fn elastic_energy(&self, q: &[f64]) -> f64 {
+        let own = |element: &ElasticElement| element.energy(&q[element.coordinate..][..element.size], q);
+        let e = &q[self.model.n_actuated()..];
+        self.cross_stiffness.iter().fold(self.elements.iter().map(own).sum(), |sum, &(i, j, k)| sum + k * e[i] * e[j])
     }
 
     /// Writes positions and velocities of the actuated joints at time `t` into `state` and their

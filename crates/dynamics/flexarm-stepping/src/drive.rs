@@ -1,7 +1,9 @@
 //! Parts of a drive: nonlinear springs, friction, and one axis of a sampled controller.
 //!
-//! Start at [`ServoAxis`], [`Friction`] and [`TorqueCurve`]. All quantities are on the joint side
+//! Start at [`ServoAxis`], [`Friction`] and [`SpringCurve`]. All quantities are on the joint side
 //! of the gear. Not here: rotors (in the tree) and linear gearbox springs (elements of the arm).
+
+use crate::guide::Guide;
 
 /// Piecewise linear torque of a spring over its deflection, odd or not; the end pieces are
 /// extrapolated.
@@ -11,6 +13,77 @@ pub struct TorqueCurve {
     x: Vec<f64>,
     /// Torques (N m or N), non-decreasing.
     y: Vec<f64>,
+}
+
+/// Law of a nonlinear spring with one coordinate e (rad or m).
+#[derive(Clone, Debug, PartialEq)]
+pub enum SpringCurve {
+    /// Torque over deflection.
+    Torque(TorqueCurve),
+    /// Guide of a telescopic joint, which depends on the position of the joint as well.
+    Guide(Guide),
+}
+
+impl SpringCurve {
+    /// Returns the torque (N m or N) at deflection `e` with the joints at `q`.
+    pub fn torque(&self, e: f64, q: &[f64]) -> f64 {
+        match self {
+            Self::Torque(curve) => curve.torque(e),
+            Self::Guide(guide) => guide.torque(e, q),
+        }
+    }
+
+    /// Returns the slope at deflection `e` with the joints at `q`; 0 within backlash.
+    pub fn slope(&self, e: f64, q: &[f64]) -> f64 {
+        match self {
+            Self::Torque(curve) => curve.slope(e),
+            Self::Guide(guide) => guide.slope(e, q),
+        }
+    }
+
+    /// Returns the slope at deflection `e`, and within backlash the steepest slope.
+    pub fn slope_beyond_play(&self, e: f64, q: &[f64]) -> f64 {
+        match self {
+            Self::Torque(curve) if curve.slope(e) <= 0.0 => curve.stiffest(),
+            _ => self.slope(e, q),
+        }
+    }
+
+    /// Returns the work from zero torque to deflection `e` (J) with the joints at `q`.
+    pub fn energy(&self, e: f64, q: &[f64]) -> f64 {
+        match self {
+            Self::Torque(curve) => curve.energy(e),
+            Self::Guide(guide) => guide.energy(e, q),
+        }
+    }
+
+    /// Returns the law of a spring stiffer by `factor`; clearances stay.
+    #[must_use]
+    pub fn scaled(&self, factor: f64) -> Self {
+        match self {
+            Self::Torque(curve) => Self::Torque(curve.scaled(factor)),
+            Self::Guide(guide) => Self::Guide(guide.scaled(factor)),
+        }
+    }
+
+    /// Returns the distance to the next rising piece; see [`TorqueCurve::way_out`].
+    pub(crate) fn way_out(&self, e: f64, direction: f64) -> Option<f64> {
+        match self {
+            Self::Torque(curve) => curve.way_out(e, direction),
+            Self::Guide(_) => None,
+        }
+    }
+
+    /// Returns the law of a telescopic guide.
+    pub fn guide(&self) -> Option<&Guide> {
+        if let Self::Guide(guide) = self { Some(guide) } else { None }
+    }
+}
+
+impl From<TorqueCurve> for SpringCurve {
+    fn from(curve: TorqueCurve) -> Self {
+        Self::Torque(curve)
+    }
 }
 
 /// Reason why points are rejected as a torque curve.

@@ -71,6 +71,19 @@ pub enum StepError {
         /// Name of the loop.
         name: String,
     },
+    /// The tubes of a telescopic joint do not overlap, or its guide has no stiffness there.
+    #[error(
+        "guide {name:?}: at this position its tubes overlap by {overlap:.4} m and tilt by {compliance:.2e} rad per N m; both must be above 0: keep \
+         the joint within its tubes, or correct outer_end, inner_end and compliance"
+    )]
+    Apart {
+        /// Name of the spring.
+        name: String,
+        /// Overlap (m).
+        overlap: f64,
+        /// Compliance (rad/(N m)).
+        compliance: f64,
+    },
     /// The solver with error control found no step size that meets the tolerance.
     #[error(
         "the reference stepper gave up at t = {t:.6} s (step {h:e} s): {what}; try a larger {} or another {}",
@@ -144,7 +157,11 @@ impl StepError {
             Self::SolverGaveUp { .. } => &[Setting::Tolerance, Setting::ReferenceMethod],
             Self::UnstableStep { .. } => &[Setting::Step, Setting::Stepper],
             Self::ModalLinks => &[Setting::Links, Setting::Stepper],
-            Self::Singular { .. } | Self::Setup(_) | Self::OpenLoop { .. } | Self::NoSlopes { .. } => &[],
+            Self::Singular { .. }
+            | Self::Setup(_)
+            | Self::OpenLoop { .. }
+            | Self::NoSlopes { .. }
+            | Self::Apart { .. } => &[],
         }
     }
 }

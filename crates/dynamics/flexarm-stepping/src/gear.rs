@@ -21,8 +21,9 @@ use std::f64::consts::FRAC_PI_2;
 use nalgebra::{DMatrix, DVector, Vector6};
 
 use crate::arm::{Damping, ElasticElement, FlexibleArm, add_product};
-use crate::drive::TorqueCurve;
+use crate::drive::{SpringCurve, TorqueCurve};
 use crate::error::StepError;
+use crate::guide::Guide;
 use crate::statics::spring_forces;
 
 /// One harmonic of a transmission error: `amplitude sin(cycles q + phase)`.
@@ -293,7 +294,7 @@ impl FlexibleArm {
             let curve = law.first_loading();
             element.K[(0, 0)] = curve.stiffest();
             element.C[(0, 0)] = 1.0 / curve.stiffest();
-            element.curve = Some(curve);
+            element.curve = Some(curve.into());
         }
         self.hysteresis = laws;
         self.update_modes_and_damping()?;
@@ -319,9 +320,10 @@ impl FlexibleArm {
     }
 
     /// Returns whether any gear has a transmission error, hysteresis, load-dependent friction or
-    /// coupling.
+    /// coupling, or any joint a telescopic guide.
     pub(crate) fn has_gear_laws(&self) -> bool {
         !(self.transmission.is_empty() && self.hysteresis.is_empty() && self.load_friction.is_empty())
+            || self.has_guides()
             || self.coupling.as_ref().is_some_and(|coupling| !coupling.is_none())
     }
 
@@ -348,8 +350,7 @@ impl FlexibleArm {
         if let Some(law) = self.hysteresis.iter().find(|law| law.element == element) {
             return Some(law.stuck_slope(delta));
         }
-        let slope = curve.slope(delta);
-        Some(if slope > 0.0 { slope } else { curve.stiffest() })
+        Some(curve.slope_beyond_play(delta, q))
     }
 
     /// Returns the forces of the springs and the energy of each element, at rest with all
@@ -365,8 +366,8 @@ impl FlexibleArm {
             let own = &e.as_slice()[first..first + element.size];
             match element.size {
                 1 if self.cross_stiffness.iter().any(|(i, j, _)| *i == first || *j == first) => 0.5 * F[first] * own[0],
-                1 => element.energy(&[self.deflection(k, own[0], q.as_slice())]),
-                _ => element.energy(own),
+                1 => element.energy(&[self.deflection(k, own[0], q.as_slice())], q.as_slice()),
+                _ => element.energy(own, q.as_slice()),
             }
         };
         let energies = self.elements.iter().enumerate().map(energy).collect();
@@ -381,11 +382,35 @@ impl FlexibleArm {
         }
     }
 
-    /// Adds the reaction of the transmission errors on the motors, for the spring forces F, to
-    /// `tau` over all joints: equation (4).
+    /// Returns whether any joint has a telescopic guide.
+    pub(crate) fn has_guides(&self) -> bool {
+        self.guides().next().is_some()
+    }
+
+    fn guides(&self) -> impl Iterator<Item = (&ElasticElement, &Guide)> {
+        self.elements.iter().filter_map(|element| Some((element, element.curve.as_ref()?.guide()?)))
+    }
+
+    /// Returns the error for the first guide whose tubes are apart or without stiffness with the
+    /// joints at `q`, if any.
+    pub(crate) fn apart(&self, q: &[f64]) -> Option<StepError> {
+        let apart = |(element, guide): (&ElasticElement, &Guide)| {
+            let overlap = guide.overlap(q);
+            let compliance = guide.compliance(overlap);
+            let fine = overlap > 0.0 && compliance > 0.0;
+            (!fine).then(|| StepError::Apart { name: element.name.clone(), overlap, compliance })
+        };
+        self.guides().find_map(apart)
+    }
+
+    /// Adds the reactions of transmission errors, equation (4), and of guides on the motors, for
+    /// the spring forces F and all coordinates `q`, to `tau` over all joints.
     pub(crate) fn add_motor_forces(&self, q: &[f64], F: &[f64], tau: &mut [f64]) {
         for error in &self.transmission {
             tau[error.motor] -= error.slope(q[error.motor]) * F[self.offset(&self.elements[error.element])];
+        }
+        for (element, guide) in self.guides() {
+            tau[guide.coordinate] += guide.reaction(q[element.coordinate], q);
         }
     }
 
@@ -467,6 +492,8 @@ struct SliderState {
 /// Gear state of a run: slider positions, and the forces of the last evaluation.
 #[derive(Clone, Debug)]
 pub(crate) struct GearState {
+    /// Actuated joints at the last evaluation.
+    q: Vec<f64>,
     /// Deflections and their rates, per elastic coordinate.
     pub(crate) delta: DVector<f64>,
     pub(crate) rate: DVector<f64>,
@@ -488,6 +515,7 @@ impl GearState {
         let slipped = |law: &Hysteresis| SliderState { delta: 0.0, s: vec![0.0; law.sliders.len()] };
         arm.has_gear_laws().then(|| {
             Box::new(Self {
+                q: vec![0.0; arm.model.n_actuated()],
                 delta: zeros.clone(),
                 rate: zeros.clone(),
                 F: zeros.clone(),
@@ -502,7 +530,9 @@ impl GearState {
     /// Computes springs and dampers at elastic coordinates `e` and rates `v`, with the joints at
     /// `q` and `qdot`.
     pub(crate) fn update(&mut self, arm: &FlexibleArm, q: &[f64], qdot: &[f64], e: &[f64], v: &[f64]) {
-        let Self { delta, rate, F, damper, slipped, .. } = self;
+        let Self { q: joints, delta, rate, F, damper, slipped, .. } = self;
+        let actuated = joints.len();
+        joints.copy_from_slice(&q[..actuated]);
         // Deflections (1) and their rates.
         delta.as_mut_slice().copy_from_slice(e);
         rate.as_mut_slice().copy_from_slice(v);
@@ -532,7 +562,7 @@ impl GearState {
                     F[range.start] += law.elastic.torque(delta) + slipped.torque(law, delta);
                 }
                 None => {
-                    element.add_spring_force(&delta.as_slice()[range.clone()], &mut F.as_mut_slice()[range]);
+                    element.add_spring_force(&delta.as_slice()[range.clone()], q, &mut F.as_mut_slice()[range]);
                 }
             }
         }
@@ -540,11 +570,11 @@ impl GearState {
     }
 
     /// Returns the slope of a nonlinear spring with one coordinate at its last deflection.
-    pub(crate) fn slope(&self, arm: &FlexibleArm, k: usize, element: &ElasticElement, curve: &TorqueCurve) -> f64 {
+    pub(crate) fn slope(&self, arm: &FlexibleArm, k: usize, element: &ElasticElement, curve: &SpringCurve) -> f64 {
         let delta = self.delta[arm.offset(element)];
         match arm.hysteresis.iter().zip(&self.slipped).find(|(law, _)| law.element == k) {
             Some((law, slipped)) => law.elastic.slope(delta) + slipped.slope(law, delta),
-            None => curve.slope(delta),
+            None => curve.slope(delta, &self.q),
         }
     }
 
@@ -585,7 +615,7 @@ impl GearState {
             let delta = &self.delta.as_slice()[arm.offset(element)..][..element.size];
             energy += match arm.hysteresis.iter().zip(&self.slipped).find(|(law, _)| law.element == k) {
                 Some((law, slipped)) => law.elastic.energy(delta[0]) + slipped.energy(law, delta[0]),
-                None => element.energy(delta),
+                None => element.energy(delta, &self.q),
             };
         }
         energy + arm.cross_stiffness.iter().map(|&(i, j, k)| k * self.delta[i] * self.delta[j]).sum::<f64>()

@@ -135,9 +135,9 @@ fn element_loads(
     for (load, element) in loads.iter_mut().zip(&arm.elements) {
         let range = arm.offset(element)..arm.offset(element) + element.size;
         let (own, spring) = (&e[range.clone()], &mut springs[range.clone()]);
-        element.add_spring_force(own, spring);
+        element.add_spring_force(own, &[], spring);
         energy += match &element.curve {
-            Some(curve) => curve.energy(own[0]),
+            Some(curve) => curve.energy(own[0], &[]),
             None => 0.5 * dot(own, spring),
         };
         load.fill(0.0);

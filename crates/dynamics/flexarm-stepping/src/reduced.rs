@@ -285,7 +285,7 @@ impl ReducedArm {
                     f: &mut f[range],
                 });
             } else {
-                element.add_spring_force(&x[range.clone()], &mut f[range.clone()]);
+                element.add_spring_force(&x[range.clone()], &[], &mut f[range.clone()]);
                 if self.arm.proportional {
                     f[first] += self.arm.tau[k] * element.K[(0, 0)] * v[first];
                 }
@@ -610,7 +610,7 @@ impl SecondOrderSystem for ReducedArm {
             if let Some(curve) = &element.curve {
                 let slope = match &self.gears {
                     Some(gears) => gears.slope(&self.arm, k, element, curve),
-                    None => curve.slope(self.state.q[element.coordinate]),
+                    None => curve.slope(self.state.q[element.coordinate], self.state.q.as_slice()),
                 };
                 C[(first, first)] += c_K * slope + damping * element.K[(0, 0)];
             } else {

@@ -35,6 +35,9 @@ pub fn static_equilibrium(arm: &FlexibleArm, t: f64) -> Result<DVector<f64>, Ste
     if n == 0 {
         return Ok(e);
     }
+    if let Some(apart) = arm.apart(&joints_at(arm, t)) {
+        return Err(apart);
+    }
     let mut data = arm.lend_data();
     let K = arm.stiffness();
     let mut residual = f64::INFINITY;
@@ -97,7 +100,7 @@ pub(crate) fn spring_forces(arm: &FlexibleArm, q: &[f64], e: &DVector<f64>) -> D
 
 /// Returns the joint positions at time `t`; empty if no spring depends on them.
 fn joints_at(arm: &FlexibleArm, t: f64) -> Vec<f64> {
-    if arm.transmission.is_empty() {
+    if arm.transmission.is_empty() && !arm.has_guides() {
         return Vec::new();
     }
     let (mut state, mut qddot) = (State::zeros(&arm.model), DVector::zeros(arm.model.nv()));
@@ -111,8 +114,8 @@ pub(crate) fn add_spring_forces(arm: &FlexibleArm, q: &[f64], e: &[f64], f: &mut
     for (k, element) in arm.elements.iter().enumerate() {
         let range = arm.offset(element)..arm.offset(element) + element.size;
         match element.size {
-            1 => element.add_spring_force(&[arm.deflection(k, e[range.start], q)], &mut f[range]),
-            _ => element.add_spring_force(&e[range.clone()], &mut f[range]),
+            1 => element.add_spring_force(&[arm.deflection(k, e[range.start], q)], q, &mut f[range]),
+            _ => element.add_spring_force(&e[range.clone()], q, &mut f[range]),
         }
     }
     arm.add_cross_forces(e, f);
@@ -171,8 +174,7 @@ pub(crate) fn with_curves(arm: &FlexibleArm, K: &DMatrix<f64>, q: &[f64], e: &DV
     for (number, element) in arm.elements.iter().enumerate() {
         if let Some(curve) = &element.curve {
             let k = arm.offset(element);
-            let slope = curve.slope(arm.deflection(number, e[k], q));
-            tangent[(k, k)] = if slope > 0.0 { slope } else { curve.stiffest() };
+            tangent[(k, k)] = curve.slope_beyond_play(arm.deflection(number, e[k], q), q);
         }
     }
     tangent

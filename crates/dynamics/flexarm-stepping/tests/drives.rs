@@ -275,6 +275,7 @@ fn loaded(curve: Option<TorqueCurve>, moment: f64) -> FlexibleArm {
     let model = Arc::new(Model::new(&rotor(Some(GEAR), 0.0)).expect("a tree"));
     let body = model.frame("body").expect("there").body;
     let (name, damping) = ("gear".to_owned(), Damping::StiffnessProportional(0.0));
+    let curve = curve.map(SpringCurve::from);
     let spring = Spring { name, K: DMatrix::from_element(1, 1, GEAR), damping, curve, geometric: None };
     let arm = FlexibleArm::new(model, vec![spring], Arc::new(Held(vec![0.3]))).expect("valid");
     arm.with_loads(vec![(body, Wrench::new(Vector3::zeros(), Vector3::z() * moment))]).expect("valid")

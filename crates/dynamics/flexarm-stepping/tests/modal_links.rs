@@ -660,7 +660,7 @@ fn everything() -> FlexibleArm {
     for g in gears {
         let mut of = spring(&g.name, g.K, Damping::Modal(0.02));
         if g.gearbox == "joint3" {
-            of.curve = Some(TorqueCurve::backlash(1e6, 1e-5));
+            of.curve = Some(TorqueCurve::backlash(1e6, 1e-5).into());
         }
         springs.push((g.joint, of));
     }

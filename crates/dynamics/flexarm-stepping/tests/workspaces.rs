@@ -133,7 +133,7 @@ fn displacement_energy_and_loads_are_those_of_their_definitions() {
     for (load, truth) in seen.load.iter().zip([forces.rows(0, 6), forces.rows(6, 6)]) {
         assert!((load + truth).norm() < 1e-12 * truth.norm());
     }
-    let energy = arm.elastic_energy(e.as_slice());
+    let energy = arm.elastic_energy(seen.q.as_slice());
     assert!((seen.energy[2] - energy).abs() < 1e-13 * energy && energy > 0.0);
     assert!((seen.power[2] - rates.dot(&(&arm.D * &rates))).abs() < 1e-12 * seen.power[2]);
 }

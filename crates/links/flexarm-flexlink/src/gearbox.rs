@@ -7,8 +7,14 @@
 //! With one stiffness the spring acts about the joint's axis; with three also the bearings tilt
 //! (extended flexible joint), as three springs about x, y, z of the joint frame; with a full 6x6
 //! stiffness, it deflects in all directions. At zero deflection all frames are unchanged.
+//!
+//! The guide of a telescopic joint tilts in the middle of the overlap of its tubes, which moves
+//! half as fast as the joint. Two joints that mimic it move there and back:
+//! ```text
+//! parent --joint--> <joint>__motor --back--> <joint>__middle --springs--> <joint>__tilted --forth--> child
+//! ```
 
-use flexarm_kinematics::{ElasticAngles, Joint, JointKind, Link, Mechanism, Pose};
+use flexarm_kinematics::{ElasticAngles, Joint, JointKind, Link, Mechanism, Mimic, Pose};
 use nalgebra::{DMatrix, Matrix6, Unit, Vector3};
 
 /// Stiffness of a gearbox on the joint side.
@@ -21,6 +27,32 @@ pub enum GearStiffness {
     Tilting([f64; 3]),
     /// Translations (N/m) and rotations (N m/rad) in the joint frame, coupled.
     Full(Matrix6<f64>),
+    /// Tilt of a sliding joint in the middle of the overlap of its tubes.
+    Guide(GuideTubes),
+}
+
+/// Overlap of the tubes of a telescopic joint, and the axes about which they tilt.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GuideTubes {
+    /// End of the outer tube, along the axis from the joint frame at zero joint position (m).
+    pub outer_end: f64,
+    /// End of the inner tube, along the axis from the child frame (m).
+    pub inner_end: f64,
+    /// Whether the guide tilts about x, y and z of the joint frame.
+    pub tilts: [bool; 3],
+}
+
+impl GuideTubes {
+    /// Returns the overlap (m) at a joint position (m).
+    pub fn overlap(&self, position: f64) -> f64 {
+        self.outer_end - self.inner_end - position
+    }
+
+    /// Returns the middle of the overlap, along the axis from the joint frame at zero joint
+    /// position, as an offset (m) and a factor on the joint position.
+    fn middle(&self) -> [f64; 2] {
+        [0.5 * (self.outer_end + self.inner_end), 0.5]
+    }
 }
 
 /// Joint with an elastic gearbox.
@@ -57,12 +89,6 @@ pub enum GearboxError {
         /// The joint.
         joint: String,
     },
-    /// A mimic joint follows another one exactly.
-    #[error("gearbox of joint {joint:?}: the joint mimics another one, which leaves no room for a spring")]
-    Mimic {
-        /// The joint.
-        joint: String,
-    },
     /// A dependent joint of a closed loop has no motor.
     #[error("gearbox of joint {joint:?}: the joint follows from loop {name:?}, so nothing drives it")]
     Dependent {
@@ -90,6 +116,14 @@ pub enum GearboxError {
         joint: String,
         /// Maximum difference from the transpose, relative to the maximum entry.
         found: f64,
+    },
+    /// A guide is on a joint that does not slide, or tilts about no axis.
+    #[error(
+        "guide of joint {joint:?}: only a prismatic joint has tubes that slide, and a guide tilts about one axis at least"
+    )]
+    NoGuide {
+        /// The joint.
+        joint: String,
     },
     /// A tilting gearbox is on a prismatic joint.
     #[error("gearbox of joint {joint:?}: three stiffnesses are about the axes of a turning joint; this one slides")]
@@ -119,11 +153,42 @@ fn check_stiffness(joint: &str, stiffness: &GearStiffness) -> Result<(), Gearbox
                 K.symmetric_eigenvalues().min()
             }
         },
+        GearStiffness::Guide(_) => 1.0,
     };
     if smallest <= 0.0 || !smallest.is_finite() {
         return Err(GearboxError::NotPositive { joint: joint.to_owned(), found: smallest });
     }
     Ok(())
+}
+
+/// Inserts the joints from the moving end of a sliding joint to the middle of the overlap of its
+/// tubes, and back; returns the links between which the springs act.
+fn there_and_back(
+    mechanism: &mut Mechanism,
+    slide: &Joint,
+    tubes: &GuideTubes,
+    motor: String,
+    child: String,
+) -> (String, String) {
+    let name = &slide.name;
+    let [middle, tilted] = ["middle", "tilted"].map(|end| format!("{name}__{end}"));
+    // The middle of the overlap from the moving end: offset + (factor - 1) position.
+    let [offset, factor] = tubes.middle();
+    // A mimic joint has no followers of its own.
+    let leader = slide.mimic.clone().unwrap_or(Mimic { joint: name.clone(), ratio: 1.0, offset: 0.0 });
+    let along = |sign: f64| Mimic {
+        joint: leader.joint.clone(),
+        ratio: sign * (factor - 1.0) * leader.ratio,
+        offset: sign * (offset + (factor - 1.0) * leader.offset),
+    };
+    for (joint, parent, end, sign) in [("back", &motor, &middle, 1.0), ("forth", &tilted, &child, -1.0)] {
+        let moved = Joint::new(format!("{name}__{joint}"), slide.kind, parent, end, Pose::identity());
+        mechanism.joints.push(Joint { mimic: Some(along(sign)), ..moved });
+    }
+    for link in [&middle, &tilted] {
+        mechanism.links.push(Link { name: link.clone(), inertia: None });
+    }
+    (middle, tilted)
 }
 
 /// Inserts a spring outward of each of the joints.
@@ -139,14 +204,17 @@ pub fn insert_gearboxes(mechanism: &mut Mechanism, gearboxes: &[Gearbox]) -> Res
             return Err(GearboxError::Dependent { joint: name.clone(), name: closure.name.clone() });
         }
         let joint = mechanism.joints.iter_mut().find(|j| j.name == *name).ok_or_else(missing)?;
-        if joint.mimic.is_some() {
-            return Err(GearboxError::Mimic { joint: name.clone() });
-        }
         let elastic = joint.kind.spring().ok_or_else(missing)?;
         if joint.kind.slides() && matches!(gearbox.stiffness, GearStiffness::Tilting(_)) {
             return Err(GearboxError::Slides { joint: name.clone() });
         }
         check_stiffness(name, &gearbox.stiffness)?;
+        if let GearStiffness::Guide(tubes) = &gearbox.stiffness
+            && !(matches!(joint.kind, JointKind::Prismatic(_)) && tubes.tilts.contains(&true))
+        {
+            return Err(GearboxError::NoGuide { joint: name.clone() });
+        }
+        let slide = joint.clone();
         let motor = format!("{name}__motor");
         let child = std::mem::replace(&mut joint.child, motor.clone());
         mechanism.links.push(Link { name: motor.clone(), inertia: None });
@@ -166,8 +234,17 @@ pub fn insert_gearboxes(mechanism: &mut Mechanism, gearboxes: &[Gearbox]) -> Res
                 let kind = JointKind::Elastic(ElasticAngles::RotationVector);
                 vec![("", kind, DMatrix::from_column_slice(6, 6, K.as_slice()))]
             }
+            GearStiffness::Guide(tubes) => {
+                let axes = [Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis()];
+                let turns = [".x", ".y", ".z"].into_iter().zip(axes).zip(tubes.tilts).filter(|(_, tilts)| *tilts);
+                turns.map(|((suffix, axis), _)| (suffix, JointKind::ElasticRevolute(axis), single(1.0))).collect()
+            }
         };
-        let (last, mut parent) = (parts.len() - 1, motor);
+        let (parent, child) = match &gearbox.stiffness {
+            GearStiffness::Guide(tubes) => there_and_back(mechanism, &slide, tubes, motor, child),
+            _ => (motor, child),
+        };
+        let (last, mut parent) = (parts.len() - 1, parent);
         for (component, (suffix, kind, K)) in parts.into_iter().enumerate() {
             let spring = format!("{name}__spring{suffix}");
             let to = if component == last { child.clone() } else { format!("{name}__gear{suffix}") };

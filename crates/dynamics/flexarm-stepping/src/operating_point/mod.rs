@@ -272,8 +272,9 @@ impl OperatingPoint {
                 let k = self.arm.offset(element);
                 let delta = self.arm.deflection(number, self.q[m + k], self.q.as_slice());
                 let stuck = self.arm.hysteresis.iter().find(|law| small && law.element == number);
-                let slope = stuck.map_or_else(|| curve.slope(delta), |law| law.stuck_slope(delta));
-                self.tangent.T[k * n + k] += if slope > 0.0 { slope } else { curve.stiffest() } - self.K[(k, k)];
+                let beyond_play = || curve.slope_beyond_play(delta, self.q.as_slice());
+                let slope = stuck.map_or_else(beyond_play, |law| law.stuck_slope(delta));
+                self.tangent.T[k * n + k] += slope - self.K[(k, k)];
             }
         }
         // A constant moment is not conservative; without one any asymmetry is an error of the

@@ -312,6 +312,9 @@ fn check(arm: &FlexibleArm, request: &SlopesRequest, directions: &[Direction]) -
     if arm.elements.iter().any(|element| element.geometric.is_some()) {
         return refuse("links that stiffen under load", "leave geometric stiffening out");
     }
+    if arm.has_guides() {
+        return refuse("telescopic guides", "vary the guide in a sweep");
+    }
     for direction in directions {
         for (spring, slope) in &direction.springs {
             let Some(element) = arm.elements.get(*spring) else {

@@ -122,7 +122,7 @@ impl Tangent {
         for element in &arm.elements {
             let first = element.coordinate;
             match &element.curve {
-                Some(curve) => self.by_q[(first, first)] += curve.slope(state.q[first]),
+                Some(curve) => self.by_q[(first, first)] += curve.slope(state.q[first], state.q.as_slice()),
                 None => {
                     let mut block = self.by_q.view_mut((first, first), (element.size, element.size));
                     block += &element.K;
@@ -213,7 +213,7 @@ pub(super) fn add_springs(
         match (&element.curve, slope) {
             (Some(curve), SpringSlope::Factor(factor)) => {
                 let with_past = gears.and_then(|gears| gears.hysteresis_torque(arm, *number));
-                to[range.start] += factor * with_past.unwrap_or_else(|| curve.torque(x[range.start]));
+                to[range.start] += factor * with_past.unwrap_or_else(|| curve.torque(x[range.start], &[]));
             }
             _ => slope.add_linear(&element.K, &x[range.clone()], &mut to[range]),
         }

@@ -12,6 +12,7 @@ pub(super) fn check_known(arm: &FlexibleArm) -> Result<(), StepError> {
         (!arm.torque_driven.is_empty(), "joints driven by torque"),
         (!arm.inertia_changes.is_empty(), "payloads that change"),
         (!arm.hysteresis.is_empty(), "gears with hysteresis"),
+        (arm.has_guides(), "telescopic guides"),
         (arm.elements.iter().any(|e| e.curve.is_some()), "springs with play or curves"),
         (!arm.transmission.is_empty(), "transmission errors"),
         (!arm.load_friction.is_empty(), "friction that grows with the load"),

@@ -318,7 +318,7 @@ impl Stepper for Spook {
             kinetic += 0.5 * body.armature * self.now.qdot[k].powi(2);
         }
         out.power = [out.drive.dot(&out.qdot.rows(0, n)), self.load_power(), self.damping_power(&out.qdot)];
-        out.energy = [kinetic, potential, self.arm.elastic_energy(&out.q.as_slice()[n..])];
+        out.energy = [kinetic, potential, self.arm.elastic_energy(out.q.as_slice())];
     }
 
     fn counts(&self) -> Counts {
