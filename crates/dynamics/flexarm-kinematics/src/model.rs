@@ -482,6 +482,13 @@ impl Model {
         model
     }
 
+    /// Sets the pose of the joint frame of a body in its parent body, at zero coordinate.
+    pub fn set_joint_frame(&mut self, body: usize, X_PJ: Pose) {
+        let body = &mut self.bodies[body];
+        body.is_parallel = X_PJ.rotation == Rotation3::identity();
+        body.X_PJ = X_PJ;
+    }
+
     /// Rotor inertia of a coordinate, reflected to it (kg m² or kg).
     pub fn rotor_inertia(&self, coordinate: usize) -> f64 {
         self.rotors.iter().filter(|(k, _)| *k == coordinate).map(|(_, inertia)| inertia).sum()

@@ -71,7 +71,9 @@ fn the_error_of_kr210_depends_on_its_numbers_as_differences_of_runs_say() {
             Effect::Stiffness(_) => 0.004,
             Effect::Damping(_) | Effect::Damper { .. } => 0.1,
             Effect::Mass { .. } => 0.5,
-            Effect::Entry { .. } | Effect::Tool(_) => unreachable!("named above are others"),
+            Effect::Entry { .. } | Effect::Tool(_) | Effect::Guide { .. } | Effect::Frame { .. } => {
+                unreachable!("named above are others")
+            }
         };
         let truth = richardson(h, |x| errors(&arm, &motion, parameter, x));
         let own: Vec<f64> = found.slopes.iter().skip(k).step_by(asked.len()).flatten().copied().collect();

@@ -6,7 +6,8 @@
 //! The intermediate link has no mass; the rotor is an armature of the motor's joint, `ratio² J`.
 //! With one stiffness the spring acts about the joint's axis; with three also the bearings tilt
 //! (extended flexible joint), as three springs about x, y, z of the joint frame; with a full 6x6
-//! stiffness, it deflects in all directions. At zero deflection all frames are unchanged.
+//! stiffness, it deflects in all directions. With three or six, a fixed joint becomes an elastic
+//! connection. At zero deflection all frames are unchanged.
 //!
 //! The guide of a telescopic joint tilts in the middle of the overlap of its tubes, which moves
 //! half as fast as the joint. Two joints that mimic it move there and back:
@@ -83,7 +84,7 @@ pub struct GearSpring {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum GearboxError {
-    /// There is no such joint, or it does not move.
+    /// There is no such joint, or it does not move and has a single stiffness.
     #[error("gearbox of joint {joint:?}: the robot has no such movable joint")]
     NoJoint {
         /// The joint.
@@ -204,7 +205,12 @@ pub fn insert_gearboxes(mechanism: &mut Mechanism, gearboxes: &[Gearbox]) -> Res
             return Err(GearboxError::Dependent { joint: name.clone(), name: closure.name.clone() });
         }
         let joint = mechanism.joints.iter_mut().find(|j| j.name == *name).ok_or_else(missing)?;
-        let elastic = joint.kind.spring().ok_or_else(missing)?;
+        let several = !matches!(gearbox.stiffness, GearStiffness::Axis(_));
+        // A fixed joint with several springs is an elastic connection.
+        let along = joint.kind.spring();
+        if along.is_none() && !(several && joint.kind == JointKind::Fixed) {
+            return Err(missing());
+        }
         if joint.kind.slides() && matches!(gearbox.stiffness, GearStiffness::Tilting(_)) {
             return Err(GearboxError::Slides { joint: name.clone() });
         }
@@ -221,7 +227,7 @@ pub fn insert_gearboxes(mechanism: &mut Mechanism, gearboxes: &[Gearbox]) -> Res
 
         let single = |k: f64| DMatrix::from_element(1, 1, k);
         let parts: Vec<(&str, JointKind, DMatrix<f64>)> = match &gearbox.stiffness {
-            GearStiffness::Axis(k) => vec![("", elastic, single(*k))],
+            GearStiffness::Axis(k) => along.map(|kind| ("", kind, single(*k))).into_iter().collect(),
             GearStiffness::Tilting(k) => {
                 let turn = |axis: Unit<Vector3<f64>>| JointKind::ElasticRevolute(axis);
                 vec![

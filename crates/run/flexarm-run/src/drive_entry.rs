@@ -3,8 +3,8 @@
 
 use std::ops::Range;
 
-use flexarm_flexlink::{GearStiffness, Gearbox};
-use flexarm_kinematics::{JointKind, Mechanism};
+use flexarm_flexlink::{GearStiffness, Gearbox, GuideTubes};
+use flexarm_kinematics::{Joint, JointKind, Mechanism};
 use flexarm_stepping::{Damping, Friction, Harmonic, TorqueCurve};
 use nalgebra::Matrix6;
 use serde::Deserialize;
@@ -12,6 +12,7 @@ use toml::Spanned;
 
 use crate::error::Error;
 use crate::gear_entry::{GearHysteresis, HarmonicEntry, HysteresisEntry, harmonics, hysteresis};
+use crate::guide_entry::{GuideEntry, GuideTilt};
 use crate::options::DriveModel;
 use crate::robot_file::{RobotFileError, Source};
 
@@ -70,6 +71,15 @@ pub(crate) struct GearboxEntry {
     pub transmission_error: Vec<HarmonicEntry>,
     /// Internal friction, in catalogue terms.
     pub hysteresis: Option<HysteresisEntry>,
+    /// Tubes of a telescopic joint, instead of a stiffness.
+    pub guide: Option<GuideEntry>,
+}
+
+impl GearboxEntry {
+    /// Whether it has several stiffnesses, as an elastic connection of a fixed joint.
+    fn connects(&self) -> bool {
+        matches!(self.stiffness, Some(Numbers::Many(_) | Numbers::Matrix(_)))
+    }
 }
 
 /// Friction of a drive.
@@ -186,6 +196,8 @@ pub struct GearDamping {
     pub transmission: Vec<Harmonic>,
     /// Internal friction.
     pub hysteresis: Option<GearHysteresis>,
+    /// Tilts of a telescopic guide, one per spring; empty for other gearboxes.
+    pub tilts: Vec<GuideTilt>,
 }
 
 impl Drive {
@@ -204,6 +216,14 @@ impl Drive {
     pub(crate) fn gearbox_as(&self, drives: DriveModel) -> Option<Gearbox> {
         let gives_way = self.kind_as(drives) != DriveKind::Prescribed;
         self.gearbox.as_ref().filter(|_| gives_way).map(|(gearbox, _)| gearbox.clone())
+    }
+
+    /// Returns the tubes of the guide if the joint is telescopic; its deflections are rotations.
+    pub fn guide(&self) -> Option<&GuideTubes> {
+        match &self.gearbox.as_ref()?.0.stiffness {
+            GearStiffness::Guide(tubes) => Some(tubes),
+            _ => None,
+        }
     }
 }
 
@@ -280,11 +300,18 @@ fn drive(
     let movable = |j: &&flexarm_kinematics::Joint| {
         j.kind != JointKind::Fixed && crate::loops::owner(mechanism, &j.name).is_none()
     };
-    let Some(joint) = mechanism.joints.iter().find(|j| j.name == *name && j.kind != JointKind::Fixed) else {
+    let connects = entry.gearbox.as_ref().is_some_and(|gearbox| gearbox.get_ref().connects());
+    let moves = |joint: &&Joint| joint.kind != JointKind::Fixed || connects;
+    let Some(joint) = mechanism.joints.iter().filter(moves).find(|j| j.name == *name) else {
         let known: Vec<_> = mechanism.joints.iter().filter(movable).map(|j| j.name.as_str()).collect();
         return Err(fail(entry.joint.span(), format!("the robot has no such movable joint; it has {known:?}")));
     };
     let kind = kind_of(entry, source)?;
+    let of_motor = entry.friction.is_some() || entry.servo.is_some() || entry.motor_inertia.is_some();
+    if joint.kind == JointKind::Fixed && (kind == DriveKind::Torque || of_motor) {
+        let text = "the joint is fixed: as an elastic connection it has kind = \"gearbox\" and a gearbox, no motor";
+        return Err(fail(entry.kind.span(), text.into()));
+    }
     if let Some(own) = crate::loops::owner(mechanism, name) {
         let text = format!(
             "the joint follows from loop {own:?}: nothing drives it, drives belong to the other joints of the loop"
@@ -307,7 +334,7 @@ fn drive(
     }
     let armature = ratio * ratio * number(&entry.motor_inertia, "motor_inertia", 0.0, 0.0)?;
     let gearbox = match &entry.gearbox {
-        Some(gearbox) => Some(gear(name, gearbox, entry.ratio.as_ref().map(|_| ratio), &fail)?),
+        Some(gearbox) => Some(gear(joint, gearbox, entry.ratio.as_ref().map(|_| ratio), &fail)?),
         None => None,
     };
     match (kind, &gearbox) {
@@ -375,13 +402,16 @@ fn drive(
 }
 
 fn gear(
-    joint: &str,
+    joint: &Joint,
     entry: &Spanned<GearboxEntry>,
     ratio: Option<f64>,
     fail: &impl Fn(Range<usize>, String) -> RobotFileError,
 ) -> Result<(Gearbox, GearDamping), RobotFileError> {
     let gear = entry.get_ref();
     let at = |message: String| fail(entry.span(), message);
+    if let Some(guide) = &gear.guide {
+        return guide_gear(joint, guide, gear).map_err(at);
+    }
     let curve = match (&gear.curve, gear.backlash, &gear.stiffness) {
         (Some(points), None, None) => Some(TorqueCurve::new(points).map_err(|e| at(e.to_string()))?),
         (None, Some(play), Some(Numbers::One(k))) if play.is_finite() && play >= 0.0 && *k > 0.0 => {
@@ -393,7 +423,9 @@ fn gear(
             )));
         }
         (Some(_), ..) => return Err(at("curve takes the place of stiffness and backlash: give one of them".into())),
-        (None, None, None) => return Err(at("gearbox needs stiffness = N m/rad, or curve = [[rad, N m], ...]".into())),
+        (None, None, None) => {
+            return Err(at("gearbox needs stiffness = N m/rad, curve = [[rad, N m], ...], or guide = { ... }".into()));
+        }
         (None, None, Some(_)) => None,
     };
     let (stiffness, size) = match (&gear.stiffness, &curve) {
@@ -417,31 +449,53 @@ fn gear(
         GearStiffness::Axis(k) => k.is_finite() && *k > 0.0,
         GearStiffness::Tilting(k) => k.iter().all(|k| k.is_finite() && *k > 0.0),
         GearStiffness::Full(K) => K.iter().all(|k| k.is_finite()) && K.symmetric_eigenvalues().min() > 0.0,
+        GearStiffness::Guide(_) => true,
     };
     if !finite {
         return Err(at("the stiffness must be finite and positive (definite)".into()));
     }
-    let dampers = match &gear.damping {
-        None => None,
-        Some(Numbers::One(d)) if size == 1 => Some(vec![*d]),
-        Some(Numbers::Many(d)) if d.len() == size => Some(d.clone()),
-        Some(_) => {
-            let text = match size {
-                1 => "one number".to_owned(),
-                n => format!("{n} numbers"),
-            };
-            return Err(at(format!("with this stiffness, damping takes {text}")));
-        }
-    };
-    if dampers.iter().flatten().any(|d| !(d.is_finite() && *d >= 0.0)) {
-        return Err(at("damping must be 0 or above".into()));
-    }
+    let dampers = dampers(gear, size).map_err(at)?;
     if size > 1 && (gear.hysteresis.is_some() || !gear.transmission_error.is_empty()) {
         return Err(at("transmission_error and hysteresis need one stiffness, about the axis".into()));
     }
     let transmission = harmonics(&gear.transmission_error, ratio).map_err(at)?;
     let about = if let GearStiffness::Axis(k) = stiffness { k } else { f64::NAN };
     let law = gear.hysteresis.as_ref().map(|entry| hysteresis(entry, about, curve.as_ref()));
-    let damping = GearDamping { dampers, curve, transmission, hysteresis: law.transpose().map_err(at)? };
-    Ok((Gearbox { joint: joint.to_owned(), stiffness }, damping))
+    let hysteresis = law.transpose().map_err(at)?;
+    let damping = GearDamping { dampers, curve, transmission, hysteresis, tilts: Vec::new() };
+    Ok((Gearbox { joint: joint.name.clone(), stiffness }, damping))
+}
+
+/// Returns the dampers of a gearbox with `size` coordinates, if it has any.
+fn dampers(gear: &GearboxEntry, size: usize) -> Result<Option<Vec<f64>>, String> {
+    let dampers = match &gear.damping {
+        None => return Ok(None),
+        Some(Numbers::One(d)) if size == 1 => vec![*d],
+        Some(Numbers::Many(d)) if d.len() == size => d.clone(),
+        Some(_) => {
+            let text = match size {
+                1 => "one number".to_owned(),
+                n => format!("{n} numbers"),
+            };
+            return Err(format!("with this stiffness, damping takes {text}"));
+        }
+    };
+    match dampers.iter().all(|d| d.is_finite() && *d >= 0.0) {
+        true => Ok(Some(dampers)),
+        false => Err("damping must be 0 or above".into()),
+    }
+}
+
+/// Returns the guide of a telescopic joint.
+fn guide_gear(joint: &Joint, guide: &GuideEntry, gear: &GearboxEntry) -> Result<(Gearbox, GearDamping), String> {
+    let others = gear.stiffness.is_some() || gear.backlash.is_some() || gear.curve.is_some();
+    if others || gear.hysteresis.is_some() || !gear.transmission_error.is_empty() {
+        return Err(
+            "guide takes the place of stiffness and of all other laws of a gearbox: keep guide and damping".into()
+        );
+    }
+    let (tubes, tilts) = guide.checked(joint)?;
+    let dampers = dampers(gear, tilts.len())?;
+    let gearbox = Gearbox { joint: joint.name.clone(), stiffness: GearStiffness::Guide(tubes) };
+    Ok((gearbox, GearDamping { dampers, curve: None, transmission: Vec::new(), hysteresis: None, tilts }))
 }

@@ -13,7 +13,8 @@ use flexarm_flexlink::{
 use flexarm_kinematics::{Coordinate, Data, ElasticAngles, ElasticGroup, Frame, MOST_COORDINATES, Model, mass_matrix};
 use flexarm_settings::Setting;
 use flexarm_stepping::{
-    Damping, FlexibleArm, Friction, GearCoupling, GeometricStiffness, PrescribedMotion, Servo, Spring, StepError,
+    Damping, FlexibleArm, Friction, GearCoupling, GeometricStiffness, PrescribedMotion, Servo, Spring, SpringCurve,
+    StepError,
 };
 use nalgebra::{DMatrix, DVector, Matrix6, Vector3};
 
@@ -22,6 +23,7 @@ use crate::caveat::size::Size;
 use crate::drive_entry::{DriveKind, ServoEntry};
 use crate::error::{Error, ModellingError, PoseError};
 use crate::gear_entry::{GearLaws, RobotCoupling};
+use crate::guide_entry::guide_law;
 use crate::mounting::RobotMounting;
 use crate::options::{DriveModel, LinkModel, Modelling};
 use crate::robot::{Robot, tcp_frame};
@@ -437,7 +439,7 @@ impl Robot {
 
         let mut owned = self.lumped_springs(&substituted);
         owned.extend(self.modal_springs(&links, &substituted));
-        owned.extend(self.gear_springs(&gears));
+        owned.extend(self.gear_springs(&gears, &model));
         let mounting = mounted.as_ref().map(|_| substituted.spans.len() - 1);
         owned.extend(mounted);
         let (springs, owners) = in_coordinate_order(&model, owned)?;
@@ -542,18 +544,26 @@ impl Robot {
     }
 
     /// Returns the springs of the gearboxes.
-    fn gear_springs(&self, gears: &[GearSpring]) -> Vec<OwnedSpring> {
+    fn gear_springs(&self, gears: &[GearSpring], model: &Model) -> Vec<OwnedSpring> {
         let mut owned = Vec::new();
         for gear in gears {
             let found = self.drives.iter().enumerate().find(|(_, drive)| drive.joint == gear.gearbox);
             let Some((number, Some((_, damping)))) = found.map(|(n, drive)| (n, &drive.gearbox)) else { continue };
-            let spring = Spring {
+            let mut spring = Spring {
                 name: gear.name.clone(),
                 K: gear.K.clone(),
                 damping: damping.of(gear.component, gear.K.nrows()),
-                curve: damping.curve.clone(),
+                curve: damping.curve.clone().map(SpringCurve::from),
                 geometric: None,
             };
+            let body = || model.bodies().iter().find(|body| body.joint == gear.gearbox);
+            let joint = || self.rigid.joint(&gear.gearbox);
+            if let (Some(tubes), Some(tilt)) = (self.drives[number].guide(), damping.tilts.get(gear.component))
+                && let (Some(body), Some(joint)) = (body(), joint())
+            {
+                let (law, stiffness) = guide_law(tubes, tilt, body, &joint.limits);
+                (spring.curve, spring.K) = (Some(law), DMatrix::from_element(1, 1, stiffness));
+            }
             owned.push(OwnedSpring { group: gear.joint.clone(), spring, owner: Owner::Drive(number) });
         }
         owned

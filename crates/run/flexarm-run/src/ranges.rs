@@ -35,6 +35,11 @@ pub(crate) const OF_ROBOT: Ranges = &[
     ("velocity_gain", Quantity::DAMPING),
     ("position_gain", Quantity::RATIO),
     ("sample_s", Quantity::TIME),
+    ("play.width", Quantity::TORQUE),
+    ("play.centre", Quantity::TORQUE),
+    ("gap", Quantity::LENGTH),
+    ("outer_end", Quantity::LENGTH),
+    ("inner_end", Quantity::LENGTH),
     ("width", Quantity::LENGTH),
     ("height", Quantity::LENGTH),
     ("wall", Quantity::LENGTH),
@@ -58,6 +63,7 @@ pub(crate) const OF_ROBOT: Ranges = &[
     ("sine.torque", Quantity::TORQUE),
     ("lead", Quantity::LENGTH),
     ("hold", Quantity::JOINT),
+    ("calibration.zero", Quantity::JOINT),
 ];
 
 /// Keys of a loads file.

@@ -10,6 +10,7 @@ use nalgebra::{Matrix3, Rotation3, Translation3, Vector3};
 use toml::Spanned;
 
 use crate::balancer_entry::add_balancers;
+use crate::calibration_entry::{Calibration, calibrate};
 use crate::caveat::{self, Caveat};
 use crate::controller_entry::{RobotAxis, controller_axes};
 use crate::drive_entry::{Drive, drives};
@@ -75,6 +76,8 @@ pub struct Robot {
     pub warnings: Vec<String>,
     /// Axes that the controller counts differently from the joints.
     pub controller: Vec<RobotAxis>,
+    /// Corrections of joint frames and joint zeros, which [`Self::rigid`] contains.
+    pub calibration: Vec<Calibration>,
     /// Caveats that can only be found in the text of the file.
     written: Vec<Caveat>,
     /// Last tree of the rigid robot, with the mechanism it was built from.
@@ -145,6 +148,7 @@ impl Robot {
             hold: Vec::new(),
             warnings: Vec::new(),
             controller: Vec::new(),
+            calibration: Vec::new(),
             written: Vec::new(),
             rigid_tree: Arc::default(),
         };
@@ -239,7 +243,7 @@ impl Robot {
     fn of_file(
         path: &Path,
         urdf_path: PathBuf,
-        urdf: UrdfRobot,
+        mut urdf: UrdfRobot,
         file: &RobotFile,
         source: &Source,
         options: &LoadOptions,
@@ -255,6 +259,8 @@ impl Robot {
         for (joint, lead) in &file.lead {
             keep(make_helical(&mut rigid, joint, lead, source).map_err(Error::from), &mut faults);
         }
+        let mechanisms = &mut [&mut rigid, &mut urdf.mechanism];
+        let calibration = calibrate(&file.calibration, mechanisms, source, &mut faults);
         for (joint, limit) in &file.effort_limit {
             keep(limit_effort(&mut rigid, joint, limit, source).map_err(Error::from), &mut faults);
         }
@@ -280,6 +286,7 @@ impl Robot {
             hold: Vec::new(),
             warnings: Vec::new(),
             controller: Vec::new(),
+            calibration,
             written: written_caveats(file),
             rigid_tree: Arc::default(),
         };

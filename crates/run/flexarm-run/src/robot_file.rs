@@ -13,6 +13,7 @@ pub(crate) use flexarm_linkmaker::MaterialEntry;
 
 use crate::balancer_entry::BalancerEntry;
 pub(crate) use crate::beam_entry::BeamEntry;
+use crate::calibration_entry::CalibrationEntry;
 use crate::controller_entry::ControllerAxisEntry;
 use crate::drive_entry::DriveEntry;
 use crate::gear_entry::CouplingEntry;
@@ -64,6 +65,9 @@ pub(crate) struct RobotFile {
     /// Helical joints: lead per turn (m), positive for right-handed threads.
     #[serde(default)]
     pub lead: std::collections::BTreeMap<String, Spanned<f64>>,
+    /// Corrections of joint frames and joint zeros.
+    #[serde(default)]
+    pub calibration: Vec<CalibrationEntry>,
     /// Elastic mounting of the base.
     pub mounting: Option<Spanned<MountingEntry>>,
     /// Flexible links.

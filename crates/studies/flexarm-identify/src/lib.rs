@@ -55,8 +55,12 @@ pub fn plant(arm: &Arm) -> Plant {
 
 /// Returns the identifiable parameters of an arm, with the names that files and `--fit` use.
 pub fn parameters(arm: &Arm) -> Vec<Parameter> {
-    let special =
-        |name: &str| parameters::is_direction(name) || parameters::is_entry(name) || parameters::is_tool(name);
+    let special = |name: &str| {
+        parameters::is_direction(name)
+            || parameters::is_entry(name)
+            || parameters::is_tool(name)
+            || parameters::is_frame(name)
+    };
     candidates_that(arm, |name| !special(name))
 }
 
@@ -76,6 +80,12 @@ pub fn link_entries(arm: &Arm) -> Vec<Parameter> {
 /// axes (m, rad).
 pub fn tcp_parameters(arm: &Arm) -> Vec<Parameter> {
     candidates_that(arm, parameters::is_tool)
+}
+
+/// Returns the displacements of the joint frames, `joint.JOINT.x` to `.roll`, and the zeros of the
+/// joints, `joint.JOINT.zero` (m, rad).
+pub fn frame_parameters(arm: &Arm) -> Vec<Parameter> {
+    candidates_that(arm, parameters::is_frame)
 }
 
 fn candidates_that(arm: &Arm, wanted: impl Fn(&str) -> bool) -> Vec<Parameter> {
@@ -186,7 +196,7 @@ impl Targets {
         let folder = self.robot.parent().unwrap_or(Path::new("."));
         // Relative paths from the new file need its folder to exist.
         std::fs::create_dir_all(folder).map_err(|source| Error::Write { path: folder.to_owned(), source })?;
-        let new = rewrite::rewritten(&text, &identified, robot.tcp(), home, folder)
+        let new = rewrite::rewritten(&text, &identified, robot.tcp(), &robot.calibration, home, folder)
             .map_err(|error| Error::File { path: robot.path.clone(), what: error.to_string() })?;
         (answer.file, answer.page) = (Some(self.robot.display().to_string()), Some(self.page.display().to_string()));
         let page = page::html(answer);

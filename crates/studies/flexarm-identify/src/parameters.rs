@@ -14,14 +14,19 @@
 //! | `drive.JOINT.gearbox.damping[k]` | one of three or six dampers, from 0 |
 //! | `link.LINK.damping` | modal ratio, `stiffness_beta` (s), or a factor on `rayleigh` |
 //! | `payload.mass` | mass of the payload (kg), its centre of mass fixed |
+//! | `drive.JOINT.gearbox.guide.AXIS.compliance[k]` | tilt of a telescopic joint about x, y or z |
+//! | `drive.JOINT.gearbox.guide.AXIS.play.gap` | its clearance (m); also `centre`, `width` (N m) |
+//! | `joint.JOINT.x`, `.y`, `.z`, `.yaw`, `.pitch`, `.roll` | shift and rotation of a joint frame |
+//! | `joint.JOINT.zero` | zero of a joint (rad; m if it slides) |
 
 use crate::estimation::{Effect, Parameter, Plant, SpringPart};
 use flexarm_flexlink::GearStiffness;
-use flexarm_kinematics::SpatialInertia;
-use flexarm_stepping::Damping;
-use nalgebra::{Matrix3, Matrix6, Vector3};
+use flexarm_kinematics::{JointMotion, SpatialInertia};
+use flexarm_stepping::{Damping, GuideTerm, SpringCurve};
+use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 
 use flexarm_run::FlexibleRobot;
+use flexarm_run::GuideTilt;
 use flexarm_run::Owner;
 use flexarm_run::Robot;
 use flexarm_run::RobotLink;
@@ -53,6 +58,10 @@ pub(crate) enum ParameterLocation {
     Mounting { entry: usize },
     /// `payload.mass`.
     Payload,
+    /// `[[drive]]` of the joint: number of its guide.
+    Guide { joint: String, axis: char, term: GuideTerm },
+    /// `[[calibration]]` of the joint: its zero, or a twist of its frame; `axis` is that of the joint.
+    Frame { joint: String, twist: Vector6<f64>, axis: Vector6<f64>, zero: bool },
 }
 
 /// A parameter and its location in the robot file.
@@ -76,7 +85,11 @@ pub(crate) fn candidates(robot: &Robot, flexible: &FlexibleRobot) -> Vec<Candida
             continue;
         }
         let slides = flexible.model.coordinates().iter().any(|c| c.joint == drive.joint && c.slides());
-        found.extend(gearbox_parameters(&drive.joint, &gearbox.stiffness, &springs, slides));
+        match &gearbox.stiffness {
+            GearStiffness::Guide(_) => found.extend(guide_parameters(&drive.joint, &damping.tilts, &springs, flexible)),
+            stiffness => found.extend(gearbox_parameters(&drive.joint, stiffness, &springs, slides)),
+        }
+        let slides = slides && drive.guide().is_none();
         found.extend(gearbox_damping(&drive.joint, damping.dampers.as_deref().unwrap_or_default(), &springs, slides));
     }
     for (number, span) in flexible.spans.iter().enumerate() {
@@ -116,6 +129,68 @@ pub(crate) fn candidates(robot: &Robot, flexible: &FlexibleRobot) -> Vec<Candida
     }
     if !found.is_empty() {
         found.extend(tool_parameters());
+        found.extend(frame_parameters(flexible));
+    }
+    found
+}
+
+/// Returns the numbers of the law of each tilt of a telescopic guide.
+fn guide_parameters(joint: &str, tilts: &[GuideTilt], springs: &[usize], flexible: &FlexibleRobot) -> Vec<Candidate> {
+    let mut found = Vec::new();
+    for (tilt, spring) in tilts.iter().zip(springs) {
+        let Some(guide) = flexible.springs[*spring].curve.as_ref().and_then(SpringCurve::guide) else { continue };
+        let (spring, axis, name) = (*spring, tilt.axis, format!("drive.{joint}.gearbox.guide.{}", tilt.axis));
+        let mut add = |key: &str, unit: &str, initial: f64, term: GuideTerm, size: f64| {
+            let effect = Effect::Guide { spring, term, size };
+            let written = ParameterLocation::Guide { joint: joint.to_owned(), axis, term };
+            found.push(Candidate::new(format!("{name}.{key}"), unit, initial, effect, written));
+        };
+        // An overlap of the usual size.
+        let overlap = 0.5 * guide.overlap[0].abs();
+        let compliance = guide.compliance(overlap);
+        for (k, unit) in ["rad/(N m)", "rad/N", "rad m/N"].into_iter().enumerate() {
+            let size = compliance * overlap.powi(k as i32);
+            add(&format!("compliance[{k}]"), unit, tilt.compliance[k], GuideTerm::Compliance(k), size);
+        }
+        if let Some(play) = tilt.play {
+            add("play.gap", "m", play.gap, GuideTerm::Gap, play.gap);
+            add("play.centre", "N m", play.centre, GuideTerm::Centre, play.width.max(play.centre.abs()));
+            add("play.width", "N m", play.width, GuideTerm::Width, play.width);
+        }
+    }
+    found
+}
+
+/// Default prior standard deviation of shifts (m) and rotations (rad) of joint frames.
+const FRAME_PRIOR: f64 = 3e-3;
+
+/// Returns the displacements of the joint frames, and the zeros of the joints. The rotations are in
+/// the order of roll, pitch and yaw as matrices multiply.
+fn frame_parameters(flexible: &FlexibleRobot) -> Vec<Candidate> {
+    let mut found = Vec::new();
+    let rigid = flexible.rigid.bodies().iter().map(|body| body.joint.as_str());
+    let of_robot: Vec<&str> = rigid.collect();
+    let bodies = flexible.model.bodies().iter().enumerate().skip(1);
+    for (body, own) in bodies.filter(|(_, own)| of_robot.contains(&own.joint.as_str())) {
+        let JointMotion::Axis(motion) = own.motion else { continue };
+        let (joint, axis) = (&own.joint, Vector6::from_row_slice(motion.column().as_slice()));
+        let mut add = |key: &str, unit: &str, twist: Vector6<f64>, zero: bool| {
+            let effect = Effect::Frame { body, twist, prior: FRAME_PRIOR };
+            let written = ParameterLocation::Frame { joint: joint.clone(), twist, axis, zero };
+            found.push(Candidate::new(format!("{FRAME}.{joint}.{key}"), unit, 0.0, effect, written));
+        };
+        for (k, (key, unit)) in [
+            (0, ("x", "m")),
+            (1, ("y", "m")),
+            (2, ("z", "m")),
+            (5, ("yaw", "rad")),
+            (4, ("pitch", "rad")),
+            (3, ("roll", "rad")),
+        ] {
+            add(key, unit, Vector6::ith(k, 1.0), false);
+        }
+        let unit = if motion.slides() { "m" } else { "rad" };
+        add("zero", unit, axis, true);
     }
     found
 }
@@ -275,6 +350,7 @@ pub fn asks_for(pattern: &str, name: &str) -> bool {
         _ if is_direction(name) => pattern.contains(DIRECTIONS),
         _ if is_entry(name) => pattern.contains("]["),
         _ if is_tool(name) => pattern.starts_with("tcp"),
+        _ if is_frame(name) => pattern.starts_with(FRAME),
         _ => true,
     };
     by_name && fits(pattern, name)
@@ -288,6 +364,14 @@ pub(crate) fn is_entry(name: &str) -> bool {
 /// Whether the name is that of the position or orientation of the tool.
 pub(crate) fn is_tool(name: &str) -> bool {
     name.starts_with("tcp.")
+}
+
+/// First word of the names of displacements of joint frames.
+const FRAME: &str = "joint";
+
+/// Whether the name is that of a displacement of a joint frame.
+pub(crate) fn is_frame(name: &str) -> bool {
+    name.strip_prefix(FRAME).is_some_and(|rest| rest.starts_with('.'))
 }
 
 /// Whether the name is that of a damping: of a gearbox, one of its dampers, or a link.

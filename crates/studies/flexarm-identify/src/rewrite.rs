@@ -3,9 +3,12 @@
 use std::path::Path;
 
 use crate::estimation::ParameterEstimate;
+use crate::estimation::parameter::displacement;
 use flexarm_kinematics::Pose;
+use flexarm_run::Calibration;
+use flexarm_stepping::GuideTerm;
 use nalgebra::{Matrix6, Rotation3, Translation3, Vector3};
-use toml_edit::{Array, DocumentMut, InlineTable, Item, Table, TableLike, Value};
+use toml_edit::{Array, ArrayOfTables, DocumentMut, InlineTable, Item, Table, TableLike, Value};
 
 use super::parameters::ParameterLocation;
 
@@ -32,12 +35,14 @@ pub(super) enum RewriteError {
 /// its standard deviation.
 ///
 /// * `tool`: link of the tool and its present pose in the link.
+/// * `calibrations`: corrections of joint frames in the old file.
 /// * `home`: folder of the old file; `to`: folder of the new file. Relative paths in the file are
 ///   rewritten if they differ.
 pub(super) fn rewritten(
     text: &str,
     found: &[(ParameterEstimate, ParameterLocation)],
     tool: (&str, &Pose),
+    calibrations: &[Calibration],
     home: &Path,
     to: &Path,
 ) -> Result<String, RewriteError> {
@@ -46,6 +51,7 @@ pub(super) fn rewritten(
         put(&mut file, parameter, written)?;
     }
     put_tool(&mut file, found, tool)?;
+    put_frames(&mut file, found, calibrations)?;
     if home != to {
         moved_paths(&mut file, home, to);
     }
@@ -84,7 +90,11 @@ fn put(file: &mut DocumentMut, found: &ParameterEstimate, written: &ParameterLoc
                 expected: "a 6x6 matrix",
             })
         }
-        ParameterLocation::Tool { .. } => Ok(()),
+        ParameterLocation::Tool { .. } | ParameterLocation::Frame { .. } => Ok(()),
+        ParameterLocation::Guide { joint, axis, term } => {
+            put_guide(named(file, "drive", "joint", joint)?, *axis, *term, number)
+                .ok_or_else(|| RewriteError::NoGearbox { joint: joint.clone(), key: "guide" })
+        }
         ParameterLocation::Mounting { entry } => {
             let mounting = file.get_mut("mounting").and_then(Item::as_table_like_mut);
             let stiffness = mounting.and_then(|mounting| mounting.get_mut("stiffness"));
@@ -249,6 +259,84 @@ fn put_tool(
         entry.insert("rpy", toml_edit::value(list([roll, pitch, yaw])));
     }
     Ok(())
+}
+
+/// Writes the corrections of joint frames: those of the old file followed by the identified ones.
+fn put_frames(
+    file: &mut DocumentMut,
+    found: &[(ParameterEstimate, ParameterLocation)],
+    calibrations: &[Calibration],
+) -> Result<(), RewriteError> {
+    let mut corrections: Vec<(Calibration, Pose)> = Vec::new();
+    for (parameter, written) in found {
+        let ParameterLocation::Frame { joint, twist, axis, zero } = written else { continue };
+        let at = corrections.iter().position(|(own, _)| own.joint == *joint).unwrap_or_else(|| {
+            let old = calibrations.iter().find(|old| old.joint == *joint).cloned();
+            let old = old.unwrap_or(Calibration { joint: joint.clone(), frame: Pose::identity(), zero: 0.0 });
+            // The old zero acts after the old frame and before the identified corrections.
+            let turned = displacement(&(axis * old.zero));
+            corrections.push((old, turned));
+            corrections.len() - 1
+        });
+        let (own, turned) = &mut corrections[at];
+        match zero {
+            true => own.zero += parameter.value,
+            false => own.frame = own.frame * *turned * displacement(&(twist * parameter.value)) * turned.inverse(),
+        }
+    }
+    for (Calibration { joint, frame, zero }, _) in corrections {
+        let entry = calibration_of(file, &joint)?;
+        let list = |values: [f64; 3]| values.map(|x| (x * 1e9).round() / 1e9).into_iter().collect::<Array>();
+        let (roll, pitch, yaw) = frame.rotation.euler_angles();
+        for (key, values) in [("xyz", frame.translation.vector.into()), ("rpy", [roll, pitch, yaw])] {
+            if values != [0.0; 3] {
+                entry.insert(key, toml_edit::value(list(values)));
+            }
+        }
+        if zero != 0.0 {
+            entry.insert("zero", toml_edit::value((zero * 1e9).round() / 1e9));
+        }
+    }
+    Ok(())
+}
+
+/// Returns the `[[calibration]]` of a joint, a new one if the file has none.
+fn calibration_of<'a>(file: &'a mut DocumentMut, joint: &str) -> Result<&'a mut dyn TableLike, RewriteError> {
+    if named(file, "calibration", "joint", joint).is_err() {
+        let mut table = Table::new();
+        table.insert("joint", toml_edit::value(joint));
+        let list = file.entry("calibration").or_insert_with(|| Item::ArrayOfTables(ArrayOfTables::new()));
+        match list {
+            Item::ArrayOfTables(tables) => tables.push(table),
+            Item::Value(Value::Array(values)) => values.push(table.into_inline_table()),
+            _ => return Err(RewriteError::Form { what: "calibration".into(), expected: "a list of tables" }),
+        }
+    }
+    named(file, "calibration", "joint", joint)
+}
+
+/// Sets a number of the guide of a drive.
+fn put_guide(drive: &mut dyn TableLike, axis: char, term: GuideTerm, number: f64) -> Option<()> {
+    let gearbox = drive.get_mut("gearbox")?.as_table_like_mut()?;
+    let guide = gearbox.get_mut("guide")?.as_table_like_mut()?;
+    let tilt = guide.get_mut(&axis.to_string())?.as_table_like_mut()?;
+    let key = match term {
+        GuideTerm::Compliance(k) => {
+            replace(tilt.get_mut("compliance")?.as_array_mut()?.get_mut(k)?, number);
+            return Some(());
+        }
+        GuideTerm::Gap => "gap",
+        GuideTerm::Centre => "centre",
+        GuideTerm::Width => "width",
+    };
+    let play = tilt.get_mut("play")?.as_table_like_mut()?;
+    match play.get_mut(key).and_then(Item::as_value_mut) {
+        Some(old) => replace(old, number),
+        None => {
+            play.insert(key, toml_edit::value(number));
+        }
+    }
+    Some(())
 }
 
 /// Sets the damping of a gearbox, or one entry of it.

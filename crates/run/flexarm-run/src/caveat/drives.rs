@@ -100,6 +100,7 @@ fn stiffness(drive: &Drive) -> Option<(f64, Option<f64>)> {
             let least = |r: std::ops::Range<usize>| r.map(|i| K[(i, i)]).fold(f64::INFINITY, f64::min);
             Some((least(3..6), Some(least(0..3))))
         }
+        GearStiffness::Guide(_) => None,
     }
 }
 

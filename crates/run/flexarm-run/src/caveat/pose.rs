@@ -49,7 +49,7 @@ impl ArmAtRest<'_> {
             let drive = &self.robot.drives[*k];
             let joint = self.robot.rigid.joints.iter().find(|j| j.name == drive.joint);
             let effort = joint.map_or(f64::INFINITY, |j| j.limits.effort);
-            let slides = joint.is_some_and(|j| j.kind.slides());
+            let slides = joint.is_some_and(|j| j.kind.slides()) && drive.guide().is_none();
             let e = &self.elastic[self.arm.offset(element)..][..element.size];
             let norm = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>().sqrt();
             let (along, turned) = match (element.size, slides) {

@@ -78,7 +78,8 @@ impl RunLoop<'_> {
             joint: drive.joint.clone(),
             peak_contribution_m: moved.peak_m,
             peak_deflection_rad: *deflection,
-            slides: self.arm.model.coordinates().iter().any(|c| c.joint == drive.joint && c.slides()),
+            slides: drive.guide().is_none()
+                && self.arm.model.coordinates().iter().any(|c| c.joint == drive.joint && c.slides()),
         });
         figures.collect()
     }
@@ -147,7 +148,7 @@ impl RunLoop<'_> {
         let elastic = drives.filter(|(k, _)| self.flexible.owners.contains(&Owner::Drive(*k)));
         let found = elastic.flat_map(|(_, (drive, give))| {
             let joint = coordinates.iter().find(|c| c.joint == drive.joint);
-            let slides = joint.is_some_and(|c| c.slides());
+            let slides = joint.is_some_and(|c| c.slides()) && drive.guide().is_none();
             let [turned, moved] = if slides { [0.0, *give] } else { [*give, 0.0] };
             let effort = joint.map_or(f64::INFINITY, |c| c.limits.effort);
             drives::give(drive, effort, (turned - drive.backlash).max(0.0), moved, 2.0)

@@ -14,7 +14,7 @@ mod encoders;
 mod identify;
 mod least_squares;
 mod measurement;
-mod parameter;
+pub(crate) mod parameter;
 mod plan;
 mod reading;
 mod response;

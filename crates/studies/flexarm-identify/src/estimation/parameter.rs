@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use flexarm_kinematics::{Frame, Model, Pose, SpatialInertia};
-use flexarm_stepping::{Damping, FlexibleArm, GearCoupling, Held, Spring, StepError};
-use nalgebra::{DMatrix, Matrix3, Rotation3, Translation3, Vector3};
+use flexarm_stepping::{Damping, FlexibleArm, GearCoupling, GuideTerm, Held, Spring, SpringCurve, StepError};
+use nalgebra::{DMatrix, Matrix3, Rotation3, Translation3, Vector3, Vector6};
 
 /// Model of an arm: tree, springs in coordinate order, tool.
 #[derive(Clone, Debug)]
@@ -64,6 +64,26 @@ pub enum Effect {
         /// Coordinate of the spring, from 0.
         coordinate: usize,
     },
+    /// Number of the law of a telescopic guide. The search coordinate is its change.
+    Guide {
+        /// Number of the spring.
+        spring: usize,
+        /// Number of the law.
+        term: GuideTerm,
+        /// Scale of the number, in its unit.
+        size: f64,
+    },
+    /// Displacement of the joint frame of a body along a twist in its own axes, linear part first
+    /// (m, rad): `X_PJ exp`. Displacements of one body follow each other in the order of the
+    /// parameters.
+    Frame {
+        /// Number of the body.
+        body: usize,
+        /// Twist per unit of the search coordinate.
+        twist: Vector6<f64>,
+        /// Default prior standard deviation (m, rad).
+        prior: f64,
+    },
     /// Mass (kg) on a body, with inertia proportional to it: `per_kg` about Bo, B axes.
     Mass {
         /// Number of the body.
@@ -102,6 +122,8 @@ impl Parameter {
             Effect::Stiffness(_) | Effect::Damping(_) | Effect::Damper { .. } => std::f64::consts::LN_2,
             Effect::Entry { size, .. } => 0.5 * size,
             Effect::Tool(_) => 0.01,
+            Effect::Guide { size, .. } => 0.5 * size,
+            Effect::Frame { prior, .. } => *prior,
             Effect::Mass { .. } => (0.5 * self.initial.abs()).max(1.0),
         }
     }
@@ -151,6 +173,16 @@ impl Plant {
                     *K += entry_slope(K.nrows(), *row, *column, factor * x);
                 }
                 Effect::Tool(_) => {}
+                Effect::Guide { spring, term, .. } => {
+                    let spring = &mut plant.springs[*spring];
+                    if let Some(SpringCurve::Guide(guide)) = &mut spring.curve {
+                        *guide = guide.with(*term, *x);
+                    }
+                }
+                Effect::Frame { body, twist, .. } => {
+                    let moved = plant.model.bodies()[*body].X_PJ * displacement(&(twist * *x));
+                    Arc::make_mut(&mut plant.model).set_joint_frame(*body, moved);
+                }
                 Effect::Mass { body, per_kg } => plant = plant.carrying(*body, &scaled(per_kg, *x)),
             }
         }
@@ -180,6 +212,12 @@ impl Plant {
             None => Ok(arm),
         }
     }
+}
+
+/// Returns the displacement by a translation (m) and a rotation vector (rad).
+pub(crate) fn displacement(twist: &Vector6<f64>) -> Pose {
+    let [linear, angular] = [twist.fixed_rows::<3>(0), twist.fixed_rows::<3>(3)];
+    Pose::from_parts(Translation3::from(linear.into_owned()), Rotation3::new(angular.into_owned()))
 }
 
 /// Returns displacement (m) and rotation vector (rad) of the tool in its own axes at given search

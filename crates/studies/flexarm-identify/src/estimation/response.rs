@@ -19,7 +19,7 @@ use flexarm_stepping::{Damping, FlexibleArm, OperatingPoint, StepError, Tangents
 use nalgebra::{Complex, DMatrix, DVector, RowDVector, Vector3};
 
 use crate::estimation::parameter::{Effect, Parameter, Plant, entry_slope, slope_of};
-use crate::estimation::sensitivity::{along, eigen, explicit, force_slopes};
+use crate::estimation::sensitivity::{FRAME_STEP, along, eigen, explicit, force_slopes, frames_beside};
 
 /// Relative distance between squared frequencies below which the shapes of the two modes are not
 /// determined.
@@ -143,7 +143,14 @@ pub fn structure_slopes(
         let (eK, eM) = explicit(&arm, &plant.tool, &none, &parameter.effect, &q, &here);
         let (K, M) = (&change[0] + eK, &change[1] + eM);
         let D = damped.slope(&parameter.effect, &K, &M);
-        let rows = change[2..].iter().map(|row| RowDVector::from_row_slice(row.as_slice())).collect();
+        let mut rows: Vec<RowDVector<f64>> =
+            change[2..].iter().map(|row| RowDVector::from_row_slice(row.as_slice())).collect();
+        if let Effect::Frame { body, twist, .. } = &parameter.effect {
+            let [ahead, behind] = frames_beside(&arm, *body, twist).map(|arm| self::rows(&arm, probes, &q));
+            for ((row, up), down) in rows.iter_mut().zip(ahead).zip(behind) {
+                *row += (up - down) / (2.0 * FRAME_STEP);
+            }
+        }
         slopes.push(Structure { M, D, K, rows });
     }
     let rows = rows(&arm, probes, &q);
@@ -258,7 +265,11 @@ impl Damped<'_> {
                     let own = *spring == number && self.arm.coupled_damping_slope(number).is_none();
                     damper = own.then_some(*coordinate);
                 }
-                Effect::Entry { .. } | Effect::Tool(_) | Effect::Mass { .. } => {}
+                Effect::Guide { .. }
+                | Effect::Frame { .. }
+                | Effect::Entry { .. }
+                | Effect::Tool(_)
+                | Effect::Mass { .. } => {}
             }
             let first = self.arm.offset(e);
             SpringSlope { first, size: e.size, K: e.K.clone(), dK, damping: e.damping, more, damper }

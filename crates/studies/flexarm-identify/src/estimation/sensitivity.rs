@@ -8,12 +8,19 @@
 //! explicit parts of dK/dx and dM/dx are exact; the parts due to the change of the equilibrium are
 //! central differences of fourth order of the analytic tangents along de/dx.
 
-use flexarm_kinematics::{Frame, Wrench};
-use flexarm_stepping::{FlexibleArm, OperatingPoint, StepError, Tangents};
-use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX, SymmetricEigen};
+use std::sync::Arc;
 
-use crate::estimation::parameter::{Effect, Parameter, Plant, entry_slope, scaled, slope_of};
+use flexarm_kinematics::{Data, Frame, Wrench, forward_kinematics, rotation_vector};
+use flexarm_stepping::{FlexibleArm, OperatingPoint, SpringCurve, StepError, Tangents};
+use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX, SymmetricEigen, Vector6};
 
+use crate::estimation::parameter::{Effect, Parameter, Plant, displacement, entry_slope, scaled, slope_of};
+
+/// Step of the central differences over displacements of joint frames (m, rad): the error is of the
+/// order of its square.
+pub(crate) const FRAME_STEP: f64 = 1e-5;
+/// Step of the central differences of a guide's slope, as a fraction of the number's scale.
+const GUIDE_STEP: f64 = 1e-4;
 /// Step of the central differences: maximum change of an elastic coordinate per step (m, rad).
 const DIFFERENCE: f64 = 1e-3;
 
@@ -38,7 +45,7 @@ pub(crate) fn force_slopes(at: &mut OperatingPoint, parameters: &[Parameter]) ->
                     let turned = arm.deflection(place.spring, e[first], at.coordinates().as_slice());
                     let e = if element.size == 1 { &[turned] } else { &e[first..first + element.size] };
                     let f = match &element.curve {
-                        Some(_) => element.spring_force(e),
+                        Some(curve) => DVector::from_element(1, curve.torque(e[0], at.coordinates().as_slice())),
                         None => slope_of(&element.K, place.coordinate) * DVector::from_column_slice(e),
                     };
                     for (i, f) in f.iter().enumerate() {
@@ -57,6 +64,24 @@ pub(crate) fn force_slopes(at: &mut OperatingPoint, parameters: &[Parameter]) ->
             // Damping exerts no force at rest; for a moved tool the caller accounts for payload and
             // load.
             Effect::Damping(_) | Effect::Damper { .. } | Effect::Tool(_) => {}
+            Effect::Guide { spring, term, .. } => {
+                let element = &at.arm().elements[*spring];
+                if let Some(guide) = element.curve.as_ref().and_then(SpringCurve::guide) {
+                    let q = at.coordinates().as_slice();
+                    let torque = guide.torque_slope(*term, q[element.coordinate], q);
+                    slopes[(at.arm().offset(element), k)] += torque;
+                }
+            }
+            Effect::Frame { body, twist, .. } => {
+                let [ahead, behind] = frames_beside(at.arm(), *body, twist);
+                let [mut up, mut down] = [DVector::zeros(n), DVector::zeros(n)];
+                at.forces_of(&ahead, &mut up);
+                at.forces_of(&behind, &mut down);
+                slopes.set_column(k, &((up - down) / (2.0 * FRAME_STEP)));
+                // The poses are those of the arm again.
+                let arm = at.arm().clone();
+                at.forces_of(&arm, &mut DVector::zeros(n));
+            }
             Effect::Mass { body, per_kg } => {
                 // Forces are linear in a mass: a difference of any size is exact.
                 let (mut with, mut without) = (DVector::zeros(n), DVector::zeros(n));
@@ -90,7 +115,37 @@ fn carrying(arm: &FlexibleArm, body: usize, per_kg: &flexarm_kinematics::Spatial
 pub fn tool_slopes(at: &mut OperatingPoint, parameters: &[Parameter]) -> Result<Matrix6xX<f64>, StepError> {
     let forces = force_slopes(at, parameters)?;
     let moved = at.yielding().tr_mul(&forces);
-    Ok(Matrix6xX::from_fn(parameters.len(), |i, j| -moved[(i, j)]))
+    let mut V = Matrix6xX::from_fn(parameters.len(), |i, j| -moved[(i, j)]);
+    for (mut V, parameter) in V.column_iter_mut().zip(parameters) {
+        if let Effect::Frame { body, twist, .. } = &parameter.effect {
+            V += rigid_slope(at, *body, twist);
+        }
+    }
+    Ok(V)
+}
+
+/// Returns the arm with the joint frame of a body displaced by [`FRAME_STEP`] along a twist and
+/// against it.
+pub(crate) fn frames_beside(arm: &FlexibleArm, body: usize, twist: &Vector6<f64>) -> [FlexibleArm; 2] {
+    [FRAME_STEP, -FRAME_STEP].map(|step| {
+        let mut arm = arm.clone();
+        let X_PJ = arm.model.bodies()[body].X_PJ * displacement(&(twist * step));
+        Arc::make_mut(&mut arm.model).set_joint_frame(body, X_PJ);
+        arm
+    })
+}
+
+/// Returns the twist of the tool (world axes, at its origin) per unit of a displacement of a joint
+/// frame, with all coordinates held.
+fn rigid_slope(at: &OperatingPoint, body: usize, twist: &Vector6<f64>) -> Vector6<f64> {
+    let [ahead, behind] = frames_beside(at.arm(), body, twist).map(|moved| {
+        let mut data = Data::new(&moved.model);
+        forward_kinematics(&moved.model, &mut data, at.coordinates());
+        data.X_WF(at.tool())
+    });
+    let turned = rotation_vector((ahead.rotation * behind.rotation.inverse()).matrix());
+    let moved = ahead.translation.vector - behind.translation.vector;
+    Vector6::from_iterator(moved.iter().chain(&turned).map(|x| x / (2.0 * FRAME_STEP)))
 }
 
 /// Natural frequencies of an arm with locked drives, and their derivatives.
@@ -271,6 +326,20 @@ pub(crate) fn explicit(
             (dK, DMatrix::zeros(n, n))
         }
         Effect::Damping(_) | Effect::Damper { .. } | Effect::Tool(_) => (DMatrix::zeros(n, n), DMatrix::zeros(n, n)),
+        Effect::Guide { spring, term, size } => {
+            let mut dK = DMatrix::zeros(n, n);
+            let element = &arm.elements[*spring];
+            if let Some(guide) = element.curve.as_ref().and_then(SpringCurve::guide) {
+                let (k, h, q) = (arm.offset(element), GUIDE_STEP * size, q.as_slice());
+                let slope = |change: f64| guide.with(*term, change).slope(q[element.coordinate], q);
+                dK[(k, k)] = (slope(h) - slope(-h)) / (2.0 * h);
+            }
+            (dK, DMatrix::zeros(n, n))
+        }
+        Effect::Frame { body, twist, .. } => {
+            let [ahead, behind] = frames_beside(arm, *body, twist).map(|arm| Tangents::at(&arm, tool, F_T_W, q));
+            ((ahead.K - behind.K) / (2.0 * FRAME_STEP), (ahead.M - behind.M) / (2.0 * FRAME_STEP))
+        }
         Effect::Mass { body, per_kg } => {
             let heavier = Tangents::at(&carrying(arm, *body, per_kg), tool, F_T_W, q);
             (heavier.K - &here.K, heavier.M - &here.M)

@@ -139,6 +139,8 @@ fn direction(arm: &FlexibleArm, parameter: &RunParameter) -> Direction {
             Effect::Tool(axis @ 0..3) => direction.tool = Vector3::ith(*axis, 1.0),
             // A rotation of the tool about its origin does not change its position error.
             Effect::Damping(_) | Effect::Damper { .. } | Effect::Tool(_) => {}
+            // Runs with a guide have no derivatives, and calibrated frames move both arms.
+            Effect::Guide { .. } | Effect::Frame { .. } => {}
             Effect::Mass { body, per_kg } => direction.inertias.push((*body, *per_kg)),
         },
         RunParameter::Joint(k) => {
