@@ -486,6 +486,9 @@ impl Model {
     pub fn set_joint_frame(&mut self, body: usize, X_PJ: Pose) {
         let body = &mut self.bodies[body];
         body.is_parallel = X_PJ.rotation == Rotation3::identity();
+        if let JointMotion::Axis(motion) = body.motion {
+            body.turn = RevoluteTable::new(&X_PJ, &motion.axis());
+        }
         body.X_PJ = X_PJ;
     }
 

@@ -52,6 +52,13 @@ pub enum GuideTerm {
 /// Maximum number of iterations for the moment; halving the bracket alone needs 60.
 const MOST_ITERATIONS: usize = 100;
 
+impl GuideTerm {
+    /// Whether the number is positive in every law.
+    pub fn is_positive(self) -> bool {
+        matches!(self, Self::Gap | Self::Width)
+    }
+}
+
 impl Guide {
     /// Returns the overlap (m) with the joints at `q`.
     pub fn overlap(&self, q: &[f64]) -> f64 {
@@ -81,6 +88,17 @@ impl Guide {
             (_, None) => {}
         }
         self
+    }
+
+    /// Returns one of the numbers of the law; 0 for those of a missing play.
+    pub fn number(&self, term: GuideTerm) -> f64 {
+        let play = |of: fn(&Play) -> f64| self.play.as_ref().map_or(0.0, of);
+        match term {
+            GuideTerm::Compliance(k) => self.compliance[k],
+            GuideTerm::Gap => play(|play| play.gap),
+            GuideTerm::Centre => play(|play| play.centre),
+            GuideTerm::Width => play(|play| play.width),
+        }
     }
 
     /// Returns the tilt (rad) under a moment (N m), equation (1), and its derivative.

@@ -163,6 +163,7 @@ fn text(found: &Identification) -> String {
         let (value, part) = match p.identifiable {
             true if p.std.is_nan() => (number(p.value), "no fit".to_owned()),
             true => (number(p.value), part_of(p.std, p.value, p.initial)),
+            false if p.value != p.initial => (number(p.value), "with others".to_owned()),
             false => ("undetermined".to_owned(), String::new()),
         };
         t.add_row(vec![p.name.clone(), number(p.initial), value, deviation(p.std), part, p.unit.clone()]);

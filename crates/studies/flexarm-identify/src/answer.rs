@@ -89,7 +89,8 @@ pub struct FittedParameter {
     pub unit: String,
     /// Initial value.
     pub initial: f64,
-    /// Estimated value; the initial value if the parameter is not identifiable.
+    /// Estimated value; the initial value if the parameter is not identifiable. A displacement of a
+    /// joint frame always has the value found, since others may replace it.
     pub value: f64,
     /// Standard deviation; NaN (null in JSON) if the parameter is not identifiable or the model
     /// does not fit the readings.
@@ -102,7 +103,7 @@ pub struct FittedParameter {
 
 impl FittedParameter {
     fn of(found: &ParameterEstimate) -> Self {
-        let ParameterEstimate { name, unit, initial, value, std, interval, identifiable } = found.clone();
+        let ParameterEstimate { name, unit, initial, value, std, interval, identifiable, .. } = found.clone();
         Self { name, unit, initial, value, std, interval, identifiable }
     }
 }

@@ -32,8 +32,24 @@ pub(super) fn chosen(arm: &Arm, input: &MeasurementInput, fit: &[String]) -> Res
     if let Some((entry, factor)) = said_twice(&chosen) {
         return Err(IdentifyFileError::Twice { entry, factor }.into());
     }
+    for (pattern, place) in &input.tie {
+        tie(&mut chosen, pattern).map_err(|message| at_place(place, format!("tie {pattern:?}: {message}")))?;
+    }
     set_priors(&mut chosen, input, &all)?;
     Ok(chosen)
+}
+
+/// Gives all parameters that match a pattern one value, under the name of the pattern.
+fn tie(chosen: &mut Vec<Candidate>, pattern: &str) -> Result<(), String> {
+    let (matching, others): (Vec<_>, Vec<_>) =
+        std::mem::take(chosen).into_iter().partition(|c| parameters::fits(pattern, &c.parameter.name));
+    *chosen = others;
+    let mut matching = matching.into_iter();
+    let mut first = matching.next().ok_or("no parameter that is fitted matches it")?;
+    matching.try_for_each(|other| first.tie(&other))?;
+    pattern.clone_into(&mut first.parameter.name);
+    chosen.push(first);
+    Ok(())
 }
 
 /// Returns the names of parameters for messages; of each matrix only the first entry is listed.

@@ -58,13 +58,25 @@ pub(super) fn caveats(found: &Identified) -> Vec<Caveat> {
             "fit more parameters, and check the largest residuals",
         ));
     }
-    for parameter in found.parameters.iter().filter(|p| !p.identifiable) {
+    for parameter in found.parameters.iter().filter(|p| !p.identifiable && !p.shared) {
         let text = format!("these readings do not determine {}: it keeps its initial value", parameter.name);
         caveats.push(Caveat::from_message(
             "not-identifiable",
             "measurements",
             text,
             "add readings at the poses of a measurement plan",
+        ));
+    }
+    if let Some(ratio) = found.kept_scatter {
+        let text = format!(
+            "with the parameters that are not determined at their initial values, the readings scatter {ratio:.1} times as \
+             much as about the fit: the values written do not explain them as well as the fit does"
+        );
+        caveats.push(Caveat::from_message(
+            "kept-parameters",
+            "measurements",
+            text,
+            "add readings that separate them, or fit fewer of them (fit, keep, tie)",
         ));
     }
     if let Some(held) = found.held_out.as_ref().filter(|held| held.rms > held.rms_initial) {

@@ -188,9 +188,11 @@ impl Targets {
         found: &Identified,
         answer: &mut Identification,
     ) -> Result<(), Error> {
-        let identified = found.parameters.iter().zip(chosen).filter(|(p, _)| p.identifiable);
+        let identified = found.parameters.iter().zip(chosen);
+        let identified = identified.filter(|(p, _)| p.identifiable || p.shared);
+        let places = |c: &parameters::Candidate| std::iter::once(c.written.clone()).chain(c.tied.clone());
         let identified: Vec<(ParameterEstimate, ParameterLocation)> =
-            identified.map(|(p, c)| (p.clone(), c.written.clone())).collect();
+            identified.flat_map(|(p, c)| places(c).map(|place| (p.clone(), place))).collect();
         let text = flexarm_files::read_text(&robot.path)?;
         let home = robot.path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
         let folder = self.robot.parent().unwrap_or(Path::new("."));

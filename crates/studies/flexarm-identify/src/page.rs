@@ -83,6 +83,7 @@ fn parameters(answer: &Identification) -> String {
     for p in &answer.parameters {
         let (class, value) = match p.identifiable {
             true => ("", number(p.value)),
+            false if p.value != p.initial => (" class=\"no\"", format!("{} (only with others)", number(p.value))),
             false => (" class=\"no\"", "not identifiable: initial value".to_owned()),
         };
         let _ = writeln!(

@@ -69,6 +69,8 @@ pub(crate) enum ParameterLocation {
 pub(crate) struct Candidate {
     pub(crate) parameter: Parameter,
     pub(crate) written: ParameterLocation,
+    /// Locations of other parameters with the same value.
+    pub(crate) tied: Vec<ParameterLocation>,
 }
 
 /// Returns all parameters of an arm, in the order of drives, links, tool and payload.
@@ -141,7 +143,7 @@ fn guide_parameters(joint: &str, tilts: &[GuideTilt], springs: &[usize], flexibl
         let Some(guide) = flexible.springs[*spring].curve.as_ref().and_then(SpringCurve::guide) else { continue };
         let (spring, axis, name) = (*spring, tilt.axis, format!("drive.{joint}.gearbox.guide.{}", tilt.axis));
         let mut add = |key: &str, unit: &str, initial: f64, term: GuideTerm, size: f64| {
-            let effect = Effect::Guide { spring, term, size };
+            let effect = Effect::Guide { springs: vec![spring], term, size };
             let written = ParameterLocation::Guide { joint: joint.to_owned(), axis, term };
             found.push(Candidate::new(format!("{name}.{key}"), unit, initial, effect, written));
         };
@@ -161,8 +163,10 @@ fn guide_parameters(joint: &str, tilts: &[GuideTilt], springs: &[usize], flexibl
     found
 }
 
-/// Default prior standard deviation of shifts (m) and rotations (rad) of joint frames.
+/// Default prior standard deviations of shifts (m) and rotations (rad) of joint frames, and of the
+/// zeros of joints.
 const FRAME_PRIOR: f64 = 3e-3;
+const ZERO_PRIOR: f64 = 1e-2;
 
 /// Returns the displacements of the joint frames, and the zeros of the joints. The rotations are in
 /// the order of roll, pitch and yaw as matrices multiply.
@@ -175,7 +179,7 @@ fn frame_parameters(flexible: &FlexibleRobot) -> Vec<Candidate> {
         let JointMotion::Axis(motion) = own.motion else { continue };
         let (joint, axis) = (&own.joint, Vector6::from_row_slice(motion.column().as_slice()));
         let mut add = |key: &str, unit: &str, twist: Vector6<f64>, zero: bool| {
-            let effect = Effect::Frame { body, twist, prior: FRAME_PRIOR };
+            let effect = Effect::Frame { body, twist, prior: if zero { ZERO_PRIOR } else { FRAME_PRIOR } };
             let written = ParameterLocation::Frame { joint: joint.clone(), twist, axis, zero };
             found.push(Candidate::new(format!("{FRAME}.{joint}.{key}"), unit, 0.0, effect, written));
         };
@@ -196,10 +200,38 @@ fn frame_parameters(flexible: &FlexibleRobot) -> Vec<Candidate> {
 }
 
 impl Candidate {
+    /// Adds another parameter that has the same value.
+    ///
+    /// # Errors
+    /// A message if the two have different laws or initial values.
+    pub(crate) fn tie(&mut self, other: &Self) -> Result<(), String> {
+        let (own, others) = (&mut self.parameter, &other.parameter);
+        if (own.initial - others.initial).abs() > 1e-9 * own.initial.abs() {
+            return Err(format!(
+                "{} = {}, {} = {}: give them one value in the robot file",
+                own.name, own.initial, others.name, others.initial
+            ));
+        }
+        match (&mut own.effect, &others.effect) {
+            (Effect::Stiffness(places), Effect::Stiffness(more)) => places.extend(more),
+            (Effect::Guide { springs, term, .. }, Effect::Guide { springs: more, term: same, .. }) if term == same => {
+                springs.extend(more);
+            }
+            _ => {
+                return Err(format!(
+                    "{} and {} cannot have one value: expected stiffnesses, or one number of guides",
+                    own.name, others.name
+                ));
+            }
+        }
+        self.tied.push(other.written.clone());
+        Ok(())
+    }
+
     fn new(name: String, unit: &str, initial: f64, effect: Effect, written: ParameterLocation) -> Self {
         let mut parameter = Parameter { name, unit: unit.into(), initial, prior: 1.0, effect };
         parameter.prior = parameter.reference();
-        Self { parameter, written }
+        Self { parameter, written, tied: Vec::new() }
     }
 }
 

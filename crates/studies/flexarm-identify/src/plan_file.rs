@@ -291,6 +291,7 @@ fn nothing_measured() -> super::MeasurementInput {
         targets: Vec::new(),
         fit: Vec::new(),
         keep: Vec::new(),
+        tie: Vec::new(),
         uncertainty: None,
         known: Vec::new(),
         loss: crate::estimation::Loss::Square,

@@ -111,7 +111,12 @@ fn put(file: &mut DocumentMut, found: &ParameterEstimate, written: &ParameterLoc
 /// Returns the header comment that lists the identified values.
 fn comments(found: &[(ParameterEstimate, ParameterLocation)]) -> String {
     let mut out = String::from("# Identified by flexarm identify: value, standard deviation, previous value.\n");
+    let mut last = "";
     for (ParameterEstimate { name, unit, value, std, initial, .. }, _) in found {
+        // Tied parameters have several places.
+        if std::mem::replace(&mut last, name) == name {
+            continue;
+        }
         let deviation = match std.is_finite() {
             true => format!("+- {} {unit}", rounded(*std, *std)),
             false => format!("{unit} (the fit does not reproduce the readings: no standard deviation)"),

@@ -60,6 +60,8 @@ pub struct ParameterEstimate {
     pub interval: [f64; 2],
     /// Whether the readings determine the parameter.
     pub identifiable: bool,
+    /// Whether it has its found value even if the readings only determine it together with others.
+    pub shared: bool,
 }
 
 /// Cross-validation: residuals of readings that the fit did not use.
@@ -98,6 +100,10 @@ pub struct Identified {
     pub misfit: Option<f64>,
     /// Cross-validation.
     pub held_out: Option<HeldOut>,
+    /// Ratio of the scatter with the parameters that are not identified at their initial values to
+    /// the scatter of the solution, if it is larger than chance: the estimates then do not explain
+    /// the readings as well as the solution does.
+    pub kept_scatter: Option<f64>,
     /// Estimated poses of unknown instruments: the world in the instrument's axes.
     pub instruments: Vec<Pose>,
     /// Estimated positions of the targets in tool axes (m).
@@ -192,8 +198,10 @@ pub fn identify(
         Some(begin) => fitted(plant, parameters, &measurements, options, Some(&begin))?,
         None => searched(plant, parameters, &measurements, options)?,
     };
+    let (solution, kept_scatter) = with_kept(plant, parameters, &measurements, options, solution)?;
     let held_out = held_out(plant, parameters, &measurements, options, &solution, &before)?;
     let mut found = summarise(parameters, &measurements, options, solution, before, held_out);
+    found.kept_scatter = kept_scatter;
     // Back to units of the given deviations.
     found.solution.residuals *= scatter;
     found.before.iter_mut().for_each(|r| *r *= scatter);
@@ -208,6 +216,11 @@ pub fn identify(
         false => Err(IdentifyError::NotFinite),
     }
 }
+
+/// Prior deviation that keeps a parameter at its initial value, relative to its reference.
+const PINNED: f64 = 1e-9;
+/// Maximum ratio of the scatters with some parameters at their initial values and without.
+const AS_WELL: f64 = 1.1;
 
 /// Returns the ratio of the scatter about the fit to the given deviations, for the case in which
 /// only the ratios of deviations are known, and the unknowns at the end of the search. The
@@ -247,6 +260,38 @@ fn scatter(
     Ok((scatter, at.unwrap_or_else(|| DVector::zeros(parameters.len() + measurements.own_unknowns()))))
 }
 
+/// Keeps the parameters that the readings do not determine at their initial values and fits the
+/// others again. Returns that solution, with the directions and deviations of the free one, if it
+/// explains the readings about as well; otherwise the free solution and the ratio of the scatters.
+fn with_kept(
+    plant: &Plant,
+    parameters: &[Parameter],
+    measurements: &Measurements,
+    options: &IdentifyOptions,
+    solution: Solution,
+) -> Result<(Solution, Option<f64>), IdentifyError> {
+    let found = estimates(parameters, &solution, 1.0);
+    let kept = |k: &usize| !found[*k].identifiable && !parameters[*k].is_shared() && solution.unknowns[*k] != 0.0;
+    let kept: Vec<usize> = (0..parameters.len()).filter(kept).collect();
+    if kept.is_empty() {
+        return Ok((solution, None));
+    }
+    let (mut start, mut priors) = (solution.unknowns.clone(), priors(parameters));
+    for k in kept {
+        (start[k], priors[k]) = (0.0, PINNED * parameters[k].reference());
+    }
+    // Without the others there may be no equilibrium, or nothing left to fit.
+    let Ok(again) = fitted_within(plant, parameters, measurements, options, (&start, &priors)) else {
+        return Ok((solution, None));
+    };
+    let ratio = (again.scale / solution.scale).sqrt();
+    if ratio.is_nan() || ratio > AS_WELL {
+        return Ok((solution, ratio.is_finite().then_some(ratio)));
+    }
+    let Solution { unknowns, residuals, weights, leverages, scale, cost, converged, .. } = again;
+    Ok((Solution { unknowns, residuals, weights, leverages, scale, cost, converged, ..solution }, None))
+}
+
 /// Returns the prior deviations, each at most the parameter's reference: a weaker prior must not
 /// make a parameter identifiable.
 fn priors(parameters: &[Parameter]) -> Vec<f64> {
@@ -260,9 +305,21 @@ fn fitted(
     options: &IdentifyOptions,
     start: Option<&DVector<f64>>,
 ) -> Result<Solution, IdentifyError> {
-    let arm = MeasuredArm { plant, parameters, measurements };
     let zeros = DVector::zeros(parameters.len() + measurements.own_unknowns());
-    solve(&arm, start.unwrap_or(&zeros), &priors(parameters), &options.search).map_err(|error| match error {
+    let within = (start.unwrap_or(&zeros), &priors(parameters)[..]);
+    fitted_within(plant, parameters, measurements, options, within)
+}
+
+/// Fits all readings from a start, with given prior deviations.
+fn fitted_within(
+    plant: &Plant,
+    parameters: &[Parameter],
+    measurements: &Measurements,
+    options: &IdentifyOptions,
+    (start, priors): (&DVector<f64>, &[f64]),
+) -> Result<Solution, IdentifyError> {
+    let arm = MeasuredArm { plant, parameters, measurements };
+    solve(&arm, start, priors, &options.search).map_err(|error| match error {
         SolveError::Model(error) => IdentifyError::Model(error),
         SolveError::Nuisance(number) => IdentifyError::Untold { what: own_name(measurements, number) },
         SolveError::NotFinite => IdentifyError::NotFinite,
@@ -511,10 +568,11 @@ fn estimates(parameters: &[Parameter], solution: &Solution, scatter: f64) -> Vec
             name: parameter.name.clone(),
             unit: parameter.unit.clone(),
             initial: parameter.initial,
-            value: if identifiable { parameter.value(x) } else { parameter.initial },
+            value: if identifiable || parameter.is_shared() { parameter.value(x) } else { parameter.initial },
             std: parameter.deviation(x, std),
             interval: parameter.interval(x, std, 1.96),
             identifiable,
+            shared: parameter.is_shared(),
         }
     };
     parameters.iter().enumerate().map(estimate).collect()
@@ -559,6 +617,7 @@ fn summarise(
         parameters: estimates(parameters, &solution, if fits { scatter } else { f64::NAN }),
         correlation,
         untold: untold(&solution),
+        kept_scatter: None,
         before,
         normalised,
         suspicious,

@@ -64,10 +64,11 @@ pub enum Effect {
         /// Coordinate of the spring, from 0.
         coordinate: usize,
     },
-    /// Number of the law of a telescopic guide. The search coordinate is its change.
+    /// Number of the laws of telescopic guides. The search coordinate is the logarithm of a
+    /// positive number, and the change of others.
     Guide {
-        /// Number of the spring.
-        spring: usize,
+        /// Numbers of the springs.
+        springs: Vec<usize>,
         /// Number of the law.
         term: GuideTerm,
         /// Scale of the number, in its unit.
@@ -112,7 +113,17 @@ pub struct Parameter {
 impl Parameter {
     /// Whether the search coordinate is the logarithm of the value, which keeps the value positive.
     pub fn is_logarithmic(&self) -> bool {
-        matches!(self.effect, Effect::Stiffness(_) | Effect::Damping(_) | Effect::Damper { .. })
+        match &self.effect {
+            Effect::Stiffness(_) | Effect::Damping(_) | Effect::Damper { .. } => true,
+            Effect::Guide { term, .. } => term.is_positive(),
+            _ => false,
+        }
+    }
+
+    /// Whether the readings determine the parameter together with others of its kind: displacements
+    /// of joint frames partly replace each other, so that all of them keep their found values.
+    pub fn is_shared(&self) -> bool {
+        matches!(self.effect, Effect::Frame { .. })
     }
 
     /// Returns the maximum standard deviation of the search coordinate for the parameter to count
@@ -122,6 +133,7 @@ impl Parameter {
             Effect::Stiffness(_) | Effect::Damping(_) | Effect::Damper { .. } => std::f64::consts::LN_2,
             Effect::Entry { size, .. } => 0.5 * size,
             Effect::Tool(_) => 0.01,
+            Effect::Guide { term, .. } if term.is_positive() => std::f64::consts::LN_2,
             Effect::Guide { size, .. } => 0.5 * size,
             Effect::Frame { prior, .. } => *prior,
             Effect::Mass { .. } => (0.5 * self.initial.abs()).max(1.0),
@@ -173,10 +185,11 @@ impl Plant {
                     *K += entry_slope(K.nrows(), *row, *column, factor * x);
                 }
                 Effect::Tool(_) => {}
-                Effect::Guide { spring, term, .. } => {
-                    let spring = &mut plant.springs[*spring];
-                    if let Some(SpringCurve::Guide(guide)) = &mut spring.curve {
-                        *guide = guide.with(*term, *x);
+                Effect::Guide { springs, term, .. } => {
+                    for spring in springs {
+                        if let Some(SpringCurve::Guide(guide)) = &mut plant.springs[*spring].curve {
+                            *guide = guide.with(*term, parameter.value(*x) - guide.number(*term));
+                        }
                     }
                 }
                 Effect::Frame { body, twist, .. } => {

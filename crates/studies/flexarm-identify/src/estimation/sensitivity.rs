@@ -11,7 +11,7 @@
 use std::sync::Arc;
 
 use flexarm_kinematics::{Data, Frame, Wrench, forward_kinematics, rotation_vector};
-use flexarm_stepping::{FlexibleArm, OperatingPoint, SpringCurve, StepError, Tangents};
+use flexarm_stepping::{FlexibleArm, Guide, GuideTerm, OperatingPoint, SpringCurve, StepError, Tangents};
 use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX, SymmetricEigen, Vector6};
 
 use crate::estimation::parameter::{Effect, Parameter, Plant, displacement, entry_slope, scaled, slope_of};
@@ -27,8 +27,17 @@ const DIFFERENCE: f64 = 1e-3;
 /// Computes `dr/dx`, the derivative of the unbalanced forces on the elastic coordinates with
 /// respect to each parameter, n×p.
 pub(crate) fn force_slopes(at: &mut OperatingPoint, parameters: &[Parameter]) -> Result<DMatrix<f64>, StepError> {
+    slopes_at_rest(at, parameters).map(|(forces, _)| forces)
+}
+
+/// Computes `dr/dx`, n×p, and the twists of the tool with all coordinates held (world axes, at its
+/// origin), 6×p.
+fn slopes_at_rest(
+    at: &mut OperatingPoint,
+    parameters: &[Parameter],
+) -> Result<(DMatrix<f64>, Matrix6xX<f64>), StepError> {
     let n = at.deflections().len();
-    let mut slopes = DMatrix::zeros(n, parameters.len());
+    let (mut slopes, rigid) = frame_slopes(at, parameters);
     for (k, parameter) in parameters.iter().enumerate() {
         match &parameter.effect {
             Effect::Stiffness(places) => {
@@ -64,24 +73,16 @@ pub(crate) fn force_slopes(at: &mut OperatingPoint, parameters: &[Parameter]) ->
             // Damping exerts no force at rest; for a moved tool the caller accounts for payload and
             // load.
             Effect::Damping(_) | Effect::Damper { .. } | Effect::Tool(_) => {}
-            Effect::Guide { spring, term, .. } => {
-                let element = &at.arm().elements[*spring];
-                if let Some(guide) = element.curve.as_ref().and_then(SpringCurve::guide) {
-                    let q = at.coordinates().as_slice();
-                    let torque = guide.torque_slope(*term, q[element.coordinate], q);
-                    slopes[(at.arm().offset(element), k)] += torque;
+            Effect::Guide { springs, term, .. } => {
+                let (arm, q) = (at.arm(), at.coordinates().as_slice());
+                for element in springs.iter().map(|spring| &arm.elements[*spring]) {
+                    if let Some(guide) = element.curve.as_ref().and_then(SpringCurve::guide) {
+                        let slope = guide.torque_slope(*term, q[element.coordinate], q);
+                        slopes[(arm.offset(element), k)] += slope * per_unit(guide, *term);
+                    }
                 }
             }
-            Effect::Frame { body, twist, .. } => {
-                let [ahead, behind] = frames_beside(at.arm(), *body, twist);
-                let [mut up, mut down] = [DVector::zeros(n), DVector::zeros(n)];
-                at.forces_of(&ahead, &mut up);
-                at.forces_of(&behind, &mut down);
-                slopes.set_column(k, &((up - down) / (2.0 * FRAME_STEP)));
-                // The poses are those of the arm again.
-                let arm = at.arm().clone();
-                at.forces_of(&arm, &mut DVector::zeros(n));
-            }
+            Effect::Frame { .. } => {}
             Effect::Mass { body, per_kg } => {
                 // Forces are linear in a mass: a difference of any size is exact.
                 let (mut with, mut without) = (DVector::zeros(n), DVector::zeros(n));
@@ -93,7 +94,12 @@ pub(crate) fn force_slopes(at: &mut OperatingPoint, parameters: &[Parameter]) ->
             }
         }
     }
-    Ok(slopes)
+    Ok((slopes, rigid))
+}
+
+/// Returns the change of a guide's number per unit of its search coordinate.
+fn per_unit(guide: &Guide, term: GuideTerm) -> f64 {
+    if term.is_positive() { guide.number(term) } else { 1.0 }
 }
 
 /// Returns the arm with one kilogram added.
@@ -113,15 +119,41 @@ fn carrying(arm: &FlexibleArm, body: usize, per_kg: &flexarm_kinematics::Spatial
 /// # Errors
 /// As [`OperatingPoint::solve`].
 pub fn tool_slopes(at: &mut OperatingPoint, parameters: &[Parameter]) -> Result<Matrix6xX<f64>, StepError> {
-    let forces = force_slopes(at, parameters)?;
+    let (forces, rigid) = slopes_at_rest(at, parameters)?;
     let moved = at.yielding().tr_mul(&forces);
-    let mut V = Matrix6xX::from_fn(parameters.len(), |i, j| -moved[(i, j)]);
-    for (mut V, parameter) in V.column_iter_mut().zip(parameters) {
-        if let Effect::Frame { body, twist, .. } = &parameter.effect {
-            V += rigid_slope(at, *body, twist);
-        }
+    Ok(Matrix6xX::from_fn(parameters.len(), |i, j| rigid[(i, j)] - moved[(i, j)]))
+}
+
+/// Computes the derivatives with respect to displacements of joint frames; other columns are zero.
+fn frame_slopes(at: &mut OperatingPoint, parameters: &[Parameter]) -> (DMatrix<f64>, Matrix6xX<f64>) {
+    let n = at.deflections().len();
+    let (mut forces, mut twists) = (DMatrix::zeros(n, parameters.len()), Matrix6xX::zeros(parameters.len()));
+    let moves = |parameter: &Parameter| matches!(parameter.effect, Effect::Frame { .. });
+    if !parameters.iter().any(moves) {
+        return (forces, twists);
     }
-    Ok(V)
+    let mut arm = at.arm().clone();
+    let mut data = Data::new(&arm.model);
+    let mut moved = [DVector::zeros(n), DVector::zeros(n)];
+    for (k, parameter) in parameters.iter().enumerate() {
+        let Effect::Frame { body, twist, .. } = &parameter.effect else { continue };
+        let X_PJ = arm.model.bodies()[*body].X_PJ;
+        let [behind, ahead] = [-FRAME_STEP, FRAME_STEP].map(|step| {
+            Arc::make_mut(&mut arm.model).set_joint_frame(*body, X_PJ * displacement(&(twist * step)));
+            at.forces_of(&arm, &mut moved[usize::from(step > 0.0)]);
+            forward_kinematics(&arm.model, &mut data, at.coordinates());
+            data.X_WF(at.tool())
+        });
+        Arc::make_mut(&mut arm.model).set_joint_frame(*body, X_PJ);
+        forces.set_column(k, &((&moved[1] - &moved[0]) / (2.0 * FRAME_STEP)));
+        let turn = rotation_vector((ahead.rotation * behind.rotation.inverse()).matrix());
+        let shift = ahead.translation.vector - behind.translation.vector;
+        let twist = shift.iter().chain(&turn).map(|x| x / (2.0 * FRAME_STEP));
+        twists.set_column(k, &Vector6::from_iterator(twist));
+    }
+    // The poses of the operating point are those of its arm again.
+    at.forces_of(&arm, &mut moved[0]);
+    (forces, twists)
 }
 
 /// Returns the arm with the joint frame of a body displaced by [`FRAME_STEP`] along a twist and
@@ -133,19 +165,6 @@ pub(crate) fn frames_beside(arm: &FlexibleArm, body: usize, twist: &Vector6<f64>
         Arc::make_mut(&mut arm.model).set_joint_frame(body, X_PJ);
         arm
     })
-}
-
-/// Returns the twist of the tool (world axes, at its origin) per unit of a displacement of a joint
-/// frame, with all coordinates held.
-fn rigid_slope(at: &OperatingPoint, body: usize, twist: &Vector6<f64>) -> Vector6<f64> {
-    let [ahead, behind] = frames_beside(at.arm(), body, twist).map(|moved| {
-        let mut data = Data::new(&moved.model);
-        forward_kinematics(&moved.model, &mut data, at.coordinates());
-        data.X_WF(at.tool())
-    });
-    let turned = rotation_vector((ahead.rotation * behind.rotation.inverse()).matrix());
-    let moved = ahead.translation.vector - behind.translation.vector;
-    Vector6::from_iterator(moved.iter().chain(&turned).map(|x| x / (2.0 * FRAME_STEP)))
 }
 
 /// Natural frequencies of an arm with locked drives, and their derivatives.
@@ -326,13 +345,13 @@ pub(crate) fn explicit(
             (dK, DMatrix::zeros(n, n))
         }
         Effect::Damping(_) | Effect::Damper { .. } | Effect::Tool(_) => (DMatrix::zeros(n, n), DMatrix::zeros(n, n)),
-        Effect::Guide { spring, term, size } => {
+        Effect::Guide { springs, term, size } => {
             let mut dK = DMatrix::zeros(n, n);
-            let element = &arm.elements[*spring];
-            if let Some(guide) = element.curve.as_ref().and_then(SpringCurve::guide) {
+            for element in springs.iter().map(|spring| &arm.elements[*spring]) {
+                let Some(guide) = element.curve.as_ref().and_then(SpringCurve::guide) else { continue };
                 let (k, h, q) = (arm.offset(element), GUIDE_STEP * size, q.as_slice());
                 let slope = |change: f64| guide.with(*term, change).slope(q[element.coordinate], q);
-                dK[(k, k)] = (slope(h) - slope(-h)) / (2.0 * h);
+                dK[(k, k)] += (slope(h) - slope(-h)) / (2.0 * h) * per_unit(guide, *term);
             }
             (dK, DMatrix::zeros(n, n))
         }

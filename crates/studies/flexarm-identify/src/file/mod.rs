@@ -45,6 +45,8 @@ struct MeasurementFile {
     fit: Vec<Spanned<String>>,
     #[serde(default)]
     keep: Vec<Spanned<String>>,
+    #[serde(default)]
+    tie: Vec<Spanned<String>>,
     uncertainty: Option<Spanned<f64>>,
     #[serde(default)]
     parameter: Vec<ParameterEntry>,
@@ -88,6 +90,8 @@ pub(super) struct MeasurementInput {
     /// stiffnesses.
     pub(super) fit: Vec<(String, RobotFileError)>,
     pub(super) keep: Vec<(String, RobotFileError)>,
+    /// Patterns of parameters that have one value.
+    pub(super) tie: Vec<(String, RobotFileError)>,
     pub(super) uncertainty: Option<f64>,
     /// Name, uncertainty, and place in the file.
     pub(super) known: Vec<(String, f64, RobotFileError)>,
@@ -161,6 +165,7 @@ pub(super) fn read(path: &Path, cell: &Cell<'_>) -> Result<MeasurementInput, Err
         recordings,
         fit: given(&file.fit),
         keep: given(&file.keep),
+        tie: given(&file.tie),
         uncertainty: file.uncertainty.as_ref().map(|value| uncertainty(value, 1.0, &source)).transpose()?,
         known: known.collect::<Result<_, RobotFileError>>()?,
         loss: loss(&file.loss, &source)?,
