@@ -570,3 +570,39 @@ fn rotors_that_turn_with_two_joints_are_in_every_algorithm() {
     eprintln!("coupled rotors {worst:.1e}, their own energy {own:.1e}");
     assert!(worst < 1e-10 && own < 1e-13, "{worst} {own}");
 }
+
+/// Truth: the model of the mechanism whose joint is written with the other frame.
+#[test]
+fn a_joint_frame_set_in_a_model_is_that_of_a_mechanism_with_this_frame() {
+    for seed in 0..8 {
+        let tree = if seed % 2 == 0 { random_tree(seed, 6) } else { random_flexible_tree(seed, 6) };
+        let mut draw = Draw(seed ^ 0xF4A3E);
+        let X = Pose::from_parts(
+            nalgebra::Translation3::from(draw.vector(0.3)),
+            nalgebra::Rotation3::new(draw.vector(0.4)),
+        );
+        let mut set = Model::new(&tree).unwrap();
+        for body in 1..set.bodies().len() {
+            let before = set.bodies()[body].X_PJ;
+            let joint = set.bodies()[body].joint.clone();
+            let mut moved = tree.clone();
+            let parent = moved.joints.iter_mut().find(|j| j.name == joint).unwrap();
+            // The joint frame of the mechanism is in its parent link, which may be fixed to a body.
+            parent.X_PJ *= X;
+            let written = Model::new(&moved).unwrap();
+            set.set_joint_frame(body, before * X);
+            let state = random_state(&written, &mut Draw(seed ^ 0xABCD));
+            let [mut a, mut b] = [Data::new(&set), Data::new(&written)];
+            let qddot = DVector::from_element(set.nv(), 0.7);
+            let tau = [&set, &written].into_iter().zip([&mut a, &mut b]);
+            let [one, other]: [DVector<f64>; 2] = tau
+                .map(|(model, data)| inverse_dynamics(model, data, &state, &qddot).clone())
+                .collect::<Vec<_>>()
+                .try_into()
+                .unwrap();
+            // measured 3e-15
+            assert!(difference(&one, &other) < 1e-12, "{seed} {joint} {:e}", difference(&one, &other));
+            set.set_joint_frame(body, before);
+        }
+    }
+}

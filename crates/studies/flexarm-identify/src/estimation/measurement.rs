@@ -9,10 +9,10 @@ use std::borrow::Cow;
 
 use flexarm_kinematics::{Frame, Pose, SpatialInertia, rotation_vector};
 use flexarm_stepping::{OperatingPoint, StepError};
-use nalgebra::{DMatrix, DVector, Matrix3xX, Rotation3, Translation3, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3xX, Rotation3, Translation3, Vector3, Vector6};
 
 use crate::estimation::least_squares::Residuals;
-use crate::estimation::parameter::{Effect, Parameter, Plant, carried_along, tool_shift};
+use crate::estimation::parameter::{Effect, Parameter, Plant, carried_along, displacement, tool_shift};
 use crate::estimation::reading::{
     Component, LoadCase, MeasuredResponse, MeasuredShape, Measurements, Reading, ReadingKind, Row,
 };
@@ -127,9 +127,9 @@ impl<'a> Workspaces<'a> {
     }
 
     /// Returns the parameters for an arm that carries a mass at its tool: moving the tool also
-    /// moves that mass.
+    /// moves that mass. Twists of joint frames are in the axes after all displacements.
     fn under(&self, carried: &SpatialInertia) -> Cow<'a, [Parameter]> {
-        if !self.parameters.iter().any(|p| matches!(p.effect, Effect::Tool(_))) {
+        if !self.parameters.iter().any(|p| matches!(p.effect, Effect::Tool(_) | Effect::Frame { .. })) {
             return Cow::Borrowed(self.parameters);
         }
         let (body, X_BF) = (self.plant.tool.body, self.plant.tool.X_BF);
@@ -138,6 +138,21 @@ impl<'a> Workspaces<'a> {
         for (k, [v, w]) in tool_twists(self.parameters, &X_BF.rotation, &tool_shift(self.parameters, &self.x).1) {
             let per_kg = carried_along(&I, &X_BF.translation.vector, &v, &w);
             all[k].effect = Effect::Mass { body, per_kg };
+        }
+        for k in 0..all.len() {
+            let (before, after) = all.split_at_mut(k);
+            let (Effect::Frame { body, twist, .. }, Some(x)) = (&after[0].effect, self.x.get(k)) else { continue };
+            let X = displacement(&(twist * *x));
+            for other in before {
+                if let Effect::Frame { body: own, twist, .. } = &mut other.effect
+                    && own == body
+                {
+                    let [v, w]: [Vector3<f64>; 2] = [0, 3].map(|first| twist.fixed_rows::<3>(first).into_owned());
+                    let back = X.rotation.inverse();
+                    let [v, w] = [back * (v + w.cross(&X.translation.vector)), back * w];
+                    *twist = Vector6::from_iterator(v.iter().chain(&w).copied());
+                }
+            }
         }
         Cow::Owned(all)
     }

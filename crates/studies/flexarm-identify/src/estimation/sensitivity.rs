@@ -18,7 +18,7 @@ use crate::estimation::parameter::{Effect, Parameter, Plant, displacement, entry
 
 /// Step of the central differences over displacements of joint frames (m, rad): the error is of the
 /// order of its square.
-pub(crate) const FRAME_STEP: f64 = 1e-5;
+pub(crate) const FRAME_STEP: f64 = 1e-4;
 /// Step of the central differences of a guide's slope, as a fraction of the number's scale.
 const GUIDE_STEP: f64 = 1e-4;
 /// Step of the central differences: maximum change of an elastic coordinate per step (m, rad).
