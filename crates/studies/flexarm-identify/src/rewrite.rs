@@ -299,7 +299,13 @@ fn put_frames(
             }
         }
         if zero != 0.0 {
-            entry.insert("zero", toml_edit::value((zero * 1e9).round() / 1e9));
+            let zero = (zero * 1e9).round() / 1e9;
+            match entry.get_mut("zero").and_then(Item::as_value_mut) {
+                Some(old) => replace(old, zero),
+                None => {
+                    entry.insert("zero", toml_edit::value(zero));
+                }
+            }
         }
     }
     Ok(())
@@ -486,8 +492,9 @@ mod tests {
         ];
         let here = Path::new(".");
         let new = rewritten(text, &all, ("tool", &Pose::identity()), std::slice::from_ref(&old), here, here).unwrap();
-        assert!(new.contains("compliance = [0, 0, 4.0004e-7]") || new.contains("4.0004e-07"), "{new}");
-        assert!(new.contains("play = { gap = 4e-4, width = 21.0 }"), "{new}");
+        assert!(new.contains("compliance = [0, 0, 0.00000040004]"), "{new}");
+        assert!(new.contains("play = { gap = 4e-4 , width = 21.0 }"), "{new}");
+        assert!(new.contains("zero = 0.31 # old"), "{new}");
         let file: DocumentMut = new.parse().unwrap();
         let tables = file["calibration"].as_array_of_tables().unwrap();
         let read = |table: &Table| {
