@@ -21,6 +21,16 @@ fn blocks(page: &str, language: &str) -> Vec<String> {
     page.split(&fence).skip(1).map(|rest| rest.split("```").next().unwrap().to_owned()).collect()
 }
 
+/// A telescopic column with an arm on a flange.
+const COLUMN: &str = r#"<robot name="column">
+  <link name="outer"/>
+  <link name="inner"><inertial><mass value="20"/><inertia ixx="2" iyy="2" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <link name="tool0"><inertial><mass value="9"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="lift" type="prismatic"><parent link="outer"/><child link="inner"/><axis xyz="0 0 1"/>
+    <limit lower="0" upper="1.2" velocity="1" effort="1000"/></joint>
+  <joint name="column_to_arm" type="fixed"><parent link="inner"/><child link="tool0"/><origin xyz="0.5 0 1.5"/></joint>
+</robot>"#;
+
 /// A folder with the shipped KR 210 class robot, without its meshes.
 struct Place(PathBuf);
 
@@ -31,6 +41,7 @@ impl Place {
         for file in ["kr210.urdf", "fe/link_2.flex", "fe/link_3.flex"] {
             std::fs::copy(project("robots/kr210").join(file), folder.join(file)).unwrap();
         }
+        std::fs::write(folder.join("column.urdf"), COLUMN).unwrap();
         Self(folder)
     }
 
@@ -66,7 +77,9 @@ fn every_example_of_a_robot_file_loads() {
             assert!(shipped.contains(block.lines().nth(1).unwrap()), "{block}");
             continue;
         }
-        let head = if block.starts_with("format") { "" } else { "format = 1\nurdf = \"kr210.urdf\"\n" };
+        let column = block.contains("\"lift\"") || block.contains("\"column_to_arm\"");
+        let urdf = if column { "column.urdf" } else { "kr210.urdf" };
+        let head = if block.starts_with("format") { String::new() } else { format!("format = 1\nurdf = \"{urdf}\"\n") };
         let robot = place.robot(&format!("{head}{block}"));
         let mounted = block.contains("[mounting]");
         let under = usize::from(mounted && !block.contains("[mounting]\nstiffness"));

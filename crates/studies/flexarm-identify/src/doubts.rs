@@ -1,6 +1,6 @@
 //! Caveats about an identification.
 
-use crate::estimation::{Identified, MeasuredArm, NoAnswer, Plant, Reading, ReadingKind};
+use crate::estimation::{Identified, MeasuredArm, NoAnswer, ParameterEstimate, Plant, Reading, ReadingKind};
 use nalgebra::DVector;
 
 use super::answer::{Identification, rms};
@@ -67,16 +67,18 @@ pub(super) fn caveats(found: &Identified) -> Vec<Caveat> {
             "add readings at the poses of a measurement plan",
         ));
     }
-    if let Some(ratio) = found.kept_scatter {
+    let together = |p: &&ParameterEstimate| p.shared && !p.identifiable && !p.name.starts_with("joint.");
+    for parameter in found.parameters.iter().filter(together) {
         let text = format!(
-            "with the parameters that are not determined at their initial values, the readings scatter {ratio:.1} times as \
-             much as about the fit: the values written do not explain them as well as the fit does"
+            "these readings determine {} only together with others: it has the value nearest to the initial one that \
+             explains them",
+            parameter.name
         );
         caveats.push(Caveat::from_message(
-            "kept-parameters",
+            "not-identifiable",
             "measurements",
             text,
-            "add readings that separate them, or fit fewer of them (fit, keep, tie)",
+            "add readings at the poses of a measurement plan",
         ));
     }
     if let Some(held) = found.held_out.as_ref().filter(|held| held.rms > held.rms_initial) {

@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, Translation3, Vector3};
 
 use crate::estimation::least_squares::{Residuals, Search, Solution, SolveError, solve};
 use crate::estimation::measurement::{MeasuredArm, NoAnswer};
-use crate::estimation::parameter::{Parameter, Plant};
+use crate::estimation::parameter::{Effect, Parameter, Plant};
 use crate::estimation::reading::{Component, Instrument, Measurements, Reading, ReadingKind, Target};
 
 /// Magnitude of a normalised residual above which its reading is suspicious.
@@ -100,10 +100,6 @@ pub struct Identified {
     pub misfit: Option<f64>,
     /// Cross-validation.
     pub held_out: Option<HeldOut>,
-    /// Ratio of the scatter with the parameters that are not identified at their initial values to
-    /// the scatter of the solution, if it is larger than chance: the estimates then do not explain
-    /// the readings as well as the solution does.
-    pub kept_scatter: Option<f64>,
     /// Estimated poses of unknown instruments: the world in the instrument's axes.
     pub instruments: Vec<Pose>,
     /// Estimated positions of the targets in tool axes (m).
@@ -198,10 +194,9 @@ pub fn identify(
         Some(begin) => fitted(plant, parameters, &measurements, options, Some(&begin))?,
         None => searched(plant, parameters, &measurements, options)?,
     };
-    let (solution, kept_scatter) = with_kept(plant, parameters, &measurements, options, solution)?;
+    let (solution, shared) = with_kept(plant, parameters, &measurements, options, solution)?;
     let held_out = held_out(plant, parameters, &measurements, options, &solution, &before)?;
-    let mut found = summarise(parameters, &measurements, options, solution, before, held_out);
-    found.kept_scatter = kept_scatter;
+    let mut found = summarise(parameters, &shared, &measurements, options, solution, before, held_out);
     // Back to units of the given deviations.
     found.solution.residuals *= scatter;
     found.before.iter_mut().for_each(|r| *r *= scatter);
@@ -262,34 +257,38 @@ fn scatter(
 
 /// Keeps the parameters that the readings do not determine at their initial values and fits the
 /// others again. Returns that solution, with the directions and deviations of the free one, if it
-/// explains the readings about as well; otherwise the free solution and the ratio of the scatters.
+/// explains the readings about as well; otherwise the free solution. Also returns which parameters
+/// have their found value although the readings only determine it together with others: joint
+/// frames, and numbers of guides whose initial values contradict the readings.
 fn with_kept(
     plant: &Plant,
     parameters: &[Parameter],
     measurements: &Measurements,
     options: &IdentifyOptions,
     solution: Solution,
-) -> Result<(Solution, Option<f64>), IdentifyError> {
-    let found = estimates(parameters, &solution, 1.0);
-    let kept = |k: &usize| !found[*k].identifiable && !parameters[*k].is_shared() && solution.unknowns[*k] != 0.0;
-    let kept: Vec<usize> = (0..parameters.len()).filter(kept).collect();
-    if kept.is_empty() {
-        return Ok((solution, None));
+) -> Result<(Solution, Vec<bool>), IdentifyError> {
+    let mut shared: Vec<bool> = parameters.iter().map(Parameter::is_shared).collect();
+    let found = estimates(parameters, &shared, &solution, 1.0);
+    let of_guide = |k: usize| matches!(parameters[k].effect, Effect::Guide { .. });
+    for _ in 0..2 {
+        let kept = |k: &usize| !found[*k].identifiable && !shared[*k] && solution.unknowns[*k] != 0.0;
+        let kept: Vec<usize> = (0..parameters.len()).filter(kept).collect();
+        if kept.is_empty() {
+            break;
+        }
+        let (mut start, mut priors) = (solution.unknowns.clone(), priors(parameters));
+        for &k in &kept {
+            (start[k], priors[k]) = (0.0, PINNED * parameters[k].reference());
+        }
+        let again = fitted_within(plant, parameters, measurements, options, (&start, &priors)).ok();
+        if let Some(again) = again.filter(|again| (again.scale / solution.scale).sqrt() <= AS_WELL) {
+            let Solution { unknowns, residuals, weights, leverages, scale, cost, converged, .. } = again;
+            let solution = Solution { unknowns, residuals, weights, leverages, scale, cost, converged, ..solution };
+            return Ok((solution, shared));
+        }
+        kept.into_iter().filter(|k| of_guide(*k)).for_each(|k| shared[k] = true);
     }
-    let (mut start, mut priors) = (solution.unknowns.clone(), priors(parameters));
-    for k in kept {
-        (start[k], priors[k]) = (0.0, PINNED * parameters[k].reference());
-    }
-    // Without the others there may be no equilibrium, or nothing left to fit.
-    let Ok(again) = fitted_within(plant, parameters, measurements, options, (&start, &priors)) else {
-        return Ok((solution, None));
-    };
-    let ratio = (again.scale / solution.scale).sqrt();
-    if ratio.is_nan() || ratio > AS_WELL {
-        return Ok((solution, ratio.is_finite().then_some(ratio)));
-    }
-    let Solution { unknowns, residuals, weights, leverages, scale, cost, converged, .. } = again;
-    Ok((Solution { unknowns, residuals, weights, leverages, scale, cost, converged, ..solution }, None))
+    Ok((solution, shared))
 }
 
 /// Returns the prior deviations, each at most the parameter's reference: a weaker prior must not
@@ -554,8 +553,9 @@ fn chi_square_bound(freedom: usize) -> f64 {
 
 /// Returns the estimates of the parameters.
 ///
+/// * `shared`: which parameters have their found value even if they are not identifiable.
 /// * `scatter`: ratio of the deviations to those of the solution; NaN if the model does not fit.
-fn estimates(parameters: &[Parameter], solution: &Solution, scatter: f64) -> Vec<ParameterEstimate> {
+fn estimates(parameters: &[Parameter], shared: &[bool], solution: &Solution, scatter: f64) -> Vec<ParameterEstimate> {
     let V = solution.directions.columns(0, solution.identified);
     let share = |k: usize| 1.0 - V.row(k).norm_squared();
     let estimate = |(k, parameter): (usize, &Parameter)| {
@@ -568,11 +568,11 @@ fn estimates(parameters: &[Parameter], solution: &Solution, scatter: f64) -> Vec
             name: parameter.name.clone(),
             unit: parameter.unit.clone(),
             initial: parameter.initial,
-            value: if identifiable || parameter.is_shared() { parameter.value(x) } else { parameter.initial },
+            value: if identifiable || shared[k] { parameter.value(x) } else { parameter.initial },
             std: parameter.deviation(x, std),
             interval: parameter.interval(x, std, 1.96),
             identifiable,
-            shared: parameter.is_shared(),
+            shared: shared[k],
         }
     };
     parameters.iter().enumerate().map(estimate).collect()
@@ -591,6 +591,7 @@ fn untold(solution: &Solution) -> Vec<Vec<(usize, f64)>> {
 
 fn summarise(
     parameters: &[Parameter],
+    shared: &[bool],
     measurements: &Measurements,
     options: &IdentifyOptions,
     mut solution: Solution,
@@ -614,10 +615,9 @@ fn summarise(
     suspicious.sort_by(|a, b| normalised[*b].abs().total_cmp(&normalised[*a].abs()));
     let own = &solution.unknowns.as_slice()[p..];
     Identified {
-        parameters: estimates(parameters, &solution, if fits { scatter } else { f64::NAN }),
+        parameters: estimates(parameters, shared, &solution, if fits { scatter } else { f64::NAN }),
         correlation,
         untold: untold(&solution),
-        kept_scatter: None,
         before,
         normalised,
         suspicious,
