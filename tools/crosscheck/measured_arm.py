@@ -16,6 +16,7 @@ the figures are written to a file, tests/verification/measured_arm.json; none of
 import argparse
 import concurrent.futures
 import csv
+import datetime
 import gzip
 import json
 import os
@@ -315,7 +316,7 @@ def positions(folder, source, flat, floors, down):
         for plays in ("", "y", "xy"):
             frames = urdf == "published"
             name = f"{urdf}_{plays or 'springs'}"
-            robot, found = identified(folder, name, f"../{URDFS[urdf]}" if False else URDFS[urdf], GRAVITY * down["flat"], train, frames, plays)
+            robot, found = identified(folder, name, URDFS[urdf], GRAVITY * down["flat"], train, frames, plays)
             at = station(places(robot, train["q"]), train["prism"])
             entry = {"name": name, "urdf": urdf, "play": bool(plays), "about": plays, "free_numbers": len(found["parameters"]) + 9}
             entry["train"] = summary(figures(places(robot, train["q"]), train["prism"], at))
@@ -419,7 +420,7 @@ def main():
             "licence": LICENCE,
             "program": "flexarm",
             "script": "tools/crosscheck/measured_arm.py",
-            "date": __import__("datetime").date.today().isoformat(),
+            "date": datetime.date.today().isoformat(),
             "method": method(folder, source, flat, down["flat"], given),
         }
         found["models"], found["rigid"], found["scatter"], found["identified"] = positions(folder, source, flat, floors, down)

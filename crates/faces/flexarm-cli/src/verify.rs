@@ -17,7 +17,8 @@ use crate::{shipped, signals};
 
 #[derive(Debug, Args)]
 pub(crate) struct VerifyArgs {
-    /// Cases to run: one-beam, three-beams, lower-arm, manipulator, programs, measured, benchmarks
+    /// Cases to run: one-beam, three-beams, lower-arm, manipulator, programs, measured, benchmarks,
+    /// measured-arm
     /// [default: all]
     pub(crate) cases: Vec<String>,
     /// Leave out slow parts

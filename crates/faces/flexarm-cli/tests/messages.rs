@@ -374,7 +374,7 @@ fn the_case_studies_name_their_flags() {
         &[
             (
                 &["nocase", "--no-files"],
-                "there is no case \"nocase\"; the cases are one-beam, three-beams, lower-arm, manipulator, programs, measured, benchmarks",
+                "there is no case \"nocase\"; the cases are one-beam, three-beams, lower-arm, manipulator, programs, measured, benchmarks, measured-arm",
             ),
             (
                 &["one-beam", "--no-files", "--data", "."],

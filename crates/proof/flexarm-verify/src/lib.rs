@@ -30,6 +30,7 @@ mod files;
 mod lower_arm;
 mod manipulator;
 mod measured;
+mod measured_arm;
 mod meshed;
 mod one_beam;
 pub mod page;
@@ -49,7 +50,7 @@ pub use files::{PAGE, VerificationFiles, differences_from};
 type Entry = (&'static str, f64, fn(&Bench, &mut Pace<'_>) -> Result<Case, Error>);
 
 /// The cases, in the order of the page.
-const CASES: [Entry; 7] = [
+const CASES: [Entry; 8] = [
     ("one-beam", 1.0, one_beam::case),
     ("three-beams", 5.0, three_beams::case),
     ("lower-arm", 5.0, lower_arm::case),
@@ -57,6 +58,7 @@ const CASES: [Entry; 7] = [
     ("programs", 3.0, programs::case),
     ("measured", 3.0, measured::case),
     ("benchmarks", 8.0, benchmarks::case),
+    ("measured-arm", 0.1, measured_arm::case),
 ];
 
 /// Names of the cases.
