@@ -18,6 +18,7 @@ import concurrent.futures
 import csv
 import datetime
 import gzip
+import hashlib
 import json
 import os
 import subprocess
@@ -405,7 +406,8 @@ def main():
     parser.add_argument("-o", "--output", type=Path, help="file of the figures")
     arguments = parser.parse_args()
     source = arguments.folder
-    missing = [name for name in [*URDFS.values(), "poses.json", "compliances.json", "flat_train.csv.gz"] if not (source / name).is_file()]
+    needed = [*URDFS.values(), "poses.json", "compliances.json", *(f"{name}.csv.gz" for name in ("flat_train", *FLOORS))]
+    missing = [name for name in needed if not (source / name).is_file()]
     if missing:
         sys.exit(f"{source} has no {', '.join(missing)}: see docs/measured_arm.md")
     down = {name: np.array(found["gravity_in_base"]) for name, found in json.loads((source / "poses.json").read_text()).items()}
@@ -421,6 +423,7 @@ def main():
             "program": "flexarm",
             "script": "tools/crosscheck/measured_arm.py",
             "date": datetime.date.today().isoformat(),
+            "outside": {name: hashlib.sha256((source / name).read_bytes()).hexdigest() for name in needed},
             "method": method(folder, source, flat, down["flat"], given),
         }
         found["models"], found["rigid"], found["scatter"], found["identified"] = positions(folder, source, flat, floors, down)

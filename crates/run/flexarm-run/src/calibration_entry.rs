@@ -9,9 +9,9 @@ use nalgebra::{Rotation3, Translation3, Vector3};
 use serde::Deserialize;
 use toml::Spanned;
 
-use crate::error::Error;
-use crate::robot::{check_finite, keep, pose};
-use crate::robot_file::{RobotFileError, Source};
+use flexarm_files::{Source, TextFileError};
+
+use crate::entry_checks::{check_finite, pose};
 
 /// Entry as written.
 #[derive(Clone, Debug, Deserialize)]
@@ -38,17 +38,21 @@ pub struct Calibration {
     pub zero: f64,
 }
 
-/// Applies all corrections to the mechanisms of a robot; collects errors in `faults`.
+/// Applies all corrections to the mechanisms of a robot; returns them with the errors found.
 pub(crate) fn calibrate(
     entries: &[CalibrationEntry],
     mechanisms: &mut [&mut Mechanism],
     source: &Source,
-    faults: &mut Vec<Error>,
-) -> Vec<Calibration> {
-    let mut found: Vec<Calibration> = Vec::new();
+) -> (Vec<Calibration>, Vec<TextFileError>) {
+    let (mut found, mut faults): (Vec<Calibration>, Vec<TextFileError>) = (Vec::new(), Vec::new());
     for entry in entries {
-        let checked = calibration(entry, &found, mechanisms, source).map_err(Error::from);
-        let Some(calibration) = keep(checked, faults) else { continue };
+        let calibration = match calibration(entry, &found, mechanisms, source) {
+            Ok(calibration) => calibration,
+            Err(fault) => {
+                faults.push(fault);
+                continue;
+            }
+        };
         for mechanism in mechanisms.iter_mut() {
             let joint = mechanism.joints.iter_mut().find(|joint| joint.name == calibration.joint);
             if let Some(joint) = joint {
@@ -57,7 +61,7 @@ pub(crate) fn calibrate(
         }
         found.push(calibration);
     }
-    found
+    (found, faults)
 }
 
 /// Returns the displacement of a joint by a value.
@@ -73,7 +77,7 @@ fn calibration(
     before: &[Calibration],
     mechanisms: &[&mut Mechanism],
     source: &Source,
-) -> Result<Calibration, RobotFileError> {
+) -> Result<Calibration, TextFileError> {
     let name = entry.joint.get_ref();
     let fail = |message: String| source.error(entry.joint.span(), format!("calibration of joint {name:?}: {message}"));
     let joints = || mechanisms.iter().flat_map(|mechanism| &mechanism.joints).filter(|j| j.kind != JointKind::Fixed);

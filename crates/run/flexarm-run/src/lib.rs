@@ -30,6 +30,7 @@ mod controller_entry;
 mod convert;
 mod deflections;
 mod drive_entry;
+mod entry_checks;
 mod error;
 pub mod file_cache;
 mod flexible;

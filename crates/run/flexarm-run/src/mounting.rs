@@ -15,9 +15,10 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use crate::drive_entry::Numbers;
+use crate::entry_checks::{check_finite, pose};
 use crate::error::Error;
 use crate::link_entry::{LinkHome, damping_of, flexible_link};
-use crate::robot::{Robot, check_finite, keep, pose};
+use crate::robot::{Robot, keep};
 use crate::robot_file::{BeamEntry, DampingEntry, FlexibleLinkEntry, RobotFileError, Source};
 
 /// `[mounting]` of a robot file: what supports the base.

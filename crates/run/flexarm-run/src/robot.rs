@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use flexarm_kinematics::{Frame, Joint, JointKind, Link, LinkInertia, Mechanism, Model, Pose};
 use flexarm_urdf::{InertiaEstimate, ReadOptions, UrdfRobot, closest, default_tcp, parse_urdf, read_urdf};
-use nalgebra::{Matrix3, Rotation3, Translation3, Vector3};
+use nalgebra::{Matrix3, Vector3};
 use toml::Spanned;
 
 use crate::balancer_entry::add_balancers;
@@ -14,6 +14,7 @@ use crate::calibration_entry::{Calibration, calibrate};
 use crate::caveat::{self, Caveat};
 use crate::controller_entry::{RobotAxis, controller_axes};
 use crate::drive_entry::{Drive, drives};
+use crate::entry_checks::{check_finite, pose};
 use crate::error::{Error, ValueError};
 use crate::file_cache::FileCache;
 use crate::flexible::{FlexibleRobot, RobotLink};
@@ -260,7 +261,8 @@ impl Robot {
             keep(make_helical(&mut rigid, joint, lead, source).map_err(Error::from), &mut faults);
         }
         let mechanisms = &mut [&mut rigid, &mut urdf.mechanism];
-        let calibration = calibrate(&file.calibration, mechanisms, source, &mut faults);
+        let (calibration, wrong) = calibrate(&file.calibration, mechanisms, source);
+        faults.extend(wrong.into_iter().map(Error::from));
         for (joint, limit) in &file.effort_limit {
             keep(limit_effort(&mut rigid, joint, limit, source).map_err(Error::from), &mut faults);
         }
@@ -654,10 +656,6 @@ fn unknown_link(what: &str, link: &str, mechanism: &Mechanism) -> String {
     format!("{what} link {link:?} is not a link of the URDF; its links are {known:?}")
 }
 
-pub(crate) fn pose(xyz: [f64; 3], rpy: [f64; 3]) -> Pose {
-    Pose::from_parts(Translation3::from(Vector3::from(xyz)), Rotation3::from_euler_angles(rpy[0], rpy[1], rpy[2]))
-}
-
 fn tcp_of(file: &RobotFile, source: &Source, urdf: &UrdfRobot, options: &LoadOptions) -> Result<(String, Pose), Error> {
     if let Some(link) = &options.tcp {
         return Ok((link.clone(), Pose::identity()));
@@ -681,16 +679,4 @@ fn tcp_of(file: &RobotFile, source: &Source, urdf: &UrdfRobot, options: &LoadOpt
 /// Returns the value, or records the error so that later errors are found too.
 pub(crate) fn keep<T>(result: Result<T, Error>, faults: &mut Vec<Error>) -> Option<T> {
     result.map_err(|e| faults.push(e)).ok()
-}
-
-pub(crate) fn check_finite(
-    what: &str,
-    values: &[f64],
-    span: std::ops::Range<usize>,
-    source: &Source,
-) -> Result<(), RobotFileError> {
-    match values.iter().find(|x| !x.is_finite()) {
-        Some(found) => Err(source.error(span, format!("{what} has the entry {found}, expected finite numbers"))),
-        None => Ok(()),
-    }
 }

@@ -1113,7 +1113,7 @@ class FittedParameter(TypedDict):
     initial: float
     """Initial value."""
     value: float
-    """Estimated value; the initial value if the parameter is not identifiable."""
+    """Estimated value; the initial value if the parameter is not identifiable. A displacement of a joint frame always has the value found, since others may replace it."""
     std: float
     """Standard deviation; NaN (null in JSON) if the parameter is not identifiable or the model does not fit the readings."""
     interval: list[float]

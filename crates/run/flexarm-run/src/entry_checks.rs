@@ -1,0 +1,23 @@
+//! Checks and conversions shared by the entries of a robot file.
+
+use flexarm_files::{Source, TextFileError};
+use flexarm_kinematics::Pose;
+use nalgebra::{Rotation3, Translation3, Vector3};
+
+/// Returns the pose of a position (m) and roll, pitch, yaw (rad).
+pub(crate) fn pose(xyz: [f64; 3], rpy: [f64; 3]) -> Pose {
+    Pose::from_parts(Translation3::from(Vector3::from(xyz)), Rotation3::from_euler_angles(rpy[0], rpy[1], rpy[2]))
+}
+
+/// Checks that numbers are finite.
+pub(crate) fn check_finite(
+    what: &str,
+    values: &[f64],
+    span: std::ops::Range<usize>,
+    source: &Source,
+) -> Result<(), TextFileError> {
+    match values.iter().find(|x| !x.is_finite()) {
+        Some(found) => Err(source.error(span, format!("{what} has the entry {found}, expected finite numbers"))),
+        None => Ok(()),
+    }
+}
