@@ -303,7 +303,7 @@ def method(folder, source, flat, gravity, given):
         apart = 1e3 * np.linalg.norm(own - truth, axis=1).max()
         size = 1e3 * np.linalg.norm(truth - rigid, axis=1).max()
         report(f"   {len(poses)} poses, {name}, displacement of at most {size:.1f} mm", apart, 0.05, "mm")
-        found[f"{name}_mm"] = round(float(apart), 6)
+        found[f"{name}_mm"] = float(f"{apart:.1e}")
     return found
 
 
