@@ -23,6 +23,7 @@ import concurrent.futures
 import functools
 import gzip
 import json
+import math
 import os
 import random
 import re
@@ -892,6 +893,74 @@ def with_visual(shape):
 
 
 BOX = with_visual('<box size="0.8 0.02 0.04"/>')
+TELESCOPE = """<robot name="lift">
+  <link name="floor"><inertial><mass value="50"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <link name="outer"><inertial><origin xyz="0 0 0.7"/><mass value="20"/><inertia ixx="2" iyy="2" izz="0.2" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="foot" type="fixed"><parent link="floor"/><child link="outer"/><origin xyz="0 0 0.1"/></joint>
+  <link name="middle"><inertial><origin xyz="0 0 0.7"/><mass value="15"/><inertia ixx="2" iyy="2" izz="0.2" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="lower" type="prismatic"><parent link="outer"/><child link="middle"/><axis xyz="0 0 1"/>
+    <limit lower="0" upper="1.1" velocity="5" effort="1000"/><mimic joint="lift" multiplier="0.5" offset="0.05"/></joint>
+  <joint name="lift" type="prismatic"><parent link="middle"/><child link="carrier"/><axis xyz="0 0 1"/>
+    <limit lower="0" upper="2" velocity="5" effort="1000"/></joint>
+  <link name="carrier"><inertial><mass value="0.001"/><inertia ixx="1e-6" iyy="1e-6" izz="1e-6" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="turn" type="revolute"><parent link="carrier"/><child link="arm"/><axis xyz="0 0 1"/><origin xyz="0 0 0.2"/>
+    <limit lower="-3" upper="3" velocity="5" effort="1000"/></joint>
+  <link name="arm"><inertial><origin xyz="0.8 0 0"/><mass value="40"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="wrist" type="revolute"><parent link="arm"/><child link="hand"/><axis xyz="0 1 0"/><origin xyz="0.9 0 0"/>
+    <limit lower="-3" upper="3" velocity="5" effort="1000"/></joint>
+  <link name="hand"><inertial><origin xyz="0.2 0 0"/><mass value="4"/><inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <link name="tcp"/>
+  <joint name="flange" type="fixed"><parent link="hand"/><child link="tcp"/><origin xyz="0.3 0 0.1"/></joint>
+</robot>"""
+
+TELESCOPE_ROBOT = """format = 1
+urdf = "beam.urdf"
+tcp = { link = "tcp" }
+[[calibration]]
+joint = "turn"
+xyz = [0.001, 0.0, -0.002]
+rpy = [0.0, 0.003, 0.0]
+zero = 0.01
+[[drive]]
+joint = "lower"
+kind = "gearbox"
+gearbox = { guide = { outer_end = 1.4, x = { compliance = [1e-6, 4e-7, 3e-7] }, y = { compliance = [0, 0, 3e-7], play = { gap = 4e-4, centre = 3, width = 20 } } }, damping = [10.0, 10.0] }
+[[drive]]
+joint = "lift"
+kind = "gearbox"
+gearbox = { guide = { outer_end = 2.5, inner_end = 0.0, y = { compliance = [1e-6, 4e-7, 3e-7] } } }
+[[drive]]
+joint = "foot"
+kind = "gearbox"
+gearbox = { stiffness = [2e5, 2e5, 1e6] }
+"""
+
+TELESCOPE_MOTION = """format = 1
+unit = "rad"
+joints = ["lift", "turn", "wrist"]
+start = [0.3, 0.0, 0.0]
+[[move]]
+to = [0.5, 0.2, 0.1]
+duration = 0.4
+"""
+
+TELESCOPE_MEASUREMENTS = """format = 1
+fit = ["drive.*stiffness*", "drive.*guide*", "joint.turn.*"]
+keep = ["*.centre"]
+tie = ["drive.*.guide.y.compliance[2]"]
+[instrument.station]
+[target.prism]
+xyz = [0, 0, 0]
+unknown = true
+[[place]]
+file = "places.csv"
+std = 0.001
+"""
+
+TELESCOPE_PLACES = "lift,turn,wrist,x,y,z\n" + "".join(
+    f"{0.2 + 0.15 * k},{0.5 * k - 2.5},{0.3 * k - 1.5},{1.2 * math.cos(0.5 * k - 2.5):.4f},{1.2 * math.sin(0.5 * k - 2.5):.4f},{0.6 + 0.2 * k:.4f}\n" for k in range(10)
+)
+
 COMPARE = ["compare", "robot.toml", "motion.toml", "--no-files", "--step", "1e-3", "--json"]
 
 
@@ -914,6 +983,8 @@ def own_targets():
         Target("robot-balancers", "robot.toml", {**base, "robot.toml": ROBOT + BALANCERS}, [check, COMPARE, ["statics", "robot.toml", "--json"], ["inspect", "robot.toml", "--json"]], True),
         Target("robot-mounting", "robot.toml", {**base, "robot.toml": ROBOT + MOUNTING}, [check, COMPARE, ["statics", "robot.toml", "--json"], ["inspect", "robot.toml", "--json"]], True),
         Target("robot-gears", "robot.toml", {**base, "robot.toml": ROBOT.replace("backlash = 1e-4", GEAR_KEYS).replace("viscous = 0.5,", "viscous = 0.5, load = 0.05,")}, [check, COMPARE, ["statics", "robot.toml", "--json"], ["modes", "robot.toml", "--json"]], True),
+        Target("robot-telescope", "robot.toml", {"beam.urdf": TELESCOPE, "robot.toml": TELESCOPE_ROBOT, "motion.toml": TELESCOPE_MOTION}, [check, COMPARE, ["statics", "robot.toml", "--json"], ["modes", "robot.toml", "--json"]], True),
+        Target("measurements-telescope", "job.toml", {"beam.urdf": TELESCOPE, "robot.toml": TELESCOPE_ROBOT, "job.toml": TELESCOPE_MEASUREMENTS, "places.csv": TELESCOPE_PLACES}, [["identify", "robot.toml", "job.toml", "-o", "made", "--force", "--json"]]),
         Target("robot-column", "robot.toml", {**base, "robot.toml": ROBOT + COLUMN}, [check, ["statics", "robot.toml", "--json"], ["modes", "robot.toml", "--json"]], True),
         Target("urdf", "beam.urdf", base, [["check", "beam.urdf", "--json"], ["inspect", "beam.urdf", "--json"], check, COMPARE], True),
         Target("xacro", "arm.xacro", {"arm.xacro": XACRO}, [["check", "arm.xacro", "--json"], ["inspect", "arm.xacro", "--json"]]),
@@ -1284,7 +1355,7 @@ def nulls(value, key=""):
 
 
 # Keys that may be null for a reason given in docs or comments of the summary.
-MAY_BE_NULL = {"settling_s", "frequency_hz", "at_rest", "compliance_share[]", "overshoot", "damping", "duration_s", "first_frequency_hz", "misfit"}
+MAY_BE_NULL = {"settling_s", "frequency_hz", "at_rest", "compliance_share[]", "effective_mass[]", "overshoot", "damping", "duration_s", "first_frequency_hz", "misfit"}
 # For new: links without a section, quantities that a description does not limit, a skipped run
 # (docs/new_robot.md).
 NEW_MAY_BE_NULL = {"section", "width", "height", "wall", "wall_of_half_mass", "material", "y_axis", "offset", "taper", "open_cuts", "reason", "mass", "lower", "upper", "velocity", "effort", "effort_fault", "summary", "lower_limit", "upper_limit", "speed_limit", "torque_limit"}

@@ -241,7 +241,13 @@ impl ReduceJob {
         put(&mut self.quadrature, flags.quadrature);
         put(&mut self.ordering, flags.ordering);
         put(&mut self.mesh_frame, flags.mesh_frame);
-        put(&mut self.urdf, flags.urdf);
+        if let Some(mut urdf) = flags.urdf {
+            if let Some(own) = self.urdf.take() {
+                urdf.rest |= own.rest;
+                urdf.joint = urdf.joint.or(own.joint.filter(|_| own.link == urdf.link));
+            }
+            self.urdf = Some(urdf);
+        }
         self.name_interfaces();
         for given in flags.interface {
             let Some(own) = self.interface.iter_mut().find(|own| own.name == given.name) else {
@@ -343,6 +349,21 @@ tie = "distributing"
 
     fn parse(text: &str) -> Result<ReduceJob, LinkError> {
         parse_job(text, Path::new("jobs/arm.toml"))
+    }
+
+    /// The mass beyond the mesh changes every result, so a flag for the URDF must not drop it.
+    #[test]
+    fn a_urdf_on_the_command_line_keeps_the_rest_and_the_joint_of_the_job() {
+        let text = format!("{JOB}[urdf]\nfile = \"a.urdf\"\nlink = \"arm\"\njoint = \"elbow\"\nrest = true\n");
+        let with = |link: &str| {
+            let mut job = parse(&text).unwrap();
+            let urdf = UrdfEntry { file: "b.urdf".into(), link: link.into(), ..UrdfEntry::default() };
+            job.put_over(ReduceJob { urdf: Some(urdf), ..ReduceJob::default() });
+            job.urdf.unwrap()
+        };
+        let (same, other) = (with("arm"), with("forearm"));
+        assert_eq!((same.file.as_path(), same.rest, same.joint.as_deref()), (Path::new("b.urdf"), true, Some("elbow")));
+        assert_eq!((other.rest, other.joint), (true, None));
     }
 
     #[test]
