@@ -1355,7 +1355,7 @@ def nulls(value, key=""):
 
 
 # Keys that may be null for a reason given in docs or comments of the summary.
-MAY_BE_NULL = {"settling_s", "frequency_hz", "at_rest", "compliance_share[]", "effective_mass[]", "overshoot", "damping", "duration_s", "first_frequency_hz", "misfit"}
+MAY_BE_NULL = {"settling_s", "frequency_hz", "at_rest", "compliance_share[]", "effective_mass[]", "static_at_peak_m", "dynamic_at_peak_m", "peak_dynamic_m", "overshoot", "damping", "duration_s", "first_frequency_hz", "misfit"}
 # For new: links without a section, quantities that a description does not limit, a skipped run
 # (docs/new_robot.md).
 NEW_MAY_BE_NULL = {"section", "width", "height", "wall", "wall_of_half_mass", "material", "y_axis", "offset", "taper", "open_cuts", "reason", "mass", "lower", "upper", "velocity", "effort", "effort_fault", "summary", "lower_limit", "upper_limit", "speed_limit", "torque_limit"}
