@@ -10,8 +10,10 @@ the figures are written to a file, tests/verification/measured_arm.json; none of
 1. Method: the displacement of the prism under the arm's weight with given springs, against a model of
    its own below: a chain of finite rotations whose moments are iterated to convergence.
 2. Positions: `flexarm identify` on every second pose of one floor; the other poses and two other floors
-   are predicted by `flexarm statics`.
+   are predicted by `flexarm statics`. For comparison: the rigid robot, as it is and with its joint frames
+   fitted, and fits to all poses of that floor.
 3. Tilts of two accelerometers over the moment of the weight, and the law of a guide fitted to them.
+4. Tilt of the foot on each floor.
 """
 import argparse
 import concurrent.futures
@@ -44,6 +46,8 @@ FLOORS = ["outdoor", "pallet"]
 # Start of every fit: round numbers of the right order of magnitude.
 START = {"foot": 2e5, "tilt": [0.0, 0.0, 3e-7], "gears": [3e4, 3e4, 1.7e4, 1e4, 1e4]}
 START_PLAY = {"gap": 5e-4, "centre": 0.0, "width": 20.0}
+# Stiffness of the rigid robot whose joint frames are fitted; `identify` needs elastic drives.
+STIFF = {"foot": 1e12, "tilt": [0.0, 0.0, 1e-16], "gears": [1e12] * 5}
 FAILED = []
 
 
@@ -243,14 +247,16 @@ def summary(mm):
     return {"rms_mm": round(float(np.sqrt((mm**2).mean())), 2), "p95_mm": round(float(np.percentile(mm, 95)), 2), "max_mm": round(float(mm.max()), 2)}
 
 
-def measurements(folder, name, data, frames, plays):
+def measurements(folder, name, data, frames, plays, stiff):
     """Writes a measurement file and its table; returns its path."""
     table = "\n".join(",".join(repr(float(x)) for x in np.append(q, p)) for q, p in zip(data["q"], data["prism"]))
     (folder / f"{name}.csv").write_text(",".join(JOINTS + ["x", "y", "z"]) + "\n" + table + "\n")
-    fit = ["drive.*stiffness*", "drive.*guide*"] + (["joint.dsr*"] if frames else [])
+    fit = ([] if stiff else ["drive.*stiffness*", "drive.*guide*"]) + (["joint.dsr*"] if frames else [])
     tie = [f"drive.*.guide.{axis}.compliance[{k}]" for axis in "xy" for k in range(3)]
     tie += [f"drive.*.guide.{axis}.play.{key}" for axis in plays for key in START_PLAY]
-    text = f'format = 1\nfit = {json.dumps(fit)}\nkeep = ["drive.{FOOT}.gearbox.stiffness[2]"]\ntie = {json.dumps(tie)}\n'
+    text = f"format = 1\nfit = {json.dumps(fit)}\n"
+    if not stiff:
+        text += f'keep = ["drive.{FOOT}.gearbox.stiffness[2]"]\ntie = {json.dumps(tie)}\n'
     text += "[instrument.station]\n[target.prism]\nxyz = [0.0, 0.0, 0.0]\nunknown = true\n"
     text += f'[[place]]\nfile = "{name}.csv"\nstd = 0.001\n'
     path = folder / f"{name}.toml"
@@ -258,14 +264,15 @@ def measurements(folder, name, data, frames, plays):
     return path
 
 
-def identified(folder, name, urdf, gravity, data, frames, plays):
+def identified(folder, name, urdf, gravity, data, frames, plays, stiff=False):
     """Identifies a model; returns the robot file with the prism as TCP, and the answer."""
+    start = STIFF if stiff else START
     play = tuple(START_PLAY.values())
     given = [play if axis in plays else None for axis in "xy"]
-    text = robot_text(urdf, gravity, [START["foot"]] * 2, [START["tilt"]] * 2, START["gears"], given)
+    text = robot_text(urdf, gravity, [start["foot"]] * 2, [start["tilt"]] * 2, start["gears"], given)
     robot = folder / f"{name}_start.toml"
     robot.write_text(text)
-    found = run("identify", robot, measurements(folder, name, data, frames, plays), "--json", "-o", folder / name)
+    found = run("identify", robot, measurements(folder, name, data, frames, plays, stiff), "--json", "-o", folder / name)
     written = (folder / name / "robot.toml").read_text()
     target = found["targets"][0]["xyz"]
     (folder / name / "robot.toml").write_text(written.replace('{ link = "prism" }', f'{{ link = "prism", xyz = {target!r} }}'))
@@ -312,25 +319,46 @@ def positions(folder, source, flat, floors, down):
     print("2. Positions: rms of the distance [mm]: fitted, held out (p95, largest), other floors")
     half = np.arange(len(flat["q"])) % 2 == 0
     train, held = some(flat, half), some(flat, ~half)
-    models, kept = [], {}
+    models, kept, whole = [], {}, []
+
+    def judged(robot, entry):
+        """Adds the figures of all sets to an entry; returns the distances of the held-out poses."""
+        own = places(robot, train["q"])
+        at = station(own, train["prism"])
+        entry["train"] = summary(figures(own, train["prism"], at))
+        mm = figures(places(robot, held["q"]), held["prism"], at)
+        entry["held_out"] = summary(mm)
+        on_others(robot, entry)
+        out = entry["held_out"]
+        print(f"   {entry['name']}: {entry['train']['rms_mm']}, {out['rms_mm']} ({out['p95_mm']}, {out['max_mm']}), outdoor {entry['outdoor']['rms_mm']}, pallet {entry['pallet']['rms_mm']}")
+        return mm
+
+    def on_others(robot, entry):
+        for floor in FLOORS:
+            own = places(on_floor(robot, GRAVITY * down[floor], floor), floors[floor]["q"])
+            entry[floor] = summary(figures(own, floors[floor]["prism"], station(own, floors[floor]["prism"])))
+
     for urdf in URDFS:
         for plays in ("", "y", "xy"):
             frames = urdf == "published"
             name = f"{urdf}_{plays or 'springs'}"
             robot, found = identified(folder, name, URDFS[urdf], GRAVITY * down["flat"], train, frames, plays)
-            at = station(places(robot, train["q"]), train["prism"])
             entry = {"name": name, "urdf": urdf, "play": bool(plays), "about": plays, "free_numbers": len(found["parameters"]) + 9}
-            entry["train"] = summary(figures(places(robot, train["q"]), train["prism"], at))
-            mm = figures(places(robot, held["q"]), held["prism"], at)
-            entry["held_out"] = summary(mm)
-            for floor in FLOORS:
-                own = places(on_floor(robot, GRAVITY * down[floor], floor), floors[floor]["q"])
-                entry[floor] = summary(figures(own, floors[floor]["prism"], station(own, floors[floor]["prism"])))
-            out = entry["held_out"]
-            print(f"   {name}: {entry['train']['rms_mm']}, {out['rms_mm']} ({out['p95_mm']}, {out['max_mm']}), outdoor {entry['outdoor']['rms_mm']}, pallet {entry['pallet']['rms_mm']}")
-            report(f"   {name}: held out", out["rms_mm"], 1.35 if plays else 2.0, "mm")
+            mm = judged(robot, entry)
+            report(f"   {name}: held out", entry["held_out"]["rms_mm"], 1.35 if plays else 2.0, "mm")
             models.append(entry)
             kept[name] = (mm, found)
+            if plays != "xy":
+                robot, found = identified(folder, f"{name}_whole", URDFS[urdf], GRAVITY * down["flat"], flat, frames, plays)
+                own = places(robot, flat["q"])
+                all_of_it = {"name": name, "train": summary(figures(own, flat["prism"], station(own, flat["prism"])))}
+                on_others(robot, all_of_it)
+                print(f"   {name}, fitted to all {len(flat['q'])} poses: {all_of_it['train']['rms_mm']}, outdoor {all_of_it['outdoor']['rms_mm']}, pallet {all_of_it['pallet']['rms_mm']}")
+                whole.append(all_of_it)
+    robot, found = identified(folder, "published_rigid", URDFS["published"], GRAVITY * down["flat"], train, True, "", stiff=True)
+    frames_only = {"name": "published_rigid", "urdf": "published", "free_numbers": len(found["parameters"]) + 9}
+    judged(robot, frames_only)
+    report("   published URDF, joint frames fitted, rigid: held out", frames_only["held_out"]["rms_mm"], None, "mm")
     chain = Chain(source / URDFS["calibrated"])
     own = lambda data: np.array([chain.prism(q) for q in data["q"]])
     at = station(own(train), train["prism"])
@@ -344,7 +372,11 @@ def positions(folder, source, flat, floors, down):
         for p in kept["calibrated_y"][1]["parameters"]
         if p["identifiable"]
     ]
-    return models, rigid, np.round(scatter, 2).tolist(), numbers
+    for urdf, undeformed in (("calibrated", rigid), ("published", frames_only)):
+        best = next(m for m in models if m["name"] == f"{urdf}_y")["held_out"]["rms_mm"]
+        part = 1 - (best / undeformed["held_out"]["rms_mm"]) ** 2
+        print(f"   {urdf}: springs and play about y explain {100 * part:.1f} % of the mean square of the rigid robot")
+    return {"models": models, "whole": whole, "rigid": rigid, "rigid_frames": frames_only, "scatter": np.round(scatter, 2).tolist(), "identified": numbers}
 
 
 def tilts(source, flat, gravity):
@@ -380,6 +412,20 @@ def tilts(source, flat, gravity):
             rows.append({"height_m": float(height), "axis": "xy"[axis], "measured_urad_per_nm": round(float(measured), 2), "law_urad_per_nm": round(float(own), 2), "r2": round(float(r2), 4)})
             report(f"   {height:.2f} m about {'xy'[axis]}: {measured:.2f}, {own:.2f}", abs(own / measured - 1), 0.05 if axis == 0 else None, "")
         print(f"   law about {'xy'[axis]}: {c[0]:.3f} + {c[1]:.3f} sum 1/l + {c[2]:.4f} sum 1/l^2")
+    return rows
+
+
+def foot_tilts(source, sets, down):
+    """Tilt of the column's foot over the moment of the weight: how far the floor yields."""
+    print("4. Tilt of the foot: range [urad], slope over the moment [urad/(N m)]")
+    chain, rows = Chain(source / URDFS["published"]), []
+    for floor, data in sets.items():
+        turned = 1e6 * np.column_stack([data["foot"][:, 1], -data["foot"][:, 0]]) / np.linalg.norm(data["foot"], axis=1)[:, None]
+        moments = np.array([moment_at_mount(chain, q, down[floor]) for q in data["q"]])
+        for axis in (0, 1):
+            slope = np.polyfit(moments[:, axis], turned[:, axis], 1)[0]
+            rows.append({"floor": floor, "axis": "xy"[axis], "range_urad": round(float(np.ptp(turned[:, axis]))), "urad_per_nm": round(float(slope), 2)})
+            print(f"   {floor} about {'xy'[axis]}: {rows[-1]['range_urad']}, {rows[-1]['urad_per_nm']}")
     return rows
 
 
@@ -426,8 +472,9 @@ def main():
             "outside": {name: hashlib.sha256((source / name).read_bytes()).hexdigest() for name in needed},
             "method": method(folder, source, flat, down["flat"], given),
         }
-        found["models"], found["rigid"], found["scatter"], found["identified"] = positions(folder, source, flat, floors, down)
+        found.update(positions(folder, source, flat, floors, down))
         found["tilts"] = tilts(source, flat, down["flat"])
+        found["foot"] = foot_tilts(source, {"flat": flat, **floors}, down)
     if arguments.output:
         arguments.output.write_text(json.dumps(found, indent=1) + "\n")
     sys.exit(f"too large: {', '.join(FAILED)}" if FAILED else 0)
