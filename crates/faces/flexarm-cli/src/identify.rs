@@ -155,6 +155,9 @@ fn readable(unit: &str) -> (&str, f64) {
     }
 }
 
+/// Maximum number of undetermined combinations in the terminal.
+const MOST_COMBINATIONS: usize = 8;
+
 fn text(found: &Identification) -> String {
     let Identification { robot, measurements, readings, numbers, .. } = found;
     let mut out = format!("{robot}: {readings} readings with {numbers} numbers of {measurements}\n\n");
@@ -208,9 +211,12 @@ fn text(found: &Identification) -> String {
             shape.reading, shape.mode, shape.assurance, shape.assurance_before
         );
     }
-    for combination in &found.untold {
+    for combination in found.untold.iter().take(MOST_COMBINATIONS) {
         let parts: Vec<String> = combination.iter().map(|w| format!("{:+.2} {}", w.weight, w.name)).collect();
         out += &format!("not determined: {}\n", parts.join(" "));
+    }
+    if let Some(more) = found.untold.len().checked_sub(MOST_COMBINATIONS).filter(|more| *more > 0) {
+        out += &format!("not determined: {more} more combinations (--json and the page list them)\n");
     }
     for s in &found.suspicious {
         out += &format!(

@@ -68,8 +68,9 @@ fn places(case: &mut Case, stored: &Stored) -> Result<(), Error> {
         "Root mean square of the distance from the measured position, and largest distance of the held-out poses [mm].";
     let heads = ["model", "URDF", "numbers fitted", "fitted poses", "held out", "largest", "outdoors", "on a pallet"];
     let mut table = Table::new(caption, &heads);
-    let rigid_mm = stored.number("rigid/held_out/rms_mm")?;
     table.rows.push(row("rigid", stored.at("rigid")?, "6"));
+    let frames = stored.at("rigid_frames")?;
+    table.rows.push(row("rigid, joint frames fitted", frames, &count(frames)));
     for (k, model) in list(stored, "models")?.iter().enumerate() {
         let play = model["play"].as_bool() == Some(true);
         let name = match model["about"].as_str() {
@@ -77,8 +78,10 @@ fn places(case: &mut Case, stored: &Stored) -> Result<(), Error> {
             Some("xy") => "springs, play about x and y",
             _ => "springs",
         };
-        let numbers = model["free_numbers"].as_u64().map_or("?".to_owned(), |n| n.to_string());
-        table.rows.push(row(name, model, &numbers));
+        table.rows.push(row(name, model, &count(model)));
+        // Each model is compared with the rigid robot of the same URDF, with the same frames.
+        let rigid = if model["urdf"] == "published" { "rigid_frames" } else { "rigid" };
+        let rigid_mm = stored.number(&format!("{rigid}/held_out/rms_mm"))?;
         let held = stored.number(&format!("models/{k}/held_out/rms_mm"))?;
         let claim = format!(
             "held-out positions over those of the rigid robot: {name}, {} URDF",
@@ -90,6 +93,10 @@ fn places(case: &mut Case, stored: &Stored) -> Result<(), Error> {
     case.table(table);
     case.figure(distances(stored)?);
     Ok(())
+}
+
+fn count(model: &Value) -> String {
+    model["free_numbers"].as_u64().map_or("?".to_owned(), |n| n.to_string())
 }
 
 fn row(name: &str, model: &Value, numbers: &str) -> Vec<Cell> {

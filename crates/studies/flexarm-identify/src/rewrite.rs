@@ -112,18 +112,26 @@ fn put(file: &mut DocumentMut, found: &ParameterEstimate, written: &ParameterLoc
 fn comments(found: &[(ParameterEstimate, ParameterLocation)]) -> String {
     let mut out = String::from("# Identified by flexarm identify: value, standard deviation, previous value.\n");
     let mut last = "";
-    for (ParameterEstimate { name, unit, value, std, initial, .. }, _) in found {
+    for (ParameterEstimate { name, unit, value, std, initial, identifiable, .. }, _) in found {
         // Tied parameters have several places.
         if std::mem::replace(&mut last, name) == name {
             continue;
         }
         let deviation = match std.is_finite() {
-            true => format!("+- {} {unit}", rounded(*std, *std)),
+            true => format!("+- {} {unit}", plain(rounded(*std, *std))),
+            false if !identifiable => format!("{unit} (found together with others)"),
             false => format!("{unit} (the fit does not reproduce the readings: no standard deviation)"),
         };
-        out += &format!("#   {name} = {} {deviation}, was {initial}\n", rounded(*value, *std));
+        let value = if *identifiable { rounded(*value, *std) } else { rounded(*value, 1e-4 * value.abs()) };
+        out += &format!("#   {name} = {} {deviation}, was {}\n", plain(value), plain(*initial));
     }
     out + "\n"
+}
+
+/// Formats a number with the digits it has, small ones with an exponent.
+fn plain(x: f64) -> String {
+    let text = format!("{x:?}");
+    text.strip_suffix(".0").map_or_else(|| text.clone(), str::to_owned)
 }
 
 /// Rounds a value to two digits beyond the first digit of its deviation.
