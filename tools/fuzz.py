@@ -893,25 +893,7 @@ def with_visual(shape):
 
 
 BOX = with_visual('<box size="0.8 0.02 0.04"/>')
-TELESCOPE = """<robot name="lift">
-  <link name="floor"><inertial><mass value="50"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
-  <link name="outer"><inertial><origin xyz="0 0 0.7"/><mass value="20"/><inertia ixx="2" iyy="2" izz="0.2" ixy="0" ixz="0" iyz="0"/></inertial></link>
-  <joint name="foot" type="fixed"><parent link="floor"/><child link="outer"/><origin xyz="0 0 0.1"/></joint>
-  <link name="middle"><inertial><origin xyz="0 0 0.7"/><mass value="15"/><inertia ixx="2" iyy="2" izz="0.2" ixy="0" ixz="0" iyz="0"/></inertial></link>
-  <joint name="lower" type="prismatic"><parent link="outer"/><child link="middle"/><axis xyz="0 0 1"/>
-    <limit lower="0" upper="1.1" velocity="5" effort="1000"/><mimic joint="lift" multiplier="0.5" offset="0.05"/></joint>
-  <joint name="lift" type="prismatic"><parent link="middle"/><child link="carrier"/><axis xyz="0 0 1"/>
-    <limit lower="0" upper="2" velocity="5" effort="1000"/></joint>
-  <link name="carrier"><inertial><mass value="0.001"/><inertia ixx="1e-6" iyy="1e-6" izz="1e-6" ixy="0" ixz="0" iyz="0"/></inertial></link>
-  <joint name="turn" type="revolute"><parent link="carrier"/><child link="arm"/><axis xyz="0 0 1"/><origin xyz="0 0 0.2"/>
-    <limit lower="-3" upper="3" velocity="5" effort="1000"/></joint>
-  <link name="arm"><inertial><origin xyz="0.8 0 0"/><mass value="40"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
-  <joint name="wrist" type="revolute"><parent link="arm"/><child link="hand"/><axis xyz="0 1 0"/><origin xyz="0.9 0 0"/>
-    <limit lower="-3" upper="3" velocity="5" effort="1000"/></joint>
-  <link name="hand"><inertial><origin xyz="0.2 0 0"/><mass value="4"/><inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>
-  <link name="tcp"/>
-  <joint name="flange" type="fixed"><parent link="hand"/><child link="tcp"/><origin xyz="0.3 0 0.1"/></joint>
-</robot>"""
+TELESCOPE = (ROOT / "crates/faces/flexarm/tests/data/lift.urdf").read_text()
 
 TELESCOPE_ROBOT = """format = 1
 urdf = "beam.urdf"

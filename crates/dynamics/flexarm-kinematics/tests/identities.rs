@@ -574,6 +574,7 @@ fn rotors_that_turn_with_two_joints_are_in_every_algorithm() {
 /// Truth: the model of the mechanism whose joint is written with the other frame.
 #[test]
 fn a_joint_frame_set_in_a_model_is_that_of_a_mechanism_with_this_frame() {
+    let mut worst = 0.0f64;
     for seed in 0..8 {
         let tree = if seed % 2 == 0 { random_tree(seed, 6) } else { random_flexible_tree(seed, 6) };
         let mut draw = Draw(seed ^ 0xF4A3E);
@@ -600,9 +601,10 @@ fn a_joint_frame_set_in_a_model_is_that_of_a_mechanism_with_this_frame() {
                 .collect::<Vec<_>>()
                 .try_into()
                 .unwrap();
-            // measured 3e-15
-            assert!(difference(&one, &other) < 1e-12, "{seed} {joint} {:e}", difference(&one, &other));
+            worst = worst.max(difference(&one, &other));
             set.set_joint_frame(body, before);
         }
     }
+    eprintln!("frames {worst:.1e}");
+    assert!(worst < 1e-12, "{worst:e}"); // measured 2e-16
 }

@@ -188,6 +188,7 @@ impl Guide {
 }
 
 #[cfg(test)]
+#[allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 mod tests {
     use super::*;
 
@@ -200,47 +201,48 @@ mod tests {
     fn the_moment_is_the_inverse_of_the_tilt_and_its_slope_the_derivative() {
         let mut narrow = with_play();
         narrow.play = Some(Play { gap: 1e-3, centre: -3.0, width: 0.01 });
+        let mut worst = [0.0f64; 2];
         for guide in [with_play(), narrow, Guide { play: None, ..with_play() }] {
             for q in [0.0, 1.3, 2.4] {
                 for moment in (-200..=200).map(|k| 2.3 * f64::from(k)).chain([-0.02, 0.0, 5.8, 6.3]) {
                     let [theta, compliance] = guide.tilt(moment, guide.overlap(&[q]));
-                    let back = guide.torque(theta, &[q]);
-                    // measured 5.7e-14
-                    assert!((back - moment).abs() < 1e-11, "{q} {moment} {back}");
-                    // measured 1.3e-12
-                    assert!((guide.slope(theta, &[q]) * compliance - 1.0).abs() < 1e-9, "{q} {moment}");
+                    let off = [guide.torque(theta, &[q]) - moment, guide.slope(theta, &[q]) * compliance - 1.0];
+                    worst.iter_mut().zip(off).for_each(|(worst, off)| *worst = worst.max(off.abs()));
                 }
             }
         }
+        eprintln!("moment {:.1e} N m, slope {:.1e}", worst[0], worst[1]);
+        assert!(worst[0] < 1e-11 && worst[1] < 1e-9, "{worst:?}"); // measured 2.3e-13 N m, 1e-15
     }
 
     #[test]
     fn moment_and_reaction_are_derivatives_of_the_energy() {
-        let guide = with_play();
+        let (guide, mut worst) = (with_play(), [0.0f64; 2]);
         for (theta, q) in [(1e-3, 2.2), (-4e-4, 1.0), (2e-5, 2.0)] {
             let h = 1e-7;
             let by_tilt = (guide.energy(theta + h, &[q]) - guide.energy(theta - h, &[q])) / (2.0 * h);
-            // measured 3.3e-9
-            assert!((by_tilt / guide.torque(theta, &[q]) - 1.0).abs() < 1e-6, "{by_tilt}");
             let h = 1e-5;
             let by_joint = (guide.energy(theta, &[q + h]) - guide.energy(theta, &[q - h])) / (2.0 * h);
-            // measured 1.1e-8
-            assert!((by_joint / guide.reaction(theta, &[q]) - 1.0).abs() < 1e-6, "{by_joint}");
+            let off = [by_tilt / guide.torque(theta, &[q]) - 1.0, by_joint / guide.reaction(theta, &[q]) - 1.0];
+            worst.iter_mut().zip(off).for_each(|(worst, off)| *worst = worst.max(off.abs()));
         }
+        eprintln!("moment {:.1e}, reaction {:.1e}", worst[0], worst[1]);
+        assert!(worst[0] < 1e-6 && worst[1] < 1e-6, "{worst:?}"); // measured 1.1e-8, 2.6e-10
     }
 
     #[test]
     fn derivatives_by_the_numbers_of_the_law_are_those_of_the_moment() {
-        let guide = with_play();
+        let (guide, mut worst) = (with_play(), 0.0f64);
         let terms = (0..3).map(GuideTerm::Compliance).chain([GuideTerm::Gap, GuideTerm::Centre, GuideTerm::Width]);
         for (term, h) in terms.zip([1e-10, 1e-10, 1e-10, 1e-8, 1e-4, 1e-4]) {
             for (theta, q) in [(1e-3, 2.2), (-4e-4, 1.0), (2e-4, 2.0)] {
                 let at = |change: f64| guide.with(term, change).torque(theta, &[q]);
                 let (difference, slope) = ((at(h) - at(-h)) / (2.0 * h), guide.torque_slope(term, theta, &[q]));
-                // measured 5.5e-8
-                assert!((difference / slope - 1.0).abs() < 1e-5, "{term:?} {difference} {slope}");
+                worst = worst.max((difference / slope - 1.0).abs());
             }
         }
+        eprintln!("derivatives {worst:.1e}");
+        assert!(worst < 1e-5, "{worst:e}"); // measured 2.5e-8
     }
 
     #[test]

@@ -54,7 +54,7 @@ fn the_tilt_of_a_column_grows_as_its_tubes_overlap_less() {
         let moment = MASS * 9.81 * (LEVER * e[1].cos() + height * e[1].sin());
         let error = e[1] / (C * moment) - 1.0;
         eprintln!("{position} {} {error:.1e}", e[1]);
-        // measured 2e-15
+        // measured 3e-16
         assert!(error.abs() < 1e-10 && e[0].abs() < 1e-12, "{position} {e} {error:e}");
         // The tangent of a pose is that of the guide at this overlap.
         let tool = arm.model.frame("upper").expect("there").clone();
@@ -79,8 +79,10 @@ fn a_guide_with_play_leans_to_the_side_of_its_load() {
     let height = position + 0.3 - 0.5 * (OUTER_END + position);
     let moment = MASS * 9.81 * (LEVER * e[1].cos() + height * e[1].sin());
     let lean = |moment: f64| 0.5 * play.gap / l * ((moment - play.centre) / play.width).tanh();
-    // measured 1.3e-8: the tilt about x tilts the axis of the other one as well
-    assert!((e[1] / (C * moment + lean(moment)) - 1.0).abs() < 1e-7, "{e}");
+    let error = e[1] / (C * moment + lean(moment)) - 1.0;
+    eprintln!("with play {error:.1e}");
+    // measured 9.7e-9: the tilt about x tilts the axis of the other one as well
+    assert!(error.abs() < 1e-7, "{e}");
     assert!((e[0] / lean(0.0) - 1.0).abs() < 0.2, "without load it leans to the side of its centre: {e}");
 }
 
@@ -105,9 +107,12 @@ fn the_drive_of_a_lifting_column_does_the_work_that_its_energy_takes() {
     });
     let play = Play { gap: 2e-3, centre: 5.0, width: 60.0 };
     let alpha = StepperKind::GeneralizedAlpha(AlphaSettings { rho: 1.0, dispersion_correction: false });
-    for (kind, h) in
-        [(alpha, 2e-5), (StepperKind::Rk4, 2e-5), (StepperKind::Reference(ReferenceSettings::new(1e-10)), 1e-4)]
-    {
+    for (kind, h) in [
+        (alpha, 2e-5),
+        (StepperKind::Sdirk3, 5e-5),
+        (StepperKind::Rk4, 2e-5),
+        (StepperKind::Reference(ReferenceSettings::new(1e-10)), 1e-4),
+    ] {
         let arm = Arc::new(arm(Some(play), 0.0, Arc::new(MotionFn(lift.0))));
         let mut stepper = new_stepper(kind, arm.clone(), h, Start::Undeformed).expect("starts");
         let mut seen = Observation::new(&arm);
@@ -126,7 +131,7 @@ fn the_drive_of_a_lifting_column_does_the_work_that_its_energy_takes() {
             largest = largest.max(seen.energy[2]);
         }
         eprintln!("{kind:?}: {worst:.1e} J of {largest:.2} J elastic, reaction {without:.2} J");
-        // measured 4e-6, 1e-5 and 3e-4 of the work of the reaction
+        // measured 4e-6, 7e-5, 1e-5 and 3e-4 of the work of the reaction
         assert!(
             worst < 2e-3 * without.abs() && without.abs() > 0.01 * largest,
             "{kind:?}: {worst:e} {without:e} {largest:e}"

@@ -76,7 +76,8 @@ pub struct GearSpring {
     pub joint: String,
     /// Index of the spring within its gearbox.
     pub component: usize,
-    /// Stiffness for its coordinates.
+    /// Stiffness for its coordinates; 1 for a guide, whose law depends on the joint and is the
+    /// caller's.
     pub K: DMatrix<f64>,
 }
 

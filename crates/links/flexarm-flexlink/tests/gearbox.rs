@@ -51,8 +51,7 @@ fn full() -> Matrix6<f64> {
     (A * A.transpose()) * 1e5
 }
 
-/// Truth: the rigid robot, rotors included. Measured: no difference in mass matrix and torques
-/// without a guide, 4e-16 with one.
+/// Truth: the rigid robot, rotors included. Measured: no difference in mass matrix and torques.
 #[test]
 fn undeflected_gearboxes_change_nothing() {
     let tubes = GuideTubes { outer_end: 0.9, inner_end: -0.1, tilts: [true, false, true] };
@@ -260,7 +259,7 @@ fn a_guide_tilts_in_the_middle_of_the_overlap_also_of_a_joint_that_mimics_anothe
         let tilted = column * middle * Pose::from_parts(nalgebra::Translation3::identity(), turn);
         let truth = tilted * middle.inverse() * column.inverse() * X_WT(&rigid, &rigid_data, "tip");
         let error = (X_WT(&model, &data, "tip").to_homogeneous() - truth.to_homogeneous()).amax();
-        // measured 2e-16
-        assert!(error < 1e-14, "{follows} {error:e}");
+        eprintln!("tilted tubes {error:.1e}");
+        assert!(error < 1e-14, "{follows} {error:e}"); // measured 2e-16
     }
 }

@@ -307,7 +307,11 @@ fn drive(
         return Err(fail(entry.joint.span(), format!("the robot has no such movable joint; it has {known:?}")));
     };
     let kind = kind_of(entry, source)?;
-    let of_motor = entry.friction.is_some() || entry.servo.is_some() || entry.motor_inertia.is_some();
+    let of_motor = entry.friction.is_some()
+        || entry.servo.is_some()
+        || entry.motor_inertia.is_some()
+        || entry.ratio.is_some()
+        || entry.torque_limit.is_some();
     if joint.kind == JointKind::Fixed && (kind == DriveKind::Torque || of_motor) {
         let text = "the joint is fixed: as an elastic connection it has kind = \"gearbox\" and a gearbox, no motor";
         return Err(fail(entry.kind.span(), text.into()));

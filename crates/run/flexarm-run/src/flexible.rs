@@ -556,11 +556,10 @@ impl Robot {
                 curve: damping.curve.clone().map(SpringCurve::from),
                 geometric: None,
             };
-            let body = || model.bodies().iter().find(|body| body.joint == gear.gearbox);
-            let joint = || self.rigid.joint(&gear.gearbox);
-            if let (Some(tubes), Some(tilt)) = (self.drives[number].guide(), damping.tilts.get(gear.component))
-                && let (Some(body), Some(joint)) = (body(), joint())
-            {
+            if let (Some(tubes), Some(tilt)) = (self.drives[number].guide(), damping.tilts.get(gear.component)) {
+                let body = model.bodies().iter().find(|body| body.joint == gear.gearbox);
+                let joint = self.rigid.joint(&gear.gearbox);
+                let (Some(body), Some(joint)) = (body, joint) else { continue };
                 let (law, stiffness) = guide_law(tubes, tilt, body, &joint.limits);
                 (spring.curve, spring.K) = (Some(law), DMatrix::from_element(1, 1, stiffness));
             }
