@@ -188,7 +188,6 @@ impl Guide {
 }
 
 #[cfg(test)]
-#[allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 mod tests {
     use super::*;
 
@@ -211,7 +210,6 @@ mod tests {
                 }
             }
         }
-        eprintln!("moment {:.1e} N m, slope {:.1e}", worst[0], worst[1]);
         assert!(worst[0] < 1e-11 && worst[1] < 1e-9, "{worst:?}"); // measured 2.3e-13 N m, 1e-15
     }
 
@@ -226,7 +224,6 @@ mod tests {
             let off = [by_tilt / guide.torque(theta, &[q]) - 1.0, by_joint / guide.reaction(theta, &[q]) - 1.0];
             worst.iter_mut().zip(off).for_each(|(worst, off)| *worst = worst.max(off.abs()));
         }
-        eprintln!("moment {:.1e}, reaction {:.1e}", worst[0], worst[1]);
         assert!(worst[0] < 1e-6 && worst[1] < 1e-6, "{worst:?}"); // measured 1.1e-8, 2.6e-10
     }
 
@@ -241,7 +238,6 @@ mod tests {
                 worst = worst.max((difference / slope - 1.0).abs());
             }
         }
-        eprintln!("derivatives {worst:.1e}");
         assert!(worst < 1e-5, "{worst:e}"); // measured 2.5e-8
     }
 
