@@ -12,7 +12,8 @@ Rules:
   * only faces print; from base to results only the writers of recordings read a clock;
   * no library crate refers to a command line: flags, environment, exit (exceptions: ALLOWED);
   * purely numerical crates (NUMBERS) do not access files;
-  * every crate uses the workspace's lints and is named in ARCHITECTURE.md, which names no other.
+  * every crate uses the workspace's lints and is named in ARCHITECTURE.md, which names no other;
+  * a tests/main.rs names every file of its folder.
 """
 import json
 import re
@@ -278,6 +279,11 @@ def check_manifest(crate, path, text):
     return [f"{path}: {crate} does not take the workspace's lints: add [lints] workspace = true"]
 
 
+def check_suite(crate, main, files):
+    """A file that tests/main.rs does not name is not compiled."""
+    return [f"{crate}: tests/main.rs has no line \"mod {name};\"" for name in files if not re.search(rf"^mod {name};", main, re.M)]
+
+
 def check_workspace():
     command = ["cargo", "metadata", "--format-version", "1", "--no-deps"]
     packages = json.loads(subprocess.run(command, cwd=ROOT, check=True, stdout=subprocess.PIPE).stdout)["packages"]
@@ -287,6 +293,10 @@ def check_workspace():
     sources = 0
     for crate, manifest in place.items():
         problems += check_manifest(crate, manifest.as_posix(), (ROOT / manifest).read_text(encoding="utf-8"))
+        suite = ROOT / manifest.parent / "tests" / "main.rs"
+        if suite.exists():
+            files = sorted(path.stem for path in suite.parent.glob("*.rs") if path != suite)
+            problems += check_suite(crate, suite.read_text(encoding="utf-8"), files)
         base = ROOT / manifest.parent / "src"
         texts = {path.relative_to(base).as_posix(): path.read_text(encoding="utf-8") for path in sorted(base.rglob("*.rs"))}
         sources += len(texts)
@@ -339,6 +349,8 @@ def self_test():
         ("a cycle of three files", check_cycles("c", {**chain, "c.rs": "use crate::{a::X, e};"}), None),
         ("a cycle of paths in code, by super", check_cycles("c", {**chain, "d.rs": "fn f() { super::a::g() }"}), "4 files import each other"),
         ("a cycle of tests", check_cycles("c", {**chain, "d.rs": "fn f() {}\n#[cfg(test)]\nmod tests { use crate::a::X; }"}), None),
+        ("a file of tests that is not compiled", check_suite("c", "mod a;\n// mod b;\n", ["a", "b"]), 'no line "mod b;"'),
+        ("files of tests, all named", check_suite("c", "mod a;\nmod b;\n", ["a", "b"]), None),
         ("printing", source("run", 'fn f() {\n    println!("x");\n}\n'), "c.rs:2: c prints"),
         ("printing to stderr", source("base", 'eprint!("x");'), "prints"),
         ("printing in the facade", check_source("flexarm", "faces", "c.rs", 'println!("x");'), "prints"),

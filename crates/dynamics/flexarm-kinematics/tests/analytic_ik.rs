@@ -1,20 +1,13 @@
 //! Analytic inverse kinematics against forward kinematics, a multi-start search, and manufacturers'
 //! data.
-#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
-#![allow(non_snake_case, reason = "monogram notation")]
-
-mod arms;
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-use arms::*;
+use crate::arms::*;
 use flexarm_kinematics::*;
 use flexarm_testkit::Draw;
-use flexarm_testkit::allocations::{CountingAllocator, count_allocations};
+use flexarm_testkit::allocations::count_allocations;
 use nalgebra::{DVector, Rotation3, Vector3};
-
-#[global_allocator]
-static ALLOCATOR: CountingAllocator = CountingAllocator;
 
 fn apart(a: &[f64; 6], b: &[f64; 6]) -> f64 {
     a.iter().zip(b).map(|(a, b)| ((a - b) - TAU * ((a - b) / TAU).round()).abs()).fold(0.0, f64::max)

@@ -1,6 +1,5 @@
 //! Balancers against closed forms: a pendulum with a spring, and a published hydraulic
 //! counterbalance.
-#![allow(non_snake_case, reason = "monogram notation")]
 
 use flexarm_kinematics::*;
 use nalgebra::{DMatrix, DVector, Vector3};

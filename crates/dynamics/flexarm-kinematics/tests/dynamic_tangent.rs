@@ -1,16 +1,10 @@
 //! Derivatives of inverse dynamics against Richardson extrapolation of differences of the
 //! recursion, on random trees.
-#![allow(non_snake_case, reason = "monogram notation")]
-#![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
-#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
 use flexarm_kinematics::*;
-use flexarm_testkit::allocations::{CountingAllocator, count_allocations};
+use flexarm_testkit::allocations::count_allocations;
 use flexarm_testkit::{Draw, random_state, random_tree};
 use nalgebra::{DMatrix, DVector};
-
-#[global_allocator]
-static ALLOCATOR: CountingAllocator = CountingAllocator;
 
 struct Case {
     model: Model,

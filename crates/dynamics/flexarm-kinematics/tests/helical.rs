@@ -1,8 +1,5 @@
 //! Helical joints against the closed form of a nut on a spindle, and against a rotation with a
 //! coupled translation.
-#![allow(non_snake_case, reason = "monogram notation")]
-#![allow(clippy::print_stderr, reason = "what was measured stands beside the bound")]
-#![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
 
 use std::f64::consts::TAU;
 

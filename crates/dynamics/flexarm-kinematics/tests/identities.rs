@@ -1,16 +1,10 @@
 //! Identities between the recursions on random trees: each algorithm is the truth for another.
-#![allow(non_snake_case, reason = "monogram notation")]
-#![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
-#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
 use flexarm_kinematics::*;
-use flexarm_testkit::allocations::{CountingAllocator, count_allocations};
+use flexarm_testkit::allocations::count_allocations;
 use flexarm_testkit::{Cloud, Draw, random_flexible_tree, random_state, random_tree};
 use nalgebra::{DMatrix, DVector, Matrix6xX, Vector3};
 use proptest::prelude::*;
-
-#[global_allocator]
-static ALLOCATOR: CountingAllocator = CountingAllocator;
 
 /// Maximum difference relative to the maximum entry.
 fn difference(a: &DVector<f64>, b: &DVector<f64>) -> f64 {

@@ -1,8 +1,5 @@
 //! Closed chains against closed forms, against Lagrange multipliers, and against the same loops cut
 //! elsewhere.
-#![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
-#![allow(non_snake_case, reason = "monogram notation")]
-#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
 use flexarm_kinematics::*;
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix6xX, Vector2, Vector3};

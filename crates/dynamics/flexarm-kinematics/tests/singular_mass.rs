@@ -1,5 +1,4 @@
 //! Forward dynamics with a mass matrix that is not positive definite.
-#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
 use flexarm_kinematics::{
     Data, Joint, JointKind, Link, LinkInertia, Mechanism, Model, ModelError, Pose, Roles, RotorCoupling, State,

@@ -1,7 +1,7 @@
 //! Cost of one step of the moving reference arm with each stepper.
 //!
 //! The work-precision table (time against error) is printed by
-//! `cargo test --release -p flexarm-stepping --test reference_arm -- --nocapture`; MuJoCo's step on
+//! `cargo test --release -p flexarm-stepping --test suite reference_arm -- --nocapture`; MuJoCo's step on
 //! the same arm takes 4.3 to 6.4 microseconds.
 #![allow(missing_docs, reason = "criterion's macros make public items")]
 #![allow(non_snake_case, reason = "monogram notation")]

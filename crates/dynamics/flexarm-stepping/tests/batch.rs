@@ -1,6 +1,4 @@
 //! Runs of one tree in parallel lanes against the same runs computed individually.
-#![allow(non_snake_case, reason = "monogram notation")]
-#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
 use std::sync::Arc;
 

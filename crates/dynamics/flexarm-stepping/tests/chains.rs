@@ -1,8 +1,5 @@
 //! Chains of rigid parts connected by springs: convergence of their deflection with the number of
 //! parts.
-#![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
-#![allow(non_snake_case, reason = "monogram notation")]
 
 use std::sync::Arc;
 

@@ -1,6 +1,4 @@
 //! Servos, friction, gearboxes with backlash, loads and payload changes, against closed forms.
-#![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
-#![allow(non_snake_case, reason = "monogram notation")]
 
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;

@@ -1,18 +1,12 @@
 //! Long chains: matrices on a tree and their elimination, compared with dense ones.
-#![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
-#![allow(non_snake_case, reason = "monogram notation")]
 
 use std::sync::Arc;
 
 use flexarm_kinematics::{ElasticAngles, Model};
 use flexarm_stepping::*;
-use flexarm_testkit::allocations::{CountingAllocator, count_allocations};
+use flexarm_testkit::allocations::count_allocations;
 use flexarm_testkit::{Draw, chain_arm};
 use nalgebra::{DMatrix, DVector};
-
-#[global_allocator]
-static ALLOCATOR: CountingAllocator = CountingAllocator;
 
 /// Returns chains with `joints` joints in two links and a branch, with a motion of all joints.
 fn arm(joints: usize, branch: usize, angles: ElasticAngles, damping: impl Fn(usize) -> Damping) -> FlexibleArm {

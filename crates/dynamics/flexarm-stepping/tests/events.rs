@@ -1,7 +1,4 @@
 //! Discrete events: payload changes, loads that start between steps, velocity jumps, failing steps.
-#![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
-#![allow(non_snake_case, reason = "monogram notation")]
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use std::sync::Arc;
 

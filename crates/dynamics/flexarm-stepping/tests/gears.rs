@@ -1,7 +1,4 @@
 //! Transmission errors, hysteresis, load-dependent friction and coupled gears against closed forms.
-#![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
-#![allow(non_snake_case, reason = "monogram notation")]
-#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
 use std::f64::consts::TAU;
 use std::sync::Arc;

@@ -1,7 +1,4 @@
 //! A body on a helical joint (spindle), driven and on a spring, in closed form with every stepper.
-#![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
-#![allow(non_snake_case, reason = "monogram notation")]
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use std::sync::Arc;
 

@@ -1,6 +1,4 @@
 //! Linearisation about a static pose against the nonlinear arm.
-#![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
-#![allow(non_snake_case, reason = "monogram notation")]
 
 use std::sync::Arc;
 

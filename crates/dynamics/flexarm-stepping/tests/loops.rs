@@ -1,19 +1,13 @@
 //! Arms with closed loops in motion: steppers against each other, statics, modes, energy, servos,
 //! refused cases.
-#![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
-#![allow(non_snake_case, reason = "monogram notation")]
-#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
 use std::sync::Arc;
 
 use flexarm_kinematics::{Data, Model, State, Wrench, forward_kinematics, frame_jacobian, inverse_dynamics};
 use flexarm_stepping::*;
-use flexarm_testkit::allocations::{CountingAllocator, count_allocations};
+use flexarm_testkit::allocations::count_allocations;
 use flexarm_testkit::palletising_arm;
 use nalgebra::{DVector, Matrix6xX, Vector3};
-
-#[global_allocator]
-static ALLOCATOR: CountingAllocator = CountingAllocator;
 
 const POSE: [f64; 3] = [0.3, 0.35, 0.2];
 

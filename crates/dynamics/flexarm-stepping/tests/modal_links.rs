@@ -1,7 +1,5 @@
 //! Arms with modal links: published spin-ups, conservation laws, steppers against each other,
 //! chains.
-#![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
-#![allow(non_snake_case, reason = "monogram notation")]
 
 use std::sync::Arc;
 
@@ -9,12 +7,9 @@ use flexarm_fem::{Bar, BeamLink, Material, ModalLink, ModalOptions, Section};
 use flexarm_flexlink::{FlexibleLink, GearStiffness, Gearbox, LinkForm, insert_gearboxes, substitute};
 use flexarm_kinematics::*;
 use flexarm_stepping::*;
-use flexarm_testkit::allocations::{CountingAllocator, count_allocations};
+use flexarm_testkit::allocations::count_allocations;
 use flexarm_testkit::{reference_arm, reference_motion};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3, vector};
-
-#[global_allocator]
-static ALLOCATOR: CountingAllocator = CountingAllocator;
 
 const fn alpha(rho: f64, dispersion_correction: bool) -> StepperKind {
     StepperKind::GeneralizedAlpha(AlphaSettings { rho, dispersion_correction })

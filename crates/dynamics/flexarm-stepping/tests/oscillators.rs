@@ -1,6 +1,4 @@
 //! Integrators on systems with closed-form solutions, independent of robots.
-#![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
-#![allow(non_snake_case, reason = "monogram notation")]
 
 use std::sync::Arc;
 

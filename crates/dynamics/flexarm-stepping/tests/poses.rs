@@ -1,6 +1,4 @@
 //! Many poses in parallel lanes against the same poses one by one.
-#![allow(non_snake_case, reason = "monogram notation")]
-#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
 use std::sync::Arc;
 

@@ -1,18 +1,13 @@
 //! The reference arm against a converged solution of another tool (Pinocchio's recursions, scipy's
 //! DOP853).
-#![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
-#![allow(non_snake_case, reason = "monogram notation")]
 
 use std::sync::Arc;
 
 use flexarm_kinematics::{Model, Wrench};
 use flexarm_stepping::*;
-use flexarm_testkit::allocations::{CountingAllocator, count_allocations};
+use flexarm_testkit::allocations::count_allocations;
 use flexarm_testkit::{reference_arm, reference_motion};
 use nalgebra::{DVector, Vector3};
-
-#[global_allocator]
-static ALLOCATOR: CountingAllocator = CountingAllocator;
 
 const GOLDEN: &str = include_str!("../../../../tests/golden/reference_arm_mid.csv");
 

@@ -1,6 +1,4 @@
 //! Reference stepper: closed forms, restarts, its work on the reference arm.
-#![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
-#![allow(non_snake_case, reason = "monogram notation")]
 
 use std::f64::consts::TAU;
 

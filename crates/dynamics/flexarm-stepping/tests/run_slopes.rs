@@ -1,8 +1,5 @@
 //! Derivatives of whole runs: closed form of one mass, Richardson differences of runs of the
 //! reference arm.
-#![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
-#![allow(non_snake_case, reason = "monogram notation")]
-#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
 use std::sync::Arc;
 
@@ -11,12 +8,9 @@ use flexarm_kinematics::{
     Wrench,
 };
 use flexarm_stepping::*;
-use flexarm_testkit::allocations::{CountingAllocator, count_allocations};
+use flexarm_testkit::allocations::count_allocations;
 use flexarm_testkit::{reference_arm, reference_motion};
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, Vector3};
-
-#[global_allocator]
-static ALLOCATOR: CountingAllocator = CountingAllocator;
 
 /// A mass on a vertical spring, with a damper.
 fn oscillator(m: f64, k: f64, d: f64) -> FlexibleArm {

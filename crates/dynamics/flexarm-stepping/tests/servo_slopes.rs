@@ -1,18 +1,12 @@
 //! Derivatives of runs with servos, gear laws and payload changes against Richardson differences of
 //! whole runs.
-#![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
-#![allow(non_snake_case, reason = "monogram notation")]
-#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
 use std::sync::Arc;
 
 use flexarm_kinematics::*;
 use flexarm_stepping::*;
-use flexarm_testkit::allocations::{CountingAllocator, count_allocations};
+use flexarm_testkit::allocations::count_allocations;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3, vector};
-
-#[global_allocator]
-static ALLOCATOR: CountingAllocator = CountingAllocator;
 
 const BETA: f64 = 1e-3;
 const GEAR: [f64; 3] = [9e4, 7e4, 3e4];

@@ -4,7 +4,6 @@
 //! These numbers were printed by the program itself and only show changes, such as a modification
 //! that gives the same results at twice the cost. If a change is intended, update the numbers; add
 //! a line for a new stepper.
-#![allow(non_snake_case, reason = "monogram notation")]
 
 use std::sync::Arc;
 

@@ -1,6 +1,4 @@
 //! At rest every stepper stays at the static equilibrium, for any step size.
-#![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
-#![allow(non_snake_case, reason = "monogram notation")]
 
 use std::sync::Arc;
 

@@ -1,8 +1,5 @@
 //! Derivatives of runs with closed loops, with modal links, and along motions with velocity jumps:
 //! against differences of whole runs.
-#![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
-#![allow(non_snake_case, reason = "monogram notation")]
-#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
 use std::sync::Arc;
 

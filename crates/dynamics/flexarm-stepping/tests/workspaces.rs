@@ -1,17 +1,12 @@
 //! Workspaces that are reused between runs of one arm.
-#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
-#![allow(non_snake_case, reason = "monogram notation")]
 
 use std::sync::Arc;
 
 use flexarm_kinematics::{Model, Wrench, forward_kinematics};
 use flexarm_stepping::*;
-use flexarm_testkit::allocations::{CountingAllocator, count_allocations};
+use flexarm_testkit::allocations::count_allocations;
 use flexarm_testkit::{reference_arm, reference_motion};
 use nalgebra::Vector3;
-
-#[global_allocator]
-static ALLOCATOR: CountingAllocator = CountingAllocator;
 
 /// Returns the reference motion at `speed` times its speed.
 fn motion(speed: f64) -> Arc<dyn PrescribedMotion> {

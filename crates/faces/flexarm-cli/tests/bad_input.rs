@@ -3,11 +3,8 @@
 //!
 //! The required words are those a user needs: file, location in it, what was found, what is
 //! expected. Tests marked `ignore` state the wanted behaviour that is not implemented yet.
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
-mod common;
-
-use common::{Answer, Place, ROBOT, SWING, URDF, flex, garbage, line_of, with};
+use crate::common::{self, Answer, Place, ROBOT, SWING, URDF, flex, garbage, line_of, with};
 
 /// Runs `compare` with the swing.
 fn compare_robot(place: &Place, robot: &str, words: &[&str]) -> Answer {

@@ -1,14 +1,10 @@
 //! Remains of a run that is killed or that fills the disk: files that are readable up to that
 //! point, and one clear message.
-#![cfg(all(unix, feature = "mcap"))]
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
-
-mod common;
 
 use std::process::Stdio;
 use std::time::{Duration, Instant};
 
-use common::{Answer, Place, Table, with};
+use crate::common::{self, Answer, Place, Table, with};
 
 /// A long run with much output: half a minute of rest in small steps.
 const LONG: [&str; 9] = ["compare", "robot.toml", "long.toml", "-o", "result", "--step", "1e-5", "--log-rate", "1000"];

@@ -1,9 +1,6 @@
 //! `flexarm convert` and `--parquet` from the user's point of view.
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
-mod common;
-
-use common::{Answer, Place, Table};
+use crate::common::{Answer, Place, Table};
 use serde_json::Value;
 
 /// A folder with the recordings of a run in `result`.

@@ -1,13 +1,9 @@
 //! Runs across discrete events, the same with every stepper: payloads, corners of a motion; joint
 //! efforts of all of them.
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
-#![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
-
-mod common;
 
 use std::fmt::Write as _;
 
-use common::{Place, shipped_robot, shipped_trajectory};
+use crate::common::{Place, shipped_robot, shipped_trajectory};
 use flexarm::{STEPPERS, StepRule, StepperEntry};
 use serde_json::Value;
 

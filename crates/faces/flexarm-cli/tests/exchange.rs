@@ -1,16 +1,9 @@
 //! `flexarm import` and `flexarm export` from the user's point of view.
-#![allow(
-    clippy::unwrap_used,
-    clippy::print_stderr,
-    reason = "a test stops at the first failure and says what it skips"
-)]
-
-mod common;
 
 use std::path::PathBuf;
 
-use common::flex;
-use common::{Place, matrix, numbers};
+use crate::common::flex;
+use crate::common::{self, Place, matrix, numbers};
 
 /// Maximum difference of two matrices over the geometric mean of the diagonal of the first.
 fn difference(a: &[Vec<f64>], b: &[Vec<f64>]) -> f64 {

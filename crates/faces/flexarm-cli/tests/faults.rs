@@ -1,14 +1,9 @@
 //! Full disks, removed folders, signals, concurrent runs: remaining files and messages of a run.
-#![cfg(unix)]
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
-#![allow(clippy::print_stderr, reason = "a test that skips says so")]
-
-mod common;
 
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use common::{Answer, Place, Table, with};
+use crate::common::{self, Answer, Place, Table, with};
 
 /// A long run: half a minute of rest in small steps.
 const LONG: [&str; 9] = ["compare", "robot.toml", "long.toml", "-o", "result", "--step", "1e-5", "--log-rate", "1000"];

@@ -1,9 +1,6 @@
 //! Names with control characters, markup and formulas: no output interprets them.
-#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
-mod common;
-
-use common::Place;
+use crate::common::Place;
 
 /// A name that colours a terminal, opens a tag, ends a cell and is a formula.
 const NAME: &str = "=1+1|\u{9b}31m\u{1b}]0;x\u{7}<b>x</b>";

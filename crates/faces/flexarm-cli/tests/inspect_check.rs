@@ -1,10 +1,7 @@
 //! `inspect`: keys, and consistency of the numbers. `check`: all findings of a file, not only the
 //! first.
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
-mod common;
-
-use common::{Place, ROBOT, URDF, line_of, matrix, numbers, shipped_robot, shipped_trajectory, with};
+use crate::common::{self, Place, ROBOT, URDF, line_of, matrix, numbers, shipped_robot, shipped_trajectory, with};
 use serde_json::Value;
 
 mod inspect {

@@ -1,13 +1,10 @@
 //! Unrealistic sizes: refused at once with the number and the limit, or processed; never a stack
 //! overflow, unbounded memory or a program that cannot be stopped.
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
-
-mod common;
 
 use std::io::Write as _;
 use std::time::{Duration, Instant};
 
-use common::{Place, ROBOT, SWING, URDF, with};
+use crate::common::{Place, ROBOT, SWING, URDF, with};
 
 /// Generous for a busy machine and a debug build; a refusal takes a tenth of a second.
 const AT_ONCE: Duration = Duration::from_secs(20);

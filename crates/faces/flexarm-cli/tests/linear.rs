@@ -1,10 +1,6 @@
 //! `statics`, `modes`, `response`, `map`: keys, consistency of the numbers, files, and bad input.
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
-#![allow(non_snake_case, reason = "C for compliance")]
 
-mod common;
-
-use common::{Place, ROBOT, Table, matrix, mcap_records, numbers, shipped_robot, with};
+use crate::common::{Place, ROBOT, Table, matrix, mcap_records, numbers, shipped_robot, with};
 
 /// The bar of the test robot: EI in the horizontal and in the vertical plane (aluminium, 20 x 40
 /// mm, lying flat), 0.8 m.

@@ -2,11 +2,8 @@
 //! truths.
 //!
 //! The meshes in `tests/data` are bars of 600 x 60 x 40 mm in cells of 50 x 30 x 20 mm.
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
-mod common;
-
-use common::Place;
+use crate::common::{self, Place};
 use serde_json::Value;
 
 /// A test folder with a mesh of `tests/data`.

@@ -1,10 +1,7 @@
 //! Messages that state how to fix something: the library gives the setting as a value, the program
 //! prints its flag. One row per sentence, compared letter by letter.
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
-mod common;
-
-use common::{Place, ROBOT, SWING, URDF, flex};
+use crate::common::{Place, ROBOT, SWING, URDF, flex};
 
 /// Options, and the resulting sentence.
 type Row<'a> = (&'a [&'a str], &'a str);

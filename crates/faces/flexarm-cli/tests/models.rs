@@ -1,10 +1,7 @@
 //! Models of links and drives, and loads during a run: effect of the command-line options, and
 //! refusals.
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
-mod common;
-
-use common::{Place, ROBOT, line_of, numbers, shipped_robot, shipped_trajectory, with};
+use crate::common::{self, Place, ROBOT, line_of, numbers, shipped_robot, shipped_trajectory, with};
 use serde_json::Value;
 
 const RUN: [&str; 4] = ["compare", "robot.toml", "swing.toml", "--no-files"];

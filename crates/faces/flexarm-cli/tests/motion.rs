@@ -1,12 +1,8 @@
 //! `flexarm motion`, and motions of other programs in the commands that accept one.
 
-#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
-
-mod common;
-
 use std::path::{Path, PathBuf};
 
-use common::Place;
+use crate::common::{self, Place};
 
 /// Fixtures of the readers: two joints of an arm and a gripper.
 fn fixture(name: &str) -> PathBuf {

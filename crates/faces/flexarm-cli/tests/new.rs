@@ -1,9 +1,6 @@
 //! `flexarm new` as a program: files, answer, exit codes.
-#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
-mod common;
-
-use common::Place;
+use crate::common::Place;
 
 /// A box of 0.5 m on a vertical axis, another one on a horizontal axis.
 const ARM: &str = r#"<robot name="two">

@@ -2,14 +2,10 @@
 //! of bad input.
 //!
 //! Reference cases are used if they are available; otherwise the tests print that they skip them.
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
-#![allow(clippy::print_stderr, reason = "a test that skips says so")]
-
-mod common;
 
 use std::io::Write as _;
 
-use common::{Place, line_of, matrix, numbers, with};
+use crate::common::{self, Place, line_of, matrix, numbers, with};
 use serde_json::Value;
 
 /// A steel beam of 600 x 60 x 40 mm along x, 6 HEX20 elements, mm: sets INTERFACE_A and INTERFACE_B

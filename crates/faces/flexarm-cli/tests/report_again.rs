@@ -1,9 +1,6 @@
 //! `flexarm report`: recreates the page from recordings.
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
-mod common;
-
-use common::Place;
+use crate::common::Place;
 
 fn recorded(extra: &[&str]) -> Place {
     let place = Place::new();

@@ -1,9 +1,6 @@
 //! Third-party robots: grippers, missing masses, arguments.
-#![allow(clippy::unwrap_used, reason = "a test stops at what it did not expect")]
 
-mod common;
-
-use common::{Place, ROBOT, SWING, URDF, with};
+use crate::common::{Place, ROBOT, SWING, URDF, with};
 
 /// The beam with a prismatic finger at its end, between 0.01 and 0.05 m.
 fn with_finger() -> String {

@@ -1,9 +1,8 @@
 //! Successful runs, and runs that stop early: printed and written output, and their consistency.
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
-mod common;
-
-use common::{Answer, Place, ROBOT, Table, matrix, mcap_records, numbers, shipped_robot, shipped_trajectory, with};
+use crate::common::{
+    self, Answer, Place, ROBOT, Table, matrix, mcap_records, numbers, shipped_robot, shipped_trajectory, with,
+};
 use serde_json::Value;
 
 const RUN: [&str; 5] = ["compare", "robot.toml", "swing.toml", "-o", "result"];

@@ -1,9 +1,6 @@
 //! Several runs side by side: `compare --with`.
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
-mod common;
-
-use common::{Place, Table};
+use crate::common::{Place, Table};
 use serde_json::Value;
 
 const COMPARE: [&str; 5] = ["compare", "robot.toml", "swing.toml", "-o", "result"];

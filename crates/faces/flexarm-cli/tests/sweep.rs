@@ -1,12 +1,8 @@
 //! `flexarm sweep`: studies, interruptions, plans for engines, minimisation of a metric.
-#![cfg(feature = "parquet")]
-#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
-
-mod common;
 
 use std::time::{Duration, Instant};
 
-use common::Place;
+use crate::common::{self, Place};
 
 /// Speed of the swing and width of the beam, 8 x 25 runs.
 const STUDY: &str = r#"format = 1

@@ -1,9 +1,6 @@
 //! `flexarm verify`: files, refusals, the check of a stored page, exit codes.
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
-mod common;
-
-use common::Place;
+use crate::common::{self, Place};
 
 const CASE: [&str; 3] = ["verify", "one-beam", "--quick"];
 

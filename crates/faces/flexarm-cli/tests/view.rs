@@ -1,14 +1,10 @@
 //! `flexarm view` with shell scripts as viewers: which one is started, its arguments, and the
 //! messages on failure.
-#![cfg(unix)]
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
-
-mod common;
 
 use std::os::unix::fs::PermissionsExt;
 use std::time::{Duration, Instant};
 
-use common::{Answer, Place};
+use crate::common::{Answer, Place};
 
 /// Answers `--version`, otherwise logs its arguments and stays open.
 const VIEWER: &str = r#"#!/bin/sh

@@ -1,8 +1,5 @@
 //! Array interfaces: results of an arm with its links, rigid-body algorithms on rows, arms
 //! commanded online, work that is stopped.
-#![allow(non_snake_case, reason = "the letters of the matrices")]
-#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
-#![allow(clippy::print_stdout, reason = "measured errors beside their bounds")]
 
 use std::collections::BTreeSet;
 use std::ops::ControlFlow;

@@ -1,7 +1,5 @@
 //! Balancers of robot files: their effect in statics and runs, on flexible links, and the messages
 //! of refusals.
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
-#![allow(non_snake_case, reason = "monogram notation")]
 
 use std::path::{Path, PathBuf};
 

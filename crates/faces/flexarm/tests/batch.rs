@@ -1,7 +1,4 @@
 //! Batches of poses and runs: the same results as one by one, for any number of threads.
-#![allow(non_snake_case, reason = "monogram notation")]
-#![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
-#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
 use std::path::{Path, PathBuf};
 

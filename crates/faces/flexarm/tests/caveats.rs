@@ -4,8 +4,6 @@
 //! A mutation changes one thing in a shipped robot; `check` and `statics` then have to warn (or
 //! refuse) with the corresponding code. A harmless change must not add a warning to those of the
 //! shipped robot.
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
-#![allow(clippy::print_stdout, reason = "the counts are what the page of caveats quotes")]
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};

@@ -1,6 +1,5 @@
 //! Caveats that `check` reports for a robot, a motion and loads are also reported by everything
 //! that uses them.
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};

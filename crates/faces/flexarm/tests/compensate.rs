@@ -1,7 +1,5 @@
 //! Motions with which the flexible TCP follows the rigid one: on the model itself, on perturbed
 //! plants, at rest, with shapers.
-#![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
-#![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 
 use std::path::{Path, PathBuf};
 

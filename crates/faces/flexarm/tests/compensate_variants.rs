@@ -1,6 +1,4 @@
 //! Compensation of arms under servos, shapers for several modes, and programs with loaded targets.
-#![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
-#![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 
 use std::path::{Path, PathBuf};
 

@@ -1,5 +1,4 @@
 //! Controller axes whose zeros and signs differ from those of the joints in the description.
-#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
 use std::path::PathBuf;
 

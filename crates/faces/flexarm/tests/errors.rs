@@ -1,6 +1,5 @@
 //! Errors in a program: the cause as a variant with its numbers, the setting that fixes it as a
 //! value, and a sentence with the library's own names.
-#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
 use std::path::{Path, PathBuf};
 

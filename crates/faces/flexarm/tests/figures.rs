@@ -1,5 +1,4 @@
 //! Figures of whole runs against what the same runs recorded.
-#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
 use std::ops::ControlFlow;
 use std::path::Path;

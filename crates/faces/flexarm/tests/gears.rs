@@ -1,8 +1,5 @@
 //! Gear properties of robot files other than stiffness: from the keys to statics, runs with every
 //! stepper, figures and caveats.
-#![allow(non_snake_case, reason = "monogram notation")]
-#![allow(clippy::print_stderr, reason = "what was measured stands beside the bound")]
-#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
 use std::path::{Path, PathBuf};
 

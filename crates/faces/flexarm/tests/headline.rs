@@ -1,6 +1,4 @@
 //! The headline of a result must agree with the run, statics and the robot.
-#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
-#![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};

@@ -1,8 +1,5 @@
 //! A SCARA whose quill moves along a thread as it turns: from the robot file to statics, runs with
 //! every stepper and recordings.
-#![allow(non_snake_case, reason = "monogram notation")]
-#![allow(clippy::print_stderr, reason = "what was measured stands beside the bound")]
-#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};

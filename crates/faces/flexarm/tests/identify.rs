@@ -1,7 +1,5 @@
 //! Shipped robots identified from synthetic measurements: files in workshop units, correct standard
 //! deviations, new robot files.
-#![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
-#![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};

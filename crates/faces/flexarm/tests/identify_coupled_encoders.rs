@@ -1,6 +1,4 @@
 //! Recordings of motors and links of an arm with coupled wrist gears.
-#![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
-#![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};

@@ -1,6 +1,4 @@
 //! Gears from encoders of an oscillating arm, recorded by the full simulator.
-#![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
-#![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};

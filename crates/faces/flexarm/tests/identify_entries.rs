@@ -1,8 +1,5 @@
 //! Entries of a link's matrix and the tool in files of measurements: results are written to the
 //! place of the original values.
-#![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
-#![allow(non_snake_case, reason = "monogram notation")]
-#![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 
 use std::path::{Path, PathBuf};
 

@@ -1,8 +1,5 @@
 //! Practical measurements and typical mistakes: axes of instruments, loads with inertia, units of
 //! loads, joints in another order.
-#![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
-#![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
-#![allow(non_snake_case, reason = "monogram notation")]
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};

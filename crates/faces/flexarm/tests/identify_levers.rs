@@ -1,7 +1,4 @@
 //! Plans that choose among levers and gauges, and arms with coupled gears.
-#![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
-#![allow(non_snake_case, reason = "monogram notation")]
-#![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 
 use std::path::{Path, PathBuf};
 

@@ -1,8 +1,5 @@
 //! Stiffness and damping from hammer tests: tables and universal files, coverage of the intervals,
 //! wrong units and positions.
-#![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
-#![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
-#![allow(non_snake_case, reason = "monogram notation")]
 
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};

@@ -1,6 +1,4 @@
 //! Statics of a beam far beyond small deflections.
-#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
-#![allow(clippy::print_stdout, reason = "measured errors beside their bounds")]
 
 use std::path::Path;
 

@@ -1,7 +1,4 @@
 //! The library as used by other programs: numbers in, columns out, built once and used repeatedly.
-#![allow(non_snake_case, reason = "monogram notation: F, C; see docs/references.md")]
-#![allow(clippy::print_stderr, reason = "what was measured stands beside the bound")]
-#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};

@@ -1,10 +1,5 @@
 //! Chatter of a tool on an arm: classical cases through the facade, an independent solution at
 //! three poses, simulations that chatter.
-#![allow(
-    clippy::unwrap_used,
-    clippy::print_stderr,
-    reason = "a failed unwrap fails the test; measured numbers are shown with --nocapture"
-)]
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};

@@ -1,7 +1,5 @@
 //! Closed loops of robot files: the shipped palletiser compared with closed forms, its runs, and
 //! the messages of refusals.
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
-#![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 
 use std::path::{Path, PathBuf};
 

@@ -1,5 +1,4 @@
 //! Maps compared with single results, symmetries and a manual search.
-#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};

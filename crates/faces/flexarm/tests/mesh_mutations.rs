@@ -1,7 +1,5 @@
 //! Valid meshes reduce without a warning, meshes with one fault each are refused or reported: both
 //! are counted.
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
-#![allow(clippy::print_stderr, reason = "the counts are what a reader of the test wants to see")]
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;

@@ -1,8 +1,5 @@
 //! Mounting of the base of a robot: springs, beams, walls and rails, compared with closed forms and
 //! between the steppers.
-#![allow(non_snake_case, reason = "monogram notation")]
-#![allow(clippy::print_stderr, reason = "what was measured stands beside the bound")]
-#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
 use std::f64::consts::TAU;
 use std::path::PathBuf;

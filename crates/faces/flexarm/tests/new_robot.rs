@@ -1,6 +1,4 @@
 //! `new_robot`: its robots can be loaded, moved and checked, whatever the description lacks.
-#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
-#![allow(clippy::print_stdout, reason = "the measured error stands beside its bound")]
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};

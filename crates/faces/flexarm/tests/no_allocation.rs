@@ -1,31 +1,7 @@
-//! Allocation-free code paths, counted. A separate test program, since the counter sees every
-//! thread.
-#![allow(unsafe_code, reason = "an allocator is unsafe by its trait")]
-#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
-
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::sync::atomic::{AtomicUsize, Ordering};
+//! Allocation-free code paths.
 
 use flexarm::{LinkModel, Modelling, Robot, Wrench};
-
-struct Counting;
-
-static ALLOCATIONS: AtomicUsize = AtomicUsize::new(0);
-
-// SAFETY: all calls are forwarded unchanged to the system allocator.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
-#[global_allocator]
-static COUNTING: Counting = Counting;
+use flexarm_testkit::allocations::count_allocations;
 
 #[test]
 fn poses_after_the_first_do_not_allocate() {
@@ -43,9 +19,8 @@ fn poses_after_the_first_do_not_allocate() {
                 at.compliance()[(2, 2)] + at.frequencies_hz()[0] + at.jacobian()[(0, 0)] + at.tcp_pose().translation.x;
         };
         visit(0);
-        let before = ALLOCATIONS.load(Ordering::Relaxed);
-        (1..10).for_each(&mut visit);
-        assert_eq!(ALLOCATIONS.load(Ordering::Relaxed) - before, 0, "{links:?}");
+        let allocations = count_allocations(|| (1..10).for_each(&mut visit));
+        assert_eq!(allocations, 0, "{links:?}");
         assert!(sum.is_finite());
     }
 }

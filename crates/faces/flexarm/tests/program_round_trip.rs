@@ -1,7 +1,5 @@
 //! Program targets that are read to joints and written again give the same joints, including their
 //! branch of the inverse kinematics.
-#![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
-#![allow(non_snake_case, reason = "monogram notation")]
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};

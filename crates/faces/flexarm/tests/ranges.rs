@@ -1,6 +1,5 @@
 //! Unrealistic numbers are refused where they are given, with their location, and never cause a
 //! panic.
-#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
 use std::path::{Path, PathBuf};
 

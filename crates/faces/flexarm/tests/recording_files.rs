@@ -1,6 +1,4 @@
 //! Information on the robot and the time in recordings, on this machine and on others.
-#![cfg(feature = "mcap")]
-#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};

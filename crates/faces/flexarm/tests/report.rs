@@ -1,6 +1,5 @@
 //! The report page of real runs: it loads no external files, agrees with the runs, and is
 //! reproducible.
-#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};

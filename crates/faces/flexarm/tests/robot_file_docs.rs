@@ -1,6 +1,5 @@
 //! The pages of the robot, motion and loads files in `docs/` and their schemas: every example
 //! loads, every key is documented.
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};

@@ -1,7 +1,5 @@
 //! Messages of a run: shares that add up in numbers and in print, step sizes that are too large,
 //! settling bands, poses in degrees, runs of different robots, colours.
-#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
-#![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 
 use std::path::{Path, PathBuf};
 

@@ -1,8 +1,5 @@
 //! Derivatives of the TCP error with respect to parameters of shipped robots: compared with
 //! Richardson differences of runs, their cost, and refusals.
-#![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
-#![allow(non_snake_case, reason = "monogram notation")]
-#![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 
 use std::path::Path;
 

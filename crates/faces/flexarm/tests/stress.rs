@@ -1,7 +1,4 @@
 //! Stress of a meshed link over a run, against the superposition of its fields by hand.
-#![allow(non_snake_case, reason = "notation of the theory")]
-#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
-#![allow(clippy::print_stdout, reason = "measured errors beside their bounds")]
 
 use std::path::{Path, PathBuf};
 

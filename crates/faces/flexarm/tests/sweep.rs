@@ -1,7 +1,5 @@
 //! Studies: runs equal those of files written by hand, no interruption loses a finished run, shards
 //! give identical bytes.
-#![cfg(feature = "parquet")]
-#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};

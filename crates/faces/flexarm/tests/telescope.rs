@@ -1,8 +1,5 @@
 //! A telescopic column with mimic joints, elastic connections and calibrated joint frames, from the
 //! robot file to the identification.
-#![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
-#![allow(non_snake_case, reason = "monogram notation")]
-#![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 
 use std::path::{Path, PathBuf};
 

@@ -1,8 +1,5 @@
 //! Links with load on a third interface: springs between rigid parts support only two, so such a
 //! link is modal or refused.
-#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
-#![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
-#![allow(non_snake_case, reason = "monogram notation")]
 
 use std::path::PathBuf;
 

@@ -1,5 +1,4 @@
 //! Motions given by TCP paths: files, standard motions and robot programs on a shipped arm.
-#![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
 
 use std::path::{Path, PathBuf};
 

@@ -1,8 +1,6 @@
 //! One small mesh in every layout that Gmsh writes (`data/three_blocks.*`, made by
 //! `tools/make_mesh_fixtures.py`), and in layouts that it does not write on this platform.
 
-#![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
-
 use std::collections::BTreeSet;
 use std::io::Write;
 

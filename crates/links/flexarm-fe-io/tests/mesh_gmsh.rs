@@ -1,7 +1,5 @@
 //! Hand-written Gmsh files: groups, beams, and rejected input with its advice.
 
-#![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
-
 use flexarm_fe_io::mesh::{FilePosition, MeshErrorKind as Kind, ReadOptions, parse_mesh};
 use flexarm_fe_io::mesh::{MeshError, MeshFile};
 use flexarm_fem::mesh::BeamProperties;

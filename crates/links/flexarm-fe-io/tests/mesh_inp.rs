@@ -1,8 +1,6 @@
 //! Hand-written CalculiX and Abaqus decks: cards, sets, sections, and rejected input with its
 //! advice.
 
-#![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
-
 use flexarm_fe_io::mesh::{FilePosition, MeshErrorKind as Kind, ReadOptions, parse_mesh};
 use flexarm_fe_io::mesh::{MeshError, MeshFile};
 use flexarm_fem::mesh::BeamProperties;

@@ -1,9 +1,6 @@
 //! Meshes of the reference cases, made and used by other programs; skipped if they are not
 //! available.
 
-#![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
-#![allow(clippy::print_stdout, reason = "a skipped test says so")]
-
 use std::path::{Path, PathBuf};
 
 use flexarm_fe_io::mesh::MeshFile;

@@ -1,12 +1,6 @@
 //! Conversion of modal links to Standard Input Data and back.
-#![allow(non_snake_case, reason = "monogram notation, as in the crate")]
-#![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
-#![allow(clippy::print_stderr, reason = "measured errors, shown with --nocapture")]
 
-#[path = "../../flexarm-fem/tests/common/mod.rs"]
-mod common;
-
-use common::turned;
+use crate::common::turned;
 use flexarm_fe_io::exchange::{
     ExchangeErrorKind, SidMatrix, modal_link_from_sid, modal_link_held_at, parse_sid, sid_of_modal_link, write_sid,
 };

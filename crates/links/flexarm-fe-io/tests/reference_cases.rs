@@ -4,13 +4,6 @@
 //! frequencies of CalculiX. They are stored outside the project; without them these tests print
 //! "skipped".
 
-#![allow(non_snake_case, reason = "K, M as in the theory")]
-#![allow(
-    clippy::unwrap_used,
-    clippy::print_stderr,
-    reason = "a test stops at the first failure and says what it skipped"
-)]
-
 use std::path::PathBuf;
 
 use flexarm_fe_io::mesh::{ReadOptions, read_mesh};

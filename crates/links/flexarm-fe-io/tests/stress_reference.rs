@@ -3,13 +3,6 @@
 //! Truth: CalculiX 2.20, C3D10: stresses at integration points, and von Mises stresses of nodal
 //! averages. They are stored outside the project; without them these tests print "skipped".
 
-#![allow(non_snake_case, reason = "notation of the theory")]
-#![allow(
-    clippy::unwrap_used,
-    clippy::print_stderr,
-    reason = "a test stops at the first failure and says what it skipped"
-)]
-
 use std::path::PathBuf;
 
 use flexarm_fe_io::mesh::{ReadOptions, read_mesh};

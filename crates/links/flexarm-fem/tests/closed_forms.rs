@@ -1,6 +1,4 @@
 //! Beams against textbook formulas: sections, tip displacements, masses, frequencies.
-#![allow(non_snake_case, reason = "monogram notation, as in the crate")]
-#![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
 
 use std::f64::consts::PI;
 

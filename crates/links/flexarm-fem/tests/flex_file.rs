@@ -1,11 +1,7 @@
 //! The reduced-link file: lossless reading and writing, and a precise error for every mistake.
-#![allow(non_snake_case, reason = "monogram notation, as in the crate")]
-#![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
 
-mod common;
-
+use crate::common::{fixed_cases, lower_arm, offset_arm, pose, spd_stiffness, turned_arm};
 use approx::assert_relative_eq;
-use common::{fixed_cases, lower_arm, offset_arm, pose, spd_stiffness, turned_arm};
 use flexarm_fem::{
     FemError, FlexErrorKind, FlexFileError, GateLimits, LinkFrames, Provenance, ReducedLink, parse_flex, read_flex,
     write_flex,

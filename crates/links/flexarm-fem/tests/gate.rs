@@ -1,12 +1,8 @@
 //! Bad matrices with their error messages, and good ones from another FE program.
-#![allow(non_snake_case, reason = "monogram notation, as in the crate")]
-#![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
-
-mod common;
 
 use std::path::{Path, PathBuf};
 
-use common::{lower_arm, turned_arm};
+use crate::common::{lower_arm, turned_arm};
 use flexarm_fem::gate::{check_matrix6, check_matrix12};
 use flexarm_fem::{FemError, GateLimits};
 use flexarm_spatial::Matrix12;

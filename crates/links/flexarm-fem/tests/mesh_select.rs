@@ -1,7 +1,5 @@
 //! Selection of interface nodes on a block of bricks with known node positions.
 
-#![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
-
 use flexarm_fem::mesh::{Mesh, Region, SelectError, connected_parts, select, skin};
 use flexarm_fem::{ElementBlock, ElementKind, NodeSelector};
 use nalgebra::Vector3;

@@ -1,17 +1,9 @@
 //! The modal link of a uniform beam against closed forms, and invariance under changes of
 //! coordinates.
-#![allow(non_snake_case, reason = "monogram notation, as in the crate")]
-#![allow(
-    clippy::unwrap_used,
-    clippy::print_stderr,
-    reason = "a test stops at the first failure; tables of measured errors are shown with --nocapture"
-)]
-
-mod common;
 
 use std::f64::consts::TAU;
 
-use common::{lower_arm, turned};
+use crate::common::{lower_arm, turned};
 use flexarm_fem::{Bar, BeamLink, BeamTheory, FemError, Material, ModalOptions, Section};
 use nalgebra::{DMatrix, Matrix6, Vector6};
 

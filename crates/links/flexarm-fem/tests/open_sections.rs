@@ -1,8 +1,5 @@
 //! I-beams and channels against tables of rolled profiles, finite elements over the section, and
 //! thin-wall limits.
-#![allow(non_snake_case, reason = "monogram notation, as in the crate")]
-#![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
-#![allow(clippy::print_stderr, reason = "tables of measured errors, shown with --nocapture")]
 
 use approx::assert_relative_eq;
 use flexarm_fem::{FemError, Section, SectionProperties};

@@ -1,11 +1,7 @@
 //! The split: an elastic joint at any frame reproduces the stiffness of the whole link.
-#![allow(non_snake_case, reason = "monogram notation, as in the crate")]
-#![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
 
-mod common;
-
+use crate::common::{fixed_cases, frames, lower_arm, offset_arm, pose, spd_stiffness, turned_arm, vector6};
 use approx::assert_relative_eq;
-use common::{fixed_cases, frames, lower_arm, offset_arm, pose, spd_stiffness, turned_arm, vector6};
 use flexarm_fem::{
     Bar, Beam, BeamLink, BeamTheory, FemError, Material, Pose, Section, drop_coupling, stiffness_at_split,
 };

@@ -1,11 +1,8 @@
 //! Arbitrary texts: the language is recognised, and no text makes a reader panic or run endlessly.
-#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
-
-mod common;
 
 use std::path::Path;
 
-use common::{fixture, read_text};
+use crate::common::{fixture, read_text};
 use flexarm_programs::{Language, ProgramError, ReadOptions, read_program, recognise};
 use proptest::prelude::*;
 

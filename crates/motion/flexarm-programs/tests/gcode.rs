@@ -1,11 +1,7 @@
 //! G-code: values of a fixture against circles in closed form and numbers computed by hand.
-#![allow(non_snake_case, reason = "X_WB: a pose")]
-#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
-mod common;
-
+use crate::common::{assert_pose, at_mm, euler_product, moves, pose, read, read_text};
 use approx::assert_relative_eq;
-use common::{assert_pose, at_mm, euler_product, moves, pose, read, read_text};
 use flexarm_path::program::{Blend, Item, Move, MoveKind};
 use flexarm_programs::{GCodeOptions, ReadOptions, Rotary};
 use nalgebra::{Rotation3, Vector3};

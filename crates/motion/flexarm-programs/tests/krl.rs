@@ -1,12 +1,8 @@
 //! KUKA KRL: values of fixtures against explicit products of rotation matrices and numbers computed
 //! by hand.
-#![allow(non_snake_case, reason = "X_WB: a pose")]
-#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
-mod common;
-
+use crate::common::{assert_pose, at_mm, euler_product, joints_deg, moves, pose, read, read_text};
 use approx::assert_relative_eq;
-use common::{assert_pose, at_mm, euler_product, joints_deg, moves, pose, read, read_text};
 use flexarm_path::program::{Blend, Configuration, Item, MoveKind, Target};
 use flexarm_programs::ReadOptions;
 use flexarm_spatial::Pose;

@@ -1,12 +1,8 @@
 //! ABB RAPID: values of a fixture against explicit rotation matrices of quaternions and numbers
 //! computed by hand.
-#![allow(non_snake_case, reason = "X_WB: a pose")]
-#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
-mod common;
-
+use crate::common::{assert_pose, at_mm, euler_product, joints_deg, moves, pose, read, read_text};
 use approx::assert_relative_eq;
-use common::{assert_pose, at_mm, euler_product, joints_deg, moves, pose, read, read_text};
 use flexarm_path::program::{Blend, Configuration, Item, MoveKind, Target};
 use flexarm_programs::ReadOptions;
 use nalgebra::{Matrix3, Rotation3, Vector3};

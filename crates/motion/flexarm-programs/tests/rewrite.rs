@@ -1,6 +1,4 @@
 //! Programs with other targets: lines and words are kept, the reader finds the new targets.
-#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
-#![allow(non_snake_case, reason = "monogram notation")]
 
 use std::path::Path;
 

@@ -1,10 +1,6 @@
 //! Arrow files as other programs read them: with the reader of the Arrow library.
-#![cfg(feature = "arrow")]
-#![allow(non_snake_case, reason = "monogram notation: X_WT, pose of T in W")]
-#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
-mod synthetic;
-
+use crate::synthetic;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 

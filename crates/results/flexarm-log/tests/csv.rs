@@ -1,9 +1,6 @@
 //! CSV recordings, read back.
-#![allow(non_snake_case, reason = "monogram notation: X_WT, pose of T in W")]
-#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
-mod synthetic;
-
+use crate::synthetic;
 use std::collections::HashMap;
 use std::path::Path;
 

@@ -1,15 +1,9 @@
 //! Damaged recordings: reading them ends with samples or with an error, in bounded memory, whatever
 //! their bytes.
-#![allow(non_snake_case, reason = "monogram notation: X_WT, pose of T in W")]
-#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
-mod synthetic;
-
+use crate::synthetic;
 use flexarm_log::{CreateOptions, RecordingFormat, open_recording};
-use flexarm_testkit::allocations::{CountingAllocator, most_bytes};
-
-#[global_allocator]
-static ALLOCATOR: CountingAllocator = CountingAllocator;
+use flexarm_testkit::allocations::most_bytes;
 
 /// Maximum memory for reading a small file (bytes).
 const MOST_BYTES: usize = 200 << 20;

@@ -1,9 +1,6 @@
 //! The table of formats: properties of every row.
-#![allow(non_snake_case, reason = "monogram notation: X_WT, pose of T in W")]
-#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
-mod synthetic;
-
+use crate::synthetic;
 use std::collections::BTreeSet;
 use std::path::Path;
 

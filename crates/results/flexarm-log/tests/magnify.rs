@@ -1,8 +1,6 @@
 //! The magnified arm: properties it keeps, and displacements it enlarges.
-#![allow(non_snake_case, reason = "monogram notation: X_WL, pose of L in W")]
 
-mod synthetic;
-
+use crate::synthetic;
 use flexarm_draw::Magnifier;
 use flexarm_kinematics::{Pose, rotation_vector};
 use flexarm_log::RunHeader;

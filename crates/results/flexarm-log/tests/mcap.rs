@@ -1,10 +1,6 @@
 //! MCAP recordings, read back with the `mcap` crate.
-#![cfg(feature = "mcap")]
-#![allow(non_snake_case, reason = "monogram notation: X_WT, pose of T in W")]
-#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
-mod synthetic;
-
+use crate::synthetic;
 use std::collections::BTreeMap;
 use std::path::Path;
 

@@ -1,9 +1,6 @@
 //! Recordings read back, and written again in other formats. Truth: the samples of `synthetic`.
-#![allow(non_snake_case, reason = "monogram notation: X_WT, pose of T in W")]
-#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
-mod synthetic;
-
+use crate::synthetic;
 use std::path::{Path, PathBuf};
 
 use flexarm_kinematics::Pose;

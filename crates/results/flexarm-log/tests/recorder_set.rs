@@ -1,9 +1,6 @@
 //! Several files at once, and existing files.
-#![allow(non_snake_case, reason = "monogram notation: X_WT, pose of T in W")]
-#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
-mod synthetic;
-
+use crate::synthetic;
 use std::error::Error;
 use std::path::{Path, PathBuf};
 

@@ -1,10 +1,6 @@
 //! Rerun recordings, read back with the decoder of the `rerun` crate.
-#![cfg(feature = "rerun")]
-#![allow(non_snake_case, reason = "monogram notation: X_WT, pose of T in W")]
-#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
-mod synthetic;
-
+use crate::synthetic;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Duration;

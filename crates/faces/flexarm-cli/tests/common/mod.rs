@@ -1,6 +1,5 @@
 //! Helpers of the command-line tests: a temporary folder with a small robot, the program, its
 //! answers.
-#![allow(dead_code, reason = "each test binary uses its own part of this")]
 
 pub(crate) mod flex;
 

@@ -7,8 +7,8 @@ use flexarm_fe_io::exchange::{
 use flexarm_fem::gate::check_matrix12;
 use flexarm_fem::{GateLimits, Matrix12, UnitSystem};
 
+use super::shared::{parse, read, samples, small_structure};
 use crate::common::turned_arm;
-use crate::shared::{parse, read, samples, small_structure};
 
 /// CalculiX 2.20 as built by Debian does not condense; the error must give this cause, not only a
 /// residual.

@@ -10,8 +10,8 @@ use flexarm_fe_io::exchange::{
 };
 use proptest::prelude::*;
 
+use super::shared::samples;
 use crate::common::fixed_cases;
-use crate::shared::samples;
 
 fn parse(bytes: &[u8]) -> Result<ImportedMatrices, ExchangeError> {
     parse_matrices(&[InputFile::new("fuzz", bytes)], &MatrixNames::default())

@@ -8,7 +8,7 @@ use flexarm_fem::gate::check_matrix12;
 use flexarm_fem::{GateLimits, Matrix12};
 use nalgebra::{DMatrix, Vector3};
 
-use crate::shared::{digits_error, read, samples, truth};
+use super::shared::{digits_error, read, samples, truth};
 
 /// Stiffness and mass of the interfaces with the proposed map, SI.
 fn assembled(folder: &std::path::Path, files: &[&str]) -> (DMatrix<f64>, Option<DMatrix<f64>>, usize) {

@@ -14,8 +14,8 @@ use flexarm_fem::{ModalLink, Pose, UnitSystem};
 use nalgebra::{DMatrix, Matrix3, Matrix3xX, Vector3};
 use proptest::prelude::*;
 
+use super::shared::{samples, truth};
 use crate::common::fixed_cases;
-use crate::shared::{samples, truth};
 
 /// Point masses with three shapes: every integral is an explicit sum.
 fn point_masses(gyro: GyroLayout, oe: OeOrder, tensor_as_3x3: bool) -> Sid {

@@ -4,7 +4,7 @@ use flexarm_fe_io::exchange::{DofLabel, InterfaceMap, assemble_interfaces, write
 use flexarm_fem::UnitSystem;
 use nalgebra::DMatrix;
 
-use crate::shared::{digits_error, parse, samples, scaled_error, small_structure, truth};
+use super::shared::{digits_error, parse, samples, scaled_error, small_structure, truth};
 
 /// The same structure in mm, t, s: N/mm, N, N·mm; t, t·mm, t·mm²; modes normalised to one tonne.
 ///

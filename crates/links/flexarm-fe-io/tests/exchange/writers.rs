@@ -9,8 +9,8 @@ use flexarm_fe_io::exchange::{
 use flexarm_fem::UnitSystem;
 use nalgebra::Vector3;
 
+use super::shared::{digits_error, parse, small_structure};
 use crate::common::turned_arm;
-use crate::shared::{digits_error, parse, small_structure};
 
 fn labels(modes: usize) -> Vec<DofLabel> {
     let boundary = (0..12).map(|i| DofLabel::new(1001 + i / 6, i as u8 % 6 + 1));

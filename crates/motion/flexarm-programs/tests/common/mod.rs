@@ -1,5 +1,4 @@
 //! Fixtures and comparisons.
-#![allow(dead_code, reason = "each test file uses its part")]
 #![allow(non_snake_case, reason = "X_BT: a pose")]
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 

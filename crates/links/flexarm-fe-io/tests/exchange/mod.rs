@@ -3,11 +3,6 @@
 //! The samples of `shared/fe` all describe one structure, case A1: a steel beam along x, interface
 //! A at (0, 0, 0) and B at (1, 0, 0), SI. They are not part of the repository; without them the
 //! tests that need them print "skipped". The small texts here cover every branch.
-#![allow(non_snake_case, reason = "monogram notation, as in the crate")]
-#![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
-
-#[path = "../../../flexarm-fem/tests/common/mod.rs"]
-mod common;
 
 mod defective;
 mod fuzz;

@@ -1,0 +1,24 @@
+//! The tests of the crate, as one program: it links once.
+#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
+#![allow(non_snake_case, reason = "monogram notation: X_WT, pose of T in W")]
+
+use flexarm_testkit::allocations::CountingAllocator;
+
+#[cfg(feature = "arrow")]
+mod arrow;
+mod csv;
+mod damaged;
+mod formats;
+mod magnify;
+#[cfg(feature = "mcap")]
+mod mcap;
+mod read;
+mod recorder_set;
+#[cfg(feature = "rerun")]
+mod rrd;
+mod synthetic;
+mod trace;
+
+/// Counts the allocations of each thread, and so of each test.
+#[global_allocator]
+static ALLOCATOR: CountingAllocator = CountingAllocator;
