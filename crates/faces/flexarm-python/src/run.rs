@@ -125,6 +125,12 @@ impl PyRun {
         PyTuple::new(py, &self.columns.contributors)
     }
 
+    /// Names of the channels of ``gauge`` (tuple of str).
+    #[getter]
+    fn gauges<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+        PyTuple::new(py, &self.columns.gauges)
+    }
+
     /// Paths of the written files (dict of str to str).
     #[getter]
     fn files<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
@@ -201,6 +207,12 @@ impl PyRun {
     #[getter]
     fn contribution<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         Self::signal(slf, "contribution")
+    }
+
+    /// Strain gauges (m/m) and stress points (Pa), (n, gauges).
+    #[getter]
+    fn gauge<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        Self::signal(slf, "gauge")
     }
 
     fn __getitem__<'py>(slf: &Bound<'py, Self>, name: &str) -> PyResult<Bound<'py, PyAny>> {
@@ -298,6 +310,7 @@ impl Pickled for PyRun {
         parts.put("prismatic", columns.prismatic.clone())?;
         parts.put("elements", columns.elements.clone())?;
         parts.put("contributors", columns.contributors.clone())?;
+        parts.put("gauges", columns.gauges.clone())?;
         parts.put("columns", columns.columns().iter().map(|column| column.name.clone()).collect::<Vec<_>>())?;
         for column in columns.columns() {
             parts.put_numbers(&column.name, &column.values)?;
@@ -313,6 +326,7 @@ impl Pickled for PyRun {
         empty.prismatic = parts.get("prismatic")?;
         empty.elements = parts.get("elements")?;
         empty.contributors = parts.get("contributors")?;
+        empty.gauges = parts.get("gauges")?;
         let wrong = || PyValueError::new_err("the pickle has columns of another version");
         let columns = empty.filled(values.into_iter().map(|(values, name)| (name, values))).ok_or_else(wrong)?;
         Ok(Self {

@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use flexarm::reduce::{ReduceJob, ReduceOptions, ReduceOutputs, reduce};
-use flexarm::{LinkModel, Modelling, Motion, Robot, RunOptions, Scenario, StepperKind, StepperOptions, Summary};
+use flexarm::{LinkModel, Modelling, Motion, Robot, Run, RunOptions, Scenario, StepperKind, StepperOptions, Summary};
 use flexarm_fem::stress::{StressFields, inertia_loads, parse_stress, von_mises};
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 /// The lower arm, reduced with stress, in a folder of its own.
 struct Arm {
@@ -41,14 +41,26 @@ impl Arm {
         parse_stress(&std::fs::read(self.folder.join("lower_arm.stress")).unwrap()).unwrap()
     }
 
+    /// Adds entries to the robot file.
+    fn with(self, entries: &str) -> Self {
+        let file = self.folder.join("robot.toml");
+        let text = std::fs::read_to_string(&file).unwrap();
+        std::fs::write(file, text + entries).unwrap();
+        self
+    }
+
     fn run(&self, motion: impl Fn(f64) -> f64, seconds: f64, modelling: Modelling) -> Summary {
+        self.record(motion, seconds, modelling).summary
+    }
+
+    fn record(&self, motion: impl Fn(f64) -> f64, seconds: f64, modelling: Modelling) -> Run {
         let robot = Robot::load(&self.folder).unwrap();
         let times: Vec<f64> = (0..=(1000.0 * seconds) as u32).map(|k| 1e-3 * f64::from(k)).collect();
         let angles: Vec<f64> = times.iter().map(|t| motion(*t)).collect();
         let motion = Motion::from_samples(&times, &angles, &robot).unwrap();
         let options = RunOptions { modelling, ..RunOptions::default() };
         let arm = robot.flexible(modelling).unwrap();
-        arm.simulate(Scenario::new(motion), &options).unwrap().summary
+        arm.simulate(Scenario::new(motion), &options).unwrap()
     }
 }
 
@@ -59,9 +71,9 @@ fn models() -> [(&'static str, Modelling); 4] {
     [("two parts", lumped(2)), ("four parts", lumped(4)), ("two modes", modal(2)), ("six modes", modal(6))]
 }
 
-/// Largest von Mises stress (Pa) of the rigid link at angle q, rate and acceleration: its fields under
-/// its own inertia and that of the disc at its end.
-fn by_hand(fields: &StressFields, clear: f64, [q, rate, acceleration]: [f64; 3]) -> f64 {
+/// Stress (Pa) of every seat of the rigid link at angle q, rate and acceleration: its fields under its
+/// own inertia and that of the disc at its end.
+fn stress_by_hand(fields: &StressFields, [q, rate, acceleration]: [f64; 3]) -> Vec<[f64; 6]> {
     let (omega, alpha) = (Vector3::y() * rate, Vector3::y() * acceleration);
     // Acceleration minus gravity in link axes; joint_1 is the link's origin.
     let a = Vector3::new(-q.sin(), 0.0, q.cos()) * 9.81;
@@ -73,15 +85,18 @@ fn by_hand(fields: &StressFields, clear: f64, [q, rate, acceleration]: [f64; 3])
     let torque = r.cross(&force) - disc * alpha - omega.cross(&(disc * omega));
     let wrench = [force.x, force.y, force.z, torque.x, torque.y, torque.z];
     let loads = inertia_loads(&a, &alpha, &omega);
-    let seats = fields.seats.iter().enumerate().filter(|(_, seat)| seat.from_tie >= clear);
-    let stress = seats.map(|(k, _)| {
-        von_mises(std::array::from_fn(|c| {
-            let row = fields.stress.row(6 * k + c);
-            let amplitudes = wrench.iter().chain(&loads);
-            amplitudes.enumerate().map(|(j, amplitude)| f64::from(row[j]) * amplitude).sum()
-        }))
-    });
-    stress.fold(0.0, f64::max)
+    let component = |k: usize, c: usize| {
+        let row = fields.stress.row(6 * k + c);
+        let amplitudes = wrench.iter().chain(&loads);
+        amplitudes.enumerate().map(|(j, amplitude)| f64::from(row[j]) * amplitude).sum()
+    };
+    (0..fields.seats.len()).map(|k| std::array::from_fn(|c| component(k, c))).collect()
+}
+
+/// Largest von Mises stress of [`stress_by_hand`] that is not near a tie.
+fn by_hand(fields: &StressFields, clear: f64, motion: [f64; 3]) -> f64 {
+    let stress = stress_by_hand(fields, motion).into_iter().zip(&fields.seats);
+    stress.filter(|(_, seat)| seat.from_tie >= clear).map(|(stress, _)| von_mises(stress)).fold(0.0, f64::max)
 }
 
 #[test]
@@ -152,4 +167,91 @@ fn stress_files_that_do_not_fit_are_refused_and_steppers_without_accelerations_s
     assert!(error.contains("lower_arm.stress") && error.contains("reduce the mesh again"), "{error}");
     std::fs::remove_file(&file).unwrap();
     assert!(run(&RunOptions::default()).unwrap().summary.stress.is_empty());
+}
+
+#[test]
+fn a_strain_gauge_reads_hookes_law_of_the_stress_below_it_and_a_rosette_adds_up() {
+    let arm = Arm::new("gauges");
+    let fields = arm.fields();
+    // In the middle of the arm, away from ties and edges.
+    let middle = fields.poses[1].translation.vector * 0.5;
+    let clear: Vec<usize> = (0..fields.seats.len()).filter(|k| fields.seats[*k].from_tie > 0.2).collect();
+    let from = |k: usize| (fields.seats[k].position - middle).norm();
+    let seat = clear.into_iter().min_by(|a, b| from(*a).total_cmp(&from(*b))).unwrap();
+    let [x, y, z] = fields.seats[seat].position.into();
+    let at = format!("link = \"lower_arm\"\nat = [{x}, {y}, {z}]\n");
+    let arm = arm.with(&format!(
+        "[[strain_gauge]]\nname = \"rosette\"\n{at}direction = [0.0, 0.0, 1.0]\nangles_deg = [0, 45, 90]\n\
+         [[stress_point]]\nname = \"eye\"\n{at}"
+    ));
+    for (name, modelling) in models() {
+        let run = arm.record(|_| 1.2, 0.01, modelling);
+        let channels = ["rosette_0_strain", "rosette_45_strain", "rosette_90_strain"];
+        let ends = ["eye_von_mises_pa", "eye_principal_1_pa", "eye_principal_3_pa"];
+        assert_eq!(run.columns.gauges, [channels, ends].concat());
+        let gauge = run.columns.column("gauge").unwrap();
+        let read = &gauge.values[gauge.values.len() - 6..];
+
+        let stress = stress_by_hand(&fields, [1.2, 0.0, 0.0])[seat];
+        let [xx, yy, zz, xy, yz, zx] = stress;
+        let sigma = Matrix3::new(xx, xy, zx, xy, yy, yz, zx, yz, zz);
+        let (E, nu) = (70e9, 0.33);
+        assert_eq!((fields.materials[0].E, fields.materials[0].nu), (E, nu));
+        let epsilon = (sigma * (1.0 + nu) - Matrix3::identity() * (nu * sigma.trace())) / E;
+        let n = fields.normal(seat);
+        let along = (Vector3::z() - n * n.z).normalize();
+        let across = n.cross(&along);
+        let truth = [along, (along + across).normalize(), across].map(|d| d.dot(&(epsilon * d)));
+        let scale = truth[0].abs();
+        let off = truth.iter().zip(read).map(|(truth, read)| (truth - read).abs() / scale).fold(0.0, f64::max);
+        let principal = sigma.symmetric_eigenvalues();
+        let truth = [von_mises(stress).copysign(principal.max() + principal.min()), principal.max(), principal.min()];
+        let scale = truth[0].abs();
+        let stress_off = truth.iter().zip(&read[3..]).map(|(truth, read)| (truth - read).abs() / scale);
+        let stress_off = stress_off.fold(0.0, f64::max);
+        println!("{name}: {:.3} um/m, off by {off:.1e}, stress by {stress_off:.1e}", 1e6 * read[0]);
+        // Measured 2.2e-5 and 2.3e-5: the deflection turns the link.
+        assert!(off < 1e-4 && stress_off < 1e-4, "{name}: {off:e} {stress_off:e}");
+
+        let link = &run.summary.stress[0];
+        assert_eq!(link.gauges.len(), 3);
+        assert!((link.gauges[0].highest / read[0] - 1.0).abs() < 1e-3, "{:?}", link.gauges[0]);
+        assert!((link.points[0].place.von_mises_pa / read[3].abs() - 1.0).abs() < 1e-3, "{:?}", link.points[0]);
+        assert_eq!(link.points[0].place.node, fields.seats[seat].node);
+    }
+}
+
+#[test]
+fn gauges_that_are_not_on_a_link_with_stress_are_refused_with_the_place() {
+    let arm = Arm::new("misplaced gauges");
+    let file = std::fs::read_to_string(arm.folder.join("robot.toml")).unwrap();
+    let seat = arm.fields().seats[0].position;
+    let gauge = |name: &str, link: &str, at: [f64; 3], rest: &str| {
+        let [x, y, z] = at;
+        format!("[[strain_gauge]]\nname = \"{name}\"\nlink = \"{link}\"\nat = [{x}, {y}, {z}]\n{rest}\n")
+    };
+    let (on, along) = (<[f64; 3]>::from(seat), "direction = [0.0, 0.0, 1.0]");
+    let load = |entries: String| {
+        std::fs::write(arm.folder.join("robot.toml"), format!("{file}\n{entries}")).unwrap();
+        let robot = Robot::load(&arm.folder)?;
+        let motion = Motion::from_samples(&[0.0, 0.01], &[0.3, 0.3], &robot).unwrap();
+        robot.flexible(Modelling::default())?.simulate(Scenario::new(motion), &RunOptions::default())
+    };
+    let twice = gauge("a", "lower_arm", on, along);
+    for (entries, said) in [
+        (gauge("a", "lower_arn", on, along), "did you mean \"lower_arm\"?"),
+        (gauge("a b", "lower_arm", on, along), "use letters, digits"),
+        (twice.clone() + &twice, "rename one"),
+        (gauge("a", "lower_arm", [0.5, 0.5, 0.5], along), "farther than the edges of the mesh"),
+        (gauge("a", "lower_arm", on, "direction = [0.0, 0.0, 0.0]"), "has no length"),
+        (gauge("a", "lower_arm", on, &format!("{along}\nangles_deg = []")), "such as [0, 45, 90]"),
+        (gauge("a", "lower_arm", on, &format!("{along}\nangles_deg = [0, 0]")), "0 twice"),
+        (gauge("a", "lower_arm", [0.0, f64::NAN, 0.0], along), "finite"),
+    ] {
+        let error = load(entries.replace("NaN", "nan")).unwrap_err().to_string();
+        assert!(error.contains(said) && error.contains("robot.toml"), "{said}: {error}");
+    }
+    std::fs::remove_file(arm.folder.join("lower_arm.stress")).unwrap();
+    let error = load(twice).unwrap_err().to_string();
+    assert!(error.contains("has no stress fields: reduce its mesh with --stress"), "{error}");
 }

@@ -101,6 +101,7 @@ fn sample(step: u64) -> Sample {
         static_m: [0, 1, 2].map(|c| 0.8 * moved[c]),
         elastic: links.into_iter().chain((0..JOINTS).map(gear)).collect(),
         contributions: (0..8).map(|k| [0, 1, 2].map(|c| moved[c] * (0.1 + 0.01 * k as f64))).collect(),
+        gauges: Vec::new(),
         energy: EnergySample { kinetic: 40.0 * ringing(1), potential: 900.0 * ringing(2), elastic: 3.0 * ringing(3) },
         solver: [1.0 + (step % 24 / 23) as f64, 1e-7 * ringing(4)],
         flexible,

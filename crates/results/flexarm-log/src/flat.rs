@@ -13,6 +13,7 @@ pub fn flat_columns(columns: &Columns) -> Vec<(String, Vec<f64>)> {
         prismatic: columns.prismatic.clone(),
         elements: columns.elements.clone(),
         contributors: columns.contributors.clone(),
+        gauges: columns.gauges.clone(),
         has_rigid,
         has_static: has_rigid,
         ..RunHeader::default()
@@ -68,6 +69,7 @@ fn places(columns: &Columns, has_rigid: bool) -> Vec<ColumnSource> {
         take("deflection", 6 * element..6 * element + 6);
         take("load", 6 * element..6 * element + 6);
     }
+    take("gauge", 0..columns.gauges.len());
     take("energy", 0..3);
     places
 }

@@ -35,6 +35,8 @@ pub(crate) struct RunJson {
     links: Vec<Link>,
     elements: Vec<String>,
     contributors: Vec<String>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    gauges: Vec<String>,
     bends: Vec<Bend>,
     has_rigid: bool,
     /// Missing in files of older versions.
@@ -111,6 +113,7 @@ pub(crate) fn write(header: &RunHeader, meshes: bool) -> String {
         links: header.links.iter().map(link).collect(),
         elements: header.elements.clone(),
         contributors: header.contributors.clone(),
+        gauges: header.gauges.clone(),
         bends: header.bends.iter().map(bend).collect(),
         has_rigid: header.has_rigid,
         has_static: header.has_static,
@@ -182,6 +185,7 @@ pub(crate) fn read(text: &[u8]) -> Result<(RunHeader, RunJson), String> {
             .collect(),
         elements: std::mem::take(&mut run.elements),
         contributors: std::mem::take(&mut run.contributors),
+        gauges: std::mem::take(&mut run.gauges),
         bends: run.bends.drain(..).map(bend).collect(),
         has_rigid: run.has_rigid,
         has_static: run.has_static,
@@ -249,6 +253,7 @@ pub(crate) fn read_result(text: &str) -> RunResult {
         readable: result.readable,
         events: result.events.into_iter().filter_map(event).collect(),
         attachments: result.files.into_iter().map(file).collect(),
+        scenery: Vec::new(),
     }
 }
 

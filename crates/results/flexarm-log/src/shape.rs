@@ -12,6 +12,7 @@ pub(crate) struct Shape {
     elements: usize,
     stations: usize,
     contributors: usize,
+    gauges: usize,
     pub(crate) has_rigid: bool,
     pub(crate) has_static: bool,
 }
@@ -24,6 +25,7 @@ impl Shape {
             elements: header.elements.len(),
             stations: header.bends.iter().map(|bend| bend.X_LS.len()).sum(),
             contributors: header.contributors.len(),
+            gauges: header.gauges.len(),
             has_rigid: header.has_rigid,
             has_static: header.has_rigid && header.has_static,
         }
@@ -44,6 +46,7 @@ impl Shape {
             ("elastic", sample.elastic.len(), self.elements),
             ("X_WS", sample.flexible.X_WS.len(), self.stations),
             ("contributions", sample.contributions.len(), self.contributors),
+            ("gauges", sample.gauges.len(), self.gauges),
         ];
         let lists = twin(&sample.flexible).into_iter().chain(rigid.into_iter().flatten()).chain(own);
 

@@ -7,7 +7,7 @@ use flexarm_kinematics::Pose;
 use nalgebra::{Translation3, Vector3};
 
 use crate::shape::Shape;
-use crate::{ElasticSample, RunHeader, Sample, TwinSample};
+use crate::{ElasticSample, GAUGE_ENDS, RunHeader, Sample, TwinSample};
 
 const DISPLACEMENT: [&str; 6] = ["x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad"];
 const WRENCH: [&str; 6] = ["fx_n", "fy_n", "fz_n", "tx_nm", "ty_nm", "tz_nm"];
@@ -42,6 +42,7 @@ pub(crate) fn columns(header: &RunHeader) -> Vec<String> {
     for element in &header.elements {
         names.extend(DISPLACEMENT.iter().chain(&WRENCH).map(|part| format!("{element}_{part}")));
     }
+    names.extend(header.gauges.iter().cloned());
     names.extend(["kinetic", "potential", "elastic"].map(|kind| format!("{kind}_energy_j")));
     // A link may be named `flexible`: of two equal names the later column gets a suffix.
     let mut taken = BTreeSet::new();
@@ -81,6 +82,7 @@ pub(crate) fn fill_row(sample: &Sample, shape: &Shape, row: &mut Vec<f64>) {
         row.extend(element.deflection);
         row.extend(element.load);
     }
+    row.extend_from_slice(&sample.gauges);
     row.extend([sample.energy.kinetic, sample.energy.potential, sample.energy.elastic]);
 }
 
@@ -134,6 +136,7 @@ impl TableLayout {
             }
             header.elements.extend(name.strip_suffix("_fx_n").map(str::to_owned));
             header.contributors.extend(name.strip_suffix("_contribution_x_m").map(str::to_owned));
+            header.gauges.extend(GAUGE_ENDS.iter().any(|(end, _)| name.ends_with(end)).then(|| name.clone()));
         }
         Self::of_header(header, names)
     }
@@ -229,6 +232,7 @@ impl TableLayout {
             load: std::array::from_fn(|_| number()),
         };
         sample.elastic = (0..self.header.elements.len()).map(element).collect();
+        sample.gauges = self.header.gauges.iter().map(|_| number()).collect();
         [sample.energy.kinetic, sample.energy.potential, sample.energy.elastic] = std::array::from_fn(|_| number());
         if self.header.step_s > 0.0 && sample.time_s.is_finite() {
             sample.step = (sample.time_s / self.header.step_s).round() as u64;

@@ -59,6 +59,8 @@ pub struct TraceRow {
     pub flexible_m: [f64; 3],
     /// See [`Sample::contributions`].
     pub contributions: Vec<[f64; 3]>,
+    /// See [`Sample::gauges`].
+    pub gauges: Vec<f64>,
     /// Joint positions of the flexible robot (rad or m).
     pub q: Vec<f64>,
     /// Joint velocities of the flexible robot (rad/s or m/s).
@@ -91,6 +93,7 @@ impl TraceRow {
         self.rigid_m = sample.rigid.X_WT.translation.vector.into();
         self.flexible_m = sample.flexible.X_WT.translation.vector.into();
         self.contributions.clone_from(&sample.contributions);
+        self.gauges.clone_from(&sample.gauges);
         self.q.clone_from(&sample.flexible.q);
         self.qdot.clone_from(&sample.flexible.qdot);
         self.effort.clone_from(&sample.flexible.effort);

@@ -29,6 +29,8 @@ pub enum CurveQuantity {
     Contribution(usize, usize),
     /// Its norm (m).
     ContributionSize(usize),
+    /// Channel of a strain gauge or stress point (m/m or Pa).
+    Gauge(usize),
     /// Joint position (rad or m).
     Joint(usize),
     /// Joint velocity (rad/s or m/s).
@@ -67,6 +69,7 @@ impl CurveQuantity {
             Self::MovingSize => norm(&[0, 1, 2].map(|c| row.error_world[c] - row.static_m[c])),
             Self::Contribution(k, c) => row.contributions.get(k).map_or(f64::NAN, |moved| moved[c]),
             Self::ContributionSize(k) => row.contributions.get(k).map_or(f64::NAN, |moved| norm(moved)),
+            Self::Gauge(k) => number(&row.gauges, k),
             Self::Joint(k) => number(&row.q, k),
             Self::JointRate(k) => number(&row.qdot, k),
             Self::Effort(k) => number(&row.effort, k),
@@ -90,7 +93,7 @@ impl CurveQuantity {
         let energies = [energy.kinetic, energy.potential, energy.elastic];
         values.extend(error_path.iter().zip(energies).flat_map(|(path, energy)| [*path, energy]));
         values.extend(row.contributions.iter().flat_map(|moved| [moved[0], moved[1], moved[2], norm(moved)]));
-        for list in [&row.q, &row.qdot, &row.effort, &row.rigid_effort] {
+        for list in [&row.gauges, &row.q, &row.qdot, &row.effort, &row.rigid_effort] {
             values.extend_from_slice(list);
         }
         for ElasticSample { deflection, load } in &row.elastic {
@@ -111,6 +114,7 @@ impl CurveQuantity {
         for k in 0..row.contributions.len() {
             all.extend((0..3).map(|c| Self::Contribution(k, c)).chain([Self::ContributionSize(k)]));
         }
+        all.extend((0..row.gauges.len()).map(Self::Gauge));
         all.extend((0..row.q.len()).map(Self::Joint));
         all.extend((0..row.qdot.len()).map(Self::JointRate));
         all.extend((0..row.effort.len()).map(Self::Effort));
@@ -248,6 +252,7 @@ mod tests {
             error_path: std::array::from_fn(|_| next()),
             static_m: std::array::from_fn(|_| next()),
             contributions: (0..3).map(|_| std::array::from_fn(|_| next())).collect(),
+            gauges: list(2),
             q: list(2),
             qdot: list(2),
             effort: list(2),

@@ -36,16 +36,17 @@ enum Width {
     PerJoint,
     PerContributor(usize),
     PerElement(usize),
+    PerGauge,
 }
 
 const fn signal(name: &'static str, unit: &'static str, width: Width, fill: Fill) -> Signal {
     Signal { name, unit, width, fill }
 }
 
-use Width::{Numbers, PerContributor, PerElement, PerJoint};
+use Width::{Numbers, PerContributor, PerElement, PerGauge, PerJoint};
 
 /// All signals; those that need the rigid twin start with the error.
-const SIGNALS: [Signal; 18] = [
+const SIGNALS: [Signal; 19] = [
     signal("time", "s", Numbers(1), |s, to| to.push(s.time_s)),
     signal("position", "", PerJoint, |s, to| to.extend_from_slice(&s.flexible.q)),
     signal("velocity", "", PerJoint, |s, to| to.extend_from_slice(&s.flexible.qdot)),
@@ -55,6 +56,7 @@ const SIGNALS: [Signal; 18] = [
     signal("deflection", "m, rad", PerElement(6), |s, to| s.elastic.iter().for_each(|e| to.extend(e.deflection))),
     signal("load", "N, N m", PerElement(6), |s, to| s.elastic.iter().for_each(|e| to.extend(e.load))),
     signal("energy", "J", Numbers(3), |s, to| to.extend([s.energy.kinetic, s.energy.potential, s.energy.elastic])),
+    signal("gauge", "m/m, Pa", PerGauge, |s, to| to.extend_from_slice(&s.gauges)),
     signal("error_world", "m", Numbers(3), |s, to| to.extend_from_slice(&s.error_world[..3])),
     signal("error_rotation", "rad", Numbers(3), |s, to| to.extend_from_slice(&s.error_world[3..])),
     signal("error_path", "m", Numbers(3), |s, to| to.extend_from_slice(&s.error_path[..3])),
@@ -66,14 +68,14 @@ const SIGNALS: [Signal; 18] = [
     signal("rigid_tcp_quaternion_wxyz", "", Numbers(4), |s, to| to.extend(wxyz(&s.rigid))),
 ];
 /// Index of the first signal that needs the rigid twin.
-const OF_TWIN: usize = 9;
+const OF_TWIN: usize = 10;
 
 fn wxyz(twin: &crate::TwinSample) -> [f64; 4] {
     let q = nalgebra::UnitQuaternion::from_rotation_matrix(&twin.X_WT.rotation);
     [q.w, q.i, q.j, q.k]
 }
 
-/// The signals of a run, with the names of their joints, elements and contributors.
+/// The signals of a run, with the names of their joints, elements, contributors and gauges.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Columns {
     /// Joints, in the order of `position`, `velocity` and `effort`.
@@ -84,6 +86,8 @@ pub struct Columns {
     pub elements: Vec<String>,
     /// Contributors to the TCP displacement, in the order of `contribution`: three numbers each.
     pub contributors: Vec<String>,
+    /// Channels of strain gauges and stress points, in the order of `gauge`.
+    pub gauges: Vec<String>,
     columns: Vec<Column>,
     rows: usize,
 }
@@ -98,6 +102,7 @@ impl Columns {
             PerJoint => header.joints.len(),
             PerContributor(n) => n * header.contributors.len(),
             PerElement(n) => n * header.elements.len(),
+            PerGauge => header.gauges.len(),
         };
         let column =
             |s: &Signal| Column { name: s.name.into(), unit: s.unit, width: width(s.width), values: Vec::new() };
@@ -106,6 +111,7 @@ impl Columns {
             prismatic: header.prismatic.clone(),
             elements: header.elements.clone(),
             contributors: header.contributors.clone(),
+            gauges: header.gauges.clone(),
             columns: signals.iter().map(column).collect(),
             rows: 0,
         }
@@ -124,6 +130,7 @@ impl Columns {
             prismatic: self.prismatic.clone(),
             elements: self.elements.clone(),
             contributors: self.contributors.clone(),
+            gauges: self.gauges.clone(),
             has_rigid: signals.len() > OF_TWIN,
             ..RunHeader::default()
         };

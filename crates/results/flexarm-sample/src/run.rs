@@ -41,6 +41,8 @@ pub struct RunHeader {
     pub description: String,
     /// Whether samples carry a rigid twin.
     pub has_rigid: bool,
+    /// Whether the result has surfaces coloured by stress ([`RunResult::scenery`]).
+    pub has_stress: bool,
     /// Whether samples carry [`Sample::static_m`], which needs the rigid twin.
     pub has_static: bool,
     /// Samples per second.
@@ -55,6 +57,9 @@ pub struct RunHeader {
     /// Flexible links and drives that contribute to the TCP error, in the order of
     /// [`Sample::contributions`].
     pub contributors: Vec<String>,
+    /// Channels of strain gauges and stress points, in the order of [`Sample::gauges`]. A name ends
+    /// in its quantity ([`GAUGE_ENDS`]).
+    pub gauges: Vec<String>,
     /// Captions by start time, in a recording of shapes without a magnitude of their own, such as
     /// modes: its errors and deflections are only drawn, not reported. Empty for a run.
     pub captions: Vec<Caption>,
@@ -85,6 +90,47 @@ impl RunHeader {
         }
         known.len()
     }
+
+    /// Returns the gauge channels of a quantity: index in [`Self::gauges`], and name to display.
+    pub fn gauges_of(&self, quantity: GaugeQuantity) -> impl Iterator<Item = (usize, String)> {
+        let is_strain = quantity == GaugeQuantity::Strain;
+        let own = self.gauges.iter().enumerate().filter(move |(_, name)| name.ends_with("_strain") == is_strain);
+        own.map(|(k, name)| {
+            let shown = GAUGE_ENDS.iter().find_map(|(end, shown)| Some(format!("{}{shown}", name.strip_suffix(end)?)));
+            (k, shown.unwrap_or_else(|| name.clone()))
+        })
+    }
+}
+
+/// Ends of [`RunHeader::gauges`], and the words that replace them in pictures.
+pub const GAUGE_ENDS: [(&str, &str); 4] = [
+    ("_strain", ""),
+    ("_von_mises_pa", " von Mises"),
+    ("_principal_1_pa", " principal 1"),
+    ("_principal_3_pa", " principal 3"),
+];
+
+/// Quantity of a gauge channel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum GaugeQuantity {
+    /// Strain (m/m).
+    Strain,
+    /// Stress (Pa).
+    Stress,
+}
+
+impl GaugeQuantity {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Strain, Self::Stress];
+
+    /// Returns the name of the quantity, the unit in pictures, and the factor from SI units.
+    #[must_use]
+    pub fn shown(self) -> (&'static str, &'static str, f64) {
+        match self {
+            Self::Strain => ("strain", "µm/m", 1e6),
+            Self::Stress => ("stress", "MPa", 1e-6),
+        }
+    }
 }
 
 /// Caption shown from an instant on.
@@ -95,6 +141,9 @@ pub struct Caption {
     /// Short text.
     pub text: String,
 }
+
+/// View of the links coloured by stress.
+pub const STRESS_VIEW: &str = "Stress";
 
 /// A static object in the world.
 #[derive(Clone, Debug, PartialEq)]
@@ -128,8 +177,8 @@ pub enum SceneryForm {
         places: Vec<[f32; 3]>,
         /// Corner indices.
         triangles: Vec<[u32; 3]>,
-        /// Colour of the surface.
-        color: [u8; 4],
+        /// One per corner, or one for all.
+        colors: Vec<[u8; 4]>,
     },
     /// Ellipsoids.
     Ellipsoids {
@@ -285,6 +334,9 @@ pub struct Sample {
     pub elastic: Vec<ElasticSample>,
     /// TCP displacement due to each contributor's deflection (m, world axes), in header order.
     pub contributions: Vec<[f64; 3]>,
+    /// Strain (m/m) or stress (Pa) of each gauge channel, in header order; NaN without
+    /// accelerations.
+    pub gauges: Vec<f64>,
     /// Energies.
     pub energy: EnergySample,
     /// Iterations of the last step (0 for explicit steppers) and residual norm.
@@ -310,6 +362,7 @@ impl Clone for Sample {
             static_m,
             elastic,
             contributions,
+            gauges,
             energy,
             solver,
         } = source;
@@ -319,6 +372,7 @@ impl Clone for Sample {
         self.rigid.clone_from(rigid);
         self.elastic.clone_from(elastic);
         self.contributions.clone_from(contributions);
+        self.gauges.clone_from(gauges);
     }
 }
 
@@ -386,4 +440,6 @@ pub struct RunResult {
     pub events: Vec<Event>,
     /// Files on the result to put into the recording, such as its summary.
     pub attachments: Vec<Attachment>,
+    /// Objects to show in a view of their own, such as links coloured by stress.
+    pub scenery: Vec<Scenery>,
 }

@@ -34,6 +34,7 @@ mod entry_checks;
 mod error;
 pub mod file_cache;
 mod flexible;
+mod gauge_entry;
 mod gear_entry;
 mod guide_entry;
 mod headline;
@@ -95,6 +96,7 @@ pub use error::{
     PoseError, RecordingError, StudyError, ValueError,
 };
 pub use flexible::{FlexibleRobot, LinkChoices, Owner, RobotLink};
+pub use gauge_entry::Gauge;
 pub use gear_entry::{GearHysteresis, RobotCoupling};
 pub use guide_entry::GuideTilt;
 pub use headline::{Bending, ShareFigures};

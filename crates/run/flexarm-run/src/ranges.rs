@@ -64,6 +64,8 @@ pub(crate) const OF_ROBOT: Ranges = &[
     ("lead", Quantity::LENGTH),
     ("hold", Quantity::JOINT),
     ("calibration.zero", Quantity::JOINT),
+    ("strain_gauge.at", Quantity::LENGTH),
+    ("stress_point.at", Quantity::LENGTH),
 ];
 
 /// Keys of a loads file.

@@ -18,6 +18,7 @@ use crate::entry_checks::{check_finite, pose};
 use crate::error::{Error, ValueError};
 use crate::file_cache::FileCache;
 use crate::flexible::{FlexibleRobot, RobotLink};
+use crate::gauge_entry::{Gauge, gauges};
 use crate::gear_entry::{RobotCoupling, coupling};
 use crate::link_entry::{LinkHome, flexible_link};
 use crate::loop_entry::add_loops;
@@ -79,6 +80,8 @@ pub struct Robot {
     pub controller: Vec<RobotAxis>,
     /// Corrections of joint frames and joint zeros, which [`Self::rigid`] contains.
     pub calibration: Vec<Calibration>,
+    /// Strain gauges and stress points.
+    pub gauges: Vec<Gauge>,
     /// Caveats that can only be found in the text of the file.
     written: Vec<Caveat>,
     /// Last tree of the rigid robot, with the mechanism it was built from.
@@ -150,6 +153,7 @@ impl Robot {
             warnings: Vec::new(),
             controller: Vec::new(),
             calibration: Vec::new(),
+            gauges: Vec::new(),
             written: Vec::new(),
             rigid_tree: Arc::default(),
         };
@@ -289,6 +293,7 @@ impl Robot {
             warnings: Vec::new(),
             controller: Vec::new(),
             calibration,
+            gauges: Vec::new(),
             written: written_caveats(file),
             rigid_tree: Arc::default(),
         };
@@ -321,6 +326,7 @@ impl Robot {
             let flexible = flexible_link(entry, urdf, source, &home, &mut robot.warnings, &mut faults);
             robot.flexible.extend(keep(flexible, &mut faults));
         }
+        robot.gauges = gauges(file, &robot.flexible, source, &mut faults);
         if let Some(mounting) = &file.mounting {
             add_mounting(&mut robot, mounting, source, &home, &mut faults);
         }

@@ -16,6 +16,7 @@ pub(crate) use crate::beam_entry::BeamEntry;
 use crate::calibration_entry::CalibrationEntry;
 use crate::controller_entry::ControllerAxisEntry;
 use crate::drive_entry::DriveEntry;
+use crate::gauge_entry::{StrainGaugeEntry, StressPointEntry};
 use crate::gear_entry::CouplingEntry;
 use crate::loop_entry::LoopEntry;
 use crate::mounting::MountingEntry;
@@ -88,6 +89,12 @@ pub(crate) struct RobotFile {
     #[serde(default)]
     #[serde(rename = "loop")]
     pub loops: Vec<Spanned<LoopEntry>>,
+    /// Strain gauges on flexible links.
+    #[serde(default)]
+    pub strain_gauge: Vec<StrainGaugeEntry>,
+    /// Points on flexible links whose stress is recorded.
+    #[serde(default)]
+    pub stress_point: Vec<StressPointEntry>,
 }
 
 /// Pose of the tool centre point in a link.

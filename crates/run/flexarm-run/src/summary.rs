@@ -227,6 +227,38 @@ pub struct LinkStressFigures {
     pub damage: Option<f64>,
     /// Places of the largest stress, the worst first.
     pub worst: Vec<StressPlaceFigures>,
+    /// Stress points of the robot file.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub points: Vec<StressPointFigures>,
+    /// Strain gauges of the robot file.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub gauges: Vec<StrainGaugeFigures>,
+}
+
+/// Maximum stress at a stress point.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct StressPointFigures {
+    /// Name of the point.
+    pub name: String,
+    /// Its node and maximum.
+    pub place: StressPlaceFigures,
+}
+
+/// Extremes of a strain gauge.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct StrainGaugeFigures {
+    /// Name of the gauge.
+    pub name: String,
+    /// Number of its node in the mesh.
+    pub node: u64,
+    /// Position of the node in the link frame (m).
+    pub position_m: [f64; 3],
+    /// Minimum strain (m/m).
+    pub lowest: f64,
+    /// Maximum strain (m/m).
+    pub highest: f64,
 }
 
 /// Maximum stress at a node of the surface.

@@ -253,7 +253,8 @@ fn surfaces(map: &Map, grid: &Grid) -> Vec<Scenery> {
         let level = *sorted.get((share * sorted.len() as f64) as usize)?;
         let surface = iso_surface(grid, &values, level);
         let [r, g, b, _] = color(level, scale);
-        let form = SceneryForm::Surface { places: surface.places, triangles: surface.triangles, color: [r, g, b, 150] };
+        let form =
+            SceneryForm::Surface { places: surface.places, triangles: surface.triangles, colors: vec![[r, g, b, 150]] };
         let name = format!("{:.3} {unit}", factor * level);
         matches!(&form, SceneryForm::Surface { triangles, .. } if !triangles.is_empty()).then(|| Scenery {
             view: format!("{}, surfaces", map.by),

@@ -20,6 +20,7 @@
 
 mod fields;
 mod file;
+mod gauge;
 mod map;
 mod recovery;
 #[cfg(test)]

@@ -29,6 +29,8 @@ pub(crate) struct Channels {
     pub(crate) static_error: Option<u16>,
     /// Present if there are contributors.
     pub(crate) contributions: Option<u16>,
+    /// Present if there are gauges.
+    pub(crate) gauges: Option<u16>,
     pub(crate) solver: u16,
     pub(crate) energy: u16,
     pub(crate) events: u16,
@@ -135,6 +137,8 @@ impl Channels {
             ARRAY,
             "displacement of the TCP caused by each flexible link or drive, world axes [m]",
         )?;
+        let gauges =
+            add_if(!header.gauges.is_empty(), "/gauges", ARRAY, "strain gauges [m/m] and stress points [Pa] of links")?;
         let what = "surfaces of the links in their frames: flexible as in the URDF, rigid twin as a ghost, magnified arm in blue";
         let surfaces = add_if(!header.meshes.is_empty(), "/markers", MARKERS, what)?;
         let factor = header.magnification;
@@ -158,6 +162,7 @@ impl Channels {
             elastic_joint_states,
             static_error,
             contributions,
+            gauges,
             solver,
             energy,
             events,

@@ -50,6 +50,7 @@ use crate::{CreateOptions, EventKind, LogError, RunHeader, RunResult, START_NS, 
 /// | `/elastic/joint_states` | `sensor_msgs/JointState` | all elements as joints `<element>/x` to `<element>/rz`, so that curves have names: deflection, load |
 /// | `/elastic/<element>` | `geometry_msgs/WrenchStamped` | the same load, for arrows; at most 60 times a second |
 /// | `/elastic/<element>/deflection` | `geometry_msgs/TwistStamped` | not a velocity: the same deflection, translation and rotation; at most 60 times a second |
+/// | `/gauges` | `std_msgs/Float64MultiArray` | strain (m/m) and stress (Pa) of [`RunHeader::gauges`] |
 /// | `/energy`, `/solver` | `std_msgs/Float64MultiArray` | |
 /// | `/events` | `rcl_interfaces/Log` | events, each at its own time; the name is the kind |
 /// | `/markers` | `visualization_msgs/MarkerArray` | surfaces, once, latched; namespaces `flexible`, `rigid`, `magnified` |
@@ -134,6 +135,8 @@ pub struct McapFile {
     deflections: Vec<String>,
     /// Label of the contributions.
     contributions: String,
+    /// Label of the gauges.
+    gauges: String,
     start: Stamp,
     last: Stamp,
     samples: u32,
@@ -165,6 +168,7 @@ impl McapFile {
             elements: header.elements.clone(),
             deflections: parts(&header.elements, &["x", "y", "z", "rx", "ry", "rz"], "/"),
             contributions: parts(&header.contributors, &["x [m]", "y [m]", "z [m]"], " ").join(","),
+            gauges: header.gauges.join(","),
             start,
             last: start,
             samples: 0,
@@ -250,6 +254,11 @@ impl McapFile {
         if let Some(channel) = self.channels.contributions {
             let shares = sample.contributions.as_flattened();
             let message = messages::labelled_array(&self.contributions, shares);
+            self.output.send(channel, self.samples, stamp, message)?;
+        }
+
+        if let Some(channel) = self.channels.gauges {
+            let message = messages::labelled_array(&self.gauges, &sample.gauges);
             self.output.send(channel, self.samples, stamp, message)?;
         }
 

@@ -7,7 +7,7 @@ use super::path;
 use super::stream::{Result, RrdStream};
 use super::tracks::{CurveExtent, ScalarTrack};
 use crate::poses::size;
-use crate::{RunHeader, Sample};
+use crate::{GaugeQuantity, RunHeader, Sample};
 
 /// All curves of a run.
 pub(crate) struct Curves {
@@ -16,6 +16,8 @@ pub(crate) struct Curves {
     /// All other curves, at the times at which the robots are drawn, in the order of
     /// [`Curves::push_causes`].
     causes: Vec<ScalarTrack>,
+    /// Indices of the gauges of each quantity, and their factor from SI units.
+    gauges: Vec<(Vec<usize>, f64)>,
     has_rigid: bool,
 }
 
@@ -67,10 +69,20 @@ impl Curves {
             let names = header.contributors.iter().map(|name| format!("{name} [mm]")).collect();
             tracks.push(counted(at(&["contributions"]), names, &series));
         }
+        let mut gauges = Vec::new();
+        for quantity in GaugeQuantity::ALL {
+            let (group, unit, factor) = quantity.shown();
+            let (places, names): (Vec<usize>, Vec<String>) =
+                header.gauges_of(quantity).map(|(k, name)| (k, format!("{name} [{unit}]"))).unzip();
+            if !names.is_empty() {
+                tracks.push(counted(at(&[group]), names, &series));
+                gauges.push((places, factor));
+            }
+        }
         let energies = ["kinetic [J]", "potential [J]", "elastic [J]"].map(str::to_owned).to_vec();
         tracks.push(counted(at(&["energy"]), energies, &series));
         tracks.push(counted(at(&["solver"]), ["iterations", "residual"].map(str::to_owned).to_vec(), &series));
-        Self { error, causes: tracks, has_rigid: header.has_rigid }
+        Self { error, causes: tracks, gauges, has_rigid: header.has_rigid }
     }
 
     /// Creates the curves of the error norm only, named for a study.
@@ -78,7 +90,7 @@ impl Curves {
         let curve = |group: &str| {
             ScalarTrack::new(root.join(&path(["study", group, label])), [format!("{label} [mm]")]).with_colors([color])
         };
-        Self { error: vec![curve("error"), curve("lateral")], causes: Vec::new(), has_rigid: true }
+        Self { error: vec![curve("error"), curve("lateral")], causes: Vec::new(), gauges: Vec::new(), has_rigid: true }
     }
 
     /// Adds a row of a study's curves: norm of the error, and of its component across the path.
@@ -120,6 +132,9 @@ impl Curves {
         }
         if !sample.contributions.is_empty() {
             put(&mut sample.contributions.iter().map(|moved| size(moved) * MILLI));
+        }
+        for (places, factor) in &self.gauges {
+            put(&mut places.iter().map(|k| sample.gauges[*k] * factor));
         }
         put(&mut [sample.energy.kinetic, sample.energy.potential, sample.energy.elastic].into_iter());
         put(&mut sample.solver.into_iter());

@@ -56,9 +56,10 @@ const SHORT_WRITINGS: usize = 16;
 /// | `/plots/contributions` | norm of the contribution of each flexible link and drive to the error, in **mm** |
 /// | `/plots/joints/{position,velocity}`, `/plots/joints/effort/{flexible,rigid}` | in rad (m), rad/s (m/s), in N m (N) |
 /// | `/plots/elastic/<element>`, `/plots/elastic_load/<element>` | deflection, in **mm** and **mrad**; load, in N and N m |
+/// | `/plots/strain`, `/plots/stress` | strain gauges in **µm/m**, stress points in **MPa** |
 /// | `/plots/energy`, `/plots/solver` | in J; iterations and residual |
 /// | `/caption`, `/<robot>/caption` | in a recording of modes: name and frequency of the current mode; such a recording has no curves |
-/// | `/scenery/<view>/<name>` | fixed objects around the robot, such as the points of a map |
+/// | `/scenery/<view>/<name>` | fixed objects around the robot, such as the points of a map, or the links coloured by stress |
 /// | `/events` | moves, maximum error, settling, limits |
 /// | `/summary`, `/urdf` | result and set-up, and the robot's description, as text |
 ///
@@ -110,6 +111,7 @@ impl RrdFile {
     fn end(&mut self, result: &RunResult) -> Result<()> {
         self.closed = true;
         self.run.finish(&mut self.store, result)?;
+        result.scenery.iter().try_for_each(|scenery| scenery::write(&self.store.stream, scenery))?;
         if !result.figures.is_empty() {
             let text = summary(&self.run.header.description, result);
             self.store.stream.constant(&path(["summary"]), &TextDocument::from_markdown(text))?;

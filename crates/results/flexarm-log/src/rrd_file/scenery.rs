@@ -31,6 +31,11 @@ pub(super) fn window(header: &RunHeader, robot: &EntityPath) -> Part {
     Part::Row(vec![(3.0, scenes), (1.6, Part::Column(right))])
 }
 
+/// Lays out the objects of one view.
+pub(super) fn view(title: &str) -> Part {
+    Part::scene(title, EntityPath::root(), vec![format!("+ {}/**", path([ROOT, title]))])
+}
+
 /// Writes a fixed object.
 pub(super) fn write(stream: &RrdStream, scenery: &Scenery) -> Result<()> {
     let view = if scenery.view.is_empty() { EVERYWHERE } else { &scenery.view };
@@ -49,11 +54,15 @@ fn archetype(form: &SceneryForm) -> Box<dyn AsComponents> {
                 false => Box::new(points.with_labels(labels.iter().map(String::as_str)).with_show_labels(true)),
             }
         }
-        SceneryForm::Surface { places, triangles, color: [r, g, b, a] } => Box::new(
-            Mesh3D::new(places.iter().copied())
-                .with_triangle_indices(triangles.iter().copied())
-                .with_albedo_factor(AlbedoFactor(Rgba32::from_unmultiplied_rgba(*r, *g, *b, *a))),
-        ),
+        SceneryForm::Surface { places, triangles, colors } => {
+            let mesh = Mesh3D::new(places.iter().copied()).with_triangle_indices(triangles.iter().copied());
+            match colors[..] {
+                [[r, g, b, a]] => {
+                    Box::new(mesh.with_albedo_factor(AlbedoFactor(Rgba32::from_unmultiplied_rgba(r, g, b, a))))
+                }
+                _ => Box::new(mesh.with_vertex_colors(colors.iter().map(color))),
+            }
+        }
         SceneryForm::Ellipsoids { places, half_axes_m, quaternions, colors } => Box::new(
             Ellipsoids3D::from_centers_and_half_sizes(places.iter().copied(), half_axes_m.iter().copied())
                 .with_quaternions(quaternions.iter().map(|q| Quaternion::from_xyzw(*q)))

@@ -5,7 +5,7 @@ use rerun::EntityPath;
 use super::layout::Part;
 use super::run::Seat;
 use super::{path, scenery};
-use crate::RunHeader;
+use crate::{GaugeQuantity, RunHeader, STRESS_VIEW};
 
 /// Lays out the robots with the result below, and the error and its causes beside them.
 pub(crate) fn window(header: &RunHeader, seat: &Seat, labels: &[String]) -> Part {
@@ -22,10 +22,13 @@ pub(crate) fn window(header: &RunHeader, seat: &Seat, labels: &[String]) -> Part
         Seat::InStudy(_, label) => format!("{label}: {}{}", title[..1].to_lowercase(), &title[1..]),
     };
     let cause = |title: &str, parts: &[&str]| plot(&own(title), parts);
+    let shows = |quantity| header.gauges_of(quantity).next().is_some();
     let causes = [
         (!header.contributors.is_empty()).then(|| cause("Shares of the error [mm]", &["contributions"])),
         (!header.elements.is_empty()).then(|| cause("Deflections [mm, mrad]", &["elastic"])),
         (!header.elements.is_empty()).then(|| cause("Loads [N, N m]", &["elastic_load"])),
+        shows(GaugeQuantity::Stress).then(|| cause("Stress [MPa]", &["stress"])),
+        shows(GaugeQuantity::Strain).then(|| cause("Strain [µm/m]", &["strain"])),
         Some(cause("Joint positions", &["joints", "position"])),
         Some(cause("Joint efforts", &["joints", "effort"])),
         Some(cause("Energy [J]", &["energy"])),
@@ -90,10 +93,14 @@ fn robots(header: &RunHeader, seat: &Seat, labels: &[String]) -> Part {
     };
     let life_size =
         |title: &str| Part::scene(title, root.clone(), without(&["magnified", "path/magnified", "path/peak"]));
-    if !(header.has_rigid && factor > 0.0) {
-        return life_size("Robot");
-    }
-    let title = format!("Deflections x {factor}");
-    let magnified = Part::scene(&title, root.clone(), without(&["flexible", "path/flexible"]));
-    Part::Tabs(vec![magnified, life_size("True scale")])
+    let mut tabs = match header.has_rigid && factor > 0.0 {
+        false => vec![life_size("Robot")],
+        true => {
+            let title = format!("Deflections x {factor}");
+            let magnified = Part::scene(&title, root.clone(), without(&["flexible", "path/flexible"]));
+            vec![magnified, life_size("True scale")]
+        }
+    };
+    tabs.extend(header.has_stress.then(|| scenery::view(STRESS_VIEW)));
+    if tabs.len() == 1 { tabs.remove(0) } else { Part::Tabs(tabs) }
 }

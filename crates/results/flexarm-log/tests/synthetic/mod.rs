@@ -67,6 +67,7 @@ pub(crate) fn header() -> RunHeader {
         description: "# synthetic, swing\n\nThree links, the upper arm bends. *Made-up numbers.*".into(),
         has_rigid: true,
         has_static: true,
+        has_stress: false,
         log_rate_hz: RATE_HZ,
         step_s: STEP_S,
         start_ns: None,
@@ -76,6 +77,9 @@ pub(crate) fn header() -> RunHeader {
             carries: vec![(3, 1)],
         }],
         contributors: vec!["upper_arm".into()],
+        gauges: ["top_strain", "eye_von_mises_pa", "eye_principal_1_pa", "eye_principal_3_pa"]
+            .map(str::to_owned)
+            .into(),
         captions: Vec::new(),
         magnification: 50.0,
         color_scale_m: 2.5e-3,
@@ -99,6 +103,7 @@ pub(crate) fn result() -> RunResult {
             media_type: "application/json".into(),
             bytes: b"{\"end\": \"complete\"}".into(),
         }],
+        scenery: Vec::new(),
     }
 }
 
@@ -130,6 +135,7 @@ pub(crate) fn sample(step: u64) -> Sample {
         static_m: [2.0e-4 * s, -1.0e-4, -1.1e-3],
         elastic: vec![ElasticSample { deflection, load: deflection.map(|part| 4.0e5 * part) }],
         contributions: vec![difference.into()],
+        gauges: vec![0.2 * about_y, 3e10 * about_y, 3.1e10 * about_y, -1e9 * about_y],
         energy: EnergySample { kinetic: 40.0 * v * v, potential: 120.0 + 30.0 * s, elastic: 1e5 * about_y.powi(2) },
         solver: [2.0, 1e-11 * (1.0 + v)],
         flexible,

@@ -3,21 +3,25 @@
 //! The monitor keeps the amplitudes of the fields at every logged sample; [`StressMonitor::result`]
 //! finds the maxima over the run for every node of the surface.
 
+use std::cell::OnceCell;
+
 use flexarm_analysis::{SnCurve, rainflow_repeating};
 #[cfg(feature = "png")]
 use flexarm_draw::mesh_picture::{Image, StressPicture, stress_sheet};
+use flexarm_draw::palette::magnitude;
 use flexarm_fem::stress::{StressFields, StressMap, inertia_loads, parse_stress, von_mises};
 use flexarm_fem::{Material, ReducedLink, RigidPart};
 use flexarm_flexlink::LinkForm;
-use flexarm_kinematics::{Data, Frame, State, inverse_dynamics};
+use flexarm_kinematics::{Data, Frame, Pose, State, inverse_dynamics};
+use flexarm_log::{GAUGE_ENDS, STRESS_VIEW, Scenery, SceneryForm};
 use flexarm_stepping::{FlexibleArm, Observation, PooledWorkspace};
-use nalgebra::{DMatrix, DVector, Matrix3};
+use nalgebra::{DMatrix, DVector, Matrix3, Point3, RowSVector};
 
 use crate::error::Error;
 use crate::flexible::{FlexibleRobot, Owner, RobotLink};
 use crate::options::Modelling;
 use crate::robot::Robot;
-use crate::summary::{LinkStressFigures, StressPlaceFigures};
+use crate::summary::{LinkStressFigures, StrainGaugeFigures, StressPlaceFigures, StressPointFigures};
 
 /// Seats this close to a tied node are left out, as a fraction of the distance between the
 /// interfaces: the stress beside a rigid tie is that of the tie.
@@ -35,6 +39,7 @@ const SEATS: usize = 512;
 /// Monitors the stress of links.
 pub(crate) struct StressMonitor {
     links: Vec<LinkStress>,
+    gauges: Vec<PlacedGauge>,
     data: PooledWorkspace<Data>,
     state: State,
     times: Vec<f64>,
@@ -53,13 +58,28 @@ struct LinkStress {
     length: f64,
     /// Amplitudes and loads of all samples.
     amplitudes: Vec<f32>,
+    /// Poses of the link in the world at all samples.
+    poses: Vec<Pose>,
+    /// Maximum von Mises stress of each seat (Pa), once it is computed.
+    peaks: OnceCell<Vec<f32>>,
+}
+
+/// A gauge at a node of the surface.
+struct PlacedGauge {
+    name: String,
+    /// Index into [`StressMonitor::links`].
+    link: usize,
+    seat: usize,
+    /// Strain per stress component (1/Pa) of a strain gauge; `None` for a stress point.
+    strain: Option<[f64; 6]>,
 }
 
 impl StressMonitor {
     /// Returns the monitor, or `None` if no link has stress fields.
     ///
     /// # Errors
-    /// [`Error::File`] for a stress file that is damaged or belongs to another link.
+    /// [`Error::File`] for a stress file that is damaged or belongs to another link, and for a gauge
+    /// that is not on the surface.
     pub(crate) fn new(
         robot: &Robot,
         flexible: &FlexibleRobot,
@@ -78,13 +98,24 @@ impl StressMonitor {
             let map = map_of(link, &fields, modelling).map_err(fail)?;
             let frame = arm.model.frame(&span.link).expect("a link of the substitution").clone();
             let (name, length) = (span.link.clone(), span.length);
-            links.push(LinkStress { name, fields, map, elements, frame, length, amplitudes: Vec::new() });
+            links.push(LinkStress {
+                name,
+                fields,
+                map,
+                elements,
+                frame,
+                length,
+                amplitudes: Vec::new(),
+                poses: Vec::new(),
+                peaks: OnceCell::new(),
+            });
         }
         if links.is_empty() {
             return Ok(None);
         }
+        let gauges = placed(robot, &links)?;
         let (data, state) = (arm.lend_data(), State::zeros(&arm.model));
-        Ok(Some(Self { links, data, state, times: Vec::new() }))
+        Ok(Some(Self { links, gauges, data, state, times: Vec::new() }))
     }
 
     /// Adds a sample; one without accelerations is left out.
@@ -100,6 +131,7 @@ impl StressMonitor {
         for link in &mut self.links {
             // A holds spatial accelerations minus gravity; ω × v makes them those of the point.
             let V = self.data.V[link.frame.body].at_child(&link.frame.X_BF);
+            link.poses.push(seen.X_WB[link.frame.body] * link.frame.X_BF);
             let A = self.data.A[link.frame.body].at_child(&link.frame.X_BF);
             let a = A.linear + V.angular.cross(&V.linear);
             q.clear();
@@ -110,9 +142,93 @@ impl StressMonitor {
         }
     }
 
-    /// Returns the worst places of each link.
+    /// Returns the names of the gauge channels.
+    pub(crate) fn channels(&self) -> Vec<String> {
+        let names = self.gauges.iter().flat_map(|gauge| match gauge.strain {
+            Some(_) => vec![format!("{}_strain", gauge.name)],
+            None => GAUGE_ENDS[1..].iter().map(|(end, _)| format!("{}{end}", gauge.name)).collect(),
+        });
+        names.collect()
+    }
+
+    /// Replaces `values` by those of the gauge channels at the last sample: strain (m/m), or signed
+    /// von Mises, largest and smallest principal stress (Pa). NaN for a sample without
+    /// accelerations.
+    pub(crate) fn read_gauges(&self, seen: &Observation, values: &mut Vec<f64>) {
+        values.clear();
+        let is_blind = self.times.last() != Some(&seen.t);
+        for gauge in &self.gauges {
+            let stress = if is_blind { [f64::NAN; 6] } else { self.links[gauge.link].last_stress(gauge.seat) };
+            match gauge.strain {
+                Some(strain) => values.push(strain.iter().zip(stress).map(|(by, stress)| by * stress).sum()),
+                None if is_blind => values.extend([f64::NAN; 3]),
+                None => {
+                    let [largest, smallest] = principal(&stress);
+                    values.extend([signed_von_mises(stress), largest, smallest]);
+                }
+            }
+        }
+    }
+
+    /// Returns the worst places of each link, and the extremes of its gauges.
     pub(crate) fn result(&self) -> Vec<LinkStressFigures> {
-        self.links.iter().filter(|_| !self.times.is_empty()).map(|link| link.figures(&self.times)).collect()
+        let figures = |(number, link): (usize, &LinkStress)| {
+            let amplitudes = link.amplitudes();
+            let own = || self.gauges.iter().filter(move |gauge| gauge.link == number);
+            let points = own().filter(|gauge| gauge.strain.is_none()).map(|gauge| StressPointFigures {
+                name: gauge.name.clone(),
+                place: link.place(gauge.seat, &amplitudes, &self.times),
+            });
+            let strain = |gauge: &PlacedGauge| {
+                let by = RowSVector::<f32, 6>::from(gauge.strain?.map(|by| by as f32));
+                let history = by * link.map.stress().fixed_rows::<6>(6 * gauge.seat) * &amplitudes;
+                let seat = &link.fields.seats[gauge.seat];
+                Some(StrainGaugeFigures {
+                    name: gauge.name.clone(),
+                    node: seat.node,
+                    position_m: seat.position.into(),
+                    lowest: f64::from(history.min()),
+                    highest: f64::from(history.max()),
+                })
+            };
+            LinkStressFigures {
+                points: points.collect(),
+                gauges: own().filter_map(strain).collect(),
+                ..link.figures(&amplitudes, &self.times)
+            }
+        };
+        self.links.iter().enumerate().filter(|_| !self.times.is_empty()).map(figures).collect()
+    }
+
+    /// Returns the surfaces of the links in the world at the instant of the largest stress, coloured by
+    /// the maximum of each node over the run, and labels of the worst places.
+    pub(crate) fn scenery(&self) -> Vec<Scenery> {
+        let links = || self.links.iter().filter(|_| !self.times.is_empty()).map(|link| (link, link.worst()));
+        let worst = |(link, worst): &(&LinkStress, Vec<usize>)| worst.first().map_or(0.0, |k| link.peaks()[*k]);
+        let Some(first) = links().max_by(|a, b| worst(a).total_cmp(&worst(b))) else { return Vec::new() };
+        let scale = f64::from(worst(&first)).max(f64::MIN_POSITIVE);
+        let Some(sample) = first.1.first().map(|k| first.0.time_of_peak(*k)) else { return Vec::new() };
+        let objects = links().flat_map(|(link, worst)| {
+            let X_WL = link.poses[sample];
+            let place = |k: usize| (X_WL * Point3::from(link.fields.seats[k].position)).coords.map(|x| x as f32).into();
+            let color = |stress: &f32| {
+                let [r, g, b] = magnitude((f64::from(*stress) / scale).min(1.0));
+                [r, g, b, 255]
+            };
+            let surface = SceneryForm::Surface {
+                places: (0..link.fields.seats.len()).map(place).collect(),
+                triangles: link.fields.triangles.clone(),
+                colors: link.peaks().iter().map(color).collect(),
+            };
+            let labels = SceneryForm::Points {
+                places: worst.iter().map(|k| place(*k)).collect(),
+                colors: vec![[255; 4]],
+                radius_m: 0.005 * link.length as f32,
+                labels: worst.iter().map(|k| format!("{:.1} MPa", 1e-6 * link.peaks()[*k])).collect(),
+            };
+            [(link.name.clone(), surface), (format!("{} worst places", link.name), labels)]
+        });
+        objects.map(|(name, form)| Scenery { view: STRESS_VIEW.into(), name, form }).collect()
     }
 
     /// Returns a picture of the stress of every link, as PNG; `None` without samples.
@@ -138,6 +254,26 @@ impl StressMonitor {
     pub(crate) fn is_blind(&self) -> bool {
         self.times.is_empty()
     }
+}
+
+/// Finds the nodes of the gauges of a robot; those on links that the arm has rigid are left out.
+fn placed(robot: &Robot, links: &[LinkStress]) -> Result<Vec<PlacedGauge>, Error> {
+    let mut gauges = Vec::new();
+    for gauge in &robot.gauges {
+        let Some(number) = links.iter().position(|link| link.name == gauge.link) else { continue };
+        let fields = &links[number].fields;
+        let place = || {
+            let seat = fields.nearest_seat(&gauge.at)?;
+            let strain = gauge.grid.map(|(direction, angle)| fields.strain_by_stress(seat, &direction, angle));
+            Ok::<_, String>((seat, strain.transpose()?))
+        };
+        let entry = if gauge.grid.is_some() { "strain_gauge" } else { "stress_point" };
+        let fail =
+            |what: String| Error::File { path: robot.path.clone(), what: format!("{entry} {:?}: {what}", gauge.name) };
+        let (seat, strain) = place().map_err(fail)?;
+        gauges.push(PlacedGauge { name: gauge.name.clone(), link: number, seat, strain });
+    }
+    Ok(gauges)
 }
 
 /// Returns the map for the model of the link.
@@ -174,8 +310,6 @@ impl LinkStress {
     /// Draws the largest stress of every node.
     #[cfg(feature = "png")]
     fn sheet(&self) -> Image {
-        let amplitudes = self.amplitudes();
-        let peaks = self.peaks(&amplitudes.select_columns(&self.corners(&amplitudes)));
         let positions: Vec<_> = self.fields.seats.iter().map(|seat| seat.position).collect();
         let [X_LA, X_LB] = [0, 1].map(|k| self.fields.poses[k].translation.vector);
         stress_sheet(&StressPicture {
@@ -183,8 +317,8 @@ impl LinkStress {
             remark: "the numbers are those of the worst places in summary.json",
             positions: &positions,
             triangles: &self.fields.triangles,
-            stress: &peaks.iter().map(|stress| f64::from(*stress)).collect::<Vec<_>>(),
-            worst: &self.worst(&peaks),
+            stress: &self.peaks().iter().map(|stress| f64::from(*stress)).collect::<Vec<_>>(),
+            worst: &self.worst(),
             along: X_LB - X_LA,
         })
     }
@@ -196,7 +330,8 @@ impl LinkStress {
     }
 
     /// Returns the worst seats, which are apart from each other.
-    fn worst(&self, peaks: &[f32]) -> Vec<usize> {
+    fn worst(&self) -> Vec<usize> {
+        let peaks = self.peaks();
         let mut order = self.judged();
         order.sort_by(|a, b| peaks[*b].total_cmp(&peaks[*a]));
         let mut worst: Vec<usize> = Vec::new();
@@ -213,51 +348,63 @@ impl LinkStress {
         worst
     }
 
+    /// Returns the stress of a seat at the last sample (Pa).
+    fn last_stress(&self, seat: usize) -> [f64; 6] {
+        let last = &self.amplitudes[self.amplitudes.len() - self.map.columns()..];
+        let stress = self.map.stress();
+        std::array::from_fn(|c| {
+            last.iter()
+                .enumerate()
+                .map(|(k, amplitude)| f64::from(stress[(6 * seat + c, k)]) * f64::from(*amplitude))
+                .sum()
+        })
+    }
+
+    /// Returns the maximum of a seat over the run.
+    fn place(&self, k: usize, amplitudes: &DMatrix<f32>, times: &[f64]) -> StressPlaceFigures {
+        let seat = &self.fields.seats[k];
+        let history = self.signed_history(k, amplitudes);
+        let sample = largest(&history);
+        let stress = history[sample].abs();
+        let strength = strength_of(&self.fields.materials[seat.material]);
+        let damage = |strength: &Strength| strength.curve().damage(&rainflow_repeating(&history)).min(1.0);
+        StressPlaceFigures {
+            node: seat.node,
+            position_m: seat.position.into(),
+            t_s: times[sample],
+            von_mises_pa: stress,
+            of_yield: strength.map(|strength| stress / strength.yield_pa),
+            material: strength.map(|strength| strength.name.to_owned()),
+            damage: strength.map(damage),
+        }
+    }
+
+    /// Returns the sample with the largest stress of a seat.
+    fn time_of_peak(&self, seat: usize) -> usize {
+        largest(&self.signed_history(seat, &self.amplitudes()))
+    }
+
     /// Returns the worst places over the run.
-    fn figures(&self, times: &[f64]) -> LinkStressFigures {
-        let amplitudes = self.amplitudes();
-        let peaks = self.peaks(&amplitudes.select_columns(&self.corners(&amplitudes)));
-        let place = |k: usize| {
-            let seat = &self.fields.seats[k];
-            let history = self.signed_history(k, &amplitudes);
-            let sample = (0..history.len()).max_by(|a, b| history[*a].abs().total_cmp(&history[*b].abs()));
-            let sample = sample.unwrap_or(0);
-            let stress = history[sample].abs();
-            let strength = strength_of(&self.fields.materials[seat.material]);
-            let damage = |strength: &Strength| strength.curve().damage(&rainflow_repeating(&history)).min(1.0);
-            StressPlaceFigures {
-                node: seat.node,
-                position_m: seat.position.into(),
-                t_s: times[sample],
-                von_mises_pa: stress,
-                of_yield: strength.map(|strength| stress / strength.yield_pa),
-                material: strength.map(|strength| strength.name.to_owned()),
-                damage: strength.map(damage),
-            }
-        };
-        let worst: Vec<StressPlaceFigures> = self.worst(&peaks).into_iter().map(place).collect();
+    fn figures(&self, amplitudes: &DMatrix<f32>, times: &[f64]) -> LinkStressFigures {
+        let worst = self.worst().into_iter().map(|k| self.place(k, amplitudes, times));
+        let worst: Vec<StressPlaceFigures> = worst.collect();
         LinkStressFigures {
             name: self.name.clone(),
-            nodes: peaks.len(),
-            left_out: peaks.len() - self.judged().len(),
+            nodes: self.fields.seats.len(),
+            left_out: self.fields.seats.len() - self.judged().len(),
             clear_of_ties_m: NEAR_TIE * self.length,
             peak_pa: worst.first().map_or(0.0, |place| place.von_mises_pa),
             of_yield: worst.first().and_then(|place| place.of_yield),
             damage: worst.iter().filter_map(|place| place.damage).reduce(f64::max),
             worst,
+            ..LinkStressFigures::default()
         }
     }
 
-    /// Returns the von Mises stress of a seat over the run (Pa), with the sign of the principal
-    /// stress of the largest magnitude.
+    /// Returns the signed von Mises stress of a seat over the run (Pa).
     fn signed_history(&self, seat: usize, amplitudes: &DMatrix<f32>) -> Vec<f64> {
         let own = self.map.stress().rows(6 * seat, 6) * amplitudes;
-        let signed = own.column_iter().map(|column| {
-            let [xx, yy, zz, xy, yz, zx] = [0, 1, 2, 3, 4, 5].map(|c| f64::from(column[c]));
-            let principal = Matrix3::new(xx, xy, zx, xy, yy, yz, zx, yz, zz).symmetric_eigenvalues();
-            von_mises([xx, yy, zz, xy, yz, zx]).copysign(principal.max() + principal.min())
-        });
-        signed.collect()
+        own.column_iter().map(|column| signed_von_mises([0, 1, 2, 3, 4, 5].map(|c| f64::from(column[c])))).collect()
     }
 
     /// Returns the samples at the corners of a polyline that is close to the amplitudes.
@@ -291,8 +438,16 @@ impl LinkStress {
         corners
     }
 
-    /// Returns the maximum von Mises stress of each seat (Pa).
-    fn peaks(&self, amplitudes: &DMatrix<f32>) -> Vec<f32> {
+    /// Returns the maximum von Mises stress of each seat over the run (Pa).
+    fn peaks(&self) -> &[f32] {
+        self.peaks.get_or_init(|| {
+            let amplitudes = self.amplitudes();
+            self.peaks_of(&amplitudes.select_columns(&self.corners(&amplitudes)))
+        })
+    }
+
+    /// Returns the maximum von Mises stress of each seat among some samples (Pa).
+    fn peaks_of(&self, amplitudes: &DMatrix<f32>) -> Vec<f32> {
         let stress = self.map.stress();
         let mut peaks = vec![0.0_f32; self.fields.seats.len()];
         let mut product = DMatrix::zeros(6 * SEATS, SAMPLES);
@@ -313,6 +468,23 @@ impl LinkStress {
         peaks.iter_mut().for_each(|square| *square = square.sqrt());
         peaks
     }
+}
+
+/// Returns the index of the number of the largest magnitude; 0 if there is none.
+fn largest(numbers: &[f64]) -> usize {
+    (0..numbers.len()).max_by(|a, b| numbers[*a].abs().total_cmp(&numbers[*b].abs())).unwrap_or(0)
+}
+
+/// Returns the largest and the smallest principal stress (Pa).
+fn principal(&[xx, yy, zz, xy, yz, zx]: &[f64; 6]) -> [f64; 2] {
+    let principal = Matrix3::new(xx, xy, zx, xy, yy, yz, zx, yz, zz).symmetric_eigenvalues();
+    [principal.max(), principal.min()]
+}
+
+/// Returns the von Mises stress (Pa) with the sign of the principal stress of the largest magnitude.
+fn signed_von_mises(stress: [f64; 6]) -> f64 {
+    let [largest, smallest] = principal(&stress);
+    von_mises(stress).copysign(largest + smallest)
 }
 
 /// Square of the von Mises stress.

@@ -1,7 +1,7 @@
 //! Data of the plots: curves of a run in readable units, thinned such that peaks remain.
 
 use flexarm_analysis::amplitude_spectrum;
-use flexarm_log::{CurveQuantity, Trace};
+use flexarm_log::{CurveQuantity, GaugeQuantity, Trace};
 
 use crate::summary::Summary;
 
@@ -152,6 +152,7 @@ pub(super) fn plots(summary: &Summary, trace: &Trace) -> Vec<Plot> {
         plots.extend(contributions(trace));
     }
     plots.extend(elements(summary, trace));
+    plots.extend(GaugeQuantity::ALL.into_iter().filter_map(|quantity| gauges(trace, quantity)));
     plots.push(torques(trace));
     plots.extend(joints(trace));
     plots.push(energy(trace));
@@ -344,6 +345,25 @@ fn contributions(trace: &Trace) -> Option<Plot> {
         note: "TCP displacement caused by the deflection of one link or drive (first order).".into(),
         views,
         ..over_time("contributions", PARTS, "Who moves the tool")
+    })
+}
+
+/// Plot of all strain gauges or of all stress points.
+fn gauges(trace: &Trace, quantity: GaugeQuantity) -> Option<Plot> {
+    let (id, unit, scale) = quantity.shown();
+    let own = trace.header.gauges_of(quantity).enumerate();
+    let curves = own.map(|(n, (k, name))| curve(trace, name, Kind::Part(n), scale, CurveQuantity::Gauge(k)));
+    let table = Table::new(trace.curve_times(), curves.collect(), MOST_POINTS);
+    let title = match quantity {
+        GaugeQuantity::Strain => "Strain gauges",
+        GaugeQuantity::Stress => "Stress points",
+    };
+    (!table.curves.is_empty()).then(|| Plot {
+        y_label: title,
+        y_unit: unit,
+        wide: true,
+        views: one_view(table),
+        ..over_time(id, PARTS, title)
     })
 }
 

@@ -24,7 +24,7 @@ use crate::headline::{self, rounded};
 use crate::options::Outputs;
 use crate::record::FIGURES_FOLDER;
 use crate::settling::within;
-use crate::summary::{LinkStressFigures, Summary};
+use crate::summary::{LinkStressFigures, StrainGaugeFigures, StressPointFigures, Summary};
 
 use self::shares::{Part, part_shares, share_numbers};
 
@@ -194,7 +194,21 @@ fn stress_figures(summary: &Summary) -> Vec<Figure> {
         let beyond = place.of_yield.is_some_and(|share| share > 1.0);
         Some(Figure { weight: if beyond { Weight::Alert } else { Weight::Plain }, ..figure })
     };
-    summary.stress.iter().filter_map(row).collect()
+    let point = |point: &StressPointFigures| {
+        let worst = vec![point.place.clone()];
+        row(&LinkStressFigures { name: point.name.clone(), worst, ..LinkStressFigures::default() })
+    };
+    let gauge = |gauge: &StrainGaugeFigures| {
+        let value = format!("{:.1} to {:.1}", 1e6 * gauge.lowest, 1e6 * gauge.highest);
+        let [x, y, z] = gauge.position_m.map(|x| format!("{:.0}", 1e3 * x));
+        let note = format!("strain, node {} at ({x}, {y}, {z}) mm of the link", gauge.node);
+        Figure::new(gauge.name.clone(), value, "µm/m", note)
+    };
+    let links = summary.stress.iter().flat_map(|link| {
+        let gauges = link.gauges.iter().map(gauge);
+        row(link).into_iter().chain(link.points.iter().filter_map(point)).chain(gauges)
+    });
+    links.collect()
 }
 
 fn tool_figures(summary: &Summary) -> Vec<Figure> {

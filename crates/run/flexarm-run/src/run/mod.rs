@@ -176,6 +176,8 @@ pub(crate) fn simulate(
     head.has_rigid = options.with_twin;
     head.bends.clone_from(&run.bends);
     head.contributors = run.contributors.iter().map(|c| c.name.clone()).collect();
+    head.gauges = run.monitors.stress.as_ref().map_or_else(Vec::new, StressMonitor::channels);
+    head.has_stress = run.monitors.stress.is_some();
     head.has_static = options.with_twin;
     head.color_scale_m = expected.color_scale_m();
     head.volume = expected.volume;
@@ -210,13 +212,19 @@ pub(crate) fn simulate(
     summary.cpu_s = cpu.elapsed().as_secs_f64();
     summary.real_time_factor = summary.duration_s / summary.wall_s.max(1e-9);
     summary.cpu_s_per_simulated_s = summary.cpu_s / summary.duration_s.max(1e-9);
-    if let Some((outputs, picture)) = outputs.zip(run.monitors.stress.as_ref().and_then(StressMonitor::picture)) {
+    let picture = outputs.and_then(|_| run.monitors.stress.as_ref().and_then(StressMonitor::picture));
+    if let Some((outputs, picture)) = outputs.zip(picture.as_ref()) {
         let path = outputs.folder.join(STRESS_PICTURE);
         files.names.stress = Some(path.display().to_string());
         flexarm_files::write_all(&[(path, picture)])?;
     }
     summary.files = files.names.clone();
-    run.trace.finish(if detail < Detail::Curves { RunResult::default() } else { result(&summary, events) });
+    let scenery = || run.monitors.stress.as_ref().map_or_else(Vec::new, StressMonitor::scenery);
+    let result = match detail < Detail::Curves {
+        true => RunResult::default(),
+        false => RunResult { scenery: scenery(), ..result(&summary, events, picture) },
+    };
+    run.trace.finish(result);
     // In short runs the page is made while the recordings are being closed, in long runs
     // afterwards, because both need memory.
     files.set.begin_to_finish(&run.trace.result);
@@ -243,21 +251,21 @@ fn how_it_ended(end: Result<(), Error>, reported: Result<(), Error>) -> Result<(
 
 /// Result for the recordings. It contains no timings, so recordings of the same run are identical
 /// byte for byte.
-fn result(summary: &Summary, events: Vec<Event>) -> RunResult {
+fn result(summary: &Summary, events: Vec<Event>, picture: Option<Vec<u8>>) -> RunResult {
     let timeless =
         Summary { wall_s: 0.0, cpu_s: 0.0, real_time_factor: 0.0, cpu_s_per_simulated_s: 0.0, ..summary.clone() };
     let timeless = Summary { files: Files::default(), ..timeless };
     let json = serde_json::to_string_pretty(&timeless).expect("plain numbers and strings") + "\n";
     let headline = Some(("result".to_owned(), timeless.headline.clone())).filter(|(_, line)| !line.is_empty());
+    let file =
+        |name: &str, media_type: &str, bytes| Attachment { name: name.into(), media_type: media_type.into(), bytes };
+    let picture = picture.map(|png| file(STRESS_PICTURE, "image/png", png));
     RunResult {
         figures: summary.labelled(),
         readable: headline.into_iter().chain(crate::report::timeless_rows(&timeless)).collect(),
         events,
-        attachments: vec![Attachment {
-            name: "summary.json".into(),
-            media_type: "application/json".into(),
-            bytes: json.into_bytes(),
-        }],
+        attachments: [file("summary.json", "application/json", json.into_bytes())].into_iter().chain(picture).collect(),
+        scenery: Vec::new(),
     }
 }
 
@@ -414,6 +422,9 @@ impl<'a> RunLoop<'a> {
         let moved = self.monitors.contributions.moved();
         sample.contributions.clear();
         sample.contributions.extend(self.contributors.iter().map(|who| [0, 1, 2].map(|c| moved[who.place][c])));
+        if let Some(stress) = &self.monitors.stress {
+            stress.read_gauges(&self.seen, &mut sample.gauges);
+        }
         sample.step = step;
         let (iterations, correction) = self.stepper.last_iteration();
         sample.solver = [iterations as f64, correction];

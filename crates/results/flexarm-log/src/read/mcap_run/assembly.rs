@@ -30,6 +30,7 @@ pub(super) enum Topic {
     Deflection(usize),
     StaticError,
     Contributions,
+    Gauges,
     Energy,
     Solver,
     Events,
@@ -77,6 +78,7 @@ impl Assembly {
             (ELASTIC, Topic::Elastic),
             ("/tcp/static_error", Topic::StaticError),
             ("/tcp/contributions", Topic::Contributions),
+            ("/gauges", Topic::Gauges),
             ("/energy", Topic::Energy),
             ("/solver", Topic::Solver),
             ("/diagnostics/solver", Topic::Solver), // older files
@@ -196,6 +198,7 @@ impl Assembly {
             Topic::Contributions => {
                 sample.contributions = array(data)?.chunks_exact(3).map(|part| [part[0], part[1], part[2]]).collect();
             }
+            Topic::Gauges => sample.gauges = array(data)?,
             Topic::Energy => {
                 let [kinetic, potential, elastic] = array(data)?.try_into().ok()?;
                 sample.energy = crate::EnergySample { kinetic, potential, elastic };

@@ -62,6 +62,10 @@ impl McapRun {
             header.contributors.clear();
             missing.push("the file has no shares of the tool error (/tcp/contributions)".into());
         }
+        if !header.gauges.is_empty() && !topics.is_empty() && !topics.contains(&Topic::Gauges) {
+            header.gauges.clear();
+            missing.push("the file has no strain gauges and stress points (/gauges)".into());
+        }
         if header.has_static && !topics.is_empty() && !topics.contains(&Topic::StaticError) {
             header.has_static = false;
             missing.push("the file has no static part of the tool error (/tcp/static_error)".into());

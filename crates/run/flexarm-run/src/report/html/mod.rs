@@ -20,7 +20,7 @@ use self::arm::arm_pictures;
 use self::data::{data, thinning};
 use self::figures::{comparison, tiles};
 use self::number::number;
-use self::tables::{iso_table, parts_tables, stops_table, tool_path};
+use self::tables::{iso_table, parts_tables, stops_table, stress_picture, tool_path};
 use super::curves::{Plot, plots};
 use crate::stepper_settings::SettingValue;
 use crate::summary::Summary;
@@ -120,6 +120,7 @@ fn body(main: &ReportRun<'_>, runs: &[ReportRun<'_>], arm: &str, thinning: &str)
         body += &comparison(runs);
     }
     body += arm;
+    body += &stress_picture(main);
     body += &tool_path(main);
     body += "<section id=\"plots\"><noscript><p>The plots need JavaScript.</p></noscript></section>\n";
     body += thinning;
@@ -135,8 +136,14 @@ fn body(main: &ReportRun<'_>, runs: &[ReportRun<'_>], arm: &str, thinning: &str)
 }
 
 /// Navigation targets of the page: text of the link, id.
-const PLACES: [(&str, &str); 5] =
-    [("Figures", "summary"), ("Arm", "arm"), ("Plots", "plots"), ("Tables", "tables"), ("Inputs", "inputs")];
+const PLACES: [(&str, &str); 6] = [
+    ("Figures", "summary"),
+    ("Arm", "arm"),
+    ("Stress", "stress"),
+    ("Plots", "plots"),
+    ("Tables", "tables"),
+    ("Inputs", "inputs"),
+];
 
 fn heading(title: &str, runs: &[ReportRun<'_>], body: &str) -> String {
     let s = runs[0].summary;

@@ -9,6 +9,7 @@ use super::figures::{moving, within, without_number};
 use super::number::number;
 use crate::headline;
 use crate::monitor::tool_path::PathMoveFigures;
+use crate::record::STRESS_PICTURE;
 use crate::report::path_plan::path_plan;
 use crate::report::shares::{Part, part_shares, share_numbers};
 use crate::summary::Summary;
@@ -64,6 +65,19 @@ pub(super) fn tool_path(run: &ReportRun<'_>) -> String {
         let _ = writeln!(out, "<p class=\"note\">{} more moves are in the summary.</p>", path.moves.len() - MOST_MOVES);
     }
     out + "</section>\n"
+}
+
+/// Returns the picture of the stress of the links, if the run has one.
+pub(super) fn stress_picture(run: &ReportRun<'_>) -> String {
+    let files = &run.trace.result.attachments;
+    let Some(picture) = files.iter().find(|file| file.name == STRESS_PICTURE) else { return String::new() };
+    let data = base64::engine::general_purpose::STANDARD.encode(&picture.bytes);
+    let caption = "Largest von Mises stress of every node during the run, from two sides.";
+    format!(
+        "<section class=\"block\" id=\"stress\"><h2>Stress of the links</h2>\n\
+         <figure><img alt=\"{caption}\" style=\"width:100%;background:#fff\" src=\"data:image/png;base64,{data}\">\
+         <figcaption>{caption}</figcaption></figure></section>\n"
+    )
 }
 
 /// Maximum number of poses with several stops in the table of the page.
