@@ -3,7 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use flexarm::reduce::{ReduceJob, ReduceOptions, ReduceOutputs, reduce};
-use flexarm::{LinkModel, Modelling, Motion, Robot, Run, RunOptions, Scenario, StepperKind, StepperOptions, Summary};
+use flexarm::{
+    LinkModel, Modelling, Motion, Robot, Run, RunOptions, Scenario, StepperKind, StepperOptions, Summary, statics,
+};
 use flexarm_fem::stress::{StressFields, inertia_loads, parse_stress, von_mises};
 use nalgebra::{Matrix3, Vector3};
 
@@ -254,4 +256,67 @@ fn gauges_that_are_not_on_a_link_with_stress_are_refused_with_the_place() {
     std::fs::remove_file(arm.folder.join("lower_arm.stress")).unwrap();
     let error = load(twice).unwrap_err().to_string();
     assert!(error.contains("has no stress fields: reduce its mesh with --stress"), "{error}");
+}
+
+#[test]
+fn statics_give_the_stress_of_a_held_link_with_a_load_on_the_tool() {
+    let arm = Arm::new("statics");
+    let fields = arm.fields();
+    let robot = Robot::load(&arm.folder).unwrap();
+    for (name, modelling) in models() {
+        let held = statics(&robot, &modelling, Some(&[1.2]), [0.0; 6]).unwrap();
+        let link = &held.stress[0];
+        let truth = by_hand(&fields, link.clear_of_ties_m, [1.2, 0.0, 0.0]);
+        let off = link.peak_pa / truth - 1.0;
+        println!("{name}: {:.4} MPa, off by {off:.1e}", 1e-6 * link.peak_pa);
+        assert!(off.abs() < 1e-4, "{name}: {off:e}"); // measured 1.5e-5: the deflection turns the link
+        assert_eq!((link.damage, link.worst[0].damage), (None, None));
+
+        // A force on the tool in addition, 75 mm from interface B.
+        let (q, r) = (1.2_f64, Vector3::new(0.0, 0.075, 0.0));
+        let F = Vector3::new(-q.sin(), 0.0, q.cos()) * -1000.0;
+        let M = r.cross(&F);
+        let wrench = [F.x, F.y, F.z, M.x, M.y, M.z];
+        let at_seat = |(k, stress): (usize, [f64; 6])| -> [f64; 6] {
+            let by = |c: usize| (0..6).map(|j| f64::from(fields.stress[(6 * k + c, j)]) * wrench[j]).sum::<f64>();
+            std::array::from_fn(|c| stress[c] + by(c))
+        };
+        let stress = stress_by_hand(&fields, [q, 0.0, 0.0]).into_iter().enumerate().map(at_seat).zip(&fields.seats);
+        let far = stress.filter(|(_, seat)| seat.from_tie >= link.clear_of_ties_m);
+        let truth = far.map(|(stress, _)| von_mises(stress)).fold(0.0, f64::max);
+        let pulled = statics(&robot, &modelling, Some(&[q]), [0.0, 0.0, -1000.0, 0.0, 0.0, 0.0]).unwrap();
+        let off = pulled.stress[0].peak_pa / truth - 1.0;
+        println!("{name}: {:.4} MPa under 1000 N, off by {off:.1e}", 1e-6 * pulled.stress[0].peak_pa);
+        assert!(off.abs() < 3e-4, "{name}: {off:e}"); // measured 1.0e-4
+    }
+}
+
+#[test]
+fn a_strength_of_the_robot_file_replaces_that_of_the_material() {
+    let arm = Arm::new("strength");
+    let file = std::fs::read_to_string(arm.folder.join("robot.toml")).unwrap();
+    let swing = |t: f64| 0.25 - 0.25 * (std::f64::consts::TAU * t).cos();
+    let run = |strength: &str| {
+        let text = file.replace("segments = 2", &format!("segments = 2\nstrength = {strength}"));
+        std::fs::write(arm.folder.join("robot.toml"), text).unwrap();
+
+        Robot::load(&arm.folder).map(|_| arm.run(swing, 0.5, Modelling::default()).stress.remove(0))
+    };
+    // A third of the fatigue strength of the preset: the damage of a slope of 9 below the knee.
+    let preset = arm.run(swing, 0.5, Modelling::default()).stress.remove(0);
+    let weak = run("{ yield = 125e6, tensile = 290e6, fatigue = 29e6 }").unwrap();
+    assert!((weak.of_yield.unwrap() / preset.of_yield.unwrap() - 2.0).abs() < 1e-12);
+    let ratio = weak.damage.unwrap() / preset.damage.unwrap();
+    println!("damage {:.3e}, preset {:.3e}", weak.damage.unwrap(), preset.damage.unwrap());
+    assert!((ratio / 3_f64.powi(9) - 1.0).abs() < 1e-6, "{ratio}");
+    assert_eq!(weak.worst[0].material.as_deref(), Some("the robot file"));
+    assert_eq!(run("{ yield = 125e6, tensile = 290e6 }").unwrap().damage, None);
+    for (wrong, said) in [
+        ("{ yield = -1, tensile = 290e6 }", "yield = -1: expected a positive number"),
+        ("{ yield = 300e6, tensile = 290e6 }", "expected at least yield and fatigue"),
+        ("{ yield = 300e6 }", "missing field `tensile`"),
+    ] {
+        let error = run(wrong).unwrap_err().to_string();
+        assert!(error.contains(said) && error.contains("robot.toml"), "{said}: {error}");
+    }
 }

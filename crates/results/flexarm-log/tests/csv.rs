@@ -33,7 +33,7 @@ fn numbers_read_back_exactly_under_their_names() {
     let path = synthetic::scratch("round-trip.csv");
     write(&path, &synthetic::header(), 200);
     let columns = columns(&path);
-    assert_eq!(columns.len(), 1 + 3 + 3 + 6 + 3 + 3 + 3 + 3 * 3 + 12 + 3);
+    assert_eq!(columns.len(), 1 + 3 + 3 + 6 + 3 + 3 + 3 + 3 * 3 + 12 + 4 + 3);
     for step in 0..200_u64 {
         let (row, sample) = (step as usize, synthetic::sample(step));
         let expected = [
@@ -41,6 +41,8 @@ fn numbers_read_back_exactly_under_their_names() {
             ("rigid_y_m", sample.rigid.X_WT.translation.y),
             ("flexible_z_m", sample.flexible.X_WT.translation.z),
             ("error_x_m", sample.error_world[0]),
+            ("top_strain", sample.gauges[0]),
+            ("eye_principal_3_pa", sample.gauges[3]),
             ("error_rz_rad", sample.error_world[5]),
             ("error_binormal_m", sample.error_path[2]),
             ("static_error_z_m", sample.static_m[2]),

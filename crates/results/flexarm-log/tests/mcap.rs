@@ -120,6 +120,7 @@ fn every_topic_is_there_with_schema_quality_of_service_and_all_samples() {
         ("/elastic/upper_arm/deflection", "geometry_msgs/msg/TwistStamped", 120),
         ("/energy", "std_msgs/msg/Float64MultiArray", n),
         ("/events", "rcl_interfaces/msg/Log", 3),
+        ("/gauges", "std_msgs/msg/Float64MultiArray", n),
         ("/joint_states", "sensor_msgs/msg/JointState", n),
         ("/markers", "visualization_msgs/msg/MarkerArray", 1),
         ("/markers/error", "visualization_msgs/msg/MarkerArray", 41), // 20 Hz, both ends
@@ -514,7 +515,7 @@ fn chunks_keep_their_size_and_checksums() {
     let (_, samples) = summary.chunk_indexes.split_last().unwrap();
     assert!(samples.iter().all(|chunk| chunk.message_end_time - chunk.message_start_time <= 500_000_000));
     let poses = synthetic::samples_with_poses(synthetic::SAMPLES).len() as u64;
-    let messages = 13 * synthetic::SAMPLES + poses + 2 * 120 + 3 + 3 + 41 + 2;
+    let messages = 14 * synthetic::SAMPLES + poses + 2 * 120 + 3 + 3 + 41 + 2;
     let checked = MessageStream::new_with_options(&file, Options::ValidateChunkCrcs.into()).unwrap();
     assert_eq!(checked.map(Result::unwrap).count() as u64, messages);
 }
@@ -576,7 +577,7 @@ fn a_dropped_recorder_closes_its_file() {
     drop(recorder);
     let file = std::fs::read(&path).unwrap();
     let summary = Summary::read(&file).unwrap().unwrap();
-    assert_eq!(summary.stats.unwrap().message_count, 10 * 14 + 2 * 2 + 3 + 1); // two animation frames, latched messages, the error
+    assert_eq!(summary.stats.unwrap().message_count, 10 * 15 + 2 * 2 + 3 + 1); // two animation frames, latched messages, the error
     std::fs::remove_file(path).unwrap();
 }
 

@@ -141,6 +141,7 @@ fn an_mcap_file_gives_back_every_number_to_the_last_bit_and_poses_to_rounding() 
         }
         assert_eq!(found.flexible.X_WS.len(), truth.flexible.X_WS.len());
         assert_eq!(found.contributions, truth.contributions);
+        assert_eq!(found.gauges, truth.gauges);
         assert_eq!(bits(&found.error_world), bits(&truth.error_world));
         assert_eq!(bits(&found.error_path), bits(&truth.error_path));
         assert_eq!(bits(&found.static_m), bits(&truth.static_m));

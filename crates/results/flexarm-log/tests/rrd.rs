@@ -72,6 +72,8 @@ fn the_error_has_a_row_for_every_sample_and_the_robots_for_every_picture() {
         "tcp_error_rotation/y",
         "tcp_error_rotation/z",
         "contributions",
+        "strain",
+        "stress",
         "joints/position",
         "joints/velocity",
         "joints/effort/flexible",

@@ -27,6 +27,7 @@ use crate::guide_entry::guide_law;
 use crate::mounting::RobotMounting;
 use crate::options::{DriveModel, LinkModel, Modelling};
 use crate::robot::{Robot, tcp_frame};
+use crate::strength::Strength;
 use flexarm_linkmaker::import::SECOND_ORDER_UNKNOWN;
 
 /// Springs along Euler angles are not symmetric between the two ends: an error of third order in
@@ -59,6 +60,8 @@ pub struct RobotLink {
     pub choices: LinkChoices,
     /// File of its stress fields, beside that of the reduced link.
     pub stress: Option<PathBuf>,
+    /// Strength against which its stress is judged; by default that of its material.
+    pub strength: Option<Strength>,
 }
 
 /// Choices of a robot file for a flexible link.

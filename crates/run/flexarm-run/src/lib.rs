@@ -75,6 +75,7 @@ mod static_part;
 mod statics;
 mod statics_picture;
 mod stepper_settings;
+mod strength;
 mod study;
 pub mod summary;
 pub mod toml_file;
@@ -116,6 +117,7 @@ pub use payload::PayloadChange;
 pub use recursions::Recursions;
 pub use report::{
     Figure, FigureGroup, ReportFiles, ReportOptions, ReportRun, Weight, figure_groups, html, markdown, report, rows,
+    stress_figures,
 };
 pub use response::{
     PeakFigures, Response, ResponseCurve, ResponseFiles, ResponseOutputs, ResponseRequest, readable_unit, response,
@@ -128,9 +130,10 @@ pub use settling::Settling;
 pub use statics::{ElementStatics, Statics, record_statics, statics};
 pub use statics_picture::{StaticsFiles, StaticsOutputs};
 pub use stepper_settings::{SettingValue, StepperSettings};
+pub use strength::Strength;
 pub use study::{STUDY_NOTE, Variant, compare_study, study_rows};
 pub use summary::{
     CURVE_PIECES, DifferenceFigures, Files, HoldFigures, LinkFigures, LinkStressFigures, PoseFigures, RecordingFiles,
-    StepperFigures, StressPlaceFigures, Summary, TcpFigures,
+    StepperFigures, StrainGaugeFigures, StressPlaceFigures, StressPointFigures, Summary, TcpFigures,
 };
 pub use tool_path::ToolPath;

@@ -16,6 +16,7 @@ use crate::flexible::{LinkChoices, RequestedKey, RobotLink};
 use crate::options::{LinkModel, Modelling};
 use crate::robot::keep;
 use crate::robot_file::{BeamEntry, DampingEntry, FlexibleLinkEntry, RobotFileError, Source};
+use crate::strength::Strength;
 use flexarm_linkmaker::reduce::STRESS_FILE;
 
 /// Tolerance for a symmetric matrix: difference of mirrored entries, relative to the geometric mean
@@ -128,7 +129,18 @@ pub(crate) fn flexible_link(
     let stiffness = entry.stiffness.as_ref().map(|given| matrix6(given, entry, source)).transpose()?;
     let stress = entry.reduced.as_ref().map(|file| home.folder.join(file.get_ref()).with_extension(STRESS_FILE));
     let stress = stress.filter(|file| file.is_file());
-    let link = RobotLink { flexible, damping, stiffness, stiffness_factor, stiffness_factors, beam, choices, stress };
+    let strength = entry.strength.as_ref().map(|entry| Strength::read(entry, name, source)).transpose()?;
+    let link = RobotLink {
+        flexible,
+        damping,
+        stiffness,
+        stiffness_factor,
+        stiffness_factors,
+        beam,
+        choices,
+        stress,
+        strength,
+    };
     // The requested model must exist; overrides are checked when they are used.
     link.form_or_key(&Modelling::default()).map_err(|(asked, message)| {
         let key = match asked {

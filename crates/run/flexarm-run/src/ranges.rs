@@ -64,6 +64,9 @@ pub(crate) const OF_ROBOT: Ranges = &[
     ("lead", Quantity::LENGTH),
     ("hold", Quantity::JOINT),
     ("calibration.zero", Quantity::JOINT),
+    ("strength.yield", Quantity::PRESSURE),
+    ("strength.tensile", Quantity::PRESSURE),
+    ("strength.fatigue", Quantity::PRESSURE),
     ("strain_gauge.at", Quantity::LENGTH),
     ("stress_point.at", Quantity::LENGTH),
 ];

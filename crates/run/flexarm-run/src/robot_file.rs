@@ -21,6 +21,7 @@ use crate::gear_entry::CouplingEntry;
 use crate::loop_entry::LoopEntry;
 use crate::mounting::MountingEntry;
 use crate::ranges::OF_ROBOT;
+use crate::strength::StrengthEntry;
 use crate::toml_file::parsed;
 
 /// Robot file as written.
@@ -158,6 +159,8 @@ pub(crate) struct FlexibleLinkEntry {
     pub stiffness: Option<Spanned<Vec<Vec<f64>>>>,
     /// Lumped: additional factors on the six directions of its springs; 1 by default.
     pub stiffness_factors: Option<Spanned<Vec<f64>>>,
+    /// Strength of its material; that of the preset material by default.
+    pub strength: Option<Spanned<StrengthEntry>>,
     /// Damping; 3 % modal damping by default.
     pub damping: Option<Spanned<DampingEntry>>,
     /// `rotation-vector` or `euler-zyx`.

@@ -9,12 +9,14 @@ use nalgebra::{DVector, Matrix6xX};
 use serde::Serialize;
 
 use crate::arm::Arm;
-use crate::caveat::{self, Caveat};
+use crate::caveat::{self, Caveat, validity};
 use crate::error::Error;
+use crate::monitor::stress::stress_at_rest;
 use crate::options::Modelling;
 use crate::posed::{Posed, all_finite};
 use crate::robot::Robot;
 use crate::statics_picture::{self, StaticsFiles, StaticsOutputs};
+use crate::summary::LinkStressFigures;
 
 /// Result of `flexarm statics`. SI units; world axes, at the TCP; six-vectors linear first.
 #[derive(Clone, Debug, Serialize)]
@@ -50,6 +52,9 @@ pub struct Statics {
     pub motor_torque: BTreeMap<String, f64>,
     /// Elastic elements.
     pub elements: Vec<ElementStatics>,
+    /// Stress of the links whose stress fields are stored.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub stress: Vec<LinkStressFigures>,
     /// Residual force relative to the largest force.
     pub residual: f64,
     /// Written files.
@@ -112,7 +117,7 @@ fn statics_of(
     outputs: Option<&StaticsOutputs>,
 ) -> Result<Statics, Error> {
     let paths = outputs.map(statics_picture::places).transpose()?;
-    statics_at(robot, Posed::new(robot, modelling, at)?, wrench, paths)
+    statics_at(robot, Posed::new(robot, modelling, at)?, modelling, wrench, paths)
 }
 
 impl Arm {
@@ -121,13 +126,14 @@ impl Arm {
     /// # Errors
     /// As [`statics()`].
     pub fn statics(&self, at: Option<&[f64]>, wrench: [f64; 6]) -> Result<Statics, Error> {
-        statics_at(self.robot(), Posed::on(self, at)?, wrench, None)
+        statics_at(self.robot(), Posed::on(self, at)?, self.modelling(), wrench, None)
     }
 }
 
 fn statics_at(
     robot: &Robot,
     posed: Posed,
+    modelling: &Modelling,
     wrench: [f64; 6],
     paths: Option<[std::path::PathBuf; 2]>,
 ) -> Result<Statics, Error> {
@@ -169,7 +175,9 @@ fn statics_at(
             deflection: deflection.as_slice().to_vec(),
         });
     }
-    let caveats = posed.caveats_of(robot, &loaded, &wrench);
+    let stress = stress_at_rest(robot, &posed.flexible, &posed.arm, modelling, &loaded.q)?;
+    let mut caveats = posed.caveats_of(robot, &loaded, &wrench);
+    caveats.extend(validity::stress(&stress));
     let [x, y, z, rx, ry, rz] = displacement;
     let [sx, sy, sz, srx, sry, srz] = sag;
     let mut statics = Statics {
@@ -185,6 +193,7 @@ fn statics_at(
         motor_torque: robot.motor_torques(&posed.arm, loaded.holding.as_slice()),
         holding_torque: loaded.holding.as_slice().to_vec(),
         elements,
+        stress,
         residual: loaded.residual,
         files: StaticsFiles::default(),
         warnings: caveat::warnings(&caveats),

@@ -114,7 +114,9 @@ __all__ = [
     "StaticsDetails",
     "StaticsFiles",
     "StepperFigures",
+    "StrainGaugeFigures",
     "StressPlaceFigures",
+    "StressPointFigures",
     "Suspicious",
     "SweepSummary",
     "TcpFigures",
@@ -337,8 +339,32 @@ class StressPlaceFigures(TypedDict):
     """Fatigue damage of the motion if it is repeated without end; the life is 1 over it in motions. 1 if the link does not survive the first motion, null for an unknown material."""
 
 
-class LinkStressFigures(TypedDict):
-    """Stress of a flexible link during a run."""
+class StressPointFigures(TypedDict):
+    """Maximum stress at a stress point."""
+
+    name: str
+    """Name of the point."""
+    place: StressPlaceFigures
+    """Its node and maximum."""
+
+
+class StrainGaugeFigures(TypedDict):
+    """Extremes of a strain gauge."""
+
+    name: str
+    """Name of the gauge."""
+    node: int
+    """Number of its node in the mesh."""
+    position_m: list[float]
+    """Position of the node in the link frame (m)."""
+    lowest: float
+    """Minimum strain (m/m)."""
+    highest: float
+    """Maximum strain (m/m)."""
+
+
+class _LinkStressFigures(TypedDict):
+    """What is always there."""
 
     name: str
     """Name of the link."""
@@ -356,6 +382,15 @@ class LinkStressFigures(TypedDict):
     """Largest fatigue damage of one motion among the worst places; null as above."""
     worst: list[StressPlaceFigures]
     """Places of the largest stress, the worst first."""
+
+
+class LinkStressFigures(_LinkStressFigures, total=False):
+    """Stress of a flexible link during a run."""
+
+    points: list[StressPointFigures]
+    """Stress points of the robot file."""
+    gauges: list[StrainGaugeFigures]
+    """Strain gauges of the robot file."""
 
 
 class DriveFigures(TypedDict):
@@ -606,6 +641,8 @@ class StaticsDetails(_StaticsDetails, total=False):
 
     motor_torque: dict[str, float]
     """Torques of motors that move several joints, after their gears: `Cᵀ` times the holding torques of these joints (N m or N)."""
+    stress: list[LinkStressFigures]
+    """Stress of the links whose stress fields are stored."""
 
 
 class ModeFigures(TypedDict):

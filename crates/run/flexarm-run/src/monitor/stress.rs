@@ -5,12 +5,12 @@
 
 use std::cell::OnceCell;
 
-use flexarm_analysis::{SnCurve, rainflow_repeating};
+use flexarm_analysis::rainflow_repeating;
 #[cfg(feature = "png")]
 use flexarm_draw::mesh_picture::{Image, StressPicture, stress_sheet};
 use flexarm_draw::palette::magnitude;
 use flexarm_fem::stress::{StressFields, StressMap, inertia_loads, parse_stress, von_mises};
-use flexarm_fem::{Material, ReducedLink, RigidPart};
+use flexarm_fem::{ReducedLink, RigidPart};
 use flexarm_flexlink::LinkForm;
 use flexarm_kinematics::{Data, Frame, Pose, State, inverse_dynamics};
 use flexarm_log::{GAUGE_ENDS, STRESS_VIEW, Scenery, SceneryForm};
@@ -21,6 +21,7 @@ use crate::error::Error;
 use crate::flexible::{FlexibleRobot, Owner, RobotLink};
 use crate::options::Modelling;
 use crate::robot::Robot;
+use crate::strength::Strength;
 use crate::summary::{LinkStressFigures, StrainGaugeFigures, StressPlaceFigures, StressPointFigures};
 
 /// Seats this close to a tied node are left out, as a fraction of the distance between the
@@ -56,6 +57,8 @@ struct LinkStress {
     frame: Frame,
     /// Distance between its interfaces (m).
     length: f64,
+    /// Strength given in the robot file.
+    strength: Option<Strength>,
     /// Amplitudes and loads of all samples.
     amplitudes: Vec<f32>,
     /// Poses of the link in the world at all samples.
@@ -105,6 +108,7 @@ impl StressMonitor {
                 elements,
                 frame,
                 length,
+                strength: link.strength,
                 amplitudes: Vec::new(),
                 poses: Vec::new(),
                 peaks: OnceCell::new(),
@@ -256,6 +260,27 @@ impl StressMonitor {
     }
 }
 
+/// Returns the stress of the links of an arm at rest at coordinates q, without times and damage.
+pub(crate) fn stress_at_rest(
+    robot: &Robot,
+    flexible: &FlexibleRobot,
+    arm: &FlexibleArm,
+    modelling: &Modelling,
+    q: &DVector<f64>,
+) -> Result<Vec<LinkStressFigures>, Error> {
+    let Some(mut monitor) = StressMonitor::new(robot, flexible, arm, modelling)? else { return Ok(Vec::new()) };
+    let mut seen = Observation::new(arm);
+    seen.q.copy_from(q);
+    monitor.update(&seen);
+    let mut links = monitor.result();
+    for link in &mut links {
+        link.damage = None;
+        let points = link.points.iter_mut().map(|point| &mut point.place);
+        link.worst.iter_mut().chain(points).for_each(|place| place.damage = None);
+    }
+    Ok(links)
+}
+
 /// Finds the nodes of the gauges of a robot; those on links that the arm has rigid are left out.
 fn placed(robot: &Robot, links: &[LinkStress]) -> Result<Vec<PlacedGauge>, Error> {
     let mut gauges = Vec::new();
@@ -366,8 +391,8 @@ impl LinkStress {
         let history = self.signed_history(k, amplitudes);
         let sample = largest(&history);
         let stress = history[sample].abs();
-        let strength = strength_of(&self.fields.materials[seat.material]);
-        let damage = |strength: &Strength| strength.curve().damage(&rainflow_repeating(&history)).min(1.0);
+        let strength = self.strength.or_else(|| Strength::of(&self.fields.materials[seat.material]));
+        let damage = |strength: Strength| Some(strength.curve()?.damage(&rainflow_repeating(&history)).min(1.0));
         StressPlaceFigures {
             node: seat.node,
             position_m: seat.position.into(),
@@ -375,7 +400,7 @@ impl LinkStress {
             von_mises_pa: stress,
             of_yield: strength.map(|strength| stress / strength.yield_pa),
             material: strength.map(|strength| strength.name.to_owned()),
-            damage: strength.map(damage),
+            damage: strength.and_then(damage),
         }
     }
 
@@ -492,43 +517,3 @@ fn von_mises_squared([xx, yy, zz, xy, yz, zx]: &[f32; 6]) -> f32 {
     let (a, b, c) = (xx - yy, yy - zz, zz - xx);
     0.5 * (a * a + b * b + c * c) + 3.0 * (xy * xy + yz * yz + zx * zx)
 }
-
-/// Strength of a material.
-#[derive(Clone, Copy)]
-struct Strength {
-    /// Material with its class.
-    name: &'static str,
-    material: Material,
-    /// Yield strength; of grey iron, which does not yield, the tensile strength (Pa).
-    yield_pa: f64,
-    tensile_pa: f64,
-    /// Fatigue strength for reversed stress over the tensile strength.
-    fatigue: f64,
-}
-
-impl Strength {
-    /// S-N curve of parts that are not welded: knee at 1e6 cycles, slope 5 (FKM guideline, 6th
-    /// edition, 4.4.3), for a probability of survival of 97.5 %, without surface and size effects.
-    fn curve(&self) -> SnCurve {
-        SnCurve { amplitude_pa: self.fatigue * self.tensile_pa, cycles: 1e6, slope: 5.0, tensile_pa: self.tensile_pa }
-    }
-}
-
-fn strength_of(material: &Material) -> Option<&'static Strength> {
-    STRENGTHS.iter().find(|strength| strength.material == *material)
-}
-
-/// Strengths of the least class that the presets name: EN 10025-2, EN 1999-1-1 (table 3.2b), EN
-/// 1561, EN 1563; ratios of fatigue to tensile strength: FKM guideline, table 4.2.1.
-static STRENGTHS: [Strength; 4] = [
-    Strength { name: "S235", material: Material::STEEL, yield_pa: 235e6, tensile_pa: 360e6, fatigue: 0.45 },
-    Strength { name: "EN AW-6082 T6", material: Material::ALUMINIUM, yield_pa: 250e6, tensile_pa: 290e6, fatigue: 0.3 },
-    Strength { name: "EN-GJL-250", material: Material::CAST_IRON, yield_pa: 250e6, tensile_pa: 250e6, fatigue: 0.3 },
-    Strength {
-        name: "EN-GJS-400",
-        material: Material::DUCTILE_IRON,
-        yield_pa: 250e6,
-        tensile_pa: 400e6,
-        fatigue: 0.34,
-    },
-];

@@ -359,7 +359,7 @@ fn gauges(trace: &Trace, quantity: GaugeQuantity) -> Option<Plot> {
         GaugeQuantity::Stress => "Stress points",
     };
     (!table.curves.is_empty()).then(|| Plot {
-        y_label: title,
+        y_label: id,
         y_unit: unit,
         wide: true,
         views: one_view(table),

@@ -159,7 +159,7 @@ pub fn figure_groups(summary: &Summary) -> Vec<FigureGroup> {
     let groups = [
         FigureGroup { title: "TCP", rows: tool_figures(summary) },
         FigureGroup { title: "links and drives", rows: part_figures(summary) },
-        FigureGroup { title: "stress", rows: stress_figures(summary) },
+        FigureGroup { title: "stress", rows: stress_figures(&summary.stress, true) },
         FigureGroup { title: "run", rows: run_figures(summary) },
     ];
     groups.into_iter().filter(|group| !group.rows.is_empty()).collect()
@@ -175,18 +175,21 @@ fn mm(x: f64) -> String {
 /// Number of motions beyond which a life is not given as a number.
 const ENDLESS: f64 = 1e12;
 
-fn stress_figures(summary: &Summary) -> Vec<Figure> {
+/// Returns the figures of the stress of links; `is_run`: with the time of the maximum and the life.
+pub fn stress_figures(links: &[LinkStressFigures], is_run: bool) -> Vec<Figure> {
     let row = |link: &LinkStressFigures| {
         let place = link.worst.first()?;
         let [x, y, z] = place.position_m.map(|x| format!("{:.0}", 1e3 * x));
-        let at = format!("von Mises, node {} at ({x}, {y}, {z}) mm of the link, {:.3} s", place.node, place.t_s);
+        let time = if is_run { format!(", {:.3} s", place.t_s) } else { String::new() };
+        let at = format!("von Mises, node {} at ({x}, {y}, {z}) mm of the link{time}", place.node);
+        let life = match place.damage {
+            None => String::new(),
+            Some(damage) if damage > 1.0 / ENDLESS => format!(", life {:.1e} motions", 1.0 / damage),
+            Some(_) => ", life beyond 1e12 motions".to_owned(),
+        };
         let note = match (place.of_yield, &place.material) {
             (Some(share), Some(material)) => {
-                let life = place.damage.filter(|damage| *damage > 1.0 / ENDLESS).map_or_else(
-                    || "life beyond 1e12 motions".to_owned(),
-                    |damage| format!("life {:.1e} motions", 1.0 / damage),
-                );
-                format!("{:.1} % of the yield strength of {material}, {life}; {at}", 100.0 * share)
+                format!("{:.1} % of the yield strength of {material}{life}; {at}", 100.0 * share)
             }
             _ => at,
         };
@@ -199,16 +202,19 @@ fn stress_figures(summary: &Summary) -> Vec<Figure> {
         row(&LinkStressFigures { name: point.name.clone(), worst, ..LinkStressFigures::default() })
     };
     let gauge = |gauge: &StrainGaugeFigures| {
-        let value = format!("{:.1} to {:.1}", 1e6 * gauge.lowest, 1e6 * gauge.highest);
+        let value = match is_run {
+            true => format!("{:.1} to {:.1}", 1e6 * gauge.lowest, 1e6 * gauge.highest),
+            false => format!("{:.1}", 1e6 * gauge.highest),
+        };
         let [x, y, z] = gauge.position_m.map(|x| format!("{:.0}", 1e3 * x));
         let note = format!("strain, node {} at ({x}, {y}, {z}) mm of the link", gauge.node);
         Figure::new(gauge.name.clone(), value, "µm/m", note)
     };
-    let links = summary.stress.iter().flat_map(|link| {
+    let figures = links.iter().flat_map(|link| {
         let gauges = link.gauges.iter().map(gauge);
         row(link).into_iter().chain(link.points.iter().filter_map(point)).chain(gauges)
     });
-    links.collect()
+    figures.collect()
 }
 
 fn tool_figures(summary: &Summary) -> Vec<Figure> {
@@ -311,7 +317,8 @@ fn part_figures(summary: &Summary) -> Vec<Figure> {
         if e.payload_j != 0.0 {
             let _ = write!(note, "energy of payloads {:.3} J, ", e.payload_j);
         }
-        let (dissipated, stored) = (e.dissipated_j, e.stored_j);
+        // Adding 0 turns -0 into 0.
+        let [dissipated, stored] = [e.dissipated_j, e.stored_j].map(|joules| (1e3 * joules).round() / 1e3 + 0.0);
         let _ = write!(note, "dissipated {dissipated:.3} J, stored {stored:.3} J; imbalance {:.1e}", e.imbalance);
         rows.push(Figure::new("net work of the drives", format!("{:.3}", e.drives_j), "J", note));
     }
