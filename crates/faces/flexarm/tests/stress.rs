@@ -95,7 +95,7 @@ fn stress_by_hand(fields: &StressFields, [q, rate, acceleration]: [f64; 3]) -> V
     (0..fields.seats.len()).map(|k| std::array::from_fn(|c| component(k, c))).collect()
 }
 
-/// Largest von Mises stress of [`stress_by_hand`] that is not near a tie.
+/// Maximum von Mises stress of [`stress_by_hand`] that is not near a tie.
 fn by_hand(fields: &StressFields, clear: f64, motion: [f64; 3]) -> f64 {
     let stress = stress_by_hand(fields, motion).into_iter().zip(&fields.seats);
     stress.filter(|(_, seat)| seat.from_tie >= clear).map(|(stress, _)| von_mises(stress)).fold(0.0, f64::max)
@@ -255,7 +255,7 @@ fn gauges_that_are_not_on_a_link_with_stress_are_refused_with_the_place() {
     }
     std::fs::remove_file(arm.folder.join("lower_arm.stress")).unwrap();
     let error = load(twice).unwrap_err().to_string();
-    assert!(error.contains("has no stress fields: reduce its mesh with --stress"), "{error}");
+    assert!(error.contains("has no stress fields: reduce its mesh again, with its stress"), "{error}");
 }
 
 #[test]

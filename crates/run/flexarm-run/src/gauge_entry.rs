@@ -10,10 +10,6 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use crate::entry_checks::check_finite;
-use crate::error::Error;
-use crate::flexible::RobotLink;
-use crate::robot::keep;
-use crate::robot_file::RobotFile;
 
 /// Maximum number of grids of a rosette.
 const MOST_GRIDS: usize = 8;
@@ -61,30 +57,35 @@ pub struct Gauge {
     pub grid: Option<(Vector3<f64>, f64)>,
 }
 
-/// Reads all entries; a rosette becomes one gauge per grid.
-pub(crate) fn gauges(file: &RobotFile, links: &[RobotLink], source: &Source, faults: &mut Vec<Error>) -> Vec<Gauge> {
-    let strain = file.strain_gauge.iter().map(|entry| (&entry.name, rosette(entry, links, source)));
-    let point = |entry: &StressPointEntry| {
-        let gauge = place(&entry.name, &entry.link, &entry.at, links, source)?;
-        Ok(vec![gauge])
-    };
-    let stress = file.stress_point.iter().map(|entry| (&entry.name, point(entry)));
-    let (mut names, mut found) = (BTreeSet::new(), Vec::new());
+/// Names of the flexible links of a robot, and whether their stress fields are stored.
+pub(crate) type StressLinks<'a> = &'a [(&'a str, bool)];
+
+/// Reads all entries; a rosette becomes one gauge per grid. Also returns the errors found.
+pub(crate) fn gauges(
+    strain: &[StrainGaugeEntry],
+    stress: &[StressPointEntry],
+    links: StressLinks<'_>,
+    source: &Source,
+) -> (Vec<Gauge>, Vec<TextFileError>) {
+    let strain = strain.iter().map(|entry| (&entry.name, rosette(entry, links, source)));
+    let point = |entry: &StressPointEntry| Ok(vec![place(&entry.name, &entry.link, &entry.at, links, source)?]);
+    let stress = stress.iter().map(|entry| (&entry.name, point(entry)));
+    let (mut names, mut found, mut faults) = (BTreeSet::new(), Vec::new(), Vec::new());
     for (name, gauges) in strain.chain(stress) {
-        let gauges = gauges.and_then(|gauges| match names.insert(name.get_ref()) {
-            true => Ok(gauges),
-            false => {
+        match gauges {
+            Err(fault) => faults.push(fault),
+            Ok(gauges) if names.insert(name.get_ref()) => found.extend(gauges),
+            Ok(_) => {
                 let message = format!("two gauges or stress points are called {:?}: rename one", name.get_ref());
-                Err(source.error(name.span(), message))
+                faults.push(source.error(name.span(), message));
             }
-        });
-        found.extend(keep(gauges.map_err(Error::from), faults).into_iter().flatten());
+        }
     }
-    found
+    (found, faults)
 }
 
 /// Returns the gauges of a rosette, or the only one.
-fn rosette(entry: &StrainGaugeEntry, links: &[RobotLink], source: &Source) -> Result<Vec<Gauge>, TextFileError> {
+fn rosette(entry: &StrainGaugeEntry, links: StressLinks<'_>, source: &Source) -> Result<Vec<Gauge>, TextFileError> {
     let gauge = place(&entry.name, &entry.link, &entry.at, links, source)?;
     let direction = Vector3::from(*entry.direction.get_ref());
     check_finite("direction", direction.as_slice(), entry.direction.span(), source)?;
@@ -114,7 +115,7 @@ fn place(
     name: &Spanned<String>,
     link: &Spanned<String>,
     at: &Spanned<[f64; 3]>,
-    links: &[RobotLink],
+    links: StressLinks<'_>,
     source: &Source,
 ) -> Result<Gauge, TextFileError> {
     let text = name.get_ref();
@@ -124,16 +125,15 @@ fn place(
         return Err(source.error(name.span(), message));
     }
     let fail = |message: String| source.error(link.span(), format!("{text:?}: {message}"));
-    let found = links.iter().find(|known| known.flexible.link == *link.get_ref());
-    let Some(found) = found else {
-        let known = links.iter().map(|link| link.flexible.link.as_str());
+    let Some((_, has_stress)) = links.iter().find(|(known, _)| known == link.get_ref()) else {
+        let known = links.iter().map(|(link, _)| *link);
         let meant =
             closest(link.get_ref(), known).map_or_else(String::new, |meant| format!("; did you mean {meant:?}?"));
         return Err(fail(format!("{:?} is none of the flexible links of this file{meant}", link.get_ref())));
     };
-    if found.stress.is_none() {
+    if !has_stress {
         return Err(fail(format!(
-            "link {:?} has no stress fields: reduce its mesh with --stress and keep the .stress file beside the .flex file",
+            "link {:?} has no stress fields: reduce its mesh again, with its stress, and keep the .stress file beside the .flex file",
             link.get_ref()
         )));
     }

@@ -326,7 +326,10 @@ impl Robot {
             let flexible = flexible_link(entry, urdf, source, &home, &mut robot.warnings, &mut faults);
             robot.flexible.extend(keep(flexible, &mut faults));
         }
-        robot.gauges = gauges(file, &robot.flexible, source, &mut faults);
+        let links = robot.flexible.iter().map(|link| (link.flexible.link.as_str(), link.stress.is_some()));
+        let (found, wrong) = gauges(&file.strain_gauge, &file.stress_point, &links.collect::<Vec<_>>(), source);
+        robot.gauges = found;
+        faults.extend(wrong.into_iter().map(Error::from));
         if let Some(mounting) = &file.mounting {
             add_mounting(&mut robot, mounting, source, &home, &mut faults);
         }

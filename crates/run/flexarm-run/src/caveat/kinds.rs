@@ -18,6 +18,14 @@ pub(crate) const LARGE_STRAIN: CaveatKind = CaveatKind::warning(
     "",
     "metals yield at 1e-3 to 5e-3: check stiffness, loads and units",
 );
+/// Centrifugal forces stiffen a modal link whose model leaves them out.
+pub(crate) const FAST_SPIN: CaveatKind = CaveatKind::warning(
+    "fast-spin",
+    "{where} turns so fast that centrifugal forces change its stiffness by about {value} %; its modal model leaves them \
+     out (limit {yardstick} %)",
+    "%",
+    "set geometric_stiffening = true on the link, or model = \"lumped\" with more segments",
+);
 /// The stress of a link exceeds the strength of its material.
 pub(crate) const STRESS: CaveatKind = CaveatKind::warning(
     "stress",

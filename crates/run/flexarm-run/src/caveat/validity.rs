@@ -14,6 +14,8 @@ use crate::summary::LinkStressFigures;
 const ROTATION_LIMIT: f64 = 0.05;
 /// Maximum engineering strain of a flexible link.
 const STRAIN_LIMIT: f64 = 1e-3;
+/// Maximum relative change of stiffness by centrifugal forces that a model may leave out.
+const STIFFENING: f64 = 0.05;
 /// Maximum relative gap in the energy balance.
 const IMBALANCE_LIMIT: f64 = 0.02;
 /// Minimum number of samples per period of the first mode.
@@ -33,6 +35,20 @@ pub(crate) fn link(name: &str, rotation: f64, strain: f64) -> impl Iterator<Item
     let bent = (rotation > ROTATION_LIMIT).then(|| kinds::LARGE_DEFORMATION.found(&link, rotation, ROTATION_LIMIT));
     let strained = (strain > STRAIN_LIMIT).then(|| kinds::LARGE_STRAIN.found(&link, strain, STRAIN_LIMIT));
     bent.into_iter().chain(strained)
+}
+
+/// Checks the angular speed (rad/s) of a modal link without geometric stiffening against the first
+/// natural frequency of the arm (Hz).
+///
+/// ```text
+/// ω² = ω_1² + φ Ω²
+/// ```
+/// φ is 1.2 for a slender cantilever with a mass at its end: its tension m l Ω² adds 6/5 of itself
+/// over the length to the stiffness across.
+pub(crate) fn spin(name: &str, speed: f64, first_hz: f64) -> Option<Caveat> {
+    let change = 1.2 * (speed / (TAU * first_hz)).powi(2);
+    let found = || kinds::FAST_SPIN.found(format!("link {name:?}"), 100.0 * change, 100.0 * STIFFENING);
+    (change > STIFFENING).then(found)
 }
 
 /// Checks for stress beyond the strength of the material: [`kinds::STRESS`].

@@ -77,7 +77,7 @@ impl Monitors {
     pub(crate) fn update(&mut self, seen: &Observation, twin: &RigidTwin, arm: &FlexibleArm, tcp: &Frame) -> ToolError {
         self.drive_loads.update(seen);
         self.contributions.update(seen, twin, arm);
-        self.strains.update(&seen.X_WB, &twin.data.X_WB);
+        self.strains.update(seen.t, &seen.X_WB, &twin.data.X_WB);
         self.deflections.update(&seen.q);
         self.energy.update(seen);
         if let Some(stress) = &mut self.stress {

@@ -1,5 +1,5 @@
-//! Strain and rotation of the flexible links, to check the small deformations that their models
-//! assume.
+//! Strain, rotation and angular speed of the flexible links, to check what their models assume:
+//! small deformations, and no stiffening by centrifugal forces.
 //!
 //! ```text
 //! ε = (|p_AB| - l)/l        θ = |log((R_AB undeformed)ᵀ R_AB)|
@@ -8,7 +8,7 @@
 
 use flexarm_analysis::engineering_strain;
 use flexarm_kinematics::{Frame, Model, Pose, rotation_vector};
-use nalgebra::Rotation3;
+use nalgebra::{Rotation3, Vector3};
 
 use crate::flexible::FlexibleRobot;
 
@@ -19,6 +19,9 @@ pub(crate) struct LinkStrain {
     pub(crate) strain: f64,
     /// Maximum rotation of its far interface relative to the near one (rad).
     pub(crate) rotation: f64,
+    /// Maximum angular speed of the undeformed line from the near to the far interface, as the mean
+    /// between two samples (rad/s).
+    pub(crate) speed: f64,
 }
 
 /// Interface of a link on its body.
@@ -45,6 +48,8 @@ struct Span {
     length: f64,
     /// Undeformed orientation of the far interface in the near one; set at the first sample.
     R_AE: Option<Rotation3<f64>>,
+    /// Time (s) and direction of the line at the last sample.
+    last: Option<(f64, Vector3<f64>)>,
 }
 
 /// Monitors the flexible links, in the order of [`FlexibleRobot::spans`].
@@ -61,16 +66,21 @@ impl Strains {
             far: Interface::new(frame(&span.distal_link), span.X_DB),
             length: span.length,
             R_AE: None,
+            last: None,
         });
         Self { spans: spans.collect(), largest: vec![LinkStrain::default(); flexible.spans.len()] }
     }
 
-    /// * `X_WB`: poses of all bodies in the world; `rigid`: those of the rigid twin, whose links
-    ///   are undeformed.
-    pub(crate) fn update(&mut self, X_WB: &[Pose], rigid: &[Pose]) {
+    /// * `X_WB`: poses of all bodies in the world at time t (s); `rigid`: those of the rigid twin,
+    ///   whose links are undeformed.
+    pub(crate) fn update(&mut self, t: f64, X_WB: &[Pose], rigid: &[Pose]) {
         for (span, largest) in self.spans.iter_mut().zip(&mut self.largest) {
             let (X_WA, X_WE) = (span.near.pose(X_WB), span.far.pose(X_WB));
             let distance = (X_WE.translation.vector - X_WA.translation.vector).norm();
+            let p_AE = span.far.pose(rigid).translation.vector - span.near.pose(rigid).translation.vector;
+            let before = span.last.replace((t, p_AE)).filter(|(before, _)| *before < t);
+            let speed = before.map_or(0.0, |(before, p)| p.angle(&p_AE) / (t - before));
+            largest.speed = largest.speed.max(speed);
             let strain = engineering_strain(distance - span.length, span.length).map_or(0.0, f64::abs);
             // Relative rotation of the ends, less the undeformed one.
             let Span { near, far, R_AE, .. } = span;
@@ -90,7 +100,6 @@ impl Strains {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::Vector3;
 
     /// Truth: a link of 2 m whose far end moves by 1 mm along it and rotates by 0.02 rad; a rigid
     /// motion of the whole arm changes nothing.
@@ -102,7 +111,7 @@ mod tests {
         };
         let near = on(1, Pose::translation(0.1, 0.0, 0.0));
         let far = on(2, Pose::translation(0.0, 0.0, 0.3));
-        let spans = vec![Span { near, far, length: 2.0, R_AE: None }];
+        let spans = vec![Span { near, far, length: 2.0, R_AE: None, last: None }];
         let mut seen = Strains { spans, largest: vec![LinkStrain::default()] };
         for X_WA in
             [Pose::identity(), Pose::from_parts([3.0, -1.0, 0.5].into(), Rotation3::new(Vector3::new(0.3, 2.0, -1.0)))]
@@ -113,10 +122,25 @@ mod tests {
                 let [X_AN, X_NE] = [Pose::translation(0.1, 0.0, 0.0), Pose::translation(0.0, 0.0, 0.3)];
                 vec![Pose::identity(), X_WA * X_AN.inverse(), X_WA * X_AE * X_NE.inverse()]
             };
-            seen.update(&at(2.001, 0.02), &at(2.0, 0.0));
-            seen.update(&at(1.9995, -0.01), &at(2.0, 0.0));
+            seen.update(0.0, &at(2.001, 0.02), &at(2.0, 0.0));
+            seen.update(0.0, &at(1.9995, -0.01), &at(2.0, 0.0));
         }
-        let LinkStrain { strain, rotation } = seen.result()[0];
+        let LinkStrain { strain, rotation, .. } = seen.result()[0];
         assert!((strain - 5e-4).abs() < 1e-14 && (rotation - 0.02).abs() < 1e-14, "{strain} {rotation}");
+    }
+
+    /// Truth: a link that turns by 2 rad/s about an axis across it and by 5 rad/s about itself.
+    #[test]
+    fn the_angular_speed_is_that_of_the_line_between_the_interfaces() {
+        let on = |X_FI| Interface::new(&Frame { name: String::new(), body: 0, X_BF: Pose::identity() }, X_FI);
+        let (near, far) = (on(Pose::identity()), on(Pose::translation(2.0, 0.0, 0.0)));
+        let spans = vec![Span { near, far, length: 2.0, R_AE: None, last: None }];
+        let mut seen = Strains { spans, largest: vec![LinkStrain::default()] };
+        for t in [0.0, 0.01, 0.02] {
+            let R = Rotation3::new(Vector3::z() * (2.0 * t)) * Rotation3::new(Vector3::x() * (5.0 * t));
+            let X = [Pose::from_parts(Vector3::zeros().into(), R)];
+            seen.update(t, &X, &X);
+        }
+        assert!((seen.result()[0].speed - 2.0).abs() < 1e-12, "{}", seen.result()[0].speed);
     }
 }

@@ -132,6 +132,7 @@ impl RunLoop<'_> {
         for link in &summary.links {
             caveats.extend(validity::link(&link.name, link.peak_rotation_rad, link.engineering_strain));
         }
+        caveats.extend(self.spin_caveats());
         caveats.extend(validity::stress(&summary.stress));
         if self.monitors.stress.as_ref().is_some_and(StressMonitor::is_blind) {
             caveats.push(kinds::NO_STRESS.found(format!("stepper {}", self.options.stepper.name()), 0.0, 0.0));
@@ -139,6 +140,17 @@ impl RunLoop<'_> {
         caveats.extend(validity::energy(self.monitors.energy.result().imbalance));
         caveats.extend(self.effort_caveats());
         caveats
+    }
+
+    /// Caveats about modal links that turn fast without geometric stiffening.
+    fn spin_caveats(&self) -> Vec<Caveat> {
+        let first_hz = self.arm.modes.frequencies_hz().first().copied().unwrap_or(f64::INFINITY);
+        let links = self.flexible.spans.iter().zip(self.monitors.strains.result()).enumerate();
+        let elements = || self.arm.elements.iter().zip(&self.flexible.owners);
+        let is_linear =
+            |k: usize| elements().any(|(e, owner)| *owner == Owner::Link(k) && e.modal && e.geometric.is_none());
+        let soft = links.filter(|(k, _)| is_linear(*k));
+        soft.filter_map(|(_, (span, seen))| validity::spin(&span.link, seen.speed, first_hz)).collect()
     }
 
     /// Caveats about gearbox deflections.
