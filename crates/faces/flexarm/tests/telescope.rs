@@ -214,6 +214,31 @@ fn laws_of_tied_guides_and_joint_frames_are_found_from_the_weight_of_the_arm_alo
     assert!(after < 1e-5 && before > 1e-3, "{before:e} {after:e}");
 }
 
+/// Truth: the frames of the arm that was measured, without noise; no part of it is elastic.
+#[test]
+fn joint_frames_of_a_rigid_arm_are_found_without_any_stiffness() {
+    let folder = Folder::new("geometry");
+    let truth = folder.robot("[[calibration]]\njoint = \"wrist\"\nxyz = [0.001, 0.0, -0.002]\nzero = 0.003\n").unwrap();
+    measured(&folder, &truth, [3.0, -1.0, 0.5]);
+    let nominal = folder.robot("").unwrap();
+    let found = identified(&folder, &nominal, "fit = [\"joint.wrist.x\", \"joint.wrist.z\", \"joint.wrist.zero\"]");
+    let parameter = |name: &str| found.parameters.iter().find(|parameter| parameter.name == name).unwrap();
+    for (name, truth) in [("joint.wrist.x", 0.001), ("joint.wrist.zero", 0.003)] {
+        let (value, error) = (parameter(name).value, (parameter(name).value - truth).abs());
+        eprintln!("{name}: {value:.6e}, off by {error:.1e}");
+        assert!(parameter(name).identifiable && error < 1e-9, "{name}: {value} {error:e}"); // measured 2.8e-16
+    }
+    // The height of the tracker, which is not known, hides that of the wrist.
+    assert!(!parameter("joint.wrist.z").identifiable);
+    let written = Robot::load(folder.0.join("out/robot.toml")).unwrap();
+    assert_eq!(written.calibration.len(), 1);
+    let file = folder.0.join("measurements.toml");
+    let text = std::fs::read_to_string(&file).unwrap().replace("fit = ", "keep = ");
+    std::fs::write(&file, text).unwrap();
+    let message = identify_robot(&nominal, &file, &IdentifyRequest::default()).unwrap_err().to_string();
+    assert!(message.contains("no stiffness to identify") && message.contains("joint.*"), "{message}");
+}
+
 /// Truth: the same energy in two ways; the lift moves through the reaction of its guides.
 #[test]
 fn a_run_of_a_lift_balances_its_energy() {

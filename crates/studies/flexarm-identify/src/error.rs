@@ -11,10 +11,10 @@ use flexarm_run::RobotFileError;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum IdentifyFileError {
-    /// The robot is rigid.
+    /// The robot is rigid, and no joint frame is to be fitted.
     #[error(
         "the robot has no flexible link and no elastic drive: there is no stiffness to identify; add \
-         [[flexible_link]] or [[drive]] entries with initial values"
+         [[flexible_link]] or [[drive]] entries with initial values, or fit its frames by fit = [\"joint.*\"]"
     )]
     NothingGives,
     /// Unknown name of a parameter.

@@ -114,9 +114,6 @@ pub struct IdentifyRequest {
 /// [`Error::Taken`], [`Error::Write`].
 pub fn identify_robot(robot: &Robot, measurements: &Path, request: &IdentifyRequest) -> Result<Identification, Error> {
     let arm = robot.flexible(request.modelling)?;
-    if parameters::candidates(robot, arm.flexible()).is_empty() {
-        return Err(IdentifyFileError::NothingGives.into());
-    }
     let joints = joints_of(&arm);
     let mut input = file::read(measurements, &Cell { joints: &joints, arm: &arm })?;
     let chosen = chosen(&arm, &input, &request.fit)?;

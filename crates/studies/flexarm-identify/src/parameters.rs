@@ -129,10 +129,8 @@ pub(crate) fn candidates(robot: &Robot, flexible: &FlexibleRobot) -> Vec<Candida
         let effect = Effect::Mass { body: frame.body, per_kg };
         found.push(Candidate::new("payload.mass".into(), "kg", mass, effect, ParameterLocation::Payload));
     }
-    if !found.is_empty() {
-        found.extend(tool_parameters());
-        found.extend(frame_parameters(flexible));
-    }
+    found.extend(tool_parameters());
+    found.extend(frame_parameters(flexible));
     found
 }
 

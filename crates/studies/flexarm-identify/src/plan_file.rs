@@ -206,9 +206,6 @@ pub fn plan_measurements(robot: &Robot, request: &PlanRequest) -> Result<Measure
     if let Some(text) = request.fault() {
         return Err(IdentifyFileError::Fit(text).into());
     }
-    if arm.flexible().springs.is_empty() {
-        return Err(IdentifyFileError::NothingGives.into());
-    }
     let targets =
         request.output.as_ref().map(|folder| [folder.join("measurements.toml"), folder.join("displacements.csv")]);
     if let Some(targets) = &targets {
