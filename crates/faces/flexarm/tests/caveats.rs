@@ -630,7 +630,7 @@ fn modal_links_that_spin_fast_without_stiffening_by_load_are_reported() {
     let run = |motion: &str, links, stiffening: bool| {
         let mut robot = robot.clone();
         robot.flexible.iter_mut().for_each(|link| link.choices.geometric = stiffening);
-        let motion = Motion::load(&project("tests/benchmarks/two_link").join(motion), &robot).unwrap();
+        let motion = Motion::load(project("tests/benchmarks/two_link").join(motion), &robot).unwrap();
         let modelling =
             Modelling { links, modes: Some(2).filter(|_| links == LinkModel::Modal), ..Modelling::default() };
         let options = RunOptions { step_s: 1e-3, modelling, ..RunOptions::default() };

@@ -286,6 +286,8 @@ fn what_is_wrong_in_a_file_of_measurements_is_said_with_its_place() {
     );
     fails(&two, "std is missing");
     let robot = Robot::load(root().join("robots/kr210/kr210.urdf")).unwrap();
+    let good = format!("format = 1\n[[displacement]]\n{q}\nvalue = [0, 0, -1e-4]\nload = {{ mass = 10 }}\n");
+    std::fs::write(&job, good).unwrap();
     let error = identify_robot(&robot, &job, &IdentifyRequest::default()).unwrap_err();
     assert!(error.to_string().contains("no flexible link and no elastic drive"), "{error}");
     std::fs::remove_dir_all(folder).unwrap();
