@@ -140,7 +140,7 @@ fn statics_text(s: &Statics) -> String {
     out += &format!("\n{}", filled(&format!("holding torques [N m or N]: {}", holding.join(", ")), ", "));
     for figure in flexarm::stress_figures(&s.stress, false) {
         let (name, value, unit) = (figure.name, figure.value, figure.unit);
-        out += &filled(&format!("stress of {name}: {value} {unit}, {}", figure.note), ", ");
+        out += &filled(&format!("{name}: {value} {unit}, {}", figure.note), ", ");
     }
     for (what, path) in [("picture", &s.files.picture), ("figures", &s.files.json)] {
         if let Some(path) = path {

@@ -1,10 +1,13 @@
 //! Stress of a meshed link over a run, against the superposition of its fields by hand.
 
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use flexarm::reduce::{ReduceJob, ReduceOptions, ReduceOutputs, reduce};
+use flexarm::sweep::{Finders, Shard, Sweep, SweepRequest};
 use flexarm::{
-    LinkModel, Modelling, Motion, Robot, Run, RunOptions, Scenario, StepperKind, StepperOptions, Summary, statics,
+    DataTable, DataValues, LinkModel, Modelling, Motion, Robot, Run, RunOptions, Scenario, StepperKind, StepperOptions,
+    Summary, statics,
 };
 use flexarm_fem::stress::{StressFields, inertia_loads, parse_stress, von_mises};
 use nalgebra::{Matrix3, Vector3};
@@ -171,11 +174,11 @@ fn stress_files_that_do_not_fit_are_refused_and_steppers_without_accelerations_s
     assert!(run(&RunOptions::default()).unwrap().summary.stress.is_empty());
 }
 
-#[test]
-fn a_strain_gauge_reads_hookes_law_of_the_stress_below_it_and_a_rosette_adds_up() {
-    let arm = Arm::new("gauges");
+/// The arm with a rosette and a stress point in the middle, away from ties and edges, at the returned
+/// seat.
+fn gauged(name: &str) -> (Arm, usize) {
+    let arm = Arm::new(name);
     let fields = arm.fields();
-    // In the middle of the arm, away from ties and edges.
     let middle = fields.poses[1].translation.vector * 0.5;
     let clear: Vec<usize> = (0..fields.seats.len()).filter(|k| fields.seats[*k].from_tie > 0.2).collect();
     let from = |k: usize| (fields.seats[k].position - middle).norm();
@@ -186,6 +189,37 @@ fn a_strain_gauge_reads_hookes_law_of_the_stress_below_it_and_a_rosette_adds_up(
         "[[strain_gauge]]\nname = \"rosette\"\n{at}direction = [0.0, 0.0, 1.0]\nangles_deg = [0, 45, 90]\n\
          [[stress_point]]\nname = \"eye\"\n{at}"
     ));
+    (arm, seat)
+}
+
+/// Truth: a run outside the study.
+#[test]
+fn studies_take_gauges_and_stress_points_as_metrics() {
+    let (arm, _) = gauged("study");
+    std::fs::write(arm.folder.join("held.csv"), "time,joint_1\n0,0.3\n0.01,0.3\n").unwrap();
+    let text = "format = 1\nrobot = \"robot.toml\"\nmotion = \"held.csv\"\n\
+                metrics = [\"a = stress.lower_arm.points.eye.place.von_mises_pa\", \"b = stress.lower_arm.gauges.rosette_0.lowest\"]\n\
+                [[parameter]]\npath = \"link.lower_arm.stiffness_factor\"\nvalues = [1.0, 2.0]\n";
+    std::fs::write(arm.folder.join("study.toml"), text).unwrap();
+    let finders = Finders { robot: |name| name.into(), motion: |name| name.into() };
+    let (output, threads) = (arm.folder.join("out"), Some(2));
+    let request = SweepRequest { output, overwrite: false, shard: Shard::ALL, threads, command: None };
+    let mut sweep = Sweep::load(&arm.folder.join("study.toml"), &finders).unwrap();
+    let done = sweep.run(&request, &mut |_, _| ControlFlow::Continue(())).unwrap();
+    let table = DataTable::read(Path::new(&done.file)).unwrap();
+    let first = |name: &str| match table.column(name) {
+        Some(DataValues::Number(values)) => values[0],
+        other => panic!("{name}: {other:?}"),
+    };
+    let link = arm.run(|_| 0.3, 0.01, Modelling::default()).stress.remove(0);
+    assert!((first("a") / link.points[0].place.von_mises_pa - 1.0).abs() < 1e-6);
+    assert!((first("b") / link.gauges[0].lowest - 1.0).abs() < 1e-6);
+}
+
+#[test]
+fn a_strain_gauge_reads_hookes_law_of_the_stress_below_it_and_a_rosette_adds_up() {
+    let (arm, seat) = gauged("gauges");
+    let fields = arm.fields();
     for (name, modelling) in models() {
         let run = arm.record(|_| 1.2, 0.01, modelling);
         let channels = ["rosette_0_strain", "rosette_45_strain", "rosette_90_strain"];

@@ -51,13 +51,13 @@ use self::workshop::Workshop;
 use flexarm_run::Error;
 use flexarm_run::FlexibleRobot;
 use flexarm_run::LinkFigures;
-use flexarm_run::LinkStressFigures;
 use flexarm_run::PathFigures;
 use flexarm_run::Robot;
 use flexarm_run::RobotFileError;
 use flexarm_run::Summary;
 use flexarm_run::TcpFigures;
 use flexarm_run::summary::DriveFigures;
+use flexarm_run::{LinkStressFigures, StrainGaugeFigures, StressPlaceFigures, StressPointFigures};
 
 pub use self::direction::Better;
 pub use self::error::SweepError;
@@ -470,11 +470,21 @@ fn parameter_names(design: &Design) -> Vec<Option<String>> {
 fn skeleton(robot: &Robot, flexible: &FlexibleRobot) -> Summary {
     let links = flexible.spans.iter().map(|span| LinkFigures { name: span.link.clone(), ..LinkFigures::default() });
     let stressed = robot.flexible.iter().filter(|link| link.stress.is_some());
-    let stress = stressed.map(|link| LinkStressFigures {
-        name: link.flexible.link.clone(),
-        of_yield: Some(0.0),
-        damage: Some(0.0),
-        ..LinkStressFigures::default()
+    let place = StressPlaceFigures { of_yield: Some(0.0), damage: Some(0.0), ..StressPlaceFigures::default() };
+    let stress = stressed.map(|link| {
+        let own = || robot.gauges.iter().filter(|gauge| gauge.link == link.flexible.link);
+        let points = own().filter(|gauge| gauge.grid.is_none());
+        let strain = own().filter(|gauge| gauge.grid.is_some());
+        LinkStressFigures {
+            name: link.flexible.link.clone(),
+            of_yield: Some(0.0),
+            damage: Some(0.0),
+            points: points.map(|p| StressPointFigures { name: p.name.clone(), place: place.clone() }).collect(),
+            gauges: strain
+                .map(|gauge| StrainGaugeFigures { name: gauge.name.clone(), ..StrainGaugeFigures::default() })
+                .collect(),
+            ..LinkStressFigures::default()
+        }
     });
     let elastic = robot.drives.iter().filter(|drive| drive.gearbox.is_some());
     let elastic = elastic.map(|drive| DriveFigures { joint: drive.joint.clone(), ..DriveFigures::default() });
