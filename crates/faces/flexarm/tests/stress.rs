@@ -278,6 +278,11 @@ fn gauges_that_are_not_on_a_link_with_stress_are_refused_with_the_place() {
         (gauge("a", "lower_arn", on, along), "did you mean \"lower_arm\"?"),
         (gauge("a b", "lower_arm", on, along), "use letters, digits"),
         (twice.clone() + &twice, "rename one"),
+        (
+            gauge("a", "lower_arm", on, &format!("{along}\nangles_deg = [0, 45]"))
+                + &gauge("a_45", "lower_arm", on, along),
+            "called \"a_45\"",
+        ),
         (gauge("a", "lower_arm", [0.5, 0.5, 0.5], along), "farther than the edges of the mesh"),
         (gauge("a", "lower_arm", on, "direction = [0.0, 0.0, 0.0]"), "has no length"),
         (gauge("a", "lower_arm", on, &format!("{along}\nangles_deg = []")), "such as [0, 45, 90]"),
@@ -343,7 +348,7 @@ fn a_strength_of_the_robot_file_replaces_that_of_the_material() {
     let ratio = weak.damage.unwrap() / preset.damage.unwrap();
     println!("damage {:.3e}, preset {:.3e}", weak.damage.unwrap(), preset.damage.unwrap());
     assert!((ratio / 3_f64.powi(9) - 1.0).abs() < 1e-6, "{ratio}");
-    assert_eq!(weak.worst[0].material.as_deref(), Some("the robot file"));
+    assert_eq!(weak.worst[0].material.as_deref(), Some("the robot file's material"));
     assert_eq!(run("{ yield = 125e6, tensile = 290e6 }").unwrap().damage, None);
     for (wrong, said) in [
         ("{ yield = -1, tensile = 290e6 }", "yield = -1: expected a positive number"),

@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-use flexarm::identify::{Identification, IdentifyRequest, identify_robot};
+use flexarm::identify::{Identification, IdentifyRequest, PlanRequest, identify_robot, plan_measurements};
 use flexarm::{Modelling, Motion, Robot, RunOptions, Scenario, statics};
 
 /// Two tubes that move half of the lift each, and an arm with a mass at its end.
@@ -237,6 +237,10 @@ fn joint_frames_of_a_rigid_arm_are_found_without_any_stiffness() {
     std::fs::write(&file, text).unwrap();
     let message = identify_robot(&nominal, &file, &IdentifyRequest::default()).unwrap_err().to_string();
     assert!(message.contains("no stiffness to identify") && message.contains("joint.*"), "{message}");
+    // Loads displace nothing, so no plan is of use.
+    let request = PlanRequest { fit: vec!["joint.*".into()], ..PlanRequest::new(8) };
+    let message = plan_measurements(&nominal, &request).unwrap_err().to_string();
+    assert!(message.contains("there is nothing to plan"), "{message}");
 }
 
 /// Truth: the same energy in two ways; the lift moves through the reaction of its guides.

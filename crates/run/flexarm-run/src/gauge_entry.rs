@@ -74,10 +74,13 @@ pub(crate) fn gauges(
     for (name, gauges) in strain.chain(stress) {
         match gauges {
             Err(fault) => faults.push(fault),
-            Ok(gauges) if names.insert(name.get_ref()) => found.extend(gauges),
-            Ok(_) => {
-                let message = format!("two gauges or stress points are called {:?}: rename one", name.get_ref());
-                faults.push(source.error(name.span(), message));
+            Ok(gauges) => {
+                // A grid of a rosette may have the name of another gauge.
+                if let Some(twice) = gauges.iter().find(|gauge| !names.insert(gauge.name.clone())) {
+                    let message = format!("two gauges or stress points are called {:?}: rename one", twice.name);
+                    faults.push(source.error(name.span(), message));
+                }
+                found.extend(gauges);
             }
         }
     }

@@ -55,7 +55,7 @@ impl Strength {
             None if yield_pa > tensile || fatigue.is_some_and(|fatigue| fatigue > tensile) => {
                 Err(fail(format!("tensile = {tensile}: expected at least yield and fatigue")))
             }
-            None => Ok(Self { name: "the robot file", yield_pa, tensile_pa: tensile, fatigue_pa: fatigue }),
+            None => Ok(Self { name: "the robot file's material", yield_pa, tensile_pa: tensile, fatigue_pa: fatigue }),
         }
     }
 }

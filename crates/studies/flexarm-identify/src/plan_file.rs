@@ -206,6 +206,11 @@ pub fn plan_measurements(robot: &Robot, request: &PlanRequest) -> Result<Measure
     if let Some(text) = request.fault() {
         return Err(IdentifyFileError::Fit(text).into());
     }
+    if arm.flexible().springs.is_empty() {
+        let text = "the robot has no flexible link and no elastic drive: loads do not displace it, so there is nothing to \
+                    plan; add [[flexible_link]] or [[drive]] entries with initial values";
+        return Err(IdentifyFileError::Fit(text.into()).into());
+    }
     let targets =
         request.output.as_ref().map(|folder| [folder.join("measurements.toml"), folder.join("displacements.csv")]);
     if let Some(targets) = &targets {
