@@ -7,7 +7,7 @@ use std::ptr;
 
 use flexarm::{DriveModel, LinkModel, Modelling};
 
-use super::{NULL, array, array_mut, guarded, message, string, text_of};
+use super::{NULL, array, get_each, guarded, message, set_each, string, text_of};
 use crate::error::PlantError;
 use crate::plant::{Plant, PlantSettings, PlantState};
 use crate::variables::{Causality, Kind};
@@ -179,8 +179,7 @@ extern "C" fn flexarm_set(plant: *mut Handle, references: *const u32, values: *c
     // SAFETY: the caller passes a plant and arrays of this length, or null.
     unsafe {
         call(plant, |handle| {
-            let (references, values) = (array(references, n).ok_or(NULL)?, array(values, n).ok_or(NULL)?);
-            references.iter().zip(values).try_for_each(|(&reference, &value)| {
+            set_each(references, values, n, |reference, value| {
                 let reference = reference as usize;
                 match handle.plant.variables().get(reference).map(|variable| variable.kind) {
                     Some(Kind::Boolean) => handle.plant.set_flag(reference, value != 0.0),
@@ -196,14 +195,12 @@ extern "C" fn flexarm_get(plant: *mut Handle, references: *const u32, values: *m
     // SAFETY: the caller passes a plant and arrays of this length, or null.
     unsafe {
         call(plant, |handle| {
-            let (references, values) = (array(references, n).ok_or(NULL)?, array_mut(values, n).ok_or(NULL)?);
-            references.iter().zip(values).try_for_each(|(&reference, value)| {
+            get_each(references, values, n, |reference| {
                 let reference = reference as usize;
-                *value = match handle.plant.variables().get(reference).map(|variable| variable.kind) {
-                    Some(Kind::Boolean) => f64::from(handle.plant.get_flag(reference)?),
-                    _ => handle.plant.get(reference)?,
-                };
-                Ok(())
+                match handle.plant.variables().get(reference).map(|variable| variable.kind) {
+                    Some(Kind::Boolean) => handle.plant.get_flag(reference).map(f64::from),
+                    _ => handle.plant.get(reference),
+                }
             })
         })
     }

@@ -4,7 +4,7 @@ use std::ffi::{CString, c_char, c_int, c_uint, c_void};
 use std::path::PathBuf;
 use std::ptr;
 
-use super::{NULL, array, array_mut, free_state, guarded, message, put_state, string, text_of};
+use super::{NULL, free_state, get_each, guarded, message, put_state, set_each, string, text_of};
 use crate::error::PlantError;
 use crate::instance::{Instance, InstanceState};
 
@@ -216,25 +216,14 @@ extern "C" fn fmi2Reset(component: *mut c_void) -> Status {
 #[unsafe(no_mangle)]
 extern "C" fn fmi2GetReal(component: *mut c_void, references: *const c_uint, n: usize, values: *mut f64) -> Status {
     // SAFETY: the importer passes an instance and arrays of this length, or null.
-    unsafe {
-        call(component, |instance| {
-            let (references, values) = (array(references, n).ok_or(NULL)?, array_mut(values, n).ok_or(NULL)?);
-            references.iter().zip(values).try_for_each(|(&reference, value)| {
-                *value = instance.get(reference)?;
-                Ok(())
-            })
-        })
-    }
+    unsafe { call(component, |instance| get_each(references, values, n, |reference| instance.get(reference))) }
 }
 
 #[unsafe(no_mangle)]
 extern "C" fn fmi2SetReal(component: *mut c_void, references: *const c_uint, n: usize, values: *const f64) -> Status {
     // SAFETY: the importer passes an instance and arrays of this length, or null.
     unsafe {
-        call(component, |instance| {
-            let (references, values) = (array(references, n).ok_or(NULL)?, array(values, n).ok_or(NULL)?);
-            references.iter().zip(values).try_for_each(|(&reference, &value)| instance.set(reference, value))
-        })
+        call(component, |instance| set_each(references, values, n, |reference, value| instance.set(reference, value)))
     }
 }
 
@@ -248,11 +237,7 @@ extern "C" fn fmi2GetBoolean(
     // SAFETY: the importer passes an instance and arrays of this length, or null.
     unsafe {
         call(component, |instance| {
-            let (references, values) = (array(references, n).ok_or(NULL)?, array_mut(values, n).ok_or(NULL)?);
-            references.iter().zip(values).try_for_each(|(&reference, value)| {
-                *value = instance.get_flag(reference)?.into();
-                Ok(())
-            })
+            get_each(references, values, n, |reference| Ok(instance.get_flag(reference)?.into()))
         })
     }
 }
@@ -267,8 +252,7 @@ extern "C" fn fmi2SetBoolean(
     // SAFETY: the importer passes an instance and arrays of this length, or null.
     unsafe {
         call(component, |instance| {
-            let (references, values) = (array(references, n).ok_or(NULL)?, array(values, n).ok_or(NULL)?);
-            references.iter().zip(values).try_for_each(|(&reference, &value)| instance.set_flag(reference, value != 0))
+            set_each(references, values, n, |reference, value: c_int| instance.set_flag(reference, value != 0))
         })
     }
 }

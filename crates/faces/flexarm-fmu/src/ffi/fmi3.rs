@@ -4,7 +4,7 @@ use std::ffi::{c_char, c_int, c_void};
 use std::path::Path;
 use std::ptr;
 
-use super::{NULL, array, array_mut, free_state, guarded, message, put_state, string, text_of};
+use super::{NULL, free_state, get_each, guarded, message, put_state, set_each, string, text_of};
 use crate::error::PlantError;
 use crate::instance::{Instance, InstanceState};
 
@@ -208,12 +208,8 @@ extern "C" fn fmi3GetFloat64(
     // SAFETY: the importer passes an instance and arrays of these lengths, or null.
     unsafe {
         call(component, |instance| {
-            let (references, values) = (array(references, n).ok_or(NULL)?, array_mut(values, n_values).ok_or(NULL)?);
             lengths(n, n_values)?;
-            references.iter().zip(values).try_for_each(|(&reference, value)| {
-                *value = instance.get(reference)?;
-                Ok(())
-            })
+            get_each(references, values, n, |reference| instance.get(reference))
         })
     }
 }
@@ -229,9 +225,8 @@ extern "C" fn fmi3SetFloat64(
     // SAFETY: the importer passes an instance and arrays of these lengths, or null.
     unsafe {
         call(component, |instance| {
-            let (references, values) = (array(references, n).ok_or(NULL)?, array(values, n_values).ok_or(NULL)?);
             lengths(n, n_values)?;
-            references.iter().zip(values).try_for_each(|(&reference, &value)| instance.set(reference, value))
+            set_each(references, values, n, |reference, value| instance.set(reference, value))
         })
     }
 }
@@ -247,12 +242,8 @@ extern "C" fn fmi3GetBoolean(
     // SAFETY: the importer passes an instance and arrays of these lengths, or null.
     unsafe {
         call(component, |instance| {
-            let (references, values) = (array(references, n).ok_or(NULL)?, array_mut(values, n_values).ok_or(NULL)?);
             lengths(n, n_values)?;
-            references.iter().zip(values).try_for_each(|(&reference, value)| {
-                *value = instance.get_flag(reference)?;
-                Ok(())
-            })
+            get_each(references, values, n, |reference| instance.get_flag(reference))
         })
     }
 }
@@ -268,9 +259,8 @@ extern "C" fn fmi3SetBoolean(
     // SAFETY: the importer passes an instance and arrays of these lengths, or null.
     unsafe {
         call(component, |instance| {
-            let (references, values) = (array(references, n).ok_or(NULL)?, array(values, n_values).ok_or(NULL)?);
             lengths(n, n_values)?;
-            references.iter().zip(values).try_for_each(|(&reference, &value)| instance.set_flag(reference, value))
+            set_each(references, values, n, |reference, value| instance.set_flag(reference, value))
         })
     }
 }

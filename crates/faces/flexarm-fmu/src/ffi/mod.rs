@@ -57,6 +57,39 @@ unsafe fn array_mut<'a, T>(values: *mut T, count: usize) -> Option<&'a mut [T]> 
     }
 }
 
+/// Writes the value of each reference.
+///
+/// # Safety
+/// As [`array`] and [`array_mut`], with `n` references and values.
+unsafe fn get_each<T>(
+    references: *const u32,
+    values: *mut T,
+    n: usize,
+    mut get: impl FnMut(u32) -> Result<T, PlantError>,
+) -> Result<(), PlantError> {
+    // SAFETY: as promised by the caller.
+    let (references, values) = unsafe { (array(references, n).ok_or(NULL)?, array_mut(values, n).ok_or(NULL)?) };
+    references.iter().zip(values).try_for_each(|(&reference, value)| {
+        *value = get(reference)?;
+        Ok(())
+    })
+}
+
+/// Sets the value of each reference.
+///
+/// # Safety
+/// As [`array`], with `n` references and values.
+unsafe fn set_each<T: Copy>(
+    references: *const u32,
+    values: *const T,
+    n: usize,
+    mut set: impl FnMut(u32, T) -> Result<(), PlantError>,
+) -> Result<(), PlantError> {
+    // SAFETY: as promised by the caller.
+    let (references, values) = unsafe { (array(references, n).ok_or(NULL)?, array(values, n).ok_or(NULL)?) };
+    references.iter().zip(values).try_for_each(|(&reference, &value)| set(reference, value))
+}
+
 /// Writes a state to its place; a state that is there is used again.
 ///
 /// # Safety
