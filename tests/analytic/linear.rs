@@ -62,7 +62,7 @@ fn modes_of_the_industrial_arm_are_those_that_compare_reports() {
     let options = RunOptions { log_rate_hz: 100.0, step_s: 0.01, ..RunOptions::default() };
     let arm = robot.flexible(options.modelling).expect("a model");
     let reported = arm.simulate(&motion, &options).expect("runs").summary.frequencies_hz;
-    let found = modes(&robot, &Modelling::default(), Some(q.as_slice()), 100).expect("an equilibrium");
+    let found = modes(&robot, &Modelling::default(), Some(q.as_slice()), None, 100).expect("an equilibrium");
     assert_eq!((found.total, found.frequencies_hz.len()), (12, reported.len()));
     let mut worst = 0.0f64;
     for (mode, truth) in found.modes.iter().zip(&reported) {

@@ -31,6 +31,7 @@
 //! ```
 #![allow(non_snake_case, reason = "monogram notation: X_WB, K_S, C_S, M; see docs/references.md")]
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
+#![cfg_attr(not(target_arch = "x86_64"), allow(dead_code, reason = "lanes are used with AVX2 alone"))]
 
 mod arm;
 mod batch;
@@ -40,6 +41,7 @@ mod draw;
 mod drive;
 mod eigenvalues;
 mod elastic_tree;
+mod equilibrium;
 mod error;
 mod events;
 mod gear;
@@ -60,6 +62,7 @@ mod servo;
 mod static_path;
 mod static_targets;
 mod statics;
+mod steady;
 mod stepper;
 pub mod steppers;
 mod system;
@@ -88,6 +91,7 @@ pub use run_slopes::{
 pub use static_path::StaticPath;
 pub use static_targets::{StaticTargets, TargetError, static_targets};
 pub use statics::static_equilibrium;
+pub use steady::{SteadyRotation, linearise_rotation};
 pub use stepper::{Counts, Start, Stepper};
 pub use steppers::*;
 pub use system::SecondOrderSystem;

@@ -21,15 +21,10 @@ use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX};
 
 use crate::arm::{ElasticElement, FlexibleArm, Servo};
 use crate::drive::{Friction, ServoAxis};
+use crate::equilibrium::{Equilibrium, Forces, equilibrium};
 use crate::error::StepError;
-use crate::statics::{
-    MOST_HALVINGS, StaticSlopes, for_vibration, spring_forces, static_equilibrium, static_forces, with_curves,
-};
+use crate::statics::{StaticSlopes, for_vibration, spring_forces, static_equilibrium, static_forces, with_curves};
 
-/// Accepted unbalanced force relative to the largest force, as in [`static_equilibrium`].
-const TOLERANCE: f64 = 1e-13;
-/// Maximum number of Newton iterations.
-const MOST_ITERATIONS: usize = 30;
 /// Minimum step of the wrench, as a share of it.
 const SMALLEST_LOAD_STEP: f64 = 1.0 / 128.0;
 
@@ -139,7 +134,9 @@ pub fn linearise(arm: &FlexibleArm, tool: &Frame, F_T_W: &Wrench, t: f64) -> Res
     let n = free.len();
     let mut data = Data::new(model);
     let statics = Statics { arm, tool, F_T_W: *F_T_W, t };
-    let Equilibrium { q, e, p, residual, iterations } = statics.equilibrium(&mut data)?;
+    let Equilibrium { e, residual, iterations } = statics.equilibrium(&mut data)?;
+    let q = all_coordinates(arm, t, &e);
+    let p = statics.forces(&mut data, &q);
 
     let slopes = statics.slopes(&mut data, &q);
     let mut springs = DMatrix::zeros(n, n);
@@ -332,18 +329,6 @@ struct Statics<'a> {
     t: f64,
 }
 
-/// Equilibrium of the arm at rest under weight and loads, motors held.
-struct Equilibrium {
-    /// All coordinates.
-    q: DVector<f64>,
-    /// Elastic coordinates.
-    e: DVector<f64>,
-    /// Static forces on all coordinates.
-    p: DVector<f64>,
-    residual: f64,
-    iterations: usize,
-}
-
 impl Statics<'_> {
     fn singular(&self) -> StepError {
         StepError::Singular { matrix: "static stiffness (with the effect of weight and load)", t: self.t }
@@ -376,53 +361,13 @@ impl Statics<'_> {
         }
     }
 
-    /// Solves `K e + p(e) = 0` by Newton's method from elastic coordinates.
-    fn equilibrium_from(&self, data: &mut Data, mut e: DVector<f64>) -> Result<Equilibrium, StepError> {
-        let Self { arm, t, .. } = *self;
-        let (m, ne) = (arm.model.n_actuated(), arm.model.n_elastic());
-        let at_rest = arm.stiffness();
-        let (mut residual, mut iterations, mut buckled) = (f64::INFINITY, 0, false);
-        loop {
-            let q = all_coordinates(arm, t, &e);
-            let p = self.forces(data, &q);
-            let spring = spring_forces(arm, q.as_slice(), &e);
-            let elastic_p = p.rows(m, ne);
-            let scale = elastic_p.amax().max(spring.amax()).max(arm.friction_of_gears()).max(f64::MIN_POSITIVE);
-            let r = &spring + elastic_p;
-            let previous = residual;
-            residual = if ne == 0 { 0.0 } else { r.amax() / scale };
-            if residual <= TOLERANCE || (iterations > 2 && residual < 1e-9 && residual >= 0.5 * previous) {
-                return Ok(Equilibrium { q, e, p, residual, iterations });
-            }
-            let most = if arm.hysteresis.is_empty() { MOST_ITERATIONS } else { 200 };
-            if !residual.is_finite() || iterations == most {
-                let lost = StepError::NoEquilibrium { t, iterations, residual };
-                return Err(if buckled { self.singular() } else { lost });
-            }
-            let springs = with_curves(arm, &at_rest, q.as_slice(), &e);
-            let tangent = &springs + self.slopes(data, &q).view((m, m), (ne, ne));
-            // If the tangent is not positive definite, its step leads uphill to a saddle point;
-            // a step with the springs only leads downhill.
-            let stable = ((&tangent + tangent.transpose()) * 0.5).cholesky().is_some();
-            buckled |= !stable;
-            let step = if stable { tangent } else { springs }.lu().solve(&r).ok_or_else(|| self.singular())?;
-            // The full step may overshoot for large deflections: no coordinate moves by more than
-            // 0.5.
-            let mut part = (0.5 / step.amax()).min(1.0);
-            let mut closer = arm.hysteresis.is_empty();
-            for _ in 0..MOST_HALVINGS {
-                if closer {
-                    break;
-                }
-                let trial = &e - &step * part;
-                let q = all_coordinates(arm, t, &trial);
-                let left = spring_forces(arm, q.as_slice(), &trial) + self.forces(data, &q).rows(m, ne);
-                closer = left.norm() < r.norm();
-                part *= if closer { 1.0 } else { 0.5 };
-            }
-            e -= &step * part;
-            iterations += 1;
-        }
+    /// Solves `K e + p(e) = 0` from elastic coordinates.
+    fn equilibrium_from(&self, data: &mut Data, e: DVector<f64>) -> Result<Equilibrium, StepError> {
+        let mut under_load = UnderLoad { statics: self, data, at_rest: self.arm.stiffness(), buckled: false };
+        equilibrium(&mut under_load, e).map_err(|error| match error {
+            StepError::NoEquilibrium { .. } if under_load.buckled => self.singular(),
+            other => other,
+        })
     }
 
     /// Returns the tangent stiffness of the free coordinates: springs plus slopes of weight and
@@ -462,5 +407,47 @@ impl Statics<'_> {
         let tool = Some((self.tool, &self.F_T_W));
         StaticSlopes::new(self.arm, 0).compute(self.arm, tool, self.t, data, q, &mut P);
         P
+    }
+}
+
+/// The arm at rest under weight, its loads and the wrench on the tool, motors held.
+struct UnderLoad<'a> {
+    statics: &'a Statics<'a>,
+    data: &'a mut Data,
+    /// Stiffness of the springs at rest.
+    at_rest: DMatrix<f64>,
+    /// Whether the tangent was not positive definite somewhere.
+    buckled: bool,
+}
+
+impl Forces for UnderLoad<'_> {
+    fn unbalanced(&mut self, e: &DVector<f64>) -> Result<(DVector<f64>, f64), StepError> {
+        let arm = self.statics.arm;
+        let q = all_coordinates(arm, self.statics.t, e);
+        let p = self.statics.forces(self.data, &q);
+        let spring = spring_forces(arm, q.as_slice(), e);
+        let elastic_p = p.rows(arm.model.n_actuated(), e.len());
+        let scale = elastic_p.amax().max(spring.amax()).max(arm.friction_of_gears());
+        Ok((&spring + elastic_p, scale))
+    }
+
+    fn step(&mut self, e: &DVector<f64>, r: &DVector<f64>) -> Result<DVector<f64>, StepError> {
+        let (arm, m, n) = (self.statics.arm, self.statics.arm.model.n_actuated(), e.len());
+        let q = all_coordinates(arm, self.statics.t, e);
+        let springs = with_curves(arm, &self.at_rest, q.as_slice(), e);
+        let tangent = &springs + self.statics.slopes(self.data, &q).view((m, m), (n, n));
+        // If the tangent is not positive definite, its step leads uphill to a saddle point; a step
+        // with the springs only leads downhill.
+        let stable = ((&tangent + tangent.transpose()) * 0.5).cholesky().is_some();
+        self.buckled |= !stable;
+        if stable { tangent } else { springs }.lu().solve(r).ok_or_else(|| self.statics.singular())
+    }
+
+    fn has_hysteresis(&self) -> bool {
+        !self.statics.arm.hysteresis.is_empty()
+    }
+
+    fn time(&self) -> f64 {
+        self.statics.t
     }
 }

@@ -9,15 +9,10 @@ use flexarm_kinematics::{
 use nalgebra::{DMatrix, DVector};
 
 use crate::arm::FlexibleArm;
+use crate::equilibrium::{Forces, equilibrium};
 use crate::error::StepError;
 use crate::reduced::add_geometric_forces;
-
-/// Accepted unbalanced force relative to the largest spring or gravity force.
-const TOLERANCE: f64 = 1e-13;
-
-/// Maximum number of halvings of a step that moves away from the equilibrium of a gear with
-/// hysteresis.
-pub(crate) const MOST_HALVINGS: usize = 12;
+use crate::workspaces::PooledWorkspace;
 
 /// Computes the elastic coordinates at which the springs carry gravity and the loads at time `t`.
 ///
@@ -31,57 +26,48 @@ pub fn static_equilibrium(arm: &FlexibleArm, t: f64) -> Result<DVector<f64>, Ste
     // changed since; with nonlinear springs (backlash) start undeformed.
     let straight = arm.elements.iter().all(|element| element.curve.is_none());
     let known = t == 0.0 && straight && arm.modes.equilibrium.len() == n;
-    let mut e = if known { arm.modes.equilibrium.clone() } else { DVector::zeros(n) };
+    let e = if known { arm.modes.equilibrium.clone() } else { DVector::zeros(n) };
     if n == 0 {
         return Ok(e);
     }
     if let Some(apart) = arm.apart(&joints_at(arm, t)) {
         return Err(apart);
     }
-    let mut data = arm.lend_data();
-    let K = arm.stiffness();
-    let mut residual = f64::INFINITY;
-    // The first loading curve of a hysteresis may be soft, then stiff: full steps may oscillate
-    // between its pieces.
-    let most = if arm.hysteresis.is_empty() { 30 } else { 200 };
-    for iteration in 0..most {
-        let (g, scale) = unbalanced(arm, &mut data, t, &e);
-        if let Some(open) = StepError::open_loop(&arm.model, &data, t) {
-            return Err(open);
-        }
-        let previous = residual;
-        residual = g.amax() / scale.max(f64::MIN_POSITIVE);
-        // Converged, or limited by round-off.
-        if residual <= TOLERANCE || (iteration > 2 && residual < 1e-9 && residual >= 0.5 * previous) {
-            return Ok(e);
-        }
-        if !residual.is_finite() {
-            break;
-        }
-        let q = joints_at(arm, t);
-        let steep = with_curves(arm, &K, &q, &e);
-        let mut tangent = |K: &DMatrix<f64>| tangent_stiffness(arm, &mut data, t, &e, K).cholesky();
-        let Some(factor) = tangent(&leave_play(arm, &q, &e, &g, &steep)).or_else(|| tangent(&steep)) else {
-            return Err(StepError::Singular { matrix: "static stiffness (with the effect of weight)", t });
-        };
-        let step = factor.solve(&g);
-        // Beyond a backlash, a small load may be below the round-off of the deflection.
-        if step.amax() <= 2.0 * f64::EPSILON * e.amax() {
-            return Ok(e);
-        }
-        // The full step may overshoot for large deflections: no coordinate moves by more than 0.5.
-        let mut shorten = (0.5 / step.amax()).min(1.0);
-        let mut closer = arm.hysteresis.is_empty();
-        for _ in 0..MOST_HALVINGS {
-            if closer {
-                break;
-            }
-            closer = unbalanced(arm, &mut data, t, &(&e - &step * shorten)).0.norm() < g.norm();
-            shorten *= if closer { 1.0 } else { 0.5 };
-        }
-        e -= step * shorten;
+    let mut weight = UnderWeight { arm, data: arm.lend_data(), K: arm.stiffness(), t };
+    Ok(equilibrium(&mut weight, e)?.e)
+}
+
+/// An arm under gravity and its loads at time t, drives held.
+struct UnderWeight<'a> {
+    arm: &'a FlexibleArm,
+    data: PooledWorkspace<Data>,
+    K: DMatrix<f64>,
+    t: f64,
+}
+
+impl Forces for UnderWeight<'_> {
+    fn unbalanced(&mut self, e: &DVector<f64>) -> Result<(DVector<f64>, f64), StepError> {
+        let found = unbalanced(self.arm, &mut self.data, self.t, e);
+        StepError::open_loop(&self.arm.model, &self.data, self.t).map_or(Ok(found), Err)
     }
-    Err(StepError::NoEquilibrium { t, iterations: most, residual })
+
+    fn step(&mut self, e: &DVector<f64>, r: &DVector<f64>) -> Result<DVector<f64>, StepError> {
+        let Self { arm, data, K, t } = self;
+        let q = joints_at(arm, *t);
+        let steep = with_curves(arm, K, &q, e);
+        let mut tangent = |K: &DMatrix<f64>| tangent_stiffness(arm, data, *t, e, K).cholesky();
+        let factor = tangent(&leave_play(arm, &q, e, r, &steep)).or_else(|| tangent(&steep));
+        let singular = StepError::Singular { matrix: "static stiffness (with the effect of weight)", t: *t };
+        Ok(factor.ok_or(singular)?.solve(r))
+    }
+
+    fn has_hysteresis(&self) -> bool {
+        !self.arm.hysteresis.is_empty()
+    }
+
+    fn time(&self) -> f64 {
+        self.t
+    }
 }
 
 /// Returns the unbalanced generalised forces, and the scale of the balancing forces.

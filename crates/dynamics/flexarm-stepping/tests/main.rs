@@ -22,6 +22,7 @@ mod oscillators;
 mod poses;
 mod reference_arm;
 mod reference_stepper;
+mod rotation;
 mod run_slopes;
 mod servo_slopes;
 mod solver_work;

@@ -25,7 +25,7 @@ fn spring(name: &str, K: DMatrix<f64>, damping: Damping) -> Spring {
     Spring { name: name.into(), K, damping, curve: None, geometric: None }
 }
 
-fn modal_spring(modal: &ModalLink, damping: Damping) -> Spring {
+pub(crate) fn modal_spring(modal: &ModalLink, damping: Damping) -> Spring {
     let geometric = modal.geometric.as_ref().map(|g| {
         Arc::new(GeometricStiffness {
             acceleration: g.acceleration.clone(),
@@ -43,7 +43,11 @@ fn own_inertia(modal: &ModalLink) -> LinkInertia {
 }
 
 /// Springs in the order of the model, selected by the name of their group.
-fn arm_of(mechanism: &Mechanism, springs: &[(String, Spring)], motion: Arc<dyn PrescribedMotion>) -> FlexibleArm {
+pub(crate) fn arm_of(
+    mechanism: &Mechanism,
+    springs: &[(String, Spring)],
+    motion: Arc<dyn PrescribedMotion>,
+) -> FlexibleArm {
     let model = Arc::new(Model::new(mechanism).expect("a tree"));
     let of = |group: &ElasticGroup| springs.iter().find(|(name, _)| *name == group.name).expect("a spring").1.clone();
     let ordered: Vec<Spring> = model.elastic().iter().map(of).collect();

@@ -50,15 +50,16 @@ pub(crate) fn modes(terminal: &Terminal, args: &ModesArgs) -> Result<ExitCode, F
     }
     let robot = load(&args.pose)?;
     let at = values::pose(args.pose.at.as_deref(), &robot)?;
-    let at = at.as_deref();
+    let speeds = values::joint_speeds(args.speeds.as_deref(), &robot)?;
+    let (at, speeds) = (at.as_deref(), speeds.as_deref());
     let modelling = args.pose.modelling.modelling();
     let found = match &args.output {
         Some(folder) => {
             let outputs = Outputs { overwrite: args.force, ..Outputs::everything(folder) };
             let movie = ModeMovie { seconds: args.seconds, tool_motion_m: args.tool_motion };
-            flexarm::record_modes(&robot, &modelling, at, args.count, &movie, &outputs)?
+            flexarm::record_modes(&robot, &modelling, at, speeds, args.count, &movie, &outputs)?
         }
-        None => flexarm::modes(&robot, &modelling, at, args.count)?,
+        None => flexarm::modes(&robot, &modelling, at, speeds, args.count)?,
     };
     caveats(terminal, &found.caveats);
     answer(terminal, || to_json(&found), || modes_text(&found));
@@ -151,8 +152,13 @@ fn statics_text(s: &Statics) -> String {
 }
 
 fn modes_text(m: &ModeTable) -> String {
-    let drives =
-        if m.driven.is_empty() { "drives locked".to_owned() } else { format!("under servos: {}", m.driven.join(", ")) };
+    let turning = m.joints.iter().zip(&m.speeds).filter(|(_, speed)| **speed != 0.0);
+    let turning: Vec<String> = turning.map(|(joint, speed)| format!("{joint} at {speed:.4} 1/s")).collect();
+    let drives = match (m.driven.is_empty(), turning.is_empty()) {
+        (_, false) => format!("turning: {}", turning.join(", ")),
+        (true, true) => "drives locked".to_owned(),
+        (false, true) => format!("under servos: {}", m.driven.join(", ")),
+    };
     let mut out = pose_text(&m.robot, &m.joints, &m.at, &format!(", {drives}"));
     if m.modes.is_empty() {
         return out + "no modes: nothing is flexible\n";
@@ -184,6 +190,9 @@ fn modes_text(m: &ModeTable) -> String {
         }
         right(&mut t, 1);
         out += &format!("\n{}", lines(&t));
+        if !m.speeds.is_empty() {
+            continue;
+        }
         let mut t = head("share of [%]");
         for (k, axis) in AXES[..3].iter().enumerate() {
             let shares = modes.iter().map(|mode| mode.compliance_share[k].map_or_else(|| "-".into(), percent));

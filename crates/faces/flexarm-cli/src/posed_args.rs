@@ -53,6 +53,10 @@ pub(crate) struct StaticsArgs {
 pub(crate) struct ModesArgs {
     #[command(flatten)]
     pub(crate) pose: PoseArgs,
+    /// Modes of the turning arm: speeds of the joints in coordinate order, or name=value pairs (rad/s
+    /// or m/s; 500rpm, 30deg per second)
+    #[arg(long, value_name = "V1,V2,...", allow_hyphen_values = true)]
+    pub(crate) speeds: Option<String>,
     /// Number of modes, from the lowest
     #[arg(long, value_name = "N", default_value_t = 10)]
     pub(crate) count: usize,

@@ -5,28 +5,32 @@ use flexarm::{Motion, Robot};
 
 use crate::failure::Failure;
 
+/// Units of angles, with their size (rad).
+const ANGLES: &[(&str, f64)] = &[("deg", std::f64::consts::PI / 180.0)];
+/// Units of angular speeds, with their size (rad/s).
+const SPEEDS: &[(&str, f64)] = &[("rpm", std::f64::consts::PI / 30.0), ("deg", std::f64::consts::PI / 180.0)];
+
 /// Parses a joint vector: `v1,v2,...` in coordinate order, or `name=value,...` with the others
-/// zero; rad or m, or degrees with the suffix `deg`.
+/// zero; SI units, or a suffix from `units` for joints that turn.
 ///
 /// * `joints`: names, and whether they are prismatic.
 ///
 /// # Errors
 /// [`Failure::Usage`], listing the joints.
-fn parse_joint_values(text: &str, joints: &[(&str, bool)]) -> Result<Vec<f64>, Failure> {
+fn parse_joint_values(text: &str, joints: &[(&str, bool)], units: &[(&str, f64)]) -> Result<Vec<f64>, Failure> {
     let mut values = vec![0.0; joints.len()];
     let items: Vec<&str> = text.split(',').map(str::trim).filter(|s| !s.is_empty()).collect();
     let names: Vec<&str> = joints.iter().map(|(name, _)| *name).collect();
     let number = |s: &str, (joint, slides): (&str, bool)| {
-        let (digits, unit) = match s.trim().strip_suffix("deg") {
-            Some(_) if slides => {
-                return Err(Failure::Usage(format!("joint value {s:?}: joint {joint:?} slides; give it in m")));
-            }
-            Some(digits) => (digits.trim(), std::f64::consts::PI / 180.0),
-            None => (s.trim(), 1.0),
-        };
+        let suffixed = units.iter().find_map(|(unit, size)| Some((s.trim().strip_suffix(unit)?.trim(), *size)));
+        if suffixed.is_some() && slides {
+            return Err(Failure::Usage(format!("joint value {s:?}: joint {joint:?} slides; give it in m or m/s")));
+        }
+        let (digits, unit) = suffixed.unwrap_or((s.trim(), 1.0));
         let value: Option<f64> = digits.parse().ok().filter(|x: &f64| x.is_finite());
         value.map(|x| x * unit).ok_or_else(|| {
-            Failure::Usage(format!("joint value {s:?} is not a finite number (rad or m, or degrees as in 30deg)"))
+            let example = format!("30{}", units[0].0);
+            Failure::Usage(format!("joint value {s:?} is not a finite number (rad or m, or as in {example})"))
         })
     };
     if items.iter().any(|i| i.contains('=')) {
@@ -82,10 +86,22 @@ pub(crate) fn pose(text: Option<&str>, robot: &Robot) -> Result<Option<Vec<f64>>
 /// # Errors
 /// Those of [`parse_joint_values`], and [`Error::Model`].
 pub(crate) fn joint_values(text: Option<&str>, robot: &Robot) -> Result<Option<Vec<f64>>, Failure> {
+    of_joints(text, robot, ANGLES)
+}
+
+/// Speeds of a robot's joints, if any are given, likewise.
+///
+/// # Errors
+/// As [`joint_values`].
+pub(crate) fn joint_speeds(text: Option<&str>, robot: &Robot) -> Result<Option<Vec<f64>>, Failure> {
+    of_joints(text, robot, SPEEDS)
+}
+
+fn of_joints(text: Option<&str>, robot: &Robot, units: &[(&str, f64)]) -> Result<Option<Vec<f64>>, Failure> {
     let Some(text) = text else { return Ok(None) };
     let model = robot.rigid_model()?;
     let joints: Vec<(&str, bool)> = model.coordinates().iter().map(|c| (c.joint.as_str(), c.slides())).collect();
-    parse_joint_values(text, &joints).map(Some)
+    parse_joint_values(text, &joints, units).map(Some)
 }
 
 /// Parses a wrench: `fx,fy,fz` or `fx,fy,fz,tx,ty,tz` (N, N m).

@@ -174,6 +174,29 @@ mod modes {
         }
     }
 
+    /// Truths: zero speed is rest; weight turns with the arm about a horizontal axis only.
+    #[test]
+    fn a_turning_arm_stiffens_and_unsteady_rotation_is_named() {
+        let place = Place::new();
+        let arm = shipped_robot("reference_arm");
+        let modes = |words: &[&str]| place.json(&[&["modes", &arm, "--count", "3"], words].concat());
+        let rest = modes(&[]);
+        assert!(rest["speeds"].is_null());
+        assert_eq!(rest, modes(&["--speeds", "joint_1=0"]));
+        let slow = modes(&["--speeds", "joint_1=0.01rpm"]);
+        for (slow, rest) in numbers(&slow["frequencies_hz"]).iter().zip(numbers(&rest["frequencies_hz"])) {
+            assert!((slow / rest - 1.0).abs() < 1e-5, "{slow} {rest}");
+        }
+        let fast = modes(&["--speeds", "joint_1=60rpm"]);
+        assert!((fast["speeds"][0].as_f64().unwrap() / std::f64::consts::TAU - 1.0).abs() < 1e-12);
+        assert!(fast["frequencies_hz"] != rest["frequencies_hz"]);
+        let codes = |found: &serde_json::Value| found["caveats"].to_string().contains("unsteady-rotation");
+        assert!(!codes(&fast) && codes(&modes(&["--speeds", "joint_2=1"])));
+        place.refused(&["modes", &arm, "--speeds", "joint_1=5 turns"], &["5 turns", "30rpm"]);
+        place.refused(&["modes", &arm, "--speeds", "1,2"], &["2 joint values", "joint_1"]);
+        assert!(numbers(&place.json(&["modes", "beam.urdf", "--speeds", "swing=1"])["frequencies_hz"]).is_empty());
+    }
+
     /// The recording contains every mode for its duration, with the requested TCP amplitude.
     #[test]
     fn modes_swing_in_a_recording() {

@@ -461,19 +461,23 @@ impl PyArm {
     /// q : array_like, shape (n,), optional
     ///     Joints (rad or m). Default: zero.
     /// count : int, default 10
+    /// speeds : array_like, shape (n,), optional
+    ///     Constant speeds of the joints (rad/s or m/s): modes about the equilibrium of the turning
+    ///     arm, stiffened by centrifugal loads, with Coriolis forces.
     ///
     /// Returns
     /// -------
     /// Modes
-    #[pyo3(signature = (q=None, count=10))]
+    #[pyo3(signature = (q=None, count=10, *, speeds=None))]
     fn modes(
         &self,
         py: Python<'_>,
         q: Option<&Bound<'_, PyAny>>,
         #[pyo3(from_py_with = whole)] count: usize,
+        speeds: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<PyModes> {
-        let q = self.pose(q)?;
-        let table = py.detach(|| self.arm.modes(q.as_deref(), count)).or_raise()?;
+        let (q, speeds) = (self.pose(q)?, self.pose(speeds)?);
+        let table = py.detach(|| self.arm.modes(q.as_deref(), speeds.as_deref(), count)).or_raise()?;
         caveat::issue(py, &table.caveats)?;
         Ok(modes(table))
     }

@@ -38,8 +38,8 @@ fn an_arm_answers_as_the_robot_that_is_substituted_for_each_question() {
     let wrench = [10.0, 0.0, -500.0, 0.0, 1.0, 0.0];
     let statics = flexarm::statics(&robot, &modelling, Some(&POSE), wrench).unwrap();
     assert_eq!(json(&arm.statics(Some(&POSE), wrench).unwrap()), json(&statics));
-    let modes = flexarm::modes(&robot, &modelling, Some(&POSE), 5).unwrap();
-    assert_eq!(json(&arm.modes(Some(&POSE), 5).unwrap()), json(&modes));
+    let modes = flexarm::modes(&robot, &modelling, Some(&POSE), None, 5).unwrap();
+    assert_eq!(json(&arm.modes(Some(&POSE), None, 5).unwrap()), json(&modes));
     let request = ResponseRequest { points: 20, ..ResponseRequest::default() };
     let response = flexarm::response(&robot, &modelling, Some(&POSE), &request, None).unwrap();
     assert_eq!(json(&arm.response(Some(&POSE), &request).unwrap()), json(&response));

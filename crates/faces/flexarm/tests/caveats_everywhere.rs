@@ -85,7 +85,7 @@ fn every_command_with_a_pose_says_of_a_robot_what_check_says() {
     };
     let found = statics(&robot, &modelling, Some(&POSE), [0.0; 6]).unwrap();
     says("statics", &found.caveats, &found.warnings);
-    let found = modes(&robot, &modelling, Some(&POSE), 4).unwrap();
+    let found = modes(&robot, &modelling, Some(&POSE), None, 4).unwrap();
     says("modes", &found.caveats, &found.warnings);
     let request = ResponseRequest { points: 10, ..ResponseRequest::default() };
     let found = response(&robot, &modelling, Some(&POSE), &request, None).unwrap();

@@ -229,7 +229,8 @@ fn a_coupled_wrist_has_springs_rotors_and_torques_at_its_motors() {
         assert!(peaks.iter().all(|p| (p / peaks[3] - 1.0).abs() < 2e-2), "{peaks:?}");
     }
     let one = place.robot(&format!("{drives}{}", WRIST.replace("-0.05", "0.0")));
-    let hz = [&one, &plain].map(|robot| modes(robot, &Modelling::default(), Some(&AT), 6).unwrap().frequencies_hz);
+    let hz =
+        [&one, &plain].map(|robot| modes(robot, &Modelling::default(), Some(&AT), None, 6).unwrap().frequencies_hz);
     assert_eq!(hz[0], hz[1]);
     let runs = [&one, &plain]
         .map(|robot| robot.flexible(Modelling::default()).unwrap().simulate(&motion, &RunOptions::default()).unwrap());

@@ -126,7 +126,7 @@ fn the_first_frequencies_are_those_of_a_rigid_body_on_the_springs() {
     let pedestal = "mass = 40.0\ncom = [0.0, 0.1, -0.2]\ninertia = [1.0, 1.1, 1.2, 0.1, 0.0, 0.0]\n";
     let text = format!("{HEAD}{FREE}[mounting]\nstiffness = {STIFF:?}\nxyz = [0.0, 0.0, -0.1]\n{pedestal}");
     let (x, slew) = (-0.6, 0.9f64);
-    let found = modes(&place.robot(&text), &Modelling::default(), Some(&[x, slew]), 6).unwrap();
+    let found = modes(&place.robot(&text), &Modelling::default(), Some(&[x, slew]), None, 6).unwrap();
     let Rz = *Rotation3::from_axis_angle(&Vector3::z_axis(), slew).matrix();
     let diagonal = |a: f64, b: f64, c: f64| Matrix3::from_diagonal(&Vector3::new(a, b, c));
     let S = Vector3::new(0.0, 0.0, -0.1);
@@ -189,7 +189,7 @@ fn springs_a_beam_and_a_gearbox_of_six_are_the_same_mounting() {
     let at = [0.4, -0.3];
     let figures = |robot: &Robot| {
         let statics = statics(robot, &Modelling::default(), Some(&at), [0.1, -0.2, 0.3, 0.01, 0.02, -0.03]).unwrap();
-        let modes = modes(robot, &Modelling::default(), Some(&at), 4).unwrap();
+        let modes = modes(robot, &Modelling::default(), Some(&at), None, 4).unwrap();
         (statics.compliance.concat(), statics.tcp_displacement_m, modes.undamped_frequencies_hz[..4].to_vec())
     };
     let springs = figures(&place.robot(&text(&format!("stiffness = {}", written(&K)))));
@@ -219,7 +219,7 @@ fn springs_a_beam_and_a_gearbox_of_six_are_the_same_mounting() {
     let at = [0.0, at[0], at[1]];
     let wrench = [0.1, -0.2, 0.3, 0.01, 0.02, -0.03];
     let statics = statics(&robot, &Modelling::default(), Some(&at), wrench).unwrap();
-    let hz = modes(&robot, &Modelling::default(), Some(&at), 4).unwrap().undamped_frequencies_hz[..4].to_vec();
+    let hz = modes(&robot, &Modelling::default(), Some(&at), None, 4).unwrap().undamped_frequencies_hz[..4].to_vec();
     compare("gearbox of six", (statics.compliance.concat(), statics.tcp_displacement_m, hz), 1e-12);
 }
 

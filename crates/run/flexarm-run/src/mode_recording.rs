@@ -5,11 +5,11 @@ use flexarm_analysis::{DampedMode, tcp_error};
 use flexarm_kinematics::{Frame, forward_kinematics};
 use flexarm_log::{Caption, ElasticSample, RunResult, Sample, TwinSample};
 use flexarm_stepping::Linear;
-use nalgebra::{DVector, Vector6};
+use nalgebra::DVector;
 
 use crate::bends::stations;
 use crate::error::{Error, PoseError, ValueError};
-use crate::modes::{ModeTable, modes_of, table};
+use crate::modes::{ModeModel, ModeTable, modes_of, table};
 use crate::options::Modelling;
 use crate::options::Outputs;
 use crate::posed::Posed;
@@ -51,6 +51,7 @@ pub fn record_modes(
     robot: &Robot,
     modelling: &Modelling,
     at: Option<&[f64]>,
+    speeds: Option<&[f64]>,
     count: usize,
     movie: &ModeMovie,
     outputs: &Outputs,
@@ -60,8 +61,9 @@ pub fn record_modes(
     within(movie.seconds, ValueError::Seconds)?;
     movie.tool_motion_m.map_or(Ok(()), |x| within(x, ValueError::ToolMotion))?;
     let posed = Posed::new(robot, modelling, at)?;
-    let linear = posed.linear(&Vector6::zeros())?;
-    let all = modes_of(&linear)?;
+    let model = ModeModel::new(&posed, speeds)?;
+    let linear = &model.linear;
+    let all = modes_of(linear)?;
     if all.is_empty() {
         return Err(PoseError::NoModes.into());
     }
@@ -90,9 +92,9 @@ pub fn record_modes(
     header.metadata = vec![("flexarm.modes".into(), shown.iter().enumerate().map(row).collect())];
     files.begin(&header)?;
     let per_mode = (swings / SHOWN_HZ * RATE_HZ).round() as u64;
-    let mut stage = Stage::new(robot, &posed, &linear, stations);
+    let mut stage = Stage::new(robot, &posed, linear, stations);
     for (k, mode) in shown.iter().enumerate() {
-        let size = magnification(mode, &linear, motion);
+        let size = magnification(mode, linear, motion);
         let last = if k + 1 == shown.len() { per_mode } else { per_mode - 1 };
         for frame in 0..=last {
             let step = k as u64 * per_mode + frame;
@@ -104,7 +106,7 @@ pub fn record_modes(
     let figures = vec![("modes".into(), shown.len().to_string())];
     files.set.finish(&RunResult { figures, ..RunResult::default() })?;
     let names = files.names.clone();
-    let mut figures = table(robot, posed, &linear, &all, count)?;
+    let mut figures = table(robot, &posed, &model, &all, count)?;
     figures.files = names;
     Ok(figures)
 }

@@ -1,16 +1,17 @@
-//! Natural modes at a pose, with drives locked or under their servos: frequencies, damping, TCP
-//! motion and strain energy of the links.
+//! Natural modes at a pose, with drives locked, under their servos, or turning at constant speed:
+//! frequencies, damping, TCP motion and strain energy of the links.
 
 use flexarm_analysis::{
     DampedMode, LinearError, compliance_parts, damped_modes, effective_mass, mode_outputs, strain_energy_shares,
 };
-use flexarm_stepping::Linear;
+use flexarm_stepping::{Linear, linearise_rotation};
 use nalgebra::{DMatrix, Vector6};
 use serde::Serialize;
 
 use crate::arm::Arm;
-use crate::caveat::{self, Caveat};
+use crate::caveat::{self, Caveat, kinds};
 use crate::error::{Error, PoseError};
+use crate::inspect::joint_values;
 use crate::options::Modelling;
 use crate::posed::{Posed, step_error};
 use crate::robot::Robot;
@@ -25,6 +26,9 @@ pub struct ModeTable {
     pub joints: Vec<String>,
     /// Positions at which they are locked (rad or m).
     pub at: Vec<f64>,
+    /// Speeds at which the joints turn instead of being locked (rad/s or m/s); left out at rest.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub speeds: Vec<f64>,
     /// Joints under a servo instead of locked; the servo acts as spring and damper here.
     pub driven: Vec<String>,
     /// Link that carries the TCP.
@@ -42,7 +46,7 @@ pub struct ModeTable {
     /// Total number of modes; `modes` may contain fewer.
     pub total: usize,
     /// Fraction of the static compliance covered by the listed modes, per TCP direction; null where
-    /// the compliance is zero.
+    /// the compliance is zero, and for a turning arm.
     pub compliance_covered: [Option<f64>; 6],
     /// Written files.
     pub files: Files,
@@ -68,7 +72,7 @@ pub struct ModeFigures {
     /// Effective mass at the TCP (kg), or moment of inertia for rotations (kg m²); null at a node.
     pub effective_mass: [Option<f64>; 6],
     /// Fraction of the static compliance of the TCP carried by this mode, per direction; null where
-    /// the compliance is zero.
+    /// the compliance is zero, and for a turning arm: Coriolis forces couple the shares of its modes.
     pub compliance_share: [Option<f64>; 6],
     /// Share of each element in the strain energy.
     pub strain_energy: Vec<f64>,
@@ -76,14 +80,17 @@ pub struct ModeFigures {
     pub residual: f64,
 }
 
+/// Change of the forces during rotation above which it is not steady.
+const STEADY: f64 = 1e-3;
 /// Effective mass above which the TCP is at a node (kg, kg m²).
 const NODE: f64 = 1e12;
 
 impl ModeFigures {
-    fn new(mode: &DampedMode, linear: &Linear, compliance: &Vector6<f64>) -> Self {
-        let C = tool_map(linear);
+    fn new(mode: &DampedMode, model: &ModeModel, compliance: &Vector6<f64>) -> Self {
+        let (linear, C) = (&model.linear, tool_map(&model.linear));
         let output = mode_outputs(mode, &C);
-        let parts = compliance_parts(mode, &linear.M, &linear.D, &C);
+        let at_rest = model.speeds.is_empty();
+        let parts = compliance_parts(mode, &linear.M, &linear.D, &C).filter(|_| at_rest);
         let six = |f: &dyn Fn(usize) -> f64| std::array::from_fn(f);
         Self {
             frequency_hz: mode.frequency_hz(),
@@ -126,12 +133,21 @@ pub(crate) fn linear_error(error: LinearError) -> Error {
 /// Computes the lowest `count` modes of the flexible robot at a pose, about its static equilibrium,
 /// with the drives locked.
 ///
-/// `at`: values of all actuated joints (rad or m), zero by default.
+/// * `at`: values of all actuated joints (rad or m), zero by default.
+/// * `speeds`: speeds of all actuated joints (rad/s or m/s). With them the modes are those about
+///   the equilibrium of the turning arm, with stiffening by centrifugal loads and Coriolis forces,
+///   the motors following their motion exactly.
 ///
 /// # Errors
 /// [`Error::Pose`] for joint values that do not fit, [`Error::Step`] if there is no equilibrium.
-pub fn modes(robot: &Robot, modelling: &Modelling, at: Option<&[f64]>, count: usize) -> Result<ModeTable, Error> {
-    lowest(robot, Posed::new(robot, modelling, at)?, count)
+pub fn modes(
+    robot: &Robot,
+    modelling: &Modelling,
+    at: Option<&[f64]>,
+    speeds: Option<&[f64]>,
+    count: usize,
+) -> Result<ModeTable, Error> {
+    lowest(robot, &Posed::new(robot, modelling, at)?, speeds, count)
 }
 
 impl Arm {
@@ -139,35 +155,69 @@ impl Arm {
     ///
     /// # Errors
     /// As [`modes()`].
-    pub fn modes(&self, at: Option<&[f64]>, count: usize) -> Result<ModeTable, Error> {
-        lowest(self.robot(), Posed::on(self, at)?, count)
+    pub fn modes(&self, at: Option<&[f64]>, speeds: Option<&[f64]>, count: usize) -> Result<ModeTable, Error> {
+        lowest(self.robot(), &Posed::on(self, at)?, speeds, count)
     }
 }
 
-fn lowest(robot: &Robot, posed: Posed, count: usize) -> Result<ModeTable, Error> {
-    let linear = posed.linear(&Vector6::zeros())?;
-    let all = modes_of(&linear)?;
-    table(robot, posed, &linear, &all, count)
+/// Linear model about which the modes oscillate.
+pub(crate) struct ModeModel {
+    pub(crate) linear: Linear,
+    /// Damping matrix without Coriolis terms.
+    damping: DMatrix<f64>,
+    /// Speeds of the joints; empty at rest.
+    speeds: Vec<f64>,
+    /// Result of [`linearise_rotation`]: change of the forces during rotation.
+    change: f64,
 }
 
-/// Computes the undamped frequencies (Hz), from which non-proportional damping shifts the damped
-/// ones. With locked drives they equal those of a map at this pose bit for bit.
-fn undamped_frequencies(posed: &Posed, linear: &Linear) -> Result<Vec<f64>, Error> {
-    if linear.driven == 0 {
-        return Ok(posed.operating_point(&[0.0; 6])?.frequencies_hz().to_vec());
+impl ModeModel {
+    pub(crate) fn new(posed: &Posed, speeds: Option<&[f64]>) -> Result<Self, Error> {
+        let names: Vec<&str> = posed.joints.iter().map(String::as_str).collect();
+        let speeds = joint_values(speeds, &names)?;
+        if speeds.iter().all(|speed| *speed == 0.0) {
+            let linear = posed.linear(&Vector6::zeros())?;
+            return Ok(Self { damping: linear.D.clone(), linear, speeds: Vec::new(), change: 0.0 });
+        }
+        let found = linearise_rotation(&posed.arm, &posed.tool, &posed.at, &speeds);
+        let found = found.map_err(|error| posed.flexible.explained(error))?;
+        Ok(Self { linear: found.linear, damping: found.damping, speeds, change: found.change })
     }
-    let undamped = damped_modes(&linear.M, &(&linear.D * 0.0), &((&linear.K + linear.K.transpose()) * 0.5));
-    Ok(undamped.map_err(linear_error)?.iter().map(DampedMode::frequency_hz).collect())
+
+    /// Computes the undamped frequencies (Hz), from which non-proportional damping shifts the damped
+    /// ones. With locked drives they equal those of a map at this pose bit for bit.
+    fn undamped_frequencies(&self, posed: &Posed) -> Result<Vec<f64>, Error> {
+        let linear = &self.linear;
+        if self.speeds.is_empty() && linear.driven == 0 {
+            return Ok(posed.operating_point(&[0.0; 6])?.frequencies_hz().to_vec());
+        }
+        let K = (&linear.K + linear.K.transpose()) * 0.5;
+        let undamped = damped_modes(&linear.M, &(&linear.D - &self.damping), &K).map_err(linear_error)?;
+        Ok(undamped.iter().map(DampedMode::frequency_hz).collect())
+    }
+
+    /// Checks whether the rotation is steady.
+    fn caveat(&self) -> Option<Caveat> {
+        let found = || kinds::UNSTEADY_ROTATION.found("the rotation", 100.0 * self.change, 100.0 * STEADY);
+        (self.change > STEADY).then(found)
+    }
+}
+
+fn lowest(robot: &Robot, posed: &Posed, speeds: Option<&[f64]>, count: usize) -> Result<ModeTable, Error> {
+    let model = ModeModel::new(posed, speeds)?;
+    let all = modes_of(&model.linear)?;
+    table(robot, posed, &model, &all, count)
 }
 
 /// Computes the figures of the modes.
 pub(crate) fn table(
     robot: &Robot,
-    posed: Posed,
-    linear: &Linear,
+    posed: &Posed,
+    model: &ModeModel,
     all: &[DampedMode],
     count: usize,
 ) -> Result<ModeTable, Error> {
+    let linear = &model.linear;
     // Under servos the modes share the compliance of springs and servos; it does not exist if a
     // motor is free.
     let compliance = match linear.driven {
@@ -185,10 +235,11 @@ pub(crate) fn table(
         caveats.push(Caveat::from_message("unstable", "modes", message, "check the gains of the servos"));
     }
     let modes: Vec<ModeFigures> =
-        all.iter().take(count).map(|mode| ModeFigures::new(mode, linear, &compliance)).collect();
+        all.iter().take(count).map(|mode| ModeFigures::new(mode, model, &compliance)).collect();
     let covered =
         |i: usize| modes.iter().map(|mode| mode.compliance_share[i]).sum::<Option<f64>>().filter(|_| !modes.is_empty());
-    let mut undamped = undamped_frequencies(&posed, linear)?;
+    caveats.extend(model.caveat());
+    let mut undamped = model.undamped_frequencies(posed)?;
     undamped.truncate(count);
     Ok(ModeTable {
         undamped_frequencies_hz: undamped,
@@ -203,8 +254,9 @@ pub(crate) fn table(
         files: Files::default(),
         warnings: caveat::warnings(&caveats),
         caveats,
-        driven: posed.arm.torque_driven.iter().map(|&k| posed.joints[k].clone()).collect(),
-        joints: posed.joints,
-        at: posed.at,
+        driven: posed.arm.torque_driven.iter().take(linear.driven).map(|&k| posed.joints[k].clone()).collect(),
+        joints: posed.joints.clone(),
+        at: posed.at.clone(),
+        speeds: model.speeds.clone(),
     })
 }

@@ -21,9 +21,10 @@ use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX};
 
 use crate::arm::FlexibleArm;
 use crate::dense::Factor;
+use crate::equilibrium::MOST_HALVINGS;
 use crate::error::StepError;
 use crate::motion::Held;
-use crate::statics::{MOST_HALVINGS, StaticSlopes, add_spring_forces, static_equilibrium, static_forces};
+use crate::statics::{StaticSlopes, add_spring_forces, static_equilibrium, static_forces};
 pub use each::{PoseAnswer, PoseOutputs};
 use tangent::{Tangent, to_hertz};
 

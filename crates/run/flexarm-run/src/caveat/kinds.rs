@@ -122,6 +122,14 @@ pub(crate) const UNDAMPED: CaveatKind = CaveatKind::warning(
     "",
     "give the springs damping",
 );
+/// The forces on the deflections change while the arm turns at constant speed.
+pub(crate) const UNSTEADY_ROTATION: CaveatKind = CaveatKind::warning(
+    "unsteady-rotation",
+    "{where} is not steady: the forces on the deflections change by {value} % while it turns by one radian (limit \
+     {yardstick} %), by weight or by other joints; the modes are those of an instant",
+    "%",
+    "turn one joint about a vertical axis, or set gravity to zero, for modes that last",
+);
 /// A joint is outside its limits at a pose.
 pub(crate) const OUTSIDE_LIMITS: CaveatKind = CaveatKind::warning(
     "outside-limits",
