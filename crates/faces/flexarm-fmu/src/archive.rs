@@ -8,6 +8,7 @@ use std::fs;
 use std::io::{Cursor, Write as _};
 use std::path::{Path, PathBuf};
 
+use flexarm::reduce::STRESS_FILE;
 use flexarm::{Arm, DriveModel, InertiaEstimate, LinkModel, LoadOptions, Modelling, Robot, STEPPERS, StepperOptions};
 use serde::{Deserialize, Serialize};
 use toml_edit::{DocumentMut, Item};
@@ -207,8 +208,13 @@ fn robot_files(
         let Some(given) = entry.get("reduced").and_then(Item::as_str).map(|path| folder.join(path)) else {
             return Ok(());
         };
-        let name = format!("link_{}.flex", files.len() + 1);
+        let number = files.len() + 1;
+        let name = format!("link_{number}.flex");
         files.push((name.clone(), fs::read(&given).map_err(failed(&given))?));
+        let stress = given.with_extension(STRESS_FILE);
+        if !robot.gauges.is_empty() && stress.is_file() {
+            files.push((format!("link_{number}.{STRESS_FILE}"), fs::read(&stress).map_err(failed(&stress))?));
+        }
         entry.insert("reduced", toml_edit::value(name));
         Ok(())
     };

@@ -81,6 +81,7 @@ impl Plant {
             payload: filed_payload(&robot)?.map(|(_, mass)| mass),
             holding: live.effort(),
             has_acceleration: !settings.stepper.entry().maximal,
+            gauges: &live.gauge_channels(),
         };
         let variables: Arc<[Variable]> = variables(&arm, &starts).into();
         let values = variables.iter().map(|variable| variable.start.unwrap_or(0.0)).collect();
@@ -351,7 +352,7 @@ impl Plant {
         let Some(live) = &mut self.live else { return };
         let (link_position, link_velocity) = (live.link_position(), live.link_velocity());
         let (tcp, rigid, V) = (live.tcp_pose(), live.target_pose(), live.tcp_velocity());
-        let a = live.tcp_acceleration();
+        let (a, gauges) = (live.tcp_acceleration(), live.gauges());
         let error = tcp.translation.vector - rigid.translation.vector;
         let turned = (tcp.rotation * rigid.rotation.inverse()).scaled_axis();
         let (own, of_rigid) = (quaternion(&tcp), quaternion(&rigid));
@@ -372,6 +373,7 @@ impl Plant {
                 Meaning::Error(k) => error[k],
                 Meaning::ErrorLength => error.norm(),
                 Meaning::RotationError(k) => turned[k],
+                Meaning::Gauge(k) => gauges[k],
                 _ => continue,
             };
         }

@@ -60,6 +60,7 @@ pub(crate) enum Meaning {
     Error(usize),
     ErrorLength,
     RotationError(usize),
+    Gauge(usize),
 }
 
 /// A variable of a plant.
@@ -81,7 +82,7 @@ pub struct Variable {
 }
 
 /// Units with their exponents of kg, m, s and rad.
-pub const UNITS: [(&str, [i32; 4]); 10] = [
+pub const UNITS: [(&str, [i32; 4]); 11] = [
     ("1", [0, 0, 0, 0]),
     ("s", [0, 0, 1, 0]),
     ("kg", [1, 0, 0, 0]),
@@ -92,6 +93,7 @@ pub const UNITS: [(&str, [i32; 4]); 10] = [
     ("rad/s", [0, 0, -1, 1]),
     ("N", [1, 1, -2, 0]),
     ("N.m", [1, 2, -2, 0]),
+    ("Pa", [1, -1, -2, 0]),
 ];
 
 /// Returns a name of a joint as a part of a structured name: quoted unless it is an identifier.
@@ -129,6 +131,8 @@ pub(crate) struct Starts<'a> {
     pub(crate) holding: &'a [f64],
     /// Whether the stepper gives accelerations.
     pub(crate) has_acceleration: bool,
+    /// Channels of gauges.
+    pub(crate) gauges: &'a [String],
 }
 
 /// Returns the variables of an arm.
@@ -176,6 +180,14 @@ pub(crate) fn variables(arm: &Arm, starts: &Starts<'_>) -> Vec<Variable> {
         }
     }
     list.tcp(starts.has_acceleration);
+    // Stress needs accelerations.
+    for (k, name) in starts.gauges.iter().enumerate().filter(|_| starts.has_acceleration) {
+        let (text, unit) = match name.ends_with("_pa") {
+            true => ("Stress below a stress point of the robot file", "Pa"),
+            false => ("Strain of a gauge of the robot file, in its direction", "1"),
+        };
+        list.add(Causality::Output, format!("gauge.{}", part(name)), text, unit, None, Meaning::Gauge(k));
+    }
     list.0
 }
 

@@ -4,7 +4,8 @@
 
 use std::path::{Path, PathBuf};
 
-use flexarm::{Command, DriveModel, LinkModel, LiveOptions, Modelling, Robot, RunOptions, Servos, Wrench};
+use flexarm::reduce::{ReduceJob, ReduceOptions, ReduceOutputs, reduce};
+use flexarm::{Command, DriveModel, LinkModel, LiveOptions, Modelling, Robot, RunOptions, Servos, Wrench, statics};
 use flexarm_fmu::{
     About, Causality, Fmi, FmuJob, Kind, Plant, PlantError, PlantSettings, description, export_fmu, open_resources,
 };
@@ -278,6 +279,26 @@ fn token_of(folder: &Path) -> String {
     rest.split_once('"').unwrap().0.to_owned()
 }
 
+/// Returns the lower arm with a stress point at its worst place, in a folder.
+fn gauged(folder: &Path) -> PathBuf {
+    let shipped = root().join("robots/lower_arm");
+    std::fs::create_dir_all(folder).unwrap();
+    for file in ["lower_arm.urdf", "lower_arm.stl", "robot.toml"] {
+        std::fs::copy(shipped.join(file), folder.join(file)).unwrap();
+    }
+    let job = ReduceJob::load(&shipped.join("lower_arm.reduce.toml")).unwrap();
+    let outputs = ReduceOutputs { flex: Some(folder.join("lower_arm.flex")), ..ReduceOutputs::default() };
+    reduce(&ReduceJob { stress: Some(true), ..job }, &ReduceOptions::default(), Some(&outputs), &mut |_| {}).unwrap();
+    let path = folder.join("robot.toml");
+    let text = std::fs::read_to_string(&path).unwrap().replace("default_trajectory", "#");
+    std::fs::write(&path, &text).unwrap();
+    let held = statics(&Robot::load(&path).unwrap(), &Modelling::default(), None, [0.0; 6]).unwrap();
+    let worst = held.stress[0].worst[0].position_m;
+    let entry = format!("\n[[stress_point]]\nname = \"worst\"\nlink = \"lower_arm\"\nat = {worst:?}\n");
+    std::fs::write(&path, text + &entry).unwrap();
+    path
+}
+
 #[test]
 fn the_resources_of_an_fmu_are_the_arm_wherever_they_are() {
     let folder = std::env::temp_dir().join(format!("flexarm fmu {}", std::process::id()));
@@ -291,6 +312,7 @@ fn the_resources_of_an_fmu_are_the_arm_wherever_they_are() {
         (robot("reference_arm"), DriveModel::Servo),
         (robot("palletiser"), DriveModel::AsFiled),
         (urdf, DriveModel::AsFiled),
+        (gauged(&folder.join("gauged")), DriveModel::AsFiled),
     ] {
         let settings = settings(LinkModel::AsFiled, drives);
         let plant = Plant::new(&path, &settings).unwrap();
@@ -304,6 +326,12 @@ fn the_resources_of_an_fmu_are_the_arm_wherever_they_are() {
         let mut again = open_resources(&own.join("resources"), &token).unwrap();
         assert_eq!(plant.variables(), again.variables());
         assert_eq!(values(&plant, &TCP), values(&again, &TCP));
+        let stress = "gauge.worst_von_mises_pa";
+        if plant.find(stress).is_some() {
+            let read = values(&plant, &[stress]);
+            assert!(read[0].abs() > 1e4 && read == values(&again, &[stress]), "{read:?}");
+        }
+        assert_eq!(plant.find(stress).is_some(), job.robot.starts_with(&folder));
         again.start(0.0).unwrap();
         again.step(0.0, 0.01).unwrap();
         let text = std::fs::read_to_string(own.join("resources/robot.toml")).unwrap();

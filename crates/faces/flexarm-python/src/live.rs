@@ -1,5 +1,6 @@
 //! An arm that is commanded while it moves.
 
+use std::collections::BTreeMap;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use flexarm::{Command, Live, LiveState};
@@ -170,6 +171,14 @@ impl PyLive {
     #[getter]
     fn tcp_acceleration<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         Self::vector(py, self.lock().tcp_acceleration().as_slice().to_vec())
+    }
+
+    /// Strain (m/m) or stress (Pa) of the gauges and stress points of the robot file, by the names of
+    /// their channels; NaN with spook.
+    #[getter]
+    fn gauges(&self) -> BTreeMap<String, f64> {
+        let mut live = self.lock();
+        live.gauge_channels().into_iter().zip(live.gauges()).collect()
     }
 
     /// TCP pose of a rigid arm with its joints at the last targets, (4, 4).

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use flexarm::reduce::{ReduceJob, ReduceOptions, ReduceOutputs, reduce};
 use flexarm::sweep::{Finders, Shard, Sweep, SweepRequest};
 use flexarm::{
-    DataTable, DataValues, LinkModel, Modelling, Motion, Robot, Run, RunOptions, Scenario, StepperKind, StepperOptions,
-    Summary, statics,
+    Command, DataTable, DataValues, LinkModel, LiveOptions, Modelling, Motion, Robot, Run, RunOptions, Scenario,
+    StepperKind, StepperOptions, Summary, statics,
 };
 use flexarm_fem::stress::{StressFields, inertia_loads, parse_stress, von_mises};
 use nalgebra::{Matrix3, Vector3};
@@ -254,6 +254,42 @@ fn a_strain_gauge_reads_hookes_law_of_the_stress_below_it_and_a_rosette_adds_up(
         assert!((link.gauges[0].highest / read[0] - 1.0).abs() < 1e-3, "{:?}", link.gauges[0]);
         assert!((link.points[0].place.von_mises_pa / read[3].abs() - 1.0).abs() < 1e-3, "{:?}", link.points[0]);
         assert_eq!(link.points[0].place.node, fields.seats[seat].node);
+    }
+}
+
+/// Truths: a run of the same motion; at rest, the strain under weight does not depend on the stiffness.
+#[test]
+fn gauges_of_a_live_arm_read_what_those_of_a_run_read() {
+    let (arm, _) = gauged("live");
+    let robot = Robot::load(&arm.folder).unwrap();
+    let swing = |t: f64| (0.3 + 0.1 * (1.0 - (4.0 * t).cos()), 0.4 * (4.0 * t).sin());
+    for (name, modelling) in models() {
+        let run = arm.record(|t| swing(t).0, 0.5, modelling);
+        let gauge = run.columns.column("gauge").unwrap();
+        let options = RunOptions { modelling, ..RunOptions::default() };
+        let flexible = robot.flexible(modelling).unwrap();
+        let mut live = flexible.live(Some(&[0.3]), 1e-3, &options).unwrap();
+        assert_eq!(live.gauge_channels(), run.columns.gauges);
+        let scale = gauge.values.iter().skip(3).step_by(6).fold(0.0_f64, |most, x| most.max(x.abs()));
+        let strain_scale = gauge.values.iter().step_by(6).fold(0.0_f64, |most, x| most.max(x.abs()));
+        let mut off = 0.0_f64;
+        let mut compare = |t: f64, read: &[f64]| {
+            let Some(row) = run.time_s().iter().position(|own| (own - t).abs() < 1e-9) else { return };
+            for (k, (own, read)) in gauge.values[6 * row..6 * row + 6].iter().zip(read).enumerate() {
+                off = off.max((own - read).abs() / if k < 3 { strain_scale } else { scale });
+            }
+        };
+        compare(0.0, &live.gauges());
+        for k in 1..=500 {
+            let (q, qdot) = swing(1e-3 * f64::from(k));
+            live.step(&Command { q: &[q], qdot: Some(&[qdot]), ..Command::default() }).unwrap();
+            compare(live.time_s(), &live.gauges());
+        }
+        let stiff = LiveOptions { stiffness: 2.0, ..LiveOptions::default() };
+        let mut stiff = flexible.live_with(Some(&[0.3]), 1e-3, &options, &stiff).unwrap();
+        let (rest, stiff) = (gauge.values[0], stiff.gauges()[0]);
+        println!("{name}: live off by {off:.1e}, twice the stiffness by {:.1e}", (stiff / rest - 1.0).abs());
+        assert!(off < 2e-3 && (stiff / rest - 1.0).abs() < 1e-4, "{name}: {off:e}, {rest} {stiff}");
     }
 }
 

@@ -21,6 +21,7 @@ use crate::arm::Arm;
 use crate::error::{Error, ValueError};
 use crate::flexible::FlexibleRobot;
 use crate::inspect::joint_values;
+use crate::monitor::stress::StressMonitor;
 use crate::options::RunOptions;
 use crate::robot::tcp_frame;
 use crate::run::link_side_angles;
@@ -144,6 +145,8 @@ pub struct Live {
     moving: (Data, State),
     /// Result of [`link_side_angles`].
     link_sides: Vec<(usize, usize, f64)>,
+    /// Stress of the links; only for a robot with gauges.
+    stress: Option<StressMonitor>,
 }
 
 impl Arm {
@@ -156,7 +159,7 @@ impl Arm {
     /// # Errors
     /// [`Error::Pose`] for joint values that do not fit, [`Error::Value`] for a step size or a
     /// period that is not positive or not a whole number of steps, [`Error::Step`] if there is no
-    /// equilibrium.
+    /// equilibrium, [`Error::File`] for damaged stress fields below gauges.
     pub fn live(&self, at: Option<&[f64]>, period_s: f64, options: &RunOptions) -> Result<Live, Error> {
         self.live_with(at, period_s, options, &LiveOptions::default())
     }
@@ -199,6 +202,14 @@ impl Arm {
             Load { body: flexible.tcp.body, X_BF: flexible.tcp.X_BF, wrench: TimedWrench::new(wrench) }
         };
         let arm = arm.with_timed_loads(vec![at_tool]).map_err(|source| Error::Step { source, partial: false })?;
+        let stress = match self.robot().gauges.is_empty() {
+            true => None,
+            false => {
+                let mut robot = self.robot().clone();
+                robot.flexible.iter_mut().for_each(|link| link.stiffness_factor *= stiffness);
+                StressMonitor::new(&robot, &flexible, &arm, self.modelling())?
+            }
+        };
         let seen = Observation::new(&arm);
         let stepper = started(&flexible, &arm, options, servos, &targets)?;
         let mut live = Live {
@@ -212,6 +223,7 @@ impl Arm {
             rigid: (Data::new(&flexible.rigid), State::zeros(&flexible.rigid)),
             moving: (Data::new(&flexible.model), State::zeros(&flexible.model)),
             link_sides: link_side_angles(self.robot(), &flexible),
+            stress,
             flexible,
             arm,
         };
@@ -479,6 +491,24 @@ impl Live {
         let (V, A) = (data.V[tcp.body].at_child(&tcp.X_BF), data.A[tcp.body].at_child(&tcp.X_BF));
         let R = self.seen.X_WB[tcp.body].rotation * tcp.X_BF.rotation;
         R * (A.linear + V.angular.cross(&V.linear)) + model.gravity
+    }
+
+    /// Returns the names of the channels of strain gauges and stress points, as in recordings; those
+    /// on links that the arm has rigid are left out.
+    pub fn gauge_channels(&self) -> Vec<String> {
+        self.stress.as_ref().map_or_else(Vec::new, StressMonitor::channels)
+    }
+
+    /// Returns the values of [`Live::gauge_channels`]: strain (m/m) or stress (Pa); NaN with a
+    /// stepper that has no accelerations.
+    pub fn gauges(&mut self) -> Vec<f64> {
+        let mut values = Vec::new();
+        if let Some(stress) = &mut self.stress {
+            stress.clear();
+            stress.update(&self.seen);
+            stress.read_gauges(&self.seen, &mut values);
+        }
+        values
     }
 
     /// Returns the TCP pose of the rigid arm with its joints at the last targets.

@@ -122,6 +122,16 @@ impl StressMonitor {
         Ok(Some(Self { links, gauges, data, state, times: Vec::new() }))
     }
 
+    /// Forgets all samples.
+    pub(crate) fn clear(&mut self) {
+        self.times.clear();
+        for link in &mut self.links {
+            link.amplitudes.clear();
+            link.poses.clear();
+            link.peaks.take();
+        }
+    }
+
     /// Adds a sample; one without accelerations is left out.
     pub(crate) fn update(&mut self, seen: &Observation) {
         if seen.qddot.iter().any(|a| a.is_nan()) {
