@@ -6,7 +6,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use flexarm::{
     DriveModel, InertiaEstimate, LinkModel, LoadOptions, Modelling, ReadOptions, RecordingFormat, STEPPERS,
-    StepperEntry,
+    StepperEntry, sweep::Change,
 };
 
 use crate::failure::Failure;
@@ -146,6 +146,11 @@ pub(crate) struct RunArgs {
     /// File with loads and payload changes during the run (.toml; flexarm format loads)
     #[arg(long, help_heading = "Models", value_name = "FILE")]
     pub(crate) loads: Option<PathBuf>,
+    /// Change an entry of the robot file for this run, payload.mass=150 or
+    /// 'drive.*.gearbox.stiffness*=0.5' (a factor), or the speed of the motion, motion.speed=0.8;
+    /// paths as in studies (may be repeated)
+    #[arg(long, help_heading = "Models", value_name = "PATH=VALUE")]
+    pub(crate) set: Vec<Change>,
     /// Logged samples per second
     #[arg(
         long,

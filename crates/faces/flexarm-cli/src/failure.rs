@@ -12,8 +12,8 @@ use crate::print::complaint;
 pub(crate) enum Failure {
     /// Inconsistent command-line arguments.
     Usage(String),
-    /// Inconsistent arguments of one run of a study.
-    InStudy { label: String, source: Box<Failure> },
+    /// An error of one run of a study, or of a robot with changed entries.
+    In { context: String, source: Box<Failure> },
     /// An error of the library.
     Library(flexarm::Error),
     /// An error of the case studies.
@@ -56,7 +56,7 @@ impl std::fmt::Display for Failure {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Usage(text) => f.write_str(text),
-            Self::InStudy { label, source } => write!(f, "run {label:?} of the study: {source}"),
+            Self::In { context, source } => write!(f, "{context}: {source}"),
             Self::Library(error) => error.fmt(f),
             Self::Verify(error) => error.fmt(f),
             Self::Plant(error) => error.fmt(f),
@@ -68,7 +68,7 @@ impl std::error::Error for Failure {
     fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
         match self {
             Self::Usage(_) => None,
-            Self::InStudy { source, .. } => Some(source),
+            Self::In { source, .. } => Some(source),
             Self::Library(error) => error.source(),
             Self::Verify(error) => error.source(),
             Self::Plant(error) => error.source(),
@@ -81,7 +81,7 @@ impl Failure {
     pub(crate) fn exit_code(&self) -> ExitCode {
         let fault = match self {
             Self::Usage(_) => Fault::Input,
-            Self::InStudy { source, .. } => return source.exit_code(),
+            Self::In { source, .. } => return source.exit_code(),
             Self::Library(error) => error.fault(),
             Self::Verify(error) => error.fault(),
             Self::Plant(_) => Fault::Input,
@@ -112,7 +112,7 @@ impl Failure {
     /// Returns the format page for a file that is malformed.
     fn page(&self) -> Option<&'static str> {
         match self {
-            Self::InStudy { source, .. } => source.page(),
+            Self::In { source, .. } => source.page(),
             Self::Library(error) => page_of(error),
             Self::Usage(_) | Self::Verify(_) | Self::Plant(_) => None,
         }

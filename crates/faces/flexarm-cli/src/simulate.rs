@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use flexarm::{
     AlphaSettings, Arm, ConstraintForm, FlexibleRobot, Keep, Modelling, ReferenceMethod, ReferenceSettings, Robot,
-    RunOptions, RunRequest, Scenario, SpookPreset, SpookSettings, Start, StepperOptions, Variant,
+    RunOptions, RunRequest, Scenario, SpookPreset, SpookSettings, Start, StepperOptions, Variant, sweep::Change,
 };
 
 use crate::args::{FormName, MethodName, PresetName, RunArgs, StartName};
@@ -28,10 +28,10 @@ pub(crate) fn run(
     let variants = parts.iter().map(|part| {
         variant(part.label.clone(), &part.args, with_twin).map_err(|error| match parts.len() {
             1 => error,
-            _ => Failure::InStudy { label: part.label.clone(), source: Box::new(error) },
+            _ => Failure::In { context: format!("run {:?} of the study", part.label), source: Box::new(error) },
         })
     });
-    let (variants, mut as_filed): (Vec<Variant>, Vec<FlexibleRobot>) =
+    let (variants, mut as_filed): (Vec<Variant>, Vec<Option<FlexibleRobot>>) =
         variants.collect::<Result<Vec<_>, Failure>>()?.into_iter().unzip();
     let Some(Variant { robot, scenario, options, .. }) = variants.first() else {
         return Err(Failure::Usage("there is nothing to run".into()));
@@ -46,7 +46,7 @@ pub(crate) fn run(
         bar.show(t, total);
         stop()
     };
-    let as_filed = as_filed.pop().filter(|_| options.modelling == Modelling::default());
+    let as_filed = as_filed.pop().flatten().filter(|_| options.modelling == Modelling::default());
     let result = if variants.len() == 1 {
         let arm = match as_filed {
             Some(flexible) => Ok(Arm::new(robot.clone(), options.modelling, flexible)),
@@ -68,9 +68,21 @@ pub(crate) fn run(
     Ok(ExitCode::SUCCESS)
 }
 
-/// Returns robot, motion and options of a run, and the robot modelled as its file specifies.
-fn variant(label: String, args: &RunArgs, with_twin: bool) -> Result<(Variant, FlexibleRobot), Failure> {
-    let (robot, as_filed) = Robot::load_modelled(&shipped::robot(args.robot.as_deref())?, &args.load.options()?)?;
+/// Returns robot, motion and options of a run, and the robot modelled as its file specifies, if
+/// that is known.
+fn variant(label: String, args: &RunArgs, with_twin: bool) -> Result<(Variant, Option<FlexibleRobot>), Failure> {
+    let path = shipped::robot(args.robot.as_deref())?;
+    let (robot, as_filed, speed) = if args.set.is_empty() {
+        let (robot, as_filed) = Robot::load_modelled(&path, &args.load.options()?)?;
+        (robot, Some(as_filed), 1.0)
+    } else {
+        let changed = flexarm::sweep::load_changed(&path, &args.load.options()?, &args.set);
+        let (robot, speed) = changed.map_err(|error| Failure::In {
+            context: format!("with {}", args.set.iter().map(Change::to_string).collect::<Vec<_>>().join(", ")),
+            source: Box::new(error.into()),
+        })?;
+        (robot, None, speed)
+    };
     let trajectory = match (&args.trajectory, &robot.default_trajectory) {
         (Some(given), _) => shipped::trajectory(given)?,
         (None, Some(own)) => own.clone(),
@@ -91,6 +103,7 @@ fn variant(label: String, args: &RunArgs, with_twin: bool) -> Result<(Variant, F
         Some(seconds) => motion.with_rounded_corners(seconds, &*robot.rigid_model()?)?,
         None => motion,
     };
+    let motion = if speed == 1.0 { motion } else { motion.scaled(1.0 / speed, &*robot.rigid_model()?)? };
     let start = if args.from_rest == StartName::Equilibrium { Start::Equilibrium } else { Start::Undeformed };
     let scenario = Scenario::new(motion).with_start(start);
     let scenario = args.loads.iter().try_fold(scenario, |scenario, path| scenario.with_loads_file(path))?;

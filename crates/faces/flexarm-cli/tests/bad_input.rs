@@ -127,7 +127,7 @@ mod missing {
         let place = Place::new();
         place.refused(&["simulate"], &["simulate"]);
         place.refused(&["inspect"], &["<ROBOT>"]);
-        place.refused(&["compare", "robot.toml", "swing.toml", "--setp", "1e-3"], &["--setp", "--step"]);
+        place.refused(&["compare", "robot.toml", "swing.toml", "--stp", "1e-3"], &["--stp", "--step"]);
     }
 }
 

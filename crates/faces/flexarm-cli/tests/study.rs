@@ -1,6 +1,6 @@
 //! Several runs side by side: `compare --with`.
 
-use crate::common::{Place, Table};
+use crate::common::{self, Place, Table};
 use serde_json::Value;
 
 const COMPARE: [&str; 5] = ["compare", "robot.toml", "swing.toml", "-o", "result"];
@@ -27,6 +27,39 @@ fn every_run_of_a_study_is_the_run_that_stands_alone() {
         assert_eq!(run["tcp"], alone["tcp"]);
         assert_eq!(run["frequencies_hz"], alone["frequencies_hz"]);
     }
+}
+
+/// Truth: the files changed by hand.
+#[test]
+fn a_run_with_changed_entries_is_the_run_of_files_changed_by_hand() {
+    let place = Place::new();
+    let changed = common::with(common::ROBOT, "height = 0.04", "height = 0.05");
+    place.write("changed/robot.toml", changed.replace("beam.urdf", "../beam.urdf"));
+    let slower = common::SWING.replace("duration = 0.5", "duration = 1.0").replace("hold = 0.5", "hold = 1.0");
+    place.write("slower.toml", slower);
+    let by_hand = place.json(&["compare", "changed", "slower.toml", "--no-files"]);
+    let set = ["--set", "link.bar.beam.height=0.05", "--set", "motion.speed=0.5"];
+    let by_flag = place.json(&[&["compare", ".", "swing.toml", "--no-files"][..], &set].concat());
+    for (key, bound) in [("peak_m", 1e-9), ("rms_m", 1e-9)] {
+        let [a, b] = [&by_hand, &by_flag].map(|run| number(&run["tcp"][key]));
+        assert!((a / b - 1.0).abs() < bound, "{key}: {a} by hand, {b} by flag"); // measured 0
+    }
+    let factor = ["compare", "robot.toml", "swing.toml", "--no-files", "--set", "link.bar.beam.height *= 1.25"];
+    assert_eq!(place.json(&factor)["frequencies_hz"], by_hand["frequencies_hz"]);
+    let both = ["compare", "robot.toml", "slower.toml", "--no-files", "--with", "set=link.bar.beam.height=0.05"];
+    assert_eq!(place.json(&both)["with"][0]["tcp"], by_hand["tcp"]);
+
+    let refused = |change: &str, words: &[&str]| {
+        place.refused(&["compare", "robot.toml", "swing.toml", "--no-files", "--set", change], words);
+    };
+    refused("link.bar.beam.heigth=1", &["robot.toml", "unknown field `heigth`", "`height`"]);
+    refused("link.bor.beam.height=1", &["robot.toml", "matches no entry", "link.bar.beam.height"]);
+    refused("gravity=down", &["with gravity=down: robot.toml:", "expected an array"]);
+    refused("motion.speed=-1", &["--set", "expected a positive number"]);
+    place.refused(
+        &["compare", "beam.urdf", "swing.toml", "--set", "payload.mass=1"],
+        &["beam.urdf", "not a robot file"],
+    );
 }
 
 /// Truth: the columns of the two tables.

@@ -11,6 +11,7 @@
 #![allow(non_snake_case, reason = "monogram notation: X_WL, K_S; see docs/references.md")]
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
+mod changes;
 mod design;
 mod direction;
 mod error;
@@ -38,9 +39,10 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use flexarm_log::CreateOptions;
+use flexarm_run::Stopwatch;
 
 use self::design::{Column, Design};
 use self::evaluate::Answer;
@@ -59,6 +61,7 @@ use flexarm_run::TcpFigures;
 use flexarm_run::summary::DriveFigures;
 use flexarm_run::{LinkStressFigures, StrainGaugeFigures, StressPlaceFigures, StressPointFigures};
 
+pub use self::changes::{Change, load_changed};
 pub use self::direction::Better;
 pub use self::error::SweepError;
 pub use self::file::Role as ParameterRole;
@@ -215,7 +218,7 @@ impl Sweep {
     /// [`SweepError`] for a folder of another study or another process at the same shard,
     /// [`SweepError::Stopped`] if `progress` breaks; [`Error::Write`]. Finished runs are kept.
     pub fn run(&mut self, request: &SweepRequest, progress: &mut SweepProgress<'_>) -> Result<SweepSummary, Error> {
-        let (started, cpu) = (Instant::now(), cpu_time::ProcessTime::now());
+        let stopwatch = Stopwatch::start();
         let SweepRequest { output, shard, .. } = request;
         let runs = self.runs();
         if shard.number == 0 || shard.number > shard.of || shard.of > runs {
@@ -247,16 +250,15 @@ impl Sweep {
             let done = collected.answers.len();
             return Err(SweepError::Stopped { done, runs, folder: output.clone() }.into());
         }
-        let spent = || (started.elapsed().as_secs_f64(), cpu.elapsed().as_secs_f64());
         if *shard != Shard::ALL {
             let (summary, _) = self.summary(&collected);
-            let (wall_s, cpu_s) = spent();
+            let (wall_s, cpu_s) = (stopwatch.wall_s(), stopwatch.cpu_s());
             let shard = Some(format!("{}/{}", shard.number, shard.of));
             return Ok(SweepSummary { shard, wall_s, cpu_s, file: output.display().to_string(), ..summary });
         }
         let path = self.write_all_runs(&collected, &manifest, output)?;
         store.remove_parts();
-        self.finish(&collected, &path, output, request.command, &spent)
+        self.finish(&collected, &path, output, request.command, stopwatch)
     }
 
     /// Writes summary, page and the best run of a complete study.
@@ -266,7 +268,7 @@ impl Sweep {
         table: &Path,
         folder: &Path,
         command: Option<fn(&Replay) -> String>,
-        spent: &dyn Fn() -> (f64, f64),
+        stopwatch: Stopwatch,
     ) -> Result<SweepSummary, Error> {
         let (mut summary, columns) = self.summary(collected);
         if let Some(best) = &mut summary.best {
@@ -277,7 +279,7 @@ impl Sweep {
         summary.file = table.display().to_string();
         let page = folder.join(PAGE);
         summary.page = Some(page.display().to_string());
-        (summary.wall_s, summary.cpu_s) = spent();
+        (summary.wall_s, summary.cpu_s) = (stopwatch.wall_s(), stopwatch.cpu_s());
         let json = serde_json::to_string_pretty(&summary).expect("plain numbers and strings") + "\n";
         flexarm_files::write_all(&[(page, self.page(&summary, &columns)), (folder.join("sweep.json"), json)])?;
         Ok(summary)
@@ -388,7 +390,7 @@ pub fn merge(
     overwrite: bool,
     command: Option<fn(&Replay) -> String>,
 ) -> Result<SweepSummary, Error> {
-    let (started, cpu) = (Instant::now(), cpu_time::ProcessTime::now());
+    let stopwatch = Stopwatch::start();
     let manifest = study.manifest();
     let mut collected = Collected::default();
     let mut first: Option<&PathBuf> = None;
@@ -412,7 +414,7 @@ pub fn merge(
         let text = serde_json::to_string_pretty(&manifest).expect("plain numbers and strings") + "\n";
         flexarm_files::write_all(&[(output.join(store::STUDY), text)])?;
     }
-    study.finish(&collected, &path, output, command, &|| (started.elapsed().as_secs_f64(), cpu.elapsed().as_secs_f64()))
+    study.finish(&collected, &path, output, command, stopwatch)
 }
 
 /// Writes files prepared in memory.

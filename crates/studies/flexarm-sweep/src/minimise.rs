@@ -12,10 +12,10 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
-use std::time::Instant;
 
 use crate::statistics::{LeastSearch, SearchResult};
 use flexarm_log::CreateOptions;
+use flexarm_run::Stopwatch;
 use serde::{Deserialize, Serialize};
 
 use super::direction::Better;
@@ -174,7 +174,7 @@ impl Sweep {
         search: &MinimiseRequest,
         progress: &mut SweepProgress<'_>,
     ) -> Result<SweepSummary, Error> {
-        let (started, cpu) = (Instant::now(), cpu_time::ProcessTime::now());
+        let stopwatch = Stopwatch::start();
         let goal = self.aim(search)?;
         let varied = self.varied()?;
         let entry = self.file.minimise.as_ref();
@@ -205,8 +205,7 @@ impl Sweep {
         }
         figures.generations = figures.progress.len();
         figures.settled = least.is_settled();
-        let spent = || (started.elapsed().as_secs_f64(), cpu.elapsed().as_secs_f64());
-        self.search_summary(&tried, goal, figures, &manifest, request, &spent)
+        self.search_summary(&tried, goal, figures, &manifest, request, stopwatch)
     }
 
     /// Adds the constraints of the request; returns the index of the metric to minimise.
@@ -377,7 +376,7 @@ impl Sweep {
         figures: MinimiseFigures,
         manifest: &Manifest,
         request: &SweepRequest,
-        spent: &dyn Fn() -> (f64, f64),
+        stopwatch: Stopwatch,
     ) -> Result<SweepSummary, Error> {
         let folder = &request.output;
         let answer = |(run, outcome): (usize, &Outcome)| Answer {
@@ -411,7 +410,7 @@ impl Sweep {
         summary.file = path.display().to_string();
         let page = folder.join(PAGE);
         summary.page = Some(page.display().to_string());
-        (summary.wall_s, summary.cpu_s) = spent();
+        (summary.wall_s, summary.cpu_s) = (stopwatch.wall_s(), stopwatch.cpu_s());
         let json = serde_json::to_string_pretty(&summary).expect("plain numbers and strings") + "\n";
         flexarm_files::write_all(&[(page, self.page(&summary, &columns)), (folder.join("sweep.json"), json)])?;
         Ok(summary)

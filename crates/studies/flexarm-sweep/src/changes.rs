@@ -1,0 +1,149 @@
+//! Changes of a robot file and of the speed of its motion for a single run, with the paths of
+//! studies.
+
+use std::fmt;
+use std::path::Path;
+use std::str::FromStr;
+
+use toml_edit::DocumentMut;
+
+use super::error::SweepError;
+use super::file::Role;
+use super::target::{Target, TargetFile, edits};
+use super::value::ParameterValue;
+use flexarm_run::{Error, LoadOptions, Robot};
+
+/// A change: `payload.mass=150` replaces a value, `drive.*.gearbox.stiffness*=0.5` multiplies it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Change {
+    path: String,
+    target: Target,
+    role: Role,
+    value: ParameterValue,
+}
+
+impl FromStr for Change {
+    type Err = SweepError;
+
+    fn from_str(text: &str) -> Result<Self, SweepError> {
+        let failed = |what: String| SweepError::Run(what);
+        let (path, value) = text.split_once('=').ok_or_else(|| {
+            failed("expected PATH=VALUE or PATH*=FACTOR, such as payload.mass=150 or motion.speed=0.8".into())
+        })?;
+        let (path, role) = match path.trim().strip_suffix('*') {
+            // "drive.*" ends with a segment, not with an operator.
+            Some(path) if !path.ends_with('.') => (path, Role::Factor),
+            _ => (path, Role::Value),
+        };
+        let (path, value) = (path.trim().to_owned(), value.trim());
+        let value = match (value.parse::<i64>(), value.parse::<f64>(), value.parse::<bool>()) {
+            (Ok(n), ..) => ParameterValue::Whole(n),
+            (_, Ok(x), _) if x.is_finite() => ParameterValue::Number(x),
+            (_, Ok(_), _) => return Err(failed(format!("{path}: {value} is not a finite number"))),
+            (.., Ok(truth)) => ParameterValue::Truth(truth),
+            _ => ParameterValue::Text(value.to_owned()),
+        };
+        let target = Target::parse(&path, &[]).map_err(failed)?;
+        match &target {
+            Target::Speed if !value.number().is_some_and(|x| x > 0.0) => {
+                Err(failed(format!("{path} is {value}, expected a positive number")))
+            }
+            Target::Speed | Target::Entry(TargetFile::Robot, _) => Ok(Self { path, target, role, value }),
+            _ => Err(failed(format!("{path}: only entries of the robot file and motion.speed can be changed here"))),
+        }
+    }
+}
+
+impl fmt::Display for Change {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let sign = if self.role == Role::Factor { "*=" } else { "=" };
+        write!(f, "{}{sign}{}", self.path, self.value)
+    }
+}
+
+/// Loads the robot file at `path`, or in that folder, with changes applied in their order. Returns
+/// the robot and the speed of the motion relative to its file. No file is written.
+///
+/// # Errors
+/// [`SweepError::Run`] for a path without a match, with similar paths, for a factor of a value that
+/// is not a number, and if `path` is not a robot file; otherwise as [`Robot::load`].
+pub fn load_changed(path: &Path, options: &LoadOptions, changes: &[Change]) -> Result<(Robot, f64), Error> {
+    let path = if path.is_dir() { path.join("robot.toml") } else { path.to_owned() };
+    if path.extension().is_none_or(|ending| ending != "toml") {
+        let what = "not a robot file, so it has no entries to change: write a robot.toml that names it";
+        return Err(SweepError::Run(format!("{}: {what}", path.display())).into());
+    }
+    let (text, speed) = change_text(&path, &flexarm_files::read_text(&path)?, changes)?;
+    Ok((Robot::from_toml(&text, &path, options)?, speed))
+}
+
+/// Returns the changed text of a robot file, and the speed of the motion.
+fn change_text(path: &Path, text: &str, changes: &[Change]) -> Result<(String, f64), Error> {
+    let (mut text, mut speed) = (text.to_owned(), 1.0);
+    for change in changes {
+        let Target::Entry(_, place) = &change.target else {
+            let x = change.value.number().unwrap_or(1.0);
+            speed = if change.role == Role::Factor { speed * x } else { x };
+            continue;
+        };
+        // A file that is not TOML is reported, with its place, by the reader of robot files.
+        let (Ok(root), Ok(mut document)) = (toml::from_str(&text), text.parse::<DocumentMut>()) else { break };
+        let edits = edits(&root, place, &change.path, change.role, &change.value, &[]);
+        for edit in edits.map_err(|what| SweepError::Run(format!("{}: {what}", path.display())))? {
+            edit.place.put(&mut document, edit.value);
+        }
+        text = document.to_string();
+    }
+    Ok((text, speed))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FILE: &str = "payload = { mass = 5.0 } # carried\n[[drive]]\njoint = \"a\"\ngearbox = { stiffness = 2 }\n\
+                        [[drive]]\njoint = \"b\"\ngearbox = { stiffness = [1.0, 3.0] }\n";
+
+    fn changed(changes: &[&str]) -> Result<(String, f64), String> {
+        let changes: Result<Vec<Change>, SweepError> = changes.iter().map(|text| text.parse()).collect();
+        let changes = changes.map_err(|error| error.to_string())?;
+        change_text(Path::new("robot.toml"), FILE, &changes).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn changes_replace_and_multiply_values_one_after_the_other_and_keep_the_comments() {
+        let (text, speed) = changed(&[
+            "payload.mass=7.5",
+            "drive.*.gearbox.stiffness *= 0.5",
+            "drive.a.gearbox.stiffness*=4",
+            "motion.speed=0.8",
+            "motion.speed*=0.5",
+        ])
+        .unwrap();
+        let expected = FILE
+            .replace("mass = 5.0", "mass = 7.5")
+            .replace("stiffness = 2 ", "stiffness = 4.0 ")
+            .replace("[1.0, 3.0]", "[0.5, 1.5]");
+        assert_eq!((text, speed), (expected, 0.4));
+    }
+
+    #[test]
+    fn a_change_that_matches_nothing_names_what_is_similar() {
+        let message = changed(&["drive.c.gearbox.stiffness=1"]).unwrap_err();
+        assert!(
+            message.starts_with("robot.toml: \"drive.c.gearbox.stiffness\" matches no entry; did you mean"),
+            "{message}"
+        );
+        for (wrong, part) in [
+            ("payload.mass", "expected PATH=VALUE"),
+            ("motion.speed=0", "expected a positive number"),
+            ("motion.speed=fast", "expected a positive number"),
+            ("payload.mass=nan", "not a finite number"),
+            ("options.step=1e-4", "only entries of the robot file"),
+            ("drive.*.gearbox*=hard", "must be a number"),
+        ] {
+            let message = changed(&[wrong]).unwrap_err();
+            assert!(message.contains(part), "{wrong}: {message}");
+        }
+    }
+}
