@@ -1,5 +1,5 @@
-//! Copies the data of the wheel (robots, trajectories and licences) to where maturin finds it, and
-//! sets the linker flags of extension modules.
+//! Copies the data of the wheel (robots, trajectories, licences, the web page if it is built) to where
+//! maturin finds it, and sets the linker flags of extension modules.
 
 use std::path::Path;
 use std::{env, fs, io};
@@ -15,18 +15,29 @@ fn main() -> io::Result<()> {
         println!("cargo::rerun-if-changed={}", root.join(folder).display());
         copy(&root.join(folder), &share.join(folder))?;
     }
+    let page = root.join("web/dist");
+    println!("cargo::rerun-if-changed={}", page.display());
+    if page.join("flexarm.wasm").exists() {
+        copy(&page, &share.join("web"))?;
+    }
     for licence in ["LICENSE-APACHE", "LICENSE-MIT"] {
         fs::copy(root.join(licence), share.join(licence))?;
     }
     Ok(())
 }
 
+fn is_rerun_viewer(name: &str) -> bool {
+    name == "rerun.html" || name.starts_with("re_viewer") || name.starts_with("rerun-")
+}
+
 fn copy(from: &Path, to: &Path) -> io::Result<()> {
     fs::create_dir_all(to)?;
     for entry in fs::read_dir(from)? {
         let entry = entry?;
-        // Meshes of links that are already reduced are available only with the sources.
-        if from.ends_with("fe") && entry.file_name().to_string_lossy().ends_with(".msh.gz") {
+        let name = entry.file_name().to_string_lossy().into_owned();
+        // Meshes of links that are already reduced are available only with the sources, and the viewer
+        // of Rerun, which is as large as all else, with rerun-sdk.
+        if from.ends_with("fe") && name.ends_with(".msh.gz") || is_rerun_viewer(&name) {
             continue;
         }
         let to = to.join(entry.file_name());

@@ -21,13 +21,14 @@ use crate::posed_args::{ModesArgs, ResponseArgs, StaticsArgs};
 use crate::reduce_args::ReduceArgs;
 use crate::report::ReportArgs;
 use crate::sensitivity::SensitivityArgs;
+use crate::serve::ServeArgs;
 use crate::sweep::SweepArgs;
 use crate::terminal::{Terminal, answer, to_json, written};
 use crate::verify::VerifyArgs;
 use crate::view::ViewArgs;
 use crate::{
     compensate, convert, exchange, fmu, formats, identify, inspect, lobes, map, motion, new, posed, reduce, report,
-    sensitivity, simulate, sweep, verify, view,
+    sensitivity, serve, simulate, sweep, verify, view,
 };
 
 /// Help of the program without a command; a line for every command.
@@ -47,6 +48,7 @@ Runs:
   report       Write the HTML report of recorded runs
   convert      Write a recording in another format
   view         Open a recording in the Rerun viewer
+  serve        Open the web page on which the program runs
 
 Robots and motions:
   new          Create a robot file, a motion and a first run from a URDF
@@ -154,6 +156,8 @@ pub(crate) enum Command {
     Verify(Later<VerifyArgs>),
     /// Open a recording in the Rerun viewer
     View(Later<ViewArgs>),
+    /// Open the web page on which the program runs, from a server on this machine alone
+    Serve(ServeArgs),
     /// Print the page of a file format: keys, units, defaults, examples
     Format {
         /// Format to describe
@@ -198,6 +202,7 @@ pub(crate) fn run(cli: &Cli, line: &[OsString]) -> Result<ExitCode, Failure> {
         Command::ExportFmu(args) => fmu::run(terminal, args),
         Command::Verify(args) => verify::run(terminal, args),
         Command::View(args) => view::run(terminal, args),
+        Command::Serve(args) => serve::run(terminal, args),
         Command::Format { page } => {
             answer(terminal, || to_json(&serde_json::json!({ "page": page.text() })), || page.text().to_owned());
             Ok(ExitCode::SUCCESS)

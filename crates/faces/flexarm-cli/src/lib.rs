@@ -29,6 +29,7 @@ mod reduce;
 mod reduce_args;
 mod report;
 mod sensitivity;
+mod serve;
 mod shipped;
 mod signals;
 mod simulate;

@@ -90,6 +90,18 @@ pub(crate) fn tool(given: &Path) -> Result<PathBuf, Error> {
     known(given, path, "tool", "give a .toml file", || names("robots/tools", |path| has_ending(path, &["toml"])))
 }
 
+/// Returns the folder of the built web page.
+///
+/// # Errors
+/// [`Error::File`] if this installation has none.
+pub(crate) fn web_page() -> Result<PathBuf, Error> {
+    let built = roots().into_iter().flat_map(|root| [root.join("web"), root.join("web/dist")]);
+    built.into_iter().find(|folder| folder.join("flexarm.wasm").is_file()).ok_or_else(|| Error::File {
+        path: PathBuf::from("web/dist"),
+        what: "there is no built web page; `python3 tools/build_web.py` in the sources builds it".into(),
+    })
+}
+
 fn has_ending(path: &Path, endings: &[&str]) -> bool {
     path.extension().is_some_and(|ending| endings.iter().any(|e| ending == *e))
 }

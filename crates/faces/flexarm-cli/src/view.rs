@@ -1,5 +1,6 @@
 //! `flexarm view`: finds the Rerun viewer and opens a recording in it.
 
+use std::ffi::OsStr;
 use std::fmt::Write as _;
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -188,23 +189,28 @@ fn last_lines(text: &str) -> String {
 /// Opens a report in the browser; if none can be started, prints which file to open.
 fn browse(terminal: &Terminal, file: &Path) -> ExitCode {
     let path = file.canonicalize().unwrap_or_else(|_| file.to_owned());
-    let mut opener = Command::new("xdg-open");
-    opener.arg(&path).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
-    detach(&mut opener);
-    let started = opener.spawn().ok().filter(|_| cfg!(target_os = "linux"));
-    let pid = started.as_ref().map(Child::id);
-    let opened = started.is_some_and(|mut child| !matches!(watch(&mut child), Some(Err(_))));
+    let pid = open_in_browser(path.as_os_str());
     let json = || {
-        let viewer = opened.then_some("xdg-open");
+        let viewer = pid.map(|_| "xdg-open");
         to_json(&serde_json::json!({
-            "file": file.display().to_string(), "viewer": viewer, "version": null, "pid": pid.filter(|_| opened),
+            "file": file.display().to_string(), "viewer": viewer, "version": null, "pid": pid,
         }))
     };
-    answer(terminal, json, || match opened {
-        true => format!("{}: opened with xdg-open\n", file.display()),
-        false => format!("{}: a report for a browser; open file://{}\n", file.display(), path.display()),
+    answer(terminal, json, || match pid {
+        Some(_) => format!("{}: opened with xdg-open\n", file.display()),
+        None => format!("{}: a report for a browser; open file://{}\n", file.display(), path.display()),
     });
     ExitCode::SUCCESS
+}
+
+/// Opens a file or an address in the browser; returns the process id of the opener if it started.
+pub(crate) fn open_in_browser(target: &OsStr) -> Option<u32> {
+    let mut opener = Command::new("xdg-open");
+    opener.arg(target).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+    detach(&mut opener);
+    let mut child = opener.spawn().ok().filter(|_| cfg!(target_os = "linux"))?;
+    let opened = !matches!(watch(&mut child), Some(Err(_)));
+    opened.then(|| child.id())
 }
 
 fn failed(message: &str) -> ExitCode {

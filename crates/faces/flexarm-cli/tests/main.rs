@@ -25,6 +25,7 @@ mod reduce;
 mod report_again;
 mod robots;
 mod runs;
+mod serve;
 mod study;
 #[cfg(feature = "parquet")]
 mod sweep;

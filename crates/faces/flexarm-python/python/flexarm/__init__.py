@@ -55,6 +55,7 @@ from ._flexarm import (
     sweep,
 )
 from ._build import RobotBuilder
+from ._web import WebPage, web
 from .errors import (
     Caveat,
     CompensateError,
@@ -120,6 +121,7 @@ __all__ = [
     "StepError",
     "Stopped",
     "UrdfError",
+    "WebPage",
     "WriteError",
     "__version__",
     "check",
@@ -136,6 +138,7 @@ __all__ = [
     "robot",
     "sensitivity",
     "sweep",
+    "web",
 ]
 
 #: Robots and motions included in the package.

@@ -1,0 +1,82 @@
+//! `flexarm serve`: which files the server on the loopback interface gives, and how.
+
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::TcpStream;
+use std::process::{Child, Stdio};
+
+use crate::common::Place;
+
+/// A running server, stopped when dropped.
+struct Server {
+    process: Child,
+    address: String,
+}
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        self.process.kill().unwrap();
+        self.process.wait().unwrap();
+    }
+}
+
+impl Server {
+    fn start(place: &Place) -> Self {
+        let mut process = place
+            .command(&["serve", "--no-open", "--json"])
+            .stdout(Stdio::piped())
+            .spawn()
+            .expect("the program starts");
+        let mut line = String::new();
+        BufReader::new(process.stdout.take().unwrap()).read_line(&mut line).unwrap();
+        let said: serde_json::Value = serde_json::from_str(&line).unwrap();
+        let url = said["url"].as_str().unwrap();
+        let address = url.strip_prefix("http://").and_then(|rest| rest.strip_suffix('/')).unwrap().to_owned();
+        assert_eq!(said["folder"], "./web");
+        Self { process, address }
+    }
+
+    /// Returns the head and the body of the answer.
+    fn ask(&self, method: &str, path: &str) -> (String, String) {
+        let mut stream = TcpStream::connect(&self.address).unwrap();
+        write!(stream, "{method} {path} HTTP/1.1\r\nHost: {}\r\nConnection: close\r\n\r\n", self.address).unwrap();
+        let mut text = String::new();
+        stream.read_to_string(&mut text).unwrap();
+        let (head, body) = text.split_once("\r\n\r\n").unwrap();
+        (head.to_owned(), body.to_owned())
+    }
+}
+
+#[test]
+fn the_page_is_served_on_the_loopback_interface_and_nothing_beside_it() {
+    let place = Place::new();
+    std::fs::create_dir_all(place.path("web/assets")).unwrap();
+    for (name, text) in [("index.html", "the page"), ("flexarm.wasm", "module"), ("assets/main.js", "script")] {
+        place.write(&format!("web/{name}"), text);
+    }
+    let server = Server::start(&place);
+    assert!(server.address.starts_with("127.0.0.1:"), "{}", server.address);
+    for (path, kind, body) in [
+        ("/", "text/html", "the page"),
+        ("/flexarm.wasm?v=2", "application/wasm", "module"),
+        ("/assets/main.js", "text/javascript", "script"),
+    ] {
+        let (head, got) = server.ask("GET", path);
+        assert!(head.starts_with("HTTP/1.1 200") && head.contains(&format!("Content-Type: {kind}")), "{head}");
+        assert_eq!(got, body);
+    }
+    assert_eq!(server.ask("HEAD", "/").1, "");
+    for missing in ["/../robot.toml", "/assets/../../robot.toml", "/assets", "/none"] {
+        assert!(server.ask("GET", missing).0.starts_with("HTTP/1.1 404"), "{missing}");
+    }
+    assert!(server.ask("POST", "/").0.starts_with("HTTP/1.1 405"));
+}
+
+#[test]
+fn a_port_in_use_gets_a_message_with_the_remedy() {
+    let place = Place::new();
+    std::fs::create_dir(place.path("web")).unwrap();
+    place.write("web/flexarm.wasm", "module");
+    let server = Server::start(&place);
+    let (_, port) = server.address.split_once(':').unwrap();
+    place.refused(&["serve", "--no-open", "--port", port], &[port, "in use", "without --port"]);
+}
