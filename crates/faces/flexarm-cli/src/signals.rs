@@ -11,8 +11,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
+#[cfg(not(target_family = "wasm"))]
 use signal_hook::consts::{SIGINT, SIGTERM};
-use signal_hook::flag;
 
 /// Must be called first. A file that reaches its size limit (`ulimit -f`) then gives a write error,
 /// which names the file, instead of a signal that kills the program.
@@ -20,7 +20,7 @@ pub(crate) fn turn_into_errors() {
     #[cfg(unix)]
     {
         // The flag is not used: a signal with a handler does not kill the process.
-        let _ = flag::register(signal_hook::consts::SIGXFSZ, Arc::default());
+        set_on(signal_hook::consts::SIGXFSZ, &Arc::default());
     }
 }
 
@@ -32,7 +32,7 @@ pub(crate) fn stop_when_asked() -> impl FnMut() -> ControlFlow<()> {
     move || {
         if !std::mem::replace(&mut armed, true) {
             for signal in signals() {
-                let _ = flag::register(signal, asked.clone()); // without a handler the signal stays what it is
+                set_on(signal, &asked);
             }
         }
         if asked.load(Ordering::SeqCst) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
@@ -72,7 +72,7 @@ pub(crate) fn end_if_not_stopped(last_words: impl Fn() -> ExitCode + Send + 'sta
     let watched = over.clone();
     let mut asked = stop_when_asked();
     let _ = asked(); // from here on
-    std::thread::spawn(move || {
+    let watching = std::thread::Builder::new().spawn(move || {
         while asked().is_continue() {
             if watched.load(Ordering::SeqCst) {
                 return;
@@ -85,10 +85,27 @@ pub(crate) fn end_if_not_stopped(last_words: impl Fn() -> ExitCode + Send + 'sta
             std::process::exit(i32::from(code != ExitCode::SUCCESS));
         }
     });
+    drop(watching); // without threads, nothing is watched
     Watch(over)
 }
 
+/// Lets a signal set a flag. Without a handler the signal keeps its default effect.
+#[cfg(not(target_family = "wasm"))]
+fn set_on(signal: i32, flag: &Arc<AtomicBool>) {
+    let _ = signal_hook::flag::register(signal, flag.clone());
+}
+
+/// There are no signals.
+#[cfg(target_family = "wasm")]
+fn set_on(_: i32, _: &Arc<AtomicBool>) {}
+
+#[cfg(target_family = "wasm")]
+fn signals() -> Vec<i32> {
+    Vec::new()
+}
+
 /// Ctrl-C, SIGTERM and a closed terminal, unless they are ignored.
+#[cfg(not(target_family = "wasm"))]
 fn signals() -> Vec<i32> {
     #[cfg(target_os = "linux")]
     let known = vec![SIGINT, SIGTERM, signal_hook::consts::SIGHUP];
@@ -100,6 +117,7 @@ fn signals() -> Vec<i32> {
     known.into_iter().filter(|signal| ignored >> (signal - 1) & 1 == 0).collect()
 }
 
+#[cfg(not(target_family = "wasm"))]
 /// Bit mask of the signals that this process was started to ignore: bit k - 1 is signal k.
 fn ignored() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();

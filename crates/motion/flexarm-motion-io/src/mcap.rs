@@ -81,7 +81,8 @@ fn in_words(error: McapError) -> String {
             format!("a record or chunk is to have {length} bytes, at most {MOST_BYTES} are read at once")
         }
         McapError::UnsupportedCompression(other) => {
-            format!("a chunk is packed by {other:?}; read are zstd, lz4 and none")
+            let zstd = if cfg!(target_family = "wasm") { "" } else { "zstd, " };
+            format!("a chunk is packed by {other:?}; read are {zstd}lz4 and none")
         }
         McapError::DecompressionError(what) => format!("its compressed content is damaged or incomplete ({what})"),
         other => format!("damaged: {other}"),

@@ -273,19 +273,51 @@ fn pose(numbers: &[f64; 12]) -> Pose {
 #[cfg(feature = "mcap")]
 pub(crate) mod meshes {
     //! Block of the triangles of all meshes, one mesh after the other: vertices, normals (three
-    //! `f32` each), triangles (three `u32` each), little endian, compressed with zstd.
+    //! `f32` each), triangles (three `u32` each), little endian; compressed with zstd, except in
+    //! WebAssembly, which is built without C.
 
     use super::MeshEntry;
     use crate::LinkMesh;
 
-    /// Name of the block in a recording.
-    pub(crate) const FILE: &str = "meshes.bin.zst";
-    /// Media type of the block.
-    pub(crate) const MEDIA_TYPE: &str = "application/zstd";
+    /// Name of the compressed block, and of the plain one.
+    const NAMES: [&str; 2] = ["meshes.bin.zst", "meshes.bin"];
+    /// Name and media type of a block as [`write`] makes it.
+    pub(crate) const FILE: &str = NAMES[cfg!(target_family = "wasm") as usize];
+    pub(crate) const MEDIA_TYPE: &str =
+        ["application/zstd", "application/octet-stream"][cfg!(target_family = "wasm") as usize];
+    /// First bytes of zstd data; as a coordinate they would be -1.5e37.
+    const ZSTD_MAGIC: [u8; 4] = [0x28, 0xB5, 0x2F, 0xFD];
+
+    /// Whether a file of a recording is such a block.
+    pub(crate) fn is_block(name: &str) -> bool {
+        NAMES.contains(&name)
+    }
 
     /// Level of zstd. Surfaces of an arm take a sixth more space than with level 9, whose search
     /// took a sixth of the start-up time of an MCAP file.
+    #[cfg(not(target_family = "wasm"))]
     const LEVEL: i32 = 1;
+
+    #[cfg(not(target_family = "wasm"))]
+    fn pack(bytes: Vec<u8>) -> std::io::Result<Vec<u8>> {
+        zstd::bulk::compress(&bytes, LEVEL)
+    }
+
+    #[cfg(target_family = "wasm")]
+    fn pack(bytes: Vec<u8>) -> std::io::Result<Vec<u8>> {
+        Ok(bytes)
+    }
+
+    /// Decompresses a block of `total` bytes.
+    #[cfg(not(target_family = "wasm"))]
+    fn unpack(block: &[u8], total: usize) -> std::io::Result<Vec<u8>> {
+        zstd::bulk::decompress(block, total)
+    }
+
+    #[cfg(target_family = "wasm")]
+    fn unpack(_: &[u8], _: usize) -> std::io::Result<Vec<u8>> {
+        Err(std::io::Error::other("zstd cannot be read here"))
+    }
 
     pub(crate) fn write(meshes: &[LinkMesh]) -> std::io::Result<Vec<u8>> {
         let mut bytes = Vec::new();
@@ -297,7 +329,7 @@ pub(crate) mod meshes {
             floats.for_each(|value| bytes.extend(value.to_le_bytes()));
             mesh.triangles.iter().flatten().for_each(|corner| bytes.extend(corner.to_le_bytes()));
         }
-        zstd::bulk::compress(&bytes, LEVEL)
+        pack(bytes)
     }
 
     /// Reads the meshes described by `entries`.
@@ -310,7 +342,10 @@ pub(crate) mod meshes {
         // Limit the allocation: no block compresses by a factor of more than 100,000.
         let total =
             total.filter(|total| *total / 100_000 <= block.len()).ok_or("its counts of corners are too large")?;
-        let bytes = zstd::bulk::decompress(block, total).map_err(|error| error.to_string())?;
+        let bytes = match block.starts_with(&ZSTD_MAGIC) {
+            true => unpack(block, total).map_err(|error| error.to_string())?,
+            false => block.to_vec(),
+        };
         if bytes.len() != total {
             return Err(format!("it has {} bytes, the list of meshes requires {total}", bytes.len()));
         }

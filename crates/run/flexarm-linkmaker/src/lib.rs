@@ -63,7 +63,9 @@ mod material_entry;
 pub mod reduce;
 mod robot_entry;
 mod stamp;
+mod stopwatch;
 pub mod yardsticks;
 
 pub use error::{ImportError, JobError, LinkError};
 pub use material_entry::{MaterialConstants, MaterialEntry};
+pub use stopwatch::Stopwatch;

@@ -96,6 +96,7 @@ pub use error::{
     BalancerError, ChannelError, Error, ExternalError, Fault, LoadError, LoopError, ModellingError, PayloadError,
     PoseError, RecordingError, StudyError, ValueError,
 };
+pub use flexarm_linkmaker::Stopwatch;
 pub use flexible::{FlexibleRobot, LinkChoices, Owner, RobotLink};
 pub use gauge_entry::Gauge;
 pub use gear_entry::{GearHysteresis, RobotCoupling};

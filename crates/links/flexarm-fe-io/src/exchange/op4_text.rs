@@ -151,7 +151,7 @@ impl Reading {
                 return Err(place.fail(ExchangeErrorKind::Syntax, "line", shown(line), expected, ""));
             }
         };
-        let size = |n: i64| usize::try_from(n).ok().filter(|n| *n <= 2 * u32::MAX as usize);
+        let size = |n: i64| usize::try_from(n).ok().filter(|n| *n as u64 <= 2 * u64::from(u32::MAX));
         let (Some(row), Some(promised)) = (size(row), size(promised)) else {
             return Err(place.fail(ExchangeErrorKind::Syntax, "row", shown(line), "positive numbers", ""));
         };

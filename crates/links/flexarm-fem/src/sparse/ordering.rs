@@ -6,6 +6,7 @@
 //!
 //! Source: Amestoy, Davis & Duff (1996); Karypis & Kumar (1998), METIS 5.2.
 
+#[cfg(not(target_family = "wasm"))]
 use std::sync::{Mutex, PoisonError};
 
 use super::symmetric::Pattern;
@@ -38,8 +39,8 @@ impl Ordering {
 
 /// Computes a nested dissection ordering: `order[k]` is eliminated as number `k`.
 ///
-/// `None` if METIS fails (out of memory, or more than 2³¹ neighbours), and if no unknowns are
-/// coupled, because METIS then divides by zero.
+/// `None` if METIS fails (out of memory, or more than 2³¹ neighbours), if no unknowns are coupled,
+/// because METIS then divides by zero, and in WebAssembly, which is built without C.
 pub(super) fn nested_dissection(pattern: &Pattern) -> Option<Vec<u32>> {
     let (group_of, groups) = group_equal_columns(pattern);
     let graph = Graph::of_groups(pattern, &group_of, groups.len()).filter(Graph::has_edges)?;
@@ -68,6 +69,7 @@ fn group_equal_columns(pattern: &Pattern) -> (Vec<u32>, Vec<std::ops::Range<u32>
 
 /// Adjacency of the groups in both directions, without self-loops, as METIS expects it.
 struct Graph {
+    #[cfg_attr(target_family = "wasm", allow(dead_code, reason = "METIS reads it"))]
     starts: Vec<i32>,
     neighbours: Vec<i32>,
 }
@@ -117,11 +119,19 @@ impl Graph {
     }
 }
 
+/// Without METIS there is no ordering; approximate minimum degree takes its place.
+#[cfg(target_family = "wasm")]
+fn metis_node_nd(_: Graph, _: &[i32]) -> Option<Vec<u32>> {
+    None
+}
+
 /// Held during a call of METIS: its random numbers come from the C library's `rand`, whose state
 /// all threads share, so that concurrent calls would return other orderings on every run.
+#[cfg(not(target_family = "wasm"))]
 static METIS: Mutex<()> = Mutex::new(());
 
 /// Calls METIS; `result[k]` is the group eliminated as number `k`.
+#[cfg(not(target_family = "wasm"))]
 #[allow(
     unsafe_code,
     reason = "METIS is a C library; this is the only call, with arrays whose lengths are checked here"

@@ -90,7 +90,8 @@ pub(crate) fn expand(
     std::thread::scope(|threads| {
         let work = || Interpreter::new(path, resolver, arguments).document(text, path);
         let thread = std::thread::Builder::new().stack_size(STACK).spawn_scoped(threads, work);
-        let thread = thread.map_err(|source| UrdfError::Io { path: path.to_owned(), source })?;
+        // Without threads, in a browser, the stack is the one that the program has.
+        let Ok(thread) = thread else { return work() };
         thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
     })
 }

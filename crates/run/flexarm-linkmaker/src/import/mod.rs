@@ -29,7 +29,6 @@ mod summary;
 mod words;
 
 use std::path::PathBuf;
-use std::time::Instant;
 
 use flexarm_fe_io::exchange::{
     ImportedMatrices, InputFile, InterfaceMap, MatrixFormat, MatrixNames, MatrixRole, RowPick, assemble_interfaces,
@@ -44,7 +43,7 @@ use flexarm_settings::{Caller, Setting};
 use nalgebra::{DMatrix, Rotation3, Translation3, Vector3};
 
 use crate::robot_entry::robot_entry;
-use crate::{ImportError, LinkError, stamp};
+use crate::{ImportError, LinkError, Stopwatch, stamp};
 use summary::Parts;
 
 pub use flexarm_fe_io::exchange::MatrixNames as Names;
@@ -138,7 +137,7 @@ pub struct ImportOutputs {
 /// # Errors
 /// [`LinkError`]; all missing data are listed in one error. See [`LinkError::fault`].
 pub fn import(job: &ImportJob, outputs: Option<&ImportOutputs>) -> Result<ImportSummary, LinkError> {
-    let (started, cpu) = (Instant::now(), cpu_time::ProcessTime::now());
+    let stopwatch = Stopwatch::start();
     let name = job.link_name();
     let targets = outputs.map(|outputs| Targets::new(outputs, &name));
     if let Some(targets) = &targets {
@@ -155,8 +154,8 @@ pub fn import(job: &ImportJob, outputs: Option<&ImportOutputs>) -> Result<Import
     };
 
     let mut summary = ImportSummary::new(&reduction, parts);
-    summary.wall_s = started.elapsed().as_secs_f64();
-    summary.cpu_s = cpu.elapsed().as_secs_f64();
+    summary.wall_s = stopwatch.wall_s();
+    summary.cpu_s = stopwatch.cpu_s();
     summary.peak_rss_bytes = stamp::peak_rss_bytes();
     if let Some(targets) = targets {
         targets.write(&write_flex(&reduction.link), &mut summary)?;

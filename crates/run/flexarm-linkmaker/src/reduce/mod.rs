@@ -31,9 +31,6 @@ mod summary;
 mod urdf_link;
 mod words;
 
-use std::time::{Duration, Instant};
-
-use cpu_time::ProcessTime;
 use flexarm_fe_io::mesh::{MeshFile, ReadOptions};
 use flexarm_fe_io::read_mesh;
 use flexarm_fem::mesh_link::ReductionStep;
@@ -43,7 +40,7 @@ use flexarm_settings::caveat;
 use flexarm_spatial::Pose;
 
 use crate::robot_entry::robot_entry;
-use crate::{JobError, LinkError};
+use crate::{JobError, LinkError, Stopwatch};
 use files::Paths;
 use interfaces::MeshFrame;
 use prepare::{Prepared, failed, prepare, read};
@@ -93,8 +90,7 @@ pub struct Reduction {
     paths: Option<Paths>,
     /// Mesh in its own axes, with its warnings.
     mesh: (MeshFile, Vec<String>),
-    started: Instant,
-    cpu: ProcessTime,
+    stopwatch: Stopwatch,
 }
 
 impl Reduction {
@@ -108,12 +104,12 @@ impl Reduction {
         outputs: Option<&ReduceOutputs>,
         progress: &mut dyn FnMut(ReduceProgress),
     ) -> Result<Self, LinkError> {
-        let (started, cpu) = (Instant::now(), ProcessTime::now());
+        let stopwatch = Stopwatch::start();
         progress(ReduceProgress { step: "reading the mesh", number: 1, of: STEPS });
         let job = with_defaults(job)?;
         let paths = outputs.map(|outputs| Paths::new(outputs, &job)).transpose()?;
         let mesh = read(&job)?;
-        Ok(Self { job, paths, mesh, started, cpu })
+        Ok(Self { job, paths, mesh, stopwatch })
     }
 
     /// Reduces the mesh to a link and writes the files.
@@ -130,26 +126,26 @@ impl Reduction {
         robot: Option<&UrdfLink>,
         progress: &mut dyn FnMut(ReduceProgress),
     ) -> Result<ReduceSummary, LinkError> {
-        let Self { job, paths, mesh, started, cpu } = self;
+        let Self { job, paths, mesh, stopwatch } = self;
         let Prepared { plan, file, units, chosen, materials, doubts } = prepare(&job, mesh, robot)?;
-        let read_s = started.elapsed();
+        let read_s = stopwatch.wall_s();
 
         let mut starts = Vec::new();
         let reduction = reduce_mesh(&file.mesh, &plan, &mut |step| {
-            starts.push(Instant::now());
+            starts.push(stopwatch.wall_s());
             let number = starts.len() + 1;
             progress(ReduceProgress { step: step.name(), number, of: STEPS });
         });
         let reduction = reduction.map_err(|source| failed(&job, &file, units, source))?;
-        starts.push(Instant::now());
+        starts.push(stopwatch.wall_s());
 
         let mut summary = summary_of(&job, &plan, &file, units, &chosen, materials, &reduction);
         let before: Vec<_> = doubts.into_iter().map(|doubt| doubted(&summary.link, doubt)).collect();
         summary.caveats.splice(0..0, before);
         summary.warnings = caveat::warnings(&summary.caveats);
         summary.phases = phases(read_s, &starts);
-        summary.wall_s = started.elapsed().as_secs_f64();
-        summary.cpu_s = cpu.elapsed().as_secs_f64();
+        summary.wall_s = stopwatch.wall_s();
+        summary.cpu_s = stopwatch.cpu_s();
         summary.peak_rss_bytes = crate::stamp::peak_rss_bytes();
         if let Some(paths) = paths {
             let pictures = if paths.folder.is_some() { pictures(&file.mesh, &plan, &reduction)? } else { Vec::new() };
@@ -223,13 +219,13 @@ fn with_defaults(job: &ReduceJob) -> Result<ReduceJob, JobError> {
     Ok(job)
 }
 
-fn phases(read: Duration, starts: &[Instant]) -> PhaseFigures {
+fn phases(read_s: f64, starts: &[f64]) -> PhaseFigures {
     let step = |k: usize| match starts.get(k..k + 2) {
-        Some([from, to]) => (*to - *from).as_secs_f64(),
+        Some([from, to]) => to - from,
         _ => 0.0,
     };
     let [assembly_s, factorisation_s, modes_s, parts_s] = [0, 1, 2, 3].map(step);
-    PhaseFigures { read_s: read.as_secs_f64(), assembly_s, factorisation_s, modes_s, parts_s }
+    PhaseFigures { read_s, assembly_s, factorisation_s, modes_s, parts_s }
 }
 
 /// Draws the pictures, as PNG with their file names; none without the feature `png`.

@@ -13,10 +13,10 @@ mod shares;
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
-use std::time::Instant;
 
 use flexarm_analysis::{LongRecord, MetricSettings, PathFrame};
 use flexarm_kinematics::Frame;
+use flexarm_linkmaker::Stopwatch;
 use flexarm_log::{
     Attachment, BendInfo, Columns, Event, EventKind, Recorder, RecorderSet, RunHeader, RunResult, Sample, Trace,
 };
@@ -142,8 +142,7 @@ pub(crate) fn simulate(
     options: &RunOptions,
     request: RunRequest<'_>,
 ) -> Result<Run, Error> {
-    let started = Instant::now();
-    let cpu = cpu_time::ProcessTime::now();
+    let stopwatch = Stopwatch::start();
     let (robot, flexible) = (built.robot(), built.flexible());
     let Checked { arm, stepper, load_caveats } = built.checked(scenario, options)?;
     let detail = Detail::of(&request);
@@ -208,8 +207,8 @@ pub(crate) fn simulate(
     summary.caveats = caveat::once_each(std::mem::take(&mut summary.caveats));
     summary.warnings = caveat::warnings(&summary.caveats);
     summary.end = end.as_ref().map_or_else(ToString::to_string, |()| "complete".into());
-    summary.wall_s = started.elapsed().as_secs_f64();
-    summary.cpu_s = cpu.elapsed().as_secs_f64();
+    summary.wall_s = stopwatch.wall_s();
+    summary.cpu_s = stopwatch.cpu_s();
     summary.real_time_factor = summary.duration_s / summary.wall_s.max(1e-9);
     summary.cpu_s_per_simulated_s = summary.cpu_s / summary.duration_s.max(1e-9);
     let picture = outputs.and_then(|_| run.monitors.stress.as_ref().and_then(StressMonitor::picture));

@@ -47,7 +47,7 @@ impl FileContents {
                 let own = match header.name.as_str() {
                     RUN_JSON => Some(&mut self.run),
                     RESULT_JSON => Some(&mut self.result),
-                    meshes::FILE => Some(&mut self.mesh_block),
+                    name if meshes::is_block(name) => Some(&mut self.mesh_block),
                     URDF => Some(&mut self.urdf),
                     _ => None,
                 };

@@ -75,12 +75,12 @@ pub fn html(runs: &[ReportRun<'_>]) -> String {
         colors()
     );
     // The arm is rendered while the plots are written.
-    let (arm, drawn, data) = std::thread::scope(|scope| {
-        let arm = scope.spawn(|| arm_pictures(runs));
+    let write_plots = || {
         let drawn: Vec<Vec<Plot>> = runs.iter().map(|run| plots(run.summary, run.trace)).collect();
         let data = data(runs, &drawn);
-        (arm.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)), drawn, data)
-    });
+        (drawn, data)
+    };
+    let (arm, (drawn, data)) = rayon::join(|| arm_pictures(runs), write_plots);
     let body = body(main, runs, &arm, &thinning(runs, &drawn));
     page += &heading(&title, runs, &body);
     let _ = write!(page, "<main>\n{body}</main>\n");
