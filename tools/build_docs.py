@@ -3,13 +3,15 @@
 
     python3 tools/build_docs.py [-o target/site]
 
-Makes a virtual environment with Sphinx in target/; a warning of Sphinx is an error. Exit status: 0
-built, 1 a broken link or a warning, 3 pip cannot install Sphinx (no network).
+Makes a virtual environment with Sphinx in target/; a warning of Sphinx is an error. The front page
+embeds the page of web/ if tools/build_web.py has built it. Exit status: 0 built, 1 a broken link or
+a warning, 3 pip cannot install Sphinx (no network).
 """
 
 import argparse
 import pathlib
 import re
+import shutil
 import subprocess
 import sys
 
@@ -42,7 +44,11 @@ def main():
     if made.returncode or subprocess.run([str(python), "-m", "pip", "install", "-q", *PACKAGES], capture_output=True).returncode:
         print("skipped: pip cannot install " + ", ".join(PACKAGES))
         return 1 if broken else 3
-    built = subprocess.run([str(python), "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html", str(ROOT / "docs"), str(out)])
+    web = ROOT / "web/dist"
+    tags = ["-t", "web"] if web.is_dir() else []
+    built = subprocess.run([str(python), "-m", "sphinx", *tags, "-q", "-W", "--keep-going", "-b", "html", str(ROOT / "docs"), str(out)])
+    if tags:
+        shutil.copytree(web, out / "web", dirs_exist_ok=True)
     if built.returncode == 0:
         print(f"{out}/index.html")
     return 1 if broken or built.returncode else 0
