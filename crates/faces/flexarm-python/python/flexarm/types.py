@@ -661,15 +661,15 @@ class ModeFigures(TypedDict):
     effective_mass: list[float | None]
     """Effective mass at the TCP (kg), or moment of inertia for rotations (kg m²); null at a node."""
     compliance_share: list[float | None]
-    """Fraction of the static compliance of the TCP carried by this mode, per direction; null where the compliance is zero."""
+    """Fraction of the static compliance of the TCP carried by this mode, per direction; null where the compliance is zero, and for a turning arm: Coriolis forces couple the shares of its modes."""
     strain_energy: list[float]
     """Share of each element in the strain energy."""
     residual: float
     """Relative residual of the eigenvalue equation."""
 
 
-class ModesSummary(TypedDict):
-    """Result of `flexarm modes`. SI units; world axes, at the TCP; six-vectors linear first."""
+class _ModesSummary(TypedDict):
+    """What is always there."""
 
     robot: str
     """Name of the robot."""
@@ -694,13 +694,20 @@ class ModesSummary(TypedDict):
     total: int
     """Total number of modes; `modes` may contain fewer."""
     compliance_covered: list[float | None]
-    """Fraction of the static compliance covered by the listed modes, per TCP direction; null where the compliance is zero."""
+    """Fraction of the static compliance covered by the listed modes, per TCP direction; null where the compliance is zero, and for a turning arm."""
     files: RunFiles
     """Written files."""
     warnings: list[str]
     """Warnings among the caveats, as sentences."""
     caveats: list[CaveatDict]
     """Probable errors in the input, and limits of the result's validity."""
+
+
+class ModesSummary(_ModesSummary, total=False):
+    """Result of `flexarm modes`. SI units; world axes, at the TCP; six-vectors linear first."""
+
+    speeds: list[float]
+    """Speeds at which the joints turn instead of being locked (rad/s or m/s); left out at rest."""
 
 
 class PeakFigures(TypedDict):
