@@ -21,14 +21,15 @@ use crate::posed_args::{ModesArgs, ResponseArgs, StaticsArgs};
 use crate::reduce_args::ReduceArgs;
 use crate::report::ReportArgs;
 use crate::sensitivity::SensitivityArgs;
-use crate::serve::ServeArgs;
+#[cfg(not(target_family = "wasm"))]
+use crate::serve::{self, ServeArgs};
 use crate::sweep::SweepArgs;
 use crate::terminal::{Terminal, answer, to_json, written};
 use crate::verify::VerifyArgs;
 use crate::view::ViewArgs;
 use crate::{
     compensate, convert, exchange, fmu, formats, identify, inspect, lobes, map, motion, new, posed, reduce, report,
-    sensitivity, serve, simulate, sweep, verify, view,
+    sensitivity, simulate, sweep, verify, view,
 };
 
 /// Help of the program without a command; a line for every command.
@@ -156,7 +157,8 @@ pub(crate) enum Command {
     Verify(Later<VerifyArgs>),
     /// Open a recording in the Rerun viewer
     View(Later<ViewArgs>),
-    /// Open the web page on which the program runs, from a server on this machine alone
+    /// Open the web page on which the program runs, by a server that only this machine reaches
+    #[cfg(not(target_family = "wasm"))]
     Serve(ServeArgs),
     /// Print the page of a file format: keys, units, defaults, examples
     Format {
@@ -202,6 +204,7 @@ pub(crate) fn run(cli: &Cli, line: &[OsString]) -> Result<ExitCode, Failure> {
         Command::ExportFmu(args) => fmu::run(terminal, args),
         Command::Verify(args) => verify::run(terminal, args),
         Command::View(args) => view::run(terminal, args),
+        #[cfg(not(target_family = "wasm"))]
         Command::Serve(args) => serve::run(terminal, args),
         Command::Format { page } => {
             answer(terminal, || to_json(&serde_json::json!({ "page": page.text() })), || page.text().to_owned());

@@ -29,6 +29,7 @@ mod reduce;
 mod reduce_args;
 mod report;
 mod sensitivity;
+#[cfg(not(target_family = "wasm"))]
 mod serve;
 mod shipped;
 mod signals;

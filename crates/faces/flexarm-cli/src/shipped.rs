@@ -94,6 +94,7 @@ pub(crate) fn tool(given: &Path) -> Result<PathBuf, Error> {
 ///
 /// # Errors
 /// [`Error::File`] if this installation has none.
+#[cfg(not(target_family = "wasm"))]
 pub(crate) fn web_page() -> Result<PathBuf, Error> {
     let built = roots().into_iter().flat_map(|root| [root.join("web"), root.join("web/dist")]);
     built.into_iter().find(|folder| folder.join("flexarm.wasm").is_file()).ok_or_else(|| Error::File {

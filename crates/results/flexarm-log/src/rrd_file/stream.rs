@@ -4,6 +4,7 @@
 use std::fs::OpenOptions;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use rerun::external::re_log_types::{BlueprintActivationCommand, StoreSource};
 use rerun::log::{Chunk, RowId};
@@ -16,6 +17,8 @@ use rerun::{
 use super::layout::Entities;
 
 const APPLICATION: &str = "flexarm";
+/// Maximum time for which the SDK's writer thread is waited for.
+const PATIENCE: Duration = Duration::from_secs(60);
 
 /// An error of writing to the stream.
 #[derive(Debug, thiserror::Error)]
@@ -100,9 +103,10 @@ impl RrdStream {
     /// Waits until all data are in the file.
     ///
     /// # Errors
-    /// The SDK's writer thread has failed.
+    /// The SDK's writer thread has failed, or does not answer within [`PATIENCE`]: a request that it
+    /// gets while it fails may stay without an answer.
     pub(crate) fn flush(&self) -> Result<()> {
-        self.recording.flush_blocking().map_err(|error| self.broken(&error).into())
+        self.recording.flush_with_timeout(PATIENCE).map_err(|error| self.broken(&error).into())
     }
 
     /// Writes the index and closes the file.
