@@ -34,8 +34,12 @@ class WebPage:
             def log_message(self, format: str, *args: Any) -> None:
                 pass
 
+        class Server(ThreadingHTTPServer):
+            def handle_error(self, request: Any, client_address: Any) -> None:
+                pass  # the browser has closed the connection
+
         self._height = height
-        self._server = ThreadingHTTPServer(("127.0.0.1", port), partial(Files, directory=str(_PAGE)))
+        self._server = Server(("127.0.0.1", port), partial(Files, directory=str(_PAGE)))
         self.url = f"http://127.0.0.1:{self._server.server_port}/"
         threading.Thread(target=self._server.serve_forever, name="flexarm.web", daemon=True).start()
 
