@@ -27,7 +27,7 @@ class WebPage:
                 f"this installation has no web page: no {_PAGE / 'flexarm.wasm'}; run tools/build_web.py in the "
                 "sources and then tools/build_wheel.py, which includes the page"
             )
-        # Imported here: it would be a tenth of the time of `import flexarm`.
+        # Imported here, because few processes serve the page.
         from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 
         class Files(SimpleHTTPRequestHandler):
