@@ -57,8 +57,13 @@ impl PyArm {
 
     /// Parses one pose, if one is given.
     pub(crate) fn pose(&self, q: Option<&Bound<'_, PyAny>>) -> PyResult<Option<Vec<f64>>> {
-        let n = self.n();
-        q.filter(|q| !q.is_none()).map(|q| Ok(numbers("q", q, &[(n, "joints")], false)?.values().to_vec())).transpose()
+        self.of_joints("q", q)
+    }
+
+    /// Returns one number per joint, if any are given; `name`: that of the argument.
+    fn of_joints(&self, name: &str, values: Option<&Bound<'_, PyAny>>) -> PyResult<Option<Vec<f64>>> {
+        let given = values.filter(|values| !values.is_none());
+        given.map(|values| Ok(numbers(name, values, &[(self.n(), "joints")], false)?.values().to_vec())).transpose()
     }
 
     /// Returns the workspace for single poses.
@@ -476,7 +481,7 @@ impl PyArm {
         #[pyo3(from_py_with = whole)] count: usize,
         speeds: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<PyModes> {
-        let (q, speeds) = (self.pose(q)?, self.pose(speeds)?);
+        let (q, speeds) = (self.pose(q)?, self.of_joints("speeds", speeds)?);
         let table = py.detach(|| self.arm.modes(q.as_deref(), speeds.as_deref(), count)).or_raise()?;
         caveat::issue(py, &table.caveats)?;
         Ok(modes(table))
