@@ -16,7 +16,7 @@ use crate::motion::MotionInputArgs;
 use crate::print::{lines, table};
 use crate::shipped;
 use crate::shipped::OutputFolder;
-use crate::terminal::{Terminal, answer, to_json};
+use crate::terminal::{Terminal, answer, to_json, working};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -205,7 +205,7 @@ pub(crate) fn run(terminal: &Terminal, args: &CompensateArgs) -> Result<ExitCode
     if let Some(loads) = &args.loads {
         scenario = scenario.with_loads_file(loads)?;
     }
-    let found = compensate_motion(&robot, scenario, &request)?;
+    let found = working(terminal, "compensating", || compensate_motion(&robot, scenario, &request))?;
     crate::print::caveats(terminal, &found.caveats);
     answer(terminal, || to_json(&found), || text(&found));
     Ok(ExitCode::SUCCESS)

@@ -8,7 +8,7 @@ use flexarm::{ConvertOptions, ConvertSummary, RecordingFormat, parse_recording_f
 
 use crate::failure::Failure;
 use crate::formats;
-use crate::terminal::{Terminal, answer, to_json};
+use crate::terminal::{Terminal, answer, to_json, working};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -41,7 +41,9 @@ pub(crate) struct ConvertArgs {
 pub(crate) fn run(terminal: &Terminal, args: &ConvertArgs) -> Result<ExitCode, Failure> {
     let options = ConvertOptions { from: args.from, to: args.to, overwrite: args.force };
     let mut stop = crate::signals::stop_when_asked();
-    let summary = flexarm::convert_until(&args.input, &args.output, &options, &mut |_| stop())?;
+    let summary = working(terminal, "converting", || {
+        flexarm::convert_until(&args.input, &args.output, &options, &mut |_| stop())
+    })?;
     crate::print::warnings(terminal, &summary.warnings);
     answer(terminal, || to_json(&summary), || text(&summary));
     Ok(ExitCode::SUCCESS)

@@ -9,7 +9,7 @@ use crate::exchange_args::{ExportArgs, ExportFormatName, ImportArgs, ImportForma
 use crate::failure::Failure;
 use crate::print;
 use crate::shipped::OutputFolder;
-use crate::terminal::{Terminal, answer, to_json};
+use crate::terminal::{Terminal, answer, to_json, working};
 
 pub(crate) fn import(terminal: &Terminal, args: &ImportArgs) -> Result<ExitCode, Failure> {
     let job = import_job(args)?;
@@ -17,7 +17,7 @@ pub(crate) fn import(terminal: &Terminal, args: &ImportArgs) -> Result<ExitCode,
     let folder = OutputFolder::of(args.output.as_deref(), &job.link_name(), in_folder && !args.no_files)?;
     let outputs = ImportOutputs { folder: folder.path(), flex: args.flex.clone(), overwrite: args.force };
     let outputs = (!args.no_files).then_some(outputs);
-    let summary = flexarm::import::import(&job, outputs.as_ref())?;
+    let summary = working(terminal, "importing", || flexarm::import::import(&job, outputs.as_ref()))?;
     print::warnings(terminal, &summary.warnings);
     answer(terminal, || to_json(&summary), || print::imported(&summary));
     Ok(ExitCode::SUCCESS)
@@ -41,7 +41,7 @@ pub(crate) fn export(terminal: &Terminal, args: &ExportArgs) -> Result<ExitCode,
         folder: folder.path().unwrap_or_default(),
         overwrite: args.force,
     };
-    let summary = flexarm::export::export(&job)?;
+    let summary = working(terminal, "exporting", || flexarm::export::export(&job))?;
     print::warnings(terminal, &summary.warnings);
     answer(terminal, || to_json(&summary), || print::exported(&summary));
     Ok(ExitCode::SUCCESS)

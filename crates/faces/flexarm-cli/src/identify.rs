@@ -15,7 +15,7 @@ use crate::failure::Failure;
 use crate::print::{lines, table};
 use crate::shipped;
 use crate::shipped::OutputFolder;
-use crate::terminal::{Terminal, answer, to_json};
+use crate::terminal::{Terminal, answer, to_json, working};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -102,7 +102,7 @@ pub(crate) fn run(terminal: &Terminal, args: &IdentifyArgs) -> Result<ExitCode, 
                 output: folder.path(),
                 overwrite: args.force,
             };
-            let found = identify_robot(&robot, measurements, &request)?;
+            let found = working(terminal, "fitting the parameters", || identify_robot(&robot, measurements, &request))?;
             crate::print::caveats(terminal, &found.caveats);
             answer(terminal, || to_json(&found), || text(&found));
             Ok(ExitCode::SUCCESS)
@@ -139,7 +139,7 @@ fn plan(terminal: &Terminal, args: &IdentifyArgs, robot: &Robot, count: usize) -
     if !forces.is_empty() {
         request.forces = forces;
     }
-    let found = plan_measurements(robot, &request)?;
+    let found = working(terminal, "planning the measurements", || plan_measurements(robot, &request))?;
     crate::print::warnings(terminal, &found.warnings);
     answer(terminal, || to_json(&found), || plan_text(&found));
     Ok(ExitCode::SUCCESS)

@@ -15,7 +15,7 @@ use crate::failure::Failure;
 use crate::posed_args::PoseArgs;
 use crate::print::{lines, table};
 use crate::shipped::OutputFolder;
-use crate::terminal::{Terminal, answer, to_json};
+use crate::terminal::{Terminal, answer, to_json, working};
 use crate::{shipped, values};
 
 const EXAMPLES: &str = "\
@@ -144,7 +144,7 @@ fn follow(
         output: folder.path(),
         overwrite: args.force,
     };
-    let found = cut(robot, tool, at, &request)?;
+    let found = working(terminal, "cutting", || cut(robot, tool, at, &request))?;
     crate::print::caveats(terminal, &found.caveats);
     answer(terminal, || to_json(&found), || cut_text(&found));
     Ok(ExitCode::SUCCESS)

@@ -1,22 +1,16 @@
 //! `flexarm reduce`: from flags to a job, and progress on the terminal.
 
-use std::io::IsTerminal;
 use std::process::ExitCode;
-use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
-use std::thread::JoinHandle;
-use std::time::Duration;
 
 use flexarm::reduce::{
-    At, InterfaceEntry, OrderingChoice, QuadratureChoice, ReduceJob, ReduceOptions, ReduceOutputs, ReduceProgress,
-    UrdfEntry,
+    At, InterfaceEntry, OrderingChoice, QuadratureChoice, ReduceJob, ReduceOptions, ReduceOutputs, UrdfEntry,
 };
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use crate::failure::Failure;
 use crate::print;
 use crate::reduce_args::{NamedValue, OrderingName, PlaceWord, QuadratureName, ReduceArgs};
 use crate::shipped::OutputFolder;
-use crate::terminal::{Terminal, answer, to_json};
+use crate::terminal::{Spinner, Terminal, answer, to_json};
 
 pub(crate) fn run(terminal: &Terminal, args: &ReduceArgs) -> Result<ExitCode, Failure> {
     let mut job = ReduceJob::load(&args.mesh)?;
@@ -33,9 +27,13 @@ pub(crate) fn run(terminal: &Terminal, args: &ReduceArgs) -> Result<ExitCode, Fa
     let mut options = ReduceOptions::default();
     options.urdf.search_paths = flexarm::search_paths_from_environment();
 
-    let steps = Steps::new(terminal);
-    let result = flexarm::reduce::reduce(&job, &options, outputs.as_ref(), &mut |step| steps.show(step));
-    steps.clear();
+    let spinner = Spinner::new(terminal, "{pos}/{len} {msg}");
+    let result = flexarm::reduce::reduce(&job, &options, outputs.as_ref(), &mut |step| {
+        spinner.bar.set_length(step.of as u64);
+        spinner.bar.set_position(step.number as u64);
+        spinner.bar.set_message(step.step);
+    });
+    spinner.clear();
     let summary = result?;
     print::warnings(terminal, &summary.warnings);
     answer(terminal, || to_json(&summary), || print::reduction(&summary));
@@ -120,48 +118,4 @@ fn entry<'a>(job: &'a mut ReduceJob, name: &str) -> &'a mut InterfaceEntry {
         job.interface.len() - 1
     });
     &mut job.interface[index]
-}
-
-/// The current step, shown on a terminal if the work takes more than two seconds.
-struct Steps {
-    bar: ProgressBar,
-    /// Stops the waiting thread that shows the bar.
-    waiting: Option<(Sender<()>, JoinHandle<()>)>,
-}
-
-impl Steps {
-    fn new(terminal: &Terminal) -> Self {
-        let style = ProgressStyle::with_template("{spinner} {pos}/{len} {msg}, {elapsed}");
-        let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::hidden())
-            .with_style(style.unwrap_or_else(|_| ProgressStyle::default_spinner()));
-        let wanted = !terminal.quiet && std::io::stderr().is_terminal();
-        let waiting = wanted.then(|| {
-            let (sender, receiver) = channel();
-            let shown = bar.clone();
-            let wait = move || {
-                // A step may take minutes: the bar must appear without waiting for the next step.
-                if receiver.recv_timeout(Duration::from_secs(2)) == Err(RecvTimeoutError::Timeout) {
-                    shown.set_draw_target(ProgressDrawTarget::stderr());
-                    shown.enable_steady_tick(Duration::from_millis(200));
-                }
-            };
-            (sender, std::thread::spawn(wait))
-        });
-        Self { bar, waiting }
-    }
-
-    fn show(&self, step: ReduceProgress) {
-        self.bar.set_length(step.of as u64);
-        self.bar.set_position(step.number as u64);
-        self.bar.set_message(step.step);
-    }
-
-    fn clear(self) {
-        if let Some((sender, thread)) = self.waiting {
-            drop(sender);
-            // The thread only displays progress; its failure can be ignored.
-            let _ = thread.join();
-        }
-        self.bar.finish_and_clear();
-    }
 }

@@ -13,7 +13,7 @@ use crate::args::{ModellingArgs, RobotArgs};
 use crate::failure::Failure;
 use crate::motion::MotionInputArgs;
 use crate::print::{lines, table};
-use crate::terminal::{Terminal, answer, to_json};
+use crate::terminal::{Terminal, answer, to_json, working};
 use crate::{shipped, values};
 
 const EXAMPLES: &str = "\
@@ -72,7 +72,10 @@ pub(crate) fn run(terminal: &Terminal, args: &SensitivityArgs) -> Result<ExitCod
     let robot = Robot::load_with(&shipped::robot(Some(&args.robot))?, &args.load.options()?)?;
     if args.at.is_some() {
         let at = values::joint_values(args.at.as_deref(), &robot)?;
-        let found = pose_sensitivity(&robot, args.modelling.modelling(), at.as_deref(), &args.by)?;
+        let modelling = args.modelling.modelling();
+        let found = working(terminal, "derivatives at the pose", || {
+            pose_sensitivity(&robot, modelling, at.as_deref(), &args.by)
+        })?;
         crate::print::caveats(terminal, &found.caveats);
         answer(terminal, || to_json(&found), || pose_text(&found));
         return Ok(ExitCode::SUCCESS);
@@ -98,7 +101,7 @@ pub(crate) fn run(terminal: &Terminal, args: &SensitivityArgs) -> Result<ExitCod
         table: args.table.clone(),
         overwrite: args.force,
     };
-    let found = sensitivity(&robot, scenario, &request)?;
+    let found = working(terminal, "derivatives along the motion", || sensitivity(&robot, scenario, &request))?;
     crate::print::caveats(terminal, &found.caveats);
     answer(terminal, || to_json(&found), || text(&found));
     Ok(ExitCode::SUCCESS)

@@ -2,11 +2,13 @@
 
 use std::io::{IsTerminal, Write};
 use std::process::ExitCode;
+use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use clap::Args;
 use flexarm::written::visible;
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use crate::print;
 
@@ -96,4 +98,52 @@ impl Bar {
             bar.finish_and_clear();
         }
     }
+}
+
+/// A line with a turning mark and the elapsed time, for work without a known end; shown only on a
+/// terminal and only if the work takes more than two seconds.
+pub(crate) struct Spinner {
+    pub(crate) bar: ProgressBar,
+    /// Stops the waiting thread that shows the line.
+    waiting: Option<(Sender<()>, JoinHandle<()>)>,
+}
+
+impl Spinner {
+    /// Waits for two seconds in a thread; `template` is one of [`ProgressStyle`].
+    pub(crate) fn new(terminal: &Terminal, template: &str) -> Self {
+        let style = ProgressStyle::with_template(&format!("{{spinner}} {template}, {{elapsed}}"));
+        let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::hidden())
+            .with_style(style.unwrap_or_else(|_| ProgressStyle::default_spinner()));
+        let wanted = !terminal.quiet && std::io::stderr().is_terminal();
+        let waiting = wanted.then(|| {
+            let (sender, receiver) = channel();
+            let shown = bar.clone();
+            let wait = move || {
+                // A step may take minutes: the line must appear without waiting for the next step.
+                if receiver.recv_timeout(Duration::from_secs(2)) == Err(RecvTimeoutError::Timeout) {
+                    shown.set_draw_target(ProgressDrawTarget::stderr());
+                    shown.enable_steady_tick(Duration::from_millis(200));
+                }
+            };
+            (sender, std::thread::spawn(wait))
+        });
+        Self { bar, waiting }
+    }
+
+    pub(crate) fn clear(self) {
+        if let Some((sender, thread)) = self.waiting {
+            drop(sender);
+            // The thread only displays progress; its failure can be ignored.
+            let _ = thread.join();
+        }
+        self.bar.finish_and_clear();
+    }
+}
+
+/// Does work during which a [`Spinner`] shows `message`.
+pub(crate) fn working<T>(terminal: &Terminal, message: &str, work: impl FnOnce() -> T) -> T {
+    let spinner = Spinner::new(terminal, message);
+    let result = work();
+    spinner.clear();
+    result
 }
