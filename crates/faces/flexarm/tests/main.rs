@@ -9,6 +9,7 @@ use flexarm_testkit::allocations::CountingAllocator;
 mod arrays;
 mod balancers;
 mod batch;
+mod beam_stress;
 mod caveats;
 mod caveats_everywhere;
 mod compensate;

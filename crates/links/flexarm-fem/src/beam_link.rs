@@ -9,7 +9,7 @@
 //! ```
 
 use flexarm_spatial::{Pose, adjoint};
-use nalgebra::{Matrix3, Rotation3, Translation3, Vector3};
+use nalgebra::{Matrix3, Matrix6, Rotation3, Translation3, Vector3};
 
 use crate::beam::{Beam, BeamTheory};
 use crate::error::{FemError, positive};
@@ -107,21 +107,27 @@ impl BeamLink {
             Some(X_LS) => frames.with_split(X_LS),
             None => frames.with_split_fraction(self.split_fraction),
         };
-        let beam = Beam::new(self.section.bar(&self.material)?, self.theory, self.length)?;
-
-        // Stiffness of the distal beam end, transferred over the rigid arm to Bo, link axes.
-        let X_LE2 = self.X_LE * Pose::translation(self.length, 0.0, 0.0);
-        let Ad_E2B = adjoint(&(X_LE2.inverse() * Pose::from(self.X_LB.translation)));
-        let K_BB = Ad_E2B.transpose() * beam.tip_stiffness() * Ad_E2B;
-
+        let beam = self.beam()?;
         ReducedLink::from_matrix6(
             &self.name,
             frames,
-            &K_BB,
+            &self.tip_stiffness()?,
             self.parts(&beam)?,
             self.provenance(),
             &GateLimits::default(),
         )
+    }
+
+    /// Returns the beam between its own ends.
+    fn beam(&self) -> Result<Beam, FemError> {
+        Beam::new(self.section.bar(&self.material)?, self.theory, self.length)
+    }
+
+    /// Stiffness of the distal beam end, transferred over the rigid arm to Bo, link axes.
+    pub(crate) fn tip_stiffness(&self) -> Result<Matrix6<f64>, FemError> {
+        let X_LE2 = self.X_LE * Pose::translation(self.length, 0.0, 0.0);
+        let Ad_E2B = adjoint(&(X_LE2.inverse() * Pose::from(self.X_LB.translation)));
+        Ok(Ad_E2B.transpose() * self.beam()?.tip_stiffness() * Ad_E2B)
     }
 
     /// Rigid parts of the two halves of the beam; the rigid arms are massless.

@@ -64,6 +64,7 @@ pub mod reduced;
 pub mod reduction;
 pub mod rigid_part;
 pub mod section;
+mod section_outline;
 pub mod sparse;
 pub mod spelling;
 pub mod stress;

@@ -57,10 +57,7 @@ impl Open {
     pub(crate) fn channel(&self, nu: f64) -> Result<SectionProperties, FemError> {
         self.check(self.width - self.web)?;
         let Self { width: b, height: h, web, flange, .. } = *self;
-        let along_y = [rectangle(2.0 * flange, b, 0.5 * b), rectangle(h - 2.0 * flange, web, 0.5 * web)]
-            .into_iter()
-            .chain([self.fillet_at(web, 1.0), self.fillet_at(web, 1.0)]);
-        let [A, y_c, I_z] = sum(along_y);
+        let [A, y_c, I_z] = self.channel_along_y();
         let (b_mid, h_mid) = (b - 0.5 * web, h - flange);
         Ok(SectionProperties {
             A,
@@ -73,6 +70,28 @@ impl Open {
             k_z: web_shear_factor(2.0 * b_mid * flange / (h_mid * web), 2.0 * b_mid / h_mid, nu),
             shear_centre_y: 0.5 * web - y_c - shear_centre(b_mid, h_mid, web, flange),
         })
+    }
+
+    /// Area, centroid from the outside of the web, and second moment about z of a channel.
+    fn channel_along_y(&self) -> [f64; 3] {
+        let Self { width: b, height: h, web, flange, .. } = *self;
+        let along_y = [rectangle(2.0 * flange, b, 0.5 * b), rectangle(h - 2.0 * flange, web, 0.5 * web)]
+            .into_iter()
+            .chain([self.fillet_at(web, 1.0), self.fillet_at(web, 1.0)]);
+        sum(along_y)
+    }
+
+    /// Distance of the centroid of a channel from the outside of its web, m.
+    pub(crate) fn channel_centroid(&self) -> f64 {
+        self.channel_along_y()[1]
+    }
+
+    /// Shear stress in the middle of the web per force along it, 1/m²: `S/(I_y t_w)` with the first
+    /// moment S of one half of the section.
+    pub(crate) fn web_shear(&self, own: &SectionProperties) -> f64 {
+        let Self { width: b, height: h, web, flange, .. } = *self;
+        let half = 0.5 * h - flange;
+        (0.5 * b * flange * (h - flange) + 0.5 * web * half * half) / (own.I_y * web)
     }
 
     /// `room`: overhang of a flange beyond the web on one side, m.

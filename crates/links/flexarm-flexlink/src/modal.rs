@@ -125,5 +125,6 @@ pub(crate) fn substitute_modal(
         length: site.length,
         own_mass: site.own.map_or(0.0, |i| i.mass),
         part_masses,
+        lumped: None,
     })
 }

@@ -132,6 +132,7 @@ pub fn insert_mounting(
         length: 0.0,
         own_mass: mass,
         part_masses: vec![mass],
+        lumped: None,
     };
     Ok((Spring { link: name.clone(), joint, distal_link: top, K_S: *K_S, X_LS: *X_BS }, span))
 }

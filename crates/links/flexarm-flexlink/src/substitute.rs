@@ -104,6 +104,8 @@ pub struct FlexibleSpan {
     pub own_mass: f64,
     /// Masses of the parts, proximal first (kg); for a modal link, the modal body first.
     pub part_masses: Vec<f64>,
+    /// Joints and parts of a lumped link; `None` for a modal link and a mounting.
+    pub lumped: Option<Chain>,
 }
 
 /// Mechanism with its flexible links.
@@ -261,8 +263,8 @@ pub fn substitute(mechanism: &Mechanism, links: &[FlexibleLink]) -> Result<Subst
                 if let Some(BranchJoint { joint, interface }) = branch_joints(mechanism, flexible).into_iter().next() {
                     return Err(SubstitutionError::Branched { link: flexible.link.clone(), joint, interface });
                 }
-                let (joints, parts) = lumped_parts(flexible, &site)?;
-                let (span, springs) = insert_chain(&mut result.mechanism, flexible, &site, &joints, &parts);
+                let chain = lumped_parts(flexible, &site)?;
+                let (span, springs) = insert_chain(&mut result.mechanism, flexible, &site, chain);
                 result.springs.extend(springs);
                 span
             }
@@ -298,23 +300,23 @@ impl Site {
 }
 
 /// Elastic joints and parts of a lumped link, proximal first.
-fn lumped_parts(
-    flexible: &FlexibleLink,
-    site: &Site,
-) -> Result<(Vec<ElasticSplit>, Vec<RigidPart>), SubstitutionError> {
+fn lumped_parts(flexible: &FlexibleLink, site: &Site) -> Result<Chain, SubstitutionError> {
     let (name, reduced) = (&flexible.link, &flexible.reduced);
     let cut = |source| SubstitutionError::Cut { link: name.clone(), source };
     let own = || site.own.ok_or_else(|| SubstitutionError::NoInertia { link: name.clone() });
     Ok(match (&flexible.form, flexible.parts) {
-        (LinkForm::Chain(chain), Parts::Reduced) => (chain.joints.clone(), chain.parts.clone()),
+        (LinkForm::Chain(chain), Parts::Reduced) => chain.clone(),
         (LinkForm::Chain(chain), Parts::FromLink(_)) => {
             let parts = cut_chain(&own()?, &site.p_LA, &site.p_LB, &chain.parts).map_err(cut)?;
-            (chain.joints.clone(), parts)
+            Chain { joints: chain.joints.clone(), parts }
         }
-        (_, Parts::Reduced) => (vec![reduced.split.clone()], vec![reduced.proximal.clone(), reduced.distal.clone()]),
+        (_, Parts::Reduced) => {
+            let parts = vec![reduced.proximal.clone(), reduced.distal.clone()];
+            Chain { joints: vec![reduced.split.clone()], parts }
+        }
         (_, Parts::FromLink(split)) => {
-            let parts = cut_inertia(&own()?, &site.p_LA, &site.p_LB, split).map_err(cut)?;
-            (vec![reduced.split.clone()], parts.to_vec())
+            let parts = cut_inertia(&own()?, &site.p_LA, &site.p_LB, split).map_err(cut)?.to_vec();
+            Chain { joints: vec![reduced.split.clone()], parts }
         }
     })
 }
@@ -323,10 +325,9 @@ fn insert_chain(
     mechanism: &mut Mechanism,
     flexible: &FlexibleLink,
     site: &Site,
-    joints: &[ElasticSplit],
-    parts: &[RigidPart],
+    chain: Chain,
 ) -> (FlexibleSpan, Vec<Spring>) {
-    let name = &flexible.link;
+    let (name, Chain { joints, parts }) = (&flexible.link, &chain);
     // The proximal part keeps the link's frame and name; the frames of the others are at the joints
     // inward of them.
     for link in mechanism.links.iter_mut().filter(|l| l.name == *name) {
@@ -367,6 +368,7 @@ fn insert_chain(
         length: site.length,
         own_mass: site.own.map_or(0.0, |i| i.mass),
         part_masses: parts.iter().map(|p| p.mass).collect(),
+        lumped: Some(chain),
     };
     (span, springs)
 }

@@ -80,7 +80,7 @@ fn half() -> f64 {
 }
 
 /// Section given by its stiffness instead of a shape.
-const GIVEN: &str = "given";
+pub(crate) const GIVEN: &str = "given";
 const GIVEN_KEYS: &[&str] = &["EA", "EI_y", "EI_z", "GJ", "kGA_y", "kGA_z", "mass_per_length", "rotary_y", "rotary_z"];
 
 impl BeamEntry {

@@ -19,6 +19,7 @@ use flexarm_stepping::{
 use nalgebra::{DMatrix, DVector, Matrix6, Vector3};
 
 use crate::caveat::Caveat;
+use crate::caveat::kinds;
 use crate::caveat::size::Size;
 use crate::drive_entry::{DriveKind, ServoEntry};
 use crate::error::{Error, ModellingError, PoseError};
@@ -58,10 +59,19 @@ pub struct RobotLink {
     pub beam: Option<BeamLink>,
     /// Choices made in the robot file.
     pub choices: LinkChoices,
-    /// File of its stress fields, beside that of the reduced link.
-    pub stress: Option<PathBuf>,
+    /// Source of its stress, if that is computed.
+    pub stress: Option<StressSource>,
     /// Strength against which its stress is judged; by default that of its material.
     pub strength: Option<Strength>,
+}
+
+/// Source of the stress of a flexible link.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum StressSource {
+    /// File of stress fields, beside that of the reduced link.
+    File(PathBuf),
+    /// Section forces of the beam.
+    Beam,
 }
 
 /// Choices of a robot file for a flexible link.
@@ -474,7 +484,7 @@ impl Robot {
         for link in wanted {
             let (form, instead) = self.form_of(link, modelling)?;
             chosen.modal_instead.extend(instead);
-            chosen.doubts.extend(doubts_of(&link.flexible, &form));
+            chosen.doubts.extend(doubts_of(link, &form));
             let mut flexible = FlexibleLink { form, ..link.flexible.clone() };
             let uncut = self.uncut(link, &mut flexible);
             chosen.doubts.extend(uncut.map(|text| Caveat::from_message("uniform-mass", "links", text, "")));
@@ -661,8 +671,13 @@ struct ChosenLinks {
 }
 
 /// Returns the caveats about a link in this form.
-fn doubts_of(link: &FlexibleLink, form: &LinkForm) -> Vec<Caveat> {
+fn doubts_of(link: &RobotLink, form: &LinkForm) -> Vec<Caveat> {
     let mut doubts = Vec::new();
+    let is_modal = matches!(form, LinkForm::Modal(_));
+    if is_modal && link.stress == Some(StressSource::Beam) {
+        doubts.push(kinds::NO_STRESS_OF_MODES.found(format!("link {:?}", link.flexible.link), 0.0, 0.0));
+    }
+    let link = &link.flexible;
     if matches!(form, LinkForm::Modal(modal) if !modal.has_second_order()) {
         let text = format!("link {:?}: {SECOND_ORDER_UNKNOWN}", link.link);
         let help = "reduce the mesh itself (flexarm reduce) to have them";

@@ -9,10 +9,10 @@ use flexarm_stepping::Damping;
 use nalgebra::{Matrix6, Vector3};
 use toml::Spanned;
 
-use crate::beam_entry::beam_section;
+use crate::beam_entry::{GIVEN, beam_section};
 use crate::error::Error;
 use crate::file_cache::FileCache;
-use crate::flexible::{LinkChoices, RequestedKey, RobotLink};
+use crate::flexible::{LinkChoices, RequestedKey, RobotLink, StressSource};
 use crate::options::{LinkModel, Modelling};
 use crate::robot::keep;
 use crate::robot_file::{BeamEntry, DampingEntry, FlexibleLinkEntry, RobotFileError, Source};
@@ -127,8 +127,7 @@ pub(crate) fn flexible_link(
         },
     };
     let stiffness = entry.stiffness.as_ref().map(|given| matrix6(given, entry, source)).transpose()?;
-    let stress = entry.reduced.as_ref().map(|file| home.folder.join(file.get_ref()).with_extension(STRESS_FILE));
-    let stress = stress.filter(|file| file.is_file());
+    let stress = stress_source(entry, source, home)?;
     let strength = entry.strength.as_ref().map(|entry| Strength::read(entry, name, source)).transpose()?;
     let link = RobotLink {
         flexible,
@@ -155,6 +154,41 @@ pub(crate) fn flexible_link(
         at(key.or(entry.model.as_ref().map(Spanned::span)).unwrap_or(entry.link.span()), message)
     })?;
     Ok(link)
+}
+
+/// Returns the source of the stress of a link, if its stress is to be computed.
+fn stress_source(
+    entry: &FlexibleLinkEntry,
+    source: &Source,
+    home: &LinkHome<'_>,
+) -> Result<Option<StressSource>, RobotFileError> {
+    let name = entry.link.get_ref();
+    let asked = entry.stress.as_ref();
+    let fail = |message: String| source.error(asked.map_or(entry.link.span(), Spanned::span), message);
+    if asked.is_some_and(|asked| !asked.get_ref()) {
+        return Ok(None);
+    }
+    let Some(reduced) = &entry.reduced else {
+        let Some(beam) = entry.beam.as_ref().filter(|_| asked.is_some()) else { return Ok(None) };
+        if beam.get_ref().section == GIVEN {
+            return Err(fail(format!(
+                "stress of link {name:?}: its section is given by its stiffness, which has no outline: give the shape of the \
+                 section, or leave stress out"
+            )));
+        }
+        return Ok(Some(StressSource::Beam));
+    };
+    let file = home.folder.join(reduced.get_ref()).with_extension(STRESS_FILE);
+    if file.is_file() {
+        return Ok(Some(StressSource::File(file)));
+    }
+    match asked {
+        None => Ok(None),
+        Some(_) => Err(fail(format!(
+            "stress of link {name:?}: there is no file {}: reduce its mesh with --stress, or leave stress out",
+            file.display()
+        ))),
+    }
 }
 
 /// Reads the stiffness of a spring; it must be symmetric and positive definite.

@@ -159,6 +159,9 @@ pub(crate) struct FlexibleLinkEntry {
     pub stiffness: Option<Spanned<Vec<Vec<f64>>>>,
     /// Lumped: additional factors on the six directions of its springs; 1 by default.
     pub stiffness_factors: Option<Spanned<Vec<f64>>>,
+    /// Whether its stress is computed: false by default for a beam, true for a reduced link with a
+    /// stress file.
+    pub stress: Option<Spanned<bool>>,
     /// Strength of its material; that of the preset material by default.
     pub strength: Option<Spanned<StrengthEntry>>,
     /// Damping; 3 % modal damping by default.

@@ -198,7 +198,7 @@ fn modal_force(link: &ModalLink, j: usize) -> DVector<f64> {
 }
 
 /// Wrench of inertia load j on a rigid part about a point, link axes.
-fn part_load(part: &RigidPart, j: usize, about: &Vector3<f64>) -> Vector6<f64> {
+pub(super) fn part_load(part: &RigidPart, j: usize, about: &Vector3<f64>) -> Vector6<f64> {
     let field = Field::unit(j);
     let D = nalgebra::Matrix3::identity() * (0.5 * part.inertia.trace()) - part.inertia;
     let force = -(field.A * part.com + field.b) * part.mass;

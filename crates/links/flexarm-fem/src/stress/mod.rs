@@ -12,12 +12,17 @@
 //! the corners by the shape functions of the corners (least squares where there are more points
 //! than corners). Averages do not mix materials: at the seam of two, the stress jumps.
 //!
-//! Not here: beams, whose section forces give their stress; ties, near which the stress of a rigid
-//! interface is not that of the part.
+//! A link that is one beam gets its stress from its section forces ([`crate::BeamLink::stress_fields`]).
+//!
+//! Not here: beam elements of a mesh; ties, near which the stress of a rigid interface is not that of
+//! the part.
 //!
 //! Source: Hinton & Campbell (1974), *Int. J. Numer. Meth. Eng.* 8; Barlow (1976), *Int. J. Numer.
 //! Meth. Eng.* 10.
 
+mod beam;
+#[cfg(test)]
+mod beam_tests;
 mod fields;
 mod file;
 mod gauge;

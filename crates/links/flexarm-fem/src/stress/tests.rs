@@ -18,15 +18,15 @@ use crate::sparse::ModesWanted;
 use crate::test_mesh::cube;
 
 /// Bar along x with its interfaces at both ends.
-struct Bar {
-    mesh: Mesh,
+pub(super) struct Bar {
+    pub(super) mesh: Mesh,
     interfaces: Vec<Interface>,
-    material: Material,
+    pub(super) material: Material,
     quadrature: Quadrature,
 }
 
 impl Bar {
-    fn new(kind: ElementKind, divisions: [usize; 3], [l, w, h]: [f64; 3]) -> Self {
+    pub(super) fn new(kind: ElementKind, divisions: [usize; 3], [l, w, h]: [f64; 3]) -> Self {
         let size = |u: Vector3<f64>| Vector3::new(u.x * l, (u.y - 0.5) * w, (u.z - 0.5) * h);
         let mesh = cube(kind, divisions, true, size);
         let near = |x: f64| -> Vec<u32> {
@@ -45,7 +45,7 @@ impl Bar {
     }
 
     /// Calls `work` with the reduced mesh and its modal link.
-    fn reduced<R>(&self, modes: usize, work: impl FnOnce(&ModalSource<'_>) -> R) -> R {
+    pub(super) fn reduced<R>(&self, modes: usize, work: impl FnOnce(&ModalSource<'_>) -> R) -> R {
         let options = AssemblyOptions { quadrature: self.quadrature, material: Some(self.material) };
         let model = FeModel::assemble(&self.mesh, &options).unwrap();
         let condensation = Condensation::new(&model, &self.interfaces, Default::default()).unwrap();

@@ -40,6 +40,13 @@ pub(crate) const NO_STRESS: CaveatKind = CaveatKind::note(
     "",
     "use another stepper for the stress",
 );
+/// A beam with modes has no section forces.
+pub(crate) const NO_STRESS_OF_MODES: CaveatKind = CaveatKind::note(
+    "no-stress",
+    "{where} is a beam with modes: its stress is not computed",
+    "",
+    "use model = \"lumped\" for the stress, with more segments if its own vibration matters",
+);
 /// A drive needs more than its effort limit during a run.
 pub(crate) const EFFORT: CaveatKind = CaveatKind::warning(
     "effort",

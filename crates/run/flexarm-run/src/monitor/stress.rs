@@ -1,24 +1,27 @@
-//! Stress of the flexible links whose stress fields are stored beside their reduced links.
+//! Stress of the flexible links, from stress fields stored beside reduced links or from the section
+//! forces of beams.
 //!
 //! The monitor keeps the amplitudes of the fields at every logged sample; [`StressMonitor::result`]
 //! finds the maxima over the run for every node of the surface.
 
 use std::cell::OnceCell;
+use std::path::Path;
 
 use flexarm_analysis::rainflow_repeating;
 #[cfg(feature = "png")]
 use flexarm_draw::mesh_picture::{Image, StressPicture, stress_sheet};
 use flexarm_draw::palette::magnitude;
+use flexarm_fem::chain::Chain;
 use flexarm_fem::stress::{StressFields, StressMap, inertia_loads, parse_stress, von_mises};
-use flexarm_fem::{ReducedLink, RigidPart};
-use flexarm_flexlink::LinkForm;
+use flexarm_fem::{FemError, ReducedLink, RigidPart};
+use flexarm_flexlink::{FlexibleSpan, LinkForm};
 use flexarm_kinematics::{Data, Frame, Pose, State, inverse_dynamics};
 use flexarm_log::{GAUGE_ENDS, STRESS_VIEW, Scenery, SceneryForm};
-use flexarm_stepping::{FlexibleArm, Observation, PooledWorkspace};
-use nalgebra::{DMatrix, DVector, Matrix3, Point3, RowSVector};
+use flexarm_stepping::{ElasticElement, FlexibleArm, Observation, PooledWorkspace};
+use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, Point3, RowSVector};
 
 use crate::error::Error;
-use crate::flexible::{FlexibleRobot, Owner, RobotLink};
+use crate::flexible::{FlexibleRobot, Owner, RobotLink, StressSource};
 use crate::options::Modelling;
 use crate::robot::Robot;
 use crate::strength::Strength;
@@ -93,12 +96,12 @@ impl StressMonitor {
         for (k, link) in robot.flexible.iter().enumerate().filter(|(_, link)| link.stress.is_some()) {
             let span = &flexible.spans[k];
             let owned = arm.elements.iter().zip(&flexible.owners).filter(|(_, owner)| **owner == Owner::Link(k));
-            let elements: Vec<_> = owned.map(|(element, _)| (element.coordinate, element.size)).collect();
-            let Some(file) = link.stress.as_ref().filter(|_| !elements.is_empty()) else { continue };
-            let fail = |what: String| Error::File { path: file.clone(), what };
-            let bytes = std::fs::read(file).map_err(|error| fail(error.to_string()))?;
-            let fields = parse_stress(&bytes).map_err(fail)?;
-            let map = map_of(link, &fields, modelling).map_err(fail)?;
+            let owned: Vec<&ElasticElement> = owned.map(|(element, _)| element).collect();
+            if owned.is_empty() {
+                continue;
+            }
+            let Some((fields, map)) = fields_and_map(robot, link, span, &owned, modelling)? else { continue };
+            let elements = owned.iter().map(|element| (element.coordinate, element.size)).collect();
             let frame = arm.model.frame(&span.link).expect("a link of the substitution").clone();
             let (name, length) = (span.link.clone(), span.length);
             links.push(LinkStress {
@@ -311,16 +314,42 @@ fn placed(robot: &Robot, links: &[LinkStress]) -> Result<Vec<PlacedGauge>, Error
     Ok(gauges)
 }
 
-/// Returns the map for the model of the link.
-fn map_of(link: &RobotLink, fields: &StressFields, modelling: &Modelling) -> Result<StressMap, String> {
-    let reduced = &link.flexible.reduced;
-    let (joints, parts) = match link.form(modelling)? {
-        LinkForm::Modal(modal) => return fields.modal_map(&modal, link.stiffness_factor),
-        LinkForm::TwoParts => (vec![reduced.split.clone()], vec![reduced.proximal.clone(), reduced.distal.clone()]),
-        LinkForm::Chain(chain) => (chain.joints, chain.parts),
+/// Returns the stress fields of a link and the map from the coordinates of its model; `None` for a
+/// beam with modes.
+fn fields_and_map(
+    robot: &Robot,
+    link: &RobotLink,
+    span: &FlexibleSpan,
+    elements: &[&ElasticElement],
+    modelling: &Modelling,
+) -> Result<Option<(StressFields, StressMap)>, Error> {
+    let fail = |path: &Path| {
+        let path = path.to_owned();
+        move |what: String| Error::File { path, what }
     };
-    let springs: Vec<_> = joints.iter().map(|joint| link.scaled(&joint.K_S)).collect();
-    fields.chain_map(&joints, &without_attached(reduced, parts), &springs)
+    let (fields, path) = match (&link.stress, &link.beam, &span.lumped) {
+        (Some(StressSource::File(path)), ..) => {
+            let bytes = std::fs::read(path).map_err(|error| fail(path)(error.to_string()))?;
+            (parse_stress(&bytes).map_err(fail(path))?, path)
+        }
+        (Some(StressSource::Beam), Some(beam), Some(lumped)) => {
+            let named = |error: FemError| fail(&robot.path)(format!("stress of link {:?}: {error}", span.link));
+            (beam.stress_fields(&lumped.joints, &lumped.parts).map_err(named)?, &robot.path)
+        }
+        _ => return Ok(None),
+    };
+    let map = match &span.lumped {
+        Some(Chain { joints, parts }) => {
+            let spring = |element: &&ElasticElement| Matrix6::from_fn(|i, j| element.K[(i, j)]);
+            let springs: Vec<Matrix6<f64>> = elements.iter().map(spring).collect();
+            fields.chain_map(joints, &without_attached(&link.flexible.reduced, parts.clone()), &springs)
+        }
+        None => match robot.form_of(link, modelling)? {
+            (LinkForm::Modal(modal), _) => fields.modal_map(&modal, link.stiffness_factor),
+            _ => return Ok(None),
+        },
+    };
+    Ok(Some((fields, map.map_err(fail(path))?)))
 }
 
 /// Returns the parts without the bodies attached to the link, whose loads act at its interfaces.
