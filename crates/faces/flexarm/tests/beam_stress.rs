@@ -78,7 +78,7 @@ fn gauges_at_the_root_of_a_swinging_beam_read_the_torque_of_its_drive() {
     let beam = Beam::new("swing", |text| text.to_owned() + GAUGES);
     for (segments, bound) in [(2, 1e-5), (4, 0.02)] {
         let run = beam.swing(parts(segments));
-        let column = |name: &str| run.columns.column(name).unwrap().values;
+        let column = |name: &str| run.columns.column(name).unwrap().values.clone();
         let (gauges, torque) = (column("gauge"), column("effort"));
         let by_torque = 0.01 / (70e9 * 0.04 * 0.02_f64.powi(3) / 12.0);
         let largest = torque.iter().fold(0.0, |largest: f64, x| largest.max(x.abs()));

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use flexarm_fem::chain::Chain;
-use flexarm_fem::{ElasticSplit, ModalLink, ReducedLink, RigidPart, drop_coupling};
+use flexarm_fem::{ModalLink, ReducedLink, RigidPart, drop_coupling};
 use flexarm_kinematics::{ElasticAngles, Joint, JointKind, Link, LinkInertia, Mechanism, Pose};
 use nalgebra::{Matrix6, Vector3};
 

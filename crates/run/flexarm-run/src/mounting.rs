@@ -324,6 +324,7 @@ fn flexible_mounting(
         stiffness_factor: None,
         stiffness: None,
         stiffness_factors: None,
+        stress: None,
         strength: None,
         damping: given.damping.clone(),
         angles: None,
