@@ -1,8 +1,8 @@
 //! KUKA's KRL: `.src` with `.dat`, including the code written by teach pendants.
 //!
 //! [`parse`] converts lines to statements and [`dialect`] runs them: [`motion`] converts PTP, LIN,
-//! CIRC and the splines to moves, [`mod@bas`] and [`functions`] implement the inline forms, [`system`]
-//! holds the variables of the controller.
+//! CIRC and the splines to moves, [`mod@bas`] and [`functions`] implement the inline forms,
+//! [`system`] holds the variables of the controller.
 //!
 //! Frames: B `$BASE` in W `$WORLD` (relative to `$ROBROOT`), T `$TOOL` on the flange F. A, B, C are
 //! Z-Y'-X'' angles in degrees.
