@@ -8,7 +8,7 @@ use crate::curve::{Curve, LONGEST, QUIET_SPEED};
 use crate::error::{FileError, TrajectoryError};
 use crate::polynomial::Piece;
 use crate::problem::{Problem, SampleError};
-use crate::table::KnownJoint;
+use crate::table::request::KnownJoint;
 use crate::warning::Warning;
 
 /// A joint that moves less than this within a piece (rad or m) is at rest there.
