@@ -3,6 +3,7 @@
 
 use std::ops::Range;
 
+use flexarm_files::{Source, TextFileError as RobotFileError};
 use flexarm_flexlink::{GearStiffness, Gearbox, GuideTubes};
 use flexarm_kinematics::{Joint, JointKind, Mechanism};
 use flexarm_stepping::{Damping, Friction, Harmonic, TorqueCurve};
@@ -10,11 +11,11 @@ use nalgebra::Matrix6;
 use serde::Deserialize;
 use toml::Spanned;
 
+use crate::entry_checks::loop_of_joint;
 use crate::error::Error;
 use crate::gear_entry::{GearHysteresis, HarmonicEntry, HysteresisEntry, harmonics, hysteresis};
 use crate::guide_entry::{GuideEntry, GuideTilt};
 use crate::options::DriveModel;
-use crate::robot_file::{RobotFileError, Source};
 
 /// Minimum sampling period of a servo (s); each sample is an event of the run.
 const SHORTEST_SAMPLE: f64 = 1e-6;
@@ -297,9 +298,8 @@ fn drive(
 ) -> Result<Drive, RobotFileError> {
     let name = entry.joint.get_ref();
     let fail = |span: Range<usize>, message: String| source.error(span, format!("drive of joint {name:?}: {message}"));
-    let movable = |j: &&flexarm_kinematics::Joint| {
-        j.kind != JointKind::Fixed && crate::loops::owner(mechanism, &j.name).is_none()
-    };
+    let movable =
+        |j: &&flexarm_kinematics::Joint| j.kind != JointKind::Fixed && loop_of_joint(mechanism, &j.name).is_none();
     let connects = entry.gearbox.as_ref().is_some_and(|gearbox| gearbox.get_ref().connects());
     let moves = |joint: &&Joint| joint.kind != JointKind::Fixed || connects;
     let Some(joint) = mechanism.joints.iter().filter(moves).find(|j| j.name == *name) else {
@@ -316,7 +316,7 @@ fn drive(
         let text = "the joint is fixed: as an elastic connection it has kind = \"gearbox\" and a gearbox, no motor";
         return Err(fail(entry.kind.span(), text.into()));
     }
-    if let Some(own) = crate::loops::owner(mechanism, name) {
+    if let Some(own) = loop_of_joint(mechanism, name) {
         let text = format!(
             "the joint follows from loop {own:?}: nothing drives it, drives belong to the other joints of the loop"
         );

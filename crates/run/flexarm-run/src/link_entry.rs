@@ -1,23 +1,24 @@
 //! Flexible link entries of a robot file: from the text to reduced links with their options.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use flexarm_fem::{BeamLink, BeamTheory, Material, ReducedLink, Section, UnitSystem};
+use flexarm_files::{Source, TextFileError as RobotFileError};
 use flexarm_flexlink::{FlexibleLink, LinkForm, Parts, SubstitutionError, distal_joint};
 use flexarm_kinematics::{ElasticAngles, Mechanism, Pose};
+use flexarm_linkmaker::reduce::STRESS_FILE;
 use flexarm_stepping::Damping;
 use nalgebra::{Matrix6, Vector3};
+use serde::Deserialize;
 use toml::Spanned;
 
-use crate::beam_entry::beam_section;
+use crate::beam_entry::{BeamEntry, beam_section};
+use crate::entry_checks::keep;
 use crate::error::Error;
 use crate::file_cache::FileCache;
-use crate::flexible::{LinkChoices, RequestedKey, RobotLink};
 use crate::options::{LinkModel, Modelling};
-use crate::robot::keep;
-use crate::robot_file::{BeamEntry, DampingEntry, FlexibleLinkEntry, RobotFileError, Source};
-use crate::strength::Strength;
-use flexarm_linkmaker::reduce::STRESS_FILE;
+use crate::robot_link::{LinkChoices, RequestedKey, RobotLink};
+use crate::strength::{Strength, StrengthEntry};
 
 /// Tolerance for a symmetric matrix: difference of mirrored entries, relative to the geometric mean
 /// of the diagonal entries.
@@ -29,6 +30,65 @@ const DEFINITE: f64 = 1e-12;
 pub(crate) struct LinkHome<'a> {
     pub(crate) folder: &'a Path,
     pub(crate) files: &'a FileCache,
+}
+
+/// Flexible link.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct FlexibleLinkEntry {
+    /// Link of the URDF.
+    pub link: Spanned<String>,
+    /// Joint at the far interface.
+    pub distal: Option<Spanned<String>>,
+    /// `.flex` file, relative to the robot file.
+    pub reduced: Option<Spanned<PathBuf>>,
+    /// Beam, instead of a `.flex` file.
+    pub beam: Option<Spanned<BeamEntry>>,
+    /// `lumped` or `modal`.
+    pub model: Option<Spanned<String>>,
+    /// Number of rigid parts of a lumped link; 2 by default.
+    pub segments: Option<Spanned<i64>>,
+    /// Number of fixed-interface modes of a modal link, in addition to those of its interfaces; by
+    /// default all in the `.flex` file, or 6 for a beam.
+    pub modes: Option<Spanned<i64>>,
+    /// Modal: use this number of eigenmodes with A held instead of interface displacements.
+    pub eigenmodes: Option<Spanned<i64>>,
+    /// Modal: whether loads change the stiffness (geometric stiffening); false by default.
+    pub geometric_stiffening: Option<Spanned<bool>>,
+    /// Mass of a beam link (kg), replaces the URDF's; its inertia is scaled in proportion.
+    pub mass: Option<Spanned<f64>>,
+    /// Factor on its stiffness, for instance from measurements; 1 by default.
+    pub stiffness_factor: Option<Spanned<f64>>,
+    /// Lumped: stiffness of the spring between the two parts, replaces that of its source; 6x6,
+    /// N/m, N, N m/rad.
+    pub stiffness: Option<Spanned<Vec<Vec<f64>>>>,
+    /// Lumped: additional factors on the six directions of its springs; 1 by default.
+    pub stiffness_factors: Option<Spanned<Vec<f64>>>,
+    /// Strength of its material; that of the preset material by default.
+    pub strength: Option<Spanned<StrengthEntry>>,
+    /// Damping; 3 % modal damping by default.
+    pub damping: Option<Spanned<DampingEntry>>,
+    /// `rotation-vector` or `euler-zyx`.
+    pub angles: Option<Spanned<String>>,
+    /// `false` drops the coupling terms, only to show their effect.
+    #[serde(default = "yes")]
+    pub coupling: bool,
+}
+
+fn yes() -> bool {
+    true
+}
+
+/// Damping, in one of these forms.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct DampingEntry {
+    /// Damping ratio of each mode.
+    pub modal: Option<f64>,
+    /// `D = beta K` (s).
+    pub stiffness_beta: Option<f64>,
+    /// `D = a M + b K` (1/s, s).
+    pub rayleigh: Option<[f64; 2]>,
 }
 
 pub(crate) fn flexible_link(

@@ -18,9 +18,10 @@ use flexarm_stepping::{FlexibleArm, Observation, PooledWorkspace};
 use nalgebra::{DMatrix, DVector, Matrix3, Point3, RowSVector};
 
 use crate::error::Error;
-use crate::flexible::{FlexibleRobot, Owner, RobotLink};
+use crate::flexible::{FlexibleRobot, Owner};
 use crate::options::Modelling;
 use crate::robot::Robot;
+use crate::robot_link::RobotLink;
 use crate::strength::Strength;
 use crate::summary::{LinkStressFigures, StrainGaugeFigures, StressPlaceFigures, StressPointFigures};
 
