@@ -4,14 +4,14 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use flexarm_files::{Source, TextFileError as RobotFileError};
-use flexarm_kinematics::{Joint, JointKind, Link, Pose};
+use flexarm_kinematics::{Joint, JointKind, Link, Mechanism, Pose};
 use flexarm_urdf::{InertiaEstimate, ReadOptions, UrdfRobot, default_tcp, parse_urdf, read_urdf};
 use toml::Spanned;
 
 use super::entries::{held_joint, limit_effort, make_helical, tcp_of};
 use super::{Robot, TCP_FRAME, finding_text};
 use crate::balancer_entry::add_balancers;
-use crate::calibration_entry::calibrate;
+use crate::calibration_entry::{Calibration, calibrate};
 use crate::caveat::{Caveat, parts};
 use crate::controller_entry::controller_axes;
 use crate::coupling_entry::coupling;
@@ -204,28 +204,10 @@ impl Robot {
     ) -> Result<(Self, FlexibleRobot), Error> {
         let folder = path.parent().unwrap_or(Path::new("."));
         let mut faults: Vec<Error> = Vec::new();
-        let mut rigid = urdf.mechanism.clone();
-        if let Some(gravity) = &file.gravity {
-            rigid.gravity = (*gravity.get_ref()).into();
-            keep(check_finite("gravity", gravity.get_ref(), gravity.span(), source).map_err(Error::from), &mut faults);
-        }
-        for (joint, lead) in &file.lead {
-            keep(make_helical(&mut rigid, joint, lead, source).map_err(Error::from), &mut faults);
-        }
-        let mechanisms = &mut [&mut rigid, &mut urdf.mechanism];
-        let (calibration, wrong) = calibrate(&file.calibration, mechanisms, source);
-        faults.extend(wrong.into_iter().map(Error::from));
-        for (joint, limit) in &file.effort_limit {
-            keep(limit_effort(&mut rigid, joint, limit, source).map_err(Error::from), &mut faults);
-        }
+        let (rigid, calibration) = changed_joints(&mut urdf.mechanism, file, source, &mut faults);
         let tcp = keep(tcp_of(file, source, &urdf, options), &mut faults);
-        // Paths such as `robot.toml`, `.` and links to folders do not contain the folder's name.
-        let real_folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
-        let real_folder = real_folder.canonicalize().unwrap_or_else(|_| real_folder.to_owned());
-        let fallback_name =
-            real_folder.file_name().map_or_else(|| "robot".into(), |n| n.to_string_lossy().into_owned());
         let mut robot = Self {
-            name: file.name.clone().unwrap_or(fallback_name),
+            name: file.name.clone().unwrap_or_else(|| name_of_folder(folder)),
             path: path.to_owned(),
             urdf_path,
             rigid,
@@ -245,42 +227,7 @@ impl Robot {
             written: written_caveats(file),
             rigid_tree: Arc::default(),
         };
-        if let Some(payload) = &file.payload {
-            let link = file.tcp.as_ref().map(|t| t.get_ref().link.get_ref().as_str());
-            let link = link.or_else(|| default_tcp(&robot.urdf.mechanism)).unwrap_or_default().to_owned();
-            keep(robot.add_payload(payload, &link, source), &mut faults);
-        }
-        add_loops(&mut robot, &file.loops, source, &mut faults);
-        for (joint, value) in &file.hold {
-            let held = held_joint(joint, value, &robot.rigid, source).map_err(Error::from);
-            robot.hold.extend(keep(held, &mut faults));
-        }
-        robot.drives = drives(&file.drive, &robot.rigid, source, &mut robot.warnings, &mut faults);
-        for drive in &robot.drives {
-            for joint in robot.rigid.joints.iter_mut().filter(|j| j.name == drive.joint) {
-                joint.armature = drive.armature;
-            }
-        }
-        robot.controller = controller_axes(&file.controller_axis, &robot.rigid, source, &mut faults);
-        if let Some(entry) = &file.coupling {
-            let found = coupling(&mut robot, entry, source).map_err(Error::from);
-            robot.coupling = keep(found, &mut faults);
-        }
-        add_balancers(&mut robot, &file.balancer, source, &mut faults);
-        let home = LinkHome { folder, files };
-        for entry in &file.flexible_link {
-            keep(robot.reweigh(entry, source).map_err(Error::from), &mut faults);
-            let urdf = &robot.urdf.mechanism;
-            let flexible = flexible_link(entry, urdf, source, &home, &mut robot.warnings, &mut faults);
-            robot.flexible.extend(keep(flexible, &mut faults));
-        }
-        let links = robot.flexible.iter().map(|link| (link.flexible.link.as_str(), link.stress.is_some()));
-        let (found, wrong) = gauges(&file.strain_gauge, &file.stress_point, &links.collect::<Vec<_>>(), source);
-        robot.gauges = found;
-        faults.extend(wrong.into_iter().map(Error::from));
-        if let Some(mounting) = &file.mounting {
-            add_mounting(&mut robot, mounting, source, &home, &mut faults);
-        }
+        robot.add_entries(file, source, &LinkHome { folder, files }, &mut faults);
         match faults.len() {
             0 => {}
             1 => return Err(faults.remove(0)),
@@ -288,6 +235,46 @@ impl Robot {
         }
         let flexible = robot.finish(Some((file, source)))?;
         Ok((robot, flexible))
+    }
+
+    /// Adds payload, loops, drives, balancers, flexible links, gauges and mounting of the file, in
+    /// an order in which each finds what it builds on.
+    fn add_entries(&mut self, file: &RobotFile, source: &Source, home: &LinkHome<'_>, faults: &mut Vec<Error>) {
+        if let Some(payload) = &file.payload {
+            let link = file.tcp.as_ref().map(|t| t.get_ref().link.get_ref().as_str());
+            let link = link.or_else(|| default_tcp(&self.urdf.mechanism)).unwrap_or_default().to_owned();
+            keep(self.add_payload(payload, &link, source), faults);
+        }
+        add_loops(self, &file.loops, source, faults);
+        for (joint, value) in &file.hold {
+            let held = held_joint(joint, value, &self.rigid, source).map_err(Error::from);
+            self.hold.extend(keep(held, faults));
+        }
+        self.drives = drives(&file.drive, &self.rigid, source, &mut self.warnings, faults);
+        for drive in &self.drives {
+            for joint in self.rigid.joints.iter_mut().filter(|j| j.name == drive.joint) {
+                joint.armature = drive.armature;
+            }
+        }
+        self.controller = controller_axes(&file.controller_axis, &self.rigid, source, faults);
+        if let Some(entry) = &file.coupling {
+            let found = coupling(self, entry, source).map_err(Error::from);
+            self.coupling = keep(found, faults);
+        }
+        add_balancers(self, &file.balancer, source, faults);
+        for entry in &file.flexible_link {
+            keep(self.reweigh(entry, source).map_err(Error::from), faults);
+            let urdf = &self.urdf.mechanism;
+            let flexible = flexible_link(entry, urdf, source, home, &mut self.warnings, faults);
+            self.flexible.extend(keep(flexible, faults));
+        }
+        let links = self.flexible.iter().map(|link| (link.flexible.link.as_str(), link.stress.is_some()));
+        let (found, wrong) = gauges(&file.strain_gauge, &file.stress_point, &links.collect::<Vec<_>>(), source);
+        self.gauges = found;
+        faults.extend(wrong.into_iter().map(Error::from));
+        if let Some(mounting) = &file.mounting {
+            add_mounting(self, mounting, source, home, faults);
+        }
     }
 
     /// Adds the TCP frame and checks that both trees can be built.
@@ -323,6 +310,38 @@ impl Robot {
             (Err(error), _) => Err(error),
         }
     }
+}
+
+/// Returns the rigid robot with the gravity, helical joints, calibration and effort limits of the
+/// file, and its corrections of joints; those also go into the mechanism of the URDF.
+fn changed_joints(
+    urdf: &mut Mechanism,
+    file: &RobotFile,
+    source: &Source,
+    faults: &mut Vec<Error>,
+) -> (Mechanism, Vec<Calibration>) {
+    let mut rigid = urdf.clone();
+    if let Some(gravity) = &file.gravity {
+        rigid.gravity = (*gravity.get_ref()).into();
+        keep(check_finite("gravity", gravity.get_ref(), gravity.span(), source).map_err(Error::from), faults);
+    }
+    for (joint, lead) in &file.lead {
+        keep(make_helical(&mut rigid, joint, lead, source).map_err(Error::from), faults);
+    }
+    let (calibration, wrong) = calibrate(&file.calibration, &mut [&mut rigid, urdf], source);
+    faults.extend(wrong.into_iter().map(Error::from));
+    for (joint, limit) in &file.effort_limit {
+        keep(limit_effort(&mut rigid, joint, limit, source).map_err(Error::from), faults);
+    }
+    (rigid, calibration)
+}
+
+/// Returns the name of a folder. Paths such as `robot.toml`, `.` and links to folders do not
+/// contain it.
+fn name_of_folder(folder: &Path) -> String {
+    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    let folder = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
+    folder.file_name().map_or_else(|| "robot".into(), |name| name.to_string_lossy().into_owned())
 }
 
 /// Reads how missing masses are estimated.
