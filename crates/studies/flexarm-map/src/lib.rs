@@ -494,7 +494,7 @@ fn summed_up(
     }
     let placement = match (request.workpiece_m, grid) {
         (Some(edges), Some(grid)) => {
-            let found = best_placement(&table, grid, by, edges);
+            let found = placement::best_placement(&table, grid, by, edges);
             if found.is_none() {
                 caveats.push(no_placement(edges));
             }
@@ -542,33 +542,11 @@ fn nothing_found(request: &MapRequest, table: &MapTable, taken: &Evaluation, by:
     }
 }
 
-/// Returns the best place of a workpiece on the grid, if it fits anywhere.
-fn best_placement(table: &MapTable, grid: &Grid, by: usize, edges: [f64; 3]) -> Option<Placement> {
-    let mut found = placement::best_box(grid, &cost_by_place(table, grid, by), edges)?;
-    if table.columns[by].more_is_better {
-        found.worst = -found.worst;
-    }
-    Some(found)
-}
-
 /// Returns the caveat that a workpiece fits nowhere.
 fn no_placement(edges: [f64; 3]) -> Caveat {
     let message =
         format!("the workpiece of {edges:?} m does not fit anywhere on the grid with all its places within reach");
     Caveat::from_message("no-placement", "map", message, "use a smaller workpiece or more tool directions")
-}
-
-/// Returns the cost of each place: that of its best pose among the rows, so the worst one if only
-/// that is kept.
-fn cost_by_place(table: &MapTable, grid: &Grid, by: usize) -> Vec<f64> {
-    let place = columns::HEAD.iter().position(|(name, _)| *name == "place").unwrap_or_default();
-    let mut cost = vec![f64::INFINITY; grid.places()];
-    for k in 0..table.rows() {
-        let row = table.row(k);
-        let slot = &mut cost[row[place] as usize];
-        *slot = slot.min(table.cost(by, row[by]));
-    }
-    cost
 }
 
 /// Returns a caveat if the map has a single place, so that there is nothing to compare.
