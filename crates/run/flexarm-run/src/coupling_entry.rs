@@ -79,19 +79,22 @@ pub(crate) fn coupling(
     if let Err(message) = gears_fit(robot, joints) {
         return fail(entry.joints.span(), message);
     }
+    couple_rotors(robot, joints, &C_inverse);
+    Ok(RobotCoupling { joints: joints.clone(), C, C_inverse })
+}
 
-    // Each rotor turns with several joints.
+/// Sets the inertias of the rotors, each of which turns with several joints.
+fn couple_rotors(robot: &mut Robot, joints: &[String], C_inverse: &DMatrix<f64>) {
     let armature: Vec<f64> =
         joints.iter().map(|name| robot.drives.iter().find(|d| d.joint == *name).map_or(0.0, |d| d.armature)).collect();
-    let rotors = GearCoupling::on_joints(&C_inverse, &armature);
+    let rotors = GearCoupling::on_joints(C_inverse, &armature);
     for (i, name) in joints.iter().enumerate() {
         robot.rigid.joints.iter_mut().filter(|j| j.name == *name).for_each(|joint| joint.armature = rotors[(i, i)]);
-        for j in (i + 1..n).filter(|j| rotors[(i, *j)] != 0.0) {
+        for j in (i + 1..joints.len()).filter(|j| rotors[(i, *j)] != 0.0) {
             let pair = [name.clone(), joints[j].clone()];
             robot.rigid.rotor_couplings.push(RotorCoupling { joints: pair, inertia: rotors[(i, j)] });
         }
     }
-    Ok(RobotCoupling { joints: joints.clone(), C, C_inverse })
 }
 
 /// Checks that the drives of coupled joints are supported by a coupling.

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use flexarm_files::{Source, TextFileError as RobotFileError};
 use flexarm_flexlink::{Mounting, base_link};
-use flexarm_kinematics::{Joint, JointKind, Link, LinkInertia};
+use flexarm_kinematics::{Joint, JointKind, Link, LinkInertia, Pose};
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 use serde::Deserialize;
 use toml::Spanned;
@@ -217,6 +217,37 @@ fn with_own_mass(beam: &Spanned<BeamEntry>) -> Spanned<BeamEntry> {
     own
 }
 
+/// Returns the pose of the base in the link under it.
+fn base_in_link(
+    entry: &Spanned<MountingEntry>,
+    xyz: &[f64; 3],
+    home: &LinkHome<'_>,
+    fail: &impl Fn(std::ops::Range<usize>, &str) -> Error,
+) -> Result<Pose, Error> {
+    let given = entry.get_ref();
+    match (&given.reduced, &given.xyz) {
+        (Some(_), Some(xyz)) => {
+            Err(fail(xyz.span(), "the .flex file gives the position of the base (its interface B): leave xyz out"))
+        }
+        (Some(file), None) => {
+            let path = home.folder.join(file.get_ref());
+            if !path.is_file() {
+                let message = format!("reduced = {:?}: there is no file {}", file.get_ref(), path.display());
+                return Err(fail(file.span(), &message));
+            }
+            Ok(home.files.flex(&path)?.X_LB)
+        }
+        (None, Some(foot)) if foot.get_ref().iter().all(|x| *x == 0.0) => {
+            Err(fail(foot.span(), "the foot of the beam is at the origin of the base: a beam needs a length"))
+        }
+        (None, Some(_)) => Ok(pose([-xyz[0], -xyz[1], -xyz[2]], [0.0; 3])),
+        (None, None) => Err(fail(
+            entry.span(),
+            "a beam needs its foot in the base link, xyz = [x, y, z] in m: [0.0, 0.0, -0.6] is 0.6 m below",
+        )),
+    }
+}
+
 /// Builds a flexible link, from a beam or a reduced mesh, between the ground and the base.
 fn flexible_mounting(
     robot: &mut Robot,
@@ -242,33 +273,7 @@ fn flexible_mounting(
             "rpy belongs to springs; the axes of a beam are those of the base, those of a .flex file its own",
         ));
     }
-    // Pose of the base in the link.
-    let X_LB = match (&given.reduced, &given.xyz) {
-        (Some(_), Some(xyz)) => {
-            return Err(fail(
-                xyz.span(),
-                "the .flex file gives the position of the base (its interface B): leave xyz out",
-            ));
-        }
-        (Some(file), None) => {
-            let path = home.folder.join(file.get_ref());
-            if !path.is_file() {
-                let message = format!("reduced = {:?}: there is no file {}", file.get_ref(), path.display());
-                return Err(fail(file.span(), &message));
-            }
-            home.files.flex(&path)?.X_LB
-        }
-        (None, Some(foot)) if foot.get_ref().iter().all(|x| *x == 0.0) => {
-            return Err(fail(foot.span(), "the foot of the beam is at the origin of the base: a beam needs a length"));
-        }
-        (None, Some(_)) => pose([-xyz[0], -xyz[1], -xyz[2]], [0.0; 3]),
-        (None, None) => {
-            return Err(fail(
-                entry.span(),
-                "a beam needs its foot in the base link, xyz = [x, y, z] in m: [0.0, 0.0, -0.6] is 0.6 m below",
-            ));
-        }
-    };
+    let X_LB = base_in_link(entry, xyz, home, &fail)?;
     let base = base_link(&robot.rigid, &name).map_err(|e| source.error(entry.span(), e.to_string()))?.name.clone();
     // The base keeps its pose at the origin of the world.
     let (ground, joint) = (format!("{name}__ground"), format!("{name}__base"));
