@@ -1,4 +1,4 @@
-//! Models of a robot: chooses the form of each flexible link, and collects springs, gears and drives.
+//! Models of a robot: the form of each flexible link, and all springs, gears and drives.
 
 use std::collections::HashMap;
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! Control flow: branches, loops and case distinctions, and what of them only the controller decides.
+//! Control flow: branches, loops, case distinctions, and branches that only the controller decides.
 
 use std::rc::Rc;
 
