@@ -20,7 +20,7 @@ pub enum RobotMounting {
     },
     /// Flexible link between ground and base.
     Link {
-        /// Name of the link in [`Robot::flexible`].
+        /// Name of the link in [`crate::Robot::flexible`].
         name: String,
     },
 }
