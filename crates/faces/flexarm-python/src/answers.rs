@@ -4,10 +4,10 @@ use flexarm::{ModeTable, OperatingPoint, OperatingPoints, Quantity, Response, Re
 use pyo3::prelude::*;
 use pyo3::types::{PyList, PyTuple};
 
-use crate::arm::{PyArm, only_for_one};
+use crate::arm::PyArm;
 use crate::arrays::{array, view};
 use crate::caveat;
-use crate::failure::OrRaise;
+use crate::failure::{OrRaise, only_for_one};
 use crate::figures::Figures;
 use crate::parts::{Parts, Pickled};
 use crate::values::{plain, word};

@@ -1,12 +1,9 @@
 //! Arms: robots with their flexible links and drives, evaluated with numpy arrays.
 
-use std::collections::HashMap;
 use std::sync::{Mutex, OnceLock, PoisonError};
 
-use flexarm::{
-    Arm, Error, LiveOptions, OperatingPoint, Outputs, RecordingFormat, RunOptions, RunRequest, Scenario, Servos,
-};
-use pyo3::exceptions::{PyRuntimeError, PyTypeError, PyValueError};
+use flexarm::{Arm, Error, LiveOptions, OperatingPoint, Outputs, RunOptions, RunRequest, Scenario, Servos};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PyTuple};
 
@@ -18,12 +15,12 @@ use crate::failure::{OrRaise, exception};
 use crate::linear::{PyLinear, linear};
 use crate::live::PyLive;
 use crate::model::PyModel;
-use crate::motion::PyMotion;
 use crate::operating_point::PyOperatingPoint;
 use crate::robot::PyRobot;
 use crate::run::{PyRun, PySample};
-use crate::scenario::{PyScenario, scenario};
-use crate::values::{as_wrench, path, stepper, texts, whole, word, wrench};
+use crate::run_arguments::{is_one, outputs, progress_function, run_options, scenarios};
+use crate::scenario::scenario;
+use crate::values::{as_wrench, texts, whole, word, wrench};
 use crate::watch::{Watch, stoppable};
 
 /// A robot with its flexible links and drives. Created by :meth:`Robot.flexible`.
@@ -73,88 +70,6 @@ impl PyArm {
         }
         let made = self.arm.operating_point().or_raise()?;
         Ok(self.point.get_or_init(|| Mutex::new(made)))
-    }
-
-    fn scenarios(&self, py: Python<'_>, runs: &Bound<'_, PyAny>) -> PyResult<Vec<Scenario>> {
-        let robot = self.robot.bind(py);
-        let wrong =
-            || PyTypeError::new_err(format!("runs is {}: expected a list of motions or Scenarios", runs.get_type()));
-        if is_one(runs) {
-            return Err(wrong());
-        }
-        // The same object again, as in [None] * 1000, gives the same scenario.
-        let mut known: HashMap<*mut pyo3::ffi::PyObject, (Bound<'_, PyAny>, Scenario)> = HashMap::new();
-        let mut all = Vec::new();
-        for run in runs.try_iter().map_err(|_| wrong())? {
-            let run = run?;
-            if let Some((_, scenario)) = known.get(&run.as_ptr()) {
-                all.push(scenario.clone());
-                continue;
-            }
-            py.check_signals()?;
-            let made = scenario(robot, Some(&run), None, None, None)?;
-            all.push(made.clone());
-            known.insert(run.as_ptr(), (run, made));
-        }
-        Ok(all)
-    }
-}
-
-/// Returns whether the argument is one motion or scenario, not a sequence.
-fn is_one(runs: &Bound<'_, PyAny>) -> bool {
-    runs.is_none()
-        || runs.cast::<PyMotion>().is_ok()
-        || runs.cast::<PyScenario>().is_ok()
-        || runs.extract::<std::path::PathBuf>().is_ok()
-}
-
-/// Options shared by single and multiple runs.
-fn run_options(
-    step: Option<f64>,
-    stepper_word: Option<&str>,
-    options: Option<&Bound<'_, PyDict>>,
-) -> PyResult<RunOptions> {
-    let stepper = stepper(stepper_word, options)?;
-    let step_s = step.unwrap_or(stepper.entry().default_step_s);
-    Ok(RunOptions { step_s, stepper, ..RunOptions::default() })
-}
-
-/// Returns the output folder and the requested recordings.
-fn outputs(
-    folder: Option<&Bound<'_, PyAny>>,
-    overwrite: bool,
-    formats: Option<Vec<String>>,
-    figures: bool,
-) -> PyResult<Option<Outputs>> {
-    let Some(folder) = folder else {
-        let unused = overwrite || figures || formats.is_some();
-        return match unused {
-            true => Err(PyValueError::new_err("overwrite, formats and figures need an output folder")),
-            false => Ok(None),
-        };
-    };
-    let mut outputs = Outputs { overwrite, figures, ..Outputs::everything(path("output", folder)?) };
-    if let Some(formats) = formats {
-        let known: Vec<(&str, RecordingFormat)> =
-            RecordingFormat::ALL.into_iter().map(|format| (format.info().extension, format)).collect();
-        outputs.recordings = formats.iter().map(|found| word("formats", found, &known)).collect::<PyResult<_>>()?;
-    }
-    Ok(Some(outputs))
-}
-
-/// Returns the progress function: the caller's, or a bar if True was given.
-pub(crate) fn progress_function<'py>(
-    py: Python<'py>,
-    given: Option<Bound<'py, PyAny>>,
-) -> PyResult<Option<Bound<'py, PyAny>>> {
-    let Some(given) = given.filter(|given| !given.is_none()) else { return Ok(None) };
-    match given.extract::<bool>() {
-        Ok(false) => Ok(None),
-        Ok(true) => {
-            let bar = py.import("flexarm._show")?.call_method0("progress_bar")?;
-            Ok(Some(bar).filter(|bar| !bar.is_none()))
-        }
-        Err(_) => Ok(Some(given)),
     }
 }
 
@@ -318,7 +233,7 @@ impl PyArm {
         errors: &str,
     ) -> PyResult<Bound<'py, PyList>> {
         let raises = word("errors", errors, &[("raise", true), ("return", false)])?;
-        let scenarios = self.scenarios(py, runs)?;
+        let scenarios = scenarios(self.robot.bind(py), runs)?;
         let options = run_options(step, stepper, stepper_options)?;
         let options = RunOptions {
             log_rate_hz: log_rate.unwrap_or(options.log_rate_hz),
@@ -402,7 +317,7 @@ impl PyArm {
         let raises = word("errors", errors, &[("raise", true), ("nan", false)])?;
         let robot = self.robot.bind(py);
         let scenarios = match runs.filter(|runs| !is_one(runs)) {
-            Some(runs) => Scenarios::Each(self.scenarios(py, runs)?),
+            Some(runs) => Scenarios::Each(scenarios(robot, runs)?),
             None => Scenarios::One(Box::new(scenario(robot, runs, None, None, None)?)),
         };
         let (mass, com, inertia) = (payload_mass, payload_com, payload_inertia);
@@ -657,9 +572,4 @@ impl PyArm {
         watch.done(run.summary.duration_s)?;
         Ok(run)
     }
-}
-
-/// Error of results that exist only for a single pose.
-pub(crate) fn only_for_one(what: &str) -> PyErr {
-    PyRuntimeError::new_err(format!("{what} is available for a single pose only"))
 }

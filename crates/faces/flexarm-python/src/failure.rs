@@ -5,6 +5,7 @@ use flexarm::compensate::CompensateError;
 use flexarm::identify::IdentifyFileError;
 use flexarm::map::MapError;
 use flexarm::{Error, Fault, NewError};
+use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::types::PyType;
 
@@ -86,4 +87,9 @@ impl<T, E: Into<Error>> OrRaise<T> for Result<T, E> {
     fn or_raise(self) -> PyResult<T> {
         self.map_err(|error| exception(error.into()))
     }
+}
+
+/// Error of results that exist only for a single pose.
+pub(crate) fn only_for_one(what: &str) -> PyErr {
+    PyRuntimeError::new_err(format!("{what} is available for a single pose only"))
 }

@@ -27,8 +27,10 @@ mod names;
 mod new;
 mod operating_point;
 mod parts;
+mod restore;
 mod robot;
 mod run;
+mod run_arguments;
 mod scenario;
 mod sensitivity;
 mod sweep;
@@ -70,7 +72,7 @@ mod _flexarm {
     #[pymodule_export]
     use crate::operating_point::PyOperatingPoint;
     #[pymodule_export]
-    use crate::parts::restore;
+    use crate::restore::restore;
     #[pymodule_export]
     use crate::robot::{PyRobot, check, load, robot};
     #[pymodule_export]

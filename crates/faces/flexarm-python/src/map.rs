@@ -9,7 +9,6 @@ use pyo3::exceptions::{PyKeyError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
-use crate::arm::progress_function;
 use crate::arrays::{array, numbers};
 use crate::caveat;
 use crate::failure::OrRaise;
@@ -17,6 +16,7 @@ use crate::figures::Figures;
 use crate::lobes::cutting_tool;
 use crate::parts::{Parts, Pickled};
 use crate::robot::PyRobot;
+use crate::run_arguments::progress_function;
 use crate::scenario::scenario;
 use crate::values::{maybe_whole, modelling, whole, word, wrench};
 use crate::watch::Watch;

@@ -1,10 +1,10 @@
 //! Results as named parts that can be pickled: numbers as arrays, the rest as plain values.
 
 use pyo3::conversion::FromPyObjectOwned;
-use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::pyclass::boolean_struct::True;
-use pyo3::types::{PyDict, PyType};
+use pyo3::types::PyDict;
 
 use crate::arrays::{any_numbers, array};
 
@@ -30,6 +30,11 @@ pub(crate) trait Pickled: pyo3::PyClass<Frozen = True> + Sync {
 }
 
 impl<'py> Parts<'py> {
+    /// Returns the parts in a dictionary.
+    pub(crate) fn of(parts: &Bound<'py, PyDict>) -> Self {
+        Self(parts.clone())
+    }
+
     /// Stores a value.
     pub(crate) fn put(&self, name: &str, value: impl IntoPyObject<'py>) -> PyResult<()> {
         self.0.set_item(name, value)
@@ -65,24 +70,4 @@ impl<'py> Parts<'py> {
             }
         }
     }
-}
-
-/// Restores a result; for `flexarm._pickle`.
-#[pyfunction]
-#[pyo3(name = "_restore")]
-pub(crate) fn restore<'py>(kind: &Bound<'py, PyType>, parts: &Bound<'py, PyDict>) -> PyResult<Bound<'py, PyAny>> {
-    let (py, parts) = (kind.py(), Parts(parts.clone()));
-    let name = kind.name()?;
-    Ok(match name.to_str()? {
-        "Run" => Bound::new(py, crate::run::PyRun::of_parts(&parts)?)?.into_any(),
-        "Sample" => Bound::new(py, crate::run::PySample::of_parts(&parts)?)?.into_any(),
-        "Statics" => Bound::new(py, crate::answers::PyStatics::of_parts(&parts)?)?.into_any(),
-        "Modes" => Bound::new(py, crate::answers::PyModes::of_parts(&parts)?)?.into_any(),
-        "Response" => Bound::new(py, crate::answers::PyResponse::of_parts(&parts)?)?.into_any(),
-        "Linear" => Bound::new(py, crate::linear::PyLinear::of_parts(&parts)?)?.into_any(),
-        "Deflections" => Bound::new(py, crate::deflections::PyDeflections::of_parts(&parts)?)?.into_any(),
-        "Map" => Bound::new(py, crate::map::PyMap::of_parts(&parts)?)?.into_any(),
-        "Compensated" => Bound::new(py, crate::compensate::PyCompensated::of_parts(&parts)?)?.into_any(),
-        other => return Err(PyTypeError::new_err(format!("{other} is not pickled by its parts"))),
-    })
 }

@@ -8,9 +8,9 @@ use flexarm::Caveat;
 use flexarm::sweep::{Finders, Shard, Sweep, SweepRequest};
 use pyo3::prelude::*;
 
-use crate::arm::progress_function;
 use crate::caveat;
 use crate::failure::OrRaise;
+use crate::run_arguments::progress_function;
 use crate::values::maybe_whole;
 use crate::watch::stoppable_telling;
 

@@ -187,14 +187,16 @@ fn keys(sources: &[&str]) -> BTreeMap<String, BTreeSet<String>> {
     found
 }
 
-const ROBOT: [&str; 9] = [
+const ROBOT: [&str; 11] = [
     "crates/run/flexarm-run/src/robot_file.rs",
     "crates/run/flexarm-run/src/balancer_entry.rs",
     "crates/run/flexarm-run/src/controller_entry.rs",
     "crates/run/flexarm-run/src/beam_entry.rs",
     "crates/run/flexarm-run/src/drive_entry.rs",
     "crates/run/flexarm-run/src/gear_entry.rs",
-    "crates/run/flexarm-run/src/mounting.rs",
+    "crates/run/flexarm-run/src/coupling_entry.rs",
+    "crates/run/flexarm-run/src/link_entry.rs",
+    "crates/run/flexarm-run/src/mounting_entry.rs",
     "crates/run/flexarm-run/src/loop_entry.rs",
     "crates/run/flexarm-linkmaker/src/material_entry.rs",
 ];

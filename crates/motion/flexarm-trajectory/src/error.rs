@@ -7,9 +7,9 @@ use std::fmt;
 use std::io;
 use std::path::PathBuf;
 
+use crate::curve::LONGEST;
 use crate::polynomial::FARTHEST;
 use crate::problem::{PlanError, Problem, SampleError, list};
-use crate::trajectory::LONGEST;
 
 /// Error of reading, planning or writing a trajectory.
 #[derive(Debug, thiserror::Error)]

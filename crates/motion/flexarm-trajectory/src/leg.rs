@@ -3,12 +3,12 @@
 //! Start at [`Leg::curves`]: unit shapes (`shape`, or `via` for moves through via points) times the
 //! travel of each joint.
 
+use crate::curve::Curve;
 use crate::optimal::JointPath;
 use crate::plan::{MotionLimits, PlannedMove, Profile};
 use crate::polynomial::Piece;
 use crate::problem::PlanError;
 use crate::shape::{self, Phases, ShapeLimits};
-use crate::trajectory::Curve;
 use crate::via;
 use crate::warning::Warning;
 

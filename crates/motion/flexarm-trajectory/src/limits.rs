@@ -3,7 +3,8 @@
 
 use std::fmt;
 
-use crate::trajectory::{Curve, Trajectory};
+use crate::curve::Curve;
+use crate::trajectory::Trajectory;
 
 /// Relative tolerance: a limit counts as violated beyond this fraction of its value, so that a move
 /// planned at the limit does not violate it.

@@ -3,12 +3,12 @@
 //! The path is the natural cubic spline through the points over chord length; [`crate::jerk_law`]
 //! computes the time law.
 
+use crate::curve::Curve;
 use crate::jerk_law::{JerkBound, PathBounds, least_time_with_jerks};
 use crate::plan::MotionLimits;
 use crate::polynomial::Piece;
 use crate::spline::natural_spline;
 use crate::time_law::{Bound, Law, PathPoint, least_time};
-use crate::trajectory::Curve;
 
 /// Rise time of the acceleration to its limit where no jerk limit is given (s).
 pub(crate) const RISE: f64 = 0.05;

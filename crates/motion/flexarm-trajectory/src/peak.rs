@@ -3,7 +3,8 @@
 //! Exact: extrema come from the roots of the next derivative of each polynomial piece, not from
 //! samples.
 
-use crate::trajectory::{Curve, Trajectory};
+use crate::curve::Curve;
+use crate::trajectory::Trajectory;
 
 /// A value and its time.
 #[derive(Debug, Clone, Copy, PartialEq)]

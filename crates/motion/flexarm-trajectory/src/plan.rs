@@ -13,10 +13,11 @@
 //! common shape (a straight line in joint space) under the strictest limits; otherwise each joint
 //! has its own shape and the slowest joint determines the duration.
 
+use crate::curve::Curve;
 use crate::error::TrajectoryError;
 use crate::leg::Leg;
 use crate::problem::PlanError;
-use crate::trajectory::{Curve, Trajectory};
+use crate::trajectory::Trajectory;
 
 /// Velocity profile of a move.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -4,8 +4,8 @@
 
 use flexarm_settings::Setting;
 
+use crate::curve::LONGEST;
 use crate::polynomial::FARTHEST;
-use crate::trajectory::LONGEST;
 
 /// A problem in a file; the message includes the remedy.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -4,10 +4,10 @@
 //! velocity and acceleration at both ends. Not here: finding corners (`corner`), recordings that
 //! start or end at speed.
 
+use crate::curve::{Curve, QUIET_SPEED};
 use crate::error::TrajectoryError;
 use crate::polynomial::Piece;
-use crate::trajectory::{Curve, Trajectory};
-use crate::warning::QUIET_SPEED;
+use crate::trajectory::Trajectory;
 
 impl Trajectory {
     /// Returns the same motion with every interior corner replaced by a quintic blend of duration

@@ -17,8 +17,8 @@
 //! (`t_jerk = rounding t_ramp / 2`; without rounding the acceleration jumps), an S-curve rounds by
 //! a jerk limit (`t_jerk = a / jerk`).
 
+use crate::curve::Curve;
 use crate::polynomial::Piece;
-use crate::trajectory::Curve;
 
 /// Fraction of the duration for each ramp of a trapezoid if only the duration is given.
 const TRAPEZOID_RAMP: f64 = 0.25;

@@ -24,11 +24,12 @@
 //! corner are not used, since it is unknown which side they belong to.
 
 use crate::corner::{Corner, corners};
+use crate::curve::Curve;
 use crate::error::TrajectoryError;
 use crate::gap::gaps;
 use crate::polynomial::Piece;
 use crate::problem::SampleError;
-use crate::trajectory::{Curve, Trajectory};
+use crate::trajectory::Trajectory;
 
 /// An end with a speed below this fraction of the top speed is at rest.
 const REST_FRACTION: f64 = 0.02;

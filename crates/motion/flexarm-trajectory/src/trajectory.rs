@@ -4,17 +4,15 @@
 //! Start at [`Trajectory::sample`]. Trajectories are built by [`crate::Plan`] and
 //! [`crate::Samples`] and do not change afterwards.
 
+use crate::curve::{Curve, LONGEST, QUIET_SPEED};
 use crate::error::{FileError, TrajectoryError};
 use crate::polynomial::Piece;
 use crate::problem::{Problem, SampleError};
-use crate::table::KnownJoint;
-use crate::warning::{QUIET_SPEED, Warning};
+use crate::table::request::KnownJoint;
+use crate::warning::Warning;
 
 /// A joint that moves less than this within a piece (rad or m) is at rest there.
 const REST: f64 = 1e-9;
-
-/// Maximum duration of a motion (s): about four months.
-pub const LONGEST: f64 = 1e7;
 
 /// Joint positions, velocities and accelerations as functions of time, from `t = 0` to
 /// [`Trajectory::duration`].
@@ -41,13 +39,6 @@ pub(crate) struct StatedUnit {
     pub(crate) is_length: bool,
     /// Line of the statement, from 1.
     pub(crate) line: usize,
-}
-
-/// Curve of one joint: `knots[i] <= t < knots[i + 1]` belongs to `pieces[i]`.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Curve {
-    pub(crate) knots: Vec<f64>,
-    pub(crate) pieces: Vec<Piece>,
 }
 
 /// Corner: a velocity jump of one joint.
@@ -405,105 +396,4 @@ fn add_note(notes: &mut Vec<Warning>, note: Warning) {
         }
     }
     notes.push(note);
-}
-
-impl Curve {
-    /// Position, velocity, acceleration and jerk at `t`, clamped to the range of the knots.
-    pub(crate) fn at(&self, t: f64) -> [f64; 4] {
-        let last = self.pieces.len() - 1;
-        let i = self.knots[1..=last].partition_point(|&knot| knot <= t);
-        let piece = &self.pieces[i];
-        piece.at((t - self.knots[i]).clamp(0.0, piece.width))
-    }
-
-    /// The curve started at `start`, held before it and after its end until `duration`.
-    fn within(&self, start: f64, duration: f64) -> Self {
-        let mut knots: Vec<f64> = self.knots.iter().map(|knot| start + knot).collect();
-        let mut pieces = self.pieces.clone();
-        if start > 0.0 {
-            knots.insert(0, 0.0);
-            pieces.insert(0, Piece::hold(start, self.start()[0]));
-        }
-        let end = knots[knots.len() - 1];
-        // Ends that differ only by rounding are the same.
-        if duration - end > 1e-9 * duration {
-            knots.push(duration);
-            pieces.push(Piece::hold(duration - end, self.end()[0]));
-        } else if let (Some(last), Some(piece)) = (knots.last_mut(), pieces.last())
-            && (duration - *last).abs() <= 1e-9 * piece.width
-        {
-            *last = duration;
-        }
-        Self { knots, pieces }
-    }
-
-    /// [`Trajectory::still_until`] for one joint.
-    fn still_until(&self, t: f64) -> f64 {
-        let last = self.pieces.len() - 1;
-        let first = self.knots[1..=last].partition_point(|&knot| knot <= t);
-        match self.pieces[first..].iter().position(|piece| !piece.is_still()) {
-            Some(0) => t,
-            Some(still) => self.knots[first + still],
-            None => f64::INFINITY,
-        }
-    }
-
-    pub(crate) fn start(&self) -> [f64; 4] {
-        self.pieces[0].at(0.0)
-    }
-
-    pub(crate) fn end(&self) -> [f64; 4] {
-        let piece = &self.pieces[self.pieces.len() - 1];
-        piece.at(piece.width)
-    }
-
-    /// Jumps at every knot, including those to the holds before and after.
-    pub(crate) fn jumps(&self) -> impl Iterator<Item = Jump> + '_ {
-        let held = |[q, ..]: [f64; 4]| [q, 0.0, 0.0, 0.0];
-        let last = self.pieces.len();
-        (0..=last).map(move |i| {
-            let left = i.checked_sub(1).map(|i| &self.pieces[i]);
-            let right = self.pieces.get(i);
-            let before = left.map_or_else(|| held(self.start()), |piece| piece.at(piece.width));
-            let after = right.map_or_else(|| held(self.end()), |piece| piece.at(0.0));
-            // Positions are exact to a few units in the last place; each derivative divides this
-            // error by the width.
-            let width = left.into_iter().chain(right).map(|piece| piece.width).fold(f64::INFINITY, f64::min);
-            let rounding = |order: i32| 1e-13 * after[0].abs() / width.powi(order);
-            Jump {
-                time_s: self.knots[i],
-                size: std::array::from_fn(|k| after[k] - before[k]),
-                rounding: [0, 1, 2, 3].map(rounding),
-            }
-        })
-    }
-
-    /// Knots at which the velocity, acceleration or jerk jumps by more than rounding and, for the
-    /// latter two, a millionth of its peak.
-    fn kinks(&self) -> Vec<f64> {
-        let levels = [0.0, QUIET_SPEED, 1e-6 * self.largest(2), 1e-6 * self.largest(3)];
-        let kinks = self.jumps().filter(|jump| (1..4).any(|order| jump.exceeds(order, levels[order])));
-        kinks.map(|jump| jump.time_s).collect()
-    }
-
-    /// Maximum magnitude of derivative `order`.
-    pub(crate) fn largest(&self, order: usize) -> f64 {
-        let [least, greatest] = self.range(order);
-        greatest.value.max(-least.value)
-    }
-}
-
-/// Jumps of position, velocity, acceleration and jerk at a knot.
-pub(crate) struct Jump {
-    pub(crate) time_s: f64,
-    pub(crate) size: [f64; 4],
-    /// Jumps below this are rounding errors.
-    rounding: [f64; 4],
-}
-
-impl Jump {
-    /// Whether the jump of derivative `order` exceeds `level` and the rounding error.
-    pub(crate) fn exceeds(&self, order: usize, level: f64) -> bool {
-        self.size[order].abs() > level.max(self.rounding[order])
-    }
 }

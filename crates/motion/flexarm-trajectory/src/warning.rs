@@ -4,10 +4,8 @@ use std::fmt;
 
 use flexarm_settings::Setting;
 
-use crate::trajectory::Curve;
+use crate::curve::{Curve, QUIET_SPEED};
 
-/// Speeds below this (rad/s or m/s) give no warning.
-pub(crate) const QUIET_SPEED: f64 = 1e-6;
 /// Jumps below this fraction of the peak acceleration are rounding errors.
 const QUIET_JUMP: f64 = 1e-6;
 

@@ -8,11 +8,12 @@ use std::ops::Range;
 
 use toml::Spanned;
 
+use crate::curve::LONGEST;
 use crate::limits::JointLimits;
 use crate::plan::{MotionLimits, Plan, PlannedMove, Profile};
 use crate::polynomial::FARTHEST;
 use crate::problem::Problem;
-use crate::trajectory::{LONGEST, StatedUnit};
+use crate::trajectory::StatedUnit;
 use crate::waypoints_toml::{FileToml, LawToml, MoveToml, ProfileToml, Values};
 
 /// Default rounding of trapezoids.

@@ -9,6 +9,7 @@ use flexarm_trajectory::Trajectory;
 use nalgebra::{DVector, Matrix6xX, Rotation3, Vector3};
 use serde::Serialize;
 
+use crate::entry_checks::loop_of_joint;
 use crate::error::BalancerError;
 use crate::robot::Robot;
 
@@ -87,7 +88,7 @@ impl Robot {
                     let known = self.rigid.joints.iter().filter(moves).map(|j| j.name.clone()).collect();
                     return Err(BalancerError::UnknownJoint { name, joint, known });
                 };
-                if let Some(own) = crate::loops::owner(&self.rigid, &joint) {
+                if let Some(own) = loop_of_joint(&self.rigid, &joint) {
                     return Err(BalancerError::Dependent { name, joint, own: own.to_owned() });
                 }
                 if matches!(law, BalancerLaw::Sine { .. }) && found.kind.slides() {

@@ -3,6 +3,7 @@
 use std::f64::consts::PI;
 use std::ops::{Range, RangeInclusive};
 
+use flexarm_files::{Source, TextFileError as RobotFileError};
 use flexarm_kinematics::{BalancerCurve, BalancerLaw, GasLaw};
 use serde::Deserialize;
 use toml::Spanned;
@@ -10,7 +11,6 @@ use toml::Spanned;
 use crate::balancer::{BalancerEnds, RobotBalancer};
 use crate::error::Error;
 use crate::robot::Robot;
-use crate::robot_file::{RobotFileError, Source};
 
 /// Polytropic exponents of gases: from isothermal to beyond the adiabatic exponent of a monatomic
 /// gas at high pressure.

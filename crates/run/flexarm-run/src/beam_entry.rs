@@ -3,9 +3,8 @@
 //! [`Section::SHAPES`] lists the lengths that each shape takes.
 
 use flexarm_fem::{Bar, Material, Section};
+use flexarm_linkmaker::MaterialEntry;
 use serde::Deserialize;
-
-use crate::robot_file::MaterialEntry;
 
 /// Closed-form beam from the link's frame to the distal joint.
 #[derive(Clone, Debug, Deserialize)]

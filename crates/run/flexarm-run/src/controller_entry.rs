@@ -1,13 +1,13 @@
 //! `[[controller_axis]]` of a robot file: axis conventions of the robot's controller that differ
 //! from the description.
 
+use flexarm_files::{Source, TextFileError as RobotFileError};
 use flexarm_kinematics::{JointKind, Mechanism};
 use flexarm_urdf::closest;
 use serde::Deserialize;
 use toml::Spanned;
 
 use crate::error::Error;
-use crate::robot_file::{RobotFileError, Source};
 
 /// Entry as written.
 #[derive(Clone, Debug, Deserialize)]

@@ -3,6 +3,7 @@
 
 use std::ops::Range;
 
+use flexarm_files::{Source, TextFileError as RobotFileError};
 use flexarm_flexlink::{GearStiffness, Gearbox, GuideTubes};
 use flexarm_kinematics::{Joint, JointKind, Mechanism};
 use flexarm_stepping::{Damping, Friction, Harmonic, TorqueCurve};
@@ -10,11 +11,11 @@ use nalgebra::Matrix6;
 use serde::Deserialize;
 use toml::Spanned;
 
+use crate::entry_checks::loop_of_joint;
 use crate::error::Error;
 use crate::gear_entry::{GearHysteresis, HarmonicEntry, HysteresisEntry, harmonics, hysteresis};
 use crate::guide_entry::{GuideEntry, GuideTilt};
 use crate::options::DriveModel;
-use crate::robot_file::{RobotFileError, Source};
 
 /// Minimum sampling period of a servo (s); each sample is an event of the run.
 const SHORTEST_SAMPLE: f64 = 1e-6;
@@ -289,6 +290,7 @@ fn kind_of(entry: &DriveEntry, source: &Source) -> Result<DriveKind, RobotFileEr
     }
 }
 
+/// Reads the drive of a joint.
 fn drive(
     entry: &DriveEntry,
     mechanism: &Mechanism,
@@ -297,35 +299,9 @@ fn drive(
 ) -> Result<Drive, RobotFileError> {
     let name = entry.joint.get_ref();
     let fail = |span: Range<usize>, message: String| source.error(span, format!("drive of joint {name:?}: {message}"));
-    let movable = |j: &&flexarm_kinematics::Joint| {
-        j.kind != JointKind::Fixed && crate::loops::owner(mechanism, &j.name).is_none()
-    };
-    let connects = entry.gearbox.as_ref().is_some_and(|gearbox| gearbox.get_ref().connects());
-    let moves = |joint: &&Joint| joint.kind != JointKind::Fixed || connects;
-    let Some(joint) = mechanism.joints.iter().filter(moves).find(|j| j.name == *name) else {
-        let known: Vec<_> = mechanism.joints.iter().filter(movable).map(|j| j.name.as_str()).collect();
-        return Err(fail(entry.joint.span(), format!("the robot has no such movable joint; it has {known:?}")));
-    };
+    let joint = joint_of(entry, mechanism, &fail)?;
     let kind = kind_of(entry, source)?;
-    let of_motor = entry.friction.is_some()
-        || entry.servo.is_some()
-        || entry.motor_inertia.is_some()
-        || entry.ratio.is_some()
-        || entry.torque_limit.is_some();
-    if joint.kind == JointKind::Fixed && (kind == DriveKind::Torque || of_motor) {
-        let text = "the joint is fixed: as an elastic connection it has kind = \"gearbox\" and a gearbox, no motor";
-        return Err(fail(entry.kind.span(), text.into()));
-    }
-    if let Some(own) = crate::loops::owner(mechanism, name) {
-        let text = format!(
-            "the joint follows from loop {own:?}: nothing drives it, drives belong to the other joints of the loop"
-        );
-        return Err(fail(entry.joint.span(), text));
-    }
-    if joint.mimic.is_some() && (kind == DriveKind::Torque || entry.friction.is_some()) {
-        let text = "the joint mimics another one: servo and friction belong to that one's drive";
-        return Err(fail(entry.joint.span(), text.into()));
-    }
+    check_joint(entry, joint, kind, mechanism, &fail)?;
     let number = |value: &Option<Spanned<f64>>, what: &str, default: f64, lowest: f64| match value {
         None => Ok(default),
         Some(v) if v.get_ref().is_finite() && *v.get_ref() >= lowest => Ok(*v.get_ref()),
@@ -356,55 +332,114 @@ fn drive(
         }
         _ => {}
     }
+    let gear = gearbox.as_ref().map(|(gearbox, _)| gearbox);
     let (friction, load_friction) = match &entry.friction {
         None => (Friction::NONE, 0.0),
-        Some(f) => {
-            let FrictionEntry { viscous, coulomb, stribeck, stribeck_velocity, regularisation, load } = *f.get_ref();
-            let values = [viscous, coulomb, stribeck, load];
-            let speeds = [stribeck_velocity, regularisation];
-            if values.iter().any(|x| !(x.is_finite() && *x >= 0.0))
-                || speeds.iter().any(|x| !(x.is_finite() && *x > 0.0))
-            {
-                let text = "friction takes viscous, coulomb, stribeck and load of at least 0, and speeds above 0";
-                return Err(fail(f.span(), text.into()));
-            }
-            let several = |g: &Gearbox| !matches!(g.stiffness, GearStiffness::Axis(_));
-            if load > 0.0 && gearbox.as_ref().is_some_and(|(gearbox, _)| several(gearbox)) {
-                let text = "friction with load needs a gearbox with one stiffness, about the axis";
-                return Err(fail(f.span(), text.into()));
-            }
-            if load > 0.0 && kind == DriveKind::Torque && gearbox.is_none() {
-                let text = "friction with load on a joint driven by torque needs a gearbox, whose torque is the load";
-                return Err(fail(f.span(), text.into()));
-            }
-            (Friction { viscous, coulomb, stribeck, stribeck_velocity, regularisation }, load)
-        }
+        Some(friction) => friction_of(friction, kind, gear, &fail)?,
     };
     let servo = match &entry.servo {
         None => ServoEntry::default(),
-        Some(s) => {
-            let gains = [s.get_ref().position_gain, s.get_ref().velocity_gain, s.get_ref().integral_gain];
-            if gains.iter().flatten().any(|g| !(g.is_finite() && *g >= 0.0)) {
-                return Err(fail(s.span(), "servo gains must be 0 or above".into()));
-            }
-            if let Some(t) = s.get_ref().sample_s.filter(|t| !(t.is_finite() && *t >= SHORTEST_SAMPLE)) {
-                let text =
-                    format!("sample_s must be a positive time in seconds, {SHORTEST_SAMPLE} at least, found {t}");
-                return Err(fail(s.span(), text));
-            }
-            if kind != DriveKind::Torque {
-                warnings
-                    .push(format!("drive of joint {name:?}: its servo is not used, only kind = \"torque\" has one"));
-            }
-            *s.get_ref()
-        }
+        Some(servo) => checked_servo(servo, &fail)?,
     };
+    if entry.servo.is_some() && kind != DriveKind::Torque {
+        warnings.push(format!("drive of joint {name:?}: its servo is not used, only kind = \"torque\" has one"));
+    }
     let torque_limit = number(&entry.torque_limit, "torque_limit", joint.limits.effort, 0.0)?;
     let backlash = entry.gearbox.as_ref().and_then(|g| g.get_ref().backlash).unwrap_or(0.0);
     let joint = name.clone();
     Ok(Drive { joint, kind, ratio, armature, gearbox, backlash, friction, load_friction, torque_limit, servo })
 }
 
+/// Returns the joint of a drive; a fixed one may have an elastic connection.
+fn joint_of<'m>(
+    entry: &DriveEntry,
+    mechanism: &'m Mechanism,
+    fail: &impl Fn(Range<usize>, String) -> RobotFileError,
+) -> Result<&'m Joint, RobotFileError> {
+    let connects = entry.gearbox.as_ref().is_some_and(|gearbox| gearbox.get_ref().connects());
+    let moves = |joint: &&Joint| joint.kind != JointKind::Fixed || connects;
+    let found = mechanism.joints.iter().filter(moves).find(|joint| joint.name == *entry.joint.get_ref());
+    found.ok_or_else(|| {
+        let movable =
+            |joint: &&Joint| joint.kind != JointKind::Fixed && loop_of_joint(mechanism, &joint.name).is_none();
+        let known: Vec<_> = mechanism.joints.iter().filter(movable).map(|joint| joint.name.as_str()).collect();
+        fail(entry.joint.span(), format!("the robot has no such movable joint; it has {known:?}"))
+    })
+}
+
+/// Checks that a joint can have a drive of this kind.
+fn check_joint(
+    entry: &DriveEntry,
+    joint: &Joint,
+    kind: DriveKind,
+    mechanism: &Mechanism,
+    fail: &impl Fn(Range<usize>, String) -> RobotFileError,
+) -> Result<(), RobotFileError> {
+    let of_motor = entry.friction.is_some()
+        || entry.servo.is_some()
+        || entry.motor_inertia.is_some()
+        || entry.ratio.is_some()
+        || entry.torque_limit.is_some();
+    if joint.kind == JointKind::Fixed && (kind == DriveKind::Torque || of_motor) {
+        let text = "the joint is fixed: as an elastic connection it has kind = \"gearbox\" and a gearbox, no motor";
+        return Err(fail(entry.kind.span(), text.into()));
+    }
+    if let Some(own) = loop_of_joint(mechanism, &joint.name) {
+        let text = format!(
+            "the joint follows from loop {own:?}: nothing drives it, drives belong to the other joints of the loop"
+        );
+        return Err(fail(entry.joint.span(), text));
+    }
+    if joint.mimic.is_some() && (kind == DriveKind::Torque || entry.friction.is_some()) {
+        let text = "the joint mimics another one: servo and friction belong to that one's drive";
+        return Err(fail(entry.joint.span(), text.into()));
+    }
+    Ok(())
+}
+
+/// Reads the friction of a joint, and the coefficient of the part that grows with its load.
+fn friction_of(
+    entry: &Spanned<FrictionEntry>,
+    kind: DriveKind,
+    gearbox: Option<&Gearbox>,
+    fail: &impl Fn(Range<usize>, String) -> RobotFileError,
+) -> Result<(Friction, f64), RobotFileError> {
+    let FrictionEntry { viscous, coulomb, stribeck, stribeck_velocity, regularisation, load } = *entry.get_ref();
+    let values = [viscous, coulomb, stribeck, load];
+    let speeds = [stribeck_velocity, regularisation];
+    if values.iter().any(|x| !(x.is_finite() && *x >= 0.0)) || speeds.iter().any(|x| !(x.is_finite() && *x > 0.0)) {
+        let text = "friction takes viscous, coulomb, stribeck and load of at least 0, and speeds above 0";
+        return Err(fail(entry.span(), text.into()));
+    }
+    if load > 0.0 && gearbox.is_some_and(|gearbox| !matches!(gearbox.stiffness, GearStiffness::Axis(_))) {
+        let text = "friction with load needs a gearbox with one stiffness, about the axis";
+        return Err(fail(entry.span(), text.into()));
+    }
+    if load > 0.0 && kind == DriveKind::Torque && gearbox.is_none() {
+        let text = "friction with load on a joint driven by torque needs a gearbox, whose torque is the load";
+        return Err(fail(entry.span(), text.into()));
+    }
+    Ok((Friction { viscous, coulomb, stribeck, stribeck_velocity, regularisation }, load))
+}
+
+/// Checks the gains and the sampling time of a servo.
+fn checked_servo(
+    entry: &Spanned<ServoEntry>,
+    fail: &impl Fn(Range<usize>, String) -> RobotFileError,
+) -> Result<ServoEntry, RobotFileError> {
+    let servo = *entry.get_ref();
+    let gains = [servo.position_gain, servo.velocity_gain, servo.integral_gain];
+    if gains.iter().flatten().any(|g| !(g.is_finite() && *g >= 0.0)) {
+        return Err(fail(entry.span(), "servo gains must be 0 or above".into()));
+    }
+    if let Some(t) = servo.sample_s.filter(|t| !(t.is_finite() && *t >= SHORTEST_SAMPLE)) {
+        let text = format!("sample_s must be a positive time in seconds, {SHORTEST_SAMPLE} at least, found {t}");
+        return Err(fail(entry.span(), text));
+    }
+    Ok(servo)
+}
+
+/// Reads a gearbox with its springs and dampers.
 fn gear(
     joint: &Joint,
     entry: &Spanned<GearboxEntry>,
@@ -416,48 +451,8 @@ fn gear(
     if let Some(guide) = &gear.guide {
         return guide_gear(joint, guide, gear).map_err(at);
     }
-    let curve = match (&gear.curve, gear.backlash, &gear.stiffness) {
-        (Some(points), None, None) => Some(TorqueCurve::new(points).map_err(|e| at(e.to_string()))?),
-        (None, Some(play), Some(Numbers::One(k))) if play.is_finite() && play >= 0.0 && *k > 0.0 => {
-            (play > 0.0).then(|| TorqueCurve::backlash(*k, play))
-        }
-        (None, Some(play), _) => {
-            return Err(at(format!(
-                "backlash = {play}: it must be 0 or above, with one positive stiffness about the axis"
-            )));
-        }
-        (Some(_), ..) => return Err(at("curve takes the place of stiffness and backlash: give one of them".into())),
-        (None, None, None) => {
-            return Err(at("gearbox needs stiffness = N m/rad, curve = [[rad, N m], ...], or guide = { ... }".into()));
-        }
-        (None, None, Some(_)) => None,
-    };
-    let (stiffness, size) = match (&gear.stiffness, &curve) {
-        (Some(Numbers::One(k)), _) => (GearStiffness::Axis(*k), 1),
-        (None, Some(curve)) => (GearStiffness::Axis(curve.stiffest()), 1),
-        (Some(Numbers::Many(k)), _) if k.len() == 3 => (GearStiffness::Tilting([k[0], k[1], k[2]]), 3),
-        (Some(Numbers::Many(k)), _) if k.len() == 6 => {
-            (GearStiffness::Full(Matrix6::from_diagonal(&nalgebra::Vector6::from_column_slice(k))), 6)
-        }
-        (Some(Numbers::Matrix(rows)), _) if rows.len() == 6 && rows.iter().all(|r| r.len() == 6) => {
-            let K = Matrix6::from_fn(|i, j| rows[i][j]);
-            let asymmetry = (K - K.transpose()).amax() / K.amax();
-            if asymmetry > 1e-9 {
-                return Err(at(format!("the 6x6 stiffness is not symmetric: relative asymmetry {asymmetry:.1e}")));
-            }
-            (GearStiffness::Full((K + K.transpose()) * 0.5), 6)
-        }
-        _ => return Err(at("stiffness takes one number, 3, 6 or a 6x6 matrix".into())),
-    };
-    let finite = match &stiffness {
-        GearStiffness::Axis(k) => k.is_finite() && *k > 0.0,
-        GearStiffness::Tilting(k) => k.iter().all(|k| k.is_finite() && *k > 0.0),
-        GearStiffness::Full(K) => K.iter().all(|k| k.is_finite()) && K.symmetric_eigenvalues().min() > 0.0,
-        GearStiffness::Guide(_) => true,
-    };
-    if !finite {
-        return Err(at("the stiffness must be finite and positive (definite)".into()));
-    }
+    let curve = curve_of(gear).map_err(at)?;
+    let (stiffness, size) = stiffness_of(gear, curve.as_ref()).map_err(at)?;
     let dampers = dampers(gear, size).map_err(at)?;
     if size > 1 && (gear.hysteresis.is_some() || !gear.transmission_error.is_empty()) {
         return Err(at("transmission_error and hysteresis need one stiffness, about the axis".into()));
@@ -468,6 +463,55 @@ fn gear(
     let hysteresis = law.transpose().map_err(at)?;
     let damping = GearDamping { dampers, curve, transmission, hysteresis, tilts: Vec::new() };
     Ok((Gearbox { joint: joint.name.clone(), stiffness }, damping))
+}
+
+/// Returns the torque curve of a gearbox, if it has one or a backlash.
+fn curve_of(gear: &GearboxEntry) -> Result<Option<TorqueCurve>, String> {
+    match (&gear.curve, gear.backlash, &gear.stiffness) {
+        (Some(points), None, None) => TorqueCurve::new(points).map(Some).map_err(|e| e.to_string()),
+        (None, Some(play), Some(Numbers::One(k))) if play.is_finite() && play >= 0.0 && *k > 0.0 => {
+            Ok((play > 0.0).then(|| TorqueCurve::backlash(*k, play)))
+        }
+        (None, Some(play), _) => {
+            Err(format!("backlash = {play}: it must be 0 or above, with one positive stiffness about the axis"))
+        }
+        (Some(_), ..) => Err("curve takes the place of stiffness and backlash: give one of them".into()),
+        (None, None, None) => {
+            Err("gearbox needs stiffness = N m/rad, curve = [[rad, N m], ...], or guide = { ... }".into())
+        }
+        (None, None, Some(_)) => Ok(None),
+    }
+}
+
+/// Returns the stiffness of a gearbox and its number of coordinates.
+fn stiffness_of(gear: &GearboxEntry, curve: Option<&TorqueCurve>) -> Result<(GearStiffness, usize), String> {
+    let (stiffness, size) = match (&gear.stiffness, curve) {
+        (Some(Numbers::One(k)), _) => (GearStiffness::Axis(*k), 1),
+        (None, Some(curve)) => (GearStiffness::Axis(curve.stiffest()), 1),
+        (Some(Numbers::Many(k)), _) if k.len() == 3 => (GearStiffness::Tilting([k[0], k[1], k[2]]), 3),
+        (Some(Numbers::Many(k)), _) if k.len() == 6 => {
+            (GearStiffness::Full(Matrix6::from_diagonal(&nalgebra::Vector6::from_column_slice(k))), 6)
+        }
+        (Some(Numbers::Matrix(rows)), _) if rows.len() == 6 && rows.iter().all(|r| r.len() == 6) => {
+            let K = Matrix6::from_fn(|i, j| rows[i][j]);
+            let asymmetry = (K - K.transpose()).amax() / K.amax();
+            if asymmetry > 1e-9 {
+                return Err(format!("the 6x6 stiffness is not symmetric: relative asymmetry {asymmetry:.1e}"));
+            }
+            (GearStiffness::Full((K + K.transpose()) * 0.5), 6)
+        }
+        _ => return Err("stiffness takes one number, 3, 6 or a 6x6 matrix".into()),
+    };
+    let finite = match &stiffness {
+        GearStiffness::Axis(k) => k.is_finite() && *k > 0.0,
+        GearStiffness::Tilting(k) => k.iter().all(|k| k.is_finite() && *k > 0.0),
+        GearStiffness::Full(K) => K.iter().all(|k| k.is_finite()) && K.symmetric_eigenvalues().min() > 0.0,
+        GearStiffness::Guide(_) => true,
+    };
+    if !finite {
+        return Err("the stiffness must be finite and positive (definite)".into());
+    }
+    Ok((stiffness, size))
 }
 
 /// Returns the dampers of a gearbox with `size` coordinates, if it has any.

@@ -1,8 +1,10 @@
 //! Checks and conversions shared by the entries of a robot file.
 
 use flexarm_files::{Source, TextFileError};
-use flexarm_kinematics::Pose;
+use flexarm_kinematics::{Mechanism, Pose};
 use nalgebra::{Rotation3, Translation3, Vector3};
+
+use crate::error::Error;
 
 /// Returns the pose of a position (m) and roll, pitch, yaw (rad).
 pub(crate) fn pose(xyz: [f64; 3], rpy: [f64; 3]) -> Pose {
@@ -20,4 +22,14 @@ pub(crate) fn check_finite(
         Some(found) => Err(source.error(span, format!("{what} has the entry {found}, expected finite numbers"))),
         None => Ok(()),
     }
+}
+
+/// Returns the name of the loop that determines a dependent joint.
+pub(crate) fn loop_of_joint<'m>(mechanism: &'m Mechanism, joint: &str) -> Option<&'m str> {
+    mechanism.loops.iter().find(|l| l.dependent.iter().any(|d| d == joint)).map(|l| l.name.as_str())
+}
+
+/// Returns the value, or records the error so that later errors are found too.
+pub(crate) fn keep<T>(result: Result<T, Error>, faults: &mut Vec<Error>) -> Option<T> {
+    result.map_err(|e| faults.push(e)).ok()
 }

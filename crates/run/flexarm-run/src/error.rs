@@ -11,11 +11,9 @@ mod value;
 
 use std::path::PathBuf;
 
-use flexarm_files::FileError;
+use flexarm_files::{FileError, TextFileError as RobotFileError};
 use flexarm_linkmaker::LinkError;
 use flexarm_settings::Setting;
-
-use crate::robot_file::RobotFileError;
 
 pub use flexarm_settings::Fault;
 pub use model::{BalancerError, ChannelError, LoadError, LoopError, ModellingError, PayloadError, PoseError};

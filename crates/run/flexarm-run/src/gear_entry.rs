@@ -1,20 +1,13 @@
-//! Gear entries of a robot file beyond stiffness: transmission error, hysteresis, and gears that
-//! move several joints.
+//! Gear entries of a robot file beyond stiffness: transmission error and hysteresis, and the gear
+//! effects of a robot.
 
-use std::collections::BTreeMap;
-
-use flexarm_flexlink::GearStiffness;
-use flexarm_kinematics::RotorCoupling;
 use flexarm_stepping::{
     FlexibleArm, GearCoupling, Harmonic, Hysteresis, LoadFriction, Slider, StepError, TorqueCurve, TransmissionError,
 };
 use nalgebra::DMatrix;
 use serde::Deserialize;
-use toml::Spanned;
 
 use crate::drive_entry::Drive;
-use crate::robot::Robot;
-use crate::robot_file::{RobotFileError, Source};
 
 /// One arc second (rad).
 const ARCSEC: f64 = std::f64::consts::PI / 648_000.0;
@@ -62,16 +55,6 @@ pub(crate) struct HysteresisEntry {
     pub reach: Option<f64>,
     /// Number of sliders in the model.
     pub sliders: Option<i64>,
-}
-
-/// Motors that move several joints through their gears.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(crate) struct CouplingEntry {
-    /// Joints; motor k is that of the drive of joint k.
-    pub joints: Spanned<Vec<String>>,
-    /// Matrix C of `q_joints = C q_motors`, with motor angles after their gears; one row per joint.
-    pub matrix: Spanned<Vec<Vec<f64>>>,
 }
 
 /// Checked coupling of joints.
@@ -203,119 +186,6 @@ pub(crate) fn hysteresis(
         Some(n) => return fail(format!("has {n} sliders, expected 1 to {MOST_SLIDERS}")),
     };
     Ok(GearHysteresis { elastic, sliders: Hysteresis::even_sliders(friction, reach, sliders), loss })
-}
-
-/// Checks a coupling and distributes the rotor inertias of its motors to the joints.
-///
-/// # Errors
-/// [`RobotFileError`] with line and column.
-pub(crate) fn coupling(
-    robot: &mut Robot,
-    entry: &CouplingEntry,
-    source: &Source,
-) -> Result<RobotCoupling, RobotFileError> {
-    let fail = |span: std::ops::Range<usize>, message: String| Err(source.error(span, format!("coupling: {message}")));
-    let joints = entry.joints.get_ref();
-    let n = joints.len();
-    if n < 2 {
-        return fail(
-            entry.joints.span(),
-            format!("joints has {n} names, expected two or more: one motor moves one joint without it"),
-        );
-    }
-    for (k, name) in joints.iter().enumerate() {
-        let single = |j: &&flexarm_kinematics::Joint| j.kind.turns() || j.kind.slides();
-        match robot.rigid.joints.iter().filter(single).find(|j| j.name == *name) {
-            None => {
-                let known: Vec<_> = robot.rigid.joints.iter().filter(single).map(|j| j.name.as_str()).collect();
-                return fail(entry.joints.span(), format!("the robot has no movable joint {name:?}; it has {known:?}"));
-            }
-            Some(joint) if joint.mimic.is_some() => {
-                return fail(
-                    entry.joints.span(),
-                    format!("joint {name:?} mimics another one and has no motor of its own"),
-                );
-            }
-            Some(_) if joints[..k].contains(name) => {
-                return fail(entry.joints.span(), format!("joint {name:?} is listed twice"));
-            }
-            Some(_) => {}
-        }
-    }
-    let rows = entry.matrix.get_ref();
-    if rows.len() != n || rows.iter().any(|row| row.len() != n) {
-        let widths: Vec<usize> = rows.iter().map(Vec::len).collect();
-        return fail(
-            entry.matrix.span(),
-            format!("matrix has rows of {widths:?} numbers, expected {n} rows of {n}: a row per joint"),
-        );
-    }
-    let C = DMatrix::from_fn(n, n, |i, j| rows[i][j]);
-    if let Some(hole) = C.iter().find(|x| !x.is_finite()) {
-        return fail(entry.matrix.span(), format!("matrix has the entry {hole}, expected finite numbers"));
-    }
-    let singular = C.singular_values();
-    let inverse = C.clone().try_inverse().filter(|_| singular.min() > 1e-6 * singular.max());
-    let Some(C_inverse) = inverse else {
-        return fail(entry.matrix.span(), "matrix cannot be inverted: some motion of the joints has no motor".into());
-    };
-    if let Err(message) = gears_fit(robot, joints) {
-        return fail(entry.joints.span(), message);
-    }
-
-    // Each rotor turns with several joints.
-    let armature: Vec<f64> =
-        joints.iter().map(|name| robot.drives.iter().find(|d| d.joint == *name).map_or(0.0, |d| d.armature)).collect();
-    let rotors = GearCoupling::on_joints(&C_inverse, &armature);
-    for (i, name) in joints.iter().enumerate() {
-        robot.rigid.joints.iter_mut().filter(|j| j.name == *name).for_each(|joint| joint.armature = rotors[(i, i)]);
-        for j in (i + 1..n).filter(|j| rotors[(i, *j)] != 0.0) {
-            let pair = [name.clone(), joints[j].clone()];
-            robot.rigid.rotor_couplings.push(RotorCoupling { joints: pair, inertia: rotors[(i, j)] });
-        }
-    }
-    Ok(RobotCoupling { joints: joints.clone(), C, C_inverse })
-}
-
-/// Checks that the drives of coupled joints are supported by a coupling.
-fn gears_fit(robot: &Robot, joints: &[String]) -> Result<(), String> {
-    let drives: Vec<Option<&Drive>> =
-        joints.iter().map(|name| robot.drives.iter().find(|d| d.joint == *name)).collect();
-    let yields = |drive: &Option<&Drive>| drive.is_some_and(|d| d.gearbox.is_some());
-    let kinds: Vec<_> = drives.iter().map(|d| d.map(|d| d.kind)).collect();
-    if drives.iter().any(yields) && (!drives.iter().all(yields) || kinds.windows(2).any(|pair| pair[0] != pair[1])) {
-        return Err("each of its joints needs a [[drive]] of the same kind with a gearbox, or none has a gearbox: a rigid gear \
-                    among elastic ones leaves no springs on the joints"
-            .into());
-    }
-    for drive in drives.iter().flatten() {
-        let joint = &drive.joint;
-        let Some((gearbox, gear)) = &drive.gearbox else { continue };
-        if !matches!(gearbox.stiffness, GearStiffness::Axis(_)) || gear.curve.is_some() {
-            return Err(format!("the gearbox of joint {joint:?} needs one stiffness, without backlash and curve"));
-        }
-        if gear.hysteresis.is_some() || !gear.transmission.is_empty() {
-            return Err(format!(
-                "the gearbox of joint {joint:?} has a transmission error or hysteresis, which coupled gears do not support"
-            ));
-        }
-    }
-    match drives.iter().flatten().find(|d| d.load_friction > 0.0) {
-        Some(drive) => Err(format!(
-            "the friction of joint {:?} grows with its load, which coupled gears do not support",
-            drive.joint
-        )),
-        None => Ok(()),
-    }
-}
-
-impl Robot {
-    /// Converts joint torques to the torques of the motors that move several joints, after their
-    /// gears; keyed by the joint of the drive.
-    pub(crate) fn motor_torques(&self, arm: &FlexibleArm, tau: &[f64]) -> BTreeMap<String, f64> {
-        let (Some(robot), Some(arm)) = (&self.coupling, &arm.coupling) else { return BTreeMap::new() };
-        robot.joints.iter().cloned().zip(arm.motor_torques(tau)).collect()
-    }
 }
 
 /// Gear effects other than elasticity, assigned to their elements.

@@ -2,9 +2,10 @@
 
 use std::sync::Arc;
 
-use flexarm_flexlink::LinkForm;
+use flexarm_flexlink::{FlexibleSpan, LinkForm};
 use flexarm_kinematics::{
-    Data, State, forward_kinematics_velocity, frame_jacobian, gravity_forces, mass_matrix, nonlinear_effects,
+    Coordinate, Data, Link, Mechanism, Model, State, forward_kinematics_velocity, frame_jacobian, gravity_forces,
+    mass_matrix, nonlinear_effects,
 };
 use flexarm_settings::Quantity;
 use nalgebra::{DMatrix, Matrix6xX, UnitQuaternion};
@@ -13,11 +14,13 @@ use serde::Serialize;
 use crate::balancer::{self, BalancerInfo};
 use crate::caveat::{self, Caveat, Use, of_use};
 use crate::error::{Error, PoseError, ValueError};
+use crate::flexible::FlexibleRobot;
 use crate::loops::{self, LoopInfo};
 use crate::mounting::RobotMounting;
 use crate::options::Modelling;
 use crate::posed::all_finite;
 use crate::robot::{Robot, tcp_frame};
+use crate::robot_link::RobotLink;
 
 /// Result of `flexarm inspect`. SI units; Jacobian at the TCP in world axes, linear rows first.
 #[derive(Clone, Debug, Serialize)]
@@ -223,51 +226,15 @@ pub fn inspect(robot: &Robot, at: Option<&[f64]>, velocity: Option<&[f64]>) -> R
     all_finite("the place of the TCP and its Jacobian", X.translation.vector.iter().chain(&J))?;
     all_finite("the mass matrix and the torques", M.iter().chain(&gravity).chain(&bias))?;
 
-    let joints = model.coordinates().iter().map(|c| JointInfo {
-        name: c.joint.clone(),
-        kind: c.kind,
-        lower: finite(c.limits.lower),
-        upper: finite(c.limits.upper),
-        velocity: finite(c.limits.velocity),
-        effort: finite(c.limits.effort),
-    });
-    let links = robot.urdf.mechanism.links.iter().map(|l| {
-        let zero = ([0.0; 3], [0.0; 6], 0.0);
-        let (com_m, inertia, mass_kg) = l.inertia.map_or(zero, |i| {
-            let I = i.inertia_com;
-            (i.com.into(), [I[(0, 0)], I[(1, 1)], I[(2, 2)], I[(0, 1)], I[(0, 2)], I[(1, 2)]], i.mass)
-        });
-        LinkInfo { name: l.name.clone(), mass_kg, com_m, inertia }
-    });
     let flexible = Arc::new(robot.flexible_robot()?);
     // Only the rigid robot is inspected, so the caveat about missing elasticity does not apply.
     let mut caveats = of_use(robot, &flexible, None, Use::Held(&q, &[0.0; 6]));
     caveats.retain(|caveat| caveat.code != "nothing-yields");
-    let forms = robot.flexible.iter().map(|link| robot.form_of(link, &Modelling::default()).map(|(form, _)| form));
-    let forms = forms.collect::<Result<Vec<_>, _>>()?;
-    let flexible_links = flexible.spans.iter().zip(&robot.flexible).zip(&forms).map(|((span, link), form)| {
-        let K = link.flexible.reduced.split.K_S;
-        let (coordinates, modal_frequencies_hz) = match form {
-            LinkForm::TwoParts => (6, None),
-            LinkForm::Chain(chain) => (6 * chain.joints.len(), None),
-            LinkForm::Modal(modal) => (modal.coordinates(), Some(modal.held_frequencies_hz())),
-        };
-        FlexibleInfo {
-            model: form.name(),
-            coordinates,
-            modal_frequencies_hz,
-            name: span.link.clone(),
-            method: link.flexible.reduced.provenance.method.clone(),
-            length_m: span.length,
-            parts_kg: span.part_masses.clone(),
-            stiffness: rows(&DMatrix::from_iterator(6, 6, K.iter().copied())),
-        }
-    });
     Ok(Inspection {
         robot: robot.name.clone(),
-        joints: joints.collect(),
-        links: links.collect(),
-        flexible_links: flexible_links.collect(),
+        joints: joint_infos(&model),
+        links: link_infos(&robot.urdf.mechanism),
+        flexible_links: flexible_infos(robot, &flexible)?,
         coupling: robot.coupling.as_ref().map(|c| CouplingInfo { joints: c.joints.clone(), matrix: rows(&c.C) }),
         mounting: robot.mounting.as_ref().and_then(MountingInfo::of),
         tcp: TcpInfo {
@@ -288,4 +255,53 @@ pub fn inspect(robot: &Robot, at: Option<&[f64]>, velocity: Option<&[f64]>) -> R
         warnings: caveat::warnings(&caveats),
         caveats,
     })
+}
+
+fn joint_infos(model: &Model) -> Vec<JointInfo> {
+    let joint = |c: &Coordinate| JointInfo {
+        name: c.joint.clone(),
+        kind: c.kind,
+        lower: finite(c.limits.lower),
+        upper: finite(c.limits.upper),
+        velocity: finite(c.limits.velocity),
+        effort: finite(c.limits.effort),
+    };
+    model.coordinates().iter().map(joint).collect()
+}
+
+fn link_infos(mechanism: &Mechanism) -> Vec<LinkInfo> {
+    let link = |l: &Link| {
+        let zero = ([0.0; 3], [0.0; 6], 0.0);
+        let (com_m, inertia, mass_kg) = l.inertia.map_or(zero, |i| {
+            let I = i.inertia_com;
+            (i.com.into(), [I[(0, 0)], I[(1, 1)], I[(2, 2)], I[(0, 1)], I[(0, 2)], I[(1, 2)]], i.mass)
+        });
+        LinkInfo { name: l.name.clone(), mass_kg, com_m, inertia }
+    };
+    mechanism.links.iter().map(link).collect()
+}
+
+/// Describes the flexible links with the models that the robot file asks for.
+fn flexible_infos(robot: &Robot, flexible: &FlexibleRobot) -> Result<Vec<FlexibleInfo>, Error> {
+    let forms = robot.flexible.iter().map(|link| robot.form_of(link, &Modelling::default()).map(|(form, _)| form));
+    let forms = forms.collect::<Result<Vec<_>, _>>()?;
+    let info = |((span, link), form): ((&FlexibleSpan, &RobotLink), &LinkForm)| {
+        let K = link.flexible.reduced.split.K_S;
+        let (coordinates, modal_frequencies_hz) = match form {
+            LinkForm::TwoParts => (6, None),
+            LinkForm::Chain(chain) => (6 * chain.joints.len(), None),
+            LinkForm::Modal(modal) => (modal.coordinates(), Some(modal.held_frequencies_hz())),
+        };
+        FlexibleInfo {
+            model: form.name(),
+            coordinates,
+            modal_frequencies_hz,
+            name: span.link.clone(),
+            method: link.flexible.reduced.provenance.method.clone(),
+            length_m: span.length,
+            parts_kg: span.part_masses.clone(),
+            stiffness: rows(&DMatrix::from_iterator(6, 6, K.iter().copied())),
+        }
+    };
+    Ok(flexible.spans.iter().zip(&robot.flexible).zip(&forms).map(info).collect())
 }

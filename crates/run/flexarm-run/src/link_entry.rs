@@ -1,23 +1,24 @@
 //! Flexible link entries of a robot file: from the text to reduced links with their options.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use flexarm_fem::{BeamLink, BeamTheory, Material, ReducedLink, Section, UnitSystem};
+use flexarm_files::{Source, TextFileError as RobotFileError};
 use flexarm_flexlink::{FlexibleLink, LinkForm, Parts, SubstitutionError, distal_joint};
 use flexarm_kinematics::{ElasticAngles, Mechanism, Pose};
+use flexarm_linkmaker::reduce::STRESS_FILE;
 use flexarm_stepping::Damping;
 use nalgebra::{Matrix6, Vector3};
+use serde::Deserialize;
 use toml::Spanned;
 
-use crate::beam_entry::{GIVEN, beam_section};
+use crate::beam_entry::{BeamEntry, GIVEN, beam_section};
+use crate::entry_checks::keep;
 use crate::error::Error;
 use crate::file_cache::FileCache;
-use crate::flexible::{LinkChoices, RequestedKey, RobotLink, StressSource};
 use crate::options::{LinkModel, Modelling};
-use crate::robot::keep;
-use crate::robot_file::{BeamEntry, DampingEntry, FlexibleLinkEntry, RobotFileError, Source};
-use crate::strength::Strength;
-use flexarm_linkmaker::reduce::STRESS_FILE;
+use crate::robot_link::{LinkChoices, RequestedKey, RobotLink, StressSource};
+use crate::strength::{Strength, StrengthEntry};
 
 /// Tolerance for a symmetric matrix: difference of mirrored entries, relative to the geometric mean
 /// of the diagonal entries.
@@ -31,6 +32,69 @@ pub(crate) struct LinkHome<'a> {
     pub(crate) files: &'a FileCache,
 }
 
+/// Flexible link.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct FlexibleLinkEntry {
+    /// Link of the URDF.
+    pub link: Spanned<String>,
+    /// Joint at the far interface.
+    pub distal: Option<Spanned<String>>,
+    /// `.flex` file, relative to the robot file.
+    pub reduced: Option<Spanned<PathBuf>>,
+    /// Beam, instead of a `.flex` file.
+    pub beam: Option<Spanned<BeamEntry>>,
+    /// `lumped` or `modal`.
+    pub model: Option<Spanned<String>>,
+    /// Number of rigid parts of a lumped link; 2 by default.
+    pub segments: Option<Spanned<i64>>,
+    /// Number of fixed-interface modes of a modal link, in addition to those of its interfaces; by
+    /// default all in the `.flex` file, or 6 for a beam.
+    pub modes: Option<Spanned<i64>>,
+    /// Modal: use this number of eigenmodes with A held instead of interface displacements.
+    pub eigenmodes: Option<Spanned<i64>>,
+    /// Modal: whether loads change the stiffness (geometric stiffening); false by default.
+    pub geometric_stiffening: Option<Spanned<bool>>,
+    /// Mass of a beam link (kg), replaces the URDF's; its inertia is scaled in proportion.
+    pub mass: Option<Spanned<f64>>,
+    /// Factor on its stiffness, for instance from measurements; 1 by default.
+    pub stiffness_factor: Option<Spanned<f64>>,
+    /// Lumped: stiffness of the spring between the two parts, replaces that of its source; 6x6,
+    /// N/m, N, N m/rad.
+    pub stiffness: Option<Spanned<Vec<Vec<f64>>>>,
+    /// Lumped: additional factors on the six directions of its springs; 1 by default.
+    pub stiffness_factors: Option<Spanned<Vec<f64>>>,
+    /// Whether its stress is computed: false by default for a beam, true for a reduced link with a
+    /// stress file.
+    pub stress: Option<Spanned<bool>>,
+    /// Strength of its material; that of the preset material by default.
+    pub strength: Option<Spanned<StrengthEntry>>,
+    /// Damping; 3 % modal damping by default.
+    pub damping: Option<Spanned<DampingEntry>>,
+    /// `rotation-vector` or `euler-zyx`.
+    pub angles: Option<Spanned<String>>,
+    /// `false` drops the coupling terms, only to show their effect.
+    #[serde(default = "yes")]
+    pub coupling: bool,
+}
+
+fn yes() -> bool {
+    true
+}
+
+/// Damping, in one of these forms.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct DampingEntry {
+    /// Damping ratio of each mode.
+    pub modal: Option<f64>,
+    /// `D = beta K` (s).
+    pub stiffness_beta: Option<f64>,
+    /// `D = a M + b K` (1/s, s).
+    pub rayleigh: Option<[f64; 2]>,
+}
+
+/// Builds the flexible link of an entry.
 pub(crate) fn flexible_link(
     entry: &FlexibleLinkEntry,
     mechanism: &Mechanism,
@@ -40,66 +104,26 @@ pub(crate) fn flexible_link(
     faults: &mut Vec<Error>,
 ) -> Result<RobotLink, Error> {
     let name = entry.link.get_ref();
-    let at = |span: std::ops::Range<usize>, message: String| source.error(span, message);
-    let model = match &entry.model {
-        None => LinkModel::Lumped,
-        Some(word) => match LinkModel::from_word(word.get_ref()) {
-            Some(model @ (LinkModel::Lumped | LinkModel::Modal)) => model,
-            _ => {
-                let message = format!("model {:?} is not known; use \"lumped\" or \"modal\"", word.get_ref());
-                return Err(at(word.span(), message).into());
-            }
-        },
-    };
-    let count = |value: &Option<Spanned<i64>>, what: &str, lowest: i64| match value {
-        None => Ok(None),
-        Some(n) if (lowest..=10_000).contains(n.get_ref()) => Ok(Some(*n.get_ref() as usize)),
-        Some(n) => Err(at(n.span(), format!("{what} = {}: expected a whole number of at least {lowest}", n.get_ref()))),
-    };
-    let segments = count(&entry.segments, "segments", 2)?.unwrap_or(2);
-    let (modes, eigenmodes) = (count(&entry.modes, "modes", 0)?, count(&entry.eigenmodes, "eigenmodes", 1)?);
-    let angles = match entry.angles.as_ref().map(|a| a.get_ref().as_str()) {
-        None | Some("rotation-vector") => ElasticAngles::RotationVector,
-        Some("euler-zyx") => ElasticAngles::EulerZyx,
-        Some(other) => {
-            let message = format!("angles {other:?} are not known; use \"rotation-vector\" or \"euler-zyx\"");
-            return Err(at(entry.angles.as_ref().map_or(0..0, Spanned::span), message).into());
-        }
-    };
+    let model = model_of(entry, source)?;
+    let segments = count(&entry.segments, "segments", 2, source)?.unwrap_or(2);
+    let modes = count(&entry.modes, "modes", 0, source)?;
+    let eigenmodes = count(&entry.eigenmodes, "eigenmodes", 1, source)?;
+    let angles = angles_of(entry, source)?;
     let damping = damping_of(entry.damping.as_ref(), source);
     let damping = keep(damping.map_err(Error::from), faults).unwrap_or(Damping::Modal(0.0));
     let distal_name = entry.distal.as_ref().map(|d| d.get_ref().as_str());
     let distal = distal_joint(mechanism, name, distal_name).map_err(|e| {
         let unknown = matches!(e, SubstitutionError::UnknownLink { .. });
         let named = entry.distal.as_ref().filter(|_| !unknown);
-        at(named.map_or(entry.link.span(), Spanned::span), e.to_string())
+        source.error(named.map_or(entry.link.span(), Spanned::span), e.to_string())
     })?;
 
     let (reduced, parts, beam) = match (&entry.reduced, &entry.beam) {
-        (Some(file), None) => {
-            let path = home.folder.join(file.get_ref());
-            if !path.is_file() {
-                let message = format!("reduced = {:?}: there is no file {}", file.get_ref(), path.display());
-                return Err(at(file.span(), message).into());
-            }
-            let reduced = home.files.flex(&path)?;
-            if reduced.name != *name {
-                warnings.push(format!(
-                    "link {name:?} takes the reduced link of {:?} ({})",
-                    reduced.name,
-                    path.display()
-                ));
-            }
-            warnings.extend(reduced.warnings(&Default::default()).into_iter().map(|w| format!("link {name:?}: {w}")));
-            let order = reduced.details.as_ref().and_then(|details| details.gate.as_ref()?.order);
-            let stiff = order.and_then(|order| order.doubt()).map(|doubt| format!("link {name:?}: its mesh: {doubt}"));
-            warnings.extend(stiff);
-            (reduced, Parts::Reduced, None)
-        }
+        (Some(file), None) => (stored_link(name, file, source, home, warnings)?, Parts::Reduced, None),
         (None, Some(beam)) => beam_link(name, beam, distal.X_PJ, mechanism, source, warnings)?,
         _ => {
             let message = format!("flexible link {name:?} needs either reduced = \"file.flex\" or beam = {{ ... }}");
-            return Err(at(entry.link.span(), message).into());
+            return Err(source.error(entry.link.span(), message).into());
         }
     };
     let distal = Some(distal.name.clone());
@@ -108,24 +132,7 @@ pub(crate) fn flexible_link(
     let geometric = entry.geometric_stiffening.as_ref().is_some_and(|asked| *asked.get_ref());
     let parts_asked = entry.beam.as_ref().is_none_or(|beam| beam.get_ref().parts.is_some());
     let choices = LinkChoices { model, segments, modes, eigenmodes, geometric, parts_asked };
-    let stiffness_factor = match &entry.stiffness_factor {
-        None => 1.0,
-        Some(factor) if factor.get_ref().is_finite() && *factor.get_ref() > 0.0 => *factor.get_ref(),
-        Some(factor) => {
-            let message = format!("stiffness_factor = {}: expected a positive number", factor.get_ref());
-            return Err(at(factor.span(), message).into());
-        }
-    };
-    let stiffness_factors = match &entry.stiffness_factors {
-        None => [1.0; 6],
-        Some(given) => match <[f64; 6]>::try_from(given.get_ref().as_slice()) {
-            Ok(all) if all.iter().all(|factor| factor.is_finite() && *factor > 0.0) => all,
-            _ => {
-                let message = format!("stiffness_factors = {:?}: expected six positive numbers", given.get_ref());
-                return Err(at(given.span(), message).into());
-            }
-        },
-    };
+    let (stiffness_factor, stiffness_factors) = factors(entry, source)?;
     let stiffness = entry.stiffness.as_ref().map(|given| matrix6(given, entry, source)).transpose()?;
     let stress = stress_source(entry, source, home)?;
     let strength = entry.strength.as_ref().map(|entry| Strength::read(entry, name, source)).transpose()?;
@@ -140,20 +147,109 @@ pub(crate) fn flexible_link(
         stress,
         strength,
     };
-    // The requested model must exist; overrides are checked when they are used.
-    link.form_or_key(&Modelling::default()).map_err(|(asked, message)| {
-        let key = match asked {
-            RequestedKey::Model => None,
-            RequestedKey::Segments => entry.segments.as_ref().map(Spanned::span),
-            RequestedKey::Modes => entry.modes.as_ref().map(Spanned::span),
-            RequestedKey::Eigenmodes => entry.eigenmodes.as_ref().map(Spanned::span),
-            RequestedKey::Geometric => entry.geometric_stiffening.as_ref().map(Spanned::span),
-            RequestedKey::Stiffness => entry.stiffness.as_ref().map(Spanned::span),
-            RequestedKey::Directions => entry.stiffness_factors.as_ref().map(Spanned::span),
-        };
-        at(key.or(entry.model.as_ref().map(Spanned::span)).unwrap_or(entry.link.span()), message)
-    })?;
+    check_form(&link, entry, source)?;
     Ok(link)
+}
+
+/// Reads the requested model.
+fn model_of(entry: &FlexibleLinkEntry, source: &Source) -> Result<LinkModel, RobotFileError> {
+    let Some(word) = &entry.model else { return Ok(LinkModel::Lumped) };
+    match LinkModel::from_word(word.get_ref()) {
+        Some(model @ (LinkModel::Lumped | LinkModel::Modal)) => Ok(model),
+        _ => {
+            let message = format!("model {:?} is not known; use \"lumped\" or \"modal\"", word.get_ref());
+            Err(source.error(word.span(), message))
+        }
+    }
+}
+
+/// Reads a whole number of at least `lowest`.
+fn count(
+    value: &Option<Spanned<i64>>,
+    what: &str,
+    lowest: i64,
+    source: &Source,
+) -> Result<Option<usize>, RobotFileError> {
+    match value {
+        None => Ok(None),
+        Some(n) if (lowest..=10_000).contains(n.get_ref()) => Ok(Some(*n.get_ref() as usize)),
+        Some(n) => {
+            let message = format!("{what} = {}: expected a whole number of at least {lowest}", n.get_ref());
+            Err(source.error(n.span(), message))
+        }
+    }
+}
+
+/// Reads the angles of the elastic joints.
+fn angles_of(entry: &FlexibleLinkEntry, source: &Source) -> Result<ElasticAngles, RobotFileError> {
+    match entry.angles.as_ref().map(|a| a.get_ref().as_str()) {
+        None | Some("rotation-vector") => Ok(ElasticAngles::RotationVector),
+        Some("euler-zyx") => Ok(ElasticAngles::EulerZyx),
+        Some(other) => {
+            let message = format!("angles {other:?} are not known; use \"rotation-vector\" or \"euler-zyx\"");
+            Err(source.error(entry.angles.as_ref().map_or(0..0, Spanned::span), message))
+        }
+    }
+}
+
+/// Reads a `.flex` file, with warnings about its content.
+fn stored_link(
+    name: &str,
+    file: &Spanned<PathBuf>,
+    source: &Source,
+    home: &LinkHome<'_>,
+    warnings: &mut Vec<String>,
+) -> Result<ReducedLink, Error> {
+    let path = home.folder.join(file.get_ref());
+    if !path.is_file() {
+        let message = format!("reduced = {:?}: there is no file {}", file.get_ref(), path.display());
+        return Err(source.error(file.span(), message).into());
+    }
+    let reduced = home.files.flex(&path)?;
+    if reduced.name != *name {
+        warnings.push(format!("link {name:?} takes the reduced link of {:?} ({})", reduced.name, path.display()));
+    }
+    warnings.extend(reduced.warnings(&Default::default()).into_iter().map(|w| format!("link {name:?}: {w}")));
+    let order = reduced.details.as_ref().and_then(|details| details.gate.as_ref()?.order);
+    let stiff = order.and_then(|order| order.doubt()).map(|doubt| format!("link {name:?}: its mesh: {doubt}"));
+    warnings.extend(stiff);
+    Ok(reduced)
+}
+
+/// Reads the factor on the stiffness and those of the six directions.
+fn factors(entry: &FlexibleLinkEntry, source: &Source) -> Result<(f64, [f64; 6]), RobotFileError> {
+    let factor = match &entry.stiffness_factor {
+        None => 1.0,
+        Some(factor) if factor.get_ref().is_finite() && *factor.get_ref() > 0.0 => *factor.get_ref(),
+        Some(factor) => {
+            let message = format!("stiffness_factor = {}: expected a positive number", factor.get_ref());
+            return Err(source.error(factor.span(), message));
+        }
+    };
+    let Some(given) = &entry.stiffness_factors else { return Ok((factor, [1.0; 6])) };
+    match <[f64; 6]>::try_from(given.get_ref().as_slice()) {
+        Ok(all) if all.iter().all(|factor| factor.is_finite() && *factor > 0.0) => Ok((factor, all)),
+        _ => {
+            let message = format!("stiffness_factors = {:?}: expected six positive numbers", given.get_ref());
+            Err(source.error(given.span(), message))
+        }
+    }
+}
+
+/// Checks that the requested model exists; overrides are checked when they are used.
+fn check_form(link: &RobotLink, entry: &FlexibleLinkEntry, source: &Source) -> Result<(), RobotFileError> {
+    let Err((asked, message)) = link.form_or_key(&Modelling::default()) else { return Ok(()) };
+    let key = match asked {
+        RequestedKey::Model => None,
+        RequestedKey::Segments => entry.segments.as_ref().map(Spanned::span),
+        RequestedKey::Modes => entry.modes.as_ref().map(Spanned::span),
+        RequestedKey::Eigenmodes => entry.eigenmodes.as_ref().map(Spanned::span),
+        RequestedKey::Geometric => entry.geometric_stiffening.as_ref().map(Spanned::span),
+        RequestedKey::Stiffness => entry.stiffness.as_ref().map(Spanned::span),
+        RequestedKey::Directions => entry.stiffness_factors.as_ref().map(Spanned::span),
+    };
+    let span = key.or(entry.model.as_ref().map(Spanned::span)).unwrap_or(entry.link.span());
+    Err(source.error(span, message))
 }
 
 /// Returns the source of the stress of a link, if its stress is to be computed.

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use exmex::{Express, FlatEx};
-use flexarm_files::read_text;
+use flexarm_files::{Source, TextFileError as RobotFileError, read_text};
 use flexarm_kinematics::{LinkInertia, Wrench};
 use flexarm_stepping::{LoadAxes, TimedWrench};
 use nalgebra::{Matrix3, Vector3};
@@ -24,7 +24,6 @@ use crate::error::{Error, LoadError};
 use crate::load_jumps::jumps_of;
 use crate::payload::PayloadChange;
 use crate::ranges::OF_LOADS;
-use crate::robot_file::{RobotFileError, Source};
 use crate::toml_file::parsed;
 
 /// Loads file as written.

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
+use flexarm_files::Source;
 use serde::Deserialize;
 use toml::Spanned;
 
@@ -10,7 +11,6 @@ use crate::balancer_entry::EndEntry;
 use crate::error::Error;
 use crate::loops::RobotLoop;
 use crate::robot::Robot;
-use crate::robot_file::Source;
 
 /// A pin that closes a chain of links.
 #[derive(Clone, Debug, Deserialize)]

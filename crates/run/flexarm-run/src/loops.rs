@@ -9,6 +9,7 @@ use nalgebra::{DVector, Rotation3, Unit, Vector3};
 use serde::Serialize;
 
 use crate::caveat::size::spread_poses;
+use crate::entry_checks::loop_of_joint;
 use crate::error::LoopError;
 use crate::robot::Robot;
 
@@ -72,8 +73,8 @@ impl Robot {
         for own in loops {
             self.add_loop(own)?;
         }
-        if let Some(drive) = self.drives.iter().find(|drive| owner(&self.rigid, &drive.joint).is_some()) {
-            let name = owner(&self.rigid, &drive.joint).unwrap_or_default().to_owned();
+        if let Some(drive) = self.drives.iter().find(|drive| loop_of_joint(&self.rigid, &drive.joint).is_some()) {
+            let name = loop_of_joint(&self.rigid, &drive.joint).unwrap_or_default().to_owned();
             return Err(LoopError::Driven { name, joint: drive.joint.clone() });
         }
         self.check_loops()?;
@@ -121,11 +122,6 @@ impl Robot {
             _ => Ok(()),
         }
     }
-}
-
-/// Returns the name of the loop that determines a dependent joint.
-pub(crate) fn owner<'m>(mechanism: &'m Mechanism, joint: &str) -> Option<&'m str> {
-    mechanism.loops.iter().find(|l| l.dependent.iter().any(|d| d == joint)).map(|l| l.name.as_str())
 }
 
 /// Axis of the first revolute one of the joints, in the axes of a link, with all joints at zero.

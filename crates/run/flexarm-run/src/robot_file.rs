@@ -9,19 +9,17 @@ use toml::Spanned;
 
 pub use flexarm_files::Source;
 pub use flexarm_files::TextFileError as RobotFileError;
-pub(crate) use flexarm_linkmaker::MaterialEntry;
 
 use crate::balancer_entry::BalancerEntry;
-pub(crate) use crate::beam_entry::BeamEntry;
 use crate::calibration_entry::CalibrationEntry;
 use crate::controller_entry::ControllerAxisEntry;
+use crate::coupling_entry::CouplingEntry;
 use crate::drive_entry::DriveEntry;
 use crate::gauge_entry::{StrainGaugeEntry, StressPointEntry};
-use crate::gear_entry::CouplingEntry;
+use crate::link_entry::FlexibleLinkEntry;
 use crate::loop_entry::LoopEntry;
-use crate::mounting::MountingEntry;
+use crate::mounting_entry::MountingEntry;
 use crate::ranges::OF_ROBOT;
-use crate::strength::StrengthEntry;
 use crate::toml_file::parsed;
 
 /// Robot file as written.
@@ -125,68 +123,6 @@ pub(crate) struct PayloadEntry {
     /// `ixx iyy izz ixy ixz iyz` about the centre of mass (kg m²).
     #[serde(default)]
     pub inertia: [f64; 6],
-}
-
-/// Flexible link.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(crate) struct FlexibleLinkEntry {
-    /// Link of the URDF.
-    pub link: Spanned<String>,
-    /// Joint at the far interface.
-    pub distal: Option<Spanned<String>>,
-    /// `.flex` file, relative to the robot file.
-    pub reduced: Option<Spanned<PathBuf>>,
-    /// Beam, instead of a `.flex` file.
-    pub beam: Option<Spanned<BeamEntry>>,
-    /// `lumped` or `modal`.
-    pub model: Option<Spanned<String>>,
-    /// Number of rigid parts of a lumped link; 2 by default.
-    pub segments: Option<Spanned<i64>>,
-    /// Number of fixed-interface modes of a modal link, in addition to those of its interfaces; by
-    /// default all in the `.flex` file, or 6 for a beam.
-    pub modes: Option<Spanned<i64>>,
-    /// Modal: use this number of eigenmodes with A held instead of interface displacements.
-    pub eigenmodes: Option<Spanned<i64>>,
-    /// Modal: whether loads change the stiffness (geometric stiffening); false by default.
-    pub geometric_stiffening: Option<Spanned<bool>>,
-    /// Mass of a beam link (kg), replaces the URDF's; its inertia is scaled in proportion.
-    pub mass: Option<Spanned<f64>>,
-    /// Factor on its stiffness, for instance from measurements; 1 by default.
-    pub stiffness_factor: Option<Spanned<f64>>,
-    /// Lumped: stiffness of the spring between the two parts, replaces that of its source; 6x6,
-    /// N/m, N, N m/rad.
-    pub stiffness: Option<Spanned<Vec<Vec<f64>>>>,
-    /// Lumped: additional factors on the six directions of its springs; 1 by default.
-    pub stiffness_factors: Option<Spanned<Vec<f64>>>,
-    /// Whether its stress is computed: false by default for a beam, true for a reduced link with a
-    /// stress file.
-    pub stress: Option<Spanned<bool>>,
-    /// Strength of its material; that of the preset material by default.
-    pub strength: Option<Spanned<StrengthEntry>>,
-    /// Damping; 3 % modal damping by default.
-    pub damping: Option<Spanned<DampingEntry>>,
-    /// `rotation-vector` or `euler-zyx`.
-    pub angles: Option<Spanned<String>>,
-    /// `false` drops the coupling terms, only to show their effect.
-    #[serde(default = "yes")]
-    pub coupling: bool,
-}
-
-fn yes() -> bool {
-    true
-}
-
-/// Damping, in one of these forms.
-#[derive(Clone, Debug, Default, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(crate) struct DampingEntry {
-    /// Damping ratio of each mode.
-    pub modal: Option<f64>,
-    /// `D = beta K` (s).
-    pub stiffness_beta: Option<f64>,
-    /// `D = a M + b K` (1/s, s).
-    pub rayleigh: Option<[f64; 2]>,
 }
 
 /// Reads the text of a robot file.

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 
 use flexarm_analysis::tcp_error;
 use flexarm_kinematics::{forward_kinematics, frame_jacobian};
+use flexarm_stepping::Linear;
 use nalgebra::{DVector, Matrix6xX};
 use serde::Serialize;
 
@@ -149,32 +150,7 @@ fn statics_at(
     all_finite("the compliances", &C)?;
     all_finite("the holding torques", &loaded.holding)?;
 
-    // To first order each element's contribution is its deflection times the Jacobian at the rigid
-    // pose.
-    let model = &posed.arm.model;
-    let (mut data, state) = posed.undeformed();
-    forward_kinematics(model, &mut data, &state.q);
-    let mut J = Matrix6xX::zeros(model.nv());
-    frame_jacobian(model, &data, &posed.tool, &mut J);
-    let ne = model.n_elastic();
-    let J = J.columns(model.nv() - ne, ne);
-    let (springs, energies) = posed.arm.springs_at_rest(&loaded.q);
-    let mut elements = Vec::new();
-    for ((name, range), energy_j) in loaded.elements.iter().zip(energies) {
-        let (first, n) = (range.start, range.len());
-        let deflection: DVector<f64> = loaded.equilibrium.rows(first, n).into_owned();
-        // For a nonlinear spring the tangent stiffness is not sufficient.
-        let load = springs.rows(first - loaded.driven, n);
-        let moved = J.columns(first - loaded.driven, n) * &deflection;
-        elements.push(ElementStatics {
-            name: name.clone(),
-            energy_j,
-            tcp_displacement_m: [moved[0], moved[1], moved[2]],
-            tcp_rotation_rad: [moved[3], moved[4], moved[5]],
-            load: load.iter().copied().collect(),
-            deflection: deflection.as_slice().to_vec(),
-        });
-    }
+    let elements = element_statics(&posed, &loaded);
     let stress = stress_at_rest(robot, &posed.flexible, &posed.arm, modelling, &loaded.q)?;
     let mut caveats = posed.caveats_of(robot, &loaded, &wrench);
     caveats.extend(validity::stress(&stress));
@@ -205,4 +181,36 @@ fn statics_at(
         statics_picture::save(&mut statics, paths, robot, &posed, &loaded)?;
     }
     Ok(statics)
+}
+
+/// Computes the deflection and load of each elastic element, and its contribution to that of the
+/// tool.
+fn element_statics(posed: &Posed, loaded: &Linear) -> Vec<ElementStatics> {
+    // To first order each element's contribution is its deflection times the Jacobian at the rigid
+    // pose.
+    let model = &posed.arm.model;
+    let (mut data, state) = posed.undeformed();
+    forward_kinematics(model, &mut data, &state.q);
+    let mut J = Matrix6xX::zeros(model.nv());
+    frame_jacobian(model, &data, &posed.tool, &mut J);
+    let ne = model.n_elastic();
+    let J = J.columns(model.nv() - ne, ne);
+    let (springs, energies) = posed.arm.springs_at_rest(&loaded.q);
+    let mut elements = Vec::new();
+    for ((name, range), energy_j) in loaded.elements.iter().zip(energies) {
+        let (first, n) = (range.start, range.len());
+        let deflection: DVector<f64> = loaded.equilibrium.rows(first, n).into_owned();
+        // For a nonlinear spring the tangent stiffness is not sufficient.
+        let load = springs.rows(first - loaded.driven, n);
+        let moved = J.columns(first - loaded.driven, n) * &deflection;
+        elements.push(ElementStatics {
+            name: name.clone(),
+            energy_j,
+            tcp_displacement_m: [moved[0], moved[1], moved[2]],
+            tcp_rotation_rad: [moved[3], moved[4], moved[5]],
+            load: load.iter().copied().collect(),
+            deflection: deflection.as_slice().to_vec(),
+        });
+    }
+    elements
 }

@@ -1,12 +1,11 @@
 //! Reading of flexarm's own TOML files: each begins with `format = 1`, and errors name their
 //! location.
 
-use flexarm_files::Source;
+use flexarm_files::{Source, TextFileError as RobotFileError};
 use serde::de::DeserializeOwned;
 use toml::Spanned;
 
 use crate::ranges::{Ranges, not_finite, outside};
-use crate::robot_file::RobotFileError;
 
 /// Reads the content of a file.
 ///

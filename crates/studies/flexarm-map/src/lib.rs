@@ -477,13 +477,7 @@ fn summed_up(
 ) -> Result<Map, Error> {
     let points = grid.map_or(taken.poses, Grid::places);
     let Some((best, worst)) = table.extremes(by) else {
-        return Err(match (&request.region, &taken.first_failure) {
-            _ if table.rows() > 0 => MapError::NothingToCompare { by: table.columns[by].name.clone() },
-            (_, Some(first)) => MapError::NoEquilibrium { poses: taken.poses, first: first.clone() },
-            (MapRegion::Workspace(w), None) => MapError::OutOfReach { places: points, axis: w.tool.axis },
-            (_, None) => MapError::Instants,
-        }
-        .into());
+        return Err(nothing_found(request, &table, taken, by, points).into());
     };
     let joints: Vec<String> = arm.joints().map(str::to_owned).collect();
     let mut caveats = match &request.region {
@@ -498,26 +492,16 @@ fn summed_up(
         );
         caveats.push(Caveat::from_message("no-equilibrium", "map", message, "analyse one of them with statics"));
     }
-    let mut placement = None;
-    if let (Some(edges), Some(grid)) = (request.workpiece_m, grid) {
-        placement = placement::best_box(grid, &cost_by_place(&table, grid, by), edges).map(|mut found| {
-            if table.columns[by].more_is_better {
-                found.worst = -found.worst;
+    let placement = match (request.workpiece_m, grid) {
+        (Some(edges), Some(grid)) => {
+            let found = placement::best_placement(&table, grid, by, edges);
+            if found.is_none() {
+                caveats.push(no_placement(edges));
             }
             found
-        });
-        if placement.is_none() {
-            let message = format!(
-                "the workpiece of {edges:?} m does not fit anywhere on the grid with all its places within reach"
-            );
-            caveats.push(Caveat::from_message(
-                "no-placement",
-                "map",
-                message,
-                "use a smaller workpiece or more tool directions",
-            ));
         }
-    }
+        _ => None,
+    };
     Ok(Map {
         robot: robot.name.clone(),
         tcp: robot.tcp.0.clone(),
@@ -548,17 +532,21 @@ fn summed_up(
     })
 }
 
-/// Returns the cost of each place: that of its best pose among the rows, so the worst one if only
-/// that is kept.
-fn cost_by_place(table: &MapTable, grid: &Grid, by: usize) -> Vec<f64> {
-    let place = columns::HEAD.iter().position(|(name, _)| *name == "place").unwrap_or_default();
-    let mut cost = vec![f64::INFINITY; grid.places()];
-    for k in 0..table.rows() {
-        let row = table.row(k);
-        let slot = &mut cost[row[place] as usize];
-        *slot = slot.min(table.cost(by, row[by]));
+/// Returns the reason why no pose can be compared with others.
+fn nothing_found(request: &MapRequest, table: &MapTable, taken: &Evaluation, by: usize, places: usize) -> MapError {
+    match (&request.region, &taken.first_failure) {
+        _ if table.rows() > 0 => MapError::NothingToCompare { by: table.columns[by].name.clone() },
+        (_, Some(first)) => MapError::NoEquilibrium { poses: taken.poses, first: first.clone() },
+        (MapRegion::Workspace(w), None) => MapError::OutOfReach { places, axis: w.tool.axis },
+        (_, None) => MapError::Instants,
     }
-    cost
+}
+
+/// Returns the caveat that a workpiece fits nowhere.
+fn no_placement(edges: [f64; 3]) -> Caveat {
+    let message =
+        format!("the workpiece of {edges:?} m does not fit anywhere on the grid with all its places within reach");
+    Caveat::from_message("no-placement", "map", message, "use a smaller workpiece or more tool directions")
 }
 
 /// Returns a caveat if the map has a single place, so that there is nothing to compare.

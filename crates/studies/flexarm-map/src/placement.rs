@@ -4,7 +4,9 @@ use std::collections::VecDeque;
 
 use serde::Serialize;
 
+use super::columns::HEAD;
 use super::region::Grid;
+use super::table::MapTable;
 
 /// Best placement of a box.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -21,6 +23,28 @@ pub struct Placement {
     pub points: usize,
 }
 
+/// Returns the best place of a workpiece on the grid, if it fits anywhere.
+pub(super) fn best_placement(table: &MapTable, grid: &Grid, by: usize, edges: [f64; 3]) -> Option<Placement> {
+    let mut found = best_box(grid, &cost_by_place(table, grid, by), edges)?;
+    if table.columns[by].more_is_better {
+        found.worst = -found.worst;
+    }
+    Some(found)
+}
+
+/// Returns the cost of each place: that of its best pose among the rows, so the worst one if only
+/// that is kept.
+fn cost_by_place(table: &MapTable, grid: &Grid, by: usize) -> Vec<f64> {
+    let place = HEAD.iter().position(|(name, _)| *name == "place").unwrap_or_default();
+    let mut cost = vec![f64::INFINITY; grid.places()];
+    for k in 0..table.rows() {
+        let row = table.row(k);
+        let slot = &mut cost[row[place] as usize];
+        *slot = slot.min(table.cost(by, row[by]));
+    }
+    cost
+}
+
 /// Finds the box of the given size with the smallest maximum cost; `None` if every box contains an
 /// unreachable place.
 ///
@@ -29,7 +53,7 @@ pub struct Placement {
 ///
 /// Complexity: linear in the number of places, independent of the size (running maxima, axis by
 /// axis).
-pub(super) fn best_box(grid: &Grid, cost: &[f64], size_m: [f64; 3]) -> Option<Placement> {
+fn best_box(grid: &Grid, cost: &[f64], size_m: [f64; 3]) -> Option<Placement> {
     let window = size_m.map(|edge| (edge / grid.spacing_m - 1e-9).ceil().max(0.0) as usize + 1);
     if (0..3).any(|c| window[c] > grid.count[c]) {
         return None;

@@ -8,9 +8,11 @@ use crate::statistics::{Sample, grid_levels};
 
 use super::file::{ParameterEntry, Role, StudyFile, Values};
 use super::metric::{Formula, Vocabulary};
-use super::store::CAVEATS;
 use super::value::ParameterValue;
 use flexarm_run::RobotFileError;
+
+/// Column of the caveats of each run.
+pub(super) const CAVEATS: &str = "caveats";
 
 /// Parameter with a column in the table of runs.
 #[derive(Clone, Debug)]

@@ -22,6 +22,7 @@ use flexarm_log::{CreateOptions, DataColumn, DataTable, DataValues, LogError};
 use serde::{Deserialize, Serialize};
 
 use super::Sweep;
+use super::design::CAVEATS;
 use super::error::SweepError;
 use super::evaluate::Answer;
 use super::table;
@@ -32,8 +33,6 @@ use flexarm_run::Error;
 pub(super) const STUDY: &str = "study.json";
 /// Table of all runs.
 pub(super) const RUNS: &str = "runs.parquet";
-/// Column of the caveats of each run.
-pub(super) const CAVEATS: &str = "caveats";
 /// Folder of the parts.
 const PARTS: &str = "parts";
 /// Number of journal entries that are converted to a part.

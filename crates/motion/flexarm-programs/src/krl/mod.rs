@@ -1,11 +1,15 @@
 //! KUKA's KRL: `.src` with `.dat`, including the code written by teach pendants.
 //!
-//! [`parse`] converts lines to statements, [`system`] implements BAS, the helpers of the inline
-//! forms and the system variables, [`motion`] converts PTP, LIN, CIRC and the splines to moves.
+//! [`parse`] converts lines to statements and [`dialect`] runs them: [`motion`] converts PTP, LIN,
+//! CIRC and the splines to moves, [`mod@bas`] and [`functions`] implement the inline forms,
+//! [`system`] holds the variables of the controller.
 //!
 //! Frames: B `$BASE` in W `$WORLD` (relative to `$ROBROOT`), T `$TOOL` on the flange F. A, B, C are
 //! Z-Y'-X'' angles in degrees.
 
+mod bas;
+mod dialect;
+mod functions;
 mod motion;
 mod parse;
 mod system;
@@ -146,7 +150,7 @@ fn add_siblings(texts: &mut Vec<Text>, path: &Path, unit: &mut Unit, data: &mut 
     called(&unit.main, &mut calls);
     let mut siblings = 0;
     while let Some(name) = calls.pop() {
-        if siblings >= MOST_SIBLINGS || system::is_built_in(&name) || !asked.insert(name.clone()) {
+        if siblings >= MOST_SIBLINGS || dialect::is_built_in(&name) || !asked.insert(name.clone()) {
             continue;
         }
         let Some((file, bytes)) = beside(path, &name, "src") else { continue };

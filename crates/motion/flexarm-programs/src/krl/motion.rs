@@ -5,15 +5,13 @@ use flexarm_path::program::{Blend, Configuration, Move, MoveKind, Speed, Target}
 use flexarm_spatial::Pose;
 use nalgebra::Vector3;
 
-use super::system::{CARTESIAN, Krl, frame_of, is_name, set_axes, tool_data, unknown_tool_number};
+use super::system::{CARTESIAN, Krls, frame_of, set_axes, tool_data, unknown_tool_number};
 use crate::common::frames::{Circle, mm_deg_zyx, pose_zyx_mm_deg};
-use crate::common::machine::{Flow, Machine};
+use crate::common::machine::{Flow, positional};
 use crate::common::recorder::Sources;
 use crate::common::tree::{Argument, Expr, Kind, Operator, Statement};
 use crate::common::value::{Record, Value, depends};
 use crate::common::{Result, Span, fail};
-
-type Krls<'a> = Machine<'a, Krl>;
 
 const AXES: [&str; 6] = ["a1", "a2", "a3", "a4", "a5", "a6"];
 /// Minimum number of axes of a first target.
@@ -520,4 +518,9 @@ pub(super) fn spline(machine: &mut Krls<'_>, arguments: &[Argument], body: &[Sta
         last.blend = blend;
     }
     Ok(flow)
+}
+
+/// Whether the argument at a position is one of these names.
+fn is_name(arguments: &[Argument], position: usize, names: &[&str]) -> bool {
+    matches!(positional(arguments, position), Some(Expr { kind: Kind::Name(name), .. }) if names.contains(&&**name))
 }

@@ -345,15 +345,7 @@ pub(super) fn setting(machine: &mut Rapids<'_>, name: &str, arguments: &[Argumen
                 return fail(span, "only SingArea \\Off and \\Wrist are read: take the line out");
             }
         }
-        "accset" => {
-            let (acceleration, ramp) = (machine.number(arguments, 0, span)?, machine.number(arguments, 1, span)?);
-            if ramp < 100.0 {
-                machine
-                    .recorder
-                    .note("ramps of accelerations (AccSet) are not taken: the robot's limits of the jerk rule", span);
-            }
-            machine.dialect.settings.acceleration = acceleration.clamp(20.0, 100.0) / 100.0;
-        }
+        "accset" => acceleration_fraction(machine, arguments, span)?,
         "velset" => {
             let (percent, largest) = (machine.number(arguments, 0, span)?, machine.number(arguments, 1, span)?);
             if !(percent > 0.0 && percent <= 100.0 && largest > 0.0) {
@@ -369,19 +361,7 @@ pub(super) fn setting(machine: &mut Rapids<'_>, name: &str, arguments: &[Argumen
             machine.dialect.settings.displacement = in_metres(pose_mm(&displacement, at)?);
         }
         "pdispoff" => machine.dialect.settings.displacement = Pose::identity(),
-        "cirpathmode" => {
-            machine.dialect.settings.circle = match arguments.first().and_then(|argument| argument.name.as_deref()) {
-                Some("pathframe") | None => CircleOrientation::WithPath,
-                Some("objectframe") => CircleOrientation::InObject,
-                Some("cirpointori") => CircleOrientation::ThroughPoint,
-                Some(other) => {
-                    return fail(
-                        span,
-                        format!("CirPathMode \\{other} is not read: \\PathFrame, \\ObjectFrame and \\CirPointOri are"),
-                    );
-                }
-            };
-        }
+        "cirpathmode" => machine.dialect.settings.circle = circle_orientation(arguments, span)?,
         "pathresol" | "sim" => machine.recorder.note("the resolution of the controller's path is not simulated", span),
         "softact" | "pdispon" | "eoffson" | "eoffsset" | "searchl" | "searchc" | "searchj" | "moveextj"
         | "stopmove" | "startmove" | "storepath" | "restopath" | "corrcon" | "corrwrite" | "contactl"
@@ -396,6 +376,30 @@ pub(super) fn setting(machine: &mut Rapids<'_>, name: &str, arguments: &[Argumen
         _ => return Ok(false),
     }
     Ok(true)
+}
+
+/// Runs `AccSet`: a fraction of the accelerations.
+fn acceleration_fraction(machine: &mut Rapids<'_>, arguments: &[Argument], span: Span) -> Result<()> {
+    let (acceleration, ramp) = (machine.number(arguments, 0, span)?, machine.number(arguments, 1, span)?);
+    if ramp < 100.0 {
+        machine
+            .recorder
+            .note("ramps of accelerations (AccSet) are not taken: the robot's limits of the jerk rule", span);
+    }
+    machine.dialect.settings.acceleration = acceleration.clamp(20.0, 100.0) / 100.0;
+    Ok(())
+}
+
+/// Reads the mode of `CirPathMode`.
+fn circle_orientation(arguments: &[Argument], span: Span) -> Result<CircleOrientation> {
+    match arguments.first().and_then(|argument| argument.name.as_deref()) {
+        Some("pathframe") | None => Ok(CircleOrientation::WithPath),
+        Some("objectframe") => Ok(CircleOrientation::InObject),
+        Some("cirpointori") => Ok(CircleOrientation::ThroughPoint),
+        Some(other) => {
+            fail(span, format!("CirPathMode \\{other} is not read: \\PathFrame, \\ObjectFrame and \\CirPointOri are"))
+        }
+    }
 }
 
 fn acceleration_limit(machine: &mut Rapids<'_>, name: &str, arguments: &[Argument], span: Span) -> Result<()> {

@@ -10,10 +10,10 @@ use flexarm_stepping::Damping;
 
 use super::slip::{self, slip};
 use super::{Caveat, CaveatKind, kinds};
-use crate::flexible::RobotLink;
 use crate::mounting::RobotMounting;
 use crate::options::LinkModel;
 use crate::robot::Robot;
+use crate::robot_link::RobotLink;
 
 /// Range of Young's modulus, from polymers to diamond (Pa).
 const YOUNG: RangeInclusive<f64> = 1e8..=1.3e12;

@@ -21,9 +21,10 @@ use flexarm_stepping::{ElasticElement, FlexibleArm, Observation, PooledWorkspace
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, Point3, RowSVector};
 
 use crate::error::Error;
-use crate::flexible::{FlexibleRobot, Owner, RobotLink, StressSource};
+use crate::flexible::{FlexibleRobot, Owner};
 use crate::options::Modelling;
 use crate::robot::Robot;
+use crate::robot_link::{RobotLink, StressSource};
 use crate::strength::Strength;
 use crate::summary::{LinkStressFigures, StrainGaugeFigures, StressPlaceFigures, StressPointFigures};
 

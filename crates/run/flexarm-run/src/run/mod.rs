@@ -24,7 +24,7 @@ use flexarm_stepping::{FlexibleArm, Observation, Stepper};
 
 use crate::arm::{Arm, Run};
 use crate::bends::stations;
-use crate::caveat;
+use crate::caveat::{self, Caveat};
 use crate::error::Error;
 use crate::flexible::{FlexibleRobot, Owner};
 use crate::headline;
@@ -166,21 +166,7 @@ pub(crate) fn simulate(
     run.monitors = run.monitors.with_stress(stress);
     let mut files = recorders(outputs, !more.is_empty())?;
     files.set.extend(more);
-    let mut head = match detail {
-        Detail::Figures => RunHeader::default(),
-        Detail::Columns => names_of_signals(robot, &run.arm),
-        Detail::Samples => signals(robot, &run.arm),
-        Detail::Curves => header(robot, scenario, options, &run.arm, flexible.links_model()),
-    };
-    head.has_rigid = options.with_twin;
-    head.bends.clone_from(&run.bends);
-    head.contributors = run.contributors.iter().map(|c| c.name.clone()).collect();
-    head.gauges = run.monitors.stress.as_ref().map_or_else(Vec::new, StressMonitor::channels);
-    head.has_stress = run.monitors.stress.is_some();
-    head.has_static = options.with_twin;
-    head.color_scale_m = expected.color_scale_m();
-    head.volume = expected.volume;
-    head.magnification = options.magnification.unwrap_or_else(|| expected.magnification());
+    let head = run.header(scenario, &expected);
     files.begin(&head)?;
     write_layouts(&files.names, &head)?;
     files.set.on_threads();
@@ -203,14 +189,7 @@ pub(crate) fn simulate(
     if let Err(error) = &end {
         events.push(Event { time_s: run.seen.t, kind: EventKind::Stopped, text: error.to_string() });
     }
-    summary.caveats.extend(load_caveats);
-    summary.caveats = caveat::once_each(std::mem::take(&mut summary.caveats));
-    summary.warnings = caveat::warnings(&summary.caveats);
-    summary.end = end.as_ref().map_or_else(ToString::to_string, |()| "complete".into());
-    summary.wall_s = stopwatch.wall_s();
-    summary.cpu_s = stopwatch.cpu_s();
-    summary.real_time_factor = summary.duration_s / summary.wall_s.max(1e-9);
-    summary.cpu_s_per_simulated_s = summary.cpu_s / summary.duration_s.max(1e-9);
+    complete(&mut summary, load_caveats, &end, &stopwatch);
     let picture = outputs.and_then(|_| run.monitors.stress.as_ref().and_then(StressMonitor::picture));
     if let Some((outputs, picture)) = outputs.zip(picture.as_ref()) {
         let path = outputs.folder.join(STRESS_PICTURE);
@@ -235,6 +214,18 @@ pub(crate) fn simulate(
     let reported = closed.and_then(|()| outputs.zip(page).map_or(Ok(()), write));
     how_it_ended(end, reported)?;
     Ok(Run { summary, columns: columns.unwrap_or_default(), trace: run.trace })
+}
+
+/// Adds caveats about loads, how the run ended, and its times.
+fn complete(summary: &mut Summary, load_caveats: Vec<Caveat>, end: &Result<(), Error>, stopwatch: &Stopwatch) {
+    summary.caveats.extend(load_caveats);
+    summary.caveats = caveat::once_each(std::mem::take(&mut summary.caveats));
+    summary.warnings = caveat::warnings(&summary.caveats);
+    summary.end = end.as_ref().map_or_else(ToString::to_string, |()| "complete".into());
+    summary.wall_s = stopwatch.wall_s();
+    summary.cpu_s = stopwatch.cpu_s();
+    summary.real_time_factor = summary.duration_s / summary.wall_s.max(1e-9);
+    summary.cpu_s_per_simulated_s = summary.cpu_s / summary.duration_s.max(1e-9);
 }
 
 /// Chooses the error to return if the run or the writing of its results failed. The error that
@@ -359,6 +350,29 @@ impl<'a> RunLoop<'a> {
             last,
             arm,
             stepper,
+        }
+    }
+
+    /// Returns the header of recordings and curves, as far as `detail` needs it.
+    fn header(&self, scenario: &Scenario, expected: &Expected) -> RunHeader {
+        let (robot, options, stress) = (self.robot, self.options, self.monitors.stress.as_ref());
+        let head = match self.detail {
+            Detail::Figures => RunHeader::default(),
+            Detail::Columns => names_of_signals(robot, &self.arm),
+            Detail::Samples => signals(robot, &self.arm),
+            Detail::Curves => header(robot, scenario, options, &self.arm, self.flexible.links_model()),
+        };
+        RunHeader {
+            has_rigid: options.with_twin,
+            bends: self.bends.clone(),
+            contributors: self.contributors.iter().map(|c| c.name.clone()).collect(),
+            gauges: stress.map_or_else(Vec::new, StressMonitor::channels),
+            has_stress: stress.is_some(),
+            has_static: options.with_twin,
+            color_scale_m: expected.color_scale_m(),
+            volume: expected.volume,
+            magnification: options.magnification.unwrap_or_else(|| expected.magnification()),
+            ..head
         }
     }
 

@@ -2,162 +2,22 @@
 //!
 //! Start at [`read_path_file`]. Docs: `docs/motions.md`.
 
-use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
+use flexarm_files::{Source, TextFileError as RobotFileError};
 use flexarm_kinematics::{Data, NullSpaceRule, Pose, forward_kinematics};
 use flexarm_path::program::{Blend, Configuration, Item, Move, MoveKind, Program, Speed, Target};
 use flexarm_path::{ControllerAxis, PathOptions, ProgramArm, check_axes, check_rate};
 use flexarm_programs::{GCodeOptions, ReadOptions, Rotary};
 use flexarm_trajectory::Trajectory;
 use nalgebra::{DVector, Quaternion, Rotation3, Translation3, UnitQuaternion, Vector3};
-use serde::Deserialize;
 use toml::Spanned;
 
 use super::program::plan_program;
-use super::standard::{Standard, Step};
+use super::standard::Step;
+use super::tables::{FrameTable, MoveTable, PathFile, PathTable, ProgramTable, Redundancy, StandardTable};
 use super::{Cell, Overrides, ToolPath};
 use crate::error::Error;
-use crate::robot_file::{RobotFileError, Source};
-
-/// Path file as written.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct PathFile {
-    format: Spanned<i64>,
-    path: PathTable,
-    #[serde(default)]
-    limits: BTreeMap<Spanned<String>, LimitsTable>,
-    #[serde(rename = "move", default)]
-    moves: Vec<Spanned<MoveTable>>,
-    standard: Option<Spanned<StandardTable>>,
-    program: Option<Spanned<ProgramTable>>,
-}
-
-/// `[program]`: a robot program instead of moves, with values for what the program leaves
-/// undefined.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct ProgramTable {
-    /// Path of the program, relative to this file.
-    file: Spanned<PathBuf>,
-    /// Routine to start with.
-    entry: Option<String>,
-    /// Joint values at the start.
-    start: Option<Vec<f64>>,
-    /// Values of names that the program leaves undefined, in the program's language.
-    #[serde(default)]
-    given: BTreeMap<String, String>,
-    #[serde(default)]
-    waits_are_over: bool,
-    endless_passes: Option<usize>,
-    /// G-code: orientation of the tool in the work frame.
-    rpy: Option<[f64; 3]>,
-    quaternion: Option<[f64; 4]>,
-    /// G-code: whether A, B and C tilt the tool.
-    #[serde(default)]
-    tilt: bool,
-    /// G-code: speed of rapids, which become straight lines.
-    rapid: Option<f64>,
-    /// G-code: whether the tool centre point is the tip of the tool.
-    #[serde(default)]
-    tip_is_known: bool,
-}
-
-/// `[standard]`: a named motion instead of moves.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct StandardTable {
-    motion: Standard,
-    /// Centre of the cube, in the base.
-    centre: [f64; 3],
-    /// Side of the cube, diameter of the circles, or length of the moves.
-    side: Spanned<f64>,
-    rpy: Option<[f64; 3]>,
-    quaternion: Option<[f64; 4]>,
-    near: Option<Vec<f64>>,
-    repeats: Option<usize>,
-}
-
-/// `[path]`.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct PathTable {
-    /// "m" or "mm".
-    lengths: Spanned<String>,
-    /// "rad" or "deg".
-    angles: Spanned<String>,
-    base: Option<Spanned<FrameTable>>,
-    tool: Option<Spanned<FrameTable>>,
-    /// Rise time of the accelerations (s).
-    rise: Option<Spanned<f64>>,
-    /// Use of the joints that the path leaves free.
-    redundancy: Option<Spanned<Redundancy>>,
-    speed: Option<f64>,
-    acceleration: Option<f64>,
-    jerk: Option<f64>,
-    turning: Option<f64>,
-    turning_acceleration: Option<f64>,
-    joint_speed: Option<f64>,
-    joint_acceleration: Option<f64>,
-    blend: Option<f64>,
-}
-
-/// `redundancy` of `[path]`: a word, or joint values.
-#[derive(Debug, Deserialize)]
-#[serde(untagged)]
-enum Redundancy {
-    Word(String),
-    Posture(Vec<f64>),
-}
-
-#[derive(Debug, Clone, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct FrameTable {
-    xyz: [f64; 3],
-    rpy: Option<[f64; 3]>,
-    quaternion: Option<[f64; 4]>,
-}
-
-/// One entry of `[limits]`.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct LimitsTable {
-    velocity: Option<Spanned<f64>>,
-    acceleration: Option<Spanned<f64>>,
-    jerk: Option<Spanned<f64>>,
-    torque: Option<Spanned<f64>>,
-}
-
-/// One `[[move]]`.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct MoveTable {
-    /// Joint move to joint values.
-    joints: Option<Spanned<Vec<f64>>>,
-    /// Joint move to a TCP pose.
-    joint_to: Option<Spanned<[f64; 3]>>,
-    line: Option<Spanned<[f64; 3]>>,
-    arc: Option<Spanned<[f64; 3]>>,
-    spline: Option<Spanned<Vec<Vec<f64>>>>,
-    /// Dwell time (s).
-    dwell: Option<Spanned<f64>>,
-    via: Option<Spanned<[f64; 3]>>,
-    angle: Option<f64>,
-    turns_with_path: Option<bool>,
-    rpy: Option<[f64; 3]>,
-    quaternion: Option<Spanned<[f64; 4]>>,
-    near: Option<Vec<f64>>,
-    duration: Option<f64>,
-    speed: Option<f64>,
-    acceleration: Option<f64>,
-    jerk: Option<f64>,
-    turning: Option<f64>,
-    turning_acceleration: Option<f64>,
-    joint_speed: Option<f64>,
-    joint_acceleration: Option<f64>,
-    blend: Option<f64>,
-}
 
 /// Maximum rise time of accelerations (s).
 const LONGEST_RISE: f64 = 100.0;

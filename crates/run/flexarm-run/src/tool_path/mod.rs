@@ -6,6 +6,7 @@
 mod file;
 mod program;
 mod standard;
+mod tables;
 
 use std::path::Path;
 

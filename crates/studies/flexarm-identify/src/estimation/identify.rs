@@ -1,13 +1,14 @@
 //! Identification of arm parameters from readings: estimates, uncertainties, combinations that are
 //! not identifiable, and evidence against the model.
 
-use flexarm_kinematics::Pose;
-use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, Translation3, Vector3};
+use nalgebra::{DMatrix, DVector};
 
+use crate::estimation::identified::{HeldOut, Identified, IdentifyError, ParameterEstimate};
 use crate::estimation::least_squares::{Residuals, Search, Solution, SolveError, solve};
-use crate::estimation::measurement::{MeasuredArm, NoAnswer};
+use crate::estimation::measurement::MeasuredArm;
 use crate::estimation::parameter::{Effect, Parameter, Plant};
-use crate::estimation::reading::{Component, Instrument, Measurements, Reading, ReadingKind, Target};
+use crate::estimation::placement::placed;
+use crate::estimation::reading::{Instrument, Measurements, Reading, ReadingKind};
 
 /// Magnitude of a normalised residual above which its reading is suspicious.
 const SUSPICIOUS: f64 = 4.0;
@@ -40,133 +41,6 @@ impl Default for IdentifyOptions {
     fn default() -> Self {
         Self { search: Search::default(), deviations_known: true, folds: 10 }
     }
-}
-
-/// Estimate of one parameter.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ParameterEstimate {
-    /// Name, as in the robot file.
-    pub name: String,
-    /// Unit of the values.
-    pub unit: String,
-    /// Initial value.
-    pub initial: f64,
-    /// Estimated value; the initial value if the parameter is not identifiable.
-    pub value: f64,
-    /// Standard deviation; NaN if the parameter is not identifiable or the model does not fit the
-    /// readings.
-    pub std: f64,
-    /// 95 % confidence interval; NaN where `std` is NaN.
-    pub interval: [f64; 2],
-    /// Whether the readings determine the parameter.
-    pub identifiable: bool,
-    /// Whether it has its found value even if the readings only determine it together with others.
-    pub shared: bool,
-}
-
-/// Cross-validation: residuals of readings that the fit did not use.
-#[derive(Clone, Debug, PartialEq)]
-pub struct HeldOut {
-    /// Number of folds.
-    pub folds: usize,
-    /// RMS of the standardised residuals, each predicted from the other folds.
-    pub rms: f64,
-    /// RMS of the standardised residuals with the initial values.
-    pub rms_initial: f64,
-    /// Standardised residual of each number of each reading; NaN where no prediction is possible.
-    pub residuals: Vec<f64>,
-}
-
-/// Result of an identification.
-#[derive(Clone, Debug)]
-pub struct Identified {
-    /// Estimates, one per parameter, in order.
-    pub parameters: Vec<ParameterEstimate>,
-    /// Correlation matrix of the parameters' coordinates, p×p.
-    pub correlation: DMatrix<f64>,
-    /// Combinations that the readings do not determine: parameter and weight, largest weight first.
-    pub untold: Vec<Vec<(usize, f64)>>,
-    /// Solution of the least-squares problem.
-    pub solution: Solution,
-    /// Standardised residuals with the initial values, with the unknowns of the measurement fitted.
-    pub before: Vec<f64>,
-    /// Residuals over their own standard deviation after the fit; a magnitude above four
-    /// contradicts the other readings.
-    pub normalised: Vec<f64>,
-    /// Indices into [`Self::normalised`] with a magnitude above four, largest first.
-    pub suspicious: Vec<usize>,
-    /// Ratio of the scatter to the declared one, if chance exceeds it less than once in a thousand
-    /// cases.
-    pub misfit: Option<f64>,
-    /// Cross-validation.
-    pub held_out: Option<HeldOut>,
-    /// Estimated poses of unknown instruments: the world in the instrument's axes.
-    pub instruments: Vec<Pose>,
-    /// Estimated positions of the targets in tool axes (m).
-    pub targets: Vec<Vector3<f64>>,
-}
-
-/// Reason why an identification fails.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum IdentifyError {
-    /// No parameter or no reading.
-    #[error("{parameters} parameters and {rows} measured numbers: at least one of each is needed")]
-    Nothing {
-        /// Number of parameters.
-        parameters: usize,
-        /// Number of measured numbers.
-        rows: usize,
-    },
-    /// Too few measured places for an instrument.
-    #[error(
-        "instrument {instrument}: its pose requires at least three measured places that are not on one line, found \
-         {places}"
-    )]
-    Instrument {
-        /// Number of the instrument.
-        instrument: usize,
-        /// Number of its places.
-        places: usize,
-    },
-    /// Too few displacements to find the axes of an instrument.
-    #[error(
-        "instrument {instrument}: its axes require displacements with all three components along at least two \
-         directions, found {displacements}; add such readings, or give its orientation"
-    )]
-    Axes {
-        /// Number of the instrument.
-        instrument: usize,
-        /// Number of its displacements.
-        displacements: usize,
-    },
-    /// The arm model has no solution for a reading.
-    #[error(transparent)]
-    Model(#[from] NoAnswer),
-    /// The readings do not determine an unknown of the measurement.
-    #[error(
-        "the readings do not determine {what}: measure at more different poses, in particular with different \
-         orientations of the tool"
-    )]
-    Untold {
-        /// Description of the unknown.
-        what: String,
-    },
-    /// The scatter cannot be estimated, because there are as many unknowns as numbers.
-    #[error(
-        "the {rows} numbers have no standard deviation and there are as many unknowns: the scatter cannot be \
-         estimated; give a standard deviation or measure more"
-    )]
-    NoScatter {
-        /// Number of measured numbers.
-        rows: usize,
-    },
-    /// A value is not finite.
-    #[error(
-        "a residual or a derivative is not finite: a value, a standard deviation or an uncertainty is too large or \
-         too small"
-    )]
-    NotFinite,
 }
 
 /// Identifies the parameters.
@@ -397,102 +271,6 @@ fn own_name(measurements: &Measurements, number: usize) -> String {
     "the position of a target on the tool".to_owned()
 }
 
-/// Returns the measurements with each unknown instrument at its best fit to the arm with its
-/// initial values.
-fn placed(plant: &Plant, measurements: &Measurements) -> Result<Measurements, IdentifyError> {
-    let mut placed = measurements.clone();
-    for number in 0..measurements.instruments.len() {
-        let of_it = |kind: &ReadingKind| match kind {
-            ReadingKind::InstrumentAt { instrument, .. } => *instrument == number,
-            _ => false,
-        };
-        let said = measurements.readings.iter().any(|reading| of_it(&reading.kind));
-        match measurements.instruments[number] {
-            Instrument::Unknown(_) if !said => {
-                let seen =
-                    |kind: &ReadingKind| matches!(kind, ReadingKind::Place { instrument, .. } if *instrument == number);
-                let [world, own] = both_points(plant, measurements, seen)?;
-                let too_few = || IdentifyError::Instrument { instrument: number, places: world.len() };
-                placed.instruments[number] = Instrument::Unknown(rigid_fit(&world, &own).ok_or_else(too_few)?);
-            }
-            Instrument::Axes(_) if !said => {
-                let seen = |kind: &ReadingKind| seen_in_axes(kind, number);
-                let [world, own] = both_points(plant, measurements, seen)?;
-                let too_few = || IdentifyError::Axes { instrument: number, displacements: world.len() };
-                placed.instruments[number] = Instrument::Axes(rotation_fit(&world, &own).ok_or_else(too_few)?);
-            }
-            _ => {}
-        }
-    }
-    Ok(placed)
-}
-
-/// Whether a reading consists of exactly the three components of a displacement in the axes of an
-/// instrument.
-fn seen_in_axes(kind: &ReadingKind, instrument: usize) -> bool {
-    let ReadingKind::Displacement { rows, .. } = kind else { return false };
-    let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
-    rows.len() == 3 && rows.iter().zip(axes).all(|(row, axis)| row.of == Component::AlongSeen(instrument, axis))
-}
-
-/// Returns the vectors of some readings, predicted in world axes by the arm with its initial
-/// values, and as observed.
-fn both_points(
-    plant: &Plant,
-    measurements: &Measurements,
-    some: impl Fn(&ReadingKind) -> bool,
-) -> Result<[Vec<Vector3<f64>>; 2], IdentifyError> {
-    // With instruments at the identity, predictions are in world axes.
-    let mut seen = measurements.of_readings(|k| some(&measurements.readings[k].kind));
-    seen.instruments.iter_mut().for_each(|i| *i = Instrument::Known(Pose::identity()));
-    seen.targets.iter_mut().for_each(|t| {
-        if let Target::Unknown(guess) = t {
-            *t = Target::Known(*guess);
-        }
-    });
-    let arm = MeasuredArm { plant, parameters: &[], measurements: &seen };
-    Ok([points(&arm.predicted(&DVector::zeros(0))?), points(&arm.observed())])
-}
-
-pub(crate) fn points(values: &[f64]) -> Vec<Vector3<f64>> {
-    values.chunks_exact(3).map(Vector3::from_column_slice).collect()
-}
-
-/// Returns the rotation and translation that map points onto others with the least sum of squares
-/// (Arun, Huang and Blostein 1987).
-pub(crate) fn rigid_fit(from: &[Vector3<f64>], to: &[Vector3<f64>]) -> Option<Pose> {
-    let n = from.len();
-    if n < 3 {
-        return None;
-    }
-    let middle = |points: &[Vector3<f64>]| points.iter().sum::<Vector3<f64>>() / n as f64;
-    let (a, b) = (middle(from), middle(to));
-    let less = |points: &[Vector3<f64>], middle| points.iter().map(|p| p - middle).collect::<Vec<_>>();
-    let R = rotation_fit(&less(from, a), &less(to, b))?;
-    Some(Pose::from_parts(Translation3::from(b - R * a), R))
-}
-
-/// Returns the rotation that maps vectors onto others with the least sum of squares; `None` if all
-/// are collinear.
-pub(crate) fn rotation_fit(from: &[Vector3<f64>], to: &[Vector3<f64>]) -> Option<Rotation3<f64>> {
-    let H: Matrix3<f64> = from.iter().zip(to).map(|(p, q)| p * q.transpose()).sum();
-    if !H.norm_squared().is_finite() {
-        return None;
-    }
-    let svd = H.svd(true, true);
-    let (U, Vt) = (svd.u?, svd.v_t?);
-    let mut sizes: Vec<f64> = svd.singular_values.iter().copied().collect();
-    sizes.sort_by(|x, y| y.total_cmp(x));
-    // Collinear vectors leave the rotation about their line undetermined.
-    if sizes[1] <= 1e-9 * sizes[0] {
-        return None;
-    }
-    let mut turn = Matrix3::identity();
-    let smallest = svd.singular_values.imin();
-    turn[(smallest, smallest)] = (Vt.transpose() * U.transpose()).determinant().signum();
-    Some(Rotation3::from_matrix_unchecked(Vt.transpose() * turn * U.transpose()))
-}
-
 /// Returns the standardised residuals of the arm with its initial values, with the unknowns of the
 /// measurements fitted.
 fn initial_residuals(
@@ -632,19 +410,6 @@ fn summarise(
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_rigid_fit_finds_a_placement_again_and_refuses_points_on_a_line() {
-        let X = Pose::from_parts(Translation3::new(3.0, -1.0, 0.4), Rotation3::from_euler_angles(0.3, -1.1, 2.0));
-        let from: Vec<Vector3<f64>> =
-            (0..6).map(|k| Vector3::new(f64::from(k).sin(), f64::from(k * k).cos(), 0.3 * f64::from(k))).collect();
-        let to: Vec<Vector3<f64>> = from.iter().map(|p| X.rotation * p + X.translation.vector).collect();
-        let found = rigid_fit(&from, &to).unwrap();
-        let error = (found.rotation.matrix() - X.rotation.matrix()).amax();
-        assert!(error < 1e-14, "{error:e}");
-        let line: Vec<Vector3<f64>> = (0..6).map(|k| Vector3::new(f64::from(k), 2.0 * f64::from(k), 1.0)).collect();
-        assert!(rigid_fit(&line, &line).is_none());
-    }
 
     #[test]
     fn the_bound_on_the_scatter_is_that_of_the_tables() {

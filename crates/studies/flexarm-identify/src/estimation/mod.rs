@@ -11,10 +11,12 @@
 
 mod coupled_gears;
 mod encoders;
+mod identified;
 mod identify;
 mod least_squares;
 mod measurement;
 pub(crate) mod parameter;
+mod placement;
 mod plan;
 mod reading;
 mod response;
@@ -24,7 +26,8 @@ mod trajectory;
 
 pub use coupled_gears::{CoupledOutput, coupled_gear_stiffness};
 pub use encoders::{GearEstimate, GearRun, gear_stiffness};
-pub use identify::{HeldOut, Identified, IdentifyError, IdentifyOptions, ParameterEstimate, identify};
+pub use identified::{HeldOut, Identified, IdentifyError, ParameterEstimate};
+pub use identify::{IdentifyOptions, identify};
 pub use least_squares::{Loss, Residuals, Search, Solution, SolveError, solve};
 pub use measurement::{MeasuredArm, NoAnswer};
 pub use parameter::{Effect, Parameter, Plant, SpringPart};

@@ -13,10 +13,10 @@
 use flexarm_kinematics::Pose;
 use nalgebra::{DMatrix, DVector, Rotation3, Vector3};
 
-use crate::estimation::identify::{points, rigid_fit, rotation_fit};
 use crate::estimation::least_squares::Residuals;
 use crate::estimation::measurement::MeasuredArm;
 use crate::estimation::parameter::{Effect, Parameter, Plant};
+use crate::estimation::placement::{points, rigid_fit, rotation_fit};
 use crate::estimation::reading::{Component, Instrument, Measurements, ReadingKind, Target};
 
 /// Mistake that explains readings which the arm does not.

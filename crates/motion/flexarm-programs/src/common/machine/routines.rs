@@ -1,0 +1,123 @@
+//! Calls of the program's routines, and the arguments of routines, functions and instructions.
+
+use std::rc::Rc;
+
+use super::{Dialect, Flow, Machine, Variable, Variables};
+use crate::common::tree::{Argument, Expr, Kind, Routine};
+use crate::common::value::Value;
+use crate::common::{Result, Span, fail};
+
+impl<D: Dialect> Machine<'_, D> {
+    pub(super) fn call(&mut self, name: &Rc<str>, arguments: &[Argument], span: Span) -> Result<Flow> {
+        let Some(routine) = self.routines.get(name).cloned() else {
+            return D::instruction(self, name, arguments, span);
+        };
+        match self.invoke(&routine, arguments, span)? {
+            Flow::Halt => Ok(Flow::Halt),
+            _ => Ok(Flow::On),
+        }
+    }
+
+    pub(super) fn function(&mut self, name: &Rc<str>, arguments: &[Argument], span: Span) -> Result<Value> {
+        let Some(routine) = self.routines.get(name).cloned() else {
+            return D::function(self, name, arguments, span);
+        };
+        self.step(span)?;
+        match self.invoke(&routine, arguments, span)? {
+            Flow::Return(value) => Ok(value),
+            _ => Ok(Value::Nothing),
+        }
+    }
+
+    /// Runs a routine; its return value is in [`Flow::Return`].
+    pub(crate) fn invoke(&mut self, routine: &Rc<Routine>, arguments: &[Argument], span: Span) -> Result<Flow> {
+        let mut scope = Variables::new();
+        let mut returned: Vec<(Rc<str>, Expr)> = Vec::new();
+        let mut position = 0;
+        for argument in arguments {
+            let parameter = match &argument.name {
+                Some(name) => routine.parameters.iter().find(|parameter| parameter.name == *name),
+                None => {
+                    let mut positional =
+                        routine.parameters.iter().filter(|p| !p.optional || D::FIRST_INDEX == 0 || p.default.is_some());
+                    position += 1;
+                    positional.nth(position - 1)
+                }
+            };
+            let Some(parameter) = parameter else {
+                return fail(argument.span, format!("`{}` has no such parameter", routine.name));
+            };
+            let value = match &argument.value {
+                Some(expression) if parameter.returned => self.value(expression).unwrap_or(Value::Nothing),
+                Some(expression) => self.value(expression)?,
+                None => Value::Flag(true),
+            };
+            let value =
+                if matches!(value, Value::Nothing) { value } else { self.fit(&parameter.kind, value, argument.span)? };
+            let origin = argument.value.as_ref().and_then(|expression| self.origin(expression));
+            scope.insert(parameter.name.clone(), Variable { origin, value, kind: parameter.kind.clone() });
+            if let (true, Some(place)) = (parameter.returned, &argument.value) {
+                returned.push((parameter.name.clone(), place.clone()));
+            }
+        }
+        for parameter in &routine.parameters {
+            if scope.contains_key(&parameter.name) || parameter.optional && parameter.default.is_none() {
+                continue;
+            }
+            let Some(default) = &parameter.default else {
+                return fail(span, format!("`{}` needs a value for `{}`", routine.name, parameter.name));
+            };
+            let value = self.value(default)?;
+            scope.insert(parameter.name.clone(), Variable { origin: None, value, kind: parameter.kind.clone() });
+        }
+        self.locals.push(scope);
+        let flow = self.nested(span, |machine| machine.run(&routine.body));
+        let scope = self.locals.pop().unwrap_or_default();
+        let flow = flow?;
+        for (name, place) in returned {
+            if let (Some(variable), Kind::Name(_) | Kind::Index(..) | Kind::Field(..)) = (scope.get(&name), &place.kind)
+            {
+                self.assign(&place, variable.value.clone())?;
+            }
+        }
+        Ok(flow)
+    }
+
+    /// Whether an argument of the current routine was given (RAPID's `Present`).
+    pub(crate) fn is_given(&self, name: &str) -> bool {
+        self.locals.last().is_some_and(|scope| scope.contains_key(name))
+    }
+
+    /// Value of an argument, or an error if it is missing.
+    pub(crate) fn argument(&mut self, arguments: &[Argument], position: usize, span: Span) -> Result<(Value, Span)> {
+        match positional(arguments, position) {
+            Some(expression) => Ok((self.value(expression)?, expression.span)),
+            None => fail(span, format!("argument {} is missing", position + 1)),
+        }
+    }
+
+    /// [`Machine::origin`] of an argument.
+    pub(crate) fn argument_origin(&mut self, arguments: &[Argument], position: usize) -> Option<Span> {
+        self.origin(positional(arguments, position)?)
+    }
+
+    /// Numeric value of an argument.
+    pub(crate) fn number(&mut self, arguments: &[Argument], position: usize, span: Span) -> Result<f64> {
+        let (value, at) = self.argument(arguments, position, span)?;
+        value.number(at)
+    }
+
+    /// Value of a named argument, if it is present.
+    pub(crate) fn named(&mut self, arguments: &[Argument], name: &str) -> Result<Option<(Value, Span)>> {
+        match arguments.iter().find(|argument| argument.name.as_deref() == Some(name)) {
+            Some(Argument { value: Some(value), .. }) => Ok(Some((self.value(value)?, value.span))),
+            Some(Argument { value: None, span, .. }) => Ok(Some((Value::Flag(true), *span))),
+            None => Ok(None),
+        }
+    }
+}
+
+/// The unnamed argument at a position.
+pub(crate) fn positional(arguments: &[Argument], position: usize) -> Option<&Expr> {
+    arguments.iter().filter(|argument| argument.name.is_none()).nth(position)?.value.as_ref()
+}

@@ -1,0 +1,189 @@
+//! Header, separator and lines of a table, and the units that its comments state.
+
+use super::dialect::{Separator, clock_time, number};
+use super::header::{Unit, name_and_unit, unit};
+use super::located::{Located, at, nowhere};
+use super::request::TableRequest;
+use crate::problem::Problem;
+
+/// The lines of a table.
+pub(super) struct Table<'t> {
+    pub(super) separator: Separator,
+    pub(super) header_line: usize,
+    pub(super) names: Vec<String>,
+    /// Units from a second header line that holds only units.
+    pub(super) units: Vec<Option<Unit>>,
+    /// Number and text of each line of numbers.
+    pub(super) lines: Vec<(usize, &'t str)>,
+    /// Units stated in the comments: whether angles are in degrees, prismatic joints.
+    pub(super) degrees: Option<bool>,
+    pub(super) metres: Vec<String>,
+    /// Whether the last line is terminated.
+    pub(super) ends_whole: bool,
+    /// First and last line of the text above the header.
+    pub(super) preamble: Option<(usize, usize)>,
+}
+
+fn is_comment(line: &str) -> bool {
+    let line = line.trim_start();
+    // rostopic names its first column `%time`.
+    line.starts_with('#') || line.starts_with("//") || (line.starts_with('%') && !line.starts_with("%time"))
+}
+
+impl<'t> Table<'t> {
+    /// Finds header and separator.
+    pub(super) fn find(text: &'t str, request: &TableRequest<'_>) -> Result<Self, Located> {
+        let ends_whole = text.ends_with(['\n', '\r']);
+        let lines = || text.split(['\n']).map(|line| line.trim_end_matches('\r')).enumerate().map(|(i, l)| (i + 1, l));
+        let mut content = lines().filter(|(_, line)| !line.trim().is_empty() && !is_comment(line));
+        let Some((first_line, first)) = content.next() else { return Err(nowhere(Problem::Empty)) };
+        let second = content.next();
+        // In a file without a header line the last comment before the numbers may be the header, as
+        // numpy writes it.
+        let comment = lines().take_while(|(line, _)| *line < first_line).filter(|(_, line)| is_comment(line)).last();
+        let comment = comment.map(|(line, text)| (line, text.trim_start().trim_start_matches(['#', '%', '/']).trim()));
+
+        let are_numbers = |fields: &[String]| fields.iter().all(|field| number(field).is_some());
+        let numeric = Separator::ALL.into_iter().find(|separator| {
+            let fields = separator.split(first);
+            fields.len() > 1 && are_numbers(&fields)
+        });
+        let (separator, header_line, names, from) = if let Some(separator) = numeric {
+            let width = separator.split(first).len();
+            let named = comment.map(|(line, text)| (line, separator.split(text))).filter(|(_, names)| {
+                names.len() == width && !are_numbers(names) && names.iter().all(|name| !name.is_empty())
+            });
+            let by_number = request.columns.is_some_and(|map| map.time.as_ref().is_some_and(|t| t.starts_with('#')));
+            match named {
+                Some((line, names)) => (separator, line, names, first_line),
+                None if by_number => (separator, first_line, vec![String::new(); width], first_line),
+                None => return Err(at(first_line, Problem::NoHeader { fields: width })),
+            }
+        } else {
+            match below_preamble(
+                &lines().filter(|(_, l)| !l.trim().is_empty() && !is_comment(l)).take(200).collect::<Vec<_>>(),
+            ) {
+                Some((separator, line, names)) => (separator, line, names, line + 1),
+                None => {
+                    let separator = separator_of(first, second.map(|(_, line)| line));
+                    (separator, first_line, separator.split(first), first_line + 1)
+                }
+            }
+        };
+        let preamble = if header_line > first_line { Some((first_line, header_line - 1)) } else { None };
+        let mut lines: Vec<(usize, &str)> =
+            lines().filter(|(n, line)| *n >= from && !line.trim().is_empty() && !is_comment(line)).collect();
+        let mut units = vec![None; names.len()];
+        if let Some(found) = lines.first().and_then(|(_, line)| units_alone(&separator.split(line), names.len())) {
+            units = found;
+            lines.remove(0);
+        }
+        let mut table = Self {
+            separator,
+            header_line,
+            names,
+            units,
+            lines,
+            degrees: None,
+            metres: Vec::new(),
+            ends_whole,
+            preamble,
+        };
+        table.read_comments(text)?;
+        Ok(table)
+    }
+
+    /// Reads units from the comments, as in the library's own format.
+    fn read_comments(&mut self, text: &str) -> Result<(), Located> {
+        for (i, line) in text.lines().enumerate().filter(|(_, line)| line.starts_with('#')) {
+            let Some((key, value)) = line[1..].split_once(':') else { continue };
+            let value = value.trim();
+            match (key.trim(), value) {
+                ("unit", "rad" | "deg") => {
+                    let degrees = value == "deg";
+                    if self.degrees.is_some_and(|before| before != degrees) {
+                        let (first, second) = (if degrees { "rad" } else { "deg" }.to_owned(), value.to_owned());
+                        return Err(at(i + 1, Problem::ContradictingUnits { key: "unit", first, second }));
+                    }
+                    self.degrees = Some(degrees);
+                }
+                ("unit", found) => {
+                    let found = found.to_owned();
+                    return Err(at(i + 1, Problem::UnknownUnit { key: "unit", found, accepted: "rad, deg" }));
+                }
+                ("metres", names) => self.metres.extend(names.split(',').map(|name| name.trim().to_owned())),
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether the table has the library's own format.
+    pub(super) fn is_own(&self, request: &TableRequest<'_>) -> bool {
+        let is_known = |name: &str| request.joints.is_some_and(|joints| joints.iter().any(|joint| joint.name == name));
+        let is_plain = |name: &String| is_known(name) || matches!(name_and_unit(name), (_, None, None));
+        self.separator == Separator::Comma
+            && self.preamble.is_none()
+            && self.names.iter().any(|name| name == "time")
+            && self.units.iter().all(Option::is_none)
+            && !self.is_run()
+            && self.names.iter().all(|name| !name.is_empty() && is_plain(name))
+    }
+
+    /// Whether the table is that of a run.
+    pub(super) fn is_run(&self) -> bool {
+        let has = |name: &str| self.names.iter().any(|own| own == name);
+        has("time")
+            && has("flexible_x_m")
+            && has("kinetic_energy_j")
+            && self.names.iter().any(|n| run_joint(n).is_some())
+    }
+}
+
+/// The joint of a column of `run.csv`, and whether it is prismatic.
+pub(super) fn run_joint(name: &str) -> Option<(&str, bool)> {
+    let joint = name.strip_suffix("_position_rad").map(|joint| (joint, false));
+    joint.or_else(|| name.strip_suffix("_position_m").map(|joint| (joint, true)))
+}
+
+/// Separator of a header: preferably one with which the line below has the same number of fields.
+fn separator_of(header: &str, below: Option<&str>) -> Separator {
+    let width = |separator: &Separator| separator.split(header).len();
+    let fits = |separator: &&Separator| {
+        below.is_some_and(|line| {
+            let fields = separator.split(line);
+            fields.len() == width(separator) && fields.iter().filter(|field| number(field).is_some()).count() > 1
+        })
+    };
+    let several = |separator: &&Separator| width(separator) > 1;
+    let candidates: Vec<Separator> = Separator::ALL.iter().filter(several).copied().collect();
+    candidates.iter().find(fits).or_else(|| candidates.first()).copied().unwrap_or(Separator::Comma)
+}
+
+/// Separator, line and names of a header below a preamble: the line directly above the first line
+/// of numbers, with the same number of fields. `None` if the first line could be the header.
+fn below_preamble(lines: &[(usize, &str)]) -> Option<(Separator, usize, Vec<String>)> {
+    let are_numbers = |separator: &Separator, line: &str| {
+        let fields = separator.split(line);
+        let numbers = fields.iter().filter(|field| number(field).is_some() || clock_time(field).is_some()).count();
+        fields.len() > 1 && 2 * numbers > fields.len()
+    };
+    let find = |(i, (_, line)): (usize, &(usize, &str))| {
+        Separator::ALL.into_iter().find(|separator| are_numbers(separator, line)).map(|separator| (i, separator))
+    };
+    let (row, separator) = lines.iter().enumerate().find_map(find)?;
+    let width = separator.split(lines[row].1).len();
+    let fits = |i: usize| separator.split(lines[i].1).len() == width;
+    let above = row.checked_sub(1).filter(|above| fits(*above))?;
+    let is_units = units_alone(&separator.split(lines[above].1), width).is_some();
+    let header = above.checked_sub(usize::from(is_units)).filter(|header| fits(*header))?;
+    (header > 0 && !fits(0)).then(|| (separator, lines[header].0, separator.split(lines[header].1)))
+}
+
+/// Units of a line that holds nothing else.
+fn units_alone(fields: &[String], width: usize) -> Option<Vec<Option<Unit>>> {
+    let units: Vec<Option<Unit>> = fields.iter().map(|field| unit(field)).collect();
+    let is_unit = |(field, unit): (&String, &Option<Unit>)| unit.is_some() || field.is_empty() || field == "-";
+    let all = fields.len() == width && fields.iter().zip(&units).all(is_unit);
+    (all && units.iter().any(Option::is_some)).then_some(units)
+}

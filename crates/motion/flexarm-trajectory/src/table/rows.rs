@@ -1,0 +1,177 @@
+//! Values of the columns in use, row by row.
+
+use super::dialect::{Decimal, Separator, clock_time, exact, number};
+use super::layout::{Layout, Used};
+use super::lines::Table;
+use super::located::{Located, at, at_field};
+use crate::problem::Problem;
+use crate::spline::JointSamples;
+
+/// Maximum number of values kept.
+const MOST_NUMBERS: usize = 30_000_000;
+
+/// A time as written.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Time {
+    pub(super) exact: Option<i128>,
+    pub(super) value: f64,
+}
+
+impl Default for Time {
+    fn default() -> Self {
+        Self { exact: Some(0), value: 0.0 }
+    }
+}
+
+impl Time {
+    /// Time elapsed since another one, without rounding either of them first.
+    pub(super) fn since(self, other: Self) -> f64 {
+        match (self.exact, other.exact) {
+            (Some(this), Some(other)) => (this - other) as f64 / 1e12,
+            _ => self.value - other.value,
+        }
+    }
+}
+
+/// Values of the columns in use, in the order of the layout.
+#[derive(Default)]
+pub(super) struct Rows {
+    pub(super) lines: Vec<usize>,
+    pub(super) times: Vec<Time>,
+    pub(super) values: Vec<Vec<f64>>,
+    pub(super) repeated: usize,
+    pub(super) cut: bool,
+    pub(super) comma: bool,
+    /// Whether times are times of day.
+    pub(super) clock: bool,
+}
+
+/// First lines with a decimal point and with a decimal comma.
+#[derive(Default)]
+struct Decimals {
+    point: Option<usize>,
+    comma: Option<usize>,
+}
+
+impl Table<'_> {
+    pub(super) fn rows(&self, layout: &Layout) -> Result<Rows, Located> {
+        let mut rows = Rows { values: vec![Vec::new(); layout.used.len()], ..Rows::default() };
+        let mut decimals = Decimals::default();
+        let mut wrong: Option<Located> = None;
+        let last = self.lines.last().map_or(0, |(line, _)| *line);
+        let mut row = vec![0.0; layout.used.len()];
+        for &(line, text) in &self.lines {
+            let fields = self.fields(text);
+            if line == last && !self.ends_whole && fields.len() < self.names.len() {
+                rows.cut = true;
+                break;
+            }
+            let time = match (self.row(line, &fields, layout, &mut row, &mut decimals), &mut wrong) {
+                (Ok((time, clock)), _) => {
+                    rows.clock |= clock;
+                    time
+                }
+                (Err(_), Some(first)) => {
+                    first.more_lines.push(line);
+                    continue;
+                }
+                (Err(error), None) => {
+                    wrong = Some(error);
+                    continue;
+                }
+            };
+            let is_same = |(values, value): (&Vec<f64>, &f64)| values.last() == Some(value);
+            if rows.times.last().is_some_and(|last| time.since(*last) == 0.0)
+                && rows.values.iter().zip(&row).all(is_same)
+            {
+                rows.repeated += 1;
+                continue;
+            }
+            if rows.times.len() >= MOST_NUMBERS / (layout.used.len() + 1) {
+                return Err(at(line, Problem::TooManyNumbers { most: MOST_NUMBERS }));
+            }
+            rows.lines.push(line);
+            rows.times.push(time);
+            rows.values.iter_mut().zip(&row).for_each(|(values, value)| values.push(*value));
+        }
+        if let Some(wrong) = wrong {
+            return Err(wrong);
+        }
+        if let (Some(point), Some(comma)) = (decimals.point, decimals.comma) {
+            return Err(at(point.max(comma), Problem::MixedDecimals { point, comma }));
+        }
+        rows.comma = decimals.comma.is_some();
+        Ok(rows)
+    }
+
+    /// Splits a line of numbers.
+    fn fields(&self, text: &str) -> Vec<String> {
+        let mut fields = self.separator.split(text);
+        // A trailing separator adds an empty field.
+        if fields.len() == self.names.len() + 1 && fields.last().is_some_and(String::is_empty) {
+            fields.pop();
+        }
+        fields
+    }
+
+    /// Reads the values of a line in the order of the layout. Returns its time and whether it is a
+    /// time of day.
+    fn row(
+        &self,
+        line: usize,
+        fields: &[String],
+        layout: &Layout,
+        row: &mut [f64],
+        decimals: &mut Decimals,
+    ) -> Result<(Time, bool), Located> {
+        let (found, expected) = (fields.len(), self.names.len());
+        if found != expected {
+            let problem = match self.separator {
+                Separator::Comma if found == 2 * expected => Problem::DecimalCommas { found, expected },
+                _ => Problem::Ragged { found, expected },
+            };
+            return Err(at(line, problem));
+        }
+        let mut value = |place: usize| -> Result<f64, Located> {
+            let field = &fields[place];
+            let (value, decimal) = number(field).ok_or_else(|| {
+                let (column, found) = (self.shown(place), field.chars().take(40).collect());
+                at_field(line, place, Problem::NotANumber { column, found })
+            })?;
+            match decimal {
+                Decimal::None => {}
+                Decimal::Point => decimals.point = decimals.point.or(Some(line)),
+                Decimal::Comma => decimals.comma = decimals.comma.or(Some(line)),
+            }
+            Ok(value)
+        };
+        let clock = clock_time(&fields[layout.time]);
+        let time = match clock {
+            Some(clock) => Time { value: clock as f64 / 1e12, exact: Some(clock) },
+            None => Time { value: value(layout.time)?, exact: exact(&fields[layout.time]) },
+        };
+        for (slot, used) in row.iter_mut().zip(&layout.used) {
+            *slot = used.scale * value(used.place)?;
+        }
+        Ok((time, clock.is_some()))
+    }
+}
+
+/// Groups the values by joint.
+pub(super) fn joints(layout: &Layout, rows: &Rows) -> Vec<JointSamples> {
+    let find = |joint: &str, order: usize| {
+        let place = layout.used.iter().position(|used| used.joint == joint && used.order == order)?;
+        Some(rows.values[place].clone())
+    };
+    let positions = layout.used.iter().filter(|used| used.order == 0);
+    let joint = |used: &Used| {
+        let velocity = find(&used.joint, 1);
+        JointSamples {
+            name: used.joint.clone(),
+            position: find(&used.joint, 0).unwrap_or_default(),
+            acceleration: velocity.is_some().then(|| find(&used.joint, 2)).flatten(),
+            velocity,
+        }
+    };
+    positions.map(joint).collect()
+}

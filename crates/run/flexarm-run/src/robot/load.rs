@@ -1,0 +1,395 @@
+//! Loading of a robot: from a robot file, its texts, or a bare URDF or xacro file.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use flexarm_files::{Source, TextFileError as RobotFileError};
+use flexarm_kinematics::{Joint, JointKind, Link, Mechanism, Pose};
+use flexarm_urdf::{InertiaEstimate, ReadOptions, UrdfRobot, default_tcp, parse_urdf, read_urdf};
+use toml::Spanned;
+
+use super::entries::{held_joint, limit_effort, make_helical, tcp_of};
+use super::{Robot, TCP_FRAME, finding_text};
+use crate::balancer_entry::add_balancers;
+use crate::calibration_entry::{Calibration, calibrate};
+use crate::caveat::{Caveat, parts};
+use crate::controller_entry::controller_axes;
+use crate::coupling_entry::coupling;
+use crate::drive_entry::drives;
+use crate::entry_checks::{check_finite, keep};
+use crate::error::Error;
+use crate::file_cache::FileCache;
+use crate::flexible::FlexibleRobot;
+use crate::gauge_entry::gauges;
+use crate::link_entry::{LinkHome, flexible_link};
+use crate::loop_entry::add_loops;
+use crate::mounting_entry::add_mounting;
+use crate::ranges::not_finite;
+use crate::robot_file::{RobotFile, parse_robot_file};
+
+/// Options for loading a robot.
+#[derive(Clone, Debug, Default)]
+pub struct LoadOptions {
+    /// Link to use as TCP instead of the one in the file.
+    pub tcp: Option<String>,
+    /// Options for the URDF reader.
+    pub urdf: ReadOptions,
+}
+
+impl Robot {
+    /// Loads a `robot.toml`, a folder with one, or a bare `.urdf` or `.xacro`.
+    ///
+    /// # Errors
+    /// [`Error`] with the file, the location, the value found and how to fix it.
+    pub fn load(path: impl AsRef<Path>) -> Result<Self, Error> {
+        Self::load_with(path.as_ref(), &LoadOptions::default())
+    }
+
+    /// As [`Robot::load`], with options.
+    ///
+    /// # Errors
+    /// As [`Robot::load`].
+    pub fn load_with(path: &Path, options: &LoadOptions) -> Result<Self, Error> {
+        Self::load_modelled(path, options).map(|(robot, _)| robot)
+    }
+
+    /// As [`Robot::load_with`], and also returns the robot with its links and drives modelled as
+    /// the file asks ([`Robot::flexible_robot`]).
+    ///
+    /// Loading already builds this model as a check; pass it to [`Arm::new`](crate::Arm::new).
+    ///
+    /// # Errors
+    /// As [`Robot::load`].
+    pub fn load_modelled(path: &Path, options: &LoadOptions) -> Result<(Self, FlexibleRobot), Error> {
+        let path = if path.is_dir() { path.join("robot.toml") } else { path.to_owned() };
+        if !path.exists() {
+            let what = "there is no such file; give a robot.toml, a folder with one, or a .urdf or .xacro file".into();
+            return Err(Error::File { path, what });
+        }
+        match path.extension().and_then(|e| e.to_str()) {
+            Some("toml") => {
+                let text = flexarm_files::read_text(&path)?;
+                Self::of_texts(&path, &text, None, options, &FileCache::default())
+            }
+            Some("urdf" | "xacro") => Self::from_urdf(&path, options),
+            _ => {
+                let what = "expected a robot.toml, a folder with one, or a file ending in .urdf or .xacro".into();
+                Err(Error::File { path, what })
+            }
+        }
+    }
+
+    fn from_urdf(path: &Path, options: &LoadOptions) -> Result<(Self, FlexibleRobot), Error> {
+        let urdf = read_urdf(path, &options.urdf)?;
+        let name = urdf.mechanism.name.clone();
+        let link = options.tcp.clone().or_else(|| default_tcp(&urdf.mechanism).map(str::to_owned));
+        let link = link.ok_or(Error::NoTcp { in_file: false })?;
+        let mut robot = Self {
+            name,
+            path: path.to_owned(),
+            urdf_path: path.to_owned(),
+            rigid: urdf.mechanism.clone(),
+            urdf,
+            flexible: Vec::new(),
+            mounting: None,
+            drives: Vec::new(),
+            coupling: None,
+            tcp: (link, Pose::identity()),
+            tcp_override: options.tcp.clone(),
+            default_trajectory: None,
+            hold: Vec::new(),
+            warnings: Vec::new(),
+            controller: Vec::new(),
+            calibration: Vec::new(),
+            gauges: Vec::new(),
+            written: Vec::new(),
+            rigid_tree: Arc::default(),
+        };
+        let flexible = robot.finish(None)?;
+        Ok((robot, flexible))
+    }
+
+    /// Builds a robot from the text of a robot file, which need not exist on disk.
+    ///
+    /// * `path`: nominal path of the file; relative paths start from its folder, and messages quote
+    ///   it.
+    ///
+    /// # Errors
+    /// As [`Robot::load`].
+    pub fn from_toml(text: &str, path: &Path, options: &LoadOptions) -> Result<Self, Error> {
+        Self::of_text(path, text, options, &FileCache::default())
+    }
+
+    /// As [`Robot::from_toml`], with the text of the URDF or xacro as well: neither needs to exist
+    /// as a file.
+    ///
+    /// The key `urdf` of the robot file then only gives the name quoted in messages and the
+    /// location from which meshes are searched.
+    ///
+    /// # Errors
+    /// As [`Robot::load`].
+    pub fn from_texts(text: &str, urdf: &str, path: &Path, options: &LoadOptions) -> Result<Self, Error> {
+        Self::of_texts(path, text, Some(urdf), options, &FileCache::default()).map(|(robot, _)| robot)
+    }
+
+    /// As [`Robot::from_toml`]; reads the files named in the text through the cache.
+    pub fn of_text(path: &Path, text: &str, options: &LoadOptions, files: &FileCache) -> Result<Self, Error> {
+        Self::of_texts(path, text, None, options, files).map(|(robot, _)| robot)
+    }
+
+    /// As [`Self::of_text`], optionally with the text of the description.
+    fn of_texts(
+        path: &Path,
+        text: &str,
+        description: Option<&str>,
+        options: &LoadOptions,
+        files: &FileCache,
+    ) -> Result<(Self, FlexibleRobot), Error> {
+        let (file, source) = parse_robot_file(text, path)?;
+        let folder = path.parent().unwrap_or(Path::new("."));
+        let urdf_path = folder.join(file.urdf.get_ref());
+        if description.is_none() && !urdf_path.is_file() {
+            let message = format!("urdf = {:?}: there is no file {}", file.urdf.get_ref(), urdf_path.display());
+            return Err(source.error(file.urdf.span(), message).into());
+        }
+        let mut urdf_options = options.urdf.clone();
+        urdf_options.packages.extend(file.packages.iter().map(|(name, to)| (name.clone(), folder.join(to))));
+        urdf_options.waive.extend(file.waive_inertia.iter().cloned());
+        urdf_options.discard.extend(file.discard_inertia.iter().cloned());
+        for (name, value) in &file.args {
+            let given = urdf_options.arguments.iter().any(|(given, _)| given == name);
+            let value = argument_text(name, value, &source)?;
+            if !given {
+                urdf_options.arguments.push((name.clone(), value));
+            }
+        }
+        if let Some(estimate) = inertia_estimate(&file, &source)? {
+            urdf_options.inertia_from_mesh.get_or_insert(estimate);
+        }
+        let urdf = match description {
+            Some(text) => parse_urdf(text, &urdf_path, &urdf_options)?,
+            None => files.urdf(&urdf_path, &urdf_options)?,
+        };
+        let found = Self::of_file(path, urdf_path, urdf, &file, &source, options, files)?;
+        match not_finite(text) {
+            Some((span, message)) => Err(source.error(span, message).into()),
+            None => Ok(found),
+        }
+    }
+
+    /// Builds a robot from the text of a robot file at `path` and a description that is already
+    /// read; also returns it with its links and drives modelled as the file asks.
+    ///
+    /// # Errors
+    /// As [`Robot::load`].
+    pub fn with_description(
+        path: &Path,
+        text: &str,
+        urdf_path: PathBuf,
+        urdf: UrdfRobot,
+    ) -> Result<(Self, FlexibleRobot), Error> {
+        let (file, source) = parse_robot_file(text, path)?;
+        Self::of_file(path, urdf_path, urdf, &file, &source, &LoadOptions::default(), &FileCache::default())
+    }
+
+    /// Builds a robot from a parsed robot file and its description.
+    fn of_file(
+        path: &Path,
+        urdf_path: PathBuf,
+        mut urdf: UrdfRobot,
+        file: &RobotFile,
+        source: &Source,
+        options: &LoadOptions,
+        files: &FileCache,
+    ) -> Result<(Self, FlexibleRobot), Error> {
+        let folder = path.parent().unwrap_or(Path::new("."));
+        let mut faults: Vec<Error> = Vec::new();
+        let (rigid, calibration) = changed_joints(&mut urdf.mechanism, file, source, &mut faults);
+        let tcp = keep(tcp_of(file, source, &urdf, options), &mut faults);
+        let mut robot = Self {
+            name: file.name.clone().unwrap_or_else(|| name_of_folder(folder)),
+            path: path.to_owned(),
+            urdf_path,
+            rigid,
+            urdf,
+            flexible: Vec::new(),
+            mounting: None,
+            drives: Vec::new(),
+            coupling: None,
+            tcp: tcp.unwrap_or_default(),
+            tcp_override: options.tcp.clone(),
+            default_trajectory: file.default_trajectory.as_ref().map(|t| folder.join(t.get_ref())),
+            hold: Vec::new(),
+            warnings: Vec::new(),
+            controller: Vec::new(),
+            calibration,
+            gauges: Vec::new(),
+            written: written_caveats(file),
+            rigid_tree: Arc::default(),
+        };
+        robot.add_entries(file, source, &LinkHome { folder, files }, &mut faults);
+        match faults.len() {
+            0 => {}
+            1 => return Err(faults.remove(0)),
+            _ => return Err(Error::Several(faults)),
+        }
+        let flexible = robot.finish(Some((file, source)))?;
+        Ok((robot, flexible))
+    }
+
+    /// Adds payload, loops, drives, balancers, flexible links, gauges and mounting of the file, in
+    /// an order in which each finds what it builds on.
+    fn add_entries(&mut self, file: &RobotFile, source: &Source, home: &LinkHome<'_>, faults: &mut Vec<Error>) {
+        if let Some(payload) = &file.payload {
+            let link = file.tcp.as_ref().map(|t| t.get_ref().link.get_ref().as_str());
+            let link = link.or_else(|| default_tcp(&self.urdf.mechanism)).unwrap_or_default().to_owned();
+            keep(self.add_payload(payload, &link, source), faults);
+        }
+        add_loops(self, &file.loops, source, faults);
+        for (joint, value) in &file.hold {
+            let held = held_joint(joint, value, &self.rigid, source).map_err(Error::from);
+            self.hold.extend(keep(held, faults));
+        }
+        self.drives = drives(&file.drive, &self.rigid, source, &mut self.warnings, faults);
+        for drive in &self.drives {
+            for joint in self.rigid.joints.iter_mut().filter(|j| j.name == drive.joint) {
+                joint.armature = drive.armature;
+            }
+        }
+        self.controller = controller_axes(&file.controller_axis, &self.rigid, source, faults);
+        if let Some(entry) = &file.coupling {
+            let found = coupling(self, entry, source).map_err(Error::from);
+            self.coupling = keep(found, faults);
+        }
+        add_balancers(self, &file.balancer, source, faults);
+        for entry in &file.flexible_link {
+            keep(self.reweigh(entry, source).map_err(Error::from), faults);
+            let urdf = &self.urdf.mechanism;
+            let flexible = flexible_link(entry, urdf, source, home, &mut self.warnings, faults);
+            self.flexible.extend(keep(flexible, faults));
+        }
+        let links = self.flexible.iter().map(|link| (link.flexible.link.as_str(), link.stress.is_some()));
+        let (found, wrong) = gauges(&file.strain_gauge, &file.stress_point, &links.collect::<Vec<_>>(), source);
+        self.gauges = found;
+        faults.extend(wrong.into_iter().map(Error::from));
+        if let Some(mounting) = &file.mounting {
+            add_mounting(self, mounting, source, home, faults);
+        }
+    }
+
+    /// Adds the TCP frame and checks that both trees can be built.
+    fn finish(&mut self, file: Option<(&RobotFile, &Source)>) -> Result<FlexibleRobot, Error> {
+        let (link, X_LT) = self.tcp.clone();
+        if self.rigid.link(&link).is_none() {
+            let known = self.rigid.links.iter().map(|l| l.name.clone()).collect();
+            return Err(Error::UnknownTcp { link, known });
+        }
+        self.rigid.joints.push(Joint::new("__tcp_joint", JointKind::Fixed, link, TCP_FRAME, X_LT));
+        self.rigid.links.push(Link { name: TCP_FRAME.into(), inertia: None });
+        self.warnings.extend(self.urdf.warnings_only().map(finding_text));
+        // Errors of the model as a whole are reported at the last flexible link, where a duplicate
+        // entry would be.
+        let last_flexible = file.and_then(|(f, s)| {
+            let mounting = f.mounting.as_ref().map(Spanned::span);
+            f.flexible_link.last().map(|e| e.link.span()).or(mounting).map(|span| (s, span))
+        });
+        match (self.flexible_robot(), last_flexible) {
+            (Ok(flexible), _) => {
+                for span in &flexible.spans {
+                    let (own, parts) = (span.own_mass, span.part_masses.iter().sum::<f64>());
+                    if own > 0.0 && (parts / own - 1.0).abs() > 1e-6 {
+                        self.warnings.push(format!(
+                            "link {:?}: the two parts weigh {parts:.4} kg, the URDF's link {own:.4} kg; the parts count",
+                            span.link
+                        ));
+                    }
+                }
+                Ok(flexible)
+            }
+            (Err(Error::Modelling(fault)), Some((source, span))) => Err(source.error(span, fault.to_string()).into()),
+            (Err(error), _) => Err(error),
+        }
+    }
+}
+
+/// Returns the rigid robot with the gravity, helical joints, calibration and effort limits of the
+/// file, and its corrections of joints; those also go into the mechanism of the URDF.
+fn changed_joints(
+    urdf: &mut Mechanism,
+    file: &RobotFile,
+    source: &Source,
+    faults: &mut Vec<Error>,
+) -> (Mechanism, Vec<Calibration>) {
+    let mut rigid = urdf.clone();
+    if let Some(gravity) = &file.gravity {
+        rigid.gravity = (*gravity.get_ref()).into();
+        keep(check_finite("gravity", gravity.get_ref(), gravity.span(), source).map_err(Error::from), faults);
+    }
+    for (joint, lead) in &file.lead {
+        keep(make_helical(&mut rigid, joint, lead, source).map_err(Error::from), faults);
+    }
+    let (calibration, wrong) = calibrate(&file.calibration, &mut [&mut rigid, urdf], source);
+    faults.extend(wrong.into_iter().map(Error::from));
+    for (joint, limit) in &file.effort_limit {
+        keep(limit_effort(&mut rigid, joint, limit, source).map_err(Error::from), faults);
+    }
+    (rigid, calibration)
+}
+
+/// Returns the name of a folder. Paths such as `robot.toml`, `.` and links to folders do not
+/// contain it.
+fn name_of_folder(folder: &Path) -> String {
+    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    let folder = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
+    folder.file_name().map_or_else(|| "robot".into(), |name| name.to_string_lossy().into_owned())
+}
+
+/// Reads how missing masses are estimated.
+fn inertia_estimate(file: &RobotFile, source: &Source) -> Result<Option<InertiaEstimate>, RobotFileError> {
+    let positive = |what: &str, value: &Spanned<f64>| match *value.get_ref() {
+        x if x.is_finite() && x > 0.0 => Ok(x),
+        x => Err(source.error(value.span(), format!("{what} is {x}, it must be positive"))),
+    };
+    match (&file.inertia_from_density, &file.inertia_from_total_mass) {
+        (Some(_), Some(mass)) => {
+            let message = "inertia_from_density and inertia_from_total_mass are both given: keep one of them";
+            Err(source.error(mass.span(), message))
+        }
+        (Some(density), None) => positive("inertia_from_density", density).map(InertiaEstimate::Density).map(Some),
+        (None, Some(mass)) => positive("inertia_from_total_mass", mass).map(InertiaEstimate::TotalMass).map(Some),
+        (None, None) => Ok(None),
+    }
+}
+
+/// Converts an argument for a xacro file to text.
+fn argument_text(name: &str, value: &Spanned<toml::Value>, source: &Source) -> Result<String, RobotFileError> {
+    match value.get_ref() {
+        toml::Value::String(text) => Ok(text.clone()),
+        toml::Value::Integer(number) => Ok(number.to_string()),
+        toml::Value::Float(number) => Ok(format!("{number:?}")),
+        toml::Value::Boolean(truth) => Ok(truth.to_string()),
+        other => {
+            let message = format!("args: {name} is a {}, expected a text, a number, true or false", other.type_str());
+            Err(source.error(value.span(), message))
+        }
+    }
+}
+
+/// Returns caveats about angles as written and about unused materials, which only the text of the
+/// file shows.
+fn written_caveats(file: &RobotFile) -> Vec<Caveat> {
+    let rpy = file.tcp.as_ref().and_then(|tcp| parts::angles("rpy of the TCP", &tcp.get_ref().rpy));
+    let beams = file.flexible_link.iter().filter_map(|link| {
+        let roll = link.beam.as_ref()?.get_ref().roll;
+        parts::angles(&format!("roll of link {:?}", link.link.get_ref()), &[roll])
+    });
+    let unused = file.flexible_link.iter().filter(|link| {
+        link.beam.as_ref().is_some_and(|beam| beam.get_ref().section == "given" && beam.get_ref().material.is_some())
+    });
+    let unused = unused.map(|link| {
+        let name = link.link.get_ref();
+        let message = format!("the material of link {name:?} has no effect: its section is given by its stiffness");
+        Caveat::from_message("no-effect", format!("link {name:?}"), message, "leave it out").as_note()
+    });
+    rpy.into_iter().chain(beams).chain(unused).collect()
+}

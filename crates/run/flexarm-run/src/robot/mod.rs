@@ -1,0 +1,203 @@
+//! A loaded robot: URDF, payload, tool centre point and flexible links, from which models are
+//! built.
+
+mod entries;
+mod load;
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use flexarm_flexlink::Mounting;
+use flexarm_kinematics::{Frame, Mechanism, Model, Pose};
+use flexarm_stepping::{Damping, FlexibleArm};
+use flexarm_urdf::UrdfRobot;
+
+use crate::calibration_entry::Calibration;
+use crate::caveat::{self, Caveat};
+use crate::controller_entry::RobotAxis;
+use crate::drive_entry::Drive;
+use crate::error::{Error, ValueError};
+use crate::gauge_entry::Gauge;
+use crate::gear_entry::RobotCoupling;
+use crate::mounting::RobotMounting;
+use crate::robot_link::RobotLink;
+
+pub use load::LoadOptions;
+
+/// Name of the frame added for the tool centre point.
+pub const TCP_FRAME: &str = "__tcp";
+/// Name of the link added for the payload.
+pub const PAYLOAD_LINK: &str = "__payload";
+
+/// Last model built, with the mechanism it was built from.
+type KeptModel = Arc<Mutex<Option<(Mechanism, Arc<Model>)>>>;
+
+/// A loaded robot.
+#[derive(Clone, Debug)]
+pub struct Robot {
+    /// Name of the robot.
+    pub name: String,
+    /// Path of the loaded file.
+    pub path: PathBuf,
+    /// Description as read. Models are built from [`Self::rigid`], which also contains the TCP,
+    /// payload and rotors.
+    pub urdf: UrdfRobot,
+    /// Path of the URDF.
+    pub urdf_path: PathBuf,
+    /// Rigid robot: the URDF with TCP frame, payload and gravity.
+    pub rigid: Mechanism,
+    /// Flexible links.
+    pub flexible: Vec<RobotLink>,
+    /// Elastic mounting of the base, if there is one.
+    pub mounting: Option<RobotMounting>,
+    /// Drives given in the robot file; all other joints are prescribed.
+    pub drives: Vec<Drive>,
+    /// Motors that move several joints.
+    pub(crate) coupling: Option<RobotCoupling>,
+    /// Link that carries the TCP, and the pose of the TCP in that link.
+    pub tcp: (String, Pose),
+    /// Link requested as TCP instead of the one in the file.
+    pub tcp_override: Option<String>,
+    /// Default trajectory, used by runs that name none.
+    pub default_trajectory: Option<PathBuf>,
+    /// Positions of joints that a motion does not drive (rad or m).
+    pub hold: Vec<(String, f64)>,
+    /// Warnings from loading.
+    pub warnings: Vec<String>,
+    /// Axes that the controller counts differently from the joints.
+    pub controller: Vec<RobotAxis>,
+    /// Corrections of joint frames and joint zeros, which [`Self::rigid`] contains.
+    pub calibration: Vec<Calibration>,
+    /// Strain gauges and stress points.
+    pub gauges: Vec<Gauge>,
+    /// Caveats that can only be found in the text of the file.
+    written: Vec<Caveat>,
+    /// Last tree of the rigid robot, with the mechanism it was built from.
+    rigid_tree: KeptModel,
+}
+
+impl Robot {
+    /// Returns the link that carries the tool centre point, and the pose `X_LT` of that point in
+    /// the link.
+    pub fn tcp(&self) -> (&str, &Pose) {
+        (&self.tcp.0, &self.tcp.1)
+    }
+
+    /// Replaces the tool centre point; the payload stays where it is. Arms built from the robot
+    /// earlier keep their TCP.
+    ///
+    /// * `link`: link of the robot; `X_LT`: pose of the point in the link's axes (m).
+    ///
+    /// # Errors
+    /// [`Error::UnknownTcp`] if the robot has no such link, [`Error::Value`] if the pose is not
+    /// finite.
+    pub fn with_tcp(mut self, link: &str, X_LT: Pose) -> Result<Self, Error> {
+        let known = || self.rigid.links.iter().map(|l| l.name.clone()).filter(|name| !name.starts_with("__")).collect();
+        if link.starts_with("__") || self.rigid.link(link).is_none() {
+            return Err(Error::UnknownTcp { link: link.to_owned(), known: known() });
+        }
+        let place = X_LT.translation.vector;
+        if let Some(found) = place.iter().chain(X_LT.rotation.matrix().iter()).find(|x| !x.is_finite()) {
+            return Err(ValueError::NotFinite { what: "the pose of the TCP", found: *found }.into());
+        }
+        for joint in self.rigid.joints.iter_mut().filter(|joint| joint.child == TCP_FRAME) {
+            (joint.parent, joint.X_PJ) = (link.to_owned(), X_LT);
+        }
+        self.tcp_override = Some(link.to_owned());
+        self.tcp = (link.to_owned(), X_LT);
+        Ok(self)
+    }
+
+    /// Returns the elastic mounting of the base, if there is one.
+    pub fn mounting(&self) -> Option<&RobotMounting> {
+        self.mounting.as_ref()
+    }
+
+    /// Whether the base has an elastic mounting.
+    pub fn is_mounted(&self) -> bool {
+        self.mounting.is_some()
+    }
+
+    /// Whether the elastic mounting has this name.
+    pub fn stands_on(&self, name: &str) -> bool {
+        self.mounting.as_ref().is_some_and(|mounting| mounting.name() == name)
+    }
+
+    /// Puts the robot on six springs.
+    ///
+    /// * `springs`: their frame in the base link, their stiffness in that frame, and the mass they
+    ///   carry in addition to the base.
+    ///
+    /// # Errors
+    /// [`Error::Modelling`] if the stiffness is singular or the name is that of a link,
+    /// [`Error::Pose`] and others as [`Robot::modelled`].
+    pub fn with_mounting(mut self, springs: Mounting, damping: Damping) -> Result<Self, Error> {
+        self.mounting = Some(RobotMounting::Springs { springs, damping });
+        self.flexible_robot()?;
+        Ok(self)
+    }
+
+    /// Returns the coupling of motors that move several joints; their rotors are in
+    /// [`Self::rigid`].
+    pub fn coupling(&self) -> Option<&RobotCoupling> {
+        self.coupling.as_ref()
+    }
+
+    /// Converts joint torques to the torques of the motors that move several joints, after their
+    /// gears; keyed by the joint of the drive.
+    pub(crate) fn motor_torques(&self, arm: &FlexibleArm, tau: &[f64]) -> BTreeMap<String, f64> {
+        let (Some(robot), Some(arm)) = (&self.coupling, &arm.coupling) else { return BTreeMap::new() };
+        robot.joints.iter().cloned().zip(arm.motor_torques(tau)).collect()
+    }
+
+    /// Returns the caveats that are known before any computation.
+    pub fn caveats(&self) -> Vec<Caveat> {
+        let file = self.path.display().to_string();
+        let of_urdf = |text: &&String| self.urdf.warnings_only().any(|w| **text == finding_text(w));
+        let own = self.warnings.iter().filter(|text| !of_urdf(text));
+        let own = own.map(|text| Caveat::from_message("flexible-link", &file, text, "compare both sources"));
+        let of_description = |caveat| Caveat { of_description: true, ..caveat };
+        let urdf =
+            self.urdf.warnings_only().map(|w| Caveat::from_message(w.code, &w.location, finding_text(w), &w.help));
+        let urdf = urdf.map(of_description);
+        let mut caveats: Vec<Caveat> = own.chain(urdf).chain(self.written.iter().cloned()).collect();
+        caveats.extend(caveat::parts::of_robot(self));
+        let inertia = |link: &RobotLink| self.urdf.mechanism.link(&link.flexible.link).and_then(|own| own.inertia);
+        caveats.extend(self.flexible.iter().flat_map(|link| caveat::links::of_link(link, inertia(link).as_ref())));
+        caveats.extend(caveat::links::of_mounting(self));
+        if let Ok(rigid) = self.rigid_model() {
+            caveats.extend(caveat::drives::of_drives(&self.drives, &self.rigid, &rigid));
+            caveats.extend(caveat::balancers::of_balancers(&self.rigid, &rigid));
+            caveats.extend(caveat::loops::of_loops(&rigid));
+        }
+        caveats
+    }
+
+    /// Returns the tree of the rigid robot.
+    ///
+    /// # Errors
+    /// [`Error::Model`].
+    pub fn rigid_model(&self) -> Result<Arc<Model>, Error> {
+        let mut kept = self.rigid_tree.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, model)) = kept.as_ref().filter(|(of, _)| *of == self.rigid) {
+            return Ok(model.clone());
+        }
+        let model = Model::new(&self.rigid);
+        let model = model
+            .map(Arc::new)
+            .map_err(|source| Error::Model { path: self.urdf_path.clone(), source: Box::new(source) })?;
+        *kept = Some((self.rigid.clone(), model.clone()));
+        Ok(model)
+    }
+}
+
+/// Returns the TCP frame in a tree of the robot.
+pub fn tcp_frame(model: &Model) -> Frame {
+    model.frame(TCP_FRAME).expect("added when the robot was loaded").clone()
+}
+
+/// Formats a finding with its location as a sentence.
+fn finding_text(finding: &flexarm_urdf::Finding) -> String {
+    format!("{}: {}", finding.location, finding.message)
+}

@@ -1,0 +1,222 @@
+//! A flexible link of a robot with the data from which its models are built.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use flexarm_fem::{BeamLink, ModalLink, ModalOptions};
+use flexarm_flexlink::{FlexibleLink, LinkForm};
+use flexarm_kinematics::MOST_COORDINATES;
+use flexarm_settings::Setting;
+use flexarm_stepping::Damping;
+use nalgebra::Matrix6;
+
+use crate::options::{LinkModel, Modelling};
+use crate::strength::Strength;
+
+/// Maximum number of fixed-interface modes of a link.
+const MOST_MODES: usize = 200;
+
+/// Default number of fixed-interface modes of a beam link.
+const BEAM_MODES: usize = 6;
+
+/// Flexible link with the data from which its models are built.
+#[derive(Clone, Debug)]
+pub struct RobotLink {
+    /// The link with its reduced model.
+    pub flexible: FlexibleLink,
+    /// Damping of the link.
+    pub damping: Damping,
+    /// Stiffness of the spring between its two parts, symmetric and positive definite; replaces
+    /// that of the source (N/m, N, N m/rad).
+    pub stiffness: Option<Matrix6<f64>>,
+    /// Factor on the stiffness of all models of the link.
+    pub stiffness_factor: f64,
+    /// Additional factors on the springs of a lumped link, one per direction: K becomes `S K S`,
+    /// where the diagonal of S holds their square roots.
+    pub stiffness_factors: [f64; 6],
+    /// Beam from which the link is built, if it is a beam.
+    pub beam: Option<BeamLink>,
+    /// Choices made in the robot file.
+    pub choices: LinkChoices,
+    /// Source of its stress, if that is computed.
+    pub stress: Option<StressSource>,
+    /// Strength against which its stress is judged; by default that of its material.
+    pub strength: Option<Strength>,
+}
+
+/// Source of the stress of a flexible link.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum StressSource {
+    /// File of stress fields, beside that of the reduced link.
+    File(PathBuf),
+    /// Section forces of the beam.
+    Beam,
+}
+
+/// Choices of a robot file for a flexible link.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LinkChoices {
+    /// Link model: lumped or modal.
+    pub model: LinkModel,
+    /// Number of rigid parts of a lumped link.
+    pub segments: usize,
+    /// Number of fixed-interface modes of a modal link.
+    pub modes: Option<usize>,
+    /// Number of eigenmodes of a modal link, used instead of fixed-interface modes.
+    pub eigenmodes: Option<usize>,
+    /// Whether loads change the stiffness (geometric stiffening).
+    pub geometric: bool,
+    /// Whether the file says whose mass the parts take; if not, the parts take that of the uniform
+    /// beam when the link's own mass cannot be cut.
+    pub parts_asked: bool,
+}
+
+/// Key of the robot file that requested something unavailable.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum RequestedKey {
+    Model,
+    Segments,
+    Modes,
+    Eigenmodes,
+    Geometric,
+    Directions,
+    Stiffness,
+}
+
+impl RobotLink {
+    /// Applies the stiffness factors to a spring of the lumped models.
+    pub(crate) fn scaled(&self, K: &Matrix6<f64>) -> Matrix6<f64> {
+        let root = self.stiffness_factors.map(f64::sqrt);
+        let K = self.stiffness.as_ref().unwrap_or(K);
+        Matrix6::from_fn(|i, j| root[i] * K[(i, j)] * root[j]) * self.stiffness_factor
+    }
+
+    /// Whether the source provides geometric stiffening for a modal link.
+    pub fn has_geometric(&self) -> bool {
+        let stored = self.flexible.reduced.details.as_ref().and_then(|details| details.modal.as_ref());
+        self.beam.is_some() || stored.is_some_and(|modal| modal.geometric.is_some())
+    }
+
+    /// Returns the model of the link; rigid links have none.
+    ///
+    /// # Errors
+    /// A message that names what the source of the link lacks.
+    pub fn form(&self, modelling: &Modelling) -> Result<LinkForm, String> {
+        self.form_or_key(modelling).map_err(|(_, message)| message)
+    }
+
+    /// As [`Self::form`], with the robot file key that requested what is missing.
+    pub(crate) fn form_or_key(&self, modelling: &Modelling) -> Result<LinkForm, (RequestedKey, String)> {
+        let model = if modelling.links == LinkModel::AsFiled { self.choices.model } else { modelling.links };
+        match model {
+            LinkModel::Modal if self.stiffness_factors != [1.0; 6] => {
+                let name = &self.flexible.link;
+                let message = format!(
+                    "link {name:?}: stiffness_factors are those of the springs of a lumped link; a modal link has one stiffness_factor"
+                );
+                Err((RequestedKey::Directions, message))
+            }
+            LinkModel::Modal if self.stiffness.is_some() => {
+                Err((RequestedKey::Stiffness, self.one_spring("modal body")))
+            }
+            LinkModel::Modal => self.modal(modelling).map(|modal| LinkForm::Modal(Arc::new(modal))),
+            _ => match modelling.segments.unwrap_or(self.choices.segments) {
+                2 => Ok(LinkForm::TwoParts),
+                n if self.stiffness.is_some() => {
+                    Err((RequestedKey::Stiffness, self.one_spring(&format!("has {n} parts"))))
+                }
+                n => self.lumped(n).map_err(|message| (RequestedKey::Segments, message)),
+            },
+        }
+    }
+
+    /// Returns the message that the link's own stiffness fits only the two-part model.
+    fn one_spring(&self, has: &str) -> String {
+        let name = &self.flexible.link;
+        format!("link {name:?} {has}: its stiffness is that of the one spring between two rigid parts; leave it out")
+    }
+
+    fn lumped(&self, segments: usize) -> Result<LinkForm, String> {
+        let name = &self.flexible.link;
+        let coordinates = 6 * segments.saturating_sub(1);
+        if coordinates > MOST_COORDINATES {
+            return Err(format!(
+                "link {name:?}: {segments} segments have {coordinates} elastic coordinates, a robot can have {MOST_COORDINATES} in all, for the \
+                 time of a step grows with their cube: ask for at most {} in one link, or for modes, which say more with fewer",
+                MOST_COORDINATES / 6 + 1
+            ));
+        }
+        if let Some(beam) = &self.beam {
+            return beam.chain(segments).map(LinkForm::Chain).map_err(|e| format!("link {name:?}: {e}"));
+        }
+        let chains = self.flexible.reduced.details.as_ref().map_or(&[][..], |d| &d.chains[..]);
+        chains.iter().find(|c| c.parts.len() == segments).cloned().map(LinkForm::Chain).ok_or_else(|| {
+            let there: Vec<String> = chains.iter().map(|c| c.parts.len().to_string()).collect();
+            let there =
+                if there.is_empty() { "only two parts".into() } else { format!("2, {} parts", there.join(", ")) };
+            format!(
+                "link {name:?}: its .flex file has no chain of {segments} parts (it has {there}): make it with flexarm \
+                 reduce {} {segments}, or choose another number of segments",
+                Setting::Chains
+            )
+        })
+    }
+
+    fn modal(&self, modelling: &Modelling) -> Result<ModalLink, (RequestedKey, String)> {
+        let name = &self.flexible.link;
+        let fail = |asked: RequestedKey| {
+            move |e: flexarm_fem::FemError| (asked, format!("link {name:?} cannot be modal: {e}"))
+        };
+        let wanted = modelling.modes.or(self.choices.modes);
+        if let Some(modes) = wanted.filter(|modes| *modes > MOST_MODES) {
+            let message = format!(
+                "link {name:?}: {modes} modes are requested, at most {MOST_MODES} are allowed: the work of a step grows with the cube of their \
+                 number, and those beyond the first dozen are far above what a drive or a tool excites"
+            );
+            return Err((RequestedKey::Modes, message));
+        }
+        let full = match &self.beam {
+            Some(beam) => {
+                let modes = wanted.unwrap_or(BEAM_MODES);
+                let options = ModalOptions { modes, geometric: self.choices.geometric, ..ModalOptions::default() };
+                beam.modal_with(&ModalOptions { elements: options.elements.max(4 * modes), ..options })
+                    .map_err(fail(RequestedKey::Modes))?
+            }
+            None => {
+                let details = self.flexible.reduced.details.as_ref();
+                let stored = details.and_then(|details| details.modal.clone()).map(Ok);
+                let condensed = || {
+                    let element = details?.superelement.as_ref()?;
+                    Some(ModalLink::from_superelement(name, element).map_err(fail(RequestedKey::Model)))
+                };
+                let link = stored.or_else(condensed).ok_or_else(|| {
+                    let message = format!(
+                        "link {name:?} cannot be modal: its .flex file has no mass over interfaces and modes; reduce \
+                         the mesh again with this version, or use model = \"lumped\""
+                    );
+                    (RequestedKey::Model, message)
+                })??;
+                let all = link.coordinates().saturating_sub(6 * link.interfaces.len());
+                match wanted {
+                    Some(n) if n < all => link.truncated(n).map_err(fail(RequestedKey::Modes))?,
+                    Some(n) if n > all => {
+                        let message = format!("link {name:?}: {n} modes are requested, its .flex file has {all}");
+                        return Err((RequestedKey::Modes, message));
+                    }
+                    _ => link,
+                }
+            }
+        };
+        if self.choices.geometric && full.geometric.is_none() {
+            let message = format!(
+                "link {name:?}: geometric_stiffening needs a beam, or a .flex file made with flexarm reduce {}",
+                Setting::Geometric
+            );
+            return Err((RequestedKey::Geometric, message));
+        }
+        match self.choices.eigenmodes {
+            Some(keep) => full.orthogonalised(Some(keep)).map_err(fail(RequestedKey::Eigenmodes)),
+            None => Ok(full),
+        }
+    }
+}

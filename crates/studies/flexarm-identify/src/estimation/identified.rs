@@ -1,0 +1,134 @@
+//! Result of an identification: estimates, cross-validation, and the reasons why it fails.
+
+use flexarm_kinematics::Pose;
+use nalgebra::{DMatrix, Vector3};
+
+use crate::estimation::least_squares::Solution;
+use crate::estimation::measurement::NoAnswer;
+
+/// Estimate of one parameter.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ParameterEstimate {
+    /// Name, as in the robot file.
+    pub name: String,
+    /// Unit of the values.
+    pub unit: String,
+    /// Initial value.
+    pub initial: f64,
+    /// Estimated value; the initial value if the parameter is not identifiable.
+    pub value: f64,
+    /// Standard deviation; NaN if the parameter is not identifiable or the model does not fit the
+    /// readings.
+    pub std: f64,
+    /// 95 % confidence interval; NaN where `std` is NaN.
+    pub interval: [f64; 2],
+    /// Whether the readings determine the parameter.
+    pub identifiable: bool,
+    /// Whether it has its found value even if the readings only determine it together with others.
+    pub shared: bool,
+}
+
+/// Cross-validation: residuals of readings that the fit did not use.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HeldOut {
+    /// Number of folds.
+    pub folds: usize,
+    /// RMS of the standardised residuals, each predicted from the other folds.
+    pub rms: f64,
+    /// RMS of the standardised residuals with the initial values.
+    pub rms_initial: f64,
+    /// Standardised residual of each number of each reading; NaN where no prediction is possible.
+    pub residuals: Vec<f64>,
+}
+
+/// Result of an identification.
+#[derive(Clone, Debug)]
+pub struct Identified {
+    /// Estimates, one per parameter, in order.
+    pub parameters: Vec<ParameterEstimate>,
+    /// Correlation matrix of the parameters' coordinates, p×p.
+    pub correlation: DMatrix<f64>,
+    /// Combinations that the readings do not determine: parameter and weight, largest weight first.
+    pub untold: Vec<Vec<(usize, f64)>>,
+    /// Solution of the least-squares problem.
+    pub solution: Solution,
+    /// Standardised residuals with the initial values, with the unknowns of the measurement fitted.
+    pub before: Vec<f64>,
+    /// Residuals over their own standard deviation after the fit; a magnitude above four
+    /// contradicts the other readings.
+    pub normalised: Vec<f64>,
+    /// Indices into [`Self::normalised`] with a magnitude above four, largest first.
+    pub suspicious: Vec<usize>,
+    /// Ratio of the scatter to the declared one, if chance exceeds it less than once in a thousand
+    /// cases.
+    pub misfit: Option<f64>,
+    /// Cross-validation.
+    pub held_out: Option<HeldOut>,
+    /// Estimated poses of unknown instruments: the world in the instrument's axes.
+    pub instruments: Vec<Pose>,
+    /// Estimated positions of the targets in tool axes (m).
+    pub targets: Vec<Vector3<f64>>,
+}
+
+/// Reason why an identification fails.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum IdentifyError {
+    /// No parameter or no reading.
+    #[error("{parameters} parameters and {rows} measured numbers: at least one of each is needed")]
+    Nothing {
+        /// Number of parameters.
+        parameters: usize,
+        /// Number of measured numbers.
+        rows: usize,
+    },
+    /// Too few measured places for an instrument.
+    #[error(
+        "instrument {instrument}: its pose requires at least three measured places that are not on one line, found \
+         {places}"
+    )]
+    Instrument {
+        /// Number of the instrument.
+        instrument: usize,
+        /// Number of its places.
+        places: usize,
+    },
+    /// Too few displacements to find the axes of an instrument.
+    #[error(
+        "instrument {instrument}: its axes require displacements with all three components along at least two \
+         directions, found {displacements}; add such readings, or give its orientation"
+    )]
+    Axes {
+        /// Number of the instrument.
+        instrument: usize,
+        /// Number of its displacements.
+        displacements: usize,
+    },
+    /// The arm model has no solution for a reading.
+    #[error(transparent)]
+    Model(#[from] NoAnswer),
+    /// The readings do not determine an unknown of the measurement.
+    #[error(
+        "the readings do not determine {what}: measure at more different poses, in particular with different \
+         orientations of the tool"
+    )]
+    Untold {
+        /// Description of the unknown.
+        what: String,
+    },
+    /// The scatter cannot be estimated, because there are as many unknowns as numbers.
+    #[error(
+        "the {rows} numbers have no standard deviation and there are as many unknowns: the scatter cannot be \
+         estimated; give a standard deviation or measure more"
+    )]
+    NoScatter {
+        /// Number of measured numbers.
+        rows: usize,
+    },
+    /// A value is not finite.
+    #[error(
+        "a residual or a derivative is not finite: a value, a standard deviation or an uncertainty is too large or \
+         too small"
+    )]
+    NotFinite,
+}

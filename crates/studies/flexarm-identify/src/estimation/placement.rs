@@ -1,0 +1,123 @@
+//! Placement of unknown instruments: fits of rigid motions and rotations to measured points.
+
+use flexarm_kinematics::Pose;
+use nalgebra::{DVector, Matrix3, Rotation3, Translation3, Vector3};
+
+use crate::estimation::identified::IdentifyError;
+use crate::estimation::measurement::MeasuredArm;
+use crate::estimation::parameter::Plant;
+use crate::estimation::reading::{Component, Instrument, Measurements, ReadingKind, Target};
+
+/// Returns the measurements with each unknown instrument at its best fit to the arm with its
+/// initial values.
+pub(crate) fn placed(plant: &Plant, measurements: &Measurements) -> Result<Measurements, IdentifyError> {
+    let mut placed = measurements.clone();
+    for number in 0..measurements.instruments.len() {
+        let of_it = |kind: &ReadingKind| match kind {
+            ReadingKind::InstrumentAt { instrument, .. } => *instrument == number,
+            _ => false,
+        };
+        let said = measurements.readings.iter().any(|reading| of_it(&reading.kind));
+        match measurements.instruments[number] {
+            Instrument::Unknown(_) if !said => {
+                let seen =
+                    |kind: &ReadingKind| matches!(kind, ReadingKind::Place { instrument, .. } if *instrument == number);
+                let [world, own] = both_points(plant, measurements, seen)?;
+                let too_few = || IdentifyError::Instrument { instrument: number, places: world.len() };
+                placed.instruments[number] = Instrument::Unknown(rigid_fit(&world, &own).ok_or_else(too_few)?);
+            }
+            Instrument::Axes(_) if !said => {
+                let seen = |kind: &ReadingKind| seen_in_axes(kind, number);
+                let [world, own] = both_points(plant, measurements, seen)?;
+                let too_few = || IdentifyError::Axes { instrument: number, displacements: world.len() };
+                placed.instruments[number] = Instrument::Axes(rotation_fit(&world, &own).ok_or_else(too_few)?);
+            }
+            _ => {}
+        }
+    }
+    Ok(placed)
+}
+
+/// Whether a reading consists of exactly the three components of a displacement in the axes of an
+/// instrument.
+fn seen_in_axes(kind: &ReadingKind, instrument: usize) -> bool {
+    let ReadingKind::Displacement { rows, .. } = kind else { return false };
+    let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
+    rows.len() == 3 && rows.iter().zip(axes).all(|(row, axis)| row.of == Component::AlongSeen(instrument, axis))
+}
+
+/// Returns the vectors of some readings, predicted in world axes by the arm with its initial
+/// values, and as observed.
+fn both_points(
+    plant: &Plant,
+    measurements: &Measurements,
+    some: impl Fn(&ReadingKind) -> bool,
+) -> Result<[Vec<Vector3<f64>>; 2], IdentifyError> {
+    // With instruments at the identity, predictions are in world axes.
+    let mut seen = measurements.of_readings(|k| some(&measurements.readings[k].kind));
+    seen.instruments.iter_mut().for_each(|i| *i = Instrument::Known(Pose::identity()));
+    seen.targets.iter_mut().for_each(|t| {
+        if let Target::Unknown(guess) = t {
+            *t = Target::Known(*guess);
+        }
+    });
+    let arm = MeasuredArm { plant, parameters: &[], measurements: &seen };
+    Ok([points(&arm.predicted(&DVector::zeros(0))?), points(&arm.observed())])
+}
+
+pub(crate) fn points(values: &[f64]) -> Vec<Vector3<f64>> {
+    values.chunks_exact(3).map(Vector3::from_column_slice).collect()
+}
+
+/// Returns the rotation and translation that map points onto others with the least sum of squares
+/// (Arun, Huang and Blostein 1987).
+pub(crate) fn rigid_fit(from: &[Vector3<f64>], to: &[Vector3<f64>]) -> Option<Pose> {
+    let n = from.len();
+    if n < 3 {
+        return None;
+    }
+    let middle = |points: &[Vector3<f64>]| points.iter().sum::<Vector3<f64>>() / n as f64;
+    let (a, b) = (middle(from), middle(to));
+    let less = |points: &[Vector3<f64>], middle| points.iter().map(|p| p - middle).collect::<Vec<_>>();
+    let R = rotation_fit(&less(from, a), &less(to, b))?;
+    Some(Pose::from_parts(Translation3::from(b - R * a), R))
+}
+
+/// Returns the rotation that maps vectors onto others with the least sum of squares; `None` if all
+/// are collinear.
+pub(crate) fn rotation_fit(from: &[Vector3<f64>], to: &[Vector3<f64>]) -> Option<Rotation3<f64>> {
+    let H: Matrix3<f64> = from.iter().zip(to).map(|(p, q)| p * q.transpose()).sum();
+    if !H.norm_squared().is_finite() {
+        return None;
+    }
+    let svd = H.svd(true, true);
+    let (U, Vt) = (svd.u?, svd.v_t?);
+    let mut sizes: Vec<f64> = svd.singular_values.iter().copied().collect();
+    sizes.sort_by(|x, y| y.total_cmp(x));
+    // Collinear vectors leave the rotation about their line undetermined.
+    if sizes[1] <= 1e-9 * sizes[0] {
+        return None;
+    }
+    let mut turn = Matrix3::identity();
+    let smallest = svd.singular_values.imin();
+    turn[(smallest, smallest)] = (Vt.transpose() * U.transpose()).determinant().signum();
+    Some(Rotation3::from_matrix_unchecked(Vt.transpose() * turn * U.transpose()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_rigid_fit_finds_a_placement_again_and_refuses_points_on_a_line() {
+        let X = Pose::from_parts(Translation3::new(3.0, -1.0, 0.4), Rotation3::from_euler_angles(0.3, -1.1, 2.0));
+        let from: Vec<Vector3<f64>> =
+            (0..6).map(|k| Vector3::new(f64::from(k).sin(), f64::from(k * k).cos(), 0.3 * f64::from(k))).collect();
+        let to: Vec<Vector3<f64>> = from.iter().map(|p| X.rotation * p + X.translation.vector).collect();
+        let found = rigid_fit(&from, &to).unwrap();
+        let error = (found.rotation.matrix() - X.rotation.matrix()).amax();
+        assert!(error < 1e-14, "{error:e}");
+        let line: Vec<Vector3<f64>> = (0..6).map(|k| Vector3::new(f64::from(k), 2.0 * f64::from(k), 1.0)).collect();
+        assert!(rigid_fit(&line, &line).is_none());
+    }
+}
