@@ -13,10 +13,11 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::axis_motion::AxisMotion;
 use crate::crba::composite_bodies;
-use crate::data::{Data, State, identity};
+use crate::data::{Data, State};
 use crate::free_forces::FreeForces;
 use crate::kinematics::{place_bodies, tree_jacobian};
 use crate::model::{Body, Frame, JointMotion, Model};
+use crate::pose::identity;
 use crate::rnea::{at_rest, newton_euler};
 use crate::static_tangent::{PointLoad, StaticTangent};
 

@@ -58,6 +58,7 @@ mod many_starts;
 mod mechanism;
 mod modal;
 mod model;
+mod pose;
 mod redundancy;
 mod rnea;
 mod static_tangent;
