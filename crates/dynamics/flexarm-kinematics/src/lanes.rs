@@ -8,16 +8,14 @@
 use std::sync::Arc;
 
 use flexarm_spatial::products::{add, lift, lift3, mul};
-use flexarm_spatial::{ElasticAngles, Pose, Real, SpatialInertia};
+use flexarm_spatial::{ElasticAngles, Real, SpatialInertia};
 use nalgebra::{Matrix3, Vector3};
 
-use crate::axis_motion::AxisMotion;
 use crate::crba::composite_bodies;
 use crate::data::{Data, State};
 use crate::free_forces::FreeForces;
 use crate::kinematics::{place_bodies, tree_jacobian};
-use crate::model::{Body, Frame, JointMotion, Model};
-use crate::pose::identity;
+use crate::model::{Frame, JointMotion, Model};
 use crate::rnea::{at_rest, newton_euler};
 use crate::static_tangent::{PointLoad, StaticTangent};
 
@@ -204,8 +202,7 @@ fn places<'a, T: Real>(
         let elastic = match body.motion {
             // Single-DoF spring.
             JointMotion::Axis(motion) if body.elastic => {
-                let [still, moved] =
-                    [along_axis(body, motion, T::zero()), along_axis(body, motion, q[body.coordinate])];
+                let [still, moved] = [body.along_axis(motion, T::zero()), body.along_axis(motion, q[body.coordinate])];
                 rigid = carried((still.rotation.matrix(), &still.translation.vector), &rigid);
                 flexible = carried((moved.rotation.matrix(), &moved.translation.vector), &flexible);
                 i = body.parent;
@@ -237,15 +234,6 @@ fn places<'a, T: Real>(
         i = body.parent;
     }
     [rigid, flexible]
-}
-
-/// `X_PB` of a single-DoF joint.
-#[inline(always)]
-pub(crate) fn along_axis<T: Real>(body: &Body, motion: AxisMotion, coordinate: T) -> Pose<T> {
-    let value = T::splat(body.ratio) * coordinate + T::splat(body.offset);
-    let mut X_PB = identity();
-    motion.place(&body.X_PJ, &body.turn, value, Real::sin_cos(value), &mut X_PB);
-    X_PB
 }
 
 /// Transforms a point from B to P.
