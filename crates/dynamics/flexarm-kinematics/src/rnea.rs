@@ -112,7 +112,7 @@ pub(crate) fn at_rest<T: Real>(tree: &impl Tree<T>, data: &mut Data<T>) {
 }
 
 /// [`newton_euler`] with the balancers of the model, for the tree; closed loops are handled in
-/// `closure.rs`.
+/// `closure`.
 #[inline(always)]
 pub(crate) fn balanced(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64], qddot: Option<&[f64]>) {
     match model.balancers.is_empty() {
