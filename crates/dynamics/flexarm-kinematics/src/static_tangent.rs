@@ -37,8 +37,8 @@ use nalgebra::{DMatrix, DVector, Matrix3, Scalar, Vector3};
 use crate::balancer::{BalancerLine, BalancerPlace};
 use crate::closure::LoopTangent;
 use crate::data::Data;
-use crate::lanes::Tree;
 use crate::model::{JointMotion, Model};
+use crate::tree::Tree;
 
 /// Wrench on a body, for [`StaticTangent::compute`].
 #[derive(Clone, Copy, Debug)]
