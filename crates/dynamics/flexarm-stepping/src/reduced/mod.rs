@@ -67,20 +67,19 @@ pub struct ReducedArm {
     /// Equations of motion of the free coordinates only, if these suffice and the tree is
     /// supported.
     points: Option<PooledWorkspace<FreeForces>>,
-    poses: Poses,
+    /// Workspace with the poses of the last [`ReducedArm::set`]; `None` until they are computed.
+    poses: Option<PosesIn>,
     /// Workspace of observations, if supported for this tree; created at the first observation.
     observer: Option<Option<PooledWorkspace<Observer>>>,
 }
 
-/// Location of the poses of the current state.
+/// Workspace of a [`ReducedArm`] that holds poses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Poses {
-    /// In `data`.
-    InData,
-    /// In `points`, after a residual.
-    InPoints,
-    /// In neither place, after an observation.
-    Nowhere,
+enum PosesIn {
+    /// `data`.
+    Data,
+    /// `points`, after a residual.
+    Points,
 }
 
 impl ReducedArm {
@@ -115,7 +114,7 @@ impl ReducedArm {
             tree: ElasticTree::that_pays(&arm),
             modes: HeldModes::that_pay(&arm),
             points,
-            poses: Poses::InData,
+            poses: None,
             observer: None,
             arm,
         }
@@ -162,6 +161,7 @@ impl ReducedArm {
     pub(crate) fn set(&mut self, t: f64, x: &DVector<f64>, v: &DVector<f64>) {
         let t = self.events.side(t);
         self.sample_joints(t);
+        self.poses = None;
         let n = self.arm.model.n_actuated();
         let driven = self.arm.torque_driven.len();
         for (i, &k) in self.arm.torque_driven.iter().enumerate() {
@@ -171,7 +171,7 @@ impl ReducedArm {
         self.state.q.as_mut_slice()[n..].copy_from_slice(&x.as_slice()[driven..]);
         self.state.qdot.as_mut_slice()[n..].copy_from_slice(&v.as_slice()[driven..]);
         if !self.arm.loads.is_empty() {
-            forward_kinematics(&self.arm.model, &mut self.data, &self.state.q);
+            self.place();
             self.arm.apply_loads(&mut self.data, t);
         }
     }
@@ -185,7 +185,7 @@ impl ReducedArm {
             return Ok(());
         }
         self.set(0.0, x, v);
-        forward_kinematics(&self.arm.model, &mut self.data, &self.state.q);
+        self.place();
         StepError::open_loop(&self.arm.model, &self.data, 0.0).map_or(Ok(()), Err)
     }
 
@@ -201,11 +201,11 @@ impl ReducedArm {
         }
     }
 
-    /// Computes the poses of the state in `data` if a residual or an observation has not left them
-    /// there.
+    /// Computes the poses of the state in `data` unless they are there.
     fn place(&mut self) {
-        if self.poses != Poses::InData {
+        if self.poses != Some(PosesIn::Data) {
             forward_kinematics(&self.arm.model, &mut self.data, &self.state.q);
+            self.poses.get_or_insert(PosesIn::Data);
         }
     }
 
@@ -222,7 +222,7 @@ impl ReducedArm {
     pub(crate) fn evaluate(&mut self, t: f64, x: &DVector<f64>, v: &DVector<f64>, a: &DVector<f64>) {
         self.set(t, x, v);
         self.set_accelerations(a);
-        self.poses = Poses::InData;
+        self.poses = Some(PosesIn::Data);
         inverse_dynamics(&self.arm.model, &mut self.data, &self.state, &self.qddot);
         self.add_joint_torques(x, v);
         world_poses(&self.arm.model, &mut self.data);
@@ -248,7 +248,6 @@ impl ReducedArm {
         };
         self.set(t, x, v);
         self.set_accelerations(a);
-        self.poses = Poses::Nowhere;
         let Self { arm, data, state, qddot, .. } = self;
         let motions = Motions { q: state.q.as_slice(), qdot: state.qdot.as_slice(), qddot: qddot.as_slice() };
         let energies = observer.observe(&arm.model, motions, None, X_WB, data.tau.as_mut_slice());

@@ -6,7 +6,7 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 use crate::error::StepError;
 use crate::held_modes::HeldModes;
 use crate::mode_matrix::ModeMatrices;
-use crate::reduced::{Poses, ReducedArm};
+use crate::reduced::{PosesIn, ReducedArm};
 use crate::system::SecondOrderSystem;
 use crate::tree_matrix::TreeMatrices;
 
@@ -28,10 +28,11 @@ impl SecondOrderSystem for ReducedArm {
                 let motions = Motions { q: state.q.as_slice(), qdot: state.qdot.as_slice(), qddot: qddot.as_slice() };
                 let loads = (!arm.loads.is_empty()).then_some(data.F_ext.as_slice());
                 points.compute(motions, loads, r.as_mut_slice());
-                self.poses = Poses::InPoints;
+                self.poses = Some(PosesIn::Points);
             }
             None => {
                 inverse_dynamics(&arm.model, data, state, qddot);
+                self.poses = Some(PosesIn::Data);
                 for (r, &k) in r.iter_mut().zip(&self.free) {
                     *r = data.tau[k];
                 }
@@ -51,7 +52,7 @@ impl SecondOrderSystem for ReducedArm {
         a: &mut DVector<f64>,
     ) -> Result<(), StepError> {
         self.set(t, x, v);
-        self.poses = Poses::InData;
+        self.poses = Some(PosesIn::Data);
         let mut forces = std::mem::replace(&mut self.forces, DVector::zeros(0));
         for pass in 0..GEOMETRIC_PASSES {
             forces.fill(0.0);
@@ -83,7 +84,7 @@ impl SecondOrderSystem for ReducedArm {
     }
 
     fn mass(&mut self, M: &mut DMatrix<f64>) {
-        if self.poses == Poses::InPoints
+        if self.poses == Some(PosesIn::Points)
             && let Some(points) = &mut self.points
         {
             return points.mass(M.as_mut_slice());
