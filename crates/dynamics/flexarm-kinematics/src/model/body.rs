@@ -25,8 +25,8 @@ pub struct Body {
     pub inertia: SpatialInertia,
     /// Motion allowed by the joint.
     pub motion: JointMotion,
-    /// Index of the (first) independent coordinate; indices from [`Model::nv`] on are dependent
-    /// coordinates of closed loops.
+    /// Index of the (first) independent coordinate; indices from [`crate::Model::nv`] on are
+    /// dependent coordinates of closed loops.
     pub coordinate: usize,
     /// Joint value = ratio × coordinate + offset; (1, 0) except for mimic joints.
     pub ratio: f64,
