@@ -22,13 +22,16 @@ use crate::doubt::Doubt;
 use crate::error::FemError;
 use crate::frames::LinkFrames;
 use crate::gate::GateLimits;
+use crate::material::Material;
 use crate::mesh::{Mesh, bodies};
 use crate::mesh_gate::ElementQuality;
 use crate::modal::ModalSource;
 use crate::model::{AssemblyOptions, FeModel, materials};
 use crate::order_check::check_order;
 use crate::reduced::{LinkDetails, Provenance, ReducedLink};
-use crate::reduction::{Condensation, CondensationOptions, Interface, InterfaceFrame, SolverFigures, stiffness12};
+use crate::reduction::{
+    Condensation, CondensationOptions, Interface, InterfaceFrame, SolverFigures, Superelement, stiffness12,
+};
 use crate::rigid_part::RigidPart;
 use crate::sparse::{Modes, ModesWanted};
 use crate::stress::{INERTIA_LOADS, StressFields};
@@ -167,30 +170,14 @@ pub fn reduce_mesh(
     step(ReductionStep::Parts);
     let densities: Vec<f64> = materials.iter().map(|m| m.rho).collect();
     let whole = mass_properties(mesh, &densities)?;
-    let (X_LA, X_LB) = (plan.interfaces[0].X_LI, plan.interfaces[1].X_LI);
     let mut doubts = suspicious(mesh, &bodies);
-    let loose = FemError::Missing { what: "stiffness of the third interface", help: "it holds nothing" };
-    // Two-part link from the 12×12 of A and B.
-    let K12 = stiffness12(&superelement).ok_or(loose)?;
-    let frames = LinkFrames::new(X_LA, X_LB);
-    let (frames, parts) = split(mesh, &densities, frames, &K12, plan.split, &mut doubts)?;
-    let mut link = ReducedLink::from_matrix12(&plan.name, frames, &K12, parts, plan.provenance.clone(), &plan.limits)?;
+    let mut link = two_part_link(mesh, plan, &densities, &superelement, &mut doubts)?;
 
     // Chains and checks against the mesh; then the attached bodies.
-    let source = ChainSource {
-        mesh,
-        model: &model,
-        materials: &materials,
-        quadrature: plan.assembly.quadrature,
-        U: &unit_loads,
-        p_LA: X_LA.translation.vector,
-        p_LB: X_LB.translation.vector,
-    };
-    let chains = plan.chains.iter().map(|parts| source.chain(*parts)).collect::<Result<Vec<_>, _>>()?;
+    let bare_chains = bare_chains(mesh, plan, &model, &materials, &unit_loads)?;
     let mut gate = gate(&condensation, &superelement, &link, &whole, &fixed_modes, &held_modes, quality);
     gate.order = check_order(mesh, &plan.assembly, &plan.interfaces, &condensation, &unit_loads)?;
-    let bare_chains = chains.clone();
-    let mut chains = chains;
+    let mut chains = bare_chains.clone();
     attach(&plan.attached, &mut link, &mut chains)?;
     doubts.extend(gate.doubts());
     doubts.extend(implausible(mesh, &whole, &held_modes));
@@ -217,4 +204,34 @@ pub fn reduce_mesh(
     let solves = fixed_modes.solves + held_modes.solves + condensation.figures().static_solves + inertia_solves;
     let solver = condensation.figures();
     Ok(MeshReduction { link, whole, solver, unit_loads, fixed_modes, held_modes, bare_chains, solves, stress, doubts })
+}
+
+/// Returns the two-part link from the 12×12 stiffness of A and B.
+fn two_part_link(
+    mesh: &Mesh,
+    plan: &LinkPlan,
+    densities: &[f64],
+    superelement: &Superelement,
+    doubts: &mut Vec<Doubt>,
+) -> Result<ReducedLink, MeshLinkError> {
+    let loose = FemError::Missing { what: "stiffness of the third interface", help: "it holds nothing" };
+    let K12 = stiffness12(superelement).ok_or(loose)?;
+    let frames = LinkFrames::new(plan.interfaces[0].X_LI, plan.interfaces[1].X_LI);
+    let (frames, parts) = split(mesh, densities, frames, &K12, plan.split, doubts)?;
+    Ok(ReducedLink::from_matrix12(&plan.name, frames, &K12, parts, plan.provenance.clone(), &plan.limits)?)
+}
+
+/// Returns the chains of the mesh without attached bodies.
+///
+/// * `U`: displacements under six unit wrenches at B.
+fn bare_chains(
+    mesh: &Mesh,
+    plan: &LinkPlan,
+    model: &FeModel,
+    materials: &[Material],
+    U: &DMatrix<f64>,
+) -> Result<Vec<Chain>, MeshLinkError> {
+    let [p_LA, p_LB] = [0, 1].map(|k| plan.interfaces[k].X_LI.translation.vector);
+    let source = ChainSource { mesh, model, materials, quadrature: plan.assembly.quadrature, U, p_LA, p_LB };
+    Ok(plan.chains.iter().map(|parts| source.chain(*parts)).collect::<Result<_, _>>()?)
 }
