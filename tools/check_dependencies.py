@@ -247,7 +247,7 @@ def without_literals(text):
 
 def check_source(crate, folder, path, text):
     problems = []
-    if re.search(r"/(?:tests|test_\w+)\.rs$", str(path)):  # a module of unit tests
+    if re.search(r"/tests/|/(?:tests|test_\w+)\.rs$", str(path)):  # a module of unit tests
         return problems
     pattern, _ = ALLOWED.get(str(path), (r"(?!)", ""))
     may = lambda hit: re.fullmatch(pattern, hit.group())
@@ -355,6 +355,7 @@ def self_test():
         ("printing to stderr", source("base", 'eprint!("x");'), "prints"),
         ("printing in the facade", check_source("flexarm", "faces", "c.rs", 'println!("x");'), "prints"),
         ("a module of tests prints", check_source("c", "base", "src/x/tests.rs", 'eprintln!("x");'), None),
+        ("a part of a module of tests prints", check_source("c", "base", "src/x/tests/y.rs", 'eprintln!("x");'), None),
         ("a face prints", source("faces", 'println!("x");'), None),
         ("printing in docs and tests", source("base", '/// println!("x");\n#[cfg(test)]\nmod tests { fn f() { println!("x"); } }'), None),
         ("a clock inside", source("motion", "let t = Instant::now();"), "clock"),
