@@ -17,8 +17,8 @@ use crate::axis_motion::AxisMotion;
 use crate::closure;
 use crate::data::{Data, ElasticSubspace, begin, joint_position};
 use crate::kinematics::turned;
-use crate::lanes::Tree;
 use crate::model::{Body, JointMotion, Model};
+use crate::tree::Tree;
 
 /// Computes the mass matrix `M(q)`, nv×nv, both triangles (kg, kg m, kg m²). Fills
 /// `data.{X_PB, M}`. Does not allocate.

@@ -6,13 +6,14 @@
 
 use flexarm_spatial::products::{add, cross, lift, lift3, mul, mul3, tr_mul, transposed};
 use flexarm_spatial::{ArticulatedInertia, ElasticAngles, Pose, Real, SpatialInertia, Twist, Wrench, sin_cos_all};
-use nalgebra::{DMatrix, DVector, Isometry, Matrix3, Rotation3, Scalar, Translation3, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Scalar, Vector3};
 
 use crate::axis_motion::AxisMotion;
 use crate::closure::LoopData;
 use crate::crba::{RotatedBody, SixWrenches};
 use crate::modal::ModalData;
 use crate::model::{Body, Frame, JointMotion, Model};
+use crate::pose::{identity, pose};
 
 /// Positions and velocities of all independent coordinates, in the model's coordinate order.
 #[derive(Clone, Debug, PartialEq)]
@@ -140,18 +141,6 @@ impl<T: Real> Data<T> {
         let p = add(&X_WB.translation.vector, &mul(R_WB, &lift(&X_BF.translation.vector)));
         pose(mul3(R_WB, &lift3(X_BF.rotation.matrix())), p)
     }
-}
-
-/// Identity pose.
-#[inline(always)]
-pub(crate) fn identity<T: Real>() -> Pose<T> {
-    pose(Matrix3::identity(), Vector3::zeros())
-}
-
-/// Pose from rotation matrix and translation.
-#[inline(always)]
-pub(crate) fn pose<T: Real>(R: Matrix3<T>, p: Vector3<T>) -> Pose<T> {
-    Isometry { rotation: Rotation3::from_matrix_unchecked(R), translation: Translation3 { vector: p } }
 }
 
 /// Joint twist and its bias in B axes; fills `X_PB` and `elastic` for one body.

@@ -92,14 +92,7 @@ pub fn inverse_kinematics(
         frame_jacobian(model, data, frame, &mut J);
         let mut Jw = DMatrix::from_fn(6, n, |r, c| if r < 3 { J[(r, c)] } else { J[(r, c)] * length });
         let e = weigh(&error);
-        // Joints at a limit that the gradient pushes outward are excluded.
-        let gradient = Jw.tr_mul(&e);
-        for k in 0..n {
-            let held = (q[k] <= limits[k].0 && gradient[k] < 0.0) || (q[k] >= limits[k].1 && gradient[k] > 0.0);
-            if held {
-                Jw.column_mut(k).fill(0.0);
-            }
-        }
+        hold_at_limits(&mut Jw, &e, &q, &limits);
         // Increase the damping until a step reduces the error.
         let scale = Jw.norm_squared().max(1e-12);
         let mut improved = false;
@@ -124,6 +117,17 @@ pub fn inverse_kinematics(
         }
     }
     Err(failure(model, frame, options.max_iterations, &error, &q))
+}
+
+/// Zeroes the columns of joints at a limit that the gradient of the error pushes outward.
+fn hold_at_limits(Jw: &mut DMatrix<f64>, e: &Vector6<f64>, q: &DVector<f64>, limits: &[(f64, f64)]) {
+    let gradient = Jw.tr_mul(e);
+    for (k, (lower, upper)) in limits.iter().enumerate() {
+        let held = (q[k] <= *lower && gradient[k] < 0.0) || (q[k] >= *upper && gradient[k] > 0.0);
+        if held {
+            Jw.column_mut(k).fill(0.0);
+        }
+    }
 }
 
 fn pose_error(model: &Model, data: &mut Data, frame: &Frame, X_WT: &Pose, q: &DVector<f64>) -> Vector6<f64> {

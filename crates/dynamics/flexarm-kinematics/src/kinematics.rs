@@ -11,8 +11,9 @@ use nalgebra::{Matrix3, Matrix6xX, Vector3};
 use crate::axis_motion::AxisMotion;
 use crate::balancer::measure;
 use crate::closure;
-use crate::data::{Data, State, begin, identity, joint_motion, joint_position, rotor_energy};
+use crate::data::{Data, State, begin, joint_motion, joint_position, rotor_energy};
 use crate::model::{Frame, JointMotion, Model};
+use crate::pose::identity;
 
 /// Computes the poses of all bodies; fills `data.{X_PB, X_WB}`.
 pub fn forward_kinematics(model: &Model, data: &mut Data, q: &nalgebra::DVector<f64>) {

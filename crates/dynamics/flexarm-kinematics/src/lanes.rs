@@ -5,96 +5,19 @@
 //! Functions are inlined into their callers, so that the SIMD instructions are available
 //! ([`flexarm_spatial::lanes::with_lanes`]).
 
-use std::sync::Arc;
-
 use flexarm_spatial::products::{add, lift, lift3, mul};
-use flexarm_spatial::{ElasticAngles, Pose, Real, SpatialInertia};
+use flexarm_spatial::{ElasticAngles, Real};
 use nalgebra::{Matrix3, Vector3};
 
-use crate::axis_motion::AxisMotion;
 use crate::crba::composite_bodies;
-use crate::data::{Data, State, identity};
+use crate::data::{Data, State};
 use crate::free_forces::FreeForces;
 use crate::kinematics::{place_bodies, tree_jacobian};
-use crate::model::{Body, Frame, JointMotion, Model};
+use crate::model::{Frame, JointMotion, Model};
 use crate::rnea::{at_rest, newton_euler};
 use crate::static_tangent::{PointLoad, StaticTangent};
 
-/// Tree with inertias in the scalar type of a recursion: a [`Model`], or one with an inertia per
-/// lane ([`LaneTree`]).
-pub trait Tree<T: Real> {
-    /// Bodies and joints, identical in all lanes.
-    fn model(&self) -> &Model;
-
-    /// Inertia of a body about Bo, B axes.
-    fn inertia(&self, body: usize) -> SpatialInertia<T>;
-}
-
-impl Tree<f64> for Model {
-    #[inline(always)]
-    fn model(&self) -> &Model {
-        self
-    }
-
-    #[inline(always)]
-    fn inertia(&self, body: usize) -> SpatialInertia {
-        self.bodies[body].inertia
-    }
-}
-
-/// Tree with separate inertias for each lane.
-#[derive(Clone, Debug)]
-pub struct LaneTree<T: Real> {
-    model: Arc<Model>,
-    inertia: Vec<SpatialInertia<T>>,
-}
-
-impl<T: Real> LaneTree<T> {
-    /// Builds the tree from one model per lane; `None` if the models differ in more than their
-    /// inertias, if their number is not the number of lanes, or if they have closed loops.
-    pub fn new(models: &[Arc<Model>]) -> Option<Self> {
-        let first = models.first().filter(|_| models.len() == T::LANES)?;
-        // Loops are closed by an iteration whose length depends on the configuration.
-        if !first.loops.is_empty() {
-            return None;
-        }
-        if !models.iter().all(|model| Arc::ptr_eq(model, first) || model.is_same_tree(first)) {
-            return None;
-        }
-        let inertia = |body: usize| {
-            let mut all = SpatialInertia::<T>::lift(&first.bodies[body].inertia);
-            for (lane, model) in models.iter().enumerate() {
-                let own = &model.bodies[body].inertia;
-                all.mass.set_lane(lane, own.mass);
-                for (to, from) in all.first_moment.iter_mut().zip(&own.first_moment) {
-                    to.set_lane(lane, *from);
-                }
-                for (to, from) in all.rotational.iter_mut().zip(&own.rotational) {
-                    to.set_lane(lane, *from);
-                }
-            }
-            all
-        };
-        Some(Self { model: first.clone(), inertia: (0..first.bodies.len()).map(inertia).collect() })
-    }
-
-    /// Model of the first lane.
-    pub fn model(&self) -> &Model {
-        &self.model
-    }
-}
-
-impl<T: Real> Tree<T> for LaneTree<T> {
-    #[inline(always)]
-    fn model(&self) -> &Model {
-        &self.model
-    }
-
-    #[inline(always)]
-    fn inertia(&self, body: usize) -> SpatialInertia<T> {
-        self.inertia[body]
-    }
-}
+pub use crate::tree::{LaneTree, Tree};
 
 /// [`crate::inverse_dynamics`] without balancers; the generalised forces are in `data.tau`.
 #[inline(always)]
@@ -203,8 +126,7 @@ fn places<'a, T: Real>(
         let elastic = match body.motion {
             // Single-DoF spring.
             JointMotion::Axis(motion) if body.elastic => {
-                let [still, moved] =
-                    [along_axis(body, motion, T::zero()), along_axis(body, motion, q[body.coordinate])];
+                let [still, moved] = [body.along_axis(motion, T::zero()), body.along_axis(motion, q[body.coordinate])];
                 rigid = carried((still.rotation.matrix(), &still.translation.vector), &rigid);
                 flexible = carried((moved.rotation.matrix(), &moved.translation.vector), &flexible);
                 i = body.parent;
@@ -236,15 +158,6 @@ fn places<'a, T: Real>(
         i = body.parent;
     }
     [rigid, flexible]
-}
-
-/// `X_PB` of a single-DoF joint.
-#[inline(always)]
-pub(crate) fn along_axis<T: Real>(body: &Body, motion: AxisMotion, coordinate: T) -> Pose<T> {
-    let value = T::splat(body.ratio) * coordinate + T::splat(body.offset);
-    let mut X_PB = identity();
-    motion.place(&body.X_PJ, &body.turn, value, Real::sin_cos(value), &mut X_PB);
-    X_PB
 }
 
 /// Transforms a point from B to P.

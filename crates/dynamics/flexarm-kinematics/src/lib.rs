@@ -58,9 +58,11 @@ mod many_starts;
 mod mechanism;
 mod modal;
 mod model;
+mod pose;
 mod redundancy;
 mod rnea;
 mod static_tangent;
+mod tree;
 
 pub use flexarm_spatial::{
     AngleKinematics, ArticulatedInertia, ElasticAngles, Pose, Real, SpatialInertia, Twist, Wrench, adjoint,

@@ -19,8 +19,8 @@ use nalgebra::{DVector, Vector3};
 use crate::balancer::{add_joint_torques, with_lines};
 use crate::closure;
 use crate::data::{Data, State, add_projection, begin, joint_motion, joint_position, rotor_energy, subspace_times};
-use crate::lanes::Tree;
 use crate::model::Model;
+use crate::tree::Tree;
 
 /// Computes generalised forces `τ = M(q) q̈ + bias(q, q̇)` (N m or N) for the accelerations
 /// `qddot`.
@@ -112,7 +112,7 @@ pub(crate) fn at_rest<T: Real>(tree: &impl Tree<T>, data: &mut Data<T>) {
 }
 
 /// [`newton_euler`] with the balancers of the model, for the tree; closed loops are handled in
-/// `closure.rs`.
+/// `closure`.
 #[inline(always)]
 pub(crate) fn balanced(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64], qddot: Option<&[f64]>) {
     match model.balancers.is_empty() {

@@ -20,7 +20,7 @@
 //! ```text
 //! τ_k = -(R C_t,k) · g,    ∂τ_k/∂q_j = ∂τ_j/∂η_k = -w_j · (R C_t,k × g)       j inward of the body      (6)
 //! ```
-//! Balancers (`balancer.rs`) enter (2) as a pair of loads of constant direction. Their change of
+//! Balancers (`balancer`) enter (2) as a pair of loads of constant direction. Their change of
 //! direction and length adds the following terms, where `d_i` is the relative velocity of the two
 //! ends per unit rate of coordinate i:
 //!
@@ -37,8 +37,8 @@ use nalgebra::{DMatrix, DVector, Matrix3, Scalar, Vector3};
 use crate::balancer::{BalancerLine, BalancerPlace};
 use crate::closure::LoopTangent;
 use crate::data::Data;
-use crate::lanes::Tree;
 use crate::model::{JointMotion, Model};
+use crate::tree::Tree;
 
 /// Wrench on a body, for [`StaticTangent::compute`].
 #[derive(Clone, Copy, Debug)]

@@ -139,16 +139,9 @@ pub fn linearise(arm: &FlexibleArm, tool: &Frame, F_T_W: &Wrench, t: f64) -> Res
     let p = statics.forces(&mut data, &q);
 
     let slopes = statics.slopes(&mut data, &q);
-    let mut springs = DMatrix::zeros(n, n);
-    springs.view_mut((driven, driven), (e.len(), e.len())).copy_from(&for_vibration(
-        arm,
-        &arm.stiffness(),
-        q.as_slice(),
-        &e,
-    ));
+    let springs = among_free(&for_vibration(arm, &arm.stiffness(), q.as_slice(), &e), driven);
     let K = statics.tangent(&springs, &slopes, &free)?;
-    let mut D = DMatrix::zeros(n, n);
-    D.view_mut((driven, driven), (e.len(), e.len())).copy_from(&arm.D);
+    let D = among_free(&arm.D, driven);
     let M = mass_matrix(model, &mut data, &q).clone();
     forward_kinematics(model, &mut data, &q);
     if let Some(open) = StepError::open_loop(model, &data, t) {
@@ -190,6 +183,15 @@ pub fn linearise(arm: &FlexibleArm, tool: &Frame, F_T_W: &Wrench, t: f64) -> Res
         linear.close_loops(arm, servo);
     }
     Ok(linear)
+}
+
+/// Returns a matrix over the elastic coordinates as one over the free coordinates, of which the
+/// first `driven` are those of the joints driven by torque.
+fn among_free(elastic: &DMatrix<f64>, driven: usize) -> DMatrix<f64> {
+    let n = driven + elastic.nrows();
+    let mut free = DMatrix::zeros(n, n);
+    free.view_mut((driven, driven), elastic.shape()).copy_from(elastic);
+    free
 }
 
 /// Returns the joint forces that hold the pose: weight, loads, and reactions of transmission errors

@@ -13,7 +13,7 @@ use crate::arm::{FlexibleArm, InertiaChange};
 use crate::dense::product_of_numbers;
 use crate::error::StepError;
 use crate::events::EventQueue;
-use crate::reduced::add_geometric_forces;
+use crate::geometric::add_geometric_forces;
 use crate::statics::{add_spring_forces, static_equilibrium, tangent_stiffness, with_curves};
 use crate::workspaces::PooledWorkspace;
 

@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::arm::FlexibleArm;
 use crate::equilibrium::{Forces, equilibrium};
 use crate::error::StepError;
-use crate::reduced::add_geometric_forces;
+use crate::geometric::add_geometric_forces;
 use crate::workspaces::PooledWorkspace;
 
 /// Computes the elastic coordinates at which the springs carry gravity and the loads at time `t`.

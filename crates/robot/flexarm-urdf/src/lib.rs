@@ -61,6 +61,7 @@ mod report;
 mod resolve;
 mod shapes;
 mod tcp;
+mod transmission;
 mod tree;
 mod xacro;
 mod xml;
@@ -73,8 +74,9 @@ pub use mesh::{
     CrossSection, MassProperties, MeshError, TriangleMesh, UpAxis, cross_section, load_mesh, load_mesh_with,
 };
 pub use read::{
-    InertiaEstimate, JointDynamics, ReadOptions, Transmission, UrdfRobot, check_urdf, check_urdf_text, expand_xacro,
-    parse_urdf, read_urdf,
+    InertiaEstimate, JointDynamics, ReadOptions, UrdfRobot, check_urdf, check_urdf_text, expand_xacro, parse_urdf,
+    read_urdf,
 };
 pub use resolve::search_paths_from_environment;
 pub use tcp::{default_tcp, tcp_candidates};
+pub use transmission::Transmission;

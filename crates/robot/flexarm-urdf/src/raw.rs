@@ -14,8 +14,8 @@ use urdf_rs::JointType;
 use crate::error::Problem;
 use crate::finding::TextPosition;
 use crate::lint::{JointMarks, OriginMark, PlainUrdf, lint};
-use crate::read::Transmission;
 use crate::report::Report;
+use crate::transmission::Transmission;
 use crate::xml::Lines;
 
 pub(crate) struct RawRobot {

@@ -12,6 +12,7 @@ use crate::raw::{RawRobot, read_robot};
 use crate::report::Report;
 use crate::resolve::Resolver;
 use crate::tcp::tcp_candidates;
+use crate::transmission::Transmission;
 use crate::{inertia, joints, shapes, tree, xacro, xml};
 
 /// Options for reading. `ReadOptions::default()` reads files unchanged and inspects meshes.
@@ -101,17 +102,6 @@ pub struct JointDynamics {
     pub damping: f64,
     /// Static friction (N m or N).
     pub friction: f64,
-}
-
-/// A `<transmission>`, listed for information.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Transmission {
-    /// Name.
-    pub name: String,
-    /// Names of the joints.
-    pub joints: Vec<String>,
-    /// Gear ratio, if given.
-    pub reduction: Option<f64>,
 }
 
 /// Reads a `.urdf` or `.xacro` file; a URDF that contains xacro is treated as xacro.

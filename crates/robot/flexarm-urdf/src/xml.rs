@@ -51,6 +51,16 @@ impl<'t> Lines<'t> {
     }
 }
 
+/// Returns the child elements.
+pub(crate) fn elements<'a, 'i>(node: Node<'a, 'i>) -> impl Iterator<Item = Node<'a, 'i>> {
+    node.children().filter(Node::is_element)
+}
+
+/// Returns the first child element of this name.
+pub(crate) fn named<'a, 'i>(node: Node<'a, 'i>, name: &str) -> Option<Node<'a, 'i>> {
+    elements(node).find(|n| n.tag_name().name() == name)
+}
+
 /// Decodes UTF-8 without a byte order mark.
 pub(crate) fn decode(bytes: Vec<u8>, file: &Path) -> Result<String, Box<Issue>> {
     let text = String::from_utf8(bytes).map_err(|error| {

@@ -31,8 +31,8 @@ use flexarm_spatial::{Real, Wrench, sin_cos_all};
 use nalgebra::{Matrix3, Vector3};
 
 use crate::aba::Roles;
-use crate::lanes::Tree;
 use crate::model::Model;
+use crate::tree::Tree;
 use composite::Composites;
 use node::{Moving, Node, NodeJoint};
 pub use observed::{BodyMotion, Observer};

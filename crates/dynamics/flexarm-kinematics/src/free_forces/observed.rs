@@ -12,8 +12,9 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::{FreeForces, Motions};
 use crate::aba::Roles;
-use crate::data::{pose, rotor_energy};
+use crate::data::rotor_energy;
 use crate::model::Model;
+use crate::pose::pose;
 
 /// World pose and velocity of a body, from (7) and (9).
 #[derive(Clone, Copy, Debug)]

@@ -13,7 +13,7 @@ use nalgebra::Vector3;
 use crate::arm::FlexibleArm;
 use crate::dense::add_product;
 use crate::elastic_tree::ElasticTree;
-use crate::reduced::HeldModes;
+use crate::held_modes::HeldModes;
 
 /// A spring assigned to its coordinates.
 struct Element<T> {

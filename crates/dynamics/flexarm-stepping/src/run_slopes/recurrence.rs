@@ -30,6 +30,7 @@ use crate::run_slopes::lu::Lu;
 use crate::run_slopes::servo::ServoSlopes;
 use crate::run_slopes::tangent::{LinearisationPoint, Tangent, add_columns, put};
 use crate::run_slopes::{Direction, SlopesRequest, TorqueLimited};
+use crate::stepper::Start;
 use crate::steppers::{Coefficients, GeneralizedAlpha};
 
 /// Maximum number of iterations of a step; after more of them a matrix that contains the dispersion
@@ -103,7 +104,6 @@ impl<'a> Recurrence<'a> {
         let tangent = Tangent::new(&arm, p);
         let mut system = ReducedArm::new(arm);
         let (x, v) = system.start(e)?;
-        // Jumps of all velocities at the start.
         let blow = (system.events.jumps_over() > 0).then(|| system.tau.clone());
         let servo = system.servo.as_ref().map(|servo| ServoSlopes::new(servo, directions));
         let h = request.step_s;
@@ -145,18 +145,24 @@ impl<'a> Recurrence<'a> {
             room: DVector::zeros(nv),
             system,
         };
-        let side = run.system.events.side(0.0);
-        run.sample_joints(side);
-        if p > 0 {
-            run.begin(e, request.start == crate::stepper::Start::Equilibrium)?;
-        }
-        run.look();
-        if let Some(blow) = &blow {
-            // The run starts from rest.
-            run.strike(0.0, blow, None)?;
-        }
-        run.accelerate()?;
+        run.start(e, request.start == Start::Equilibrium, blow.as_ref())?;
         Ok(run)
+    }
+
+    /// Evaluates the start of the run and the derivatives there; `blow`: jumps of all velocities at
+    /// the start.
+    fn start(&mut self, e: &DVector<f64>, at_rest: bool, blow: Option<&DVector<f64>>) -> Result<(), StepError> {
+        let side = self.system.events.side(0.0);
+        self.sample_joints(side);
+        if !self.directions.is_empty() {
+            self.begin(e, at_rest)?;
+        }
+        self.look();
+        if let Some(blow) = blow {
+            // The run starts from rest.
+            self.strike(0.0, blow, None)?;
+        }
+        self.accelerate()
     }
 
     /// Computes the derivatives of the initial state and of the torques initially held by the

@@ -3,8 +3,9 @@
 use flexarm_kinematics::Model;
 use nalgebra::Matrix6;
 
+use super::RIGID_COMPLIANCE;
+use super::settings::SpookPreset;
 use super::solve::{Sigma, Symmetric};
-use super::{RIGID_COMPLIANCE, SpookPreset};
 use crate::arm::FlexibleArm;
 
 /// Compliance of the rows of a joint.

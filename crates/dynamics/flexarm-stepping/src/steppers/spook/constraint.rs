@@ -25,7 +25,7 @@ use flexarm_kinematics::{AxisMotion, ElasticAngles, Pose, rotation_vector, skew}
 use flexarm_spatial::products::{mul, mul3, tr_mul, tr_mul3};
 use nalgebra::{Matrix3, Vector3, Vector6};
 
-use super::ConstraintForm;
+use super::settings::ConstraintForm;
 use super::solve::{Jacobian, Triangle, joined};
 
 /// Constraint rows of one joint.

@@ -18,16 +18,16 @@
 //! and thus its own Σ and Υ.
 //!
 //! Frames: P, Q proximal and distal face of a joint, P = Q when undeformed. [`constraint`] contains
-//! the rows, [`solve`] the elimination, [`pins`] the closure of loops. Source: [Lacoursière 2007];
+//! the rows, [`solve`] the elimination, [`pins`] the closure of loops, [`observe`] what is measured. Source: [Lacoursière 2007];
 //! theory page, section 4.
 
 mod checks;
 mod compliance;
 mod constraint;
+mod observe;
 mod pins;
+mod settings;
 mod solve;
-
-use std::sync::Arc;
 
 use flexarm_kinematics::{
     BalancerPlace, Data, ElasticAngles, JointMotion, Model, PlacedBalancer, Pose, State, Twist, Wrench,
@@ -35,82 +35,24 @@ use flexarm_kinematics::{
 };
 use flexarm_spatial::products::{mul, sub, turn_symmetric};
 use flexarm_spatial::{composed, quaternion};
-use nalgebra::{DVector, Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{DVector, Matrix3, UnitQuaternion, Vector3, Vector6};
 
 use crate::arm::FlexibleArm;
 use crate::error::StepError;
 use crate::events::{EventQueue, SAME_TIME};
 use crate::observation::Observation;
 use crate::stepper::{Counts, LARGEST_DEFLECTION, Stepper};
-use crate::steppers::{Method, StepRule, StepperEntry, StepperKind, StepperSetting};
 use checks::{check_ends, check_known};
 use compliance::{JointCompliance, joint_compliance, rigid_upsilon};
 use constraint::Rows;
 use pins::Pins;
 use solve::{Sigma, Symmetric, TreeSolver, joined};
 
-pub(super) static ENTRY: StepperEntry = StepperEntry {
-    name: "spook",
-    aliases: &[],
-    help: "Bodies with compliant constraints, first order; lumped links without motors",
-    steps: StepRule::AnyLength,
-    default_step_s: 1e-4,
-    order: 1,
-    maximal: true,
-    allocates: false,
-    with: |options| StepperKind::Spook(options.spook),
-};
+pub(super) use settings::ENTRY;
+pub use settings::{ConstraintForm, SpookPreset, SpookSettings};
 
 /// Compliance of a rigid joint (m/N, rad/(N m)): 1e4 N displace it by 1e-13 m.
 const RIGID_COMPLIANCE: f64 = 1e-17;
-
-/// Axes in which the relative motion of an elastic joint is measured.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub enum ConstraintForm {
-    /// In the proximal frame, with the exact Jacobian; the stiffness is constant.
-    #[default]
-    Local,
-    /// In world axes, with the stiffness rotated along; equal to the local form to first order in
-    /// the deflection.
-    Global,
-}
-
-/// Relation of Σ and Υ to the damping time.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub enum SpookPreset {
-    /// `Υ = 1/(1 + 4 τ/h)` with the physical damping time of each elastic joint; τ = 2h for rigid
-    /// joints.
-    #[default]
-    Exact,
-    /// Choice of the thesis: τ = 2h everywhere and `1 + 4 τ/h ≈ 4 τ/h`, so Υ = 1/8 and Σ = K^-1/(2
-    /// h²).
-    Source,
-}
-
-/// Settings of SPOOK.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub struct SpookSettings {
-    /// Local or global constraint form.
-    pub form: ConstraintForm,
-    /// Exact or source preset.
-    pub preset: SpookPreset,
-}
-
-impl Method for SpookSettings {
-    fn entry(&self) -> &'static StepperEntry {
-        &ENTRY
-    }
-
-    fn settings(&self) -> Vec<(&'static str, StepperSetting)> {
-        let form = if self.form == ConstraintForm::Local { "local" } else { "global" };
-        let preset = if self.preset == SpookPreset::Exact { "exact" } else { "source" };
-        vec![("form", StepperSetting::Word(form)), ("preset", StepperSetting::Word(preset))]
-    }
-
-    fn start(&self, arm: Arc<FlexibleArm>, h: f64, e: &DVector<f64>) -> Result<Box<dyn Stepper>, StepError> {
-        Ok(Box::new(Spook::new(Arc::unwrap_or_clone(arm), h, *self, e)?))
-    }
-}
 
 /// A body of the tree in maximal coordinates.
 #[derive(Clone, Debug)]
@@ -331,77 +273,6 @@ impl Stepper for Spook {
 }
 
 impl Spook {
-    /// Writes the poses of the bodies; returns their kinetic and gravitational energy (J).
-    fn observe_bodies(&self, out: &mut Observation) -> (f64, f64) {
-        let (mut kinetic, mut potential) = (0.0, 0.0);
-        for (i, state) in self.bodies.iter().enumerate() {
-            out.X_WB[i] = state.X_WB();
-            let w = state.R.inverse() * state.V.angular;
-            kinetic += 0.5 * (state.mass * state.V.linear.norm_squared() + w.dot(&(state.J * w)));
-            potential -= state.mass * self.arm.model.gravity.dot(&state.x);
-        }
-        (kinetic, potential)
-    }
-
-    /// Writes the drive force of the joint of body i, or the coordinates of its spring with rates
-    /// and load. `force`: force of the joint on the body, in its rows.
-    fn observe_joint(&self, i: usize, force: Vector6<f64>, out: &mut Observation) {
-        let body = &self.arm.model.bodies()[i];
-        let element = || self.arm.elements.iter().position(|element| element.body == i);
-        match body.motion {
-            JointMotion::Axis(motion) if body.elastic => {
-                let (g, rate) = self.deflection_now(i, Default::default());
-                let (e, rate) = (motion.coordinate_of(&g), motion.coordinate_of(&rate));
-                out.q[body.coordinate] = e;
-                out.qdot[body.coordinate] = rate;
-                if let Some(k) = element() {
-                    out.load[k] = Vector6::zeros();
-                    out.load[k][0] = -self.arm.elements[k].K[(0, 0)] * (e + rate * self.arm.tau[k]);
-                }
-            }
-            JointMotion::Axis(_) if body.coordinate < out.drive.len() => {
-                out.drive[body.coordinate] = self.rows[i].S.dot(&force);
-            }
-            JointMotion::Axis(_) => {}
-            JointMotion::Interface { .. } | JointMotion::Welded => {}
-            JointMotion::Elastic(angles) => {
-                let (g, rate) = self.deflection_now(i, angles);
-                out.q.fixed_rows_mut::<6>(body.coordinate).copy_from(&g);
-                out.qdot.fixed_rows_mut::<6>(body.coordinate).copy_from(&rate);
-                if let Some(k) = element() {
-                    let K = Matrix6::from_column_slice(self.arm.elements[k].K.as_slice());
-                    out.load[k] = -(K * (g + rate * self.arm.tau[k]));
-                }
-            }
-        }
-    }
-
-    /// Returns the power of dampers and friction (W) at all rates `qdot`.
-    fn damping_power(&self, qdot: &DVector<f64>) -> f64 {
-        let mut damping = 0.0;
-        for (k, element) in self.arm.elements.iter().enumerate() {
-            let rate = qdot.rows(element.coordinate, element.size);
-            damping += self.arm.tau[k] * rate.dot(&(&element.K * rate));
-        }
-        for (k, rate) in self.now.qdot.iter().enumerate() {
-            damping += self.arm.friction_torque(k, *rate) * rate;
-        }
-        damping
-    }
-
-    /// Returns the power of the external loads (W).
-    fn load_power(&self) -> f64 {
-        let mut power = 0.0;
-        for load in &self.arm.loads {
-            let body = &self.bodies[load.body];
-            let X = body.X_WB();
-            let F = load.on_body(self.events.side(self.t), &X);
-            let v = body.V.linear - body.V.angular.cross(&(X.rotation * body.com));
-            power += v.dot(&(X.rotation * F.force)) + body.V.angular.dot(&(X.rotation * F.torque));
-        }
-        power
-    }
-
     /// Returns the relative displacement of the two faces of the joint of body i and its rate at
     /// the current poses, in the local form.
     fn deflection_now(&self, i: usize, angles: ElasticAngles) -> (Vector6<f64>, Vector6<f64>) {

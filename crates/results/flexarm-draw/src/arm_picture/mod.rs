@@ -8,33 +8,28 @@
 //! in their text, and at [`arm_png`] for a self-explanatory picture; [`arm_sheet`] shows both sides
 //! next to each other under a heading.
 
-use flexarm_spatial::Pose;
-use nalgebra::{Matrix2x3, Matrix3, Point3, SymmetricEigen, Vector3};
+mod ellipsoid;
+mod legend;
+mod skin;
+
+use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
-use crate::mesh_picture::draw::{Align, Style, text_width};
+use crate::Magnifier;
+use crate::mesh_picture::draw::{Align, Style};
 use crate::mesh_picture::scene::{Layer, Paint, Scene};
 use crate::mesh_picture::{Image, Rgb, View, color};
-use crate::{BentMesh, Magnifier, stations_in_link};
-use flexarm_sample::{BendInfo, LinkMesh, RunHeader, Sample, TwinSample};
+use ellipsoid::Ellipsoid;
+use flexarm_sample::{RunHeader, Sample, TwinSample};
+use legend::{ARROW, GHOST, GHOST_FADE, legend, on_scale};
+use skin::{Skin, bodies, reach};
+
+pub use legend::arm_color;
 
 /// Width of a picture at which lines and text have their nominal size (pixels).
 const NOMINAL_WIDTH: f64 = 900.0;
-/// Colour of the rigid twin.
-const GHOST: Rgb = [196, 202, 212];
-/// Transparency of the rigid twin.
-const GHOST_FADE: f64 = 0.35;
 /// Outline of the rigid twin where the flexible arm covers it.
 const GHOST_LINE: Rgb = [70, 78, 92];
-/// Colour of the arrow at the TCP: vermilion, which is not on the colour scale.
-const ARROW: Rgb = [213, 60, 0];
-/// Radius of the rods drawn for links, as a share of the size of the arm.
-const ROD: f64 = 0.012;
-/// Position of zero on the scale of [`color::magnitude`]: shading is not visible on its darkest
-/// colours.
-const LOWEST: f64 = 0.16;
-/// Sides of a rod.
-const ROD_SIDES: u32 = 10;
 
 /// Reason why there is no picture of an arm.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -272,198 +267,6 @@ fn check(header: &RunHeader, sample: &Sample) -> Result<(), ArmPictureError> {
     Ok(())
 }
 
-/// Displacements of the TCP under a force of constant magnitude in all directions.
-struct Ellipsoid {
-    /// Map from the direction of the force to the drawn displacement (m).
-    map: Matrix3<f64>,
-    /// Principal axes: drawn displacement (m), compliance (m/N).
-    axes: [(Vector3<f64>, f64); 3],
-}
-
-/// Length of the longest half axis, as a share of the size of the arm.
-const ELLIPSOID: f64 = 0.13;
-/// Number of segments of the outline.
-const OUTLINE_PIECES: usize = 96;
-const ELLIPSOID_COLOR: Rgb = [126, 46, 132];
-
-impl Ellipsoid {
-    /// `None` for a rigid arm.
-    fn new(C: &Matrix3<f64>, size: f64) -> Option<Self> {
-        let eigen = SymmetricEigen::new(0.5 * (C + C.transpose()));
-        let largest = eigen.eigenvalues.amax();
-        if !(largest > 0.0 && largest.is_finite() && size > 0.0) {
-            return None;
-        }
-        let scale = ELLIPSOID * size / largest;
-        let axes = [0, 1, 2].map(|k| {
-            let value = eigen.eigenvalues[k];
-            (eigen.eigenvectors.column(k) * value * scale, value)
-        });
-        Some(Self { map: scale * C, axes })
-    }
-
-    /// Ends of the axes about a position.
-    fn corners(&self, at: &Vector3<f64>) -> Vec<Vector3<f64>> {
-        self.axes.iter().flat_map(|(axis, _)| [at + axis, at - axis]).collect()
-    }
-
-    /// Draws the outline, which is an ellipse, and the axes with their values.
-    fn draw(&self, image: &mut Image, view: &View, unit: f64, at: &Vector3<f64>) {
-        let point = |p: &Vector3<f64>| {
-            let [x, y, _] = view.project(p);
-            [x, y]
-        };
-        // The outline is the image of unit forces in the picture plane: with P the projection onto
-        // the plane, its half axes are the eigenvectors of P C Cᵀ Pᵀ, their squared lengths the
-        // eigenvalues.
-        let P = Matrix2x3::from_rows(&[view.right.transpose(), view.up.transpose()]);
-        let A = P * self.map;
-        let eigen = SymmetricEigen::new(A * A.transpose());
-        let half = [0, 1].map(|k| P.transpose() * eigen.eigenvectors.column(k) * eigen.eigenvalues[k].max(0.0).sqrt());
-        let place = |k: usize| {
-            let (sin, cos) = (std::f64::consts::TAU * k as f64 / OUTLINE_PIECES as f64).sin_cos();
-            point(&(at + half[0] * cos + half[1] * sin))
-        };
-        for k in 0..OUTLINE_PIECES {
-            image.line(place(k), place(k + 1), 2.2 * unit, ELLIPSOID_COLOR, 0.9);
-        }
-        for (axis, value) in &self.axes {
-            let ends = [at - axis, at + axis].map(|p| point(&p));
-            image.line(ends[0], ends[1], 1.4 * unit, ELLIPSOID_COLOR, 0.8);
-            let length = (ends[1][0] - ends[0][0]).hypot(ends[1][1] - ends[0][1]);
-            // An axis that points at the viewer has no label.
-            if length > 44.0 * unit {
-                let right = usize::from(ends[1][0] > ends[0][0]);
-                let [x, y] = ends[right];
-                let style = Style::new(14.0 * unit, ELLIPSOID_COLOR).bold().halo(color::PAPER);
-                let text = format!("{} µm/N", short(1e6 * value));
-                // Keep the text within the picture.
-                let most = image.width as f64 - text_width(&text, style) - 6.0 * unit;
-                image.text(&text, [(x + 5.0 * unit).min(most), y - 6.0 * unit], Align::Left, style);
-            }
-        }
-    }
-}
-
-/// Returns the colour on the arm for a share of the maximum deviation on the scale.
-#[must_use]
-pub fn arm_color(share: f64) -> Rgb {
-    color::magnitude(on_scale(share.clamp(0.0, 1.0)))
-}
-
-/// Position on the colour scale for a share of the maximum deviation.
-fn on_scale(share: f64) -> f64 {
-    LOWEST + (1.0 - LOWEST) * share
-}
-
-/// A surface attached to a link, deformed with it if the link is flexible.
-struct Body {
-    link: usize,
-    bent: Option<(BentMesh, usize, usize)>,
-    mesh: LinkMesh,
-}
-
-/// Returns the surfaces of the arm, cut for deformation; rods if there are none.
-fn bodies(header: &RunHeader, sample: &Sample) -> Vec<Body> {
-    let mut meshes = header.meshes.clone();
-    let size = reach(&sample.rigid);
-    if meshes.is_empty() {
-        for (child, info) in header.links.iter().enumerate() {
-            let Some(parent) = info.parent else { continue };
-            let X_PC = sample.rigid.X_WL[parent].inv_mul(&sample.rigid.X_WL[child]);
-            meshes.extend(rod(parent, &Vector3::zeros(), &X_PC.translation.vector, ROD * size));
-        }
-    }
-    if let Some(link) = header.links.iter().position(|link| link.name == header.tcp) {
-        let X_LT = sample.rigid.X_WL[link].inv_mul(&sample.rigid.X_WT);
-        meshes.extend(rod(link, &Vector3::zeros(), &X_LT.translation.vector, 0.5 * ROD * size));
-    }
-    let mut firsts = Vec::new();
-    let mut first = 0;
-    for bend in &header.bends {
-        firsts.push(first);
-        first += bend.X_LS.len();
-    }
-    let of = |mesh: LinkMesh| {
-        let found = header.bends.iter().zip(&firsts).find(|(bend, _)| bend.link == mesh.link);
-        let bent = found
-            .and_then(|(bend, first): (&BendInfo, _)| Some((BentMesh::new(&mesh, bend)?, *first, bend.X_LS.len())));
-        Body { link: mesh.link, bent, mesh }
-    };
-    meshes.into_iter().map(of).collect()
-}
-
-/// Maximum distance of a link from the base (m).
-fn reach(twin: &TwinSample) -> f64 {
-    let base = twin.X_WL[0].translation.vector;
-    let places = twin.X_WL.iter().chain([&twin.X_WT]);
-    places.map(|X| (X.translation.vector - base).norm()).fold(0.0, f64::max)
-}
-
-/// Creates a prism between two points of a link; `None` if they coincide.
-fn rod(link: usize, from: &Vector3<f64>, to: &Vector3<f64>, radius: f64) -> Option<LinkMesh> {
-    let along = (to - from).try_normalize(1e-6)?;
-    let y = along.cross(&Vector3::ith(along.iamin(), 1.0)).normalize();
-    let z = along.cross(&y);
-    let mut positions = Vec::new();
-    for end in [from, to] {
-        for k in 0..ROD_SIDES {
-            let (sin, cos) = (f64::from(k) / f64::from(ROD_SIDES) * std::f64::consts::TAU).sin_cos();
-            let p: Vector3<f64> = end + (y * cos + z * sin) * radius;
-            positions.push([p.x as f32, p.y as f32, p.z as f32]);
-        }
-    }
-    let n = ROD_SIDES;
-    let sides = (0..n).flat_map(|k| {
-        let next = (k + 1) % n;
-        [[k, next, n + next], [k, n + next, n + k]]
-    });
-    let caps = (2..n).flat_map(|k| [[0, k, k - 1], [n, n + k - 1, n + k]]);
-    let triangles = sides.chain(caps).collect();
-    Some(LinkMesh { link, name: "rod".into(), positions, normals: Vec::new(), triangles, color: [0.7; 4], file: None })
-}
-
-/// A set of triangles in the world.
-#[derive(Default)]
-struct Skin {
-    positions: Vec<Vector3<f64>>,
-    triangles: Vec<[u32; 3]>,
-}
-
-impl Skin {
-    fn rigid(bodies: &[Body], twin: &TwinSample) -> Self {
-        let mut skin = Self::default();
-        for body in bodies {
-            let mesh = body.bent.as_ref().map_or(&body.mesh, |(bent, ..)| &bent.mesh);
-            skin.add(&twin.X_WL[body.link], mesh.positions.iter().copied(), &mesh.triangles);
-        }
-        skin
-    }
-
-    fn bent(bodies: &[Body], header: &RunHeader, twin: &TwinSample) -> Self {
-        let mut skin = Self::default();
-        let stations: usize = header.bends.iter().map(|bend| bend.X_LS.len()).sum();
-        for body in bodies {
-            let X_WL = &twin.X_WL[body.link];
-            match &body.bent {
-                Some((bent, first, count)) if twin.X_WS.len() == stations => {
-                    let moved = stations_in_link(twin, body.link, *first, *count);
-                    skin.add(X_WL, bent.positions(&moved), &bent.mesh.triangles);
-                }
-                Some((bent, ..)) => skin.add(X_WL, bent.mesh.positions.iter().copied(), &bent.mesh.triangles),
-                None => skin.add(X_WL, body.mesh.positions.iter().copied(), &body.mesh.triangles),
-            }
-        }
-        skin
-    }
-
-    fn add(&mut self, X_WL: &Pose, positions: impl Iterator<Item = [f32; 3]>, triangles: &[[u32; 3]]) {
-        let first = self.positions.len() as u32;
-        self.positions.extend(positions.map(|p| (X_WL * Point3::from(Vector3::from(p.map(f64::from)))).coords));
-        self.triangles.extend(triangles.iter().map(|t| t.map(|v| first + v)));
-    }
-}
-
 /// Returns the directions towards the viewer and to the right. The plane of the arm is the vertical
 /// plane through base and tool.
 fn directions(side: ArmSide, rigid: &TwinSample) -> (Vector3<f64>, Vector3<f64>) {
@@ -488,62 +291,11 @@ fn arrow(image: &mut Image, view: &View, unit: f64, from: &Vector3<f64>, to: &Ve
     image.line(a, a, 5.5 * unit, color::INK, 1.0);
 }
 
-/// Draws axes, colour scale and caption at the bottom of the picture.
-fn legend(image: &mut Image, view: &View, unit: f64, header: &RunHeader, factor: f64) {
-    let (width, height) = (image.width as f64, image.height as f64);
-    let text = |size: f64| Style::new(size * unit, color::INK);
-    let origin = [44.0 * unit, height - 40.0 * unit];
-    let mut order = [0, 1, 2];
-    order.sort_by(|a, b| view.toward[*a].total_cmp(&view.toward[*b]));
-    for k in order {
-        let direction = [view.right[k], -view.up[k]];
-        // Skip an axis that points at the viewer.
-        if direction[0].hypot(direction[1]) < 0.15 {
-            continue;
-        }
-        let place = |length: f64| [0, 1].map(|i| origin[i] + length * unit * direction[i]);
-        image.arrow(origin, place(26.0), 1.8 * unit, color::axis(k));
-        let [x, y] = place(36.0);
-        let style = Style::new(14.0 * unit, color::axis(k)).bold();
-        image.text(["x", "y", "z"][k], [x, y + 5.0 * unit], Align::Middle, style);
-    }
-
-    let (bar, left, top) = (240.0 * unit, width - 286.0 * unit, height - 42.0 * unit);
-    let thick = 11.0 * unit;
-    for x in 0..bar as usize {
-        image.fill(left + x as f64, top, 1.0, thick, arm_color(x as f64 / (bar - 1.0)));
-    }
-    let scale = 1e3 * if header.color_scale_m > 0.0 { header.color_scale_m } else { 1.0 };
-    for place in [0.0, 0.5, 1.0] {
-        let x = left + place * (bar - 1.0);
-        image.line([x, top + thick], [x, top + thick + 4.0 * unit], unit, color::INK, 1.0);
-        image.text(&short(place * scale), [x, top + thick + 18.0 * unit], Align::Middle, text(15.0).bold());
-    }
-    image.text("deviation from the rigid arm, mm", [left, top - 7.0 * unit], Align::Left, text(13.0));
-
-    let (x, y) = (104.0 * unit, height - 24.0 * unit);
-    let bold = text(14.0).bold();
-    let first = format!("deflections magnified {} times", short(factor));
-    image.text(&first, [x, y - 20.0 * unit], Align::Left, bold);
-    let swatch = 12.0 * unit;
-    image.fill(x, y - swatch + unit, swatch, swatch, color::mix(GHOST, color::PAPER, GHOST_FADE));
-    image.text("rigid arm", [x + 1.5 * swatch, y], Align::Left, text(13.0));
-    let next = x + 1.5 * swatch + text_width("rigid arm", text(13.0)) + 1.6 * swatch;
-    image.arrow([next, y - 4.0 * unit], [next + 24.0 * unit, y - 4.0 * unit], 3.0 * unit, ARROW);
-    image.text("TCP error", [next + 32.0 * unit, y], Align::Left, text(13.0));
-}
-
-/// Formats a number without trailing zeros.
-fn short(x: f64) -> String {
-    let digits = if x == 0.0 { 0 } else { (2.0 - x.abs().log10().floor()).clamp(0.0, 9.0) as usize };
-    let text = format!("{x:.digits$}");
-    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use flexarm_sample::LinkInfo;
+    use flexarm_spatial::Pose;
     use nalgebra::{Rotation3, Translation3};
 
     /// An arm without surfaces: base, upright link, and a link along x, rotated so that the TCP
@@ -634,32 +386,6 @@ mod tests {
         // z is drawn upwards from every side.
         let [right, up] = picture.axes[2];
         assert!(right.abs() < 1e-9 && up > 0.5, "{:?}", picture.axes);
-    }
-
-    /// Truth: the points `C f` of the ellipsoid for unit forces; none is outside its outline, and
-    /// some touch it.
-    #[test]
-    fn the_outline_of_the_compliance_holds_what_every_force_does() {
-        let C = Matrix3::new(3.0, 0.4, -0.2, 0.4, 1.0, 0.3, -0.2, 0.3, 2.0) * 1e-6;
-        let ellipsoid = Ellipsoid::new(&C, 2.0).unwrap();
-        let (toward, right) = (Vector3::new(0.5, 0.6, 0.4), Vector3::new(0.6, -0.5, 0.0));
-        let view = View::fit(toward, right, ellipsoid.corners(&Vector3::zeros()).into_iter(), [0.0, 0.0, 100.0, 100.0]);
-        let P = Matrix2x3::from_rows(&[view.right.transpose(), view.up.transpose()]);
-        let A = P * ellipsoid.map;
-        let inverse = (A * A.transpose()).try_inverse().unwrap();
-        let mut largest = 0.0_f64;
-        for i in 0..60 {
-            for j in 0..60 {
-                let (theta, phi) = (0.0523 * f64::from(i), 0.1047 * f64::from(j));
-                let force = Vector3::new(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos());
-                let moved = P * (ellipsoid.map * force);
-                largest = largest.max((moved.transpose() * inverse * moved)[0]);
-            }
-        }
-        assert!((0.995..1.0 + 1e-12).contains(&largest), "{largest}"); // measured 0.9995
-        let longest = ellipsoid.axes.iter().map(|(axis, _)| axis.norm()).fold(0.0, f64::max);
-        assert!((longest - ELLIPSOID * 2.0).abs() < 1e-12);
-        assert!(Ellipsoid::new(&Matrix3::zeros(), 2.0).is_none());
     }
 
     #[test]

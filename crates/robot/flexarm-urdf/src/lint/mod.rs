@@ -24,17 +24,24 @@
 //!
 //! Not here: conclusions from the values ([`crate::raw`] and beyond).
 
-use std::fmt::Write as _;
+mod attribute;
+mod element;
+mod marks;
 
+use flexarm_settings::closest;
 use nalgebra::{Quaternion, UnitQuaternion};
 use roxmltree::Node;
 
 use crate::error::Problem;
 use crate::finding::TextPosition;
-use crate::read::Transmission;
 use crate::report::Report;
-use crate::xml::{Lines, escaped};
-use flexarm_settings::closest;
+use crate::transmission::transmission;
+use crate::xml::{Lines, elements, named};
+use attribute::Attribute;
+use attribute::Kind::{Bound, Name, Numbers, Text};
+use attribute::Missing::{As, Fault, LeftOut};
+
+pub(crate) use marks::{JointMarks, LinkMarks, OriginMark, PlainUrdf};
 
 /// Maximum number of links and joints of a robot; some checks compare every pair.
 const MOST_ELEMENTS: usize = 4000;
@@ -70,98 +77,6 @@ const JOINT_CHILDREN: [&str; 11] = [
     "physics",
     "hardwareInterface",
 ];
-
-/// Text for `urdf_rs`, and a mark for each of its links and joints, in the same order.
-pub(crate) struct PlainUrdf {
-    pub(crate) text: String,
-    pub(crate) place: TextPosition,
-    pub(crate) links: Vec<LinkMarks>,
-    pub(crate) joints: Vec<JointMarks>,
-    pub(crate) transmissions: Vec<Transmission>,
-}
-
-/// Marks of an element that may have an `<origin>`.
-pub(crate) struct OriginMark {
-    pub(crate) place: TextPosition,
-    /// Rotation of `<origin>` if it is not given by `rpy`: from a quaternion, or the identity if
-    /// there is no origin.
-    pub(crate) quaternion: Option<UnitQuaternion<f64>>,
-    /// Whether some part could not be read; disables further checks.
-    pub(crate) faulty: bool,
-}
-
-/// Elements of a link in the tree; `None` if an element does not exist.
-pub(crate) struct LinkMarks {
-    pub(crate) place: TextPosition,
-    pub(crate) inertial: Option<OriginMark>,
-    pub(crate) visuals: Vec<OriginMark>,
-    pub(crate) collisions: Vec<OriginMark>,
-}
-
-/// Elements of a joint in the tree; `None` if an element does not exist.
-pub(crate) struct JointMarks {
-    pub(crate) joint: OriginMark,
-    pub(crate) axis: Option<TextPosition>,
-    pub(crate) limit: Option<TextPosition>,
-    pub(crate) mimic: Option<TextPosition>,
-}
-
-/// Kind of value of an attribute.
-#[derive(Clone, Copy)]
-enum Kind {
-    Text,
-    /// Non-empty text.
-    Name,
-    /// The given number of finite numbers.
-    Numbers(usize),
-    /// A number that may be infinite.
-    Bound,
-}
-
-impl Kind {
-    /// Returns the numbers in a value, or `None` if the value is not of this kind.
-    fn numbers(self, value: &str) -> Option<Vec<f64>> {
-        let number = |word: &str| word.parse::<f64>().ok().filter(|x| x.is_finite());
-        match self {
-            Self::Text | Self::Name => Some(Vec::new()),
-            Self::Numbers(n) => {
-                value.split_whitespace().map(number).collect::<Option<Vec<f64>>>().filter(|v| v.len() == n)
-            }
-            Self::Bound => value.trim().parse().ok().filter(|x: &f64| !x.is_nan()).map(|x| vec![x]),
-        }
-    }
-
-    fn expected(self) -> &'static str {
-        match self {
-            Self::Text | Self::Name => "a name",
-            Self::Numbers(1) => "a finite number",
-            Self::Numbers(4) => "four numbers from 0 to 1",
-            Self::Numbers(_) => "three finite numbers",
-            Self::Bound => "a number",
-        }
-    }
-
-    /// Returns the replacement of a missing or wrong value.
-    fn zero(self) -> &'static str {
-        match self {
-            Self::Text | Self::Name => "",
-            Self::Numbers(n) => &"0 0 0 0"[..2 * n - 1],
-            Self::Bound => "0",
-        }
-    }
-}
-
-/// Consequence of a missing attribute.
-#[derive(Clone, Copy)]
-enum Missing {
-    Fault,
-    LeftOut,
-    As(&'static str),
-}
-use Kind::{Bound, Name, Numbers, Text};
-use Missing::{As, Fault, LeftOut};
-
-type Attribute = (&'static str, Kind, Missing);
 
 /// Reports the faults of everything below `<robot>`. Returns `None` if the root is another element,
 /// or there are too many links and joints.
@@ -386,145 +301,6 @@ impl Lint<'_, '_> {
         }
         None
     }
-
-    /// Writes the first child of this name and returns its place. A missing required child is
-    /// written with zeros.
-    fn child(
-        &mut self,
-        node: Node<'_, '_>,
-        name: &'static str,
-        must: bool,
-        attributes: &[Attribute],
-    ) -> Option<TextPosition> {
-        let found = if must { self.needed(node, name) } else { named(node, name) };
-        if let Some(child) = found {
-            self.element(child, &format!("{}, <{name}>", self.owner), attributes);
-        } else if must {
-            let zeros: Vec<_> = attributes.iter().map(|(name, kind, _)| (*name, kind.zero())).collect();
-            self.start(name, &zeros);
-            self.end(name);
-        }
-        found.map(|child| self.lines.of(child))
-    }
-
-    /// Writes an element with these attributes. Returns the numbers that could be read.
-    fn element(&mut self, node: Node<'_, '_>, owner: &str, attributes: &[Attribute]) -> Vec<f64> {
-        let (mut all, mut written) = (Vec::new(), Vec::new());
-        for &(attribute, kind, missing) in attributes {
-            let found = match missing {
-                Fault => self.required(node, owner, attribute, kind),
-                LeftOut | As(_) => node.attribute(attribute),
-            };
-            let value = match (found, missing) {
-                (Some(found), _) => match kind.numbers(found) {
-                    Some(numbers) => {
-                        all.extend(numbers);
-                        found
-                    }
-                    None => {
-                        let (owner, found, expected) = (owner.to_owned(), found.to_owned(), kind.expected());
-                        let problem = Problem::NotANumber { owner, attribute, found, expected };
-                        self.report.error(&self.lines.of(node), problem);
-                        kind.zero()
-                    }
-                },
-                (None, LeftOut) => continue,
-                (None, As(value)) => value,
-                (None, Fault) => kind.zero(),
-            };
-            written.push((attribute, value));
-        }
-        self.start(node.tag_name().name(), &written);
-        self.end(node.tag_name().name());
-        all
-    }
-
-    fn start(&mut self, element: &str, attributes: &[(&str, &str)]) {
-        let _ = write!(self.text, "<{element}");
-        for (name, value) in attributes {
-            let _ = write!(self.text, " {name}=\"{}\"", escaped(value, true));
-        }
-        self.text.push('>');
-    }
-
-    fn end(&mut self, element: &str) {
-        let _ = write!(self.text, "</{element}>");
-    }
-
-    /// Returns the name of a link or joint and sets it as the owner in later messages.
-    fn name<'n>(&mut self, node: Node<'n, '_>) -> Option<&'n str> {
-        let tag = node.tag_name().name();
-        let name = self.required(node, &format!("<{tag}>"), "name", Name)?;
-        self.owner = format!("{tag} {name:?}");
-        Some(name)
-    }
-
-    /// Returns the name of an element for messages about its children.
-    fn outer(&self, node: Node<'_, '_>) -> String {
-        match node.tag_name().name() {
-            "link" | "joint" => self.owner.clone(),
-            tag => format!("{}, <{tag}>", self.owner),
-        }
-    }
-
-    /// Returns a child element; reports a fault if it is missing.
-    fn needed<'n, 'i>(&mut self, node: Node<'n, 'i>, element: &'static str) -> Option<Node<'n, 'i>> {
-        let child = named(node, element);
-        if child.is_none() {
-            let owner = self.outer(node);
-            self.report.error(&self.lines.of(node), Problem::MissingElement { owner, element });
-        }
-        child
-    }
-
-    /// Returns an attribute; reports a fault if it is missing.
-    fn required<'n>(
-        &mut self,
-        node: Node<'n, '_>,
-        owner: &str,
-        attribute: &'static str,
-        kind: Kind,
-    ) -> Option<&'n str> {
-        let value = node.attribute(attribute).filter(|value| !matches!(kind, Name) || !value.trim().is_empty());
-        if value.is_none() {
-            let problem = Problem::MissingAttribute { owner: owner.to_owned(), attribute };
-            self.report.error(&self.lines.of(node), problem);
-        }
-        value
-    }
-
-    /// Warns about an element that is neither URDF nor a known extension, and thus probably
-    /// misspelt.
-    fn known_element(&mut self, node: Node<'_, '_>, known: &[&'static str]) {
-        let name = node.tag_name().name();
-        if node.tag_name().namespace().is_some() || known.contains(&name) {
-            return;
-        }
-        let help = match closest(name, known.iter().copied()) {
-            Some(meant) => format!("did you mean <{meant}>?"),
-            None => format!("remove it, or use one of {}", known.join(", ")),
-        };
-        let message = format!("{}: the element <{name}> is not URDF and is ignored", self.owner);
-        self.report.warning(&self.lines.of(node), "unknown-element", message, help);
-    }
-}
-
-fn transmission(node: Node<'_, '_>) -> Transmission {
-    let joints = elements(node).filter(|n| n.tag_name().name() == "joint");
-    let reduction = node.descendants().find(|n| n.tag_name().name() == "mechanicalReduction");
-    Transmission {
-        name: node.attribute("name").unwrap_or("").to_owned(),
-        joints: joints.filter_map(|j| j.attribute("name")).map(str::to_owned).collect(),
-        reduction: reduction.and_then(|r| r.text()).and_then(|t| t.trim().parse().ok()),
-    }
-}
-
-fn elements<'a, 'i>(node: Node<'a, 'i>) -> impl Iterator<Item = Node<'a, 'i>> {
-    node.children().filter(Node::is_element)
-}
-
-fn named<'a, 'i>(node: Node<'a, 'i>, name: &str) -> Option<Node<'a, 'i>> {
-    elements(node).find(|n| n.tag_name().name() == name)
 }
 
 #[cfg(test)]

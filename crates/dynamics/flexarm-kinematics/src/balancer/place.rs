@@ -1,0 +1,95 @@
+//! Placement of the balancers of a mechanism on the bodies of the tree.
+
+use std::collections::HashSet;
+
+use crate::balancer::placed::{BalancerPlace, PlacedBalancer};
+use crate::balancer::{Balancer, BalancerSpan};
+use crate::mechanism::Mechanism;
+use crate::model::{Body, Frame, JointMotion, ModelError};
+
+/// Places the balancers of a mechanism on its bodies.
+///
+/// # Errors
+/// [`ModelError::Duplicate`], [`ModelError::UnknownLink`] and [`ModelError::BadBalancer`].
+pub(crate) fn place_balancers(
+    mechanism: &Mechanism,
+    frames: &[Frame],
+    bodies: &[Body],
+    nv: usize,
+) -> Result<Vec<PlacedBalancer>, ModelError> {
+    let mut names = HashSet::new();
+    let mut placed = Vec::new();
+    for Balancer { name, span, law } in &mechanism.balancers {
+        if !names.insert(name) {
+            return Err(ModelError::Duplicate { what: "balancer", name: name.clone() });
+        }
+        if !law.is_finite() {
+            return Err(ModelError::NotFinite { what: "law of balancer", name: name.clone() });
+        }
+        let fail = |what: &'static str| ModelError::BadBalancer { balancer: name.clone(), what };
+        let frame =
+            |link: &String, what: &'static str| frames.iter().find(|f| f.name == *link).ok_or_else(|| fail(what));
+        let place = match span {
+            BalancerSpan::Points { from, to } => {
+                let ends = [frame(from, "the link at its first end")?, frame(to, "the link at its second end")?];
+                BalancerPlace::Points(ends.map(|f| (f.body, f.X_BF.translation.vector)))
+            }
+            BalancerSpan::Joint { joint, child } => {
+                let last = frame(child, "the link behind its joint")?.body;
+                let place = over_joint(bodies, joint, last).ok_or_else(|| fail("its joint"))?;
+                if matches!(&place, BalancerPlace::Joint { terms, .. } if terms.iter().any(|(k, _)| *k >= nv)) {
+                    return Err(ModelError::BadLoop {
+                        name: name.clone(),
+                        what: format!(
+                            "balancer {name:?} acts over joint {joint:?}, which follows from a loop: give its two ends (from, to) instead"
+                        ),
+                    });
+                }
+                place
+            }
+        };
+        placed.push(PlacedBalancer { name: name.clone(), law: law.clone(), place });
+    }
+    Ok(placed)
+}
+
+/// Sums over the bodies from `child` inward to that of the joint: each contributes its rotation (or
+/// translation) projected on the joint axis.
+fn over_joint(bodies: &[Body], joint: &str, child: usize) -> Option<BalancerPlace> {
+    let first = bodies.iter().skip(1).position(|b| b.joint == joint)? + 1;
+    let JointMotion::Axis(motion) = bodies[first].motion else { return None };
+    let (axis, slides) = (motion.axis(), motion.slides());
+    let (mut terms, mut offset) = (Vec::new(), 0.0);
+    let mut i = child;
+    loop {
+        let body = &bodies[i];
+        match body.motion {
+            JointMotion::Axis(motion) => {
+                let share = motion.axis().dot(&axis);
+                terms.push((body.coordinate, share * body.ratio));
+                offset += share * body.offset;
+            }
+            JointMotion::Elastic(_) => {
+                let k = body.coordinate + if slides { 0 } else { 3 };
+                terms.extend(axis.iter().enumerate().map(|(c, share)| (k + c, *share)));
+            }
+            JointMotion::Welded | JointMotion::Interface { .. } => return None,
+        }
+        if i == first {
+            break;
+        }
+        i = body.parent;
+        if i < first {
+            return None;
+        }
+    }
+    terms.retain(|(_, c)| *c != 0.0);
+    Some(BalancerPlace::Joint {
+        terms,
+        offset,
+        parent: bodies[first].parent,
+        body: first,
+        child,
+        axis: motion.twist(1.0),
+    })
+}

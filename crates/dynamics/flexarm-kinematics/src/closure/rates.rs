@@ -1,0 +1,92 @@
+//! Rates of the loops at given velocities: γ of equation (3) and the time derivative of T.
+
+use nalgebra::{Matrix2, Vector2, Vector3};
+
+use crate::closure::placed_loop::PlacedLoop;
+use crate::closure::workspace::{LoopRates, Solved};
+use crate::data::Data;
+use crate::kinematics::{joint_column_rates, joint_columns};
+use crate::model::Model;
+
+impl Solved {
+    /// (3) at the tree velocities `qdot`, and Ṫ if `with_T`.
+    pub(super) fn rates(&self, model: &Model, data: &Data, q: &[f64], qdot: &[f64], to: &mut LoopRates, with_T: bool) {
+        let nv = self.nv;
+        for (k, loop_) in model.loops.iter().enumerate() {
+            loop_.place_chains(model, data, &mut to.X);
+            loop_.move_chains(model, data, q, qdot, to);
+            let (J, Jdot) = (&self.J[k], &to.Jdot);
+            let minus = -self.inverse[k];
+            // J̇ q̇ over all coordinates, plus the γ of dependent joints of earlier loops.
+            let own = [loop_.first, loop_.first + 1];
+            let all = loop_.moved_by.iter().copied().chain(own);
+            let mut c = all.fold(Vector2::zeros(), |sum, j| sum + Jdot[j] * qdot[j]);
+            for &j in loop_.moved_by.iter().filter(|j| **j >= nv) {
+                c += J[j] * to.gamma[j - nv];
+            }
+            let gamma = minus * c;
+            let d = loop_.first - nv;
+            (to.gamma[d], to.gamma[d + 1]) = (gamma.x, gamma.y);
+            if with_T {
+                self.slope_rates(loop_, k, minus, to);
+            }
+        }
+    }
+
+    /// `Ṫ = -J_d^-1 (J̇ + J̇_d T)`.
+    fn slope_rates(&self, loop_: &PlacedLoop, k: usize, minus: Matrix2<f64>, to: &mut LoopRates) {
+        let (nv, d) = (self.nv, loop_.first - self.nv);
+        let LoopRates { Jdot, Tdot, .. } = to;
+        let J = &self.J[k];
+        for i in 0..nv {
+            let mut c = Jdot[loop_.first] * self.T[d * nv + i] + Jdot[loop_.first + 1] * self.T[(d + 1) * nv + i];
+            for &j in &loop_.moved_by {
+                if j == i {
+                    c += Jdot[j];
+                } else if j >= nv {
+                    let at = (j - nv) * nv + i;
+                    c += Jdot[j] * self.T[at] + J[j] * Tdot[at];
+                }
+            }
+            let rate = minus * c;
+            Tdot[d * nv + i] = rate.x;
+            Tdot[(d + 1) * nv + i] = rate.y;
+        }
+    }
+}
+
+impl PlacedLoop {
+    /// Velocities in the axes of the common body, and the time derivative of the Jacobian.
+    fn move_chains(&self, model: &Model, data: &Data, q: &[f64], qdot: &[f64], to: &mut LoopRates) {
+        let LoopRates { X, v, w, Jdot, .. } = to;
+        (v[self.common], w[self.common]) = (Vector3::zeros(), Vector3::zeros());
+        // Velocities of the bodies, from the common body outward.
+        for &i in self.chains.iter().flatten() {
+            let parent = model.bodies[i].parent;
+            let arm = X[i].translation.vector - X[parent].translation.vector;
+            let (mut v_i, mut w_i) = (v[parent] + w[parent].cross(&arm), w[parent]);
+            joint_columns(model, data, i, X[i].rotation.matrix(), |k, l, a| {
+                v_i += l * qdot[k];
+                w_i += a * qdot[k];
+            });
+            (v[i], w[i]) = (v_i, w_i);
+        }
+        // Columns of J̇ in A axes: d/dt (l + a × r) - w_A × (l + a × r).
+        let (A, p_B) = self.ends_at(X);
+        let [a, b] = self.ends;
+        let v_B = v[b] + w[b].cross(&(p_B - X[b].translation.vector));
+        let (R_A, w_A) = (A.rotation.inverse(), w[a]);
+        Jdot.fill(Vector2::zeros());
+        for (chain, sign) in self.chains.iter().zip([-1.0, 1.0]) {
+            for &i in chain {
+                let (r, rdot) = (p_B - X[i].translation.vector, v_B - v[i]);
+                let R = X[i].rotation.matrix();
+                joint_column_rates(model, data, i, R, &w[i], q, qdot, |k, [l, a, ldot, adot]| {
+                    let column = l + a.cross(&r);
+                    let rate = ldot + adot.cross(&r) + a.cross(&rdot) - w_A.cross(&column);
+                    Jdot[k] += (R_A * rate).xy() * sign;
+                });
+            }
+        }
+    }
+}

@@ -1,0 +1,127 @@
+//! Generalised forces beside those of the tree: springs, dampers, friction, gears, controller.
+
+use nalgebra::DVector;
+
+use crate::dense::{Loops, add_product, quickly};
+use crate::gear::{GearState, LoadFriction};
+use crate::geometric::add_geometric_forces;
+use crate::reduced::ReducedArm;
+
+impl ReducedArm {
+    /// Adds springs, dampers, friction and controller: `f += K x + D v + friction - τ`.
+    pub(super) fn add_forces(&mut self, x: &DVector<f64>, v: &DVector<f64>, f: &mut DVector<f64>) {
+        let driven = self.arm.torque_driven.len();
+        if self.gears.is_some() {
+            return self.add_gear_forces(x, v, f);
+        }
+        for (i, &k) in self.arm.torque_driven.iter().enumerate() {
+            f[i] += self.arm.friction_torque(k, v[i]);
+            f[i] -= self.servo.as_ref().map_or(0.0, |s| s.torque[i]);
+        }
+        let (x, v, f) = (&x.as_slice()[driven..], &v.as_slice()[driven..], &mut f.as_mut_slice()[driven..]);
+        for (k, element) in self.arm.elements.iter().enumerate() {
+            let first = self.arm.offset(element);
+            let range = first..first + element.size;
+            if self.arm.proportional && element.curve.is_none() {
+                quickly(Damped {
+                    K: element.K.as_slice(),
+                    tau: self.arm.tau[k],
+                    x: &x[range.clone()],
+                    v: &v[range.clone()],
+                    y: &mut self.shifted.as_mut_slice()[..element.size],
+                    f: &mut f[range],
+                });
+            } else {
+                element.add_spring_force(&x[range.clone()], &[], &mut f[range.clone()]);
+                if self.arm.proportional {
+                    f[first] += self.arm.tau[k] * element.K[(0, 0)] * v[first];
+                }
+            }
+        }
+        if !self.arm.proportional {
+            self.arm.add_damping(v, f);
+        }
+    }
+
+    /// Works as [`ReducedArm::add_forces`] for arms with gear effects other than elasticity, at the
+    /// state set before.
+    #[cold]
+    fn add_gear_forces(&mut self, x: &DVector<f64>, v: &DVector<f64>, f: &mut DVector<f64>) {
+        let Self { arm, gears: Some(gears), state, servo, tau, .. } = self else { return };
+        let driven = arm.torque_driven.len();
+        let (q, qdot) = (state.q.as_slice(), state.qdot.as_slice());
+        gears.update(arm, q, qdot, &x.as_slice()[driven..], &v.as_slice()[driven..]);
+        f.rows_mut(driven, gears.F.len()).axpy(1.0, &gears.F, 1.0);
+        if driven == 0 {
+            return;
+        }
+        // Motors: transmission error and friction minus the torque of the controller.
+        let GearState { F, friction, .. } = &mut **gears;
+        let load = |k: Option<usize>| k.map_or(0.0, |k| F[arm.offset(&arm.elements[k])]);
+        arm.friction_torques(qdot, |law| load(law.element), friction);
+        let motors = &mut tau.as_mut_slice()[..friction.len()];
+        motors.copy_from_slice(friction);
+        arm.add_motor_forces(q, F.as_slice(), motors);
+        for (i, &k) in arm.torque_driven.iter().enumerate() {
+            f[i] += motors[k] - servo.as_ref().map_or(0.0, |s| s.torque[i]);
+        }
+    }
+
+    /// Adds the torques of transmission errors and friction to the actuated joints in `data.tau`,
+    /// at the state set before.
+    #[cold]
+    fn add_gear_torques(&mut self, x: &DVector<f64>, v: &DVector<f64>) {
+        let Self { arm, gears: Some(gears), state, data, qddot, .. } = self else { return };
+        let (n, driven) = (arm.model.n_actuated(), arm.torque_driven.len());
+        let (q, qdot) = (state.q.as_slice(), state.qdot.as_slice());
+        gears.update(arm, q, qdot, &x.as_slice()[driven..], &v.as_slice()[driven..]);
+        let GearState { F, friction, .. } = &mut **gears;
+        let tau = &mut data.tau.as_mut_slice()[..n];
+        let rotor = |k: usize| arm.model.rotor_inertia(k) * qddot[k];
+        let load = |law: &LoadFriction| match law.element {
+            Some(k) => F[arm.offset(&arm.elements[k])],
+            // A rigid gear transmits the torque of the joint without the share of its own rotor.
+            None => tau[law.coordinate] - rotor(law.coordinate),
+        };
+        arm.friction_torques(qdot, load, friction);
+        arm.add_motor_forces(q, F.as_slice(), tau);
+        tau.iter_mut().zip(friction).for_each(|(tau, friction)| *tau += *friction);
+    }
+
+    pub(super) fn add_geometric_forces(&self, x: &DVector<f64>, f: &mut DVector<f64>) {
+        let driven = self.arm.torque_driven.len();
+        add_geometric_forces(&self.arm, &self.data, &x.as_slice()[driven..], &mut f.as_mut_slice()[driven..]);
+    }
+
+    /// Adds friction and gear torques to the actuated joints in `data.tau`, at the state set
+    /// before.
+    pub(super) fn add_joint_torques(&mut self, x: &DVector<f64>, v: &DVector<f64>) {
+        if self.gears.is_some() {
+            return self.add_gear_torques(x, v);
+        }
+        for k in 0..self.arm.model.n_actuated() {
+            self.data.tau[k] += self.arm.friction_torque(k, self.state.qdot[k]);
+        }
+    }
+}
+
+/// `f += K (x + tau v)` of a spring; `y` is workspace.
+struct Damped<'a> {
+    K: &'a [f64],
+    tau: f64,
+    x: &'a [f64],
+    v: &'a [f64],
+    y: &'a mut [f64],
+    f: &'a mut [f64],
+}
+
+impl Loops for Damped<'_> {
+    #[inline(always)]
+    fn run(self) {
+        let Self { K, tau, x, v, y, f } = self;
+        for ((y, x), v) in y.iter_mut().zip(x).zip(v) {
+            *y = x + tau * v;
+        }
+        add_product(K, y, f);
+    }
+}

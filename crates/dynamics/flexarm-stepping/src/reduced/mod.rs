@@ -1,0 +1,264 @@
+//! Flexible arm in reduced coordinates: elastic coordinates and joints driven by torque are free,
+//! all other joints are prescribed.
+//!
+//! ```text
+//! M_ff ẍ + h_f(q, q̇, [q̈_p, 0]) + K x + D ẋ + friction(ẋ) = τ
+//! ```
+//! The residual is one Newton-Euler pass, the acceleration one hybrid-dynamics pass. Mass matrix,
+//! damping and stiffness are dense in the free coordinates. Torques of a sampled controller are
+//! constant between its samples. Discrete events are in `events`. The residual and
+//! the matrices are in `system`. Not here: integration.
+
+mod events;
+mod forces;
+mod system;
+
+use std::sync::Arc;
+
+use flexarm_kinematics::{
+    Data, FreeForces, Motions, Observer, Pose, Roles, State, forward_kinematics, inverse_dynamics, kinetic_energy_of,
+    potential_energy_of, world_poses,
+};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+
+use crate::arm::FlexibleArm;
+use crate::elastic_tree::ElasticTree;
+use crate::error::StepError;
+use crate::events::{ArmDamping, EventQueue, damping_after_changes};
+use crate::gear::GearState;
+use crate::held_modes::HeldModes;
+use crate::servo::ServoState;
+use crate::workspaces::PooledWorkspace;
+use events::StepStart;
+
+pub(crate) use events::{IMPULSE_DEFECT, SLOW};
+
+/// A flexible arm as a second-order system; see the module documentation.
+#[derive(Clone)]
+pub struct ReducedArm {
+    pub(crate) arm: Arc<FlexibleArm>,
+    pub(crate) data: PooledWorkspace<Data>,
+    pub(crate) state: State,
+    pub(crate) qddot: DVector<f64>,
+    pub(crate) tau: DVector<f64>,
+    roles: Roles,
+    /// Free coordinates in the model's order.
+    pub(crate) free: Vec<usize>,
+    pub(crate) servo: Option<ServoState>,
+    pub(crate) events: EventQueue,
+    /// Damping after each change of inertia.
+    pub(crate) dampings: Vec<ArmDamping>,
+    /// Work done by the drives at jumps of prescribed velocities (J).
+    pub(crate) struck: f64,
+    geometric: bool,
+    pub(crate) sampled_at: f64,
+    pub(crate) step_start: StepStart,
+    /// Storage of the factor of `M_ff` at velocity jumps.
+    pub(crate) mass_factor: Option<Cholesky<f64, Dyn>>,
+    pub(crate) shifted: DVector<f64>,
+    /// Forces of the springs, or of load-dependent stiffness.
+    pub(crate) forces: DVector<f64>,
+    /// State of gear effects other than elasticity.
+    pub(crate) gears: Option<Box<GearState>>,
+    /// Tree of the elastic joints, if there are enough of them and they are damped by element.
+    tree: Option<ElasticTree>,
+    /// Modes that are eliminated first, if there are enough of them.
+    modes: Option<HeldModes>,
+    /// Equations of motion of the free coordinates only, if these suffice and the tree is
+    /// supported.
+    points: Option<PooledWorkspace<FreeForces>>,
+    /// Workspace with the poses of the last [`ReducedArm::set`]; `None` until they are computed.
+    poses: Option<PosesIn>,
+    /// Workspace of observations, if supported for this tree; created at the first observation.
+    observer: Option<Option<PooledWorkspace<Observer>>>,
+}
+
+/// Workspace of a [`ReducedArm`] that holds poses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum PosesIn {
+    /// `data`.
+    Data,
+    /// `points`, after a residual.
+    Points,
+}
+
+impl ReducedArm {
+    /// Creates the workspaces for the arm, reusing those of an earlier run if available.
+    pub fn new(arm: impl Into<Arc<FlexibleArm>>) -> Self {
+        let arm = arm.into();
+        let model = &arm.model;
+        let n = arm.n_free();
+        let driven = arm.torque_driven.clone();
+        let roles = Roles::new(model, |k| k < model.n_actuated() && !driven.contains(&k));
+        // Load-dependent stiffness needs the spatial accelerations of the full pass.
+        let geometric = arm.elements.iter().any(|e| e.geometric.is_some());
+        let points = if geometric { None } else { arm.lend_points(&roles) };
+        Self {
+            data: arm.lend_data(),
+            state: State::zeros(model),
+            qddot: DVector::zeros(model.nv()),
+            tau: DVector::zeros(model.nv()),
+            free: roles.free_coordinates().to_vec(),
+            roles,
+            servo: arm.servo.clone().map(|servo| ServoState::new(servo, &arm)),
+            events: EventQueue::of(&arm),
+            dampings: damping_after_changes(&arm),
+            struck: 0.0,
+            geometric,
+            sampled_at: f64::NAN,
+            step_start: StepStart::new(model.n_actuated()),
+            mass_factor: Cholesky::new(DMatrix::identity(n, n)),
+            shifted: DVector::zeros(n),
+            forces: DVector::zeros(n),
+            gears: GearState::of(&arm),
+            tree: ElasticTree::that_pays(&arm),
+            modes: HeldModes::that_pay(&arm),
+            points,
+            poses: None,
+            observer: None,
+            arm,
+        }
+    }
+
+    /// Returns the arm.
+    pub fn arm(&self) -> &FlexibleArm {
+        &self.arm
+    }
+
+    /// Returns free coordinates and rates at `t = 0`: driven joints at position and speed of their
+    /// reference, springs at `e`. A motion whose velocities jump at 0 starts from rest.
+    pub(crate) fn start(&mut self, e: &DVector<f64>) -> Result<(DVector<f64>, DVector<f64>), StepError> {
+        let (n, driven) = (self.arm.n_free(), self.arm.torque_driven.len());
+        let (mut x, mut v) = (DVector::zeros(n), DVector::zeros(n));
+        self.arm.prescribed_state(0.0, &mut self.state, &mut self.qddot);
+        for (i, &k) in self.arm.torque_driven.iter().enumerate() {
+            x[i] = self.state.q[k];
+            v[i] = self.state.qdot[k];
+        }
+        x.rows_mut(driven, e.len()).copy_from(e);
+        if let Some(gears) = &mut self.gears {
+            gears.begin(&self.arm, self.state.q.as_slice(), e.as_slice());
+        }
+        if self.servo.is_some() {
+            // Initialise the controller with the torques that keep the arm on its motion with the
+            // springs as they are.
+            let mut at_rest = DVector::zeros(n);
+            for (i, &k) in self.arm.torque_driven.iter().enumerate() {
+                at_rest[i] = self.qddot[k];
+            }
+            self.evaluate(0.0, &x, &v, &at_rest);
+            let tau = self.data.tau.clone();
+            if let Some(servo) = &mut self.servo {
+                servo.hold(&tau);
+            }
+        }
+        self.at_time(0.0, &x, &mut v)?;
+        Ok((x, v))
+    }
+
+    /// Writes the joint motion at `t` (sampled once per time) and the free coordinates into the
+    /// full state.
+    pub(crate) fn set(&mut self, t: f64, x: &DVector<f64>, v: &DVector<f64>) {
+        let t = self.events.side(t);
+        self.sample_joints(t);
+        self.poses = None;
+        let n = self.arm.model.n_actuated();
+        let driven = self.arm.torque_driven.len();
+        for (i, &k) in self.arm.torque_driven.iter().enumerate() {
+            self.state.q[k] = x[i];
+            self.state.qdot[k] = v[i];
+        }
+        self.state.q.as_mut_slice()[n..].copy_from_slice(&x.as_slice()[driven..]);
+        self.state.qdot.as_mut_slice()[n..].copy_from_slice(&v.as_slice()[driven..]);
+        if !self.arm.loads.is_empty() {
+            self.place();
+            self.arm.apply_loads(&mut self.data, t);
+        }
+    }
+
+    /// Checks that the loops of the arm close at the start.
+    ///
+    /// # Errors
+    /// [`StepError::OpenLoop`].
+    pub(crate) fn check_loops(&mut self, x: &DVector<f64>, v: &DVector<f64>) -> Result<(), StepError> {
+        if self.arm.model.loops().is_empty() {
+            return Ok(());
+        }
+        self.set(0.0, x, v);
+        self.place();
+        StepError::open_loop(&self.arm.model, &self.data, 0.0).map_or(Ok(()), Err)
+    }
+
+    /// Updates the workspaces after a change of the masses of the bodies.
+    pub(crate) fn weigh(&mut self) {
+        if let Some(points) = &mut self.points {
+            points.weigh(&*self.arm.model);
+            points.keep();
+        }
+        if let Some(Some(observer)) = &mut self.observer {
+            observer.weigh(&self.arm.model);
+            observer.keep();
+        }
+    }
+
+    /// Computes the poses of the state in `data` unless they are there.
+    fn place(&mut self) {
+        if self.poses != Some(PosesIn::Data) {
+            forward_kinematics(&self.arm.model, &mut self.data, &self.state.q);
+            self.poses.get_or_insert(PosesIn::Data);
+        }
+    }
+
+    fn set_accelerations(&mut self, a: &DVector<f64>) {
+        let (n, driven) = (self.arm.model.n_actuated(), self.arm.torque_driven.len());
+        for (i, &k) in self.arm.torque_driven.iter().enumerate() {
+            self.qddot[k] = a[i];
+        }
+        self.qddot.as_mut_slice()[n..].copy_from_slice(&a.as_slice()[driven..]);
+    }
+
+    /// Computes poses, twists and all generalised forces at `t`; those of the actuated joints are
+    /// the drive torques, friction included.
+    pub(crate) fn evaluate(&mut self, t: f64, x: &DVector<f64>, v: &DVector<f64>, a: &DVector<f64>) {
+        self.set(t, x, v);
+        self.set_accelerations(a);
+        self.poses = Some(PosesIn::Data);
+        inverse_dynamics(&self.arm.model, &mut self.data, &self.state, &self.qddot);
+        self.add_joint_torques(x, v);
+        world_poses(&self.arm.model, &mut self.data);
+    }
+
+    /// Works as [`ReducedArm::evaluate`] with the poses in `X_WB` and without twists; returns
+    /// kinetic energy and potential energy of gravity (J).
+    pub(crate) fn observe(
+        &mut self,
+        t: f64,
+        x: &DVector<f64>,
+        v: &DVector<f64>,
+        a: &DVector<f64>,
+        X_WB: &mut [Pose],
+    ) -> [f64; 2] {
+        let is_plain = self.points.is_some() && self.arm.loads.is_empty();
+        let make = || if is_plain { self.arm.lend_observer() } else { None };
+        let Some(mut observer) = self.observer.take().unwrap_or_else(make) else {
+            self.observer = Some(None);
+            self.evaluate(t, x, v, a);
+            X_WB.copy_from_slice(&self.data.X_WB);
+            return [kinetic_energy_of(&self.arm.model, &self.data), potential_energy_of(&self.arm.model, &self.data)];
+        };
+        self.set(t, x, v);
+        self.set_accelerations(a);
+        let Self { arm, data, state, qddot, .. } = self;
+        let motions = Motions { q: state.q.as_slice(), qdot: state.qdot.as_slice(), qddot: qddot.as_slice() };
+        let energies = observer.observe(&arm.model, motions, None, X_WB, data.tau.as_mut_slice());
+        self.observer = Some(Some(observer));
+        self.add_joint_torques(x, v);
+        energies
+    }
+
+    /// Returns the torques currently held by the controller, in the order of
+    /// [`FlexibleArm::torque_driven`]; empty without a controller.
+    pub(crate) fn held_torques(&self) -> &[f64] {
+        self.servo.as_ref().map_or(&[], |s| &s.torque)
+    }
+}

@@ -1,0 +1,227 @@
+//! Residual, acceleration and matrices of the arm as a second-order system.
+
+use flexarm_kinematics::{Motions, hybrid_dynamics, inverse_dynamics, mass_matrix_at_poses};
+use nalgebra::{Cholesky, DMatrix, DVector};
+
+use crate::error::StepError;
+use crate::held_modes::HeldModes;
+use crate::mode_matrix::ModeMatrices;
+use crate::reduced::{PosesIn, ReducedArm};
+use crate::system::SecondOrderSystem;
+use crate::tree_matrix::TreeMatrices;
+
+/// Maximum number of fixed-point passes for accelerations with load-dependent (geometric)
+/// stiffness.
+const GEOMETRIC_PASSES: usize = 12;
+
+impl SecondOrderSystem for ReducedArm {
+    fn dimension(&self) -> usize {
+        self.arm.n_free()
+    }
+
+    fn residual(&mut self, t: f64, x: &DVector<f64>, v: &DVector<f64>, a: &DVector<f64>, r: &mut DVector<f64>) {
+        self.set(t, x, v);
+        self.set_accelerations(a);
+        let Self { arm, data, state, qddot, points, .. } = self;
+        match points {
+            Some(points) => {
+                let motions = Motions { q: state.q.as_slice(), qdot: state.qdot.as_slice(), qddot: qddot.as_slice() };
+                let loads = (!arm.loads.is_empty()).then_some(data.F_ext.as_slice());
+                points.compute(motions, loads, r.as_mut_slice());
+                self.poses = Some(PosesIn::Points);
+            }
+            None => {
+                inverse_dynamics(&arm.model, data, state, qddot);
+                self.poses = Some(PosesIn::Data);
+                for (r, &k) in r.iter_mut().zip(&self.free) {
+                    *r = data.tau[k];
+                }
+            }
+        }
+        self.add_forces(x, v, r);
+        if self.geometric {
+            self.add_geometric_forces(x, r);
+        }
+    }
+
+    fn acceleration(
+        &mut self,
+        t: f64,
+        x: &DVector<f64>,
+        v: &DVector<f64>,
+        a: &mut DVector<f64>,
+    ) -> Result<(), StepError> {
+        self.set(t, x, v);
+        self.poses = Some(PosesIn::Data);
+        let mut forces = std::mem::replace(&mut self.forces, DVector::zeros(0));
+        for pass in 0..GEOMETRIC_PASSES {
+            forces.fill(0.0);
+            if pass > 0 {
+                self.add_geometric_forces(x, &mut forces);
+            }
+            self.add_forces(x, v, &mut forces);
+            for (&k, f) in self.free.iter().zip(forces.iter()) {
+                self.tau[k] = -f;
+            }
+            let Self { arm, data, state, roles, qddot, tau, .. } = self;
+            hybrid_dynamics(&arm.model, data, state, roles, qddot, tau);
+            let mut change = 0.0f64;
+            for (a, &k) in a.iter_mut().zip(&self.free) {
+                change = change.max((qddot[k] - *a).abs());
+                *a = qddot[k];
+            }
+            if !self.geometric || (pass > 0 && change <= 1e-13 * a.amax()) {
+                break;
+            }
+            // Update the loads for the accelerations just computed.
+            inverse_dynamics(&self.arm.model, &mut self.data, &self.state, &self.qddot);
+        }
+        self.forces = forces;
+        match a.iter().all(|a| a.is_finite()) {
+            true => Ok(()),
+            false => self.check_mass(t),
+        }
+    }
+
+    fn mass(&mut self, M: &mut DMatrix<f64>) {
+        if self.poses == Some(PosesIn::Points)
+            && let Some(points) = &mut self.points
+        {
+            return points.mass(M.as_mut_slice());
+        }
+        self.place();
+        mass_matrix_at_poses(&self.arm.model, &mut self.data);
+        for (column, &l) in self.free.iter().enumerate() {
+            for (row, &k) in self.free.iter().enumerate() {
+                M[(row, column)] = self.data.M[(k, l)];
+            }
+        }
+    }
+
+    fn damping_and_stiffness(&mut self, c_D: f64, c_K: f64, C: &mut DMatrix<f64>) {
+        let driven = self.arm.torque_driven.len();
+        C.as_mut_slice().fill(0.0);
+        // Friction of the joints driven by torque.
+        for (i, &k) in self.arm.torque_driven.iter().enumerate() {
+            // A negative friction slope (Stribeck) is dropped to keep the matrix positive definite.
+            C[(i, i)] = c_D * self.arm.friction.get(k).map_or(0.0, |f| f.slope(self.state.qdot[k]).max(0.0));
+        }
+        if let Some(gears) = &self.gears {
+            let rates = self.state.qdot.as_slice();
+            for (i, &row) in self.arm.torque_driven.iter().enumerate() {
+                for (j, &column) in self.arm.torque_driven.iter().enumerate() {
+                    C[(i, j)] = c_D * self.arm.friction_slope(row, column, rates, gears);
+                }
+            }
+        }
+        // Springs, including their dampers if these are proportional.
+        for (k, element) in self.arm.elements.iter().enumerate() {
+            let (first, size) = (driven + self.arm.offset(element), element.size);
+            let damping = if self.arm.proportional { c_D * self.arm.tau[k] } else { 0.0 };
+            if let Some(curve) = &element.curve {
+                let slope = match &self.gears {
+                    Some(gears) => gears.slope(&self.arm, k, element, curve),
+                    None => curve.slope(self.state.q[element.coordinate], self.state.q.as_slice()),
+                };
+                C[(first, first)] += c_K * slope + damping * element.K[(0, 0)];
+            } else {
+                let mut block = C.view_mut((first, first), (size, size));
+                block.zip_apply(&element.K, |c, k| *c += (c_K + damping) * k);
+            }
+        }
+        for &(i, j, k) in &self.arm.cross_stiffness {
+            C[(driven + i, driven + j)] += c_K * k;
+            C[(driven + j, driven + i)] += c_K * k;
+        }
+        // Otherwise the damping couples the elements.
+        if !self.arm.proportional {
+            let ne = self.dimension() - driven;
+            C.view_mut((driven, driven), (ne, ne)).zip_apply(&self.arm.D, |s, d| *s += c_D * d);
+        }
+    }
+
+    fn stiffness(&mut self, K: &mut DMatrix<f64>) {
+        let driven = self.arm.torque_driven.len();
+        K.as_mut_slice().fill(0.0);
+        for element in &self.arm.elements {
+            let (first, size) = (driven + self.arm.offset(element), element.size);
+            K.view_mut((first, first), (size, size)).copy_from(&element.K);
+        }
+        for &(i, j, k) in &self.arm.cross_stiffness {
+            (K[(driven + i, driven + j)], K[(driven + j, driven + i)]) = (k, k);
+        }
+    }
+
+    fn settle(&mut self, t: f64, x: &DVector<f64>) {
+        if self.arm.hysteresis.is_empty() {
+            return;
+        }
+        self.sample_joints(t);
+        for (i, &k) in self.arm.torque_driven.iter().enumerate() {
+            self.state.q[k] = x[i];
+        }
+        if let Some(gears) = &mut self.gears {
+            gears.settle(&self.arm, self.state.q.as_slice(), &x.as_slice()[self.arm.torque_driven.len()..]);
+        }
+    }
+
+    fn along_tree(&mut self, c_D: f64, c_K: f64, to: &mut TreeMatrices) -> bool {
+        if self.tree.is_some() {
+            self.place();
+        }
+        let Some(tree) = &mut self.tree else { return false };
+        let placed = tree.place(&self.arm.model, &self.data, &self.state, &mut to.nodes);
+        if placed {
+            self.arm.blocks(c_D, c_K, to);
+        }
+        placed
+    }
+
+    fn with_modes(&mut self, c_D: f64, c_K: f64, to: &mut ModeMatrices) -> bool {
+        let Some(mut held) = self.modes.take() else { return false };
+        self.place();
+        mass_matrix_at_poses(&self.arm.model, &mut self.data);
+        self.damping_and_stiffness(c_D, c_K, &mut held.dense);
+        self.stiffness(&mut held.K);
+        let HeldModes { others, modes, dense: C, K } = &held;
+        let (nb, free, M) = (others.len(), &self.free, &self.data.M);
+        if to.mass.nrows() != nb || to.modes.len() != modes.len() {
+            let zero = DMatrix::zeros(nb, nb);
+            (to.mass, to.C, to.K) = (zero.clone(), zero.clone(), zero);
+            to.coupling = DMatrix::zeros(nb, modes.len());
+            to.others.clone_from(others);
+            to.modes.clone_from(modes);
+        }
+        for (j, &column) in others.iter().enumerate() {
+            for (i, &row) in others.iter().enumerate() {
+                to.mass[(i, j)] = M[(free[row], free[column])];
+                to.C[(i, j)] = C[(row, column)];
+                to.K[(i, j)] = K[(row, column)];
+            }
+        }
+        to.own.clear();
+        for (j, &mode) in modes.iter().enumerate() {
+            for (i, &row) in others.iter().enumerate() {
+                to.coupling[(i, j)] = M[(free[row], free[mode])];
+            }
+            to.own.push([M[(free[mode], free[mode])], C[(mode, mode)], K[(mode, mode)]]);
+        }
+        self.modes = Some(held);
+        true
+    }
+}
+
+impl ReducedArm {
+    /// Checks that the mass matrix at the last coordinates is positive definite.
+    #[cold]
+    fn check_mass(&mut self, t: f64) -> Result<(), StepError> {
+        let n = self.dimension();
+        let mut M = DMatrix::zeros(n, n);
+        self.mass(&mut M);
+        let finite = M.iter().all(|m| m.is_finite());
+        match finite && Cholesky::new(M).is_none() {
+            true => Err(StepError::Singular { matrix: "mass matrix", t }),
+            false => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,71 @@
+//! Settings of SPOOK and its entry in the registry of steppers.
+
+use std::sync::Arc;
+
+use nalgebra::DVector;
+
+use crate::arm::FlexibleArm;
+use crate::error::StepError;
+use crate::stepper::Stepper;
+use crate::steppers::spook::Spook;
+use crate::steppers::{Method, StepRule, StepperEntry, StepperKind, StepperSetting};
+
+pub(in crate::steppers) static ENTRY: StepperEntry = StepperEntry {
+    name: "spook",
+    aliases: &[],
+    help: "Bodies with compliant constraints, first order; lumped links without motors",
+    steps: StepRule::AnyLength,
+    default_step_s: 1e-4,
+    order: 1,
+    maximal: true,
+    allocates: false,
+    with: |options| StepperKind::Spook(options.spook),
+};
+
+/// Axes in which the relative motion of an elastic joint is measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum ConstraintForm {
+    /// In the proximal frame, with the exact Jacobian; the stiffness is constant.
+    #[default]
+    Local,
+    /// In world axes, with the stiffness rotated along; equal to the local form to first order in
+    /// the deflection.
+    Global,
+}
+
+/// Relation of Σ and Υ to the damping time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum SpookPreset {
+    /// `Υ = 1/(1 + 4 τ/h)` with the physical damping time of each elastic joint; τ = 2h for rigid
+    /// joints.
+    #[default]
+    Exact,
+    /// Choice of the thesis: τ = 2h everywhere and `1 + 4 τ/h ≈ 4 τ/h`, so Υ = 1/8 and Σ = K^-1/(2
+    /// h²).
+    Source,
+}
+
+/// Settings of SPOOK.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub struct SpookSettings {
+    /// Local or global constraint form.
+    pub form: ConstraintForm,
+    /// Exact or source preset.
+    pub preset: SpookPreset,
+}
+
+impl Method for SpookSettings {
+    fn entry(&self) -> &'static StepperEntry {
+        &ENTRY
+    }
+
+    fn settings(&self) -> Vec<(&'static str, StepperSetting)> {
+        let form = if self.form == ConstraintForm::Local { "local" } else { "global" };
+        let preset = if self.preset == SpookPreset::Exact { "exact" } else { "source" };
+        vec![("form", StepperSetting::Word(form)), ("preset", StepperSetting::Word(preset))]
+    }
+
+    fn start(&self, arm: Arc<FlexibleArm>, h: f64, e: &DVector<f64>) -> Result<Box<dyn Stepper>, StepError> {
+        Ok(Box::new(Spook::new(Arc::unwrap_or_clone(arm), h, *self, e)?))
+    }
+}

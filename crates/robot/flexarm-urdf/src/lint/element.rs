@@ -1,0 +1,137 @@
+//! Single elements: their attributes, checked and written to the plain text.
+
+use std::fmt::Write as _;
+
+use flexarm_settings::closest;
+use roxmltree::Node;
+
+use crate::error::Problem;
+use crate::finding::TextPosition;
+use crate::lint::Lint;
+use crate::lint::attribute::Attribute;
+use crate::lint::attribute::Kind::{self, Name};
+use crate::lint::attribute::Missing::{As, Fault, LeftOut};
+use crate::xml::{escaped, named};
+
+impl Lint<'_, '_> {
+    /// Writes the first child of this name and returns its place. A missing required child is
+    /// written with zeros.
+    pub(super) fn child(
+        &mut self,
+        node: Node<'_, '_>,
+        name: &'static str,
+        must: bool,
+        attributes: &[Attribute],
+    ) -> Option<TextPosition> {
+        let found = if must { self.needed(node, name) } else { named(node, name) };
+        if let Some(child) = found {
+            self.element(child, &format!("{}, <{name}>", self.owner), attributes);
+        } else if must {
+            let zeros: Vec<_> = attributes.iter().map(|(name, kind, _)| (*name, kind.zero())).collect();
+            self.start(name, &zeros);
+            self.end(name);
+        }
+        found.map(|child| self.lines.of(child))
+    }
+
+    /// Writes an element with these attributes. Returns the numbers that could be read.
+    pub(super) fn element(&mut self, node: Node<'_, '_>, owner: &str, attributes: &[Attribute]) -> Vec<f64> {
+        let (mut all, mut written) = (Vec::new(), Vec::new());
+        for &(attribute, kind, missing) in attributes {
+            let found = match missing {
+                Fault => self.required(node, owner, attribute, kind),
+                LeftOut | As(_) => node.attribute(attribute),
+            };
+            let value = match (found, missing) {
+                (Some(found), _) => match kind.numbers(found) {
+                    Some(numbers) => {
+                        all.extend(numbers);
+                        found
+                    }
+                    None => {
+                        let (owner, found, expected) = (owner.to_owned(), found.to_owned(), kind.expected());
+                        let problem = Problem::NotANumber { owner, attribute, found, expected };
+                        self.report.error(&self.lines.of(node), problem);
+                        kind.zero()
+                    }
+                },
+                (None, LeftOut) => continue,
+                (None, As(value)) => value,
+                (None, Fault) => kind.zero(),
+            };
+            written.push((attribute, value));
+        }
+        self.start(node.tag_name().name(), &written);
+        self.end(node.tag_name().name());
+        all
+    }
+
+    pub(super) fn start(&mut self, element: &str, attributes: &[(&str, &str)]) {
+        let _ = write!(self.text, "<{element}");
+        for (name, value) in attributes {
+            let _ = write!(self.text, " {name}=\"{}\"", escaped(value, true));
+        }
+        self.text.push('>');
+    }
+
+    pub(super) fn end(&mut self, element: &str) {
+        let _ = write!(self.text, "</{element}>");
+    }
+
+    /// Returns the name of a link or joint and sets it as the owner in later messages.
+    pub(super) fn name<'n>(&mut self, node: Node<'n, '_>) -> Option<&'n str> {
+        let tag = node.tag_name().name();
+        let name = self.required(node, &format!("<{tag}>"), "name", Name)?;
+        self.owner = format!("{tag} {name:?}");
+        Some(name)
+    }
+
+    /// Returns the name of an element for messages about its children.
+    pub(super) fn outer(&self, node: Node<'_, '_>) -> String {
+        match node.tag_name().name() {
+            "link" | "joint" => self.owner.clone(),
+            tag => format!("{}, <{tag}>", self.owner),
+        }
+    }
+
+    /// Returns a child element; reports a fault if it is missing.
+    pub(super) fn needed<'n, 'i>(&mut self, node: Node<'n, 'i>, element: &'static str) -> Option<Node<'n, 'i>> {
+        let child = named(node, element);
+        if child.is_none() {
+            let owner = self.outer(node);
+            self.report.error(&self.lines.of(node), Problem::MissingElement { owner, element });
+        }
+        child
+    }
+
+    /// Returns an attribute; reports a fault if it is missing.
+    pub(super) fn required<'n>(
+        &mut self,
+        node: Node<'n, '_>,
+        owner: &str,
+        attribute: &'static str,
+        kind: Kind,
+    ) -> Option<&'n str> {
+        let value = node.attribute(attribute).filter(|value| !matches!(kind, Name) || !value.trim().is_empty());
+        if value.is_none() {
+            let problem = Problem::MissingAttribute { owner: owner.to_owned(), attribute };
+            self.report.error(&self.lines.of(node), problem);
+        }
+        value
+    }
+
+    /// Warns about an element that is neither URDF nor a known extension, and thus probably
+    /// misspelt.
+    pub(super) fn known_element(&mut self, node: Node<'_, '_>, known: &[&'static str]) {
+        let name = node.tag_name().name();
+        if node.tag_name().namespace().is_some() || known.contains(&name) {
+            return;
+        }
+        let help = match closest(name, known.iter().copied()) {
+            Some(meant) => format!("did you mean <{meant}>?"),
+            None => format!("remove it, or use one of {}", known.join(", ")),
+        };
+        let message = format!("{}: the element <{name}> is not URDF and is ignored", self.owner);
+        self.report.warning(&self.lines.of(node), "unknown-element", message, help);
+    }
+}
