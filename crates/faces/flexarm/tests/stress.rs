@@ -330,7 +330,7 @@ fn gauges_that_are_not_on_a_link_with_stress_are_refused_with_the_place() {
     }
     std::fs::remove_file(arm.folder.join("lower_arm.stress")).unwrap();
     let error = load(twice).unwrap_err().to_string();
-    assert!(error.contains("has no stress: of a mesh, reduce it again with --stress"), "{error}");
+    assert!(error.contains("has no stress: of a mesh, reduce it again, with its stress"), "{error}");
 }
 
 #[test]

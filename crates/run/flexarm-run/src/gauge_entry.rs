@@ -136,7 +136,7 @@ fn place(
     };
     if !has_stress {
         return Err(fail(format!(
-            "link {:?} has no stress: of a mesh, reduce it again with --stress and keep the .stress file beside the .flex file; of a beam, \
+            "link {:?} has no stress: of a mesh, reduce it again, with its stress, and keep the .stress file beside the .flex file; of a beam, \
              set stress = true",
             link.get_ref()
         )));

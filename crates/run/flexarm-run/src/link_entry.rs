@@ -281,7 +281,7 @@ fn stress_source(
     match asked {
         None => Ok(None),
         Some(_) => Err(fail(format!(
-            "stress of link {name:?}: there is no file {}: reduce its mesh with --stress, or leave stress out",
+            "stress of link {name:?}: there is no file {}: reduce its mesh again, with its stress, or leave stress out",
             file.display()
         ))),
     }

@@ -21,8 +21,6 @@
 //! Meth. Eng.* 10.
 
 mod beam;
-#[cfg(test)]
-mod beam_tests;
 mod fields;
 mod file;
 mod gauge;

@@ -1,6 +1,8 @@
 //! Stress against closed forms and energies.
 #![allow(clippy::print_stderr, reason = "tables of measured errors, shown with --nocapture")]
 
+mod beam;
+
 use flexarm_spatial::Pose;
 use nalgebra::{DVector, Rotation3, Vector3};
 
@@ -18,15 +20,15 @@ use crate::sparse::ModesWanted;
 use crate::test_mesh::cube;
 
 /// Bar along x with its interfaces at both ends.
-pub(super) struct Bar {
-    pub(super) mesh: Mesh,
+struct Bar {
+    mesh: Mesh,
     interfaces: Vec<Interface>,
-    pub(super) material: Material,
+    material: Material,
     quadrature: Quadrature,
 }
 
 impl Bar {
-    pub(super) fn new(kind: ElementKind, divisions: [usize; 3], [l, w, h]: [f64; 3]) -> Self {
+    fn new(kind: ElementKind, divisions: [usize; 3], [l, w, h]: [f64; 3]) -> Self {
         let size = |u: Vector3<f64>| Vector3::new(u.x * l, (u.y - 0.5) * w, (u.z - 0.5) * h);
         let mesh = cube(kind, divisions, true, size);
         let near = |x: f64| -> Vec<u32> {
@@ -45,7 +47,7 @@ impl Bar {
     }
 
     /// Calls `work` with the reduced mesh and its modal link.
-    pub(super) fn reduced<R>(&self, modes: usize, work: impl FnOnce(&ModalSource<'_>) -> R) -> R {
+    fn reduced<R>(&self, modes: usize, work: impl FnOnce(&ModalSource<'_>) -> R) -> R {
         let options = AssemblyOptions { quadrature: self.quadrature, material: Some(self.material) };
         let model = FeModel::assemble(&self.mesh, &options).unwrap();
         let condensation = Condensation::new(&model, &self.interfaces, Default::default()).unwrap();

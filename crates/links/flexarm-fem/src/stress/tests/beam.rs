@@ -1,17 +1,16 @@
 //! Stress of beams against solid meshes, equilibrium and handbooks.
-#![allow(clippy::print_stderr, reason = "tables of measured errors, shown with --nocapture")]
 
 use flexarm_spatial::Pose;
 use nalgebra::{DVector, Rotation3, Vector3, Vector6};
 
-use super::tests::Bar;
-use super::*;
+use super::Bar;
 use crate::beam_link::BeamLink;
 use crate::material::Material;
 use crate::mesh::ElementKind;
 use crate::reduced::ElasticSplit;
 use crate::rigid_part::RigidPart;
 use crate::section::Section;
+use crate::stress::{StressFields, inertia_loads};
 
 /// Steel without lateral contraction, for which solids and beams agree.
 const PLAIN: Material = Material { nu: 0.0, ..Material::STEEL };
