@@ -41,6 +41,7 @@ mod guide_entry;
 mod headline;
 pub mod html_page;
 pub mod inspect;
+mod joint_values;
 mod link_entry;
 mod live;
 mod load_jumps;
