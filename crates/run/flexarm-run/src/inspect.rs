@@ -7,13 +7,12 @@ use flexarm_kinematics::{
     Coordinate, Data, Link, Mechanism, Model, State, forward_kinematics_velocity, frame_jacobian, gravity_forces,
     mass_matrix, nonlinear_effects,
 };
-use flexarm_settings::Quantity;
 use nalgebra::{DMatrix, Matrix6xX, UnitQuaternion};
 use serde::Serialize;
 
 use crate::balancer::{self, BalancerInfo};
 use crate::caveat::{self, Caveat, Use, of_use};
-use crate::error::{Error, PoseError, ValueError};
+use crate::error::Error;
 use crate::flexible::FlexibleRobot;
 use crate::loops::{self, LoopInfo};
 use crate::mounting::RobotMounting;
@@ -21,6 +20,8 @@ use crate::options::Modelling;
 use crate::posed::all_finite;
 use crate::robot::{Robot, tcp_frame};
 use crate::robot_link::RobotLink;
+
+pub use crate::joint_values::joint_values;
 
 /// Result of `flexarm inspect`. SI units; Jacobian at the TCP in world axes, linear rows first.
 #[derive(Clone, Debug, Serialize)]
@@ -177,25 +178,6 @@ fn finite(x: f64) -> Option<f64> {
 
 fn rows(M: &DMatrix<f64>) -> Vec<Vec<f64>> {
     M.row_iter().map(|r| r.iter().copied().collect()).collect()
-}
-
-/// Returns the values of all actuated joints; zeros by default.
-///
-/// # Errors
-/// [`Error::Pose`] for a wrong number of values, and for values that are not finite.
-pub fn joint_values(values: Option<&[f64]>, joints: &[&str]) -> Result<Vec<f64>, Error> {
-    let Some(values) = values else { return Ok(vec![0.0; joints.len()]) };
-    if values.len() != joints.len() {
-        let joints = joints.iter().map(|joint| (*joint).to_owned()).collect();
-        return Err(PoseError::Count { found: values.len(), joints }.into());
-    }
-    match values.iter().zip(joints).find(|(value, _)| !value.is_finite()) {
-        Some((value, joint)) => Err(PoseError::NotFinite { joint: (*joint).to_owned(), value: *value }.into()),
-        None => {
-            let named = |(value, joint): (&f64, &&str)| Quantity::JOINT.check(&format!("joint {joint:?}"), *value);
-            Ok(values.iter().zip(joints).map(named).collect::<Result<_, _>>().map_err(ValueError::from)?)
-        }
-    }
 }
 
 /// Inspects the rigid robot (with payload) at a pose. `at` (rad or m) and `velocity` are for all

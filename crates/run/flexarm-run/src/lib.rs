@@ -26,6 +26,7 @@ mod bends;
 mod calibration_entry;
 pub mod caveat;
 mod check;
+mod comparison;
 mod controller_entry;
 mod convert;
 mod coupling_entry;
@@ -41,6 +42,7 @@ mod guide_entry;
 mod headline;
 pub mod html_page;
 pub mod inspect;
+mod joint_values;
 mod link_entry;
 mod live;
 mod load_jumps;
@@ -93,6 +95,7 @@ pub use bends::Bend;
 pub use calibration_entry::Calibration;
 pub use caveat::{Caveat, Severity};
 pub use check::{Finding, check, check_with_loads, check_with_motion};
+pub use comparison::{STUDY_NOTE, study_rows};
 pub use convert::{ConvertOptions, ConvertSummary, convert, convert_until, parse_recording_format, read_run};
 pub use deflections::Variation;
 pub use drive_entry::{Drive, DriveKind};
@@ -137,7 +140,7 @@ pub use statics::{ElementStatics, Statics, record_statics, statics};
 pub use statics_picture::{StaticsFiles, StaticsOutputs};
 pub use stepper_settings::{SettingValue, StepperSettings};
 pub use strength::Strength;
-pub use study::{STUDY_NOTE, Variant, compare_study, study_rows};
+pub use study::{Variant, compare_study};
 pub use summary::{
     CURVE_PIECES, DifferenceFigures, Files, HoldFigures, LinkFigures, LinkStressFigures, PoseFigures, RecordingFiles,
     StepperFigures, StrainGaugeFigures, StressPlaceFigures, StressPointFigures, Summary, TcpFigures,

@@ -20,7 +20,7 @@ use nalgebra::{DVector, Vector3, Vector6};
 use crate::arm::Arm;
 use crate::error::{Error, ValueError};
 use crate::flexible::FlexibleRobot;
-use crate::inspect::joint_values;
+use crate::joint_values::joint_values;
 use crate::monitor::stress::StressMonitor;
 use crate::options::RunOptions;
 use crate::robot::tcp_frame;

@@ -11,7 +11,7 @@ use serde::Serialize;
 use crate::arm::Arm;
 use crate::caveat::{self, Caveat, kinds};
 use crate::error::{Error, PoseError};
-use crate::inspect::joint_values;
+use crate::joint_values::joint_values;
 use crate::options::Modelling;
 use crate::posed::{Posed, step_error};
 use crate::robot::Robot;

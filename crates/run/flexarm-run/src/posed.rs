@@ -14,7 +14,7 @@ use crate::caveat::pose::ArmAtRest;
 use crate::caveat::{Caveat, kinds, of_use, once_each, validity};
 use crate::error::{Error, PoseError, ValueError};
 use crate::flexible::FlexibleRobot;
-use crate::inspect::joint_values;
+use crate::joint_values::joint_values;
 use crate::loops;
 use crate::options::Modelling;
 use crate::robot::Robot;

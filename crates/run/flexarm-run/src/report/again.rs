@@ -123,7 +123,7 @@ fn read_all(inputs: &[Input], warnings: &mut Vec<String>) -> Result<Vec<(String,
             tcp.settling_band_m = settling_band_m(&trace.header);
         }
         if summary.difference.is_none() {
-            summary.difference = runs.first().and_then(|(_, _, first)| crate::study::difference(first, &trace));
+            summary.difference = runs.first().and_then(|(_, _, first)| crate::comparison::difference(first, &trace));
         }
         let label = match (inputs.len(), &summary.label) {
             (1, _) => super::title(&summary),

@@ -86,7 +86,7 @@ pub fn markdown(summary: &Summary) -> String {
     }
     if !summary.with.is_empty() {
         page += "\n## Runs of the study\n\n";
-        page += &crate::study::table(summary);
+        page += &crate::comparison::table(summary);
     }
     if !summary.warnings.is_empty() {
         page += "\n## Warnings\n\n";

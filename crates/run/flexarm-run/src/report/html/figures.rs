@@ -7,7 +7,7 @@ use flexarm_draw::palette;
 use super::number::{fixed, number};
 use super::tables::STABILISATION;
 use super::{ReportRun, method};
-use crate::study::of_one_robot;
+use crate::comparison::of_one_robot;
 use crate::summary::{EnergyFigures, Summary, TcpFigures};
 use flexarm_settings::written::markup;
 

@@ -1,0 +1,24 @@
+//! Values of all actuated joints, checked against their number and range.
+
+use flexarm_settings::Quantity;
+
+use crate::error::{Error, PoseError, ValueError};
+
+/// Returns the values of all actuated joints; zeros by default.
+///
+/// # Errors
+/// [`Error::Pose`] for a wrong number of values, and for values that are not finite.
+pub fn joint_values(values: Option<&[f64]>, joints: &[&str]) -> Result<Vec<f64>, Error> {
+    let Some(values) = values else { return Ok(vec![0.0; joints.len()]) };
+    if values.len() != joints.len() {
+        let joints = joints.iter().map(|joint| (*joint).to_owned()).collect();
+        return Err(PoseError::Count { found: values.len(), joints }.into());
+    }
+    match values.iter().zip(joints).find(|(value, _)| !value.is_finite()) {
+        Some((value, joint)) => Err(PoseError::NotFinite { joint: (*joint).to_owned(), value: *value }.into()),
+        None => {
+            let named = |(value, joint): (&f64, &&str)| Quantity::JOINT.check(&format!("joint {joint:?}"), *value);
+            Ok(values.iter().zip(joints).map(named).collect::<Result<_, _>>().map_err(ValueError::from)?)
+        }
+    }
+}
