@@ -53,6 +53,17 @@ struct SizedNode<'t> {
     height: usize,
 }
 
+impl<'t> SizedNode<'t> {
+    /// Appends an item to a collection.
+    fn add(&mut self, item: Self) {
+        self.size += item.size;
+        self.height = self.height.max(item.height + 1);
+        if let YamlValue::List(items) | YamlValue::Map(items) = &mut self.node.value {
+            items.push(item.node);
+        }
+    }
+}
+
 /// Calls `take` with the root of each document in turn.
 ///
 /// * `most`: maximum number of nodes. Anchored and aliased nodes count again, and every 32 bytes of
@@ -111,13 +122,7 @@ pub fn read_yaml<'t, E: From<YamlError>>(
         }
         match open.last_mut() {
             None => take(done.node)?,
-            Some(outer) => {
-                outer.size += done.size;
-                outer.height = outer.height.max(done.height + 1);
-                if let YamlValue::List(items) | YamlValue::Map(items) = &mut outer.node.value {
-                    items.push(done.node);
-                }
-            }
+            Some(outer) => outer.add(done),
         }
     }
     Ok(())

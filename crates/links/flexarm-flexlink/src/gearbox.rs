@@ -226,27 +226,7 @@ pub fn insert_gearboxes(mechanism: &mut Mechanism, gearboxes: &[Gearbox]) -> Res
         let child = std::mem::replace(&mut joint.child, motor.clone());
         mechanism.links.push(Link { name: motor.clone(), inertia: None });
 
-        let single = |k: f64| DMatrix::from_element(1, 1, k);
-        let parts: Vec<(&str, JointKind, DMatrix<f64>)> = match &gearbox.stiffness {
-            GearStiffness::Axis(k) => along.map(|kind| ("", kind, single(*k))).into_iter().collect(),
-            GearStiffness::Tilting(k) => {
-                let turn = |axis: Unit<Vector3<f64>>| JointKind::ElasticRevolute(axis);
-                vec![
-                    (".x", turn(Vector3::x_axis()), single(k[0])),
-                    (".y", turn(Vector3::y_axis()), single(k[1])),
-                    (".z", turn(Vector3::z_axis()), single(k[2])),
-                ]
-            }
-            GearStiffness::Full(K) => {
-                let kind = JointKind::Elastic(ElasticAngles::RotationVector);
-                vec![("", kind, DMatrix::from_column_slice(6, 6, K.as_slice()))]
-            }
-            GearStiffness::Guide(tubes) => {
-                let axes = [Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis()];
-                let turns = [".x", ".y", ".z"].into_iter().zip(axes).zip(tubes.tilts).filter(|(_, tilts)| *tilts);
-                turns.map(|((suffix, axis), _)| (suffix, JointKind::ElasticRevolute(axis), single(1.0))).collect()
-            }
-        };
+        let parts = spring_joints(&gearbox.stiffness, along);
         let (parent, child) = match &gearbox.stiffness {
             GearStiffness::Guide(tubes) => there_and_back(mechanism, &slide, tubes, motor, child),
             _ => (motor, child),
@@ -265,4 +245,30 @@ pub fn insert_gearboxes(mechanism: &mut Mechanism, gearboxes: &[Gearbox]) -> Res
         }
     }
     Ok(springs)
+}
+
+/// Returns the joints with springs that replace a joint, from the motor outward: suffix of the
+/// name, kind and stiffness. `along`: spring along the axis of the joint, if it has one.
+fn spring_joints(stiffness: &GearStiffness, along: Option<JointKind>) -> Vec<(&'static str, JointKind, DMatrix<f64>)> {
+    let single = |k: f64| DMatrix::from_element(1, 1, k);
+    match stiffness {
+        GearStiffness::Axis(k) => along.map(|kind| ("", kind, single(*k))).into_iter().collect(),
+        GearStiffness::Tilting(k) => {
+            let turn = |axis: Unit<Vector3<f64>>| JointKind::ElasticRevolute(axis);
+            vec![
+                (".x", turn(Vector3::x_axis()), single(k[0])),
+                (".y", turn(Vector3::y_axis()), single(k[1])),
+                (".z", turn(Vector3::z_axis()), single(k[2])),
+            ]
+        }
+        GearStiffness::Full(K) => {
+            let kind = JointKind::Elastic(ElasticAngles::RotationVector);
+            vec![("", kind, DMatrix::from_column_slice(6, 6, K.as_slice()))]
+        }
+        GearStiffness::Guide(tubes) => {
+            let axes = [Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis()];
+            let turns = [".x", ".y", ".z"].into_iter().zip(axes).zip(tubes.tilts).filter(|(_, tilts)| *tilts);
+            turns.map(|((suffix, axis), _)| (suffix, JointKind::ElasticRevolute(axis), single(1.0))).collect()
+        }
+    }
 }

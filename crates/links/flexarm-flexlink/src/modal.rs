@@ -60,20 +60,7 @@ pub(crate) fn substitute_modal(
     }
     let mut body = modal_body(modal);
 
-    // Attached bodies: those near A go to the link itself, those near B to the distal link.
-    let middle = reduced.split.X_LS.translation.vector;
-    let line = site.p_LB - site.p_LA;
-    let (mut near, mut beyond): (Option<SpatialInertia>, Option<SpatialInertia>) = (None, None);
-    if let (Some(details), Parts::Reduced) = (&reduced.details, flexible.parts) {
-        for part in &details.attached {
-            let place = if (part.com - middle).dot(&line) > 0.0 { &mut beyond } else { &mut near };
-            let add = inertia_of(part).spatial();
-            match place {
-                Some(sum) => *sum += add,
-                None => *place = Some(add),
-            }
-        }
-    }
+    let [near, beyond] = attached_bodies(flexible, site);
     // Mass integrals of the undeformed body from the mechanism's link.
     if let Parts::FromLink(_) = flexible.parts {
         let own = site.own.ok_or_else(|| SubstitutionError::NoInertia { link: name.clone() })?.spatial();
@@ -127,4 +114,24 @@ pub(crate) fn substitute_modal(
         part_masses,
         lumped: None,
     })
+}
+
+/// Returns the inertias of the attached bodies: those near A, which go to the link itself, and
+/// those near B, which go to the distal link.
+fn attached_bodies(flexible: &FlexibleLink, site: &Site) -> [Option<SpatialInertia>; 2] {
+    let reduced = &flexible.reduced;
+    let middle = reduced.split.X_LS.translation.vector;
+    let line = site.p_LB - site.p_LA;
+    let (mut near, mut beyond): (Option<SpatialInertia>, Option<SpatialInertia>) = (None, None);
+    if let (Some(details), Parts::Reduced) = (&reduced.details, flexible.parts) {
+        for part in &details.attached {
+            let place = if (part.com - middle).dot(&line) > 0.0 { &mut beyond } else { &mut near };
+            let add = inertia_of(part).spatial();
+            match place {
+                Some(sum) => *sum += add,
+                None => *place = Some(add),
+            }
+        }
+    }
+    [near, beyond]
 }

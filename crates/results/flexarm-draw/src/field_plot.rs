@@ -4,12 +4,13 @@
 //! picture are thinned to the maximum of the merged cells, so that a page with many maps stays
 //! small.
 
+use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use crate::charts::{LEADING, draw_lines, range, wrapped};
 use crate::palette::magnitude;
-use crate::plot::{Area, Axes, PlotError, axes, ink, picture, plain, three_digits};
+use crate::plot::{Area, Axes, Chart, PlotError, axes, ink, picture, plain, three_digits};
 
 /// Maximum number of cells along an axis of the picture.
 const MOST_CELLS: usize = 120;
@@ -129,22 +130,7 @@ impl FieldPlot<'_> {
                     }
                 }
             }
-            for [low, high] in self.outlines {
-                let corners =
-                    [(low[0], low[1]), (high[0], low[1]), (high[0], high[1]), (low[0], high[1]), (low[0], low[1])];
-                for (color, width) in [(WHITE, 4), (OUTLINE, 2)] {
-                    chart.draw_series([PathElement::new(corners, color.stroke_width(width))])?;
-                }
-            }
-            for ([x, y], letter) in self.marks {
-                let letter = Text::new(
-                    (*letter).to_owned(),
-                    (0, 0),
-                    centred(("sans-serif", 14).into_font().style(FontStyle::Bold).into()),
-                );
-                let circle = Circle::new((0, 0), 8, WHITE.filled());
-                chart.draw_series([EmptyElement::at((*x, *y)) + circle + Circle::new((0, 0), 8, BLACK) + letter])?;
-            }
+            self.draw_overlays(&mut chart)?;
             draw_lines(area, (left + width / 2, TOP + height + FOOT), &x_label, false)?;
             draw_lines(area, (0, TOP + height / 2), &y_label, true)?;
             self.draw_scale(&area.clone().shrink((right, 0), (RIGHT, TOP + height.max(80) + 6)), scale)
@@ -155,6 +141,27 @@ impl FieldPlot<'_> {
     fn largest(&self, cell: [usize; 2], every: [usize; 2]) -> f64 {
         let [columns, rows] = [0, 1].map(|k| cell[k] * every[k]..((cell[k] + 1) * every[k]).min(self.count[k]));
         rows.flat_map(|y| columns.clone().map(move |x| self.values[x + self.count[0] * y])).fold(f64::NAN, f64::max)
+    }
+
+    /// Draws outlines and marks over the cells.
+    fn draw_overlays(&self, chart: &mut Chart<'_, '_, RangedCoordf64, RangedCoordf64>) -> Result<(), PlotError> {
+        for [low, high] in self.outlines {
+            let corners =
+                [(low[0], low[1]), (high[0], low[1]), (high[0], high[1]), (low[0], high[1]), (low[0], low[1])];
+            for (color, width) in [(WHITE, 4), (OUTLINE, 2)] {
+                chart.draw_series([PathElement::new(corners, color.stroke_width(width))])?;
+            }
+        }
+        for ([x, y], letter) in self.marks {
+            let letter = Text::new(
+                (*letter).to_owned(),
+                (0, 0),
+                centred(("sans-serif", 14).into_font().style(FontStyle::Bold).into()),
+            );
+            let circle = Circle::new((0, 0), 8, WHITE.filled());
+            chart.draw_series([EmptyElement::at((*x, *y)) + circle + Circle::new((0, 0), 8, BLACK) + letter])?;
+        }
+        Ok(())
     }
 
     /// Draws the colours with their values and label.

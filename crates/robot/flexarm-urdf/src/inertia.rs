@@ -10,13 +10,13 @@
 //! Start at [`link_inertias`]. Checks refer to the centre of mass and are relative to the largest
 //! principal moment.
 
-use flexarm_kinematics::{LinkInertia, SpatialInertia, moment_floor};
+use flexarm_kinematics::{LinkInertia, Pose, SpatialInertia, moment_floor};
 use nalgebra::{Matrix3, Vector3};
 
 use crate::error::Problem;
 use crate::finding::TextPosition;
 use crate::mesh::MassProperties;
-use crate::raw::{RawInertial, RawRobot};
+use crate::raw::{RawInertial, RawLink, RawRobot};
 use crate::read::{InertiaEstimate, ReadOptions};
 use crate::report::Report;
 use crate::shapes::LinkShape;
@@ -289,23 +289,11 @@ fn fill_from_shapes(
     let empty = bodies_without(robot, bodies);
     let (mut filled, mut shapeless): (Vec<(usize, SpatialInertia)>, Vec<usize>) = (Vec::new(), Vec::new());
     for i in empty.flat_map(|b| b.members.iter().map(|m| m.0)) {
-        let link = &robot.links[i];
         match &shapes[i].solids {
             // A frame without shapes may remain massless if other links have shapes.
             Ok(solids) if solids.is_empty() => shapeless.push(i),
             Ok(solids) => {
-                let open: usize = solids.iter().map(|(_, p)| p.open_edges).sum();
-                if open > 0 {
-                    let message = format!(
-                        "link {:?}: inertia is estimated from a mesh that is not closed ({open} open edges)",
-                        link.name
-                    );
-                    report.warning(&link.place, "open-mesh", message, "close the mesh or give <inertial>");
-                }
-                let M_L = solids.iter().fold(SpatialInertia::zeros(), |mut sum, (X_LV, p)| {
-                    sum += unit_density(p).at_parent(X_LV);
-                    sum
-                });
+                let M_L = of_solids(&robot.links[i], solids, report);
                 if M_L.mass > 0.0 {
                     filled.push((i, M_L));
                 } else {
@@ -345,6 +333,20 @@ fn fill_from_shapes(
         inertias[i] = Some(inertia);
     }
     failures
+}
+
+/// Returns the inertia of the solids of a link at unit density; warns if a mesh is not closed.
+fn of_solids(link: &RawLink, solids: &[(Pose, MassProperties)], report: &mut Report) -> SpatialInertia {
+    let open: usize = solids.iter().map(|(_, p)| p.open_edges).sum();
+    if open > 0 {
+        let message =
+            format!("link {:?}: inertia is estimated from a mesh that is not closed ({open} open edges)", link.name);
+        report.warning(&link.place, "open-mesh", message, "close the mesh or give <inertial>");
+    }
+    solids.iter().fold(SpatialInertia::zeros(), |mut sum, (X_LV, p)| {
+        sum += unit_density(p).at_parent(X_LV);
+        sum
+    })
 }
 
 /// Bodies without any `<inertial>`.

@@ -1,4 +1,4 @@
-//! Construction of the tree from a mechanism: bodies and frames, then coordinates, loops and rotors.
+//! Construction of the tree from a mechanism: bodies and frames, coordinates, loops, rotors.
 
 use std::collections::HashMap;
 

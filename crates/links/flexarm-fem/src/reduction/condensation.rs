@@ -168,7 +168,6 @@ impl<'m> Condensation<'m> {
             let (node, component) = model.dofs.node_of(solved[unknown] as usize);
             return Err(ReductionError::Loose { node, component: crate::error::COMPONENTS[component] });
         }
-        let columns = boundary.columns();
         let empty = DMatrix::zeros(0, 0);
         let mut this = Self {
             model,
@@ -184,25 +183,31 @@ impl<'m> Condensation<'m> {
             tip: empty,
         };
         this.saddle = this.saddle_of(rigid);
-        let (T, lambda) = this.static_shapes(columns);
-        this.T_B = blocks(&T.columns(6.min(columns), columns.saturating_sub(6)).into_owned());
-        this.T = T;
-        let KT = this.model.K.product(&this.T);
+        this.condense();
+        this.tip = this.tip_compliance()?;
+        Ok(this)
+    }
+
+    /// Computes the static shapes and the condensed matrices.
+    fn condense(&mut self) {
+        let columns = self.boundary.columns();
+        let (T, lambda) = self.static_shapes(columns);
+        self.T_B = blocks(&T.columns(6.min(columns), columns.saturating_sub(6)).into_owned());
+        self.T = T;
+        let KT = self.model.K.product(&self.T);
         // The energy Tᵀ K T is symmetric for any T, but the forces on the interfaces are symmetric
         // only if T solves the equations, so the asymmetry is measured on the forces.
-        let mut forces = gram(&this.boundary.rigid_part(), &KT);
-        for ((column, _), row) in this.boundary.means().iter().zip(lambda.row_iter()) {
+        let mut forces = gram(&self.boundary.rigid_part(), &KT);
+        for ((column, _), row) in self.boundary.means().iter().zip(lambda.row_iter()) {
             let mut force = forces.row_mut(*column);
             force -= row;
         }
-        this.K_g = symmetric(gram(&this.T, &KT));
-        let d = this.K_g.diagonal();
+        self.K_g = symmetric(gram(&self.T, &KT));
+        let d = self.K_g.diagonal();
         let place = |(i, j): (usize, usize)| (forces[(i, j)] - forces[(j, i)]).abs() / (d[i] * d[j]).sqrt();
         let pairs = (0..columns).flat_map(|i| (0..i).map(move |j| (i, j)));
-        this.asymmetry = worst(pairs.map(place));
-        this.M_g = symmetric(gram(&this.T, &this.model.M.product(&this.T)));
-        this.tip = this.tip_compliance()?;
-        Ok(this)
+        self.asymmetry = worst(pairs.map(place));
+        self.M_g = symmetric(gram(&self.T, &self.model.M.product(&self.T)));
     }
 
     fn saddle_of(&self, rigid: Option<DMatrix<f64>>) -> Option<Saddle> {

@@ -21,7 +21,7 @@ use style::{COLUMN, PAGE, PLAN, SCREEN, Style};
 pub use curve::{CurveLook, Panel, PlotCurve};
 pub use svg::PlotError;
 
-pub(crate) use svg::{Area, Axes, MARK, axes, ink, picture, plain, three_digits};
+pub(crate) use svg::{Area, Axes, Chart, MARK, axes, ink, picture, plain, three_digits};
 
 /// Panels over a common horizontal axis, for the screen. Curves are named above the panels, where
 /// the names hide nothing.

@@ -18,8 +18,8 @@
 //! and thus its own Σ and Υ.
 //!
 //! Frames: P, Q proximal and distal face of a joint, P = Q when undeformed. [`constraint`] contains
-//! the rows, [`solve`] the elimination, [`pins`] the closure of loops, [`observe`] what is measured. Source: [Lacoursière 2007];
-//! theory page, section 4.
+//! the rows, [`solve`] the elimination, [`pins`] the closure of loops, [`observe`] what a run
+//! reports. Source: [Lacoursière 2007]; theory page, section 4.
 
 mod checks;
 mod compliance;
