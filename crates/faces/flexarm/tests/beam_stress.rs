@@ -110,6 +110,9 @@ fn stress_of_a_beam_is_computed_only_if_it_is_asked_for_and_there_is_an_outline(
     let shape = "section = \"rectangle\", width = 0.02, height = 0.04, material = \"aluminium\"";
     refused("given", &|text| text.replace(shape, bar), "give the shape of the section");
 
+    let rigid = Modelling { links: LinkModel::Rigid, ..Modelling::default() };
+    let stiff = Beam::new("rigid", str::to_owned);
+    assert!(statics(&stiff.robot(), &rigid, None, [0.0; 6]).unwrap().stress.is_empty());
     let modal = Modelling { links: LinkModel::Modal, ..Modelling::default() };
     let run = Beam::new("modal", str::to_owned).swing(modal);
     let caveat = run.summary.caveats.iter().find(|caveat| caveat.code == "no-stress").unwrap();

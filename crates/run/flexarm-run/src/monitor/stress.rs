@@ -95,7 +95,8 @@ impl StressMonitor {
     ) -> Result<Option<Self>, Error> {
         let mut links = Vec::new();
         for (k, link) in robot.flexible.iter().enumerate().filter(|(_, link)| link.stress.is_some()) {
-            let span = &flexible.spans[k];
+            // Rigid links have no spans.
+            let Some(span) = flexible.spans.get(k) else { continue };
             let owned = arm.elements.iter().zip(&flexible.owners).filter(|(_, owner)| **owner == Owner::Link(k));
             let owned: Vec<&ElasticElement> = owned.map(|(element, _)| element).collect();
             if owned.is_empty() {
