@@ -56,7 +56,7 @@ impl FlexibleArm {
     }
 
     /// Returns an entry of the damping over joints that has `of_motor` for the motor of each
-    /// coordinate: diagonal but for motors that move several joints.
+    /// coordinate; off-diagonal entries exist only for motors that move several joints.
     pub(crate) fn over_joints(&self, row: usize, column: usize, of_motor: impl Fn(usize) -> f64) -> f64 {
         let places = self.coupling.as_ref().and_then(|c| Some((c, c.place(row)?, c.place(column)?)));
         if let Some((coupling, i, j)) = places {

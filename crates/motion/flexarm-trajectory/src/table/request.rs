@@ -1,4 +1,4 @@
-//! What the user tells about a table: its columns, and the joints of the robot.
+//! Request to read a table: meaning of its columns, and the joints of the robot.
 
 use crate::column_map::ColumnMap;
 
