@@ -149,18 +149,19 @@ impl<'a> Recurrence<'a> {
         Ok(run)
     }
 
-    /// Evaluates the start of the run and the derivatives there; `blow`: jumps of all velocities at
-    /// the start.
-    fn start(&mut self, e: &DVector<f64>, at_rest: bool, blow: Option<&DVector<f64>>) -> Result<(), StepError> {
+    /// Evaluates the start of the run and the derivatives there.
+    ///
+    /// * `jumps`: velocity jumps of all coordinates at the start.
+    fn start(&mut self, e: &DVector<f64>, at_rest: bool, jumps: Option<&DVector<f64>>) -> Result<(), StepError> {
         let side = self.system.events.side(0.0);
         self.sample_joints(side);
         if !self.directions.is_empty() {
             self.begin(e, at_rest)?;
         }
         self.look();
-        if let Some(blow) = blow {
+        if let Some(jumps) = jumps {
             // The run starts from rest.
-            self.strike(0.0, blow, None)?;
+            self.strike(0.0, jumps, None)?;
         }
         self.accelerate()
     }
