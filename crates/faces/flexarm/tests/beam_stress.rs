@@ -38,12 +38,13 @@ impl Beam {
         Robot::load(&self.folder).unwrap()
     }
 
-    /// Swings by 1 rad in 0.4 s.
+    /// Swings by 0.6 rad in 0.4 s.
     fn swing(&self, modelling: Modelling) -> Run {
         let robot = self.robot();
         let times: Vec<f64> = (0..=600).map(|k| 1e-3 * f64::from(k)).collect();
         let s = |t: f64| (t / 0.4).min(1.0);
-        let angles: Vec<f64> = times.iter().map(|t| s(*t).powi(3) * (10.0 - s(*t) * (15.0 - 6.0 * s(*t)))).collect();
+        let angles: Vec<f64> =
+            times.iter().map(|t| 0.6 * s(*t).powi(3) * (10.0 - s(*t) * (15.0 - 6.0 * s(*t)))).collect();
         let motion = Motion::from_samples(&times, &angles, &robot).unwrap();
         let options = RunOptions { modelling, ..RunOptions::default() };
         robot.flexible(modelling).unwrap().simulate(Scenario::new(motion), &options).unwrap()
@@ -75,8 +76,10 @@ fn a_held_beam_bears_the_bending_stress_of_its_weight_and_load_at_its_root() {
 /// gauges is bending, M c/(E I).
 #[test]
 fn gauges_at_the_root_of_a_swinging_beam_read_the_torque_of_its_drive() {
-    let beam = Beam::new("swing", |text| text.to_owned() + GAUGES);
-    for (segments, bound) in [(2, 1e-5), (4, 0.02)] {
+    // The torque of dampers is not in the stress.
+    let beam = Beam::new("swing", |text| text.replace("modal = 0.03", "modal = 0.0") + GAUGES);
+    // Two parts: the deflection turns the levers (1.2e-4). Four: loads between the springs (7.6e-3).
+    for (segments, bound) in [(2, 5e-4), (4, 2e-2)] {
         let run = beam.swing(parts(segments));
         let column = |name: &str| run.columns.column(name).unwrap().values.clone();
         let (gauges, torque) = (column("gauge"), column("effort"));
@@ -87,7 +90,7 @@ fn gauges_at_the_root_of_a_swinging_beam_read_the_torque_of_its_drive() {
             .0
             .iter()
             .zip(torque.iter())
-            .map(|([left, right], torque)| (0.5 * (right - left) / by_torque - torque).abs() / largest);
+            .map(|([left, right], torque)| (0.5 * (left - right) / by_torque - torque).abs() / largest);
         let off = off.fold(0.0, f64::max);
         eprintln!("{segments} parts: {off:.1e} of {largest:.1} N m");
         assert!(off < bound, "{segments}: {off:e}");
