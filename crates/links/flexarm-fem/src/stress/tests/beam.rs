@@ -17,7 +17,7 @@ const PLAIN: Material = Material { nu: 0.0, ..Material::STEEL };
 
 fn fields_of(link: &BeamLink) -> StressFields {
     let reduced = link.reduce().unwrap();
-    link.stress_fields(&[reduced.split.clone()], &[reduced.proximal, reduced.distal]).unwrap()
+    link.stress_fields(std::slice::from_ref(&reduced.split), &[reduced.proximal, reduced.distal]).unwrap()
 }
 
 /// Columns of torsion: torque, angular acceleration and product of angular velocities.
@@ -193,7 +193,8 @@ fn the_normal_of_the_outline_points_outward_at_every_place() {
     let given = Section::Given(Section::Circle { diameter: 0.1 }.bar(&Material::STEEL).unwrap());
     let link = BeamLink::new("link", given, Material::STEEL, 1.0);
     let reduced = link.reduce().unwrap();
-    let error = link.stress_fields(&[reduced.split.clone()], &[reduced.proximal.clone(), reduced.distal.clone()]);
+    let error =
+        link.stress_fields(std::slice::from_ref(&reduced.split), &[reduced.proximal.clone(), reduced.distal.clone()]);
     assert!(error.unwrap_err().to_string().contains("shape of a section"));
     let back =
         Pose::from_parts(Vector3::new(1.0, 0.0, 0.0).into(), Rotation3::from_axis_angle(&Vector3::z_axis(), 3.1));
