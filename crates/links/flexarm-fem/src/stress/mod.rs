@@ -12,7 +12,8 @@
 //! the corners by the shape functions of the corners (least squares where there are more points
 //! than corners). Averages do not mix materials: at the seam of two, the stress jumps.
 //!
-//! A link that is one beam gets its stress from its section forces ([`crate::BeamLink::stress_fields`]).
+//! A link that is one beam gets its stress from its section forces
+//! ([`crate::BeamLink::stress_fields`]).
 //!
 //! Not here: beam elements of a mesh; ties, near which the stress of a rigid interface is not that of
 //! the part.
