@@ -121,3 +121,53 @@ fn stress_of_a_beam_is_computed_only_if_it_is_asked_for_and_there_is_an_outline(
     let caveat = run.summary.caveats.iter().find(|caveat| caveat.code == "no-stress").unwrap();
     assert!(run.summary.stress.is_empty() && caveat.message.contains("beam with modes"), "{caveat:?}");
 }
+
+/// Truth: the weight beyond each plane, m_tip + m (1 - x/l), and its moment; a horizontal beam has no
+/// tension and no torsion.
+#[test]
+fn the_section_forces_of_a_held_beam_are_shear_and_moment_of_the_weight_beyond_each_plane() {
+    let beam = Beam::new("section forces", str::to_owned);
+    let (g, m, tip, l) = (9.81, 1.728, 0.5, 0.8);
+    for segments in [2, 8] {
+        let held = statics(&beam.robot(), &parts(segments), Some(&[0.3]), [0.0; 6]).unwrap();
+        let planes = &held.stress[0].section_forces;
+        assert_eq!((planes.len(), planes[20].at_m), (21, l));
+        let mut off = [0.0_f64; 2];
+        for plane in planes {
+            assert_eq!(plane.lowest, plane.highest);
+            let [n, v_y, v_z, t, m_y, m_z] = plane.highest;
+            let x = plane.at_m;
+            let shear = g * (tip + m * (1.0 - x / l));
+            let moment = g * (tip * (l - x) + m * (l - x).powi(2) / (2.0 * l));
+            off[0] = off[0].max((v_y.hypot(v_z) / shear - 1.0).abs());
+            off[1] = off[1].max((m_y.hypot(m_z) - moment).abs() / (g * (tip + 0.5 * m) * l));
+            assert!(n.abs() < 3e-3 * shear && t.abs() < 1e-6, "{n} {t}");
+        }
+        eprintln!("{segments} parts: shear off by {:.1e}, moment by {:.1e}", off[0], off[1]);
+        assert!(off[0] < 2e-5 && off[1] < 2e-5, "{off:?}"); // measured
+    }
+}
+
+/// Truth: the damage at stress points on all places of the surface. Tension and compression sides have
+/// the same largest stress, but not the same damage.
+#[test]
+fn the_most_damaged_place_is_that_of_the_largest_damage_among_all_places_of_the_surface() {
+    let places = (0..=20).flat_map(|plane| {
+        let sides = [(-1, -1), (-1, 0), (-1, 1), (0, -1), (0, 1), (1, -1), (1, 0), (1, 1)];
+        sides.map(|(y, z)| [0.04 * f64::from(plane), 0.01 * f64::from(y), 0.02 * f64::from(z)])
+    });
+    let points = places.enumerate().map(|(k, [x, y, z])| {
+        format!("\n[[stress_point]]\nname = \"p{k}\"\nlink = \"beam_1\"\nat = [{x}, {y}, {z}]\n")
+    });
+    let points: String = points.collect();
+    let beam = Beam::new("fatigue", |text| text.to_owned() + &points);
+    let link = beam.swing(parts(4)).summary.stress.remove(0);
+    assert_eq!((link.points.len(), link.nodes), (168, 168));
+    let of_point = |k: usize| link.points[k].place.damage.unwrap();
+    let truth = (0..168).max_by(|a, b| of_point(*a).total_cmp(&of_point(*b))).unwrap();
+    let found = link.most_damaged.unwrap();
+    eprintln!("most damaged {:?}, worst {:?}", found, link.worst[0]);
+    assert_eq!(found, link.points[truth].place);
+    assert_eq!(link.damage, found.damage);
+    assert!(found.damage > link.points[0].place.damage);
+}

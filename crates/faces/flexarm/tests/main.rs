@@ -47,6 +47,7 @@ mod sensitivity;
 mod stress;
 #[cfg(feature = "parquet")]
 mod sweep;
+mod swung_stress;
 mod telescope;
 mod third_interface;
 mod tool_path;

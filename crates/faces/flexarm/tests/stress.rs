@@ -151,10 +151,8 @@ fn stress_files_that_do_not_fit_are_refused_and_steppers_without_accelerations_s
     let robot = Robot::load(&arm.folder).unwrap();
     let motion = Motion::from_samples(&[0.0, 0.01], &[0.3, 0.3], &robot).unwrap();
     let scenario = Scenario::new(motion);
-    let run = |options: &RunOptions| {
-        let flexible = Robot::load(&arm.folder).unwrap().flexible(options.modelling).unwrap();
-        flexible.simulate(&scenario, options)
-    };
+    let run =
+        |options: &RunOptions| Robot::load(&arm.folder)?.flexible(options.modelling)?.simulate(&scenario, options);
     let spook = flexarm::STEPPERS.iter().find(|entry| entry.name == "spook").unwrap();
     let stepper: StepperKind = (spook.with)(&StepperOptions::default());
     let blind = run(&RunOptions { stepper, step_s: 1e-3, ..RunOptions::default() }).unwrap().summary;

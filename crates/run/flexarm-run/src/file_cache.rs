@@ -7,6 +7,7 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
+use flexarm_fem::stress::{StressFields, parse_stress};
 use flexarm_fem::{ReducedLink, read_flex};
 use flexarm_urdf::{ReadOptions, UrdfRobot, read_urdf};
 
@@ -18,6 +19,7 @@ pub struct FileCache {
     /// By path and options.
     urdfs: Mutex<HashMap<(PathBuf, String), Arc<UrdfRobot>>>,
     links: Mutex<HashMap<PathBuf, Arc<ReducedLink>>>,
+    stresses: Mutex<HashMap<PathBuf, Arc<StressFields>>>,
 }
 
 impl FileCache {
@@ -48,5 +50,21 @@ impl FileCache {
         let read = Arc::new(read_flex(path).map_err(Box::new)?);
         self.links.lock().unwrap_or_else(PoisonError::into_inner).insert(path.to_owned(), read.clone());
         Ok((*read).clone())
+    }
+
+    /// Reads the stress fields of a link, or returns the cached ones.
+    ///
+    /// # Errors
+    /// [`Error::File`] for a file that cannot be read or is damaged.
+    pub(crate) fn stress(&self, path: &Path) -> Result<Arc<StressFields>, Error> {
+        let known = self.stresses.lock().unwrap_or_else(PoisonError::into_inner).get(path).cloned();
+        if let Some(known) = known {
+            return Ok(known);
+        }
+        let fail = |what: String| Error::File { path: path.to_owned(), what };
+        let bytes = std::fs::read(path).map_err(|error| fail(error.to_string()))?;
+        let read = Arc::new(parse_stress(&bytes).map_err(|error| fail(error.to_string()))?);
+        self.stresses.lock().unwrap_or_else(PoisonError::into_inner).insert(path.to_owned(), read.clone());
+        Ok(read)
     }
 }

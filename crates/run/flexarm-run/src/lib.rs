@@ -143,6 +143,7 @@ pub use strength::Strength;
 pub use study::{Variant, compare_study};
 pub use summary::{
     CURVE_PIECES, DifferenceFigures, Files, HoldFigures, LinkFigures, LinkStressFigures, PoseFigures, RecordingFiles,
-    StepperFigures, StrainGaugeFigures, StressPlaceFigures, StressPointFigures, Summary, TcpFigures,
+    SectionForceFigures, StepperFigures, StrainGaugeFigures, StressPlaceFigures, StressPointFigures, Summary,
+    TcpFigures,
 };
 pub use tool_path::ToolPath;

@@ -276,7 +276,8 @@ fn stress_source(
     };
     let file = home.folder.join(reduced.get_ref()).with_extension(STRESS_FILE);
     if file.is_file() {
-        return Ok(Some(StressSource::File(file)));
+        let fields = home.files.stress(&file).map_err(|error| fail(format!("stress of link {name:?}: {error}")))?;
+        return Ok(Some(StressSource::File { path: file, fields }));
     }
     match asked {
         None => Ok(None),

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use flexarm_fem::stress::StressFields;
 use flexarm_fem::{BeamLink, ModalLink, ModalOptions};
 use flexarm_flexlink::{FlexibleLink, LinkForm};
 use flexarm_kinematics::MOST_COORDINATES;
@@ -45,10 +46,15 @@ pub struct RobotLink {
 }
 
 /// Source of the stress of a flexible link.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum StressSource {
-    /// File of stress fields, beside that of the reduced link.
-    File(PathBuf),
+    /// Stress fields from a file beside that of the reduced link.
+    File {
+        /// The file.
+        path: PathBuf,
+        /// Its content.
+        fields: Arc<StressFields>,
+    },
     /// Section forces of the beam.
     Beam,
 }

@@ -223,8 +223,10 @@ pub struct LinkStressFigures {
     pub peak_pa: f64,
     /// The same over the yield strength; null for a material whose strength is not known.
     pub of_yield: Option<f64>,
-    /// Largest fatigue damage of one motion among the worst places; null as above.
+    /// Largest fatigue damage of one motion on the surface; null as above.
     pub damage: Option<f64>,
+    /// Place of the largest damage; null as above.
+    pub most_damaged: Option<StressPlaceFigures>,
     /// Places of the largest stress, the worst first.
     pub worst: Vec<StressPlaceFigures>,
     /// Stress points of the robot file.
@@ -233,6 +235,22 @@ pub struct LinkStressFigures {
     /// Strain gauges of the robot file.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub gauges: Vec<StrainGaugeFigures>,
+    /// Section forces of a beam, from its near end to its far end.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub section_forces: Vec<SectionForceFigures>,
+}
+
+/// Extremes of the section forces at a plane across a beam: `N V_y V_z T M_y M_z`, in beam axes about
+/// the axis of the beam (N, N m), of the far side on the near side, so that tension is positive.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct SectionForceFigures {
+    /// Position along the beam from its near end (m).
+    pub at_m: f64,
+    /// Minima over the run.
+    pub lowest: [f64; 6],
+    /// Maxima over the run.
+    pub highest: [f64; 6],
 }
 
 /// Maximum stress at a stress point.

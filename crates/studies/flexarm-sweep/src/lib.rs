@@ -481,6 +481,7 @@ fn skeleton(robot: &Robot, flexible: &FlexibleRobot) -> Summary {
             name: link.flexible.link.clone(),
             of_yield: Some(0.0),
             damage: Some(0.0),
+            most_damaged: Some(place.clone()),
             points: points.map(|p| StressPointFigures { name: p.name.clone(), place: place.clone() }).collect(),
             gauges: strain
                 .map(|gauge| StrainGaugeFigures { name: gauge.name.clone(), ..StrainGaugeFigures::default() })

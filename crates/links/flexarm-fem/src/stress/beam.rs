@@ -12,7 +12,7 @@
 
 use nalgebra::{DMatrix, Matrix3, Point3, Vector3, Vector6};
 
-use super::fields::{INERTIA_LOADS, StressFields, StressSeat};
+use super::fields::{INERTIA_LOADS, SectionForces, StressFields, StressSeat};
 use super::map::part_load;
 use crate::beam_link::BeamLink;
 use crate::error::{FemError, positive};
@@ -58,9 +58,13 @@ impl BeamLink {
         let count = outline.len();
         let mut stress = DMatrix::zeros(6 * count * (PIECES + 1), columns);
         let mut seats = Vec::with_capacity(count * (PIECES + 1));
-        for plane in 0..=PIECES {
-            let x = self.length * plane as f64 / PIECES as f64;
+        let x: Vec<f64> = (0..=PIECES).map(|plane| self.length * plane as f64 / PIECES as f64).collect();
+        let mut forces = DMatrix::zeros(6 * x.len(), columns);
+        for (plane, &x) in x.iter().enumerate() {
             let section: Vec<Vector6<f64>> = self.section_forces(x, &spread).iter().map(|F| turned(&R, F)).collect();
+            for (j, F) in section.iter().enumerate() {
+                forces.fixed_view_mut::<6, 1>(6 * plane, j).copy_from(&F.cast::<f32>());
+            }
             for point in &outline {
                 let first = 6 * seats.len();
                 let position = self.X_LE * Point3::new(x, point.y, point.z);
@@ -89,6 +93,7 @@ impl BeamLink {
             triangles: surface(&seats, count),
             seats,
             stress,
+            section_forces: Some(SectionForces { x, forces }),
         })
     }
 

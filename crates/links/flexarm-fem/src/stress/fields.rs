@@ -25,6 +25,17 @@ pub struct StressSeat {
     pub from_tie: f64,
 }
 
+/// Section forces of a beam per unit load, at planes across it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SectionForces {
+    /// Positions of the planes along the beam, m from its end E.
+    pub x: Vec<f64>,
+    /// Six components `N V_y V_z T M_y M_z` of the first plane, beam axes about the axis of the beam (N,
+    /// N m), then of the second, ...; columns as of [`StressFields::stress`]. Tension and moments
+    /// are those of the far side on the near side.
+    pub forces: DMatrix<f32>,
+}
+
 /// Stress of a link at the nodes of its surface, per unit load and per unit amplitude of a mode.
 ///
 /// ```text
@@ -56,6 +67,8 @@ pub struct StressFields {
     /// `xx yy zz xy yz zx` of the first seat, then of the second, ...; one column per wrench
     /// component, inertia load and mode.
     pub stress: DMatrix<f32>,
+    /// Section forces; `None` for a mesh.
+    pub section_forces: Option<SectionForces>,
 }
 
 impl ModalSource<'_> {
@@ -92,6 +105,7 @@ impl ModalSource<'_> {
             seats: self.seats(&places),
             triangles: triangles.collect(),
             stress: DMatrix::from_fn(6 * places.len(), columns, stress),
+            section_forces: None,
         }
     }
 

@@ -164,6 +164,7 @@ pub fn parse_stress(bytes: &[u8]) -> Result<StressFields, String> {
         seats: (0..seats).map(seat).collect(),
         triangles: corners.chunks_exact(3).map(|c| [c[0] as u32, c[1] as u32, c[2] as u32]).collect(),
         stress: DMatrix::from_vec(6 * seats, columns, stress),
+        section_forces: None,
     })
 }
 

@@ -24,6 +24,8 @@ pub struct StressMap {
     A: DMatrix<f64>,
     /// Stress by amplitudes and inertia loads, Pa; six rows per seat.
     stress: DMatrix<f32>,
+    /// Section forces by amplitudes and inertia loads; six rows per plane, none for a mesh.
+    section_forces: DMatrix<f32>,
 }
 
 /// Returns the inertia loads of a link.
@@ -44,6 +46,12 @@ impl StressMap {
     /// Stress by amplitudes and inertia loads, Pa; six rows per seat.
     pub fn stress(&self) -> &DMatrix<f32> {
         &self.stress
+    }
+
+    /// Section forces by amplitudes and inertia loads, N and N m; six rows per plane of
+    /// [`StressFields::section_forces`], none for a mesh.
+    pub fn section_forces(&self) -> &DMatrix<f32> {
+        &self.section_forces
     }
 
     /// Appends the amplitudes and inertia loads at coordinates q.
@@ -142,27 +150,33 @@ impl StressFields {
     /// * `columns`: field of each amplitude, with its factor; `own`: amplitudes of the model under
     ///   each inertia load.
     fn map(&self, A: DMatrix<f64>, columns: &[usize], factors: &[f64], own: &[DVector<f64>]) -> StressMap {
-        let (rows, n) = (self.stress.nrows(), columns.len());
         let wrenches = self.compliance.nrows();
-        let mut stress = DMatrix::zeros(rows, n + INERTIA_LOADS);
-        for (k, (column, factor)) in columns.iter().zip(factors).enumerate() {
-            stress.set_column(k, &(self.stress.column(*column) * *factor as f32));
-        }
-        let mut residual = vec![0.0_f64; rows];
-        for (j, own) in own.iter().enumerate() {
-            let of_mesh = self.stress.column(wrenches + j);
-            residual.iter_mut().zip(of_mesh.iter()).for_each(|(residual, stress)| *residual = f64::from(*stress));
-            for (k, own) in own.iter().enumerate() {
-                let held = stress.column(k);
-                residual.iter_mut().zip(held.iter()).for_each(|(residual, held)| *residual -= own * f64::from(*held));
+        let by_amplitudes = |fields: &DMatrix<f32>| {
+            let (rows, n) = (fields.nrows(), columns.len());
+            let mut mapped = DMatrix::zeros(rows, n + INERTIA_LOADS);
+            for (k, (column, factor)) in columns.iter().zip(factors).enumerate() {
+                mapped.set_column(k, &(fields.column(*column) * *factor as f32));
             }
-            stress
-                .column_mut(n + j)
-                .iter_mut()
-                .zip(&residual)
-                .for_each(|(stress, residual)| *stress = *residual as f32);
+            let mut residual = vec![0.0_f64; rows];
+            for (j, own) in own.iter().enumerate() {
+                let of_mesh = fields.column(wrenches + j);
+                residual.iter_mut().zip(of_mesh.iter()).for_each(|(residual, field)| *residual = f64::from(*field));
+                for (k, own) in own.iter().enumerate() {
+                    let held = mapped.column(k);
+                    let pairs = residual.iter_mut().zip(held.iter());
+                    pairs.for_each(|(residual, held)| *residual -= own * f64::from(*held));
+                }
+                let pairs = mapped.column_mut(n + j).into_iter().zip(&residual);
+                pairs.for_each(|(mapped, residual)| *mapped = *residual as f32);
+            }
+            mapped
+        };
+        let sections = self.section_forces.as_ref().map(|sections| by_amplitudes(&sections.forces));
+        StressMap {
+            A,
+            stress: by_amplitudes(&self.stress),
+            section_forces: sections.unwrap_or_else(|| DMatrix::zeros(0, 0)),
         }
-        StressMap { A, stress }
     }
 
     /// Compares the stiffness of interfaces with that of the fields.

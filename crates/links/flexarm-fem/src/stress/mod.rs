@@ -30,7 +30,7 @@ mod recovery;
 #[cfg(test)]
 mod tests;
 
-pub use fields::{INERTIA_LOADS, StressFields, StressSeat};
+pub use fields::{INERTIA_LOADS, SectionForces, StressFields, StressSeat};
 pub use file::{parse_stress, write_stress};
 pub use map::{StressMap, inertia_loads};
 pub use recovery::{NodalPlace, StressPoint, StressRecovery, von_mises};

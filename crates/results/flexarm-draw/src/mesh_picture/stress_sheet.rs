@@ -21,6 +21,8 @@ pub struct StressPicture<'a> {
     pub link: &'a str,
     /// Text on the right of the heading.
     pub remark: &'a str,
+    /// Text below each side.
+    pub note: &'a str,
     /// Nodes of the surface, link axes, m.
     pub positions: &'a [Vector3<f64>],
     /// Triangles, as indices into the positions.
@@ -107,9 +109,8 @@ fn panel(
     let names = ["0".to_owned(), megapascals(0.5 * peak), megapascals(peak)];
     let bar = [width as f64 - 300.0, height as f64 - 44.0];
     sheet::color_bar(&mut image, bar, 250.0, names.each_ref().map(String::as_str));
-    let text = "nodes near tied ones are not judged";
     let style = Style::new(13.0, color::FAINT);
-    image.text(text, [width as f64 - 320.0, height as f64 - 33.0], Align::Right, style);
+    image.text(picture.note, [width as f64 - 320.0, height as f64 - 33.0], Align::Right, style);
     image
 }
 
@@ -131,6 +132,7 @@ mod tests {
         let picture = StressPicture {
             link: "box",
             remark: "",
+            note: "",
             positions: &positions,
             triangles: &triangles,
             stress: &stress,

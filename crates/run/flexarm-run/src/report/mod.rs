@@ -182,9 +182,11 @@ pub fn stress_figures(links: &[LinkStressFigures], is_run: bool) -> Vec<Figure> 
         let [x, y, z] = place.position_m.map(|x| format!("{:.0}", 1e3 * x));
         let time = if is_run { format!(", {:.3} s", place.t_s) } else { String::new() };
         let at = format!("von Mises, node {} at ({x}, {y}, {z}) mm of the link{time}", place.node);
-        let life = match place.damage {
+        let weakest = link.most_damaged.as_ref().unwrap_or(place);
+        let node = if weakest.node == place.node { String::new() } else { format!(" at node {}", weakest.node) };
+        let life = match weakest.damage {
             None => String::new(),
-            Some(damage) if damage > 1.0 / ENDLESS => format!(", life {:.1e} motions", 1.0 / damage),
+            Some(damage) if damage > 1.0 / ENDLESS => format!(", life {:.1e} motions{node}", 1.0 / damage),
             Some(_) => ", life beyond 1e12 motions".to_owned(),
         };
         let note = match (place.of_yield, &place.material) {

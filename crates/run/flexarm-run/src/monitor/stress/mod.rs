@@ -4,15 +4,17 @@
 //! The monitor keeps the amplitudes of the fields at every logged sample; [`StressMonitor::result`]
 //! finds the maxima over the run for every node of the surface.
 
+mod fatigue;
+
 use std::cell::OnceCell;
 use std::path::Path;
+use std::sync::Arc;
 
-use flexarm_analysis::rainflow_repeating;
 #[cfg(feature = "png")]
 use flexarm_draw::mesh_picture::{Image, StressPicture, stress_sheet};
 use flexarm_draw::palette::magnitude;
 use flexarm_fem::chain::Chain;
-use flexarm_fem::stress::{StressFields, StressMap, inertia_loads, parse_stress, von_mises};
+use flexarm_fem::stress::{StressFields, StressMap, inertia_loads, von_mises};
 use flexarm_fem::{FemError, ReducedLink, RigidPart};
 use flexarm_flexlink::{FlexibleSpan, LinkForm};
 use flexarm_kinematics::{Data, Frame, Pose, State, inverse_dynamics};
@@ -26,7 +28,9 @@ use crate::options::Modelling;
 use crate::robot::Robot;
 use crate::robot_link::{RobotLink, StressSource};
 use crate::strength::Strength;
-use crate::summary::{LinkStressFigures, StrainGaugeFigures, StressPlaceFigures, StressPointFigures};
+use crate::summary::{
+    LinkStressFigures, SectionForceFigures, StrainGaugeFigures, StressPlaceFigures, StressPointFigures,
+};
 
 /// Seats this close to a tied node are left out, as a fraction of the distance between the
 /// interfaces: the stress beside a rigid tie is that of the tie.
@@ -53,7 +57,7 @@ pub(crate) struct StressMonitor {
 /// A link with its map from coordinates to stress.
 struct LinkStress {
     name: String,
-    fields: StressFields,
+    fields: Arc<StressFields>,
     map: StressMap,
     /// Coordinates of its elements in the model: first one and number.
     elements: Vec<(usize, usize)>,
@@ -290,6 +294,7 @@ pub(crate) fn stress_at_rest(
     let mut links = monitor.result();
     for link in &mut links {
         link.damage = None;
+        link.most_damaged = None;
         let points = link.points.iter_mut().map(|point| &mut point.place);
         link.worst.iter_mut().chain(points).for_each(|place| place.damage = None);
     }
@@ -324,19 +329,16 @@ fn fields_and_map(
     span: &FlexibleSpan,
     elements: &[&ElasticElement],
     modelling: &Modelling,
-) -> Result<Option<(StressFields, StressMap)>, Error> {
+) -> Result<Option<(Arc<StressFields>, StressMap)>, Error> {
     let fail = |path: &Path| {
         let path = path.to_owned();
         move |what: String| Error::File { path, what }
     };
     let (fields, path) = match (&link.stress, &link.beam, &span.lumped) {
-        (Some(StressSource::File(path)), ..) => {
-            let bytes = std::fs::read(path).map_err(|error| fail(path)(error.to_string()))?;
-            (parse_stress(&bytes).map_err(fail(path))?, path)
-        }
+        (Some(StressSource::File { path, fields }), ..) => (fields.clone(), path),
         (Some(StressSource::Beam), Some(beam), Some(lumped)) => {
             let named = |error: FemError| fail(&robot.path)(format!("stress of link {:?}: {error}", span.link));
-            (beam.stress_fields(&lumped.joints, &lumped.parts).map_err(named)?, &robot.path)
+            (Arc::new(beam.stress_fields(&lumped.joints, &lumped.parts).map_err(named)?), &robot.path)
         }
         _ => return Ok(None),
     };
@@ -381,6 +383,7 @@ impl LinkStress {
         stress_sheet(&StressPicture {
             link: &self.name,
             remark: "the numbers are those of the worst places in summary.json",
+            note: if self.judged().len() < positions.len() { "nodes near tied ones are not judged" } else { "" },
             positions: &positions,
             triangles: &self.fields.triangles,
             stress: &self.peaks().iter().map(|stress| f64::from(*stress)).collect::<Vec<_>>(),
@@ -432,8 +435,7 @@ impl LinkStress {
         let history = self.signed_history(k, amplitudes);
         let sample = largest(&history);
         let stress = history[sample].abs();
-        let strength = self.strength.or_else(|| Strength::of(&self.fields.materials[seat.material]));
-        let damage = |strength: Strength| Some(strength.curve()?.damage(&rainflow_repeating(&history)).min(1.0));
+        let strength = self.strength_at(k);
         StressPlaceFigures {
             node: seat.node,
             position_m: seat.position.into(),
@@ -441,7 +443,7 @@ impl LinkStress {
             von_mises_pa: stress,
             of_yield: strength.map(|strength| stress / strength.yield_pa),
             material: strength.map(|strength| strength.name.to_owned()),
-            damage: strength.and_then(damage),
+            damage: self.damage(k, &history),
         }
     }
 
@@ -454,6 +456,7 @@ impl LinkStress {
     fn figures(&self, amplitudes: &DMatrix<f32>, times: &[f64]) -> LinkStressFigures {
         let worst = self.worst().into_iter().map(|k| self.place(k, amplitudes, times));
         let worst: Vec<StressPlaceFigures> = worst.collect();
+        let most_damaged = self.most_damaged(amplitudes).map(|k| self.place(k, amplitudes, times));
         LinkStressFigures {
             name: self.name.clone(),
             nodes: self.fields.seats.len(),
@@ -461,10 +464,24 @@ impl LinkStress {
             clear_of_ties_m: NEAR_TIE * self.length,
             peak_pa: worst.first().map_or(0.0, |place| place.von_mises_pa),
             of_yield: worst.first().and_then(|place| place.of_yield),
-            damage: worst.iter().filter_map(|place| place.damage).reduce(f64::max),
+            damage: most_damaged.as_ref().and_then(|place| place.damage),
+            most_damaged,
             worst,
+            section_forces: self.section_forces(amplitudes),
             ..LinkStressFigures::default()
         }
+    }
+
+    /// Returns the extremes of the section forces of a beam over the run.
+    fn section_forces(&self, amplitudes: &DMatrix<f32>) -> Vec<SectionForceFigures> {
+        let Some(sections) = &self.fields.section_forces else { return Vec::new() };
+        let forces = self.map.section_forces() * amplitudes;
+        let extremes = |(plane, x): (usize, &f64)| SectionForceFigures {
+            at_m: *x,
+            lowest: std::array::from_fn(|c| f64::from(forces.row(6 * plane + c).min())),
+            highest: std::array::from_fn(|c| f64::from(forces.row(6 * plane + c).max())),
+        };
+        sections.x.iter().enumerate().map(extremes).collect()
     }
 
     /// Returns the signed von Mises stress of a seat over the run (Pa).
@@ -549,8 +566,15 @@ fn principal(&[xx, yy, zz, xy, yz, zx]: &[f64; 6]) -> [f64; 2] {
 
 /// Returns the von Mises stress (Pa) with the sign of the principal stress of the largest magnitude.
 fn signed_von_mises(stress: [f64; 6]) -> f64 {
+    let von_mises = von_mises(stress);
+    // The sum of both is 2/3 of the trace minus the middle principal deviator, which is at most a third
+    // of the von Mises stress.
+    let trace = stress[0] + stress[1] + stress[2];
+    if 2.0 * trace.abs() > von_mises {
+        return von_mises.copysign(trace);
+    }
     let [largest, smallest] = principal(&stress);
-    von_mises(stress).copysign(largest + smallest)
+    von_mises.copysign(largest + smallest)
 }
 
 /// Square of the von Mises stress.
