@@ -167,7 +167,7 @@ fn solve_with_balancers(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64],
 /// inward    F = S^-T τ,   p_a = F,   I_a = 0                     (9)
 /// outward   A_B = I_A^-1 (F - p_A),   q̈ = S^-1 (A_B - A')        (10)
 /// ```
-#[inline(always)]
+#[inline]
 fn solve_articulated(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64], roles: &Roles) {
     begin_bodies(model, data, q, qdot, roles);
     for i in (1..model.bodies.len()).rev() {
@@ -182,7 +182,7 @@ fn solve_articulated(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64], ro
 }
 
 /// Outward pass: poses, velocities and the body's own inertia and bias forces, (1) to (3).
-#[inline(always)]
+#[inline]
 fn begin_bodies(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64], roles: &Roles) {
     data.V[0] = Twist::zeros();
     data.pA[0] = Wrench::zeros();
@@ -210,7 +210,7 @@ fn begin_bodies(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64], roles: 
 }
 
 /// Inward pass: inertia and force transmitted by body i to its parent, (4) to (6) and (9).
-#[inline(always)]
+#[inline]
 fn pass_inward(model: &Model, data: &mut Data, i: usize, roles: &Roles) {
     let body = &model.bodies[i];
     if let Some(m) = body.modal {
@@ -254,7 +254,7 @@ fn pass_inward(model: &Model, data: &mut Data, i: usize, roles: &Roles) {
 }
 
 /// Outward pass: accelerations of free joints and forces of prescribed ones, (7), (8) and (10).
-#[inline(always)]
+#[inline]
 fn finish_bodies(model: &Model, data: &mut Data, roles: &Roles) {
     // A coordinate may move several joints, so forces are summed from zero.
     for (i, &is_prescribed) in roles.prescribed_body.iter().enumerate().skip(1) {
@@ -294,7 +294,7 @@ fn finish_bodies(model: &Model, data: &mut Data, roles: &Roles) {
 
 /// Outward step over a free elastic joint: accelerations of its six coordinates and of body i,
 /// (10).
-#[inline(always)]
+#[inline]
 fn free_elastic(data: &mut Data, i: usize, k: usize, A: &Twist) -> Twist {
     let A_B = solve_inertia(&data.articulated[i], &(data.F[i] - data.pA[i]));
     let relative = A_B - *A;
@@ -307,7 +307,7 @@ fn free_elastic(data: &mut Data, i: usize, k: usize, A: &Twist) -> Twist {
 }
 
 /// Outward step: own inertia and velocity terms of modal body m, which is body i.
-#[inline(always)]
+#[inline]
 fn begin_modal(model: &Model, data: &mut Data, i: usize, m: usize, qdot: &[f64]) {
     let entry = &model.modal[m];
     let (modal, shapes) = (&mut data.modal[m], &entry.tables.shapes);
@@ -321,7 +321,7 @@ fn begin_modal(model: &Model, data: &mut Data, i: usize, m: usize, qdot: &[f64])
 
 /// Inward step: adds articulated inertia and bias of interface body i to the frame and coordinates
 /// of its modal body.
-#[inline(always)]
+#[inline]
 fn gather_interface(model: &Model, data: &mut Data, i: usize, m: usize, interface: usize) {
     let (entry, S, X_PB) = (&model.modal[m], data.elastic[i], data.X_PB[i]);
     let parent = model.bodies[i].parent;
@@ -341,7 +341,7 @@ fn gather_interface(model: &Model, data: &mut Data, i: usize, m: usize, interfac
 }
 
 /// Inward step: eliminates the modal coordinates from the articulated inertia of body i.
-#[inline(always)]
+#[inline]
 fn eliminate_modal(model: &Model, data: &mut Data, i: usize, m: usize, prescribed: bool) {
     let (entry, modal) = (&model.modal[m], &mut data.modal[m]);
     let range = entry.coordinate..entry.coordinate + entry.n;
@@ -381,7 +381,7 @@ fn eliminate_modal(model: &Model, data: &mut Data, i: usize, m: usize, prescribe
 }
 
 /// Outward step: accelerations of the modal coordinates, or their forces if prescribed.
-#[inline(always)]
+#[inline]
 fn finish_modal(model: &Model, data: &mut Data, i: usize, m: usize, prescribed: bool) {
     let (entry, modal, A) = (&model.modal[m], &data.modal[m], data.A[i]);
     for k in 0..entry.n {
@@ -399,7 +399,7 @@ fn finish_modal(model: &Model, data: &mut Data, i: usize, m: usize, prescribed: 
 
 /// Inward step over a free single-DoF joint: inertia and force transmitted to the parent, in B
 /// axes.
-#[inline(always)]
+#[inline]
 fn one_dof_inward(
     data: &mut Data,
     i: usize,
@@ -419,7 +419,7 @@ fn one_dof_inward(
 }
 
 /// `F_B = S^-T τ`: wrench exerted on B by a free elastic joint, in B axes.
-#[inline(always)]
+#[inline]
 fn elastic_wrench(data: &Data, i: usize, k: usize) -> Wrench {
     let S = &data.elastic[i];
     let tau = data.tau.as_slice();
@@ -430,7 +430,7 @@ fn elastic_wrench(data: &Data, i: usize, k: usize) -> Wrench {
 }
 
 /// Inverse of a 3×3 matrix by cofactors.
-#[inline(always)]
+#[inline]
 fn inverse_3x3(B: &Matrix3<f64>) -> Matrix3<f64> {
     let (a, b, c) = (B.column(0).into_owned(), B.column(1).into_owned(), B.column(2).into_owned());
     let (r0, r1, r2) = (b.cross(&c), c.cross(&a), a.cross(&b));
@@ -439,7 +439,7 @@ fn inverse_3x3(B: &Matrix3<f64>) -> Matrix3<f64> {
 }
 
 /// `I^-1 F` by block elimination of the linear part.
-#[inline(always)]
+#[inline]
 fn solve_inertia(I: &ArticulatedInertia, F: &Wrench) -> Twist {
     let linear_inverse = inverse_3x3(&I.linear);
     let G = mul3(&linear_inverse, &I.coupling);

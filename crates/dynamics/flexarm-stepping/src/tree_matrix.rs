@@ -86,7 +86,7 @@ type Matrices<const F: usize> = [[Matrix6<f64>; F]; F];
 type Scalars<const F: usize> = [[f64; F]; F];
 
 /// Computes `y += A x`.
-#[inline(always)]
+#[inline]
 fn add_product(A: &Matrix6<f64>, x: &Vector6<f64>, y: &mut Vector6<f64>) {
     let y = &mut y.data.0[0];
     for (column, x) in A.data.0.iter().zip(&x.data.0[0]) {
@@ -97,7 +97,7 @@ fn add_product(A: &Matrix6<f64>, x: &Vector6<f64>, y: &mut Vector6<f64>) {
 }
 
 /// Returns `A x`.
-#[inline(always)]
+#[inline]
 fn product(A: &Matrix6<f64>, x: &Vector6<f64>) -> Vector6<f64> {
     let mut y = Vector6::zeros();
     add_product(A, x, &mut y);
@@ -105,7 +105,7 @@ fn product(A: &Matrix6<f64>, x: &Vector6<f64>) -> Vector6<f64> {
 }
 
 /// Returns `A x`.
-#[inline(always)]
+#[inline]
 fn products<const F: usize>(A: &Matrices<F>, x: &Vectors<F>) -> Vectors<F> {
     let mut y = [[0.0; 6]; F];
     for column in 0..6 {
@@ -185,7 +185,7 @@ fn invert<const F: usize>(A: &mut Matrices<F>) -> bool {
 
 impl TreeNode {
     /// Returns `X α`.
-    #[inline(always)]
+    #[inline]
     fn outward(&self, alpha: &Vector6<f64>) -> Vector6<f64> {
         let [A, B, C] = &self.carried;
         let [x, y, z, u, v, w] = alpha.data.0[0];
@@ -198,7 +198,7 @@ impl TreeNode {
     }
 
     /// Returns `Xᵀ f`.
-    #[inline(always)]
+    #[inline]
     fn inward(&self, f: &Vector6<f64>) -> Vector6<f64> {
         let [A, B, C] = &self.carried;
         let [x, y, z, u, v, w] = f.data.0[0];
@@ -228,7 +228,7 @@ impl TreeNode {
     }
 
     /// Returns `S x`.
-    #[inline(always)]
+    #[inline]
     fn stretched<const F: usize>(&self, s: f64, x: &Vectors<F>) -> Vectors<F> {
         if F == 1 {
             return [product(&self.C, &x[0]); F];

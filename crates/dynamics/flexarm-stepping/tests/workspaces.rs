@@ -91,7 +91,7 @@ fn a_run_has_the_same_bits_with_new_and_with_used_workspaces() {
 #[test]
 fn the_second_run_of_an_arm_takes_less_memory_than_the_first() {
     let arm = arm();
-    let set_up = || drop((ReducedArm::new(arm.clone()), StaticPath::new(arm.clone()), arm.lend_observer()));
+    let set_up = || drop((ReducedArm::new(arm.clone()), StaticPath::new(arm.clone())));
     let [first, second] = [count_allocations(set_up), count_allocations(set_up)];
     assert!(second + 50 < first, "{second} and {first} allocations");
 }

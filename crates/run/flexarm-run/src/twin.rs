@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use flexarm_kinematics::{
-    Data, Frame, Model, Motions, Observer, State, forward_kinematics, forward_kinematics_velocity, frame_jacobian,
-    frame_twist, inverse_dynamics, world_poses,
+    Data, Frame, Model, State, forward_kinematics, forward_kinematics_velocity, frame_jacobian, frame_twist,
+    inverse_dynamics, world_poses,
 };
 use flexarm_stepping::{FlexibleArm, PooledWorkspace};
 use nalgebra::{DVector, Matrix6xX, Vector3};
@@ -23,9 +23,6 @@ pub(crate) struct RigidTwin {
     /// Model and state to which [`Self::data`] and [`Self::J`] belong; `None` if other functions
     /// used them last.
     placed: Option<(Arc<Model>, State)>,
-    /// Observer that computes all quantities in one pass, if it supports the tree, and the model
-    /// whose inertias it has; created at first use.
-    observer: Option<(Arc<Model>, Option<PooledWorkspace<Observer>>)>,
 }
 
 impl RigidTwin {
@@ -39,7 +36,6 @@ impl RigidTwin {
             velocity: Vector3::zeros(),
             acceleration: Vector3::zeros(),
             placed: None,
-            observer: None,
         }
     }
 
@@ -68,9 +64,6 @@ impl RigidTwin {
         } else {
             self.placed = Some((arm.model.clone(), self.state.clone()));
         }
-        if self.look(arm, tcp, false) {
-            return;
-        }
         forward_kinematics_velocity(&arm.model, &mut self.data, &self.state);
         frame_jacobian(&arm.model, &self.data, tcp, &mut self.J);
         self.velocity = frame_twist(&self.data, tcp).linear;
@@ -81,9 +74,6 @@ impl RigidTwin {
         self.placed = None;
         let model = &arm.model;
         arm.prescribed_state(t, &mut self.state, &mut self.qddot);
-        if self.look(arm, tcp, true) {
-            return;
-        }
         inverse_dynamics(model, &mut self.data, &self.state, &self.qddot);
         world_poses(model, &mut self.data);
         frame_jacobian(model, &self.data, tcp, &mut self.J);
@@ -93,36 +83,5 @@ impl RigidTwin {
         let A = self.data.A[tcp.body].at_child(&tcp.X_BF);
         let R = self.data.X_WB[tcp.body].rotation * tcp.X_BF.rotation;
         self.acceleration = R * (A.linear + V.angular.cross(&V.linear)) + model.gravity;
-    }
-
-    /// Computes world poses, Jacobian and TCP velocity in one pass, and with forces also the TCP
-    /// acceleration; returns false if the observer does not support the tree.
-    fn look(&mut self, arm: &FlexibleArm, tcp: &Frame, with_forces: bool) -> bool {
-        let (model, data) = (&arm.model, &mut *self.data);
-        let Self { state, qddot, observer, .. } = self;
-        let (weighed, observer) = observer.get_or_insert_with(|| {
-            // Initialises the spring data that the Jacobian needs; they do not change.
-            forward_kinematics(model, data, &state.q);
-            (model.clone(), if tcp.body > 0 { arm.lend_observer() } else { None })
-        });
-        let Some(observer) = observer else { return false };
-        if !Arc::ptr_eq(weighed, model) {
-            observer.weigh(model);
-            observer.keep();
-            weighed.clone_from(model);
-        }
-        let motions = Motions { q: state.q.as_slice(), qdot: state.qdot.as_slice(), qddot: qddot.as_slice() };
-        if with_forces {
-            observer.observe(model, motions, None, &mut data.X_WB, data.tau.as_mut_slice());
-        } else {
-            observer.place(motions, &mut data.X_WB);
-        }
-        let (moving, R, r) = (observer.motion(tcp.body), &data.X_WB[tcp.body].rotation, &tcp.X_BF.translation.vector);
-        self.velocity = R * moving.velocity(r);
-        if with_forces {
-            self.acceleration = R * moving.acceleration(r) + model.gravity;
-        }
-        frame_jacobian(model, data, tcp, &mut self.J);
-        true
     }
 }

@@ -64,7 +64,7 @@ struct Eliminate<'a> {
 }
 
 impl Loops for Eliminate<'_> {
-    #[inline(always)]
+    #[inline]
     fn run(self) {
         let Self { A, B, p } = self;
         let n = A.nrows();
@@ -82,7 +82,7 @@ impl Loops for Eliminate<'_> {
 }
 
 /// Subtracts multiples of one column from others.
-#[inline(always)]
+#[inline]
 fn subtract(from: &[f64], factors: &[f64], others: &mut [f64]) {
     for (to, factor) in others.chunks_exact_mut(from.len()).zip(factors) {
         to.iter_mut().zip(from).for_each(|(to, x)| *to -= factor * x);

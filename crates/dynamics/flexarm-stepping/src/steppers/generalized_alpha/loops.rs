@@ -18,7 +18,7 @@ pub(super) struct UpdatePositions<'a> {
 }
 
 impl Loops for UpdatePositions<'_> {
-    #[inline(always)]
+    #[inline]
     fn run(self) {
         let Self { coefficients, h, now, x_tilde_new, to: [x_new, v_new] } = self;
         let n = x_new.len();
@@ -39,7 +39,7 @@ pub(super) struct Shifted<'a> {
 }
 
 impl Loops for Shifted<'_> {
-    #[inline(always)]
+    #[inline]
     fn run(self) {
         for ((to, a), shift) in self.to.iter_mut().zip(self.a).zip(self.shift) {
             *to = self.c_h2 * shift + a;
@@ -60,7 +60,7 @@ pub(super) struct Correct<'a> {
 }
 
 impl Loops for Correct<'_> {
-    #[inline(always)]
+    #[inline]
     fn run(self) {
         let Self { d, shift, derivatives: (c_D, c_K), trial: [trial, x_tilde, x, v], sizes } = self;
         let n = d.len();
@@ -92,7 +92,7 @@ impl Loops for Correct<'_> {
 pub(super) struct Add<'a>(pub(super) &'a mut [f64], pub(super) &'a [f64]);
 
 impl Loops for Add<'_> {
-    #[inline(always)]
+    #[inline]
     fn run(self) {
         crate::dense::add(self.0, self.1);
     }
@@ -106,7 +106,7 @@ pub(super) struct Extrapolate<'a> {
 }
 
 impl Loops for Extrapolate<'_> {
-    #[inline(always)]
+    #[inline]
     fn run(self) {
         for ((to, a), b) in self.to.iter_mut().zip(self.a).zip(self.b) {
             *to = 2.0 * a - b;
@@ -123,7 +123,7 @@ pub(super) struct UpdateAccelerations<'a> {
 }
 
 impl Loops for UpdateAccelerations<'_> {
-    #[inline(always)]
+    #[inline]
     fn run(self) {
         for ((a, x_tilde), new) in self.a.iter_mut().zip(self.x_tilde).zip(self.x_tilde_new) {
             *a = self.coefficients.remembered(*a, *x_tilde, *new);

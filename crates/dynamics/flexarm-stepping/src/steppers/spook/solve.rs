@@ -46,18 +46,18 @@ pub(super) struct Triangle {
     pub(super) rw: Matrix3<f64>,
 }
 
-#[inline(always)]
+#[inline]
 fn halves(v: &Vector6<f64>) -> (Vector3<f64>, Vector3<f64>) {
     (Vector3::new(v[0], v[1], v[2]), Vector3::new(v[3], v[4], v[5]))
 }
 
-#[inline(always)]
+#[inline]
 pub(super) fn joined(a: &Vector3<f64>, b: &Vector3<f64>) -> Vector6<f64> {
     Vector6::new(a.x, a.y, a.z, b.x, b.y, b.z)
 }
 
 /// Returns a symmetric matrix from its lower triangle; the upper triangle is not read.
-#[inline(always)]
+#[inline]
 fn mirrored(X: &Matrix3<f64>) -> Matrix3<f64> {
     let (xy, xz, yz) = (X[(1, 0)], X[(2, 0)], X[(2, 1)]);
     Matrix3::new(X[(0, 0)], xy, xz, xy, X[(1, 1)], yz, xz, yz, X[(2, 2)])
@@ -65,7 +65,7 @@ fn mirrored(X: &Matrix3<f64>) -> Matrix3<f64> {
 
 /// Returns the inverse of a symmetric matrix by cofactors; `None` if the determinant is not
 /// positive.
-#[inline(always)]
+#[inline]
 fn inverse(X: &Matrix3<f64>) -> Option<Matrix3<f64>> {
     let (a, b, c): (Vector3<f64>, Vector3<f64>, Vector3<f64>) =
         (X.column(0).into(), X.column(1).into(), X.column(2).into());
@@ -97,19 +97,19 @@ impl Symmetric {
         Self { A: turn_symmetric(R, &self.A), B, C: turn_symmetric(R, &self.C) }
     }
 
-    #[inline(always)]
+    #[inline]
     fn plus(&self, o: &Self) -> Self {
         Self { A: self.A + o.A, B: self.B + o.B, C: self.C + o.C }
     }
 
-    #[inline(always)]
+    #[inline]
     fn times(&self, v: &Vector6<f64>) -> Vector6<f64> {
         let (a, b) = halves(v);
         joined(&(mul(&self.A, &a) + mul(&self.B, &b)), &(tr_mul(&self.B, &a) + mul(&self.C, &b)))
     }
 
     /// Returns `X Y`, which must be symmetric.
-    #[inline(always)]
+    #[inline]
     fn commuting_product(&self, Y: &Self) -> Self {
         let Bt = Y.B.transpose();
         let A = mul3(&self.A, &Y.A) + mul3(&self.B, &Bt);
@@ -119,7 +119,7 @@ impl Symmetric {
     }
 
     /// Returns `X Y Z`, which must be symmetric.
-    #[inline(always)]
+    #[inline]
     fn symmetric_product(&self, Y: &Self, Z: &Self) -> Self {
         // Columns of Y Z.
         let Bt = Z.B.transpose();
@@ -132,7 +132,7 @@ impl Symmetric {
     }
 
     /// Inverts by elimination of A; `None` if not positive definite.
-    #[inline(always)]
+    #[inline]
     fn inverse(&self) -> Option<Self> {
         let A = inverse(&self.A)?;
         let G = mul3(&A, &self.B);
@@ -143,20 +143,20 @@ impl Symmetric {
 }
 
 impl Triangle {
-    #[inline(always)]
+    #[inline]
     fn times(&self, v: &Vector6<f64>) -> Vector6<f64> {
         let (a, b) = halves(v);
         joined(&(mul(&self.tv, &a) + mul(&self.tw, &b)), &mul(&self.rw, &b))
     }
 
-    #[inline(always)]
+    #[inline]
     fn tr_times(&self, f: &Vector6<f64>) -> Vector6<f64> {
         let (a, b) = halves(f);
         joined(&tr_mul(&self.tv, &a), &(tr_mul(&self.tw, &a) + tr_mul(&self.rw, &b)))
     }
 
     /// Returns `Gᵀ X G`.
-    #[inline(always)]
+    #[inline]
     fn congruent(&self, X: &Symmetric) -> Symmetric {
         let Self { tv, tw, rw } = self;
         let (t, r) = (mul3(&X.A, tw) + mul3(&X.B, rw), tr_mul3(&X.B, tw) + mul3(&X.C, rw));
@@ -166,7 +166,7 @@ impl Triangle {
 }
 
 /// Returns `Gᵀ X G` for `G = [[1, [r]x], [0, 1]]`.
-#[inline(always)]
+#[inline]
 fn shifted(X: &Symmetric, r: &Vector3<f64>) -> Symmetric {
     // A [r]x = -([r]x A)ᵀ for a symmetric A.
     let B = X.B - cross3(r, &X.A).transpose();
@@ -185,7 +185,7 @@ pub(super) enum Jacobian {
 
 impl Jacobian {
     /// Returns `G_p v`.
-    #[inline(always)]
+    #[inline]
     pub(super) fn of_parent(&self, v: &Vector6<f64>) -> Vector6<f64> {
         match self {
             Self::Levers { parent, .. } => {
@@ -197,7 +197,7 @@ impl Jacobian {
     }
 
     /// Returns `G_c v`.
-    #[inline(always)]
+    #[inline]
     pub(super) fn of_child(&self, v: &Vector6<f64>) -> Vector6<f64> {
         match self {
             Self::Levers { child, .. } => {
@@ -209,7 +209,7 @@ impl Jacobian {
     }
 
     /// Returns `G_c^-1 u`.
-    #[inline(always)]
+    #[inline]
     fn back(&self, u: &Vector6<f64>) -> Vector6<f64> {
         match self {
             Self::Levers { child, .. } => {
@@ -221,7 +221,7 @@ impl Jacobian {
     }
 
     /// Returns `G_c^-T M G_c^-1` and `G_c^-T b`.
-    #[inline(always)]
+    #[inline]
     fn in_rows(&self, M: &Symmetric, b: &Vector6<f64>) -> (Symmetric, Vector6<f64>) {
         match self {
             Self::Levers { child, .. } => {
@@ -233,7 +233,7 @@ impl Jacobian {
     }
 
     /// Returns `G_pᵀ S G_p` and `G_pᵀ y`.
-    #[inline(always)]
+    #[inline]
     fn on_parent(&self, S: &Symmetric, y: &Vector6<f64>) -> (Symmetric, Vector6<f64>) {
         match self {
             Self::Levers { parent, .. } => {
@@ -260,7 +260,7 @@ pub(super) enum Sigma {
 }
 
 impl Sigma {
-    #[inline(always)]
+    #[inline]
     fn times(&self, v: &Vector6<f64>) -> Vector6<f64> {
         match self {
             Self::Hard(sigma) | Self::Free(sigma) => v * *sigma,
@@ -269,7 +269,7 @@ impl Sigma {
     }
 
     /// Returns `S^-1` and `S^-1 ŝ` by (4).
-    #[inline(always)]
+    #[inline]
     fn hold(&self, M: &Symmetric, b: &Vector6<f64>, s: &Vector6<f64>) -> Option<(Symmetric, Vector6<f64>)> {
         let push = M.times(s) - b;
         Some(match self {
