@@ -73,28 +73,6 @@ pub fn lanes_for(things: usize) -> usize {
     }
 }
 
-/// Loops over numbers, to be inlined.
-pub trait Loops {
-    /// Runs the loops.
-    fn run(self);
-}
-
-/// Runs loops with the vector instructions of the processor. Operations and their order are the
-/// same with and without.
-#[inline]
-pub fn quickly(loops: impl Loops) {
-    #[target_feature(enable = "avx2")]
-    fn compiled(loops: impl Loops) {
-        loops.run();
-    }
-    if is_x86_feature_detected!("avx2") {
-        // SAFETY: the processor has the features for which `compiled` is compiled.
-        unsafe { compiled(loops) }
-    } else {
-        loops.run();
-    }
-}
-
 /// Implements a type of SIMD lanes: type, number of lanes, register type and its instructions.
 macro_rules! lanes {
     ($name:ident, $lanes:literal, $register:ident, $splat:ident, $xor:ident, $andnot:ident, $sqrt:ident, $($trait:ident $method:ident $assign:ident $assign_method:ident $instruction:ident),+) => {

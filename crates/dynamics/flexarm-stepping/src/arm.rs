@@ -11,7 +11,7 @@ use std::sync::Arc;
 use flexarm_kinematics::{AxisMotion, Data, JointMotion, Model, SpatialInertia, State, Wrench, mass_matrix};
 use nalgebra::{DMatrix, DVector, Matrix6};
 
-use crate::dense::{self, Loops, quickly};
+use crate::dense::add_product;
 use crate::drive::{Friction, ServoAxis, SpringCurve};
 use crate::error::StepError;
 use crate::events::SAME_TIME;
@@ -103,21 +103,9 @@ impl ElasticElement {
     pub(crate) fn add_spring_force(&self, e: &[f64], q: &[f64], f: &mut [f64]) {
         match &self.curve {
             Some(curve) => f[0] += curve.torque(e[0], q),
-            None => add_product(&self.K, e, f),
+            None => add_product(self.K.as_slice(), e, f),
         }
     }
-}
-
-/// Computes `y += A x` for a square A, with the vector instructions that the processor has.
-pub(crate) fn add_product(A: &DMatrix<f64>, x: &[f64], y: &mut [f64]) {
-    struct AddProduct<'a>(&'a [f64], &'a [f64], &'a mut [f64]);
-    impl Loops for AddProduct<'_> {
-        #[inline(always)]
-        fn run(self) {
-            dense::add_product(self.0, self.1, self.2);
-        }
-    }
-    quickly(AddProduct(A.as_slice(), x, y));
 }
 
 /// Damping of an elastic element.

@@ -10,8 +10,8 @@
 use flexarm_kinematics::{Data, ElasticAngles, JointMotion, Model, Pose, SpatialInertia, State, skew};
 use nalgebra::{Matrix3, Matrix6};
 
-use crate::arm::{Damping, FlexibleArm, add_product};
-use crate::dense::{Loops, quickly};
+use crate::arm::{Damping, FlexibleArm};
+use crate::dense::add_product;
 use crate::tree_matrix::{TreeMatrices, TreeNode};
 
 /// Minimum number of elastic joints for elimination instead of a dense inverse: with two, 12
@@ -137,33 +137,6 @@ impl ElasticJoint {
     }
 }
 
-/// Computes `f += D v` for a diagonal block of a matrix.
-struct AddBlock<'a> {
-    D: &'a [f64],
-    rows: usize,
-    first: usize,
-    v: &'a [f64],
-    f: &'a mut [f64],
-}
-
-impl Loops for AddBlock<'_> {
-    #[inline(always)]
-    fn run(self) {
-        let Self { D, rows, first, v, f } = self;
-        let columns = D.chunks_exact(rows).skip(first).map(|column| &column[first..]).zip(v);
-        // Usually an elastic joint: a loop of known length.
-        if let Ok(f) = <&mut [f64; 6]>::try_from(&mut *f) {
-            let mut sum = *f;
-            for (column, rate) in columns {
-                sum.iter_mut().zip(&column[..6]).for_each(|(sum, d)| *sum += d * rate);
-            }
-            *f = sum;
-        } else {
-            columns.for_each(|(column, rate)| f.iter_mut().zip(column).for_each(|(f, d)| *f += d * rate));
-        }
-    }
-}
-
 impl FlexibleArm {
     /// Returns whether the damping matrix is block diagonal with one block per element.
     pub(crate) fn damps_by_element(&self) -> bool {
@@ -175,11 +148,14 @@ impl FlexibleArm {
     /// element.
     pub(crate) fn add_damping(&self, v: &[f64], f: &mut [f64]) {
         if !self.damps_by_element() {
-            return add_product(&self.D, v, f);
+            return add_product(self.D.as_slice(), v, f);
         }
         for element in &self.elements {
-            let (first, range) = (self.offset(element), self.offset(element)..self.offset(element) + element.size);
-            quickly(AddBlock { D: self.D.as_slice(), rows: v.len(), first, v: &v[range.clone()], f: &mut f[range] });
+            let (first, size) = (self.offset(element), element.size);
+            for (column, rate) in (first..first + size).zip(&v[first..]) {
+                let block = &self.D.as_slice()[column * v.len() + first..];
+                f[first..first + size].iter_mut().zip(block).for_each(|(f, d)| *f += d * rate);
+            }
         }
     }
 

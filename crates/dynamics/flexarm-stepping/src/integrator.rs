@@ -7,7 +7,7 @@ use std::sync::Arc;
 use nalgebra::DVector;
 
 use crate::arm::FlexibleArm;
-use crate::dense::largest_quickly;
+use crate::dense::largest_of_numbers;
 use crate::error::StepError;
 use crate::events::Change;
 use crate::observation::{Observation, observe_reduced};
@@ -294,7 +294,7 @@ impl<I: Integrator + 'static> Stepper for ReducedStepper<I> {
 
 /// Returns an error if an elastic coordinate exceeds [`LARGEST_DEFLECTION`].
 pub(crate) fn check_deflection(arm: &FlexibleArm, x: &DVector<f64>, t: f64, h: f64) -> Result<(), StepError> {
-    if largest_quickly(x.as_slice()) <= LARGEST_DEFLECTION {
+    if largest_of_numbers(x.as_slice()) <= LARGEST_DEFLECTION {
         return Ok(());
     }
     for element in arm.elements.iter().filter(|e| !e.modal || e.size >= 6) {

@@ -11,7 +11,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-use crate::dense::{norm, product_of_numbers, solve_quickly};
+use crate::dense::{dot, product, solve_in_place};
 use crate::error::StepError;
 use crate::mode_matrix::ModeInverse;
 use crate::system::SecondOrderSystem;
@@ -64,14 +64,14 @@ impl DenseInverse {
     fn invert(&mut self, t: f64) -> Result<(), StepError> {
         self.S += &self.C;
         let n = self.S.nrows();
-        match solve_quickly(self.S.as_mut_slice(), self.inverse.as_mut_slice(), n) {
+        match solve_in_place(self.S.as_mut_slice(), self.inverse.as_mut_slice(), n) {
             true => Ok(()),
             false => Err(StepError::Singular { matrix: "iteration matrix", t }),
         }
     }
 
     fn solve(&mut self, r: &mut DVector<f64>) {
-        product_of_numbers(self.inverse.as_slice(), r.as_slice(), self.product.as_mut_slice());
+        product(self.inverse.as_slice(), r.as_slice(), self.product.as_mut_slice());
         r.copy_from(&self.product);
     }
 }
@@ -123,7 +123,7 @@ impl IterationMatrix {
             MatrixForm::Tree(tree) => tree.solve(r),
             MatrixForm::Modes(modes) => modes.solve(r),
         }
-        norm(r.as_slice())
+        dot(r.as_slice(), r.as_slice()).sqrt()
     }
 }
 

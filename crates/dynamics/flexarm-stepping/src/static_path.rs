@@ -8,7 +8,7 @@ use flexarm_kinematics::{Data, Frame, JointMotion, State, forward_kinematics, gr
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::arm::{FlexibleArm, InertiaChange};
-use crate::dense::product_of_numbers;
+use crate::dense::product;
 use crate::error::StepError;
 use crate::events::EventQueue;
 use crate::geometric::add_geometric_forces;
@@ -157,7 +157,7 @@ impl StaticPath {
         let (mut found, mut last) = (false, f64::INFINITY);
         for _ in 0..MOST_CORRECTIONS {
             self.balance(t);
-            product_of_numbers(inverse.as_slice(), self.unbalanced.as_slice(), self.correction.as_mut_slice());
+            product(inverse.as_slice(), self.unbalanced.as_slice(), self.correction.as_mut_slice());
             let size = self.correction.amax();
             // An inverse of another position also makes small steps; require a fast decrease.
             if !size.is_finite() || size > 0.1 * last {

@@ -13,7 +13,7 @@ use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::arm::FlexibleArm;
 use crate::batch::lane_arm::{LaneArm, set_lane};
-use crate::dense::{change_and_product, congruence_quickly, dot, larger, product, solve_quickly};
+use crate::dense::{change_and_product, congruence, dot, larger, product, solve_in_place};
 use crate::error::StepError;
 use crate::implicit::{ImplicitStep, Newton, Search, Sizes};
 use crate::integrator::TimeGrid;
@@ -530,8 +530,8 @@ impl Matrices {
         let n = *n;
         L.copy_from_slice(S);
         M_inverse_K.copy_from_slice(K);
-        let positive = solve_quickly(L, M_inverse_K, n);
-        congruence_quickly(c_h2, M_inverse_K, C, n, [L, turned], product);
+        let positive = solve_in_place(L, M_inverse_K, n);
+        congruence(c_h2, M_inverse_K, C, n, [L, turned], product);
         // M + c h² K + S C Sᵀ, and Sᵀ as right-hand side, stored transposed.
         for ((s, k), c) in S.iter_mut().zip(K).zip(product.iter()) {
             *s += c_h2 * *k;
@@ -544,7 +544,7 @@ impl Matrices {
         for (i, s) in inverse.iter_mut().zip(M_inverse_K.iter()) {
             *i += c_h2 * *s;
         }
-        solve_quickly(S, inverse, n) && positive
+        solve_in_place(S, inverse, n) && positive
     }
 }
 

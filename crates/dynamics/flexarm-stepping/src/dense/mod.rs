@@ -4,11 +4,7 @@
 //! which single runs use, so that each lane is bitwise the same. [`Factor`] has its own order, used
 //! for single poses and lanes alike.
 
-mod quick;
-
 use flexarm_kinematics::Real;
-
-pub(crate) use quick::{Loops, congruence_quickly, largest_quickly, norm, product_of_numbers, quickly, solve_quickly};
 
 /// Computes `y = A x`.
 #[inline(always)]
@@ -144,7 +140,7 @@ pub(crate) fn cholesky<T: Real>(A: &mut [T], n: usize) -> T {
 
 /// Replaces A by its factor and `Bᵀ` by `A^-1 B`; returns false if A is not positive definite.
 #[inline(always)]
-fn solve_in_place(A: &mut [f64], Bt: &mut [f64], n: usize) -> bool {
+pub(crate) fn solve_in_place(A: &mut [f64], Bt: &mut [f64], n: usize) -> bool {
     let positive = cholesky(A, n) == 1.0;
     solve_transposed(A, Bt, n);
     transpose(Bt, n);
@@ -186,7 +182,7 @@ fn subtract<T: Real>(to: &mut [T], factor: T, from: &[T]) {
 
 /// Computes `S C Sᵀ` with `Sᵀ = 1 + c X` for a symmetric C; both workspaces are n × n.
 #[inline(always)]
-fn congruence(c: f64, X: &[f64], C: &[f64], n: usize, room: [&mut [f64]; 2], product: &mut [f64]) {
+pub(crate) fn congruence(c: f64, X: &[f64], C: &[f64], n: usize, room: [&mut [f64]; 2], product: &mut [f64]) {
     let [room, Xt] = room;
     if n == 0 {
         return;
@@ -430,7 +426,7 @@ mod tests {
             for broken in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
                 for k in 0..x.len() {
                     let held = std::mem::replace(&mut x[k], broken);
-                    assert_eq!(largest_quickly(&x), f64::INFINITY, "{n} {k}");
+                    assert_eq!(largest_of_numbers(&x), f64::INFINITY, "{n} {k}");
                     x[k] = held;
                 }
             }

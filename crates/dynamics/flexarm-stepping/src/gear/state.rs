@@ -2,7 +2,8 @@
 
 use nalgebra::{DVector, Vector6};
 
-use crate::arm::{ElasticElement, FlexibleArm, add_product};
+use crate::arm::{ElasticElement, FlexibleArm};
+use crate::dense::add_product;
 use crate::drive::SpringCurve;
 use crate::gear::hysteresis::SliderState;
 
@@ -62,7 +63,11 @@ impl GearState {
         if arm.proportional {
             for (element, tau) in arm.elements.iter().zip(&arm.tau) {
                 let range = arm.offset(element)..arm.offset(element) + element.size;
-                add_product(&element.K, &rate.as_slice()[range.clone()], &mut damper.as_mut_slice()[range.clone()]);
+                add_product(
+                    element.K.as_slice(),
+                    &rate.as_slice()[range.clone()],
+                    &mut damper.as_mut_slice()[range.clone()],
+                );
                 damper.as_mut_slice()[range].iter_mut().for_each(|d| *d *= tau);
             }
         } else {

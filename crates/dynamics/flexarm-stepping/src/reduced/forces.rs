@@ -2,7 +2,7 @@
 
 use nalgebra::DVector;
 
-use crate::dense::{Loops, add_product, quickly};
+use crate::dense::add_product;
 use crate::gear::{GearState, LoadFriction};
 use crate::geometric::add_geometric_forces;
 use crate::reduced::ReducedArm;
@@ -23,14 +23,12 @@ impl ReducedArm {
             let first = self.arm.offset(element);
             let range = first..first + element.size;
             if self.arm.proportional && element.curve.is_none() {
-                quickly(Damped {
-                    K: element.K.as_slice(),
-                    tau: self.arm.tau[k],
-                    x: &x[range.clone()],
-                    v: &v[range.clone()],
-                    y: &mut self.shifted.as_mut_slice()[..element.size],
-                    f: &mut f[range],
-                });
+                // K (x + tau v)
+                let (tau, shifted) = (self.arm.tau[k], &mut self.shifted.as_mut_slice()[..element.size]);
+                for ((shifted, x), v) in shifted.iter_mut().zip(&x[range.clone()]).zip(&v[range.clone()]) {
+                    *shifted = x + tau * v;
+                }
+                add_product(element.K.as_slice(), shifted, &mut f[range]);
             } else {
                 element.add_spring_force(&x[range.clone()], &[], &mut f[range.clone()]);
                 if self.arm.proportional {
@@ -102,26 +100,5 @@ impl ReducedArm {
         for k in 0..self.arm.model.n_actuated() {
             self.data.tau[k] += self.arm.friction_torque(k, self.state.qdot[k]);
         }
-    }
-}
-
-/// `f += K (x + tau v)` of a spring; `y` is workspace.
-struct Damped<'a> {
-    K: &'a [f64],
-    tau: f64,
-    x: &'a [f64],
-    v: &'a [f64],
-    y: &'a mut [f64],
-    f: &'a mut [f64],
-}
-
-impl Loops for Damped<'_> {
-    #[inline(always)]
-    fn run(self) {
-        let Self { K, tau, x, v, y, f } = self;
-        for ((y, x), v) in y.iter_mut().zip(x).zip(v) {
-            *y = x + tau * v;
-        }
-        add_product(K, y, f);
     }
 }

@@ -2,7 +2,6 @@
 
 use nalgebra::DMatrix;
 
-use crate::dense::{Loops, quickly};
 use crate::error::StepError;
 
 /// `P A = L U`.
@@ -53,21 +52,7 @@ impl Lu {
         for (k, row) in self.rows.iter().enumerate() {
             B.swap_columns(k, *row);
         }
-        quickly(Eliminate { A: &self.A, B: B.as_mut_slice(), p });
-    }
-}
-
-struct Eliminate<'a> {
-    A: &'a DMatrix<f64>,
-    B: &'a mut [f64],
-    p: usize,
-}
-
-impl Loops for Eliminate<'_> {
-    #[inline]
-    fn run(self) {
-        let Self { A, B, p } = self;
-        let n = A.nrows();
+        let (A, B, n) = (&self.A, B.as_mut_slice(), self.A.nrows());
         for (k, factors) in A.as_slice().chunks_exact(n).enumerate() {
             let (inner, outer) = B.split_at_mut((k + 1) * p);
             subtract(&inner[k * p..], &factors[k + 1..], outer);

@@ -11,8 +11,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::loops::Shifted;
-use crate::dense::{congruence_quickly, product_of_numbers, quickly, solve_quickly};
+use crate::dense::{congruence, product, solve_in_place};
 use crate::error::StepError;
 use crate::iteration_matrix::{IterationMatrix, MatrixForm};
 use crate::system::SecondOrderSystem;
@@ -93,14 +92,14 @@ impl DispersionCorrection {
         // M^-1 K; K is symmetric.
         if !kept {
             M_inverse_K.copy_from(K);
-            if !solve_quickly(factor.as_mut_slice(), M_inverse_K.as_mut_slice(), n) {
+            if !solve_in_place(factor.as_mut_slice(), M_inverse_K.as_mut_slice(), n) {
                 return Err(StepError::Singular { matrix: "mass matrix", t });
             }
         }
 
         // Product S C Sᵀ.
         let (X, C) = (M_inverse_K.as_slice(), matrix.C.as_slice());
-        congruence_quickly(c_h2, X, C, n, [factor.as_mut_slice(), turned.as_mut_slice()], product.as_mut_slice());
+        congruence(c_h2, X, C, n, [factor.as_mut_slice(), turned.as_mut_slice()], product.as_mut_slice());
         matrix.C.copy_from(product);
 
         // M + c h² K, and Sᵀ as right-hand side, stored transposed.
@@ -122,8 +121,9 @@ impl DispersionCorrection {
             MatrixForm::Dense(_) => {}
         }
         self.shift_by(acceleration);
-        let (a, shift) = (acceleration.as_slice(), self.shift.as_slice());
-        quickly(Shifted { a, c_h2: self.c_h2, shift, to: x_tilde.as_mut_slice() });
+        for ((x_tilde, a), shift) in x_tilde.iter_mut().zip(acceleration).zip(&self.shift) {
+            *x_tilde = self.c_h2 * shift + a;
+        }
     }
 
     /// Returns the contribution of a change d of ẍ, the last solution with the matrix, to the
@@ -140,6 +140,6 @@ impl DispersionCorrection {
 
     /// Computes `M^-1 K d`.
     fn shift_by(&mut self, d: &DVector<f64>) {
-        product_of_numbers(self.M_inverse_K.as_slice(), d.as_slice(), self.shift.as_mut_slice());
+        product(self.M_inverse_K.as_slice(), d.as_slice(), self.shift.as_mut_slice());
     }
 }

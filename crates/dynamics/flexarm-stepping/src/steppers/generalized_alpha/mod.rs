@@ -40,7 +40,6 @@
 
 mod course;
 mod dispersion;
-mod loops;
 
 use std::sync::Arc;
 
@@ -48,7 +47,7 @@ use flexarm_kinematics::Real;
 use nalgebra::DVector;
 
 use crate::arm::FlexibleArm;
-use crate::dense::quickly;
+use crate::dense::{add, largest_of_numbers};
 use crate::error::StepError;
 use crate::implicit::{ImplicitStep, Newton, Search, Sizes};
 use crate::integrator::{Current, ReducedStepper};
@@ -359,8 +358,8 @@ impl GeneralizedAlpha {
             (&mut self.course, &mut self.correction, &mut self.newton.matrix.way)
         {
             let (change, _) = course.step();
-            quickly(loops::Add(dense.inverse.as_mut_slice(), &change[0]));
-            quickly(loops::Add(correction.M_inverse_K_mut(), &change[1]));
+            add(dense.inverse.as_mut_slice(), &change[0]);
+            add(correction.M_inverse_K_mut(), &change[1]);
         }
     }
 
@@ -371,13 +370,10 @@ impl GeneralizedAlpha {
             Some(correction) => correction.corrected(&mut self.newton.matrix, &self.trial, &mut self.x_tilde_new),
             None => self.x_tilde_new.copy_from(&self.trial),
         }
-        quickly(loops::UpdatePositions {
-            coefficients: self.coefficients,
-            h,
-            now: [self.now.x.as_slice(), self.now.v.as_slice(), self.a.as_slice(), self.x_tilde.as_slice()],
-            x_tilde_new: self.x_tilde_new.as_slice(),
-            to: [self.x_new.as_mut_slice(), self.v_new.as_mut_slice()],
-        });
+        let Self { now: Current { x, v, .. }, a, x_tilde, x_tilde_new, .. } = self;
+        for k in 0..x.len() {
+            (self.x_new[k], self.v_new[k]) = self.coefficients.advance(h, x[k], v[k], a[k], x_tilde[k], x_tilde_new[k]);
+        }
     }
 
     /// Computes `r(t⁺, x⁺, v⁺, ẍ⁺)` of (1).
@@ -389,25 +385,24 @@ impl GeneralizedAlpha {
     fn correct(&mut self, mut sizes: Sizes) -> Sizes {
         let d = &self.newton.r;
         let shift = self.correction.as_mut().map(|correction| correction.shift(&self.newton.matrix, d));
-        let [trial, x_tilde] = [self.trial.as_mut_slice(), self.x_tilde_new.as_mut_slice()];
-        quickly(loops::Correct {
-            d: d.as_slice(),
-            shift: shift.map(|(factor, shift)| (factor, shift.as_slice())),
-            derivatives: self.coefficients.derivatives(self.newton.dt),
-            trial: [trial, x_tilde, self.x_new.as_mut_slice(), self.v_new.as_mut_slice()],
-            sizes: &mut sizes,
-        });
+        let (c_D, c_K) = self.coefficients.derivatives(self.newton.dt);
+        for k in 0..d.len() {
+            let d_tilde = d[k] + shift.map_or(0.0, |(factor, shift)| factor * shift[k]);
+            self.trial[k] -= d[k];
+            self.x_tilde_new[k] -= d_tilde;
+            self.x_new[k] -= c_K * d_tilde;
+            self.v_new[k] -= c_D * d_tilde;
+        }
+        let [d, acceleration, place] = [d, &self.trial, &self.x_new].map(|x| largest_of_numbers(x.as_slice()));
+        sizes.include(d, acceleration, place);
         sizes
     }
 
     /// Accepts the trial values as the state at `t`.
     fn accept(&mut self, t: f64) {
-        quickly(loops::UpdateAccelerations {
-            coefficients: self.coefficients,
-            a: self.a.as_mut_slice(),
-            x_tilde: self.x_tilde.as_slice(),
-            x_tilde_new: self.x_tilde_new.as_slice(),
-        });
+        for ((a, x_tilde), new) in self.a.iter_mut().zip(&self.x_tilde).zip(&self.x_tilde_new) {
+            *a = self.coefficients.remembered(*a, *x_tilde, *new);
+        }
         std::mem::swap(&mut self.now.x, &mut self.x_new);
         std::mem::swap(&mut self.now.v, &mut self.v_new);
         std::mem::swap(&mut self.x_tilde, &mut self.x_tilde_new);
@@ -455,8 +450,9 @@ impl ImplicitStep for GeneralizedAlpha {
         }
 
         // Predict ẍ⁺ by extrapolation.
-        let (a, b) = (self.now.acceleration.as_slice(), self.previous.as_slice());
-        quickly(loops::Extrapolate { a, b, to: self.trial.as_mut_slice() });
+        for ((trial, a), b) in self.trial.iter_mut().zip(&self.now.acceleration).zip(&self.previous) {
+            *trial = 2.0 * a - b;
+        }
         self.place();
 
         // Newton's method on (1).
