@@ -297,21 +297,19 @@ fn metadata(
     inputs.extend(scenario.loads_file.as_ref().map(|path| ("loads_file", straight(path))));
     let drives = options.modelling.drives.word().unwrap_or(AS_FILED);
     let links_choice = options.modelling.links.word().unwrap_or(AS_FILED);
+    let mut run = vec![
+        ("version", env!("CARGO_PKG_VERSION").into()),
+        ("robot", robot.name.clone()),
+        ("trajectory", motion.name.clone()),
+        ("stepper", stepper.name.clone()),
+        ("step_s", options.step_s.to_string()),
+        ("start", format!("{:?}", scenario.start).to_lowercase()),
+        ("log_rate_hz", options.log_rate_hz.to_string()),
+        ("settling_band_m", options.settling_band_m.to_string()),
+    ];
+    run.extend(stepper.settings.0.iter().map(|(key, value)| (key.as_str(), value.to_string())));
     vec![
-        group(
-            "flexarm.run",
-            &[
-                ("version", env!("CARGO_PKG_VERSION").into()),
-                ("robot", robot.name.clone()),
-                ("trajectory", motion.name.clone()),
-                ("stepper", stepper.name.clone()),
-                ("step_s", options.step_s.to_string()),
-                ("rho_inf", stepper.settings.get("rho_inf").map_or_else(String::new, ToString::to_string)),
-                ("start", format!("{:?}", scenario.start).to_lowercase()),
-                ("log_rate_hz", options.log_rate_hz.to_string()),
-                ("settling_band_m", options.settling_band_m.to_string()),
-            ],
-        ),
+        group("flexarm.run", &run),
         group(
             "flexarm.model",
             &[

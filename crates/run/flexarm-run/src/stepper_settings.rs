@@ -45,6 +45,23 @@ impl StepperSettings {
         Self(stepper.settings().into_iter().map(|(key, setting)| (key.to_owned(), value(setting))).collect())
     }
 
+    /// Returns the settings whose texts are known by their keys.
+    pub(crate) fn from_texts<'t>(text: impl Fn(&str) -> Option<&'t str>) -> Self {
+        let value = |text: &str| match (text.parse(), text.parse()) {
+            (Ok(on), _) => SettingValue::Flag(on),
+            (_, Ok(number)) => SettingValue::Number(number),
+            _ => SettingValue::Word(text.to_owned()),
+        };
+        let known = known_keys().into_iter().filter_map(|key| Some((key, text(key).filter(|text| !text.is_empty())?)));
+        let mut settings: Vec<(String, SettingValue)> = Vec::new();
+        for (key, text) in known {
+            if settings.iter().all(|(own, _)| own != key) {
+                settings.push((key.to_owned(), value(text)));
+            }
+        }
+        Self(settings)
+    }
+
     /// Returns the setting with this key, if the stepper has it.
     pub fn get(&self, key: &str) -> Option<&SettingValue> {
         self.0.iter().find(|(own, _)| own == key).map(|(_, value)| value)
@@ -135,6 +152,17 @@ mod tests {
         ];
         for (stepper, settings, name) in cases {
             assert_eq!(json(stepper), with(settings, name));
+        }
+    }
+
+    #[test]
+    fn settings_of_every_stepper_are_read_back_from_their_texts() {
+        for entry in flexarm_stepping::STEPPERS {
+            let own = StepperSettings::of(&(entry.with)(&Default::default()));
+            let texts: Vec<(String, String)> =
+                own.0.iter().map(|(key, value)| (key.clone(), value.to_string())).collect();
+            let text = |key: &str| texts.iter().find(|(own, _)| own == key).map(|(_, text)| text.as_str());
+            assert_eq!(StepperSettings::from_texts(text), own, "{}", entry.name);
         }
     }
 

@@ -3,8 +3,7 @@
 use std::sync::Arc;
 
 use flexarm_kinematics::{
-    Data, Frame, Model, State, forward_kinematics, forward_kinematics_velocity, frame_jacobian, frame_twist,
-    inverse_dynamics, world_poses,
+    Data, Frame, Model, State, forward_kinematics_velocity, frame_jacobian, frame_twist, inverse_dynamics, world_poses,
 };
 use flexarm_stepping::{FlexibleArm, PooledWorkspace};
 use nalgebra::{DVector, Matrix6xX, Vector3};

@@ -12,7 +12,7 @@ use super::{ReportRun, figures, html};
 use crate::convert::{no_sample, read_run, same_file};
 use crate::error::{Error, RecordingError};
 use crate::magnification::fit_color_scale;
-use crate::stepper_settings::{SettingValue, StepperSettings};
+use crate::stepper_settings::StepperSettings;
 use crate::summary::{StepperFigures, Summary, TcpFigures};
 
 /// Options of a report.
@@ -262,7 +262,6 @@ fn computed(trace: &Trace) -> Summary {
     let flexible = if header.elements.is_empty() { "" } else { "flexible" };
     let robot = run("robot").unwrap_or(&header.robot);
     let trajectory = run("trajectory").unwrap_or(&header.trajectory);
-    let rho = run("rho_inf").and_then(|rho| rho.parse().ok()).into_iter();
     Summary {
         robot: named(robot, "recorded run"),
         trajectory: if trajectory == UNKNOWN { String::new() } else { trajectory.to_owned() },
@@ -270,7 +269,7 @@ fn computed(trace: &Trace) -> Summary {
         stepper: StepperFigures {
             name: run("stepper").unwrap_or_default().to_owned(),
             h_s: run("step_s").and_then(|h| h.parse().ok()).unwrap_or(header.step_s),
-            settings: StepperSettings(rho.map(|rho| ("rho_inf".to_owned(), SettingValue::Number(rho))).collect()),
+            settings: StepperSettings::from_texts(run),
             ..StepperFigures::default()
         },
         duration_s: trace.rows.last().map_or(0.0, |row| row.time_s),
