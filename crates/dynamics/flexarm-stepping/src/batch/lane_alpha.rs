@@ -525,6 +525,7 @@ impl Matrices {
 
     /// Computes `M^-1 K` and the inverse of Newton's matrix from S and the C and K of a run, as the
     /// dispersion correction of a single run does; returns false if there is none.
+    #[inline(always)]
     fn invert(&mut self, c_h2: f64, C: &[f64], K: &[f64]) -> bool {
         let Self { n, S, product, L, turned, M_inverse_K, inverse } = self;
         let n = *n;
