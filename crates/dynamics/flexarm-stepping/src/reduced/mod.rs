@@ -16,7 +16,8 @@ mod system;
 use std::sync::Arc;
 
 use flexarm_kinematics::{
-    Data, Pose, Roles, State, forward_kinematics, inverse_dynamics, kinetic_energy_of, potential_energy_of, world_poses,
+    Data, FreeForces, Pose, Roles, State, forward_kinematics, inverse_dynamics, kinetic_energy_of,
+    potential_energy_of, world_poses,
 };
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
@@ -63,8 +64,20 @@ pub struct ReducedArm {
     tree: Option<ElasticTree>,
     /// Modes that are eliminated first, if there are enough of them.
     modes: Option<HeldModes>,
-    /// Whether `data` holds the poses of the last [`ReducedArm::set`].
-    is_placed: bool,
+    /// Equations of motion of the free coordinates only, if these suffice and the tree is
+    /// supported.
+    points: Option<PooledWorkspace<FreeForces>>,
+    /// Workspace with the poses of the last [`ReducedArm::set`]; `None` until they are computed.
+    poses: Option<PosesIn>,
+}
+
+/// Workspace of a [`ReducedArm`] that holds poses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum PosesIn {
+    /// `data`.
+    Data,
+    /// `points`, after a residual.
+    Points,
 }
 
 impl ReducedArm {
@@ -77,6 +90,7 @@ impl ReducedArm {
         let roles = Roles::new(model, |k| k < model.n_actuated() && !driven.contains(&k));
         // Load-dependent stiffness needs the spatial accelerations of the full pass.
         let geometric = arm.elements.iter().any(|e| e.geometric.is_some());
+        let points = if geometric { None } else { arm.lend_points(&roles) };
         Self {
             data: arm.lend_data(),
             state: State::zeros(model),
@@ -97,7 +111,8 @@ impl ReducedArm {
             gears: GearState::of(&arm),
             tree: ElasticTree::that_pays(&arm),
             modes: HeldModes::that_pay(&arm),
-            is_placed: false,
+            points,
+            poses: None,
             arm,
         }
     }
@@ -143,7 +158,7 @@ impl ReducedArm {
     pub(crate) fn set(&mut self, t: f64, x: &DVector<f64>, v: &DVector<f64>) {
         let t = self.events.side(t);
         self.sample_joints(t);
-        self.is_placed = false;
+        self.poses = None;
         let n = self.arm.model.n_actuated();
         let driven = self.arm.torque_driven.len();
         for (i, &k) in self.arm.torque_driven.iter().enumerate() {
@@ -171,11 +186,19 @@ impl ReducedArm {
         StepError::open_loop(&self.arm.model, &self.data, 0.0).map_or(Ok(()), Err)
     }
 
+    /// Updates the workspaces after a change of the masses of the bodies.
+    pub(crate) fn weigh(&mut self) {
+        if let Some(points) = &mut self.points {
+            points.weigh(&*self.arm.model);
+            points.keep();
+        }
+    }
+
     /// Computes the poses of the state in `data` unless they are there.
     fn place(&mut self) {
-        if !self.is_placed {
+        if self.poses != Some(PosesIn::Data) {
             forward_kinematics(&self.arm.model, &mut self.data, &self.state.q);
-            self.is_placed = true;
+            self.poses.get_or_insert(PosesIn::Data);
         }
     }
 
@@ -192,7 +215,7 @@ impl ReducedArm {
     pub(crate) fn evaluate(&mut self, t: f64, x: &DVector<f64>, v: &DVector<f64>, a: &DVector<f64>) {
         self.set(t, x, v);
         self.set_accelerations(a);
-        self.is_placed = true;
+        self.poses = Some(PosesIn::Data);
         inverse_dynamics(&self.arm.model, &mut self.data, &self.state, &self.qddot);
         self.add_joint_torques(x, v);
         world_poses(&self.arm.model, &mut self.data);
