@@ -19,7 +19,7 @@ use crate::mesh::MassProperties;
 use crate::raw::{RawInertial, RawLink, RawRobot};
 use crate::read::{InertiaEstimate, ReadOptions};
 use crate::report::Report;
-use crate::shapes::LinkShape;
+use crate::shapes::{LinkShape, NoEstimate};
 use crate::tree::Body;
 
 /// Relative tolerance of the checks, that of single-precision files.
@@ -184,7 +184,7 @@ fn check_body(
     body: &Body,
     inertias: &[Option<LinkInertia>],
     without_extent: &[bool],
-    failures: &[Option<String>],
+    failures: &[Option<NoEstimate>],
     options: &ReadOptions,
     report: &mut Report,
 ) -> Option<(TextPosition, Problem)> {
@@ -194,7 +194,7 @@ fn check_body(
     let lumped = || body.members[1..].iter().map(|&(i, _)| robot.links[i].name.clone()).collect();
     let with_inertia: Vec<usize> = body.members.iter().map(|m| m.0).filter(|&i| inertias[i].is_some()).collect();
     if with_inertia.is_empty() {
-        let no_estimate = body.members.iter().find_map(|&(i, _)| failures[i].clone());
+        let no_estimate = body.members.iter().find_map(|&(i, _)| failures[i].as_ref()).map(NoEstimate::to_string);
         let asked = no_estimate.is_some();
         let problem = Problem::MissingInertial { link, joint, lumped: lumped(), no_estimate };
         if asked {
@@ -274,7 +274,7 @@ fn fill_from_shapes(
     estimate: InertiaEstimate,
     inertias: &mut [Option<LinkInertia>],
     report: &mut Report,
-) -> Vec<Option<String>> {
+) -> Vec<Option<NoEstimate>> {
     let mut failures = vec![None; robot.links.len()];
     let (what, value) = match estimate {
         InertiaEstimate::Density(density) => ("the density", density),
@@ -297,7 +297,7 @@ fn fill_from_shapes(
                 if M_L.mass > 0.0 {
                     filled.push((i, M_L));
                 } else {
-                    failures[i] = Some("its mesh encloses no volume".to_owned());
+                    failures[i] = Some(NoEstimate::NoVolume);
                 }
             }
             Err(reason) => failures[i] = Some(reason.clone()),
@@ -311,7 +311,7 @@ fn fill_from_shapes(
         filled.iter().for_each(|(i, _)| failures[*i] = None);
     }
     if filled.is_empty() {
-        shapeless.iter().for_each(|&i| failures[i] = Some("there is no shape".to_owned()));
+        shapeless.iter().for_each(|&i| failures[i] = Some(NoEstimate::NoShape));
     }
     // For rods the "volume" is the length.
     let volume: f64 = filled.iter().map(|(_, M)| M.mass).sum();
