@@ -274,25 +274,46 @@ pub fn parse_matrices(files: &[InputFile], names: &MatrixNames) -> Result<Import
 
 fn parse_file(file: &InputFile, found: &mut CombinedFiles) -> Result<(), ExchangeError> {
     let origin = file.origin.as_str();
-    let place = ErrorPosition::file(origin);
     let Some(format) = recognise(&file.bytes) else {
         let help = ".mtx of Adams and Altair, .mnf, .sub, .h3d and .npz cannot be read: export text, such as DMIG or \
                     Matrix Market";
         let expected = "Matrix Market, CalculiX or Abaqus matrices, DMIG, OP4, Harwell-Boeing, Exudyn HDF5, CSV";
+        let place = ErrorPosition::file(origin);
         return Err(place.fail(ExchangeErrorKind::NotRecognised, "file", "an unknown format", expected, help));
     };
     let bytes = unpack(&file.bytes, origin)?;
+    let mut matrices = parse_format(format, &bytes, file, found)?;
+    // A role given by the user takes precedence; if the file has several matrices, those with that
+    // role are kept.
+    match (&mut matrices[..], file.role) {
+        ([(role, _)], Some(said)) => *role = Some(said),
+        (several, Some(said)) => several.iter_mut().for_each(|(role, _)| *role = role.filter(|role| *role == said)),
+        (_, None) => {}
+    }
+    let candidate = |(role, matrix)| Candidate { format, origin: origin.into(), role, matrix };
+    found.candidates.extend(matrices.into_iter().map(candidate));
+    Ok(())
+}
+
+/// Returns the matrices of a file with their roles, as far as known; keeps other data in `found`.
+fn parse_format(
+    format: MatrixFormat,
+    bytes: &[u8],
+    file: &InputFile,
+    found: &mut CombinedFiles,
+) -> Result<Vec<(Option<MatrixRole>, LabelledMatrix)>, ExchangeError> {
+    let origin = file.origin.as_str();
     let lossy = if matches!(format, MatrixFormat::Op4Binary | MatrixFormat::ExudynHdf5) {
         std::borrow::Cow::Borrowed("")
     } else {
-        String::from_utf8_lossy(&bytes)
+        String::from_utf8_lossy(bytes)
     };
     let text = Text::new(&lossy, origin);
     let by_file = file.role.or_else(|| role_by_name(origin));
     let one = |matrix| vec![(by_file, matrix)];
     let several = |list: Vec<LabelledMatrix>| list.into_iter().map(|m| (role_by_letter(&m.name), m)).collect();
 
-    let mut matrices: Vec<(Option<MatrixRole>, LabelledMatrix)> = match format {
+    Ok(match format {
         MatrixFormat::MatrixMarket => one(matrix_market::parse(text)?),
         MatrixFormat::UserElement => user_element::parse(text)?.into_iter().map(|(role, m)| (Some(role), m)).collect(),
         MatrixFormat::LabelledText => {
@@ -316,7 +337,7 @@ fn parse_file(file: &InputFile, found: &mut CombinedFiles) -> Result<(), Exchang
             several(dmig.matrices)
         }
         MatrixFormat::Op4Text => several(op4_text::parse(text)?),
-        MatrixFormat::Op4Binary => several(op4_binary::parse(&bytes, origin)?),
+        MatrixFormat::Op4Binary => several(op4_binary::parse(bytes, origin)?),
         MatrixFormat::HarwellBoeing => one(harwell_boeing::parse(text)?),
         #[cfg(not(feature = "hdf5"))]
         MatrixFormat::ExudynHdf5 => {
@@ -326,7 +347,7 @@ fn parse_file(file: &InputFile, found: &mut CombinedFiles) -> Result<(), Exchang
         }
         #[cfg(feature = "hdf5")]
         MatrixFormat::ExudynHdf5 => {
-            let exudyn = super::exudyn::parse(&bytes, origin)?;
+            let exudyn = super::exudyn::parse(bytes, origin)?;
             found.positions.extend(exudyn.positions);
             found.node_sets.extend(exudyn.node_sets);
             vec![(Some(MatrixRole::Stiffness), exudyn.stiffness), (Some(MatrixRole::Mass), exudyn.mass)]
@@ -343,19 +364,10 @@ fn parse_file(file: &InputFile, found: &mut CombinedFiles) -> Result<(), Exchang
         MatrixFormat::Sid => {
             let help = "read it with parse_sid";
             let expected = "stiffness and mass of interfaces";
+            let place = ErrorPosition::file(origin);
             return Err(place.fail(ExchangeErrorKind::Unsupported, "file", "a modal body (SID)", expected, help));
         }
-    };
-    // A role given by the user takes precedence; if the file has several matrices, those with that
-    // role are kept.
-    match (&mut matrices[..], file.role) {
-        ([(role, _)], Some(said)) => *role = Some(said),
-        (several, Some(said)) => several.iter_mut().for_each(|(role, _)| *role = role.filter(|role| *role == said)),
-        (_, None) => {}
-    }
-    let candidate = |(role, matrix)| Candidate { format, origin: origin.into(), role, matrix };
-    found.candidates.extend(matrices.into_iter().map(candidate));
-    Ok(())
+    })
 }
 
 /// Full models (`.sti`, `.mas`) are stored sparse, other files by size.
