@@ -3,7 +3,7 @@
 use rerun::{Color, EntityPath, TimeColumn};
 
 use super::colors::{axis, component, faint, series, total};
-use super::path;
+use super::entity::path;
 use super::stream::{Result, RrdStream};
 use super::tracks::{CurveExtent, ScalarTrack};
 use crate::poses::size;

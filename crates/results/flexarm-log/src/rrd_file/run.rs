@@ -7,8 +7,8 @@ use rerun::{
 
 use super::colors::{self, ColorScale};
 use super::curves::Curves;
+use super::entity::path;
 use super::eye::{Eye, eye};
-use super::path;
 use super::robot::{Paint, RobotAppearance, RobotTracks};
 use super::stream::{Result, RrdStream};
 use super::tracks::{ArrowTrack, CurveExtent, Instant, PathTrack, SIM_TIME, Times, Track, point};
