@@ -5,10 +5,10 @@ use serde::Deserialize;
 
 use super::document::{Node, Table};
 use super::error::{FlexErrorKind, FlexFileError};
-use super::frames::read_pose;
-use super::read::{read_inertial, refused};
+use super::frames::{pose_lines, read_pose};
+use super::rigid_part::{inertial, read_inertial};
+use super::text::{numbers, quoted};
 use super::units::Units;
-use super::write::{numbers, pose_lines, quoted};
 use crate::chain::Chain;
 use crate::error::FemError;
 use crate::gate::{GateLimits, check_matrix6, check_matrix12};
@@ -45,13 +45,13 @@ pub(super) fn write_details(link: &ReducedLink) -> String {
             text += &matrix("stiffness", &DMatrix::from_column_slice(6, 6, joint.K_S.as_slice()));
         }
         for part in &chain.parts {
-            text += &format!("\n[[chain.part]]\n{}", super::write::inertial(part));
+            text += &format!("\n[[chain.part]]\n{}", inertial(part));
         }
     }
     for body in &details.attached {
         text +=
             "\n[[attached]]                  # rides on the link: in the parts and chains, not in the superelement\n";
-        text += &super::write::inertial(body);
+        text += &inertial(body);
     }
     if let Some(modal) = &details.modal {
         text += &super::modal::write_modal(modal);
@@ -224,7 +224,7 @@ fn read_chain(node: &Node<'_, '_>, units: &Units, link: &ReducedLink) -> Result<
         let K = Matrix6::from_column_slice(K.as_slice());
         let expected = "a symmetric, positive definite stiffness";
         let (K_S, _) =
-            check_matrix6("K_S", &K, &GateLimits::default()).map_err(|cause| refused(&item, cause, expected))?;
+            check_matrix6("K_S", &K, &GateLimits::default()).map_err(|cause| item.refused(cause, expected))?;
         joints.push(ElasticSplit { X_LS, K_S });
     }
     for item in table.require("part", "one [[chain.part]] per rigid part")?.list()? {

@@ -7,14 +7,31 @@ use nalgebra::{DMatrix, Matrix3, Matrix3xX, Matrix6, Matrix6xX, Vector3};
 
 use super::document::{Node, Table};
 use super::error::{FlexErrorKind, FlexFileError};
-use super::frames::read_pose;
+use super::frames::{pose_lines, read_pose};
+use super::text::{numbers, quoted};
 use super::units::Units;
-use super::write::{numbers, pose_lines, quoted};
 use crate::modal::{GeometricStiffness, ModalInterface, ModalLink};
 use crate::reduced::ReducedLink;
 
 /// Maximum number of coordinates, more than any link has.
 const MOST_COORDINATES: usize = 6000;
+
+/// Keys of the table.
+const KEYS: [&str; 13] = [
+    "coordinates",
+    "interfaces",
+    "shapes",
+    "mass",
+    "first_moment",
+    "inertia",
+    "C_t",
+    "C_r",
+    "P",
+    "N",
+    "K",
+    "M",
+    "geometric",
+];
 
 /// Writes the table as text.
 pub(super) fn write_modal(modal: &ModalLink) -> String {
@@ -82,28 +99,8 @@ pub(super) fn read_modal(
     agreement: f64,
 ) -> Result<ModalLink, FlexFileError> {
     let table = node.table()?;
-    table.only(&[
-        "coordinates",
-        "interfaces",
-        "shapes",
-        "mass",
-        "first_moment",
-        "inertia",
-        "C_t",
-        "C_r",
-        "P",
-        "N",
-        "K",
-        "M",
-        "geometric",
-    ])?;
-    let labels = table.require("coordinates", "a text for each coordinate")?;
-    let list = labels.list()?;
-    if list.is_empty() || list.len() > MOST_COORDINATES {
-        let expected = format!("1 to {MOST_COORDINATES} coordinates");
-        return Err(labels.fail(FlexErrorKind::WrongSize, list.len().to_string(), expected, ""));
-    }
-    let labels = list.iter().map(|label| label.text().map(str::to_owned)).collect::<Result<Vec<_>, _>>()?;
+    table.only(&KEYS)?;
+    let labels = read_labels(&table)?;
     let n = labels.len();
     let interfaces = read_interfaces(&table, units, n)?;
     let count = interfaces.len();
@@ -143,6 +140,16 @@ pub(super) fn read_modal(
     };
     check_agreement(node, &modal, link, agreement)?;
     Ok(modal)
+}
+
+fn read_labels(table: &Table<'_, '_>) -> Result<Vec<String>, FlexFileError> {
+    let labels = table.require("coordinates", "a text for each coordinate")?;
+    let list = labels.list()?;
+    if list.is_empty() || list.len() > MOST_COORDINATES {
+        let expected = format!("1 to {MOST_COORDINATES} coordinates");
+        return Err(labels.fail(FlexErrorKind::WrongSize, list.len().to_string(), expected, ""));
+    }
+    list.iter().map(|label| label.text().map(str::to_owned)).collect()
 }
 
 fn read_interfaces(table: &Table<'_, '_>, units: &Units, n: usize) -> Result<Vec<ModalInterface>, FlexFileError> {
