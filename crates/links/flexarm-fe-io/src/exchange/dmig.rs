@@ -214,7 +214,7 @@ pub fn write_dmig(
 
 /// Formats a number in 16 columns, nine decimals, with D exponent.
 fn large(value: f64) -> String {
-    super::user_element::fortran(value, 9, 16).replace('E', "D")
+    super::fortran::fortran(value, 9, 16).replace('E', "D")
 }
 
 #[cfg(test)]
