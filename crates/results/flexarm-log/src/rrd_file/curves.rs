@@ -9,47 +9,6 @@ use super::tracks::{CurveExtent, ScalarTrack};
 use crate::poses::size;
 use crate::{GaugeQuantity, RunHeader, Sample};
 
-/// Several curves in one plot, each with a name.
-fn group(path: EntityPath, names: Vec<String>, color: &dyn Fn(usize) -> Color) -> ScalarTrack {
-    let colors: Vec<Color> = (0..names.len()).map(color).collect();
-    ScalarTrack::new(path, names).with_colors(colors)
-}
-
-/// Curves of the TCP error: translations, and rotations.
-fn error_curves(root: &EntityPath) -> (Vec<ScalarTrack>, Vec<ScalarTrack>) {
-    let curve = |group: &str, key: &str, name: &str, color: Color| {
-        ScalarTrack::new(root.join(&path([group, key])), [name]).with_colors([color])
-    };
-    let translations = vec![
-        curve("tcp_error", "x", "x [mm]", axis(0)),
-        curve("tcp_error", "y", "y [mm]", axis(1)),
-        curve("tcp_error", "z", "z [mm]", axis(2)),
-        curve("tcp_error", "norm", "norm [mm]", total()),
-        curve("tcp_error_path", "tangential", "tangential [mm]", series(0)),
-        curve("tcp_error_path", "normal", "normal [mm]", series(1)),
-        curve("tcp_error_path", "binormal", "binormal [mm]", series(2)),
-    ];
-    let rotations = vec![
-        curve("tcp_error_rotation", "x", "about x [mrad]", axis(0)),
-        curve("tcp_error_rotation", "y", "about y [mrad]", axis(1)),
-        curve("tcp_error_rotation", "z", "about z [mrad]", axis(2)),
-    ];
-    (translations, rotations)
-}
-
-/// Curves of the deflection and the load of an elastic element; one plot shows all elements.
-fn element_curves(header: &RunHeader, root: &EntityPath, element: &str) -> [ScalarTrack; 2] {
-    let names = |parts: [&str; 6]| parts.map(|part| format!("{element} {part}")).to_vec();
-    let number = header.color_number(element);
-    let curves = |kind: &str, parts: [&str; 6]| {
-        group(root.join(&path([kind, element])), names(parts), &|part| component(number, part))
-    };
-    [
-        curves("elastic", ["x [mm]", "y [mm]", "z [mm]", "rx [mrad]", "ry [mrad]", "rz [mrad]"]),
-        curves("elastic_load", ["Fx [N]", "Fy [N]", "Fz [N]", "Mx [N m]", "My [N m]", "Mz [N m]"]),
-    ]
-}
-
 /// All curves of a run.
 pub(crate) struct Curves {
     /// Curves of the error, at every sample, in the order of [`Curves::push_error`].
@@ -168,6 +127,47 @@ impl Curves {
     pub(crate) fn seen(&self) -> impl Iterator<Item = CurveExtent> + '_ {
         self.error.iter().chain(&self.causes).map(ScalarTrack::seen)
     }
+}
+
+/// Several curves in one plot, each with a name.
+fn group(path: EntityPath, names: Vec<String>, color: &dyn Fn(usize) -> Color) -> ScalarTrack {
+    let colors: Vec<Color> = (0..names.len()).map(color).collect();
+    ScalarTrack::new(path, names).with_colors(colors)
+}
+
+/// Curves of the TCP error: translations, and rotations.
+fn error_curves(root: &EntityPath) -> (Vec<ScalarTrack>, Vec<ScalarTrack>) {
+    let curve = |group: &str, key: &str, name: &str, color: Color| {
+        ScalarTrack::new(root.join(&path([group, key])), [name]).with_colors([color])
+    };
+    let translations = vec![
+        curve("tcp_error", "x", "x [mm]", axis(0)),
+        curve("tcp_error", "y", "y [mm]", axis(1)),
+        curve("tcp_error", "z", "z [mm]", axis(2)),
+        curve("tcp_error", "norm", "norm [mm]", total()),
+        curve("tcp_error_path", "tangential", "tangential [mm]", series(0)),
+        curve("tcp_error_path", "normal", "normal [mm]", series(1)),
+        curve("tcp_error_path", "binormal", "binormal [mm]", series(2)),
+    ];
+    let rotations = vec![
+        curve("tcp_error_rotation", "x", "about x [mrad]", axis(0)),
+        curve("tcp_error_rotation", "y", "about y [mrad]", axis(1)),
+        curve("tcp_error_rotation", "z", "about z [mrad]", axis(2)),
+    ];
+    (translations, rotations)
+}
+
+/// Curves of the deflection and the load of an elastic element; one plot shows all elements.
+fn element_curves(header: &RunHeader, root: &EntityPath, element: &str) -> [ScalarTrack; 2] {
+    let names = |parts: [&str; 6]| parts.map(|part| format!("{element} {part}")).to_vec();
+    let number = header.color_number(element);
+    let curves = |kind: &str, parts: [&str; 6]| {
+        group(root.join(&path([kind, element])), names(parts), &|part| component(number, part))
+    };
+    [
+        curves("elastic", ["x [mm]", "y [mm]", "z [mm]", "rx [mrad]", "ry [mrad]", "rz [mrad]"]),
+        curves("elastic_load", ["Fx [N]", "Fy [N]", "Fz [N]", "Mx [N m]", "My [N m]", "Mz [N m]"]),
+    ]
 }
 
 const MILLI: f64 = 1e3;
