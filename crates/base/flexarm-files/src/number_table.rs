@@ -29,15 +29,14 @@ impl NumberTable {
     /// has a row with a different number of cells or a cell that is not a number. The message gives
     /// the line, the column and what was found.
     pub fn read(path: &Path) -> Result<Self, FileError> {
-        Self::parse(&read_text(path)?).map_err(|what| FileError::Unusable { path: path.to_owned(), what })
+        let unusable = |fault: TableFault| FileError::Unusable { path: path.to_owned(), what: fault.to_string() };
+        Self::parse(&read_text(path)?).map_err(unusable)
     }
 
-    /// Parses the text of a file; the error is a complete message.
-    fn parse(text: &str) -> Result<Self, String> {
+    fn parse(text: &str) -> Result<Self, TableFault> {
         let mut lines = text.trim_start_matches('\u{feff}').lines().enumerate();
         let counts = |line: &str| !line.trim().is_empty() && !line.trim_start().starts_with('#');
-        let (_, header) =
-            lines.by_ref().find(|(_, line)| counts(line)).ok_or("the table is empty: expected a header")?;
+        let (_, header) = lines.by_ref().find(|(_, line)| counts(line)).ok_or(TableFault::Empty)?;
         let separator = [';', '\t'].into_iter().find(|c| header.contains(*c)).unwrap_or(',');
         let cells = |line: &str| -> Vec<String> {
             csv_fields(line, |c| c == separator, false).iter().map(|cell| cell.trim().to_owned()).collect()
@@ -45,31 +44,28 @@ impl NumberTable {
         let names = cells(header);
         for (k, name) in names.iter().enumerate() {
             if name.is_empty() {
-                return Err(format!("column {} of the header has no name", k + 1));
+                return Err(TableFault::Unnamed { column: k + 1 });
             }
             if names[..k].contains(name) {
-                return Err(format!("the header names {name:?} twice: rename or remove one of the columns"));
+                return Err(TableFault::NamedTwice { name: name.clone() });
             }
             if name.parse::<f64>().is_ok() {
-                return Err(format!("the first row has the number {name} where a name was expected: add a header"));
+                return Err(TableFault::NoHeader { number: name.clone() });
             }
         }
         let mut table = Self { names, rows: Vec::new(), lines: Vec::new() };
-        for (number, line) in lines.filter(|(_, line)| counts(line)) {
-            let found = cells(line);
-            if found.len() != table.names.len() {
-                let (found, expected) = (found.len(), table.names.len());
-                return Err(format!("line {}: expected {expected} cells as in the header, found {found}", number + 1));
+        for (line, cells) in lines.filter(|(_, line)| counts(line)).map(|(k, line)| (k + 1, cells(line))) {
+            let (found, expected) = (cells.len(), table.names.len());
+            if found != expected {
+                return Err(TableFault::Cells { line, found, expected });
             }
-            let value = |(k, cell): (usize, &String)| {
-                number_of(cell, separator != ',').ok_or_else(|| {
-                    let name = &table.names[k];
-                    format!("line {}, column {name:?}: expected a number, found {cell:?}", number + 1)
-                })
+            let value = |(name, cell): (&String, &String)| {
+                let not_a_number = || TableFault::NotANumber { line, column: name.clone(), found: cell.clone() };
+                number_of(cell, separator != ',').ok_or_else(not_a_number)
             };
-            let row = found.iter().enumerate().map(value).collect::<Result<Vec<f64>, String>>()?;
+            let row = table.names.iter().zip(&cells).map(value).collect::<Result<Vec<f64>, _>>()?;
             table.rows.push(row);
-            table.lines.push(number + 1);
+            table.lines.push(line);
         }
         Ok(table)
     }
@@ -78,6 +74,23 @@ impl NumberTable {
     pub fn column(&self, name: &str) -> Option<usize> {
         self.names.iter().position(|known| known == name)
     }
+}
+
+/// Reason why a text is not a table of numbers.
+#[derive(Debug, thiserror::Error)]
+enum TableFault {
+    #[error("the table is empty: expected a header")]
+    Empty,
+    #[error("column {column} of the header has no name")]
+    Unnamed { column: usize },
+    #[error("the header names {name:?} twice: rename or remove one of the columns")]
+    NamedTwice { name: String },
+    #[error("the first row has the number {number} where a name was expected: add a header")]
+    NoHeader { number: String },
+    #[error("line {line}: expected {expected} cells as in the header, found {found}")]
+    Cells { line: usize, found: usize, expected: usize },
+    #[error("line {line}, column {column:?}: expected a number, found {found:?}")]
+    NotANumber { line: usize, column: String, found: String },
 }
 
 /// A finite number; NaN for an empty cell.
@@ -109,7 +122,7 @@ mod tests {
     #[test]
     fn what_is_no_table_of_numbers_is_said_with_line_and_column() {
         let fails = |text: &str, part: &str| {
-            let error = NumberTable::parse(text).unwrap_err();
+            let error = NumberTable::parse(text).unwrap_err().to_string();
             assert!(error.contains(part), "{error}");
         };
         fails("", "empty");

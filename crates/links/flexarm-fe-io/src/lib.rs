@@ -32,7 +32,7 @@ pub mod exchange;
 pub mod mesh;
 mod unpack;
 
-pub use unpack::unpack_gzip;
+pub use unpack::{UnpackError, unpack_gzip};
 
 pub use exchange::ExchangeError;
 pub use mesh::{MeshError, MeshFile, ReadOptions, parse_mesh, read_mesh};

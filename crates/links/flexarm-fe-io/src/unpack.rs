@@ -21,21 +21,27 @@ pub(crate) fn allowed_unpacked(packed: usize, largest: u64) -> u64 {
     ALWAYS_UNPACKED.max(LARGEST_RATIO.saturating_mul(packed as u64)).min(largest)
 }
 
-/// Unpacking error: what was found, what was expected, and a hint for a correction.
-pub(crate) struct NotUnpacked {
-    pub(crate) too_large: bool,
-    pub(crate) found: String,
-    pub(crate) expected: String,
-    pub(crate) help: &'static str,
+/// Error of unpacking gzip.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{found}, expected {expected}: {help}")]
+pub struct UnpackError {
+    /// Whether the bytes expand to far more than real files; otherwise they are no whole gzip file.
+    pub too_large: bool,
+    /// What was found.
+    pub found: String,
+    /// What was expected.
+    pub expected: String,
+    /// Hint for a correction.
+    pub help: &'static str,
 }
 
 /// Unpacks gzip, up to `largest` bytes and the size that is plausible for the packed size.
-pub(crate) fn unpacked(packed: &[u8], largest: u64) -> Result<Vec<u8>, NotUnpacked> {
+pub(crate) fn unpacked(packed: &[u8], largest: u64) -> Result<Vec<u8>, UnpackError> {
     let allowed = allowed_unpacked(packed.len(), largest);
     let mut bytes = Vec::new();
     let result = MultiGzDecoder::new(packed).take(allowed + 1).read_to_end(&mut bytes);
     if let Err(error) = result {
-        return Err(NotUnpacked {
+        return Err(UnpackError {
             too_large: false,
             found: format!("{error} after {} bytes", bytes.len()),
             expected: "a whole gzip file".into(),
@@ -43,7 +49,7 @@ pub(crate) fn unpacked(packed: &[u8], largest: u64) -> Result<Vec<u8>, NotUnpack
         });
     }
     if bytes.len() as u64 > allowed {
-        return Err(NotUnpacked {
+        return Err(UnpackError {
             too_large: true,
             found: format!("{} bytes that unpack to more than {allowed} bytes", packed.len()),
             expected: format!("at most {LARGEST_RATIO} times the packed size, or {ALWAYS_UNPACKED} bytes"),
@@ -56,10 +62,9 @@ pub(crate) fn unpacked(packed: &[u8], largest: u64) -> Result<Vec<u8>, NotUnpack
 /// Unpacks gzip bytes, up to the size that is plausible for the packed size.
 ///
 /// # Errors
-/// A message with what was found and expected, if the bytes are not gzip, truncated, or expand to
-/// far more than real files.
-pub fn unpack_gzip(packed: &[u8]) -> Result<Vec<u8>, String> {
-    unpacked(packed, u64::MAX).map_err(|why| format!("{}, expected {}: {}", why.found, why.expected, why.help))
+/// [`UnpackError`] if the bytes are not gzip, truncated, or expand to far more than real files.
+pub fn unpack_gzip(packed: &[u8]) -> Result<Vec<u8>, UnpackError> {
+    unpacked(packed, u64::MAX)
 }
 
 #[cfg(test)]
@@ -77,10 +82,10 @@ mod tests {
     #[test]
     fn a_packed_file_that_grows_without_end_is_refused_early() {
         let bytes = packed(&vec![b'*'; 100_000]);
-        let refused = unpacked(&bytes, 1000).err().unwrap();
+        let refused = unpacked(&bytes, 1000).unwrap_err();
         assert!(refused.too_large && refused.found.contains("more than 1000 bytes"), "{}", refused.found);
-        assert_eq!(unpacked(&bytes, 100_000).ok().unwrap().len(), 100_000);
-        assert!(!unpacked(&bytes[..bytes.len() / 2], 100_000).err().unwrap().too_large);
+        assert_eq!(unpacked(&bytes, 100_000).unwrap().len(), 100_000);
+        assert!(!unpacked(&bytes[..bytes.len() / 2], 100_000).unwrap_err().too_large);
     }
 
     /// Ratio 1000 to 1, beyond any mesh: 71 MB of blanks in 71 kB.
@@ -88,7 +93,7 @@ mod tests {
     fn a_ratio_that_no_mesh_has_is_refused_beyond_64_megabytes() {
         let bytes = packed(&vec![b' '; 71 << 20]);
         assert!(bytes.len() < 1 << 20, "{}", bytes.len());
-        assert!(unpacked(&bytes, u64::MAX).err().unwrap().too_large);
+        assert!(unpacked(&bytes, u64::MAX).unwrap_err().too_large);
         assert_eq!(allowed_unpacked(10 << 20, u64::MAX), 500 << 20);
         assert_eq!(allowed_unpacked(10 << 20, 1 << 20), 1 << 20);
     }

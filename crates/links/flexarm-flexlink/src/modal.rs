@@ -59,39 +59,60 @@ pub(crate) fn substitute_modal(
         return Err(fail(format!("its interface {:?} lies {distance:.3e} m from B of the reduced link", far.name)));
     }
     let mut body = modal_body(modal);
-
-    let [near, beyond] = attached_bodies(flexible, site);
-    // Mass integrals of the undeformed body from the mechanism's link.
     if let Parts::FromLink(_) = flexible.parts {
-        let own = site.own.ok_or_else(|| SubstitutionError::NoInertia { link: name.clone() })?.spatial();
-        if (own.mass / body.mass - 1.0).abs() > 1e-9 {
-            return Err(fail(format!("it weighs {} kg, the link {} kg", body.mass, own.mass)));
-        }
-        (body.first_moment, body.inertia) = (own.first_moment, own.rotational);
-        let smallest = smallest_scaled(&body.mass_matrix());
-        if smallest <= 0.0 {
-            return Err(SubstitutionError::Cut { link: name.clone(), source: CutError::Modes { smallest } });
-        }
+        take_mass_integrals(&mut body, name, site)?;
     }
 
-    let rigid = |inertia: SpatialInertia| LinkInertia {
-        mass: inertia.mass,
-        com: inertia.com(),
-        inertia_com: inertia.inertia_com(),
-    };
+    let [near, beyond] = attached_bodies(flexible, site);
     for link in mechanism.links.iter_mut().filter(|l| l.name == *name) {
         link.inertia = near.map(rigid);
     }
     let mut part_masses = vec![body.mass];
     part_masses.extend(near.iter().chain(&beyond).map(|i| i.mass));
-    let distal_link = format!("{name}__distal");
-    // One child link per interface, with the joints nearest to it.
+    add_interfaces(mechanism, name, site, modal, beyond);
+    mechanism.modal.push((name.clone(), Arc::new(body)));
+    Ok(FlexibleSpan {
+        link: name.clone(),
+        distal_link: format!("{name}__distal"),
+        X_LA: reduced.X_LA,
+        X_DB: Pose::from(far.X_LI.translation).inverse() * reduced.X_LB,
+        length: site.length,
+        own_mass: site.own.map_or(0.0, |i| i.mass),
+        part_masses,
+        lumped: None,
+    })
+}
+
+/// Replaces the mass integrals of the undeformed body by those of the mechanism's link.
+fn take_mass_integrals(body: &mut ModalBody, name: &str, site: &Site) -> Result<(), SubstitutionError> {
+    let own = site.own.ok_or_else(|| SubstitutionError::NoInertia { link: name.to_owned() })?.spatial();
+    if (own.mass / body.mass - 1.0).abs() > 1e-9 {
+        let what = format!("it weighs {} kg, the link {} kg", body.mass, own.mass);
+        return Err(SubstitutionError::Modal { link: name.to_owned(), what });
+    }
+    (body.first_moment, body.inertia) = (own.first_moment, own.rotational);
+    let smallest = smallest_scaled(&body.mass_matrix());
+    if smallest <= 0.0 {
+        return Err(SubstitutionError::Cut { link: name.to_owned(), source: CutError::Modes { smallest } });
+    }
+    Ok(())
+}
+
+/// Adds a child link per interface, with the joints nearest to it; that at B has the inertia
+/// `beyond`.
+fn add_interfaces(
+    mechanism: &mut Mechanism,
+    name: &str,
+    site: &Site,
+    modal: &ModalLink,
+    beyond: Option<SpatialInertia>,
+) {
     let far_ends = modal.interfaces.iter().map(|interface| interface.X_LI.translation.vector);
     let places: Vec<_> = std::iter::once(site.p_LA).chain(far_ends).collect();
     for (k, interface) in modal.interfaces.iter().enumerate() {
         // Interface frames have the axes of the link.
         let X_LI = Pose::from(interface.X_LI.translation);
-        let to = if k == 0 { distal_link.clone() } else { format!("{name}__{}", interface.name) };
+        let to = if k == 0 { format!("{name}__distal") } else { format!("{name}__{}", interface.name) };
         move_children(mechanism, name, &to, &X_LI, |child, p| match child == site.distal_joint {
             true => k == 0,
             false => nearest(p, places.iter()) == Some(k + 1),
@@ -103,17 +124,10 @@ pub(crate) fn substitute_modal(
         mechanism.links.push(Link { name: to.clone(), inertia: at_B });
         mechanism.joints.push(Joint::new(format!("{to}__interface"), JointKind::Interface(k), name, &to, X_LI));
     }
-    mechanism.modal.push((name.clone(), Arc::new(body)));
-    Ok(FlexibleSpan {
-        link: name.clone(),
-        distal_link,
-        X_LA: reduced.X_LA,
-        X_DB: Pose::from(far.X_LI.translation).inverse() * reduced.X_LB,
-        length: site.length,
-        own_mass: site.own.map_or(0.0, |i| i.mass),
-        part_masses,
-        lumped: None,
-    })
+}
+
+fn rigid(inertia: SpatialInertia) -> LinkInertia {
+    LinkInertia { mass: inertia.mass, com: inertia.com(), inertia_com: inertia.inertia_com() }
 }
 
 /// Returns the inertias of the attached bodies: those near A, which go to the link itself, and

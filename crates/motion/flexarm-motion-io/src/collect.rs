@@ -114,9 +114,9 @@ impl<'a> Collector<'a> {
         let Some((encoding, definitions)) = topic.reader.clone() else { return Ok(()) };
         let taken = match decode(bytes, encoding, &definitions) {
             Ok(node) => self.node(index, log_ns, &node),
-            Err(what) => {
+            Err(error) => {
                 let message = topic.message.clone();
-                Err(PlacedProblem::new(Problem::Message { message, what }))
+                Err(PlacedProblem::new(Problem::Message { message, what: error.to_string() }))
             }
         };
         let topic = &mut self.topics[index];

@@ -99,6 +99,32 @@ pub fn read_db3(path: &Path, request: &Request<'_>) -> Result<MessageMotion, Mot
     read_files(&[path.to_owned()], path, request)
 }
 
+/// Reads an MCAP file.
+///
+/// # Errors
+/// [`MotionError::Read`], or [`MotionError::Content`] if the file is not MCAP, the requested topic
+/// does not exist, a message cannot be read, or the bag has no motion of the requested joints.
+pub fn read_mcap(path: &Path, request: &Request<'_>) -> Result<MessageMotion, MotionError> {
+    read_files(&[path.to_owned()], path, request)
+}
+
+/// Reads a ROS 1 bag.
+///
+/// # Errors
+/// As [`crate::read_mcap`].
+pub fn read_rosbag(path: &Path, request: &Request<'_>) -> Result<MessageMotion, MotionError> {
+    read_files(&[path.to_owned()], path, request)
+}
+
+/// Reads a bag that is compressed as a whole (`.mcap.zstd`, `.db3.zstd`).
+///
+/// # Errors
+/// [`MotionError`] as [`crate::read_mcap`] and [`crate::read_db3`], and if the content is not a
+/// bag.
+pub fn read_packed(path: &Path, request: &Request<'_>) -> Result<MessageMotion, MotionError> {
+    read_files(&[path.to_owned()], path, request)
+}
+
 /// Reads the files of a bag as one.
 ///
 /// * `bag`: name of the bag for messages.

@@ -53,12 +53,11 @@ mod write;
 mod yaml;
 
 pub use error::{FilePosition, MotionError, Problem};
-pub use folder::read_folder;
-pub use folder::{SQLITE_MAGIC, read_db3};
-pub use mcap::{MCAP_MAGIC, read_mcap};
-pub use rosbag::{ROSBAG_MAGIC, read_rosbag};
+pub use folder::{SQLITE_MAGIC, read_db3, read_folder, read_mcap, read_packed, read_rosbag};
+pub use mcap::MCAP_MAGIC;
+pub use rosbag::ROSBAG_MAGIC;
 pub use text::{looks_like_messages, read_text};
-pub use unpack::{ZSTD_MAGIC, read_packed};
+pub use unpack::ZSTD_MAGIC;
 pub use write::{TextFormat, write_joint_trajectory};
 
 use flexarm_settings::Caveat;

@@ -17,7 +17,6 @@ use mcap::{McapError, McapResult};
 
 use crate::collect::Collector;
 use crate::error::{MotionError, PlacedProblem};
-use crate::{MessageMotion, Request};
 
 /// First bytes of an MCAP file.
 pub const MCAP_MAGIC: &[u8] = mcap::MAGIC;
@@ -27,15 +26,6 @@ pub const MCAP_MAGIC: &[u8] = mcap::MAGIC;
 const MOST_BYTES: usize = 256 << 20;
 /// Number of bytes read at once, regardless of the stated length of a record.
 const READ_BYTES: usize = 64 << 10;
-
-/// Reads an MCAP file.
-///
-/// # Errors
-/// [`MotionError::Read`], or [`MotionError::Content`] if the file is not MCAP, the requested topic
-/// does not exist, a message cannot be read, or the bag has no motion of the requested joints.
-pub fn read_mcap(path: &Path, request: &Request<'_>) -> Result<MessageMotion, MotionError> {
-    crate::folder::read_files(&[path.to_owned()], path, request)
-}
 
 pub(crate) fn collect_file(path: &Path, into: &mut Collector<'_>) -> Result<Option<String>, MotionError> {
     let failed = |source| MotionError::Read { path: path.to_owned(), source };

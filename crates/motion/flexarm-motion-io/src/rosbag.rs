@@ -13,7 +13,6 @@ use std::path::Path;
 use crate::collect::Collector;
 use crate::error::{MotionError, PlacedProblem, Problem};
 use crate::unpack::{MOST_BYTES, Packing, unpacked};
-use crate::{MessageMotion, Request};
 
 /// First bytes of a ROS 1 bag of any version.
 pub const ROSBAG_MAGIC: &[u8] = b"#ROSBAG V";
@@ -26,14 +25,6 @@ const CHUNK: u8 = 0x05;
 const CONNECTION: u8 = 0x07;
 /// Maximum length of a record header (bytes).
 const MOST_HEAD: u64 = 1 << 20;
-
-/// Reads a ROS 1 bag.
-///
-/// # Errors
-/// As [`crate::read_mcap`].
-pub fn read_rosbag(path: &Path, request: &Request<'_>) -> Result<MessageMotion, MotionError> {
-    crate::folder::read_files(&[path.to_owned()], path, request)
-}
 
 pub(crate) fn collect_file(path: &Path, into: &mut Collector<'_>) -> Result<Option<String>, MotionError> {
     let failed = |source| MotionError::Read { path: path.to_owned(), source };

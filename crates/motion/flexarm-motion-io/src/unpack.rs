@@ -4,7 +4,7 @@ use std::io::{BufReader, Read};
 use std::path::Path;
 
 use crate::error::{MotionError, PlacedProblem, Problem};
-use crate::{MessageMotion, Request, mcap};
+use crate::mcap;
 
 /// First bytes of zstd data.
 pub const ZSTD_MAGIC: &[u8] = &[0x28, 0xB5, 0x2F, 0xFD];
@@ -37,15 +37,6 @@ pub(crate) enum Packing {
     #[cfg(feature = "sqlite")]
     Zstd,
     Lz4,
-}
-
-/// Reads a bag that is compressed as a whole (`.mcap.zstd`, `.db3.zstd`).
-///
-/// # Errors
-/// [`MotionError`] as [`crate::read_mcap`] and [`crate::read_db3`], and if the content is not a
-/// bag.
-pub fn read_packed(path: &Path, request: &Request<'_>) -> Result<MessageMotion, MotionError> {
-    crate::folder::read_files(&[path.to_owned()], path, request)
 }
 
 /// Opens a compressed file as a stream.

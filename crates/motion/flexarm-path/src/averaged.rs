@@ -1,9 +1,10 @@
 //! Time-optimal law with an averaged speed: accelerations rise within a given time.
 
 use crate::route::Route;
-use crate::schedule::SLACK;
 use crate::time_law::{Law, LawError, PathPoint, least_time};
 
+/// Relative tolerance of limits.
+pub(crate) const SLACK: f64 = 1e-3;
 /// A law is better only if it is faster by more than this fraction of its duration.
 const NEAR: f64 = 1e-4;
 /// Maximum number of attempts to find a better law.

@@ -11,7 +11,7 @@ use flexarm_kinematics::{
 use flexarm_spatial::Pose;
 use nalgebra::DVector;
 
-use crate::plan::ProgramArm;
+use crate::arm::ProgramArm;
 use crate::program::Configuration;
 
 /// Number of starts of the numerical search.

@@ -20,7 +20,6 @@ use flexarm_spatial::{Pose, rotation_vector};
 use nalgebra::{DMatrix, DVector, Matrix6xX, Vector6};
 
 use crate::curve::{TURN_LENGTH, ToolCurve};
-use crate::route::between;
 
 /// Newton's method has converged below this error (m and rad).
 const ARRIVED: f64 = 1e-12;
@@ -42,6 +41,20 @@ pub struct JointJet {
     pub d: DVector<f64>,
     /// Second derivative.
     pub dd: DVector<f64>,
+}
+
+/// The quintic between two joint jets at `s`, with its third derivative.
+pub(crate) fn between(a: &JointJet, b: &JointJet, h: f64, s: f64) -> (JointJet, DVector<f64>) {
+    let step = &b.q - &a.q;
+    let c3 = (&step * 20.0 - (&b.d * 8.0 + &a.d * 12.0) * h - (&a.dd * 3.0 - &b.dd) * (h * h)) / (2.0 * h.powi(3));
+    let c4 =
+        (&step * -30.0 + (&b.d * 14.0 + &a.d * 16.0) * h + (&a.dd * 3.0 - &b.dd * 2.0) * (h * h)) / (2.0 * h.powi(4));
+    let c5 = (step * 12.0 - (&b.d + &a.d) * (6.0 * h) + (&b.dd - &a.dd) * (h * h)) / (2.0 * h.powi(5));
+    let q = &a.q + (&a.d + (&a.dd * 0.5 + (&c3 + (&c4 + &c5 * s) * s) * s) * s) * s;
+    let d = &a.d + (&a.dd + (&c3 * 3.0 + (&c4 * 4.0 + &c5 * (5.0 * s)) * s) * s) * s;
+    let dd = &a.dd + (&c3 * 6.0 + (&c4 * 12.0 + &c5 * (20.0 * s)) * s) * s;
+    let ddd = c3 * 6.0 + (c4 * 24.0 + c5 * (60.0 * s)) * s;
+    (JointJet { q, d, dd }, ddd)
 }
 
 /// A coordinate that moves along a path by its own polynomial while others follow the tool.

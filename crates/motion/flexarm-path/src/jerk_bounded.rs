@@ -1,16 +1,11 @@
 //! Time-optimal law of a route with joint jerk limits. Every moving joint gets a jerk limit:
 //! without a given one it is such that the acceleration rises to its limit in a given time.
 
+use crate::arm::ProgramArm;
 use crate::jerk_law::{QuinticLaw, least_time_with_jerks};
 use crate::limits::Limits;
-use crate::plan::ProgramArm;
 use crate::route::Route;
 use crate::time_law::{Law, LawError, PathPoint, least_time};
-
-/// Whether some joint has a given jerk limit.
-pub(crate) fn has_jerks(arm: &ProgramArm<'_>) -> bool {
-    arm.bounds.iter().any(|bounds| bounds.jerk.is_some())
-}
 
 /// A law with the jerk limits that it keeps.
 pub(crate) struct JerkBounded {

@@ -4,10 +4,11 @@ use flexarm_kinematics::{Data, Frame, IkOptions, inverse_kinematics_with_rule};
 use flexarm_spatial::{Pose, rotation_vector};
 use nalgebra::{DVector, Vector3, Vector6};
 
+use crate::arm::{PathOptions, ProgramArm};
 use crate::branch::{Branches, NoBranch};
 use crate::curve::{ToolCurve, ToolJet};
+use crate::error::PathError;
 use crate::follow::{Blocked, Follower, FrameCurve, GuidedJoint, JointJet};
-use crate::plan::{PathError, PathOptions, ProgramArm};
 use crate::program::{Blend, Item, Move, MoveKind, Target};
 
 /// Joint moves shorter than this (rad or m) are ignored.

@@ -8,14 +8,17 @@
 #![allow(non_snake_case, reason = "monogram notation: X_WT, R_AB; see docs/references.md")]
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test stops at the first failure"))]
 
+mod arm;
 mod averaged;
 mod branch;
 mod curve;
+mod error;
 mod follow;
 mod jerk_bounded;
 mod legs;
 mod limits;
 mod plan;
+mod planned;
 pub mod program;
 mod range;
 mod route;
@@ -24,10 +27,11 @@ mod targets;
 
 pub use flexarm_trajectory::{jerk_law, time_law};
 
+pub use arm::{ControllerAxis, JointBounds, PathOptions, ProgramArm};
 pub use curve::{ArcError, TURN_LENGTH, ToolCurve, ToolJet};
+pub use error::PathError;
 pub use follow::{Blocked, Follower, FrameCurve, GuidedJoint, JointJet, coordinates_of};
-pub use plan::{
-    ControllerAxis, JointBounds, PathError, PathOptions, Planned, PlannedMove, ProgramArm, Slowed, SlowedBy, plan,
-};
+pub use plan::plan;
+pub use planned::{Planned, PlannedMove, Slowed, SlowedBy};
 pub use range::{OutOfRange, check_axes, check_rate};
 pub use targets::{base_of, target_at, target_joints, tool_of};

@@ -4,9 +4,10 @@
 use flexarm_kinematics::{Data, State, inverse_dynamics};
 use nalgebra::{DVector, Vector3, Vector6};
 
+use crate::arm::{JointBounds, ProgramArm};
 use crate::curve::ToolJet;
 use crate::jerk_law::{JerkBound, PathBounds};
-use crate::plan::{JointBounds, ProgramArm, SlowedBy};
+use crate::planned::SlowedBy;
 use crate::route::{Piece, Route, Station};
 use crate::time_law::{Bound, Law, PathPoint};
 

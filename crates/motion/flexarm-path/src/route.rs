@@ -3,11 +3,11 @@
 use flexarm_spatial::{Pose, rotation_vector};
 use nalgebra::{DVector, Vector3};
 
+use crate::arm::PathOptions;
 use crate::curve::{TURN_LENGTH, ToolCurve, ToolJet};
-use crate::follow::{Follower, FrameCurve, GuidedJoint, JointJet};
-use crate::jerk_bounded::has_jerks;
+use crate::error::PathError;
+use crate::follow::{Blocked, Follower, FrameCurve, GuidedJoint, JointJet, between};
 use crate::legs::{Leg, LegPath, Legs, blocked_error};
-use crate::plan::{PathError, PathOptions};
 use crate::program::{Blend, Speed};
 
 /// Two legs join without a corner if their derivatives agree to this (m/m, rad/m).
@@ -98,7 +98,7 @@ impl Route {
         let (mut routes, mut here) = (Vec::new(), Vec::new());
         for leg in legs {
             if let Some(last) = here.last()
-                && let Corner::Stop(why) = corner(last, &leg, has_jerks(&owner.arm))
+                && let Corner::Stop(why) = corner(last, &leg, owner.arm.has_jerk_limits())
             {
                 if last.of.blend != Blend::Pass || why == CURVATURE {
                     stops.push((last.of.line, why.to_owned()));
@@ -118,7 +118,7 @@ impl Route {
         // Length of each leg that its two blends take.
         let mut taken = vec![[0.0, 0.0]; n];
         for k in 0..n - 1 {
-            if matches!(corner(&legs[k], &legs[k + 1], has_jerks(&owner.arm)), Corner::Blend) {
+            if matches!(corner(&legs[k], &legs[k + 1], owner.arm.has_jerk_limits()), Corner::Blend) {
                 let reach = blend_reach(owner, &legs[k], &legs[k + 1]);
                 taken[k][1] = reach[0];
                 taken[k + 1][0] = reach[1];
@@ -360,20 +360,6 @@ fn joint_jet(way: &LegPath, length: f64, s: f64) -> JointJet {
     }
 }
 
-/// The quintic between two joint jets at `s`, with its third derivative.
-pub(crate) fn between(a: &JointJet, b: &JointJet, h: f64, s: f64) -> (JointJet, DVector<f64>) {
-    let step = &b.q - &a.q;
-    let c3 = (&step * 20.0 - (&b.d * 8.0 + &a.d * 12.0) * h - (&a.dd * 3.0 - &b.dd) * (h * h)) / (2.0 * h.powi(3));
-    let c4 =
-        (&step * -30.0 + (&b.d * 14.0 + &a.d * 16.0) * h + (&a.dd * 3.0 - &b.dd * 2.0) * (h * h)) / (2.0 * h.powi(4));
-    let c5 = (step * 12.0 - (&b.d + &a.d) * (6.0 * h) + (&b.dd - &a.dd) * (h * h)) / (2.0 * h.powi(5));
-    let q = &a.q + (&a.d + (&a.dd * 0.5 + (&c3 + (&c4 + &c5 * s) * s) * s) * s) * s;
-    let d = &a.d + (&a.dd + (&c3 * 3.0 + (&c4 * 4.0 + &c5 * (5.0 * s)) * s) * s) * s;
-    let dd = &a.dd + (&c3 * 6.0 + (&c4 * 12.0 + &c5 * (20.0 * s)) * s) * s;
-    let ddd = c3 * 6.0 + (c4 * 24.0 + c5 * (60.0 * s)) * s;
-    (JointJet { q, d, dd }, ddd)
-}
-
 /// The slower of two speeds for each quantity.
 fn slower(a: &Speed, b: &Speed) -> Speed {
     let least = |a: Option<f64>, b: Option<f64>| match (a, b) {
@@ -416,7 +402,7 @@ fn walk(
     [from, to]: [f64; 2],
     near: &DVector<f64>,
     options: &PathOptions,
-) -> Result<Walked, crate::follow::Blocked> {
+) -> Result<Walked, Blocked> {
     let n = intervals(to - from, options);
     let mut last = (from, follower.start(way, from, near)?);
     let mut least = (follower.sigma(), from);
@@ -445,7 +431,7 @@ fn refine(
     chord: f64,
     depth: usize,
     points: &mut Vec<(f64, JointJet)>,
-) -> Result<(), crate::follow::Blocked> {
+) -> Result<(), Blocked> {
     let middle = 0.5 * (a.0 + b.0);
     let (guess, _) = between(&a.1, &b.1, b.0 - a.0, middle - a.0);
     if depth == 0 || follower.distance(&way.curve, middle, &guess.q) <= chord {

@@ -1,18 +1,19 @@
 //! A route over time: its time law, the knots of the joint curves, and the results of its moves.
 
-use flexarm_trajectory::{JointPeak, LONGEST, TrajectoryError};
+use flexarm_kinematics::Model;
+use flexarm_trajectory::{JointKnots, JointPeak, LONGEST, Trajectory, TrajectoryError};
 use nalgebra::DVector;
 
-use crate::averaged::kept;
-use crate::follow::JointJet;
-use crate::jerk_bounded::{JerkBounded, has_jerks};
+use crate::arm::{JointBounds, PathOptions, ProgramArm};
+use crate::averaged::{SLACK, kept};
+use crate::error::PathError;
+use crate::follow::{JointJet, between};
+use crate::jerk_bounded::JerkBounded;
 use crate::limits::{Cap, LimitedPath, Limits};
-use crate::plan::{JointBounds, PathError, PathOptions, PlannedMove, ProgramArm, Slowed, SlowedBy, through};
-use crate::route::{Route, Station, between};
+use crate::planned::{PlannedMove, Slowed, SlowedBy};
+use crate::route::{Route, Station};
 use crate::time_law::{Law, LawError, Progress};
 
-/// Relative tolerance of limits.
-pub(crate) const SLACK: f64 = 1e-3;
 /// Relative tolerance of joint limits, tighter than that of the checks.
 const ROUNDING: f64 = 1e-10;
 /// Shorter averaging windows are lost in rounding (s).
@@ -53,6 +54,19 @@ impl Knot {
         let zero = DVector::zeros(q.len());
         Self { t, q: q.clone(), v: zero.clone(), before: zero.clone(), after: zero }
     }
+}
+
+/// The quintics through knots.
+pub(crate) fn through(model: &Model, knots: &[Knot]) -> Result<Trajectory, TrajectoryError> {
+    let times: Vec<f64> = knots.iter().map(|knot| knot.t).collect();
+    let joint = |k: usize| JointKnots {
+        name: model.coordinates()[k].joint.clone(),
+        position: knots.iter().map(|knot| knot.q[k]).collect(),
+        velocity: knots.iter().map(|knot| knot.v[k]).collect(),
+        acceleration: knots.iter().map(|knot| [knot.before[k], knot.after[k]]).collect(),
+    };
+    let joints: Vec<JointKnots> = (0..model.n_actuated()).map(joint).collect();
+    Trajectory::through_knots(&times, &joints)
 }
 
 /// Time law of a route.
@@ -109,7 +123,7 @@ impl<'r> Schedule<'r> {
                 options.rise_s
             )));
         }
-        let rise = has_jerks(arm).then_some(options.rise_s);
+        let rise = arm.has_jerk_limits().then_some(options.rise_s);
         let mut limits = Limits::new(route, arm, rise);
         let LimitedPath { points, programmed, caps } = limits.at_stations();
         let points = if rise.is_none() { limits.divided(&points) } else { points };

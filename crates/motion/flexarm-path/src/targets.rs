@@ -4,8 +4,9 @@ use flexarm_kinematics::{AnalyticArm, Data, Frame, forward_kinematics, kuka_turn
 use flexarm_spatial::Pose;
 use nalgebra::DVector;
 
+use crate::arm::{PathOptions, ProgramArm};
+use crate::error::PathError;
 use crate::legs::{Legs, Start, spline_group};
-use crate::plan::{PathError, PathOptions, ProgramArm};
 use crate::program::{Configuration, Item, Move, MoveKind, Program, Target};
 
 /// Returns the joints at the target of each item, even if a blend passes it; `None` for dwells and

@@ -34,61 +34,12 @@ pub(crate) struct Corner {
 
 /// Returns the corners of positions q at times t, in ascending order.
 pub(crate) fn corners(t: &[f64], q: &[f64]) -> Vec<Corner> {
-    let last = q.len() - 1;
-    let slope: Vec<f64> = (0..last).map(|i| (q[i + 1] - q[i]) / (t[i + 1] - t[i])).collect();
-    let top = slope.iter().fold(0.0, |top: f64, s| top.max(s.abs()));
-    // Positions are exact to a few units in the last place.
-    let size = q.iter().fold(0.0, |size: f64, q| size.max(q.abs()));
-    let rounding = |i: usize| 1e-14 * size / (t[i + 1] - t[i]).min(t[i] - t[i - 1]);
-    // Acceleration at inner sample i: change(i) / span(i).
-    let span = |i: usize| 0.5 * (t[i + 1] - t[i - 1]);
-    let change = |i: usize| slope[i] - slope[i - 1];
-    // Largest acceleration around the samples `i..=j`, and the means on the left and on the right;
-    // `None` with too few samples nearby.
-    let around = |i: usize, j: usize| {
-        let (left, right) = (i.saturating_sub(AROUND).max(1)..i, j + 1..last.min(j + 1 + AROUND));
-        let enough = left.len() >= LEAST_AROUND && right.len() >= LEAST_AROUND;
-        let mean = |range: std::ops::Range<usize>| {
-            let n = range.len() as f64;
-            range.map(|k| change(k) / span(k)).sum::<f64>() / n
-        };
-        let most = left.clone().chain(right.clone()).map(|k| change(k).abs() / span(k)).fold(0.0, f64::max);
-        enough.then(|| (most, mean(left), mean(right)))
-    };
-    let stands_out = |jump: f64, i: usize, most: f64| {
-        jump.abs() > STANDS_OUT * (most * span(i) + rounding(i)) && jump.abs() > SMALLEST * top
-    };
-
-    let resolution = resolution(q);
-    // Whether the samples equal a cubic within rounding: then the apparent corner is a rounding
-    // step.
-    let is_rounding = |i: usize| {
-        resolution > 0.0
-            && WINDOWS.iter().any(|window| {
-                let range = i.saturating_sub(*window)..(i + window + 1).min(q.len());
-                distance_from_cubic(&t[range.clone()], &q[range]) < BEYOND_ROUNDING * resolution
-            })
-    };
-
+    let samples = Samples::new(t, q);
     let mut corners = Vec::new();
     let mut i = 1;
-    while i < last {
-        let between = (i + 1 < last).then(|| around(i, i + 1)).flatten().and_then(|(most, left, right)| {
-            let h = t[i + 1] - t[i];
-            // Subtracts the curvature on either side, which is not part of the corner.
-            let shares = [change(i) - left * span(i), change(i + 1) - right * span(i + 1)];
-            let jump = shares[0] + shares[1];
-            let fraction = shares[1] / jump;
-            let lies_between = (AT_SAMPLE..=1.0 - AT_SAMPLE).contains(&fraction);
-            let tau = fraction * h;
-            let position = q[i] + (slope[i - 1] + 0.5 * left * (t[i] - t[i - 1])) * tau + 0.5 * left * tau * tau;
-            (lies_between && stands_out(jump, i, most)).then_some(Corner { sample: i, fraction, position })
-        });
-        let at = || {
-            let (most, ..) = around(i, i)?;
-            stands_out(change(i), i, most).then_some(Corner { sample: i, fraction: 0.0, position: q[i] })
-        };
-        match between.or_else(at).filter(|corner| !is_rounding(corner.sample)) {
+    while i < samples.last {
+        let corner = samples.corner_between(i).or_else(|| samples.corner_at(i));
+        match corner.filter(|corner| !samples.is_rounding(corner.sample)) {
             Some(corner) => {
                 corners.push(corner);
                 i += 2;
@@ -97,6 +48,91 @@ pub(crate) fn corners(t: &[f64], q: &[f64]) -> Vec<Corner> {
         }
     }
     corners
+}
+
+/// Samples with the slopes between them.
+struct Samples<'a> {
+    t: &'a [f64],
+    q: &'a [f64],
+    /// Index of the last sample.
+    last: usize,
+    slope: Vec<f64>,
+    top_speed: f64,
+    /// Largest position.
+    size: f64,
+    resolution: f64,
+}
+
+impl<'a> Samples<'a> {
+    fn new(t: &'a [f64], q: &'a [f64]) -> Self {
+        let last = q.len() - 1;
+        let slope: Vec<f64> = (0..last).map(|i| (q[i + 1] - q[i]) / (t[i + 1] - t[i])).collect();
+        let largest = |values: &[f64]| values.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+        Self { t, q, last, top_speed: largest(&slope), slope, size: largest(q), resolution: resolution(q) }
+    }
+
+    /// Acceleration at inner sample i: change(i) / span(i).
+    fn span(&self, i: usize) -> f64 {
+        0.5 * (self.t[i + 1] - self.t[i - 1])
+    }
+
+    fn change(&self, i: usize) -> f64 {
+        self.slope[i] - self.slope[i - 1]
+    }
+
+    /// Largest acceleration around the samples `i..=j`, and the means on the left and on the right;
+    /// `None` with too few samples nearby.
+    fn around(&self, i: usize, j: usize) -> Option<(f64, f64, f64)> {
+        let (left, right) = (i.saturating_sub(AROUND).max(1)..i, j + 1..self.last.min(j + 1 + AROUND));
+        if left.len() < LEAST_AROUND || right.len() < LEAST_AROUND {
+            return None;
+        }
+        let acceleration = |k: usize| self.change(k) / self.span(k);
+        let mean = |range: std::ops::Range<usize>| {
+            let n = range.len() as f64;
+            range.map(acceleration).sum::<f64>() / n
+        };
+        let most = left.clone().chain(right.clone()).map(|k| acceleration(k).abs()).fold(0.0, f64::max);
+        Some((most, mean(left), mean(right)))
+    }
+
+    fn stands_out(&self, jump: f64, i: usize, most: f64) -> bool {
+        // Positions are exact to a few units in the last place.
+        let rounding = 1e-14 * self.size / (self.t[i + 1] - self.t[i]).min(self.t[i] - self.t[i - 1]);
+        jump.abs() > STANDS_OUT * (most * self.span(i) + rounding) && jump.abs() > SMALLEST * self.top_speed
+    }
+
+    /// Whether the samples around i equal a cubic within rounding: then the apparent corner is a
+    /// rounding step.
+    fn is_rounding(&self, i: usize) -> bool {
+        self.resolution > 0.0
+            && WINDOWS.iter().any(|window| {
+                let range = i.saturating_sub(*window)..(i + window + 1).min(self.q.len());
+                distance_from_cubic(&self.t[range.clone()], &self.q[range]) < BEYOND_ROUNDING * self.resolution
+            })
+    }
+
+    fn corner_at(&self, i: usize) -> Option<Corner> {
+        let (most, ..) = self.around(i, i)?;
+        self.stands_out(self.change(i), i, most).then_some(Corner { sample: i, fraction: 0.0, position: self.q[i] })
+    }
+
+    /// Corner between sample i and the next one.
+    fn corner_between(&self, i: usize) -> Option<Corner> {
+        if i + 1 >= self.last {
+            return None;
+        }
+        let (t, q) = (self.t, self.q);
+        let (most, left, right) = self.around(i, i + 1)?;
+        // Subtracts the curvature on either side, which is not part of the corner.
+        let shares = [self.change(i) - left * self.span(i), self.change(i + 1) - right * self.span(i + 1)];
+        let jump = shares[0] + shares[1];
+        let fraction = shares[1] / jump;
+        let lies_between = (AT_SAMPLE..=1.0 - AT_SAMPLE).contains(&fraction);
+        let tau = fraction * (t[i + 1] - t[i]);
+        let position = q[i] + (self.slope[i - 1] + 0.5 * left * (t[i] - t[i - 1])) * tau + 0.5 * left * tau * tau;
+        (lies_between && self.stands_out(jump, i, most)).then_some(Corner { sample: i, fraction, position })
+    }
 }
 
 /// Resolution of positions that are multiples of a step plus an offset: decimals of a table, counts

@@ -104,7 +104,7 @@ impl DescribedTable {
                 attachments.sort_by_key(|file| run.attachments.iter().position(|name| *name == file.name));
                 TableLayout::of_header(header, names)
             }
-            Some(Err(what)) => Err((what, "the description of a run".to_owned())),
+            Some(Err(error)) => Err((error.to_string(), "the description of a run".to_owned())),
             None => TableLayout::of_names(names),
         };
         let mut layout = layout.map_err(refuse)?;

@@ -148,15 +148,22 @@ pub(crate) fn files(header: &RunHeader) -> std::io::Result<Vec<crate::Attachment
     Ok(files)
 }
 
+/// What is wrong with the text of a header.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum RunJsonError {
+    #[error("{RUN_JSON} cannot be read: {0}")]
+    NotAHeader(serde_json::Error),
+    #[error("{RUN_JSON} has format {found}, this program reads up to {FORMAT}")]
+    LaterFormat { found: u32 },
+    #[error("{RUN_JSON} names links that it does not have")]
+    UnknownLink,
+}
+
 /// Reads the header, without URDF, attached files and meshes, which the caller adds.
-///
-/// # Errors
-/// A description of what is wrong with the text.
-pub(crate) fn read(text: &[u8]) -> Result<(RunHeader, RunJson), String> {
-    let mut run: RunJson =
-        serde_json::from_slice(text).map_err(|error| format!("{RUN_JSON} cannot be read: {error}"))?;
+pub(crate) fn read(text: &[u8]) -> Result<(RunHeader, RunJson), RunJsonError> {
+    let mut run: RunJson = serde_json::from_slice(text).map_err(RunJsonError::NotAHeader)?;
     if run.format > FORMAT {
-        return Err(format!("{RUN_JSON} has format {}, this program reads up to {FORMAT}", run.format));
+        return Err(RunJsonError::LaterFormat { found: run.format });
     }
     let links = run.links.len();
     let parents_first = run.links.iter().enumerate().all(|(k, link)| link.parent.is_none_or(|parent| parent < k));
@@ -165,7 +172,7 @@ pub(crate) fn read(text: &[u8]) -> Result<(RunHeader, RunJson), String> {
             bend.link < links && bend.carries.iter().all(|&(link, k)| link < links && k < bend.stations.len())
         });
     if !parents_first || !in_range {
-        return Err(format!("{RUN_JSON} names links that it does not have"));
+        return Err(RunJsonError::UnknownLink);
     }
     let bend = |bend: Bend| BendInfo {
         link: bend.link,
@@ -332,22 +339,31 @@ pub(crate) mod meshes {
         pack(bytes)
     }
 
+    /// What is wrong with a block.
+    #[derive(Debug, thiserror::Error)]
+    pub(crate) enum BlockError {
+        #[error("its counts of corners are too large")]
+        Counts,
+        #[error(transparent)]
+        Unpack(#[from] std::io::Error),
+        #[error("it has {found} bytes, the list of meshes requires {expected}")]
+        Length { found: usize, expected: usize },
+        #[error("a triangle of mesh {mesh:?} has a corner that is not there")]
+        NoCorner { mesh: String },
+    }
+
     /// Reads the meshes described by `entries`.
-    ///
-    /// # Errors
-    /// A description of what is wrong with the block.
-    pub(crate) fn read(block: &[u8], entries: &[MeshEntry]) -> Result<Vec<LinkMesh>, String> {
+    pub(crate) fn read(block: &[u8], entries: &[MeshEntry]) -> Result<Vec<LinkMesh>, BlockError> {
         let size = |entry: &MeshEntry| entry.corners.checked_mul(24)?.checked_add(entry.triangles.checked_mul(12)?);
         let total = entries.iter().try_fold(0_usize, |sum, entry| sum.checked_add(size(entry)?));
         // Limit the allocation: no block compresses by a factor of more than 100,000.
-        let total =
-            total.filter(|total| *total / 100_000 <= block.len()).ok_or("its counts of corners are too large")?;
+        let total = total.filter(|total| *total / 100_000 <= block.len()).ok_or(BlockError::Counts)?;
         let bytes = match block.starts_with(&ZSTD_MAGIC) {
-            true => unpack(block, total).map_err(|error| error.to_string())?,
+            true => unpack(block, total)?,
             false => block.to_vec(),
         };
         if bytes.len() != total {
-            return Err(format!("it has {} bytes, the list of meshes requires {total}", bytes.len()));
+            return Err(BlockError::Length { found: bytes.len(), expected: total });
         }
         let mut words = bytes.chunks_exact(4).map(|word| [word[0], word[1], word[2], word[3]]);
         let mut word = || words.next().unwrap_or_default();
@@ -360,7 +376,7 @@ pub(crate) mod meshes {
             let triangles: Vec<[u32; 3]> =
                 triples(entry.triangles).into_iter().map(|triple| triple.map(u32::from_le_bytes)).collect();
             if triangles.iter().flatten().any(|corner| *corner as usize >= entry.corners) {
-                return Err(format!("a triangle of mesh {:?} has a corner that is not there", entry.name));
+                return Err(BlockError::NoCorner { mesh: entry.name.clone() });
             }
             let (link, name, color) = (entry.link, entry.name.clone(), entry.color);
             meshes.push(LinkMesh { link, name, positions, normals, triangles, color, file: None });

@@ -267,19 +267,9 @@ impl Problem {
         match self {
             Self::NotUtf8 { .. } => "save the file as UTF-8; is it a URDF at all?".into(),
             Self::Malformed { .. } => "is the file complete? Export or copy it again, or mend it here".into(),
-            Self::NotUrdf { root } => match root.as_str() {
-                "sdf" => "this is an SDF file; export the robot as URDF".into(),
-                "mujoco" => "this is an MJCF file; export the robot as URDF".into(),
-                "COLLADA" => "this is a mesh; give the URDF that refers to it".into(),
-                _ => "give a URDF file".into(),
-            },
+            Self::NotUrdf { root } => instead_of_document(root).into(),
             Self::NotRead { .. } => "please report it with the file; do names hold unusual characters?".into(),
-            Self::NoLink { idle_macros, .. } if !idle_macros.is_empty() => {
-                let calls = idle_macros.iter().take(3).map(|name| format!("<xacro:{name} .../>"));
-                let calls = calls.collect::<Vec<_>>().join(", ");
-                format!("give the file that calls them, or one that includes this one and calls {calls}")
-            }
-            Self::NoLink { .. } => "is the file complete? A robot needs at least one <link>".into(),
+            Self::NoLink { idle_macros, .. } => add_links(idle_macros),
             Self::TooManyElements { .. } => {
                 "is this one robot? Arms have some dozens of links: leave out what does not move with it".into()
             }
@@ -287,26 +277,18 @@ impl Problem {
             Self::MissingAttribute { attribute, .. } => format!("add {attribute}=\"...\""),
             Self::NotANumber { .. } => "write plain decimal numbers such as 0.1 or -1.5e-3, separated by spaces".into(),
             Self::DuplicateLink { .. } | Self::DuplicateJoint { .. } => "rename or remove one of them".into(),
-            Self::UnknownLink { closest, .. } | Self::UnknownMimic { closest, .. } => match closest {
-                Some(name) => format!("did you mean {name:?}?"),
-                None => "correct the name or define it".into(),
-            },
+            Self::UnknownLink { closest, .. } | Self::UnknownMimic { closest, .. } => {
+                did_you_mean(closest, "correct the name or define it")
+            }
             Self::TwoParents { .. } => {
                 "URDF describes trees: remove one of the joints; a closed loop is described with <mimic>".into()
             }
             Self::Cycle { .. } => "remove one of these joints or correct its parent".into(),
             Self::Disconnected { .. } => "add a (fixed) joint between the parts or remove the part not needed".into(),
-            Self::UnknownJointType { closest, .. } => match closest {
-                Some(name) => format!("did you mean {name:?}?"),
-                None => "types are fixed, revolute, continuous and prismatic".into(),
-            },
-            Self::UnsupportedJoint { kind, .. } => match kind.as_str() {
-                "floating" => "the base is fixed here: make the joint fixed, or replace it by three prismatic and \
-                               three revolute joints in series"
-                    .into(),
-                "planar" => "replace it by two prismatic and one continuous joint in series".into(),
-                _ => "replace it by three revolute joints in series with links of small mass between".into(),
-            },
+            Self::UnknownJointType { closest, .. } => {
+                did_you_mean(closest, "types are fixed, revolute, continuous and prismatic")
+            }
+            Self::UnsupportedJoint { kind, .. } => instead_of_joint(kind).into(),
             Self::MissingLimit { kind: "revolute", .. } => {
                 "add <limit lower=\"..\" upper=\"..\" effort=\"..\" velocity=\"..\"/> or make the joint continuous"
                     .into()
@@ -321,15 +303,7 @@ impl Problem {
                 "give the link its mass and inertia: without them it needs no force to move, and nothing bends under it"
                     .into()
             }
-            Self::MissingInertial { no_estimate, .. } => match no_estimate {
-                None => format!(
-                    "add <inertial> with mass and inertia, or have it estimated from the meshes ({} or {}, or such keys in \
-                     the robot file): without them the link needs no force to move, and nothing bends under it",
-                    Setting::InertiaFromDensity,
-                    Setting::InertiaFromTotalMass
-                ),
-                Some(why) => format!("add <inertial> with mass and inertia; it could not be estimated: {why}"),
-            },
+            Self::MissingInertial { no_estimate, .. } => add_inertial(no_estimate.as_deref()),
             Self::InertiaNotPositiveDefinite { .. } => {
                 "check signs, units (kg m^2) and that the values are about the centre of mass".into()
             }
@@ -342,6 +316,50 @@ impl Problem {
             }
             Self::BadEstimate { .. } => "give a density in kg/m^3 (steel 7850, aluminium 2700) or a mass in kg".into(),
         }
+    }
+}
+
+fn did_you_mean(closest: &Option<String>, otherwise: &str) -> String {
+    closest.as_ref().map_or_else(|| otherwise.into(), |name| format!("did you mean {name:?}?"))
+}
+
+fn instead_of_document(root: &str) -> &'static str {
+    match root {
+        "sdf" => "this is an SDF file; export the robot as URDF",
+        "mujoco" => "this is an MJCF file; export the robot as URDF",
+        "COLLADA" => "this is a mesh; give the URDF that refers to it",
+        _ => "give a URDF file",
+    }
+}
+
+fn instead_of_joint(kind: &str) -> &'static str {
+    match kind {
+        "floating" => {
+            "the base is fixed here: make the joint fixed, or replace it by three prismatic and three revolute joints \
+             in series"
+        }
+        "planar" => "replace it by two prismatic and one continuous joint in series",
+        _ => "replace it by three revolute joints in series with links of small mass between",
+    }
+}
+
+fn add_links(idle_macros: &[String]) -> String {
+    if idle_macros.is_empty() {
+        return "is the file complete? A robot needs at least one <link>".into();
+    }
+    let calls: Vec<_> = idle_macros.iter().take(3).map(|name| format!("<xacro:{name} .../>")).collect();
+    format!("give the file that calls them, or one that includes this one and calls {}", calls.join(", "))
+}
+
+fn add_inertial(no_estimate: Option<&str>) -> String {
+    match no_estimate {
+        None => format!(
+            "add <inertial> with mass and inertia, or have it estimated from the meshes ({} or {}, or such keys in the \
+             robot file): without them the link needs no force to move, and nothing bends under it",
+            Setting::InertiaFromDensity,
+            Setting::InertiaFromTotalMass
+        ),
+        Some(why) => format!("add <inertial> with mass and inertia; it could not be estimated: {why}"),
     }
 }
 

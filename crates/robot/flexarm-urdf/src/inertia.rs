@@ -19,7 +19,7 @@ use crate::mesh::MassProperties;
 use crate::raw::{RawInertial, RawLink, RawRobot};
 use crate::read::{InertiaEstimate, ReadOptions};
 use crate::report::Report;
-use crate::shapes::LinkShape;
+use crate::shapes::{LinkShape, NoEstimate};
 use crate::tree::Body;
 
 /// Relative tolerance of the checks, that of single-precision files.
@@ -184,7 +184,7 @@ fn check_body(
     body: &Body,
     inertias: &[Option<LinkInertia>],
     without_extent: &[bool],
-    failures: &[Option<String>],
+    failures: &[Option<NoEstimate>],
     options: &ReadOptions,
     report: &mut Report,
 ) -> Option<(TextPosition, Problem)> {
@@ -194,7 +194,7 @@ fn check_body(
     let lumped = || body.members[1..].iter().map(|&(i, _)| robot.links[i].name.clone()).collect();
     let with_inertia: Vec<usize> = body.members.iter().map(|m| m.0).filter(|&i| inertias[i].is_some()).collect();
     if with_inertia.is_empty() {
-        let no_estimate = body.members.iter().find_map(|&(i, _)| failures[i].clone());
+        let no_estimate = body.members.iter().find_map(|&(i, _)| failures[i].as_ref()).map(NoEstimate::to_string);
         let asked = no_estimate.is_some();
         let problem = Problem::MissingInertial { link, joint, lumped: lumped(), no_estimate };
         if asked {
@@ -274,7 +274,7 @@ fn fill_from_shapes(
     estimate: InertiaEstimate,
     inertias: &mut [Option<LinkInertia>],
     report: &mut Report,
-) -> Vec<Option<String>> {
+) -> Vec<Option<NoEstimate>> {
     let mut failures = vec![None; robot.links.len()];
     let (what, value) = match estimate {
         InertiaEstimate::Density(density) => ("the density", density),
@@ -286,32 +286,23 @@ fn fill_from_shapes(
     }
 
     // The base is included, so that the total mass may be that of the data sheet.
-    let empty = bodies_without(robot, bodies);
-    let (mut filled, mut shapeless): (Vec<(usize, SpatialInertia)>, Vec<usize>) = (Vec::new(), Vec::new());
-    for i in empty.flat_map(|b| b.members.iter().map(|m| m.0)) {
-        match &shapes[i].solids {
-            // A frame without shapes may remain massless if other links have shapes.
-            Ok(solids) if solids.is_empty() => shapeless.push(i),
-            Ok(solids) => {
-                let M_L = of_solids(&robot.links[i], solids, report);
-                if M_L.mass > 0.0 {
-                    filled.push((i, M_L));
-                } else {
-                    failures[i] = Some("its mesh encloses no volume".to_owned());
-                }
-            }
-            Err(reason) => failures[i] = Some(reason.clone()),
+    let empty: Vec<usize> = links_without(robot, bodies).collect();
+    let mut filled: Vec<(usize, SpatialInertia)> = Vec::new();
+    for &i in &empty {
+        match of_shapes(&robot.links[i], &shapes[i], report) {
+            Ok(M_L) => filled.extend(M_L.map(|M_L| (i, M_L))),
+            Err(reason) => failures[i] = Some(reason),
         }
     }
 
     let by_length = filled.is_empty() && matches!(estimate, InertiaEstimate::TotalMass(_));
     if by_length {
-        let links = bodies_without(robot, bodies).flat_map(|b| b.members.iter().map(|m| m.0));
-        filled = links.filter_map(|i| Some((i, rod(robot, i)?))).collect();
+        filled = empty.iter().filter_map(|&i| Some((i, rod(robot, i)?))).collect();
         filled.iter().for_each(|(i, _)| failures[*i] = None);
     }
     if filled.is_empty() {
-        shapeless.iter().for_each(|&i| failures[i] = Some("there is no shape".to_owned()));
+        let has_no_shape = |i: &usize| shapes[*i].solids.as_ref().is_ok_and(Vec::is_empty);
+        empty.into_iter().filter(has_no_shape).for_each(|i| failures[i] = Some(NoEstimate::NoShape));
     }
     // For rods the "volume" is the length.
     let volume: f64 = filled.iter().map(|(_, M)| M.mass).sum();
@@ -335,6 +326,17 @@ fn fill_from_shapes(
     failures
 }
 
+/// Returns the inertia of the shapes of a link at unit density; `None` without shapes: such a frame
+/// may remain massless if other links have shapes.
+fn of_shapes(link: &RawLink, shape: &LinkShape, report: &mut Report) -> Result<Option<SpatialInertia>, NoEstimate> {
+    let solids = shape.solids.as_ref().map_err(NoEstimate::clone)?;
+    if solids.is_empty() {
+        return Ok(None);
+    }
+    let M_L = of_solids(link, solids, report);
+    if M_L.mass > 0.0 { Ok(Some(M_L)) } else { Err(NoEstimate::NoVolume) }
+}
+
 /// Returns the inertia of the solids of a link at unit density; warns if a mesh is not closed.
 fn of_solids(link: &RawLink, solids: &[(Pose, MassProperties)], report: &mut Report) -> SpatialInertia {
     let open: usize = solids.iter().map(|(_, p)| p.open_edges).sum();
@@ -349,9 +351,10 @@ fn of_solids(link: &RawLink, solids: &[(Pose, MassProperties)], report: &mut Rep
     })
 }
 
-/// Bodies without any `<inertial>`.
-fn bodies_without<'a>(robot: &'a RawRobot, bodies: &'a [Body]) -> impl Iterator<Item = &'a Body> {
-    bodies.iter().filter(|b| b.members.iter().all(|&(i, _)| robot.links[i].inertial.is_none()))
+/// Links of the bodies without any `<inertial>`.
+fn links_without(robot: &RawRobot, bodies: &[Body]) -> impl Iterator<Item = usize> {
+    let empty = bodies.iter().filter(|b| b.members.iter().all(|&(i, _)| robot.links[i].inertial.is_none()));
+    empty.flat_map(|b| b.members.iter().map(|m| m.0))
 }
 
 /// Ratio of diameter to length of a rod.

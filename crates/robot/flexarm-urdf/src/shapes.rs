@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
+use std::rc::Rc;
 
 use flexarm_kinematics::Pose;
 use nalgebra::{Point3, Vector3};
@@ -9,7 +10,7 @@ use urdf_rs::Geometry as Shape;
 
 use crate::finding::TextPosition;
 use crate::geometry::{Geometry, Visual};
-use crate::mesh::{MassProperties, TriangleMesh, UpAxis, load_with_remarks};
+use crate::mesh::{MassProperties, MeshError, TriangleMesh, UpAxis, load_with_remarks};
 use crate::raw::{RawRobot, RawVisual, color};
 use crate::report::Report;
 use crate::resolve::Resolver;
@@ -24,7 +25,22 @@ pub(crate) struct LinkShape {
     /// Bounding box of all shapes in link axes; `None` if there are none or one is unknown.
     pub(crate) bounds: Option<(Vector3<f64>, Vector3<f64>)>,
     /// Poses `X_LV` and mass properties of all shapes, or the reason why one is unknown.
-    pub(crate) solids: Result<Vec<(Pose, MassProperties)>, String>,
+    pub(crate) solids: Result<Vec<(Pose, MassProperties)>, NoEstimate>,
+}
+
+/// Reason why the inertia of a link cannot be estimated from its shapes.
+#[derive(Clone, Debug, thiserror::Error)]
+pub(crate) enum NoEstimate {
+    #[error("meshes were not looked into")]
+    NotInspected,
+    #[error("the mesh {uri:?} was not found")]
+    NotFound { uri: String },
+    #[error("{}", with_source(&**.0))]
+    Unreadable(Rc<MeshError>),
+    #[error("its mesh encloses no volume")]
+    NoVolume,
+    #[error("there is no shape")]
+    NoShape,
 }
 
 /// Returns all visuals, with their mesh files.
@@ -116,7 +132,7 @@ pub(crate) fn inspect(robot: &RawRobot, visuals: &[Visual], report: &mut Report)
 
 /// Shape data without inspection of files.
 pub(crate) fn unknown(robot: &RawRobot) -> Vec<LinkShape> {
-    let unknown = || LinkShape { bounds: None, solids: Err("meshes were not looked into".to_owned()) };
+    let unknown = || LinkShape { bounds: None, solids: Err(NoEstimate::NotInspected) };
     robot.links.iter().map(|_| unknown()).collect()
 }
 
@@ -137,7 +153,7 @@ type Bounds = (Vector3<f64>, Vector3<f64>);
 /// Mesh files, each read once.
 #[derive(Default)]
 struct Meshes {
-    loaded: HashMap<PathBuf, Result<TriangleMesh, String>>,
+    loaded: HashMap<PathBuf, Result<TriangleMesh, Rc<MeshError>>>,
 }
 
 impl Meshes {
@@ -147,19 +163,20 @@ impl Meshes {
         visual: &Visual,
         place: &TextPosition,
         report: &mut Report,
-    ) -> Result<(Bounds, MassProperties), String> {
+    ) -> Result<(Bounds, MassProperties), NoEstimate> {
+        let unreadable = |error: MeshError| NoEstimate::Unreadable(Rc::new(error));
         let (low_V, high_V, properties) = match &visual.geometry {
-            Geometry::Mesh { path: None, uri, .. } => return Err(format!("the mesh {uri:?} was not found")),
+            Geometry::Mesh { path: None, uri, .. } => return Err(NoEstimate::NotFound { uri: uri.clone() }),
             Geometry::Mesh { path: Some(path), scale, up_axis, .. } => {
-                let mesh = self.load(path, *up_axis, &visual.link, place, report).as_ref().map_err(String::clone)?;
-                let mesh = mesh.clone().scaled(scale);
+                let mesh = self.load(path, *up_axis, &visual.link, place, report);
+                let mesh = mesh.clone().map_err(NoEstimate::Unreadable)?.scaled(scale);
                 let (low, high) = mesh.bounds().unwrap_or_default();
                 (low, high, mesh.mass_properties())
             }
             shape => {
-                let mesh = shape.triangles().map_err(|e| e.to_string())?;
+                let mesh = shape.triangles().map_err(unreadable)?;
                 let (low, high) = mesh.bounds().unwrap_or_default();
-                (low, high, shape.mass_properties().map_err(|e| e.to_string())?)
+                (low, high, shape.mass_properties().map_err(unreadable)?)
             }
         };
         // Bounding box of the rotated box: slightly larger than that of the shape.
@@ -178,7 +195,7 @@ impl Meshes {
         link: &str,
         place: &TextPosition,
         report: &mut Report,
-    ) -> &Result<TriangleMesh, String> {
+    ) -> &Result<TriangleMesh, Rc<MeshError>> {
         self.loaded.entry(path.to_owned()).or_insert_with(|| match load_with_remarks(path, up_axis) {
             Ok(loaded) => {
                 for remark in loaded.remarks {
@@ -189,7 +206,7 @@ impl Meshes {
             Err(error) => {
                 let message = format!("link {link:?}: {}", with_source(&error));
                 report.warning(place, "unreadable-mesh", message, "export the mesh again, as STL for example");
-                Err(with_source(&error))
+                Err(Rc::new(error))
             }
         })
     }

@@ -16,7 +16,8 @@ use nalgebra::DMatrix;
 use super::diagnose::diagnose_substructure;
 use super::error::{ErrorPosition, ExchangeError, ExchangeErrorKind};
 use super::interface::{InterfaceMap, propose_map};
-use super::matrix::{Entries, ImportedMatrices, LabelledMatrix};
+use super::matrix::{Entries, LabelledMatrix};
+use super::read::ImportedMatrices;
 use flexarm_fem::units::UnitSystem;
 
 /// Stiffness and mass of the interfaces, SI, modal coordinates last.

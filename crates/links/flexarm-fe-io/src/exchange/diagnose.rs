@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::error::{ErrorPosition, ExchangeError, ExchangeErrorKind};
-use super::matrix::ImportedMatrices;
+use super::read::ImportedMatrices;
 use super::recognise::MatrixFormat;
 
 /// Relative force under translation above which it is of order one: nothing cancels.

@@ -54,10 +54,7 @@ pub(super) fn parse(text: Text<'_>) -> Result<Dmig, ExchangeError> {
         }
     }
     for raw in matrices {
-        match assemble(raw, text)? {
-            Ok(matrix) => result.matrices.push(matrix),
-            Err(warning) => result.warnings.push(warning),
-        }
+        result.matrices.extend(assemble(raw, text, &mut result.warnings)?);
     }
     Ok(result)
 }
@@ -145,17 +142,23 @@ fn parse_grid(card: &Card<'_>, result: &mut Dmig) -> Result<(), ExchangeError> {
     Ok(())
 }
 
-/// Assembles the symmetric matrix, or returns the reason why the matrix is not symmetric.
-fn assemble(raw: RawMatrix<'_>, text: Text<'_>) -> Result<Result<LabelledMatrix, String>, ExchangeError> {
+/// Assembles a symmetric matrix; warns of another one and returns `None`.
+fn assemble(
+    raw: RawMatrix<'_>,
+    text: Text<'_>,
+    warnings: &mut Vec<String>,
+) -> Result<Option<LabelledMatrix>, ExchangeError> {
     let RawMatrix { name, is_rectangular, header, entries } = raw;
     let rows: BTreeSet<DofLabel> = entries.iter().map(|(row, ..)| *row).collect();
     let columns: BTreeSet<DofLabel> = entries.iter().map(|(_, column, ..)| *column).collect();
     if entries.is_empty() {
-        return Ok(Err(format!("DMIG {name} (line {}) has no entries", header.line.unwrap_or(0))));
+        warnings.push(format!("DMIG {name} (line {}) has no entries", header.line.unwrap_or(0)));
+        return Ok(None);
     }
     // Columns without grids in common with the rows: loads and other rectangular matrices.
     if is_rectangular || rows.is_disjoint(&columns) {
-        return Ok(Err(format!("DMIG {name} is rectangular and was left out")));
+        warnings.push(format!("DMIG {name} is rectangular and was left out"));
+        return Ok(None);
     }
     // Grids first, then scalar points (modal coordinates), each in ascending order.
     let mut labels: Vec<DofLabel> = rows.union(&columns).copied().collect();
@@ -165,7 +168,7 @@ fn assemble(raw: RawMatrix<'_>, text: Text<'_>) -> Result<Result<LabelledMatrix,
     for (row, column, value, place) in &entries {
         triplets.push(index[row], index[column], *value, place);
     }
-    triplets.symmetric(&name, text.origin, labels, Storage::BySize).map(Ok)
+    triplets.symmetric(&name, text.origin, labels, Storage::BySize).map(Some)
 }
 
 /// Writes matrices as DMIG entries in large field: ten significant digits, relative error 5e-10.
@@ -211,7 +214,7 @@ pub fn write_dmig(
 
 /// Formats a number in 16 columns, nine decimals, with D exponent.
 fn large(value: f64) -> String {
-    super::user_element::fortran(value, 9, 16).replace('E', "D")
+    super::fortran::fortran(value, 9, 16).replace('E', "D")
 }
 
 #[cfg(test)]

@@ -1,4 +1,5 @@
-//! Fortran edit descriptors: `(8I10)`, `(1P,3E25.16)`, `1P5D16.9`, and fields of such formats.
+//! Fortran edit descriptors: `(8I10)`, `(1P,3E25.16)`, `1P5D16.9`, fields of such formats, and numbers
+//! as Fortran writes them.
 
 use super::error::{ErrorPosition, ExchangeError, ExchangeErrorKind};
 use super::text::shown;
@@ -31,6 +32,17 @@ impl Format {
         let width = self.width;
         (0..line.len().div_ceil(width)).map(move |i| line[i * width..line.len().min((i + 1) * width)].trim())
     }
+}
+
+/// Formats as `1.2345E+08` with `decimals` digits after the point, right-aligned in `width`.
+pub(super) fn fortran(value: f64, decimals: usize, width: usize) -> String {
+    let printed = format!("{value:.decimals$E}");
+    let (mantissa, exponent) = printed.split_once('E').unwrap_or((&printed, "0"));
+    let exponent: i32 = exponent.parse().unwrap_or(0);
+    let sign = if exponent < 0 { '-' } else { '+' };
+    // A three-digit exponent replaces the letter, as in Fortran.
+    let letter = if exponent.abs() < 100 { "E" } else { "" };
+    format!("{:>width$}", format!("{mantissa}{letter}{sign}{:02}", exponent.abs()))
 }
 
 #[cfg(test)]

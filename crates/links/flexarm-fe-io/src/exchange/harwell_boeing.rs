@@ -28,24 +28,9 @@ pub(super) fn parse(text: Text<'_>) -> Result<LabelledMatrix, ExchangeError> {
         next()?;
     }
 
-    // Three lists, each starting on a new line.
-    let mut list =
-        |what: &'static str, format: Format, count: usize| -> Result<Vec<(ErrorPosition<'_>, &str)>, ExchangeError> {
-            let mut fields = Vec::new();
-            while fields.len() < count {
-                let Some((place, line)) = lines.next() else {
-                    let (found, expected) = (format!("{} {what}", fields.len()), format!("{count}"));
-                    let help = "is the file cut off?";
-                    return Err(text.file().fail(ExchangeErrorKind::WrongSize, "matrix", found, expected, help));
-                };
-                fields.extend(format.fields(line).map(|field| (place, field)));
-            }
-            fields.truncate(count);
-            Ok(fields)
-        };
-    let pointers = list("column pointers", pointers, n.saturating_add(1))?;
-    let indices = list("row numbers", indices, promised)?;
-    let values = list("values", values, promised)?;
+    let pointers = list(text, &mut lines, "column pointers", pointers, n.saturating_add(1))?;
+    let indices = list(text, &mut lines, "row numbers", indices, promised)?;
+    let values = list(text, &mut lines, "values", values, promised)?;
 
     let mut triplets = Triplets::default();
     let mut start = 0;
@@ -67,6 +52,27 @@ pub(super) fn parse(text: Text<'_>) -> Result<LabelledMatrix, ExchangeError> {
     }
     let rows = triplets.unlabelled(n, &text.file())?;
     triplets.symmetric("the matrix", text.origin, rows, Storage::BySize)
+}
+
+/// Reads the fields of a list, which starts on a new line.
+fn list<'a>(
+    text: Text<'a>,
+    lines: &mut impl Iterator<Item = (ErrorPosition<'a>, &'a str)>,
+    what: &str,
+    format: Format,
+    count: usize,
+) -> Result<Vec<(ErrorPosition<'a>, &'a str)>, ExchangeError> {
+    let mut fields = Vec::new();
+    while fields.len() < count {
+        let Some((place, line)) = lines.next() else {
+            let (found, expected) = (format!("{} {what}", fields.len()), format!("{count}"));
+            let help = "is the file cut off?";
+            return Err(text.file().fail(ExchangeErrorKind::WrongSize, "matrix", found, expected, help));
+        };
+        fields.extend(format.fields(line).map(|field| (place, field)));
+    }
+    fields.truncate(count);
+    Ok(fields)
 }
 
 /// Numbers of rows and entries of a real, symmetric or unsymmetric, assembled matrix.

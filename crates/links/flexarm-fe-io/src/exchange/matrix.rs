@@ -1,14 +1,11 @@
 //! Symmetric matrices with labelled rows as they are in a file; no unit conversion here.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::HashMap;
 use std::fmt;
 
-use flexarm_spatial::Pose;
-use nalgebra::{DMatrix, Vector3};
+use nalgebra::DMatrix;
 
 use super::error::{ErrorPosition, ExchangeError, ExchangeErrorKind};
-use super::recognise::MatrixFormat;
-use super::sidecar::Sidecar;
 
 /// Maximum number of rows of a matrix that is stored dense (32 MB).
 pub const LARGEST_DENSE: usize = 2000;
@@ -16,6 +13,25 @@ pub const LARGEST_DENSE: usize = 2000;
 /// Allowed difference of mirrored entries relative to `sqrt(|k_ii k_jj|)`: the last of nine printed
 /// decimals.
 pub const LARGEST_ASYMMETRY: f64 = 1e-8;
+
+/// Role of a matrix.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MatrixRole {
+    /// Stiffness.
+    Stiffness,
+    /// Mass.
+    Mass,
+}
+
+impl MatrixRole {
+    /// Name: "stiffness" or "mass".
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Stiffness => "stiffness",
+            Self::Mass => "mass",
+        }
+    }
+}
 
 /// Node and component of a matrix row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -138,29 +154,6 @@ impl LabelledMatrix {
     pub fn is_labelled(&self) -> bool {
         self.rows.iter().any(|label| label.node.is_some())
     }
-}
-
-/// Data of one structure from one or several files, in the units of the files.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ImportedMatrices {
-    /// Format of the file with the stiffness.
-    pub format: MatrixFormat,
-    /// Source of the data, for messages.
-    pub origin: String,
-    /// Stiffness matrix.
-    pub stiffness: LabelledMatrix,
-    /// Mass matrix, with the same order of rows.
-    pub mass: Option<LabelledMatrix>,
-    /// Positions of nodes, if the format has them.
-    pub positions: BTreeMap<i64, Vector3<f64>>,
-    /// Nodes by name of their set, if the format has them.
-    pub node_sets: BTreeMap<String, Vec<i64>>,
-    /// Frames of the interfaces in the order of the rows, if the format has them.
-    pub frames: Vec<Pose>,
-    /// Units, interfaces and frames from the sidecar of Matrix Market files.
-    pub sidecar: Option<Sidecar>,
-    /// Warnings about accepted but suspicious input.
-    pub warnings: Vec<String>,
 }
 
 /// Entries as read from a file, in any order and from either triangle.

@@ -8,10 +8,9 @@
 use nalgebra::DMatrix;
 
 use super::error::{ErrorPosition, ExchangeError, ExchangeErrorKind};
-use super::fortran::{Format, parse_format};
+use super::fortran::{Format, fortran, parse_format};
 use super::matrix::{LabelledMatrix, Storage, Triplets};
 use super::text::{Text, shown, words};
-use super::user_element::fortran;
 
 /// Header of a matrix, in text and in binary files.
 #[derive(Debug, Clone, PartialEq)]

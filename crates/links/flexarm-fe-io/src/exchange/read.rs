@@ -8,31 +8,12 @@ use flexarm_spatial::Pose;
 use nalgebra::Vector3;
 
 use super::error::{ErrorPosition, ExchangeError, ExchangeErrorKind};
-use super::matrix::{DofLabel, ImportedMatrices, LabelledMatrix, Storage, reordered};
+use super::matrix::{DofLabel, LabelledMatrix, MatrixRole, Storage, reordered};
 use super::recognise::{MatrixFormat, recognise};
 use super::sidecar::Sidecar;
 use super::text::{LARGEST_UNPACKED, Text, unpack};
 use super::{abaqus_text, dmig, harwell_boeing, matrix_market, op4_binary, op4_text, sidecar, simscape, user_element};
 use flexarm_fem::input::read_file;
-
-/// Role of a matrix.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum MatrixRole {
-    /// Stiffness.
-    Stiffness,
-    /// Mass.
-    Mass,
-}
-
-impl MatrixRole {
-    /// Name: "stiffness" or "mass".
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Stiffness => "stiffness",
-            Self::Mass => "mass",
-        }
-    }
-}
 
 /// Names of the matrices to select in files with several (DMIG, OP4); `None`: by the letters K and
 /// M.
@@ -42,6 +23,29 @@ pub struct MatrixNames {
     pub stiffness: Option<String>,
     /// Name of the mass, such as `MAAX`.
     pub mass: Option<String>,
+}
+
+/// Data of one structure from one or several files, in the units of the files.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ImportedMatrices {
+    /// Format of the file with the stiffness.
+    pub format: MatrixFormat,
+    /// Source of the data, for messages.
+    pub origin: String,
+    /// Stiffness matrix.
+    pub stiffness: LabelledMatrix,
+    /// Mass matrix, with the same order of rows.
+    pub mass: Option<LabelledMatrix>,
+    /// Positions of nodes, if the format has them.
+    pub positions: BTreeMap<i64, Vector3<f64>>,
+    /// Nodes by name of their set, if the format has them.
+    pub node_sets: BTreeMap<String, Vec<i64>>,
+    /// Frames of the interfaces in the order of the rows, if the format has them.
+    pub frames: Vec<Pose>,
+    /// Units, interfaces and frames from the sidecar of Matrix Market files.
+    pub sidecar: Option<Sidecar>,
+    /// Warnings about accepted but suspicious input.
+    pub warnings: Vec<String>,
 }
 
 /// File in memory.
@@ -274,25 +278,46 @@ pub fn parse_matrices(files: &[InputFile], names: &MatrixNames) -> Result<Import
 
 fn parse_file(file: &InputFile, found: &mut CombinedFiles) -> Result<(), ExchangeError> {
     let origin = file.origin.as_str();
-    let place = ErrorPosition::file(origin);
     let Some(format) = recognise(&file.bytes) else {
         let help = ".mtx of Adams and Altair, .mnf, .sub, .h3d and .npz cannot be read: export text, such as DMIG or \
                     Matrix Market";
         let expected = "Matrix Market, CalculiX or Abaqus matrices, DMIG, OP4, Harwell-Boeing, Exudyn HDF5, CSV";
+        let place = ErrorPosition::file(origin);
         return Err(place.fail(ExchangeErrorKind::NotRecognised, "file", "an unknown format", expected, help));
     };
     let bytes = unpack(&file.bytes, origin)?;
-    let lossy = if matches!(format, MatrixFormat::Op4Binary | MatrixFormat::ExudynHdf5) {
-        std::borrow::Cow::Borrowed("")
-    } else {
-        String::from_utf8_lossy(&bytes)
-    };
+    let mut matrices = parse_format(format, &bytes, file, found)?;
+    // A role given by the user takes precedence; if the file has several matrices, those with that
+    // role are kept.
+    match (&mut matrices[..], file.role) {
+        ([(role, _)], Some(said)) => *role = Some(said),
+        (several, Some(said)) => several.iter_mut().for_each(|(role, _)| *role = role.filter(|role| *role == said)),
+        (_, None) => {}
+    }
+    let candidate = |(role, matrix)| Candidate { format, origin: origin.into(), role, matrix };
+    found.candidates.extend(matrices.into_iter().map(candidate));
+    Ok(())
+}
+
+/// A matrix with its role, if that is known.
+type MatrixWithRole = (Option<MatrixRole>, LabelledMatrix);
+
+/// Returns the matrices of a file with their roles, as far as known; keeps other data in `found`.
+fn parse_format(
+    format: MatrixFormat,
+    bytes: &[u8],
+    file: &InputFile,
+    found: &mut CombinedFiles,
+) -> Result<Vec<MatrixWithRole>, ExchangeError> {
+    let origin = file.origin.as_str();
+    let is_binary = matches!(format, MatrixFormat::Op4Binary | MatrixFormat::ExudynHdf5);
+    let lossy = String::from_utf8_lossy(if is_binary { b"" } else { bytes });
     let text = Text::new(&lossy, origin);
     let by_file = file.role.or_else(|| role_by_name(origin));
     let one = |matrix| vec![(by_file, matrix)];
     let several = |list: Vec<LabelledMatrix>| list.into_iter().map(|m| (role_by_letter(&m.name), m)).collect();
 
-    let mut matrices: Vec<(Option<MatrixRole>, LabelledMatrix)> = match format {
+    Ok(match format {
         MatrixFormat::MatrixMarket => one(matrix_market::parse(text)?),
         MatrixFormat::UserElement => user_element::parse(text)?.into_iter().map(|(role, m)| (Some(role), m)).collect(),
         MatrixFormat::LabelledText => {
@@ -316,21 +341,9 @@ fn parse_file(file: &InputFile, found: &mut CombinedFiles) -> Result<(), Exchang
             several(dmig.matrices)
         }
         MatrixFormat::Op4Text => several(op4_text::parse(text)?),
-        MatrixFormat::Op4Binary => several(op4_binary::parse(&bytes, origin)?),
+        MatrixFormat::Op4Binary => several(op4_binary::parse(bytes, origin)?),
         MatrixFormat::HarwellBoeing => one(harwell_boeing::parse(text)?),
-        #[cfg(not(feature = "hdf5"))]
-        MatrixFormat::ExudynHdf5 => {
-            let (found, expected) = ("HDF5", "a format that this build reads");
-            let help = "build flexarm with the feature hdf5, or install the Python package, which reads it";
-            return Err(ErrorPosition::file(origin).fail(ExchangeErrorKind::Syntax, "file", found, expected, help));
-        }
-        #[cfg(feature = "hdf5")]
-        MatrixFormat::ExudynHdf5 => {
-            let exudyn = super::exudyn::parse(&bytes, origin)?;
-            found.positions.extend(exudyn.positions);
-            found.node_sets.extend(exudyn.node_sets);
-            vec![(Some(MatrixRole::Stiffness), exudyn.stiffness), (Some(MatrixRole::Mass), exudyn.mass)]
-        }
+        MatrixFormat::ExudynHdf5 => parse_exudyn(bytes, origin, found)?,
         MatrixFormat::Csv => one(simscape::parse_matrix(text)?),
         MatrixFormat::CsvFrames => {
             found.frames = simscape::parse_frames(text)?;
@@ -343,19 +356,25 @@ fn parse_file(file: &InputFile, found: &mut CombinedFiles) -> Result<(), Exchang
         MatrixFormat::Sid => {
             let help = "read it with parse_sid";
             let expected = "stiffness and mass of interfaces";
+            let place = ErrorPosition::file(origin);
             return Err(place.fail(ExchangeErrorKind::Unsupported, "file", "a modal body (SID)", expected, help));
         }
-    };
-    // A role given by the user takes precedence; if the file has several matrices, those with that
-    // role are kept.
-    match (&mut matrices[..], file.role) {
-        ([(role, _)], Some(said)) => *role = Some(said),
-        (several, Some(said)) => several.iter_mut().for_each(|(role, _)| *role = role.filter(|role| *role == said)),
-        (_, None) => {}
-    }
-    let candidate = |(role, matrix)| Candidate { format, origin: origin.into(), role, matrix };
-    found.candidates.extend(matrices.into_iter().map(candidate));
-    Ok(())
+    })
+}
+
+#[cfg(not(feature = "hdf5"))]
+fn parse_exudyn(_: &[u8], origin: &str, _: &mut CombinedFiles) -> Result<Vec<MatrixWithRole>, ExchangeError> {
+    let (found, expected) = ("HDF5", "a format that this build reads");
+    let help = "build flexarm with the feature hdf5, or install the Python package, which reads it";
+    Err(ErrorPosition::file(origin).fail(ExchangeErrorKind::Syntax, "file", found, expected, help))
+}
+
+#[cfg(feature = "hdf5")]
+fn parse_exudyn(bytes: &[u8], origin: &str, found: &mut CombinedFiles) -> Result<Vec<MatrixWithRole>, ExchangeError> {
+    let exudyn = super::exudyn::parse(bytes, origin)?;
+    found.positions.extend(exudyn.positions);
+    found.node_sets.extend(exudyn.node_sets);
+    Ok(vec![(Some(MatrixRole::Stiffness), exudyn.stiffness), (Some(MatrixRole::Mass), exudyn.mass)])
 }
 
 /// Full models (`.sti`, `.mas`) are stored sparse, other files by size.

@@ -6,8 +6,8 @@
 use nalgebra::DMatrix;
 
 use super::error::{ErrorPosition, ExchangeError, ExchangeErrorKind};
-use super::matrix::{DofLabel, LabelledMatrix, Storage, Triplets};
-use super::read::MatrixRole;
+use super::fortran::fortran;
+use super::matrix::{DofLabel, LabelledMatrix, MatrixRole, Storage, Triplets};
 use super::text::{Text, shown, words};
 
 /// Section of the file that the current lines belong to.
@@ -234,15 +234,4 @@ pub fn write_user_element(K: &DMatrix<f64>, M: Option<&DMatrix<f64>>, rows: &[Do
         }
     }
     text
-}
-
-/// Formats as `1.2345E+08` with `decimals` digits after the point, right-aligned in `width`.
-pub(super) fn fortran(value: f64, decimals: usize, width: usize) -> String {
-    let printed = format!("{value:.decimals$E}");
-    let (mantissa, exponent) = printed.split_once('E').unwrap_or((&printed, "0"));
-    let exponent: i32 = exponent.parse().unwrap_or(0);
-    let sign = if exponent < 0 { '-' } else { '+' };
-    // A three-digit exponent replaces the letter, as in Fortran.
-    let letter = if exponent.abs() < 100 { "E" } else { "" };
-    format!("{:>width$}", format!("{mantissa}{letter}{sign}{:02}", exponent.abs()))
 }

@@ -5,10 +5,10 @@ use serde::Deserialize;
 
 use super::document::{Node, Table};
 use super::error::{FlexErrorKind, FlexFileError};
-use super::frames::read_pose;
-use super::read::{read_inertial, refused};
+use super::frames::{pose_lines, read_pose};
+use super::rigid_part::{inertial, read_inertial};
+use super::text::{numbers, quoted};
 use super::units::Units;
-use super::write::{numbers, pose_lines, quoted};
 use crate::chain::Chain;
 use crate::error::FemError;
 use crate::gate::{GateLimits, check_matrix6, check_matrix12};
@@ -45,13 +45,13 @@ pub(super) fn write_details(link: &ReducedLink) -> String {
             text += &matrix("stiffness", &DMatrix::from_column_slice(6, 6, joint.K_S.as_slice()));
         }
         for part in &chain.parts {
-            text += &format!("\n[[chain.part]]\n{}", super::write::inertial(part));
+            text += &format!("\n[[chain.part]]\n{}", inertial(part));
         }
     }
     for body in &details.attached {
         text +=
             "\n[[attached]]                  # rides on the link: in the parts and chains, not in the superelement\n";
-        text += &super::write::inertial(body);
+        text += &inertial(body);
     }
     if let Some(modal) = &details.modal {
         text += &super::modal::write_modal(modal);
@@ -168,25 +168,27 @@ fn read_superelement(
         }
     }
     let element = Superelement { interfaces, K, M };
-    agrees(&element, link).map_err(|found| {
-        node.fail(FlexErrorKind::Link, found, "the same K_BB as in [stiffness]", "was one of them edited?")
-    })?;
+    check_superelement(node, &element, link)?;
     Ok(element)
 }
 
 /// Checks that the superelement agrees with the frames and the 6×6 of its link.
-fn agrees(element: &Superelement, link: &ReducedLink) -> Result<(), String> {
+fn check_superelement(node: &Node<'_, '_>, element: &Superelement, link: &ReducedLink) -> Result<(), FlexFileError> {
+    let fail = |found: String| {
+        node.fail(FlexErrorKind::Link, found, "the same K_BB as in [stiffness]", "was one of them edited?")
+    };
     for (k, X) in [(0, &link.X_LA), (1, &link.X_LB)] {
         let gap = (element.interfaces[k].X_LI.translation.vector - X.translation.vector).norm();
         if !(gap <= 1e-9) {
-            return Err(format!("interface {:?} is {gap:.1e} m from the one of the link", element.interfaces[k].name));
+            let name = &element.interfaces[k].name;
+            return Err(fail(format!("interface {name:?} is {gap:.1e} m from the one of the link")));
         }
     }
-    let K = stiffness12(element).ok_or("a singular stiffness")?;
-    check_matrix12(&K, &link.p_AB(), &GateLimits::default()).map_err(|error| error.to_string())?;
+    let K = stiffness12(element).ok_or_else(|| fail("a singular stiffness".into()))?;
+    check_matrix12(&K, &link.p_AB(), &GateLimits::default()).map_err(|error| fail(error.to_string()))?;
     let s = link.K_BB.diagonal().map(f64::sqrt);
     let gap = Matrix6::from_fn(|i, j| (K[(6 + i, 6 + j)] - link.K_BB[(i, j)]).abs() / (s[i] * s[j])).amax();
-    if gap <= AGREEMENT { Ok(()) } else { Err(format!("a K_BB that differs by {gap:.1e}")) }
+    if gap <= AGREEMENT { Ok(()) } else { Err(fail(format!("a K_BB that differs by {gap:.1e}"))) }
 }
 
 /// Reads a square matrix of at least `smallest` rows.
@@ -222,7 +224,7 @@ fn read_chain(node: &Node<'_, '_>, units: &Units, link: &ReducedLink) -> Result<
         let K = Matrix6::from_column_slice(K.as_slice());
         let expected = "a symmetric, positive definite stiffness";
         let (K_S, _) =
-            check_matrix6("K_S", &K, &GateLimits::default()).map_err(|cause| refused(&item, cause, expected))?;
+            check_matrix6("K_S", &K, &GateLimits::default()).map_err(|cause| item.refused(cause, expected))?;
         joints.push(ElasticSplit { X_LS, K_S });
     }
     for item in table.require("part", "one [[chain.part]] per rigid part")?.list()? {
@@ -237,27 +239,29 @@ fn read_chain(node: &Node<'_, '_>, units: &Units, link: &ReducedLink) -> Result<
         return Err(FlexFileError { source: Some(Box::new(cause)), ..error });
     }
     let chain = Chain { joints, parts };
-    let same = "the compliance and the mass of the link";
-    chain_agrees(&chain, link)
-        .map_err(|found| node.fail(FlexErrorKind::Link, found, same, "was one of them edited?"))?;
+    check_chain(node, &chain, link)?;
     Ok(chain)
 }
 
 /// Checks that the joints of a chain add up to the 6×6 of its link, and its parts to the link's
 /// mass.
-fn chain_agrees(chain: &Chain, link: &ReducedLink) -> Result<(), String> {
+fn check_chain(node: &Node<'_, '_>, chain: &Chain, link: &ReducedLink) -> Result<(), FlexFileError> {
+    let fail = |found: String| {
+        let expected = "the compliance and the mass of the link";
+        Err(node.fail(FlexErrorKind::Link, found, expected, "was one of them edited?"))
+    };
     let p_LB = link.X_LB.translation.vector;
     let (Some(sum), Ok(C)) = (chain.tip_compliance(&p_LB), link.tip_compliance()) else {
-        return Err("a joint without compliance".into());
+        return fail("a joint without compliance".into());
     };
     let s = C.diagonal().map(f64::sqrt);
     let gap = Matrix6::from_fn(|i, j| (sum[(i, j)] - C[(i, j)]).abs() / (s[i] * s[j])).amax();
     if !(gap <= AGREEMENT) {
-        return Err(format!("joints whose compliance differs from that of the link by {gap:.1e}"));
+        return fail(format!("joints whose compliance differs from that of the link by {gap:.1e}"));
     }
     let mass: f64 = chain.parts.iter().map(|part| part.mass).sum();
     if !((mass / link.mass() - 1.0).abs() <= AGREEMENT) {
-        return Err(format!("parts of {mass} kg in a link of {} kg", link.mass()));
+        return fail(format!("parts of {mass} kg in a link of {} kg", link.mass()));
     }
     Ok(())
 }

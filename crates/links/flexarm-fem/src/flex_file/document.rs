@@ -7,6 +7,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::error::{FlexErrorKind, FlexFileError};
+use crate::error::FemError;
 
 /// The text and its name in messages.
 pub(super) struct Document<'d> {
@@ -132,6 +133,12 @@ impl<'d, 't> Node<'d, 't> {
         help: impl Into<Box<str>>,
     ) -> FlexFileError {
         self.document.fail(self.value.span(), &self.path, kind, found, expected, help)
+    }
+
+    /// Creates an error for a well-formed element that is invalid in a link.
+    pub(super) fn refused(&self, cause: FemError, expected: &str) -> FlexFileError {
+        let error = self.fail(FlexErrorKind::Link, cause.to_string(), expected, "");
+        FlexFileError { source: Some(Box::new(cause)), ..error }
     }
 
     fn wrong_type(&self, expected: &str) -> FlexFileError {

@@ -1,13 +1,30 @@
-//! Frames of a reduced-link file: `[interface.A]`, `[interface.B]`, `[split]`.
+//! Frames of a reduced-link file, written and read: `[interface.A]`, `[interface.B]`, `[split]`.
 
 use flexarm_spatial::Pose;
 use nalgebra::{Matrix3, Rotation3, Translation3};
 
 use super::document::{Node, Table};
 use super::error::{FlexErrorKind, FlexFileError};
-use super::read::{refused, required_table};
+use super::text::numbers;
 use super::units::Units;
 use crate::frames::LinkFrames;
+
+pub(super) fn pose_lines(X: &Pose) -> String {
+    let mut text = format!("xyz = {}\n", numbers(X.translation.vector.iter()));
+    let R = X.rotation.matrix();
+    let (roll, pitch, yaw) = X.rotation.euler_angles();
+    if *Rotation3::from_euler_angles(roll, pitch, yaw).matrix() == *R {
+        text += &format!("rpy = {}\n", numbers([roll, pitch, yaw].iter()));
+    } else {
+        text += &format!("rotation = {}\n", rows(R));
+    }
+    text
+}
+
+fn rows(R: &Matrix3<f64>) -> String {
+    let rows: Vec<_> = R.row_iter().map(|row| numbers(row.iter())).collect();
+    format!("[{}]", rows.join(", "))
+}
 
 /// Reads interfaces and split, in SI; without `[split]` the split is in the middle.
 pub(super) fn read_frames(root: &Table<'_, '_>, units: &Units) -> Result<LinkFrames, FlexFileError> {
@@ -15,14 +32,14 @@ pub(super) fn read_frames(root: &Table<'_, '_>, units: &Units) -> Result<LinkFra
     let interface = node.table()?;
     interface.only(&["A", "B"])?;
     let help = "a link has a proximal interface A and a distal one B";
-    let X_LA = read_pose(&required_table(&interface, "A", help)?, units, &[])?;
-    let X_LB = read_pose(&required_table(&interface, "B", help)?, units, &[])?;
+    let X_LA = read_pose(&interface.require("A", help)?.table()?, units, &[])?;
+    let X_LB = read_pose(&interface.require("B", help)?.table()?, units, &[])?;
     let frames = LinkFrames::new(X_LA, X_LB);
-    frames.check().map_err(|cause| refused(&node, cause, "frames in reach of each other"))?;
+    frames.check().map_err(|cause| node.refused(cause, "frames in reach of each other"))?;
 
     let Some(node) = root.get("split") else { return Ok(frames) };
     let frames = frames.with_split(read_pose(&node.table()?, units, &[])?);
-    frames.check().map_err(|cause| refused(&node, cause, "a frame on or near the link"))?;
+    frames.check().map_err(|cause| node.refused(cause, "a frame on or near the link"))?;
     Ok(frames)
 }
 

@@ -6,6 +6,8 @@ mod error;
 mod frames;
 mod modal;
 mod read;
+mod rigid_part;
+mod text;
 mod units;
 mod write;
 

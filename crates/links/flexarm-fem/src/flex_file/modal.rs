@@ -7,14 +7,31 @@ use nalgebra::{DMatrix, Matrix3, Matrix3xX, Matrix6, Matrix6xX, Vector3};
 
 use super::document::{Node, Table};
 use super::error::{FlexErrorKind, FlexFileError};
-use super::frames::read_pose;
+use super::frames::{pose_lines, read_pose};
+use super::text::{numbers, quoted};
 use super::units::Units;
-use super::write::{numbers, pose_lines, quoted};
 use crate::modal::{GeometricStiffness, ModalInterface, ModalLink};
 use crate::reduced::ReducedLink;
 
 /// Maximum number of coordinates, more than any link has.
 const MOST_COORDINATES: usize = 6000;
+
+/// Keys of the table.
+const KEYS: [&str; 13] = [
+    "coordinates",
+    "interfaces",
+    "shapes",
+    "mass",
+    "first_moment",
+    "inertia",
+    "C_t",
+    "C_r",
+    "P",
+    "N",
+    "K",
+    "M",
+    "geometric",
+];
 
 /// Writes the table as text.
 pub(super) fn write_modal(modal: &ModalLink) -> String {
@@ -82,28 +99,8 @@ pub(super) fn read_modal(
     agreement: f64,
 ) -> Result<ModalLink, FlexFileError> {
     let table = node.table()?;
-    table.only(&[
-        "coordinates",
-        "interfaces",
-        "shapes",
-        "mass",
-        "first_moment",
-        "inertia",
-        "C_t",
-        "C_r",
-        "P",
-        "N",
-        "K",
-        "M",
-        "geometric",
-    ])?;
-    let labels = table.require("coordinates", "a text for each coordinate")?;
-    let list = labels.list()?;
-    if list.is_empty() || list.len() > MOST_COORDINATES {
-        let expected = format!("1 to {MOST_COORDINATES} coordinates");
-        return Err(labels.fail(FlexErrorKind::WrongSize, list.len().to_string(), expected, ""));
-    }
-    let labels = list.iter().map(|label| label.text().map(str::to_owned)).collect::<Result<Vec<_>, _>>()?;
+    table.only(&KEYS)?;
+    let labels = read_labels(&table)?;
     let n = labels.len();
     let interfaces = read_interfaces(&table, units, n)?;
     let count = interfaces.len();
@@ -141,10 +138,18 @@ pub(super) fn read_modal(
         labels,
         X_LA: link.X_LA,
     };
-    agrees(&modal, link, agreement).map_err(|found| {
-        node.fail(FlexErrorKind::Link, found, "the stiffness and the frames of the link", "was one of them edited?")
-    })?;
+    check_agreement(node, &modal, link, agreement)?;
     Ok(modal)
+}
+
+fn read_labels(table: &Table<'_, '_>) -> Result<Vec<String>, FlexFileError> {
+    let labels = table.require("coordinates", "a text for each coordinate")?;
+    let list = labels.list()?;
+    if list.is_empty() || list.len() > MOST_COORDINATES {
+        let expected = format!("1 to {MOST_COORDINATES} coordinates");
+        return Err(labels.fail(FlexErrorKind::WrongSize, list.len().to_string(), expected, ""));
+    }
+    list.iter().map(|label| label.text().map(str::to_owned)).collect()
 }
 
 fn read_interfaces(table: &Table<'_, '_>, units: &Units, n: usize) -> Result<Vec<ModalInterface>, FlexFileError> {
@@ -230,24 +235,33 @@ fn read_geometric(node: &Node<'_, '_>, n: usize, interfaces: usize) -> Result<Ge
 }
 
 /// Checks the position of B and, if all static shapes are present, the compliance against the link.
-fn agrees(modal: &ModalLink, link: &ReducedLink, agreement: f64) -> Result<(), String> {
+fn check_agreement(
+    node: &Node<'_, '_>,
+    modal: &ModalLink,
+    link: &ReducedLink,
+    agreement: f64,
+) -> Result<(), FlexFileError> {
+    let fail = |found: String| {
+        let expected = "the stiffness and the frames of the link";
+        Err(node.fail(FlexErrorKind::Link, found, expected, "was one of them edited?"))
+    };
     let p_LB: &Vector3<f64> = &link.X_LB.translation.vector;
     let gap = (modal.interfaces[0].X_LI.translation.vector - p_LB).norm();
     if !(gap <= 1e-9) {
-        return Err(format!("an interface {:?} that is {gap:.1e} m from B", modal.interfaces[0].name));
+        return fail(format!("an interface {:?} that is {gap:.1e} m from B", modal.interfaces[0].name));
     }
     for (what, A) in [("K", &modal.K), ("M", &modal.M)] {
         if let Some(found) = A.diagonal().iter().find(|a| !(**a > 0.0)) {
-            return Err(format!("{found} on the diagonal of {what}"));
+            return fail(format!("{found} on the diagonal of {what}"));
         }
     }
     if !modal.is_craig_bampton() {
         return Ok(());
     }
     let (Ok(of_modal), Ok(of_link)) = (modal.compliance(0), link.tip_compliance()) else {
-        return Err("a stiffness that is not positive definite".into());
+        return fail("a stiffness that is not positive definite".into());
     };
     let s = of_link.diagonal().map(f64::sqrt);
     let gap = Matrix6::from_fn(|i, j| (of_modal[(i, j)] - of_link[(i, j)]).abs() / (s[i] * s[j])).amax();
-    if gap <= agreement { Ok(()) } else { Err(format!("a compliance of B that differs by {gap:.1e}")) }
+    if gap <= agreement { Ok(()) } else { fail(format!("a compliance of B that differs by {gap:.1e}")) }
 }

@@ -10,9 +10,9 @@ use super::details::read_details;
 use super::document::{Document, Node, Table};
 use super::error::{FlexErrorKind, FlexFileError};
 use super::frames::read_frames;
+use super::rigid_part::read_inertial;
 use super::units::Units;
 use super::{FORMAT, ORDER, VERSION};
-use crate::error::FemError;
 use crate::frames::LinkFrames;
 use crate::gate::GateLimits;
 use crate::input::read_file;
@@ -93,7 +93,7 @@ pub fn parse_flex_with(text: &str, origin: &str, limits: &GateLimits) -> Result<
         "part",
     ])?;
     let name = root.require("link", "give the name of the link")?.text()?;
-    let units = Units::read(&required_table(&root, "units", "declare length, force and mass")?)?;
+    let units = Units::read(&root.require("units", "declare length, force and mass")?.table()?)?;
     let frames = read_frames(&root, &units)?;
     let provenance = read_provenance(&root, &units)?;
     let parts = read_parts(&root, &units)?;
@@ -125,14 +125,6 @@ fn check_format(root: &Table<'_, '_>) -> Result<(), FlexFileError> {
         return Err(version.fail(FlexErrorKind::Format, found, expected, help));
     }
     Ok(())
-}
-
-pub(super) fn required_table<'d, 't>(
-    parent: &Table<'d, 't>,
-    key: &str,
-    help: &str,
-) -> Result<Table<'d, 't>, FlexFileError> {
-    parent.require(key, help)?.table()
 }
 
 fn read_provenance(root: &Table<'_, '_>, units: &Units) -> Result<Provenance, FlexFileError> {
@@ -177,23 +169,6 @@ fn read_parts(root: &Table<'_, '_>, units: &Units) -> Result<[RigidPart; 2], Fle
     Ok([proximal, distal])
 }
 
-pub(super) fn read_inertial(
-    item: &Node<'_, '_>,
-    table: &Table<'_, '_>,
-    name: &str,
-    units: &Units,
-) -> Result<RigidPart, FlexFileError> {
-    let mass = table.require("mass", "the mass of this part")?.number()? * units.mass;
-    let com = table.require("com", "the centre of mass of this part, link axes")?.vector()?;
-    let inertia = table.require("inertia", "[ixx, iyy, izz, ixy, ixz, iyz] about the com")?;
-    let [xx, yy, zz, xy, xz, yz] =
-        inertia.numbers::<6>("numbers: ixx, iyy, izz, ixy, ixz, iyz")?.map(|moment| moment * units.inertia());
-
-    let part = RigidPart { mass, com: com * units.length, inertia: Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz) };
-    part.check(name).map_err(|cause| refused(item, cause, "mass and inertia of a possible body"))?;
-    Ok(part)
-}
-
 fn read_stiffness(
     root: &Table<'_, '_>,
     units: &Units,
@@ -203,7 +178,7 @@ fn read_stiffness(
     parts: [RigidPart; 2],
     limits: &GateLimits,
 ) -> Result<ReducedLink, FlexFileError> {
-    let table = required_table(root, "stiffness", "give kind, axes, order and matrix")?;
+    let table = root.require("stiffness", "give kind, axes, order and matrix")?.table()?;
     table.only(&["kind", "axes", "order", "matrix"])?;
     let kind = table
         .require("kind", "\"12x12\" or \"6x6\"")?
@@ -245,7 +220,7 @@ fn read_stiffness(
         }
         ReducedLink::from_matrix12(name, frames, &K, parts, provenance, limits)
     };
-    link.map_err(|cause| refused(&node, cause, "a symmetric, positive definite stiffness of a free link"))
+    link.map_err(|cause| node.refused(cause, "a symmetric, positive definite stiffness of a free link"))
 }
 
 fn read_square<const N: usize>(node: &Node<'_, '_>) -> Result<[[f64; N]; N], FlexFileError> {
@@ -274,10 +249,4 @@ fn read_checks(root: &Table<'_, '_>, link: &mut ReducedLink) -> Result<(), FlexF
     link.checks.rigid_body_residual = read("rigid_body_residual")?;
     link.checks.block_identity = read("block_identity")?;
     Ok(())
-}
-
-/// Error for a well-formed element that is invalid in a link.
-pub(super) fn refused(node: &Node<'_, '_>, cause: FemError, expected: &str) -> FlexFileError {
-    let error = node.fail(FlexErrorKind::Link, cause.to_string(), expected, "");
-    FlexFileError { source: Some(Box::new(cause)), ..error }
 }

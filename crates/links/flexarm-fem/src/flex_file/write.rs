@@ -1,10 +1,10 @@
 //! Writes a [`ReducedLink`] as text that reads back to bitwise equal numbers.
 
-use std::fmt::Write;
-
 use flexarm_spatial::Pose;
-use nalgebra::{Matrix3, Rotation3};
 
+use super::frames::pose_lines;
+use super::rigid_part::inertial;
+use super::text::{numbers, quoted};
 use super::{FORMAT, ORDER, VERSION};
 use crate::reduced::{Provenance, ReducedLink};
 use crate::rigid_part::RigidPart;
@@ -57,18 +57,6 @@ fn pose(name: &str, X: &Pose) -> String {
     format!("\n[{name}]\n{}", pose_lines(X))
 }
 
-pub(super) fn pose_lines(X: &Pose) -> String {
-    let mut text = format!("xyz = {}\n", numbers(X.translation.vector.iter()));
-    let R = X.rotation.matrix();
-    let (roll, pitch, yaw) = X.rotation.euler_angles();
-    if *Rotation3::from_euler_angles(roll, pitch, yaw).matrix() == *R {
-        text += &format!("rpy = {}\n", numbers([roll, pitch, yaw].iter()));
-    } else {
-        text += &format!("rotation = {}\n", rows(R));
-    }
-    text
-}
-
 fn checks(link: &ReducedLink) -> String {
     let entries = [
         ("asymmetry", Some(link.checks.asymmetry)),
@@ -82,40 +70,4 @@ fn checks(link: &ReducedLink) -> String {
 
 fn part(name: &str, part: &RigidPart) -> String {
     format!("\n[[part]]\nname = \"{name}\"\n{}", inertial(part))
-}
-
-pub(super) fn inertial(part: &RigidPart) -> String {
-    let I = &part.inertia;
-    let moments = [I[(0, 0)], I[(1, 1)], I[(2, 2)], I[(0, 1)], I[(0, 2)], I[(1, 2)]];
-    format!("mass = {:?}\ncom = {}\ninertia = {}\n", part.mass, numbers(part.com.iter()), numbers(moments.iter()),)
-}
-
-fn rows(R: &Matrix3<f64>) -> String {
-    let rows: Vec<_> = R.row_iter().map(|row| numbers(row.iter())).collect();
-    format!("[{}]", rows.join(", "))
-}
-
-/// `{:?}` prints the shortest text that parses back to the same f64, always with a point or an
-/// exponent.
-pub(super) fn numbers<'a>(values: impl Iterator<Item = &'a f64>) -> String {
-    let printed: Vec<_> = values.map(|x| format!("{x:?}")).collect();
-    format!("[{}]", printed.join(", "))
-}
-
-/// Quotes a text as a TOML basic string.
-pub(super) fn quoted(text: &str) -> String {
-    let mut result = String::from('"');
-    for c in text.chars() {
-        match c {
-            '"' => result.push_str("\\\""),
-            '\\' => result.push_str("\\\\"),
-            c if c.is_control() => {
-                // Writing to a String cannot fail.
-                let _ = write!(result, "\\u{:04X}", u32::from(c));
-            }
-            c => result.push(c),
-        }
-    }
-    result.push('"');
-    result
 }

@@ -5,8 +5,8 @@ use std::collections::{BTreeMap, HashMap};
 
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 
-use super::Mesh;
 use super::surface::{FaceRef, for_each_face};
+use super::{ElementBlock, Mesh};
 
 /// Two bodies that share nodes but no face.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -42,37 +42,9 @@ pub struct Bodies {
 pub fn bodies(mesh: &Mesh) -> Bodies {
     let offsets: Vec<usize> =
         mesh.blocks.iter().scan(0, |sum, b| Some(std::mem::replace(sum, *sum + b.len()))).collect();
-    let count = mesh.element_count();
-    let mut parent: Vec<usize> = (0..count).collect();
-    let index = |face: &FaceRef| offsets[face.block as usize] + face.element as usize;
-    let mut first: HashMap<[u32; 4], usize> = HashMap::new();
-    for_each_face(&mesh.blocks, |face, key| {
-        let element = index(&face);
-        let other = *first.entry(key).or_insert(element);
-        join(&mut parent, element, other);
-    });
-    drop(first);
-    let mut at_beam = vec![usize::MAX; mesh.nodes.len()];
-    let elements = || {
-        let blocks = mesh.blocks.iter().zip(&offsets);
-        blocks.flat_map(|(block, start)| (*start..).zip(block.elements()).map(move |(e, nodes)| (e, block, nodes)))
-    };
-    for (element, _, nodes) in elements().filter(|(_, block, _)| block.kind.is_beam()) {
-        for node in nodes {
-            let other = &mut at_beam[*node as usize];
-            *other = (*other).min(element);
-            let other = *other;
-            join(&mut parent, element, other);
-        }
-    }
-    for (element, _, nodes) in elements() {
-        for node in nodes.iter().filter(|node| at_beam[**node as usize] != usize::MAX) {
-            join(&mut parent, element, at_beam[*node as usize]);
-        }
-    }
+    let roots = first_elements(mesh, &offsets);
 
     // Bodies by size; of equal ones the one with the smaller element index first.
-    let roots: Vec<usize> = (0..count).map(|element| root(&mut parent, element)).collect();
     let mut sizes: BTreeMap<usize, usize> = BTreeMap::new();
     roots.iter().for_each(|root| *sizes.entry(*root).or_insert(0) += 1);
     let mut order: Vec<(usize, usize)> = sizes.into_iter().collect();
@@ -81,7 +53,7 @@ pub fn bodies(mesh: &Mesh) -> Bodies {
 
     let mut of_node = vec![usize::MAX; mesh.nodes.len()];
     let mut shared: BTreeMap<[usize; 2], Vec<u32>> = BTreeMap::new();
-    for (element, _, nodes) in elements() {
+    for (element, _, nodes) in elements(mesh, &offsets) {
         let body = rank[&roots[element]];
         for node in nodes {
             let before = of_node[*node as usize];
@@ -105,6 +77,39 @@ pub fn bodies(mesh: &Mesh) -> Bodies {
     };
     let hinges = shared.into_iter().map(hinge).collect();
     Bodies { of_node, elements: order.iter().map(|(_, size)| *size).collect(), hinges }
+}
+
+/// Elements with their index in the mesh, their block and their nodes.
+fn elements<'a>(mesh: &'a Mesh, offsets: &'a [usize]) -> impl Iterator<Item = (usize, &'a ElementBlock, &'a [u32])> {
+    let blocks = mesh.blocks.iter().zip(offsets);
+    blocks.flat_map(|(block, start)| (*start..).zip(block.elements()).map(move |(e, nodes)| (e, block, nodes)))
+}
+
+/// Returns the first element of the body of each element.
+fn first_elements(mesh: &Mesh, offsets: &[usize]) -> Vec<usize> {
+    let mut parent: Vec<usize> = (0..mesh.element_count()).collect();
+    let index = |face: &FaceRef| offsets[face.block as usize] + face.element as usize;
+    let mut first: HashMap<[u32; 4], usize> = HashMap::new();
+    for_each_face(&mesh.blocks, |face, key| {
+        let element = index(&face);
+        let other = *first.entry(key).or_insert(element);
+        join(&mut parent, element, other);
+    });
+    drop(first);
+    let mut at_beam = vec![usize::MAX; mesh.nodes.len()];
+    for (element, _, nodes) in elements(mesh, offsets).filter(|(_, block, _)| block.kind.is_beam()) {
+        for node in nodes {
+            let other = &mut at_beam[*node as usize];
+            *other = (*other).min(element);
+            join(&mut parent, element, *other);
+        }
+    }
+    for (element, _, nodes) in elements(mesh, offsets) {
+        for node in nodes.iter().filter(|node| at_beam[**node as usize] != usize::MAX) {
+            join(&mut parent, element, at_beam[*node as usize]);
+        }
+    }
+    (0..parent.len()).map(|element| root(&mut parent, element)).collect()
 }
 
 impl std::fmt::Display for Hinge {

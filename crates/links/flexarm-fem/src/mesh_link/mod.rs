@@ -145,13 +145,8 @@ pub fn reduce_mesh(
     plan: &LinkPlan,
     step: &mut dyn FnMut(ReductionStep),
 ) -> Result<MeshReduction, MeshLinkError> {
-    check_connected(mesh)?;
-    check_fit(mesh)?;
+    check_input(mesh, plan)?;
     let bodies = bodies(mesh);
-    // Frames in wrong units are rejected before the expensive work.
-    if let [a, b, ..] = plan.interfaces.as_slice() {
-        LinkFrames::new(a.X_LI, b.X_LI).check()?;
-    }
     step(ReductionStep::Assembly);
     let quality = ElementQuality::of(mesh);
     let materials = materials(mesh, &plan.assembly)?;
@@ -204,6 +199,16 @@ pub fn reduce_mesh(
     let solves = fixed_modes.solves + held_modes.solves + condensation.figures().static_solves + inertia_solves;
     let solver = condensation.figures();
     Ok(MeshReduction { link, whole, solver, unit_loads, fixed_modes, held_modes, bare_chains, solves, stress, doubts })
+}
+
+/// Checks the mesh and, before the expensive work, whether frames are in wrong units.
+fn check_input(mesh: &Mesh, plan: &LinkPlan) -> Result<(), MeshLinkError> {
+    check_connected(mesh)?;
+    check_fit(mesh)?;
+    if let [a, b, ..] = plan.interfaces.as_slice() {
+        LinkFrames::new(a.X_LI, b.X_LI).check()?;
+    }
+    Ok(())
 }
 
 /// Returns the two-part link from the 12×12 stiffness of A and B.

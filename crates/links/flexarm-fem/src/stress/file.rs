@@ -21,6 +21,7 @@ use nalgebra::{DMatrix, Matrix3, Rotation3, Vector3};
 use safetensors::tensor::{Dtype, SafeTensors, TensorView, serialize};
 use serde::{Deserialize, Serialize};
 
+use super::error::StressFileError;
 use super::fields::{INERTIA_LOADS, StressFields, StressSeat};
 use crate::material::Material;
 
@@ -93,79 +94,55 @@ pub fn write_stress(fields: &StressFields) -> Vec<u8> {
 /// Reads a stress file.
 ///
 /// # Errors
-/// A message with what was found and expected.
-pub fn parse_stress(bytes: &[u8]) -> Result<StressFields, String> {
-    let help = "reduce the mesh again, with its stress";
-    let fail = |what: String| format!("{what}; {help}");
-    let (_, header) = SafeTensors::read_metadata(bytes).map_err(|error| fail(format!("not a stress file: {error}")))?;
-    let about = header.metadata().as_ref().and_then(|about| about.get(KEY));
-    let about: About = about
-        .and_then(|text| serde_json::from_str(text).ok())
-        .ok_or_else(|| fail(format!("its metadata have no key {KEY:?} with format, link and interfaces")))?;
-    if about.format != FORMAT {
-        return Err(fail(format!("format {:?}, expected {FORMAT:?}", about.format)));
-    }
-    let file = SafeTensors::deserialize(bytes).map_err(|error| fail(format!("damaged: {error}")))?;
+/// [`StressFileError`].
+pub fn parse_stress(bytes: &[u8]) -> Result<StressFields, StressFileError> {
+    let about = read_about(bytes)?;
+    let file = SafeTensors::deserialize(bytes).map_err(|e| StressFileError::Damaged { cause: e.to_string() })?;
     let file = Tensors { file: &file };
     let (materials, poses) = (file.rows("materials", 3)?, file.rows("pose", 12)?);
-    let (positions, frequencies_hz) = (file.rows("position", 3)?, file.numbers("frequency_hz")?);
-    let (nodes, kinds, tied) = (file.whole("node")?, file.whole("material")?, file.numbers("from_tie")?);
-    let corners = file.whole("triangle")?;
-    let (seats, wrenches) = (positions.len(), 6 * poses.len().saturating_sub(1));
-    let columns = wrenches + INERTIA_LOADS + frequencies_hz.len();
-    let stress = file.tensor("stress", Dtype::F32)?;
-    let expected = [columns, seats, 6];
-    if stress.shape() != expected {
-        return Err(fail(format!("tensor \"stress\" has the shape {:?}, expected {expected:?}", stress.shape())));
+    let frequencies_hz = file.numbers("frequency_hz")?;
+    let seats = file.seats(materials.len())?;
+    let triangles = file.triangles(seats.len())?;
+    let wrenches = 6 * poses.len().saturating_sub(1);
+    let stress = file.stress(wrenches + INERTIA_LOADS + frequencies_hz.len(), seats.len())?;
+    let compliance = file.compliance(wrenches)?;
+    if about.interfaces.len() != poses.len() {
+        return Err(StressFileError::PoseCount { interfaces: about.interfaces.len(), poses: poses.len() });
     }
-    if [nodes.len(), kinds.len(), tied.len()] != [seats; 3] {
-        return Err(fail(format!("its tensors \"node\", \"material\", \"from_tie\" do not have {seats} entries")));
-    }
-    if kinds.iter().any(|kind| *kind >= materials.len() as u64) || corners.iter().any(|seat| *seat >= seats as u64) {
-        return Err(fail("an index is out of range".to_owned()));
-    }
-    let compliance = file.numbers("compliance")?;
-    if compliance.len() != wrenches * wrenches || wrenches == 0 {
-        return Err(fail(format!(
-            "tensor \"compliance\" has {} entries, expected {}",
-            compliance.len(),
-            wrenches * wrenches
-        )));
-    }
-    let single = |word: &[u8]| f32::from_le_bytes([word[0], word[1], word[2], word[3]]);
-    let stress: Vec<f32> = stress.data().chunks_exact(4).map(single).collect();
-    let finite = |numbers: &[f64]| numbers.iter().all(|number| number.is_finite());
-    if !stress.iter().all(|stress| stress.abs() < LARGEST)
-        || !positions.iter().all(|p| finite(p))
-        || !finite(&compliance)
-    {
-        return Err(fail(format!("a number is not finite, or a stress beyond {LARGEST:e} Pa per unit")));
-    }
-    let seat = |k: usize| StressSeat {
-        node: nodes[k],
-        position: Vector3::from_column_slice(&positions[k]),
-        material: kinds[k] as usize,
-        from_tie: tied[k],
-    };
     let pose = |row: &Vec<f64>| {
         let R = Rotation3::from_matrix_unchecked(Matrix3::from_row_slice(&row[..9]));
         Pose::from_parts(Vector3::from_column_slice(&row[9..]).into(), R)
     };
-    if about.interfaces.len() != poses.len() {
-        return Err(fail(format!("{} interfaces have {} poses", about.interfaces.len(), poses.len())));
-    }
     Ok(StressFields {
         link: about.link,
         interfaces: about.interfaces,
         poses: poses.iter().map(pose).collect(),
-        compliance: DMatrix::from_column_slice(wrenches, wrenches, &compliance),
+        compliance,
         frequencies_hz,
         materials: materials.iter().map(|row| Material::isotropic(row[0], row[1], row[2])).collect(),
-        seats: (0..seats).map(seat).collect(),
-        triangles: corners.chunks_exact(3).map(|c| [c[0] as u32, c[1] as u32, c[2] as u32]).collect(),
-        stress: DMatrix::from_vec(6 * seats, columns, stress),
+        seats,
+        triangles,
+        stress,
         section_forces: None,
     })
+}
+
+/// Reads the description in the metadata.
+fn read_about(bytes: &[u8]) -> Result<About, StressFileError> {
+    let (_, header) =
+        SafeTensors::read_metadata(bytes).map_err(|e| StressFileError::NotTensors { cause: e.to_string() })?;
+    let text = header.metadata().as_ref().and_then(|about| about.get(KEY));
+    let about: About =
+        text.and_then(|text| serde_json::from_str(text).ok()).ok_or(StressFileError::NoDescription { key: KEY })?;
+    if about.format != FORMAT {
+        return Err(StressFileError::Format { found: about.format, expected: FORMAT });
+    }
+    Ok(about)
+}
+
+fn check_finite(numbers: &[f64]) -> Result<(), StressFileError> {
+    let finite = numbers.iter().all(|number| number.is_finite());
+    if finite { Ok(()) } else { Err(StressFileError::ImpossibleNumber { largest: LARGEST }) }
 }
 
 struct Tensors<'a> {
@@ -173,33 +150,87 @@ struct Tensors<'a> {
 }
 
 impl<'a> Tensors<'a> {
-    fn tensor(&self, name: &str, kind: Dtype) -> Result<TensorView<'a>, String> {
-        let tensor = self.file.tensor(name).map_err(|_| format!("tensor {name:?} is missing"))?;
+    fn tensor(&self, name: &'static str, kind: Dtype) -> Result<TensorView<'a>, StressFileError> {
+        let tensor = self.file.tensor(name).map_err(|_| StressFileError::Missing { name })?;
         if tensor.dtype() == kind {
             return Ok(tensor);
         }
-        Err(format!("tensor {name:?} has numbers of the type {:?}, expected {kind:?}", tensor.dtype()))
+        let (found, expected) = (format!("{:?}", tensor.dtype()), format!("{kind:?}"));
+        Err(StressFileError::NumberType { name, found, expected })
     }
 
-    fn numbers(&self, name: &str) -> Result<Vec<f64>, String> {
+    fn numbers(&self, name: &'static str) -> Result<Vec<f64>, StressFileError> {
         let tensor = self.tensor(name, Dtype::F64)?;
         Ok(tensor.data().as_chunks().0.iter().map(|word| f64::from_le_bytes(*word)).collect())
     }
 
-    fn rows(&self, name: &str, width: usize) -> Result<Vec<Vec<f64>>, String> {
+    fn rows(&self, name: &'static str, width: usize) -> Result<Vec<Vec<f64>>, StressFileError> {
         let tensor = self.tensor(name, Dtype::F64)?;
         if tensor.shape().len() != 2 || tensor.shape()[1] != width {
-            return Err(format!("tensor {name:?} has the shape {:?}, expected rows of {width}", tensor.shape()));
+            return Err(StressFileError::Rows { name, found: tensor.shape().to_vec(), width });
         }
         Ok(self.numbers(name)?.chunks_exact(width).map(<[f64]>::to_vec).collect())
     }
 
     /// Whole numbers of 32 or 64 bits.
-    fn whole(&self, name: &str) -> Result<Vec<u64>, String> {
+    fn whole(&self, name: &'static str) -> Result<Vec<u64>, StressFileError> {
         if let Ok(tensor) = self.tensor(name, Dtype::U64) {
             return Ok(tensor.data().as_chunks().0.iter().map(|word| u64::from_le_bytes(*word)).collect());
         }
         let tensor = self.tensor(name, Dtype::U32)?;
         Ok(tensor.data().as_chunks().0.iter().map(|word| u64::from(u32::from_le_bytes(*word))).collect())
+    }
+
+    fn seats(&self, materials: usize) -> Result<Vec<StressSeat>, StressFileError> {
+        let positions = self.rows("position", 3)?;
+        let (nodes, kinds, tied) = (self.whole("node")?, self.whole("material")?, self.numbers("from_tie")?);
+        let seats = positions.len();
+        if [nodes.len(), kinds.len(), tied.len()] != [seats; 3] {
+            return Err(StressFileError::SeatCounts { seats });
+        }
+        if kinds.iter().any(|kind| *kind >= materials as u64) {
+            return Err(StressFileError::IndexOutOfRange);
+        }
+        positions.iter().try_for_each(|position| check_finite(position))?;
+        let seat = |k: usize| StressSeat {
+            node: nodes[k],
+            position: Vector3::from_column_slice(&positions[k]),
+            material: kinds[k] as usize,
+            from_tie: tied[k],
+        };
+        Ok((0..seats).map(seat).collect())
+    }
+
+    fn triangles(&self, seats: usize) -> Result<Vec<[u32; 3]>, StressFileError> {
+        let corners = self.whole("triangle")?;
+        if corners.iter().any(|seat| *seat >= seats as u64) {
+            return Err(StressFileError::IndexOutOfRange);
+        }
+        Ok(corners.as_chunks().0.iter().map(|corners| corners.map(|seat| seat as u32)).collect())
+    }
+
+    /// Stress by fields, six rows per seat.
+    fn stress(&self, fields: usize, seats: usize) -> Result<DMatrix<f32>, StressFileError> {
+        let tensor = self.tensor("stress", Dtype::F32)?;
+        let expected = [fields, seats, 6];
+        if tensor.shape() != expected {
+            return Err(StressFileError::StressShape { found: tensor.shape().to_vec(), expected });
+        }
+        let stress: Vec<f32> = tensor.data().as_chunks().0.iter().map(|word| f32::from_le_bytes(*word)).collect();
+        if !stress.iter().all(|stress| stress.abs() < LARGEST) {
+            return Err(StressFileError::ImpossibleNumber { largest: LARGEST });
+        }
+        Ok(DMatrix::from_vec(6 * seats, fields, stress))
+    }
+
+    /// Displacements under unit wrenches.
+    fn compliance(&self, wrenches: usize) -> Result<DMatrix<f64>, StressFileError> {
+        let numbers = self.numbers("compliance")?;
+        let (found, expected) = (numbers.len(), wrenches * wrenches);
+        if found != expected || wrenches == 0 {
+            return Err(StressFileError::ComplianceSize { found, expected });
+        }
+        check_finite(&numbers)?;
+        Ok(DMatrix::from_vec(wrenches, wrenches, numbers))
     }
 }

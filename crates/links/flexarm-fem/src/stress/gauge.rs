@@ -7,6 +7,7 @@
 
 use nalgebra::{Rotation3, Unit, Vector3};
 
+use super::error::StressError;
 use super::fields::StressFields;
 
 /// Minimum sine of the angle between the direction of a gauge and the normal of the surface.
@@ -17,24 +18,18 @@ impl StressFields {
     /// first one.
     ///
     /// # Errors
-    /// A message if the point is farther from it than the longest edge at this node.
-    pub fn nearest_seat(&self, point: &Vector3<f64>) -> Result<usize, String> {
+    /// [`StressError::OffSurface`] if the point is farther from it than the longest edge at this
+    /// node; [`StressError::NoSurface`].
+    pub fn nearest_seat(&self, point: &Vector3<f64>) -> Result<usize, StressError> {
         let place = |k: u32| self.seats[k as usize].position;
         let from = |k: &u32| (place(*k) - point).norm();
         let nearest = self.triangles.iter().flatten().copied().min_by(|a, b| from(a).total_cmp(&from(b)));
-        let seat = nearest.ok_or("the stress file has no surface")?;
+        let seat = nearest.ok_or(StressError::NoSurface)?;
         let own = self.triangles.iter().filter(|corners| corners.contains(&seat)).flatten();
         let edge = own.map(|k| (place(*k) - place(seat)).norm()).fold(0.0, f64::max);
-        let (off, p) = (from(&seat), place(seat) * 1e3);
+        let off = from(&seat);
         if off > edge {
-            return Err(format!(
-                "the nearest node of the surface, at ({:.1}, {:.1}, {:.1}) mm, is {:.1} mm away, farther than the edges of \
-                 the mesh there: give a point on the surface, in the axes of the link (m)",
-                p.x,
-                p.y,
-                p.z,
-                1e3 * off
-            ));
+            return Err(StressError::OffSurface { nearest_mm: (place(seat) * 1e3).into(), off_mm: 1e3 * off });
         }
         Ok(seat as usize)
     }
@@ -58,17 +53,14 @@ impl StressFields {
     /// * `angle`: by which it is turned about the outward normal (rad).
     ///
     /// # Errors
-    /// A message if the direction is normal to the surface.
-    pub fn strain_by_stress(&self, seat: usize, direction: &Vector3<f64>, angle: f64) -> Result<[f64; 6], String> {
+    /// [`StressError::NormalDirection`].
+    pub fn strain_by_stress(&self, seat: usize, direction: &Vector3<f64>, angle: f64) -> Result<[f64; 6], StressError> {
         let n = self.normal(seat);
         let along = direction - n * n.dot(direction);
         // Not above, rather than below: a direction of zero length gives no number.
         if !(along.norm() > TANGENTIAL * direction.norm()) {
-            let n = n.map(|x| (x * 100.0).round() / 100.0 + 0.0);
-            return Err(format!(
-                "the direction has no part along the surface, whose normal there is [{}, {}, {}]",
-                n.x, n.y, n.z
-            ));
+            let normal = n.map(|x| (x * 100.0).round() / 100.0 + 0.0).into();
+            return Err(StressError::NormalDirection { normal });
         }
         let d = Rotation3::from_axis_angle(&Unit::new_unchecked(n), angle) * along.normalize();
         let material = &self.materials[self.seats[seat].material];

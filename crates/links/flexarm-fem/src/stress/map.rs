@@ -9,6 +9,7 @@
 
 use nalgebra::{DMatrix, DVector, Matrix6, Vector3, Vector6};
 
+use super::error::StressError;
 use super::fields::{INERTIA_LOADS, StressFields};
 use crate::modal::{Field, ModalLink, axial};
 use crate::reduced::ElasticSplit;
@@ -69,24 +70,20 @@ impl StressFields {
     /// * `factor`: factor on its stiffness.
     ///
     /// # Errors
-    /// A message if the link is another one, or has other coordinates.
-    pub fn modal_map(&self, link: &ModalLink, factor: f64) -> Result<StressMap, String> {
+    /// [`StressError`] if the link is another one, or has other coordinates.
+    pub fn modal_map(&self, link: &ModalLink, factor: f64) -> Result<StressMap, StressError> {
         let wrenches = self.compliance.nrows();
         let modes = link.coordinates().saturating_sub(wrenches);
         if !link.is_craig_bampton() || 6 * link.interfaces.len() != wrenches || modes > self.frequencies_hz.len() {
-            return Err(format!(
-                "stress is stored for {} interfaces and {} fixed-interface modes, which are not the coordinates of the \
-                 modal link: leave out eigenmodes, or reduce the mesh again, with its stress",
-                wrenches / 6,
-                self.frequencies_hz.len()
-            ));
+            let (interfaces, modes) = (wrenches / 6, self.frequencies_hz.len());
+            return Err(StressError::OtherCoordinates { interfaces, modes });
         }
         let n = link.coordinates();
         let K_cc = link.K.view((0, 0), (wrenches, wrenches)).into_owned();
         self.check(&K_cc)?;
         let mut A = DMatrix::identity(n, n);
         A.view_mut((0, 0), (wrenches, wrenches)).copy_from(&(K_cc * factor));
-        let K = (&link.K * factor).cholesky().ok_or("the stiffness of the modal link is not positive definite")?;
+        let K = (&link.K * factor).cholesky().ok_or(StressError::SingularLink)?;
         let own: Vec<DVector<f64>> = (0..INERTIA_LOADS).map(|j| &A * K.solve(&modal_force(link, j))).collect();
         let columns: Vec<usize> = (0..wrenches).chain((0..modes).map(|k| wrenches + INERTIA_LOADS + k)).collect();
         // A mode stresses a link that is stiffer by a factor more by this factor.
@@ -100,13 +97,13 @@ impl StressFields {
     /// * `springs`: stiffness of the joints in use, which may differ from that of the source.
     ///
     /// # Errors
-    /// A message if the link is another one.
+    /// [`StressError`] if the link is another one.
     pub fn chain_map(
         &self,
         joints: &[ElasticSplit],
         parts: &[RigidPart],
         springs: &[Matrix6<f64>],
-    ) -> Result<StressMap, String> {
+    ) -> Result<StressMap, StressError> {
         let p_LB = self.poses[1].translation.vector;
         let displacement = |joint: &ElasticSplit| {
             let (R, r) = (joint.X_LS.rotation.matrix(), p_LB - joint.X_LS.translation.vector);
@@ -117,11 +114,11 @@ impl StressFields {
             X
         };
         let X: Vec<Matrix6<f64>> = joints.iter().map(displacement).collect();
-        let inverse = |K: &Matrix6<f64>| K.try_inverse().ok_or("the stiffness of a joint is singular");
+        let inverse = |K: &Matrix6<f64>| K.try_inverse().ok_or(StressError::SingularJoint);
         let at_B = |springs: &mut dyn Iterator<Item = &Matrix6<f64>>| {
             let C: Vec<Matrix6<f64>> = springs.map(inverse).collect::<Result<_, _>>()?;
             let at_B: Matrix6<f64> = X.iter().zip(&C).map(|(X, C)| X * C * X.transpose()).sum();
-            Ok::<_, String>((C, inverse(&at_B)?))
+            Ok::<_, StressError>((C, inverse(&at_B)?))
         };
         let (_, nominal) = at_B(&mut joints.iter().map(|joint| &joint.K_S))?;
         self.check(&DMatrix::from_column_slice(6, 6, nominal.as_slice()))?;
@@ -180,7 +177,7 @@ impl StressFields {
     }
 
     /// Compares the stiffness of interfaces with that of the fields.
-    fn check(&self, K: &DMatrix<f64>) -> Result<(), String> {
+    fn check(&self, K: &DMatrix<f64>) -> Result<(), StressError> {
         let n = K.nrows();
         let product = self.compliance.view((0, 0), (n, n)) * K;
         let scale = |i: usize, j: usize| (self.compliance[(j, j)] / self.compliance[(i, i)]).sqrt();
@@ -189,13 +186,7 @@ impl StressFields {
             ((product[(i, j)] - unit) * scale(i, j)).abs()
         });
         let off = off.fold(0.0, f64::max);
-        if off <= SAME_LINK {
-            return Ok(());
-        }
-        Err(format!(
-            "the stress file belongs to another link: stiffness times its compliance differs from 1 by {off:.1e}; reduce \
-             the mesh again, with its stress"
-        ))
+        if off <= SAME_LINK { Ok(()) } else { Err(StressError::OtherLink { off }) }
     }
 }
 

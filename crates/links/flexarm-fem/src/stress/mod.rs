@@ -22,6 +22,7 @@
 //! Meth. Eng.* 10.
 
 mod beam;
+mod error;
 mod fields;
 mod file;
 mod gauge;
@@ -30,6 +31,7 @@ mod recovery;
 #[cfg(test)]
 mod tests;
 
+pub use error::{StressError, StressFileError};
 pub use fields::{INERTIA_LOADS, SectionForces, StressFields, StressSeat};
 pub use file::{parse_stress, write_stress};
 pub use map::{StressMap, inertia_loads};

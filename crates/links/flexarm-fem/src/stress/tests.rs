@@ -187,7 +187,7 @@ fn a_stress_file_returns_what_was_written_and_refuses_damage() {
         bytes[at + 15] = b'9';
         bytes
     };
-    assert!(parse_stress(&newer).unwrap_err().contains("flexarm stress 9"));
+    assert!(parse_stress(&newer).unwrap_err().to_string().contains("flexarm stress 9"));
 }
 
 /// Truth: the field of the mesh. A link at rest in an accelerated frame has the deflection of its
@@ -272,5 +272,6 @@ fn the_stress_of_a_link_at_rest_does_not_depend_on_its_model() {
     assert!(off < 1e-5, "{off:e}");
     let other =
         Bar::new(ElementKind::Tet10, [8, 2, 2], [0.6, 0.1, 0.06]).reduced(2, |source| source.stress_fields("x"));
-    assert!(other.chain_map(two.0, &two.1, &[link.split.K_S]).unwrap_err().contains("another link"));
+    let error = other.chain_map(two.0, &two.1, &[link.split.K_S]).unwrap_err();
+    assert!(matches!(error, StressError::OtherLink { .. }), "{error}");
 }

@@ -7,7 +7,7 @@ use crate::common::expressions::{Parser, Syntax};
 use crate::common::lexer::{Spelling, Token, tokens};
 use crate::common::tree::{Action, Argument, Expr, Kind, Operator, Parameter, Routine, Statement};
 use crate::common::value::Value;
-use crate::common::{Fail, Result, Text, fail};
+use crate::common::{Fail, Result, Span, Text, fail};
 
 pub(crate) const SPELLING: Spelling = Spelling {
     comment: ';',
@@ -191,7 +191,7 @@ fn statement(parser: &mut Parser) -> Result<Vec<Statement>> {
 }
 
 /// Span of the line that begins at a token.
-fn line_span(parser: &Parser, start: usize) -> crate::common::Span {
+fn line_span(parser: &Parser, start: usize) -> Span {
     let tokens = &parser.lexemes[start..];
     let length = tokens.iter().take_while(|lexeme| lexeme.token != Token::Line).count();
     tokens[0].span.to(tokens[length.saturating_sub(1)].span)
@@ -199,16 +199,11 @@ fn line_span(parser: &Parser, start: usize) -> crate::common::Span {
 
 /// Parses a block and consumes its end word.
 fn structure(parser: &mut Parser, word: &str) -> Result<Option<Action>> {
-    let start = parser.span();
-    let end = |parser: &mut Parser, word: &str| {
-        if parser.take_word(word) {
-            return Ok(());
-        }
-        fail(start, format!("this block does not end: `{}` is missing", word.to_uppercase()))
-    };
     if is_assigned(parser) {
         return Ok(None);
     }
+    let start = parser.span();
+    let end = |parser: &mut Parser, word: &str| end_of_block(parser, start, word);
     let action = match word {
         "if" => {
             parser.advance();
@@ -242,18 +237,7 @@ fn structure(parser: &mut Parser, word: &str) -> Result<Option<Action>> {
             end(parser, "until")?;
             Action::Repeat { body, until: parser.expression()? }
         }
-        "for" => {
-            parser.advance();
-            let name = parser.expect_name()?;
-            parser.expect_symbol("=")?;
-            let from = parser.expression()?;
-            parser.expect_word("to")?;
-            let to = parser.expression()?;
-            let step = if parser.take_word("step") { Some(parser.expression()?) } else { None };
-            let body = block(parser, &["endfor"])?;
-            end(parser, "endfor")?;
-            Action::For { name, from, to, step, body }
-        }
+        "for" => for_loop(parser)?,
         "switch" => switch(parser)?,
         "spline" | "ptp_spline" => {
             let name = parser.expect_name()?;
@@ -266,6 +250,26 @@ fn structure(parser: &mut Parser, word: &str) -> Result<Option<Action>> {
         _ => return Ok(None),
     };
     Ok(Some(action))
+}
+
+fn end_of_block(parser: &mut Parser, start: Span, word: &str) -> Result<()> {
+    if parser.take_word(word) {
+        return Ok(());
+    }
+    fail(start, format!("this block does not end: `{}` is missing", word.to_uppercase()))
+}
+
+fn for_loop(parser: &mut Parser) -> Result<Action> {
+    let start = parser.advance().span;
+    let name = parser.expect_name()?;
+    parser.expect_symbol("=")?;
+    let from = parser.expression()?;
+    parser.expect_word("to")?;
+    let to = parser.expression()?;
+    let step = if parser.take_word("step") { Some(parser.expression()?) } else { None };
+    let body = block(parser, &["endfor"])?;
+    end_of_block(parser, start, "endfor")?;
+    Ok(Action::For { name, from, to, step, body })
 }
 
 fn switch(parser: &mut Parser) -> Result<Action> {

@@ -47,7 +47,7 @@ impl Recording {
         let path = bench.file(&path(number));
         let fail = |what: String| Error::from(flexarm::Error::File { path: path.clone(), what });
         let packed = std::fs::read(&path).map_err(|e| fail(format!("the recording cannot be read: {e}")))?;
-        let bytes = unpack_gzip(&packed).map_err(fail)?;
+        let bytes = unpack_gzip(&packed).map_err(|e| fail(e.to_string()))?;
         let text = String::from_utf8(bytes).map_err(|e| fail(format!("is no text: {e}")))?;
         let table = Table::new(&text).map_err(fail)?;
         let all = |name: fn(usize) -> String, count: usize| -> Result<Vec<Vec<f64>>, Error> {

@@ -18,7 +18,7 @@ use rayon::prelude::*;
 use crate::Magnifier;
 use crate::mesh_picture::draw::{Align, Style};
 use crate::mesh_picture::scene::{Layer, Paint, Scene};
-use crate::mesh_picture::{Image, Rgb, View, color};
+use crate::mesh_picture::{Image, PngError, Rgb, View, color};
 use ellipsoid::Ellipsoid;
 use flexarm_sample::{RunHeader, Sample, TwinSample};
 use legend::{ARROW, GHOST, GHOST_FADE, legend, on_scale};
@@ -54,7 +54,7 @@ pub enum ArmPictureError {
     Nothing,
     /// The image does not fit into its file format.
     #[error("no picture of the arm: cannot make a PNG: {0}")]
-    Encode(String),
+    Encode(PngError),
 }
 
 /// Direction of view.

@@ -14,6 +14,24 @@ pub struct Image {
     pub rgba: Vec<u8>,
 }
 
+/// Reason why an image cannot become a PNG file.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum PngError {
+    /// A side is longer than the format allows.
+    #[error("{pixels} pixels are too many for a PNG")]
+    TooLarge {
+        /// Length of the side.
+        pixels: usize,
+    },
+    /// The encoder refuses the image.
+    #[error("{cause}")]
+    Encoder {
+        /// Message of the encoder.
+        cause: String,
+    },
+}
+
 impl Image {
     /// Creates an image of one colour.
     pub fn new(width: usize, height: usize, color: Rgb) -> Self {
@@ -66,25 +84,26 @@ impl Image {
     ///
     /// # Errors
     /// If the image has no pixels, or more than a PNG can hold.
-    pub fn to_png(&self) -> Result<Vec<u8>, String> {
+    pub fn to_png(&self) -> Result<Vec<u8>, PngError> {
         self.png(png::Compression::Balanced)
     }
 
     /// The same with faster compression, which takes more bytes.
-    pub(crate) fn to_png_quickly(&self) -> Result<Vec<u8>, String> {
+    pub(crate) fn to_png_quickly(&self) -> Result<Vec<u8>, PngError> {
         self.png(png::Compression::Fast)
     }
 
-    fn png(&self, compression: png::Compression) -> Result<Vec<u8>, String> {
-        let size = |n: usize| u32::try_from(n).map_err(|_| format!("{n} pixels are too many for a PNG"));
+    fn png(&self, compression: png::Compression) -> Result<Vec<u8>, PngError> {
+        let size = |pixels: usize| u32::try_from(pixels).map_err(|_| PngError::TooLarge { pixels });
+        let failed = |error: png::EncodingError| PngError::Encoder { cause: error.to_string() };
         let mut bytes = Vec::new();
         let mut encoder = png::Encoder::new(&mut bytes, size(self.width)?, size(self.height)?);
         encoder.set_color(png::ColorType::Rgba);
         encoder.set_depth(png::BitDepth::Eight);
         encoder.set_compression(compression);
-        let mut writer = encoder.write_header().map_err(|error| error.to_string())?;
-        writer.write_image_data(&self.rgba).map_err(|error| error.to_string())?;
-        writer.finish().map_err(|error| error.to_string())?;
+        let mut writer = encoder.write_header().map_err(failed)?;
+        writer.write_image_data(&self.rgba).map_err(failed)?;
+        writer.finish().map_err(failed)?;
         Ok(bytes)
     }
 }

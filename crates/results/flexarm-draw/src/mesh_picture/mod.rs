@@ -37,7 +37,7 @@ use flexarm_fem::model::DofMap;
 use flexarm_fem::reduction::Interface;
 use flexarm_fem::{Mesh, MeshReduction};
 
-pub use image::{Image, Rgb};
+pub use image::{Image, PngError, Rgb};
 pub use stress_sheet::{StressPicture, stress_sheet};
 pub use view::View;
 
@@ -78,7 +78,7 @@ pub enum PictureError {
         /// The file.
         path: PathBuf,
         /// Error of the encoder.
-        cause: String,
+        cause: PngError,
     },
     /// An error of the operating system.
     #[error("{}: cannot {action}", path.display())]

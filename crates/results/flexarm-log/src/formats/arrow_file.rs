@@ -21,7 +21,7 @@ use arrow_schema::{ArrowError, DataType, Field, Schema, SchemaRef};
 use crate::described_table::{Block, Blocks, DescribedTable, TableRun, texts_at_end, texts_at_start};
 use crate::file_recorder::{FileRecorder, OpenFile};
 use crate::read::not_a_recording;
-use crate::read::wall::caught;
+use crate::read::wall::{ReaderPanic, caught};
 use crate::whole_file::WholeFile;
 use crate::{CreateOptions, LogError, RunHeader, RunResult, Sample, table};
 
@@ -167,7 +167,7 @@ impl ArrowRun {
     pub(crate) fn open(path: &Path) -> Result<Self, LogError> {
         let mut file = File::open(path).map_err(LogError::io(path, "open the recording"))?;
         let footer = footer(&mut file).map_err(LogError::io(path, "read the recording"))?;
-        let footer = footer.ok_or_else(|| damaged(path, "it has no end"))?;
+        let footer = footer.ok_or_else(|| damaged(path, &Damage::NoFooter))?;
         let (batches, texts) = decoded(path, || Batches::of(file, &footer))?;
         let names: Vec<String> = batches.schema.fields().iter().map(|field| field.name().clone()).collect();
         let table = DescribedTable::of(path, &names, &texts)?;
@@ -211,13 +211,13 @@ pub(crate) struct Batches {
 impl Batches {
     /// Reads the list of batches from a footer; also returns the texts of the schema, sorted by
     /// key.
-    fn of(file: File, footer: &[u8]) -> Result<(Self, Vec<(String, String)>), String> {
-        let footer = root_as_footer(footer).map_err(|error| error.to_string())?;
-        let schema = fb_to_schema(footer.schema().ok_or("its footer has no schema")?);
+    fn of(file: File, footer: &[u8]) -> Result<(Self, Vec<(String, String)>), Damage> {
+        let footer = root_as_footer(footer).map_err(Damage::library)?;
+        let schema = fb_to_schema(footer.schema().ok_or(Damage::NoSchema)?);
         let mut texts: Vec<(String, String)> = schema.metadata().clone().into_iter().collect();
         texts.sort();
         let places = footer.recordBatches().map(|places| places.iter().copied().collect()).unwrap_or_default();
-        let length = file.metadata().map_err(|error| error.to_string())?.len();
+        let length = file.metadata().map_err(Damage::library)?.len();
         Ok((Self { file, length, schema: Arc::new(schema), version: footer.version(), places }, texts))
     }
 
@@ -239,15 +239,13 @@ impl Batches {
     }
 
     /// Decodes the given columns of a record batch.
-    fn batch(&self, place: &arrow_ipc::Block, bytes: Vec<u8>, columns: &[usize]) -> Result<RecordBatch, String> {
-        let message = root_as_message(bytes.get(8..).ok_or("a record batch is cut off")?);
-        let message = message.map_err(|error| error.to_string())?;
+    fn batch(&self, place: &arrow_ipc::Block, bytes: Vec<u8>, columns: &[usize]) -> Result<RecordBatch, Damage> {
+        let message = root_as_message(bytes.get(8..).ok_or(Damage::BatchCutOff)?).map_err(Damage::library)?;
         if message.header_as_record_batch().is_some_and(|batch| batch.compression().is_some()) {
-            return Err("its columns are compressed, which is not read here: write them uncompressed".into());
+            return Err(Damage::Compressed);
         }
         let decoder = FileDecoder::new(self.schema.clone(), self.version).with_projection(columns.to_vec());
-        let batch = decoder.read_record_batch(place, &bytes.into()).map_err(|error| error.to_string())?;
-        batch.ok_or_else(|| "a record batch is missing".into())
+        decoder.read_record_batch(place, &bytes.into()).map_err(Damage::library)?.ok_or(Damage::BatchMissing)
     }
 }
 
@@ -259,14 +257,14 @@ impl Blocks for Batches {
     fn read(&self, path: &Path, block: usize, places: &[usize], columns: &mut [Vec<f64>]) -> Result<(), LogError> {
         let place = &self.places[block];
         let bytes = self.bytes(place).map_err(LogError::io(path, "read the recording"))?;
-        let bytes = bytes.ok_or_else(|| damaged(path, "a record batch lies outside of it"))?;
+        let bytes = bytes.ok_or_else(|| damaged(path, &Damage::BatchOutside))?;
         let batch = decoded(path, || self.batch(place, bytes, places))?;
         for (array, values) in batch.columns().iter().zip(columns) {
             values.clear();
             match array.as_primitive_opt::<Float64Type>() {
                 Some(array) if array.null_count() == 0 => values.extend_from_slice(array.values()),
                 Some(array) => values.extend(array.iter().map(|value| value.unwrap_or(f64::NAN))),
-                None => return Err(damaged(path, "a column is not double")),
+                None => return Err(damaged(path, &Damage::NotDouble)),
             }
         }
         Ok(())
@@ -274,10 +272,40 @@ impl Blocks for Batches {
 }
 
 /// Calls the Arrow library, which may panic on a damaged file.
-fn decoded<T>(path: &Path, decode: impl FnOnce() -> Result<T, String>) -> Result<T, LogError> {
-    caught(decode).and_then(|result| result).map_err(|cause| damaged(path, &cause))
+fn decoded<T>(path: &Path, decode: impl FnOnce() -> Result<T, Damage>) -> Result<T, LogError> {
+    caught(decode).map_err(Damage::Panic).and_then(|result| result).map_err(|damage| damaged(path, &damage))
 }
 
-fn damaged(path: &Path, cause: &str) -> LogError {
-    not_a_recording(path, format!("a damaged file ({cause})"), "a whole Arrow file")
+fn damaged(path: &Path, damage: &Damage) -> LogError {
+    not_a_recording(path, format!("a damaged file ({damage})"), "a whole Arrow file")
+}
+
+/// What is wrong with a file.
+#[derive(Debug, thiserror::Error)]
+enum Damage {
+    #[error("it has no end")]
+    NoFooter,
+    #[error("its footer has no schema")]
+    NoSchema,
+    #[error("a record batch lies outside of it")]
+    BatchOutside,
+    #[error("a record batch is cut off")]
+    BatchCutOff,
+    #[error("a record batch is missing")]
+    BatchMissing,
+    #[error("its columns are compressed, which is not read here: write them uncompressed")]
+    Compressed,
+    #[error("a column is not double")]
+    NotDouble,
+    /// Error of the Arrow library.
+    #[error("{0}")]
+    Library(String),
+    #[error(transparent)]
+    Panic(ReaderPanic),
+}
+
+impl Damage {
+    fn library(error: impl ToString) -> Self {
+        Self::Library(error.to_string())
+    }
 }

@@ -65,92 +65,47 @@ pub(crate) struct ElasticChannels {
     pub(crate) deflection: u16,
 }
 
+const ARRAY: &str = "std_msgs/Float64MultiArray";
+const JOINTS: &str = "sensor_msgs/JointState";
+const POSE: &str = "geometry_msgs/PoseStamped";
+const TWIST: &str = "geometry_msgs/TwistStamped";
+const WRENCH: &str = "geometry_msgs/WrenchStamped";
+const MARKERS: &str = "visualization_msgs/MarkerArray";
+
 impl Channels {
     /// Adds all topics of a run to the file.
     pub(crate) fn add(output: &mut Output, header: &RunHeader) -> io::Result<Self> {
-        let mut add = |topic: &str, kind: &str, note: &str| add_channel(output, topic, kind, note);
-        const ARRAY: &str = "std_msgs/Float64MultiArray";
-        const JOINTS: &str = "sensor_msgs/JointState";
-        const POSE: &str = "geometry_msgs/PoseStamped";
-        const TWIST: &str = "geometry_msgs/TwistStamped";
-        const MARKERS: &str = "visualization_msgs/MarkerArray";
-
-        let robot_description = match header.urdf.is_empty() {
-            true => None,
-            false => Some(add("/robot_description", "std_msgs/String", "URDF as read")?),
-        };
+        let robot_description =
+            add_if(!header.urdf.is_empty(), output, "/robot_description", "std_msgs/String", "URDF as read")?;
         let trees = "flexible robot with stations along its bent links; rigid twin below rigid/; magnified arm below magnified/";
-        let tf = add("/tf", "tf2_msgs/TFMessage", trees)?;
-        let tf_static = add("/tf_static", "tf2_msgs/TFMessage", "base and fixed links, once")?;
-        let joint_states = add("/joint_states", JOINTS, "flexible robot; effort is the required force of the drives")?;
-        let tcp_flexible = add("/tcp/flexible", POSE, "tool centre point of the flexible robot")?;
-        let rigid = match header.has_rigid {
-            false => None,
-            true => Some(RigidChannels {
-                joint_states: add(
-                    "/rigid/joint_states",
-                    JOINTS,
-                    "rigid twin; effort is the required force of the drives",
-                )?,
-                tcp: add("/tcp/rigid", POSE, "tool centre point of the rigid twin")?,
-                error: add(
-                    "/tcp/error",
-                    TWIST,
-                    "not a velocity: TCP error, flexible minus rigid, world axes; linear = translation [m], angular = rotation vector [rad]",
-                )?,
-                error_plot: add("/deviation/tcp", ARRAY, "translation of /tcp/error, for plotting")?,
-                error_path: add(
-                    "/tcp/error_path",
-                    TWIST,
-                    "not a velocity: TCP error, flexible minus rigid, along tangent, normal and binormal of the rigid path; linear = translation [m], angular = rotation vector [rad]",
-                )?,
-                error_path_plot: add("/deviation/tcp_path", ARRAY, "translation of /tcp/error_path, for plotting")?,
-            }),
-        };
-        let mut elastic = Vec::new();
-        for (name, element) in topic_names(&header.elements).iter().zip(&header.elements) {
-            let load = format!(
-                "load of {element} on its distal part, axes of the proximal face [N, N m], as in /elastic/joint_states"
-            );
-            let deflection = format!("not a velocity: deflection of {element}, axes of the proximal face [m, rad]");
-            elastic.push(ElasticChannels {
-                load: add(&format!("/elastic/{name}"), "geometry_msgs/WrenchStamped", &load)?,
-                deflection: add(&format!("/elastic/{name}/deflection"), TWIST, &deflection)?,
-            });
-        }
-        let mut add_if = |wanted: bool, topic: &str, kind: &str, note: &str| match wanted {
-            true => add(topic, kind, note).map(Some),
-            false => Ok(None),
-        };
-        let elastic_joint_states = add_if(
-            !header.elements.is_empty(),
-            "/elastic/joint_states",
-            JOINTS,
-            "all elastic elements by name: position = deflection [m, rad], effort = load on the distal part [N, N m], axes of \
-             the proximal face",
-        )?;
+        let tf = add(output, "/tf", "tf2_msgs/TFMessage", trees)?;
+        let tf_static = add(output, "/tf_static", "tf2_msgs/TFMessage", "base and fixed links, once")?;
+        let what = "flexible robot; effort is the required force of the drives";
+        let joint_states = add(output, "/joint_states", JOINTS, what)?;
+        let tcp_flexible = add(output, "/tcp/flexible", POSE, "tool centre point of the flexible robot")?;
+        let rigid = header.has_rigid.then(|| RigidChannels::add(output)).transpose()?;
+        let elements = topic_names(&header.elements).into_iter().zip(&header.elements);
+        let elastic = elements.map(|(topic, element)| ElasticChannels::add(output, &topic, element));
+        let elastic = elastic.collect::<io::Result<_>>()?;
+        let what = "all elastic elements by name: position = deflection [m, rad], effort = load on the distal part [N, N m], axes of \
+                    the proximal face";
+        let elastic_joint_states = add_if(!header.elements.is_empty(), output, "/elastic/joint_states", JOINTS, what)?;
         let what = "static part of /tcp/error: the TCP error if the arm stood still where it is, world axes [m]";
-        let static_error = add_if(header.has_rigid && header.has_static, "/tcp/static_error", ARRAY, what)?;
-        let contributions = add_if(
-            !header.contributors.is_empty(),
-            "/tcp/contributions",
-            ARRAY,
-            "displacement of the TCP caused by each flexible link or drive, world axes [m]",
-        )?;
-        let gauges =
-            add_if(!header.gauges.is_empty(), "/gauges", ARRAY, "strain gauges [m/m] and stress points [Pa] of links")?;
+        let static_error = add_if(header.has_rigid && header.has_static, output, "/tcp/static_error", ARRAY, what)?;
+        let what = "displacement of the TCP caused by each flexible link or drive, world axes [m]";
+        let contributions = add_if(!header.contributors.is_empty(), output, "/tcp/contributions", ARRAY, what)?;
+        let what = "strain gauges [m/m] and stress points [Pa] of links";
+        let gauges = add_if(!header.gauges.is_empty(), output, "/gauges", ARRAY, what)?;
         let what = "surfaces of the links in their frames: flexible as in the URDF, rigid twin as a ghost, magnified arm in blue";
-        let surfaces = add_if(!header.meshes.is_empty(), "/markers", MARKERS, what)?;
-        let factor = header.magnification;
-        let what = format!("TCP error from the rigid tool on, drawn {factor} times");
-        let error = add_if(is_magnified(header), "/markers/error", MARKERS, &what)?;
-        let solver = add("/solver", ARRAY, "stepper")?;
-        let energy = add("/energy", ARRAY, "energies of the flexible robot [J]")?;
+        let surfaces = add_if(!header.meshes.is_empty(), output, "/markers", MARKERS, what)?;
+        let what = format!("TCP error from the rigid tool on, drawn {} times", header.magnification);
+        let error = add_if(is_magnified(header), output, "/markers/error", MARKERS, &what)?;
+        let solver = add(output, "/solver", ARRAY, "stepper")?;
+        let energy = add(output, "/energy", ARRAY, "energies of the flexible robot [J]")?;
         let what = "events; name = kind; written at the end of the run, with the times of the events";
-        let events = add("/events", "rcl_interfaces/Log", what)?;
-        let paths = add("/markers/path", MARKERS, "paths of the tool so far, each second")?;
+        let events = add(output, "/events", "rcl_interfaces/Log", what)?;
+        let paths = add(output, "/markers/path", MARKERS, "paths of the tool so far, each second")?;
         let markers = MarkerChannels { surfaces, paths, error };
-
         Ok(Self {
             robot_description,
             tf,
@@ -171,7 +126,40 @@ impl Channels {
     }
 }
 
-fn add_channel(output: &mut Output, topic: &str, kind: &str, note: &str) -> io::Result<u16> {
+impl RigidChannels {
+    fn add(output: &mut Output) -> io::Result<Self> {
+        let mut add = |topic: &str, kind: &str, note: &str| add(output, topic, kind, note);
+        let what = "not a velocity: TCP error, flexible minus rigid, world axes; linear = translation [m], angular = rotation vector [rad]";
+        let along = "not a velocity: TCP error, flexible minus rigid, along tangent, normal and binormal of the rigid path; linear = translation [m], angular = rotation vector [rad]";
+        Ok(Self {
+            joint_states: add("/rigid/joint_states", JOINTS, "rigid twin; effort is the required force of the drives")?,
+            tcp: add("/tcp/rigid", POSE, "tool centre point of the rigid twin")?,
+            error: add("/tcp/error", TWIST, what)?,
+            error_plot: add("/deviation/tcp", ARRAY, "translation of /tcp/error, for plotting")?,
+            error_path: add("/tcp/error_path", TWIST, along)?,
+            error_path_plot: add("/deviation/tcp_path", ARRAY, "translation of /tcp/error_path, for plotting")?,
+        })
+    }
+}
+
+impl ElasticChannels {
+    fn add(output: &mut Output, topic: &str, element: &str) -> io::Result<Self> {
+        let load = format!(
+            "load of {element} on its distal part, axes of the proximal face [N, N m], as in /elastic/joint_states"
+        );
+        let deflection = format!("not a velocity: deflection of {element}, axes of the proximal face [m, rad]");
+        Ok(Self {
+            load: add(output, &format!("/elastic/{topic}"), WRENCH, &load)?,
+            deflection: add(output, &format!("/elastic/{topic}/deflection"), TWIST, &deflection)?,
+        })
+    }
+}
+
+fn add_if(wanted: bool, output: &mut Output, topic: &str, kind: &str, note: &str) -> io::Result<Option<u16>> {
+    wanted.then(|| add(output, topic, kind, note)).transpose()
+}
+
+fn add(output: &mut Output, topic: &str, kind: &str, note: &str) -> io::Result<u16> {
     // ROS 2 names a type package/msg/Type in the file and package/Type inside definitions.
     let name = kind.replacen('/', "/msg/", 1);
     let latched = ["/robot_description", "/tf_static", "/markers", "/markers/path"].contains(&topic);

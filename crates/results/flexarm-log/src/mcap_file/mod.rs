@@ -222,11 +222,35 @@ impl McapFile {
     }
 
     fn sample(&mut self, stamp: Stamp, sample: &Sample) -> io::Result<()> {
-        let since_start = stamp.0 - self.start.0;
-        let rigid = self.channels.rigid.map(|channels| (channels, &sample.rigid));
+        self.transforms(stamp, sample)?;
+        self.robots(stamp, sample)?;
+        if let Some(channel) = self.channels.static_error {
+            self.send(channel, stamp, messages::labelled_array("x [m],y [m],z [m]", &sample.static_m))?;
+        }
+        if let Some(channel) = self.channels.contributions {
+            let shares = sample.contributions.as_flattened();
+            let message = messages::labelled_array(&self.contributions, shares);
+            self.output.send(channel, self.samples, stamp, message)?;
+        }
+        if let Some(channel) = self.channels.gauges {
+            let message = messages::labelled_array(&self.gauges, &sample.gauges);
+            self.output.send(channel, self.samples, stamp, message)?;
+        }
+        self.elastic(stamp, sample)?;
+        let energy = &sample.energy;
+        let energies = [energy.kinetic, energy.potential, energy.elastic];
+        let labels = "kinetic [J],potential [J],elastic [J]";
+        self.send(self.channels.energy, stamp, messages::labelled_array(labels, &energies))?;
+        let labels = "iterations,residual";
+        self.send(self.channels.solver, stamp, messages::labelled_array(labels, &sample.solver))?;
+        self.moving_markers(stamp, sample)?;
+        self.samples = self.samples.wrapping_add(1);
+        Ok(())
+    }
 
-        // Frames. The fixed transforms are known only with the first sample.
-        let shown = self.frames.advance(since_start, sample);
+    /// Sends the transforms; the fixed ones are known only with the first sample.
+    fn transforms(&mut self, stamp: Stamp, sample: &Sample) -> io::Result<()> {
+        let shown = self.frames.advance(stamp.0 - self.start.0, sample);
         if self.samples == 0 {
             let fixed = messages::transforms(stamp, &self.frames.transforms(sample, Moving::No));
             self.output.send(self.channels.tf_static, 0, stamp, fixed)?;
@@ -236,44 +260,27 @@ impl McapFile {
             self.output.send(self.channels.tf, self.poses, stamp, moving)?;
             self.poses = self.poses.wrapping_add(1);
         }
+        Ok(())
+    }
 
-        // Joints and TCP of both robots.
+    /// Sends the joints and the TCP of both robots.
+    fn robots(&mut self, stamp: Stamp, sample: &Sample) -> io::Result<()> {
         self.joint_states(self.channels.joint_states, stamp, &sample.flexible)?;
         let tool = &sample.flexible.X_WT;
         self.send(self.channels.tcp_flexible, stamp, messages::pose_stamped(stamp, WORLD, tool))?;
-        if let Some((channels, rigid)) = rigid {
-            self.joint_states(channels.joint_states, stamp, rigid)?;
-            self.send(channels.tcp, stamp, messages::pose_stamped(stamp, WORLD, &rigid.X_WT))?;
+        if let Some(channels) = self.channels.rigid {
+            self.joint_states(channels.joint_states, stamp, &sample.rigid)?;
+            self.send(channels.tcp, stamp, messages::pose_stamped(stamp, WORLD, &sample.rigid.X_WT))?;
             self.error(stamp, channels.error, channels.error_plot, "x [m],y [m],z [m],norm [m]", &sample.error_world)?;
             let axes = "tangential [m],normal [m],binormal [m],norm [m]";
             self.error(stamp, channels.error_path, channels.error_path_plot, axes, &sample.error_path)?;
         }
-        if let Some(channel) = self.channels.static_error {
-            let message = messages::labelled_array("x [m],y [m],z [m]", &sample.static_m);
-            self.output.send(channel, self.samples, stamp, message)?;
-        }
-        if let Some(channel) = self.channels.contributions {
-            let shares = sample.contributions.as_flattened();
-            let message = messages::labelled_array(&self.contributions, shares);
-            self.output.send(channel, self.samples, stamp, message)?;
-        }
+        Ok(())
+    }
 
-        if let Some(channel) = self.channels.gauges {
-            let message = messages::labelled_array(&self.gauges, &sample.gauges);
-            self.output.send(channel, self.samples, stamp, message)?;
-        }
-
-        self.elastic(stamp, sample)?;
-
-        // Energies and solver figures.
-        let energy = &sample.energy;
-        let energies = [energy.kinetic, energy.potential, energy.elastic];
-        let labels = "kinetic [J],potential [J],elastic [J]";
-        self.send(self.channels.energy, stamp, messages::labelled_array(labels, &energies))?;
-        let labels = "iterations,residual";
-        self.send(self.channels.solver, stamp, messages::labelled_array(labels, &sample.solver))?;
-
-        // Markers.
+    /// Sends the markers that are due.
+    fn moving_markers(&mut self, stamp: Stamp, sample: &Sample) -> io::Result<()> {
+        let since_start = stamp.0 - self.start.0;
         let (paths, error) = self.markers.advance(since_start, sample, self.frames.magnified());
         self.last = stamp;
         if paths {
@@ -284,8 +291,6 @@ impl McapFile {
             self.output.send(channel, self.errors, stamp, messages::markers(stamp, &arrow))?;
             self.errors = self.errors.wrapping_add(1);
         }
-
-        self.samples = self.samples.wrapping_add(1);
         Ok(())
     }
 

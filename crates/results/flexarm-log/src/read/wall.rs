@@ -13,9 +13,16 @@ thread_local! {
     static CAUGHT: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Calls a reader of a dependency. A panic in it becomes an error message and is not printed. Data
-/// changed by the reader must not be used after an error.
-pub(crate) fn caught<T>(read: impl FnOnce() -> T) -> Result<T, String> {
+/// Panic in a reader of a dependency.
+#[derive(Debug, PartialEq, thiserror::Error)]
+#[error("its reader gave up: {message}")]
+pub(crate) struct ReaderPanic {
+    message: String,
+}
+
+/// Calls a reader of a dependency. A panic in it becomes an error and is not printed. Data changed
+/// by the reader must not be used after an error.
+pub(crate) fn caught<T>(read: impl FnOnce() -> T) -> Result<T, ReaderPanic> {
     static QUIET: Once = Once::new();
     QUIET.call_once(|| {
         let usual = std::panic::take_hook();
@@ -28,7 +35,7 @@ pub(crate) fn caught<T>(read: impl FnOnce() -> T) -> Result<T, String> {
     let before = CAUGHT.replace(true);
     let result = std::panic::catch_unwind(AssertUnwindSafe(read));
     CAUGHT.set(before);
-    result.map_err(|panic| format!("its reader gave up: {}", message(panic.as_ref())))
+    result.map_err(|panic| ReaderPanic { message: message(panic.as_ref()) })
 }
 
 /// Returns the message of a panic, on one short line.
@@ -46,7 +53,7 @@ mod tests {
         assert_eq!(caught(|| 1 + 1), Ok(2));
         let (empty, k) = (Vec::<u8>::new(), 3);
         let error = caught(|| empty[k]).unwrap_err();
-        assert!(error.contains("index out of bounds"), "{error}");
+        assert!(error.message.contains("index out of bounds"), "{error}");
         assert!(!CAUGHT.get());
     }
 }

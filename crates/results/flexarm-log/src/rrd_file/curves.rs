@@ -3,7 +3,7 @@
 use rerun::{Color, EntityPath, TimeColumn};
 
 use super::colors::{axis, component, faint, series, total};
-use super::path;
+use super::entity::path;
 use super::stream::{Result, RrdStream};
 use super::tracks::{CurveExtent, ScalarTrack};
 use crate::poses::size;
@@ -25,63 +25,35 @@ impl Curves {
     /// Creates the curves below `root`.
     pub(crate) fn new(header: &RunHeader, root: &EntityPath) -> Self {
         let at = |parts: &[&str]| root.join(&path(parts));
-        let curve = |group: &str, key: &str, name: &str, color: Color| {
-            ScalarTrack::new(at(&[group, key]), [name]).with_colors([color])
-        };
-        let counted = |path: EntityPath, names: Vec<String>, color: &dyn Fn(usize) -> Color| {
-            let colors: Vec<Color> = (0..names.len()).map(color).collect();
-            ScalarTrack::new(path, names).with_colors(colors)
-        };
-        let (mut error, mut tracks) = (Vec::new(), Vec::new());
-        if header.has_rigid {
-            error.push(curve("tcp_error", "x", "x [mm]", axis(0)));
-            error.push(curve("tcp_error", "y", "y [mm]", axis(1)));
-            error.push(curve("tcp_error", "z", "z [mm]", axis(2)));
-            error.push(curve("tcp_error", "norm", "norm [mm]", total()));
-            error.push(curve("tcp_error_path", "tangential", "tangential [mm]", series(0)));
-            error.push(curve("tcp_error_path", "normal", "normal [mm]", series(1)));
-            error.push(curve("tcp_error_path", "binormal", "binormal [mm]", series(2)));
-            tracks.push(curve("tcp_error_rotation", "x", "about x [mrad]", axis(0)));
-            tracks.push(curve("tcp_error_rotation", "y", "about y [mrad]", axis(1)));
-            tracks.push(curve("tcp_error_rotation", "z", "about z [mrad]", axis(2)));
-        }
+        let (error, mut tracks) = if header.has_rigid { error_curves(root) } else { Default::default() };
         let joints = &header.joints;
         let of_joint = |k: usize| series(header.color_number(&joints[k]));
-        tracks.push(counted(at(&["joints", "position"]), joints.clone(), &of_joint));
-        tracks.push(counted(at(&["joints", "velocity"]), joints.clone(), &of_joint));
-        tracks.push(counted(at(&["joints", "effort", "flexible"]), joints.clone(), &of_joint));
+        tracks.push(group(at(&["joints", "position"]), joints.clone(), &of_joint));
+        tracks.push(group(at(&["joints", "velocity"]), joints.clone(), &of_joint));
+        tracks.push(group(at(&["joints", "effort", "flexible"]), joints.clone(), &of_joint));
         if header.has_rigid {
             let names = joints.iter().map(|joint| format!("{joint} (rigid)")).collect();
             let of_twin = |k: usize| faint(header.color_number(&joints[k]));
-            tracks.push(counted(at(&["joints", "effort", "rigid"]), names, &of_twin));
+            tracks.push(group(at(&["joints", "effort", "rigid"]), names, &of_twin));
         }
-        for element in &header.elements {
-            let names = |parts: [&str; 6]| parts.map(|part| format!("{element} {part}")).to_vec();
-            // One plot shows all elements.
-            let number = header.color_number(element);
-            let color = |part: usize| component(number, part);
-            let deflections = names(["x [mm]", "y [mm]", "z [mm]", "rx [mrad]", "ry [mrad]", "rz [mrad]"]);
-            tracks.push(counted(at(&["elastic", element]), deflections, &color));
-            let loads = names(["Fx [N]", "Fy [N]", "Fz [N]", "Mx [N m]", "My [N m]", "Mz [N m]"]);
-            tracks.push(counted(at(&["elastic_load", element]), loads, &color));
-        }
+        tracks.extend(header.elements.iter().flat_map(|element| element_curves(header, root, element)));
         if !header.contributors.is_empty() {
             let names = header.contributors.iter().map(|name| format!("{name} [mm]")).collect();
-            tracks.push(counted(at(&["contributions"]), names, &series));
+            tracks.push(group(at(&["contributions"]), names, &series));
         }
         let mut gauges = Vec::new();
         for quantity in GaugeQuantity::ALL {
-            let (group, unit, factor) = quantity.shown();
+            let (name_of_plot, unit, factor) = quantity.shown();
             let (places, names): (Vec<usize>, Vec<String>) =
                 header.gauges_of(quantity).map(|(k, name)| (k, format!("{name} [{unit}]"))).unzip();
             if !names.is_empty() {
-                tracks.push(counted(at(&[group]), names, &series));
+                tracks.push(group(at(&[name_of_plot]), names, &series));
                 gauges.push((places, factor));
             }
         }
         let energies = ["kinetic [J]", "potential [J]", "elastic [J]"].map(str::to_owned).to_vec();
-        tracks.push(counted(at(&["energy"]), energies, &series));
-        tracks.push(counted(at(&["solver"]), ["iterations", "residual"].map(str::to_owned).to_vec(), &series));
+        tracks.push(group(at(&["energy"]), energies, &series));
+        tracks.push(group(at(&["solver"]), ["iterations", "residual"].map(str::to_owned).to_vec(), &series));
         Self { error, causes: tracks, gauges, has_rigid: header.has_rigid }
     }
 
@@ -155,6 +127,47 @@ impl Curves {
     pub(crate) fn seen(&self) -> impl Iterator<Item = CurveExtent> + '_ {
         self.error.iter().chain(&self.causes).map(ScalarTrack::seen)
     }
+}
+
+/// Several curves in one plot, each with a name.
+fn group(path: EntityPath, names: Vec<String>, color: &dyn Fn(usize) -> Color) -> ScalarTrack {
+    let colors: Vec<Color> = (0..names.len()).map(color).collect();
+    ScalarTrack::new(path, names).with_colors(colors)
+}
+
+/// Curves of the TCP error: translations, and rotations.
+fn error_curves(root: &EntityPath) -> (Vec<ScalarTrack>, Vec<ScalarTrack>) {
+    let curve = |group: &str, key: &str, name: &str, color: Color| {
+        ScalarTrack::new(root.join(&path([group, key])), [name]).with_colors([color])
+    };
+    let translations = vec![
+        curve("tcp_error", "x", "x [mm]", axis(0)),
+        curve("tcp_error", "y", "y [mm]", axis(1)),
+        curve("tcp_error", "z", "z [mm]", axis(2)),
+        curve("tcp_error", "norm", "norm [mm]", total()),
+        curve("tcp_error_path", "tangential", "tangential [mm]", series(0)),
+        curve("tcp_error_path", "normal", "normal [mm]", series(1)),
+        curve("tcp_error_path", "binormal", "binormal [mm]", series(2)),
+    ];
+    let rotations = vec![
+        curve("tcp_error_rotation", "x", "about x [mrad]", axis(0)),
+        curve("tcp_error_rotation", "y", "about y [mrad]", axis(1)),
+        curve("tcp_error_rotation", "z", "about z [mrad]", axis(2)),
+    ];
+    (translations, rotations)
+}
+
+/// Curves of the deflection and the load of an elastic element; one plot shows all elements.
+fn element_curves(header: &RunHeader, root: &EntityPath, element: &str) -> [ScalarTrack; 2] {
+    let names = |parts: [&str; 6]| parts.map(|part| format!("{element} {part}")).to_vec();
+    let number = header.color_number(element);
+    let curves = |kind: &str, parts: [&str; 6]| {
+        group(root.join(&path([kind, element])), names(parts), &|part| component(number, part))
+    };
+    [
+        curves("elastic", ["x [mm]", "y [mm]", "z [mm]", "rx [mrad]", "ry [mrad]", "rz [mrad]"]),
+        curves("elastic_load", ["Fx [N]", "Fy [N]", "Fz [N]", "Mx [N m]", "My [N m]", "Mz [N m]"]),
+    ]
 }
 
 const MILLI: f64 = 1e3;

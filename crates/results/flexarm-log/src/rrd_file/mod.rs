@@ -7,6 +7,7 @@
 
 mod colors;
 mod curves;
+mod entity;
 mod eye;
 mod layout;
 mod robot;
@@ -21,6 +22,7 @@ use std::path::Path;
 
 use rerun::{EntityPath, TextDocument, ViewCoordinates};
 
+use self::entity::path;
 use self::layout::{Part, PlotPlace};
 use self::run::{RunTracks, Seat};
 use self::stream::{Result, RrdStream, StreamError};
@@ -255,19 +257,6 @@ fn summary(description: &str, result: &RunResult) -> String {
     let plain = |text: &str| text.replace('*', "\\*").replace('_', "\\_");
     let line = |(name, value): &(String, String)| format!("- **{}** {}\n", plain(name), plain(value));
     result.readable.iter().map(line).collect::<String>() + "\n" + description
-}
-
-/// Builds an entity path from parts that may hold any character.
-pub(crate) fn path<S: AsRef<str>>(parts: impl IntoIterator<Item = S>) -> EntityPath {
-    EntityPath::from_iter(parts.into_iter().map(|part| part.as_ref().into()))
-}
-
-/// Returns the entity name of a link; names of a robot's own entities get a prefix.
-pub(crate) fn link_part(name: &str) -> String {
-    match name {
-        "tcp" | "skeleton" | "error" | "color_scale" => format!("link_{name}"),
-        _ => name.to_owned(),
-    }
 }
 
 /// FNV-1a hash of texts, names, numbers and attached files of the header, and of the labels of a

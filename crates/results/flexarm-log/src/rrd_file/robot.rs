@@ -7,9 +7,9 @@ use rerun::components::MeshFaceRendering;
 use rerun::{AlbedoFactor, Color, EntityPath, LineStrips3D, Mesh3D, Radius, Rgba32, TransformAxes3D};
 
 use super::colors::{self, ColorScale};
+use super::entity::{link_part, path};
 use super::stream::{Result, RrdStream};
 use super::tracks::{Instant, PoseTrack, ShapeTrack, SkeletonTrack, TintTrack, Track, point};
-use super::{link_part, path};
 use crate::{LinkMesh, RunHeader, Sample, TwinSample};
 use flexarm_draw::{BendLine, BentMesh, BentPieces, stations_in_link};
 

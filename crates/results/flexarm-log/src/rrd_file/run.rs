@@ -7,8 +7,8 @@ use rerun::{
 
 use super::colors::{self, ColorScale};
 use super::curves::Curves;
+use super::entity::path;
 use super::eye::{Eye, eye};
-use super::path;
 use super::robot::{Paint, RobotAppearance, RobotTracks};
 use super::stream::{Result, RrdStream};
 use super::tracks::{ArrowTrack, CurveExtent, Instant, PathTrack, SIM_TIME, Times, Track, point};
@@ -33,6 +33,11 @@ impl Seat {
             Self::Alone => path([&header.robot]),
             Self::InStudy(_, label) => path([label]),
         }
+    }
+
+    /// Whether the run is the only one or the first of a study.
+    fn is_first(&self) -> bool {
+        matches!(self, Self::Alone | Self::InStudy(0, _))
     }
 
     pub(crate) fn color(&self) -> Option<Color> {
@@ -114,61 +119,75 @@ fn magnified_paint(seat: &Seat, scale: ColorScale) -> Paint {
     }
 }
 
+/// Robots of a run, each with its TCP path.
+struct DrawnRobots {
+    flexible: Drawn,
+    rigid: Option<Drawn>,
+    magnified: Option<Drawn>,
+}
+
+impl DrawnRobots {
+    fn new(header: &RunHeader, seat: &Seat, scale: ColorScale, stream: &RrdStream) -> Result<Self> {
+        let root = seat.root(header);
+        let alone = matches!(seat, Seat::Alone);
+        let Fineness { pixel_m, true_tolerance_m, quantum_m } = Fineness::of(header);
+        let way = |who: &str| PathTrack::new(root.join(&path(["path", who])));
+        let robot = |name: &str, paint: Paint, bends: bool, tolerance_m: f64, quantum_m: f32| {
+            // At true scale bending is hardly visible; a surface for every frame would be wasteful.
+            let every_ns = if quantum_m > 0.0 { 10_000_000 } else { 100_000_000 };
+            let root = root.join(&path([name]));
+            RobotTracks::new(header, RobotAppearance { root, paint, bends, tolerance_m, every_ns, quantum_m }, stream)
+        };
+        let with_magnified = has_magnified(header);
+        let flexible = match alone || !with_magnified {
+            // Unmagnified deflections with a colour scale are large: modes.
+            true if header.has_rigid && !with_magnified && header.color_scale_m > 0.0 => {
+                Some(robot("flexible", Paint::Deviation(scale), true, pixel_m, quantum_m)?)
+            }
+            true => Some(robot("flexible", Paint::Own, true, true_tolerance_m, 0.0)?),
+            false => None,
+        };
+        let rigid = match header.has_rigid && seat.is_first() {
+            true => Some(robot("rigid", Paint::Ghost, false, 0.0, 0.0)?),
+            false => None,
+        };
+        let magnified = match with_magnified {
+            true => Some(robot("magnified", magnified_paint(seat, scale), true, pixel_m, quantum_m)?),
+            false => None,
+        };
+        Ok(Self {
+            flexible: Drawn { robot: flexible, way: way("flexible"), way_color: None },
+            rigid: header.has_rigid.then(|| Drawn {
+                robot: rigid,
+                way: way("rigid"),
+                way_color: Some(colors::rigid()),
+            }),
+            magnified: with_magnified.then(|| Drawn {
+                robot: magnified,
+                way: way("magnified"),
+                way_color: seat.color(),
+            }),
+        })
+    }
+}
+
+fn has_magnified(header: &RunHeader) -> bool {
+    header.has_rigid && header.magnification > 0.0
+}
+
 impl RunTracks {
     /// Creates the tracks of a run; writes its constant data.
     pub(crate) fn new(header: &RunHeader, seat: &Seat, stream: &RrdStream) -> Result<Self> {
         let root = seat.root(header);
-        let at = |what: &str| root.join(&path([what]));
-        let way = |who: &str| PathTrack::new(root.join(&path(["path", who])));
         let scale = ColorScale { full_m: header.color_scale_m };
-        let alone = matches!(seat, Seat::Alone);
-        let first = matches!(seat, Seat::Alone | Seat::InStudy(0, _));
-        let Fineness { pixel_m, true_tolerance_m, quantum_m } = Fineness::of(header);
-
-        let robot = |name: &str, paint: Paint, bends: bool, tolerance_m: f64, quantum_m: f32| {
-            // At true scale bending is hardly visible; a surface for every frame would be wasteful.
-            let every_ns = if quantum_m > 0.0 { 10_000_000 } else { 100_000_000 };
-            let look = RobotAppearance { root: at(name), paint, bends, tolerance_m, every_ns, quantum_m };
-            RobotTracks::new(header, look, stream).map(Some)
-        };
-        let with_magnified = header.has_rigid && header.magnification > 0.0;
-        let flexible = Drawn {
-            robot: match alone || !with_magnified {
-                // Unmagnified deflections with a colour scale are large: modes.
-                true if header.has_rigid && !with_magnified && header.color_scale_m > 0.0 => {
-                    robot("flexible", Paint::Deviation(scale), true, pixel_m, quantum_m)?
-                }
-                true => robot("flexible", Paint::Own, true, true_tolerance_m, 0.0)?,
-                false => None,
-            },
-            way: way("flexible"),
-            way_color: None,
-        };
-        let rigid = match header.has_rigid {
-            false => None,
-            true => Some(Drawn {
-                robot: match first {
-                    true => robot("rigid", Paint::Ghost, false, 0.0, 0.0)?,
-                    false => None,
-                },
-                way: way("rigid"),
-                way_color: Some(colors::rigid()),
-            }),
-        };
-        let magnified = match with_magnified {
-            false => None,
-            true => {
-                let robot = robot("magnified", magnified_paint(seat, scale), true, pixel_m, quantum_m)?;
-                Some(Drawn { robot, way: way("magnified"), way_color: seat.color() })
-            }
-        };
-        let arrow = with_magnified.then(|| ArrowTrack::new(root.join(&path(["magnified", "error"]))));
+        let DrawnRobots { flexible, rigid, magnified } = DrawnRobots::new(header, seat, scale, stream)?;
+        let arrow = has_magnified(header).then(|| ArrowTrack::new(root.join(&path(["magnified", "error"]))));
         if let Some(arrow) = &arrow {
             arrow.style(stream, seat.color().unwrap_or_else(colors::total))?;
         }
         let plots = path(["plots"]);
         let shapes = !header.captions.is_empty();
-        let curves = (first && !shapes).then(|| Curves::new(header, &plots));
+        let curves = (seat.is_first() && !shapes).then(|| Curves::new(header, &plots));
         let study_curves = match seat {
             Seat::InStudy(_, label) if header.has_rigid => {
                 Some(Curves::of_study(label, &plots, seat.color().unwrap_or_else(|| colors::series(0))))

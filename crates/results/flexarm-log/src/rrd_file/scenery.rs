@@ -6,8 +6,8 @@ use rerun::{
     AlbedoFactor, AsComponents, Boxes3D, Color, Ellipsoids3D, EntityPath, Mesh3D, Points3D, Quaternion, Radius, Rgba32,
 };
 
+use super::entity::path;
 use super::layout::Part;
-use super::path;
 use super::stream::{Result, RrdStream};
 
 const ROOT: &str = "scenery";

@@ -5,8 +5,9 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use rerun::TextDocument;
 
+use super::entity::path;
 use super::run::Seat;
-use super::{RunWriter, Store, content_hash, path, stream_error};
+use super::{RunWriter, Store, content_hash, stream_error};
 use crate::{CreateOptions, LogError, Recorder, RunHeader, RunResult, Sample};
 
 /// A recording of several runs: each has its arm in its own colour (deflections magnified), its TCP

@@ -2,9 +2,10 @@
 
 use rerun::EntityPath;
 
+use super::entity::path;
 use super::layout::Part;
 use super::run::Seat;
-use super::{path, scenery};
+use super::scenery;
 use crate::{GaugeQuantity, RunHeader, STRESS_VIEW};
 
 /// Lays out the robots with the result below, and the error and its causes beside them.

@@ -23,15 +23,14 @@ const MAX_DEPTH: usize = 64;
 const MAX_INSTANCES: usize = 100_000;
 
 pub(super) fn decode(bytes: &[u8], path: &Path) -> Result<TriangleMesh, MeshError> {
-    let malformed = |reason: String| MeshError::Malformed { path: path.to_owned(), format: "glTF", reason };
-    check_lengths(bytes).map_err(malformed)?;
+    check_lengths(bytes, path)?;
     let (json, blob) = if bytes.starts_with(b"glTF") {
-        let glb = gltf::Glb::from_slice(bytes).map_err(|error| malformed(error.to_string()))?;
+        let glb = gltf::Glb::from_slice(bytes).map_err(|error| malformed(path, error.to_string()))?;
         (glb.json, glb.bin)
     } else {
         (bytes.into(), None)
     };
-    let root = Root::from_slice(&json).map_err(|error| malformed(error.to_string()))?;
+    let root = Root::from_slice(&json).map_err(|error| malformed(path, error.to_string()))?;
     // Extensions of materials do not affect the triangles.
     let required = root.extensions_required.iter().find(|e| !e.starts_with("KHR_materials") && !e.contains("texture"));
     if let Some(extension) = required {
@@ -64,39 +63,44 @@ pub(super) fn decode(bytes: &[u8], path: &Path) -> Result<TriangleMesh, MeshErro
     Ok(mesh)
 }
 
+fn malformed(path: &Path, reason: impl Into<String>) -> MeshError {
+    MeshError::Malformed { path: path.to_owned(), format: "glTF", reason: reason.into() }
+}
+
 /// Checks the lengths in the header of a binary file, which must not exceed the file.
-fn check_lengths(bytes: &[u8]) -> Result<(), String> {
+fn check_lengths(bytes: &[u8], path: &Path) -> Result<(), MeshError> {
     if !bytes.starts_with(b"glTF") {
         return Ok(());
     }
     let word = |at: usize| bytes.get(at..at + 4)?.try_into().ok().map(u32::from_le_bytes).map(u64::from);
-    let (Some(total), Some(json)) = (word(8), word(12)) else { return Err("cut off within its header".to_owned()) };
+    let (Some(total), Some(json)) = (word(8), word(12)) else {
+        return Err(malformed(path, "cut off within its header"));
+    };
     if total > bytes.len() as u64 || json + 20 > total {
-        return Err(format!("cut off: {} bytes, expected {total}", bytes.len()));
+        return Err(malformed(path, format!("cut off: {} bytes, expected {total}", bytes.len())));
     }
     Ok(())
 }
 
 /// Reads the bytes of all buffers, from the file itself, separate files, or base64 text.
 fn read_buffers(root: &Root, mut blob: Option<Vec<u8>>, path: &Path) -> Result<Vec<Vec<u8>>, MeshError> {
-    let missing = |reason: String| MeshError::Malformed { path: path.to_owned(), format: "glTF", reason };
     let mut buffers = Vec::new();
     for buffer in &root.buffers {
         let data = match buffer.uri.as_deref() {
-            None => blob.take().ok_or_else(|| missing("its binary part is missing".to_owned()))?,
+            None => blob.take().ok_or_else(|| malformed(path, "its binary part is missing"))?,
             Some(uri) => match uri.strip_prefix("data:") {
                 Some(data) => data
                     .split_once(";base64,")
                     .and_then(|(_, text)| decode_base64(text))
-                    .ok_or_else(|| missing("a buffer is not base64 text".to_owned()))?,
+                    .ok_or_else(|| malformed(path, "a buffer is not base64 text"))?,
                 None => {
                     let file = path.with_file_name(uri);
                     if !file.is_file() {
-                        return Err(missing(format!("its buffer {uri:?} is not beside it")));
+                        return Err(malformed(path, format!("its buffer {uri:?} is not beside it")));
                     }
                     let large = std::fs::metadata(&file).is_ok_and(|meta| meta.len() > LARGEST);
                     if large {
-                        return Err(missing(format!("its buffer {uri:?} has more than {LARGEST} bytes")));
+                        return Err(malformed(path, format!("its buffer {uri:?} has more than {LARGEST} bytes")));
                     }
                     std::fs::read(&file).map_err(|source| MeshError::Io { path: file, source })?
                 }
@@ -142,7 +146,7 @@ struct Reader<'a> {
 
 impl<'a> Reader<'a> {
     fn malformed(&self, reason: impl Into<String>) -> MeshError {
-        MeshError::Malformed { path: self.path.to_owned(), format: "glTF", reason: reason.into() }
+        malformed(self.path, reason)
     }
 
     fn unsupported(&self, feature: impl Into<String>) -> MeshError {

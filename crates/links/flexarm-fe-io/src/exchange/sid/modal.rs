@@ -49,6 +49,48 @@ fn skew_of(c: &Vector3<f64>) -> Matrix3<f64> {
     c.cross_matrix() * -0.5
 }
 
+/// Matrices of the inertia forces.
+struct InertiaTerms {
+    Gr: DMatrix<f64>,
+    Ge: DMatrix<f64>,
+    Oe0: DMatrix<f64>,
+    /// First-order parts, by mode.
+    Ct1: Vec<DMatrix<f64>>,
+    Cr1: Vec<DMatrix<f64>>,
+    Oe1: Vec<DMatrix<f64>>,
+}
+
+impl InertiaTerms {
+    fn of(link: &ModalLink) -> Self {
+        let (n, G) = (link.coordinates(), link.geometric.as_ref());
+        let (mut Gr, mut Ge) = (DMatrix::zeros(3, 3 * n), DMatrix::zeros(n, 3 * n));
+        let mut Oe0 = DMatrix::zeros(n, 6);
+        let zeros = |columns| vec![DMatrix::zeros(n, columns); n];
+        let (mut Ct1, mut Cr1, mut Oe1) = (zeros(3), zeros(3), zeros(6));
+        for k in 0..n {
+            let gyro = (Matrix3::identity() * link.P[k].trace() - link.P[k].transpose()) * 2.0;
+            for (row, axis) in (0..9).map(|e| (e / 3, e % 3)) {
+                Gr[(row, GyroLayout::ComponentMajor.column(n, axis, k))] = gyro[(row, axis)];
+            }
+            for (value, at) in centrifugal(&link.P[k]).into_iter().zip(OE_COLUMNS) {
+                Oe0[(k, at)] = value;
+            }
+            for l in 0..n {
+                let cross = axial(&link.N[l * n + k]);
+                for axis in 0..3 {
+                    Ge[(k, GyroLayout::ComponentMajor.column(n, axis, l))] = 2.0 * cross[axis];
+                    Ct1[l][(k, axis)] = G.map_or(0.0, |G| G.acceleration[axis][(k, l)]);
+                    Cr1[l][(k, axis)] = cross[axis] + G.map_or(0.0, |G| G.angular[axis][(k, l)]);
+                }
+                for (i, value) in centrifugal(&link.N[k * n + l]).into_iter().enumerate() {
+                    Oe1[l][(k, OE_COLUMNS[i])] = value + G.map_or(0.0, |G| G.centrifugal[i][(k, l)]);
+                }
+            }
+        }
+        Self { Gr, Ge, Oe0, Ct1, Cr1, Oe1 }
+    }
+}
+
 /// Converts a modal link to Standard Input Data, SI; node 1 is A, the others follow in order.
 ///
 /// `De` is zero, because a modal link has no damping.
@@ -60,33 +102,7 @@ pub fn sid_of_modal_link(link: &ModalLink) -> Sid {
     let J1 = |P: &Matrix3<f64>| Matrix3::identity() * (2.0 * P.trace()) - (P + P.transpose());
     let square = |A: &DMatrix<f64>| SidMatrix { structure: 2, ..SidMatrix::constant(n, A) };
     let G = link.geometric.as_ref();
-
-    let (mut Gr, mut Ge) = (DMatrix::zeros(3, 3 * n), DMatrix::zeros(n, 3 * n));
-    let mut Oe0 = DMatrix::zeros(n, 6);
-    // By mode, like the first-order parts.
-    let zeros = |columns| vec![DMatrix::zeros(n, columns); n];
-    let (mut Ct1, mut Cr1, mut Oe1) = (zeros(3), zeros(3), zeros(6));
-    for k in 0..n {
-        let gyro = (Matrix3::identity() * link.P[k].trace() - link.P[k].transpose()) * 2.0;
-        for (row, axis) in (0..9).map(|e| (e / 3, e % 3)) {
-            Gr[(row, GyroLayout::ComponentMajor.column(n, axis, k))] = gyro[(row, axis)];
-        }
-        for (value, at) in centrifugal(&link.P[k]).into_iter().zip(OE_COLUMNS) {
-            Oe0[(k, at)] = value;
-        }
-        for l in 0..n {
-            let cross = axial(&link.N[l * n + k]);
-            for axis in 0..3 {
-                Ge[(k, GyroLayout::ComponentMajor.column(n, axis, l))] = 2.0 * cross[axis];
-                Ct1[l][(k, axis)] = G.map_or(0.0, |G| G.acceleration[axis][(k, l)]);
-                Cr1[l][(k, axis)] = cross[axis] + G.map_or(0.0, |G| G.angular[axis][(k, l)]);
-            }
-            for (i, value) in centrifugal(&link.N[k * n + l]).into_iter().enumerate() {
-                Oe1[l][(k, OE_COLUMNS[i])] = value + G.map_or(0.0, |G| G.centrifugal[i][(k, l)]);
-            }
-        }
-    }
-
+    let InertiaTerms { Gr, Ge, Oe0, Ct1, Cr1, Oe1 } = InertiaTerms::of(link);
     let first: Vec<_> = (0..n).map(|k| column(&link.C_t.column(k).into_owned())).collect();
     let turning: Vec<_> = link.P.iter().map(|P| six(&J1(P))).collect();
     let mut nodes = vec![node(1, &link.X_LA, &Matrix6xX::zeros(n), None)];

@@ -225,45 +225,55 @@ impl<'a, I: Iterator<Item = Line<'a>>> Cursor<'a, I> {
                 _ => entry(&mut matrix, &place, name, key, value)?,
             }
         }
-        // The kind of matrix determines most sizes.
-        let shape = (matrix.nrow, matrix.ncol);
-        let expected: &[(usize, usize)] = match name {
-            "origin" | "mdCM" => &[(3, 1)],
-            "phi" | "psi" => &[(3, nq)],
-            "AP" => &[(3, 3)],
-            "J" => &[(6, 1), (3, 3)],
-            "Ct" | "Cr" => &[(nq, 3)],
-            "Me" | "Ke" | "De" => &[(nq, nq)],
-            "Gr" => &[(3, 3 * nq)],
-            "Ge" => &[(nq, 3 * nq)],
-            "Oe" => &[(nq, 6)],
-            _ => &[],
-        };
-        if matrix.order > 1
-            || matrix.structure > 4
-            || matrix.nq > nq
-            || (!expected.is_empty() && !expected.contains(&shape))
-        {
-            let found = format!(
-                "{} x {}, order {}, structure {}, nq {}",
-                matrix.nrow, matrix.ncol, matrix.order, matrix.structure, matrix.nq
-            );
-            let sizes: Vec<_> = expected.iter().map(|(rows, columns)| format!("{rows} x {columns}")).collect();
-            let expected = format!("{}, order 0 or 1, structure 0 to 4, nq {nq}", sizes.join(" or "));
-            return Err(last.fail(ExchangeErrorKind::WrongSize, name, found, expected, ""));
-        }
-        let found = format!("{} x {}, structure {}", shape.0, shape.1, matrix.structure);
-        if matches!(matrix.structure, 1 | 2 | 4) && shape.0 != shape.1 {
-            let expected = "a square matrix for structure 1 (diagonal), 2 (symmetric) and 4 (unit matrix)";
-            return Err(last.fail(ExchangeErrorKind::WrongSize, name, found, expected, ""));
-        }
-        // Limits blocks of variable size, and many shape coordinates in a file of a few lines.
-        if shape.0 * shape.1 > self.most_entries {
-            let expected = format!("at most {} entries, by the size of the file", self.most_entries);
-            return Err(last.fail(ExchangeErrorKind::WrongSize, name, found, expected, ""));
-        }
+        check_sizes(&matrix, &last, name, nq, self.most_entries)?;
         Ok(matrix)
     }
+}
+
+/// Checks the sizes of a matrix, most of which its kind determines.
+fn check_sizes(
+    matrix: &SidMatrix,
+    end: &ErrorPosition<'_>,
+    name: &str,
+    nq: usize,
+    most_entries: usize,
+) -> Result<(), ExchangeError> {
+    let shape = (matrix.nrow, matrix.ncol);
+    let expected: &[(usize, usize)] = match name {
+        "origin" | "mdCM" => &[(3, 1)],
+        "phi" | "psi" => &[(3, nq)],
+        "AP" => &[(3, 3)],
+        "J" => &[(6, 1), (3, 3)],
+        "Ct" | "Cr" => &[(nq, 3)],
+        "Me" | "Ke" | "De" => &[(nq, nq)],
+        "Gr" => &[(3, 3 * nq)],
+        "Ge" => &[(nq, 3 * nq)],
+        "Oe" => &[(nq, 6)],
+        _ => &[],
+    };
+    let fail = |found: String, expected: String| Err(end.fail(ExchangeErrorKind::WrongSize, name, found, expected, ""));
+    if matrix.order > 1
+        || matrix.structure > 4
+        || matrix.nq > nq
+        || (!expected.is_empty() && !expected.contains(&shape))
+    {
+        let found = format!(
+            "{} x {}, order {}, structure {}, nq {}",
+            matrix.nrow, matrix.ncol, matrix.order, matrix.structure, matrix.nq
+        );
+        let sizes: Vec<_> = expected.iter().map(|(rows, columns)| format!("{rows} x {columns}")).collect();
+        return fail(found, format!("{}, order 0 or 1, structure 0 to 4, nq {nq}", sizes.join(" or ")));
+    }
+    let found = format!("{} x {}, structure {}", shape.0, shape.1, matrix.structure);
+    if matches!(matrix.structure, 1 | 2 | 4) && shape.0 != shape.1 {
+        let expected = "a square matrix for structure 1 (diagonal), 2 (symmetric) and 4 (unit matrix)";
+        return fail(found, expected.into());
+    }
+    // Limits blocks of variable size, and many shape coordinates in a file of a few lines.
+    if shape.0 * shape.1 > most_entries {
+        return fail(found, format!("at most {most_entries} entries, by the size of the file"));
+    }
+    Ok(())
 }
 
 /// Reads an entry `m0( i, j) = v` or `m1( i, k, j) = v`.

@@ -1,7 +1,7 @@
 //! Writes a [`Sid`] as text in the layout of FEMBS files.
 
 use super::{NODE_BLOCKS, Sid, SidMatrix};
-use crate::exchange::user_element::fortran;
+use crate::exchange::fortran::fortran;
 
 /// Writes a `.SID_FEM` file with 17 digits; it reads back bit for bit.
 ///

@@ -167,12 +167,8 @@ impl<'a> Deck<'a> {
                     .refuse(&src, found, "the whole deck in one file")
                     .help("put the text of that file in its place"))
             }
-            "ASSEMBLY" => {
-                self.scope = Scope::Assembly;
-                Ok(())
-            }
             "INSTANCE" => self.instance(card),
-            "ENDINSTANCE" => {
+            "ASSEMBLY" | "ENDINSTANCE" => {
                 self.scope = Scope::Assembly;
                 Ok(())
             }

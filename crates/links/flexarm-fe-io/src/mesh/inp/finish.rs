@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::deck::{Deck, Surface};
 use super::lines::squeezed;
+use super::properties::SectionCard;
 use super::sets::{Budget, Scope, unknown};
 use super::types::Class;
 use crate::mesh::error::{MeshError, MeshErrorKind as Kind};
@@ -74,39 +75,7 @@ impl Deck<'_> {
             let material = section
                 .find(&src, &self.materials, &self.material_by_name)?
                 .material(&src, &mut self.draft.warnings)?;
-            let region = self.draft.regions.len();
-            let mut theory: Option<BeamTheory> = None;
-            for element in elsets[set].iter().map(|element| *element as usize) {
-                let what = || format!("element {} of section {:?}", self.elements.ids[element], section.elset);
-                let card = &self.elements.groups[self.elements.cards[element] as usize];
-                let fault = |kind, found: String, expected: &str| src.error(kind, section.at, what(), found, expected);
-                if region_of[element] != NONE {
-                    let other = &self.draft.regions[region_of[element] as usize].name;
-                    return Err(fault(
-                        Kind::Region,
-                        format!("a second section; the first is {other:?}"),
-                        "one section",
-                    ));
-                }
-                match (card.class, section.beam.is_some()) {
-                    (Class::Solid(_), false) => {}
-                    (Class::Beam(of_card), true) if theory.is_none_or(|known| known == of_card) => {
-                        theory = Some(of_card);
-                    }
-                    (Class::Beam(_), true) => {
-                        return Err(fault(Kind::Unsupported, "both B31 and B33".into(), "one of them per section"));
-                    }
-                    _ => {
-                        let found = format!("{} with {}", card.type_name, section.title);
-                        return Err(fault(
-                            Kind::Unsupported,
-                            found,
-                            "solids with *SOLID SECTION, beams with *BEAM SECTION",
-                        ));
-                    }
-                }
-                region_of[element] = region as u32;
-            }
+            let theory = self.assign_section(section, &elsets[set], &mut region_of)?;
             if elsets[set].is_empty() {
                 self.draft.warnings.push(format!("section {:?} has no elements", section.elset));
                 continue;
@@ -115,7 +84,47 @@ impl Deck<'_> {
             self.draft.regions.push(Region { name: self.elsets.list[set].name.clone(), material, beam });
         }
 
-        // Elements without a section: by the set of the element card.
+        self.assign_cards(&mut region_of);
+        Ok(region_of)
+    }
+
+    /// Assigns the elements of a section to the next region; returns the theory of its beams.
+    fn assign_section(
+        &self,
+        section: &SectionCard,
+        elements: &[u32],
+        region_of: &mut [u32],
+    ) -> Result<Option<BeamTheory>, MeshError> {
+        let mut theory: Option<BeamTheory> = None;
+        for element in elements.iter().map(|element| *element as usize) {
+            let fault = |kind, found: String, expected: &str| {
+                let what = format!("element {} of section {:?}", self.elements.ids[element], section.elset);
+                Err(self.lines.src.error(kind, section.at, what, found, expected))
+            };
+            if region_of[element] != NONE {
+                let other = &self.draft.regions[region_of[element] as usize].name;
+                return fault(Kind::Region, format!("a second section; the first is {other:?}"), "one section");
+            }
+            let card = &self.elements.groups[self.elements.cards[element] as usize];
+            match (card.class, section.beam.is_some()) {
+                (Class::Solid(_), false) => {}
+                (Class::Beam(of_card), true) if theory.is_none_or(|known| known == of_card) => theory = Some(of_card),
+                (Class::Beam(_), true) => {
+                    return fault(Kind::Unsupported, "both B31 and B33".into(), "one of them per section");
+                }
+                _ => {
+                    let found = format!("{} with {}", card.type_name, section.title);
+                    let expected = "solids with *SOLID SECTION, beams with *BEAM SECTION";
+                    return fault(Kind::Unsupported, found, expected);
+                }
+            }
+            region_of[element] = self.draft.regions.len() as u32;
+        }
+        Ok(theory)
+    }
+
+    /// Assigns elements without a section to regions by the sets of their element cards.
+    fn assign_cards(&mut self, region_of: &mut [u32]) {
         let mut by_name = BTreeMap::new();
         for (element, region) in region_of.iter_mut().enumerate().filter(|(_, region)| **region == NONE) {
             let card = &self.elements.groups[self.elements.cards[element] as usize];
@@ -133,7 +142,6 @@ impl Deck<'_> {
                 listed(self.draft.regions.iter().skip(self.draft.regions.len() - by_name.len()).map(|r| &r.name));
             self.draft.warnings.push(format!("elements without a section, hence without a material: {regions}"));
         }
-        Ok(region_of)
     }
 
     /// Applies beam sections given by the caller.

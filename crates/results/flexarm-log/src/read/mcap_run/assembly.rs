@@ -43,6 +43,14 @@ impl Topic {
     }
 }
 
+/// A message that does not have the form of its topic.
+#[derive(Debug, thiserror::Error)]
+#[error("a message {topic:?} that cannot be read, at {log_time_ns} ns")]
+pub(super) struct UnreadableMessage {
+    topic: Topic,
+    log_time_ns: u64,
+}
+
 /// Assembles the messages of a sample.
 pub(super) struct Assembly {
     channels: HashMap<u16, Topic>,
@@ -108,12 +116,9 @@ impl Assembly {
         }
     }
 
-    /// Takes a record. Returns `Some` if it starts a new sample; the previous one is then in
+    /// Takes a record. Returns whether it starts a new sample; the previous one is then in
     /// [`Assembly::done`].
-    ///
-    /// # Errors
-    /// A description of the message that cannot be read.
-    pub(super) fn take(&mut self, record: &Record<'_>) -> Result<Option<()>, String> {
+    pub(super) fn take(&mut self, record: &Record<'_>) -> Result<bool, UnreadableMessage> {
         match record {
             Record::Channel(channel) => {
                 if let Some(topic) = self.known.get(&channel.topic) {
@@ -124,10 +129,10 @@ impl Assembly {
                 if self.channels.values().any(|topic| *topic == Topic::Elastic) {
                     self.channels.retain(|_, topic| !matches!(topic, Topic::Load(_) | Topic::Deflection(_)));
                 }
-                Ok(None)
+                Ok(false)
             }
             Record::Message { header, data } => {
-                let Some(&topic) = self.channels.get(&header.channel_id) else { return Ok(None) };
+                let Some(&topic) = self.channels.get(&header.channel_id) else { return Ok(false) };
                 let next = topic.is_of_a_sample() && self.sequence != Some(header.sequence);
                 // Frames precede the rest of their sample and have their own sequence numbers.
                 // Those of the last sample may follow it.
@@ -139,14 +144,14 @@ impl Assembly {
                     (self.sample.time_s, self.sample.step) = exact_time(time_ns, self.step_s);
                 }
                 if self.message(topic, data).is_none() {
-                    return Err(format!("a message {topic:?} that cannot be read, at {} ns", header.log_time));
+                    return Err(UnreadableMessage { topic, log_time_ns: header.log_time });
                 }
                 if topic.is_of_a_sample() {
                     self.seen.push(topic);
                 }
-                Ok(closed.then_some(()))
+                Ok(closed)
             }
-            _ => Ok(None),
+            _ => Ok(false),
         }
     }
 

@@ -95,12 +95,12 @@ impl FileContents {
             return if self.samples == 0 { Err(cut(broken)) } else { Ok(self.plain_header(path)) };
         };
         let damaged = |what: String| not_a_recording(path, what, "the description of a run");
-        let (mut header, run) = run_json::read(run).map_err(damaged)?;
+        let (mut header, run) = run_json::read(run).map_err(|error| damaged(error.to_string()))?;
         let mut missing = Vec::new();
         header.urdf = String::from_utf8_lossy(self.urdf.as_deref().unwrap_or_default()).into_owned();
         match &self.mesh_block {
             Some(block) => {
-                let what = |what| damaged(format!("{}: {what}", meshes::FILE));
+                let what = |error| damaged(format!("{}: {error}", meshes::FILE));
                 header.meshes = meshes::read(block, &run.meshes).map_err(what)?;
             }
             None if run.meshes.is_empty() => {}

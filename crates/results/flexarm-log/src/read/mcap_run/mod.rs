@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 
 use mcap::records::Record;
 
-use self::assembly::{Assembly, Topic};
+use self::assembly::{Assembly, Topic, UnreadableMessage};
 use self::found::FileContents;
 use self::walk::{Flow, walk};
 use super::{broken_end, not_a_recording};
@@ -48,11 +48,11 @@ impl McapRun {
         let mut assembly = Assembly::new(&header, epoch_ns);
         let mut topics = Vec::new();
         walk(path, &mut |record| {
-            let done = assembly.take(&record).map_err(|what| not_a_recording(path, what, "messages of flexarm"))?;
-            if done.is_some() {
+            let done = assembly.take(&record).map_err(|error| not_of_flexarm(path, &error))?;
+            if done {
                 topics.clone_from(&assembly.done_topics);
             }
-            Ok(if done.is_some() { Flow::Stop } else { Flow::On })
+            Ok(if done { Flow::Stop } else { Flow::On })
         })?;
         if topics.is_empty() {
             assembly.close();
@@ -77,6 +77,10 @@ impl McapRun {
         let path = path.to_owned();
         Ok(Self { path, header, epoch_ns, topics, files_of_header, missing, warnings: Vec::new() })
     }
+}
+
+fn not_of_flexarm(path: &Path, error: &UnreadableMessage) -> LogError {
+    not_a_recording(path, error.to_string(), "messages of flexarm")
 }
 
 impl RunSource for McapRun {
@@ -108,8 +112,8 @@ impl RunSource for McapRun {
             Ok(())
         };
         let broken = walk(path, &mut |record| {
-            let done = assembly.take(&record).map_err(|what| not_a_recording(path, what, "messages of flexarm"))?;
-            if done.is_some() {
+            let done = assembly.take(&record).map_err(|error| not_of_flexarm(path, &error))?;
+            if done {
                 give(&assembly)?;
             }
             if !matches!(record, Record::Message { .. }) {

@@ -40,7 +40,7 @@ pub(super) fn walk(
         let event = match caught(move || from.next_event()) {
             Ok(Some(event)) => event,
             Ok(None) => break,
-            Err(cause) => return Ok(Some(cause)),
+            Err(panic) => return Ok(Some(panic.to_string())),
         };
         match event {
             Ok(LinearReadEvent::ReadRequest(wanted)) => {
@@ -57,7 +57,7 @@ pub(super) fn walk(
                 let record = match caught(move || mcap::parse_record(opcode, data)) {
                     Ok(Ok(record)) => record,
                     Ok(Err(error)) => return Ok(Some(in_words(&error))),
-                    Err(cause) => return Ok(Some(cause)),
+                    Err(panic) => return Ok(Some(panic.to_string())),
                 };
                 if take(record)? == Flow::Stop {
                     return Ok(None);

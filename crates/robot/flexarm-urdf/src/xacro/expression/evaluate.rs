@@ -5,7 +5,7 @@ use std::rc::Rc;
 use super::super::scope::Table;
 use super::arithmetic::{binary, compare, unary};
 use super::functions::named_value;
-use super::methods::{index, slice};
+use super::methods::{elements, index, slice, unique};
 use super::parse::{Clause, Expr};
 use super::value::{Value, lookup};
 use super::{ExpressionError, Interpreter, Scope};
@@ -34,27 +34,8 @@ impl Interpreter<'_> {
                 Value::Dict(Rc::new(unique(pairs)))
             }
             Expr::Unary(sign, operand) => return unary(sign, &self.evaluate(operand, scope)?),
-            Expr::Binary(sign, left, right) => {
-                let (left, right) = (self.evaluate(left, scope)?, self.evaluate(right, scope)?);
-                self.charge_whole(&left)?;
-                self.charge_whole(&right)?;
-                let value = binary(sign, &left, &right, &mut |size| self.charge(size))?;
-                self.charge(value.size())?;
-                value
-            }
-            Expr::Compare(first, rest) => {
-                let mut left = self.evaluate(first, scope)?;
-                for (sign, right) in rest {
-                    let right = self.evaluate(right, scope)?;
-                    self.charge_whole(&left)?;
-                    self.charge_whole(&right)?;
-                    if !compare(sign, &left, &right)? {
-                        return Ok(Value::Bool(false));
-                    }
-                    left = right;
-                }
-                Value::Bool(true)
-            }
+            Expr::Binary(sign, left, right) => return self.operation(sign, left, right, scope),
+            Expr::Compare(first, rest) => Value::Bool(self.comparison(first, rest, scope)?),
             Expr::And(terms) => return self.until(terms, scope, false),
             Expr::Or(terms) => return self.until(terms, scope, true),
             Expr::If { condition, then, otherwise } => {
@@ -72,27 +53,56 @@ impl Interpreter<'_> {
                 self.charge_whole(&key)?;
                 return index(&owner, &key);
             }
-            Expr::Slice(owner, parts) => {
-                let owner = self.evaluate(owner, scope)?;
-                let mut bounds = [None, None, None];
-                for (bound, part) in bounds.iter_mut().zip(parts) {
-                    let value = part.as_ref().map(|part| self.evaluate(part, scope)).transpose()?;
-                    *bound = match value {
-                        None | Some(Value::None) => None,
-                        Some(value) => {
-                            Some(value.as_int().ok_or_else(|| ExpressionError::new("a slice needs whole numbers"))?)
-                        }
-                    };
-                }
-                self.charge(owner.size())?;
-                return slice(&owner, bounds);
-            }
+            Expr::Slice(owner, parts) => return self.slice(owner, parts, scope),
             Expr::Comprehension { item, clauses } => {
                 let mut items = Vec::new();
                 self.comprehend(item, clauses, scope, &mut items)?;
                 Value::list(items)
             }
         })
+    }
+
+    fn operation(&mut self, sign: &str, left: &Expr, right: &Expr, scope: &Scope) -> Result<Value, ExpressionError> {
+        let (left, right) = (self.evaluate(left, scope)?, self.evaluate(right, scope)?);
+        self.charge_whole(&left)?;
+        self.charge_whole(&right)?;
+        let value = binary(sign, &left, &right, &mut |size| self.charge(size))?;
+        self.charge(value.size())?;
+        Ok(value)
+    }
+
+    /// Whether each of the comparisons `a < b <= c` holds; those after the first failure are not
+    /// evaluated.
+    fn comparison(
+        &mut self,
+        first: &Expr,
+        rest: &[(&'static str, Expr)],
+        scope: &Scope,
+    ) -> Result<bool, ExpressionError> {
+        let mut left = self.evaluate(first, scope)?;
+        for (sign, right) in rest {
+            let right = self.evaluate(right, scope)?;
+            self.charge_whole(&left)?;
+            self.charge_whole(&right)?;
+            if !compare(sign, &left, &right)? {
+                return Ok(false);
+            }
+            left = right;
+        }
+        Ok(true)
+    }
+
+    fn slice(&mut self, owner: &Expr, parts: &[Option<Box<Expr>>; 3], scope: &Scope) -> Result<Value, ExpressionError> {
+        let owner = self.evaluate(owner, scope)?;
+        let mut bounds = [None, None, None];
+        for (bound, part) in bounds.iter_mut().zip(parts) {
+            *bound = match part.as_ref().map(|part| self.evaluate(part, scope)).transpose()? {
+                None | Some(Value::None) => None,
+                Some(value) => Some(value.as_int().ok_or_else(|| ExpressionError::new("a slice needs whole numbers"))?),
+            };
+        }
+        self.charge(owner.size())?;
+        slice(&owner, bounds)
     }
 
     /// Charges a value with all its elements before it is printed or compared: lists may share
@@ -245,26 +255,4 @@ fn missing_key(items: &[(Value, Value)], name: &str) -> ExpressionError {
         Some(meant) => trouble.help(format!("did you mean {meant:?}?")),
         None => trouble.help(format!("its keys are {}", super::shortened(&keys.join(", ")))),
     }
-}
-
-/// Elements that a loop over the value visits.
-pub(super) fn elements(value: &Value) -> Result<Vec<Value>, ExpressionError> {
-    Ok(match value {
-        Value::List(items) | Value::Tuple(items) => items.to_vec(),
-        Value::Dict(items) => items.iter().map(|(k, _)| k.clone()).collect(),
-        Value::Str(text) => text.chars().map(|c| Value::text(c.to_string())).collect(),
-        other => return Err(ExpressionError::new(format!("a {} has no elements", other.kind()))),
-    })
-}
-
-/// Keeps the last value of each key, at the position of the first one.
-pub(crate) fn unique(pairs: Vec<(Value, Value)>) -> Vec<(Value, Value)> {
-    let mut kept: Vec<(Value, Value)> = Vec::with_capacity(pairs.len());
-    for (key, value) in pairs {
-        match kept.iter_mut().find(|(k, _)| k.equals(&key)) {
-            Some(slot) => slot.1 = value,
-            None => kept.push((key, value)),
-        }
-    }
-    kept
 }

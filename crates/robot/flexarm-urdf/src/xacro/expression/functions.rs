@@ -4,7 +4,7 @@ use std::f64::consts;
 use std::rc::Rc;
 
 use super::arithmetic::{binary, floor_division};
-use super::evaluate::{elements, unique};
+use super::methods::{elements, unique};
 use super::value::{Value, float_of, float_repr, int_of};
 use super::{ExpressionError, Interpreter, Scope};
 
@@ -190,13 +190,7 @@ fn plain(name: &str, arguments: &[Value]) -> Result<Value, ExpressionError> {
             let (a, b) = (a.as_float().ok_or_else(wrong)?, b.as_float().ok_or_else(wrong)?);
             Value::Bool(a == b || (a - b).abs() <= 1e-9 * a.abs().max(b.abs()))
         }
-        ("gcd", [a, b]) => {
-            let (mut a, mut b) = (a.as_int().ok_or_else(wrong)?, b.as_int().ok_or_else(wrong)?);
-            while b != 0 {
-                (a, b) = (b, a.wrapping_rem(b));
-            }
-            Value::Int(a.saturating_abs())
-        }
+        ("gcd", [a, b]) => Value::Int(gcd(a.as_int().ok_or_else(wrong)?, b.as_int().ok_or_else(wrong)?)),
         ("abs", [Value::Float(x)]) => Value::Float(x.abs()),
         ("abs", [x]) => Value::Int(x.as_int().and_then(i128::checked_abs).ok_or_else(wrong)?),
         ("round", [x]) => rounded(x, f64::round_ties_even).ok_or_else(wrong)?,
@@ -222,22 +216,30 @@ fn plain(name: &str, arguments: &[Value]) -> Result<Value, ExpressionError> {
             let code = code.as_int().and_then(|i| u32::try_from(i).ok()).and_then(char::from_u32);
             Value::text(code.ok_or_else(wrong)?.to_string())
         }
-        ("divmod", [a, b]) => match (a.as_int(), b.as_int()) {
-            (Some(_), Some(_)) => {
-                let part = |sign| binary(sign, a, b, &mut |_| Ok(()));
-                Value::Tuple(Rc::new(vec![part("//")?, part("%")?]))
-            }
-            _ => {
-                let (a, b) = (a.as_float().ok_or_else(wrong)?, b.as_float().ok_or_else(wrong)?);
-                if b == 0.0 {
-                    return Err(ExpressionError::new("division by zero"));
-                }
-                let (quotient, remainder) = floor_division(a, b);
-                Value::Tuple(Rc::new(vec![Value::Float(quotient), Value::Float(remainder)]))
-            }
-        },
+        ("divmod", [a, b]) => Value::Tuple(Rc::new(divmod(a, b)?.ok_or_else(wrong)?.to_vec())),
         _ => return of_elements(name, arguments).unwrap_or_else(|| Err(wrong())),
     })
+}
+
+fn gcd(mut a: i128, mut b: i128) -> i128 {
+    while b != 0 {
+        (a, b) = (b, a.wrapping_rem(b));
+    }
+    a.saturating_abs()
+}
+
+/// Quotient and remainder; `None` unless both arguments are numbers.
+fn divmod(a: &Value, b: &Value) -> Result<Option<[Value; 2]>, ExpressionError> {
+    if a.as_int().is_some() && b.as_int().is_some() {
+        let part = |sign| binary(sign, a, b, &mut |_| Ok(()));
+        return Ok(Some([part("//")?, part("%")?]));
+    }
+    let (Some(a), Some(b)) = (a.as_float(), b.as_float()) else { return Ok(None) };
+    if b == 0.0 {
+        return Err(ExpressionError::new("division by zero"));
+    }
+    let (quotient, remainder) = floor_division(a, b);
+    Ok(Some([quotient, remainder].map(Value::Float)))
 }
 
 /// Functions of sequences; `None` if there is no such function.

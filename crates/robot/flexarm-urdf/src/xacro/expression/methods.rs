@@ -108,7 +108,7 @@ fn of_text(text: &str, name: &str, arguments: &[Value]) -> Result<Option<Value>,
     let set = |chars: &str| chars.chars().collect::<Vec<char>>();
     Ok(Some(match (name, &texts[..]) {
         ("join", []) if arguments.len() == 1 => {
-            let parts = super::evaluate::elements(&arguments[0])?;
+            let parts = elements(&arguments[0])?;
             let parts: Option<Vec<_>> =
                 parts.iter().map(|p| if let Value::Str(s) = p { Some(s.to_string()) } else { None }).collect();
             Value::text(parts.ok_or_else(|| ExpressionError::new("join() takes texts"))?.join(text))
@@ -287,4 +287,26 @@ fn formatted(value: &Value, spec: &str) -> Result<String, ExpressionError> {
         (">", _) | (_, true) => format!("{text:>width$}"),
         _ => format!("{text:<width$}"),
     })
+}
+
+/// Elements that a loop over the value visits.
+pub(super) fn elements(value: &Value) -> Result<Vec<Value>, ExpressionError> {
+    Ok(match value {
+        Value::List(items) | Value::Tuple(items) => items.to_vec(),
+        Value::Dict(items) => items.iter().map(|(k, _)| k.clone()).collect(),
+        Value::Str(text) => text.chars().map(|c| Value::text(c.to_string())).collect(),
+        other => return Err(ExpressionError::new(format!("a {} has no elements", other.kind()))),
+    })
+}
+
+/// Keeps the last value of each key, at the position of the first one.
+pub(crate) fn unique(pairs: Vec<(Value, Value)>) -> Vec<(Value, Value)> {
+    let mut kept: Vec<(Value, Value)> = Vec::with_capacity(pairs.len());
+    for (key, value) in pairs {
+        match kept.iter_mut().find(|(k, _)| k.equals(&key)) {
+            Some(slot) => slot.1 = value,
+            None => kept.push((key, value)),
+        }
+    }
+    kept
 }

@@ -13,8 +13,8 @@ mod parse;
 mod token;
 pub(crate) mod value;
 
-pub(crate) use evaluate::unique;
 pub(crate) use functions::is_built_in;
+pub(crate) use methods::unique;
 pub(crate) use parse::KEYWORDS;
 use value::Value;
 

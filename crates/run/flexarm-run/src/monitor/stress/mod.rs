@@ -14,7 +14,7 @@ use std::sync::Arc;
 use flexarm_draw::mesh_picture::{Image, StressPicture, stress_sheet};
 use flexarm_draw::palette::magnitude;
 use flexarm_fem::chain::Chain;
-use flexarm_fem::stress::{StressFields, StressMap, inertia_loads, von_mises};
+use flexarm_fem::stress::{StressError, StressFields, StressMap, inertia_loads, von_mises};
 use flexarm_fem::{FemError, ReducedLink, RigidPart};
 use flexarm_flexlink::{FlexibleSpan, LinkForm};
 use flexarm_kinematics::{Data, Frame, Pose, State, inverse_dynamics};
@@ -310,12 +310,13 @@ fn placed(robot: &Robot, links: &[LinkStress]) -> Result<Vec<PlacedGauge>, Error
         let place = || {
             let seat = fields.nearest_seat(&gauge.at)?;
             let strain = gauge.grid.map(|(direction, angle)| fields.strain_by_stress(seat, &direction, angle));
-            Ok::<_, String>((seat, strain.transpose()?))
+            Ok::<_, StressError>((seat, strain.transpose()?))
         };
         let entry = if gauge.grid.is_some() { "strain_gauge" } else { "stress_point" };
-        let fail =
-            |what: String| Error::File { path: robot.path.clone(), what: format!("{entry} {:?}: {what}", gauge.name) };
-        let (seat, strain) = place().map_err(fail)?;
+        let (seat, strain) = place().map_err(|error| Error::File {
+            path: robot.path.clone(),
+            what: format!("{entry} {:?}: {error}", gauge.name),
+        })?;
         gauges.push(PlacedGauge { name: gauge.name.clone(), link: number, seat, strain });
     }
     Ok(gauges)
@@ -330,14 +331,11 @@ fn fields_and_map(
     elements: &[&ElasticElement],
     modelling: &Modelling,
 ) -> Result<Option<(Arc<StressFields>, StressMap)>, Error> {
-    let fail = |path: &Path| {
-        let path = path.to_owned();
-        move |what: String| Error::File { path, what }
-    };
     let (fields, path) = match (&link.stress, &link.beam, &span.lumped) {
         (Some(StressSource::File { path, fields }), ..) => (fields.clone(), path),
         (Some(StressSource::Beam), Some(beam), Some(lumped)) => {
-            let named = |error: FemError| fail(&robot.path)(format!("stress of link {:?}: {error}", span.link));
+            let named =
+                |error: FemError| unusable(&robot.path, format_args!("stress of link {:?}: {error}", span.link));
             (Arc::new(beam.stress_fields(&lumped.joints, &lumped.parts).map_err(named)?), &robot.path)
         }
         _ => return Ok(None),
@@ -353,7 +351,11 @@ fn fields_and_map(
             _ => return Ok(None),
         },
     };
-    Ok(Some((fields, map.map_err(fail(path))?)))
+    Ok(Some((fields, map.map_err(|error| unusable(path, error))?)))
+}
+
+fn unusable(path: &Path, what: impl ToString) -> Error {
+    Error::File { path: path.to_owned(), what: what.to_string() }
 }
 
 /// Returns the parts without the bodies attached to the link, whose loads act at its interfaces.
