@@ -362,6 +362,14 @@ pub(crate) fn damping_of(entry: Option<&Spanned<DampingEntry>>, source: &Source)
     Ok(damping)
 }
 
+fn theory_of(beam: &BeamEntry) -> Result<BeamTheory, String> {
+    match beam.theory.as_deref() {
+        None | Some("timoshenko") => Ok(BeamTheory::Timoshenko),
+        Some("euler-bernoulli") => Ok(BeamTheory::EulerBernoulli),
+        Some(other) => Err(format!("theory {other:?} is not known; use \"timoshenko\" or \"euler-bernoulli\"")),
+    }
+}
+
 fn beam_link(
     name: &str,
     entry: &Spanned<BeamEntry>,
@@ -377,13 +385,7 @@ fn beam_link(
         let doubts = material.doubts(&UnitSystem::SI).into_iter();
         warnings.extend(doubts.map(|doubt| format!("link {name:?}: {doubt}")));
     }
-    let theory = match beam.theory.as_deref() {
-        None | Some("timoshenko") => BeamTheory::Timoshenko,
-        Some("euler-bernoulli") => BeamTheory::EulerBernoulli,
-        Some(other) => {
-            return Err(fail(format!("theory {other:?} is not known; use \"timoshenko\" or \"euler-bernoulli\"")));
-        }
-    };
+    let theory = theory_of(beam).map_err(fail)?;
     let [from, to] = beam.ends.map_or([Vector3::zeros(), X_LB.translation.vector], |ends| ends.map(Vector3::from));
     let axis = to - from;
     let length = axis.norm();
