@@ -2,13 +2,14 @@
 
 use std::collections::HashMap;
 use std::path::Path;
+use std::sync::Arc;
 
 use flexarm_kinematics::{Data, Joint, Link, Mechanism, Model, forward_kinematics};
 use flexarm_settings::Setting;
 use flexarm_urdf::{Geometry, ReadOptions, TriangleMesh, UrdfError, UrdfRobot, Visual, read_urdf};
 use nalgebra::{DVector, Vector3};
 
-use super::beams::{self, BeamSection};
+use super::beams::{self, BeamSection, NoSection};
 use super::chain::{self, Chain};
 use super::gears::{self, GearClass};
 use super::loads::{self, Cube, Workspace};
@@ -26,7 +27,7 @@ pub(crate) struct DraftLink {
     pub(crate) distal: String,
     pub(crate) length: f64,
     pub(crate) mass: Option<f64>,
-    pub(crate) section: Result<BeamSection, String>,
+    pub(crate) section: Result<BeamSection, NoSection>,
     /// Whether the link has the mass of a uniform beam, because its own inertia cannot be split.
     pub(crate) uniform: bool,
     /// Whether its shapes are the collision shapes.
@@ -79,14 +80,7 @@ impl Draft {
         if let Some(found) = options.payload_kg.filter(|kg| !(kg.is_finite() && *kg >= 0.0)) {
             return Err(NewError::Payload { found }.into());
         }
-        let (mut urdf, mut waived) = read(path, &options.urdf)?;
-        let placeholders = placeholders(&urdf.mechanism);
-        let mut discarded = Vec::new();
-        if options.urdf.inertia_from_mesh.is_some() && !placeholders.is_empty() {
-            discarded = placeholders;
-            let read_options = ReadOptions { discard: discarded.clone(), ..options.urdf.clone() };
-            (urdf, waived) = read(path, &read_options)?;
-        }
+        let Description { urdf, waived, discarded } = Description::read(path, &options.urdf)?;
         let mechanism = &urdf.mechanism;
         let chain = chain::find(mechanism, options)?;
         let name = if mechanism.name.trim().is_empty() { "robot".to_owned() } else { mechanism.name.clone() };
@@ -100,14 +94,7 @@ impl Draft {
             let links = mechanism.links.iter().filter(|l| l.inertia.is_none_or(|i| i.mass <= 0.0)).count();
             return Err(NewError::NoMass { links }.into());
         }
-        let held: Vec<(String, f64, &'static str)> = chain
-            .held
-            .iter()
-            .map(|&(k, why)| {
-                let joint = &mechanism.joints[k];
-                (joint.name.clone(), 0.0f64.clamp(joint.limits.lower, joint.limits.upper), why)
-            })
-            .collect();
+        let held = held_joints(mechanism, &chain);
         let ranges = ranges(&bare, mechanism, &chain, &held);
         let payload_known = options.payload_kg.is_some();
         let payload = match options.payload_kg {
@@ -169,13 +156,33 @@ impl Draft {
             let Err(_) = loads(self, &[&self.links[k]]) else { continue };
             self.links[k].uniform = true;
             if let Err(error) = loads(self, &[&self.links[k]]) {
-                let reason = error.to_string();
-                self.links[k].section = Err(format!("the beam cannot be used: {reason}"));
+                self.links[k].section = Err(NoSection::Refused(Arc::new(error)));
             }
         }
         self.assumptions = assumptions(self);
         self.questions = questions(self);
         Ok(())
+    }
+}
+
+/// The description as read, with the links whose inertia is doubtful.
+struct Description {
+    urdf: UrdfRobot,
+    /// Links with impossible moments of inertia, used unchanged.
+    waived: Vec<String>,
+    /// Links with placeholder masses, which are estimated instead.
+    discarded: Vec<String>,
+}
+
+impl Description {
+    fn read(path: &Path, options: &ReadOptions) -> Result<Self, Error> {
+        let (urdf, waived) = read(path, options)?;
+        let discarded = placeholders(&urdf.mechanism);
+        if options.inertia_from_mesh.is_none() || discarded.is_empty() {
+            return Ok(Self { urdf, waived, discarded: Vec::new() });
+        }
+        let (urdf, waived) = read(path, &ReadOptions { discard: discarded.clone(), ..options.clone() })?;
+        Ok(Self { urdf, waived, discarded })
     }
 }
 
@@ -231,6 +238,15 @@ fn mass_after(mechanism: &Mechanism, chain: &Chain) -> f64 {
         false
     };
     mechanism.links.iter().filter(|l| is_moved(&l.name)).filter_map(|l| l.inertia).map(|i| i.mass).sum()
+}
+
+/// Returns the joints that are not part of the arm: name, position and reason.
+fn held_joints(mechanism: &Mechanism, chain: &Chain) -> Vec<(String, f64, &'static str)> {
+    let held = |&(k, why): &(usize, &'static str)| {
+        let joint = &mechanism.joints[k];
+        (joint.name.clone(), 0.0f64.clamp(joint.limits.lower, joint.limits.upper), why)
+    };
+    chain.held.iter().map(held).collect()
 }
 
 /// Returns the range of each coordinate to be sampled; held ones have a single value.
@@ -400,29 +416,7 @@ fn assumptions(draft: &Draft) -> Vec<Assumption> {
         );
         list.push(assumption("payload", text, &format!("{} KG, or payload in robot.toml", Setting::Payload)));
     }
-    for joint in &draft.joints {
-        let name = format!("joint {:?}", joint.joint.name);
-        if joint.speed_assumed {
-            let unit = if joint.joint.kind.slides() { "m/s" } else { "rad/s" };
-            let text = format!("its speed limit is unknown; the sample motion uses {} {unit}", joint.speed);
-            list.push(assumption(&name, text, "add it to the description, or to [limits] of motion.toml"));
-        }
-        if let Some(gear) = &joint.gear {
-            let of = match joint.effort_fault {
-                None => format!("its effort limit {:.4} N m", joint.joint.limits.effort),
-                Some(why) => format!(
-                    "the required torque, {:.0} N m against gravity and {:.0} N m in motion, because its effort \
-                     limit {why}",
-                    joint.weight, joint.needed
-                ),
-            };
-            let text = format!(
-                "its reducer has {:.3e} N m/rad ({:.1e} to {:.1e}), typical of a rated torque of {:.0} N m, from {of}",
-                gear.stiffness, gear.low, gear.high, joint.rated
-            );
-            list.push(assumption(&name, text, "ask the manufacturer for its torsional stiffness, or measure it"));
-        }
-    }
+    draft.joints.iter().for_each(|joint| of_joint(joint, &mut list));
     for link in &draft.links {
         if let Ok(section) = &link.section {
             let text = format!(
@@ -438,6 +432,31 @@ fn assumptions(draft: &Draft) -> Vec<Assumption> {
         list.push(assumption("the sample motion", note.clone(), "check the effort limits of the description"));
     }
     list
+}
+
+/// Adds the assumptions about speed limit and reducer of a joint.
+fn of_joint(joint: &DraftJoint, list: &mut Vec<Assumption>) {
+    let name = format!("joint {:?}", joint.joint.name);
+    if joint.speed_assumed {
+        let unit = if joint.joint.kind.slides() { "m/s" } else { "rad/s" };
+        let text = format!("its speed limit is unknown; the sample motion uses {} {unit}", joint.speed);
+        list.push(assumption(&name, text, "add it to the description, or to [limits] of motion.toml"));
+    }
+    if let Some(gear) = &joint.gear {
+        let of = match joint.effort_fault {
+            None => format!("its effort limit {:.4} N m", joint.joint.limits.effort),
+            Some(why) => format!(
+                "the required torque, {:.0} N m against gravity and {:.0} N m in motion, because its effort \
+                 limit {why}",
+                joint.weight, joint.needed
+            ),
+        };
+        let text = format!(
+            "its reducer has {:.3e} N m/rad ({:.1e} to {:.1e}), typical of a rated torque of {:.0} N m, from {of}",
+            gear.stiffness, gear.low, gear.high, joint.rated
+        );
+        list.push(assumption(&name, text, "ask the manufacturer for its torsional stiffness, or measure it"));
+    }
 }
 
 /// Adds the assumptions about masses that are implausible for this arm.

@@ -253,7 +253,7 @@ fn of_link(link: &super::draft::DraftLink) -> NewLink {
     let (name, distal) = (link.link.clone(), link.distal.clone());
     let plain = NewLink { name, distal, length: link.length, mass: link.mass, ..NewLink::default() };
     match &link.section {
-        Err(reason) => NewLink { reason: Some(reason.clone()), ..plain },
+        Err(reason) => NewLink { reason: Some(reason.to_string()), ..plain },
         Ok(s) => NewLink {
             section: Some(s.section),
             width: Some(s.width),

@@ -59,6 +59,10 @@ pub(crate) fn robot_file(draft: &Draft, placed: &Placed, beams: &[&DraftLink]) -
     let mut t = String::new();
     // Writing to a String cannot fail.
     let _ = head(&mut t, draft, placed);
+    let _ = efforts(&mut t, draft);
+    let _ = masses(&mut t, draft);
+    let _ = tool(&mut t, draft);
+    let _ = held(&mut t, draft);
     let _ = links(&mut t, draft, beams);
     let _ = drives(&mut t, draft);
     t
@@ -89,7 +93,11 @@ fn head(t: &mut String, draft: &Draft, placed: &Placed) -> std::fmt::Result {
         writeln!(t, "\n# Physically impossible moments of inertia, used unchanged: correct them in the description.")?;
         writeln!(t, "waive_inertia = [{}]", names.join(", "))?;
     }
-    efforts(t, draft)?;
+    Ok(())
+}
+
+/// Writes the masses that are ignored, and the estimate that replaces them.
+fn masses(t: &mut String, draft: &Draft) -> std::fmt::Result {
     if !draft.discarded.is_empty() {
         let names: Vec<String> = draft.discarded.iter().map(|n| quoted(n)).collect();
         writeln!(t, "\n# The mass of these links is a placeholder, the same for all: it is ignored.")?;
@@ -115,6 +123,11 @@ fn head(t: &mut String, draft: &Draft, placed: &Placed) -> std::fmt::Result {
             }
         }
     }
+    Ok(())
+}
+
+/// Writes TCP and payload.
+fn tool(t: &mut String, draft: &Draft) -> std::fmt::Result {
     writeln!(
         t,
         "\n# The TCP, in the frame of link {}. Move it to the working point of the tool with xyz (m) and rpy (rad).",
@@ -144,6 +157,11 @@ fn head(t: &mut String, draft: &Draft, placed: &Placed) -> std::fmt::Result {
             inline(&quoted(&draft.chain.tool))
         )?;
     }
+    Ok(())
+}
+
+/// Writes the joints that are held.
+fn held(t: &mut String, draft: &Draft) -> std::fmt::Result {
     if !draft.held.is_empty() {
         writeln!(t, "\n# Positions of the joints that are not part of the arm (rad, m).\n[hold]")?;
         for (joint, at, why) in &draft.held {
@@ -182,45 +200,7 @@ fn links(t: &mut String, draft: &Draft, beams: &[&DraftLink]) -> std::fmt::Resul
     writeln!(t, "# mass. ASSUMED: the material, and all of the mass in the wall: an upper estimate of the stiffness.")?;
     for link in beams {
         let Ok(s) = &link.section else { continue };
-        writeln!(
-            t,
-            "\n# {:.0} mm long, {:.2} kg: a {}.",
-            1e3 * link.length,
-            link.mass.unwrap_or(0.0),
-            section_words(s)
-        )?;
-        if s.ends.is_some() {
-            writeln!(
-                t,
-                "# The frames of the description are not along it: ends are those of its geometry between the \
-                 joint axes."
-            )?;
-        }
-        if link.of_collisions {
-            writeln!(t, "# The outline is that of the collision geometry, which is often larger.")?;
-        }
-        if s.taper > 1.25 {
-            writeln!(
-                t,
-                "# Its width varies by a factor of {:.1}: this is the uniform beam with the same tip deflection \
-                 under a force.",
-                s.taper
-            )?;
-        }
-        if s.open > 0.0 {
-            writeln!(
-                t,
-                "# {:.0} % of the sections of the mesh are not closed: their convex hull is used.",
-                100.0 * s.open
-            )?;
-        }
-        if let Some(half) = s.wall_of_half {
-            writeln!(
-                t,
-                "# If only half of the mass is in the wall (the rest is motors and gears): wall = {}",
-                float(half, 5)
-            )?;
-        }
+        section_notes(t, link, s)?;
         writeln!(t, "[[flexible_link]]\nlink = {}\ndistal = {}", quoted(&link.link), quoted(&link.distal))?;
         writeln!(t, "damping = {{ modal = 0.03 }}   # ASSUMED: 3 % of critical, typical of jointed structures")?;
         let mut beam = format!("section = {:?}, {}, material = {:?}", s.section, beam_keys(s, s.wall), s.material);
@@ -239,9 +219,47 @@ fn links(t: &mut String, draft: &Draft, beams: &[&DraftLink]) -> std::fmt::Resul
     if !others.is_empty() {
         writeln!(t, "\n# Rigid, because no section could be proposed:")?;
         for link in others {
-            let reason = link.section.as_ref().err().map(|r| inline(r)).unwrap_or_default();
+            let reason = link.section.as_ref().err().map(|r| inline(&r.to_string())).unwrap_or_default();
             writeln!(t, "#   {}: {reason}", inline(&link.link))?;
         }
+    }
+    Ok(())
+}
+
+/// Writes size and mass of a link, and how far its section can be trusted.
+fn section_notes(t: &mut String, link: &DraftLink, s: &BeamSection) -> std::fmt::Result {
+    writeln!(t, "\n# {:.0} mm long, {:.2} kg: a {}.", 1e3 * link.length, link.mass.unwrap_or(0.0), section_words(s))?;
+    if s.ends.is_some() {
+        writeln!(
+            t,
+            "# The frames of the description are not along it: ends are those of its geometry between the \
+             joint axes."
+        )?;
+    }
+    if link.of_collisions {
+        writeln!(t, "# The outline is that of the collision geometry, which is often larger.")?;
+    }
+    if s.taper > 1.25 {
+        writeln!(
+            t,
+            "# Its width varies by a factor of {:.1}: this is the uniform beam with the same tip deflection \
+             under a force.",
+            s.taper
+        )?;
+    }
+    if s.open > 0.0 {
+        writeln!(
+            t,
+            "# {:.0} % of the sections of the mesh are not closed: their convex hull is used.",
+            100.0 * s.open
+        )?;
+    }
+    if let Some(half) = s.wall_of_half {
+        writeln!(
+            t,
+            "# If only half of the mass is in the wall (the rest is motors and gears): wall = {}",
+            float(half, 5)
+        )?;
     }
     Ok(())
 }
@@ -377,6 +395,20 @@ fn write_readme(t: &mut String, draft: &Draft, placed: &Placed) -> std::fmt::Res
     for (joint, at, why) in &draft.held {
         writeln!(t, "* {} is held at {at}: {why}.", markdown_code(joint))?;
     }
+    joint_table(t, draft)?;
+    link_table(t, draft)?;
+    writeln!(t, "\n## Assumed\n")?;
+    for a in &draft.assumptions {
+        writeln!(t, "* {}: {}. Better: {}.", markdown(&a.about), markdown(&a.text), markdown(&a.mend))?;
+    }
+    writeln!(t, "\n## To ask the manufacturer, or to measure\n")?;
+    for question in &draft.questions {
+        writeln!(t, "* {}.", markdown(question))?;
+    }
+    Ok(())
+}
+
+fn joint_table(t: &mut String, draft: &Draft) -> std::fmt::Result {
     writeln!(
         t,
         "\n| joint | effort limit | gravity torque | torque in motion | reducer, N m/rad | range |\n\
@@ -393,26 +425,18 @@ fn write_readme(t: &mut String, draft: &Draft, placed: &Placed) -> std::fmt::Res
         let name = markdown_code(&j.joint.name);
         writeln!(t, "| {name} | {effort} | {:.1} | {:.1} | {k} | {range} |", j.weight, j.needed)?;
     }
-    writeln!(
-        t,
-        "\nTorques in N m (forces in N), with payload, maxima over the workspace.\n\n\
-         | link | length, mm | mass, kg | section |\n| --- | --- | --- | --- |"
-    )?;
+    writeln!(t, "\nTorques in N m (forces in N), with payload, maxima over the workspace.")
+}
+
+fn link_table(t: &mut String, draft: &Draft) -> std::fmt::Result {
+    writeln!(t, "\n| link | length, mm | mass, kg | section |\n| --- | --- | --- | --- |")?;
     for link in &draft.links {
         let section = match &link.section {
             Ok(section) => section_words(section),
-            Err(reason) => format!("none: {}", markdown(reason)),
+            Err(reason) => format!("none: {}", markdown(&reason.to_string())),
         };
         let mass = link.mass.map_or("not known".into(), |m| format!("{m:.2}"));
         writeln!(t, "| {} | {:.0} | {mass} | {section} |", markdown_code(&link.link), 1e3 * link.length)?;
-    }
-    writeln!(t, "\n## Assumed\n")?;
-    for a in &draft.assumptions {
-        writeln!(t, "* {}: {}. Better: {}.", markdown(&a.about), markdown(&a.text), markdown(&a.mend))?;
-    }
-    writeln!(t, "\n## To ask the manufacturer, or to measure\n")?;
-    for question in &draft.questions {
-        writeln!(t, "* {}.", markdown(question))?;
     }
     Ok(())
 }
