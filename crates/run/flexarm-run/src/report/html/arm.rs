@@ -57,7 +57,7 @@ pub(super) fn arm_pictures(runs: &[ReportRun<'_>]) -> String {
                     );
                 }
                 Err(why) => {
-                    let _ = writeln!(out, "<p class=\"note\">{}</p>", markup(&why));
+                    let _ = writeln!(out, "<p class=\"note\">{}</p>", markup(&why.to_string()));
                 }
             }
         }
