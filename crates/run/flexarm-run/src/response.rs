@@ -188,7 +188,7 @@ impl Arm {
     /// # Errors
     /// As [`response()`].
     pub fn response(&self, at: Option<&[f64]>, request: &ResponseRequest) -> Result<Response, Error> {
-        response_at(self.robot(), Posed::on(self, at)?, request, None)
+        response_at(self.robot(), self.posed(at)?, request, None)
     }
 }
 
