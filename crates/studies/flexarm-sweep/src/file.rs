@@ -406,16 +406,19 @@ fn range(
     Ok((Values::Levels(levels), Some((from.min(to), from.max(to)))))
 }
 
-fn keys_of_distribution(word: &str) -> Result<&'static [&'static str], String> {
+fn keys_of_distribution(
+    word: &str,
+    fail: &dyn Fn(String) -> RobotFileError,
+) -> Result<&'static [&'static str], RobotFileError> {
     match word {
         "uniform" | "log-uniform" => Ok(&["low", "high"]),
         "normal" => Ok(&["mean", "std"]),
         "lognormal" => Ok(&["median", "sigma"]),
         "triangular" => Ok(&["low", "mode", "high"]),
-        "choice" => Err("distribution = \"choice\" needs values = [...]".into()),
+        "choice" => Err(fail("distribution = \"choice\" needs values = [...]".into())),
         other => {
             let words = "uniform, log-uniform, normal, lognormal, triangular or choice";
-            Err(format!("distribution {other:?} is not known; use {words}"))
+            Err(fail(format!("distribution {other:?} is not known; use {words}")))
         }
     }
 }
@@ -434,7 +437,7 @@ fn distribution(
         ("sigma", own.sigma),
         ("mode", own.mode),
     ];
-    let taken = keys_of_distribution(word).map_err(fail)?;
+    let taken = keys_of_distribution(word, fail)?;
     if let Some((key, _)) = numbers.iter().find(|(key, value)| value.is_some() && !taken.contains(key)) {
         return Err(fail(format!("distribution = {word:?} has no key {key}; its keys are {}", taken.join(", "))));
     }

@@ -214,7 +214,7 @@ impl Sweep {
         let name = (self.parameter_names(), self.metrics.clone());
         let known = Vocabulary { parameters: &name.0, metrics: &name.1, summary: &self.vocabulary };
         for text in &search.constraints {
-            self.constraints.push(Constraint::parse(text, &known).map_err(fail)?);
+            self.constraints.push(Constraint::parse(text, &known).map_err(|error| fail(error.to_string()))?);
         }
         self.quick = self.quick && self.constraints.iter().all(Constraint::is_quick);
         let place = |name: &str| self.metrics.iter().position(|metric| metric.name == name);
