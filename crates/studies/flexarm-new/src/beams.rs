@@ -64,6 +64,18 @@ pub(crate) struct BeamSection {
     pub(crate) open: f64,
 }
 
+impl BeamSection {
+    /// Describes a section: `box of 120 x 180 mm with a wall of 8.0 mm`.
+    pub(crate) fn words(&self) -> String {
+        let mm = |x: f64| format!("{:.0}", 1e3 * x);
+        let size = match self.section {
+            "tube" | "circle" => format!("{} of {} mm", self.section, mm(self.width)),
+            _ => format!("{} of {} x {} mm", self.section, mm(self.width), mm(self.height)),
+        };
+        self.wall.map_or(size.clone(), |wall| format!("{size} with a wall of {:.1} mm", 1e3 * wall))
+    }
+}
+
 /// Data of a link that may be a beam.
 pub(crate) struct Candidate<'a> {
     /// Parent joint of the link.

@@ -6,6 +6,7 @@ use flexarm_settings::written::{markdown, markdown_code, one_line as inline};
 
 use super::beams::BeamSection;
 use super::draft::{Draft, DraftLink};
+use super::gears::three_digits;
 use super::place::Placed;
 
 /// Maximum plausible effort limit of a joint of an arm (N m).
@@ -17,11 +18,6 @@ fn quoted(text: &str) -> String {
     serde_json::to_string(text).unwrap_or_default().replace('\u{7f}', "\\u007F")
 }
 
-/// Rounds a number to three significant digits.
-pub(crate) fn three_digits(value: f64) -> f64 {
-    format!("{value:.2e}").parse().unwrap_or(value)
-}
-
 /// Formats a float for TOML, rounded to the given number of decimals.
 fn float(value: f64, digits: i32) -> String {
     let scale = 10f64.powi(digits);
@@ -31,16 +27,6 @@ fn float(value: f64, digits: i32) -> String {
 
 fn vector(values: &[f64; 3], digits: i32) -> String {
     format!("[{}]", values.map(|x| float(x, digits)).join(", "))
-}
-
-/// Describes a section: `box of 120 x 180 mm with a wall of 8.0 mm`.
-pub(crate) fn section_words(s: &BeamSection) -> String {
-    let mm = |x: f64| format!("{:.0}", 1e3 * x);
-    let size = match s.section {
-        "tube" | "circle" => format!("{} of {} mm", s.section, mm(s.width)),
-        _ => format!("{} of {} x {} mm", s.section, mm(s.width), mm(s.height)),
-    };
-    s.wall.map_or(size.clone(), |wall| format!("{size} with a wall of {:.1} mm", 1e3 * wall))
 }
 
 fn beam_keys(s: &BeamSection, wall: Option<f64>) -> String {
@@ -228,7 +214,7 @@ fn links(t: &mut String, draft: &Draft, beams: &[&DraftLink]) -> std::fmt::Resul
 
 /// Writes size and mass of a link, and how far its section can be trusted.
 fn section_notes(t: &mut String, link: &DraftLink, s: &BeamSection) -> std::fmt::Result {
-    writeln!(t, "\n# {:.0} mm long, {:.2} kg: a {}.", 1e3 * link.length, link.mass.unwrap_or(0.0), section_words(s))?;
+    writeln!(t, "\n# {:.0} mm long, {:.2} kg: a {}.", 1e3 * link.length, link.mass.unwrap_or(0.0), s.words())?;
     if s.ends.is_some() {
         writeln!(
             t,
@@ -432,7 +418,7 @@ fn link_table(t: &mut String, draft: &Draft) -> std::fmt::Result {
     writeln!(t, "\n| link | length, mm | mass, kg | section |\n| --- | --- | --- | --- |")?;
     for link in &draft.links {
         let section = match &link.section {
-            Ok(section) => section_words(section),
+            Ok(section) => section.words(),
             Err(reason) => format!("none: {}", markdown(&reason.to_string())),
         };
         let mass = link.mass.map_or("not known".into(), |m| format!("{m:.2}"));
