@@ -135,7 +135,7 @@ impl RobotLink {
         }
         if let Some(beam) = &self.beam {
             let chain = beam.chain(segments).map(LinkForm::Chain);
-            return chain.map_err(|source| LinkFormError::Chain { link: link(), source });
+            return chain.map_err(|source| LinkFormError::Chain { link: link(), source: Box::new(source) });
         }
         let chains = self.flexible.reduced.details.as_ref().map_or(&[][..], |d| &d.chains[..]);
         let chain = chains.iter().find(|chain| chain.parts.len() == segments).cloned();
@@ -150,7 +150,7 @@ impl RobotLink {
         let name = &self.flexible.link;
         let link = || name.clone();
         let fail = |asked: RequestedKey| {
-            move |source: FemError| (asked, LinkFormError::NotModal { link: name.clone(), source })
+            move |source: FemError| (asked, LinkFormError::NotModal { link: name.clone(), source: Box::new(source) })
         };
         let wanted = modelling.modes.or(self.choices.modes);
         if let Some(modes) = wanted.filter(|modes| *modes > MOST_MODES) {

@@ -59,7 +59,7 @@ pub enum LinkFormError {
         /// Name of the link.
         link: String,
         /// Cause.
-        source: FemError,
+        source: Box<FemError>,
     },
     /// A reduced link without a chain of this length.
     #[error(
@@ -82,7 +82,7 @@ pub enum LinkFormError {
         /// Name of the link.
         link: String,
         /// Cause.
-        source: FemError,
+        source: Box<FemError>,
     },
     /// A reduced link without a mass matrix.
     #[error(
@@ -147,7 +147,7 @@ pub enum ModellingError {
         /// Joint on the third interface.
         why: String,
         /// Reason why the link cannot be modal.
-        instead: LinkFormError,
+        instead: Box<LinkFormError>,
     },
     /// A number of segments is requested, but no link is lumped.
     #[error("{segments} segments are requested, but no link of the robot is lumped: {}", lumped_remedy(modal_instead))]
