@@ -4,7 +4,6 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
-use comfy_table::CellAlignment;
 use flexarm::compensate::{
     CompensateRequest, Compensation, ErrorFigures, LimitRule, Method, ShaperKind, Shaping, compensate_motion,
 };
@@ -244,11 +243,7 @@ fn plants_text(found: &Compensation) -> String {
     };
     row("as given", &found.before, &found.after);
     found.plants.iter().for_each(|plant| row(&plant.plant, &plant.before, &plant.after));
-    for k in 1..8 {
-        if let Some(column) = t.column_mut(k) {
-            column.set_cell_alignment(CellAlignment::Right);
-        }
-    }
+    t.align_right(1..8);
     lines(&t)
 }
 

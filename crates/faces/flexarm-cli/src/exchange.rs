@@ -2,6 +2,7 @@
 
 use std::process::ExitCode;
 
+use flexarm::WordError;
 use flexarm::export::{ExportFormat, ExportJob};
 use flexarm::import::{ImportFormat, ImportJob, ImportOutputs, Names, PartMasses, RigidPart, parse_inertia, triple};
 
@@ -48,7 +49,7 @@ pub(crate) fn export(terminal: &Terminal, args: &ExportArgs) -> Result<ExitCode,
 }
 
 fn import_job(args: &ImportArgs) -> Result<ImportJob, Failure> {
-    let usage = |flag: &'static str| move |what: String| Failure::Usage(format!("{flag}: {what}"));
+    let usage = |flag: &'static str| move |error: WordError| Failure::Usage(format!("{flag}: {error}"));
     let masses = match (&args.part_a, &args.part_b, args.mass, &args.com, &args.inertia) {
         (Some(a), Some(b), ..) => PartMasses::Given([a.clone(), b.clone()]),
         (_, _, Some(mass), Some(com), Some(inertia)) => PartMasses::Whole(RigidPart {

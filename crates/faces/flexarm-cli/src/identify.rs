@@ -4,10 +4,10 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
-use comfy_table::CellAlignment;
 use flexarm::Robot;
 use flexarm::identify::{
-    Identification, IdentifyRequest, MeasurementPlan, PlanRequest, identify_robot, plan_measurements,
+    EncoderFigures, Identification, IdentifyRequest, MeasurementPlan, PlanRequest, Weight, identify_robot,
+    plan_measurements,
 };
 
 use crate::args::{ModellingArgs, RobotArgs};
@@ -161,63 +161,16 @@ const MOST_COMBINATIONS: usize = 8;
 fn text(found: &Identification) -> String {
     let Identification { robot, measurements, readings, numbers, .. } = found;
     let mut out = format!("{robot}: {readings} readings with {numbers} numbers of {measurements}\n\n");
-    let mut t = table(&["parameter", "before", "value", "std", "", "unit"]);
-    for p in &found.parameters {
-        let (value, part) = match p.identifiable {
-            true if p.std.is_nan() => (number(p.value), "no fit".to_owned()),
-            true => (number(p.value), part_of(p.std, p.value, p.initial)),
-            false if p.value != p.initial => (number(p.value), "with others".to_owned()),
-            false => ("undetermined".to_owned(), String::new()),
-        };
-        t.add_row(vec![p.name.clone(), number(p.initial), value, deviation(p.std), part, p.unit.clone()]);
-    }
-    for k in 1..5 {
-        if let Some(column) = t.column_mut(k) {
-            column.set_cell_alignment(CellAlignment::Right);
-        }
-    }
-    out += &lines(&t);
-    let (unit, factor) = readable(found.residual.unit);
-    out += &format!(
-        "\nresidual (RMS): {} {unit} before, {} {unit} after\n",
-        number(factor * found.residual.before),
-        number(factor * found.residual.after)
-    );
-    if let Some(held) = &found.held_out {
-        out += &format!(
-            "readings held out of the fit: {} {unit} (before {})\n",
-            number(factor * held.rms),
-            number(factor * held.rms_before)
-        );
-    }
-    for gear in &found.encoders {
-        let unseen: Vec<String> = gear.unseen_r2.iter().map(|r2| format!("{r2:.2}")).collect();
-        out += &format!(
-            "encoders of {}: {} +- {}, late by {:.1} ms, rest {:.1} of {:.1} urad (noise {:.1}), R2 of unseen runs {}{}\n",
-            gear.joint,
-            number(gear.stiffness),
-            number(gear.std),
-            1e3 * gear.delay_s,
-            1e6 * gear.rest_rms,
-            1e6 * gear.deflection_rms,
-            1e6 * gear.noise_rms,
-            unseen.join(", "),
-            if gear.told { "" } else { ": not determined" }
-        );
-    }
+    out += &parameter_table(found);
+    out += &residual_lines(found);
+    out.extend(found.encoders.iter().map(encoder_line));
     for shape in &found.shapes {
         out += &format!(
             "{}: like mode {} by {:.4} (assurance), {:.4} before\n",
             shape.reading, shape.mode, shape.assurance, shape.assurance_before
         );
     }
-    for combination in found.untold.iter().take(MOST_COMBINATIONS) {
-        let parts: Vec<String> = combination.iter().map(|w| format!("{:+.2} {}", w.weight, w.name)).collect();
-        out += &format!("not determined: {}\n", parts.join(" "));
-    }
-    if let Some(more) = found.untold.len().checked_sub(MOST_COMBINATIONS).filter(|more| *more > 0) {
-        out += &format!("not determined: {more} more combinations (--json and the page list them)\n");
-    }
+    out += &combination_lines(&found.untold);
     for s in &found.suspicious {
         out += &format!(
             "contradicts the others: {}, measured {}, expected {} ({:.1} deviations)\n",
@@ -242,6 +195,68 @@ fn text(found: &Identification) -> String {
         if let Some(file) = file {
             out += &format!("{what:<8} {file}\n");
         }
+    }
+    out
+}
+
+fn parameter_table(found: &Identification) -> String {
+    let mut t = table(&["parameter", "before", "value", "std", "", "unit"]);
+    for p in &found.parameters {
+        let (value, part) = match p.identifiable {
+            true if p.std.is_nan() => (number(p.value), "no fit".to_owned()),
+            true => (number(p.value), part_of(p.std, p.value, p.initial)),
+            false if p.value != p.initial => (number(p.value), "with others".to_owned()),
+            false => ("undetermined".to_owned(), String::new()),
+        };
+        t.add_row(vec![p.name.clone(), number(p.initial), value, deviation(p.std), part, p.unit.clone()]);
+    }
+    t.align_right(1..5);
+    lines(&t)
+}
+
+/// States the residual of the readings, and that of the readings held out of the fit.
+fn residual_lines(found: &Identification) -> String {
+    let (unit, factor) = readable(found.residual.unit);
+    let mut out = format!(
+        "\nresidual (RMS): {} {unit} before, {} {unit} after\n",
+        number(factor * found.residual.before),
+        number(factor * found.residual.after)
+    );
+    if let Some(held) = &found.held_out {
+        out += &format!(
+            "readings held out of the fit: {} {unit} (before {})\n",
+            number(factor * held.rms),
+            number(factor * held.rms_before)
+        );
+    }
+    out
+}
+
+fn encoder_line(gear: &EncoderFigures) -> String {
+    let unseen: Vec<String> = gear.unseen_r2.iter().map(|r2| format!("{r2:.2}")).collect();
+    format!(
+        "encoders of {}: {} +- {}, late by {:.1} ms, rest {:.1} of {:.1} urad (noise {:.1}), R2 of unseen runs {}{}\n",
+        gear.joint,
+        number(gear.stiffness),
+        number(gear.std),
+        1e3 * gear.delay_s,
+        1e6 * gear.rest_rms,
+        1e6 * gear.deflection_rms,
+        1e6 * gear.noise_rms,
+        unseen.join(", "),
+        if gear.told { "" } else { ": not determined" }
+    )
+}
+
+/// Lists the first combinations of parameters that the readings do not determine.
+fn combination_lines(untold: &[Vec<Weight>]) -> String {
+    let mut out = String::new();
+    for combination in untold.iter().take(MOST_COMBINATIONS) {
+        let parts: Vec<String> = combination.iter().map(|w| format!("{:+.2} {}", w.weight, w.name)).collect();
+        out += &format!("not determined: {}\n", parts.join(" "));
+    }
+    if let Some(more) = untold.len().checked_sub(MOST_COMBINATIONS).filter(|more| *more > 0) {
+        out += &format!("not determined: {more} more combinations (--json and the page list them)\n");
     }
     out
 }

@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
-use comfy_table::CellAlignment;
 use flexarm::lobes::{
     CutRequest, CutRun, CuttingPlace, CuttingTool, LobePoint, Lobes, LobesRequest, cut, lobes, rounded_down,
 };
@@ -223,7 +222,7 @@ fn text(found: &Lobes) -> String {
     for point in found.points.iter().step_by(every) {
         t.add_row(row(found, point, along, ranges));
     }
-    right(&mut t);
+    t.align_right(0..);
     out += &lines(&t);
     if every > 1 {
         out +=
@@ -279,18 +278,10 @@ fn poses(found: &Lobes) -> String {
         row.push(pose.frequencies_hz.first().map_or_else(|| "-".into(), |hz| format!("{hz:.2}")));
         t.add_row(row);
     }
-    right(&mut t);
+    t.align_right(0..);
     let left_out = match found.left_out {
         0 => String::new(),
         n => format!("{n} places are left out: the tool is at rest there, or moves along its axis\n"),
     };
     format!("\n{}{left_out}", lines(&t))
-}
-
-fn right(t: &mut comfy_table::Table) {
-    for k in 0..t.column_count() {
-        if let Some(column) = t.column_mut(k) {
-            column.set_cell_alignment(CellAlignment::Right);
-        }
-    }
 }

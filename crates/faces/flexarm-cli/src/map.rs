@@ -4,7 +4,6 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
-use comfy_table::CellAlignment;
 use flexarm::map::{
     JointRange, KeptPoses, Map, MapPose, MapRegion, MapRequest, ToolDirections, WorkspaceGrid, map, quantity_text,
     read_poses, readable_quantity,
@@ -276,11 +275,7 @@ fn text(map: &Map) -> String {
         row.extend(numbers.map(|x| quantity_text(&column.name, x)));
         t.add_row(row);
     }
-    for k in 2..t.column_count() {
-        if let Some(column) = t.column_mut(k) {
-            column.set_cell_alignment(CellAlignment::Right);
-        }
-    }
+    t.align_right(2..);
     out += &lines(&t);
     out += &format!("\nbest and worst by {}:\n", map.by);
     for (name, pose) in [("best", &map.best), ("worst", &map.worst)] {

@@ -4,7 +4,6 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
-use comfy_table::CellAlignment;
 use flexarm::{ColumnMap, MotionCurve, MotionOptions, MotionPeak, MotionReport, Robot};
 
 use crate::args::RobotArgs;
@@ -154,11 +153,7 @@ fn peaks(peaks: &[MotionPeak]) -> String {
         }
         t.add_row(row);
     }
-    for k in 2..header.len() {
-        if let Some(column) = t.column_mut(k) {
-            column.set_cell_alignment(CellAlignment::Right);
-        }
-    }
+    t.align_right(2..);
     let note = if with_torque {
         "peaks per s, s², s³; in brackets the part of the limit; torque in N m (forces in N) of the rigid robot with payload\n"
     } else {

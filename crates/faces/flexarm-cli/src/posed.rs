@@ -3,7 +3,6 @@
 
 use std::process::ExitCode;
 
-use comfy_table::CellAlignment;
 use flexarm::{
     ModeMovie, ModeTable, Outputs, Quantity, Response, ResponseOutputs, ResponseRequest, Robot, Spacing, Statics,
     StaticsOutputs,
@@ -97,15 +96,6 @@ pub(crate) fn response(terminal: &Terminal, args: &ResponseArgs) -> Result<ExitC
     Ok(ExitCode::SUCCESS)
 }
 
-/// Aligns the columns from `from` on to the right.
-fn right(table: &mut comfy_table::Table, from: usize) {
-    for k in from..table.column_count() {
-        if let Some(column) = table.column_mut(k) {
-            column.set_cell_alignment(CellAlignment::Right);
-        }
-    }
-}
-
 /// First lines of an answer at a pose, of at most 80 columns.
 fn pose_text(robot: &str, joints: &[String], at: &[f64], end: &str) -> String {
     let values: Vec<String> = joints.iter().zip(at).map(|(joint, q)| format!("{joint} {q:.4}")).collect();
@@ -127,14 +117,14 @@ fn statics_text(s: &Statics) -> String {
     for e in &s.elements {
         t.add_row(row(&format!("  by {}", e.name), &e.tcp_displacement_m, &e.tcp_rotation_rad));
     }
-    right(&mut t, 1);
+    t.align_right(1..);
     out += &lines(&t);
     out += "\ncompliance [um/N, urad/N; um/(N m), urad/(N m)]\n";
     let mut t = table(&["", "fx", "fy", "fz", "tx", "ty", "tz"]);
     for (axis, values) in AXES.iter().zip(&s.compliance) {
         t.add_row([vec![(*axis).to_owned()], triple(values, 1e6)].concat());
     }
-    right(&mut t, 1);
+    t.align_right(1..);
     out += &lines(&t);
     let holding: Vec<String> =
         s.joints.iter().zip(&s.holding_torque).map(|(joint, torque)| format!("{joint} {torque:.2}")).collect();
@@ -174,7 +164,7 @@ fn modes_text(m: &ModeTable) -> String {
         let mass = mass(mode.tcp[..3].iter().map(|x| x * x).sum());
         t.add_row([(k + 1).to_string(), frequency, damping, direction(&mode.tcp), mass]);
     }
-    right(&mut t, 1);
+    t.align_right(1..);
     out += &lines(&t);
     let percent = |x: f64| format!("{:.1}", 100.0 * x);
     for (block, modes) in m.modes.chunks(MODES_SIDE_BY_SIDE).enumerate() {
@@ -188,7 +178,7 @@ fn modes_text(m: &ModeTable) -> String {
             let shares = modes.iter().map(|mode| percent(mode.strain_energy[k]));
             t.add_row(std::iter::once(name.clone()).chain(shares));
         }
-        right(&mut t, 1);
+        t.align_right(1..);
         out += &format!("\n{}", lines(&t));
         if !m.speeds.is_empty() {
             continue;
@@ -198,7 +188,7 @@ fn modes_text(m: &ModeTable) -> String {
             let shares = modes.iter().map(|mode| mode.compliance_share[k].map_or_else(|| "-".into(), percent));
             t.add_row(std::iter::once(format!("compliance {axis}")).chain(shares));
         }
-        right(&mut t, 1);
+        t.align_right(1..);
         out += &format!("\n{}", lines(&t));
     }
     for (format, path) in m.files.recordings.iter() {
@@ -247,7 +237,7 @@ fn response_text(r: &Response) -> String {
         );
         t.add_row(row);
     }
-    right(&mut t, 3);
+    t.align_right(3..);
     out += &lines(&t);
     for (what, path) in [("CSV", &r.files.csv), ("plot", &r.files.plot), ("figures", &r.files.json)] {
         if let Some(path) = path {

@@ -1,12 +1,12 @@
 //! Tables for people.
 
-use std::ops::{Deref, DerefMut};
+use std::ops::{Deref, DerefMut, RangeBounds};
 
 use crate::terminal::Terminal;
 use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
 use flexarm::reduce::{MeshListing, ReduceSummary, ReportTable, SetListing};
 use flexarm::written::{message, one_line};
-use flexarm::{Caveat, Finding, Inspection, gathered};
+use flexarm::{BalancerInfo, Caveat, Finding, FlexibleInfo, Inspection, LoopInfo, gathered};
 
 /// Maximum length of a name in a table (characters).
 const LONGEST_NAME: usize = 60;
@@ -41,6 +41,13 @@ impl TextTable {
     pub(crate) fn set_header<C: ToString>(&mut self, cells: impl IntoIterator<Item = C>) {
         let cells: Vec<String> = cells.into_iter().map(|cell| self.cell(&cell.to_string())).collect();
         self.table.set_header(cells);
+    }
+
+    /// Aligns columns to the right.
+    pub(crate) fn align_right(&mut self, columns: impl RangeBounds<usize>) {
+        for (_, column) in self.table.column_iter_mut().enumerate().filter(|(k, _)| columns.contains(k)) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
     }
 
     fn cell(&mut self, text: &str) -> String {
@@ -114,7 +121,7 @@ fn limit(x: Option<f64>) -> String {
 }
 
 /// Describes a closed loop: its dependent joints, and its transmission angle.
-fn loop_line(own: &flexarm::LoopInfo) -> String {
+fn loop_line(own: &LoopInfo) -> String {
     let joints: Vec<String> = own.dependent.iter().map(|joint| format!("{} at {:.4}", joint.name, joint.q)).collect();
     let least = own
         .smallest_transmission_angle
@@ -131,71 +138,15 @@ fn loop_line(own: &flexarm::LoopInfo) -> String {
 /// Formats what was loaded.
 pub(crate) fn inspection(i: &Inspection) -> String {
     let mut out = format!("{}, {:.2} kg\n", i.robot, i.mass_kg);
-    // Without velocities the bias is the gravity torque.
-    let moves = i.bias.iter().zip(&i.gravity_torque).any(|(bias, gravity)| bias != gravity);
-    let mut head = vec!["joint", "type", "lower", "upper", "velocity", "effort", "at", "gravity"];
-    head.extend(moves.then_some("bias"));
-    let mut t = table(&head);
-    for (k, j) in i.joints.iter().enumerate() {
-        let mut row = vec![
-            j.name.clone(),
-            j.kind.into(),
-            limit(j.lower),
-            limit(j.upper),
-            limit(j.velocity),
-            j.effort.map_or_else(|| "-".into(), |effort| format!("{effort:.1}")),
-            format!("{:.4}", i.q[k]),
-            format!("{:.2}", i.gravity_torque[k]),
-        ];
-        row.extend(moves.then(|| format!("{:.2}", i.bias[k])));
-        t.add_row(row);
-    }
-    for k in 2..head.len() {
-        if let Some(column) = t.column_mut(k) {
-            column.set_cell_alignment(CellAlignment::Right);
-        }
-    }
-    out += &lines(&t);
+    out += &joint_table(i);
     let mut t = table(&["link", "mass [kg]", "centre of mass [m]"]);
     for l in i.links.iter().filter(|l| l.mass_kg > 0.0) {
         t.add_row([l.name.clone(), format!("{:.3}", l.mass_kg), format!("{:.4?}", l.com_m)]);
     }
     out += &lines(&t);
-    for b in &i.balancers {
-        let torque: Vec<String> = b.torque.iter().map(|torque| format!("{torque:.1}")).collect();
-        let (length, pull) = match b.kind {
-            "line" => ("length", "pull"),
-            _ => ("joint at", "torque against it"),
-        };
-        out += &format!(
-            "balancer: {}, {length} {:.4}, {pull} {:.1}, stiffness {:.4e}, on the joints {}\n",
-            b.name,
-            b.length,
-            b.tension,
-            b.stiffness,
-            torque.join(" ")
-        );
-    }
-    for l in &i.loops {
-        out += &loop_line(l);
-    }
-    for f in &i.flexible_links {
-        let line = format!(
-            "flexible: {} ({}), {:.4} m, parts {} kg; {}, {} coordinates",
-            f.name,
-            f.method,
-            f.length_m,
-            f.parts_kg.iter().map(|m| format!("{m:.2}")).collect::<Vec<_>>().join(" + "),
-            f.model,
-            f.coordinates
-        );
-        out += &filled(&line, " ");
-        if let Some(hz) = &f.modal_frequencies_hz {
-            let first: Vec<String> = hz.iter().take(6).map(|hz| format!("{hz:.1}")).collect();
-            let more = if hz.len() > 6 { hz.last().map(|hz| format!(", ... {hz:.0}")) } else { None };
-            out += &format!("  near joint held: {}{} Hz\n", first.join(", "), more.unwrap_or_default());
-        }
-    }
+    out.extend(i.balancers.iter().map(balancer_line));
+    out.extend(i.loops.iter().map(loop_line));
+    out.extend(i.flexible_links.iter().map(flexible_lines));
     if let Some(c) = &i.coupling {
         let rows: Vec<String> = c.matrix.iter().map(|row| format!("{row:?}")).collect();
         out += &format!(
@@ -219,6 +170,67 @@ pub(crate) fn inspection(i: &Inspection) -> String {
         i.tcp.link, i.tcp.position_m, i.tcp.quaternion_wxyz
     );
     out += &filled(&tcp, " ");
+    out
+}
+
+/// Lists the joints with their limits, positions and torques at rest.
+fn joint_table(i: &Inspection) -> String {
+    // Without velocities the bias is the gravity torque.
+    let moves = i.bias.iter().zip(&i.gravity_torque).any(|(bias, gravity)| bias != gravity);
+    let mut head = vec!["joint", "type", "lower", "upper", "velocity", "effort", "at", "gravity"];
+    head.extend(moves.then_some("bias"));
+    let mut t = table(&head);
+    for (k, j) in i.joints.iter().enumerate() {
+        let mut row = vec![
+            j.name.clone(),
+            j.kind.into(),
+            limit(j.lower),
+            limit(j.upper),
+            limit(j.velocity),
+            j.effort.map_or_else(|| "-".into(), |effort| format!("{effort:.1}")),
+            format!("{:.4}", i.q[k]),
+            format!("{:.2}", i.gravity_torque[k]),
+        ];
+        row.extend(moves.then(|| format!("{:.2}", i.bias[k])));
+        t.add_row(row);
+    }
+    t.align_right(2..);
+    lines(&t)
+}
+
+fn balancer_line(b: &BalancerInfo) -> String {
+    let torque: Vec<String> = b.torque.iter().map(|torque| format!("{torque:.1}")).collect();
+    let (length, pull) = match b.kind {
+        "line" => ("length", "pull"),
+        _ => ("joint at", "torque against it"),
+    };
+    format!(
+        "balancer: {}, {length} {:.4}, {pull} {:.1}, stiffness {:.4e}, on the joints {}\n",
+        b.name,
+        b.length,
+        b.tension,
+        b.stiffness,
+        torque.join(" ")
+    )
+}
+
+/// Describes a flexible link, and the natural frequencies of its modes if it has any.
+fn flexible_lines(f: &FlexibleInfo) -> String {
+    let line = format!(
+        "flexible: {} ({}), {:.4} m, parts {} kg; {}, {} coordinates",
+        f.name,
+        f.method,
+        f.length_m,
+        f.parts_kg.iter().map(|m| format!("{m:.2}")).collect::<Vec<_>>().join(" + "),
+        f.model,
+        f.coordinates
+    );
+    let mut out = filled(&line, " ");
+    if let Some(hz) = &f.modal_frequencies_hz {
+        let first: Vec<String> = hz.iter().take(6).map(|hz| format!("{hz:.1}")).collect();
+        let more = if hz.len() > 6 { hz.last().map(|hz| format!(", ... {hz:.0}")) } else { None };
+        out += &format!("  near joint held: {}{} Hz\n", first.join(", "), more.unwrap_or_default());
+    }
     out
 }
 

@@ -74,17 +74,23 @@ fn flags(args: &ReduceArgs) -> Result<ReduceJob, Failure> {
             None => once(&mut job.material, *value, "--material")?,
         }
     }
+    name_interfaces(&mut job, args)?;
+    Ok(job)
+}
+
+/// Adds interfaces with their nodes, frames and ties.
+fn name_interfaces(job: &mut ReduceJob, args: &ReduceArgs) -> Result<(), Failure> {
     for (NamedValue { name, value }, letter) in args.interfaces.iter().zip('A'..='Z') {
         let name = name.clone().unwrap_or_else(|| letter.to_string());
-        once(&mut entry(&mut job, &name).select, value.clone(), &format!("--interface {name}=..."))?;
-        entry(&mut job, &name).place = "command line".into();
+        once(&mut entry(job, &name).select, value.clone(), &format!("--interface {name}=..."))?;
+        entry(job, &name).place = "command line".into();
     }
     for NamedValue { name, value } in &args.at {
         let Some(name) = name else {
             let text = "--at needs the name of an interface: --at A=x,y,z, --at A=centroid or --at A=joint:NAME";
             return Err(Failure::Usage(text.into()));
         };
-        let own = entry(&mut job, name);
+        let own = entry(job, name);
         if own.xyz.is_some() || own.at.is_some() || own.joint.is_some() {
             return Err(Failure::Usage(format!("--at {name}=... is given twice")));
         }
@@ -96,11 +102,11 @@ fn flags(args: &ReduceArgs) -> Result<ReduceJob, Failure> {
     }
     for NamedValue { name, value } in &args.ties {
         match name {
-            Some(name) => once(&mut entry(&mut job, name).tie, value.0, &format!("--tie {name}=..."))?,
+            Some(name) => once(&mut entry(job, name).tie, value.0, &format!("--tie {name}=..."))?,
             None => once(&mut job.tie, value.0, "--tie")?,
         }
     }
-    Ok(job)
+    Ok(())
 }
 
 fn once<T>(own: &mut Option<T>, value: T, flag: &str) -> Result<(), Failure> {

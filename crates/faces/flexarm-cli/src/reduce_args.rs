@@ -181,7 +181,7 @@ impl FromStr for PlaceWord {
 }
 
 fn parse_frame(text: &str) -> Result<FrameEntry, String> {
-    match numbers(text)?.as_slice() {
+    match numbers(text).map_err(|error| error.to_string())?.as_slice() {
         [x, y, z] => Ok(FrameEntry { xyz: [*x, *y, *z], rpy: [0.0; 3] }),
         [x, y, z, roll, pitch, yaw] => Ok(FrameEntry { xyz: [*x, *y, *z], rpy: [*roll, *pitch, *yaw] }),
         other => Err(format!("{} numbers in {text:?}, 3 or 6 are expected", other.len())),

@@ -5,7 +5,6 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
-use comfy_table::CellAlignment;
 use flexarm::sensitivity::{PoseSensitivity, Sensitivity, SensitivityRequest, pose_sensitivity, sensitivity};
 use flexarm::{Motion, Robot, RunOptions, Scenario};
 
@@ -149,9 +148,7 @@ fn value(value: f64, unit: &str) -> String {
 
 /// Formats the table with numbers aligned to the right.
 fn right(t: &mut crate::print::TextTable) -> String {
-    for column in t.column_iter_mut().skip(1) {
-        column.set_cell_alignment(CellAlignment::Right);
-    }
+    t.align_right(1..);
     lines(t)
 }
 

@@ -9,7 +9,9 @@ use std::io::{Cursor, Write as _};
 use std::path::{Path, PathBuf};
 
 use flexarm::reduce::STRESS_FILE;
-use flexarm::{Arm, DriveModel, InertiaEstimate, LinkModel, LoadOptions, Modelling, Robot, STEPPERS, StepperOptions};
+use flexarm::{
+    Arm, DriveModel, InertiaEstimate, LinkModel, LoadOptions, Modelling, ReadOptions, Robot, STEPPERS, StepperOptions,
+};
 use serde::{Deserialize, Serialize};
 use toml_edit::{DocumentMut, Item};
 use twox_hash::XxHash3_128;
@@ -188,10 +190,25 @@ fn robot_files(
     })?;
     document["urdf"] = toml_edit::value(URDF);
     document["name"] = toml_edit::value(&*robot.name);
+    take_over_urdf_settings(&mut document, &settings.load.urdf);
+    let mut files = move_links(&mut document, folder, !robot.gauges.is_empty())?;
+    let mut urdf = robot.urdf.text.clone();
+    for (reference, name, path) in meshes {
+        for quote in ['"', '\''] {
+            urdf = urdf.replace(&format!("{quote}{reference}{quote}"), &format!("{quote}{name}{quote}"));
+        }
+        files.push((name.clone(), fs::read(path).map_err(failed(path))?));
+    }
+    files.push((URDF.into(), urdf.into_bytes()));
+    files.push((ROBOT.into(), document.to_string().into_bytes()));
+    Ok(files)
+}
+
+/// Writes the settings with which the URDF was read into the robot file.
+fn take_over_urdf_settings(document: &mut DocumentMut, urdf: &ReadOptions) {
     for key in ["default_trajectory", "packages", "args"] {
         document.remove(key);
     }
-    let urdf = &settings.load.urdf;
     for (key, links) in [("waive_inertia", &urdf.waive), ("discard_inertia", &urdf.discard)] {
         if !links.is_empty() {
             let list = document.entry(key).or_insert(toml_edit::array());
@@ -203,6 +220,11 @@ fn robot_files(
         Some(InertiaEstimate::TotalMass(mass)) => document["inertia_from_total_mass"] = toml_edit::value(mass),
         None => {}
     }
+}
+
+/// Makes the robot file refer to copies of the reduced links and of their stress, if it is needed;
+/// returns the copies.
+fn move_links(document: &mut DocumentMut, folder: &Path, with_stress: bool) -> Result<NamedFiles, PlantError> {
     let mut files = NamedFiles::new();
     let mut take = |entry: &mut dyn toml_edit::TableLike| -> Result<(), PlantError> {
         let Some(given) = entry.get("reduced").and_then(Item::as_str).map(|path| folder.join(path)) else {
@@ -212,7 +234,7 @@ fn robot_files(
         let name = format!("link_{number}.flex");
         files.push((name.clone(), fs::read(&given).map_err(failed(&given))?));
         let stress = given.with_extension(STRESS_FILE);
-        if !robot.gauges.is_empty() && stress.is_file() {
+        if with_stress && stress.is_file() {
             files.push((format!("link_{number}.{STRESS_FILE}"), fs::read(&stress).map_err(failed(&stress))?));
         }
         entry.insert("reduced", toml_edit::value(name));
@@ -228,15 +250,6 @@ fn robot_files(
     if let Some(mounting) = document.get_mut("mounting").and_then(Item::as_table_like_mut) {
         take(mounting)?;
     }
-    let mut urdf = robot.urdf.text.clone();
-    for (reference, name, path) in meshes {
-        for quote in ['"', '\''] {
-            urdf = urdf.replace(&format!("{quote}{reference}{quote}"), &format!("{quote}{name}{quote}"));
-        }
-        files.push((name.clone(), fs::read(path).map_err(failed(path))?));
-    }
-    files.push((URDF.into(), urdf.into_bytes()));
-    files.push((ROBOT.into(), document.to_string().into_bytes()));
     Ok(files)
 }
 

@@ -2,7 +2,9 @@
 
 use std::path::PathBuf;
 
-use flexarm::compensate::{CompensateRequest, LimitRule, Method, ShaperKind, Shaping, compensate_motion_until};
+use flexarm::compensate::{
+    CompensateRequest, Compensation, LimitRule, Method, ShaperKind, Shaping, compensate_motion_until,
+};
 use flexarm::{Motion, RunOptions};
 use pyo3::prelude::*;
 use pyo3::types::PyList;
@@ -28,6 +30,19 @@ pub(crate) struct PyCompensated {
     /// Summary in one line.
     headline: String,
     figures: Figures,
+}
+
+impl PyCompensated {
+    fn new(motion: Py<PyMotion>, found: Compensation) -> Self {
+        let (before, after) = (1e3 * found.before.peak_m, 1e3 * found.after.peak_m);
+        let caveats = found.caveats.clone();
+        Self {
+            motion,
+            curves: found.curves.iter().flatten().copied().collect(),
+            headline: format!("{}: peak error {before:.4} mm before, {after:.4} mm after", found.motion),
+            figures: Figures::of(found, &caveats),
+        }
+    }
 }
 
 #[pymethods]
@@ -168,11 +183,7 @@ pub(crate) fn compensate<'py>(
     write: Option<Vec<PathBuf>>,
     overwrite: bool,
 ) -> PyResult<PyCompensated> {
-    let mut chosen = [components.is_none(); 6];
-    for found in components.iter().flatten() {
-        let known: Vec<(&str, usize)> = COMPONENTS.into_iter().zip(0..).collect();
-        chosen[word("components", found, &known)?] = true;
-    }
+    let chosen = chosen_components(components.as_deref())?;
     let n = robot.get().robot.rigid_model().or_raise()?.n_actuated();
     let accelerations = accelerations.map(|a| numbers("accelerations", a, &[(n, "joints")], false)).transpose()?;
     let rules = [("slow", LimitRule::Slow), ("refuse", LimitRule::Refuse), ("tell", LimitRule::Tell)];
@@ -200,14 +211,15 @@ pub(crate) fn compensate<'py>(
     let found = stoppable(py, move |stop| compensate_motion_until(&of, scenario, &request, stop))?.or_raise()?;
     caveat::answer(py, &found, &found.caveats)?;
     let motion = Motion::along((*found.trajectory).clone(), &name, &robot.get().robot).or_raise()?;
-    let (before, after) = (1e3 * found.before.peak_m, 1e3 * found.after.peak_m);
-    Ok(PyCompensated {
-        motion: Py::new(py, PyMotion::made(motion, robot))?,
-        curves: found.curves.iter().flatten().copied().collect(),
-        headline: format!("{}: peak error {before:.4} mm before, {after:.4} mm after", found.motion),
-        figures: {
-            let caveats = found.caveats.clone();
-            Figures::of(found, &caveats)
-        },
-    })
+    Ok(PyCompensated::new(Py::new(py, PyMotion::made(motion, robot))?, found))
+}
+
+/// Returns which components are named; all if there are no names.
+fn chosen_components(names: Option<&[String]>) -> PyResult<[bool; 6]> {
+    let known: Vec<(&str, usize)> = COMPONENTS.into_iter().zip(0..).collect();
+    let mut chosen = [names.is_none(); 6];
+    for found in names.into_iter().flatten() {
+        chosen[word("components", found, &known)?] = true;
+    }
+    Ok(chosen)
 }

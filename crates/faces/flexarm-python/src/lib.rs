@@ -29,6 +29,7 @@ mod operating_point;
 mod parts;
 mod restore;
 mod robot;
+mod robot_methods;
 mod run;
 mod run_arguments;
 mod scenario;

@@ -252,40 +252,9 @@ pub(crate) fn map<'py>(
     overwrite: bool,
     progress: Option<Bound<'py, PyAny>>,
 ) -> PyResult<PyMap> {
-    let places = [bounds.is_some() || spacing.is_some(), joints.is_some(), poses.is_some(), along.is_some()];
-    if places.into_iter().filter(|given| *given).count() > 1 {
-        return Err(PyValueError::new_err(
-            "bounds and spacing, joints, poses, and along exclude each other: give one of them",
-        ));
-    }
     let n = robot.get().robot.rigid_model().or_raise()?.n_actuated();
-    let region = match (joints, poses, along) {
-        (Some(joints), ..) => over_joints(joints)?,
-        (None, Some(poses), _) => {
-            let poses = numbers("poses", poses, &[(n, "joints")], true)?;
-            MapRegion::Poses(poses.values().chunks_exact(n.max(1)).map(<[f64]>::to_vec).collect())
-        }
-        (None, None, Some(along)) => {
-            let motion: Motion = scenario(robot, Some(along), None, None, None)?.motion;
-            MapRegion::Along { motion: Box::new(motion), points }
-        }
-        (None, None, None) => {
-            let usual = ToolDirections::default();
-            let tool = ToolDirections {
-                axis: tool_axis.map_or(Ok(usual.axis), |axis| three("tool_axis", axis))?,
-                roll_rad: roll,
-                cone_rad: cone,
-                tilts: tilts.unwrap_or(if cone > 0.0 { 9 } else { 1 }),
-                rolls,
-            };
-            let bounds = bounds.map(|bounds| numbers("bounds", bounds, &[(2, "corners"), (3, "numbers (m)")], false));
-            let bounds = bounds.transpose()?.map(|bounds| {
-                let b = bounds.values();
-                [[b[0], b[1], b[2]], [b[3], b[4], b[5]]]
-            });
-            MapRegion::Workspace(WorkspaceGrid { bounds, spacing_m: spacing, keep_out_m: keep_out, tool })
-        }
-    };
+    let grid = GridArguments { bounds, spacing, keep_out, tool_axis, roll, cone, tilts, rolls };
+    let region = region(robot, n, Places { joints, poses, along, points }, &grid)?;
     let kept = [("best", KeptPoses::Best), ("worst", KeptPoses::Worst), ("all", KeptPoses::All)];
     let at = at.map(|at| numbers("at", at, &[(n, "joints")], false)).transpose()?;
     let request = MapRequest {
@@ -302,16 +271,92 @@ pub(crate) fn map<'py>(
         output,
         overwrite,
     };
-    let bar = progress_function(py, progress)?;
-    let found = watched(py, &robot.get().robot, &request, bar.clone().map(Bound::unbind));
+    let map = with_bar(py, &robot.get().robot, &request, progress_function(py, progress)?)?;
+    caveat::answer(py, &map, &map.caveats)?;
+    Ok(PyMap::new(map))
+}
+
+/// Places that replace the box: values of joints, listed poses, or a motion.
+struct Places<'a, 'py> {
+    joints: Option<&'a Bound<'py, PyDict>>,
+    poses: Option<&'a Bound<'py, PyAny>>,
+    along: Option<&'a Bound<'py, PyAny>>,
+    points: usize,
+}
+
+/// Grid of TCP positions in a box, and directions of the tool at each.
+struct GridArguments<'a, 'py> {
+    bounds: Option<&'a Bound<'py, PyAny>>,
+    spacing: Option<f64>,
+    keep_out: f64,
+    tool_axis: Option<&'a Bound<'py, PyAny>>,
+    roll: f64,
+    cone: f64,
+    tilts: Option<usize>,
+    rolls: usize,
+}
+
+impl GridArguments<'_, '_> {
+    fn grid(&self) -> PyResult<WorkspaceGrid> {
+        let usual = ToolDirections::default();
+        let tool = ToolDirections {
+            axis: self.tool_axis.map_or(Ok(usual.axis), |axis| three("tool_axis", axis))?,
+            roll_rad: self.roll,
+            cone_rad: self.cone,
+            tilts: self.tilts.unwrap_or(if self.cone > 0.0 { 9 } else { 1 }),
+            rolls: self.rolls,
+        };
+        let corners = |bounds| -> PyResult<[[f64; 3]; 2]> {
+            let found = numbers("bounds", bounds, &[(2, "corners"), (3, "numbers (m)")], false)?;
+            let b = found.values();
+            Ok([[b[0], b[1], b[2]], [b[3], b[4], b[5]]])
+        };
+        let bounds = self.bounds.map(corners).transpose()?;
+        Ok(WorkspaceGrid { bounds, spacing_m: self.spacing, keep_out_m: self.keep_out, tool })
+    }
+}
+
+/// Returns the region of the only arguments that give one; `n` is the number of joints.
+fn region<'py>(
+    robot: &Bound<'py, PyRobot>,
+    n: usize,
+    Places { joints, poses, along, points }: Places<'_, 'py>,
+    grid: &GridArguments<'_, 'py>,
+) -> PyResult<MapRegion> {
+    let boxed = grid.bounds.is_some() || grid.spacing.is_some();
+    if [boxed, joints.is_some(), poses.is_some(), along.is_some()].into_iter().filter(|given| *given).count() > 1 {
+        return Err(PyValueError::new_err(
+            "bounds and spacing, joints, poses, and along exclude each other: give one of them",
+        ));
+    }
+    match (joints, poses, along) {
+        (Some(joints), ..) => over_joints(joints),
+        (None, Some(poses), _) => {
+            let poses = numbers("poses", poses, &[(n, "joints")], true)?;
+            Ok(MapRegion::Poses(poses.values().chunks_exact(n.max(1)).map(<[f64]>::to_vec).collect()))
+        }
+        (None, None, Some(along)) => {
+            let motion: Motion = scenario(robot, Some(along), None, None, None)?.motion;
+            Ok(MapRegion::Along { motion: Box::new(motion), points })
+        }
+        (None, None, None) => Ok(MapRegion::Workspace(grid.grid()?)),
+    }
+}
+
+/// Computes a map with a progress bar, which is closed at the end.
+fn with_bar<'py>(
+    py: Python<'py>,
+    robot: &Robot,
+    request: &MapRequest,
+    bar: Option<Bound<'py, PyAny>>,
+) -> PyResult<Map> {
+    let found = watched(py, robot, request, bar.clone().map(Bound::unbind));
     if let Some(bar) = bar
         && let Ok(close) = bar.getattr("close")
     {
         close.call0()?;
     }
-    let map = found?;
-    caveat::answer(py, &map, &map.caveats)?;
-    Ok(PyMap::new(map))
+    found
 }
 
 /// Computes a map that signals and a progress function can stop.

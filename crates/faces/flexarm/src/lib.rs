@@ -67,14 +67,14 @@ pub use flexarm_run::{
     Command, ConvertOptions, ConvertSummary, CouplingInfo, DependentInfo, DifferenceFigures, Disturbances, Drive,
     DriveKind, DriveModel, ElementStatics, Error, Fault, Figure, FigureGroup, Files, Finding, FlexibleInfo,
     FlexibleRobot, GearHysteresis, HeldJoint, HoldFigures, Inspection, JointInfo, Keep, LinkChoices, LinkFigures,
-    LinkInfo, LinkModel, LinkStressFigures, Live, LiveOptions, LiveState, LoadError, LoadOptions, LoopError, LoopInfo,
-    ModeFigures, ModeMovie, ModeTable, Modelling, ModellingError, Motion, MotionCurve, MotionFiles, MotionOptions,
-    MotionPeak, MotionReport, MotionViolation, MountingInfo, OperatingPoints, Outputs, Owner, PathFigures,
-    PathMoveFigures, PayloadChange, PayloadError, PeakFigures, PoseError, PoseFigures, Progress, RecordingError,
-    RecordingFiles, Recursions, ReportFiles, ReportOptions, ReportRun, Response, ResponseCurve, ResponseFiles,
-    ResponseOutputs, ResponseRequest, Robot, RobotBalancer, RobotCoupling, RobotFileError, RobotLink, RobotLoop,
-    RobotMounting, Run, RunOptions, RunRequest, STUDY_NOTE, SampleObserver, Scenario, SectionForceFigures, Servos,
-    SettingValue, Settling, Severity, ShareFigures, Statics, StaticsFiles, StaticsOutputs, StepperFigures,
+    LinkFormError, LinkInfo, LinkModel, LinkStressFigures, Live, LiveOptions, LiveState, LoadError, LoadOptions,
+    LoopError, LoopInfo, ModeFigures, ModeMovie, ModeTable, Modelling, ModellingError, Motion, MotionCurve,
+    MotionFiles, MotionOptions, MotionPeak, MotionReport, MotionViolation, MountingInfo, OperatingPoints, Outputs,
+    Owner, PathFigures, PathMoveFigures, PayloadChange, PayloadError, PeakFigures, PoseError, PoseFigures, Progress,
+    RecordingError, RecordingFiles, Recursions, ReportFiles, ReportOptions, ReportRun, Response, ResponseCurve,
+    ResponseFiles, ResponseOutputs, ResponseRequest, Robot, RobotBalancer, RobotCoupling, RobotFileError, RobotLink,
+    RobotLoop, RobotMounting, Run, RunOptions, RunRequest, STUDY_NOTE, SampleObserver, Scenario, SectionForceFigures,
+    Servos, SettingValue, Settling, Severity, ShareFigures, Statics, StaticsFiles, StaticsOutputs, StepperFigures,
     StepperSettings, StrainGaugeFigures, StressPlaceFigures, StressPointFigures, StressSource, StudyError, Summary,
     TCP_FRAME, TcpFigures, TcpInfo, ToolPath, ValueError, Variant, Variation, Weight, check, check_with_loads,
     check_with_motion, compare_study, convert, convert_until, figure_groups, html, inspect, markdown, modes,
@@ -88,7 +88,7 @@ pub use flexarm_flexlink::Mounting;
 pub use flexarm_kinematics::{
     BalancerCurve, BalancerCurveError, BalancerLaw, Coordinate, GasLaw, LinkInertia, Model, Pose, Wrench,
 };
-pub use flexarm_linkmaker::{ImportError, JobError, LinkError, export, import};
+pub use flexarm_linkmaker::{ImportError, JobError, LinkError, WordError, export, import};
 #[cfg(feature = "arrow")]
 pub use flexarm_log::arrow_stream;
 pub use flexarm_log::{

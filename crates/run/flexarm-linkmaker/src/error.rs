@@ -3,6 +3,7 @@
 
 mod import;
 mod job;
+mod word;
 
 use std::path::PathBuf;
 
@@ -14,6 +15,7 @@ use flexarm_settings::Fault;
 
 pub use import::ImportError;
 pub use job::JobError;
+pub use word::WordError;
 
 /// An error of making or exporting a link.
 #[derive(Debug, thiserror::Error)]

@@ -66,6 +66,6 @@ mod stamp;
 mod stopwatch;
 pub mod yardsticks;
 
-pub use error::{ImportError, JobError, LinkError};
+pub use error::{ImportError, JobError, LinkError, WordError};
 pub use material_entry::{MaterialConstants, MaterialEntry};
 pub use stopwatch::Stopwatch;

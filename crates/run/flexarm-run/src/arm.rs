@@ -7,13 +7,15 @@ use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex};
 
 use flexarm_log::{Columns, Trace};
-use flexarm_stepping::{FlexibleArm, Held, OperatingPoint};
+use flexarm_stepping::{FlexibleArm, Held, Linear, OperatingPoint};
 use rayon::prelude::*;
 
 use crate::caveat::{Caveat, Use, of_use};
 use crate::error::Error;
 use crate::flexible::FlexibleRobot;
+use crate::joint_values::joint_values;
 use crate::options::{Modelling, RunOptions};
+use crate::posed::Posed;
 use crate::robot::Robot;
 use crate::run::{self, RunRequest};
 use crate::scenario::Scenario;
@@ -105,6 +107,29 @@ impl Arm {
     /// Returns the caveats about the robot as modelled, and about its use by a command.
     pub fn caveats(&self, used: Use<'_>) -> Vec<Caveat> {
         of_use(&self.robot, &self.flexible, Some(&self.caveats), used)
+    }
+
+    /// Holds the arm at a pose; `at`: values of all actuated joints (rad or m), zero by default.
+    ///
+    /// # Errors
+    /// [`Error::Pose`] for joint values that do not fit the arm.
+    pub fn posed(&self, at: Option<&[f64]>) -> Result<Posed, Error> {
+        let names: Vec<&str> = self.flexible.rigid.coordinates().iter().map(|c| c.joint.as_str()).collect();
+        let posed = Posed::with(self.flexible.clone(), joint_values(at, &names)?)?;
+        Ok(Posed { of_robot: Some(self.robot_caveats()), ..posed })
+    }
+
+    /// Returns mass, damping and stiffness about the static equilibrium at a pose under gravity and
+    /// a wrench at the TCP, and the Jacobian of the TCP with respect to the free coordinates.
+    ///
+    /// * `at`: values of all actuated joints (rad or m), zero by default.
+    /// * `wrench`: force and moment at the TCP, world axes (N, N m).
+    ///
+    /// # Errors
+    /// [`Error::Pose`] for joint values that do not fit, [`Error::Step`] if there is no
+    /// equilibrium.
+    pub fn linearise(&self, at: Option<&[f64]>, wrench: [f64; 6]) -> Result<Linear, Error> {
+        self.posed(at)?.linear(&wrench.into())
     }
 
     /// Returns how links and drives are modelled.

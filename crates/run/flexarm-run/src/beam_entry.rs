@@ -2,7 +2,7 @@
 //!
 //! [`Section::SHAPES`] lists the lengths that each shape takes.
 
-use flexarm_fem::{Bar, Material, Section};
+use flexarm_fem::{Bar, BeamTheory, FemError, Material, Section};
 use flexarm_linkmaker::MaterialEntry;
 use serde::Deserialize;
 
@@ -82,6 +82,27 @@ fn half() -> f64 {
 pub(crate) const GIVEN: &str = "given";
 const GIVEN_KEYS: &[&str] = &["EA", "EI_y", "EI_z", "GJ", "kGA_y", "kGA_z", "mass_per_length", "rotary_y", "rotary_z"];
 
+/// Reason why an entry is no beam.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum BeamEntryError {
+    #[error("section {section:?} needs {key}")]
+    MissingKey { section: String, key: &'static str },
+    #[error("section {section:?} does not take {key}; it takes {taken:?}")]
+    StrayKey { section: String, key: &'static str, taken: &'static [&'static str] },
+    #[error("section {section:?} is not known; use {} or {}", shapes(), GIVEN)]
+    UnknownSection { section: String },
+    #[error("material is missing: a name such as \"steel\" or {{ E = ..., nu = ..., rho = ... }}")]
+    NoMaterial,
+    #[error(transparent)]
+    Material(#[from] FemError),
+    #[error("theory {theory:?} is not known; use \"timoshenko\" or \"euler-bernoulli\"")]
+    UnknownTheory { theory: String },
+}
+
+fn shapes() -> String {
+    Section::SHAPES.iter().map(|(word, _)| *word).collect::<Vec<_>>().join(", ")
+}
+
 impl BeamEntry {
     /// Returns all numbers that describe a section, by key.
     fn section_numbers(&self) -> [(&'static str, Option<f64>); 17] {
@@ -110,29 +131,38 @@ impl BeamEntry {
         self.section_numbers().into_iter().find(|(name, _)| *name == key).and_then(|(_, value)| value)
     }
 
-    fn needed(&self, key: &str) -> Result<f64, String> {
-        self.number(key).ok_or_else(|| format!("section {:?} needs {key}", self.section))
+    fn needed(&self, key: &'static str) -> Result<f64, BeamEntryError> {
+        self.number(key).ok_or_else(|| BeamEntryError::MissingKey { section: self.section.clone(), key })
+    }
+
+    pub(crate) fn theory(&self) -> Result<BeamTheory, BeamEntryError> {
+        match self.theory.as_deref() {
+            None | Some("timoshenko") => Ok(BeamTheory::Timoshenko),
+            Some("euler-bernoulli") => Ok(BeamTheory::EulerBernoulli),
+            Some(other) => Err(BeamEntryError::UnknownTheory { theory: other.to_owned() }),
+        }
     }
 }
 
 /// Builds section and material; messages name missing and superfluous keys.
-pub(crate) fn beam_section(beam: &BeamEntry) -> Result<(Section, Material), String> {
+pub(crate) fn beam_section(beam: &BeamEntry) -> Result<(Section, Material), BeamEntryError> {
     let material = match &beam.material {
-        Some(MaterialEntry::Named(name)) => Material::named(name).map_err(|e| e.to_string())?,
+        Some(MaterialEntry::Named(name)) => Material::named(name)?,
         Some(MaterialEntry::Given(m)) => Material::isotropic(m.young, m.nu, m.rho),
         // A given section contains its own stiffness.
         None if beam.section == GIVEN => Material::STEEL,
-        None => return Err("material is missing: a name such as \"steel\" or { E = ..., nu = ..., rho = ... }".into()),
+        None => return Err(BeamEntryError::NoMaterial),
     };
-    let (section, used) = section(beam)?;
-    if let Some((key, _)) = beam.section_numbers().iter().find(|(key, value)| value.is_some() && !used.contains(key)) {
-        return Err(format!("section {:?} does not take {key}; it takes {used:?}", beam.section));
+    let (section, taken) = section(beam)?;
+    let stray = |(key, value): &(&'static str, Option<f64>)| value.is_some() && !taken.contains(key);
+    if let Some((key, _)) = beam.section_numbers().into_iter().find(stray) {
+        return Err(BeamEntryError::StrayKey { section: beam.section.clone(), key, taken });
     }
     Ok((section, material))
 }
 
 /// Builds the section, and returns the keys that it takes.
-fn section(beam: &BeamEntry) -> Result<(Section, &'static [&'static str]), String> {
+fn section(beam: &BeamEntry) -> Result<(Section, &'static [&'static str]), BeamEntryError> {
     if beam.section == GIVEN {
         let bar = Bar {
             EA: beam.needed("EA")?,
@@ -147,15 +177,12 @@ fn section(beam: &BeamEntry) -> Result<(Section, &'static [&'static str]), Strin
         };
         return Ok((Section::Given(bar), GIVEN_KEYS));
     }
-    let length = |key: &str, default: Option<f64>| {
+    let length = |key: &'static str, default: Option<f64>| {
         default.map_or_else(|| beam.needed(key), |d| Ok(beam.number(key).unwrap_or(d)))
     };
     let shape = Section::SHAPES.iter().find(|(word, _)| *word == beam.section);
     match (Section::from_lengths(&beam.section, length)?, shape) {
         (Some(section), Some((_, keys))) => Ok((section, keys)),
-        _ => {
-            let words: Vec<&str> = Section::SHAPES.iter().map(|(word, _)| *word).collect();
-            Err(format!("section {:?} is not known; use {} or {GIVEN}", beam.section, words.join(", ")))
-        }
+        _ => Err(BeamEntryError::UnknownSection { section: beam.section.clone() }),
     }
 }

@@ -1,6 +1,8 @@
 //! `[[controller_axis]]` of a robot file: axis conventions of the robot's controller that differ
 //! from the description.
 
+use std::ops::Range;
+
 use flexarm_files::{Source, TextFileError as RobotFileError};
 use flexarm_kinematics::{JointKind, Mechanism};
 use flexarm_urdf::closest;
@@ -61,7 +63,9 @@ fn axis(
     source: &Source,
 ) -> Result<RobotAxis, RobotFileError> {
     let name = entry.joint.get_ref();
-    let fail = |span, message: String| source.error(span, format!("controller axis of joint {name:?}: {message}"));
+    let fail = |span: Range<usize>, message: String| {
+        source.error(span, format!("controller axis of joint {name:?}: {message}"))
+    };
     let free = |name: &str| {
         let joint = mechanism.joints.iter().find(|j| j.name == name);
         joint.is_some_and(|j| j.kind != JointKind::Fixed && j.mimic.is_none())
@@ -85,18 +89,7 @@ fn axis(
         Some(sense) if matches!(*sense.get_ref(), 1 | -1) => *sense.get_ref() as f64,
         Some(sense) => return Err(fail(sense.span(), format!("sense is {}, expected 1 or -1", sense.get_ref()))),
     };
-    let finite = |value: &Spanned<f64>, what: &str| match *value.get_ref() {
-        x if x.is_finite() => Ok(x),
-        x => Err(fail(value.span(), format!("{what} is {x}, expected a finite number"))),
-    };
-    let zero = match (&entry.zero, &entry.zero_deg) {
-        (None, None) => 0.0,
-        (Some(zero), None) => finite(zero, "zero")?,
-        (None, Some(degrees)) => finite(degrees, "zero_deg")?.to_radians(),
-        (Some(_), Some(degrees)) => {
-            return Err(fail(degrees.span(), "zero (rad) and zero_deg are both given: keep one of them".into()));
-        }
-    };
+    let zero = zero_of(entry, &fail)?;
     let relative = match (&entry.relative_to, &entry.factor) {
         (None, None) => None,
         (None, Some(factor)) => {
@@ -113,11 +106,33 @@ fn axis(
             return Err(fail(other.span(), message));
         }
         (Some(other), factor) => {
-            let factor = factor.as_ref().map(|factor| finite(factor, "factor")).transpose()?.unwrap_or(-1.0);
+            let factor = factor.as_ref().map(|factor| finite(factor, "factor", &fail)).transpose()?.unwrap_or(-1.0);
             Some((other.get_ref().clone(), factor))
         }
     };
     Ok(RobotAxis { joint: name.clone(), sense, zero, relative })
+}
+
+/// Makes an error of a place in the file and a message.
+type Fail<'a> = &'a dyn Fn(Range<usize>, String) -> RobotFileError;
+
+/// Returns the joint value at which the axis is zero (rad or m).
+fn zero_of(entry: &ControllerAxisEntry, fail: Fail<'_>) -> Result<f64, RobotFileError> {
+    match (&entry.zero, &entry.zero_deg) {
+        (None, None) => Ok(0.0),
+        (Some(zero), None) => finite(zero, "zero", fail),
+        (None, Some(degrees)) => finite(degrees, "zero_deg", fail).map(f64::to_radians),
+        (Some(_), Some(degrees)) => {
+            Err(fail(degrees.span(), "zero (rad) and zero_deg are both given: keep one of them".into()))
+        }
+    }
+}
+
+fn finite(value: &Spanned<f64>, what: &str, fail: Fail<'_>) -> Result<f64, RobotFileError> {
+    match *value.get_ref() {
+        x if x.is_finite() => Ok(x),
+        x => Err(fail(value.span(), format!("{what} is {x}, expected a finite number"))),
+    }
 }
 
 /// Whether one joint carries another.

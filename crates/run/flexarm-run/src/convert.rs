@@ -167,13 +167,9 @@ pub fn read_run(path: &Path) -> Result<(Option<serde_json::Value>, Trace, Vec<St
 /// Returns the recording format with this name.
 ///
 /// # Errors
-/// A message with the valid names.
-pub fn parse_recording_format(word: &str) -> Result<RecordingFormat, String> {
-    RecordingFormat::from_word(word).ok_or_else(|| format!("expected one of {}", words()))
-}
-
-fn words() -> String {
-    RecordingFormat::ALL.map(RecordingFormat::extension).join(", ")
+/// [`RecordingError::UnknownFormat`] with the valid names.
+pub fn parse_recording_format(word: &str) -> Result<RecordingFormat, RecordingError> {
+    RecordingFormat::from_word(word).ok_or(RecordingError::UnknownFormat)
 }
 
 fn format(path: &Path, given: Option<RecordingFormat>, setting: Option<Setting>) -> Result<RecordingFormat, Error> {

@@ -76,8 +76,8 @@ pub(crate) fn coupling(
     let Some(C_inverse) = inverse else {
         return fail(entry.matrix.span(), "matrix cannot be inverted: some motion of the joints has no motor".into());
     };
-    if let Err(message) = gears_fit(robot, joints) {
-        return fail(entry.joints.span(), message);
+    if let Err(error) = gears_fit(robot, joints) {
+        return fail(entry.joints.span(), error.to_string());
     }
     couple_rotors(robot, joints, &C_inverse);
     Ok(RobotCoupling { joints: joints.clone(), C, C_inverse })
@@ -97,34 +97,45 @@ fn couple_rotors(robot: &mut Robot, joints: &[String], C_inverse: &DMatrix<f64>)
     }
 }
 
+/// Drives that a coupling does not support.
+#[derive(Debug, thiserror::Error)]
+enum CoupledDriveError {
+    #[error(
+        "each of its joints needs a [[drive]] of the same kind with a gearbox, or none has a gearbox: a rigid gear \
+         among elastic ones leaves no springs on the joints"
+    )]
+    Mixed,
+    #[error("the gearbox of joint {joint:?} needs one stiffness, without backlash and curve")]
+    Stiffness { joint: String },
+    #[error(
+        "the gearbox of joint {joint:?} has a transmission error or hysteresis, which coupled gears do not support"
+    )]
+    GearLaws { joint: String },
+    #[error("the friction of joint {joint:?} grows with its load, which coupled gears do not support")]
+    LoadFriction { joint: String },
+}
+
 /// Checks that the drives of coupled joints are supported by a coupling.
-fn gears_fit(robot: &Robot, joints: &[String]) -> Result<(), String> {
+fn gears_fit(robot: &Robot, joints: &[String]) -> Result<(), CoupledDriveError> {
     let drives: Vec<Option<&Drive>> =
         joints.iter().map(|name| robot.drives.iter().find(|d| d.joint == *name)).collect();
     let yields = |drive: &Option<&Drive>| drive.is_some_and(|d| d.gearbox.is_some());
     let kinds: Vec<_> = drives.iter().map(|d| d.map(|d| d.kind)).collect();
     if drives.iter().any(yields) && (!drives.iter().all(yields) || kinds.windows(2).any(|pair| pair[0] != pair[1])) {
-        return Err("each of its joints needs a [[drive]] of the same kind with a gearbox, or none has a gearbox: a rigid gear \
-                    among elastic ones leaves no springs on the joints"
-            .into());
+        return Err(CoupledDriveError::Mixed);
     }
     for drive in drives.iter().flatten() {
-        let joint = &drive.joint;
+        let joint = || drive.joint.clone();
         let Some((gearbox, gear)) = &drive.gearbox else { continue };
         if !matches!(gearbox.stiffness, GearStiffness::Axis(_)) || gear.curve.is_some() {
-            return Err(format!("the gearbox of joint {joint:?} needs one stiffness, without backlash and curve"));
+            return Err(CoupledDriveError::Stiffness { joint: joint() });
         }
         if gear.hysteresis.is_some() || !gear.transmission.is_empty() {
-            return Err(format!(
-                "the gearbox of joint {joint:?} has a transmission error or hysteresis, which coupled gears do not support"
-            ));
+            return Err(CoupledDriveError::GearLaws { joint: joint() });
         }
     }
     match drives.iter().flatten().find(|d| d.load_friction > 0.0) {
-        Some(drive) => Err(format!(
-            "the friction of joint {:?} grows with its load, which coupled gears do not support",
-            drive.joint
-        )),
+        Some(drive) => Err(CoupledDriveError::LoadFriction { joint: drive.joint.clone() }),
         None => Ok(()),
     }
 }

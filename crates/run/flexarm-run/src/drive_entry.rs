@@ -449,42 +449,49 @@ fn gear(
     let gear = entry.get_ref();
     let at = |message: String| fail(entry.span(), message);
     if let Some(guide) = &gear.guide {
-        return guide_gear(joint, guide, gear).map_err(at);
+        return guide_gear(joint, guide, gear, &at);
     }
-    let curve = curve_of(gear).map_err(at)?;
-    let (stiffness, size) = stiffness_of(gear, curve.as_ref()).map_err(at)?;
-    let dampers = dampers(gear, size).map_err(at)?;
+    let curve = curve_of(gear, &at)?;
+    let (stiffness, size) = stiffness_of(gear, curve.as_ref(), &at)?;
+    let dampers = dampers(gear, size, &at)?;
     if size > 1 && (gear.hysteresis.is_some() || !gear.transmission_error.is_empty()) {
         return Err(at("transmission_error and hysteresis need one stiffness, about the axis".into()));
     }
-    let transmission = harmonics(&gear.transmission_error, ratio).map_err(at)?;
+    let transmission = harmonics(&gear.transmission_error, ratio).map_err(|error| at(error.to_string()))?;
     let about = if let GearStiffness::Axis(k) = stiffness { k } else { f64::NAN };
     let law = gear.hysteresis.as_ref().map(|entry| hysteresis(entry, about, curve.as_ref()));
-    let hysteresis = law.transpose().map_err(at)?;
+    let hysteresis = law.transpose().map_err(|error| at(error.to_string()))?;
     let damping = GearDamping { dampers, curve, transmission, hysteresis, tilts: Vec::new() };
     Ok((Gearbox { joint: joint.name.clone(), stiffness }, damping))
 }
 
+/// Makes an error at a gearbox.
+type GearboxFault<'a> = &'a dyn Fn(String) -> RobotFileError;
+
 /// Returns the torque curve of a gearbox, if it has one or a backlash.
-fn curve_of(gear: &GearboxEntry) -> Result<Option<TorqueCurve>, String> {
+fn curve_of(gear: &GearboxEntry, at: GearboxFault<'_>) -> Result<Option<TorqueCurve>, RobotFileError> {
     match (&gear.curve, gear.backlash, &gear.stiffness) {
-        (Some(points), None, None) => TorqueCurve::new(points).map(Some).map_err(|e| e.to_string()),
+        (Some(points), None, None) => TorqueCurve::new(points).map(Some).map_err(|error| at(error.to_string())),
         (None, Some(play), Some(Numbers::One(k))) if play.is_finite() && play >= 0.0 && *k > 0.0 => {
             Ok((play > 0.0).then(|| TorqueCurve::backlash(*k, play)))
         }
         (None, Some(play), _) => {
-            Err(format!("backlash = {play}: it must be 0 or above, with one positive stiffness about the axis"))
+            Err(at(format!("backlash = {play}: it must be 0 or above, with one positive stiffness about the axis")))
         }
-        (Some(_), ..) => Err("curve takes the place of stiffness and backlash: give one of them".into()),
+        (Some(_), ..) => Err(at("curve takes the place of stiffness and backlash: give one of them".into())),
         (None, None, None) => {
-            Err("gearbox needs stiffness = N m/rad, curve = [[rad, N m], ...], or guide = { ... }".into())
+            Err(at("gearbox needs stiffness = N m/rad, curve = [[rad, N m], ...], or guide = { ... }".into()))
         }
         (None, None, Some(_)) => Ok(None),
     }
 }
 
 /// Returns the stiffness of a gearbox and its number of coordinates.
-fn stiffness_of(gear: &GearboxEntry, curve: Option<&TorqueCurve>) -> Result<(GearStiffness, usize), String> {
+fn stiffness_of(
+    gear: &GearboxEntry,
+    curve: Option<&TorqueCurve>,
+    at: GearboxFault<'_>,
+) -> Result<(GearStiffness, usize), RobotFileError> {
     let (stiffness, size) = match (&gear.stiffness, curve) {
         (Some(Numbers::One(k)), _) => (GearStiffness::Axis(*k), 1),
         (None, Some(curve)) => (GearStiffness::Axis(curve.stiffest()), 1),
@@ -496,11 +503,11 @@ fn stiffness_of(gear: &GearboxEntry, curve: Option<&TorqueCurve>) -> Result<(Gea
             let K = Matrix6::from_fn(|i, j| rows[i][j]);
             let asymmetry = (K - K.transpose()).amax() / K.amax();
             if asymmetry > 1e-9 {
-                return Err(format!("the 6x6 stiffness is not symmetric: relative asymmetry {asymmetry:.1e}"));
+                return Err(at(format!("the 6x6 stiffness is not symmetric: relative asymmetry {asymmetry:.1e}")));
             }
             (GearStiffness::Full((K + K.transpose()) * 0.5), 6)
         }
-        _ => return Err("stiffness takes one number, 3, 6 or a 6x6 matrix".into()),
+        _ => return Err(at("stiffness takes one number, 3, 6 or a 6x6 matrix".into())),
     };
     let finite = match &stiffness {
         GearStiffness::Axis(k) => k.is_finite() && *k > 0.0,
@@ -509,13 +516,13 @@ fn stiffness_of(gear: &GearboxEntry, curve: Option<&TorqueCurve>) -> Result<(Gea
         GearStiffness::Guide(_) => true,
     };
     if !finite {
-        return Err("the stiffness must be finite and positive (definite)".into());
+        return Err(at("the stiffness must be finite and positive (definite)".into()));
     }
     Ok((stiffness, size))
 }
 
 /// Returns the dampers of a gearbox with `size` coordinates, if it has any.
-fn dampers(gear: &GearboxEntry, size: usize) -> Result<Option<Vec<f64>>, String> {
+fn dampers(gear: &GearboxEntry, size: usize, at: GearboxFault<'_>) -> Result<Option<Vec<f64>>, RobotFileError> {
     let dampers = match &gear.damping {
         None => return Ok(None),
         Some(Numbers::One(d)) if size == 1 => vec![*d],
@@ -525,25 +532,29 @@ fn dampers(gear: &GearboxEntry, size: usize) -> Result<Option<Vec<f64>>, String>
                 1 => "one number".to_owned(),
                 n => format!("{n} numbers"),
             };
-            return Err(format!("with this stiffness, damping takes {text}"));
+            return Err(at(format!("with this stiffness, damping takes {text}")));
         }
     };
     match dampers.iter().all(|d| d.is_finite() && *d >= 0.0) {
         true => Ok(Some(dampers)),
-        false => Err("damping must be 0 or above".into()),
+        false => Err(at("damping must be 0 or above".into())),
     }
 }
 
 /// Returns the guide of a telescopic joint.
-fn guide_gear(joint: &Joint, guide: &GuideEntry, gear: &GearboxEntry) -> Result<(Gearbox, GearDamping), String> {
+fn guide_gear(
+    joint: &Joint,
+    guide: &GuideEntry,
+    gear: &GearboxEntry,
+    at: GearboxFault<'_>,
+) -> Result<(Gearbox, GearDamping), RobotFileError> {
     let others = gear.stiffness.is_some() || gear.backlash.is_some() || gear.curve.is_some();
     if others || gear.hysteresis.is_some() || !gear.transmission_error.is_empty() {
-        return Err(
-            "guide takes the place of stiffness and of all other laws of a gearbox: keep guide and damping".into()
-        );
+        let text = "guide takes the place of stiffness and of all other laws of a gearbox: keep guide and damping";
+        return Err(at(text.into()));
     }
-    let (tubes, tilts) = guide.checked(joint)?;
-    let dampers = dampers(gear, tilts.len())?;
+    let (tubes, tilts) = guide.checked(joint).map_err(|error| at(error.to_string()))?;
+    let dampers = dampers(gear, tilts.len(), at)?;
     let gearbox = Gearbox { joint: joint.name.clone(), stiffness: GearStiffness::Guide(tubes) };
     Ok((gearbox, GearDamping { dampers, curve: None, transmission: Vec::new(), hysteresis: None, tilts }))
 }

@@ -6,6 +6,7 @@
 //! process, is up to the interface.
 
 mod model;
+mod picture;
 mod recording;
 mod value;
 
@@ -16,7 +17,10 @@ use flexarm_linkmaker::LinkError;
 use flexarm_settings::Setting;
 
 pub use flexarm_settings::Fault;
-pub use model::{BalancerError, ChannelError, LoadError, LoopError, ModellingError, PayloadError, PoseError};
+pub use model::{
+    BalancerError, ChannelError, LinkFormError, LoadError, LoopError, ModellingError, PayloadError, PoseError,
+};
+pub(crate) use picture::NoPicture;
 pub use recording::{RecordingError, StudyError};
 pub use value::ValueError;
 

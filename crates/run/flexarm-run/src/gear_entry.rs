@@ -2,7 +2,8 @@
 //! effects of a robot.
 
 use flexarm_stepping::{
-    FlexibleArm, GearCoupling, Harmonic, Hysteresis, LoadFriction, Slider, StepError, TorqueCurve, TransmissionError,
+    CurveError, FlexibleArm, GearCoupling, Harmonic, Hysteresis, LoadFriction, Slider, StepError, TorqueCurve,
+    TransmissionError,
 };
 use nalgebra::DMatrix;
 use serde::Deserialize;
@@ -79,17 +80,75 @@ pub struct GearHysteresis {
     pub loss: f64,
 }
 
+/// Reason why an angle of a gear is not read.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum AngleError {
+    #[error("{0} and {1} are both given: keep one of them")]
+    Twice(&'static str, &'static str),
+    #[error("{key} is {found}, expected a positive number")]
+    NotPositive { key: &'static str, found: f64 },
+}
+
+/// Reason why an entry is no transmission error.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum TransmissionEntryError {
+    #[error("transmission_error {0}")]
+    Amplitude(#[from] AngleError),
+    #[error("transmission_error needs amplitude (rad) or amplitude_arcsec")]
+    NoAmplitude,
+    #[error("transmission_error per_motor_turn needs the ratio of the drive")]
+    NoRatio,
+    #[error("transmission_error needs one of per_motor_turn and per_joint_turn")]
+    NoCycles,
+    #[error(
+        "transmission_error has {cycles} cycles in a turn of the joint and phase {phase}: expected positive and \
+         finite numbers"
+    )]
+    Values { cycles: f64, phase: f64 },
+}
+
+/// Reason why an entry is no hysteresis.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum HysteresisEntryError {
+    #[error("hysteresis {0}")]
+    Angle(#[from] AngleError),
+    #[error("hysteresis needs loss (rad) or loss_arcmin: the width of its loop without torque")]
+    NoLoss,
+    #[error("hysteresis with lost_motion takes a stiffness, not backlash or a curve, which say the same")]
+    LostMotionOfCurve,
+    #[error("hysteresis needs the rated_torque (N m) to which its lost_motion belongs")]
+    NoRatedTorque,
+    #[error("hysteresis has rated_torque {0}, expected a positive torque in N m")]
+    RatedTorque(f64),
+    #[error(
+        "hysteresis has a lost motion of {lost:e} rad, less than the {elastic:e} rad of elastic deflection at 3 % of \
+         the rated torque to either side: check both, or leave lost_motion out"
+    )]
+    LostMotion { lost: f64, elastic: f64 },
+    #[error(transparent)]
+    Curve(#[from] CurveError),
+    #[error(
+        "hysteresis has a loss of {loss:e} rad within the play, where no torque holds the gear back: give a larger \
+         loss, or less backlash"
+    )]
+    LossWithinPlay { loss: f64 },
+    #[error("hysteresis has reach {0}, expected a positive deflection in rad")]
+    Reach(f64),
+    #[error("hysteresis has {0} sliders, expected 1 to {most}", most = MOST_SLIDERS)]
+    Sliders(i64),
+}
+
 /// Reads a value in rad, or in another unit under another key; at most one may be given.
-fn one_of(keys: [(&str, Option<f64>); 2], unit: f64) -> Result<Option<f64>, String> {
+fn one_of(keys: [(&'static str, Option<f64>); 2], unit: f64) -> Result<Option<f64>, AngleError> {
     let [(own, value), (other, scaled)] = keys;
     let found = match (value, scaled) {
-        (Some(_), Some(_)) => return Err(format!("{own} and {other} are both given: keep one of them")),
+        (Some(_), Some(_)) => return Err(AngleError::Twice(own, other)),
         (Some(x), None) => Some((own, x, x)),
         (None, Some(x)) => Some((other, x, x * unit)),
         (None, None) => None,
     };
     match found {
-        Some((key, x, _)) if !(x.is_finite() && x > 0.0) => Err(format!("{key} is {x}, expected a positive number")),
+        Some((key, x, _)) if !(x.is_finite() && x > 0.0) => Err(AngleError::NotPositive { key, found: x }),
         found => Ok(found.map(|(_, _, value)| value)),
     }
 }
@@ -97,27 +156,26 @@ fn one_of(keys: [(&str, Option<f64>); 2], unit: f64) -> Result<Option<f64>, Stri
 /// Reads the harmonics of a gear whose motor makes `ratio` turns per turn of the joint.
 ///
 /// # Errors
-/// A message about a missing or invalid value.
-pub(crate) fn harmonics(entries: &[HarmonicEntry], ratio: Option<f64>) -> Result<Vec<Harmonic>, String> {
+/// [`TransmissionEntryError`] for a missing or invalid value.
+pub(crate) fn harmonics(
+    entries: &[HarmonicEntry],
+    ratio: Option<f64>,
+) -> Result<Vec<Harmonic>, TransmissionEntryError> {
     let harmonic = |entry: &HarmonicEntry| {
         let keys = [("amplitude", entry.amplitude), ("amplitude_arcsec", entry.amplitude_arcsec)];
-        let amplitude = one_of(keys, ARCSEC)?.ok_or("needs amplitude (rad) or amplitude_arcsec")?;
+        let amplitude = one_of(keys, ARCSEC)?.ok_or(TransmissionEntryError::NoAmplitude)?;
         let cycles = match (entry.per_motor_turn, entry.per_joint_turn, ratio) {
             (Some(n), None, Some(ratio)) => n * ratio.abs(),
-            (Some(_), None, None) => return Err("per_motor_turn needs the ratio of the drive".to_owned()),
+            (Some(_), None, None) => return Err(TransmissionEntryError::NoRatio),
             (None, Some(n), _) => n,
-            _ => return Err("needs one of per_motor_turn and per_joint_turn".to_owned()),
+            _ => return Err(TransmissionEntryError::NoCycles),
         };
         if !(cycles.is_finite() && cycles > 0.0 && entry.phase.is_finite()) {
-            return Err(format!(
-                "has {cycles} cycles in a turn of the joint and phase {}: expected positive and finite numbers",
-                entry.phase
-            ));
+            return Err(TransmissionEntryError::Values { cycles, phase: entry.phase });
         }
         Ok(Harmonic { amplitude, cycles, phase: entry.phase })
     };
-    let checked = |entry: &HarmonicEntry| harmonic(entry).map_err(|fault| format!("transmission_error {fault}"));
-    entries.iter().map(checked).collect()
+    entries.iter().map(harmonic).collect()
 }
 
 /// Builds the hysteresis of a spring with this curve.
@@ -126,36 +184,26 @@ pub(crate) fn harmonics(entries: &[HarmonicEntry], ratio: Option<f64>) -> Result
 /// all sliders slipping, the branches of the loop cross zero torque there.
 ///
 /// # Errors
-/// A message about a value that is missing, invalid or inconsistent with the stiffness.
+/// [`HysteresisEntryError`] for a value that is missing, invalid or inconsistent with the stiffness.
 pub(crate) fn hysteresis(
     entry: &HysteresisEntry,
     stiffness: f64,
     curve: Option<&TorqueCurve>,
-) -> Result<GearHysteresis, String> {
-    let fail = |fault: String| Err(format!("hysteresis {fault}"));
-    let named = |fault: String| format!("hysteresis {fault}");
-    let loss = one_of([("loss", entry.loss), ("loss_arcmin", entry.loss_arcmin)], ARCMIN).map_err(named)?;
-    let Some(loss) = loss else {
-        return fail("needs loss (rad) or loss_arcmin: the width of its loop without torque".into());
-    };
+) -> Result<GearHysteresis, HysteresisEntryError> {
+    let loss = one_of([("loss", entry.loss), ("loss_arcmin", entry.loss_arcmin)], ARCMIN)?;
+    let loss = loss.ok_or(HysteresisEntryError::NoLoss)?;
     let lost_motion =
-        one_of([("lost_motion", entry.lost_motion), ("lost_motion_arcmin", entry.lost_motion_arcmin)], ARCMIN)
-            .map_err(named)?;
+        one_of([("lost_motion", entry.lost_motion), ("lost_motion_arcmin", entry.lost_motion_arcmin)], ARCMIN)?;
     let elastic = match (curve, lost_motion, entry.rated_torque) {
-        (Some(_), Some(_), _) => {
-            return fail("with lost_motion takes a stiffness, not backlash or a curve, which say the same".into());
-        }
-        (None, Some(_), None) => return fail("needs the rated_torque (N m) to which its lost_motion belongs".into()),
+        (Some(_), Some(_), _) => return Err(HysteresisEntryError::LostMotionOfCurve),
+        (None, Some(_), None) => return Err(HysteresisEntryError::NoRatedTorque),
         (_, _, Some(rated)) if !(rated.is_finite() && rated > 0.0) => {
-            return fail(format!("has rated_torque {rated}, expected a positive torque in N m"));
+            return Err(HysteresisEntryError::RatedTorque(rated));
         }
         (None, Some(lost), Some(rated)) => {
             let (torque, half) = (LOST_MOTION_AT * rated, 0.5 * lost);
             if half <= torque / stiffness {
-                return fail(format!(
-                    "has a lost motion of {lost:e} rad, less than the {:e} rad of elastic deflection at 3 % of the rated torque to either side: check both, or leave lost_motion out",
-                    2.0 * torque / stiffness
-                ));
+                return Err(HysteresisEntryError::LostMotion { lost, elastic: 2.0 * torque / stiffness });
             }
             // On either branch of the loop the elastic part is offset by half the loop width. It
             // must be soft up to that offset plus half the lost motion, so that the middle line
@@ -163,27 +211,24 @@ pub(crate) fn hysteresis(
             let (slope, soft) = (torque / half, half + 0.5 * loss);
             let (edge, far) = (slope * soft, soft + 1.0);
             let end = edge + stiffness;
-            TorqueCurve::new(&[[-far, -end], [-soft, -edge], [0.0, 0.0], [soft, edge], [far, end]])
-                .map_err(|e| e.to_string())?
+            TorqueCurve::new(&[[-far, -end], [-soft, -edge], [0.0, 0.0], [soft, edge], [far, end]])?
         }
         (Some(curve), None, _) => curve.clone(),
         (None, None, _) => TorqueCurve::straight(stiffness),
     };
     let friction = elastic.torque(0.5 * loss);
     if friction <= 0.0 {
-        return fail(format!(
-            "has a loss of {loss:e} rad within the play, where no torque holds the gear back: give a larger loss, or less backlash"
-        ));
+        return Err(HysteresisEntryError::LossWithinPlay { loss });
     }
     let reach = match entry.reach {
         None => 0.5 * loss,
         Some(reach) if reach.is_finite() && reach > 0.0 => reach,
-        Some(reach) => return fail(format!("has reach {reach}, expected a positive deflection in rad")),
+        Some(reach) => return Err(HysteresisEntryError::Reach(reach)),
     };
     let sliders = match entry.sliders {
         None => SLIDERS,
         Some(n) if (1..=MOST_SLIDERS).contains(&n) => n as usize,
-        Some(n) => return fail(format!("has {n} sliders, expected 1 to {MOST_SLIDERS}")),
+        Some(n) => return Err(HysteresisEntryError::Sliders(n)),
     };
     Ok(GearHysteresis { elastic, sliders: Hysteresis::even_sliders(friction, reach, sliders), loss })
 }
@@ -294,7 +339,7 @@ mod tests {
     #[test]
     fn what_makes_no_hysteresis_or_ripple_is_told() {
         let fails = |text: &str, curve: Option<&TorqueCurve>, words: &str| {
-            let fault = hysteresis(&entry(text), 1e6, curve).expect_err(text);
+            let fault = hysteresis(&entry(text), 1e6, curve).expect_err(text).to_string();
             assert!(fault.contains(words), "{text}: {fault}");
         };
         fails("", None, "loss_arcmin");
@@ -313,7 +358,7 @@ mod tests {
             ("amplitude = 1e-5\nper_joint_turn = -2", "positive"),
             ("amplitude = nan\nper_joint_turn = 2", "NaN"),
         ] {
-            let fault = ripple(text, None).expect_err(text);
+            let fault = ripple(text, None).expect_err(text).to_string();
             assert!(fault.contains(words), "{text}: {fault}");
         }
         let found = ripple("amplitude_arcsec = 20.0\nper_motor_turn = 2", Some(-121.0)).unwrap()[0];

@@ -60,14 +60,37 @@ pub struct GuideTilt {
     pub play: Option<Play>,
 }
 
+/// Reason why an entry is no guide of a joint.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum GuideEntryError {
+    #[error("guide is for a prismatic joint, whose tubes slide in each other")]
+    NotPrismatic,
+    #[error(
+        "guide: at joint position {position} m the tubes overlap by {overlap:.4} m, expected more than 0 within the \
+         limits of the joint: overlap = outer_end - inner_end - position"
+    )]
+    NoOverlap { position: f64, overlap: f64 },
+    #[error(
+        "guide.{axis}.play: gap = {gap} m and width = {width} N m, expected a gap of at least 0 and a width above 0"
+    )]
+    Play { axis: char, gap: f64, width: f64 },
+    #[error(
+        "guide.{axis}.compliance: {found:.3e} rad per N m at an overlap of {overlap:.4} m, expected more than 0 within \
+         the limits of the joint: [c0, c1, c2] of c0 + c1/overlap + c2/overlap²"
+    )]
+    Compliance { axis: char, found: f64, overlap: f64 },
+    #[error("guide needs x, y or z = {{ compliance = [c0, c1, c2] }}, a tilt about an axis")]
+    NoTilt,
+}
+
 impl GuideEntry {
     /// Checks the entry for a joint; returns its tubes and the tilts about their axes.
     ///
     /// # Errors
-    /// A message that names the key, the number found and the remedy.
-    pub(crate) fn checked(&self, joint: &Joint) -> Result<(GuideTubes, Vec<GuideTilt>), String> {
+    /// [`GuideEntryError`] with the key, the number found and the remedy.
+    pub(crate) fn checked(&self, joint: &Joint) -> Result<(GuideTubes, Vec<GuideTilt>), GuideEntryError> {
         if !matches!(joint.kind, JointKind::Prismatic(_)) {
-            return Err("guide is for a prismatic joint, whose tubes slide in each other".into());
+            return Err(GuideEntryError::NotPrismatic);
         }
         let entries = [('x', &self.x), ('y', &self.y), ('z', &self.z)];
         let tubes = GuideTubes {
@@ -76,11 +99,8 @@ impl GuideEntry {
             tilts: entries.map(|(_, entry)| entry.is_some()),
         };
         let overlaps = overlaps(&tubes, &joint.limits);
-        if let Some((position, overlap)) = overlaps.iter().find(|(_, overlap)| *overlap <= 0.0) {
-            return Err(format!(
-                "guide: at joint position {position} m the tubes overlap by {overlap:.4} m, expected more than 0 within the limits of \
-                 the joint: overlap = outer_end - inner_end - position"
-            ));
+        if let Some(&(position, overlap)) = overlaps.iter().find(|(_, overlap)| *overlap <= 0.0) {
+            return Err(GuideEntryError::NoOverlap { position, overlap });
         }
         let mut tilts = Vec::new();
         for (axis, entry) in entries {
@@ -89,20 +109,15 @@ impl GuideEntry {
             if let Some(Play { gap, centre, width }) = play
                 && !(gap >= 0.0 && width > 0.0 && centre.is_finite())
             {
-                return Err(format!(
-                    "guide.{axis}.play: gap = {gap} m and width = {width} N m, expected a gap of at least 0 and a width above 0"
-                ));
+                return Err(GuideEntryError::Play { axis, gap, width });
             }
             if let Some((overlap, found)) = least_compliance(compliance, &overlaps).filter(|(_, found)| *found <= 0.0) {
-                return Err(format!(
-                    "guide.{axis}.compliance: {found:.3e} rad per N m at an overlap of {overlap:.4} m, expected more than 0 within \
-                     the limits of the joint: [c0, c1, c2] of c0 + c1/overlap + c2/overlap²"
-                ));
+                return Err(GuideEntryError::Compliance { axis, found, overlap });
             }
             tilts.push(GuideTilt { axis, compliance: *compliance, play: play.filter(|play| play.gap > 0.0) });
         }
         match tilts.is_empty() {
-            true => Err("guide needs x, y or z = { compliance = [c0, c1, c2] }, a tilt about an axis".into()),
+            true => Err(GuideEntryError::NoTilt),
             false => Ok((tubes, tilts)),
         }
     }
@@ -152,7 +167,7 @@ mod tests {
         joint
     }
 
-    fn checked(text: &str) -> Result<(GuideTubes, Vec<GuideTilt>), String> {
+    fn checked(text: &str) -> Result<(GuideTubes, Vec<GuideTilt>), GuideEntryError> {
         toml::from_str::<GuideEntry>(text).unwrap().checked(&lift())
     }
 
@@ -163,7 +178,7 @@ mod tests {
         assert_eq!((tubes.tilts, tubes.overlap(1.2)), ([false, true, false], 1.4 - 1.2));
         assert_eq!(tilts[0].play.unwrap().width, 10.0);
         let refused = |text: &str, part: &str| {
-            let message = checked(text).unwrap_err();
+            let message = checked(text).unwrap_err().to_string();
             assert!(message.contains(part), "{message}");
         };
         refused(

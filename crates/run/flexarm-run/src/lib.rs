@@ -100,8 +100,8 @@ pub use convert::{ConvertOptions, ConvertSummary, convert, convert_until, parse_
 pub use deflections::Variation;
 pub use drive_entry::{Drive, DriveKind};
 pub use error::{
-    BalancerError, ChannelError, Error, ExternalError, Fault, LoadError, LoopError, ModellingError, PayloadError,
-    PoseError, RecordingError, StudyError, ValueError,
+    BalancerError, ChannelError, Error, ExternalError, Fault, LinkFormError, LoadError, LoopError, ModellingError,
+    PayloadError, PoseError, RecordingError, StudyError, ValueError,
 };
 pub use flexarm_linkmaker::Stopwatch;
 pub use flexible::{FlexibleRobot, Owner};

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use flexarm_fem::{BeamLink, BeamTheory, Material, ReducedLink, Section, UnitSystem};
+use flexarm_fem::{BeamLink, Material, ReducedLink, Section, UnitSystem};
 use flexarm_files::{Source, TextFileError as RobotFileError};
 use flexarm_flexlink::{FlexibleLink, LinkForm, Parts, SubstitutionError, distal_joint};
 use flexarm_kinematics::{ElasticAngles, Mechanism, Pose};
@@ -238,7 +238,7 @@ fn factors(entry: &FlexibleLinkEntry, source: &Source) -> Result<(f64, [f64; 6])
 
 /// Checks that the requested model exists; overrides are checked when they are used.
 fn check_form(link: &RobotLink, entry: &FlexibleLinkEntry, source: &Source) -> Result<(), RobotFileError> {
-    let Err((asked, message)) = link.form_or_key(&Modelling::default()) else { return Ok(()) };
+    let Err((asked, error)) = link.form_or_key(&Modelling::default()) else { return Ok(()) };
     let key = match asked {
         RequestedKey::Model => None,
         RequestedKey::Segments => entry.segments.as_ref().map(Spanned::span),
@@ -249,7 +249,7 @@ fn check_form(link: &RobotLink, entry: &FlexibleLinkEntry, source: &Source) -> R
         RequestedKey::Directions => entry.stiffness_factors.as_ref().map(Spanned::span),
     };
     let span = key.or(entry.model.as_ref().map(Spanned::span)).unwrap_or(entry.link.span());
-    Err(source.error(span, message))
+    Err(source.error(span, error.to_string()))
 }
 
 /// Returns the source of the stress of a link, if its stress is to be computed.
@@ -373,18 +373,12 @@ fn beam_link(
 ) -> Result<(ReducedLink, Parts, Option<BeamLink>), Error> {
     let beam = entry.get_ref();
     let fail = |message: String| Error::from(source.error(entry.span(), format!("link {name:?}: {message}")));
-    let (section, material): (Section, Material) = beam_section(beam).map_err(fail)?;
+    let (section, material): (Section, Material) = beam_section(beam).map_err(|error| fail(error.to_string()))?;
     if beam.material.is_some() {
         let doubts = material.doubts(&UnitSystem::SI).into_iter();
         warnings.extend(doubts.map(|doubt| format!("link {name:?}: {doubt}")));
     }
-    let theory = match beam.theory.as_deref() {
-        None | Some("timoshenko") => BeamTheory::Timoshenko,
-        Some("euler-bernoulli") => BeamTheory::EulerBernoulli,
-        Some(other) => {
-            return Err(fail(format!("theory {other:?} is not known; use \"timoshenko\" or \"euler-bernoulli\"")));
-        }
-    };
+    let theory = beam.theory().map_err(|error| fail(error.to_string()))?;
     let [from, to] = beam.ends.map_or([Vector3::zeros(), X_LB.translation.vector], |ends| ends.map(Vector3::from));
     let axis = to - from;
     let length = axis.norm();

@@ -3,7 +3,7 @@
 
 use flexarm_analysis::{DampedMode, tcp_error};
 use flexarm_kinematics::{Frame, forward_kinematics};
-use flexarm_log::{Caption, ElasticSample, RunResult, Sample, TwinSample};
+use flexarm_log::{Caption, ElasticSample, RunHeader, RunResult, Sample, TwinSample};
 use flexarm_stepping::Linear;
 use nalgebra::DVector;
 
@@ -73,23 +73,13 @@ pub fn record_modes(
     let mut files = recorders(Some(outputs), false)?;
     (files.names.report, files.names.report_md) = (None, None);
     let mut header = robot_header(robot, &posed.arm);
-    header.trajectory = "modes".into();
-    header.has_rigid = true;
     let flexible = robot.modelled(modelling)?;
     let (bends, stations) = stations(&flexible.bends, &posed.arm.model, &header.links);
     header.bends = bends;
     header.color_scale_m = crate::magnification::round_up(motion);
     header.volume = Some(volume(&posed, motion));
-    header.log_rate_hz = RATE_HZ;
     let swings = (movie.seconds * SHOWN_HZ).ceil();
-    let start = |k: usize| k as f64 * swings / SHOWN_HZ;
-    let caption = |(k, mode): (usize, &DampedMode)| Caption { from_s: start(k), text: name(k, mode) };
-    header.captions = shown.iter().enumerate().map(caption).collect();
-    header.description = list(&robot.name, shown, start);
-    let row = |(k, mode): (usize, &DampedMode)| {
-        (format!("mode {}", k + 1), format!("{:.4} Hz, from {} s", mode.frequency_hz(), start(k)))
-    };
-    header.metadata = vec![("flexarm.modes".into(), shown.iter().enumerate().map(row).collect())];
+    describe_modes(&mut header, shown, swings / SHOWN_HZ);
     files.begin(&header)?;
     let per_mode = (swings / SHOWN_HZ * RATE_HZ).round() as u64;
     let mut stage = Stage::new(robot, &posed, linear, stations);
@@ -109,6 +99,21 @@ pub fn record_modes(
     let mut figures = table(robot, &posed, &model, &all, count)?;
     figures.files = names;
     Ok(figures)
+}
+
+/// Adds captions and tables of the modes, each shown for the same time, to the header.
+fn describe_modes(header: &mut RunHeader, shown: &[DampedMode], seconds: f64) {
+    header.trajectory = "modes".into();
+    header.has_rigid = true;
+    header.log_rate_hz = RATE_HZ;
+    let start = |k: usize| k as f64 * seconds;
+    let caption = |(k, mode): (usize, &DampedMode)| Caption { from_s: start(k), text: name(k, mode) };
+    header.captions = shown.iter().enumerate().map(caption).collect();
+    header.description = list(&header.robot, shown, start);
+    let row = |(k, mode): (usize, &DampedMode)| {
+        (format!("mode {}", k + 1), format!("{:.4} Hz, from {} s", mode.frequency_hz(), start(k)))
+    };
+    header.metadata = vec![("flexarm.modes".into(), shown.iter().enumerate().map(row).collect())];
 }
 
 /// Caption of a mode.

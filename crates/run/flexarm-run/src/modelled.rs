@@ -248,7 +248,7 @@ impl Robot {
         let modal = link.form(&modelling).map_err(|instead| ModellingError::Branch {
             link: name.clone(),
             why: why.clone(),
-            instead,
+            instead: Box::new(instead),
         })?;
         Ok((modal, Some(format!("link {name:?} is modal (model = \"modal\"): {why}"))))
     }

@@ -156,7 +156,7 @@ impl Arm {
     /// # Errors
     /// As [`modes()`].
     pub fn modes(&self, at: Option<&[f64]>, speeds: Option<&[f64]>, count: usize) -> Result<ModeTable, Error> {
-        lowest(self.robot(), &Posed::on(self, at)?, speeds, count)
+        lowest(self.robot(), &self.posed(at)?, speeds, count)
     }
 }
 

@@ -8,7 +8,6 @@ use flexarm_settings::Quantity;
 use flexarm_stepping::{FlexibleArm, Held, Linear, OperatingPoint, StepError, linearise};
 use nalgebra::{DVector, Vector6};
 
-use crate::arm::Arm;
 use crate::balancer;
 use crate::caveat::pose::ArmAtRest;
 use crate::caveat::{Caveat, kinds, of_use, once_each, validity};
@@ -34,7 +33,7 @@ pub struct Posed {
     /// Joint values (rad or m).
     pub at: Vec<f64>,
     /// Result of [`Robot::caveats`], if already known.
-    of_robot: Option<Arc<[Caveat]>>,
+    pub(crate) of_robot: Option<Arc<[Caveat]>>,
 }
 
 /// Wraps a step error of a command that takes no steps.
@@ -61,15 +60,6 @@ impl Posed {
     /// As [`Self::new`], with `at` in coordinate order (rad or m).
     pub(crate) fn held(robot: &Robot, modelling: &Modelling, at: Vec<f64>) -> Result<Self, Error> {
         Self::with(Arc::new(robot.modelled(modelling)?), at)
-    }
-
-    /// Poses an arm that is already modelled; `at`: values of all actuated joints (rad or m), zero
-    /// by default.
-    pub fn on(arm: &Arm, at: Option<&[f64]>) -> Result<Self, Error> {
-        let flexible = arm.flexible().clone();
-        let names: Vec<&str> = flexible.rigid.coordinates().iter().map(|c| c.joint.as_str()).collect();
-        let at = joint_values(at, &names)?;
-        Ok(Self { of_robot: Some(arm.robot_caveats()), ..Self::with(flexible, at)? })
     }
 
     /// Poses a robot that is already modelled; `at` in coordinate order (rad or m).
@@ -184,21 +174,6 @@ pub(crate) fn strains(flexible: &FlexibleRobot, arm: &FlexibleArm, q: &DVector<f
             (strain, rotation_vector((straight.rotation.inverse() * bent.rotation).matrix()).norm())
         })
         .collect()
-}
-
-impl Arm {
-    /// Returns mass, damping and stiffness about the static equilibrium at a pose under gravity and
-    /// a wrench at the TCP, and the Jacobian of the TCP with respect to the free coordinates.
-    ///
-    /// * `at`: values of all actuated joints (rad or m), zero by default.
-    /// * `wrench`: force and moment at the TCP, world axes (N, N m).
-    ///
-    /// # Errors
-    /// [`Error::Pose`] for joint values that do not fit, [`Error::Step`] if there is no
-    /// equilibrium.
-    pub fn linearise(&self, at: Option<&[f64]>, wrench: [f64; 6]) -> Result<Linear, Error> {
-        Posed::on(self, at)?.linear(&wrench.into())
-    }
 }
 
 /// Checks that the figures of a result are finite.

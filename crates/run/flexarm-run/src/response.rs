@@ -188,7 +188,7 @@ impl Arm {
     /// # Errors
     /// As [`response()`].
     pub fn response(&self, at: Option<&[f64]>, request: &ResponseRequest) -> Result<Response, Error> {
-        response_at(self.robot(), Posed::on(self, at)?, request, None)
+        response_at(self.robot(), self.posed(at)?, request, None)
     }
 }
 
@@ -214,52 +214,11 @@ fn response_at(
     let (from, to) = range(request, &frequencies_hz)?;
     let system = system(&linear, &inputs, &channels);
 
-    // One solution per frequency serves all curves; it does not exist at an undamped resonance,
-    // which is left out.
     let resonances: Vec<(f64, f64)> = frequencies_hz.iter().copied().zip(damping_ratio.iter().copied()).collect();
     let grid = with_resonances(&frequency_grid(from, to, request.points, request.spacing), &resonances);
-    let displacement = |hz: f64| system.response(std::f64::consts::TAU * hz).ok();
-    let factor = |hz: f64| request.quantity.factor(std::f64::consts::TAU * hz);
-    let answer = |hz: f64| displacement(hz).map(|H| H * factor(hz));
-    // All quantities use the same frequencies, those that resolve the displacement.
-    let (frequency_hz, answers) = resolved_response(&grid, displacement, RESOLUTION);
-    let answers: Vec<DMatrix<Complex<f64>>> = frequency_hz.iter().zip(answers).map(|(hz, H)| H * factor(*hz)).collect();
+    let transfer = Transfer::resolved(&system, request.quantity, &grid);
     system.check().map_err(linear_error)?;
-
-    // A curve that is negligible among those of its unit has only round-off peaks.
-    let size = |i: usize, j: usize| answers.iter().map(|H| H[(i, j)].norm()).fold(0.0, f64::max);
-    let largest = |unit: &str, other: &dyn Fn(usize, usize) -> String| {
-        let all = (0..channels.len()).flat_map(|i| (0..inputs.len()).map(move |j| (i, j)));
-        all.filter(|&(i, j)| other(i, j) == unit).map(|(i, j)| size(i, j)).fold(0.0, f64::max)
-    };
-    let unit_of = |i: usize, j: usize| unit(&channels[i], &inputs[j], request.quantity);
-    let mut curves = Vec::new();
-    for (j, input) in inputs.iter().enumerate() {
-        for (i, output) in channels.iter().enumerate() {
-            let at = |hz: f64| answer(hz).map_or(Complex::new(0.0, 0.0), |H| H[(i, j)]);
-            let magnitude: Vec<f64> = answers.iter().map(|H| H[(i, j)].norm()).collect();
-            let nothing = size(i, j) < NOTHING * largest(&unit_of(i, j), &unit_of);
-            let peaks =
-                if nothing { Vec::new() } else { response_peaks(&frequency_hz, &magnitude, |hz| at(hz).norm()) };
-            let peaks = peaks
-                .into_iter()
-                .map(|p| PeakFigures {
-                    frequency_hz: p.frequency,
-                    magnitude: p.magnitude,
-                    phase_rad: at(p.frequency).arg(),
-                })
-                .collect();
-            curves.push(ResponseCurve {
-                input: input.word.clone(),
-                output: output.word.clone(),
-                unit: unit(output, input, request.quantity),
-                at_rest: answer(0.0).map(|H| H[(i, j)].re),
-                peaks,
-                magnitude,
-                phase_rad: unwrapped(answers.iter().map(|H| H[(i, j)].arg())),
-            });
-        }
-    }
+    let curves = transfer.curves(&inputs, &channels);
     let mut caveats = posed.caveats_of(robot, &linear, &[0.0; 6]);
     let within = |k: &usize| damping_ratio[*k] < UNDAMPED && (from..=to).contains(&frequencies_hz[*k]);
     if let Some(k) = (0..modes.len()).find(within) {
@@ -272,7 +231,7 @@ fn response_at(
         quantity: quantity_name(request.quantity),
         frequencies_hz,
         damping_ratio,
-        frequency_hz,
+        frequency_hz: transfer.frequency_hz,
         logarithmic: request.spacing == Spacing::Logarithmic,
         curves,
         files: ResponseFiles::default(),
@@ -286,6 +245,65 @@ fn response_at(
         save(&mut response, paths)?;
     }
     Ok(response)
+}
+
+/// Response matrices of a linear system, outputs by inputs. One solution per frequency serves all
+/// curves.
+struct Transfer<'a> {
+    system: &'a LinearSystem,
+    quantity: Quantity,
+    /// Frequencies that resolve the displacements (Hz); all quantities use the same.
+    frequency_hz: Vec<f64>,
+    matrices: Vec<DMatrix<Complex<f64>>>,
+}
+
+impl<'a> Transfer<'a> {
+    fn resolved(system: &'a LinearSystem, quantity: Quantity, grid: &[f64]) -> Self {
+        let displacement = |hz: f64| system.response(std::f64::consts::TAU * hz).ok();
+        let (frequency_hz, displacements) = resolved_response(grid, displacement, RESOLUTION);
+        let factor = |hz: &f64| quantity.factor(std::f64::consts::TAU * hz);
+        let matrices = frequency_hz.iter().zip(displacements).map(|(hz, H)| H * factor(hz)).collect();
+        Self { system, quantity, frequency_hz, matrices }
+    }
+
+    /// Returns the matrix at a frequency; there is none at an undamped resonance.
+    fn at(&self, hz: f64) -> Option<DMatrix<Complex<f64>>> {
+        let omega = std::f64::consts::TAU * hz;
+        self.system.response(omega).ok().map(|H| H * self.quantity.factor(omega))
+    }
+
+    /// Returns a curve for each pair of output and input.
+    fn curves(&self, inputs: &[Channel], outputs: &[Channel]) -> Vec<ResponseCurve> {
+        let pairs = || (0..inputs.len()).flat_map(|j| (0..outputs.len()).map(move |i| (i, j)));
+        let unit_of = |(i, j): (usize, usize)| unit(&outputs[i], &inputs[j], self.quantity);
+        let size = |place: (usize, usize)| self.matrices.iter().map(|H| H[place].norm()).fold(0.0, f64::max);
+        let curve = |place: (usize, usize)| {
+            let unit = unit_of(place);
+            let at = |hz: f64| self.at(hz).map_or(Complex::new(0.0, 0.0), |H| H[place]);
+            let magnitude: Vec<f64> = self.matrices.iter().map(|H| H[place].norm()).collect();
+            // A curve that is negligible among those of its unit has only round-off peaks.
+            let largest = pairs().filter(|other| unit_of(*other) == unit).map(size).fold(0.0, f64::max);
+            let peaks = match size(place) < NOTHING * largest {
+                true => Vec::new(),
+                false => response_peaks(&self.frequency_hz, &magnitude, |hz| at(hz).norm()),
+            };
+            let peaks = peaks.into_iter().map(|p| PeakFigures {
+                frequency_hz: p.frequency,
+                magnitude: p.magnitude,
+                phase_rad: at(p.frequency).arg(),
+            });
+            ResponseCurve {
+                input: inputs[place.1].word.clone(),
+                output: outputs[place.0].word.clone(),
+                unit,
+                at_rest: self.at(0.0).map(|H| H[place].re),
+                peaks: peaks.collect(),
+                magnitude,
+                phase_rad: unwrapped(self.matrices.iter().map(|H| H[place].arg())),
+            }
+        };
+        pairs().map(curve).collect()
+    }
 }
 
 /// Lowest and highest frequency, as requested or derived from the modes.

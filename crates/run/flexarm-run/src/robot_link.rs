@@ -4,13 +4,13 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use flexarm_fem::stress::StressFields;
-use flexarm_fem::{BeamLink, ModalLink, ModalOptions};
+use flexarm_fem::{BeamLink, FemError, ModalLink, ModalOptions};
 use flexarm_flexlink::{FlexibleLink, LinkForm};
 use flexarm_kinematics::MOST_COORDINATES;
-use flexarm_settings::Setting;
 use flexarm_stepping::Damping;
 use nalgebra::Matrix6;
 
+use crate::error::LinkFormError;
 use crate::options::{LinkModel, Modelling};
 use crate::strength::Strength;
 
@@ -106,80 +106,62 @@ impl RobotLink {
     /// Returns the model of the link; rigid links have none.
     ///
     /// # Errors
-    /// A message that names what the source of the link lacks.
-    pub fn form(&self, modelling: &Modelling) -> Result<LinkForm, String> {
-        self.form_or_key(modelling).map_err(|(_, message)| message)
+    /// [`LinkFormError`] with what the source of the link lacks.
+    pub fn form(&self, modelling: &Modelling) -> Result<LinkForm, LinkFormError> {
+        self.form_or_key(modelling).map_err(|(_, error)| error)
     }
 
     /// As [`Self::form`], with the robot file key that requested what is missing.
-    pub(crate) fn form_or_key(&self, modelling: &Modelling) -> Result<LinkForm, (RequestedKey, String)> {
+    pub(crate) fn form_or_key(&self, modelling: &Modelling) -> Result<LinkForm, (RequestedKey, LinkFormError)> {
+        let link = || self.flexible.link.clone();
         let model = if modelling.links == LinkModel::AsFiled { self.choices.model } else { modelling.links };
         match model {
             LinkModel::Modal if self.stiffness_factors != [1.0; 6] => {
-                let name = &self.flexible.link;
-                let message = format!(
-                    "link {name:?}: stiffness_factors are those of the springs of a lumped link; a modal link has one stiffness_factor"
-                );
-                Err((RequestedKey::Directions, message))
+                Err((RequestedKey::Directions, LinkFormError::ModalDirections { link: link() }))
             }
             LinkModel::Modal if self.stiffness.is_some() => {
-                Err((RequestedKey::Stiffness, self.one_spring("modal body")))
+                Err((RequestedKey::Stiffness, LinkFormError::ModalStiffness { link: link() }))
             }
             LinkModel::Modal => self.modal(modelling).map(|modal| LinkForm::Modal(Arc::new(modal))),
             _ => match modelling.segments.unwrap_or(self.choices.segments) {
                 2 => Ok(LinkForm::TwoParts),
-                n if self.stiffness.is_some() => {
-                    Err((RequestedKey::Stiffness, self.one_spring(&format!("has {n} parts"))))
+                parts if self.stiffness.is_some() => {
+                    Err((RequestedKey::Stiffness, LinkFormError::ChainStiffness { link: link(), parts }))
                 }
-                n => self.lumped(n).map_err(|message| (RequestedKey::Segments, message)),
+                n => self.lumped(n).map_err(|error| (RequestedKey::Segments, error)),
             },
         }
     }
 
-    /// Returns the message that the link's own stiffness fits only the two-part model.
-    fn one_spring(&self, has: &str) -> String {
-        let name = &self.flexible.link;
-        format!("link {name:?} {has}: its stiffness is that of the one spring between two rigid parts; leave it out")
-    }
-
-    fn lumped(&self, segments: usize) -> Result<LinkForm, String> {
-        let name = &self.flexible.link;
+    fn lumped(&self, segments: usize) -> Result<LinkForm, LinkFormError> {
+        let link = || self.flexible.link.clone();
         let coordinates = 6 * segments.saturating_sub(1);
         if coordinates > MOST_COORDINATES {
-            return Err(format!(
-                "link {name:?}: {segments} segments have {coordinates} elastic coordinates, a robot can have {MOST_COORDINATES} in all, for the \
-                 time of a step grows with their cube: ask for at most {} in one link, or for modes, which say more with fewer",
-                MOST_COORDINATES / 6 + 1
-            ));
+            return Err(LinkFormError::ManySegments { link: link(), segments, coordinates });
         }
         if let Some(beam) = &self.beam {
-            return beam.chain(segments).map(LinkForm::Chain).map_err(|e| format!("link {name:?}: {e}"));
+            let chain = beam.chain(segments).map(LinkForm::Chain);
+            return chain.map_err(|source| LinkFormError::Chain { link: link(), source: Box::new(source) });
         }
         let chains = self.flexible.reduced.details.as_ref().map_or(&[][..], |d| &d.chains[..]);
-        chains.iter().find(|c| c.parts.len() == segments).cloned().map(LinkForm::Chain).ok_or_else(|| {
-            let there: Vec<String> = chains.iter().map(|c| c.parts.len().to_string()).collect();
-            let there =
-                if there.is_empty() { "only two parts".into() } else { format!("2, {} parts", there.join(", ")) };
-            format!(
-                "link {name:?}: its .flex file has no chain of {segments} parts (it has {there}): make it with flexarm \
-                 reduce {} {segments}, or choose another number of segments",
-                Setting::Chains
-            )
+        let chain = chains.iter().find(|chain| chain.parts.len() == segments).cloned();
+        chain.map(LinkForm::Chain).ok_or_else(|| LinkFormError::NoChain {
+            link: link(),
+            segments,
+            stored: chains.iter().map(|chain| chain.parts.len()).collect(),
         })
     }
 
-    fn modal(&self, modelling: &Modelling) -> Result<ModalLink, (RequestedKey, String)> {
+    fn modal(&self, modelling: &Modelling) -> Result<ModalLink, (RequestedKey, LinkFormError)> {
         let name = &self.flexible.link;
+        let link = || name.clone();
         let fail = |asked: RequestedKey| {
-            move |e: flexarm_fem::FemError| (asked, format!("link {name:?} cannot be modal: {e}"))
+            move |source: FemError| (asked, LinkFormError::NotModal { link: name.clone(), source: Box::new(source) })
         };
         let wanted = modelling.modes.or(self.choices.modes);
         if let Some(modes) = wanted.filter(|modes| *modes > MOST_MODES) {
-            let message = format!(
-                "link {name:?}: {modes} modes are requested, at most {MOST_MODES} are allowed: the work of a step grows with the cube of their \
-                 number, and those beyond the first dozen are far above what a drive or a tool excites"
-            );
-            return Err((RequestedKey::Modes, message));
+            let error = LinkFormError::ManyModes { link: link(), modes, most: MOST_MODES };
+            return Err((RequestedKey::Modes, error));
         }
         let full = match &self.beam {
             Some(beam) => {
@@ -195,30 +177,20 @@ impl RobotLink {
                     let element = details?.superelement.as_ref()?;
                     Some(ModalLink::from_superelement(name, element).map_err(fail(RequestedKey::Model)))
                 };
-                let link = stored.or_else(condensed).ok_or_else(|| {
-                    let message = format!(
-                        "link {name:?} cannot be modal: its .flex file has no mass over interfaces and modes; reduce \
-                         the mesh again with this version, or use model = \"lumped\""
-                    );
-                    (RequestedKey::Model, message)
-                })??;
-                let all = link.coordinates().saturating_sub(6 * link.interfaces.len());
+                let no_mass = || (RequestedKey::Model, LinkFormError::NoModalMass { link: link() });
+                let modal = stored.or_else(condensed).ok_or_else(no_mass)??;
+                let stored = modal.coordinates().saturating_sub(6 * modal.interfaces.len());
                 match wanted {
-                    Some(n) if n < all => link.truncated(n).map_err(fail(RequestedKey::Modes))?,
-                    Some(n) if n > all => {
-                        let message = format!("link {name:?}: {n} modes are requested, its .flex file has {all}");
-                        return Err((RequestedKey::Modes, message));
+                    Some(n) if n < stored => modal.truncated(n).map_err(fail(RequestedKey::Modes))?,
+                    Some(modes) if modes > stored => {
+                        return Err((RequestedKey::Modes, LinkFormError::FewModes { link: link(), modes, stored }));
                     }
-                    _ => link,
+                    _ => modal,
                 }
             }
         };
         if self.choices.geometric && full.geometric.is_none() {
-            let message = format!(
-                "link {name:?}: geometric_stiffening needs a beam, or a .flex file made with flexarm reduce {}",
-                Setting::Geometric
-            );
-            return Err((RequestedKey::Geometric, message));
+            return Err((RequestedKey::Geometric, LinkFormError::NoGeometric { link: link() }));
         }
         match self.choices.eigenmodes {
             Some(keep) => full.orthogonalised(Some(keep)).map_err(fail(RequestedKey::Eigenmodes)),

@@ -127,7 +127,7 @@ impl Arm {
     /// # Errors
     /// As [`statics()`].
     pub fn statics(&self, at: Option<&[f64]>, wrench: [f64; 6]) -> Result<Statics, Error> {
-        statics_at(self.robot(), Posed::on(self, at)?, self.modelling(), wrench, None)
+        statics_at(self.robot(), self.posed(at)?, self.modelling(), wrench, None)
     }
 }
 

@@ -11,7 +11,7 @@ use nalgebra::DVector;
 use serde::Serialize;
 
 use crate::bends::stations;
-use crate::error::Error;
+use crate::error::{Error, NoPicture};
 use crate::magnification::Expected;
 use crate::posed::Posed;
 use crate::record::{link_frames, robot_header};
@@ -63,7 +63,7 @@ pub(crate) fn save(
     let picture = match draw(&header, &sample, statics, &posed.prismatic) {
         Ok(png) => Some(png),
         Err(why) => {
-            statics.warnings.push(why);
+            statics.warnings.push(why.to_string());
             None
         }
     };
@@ -79,14 +79,14 @@ pub(crate) fn save(
 }
 
 #[cfg(feature = "png")]
-fn draw(header: &RunHeader, sample: &Sample, statics: &Statics, slides: &[bool]) -> Result<Vec<u8>, String> {
+fn draw(header: &RunHeader, sample: &Sample, statics: &Statics, slides: &[bool]) -> Result<Vec<u8>, NoPicture> {
     let C = nalgebra::Matrix3::from_fn(|row, column| statics.compliance[row][column]);
-    flexarm_draw::arm_sheet(header, sample, &lines(statics, slides), Some(&C), WIDTH).map_err(|error| error.to_string())
+    Ok(flexarm_draw::arm_sheet(header, sample, &lines(statics, slides), Some(&C), WIDTH)?)
 }
 
 #[cfg(not(feature = "png"))]
-fn draw(_: &RunHeader, _: &Sample, _: &Statics, _: &[bool]) -> Result<Vec<u8>, String> {
-    Err("this build has no pictures: it was made without the feature png".to_owned())
+fn draw(_: &RunHeader, _: &Sample, _: &Statics, _: &[bool]) -> Result<Vec<u8>, NoPicture> {
+    Err(NoPicture::NotBuilt)
 }
 
 /// Text lines of the picture.

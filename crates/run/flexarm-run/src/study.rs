@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use flexarm_log::{Recorder, RecordingFormat, Trace};
 
-use crate::arm::Run;
+use crate::arm::{Arm, Run};
 use crate::comparison::difference;
 use crate::error::{Error, StudyError};
 use crate::magnification::{Expected, fit_color_scale};
@@ -28,6 +28,13 @@ pub struct Variant {
     pub scenario: Scenario,
     /// Options of the run.
     pub options: RunOptions,
+}
+
+impl Variant {
+    /// Adds the label to an error.
+    fn named(&self, error: Error) -> Error {
+        Error::InStudy { label: self.label.clone(), source: Box::new(error) }
+    }
 }
 
 /// Runs all variants and compares them with the first.
@@ -60,19 +67,7 @@ pub fn compare_study(
                 .without(RecordingFormat::Rrd),
         })
     };
-    let named = |number: usize| {
-        let label: &String = &variants[number].label;
-        move |error: Error| Error::InStudy { label: label.clone(), source: Box::new(error) }
-    };
-    // All checks that need no simulation come first, so that errors appear before minutes of
-    // running.
-    let (mut expected, mut arms) = (Expected::default(), Vec::new());
-    for (number, variant) in variants.iter().enumerate() {
-        let arm = variant.robot.flexible(variant.options.modelling).map_err(named(number))?;
-        expected = expected.or(arm.expected(&variant.scenario, &variant.options).map_err(named(number))?);
-        arms.push(arm);
-        own_outputs(number).as_ref().map_or(Ok(()), refuse_to_overwrite)?;
-    }
+    let (arms, expected) = checked_arms(variants, own_outputs)?;
     let recording = StudyRecording::new(variants, outputs)?;
     let mut summaries = Vec::new();
     let mut traces: Vec<(String, Trace)> = Vec::new();
@@ -91,7 +86,7 @@ pub fn compare_study(
             ..RunRequest::keeping(Keep::Curves)
         };
         let run = arm.simulate_with(&variant.scenario, &options, request);
-        let Run { mut summary, trace, .. } = run.map_err(named(number))?;
+        let Run { mut summary, trace, .. } = run.map_err(|error| variant.named(error))?;
         before += variant.scenario.duration_s();
         summary.label = Some(variant.label.clone());
         summary.difference = traces.first().and_then(|(_, first)| difference(first, &trace));
@@ -108,6 +103,24 @@ pub fn compare_study(
         crate::report::write_study(outputs, &summary, &traces)?;
     }
     Ok((summary, traces))
+}
+
+/// Returns the arms of the variants and the largest expected deflections.
+///
+/// These are all checks that need no simulation: errors appear before minutes of running.
+fn checked_arms(
+    variants: &[Variant],
+    own_outputs: impl Fn(usize) -> Option<Outputs>,
+) -> Result<(Vec<Arm>, Expected), Error> {
+    let (mut expected, mut arms) = (Expected::default(), Vec::new());
+    for (number, variant) in variants.iter().enumerate() {
+        let Variant { robot, scenario, options, .. } = variant;
+        let arm = robot.flexible(options.modelling).map_err(|error| variant.named(error))?;
+        expected = expected.or(arm.expected(scenario, options).map_err(|error| variant.named(error))?);
+        arms.push(arm);
+        own_outputs(number).as_ref().map_or(Ok(()), refuse_to_overwrite)?;
+    }
+    Ok((arms, expected))
 }
 
 /// Maximum length of a run's folder name.

@@ -296,10 +296,7 @@ fn attempt(
     let own = limits::passed(robot, &scenario.motion, &before.efforts, request)?;
     // Results that will be refused or computed again are not evaluated on other plants.
     let kept = request.limits == LimitRule::Tell || limits::worse(&limits, &own).next().is_none();
-    let plants = match request.sweep && kept {
-        true => sweep(robot, request, &job, arm, &found.motion)?,
-        false => Vec::new(),
-    };
+    let plants = if request.sweep && kept { sweep(robot, request, &job, arm, &found.motion)? } else { Vec::new() };
     let change = |(k, joint): (usize, &str)| JointChange { joint: joint.into(), largest: found.change.row(k).amax() };
     let curves = job.times.iter().zip(before.distance.iter().zip(&after.distance)).map(|(t, (a, b))| [*t, *a, *b]);
     let mut answer = Compensation {

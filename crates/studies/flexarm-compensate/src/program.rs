@@ -9,12 +9,12 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use flexarm_kinematics::{
-    Data, Frame, IkOptions, Pose, Wrench, forward_kinematics, inverse_kinematics, rotation_vector,
+    Data, Frame, IkError, IkOptions, Pose, Wrench, forward_kinematics, inverse_kinematics, rotation_vector,
 };
 use flexarm_path::program::{Item, Move, MoveKind, Target};
 use flexarm_path::{PathOptions, ProgramArm, base_of, target_at, target_joints, tool_of};
 use flexarm_programs::{NewTarget, ProgramText};
-use flexarm_stepping::{FlexibleArm, Held, InertiaChange, linearise, static_targets};
+use flexarm_stepping::{FlexibleArm, Held, InertiaChange, StepError, TargetError, linearise, static_targets};
 use nalgebra::{DVector, Translation3, Vector3, Vector6};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -82,6 +82,19 @@ pub(super) struct Corrected {
     pub(super) files: Vec<(PathBuf, Vec<u8>)>,
 }
 
+/// Reason why a target cannot be corrected or judged.
+#[derive(Debug, thiserror::Error)]
+enum NoCorrection {
+    #[error(transparent)]
+    Target(#[from] TargetError),
+    #[error(transparent)]
+    Step(#[from] StepError),
+    #[error("its auxiliary point is not reached: {0}")]
+    AuxiliaryPoint(IkError),
+    #[error("the corrected program has different moves")]
+    OtherMoves,
+}
+
 /// Whether a motion was read from a program with replaceable targets.
 pub(super) fn is_program(motion: &Motion) -> bool {
     ["KRL", "RAPID"]
@@ -133,13 +146,13 @@ pub(super) fn corrected(
     let rests = stops.iter().map(|stop| stop.rest_s).collect();
     let rest = AtRest::new(arm, &controller, scenario, request, rests)?;
 
-    let found: Vec<Result<TargetValues, String>> = stops.par_iter().map(|stop| rest.target(stop)).collect();
+    let found: Vec<Result<TargetValues, NoCorrection>> = stops.par_iter().map(|stop| rest.target(stop)).collect();
     let mut left: Vec<(usize, String)> = Vec::new();
     let mut targets = Vec::new();
     for (stop, found) in stops.iter().zip(found) {
         match found {
             Ok((target, via)) => targets.push((stop.item, target, via)),
-            Err(why) => left.push((stop.item, why)),
+            Err(why) => left.push((stop.item, why.to_string())),
         }
     }
     let loaded = if rest.is_loaded() { " under the loads at each target" } else { "" };
@@ -153,8 +166,8 @@ pub(super) fn corrected(
         return Err(Error::File { path: path.clone(), what: "the program has no text".into() });
     };
     let again = understood(main, others.to_vec())?;
-    let judged =
-        judged(&rest, &stops, &again.places, &left).map_err(|what| Error::File { path: path.clone(), what })?;
+    let judged = judged(&rest, &stops, &again.places, &left)
+        .map_err(|error| Error::File { path: path.clone(), what: error.to_string() })?;
     let figures = ProgramFigures {
         files: rewritten.files.iter().map(|(file, _)| in_folder(folder, file).display().to_string()).collect(),
         corrected: rewritten.replaced.len(),
@@ -191,12 +204,12 @@ fn judged(
     stops: &[Stop<'_>],
     again: &[Option<DVector<f64>>],
     left: &[(usize, String)],
-) -> Result<ProgramFigures, String> {
+) -> Result<ProgramFigures, NoCorrection> {
     let off = |stop: &Stop<'_>| {
-        let now = again.get(stop.item).and_then(Option::as_ref).ok_or("the corrected program has different moves")?;
+        let now = again.get(stop.item).and_then(Option::as_ref).ok_or(NoCorrection::OtherMoves)?;
         Ok([rest.off(stop, stop.q)?, rest.off(stop, now)?])
     };
-    let off: Vec<[Vector6<f64>; 2]> = stops.par_iter().map(off).collect::<Result<_, String>>()?;
+    let off: Vec<[Vector6<f64>; 2]> = stops.par_iter().map(off).collect::<Result<_, NoCorrection>>()?;
     let loaded = stops.iter().filter(|stop| rest.acts(stop.rest_s)).count();
     let mut figures = ProgramFigures { targets: stops.len(), loaded, ..ProgramFigures::default() };
     let size = |v: &Vector6<f64>, first: usize| v.fixed_rows::<3>(first).norm();
@@ -365,18 +378,18 @@ impl<'a> AtRest<'a> {
 
     /// Returns the joint positions at which the flexible TCP is at the pose of the rigid one at
     /// `q`.
-    fn joints(&self, stop: &Stop<'_>, q: &DVector<f64>) -> Result<DVector<f64>, String> {
+    fn joints(&self, stop: &Stop<'_>, q: &DVector<f64>) -> Result<DVector<f64>, TargetError> {
         let m = self.arm.model.n_actuated();
         let (own, t) = (&q.as_slice()[..m], stop.rest_s[0]);
         let (arm, tool) = (self.carrying(t), self.tool(stop.of));
-        let found = static_targets(&arm, &tool, own, &Wrench::zeros(), t, &self.components);
+        let found = static_targets(&arm, &tool, own, &Wrench::zeros(), t, &self.components)?;
         let mut new = q.clone();
-        new.rows_mut(0, m).copy_from_slice(&found.map_err(|error| error.to_string())?.q);
+        new.rows_mut(0, m).copy_from_slice(&found.q);
         Ok(new)
     }
 
     /// Computes the new values of a target, and of an auxiliary point.
-    fn target(&self, stop: &Stop<'_>) -> Result<TargetValues, String> {
+    fn target(&self, stop: &Stop<'_>) -> Result<TargetValues, NoCorrection> {
         let (of, q) = (stop.of, stop.q);
         let target = match target_at(self.arm, of, &self.joints(stop, q)?) {
             Target::Joints(values) => NewTarget::Joints(values),
@@ -390,18 +403,18 @@ impl<'a> AtRest<'a> {
         let X = Pose::from_parts(Translation3::from(at.coords), self.rigid(of, q).rotation);
         let (model, frame) = (self.arm.model, tool_of(self.arm, of));
         let q_via = inverse_kinematics(model, &mut Data::new(model), &frame, &X, q, &IkOptions::default());
-        let q_via = q_via.map_err(|error| format!("its auxiliary point is not reached: {error}"))?;
+        let q_via = q_via.map_err(NoCorrection::AuxiliaryPoint)?;
         let moved = self.rigid(of, &self.joints(stop, &q_via)?).translation.vector;
         Ok((target, Some((X_MB.inverse() * nalgebra::Point3::from(moved)).coords)))
     }
 
     /// Returns the displacement of the flexible TCP at the given joint positions from the rigid TCP
     /// at the intended ones.
-    fn off(&self, stop: &Stop<'_>, q: &DVector<f64>) -> Result<Vector6<f64>, String> {
+    fn off(&self, stop: &Stop<'_>, q: &DVector<f64>) -> Result<Vector6<f64>, StepError> {
         let m = self.arm.model.n_actuated();
         let t = stop.rest_s[0];
         let held = self.carrying(t).along(Arc::new(Held(q.as_slice()[..m].to_vec())));
-        let at = linearise(&held, &self.tool(stop.of), &Wrench::zeros(), t).map_err(|error| error.to_string())?;
+        let at = linearise(&held, &self.tool(stop.of), &Wrench::zeros(), t)?;
         let wanted = self.rigid(stop.of, stop.q);
         let p = at.X_WT.translation.vector - wanted.translation.vector;
         let r = rotation_vector((at.X_WT.rotation * wanted.rotation.inverse()).matrix());

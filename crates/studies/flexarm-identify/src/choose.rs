@@ -4,7 +4,7 @@ use crate::estimation::{Probe, Reading, ReadingKind};
 
 use super::error::{IdentifyFileError, at_place};
 use super::file::MeasurementInput;
-use super::parameters::{self, Candidate, ParameterLocation};
+use super::parameters::{self, Candidate, ParameterLocation, TieError};
 use flexarm_run::Arm;
 use flexarm_run::Error;
 use flexarm_run::Robot;
@@ -33,19 +33,19 @@ pub(super) fn chosen(arm: &Arm, input: &MeasurementInput, fit: &[String]) -> Res
         return Err(IdentifyFileError::Twice { entry, factor }.into());
     }
     for (pattern, place) in &input.tie {
-        tie(&mut chosen, pattern).map_err(|message| at_place(place, format!("tie {pattern:?}: {message}")))?;
+        tie(&mut chosen, pattern).map_err(|error| at_place(place, format!("tie {pattern:?}: {error}")))?;
     }
     set_priors(&mut chosen, input, &all)?;
     Ok(chosen)
 }
 
 /// Gives all parameters that match a pattern one value, under the name of the pattern.
-fn tie(chosen: &mut Vec<Candidate>, pattern: &str) -> Result<(), String> {
+fn tie(chosen: &mut Vec<Candidate>, pattern: &str) -> Result<(), TieError> {
     let (matching, others): (Vec<_>, Vec<_>) =
         std::mem::take(chosen).into_iter().partition(|c| parameters::fits(pattern, &c.parameter.name));
     *chosen = others;
     let mut matching = matching.into_iter();
-    let mut first = matching.next().ok_or("no parameter that is fitted matches it")?;
+    let mut first = matching.next().ok_or(TieError::NoMatch)?;
     matching.try_for_each(|other| first.tie(&other))?;
     pattern.clone_into(&mut first.parameter.name);
     chosen.push(first);

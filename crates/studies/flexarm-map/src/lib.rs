@@ -225,6 +225,18 @@ pub struct GridFigures {
     pub directions: usize,
 }
 
+impl GridFigures {
+    fn of(grid: &Grid, directions: usize) -> Self {
+        Self {
+            lower_m: grid.lower,
+            upper_m: grid.place(grid.places() - 1),
+            spacing_m: grid.spacing_m,
+            count: grid.count,
+            directions,
+        }
+    }
+}
+
 /// Computes a map.
 ///
 /// `go_on` is called with the number of places done and their total, and may interrupt.
@@ -485,13 +497,7 @@ fn summed_up(
         _ => arm.caveats(Use::Any),
     };
     caveats.extend(of_wrench(&request.wrench, &Size::of(&robot.rigid)));
-    if let Some(first) = &taken.first_failure {
-        let message = format!(
-            "{} of {} poses have no equilibrium and are left out; at the first: {first}",
-            taken.failed, taken.poses
-        );
-        caveats.push(Caveat::from_message("no-equilibrium", "map", message, "analyse one of them with statics"));
-    }
+    caveats.extend(no_equilibrium(taken));
     let placement = match (request.workpiece_m, grid) {
         (Some(edges), Some(grid)) => {
             let found = placement::best_placement(&table, grid, by, edges);
@@ -509,13 +515,7 @@ fn summed_up(
         reachable: taken.reachable,
         poses: taken.poses - taken.failed,
         failed: taken.failed,
-        grid: grid.map(|grid| GridFigures {
-            lower_m: grid.lower,
-            upper_m: grid.place(grid.places() - 1),
-            spacing_m: grid.spacing_m,
-            count: grid.count,
-            directions,
-        }),
+        grid: grid.map(|grid| GridFigures::of(grid, directions)),
         wrench: request.wrench,
         by: table.columns[by].name.clone(),
         quantities: table.spreads().into_iter().collect(),
@@ -540,6 +540,14 @@ fn nothing_found(request: &MapRequest, table: &MapTable, taken: &Evaluation, by:
         (MapRegion::Workspace(w), None) => MapError::OutOfReach { places, axis: w.tool.axis },
         (_, None) => MapError::Instants,
     }
+}
+
+/// Returns the caveat that some poses have no equilibrium.
+fn no_equilibrium(taken: &Evaluation) -> Option<Caveat> {
+    let Evaluation { poses, failed, .. } = taken;
+    let first = taken.first_failure.as_ref()?;
+    let message = format!("{failed} of {poses} poses have no equilibrium and are left out; at the first: {first}");
+    Some(Caveat::from_message("no-equilibrium", "map", message, "analyse one of them with statics"))
 }
 
 /// Returns the caveat that a workpiece fits nowhere.

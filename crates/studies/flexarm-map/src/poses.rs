@@ -4,7 +4,7 @@ use std::path::Path;
 
 use flexarm_files::{NumberTable, read_text};
 use flexarm_kinematics::Model;
-use flexarm_settings::Quantity;
+use flexarm_settings::{OutOfRange, Quantity};
 use serde::Deserialize;
 use toml::Spanned;
 
@@ -52,6 +52,21 @@ pub fn read_poses(path: impl AsRef<Path>, robot: &Robot, at: Option<&[f64]>) -> 
     }
 }
 
+/// Reason why numbers are not a list of poses.
+#[derive(Debug, thiserror::Error)]
+enum PoseListError {
+    #[error(
+        "column {name:?} is not a joint of the robot; its joints are {known:?}; append _deg to the name for degrees"
+    )]
+    UnknownColumn { name: String, known: Vec<String> },
+    #[error("a pose has {found} values, expected {expected}")]
+    Length { found: usize, expected: usize },
+    #[error(transparent)]
+    OutOfRange(#[from] OutOfRange),
+    #[error("there is no pose: expected a row of joint values")]
+    Empty,
+}
+
 /// Data of the robot needed to read a list.
 struct List<'a> {
     /// Names, and whether they are prismatic.
@@ -63,11 +78,13 @@ impl List<'_> {
     fn of_table(&self, path: &Path) -> Result<Vec<Vec<f64>>, Error> {
         let fail = |what: String| Error::File { path: path.to_owned(), what };
         let table = NumberTable::read(path)?;
-        let columns = table.names.iter().map(|name| self.column(name)).collect::<Result<Vec<_>, _>>().map_err(fail)?;
+        let columns = table.names.iter().map(|name| self.column(name)).collect::<Result<Vec<_>, _>>();
+        let columns = columns.map_err(|error| fail(error.to_string()))?;
         let pose = |(row, line): (&Vec<f64>, &usize)| {
-            self.pose(row, &columns).map_err(|what| fail(format!("line {line}: {what}")))
+            self.pose(row, &columns).map_err(|error| fail(format!("line {line}: {error}")))
         };
-        self.some(table.rows.iter().zip(&table.lines).map(pose).collect::<Result<_, _>>()?).map_err(fail)
+        let poses = table.rows.iter().zip(&table.lines).map(pose).collect::<Result<_, _>>()?;
+        some(poses).map_err(|error| fail(error.to_string()))
     }
 
     fn of_toml(&self, path: &Path) -> Result<Vec<Vec<f64>>, Error> {
@@ -86,49 +103,46 @@ impl List<'_> {
             None => (0..self.joints.len()).map(|k| (k, 1.0)).collect(),
             Some(names) => {
                 let columns = names.get_ref().iter().map(|name| self.column(name)).collect::<Result<Vec<_>, _>>();
-                columns.map_err(|what| source.error(names.span(), what))?
+                columns.map_err(|error| source.error(names.span(), error.to_string()))?
             }
         };
         for (_, factor) in columns.iter_mut().filter(|(k, _)| degrees && !self.joints[*k].1) {
             *factor = 1.0_f64.to_radians();
         }
-        let pose =
-            |row: &Spanned<Vec<f64>>| self.pose(row.get_ref(), &columns).map_err(|what| source.error(row.span(), what));
+        let pose = |row: &Spanned<Vec<f64>>| {
+            self.pose(row.get_ref(), &columns).map_err(|error| source.error(row.span(), error.to_string()))
+        };
         let poses = file.poses.iter().map(pose).collect::<Result<_, _>>()?;
-        self.some(poses).map_err(|what| Error::File { path: path.to_owned(), what })
+        some(poses).map_err(|error| Error::File { path: path.to_owned(), what: error.to_string() })
     }
 
     /// Returns the index of the joint of a column, and the factor from its unit to rad or m.
-    fn column(&self, name: &str) -> Result<(usize, f64), String> {
+    fn column(&self, name: &str) -> Result<(usize, f64), PoseListError> {
         let joint = |(k, (joint, slides)): (usize, &(&str, bool))| match (name.strip_prefix(joint)?, slides) {
             ("", _) | ("_rad", false) | ("_m", true) => Some((k, 1.0)),
             ("_deg", false) => Some((k, 1.0_f64.to_radians())),
             _ => None,
         };
-        self.joints.iter().enumerate().find_map(joint).ok_or_else(|| {
-            let known: Vec<&str> = self.joints.iter().map(|(name, _)| *name).collect();
-            format!(
-                "column {name:?} is not a joint of the robot; its joints are {known:?}; append _deg to the name \
-                 for degrees"
-            )
-        })
+        let known = || self.joints.iter().map(|(name, _)| (*name).to_owned()).collect();
+        let unknown = || PoseListError::UnknownColumn { name: name.to_owned(), known: known() };
+        self.joints.iter().enumerate().find_map(joint).ok_or_else(unknown)
     }
 
-    fn pose(&self, row: &[f64], columns: &[(usize, f64)]) -> Result<Vec<f64>, String> {
+    fn pose(&self, row: &[f64], columns: &[(usize, f64)]) -> Result<Vec<f64>, PoseListError> {
         if row.len() != columns.len() {
-            return Err(format!("a pose has {} values, expected {}", row.len(), columns.len()));
+            return Err(PoseListError::Length { found: row.len(), expected: columns.len() });
         }
         let mut pose = self.home.clone();
         for (value, (k, unit)) in row.iter().zip(columns) {
             let name = format!("joint {:?}", self.joints[*k].0);
-            pose[*k] = Quantity::JOINT.check(&name, unit * value).map_err(|outside| outside.to_string())?;
+            pose[*k] = Quantity::JOINT.check(&name, unit * value)?;
         }
         Ok(pose)
     }
+}
 
-    fn some(&self, poses: Vec<Vec<f64>>) -> Result<Vec<Vec<f64>>, String> {
-        if poses.is_empty() { Err("there is no pose: expected a row of joint values".into()) } else { Ok(poses) }
-    }
+fn some(poses: Vec<Vec<f64>>) -> Result<Vec<Vec<f64>>, PoseListError> {
+    if poses.is_empty() { Err(PoseListError::Empty) } else { Ok(poses) }
 }
 
 /// Checks the poses and returns them as a region.

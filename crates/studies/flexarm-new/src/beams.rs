@@ -3,6 +3,8 @@
 //!
 //! Frames: L link; S section, x from the link's origin to the distal joint, y and z across.
 
+use std::sync::Arc;
+
 use flexarm_kinematics::{Joint, LinkInertia, Pose};
 use flexarm_urdf::{CrossSection, TriangleMesh, cross_section};
 use nalgebra::{Matrix2, Matrix3, Rotation2, Rotation3, Translation3, Vector2, Vector3};
@@ -62,6 +64,18 @@ pub(crate) struct BeamSection {
     pub(crate) open: f64,
 }
 
+impl BeamSection {
+    /// Describes a section: `box of 120 x 180 mm with a wall of 8.0 mm`.
+    pub(crate) fn words(&self) -> String {
+        let mm = |x: f64| format!("{:.0}", 1e3 * x);
+        let size = match self.section {
+            "tube" | "circle" => format!("{} of {} mm", self.section, mm(self.width)),
+            _ => format!("{} of {} x {} mm", self.section, mm(self.width), mm(self.height)),
+        };
+        self.wall.map_or(size.clone(), |wall| format!("{size} with a wall of {:.1} mm", 1e3 * wall))
+    }
+}
+
 /// Data of a link that may be a beam.
 pub(crate) struct Candidate<'a> {
     /// Parent joint of the link.
@@ -77,87 +91,113 @@ pub(crate) struct Candidate<'a> {
 
 /// Returns a section for the link, or the reason why there is none. If the shape is not between the
 /// link's frames, the beam runs along the body given by shape and joint axes.
-pub(crate) fn propose(link: &Candidate<'_>) -> Result<BeamSection, String> {
+pub(crate) fn propose(link: &Candidate<'_>) -> Result<BeamSection, NoSection> {
     let reason = match between(link, [Vector3::zeros(), link.distal.X_PJ.translation.vector]) {
-        Ok(section) => return Ok(section),
-        Err(NoBeam::Else(reason)) => return Err(reason),
-        Err(NoBeam::NotThere(reason)) => reason,
+        Err(reason) if reason.is_elsewhere() => reason,
+        found => return found,
     };
     let Some(ends) = ends::of(link) else { return Err(reason) };
-    let mut section = between(link, ends).map_err(|why| match why {
-        NoBeam::Else(own) => format!("its geometry between the joint axes: {own}"),
-        NoBeam::NotThere(_) => reason,
+    let mut section = between(link, ends).map_err(|own| match own.is_elsewhere() {
+        true => reason,
+        false => NoSection::BetweenAxes(Box::new(own)),
     })?;
     section.ends = Some(ends.map(|end| (end + Vector3::from(section.offset)).into()));
     section.offset = [0.0; 3];
     Ok(section)
 }
 
-/// Reasons why there is no beam between two points.
-enum NoBeam {
-    /// The points are too close, or there is no shape between them.
-    NotThere(String),
-    /// Another reason.
-    Else(String),
+/// Reason why a link has no section.
+#[derive(Clone, Debug, thiserror::Error)]
+pub(crate) enum NoSection {
+    #[error("too short: {:.0} mm of the arm's {:.0} mm", 1e3 * .length, 1e3 * .arm)]
+    TooShort { length: f64, arm: f64 },
+    #[error("its mass is unknown")]
+    UnknownMass,
+    #[error("it has no readable geometry")]
+    NoGeometry,
+    #[error("its geometry is flat")]
+    Flat,
+    #[error(
+        "between its frame and joint {joint:?} its geometry covers only {:.0} % of the distance: the frames of the \
+         file are not along the link",
+        100.0 * .along
+    )]
+    Gap { joint: String, along: f64 },
+    #[error(
+        "between its frame and joint {joint:?} its geometry is offset by {:.0} mm: the frames of the file are not \
+         along the link",
+        1e3 * .aside
+    )]
+    Aside { joint: String, aside: f64 },
+    #[error("not slender: {:.0} mm long, {:.0} mm thick", 1e3 * .length, 1e3 * .thickness)]
+    NotSlender { length: f64, thickness: f64 },
+    #[error(
+        "its {mass:.3} kg would be a wall of {:.2} mm of {material} around its outline: the mass does not match the \
+         mesh",
+        1e3 * .wall
+    )]
+    ThinWall { mass: f64, wall: f64, material: &'static str },
+    #[error(
+        "its mass contradicts its mesh: {mass:.2} kg in {:.2} litres, solid steel would have {:.2} kg",
+        1e3 * .volume,
+        7850.0 * .volume
+    )]
+    TooHeavy { mass: f64, volume: f64 },
+    #[error("its width varies by a factor of {taper:.1} between the joints: not a beam")]
+    Tapered { taper: f64 },
+    #[error("only {:.0} % of its mass is between the joints", 100.0 * .own / .whole)]
+    MassElsewhere { own: f64, whole: f64 },
+    #[error("its geometry between the joint axes: {0}")]
+    BetweenAxes(Box<NoSection>),
+    #[error("the beam cannot be used: {0}")]
+    Refused(Arc<flexarm_run::Error>),
 }
 
-impl From<String> for NoBeam {
-    fn from(reason: String) -> Self {
-        Self::Else(reason)
+impl NoSection {
+    /// Whether the shape may be elsewhere: the points are too close, or there is none between them.
+    fn is_elsewhere(&self) -> bool {
+        matches!(self, Self::TooShort { .. } | Self::Gap { .. } | Self::Aside { .. })
     }
 }
 
 /// Returns a section for the part of the link between two points, link axes.
-fn between(link: &Candidate<'_>, [from, to]: [Vector3<f64>; 2]) -> Result<BeamSection, NoBeam> {
+fn between(link: &Candidate<'_>, [from, to]: [Vector3<f64>; 2]) -> Result<BeamSection, NoSection> {
     let axis = to - from;
     let length = axis.norm();
     if length < SHARE * link.arm || length < 1e-3 {
-        return Err(NoBeam::NotThere(format!(
-            "too short: {:.0} mm of the arm's {:.0} mm",
-            1e3 * length,
-            1e3 * link.arm
-        )));
+        return Err(NoSection::TooShort { length, arm: link.arm });
     }
-    let Some(inertia) = link.inertia.filter(|i| i.mass > 0.0) else {
-        return Err(NoBeam::Else("its mass is unknown".into()));
-    };
+    let inertia = link.inertia.filter(|i| i.mass > 0.0).ok_or(NoSection::UnknownMass)?;
     if link.meshes.is_empty() {
-        return Err(NoBeam::Else("it has no readable geometry".into()));
+        return Err(NoSection::NoGeometry);
     }
     let cuts = Cuts::of(link.meshes, &from, &axis)?;
     let along = cuts.along(length);
     let aside = cuts.centroid(length).norm();
-    if along < ALONG || aside > BESIDE * length {
-        let where_is_it = if along < ALONG {
-            format!("covers only {:.0} % of the distance", 100.0 * along)
-        } else {
-            format!("is offset by {:.0} mm", 1e3 * aside)
-        };
-        return Err(NoBeam::NotThere(format!(
-            "between its frame and joint {:?} its geometry {where_is_it}: the frames of the file are not along the \
-             link",
-            link.distal.name
-        )));
+    if along < ALONG {
+        return Err(NoSection::Gap { joint: link.distal.name.clone(), along });
+    }
+    if aside > BESIDE * length {
+        return Err(NoSection::Aside { joint: link.distal.name.clone(), aside });
     }
     let shape = if cuts.is_round(length) { Shape::Tube } else { Shape::Box };
     let turn = if shape == Shape::Box { cuts.principal_turn(length) } else { 0.0 };
     let outlines = cuts.outlines(turn, shape);
-    let thick = weighted(&outlines, length, |o| o.width.max(o.height));
-    if length < SLENDER * thick {
-        return Err(format!("not slender: {:.0} mm long, {:.0} mm thick", 1e3 * length, 1e3 * thick).into());
+    let thickness = weighted(&outlines, length, |o| o.width.max(o.height));
+    if length < SLENDER * thickness {
+        return Err(NoSection::NotSlender { length, thickness });
     }
     let (material, wall) = wall(&outlines, shape, inertia.mass)?;
     let mut section = equivalent(&outlines, shape, length, wall);
     section.material = material;
     if section.taper > TAPER {
-        let taper = section.taper;
-        return Err(format!("its width varies by a factor of {taper:.1} between the joints: not a beam").into());
+        return Err(NoSection::Tapered { taper: section.taper });
     }
     let density = MATERIALS.iter().find(|m| m.0 == material).map_or(2700.0, |m| m.1);
     let whole = shell(&outlines, shape, wall);
     let own = shell_between(&outlines, shape, length, wall);
     if own < OWN * whole {
-        return Err(format!("only {:.0} % of its mass is between the joints", 100.0 * own / whole).into());
+        return Err(NoSection::MassElsewhere { own, whole });
     }
     section.wall_of_half = section.wall.and_then(|_| wall_for(&outlines, shape, 0.5 * inertia.mass / density));
     let R_LS = cuts.X_LS.rotation * Rotation3::from_axis_angle(&Vector3::x_axis(), turn);
@@ -196,7 +236,7 @@ struct Outline {
 }
 
 impl Cuts {
-    fn of(meshes: &[TriangleMesh], from: &Vector3<f64>, axis: &Vector3<f64>) -> Result<Self, String> {
+    fn of(meshes: &[TriangleMesh], from: &Vector3<f64>, axis: &Vector3<f64>) -> Result<Self, NoSection> {
         let x = axis.normalize();
         let across = Vector3::ith(axis.abs().imin(), 1.0);
         let y = (across - x * x.dot(&across)).normalize();
@@ -206,7 +246,7 @@ impl Cuts {
         let places = || meshes.iter().flat_map(|m| &m.positions).map(along);
         let (low, high) = (places().fold(f64::INFINITY, f64::min), places().fold(f64::NEG_INFINITY, f64::max));
         if high - low < 1e-4 {
-            return Err("its geometry is flat".into());
+            return Err(NoSection::Flat);
         }
         let step = (high - low) / CUTS as f64;
         let cut = |k: usize| {
@@ -366,24 +406,15 @@ fn wall_for(outlines: &[Outline], shape: Shape, volume: f64) -> Option<f64> {
 }
 
 /// Returns the lightest material with which the shape can have the mass, and the wall thickness.
-fn wall(outlines: &[Outline], shape: Shape, mass: f64) -> Result<(&'static str, f64), String> {
-    for (name, density, words) in MATERIALS {
+fn wall(outlines: &[Outline], shape: Shape, mass: f64) -> Result<(&'static str, f64), NoSection> {
+    for (name, density, material) in MATERIALS {
         let Some(wall) = wall_for(outlines, shape, mass / density) else { continue };
         if wall < THINNEST {
-            return Err(format!(
-                "its {mass:.3} kg would be a wall of {:.2} mm of {words} around its outline: the mass does not \
-                 match the mesh",
-                1e3 * wall
-            ));
+            return Err(NoSection::ThinWall { mass, wall, material });
         }
         return Ok((name, wall));
     }
-    let solid = shell(outlines, shape, f64::INFINITY);
-    Err(format!(
-        "its mass contradicts its mesh: {mass:.2} kg in {:.2} litres, solid steel would have {:.2} kg",
-        1e3 * solid,
-        7850.0 * solid
-    ))
+    Err(NoSection::TooHeavy { mass, volume: shell(outlines, shape, f64::INFINITY) })
 }
 
 /// Second moments of a hollow section about y and z (m⁴).
@@ -443,7 +474,7 @@ mod tests {
 
     use super::*;
 
-    fn candidate(mass: f64, meshes: &[TriangleMesh], X_LB: Pose) -> Result<BeamSection, String> {
+    fn candidate(mass: f64, meshes: &[TriangleMesh], X_LB: Pose) -> Result<BeamSection, NoSection> {
         let distal = Joint::new("elbow", JointKind::Fixed, "arm", "next", X_LB);
         let inertia = LinkInertia { mass, com: Vector3::zeros(), inertia_com: Matrix3::identity() };
         propose(&Candidate {
@@ -570,15 +601,15 @@ mod tests {
         let X_LB = Pose::from_parts(Translation3::new(0.9, 0.0, 0.0), Rotation3::identity());
         let of = |mass: f64| candidate(mass, std::slice::from_ref(&mesh), X_LB);
         let solid = 0.9 * 0.18 * 0.12;
-        assert!(of(7900.0 * solid).unwrap_err().contains("contradicts"));
+        assert!(of(7900.0 * solid).unwrap_err().to_string().contains("contradicts"));
         assert_eq!(of(7000.0 * solid).unwrap().material, "ductile_iron");
         assert_eq!(of(2600.0 * solid).unwrap().material, "aluminium");
-        assert!(of(0.1).unwrap_err().contains("wall of"));
+        assert!(of(0.1).unwrap_err().to_string().contains("wall of"));
         let aside = Pose::from_parts(Translation3::new(0.0, 0.0, 0.9), Rotation3::identity());
-        let frames = candidate(20.0, std::slice::from_ref(&mesh), aside).unwrap_err();
+        let frames = candidate(20.0, std::slice::from_ref(&mesh), aside).unwrap_err().to_string();
         assert!(frames.contains("are not along the link"), "{frames}");
         let short = Pose::from_parts(Translation3::new(0.1, 0.0, 0.0), Rotation3::identity());
-        assert!(candidate(20.0, &[mesh], short).unwrap_err().contains("not slender"));
+        assert!(candidate(20.0, &[mesh], short).unwrap_err().to_string().contains("not slender"));
         let wide = Geometry::Sphere { radius: 0.2 }.triangles().unwrap();
         assert!(candidate(2.0, &[wide], short).is_err());
     }

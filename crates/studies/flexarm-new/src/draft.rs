@@ -4,20 +4,17 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use flexarm_kinematics::{Data, Joint, Link, Mechanism, Model, forward_kinematics};
-use flexarm_settings::Setting;
 use flexarm_urdf::{Geometry, ReadOptions, TriangleMesh, UrdfError, UrdfRobot, Visual, read_urdf};
 use nalgebra::{DVector, Vector3};
 
-use super::beams::{self, BeamSection};
+use super::assumption::Assumption;
+use super::beams::{self, BeamSection, NoSection};
 use super::chain::{self, Chain};
 use super::gears::{self, GearClass};
 use super::loads::{self, Cube, Workspace};
-use super::place::Placed;
-use super::report::{Assumption, assumption};
 use super::sample::{self, Axis, SampleMotion};
-use super::{NewError, NewOptions, text};
+use super::{NewError, NewOptions};
 use flexarm_run::Error;
-use flexarm_run::Robot;
 
 /// A link of the arm with its section, or the reason why it has none.
 #[derive(Clone, Debug)]
@@ -26,7 +23,7 @@ pub(crate) struct DraftLink {
     pub(crate) distal: String,
     pub(crate) length: f64,
     pub(crate) mass: Option<f64>,
-    pub(crate) section: Result<BeamSection, String>,
+    pub(crate) section: Result<BeamSection, NoSection>,
     /// Whether the link has the mass of a uniform beam, because its own inertia cannot be split.
     pub(crate) uniform: bool,
     /// Whether its shapes are the collision shapes.
@@ -69,8 +66,8 @@ pub(crate) struct Draft {
     pub(crate) joints: Vec<DraftJoint>,
     pub(crate) links: Vec<DraftLink>,
     pub(crate) motion: SampleMotion,
+    /// Assumptions, and questions for the manufacturer; set once the beams are settled.
     pub(crate) assumptions: Vec<Assumption>,
-    /// Questions for the manufacturer.
     pub(crate) questions: Vec<String>,
 }
 
@@ -79,14 +76,7 @@ impl Draft {
         if let Some(found) = options.payload_kg.filter(|kg| !(kg.is_finite() && *kg >= 0.0)) {
             return Err(NewError::Payload { found }.into());
         }
-        let (mut urdf, mut waived) = read(path, &options.urdf)?;
-        let placeholders = placeholders(&urdf.mechanism);
-        let mut discarded = Vec::new();
-        if options.urdf.inertia_from_mesh.is_some() && !placeholders.is_empty() {
-            discarded = placeholders;
-            let read_options = ReadOptions { discard: discarded.clone(), ..options.urdf.clone() };
-            (urdf, waived) = read(path, &read_options)?;
-        }
+        let Description { urdf, waived, discarded } = Description::read(path, &options.urdf)?;
         let mechanism = &urdf.mechanism;
         let chain = chain::find(mechanism, options)?;
         let name = if mechanism.name.trim().is_empty() { "robot".to_owned() } else { mechanism.name.clone() };
@@ -100,14 +90,7 @@ impl Draft {
             let links = mechanism.links.iter().filter(|l| l.inertia.is_none_or(|i| i.mass <= 0.0)).count();
             return Err(NewError::NoMass { links }.into());
         }
-        let held: Vec<(String, f64, &'static str)> = chain
-            .held
-            .iter()
-            .map(|&(k, why)| {
-                let joint = &mechanism.joints[k];
-                (joint.name.clone(), 0.0f64.clamp(joint.limits.lower, joint.limits.upper), why)
-            })
-            .collect();
+        let held = held_joints(mechanism, &chain);
         let ranges = ranges(&bare, mechanism, &chain, &held);
         let payload_known = options.payload_kg.is_some();
         let payload = match options.payload_kg {
@@ -124,7 +107,7 @@ impl Draft {
         let motion = sample::sample_motion(&model, &workspace, &axes);
         let links = links(&urdf, &chain);
         let estimated = urdf.warnings.iter().any(|w| w.code == "estimated-inertia");
-        let mut draft = Self {
+        Ok(Self {
             name,
             chain,
             waived,
@@ -142,40 +125,33 @@ impl Draft {
             assumptions: Vec::new(),
             questions: Vec::new(),
             urdf,
-        };
-        draft.assumptions = assumptions(&draft);
-        draft.questions = questions(&draft);
-        Ok(draft)
+        })
     }
 
     /// Returns the links proposed as flexible.
     pub(crate) fn beams_with_sections(&self) -> Vec<&DraftLink> {
         self.links.iter().filter(|link| link.section.is_ok()).collect()
     }
+}
 
-    /// Tries each beam in the robot file to be written: a link whose inertia cannot be split gets
-    /// the mass of a uniform beam; a beam that cannot be used at all is left out, with the reason.
-    pub(crate) fn settle(&mut self, placed: &Placed, _options: &NewOptions) -> Result<(), Error> {
-        let loads = |draft: &Self, beams: &[&DraftLink]| {
-            let text = text::robot_file(draft, placed, beams);
-            let urdf_path = placed.robot_path.with_file_name(&placed.reference);
-            Robot::with_description(&placed.robot_path, &text, urdf_path, draft.urdf.clone())
-        };
-        loads(self, &[])?;
-        for k in 0..self.links.len() {
-            if self.links[k].section.is_err() {
-                continue;
-            }
-            let Err(_) = loads(self, &[&self.links[k]]) else { continue };
-            self.links[k].uniform = true;
-            if let Err(error) = loads(self, &[&self.links[k]]) {
-                let reason = error.to_string();
-                self.links[k].section = Err(format!("the beam cannot be used: {reason}"));
-            }
+/// The description as read, with the links whose inertia is doubtful.
+struct Description {
+    urdf: UrdfRobot,
+    /// Links with impossible moments of inertia, used unchanged.
+    waived: Vec<String>,
+    /// Links with placeholder masses, which are estimated instead.
+    discarded: Vec<String>,
+}
+
+impl Description {
+    fn read(path: &Path, options: &ReadOptions) -> Result<Self, Error> {
+        let (urdf, waived) = read(path, options)?;
+        let discarded = placeholders(&urdf.mechanism);
+        if options.inertia_from_mesh.is_none() || discarded.is_empty() {
+            return Ok(Self { urdf, waived, discarded: Vec::new() });
         }
-        self.assumptions = assumptions(self);
-        self.questions = questions(self);
-        Ok(())
+        let (urdf, waived) = read(path, &ReadOptions { discard: discarded.clone(), ..options.clone() })?;
+        Ok(Self { urdf, waived, discarded })
     }
 }
 
@@ -204,7 +180,7 @@ fn read(path: &Path, options: &ReadOptions) -> Result<(UrdfRobot, Vec<String>), 
 const ALIKE: f64 = 0.7;
 
 /// Returns the links with the mass shared by most links, if it is a placeholder.
-fn placeholders(mechanism: &Mechanism) -> Vec<String> {
+pub(crate) fn placeholders(mechanism: &Mechanism) -> Vec<String> {
     let with = |link: &Link| Some((link.name.clone(), link.inertia?.mass)).filter(|(_, mass)| *mass > 0.0);
     let with: Vec<(String, f64)> = mechanism.links.iter().filter_map(with).collect();
     let alike = |mass: f64| with.iter().filter(move |(_, other)| (other - mass).abs() < 1e-9 * mass);
@@ -231,6 +207,15 @@ fn mass_after(mechanism: &Mechanism, chain: &Chain) -> f64 {
         false
     };
     mechanism.links.iter().filter(|l| is_moved(&l.name)).filter_map(|l| l.inertia).map(|i| i.mass).sum()
+}
+
+/// Returns the joints that are not part of the arm: name, position and reason.
+fn held_joints(mechanism: &Mechanism, chain: &Chain) -> Vec<(String, f64, &'static str)> {
+    let held = |&(k, why): &(usize, &'static str)| {
+        let joint = &mechanism.joints[k];
+        (joint.name.clone(), 0.0f64.clamp(joint.limits.lower, joint.limits.upper), why)
+    };
+    chain.held.iter().map(held).collect()
 }
 
 /// Returns the range of each coordinate to be sampled; held ones have a single value.
@@ -375,157 +360,4 @@ fn shapes(urdf: &UrdfRobot, link: &str) -> (Vec<TriangleMesh>, bool) {
     };
     let seen = read(&urdf.visuals);
     if seen.is_empty() { (read(&urdf.collisions), true) } else { (seen, false) }
-}
-
-fn assumptions(draft: &Draft) -> Vec<Assumption> {
-    let mut list = Vec::new();
-    for choice in &draft.chain.choices {
-        list.push(assumption("the arm", choice.clone(), &format!("choose another one with {} LINK", Setting::Tool)));
-    }
-    for link in &draft.waived {
-        let text = "its moments of inertia are physically impossible (the maximum is above the sum of the others); \
-                    used unchanged";
-        list.push(assumption(&format!("link {link:?}"), text.into(), "correct them in the description"));
-    }
-    masses(draft, &mut list);
-    if !draft.payload_known && draft.payload.mass == 0.0 {
-        let text = "none: the effort limits do not allow one".to_owned();
-        list.push(assumption("payload", text, &format!("{} KG, or payload in robot.toml", Setting::Payload)));
-    }
-    if !draft.payload_known && draft.payload.mass > 0.0 {
-        let text = format!(
-            "{} kg, at most 15 % of the moving mass ({:.1} kg) and within the effort limits, an aluminium cube at \
-             the tool",
-            draft.payload.mass, draft.moving_mass
-        );
-        list.push(assumption("payload", text, &format!("{} KG, or payload in robot.toml", Setting::Payload)));
-    }
-    for joint in &draft.joints {
-        let name = format!("joint {:?}", joint.joint.name);
-        if joint.speed_assumed {
-            let unit = if joint.joint.kind.slides() { "m/s" } else { "rad/s" };
-            let text = format!("its speed limit is unknown; the sample motion uses {} {unit}", joint.speed);
-            list.push(assumption(&name, text, "add it to the description, or to [limits] of motion.toml"));
-        }
-        if let Some(gear) = &joint.gear {
-            let of = match joint.effort_fault {
-                None => format!("its effort limit {:.4} N m", joint.joint.limits.effort),
-                Some(why) => format!(
-                    "the required torque, {:.0} N m against gravity and {:.0} N m in motion, because its effort \
-                     limit {why}",
-                    joint.weight, joint.needed
-                ),
-            };
-            let text = format!(
-                "its reducer has {:.3e} N m/rad ({:.1e} to {:.1e}), typical of a rated torque of {:.0} N m, from {of}",
-                gear.stiffness, gear.low, gear.high, joint.rated
-            );
-            list.push(assumption(&name, text, "ask the manufacturer for its torsional stiffness, or measure it"));
-        }
-    }
-    for link in &draft.links {
-        if let Ok(section) = &link.section {
-            let text = format!(
-                "it is modelled as a {}, assuming that all of its {:.2} kg is structural, of {}",
-                text::section_words(section),
-                link.mass.unwrap_or(0.0),
-                section.material
-            );
-            list.push(assumption(&format!("link {:?}", link.link), text, "flexarm reduce with a mesh of the casting"));
-        }
-    }
-    for note in &draft.motion.notes {
-        list.push(assumption("the sample motion", note.clone(), "check the effort limits of the description"));
-    }
-    list
-}
-
-/// Adds the assumptions about masses that are implausible for this arm.
-fn masses(draft: &Draft, list: &mut Vec<Assumption>) {
-    let own: f64 = draft.urdf.mechanism.links.iter().filter_map(|l| l.inertia).map(|i| i.mass).sum();
-    let which = match draft.discarded.is_empty() {
-        true => "links without <inertial>",
-        false => "links without <inertial> or with a placeholder mass",
-    };
-    match draft.estimate {
-        Some(flexarm_urdf::InertiaEstimate::TotalMass(mass)) => {
-            let text = format!(
-                "{which} have {mass} kg in total, distributed by the volumes of their meshes or by their lengths; \
-                 all links have {own:.1} kg in total"
-            );
-            list.push(assumption("masses", text, "use the masses of the manufacturer"));
-        }
-        Some(flexarm_urdf::InertiaEstimate::Density(density)) => {
-            let text = format!("{which} are solid bodies with {density} kg/m³");
-            list.push(assumption("masses", text, "use the masses of the manufacturer"));
-        }
-        None => {}
-    }
-    if draft.idle_estimate {
-        let text = format!(
-            "no link lacks a mass, so none was estimated: the masses of the description are used, {own:.1} kg in total"
-        );
-        list.push(assumption("masses", text, "remove <inertial> from the description if its masses are unreliable"));
-    }
-    let alike = placeholders(&draft.urdf.mechanism);
-    let mass = alike.first().and_then(|name| draft.urdf.mechanism.link(name)?.inertia).map_or(0.0, |i| i.mass);
-    if !alike.is_empty() && draft.discarded.is_empty() {
-        let text = format!("{} links have {mass} kg each, which is a placeholder", alike.len());
-        let mend = format!(
-            "distribute the mass of the arm over these links with {} KG, by the volumes of their meshes or by \
-             their lengths; ideally use the masses of the manufacturer",
-            Setting::InertiaFromTotalMass
-        );
-        list.push(assumption("masses", text, &mend));
-    }
-    let missing = draft.urdf.warnings.iter().filter(|w| matches!(w.code, "missing-inertial" | "zero-mass"));
-    for finding in missing {
-        list.push(assumption(
-            "masses",
-            finding.message.clone(),
-            &format!(
-                "estimate them with {} KG or {} KG_PER_M3",
-                Setting::InertiaFromTotalMass,
-                Setting::InertiaFromDensity
-            ),
-        ));
-    }
-}
-
-fn questions(draft: &Draft) -> Vec<String> {
-    let mut list = Vec::new();
-    let turning: Vec<&str> = draft.joints.iter().filter(|j| j.gear.is_some()).map(|j| j.joint.name.as_str()).collect();
-    if !turning.is_empty() {
-        list.push(format!(
-            "torsional stiffness of the reducers of {}, in N m/rad at the output (or N m per arc minute, times \
-             3438); at least the type of reducer, whose catalogue gives the value",
-            turning.join(", ")
-        ));
-    }
-    if !draft.payload_known {
-        list.push("mass, centre of mass and inertia of the payload".into());
-    }
-    for link in draft.beams_with_sections() {
-        list.push(format!(
-            "link {:?}: wall thickness and material of the casting, and the share of the casting in its mass \
-             (motors and gears add no stiffness); ideally a CAD model for meshing",
-            link.link
-        ));
-    }
-    let unsure: Vec<&str> =
-        draft.joints.iter().filter(|j| j.effort_fault.is_some()).map(|j| j.joint.name.as_str()).collect();
-    if !unsure.is_empty() {
-        list.push(format!("maximum torque of {}", unsure.join(", ")));
-    }
-    let slow: Vec<&str> = draft.joints.iter().filter(|j| j.speed_assumed).map(|j| j.joint.name.as_str()).collect();
-    if !slow.is_empty() {
-        list.push(format!("maximum speed of {}", slow.join(", ")));
-    }
-    if draft.estimate.is_some() || draft.assumptions.iter().any(|a| a.about == "masses") {
-        list.push("mass, centre of mass and inertia of each link".into());
-    }
-    list.push(
-        "static deflection of the TCP under a known weight, in one or two poses, to validate the numbers above".into(),
-    );
-    list
 }

@@ -105,6 +105,11 @@ fn between(rows: &[(f64, f64, f64)], rated: f64, before: &str, after: &str) -> (
     }
 }
 
+/// Rounds a number to three significant digits.
+pub(crate) fn three_digits(value: f64) -> f64 {
+    format!("{value:.2e}").parse().unwrap_or(value)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -17,6 +17,7 @@
 #![allow(non_snake_case, reason = "monogram notation: X_WL, K_S; see docs/references.md")]
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
+mod assumption;
 mod beams;
 mod chain;
 mod draft;
@@ -26,6 +27,7 @@ mod loads;
 mod place;
 mod report;
 mod sample;
+mod settle;
 mod text;
 
 use flexarm_run::ExternalError;
@@ -39,7 +41,8 @@ use flexarm_run::Motion;
 use flexarm_run::Robot;
 use flexarm_run::motion_report::motion_report;
 
-pub use report::{Assumption, NewDrive, NewHeld, NewJoint, NewLink, NewPayload, NewRobot};
+pub use assumption::Assumption;
+pub use report::{NewDrive, NewHeld, NewJoint, NewLink, NewPayload, NewRobot};
 
 /// Options of [`new_robot`]; missing ones are determined from the description.
 #[derive(Clone, Debug, Default)]
@@ -177,7 +180,7 @@ pub fn new_robot(urdf: &Path, folder: &Path, overwrite: bool, options: &NewOptio
     place::refuse_other_formats(urdf)?;
     let mut draft = draft::Draft::of(urdf, options)?;
     let placed = place::place(&draft, urdf, folder, options)?;
-    draft.settle(&placed, options)?;
+    settle::settle(&mut draft, &placed)?;
     let robot_path = folder.join("robot.toml");
     let motion_path = folder.join("motion.toml");
     let mut files = placed.files.clone();

@@ -4,7 +4,9 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
+use super::assumption::Assumption;
 use super::draft::Draft;
+use super::gears::three_digits;
 use super::place::Placed;
 use flexarm_run::Finding;
 use flexarm_run::MotionPeak;
@@ -172,21 +174,6 @@ pub struct NewPayload {
     pub assumed: bool,
 }
 
-/// An assumption.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Assumption {
-    /// Subject: a joint, a link, the payload.
-    pub about: String,
-    /// The assumption made.
-    pub text: String,
-    /// Way to replace it by a fact.
-    pub mend: String,
-}
-
-pub(crate) fn assumption(about: &str, text: String, mend: &str) -> Assumption {
-    Assumption { about: about.to_owned(), text, mend: mend.to_owned() }
-}
-
 fn finite(value: f64) -> Option<f64> {
     value.is_finite().then_some(value)
 }
@@ -253,7 +240,7 @@ fn of_link(link: &super::draft::DraftLink) -> NewLink {
     let (name, distal) = (link.link.clone(), link.distal.clone());
     let plain = NewLink { name, distal, length: link.length, mass: link.mass, ..NewLink::default() };
     match &link.section {
-        Err(reason) => NewLink { reason: Some(reason.clone()), ..plain },
+        Err(reason) => NewLink { reason: Some(reason.to_string()), ..plain },
         Ok(s) => NewLink {
             section: Some(s.section),
             width: Some(s.width),
@@ -276,7 +263,7 @@ fn of_drive(joint: &super::draft::DraftJoint) -> Option<NewDrive> {
     let gear = joint.gear.as_ref()?;
     Some(NewDrive {
         joint: joint.joint.name.clone(),
-        stiffness: super::text::three_digits(gear.stiffness),
+        stiffness: three_digits(gear.stiffness),
         low: gear.low,
         high: gear.high,
         rated_torque: joint.rated,

@@ -6,6 +6,7 @@ use flexarm_settings::written::{markdown, markdown_code, one_line as inline};
 
 use super::beams::BeamSection;
 use super::draft::{Draft, DraftLink};
+use super::gears::three_digits;
 use super::place::Placed;
 
 /// Maximum plausible effort limit of a joint of an arm (N m).
@@ -17,11 +18,6 @@ fn quoted(text: &str) -> String {
     serde_json::to_string(text).unwrap_or_default().replace('\u{7f}', "\\u007F")
 }
 
-/// Rounds a number to three significant digits.
-pub(crate) fn three_digits(value: f64) -> f64 {
-    format!("{value:.2e}").parse().unwrap_or(value)
-}
-
 /// Formats a float for TOML, rounded to the given number of decimals.
 fn float(value: f64, digits: i32) -> String {
     let scale = 10f64.powi(digits);
@@ -31,16 +27,6 @@ fn float(value: f64, digits: i32) -> String {
 
 fn vector(values: &[f64; 3], digits: i32) -> String {
     format!("[{}]", values.map(|x| float(x, digits)).join(", "))
-}
-
-/// Describes a section: `box of 120 x 180 mm with a wall of 8.0 mm`.
-pub(crate) fn section_words(s: &BeamSection) -> String {
-    let mm = |x: f64| format!("{:.0}", 1e3 * x);
-    let size = match s.section {
-        "tube" | "circle" => format!("{} of {} mm", s.section, mm(s.width)),
-        _ => format!("{} of {} x {} mm", s.section, mm(s.width), mm(s.height)),
-    };
-    s.wall.map_or(size.clone(), |wall| format!("{size} with a wall of {:.1} mm", 1e3 * wall))
 }
 
 fn beam_keys(s: &BeamSection, wall: Option<f64>) -> String {
@@ -59,6 +45,10 @@ pub(crate) fn robot_file(draft: &Draft, placed: &Placed, beams: &[&DraftLink]) -
     let mut t = String::new();
     // Writing to a String cannot fail.
     let _ = head(&mut t, draft, placed);
+    let _ = efforts(&mut t, draft);
+    let _ = masses(&mut t, draft);
+    let _ = tool(&mut t, draft);
+    let _ = held(&mut t, draft);
     let _ = links(&mut t, draft, beams);
     let _ = drives(&mut t, draft);
     t
@@ -89,7 +79,11 @@ fn head(t: &mut String, draft: &Draft, placed: &Placed) -> std::fmt::Result {
         writeln!(t, "\n# Physically impossible moments of inertia, used unchanged: correct them in the description.")?;
         writeln!(t, "waive_inertia = [{}]", names.join(", "))?;
     }
-    efforts(t, draft)?;
+    Ok(())
+}
+
+/// Writes the masses that are ignored, and the estimate that replaces them.
+fn masses(t: &mut String, draft: &Draft) -> std::fmt::Result {
     if !draft.discarded.is_empty() {
         let names: Vec<String> = draft.discarded.iter().map(|n| quoted(n)).collect();
         writeln!(t, "\n# The mass of these links is a placeholder, the same for all: it is ignored.")?;
@@ -115,6 +109,11 @@ fn head(t: &mut String, draft: &Draft, placed: &Placed) -> std::fmt::Result {
             }
         }
     }
+    Ok(())
+}
+
+/// Writes TCP and payload.
+fn tool(t: &mut String, draft: &Draft) -> std::fmt::Result {
     writeln!(
         t,
         "\n# The TCP, in the frame of link {}. Move it to the working point of the tool with xyz (m) and rpy (rad).",
@@ -144,6 +143,11 @@ fn head(t: &mut String, draft: &Draft, placed: &Placed) -> std::fmt::Result {
             inline(&quoted(&draft.chain.tool))
         )?;
     }
+    Ok(())
+}
+
+/// Writes the joints that are held.
+fn held(t: &mut String, draft: &Draft) -> std::fmt::Result {
     if !draft.held.is_empty() {
         writeln!(t, "\n# Positions of the joints that are not part of the arm (rad, m).\n[hold]")?;
         for (joint, at, why) in &draft.held {
@@ -182,45 +186,7 @@ fn links(t: &mut String, draft: &Draft, beams: &[&DraftLink]) -> std::fmt::Resul
     writeln!(t, "# mass. ASSUMED: the material, and all of the mass in the wall: an upper estimate of the stiffness.")?;
     for link in beams {
         let Ok(s) = &link.section else { continue };
-        writeln!(
-            t,
-            "\n# {:.0} mm long, {:.2} kg: a {}.",
-            1e3 * link.length,
-            link.mass.unwrap_or(0.0),
-            section_words(s)
-        )?;
-        if s.ends.is_some() {
-            writeln!(
-                t,
-                "# The frames of the description are not along it: ends are those of its geometry between the \
-                 joint axes."
-            )?;
-        }
-        if link.of_collisions {
-            writeln!(t, "# The outline is that of the collision geometry, which is often larger.")?;
-        }
-        if s.taper > 1.25 {
-            writeln!(
-                t,
-                "# Its width varies by a factor of {:.1}: this is the uniform beam with the same tip deflection \
-                 under a force.",
-                s.taper
-            )?;
-        }
-        if s.open > 0.0 {
-            writeln!(
-                t,
-                "# {:.0} % of the sections of the mesh are not closed: their convex hull is used.",
-                100.0 * s.open
-            )?;
-        }
-        if let Some(half) = s.wall_of_half {
-            writeln!(
-                t,
-                "# If only half of the mass is in the wall (the rest is motors and gears): wall = {}",
-                float(half, 5)
-            )?;
-        }
+        section_notes(t, link, s)?;
         writeln!(t, "[[flexible_link]]\nlink = {}\ndistal = {}", quoted(&link.link), quoted(&link.distal))?;
         writeln!(t, "damping = {{ modal = 0.03 }}   # ASSUMED: 3 % of critical, typical of jointed structures")?;
         let mut beam = format!("section = {:?}, {}, material = {:?}", s.section, beam_keys(s, s.wall), s.material);
@@ -239,9 +205,47 @@ fn links(t: &mut String, draft: &Draft, beams: &[&DraftLink]) -> std::fmt::Resul
     if !others.is_empty() {
         writeln!(t, "\n# Rigid, because no section could be proposed:")?;
         for link in others {
-            let reason = link.section.as_ref().err().map(|r| inline(r)).unwrap_or_default();
+            let reason = link.section.as_ref().err().map(|r| inline(&r.to_string())).unwrap_or_default();
             writeln!(t, "#   {}: {reason}", inline(&link.link))?;
         }
+    }
+    Ok(())
+}
+
+/// Writes size and mass of a link, and how far its section can be trusted.
+fn section_notes(t: &mut String, link: &DraftLink, s: &BeamSection) -> std::fmt::Result {
+    writeln!(t, "\n# {:.0} mm long, {:.2} kg: a {}.", 1e3 * link.length, link.mass.unwrap_or(0.0), s.words())?;
+    if s.ends.is_some() {
+        writeln!(
+            t,
+            "# The frames of the description are not along it: ends are those of its geometry between the \
+             joint axes."
+        )?;
+    }
+    if link.of_collisions {
+        writeln!(t, "# The outline is that of the collision geometry, which is often larger.")?;
+    }
+    if s.taper > 1.25 {
+        writeln!(
+            t,
+            "# Its width varies by a factor of {:.1}: this is the uniform beam with the same tip deflection \
+             under a force.",
+            s.taper
+        )?;
+    }
+    if s.open > 0.0 {
+        writeln!(
+            t,
+            "# {:.0} % of the sections of the mesh are not closed: their convex hull is used.",
+            100.0 * s.open
+        )?;
+    }
+    if let Some(half) = s.wall_of_half {
+        writeln!(
+            t,
+            "# If only half of the mass is in the wall (the rest is motors and gears): wall = {}",
+            float(half, 5)
+        )?;
     }
     Ok(())
 }
@@ -377,6 +381,20 @@ fn write_readme(t: &mut String, draft: &Draft, placed: &Placed) -> std::fmt::Res
     for (joint, at, why) in &draft.held {
         writeln!(t, "* {} is held at {at}: {why}.", markdown_code(joint))?;
     }
+    joint_table(t, draft)?;
+    link_table(t, draft)?;
+    writeln!(t, "\n## Assumed\n")?;
+    for a in &draft.assumptions {
+        writeln!(t, "* {}: {}. Better: {}.", markdown(&a.about), markdown(&a.text), markdown(&a.mend))?;
+    }
+    writeln!(t, "\n## To ask the manufacturer, or to measure\n")?;
+    for question in &draft.questions {
+        writeln!(t, "* {}.", markdown(question))?;
+    }
+    Ok(())
+}
+
+fn joint_table(t: &mut String, draft: &Draft) -> std::fmt::Result {
     writeln!(
         t,
         "\n| joint | effort limit | gravity torque | torque in motion | reducer, N m/rad | range |\n\
@@ -393,26 +411,18 @@ fn write_readme(t: &mut String, draft: &Draft, placed: &Placed) -> std::fmt::Res
         let name = markdown_code(&j.joint.name);
         writeln!(t, "| {name} | {effort} | {:.1} | {:.1} | {k} | {range} |", j.weight, j.needed)?;
     }
-    writeln!(
-        t,
-        "\nTorques in N m (forces in N), with payload, maxima over the workspace.\n\n\
-         | link | length, mm | mass, kg | section |\n| --- | --- | --- | --- |"
-    )?;
+    writeln!(t, "\nTorques in N m (forces in N), with payload, maxima over the workspace.")
+}
+
+fn link_table(t: &mut String, draft: &Draft) -> std::fmt::Result {
+    writeln!(t, "\n| link | length, mm | mass, kg | section |\n| --- | --- | --- | --- |")?;
     for link in &draft.links {
         let section = match &link.section {
-            Ok(section) => section_words(section),
-            Err(reason) => format!("none: {}", markdown(reason)),
+            Ok(section) => section.words(),
+            Err(reason) => format!("none: {}", markdown(&reason.to_string())),
         };
         let mass = link.mass.map_or("not known".into(), |m| format!("{m:.2}"));
         writeln!(t, "| {} | {:.0} | {mass} | {section} |", markdown_code(&link.link), 1e3 * link.length)?;
-    }
-    writeln!(t, "\n## Assumed\n")?;
-    for a in &draft.assumptions {
-        writeln!(t, "* {}: {}. Better: {}.", markdown(&a.about), markdown(&a.text), markdown(&a.mend))?;
-    }
-    writeln!(t, "\n## To ask the manufacturer, or to measure\n")?;
-    for question in &draft.questions {
-        writeln!(t, "* {}.", markdown(question))?;
     }
     Ok(())
 }

@@ -43,7 +43,7 @@ impl FromStr for Change {
             (.., Ok(truth)) => ParameterValue::Truth(truth),
             _ => ParameterValue::Text(value.to_owned()),
         };
-        let target = Target::parse(&path, &[]).map_err(failed)?;
+        let target = Target::parse(&path, &[]).map_err(|error| failed(error.to_string()))?;
         match &target {
             Target::Speed if !value.number().is_some_and(|x| x > 0.0) => {
                 Err(failed(format!("{path} is {value}, expected a positive number")))
@@ -89,7 +89,7 @@ fn change_text(path: &Path, text: &str, changes: &[Change]) -> Result<(String, f
         // A file that is not TOML is reported, with its place, by the reader of robot files.
         let (Ok(root), Ok(mut document)) = (toml::from_str(&text), text.parse::<DocumentMut>()) else { break };
         let edits = edits(&root, place, &change.path, change.role, &change.value, &[]);
-        for edit in edits.map_err(|what| SweepError::Run(format!("{}: {what}", path.display())))? {
+        for edit in edits.map_err(|error| SweepError::Run(format!("{}: {error}", path.display())))? {
             edit.place.put(&mut document, edit.value);
         }
         text = document.to_string();

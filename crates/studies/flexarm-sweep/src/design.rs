@@ -212,7 +212,7 @@ fn derived(columns: &[Column]) -> Result<Vec<(usize, Formula)>, RobotFileError> 
         };
         let parameters: Vec<Option<String>> = columns.iter().enumerate().map(known).collect();
         let vocabulary = Vocabulary { parameters: &parameters, metrics: &[], summary: &serde_json::Value::Null };
-        let formula = Formula::parse(text, &vocabulary).map_err(fail)?;
+        let formula = Formula::parse(text, &vocabulary).map_err(|error| fail(error.to_string()))?;
         if !formula.is_of_parameters() {
             return Err(fail(format!("expression {text:?}: only parameters defined before it are allowed")));
         }

@@ -123,26 +123,37 @@ impl Sweep {
         stop: &AtomicBool,
         on_result: &mut OnResult<'_>,
     ) {
-        let answered = |place: usize, facts: &dyn Facts| {
-            let values = metric::values(&self.metrics, &points[place].1, facts);
-            let passed = self.constraints.iter().map(|c| c.violation(&points[place].1, &values, facts)).collect();
-            (values, passed)
-        };
-        if !self.quick {
-            for (place, (_, values)) in points.iter().enumerate() {
-                if stop.load(Ordering::Relaxed) {
-                    return;
-                }
-                let mut caveats = Vec::new();
-                match self.whole(values, stop, &mut caveats) {
-                    Err(Error::Interrupted { .. }) => return,
-                    result => {
-                        on_result(place, result.map(|facts| answered(place, &facts)), self.stored_caveats(caveats))
-                    }
+        if self.quick {
+            return self.evaluate_quickly(points, stop, on_result);
+        }
+        for (place, (_, values)) in points.iter().enumerate() {
+            if stop.load(Ordering::Relaxed) {
+                return;
+            }
+            let mut caveats = Vec::new();
+            match self.whole(values, stop, &mut caveats) {
+                Err(Error::Interrupted { .. }) => return,
+                result => {
+                    let result = result.map(|facts| self.metric_values(values, &facts));
+                    on_result(place, result, self.stored_caveats(caveats));
                 }
             }
-            return;
         }
+    }
+
+    fn metric_values(&self, point: &[ParameterValue], facts: &dyn Facts) -> MetricValues {
+        let values = metric::values(&self.metrics, point, facts);
+        let passed = self.constraints.iter().map(|c| c.violation(point, &values, facts)).collect();
+        (values, passed)
+    }
+
+    /// Computes runs without full summaries, those that go together side by side.
+    fn evaluate_quickly(
+        &self,
+        points: &[(usize, Vec<ParameterValue>)],
+        stop: &AtomicBool,
+        on_result: &mut OnResult<'_>,
+    ) {
         let mut going: Vec<QuickRun> = Vec::new();
         for (place, (_, values)) in points.iter().enumerate() {
             if stop.load(Ordering::Relaxed) {
@@ -174,7 +185,8 @@ impl Sweep {
                 let runs: Vec<BatchRun> = few.iter().map(|run| run.run.clone()).collect();
                 for (own, result) in few.iter().zip(batch.run(&runs)) {
                     let result = result.map_err(|error| own.flexible.explained(error));
-                    let result = result.map(|d| answered(own.place, &own.facts.clone().of(&d, &own.options)));
+                    let facts = result.map(|deflection| own.facts.clone().of(&deflection, &own.options));
+                    let result = facts.map(|facts| self.metric_values(&points[own.place].1, &facts));
                     on_result(own.place, result, own.stored.clone());
                 }
             }

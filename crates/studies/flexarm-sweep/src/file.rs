@@ -406,6 +406,23 @@ fn range(
     Ok((Values::Levels(levels), Some((from.min(to), from.max(to)))))
 }
 
+fn keys_of_distribution(
+    word: &str,
+    fail: &dyn Fn(String) -> RobotFileError,
+) -> Result<&'static [&'static str], RobotFileError> {
+    match word {
+        "uniform" | "log-uniform" => Ok(&["low", "high"]),
+        "normal" => Ok(&["mean", "std"]),
+        "lognormal" => Ok(&["median", "sigma"]),
+        "triangular" => Ok(&["low", "mode", "high"]),
+        "choice" => Err(fail("distribution = \"choice\" needs values = [...]".into())),
+        other => {
+            let words = "uniform, log-uniform, normal, lognormal, triangular or choice";
+            Err(fail(format!("distribution {other:?} is not known; use {words}")))
+        }
+    }
+}
+
 fn distribution(
     own: &ParameterToml,
     word: &str,
@@ -420,17 +437,7 @@ fn distribution(
         ("sigma", own.sigma),
         ("mode", own.mode),
     ];
-    let taken: &[&str] = match word {
-        "uniform" | "log-uniform" => &["low", "high"],
-        "normal" => &["mean", "std"],
-        "lognormal" => &["median", "sigma"],
-        "triangular" => &["low", "mode", "high"],
-        "choice" => return Err(fail("distribution = \"choice\" needs values = [...]".into())),
-        other => {
-            let words = "uniform, log-uniform, normal, lognormal, triangular or choice";
-            return Err(fail(format!("distribution {other:?} is not known; use {words}")));
-        }
-    };
+    let taken = keys_of_distribution(word, fail)?;
     if let Some((key, _)) = numbers.iter().find(|(key, value)| value.is_some() && !taken.contains(key)) {
         return Err(fail(format!("distribution = {word:?} has no key {key}; its keys are {}", taken.join(", "))));
     }

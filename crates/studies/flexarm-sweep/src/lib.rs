@@ -47,7 +47,7 @@ use flexarm_run::Stopwatch;
 use self::design::{Column, Design};
 use self::evaluate::Answer;
 use self::file::StudyFile;
-use self::metric::{Constraint, Metric, Vocabulary};
+use self::metric::{Constraint, Metric, MetricError, Vocabulary};
 use self::store::{Collected, Manifest, RUNS, Store, known_manifest};
 use self::workshop::Workshop;
 use flexarm_run::Error;
@@ -162,7 +162,8 @@ impl Sweep {
         let asked = file.metrics.iter().map(|metric| (metric.text.clone(), metric.place.clone()));
         for (text, place) in usual.into_iter().flatten().chain(asked) {
             let known = Vocabulary { parameters: &parameters, metrics: &metrics, summary: &summary };
-            let mut metric = Metric::parse(&text, &known).map_err(|message| RobotFileError { message, ..place })?;
+            let fail = |error: MetricError| RobotFileError { message: error.to_string(), ..place };
+            let mut metric = Metric::parse(&text, &known).map_err(fail)?;
             let said = file.better.iter().find(|(name, ..)| *name == metric.name);
             metric.better = said.map(|(_, better, _)| *better).or(metric.better);
             metrics.push(metric);
@@ -170,7 +171,7 @@ impl Sweep {
         let known = Vocabulary { parameters: &parameters, metrics: &metrics, summary: &summary };
         let mut constraints = Vec::new();
         for text in file.minimise.iter().flat_map(|entry| &entry.constraints) {
-            let fail = |message| RobotFileError { message, ..text.place.clone() };
+            let fail = |error: MetricError| RobotFileError { message: error.to_string(), ..text.place.clone() };
             constraints.push(Constraint::parse(&text.text, &known).map_err(fail)?);
         }
         check_names(&file, &metrics)?;
@@ -454,7 +455,7 @@ fn columns(file: &StudyFile, workshop: &Workshop) -> Result<Vec<Column>, RobotFi
         for path in &entry.paths {
             let fail =
                 |message: String| RobotFileError { message: format!("parameter {message}"), ..entry.place.clone() };
-            let places = workshop.expanded(path).map_err(fail)?;
+            let places = workshop.expanded(path).map_err(|error| fail(error.to_string()))?;
             if places.is_empty() {
                 return Err(fail(format!("{path:?} matches no entry")));
             }

@@ -57,6 +57,25 @@ pub(super) struct Formula {
     variables: Vec<Variable>,
 }
 
+/// Reason why a text is not a metric, formula or constraint.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum MetricError {
+    #[error("metric {text:?} has no name: expected name = expression")]
+    NoName { text: String },
+    #[error("metric {text:?}: the name {name:?} is taken: give it another one")]
+    NameTaken { text: String, name: String },
+    #[error("the expression has {bytes} bytes, the maximum is {}", LONGEST)]
+    Long { bytes: usize },
+    #[error("expression {text:?}: {source}")]
+    Syntax { text: String, source: exmex::ExError },
+    #[error("{word} depends on the machine and its load: it cannot be a metric of a study")]
+    OfTheMachine { word: String },
+    #[error("{word:?} {what}; {near}")]
+    NoNumber { word: String, what: &'static str, near: String },
+    #[error("constraint {text:?}: expected metric <= number, or metric >= number")]
+    NoConstraint { text: String },
+}
+
 /// Names that a metric may refer to.
 pub(super) struct Vocabulary<'a> {
     /// Names of the parameters, in the order of their columns; `None` for parameters that are not
@@ -110,19 +129,19 @@ impl Metric {
     /// Parses `expression`, or `name = expression`.
     ///
     /// # Errors
-    /// A sentence that names an unknown variable or a syntax error.
-    pub(super) fn parse(text: &str, known: &Vocabulary<'_>) -> Result<Self, String> {
+    /// [`MetricError`] for an unknown variable, a syntax error or an invalid name.
+    pub(super) fn parse(text: &str, known: &Vocabulary<'_>) -> Result<Self, MetricError> {
         let (name, expression) = match text.split_once('=') {
             Some((name, expression)) => (name.trim(), expression.trim()),
             None => (text.trim(), text.trim()),
         };
         if name.is_empty() || name.chars().any(|c| c.is_control()) {
-            return Err(format!("metric {text:?} has no name: expected name = expression"));
+            return Err(MetricError::NoName { text: text.to_owned() });
         }
         if known.metrics.iter().any(|other| other.name == name)
             || name != expression && known.parameters.iter().flatten().any(|other| other == name)
         {
-            return Err(format!("metric {text:?}: the name {name:?} is taken: give it another one"));
+            return Err(MetricError::NameTaken { text: text.to_owned(), name: name.to_owned() });
         }
         let formula = Formula::parse(expression, known)?;
         let better = formula.better(known).or_else(|| direction::of_name(name));
@@ -146,8 +165,8 @@ impl Formula {
     /// Parses an expression.
     ///
     /// # Errors
-    /// A sentence that names an unknown variable or a syntax error.
-    pub(super) fn parse(text: &str, known: &Vocabulary<'_>) -> Result<Self, String> {
+    /// [`MetricError`] for an unknown variable or a syntax error.
+    pub(super) fn parse(text: &str, known: &Vocabulary<'_>) -> Result<Self, MetricError> {
         let (expression, variables) = expression_of(text, known)?;
         Ok(Self { expression, variables })
     }
@@ -205,9 +224,9 @@ pub(super) fn values(metrics: &[Metric], parameters: &[ParameterValue], facts: &
 }
 
 /// Parses an expression, with a variable in place of each path.
-fn expression_of(text: &str, known: &Vocabulary<'_>) -> Result<(FlatEx<f64>, Vec<Variable>), String> {
+fn expression_of(text: &str, known: &Vocabulary<'_>) -> Result<(FlatEx<f64>, Vec<Variable>), MetricError> {
     if text.len() > LONGEST {
-        return Err(format!("the expression has {} bytes, the maximum is {LONGEST}", text.len()));
+        return Err(MetricError::Long { bytes: text.len() });
     }
     let mut plain = String::new();
     let mut words: Vec<String> = Vec::new();
@@ -223,8 +242,8 @@ fn expression_of(text: &str, known: &Vocabulary<'_>) -> Result<(FlatEx<f64>, Vec
             Token::Other(other) => plain += &other,
         }
     }
-    let variables = words.iter().map(|word| variable(word, known)).collect::<Result<Vec<_>, String>>()?;
-    let fail = |error: exmex::ExError| format!("expression {text:?}: {error}");
+    let variables = words.iter().map(|word| variable(word, known)).collect::<Result<Vec<_>, _>>()?;
+    let fail = |source| MetricError::Syntax { text: text.to_owned(), source };
     let parsed: FlatEx<f64> = exmex::parse(&plain).map_err(fail)?;
     // The parser orders variables by name.
     let place = |name: &String| name.strip_prefix('v').and_then(|number| number.parse::<usize>().ok());
@@ -289,7 +308,7 @@ fn goes_on(letters: &[char], k: usize) -> bool {
     }
 }
 
-fn variable(word: &str, known: &Vocabulary<'_>) -> Result<Variable, String> {
+fn variable(word: &str, known: &Vocabulary<'_>) -> Result<Variable, MetricError> {
     if let Some(column) = known.parameters.iter().position(|name| name.as_deref() == Some(word)) {
         return Ok(Variable::Parameter(column));
     }
@@ -298,7 +317,7 @@ fn variable(word: &str, known: &Vocabulary<'_>) -> Result<Variable, String> {
     }
     let path: Vec<String> = word.replace('[', ".").replace(']', "").split('.').map(str::to_owned).collect();
     if path.len() == 1 && OF_THE_MACHINE.contains(&word) {
-        return Err(format!("{word} depends on the machine and its load: it cannot be a metric of a study"));
+        return Err(MetricError::OfTheMachine { word: word.to_owned() });
     }
     let quick = quick(&path);
     match (quick, find(known.summary, &path)) {
@@ -317,7 +336,7 @@ fn variable(word: &str, known: &Vocabulary<'_>) -> Result<Variable, String> {
                 leaves(known.summary, "", &mut all);
             }
             all.extend(known.parameters.iter().flatten().cloned());
-            Err(format!("{word:?} {what}; {}", near(word, &all)))
+            Err(MetricError::NoNumber { word: word.to_owned(), what, near: near(word, &all) })
         }
     }
 }
@@ -368,11 +387,11 @@ impl Constraint {
     ///
     /// # Errors
     /// As [`Metric::parse`].
-    pub(super) fn parse(text: &str, known: &Vocabulary<'_>) -> Result<Self, String> {
+    pub(super) fn parse(text: &str, known: &Vocabulary<'_>) -> Result<Self, MetricError> {
         let (left, right, turned) = match (text.split_once("<="), text.split_once(">=")) {
             (Some((left, right)), None) => (left, right, false),
             (None, Some((left, right))) => (left, right, true),
-            _ => return Err(format!("constraint {text:?}: expected metric <= number, or metric >= number")),
+            _ => return Err(MetricError::NoConstraint { text: text.to_owned() }),
         };
         let (left, right) = (Formula::parse(left.trim(), known)?, Formula::parse(right.trim(), known)?);
         let (less, more) = if turned { (right, left) } else { (left, right) };
@@ -405,7 +424,7 @@ mod tests {
                 "links": [{ "name": "link_2", "peak_contribution_m": 1e-3 }], "frequencies_hz": [9.5, 20.0], "drives": { "joint_1": 4.0 } })
     }
 
-    fn value(text: &str) -> Result<f64, String> {
+    fn value(text: &str) -> Result<f64, MetricError> {
         let summary = summary();
         let parameters = [Some("payload.mass".to_owned()), None];
         let known = Vocabulary { parameters: &parameters, metrics: &[], summary: &summary };
@@ -450,13 +469,13 @@ mod tests {
 
     #[test]
     fn what_no_run_has_is_told_with_what_is_near() {
-        let message = value("tcp.peak").unwrap_err();
+        let message = value("tcp.peak").unwrap_err().to_string();
         assert!(message.contains("\"tcp.peak\" is not in the summary") && message.contains("tcp.peak_m"), "{message}");
-        assert!(value("tcp.settling").unwrap_err().contains("is a string"));
-        assert!(value("tcp").unwrap_err().contains("several entries"));
-        assert!(value("wall_s").unwrap_err().contains("depends on the machine"));
+        assert!(value("tcp.settling").unwrap_err().to_string().contains("is a string"));
+        assert!(value("tcp").unwrap_err().to_string().contains("several entries"));
+        assert!(value("wall_s").unwrap_err().to_string().contains("depends on the machine"));
         assert!(value("tcp.peak_m +* 2").is_err() && value("= 2").is_err() && value("").is_err());
-        assert!(value("payload.mass = tcp.peak_m").unwrap_err().contains("taken"));
+        assert!(value("payload.mass = tcp.peak_m").unwrap_err().to_string().contains("taken"));
     }
 
     #[test]

@@ -11,7 +11,7 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 
 use crate::statistics::{LeastSearch, SearchResult};
 use flexarm_log::CreateOptions;
@@ -214,7 +214,7 @@ impl Sweep {
         let name = (self.parameter_names(), self.metrics.clone());
         let known = Vocabulary { parameters: &name.0, metrics: &name.1, summary: &self.vocabulary };
         for text in &search.constraints {
-            self.constraints.push(Constraint::parse(text, &known).map_err(fail)?);
+            self.constraints.push(Constraint::parse(text, &known).map_err(|error| fail(error.to_string()))?);
         }
         self.quick = self.quick && self.constraints.iter().all(Constraint::is_quick);
         let place = |name: &str| self.metrics.iter().position(|metric| metric.name == name);
@@ -296,26 +296,13 @@ impl Sweep {
             .map(|(k, values)| (k, values.clone()))
             .collect();
         let threads = request.threads.unwrap_or_else(rayon::current_num_threads).max(1);
-        let few = todo.len().div_ceil(threads).clamp(1, FEW);
         let (stop, next) = (AtomicBool::new(false), AtomicUsize::new(0));
         let (sender, receiver) = channel();
         let mut failed = None;
         std::thread::scope(|scope| {
             for _ in 0..threads {
                 let (sender, todo, stop, next) = (sender.clone(), &todo, &stop, &next);
-                scope.spawn(move || {
-                    loop {
-                        let start = next.fetch_add(few, Ordering::Relaxed);
-                        if start >= todo.len() || stop.load(Ordering::Relaxed) {
-                            break;
-                        }
-                        let some = &todo[start..(start + few).min(todo.len())];
-                        self.evaluate_points(some, stop, &mut |place, result, stored| {
-                            let result = result.map_err(|error| self.workshop.reason(&error));
-                            let _ = sender.send((some[place].0, Outcome { result, stored }));
-                        });
-                    }
-                });
+                scope.spawn(move || self.work_off(todo, todo.len().div_ceil(threads), next, stop, &sender));
             }
             drop(sender);
             loop {
@@ -338,6 +325,29 @@ impl Sweep {
         match failed {
             Some(error) => Err(error),
             None => Ok(outcomes.into_iter().collect()),
+        }
+    }
+
+    /// Evaluates the next points, a few at a time, until none is left or `stop` is set.
+    fn work_off(
+        &self,
+        todo: &[(usize, Vec<ParameterValue>)],
+        few: usize,
+        next: &AtomicUsize,
+        stop: &AtomicBool,
+        sender: &Sender<(usize, Outcome)>,
+    ) {
+        let few = few.clamp(1, FEW);
+        loop {
+            let start = next.fetch_add(few, Ordering::Relaxed);
+            if start >= todo.len() || stop.load(Ordering::Relaxed) {
+                break;
+            }
+            let some = &todo[start..(start + few).min(todo.len())];
+            self.evaluate_points(some, stop, &mut |place, result, stored| {
+                let result = result.map_err(|error| self.workshop.reason(&error));
+                let _ = sender.send((some[place].0, Outcome { result, stored }));
+            });
         }
     }
 

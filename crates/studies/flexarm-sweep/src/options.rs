@@ -26,6 +26,29 @@ const KEYS: [&str; 15] = [
     "round_corners",
 ];
 
+/// Reason why an option cannot be set.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum OptionError {
+    #[error("there is no option {key:?}; options are {}", KEYS.join(", "))]
+    Unknown { key: String },
+    #[error("options.{key} = {value}: expected {expected}")]
+    Type { key: String, value: ParameterValue, expected: &'static str },
+    #[error("options.{key} = {value}: expected a whole number from {least}")]
+    NotWhole { key: String, value: ParameterValue, least: usize },
+    #[error("options.{key} = {word:?} is not known; use {}", known.join(", "))]
+    Word { key: String, word: String, known: Vec<&'static str> },
+}
+
+impl OptionError {
+    fn of_type(key: &str, value: &ParameterValue, expected: &'static str) -> Self {
+        Self::Type { key: key.to_owned(), value: value.clone(), expected }
+    }
+
+    fn of_word(key: &str, word: &str, known: &[&'static str]) -> Self {
+        Self::Word { key: key.to_owned(), word: word.to_owned(), known: known.to_vec() }
+    }
+}
+
 /// Options of time integration and evaluation of runs.
 #[derive(Clone, Debug)]
 pub(super) struct StudyOptions {
@@ -57,8 +80,8 @@ impl StudyOptions {
     /// Sets an option.
     ///
     /// # Errors
-    /// A sentence about an unknown option or a value of the wrong type.
-    pub(super) fn set(&mut self, key: &str, value: &ParameterValue) -> Result<(), String> {
+    /// [`OptionError`] for an unknown option or a value of the wrong type.
+    pub(super) fn set(&mut self, key: &str, value: &ParameterValue) -> Result<(), OptionError> {
         match key {
             "step" => self.step_s = Some(number(key, value)?),
             "log_rate" => self.run.log_rate_hz = number(key, value)?,
@@ -71,30 +94,31 @@ impl StudyOptions {
             "ignore_limits" => self.run.ignore_limits = truth(key, value)?,
             "dispersion_correction" => self.settings.alpha.dispersion_correction = truth(key, value)?,
             "stepper" => {
-                let known: Vec<&str> = STEPPERS.iter().map(|entry| entry.name).collect();
+                let known: Vec<&'static str> = STEPPERS.iter().map(|entry| entry.name).collect();
                 let word = word(key, value)?;
                 let is_it =
                     |entry: &&&flexarm_stepping::StepperEntry| entry.name == word || entry.aliases.contains(&word);
                 let place = STEPPERS.iter().position(|entry| is_it(&entry));
-                self.stepper = place.ok_or_else(|| unknown(key, word, &known))?;
+                self.stepper = place.ok_or_else(|| OptionError::of_word(key, word, &known))?;
             }
             "links" => {
                 let word = word(key, value)?;
                 let known = LinkModel::WORDS.map(|(word, ..)| word);
-                self.run.modelling.links = LinkModel::from_word(word).ok_or_else(|| unknown(key, word, &known))?;
+                self.run.modelling.links =
+                    LinkModel::from_word(word).ok_or_else(|| OptionError::of_word(key, word, &known))?;
             }
             "drives" => {
                 let word = word(key, value)?;
                 let known = DriveModel::WORDS.map(|(word, ..)| word);
                 let found = DriveModel::WORDS.iter().find(|(known, ..)| *known == word);
                 self.run.modelling.drives =
-                    found.map(|(_, model, _)| *model).ok_or_else(|| unknown(key, word, &known))?;
+                    found.map(|(_, model, _)| *model).ok_or_else(|| OptionError::of_word(key, word, &known))?;
             }
             "from_rest" => {
                 self.start = match word(key, value)? {
                     "equilibrium" => Start::Equilibrium,
                     "undeformed" => Start::Undeformed,
-                    other => return Err(unknown(key, other, &["equilibrium", "undeformed"])),
+                    other => return Err(OptionError::of_word(key, other, &["equilibrium", "undeformed"])),
                 };
             }
             "reference_method" => {
@@ -102,38 +126,35 @@ impl StudyOptions {
                     "bdf" => ReferenceMethod::Bdf,
                     "esdirk34" => ReferenceMethod::Esdirk34,
                     "tsit45" => ReferenceMethod::Tsit45,
-                    other => return Err(unknown(key, other, &["bdf", "esdirk34", "tsit45"])),
+                    other => return Err(OptionError::of_word(key, other, &["bdf", "esdirk34", "tsit45"])),
                 };
             }
-            _ => return Err(format!("there is no option {key:?}; options are {}", KEYS.join(", "))),
+            _ => return Err(OptionError::Unknown { key: key.to_owned() }),
         }
         Ok(())
     }
 }
 
-fn number(key: &str, value: &ParameterValue) -> Result<f64, String> {
-    value.number().ok_or_else(|| format!("options.{key} = {value}: expected a number"))
+fn number(key: &str, value: &ParameterValue) -> Result<f64, OptionError> {
+    value.number().ok_or_else(|| OptionError::of_type(key, value, "a number"))
 }
 
-fn count(key: &str, value: &ParameterValue, least: usize) -> Result<usize, String> {
+fn count(key: &str, value: &ParameterValue, least: usize) -> Result<usize, OptionError> {
     let whole = value.number().filter(|x| x.fract() == 0.0 && (least as f64..=1e4).contains(x));
-    whole.map(|x| x as usize).ok_or_else(|| format!("options.{key} = {value}: expected a whole number from {least}"))
+    let fail = || OptionError::NotWhole { key: key.to_owned(), value: value.clone(), least };
+    whole.map(|x| x as usize).ok_or_else(fail)
 }
 
-fn truth(key: &str, value: &ParameterValue) -> Result<bool, String> {
+fn truth(key: &str, value: &ParameterValue) -> Result<bool, OptionError> {
     match value {
         ParameterValue::Truth(truth) => Ok(*truth),
-        _ => Err(format!("options.{key} = {value}: expected true or false")),
+        _ => Err(OptionError::of_type(key, value, "true or false")),
     }
 }
 
-fn word<'a>(key: &str, value: &'a ParameterValue) -> Result<&'a str, String> {
+fn word<'a>(key: &str, value: &'a ParameterValue) -> Result<&'a str, OptionError> {
     match value {
         ParameterValue::Text(word) => Ok(word),
-        _ => Err(format!("options.{key} = {value}: expected a string")),
+        _ => Err(OptionError::of_type(key, value, "a string")),
     }
-}
-
-fn unknown(key: &str, word: &str, known: &[&str]) -> String {
-    format!("options.{key} = {word:?} is not known; use {}", known.join(", "))
 }

@@ -1,6 +1,8 @@
 //! Targets of a parameter's path: the robot file, the motion, the loads, an option, or the job of a
 //! reduced link.
 
+use std::path::PathBuf;
+
 use super::file::Role;
 use super::path::{Segment, ValueLocation, changed, leaves, near, places, segments, written};
 use super::value::ParameterValue;
@@ -31,17 +33,38 @@ pub(super) enum Target {
     Entry(TargetFile, Vec<Segment>),
 }
 
+/// Reason why a path of a parameter has no target, or why a value cannot be put there.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum TargetError {
+    #[error("{path:?} is not a path: expected names separated by dots, such as drive.joint_2.gearbox.stiffness")]
+    NoPath { path: String },
+    #[error("{path:?}: an option has one name, such as options.step")]
+    LongOption { path: String },
+    #[error("{path:?}: the study names no job for link {link:?}; add {link} = \"job.toml\" to [reduce]")]
+    NoJob { path: String, link: String },
+    #[error("{path:?}: the study names no file of this kind")]
+    NoFile { path: String },
+    #[error("{path:?}: {} is not a TOML file and has no keys", file.display())]
+    NoToml { path: String, file: PathBuf },
+    #[error("{path:?} matches no entry; {near}")]
+    NoMatch { path: String, near: String },
+    #[error("{path:?}: {name} is not a number: a factor or offset does not apply")]
+    NoNumber { path: String, name: String },
+    #[error("{path:?}: {name} is not in the file: a factor or offset needs an existing number")]
+    NotInFile { path: String, name: String },
+    #[error("{path:?}: factor or offset {value:?} must be a number")]
+    NoFactor { path: String, value: ParameterValue },
+}
+
 impl Target {
     /// Parses a path.
     ///
     /// * `jobs`: names of the links with a job.
     ///
     /// # Errors
-    /// A sentence about an invalid path.
-    pub(super) fn parse(path: &str, jobs: &[String]) -> Result<Self, String> {
-        let all = segments(path).ok_or_else(|| {
-            format!("{path:?} is not a path: expected names separated by dots, such as drive.joint_2.gearbox.stiffness")
-        })?;
+    /// [`TargetError`] for an invalid path.
+    pub(super) fn parse(path: &str, jobs: &[String]) -> Result<Self, TargetError> {
+        let all = segments(path).ok_or_else(|| TargetError::NoPath { path: path.to_owned() })?;
         let word = |k: usize| match all.get(k) {
             Some(Segment::Key(key)) => key.as_str(),
             _ => "",
@@ -52,15 +75,12 @@ impl Target {
             ("loads", 1) => Ok(Self::File(TargetFile::Loads)),
             ("motion", 2) if word(1) == "speed" => Ok(Self::Speed),
             ("options", 2) => Ok(Self::Option(word(1).to_owned())),
-            ("options", _) => Err(format!("{path:?}: an option has one name, such as options.step")),
+            ("options", _) => Err(TargetError::LongOption { path: path.to_owned() }),
             ("motion", _) => Ok(Self::Entry(TargetFile::Motion, all[1..].to_vec())),
             ("loads", _) => Ok(Self::Entry(TargetFile::Loads, all[1..].to_vec())),
             ("reduce", 3..) => match jobs.iter().position(|link| link == word(1)) {
                 Some(job) => Ok(Self::Entry(TargetFile::Job(job), all[2..].to_vec())),
-                None => Err(format!(
-                    "{path:?}: the study names no job for link {:?}; add {0} = \"job.toml\" to [reduce]",
-                    word(1)
-                )),
+                None => Err(TargetError::NoJob { path: path.to_owned(), link: word(1).to_owned() }),
             },
             ("robot", _) => Ok(Self::Entry(TargetFile::Robot, of_robot(all[1..].to_vec()))),
             _ => Ok(Self::Entry(TargetFile::Robot, of_robot(all))),
@@ -91,8 +111,8 @@ pub(super) struct Edit {
 /// * `known`: earlier edits, to which a factor or an offset is applied.
 ///
 /// # Errors
-/// A sentence about a path without a match, with similar paths, or about a factor or an offset for
-/// a value that is not numeric.
+/// [`TargetError`] for a path without a match, and for a factor or an offset of a value that is not
+/// numeric.
 pub(super) fn edits(
     root: &toml::Value,
     path: &[Segment],
@@ -100,10 +120,11 @@ pub(super) fn edits(
     role: Role,
     value: &ParameterValue,
     known: &[Edit],
-) -> Result<Vec<Edit>, String> {
+) -> Result<Vec<Edit>, TargetError> {
     let found = places(root, path);
+    let text = || text.to_owned();
     if found.is_empty() {
-        return Err(format!("{text:?} matches no entry; {}", near(text, &leaves(root))));
+        return Err(TargetError::NoMatch { near: near(&text(), &leaves(root)), path: text() });
     }
     let edit = |place: ValueLocation| {
         let before = known.iter().rev().find(|edit| edit.place == place).and_then(|edit| plain(&edit.value));
@@ -112,17 +133,10 @@ pub(super) fn edits(
             (Role::Value, ..) => written(value, old),
             (_, Some(x), Some(old)) => {
                 let change: &dyn Fn(f64) -> f64 = if role == Role::Factor { &move |y| y * x } else { &move |y| y + x };
-                changed(old, change).ok_or_else(|| {
-                    format!("{text:?}: {} is not a number: a factor or offset does not apply", place.name)
-                })?
+                changed(old, change).ok_or_else(|| TargetError::NoNumber { path: text(), name: place.name.clone() })?
             }
-            (_, Some(_), None) => {
-                let name = &place.name;
-                return Err(format!(
-                    "{text:?}: {name} is not in the file: a factor or offset needs an existing number"
-                ));
-            }
-            (_, None, _) => return Err(format!("{text:?}: factor or offset {value:?} must be a number")),
+            (_, Some(_), None) => return Err(TargetError::NotInFile { path: text(), name: place.name }),
+            (_, None, _) => return Err(TargetError::NoFactor { path: text(), value: value.clone() }),
         };
         Ok(Edit { place, value })
     };

@@ -173,29 +173,6 @@ impl<T: Real> Node<T> {
         }
     }
 
-    /// Angular velocity, (1) only.
-    #[inline(always)]
-    pub(super) fn turns_with(&self, parent: &Vector3<T>, rates: &JointRates<T>) -> Vector3<T> {
-        let omega = tr_mul(&self.R, parent);
-        rates.turn.as_ref().map_or(omega, |[w, _]| add(&omega, w))
-    }
-
-    /// ṗ in P axes; `None` for joints without translation.
-    #[inline(always)]
-    pub(super) fn shift_rate(&self, qdot: &[T]) -> Option<Vector3<T>> {
-        let k = self.coordinate;
-        match &self.joint {
-            NodeJoint::Turns { along: None, .. } => None,
-            NodeJoint::Turns { along: Some(along), .. } | NodeJoint::Slides { along } => {
-                Some(scaled(&lift(along), T::splat(self.ratio) * qdot[k]))
-            }
-            NodeJoint::Elastic { is_parallel, .. } => {
-                let rate = Vector3::new(qdot[k], qdot[k + 1], qdot[k + 2]);
-                Some(if *is_parallel { rate } else { mul(&self.R_PJ, &rate) })
-            }
-        }
-    }
-
     /// (1) to (3).
     #[inline(always)]
     pub(super) fn follow(&self, parent: &Moving<T>, rates: &JointRates<T>) -> Moving<T> {

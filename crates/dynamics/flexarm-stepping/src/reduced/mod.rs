@@ -16,8 +16,8 @@ mod system;
 use std::sync::Arc;
 
 use flexarm_kinematics::{
-    Data, FreeForces, Pose, Roles, State, forward_kinematics, inverse_dynamics, kinetic_energy_of,
-    potential_energy_of, world_poses,
+    Data, FreeForces, Pose, Roles, State, forward_kinematics, inverse_dynamics, kinetic_energy_of, potential_energy_of,
+    world_poses,
 };
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 

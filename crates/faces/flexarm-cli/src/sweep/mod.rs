@@ -9,10 +9,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use clap::{Args, Subcommand};
-use comfy_table::CellAlignment;
 use flexarm::sweep::{
-    Finders, MetricFigures, MinimiseRequest, ParameterRole, ParameterValue, Replay, Shard, Sweep, SweepError,
-    SweepRequest, SweepSummary, merge,
+    BestRun, Finders, MetricFigures, MinimiseFigures, MinimiseRequest, ParameterFigures, ParameterRole, ParameterValue,
+    Replay, Shard, Sweep, SweepError, SweepRequest, SweepSummary, merge,
 };
 
 use self::plan::PlanArgs;
@@ -210,9 +209,29 @@ fn text(found: &SweepSummary) -> String {
         "{}{shard}: {} of {} runs done, {} failed; {:.1} s, {:.1} s of processor time\n\n",
         found.study, found.done, found.runs, found.failed, found.wall_s, found.cpu_s
     );
+    out += &metric_table(&found.metrics);
+    out.extend(found.minimise.as_ref().map(search_lines));
+    out.extend(found.best.as_ref().map(|best| best_lines(best, &found.parameters)));
+    for failure in &found.failures {
+        out += &format!("\nfailed: {} runs, first {}: {}\n", failure.runs, failure.first, failure.reason);
+    }
+    if found.doubles > 0 {
+        out += &format!("\n{} runs were there twice, with the same result: they count once\n", found.doubles);
+    }
+    out += "\n";
+    let again = found.best.as_ref().and_then(|best| best.command.as_ref());
+    for (what, file) in [("runs", Some(&found.file)), ("page", found.page.as_ref()), ("again", again)] {
+        if let Some(file) = file {
+            out += &format!("{what:<8} {file}\n");
+        }
+    }
+    out
+}
+
+fn metric_table(metrics: &[MetricFigures]) -> String {
     let mut t =
         table(&["metric", "runs", "least", "5 %", "median", "95 %", "largest", "mean", "std", "varies most with"]);
-    for metric in &found.metrics {
+    for metric in metrics {
         let quantile = |k: usize| number(metric.quantiles.map(|q| q[k]));
         t.add_row(vec![
             metric.name.clone(),
@@ -227,57 +246,43 @@ fn text(found: &SweepSummary) -> String {
             strongest(metric),
         ]);
     }
-    for k in 1..9 {
-        if let Some(column) = t.column_mut(k) {
-            column.set_cell_alignment(CellAlignment::Right);
-        }
-    }
-    out += &lines(&t);
-    if let Some(search) = &found.minimise {
-        let constraints = if search.constraints.is_empty() {
-            String::new()
-        } else {
-            format!(" under {}", search.constraints.join(", "))
+    t.align_right(1..9);
+    lines(&t)
+}
+
+/// States how a minimisation ended and where it started.
+fn search_lines(search: &MinimiseFigures) -> String {
+    let constraints = match search.constraints.as_slice() {
+        [] => String::new(),
+        some => format!(" under {}", some.join(", ")),
+    };
+    let end = match (search.kept, search.settled) {
+        (false, _) => "no run keeps that",
+        (true, true) => "settled",
+        (true, false) => "ended with its runs, more might find less",
+    };
+    format!(
+        "\nleast {}{constraints}: {} generations, {end}; as filed {}{}\n",
+        search.metric,
+        search.generations,
+        number(search.start),
+        if search.start_kept { "" } else { " (which does not keep it)" }
+    )
+}
+
+/// Lists the best run with the values of its parameters.
+fn best_lines(best: &BestRun, parameters: &[ParameterFigures]) -> String {
+    let (most, value) = (best.better.most(), number(Some(best.value)));
+    let mut out = format!("\nbest: run {}, {most} {} {value}\n", best.run, best.metric);
+    for (name, value) in &best.parameters {
+        let role = parameters.iter().find(|parameter| parameter.name == *name).map(|p| p.role);
+        out += &match (role, value.number()) {
+            (Some(ParameterRole::Factor), Some(x)) => {
+                format!("    {name} = {} % of the file\n", number(Some(100.0 * x)))
+            }
+            (Some(ParameterRole::Offset), Some(x)) => format!("    {name} = the file {x:+}\n"),
+            _ => format!("    {name} = {value}\n"),
         };
-        let end = match (search.kept, search.settled) {
-            (false, _) => "no run keeps that",
-            (true, true) => "settled",
-            (true, false) => "ended with its runs, more might find less",
-        };
-        out += &format!(
-            "\nleast {}{constraints}: {} generations, {end}; as filed {}{}\n",
-            search.metric,
-            search.generations,
-            number(search.start),
-            if search.start_kept { "" } else { " (which does not keep it)" }
-        );
-    }
-    if let Some(best) = &found.best {
-        let (most, value) = (best.better.most(), number(Some(best.value)));
-        out += &format!("\nbest: run {}, {most} {} {value}\n", best.run, best.metric);
-        for (name, value) in &best.parameters {
-            let role = found.parameters.iter().find(|parameter| parameter.name == *name).map(|p| p.role);
-            out += &match (role, value.number()) {
-                (Some(ParameterRole::Factor), Some(x)) => {
-                    format!("    {name} = {} % of the file\n", number(Some(100.0 * x)))
-                }
-                (Some(ParameterRole::Offset), Some(x)) => format!("    {name} = the file {x:+}\n"),
-                _ => format!("    {name} = {value}\n"),
-            };
-        }
-    }
-    for failure in &found.failures {
-        out += &format!("\nfailed: {} runs, first {}: {}\n", failure.runs, failure.first, failure.reason);
-    }
-    if found.doubles > 0 {
-        out += &format!("\n{} runs were there twice, with the same result: they count once\n", found.doubles);
-    }
-    out += "\n";
-    let again = found.best.as_ref().and_then(|best| best.command.as_ref());
-    for (what, file) in [("runs", Some(&found.file)), ("page", found.page.as_ref()), ("again", again)] {
-        if let Some(file) = file {
-            out += &format!("{what:<8} {file}\n");
-        }
     }
     out
 }

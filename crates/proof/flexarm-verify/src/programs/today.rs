@@ -112,23 +112,30 @@ struct Curve {
     peak: f64,
 }
 
+/// A row of the truth that is not one.
+#[derive(Debug, thiserror::Error)]
+#[error("row {row:?}: expected seven finite numbers")]
+struct RowError {
+    row: String,
+}
+
 impl Curve {
     fn read(path: &Path) -> Result<Self, Error> {
-        let text = std::fs::read_to_string(path).map_err(|e| format!("cannot be read: {e}"));
-        let curve = text.and_then(|text| Self::parse(&text));
-        curve.map_err(|what| flexarm::Error::File { path: path.to_owned(), what }.into())
+        let fail = |what: String| flexarm::Error::File { path: path.to_owned(), what };
+        let text = std::fs::read_to_string(path).map_err(|error| fail(format!("cannot be read: {error}")))?;
+        Ok(Self::parse(&text).map_err(|error| fail(error.to_string()))?)
     }
 
     /// Parses rows of time, rigid and flexible TCP, below a header; lines starting with `#` are
     /// notes.
-    fn parse(text: &str) -> Result<Self, String> {
+    fn parse(text: &str) -> Result<Self, RowError> {
         let rows = text.lines().filter(|line| !line.starts_with('#')).skip(1);
         let (mut flexible, mut peak) = (Vec::new(), 0.0f64);
         for row in rows {
             let values: Option<Vec<f64>> = row.split(',').map(|word| word.trim().parse().ok()).collect();
             let values = values
                 .filter(|v| v.len() == 7 && v.iter().all(|x| x.is_finite()))
-                .ok_or_else(|| format!("row {row:?}: expected seven finite numbers"))?;
+                .ok_or_else(|| RowError { row: row.to_owned() })?;
             let (rigid, tool) = (Vector3::from_column_slice(&values[1..4]), Vector3::from_column_slice(&values[4..7]));
             peak = larger(peak, (tool - rigid).norm());
             flexible.push(tool);
@@ -149,7 +156,8 @@ mod tests {
         assert_eq!((curve.flexible.len(), curve.peak), (2, 5.0));
         assert_eq!(curve.flexible[0], Vector3::new(4.0, 5.0, 1.0));
         for (good, bad) in [("0,0,1\n", "0,0\n"), ("0,0,1\n", "0,0,NaN\n"), ("0,0,1\n", "0,0,x\n")] {
-            let refused = Curve::parse(&text.replace(good, bad)).err().unwrap_or_default();
+            let refused =
+                Curve::parse(&text.replace(good, bad)).err().map(|error| error.to_string()).unwrap_or_default();
             assert!(refused.contains("expected seven finite numbers") && refused.contains(bad.trim()), "{refused}");
         }
     }

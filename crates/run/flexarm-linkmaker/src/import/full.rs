@@ -213,12 +213,21 @@ fn to_si(matrix: &LabelledMatrix, units: UnitSystem, is_turn: &[bool], is_mass: 
     SparseSymmetric::from_triplets(matrix.size(), &entries)
 }
 
+/// Reason why a map entry selects no nodes.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum NoNodes {
+    #[error("there is no node set {name:?}; the sets are {known:?}")]
+    UnknownSet { name: String, known: Vec<String> },
+    #[error("no node is on {plane}; the nodes extend from {low:?} to {high:?}")]
+    OffPlane { plane: NodeChoice, low: [f64; 3], high: [f64; 3] },
+}
+
 /// Returns the nodes selected by a map entry.
-pub(super) fn chosen_nodes(imported: &ImportedMatrices, choice: &NodeChoice) -> Result<Vec<i64>, String> {
+pub(super) fn chosen_nodes(imported: &ImportedMatrices, choice: &NodeChoice) -> Result<Vec<i64>, NoNodes> {
     match choice {
-        NodeChoice::Set(name) => imported.node_sets.get(name).cloned().ok_or_else(|| {
-            let known: Vec<&String> = imported.node_sets.keys().collect();
-            format!("there is no node set {name:?}; the sets are {known:?}")
+        NodeChoice::Set(name) => imported.node_sets.get(name).cloned().ok_or_else(|| NoNodes::UnknownSet {
+            name: name.clone(),
+            known: imported.node_sets.keys().cloned().collect(),
         }),
         NodeChoice::Plane { point, normal } => {
             let (low, high) = box_of(imported);
@@ -227,8 +236,7 @@ pub(super) fn chosen_nodes(imported: &ImportedMatrices, choice: &NodeChoice) -> 
             let near = |p: &Vector3<f64>| (p - point).dot(&n).abs() <= tolerance;
             let nodes: Vec<i64> = imported.positions.iter().filter(|(_, p)| near(p)).map(|(node, _)| *node).collect();
             if nodes.is_empty() {
-                let (low, high): ([f64; 3], [f64; 3]) = (low.into(), high.into());
-                return Err(format!("no node is on {choice}; the nodes extend from {low:?} to {high:?}"));
+                return Err(NoNodes::OffPlane { plane: choice.clone(), low: low.into(), high: high.into() });
             }
             Ok(nodes)
         }

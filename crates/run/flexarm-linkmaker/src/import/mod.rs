@@ -436,7 +436,7 @@ fn place(
     let mut placed = Vec::new();
     for (k, name) in names.iter().enumerate() {
         let found =
-            in_file(imported, map, k).map_err(|what| file_error(imported, format!("interface {name}: {what}")))?;
+            in_file(imported, map, k).map_err(|error| file_error(imported, format!("interface {name}: {error}")))?;
         let found = found.map(|(X, from)| (R_LM * X.translation.vector, R_LM * X.rotation, from));
         let given = job.at.iter().find(|at| at.name == *name);
         let one = match (given, found) {
@@ -462,7 +462,11 @@ fn place(
 }
 
 /// Returns the frame of interface `k` according to the file: matrix axes, unit of the file.
-fn in_file(imported: &ImportedMatrices, map: &ImportMap, k: usize) -> Result<Option<(Pose, &'static str)>, String> {
+fn in_file(
+    imported: &ImportedMatrices,
+    map: &ImportMap,
+    k: usize,
+) -> Result<Option<(Pose, &'static str)>, full::NoNodes> {
     let at = |p: Vector3<f64>| Pose::from_parts(Translation3::from(p), Rotation3::identity());
     let map = match map {
         ImportMap::Rows(map) => map,

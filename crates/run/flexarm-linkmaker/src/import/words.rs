@@ -8,6 +8,9 @@ use flexarm_fe_io::exchange::{InterfaceMap, MatrixFormat};
 use flexarm_fem::{RigidPart, SplitAt};
 use nalgebra::{Matrix3, Vector3};
 
+use crate::WordError;
+use crate::reduce::numbers;
+
 /// Rows or nodes of the interfaces.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ImportMap {
@@ -33,21 +36,18 @@ pub enum NodeChoice {
 }
 
 impl FromStr for ImportMap {
-    type Err = String;
+    type Err = WordError;
 
-    fn from_str(text: &str) -> Result<Self, String> {
+    fn from_str(text: &str) -> Result<Self, WordError> {
         let is_nodes = |value: &str| value.trim().starts_with("set:") || value.trim().starts_with("plane(");
         let parts = split_outside_brackets(text);
         let values = || parts.iter().filter_map(|part| part.split_once('=').map(|(_, value)| value));
         if !values().any(is_nodes) {
-            return text
-                .parse()
-                .map(Self::Rows)
-                .map_err(|error: flexarm_fe_io::exchange::ExchangeError| error.to_string());
+            return text.parse().map(Self::Rows).map_err(|error| WordError::Rows(Box::new(error)));
         }
         let one = |part: &&str| {
-            let wrong =
-                || format!("{part:?}: expected NAME=set:NAME or NAME=plane(x,y,z;nx,ny,nz) for every interface");
+            let form = "NAME=set:NAME or NAME=plane(x,y,z;nx,ny,nz) for every interface";
+            let wrong = || WordError::form(part, form);
             let (name, value) = part.split_once('=').ok_or_else(wrong)?;
             let value = value.trim();
             let choice =
@@ -57,7 +57,7 @@ impl FromStr for ImportMap {
                         let (point, normal) = inside.split_once(';').ok_or_else(wrong)?;
                         let (point, normal) = (triple(point)?, triple(normal)?);
                         if normal.norm() == 0.0 {
-                            return Err(format!("{part:?}: the normal of the plane is zero"));
+                            return Err(WordError::NoNormal { text: (*part).to_owned() });
                         }
                         NodeChoice::Plane { point, normal }
                     }
@@ -65,10 +65,10 @@ impl FromStr for ImportMap {
                 };
             Ok((name.trim().to_owned(), choice))
         };
-        let list: Vec<(String, NodeChoice)> = parts.iter().map(one).collect::<Result<_, String>>()?;
+        let list: Vec<(String, NodeChoice)> = parts.iter().map(one).collect::<Result<_, _>>()?;
         for (k, (name, _)) in list.iter().enumerate() {
             if list[..k].iter().any(|(other, _)| other == name) {
-                return Err(format!("the name {name:?} is used twice in the map"));
+                return Err(WordError::NameTwice { name: name.clone() });
             }
         }
         Ok(Self::Nodes(list))
@@ -134,12 +134,12 @@ pub struct FrameAt {
 }
 
 impl FromStr for FrameAt {
-    type Err = String;
+    type Err = WordError;
 
-    fn from_str(text: &str) -> Result<Self, String> {
-        let wrong = || format!("{text:?}: expected NAME=x,y,z or NAME=x,y,z,roll,pitch,yaw, such as B=0,0,1.1");
+    fn from_str(text: &str) -> Result<Self, WordError> {
+        let wrong = || WordError::form(text, "NAME=x,y,z or NAME=x,y,z,roll,pitch,yaw, such as B=0,0,1.1");
         let (name, values) = text.split_once('=').ok_or_else(wrong)?;
-        match finite_numbers(values)?.as_slice() {
+        match numbers(values)?.as_slice() {
             [x, y, z] => Ok(Self { name: name.trim().into(), xyz: Vector3::new(*x, *y, *z), rpy: Vector3::zeros() }),
             [x, y, z, r, p, w] => {
                 Ok(Self { name: name.trim().into(), xyz: Vector3::new(*x, *y, *z), rpy: Vector3::new(*r, *p, *w) })
@@ -196,25 +196,25 @@ impl ImportFormat {
 /// mass, link axes.
 ///
 /// # Errors
-/// A description of what is wrong with the text.
-pub fn parse_part(text: &str) -> Result<RigidPart, String> {
-    let wrong = || format!("{text:?}: expected mass;x,y,z;ixx,iyy,izz,ixy,ixz,iyz in kg, m, kg m2");
+/// [`WordError`].
+pub fn parse_part(text: &str) -> Result<RigidPart, WordError> {
+    let wrong = || WordError::form(text, "mass;x,y,z;ixx,iyy,izz,ixy,ixz,iyz in kg, m, kg m2");
     let mut pieces = text.split(';');
     let (Some(mass), Some(com), Some(inertia), None) = (pieces.next(), pieces.next(), pieces.next(), pieces.next())
     else {
         return Err(wrong());
     };
-    let [mass] = finite_numbers(mass)?[..] else { return Err(wrong()) };
+    let [mass] = numbers(mass)?[..] else { return Err(wrong()) };
     Ok(RigidPart { mass, com: triple(com)?, inertia: parse_inertia(inertia)? })
 }
 
 /// Parses an inertia `ixx,iyy,izz,ixy,ixz,iyz` (kg m²).
 ///
 /// # Errors
-/// A description of what is wrong with the text.
-pub fn parse_inertia(text: &str) -> Result<Matrix3<f64>, String> {
-    let [xx, yy, zz, xy, xz, yz] = finite_numbers(text)?[..] else {
-        return Err(format!("{text:?}: expected ixx,iyy,izz,ixy,ixz,iyz"));
+/// [`WordError`].
+pub fn parse_inertia(text: &str) -> Result<Matrix3<f64>, WordError> {
+    let [xx, yy, zz, xy, xz, yz] = numbers(text)?[..] else {
+        return Err(WordError::form(text, "ixx,iyy,izz,ixy,ixz,iyz"));
     };
     Ok(Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz))
 }
@@ -223,17 +223,14 @@ pub fn parse_inertia(text: &str) -> Result<Matrix3<f64>, String> {
 /// unit of the file.
 ///
 /// # Errors
-/// A description of what is wrong with the text.
-pub fn parse_split(text: &str) -> Result<SplitAt, String> {
-    let wrong = || {
-        format!(
-            "split {text:?}: expected elastic-centre, mid, a fraction of the distance from A to B (0 to 1), or x,y,z"
-        )
-    };
+/// [`WordError`].
+pub fn parse_split(text: &str) -> Result<SplitAt, WordError> {
+    let expected = "elastic-centre, mid, a fraction of the distance from A to B (0 to 1), or x,y,z";
+    let wrong = || WordError::ImportSplit { text: text.to_owned(), expected };
     match text.trim() {
         "elastic-centre" | "elastic-center" => Ok(SplitAt::ElasticCentre),
         "mid" => Ok(SplitAt::MidLength),
-        other => match finite_numbers(other).map_err(|_| wrong())?[..] {
+        other => match numbers(other).map_err(|_| wrong())?[..] {
             [x] if (0.0..=1.0).contains(&x) => Ok(SplitAt::Fraction(x)),
             [x, y, z] => Ok(SplitAt::Point(Vector3::new(x, y, z))),
             _ => Err(wrong()),
@@ -244,18 +241,10 @@ pub fn parse_split(text: &str) -> Result<SplitAt, String> {
 /// Parses three finite numbers separated by commas.
 ///
 /// # Errors
-/// A description of what is wrong with the text.
-pub fn triple(text: &str) -> Result<Vector3<f64>, String> {
-    let [x, y, z] = finite_numbers(text)?[..] else { return Err(format!("{text:?}: expected three numbers x,y,z")) };
+/// [`WordError`].
+pub fn triple(text: &str) -> Result<Vector3<f64>, WordError> {
+    let [x, y, z] = numbers(text)?[..] else { return Err(WordError::form(text, "three numbers x,y,z")) };
     Ok(Vector3::new(x, y, z))
-}
-
-fn finite_numbers(text: &str) -> Result<Vec<f64>, String> {
-    let number = |word: &str| {
-        let value = word.trim().parse().ok().filter(|x: &f64| x.is_finite());
-        value.ok_or_else(|| format!("{:?} in {text:?} is not a finite number", word.trim()))
-    };
-    text.split(',').map(number).collect()
 }
 
 #[cfg(test)]
@@ -268,8 +257,8 @@ mod tests {
         let map: ImportMap = "A=plane(0,0,0;1,0,0),B=set:tip".parse().unwrap();
         assert_eq!(map.entries()[0].1, "plane(0,0,0;1,0,0)");
         assert_eq!(map.entries()[1], ("B".into(), "set:tip".into()));
-        assert!("A=set:x,B=1002".parse::<ImportMap>().unwrap_err().contains("set:NAME"));
-        assert!("A=set:x,A=set:y".parse::<ImportMap>().unwrap_err().contains("twice"));
+        assert!("A=set:x,B=1002".parse::<ImportMap>().unwrap_err().to_string().contains("set:NAME"));
+        assert!("A=set:x,A=set:y".parse::<ImportMap>().unwrap_err().to_string().contains("twice"));
     }
 
     #[test]

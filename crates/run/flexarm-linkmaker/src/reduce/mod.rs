@@ -60,6 +60,7 @@ pub use summary::{
 pub(crate) use summary::{coarse, doubted};
 pub use urdf_link::{LinkJoint, UrdfLink};
 pub use words::{At, MaterialChoice, OrderingChoice, QuadratureChoice, SplitChoice, numbers};
+pub(crate) use words::{MATERIAL_FORMS, SPLIT_FORMS};
 
 /// Default number of modes to keep.
 const MODES: usize = 10;

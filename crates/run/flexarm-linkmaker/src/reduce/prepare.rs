@@ -102,7 +102,8 @@ pub(super) fn prepare(
         let mesh =
             mass_properties(&file.mesh, &densities).map_err(|error| LinkError::file(&job.mesh, error.to_string()))?;
         let along = plan.interfaces[1].X_LI.translation.vector - plan.interfaces[0].X_LI.translation.vector;
-        plan.attached = robot.rest(&mesh, &along).map_err(|what| LinkError::file(&entry.file, what))?.into();
+        plan.attached =
+            robot.rest(&mesh, &along).map_err(|error| LinkError::file(&entry.file, error.to_string()))?.into();
     }
     Ok(Prepared { plan, file, units, chosen, materials, doubts })
 }

@@ -1,7 +1,7 @@
 //! Data of the link from a robot file.
 
-use flexarm_fem::RigidPart;
 use flexarm_fem::matrix_link::halves_of_bar;
+use flexarm_fem::{FemError, RigidPart};
 use flexarm_spatial::Pose;
 use nalgebra::Vector3;
 
@@ -31,6 +31,22 @@ pub struct LinkJoint {
     pub leads_on: bool,
 }
 
+/// Reason why a link of a robot lacks what a job takes from it.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum UrdfLinkError {
+    #[error("link {link:?} has no <inertial>, so `rest` is undefined")]
+    NoInertia { link: String },
+    #[error(
+        "the mesh has {mesh:.4} kg, link {link:?} of the URDF {whole:.4} kg: no mass remains for attached bodies; omit \
+         `rest`, or correct the density"
+    )]
+    NoRest { link: String, mesh: f64, whole: f64 },
+    #[error("{0}: the mesh has more inertia than the link in the URDF; omit `rest`, or correct one of them")]
+    Inertia(FemError),
+    #[error("link {link:?} has no joint {joint:?}; its joints are {known:?}")]
+    UnknownJoint { link: String, joint: String, known: Vec<String> },
+}
+
 impl UrdfLink {
     /// Returns the name of the joint at B.
     pub(super) fn distal_joint(&self) -> Option<&str> {
@@ -40,17 +56,13 @@ impl UrdfLink {
 
     /// Returns the difference between the mass of the link and that of its mesh, as two halves
     /// along the line from A to B, in link axes.
-    pub(super) fn rest(&self, mesh: &RigidPart, along: &Vector3<f64>) -> Result<[RigidPart; 2], String> {
+    pub(super) fn rest(&self, mesh: &RigidPart, along: &Vector3<f64>) -> Result<[RigidPart; 2], UrdfLinkError> {
         let Some(whole) = &self.inertia else {
-            return Err(format!("link {:?} has no <inertial>, so `rest` is undefined", self.name));
+            return Err(UrdfLinkError::NoInertia { link: self.name.clone() });
         };
         let mass = whole.mass - mesh.mass;
         if mass.is_nan() || mass <= 0.0 {
-            return Err(format!(
-                "the mesh has {:.4} kg, link {:?} of the URDF {:.4} kg: no mass remains for attached bodies; omit \
-                 `rest`, or correct the density",
-                mesh.mass, self.name, whole.mass
-            ));
+            return Err(UrdfLinkError::NoRest { link: self.name.clone(), mesh: mesh.mass, whole: whole.mass });
         }
         let com = (whole.com * whole.mass - mesh.com * mesh.mass) / mass;
         // Second moments about the centre of mass of the difference.
@@ -61,11 +73,7 @@ impl UrdfLink {
         let inertia = whole.inertia + about(whole.mass, whole.com) - mesh.inertia - about(mesh.mass, mesh.com);
         let halves = halves_of_bar(&RigidPart { mass, com, inertia }, along);
         for half in &halves {
-            half.check("the difference between link and mesh").map_err(|error| {
-                format!(
-                    "{error}: the mesh has more inertia than the link in the URDF; omit `rest`, or correct one of them"
-                )
-            })?;
+            half.check("the difference between link and mesh").map_err(UrdfLinkError::Inertia)?;
         }
         Ok(halves)
     }
@@ -76,12 +84,13 @@ impl UrdfLink {
     }
 
     /// Returns the frame of a parent or child joint in the link.
-    pub(super) fn joint(&self, name: &str) -> Result<Pose, String> {
+    pub(super) fn joint(&self, name: &str) -> Result<Pose, UrdfLinkError> {
         // Child joints are searched before the parent joint.
         let found = self.leading_on().chain(&self.joints).find(|joint| joint.name == name);
-        found.map(|joint| joint.X_LJ).ok_or_else(|| {
-            let known: Vec<&str> = self.joints.iter().map(|joint| joint.name.as_str()).collect();
-            format!("link {:?} has no joint {name:?}; its joints are {known:?}", self.name)
+        found.map(|joint| joint.X_LJ).ok_or_else(|| UrdfLinkError::UnknownJoint {
+            link: self.name.clone(),
+            joint: name.to_owned(),
+            known: self.joints.iter().map(|joint| joint.name.clone()).collect(),
         })
     }
 }
@@ -111,7 +120,9 @@ mod tests {
         assert!((joined.inertia - whole.inertia).amax() < 1e-12 * whole.inertia.amax());
         assert!(near.com.x < far.com.x, "proximal first");
         // A mesh heavier than the link leaves no mass to attach.
-        assert!(link.rest(&mesh.with_mass(31.0), &Vector3::x()).unwrap_err().contains("correct the density"));
+        assert!(
+            link.rest(&mesh.with_mass(31.0), &Vector3::x()).unwrap_err().to_string().contains("correct the density")
+        );
     }
 
     #[test]
@@ -129,7 +140,7 @@ mod tests {
         };
         assert_eq!(link.joint("elbow").unwrap().translation.vector.x, 0.8);
         assert_eq!(link.joint("shoulder").unwrap(), Pose::identity());
-        assert!(link.joint("wrist").unwrap_err().contains(r#"["shoulder", "elbow"]"#));
+        assert!(link.joint("wrist").unwrap_err().to_string().contains(r#"["shoulder", "elbow"]"#));
         assert_eq!(link.leading_on().count(), 1);
     }
 }

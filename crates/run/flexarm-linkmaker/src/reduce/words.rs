@@ -7,7 +7,7 @@ use flexarm_fem::Material;
 use serde::de::{Error as _, SeqAccess, Visitor, value::SeqAccessDeserializer};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-use crate::MaterialEntry;
+use crate::{MaterialEntry, WordError};
 
 /// A material, by the name of a preset or by its constants.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,34 +19,34 @@ pub struct MaterialChoice {
 }
 
 /// Notations of a material, for messages.
-pub(super) const MATERIAL_FORMS: &str =
+pub(crate) const MATERIAL_FORMS: &str =
     "steel, aluminium, cast_iron, ductile_iron, or E,nu,rho in SI such as 70e9,0.33,2700 (Pa, -, kg/m3)";
 
 impl MaterialChoice {
-    fn named(name: &str) -> Result<Self, String> {
-        let (name, material) = Material::preset(name).ok_or_else(|| {
-            let meant = Material::suggestion(name).map_or(String::new(), |meant| format!("; did you mean {meant:?}?"));
-            format!("material {name:?} is not known; expected {MATERIAL_FORMS}{meant}")
-        })?;
+    fn named(name: &str) -> Result<Self, WordError> {
+        let unknown = || match (Material::suggestion(name), name.to_owned()) {
+            (Some(meant), name) => WordError::MisspeltMaterial { name, meant },
+            (None, name) => WordError::Material { name },
+        };
+        let (name, material) = Material::preset(name).ok_or_else(unknown)?;
         Ok(Self { name: Some(name), material })
     }
 
-    fn given([young, nu, rho]: [f64; 3]) -> Result<Self, String> {
+    fn given([young, nu, rho]: [f64; 3]) -> Result<Self, WordError> {
         let material = Material::isotropic(young, nu, rho);
-        material.check().map_err(|error| error.to_string())?;
+        material.check()?;
         Ok(Self { name: None, material })
     }
 }
 
 impl FromStr for MaterialChoice {
-    type Err = String;
+    type Err = WordError;
 
-    fn from_str(text: &str) -> Result<Self, String> {
+    fn from_str(text: &str) -> Result<Self, WordError> {
         if !text.contains(',') {
             return Self::named(text.trim());
         }
-        let wrong = || format!("material {text:?} is not known; expected {MATERIAL_FORMS}");
-        Self::given(<[f64; 3]>::try_from(numbers(text)?).map_err(|_| wrong())?)
+        Self::given(<[f64; 3]>::try_from(numbers(text)?).map_err(|_| WordError::Material { name: text.to_owned() })?)
     }
 }
 
@@ -109,20 +109,21 @@ pub enum SplitChoice {
 }
 
 /// Notations of a split, for messages.
-const SPLIT_FORMS: &str = "elastic-centre, mid, a fraction of the distance from A to B (0 to 1), or a point x,y,z";
+pub(crate) const SPLIT_FORMS: &str =
+    "elastic-centre, mid, a fraction of the distance from A to B (0 to 1), or a point x,y,z";
 
 impl SplitChoice {
-    fn fraction(x: f64) -> Result<Self, String> {
+    fn fraction(x: f64) -> Result<Self, WordError> {
         let inside = x.is_finite() && (0.0..=1.0).contains(&x);
-        inside.then_some(Self::Fraction(x)).ok_or_else(|| format!("split is {x}; expected {SPLIT_FORMS}"))
+        inside.then_some(Self::Fraction(x)).ok_or(WordError::Fraction { found: x })
     }
 }
 
 impl FromStr for SplitChoice {
-    type Err = String;
+    type Err = WordError;
 
-    fn from_str(text: &str) -> Result<Self, String> {
-        let wrong = || format!("split {text:?} is not known; expected {SPLIT_FORMS}");
+    fn from_str(text: &str) -> Result<Self, WordError> {
+        let wrong = || WordError::Split { text: text.to_owned() };
         match text.trim() {
             "elastic-centre" | "elastic-center" => Ok(Self::ElasticCentre),
             "mid" => Ok(Self::Mid),
@@ -211,13 +212,13 @@ pub enum At {
 /// Parses finite numbers separated by commas.
 ///
 /// # Errors
-/// A message with the word that is not a finite number.
-pub fn numbers(text: &str) -> Result<Vec<f64>, String> {
+/// [`WordError::NotFinite`].
+pub fn numbers(text: &str) -> Result<Vec<f64>, WordError> {
     let number = |word: &str| {
-        let value = word.trim().parse().ok().filter(|x: &f64| x.is_finite());
-        value.ok_or_else(|| format!("{:?} in {text:?} is not a finite number", word.trim()))
+        let value = word.parse().ok().filter(|x: &f64| x.is_finite());
+        value.ok_or_else(|| WordError::NotFinite { word: word.to_owned(), text: text.to_owned() })
     };
-    text.split(',').map(number).collect()
+    text.split(',').map(str::trim).map(number).collect()
 }
 
 /// (De)serialisation of an optional value through its text form.
@@ -253,18 +254,19 @@ mod tests {
         let given: MaterialChoice = "70e9, 0.33, 2700".parse().unwrap();
         assert_eq!(given.material, Material::ALUMINIUM);
         for (text, word) in [("steal", "aluminium"), ("70e9,0.33", "E,nu,rho"), ("70e9,0.7,2700", "Poisson")] {
-            let message = text.parse::<MaterialChoice>().unwrap_err();
+            let message = text.parse::<MaterialChoice>().unwrap_err().to_string();
             assert!(message.contains(word), "{message}");
         }
     }
 
     #[test]
     fn a_split_has_four_forms() {
-        assert_eq!("mid".parse(), Ok(SplitChoice::Mid));
-        assert_eq!("0.4".parse(), Ok(SplitChoice::Fraction(0.4)));
-        assert_eq!("1,2,3".parse(), Ok(SplitChoice::Point([1.0, 2.0, 3.0])));
+        let split = |text: &str| text.parse::<SplitChoice>().unwrap();
+        assert_eq!(split("mid"), SplitChoice::Mid);
+        assert_eq!(split("0.4"), SplitChoice::Fraction(0.4));
+        assert_eq!(split("1,2,3"), SplitChoice::Point([1.0, 2.0, 3.0]));
         for text in ["middle", "1.5", "1,2", "nan"] {
-            assert!(text.parse::<SplitChoice>().unwrap_err().contains("elastic-centre"), "{text}");
+            assert!(text.parse::<SplitChoice>().unwrap_err().to_string().contains("elastic-centre"), "{text}");
         }
     }
 }

@@ -3,17 +3,142 @@
 use std::path::PathBuf;
 
 use flexarm_analysis::LinearError;
+use flexarm_fem::FemError;
 use flexarm_flexlink::{GearboxError, MountingError, SubstitutionError};
+use flexarm_kinematics::MOST_COORDINATES;
 use flexarm_settings::{OutOfRange, Setting};
 use flexarm_stepping::StepError;
+
+/// Model that a link cannot have.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum LinkFormError {
+    /// A modal link with stiffness factors of single directions.
+    #[error(
+        "link {link:?}: stiffness_factors are those of the springs of a lumped link; a modal link has one \
+         stiffness_factor"
+    )]
+    ModalDirections {
+        /// Name of the link.
+        link: String,
+    },
+    /// A modal link with a stiffness of its own.
+    #[error("link {link:?} modal body: its stiffness is that of the one spring between two rigid parts; leave it out")]
+    ModalStiffness {
+        /// Name of the link.
+        link: String,
+    },
+    /// A chain with a stiffness of its own.
+    #[error(
+        "link {link:?} has {parts} parts: its stiffness is that of the one spring between two rigid parts; leave it out"
+    )]
+    ChainStiffness {
+        /// Name of the link.
+        link: String,
+        /// Number of parts.
+        parts: usize,
+    },
+    /// A chain with more coordinates than a robot can have.
+    #[error(
+        "link {link:?}: {segments} segments have {coordinates} elastic coordinates, a robot can have {} in all, for \
+         the time of a step grows with their cube: ask for at most {} in one link, or for modes, which say more with \
+         fewer",
+        MOST_COORDINATES, MOST_COORDINATES / 6 + 1
+    )]
+    ManySegments {
+        /// Name of the link.
+        link: String,
+        /// Requested number of segments.
+        segments: usize,
+        /// Number of elastic coordinates.
+        coordinates: usize,
+    },
+    /// A beam that cannot be a chain.
+    #[error("link {link:?}: {source}")]
+    Chain {
+        /// Name of the link.
+        link: String,
+        /// Cause.
+        source: Box<FemError>,
+    },
+    /// A reduced link without a chain of this length.
+    #[error(
+        "link {link:?}: its .flex file has no chain of {segments} parts (it has {}): make it with flexarm reduce {} \
+         {segments}, or choose another number of segments",
+        numbers_of_parts(stored),
+        Setting::Chains
+    )]
+    NoChain {
+        /// Name of the link.
+        link: String,
+        /// Requested number of segments.
+        segments: usize,
+        /// Numbers of parts of the stored chains.
+        stored: Vec<usize>,
+    },
+    /// A link whose modes cannot be computed.
+    #[error("link {link:?} cannot be modal: {source}")]
+    NotModal {
+        /// Name of the link.
+        link: String,
+        /// Cause.
+        source: Box<FemError>,
+    },
+    /// A reduced link without a mass matrix.
+    #[error(
+        "link {link:?} cannot be modal: its .flex file has no mass over interfaces and modes; reduce the mesh again \
+         with this version, or use model = \"lumped\""
+    )]
+    NoModalMass {
+        /// Name of the link.
+        link: String,
+    },
+    /// More modes than a link may have.
+    #[error(
+        "link {link:?}: {modes} modes are requested, at most {most} are allowed: the work of a step grows with the \
+         cube of their number, and those beyond the first dozen are far above what a drive or a tool excites"
+    )]
+    ManyModes {
+        /// Name of the link.
+        link: String,
+        /// Requested number of modes.
+        modes: usize,
+        /// Maximum number of modes.
+        most: usize,
+    },
+    /// More modes than the reduced link has.
+    #[error("link {link:?}: {modes} modes are requested, its .flex file has {stored}")]
+    FewModes {
+        /// Name of the link.
+        link: String,
+        /// Requested number of modes.
+        modes: usize,
+        /// Number of modes of the file.
+        stored: usize,
+    },
+    /// Geometric stiffening without its data.
+    #[error(
+        "link {link:?}: geometric_stiffening needs a beam, or a .flex file made with flexarm reduce {}",
+        Setting::Geometric
+    )]
+    NoGeometric {
+        /// Name of the link.
+        link: String,
+    },
+}
+
+fn numbers_of_parts(stored: &[usize]) -> String {
+    let stored: Vec<String> = stored.iter().map(usize::to_string).collect();
+    if stored.is_empty() { "only two parts".into() } else { format!("2, {} parts", stored.join(", ")) }
+}
 
 /// Link or drive that cannot be modelled as requested.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ModellingError {
-    /// A link does not have the requested model; the message names the link and what is missing.
-    #[error("{0}")]
-    NoSuchModel(String),
+    /// A link does not have the requested model.
+    #[error(transparent)]
+    NoSuchModel(#[from] LinkFormError),
     /// A link with load on a third interface cannot be modelled with modes either.
     #[error("link {link:?}: {why}; {instead}")]
     Branch {
@@ -22,7 +147,7 @@ pub enum ModellingError {
         /// Joint on the third interface.
         why: String,
         /// Reason why the link cannot be modal.
-        instead: String,
+        instead: Box<LinkFormError>,
     },
     /// A number of segments is requested, but no link is lumped.
     #[error("{segments} segments are requested, but no link of the robot is lumped: {}", lumped_remedy(modal_instead))]

@@ -20,6 +20,9 @@ pub enum RecordingError {
         /// Setting that gives the format regardless of the name.
         setting: Option<Setting>,
     },
+    /// No format has this name.
+    #[error("expected one of {}", RecordingFormat::ALL.map(RecordingFormat::extension).join(", "))]
+    UnknownFormat,
     /// The program was built without this format.
     #[error("{}: this program was built without {format}; use a build with it", path.display())]
     NotBuiltIn {

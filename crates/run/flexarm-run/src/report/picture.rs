@@ -2,13 +2,15 @@
 
 use flexarm_log::Trace;
 
+use crate::error::NoPicture;
+
 /// A picture for the page, which adds caption and key.
 pub(super) struct Picture {
     /// Title for the caption.
     pub(super) title: &'static str,
     /// PNG without background, and the projected directions of x, y and z (right and up); or the
     /// reason why there is none.
-    pub(super) drawn: Result<(Vec<u8>, [[f64; 2]; 3]), String>,
+    pub(super) drawn: Result<(Vec<u8>, [[f64; 2]; 3]), NoPicture>,
 }
 
 /// Height of a picture with this width.
@@ -28,15 +30,14 @@ pub(super) fn pictures(trace: &Trace, width: usize) -> Vec<Picture> {
             let pictures = titles.into_iter().zip(drawn);
             pictures.map(|(title, p)| Picture { title, drawn: Ok((p.png, p.axes)) }).collect()
         }
-        Err(error) => titles.map(|title| Picture { title, drawn: Err(error.to_string()) }).into(),
+        Err(error) => titles.map(|title| Picture { title, drawn: Err(error.clone().into()) }).into(),
     }
 }
 
 /// Without the feature `png` there are no pictures; returns the reason.
 #[cfg(not(feature = "png"))]
 pub(super) fn pictures(_trace: &Trace, _width: usize) -> Vec<Picture> {
-    let drawn = Err("this build has no pictures: it was made without the feature png".to_owned());
-    vec![Picture { title: "", drawn }]
+    vec![Picture { title: "", drawn: Err(NoPicture::NotBuilt) }]
 }
 
 /// Returns both pictures for papers, with their scales, by file name. Those that cannot be drawn

@@ -36,7 +36,7 @@ use crate::motion::Motion;
 use crate::options::{Outputs, RunOptions};
 use crate::prepare::Checked;
 use crate::record::{
-    STRESS_PICTURE, header, link_frames, names_of_signals, ordered_links, recorders, signals, write_layouts,
+    Recordings, STRESS_PICTURE, header, link_frames, names_of_signals, ordered_links, recorders, signals, write_layouts,
 };
 use crate::robot::Robot;
 use crate::run::sampler::Sampler;
@@ -129,6 +129,23 @@ impl Detail {
             Keep::Figures => Self::Figures,
         }
     }
+
+    /// Returns the deflections to expect; only recordings need the magnification.
+    fn expected(self, arm: &FlexibleArm, tcp: &Frame, scenario: &Scenario) -> Expected {
+        match self {
+            Self::Curves => Expected::of(arm, tcp, scenario.duration_s(), scenario.start),
+            _ => Expected::default(),
+        }
+    }
+
+    /// Returns an empty trace with the curves of this level.
+    fn trace(self, for_page: bool, head: RunHeader) -> Trace {
+        match for_page {
+            _ if self < Self::Curves => Trace::without_curves(head),
+            true => Trace::for_page(head),
+            false => Trace::new(head),
+        }
+    }
 }
 
 /// Number of samples above which the page is made after the recordings are closed, which saves
@@ -154,13 +171,8 @@ pub(crate) fn simulate(
     if progress(0.0, scenario.duration_s()).is_break() {
         return Err(Error::Interrupted { t: 0.0, partial: false });
     }
-    let own = || match detail {
-        Detail::Curves => Expected::of(&arm, &flexible.tcp, scenario.duration_s(), scenario.start),
-        // Only recordings need the magnification.
-        _ => Expected::default(),
-    };
     let shares_scale = expected.is_some();
-    let expected = expected.unwrap_or_else(own);
+    let expected = expected.unwrap_or_else(|| detail.expected(&arm, &flexible.tcp, scenario));
     let stress = StressMonitor::new(robot, flexible, &arm, &options.modelling)?;
     let mut run = RunLoop::new(robot, &scenario.motion, options, flexible, arm, stepper, detail);
     run.monitors = run.monitors.with_stress(stress);
@@ -171,11 +183,7 @@ pub(crate) fn simulate(
     write_layouts(&files.names, &head)?;
     files.set.on_threads();
     let mut columns = (keep == Keep::Columns).then(|| Columns::new(&head));
-    run.trace = match outputs {
-        _ if detail < Detail::Curves => Trace::without_curves(head),
-        Some(_) => Trace::for_page(head),
-        None => Trace::new(head),
-    };
+    run.trace = detail.trace(outputs.is_some(), head);
     let mut watch = |sample: &Sample| {
         columns.iter_mut().for_each(|columns| columns.push(sample));
         observer.as_mut().map_or(ControlFlow::Continue(()), |observer| observer(sample))
@@ -190,30 +198,45 @@ pub(crate) fn simulate(
         events.push(Event { time_s: run.seen.t, kind: EventKind::Stopped, text: error.to_string() });
     }
     complete(&mut summary, load_caveats, &end, &stopwatch);
-    let picture = outputs.and_then(|_| run.monitors.stress.as_ref().and_then(StressMonitor::picture));
-    if let Some((outputs, picture)) = outputs.zip(picture.as_ref()) {
-        let path = outputs.folder.join(STRESS_PICTURE);
-        files.names.stress = Some(path.display().to_string());
-        flexarm_files::write_all(&[(path, picture)])?;
-    }
+    let stress = run.monitors.stress.as_ref();
+    let picture = outputs.and_then(|_| stress.and_then(StressMonitor::picture));
+    files.names.stress = outputs.zip(picture.as_ref()).map(|(outputs, png)| write_picture(outputs, png)).transpose()?;
     summary.files = files.names.clone();
-    let scenery = || run.monitors.stress.as_ref().map_or_else(Vec::new, StressMonitor::scenery);
-    let result = match detail < Detail::Curves {
-        true => RunResult::default(),
-        false => RunResult { scenery: scenery(), ..result(&summary, events, picture) },
-    };
-    run.trace.finish(result);
+    run.trace.finish(match detail {
+        Detail::Curves => {
+            let scenery = stress.map_or_else(Vec::new, StressMonitor::scenery);
+            RunResult { scenery, ..result(&summary, events, picture) }
+        }
+        _ => RunResult::default(),
+    });
+    how_it_ended(end, write_results(&mut files, outputs, &summary, &run.trace))?;
+    Ok(Run { summary, columns: columns.unwrap_or_default(), trace: run.trace })
+}
+
+/// Writes the picture of the stress; returns its path.
+fn write_picture(outputs: &Outputs, png: &[u8]) -> Result<String, Error> {
+    let path = outputs.folder.join(STRESS_PICTURE);
+    let name = path.display().to_string();
+    flexarm_files::write_all(&[(path, png)])?;
+    Ok(name)
+}
+
+/// Closes the recordings and writes page and figures.
+fn write_results(
+    files: &mut Recordings,
+    outputs: Option<&Outputs>,
+    summary: &Summary,
+    trace: &Trace,
+) -> Result<(), Error> {
     // In short runs the page is made while the recordings are being closed, in long runs
     // afterwards, because both need memory.
-    files.set.begin_to_finish(&run.trace.result);
-    let make_page = || outputs.map(|_| crate::report::page(&summary, &run.trace));
-    let early = if run.trace.samples() < LONG_RUN { make_page() } else { None };
-    let closed = files.set.finish(&run.trace.result).map_err(Error::from);
+    files.set.begin_to_finish(&trace.result);
+    let make_page = || outputs.map(|_| crate::report::page(summary, trace));
+    let early = if trace.samples() < LONG_RUN { make_page() } else { None };
+    let closed = files.set.finish(&trace.result).map_err(Error::from);
     let page = early.or_else(make_page);
-    let write = |(outputs, page): (_, String)| crate::report::write(outputs, &summary, &run.trace, &page);
-    let reported = closed.and_then(|()| outputs.zip(page).map_or(Ok(()), write));
-    how_it_ended(end, reported)?;
-    Ok(Run { summary, columns: columns.unwrap_or_default(), trace: run.trace })
+    let write = |(outputs, page): (_, String)| crate::report::write(outputs, summary, trace, &page);
+    closed.and_then(|()| outputs.zip(page).map_or(Ok(()), write))
 }
 
 /// Adds caveats about loads, how the run ended, and its times.

@@ -199,9 +199,18 @@ fn frame_of(
     source: &Source,
     span: std::ops::Range<usize>,
 ) -> Result<Pose, RobotFileError> {
-    let R = rotation(table.rpy, table.quaternion, units).map_err(|message| source.error(span, message))?;
+    let R = rotation(table.rpy, table.quaternion, units).map_err(|error| source.error(span, error.to_string()))?;
     let p = Vector3::from(table.xyz) * units.length;
     Ok(Pose::from_parts(Translation3::from(p), R.unwrap_or_else(Rotation3::identity)))
+}
+
+/// Reason why an entry gives no orientation.
+#[derive(Debug, thiserror::Error)]
+enum OrientationError {
+    #[error("give rpy or quaternion, not both")]
+    Twice,
+    #[error("quaternion = [w, x, y, z] has the length {length:.6}: it must be 1")]
+    NotUnit { length: f64 },
 }
 
 /// Converts roll, pitch, yaw about fixed axes x, y, z (as in URDF) or a quaternion w, x, y, z.
@@ -209,16 +218,16 @@ fn rotation(
     rpy: Option<[f64; 3]>,
     quaternion: Option<[f64; 4]>,
     units: Units,
-) -> Result<Option<Rotation3<f64>>, String> {
+) -> Result<Option<Rotation3<f64>>, OrientationError> {
     match (rpy, quaternion) {
-        (Some(_), Some(_)) => Err("give rpy or quaternion, not both".to_owned()),
+        (Some(_), Some(_)) => Err(OrientationError::Twice),
         (Some([r, p, y]), None) => {
             Ok(Some(Rotation3::from_euler_angles(r * units.angle, p * units.angle, y * units.angle)))
         }
         (None, Some([w, x, y, z])) => {
             let q = Quaternion::new(w, x, y, z);
             if (q.norm() - 1.0).abs() > 1e-3 {
-                return Err(format!("quaternion = [w, x, y, z] has the length {:.6}: it must be 1", q.norm()));
+                return Err(OrientationError::NotUnit { length: q.norm() });
             }
             Ok(Some(UnitQuaternion::from_quaternion(q).to_rotation_matrix()))
         }
@@ -249,6 +258,16 @@ impl Reader<'_> {
     fn place<T>(&self, at: &Spanned<T>) -> (usize, usize) {
         let error = self.source.error(at.span(), "");
         (error.line, error.column)
+    }
+
+    /// Returns the orientation of the tool that a table gives, if it gives one.
+    fn orientation<T>(
+        &self,
+        table: &Spanned<T>,
+        rpy: Option<[f64; 3]>,
+        quaternion: Option<[f64; 4]>,
+    ) -> Result<Option<Rotation3<f64>>, RobotFileError> {
+        rotation(rpy, quaternion, self.units).map_err(|error| self.source.error(table.span(), error.to_string()))
     }
 
     /// Checks that a move has exactly one kind.
@@ -303,7 +322,7 @@ impl Reader<'_> {
                 .error(table.span(), "a move needs one of joints, joint_to, line, arc, spline, dwell"));
         };
         let quaternion = entry.quaternion.as_ref().map(|q| *q.get_ref());
-        let given = rotation(entry.rpy, quaternion, self.units).map_err(|m| self.source.error(table.span(), m))?;
+        let given = self.orientation(table, entry.rpy, quaternion)?;
         let turned = given.or(*R).ok_or_else(|| {
             let message =
                 "the orientation of the tool is not known yet: give rpy or quaternion, or begin with a move joints";
@@ -369,7 +388,7 @@ impl Reader<'_> {
             let message = format!("there is no program {}", file.display());
             return Err(self.source.error(entry.file.span(), message).into());
         }
-        let R = rotation(entry.rpy, entry.quaternion, self.units).map_err(|m| self.source.error(table.span(), m))?;
+        let R = self.orientation(table, entry.rpy, entry.quaternion)?;
         let mut gcode = GCodeOptions {
             offsets: WORK_FRAMES.iter().map(|code| ((*code).to_owned(), self.X_WB)).collect(),
             machine: self.X_WB,
@@ -433,7 +452,7 @@ impl Reader<'_> {
     fn standard(&self, table: &Spanned<StandardTable>) -> Result<Vec<Item>, RobotFileError> {
         let entry = table.get_ref();
         let (line, _) = self.place(table);
-        let R = rotation(entry.rpy, entry.quaternion, self.units).map_err(|m| self.source.error(table.span(), m))?;
+        let R = self.orientation(table, entry.rpy, entry.quaternion)?;
         let R = R.ok_or_else(|| self.source.error(table.span(), "give the tool's orientation: rpy or quaternion"))?;
         let side = *entry.side.get_ref() * self.units.length;
         if !(side > 0.0 && side.is_finite()) {

@@ -14,7 +14,7 @@ use flexarm_kinematics::{Data, Frame, Wrench, forward_kinematics, rotation_vecto
 use flexarm_stepping::{FlexibleArm, Guide, GuideTerm, OperatingPoint, SpringCurve, StepError, Tangents};
 use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX, SymmetricEigen, Vector6};
 
-use crate::estimation::parameter::{Effect, Parameter, Plant, displacement, entry_slope, scaled, slope_of};
+use crate::estimation::parameter::{Effect, Parameter, Plant, SpringPart, displacement, entry_slope, scaled, slope_of};
 
 /// Step of the central differences over displacements of joint frames (m, rad): the error is of the
 /// order of its square.
@@ -41,25 +41,8 @@ fn slopes_at_rest(
     for (k, parameter) in parameters.iter().enumerate() {
         match &parameter.effect {
             Effect::Stiffness(places) => {
-                for place in places {
-                    let (arm, e) = (at.arm(), at.deflections());
-                    if let Some((places, dK)) = arm.coupled_stiffness_slope(place.spring) {
-                        let f = dK * DVector::from_iterator(places.len(), places.iter().map(|i| e[*i]));
-                        places.iter().zip(f.iter()).for_each(|(i, f)| slopes[(*i, k)] += f);
-                        continue;
-                    }
-                    let element = &arm.elements[place.spring];
-                    let first = arm.offset(element);
-                    // The deflection of a single-coordinate spring includes its transmission error.
-                    let turned = arm.deflection(place.spring, e[first], at.coordinates().as_slice());
-                    let e = if element.size == 1 { &[turned] } else { &e[first..first + element.size] };
-                    let f = match &element.curve {
-                        Some(curve) => DVector::from_element(1, curve.torque(e[0], at.coordinates().as_slice())),
-                        None => slope_of(&element.K, place.coordinate) * DVector::from_column_slice(e),
-                    };
-                    for (i, f) in f.iter().enumerate() {
-                        slopes[(first + i, k)] += f;
-                    }
+                for (i, f) in places.iter().flat_map(|place| stiffness_forces(at, place)) {
+                    slopes[(i, k)] += f;
                 }
             }
             Effect::Entry { spring, row, column, factor, .. } => {
@@ -95,6 +78,26 @@ fn slopes_at_rest(
         }
     }
     Ok((slopes, rigid))
+}
+
+/// Returns the forces of a spring per relative change of its stiffness, with their elastic
+/// coordinates.
+fn stiffness_forces(at: &OperatingPoint, place: &SpringPart) -> Vec<(usize, f64)> {
+    let (arm, e, q) = (at.arm(), at.deflections(), at.coordinates().as_slice());
+    if let Some((places, dK)) = arm.coupled_stiffness_slope(place.spring) {
+        let f = dK * DVector::from_iterator(places.len(), places.iter().map(|i| e[*i]));
+        return places.iter().copied().zip(f.iter().copied()).collect();
+    }
+    let element = &arm.elements[place.spring];
+    let first = arm.offset(element);
+    // The deflection of a single-coordinate spring includes its transmission error.
+    let turned = arm.deflection(place.spring, e[first], q);
+    let e = if element.size == 1 { &[turned] } else { &e[first..first + element.size] };
+    let f = match &element.curve {
+        Some(curve) => DVector::from_element(1, curve.torque(e[0], q)),
+        None => slope_of(&element.K, place.coordinate) * DVector::from_column_slice(e),
+    };
+    f.iter().enumerate().map(|(i, f)| (first + i, *f)).collect()
 }
 
 /// Returns the change of a guide's number per unit of its search coordinate.

@@ -11,7 +11,7 @@ use nalgebra::{Matrix3, Vector3};
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::{Reader, Units};
+use super::reader::{Reader, Units};
 use flexarm_run::Error;
 
 /// Joint values: a list in order, or by name.
@@ -52,6 +52,11 @@ pub(super) struct TableRow<'a> {
     pub(super) row: usize,
 }
 
+/// A cell without the number that is needed.
+pub(super) struct EmptyCell<'n> {
+    pub(super) column: &'n str,
+}
+
 impl TableRow<'_> {
     pub(super) fn get(&self, name: &str) -> Option<f64> {
         let value = self.table.rows[self.row][self.table.column(name)?];
@@ -61,15 +66,15 @@ impl TableRow<'_> {
     /// Returns components, 0 for those without a column; `None` if none has a column.
     ///
     /// # Errors
-    /// The name of a column without a value in this row.
-    pub(super) fn all<const N: usize>(&self, names: [&str; N]) -> Result<Option<[f64; N]>, String> {
+    /// [`EmptyCell`] for a column without a value in this row.
+    pub(super) fn all<'n, const N: usize>(&self, names: [&'n str; N]) -> Result<Option<[f64; N]>, EmptyCell<'n>> {
         if names.iter().all(|name| self.table.column(name).is_none()) {
             return Ok(None);
         }
         let mut values = [0.0; N];
         for (value, name) in values.iter_mut().zip(names) {
             if self.table.column(name).is_some() {
-                *value = self.get(name).ok_or_else(|| name.to_owned())?;
+                *value = self.get(name).ok_or(EmptyCell { column: name })?;
             }
         }
         Ok(Some(values))
@@ -206,9 +211,9 @@ impl Reader<'_> {
     }
 
     /// Returns the error for an empty cell where a number is required.
-    pub(super) fn empty(&self, row: &TableRow<'_>, file: &Spanned<PathBuf>, name: &str) -> Error {
-        let line = row.table.lines[row.row];
-        let text = format!("{} line {line}: {name} is empty, expected a number", file.get_ref().display());
+    pub(super) fn empty(&self, row: &TableRow<'_>, file: &Spanned<PathBuf>, cell: &EmptyCell<'_>) -> Error {
+        let (line, column) = (row.table.lines[row.row], cell.column);
+        let text = format!("{} line {line}: {column} is empty, expected a number", file.get_ref().display());
         self.error(file.span(), text)
     }
 
@@ -219,10 +224,10 @@ impl Reader<'_> {
         row: &TableRow<'_>,
         file: &Spanned<PathBuf>,
     ) -> Result<LoadEntry, Error> {
-        let empty = |name: String| self.empty(row, file, &name);
+        let empty = |cell: EmptyCell<'_>| self.empty(row, file, &cell);
         let mass = match row.table.column("mass") {
             None => load.mass,
-            Some(_) => row.get("mass").ok_or_else(|| empty("mass".into()))?,
+            Some(_) => row.get("mass").ok_or_else(|| empty(EmptyCell { column: "mass" }))?,
         };
         let force = row.all(["fx", "fy", "fz"]).map_err(empty)?.unwrap_or(load.force);
         let torque = row.all(["mx", "my", "mz"]).map_err(empty)?.unwrap_or(load.torque);
@@ -242,7 +247,7 @@ impl Reader<'_> {
         if row.get("d").is_none() {
             return Ok(None);
         }
-        let empty = |name: String| self.empty(row, file, &name);
+        let empty = |cell: EmptyCell<'_>| self.empty(row, file, &cell);
         let direction = row.all(["ux", "uy", "uz"]).map_err(empty)?;
         Ok(direction.map(|direction| Spanned::new(file.span(), direction)))
     }

@@ -8,8 +8,8 @@ use nalgebra::Vector3;
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::Reader;
 use super::common::{Joints, LOAD_COLUMNS, LoadEntry, TableRow};
+use super::reader::Reader;
 use flexarm_run::Error;
 
 #[derive(Debug, Deserialize)]
@@ -100,7 +100,7 @@ impl Reader<'_> {
                     let rotation = at.filled(["rx", "ry", "rz"]);
                     let direction = self.table_direction(&at, file)?.or_else(|| e.direction.clone());
                     let point =
-                        at.all(["px", "py", "pz"]).map_err(|name| self.empty(&at, file, &name))?.unwrap_or(e.point);
+                        at.all(["px", "py", "pz"]).map_err(|cell| self.empty(&at, file, &cell))?.unwrap_or(e.point);
                     let said = FileDisplacement { name, q, load, point, value, direction, rotation, std, std_rotation };
                     self.moved(entry, said)?;
                 }

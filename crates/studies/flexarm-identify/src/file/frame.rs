@@ -8,7 +8,7 @@ use nalgebra::{Rotation3, Translation3, Vector3};
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::Reader;
+use super::reader::Reader;
 use flexarm_run::Error;
 
 #[derive(Debug, Deserialize)]

@@ -4,8 +4,8 @@ use crate::estimation::{Reading, ReadingKind, Row};
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::Reader;
 use super::common::{Joints, LoadEntry};
+use super::reader::Reader;
 use flexarm_run::Error;
 
 #[derive(Debug, Deserialize)]

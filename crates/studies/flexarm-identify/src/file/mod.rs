@@ -6,10 +6,10 @@ mod displacement;
 mod frame;
 mod frequency;
 mod place;
+mod reader;
 mod recording;
 
 use std::collections::BTreeMap;
-use std::ops::Range;
 use std::path::Path;
 
 use crate::estimation::{Loss, Measurements};
@@ -21,15 +21,16 @@ use self::displacement::DisplacementEntry;
 use self::frame::{InstrumentEntry, TargetEntry};
 use self::frequency::FrequencyEntry;
 use self::place::PlaceEntry;
+use self::reader::Units;
 use self::recording::EncodersEntry;
 use super::response_file::{NodeEntry, ResponseEntry, ShapeEntry};
-use flexarm_run::Arm;
 use flexarm_run::Error;
 use flexarm_run::RobotFileError;
 use flexarm_run::robot_file::Source;
 use flexarm_run::toml_file::parsed;
 
 pub(super) use self::common::{Joints, LoadEntry};
+pub(super) use self::reader::{Cell, Reader};
 pub(super) use self::recording::EncoderRecording;
 
 /// Contents of the file as written.
@@ -104,25 +105,9 @@ pub(super) struct MeasurementInput {
     pub(super) angle_rad: f64,
 }
 
-/// Factors from the units of a file to SI units.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Units {
-    pub(super) length: f64,
-    pub(super) angle: f64,
-    force: f64,
-}
-
 const LENGTHS: [(&str, f64); 3] = [("m", 1.0), ("mm", 1e-3), ("um", 1e-6)];
 const ANGLES: [(&str, f64); 3] = [("rad", 1.0), ("deg", std::f64::consts::PI / 180.0), ("mrad", 1e-3)];
 const FORCES: [(&str, f64); 2] = [("N", 1.0), ("kN", 1e3)];
-
-/// Robot data needed to read its measurements.
-pub(super) struct Cell<'a> {
-    /// Actuated joints in coordinate order, and whether they slide.
-    pub(super) joints: &'a [(String, bool)],
-    /// Measured arm.
-    pub(super) arm: &'a Arm,
-}
 
 /// Reads a file of measurements.
 ///
@@ -209,25 +194,7 @@ fn loss(given: &Option<Spanned<String>>, source: &Source) -> Result<Loss, RobotF
     }
 }
 
-/// State of the reader.
-pub(super) struct Reader<'a> {
-    pub(super) cell: &'a Cell<'a>,
-    source: &'a Source,
-    pub(super) folder: &'a Path,
-    pub(super) units: Units,
-    instruments: Vec<String>,
-    targets: Vec<String>,
-    pub(super) measurements: Measurements,
-    /// For each reading: kind of quantity, whether a standard deviation is given, and its place in
-    /// the file.
-    pub(super) given: Vec<(&'static str, bool, Range<usize>)>,
-}
-
 impl Reader<'_> {
-    pub(super) fn error(&self, span: Range<usize>, message: impl Into<String>) -> Error {
-        self.source.error(span, message).into()
-    }
-
     /// Adds all readings of the file, with their instruments and targets.
     fn readings(&mut self, file: &MeasurementFile) -> Result<(), Error> {
         self.frames(&file.instrument, &file.target)?;

@@ -8,8 +8,8 @@ use nalgebra::Vector3;
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::Reader;
 use super::common::{Joints, LOAD_COLUMNS, LoadEntry, TableRow};
+use super::reader::Reader;
 use flexarm_run::Error;
 
 #[derive(Debug, Deserialize)]

@@ -8,7 +8,7 @@ use flexarm_files::NumberTable;
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::{Reader, Units};
+use super::reader::{Reader, Units};
 use flexarm_run::Error;
 use flexarm_run::RobotFileError;
 

@@ -103,7 +103,7 @@ impl Workshop {
                         });
                     }
                     (Target::Option(key), _) => {
-                        let failed = |message| Error::from(SweepError::Run(format!("{text}: {message}")));
+                        let failed = |error| Error::from(SweepError::Run(format!("{text}: {error}")));
                         options.set(key, value).map_err(failed)?;
                         given.retain(|(known, _)| known != key);
                         given.push((key.clone(), value.clone()));
@@ -142,7 +142,8 @@ impl Workshop {
                 };
                 let file = file.ok_or_else(|| failed(format!("{text}: the run has no such file")))?;
                 let known = changes.entry(*which).or_default();
-                let edits = self.entry_edits(file, path, text, *role, value, known).map_err(failed)?;
+                let edits = self.entry_edits(file, path, text, *role, value, known);
+                let edits = edits.map_err(|error| failed(error.to_string()))?;
                 known.extend(edits);
             }
         }
@@ -157,7 +158,7 @@ impl Workshop {
             let path = ["flexible_link", link, "reduced"].map(|key| Segment::Key(key.to_owned()));
             let value = ParameterValue::Text(flex.display().to_string());
             let edits = self.entry_edits(robot, &path, &format!("link.{link}.reduced"), Role::Value, &value, &[]);
-            let edits = edits.map_err(SweepError::Run)?;
+            let edits = edits.map_err(|error| SweepError::Run(error.to_string()))?;
             changes.entry(TargetFile::Robot).or_default().extend(edits);
         }
         Ok(())

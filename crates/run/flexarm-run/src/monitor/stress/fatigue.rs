@@ -19,27 +19,30 @@ impl LinkStress {
 
     /// Returns the seat of the largest damage; `None` without an S-N curve.
     ///
-    /// A seat is left out if a bound of its damage is below the damage of another one. The bound: n
-    /// samples have n/2 cycles at most, and no cycle is worse than a reversed one whose amplitude is
-    /// the peak stress P. A cycle of amplitude a and mean m has `a + m <= P`, so Goodman's
-    /// `a/(1 - m/R) <= P` for P below the tensile strength R.
+    /// Seats are tried in the order of a bound of their damage, until the bound is below the damage
+    /// found. The bound: n samples have n/2 cycles at most, and with the largest stress P of positive
+    /// and Q of negative sign no cycle has a larger amplitude than (P + Q)/2, nor, at this
+    /// amplitude, a larger mean than (P - Q)/2; a smaller amplitude with a larger mean is less
+    /// harmful.
     pub(super) fn most_damaged(&self, amplitudes: &DMatrix<f32>) -> Option<usize> {
-        let peaks = self.peaks();
-        let largest = self.judged().into_iter().map(|k| peaks[k]).fold(0.0, f32::max);
+        let sides = self.sides();
+        let largest = self.judged().into_iter().map(|k| self.peak(k)).fold(0.0, f32::max);
         let samples = amplitudes.ncols();
-        let mut order = self.judged();
-        order.sort_by(|a, b| peaks[*b].total_cmp(&peaks[*a]));
+        let bound = |k: usize| {
+            let [positive, negative] = sides[k].map(|side| f64::from(side + POLYLINE * largest));
+            let (range, mean) = (positive + negative, 0.5 * (positive - negative));
+            let worst = FatigueCycle { range, mean, count: 0.5 * samples as f64 };
+            Some((k, self.strength_at(k)?.curve()?.damage(&[worst])))
+        };
+        let mut bounds: Vec<(usize, f64)> = self.judged().into_iter().filter_map(bound).collect();
+        bounds.sort_by(|a, b| b.1.total_cmp(&a.1));
         let mut most: Option<(usize, f64)> = None;
-        for k in order {
-            let Some(curve) = self.strength_at(k).and_then(|strength| strength.curve()) else { continue };
-            let peak = f64::from(peaks[k] + POLYLINE * largest);
-            let worst = FatigueCycle { range: 2.0 * peak, mean: 0.0, count: 0.5 * samples as f64 };
-            let found = most.map_or(0.0, |(_, damage)| damage);
-            if most.is_some() && peak < curve.tensile_pa && curve.damage(&[worst]) <= found {
-                continue;
+        for (k, bound) in bounds {
+            if most.is_some_and(|(_, found)| bound <= found) {
+                break;
             }
             let damage = self.damage(k, &self.signed_history(k, amplitudes)).unwrap_or(0.0);
-            if most.is_none() || damage > found {
+            if most.is_none_or(|(_, found)| damage > found) {
                 most = Some((k, damage));
             }
         }

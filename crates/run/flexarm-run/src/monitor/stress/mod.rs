@@ -71,8 +71,9 @@ struct LinkStress {
     amplitudes: Vec<f32>,
     /// Poses of the link in the world at all samples.
     poses: Vec<Pose>,
-    /// Maximum von Mises stress of each seat (Pa), once it is computed.
-    peaks: OnceCell<Vec<f32>>,
+    /// Maximum von Mises stress of each seat (Pa) with positive and with negative sign, once it is
+    /// computed.
+    sides: OnceCell<Vec<[f32; 2]>>,
 }
 
 /// A gauge at a node of the surface.
@@ -120,7 +121,7 @@ impl StressMonitor {
                 strength: link.strength,
                 amplitudes: Vec::new(),
                 poses: Vec::new(),
-                peaks: OnceCell::new(),
+                sides: OnceCell::new(),
             });
         }
         if links.is_empty() {
@@ -137,7 +138,7 @@ impl StressMonitor {
         for link in &mut self.links {
             link.amplitudes.clear();
             link.poses.clear();
-            link.peaks.take();
+            link.sides.take();
         }
     }
 
@@ -227,27 +228,27 @@ impl StressMonitor {
     /// the maximum of each node over the run, and labels of the worst places.
     pub(crate) fn scenery(&self) -> Vec<Scenery> {
         let links = || self.links.iter().filter(|_| !self.times.is_empty()).map(|link| (link, link.worst()));
-        let worst = |(link, worst): &(&LinkStress, Vec<usize>)| worst.first().map_or(0.0, |k| link.peaks()[*k]);
+        let worst = |(link, worst): &(&LinkStress, Vec<usize>)| worst.first().map_or(0.0, |k| link.peak(*k));
         let Some(first) = links().max_by(|a, b| worst(a).total_cmp(&worst(b))) else { return Vec::new() };
         let scale = f64::from(worst(&first)).max(f64::MIN_POSITIVE);
         let Some(sample) = first.1.first().map(|k| first.0.time_of_peak(*k)) else { return Vec::new() };
         let objects = links().flat_map(|(link, worst)| {
             let X_WL = link.poses[sample];
             let place = |k: usize| (X_WL * Point3::from(link.fields.seats[k].position)).coords.map(|x| x as f32).into();
-            let color = |stress: &f32| {
-                let [r, g, b] = magnitude((f64::from(*stress) / scale).min(1.0));
+            let color = |stress: f32| {
+                let [r, g, b] = magnitude((f64::from(stress) / scale).min(1.0));
                 [r, g, b, 255]
             };
             let surface = SceneryForm::Surface {
                 places: (0..link.fields.seats.len()).map(place).collect(),
                 triangles: link.fields.triangles.clone(),
-                colors: link.peaks().iter().map(color).collect(),
+                colors: (0..link.fields.seats.len()).map(|k| color(link.peak(k))).collect(),
             };
             let labels = SceneryForm::Points {
                 places: worst.iter().map(|k| place(*k)).collect(),
                 colors: vec![[255; 4]],
                 radius_m: 0.005 * link.length as f32,
-                labels: worst.iter().map(|k| format!("{:.1} MPa", 1e-6 * link.peaks()[*k])).collect(),
+                labels: worst.iter().map(|k| format!("{:.1} MPa", 1e-6 * link.peak(*k))).collect(),
             };
             [(link.name.clone(), surface), (format!("{} worst places", link.name), labels)]
         });
@@ -388,7 +389,7 @@ impl LinkStress {
             note: if self.judged().len() < positions.len() { "nodes near tied ones are not judged" } else { "" },
             positions: &positions,
             triangles: &self.fields.triangles,
-            stress: &self.peaks().iter().map(|stress| f64::from(*stress)).collect::<Vec<_>>(),
+            stress: &(0..positions.len()).map(|k| f64::from(self.peak(k))).collect::<Vec<_>>(),
             worst: &self.worst(),
             along: X_LB - X_LA,
         })
@@ -402,9 +403,8 @@ impl LinkStress {
 
     /// Returns the worst seats, which are apart from each other.
     fn worst(&self) -> Vec<usize> {
-        let peaks = self.peaks();
         let mut order = self.judged();
-        order.sort_by(|a, b| peaks[*b].total_cmp(&peaks[*a]));
+        order.sort_by(|a, b| self.peak(*b).total_cmp(&self.peak(*a)));
         let mut worst: Vec<usize> = Vec::new();
         for k in order {
             let p = self.fields.seats[k].position;
@@ -523,35 +523,58 @@ impl LinkStress {
         corners
     }
 
-    /// Returns the maximum von Mises stress of each seat over the run (Pa).
-    fn peaks(&self) -> &[f32] {
-        self.peaks.get_or_init(|| {
+    /// Returns the maximum von Mises stress of a seat over the run (Pa).
+    fn peak(&self, seat: usize) -> f32 {
+        let [positive, negative] = self.sides()[seat];
+        positive.max(negative)
+    }
+
+    /// Returns the maximum von Mises stress of each seat over the run (Pa) with positive and with
+    /// negative sign.
+    fn sides(&self) -> &[[f32; 2]] {
+        self.sides.get_or_init(|| {
             let amplitudes = self.amplitudes();
-            self.peaks_of(&amplitudes.select_columns(&self.corners(&amplitudes)))
+            self.sides_of(&amplitudes.select_columns(&self.corners(&amplitudes)))
         })
     }
 
-    /// Returns the maximum von Mises stress of each seat among some samples (Pa).
-    fn peaks_of(&self, amplitudes: &DMatrix<f32>) -> Vec<f32> {
+    /// Returns [`LinkStress::sides`] among the corners of a polyline.
+    ///
+    /// The sign is that of the trace where the trace exceeds half of the von Mises stress at both ends
+    /// of a piece, and so in between. Other pieces count for both signs.
+    fn sides_of(&self, amplitudes: &DMatrix<f32>) -> Vec<[f32; 2]> {
         let stress = self.map.stress();
-        let mut peaks = vec![0.0_f32; self.fields.seats.len()];
+        let mut sides = vec![[0.0_f32; 2]; self.fields.seats.len()];
+        // Sign (0 if unknown) and square at the last corner.
+        let mut last = vec![(0.0_f32, 0.0_f32); SEATS];
         let mut product = DMatrix::zeros(6 * SEATS, SAMPLES);
-        for (block, peaks) in peaks.chunks_mut(SEATS).enumerate() {
-            let own = stress.rows(6 * SEATS * block, 6 * peaks.len());
+        for (block, sides) in sides.chunks_mut(SEATS).enumerate() {
+            let own = stress.rows(6 * SEATS * block, 6 * sides.len());
             for first in (0..amplitudes.ncols()).step_by(SAMPLES) {
                 let count = SAMPLES.min(amplitudes.ncols() - first);
                 let mut product = product.view_mut((0, 0), (own.nrows(), count));
                 product.gemm(1.0, &own, &amplitudes.columns(first, count), 0.0);
-                for column in product.column_iter() {
+                for (k, column) in product.column_iter().enumerate() {
                     let seats = column.as_slice().as_chunks::<6>().0;
-                    for (peak, stress) in peaks.iter_mut().zip(seats) {
-                        *peak = peak.max(von_mises_squared(stress));
+                    for ((side, last), stress) in sides.iter_mut().zip(&mut last).zip(seats) {
+                        let square = von_mises_squared(stress);
+                        let trace = stress[0] + stress[1] + stress[2];
+                        let sign = if 4.0 * trace * trace > square { trace.signum() } else { 0.0 };
+                        let (before, squared) = if first + k == 0 { (sign, square) } else { *last };
+                        let is_mixed = sign != before || sign == 0.0;
+                        let most = if is_mixed { square.max(squared) } else { square };
+                        for (side, of) in side.iter_mut().zip([1.0, -1.0]) {
+                            if is_mixed || sign == of {
+                                *side = side.max(most);
+                            }
+                        }
+                        *last = (sign, square);
                     }
                 }
             }
         }
-        peaks.iter_mut().for_each(|square| *square = square.sqrt());
-        peaks
+        sides.iter_mut().flatten().for_each(|square| *square = square.sqrt());
+        sides
     }
 }
 
@@ -569,14 +592,17 @@ fn principal(&[xx, yy, zz, xy, yz, zx]: &[f64; 6]) -> [f64; 2] {
 /// Returns the von Mises stress (Pa) with the sign of the principal stress of the largest magnitude.
 fn signed_von_mises(stress: [f64; 6]) -> f64 {
     let von_mises = von_mises(stress);
-    // The sum of both is 2/3 of the trace minus the middle principal deviator, which is at most a third
-    // of the von Mises stress.
-    let trace = stress[0] + stress[1] + stress[2];
-    if 2.0 * trace.abs() > von_mises {
-        return von_mises.copysign(trace);
+    // The sum of the largest and the smallest principal stress is 2p - s, with the mean stress p and the
+    // middle deviator s, |s| <= von Mises/3, the root of f(x) = x^3 - J2 x - J3 where f falls.
+    let p = (stress[0] + stress[1] + stress[2]) / 3.0;
+    if (2.0 * p).abs() > von_mises / 3.0 {
+        return von_mises.copysign(p);
     }
-    let [largest, smallest] = principal(&stress);
-    von_mises.copysign(largest + smallest)
+    let [xx, yy, zz, xy, yz, zx] = stress;
+    let (a, b, c) = (xx - p, yy - p, zz - p);
+    let J3 = a * b * c + 2.0 * xy * yz * zx - a * yz * yz - b * zx * zx - c * xy * xy;
+    let f = 2.0 * p * (4.0 * p * p - von_mises * von_mises / 3.0) - J3;
+    if f > 0.0 { -von_mises } else { von_mises }
 }
 
 /// Square of the von Mises stress.

@@ -6,9 +6,9 @@ use base64::Engine as _;
 use flexarm_draw::palette::hex;
 use flexarm_log::RunHeader;
 
-use super::ReportRun;
 use super::figures::lies_on_twin;
 use super::number::{number, short};
+use super::run::ReportRun;
 use crate::report::picture::{pictures, scale_colors};
 use flexarm_settings::written::markup;
 
@@ -57,7 +57,7 @@ pub(super) fn arm_pictures(runs: &[ReportRun<'_>]) -> String {
                     );
                 }
                 Err(why) => {
-                    let _ = writeln!(out, "<p class=\"note\">{}</p>", markup(&why));
+                    let _ = writeln!(out, "<p class=\"note\">{}</p>", markup(&why.to_string()));
                 }
             }
         }

@@ -2,9 +2,9 @@
 
 use flexarm_log::EventKind;
 
-use super::ReportRun;
 use super::figures::lies_on_twin;
 use super::number::{push_short, short};
+use super::run::ReportRun;
 use crate::report::curves::{Kind, Plot, overlays};
 use flexarm_settings::written::markup;
 

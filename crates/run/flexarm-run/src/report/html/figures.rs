@@ -5,12 +5,13 @@ use std::fmt::Write as _;
 use flexarm_draw::palette;
 
 use super::number::{fixed, number};
-use super::tables::STABILISATION;
-use super::{ReportRun, method};
+use super::run::{ReportRun, method};
 use crate::comparison::of_one_robot;
 use crate::summary::{EnergyFigures, Summary, TcpFigures};
 use flexarm_settings::written::markup;
 
+/// Name of the settling time in the standard.
+pub(super) const STABILISATION: &str = "Position stabilisation time";
 /// Errors below this are round-off (m).
 const NOTHING_M: f64 = 1e-12;
 

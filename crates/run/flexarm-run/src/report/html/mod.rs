@@ -9,23 +9,25 @@ mod arm;
 mod data;
 mod figures;
 mod number;
+mod run;
 mod tables;
 
 use std::fmt::Write as _;
 
 use flexarm_draw::palette::{self, Ground, hex};
-use flexarm_log::Trace;
 
 use self::arm::arm_pictures;
 use self::data::{data, thinning};
 use self::figures::{comparison, tiles};
 use self::number::number;
+use self::run::method;
 use self::tables::{iso_table, parts_tables, stops_table, stress_picture, tool_path};
 use super::curves::{Plot, plots};
 use crate::stepper_settings::SettingValue;
-use crate::summary::Summary;
 use flexarm_settings::gathered;
 use flexarm_settings::written::markup;
+
+pub use self::run::ReportRun;
 
 const STYLE: &str = include_str!("../../../assets/report.css");
 
@@ -38,17 +40,6 @@ const UPLOT_STYLE: &str = include_str!("../../../assets/uplot/uPlot.min.css");
 const UPLOT_LICENSE: &str = include_str!("../../../assets/uplot/LICENSE");
 
 const UPLOT_VERSION: &str = "1.6.32";
-
-/// Run shown in a report.
-#[derive(Clone, Copy, Debug)]
-pub struct ReportRun<'a> {
-    /// Name of the run, used if there are several.
-    pub label: &'a str,
-    /// Figures of the run.
-    pub summary: &'a Summary,
-    /// Curves of the run.
-    pub trace: &'a Trace,
-}
 
 /// Returns the report of one run, or of several side by side with the first as the main one.
 #[must_use]
@@ -178,14 +169,6 @@ fn headlines(runs: &[ReportRun<'_>]) -> String {
         format!("<p class=\"headline\">{}</p>\n", markup(&(who + &run.summary.headline)))
     };
     runs.iter().filter(|run| !run.summary.headline.is_empty()).map(line).collect()
-}
-
-/// Describes stepper and step size, as far as known.
-fn method(s: &Summary, before: &str) -> Option<String> {
-    let step = (s.stepper.h_s > 0.0).then(|| format!("{before}{} ms", number(1e3 * s.stepper.h_s, 4)));
-    let name = Some(s.stepper.name.clone()).filter(|name| !name.is_empty());
-    let known: Vec<String> = name.into_iter().chain(step).collect();
-    (!known.is_empty()).then(|| known.join(", "))
 }
 
 /// Returns the reason for an early stop, and the warnings.

@@ -4,9 +4,9 @@ use std::fmt::Write as _;
 
 use base64::Engine as _;
 
-use super::ReportRun;
-use super::figures::{moving, within, without_number};
+use super::figures::{STABILISATION, moving, within, without_number};
 use super::number::number;
+use super::run::ReportRun;
 use crate::headline;
 use crate::monitor::tool_path::PathMoveFigures;
 use crate::record::STRESS_PICTURE;
@@ -85,9 +85,6 @@ const MOST_POSES: usize = 50;
 
 /// Row of the ISO table: name, meaning, unit, value.
 type Iso = (&'static str, &'static str, &'static str, fn(&Summary) -> Option<f64>);
-
-/// Name of the settling time in the standard.
-pub(super) const STABILISATION: &str = "Position stabilisation time";
 
 const ISO: [Iso; 8] = [
     (
