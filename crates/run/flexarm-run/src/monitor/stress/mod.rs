@@ -4,6 +4,7 @@
 //! The monitor keeps the amplitudes of the fields at every logged sample; [`StressMonitor::result`]
 //! finds the maxima over the run for every node of the surface.
 
+mod equivalent;
 mod fatigue;
 
 use std::cell::OnceCell;
@@ -14,13 +15,13 @@ use std::sync::Arc;
 use flexarm_draw::mesh_picture::{Image, StressPicture, stress_sheet};
 use flexarm_draw::palette::magnitude;
 use flexarm_fem::chain::Chain;
-use flexarm_fem::stress::{StressError, StressFields, StressMap, inertia_loads, von_mises};
+use flexarm_fem::stress::{StressError, StressFields, StressMap, inertia_loads};
 use flexarm_fem::{FemError, ReducedLink, RigidPart};
 use flexarm_flexlink::{FlexibleSpan, LinkForm};
 use flexarm_kinematics::{Data, Frame, Pose, State, inverse_dynamics};
 use flexarm_log::{GAUGE_ENDS, STRESS_VIEW, Scenery, SceneryForm};
 use flexarm_stepping::{ElasticElement, FlexibleArm, Observation, PooledWorkspace};
-use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, Point3, RowSVector};
+use nalgebra::{DMatrix, DVector, Matrix6, Point3, RowSVector};
 
 use crate::error::Error;
 use crate::flexible::{FlexibleRobot, Owner};
@@ -31,6 +32,7 @@ use crate::strength::Strength;
 use crate::summary::{
     LinkStressFigures, SectionForceFigures, StrainGaugeFigures, StressPlaceFigures, StressPointFigures,
 };
+use equivalent::{principal, signed_von_mises, von_mises_squared};
 
 /// Seats this close to a tied node are left out, as a fraction of the distance between the
 /// interfaces: the stress beside a rigid tie is that of the tie.
@@ -581,32 +583,4 @@ impl LinkStress {
 /// Returns the index of the number of the largest magnitude; 0 if there is none.
 fn largest(numbers: &[f64]) -> usize {
     (0..numbers.len()).max_by(|a, b| numbers[*a].abs().total_cmp(&numbers[*b].abs())).unwrap_or(0)
-}
-
-/// Returns the largest and the smallest principal stress (Pa).
-fn principal(&[xx, yy, zz, xy, yz, zx]: &[f64; 6]) -> [f64; 2] {
-    let principal = Matrix3::new(xx, xy, zx, xy, yy, yz, zx, yz, zz).symmetric_eigenvalues();
-    [principal.max(), principal.min()]
-}
-
-/// Returns the von Mises stress (Pa) with the sign of the principal stress of the largest magnitude.
-fn signed_von_mises(stress: [f64; 6]) -> f64 {
-    let von_mises = von_mises(stress);
-    // The sum of the largest and the smallest principal stress is 2p - s, with the mean stress p and the
-    // middle deviator s, |s| <= von Mises/3, the root of f(x) = x^3 - J2 x - J3 where f falls.
-    let p = (stress[0] + stress[1] + stress[2]) / 3.0;
-    if (2.0 * p).abs() > von_mises / 3.0 {
-        return von_mises.copysign(p);
-    }
-    let [xx, yy, zz, xy, yz, zx] = stress;
-    let (a, b, c) = (xx - p, yy - p, zz - p);
-    let J3 = a * b * c + 2.0 * xy * yz * zx - a * yz * yz - b * zx * zx - c * xy * xy;
-    let f = 2.0 * p * (4.0 * p * p - von_mises * von_mises / 3.0) - J3;
-    if f > 0.0 { -von_mises } else { von_mises }
-}
-
-/// Square of the von Mises stress.
-fn von_mises_squared([xx, yy, zz, xy, yz, zx]: &[f32; 6]) -> f32 {
-    let (a, b, c) = (xx - yy, yy - zz, zz - xx);
-    0.5 * (a * a + b * b + c * c) + 3.0 * (xy * xy + yz * yz + zx * zx)
 }
