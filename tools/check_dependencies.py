@@ -8,7 +8,7 @@ Rules:
   * a crate uses crates of its own folder and of folders below (FOLDERS), except dev-dependencies;
   * the faces use only the facade and each other (ONLY);
   * an outside crate that belongs to some folders (OWNERS) is used in no other;
-  * the files of a crate import each other in cycles of at most three, except those in CYCLES;
+  * the files of a crate import each other in cycles of at most three;
   * only faces print; from base to results only the writers of recordings read a clock;
   * no library crate refers to a command line: flags, environment, exit (exceptions: ALLOWED);
   * purely numerical crates (NUMBERS) do not access files;
@@ -41,9 +41,6 @@ OWNERS = {  # outside crate: folders that may name it
     **dict.fromkeys(["clap", "clap_complete", "clap_mangen", "indicatif", "numpy", "pyo3", "pyo3-build-config", "quick-xml", "signal-hook", "twox-hash", "zip"], ["faces"]),
 }
 LARGEST_CYCLE = 3
-CYCLES = {  # crate: files in its largest cycle of imports, to be reduced
-    "flexarm-stepping": 6,
-}
 PRINTS = re.compile(r"\b(?:e?print(?:ln)?|dbg)!\s*[(\[{]|\bstd::io::(?:stdout|stderr)\b")
 CLOCK = re.compile(r"\b(?:Instant|SystemTime)::now\b")
 ENVIRONMENT = re.compile(r"\bstd::env\b|\benv::(?:var|args|current)")
@@ -178,11 +175,9 @@ def largest_cycle(graph):
 
 def check_cycles(crate, texts):
     graph = {path: imports(path, text, texts) for path, text in texts.items()}
-    cycle, most = largest_cycle(graph), CYCLES.get(crate, LARGEST_CYCLE)
-    if len(cycle) > most:
-        return [f"{crate}: {len(cycle)} files import each other in a cycle, at most {most}: {', '.join(cycle)}"]
-    if crate in CYCLES and len(cycle) < most:
-        return [f"{crate}: its largest cycle has {len(cycle)} files: write that into CYCLES"]
+    cycle = largest_cycle(graph)
+    if len(cycle) > LARGEST_CYCLE:
+        return [f"{crate}: {len(cycle)} files import each other in a cycle, at most {LARGEST_CYCLE}: {', '.join(cycle)}"]
     return []
 
 

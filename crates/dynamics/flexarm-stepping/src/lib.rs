@@ -34,6 +34,7 @@
 #![cfg_attr(not(target_arch = "x86_64"), allow(dead_code, reason = "lanes are used with AVX2 alone"))]
 
 mod arm;
+mod assembly;
 mod batch;
 mod dense;
 #[cfg(test)]
@@ -71,7 +72,7 @@ mod system;
 mod tree_matrix;
 mod workspaces;
 
-pub use arm::{Damping, ElasticElement, FlexibleArm, GeometricStiffness, InertiaChange, Servo, Spring};
+pub use arm::{Damping, ElasticElement, FlexibleArm, GeometricStiffness, InertiaChange, Modes, Servo, Spring};
 pub use batch::{Batch, BatchRun, ToolDeflection};
 pub use drive::{CurveError, Friction, ServoAxis, SpringCurve, TorqueCurve};
 pub use error::StepError;
@@ -81,7 +82,7 @@ pub use integrator::{Current, Integrator, TimeGrid};
 pub use linear::{Linear, Tangents, linearise};
 pub use load::{Load, LoadAxes, TimedWrench};
 pub use mode_matrix::ModeMatrices;
-pub use modes::{Modes, modes_at};
+pub use modes::modes_at;
 pub use motion::{Held, MotionFn, PrescribedMotion};
 pub use observation::Observation;
 pub use operating_point::{OperatingPoint, PoseAnswer, PoseOutputs};

@@ -3,29 +3,9 @@
 use flexarm_kinematics::{State, mass_matrix};
 use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
 
-use crate::arm::FlexibleArm;
+use crate::arm::{FlexibleArm, Modes};
 use crate::error::StepError;
 use crate::statics::{for_vibration, static_equilibrium, tangent_stiffness};
-
-/// Modes of `K_t φ = ω² M φ`, mass-normalised, ascending.
-#[derive(Clone, Debug, Default)]
-pub struct Modes {
-    /// Angular frequencies (rad/s).
-    pub omega: Vec<f64>,
-    /// Shapes in the elastic coordinates, one column each; `Φᵀ M Φ = 1`.
-    pub shapes: DMatrix<f64>,
-    /// Elastic coordinates of the static pose.
-    pub equilibrium: DVector<f64>,
-    /// Maximum of `|K φ - ω² M φ| / |K φ|`: check of the eigensolver.
-    pub residual: f64,
-}
-
-impl Modes {
-    /// Returns the frequencies (Hz), ascending.
-    pub fn frequencies_hz(&self) -> Vec<f64> {
-        self.omega.iter().map(|w| w / std::f64::consts::TAU).collect()
-    }
-}
 
 /// Computes the undamped modes at time `t` of the motion about static equilibrium, including the
 /// geometric stiffness due to weight.
