@@ -104,6 +104,7 @@ __all__ = [
     "ResponseSummary",
     "RunFiles",
     "RunSummary",
+    "SectionForceFigures",
     "Sensitivity",
     "ShapeFigures",
     "ShapedModeFigures",
@@ -363,6 +364,17 @@ class StrainGaugeFigures(TypedDict):
     """Maximum strain (m/m)."""
 
 
+class SectionForceFigures(TypedDict):
+    """Extremes of the section forces at a plane across a beam: `N V_y V_z T M_y M_z`, in beam axes about the axis of the beam (N, N m), of the far side on the near side, so that tension is positive."""
+
+    at_m: float
+    """Position along the beam from its near end (m)."""
+    lowest: list[float]
+    """Minima over the run."""
+    highest: list[float]
+    """Maxima over the run."""
+
+
 class _LinkStressFigures(TypedDict):
     """What is always there."""
 
@@ -379,7 +391,9 @@ class _LinkStressFigures(TypedDict):
     of_yield: float | None
     """The same over the yield strength; null for a material whose strength is not known."""
     damage: float | None
-    """Largest fatigue damage of one motion among the worst places; null as above."""
+    """Largest fatigue damage of one motion on the surface; null as above."""
+    most_damaged: StressPlaceFigures | None
+    """Place of the largest damage; null as above."""
     worst: list[StressPlaceFigures]
     """Places of the largest stress, the worst first."""
 
@@ -391,6 +405,8 @@ class LinkStressFigures(_LinkStressFigures, total=False):
     """Stress points of the robot file."""
     gauges: list[StrainGaugeFigures]
     """Strain gauges of the robot file."""
+    section_forces: list[SectionForceFigures]
+    """Section forces of a beam, from its near end to its far end."""
 
 
 class DriveFigures(TypedDict):
