@@ -291,6 +291,10 @@ pub(crate) trait ImplicitStep: Clone + Send {
     fn set_length(&mut self, _dt: f64) {}
 
     /// Takes one step of size `newton().dt` to `t`; on error only the matrix has changed.
+    ///
+    /// It computes the matrix if `newton().factored` is false and the history if `newton().fresh` is
+    /// true, iterates with a [`Search`], reports the iterations to [`Newton::found`], and moves the
+    /// grid of `current` to `t`.
     fn attempt(&mut self, system: &mut impl SecondOrderSystem, t: f64) -> Result<(), StepError>;
 }
 

@@ -27,9 +27,9 @@ pub(crate) fn allowed_unpacked(packed: usize, largest: u64) -> u64 {
 pub struct UnpackError {
     /// Whether the bytes expand to far more than real files; otherwise they are no whole gzip file.
     pub too_large: bool,
-    /// What was found.
+    /// Description of the bytes.
     pub found: String,
-    /// What was expected.
+    /// Description of valid bytes.
     pub expected: String,
     /// Hint for a correction.
     pub help: &'static str,

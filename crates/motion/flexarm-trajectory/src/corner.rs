@@ -58,7 +58,7 @@ struct Samples<'a> {
     last: usize,
     slope: Vec<f64>,
     top_speed: f64,
-    /// Largest position.
+    /// Maximum absolute position.
     size: f64,
     resolution: f64,
 }
@@ -80,7 +80,7 @@ impl<'a> Samples<'a> {
         self.slope[i] - self.slope[i - 1]
     }
 
-    /// Largest acceleration around the samples `i..=j`, and the means on the left and on the right;
+    /// Maximum acceleration around the samples `i..=j`, and the means on the left and on the right;
     /// `None` with too few samples nearby.
     fn around(&self, i: usize, j: usize) -> Option<(f64, f64, f64)> {
         let (left, right) = (i.saturating_sub(AROUND).max(1)..i, j + 1..self.last.min(j + 1 + AROUND));

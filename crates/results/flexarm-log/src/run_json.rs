@@ -148,7 +148,7 @@ pub(crate) fn files(header: &RunHeader) -> std::io::Result<Vec<crate::Attachment
     Ok(files)
 }
 
-/// What is wrong with the text of a header.
+/// Fault in the text of a header.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum RunJsonError {
     #[error("{RUN_JSON} cannot be read: {0}")]
@@ -339,7 +339,7 @@ pub(crate) mod meshes {
         pack(bytes)
     }
 
-    /// What is wrong with a block.
+    /// Fault in a block.
     #[derive(Debug, thiserror::Error)]
     pub(crate) enum BlockError {
         #[error("its counts of corners are too large")]

@@ -223,7 +223,7 @@ pub struct LinkStressFigures {
     pub peak_pa: f64,
     /// The same over the yield strength; null for a material whose strength is not known.
     pub of_yield: Option<f64>,
-    /// Largest fatigue damage of one motion on the surface; null as above.
+    /// Maximum fatigue damage of one motion on the surface; null as above.
     pub damage: Option<f64>,
     /// Place of the largest damage; null as above.
     pub most_damaged: Option<StressPlaceFigures>,

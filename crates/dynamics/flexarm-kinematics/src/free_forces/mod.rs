@@ -17,8 +17,7 @@
 //! (all before the first spring of an arm) take part only in (1) to (3), and those without a
 //! loading body outward of them not even in these.
 //!
-//! It makes runs in lanes twice as fast as the recursion over spatial vectors. Trees with closed loops,
-//! balancers or modal bodies are not supported. Start at [`FreeForces`].
+//! Start at [`FreeForces`]. Trees with closed loops, balancers or modal bodies are not supported.
 //!
 //! Source: [Luh, Walker & Paul 1980].
 

@@ -1,9 +1,10 @@
 //! Registry of steppers: the choices of programs, command line and tests, and their construction.
 //!
 //! **A new stepper** is a file in this folder plus its lines here: `mod` and `use`, a variant of
-//! [`StepperKind`], its line in `method` and in [`STEPPERS`]. The file contains the integrator (an
-//! [`crate::Integrator`] over [`crate::SecondOrderSystem`], or a [`Stepper`] of its own), settings
-//! that implement `Method`, and a [`StepperEntry`]. Names and help of the command line, summaries,
+//! [`StepperKind`], its line in `method` and in [`STEPPERS`]. The file contains the integrator,
+//! settings that implement `Method`, and a [`StepperEntry`]. The integrator is an `ImplicitStep`
+//! (`implicit.rs`; see `sdirk3.rs`), a [`crate::Integrator`] over [`crate::SecondOrderSystem`] (see
+//! `rk4.rs`), or a [`Stepper`] of its own. Names and help of the command line, summaries,
 //! and the tests over all steppers read [`STEPPERS`]; settings chosen by the user are also fields
 //! of [`StepperOptions`].
 

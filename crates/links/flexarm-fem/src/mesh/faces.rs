@@ -65,15 +65,7 @@ pub fn face_nodes(kind: ElementKind) -> Vec<Vec<u8>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    const SOLIDS: [ElementKind; 6] = [
-        ElementKind::Tet4,
-        ElementKind::Tet10,
-        ElementKind::Hex8,
-        ElementKind::Hex20,
-        ElementKind::Wedge6,
-        ElementKind::Wedge15,
-    ];
+    use crate::test_mesh::SOLIDS;
 
     #[test]
     fn every_edge_lies_between_two_faces_that_run_along_it_in_opposite_directions() {

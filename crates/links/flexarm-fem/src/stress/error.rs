@@ -144,7 +144,7 @@ pub enum StressError {
         "the stress file belongs to another link: stiffness times its compliance differs from 1 by {off:.1e}; {REDUCE_AGAIN}"
     )]
     OtherLink {
-        /// Largest difference, relative.
+        /// Maximum relative difference.
         off: f64,
     },
     /// A modal stiffness is not positive definite.

@@ -17,7 +17,7 @@ use crate::reduced::ElasticSplit;
 use crate::reduction::{Condensation, Interface, InterfaceFrame, Tie};
 use crate::rigid_part::RigidPart;
 use crate::sparse::ModesWanted;
-use crate::test_mesh::cube;
+use crate::test_mesh::{SOLIDS, cube};
 
 /// Bar along x with its interfaces at both ends.
 struct Bar {
@@ -65,15 +65,6 @@ impl Bar {
         })
     }
 }
-
-const SOLIDS: [ElementKind; 6] = [
-    ElementKind::Tet4,
-    ElementKind::Tet10,
-    ElementKind::Hex8,
-    ElementKind::Hex20,
-    ElementKind::Wedge6,
-    ElementKind::Wedge15,
-];
 
 /// Truth: force over area.
 #[test]

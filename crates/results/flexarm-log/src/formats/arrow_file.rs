@@ -280,7 +280,7 @@ fn damaged(path: &Path, damage: &Damage) -> LogError {
     not_a_recording(path, format!("a damaged file ({damage})"), "a whole Arrow file")
 }
 
-/// What is wrong with a file.
+/// Damage of a file.
 #[derive(Debug, thiserror::Error)]
 enum Damage {
     #[error("it has no end")]

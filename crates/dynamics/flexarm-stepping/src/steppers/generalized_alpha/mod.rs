@@ -233,7 +233,7 @@ impl Coefficients {
     }
 
     /// Returns x⁺ and v⁺ by (4), (2), (3) from x, v, a and x̃ of one coordinate and x̃⁺.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn advance<T: Real>(&self, h: f64, x: T, v: T, a: T, x_tilde: T, x_tilde_new: T) -> (T, T) {
         let Self { alpha_m, alpha_f, beta, gamma } = *self;
         let c = T::splat;
@@ -246,7 +246,7 @@ impl Coefficients {
     }
 
     /// Returns a⁺ of (4).
-    #[inline]
+    #[inline(always)]
     pub(crate) fn remembered<T: Real>(&self, a: T, x_tilde: T, x_tilde_new: T) -> T {
         let Self { alpha_m, alpha_f, .. } = *self;
         let c = T::splat;
