@@ -391,7 +391,7 @@ class _LinkStressFigures(TypedDict):
     of_yield: float | None
     """The same over the yield strength; null for a material whose strength is not known."""
     damage: float | None
-    """Largest fatigue damage of one motion on the surface; null as above."""
+    """Maximum fatigue damage of one motion on the surface; null as above."""
     most_damaged: StressPlaceFigures | None
     """Place of the largest damage; null as above."""
     worst: list[StressPlaceFigures]
