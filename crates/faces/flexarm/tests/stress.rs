@@ -168,6 +168,13 @@ fn stress_files_that_do_not_fit_are_refused_and_steppers_without_accelerations_s
     std::fs::write(&file, &bytes[..bytes.len() / 2]).unwrap();
     let error = run(&RunOptions::default()).unwrap_err().to_string();
     assert!(error.contains("lower_arm.stress") && error.contains("reduce the mesh again"), "{error}");
+    // A gauge on the link is no second fault.
+    let toml = arm.folder.join("robot.toml");
+    let text = std::fs::read_to_string(&toml).unwrap();
+    let point = "[[stress_point]]\nname = \"eye\"\nlink = \"lower_arm\"\nat = [0.0, 0.0, 0.0]\n";
+    std::fs::write(&toml, format!("{text}\n{point}")).unwrap();
+    assert_eq!(run(&RunOptions::default()).unwrap_err().to_string(), error);
+    std::fs::write(&toml, text).unwrap();
     std::fs::remove_file(&file).unwrap();
     assert!(run(&RunOptions::default()).unwrap().summary.stress.is_empty());
 }

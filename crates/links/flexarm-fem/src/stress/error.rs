@@ -34,13 +34,13 @@ pub enum StressFileError {
         cause: String,
     },
     /// A tensor is missing.
-    #[error("tensor {name:?} is missing")]
+    #[error("tensor {name:?} is missing; {REDUCE_AGAIN}")]
     Missing {
         /// Its name.
         name: &'static str,
     },
     /// A tensor has numbers of another type.
-    #[error("tensor {name:?} has numbers of the type {found}, expected {expected}")]
+    #[error("tensor {name:?} has numbers of the type {found}, expected {expected}; {REDUCE_AGAIN}")]
     NumberType {
         /// Its name.
         name: &'static str,
@@ -50,7 +50,7 @@ pub enum StressFileError {
         expected: String,
     },
     /// A tensor is not a matrix of the right width.
-    #[error("tensor {name:?} has the shape {found:?}, expected rows of {width}")]
+    #[error("tensor {name:?} has the shape {found:?}, expected rows of {width}; {REDUCE_AGAIN}")]
     Rows {
         /// Its name.
         name: &'static str,

@@ -268,7 +268,12 @@ impl Robot {
             let flexible = flexible_link(entry, urdf, source, home, &mut self.warnings, faults);
             self.flexible.extend(keep(flexible, faults));
         }
-        let links = self.flexible.iter().map(|link| (link.flexible.link.as_str(), link.stress.is_some()));
+        // A gauge on a link that has a fault of its own is not judged.
+        let links = file.flexible_link.iter().map(|entry| {
+            let name = entry.link.get_ref().as_str();
+            let loaded = self.flexible.iter().find(|link| link.flexible.link == name);
+            (name, loaded.is_none_or(|link| link.stress.is_some()))
+        });
         let (found, wrong) = gauges(&file.strain_gauge, &file.stress_point, &links.collect::<Vec<_>>(), source);
         self.gauges = found;
         faults.extend(wrong.into_iter().map(Error::from));
