@@ -51,17 +51,6 @@ fn main() {
             black_box(mass_matrix(&model, &mut data, black_box(&states[i].q)));
         });
         let free = Roles::all_free(&model);
-        let mut points = FreeForces::new(&model, &free).unwrap();
-        let mut M = vec![0.0; model.nv() * model.nv()];
-        time_calls(name, "crba_points", |i| {
-            points.mass_at(black_box(states[i].q.as_slice()), black_box(&mut M));
-        });
-        let mut tau = vec![0.0; model.nv()];
-        time_calls(name, "rnea_points", |i| {
-            let motions =
-                Motions { q: states[i].q.as_slice(), qdot: states[i].qdot.as_slice(), qddot: a[i].as_slice() };
-            points.compute(black_box(motions), None, black_box(&mut tau));
-        });
         time_calls(name, "aba", |i| {
             black_box(forward_dynamics(&model, &mut data, black_box(&states[i]), &free, &a[i]));
         });

@@ -22,9 +22,6 @@ use crate::tree::Tree;
 
 /// Computes the mass matrix `M(q)`, nv×nv, both triangles (kg, kg m, kg m²). Fills
 /// `data.{X_PB, M}`. Does not allocate.
-///
-/// For trees without closed loops, balancers and modal bodies, [`crate::FreeForces::mass_at`]
-/// returns the same matrix to rounding in two thirds to four fifths of the time.
 pub fn mass_matrix<'d>(model: &Model, data: &'d mut Data, q: &DVector<f64>) -> &'d DMatrix<f64> {
     if !model.loops.is_empty() {
         closure::place(model, data, q.as_slice());

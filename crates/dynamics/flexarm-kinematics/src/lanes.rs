@@ -11,9 +11,8 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::crba::composite_bodies;
 use crate::data::{Data, State};
-use crate::free_forces::FreeForces;
 use crate::kinematics::{place_bodies, tree_jacobian};
-use crate::model::{Frame, JointMotion, Model};
+use crate::model::{Frame, JointMotion};
 use crate::rnea::{at_rest, newton_euler};
 use crate::static_tangent::{PointLoad, StaticTangent};
 
@@ -75,40 +74,8 @@ pub fn static_tangent<T: Real>(
 /// elastic coordinates may differ.
 #[inline(always)]
 pub fn rigid_and_flexible<T: Real>(tree: &LaneTree<T>, data: &Data<T>, frame: &Frame, q: &[T]) -> [Vector3<T>; 2] {
-    places(
-        tree.model(),
-        frame,
-        q,
-        #[inline(always)]
-        |i| (data.X_PB[i].rotation.matrix(), &data.X_PB[i].translation.vector),
-    )
-}
-
-/// [`rigid_and_flexible`] with the joint poses of the last [`FreeForces::compute`].
-#[inline(always)]
-pub fn rigid_and_flexible_of_points<T: Real>(
-    tree: &LaneTree<T>,
-    points: &FreeForces<T>,
-    frame: &Frame,
-    q: &[T],
-) -> [Vector3<T>; 2] {
-    places(
-        tree.model(),
-        frame,
-        q,
-        #[inline(always)]
-        |i| points.pose(i),
-    )
-}
-
-/// Both positions; `pose` returns rotation and origin in the parent of bodies on single-DoF joints.
-#[inline(always)]
-fn places<'a, T: Real>(
-    model: &Model,
-    frame: &Frame,
-    q: &[T],
-    pose: impl Fn(usize) -> (&'a Matrix3<T>, &'a Vector3<T>),
-) -> [Vector3<T>; 2] {
+    let model = tree.model();
+    let pose = |i: usize| (data.X_PB[i].rotation.matrix(), &data.X_PB[i].translation.vector);
     let mut rigid = lift(&frame.X_BF.translation.vector);
     let mut i = frame.body;
     // Outward of all springs both positions are equal.

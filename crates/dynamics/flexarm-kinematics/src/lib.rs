@@ -50,7 +50,6 @@ mod crba;
 mod data;
 mod dynamic_tangent;
 mod energy;
-mod free_forces;
 mod inverse_kinematics;
 mod kinematics;
 pub mod lanes;
@@ -90,7 +89,6 @@ pub use dynamic_tangent::DynamicTangent;
 pub use energy::{
     center_of_mass, kinetic_energy, kinetic_energy_of, momentum_of, potential_energy, potential_energy_of,
 };
-pub use free_forces::{FreeForces, Motions};
 pub use inverse_kinematics::{IkError, IkOptions, inverse_kinematics};
 pub use kinematics::{
     forward_kinematics, forward_kinematics_velocity, frame_jacobian, frame_jacobian_derivative, frame_twist,

@@ -102,39 +102,6 @@ proptest! {
         prop_assert!(M.cholesky().is_some());
     }
 
-    /// The recursion over point accelerations gives the same forces of the free coordinates and the
-    /// same mass matrix as the recursions over spatial vectors. Measured 3e-13 and 2e-14.
-    #[test]
-    fn free_forces_are_those_of_inverse_dynamics(seed in any::<u64>(), n in 1usize..=40, mask in any::<u64>()) {
-        // Balancers and modal links are not supported there.
-        let Case { model, mut data, state, qddot, .. } = case((seed & !1) | 2, n);
-        let tau = inverse_dynamics(&model, &mut data, &state, &qddot).clone();
-        let drawn = Roles::new(&model, |k| (mask >> (k % 64)) & 1 == 1);
-        for roles in [Roles::all_free(&model), Roles::actuated_prescribed(&model), drawn] {
-            let free = roles.free_coordinates();
-            let mut found = vec![0.0; free.len()];
-            let motions = Motions { q: state.q.as_slice(), qdot: state.qdot.as_slice(), qddot: qddot.as_slice() };
-            let mut points = FreeForces::new(&model, &roles).unwrap();
-            points.compute(motions, Some(&data.F_ext), &mut found);
-            let error = free.iter().zip(&found).map(|(k, found)| (tau[*k] - found).abs()).fold(0.0, f64::max);
-            prop_assert!(error <= 1e-11 * tau.amax(), "{:e}", error / tau.amax());
-
-            let mut M = DMatrix::zeros(free.len(), free.len());
-            points.mass(M.as_mut_slice());
-            // Bitwise the same with positions only.
-            let mut at_q = DMatrix::from_element(free.len(), free.len(), f64::NAN);
-            let mut others = FreeForces::new(&model, &roles).unwrap();
-            others.mass_at(state.q.as_slice(), at_q.as_mut_slice());
-            prop_assert_eq!(&M, &at_q);
-            assert_eq!(count_allocations(|| others.mass_at(state.q.as_slice(), at_q.as_mut_slice())), 0);
-            prop_assert_eq!(&M, &at_q);
-            let whole = mass_matrix(&model, &mut data, &state.q);
-            let of_free = DMatrix::from_fn(free.len(), free.len(), |i, j| whole[(free[i], free[j])]);
-            let scale = whole.amax();
-            prop_assert!((&M - &of_free).amax() <= 1e-12 * scale, "{:e}", (&M - &of_free).amax() / scale);
-        }
-    }
-
     /// The tangent of the static forces, with fixed and follower loads, equals their central
     /// differences; measured below 2e-8 of the maximum entry, which is the error of the
     /// differences.

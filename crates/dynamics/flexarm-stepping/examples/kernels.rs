@@ -18,7 +18,7 @@ use nalgebra::DVector;
 /// A kernel; its argument is the number of repetitions.
 type Kernel = fn(usize);
 
-const KERNELS: [(&str, Kernel); 13] = [
+const KERNELS: [(&str, Kernel); 11] = [
     ("inverse_dynamics", |times| {
         recursion(times, |c| {
             inverse_dynamics(&c.model, &mut c.data, &c.state, &c.a);
@@ -28,15 +28,6 @@ const KERNELS: [(&str, Kernel); 13] = [
         recursion(times, |c| {
             mass_matrix(&c.model, &mut c.data, &c.state.q);
         });
-    }),
-    ("points_forces", |times| {
-        over_points(times, |points, c, tau, _| {
-            let motions = Motions { q: c.state.q.as_slice(), qdot: c.state.qdot.as_slice(), qddot: c.a.as_slice() };
-            points.compute(motions, None, tau);
-        });
-    }),
-    ("points_mass", |times| {
-        over_points(times, |points, c, _, M| points.mass_at(c.state.q.as_slice(), M));
     }),
     ("forward_dynamics", |times| {
         recursion(times, |c| {
@@ -96,18 +87,6 @@ fn recursion(times: usize, mut call: impl FnMut(&mut Case)) {
     for _ in 0..times {
         call(black_box(&mut case));
     }
-}
-
-fn over_points(times: usize, mut call: impl FnMut(&mut FreeForces, &Case, &mut [f64], &mut [f64])) {
-    let mut points = None;
-    let (mut tau, mut M) = (Vec::new(), Vec::new());
-    recursion(times, |c| {
-        let points = points.get_or_insert_with(|| {
-            (tau, M) = (vec![0.0; c.model.nv()], vec![0.0; c.model.nv() * c.model.nv()]);
-            FreeForces::new(&c.model, &c.free).unwrap()
-        });
-        call(points, c, &mut tau, &mut M);
-    });
 }
 
 fn steps(times: usize, arm: FlexibleArm, kind: StepperKind, h: f64) {

@@ -4,9 +4,7 @@
 use std::sync::Arc;
 
 use flexarm_kinematics::products::{add, mul};
-use flexarm_kinematics::{
-    Data, Frame, FreeForces, JointMotion, Motions, Roles, State, forward_kinematics, gravity_forces,
-};
+use flexarm_kinematics::{Data, Frame, JointMotion, State, forward_kinematics, gravity_forces};
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::arm::{FlexibleArm, InertiaChange};
@@ -39,13 +37,9 @@ pub struct StaticPath {
     arm: Arc<FlexibleArm>,
     events: EventQueue,
     data: PooledWorkspace<Data>,
-    /// Static forces on the springs only, if supported for this tree.
-    points: Option<PooledWorkspace<FreeForces>>,
     /// Drives at the last time, springs at `e`.
     state: State,
     qddot: DVector<f64>,
-    /// Zero velocities and accelerations.
-    still: DVector<f64>,
     e: DVector<f64>,
     unbalanced: DVector<f64>,
     correction: DVector<f64>,
@@ -63,10 +57,8 @@ impl StaticPath {
         Self {
             events: EventQueue::of_changes(&arm),
             data: arm.lend_data(),
-            points: arm.lend_points(&Roles::actuated_prescribed(&arm.model)),
             state: State::zeros(&arm.model),
             qddot: DVector::zeros(nv),
-            still: DVector::zeros(nv),
             e: if arm.modes.equilibrium.len() == n { arm.modes.equilibrium.clone() } else { DVector::zeros(n) },
             unbalanced: DVector::zeros(n),
             correction: DVector::zeros(n),
@@ -85,7 +77,7 @@ impl StaticPath {
     pub fn at(&mut self, t: f64) -> Result<&DVector<f64>, StepError> {
         self.take_inverse();
         while let Some((_, change)) = self.events.due_change(t) {
-            carry(&mut self.arm, &mut self.points, change);
+            carry(&mut self.arm, change);
         }
         self.balanced(t)
     }
@@ -97,7 +89,7 @@ impl StaticPath {
     pub fn just_before(&mut self, t: f64) -> Result<&DVector<f64>, StepError> {
         self.take_inverse();
         while let Some((_, change)) = self.events.change_before(t) {
-            carry(&mut self.arm, &mut self.points, change);
+            carry(&mut self.arm, change);
         }
         self.balanced(before(t))
     }
@@ -187,34 +179,20 @@ impl StaticPath {
 
     /// Computes the unbalanced forces of springs, weight and loads at the state.
     fn balance(&mut self, t: f64) {
-        let Self { arm, data, points, state, still, e, unbalanced, .. } = self;
+        let Self { arm, data, state, e, unbalanced, .. } = self;
         if !arm.loads.is_empty() {
             forward_kinematics(&arm.model, data, &state.q);
             arm.apply_loads(data, t);
         }
-        match points {
-            Some(points) => {
-                let still = still.as_slice();
-                let motions = Motions { q: state.q.as_slice(), qdot: still, qddot: still };
-                let loads = (!arm.loads.is_empty()).then_some(data.F_ext.as_slice());
-                points.compute(motions, loads, unbalanced.as_mut_slice());
-            }
-            None => {
-                let forces = gravity_forces(&arm.model, data, &state.q);
-                unbalanced.copy_from(&forces.rows(arm.model.n_actuated(), e.len()));
-                add_geometric_forces(arm, data, e.as_slice(), unbalanced.as_mut_slice());
-            }
-        }
+        let forces = gravity_forces(&arm.model, data, &state.q);
+        unbalanced.copy_from(&forces.rows(arm.model.n_actuated(), e.len()));
+        add_geometric_forces(arm, data, e.as_slice(), unbalanced.as_mut_slice());
         add_spring_forces(arm, state.q.as_slice(), e.as_slice(), unbalanced.as_mut_slice());
     }
 }
 
 /// Applies a change of inertia to the arm.
-fn carry(arm: &mut Arc<FlexibleArm>, points: &mut Option<PooledWorkspace<FreeForces>>, change: &InertiaChange) {
+fn carry(arm: &mut Arc<FlexibleArm>, change: &InertiaChange) {
     let arm = Arc::make_mut(arm);
     arm.model = Arc::new(arm.model.with_inertia(change.body, change.inertia));
-    if let Some(points) = points {
-        points.weigh(&*arm.model);
-        points.keep();
-    }
 }

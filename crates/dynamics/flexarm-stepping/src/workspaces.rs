@@ -9,7 +9,7 @@
 use std::ops::{Deref, DerefMut};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use flexarm_kinematics::{Data, FreeForces, Model, Roles};
+use flexarm_kinematics::{Data, Model};
 
 use crate::arm::FlexibleArm;
 
@@ -22,13 +22,12 @@ pub struct Workspaces {
     /// Model for which they were made.
     model: Arc<Model>,
     data: Pool<Data>,
-    points: Pool<FreeForces>,
 }
 
 impl Workspaces {
     /// Creates an empty pool.
     pub(crate) fn of(model: &Arc<Model>) -> Self {
-        Self { model: model.clone(), data: Pool::default(), points: Pool::default() }
+        Self { model: model.clone(), data: Pool::default() }
     }
 
     /// Returns whether they belong to this same model and carry no state between uses.
@@ -49,15 +48,6 @@ impl FlexibleArm {
         lent.clear_external_wrenches();
         lent
     }
-
-    /// Returns a workspace of [`FreeForces::new`] in the same way.
-    pub(crate) fn lend_points(&self, roles: &Roles) -> Option<PooledWorkspace<FreeForces>> {
-        // Only if all free coordinates are elastic: the joints driven by torque may differ between
-        // copies.
-        let held = roles.free_coordinates().first().is_none_or(|first| *first >= self.model.n_actuated());
-        let pool = (held && self.workspaces.are_for(&self.model)).then_some(&self.workspaces.points);
-        PooledWorkspace::from(pool, || FreeForces::new(&*self.model, roles))
-    }
 }
 
 /// A borrowed workspace; dropping it returns it to the pool.
@@ -72,11 +62,6 @@ impl<T> PooledWorkspace<T> {
         let used = pool.and_then(|pool| pool.lock().unwrap_or_else(PoisonError::into_inner).pop());
         let it = used.or_else(make)?;
         Some(Self { it: Some(it), pool: pool.cloned() })
-    }
-
-    /// Keeps the workspace out of the pool, because its contents no longer match the arm.
-    pub fn keep(&mut self) {
-        self.pool = None;
     }
 }
 

@@ -3,11 +3,9 @@
 //! The arms share the tree; inertias, stiffness, damping and motion differ. All joints are
 //! prescribed, springs are linear, and there are no discrete events.
 
-use flexarm_kinematics::lanes::{
-    LaneTree, inverse_dynamics, mass_matrix_at_poses, rigid_and_flexible, rigid_and_flexible_of_points,
-};
+use flexarm_kinematics::lanes::{LaneTree, inverse_dynamics, mass_matrix_at_poses, rigid_and_flexible};
 use flexarm_kinematics::products::sub;
-use flexarm_kinematics::{Data, Frame, FreeForces, Motions, Real, Roles, State};
+use flexarm_kinematics::{Data, Frame, Real, State};
 use nalgebra::Vector3;
 
 use crate::arm::FlexibleArm;
@@ -29,8 +27,6 @@ struct Element<T> {
 /// Arms in lanes, with the workspaces of their equations of motion.
 pub(super) struct LaneArm<T: Real> {
     tree: LaneTree<T>,
-    /// Equations of motion of the elastic coordinates only, if supported for this tree.
-    points: Option<FreeForces<T>>,
     data: Data<T>,
     state: State<T>,
     qddot: Vec<T>,
@@ -86,7 +82,6 @@ impl<T: Real> LaneArm<T> {
         let D = (!first.proportional).then(|| (0..n * n).map(|i| gather(arms, |arm| arm.D[i])).collect());
         let model = tree.model();
         Some(Self {
-            points: FreeForces::new(&tree, &Roles::actuated_prescribed(model)),
             data: Data::new(model),
             state: State::zeros(model),
             qddot: vec![T::zero(); model.nv()],
@@ -127,10 +122,7 @@ impl<T: Real> LaneArm<T> {
     #[inline(always)]
     pub(super) fn deflection(&mut self, tool: &Frame, x: &[T]) -> Vector3<T> {
         self.q[self.tree.model().n_actuated()..].copy_from_slice(x);
-        let [rigid, flexible] = match &self.points {
-            Some(points) => rigid_and_flexible_of_points(&self.tree, points, tool, &self.q),
-            None => rigid_and_flexible(&self.tree, &self.data, tool, &self.q),
-        };
+        let [rigid, flexible] = rigid_and_flexible(&self.tree, &self.data, tool, &self.q);
         sub(&flexible, &rigid)
     }
 
@@ -142,16 +134,8 @@ impl<T: Real> LaneArm<T> {
         set(active, x, &mut self.state.q.as_mut_slice()[n..]);
         set(active, v, &mut self.state.qdot.as_mut_slice()[n..]);
         set(active, a, &mut self.qddot[n..]);
-        match &mut self.points {
-            Some(points) => {
-                let (q, qdot) = (self.state.q.as_slice(), self.state.qdot.as_slice());
-                points.compute(Motions { q, qdot, qddot: &self.qddot }, None, r);
-            }
-            None => {
-                inverse_dynamics(&self.tree, &mut self.data, &self.state, &self.qddot);
-                r.copy_from_slice(&self.data.tau.as_slice()[n..]);
-            }
-        }
+        inverse_dynamics(&self.tree, &mut self.data, &self.state, &self.qddot);
+        r.copy_from_slice(&self.data.tau.as_slice()[n..]);
         let (x, v) = (&self.state.q.as_slice()[n..], &self.state.qdot.as_slice()[n..]);
         for element in &self.elements {
             let range = element.first..element.first + element.size;
@@ -175,9 +159,6 @@ impl<T: Real> LaneArm<T> {
     /// Computes the mass matrix at the configuration of the last residual.
     #[inline(always)]
     pub(super) fn mass(&mut self, M: &mut [T]) {
-        if let Some(points) = &mut self.points {
-            return points.mass(M);
-        }
         mass_matrix_at_poses(&self.tree, &mut self.data);
         let (n, joints) = (self.dimension(), self.joints());
         for (column, to) in M.chunks_exact_mut(n).enumerate() {

@@ -78,7 +78,6 @@ impl ReducedArm {
                 std::mem::swap(&mut arm.tau, tau);
                 arm.proportional = *proportional;
             }
-            self.weigh();
             what = Change::Matrices;
         }
         if let Some((before, after)) = self.events.pass_jumps(t) {

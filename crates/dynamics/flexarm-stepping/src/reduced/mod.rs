@@ -16,8 +16,7 @@ mod system;
 use std::sync::Arc;
 
 use flexarm_kinematics::{
-    Data, FreeForces, Pose, Roles, State, forward_kinematics, inverse_dynamics, kinetic_energy_of, potential_energy_of,
-    world_poses,
+    Data, Pose, Roles, State, forward_kinematics, inverse_dynamics, kinetic_energy_of, potential_energy_of, world_poses,
 };
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
@@ -64,20 +63,8 @@ pub struct ReducedArm {
     tree: Option<ElasticTree>,
     /// Modes that are eliminated first, if there are enough of them.
     modes: Option<HeldModes>,
-    /// Equations of motion of the free coordinates only, if these suffice and the tree is
-    /// supported.
-    points: Option<PooledWorkspace<FreeForces>>,
-    /// Workspace with the poses of the last [`ReducedArm::set`]; `None` until they are computed.
-    poses: Option<PosesIn>,
-}
-
-/// Workspace of a [`ReducedArm`] that holds poses.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum PosesIn {
-    /// `data`.
-    Data,
-    /// `points`, after a residual.
-    Points,
+    /// Whether `data` holds the poses of the last [`ReducedArm::set`].
+    is_placed: bool,
 }
 
 impl ReducedArm {
@@ -90,7 +77,6 @@ impl ReducedArm {
         let roles = Roles::new(model, |k| k < model.n_actuated() && !driven.contains(&k));
         // Load-dependent stiffness needs the spatial accelerations of the full pass.
         let geometric = arm.elements.iter().any(|e| e.geometric.is_some());
-        let points = if geometric { None } else { arm.lend_points(&roles) };
         Self {
             data: arm.lend_data(),
             state: State::zeros(model),
@@ -111,8 +97,7 @@ impl ReducedArm {
             gears: GearState::of(&arm),
             tree: ElasticTree::that_pays(&arm),
             modes: HeldModes::that_pay(&arm),
-            points,
-            poses: None,
+            is_placed: false,
             arm,
         }
     }
@@ -158,7 +143,7 @@ impl ReducedArm {
     pub(crate) fn set(&mut self, t: f64, x: &DVector<f64>, v: &DVector<f64>) {
         let t = self.events.side(t);
         self.sample_joints(t);
-        self.poses = None;
+        self.is_placed = false;
         let n = self.arm.model.n_actuated();
         let driven = self.arm.torque_driven.len();
         for (i, &k) in self.arm.torque_driven.iter().enumerate() {
@@ -186,19 +171,11 @@ impl ReducedArm {
         StepError::open_loop(&self.arm.model, &self.data, 0.0).map_or(Ok(()), Err)
     }
 
-    /// Updates the workspaces after a change of the masses of the bodies.
-    pub(crate) fn weigh(&mut self) {
-        if let Some(points) = &mut self.points {
-            points.weigh(&*self.arm.model);
-            points.keep();
-        }
-    }
-
     /// Computes the poses of the state in `data` unless they are there.
     fn place(&mut self) {
-        if self.poses != Some(PosesIn::Data) {
+        if !self.is_placed {
             forward_kinematics(&self.arm.model, &mut self.data, &self.state.q);
-            self.poses.get_or_insert(PosesIn::Data);
+            self.is_placed = true;
         }
     }
 
@@ -215,7 +192,7 @@ impl ReducedArm {
     pub(crate) fn evaluate(&mut self, t: f64, x: &DVector<f64>, v: &DVector<f64>, a: &DVector<f64>) {
         self.set(t, x, v);
         self.set_accelerations(a);
-        self.poses = Some(PosesIn::Data);
+        self.is_placed = true;
         inverse_dynamics(&self.arm.model, &mut self.data, &self.state, &self.qddot);
         self.add_joint_torques(x, v);
         world_poses(&self.arm.model, &mut self.data);

@@ -1,12 +1,12 @@
 //! Residual, acceleration and matrices of the arm as a second-order system.
 
-use flexarm_kinematics::{Motions, hybrid_dynamics, inverse_dynamics, mass_matrix_at_poses};
+use flexarm_kinematics::{hybrid_dynamics, inverse_dynamics, mass_matrix_at_poses};
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use crate::error::StepError;
 use crate::held_modes::HeldModes;
 use crate::mode_matrix::ModeMatrices;
-use crate::reduced::{PosesIn, ReducedArm};
+use crate::reduced::ReducedArm;
 use crate::system::SecondOrderSystem;
 use crate::tree_matrix::TreeMatrices;
 
@@ -22,21 +22,10 @@ impl SecondOrderSystem for ReducedArm {
     fn residual(&mut self, t: f64, x: &DVector<f64>, v: &DVector<f64>, a: &DVector<f64>, r: &mut DVector<f64>) {
         self.set(t, x, v);
         self.set_accelerations(a);
-        let Self { arm, data, state, qddot, points, .. } = self;
-        match points {
-            Some(points) => {
-                let motions = Motions { q: state.q.as_slice(), qdot: state.qdot.as_slice(), qddot: qddot.as_slice() };
-                let loads = (!arm.loads.is_empty()).then_some(data.F_ext.as_slice());
-                points.compute(motions, loads, r.as_mut_slice());
-                self.poses = Some(PosesIn::Points);
-            }
-            None => {
-                inverse_dynamics(&arm.model, data, state, qddot);
-                self.poses = Some(PosesIn::Data);
-                for (r, &k) in r.iter_mut().zip(&self.free) {
-                    *r = data.tau[k];
-                }
-            }
+        inverse_dynamics(&self.arm.model, &mut self.data, &self.state, &self.qddot);
+        self.is_placed = true;
+        for (r, &k) in r.iter_mut().zip(&self.free) {
+            *r = self.data.tau[k];
         }
         self.add_forces(x, v, r);
         if self.geometric {
@@ -52,7 +41,7 @@ impl SecondOrderSystem for ReducedArm {
         a: &mut DVector<f64>,
     ) -> Result<(), StepError> {
         self.set(t, x, v);
-        self.poses = Some(PosesIn::Data);
+        self.is_placed = true;
         let mut forces = std::mem::replace(&mut self.forces, DVector::zeros(0));
         for pass in 0..GEOMETRIC_PASSES {
             forces.fill(0.0);
@@ -84,11 +73,6 @@ impl SecondOrderSystem for ReducedArm {
     }
 
     fn mass(&mut self, M: &mut DMatrix<f64>) {
-        if self.poses == Some(PosesIn::Points)
-            && let Some(points) = &mut self.points
-        {
-            return points.mass(M.as_mut_slice());
-        }
         self.place();
         mass_matrix_at_poses(&self.arm.model, &mut self.data);
         for (column, &l) in self.free.iter().enumerate() {
