@@ -29,7 +29,7 @@ const MOST_HALVINGS: u32 = 6;
 /// Number of iterations above which a step renews the matrix for the next one; at twice this number
 /// it renews the matrix for itself.
 const RENEW_ABOVE: usize = 4;
-/// Default of the maximum ρ of a matrix that is kept.
+/// Maximum ρ of a matrix that is kept.
 const STALE: f64 = 0.03;
 /// Accepted correction relative to the acceleration.
 const TOLERANCE: f64 = 1e-9;
@@ -69,9 +69,6 @@ pub(crate) struct Newton {
     pub(crate) factored: bool,
     /// Whether the history of previous steps has to be initialised again.
     pub(crate) fresh: bool,
-    /// Whether the next matrix continues the last one: same step size, masses changed only by the
-    /// motion.
-    pub(crate) same_course: bool,
     iterations: u64,
     factorisations: u64,
     last_iterations: usize,
@@ -83,8 +80,6 @@ pub(crate) struct Newton {
     measuring: bool,
     /// Permitted remaining fraction of the first correction.
     left: f64,
-    /// Maximum ρ of a matrix that is kept.
-    stale: f64,
     /// Whether the matrix was computed during the current search.
     new: bool,
     /// Decaying maximum of the first corrections.
@@ -100,7 +95,6 @@ impl Newton {
             dt: h,
             factored: false,
             fresh: true,
-            same_course: false,
             iterations: 0,
             factorisations: 0,
             last_iterations: 0,
@@ -109,7 +103,6 @@ impl Newton {
             first_contraction: f64::INFINITY,
             measuring: false,
             left: TO_THE_END,
-            stale: STALE,
             new: false,
             largest_first: 0.0,
         }
@@ -120,11 +113,6 @@ impl Newton {
         Self { left, ..self }
     }
 
-    /// Sets the maximum ρ of a matrix that is kept.
-    pub(crate) fn keeping(self, stale: f64) -> Self {
-        Self { stale, ..self }
-    }
-
     /// Begins the next step after `steps` complete ones.
     pub(crate) fn begin_step(&mut self, steps: u64) {
         let every = if self.contraction <= WELL_BELOW * self.left { MEASURED_RARELY } else { MEASURED_EVERY };
@@ -133,12 +121,12 @@ impl Newton {
 
     /// Invalidates matrix and history.
     fn forget(&mut self) {
-        (self.factored, self.fresh, self.same_course) = (false, true, false);
+        (self.factored, self.fresh) = (false, true);
     }
 
     /// Records that `self.matrix` was inverted.
     pub(crate) fn renewed(&mut self) {
-        (self.factored, self.new, self.same_course) = (true, true, true);
+        (self.factored, self.new) = (true, true);
         (self.contraction, self.first_contraction) = (f64::INFINITY, f64::INFINITY);
         self.factorisations += 1;
     }
@@ -154,7 +142,7 @@ impl Newton {
     pub(crate) fn found(&mut self, iterations: usize, longest: usize) {
         self.iterations += iterations as u64;
         self.last_iterations += iterations;
-        let stale = self.contraction.is_finite() && self.contraction > self.stale;
+        let stale = self.contraction.is_finite() && self.contraction > STALE;
         self.new = false;
         self.factored = longest <= RENEW_ABOVE && !stale;
     }
@@ -326,7 +314,7 @@ impl<M: ImplicitStep> Integrator for M {
     }
 
     fn renew(&mut self, system: &mut impl SecondOrderSystem) -> Result<(), StepError> {
-        (self.newton_mut().factored, self.newton_mut().same_course) = (false, false);
+        self.newton_mut().factored = false;
         self.restart(system)
     }
 

@@ -13,7 +13,7 @@ use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::arm::FlexibleArm;
 use crate::batch::lane_arm::{LaneArm, set_lane};
-use crate::dense::{change_and_product, congruence, dot, larger, product, solve_in_place};
+use crate::dense::{congruence, dot, larger, product, solve_in_place};
 use crate::error::StepError;
 use crate::implicit::{ImplicitStep, Newton, Search, Sizes};
 use crate::integrator::TimeGrid;
@@ -21,7 +21,7 @@ use crate::motion::PrescribedMotion;
 use crate::reduced::{IMPULSE_DEFECT, ReducedArm, SLOW};
 use crate::statics::static_equilibrium;
 use crate::stepper::{LARGEST_DEFLECTION, Start};
-use crate::steppers::{AlphaSettings, Coefficients, Course, FOLLOWED_TO, GeneralizedAlpha, follows, leave_of};
+use crate::steppers::{AlphaSettings, Coefficients, GeneralizedAlpha, leave_of};
 use crate::system::SecondOrderSystem;
 
 /// Phases of a step.
@@ -42,8 +42,6 @@ struct Lane {
     /// `c_D D + c_K K` and K, both constant.
     C: DMatrix<f64>,
     K: DMatrix<f64>,
-    /// Extrapolation of its matrices between two renewals, if used.
-    course: Option<Course>,
     /// Whether the run continues in this lane.
     alive: bool,
 }
@@ -129,11 +127,6 @@ pub(super) struct LaneAlpha<T: Real> {
     /// `M^-1 K` and the inverse of Newton's matrix.
     M_inverse_K: Vec<T>,
     inverse: Vec<T>,
-    /// Change of both matrices per step, by their extrapolation.
-    changes: [Vec<T>; 2],
-    /// Whether each of them still lacks the change of this step, which is added with its next
-    /// product.
-    behind: [bool; 2],
     /// Workspaces of the matrices.
     S: Vec<T>,
     matrices: Matrices,
@@ -179,8 +172,6 @@ impl<T: Real> LaneAlpha<T> {
             shift: zeros(),
             M_inverse_K: square(),
             inverse: square(),
-            changes: [square(), square()],
-            behind: [false; 2],
             S: square(),
             matrices: Matrices::new(n),
         };
@@ -232,11 +223,7 @@ impl<T: Real> LaneAlpha<T> {
         let (c_D, c_K) = self.coefficients.derivatives(h);
         system.damping_and_stiffness(c_D, c_K, &mut C);
         system.stiffness(&mut K);
-        let course = (left.is_some() && follows(settings, arm, h)).then(Course::default);
-        if course.is_some() {
-            newton = newton.keeping(FOLLOWED_TO);
-        }
-        Ok(Lane { motion: arm.motion.clone(), newton, C, K, course, alive: true })
+        Ok(Lane { motion: arm.motion.clone(), newton, C, K, alive: true })
     }
 
     fn place_joints(&mut self, lane: usize, system: &ReducedArm) {
@@ -277,7 +264,6 @@ impl<T: Real> LaneAlpha<T> {
             self.v_new.copy_from_slice(&self.v);
             self.trial.copy_from_slice(&self.acceleration);
         } else {
-            self.follow();
             active = self.begin_search(t);
         }
         loop {
@@ -314,18 +300,6 @@ impl<T: Real> LaneAlpha<T> {
                 }
             }
         }
-    }
-
-    /// Updates the extrapolated change of the matrices for the next step.
-    #[inline(always)]
-    fn follow(&mut self) {
-        for (k, lane) in self.lanes.iter_mut().enumerate() {
-            if let Some((change, true)) = lane.course.as_mut().map(Course::step) {
-                set_lane(&mut self.changes[0], k, &change[0]);
-                set_lane(&mut self.changes[1], k, &change[1]);
-            }
-        }
-        self.behind = [true; 2];
     }
 
     /// Returns 1 in the lanes that satisfy a condition, else 0.
@@ -381,10 +355,7 @@ impl<T: Real> LaneAlpha<T> {
     /// `active` is 1.
     #[inline(always)]
     fn place(&mut self, active: T) {
-        match std::mem::take(&mut self.behind[1]) {
-            true => change_and_product(&mut self.M_inverse_K, &self.changes[1], &self.trial, &mut self.shift),
-            false => product(&self.M_inverse_K, &self.trial, &mut self.shift),
-        }
+        product(&self.M_inverse_K, &self.trial, &mut self.shift);
         let h = self.grid.step_size();
         let c_h2 = T::splat(self.c_h2);
         let n = self.trial.len();
@@ -405,10 +376,7 @@ impl<T: Real> LaneAlpha<T> {
     #[inline(always)]
     fn correct(&mut self, active: T) -> T {
         let zero = T::zero();
-        match std::mem::take(&mut self.behind[0]) {
-            true => change_and_product(&mut self.inverse, &self.changes[0], &self.r, &mut self.d),
-            false => product(&self.inverse, &self.r, &mut self.d),
-        }
+        product(&self.inverse, &self.r, &mut self.d);
         let norm = dot(&self.d, &self.d).sqrt();
         for d in &mut self.d {
             *d = picked(active, zero, *d);
@@ -470,10 +438,6 @@ impl<T: Real> LaneAlpha<T> {
     /// along the columns.
     #[inline(always)]
     fn factor(&mut self, wanted: T) {
-        debug_assert_eq!(
-            self.behind, [false; 2],
-            "a matrix is renewed after the first correction of a step at the earliest"
-        );
         self.arm.mass(&mut self.S);
         for k in (0..T::LANES).filter(|k| wanted.lane(*k) == 1.0) {
             let (lane, matrices) = (&mut self.lanes[k], &mut self.matrices);
@@ -487,11 +451,6 @@ impl<T: Real> LaneAlpha<T> {
             lane.newton.fresh = false;
             set_lane(&mut self.M_inverse_K, k, &matrices.M_inverse_K);
             set_lane(&mut self.inverse, k, &matrices.inverse);
-            if let Some(course) = &mut lane.course {
-                let change = course.taken([&matrices.inverse, &matrices.M_inverse_K]);
-                set_lane(&mut self.changes[0], k, &change[0]);
-                set_lane(&mut self.changes[1], k, &change[1]);
-            }
         }
     }
 }

@@ -17,21 +17,6 @@ pub(crate) fn product<T: Real>(A: &[T], x: &[T], y: &mut [T]) {
     add_columns(columns, x.iter().copied(), y);
 }
 
-/// Computes `A ← A + B`.
-#[inline(always)]
-pub(crate) fn add<T: Real>(A: &mut [T], B: &[T]) {
-    for (a, b) in A.iter_mut().zip(B) {
-        *a += *b;
-    }
-}
-
-/// Computes `A ← A + B`, then `y = A x`; each entry is loaded once.
-#[inline(always)]
-pub(crate) fn change_and_product<T: Real>(A: &mut [T], B: &[T], x: &[T], y: &mut [T]) {
-    add(A, B);
-    product(A, x, y);
-}
-
 /// Computes `y += A x`.
 #[inline(always)]
 pub(crate) fn add_product<T: Real>(A: &[T], x: &[T], y: &mut [T]) {

@@ -55,8 +55,8 @@ impl Method for ExtrapolatedAlpha {
     fn start(&self, arm: Arc<FlexibleArm>, h: f64, e: &DVector<f64>) -> Result<Box<dyn Stepper>, StepError> {
         // Extrapolated matrices differ more between the two runs, by errors without an expansion in
         // h: three times the error.
-        let coarse = self.0.stepper(arm.clone(), h, e, false)?;
-        let fine = self.0.stepper(arm, 0.5 * h, e, false)?;
+        let coarse = self.0.stepper(arm.clone(), h, e)?;
+        let fine = self.0.stepper(arm, 0.5 * h, e)?;
         // Both start in the same state.
         let now = fine.integrator.now.clone();
         Ok(Box::new(Extrapolated { x: now.x, v: now.v, a: now.acceleration, t: 0.0, coarse, fine }))

@@ -47,16 +47,6 @@ impl DispersionCorrection {
         }
     }
 
-    /// Returns `M^-1 K`, n × n.
-    pub(super) fn M_inverse_K(&self) -> &[f64] {
-        self.M_inverse_K.as_slice()
-    }
-
-    /// Returns `M^-1 K` for extrapolation.
-    pub(super) fn M_inverse_K_mut(&mut self) -> &mut [f64] {
-        self.M_inverse_K.as_mut_slice()
-    }
-
     /// Returns `c h²`.
     pub(super) fn c_h2(&self) -> f64 {
         self.c_h2

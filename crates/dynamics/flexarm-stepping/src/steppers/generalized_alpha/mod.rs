@@ -38,7 +38,6 @@
 //! ([`Integrator::advance_to`]). A step whose iteration fails is repeated with a matrix computed at
 //! its start, then in halves, down to `h/64`; afterwards the grid of multiples of h continues.
 
-mod course;
 mod dispersion;
 
 use std::sync::Arc;
@@ -47,15 +46,13 @@ use flexarm_kinematics::Real;
 use nalgebra::DVector;
 
 use crate::arm::FlexibleArm;
-use crate::dense::{add, largest_of_numbers};
+use crate::dense::largest_of_numbers;
 use crate::error::StepError;
 use crate::implicit::{ImplicitStep, Newton, Search, Sizes};
 use crate::integrator::{Current, ReducedStepper};
-use crate::iteration_matrix::MatrixForm;
 use crate::stepper::Stepper;
 use crate::steppers::{Method, StepRule, StepperEntry, StepperKind, StepperSetting};
 use crate::system::SecondOrderSystem;
-pub(crate) use course::{Course, FOLLOWED_TO};
 use dispersion::DispersionCorrection;
 
 pub(super) static ENTRY: StepperEntry = StepperEntry {
@@ -96,7 +93,7 @@ impl Method for AlphaSettings {
     }
 
     fn start(&self, arm: Arc<FlexibleArm>, h: f64, e: &DVector<f64>) -> Result<Box<dyn Stepper>, StepError> {
-        Ok(Box::new(self.stepper(arm, h, e, true)?))
+        Ok(Box::new(self.stepper(arm, h, e)?))
     }
 }
 
@@ -106,28 +103,24 @@ impl AlphaSettings {
         (OF_DAMPING * (1.0 - self.rho)).min(QUICK)
     }
 
-    /// Creates the stepper of an arm with its permitted iteration error; `follow`: whether its
-    /// matrices may be extrapolated between renewals.
+    /// Creates the stepper of an arm with its permitted iteration error.
     pub(crate) fn stepper(
         self,
         arm: Arc<FlexibleArm>,
         h: f64,
         e: &DVector<f64>,
-        follow: bool,
     ) -> Result<ReducedStepper<GeneralizedAlpha>, StepError> {
         let rho = self.rho;
         let left = leave_of(self, &arm, h);
-        let follows = follow && left.is_some() && follows(self, &arm, h);
         if !(0.0..=1.0).contains(&rho) {
             return Err(StepError::Setup(format!("the spectral radius must lie between 0 and 1, found {rho}")));
         }
         ReducedStepper::start(arm, e, |system, x, v| {
             let integrator = GeneralizedAlpha::new(system, 0.0, h, self, x, v)?;
-            let integrator = match left {
+            Ok(match left {
                 Some(left) => integrator.leaving(left),
                 None => integrator,
-            };
-            Ok(if follows { integrator.following() } else { integrator })
+            })
         })
     }
 }
@@ -138,12 +131,6 @@ pub(crate) fn leave_of(settings: AlphaSettings, arm: &FlexibleArm, h: f64) -> Op
     let followed = arm.modes.omega.first().is_none_or(|omega| h * omega <= FOLLOWED);
     let left = if followed { settings.may_leave() } else { settings.may_leave().min(COARSE) };
     (left > 0.0 && forgets_errors(arm)).then_some(left)
-}
-
-/// Returns whether the matrices of an arm with a permitted iteration error are extrapolated between
-/// renewals ([`Course`]): only for small steps.
-pub(crate) fn follows(settings: AlphaSettings, arm: &FlexibleArm, h: f64) -> bool {
-    settings.dispersion_correction && arm.modes.omega.first().is_some_and(|omega| h * omega <= course::SHORT)
 }
 
 /// Permitted iteration error of damped arms, as a fraction of the first correction of Newton's
@@ -188,8 +175,6 @@ pub struct GeneralizedAlpha {
     newton: Newton,
     /// See [`GeneralizedAlpha::exactly`].
     exact: bool,
-    /// See [`GeneralizedAlpha::following`].
-    course: Option<Course>,
     /// Time, positions, velocities and accelerations.
     pub now: Current,
     /// a and x̃ at the current time, ẍ one step earlier.
@@ -287,7 +272,6 @@ impl GeneralizedAlpha {
             correction: (dispersion_correction && c > 0.0).then(|| DispersionCorrection::new(c, h, n)),
             newton: Newton::new(n, h),
             exact: false,
-            course: None,
             x_new: now.x.clone(),
             v_new: now.v.clone(),
             a: now.acceleration.clone(),
@@ -306,19 +290,13 @@ impl GeneralizedAlpha {
         Self { newton: self.newton.leaving(part), ..self }
     }
 
-    /// Enables extrapolation of dense matrices between renewals.
-    #[must_use]
-    pub fn following(self) -> Self {
-        Self { course: Some(Course::default()), newton: self.newton.keeping(FOLLOWED_TO), ..self }
-    }
-
     /// Makes steps smooth functions of all their inputs: the matrix, and with it that of the
     /// dispersion correction, is computed at the start of each step, and the iteration converges
     /// fully. For trees and modal links, whose matrix contains the correction, this holds for steps
     /// of at most eight iterations.
     #[must_use]
     pub fn exactly(self) -> Self {
-        Self { exact: true, course: None, ..self.leaving(0.0) }
+        Self { exact: true, ..self.leaving(0.0) }
     }
 
     /// Initialises a and x̃ with the current acceleration, without the correction: with it, a jump
@@ -340,27 +318,8 @@ impl GeneralizedAlpha {
             correction.correct(system, matrix, t, kept)?;
         }
         matrix.invert(t)?;
-        if let (Some(course), Some(correction), MatrixForm::Dense(dense)) =
-            (&mut self.course, &self.correction, &matrix.way)
-        {
-            if !self.newton.same_course {
-                course.forget();
-            }
-            course.taken([dense.inverse.as_slice(), correction.M_inverse_K()]);
-        }
         self.newton.renewed();
         Ok(())
-    }
-
-    /// Adds the extrapolated change of the matrices for the next step, if enabled.
-    fn follow(&mut self) {
-        if let (Some(course), Some(correction), MatrixForm::Dense(dense)) =
-            (&mut self.course, &mut self.correction, &mut self.newton.matrix.way)
-        {
-            let (change, _) = course.step();
-            add(dense.inverse.as_mut_slice(), &change[0]);
-            add(correction.M_inverse_K_mut(), &change[1]);
-        }
     }
 
     /// Computes x̃⁺, a⁺, x⁺, v⁺ from the trial ẍ⁺ by (5), (4), (2), (3).
@@ -442,8 +401,6 @@ impl ImplicitStep for GeneralizedAlpha {
             // The matrix is computed at the configuration of the last residual.
             system.residual(self.now.grid.time(), &self.now.x, &self.now.v, &self.now.acceleration, &mut self.newton.r);
             self.factor(system, t, false)?;
-        } else {
-            self.follow();
         }
         if self.newton.fresh {
             self.remember();
