@@ -82,6 +82,11 @@ pub struct ElasticElement {
 }
 
 impl ElasticElement {
+    /// Returns whether it is a single translation (m, N).
+    pub fn slides(&self, model: &Model) -> bool {
+        matches!(model.bodies()[self.body].motion, JointMotion::Axis(motion) if motion.slides())
+    }
+
     /// Returns the stored energy (J) at its coordinates `e` with the joints at `q`.
     pub fn energy(&self, e: &[f64], q: &[f64]) -> f64 {
         match &self.curve {

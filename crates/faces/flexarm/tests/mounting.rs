@@ -307,6 +307,86 @@ fn every_stepper_swings_on_the_mounting_as_the_reference_does() {
     assert_eq!(rigid.flexible().springs.len(), 0);
 }
 
+/// Truth, to first order: each spring with play gives way by its play and by its force over its
+/// stiffness, in the frame of the springs; without load it does not move. A fixed joint with six
+/// stiffnesses and the same play below the base is the same mounting.
+#[test]
+fn springs_with_play_give_way_by_their_play_and_their_force_over_stiffness() {
+    let place = Place::new("play");
+    let play: [f64; 6] = [2e-7, 0.0, 3e-7, 4e-7, 5e-7, 6e-7];
+    let pivot = [0.1, -0.2, -0.3];
+    let springs = format!("stiffness = {STIFF:?}\nbacklash = {play:?}\n");
+    let text = format!("{HEAD}{FREE}[mounting]\n{springs}xyz = {pivot:?}\n");
+    let robot = place.robot(&text);
+    let (x, slew) = (0.7, 0.5f64);
+    let lever = Vector3::new(x + 0.9 * slew.cos(), 0.9 * slew.sin(), 0.6) - Vector3::from(pivot);
+    let displacement = |robot: &Robot, q: &[f64], wrench: [f64; 6]| {
+        let found = statics(robot, &Modelling::default(), Some(q), wrench).unwrap();
+        assert!(found.sag_m.iter().all(|sag| sag.abs() < 1e-15), "{:?}", found.sag_m);
+        Vector3::from(found.tcp_displacement_m)
+    };
+    let wrenches = [[30.0, -20.0, 40.0, 15.0, 10.0, -20.0], [-10.0, 60.0, -5.0, -30.0, 2.0, 9.0]];
+    let mut found = Vec::new();
+    for wrench in wrenches {
+        let (force, moment) = (Vector3::from_row_slice(&wrench[..3]), Vector3::from_row_slice(&wrench[3..]));
+        let moment: Vector3<f64> = moment + lever.cross(&force);
+        let loads = [force.as_slice(), moment.as_slice()].concat();
+        let give: Vec<f64> = (0..6).map(|c| loads[c] / STIFF[c] + play[c].copysign(loads[c])).collect();
+        let truth = Vector3::from_row_slice(&give[..3]) + Vector3::from_row_slice(&give[3..]).cross(&lever);
+        let moved = displacement(&robot, &[x, slew], wrench);
+        let error = (moved - truth).norm() / truth.norm();
+        eprintln!("springs with play: {error:.1e} of {:.2e} m", truth.norm());
+        assert!(error < 1e-5, "{moved:?} {truth:?}");
+        found.push(moved);
+    }
+    // No play is a mounting without the key.
+    let none = place.robot(&text.replace(&format!("{play:?}"), &format!("{:?}", [0.0; 6])));
+    assert_eq!(none.flexible_robot().unwrap().springs.len(), 1);
+
+    let base = "<link name=\"base\">";
+    let floor = format!(
+        "<link name=\"floor\"/><joint name=\"anchors\" type=\"fixed\"><parent link=\"floor\"/><child link=\"foot\"/>\
+         <origin xyz=\"0.1 -0.2 -0.3\"/></joint><link name=\"foot\"/><joint name=\"up\" type=\"fixed\"><parent link=\"foot\"/>\
+         <child link=\"base\"/><origin xyz=\"-0.1 0.2 0.3\"/></joint>{base}"
+    );
+    std::fs::write(place.0.join("cell.urdf"), URDF.replace(base, &floor)).unwrap();
+    let gearbox = format!("{{ stiffness = {STIFF:?}, backlash = {play:?} }}");
+    let drive = format!("[[drive]]\njoint = \"anchors\"\nkind = \"gearbox\"\ngearbox = {gearbox}\n");
+    let robot = place.robot(&format!("{HEAD}{FREE}{drive}"));
+    for (wrench, moved) in wrenches.into_iter().zip(found) {
+        assert!((displacement(&robot, &[x, slew], wrench) - moved).norm() < 1e-9 * moved.norm());
+    }
+}
+
+/// Truth: the reference stepper. A base that stands on its springs by its weight and rocks within
+/// its play as the arm moves; the energy that springs and dampers take is accounted for.
+#[test]
+fn a_base_that_rocks_within_its_play_moves_as_the_reference_says() {
+    let place = Place::new("rocking");
+    let robot = place.robot(&format!(
+        "{HEAD}[mounting]\nstiffness = [8e6, 8e6, 2e7, 4e6, 4e6, 5e6]\n\
+         backlash = [0.0, 0.0, 0.0, 2e-5, 2e-5, 0.0]\n{DAMPED}"
+    ));
+    let motion = moving(&robot);
+    let arm = robot.flexible(Modelling::default()).unwrap();
+    let run = |stepper: StepperKind, step_s: f64| {
+        let options = RunOptions { stepper, step_s, log_rate_hz: 500.0, ..RunOptions::default() };
+        arm.simulate(&motion, &options).unwrap_or_else(|e| panic!("{} {e}", stepper.name()))
+    };
+    let truth = run(StepperKind::Reference(ReferenceSettings::new(1e-9)), 5e-4);
+    let tcp = truth.summary.tcp.as_ref().unwrap();
+    assert_eq!(truth.summary.bends.mounting.as_deref(), Some("mounting"));
+    assert!((tcp.shares_at_peak[0].along_m / tcp.peak_m - 1.0).abs() < 0.01, "{:?}", tcp.shares_at_peak);
+    for (stepper, step, bound) in [(StepperKind::default(), 1e-4, 2e-3), (StepperKind::Rk4, 1e-4, 2e-3)] {
+        let found = run(stepper, step);
+        let difference = |(a, b): (&f64, &f64)| (a - b).abs();
+        let error = found.error_world_m().iter().zip(truth.error_world_m()).map(difference).fold(0.0, f64::max);
+        eprintln!("{:<18} {:.1e} of the peak", stepper.name(), error / tcp.peak_m);
+        assert!(error < bound * tcp.peak_m, "{} {}", stepper.name(), error / tcp.peak_m);
+        assert!(found.summary.energy.imbalance < 1e-2, "{}", found.summary.energy.imbalance);
+    }
+}
+
 #[test]
 fn what_makes_no_mounting_is_refused_with_what_was_found_and_expected() {
     let place = Place::new("refused");
@@ -339,6 +419,9 @@ fn what_makes_no_mounting_is_refused_with_what_was_found_and_expected() {
         &["section"],
     );
     fails("reduced = \"nowhere.flex\"", &["there is no file"]);
+    fails(&format!("{six}backlash = [0.0, 0.0]"), &["backlash has 2 numbers", "6"]);
+    fails(&format!("{six}backlash = [0.0, 0.0, 0.0, -1e-3, 0.0, 0.0]"), &["backlash = -0.001", "0 or above"]);
+    fails(&format!("stiffness = {}\nbacklash = {STIFF:?}", written(&coupled())), &["uncoupled", "6x6"]);
     fails(&format!("{six}mas = 3.0"), &["unknown field `mas`"]);
 
     // A base without mass: the mass that oscillates on the springs is unknown, unless the file

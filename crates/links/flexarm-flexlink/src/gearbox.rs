@@ -7,7 +7,8 @@
 //! With one stiffness the spring acts about the joint's axis; with three also the bearings tilt
 //! (extended flexible joint), as three springs about x, y, z of the joint frame; with a full 6x6
 //! stiffness, it deflects in all directions. With three or six, a fixed joint becomes an elastic
-//! connection. At zero deflection all frames are unchanged.
+//! connection. Six springs with play act one after another: translations along x, y, z, then
+//! rotations about x, y, z. At zero deflection all frames are unchanged.
 //!
 //! The guide of a telescopic joint tilts in the middle of the overlap of its tubes, which moves
 //! half as fast as the joint. Two joints that mimic it move there and back:
@@ -16,7 +17,7 @@
 //! ```
 
 use flexarm_kinematics::{ElasticAngles, Joint, JointKind, Link, Mechanism, Mimic, Pose};
-use nalgebra::{DMatrix, Matrix6, Unit, Vector3};
+use nalgebra::{DMatrix, Matrix6, Vector3};
 
 /// Stiffness of a gearbox on the joint side.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,6 +29,9 @@ pub enum GearStiffness {
     Tilting([f64; 3]),
     /// Translations (N/m) and rotations (N m/rad) in the joint frame, coupled.
     Full(Matrix6<f64>),
+    /// Translations along x, y and z (N/m), then rotations about them (N m/rad), one after another,
+    /// so that each can have its own law.
+    Separate([f64; 6]),
     /// Tilt of a sliding joint in the middle of the overlap of its tubes.
     Guide(GuideTubes),
 }
@@ -41,6 +45,18 @@ pub struct GuideTubes {
     pub inner_end: f64,
     /// Whether the guide tilts about x, y and z of the joint frame.
     pub tilts: [bool; 3],
+}
+
+impl GearStiffness {
+    /// Returns the stiffness of each spring, if they are not coupled.
+    pub fn each(&self) -> Option<&[f64]> {
+        match self {
+            Self::Axis(k) => Some(std::slice::from_ref(k)),
+            Self::Tilting(k) => Some(k),
+            Self::Separate(k) => Some(k),
+            Self::Full(_) | Self::Guide(_) => None,
+        }
+    }
 }
 
 impl GuideTubes {
@@ -65,12 +81,12 @@ pub struct Gearbox {
     pub stiffness: GearStiffness,
 }
 
-/// Spring inserted for a gearbox.
+/// Spring inserted for a gearbox or a mounting.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GearSpring {
-    /// Name in messages: the joint, with the axis if there are three.
+    /// Name in messages: the joint, with the axis if there are several.
     pub name: String,
-    /// Name of the joint with the gearbox.
+    /// Name of the joint with the gearbox, or of the mounting.
     pub gearbox: String,
     /// Name of the elastic joint.
     pub joint: String,
@@ -141,10 +157,8 @@ pub(crate) const ASYMMETRY: f64 = 1e-9;
 fn check_stiffness(joint: &str, stiffness: &GearStiffness) -> Result<(), GearboxError> {
     let smallest = match stiffness {
         GearStiffness::Axis(k) => *k,
-        GearStiffness::Tilting(k) => match k.iter().find(|k| !k.is_finite()) {
-            Some(hole) => *hole,
-            None => k.iter().copied().fold(f64::INFINITY, f64::min),
-        },
+        GearStiffness::Tilting(k) => smallest_of(k),
+        GearStiffness::Separate(k) => smallest_of(k),
         GearStiffness::Full(K) => match K.iter().find(|k| !k.is_finite()) {
             Some(hole) => *hole,
             None => {
@@ -161,6 +175,11 @@ fn check_stiffness(joint: &str, stiffness: &GearStiffness) -> Result<(), Gearbox
         return Err(GearboxError::NotPositive { joint: joint.to_owned(), found: smallest });
     }
     Ok(())
+}
+
+/// Returns the smallest of the numbers, or the first that is not finite.
+fn smallest_of(k: &[f64]) -> f64 {
+    k.iter().copied().find(|k| !k.is_finite()).unwrap_or_else(|| k.iter().copied().fold(f64::INFINITY, f64::min))
 }
 
 /// Inserts the joints from the moving end of a sliding joint to the middle of the overlap of its
@@ -231,43 +250,60 @@ pub fn insert_gearboxes(mechanism: &mut Mechanism, gearboxes: &[Gearbox]) -> Res
             GearStiffness::Guide(tubes) => there_and_back(mechanism, &slide, tubes, motor, child),
             _ => (motor, child),
         };
-        let (last, mut parent) = (parts.len() - 1, parent);
-        for (component, (suffix, kind, K)) in parts.into_iter().enumerate() {
-            let spring = format!("{name}__spring{suffix}");
-            let to = if component == last { child.clone() } else { format!("{name}__gear{suffix}") };
-            if component < last {
-                mechanism.links.push(Link { name: to.clone(), inertia: None });
-            }
-            mechanism.joints.push(Joint::new(&spring, kind, &parent, &to, Pose::identity()));
-            let gearbox = name.clone();
-            springs.push(GearSpring { name: format!("{name}{suffix}"), gearbox, joint: spring, component, K });
-            parent = to;
-        }
+        springs.extend(insert_springs(mechanism, name, parts, (parent, child), Pose::identity()));
     }
     Ok(springs)
 }
 
-/// Returns the joints with springs that replace a joint, from the motor outward: suffix of the
-/// name, kind and stiffness. `along`: spring along the axis of the joint, if it has one.
-fn spring_joints(stiffness: &GearStiffness, along: Option<JointKind>) -> Vec<(&'static str, JointKind, DMatrix<f64>)> {
+/// Inserts springs one after another between two links; `X`: pose of the first one in its parent.
+pub(crate) fn insert_springs(
+    mechanism: &mut Mechanism,
+    name: &str,
+    parts: Vec<SpringJoint>,
+    (mut parent, child): (String, String),
+    mut X: Pose,
+) -> Vec<GearSpring> {
+    let (last, mut springs) = (parts.len() - 1, Vec::new());
+    for (component, (suffix, kind, K)) in parts.into_iter().enumerate() {
+        let joint = format!("{name}__spring{suffix}");
+        let to = if component == last { child.clone() } else { format!("{name}__gear{suffix}") };
+        if component < last {
+            mechanism.links.push(Link { name: to.clone(), inertia: None });
+        }
+        mechanism.joints.push(Joint::new(&joint, kind, &parent, &to, X));
+        X = Pose::identity();
+        springs.push(GearSpring { name: format!("{name}{suffix}"), gearbox: name.to_owned(), joint, component, K });
+        parent = to;
+    }
+    springs
+}
+
+/// Suffix of the name, kind and stiffness of a joint with a spring.
+type SpringJoint = (&'static str, JointKind, DMatrix<f64>);
+
+/// Returns the joints with springs that replace a joint, from the motor outward. `along`: spring
+/// along the axis of the joint, if it has one.
+pub(crate) fn spring_joints(stiffness: &GearStiffness, along: Option<JointKind>) -> Vec<SpringJoint> {
+    let axes = || [Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis()];
     let single = |k: f64| DMatrix::from_element(1, 1, k);
     match stiffness {
         GearStiffness::Axis(k) => along.map(|kind| ("", kind, single(*k))).into_iter().collect(),
         GearStiffness::Tilting(k) => {
-            let turn = |axis: Unit<Vector3<f64>>| JointKind::ElasticRevolute(axis);
-            vec![
-                (".x", turn(Vector3::x_axis()), single(k[0])),
-                (".y", turn(Vector3::y_axis()), single(k[1])),
-                (".z", turn(Vector3::z_axis()), single(k[2])),
-            ]
+            let turns = [".x", ".y", ".z"].into_iter().zip(axes()).zip(k);
+            turns.map(|((suffix, axis), k)| (suffix, JointKind::ElasticRevolute(axis), single(*k))).collect()
+        }
+        GearStiffness::Separate(k) => {
+            let slides = axes().map(JointKind::ElasticPrismatic);
+            let turns = axes().map(JointKind::ElasticRevolute);
+            let named = [".x", ".y", ".z", ".rx", ".ry", ".rz"].into_iter().zip(slides.into_iter().chain(turns));
+            named.zip(k).map(|((suffix, kind), k)| (suffix, kind, single(*k))).collect()
         }
         GearStiffness::Full(K) => {
             let kind = JointKind::Elastic(ElasticAngles::RotationVector);
             vec![("", kind, DMatrix::from_column_slice(6, 6, K.as_slice()))]
         }
         GearStiffness::Guide(tubes) => {
-            let axes = [Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis()];
-            let turns = [".x", ".y", ".z"].into_iter().zip(axes).zip(tubes.tilts).filter(|(_, tilts)| *tilts);
+            let turns = [".x", ".y", ".z"].into_iter().zip(axes()).zip(tubes.tilts).filter(|(_, tilts)| *tilts);
             turns.map(|((suffix, axis), _)| (suffix, JointKind::ElasticRevolute(axis), single(1.0))).collect()
         }
     }

@@ -3,15 +3,16 @@
 //! ```text
 //! ground --springs at S--> <name>__top (attached mass) --fixed--> base
 //! ```
+//! Springs with play act one after another, as those of an elastic connection.
 //! The ground becomes the root of the tree. At zero deflection the base is at its original pose, so
 //! that the world axes remain those of the base. Not here: a base on a beam or a mesh, which is a
 //! flexible link ([`crate::substitute`]).
 
-use flexarm_kinematics::{ElasticAngles, Joint, JointKind, Link, LinkInertia, Mechanism, Pose};
+use flexarm_kinematics::{Joint, JointKind, Link, LinkInertia, Mechanism, Pose};
 use nalgebra::Matrix6;
 
-use crate::gearbox::ASYMMETRY;
-use crate::substitute::{FlexibleSpan, Spring};
+use crate::gearbox::{ASYMMETRY, GearSpring, GearStiffness, insert_springs, spring_joints};
+use crate::substitute::FlexibleSpan;
 
 /// Springs below the base.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,6 +23,9 @@ pub struct Mounting {
     pub X_BS: Pose,
     /// Stiffness at So in S axes (N/m, N/rad; N m/m, N m/rad).
     pub K_S: Matrix6<f64>,
+    /// Whether the six springs of a diagonal stiffness act one after another, each with its own
+    /// law.
+    pub separate: bool,
     /// Additional mass on the springs, in S axes.
     pub inertia: Option<LinkInertia>,
 }
@@ -102,17 +106,17 @@ fn check_stiffness(name: &str, K: &Matrix6<f64>) -> Result<(), MountingError> {
     }
 }
 
-/// Inserts the springs between a new ground link and the base. Returns the elastic joint and the
-/// location of its ends.
+/// Inserts the springs between a new ground link and the base. Returns them, from the ground
+/// upward, and the location of their ends.
 ///
 /// # Errors
 /// [`MountingError`]; the mechanism is then unchanged.
 pub fn insert_mounting(
     mechanism: &mut Mechanism,
     mounting: &Mounting,
-) -> Result<(Spring, FlexibleSpan), MountingError> {
-    let Mounting { name, X_BS, K_S, inertia } = mounting;
-    let (top, joint) = (format!("{name}__top"), format!("{name}__elastic"));
+) -> Result<(Vec<GearSpring>, FlexibleSpan), MountingError> {
+    let Mounting { name, X_BS, K_S, separate, inertia } = mounting;
+    let top = format!("{name}__top");
     if let Some(taken) = [name, &top].into_iter().find(|name| mechanism.link(name).is_some()) {
         return Err(MountingError::NameTaken { name: taken.clone() });
     }
@@ -120,13 +124,17 @@ pub fn insert_mounting(
     check_stiffness(name, K_S)?;
     mechanism.links.push(Link { name: name.clone(), inertia: None });
     mechanism.links.push(Link { name: top.clone(), inertia: *inertia });
-    let elastic = JointKind::Elastic(ElasticAngles::RotationVector);
-    mechanism.joints.push(Joint::new(&joint, elastic, name, &top, *X_BS));
+    let stiffness = match separate {
+        true => GearStiffness::Separate(K_S.diagonal().into()),
+        false => GearStiffness::Full(*K_S),
+    };
+    let ends = (name.clone(), top.clone());
+    let springs = insert_springs(mechanism, name, spring_joints(&stiffness, None), ends, *X_BS);
     mechanism.joints.push(Joint::new(format!("{name}__base"), JointKind::Fixed, &top, base, X_BS.inverse()));
     let mass = inertia.map_or(0.0, |inertia| inertia.mass);
     let span = FlexibleSpan {
         link: name.clone(),
-        distal_link: top.clone(),
+        distal_link: top,
         X_LA: *X_BS,
         X_DB: Pose::identity(),
         length: 0.0,
@@ -134,5 +142,5 @@ pub fn insert_mounting(
         part_masses: vec![mass],
         lumped: None,
     };
-    Ok((Spring { link: name.clone(), joint, distal_link: top, K_S: *K_S, X_LS: *X_BS }, span))
+    Ok((springs, span))
 }

@@ -154,6 +154,8 @@ fn tip_gives_way_by_lever_and_axis() {
         ("elbow", GearStiffness::Tilting(k)),
         ("elbow", GearStiffness::Full(full())),
         ("slide", GearStiffness::Full(full())),
+        ("elbow", GearStiffness::Separate([3e6, 5e6, 4e6, k[0], k[1], k[2]])),
+        ("slide", GearStiffness::Separate([3e6, 5e6, 4e6, k[0], k[1], k[2]])),
     ] {
         let mut soft = robot();
         let springs = insert_gearboxes(&mut soft, &[gearbox(joint, stiffness.clone())]).expect("fits");
@@ -176,6 +178,12 @@ fn tip_gives_way_by_lever_and_axis() {
             (GearStiffness::Axis(k), JointKind::Revolute(axis)) => turn(*axis) * turn(*axis).transpose() / *k,
             (GearStiffness::Axis(k), JointKind::Prismatic(axis)) => shift(*axis) * shift(*axis).transpose() / *k,
             (GearStiffness::Tilting(k), _) => (0..3).map(|a| turn(e(a)) * turn(e(a)).transpose() / k[a]).sum(),
+            (GearStiffness::Separate(k), _) => (0..3)
+                .map(|a| {
+                    let (u, w) = (shift(e(a)), turn(e(a)));
+                    u * u.transpose() / k[a] + w * w.transpose() / k[a + 3]
+                })
+                .sum(),
             (GearStiffness::Full(K), _) => {
                 let A =
                     Matrix6::from_columns(&[shift(e(0)), shift(e(1)), shift(e(2)), turn(e(0)), turn(e(1)), turn(e(2))]);

@@ -127,7 +127,7 @@ fn gears_fit(robot: &Robot, joints: &[String]) -> Result<(), CoupledDriveError> 
     for drive in drives.iter().flatten() {
         let joint = || drive.joint.clone();
         let Some((gearbox, gear)) = &drive.gearbox else { continue };
-        if !matches!(gearbox.stiffness, GearStiffness::Axis(_)) || gear.curve.is_some() {
+        if !matches!(gearbox.stiffness, GearStiffness::Axis(_)) || !gear.curves.is_empty() {
             return Err(CoupledDriveError::Stiffness { joint: joint() });
         }
         if gear.hysteresis.is_some() || !gear.transmission.is_empty() {

@@ -63,8 +63,8 @@ pub(crate) struct GearboxEntry {
     pub stiffness: Option<Numbers>,
     /// Damping in the same forms except 6x6 (N m s/rad); 3 % modal damping by default.
     pub damping: Option<Numbers>,
-    /// Backlash to each side (rad).
-    pub backlash: Option<f64>,
+    /// Play to each side (rad), in the form of the stiffness.
+    pub backlash: Option<Numbers>,
     /// Torque curve instead of a stiffness: points (deflection, torque).
     pub curve: Option<Vec<[f64; 2]>>,
     /// Harmonics of the transmission error.
@@ -155,8 +155,6 @@ pub struct Drive {
     pub(crate) armature: f64,
     /// Spring of the gearbox, with its damping and curve.
     pub gearbox: Option<(Gearbox, GearDamping)>,
-    /// Backlash of the gearbox to each side (rad or m).
-    pub backlash: f64,
     /// Friction.
     pub friction: Friction,
     /// Load-dependent friction as a fraction of the transmitted torque.
@@ -179,10 +177,13 @@ impl Drive {
         self.armature
     }
 
-    /// Returns the backlash of the gearbox to each side (rad or m), which its torque curve
-    /// includes.
-    pub fn backlash(&self) -> f64 {
-        self.backlash
+    /// Returns the largest play to each side of the gearbox's rotations (rad), or of its only spring
+    /// (rad or m), and of its translations (m). The curves of the springs include it.
+    pub fn play(&self) -> [f64; 2] {
+        let Some((_, springs)) = &self.gearbox else { return [0.0; 2] };
+        let turns = if springs.play.len() == 6 { 3 } else { 0 };
+        let largest = |play: &[f64]| play.iter().copied().fold(0.0, f64::max);
+        [largest(&springs.play[turns..]), largest(&springs.play[..turns])]
     }
 }
 
@@ -191,8 +192,11 @@ impl Drive {
 pub struct GearDamping {
     /// Damping per coordinate; None means 3 % modal damping.
     pub dampers: Option<Vec<f64>>,
-    /// Torque curve of the axis.
-    pub curve: Option<TorqueCurve>,
+    /// Torque curve of each spring; empty if all are linear.
+    pub curves: Vec<Option<TorqueCurve>>,
+    /// Play of each spring to each side (rad or m), which its curve includes; empty if there is
+    /// none.
+    pub play: Vec<f64>,
     /// Harmonics of the transmission error.
     pub transmission: Vec<Harmonic>,
     /// Internal friction.
@@ -345,9 +349,8 @@ fn drive(
         warnings.push(format!("drive of joint {name:?}: its servo is not used, only kind = \"torque\" has one"));
     }
     let torque_limit = number(&entry.torque_limit, "torque_limit", joint.limits.effort, 0.0)?;
-    let backlash = entry.gearbox.as_ref().and_then(|g| g.get_ref().backlash).unwrap_or(0.0);
     let joint = name.clone();
-    Ok(Drive { joint, kind, ratio, armature, gearbox, backlash, friction, load_friction, torque_limit, servo })
+    Ok(Drive { joint, kind, ratio, armature, gearbox, friction, load_friction, torque_limit, servo })
 }
 
 /// Returns the joint of a drive; a fixed one may have an elastic connection.
@@ -451,39 +454,98 @@ fn gear(
     if let Some(guide) = &gear.guide {
         return guide_gear(joint, guide, gear, &at);
     }
-    let curve = curve_of(gear, &at)?;
-    let (stiffness, size) = stiffness_of(gear, curve.as_ref(), &at)?;
+    let points = points_of(gear, &at)?;
+    let (stiffness, size) = stiffness_of(gear, points.as_ref(), &at)?;
+    let (stiffness, play) = with_play(gear.backlash.as_ref(), stiffness, &at)?;
     let dampers = dampers(gear, size, &at)?;
     if size > 1 && (gear.hysteresis.is_some() || !gear.transmission_error.is_empty()) {
         return Err(at("transmission_error and hysteresis need one stiffness, about the axis".into()));
     }
     let transmission = harmonics(&gear.transmission_error, ratio).map_err(|error| at(error.to_string()))?;
+    let curves = match (points, stiffness.each()) {
+        (Some(points), _) => vec![Some(points)],
+        (None, Some(k)) if !play.is_empty() => curves_with_play(k, &play),
+        _ => Vec::new(),
+    };
     let about = if let GearStiffness::Axis(k) = stiffness { k } else { f64::NAN };
-    let law = gear.hysteresis.as_ref().map(|entry| hysteresis(entry, about, curve.as_ref()));
+    let curve = curves.first().and_then(Option::as_ref);
+    let law = gear.hysteresis.as_ref().map(|entry| hysteresis(entry, about, curve));
     let hysteresis = law.transpose().map_err(|error| at(error.to_string()))?;
-    let damping = GearDamping { dampers, curve, transmission, hysteresis, tilts: Vec::new() };
+    let damping = GearDamping { dampers, curves, play, transmission, hysteresis, tilts: Vec::new() };
     Ok((Gearbox { joint: joint.name.clone(), stiffness }, damping))
 }
 
 /// Makes an error at a gearbox.
 type GearboxFault<'a> = &'a dyn Fn(String) -> RobotFileError;
 
-/// Returns the torque curve of a gearbox, if it has one or a backlash.
-fn curve_of(gear: &GearboxEntry, at: GearboxFault<'_>) -> Result<Option<TorqueCurve>, RobotFileError> {
-    match (&gear.curve, gear.backlash, &gear.stiffness) {
+/// Returns the torque curve of a gearbox that is given by points.
+fn points_of(gear: &GearboxEntry, at: GearboxFault<'_>) -> Result<Option<TorqueCurve>, RobotFileError> {
+    match (&gear.curve, &gear.backlash, &gear.stiffness) {
         (Some(points), None, None) => TorqueCurve::new(points).map(Some).map_err(|error| at(error.to_string())),
-        (None, Some(play), Some(Numbers::One(k))) if play.is_finite() && play >= 0.0 && *k > 0.0 => {
-            Ok((play > 0.0).then(|| TorqueCurve::backlash(*k, play)))
-        }
-        (None, Some(play), _) => {
-            Err(at(format!("backlash = {play}: it must be 0 or above, with one positive stiffness about the axis")))
-        }
         (Some(_), ..) => Err(at("curve takes the place of stiffness and backlash: give one of them".into())),
-        (None, None, None) => {
+        (None, _, None) => {
             Err(at("gearbox needs stiffness = N m/rad, curve = [[rad, N m], ...], or guide = { ... }".into()))
         }
-        (None, None, Some(_)) => Ok(None),
+        (None, _, Some(_)) => Ok(None),
     }
+}
+
+/// Returns the stiffness and the play of each spring; with play in any of six springs they act one
+/// after another.
+fn with_play(
+    backlash: Option<&Numbers>,
+    stiffness: GearStiffness,
+    at: GearboxFault<'_>,
+) -> Result<(GearStiffness, Vec<f64>), RobotFileError> {
+    let given: &[f64] = match backlash {
+        None => return Ok((stiffness, Vec::new())),
+        Some(Numbers::One(play)) => &[*play],
+        Some(Numbers::Many(play)) => play,
+        Some(Numbers::Matrix(_)) => &[],
+    };
+    let stiffness = match stiffness {
+        GearStiffness::Full(K) if K == Matrix6::from_diagonal(&K.diagonal()) => {
+            GearStiffness::Separate(K.diagonal().into())
+        }
+        other => other,
+    };
+    let Some(k) = stiffness.each() else {
+        return Err(at("backlash needs uncoupled springs: stiffness of one number, 3 or 6, not a 6x6 matrix".into()));
+    };
+    let play = checked_play(given, k.len()).map_err(|error| at(error.to_string()))?;
+    match (play.iter().all(|play| *play == 0.0), stiffness) {
+        (true, GearStiffness::Separate(k)) => Ok((GearStiffness::Full(Matrix6::from_diagonal(&k.into())), Vec::new())),
+        (true, stiffness) => Ok((stiffness, Vec::new())),
+        (false, stiffness) => Ok((stiffness, play)),
+    }
+}
+
+/// Reason why numbers are not the play of springs.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum PlayError {
+    /// Their number is not that of the springs.
+    #[error("backlash has {found} numbers, the stiffness {expected}: give the play to each side of every spring")]
+    Count { found: usize, expected: usize },
+    /// A number is negative or not finite.
+    #[error("backlash = {0}: it must be 0 or above")]
+    Negative(f64),
+}
+
+/// Checks the play of `count` springs.
+pub(crate) fn checked_play(given: &[f64], count: usize) -> Result<Vec<f64>, PlayError> {
+    if given.len() != count {
+        return Err(PlayError::Count { found: given.len(), expected: count });
+    }
+    match given.iter().find(|play| !(play.is_finite() && **play >= 0.0)) {
+        Some(wrong) => Err(PlayError::Negative(*wrong)),
+        None => Ok(given.to_vec()),
+    }
+}
+
+/// Returns the curves of springs with play; `None` for those without.
+pub(crate) fn curves_with_play(stiffness: &[f64], play: &[f64]) -> Vec<Option<TorqueCurve>> {
+    let springs = stiffness.iter().zip(play);
+    springs.map(|(k, play)| (*play > 0.0).then(|| TorqueCurve::backlash(*k, *play))).collect()
 }
 
 /// Returns the stiffness of a gearbox and its number of coordinates.
@@ -513,7 +575,7 @@ fn stiffness_of(
         GearStiffness::Axis(k) => k.is_finite() && *k > 0.0,
         GearStiffness::Tilting(k) => k.iter().all(|k| k.is_finite() && *k > 0.0),
         GearStiffness::Full(K) => K.iter().all(|k| k.is_finite()) && K.symmetric_eigenvalues().min() > 0.0,
-        GearStiffness::Guide(_) => true,
+        GearStiffness::Separate(_) | GearStiffness::Guide(_) => true,
     };
     if !finite {
         return Err(at("the stiffness must be finite and positive (definite)".into()));
@@ -556,5 +618,15 @@ fn guide_gear(
     let (tubes, tilts) = guide.checked(joint).map_err(|error| at(error.to_string()))?;
     let dampers = dampers(gear, tilts.len(), at)?;
     let gearbox = Gearbox { joint: joint.name.clone(), stiffness: GearStiffness::Guide(tubes) };
-    Ok((gearbox, GearDamping { dampers, curve: None, transmission: Vec::new(), hysteresis: None, tilts }))
+    Ok((
+        gearbox,
+        GearDamping {
+            dampers,
+            curves: Vec::new(),
+            play: Vec::new(),
+            transmission: Vec::new(),
+            hysteresis: None,
+            tilts,
+        },
+    ))
 }

@@ -16,7 +16,7 @@ use crate::bends::bends;
 use crate::caveat::Caveat;
 use crate::caveat::kinds;
 use crate::caveat::size::Size;
-use crate::drive_entry::{DriveKind, ServoEntry};
+use crate::drive_entry::{DriveKind, ServoEntry, curves_with_play};
 use crate::error::{Error, ModellingError};
 use crate::flexible::{FlexibleRobot, Owner};
 use crate::gear_entry::{GearLaws, RobotCoupling};
@@ -60,7 +60,7 @@ impl Robot {
         let gearboxes: Vec<Gearbox> =
             self.drives.iter().filter_map(|drive| drive.gearbox_as(modelling.drives)).collect();
         let gears = insert_gearboxes(&mut substituted.mechanism, &gearboxes).map_err(ModellingError::from)?;
-        let mounted = self.insert_springs(&mut substituted, modelling)?;
+        let mounted = self.insert_mounting(&mut substituted, modelling)?;
         let model = Model::new(&substituted.mechanism)
             .map_err(|source| Error::Model { path: self.urdf_path.clone(), source: Box::new(source) })?;
 
@@ -68,7 +68,7 @@ impl Robot {
         owned.extend(self.modal_springs(&links, &substituted));
         owned.extend(self.gear_springs(&gears, &model));
         let mounting = mounted.as_ref().map(|_| substituted.spans.len() - 1);
-        owned.extend(mounted);
+        owned.extend(mounted.into_iter().flatten());
         let (springs, owners) = in_coordinate_order(&model, owned)?;
         let (friction, torque) = self.actuation(&model, modelling.drives);
         let gears = self.gear_laws(&model, &owners);
@@ -116,20 +116,24 @@ impl Robot {
     }
 
     /// Inserts the mounting springs under the base; with rigid links the ground is rigid too.
-    fn insert_springs(
+    fn insert_mounting(
         &self,
         substituted: &mut Substituted,
         modelling: &Modelling,
-    ) -> Result<Option<OwnedSpring>, Error> {
-        let Some(RobotMounting::Springs { springs, damping }) = &self.mounting else { return Ok(None) };
+    ) -> Result<Option<Vec<OwnedSpring>>, Error> {
+        let Some(RobotMounting::Springs { springs, damping, play }) = &self.mounting else { return Ok(None) };
         if modelling.links == LinkModel::Rigid {
             return Ok(None);
         }
-        let (spring, span) = insert_mounting(&mut substituted.mechanism, springs).map_err(ModellingError::from)?;
+        let (inserted, span) = insert_mounting(&mut substituted.mechanism, springs).map_err(ModellingError::from)?;
         let owner = Owner::Link(substituted.spans.len());
         substituted.spans.push(span);
-        let (group, name) = (spring.joint, spring.link);
-        Ok(Some(OwnedSpring { group, spring: Spring::from((name, spring.K_S, *damping)), owner }))
+        let curves = curves_with_play(springs.K_S.diagonal().as_slice(), play);
+        let owned = inserted.into_iter().map(|GearSpring { name, joint, component, K, .. }| {
+            let curve = curves.get(component).cloned().flatten().map(SpringCurve::from);
+            OwnedSpring { group: joint, spring: Spring { name, K, damping: *damping, curve, geometric: None }, owner }
+        });
+        Ok(Some(owned.collect()))
     }
 
     /// Returns the springs of the lumped links.
@@ -180,7 +184,7 @@ impl Robot {
                 name: gear.name.clone(),
                 K: gear.K.clone(),
                 damping: damping.of(gear.component, gear.K.nrows()),
-                curve: damping.curve.clone().map(SpringCurve::from),
+                curve: damping.curves.get(gear.component).cloned().flatten().map(SpringCurve::from),
                 geometric: None,
             };
             if let (Some(tubes), Some(tilt)) = (self.drives[number].guide(), damping.tilts.get(gear.component)) {

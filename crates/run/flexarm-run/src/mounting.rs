@@ -17,6 +17,8 @@ pub enum RobotMounting {
         springs: Mounting,
         /// Damping of the springs.
         damping: Damping,
+        /// Play of each spring to each side (m, rad); empty if there is none.
+        play: Vec<f64>,
     },
     /// Flexible link between ground and base.
     Link {

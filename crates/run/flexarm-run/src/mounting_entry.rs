@@ -10,7 +10,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use crate::beam_entry::BeamEntry;
-use crate::drive_entry::Numbers;
+use crate::drive_entry::{Numbers, checked_play};
 use crate::entry_checks::{check_finite, keep, pose};
 use crate::error::Error;
 use crate::link_entry::{DampingEntry, FlexibleLinkEntry, LinkHome, damping_of, flexible_link};
@@ -26,6 +26,8 @@ pub(crate) struct MountingEntry {
     /// Six stiffnesses along and about the axes of the springs' frame (N/m, N m/rad), or a 6x6
     /// matrix.
     pub stiffness: Option<Spanned<Numbers>>,
+    /// Play of the six springs to each side (m, rad).
+    pub backlash: Option<Spanned<Numbers>>,
     /// Beam from its foot to the base, instead of springs.
     pub beam: Option<Spanned<BeamEntry>>,
     /// Reduced mesh instead of springs: a `.flex` file, relative to the robot file, whose interface
@@ -97,8 +99,9 @@ fn mounting(
             }
             let damping = damping_of(given.damping.as_ref(), source)?;
             let inertia = riding_mass(robot, given, entry, source)?;
-            let springs = Mounting { name, X_BS: pose(xyz, rpy), K_S, inertia };
-            Ok(RobotMounting::Springs { springs, damping })
+            let play = play_of(given.backlash.as_ref(), &K_S, source)?;
+            let springs = Mounting { name, X_BS: pose(xyz, rpy), K_S, separate: !play.is_empty(), inertia };
+            Ok(RobotMounting::Springs { springs, damping, play })
         }
         (None, Some(_), None) | (None, None, Some(_)) => {
             flexible_mounting(robot, entry, name, &xyz, source, home, faults)
@@ -109,6 +112,22 @@ fn mounting(
             Err(source.error(entry.span(), message).into())
         }
     }
+}
+
+/// Returns the play of each spring; none if all are 0.
+fn play_of(given: Option<&Spanned<Numbers>>, K: &Matrix6<f64>, source: &Source) -> Result<Vec<f64>, RobotFileError> {
+    let Some(given) = given else { return Ok(Vec::new()) };
+    let fail = |message: String| source.error(given.span(), format!("mounting: {message}"));
+    if *K != Matrix6::from_diagonal(&K.diagonal()) {
+        return Err(fail("backlash needs uncoupled springs: stiffness of six numbers, not a 6x6 matrix".into()));
+    }
+    let play = match given.get_ref() {
+        Numbers::One(play) => checked_play(&[*play], 6),
+        Numbers::Many(play) => checked_play(play, 6),
+        Numbers::Matrix(_) => checked_play(&[], 6),
+    };
+    let play = play.map_err(|error| fail(error.to_string()))?;
+    Ok(if play.iter().all(|play| *play == 0.0) { Vec::new() } else { play })
 }
 
 /// Returns the first given key that only a flexible link has.
@@ -266,6 +285,9 @@ fn flexible_mounting(
             entry.span(),
             "mass, com and inertia belong to springs; a beam has the mass of its section, a .flex file its own",
         ));
+    }
+    if let Some(backlash) = &given.backlash {
+        return Err(fail(backlash.span(), "backlash belongs to springs; a beam and a .flex file have none"));
     }
     if let Some(rpy) = &given.rpy {
         return Err(fail(

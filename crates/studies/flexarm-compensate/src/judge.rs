@@ -68,10 +68,11 @@ fn changed(robot: &Robot, stiffness: f64, damping: f64) -> Robot {
                 GearStiffness::Axis(k) => GearStiffness::Axis(stiffness * k),
                 GearStiffness::Tilting(k) => GearStiffness::Tilting(k.map(|k| stiffness * k)),
                 GearStiffness::Full(K) => GearStiffness::Full(K * stiffness),
+                GearStiffness::Separate(k) => GearStiffness::Separate(k.map(|k| stiffness * k)),
                 GearStiffness::Guide(tubes) => GearStiffness::Guide(tubes.clone()),
             };
             gear.tilts.iter_mut().for_each(|tilt| tilt.compliance = tilt.compliance.map(|c| c / stiffness));
-            gear.curve = gear.curve.as_ref().map(|curve| curve.scaled(stiffness));
+            gear.curves.iter_mut().flatten().for_each(|curve| *curve = curve.scaled(stiffness));
             gear.dampers = gear.dampers.as_ref().map(|d| d.iter().map(|d| damping * d).collect());
         }
     }

@@ -83,7 +83,7 @@ pub(crate) fn candidates(robot: &Robot, flexible: &FlexibleRobot) -> Vec<Candida
         let springs = of(Owner::Drive(number));
         let Some((gearbox, damping)) = drive.gearbox.as_ref().filter(|_| !springs.is_empty()) else { continue };
         // A piecewise stiffness curve has no single stiffness, but one with backlash has.
-        if damping.curve.is_some() && drive.backlash == 0.0 {
+        if !damping.curves.is_empty() && damping.play.is_empty() {
             continue;
         }
         let slides = flexible.model.coordinates().iter().any(|c| c.joint == drive.joint && c.slides());
@@ -329,14 +329,10 @@ fn gearbox_parameters(joint: &str, K: &GearStiffness, springs: &[usize], slides:
             each.map(|(i, (s, k))| stiffness(format!("{name}[{i}]"), "N m/rad", *k, whole(*s), written(Some(i))))
                 .collect()
         }
-        (GearStiffness::Full(K), [spring]) if is_diagonal(K) => {
-            let entry = |i: usize| {
-                let unit = if i < 3 { "N/m" } else { "N m/rad" };
-                let place = vec![SpringPart { spring: *spring, coordinate: Some(i) }];
-                stiffness(format!("{name}[{i}]"), unit, K[(i, i)], place, written(Some(i)))
-            };
-            (0..6).map(entry).collect()
+        (GearStiffness::Full(K), _) if is_diagonal(K) => {
+            six_springs(&name, K.diagonal().as_slice(), springs, |i| written(Some(i)))
         }
+        (GearStiffness::Separate(k), _) => six_springs(&name, k, springs, |i| written(Some(i))),
         // Full matrix: one factor on all entries.
         _ => {
             let places = springs.iter().map(|spring| SpringPart { spring: *spring, coordinate: None }).collect();
@@ -345,27 +341,33 @@ fn gearbox_parameters(joint: &str, K: &GearStiffness, springs: &[usize], slides:
     }
 }
 
+/// Returns the stiffness of six uncoupled springs: one element with six coordinates, or six.
+fn six_springs(
+    name: &str,
+    k: &[f64],
+    springs: &[usize],
+    written: impl Fn(usize) -> ParameterLocation,
+) -> Vec<Candidate> {
+    let part = |i: usize| match springs {
+        [spring] => SpringPart { spring: *spring, coordinate: Some(i) },
+        _ => SpringPart { spring: springs[i], coordinate: None },
+    };
+    let entry = |(i, k): (usize, &f64)| {
+        let unit = if i < 3 { "N/m" } else { "N m/rad" };
+        stiffness(format!("{name}[{i}]"), unit, *k, vec![part(i)], written(i))
+    };
+    k.iter().enumerate().map(entry).collect()
+}
+
 /// Returns the six uncoupled springs under the base. A beam or mesh there has no stiffness values
 /// in the robot file.
 fn mounting_parameters(robot: &Robot, springs: &[usize]) -> Vec<Candidate> {
-    let (Some(RobotMounting::Springs { springs: mounting, .. }), [spring]) = (&robot.mounting, springs) else {
-        return Vec::new();
-    };
-    if !is_diagonal(&mounting.K_S) {
+    let Some(RobotMounting::Springs { springs: mounting, .. }) = &robot.mounting else { return Vec::new() };
+    if !is_diagonal(&mounting.K_S) || springs.is_empty() {
         return Vec::new();
     }
-    let entry = |i: usize| {
-        let unit = if i < 3 { "N/m" } else { "N m/rad" };
-        let place = vec![SpringPart { spring: *spring, coordinate: Some(i) }];
-        stiffness(
-            format!("mounting.stiffness[{i}]"),
-            unit,
-            mounting.K_S[(i, i)],
-            place,
-            ParameterLocation::Mounting { entry: i },
-        )
-    };
-    (0..6).map(entry).collect()
+    let k = mounting.K_S.diagonal();
+    six_springs("mounting.stiffness", k.as_slice(), springs, |entry| ParameterLocation::Mounting { entry })
 }
 
 fn is_diagonal(K: &nalgebra::Matrix6<f64>) -> bool {

@@ -412,7 +412,7 @@ class RobotBuilder:
         *,
         stiffness: Optional[ArrayLike] = None,
         damping: Optional[ArrayLike] = None,
-        backlash: Optional[float] = None,
+        backlash: Optional[ArrayLike] = None,
         curve: Optional[ArrayLike] = None,
         ratio: Optional[float] = None,
         motor_inertia: Optional[float] = None,
@@ -436,8 +436,8 @@ class RobotBuilder:
             Stiffness of the gearbox about the axis (N m/rad), about x, y, z, or of all directions.
         damping : float or array_like, shape (3,) or (6,), optional
             Damping in the same form (N m s/rad). Default: 3 % modal.
-        backlash : float, optional
-            Backlash to each side (rad).
+        backlash : float or array_like, shape (3,) or (6,), optional
+            Play to each side (rad), in the form of the stiffness.
         curve : array_like, shape (m, 2), optional
             Points (rad, N m), instead of stiffness and backlash.
         ratio : float, optional
@@ -459,7 +459,7 @@ class RobotBuilder:
         gear = {
             "stiffness": None if stiffness is None else _numbers("stiffness", stiffness, (), (3,), (6,), (6, 6)),
             "damping": None if damping is None else _numbers("damping", damping, (), (3,), (6,)),
-            "backlash": _number("backlash", backlash),
+            "backlash": None if backlash is None else _numbers("backlash", backlash, (), (3,), (6,)),
             "curve": curve,
             **gearbox,
         }

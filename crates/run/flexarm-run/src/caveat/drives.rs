@@ -100,6 +100,10 @@ fn stiffness(drive: &Drive) -> Option<(f64, Option<f64>)> {
             let least = |r: std::ops::Range<usize>| r.map(|i| K[(i, i)]).fold(f64::INFINITY, f64::min);
             Some((least(3..6), Some(least(0..3))))
         }
+        GearStiffness::Separate(k) => {
+            let least = |k: &[f64]| k.iter().copied().fold(f64::INFINITY, f64::min);
+            Some((least(&k[3..]), Some(least(&k[..3]))))
+        }
         GearStiffness::Guide(_) => None,
     }
 }
@@ -152,10 +156,11 @@ fn gear(drive: &Drive, effort: f64, others: Option<f64>) -> Vec<Caveat> {
     if gear.dampers.as_ref().is_some_and(|d| d.len() == 1) && relaxation > CREEP {
         caveats.push(kinds::CREEP.found(name(drive), relaxation, CREEP));
     }
-    if drive.backlash > PLAY[0] {
-        let likely = slip(drive.backlash, &(0.0..=PLAY[0]), slip::ANGLE, 1.0);
-        let caveat = kinds::BACKLASH.found(name(drive), drive.backlash, PLAY[0]).likely(likely);
-        caveats.push(if drive.backlash > PLAY[1] { caveat } else { caveat.as_note() });
+    let [play, _] = drive.play();
+    if play > PLAY[0] {
+        let likely = slip(play, &(0.0..=PLAY[0]), slip::ANGLE, 1.0);
+        let caveat = kinds::BACKLASH.found(name(drive), play, PLAY[0]).likely(likely);
+        caveats.push(if play > PLAY[1] { caveat } else { caveat.as_note() });
     }
     caveats
 }

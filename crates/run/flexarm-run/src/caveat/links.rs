@@ -82,7 +82,7 @@ const SINKS: [f64; 2] = [1e-3, 5e-3];
 
 /// Checks the springs under the base.
 pub(crate) fn of_mounting(robot: &Robot) -> Vec<Caveat> {
-    let Some(RobotMounting::Springs { springs, damping: damped }) = &robot.mounting else { return Vec::new() };
+    let Some(RobotMounting::Springs { springs, damping: damped, .. }) = &robot.mounting else { return Vec::new() };
     let name = format!("mounting {:?}", springs.name);
     let mut caveats: Vec<Caveat> = damping(&name, damped).into_iter().collect();
     let links = robot.rigid.links.iter().filter_map(|link| link.inertia).map(|inertia| inertia.mass);

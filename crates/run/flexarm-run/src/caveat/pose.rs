@@ -49,16 +49,17 @@ impl ArmAtRest<'_> {
             let drive = &self.robot.drives[*k];
             let joint = self.robot.rigid.joints.iter().find(|j| j.name == drive.joint);
             let effort = joint.map_or(f64::INFINITY, |j| j.limits.effort);
-            let slides = joint.is_some_and(|j| j.kind.slides()) && drive.guide().is_none();
             let e = &self.elastic[self.arm.offset(element)..][..element.size];
             let norm = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>().sqrt();
-            let (along, turned) = match (element.size, slides) {
-                (6, _) => (norm(&e[..3]), norm(&e[3..])),
-                (_, true) => (norm(e), 0.0),
+            let (along, turned) = match element.size {
+                6 => (norm(&e[..3]), norm(&e[3..])),
+                _ if element.slides(&self.arm.model) => (norm(e), 0.0),
                 _ => (0.0, norm(e)),
             };
-            // Backlash is not deflection.
-            caveats.extend(give(drive, effort, (turned - drive.backlash).max(0.0), along, 1.0));
+            // Play is not deflection. That of a prismatic joint's only spring is the first number.
+            let [play, translations] = drive.play();
+            let sliding = if translations > 0.0 { translations } else { play };
+            caveats.extend(give(drive, effort, (turned - play).max(0.0), (along - sliding).max(0.0), 1.0));
         }
         caveats
     }

@@ -133,7 +133,7 @@ impl Robot {
     /// [`Error::Modelling`] if the stiffness is singular or the name is that of a link,
     /// [`Error::Pose`] and others as [`Robot::modelled`].
     pub fn with_mounting(mut self, springs: Mounting, damping: Damping) -> Result<Self, Error> {
-        self.mounting = Some(RobotMounting::Springs { springs, damping });
+        self.mounting = Some(RobotMounting::Springs { springs, damping, play: Vec::new() });
         self.flexible_robot()?;
         Ok(self)
     }

@@ -112,6 +112,8 @@ pub(crate) fn link_side_angles(robot: &Robot, flexible: &FlexibleRobot) -> Vec<(
         let JointMotion::Axis(motion) = motor.motion else { continue };
         let axis = motion.axis();
         match flexible.model.bodies()[group.body].motion {
+            // Of several springs only those of the joint's own kind move it.
+            JointMotion::Axis(own) if own.slides() != motion.slides() => {}
             JointMotion::Axis(own) => {
                 angles.push((k, group.coordinate, axis.dot(&own.axis())));
             }
