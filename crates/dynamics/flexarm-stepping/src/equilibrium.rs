@@ -5,7 +5,7 @@ use nalgebra::DVector;
 use crate::error::StepError;
 
 /// Accepted unbalanced force relative to the largest force.
-const TOLERANCE: f64 = 1e-13;
+pub(crate) const TOLERANCE: f64 = 1e-13;
 /// Maximum number of iterations, and that with hysteresis: the first loading curve may be soft,
 /// then stiff, and full steps may oscillate between its pieces.
 const MOST_ITERATIONS: [usize; 2] = [30, 200];
@@ -18,8 +18,9 @@ pub(crate) trait Forces {
     /// Returns the unbalanced forces at `e`, and the largest of the forces that they consist of.
     fn unbalanced(&mut self, e: &DVector<f64>) -> Result<(DVector<f64>, f64), StepError>;
 
-    /// Returns the step of Newton's method at `e`, to be subtracted, for the unbalanced forces `r`.
-    fn step(&mut self, e: &DVector<f64>, r: &DVector<f64>) -> Result<DVector<f64>, StepError>;
+    /// Returns the step of Newton's method at `e`, to be subtracted, for the unbalanced forces `r`,
+    /// and `scale`, the largest of the forces that they consist of.
+    fn step(&mut self, e: &DVector<f64>, r: &DVector<f64>, scale: f64) -> Result<DVector<f64>, StepError>;
 
     /// Returns whether a gear has hysteresis.
     fn has_hysteresis(&self) -> bool;
@@ -55,7 +56,7 @@ pub(crate) fn equilibrium(forces: &mut impl Forces, mut e: DVector<f64>) -> Resu
         if !residual.is_finite() || iterations == most {
             return Err(StepError::NoEquilibrium { t: forces.time(), iterations, residual });
         }
-        let step = forces.step(&e, &r)?;
+        let step = forces.step(&e, &r, scale)?;
         // Beyond a backlash, a small load may be below the round-off of the deflection.
         if step.amax() <= 2.0 * f64::EPSILON * e.amax() {
             return Ok(Equilibrium { e, residual, iterations });

@@ -23,7 +23,9 @@ use crate::arm::{ElasticElement, FlexibleArm, Servo};
 use crate::drive::{Friction, ServoAxis};
 use crate::equilibrium::{Equilibrium, Forces, equilibrium};
 use crate::error::StepError;
-use crate::statics::{StaticSlopes, for_vibration, spring_forces, static_equilibrium, static_forces, with_curves};
+use crate::statics::{
+    StaticSlopes, for_vibration, leave_play, spring_forces, static_equilibrium, static_forces, to_the_edge, with_curves,
+};
 
 /// Minimum step of the wrench, as a share of it.
 const SMALLEST_LOAD_STEP: f64 = 1.0 / 128.0;
@@ -322,6 +324,22 @@ fn all_coordinates(arm: &FlexibleArm, t: f64, e: &DVector<f64>) -> DVector<f64> 
     state.q
 }
 
+/// Returns the elastic coordinates in equilibrium under weight, the loads at `t` and a wrench at the
+/// tool's origin (world axes).
+///
+/// # Errors
+/// [`StepError::NoEquilibrium`], [`StepError::OpenLoop`], and [`StepError::Singular`] beyond a
+/// buckling load.
+pub(crate) fn loaded_equilibrium(
+    arm: &FlexibleArm,
+    tool: &Frame,
+    F_T_W: &Wrench,
+    t: f64,
+) -> Result<DVector<f64>, StepError> {
+    let statics = Statics { arm, tool, F_T_W: *F_T_W, t };
+    Ok(statics.equilibrium(&mut Data::new(&arm.model))?.e)
+}
+
 /// Static loading: weight, loads of the arm, wrench on the tool.
 struct Statics<'a> {
     arm: &'a FlexibleArm,
@@ -433,16 +451,25 @@ impl Forces for UnderLoad<'_> {
         Ok((&spring + elastic_p, scale))
     }
 
-    fn step(&mut self, e: &DVector<f64>, r: &DVector<f64>) -> Result<DVector<f64>, StepError> {
+    fn step(&mut self, e: &DVector<f64>, r: &DVector<f64>, scale: f64) -> Result<DVector<f64>, StepError> {
         let (arm, m, n) = (self.statics.arm, self.statics.arm.model.n_actuated(), e.len());
         let q = all_coordinates(arm, self.statics.t, e);
         let springs = with_curves(arm, &self.at_rest, q.as_slice(), e);
-        let tangent = &springs + self.statics.slopes(self.data, &q).view((m, m), (n, n));
+        let slopes = self.statics.slopes(self.data, &q).view((m, m), (n, n)).into_owned();
+        let is_stable = |K: &DMatrix<f64>| ((K + K.transpose()) * 0.5).cholesky().is_some();
         // If the tangent is not positive definite, its step leads uphill to a saddle point; a step
         // with the springs only leads downhill.
-        let stable = ((&tangent + tangent.transpose()) * 0.5).cholesky().is_some();
+        let tangent = &springs + &slopes;
+        let stable = is_stable(&tangent);
         self.buckled |= !stable;
-        if stable { tangent } else { springs }.lu().solve(r).ok_or_else(|| self.statics.singular())
+        let out = leave_play(arm, q.as_slice(), e, r, scale, &springs) + slopes;
+        let K = match (stable && is_stable(&out), stable) {
+            (true, _) => out,
+            (false, true) => tangent,
+            _ => springs,
+        };
+        let step = K.lu().solve(r).ok_or_else(|| self.statics.singular())?;
+        Ok(to_the_edge(arm, q.as_slice(), e, step))
     }
 
     fn has_hysteresis(&self) -> bool {

@@ -9,7 +9,7 @@ use flexarm_kinematics::{
 use nalgebra::{DMatrix, DVector};
 
 use crate::arm::FlexibleArm;
-use crate::equilibrium::{Forces, equilibrium};
+use crate::equilibrium::{Forces, TOLERANCE, equilibrium};
 use crate::error::StepError;
 use crate::geometric::add_geometric_forces;
 use crate::workspaces::PooledWorkspace;
@@ -51,14 +51,14 @@ impl Forces for UnderWeight<'_> {
         StepError::open_loop(&self.arm.model, &self.data, self.t).map_or(Ok(found), Err)
     }
 
-    fn step(&mut self, e: &DVector<f64>, r: &DVector<f64>) -> Result<DVector<f64>, StepError> {
+    fn step(&mut self, e: &DVector<f64>, r: &DVector<f64>, scale: f64) -> Result<DVector<f64>, StepError> {
         let Self { arm, data, K, t } = self;
         let q = joints_at(arm, *t);
         let steep = with_curves(arm, K, &q, e);
         let mut tangent = |K: &DMatrix<f64>| tangent_stiffness(arm, data, *t, e, K).cholesky();
-        let factor = tangent(&leave_play(arm, &q, e, r, &steep)).or_else(|| tangent(&steep));
+        let factor = tangent(&leave_play(arm, &q, e, r, scale, &steep)).or_else(|| tangent(&steep));
         let singular = StepError::Singular { matrix: "static stiffness (with the effect of weight)", t: *t };
-        Ok(factor.ok_or(singular)?.solve(r))
+        Ok(to_the_edge(arm, &q, e, factor.ok_or(singular)?.solve(r)))
     }
 
     fn has_hysteresis(&self) -> bool {
@@ -177,20 +177,46 @@ pub(crate) fn for_vibration(arm: &FlexibleArm, K: &DMatrix<f64>, q: &[f64], e: &
     tangent
 }
 
-/// Returns the stiffness with which Newton's step out of a backlash ends just beyond its edge,
-/// however small the force.
-fn leave_play(arm: &FlexibleArm, q: &[f64], e: &DVector<f64>, g: &DVector<f64>, K: &DMatrix<f64>) -> DMatrix<f64> {
+/// Distance over which a step of Newton's method leaves a play, divided by that to its edge.
+const BEYOND_EDGE: f64 = 1.001;
+
+/// Returns the stiffness K with which Newton's step out of a backlash ends just beyond its edge,
+/// however small the unbalanced force r. Forces below the accepted part of `scale` do not count.
+pub(crate) fn leave_play(
+    arm: &FlexibleArm,
+    q: &[f64],
+    e: &DVector<f64>,
+    r: &DVector<f64>,
+    scale: f64,
+    K: &DMatrix<f64>,
+) -> DMatrix<f64> {
     let mut K = K.clone();
     for (number, element) in arm.elements.iter().enumerate() {
         let k = arm.offset(element);
         if let Some(curve) = &element.curve
-            && g[k] != 0.0
-            && let Some(way) = curve.way_out(arm.deflection(number, e[k], q), -g[k])
+            && r[k].abs() > TOLERANCE * scale
+            && let Some(way) = curve.way_out(arm.deflection(number, e[k], q), -r[k])
         {
-            K[(k, k)] = K[(k, k)].min(g[k].abs() / (1.001 * way));
+            K[(k, k)] = K[(k, k)].min(r[k].abs() / (BEYOND_EDGE * way));
         }
     }
     K
+}
+
+/// Returns a step of Newton's method, to be subtracted from `e`, that takes no coordinate out of its
+/// play further than just beyond the edge: the force on it there is not that of the step's start if
+/// others move too.
+pub(crate) fn to_the_edge(arm: &FlexibleArm, q: &[f64], e: &DVector<f64>, mut step: DVector<f64>) -> DVector<f64> {
+    for (number, element) in arm.elements.iter().enumerate() {
+        let k = arm.offset(element);
+        if let Some(curve) = &element.curve
+            && let Some(way) = curve.way_out(arm.deflection(number, e[k], q), -step[k])
+        {
+            let most = BEYOND_EDGE * way;
+            step[k] = step[k].clamp(-most, most);
+        }
+    }
+    step
 }
 
 /// Returns `K + dg/de` under weight and the loads at time `t`, symmetrised.

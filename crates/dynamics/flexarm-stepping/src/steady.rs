@@ -168,7 +168,7 @@ impl Forces for Rotation {
         Ok((r, scale))
     }
 
-    fn step(&mut self, e: &DVector<f64>, r: &DVector<f64>) -> Result<DVector<f64>, StepError> {
+    fn step(&mut self, e: &DVector<f64>, r: &DVector<f64>, _: f64) -> Result<DVector<f64>, StepError> {
         let singular = StepError::Singular { matrix: "stiffness under rotation", t: 0.0 };
         self.slopes(e, false).lu().solve(r).ok_or(singular)
     }

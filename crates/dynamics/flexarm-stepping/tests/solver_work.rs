@@ -14,7 +14,7 @@ use flexarm_testkit::{reference_arm, reference_motion};
 /// Stepper, step size (s), then the work: steps, evaluations, factorisations. The reference stepper
 /// chooses its own steps.
 const WORK: [(&str, f64, [u64; 3]); 6] = [
-    ("generalized-alpha", 1e-3, [500, 553, 15]),
+    ("generalized-alpha", 1e-3, [500, 613, 13]),
     ("spook", 1e-3, [500, 500, 500]),
     ("rk4", 1e-4, [5000, 20000, 0]),
     ("reference", 1e-3, [2750, 6374, 583]),

@@ -23,8 +23,9 @@ use crate::arm::FlexibleArm;
 use crate::dense::Factor;
 use crate::equilibrium::MOST_HALVINGS;
 use crate::error::StepError;
+use crate::linear::loaded_equilibrium;
 use crate::motion::Held;
-use crate::statics::{StaticSlopes, add_spring_forces, static_equilibrium, static_forces};
+use crate::statics::{StaticSlopes, add_spring_forces, static_forces};
 pub use each::{PoseAnswer, PoseOutputs};
 use tangent::{Tangent, to_hertz};
 
@@ -152,7 +153,7 @@ impl OperatingPoint {
         if self.curved {
             // Leave backlash with the dedicated solver.
             let held = FlexibleArm { motion: std::sync::Arc::new(Held(q.to_vec())), ..self.arm.clone() };
-            let e = static_equilibrium(&held, 0.0)?;
+            let e = loaded_equilibrium(&held, &self.tool, F_T_W, 0.0)?;
             self.q.rows_mut(m, e.len()).copy_from(&e);
             // The factor of the springs at rest does not apply beyond the backlash.
             self.factored = false;
