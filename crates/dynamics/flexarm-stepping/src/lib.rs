@@ -70,7 +70,6 @@ mod stepper;
 pub mod steppers;
 mod system;
 mod tree_matrix;
-mod workspaces;
 
 pub use arm::{Damping, ElasticElement, FlexibleArm, GeometricStiffness, InertiaChange, Modes, Servo, Spring};
 pub use batch::{Batch, BatchRun, ToolDeflection};
@@ -99,4 +98,3 @@ pub use stepper::{Counts, Start, Stepper};
 pub use steppers::*;
 pub use system::SecondOrderSystem;
 pub use tree_matrix::{TreeMatrices, TreeNode};
-pub use workspaces::{PooledWorkspace, Workspaces};
