@@ -25,7 +25,6 @@ use crate::elastic_tree::ElasticTree;
 use crate::error::StepError;
 use crate::events::{ArmDamping, EventQueue, damping_after_changes};
 use crate::gear::GearState;
-use crate::held_modes::HeldModes;
 use crate::servo::ServoState;
 use events::StepStart;
 
@@ -60,8 +59,6 @@ pub struct ReducedArm {
     pub(crate) gears: Option<Box<GearState>>,
     /// Tree of the elastic joints, if there are enough of them and they are damped by element.
     tree: Option<ElasticTree>,
-    /// Modes that are eliminated first, if there are enough of them.
-    modes: Option<HeldModes>,
     /// Whether `data` holds the poses of the last [`ReducedArm::set`].
     is_placed: bool,
 }
@@ -95,7 +92,6 @@ impl ReducedArm {
             forces: DVector::zeros(n),
             gears: GearState::of(&arm),
             tree: ElasticTree::that_pays(&arm),
-            modes: HeldModes::that_pay(&arm),
             is_placed: false,
             arm,
         }
