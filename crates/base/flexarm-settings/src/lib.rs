@@ -1,7 +1,7 @@
 //! Building blocks of errors and caveats: settings named in messages, which each front end names in
 //! its own way ([`Setting`]); the [`Caveat`], which compares a value with a reference; the party
 //! responsible for an error ([`Fault`]); ranges of physical quantities ([`Quantity`]); TOML
-//! messages without type names ([`without_types`]); escaping of foreign text for each kind of
+//! messages without type names ([`without_types`]); choices by a word ([`Words`]); escaping of foreign text for each kind of
 //! output ([`written`]).
 //!
 //! "Try a smaller step" refers to a struct field in Rust, to a keyword argument in Python and to a
@@ -26,6 +26,7 @@ mod gathered;
 mod quantity;
 mod spelling;
 mod toml_message;
+mod words;
 pub mod written;
 
 use std::fmt;
@@ -37,6 +38,7 @@ pub use gathered::gathered;
 pub use quantity::{OutOfRange, Quantity};
 pub use spelling::closest;
 pub use toml_message::without_types;
+pub use words::Words;
 
 /// Setting named in a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -92,19 +92,6 @@ impl ModalBody {
         M
     }
 
-    /// Coordinates that move no interface; empty unless they are mutually orthogonal in mass.
-    pub(crate) fn held(&self) -> Vec<usize> {
-        /// Relative size below which values are considered rounding errors.
-        const ROUNDING: f64 = 1e-12;
-        let largest = self.interfaces.iter().map(|shape| shape.Phi.amax()).fold(0.0, f64::max);
-        let still = |k: &usize| self.interfaces.iter().all(|shape| shape.Phi.column(*k).amax() <= ROUNDING * largest);
-        let held: Vec<usize> = (0..self.n()).filter(still).collect();
-        let M = &self.M;
-        let meet = |k: usize, l: usize| M[(k, l)].abs() > ROUNDING * (M[(k, k)] * M[(l, l)]).abs().sqrt();
-        let orthogonal = held.iter().all(|&k| M[(k, k)] > 0.0 && held.iter().all(|&l| k == l || !meet(k, l)));
-        if orthogonal { held } else { Vec::new() }
-    }
-
     /// Returns a description of inconsistent sizes or values, if any.
     pub(crate) fn fault(&self) -> Option<&'static str> {
         let n = self.n();

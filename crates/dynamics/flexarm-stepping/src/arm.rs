@@ -16,7 +16,6 @@ use crate::drive::{Friction, ServoAxis, SpringCurve};
 use crate::gear::{GearCoupling, Hysteresis, LoadFriction, TransmissionError};
 use crate::load::Load;
 use crate::motion::PrescribedMotion;
-use crate::workspaces::Workspaces;
 
 /// Stiffness and damping of one group of elastic coordinates, before it is assigned to the model.
 #[derive(Clone, Debug)]
@@ -189,8 +188,6 @@ pub struct FlexibleArm {
     pub cross_damping: Vec<(usize, usize, f64)>,
     /// Natural modes at the start pose, drives locked.
     pub modes: Modes,
-    /// Reusable workspaces, shared with all copies of the arm.
-    pub workspaces: Workspaces,
 }
 
 /// Sampled joint controllers; see [`ServoAxis`].

@@ -12,7 +12,6 @@ use crate::events::SAME_TIME;
 use crate::load::Load;
 use crate::modes::modes_at;
 use crate::motion::PrescribedMotion;
-use crate::workspaces::Workspaces;
 
 impl FlexibleArm {
     /// Creates an arm from a model and the springs of its elastic groups.
@@ -52,7 +51,6 @@ impl FlexibleArm {
         }
         let n = model.n_elastic();
         let mut arm = Self {
-            workspaces: Workspaces::of(&model),
             model,
             elements,
             D: DMatrix::zeros(n, n),
@@ -225,7 +223,7 @@ impl FlexibleArm {
         let (mut state, mut qddot) = (State::zeros(model), DVector::zeros(model.nv()));
         self.prescribed_state(0.0, &mut state, &mut qddot);
         state.q.rows_mut(model.n_actuated(), n).copy_from(&self.modes.equilibrium);
-        let mut data = self.lend_data();
+        let mut data = Data::new(&self.model);
         let M = mass_matrix(model, &mut data, &state.q);
         M.view((model.n_actuated(), model.n_actuated()), (n, n)).clone_owned()
     }

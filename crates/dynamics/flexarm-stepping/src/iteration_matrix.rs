@@ -1,10 +1,9 @@
-//! Matrix of Newton's method in an implicit step, `J = M + c_D D + c_K K`, in one of three forms:
+//! Matrix of Newton's method in an implicit step, `J = M + c_D D + c_K K`, in one of two forms:
 //!
 //! - dense inverse: it is used dozens of times before it is renewed, and a product costs a third of
 //!   two triangular solves;
 //! - elimination along the tree, if the coordinates form a tree and are many
-//!   ([`crate::tree_matrix`]);
-//! - elimination of the modal coordinates first, if many are modal ([`crate::mode_matrix`]).
+//!   ([`crate::tree_matrix`]).
 //!
 //! Between [`IterationMatrix::read`] and [`IterationMatrix::invert`] a method may change a dense J
 //! (fields of [`DenseInverse`]). Nothing here allocates after the first use.
@@ -13,7 +12,6 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use crate::dense::{dot, product, solve_in_place};
 use crate::error::StepError;
-use crate::mode_matrix::ModeInverse;
 use crate::system::SecondOrderSystem;
 use crate::tree_matrix::TreeInverse;
 
@@ -32,8 +30,6 @@ pub(crate) enum MatrixForm {
     Dense(DenseInverse),
     /// Elimination along the tree, including s.
     Tree(TreeInverse),
-    /// Elimination of modes first, including s.
-    Modes(Box<ModeInverse>),
 }
 
 /// `(S + C)^-1 B`; after reading, `S = M`, `C = c_D D + c_K K` and `B = 1`. All are n × n; S and C
@@ -91,12 +87,6 @@ impl IterationMatrix {
             if system.along_tree(c_D, c_K, &mut tree.matrices) {
                 return;
             }
-            self.way = MatrixForm::Modes(Box::default());
-        }
-        if let MatrixForm::Modes(modes) = &mut self.way {
-            if system.with_modes(c_D, c_K, &mut modes.matrices) {
-                return;
-            }
             self.way = MatrixForm::Dense(DenseInverse::new(system.dimension()));
         }
         if let MatrixForm::Dense(dense) = &mut self.way {
@@ -112,7 +102,6 @@ impl IterationMatrix {
         match &mut self.way {
             MatrixForm::Dense(dense) => dense.invert(t),
             MatrixForm::Tree(tree) => tree.factor(self.s, t),
-            MatrixForm::Modes(modes) => modes.factor(self.s, t),
         }
     }
 
@@ -121,7 +110,6 @@ impl IterationMatrix {
         match &mut self.way {
             MatrixForm::Dense(dense) => dense.solve(r),
             MatrixForm::Tree(tree) => tree.solve(r),
-            MatrixForm::Modes(modes) => modes.solve(r),
         }
         dot(r.as_slice(), r.as_slice()).sqrt()
     }

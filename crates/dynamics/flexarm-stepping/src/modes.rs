@@ -19,7 +19,7 @@ pub fn modes_at(arm: &FlexibleArm, t: f64) -> Result<Modes, StepError> {
     }
     let model = &arm.model;
     let equilibrium = static_equilibrium(arm, t)?;
-    let mut data = arm.lend_data();
+    let mut data = Data::new(&arm.model);
     let (mut state, mut qddot) = (State::zeros(model), DVector::zeros(model.nv()));
     arm.prescribed_state(t, &mut state, &mut qddot);
     let K = for_vibration(arm, &arm.stiffness(), state.q.as_slice(), &equilibrium);

@@ -13,7 +13,6 @@ use crate::error::StepError;
 use crate::events::EventQueue;
 use crate::geometric::add_geometric_forces;
 use crate::statics::{add_spring_forces, static_equilibrium, tangent_stiffness, with_curves};
-use crate::workspaces::PooledWorkspace;
 
 /// Relative correction that ends the search: the next correction would be at least ten times
 /// smaller.
@@ -36,7 +35,7 @@ pub(crate) fn before(t: f64) -> f64 {
 pub struct StaticPath {
     arm: Arc<FlexibleArm>,
     events: EventQueue,
-    data: PooledWorkspace<Data>,
+    data: Data,
     /// Drives at the last time, springs at `e`.
     state: State,
     qddot: DVector<f64>,
@@ -56,7 +55,7 @@ impl StaticPath {
         let (nv, n) = (arm.model.nv(), arm.n_elastic_coordinates());
         Self {
             events: EventQueue::of_changes(&arm),
-            data: arm.lend_data(),
+            data: Data::new(&arm.model),
             state: State::zeros(&arm.model),
             qddot: DVector::zeros(nv),
             e: if arm.modes.equilibrium.len() == n { arm.modes.equilibrium.clone() } else { DVector::zeros(n) },

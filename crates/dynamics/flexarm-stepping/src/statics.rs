@@ -12,7 +12,6 @@ use crate::arm::FlexibleArm;
 use crate::equilibrium::{Forces, TOLERANCE, equilibrium};
 use crate::error::StepError;
 use crate::geometric::add_geometric_forces;
-use crate::workspaces::PooledWorkspace;
 
 /// Computes the elastic coordinates at which the springs carry gravity and the loads at time `t`.
 ///
@@ -33,14 +32,14 @@ pub fn static_equilibrium(arm: &FlexibleArm, t: f64) -> Result<DVector<f64>, Ste
     if let Some(apart) = arm.apart(&joints_at(arm, t)) {
         return Err(apart);
     }
-    let mut weight = UnderWeight { arm, data: arm.lend_data(), K: arm.stiffness(), t };
+    let mut weight = UnderWeight { arm, data: Data::new(&arm.model), K: arm.stiffness(), t };
     Ok(equilibrium(&mut weight, e)?.e)
 }
 
 /// An arm under gravity and its loads at time t, drives held.
 struct UnderWeight<'a> {
     arm: &'a FlexibleArm,
-    data: PooledWorkspace<Data>,
+    data: Data,
     K: DMatrix<f64>,
     t: f64,
 }

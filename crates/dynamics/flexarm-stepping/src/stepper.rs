@@ -1,6 +1,8 @@
 //! Common interface of all steppers: step, observe, count. The steppers are listed in
 //! [`crate::steppers`].
 
+use flexarm_settings::Words;
+
 use crate::error::StepError;
 use crate::observation::Observation;
 
@@ -12,6 +14,13 @@ pub enum Start {
     Equilibrium,
     /// Undeformed: the springs are relaxed.
     Undeformed,
+}
+
+impl Words for Start {
+    const WORDS: &'static [(&'static str, Self, &'static str)] = &[
+        ("equilibrium", Self::Equilibrium, "Static equilibrium under gravity"),
+        ("undeformed", Self::Undeformed, "Undeformed: the arm falls into its static deflection and rings"),
+    ];
 }
 
 /// Work done by a stepper.

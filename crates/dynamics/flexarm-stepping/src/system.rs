@@ -12,7 +12,6 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::error::StepError;
-use crate::mode_matrix::ModeMatrices;
 use crate::tree_matrix::TreeMatrices;
 
 /// A mechanical system with n coordinates x in a vector space.
@@ -55,13 +54,6 @@ pub trait SecondOrderSystem {
     /// instead of O(n²). Returns `false`, with the contents of `to` unspecified, if they have no
     /// tree structure or if n is so small that dense matrices are faster.
     fn along_tree(&mut self, _c_D: f64, _c_K: f64, _to: &mut TreeMatrices) -> bool {
-        false
-    }
-
-    /// Writes the same three matrices into `to` for a system in which many coordinates are modal:
-    /// these are coupled with the others by the mass matrix only, and not with each other.
-    /// Otherwise returns `false` as [`SecondOrderSystem::along_tree`] does.
-    fn with_modes(&mut self, _c_D: f64, _c_K: f64, _to: &mut ModeMatrices) -> bool {
         false
     }
 }

@@ -18,6 +18,7 @@ mod helical;
 mod linear;
 mod loops;
 mod modal_links;
+mod observed_run;
 mod oscillators;
 mod poses;
 mod reference_arm;
@@ -29,7 +30,6 @@ mod solver_work;
 mod static_targets;
 mod statics;
 mod structure_slopes;
-mod workspaces;
 
 /// Counts the allocations of each thread, and so of each test.
 #[global_allocator]

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use flexarm::{
-    DriveModel, InertiaEstimate, LinkModel, LoadOptions, Modelling, ReadOptions, RecordingFormat, STEPPERS,
-    StepperEntry, sweep::Change,
+    ConstraintForm, DriveModel, InertiaEstimate, LinkModel, LoadOptions, Modelling, ReadOptions, RecordingFormat,
+    ReferenceMethod, STEPPERS, SpookPreset, Start, StepperEntry, Words, sweep::Change,
 };
 
 use crate::failure::Failure;
@@ -84,10 +84,10 @@ impl RobotArgs {
 #[command(next_help_heading = "Models")]
 pub(crate) struct ModellingArgs {
     /// Model of the links [default: as the robot file says]
-    #[arg(long, value_parser = word_of(&LinkModel::WORDS))]
+    #[arg(long, value_parser = word_of::<LinkModel>())]
     pub(crate) links: Option<LinkModel>,
     /// Model of the drives [default: as the robot file says]
-    #[arg(long, value_parser = word_of(&DriveModel::WORDS))]
+    #[arg(long, value_parser = word_of::<DriveModel>())]
     pub(crate) drives: Option<DriveModel>,
     /// Rigid parts of every lumped link, instead of the robot file's
     #[arg(long, value_name = "N", hide_short_help = true, value_parser = clap::value_parser!(u32).range(2..))]
@@ -97,15 +97,11 @@ pub(crate) struct ModellingArgs {
     pub(crate) modes: Option<u32>,
 }
 
-/// Parser for the words of a list of the facade, each with its help text.
-fn word_of<T: Copy + Send + Sync + 'static>(
-    words: &'static [(&'static str, T, &'static str)],
-) -> impl TypedValueParser<Value = T> {
-    let known = words.iter().map(|(word, _, means)| PossibleValue::new(*word).help(*means));
-    PossibleValuesParser::new(known).try_map(|given| {
-        let found = words.iter().find(|(word, ..)| *word == given).map(|(_, value, _)| *value);
-        found.ok_or_else(|| format!("{given:?} is not known"))
-    })
+/// Parser for the words of a choice, each with its help text.
+fn word_of<T: Words + Send + Sync>() -> impl TypedValueParser<Value = T> {
+    let known = T::WORDS.iter().map(|(word, _, means)| PossibleValue::new(*word).help(*means));
+    PossibleValuesParser::new(known)
+        .try_map(|given| T::from_word(&given).ok_or_else(|| format!("{given:?} is not known")))
 }
 
 impl ModellingArgs {
@@ -162,8 +158,8 @@ pub(crate) struct RunArgs {
     )]
     pub(crate) log_rate: f64,
     /// Initial state of the run
-    #[arg(long, help_heading = "Models", hide_short_help = true, value_enum, default_value_t = StartName::Equilibrium)]
-    pub(crate) from_rest: StartName,
+    #[arg(long, help_heading = "Models", hide_short_help = true, value_parser = word_of::<Start>(), default_value = "equilibrium")]
+    pub(crate) from_rest: Start,
     /// Spectral radius of generalized-alpha: 1 for no numerical damping, 0 to annihilate the
     /// highest modes
     #[arg(
@@ -179,11 +175,11 @@ pub(crate) struct RunArgs {
     #[arg(long, help_heading = "Stepper", hide_short_help = true)]
     pub(crate) no_dispersion_correction: bool,
     /// Constraint form of spook
-    #[arg(long, help_heading = "Stepper", hide_short_help = true, value_enum, default_value_t = FormName::Local)]
-    pub(crate) spook_form: FormName,
+    #[arg(long, help_heading = "Stepper", hide_short_help = true, value_parser = word_of::<ConstraintForm>(), default_value = "local")]
+    pub(crate) spook_form: ConstraintForm,
     /// Preset of spook: exact formulas, or those of the method's source
-    #[arg(long, help_heading = "Stepper", hide_short_help = true, value_enum, default_value_t = PresetName::Exact)]
-    pub(crate) spook_preset: PresetName,
+    #[arg(long, help_heading = "Stepper", hide_short_help = true, value_parser = word_of::<SpookPreset>(), default_value = "exact")]
+    pub(crate) spook_preset: SpookPreset,
     /// Relative tolerance of reference, which chooses its step size by error control; --step is
     /// then the interval of the output points
     #[arg(
@@ -196,8 +192,8 @@ pub(crate) struct RunArgs {
     )]
     pub(crate) rtol: f64,
     /// Integration method of reference
-    #[arg(long, help_heading = "Stepper", hide_short_help = true, value_enum, default_value_t = MethodName::Bdf)]
-    pub(crate) reference_method: MethodName,
+    #[arg(long, help_heading = "Stepper", hide_short_help = true, value_parser = word_of::<ReferenceMethod>(), default_value = "bdf")]
+    pub(crate) reference_method: ReferenceMethod,
     /// Band around the final TCP error for the settling time (m)
     #[arg(
         long,
@@ -282,10 +278,7 @@ pub(crate) struct CheckArgs {
 pub(crate) fn stepper_words() -> impl TypedValueParser<Value = &'static StepperEntry> {
     let help = |entry: &StepperEntry| format!("{}; step {} ms", entry.help, 1e3 * entry.default_step_s);
     let words = STEPPERS.map(|entry| PossibleValue::new(entry.name).help(help(entry)).aliases(entry.aliases));
-    PossibleValuesParser::new(words).map(|word| {
-        let named = |entry: &&StepperEntry| entry.name == word || entry.aliases.contains(&word.as_str());
-        STEPPERS.into_iter().find(named).expect("the parser lets no other word pass")
-    })
+    PossibleValuesParser::new(words).map(|word| StepperEntry::named(&word).expect("the parser lets no other word pass"))
 }
 
 /// Pages on file formats.
@@ -331,40 +324,6 @@ impl PageName {
             Self::Flex => include_str!("../../../links/flexarm-fem/src/flex_file/format.md"),
         }
     }
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum StartName {
-    /// Static equilibrium under gravity
-    Equilibrium,
-    /// Undeformed: the arm falls into its static deflection and rings
-    Undeformed,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum FormName {
-    /// Relative motion in the proximal frame
-    Local,
-    /// Relative motion in world axes
-    Global,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum PresetName {
-    /// Physical damping time
-    Exact,
-    /// Damping time of two steps
-    Source,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum MethodName {
-    /// Implicit, order 1 to 5: well damped high modes
-    Bdf,
-    /// Implicit, order 3: lightly damped modes in the kHz, loose tolerances
-    Esdirk34,
-    /// Explicit, order 5: no stiff modes
-    Tsit45,
 }
 
 /// Parses a time as nanoseconds since 1970; ROS times end in 2038.

@@ -4,11 +4,11 @@ use std::ffi::OsString;
 use std::process::ExitCode;
 
 use flexarm::{
-    AlphaSettings, Arm, ConstraintForm, FlexibleRobot, Keep, Modelling, ReferenceMethod, ReferenceSettings, Robot,
-    RunOptions, RunRequest, Scenario, SpookPreset, SpookSettings, Start, StepperOptions, Variant, sweep::Change,
+    AlphaSettings, Arm, FlexibleRobot, Keep, Modelling, ReferenceSettings, Robot, RunOptions, RunRequest, Scenario,
+    SpookSettings, StepperOptions, Variant, sweep::Change,
 };
 
-use crate::args::{FormName, MethodName, PresetName, RunArgs, StartName};
+use crate::args::RunArgs;
 use crate::failure::Failure;
 use crate::shipped::OutputFolder;
 use crate::terminal::{Bar, Terminal, answer_styled, to_json};
@@ -104,8 +104,7 @@ fn variant(label: String, args: &RunArgs, with_twin: bool) -> Result<(Variant, O
         None => motion,
     };
     let motion = if speed == 1.0 { motion } else { motion.scaled(1.0 / speed, &*robot.rigid_model()?)? };
-    let start = if args.from_rest == StartName::Equilibrium { Start::Equilibrium } else { Start::Undeformed };
-    let scenario = Scenario::new(motion).with_start(start);
+    let scenario = Scenario::new(motion).with_start(args.from_rest);
     let scenario = args.loads.iter().try_fold(scenario, |scenario, path| scenario.with_loads_file(path))?;
     Ok((Variant { label, robot, scenario, options: run_options(args, with_twin) }, as_filed))
 }
@@ -113,18 +112,8 @@ fn variant(label: String, args: &RunArgs, with_twin: bool) -> Result<(Variant, O
 fn run_options(args: &RunArgs, with_twin: bool) -> RunOptions {
     let stepper_options = StepperOptions {
         alpha: AlphaSettings { rho: args.rho_inf, dispersion_correction: !args.no_dispersion_correction },
-        spook: SpookSettings {
-            form: if args.spook_form == FormName::Local { ConstraintForm::Local } else { ConstraintForm::Global },
-            preset: if args.spook_preset == PresetName::Exact { SpookPreset::Exact } else { SpookPreset::Source },
-        },
-        reference: ReferenceSettings {
-            method: match args.reference_method {
-                MethodName::Bdf => ReferenceMethod::Bdf,
-                MethodName::Esdirk34 => ReferenceMethod::Esdirk34,
-                MethodName::Tsit45 => ReferenceMethod::Tsit45,
-            },
-            ..ReferenceSettings::new(args.rtol)
-        },
+        spook: SpookSettings { form: args.spook_form, preset: args.spook_preset },
+        reference: ReferenceSettings { method: args.reference_method, ..ReferenceSettings::new(args.rtol) },
     };
     RunOptions {
         stepper: (args.stepper.with)(&stepper_options),

@@ -10,7 +10,8 @@ use std::path::{Path, PathBuf};
 
 use flexarm::reduce::STRESS_FILE;
 use flexarm::{
-    Arm, DriveModel, InertiaEstimate, LinkModel, LoadOptions, Modelling, ReadOptions, Robot, STEPPERS, StepperOptions,
+    Arm, DriveModel, InertiaEstimate, LinkModel, LoadOptions, Modelling, ReadOptions, Robot, StepperEntry,
+    StepperOptions, Words,
 };
 use serde::{Deserialize, Serialize};
 use toml_edit::{DocumentMut, Item};
@@ -335,7 +336,7 @@ pub fn open_resources(folder: &Path, token: &str) -> Result<Plant, PlantError> {
     if filed.token != token {
         return Err(PlantError::Token { given: token.to_owned(), own: filed.token });
     }
-    let stepper = STEPPERS.iter().find(|entry| entry.name == filed.stepper);
+    let stepper = StepperEntry::named(&filed.stepper);
     let stepper = stepper.ok_or_else(|| damaged(format!("stepper = {:?}: there is no such stepper", filed.stepper)))?;
     let word = |what: &str, word: &str| damaged(format!("{what} = {word:?}: there is no such model"));
     let links = match &filed.links {

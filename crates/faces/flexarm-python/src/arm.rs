@@ -2,7 +2,7 @@
 
 use std::sync::{Mutex, OnceLock, PoisonError};
 
-use flexarm::{Arm, Error, LiveOptions, OperatingPoint, Outputs, RunOptions, RunRequest, Scenario, Servos};
+use flexarm::{Arm, Error, LiveOptions, OperatingPoint, Outputs, RunOptions, RunRequest, Scenario, Servos, Words};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PyTuple};

@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use flexarm::{
-    AlphaSettings, ConstraintForm, DriveModel, LinkModel, Modelling, ReferenceMethod, ReferenceSettings, STEPPERS,
-    SpookPreset, SpookSettings, Start, StepperKind, StepperOptions, Wrench, closest,
+    AlphaSettings, DriveModel, LinkModel, Modelling, ReferenceSettings, STEPPERS, SpookSettings, Start, StepperEntry,
+    StepperKind, StepperOptions, Words, Wrench, closest,
 };
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
@@ -26,6 +26,12 @@ pub(crate) fn word<T: Copy>(argument: &str, found: &str, words: &[(&str, T)]) ->
     Err(PyValueError::new_err(format!("{argument}={found:?}: expected one of {known}{meant}")))
 }
 
+/// Returns the value of a word, as [`word`].
+fn choice<T: Words>(argument: &str, found: &str) -> PyResult<T> {
+    let words: Vec<_> = T::WORDS.iter().map(|(word, value, _)| (*word, *value)).collect();
+    word(argument, found, &words)
+}
+
 /// Returns the modelling of links and drives.
 pub(crate) fn modelling(
     links: Option<&str>,
@@ -33,21 +39,19 @@ pub(crate) fn modelling(
     segments: Option<usize>,
     modes: Option<usize>,
 ) -> PyResult<Modelling> {
-    let known = LinkModel::WORDS.map(|(word, model, _)| (word, model));
-    let links = links.map_or(Ok(LinkModel::AsFiled), |found| word("links", found, &known))?;
-    let known = DriveModel::WORDS.map(|(word, model, _)| (word, model));
-    let drives = drives.map_or(Ok(DriveModel::AsFiled), |found| word("drives", found, &known))?;
+    let links = links.map_or(Ok(LinkModel::AsFiled), |found| choice("links", found))?;
+    let drives = drives.map_or(Ok(DriveModel::AsFiled), |found| choice("drives", found))?;
     Ok(Modelling { links, drives, segments, modes })
 }
 
 /// Returns a stepper by its name, with its options by theirs.
 pub(crate) fn stepper(name: Option<&str>, options: Option<&Bound<'_, PyDict>>) -> PyResult<StepperKind> {
-    let mut known: Vec<(&str, usize)> = Vec::new();
-    for (k, entry) in STEPPERS.iter().enumerate() {
-        known.push((entry.name, k));
-        known.extend(entry.aliases.iter().map(|alias| (*alias, k)));
+    let mut known: Vec<(&str, &StepperEntry)> = Vec::new();
+    for entry in STEPPERS {
+        known.push((entry.name, entry));
+        known.extend(entry.aliases.iter().map(|alias| (*alias, entry)));
     }
-    let entry = STEPPERS[name.map_or(Ok(0), |found| word("stepper", found, &known))?];
+    let entry = name.map_or(Ok(STEPPERS[0]), |found| word("stepper", found, &known))?;
     let mut chosen = StepperOptions::default();
     let Some(options) = options else { return Ok((entry.with)(&chosen)) };
     let takes: &[&str] = match (entry.with)(&chosen) {
@@ -76,26 +80,17 @@ fn set(chosen: &mut StepperOptions, key: &str, value: &Bound<'_, PyAny>) -> PyRe
             chosen.alpha = AlphaSettings { dispersion_correction: value.extract()?, ..chosen.alpha };
         }
         "form" => {
-            let forms = [("local", ConstraintForm::Local), ("global", ConstraintForm::Global)];
-            chosen.spook = SpookSettings { form: word("form", &text()?, &forms)?, ..chosen.spook };
+            chosen.spook = SpookSettings { form: choice("form", &text()?)?, ..chosen.spook };
         }
         "preset" => {
-            let presets = [("exact", SpookPreset::Exact), ("source", SpookPreset::Source)];
-            chosen.spook = SpookSettings { preset: word("preset", &text()?, &presets)?, ..chosen.spook };
+            chosen.spook = SpookSettings { preset: choice("preset", &text()?)?, ..chosen.spook };
         }
         "rtol" => {
             chosen.reference =
                 ReferenceSettings { method: chosen.reference.method, ..ReferenceSettings::new(value.extract()?) };
         }
         "atol" => chosen.reference.atol = value.extract()?,
-        "method" => {
-            let methods = [
-                ("bdf", ReferenceMethod::Bdf),
-                ("esdirk34", ReferenceMethod::Esdirk34),
-                ("tsit45", ReferenceMethod::Tsit45),
-            ];
-            chosen.reference.method = word("method", &text()?, &methods)?;
-        }
+        "method" => chosen.reference.method = choice("method", &text()?)?,
         _ => {}
     }
     Ok(())
@@ -103,8 +98,7 @@ fn set(chosen: &mut StepperOptions, key: &str, value: &Bound<'_, PyAny>) -> PyRe
 
 /// Returns the initial state of a run.
 pub(crate) fn start(found: Option<&str>) -> PyResult<Start> {
-    let known = [("equilibrium", Start::Equilibrium), ("undeformed", Start::Undeformed)];
-    found.map_or(Ok(Start::Equilibrium), |found| word("start", found, &known))
+    found.map_or(Ok(Start::Equilibrium), |found| choice("start", found))
 }
 
 /// Reads force and moment: six numbers, or three for a force. Default: zero.

@@ -7,6 +7,7 @@ use flexarm_files::{Source, TextFileError as RobotFileError};
 use flexarm_flexlink::{FlexibleLink, LinkForm, Parts, SubstitutionError, distal_joint};
 use flexarm_kinematics::{ElasticAngles, Mechanism, Pose};
 use flexarm_linkmaker::reduce::STRESS_FILE;
+use flexarm_settings::Words;
 use flexarm_stepping::Damping;
 use nalgebra::{Matrix6, Vector3};
 use serde::Deserialize;

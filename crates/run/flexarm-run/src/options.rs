@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use flexarm_log::RecordingFormat;
+use flexarm_settings::Words;
 use flexarm_stepping::StepperKind;
 
 /// Requested model of the links. The model of a link in the tree is a
@@ -21,24 +22,12 @@ pub enum LinkModel {
     Modal,
 }
 
-impl LinkModel {
-    /// Models that can be requested: name in robot files, command line and recordings, and
-    /// description.
-    pub const WORDS: [(&'static str, Self, &'static str); 3] = [
+impl Words for LinkModel {
+    const WORDS: &'static [(&'static str, Self, &'static str)] = &[
         ("rigid", Self::Rigid, "All links rigid"),
         ("lumped", Self::Lumped, "Rigid parts with coupled 6x6 springs"),
         ("modal", Self::Modal, "Modal bodies (floating frame, Craig-Bampton)"),
     ];
-
-    /// Returns the model with this name.
-    pub fn from_word(word: &str) -> Option<Self> {
-        Self::WORDS.iter().find(|(known, ..)| *known == word).map(|(_, model, _)| *model)
-    }
-
-    /// Returns the name; None if the robot file decides.
-    pub fn word(self) -> Option<&'static str> {
-        Self::WORDS.iter().find(|(_, model, _)| *model == self).map(|(word, ..)| *word)
-    }
 }
 
 /// Model of the drives.
@@ -55,23 +44,12 @@ pub enum DriveModel {
     Servo,
 }
 
-impl DriveModel {
-    /// Models that can be requested: name on the command line and in recordings, and description.
-    pub const WORDS: [(&'static str, Self, &'static str); 3] = [
+impl Words for DriveModel {
+    const WORDS: &'static [(&'static str, Self, &'static str)] = &[
         ("rigid", Self::Rigid, "Every joint exactly along the trajectory, no springs"),
         ("elastic", Self::Elastic, "Elastic gearboxes, motors exactly on the trajectory"),
         ("servo", Self::Servo, "Motors by torque under servos"),
     ];
-
-    /// Returns the model with this name.
-    pub fn from_word(word: &str) -> Option<Self> {
-        Self::WORDS.iter().find(|(known, ..)| *known == word).map(|(_, model, _)| *model)
-    }
-
-    /// Returns the name; None if the robot file decides.
-    pub fn word(self) -> Option<&'static str> {
-        Self::WORDS.iter().find(|(_, model, _)| *model == self).map(|(word, ..)| *word)
-    }
 }
 
 /// Models of links and drives that override the robot file.

@@ -15,6 +15,7 @@ use crate::options::{Outputs, RunOptions};
 use crate::robot::Robot;
 use crate::scenario::Scenario;
 use crate::summary::Files;
+use flexarm_settings::Words;
 use flexarm_settings::written::{markdown, markdown_code, markdown_row};
 
 /// Recorders of a run with the names of their files.

@@ -5,12 +5,12 @@ use std::sync::Arc;
 use flexarm_kinematics::{
     Data, Frame, Model, State, forward_kinematics_velocity, frame_jacobian, frame_twist, inverse_dynamics, world_poses,
 };
-use flexarm_stepping::{FlexibleArm, PooledWorkspace};
+use flexarm_stepping::FlexibleArm;
 use nalgebra::{DVector, Matrix6xX, Vector3};
 
 /// Kinematics and required torques of the rigid twin at one time.
 pub(crate) struct RigidTwin {
-    pub(crate) data: PooledWorkspace<Data>,
+    pub(crate) data: Data,
     pub(crate) state: State,
     qddot: DVector<f64>,
     /// Jacobian of the TCP, world axes.
@@ -28,7 +28,7 @@ impl RigidTwin {
     pub(crate) fn new(arm: &FlexibleArm) -> Self {
         let model = &arm.model;
         Self {
-            data: arm.lend_data(),
+            data: Data::new(&arm.model),
             state: State::zeros(model),
             qddot: DVector::zeros(model.nv()),
             J: Matrix6xX::zeros(model.nv()),

@@ -1,6 +1,7 @@
 //! Options of the runs of a study, with the names of `flexarm compare`, `_` in place of `-`.
 
-use flexarm_stepping::{ReferenceMethod, STEPPERS, Start, StepperOptions};
+use flexarm_settings::Words;
+use flexarm_stepping::{STEPPERS, Start, StepperEntry, StepperOptions};
 
 use super::value::ParameterValue;
 use flexarm_run::DriveModel;
@@ -44,15 +45,15 @@ impl OptionError {
         Self::Type { key: key.to_owned(), value: value.clone(), expected }
     }
 
-    fn of_word(key: &str, word: &str, known: &[&'static str]) -> Self {
-        Self::Word { key: key.to_owned(), word: word.to_owned(), known: known.to_vec() }
+    fn of_word(key: &str, word: &str, known: Vec<&'static str>) -> Self {
+        Self::Word { key: key.to_owned(), word: word.to_owned(), known }
     }
 }
 
 /// Options of time integration and evaluation of runs.
 #[derive(Clone, Debug)]
 pub(super) struct StudyOptions {
-    stepper: usize,
+    stepper: &'static StepperEntry,
     /// Step size (s); the stepper's default if absent.
     step_s: Option<f64>,
     settings: StepperOptions,
@@ -65,14 +66,14 @@ pub(super) struct StudyOptions {
 impl Default for StudyOptions {
     fn default() -> Self {
         let (settings, run, start) = (StepperOptions::default(), RunOptions::default(), Start::default());
-        Self { stepper: 0, step_s: None, settings, run, start, round_corners: None }
+        Self { stepper: STEPPERS[0], step_s: None, settings, run, start, round_corners: None }
     }
 }
 
 impl StudyOptions {
     /// Returns the options in the form for a run.
     pub(super) fn run(&self) -> RunOptions {
-        let entry = STEPPERS[self.stepper];
+        let entry = self.stepper;
         let step_s = self.step_s.unwrap_or(entry.default_step_s);
         RunOptions { stepper: (entry.with)(&self.settings), step_s, ..self.run.clone() }
     }
@@ -94,41 +95,14 @@ impl StudyOptions {
             "ignore_limits" => self.run.ignore_limits = truth(key, value)?,
             "dispersion_correction" => self.settings.alpha.dispersion_correction = truth(key, value)?,
             "stepper" => {
-                let known: Vec<&'static str> = STEPPERS.iter().map(|entry| entry.name).collect();
                 let word = word(key, value)?;
-                let is_it =
-                    |entry: &&&flexarm_stepping::StepperEntry| entry.name == word || entry.aliases.contains(&word);
-                let place = STEPPERS.iter().position(|entry| is_it(&entry));
-                self.stepper = place.ok_or_else(|| OptionError::of_word(key, word, &known))?;
+                let known = || STEPPERS.iter().map(|entry| entry.name).collect();
+                self.stepper = StepperEntry::named(word).ok_or_else(|| OptionError::of_word(key, word, known()))?;
             }
-            "links" => {
-                let word = word(key, value)?;
-                let known = LinkModel::WORDS.map(|(word, ..)| word);
-                self.run.modelling.links =
-                    LinkModel::from_word(word).ok_or_else(|| OptionError::of_word(key, word, &known))?;
-            }
-            "drives" => {
-                let word = word(key, value)?;
-                let known = DriveModel::WORDS.map(|(word, ..)| word);
-                let found = DriveModel::WORDS.iter().find(|(known, ..)| *known == word);
-                self.run.modelling.drives =
-                    found.map(|(_, model, _)| *model).ok_or_else(|| OptionError::of_word(key, word, &known))?;
-            }
-            "from_rest" => {
-                self.start = match word(key, value)? {
-                    "equilibrium" => Start::Equilibrium,
-                    "undeformed" => Start::Undeformed,
-                    other => return Err(OptionError::of_word(key, other, &["equilibrium", "undeformed"])),
-                };
-            }
-            "reference_method" => {
-                self.settings.reference.method = match word(key, value)? {
-                    "bdf" => ReferenceMethod::Bdf,
-                    "esdirk34" => ReferenceMethod::Esdirk34,
-                    "tsit45" => ReferenceMethod::Tsit45,
-                    other => return Err(OptionError::of_word(key, other, &["bdf", "esdirk34", "tsit45"])),
-                };
-            }
+            "links" => self.run.modelling.links = choice(key, value)?,
+            "drives" => self.run.modelling.drives = choice(key, value)?,
+            "from_rest" => self.start = choice(key, value)?,
+            "reference_method" => self.settings.reference.method = choice(key, value)?,
             _ => return Err(OptionError::Unknown { key: key.to_owned() }),
         }
         Ok(())
@@ -157,4 +131,10 @@ fn word<'a>(key: &str, value: &'a ParameterValue) -> Result<&'a str, OptionError
         ParameterValue::Text(word) => Ok(word),
         _ => Err(OptionError::of_type(key, value, "a string")),
     }
+}
+
+/// Reads a choice by its word.
+fn choice<T: Words>(key: &str, value: &ParameterValue) -> Result<T, OptionError> {
+    let word = word(key, value)?;
+    T::from_word(word).ok_or_else(|| OptionError::of_word(key, word, T::known()))
 }

@@ -93,16 +93,6 @@ impl Model {
         !self.modal.is_empty()
     }
 
-    /// Modal coordinates that move no interface and are mutually orthogonal with respect to the
-    /// body's mass, such as fixed-interface modes. The mass matrix has a constant diagonal entry
-    /// for each and zeros between them.
-    pub fn held_modes(&self) -> Vec<usize> {
-        self.modal
-            .iter()
-            .flat_map(|modal| modal.tables.shapes.held().into_iter().map(|k| modal.coordinate + k))
-            .collect()
-    }
-
     /// Bodies, parents before children; body 0 is the world.
     pub fn bodies(&self) -> &[Body] {
         &self.bodies

@@ -11,7 +11,6 @@ use nalgebra::Vector3;
 use crate::arm::FlexibleArm;
 use crate::dense::add_product;
 use crate::elastic_tree::ElasticTree;
-use crate::held_modes::HeldModes;
 
 /// A spring assigned to its coordinates.
 struct Element<T> {
@@ -54,7 +53,6 @@ impl<T: Real> LaneArm<T> {
         let plain = |arm: &&FlexibleArm| {
             arm.n_elastic_coordinates() > 0
                 && ElasticTree::that_pays(arm).is_none()
-                && HeldModes::that_pay(arm).is_none()
                 && arm.torque_driven.is_empty()
                 && !arm.has_gear_laws()
                 && arm.loads.is_empty()

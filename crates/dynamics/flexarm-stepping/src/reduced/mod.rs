@@ -25,9 +25,7 @@ use crate::elastic_tree::ElasticTree;
 use crate::error::StepError;
 use crate::events::{ArmDamping, EventQueue, damping_after_changes};
 use crate::gear::GearState;
-use crate::held_modes::HeldModes;
 use crate::servo::ServoState;
-use crate::workspaces::PooledWorkspace;
 use events::StepStart;
 
 pub(crate) use events::{IMPULSE_DEFECT, SLOW};
@@ -36,7 +34,7 @@ pub(crate) use events::{IMPULSE_DEFECT, SLOW};
 #[derive(Clone)]
 pub struct ReducedArm {
     pub(crate) arm: Arc<FlexibleArm>,
-    pub(crate) data: PooledWorkspace<Data>,
+    pub(crate) data: Data,
     pub(crate) state: State,
     pub(crate) qddot: DVector<f64>,
     pub(crate) tau: DVector<f64>,
@@ -61,14 +59,12 @@ pub struct ReducedArm {
     pub(crate) gears: Option<Box<GearState>>,
     /// Tree of the elastic joints, if there are enough of them and they are damped by element.
     tree: Option<ElasticTree>,
-    /// Modes that are eliminated first, if there are enough of them.
-    modes: Option<HeldModes>,
     /// Whether `data` holds the poses of the last [`ReducedArm::set`].
     is_placed: bool,
 }
 
 impl ReducedArm {
-    /// Creates the workspaces for the arm, reusing those of an earlier run if available.
+    /// Creates the workspaces for the arm.
     pub fn new(arm: impl Into<Arc<FlexibleArm>>) -> Self {
         let arm = arm.into();
         let model = &arm.model;
@@ -78,7 +74,7 @@ impl ReducedArm {
         // Load-dependent stiffness needs the spatial accelerations of the full pass.
         let geometric = arm.elements.iter().any(|e| e.geometric.is_some());
         Self {
-            data: arm.lend_data(),
+            data: Data::new(&arm.model),
             state: State::zeros(model),
             qddot: DVector::zeros(model.nv()),
             tau: DVector::zeros(model.nv()),
@@ -96,7 +92,6 @@ impl ReducedArm {
             forces: DVector::zeros(n),
             gears: GearState::of(&arm),
             tree: ElasticTree::that_pays(&arm),
-            modes: HeldModes::that_pay(&arm),
             is_placed: false,
             arm,
         }

@@ -4,8 +4,6 @@ use flexarm_kinematics::{hybrid_dynamics, inverse_dynamics, mass_matrix_at_poses
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use crate::error::StepError;
-use crate::held_modes::HeldModes;
-use crate::mode_matrix::ModeMatrices;
 use crate::reduced::ReducedArm;
 use crate::system::SecondOrderSystem;
 use crate::tree_matrix::TreeMatrices;
@@ -159,39 +157,6 @@ impl SecondOrderSystem for ReducedArm {
             self.arm.blocks(c_D, c_K, to);
         }
         placed
-    }
-
-    fn with_modes(&mut self, c_D: f64, c_K: f64, to: &mut ModeMatrices) -> bool {
-        let Some(mut held) = self.modes.take() else { return false };
-        self.place();
-        mass_matrix_at_poses(&self.arm.model, &mut self.data);
-        self.damping_and_stiffness(c_D, c_K, &mut held.dense);
-        self.stiffness(&mut held.K);
-        let HeldModes { others, modes, dense: C, K } = &held;
-        let (nb, free, M) = (others.len(), &self.free, &self.data.M);
-        if to.mass.nrows() != nb || to.modes.len() != modes.len() {
-            let zero = DMatrix::zeros(nb, nb);
-            (to.mass, to.C, to.K) = (zero.clone(), zero.clone(), zero);
-            to.coupling = DMatrix::zeros(nb, modes.len());
-            to.others.clone_from(others);
-            to.modes.clone_from(modes);
-        }
-        for (j, &column) in others.iter().enumerate() {
-            for (i, &row) in others.iter().enumerate() {
-                to.mass[(i, j)] = M[(free[row], free[column])];
-                to.C[(i, j)] = C[(row, column)];
-                to.K[(i, j)] = K[(row, column)];
-            }
-        }
-        to.own.clear();
-        for (j, &mode) in modes.iter().enumerate() {
-            for (i, &row) in others.iter().enumerate() {
-                to.coupling[(i, j)] = M[(free[row], free[mode])];
-            }
-            to.own.push([M[(free[mode], free[mode])], C[(mode, mode)], K[(mode, mode)]]);
-        }
-        self.modes = Some(held);
-        true
     }
 }
 

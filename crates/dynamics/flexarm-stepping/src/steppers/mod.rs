@@ -18,6 +18,7 @@ mod spook;
 
 use std::sync::Arc;
 
+use flexarm_settings::Words;
 use nalgebra::DVector;
 
 use crate::arm::FlexibleArm;
@@ -113,6 +114,13 @@ pub struct StepperEntry {
     pub with: fn(&StepperOptions) -> StepperKind,
 }
 
+impl StepperEntry {
+    /// Returns the stepper with this name or alias.
+    pub fn named(word: &str) -> Option<&'static Self> {
+        STEPPERS.into_iter().find(|entry| entry.name == word || entry.aliases.contains(&word))
+    }
+}
+
 /// Rule for the step size of a stepper.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StepRule {
@@ -144,6 +152,13 @@ pub enum StepperSetting {
     Flag(bool),
     /// One of several words.
     Word(&'static str),
+}
+
+impl StepperSetting {
+    /// Returns the setting of a choice.
+    fn of_word(choice: impl Words) -> Self {
+        Self::Word(choice.word().unwrap_or_default())
+    }
 }
 
 /// Interface between the registry and the settings of a stepper.

@@ -38,6 +38,7 @@ use diffsol::{
     BdfState, DiffsolError, NalgebraLU, NalgebraMat, NalgebraVec, OdeBuilder, OdeEquations, OdeSolverMethod,
     OdeSolverState, OdeSolverStopReason, RkState, Tableau, VectorCommon,
 };
+use flexarm_settings::Words;
 use nalgebra::DVector;
 
 use crate::arm::FlexibleArm;
@@ -88,15 +89,12 @@ pub enum ReferenceMethod {
     Tsit45,
 }
 
-impl ReferenceMethod {
-    /// Returns the name on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Bdf => "bdf",
-            Self::Esdirk34 => "esdirk34",
-            Self::Tsit45 => "tsit45",
-        }
-    }
+impl Words for ReferenceMethod {
+    const WORDS: &'static [(&'static str, Self, &'static str)] = &[
+        ("bdf", Self::Bdf, "Implicit, order 1 to 5: well damped high modes"),
+        ("esdirk34", Self::Esdirk34, "Implicit, order 3: lightly damped modes in the kHz, loose tolerances"),
+        ("tsit45", Self::Tsit45, "Explicit, order 5: no stiff modes"),
+    ];
 }
 
 /// Tolerances on the local error: `atol + rtol |y|` per coordinate y, in the root mean square over
@@ -144,7 +142,7 @@ impl Method for ReferenceSettings {
     }
 
     fn settings(&self) -> Vec<(&'static str, StepperSetting)> {
-        vec![("rtol", StepperSetting::Number(self.rtol)), ("method", StepperSetting::Word(self.method.name()))]
+        vec![("rtol", StepperSetting::Number(self.rtol)), ("method", StepperSetting::of_word(self.method))]
     }
 
     fn start(&self, arm: Arc<FlexibleArm>, h: f64, e: &DVector<f64>) -> Result<Box<dyn Stepper>, StepError> {

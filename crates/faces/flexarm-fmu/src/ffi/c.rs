@@ -5,7 +5,7 @@ use std::ffi::{CString, c_char, c_int};
 use std::path::Path;
 use std::ptr;
 
-use flexarm::{DriveModel, LinkModel, Modelling};
+use flexarm::{DriveModel, LinkModel, Modelling, Words};
 
 use super::{NULL, array, get_each, guarded, message, set_each, string, text_of};
 use crate::error::PlantError;
@@ -98,16 +98,17 @@ unsafe fn opened(
     let (robot, [links, drives]) = unsafe { (string(robot), models.map(|model| string(model))) };
     let robot = robot.ok_or("robot: expected a path as UTF-8")?;
     let unknown = |what: &str, word: &str, known: String| format!("{what} = {word:?}: expected one of {known}");
-    let known = |words: [(&str, &str); 3]| words.map(|(word, _)| word).join(", ");
     let links = match links {
         None => LinkModel::AsFiled,
-        Some(word) => LinkModel::from_word(word)
-            .ok_or_else(|| unknown("links", word, known(LinkModel::WORDS.map(|(word, _, text)| (word, text)))))?,
+        Some(word) => {
+            LinkModel::from_word(word).ok_or_else(|| unknown("links", word, LinkModel::known().join(", ")))?
+        }
     };
     let drives = match drives {
         None => DriveModel::AsFiled,
-        Some(word) => DriveModel::from_word(word)
-            .ok_or_else(|| unknown("drives", word, known(DriveModel::WORDS.map(|(word, _, text)| (word, text)))))?,
+        Some(word) => {
+            DriveModel::from_word(word).ok_or_else(|| unknown("drives", word, DriveModel::known().join(", ")))?
+        }
     };
     let settings = PlantSettings {
         modelling: Modelling { links, drives, ..Modelling::default() },

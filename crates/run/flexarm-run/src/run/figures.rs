@@ -185,7 +185,7 @@ impl RunLoop<'_> {
 /// (m).
 pub fn static_sag(arm: &FlexibleArm, tcp: &Frame) -> f64 {
     let model = &arm.model;
-    let (mut data, mut state) = (arm.lend_data(), State::zeros(model));
+    let (mut data, mut state) = (Data::new(model), State::zeros(model));
     arm.prescribed_state(0.0, &mut state, &mut nalgebra::DVector::zeros(model.nv()));
     forward_kinematics(model, &mut data, &state.q);
     let rigid = data.X_WF(tcp).translation.vector;

@@ -6,8 +6,7 @@
 //! J = M + C Sᵀ,   C = h γ' D + h² β' K               (7)  derivative of (1) by ẍ⁺
 //! S J = M + c h² K + S C Sᵀ,   J^-1 = (S J)^-1 S     (8)  symmetric for every damping, unlike J
 //! ```
-//! For trees and modal links the matrix contains the complete correction: [`crate::tree_matrix`],
-//! [`crate::mode_matrix`].
+//! Along a tree the matrix contains the complete correction: [`crate::tree_matrix`].
 
 use nalgebra::{DMatrix, DVector};
 
@@ -105,10 +104,8 @@ impl DispersionCorrection {
         acceleration: &DVector<f64>,
         x_tilde: &mut DVector<f64>,
     ) {
-        match &mut matrix.way {
-            MatrixForm::Tree(tree) => return tree.correct(acceleration, x_tilde),
-            MatrixForm::Modes(modes) => return modes.correct(acceleration, x_tilde),
-            MatrixForm::Dense(_) => {}
+        if let MatrixForm::Tree(tree) = &mut matrix.way {
+            return tree.correct(acceleration, x_tilde);
         }
         self.shift_by(acceleration);
         for ((x_tilde, a), shift) in x_tilde.iter_mut().zip(acceleration).zip(&self.shift) {
@@ -119,10 +116,8 @@ impl DispersionCorrection {
     /// Returns the contribution of a change d of ẍ, the last solution with the matrix, to the
     /// change of x̃ beyond d itself: a factor and a vector, whose product is `c h² M^-1 K d`.
     pub(super) fn shift<'a>(&'a mut self, matrix: &'a IterationMatrix, d: &DVector<f64>) -> (f64, &'a DVector<f64>) {
-        match &matrix.way {
-            MatrixForm::Tree(tree) => return (1.0, tree.shift()),
-            MatrixForm::Modes(modes) => return (1.0, modes.shift()),
-            MatrixForm::Dense(_) => {}
+        if let MatrixForm::Tree(tree) = &matrix.way {
+            return (1.0, tree.shift());
         }
         self.shift_by(d);
         (self.c_h2, &self.shift)

@@ -292,7 +292,7 @@ impl GeneralizedAlpha {
 
     /// Makes steps smooth functions of all their inputs: the matrix, and with it that of the
     /// dispersion correction, is computed at the start of each step, and the iteration converges
-    /// fully. For trees and modal links, whose matrix contains the correction, this holds for steps
+    /// fully. Along a tree, where the matrix contains the correction, this holds for steps
     /// of at most eight iterations.
     #[must_use]
     pub fn exactly(self) -> Self {

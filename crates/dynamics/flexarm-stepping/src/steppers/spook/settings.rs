@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use flexarm_settings::Words;
 use nalgebra::DVector;
 
 use crate::arm::FlexibleArm;
@@ -33,6 +34,13 @@ pub enum ConstraintForm {
     Global,
 }
 
+impl Words for ConstraintForm {
+    const WORDS: &'static [(&'static str, Self, &'static str)] = &[
+        ("local", Self::Local, "Relative motion in the proximal frame"),
+        ("global", Self::Global, "Relative motion in world axes"),
+    ];
+}
+
 /// Relation of Σ and Υ to the damping time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum SpookPreset {
@@ -43,6 +51,11 @@ pub enum SpookPreset {
     /// Choice of the thesis: τ = 2h everywhere and `1 + 4 τ/h ≈ 4 τ/h`, so Υ = 1/8 and Σ = K^-1/(2
     /// h²).
     Source,
+}
+
+impl Words for SpookPreset {
+    const WORDS: &'static [(&'static str, Self, &'static str)] =
+        &[("exact", Self::Exact, "Physical damping time"), ("source", Self::Source, "Damping time of two steps")];
 }
 
 /// Settings of SPOOK.
@@ -60,9 +73,7 @@ impl Method for SpookSettings {
     }
 
     fn settings(&self) -> Vec<(&'static str, StepperSetting)> {
-        let form = if self.form == ConstraintForm::Local { "local" } else { "global" };
-        let preset = if self.preset == SpookPreset::Exact { "exact" } else { "source" };
-        vec![("form", StepperSetting::Word(form)), ("preset", StepperSetting::Word(preset))]
+        vec![("form", StepperSetting::of_word(self.form)), ("preset", StepperSetting::of_word(self.preset))]
     }
 
     fn start(&self, arm: Arc<FlexibleArm>, h: f64, e: &DVector<f64>) -> Result<Box<dyn Stepper>, StepError> {

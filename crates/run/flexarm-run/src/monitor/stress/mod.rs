@@ -20,7 +20,7 @@ use flexarm_fem::{FemError, ReducedLink, RigidPart};
 use flexarm_flexlink::{FlexibleSpan, LinkForm};
 use flexarm_kinematics::{Data, Frame, Pose, State, inverse_dynamics};
 use flexarm_log::{GAUGE_ENDS, STRESS_VIEW, Scenery, SceneryForm};
-use flexarm_stepping::{ElasticElement, FlexibleArm, Observation, PooledWorkspace};
+use flexarm_stepping::{ElasticElement, FlexibleArm, Observation};
 use nalgebra::{DMatrix, DVector, Matrix6, Point3, RowSVector};
 
 use crate::error::Error;
@@ -51,7 +51,7 @@ const SEATS: usize = 512;
 pub(crate) struct StressMonitor {
     links: Vec<LinkStress>,
     gauges: Vec<PlacedGauge>,
-    data: PooledWorkspace<Data>,
+    data: Data,
     state: State,
     times: Vec<f64>,
 }
@@ -130,7 +130,7 @@ impl StressMonitor {
             return Ok(None);
         }
         let gauges = placed(robot, &links)?;
-        let (data, state) = (arm.lend_data(), State::zeros(&arm.model));
+        let (data, state) = (Data::new(&arm.model), State::zeros(&arm.model));
         Ok(Some(Self { links, gauges, data, state, times: Vec::new() }))
     }
 
