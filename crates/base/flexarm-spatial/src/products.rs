@@ -96,16 +96,6 @@ pub fn column<T: Real>(A: &Matrix3<T>, j: usize) -> Vector3<T> {
     Vector3::new(c[0], c[1], c[2])
 }
 
-/// `u wᵀ + [v]x + d 1`.
-#[inline(always)]
-pub fn dyad<T: Real>(u: &Vector3<T>, w: &Vector3<T>, v: &Vector3<T>, d: T) -> Matrix3<T> {
-    columns(
-        Vector3::new(u.x * w.x + d, u.y * w.x + v.z, u.z * w.x - v.y),
-        Vector3::new(u.x * w.y - v.z, u.y * w.y + d, u.z * w.y + v.x),
-        Vector3::new(u.x * w.z + v.y, u.y * w.z - v.x, u.z * w.z + d),
-    )
-}
-
 /// `A B`.
 #[inline(always)]
 pub fn mul3<T: Real>(A: &Matrix3<T>, B: &Matrix3<T>) -> Matrix3<T> {

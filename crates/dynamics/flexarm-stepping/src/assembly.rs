@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use flexarm_kinematics::{Model, State, Wrench, mass_matrix};
+use flexarm_kinematics::{Data, Model, State, Wrench, mass_matrix};
 use nalgebra::{DMatrix, DVector};
 
 use crate::arm::{Damping, ElasticElement, FlexibleArm, InertiaChange, Modes, Servo, Spring};

@@ -1,6 +1,6 @@
 //! Natural frequencies and mode shapes of the arm about its static equilibrium, drives locked.
 
-use flexarm_kinematics::{State, mass_matrix};
+use flexarm_kinematics::{Data, State, mass_matrix};
 use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
 
 use crate::arm::{FlexibleArm, Modes};

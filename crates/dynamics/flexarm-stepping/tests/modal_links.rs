@@ -9,7 +9,7 @@ use flexarm_kinematics::*;
 use flexarm_stepping::*;
 use flexarm_testkit::allocations::count_allocations;
 use flexarm_testkit::{reference_arm, reference_motion};
-use nalgebra::{DMatrix, DVector, Matrix3, Vector3, vector};
+use nalgebra::{DMatrix, Matrix3, Vector3, vector};
 
 const fn alpha(rho: f64, dispersion_correction: bool) -> StepperKind {
     StepperKind::GeneralizedAlpha(AlphaSettings { rho, dispersion_correction })

@@ -4,6 +4,7 @@
 use std::sync::Arc;
 
 use flexarm_kinematics::{Model, Wrench};
+use flexarm_settings::Words;
 use flexarm_stepping::*;
 use flexarm_testkit::allocations::count_allocations;
 use flexarm_testkit::{reference_arm, reference_motion};
@@ -308,7 +309,7 @@ fn reference_stepper_converges_with_its_tolerance() {
     for (method, tolerances) in cases {
         for (rtol, bound) in tolerances {
             let error = tcp_error(reference(method, *rtol), 1e-3) * 4.836e-3;
-            eprintln!("  {} rtol {rtol:.0e}: {error:.2e} m", method.name());
+            eprintln!("  {} rtol {rtol:.0e}: {error:.2e} m", method.word().unwrap_or_default());
             assert!(error < *bound, "{method:?} {rtol}: {error}");
         }
     }
@@ -340,7 +341,7 @@ fn reference_stepper_agrees_with_rk4() {
     for method in [ReferenceMethod::Bdf, ReferenceMethod::Tsit45] {
         let (found, counts) = run(reference(method, 1e-11), 1e-3);
         let difference = truth.iter().zip(&found).map(|(a, b)| (a - b).amax()).fold(0.0f64, f64::max);
-        eprintln!("{} against rk4: {difference:.1e}, {counts:?}", method.name());
+        eprintln!("{} against rk4: {difference:.1e}, {counts:?}", method.word().unwrap_or_default());
         assert!(difference < 1e-10, "{method:?} {difference:e}");
     }
 }

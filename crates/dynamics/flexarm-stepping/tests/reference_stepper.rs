@@ -2,6 +2,7 @@
 
 use std::f64::consts::TAU;
 
+use flexarm_settings::Words;
 use flexarm_stepping::*;
 use nalgebra::{DMatrix, DVector};
 
@@ -94,7 +95,7 @@ fn harmonic_oscillator_keeps_its_closed_form_to_the_tolerance() {
             let (error, g) = run(&mut system, settings(method, rtol), 1e-3, [1.0, 0.0], &[], truth);
             eprintln!(
                 "{:<8} rtol {rtol:.0e}: error {:.1e} of x, {:.1e} of v; {} steps, {} evaluations, {} factorisations",
-                method.name(),
+                method.word().unwrap_or_default(),
                 error[0],
                 error[1],
                 g.solver_steps,
@@ -133,7 +134,12 @@ fn damped_driven_oscillator_keeps_its_closed_form() {
     for method in METHODS {
         let mut system = Oscillators { omega: vec![OMEGA], zeta, load: |t: f64| f * (p * t).sin(), evaluations: 0 };
         let (error, _) = run(&mut system, settings(method, 1e-8), 1e-3, [0.0; 2], &[], |t| driven(t, zeta, f, p));
-        eprintln!("{:<8} error {:.1e} of x, {:.1e} of v", method.name(), error[0] / amplitude, error[1] / amplitude);
+        eprintln!(
+            "{:<8} error {:.1e} of x, {:.1e} of v",
+            method.word().unwrap_or_default(),
+            error[0] / amplitude,
+            error[1] / amplitude
+        );
         assert!(error[0].max(error[1]) < 1e3 * 1e-8 * amplitude, "{method:?} {error:?}");
     }
 }
@@ -149,7 +155,7 @@ fn error_between_the_steps_is_that_of_the_steps() {
         let [coarse, dense] = [1e-2, 1e-5].map(|h| {
             let mut system = Oscillators { omega: vec![OMEGA], zeta: 0.0, load: |_| 0.0, evaluations: 0 };
             let (error, g) = run(&mut system, settings(method, 1e-6), h, [1.0, 0.0], &[], truth);
-            eprintln!("{:<8} h {h:.0e}: {error:?}, {} steps", method.name(), g.solver_steps);
+            eprintln!("{:<8} h {h:.0e}: {error:?}, {} steps", method.word().unwrap_or_default(), g.solver_steps);
             error
         });
         for k in 0..2 {
@@ -194,7 +200,7 @@ fn restart_at_a_jump_of_the_load_keeps_the_accuracy() {
                 });
                 eprintln!(
                     "{:<8} jump at {s}, load there {at_s:.0}: without {:?}, with {:?}",
-                    method.name(),
+                    method.word().unwrap_or_default(),
                     both[0],
                     both[1]
                 );
@@ -227,7 +233,7 @@ fn restart_sees_a_system_changed_from_outside() {
             g.step(&mut system).expect("steps");
             worst = worst.max((g.now.x[0] - after_jump(g.time(), s)[0]).abs());
         }
-        eprintln!("{:<8} {worst:.1e}", method.name());
+        eprintln!("{:<8} {worst:.1e}", method.word().unwrap_or_default());
         assert!(worst < 1e3 * rtol, "{method:?}: {worst}");
         assert_eq!(g.evaluations, system.evaluations);
     }
@@ -271,7 +277,7 @@ fn a_pulse_after_a_long_rest_is_seen() {
     for method in METHODS {
         for rtol in [1e-3, 1e-4, 1e-6] {
             let error = (end(settings(method, rtol), &[]) - truth).abs();
-            eprintln!("{:<8} rtol {rtol:.0e}: {error:.1e} of {truth:.3}", method.name());
+            eprintln!("{:<8} rtol {rtol:.0e}: {error:.1e} of {truth:.3}", method.word().unwrap_or_default());
             assert!(error < 300.0 * rtol * truth.abs(), "{method:?} {rtol}: {error}");
         }
     }

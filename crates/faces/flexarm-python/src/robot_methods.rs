@@ -195,7 +195,7 @@ impl PyRobot {
 
     fn __repr__(&self) -> PyResult<String> {
         let n = self.robot.rigid_model().or_raise()?.n_actuated();
-        let (links, drives) = (self.robot.flexible.len(), self.robot.drives.len());
+        let (links, drives) = (self.robot.flexible_links.len(), self.robot.drives.len());
         Ok(format!("<Robot {:?}: {n} joints, {links} flexible links, {drives} drives>", self.robot.name))
     }
 

@@ -60,8 +60,9 @@ fn main() {
     let modal = |modes| Modelling { links: LinkModel::Modal, modes: Some(modes), ..Modelling::default() };
     let modal_all = Modelling { links: LinkModel::Modal, ..Modelling::default() };
     let lumped = |n| Modelling { links: LinkModel::Lumped, segments: Some(n), ..Modelling::default() };
-    let stiffened = |robot: &mut Robot, on: bool| robot.flexible.iter_mut().for_each(|l| l.choices.geometric = on);
-    let beams = robot.flexible.iter().all(|l| l.beam.is_some());
+    let stiffened =
+        |robot: &mut Robot, on: bool| robot.flexible_links.iter_mut().for_each(|l| l.choices.geometric = on);
+    let beams = robot.flexible_links.iter().all(|l| l.beam.is_some());
     stiffened(&mut robot, beams);
     let (truth, _) = run(&arm(&robot, &if beams { modal(20) } else { modal_all }), reference(), duration);
     let peak = truth.iter().zip(&reference_path).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);

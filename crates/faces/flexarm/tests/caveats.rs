@@ -629,7 +629,7 @@ fn modal_links_that_spin_fast_without_stiffening_by_load_are_reported() {
     let robot = Robot::load(project("tests/benchmarks/two_link/two_link_30.toml")).unwrap();
     let run = |motion: &str, links, stiffening: bool| {
         let mut robot = robot.clone();
-        robot.flexible.iter_mut().for_each(|link| link.choices.geometric = stiffening);
+        robot.flexible_links.iter_mut().for_each(|link| link.choices.geometric = stiffening);
         let motion = Motion::load(project("tests/benchmarks/two_link").join(motion), &robot).unwrap();
         let modelling =
             Modelling { links, modes: Some(2).filter(|_| links == LinkModel::Modal), ..Modelling::default() };

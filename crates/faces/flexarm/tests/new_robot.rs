@@ -160,7 +160,7 @@ fn an_arm_of_known_sections_is_found_with_its_sections_and_is_clean() {
     assert!(errors.iter().all(|e| e.abs() < 1e-3), "{errors:?}");
     assert!(upper.assumed && upper.material == Some("aluminium"));
     let robot = Robot::load(&made.robot).unwrap();
-    assert!(robot.flexible.iter().any(|link| link.flexible.link == "upper"));
+    assert!(robot.flexible_links.iter().any(|link| link.flexible.link == "upper"));
     assert_eq!(robot.drives.len(), 3);
     assert!(made.assumptions.iter().any(|a| a.about == "payload"));
     // The motion covers a good part of the ranges.
@@ -375,7 +375,7 @@ fn a_link_whose_frames_sit_at_its_far_end_bends_as_the_same_link_with_frames_at_
     println!("width, height, wall, length, ends off by {errors:?}, bound 1e-3");
     assert!(errors.iter().all(|e| e.abs() < 1e-3), "{errors:?} {upper:?}");
     let robot = Robot::load(&made.robot).unwrap();
-    assert!(robot.flexible.iter().any(|link| link.flexible.link == "upper"));
+    assert!(robot.flexible_links.iter().any(|link| link.flexible.link == "upper"));
     assert_eq!(codes(&made), [""; 0]);
 }
 

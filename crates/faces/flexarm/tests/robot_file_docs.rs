@@ -83,11 +83,11 @@ fn every_example_of_a_robot_file_loads() {
         let mounted = block.contains("[mounting]");
         let under = usize::from(mounted && !block.contains("[mounting]\nstiffness"));
         assert_eq!(robot.is_mounted(), mounted);
-        assert_eq!(robot.flexible.len(), block.matches("[[flexible_link]]").count() + under);
+        assert_eq!(robot.flexible_links.len(), block.matches("[[flexible_link]]").count() + under);
         assert_eq!(robot.drives.len(), block.matches("[[drive]]").count());
         assert_eq!(robot.rigid.balancers.len(), block.matches("[[balancer]]").count());
         robot.flexible_robot().unwrap();
-        modal += robot.flexible.iter().filter(|link| link.choices.model == LinkModel::Modal).count();
+        modal += robot.flexible_links.iter().filter(|link| link.choices.model == LinkModel::Modal).count();
         torque += robot.drives.iter().filter(|drive| drive.kind == DriveKind::Torque).count();
     }
     assert!(modal >= 2 && torque >= 1, "{modal} {torque}");

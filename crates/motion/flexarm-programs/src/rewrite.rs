@@ -89,11 +89,6 @@ struct Edit {
 type Edits = BTreeMap<(usize, usize, usize), Edit>;
 
 impl ProgramText {
-    /// Whether targets of this language can be replaced.
-    pub fn is_rewritable(&self) -> bool {
-        matches!(self.language, Language::Krl | Language::Rapid)
-    }
-
     /// Returns the files with other targets; the lines are not moved.
     ///
     /// * `targets`: for some items (by index among those of the program) the new target, and the

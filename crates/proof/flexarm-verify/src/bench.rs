@@ -164,7 +164,7 @@ pub fn weightless(mut robot: Robot) -> Robot {
 
 /// Returns the robot with its first mode critically damped, so that it comes to rest quickly.
 pub fn damped(mut robot: Robot) -> Robot {
-    for link in &mut robot.flexible {
+    for link in &mut robot.flexible_links {
         link.damping = Damping::Modal(1.0);
     }
     robot
@@ -326,7 +326,7 @@ pub fn tool_path(
     (h, steps): (f64, usize),
 ) -> Result<Vec<Vector3<f64>>, Error> {
     let mut robot = robot.clone();
-    for link in &mut robot.flexible {
+    for link in &mut robot.flexible_links {
         link.choices.geometric = stiffening;
         link.damping = Damping::StiffnessProportional(PATH_DAMPING_S);
     }

@@ -194,7 +194,7 @@ fn load_findings(error: &Error, path: &Path, findings: &mut Vec<Finding>) {
 fn check_flexible(robot: &Robot, motion: Option<&Motion>, findings: &mut Vec<Finding>) {
     let file = robot.path.display().to_string();
     let gives_way = robot.drives.iter().any(|d| d.kind != DriveKind::Prescribed);
-    if robot.flexible.is_empty() && !gives_way && !robot.is_mounted() {
+    if robot.flexible_links.is_empty() && !gives_way && !robot.is_mounted() {
         let message = "no link is flexible and no drive is elastic: compare will find no deflection";
         let help = "add [[flexible_link]] or [[drive]] entries to a robot.toml".into();
         findings.push(Finding { help, ..Finding::note("no-flexible-link", file.clone(), message.into()) });

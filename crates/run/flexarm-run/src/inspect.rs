@@ -265,7 +265,8 @@ fn link_infos(mechanism: &Mechanism) -> Vec<LinkInfo> {
 
 /// Describes the flexible links with the models that the robot file asks for.
 fn flexible_infos(robot: &Robot, flexible: &FlexibleRobot) -> Result<Vec<FlexibleInfo>, Error> {
-    let forms = robot.flexible.iter().map(|link| robot.form_of(link, &Modelling::default()).map(|(form, _)| form));
+    let forms =
+        robot.flexible_links.iter().map(|link| robot.form_of(link, &Modelling::default()).map(|(form, _)| form));
     let forms = forms.collect::<Result<Vec<_>, _>>()?;
     let info = |((span, link), form): ((&FlexibleSpan, &RobotLink), &LinkForm)| {
         let K = link.flexible.reduced.split.K_S;
@@ -285,5 +286,5 @@ fn flexible_infos(robot: &Robot, flexible: &FlexibleRobot) -> Result<Vec<Flexibl
             stiffness: rows(&DMatrix::from_iterator(6, 6, K.iter().copied())),
         }
     };
-    Ok(flexible.spans.iter().zip(&robot.flexible).zip(&forms).map(info).collect())
+    Ok(flexible.spans.iter().zip(&robot.flexible_links).zip(&forms).map(info).collect())
 }

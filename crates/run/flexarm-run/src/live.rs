@@ -206,7 +206,7 @@ impl Arm {
             true => None,
             false => {
                 let mut robot = self.robot().clone();
-                robot.flexible.iter_mut().for_each(|link| link.stiffness_factor *= stiffness);
+                robot.flexible_links.iter_mut().for_each(|link| link.stiffness_factor *= stiffness);
                 StressMonitor::new(&robot, &flexible, &arm, self.modelling())?
             }
         };

@@ -94,7 +94,7 @@ impl Robot {
     /// Chooses the model of each flexible link.
     fn chosen_links(&self, modelling: &Modelling) -> Result<ChosenLinks, Error> {
         let mut chosen = ChosenLinks::default();
-        let wanted = if modelling.links == LinkModel::Rigid { &[][..] } else { &self.flexible[..] };
+        let wanted = if modelling.links == LinkModel::Rigid { &[][..] } else { &self.flexible_links[..] };
         for link in wanted {
             let (form, instead) = self.form_of(link, modelling)?;
             chosen.modal_instead.extend(instead);
@@ -147,10 +147,10 @@ impl Robot {
                     1 => span.link.clone(),
                     _ => format!("{}.{}", span.link, number + 1),
                 };
-                let (group, damping) = (spring.joint.clone(), self.flexible[k].damping);
+                let (group, damping) = (spring.joint.clone(), self.flexible_links[k].damping);
                 owned.push(OwnedSpring {
                     group,
-                    spring: Spring::from((name, self.flexible[k].scaled(&spring.K_S), damping)),
+                    spring: Spring::from((name, self.flexible_links[k].scaled(&spring.K_S), damping)),
                     owner: Owner::Link(k),
                 });
             }
@@ -164,7 +164,7 @@ impl Robot {
         for link in links {
             let span = substituted.spans.iter().position(|span| span.link == link.link);
             let (LinkForm::Modal(modal), Some(k)) = (&link.form, span) else { continue };
-            let source = &self.flexible[k];
+            let source = &self.flexible_links[k];
             let geometric = modal.geometric.as_ref().filter(|_| source.choices.geometric);
             let geometric = geometric.map(|g| Arc::new(stiffening(g)));
             let (name, K, damping) = (link.link.clone(), &modal.K * source.stiffness_factor, source.damping);

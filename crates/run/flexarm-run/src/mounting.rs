@@ -22,7 +22,7 @@ pub enum RobotMounting {
     },
     /// Flexible link between ground and base.
     Link {
-        /// Name of the link in [`crate::Robot::flexible`].
+        /// Name of the link in [`crate::Robot::flexible_links`].
         name: String,
     },
 }

@@ -326,6 +326,6 @@ fn flexible_mounting(
         coupling: true,
     };
     let flexible = flexible_link(&link, &robot.rigid, source, home, &mut robot.warnings, faults)?;
-    robot.flexible.push(flexible);
+    robot.flexible_links.push(flexible);
     Ok(RobotMounting::Link { name })
 }

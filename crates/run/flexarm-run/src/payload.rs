@@ -95,7 +95,9 @@ impl PayloadChange {
             let known = moving_links(model).into_iter().map(str::to_owned).collect();
             fail(PayloadError::UnknownLink { link: link.clone(), known })
         })?;
-        if robot.flexible.iter().any(|f| f.flexible.link == link) && model.frame(&format!("{link}__distal")).is_some() {
+        if robot.flexible_links.iter().any(|f| f.flexible.link == link)
+            && model.frame(&format!("{link}__distal")).is_some()
+        {
             let beyond = robot.urdf.mechanism.child_joints(&link).map(|j| j.child.clone()).collect();
             return Err(fail(PayloadError::Bends { link, beyond }));
         }

@@ -216,7 +216,7 @@ pub(crate) fn ordered_links(robot: &Robot) -> Vec<LinkInfo> {
             parent: Some(next),
             // A fixed joint at the far end of a flexible link moves relative to the link's frame.
             fixed: j.kind == JointKind::Fixed
-                && robot.flexible.iter().all(|f| f.flexible.link != name)
+                && robot.flexible_links.iter().all(|f| f.flexible.link != name)
                 && !(next == 0 && robot.is_mounted()),
         }));
         next += 1;
@@ -286,7 +286,7 @@ fn metadata(
     let stepper = crate::summary::StepperFigures::new(options, Default::default());
     let elements: Vec<String> = arm.elements.iter().map(|e| e.name.clone()).collect();
     let methods: Vec<String> = robot
-        .flexible
+        .flexible_links
         .iter()
         .map(|f| format!("{}: {}", f.flexible.link, f.flexible.reduced.provenance.method))
         .collect();
@@ -403,7 +403,7 @@ fn description(
         options.step_s,
         links_model,
     );
-    for f in robot.flexible.iter().map(|f| &f.flexible) {
+    for f in robot.flexible_links.iter().map(|f| &f.flexible) {
         text += &markdown_row(&["flexible link", &format!("{}: {}", f.link, f.reduced.provenance.method)]);
     }
     if !frequencies.is_empty() {

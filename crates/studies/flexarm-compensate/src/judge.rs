@@ -76,7 +76,7 @@ fn changed(robot: &Robot, stiffness: f64, damping: f64) -> Robot {
             gear.dampers = gear.dampers.as_ref().map(|d| d.iter().map(|d| damping * d).collect());
         }
     }
-    for link in &mut changed.flexible {
+    for link in &mut changed.flexible_links {
         link.stiffness_factor *= stiffness;
         link.damping = link.damping.scaled(damping);
     }

@@ -100,7 +100,7 @@ pub(crate) fn candidates(robot: &Robot, flexible: &FlexibleRobot) -> Vec<Candida
             found.extend(mounting_parameters(robot, &springs));
             continue;
         }
-        let Some(link) = robot.flexible.iter().find(|link| link.flexible.link == span.link) else { continue };
+        let Some(link) = robot.flexible_links.iter().find(|link| link.flexible.link == span.link) else { continue };
         let places = springs.iter().map(|spring| SpringPart { spring: *spring, coordinate: None }).collect();
         let name = format!("link.{}.stiffness_factor", span.link);
         let written = ParameterLocation::Link { link: span.link.clone() };

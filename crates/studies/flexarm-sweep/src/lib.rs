@@ -472,7 +472,7 @@ fn parameter_names(design: &Design) -> Vec<Option<String>> {
 /// Returns an example of a summary with all names that a run of the robot can have.
 fn skeleton(robot: &Robot, flexible: &FlexibleRobot) -> Summary {
     let links = flexible.spans.iter().map(|span| LinkFigures { name: span.link.clone(), ..LinkFigures::default() });
-    let stressed = robot.flexible.iter().filter(|link| link.stress.is_some());
+    let stressed = robot.flexible_links.iter().filter(|link| link.stress.is_some());
     let place = StressPlaceFigures { of_yield: Some(0.0), damage: Some(0.0), ..StressPlaceFigures::default() };
     let stress = stressed.map(|link| {
         let own = || robot.gauges.iter().filter(|gauge| gauge.link == link.flexible.link);

@@ -4,8 +4,6 @@ use flexarm_settings::Words;
 use flexarm_stepping::{STEPPERS, Start, StepperEntry, StepperOptions};
 
 use super::value::ParameterValue;
-use flexarm_run::DriveModel;
-use flexarm_run::LinkModel;
 use flexarm_run::RunOptions;
 
 /// Names of all options.

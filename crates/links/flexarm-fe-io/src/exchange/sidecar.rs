@@ -57,13 +57,6 @@ impl Sidecar {
     pub fn map(&self) -> InterfaceMap {
         InterfaceMap { interfaces: self.interfaces.iter().map(|i| i.interface.clone()).collect(), modal: Vec::new() }
     }
-
-    /// Frames with translations in m.
-    pub fn frames_si(&self) -> Vec<Pose> {
-        let scaled =
-            |X: &Pose| Pose::from_parts(Translation3::from(X.translation.vector * self.units.length), X.rotation);
-        self.interfaces.iter().map(|interface| scaled(&interface.frame)).collect()
-    }
 }
 
 #[derive(Deserialize)]

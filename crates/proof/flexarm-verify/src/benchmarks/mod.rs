@@ -67,7 +67,7 @@ impl Method {
     /// * `rate_hz`: samples per second.
     fn run(&self, robot: &Robot, motion: &Motion, step_s: f64, rate_hz: f64) -> Result<Trace, Error> {
         let mut robot = robot.clone();
-        for link in &mut robot.flexible {
+        for link in &mut robot.flexible_links {
             link.choices.geometric = self.stiffening;
         }
         let (stepper, modelling) = (self.stepper, self.modelling);

@@ -63,7 +63,7 @@ struct MeshResult {
 
 impl About {
     fn new(robot: &Robot, programs: &[Program; 2]) -> Self {
-        let reduced = &robot.flexible[0].flexible.reduced;
+        let reduced = &robot.flexible_links[0].flexible.reduced;
         let along = reduced.X_LB.translation.vector - reduced.X_LA.translation.vector;
         Self {
             mass_kg: reduced.proximal.mass + reduced.distal.mass,
@@ -87,7 +87,7 @@ impl Findings {
             return Self::against(&robot, &truth, &programs, about, None);
         }
         let mesh = Meshed::read(bench, MESH, "mm-t-s".parse::<UnitSystem>()?)?;
-        let reduced = &robot.flexible[0].flexible.reduced;
+        let reduced = &robot.flexible_links[0].flexible.reduced;
         let (p_A, p_B) = (reduced.X_LA.translation.vector, reduced.X_LB.translation.vector);
         let condensed = mesh.condensed([Tie::Rigid; 2], p_A, p_B)?;
         let truth = Truth::new(&condensed)?;

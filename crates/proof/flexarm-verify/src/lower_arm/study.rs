@@ -42,7 +42,7 @@ pub(super) struct AxialLoad {
 
 impl FlangeLoads {
     pub(super) fn new(robot: &Robot, truth: &Truth, programs: &[Program; 2]) -> Result<Self, Error> {
-        let filed = inverse(&robot.flexible[0].flexible.reduced.K_BB);
+        let filed = inverse(&robot.flexible_links[0].flexible.reduced.K_BB);
         let mut loads = small_loads(&truth.C);
         loads[F_Z] *= AXIAL_PART;
         let chains = CHAINS.map(in_parts);
@@ -150,7 +150,7 @@ pub(super) struct Frequencies {
 
 impl Frequencies {
     pub(super) fn new(robot: &Robot, truth: &Truth, programs: &[Program; 2]) -> Result<Self, Error> {
-        let details = robot.flexible[0].flexible.reduced.details.as_ref();
+        let details = robot.flexible_links[0].flexible.reduced.details.as_ref();
         let element = details.and_then(|details| details.superelement.as_ref());
         let held = element.map(|element| element.fixed_frequencies_hz()).unwrap_or_default();
         let models = models().into_iter().map(|model| {

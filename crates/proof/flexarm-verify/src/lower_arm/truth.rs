@@ -29,7 +29,7 @@ impl Truth {
 
     /// Computes them from the condensed matrices of the link file, which have only a few modes.
     pub(super) fn filed(robot: &Robot, hz: Vec<f64>) -> Result<Self, Error> {
-        let reduced = &robot.flexible[0].flexible.reduced;
+        let reduced = &robot.flexible_links[0].flexible.reduced;
         let element = reduced.details.as_ref().and_then(|details| details.superelement.as_ref());
         let element = element.ok_or(Error::NoCondensedMass)?;
         let C = inverse(&reduced.K_BB).ok_or(Error::SingularLink)?;

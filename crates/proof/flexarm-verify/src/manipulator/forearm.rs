@@ -41,7 +41,7 @@ impl Forearm {
     /// Returns `None` if the robot has no such link.
     pub(super) fn new(bench: &Bench, robot: &Robot) -> Result<Option<Self>, Error> {
         let fe = Meshed::read_with(bench, MESH, UnitSystem::SI, DUCTILE_IRON, Quadrature::Exact)?;
-        let Some(link) = robot.flexible.iter().map(|l| &l.flexible.reduced).find(|r| r.name == LINK) else {
+        let Some(link) = robot.flexible_links.iter().map(|l| &l.flexible.reduced).find(|r| r.name == LINK) else {
             return Ok(None);
         };
         let (A, B) = (link.X_LA.translation.vector, link.X_LB.translation.vector);

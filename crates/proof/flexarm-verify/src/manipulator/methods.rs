@@ -106,7 +106,7 @@ fn list() -> Vec<Method> {
 /// with the same damping in both models, only the steppers differ.
 fn proportionally_damped(robot: &Robot, first_hz: f64) -> Robot {
     let mut robot = robot.clone();
-    for link in &mut robot.flexible {
+    for link in &mut robot.flexible_links {
         link.damping = Damping::StiffnessProportional(2.0 * DAMPING / (std::f64::consts::TAU * first_hz));
     }
     robot

@@ -72,7 +72,7 @@ impl Findings {
 
 /// Lowest frequency of a casting with both ends held (Hz).
 fn held_hz(robot: &Robot) -> f64 {
-    let details = robot.flexible.iter().filter_map(|link| link.flexible.reduced.details.as_ref());
+    let details = robot.flexible_links.iter().filter_map(|link| link.flexible.reduced.details.as_ref());
     let elements = details.filter_map(|details| details.superelement.as_ref());
     elements.flat_map(|element| element.fixed_frequencies_hz()).reduce(f64::min).unwrap_or(f64::NAN)
 }

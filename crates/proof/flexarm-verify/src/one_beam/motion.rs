@@ -48,7 +48,7 @@ impl Steps {
         let mut robot = robot.clone();
         let first_hz = nth(&Rig::new(&robot, &parts(2), None)?.bending_hz()[1], 0);
         let beta = 2.0 * DAMPING / (std::f64::consts::TAU * first_hz);
-        robot.flexible[0].damping = Damping::StiffnessProportional(beta);
+        robot.flexible_links[0].damping = Damping::StiffnessProportional(beta);
         let rig = Rig::new(&robot, &parts(2), None)?;
         let precise = StepperKind::Reference(ReferenceSettings::new(TOLERANCE));
         let fine = rig.path(precise, TRUTH_EVERY_S, TRUTH_EVERY_S, DURATION_S)?;

@@ -223,14 +223,14 @@ impl Splits {
 impl Split {
     fn new(robot: &Robot, fraction: f64, truth: &Matrix6<f64>, sag_m: f64, hz: &[Vec<f64>; 2]) -> Result<Self, Error> {
         let mut robot = robot.clone();
-        let link = &mut robot.flexible[0];
+        let link = &mut robot.flexible_links[0];
         if let Some(beam) = &mut link.beam {
             beam.split_fraction = fraction;
             link.flexible.reduced = beam.reduce()?;
         }
         let light = weightless(robot.clone());
         let mut uncoupled = light.clone();
-        uncoupled.flexible[0].flexible.coupling = false;
+        uncoupled.flexible_links[0].flexible.coupling = false;
         let [C, D] = [&light, &uncoupled]
             .map(|robot| Rig::new(robot, &parts(2), None)?.compliance(&small_loads(truth), Rig::statics));
         let heavy = Rig::new(&robot, &parts(2), None)?;

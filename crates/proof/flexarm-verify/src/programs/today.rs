@@ -64,7 +64,7 @@ impl Today {
     pub(super) fn new(bench: &Bench, damping_s: f64) -> Result<Self, Error> {
         let truth = Curve::read(&bench.root.join(CURVE))?;
         let mut robot = bench.robot(ROBOT)?;
-        for link in &mut robot.flexible {
+        for link in &mut robot.flexible_links {
             link.damping = Damping::StiffnessProportional(damping_s);
             link.flexible.angles = ElasticAngles::EulerZyx;
         }

@@ -91,11 +91,11 @@ impl RingDown {
 /// `beta` (s).
 fn models(robot: &Robot, beta: f64, duration_s: f64) -> Result<Vec<Model>, Error> {
     let mut robot = robot.clone();
-    for link in &mut robot.flexible {
+    for link in &mut robot.flexible_links {
         link.damping = Damping::StiffnessProportional(beta);
     }
     let mut stiffened = robot.clone();
-    for link in &mut stiffened.flexible {
+    for link in &mut stiffened.flexible_links {
         link.choices.geometric = true;
     }
     let (modal, links) = in_modes(MODES);

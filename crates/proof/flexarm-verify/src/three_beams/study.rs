@@ -128,7 +128,7 @@ impl Meshes {
         let models = models.collect::<Result<_, Error>>()?;
         let all_modes: Modelling = in_modes(ALL_MODES).1;
         let rig = Rig::new(&weightless(robot.clone()), &all_modes, None)?;
-        let condition = robot.flexible[super::beams::TUBE].flexible.reduced.details.as_ref();
+        let condition = robot.flexible_links[super::beams::TUBE].flexible.reduced.details.as_ref();
         let condition = condition.and_then(|details| details.gate.as_ref()).map(|gate| gate.condition);
         Ok(Self {
             tube_condition: condition.unwrap_or(f64::NAN),
@@ -171,7 +171,7 @@ impl Meshes {
 fn tube_rule_error(bench: &Bench, robot: &Robot) -> Result<f64, Error> {
     let by_rule = |quadrature: Quadrature| -> Result<Matrix6<f64>, Error> {
         let tube = Meshed::read_with(bench, TUBE_MESH, UnitSystem::SI, Material::ALUMINIUM, quadrature)?;
-        let p_B = robot.flexible[super::beams::TUBE].flexible.reduced.X_LB.translation.vector;
+        let p_B = robot.flexible_links[super::beams::TUBE].flexible.reduced.X_LB.translation.vector;
         tube.condensed([Tie::Rigid; 2], Vector3::zeros(), p_B)?.compliance()
     };
     Ok(compliance_error(&by_rule(Quadrature::Calculix)?, &by_rule(Quadrature::Exact)?))

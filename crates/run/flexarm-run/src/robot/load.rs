@@ -90,7 +90,7 @@ impl Robot {
             urdf_path: path.to_owned(),
             rigid: urdf.mechanism.clone(),
             urdf,
-            flexible: Vec::new(),
+            flexible_links: Vec::new(),
             mounting: None,
             drives: Vec::new(),
             coupling: None,
@@ -212,7 +212,7 @@ impl Robot {
             urdf_path,
             rigid,
             urdf,
-            flexible: Vec::new(),
+            flexible_links: Vec::new(),
             mounting: None,
             drives: Vec::new(),
             coupling: None,
@@ -266,12 +266,12 @@ impl Robot {
             keep(self.reweigh(entry, source).map_err(Error::from), faults);
             let urdf = &self.urdf.mechanism;
             let flexible = flexible_link(entry, urdf, source, home, &mut self.warnings, faults);
-            self.flexible.extend(keep(flexible, faults));
+            self.flexible_links.extend(keep(flexible, faults));
         }
         // A gauge on a link that has a fault of its own is not judged.
         let links = file.flexible_link.iter().map(|entry| {
             let name = entry.link.get_ref().as_str();
-            let loaded = self.flexible.iter().find(|link| link.flexible.link == name);
+            let loaded = self.flexible_links.iter().find(|link| link.flexible.link == name);
             (name, loaded.is_none_or(|link| link.stress.is_some()))
         });
         let (found, wrong) = gauges(&file.strain_gauge, &file.stress_point, &links.collect::<Vec<_>>(), source);

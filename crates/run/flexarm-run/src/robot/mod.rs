@@ -48,7 +48,7 @@ pub struct Robot {
     /// Rigid robot: the URDF with TCP frame, payload and gravity.
     pub rigid: Mechanism,
     /// Flexible links.
-    pub flexible: Vec<RobotLink>,
+    pub flexible_links: Vec<RobotLink>,
     /// Elastic mounting of the base, if there is one.
     pub mounting: Option<RobotMounting>,
     /// Drives given in the robot file; all other joints are prescribed.
@@ -164,7 +164,8 @@ impl Robot {
         let mut caveats: Vec<Caveat> = own.chain(urdf).chain(self.written.iter().cloned()).collect();
         caveats.extend(caveat::parts::of_robot(self));
         let inertia = |link: &RobotLink| self.urdf.mechanism.link(&link.flexible.link).and_then(|own| own.inertia);
-        caveats.extend(self.flexible.iter().flat_map(|link| caveat::links::of_link(link, inertia(link).as_ref())));
+        caveats
+            .extend(self.flexible_links.iter().flat_map(|link| caveat::links::of_link(link, inertia(link).as_ref())));
         caveats.extend(caveat::links::of_mounting(self));
         if let Ok(rigid) = self.rigid_model() {
             caveats.extend(caveat::drives::of_drives(&self.drives, &self.rigid, &rigid));

@@ -1,7 +1,7 @@
 //! Computes the figures of a run from its monitors, and checks whether its models are valid.
 
 use flexarm_analysis::TcpMetrics;
-use flexarm_kinematics::{Frame, State, forward_kinematics};
+use flexarm_kinematics::{Data, Frame, State, forward_kinematics};
 use flexarm_log::Event;
 use flexarm_stepping::FlexibleArm;
 
@@ -23,7 +23,7 @@ impl RunLoop<'_> {
         let (links, elastic_drives) = (self.link_figures(), self.drive_figures());
         let sag_m = static_sag(&self.arm, &self.tcp);
         let robot = self.robot;
-        let by_choice = !robot.flexible.is_empty()
+        let by_choice = !robot.flexible_links.is_empty()
             || robot.is_mounted()
             || robot.drives.iter().any(|drive| drive.gearbox.is_some());
         let coordinates = self.arm.model.coordinates().iter();

@@ -101,7 +101,7 @@ impl StressMonitor {
         modelling: &Modelling,
     ) -> Result<Option<Self>, Error> {
         let mut links = Vec::new();
-        for (k, link) in robot.flexible.iter().enumerate().filter(|(_, link)| link.stress.is_some()) {
+        for (k, link) in robot.flexible_links.iter().enumerate().filter(|(_, link)| link.stress.is_some()) {
             // Rigid links have no spans.
             let Some(span) = flexible.spans.get(k) else { continue };
             let owned = arm.elements.iter().zip(&flexible.owners).filter(|(_, owner)| **owner == Owner::Link(k));
