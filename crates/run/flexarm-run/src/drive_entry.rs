@@ -524,7 +524,9 @@ fn with_play(
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum PlayError {
     /// Their number is not that of the springs.
-    #[error("backlash has {found} numbers, the stiffness {expected}: give the play to each side of every spring")]
+    #[error(
+        "backlash has a length of {found}, the stiffness of {expected}: give the play to each side of every spring"
+    )]
     Count { found: usize, expected: usize },
     /// A number is negative or not finite.
     #[error("backlash = {0}: it must be 0 or above")]
