@@ -1,8 +1,8 @@
 //! Building blocks of errors and caveats: settings named in messages, which each front end names in
 //! its own way ([`Setting`]); the [`Caveat`], which compares a value with a reference; the party
-//! responsible for an error ([`Fault`]); ranges of physical quantities ([`Quantity`]); TOML
-//! messages without type names ([`without_types`]); choices by a word ([`Words`]); escaping of foreign text for each kind of
-//! output ([`written`]).
+//! responsible for an error ([`Fault`]); ranges of physical quantities ([`Quantity`]); choices by a
+//! word ([`Words`]); TOML messages without type names ([`without_types`]); escaping of foreign text
+//! for each kind of output ([`written`]).
 //!
 //! "Try a smaller step" refers to a struct field in Rust, to a keyword argument in Python and to a
 //! flag on the command line. Errors and caveats therefore carry a [`Setting`], whose name is looked

@@ -159,9 +159,10 @@ pub(crate) fn inspection(i: &Inspection) -> String {
         let k: Vec<String> = (0..6).map(|c| format!("{:.3e}", m.stiffness[c][c])).collect();
         let at = m.position_m;
         out += &format!(
-            "mounting: {:?} on springs at {at:?} m of the base link, {} (N/m, N m/rad) on their diagonal; {:.2} kg ride on them\n",
+            "mounting: {:?} on springs at {at:?} m of the base link, {} (N/m, N m/rad) on their diagonal{}; {:.2} kg ride on them\n",
             m.name,
             k.join(", "),
+            if m.backlash.is_empty() { String::new() } else { format!(", play of {:?} (m, rad)", m.backlash) },
             m.mass_kg
         );
     }

@@ -307,12 +307,12 @@ fn every_stepper_swings_on_the_mounting_as_the_reference_does() {
     assert_eq!(rigid.flexible().springs.len(), 0);
 }
 
-/// Truth, to first order: each spring with play gives way by its play and by its force over its
+/// Truth, to first order: each spring with play deflects by its play and by its force over its
 /// stiffness, in the frame of the springs; without load it does not move. A fixed joint with six
 /// stiffnesses and the same play below the base is the same mounting. Measured below 1.4e-6, the
 /// second order in the deflection.
 #[test]
-fn springs_with_play_give_way_by_their_play_and_their_force_over_stiffness() {
+fn springs_with_play_deflect_by_their_play_and_their_force_over_stiffness() {
     let place = Place::new("play");
     let play: [f64; 6] = [2e-7, 0.0, 3e-7, 4e-7, 5e-7, 6e-7];
     let pivot = [0.1, -0.2, -0.3];
@@ -424,7 +424,7 @@ fn what_makes_no_mounting_is_refused_with_what_was_found_and_expected() {
         &["section"],
     );
     fails("reduced = \"nowhere.flex\"", &["there is no file"]);
-    fails(&format!("{six}backlash = [0.0, 0.0]"), &["backlash has 2 numbers", "6"]);
+    fails(&format!("{six}backlash = [0.0, 0.0]"), &["backlash has a length of 2", "6"]);
     fails(&format!("{six}backlash = [0.0, 0.0, 0.0, -1e-3, 0.0, 0.0]"), &["backlash = -0.001", "0 or above"]);
     fails(&format!("stiffness = {}\nbacklash = {:?}", written(&coupled()), [1e-3; 6]), &["uncoupled", "6x6"]);
     fails(&format!("{six}mas = 3.0"), &["unknown field `mas`"]);

@@ -177,13 +177,17 @@ impl Drive {
         self.armature
     }
 
-    /// Returns the largest play to each side of the gearbox's rotations (rad), or of its only spring
-    /// (rad or m), and of its translations (m). The curves of the springs include it.
-    pub fn play(&self) -> [f64; 2] {
+    /// Returns the largest play to each side of the gearbox's rotations (rad) and translations (m);
+    /// `slides`: whether its only spring is a translation. The curves of the springs include it.
+    pub fn play(&self, slides: bool) -> [f64; 2] {
         let Some((_, springs)) = &self.gearbox else { return [0.0; 2] };
-        let turns = if springs.play.len() == 6 { 3 } else { 0 };
+        let translations = match springs.play.len() {
+            6 => 3,
+            1 if slides => 1,
+            _ => 0,
+        };
         let largest = |play: &[f64]| play.iter().copied().fold(0.0, f64::max);
-        [largest(&springs.play[turns..]), largest(&springs.play[..turns])]
+        [largest(&springs.play[translations..]), largest(&springs.play[..translations])]
     }
 }
 
@@ -524,7 +528,9 @@ fn with_play(
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum PlayError {
     /// Their number is not that of the springs.
-    #[error("backlash has {found} numbers, the stiffness {expected}: give the play to each side of every spring")]
+    #[error(
+        "backlash has a length of {found}, the stiffness of {expected}: give the play to each side of every spring"
+    )]
     Count { found: usize, expected: usize },
     /// A number is negative or not finite.
     #[error("backlash = {0}: it must be 0 or above")]

@@ -143,19 +143,23 @@ pub struct MountingInfo {
     pub quaternion_wxyz: [f64; 4],
     /// Stiffness in the axes of the springs, 6×6, linear first.
     pub stiffness: Vec<Vec<f64>>,
+    /// Play of each spring to each side (m, rad); empty if there is none.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub backlash: Vec<f64>,
     /// Mass carried in addition to the base (kg).
     pub mass_kg: f64,
 }
 
 impl MountingInfo {
     fn of(mounting: &RobotMounting) -> Option<Self> {
-        let RobotMounting::Springs { springs, .. } = mounting else { return None };
+        let RobotMounting::Springs { springs, play, .. } = mounting else { return None };
         let attitude = UnitQuaternion::from_rotation_matrix(&springs.X_BS.rotation);
         Some(Self {
             name: springs.name.clone(),
             position_m: springs.X_BS.translation.vector.into(),
             quaternion_wxyz: [attitude.w, attitude.i, attitude.j, attitude.k],
             stiffness: springs.K_S.row_iter().map(|row| row.iter().copied().collect()).collect(),
+            backlash: play.clone(),
             mass_kg: springs.inertia.map_or(0.0, |inertia| inertia.mass),
         })
     }

@@ -111,7 +111,7 @@ pub(super) fn of(
     let untold: Vec<&str> = robot
         .drives
         .iter()
-        .filter(|d| d.play() != [0.0; 2] || d.friction != flexarm_stepping::Friction::NONE)
+        .filter(|d| d.play(false) != [0.0; 2] || d.friction != flexarm_stepping::Friction::NONE)
         .map(|d| d.joint.as_str())
         .collect();
     if !untold.is_empty() {

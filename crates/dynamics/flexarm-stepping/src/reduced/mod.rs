@@ -71,7 +71,6 @@ impl ReducedArm {
         let n = arm.n_free();
         let driven = arm.torque_driven.clone();
         let roles = Roles::new(model, |k| k < model.n_actuated() && !driven.contains(&k));
-        // Load-dependent stiffness needs the spatial accelerations of the full pass.
         let geometric = arm.elements.iter().any(|e| e.geometric.is_some());
         Self {
             data: Data::new(&arm.model),

@@ -1,10 +1,11 @@
 //! Benchmarks of flexible multibody systems in large motion, from `tests/benchmarks`: two-link arms
-//! of slender beams, and Simeon's slider crank.
+//! of slender beams, Simeon's slider crank, a turning blade.
 //!
-//! `two_link` and `slider_crank` compute findings, `page` writes them up.
+//! `two_link`, `slider_crank` and `swept_rotor` compute findings, `page` writes them up.
 
 mod page;
 mod slider_crank;
+mod swept_rotor;
 mod two_link;
 
 use std::path::Path;
@@ -19,6 +20,7 @@ use crate::bench::{ALPHA, Bench, spook};
 use crate::page::Case;
 
 use slider_crank::SliderCrank;
+use swept_rotor::Spin;
 use two_link::TwoLink;
 
 /// Folder of the benchmarks.
@@ -28,13 +30,15 @@ const FOLDER: &str = "tests/benchmarks";
 struct Findings {
     two_link: TwoLink,
     slider_crank: SliderCrank,
+    spins: Vec<Spin>,
 }
 
 /// Runs the case.
 pub(crate) fn case(bench: &Bench, pace: &mut Pace<'_>) -> Result<Case, Error> {
-    let two_link = TwoLink::new(bench, &mut |share| pace.at(0.7 * share))?;
-    let slider_crank = SliderCrank::new(bench, &mut |share| pace.at(0.7 + 0.3 * share))?;
-    Ok(page::page(&Findings { two_link, slider_crank }))
+    let two_link = TwoLink::new(bench, &mut |share| pace.at(0.6 * share))?;
+    let slider_crank = SliderCrank::new(bench, &mut |share| pace.at(0.6 + 0.25 * share))?;
+    let spins = swept_rotor::spins(bench, &mut |share| pace.at(0.85 + 0.15 * share))?;
+    Ok(page::page(&Findings { two_link, slider_crank, spins }))
 }
 
 /// A link model, with its name on the page.

@@ -156,7 +156,7 @@ fn gear(drive: &Drive, effort: f64, others: Option<f64>) -> Vec<Caveat> {
     if gear.dampers.as_ref().is_some_and(|d| d.len() == 1) && relaxation > CREEP {
         caveats.push(kinds::CREEP.found(name(drive), relaxation, CREEP));
     }
-    let [play, _] = drive.play();
+    let [play, _] = drive.play(false);
     if play > PLAY[0] {
         let likely = slip(play, &(0.0..=PLAY[0]), slip::ANGLE, 1.0);
         let caveat = kinds::BACKLASH.found(name(drive), play, PLAY[0]).likely(likely);

@@ -56,10 +56,9 @@ impl ArmAtRest<'_> {
                 _ if element.slides(&self.arm.model) => (norm(e), 0.0),
                 _ => (0.0, norm(e)),
             };
-            // Play is not deflection. That of a prismatic joint's only spring is the first number.
-            let [play, translations] = drive.play();
-            let sliding = if translations > 0.0 { translations } else { play };
-            caveats.extend(give(drive, effort, (turned - play).max(0.0), (along - sliding).max(0.0), 1.0));
+            // Play is not deflection.
+            let [turning, sliding] = drive.play(element.slides(&self.arm.model));
+            caveats.extend(give(drive, effort, (turned - turning).max(0.0), (along - sliding).max(0.0), 1.0));
         }
         caveats
     }

@@ -16,7 +16,7 @@ pub(crate) struct Deflections {
 impl Deflections {
     pub(crate) fn new(arm: &FlexibleArm, flexible: &FlexibleRobot, n_drives: usize) -> Self {
         let springs = arm.elements.iter().zip(&flexible.owners).filter_map(|(element, owner)| match owner {
-            // Of several springs only the rotations count.
+            // The translations of several springs do not count.
             Owner::Drive(_)
                 if element.slides(&arm.model) && flexible.owners.iter().filter(|o| *o == owner).count() > 1 =>
             {

@@ -163,7 +163,8 @@ impl RunLoop<'_> {
             let slides = joint.is_some_and(|c| c.slides()) && drive.guide().is_none();
             let [turned, moved] = if slides { [0.0, *give] } else { [*give, 0.0] };
             let effort = joint.map_or(f64::INFINITY, |c| c.limits.effort);
-            drives::give(drive, effort, (turned - drive.play()[0]).max(0.0), moved, 2.0)
+            let [turning, sliding] = drive.play(slides);
+            drives::give(drive, effort, (turned - turning).max(0.0), (moved - sliding).max(0.0), 2.0)
         });
         found.collect()
     }

@@ -112,7 +112,7 @@ pub(crate) fn link_side_angles(robot: &Robot, flexible: &FlexibleRobot) -> Vec<(
         let JointMotion::Axis(motion) = motor.motion else { continue };
         let axis = motion.axis();
         match flexible.model.bodies()[group.body].motion {
-            // Of several springs only those of the joint's own kind move it.
+            // A sliding spring does not turn a joint, and a turning one does not move a slide.
             JointMotion::Axis(own) if own.slides() != motion.slides() => {}
             JointMotion::Axis(own) => {
                 angles.push((k, group.coordinate, axis.dot(&own.axis())));
