@@ -54,7 +54,8 @@ pub(crate) fn run(terminal: &Terminal, args: &VerifyArgs) -> Result<ExitCode, Fa
     let wanted = !args.no_files && stored.is_none();
     let folder = OutputFolder::of(args.output.as_deref(), "verification", wanted)?;
     let files = folder.path().map(|folder| VerificationFiles::new(folder, args.force)).transpose()?;
-    let bench = Bench { root: args.data.clone().unwrap_or_else(shipped::checkout), quick: args.quick };
+    let root = args.data.clone().unwrap_or_else(shipped::checkout);
+    let bench = Bench { root, scratch: std::env::temp_dir(), quick: args.quick };
 
     let started = Instant::now();
     let (mut stop, mut bar) = (signals::stop_when_asked(), Bar::new(terminal));

@@ -25,6 +25,8 @@ use crate::Error;
 pub struct Bench {
     /// Root folder.
     pub root: PathBuf,
+    /// Folder for files that are removed at the end.
+    pub scratch: PathBuf,
     /// Whether slow parts are left out.
     pub quick: bool,
 }

@@ -8,7 +8,7 @@ use flexarm_verify::bench::Bench;
 use flexarm_verify::{Verification, case_names, verify};
 
 fn bench() -> Bench {
-    Bench { root: Path::new(env!("CARGO_MANIFEST_DIR")).join("../../.."), quick: true }
+    Bench { root: Path::new(env!("CARGO_MANIFEST_DIR")).join("../../.."), scratch: std::env::temp_dir(), quick: true }
 }
 
 fn quick(names: &[&str]) -> Verification {
@@ -52,7 +52,7 @@ fn a_link_that_is_slightly_wrong_breaks_claims() {
     let text = std::fs::read_to_string(&file).expect("copied");
     assert!(text.contains("height = 0.04,"));
     std::fs::write(&file, text.replace("height = 0.04,", "height = 0.0400002,")).expect("written");
-    let wrong = Bench { root: folder.clone(), quick: true };
+    let wrong = Bench { root: folder.clone(), ..bench() };
     let found = verify(&wrong, &["one-beam".to_owned()], &mut |_, _| ControlFlow::Continue(())).expect("runs");
     let broken = found.cases[0].claims().filter(|claim| !claim.holds && claim.text.starts_with("end loads")).count();
     assert!(!found.passed && broken >= 5, "{broken} claims broke");
@@ -95,7 +95,7 @@ fn unknown_cases_and_missing_files_are_named() {
     let mut go = |_: f64, _: &str| ControlFlow::Continue(());
     let error = verify(&bench(), &["no-beam".to_owned()], &mut go).expect_err("unknown").to_string();
     assert!(error.contains("no-beam") && error.contains("one-beam") && error.contains("manipulator"), "{error}");
-    let nowhere = Bench { root: "/nowhere".into(), quick: true };
+    let nowhere = Bench { root: "/nowhere".into(), ..bench() };
     let error = verify(&nowhere, &["one-beam".to_owned()], &mut go).expect_err("missing").to_string();
     assert!(error.contains("/nowhere/robots/one_beam/robot.toml"), "{error}");
 }

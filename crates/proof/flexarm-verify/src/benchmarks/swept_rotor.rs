@@ -82,7 +82,7 @@ pub(super) fn spins(bench: &Bench, progress: &mut dyn FnMut(f64) -> Result<(), E
     let names =
         ["sweep[deg]", "speed[rpm]", "f1[Hz]", "f2[Hz]", "f3[Hz]", "f4[Hz]", "f5[Hz]", "f6[Hz]", "f7[Hz]", "f8[Hz]"];
     let truth = columns(&bench.file(&format!("{FOLDER}/swept_rotor/truth.csv")), names)?;
-    let folder = Scratch::new()?;
+    let folder = Scratch::new(&bench.scratch)?;
     let (mut spins, mut robot): (Vec<Spin>, Option<Robot>) = (Vec::new(), None);
     for (row, [sweep_deg, speed_rpm, truth_hz @ ..]) in truth.iter().enumerate() {
         progress(row as f64 / truth.len() as f64)?;
@@ -104,8 +104,8 @@ pub(super) fn spins(bench: &Bench, progress: &mut dyn FnMut(f64) -> Result<(), E
 struct Scratch(PathBuf);
 
 impl Scratch {
-    fn new() -> Result<Self, Error> {
-        let folder = std::env::temp_dir().join(format!("flexarm-verify-{}", std::process::id()));
+    fn new(within: &Path) -> Result<Self, Error> {
+        let folder = within.join(format!("flexarm-verify-{}", std::process::id()));
         std::fs::create_dir_all(&folder).map_err(|e| fault(&folder, &e))?;
         Ok(Self(folder))
     }
@@ -113,7 +113,6 @@ impl Scratch {
 
 impl Drop for Scratch {
     fn drop(&mut self) {
-        // What is left over lies in the folder for temporary files.
         let _ = std::fs::remove_dir_all(&self.0);
     }
 }
