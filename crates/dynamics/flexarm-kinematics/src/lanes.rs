@@ -1,8 +1,8 @@
 //! Recursions over several runs or poses of one tree at once, in the lanes of a SIMD scalar type.
 //!
 //! Poses, velocities and inertias differ between lanes; bodies, joints and mode shapes are those of
-//! one [`Model`]. Every lane gives bitwise the result of the `f64` function of the same name.
-//! Functions are inlined into their callers, so that the SIMD instructions are available
+//! one [`Model`](crate::Model). Every lane gives bitwise the result of the `f64` function of the
+//! same name. Functions are inlined into their callers, so that the SIMD instructions are available
 //! ([`flexarm_spatial::lanes::with_lanes`]).
 
 use flexarm_spatial::products::{add, lift, lift3, mul};

@@ -2182,8 +2182,8 @@ class FlexibleInfo(_FlexibleInfo, total=False):
     """Natural frequencies of a modal link with interface A held, all of them (Hz)."""
 
 
-class MountingInfo(TypedDict):
-    """Springs under the base."""
+class _MountingInfo(TypedDict):
+    """What is always there."""
 
     name: str
     """Name."""
@@ -2195,6 +2195,13 @@ class MountingInfo(TypedDict):
     """Stiffness in the axes of the springs, 6×6, linear first."""
     mass_kg: float
     """Mass carried in addition to the base (kg)."""
+
+
+class MountingInfo(_MountingInfo, total=False):
+    """Springs under the base."""
+
+    backlash: list[float]
+    """Play of each spring to each side (m, rad); empty if there is none."""
 
 
 class CouplingInfo(TypedDict):
