@@ -38,6 +38,7 @@ pub mod file_cache;
 mod flexible;
 mod gauge_entry;
 mod gear_entry;
+mod gearbox_entry;
 mod guide_entry;
 mod headline;
 pub mod html_page;

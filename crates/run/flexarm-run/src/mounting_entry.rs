@@ -10,9 +10,9 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use crate::beam_entry::BeamEntry;
-use crate::drive_entry::{Numbers, checked_play};
 use crate::entry_checks::{check_finite, keep, pose};
 use crate::error::Error;
+use crate::gearbox_entry::{Numbers, checked_play};
 use crate::link_entry::{DampingEntry, FlexibleLinkEntry, LinkHome, damping_of, flexible_link};
 use crate::mounting::RobotMounting;
 use crate::robot::Robot;
