@@ -162,11 +162,11 @@ fn every_example_of_a_motion_file_loads_and_goes_where_it_says() {
 }
 
 /// Keys of every struct that is read from a file.
-fn keys(sources: &[&str]) -> BTreeMap<String, BTreeSet<String>> {
+fn keys(sources: &[impl AsRef<str>]) -> BTreeMap<String, BTreeSet<String>> {
     let mut found: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
     for source in sources {
         let (mut reads, mut inside, mut renamed) = (false, None::<String>, None::<String>);
-        for line in read(source).lines().map(str::trim) {
+        for line in read(source.as_ref()).lines().map(str::trim) {
             let line = line.strip_prefix("pub ").or_else(|| line.strip_prefix("pub(crate) ")).unwrap_or(line);
             if line.starts_with("#[derive(") {
                 reads = line.contains("Deserialize");
@@ -187,19 +187,16 @@ fn keys(sources: &[&str]) -> BTreeMap<String, BTreeSet<String>> {
     found
 }
 
-const ROBOT: [&str; 11] = [
-    "crates/run/flexarm-run/src/robot_file.rs",
-    "crates/run/flexarm-run/src/balancer_entry.rs",
-    "crates/run/flexarm-run/src/controller_entry.rs",
-    "crates/run/flexarm-run/src/beam_entry.rs",
-    "crates/run/flexarm-run/src/drive_entry.rs",
-    "crates/run/flexarm-run/src/gear_entry.rs",
-    "crates/run/flexarm-run/src/coupling_entry.rs",
-    "crates/run/flexarm-run/src/link_entry.rs",
-    "crates/run/flexarm-run/src/mounting_entry.rs",
-    "crates/run/flexarm-run/src/loop_entry.rs",
-    "crates/run/flexarm-linkmaker/src/material_entry.rs",
-];
+/// Sources of `robot.toml`: the file itself and every entry.
+fn robot_sources() -> Vec<String> {
+    let mut found = vec!["crates/run/flexarm-run/src/robot_file.rs".to_owned()];
+    for folder in ["crates/run/flexarm-run/src", "crates/run/flexarm-linkmaker/src"] {
+        let names = std::fs::read_dir(project(folder)).unwrap().map(|file| file.unwrap().file_name());
+        let names = names.map(|name| name.into_string().unwrap());
+        found.extend(names.filter(|name| name.ends_with("_entry.rs")).map(|name| format!("{folder}/{name}")));
+    }
+    found
+}
 
 const LOADS: [&str; 1] = ["crates/run/flexarm-run/src/loads_file.rs"];
 const MOTION: [&str; 2] =
@@ -207,15 +204,17 @@ const MOTION: [&str; 2] =
 
 #[test]
 fn every_key_is_on_its_page() {
-    let all = keys(&ROBOT);
+    let robot = robot_sources();
+    let all = keys(&robot);
     assert!(all["FlexibleLinkEntry"].contains("eigenmodes") && all["BeamEntry"].contains("kGA_y"), "{all:?}");
     assert!(all["DriveEntry"].contains("motor_inertia"), "{all:?}");
     assert!(keys(&LOADS)["LoadEntry"].contains("spindle_rpm"));
     assert!(keys(&MOTION)["MoveToml"].contains("via") && keys(&MOTION)["FileToml"].contains("move"));
-    for (path, sources) in [("docs/robot-file.md", &ROBOT[..]), ("docs/loads.md", &LOADS), ("docs/motions.md", &MOTION)]
+    for (path, structs) in
+        [("docs/robot-file.md", all), ("docs/loads.md", keys(&LOADS)), ("docs/motions.md", keys(&MOTION))]
     {
         let page = read(path);
-        for (of, names) in &keys(sources) {
+        for (of, names) in &structs {
             for name in names {
                 let shown = [format!("`{name}`"), format!("{name} ="), format!("{{ {name}"), format!(", {name}")];
                 assert!(shown.iter().any(|text| page.contains(text)), "{name} of {of} is not in {path}");
@@ -226,7 +225,7 @@ fn every_key_is_on_its_page() {
 
 /// Compares the definitions of a schema, by name, with the struct that each describes; the first
 /// one is the whole file.
-fn same_keys(schema: &str, sources: &[&str], files: &[&str], definitions: &[(&str, &str)]) {
+fn same_keys(schema: &str, sources: &[impl AsRef<str>], files: &[&str], definitions: &[(&str, &str)]) {
     let schema: serde_json::Value = serde_json::from_str(&read(schema)).unwrap();
     let properties = |node: &serde_json::Value| -> BTreeSet<String> {
         node["properties"].as_object().unwrap().keys().cloned().collect()
@@ -267,8 +266,13 @@ fn the_schemas_have_the_same_keys() {
         ("balancer_gas", "GasEntry"),
         ("balancer_gas_spring", "GasSpringEntry"),
         ("balancer_sine", "SineEntry"),
+        ("guide", "GuideEntry"),
+        ("tilt", "TiltEntry"),
+        ("calibration", "CalibrationEntry"),
+        ("strain_gauge", "StrainGaugeEntry"),
+        ("stress_point", "StressPointEntry"),
     ];
-    same_keys("docs/robot.schema.json", &ROBOT, &["RobotFile"], &robot);
+    same_keys("docs/robot.schema.json", &robot_sources(), &["RobotFile"], &robot);
     same_keys("docs/loads.schema.json", &LOADS, &["LoadsFile"], &[("load", "LoadEntry"), ("payload", "PayloadEntry")]);
     let motion = [("move", "MoveToml"), ("limits", "LimitsToml"), ("samples", "SamplesToml")];
     same_keys("docs/motion.schema.json", &MOTION, &["FileToml", "SamplesFileToml"], &motion);
