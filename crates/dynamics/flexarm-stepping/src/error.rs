@@ -124,9 +124,22 @@ pub enum StepError {
         /// Remedy.
         mend: &'static str,
     },
+    /// The arm is no ordinary differential equation in its coordinates.
+    #[error(
+        "an arm with hysteresis is no differential equation in its coordinates, because its springs depend on the past: leave hysteresis out"
+    )]
+    NoEquations,
+    /// A solver outside has set a state beyond what an arm can do.
+    #[error(
+        "the state is out of the range of the arm: the solver has become unstable; a stiff arm needs an implicit solver or small steps"
+    )]
+    OutOfRange,
     /// The parts of the arm do not fit together.
     #[error("{0}")]
     Setup(String),
+    /// A stepper in maximal coordinates was given an arm with a feature that it does not support.
+    #[error("spook works in maximal coordinates and does not support {0}: use generalized-alpha")]
+    NotInMaximal(&'static str),
     /// A stepper in maximal coordinates was given links with modal coordinates.
     #[error(
         "spook works in maximal coordinates and does not support modal links ({} lumped would do): use generalized-alpha",
@@ -156,11 +169,14 @@ impl StepError {
             Self::NoEquilibrium { .. } => &[Setting::Start],
             Self::SolverGaveUp { .. } => &[Setting::Tolerance, Setting::ReferenceMethod],
             Self::UnstableStep { .. } => &[Setting::Step, Setting::Stepper],
+            Self::NotInMaximal(_) => &[Setting::Stepper],
             Self::ModalLinks => &[Setting::Links, Setting::Stepper],
             Self::Singular { .. }
             | Self::Setup(_)
             | Self::OpenLoop { .. }
             | Self::NoSlopes { .. }
+            | Self::NoEquations
+            | Self::OutOfRange
             | Self::Apart { .. } => &[],
         }
     }

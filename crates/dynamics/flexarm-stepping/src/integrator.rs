@@ -287,6 +287,11 @@ impl<I: Integrator + 'static> Stepper for ReducedStepper<I> {
         self.integrator.restart(&mut self.system)
     }
 
+    fn change_masses(&mut self, arm: &Arc<FlexibleArm>) -> Result<(), StepError> {
+        self.system.arm = arm.clone();
+        self.integrator.renew(&mut self.system)
+    }
+
     fn copy(&self) -> Option<Box<dyn Stepper>> {
         Some(Box::new(Self { system: self.system.clone(), integrator: self.integrator.copy()? }))
     }

@@ -1,8 +1,11 @@
 //! Common interface of all steppers: step, observe, count. The steppers are listed in
 //! [`crate::steppers`].
 
+use std::sync::Arc;
+
 use flexarm_settings::Words;
 
+use crate::arm::FlexibleArm;
 use crate::error::StepError;
 use crate::observation::Observation;
 
@@ -66,6 +69,13 @@ pub trait Stepper: Send {
     fn restart(&mut self) -> Result<(), StepError> {
         Ok(())
     }
+
+    /// Continues with masses and damping of an arm that is the same otherwise, as after a payload is
+    /// picked up or put down: positions and velocities stay.
+    ///
+    /// # Errors
+    /// [`StepError::NotInMaximal`]; as [`Stepper::restart`].
+    fn change_masses(&mut self, arm: &Arc<FlexibleArm>) -> Result<(), StepError>;
 
     /// Returns a copy that goes on from the current state with the same bits; `None` if the solver
     /// cannot be copied.

@@ -130,6 +130,11 @@ impl Stepper for Extrapolated {
         self.fine.restart()
     }
 
+    fn change_masses(&mut self, arm: &Arc<FlexibleArm>) -> Result<(), StepError> {
+        self.coarse.change_masses(arm)?;
+        self.fine.change_masses(arm)
+    }
+
     fn copy(&self) -> Option<Box<dyn Stepper>> {
         Some(Box::new(self.clone()))
     }

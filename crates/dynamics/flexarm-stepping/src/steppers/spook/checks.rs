@@ -6,11 +6,14 @@ use nalgebra::Vector3;
 use crate::arm::FlexibleArm;
 use crate::error::StepError;
 
+/// Name of changes of inertia.
+pub(super) const CHANGES: &str = "payloads that change";
+
 /// Refuses arms with unsupported features.
 pub(super) fn check_known(arm: &FlexibleArm) -> Result<(), StepError> {
     let unknown = [
         (!arm.torque_driven.is_empty(), "joints driven by torque"),
-        (!arm.inertia_changes.is_empty(), "payloads that change"),
+        (!arm.inertia_changes.is_empty(), CHANGES),
         (!arm.hysteresis.is_empty(), "gears with hysteresis"),
         (arm.has_guides(), "telescopic guides"),
         (arm.elements.iter().any(|e| e.curve.is_some()), "springs with play or curves"),
@@ -22,9 +25,7 @@ pub(super) fn check_known(arm: &FlexibleArm) -> Result<(), StepError> {
     match unknown.iter().find(|(there, _)| *there) {
         _ if arm.model.has_modal() => Err(StepError::ModalLinks),
         None => Ok(()),
-        Some((_, what)) => Err(StepError::Setup(format!(
-            "spook works in maximal coordinates and does not support {what}: use generalized-alpha"
-        ))),
+        Some((_, what)) => Err(StepError::NotInMaximal(what)),
     }
 }
 

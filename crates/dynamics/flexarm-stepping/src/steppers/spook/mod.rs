@@ -29,6 +29,8 @@ mod pins;
 mod settings;
 mod solve;
 
+use std::sync::Arc;
+
 use flexarm_kinematics::{
     BalancerPlace, Data, ElasticAngles, JointMotion, Model, PlacedBalancer, Pose, State, Twist, Wrench,
     forward_kinematics_velocity, rotation_vector,
@@ -265,6 +267,10 @@ impl Stepper for Spook {
 
     fn counts(&self) -> Counts {
         Counts { steps: self.steps, evaluations: self.steps, factorisations: self.steps }
+    }
+
+    fn change_masses(&mut self, _arm: &Arc<FlexibleArm>) -> Result<(), StepError> {
+        Err(StepError::NotInMaximal(checks::CHANGES))
     }
 
     fn copy(&self) -> Option<Box<dyn Stepper>> {
