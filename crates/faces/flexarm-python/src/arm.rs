@@ -506,7 +506,7 @@ impl PyArm {
             "open" => Servos::Open,
             other => return Err(PyValueError::new_err(format!("servos = {other:?}: expected \"closed\" or \"open\""))),
         };
-        let own = LiveOptions { servos, stiffness, damping };
+        let own = LiveOptions { servos, stiffness, damping, ..LiveOptions::default() };
         let live = self.arm.live_with(self.pose(q)?.as_deref(), period, &options, &own).or_raise()?;
         Ok(PyLive::new(live, self.n()))
     }

@@ -91,6 +91,16 @@ impl PyLive {
         live.advance(period, &Command { q: q.values(), qdot, torque, wrench }).or_raise()
     }
 
+    /// Picks up or puts down the payload of the robot file; positions and velocities stay.
+    ///
+    /// Parameters
+    /// ----------
+    /// carried : bool
+    ///     Whether the arm carries it from now on.
+    fn set_payload(&self, carried: bool) -> PyResult<()> {
+        self.lock().set_payload(carried).or_raise()
+    }
+
     /// Returns a copy of the state, for :meth:`restore`.
     fn state(&self) -> PyResult<PyLiveState> {
         Ok(PyLiveState(Mutex::new(self.lock().state().or_raise()?)))

@@ -111,7 +111,9 @@ pub use gear_entry::{GearHysteresis, RobotCoupling};
 pub use guide_entry::GuideTilt;
 pub use headline::{Bending, ShareFigures};
 pub use inspect::{CouplingInfo, FlexibleInfo, Inspection, JointInfo, LinkInfo, MountingInfo, TcpInfo, inspect};
-pub use live::{Command, Live, LiveOptions, LiveState, Servos};
+pub use live::{
+    Command, ElasticCoordinate, EquationCommand, Equations, Live, LiveOptions, LiveState, Readings, Servos,
+};
 pub use loops::{DependentInfo, LoopInfo, RobotLoop};
 pub use mode_recording::{ModeMovie, record_modes};
 pub use modes::{ModeFigures, ModeTable, modes};

@@ -20,6 +20,11 @@ pub enum ValueError {
     /// A value is outside the range of plausible robots.
     #[error(transparent)]
     OutOfRange(#[from] OutOfRange),
+    /// There is no payload that can be put down.
+    #[error(
+        "this arm has no payload that can be put down: give its robot file a [payload] on a link that does not bend"
+    )]
+    NoPayload,
     /// The log rate is not positive.
     #[error("{setting}: the log rate must be positive, found {0} Hz", setting = Setting::LogRate)]
     LogRate(f64),

@@ -7,24 +7,27 @@
 //! as in any controller that receives positions only. Drives respond as in a run: prescribed joints
 //! follow exactly, servos with their gains and lag.
 
+mod equations;
+mod readings;
+
+use std::ops::{Deref, DerefMut};
 use std::sync::{Arc, PoisonError, RwLock};
 
-use flexarm_kinematics::{
-    Data, Pose, State, Wrench, forward_kinematics, forward_kinematics_velocity, frame_twist, inverse_dynamics,
-};
+use flexarm_kinematics::Wrench;
 use flexarm_stepping::{
     FlexibleArm, Load, Observation, PrescribedMotion, Start, StepRule, Stepper, TimedWrench, new_stepper,
 };
-use nalgebra::{DVector, Vector3, Vector6};
 
 use crate::arm::Arm;
 use crate::error::{Error, ValueError};
 use crate::flexible::FlexibleRobot;
 use crate::joint_values::joint_values;
-use crate::monitor::stress::StressMonitor;
 use crate::options::RunOptions;
-use crate::robot::tcp_frame;
-use crate::run::link_side_angles;
+use crate::payload::PayloadChange;
+use crate::robot::PAYLOAD_LINK;
+
+pub use equations::{ElasticCoordinate, EquationCommand, Equations};
+pub use readings::Readings;
 
 /// Tolerance for the control period to be a whole number of steps (in steps).
 const WHOLE: f64 = 1e-6;
@@ -63,11 +66,13 @@ pub struct LiveOptions {
     pub stiffness: f64,
     /// Factor on all damping, as in [`Variation`](crate::Variation).
     pub damping: f64,
+    /// Whether the arm carries the payload of its robot file at the start.
+    pub payload: bool,
 }
 
 impl Default for LiveOptions {
     fn default() -> Self {
-        Self { servos: Servos::Closed, stiffness: 1.0, damping: 1.0 }
+        Self { servos: Servos::Closed, stiffness: 1.0, damping: 1.0, payload: true }
     }
 }
 
@@ -76,6 +81,7 @@ pub struct LiveState {
     targets: Arc<Targets>,
     period: Period,
     push: Wrench,
+    has_payload: bool,
     stepper: Box<dyn Stepper>,
     seen: Observation,
 }
@@ -132,21 +138,30 @@ impl PrescribedMotion for Targets {
 /// A running arm, commanded period by period.
 pub struct Live {
     flexible: Arc<FlexibleRobot>,
-    arm: FlexibleArm,
+    arms: Loaded,
+    has_payload: bool,
     servos: Servos,
     options: RunOptions,
     period_s: f64,
     targets: Arc<Targets>,
     push: Arc<RwLock<Wrench>>,
     stepper: Box<dyn Stepper>,
-    seen: Observation,
-    /// Workspaces for the poses of the rigid and for the velocities of the flexible arm.
-    rigid: (Data, State),
-    moving: (Data, State),
-    /// Result of [`link_side_angles`].
-    link_sides: Vec<(usize, usize, f64)>,
-    /// Stress of the links; only for a robot with gauges.
-    stress: Option<StressMonitor>,
+    readings: Readings,
+}
+
+/// A live arm is read as its [`Readings`].
+impl Deref for Live {
+    type Target = Readings;
+
+    fn deref(&self) -> &Readings {
+        &self.readings
+    }
+}
+
+impl DerefMut for Live {
+    fn deref_mut(&mut self) -> &mut Readings {
+        &mut self.readings
+    }
 }
 
 impl Arm {
@@ -177,7 +192,7 @@ impl Arm {
         options: &RunOptions,
         own: &LiveOptions,
     ) -> Result<Live, Error> {
-        let LiveOptions { servos, stiffness, damping } = *own;
+        let servos = own.servos;
         if servos == Servos::Open && !self.flexible().has_servo() {
             return Err(ValueError::NoServo.into());
         }
@@ -191,44 +206,65 @@ impl Arm {
             return Err(ValueError::Step(step_s).into());
         }
         whole_steps(period_s, step_s)?;
-        let flexible = self.flexible().clone();
         let targets = Arc::new(Targets(RwLock::new(Period::at_rest(&at, period_s))));
+        let Commanded { flexible, arms, push, readings } = Commanded::new(self, own, targets.clone())?;
+        let (has_payload, options) = (own.payload, options.clone());
+        let stepper = started(&flexible, arms.carrying(has_payload)?, &options, servos, &targets)?;
+        let mut live =
+            Live { flexible, arms, has_payload, servos, options, period_s, targets, push, stepper, readings };
+        live.look();
+        Ok(live)
+    }
+}
+
+/// An arm that follows a motion under a wrench on its TCP, both set from outside.
+struct Commanded {
+    flexible: Arc<FlexibleRobot>,
+    arms: Loaded,
+    /// Wrench on the TCP, world axes.
+    push: Arc<RwLock<Wrench>>,
+    readings: Readings,
+}
+
+impl Commanded {
+    fn new(of: &Arm, own: &LiveOptions, motion: Arc<dyn PrescribedMotion>) -> Result<Self, Error> {
+        let flexible = of.flexible().clone();
         let push = Arc::new(RwLock::new(Wrench::zeros()));
-        let springs = flexible.scaled_springs(stiffness, damping)?;
-        let arm = flexible.arm_with(springs, targets.clone()).map_err(|error| flexible.explained(error))?;
+        let springs = flexible.scaled_springs(own.stiffness, own.damping)?;
+        let arm = flexible.arm_with(springs, motion).map_err(|error| flexible.explained(error))?;
         let at_tool = {
             let push = push.clone();
             let wrench = move |_: f64| *push.read().unwrap_or_else(PoisonError::into_inner);
             Load { body: flexible.tcp.body, X_BF: flexible.tcp.X_BF, wrench: TimedWrench::new(wrench) }
         };
         let arm = arm.with_timed_loads(vec![at_tool]).map_err(|source| Error::Step { source, partial: false })?;
-        let stress = match self.robot().gauges.is_empty() {
-            true => None,
-            false => {
-                let mut robot = self.robot().clone();
-                robot.flexible_links.iter_mut().for_each(|link| link.stiffness_factor *= stiffness);
-                StressMonitor::new(&robot, &flexible, &arm, self.modelling())?
-            }
+        let readings = Readings::new(of, &arm, own.stiffness)?;
+        let arms = Loaded::new(of, &flexible, arm);
+        Ok(Self { flexible, arms, push, readings })
+    }
+}
+
+/// An arm with and without the payload of its robot file.
+struct Loaded {
+    with: Arc<FlexibleArm>,
+    /// `None` if there is no payload that can be put down.
+    without: Option<Arc<FlexibleArm>>,
+}
+
+impl Loaded {
+    fn new(of: &Arm, flexible: &FlexibleRobot, arm: FlexibleArm) -> Self {
+        // A payload on a link that bends cannot be put down, nor one without which a part of the
+        // arm has no mass.
+        let release = match of.robot().rigid.link(PAYLOAD_LINK).is_some() {
+            true => PayloadChange::release(0.0).on(of.robot(), &flexible.model, &[]).ok(),
+            false => None,
         };
-        let seen = Observation::new(&arm);
-        let stepper = started(&flexible, &arm, options, servos, &targets)?;
-        let mut live = Live {
-            servos,
-            options: options.clone(),
-            period_s,
-            targets,
-            push,
-            stepper,
-            seen,
-            rigid: (Data::new(&flexible.rigid), State::zeros(&flexible.rigid)),
-            moving: (Data::new(&flexible.model), State::zeros(&flexible.model)),
-            link_sides: link_side_angles(self.robot(), &flexible),
-            stress,
-            flexible,
-            arm,
-        };
-        live.look();
-        Ok(live)
+        let without = release.and_then(|change| arm.clone().with_inertia_changes(vec![change]).ok());
+        Self { with: Arc::new(arm), without: without.map(Arc::new) }
+    }
+
+    fn carrying(&self, payload: bool) -> Result<&Arc<FlexibleArm>, ValueError> {
+        if payload { Ok(&self.with) } else { self.without.as_ref().ok_or(ValueError::NoPayload) }
     }
 }
 
@@ -291,7 +327,7 @@ impl Period {
 /// Returns the stepper of the arm at rest at the targets.
 fn started(
     flexible: &FlexibleRobot,
-    arm: &FlexibleArm,
+    arm: &Arc<FlexibleArm>,
     options: &RunOptions,
     servos: Servos,
     targets: &Targets,
@@ -299,7 +335,7 @@ fn started(
     let start = |arm: FlexibleArm| {
         new_stepper(options.stepper, arm, options.step_s, Start::Equilibrium).map_err(|error| flexible.explained(error))
     };
-    let mut stepper = start(arm.clone())?;
+    let mut stepper = start(FlexibleArm::clone(arm))?;
     if servos == Servos::Open {
         let mut seen = Observation::new(arm);
         stepper.observe(&mut seen);
@@ -318,7 +354,8 @@ impl Live {
         let at = self.checked(at)?;
         *self.targets.0.write().unwrap_or_else(PoisonError::into_inner) = Period::at_rest(&at, self.period_s);
         *self.push.write().unwrap_or_else(PoisonError::into_inner) = Wrench::zeros();
-        self.stepper = started(&self.flexible, &self.arm, &self.options, self.servos, &self.targets)?;
+        let arm = self.arms.carrying(self.has_payload)?;
+        self.stepper = started(&self.flexible, arm, &self.options, self.servos, &self.targets)?;
         self.look();
         Ok(())
     }
@@ -364,6 +401,26 @@ impl Live {
         Ok(())
     }
 
+    /// Picks up or puts down the payload of the robot file; positions and velocities stay.
+    ///
+    /// # Errors
+    /// [`Error::Value`] if there is no payload that can be put down; [`Error::Step`] with a stepper
+    /// in maximal coordinates.
+    pub fn set_payload(&mut self, carried: bool) -> Result<(), Error> {
+        let arm = self.arms.carrying(carried)?;
+        if carried != self.has_payload {
+            self.stepper.change_masses(arm).map_err(|source| Error::Step { source, partial: false })?;
+            self.has_payload = carried;
+            self.look();
+        }
+        Ok(())
+    }
+
+    /// Returns whether there is a payload that can be put down.
+    pub fn can_release(&self) -> bool {
+        self.arms.without.is_some()
+    }
+
     /// Returns a copy of the current state.
     ///
     /// # Errors
@@ -374,8 +431,9 @@ impl Live {
             targets: self.targets.clone(),
             period: self.targets.0.read().unwrap_or_else(PoisonError::into_inner).clone(),
             push: *self.push.read().unwrap_or_else(PoisonError::into_inner),
+            has_payload: self.has_payload,
             stepper,
-            seen: self.seen.clone(),
+            seen: self.readings.seen.clone(),
         })
     }
 
@@ -390,7 +448,9 @@ impl Live {
         self.stepper = state.stepper.copy().ok_or(ValueError::RunsAhead(self.options.stepper.name()))?;
         self.targets.0.write().unwrap_or_else(PoisonError::into_inner).clone_from(&state.period);
         *self.push.write().unwrap_or_else(PoisonError::into_inner) = state.push;
-        self.seen.clone_from(&state.seen);
+        self.has_payload = state.has_payload;
+        self.readings.seen.clone_from(&state.seen);
+        self.readings.set_targets(&state.period.q[1]);
         Ok(())
     }
 
@@ -412,111 +472,13 @@ impl Live {
     }
 
     fn look(&mut self) {
-        self.stepper.observe(&mut self.seen);
-    }
-
-    /// Returns the time (s).
-    pub fn time_s(&self) -> f64 {
-        self.seen.t
+        self.stepper.observe(&mut self.readings.seen);
+        let period = self.targets.0.read().unwrap_or_else(PoisonError::into_inner);
+        self.readings.set_targets(&period.q[1]);
     }
 
     /// Returns the length of a control period (s).
     pub fn period_s(&self) -> f64 {
         self.period_s
-    }
-
-    /// Returns the actual joint positions (rad or m); under servos they lag behind their targets.
-    pub fn position(&self) -> &[f64] {
-        &self.seen.q.as_slice()[..self.flexible.model.n_actuated()]
-    }
-
-    /// Returns the joint velocities (rad/s or m/s).
-    pub fn velocity(&self) -> &[f64] {
-        &self.seen.qdot.as_slice()[..self.flexible.model.n_actuated()]
-    }
-
-    /// Returns the torques or forces of the drives (N m or N).
-    pub fn effort(&self) -> &[f64] {
-        self.seen.drive.as_slice()
-    }
-
-    /// Returns the joint positions at the links: with the deflections of the gearboxes (rad or m).
-    pub fn link_position(&self) -> Vec<f64> {
-        self.at_links(self.seen.q.as_slice())
-    }
-
-    /// Returns the joint velocities at the links (rad/s or m/s).
-    pub fn link_velocity(&self) -> Vec<f64> {
-        self.at_links(self.seen.qdot.as_slice())
-    }
-
-    fn at_links(&self, values: &[f64]) -> Vec<f64> {
-        let mut at_links = values[..self.flexible.model.n_actuated()].to_vec();
-        for &(joint, coordinate, share) in &self.link_sides {
-            at_links[joint] += share * values[coordinate];
-        }
-        at_links
-    }
-
-    /// Returns the elastic coordinates.
-    pub fn deflection(&self) -> &[f64] {
-        &self.seen.q.as_slice()[self.flexible.model.n_actuated()..]
-    }
-
-    /// Returns the TCP pose in the world.
-    pub fn tcp_pose(&self) -> Pose {
-        let tcp = &self.flexible.tcp;
-        self.seen.X_WB[tcp.body] * tcp.X_BF
-    }
-
-    /// Returns the velocity of the TCP: linear, then angular, world axes (m/s, rad/s).
-    pub fn tcp_velocity(&mut self) -> Vector6<f64> {
-        let (data, state) = &mut self.moving;
-        state.q.copy_from(&self.seen.q);
-        state.qdot.copy_from(&self.seen.qdot);
-        forward_kinematics_velocity(&self.flexible.model, data, state);
-        let V = frame_twist(data, &self.flexible.tcp);
-        Vector6::from_iterator(V.linear.iter().chain(V.angular.iter()).copied())
-    }
-
-    /// Returns the acceleration of the TCP, world axes (m/s²); NaN with a stepper that has no
-    /// accelerations.
-    pub fn tcp_acceleration(&mut self) -> Vector3<f64> {
-        let (model, tcp) = (&self.flexible.model, &self.flexible.tcp);
-        let (data, state) = &mut self.moving;
-        state.q.copy_from(&self.seen.q);
-        state.qdot.copy_from(&self.seen.qdot);
-        inverse_dynamics(model, data, state, &self.seen.qddot);
-        // Spatial acceleration plus ω × v, without the gravity term.
-        let (V, A) = (data.V[tcp.body].at_child(&tcp.X_BF), data.A[tcp.body].at_child(&tcp.X_BF));
-        let R = self.seen.X_WB[tcp.body].rotation * tcp.X_BF.rotation;
-        R * (A.linear + V.angular.cross(&V.linear)) + model.gravity
-    }
-
-    /// Returns the names of the channels of strain gauges and stress points, as in recordings; those
-    /// on links that the arm has rigid are left out.
-    pub fn gauge_channels(&self) -> Vec<String> {
-        self.stress.as_ref().map_or_else(Vec::new, StressMonitor::channels)
-    }
-
-    /// Returns the values of [`Live::gauge_channels`]: strain (m/m) or stress (Pa); NaN with a
-    /// stepper that has no accelerations.
-    pub fn gauges(&mut self) -> Vec<f64> {
-        let mut values = Vec::new();
-        if let Some(stress) = &mut self.stress {
-            stress.clear();
-            stress.update(&self.seen);
-            stress.read_gauges(&self.seen, &mut values);
-        }
-        values
-    }
-
-    /// Returns the TCP pose of the rigid arm with its joints at the last targets.
-    pub fn target_pose(&mut self) -> Pose {
-        let period = self.targets.0.read().unwrap_or_else(PoisonError::into_inner);
-        let (data, state) = &mut self.rigid;
-        state.q.copy_from(&DVector::from_column_slice(&period.q[1]));
-        forward_kinematics(&self.flexible.rigid, data, &state.q);
-        data.X_WF(&tcp_frame(&self.flexible.rigid))
     }
 }
