@@ -149,9 +149,9 @@ pub(crate) enum Command {
     Export(Later<ExportArgs>),
     /// Write the arm as an FMU, a plant for control programs
     ///
-    /// The FMU (FMI 3.0 or 2.0, co-simulation) holds the robot, its links, drives and payload. Its
-    /// inputs are joint targets, motor torques and a wrench on the TCP; its outputs are encoders,
-    /// drive torques, the TCP and its error.
+    /// The FMU (FMI 3.0 or 2.0, co-simulation and model exchange) holds the robot, its links, drives
+    /// and payload. Its inputs are joint targets, motor torques, a wrench on the TCP, and whether the
+    /// payload is carried; its outputs are encoders, drive torques, the TCP and its error.
     ExportFmu(Later<ExportFmuArgs>),
     /// Run the case studies against their truths and write the page of results
     Verify(Later<VerifyArgs>),

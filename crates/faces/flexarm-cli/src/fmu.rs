@@ -104,16 +104,17 @@ fn built_library() -> Result<PathBuf, Failure> {
 }
 
 fn text(summary: &FmuSummary) -> String {
+    let exchange = if summary.states > 0 { " and model exchange" } else { "" };
     let mut out = format!(
-        "{}: FMI {} for co-simulation, {}, {:.1} MB\n",
+        "{}: FMI {} for co-simulation{exchange}, {}, {:.1} MB\n",
         summary.file.display(),
         summary.fmi_version,
         summary.platform,
         summary.bytes as f64 / 1e6
     );
     out += &format!(
-        "{} parameters, {} inputs, {} outputs; solver step {} s\n",
-        summary.parameters, summary.inputs, summary.outputs, summary.step_s
+        "{} parameters, {} inputs, {} outputs, {} states; solver step {} s\n",
+        summary.parameters, summary.inputs, summary.outputs, summary.states, summary.step_s
     );
     if summary.meshes > 0 {
         out += &format!("{} meshes are in it, because masses are computed from them\n", summary.meshes);

@@ -20,7 +20,10 @@ extern "C" {
 typedef struct flexarm_plant flexarm_plant;
 typedef struct flexarm_state_of flexarm_state_of;
 
-enum flexarm_causality_of { FLEXARM_TIME = 0, FLEXARM_PARAMETER = 1, FLEXARM_INPUT = 2, FLEXARM_OUTPUT = 3 };
+/* FLEXARM_LOCAL: elastic coordinates, their velocities and accelerations. */
+enum flexarm_causality_of {
+    FLEXARM_TIME = 0, FLEXARM_PARAMETER = 1, FLEXARM_INPUT = 2, FLEXARM_OUTPUT = 3, FLEXARM_LOCAL = 4
+};
 
 /* Version of the library, such as "0.1.0". */
 const char *flexarm_version(void);

@@ -84,6 +84,8 @@ pub struct FmuSummary {
     pub outputs: usize,
     /// Number of parameters.
     pub parameters: usize,
+    /// Number of continuous states in model exchange; 0 if there is none.
+    pub states: usize,
     /// Step size of the solver (s).
     pub step_s: f64,
     /// Meshes in the resources, because masses are computed from them.
@@ -130,6 +132,7 @@ pub fn export_fmu(job: &FmuJob) -> Result<FmuSummary, PlantError> {
         inputs: count(Causality::Input),
         outputs: count(Causality::Output),
         parameters: count(Causality::Parameter),
+        states: plant.state_references().len(),
         step_s,
         meshes,
     })

@@ -1,11 +1,12 @@
 //! `modelDescription.xml` of FMI 2.0 and 3.0.
 
+use std::collections::BTreeSet;
 use std::io;
 
 use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, BytesText, Event};
 
-use crate::variables::{Causality, Kind, UNITS, Variable};
+use crate::variables::{Causality, Kind, StateReferences, UNITS, Variable};
 
 /// Version of the standard.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -49,16 +50,17 @@ pub fn description(fmi: Fmi, about: &About<'_>, variables: &[Variable]) -> io::R
         ("variableNamingConvention", "structured"),
     ]);
     root.write_inner_content(|xml| {
-        co_simulation(xml, fmi)?;
+        interfaces(xml, fmi, variables)?;
         xml.create_element("UnitDefinitions").write_inner_content(units)?;
         let step = about.step_s.to_string();
         xml.create_element("DefaultExperiment")
             .with_attributes([("startTime", "0"), ("stopTime", "1"), ("stepSize", &step)])
             .write_empty()?;
         xml.create_element("ModelVariables").write_inner_content(|xml| {
+            let states = StateReferences::of(variables).states;
             let mut write = |(reference, variable)| match fmi {
-                Fmi::V2 => variable_2(xml, reference, variable),
-                Fmi::V3 => variable_3(xml, reference, variable),
+                Fmi::V2 => variable_2(xml, reference, variable, states.contains(&reference)),
+                Fmi::V3 => variable_3(xml, reference, variable, states.contains(&reference)),
             };
             variables.iter().enumerate().try_for_each(&mut write)
         })?;
@@ -70,14 +72,23 @@ pub fn description(fmi: Fmi, about: &About<'_>, variables: &[Variable]) -> io::R
     Ok(text)
 }
 
-fn co_simulation(xml: &mut Xml, fmi: Fmi) -> io::Result<()> {
-    let state = if fmi == Fmi::V2 { "canGetAndSetFMUstate" } else { "canGetAndSetFMUState" };
+/// Writes what the FMU is for; model exchange only with states.
+fn interfaces(xml: &mut Xml, fmi: Fmi, variables: &[Variable]) -> io::Result<()> {
+    let [state, derivative] = match fmi {
+        Fmi::V2 => ["canGetAndSetFMUstate", "providesDirectionalDerivative"],
+        Fmi::V3 => ["canGetAndSetFMUState", "providesDirectionalDerivatives"],
+    };
+    let own = [("modelIdentifier", MODEL_IDENTIFIER), (state, "true")];
+    if variables.iter().any(|variable| variable.derivative_of.is_some()) {
+        let more = [(derivative, "true"), ("completedIntegratorStepNotNeeded", "true")];
+        // needsCompletedIntegratorStep is false by default in FMI 3.0.
+        let more = if fmi == Fmi::V2 { &more[..] } else { &more[..1] };
+        let element = xml.create_element("ModelExchange").with_attributes(own);
+        element.with_attributes(more.iter().copied()).write_empty()?;
+    }
     xml.create_element("CoSimulation")
-        .with_attributes([
-            ("modelIdentifier", MODEL_IDENTIFIER),
-            ("canHandleVariableCommunicationStepSize", "true"),
-            (state, "true"),
-        ])
+        .with_attributes(own)
+        .with_attribute(("canHandleVariableCommunicationStepSize", "true"))
         .write_empty()?;
     Ok(())
 }
@@ -104,20 +115,27 @@ fn roles(variable: &Variable) -> [(&'static str, &'static str); 2] {
         (Causality::Input, Kind::Boolean) => ("input", "discrete"),
         (Causality::Output, Kind::Real) => ("output", "continuous"),
         (Causality::Output, Kind::Boolean) => ("output", "discrete"),
+        (Causality::Local, _) => ("local", "continuous"),
     };
     [("causality", causality), ("variability", variability)]
 }
 
-/// Returns the start value as text.
-fn start(variable: &Variable) -> Option<String> {
-    variable.start.map(|value| match variable.kind {
+/// Returns start value, nominal value of a state, and whose derivative a variable is, as attributes.
+///
+/// * `first`: number of the first variable.
+fn numbers(variable: &Variable, is_state: bool, first: usize) -> Vec<(&'static str, String)> {
+    let start = variable.start.map(|value| match variable.kind {
         Kind::Real => value.to_string(),
         Kind::Boolean => (value != 0.0).to_string(),
-    })
+    });
+    let nominal = is_state.then(|| variable.nominal().to_string());
+    let derivative = variable.derivative_of.map(|reference| (reference + first).to_string());
+    let all = [("start", start), ("nominal", nominal), ("derivative", derivative)];
+    all.into_iter().filter_map(|(name, value)| Some((name, value?))).collect()
 }
 
-fn variable_3(xml: &mut Xml, reference: usize, variable: &Variable) -> io::Result<()> {
-    let (reference, start) = (reference.to_string(), start(variable));
+fn variable_3(xml: &mut Xml, reference: usize, variable: &Variable, is_state: bool) -> io::Result<()> {
+    let reference = reference.to_string();
     let kind = if variable.kind == Kind::Real { "Float64" } else { "Boolean" };
     let mut element = xml
         .create_element(kind)
@@ -130,15 +148,15 @@ fn variable_3(xml: &mut Xml, reference: usize, variable: &Variable) -> io::Resul
     if variable.kind == Kind::Real {
         element = element.with_attribute(("unit", variable.unit));
     }
-    if let Some(start) = &start {
-        element = element.with_attribute(("start", &**start));
+    for (name, value) in numbers(variable, is_state, 0) {
+        element = element.with_attribute((name, &*value));
     }
     element.write_empty()?;
     Ok(())
 }
 
-fn variable_2(xml: &mut Xml, reference: usize, variable: &Variable) -> io::Result<()> {
-    let (reference, start) = (reference.to_string(), start(variable));
+fn variable_2(xml: &mut Xml, reference: usize, variable: &Variable, is_state: bool) -> io::Result<()> {
+    let reference = reference.to_string();
     let kind = if variable.kind == Kind::Real { "Real" } else { "Boolean" };
     xml.create_element("ScalarVariable")
         .with_attributes([
@@ -152,8 +170,8 @@ fn variable_2(xml: &mut Xml, reference: usize, variable: &Variable) -> io::Resul
             if variable.kind == Kind::Real {
                 element = element.with_attribute(("unit", variable.unit));
             }
-            if let Some(start) = &start {
-                element = element.with_attribute(("start", &**start));
+            for (name, value) in numbers(variable, is_state, 1) {
+                element = element.with_attribute((name, &*value));
             }
             element.write_empty()?;
             Ok(())
@@ -161,28 +179,30 @@ fn variable_2(xml: &mut Xml, reference: usize, variable: &Variable) -> io::Resul
     Ok(())
 }
 
-/// Writes the outputs, and that all of them are known after the initialisation.
+/// Writes outputs and derivatives of states, and that they and the states are known after the
+/// initialisation.
 fn structure(xml: &mut Xml, fmi: Fmi, variables: &[Variable]) -> io::Result<()> {
-    let outputs = || variables.iter().enumerate().filter(|(_, variable)| variable.causality == Causality::Output);
-    match fmi {
-        Fmi::V3 => {
-            for element in ["Output", "InitialUnknown"] {
-                for (reference, _) in outputs() {
-                    let reference = reference.to_string();
-                    xml.create_element(element).with_attribute(("valueReference", &*reference)).write_empty()?;
-                }
-            }
-        }
-        // FMI 2.0 counts from one.
-        Fmi::V2 => {
-            for list in ["Outputs", "InitialUnknowns"] {
-                xml.create_element(list).write_inner_content(|xml| {
-                    for (place, _) in outputs() {
-                        let place = (place + 1).to_string();
-                        xml.create_element("Unknown").with_attribute(("index", &*place)).write_empty()?;
-                    }
-                    Ok(())
-                })?;
+    let all = variables.iter().enumerate();
+    let outputs: Vec<usize> = all.filter(|(_, own)| own.causality == Causality::Output).map(|(k, _)| k).collect();
+    let StateReferences { states, derivatives } = StateReferences::of(variables);
+    let initial: BTreeSet<usize> = outputs.iter().chain(&states).chain(&derivatives).copied().collect();
+    let lists = [
+        (["Outputs", "Output"], outputs),
+        (["Derivatives", "ContinuousStateDerivative"], derivatives),
+        (["InitialUnknowns", "InitialUnknown"], initial.into_iter().collect()),
+    ];
+    for ([list, element], references) in lists.into_iter().filter(|(_, references)| !references.is_empty()) {
+        let write = |xml: &mut Xml, element: &str, attribute: &str, number: usize| {
+            xml.create_element(element).with_attribute((attribute, &*number.to_string())).write_empty().map(drop)
+        };
+        match fmi {
+            Fmi::V3 => references.into_iter().try_for_each(|own| write(xml, element, "valueReference", own))?,
+            // FMI 2.0 counts from one.
+            Fmi::V2 => {
+                let unknowns = |xml: &mut Xml| {
+                    references.iter().try_for_each(|reference| write(xml, "Unknown", "index", reference + 1))
+                };
+                xml.create_element(list).write_inner_content(unknowns)?;
             }
         }
     }

@@ -31,6 +31,11 @@ pub enum PlantError {
     /// A parameter is set after the start.
     #[error("{0}: the arm has started; set parameters before, or reset the arm")]
     Started(String),
+    /// The arm is no differential equation in its coordinates.
+    #[error(
+        "this arm has no equations for model exchange: it is rigid, has hysteresis, or its stepper is spook; use co-simulation"
+    )]
+    NoEquations,
     /// The plant is not started.
     #[error("the arm has not started: exit the initialisation first")]
     NotStarted,

@@ -11,7 +11,12 @@ use crate::plant::{Plant, PlantState};
 enum Phase {
     Instantiated,
     Initialisation,
+    /// Co-simulation.
     Step,
+    /// Model exchange, at an event.
+    Event,
+    /// Model exchange, while the importer integrates.
+    Continuous,
     Terminated,
     /// A step failed.
     Failed,
@@ -23,15 +28,39 @@ impl Phase {
             Self::Instantiated => "before the initialisation",
             Self::Initialisation => "during the initialisation",
             Self::Step => "between steps",
+            Self::Event => "in event mode",
+            Self::Continuous => "in continuous-time mode",
             Self::Terminated => "after the end",
             Self::Failed => "after a step that failed; reset the instance",
         }
     }
 }
 
+/// Kind of an instance.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Interface {
+    CoSimulation,
+    ModelExchange,
+}
+
+/// Phases in which a model exchange has states.
+const EXCHANGE: [Phase; 2] = [Phase::Event, Phase::Continuous];
+
+/// Phases in which parameters or inputs are set.
+const SETTABLE: [Phase; 5] = [Phase::Instantiated, Phase::Initialisation, Phase::Step, Phase::Event, Phase::Continuous];
+
+/// Values of continuous states that an importer reads.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum StateValues {
+    States,
+    Derivatives,
+    Nominals,
+}
+
 /// An instance.
 pub(crate) struct Instance {
     plant: Plant,
+    interface: Interface,
     phase: Phase,
     begin_s: f64,
 }
@@ -47,8 +76,12 @@ pub(crate) struct InstanceState {
 
 impl Instance {
     /// Makes an instance of the resources of an FMU.
-    pub(crate) fn new(resources: &Path, token: &str) -> Result<Self, PlantError> {
-        Ok(Self { plant: open_resources(resources, token)?, phase: Phase::Instantiated, begin_s: 0.0 })
+    pub(crate) fn new(resources: &Path, token: &str, interface: Interface) -> Result<Self, PlantError> {
+        let plant = open_resources(resources, token)?;
+        if interface == Interface::ModelExchange && !plant.has_equations() {
+            return Err(PlantError::NoEquations);
+        }
+        Ok(Self { plant, interface, phase: Phase::Instantiated, begin_s: 0.0 })
     }
 
     fn expect(&self, function: &'static str, phases: &[Phase]) -> Result<(), PlantError> {
@@ -73,8 +106,87 @@ impl Instance {
 
     pub(crate) fn exit_initialisation(&mut self) -> Result<(), PlantError> {
         self.expect("the end of the initialisation", &[Phase::Initialisation])?;
-        self.plant.start(self.begin_s)?;
-        self.phase = Phase::Step;
+        match self.interface {
+            Interface::CoSimulation => self.plant.start(self.begin_s)?,
+            Interface::ModelExchange => self.plant.start_equations(self.begin_s)?,
+        }
+        self.phase = if self.interface == Interface::CoSimulation { Phase::Step } else { Phase::Event };
+        Ok(())
+    }
+
+    pub(crate) fn enter_event_mode(&mut self) -> Result<(), PlantError> {
+        self.expect("event mode", &EXCHANGE)?;
+        self.phase = Phase::Event;
+        Ok(())
+    }
+
+    pub(crate) fn enter_continuous_time_mode(&mut self) -> Result<(), PlantError> {
+        self.expect("continuous-time mode", &EXCHANGE)?;
+        self.phase = Phase::Continuous;
+        Ok(())
+    }
+
+    /// Checks that an event is handled now; none changes the state.
+    pub(crate) fn update_discrete_states(&mut self) -> Result<(), PlantError> {
+        self.expect("an update of discrete states", &[Phase::Event])
+    }
+
+    /// Checks that the importer integrates; the end of its step changes nothing.
+    pub(crate) fn complete_step(&mut self) -> Result<(), PlantError> {
+        self.expect("the end of a step of the importer", &[Phase::Continuous])
+    }
+
+    pub(crate) fn set_time(&mut self, time_s: f64) -> Result<(), PlantError> {
+        self.expect("the time", &EXCHANGE)?;
+        self.plant.set_time(time_s)
+    }
+
+    pub(crate) fn set_states(&mut self, states: &[f64]) -> Result<(), PlantError> {
+        self.expect("setting states", &EXCHANGE)?;
+        self.check_count(states.len())?;
+        self.plant.set_states(states)
+    }
+
+    /// Writes values of all continuous states.
+    pub(crate) fn write_states(&mut self, what: StateValues, to: &mut [f64]) -> Result<(), PlantError> {
+        let phases = [Phase::Initialisation, Phase::Event, Phase::Continuous];
+        self.expect("reading states", &phases)?;
+        self.check_count(to.len())?;
+        self.current_outputs()?;
+        let values = match what {
+            StateValues::States => self.plant.states(),
+            StateValues::Derivatives => self.plant.derivatives()?,
+            StateValues::Nominals => self.plant.nominals(),
+        };
+        to.copy_from_slice(&values);
+        Ok(())
+    }
+
+    fn check_count(&self, count: usize) -> Result<(), PlantError> {
+        match count == self.n_states() {
+            true => Ok(()),
+            false => {
+                Err(PlantError::Order { function: "a function of states", phase: "with another number of states" })
+            }
+        }
+    }
+
+    pub(crate) fn n_states(&self) -> usize {
+        self.plant.state_references().len()
+    }
+
+    pub(crate) fn directional_derivative(
+        &mut self,
+        [unknowns, knowns]: [&[u32]; 2],
+        seed: &[f64],
+        to: &mut [f64],
+    ) -> Result<(), PlantError> {
+        self.expect("a directional derivative", &EXCHANGE)?;
+        if seed.len() != knowns.len() || to.len() != unknowns.len() {
+            return Err(PlantError::Order { function: "a directional derivative", phase: "with other lengths" });
+        }
+        let [unknowns, knowns] = [unknowns, knowns].map(|own| own.iter().map(|k| *k as usize).collect::<Vec<_>>());
+        to.copy_from_slice(&self.plant.directional_derivative(&unknowns, &knowns, seed)?);
         Ok(())
     }
 
@@ -90,7 +202,7 @@ impl Instance {
     }
 
     pub(crate) fn terminate(&mut self) -> Result<(), PlantError> {
-        self.expect("the end", &[Phase::Step, Phase::Failed])?;
+        self.expect("the end", &[Phase::Step, Phase::Event, Phase::Continuous, Phase::Failed])?;
         self.phase = Phase::Terminated;
         Ok(())
     }
@@ -106,7 +218,7 @@ impl Instance {
     }
 
     pub(crate) fn get(&mut self, reference: u32) -> Result<f64, PlantError> {
-        self.initial_outputs()?;
+        self.current_outputs()?;
         self.plant.get(reference as usize)
     }
 
@@ -115,20 +227,21 @@ impl Instance {
     }
 
     pub(crate) fn set(&mut self, reference: u32, value: f64) -> Result<(), PlantError> {
-        self.expect("a setter", &[Phase::Instantiated, Phase::Initialisation, Phase::Step])?;
+        self.expect("a setter", &SETTABLE)?;
         self.plant.set(reference as usize, value)
     }
 
     pub(crate) fn set_flag(&mut self, reference: u32, value: bool) -> Result<(), PlantError> {
-        self.expect("a setter", &[Phase::Instantiated, Phase::Initialisation, Phase::Step])?;
+        self.expect("a setter", &SETTABLE)?;
         self.plant.set_flag(reference as usize, value)
     }
 
-    /// Computes the outputs of the initialisation, where parameters and inputs may still change.
-    fn initial_outputs(&mut self) -> Result<(), PlantError> {
+    /// Computes the outputs of the initialisation, where parameters and inputs may still change,
+    /// and those of model exchange.
+    fn current_outputs(&mut self) -> Result<(), PlantError> {
         match self.phase {
             Phase::Initialisation => self.plant.preview(self.begin_s),
-            _ => Ok(()),
+            _ => self.plant.evaluate(),
         }
     }
 

@@ -1,4 +1,5 @@
-//! An arm as a plant for other programs: FMI 2.0 and 3.0 for co-simulation, and a C interface.
+//! An arm as a plant for other programs: FMI 2.0 and 3.0 for co-simulation and model exchange, and
+//! a C interface.
 //!
 //! [`Plant`] is an arm with named parameters, inputs and outputs. [`export_fmu`] writes one as an
 //! FMU: a zip file with the robot, the description of its variables, and this crate as a library.
@@ -24,6 +25,7 @@
 mod archive;
 mod description;
 mod error;
+mod exchange;
 #[allow(unsafe_code, reason = "functions called from C take pointers")]
 mod ffi;
 mod instance;

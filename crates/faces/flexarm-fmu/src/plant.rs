@@ -4,14 +4,14 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use flexarm::{
-    Arm, Command, Live, LiveOptions, LiveState, LoadOptions, Modelling, Pose, Robot, RunOptions, Servos, StepperKind,
-    Wrench,
+    Arm, Command, Equations, Error, Live, LiveOptions, LiveState, LoadOptions, Modelling, Pose, Readings, Robot,
+    RunOptions, Servos, StepError, StepperKind, Wrench,
 };
 use nalgebra::UnitQuaternion;
 use toml_edit::DocumentMut;
 
 use crate::error::PlantError;
-use crate::variables::{Causality, Kind, Meaning, Starts, Variable, variables};
+use crate::variables::{Causality, Kind, Meaning, Starts, StateReferences, Variable, variables};
 
 /// Tolerance for a communication step to be a whole number of solver steps (in steps).
 const WHOLE: f64 = 1e-6;
@@ -40,26 +40,52 @@ impl Default for PlantSettings {
     }
 }
 
-/// An arm with its variables. It is made, gets parameters and inputs, is started, and then steps.
+/// What moves a started arm.
+pub(crate) enum Running {
+    /// Its own stepper, for co-simulation.
+    Steps(Box<Live>),
+    /// A solver outside, for model exchange.
+    Equations {
+        equations: Box<Equations>,
+        time_s: f64,
+        /// Whether state or inputs changed after the last evaluation.
+        is_stale: bool,
+    },
+}
+
+impl Running {
+    fn readings(&mut self) -> &mut Readings {
+        match self {
+            Self::Steps(live) => live,
+            Self::Equations { equations, .. } => equations.readings(),
+        }
+    }
+}
+
+/// An arm with its variables. It is made, gets parameters and inputs, is started, and then steps, or
+/// is evaluated at states that a solver outside sets.
 pub struct Plant {
     path: PathBuf,
     settings: PlantSettings,
     /// The arm as filed, shared by copies and kept when a parameter changes the robot.
     arm: Arm,
-    variables: Arc<[Variable]>,
+    pub(crate) variables: Arc<[Variable]>,
     /// Value of each variable; 1 is true.
-    values: Vec<f64>,
-    live: Option<Live>,
+    pub(crate) values: Vec<f64>,
+    pub(crate) states: StateReferences,
+    pub(crate) running: Option<Running>,
     /// Parameters and inputs for which the outputs before the start are computed.
     previewed: Option<Vec<f64>>,
     /// Time of the caller at the start (s).
-    begin_s: f64,
+    pub(crate) begin_s: f64,
     steps: u64,
 }
 
 /// State of a plant that is started.
 pub struct PlantState {
-    live: LiveState,
+    /// `None` in model exchange, where the values have the state.
+    live: Option<LiveState>,
+    time_s: f64,
     values: Vec<f64>,
     begin_s: f64,
     steps: u64,
@@ -75,21 +101,33 @@ impl Plant {
         let arm = robot.flexible(settings.modelling)?;
         let options = options(settings, None);
         let live = arm.live(settings.pose.as_deref(), options.step_s, &options)?;
+        let equations = match settings.stepper.entry().maximal {
+            true => None,
+            false => match arm.equations(settings.pose.as_deref(), &LiveOptions::default()) {
+                Ok(equations) => Some(equations).filter(|own| !own.coordinates().is_empty()),
+                Err(Error::Step { source: StepError::NoEquations, .. }) => None,
+                Err(error) => return Err(error.into()),
+            },
+        };
+        let elastic = equations.map(|own| own.elastic());
         let starts = Starts {
             pose: live.position(),
             step_s: options.step_s,
             payload: filed_payload(&robot)?.map(|(_, mass)| mass),
+            releases: live.can_release() && !settings.stepper.entry().maximal,
             holding: live.effort(),
             has_acceleration: !settings.stepper.entry().maximal,
             gauges: &live.gauge_channels(),
+            elastic: elastic.as_deref(),
         };
         let variables: Arc<[Variable]> = variables(&arm, &starts).into();
         let values = variables.iter().map(|variable| variable.start.unwrap_or(0.0)).collect();
-        let (path, settings) = (robot.path, settings.clone());
-        let (live, previewed) = (Some(live), None);
-        let mut plant = Self { path, settings, arm, variables, values, live, previewed, begin_s: 0.0, steps: 0 };
+        let (path, settings, states) = (robot.path, settings.clone(), StateReferences::of(&variables));
+        let (running, previewed) = (Some(Running::Steps(Box::new(live))), None);
+        let (begin_s, steps) = (0.0, 0);
+        let mut plant = Self { path, settings, arm, variables, values, states, running, previewed, begin_s, steps };
         plant.update();
-        plant.live = None;
+        plant.running = None;
         plant.previewed = Some(plant.settable());
         Ok(plant)
     }
@@ -111,15 +149,19 @@ impl Plant {
 
     /// Returns whether the plant is started.
     pub fn is_started(&self) -> bool {
-        self.live.is_some()
+        self.running.is_some()
     }
 
     /// Returns the time (s).
     pub fn time_s(&self) -> f64 {
-        self.begin_s + self.live.as_ref().map_or(0.0, Live::time_s)
+        match &self.running {
+            None => self.begin_s,
+            Some(Running::Steps(live)) => self.begin_s + live.time_s(),
+            Some(Running::Equations { time_s, .. }) => *time_s,
+        }
     }
 
-    fn variable(&self, reference: usize, kind: Kind) -> Result<&Variable, PlantError> {
+    pub(crate) fn variable(&self, reference: usize, kind: Kind) -> Result<&Variable, PlantError> {
         let variable = self.variables.get(reference).ok_or(PlantError::Reference(reference))?;
         if variable.kind != kind {
             return Err(PlantError::Kind { name: variable.name.clone(), kind: variable.kind });
@@ -169,12 +211,15 @@ impl Plant {
             Causality::Input => {}
             Causality::Parameter if !self.is_started() => {}
             Causality::Parameter => return Err(PlantError::Started(name())),
-            Causality::Output | Causality::Independent => return Err(PlantError::NotSettable(name())),
+            Causality::Output | Causality::Independent | Causality::Local => {
+                return Err(PlantError::NotSettable(name()));
+            }
         }
         if !value.is_finite() {
             return Err(PlantError::NotFinite { name: name(), found: value });
         }
         self.values[reference] = value;
+        self.make_stale();
         Ok(())
     }
 
@@ -185,7 +230,7 @@ impl Plant {
 
     /// Returns to parameters and inputs of before the start.
     pub(crate) fn return_to(&mut self, values: &[f64]) {
-        self.live = None;
+        self.running = None;
         self.values.copy_from_slice(values);
     }
 
@@ -196,7 +241,7 @@ impl Plant {
         }
         let settable = self.settable();
         self.start(begin_s)?;
-        self.live = None;
+        self.running = None;
         self.previewed = Some(settable);
         Ok(())
     }
@@ -212,16 +257,29 @@ impl Plant {
     /// # Errors
     /// [`PlantError::Robot`] for parameters without sense, [`PlantError::Started`].
     pub fn start(&mut self, begin_s: f64) -> Result<(), PlantError> {
+        self.check_start(begin_s)?;
+        (self.begin_s, self.steps) = (begin_s, 0);
+        self.running = Some(Running::Steps(Box::new(self.begun(None)?)));
+        self.update();
+        Ok(())
+    }
+
+    /// Checks that the arm may start at a time (s).
+    pub(crate) fn check_start(&self, begin_s: f64) -> Result<(), PlantError> {
         if self.is_started() {
             return Err(PlantError::Started("start".into()));
         }
-        if !begin_s.is_finite() {
-            return Err(PlantError::NotFinite { name: "start time".into(), found: begin_s });
+        match begin_s.is_finite() {
+            true => Ok(()),
+            false => Err(PlantError::NotFinite { name: "start time".into(), found: begin_s }),
         }
-        (self.begin_s, self.steps) = (begin_s, 0);
-        self.live = Some(self.begun(None)?);
-        self.update();
-        Ok(())
+    }
+
+    /// Marks the outputs of model exchange as out of date.
+    pub(crate) fn make_stale(&mut self) {
+        if let Some(Running::Equations { is_stale, .. }) = &mut self.running {
+            *is_stale = true;
+        }
     }
 
     /// Returns the arm at rest at the targets.
@@ -230,17 +288,21 @@ impl Plant {
     fn begun(&self, step_s: Option<f64>) -> Result<Live, PlantError> {
         let step_s = step_s.unwrap_or(self.parameter(Meaning::Step, 0.0));
         let options = options(&self.settings, Some(step_s));
-        let own = LiveOptions {
+        let pose = self.all(Meaning::TargetPosition);
+        Ok(self.loaded()?.live_with(Some(&pose), step_s, &options, &self.live_options())?)
+    }
+
+    pub(crate) fn live_options(&self) -> LiveOptions {
+        LiveOptions {
             servos: if self.parameter(Meaning::OpenServos, 0.0) == 0.0 { Servos::Closed } else { Servos::Open },
             stiffness: self.parameter(Meaning::StiffnessFactor, 1.0),
             damping: self.parameter(Meaning::DampingFactor, 1.0),
-        };
-        let pose = self.all(Meaning::TargetPosition);
-        Ok(self.loaded()?.live_with(Some(&pose), step_s, &options, &own)?)
+            payload: self.parameter(Meaning::Payload, 1.0) != 0.0,
+        }
     }
 
     /// Returns the arm with the payload of the parameter.
-    fn loaded(&self) -> Result<Arm, PlantError> {
+    pub(crate) fn loaded(&self) -> Result<Arm, PlantError> {
         let filed = self.variables.iter().find(|variable| variable.meaning == Meaning::PayloadMass);
         let Some(start) = filed.and_then(|variable| variable.start) else { return Ok(self.arm.clone()) };
         let mass = self.parameter(Meaning::PayloadMass, start);
@@ -261,13 +323,13 @@ impl Plant {
     }
 
     /// Returns the value of a parameter; `default` if the plant has none such.
-    fn parameter(&self, meaning: Meaning, default: f64) -> f64 {
+    pub(crate) fn parameter(&self, meaning: Meaning, default: f64) -> f64 {
         let place = self.variables.iter().position(|variable| variable.meaning == meaning);
         place.map_or(default, |reference| self.values[reference])
     }
 
     /// Returns the values of an input of all joints; zero where a joint has none.
-    fn all(&self, meaning: impl Fn(usize) -> Meaning) -> Vec<f64> {
+    pub(crate) fn all(&self, meaning: impl Fn(usize) -> Meaning) -> Vec<f64> {
         (0..self.arm.joints().count()).map(|k| self.parameter(meaning(k), 0.0)).collect()
     }
 
@@ -282,8 +344,12 @@ impl Plant {
     /// that fails.
     pub fn step(&mut self, from_s: f64, length_s: f64) -> Result<(), PlantError> {
         let own_s = self.time_s();
-        if self.live.is_none() {
-            return Err(PlantError::NotStarted);
+        match &self.running {
+            None => return Err(PlantError::NotStarted),
+            Some(Running::Equations { .. }) => {
+                return Err(PlantError::Order { function: "a step", phase: "in model exchange" });
+            }
+            Some(Running::Steps(_)) => {}
         }
         if !(length_s.is_finite() && length_s > 0.0) {
             return Err(PlantError::Length(length_s));
@@ -296,18 +362,18 @@ impl Plant {
             let step_s = self.parameter(Meaning::Step, 0.0);
             let count = length_s / step_s;
             if (count - count.round()).abs() > WHOLE || count < 0.5 {
-                self.live = Some(self.begun(Some(length_s / count.ceil().max(1.0)))?);
+                let live = self.begun(Some(length_s / count.ceil().max(1.0)))?;
+                self.running = Some(Running::Steps(Box::new(live)));
             }
         }
         let (q, qdot, torque) =
             (self.all(Meaning::TargetPosition), self.all(Meaning::TargetVelocity), self.all(Meaning::Torque));
-        let F: [f64; 6] = std::array::from_fn(|k| self.parameter(Meaning::Wrench(k), 0.0));
-        let mut wrench = Wrench::zeros();
-        wrench.force.copy_from_slice(&F[..3]);
-        wrench.torque.copy_from_slice(&F[3..]);
+        let wrench = self.wrench();
         let with_velocity = self.parameter(Meaning::UseTargetVelocity, 0.0) != 0.0;
         let command = Command { q: &q, qdot: with_velocity.then_some(&qdot[..]), torque: Some(&torque), wrench };
-        if let Some(live) = &mut self.live {
+        let payload = self.parameter(Meaning::Payload, 1.0) != 0.0;
+        if let Some(Running::Steps(live)) = &mut self.running {
+            live.set_payload(payload)?;
             live.advance(length_s, &command)?;
         }
         self.steps += 1;
@@ -315,13 +381,25 @@ impl Plant {
         Ok(())
     }
 
+    pub(crate) fn wrench(&self) -> Wrench {
+        let F: [f64; 6] = std::array::from_fn(|k| self.parameter(Meaning::Wrench(k), 0.0));
+        let mut wrench = Wrench::zeros();
+        wrench.force.copy_from_slice(&F[..3]);
+        wrench.torque.copy_from_slice(&F[3..]);
+        wrench
+    }
+
     /// Returns a copy of the state of a started plant.
     ///
     /// # Errors
     /// [`PlantError::NotStarted`].
     pub fn state(&self) -> Result<PlantState, PlantError> {
-        let live = self.live.as_ref().ok_or(PlantError::NotStarted)?.state()?;
-        Ok(PlantState { live, values: self.values.clone(), begin_s: self.begin_s, steps: self.steps })
+        let live = match self.running.as_ref().ok_or(PlantError::NotStarted)? {
+            Running::Steps(live) => Some(live.state()?),
+            Running::Equations { .. } => None,
+        };
+        let (values, time_s) = (self.values.clone(), self.time_s());
+        Ok(PlantState { live, time_s, values, begin_s: self.begin_s, steps: self.steps })
     }
 
     /// Returns to a state of this plant, taken since it was started.
@@ -330,7 +408,11 @@ impl Plant {
     /// [`PlantError::NotStarted`]; [`PlantError::Robot`] for a state of another plant or of before
     /// a reset.
     pub fn restore(&mut self, state: &PlantState) -> Result<(), PlantError> {
-        self.live.as_mut().ok_or(PlantError::NotStarted)?.restore(&state.live)?;
+        match (self.running.as_mut().ok_or(PlantError::NotStarted)?, &state.live) {
+            (Running::Steps(live), Some(state)) => live.restore(state)?,
+            (Running::Equations { time_s, is_stale, .. }, None) => (*time_s, *is_stale) = (state.time_s, true),
+            _ => return Err(PlantError::Order { function: "a return to a state", phase: "of the other kind of FMU" }),
+        }
         self.values.clone_from(&state.values);
         (self.begin_s, self.steps) = (state.begin_s, state.steps);
         Ok(())
@@ -338,7 +420,7 @@ impl Plant {
 
     /// Returns to the state in which the plant was made: not started, with all start values.
     pub fn reset(&mut self) {
-        self.live = None;
+        self.running = None;
         for (value, variable) in self.values.iter_mut().zip(self.variables.iter()) {
             if let Some(start) = variable.start {
                 *value = start;
@@ -347,9 +429,9 @@ impl Plant {
     }
 
     /// Computes the outputs.
-    fn update(&mut self) {
+    pub(crate) fn update(&mut self) {
         let time_s = self.time_s();
-        let Some(live) = &mut self.live else { return };
+        let Some(live) = self.running.as_mut().map(Running::readings) else { return };
         let (link_position, link_velocity) = (live.link_position(), live.link_velocity());
         let (tcp, rigid, V) = (live.tcp_pose(), live.target_pose(), live.tcp_velocity());
         let (a, gauges) = (live.tcp_acceleration(), live.gauges());
@@ -361,6 +443,7 @@ impl Plant {
                 Meaning::Time => time_s,
                 Meaning::MotorPosition(k) => live.position()[k],
                 Meaning::MotorVelocity(k) => live.velocity()[k],
+                Meaning::MotorAcceleration(k) => live.acceleration()[k],
                 Meaning::LinkPosition(k) => link_position[k],
                 Meaning::LinkVelocity(k) => link_velocity[k],
                 Meaning::Effort(k) => live.effort()[k],
@@ -374,6 +457,9 @@ impl Plant {
                 Meaning::ErrorLength => error.norm(),
                 Meaning::RotationError(k) => turned[k],
                 Meaning::Gauge(k) => gauges[k],
+                Meaning::Deflection(k) => live.deflection()[k],
+                Meaning::DeflectionVelocity(k) => live.deflection_velocity()[k],
+                Meaning::DeflectionAcceleration(k) => live.deflection_acceleration()[k],
                 _ => continue,
             };
         }

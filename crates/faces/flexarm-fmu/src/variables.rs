@@ -5,7 +5,7 @@
 
 use std::fmt::Write as _;
 
-use flexarm::Arm;
+use flexarm::{Arm, ElasticCoordinate};
 
 /// Axes of vectors.
 const AXES: [&str; 3] = ["x", "y", "z"];
@@ -21,6 +21,8 @@ pub enum Causality {
     Input,
     /// Computed.
     Output,
+    /// Coordinate of the arm, its velocity or its acceleration.
+    Local,
 }
 
 /// Type of a variable.
@@ -40,14 +42,17 @@ pub(crate) enum Meaning {
     StiffnessFactor,
     DampingFactor,
     PayloadMass,
+    Payload,
     UseTargetVelocity,
     OpenServos,
     TargetPosition(usize),
     TargetVelocity(usize),
+    TargetAcceleration(usize),
     Torque(usize),
     Wrench(usize),
     MotorPosition(usize),
     MotorVelocity(usize),
+    MotorAcceleration(usize),
     LinkPosition(usize),
     LinkVelocity(usize),
     Effort(usize),
@@ -61,6 +66,9 @@ pub(crate) enum Meaning {
     ErrorLength,
     RotationError(usize),
     Gauge(usize),
+    Deflection(usize),
+    DeflectionVelocity(usize),
+    DeflectionAcceleration(usize),
 }
 
 /// A variable of a plant.
@@ -78,12 +86,59 @@ pub struct Variable {
     pub causality: Causality,
     /// Start value of parameters and inputs; 1 is true.
     pub start: Option<f64>,
+    /// Reference of the variable whose derivative it is, in an arm that has equations of motion.
+    pub derivative_of: Option<usize>,
     pub(crate) meaning: Meaning,
 }
 
+impl Variable {
+    /// Returns the nominal value of a continuous state: of a deflection and of its velocity less
+    /// than of a joint.
+    pub(crate) fn nominal(&self) -> f64 {
+        match self.meaning {
+            Meaning::Deflection(_) => 1e-3,
+            Meaning::DeflectionVelocity(_) => 1e-1,
+            _ => 1.0,
+        }
+    }
+
+    /// Returns the step of differences with respect to a state or an input: small beside play and
+    /// the velocities at which friction turns, large beside rounding.
+    pub(crate) fn difference_step(&self) -> f64 {
+        match self.unit {
+            "m" | "rad" | "1" => 1e-5,
+            "m/s" | "rad/s" | "1/s" => 1e-4,
+            _ => 1.0,
+        }
+    }
+}
+
+/// References of the continuous states and of their derivatives.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct StateReferences {
+    /// Coordinates, then their velocities.
+    pub(crate) states: Vec<usize>,
+    /// Velocities, then accelerations.
+    pub(crate) derivatives: Vec<usize>,
+}
+
+impl StateReferences {
+    pub(crate) fn of(variables: &[Variable]) -> Self {
+        let of = |reference: usize| variables[reference].derivative_of;
+        let all = |is_acceleration: bool| {
+            let derivatives = (0..variables.len()).filter_map(move |own| Some((own, of(own)?)));
+            derivatives.filter(move |(_, state)| of(*state).is_some() == is_acceleration)
+        };
+        let (derivatives, states) = all(false).chain(all(true)).unzip();
+        Self { states, derivatives }
+    }
+}
+
 /// Units with their exponents of kg, m, s and rad.
-pub const UNITS: [(&str, [i32; 4]); 11] = [
+pub const UNITS: [(&str, [i32; 4]); 14] = [
     ("1", [0, 0, 0, 0]),
+    ("1/s", [0, 0, -1, 0]),
+    ("1/s2", [0, 0, -2, 0]),
     ("s", [0, 0, 1, 0]),
     ("kg", [1, 0, 0, 0]),
     ("m", [0, 1, 0, 0]),
@@ -91,6 +146,7 @@ pub const UNITS: [(&str, [i32; 4]); 11] = [
     ("m/s2", [0, 1, -2, 0]),
     ("rad", [0, 0, 0, 1]),
     ("rad/s", [0, 0, -1, 1]),
+    ("rad/s2", [0, 0, -2, 1]),
     ("N", [1, 1, -2, 0]),
     ("N.m", [1, 2, -2, 0]),
     ("Pa", [1, -1, -2, 0]),
@@ -127,12 +183,16 @@ pub(crate) struct Starts<'a> {
     pub(crate) step_s: f64,
     /// Mass of the payload (kg), if the robot file has one that can be changed.
     pub(crate) payload: Option<f64>,
+    /// Whether the payload can be put down.
+    pub(crate) releases: bool,
     /// Torques that hold the pose (N m or N).
     pub(crate) holding: &'a [f64],
     /// Whether the stepper gives accelerations.
     pub(crate) has_acceleration: bool,
     /// Channels of gauges.
     pub(crate) gauges: &'a [String],
+    /// Elastic coordinates of the equations of motion; `None` if the arm has none.
+    pub(crate) elastic: Option<&'a [ElasticCoordinate]>,
 }
 
 /// Returns the variables of an arm.
@@ -153,7 +213,8 @@ pub(crate) fn variables(arm: &Arm, starts: &Starts<'_>) -> Vec<Variable> {
     let driven: Vec<usize> = arm.flexible().servo_limits().map(|(coordinate, _)| coordinate).collect();
     for (k, coordinate) in model.coordinates()[..model.n_actuated()].iter().enumerate() {
         let slides = coordinate.slides();
-        let [position, velocity, effort] = if slides { ["m", "m/s", "N"] } else { ["rad", "rad/s", "N.m"] };
+        let [position, velocity, acceleration] = motion_units(slides);
+        let effort = if slides { "N" } else { "N.m" };
         let of_joint = |what: &str| format!("joint.{}.{what}", part(&coordinate.joint));
         let (input, output) = (Causality::Input, Causality::Output);
         let start = starts.pose.get(k).copied().unwrap_or(0.0);
@@ -162,6 +223,17 @@ pub(crate) fn variables(arm: &Arm, starts: &Starts<'_>) -> Vec<Variable> {
         list.add(input, of_joint("target_position"), text, position, Some(start), Meaning::TargetPosition(k));
         let text = "Target velocity at the end of the communication step, used with use_target_velocity";
         list.add(input, of_joint("target_velocity"), text, velocity, Some(0.0), Meaning::TargetVelocity(k));
+        if starts.elastic.is_some() {
+            let text = "Target acceleration, of a prescribed joint in model exchange";
+            list.add(
+                input,
+                of_joint("target_acceleration"),
+                text,
+                acceleration,
+                Some(0.0),
+                Meaning::TargetAcceleration(k),
+            );
+        }
         if driven.contains(&k) {
             let text = format!(
                 "Torque or force at the joint, added to that of the servo; {holding:.6} {effort} hold the first pose"
@@ -175,10 +247,20 @@ pub(crate) fn variables(arm: &Arm, starts: &Starts<'_>) -> Vec<Variable> {
             ("link_velocity", "Velocity of the link behind the gearbox", velocity, Meaning::LinkVelocity(k)),
             ("effort", "Torque or force of the drive, at the joint", effort, Meaning::Effort(k)),
         ];
+        let first = list.0.len();
         for (what, text, unit, meaning) in outputs {
             list.add(output, of_joint(what), text, unit, None, meaning);
         }
+        if starts.elastic.is_some() && driven.contains(&k) {
+            let text = "Acceleration of the motor, at the joint";
+            let name = of_joint("motor_acceleration");
+            list.add(Causality::Local, name, text, acceleration, None, Meaning::MotorAcceleration(k));
+            let acceleration = list.0.len() - 1;
+            list.0[first + 1].derivative_of = Some(first);
+            list.0[acceleration].derivative_of = Some(first + 1);
+        }
     }
+    list.deflections(starts.elastic.unwrap_or_default());
     list.tcp(starts.has_acceleration);
     // Stress needs accelerations.
     for (k, name) in starts.gauges.iter().enumerate().filter(|_| starts.has_acceleration) {
@@ -189,6 +271,11 @@ pub(crate) fn variables(arm: &Arm, starts: &Starts<'_>) -> Vec<Variable> {
         list.add(Causality::Output, format!("gauge.{}", part(name)), text, unit, None, Meaning::Gauge(k));
     }
     list.0
+}
+
+/// Returns the units of a position, a velocity and an acceleration.
+fn motion_units(slides: bool) -> [&'static str; 3] {
+    if slides { ["m", "m/s", "m/s2"] } else { ["rad", "rad/s", "rad/s2"] }
 }
 
 struct List(Vec<Variable>);
@@ -204,11 +291,34 @@ impl List {
         meaning: Meaning,
     ) {
         let kind = match meaning {
-            Meaning::UseTargetVelocity | Meaning::OpenServos => Kind::Boolean,
+            Meaning::UseTargetVelocity | Meaning::OpenServos | Meaning::Payload => Kind::Boolean,
             _ => Kind::Real,
         };
         let (name, description) = (name.into(), description.into());
-        self.0.push(Variable { name, description, unit, kind, causality, start, meaning });
+        self.0.push(Variable { name, description, unit, kind, causality, start, derivative_of: None, meaning });
+    }
+
+    /// Adds the elastic coordinates with velocities and accelerations.
+    fn deflections(&mut self, elastic: &[ElasticCoordinate]) {
+        for (k, ElasticCoordinate { element, number, unit }) in elastic.iter().enumerate() {
+            let units = match *unit {
+                "m" => motion_units(true),
+                "rad" => motion_units(false),
+                _ => ["1", "1/s", "1/s2"],
+            };
+            let name = format!("elastic.{}[{number}]", part(element));
+            let text = format!("Elastic coordinate {number} of {element}");
+            let own = [
+                (name.clone(), text.clone(), Meaning::Deflection(k)),
+                (format!("der({name})"), format!("{text}, velocity"), Meaning::DeflectionVelocity(k)),
+                (format!("der({name},2)"), format!("{text}, acceleration"), Meaning::DeflectionAcceleration(k)),
+            ];
+            let first = self.0.len();
+            for ((name, text, meaning), unit) in own.into_iter().zip(units) {
+                self.add(Causality::Local, name, text, unit, None, meaning);
+            }
+            (self.0[first + 1].derivative_of, self.0[first + 2].derivative_of) = (Some(first), Some(first + 1));
+        }
     }
 
     fn parameters(&mut self, starts: &Starts<'_>) {
@@ -222,6 +332,10 @@ impl List {
         self.add(parameter, "damping_factor", text, "1", Some(1.0), Meaning::DampingFactor);
         if let Some(mass) = starts.payload {
             self.add(parameter, "payload.mass", "Mass of the payload", "kg", Some(mass), Meaning::PayloadMass);
+        }
+        if starts.releases {
+            let text = "Whether the arm carries its payload";
+            self.add(Causality::Input, "payload.attached", text, "", Some(1.0), Meaning::Payload);
         }
         let text = "Whether the inputs target_velocity are used; without them joints follow the parabola through \
                     the last three targets";

@@ -2,44 +2,19 @@
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 #![allow(clippy::print_stdout, reason = "measured errors beside their bounds")]
 
+mod helpers;
+
 use std::path::{Path, PathBuf};
 
 use flexarm::reduce::{ReduceJob, ReduceOptions, ReduceOutputs, reduce};
-use flexarm::{Command, DriveModel, LinkModel, LiveOptions, Modelling, Robot, RunOptions, Servos, Wrench, statics};
+use flexarm::{
+    Command, DriveModel, LinkModel, LiveOptions, Modelling, Motion, PayloadChange, Robot, RunOptions, Scenario, Servos,
+    Wrench, statics,
+};
 use flexarm_fmu::{
     About, Causality, Fmi, FmuJob, Kind, Plant, PlantError, PlantSettings, description, export_fmu, open_resources,
 };
-
-fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(3).unwrap().to_owned()
-}
-
-fn robot(name: &str) -> PathBuf {
-    root().join("robots").join(name).join("robot.toml")
-}
-
-fn settings(links: LinkModel, drives: DriveModel) -> PlantSettings {
-    PlantSettings { modelling: Modelling { links, drives, ..Modelling::default() }, ..PlantSettings::default() }
-}
-
-/// Targets of a smooth swing of all joints that starts at rest.
-fn targets(from: &[f64], t: f64) -> (Vec<f64>, Vec<f64>) {
-    let swing = |k: usize| (0.05 + 0.01 * k as f64, 3.0 + k as f64);
-    let q = from.iter().enumerate().map(|(k, q)| q + swing(k).0 * (1.0 - (swing(k).1 * t).cos()));
-    let qdot = from.iter().enumerate().map(|(k, _)| swing(k).0 * swing(k).1 * (swing(k).1 * t).sin());
-    (q.collect(), qdot.collect())
-}
-
-/// References of a variable of every joint that has it.
-fn of_joints(plant: &Plant, what: &str) -> Vec<usize> {
-    let ending = format!(".{what}");
-    let names = plant.variables().iter().enumerate();
-    names.filter(|(_, v)| v.name.starts_with("joint.") && v.name.ends_with(&ending)).map(|(k, _)| k).collect()
-}
-
-fn values(plant: &Plant, names: &[&str]) -> Vec<f64> {
-    names.iter().map(|name| plant.get(plant.find(name).unwrap()).unwrap()).collect()
-}
+use helpers::{of_joints, robot, root, settings, targets, values};
 
 const TCP: [&str; 3] = ["tcp.position.x", "tcp.position.y", "tcp.position.z"];
 const ERROR: [&str; 3] = ["tcp_error.position.x", "tcp_error.position.y", "tcp_error.position.z"];
@@ -156,6 +131,67 @@ fn a_payload_twice_as_heavy_sags_as_the_robot_file_with_it() {
     let live = edited.flexible(Modelling::default()).unwrap().live(None, 1e-3, &RunOptions::default()).unwrap();
     let tcp = live.tcp_pose().translation.vector;
     assert_eq!(values(&plant, &TCP), tcp.as_slice(), "the static sag does not depend on the payload's inertia");
+}
+
+/// Truth: the robot file without the payload, and a run whose payload is put down by its scenario.
+#[test]
+fn a_payload_that_is_put_down_leaves_the_arm_of_the_robot_file_without_it() {
+    let text = std::fs::read_to_string(robot("kr210")).unwrap();
+    let mut document: toml_edit::DocumentMut = text.parse().unwrap();
+    document.remove("payload").unwrap();
+    let empty = Robot::from_toml(&document.to_string(), &robot("kr210"), &Default::default()).unwrap();
+    let empty = empty.flexible(Modelling::default()).unwrap();
+    let pose = [0.0, -1.0, 1.0, 0.0, 0.0, 0.0];
+    let sag = empty.live(Some(&pose), 1e-3, &RunOptions::default()).unwrap().tcp_pose().translation.vector;
+    let settings = PlantSettings { pose: Some(pose.to_vec()), ..PlantSettings::default() };
+    let mut plant = Plant::new(&robot("kr210"), &settings).unwrap();
+    let attached = plant.find("payload.attached").unwrap();
+    let loaded = values(&plant, &TCP);
+    let off = |plant: &Plant, truth: &[f64]| {
+        values(plant, &TCP).iter().zip(truth).fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()))
+    };
+    plant.set_flag(attached, false).unwrap();
+    plant.start(0.0).unwrap();
+    let (without, moved) = (off(&plant, sag.as_slice()), off(&plant, &loaded));
+    println!("sag without payload off by {without:.1e} m, with it by {moved:.1e} m");
+    assert!(without < 1e-12 && moved > 1e-4, "{without:e} {moved:e}");
+
+    // Put down on the way: the steps of the arm whose scenario does so.
+    plant.reset();
+    plant.start(0.0).unwrap();
+    let arm = Robot::load(robot("kr210")).unwrap().flexible(Modelling::default()).unwrap();
+    let still = Motion::from_samples(&[0.0, 0.3], &[pose, pose].concat(), arm.robot()).unwrap();
+    let scenario = Scenario::from(&still).with_payload(PayloadChange::release(0.1));
+    let run = arm.simulate(&scenario, &RunOptions::default()).unwrap();
+    let mut errors = run.error_world_m().chunks_exact(3).skip(1);
+    let mut largest = 0.0_f64;
+    for k in 0..300 {
+        plant.set_flag(attached, k < 100).unwrap();
+        plant.step(plant.time_s(), 1e-3).unwrap();
+        // The run is sampled at 500 Hz.
+        if k % 2 == 0 {
+            continue;
+        }
+        let own = values(&plant, &ERROR);
+        let apart = own.iter().zip(errors.next().unwrap()).map(|(a, b)| (a - b).abs());
+        largest = apart.fold(largest, f64::max);
+    }
+    assert!(errors.next().is_none());
+    println!("run with a payload put down off by {largest:.1e} m");
+    assert!(largest < 1e-12, "{largest:e}");
+
+    // At rest again without it, and with it once more.
+    for (flag, truth, steps) in [(false, sag.as_slice().to_vec(), 4000), (true, loaded, 12_000)] {
+        plant.set_flag(attached, flag).unwrap();
+        for _ in 0..steps {
+            plant.step(plant.time_s(), 1e-3).unwrap();
+        }
+        let still_rings = off(&plant, &truth);
+        println!("{steps} ms later off by {still_rings:.1e} m");
+        assert!(still_rings < 5e-6, "{flag}: {still_rings:e}");
+    }
+    let fixed = Plant::new(&robot("one_beam"), &PlantSettings::default()).unwrap();
+    assert!(fixed.find("payload.attached").is_none());
 }
 
 #[test]

@@ -171,6 +171,7 @@ extern "C" fn flexarm_causality(plant: *const Handle, reference: u32) -> c_int {
         Some(Causality::Parameter) => 1,
         Some(Causality::Input) => 2,
         Some(Causality::Output) => 3,
+        Some(Causality::Local) => 4,
         None => -1,
     }
 }

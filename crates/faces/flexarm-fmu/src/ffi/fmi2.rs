@@ -1,17 +1,21 @@
-//! FMI 2.0, co-simulation.
+//! FMI 2.0, co-simulation and model exchange.
 
 use std::ffi::{CString, c_char, c_int, c_uint, c_void};
 use std::path::PathBuf;
 use std::ptr;
 
-use super::{NULL, free_state, get_each, guarded, message, put_state, set_each, string, text_of};
+use super::{
+    Differential, NULL, array, free_state, get_each, guarded, message, put_state, put_states, set_each, string, text_of,
+};
 use crate::error::PlantError;
-use crate::instance::{Instance, InstanceState};
+use crate::instance::{Instance, InstanceState, Interface, StateValues};
 
 type Status = c_int;
 const OK: Status = 0;
 const DISCARD: Status = 2;
 const ERROR: Status = 3;
+/// `fmi2ModelExchange`.
+const MODEL_EXCHANGE: c_int = 0;
 /// `fmi2CoSimulation`.
 const CO_SIMULATION: c_int = 1;
 /// `fmi2LastSuccessfulTime`.
@@ -148,15 +152,19 @@ extern "C" fn fmi2Instantiate(
         unsafe { (string(name), string(guid), string(location), callbacks.as_ref()) };
     let (logger, environment) = callbacks.map_or((None, ptr::null_mut()), |own| (own.logger, own.environment));
     let log = Log { logger, environment, name: message(name.unwrap_or_default()) };
-    if kind != CO_SIMULATION {
-        log.write("this FMU is for co-simulation");
-        return ptr::null_mut();
-    }
+    let interface = match kind {
+        MODEL_EXCHANGE => Interface::ModelExchange,
+        CO_SIMULATION => Interface::CoSimulation,
+        _ => {
+            log.write("this FMU is for co-simulation and model exchange");
+            return ptr::null_mut();
+        }
+    };
     let (Some(guid), Some(location)) = (guid, location) else {
         log.write("GUID and location of the resources are needed as UTF-8");
         return ptr::null_mut();
     };
-    match guarded(|| Instance::new(&folder(location), guid)) {
+    match guarded(|| Instance::new(&folder(location), guid, interface)) {
         Some(Ok(instance)) => Box::into_raw(Box::new(Component { instance, log })).cast(),
         Some(Err(error)) => {
             log.write(&text_of(&error));
@@ -296,6 +304,121 @@ extern "C" fn fmi2GetRealStatus(component: *mut c_void, kind: c_int, value: *mut
     }
 }
 
+/// `fmi2EventInfo`.
+#[repr(C)]
+struct EventInfo {
+    again: c_int,
+    terminate: c_int,
+    nominals_changed: c_int,
+    states_changed: c_int,
+    has_next: c_int,
+    next_s: f64,
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2EnterEventMode(component: *mut c_void) -> Status {
+    // SAFETY: the importer passes an instance or null.
+    unsafe { call(component, Instance::enter_event_mode) }
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2EnterContinuousTimeMode(component: *mut c_void) -> Status {
+    // SAFETY: the importer passes an instance or null.
+    unsafe { call(component, Instance::enter_continuous_time_mode) }
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2NewDiscreteStates(component: *mut c_void, info: *mut EventInfo) -> Status {
+    // SAFETY: the importer passes an instance and a place for the answer, or null.
+    unsafe {
+        call(component, |instance| {
+            let (none, next_s) = (0, 0.0);
+            *info.as_mut().ok_or(NULL)? = EventInfo {
+                again: none,
+                terminate: none,
+                nominals_changed: none,
+                states_changed: none,
+                has_next: none,
+                next_s,
+            };
+            instance.update_discrete_states()
+        })
+    }
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2CompletedIntegratorStep(
+    component: *mut c_void,
+    _final: c_int,
+    event: *mut c_int,
+    terminate: *mut c_int,
+) -> Status {
+    // SAFETY: the importer passes an instance and places for the answers, or null.
+    unsafe {
+        call(component, |instance| {
+            (*event.as_mut().ok_or(NULL)?, *terminate.as_mut().ok_or(NULL)?) = (0, 0);
+            instance.complete_step()
+        })
+    }
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2SetTime(component: *mut c_void, time_s: f64) -> Status {
+    // SAFETY: the importer passes an instance or null.
+    unsafe { call(component, |instance| instance.set_time(time_s)) }
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2SetContinuousStates(component: *mut c_void, states: *const f64, n: usize) -> Status {
+    // SAFETY: the importer passes an instance and an array of this length, or null.
+    unsafe { call(component, |instance| instance.set_states(array(states, n).ok_or(NULL)?)) }
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2GetContinuousStates(component: *mut c_void, states: *mut f64, n: usize) -> Status {
+    // SAFETY: the importer passes an instance and an array of this length, or null.
+    unsafe { call(component, |instance| put_states(instance, StateValues::States, states, n)) }
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2GetDerivatives(component: *mut c_void, slopes: *mut f64, n: usize) -> Status {
+    // SAFETY: the importer passes an instance and an array of this length, or null.
+    unsafe { call(component, |instance| put_states(instance, StateValues::Derivatives, slopes, n)) }
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2GetNominalsOfContinuousStates(component: *mut c_void, nominals: *mut f64, n: usize) -> Status {
+    // SAFETY: the importer passes an instance and an array of this length, or null.
+    unsafe { call(component, |instance| put_states(instance, StateValues::Nominals, nominals, n)) }
+}
+
+/// There are no event indicators.
+#[unsafe(no_mangle)]
+extern "C" fn fmi2GetEventIndicators(component: *mut c_void, _: *mut f64, _: usize) -> Status {
+    // SAFETY: the importer passes an instance or null.
+    unsafe { call(component, |_| Ok(())) }
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2GetDirectionalDerivative(
+    component: *mut c_void,
+    unknowns: *const c_uint,
+    n_unknowns: usize,
+    knowns: *const c_uint,
+    n_knowns: usize,
+    seed: *const f64,
+    result: *mut f64,
+) -> Status {
+    let own = Differential {
+        unknowns: (unknowns, n_unknowns),
+        knowns: (knowns, n_knowns),
+        seed: (seed, n_knowns),
+        result: (result, n_unknowns),
+    };
+    // SAFETY: the importer passes an instance and arrays of these lengths, or null.
+    unsafe { call(component, |instance| own.compute(instance)) }
+}
+
 /// Steps are never pending: no other status is known.
 macro_rules! discarded {
     ($($name:ident($value:ty);)*) => {$(
@@ -323,20 +446,9 @@ without! {
     fmi2SerializedFMUstateSize(*mut c_void, Out<usize>);
     fmi2SerializeFMUstate(*mut c_void, Out<c_char>, usize);
     fmi2DeSerializeFMUstate(*const c_char, usize, Out<*mut c_void>);
-    fmi2GetDirectionalDerivative(Refs, usize, Refs, usize, *const f64, Out<f64>);
     fmi2SetRealInputDerivatives(Refs, usize, *const c_int, *const f64);
     fmi2GetRealOutputDerivatives(Refs, usize, *const c_int, Out<f64>);
     fmi2CancelStep();
-    fmi2EnterEventMode();
-    fmi2NewDiscreteStates(*mut c_void);
-    fmi2EnterContinuousTimeMode();
-    fmi2CompletedIntegratorStep(c_int, Out<c_int>, Out<c_int>);
-    fmi2SetTime(f64);
-    fmi2SetContinuousStates(*const f64, usize);
-    fmi2GetDerivatives(Out<f64>, usize);
-    fmi2GetEventIndicators(Out<f64>, usize);
-    fmi2GetContinuousStates(Out<f64>, usize);
-    fmi2GetNominalsOfContinuousStates(Out<f64>, usize);
 }
 
 #[cfg(test)]

@@ -1,12 +1,14 @@
-//! FMI 3.0, co-simulation.
+//! FMI 3.0, co-simulation and model exchange.
 
 use std::ffi::{c_char, c_int, c_void};
 use std::path::Path;
 use std::ptr;
 
-use super::{NULL, free_state, get_each, guarded, message, put_state, set_each, string, text_of};
+use super::{
+    Differential, NULL, array, free_state, get_each, guarded, message, put_state, put_states, set_each, string, text_of,
+};
 use crate::error::PlantError;
-use crate::instance::{Instance, InstanceState};
+use crate::instance::{Instance, InstanceState, Interface, StateValues};
 
 type Status = c_int;
 const OK: Status = 0;
@@ -80,16 +82,16 @@ extern "C" fn fmi3SetDebugLogging(component: *mut c_void, _: bool, _: usize, _: 
 
 #[unsafe(no_mangle)]
 extern "C" fn fmi3InstantiateModelExchange(
-    _: *const c_char,
-    _: *const c_char,
-    _: *const c_char,
-    _: bool,
-    _: bool,
+    _name: *const c_char,
+    token: *const c_char,
+    resources: *const c_char,
+    _visible: bool,
+    _logging: bool,
     environment: *mut c_void,
     logger: LogMessage,
 ) -> *mut c_void {
-    log(logger, environment, "this FMU is for co-simulation");
-    ptr::null_mut()
+    // SAFETY: the importer passes strings or null.
+    unsafe { instantiated([token, resources], Interface::ModelExchange, environment, logger) }
 }
 
 #[unsafe(no_mangle)]
@@ -105,8 +107,37 @@ extern "C" fn fmi3InstantiateScheduledExecution(
     _: *const c_void,
     _: *const c_void,
 ) -> *mut c_void {
-    log(logger, environment, "this FMU is for co-simulation");
+    log(logger, environment, "this FMU is for co-simulation and model exchange");
     ptr::null_mut()
+}
+
+/// Returns a new instance, or null after a message.
+///
+/// # Safety
+/// Token and path of the resources are null or end with zero.
+unsafe fn instantiated(
+    [token, resources]: [*const c_char; 2],
+    interface: Interface,
+    environment: *mut c_void,
+    logger: LogMessage,
+) -> *mut c_void {
+    // SAFETY: as promised by the caller.
+    let (token, resources) = unsafe { (string(token), string(resources)) };
+    let (Some(token), Some(resources)) = (token, resources) else {
+        log(logger, environment, "token and path of the resources are needed as UTF-8");
+        return ptr::null_mut();
+    };
+    match guarded(|| Instance::new(Path::new(resources), token, interface)) {
+        Some(Ok(instance)) => Box::into_raw(Box::new(Component { instance, environment, log: logger })).cast(),
+        Some(Err(error)) => {
+            log(logger, environment, &text_of(&error));
+            ptr::null_mut()
+        }
+        None => {
+            log(logger, environment, "the library failed; please report it");
+            ptr::null_mut()
+        }
+    }
 }
 
 #[unsafe(no_mangle)]
@@ -124,27 +155,12 @@ extern "C" fn fmi3InstantiateCoSimulation(
     logger: LogMessage,
     _update: *const c_void,
 ) -> *mut c_void {
-    // SAFETY: the importer passes strings or null.
-    let (token, resources) = unsafe { (string(token), string(resources)) };
-    let (Some(token), Some(resources)) = (token, resources) else {
-        log(logger, environment, "token and path of the resources are needed as UTF-8");
-        return ptr::null_mut();
-    };
     if n_intermediate > 0 {
         log(logger, environment, "this FMU has no intermediate update");
         return ptr::null_mut();
     }
-    match guarded(|| Instance::new(Path::new(resources), token)) {
-        Some(Ok(instance)) => Box::into_raw(Box::new(Component { instance, environment, log: logger })).cast(),
-        Some(Err(error)) => {
-            log(logger, environment, &text_of(&error));
-            ptr::null_mut()
-        }
-        None => {
-            log(logger, environment, "the library failed; please report it");
-            ptr::null_mut()
-        }
-    }
+    // SAFETY: the importer passes strings or null.
+    unsafe { instantiated([token, resources], Interface::CoSimulation, environment, logger) }
 }
 
 #[unsafe(no_mangle)]
@@ -304,11 +320,7 @@ extern "C" fn fmi3DoStep(
 ) -> Status {
     // SAFETY: the importer passes an instance and places for the answers, or null.
     unsafe {
-        for flag in [event, terminate, early] {
-            if let Some(flag) = flag.as_mut() {
-                *flag = false;
-            }
-        }
+        lower([event, terminate, early]);
         call(component, |instance| {
             let done = instance.step(from_s, length_s);
             if let Some(last_s) = last_s.as_mut() {
@@ -319,15 +331,150 @@ extern "C" fn fmi3DoStep(
     }
 }
 
+#[unsafe(no_mangle)]
+extern "C" fn fmi3EnterEventMode(component: *mut c_void) -> Status {
+    // SAFETY: the importer passes an instance or null.
+    unsafe { call(component, Instance::enter_event_mode) }
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi3EnterContinuousTimeMode(component: *mut c_void) -> Status {
+    // SAFETY: the importer passes an instance or null.
+    unsafe { call(component, Instance::enter_continuous_time_mode) }
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi3UpdateDiscreteStates(
+    component: *mut c_void,
+    again: *mut bool,
+    terminate: *mut bool,
+    nominals_changed: *mut bool,
+    states_changed: *mut bool,
+    has_next: *mut bool,
+    _next_s: *mut f64,
+) -> Status {
+    // SAFETY: the importer passes an instance and places for the answers, or null.
+    unsafe {
+        lower([again, terminate, nominals_changed, states_changed, has_next]);
+        call(component, Instance::update_discrete_states)
+    }
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi3CompletedIntegratorStep(
+    component: *mut c_void,
+    _final: bool,
+    event: *mut bool,
+    terminate: *mut bool,
+) -> Status {
+    // SAFETY: the importer passes an instance and places for the answers, or null.
+    unsafe {
+        lower([event, terminate]);
+        call(component, Instance::complete_step)
+    }
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi3SetTime(component: *mut c_void, time_s: f64) -> Status {
+    // SAFETY: the importer passes an instance or null.
+    unsafe { call(component, |instance| instance.set_time(time_s)) }
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi3SetContinuousStates(component: *mut c_void, states: *const f64, n: usize) -> Status {
+    // SAFETY: the importer passes an instance and an array of this length, or null.
+    unsafe { call(component, |instance| instance.set_states(array(states, n).ok_or(NULL)?)) }
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi3GetContinuousStates(component: *mut c_void, states: *mut f64, n: usize) -> Status {
+    // SAFETY: the importer passes an instance and an array of this length, or null.
+    unsafe { call(component, |instance| put_states(instance, StateValues::States, states, n)) }
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi3GetContinuousStateDerivatives(component: *mut c_void, slopes: *mut f64, n: usize) -> Status {
+    // SAFETY: the importer passes an instance and an array of this length, or null.
+    unsafe { call(component, |instance| put_states(instance, StateValues::Derivatives, slopes, n)) }
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi3GetNominalsOfContinuousStates(component: *mut c_void, nominals: *mut f64, n: usize) -> Status {
+    // SAFETY: the importer passes an instance and an array of this length, or null.
+    unsafe { call(component, |instance| put_states(instance, StateValues::Nominals, nominals, n)) }
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi3GetNumberOfContinuousStates(component: *mut c_void, count: *mut usize) -> Status {
+    // SAFETY: the importer passes an instance and a place for the number, or null.
+    unsafe {
+        call(component, |instance| {
+            *count.as_mut().ok_or(NULL)? = instance.n_states();
+            Ok(())
+        })
+    }
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi3GetNumberOfEventIndicators(component: *mut c_void, count: *mut usize) -> Status {
+    // SAFETY: the importer passes an instance and a place for the number, or null.
+    unsafe {
+        call(component, |_| {
+            *count.as_mut().ok_or(NULL)? = 0;
+            Ok(())
+        })
+    }
+}
+
+/// There are no event indicators.
+#[unsafe(no_mangle)]
+extern "C" fn fmi3GetEventIndicators(component: *mut c_void, _: *mut f64, _: usize) -> Status {
+    // SAFETY: the importer passes an instance or null.
+    unsafe { call(component, |_| Ok(())) }
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi3GetDirectionalDerivative(
+    component: *mut c_void,
+    unknowns: *const u32,
+    n_unknowns: usize,
+    knowns: *const u32,
+    n_knowns: usize,
+    seed: *const f64,
+    n_seed: usize,
+    result: *mut f64,
+    n_result: usize,
+) -> Status {
+    let own = Differential {
+        unknowns: (unknowns, n_unknowns),
+        knowns: (knowns, n_knowns),
+        seed: (seed, n_seed),
+        result: (result, n_result),
+    };
+    // SAFETY: the importer passes an instance and arrays of these lengths, or null.
+    unsafe { call(component, |instance| own.compute(instance)) }
+}
+
+/// Writes "false" to every place that is there.
+///
+/// # Safety
+/// Each place is null or can be written.
+unsafe fn lower<const N: usize>(places: [*mut bool; N]) {
+    for place in places {
+        // SAFETY: as promised by the caller.
+        if let Some(place) = unsafe { place.as_mut() } {
+            *place = false;
+        }
+    }
+}
+
 type Refs = *const u32;
 type Out<T> = *mut T;
 without! {
-    fmi3EnterEventMode();
     fmi3EnterStepMode();
     fmi3EnterConfigurationMode();
     fmi3ExitConfigurationMode();
     fmi3EvaluateDiscreteStates();
-    fmi3EnterContinuousTimeMode();
     fmi3GetFloat32(Refs, usize, Out<f32>, usize);
     fmi3GetInt8(Refs, usize, Out<i8>, usize);
     fmi3GetUInt8(Refs, usize, Out<u8>, usize);
@@ -357,7 +504,6 @@ without! {
     fmi3SerializedFMUStateSize(*mut c_void, Out<usize>);
     fmi3SerializeFMUState(*mut c_void, Out<u8>, usize);
     fmi3DeserializeFMUState(*const u8, usize, Out<*mut c_void>);
-    fmi3GetDirectionalDerivative(Refs, usize, Refs, usize, *const f64, usize, Out<f64>, usize);
     fmi3GetAdjointDerivative(Refs, usize, Refs, usize, *const f64, usize, Out<f64>, usize);
     fmi3GetIntervalDecimal(Refs, usize, Out<f64>, Out<c_int>);
     fmi3GetIntervalFraction(Refs, usize, Out<u64>, Out<u64>, Out<c_int>);
@@ -367,16 +513,6 @@ without! {
     fmi3SetIntervalFraction(Refs, usize, *const u64, *const u64);
     fmi3SetShiftDecimal(Refs, usize, *const f64);
     fmi3SetShiftFraction(Refs, usize, *const u64, *const u64);
-    fmi3UpdateDiscreteStates(Out<bool>, Out<bool>, Out<bool>, Out<bool>, Out<bool>, Out<f64>);
-    fmi3CompletedIntegratorStep(bool, Out<bool>, Out<bool>);
-    fmi3SetTime(f64);
-    fmi3SetContinuousStates(*const f64, usize);
-    fmi3GetContinuousStateDerivatives(Out<f64>, usize);
-    fmi3GetEventIndicators(Out<f64>, usize);
-    fmi3GetContinuousStates(Out<f64>, usize);
-    fmi3GetNominalsOfContinuousStates(Out<f64>, usize);
-    fmi3GetNumberOfEventIndicators(Out<usize>);
-    fmi3GetNumberOfContinuousStates(Out<usize>);
     fmi3GetOutputDerivatives(Refs, usize, *const i32, Out<f64>, usize);
     fmi3ActivateModelPartition(u32, f64);
 }

@@ -12,7 +12,7 @@ use std::ffi::{CStr, CString, c_char, c_void};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use crate::error::PlantError;
-use crate::instance::InstanceState;
+use crate::instance::{Instance, InstanceState, StateValues};
 
 /// Error for a null pointer where an object or an array is needed.
 const NULL: PlantError = PlantError::Order { function: "a function", phase: "with a null pointer" };
@@ -88,6 +88,42 @@ unsafe fn set_each<T: Copy>(
     // SAFETY: as promised by the caller.
     let (references, values) = unsafe { (array(references, n).ok_or(NULL)?, array(values, n).ok_or(NULL)?) };
     references.iter().zip(values).try_for_each(|(&reference, &value)| set(reference, value))
+}
+
+/// Writes values of the continuous states of an instance.
+///
+/// # Safety
+/// As [`array_mut`], with `n` values.
+unsafe fn put_states(instance: &mut Instance, what: StateValues, to: *mut f64, n: usize) -> Result<(), PlantError> {
+    // SAFETY: as promised by the caller.
+    instance.write_states(what, unsafe { array_mut(to, n) }.ok_or(NULL)?)
+}
+
+/// Arrays of a directional derivative: references of unknowns and knowns, seed, result.
+struct Differential {
+    unknowns: (*const u32, usize),
+    knowns: (*const u32, usize),
+    seed: (*const f64, usize),
+    result: (*mut f64, usize),
+}
+
+impl Differential {
+    /// # Safety
+    /// As [`array`] and [`array_mut`].
+    unsafe fn compute(self, instance: &mut Instance) -> Result<(), PlantError> {
+        let Self { unknowns, knowns, seed, result } = self;
+        // SAFETY: as promised by the caller.
+        let (unknowns, knowns, seed, result) = unsafe {
+            (
+                array(unknowns.0, unknowns.1),
+                array(knowns.0, knowns.1),
+                array(seed.0, seed.1),
+                array_mut(result.0, result.1),
+            )
+        };
+        let references = [unknowns.ok_or(NULL)?, knowns.ok_or(NULL)?];
+        instance.directional_derivative(references, seed.ok_or(NULL)?, result.ok_or(NULL)?)
+    }
 }
 
 /// Writes a state to its place; a state that is there is used again.
