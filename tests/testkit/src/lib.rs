@@ -13,4 +13,4 @@ mod reference_arm;
 pub use chain_arm::{ChainArm, chain_arm};
 pub use palletiser::{PalletisingArm, palletising_arm};
 pub use random_tree::{Cloud, Draw, random_flexible_tree, random_state, random_tree};
-pub use reference_arm::{ReferenceArm, arm_of_parts, reference_arm, reference_motion};
+pub use reference_arm::{ReferenceArm, arm_of_parts, follow_reference_motion, reference_arm, reference_motion};

@@ -171,6 +171,14 @@ pub fn reference_motion(t: f64) -> ([f64; 6], [f64; 6], [f64; 6]) {
     (goal.map(|g| g * (a[0] - b[0])), goal.map(|g| g * (a[1] - b[1])), goal.map(|g| g * (a[2] - b[2])))
 }
 
+/// Writes positions, velocities and accelerations of [`reference_motion`].
+pub fn follow_reference_motion(t: f64, q: &mut [f64], qdot: &mut [f64], qddot: &mut [f64]) {
+    let motion = reference_motion(t);
+    q.copy_from_slice(&motion.0);
+    qdot.copy_from_slice(&motion.1);
+    qddot.copy_from_slice(&motion.2);
+}
+
 /// The flexible arm with each of its elastic joints as so many in a row, and a part between any
 /// two: a tree of 6 + 12 n coordinates for times and instructions.
 pub fn arm_of_parts(n: usize) -> Mechanism {

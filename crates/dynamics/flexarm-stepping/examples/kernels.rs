@@ -12,7 +12,7 @@ use std::sync::Arc;
 
 use flexarm_kinematics::*;
 use flexarm_stepping::*;
-use flexarm_testkit::{chain_arm, reference_arm, reference_motion};
+use flexarm_testkit::{chain_arm, follow_reference_motion, reference_arm};
 use nalgebra::DVector;
 
 /// A kernel; its argument is the number of repetitions.
@@ -110,12 +110,7 @@ fn beams() -> FlexibleArm {
     let reference = reference_arm(true);
     let damping = Damping::StiffnessProportional(reference.beta);
     let springs = reference.K_S.map(|K| ("spring".to_owned(), K, damping)).to_vec();
-    let motion = MotionFn(|t: f64, q: &mut [f64], v: &mut [f64], a: &mut [f64]| {
-        let (x, y, z) = reference_motion(t);
-        q.copy_from_slice(&x);
-        v.copy_from_slice(&y);
-        a.copy_from_slice(&z);
-    });
+    let motion = MotionFn(follow_reference_motion);
     FlexibleArm::new(Arc::new(Model::new(&reference.mechanism).unwrap()), springs, Arc::new(motion)).unwrap()
 }
 

@@ -13,7 +13,7 @@ use std::sync::Arc;
 
 use flexarm_kinematics::{Data, Model, State, forward_kinematics};
 use flexarm_stepping::*;
-use flexarm_testkit::{reference_arm, reference_motion};
+use flexarm_testkit::{follow_reference_motion, reference_arm};
 use nalgebra::{DVector, Vector3};
 
 const DURATION: f64 = 4.0;
@@ -25,12 +25,7 @@ fn arm() -> FlexibleArm {
     let model = Arc::new(Model::new(&reference.mechanism).unwrap());
     let damping = Damping::StiffnessProportional(reference.beta);
     let springs = reference.K_S.map(|K| ("spring".to_owned(), K, damping)).to_vec();
-    let motion = MotionFn(|t: f64, q: &mut [f64], v: &mut [f64], a: &mut [f64]| {
-        let (x, y, z) = reference_motion(t);
-        q.copy_from_slice(&x);
-        v.copy_from_slice(&y);
-        a.copy_from_slice(&z);
-    });
+    let motion = MotionFn(follow_reference_motion);
     FlexibleArm::new(model, springs, Arc::new(motion)).unwrap()
 }
 

@@ -6,7 +6,7 @@ use flexarm_kinematics::{
     Balancer, BalancerLaw, BalancerSpan, GasLaw, Joint, JointKind, Link, LinkInertia, Mechanism, Model, Pose, Wrench,
 };
 use flexarm_stepping::*;
-use flexarm_testkit::{reference_arm, reference_motion};
+use flexarm_testkit::{follow_reference_motion, reference_arm};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 const POSE: [f64; 6] = [0.4, 0.5, -0.3, 0.7, 0.6, -1.2];
@@ -37,12 +37,7 @@ fn arm_of(tree: &Mechanism, motion: Arc<dyn PrescribedMotion>, beta: f64) -> Fle
 }
 
 fn moving() -> Arc<dyn PrescribedMotion> {
-    Arc::new(MotionFn(|t: f64, q: &mut [f64], v: &mut [f64], a: &mut [f64]| {
-        let (x, y, z) = reference_motion(t);
-        q.copy_from_slice(&x);
-        v.copy_from_slice(&y);
-        a.copy_from_slice(&z);
-    }))
+    Arc::new(MotionFn(follow_reference_motion))
 }
 
 /// Returns the position of the TCP at the end of a run.

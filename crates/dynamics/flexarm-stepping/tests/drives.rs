@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use flexarm_kinematics::*;
 use flexarm_stepping::*;
-use flexarm_testkit::{reference_arm, reference_motion};
+use flexarm_testkit::{follow_reference_motion, reference_arm};
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, Vector3, Vector6, vector};
 
 const ALPHA: StepperKind = StepperKind::GeneralizedAlpha(AlphaSettings { rho: 0.9, dispersion_correction: true });
@@ -671,12 +671,7 @@ fn run_from(arm: &FlexibleArm, kind: StepperKind, h: f64, duration: f64) -> Vec<
 /// solver failed.
 #[test]
 fn reference_stepper_and_generalised_alpha_agree_over_events() {
-    let path: Arc<dyn PrescribedMotion> = Arc::new(MotionFn(|t: f64, q: &mut [f64], v: &mut [f64], a: &mut [f64]| {
-        let (x, y, z) = reference_motion(t);
-        q.copy_from_slice(&x);
-        v.copy_from_slice(&y);
-        a.copy_from_slice(&z);
-    }));
+    let path: Arc<dyn PrescribedMotion> = Arc::new(MotionFn(follow_reference_motion));
     let (mut arm, _) = dropping_arm(0.208, 1e-3, path);
     let axis = |coordinate| ServoAxis {
         coordinate,

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use flexarm_kinematics::{Data, Model, forward_kinematics};
 use flexarm_stepping::*;
-use flexarm_testkit::{reference_arm, reference_motion};
+use flexarm_testkit::{follow_reference_motion, reference_arm};
 
 fn arm() -> FlexibleArm {
     let reference = reference_arm(true);
@@ -12,12 +12,7 @@ fn arm() -> FlexibleArm {
     let damping = Damping::StiffnessProportional(reference.beta);
     let springs =
         vec![("lower".to_owned(), reference.K_S[0], damping), ("upper".to_owned(), reference.K_S[1], damping)];
-    let motion = MotionFn(|t: f64, q: &mut [f64], v: &mut [f64], a: &mut [f64]| {
-        let (x, y, z) = reference_motion(t);
-        q.copy_from_slice(&x);
-        v.copy_from_slice(&y);
-        a.copy_from_slice(&z);
-    });
+    let motion = MotionFn(follow_reference_motion);
     FlexibleArm::new(model, springs, Arc::new(motion)).unwrap()
 }
 

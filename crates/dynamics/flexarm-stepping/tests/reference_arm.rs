@@ -7,7 +7,7 @@ use flexarm_kinematics::{Model, Wrench};
 use flexarm_settings::Words;
 use flexarm_stepping::*;
 use flexarm_testkit::allocations::count_allocations;
-use flexarm_testkit::{reference_arm, reference_motion};
+use flexarm_testkit::{follow_reference_motion, reference_arm};
 use nalgebra::{DVector, Vector3};
 
 const GOLDEN: &str = include_str!("../../../../tests/golden/reference_arm_mid.csv");
@@ -33,12 +33,7 @@ fn arm() -> FlexibleArm {
     let damping = Damping::StiffnessProportional(reference.beta);
     let springs =
         vec![("lower".to_owned(), reference.K_S[0], damping), ("upper".to_owned(), reference.K_S[1], damping)];
-    let motion = MotionFn(|t: f64, q: &mut [f64], v: &mut [f64], a: &mut [f64]| {
-        let (x, y, z) = reference_motion(t);
-        q.copy_from_slice(&x);
-        v.copy_from_slice(&y);
-        a.copy_from_slice(&z);
-    });
+    let motion = MotionFn(follow_reference_motion);
     FlexibleArm::new(model, springs, Arc::new(motion)).expect("valid")
 }
 
@@ -423,12 +418,7 @@ fn unlike_damping_of_the_links_costs_no_more_iterations() {
     for damping in cases {
         let model = Arc::new(Model::new(&reference.mechanism).expect("valid"));
         let springs = (0..2).map(|k| (format!("link {k}"), reference.K_S[k], damping[k])).collect();
-        let motion = MotionFn(|t: f64, q: &mut [f64], v: &mut [f64], a: &mut [f64]| {
-            let (x, y, z) = reference_motion(t);
-            q.copy_from_slice(&x);
-            v.copy_from_slice(&y);
-            a.copy_from_slice(&z);
-        });
+        let motion = MotionFn(follow_reference_motion);
         let arm = FlexibleArm::new(model, springs, Arc::new(motion)).expect("valid");
         let run = |kind: StepperKind, h: f64| {
             let mut seen = Observation::new(&arm);

@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use flexarm_kinematics::Model;
 use flexarm_stepping::*;
-use flexarm_testkit::{reference_arm, reference_motion};
+use flexarm_testkit::{follow_reference_motion, reference_arm};
 
 /// Stepper, step size (s), then the work: steps, evaluations, factorisations. The reference stepper
 /// chooses its own steps.
@@ -29,12 +29,7 @@ fn every_stepper_works_as_hard_as_it_did() {
     let reference = reference_arm(true);
     let model = Arc::new(Model::new(&reference.mechanism).expect("valid"));
     let springs = reference.K_S.map(|K| ("spring".to_owned(), K, Damping::Modal(0.03))).to_vec();
-    let motion = MotionFn(|t: f64, q: &mut [f64], v: &mut [f64], a: &mut [f64]| {
-        let (x, y, z) = reference_motion(t);
-        q.copy_from_slice(&x);
-        v.copy_from_slice(&y);
-        a.copy_from_slice(&z);
-    });
+    let motion = MotionFn(follow_reference_motion);
     let arm = FlexibleArm::new(model, springs, Arc::new(motion)).expect("valid");
     let found = STEPPERS.map(|entry| {
         let told = WORK.iter().find(|work| work.0 == entry.name);

@@ -7,7 +7,7 @@ use flexarm_fem::{BeamLink, Material, ModalOptions, Section};
 use flexarm_flexlink::{FlexibleLink, LinkForm, substitute};
 use flexarm_kinematics::*;
 use flexarm_stepping::*;
-use flexarm_testkit::{reference_arm, reference_motion};
+use flexarm_testkit::{follow_reference_motion, reference_arm, reference_motion};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3, vector};
 
 const BETA: f64 = 1e-3;
@@ -206,13 +206,7 @@ fn modal_arm(damping: Damping, servo: bool) -> Other {
         FlexibleLink { form: LinkForm::Modal(modal.clone()), ..FlexibleLink::new("link4", beam.reduce().unwrap()) };
     let tree = substitute(&arm, &[link]).unwrap().mechanism;
     let spring = Spring { name: "link4".into(), K: modal.K.clone(), damping, curve: None, geometric: None };
-    fn motion(t: f64, q: &mut [f64], v: &mut [f64], a: &mut [f64]) {
-        let (x, y, z) = reference_motion(t);
-        q.copy_from_slice(&x);
-        v.copy_from_slice(&y);
-        a.copy_from_slice(&z);
-    }
-    Other { tree, springs: vec![spring], tool: "tcp", servo: servo.then_some(arm), motion }
+    Other { tree, springs: vec![spring], tool: "tcp", servo: servo.then_some(arm), motion: follow_reference_motion }
 }
 
 /// Truth: differences of whole runs.
