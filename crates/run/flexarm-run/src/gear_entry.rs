@@ -125,7 +125,7 @@ pub(crate) enum HysteresisEntryError {
          the rated torque to either side: check both, or leave lost_motion out"
     )]
     LostMotion { lost: f64, elastic: f64 },
-    #[error(transparent)]
+    #[error("hysteresis: {0}")]
     Curve(#[from] CurveError),
     #[error(
         "hysteresis has a loss of {loss:e} rad within the play, where no torque holds the gear back: give a larger \

@@ -97,7 +97,16 @@ pub(crate) fn gear(
     }
     let points = points_of(gear, &at)?;
     let (stiffness, size) = stiffness_of(gear, points.as_ref(), &at)?;
-    let (stiffness, play) = with_play(gear.backlash.as_ref(), stiffness, &at)?;
+    let springs = match &stiffness {
+        GearStiffness::Full(K) => uncoupled(K),
+        other => other.each().map(<[f64]>::len),
+    };
+    let play = play_of(gear.backlash.as_ref(), springs).map_err(|error| at(error.to_string()))?;
+    let stiffness = match stiffness {
+        // Six springs with play act one after another.
+        GearStiffness::Full(K) if !play.is_empty() => GearStiffness::Separate(K.diagonal().into()),
+        other => other,
+    };
     let dampers = dampers(gear, size, &at)?;
     if size > 1 && (gear.hysteresis.is_some() || !gear.transmission_error.is_empty()) {
         return Err(at("transmission_error and hysteresis need one stiffness, about the axis".into()));
@@ -131,39 +140,12 @@ fn points_of(gear: &GearboxEntry, at: GearboxFault<'_>) -> Result<Option<TorqueC
     }
 }
 
-/// Returns the stiffness and the play of each spring; with play in any of six springs they act one
-/// after another.
-fn with_play(
-    backlash: Option<&Numbers>,
-    stiffness: GearStiffness,
-    at: GearboxFault<'_>,
-) -> Result<(GearStiffness, Vec<f64>), RobotFileError> {
-    let given: &[f64] = match backlash {
-        None => return Ok((stiffness, Vec::new())),
-        Some(Numbers::One(play)) => &[*play],
-        Some(Numbers::Many(play)) => play,
-        Some(Numbers::Matrix(_)) => &[],
-    };
-    let stiffness = match stiffness {
-        GearStiffness::Full(K) if K == Matrix6::from_diagonal(&K.diagonal()) => {
-            GearStiffness::Separate(K.diagonal().into())
-        }
-        other => other,
-    };
-    let Some(k) = stiffness.each() else {
-        return Err(at("backlash needs uncoupled springs: stiffness of one number, 3 or 6, not a 6x6 matrix".into()));
-    };
-    let play = checked_play(given, k.len()).map_err(|error| at(error.to_string()))?;
-    match (play.iter().all(|play| *play == 0.0), stiffness) {
-        (true, GearStiffness::Separate(k)) => Ok((GearStiffness::Full(Matrix6::from_diagonal(&k.into())), Vec::new())),
-        (true, stiffness) => Ok((stiffness, Vec::new())),
-        (false, stiffness) => Ok((stiffness, play)),
-    }
-}
-
 /// Reason why numbers are not the play of springs.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum PlayError {
+    /// The springs are coupled.
+    #[error("backlash needs uncoupled springs: stiffness of single numbers, not a 6x6 matrix")]
+    Coupled,
     /// Their number is not that of the springs.
     #[error(
         "backlash has a length of {found}, the stiffness of {expected}: give the play to each side of every spring"
@@ -174,15 +156,28 @@ pub(crate) enum PlayError {
     Negative(f64),
 }
 
-/// Checks the play of `count` springs.
-pub(crate) fn checked_play(given: &[f64], count: usize) -> Result<Vec<f64>, PlayError> {
-    if given.len() != count {
-        return Err(PlayError::Count { found: given.len(), expected: count });
+/// Reads the play of `springs` springs, `None` if they are coupled; empty if there is none.
+pub(crate) fn play_of(given: Option<&Numbers>, springs: Option<usize>) -> Result<Vec<f64>, PlayError> {
+    let play: &[f64] = match given {
+        None => return Ok(Vec::new()),
+        Some(Numbers::One(play)) => std::slice::from_ref(play),
+        Some(Numbers::Many(play)) => play,
+        Some(Numbers::Matrix(_)) => &[],
+    };
+    let expected = springs.ok_or(PlayError::Coupled)?;
+    if play.len() != expected {
+        return Err(PlayError::Count { found: play.len(), expected });
     }
-    match given.iter().find(|play| !(play.is_finite() && **play >= 0.0)) {
+    match play.iter().find(|play| !(play.is_finite() && **play >= 0.0)) {
         Some(wrong) => Err(PlayError::Negative(*wrong)),
-        None => Ok(given.to_vec()),
+        None if play.iter().all(|play| *play == 0.0) => Ok(Vec::new()),
+        None => Ok(play.to_vec()),
     }
+}
+
+/// Returns the number of springs along and about six axes; `None` if they are coupled.
+pub(crate) fn uncoupled(K: &Matrix6<f64>) -> Option<usize> {
+    (*K == Matrix6::from_diagonal(&K.diagonal())).then_some(6)
 }
 
 /// Returns the curves of springs with play; `None` for those without.
@@ -214,16 +209,15 @@ fn stiffness_of(
         }
         _ => return Err(at("stiffness takes one number, 3, 6 or a 6x6 matrix".into())),
     };
-    let finite = match &stiffness {
-        GearStiffness::Axis(k) => k.is_finite() && *k > 0.0,
-        GearStiffness::Tilting(k) => k.iter().all(|k| k.is_finite() && *k > 0.0),
-        GearStiffness::Full(K) => K.iter().all(|k| k.is_finite()) && K.symmetric_eigenvalues().min() > 0.0,
-        GearStiffness::Separate(_) | GearStiffness::Guide(_) => true,
+    let values = match &stiffness {
+        GearStiffness::Full(K) if K.iter().all(|k| k.is_finite()) => K.symmetric_eigenvalues().as_slice().to_vec(),
+        GearStiffness::Full(K) => K.as_slice().to_vec(),
+        other => other.each().unwrap_or_default().to_vec(),
     };
-    if !finite {
-        return Err(at("the stiffness must be finite and positive (definite)".into()));
+    match values.into_iter().find(|k| !(k.is_finite() && *k > 0.0)) {
+        Some(found) => Err(at(format!("the stiffness must be finite and positive (definite), found {found:e}"))),
+        None => Ok((stiffness, size)),
     }
-    Ok((stiffness, size))
 }
 
 /// Returns the dampers of a gearbox with `size` coordinates, if it has any.

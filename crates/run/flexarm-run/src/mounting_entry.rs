@@ -12,7 +12,7 @@ use toml::Spanned;
 use crate::beam_entry::BeamEntry;
 use crate::entry_checks::{check_finite, keep, pose};
 use crate::error::Error;
-use crate::gearbox_entry::{Numbers, checked_play};
+use crate::gearbox_entry::{Numbers, play_of, uncoupled};
 use crate::link_entry::{DampingEntry, FlexibleLinkEntry, LinkHome, damping_of, flexible_link};
 use crate::mounting::RobotMounting;
 use crate::robot::Robot;
@@ -99,7 +99,10 @@ fn mounting(
             }
             let damping = damping_of(given.damping.as_ref(), source)?;
             let inertia = riding_mass(robot, given, entry, source)?;
-            let play = play_of(given.backlash.as_ref(), &K_S, source)?;
+            let backlash = given.backlash.as_ref();
+            let play = play_of(backlash.map(Spanned::get_ref), uncoupled(&K_S)).map_err(|error| {
+                source.error(backlash.map_or(entry.span(), Spanned::span), format!("mounting: {error}"))
+            })?;
             let springs = Mounting { name, X_BS: pose(xyz, rpy), K_S, separate: !play.is_empty(), inertia };
             Ok(RobotMounting::Springs { springs, damping, play })
         }
@@ -112,22 +115,6 @@ fn mounting(
             Err(source.error(entry.span(), message).into())
         }
     }
-}
-
-/// Returns the play of each spring; none if all are 0.
-fn play_of(given: Option<&Spanned<Numbers>>, K: &Matrix6<f64>, source: &Source) -> Result<Vec<f64>, RobotFileError> {
-    let Some(given) = given else { return Ok(Vec::new()) };
-    let fail = |message: String| source.error(given.span(), format!("mounting: {message}"));
-    if *K != Matrix6::from_diagonal(&K.diagonal()) {
-        return Err(fail("backlash needs uncoupled springs: stiffness of six numbers, not a 6x6 matrix".into()));
-    }
-    let play = match given.get_ref() {
-        Numbers::One(play) => checked_play(&[*play], 6),
-        Numbers::Many(play) => checked_play(play, 6),
-        Numbers::Matrix(_) => checked_play(&[], 6),
-    };
-    let play = play.map_err(|error| fail(error.to_string()))?;
-    Ok(if play.iter().all(|play| *play == 0.0) { Vec::new() } else { play })
 }
 
 /// Returns the first given key that only a flexible link has.

@@ -23,7 +23,9 @@ pub enum LinkFormError {
         link: String,
     },
     /// A modal link with a stiffness of its own.
-    #[error("link {link:?} modal body: its stiffness is that of the one spring between two rigid parts; leave it out")]
+    #[error(
+        "link {link:?} is a modal body: its stiffness is that of the one spring between two rigid parts; leave it out"
+    )]
     ModalStiffness {
         /// Name of the link.
         link: String,

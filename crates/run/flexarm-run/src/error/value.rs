@@ -21,9 +21,7 @@ pub enum ValueError {
     #[error(transparent)]
     OutOfRange(#[from] OutOfRange),
     /// There is no payload that can be put down.
-    #[error(
-        "this arm has no payload that can be put down: give its robot file a [payload] on a link that does not bend"
-    )]
+    #[error("this arm has no payload that can be put down: give its robot file a [payload] on a rigid link")]
     NoPayload,
     /// The log rate is not positive.
     #[error("{setting}: the log rate must be positive, found {0} Hz", setting = Setting::LogRate)]

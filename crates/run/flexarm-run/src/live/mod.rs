@@ -253,8 +253,8 @@ struct Loaded {
 
 impl Loaded {
     fn new(of: &Arm, flexible: &FlexibleRobot, arm: FlexibleArm) -> Self {
-        // A payload on a link that bends cannot be put down, nor one without which a part of the
-        // arm has no mass.
+        // A payload on a flexible link cannot be put down, nor one without which a part of the arm
+        // has no mass.
         let release = match of.robot().rigid.link(PAYLOAD_LINK).is_some() {
             true => PayloadChange::release(0.0).on(of.robot(), &flexible.model, &[]).ok(),
             false => None,

@@ -1,4 +1,4 @@
-//! What can be read of an arm that is commanded: joints, TCP, gauges.
+//! Readings of an arm that is commanded: joints, TCP, gauges.
 
 use std::sync::Arc;
 
