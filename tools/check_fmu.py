@@ -83,15 +83,16 @@ class Importer:
         instance.terminate()
         instance.freeInstance()
 
-        columns = {"time": t}
+        inputs = [v for v in self.description.modelVariables if v.causality == "input"]
+        columns = {"time": t} | {v.name: np.full(len(t), torques.get(v.name, v.start == "true")) for v in inputs}
         for what, values in motion.items():
             start = self.pose if what == "position" else [0.0] * len(joints)
             columns.update((name, begin + values) for name, begin in zip(names[what], start))
-        inputs = np.array(list(zip(*columns.values())), dtype=[(name, float) for name in columns])
+        kinds = {v.name: bool for v in inputs if v.type == "Boolean"}
+        given = np.array(list(zip(*columns.values())), dtype=[(name, kinds.get(name, float)) for name in columns])
         outputs = ["tcp_error.position." + axis for axis in "xyz"]
         run = self.fmpy.simulate_fmu(self.folder, fmi_type="ModelExchange", solver="CVode", relative_tolerance=1e-8,
-                                     stop_time=0.2, output_interval=1e-3, input=inputs, output=outputs,
-                                     start_values=torques)
+                                     stop_time=0.2, output_interval=1e-3, input=given, output=outputs)
         own, other = np.array(own), np.array([run[name] for name in outputs]).T
         states = sum(v.derivative is not None for v in self.description.modelVariables)
         return np.abs(own - other[:len(own)]).max(), np.abs(own).max(), states
@@ -181,9 +182,10 @@ def check(path, report, rounds):
         first = fmu.swing(a, 1000, 1300)
         fmu.restore(a, state)
         report.say("the same bits after returns to a state", first == later == fmu.swing(a, 1000, 1300))
-        apart, largest, states = fmu.exchange()
-        report.say("model exchange with CVode is co-simulation", apart < 0.02 * largest + 1e-6,
-                   f"{states} states, {apart:.1e} of {largest:.1e} m apart")
+        if fmu.description.modelExchange:
+            apart, largest, states = fmu.exchange()
+            report.say("model exchange with CVode is co-simulation", apart < 0.02 * largest + 1e-6,
+                       f"{states} states, {apart:.1e} of {largest:.1e} m apart")
         finite = fmu.get(a)
         wrong = [lambda: fmu.set(a, [float("nan")] * len(fmu.targets)), lambda: fmu.step(a, 5),
                  lambda: fmu.start(a), lambda: (a.getFloat64 if fmu.is_3 else a.getReal)([99999])]

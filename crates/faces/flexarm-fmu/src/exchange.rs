@@ -26,8 +26,8 @@ impl Plant {
         &self.states.derivatives
     }
 
-    /// Starts as [`Plant::start`], for a solver outside. Servos are open: their joints get the
-    /// inputs `torque` alone.
+    /// Starts as [`Plant::start`], for a solver outside. Servos are open: their joints get only
+    /// the inputs `torque`.
     ///
     /// # Errors
     /// As [`Plant::start`]; [`PlantError::NoEquations`] for an arm without equations of motion.

@@ -40,7 +40,7 @@ impl Default for PlantSettings {
     }
 }
 
-/// What moves a started arm.
+/// Source of the motion of a started arm.
 pub(crate) enum Running {
     /// Its own stepper, for co-simulation.
     Steps(Box<Live>),

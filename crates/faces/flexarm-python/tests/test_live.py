@@ -90,6 +90,23 @@ def test_a_state_repeats_what_followed_and_periods_may_differ() -> None:
         flexarm.load("kr210").flexible().live(POSE).restore(state)
 
 
+def test_a_payload_is_put_down_and_the_tool_rises_to_where_it_is_without_it() -> None:
+    robot = flexarm.load("kr210")
+    live = robot.flexible().live(POSE, period=1e-2)
+    loaded = live.tcp_pose[:3, 3]
+    live.set_payload(False)
+    for _ in range(400):
+        live.step(POSE)
+    empty = live.tcp_pose[:3, 3]
+    assert empty[2] - loaded[2] > 1e-3
+    live.reset(POSE)
+    # Still without payload; the run above rings within 1 micrometre after 4 s.
+    assert abs(live.tcp_pose[:3, 3] - empty).max() < 5e-6
+    beam = flexarm.load("one_beam").flexible().live()
+    with pytest.raises(ValueError, match="no payload"):
+        beam.set_payload(False)
+
+
 def test_open_servos_leave_the_motors_to_torques_and_links_follow_through_the_gears() -> None:
     arm = flexarm.load("kr300").flexible(drives="servo")
     live = arm.live(POSE, servos="open")
