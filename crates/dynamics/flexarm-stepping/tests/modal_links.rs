@@ -70,6 +70,11 @@ fn run(arm: &FlexibleArm, kind: StepperKind, h: f64, start: Start, times: &[f64]
     times.iter().map(at).collect()
 }
 
+fn bar(EA: f64, kGA: f64, EI: f64, mass: f64, rotary: f64) -> Bar {
+    let (kGA_y, kGA_z) = (Some(kGA), Some(kGA));
+    Bar { EA, EI_y: EI, EI_z: EI, GJ: EI, kGA_y, kGA_z, mass_per_length: mass, rotary_y: rotary, rotary_z: rotary }
+}
+
 // --- Conservation laws of a free body
 
 /// Returns a soft beam with a mass at its tip, flying freely: three prismatic and three revolute

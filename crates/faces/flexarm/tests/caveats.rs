@@ -10,8 +10,8 @@ mod changes;
 use std::collections::BTreeSet;
 
 use changes::*;
-use flexarm::{Modelling, Motion, Robot, RunOptions, Scenario};
-use toml::{Table, Value};
+use flexarm::{LinkModel, Modelling, Motion, Robot, RunOptions, Scenario};
+use toml::Value;
 
 const ROBOTS: [&str; 15] = [
     "kr210/robot.toml",

@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use flexarm_fem::{Bar, BeamLink, ModalLink, ModalOptions};
+use flexarm_fem::{Bar, BeamLink, ModalOptions};
 use flexarm_flexlink::{FlexibleLink, LinkForm, substitute};
 use flexarm_kinematics::*;
 use flexarm_stepping::*;
-use nalgebra::{DMatrix, Vector3};
+use nalgebra::Vector3;
 
 use super::*;
 
@@ -23,11 +23,6 @@ struct SpinUp {
     turn: f64,
     length: f64,
     bar: Bar,
-}
-
-fn bar(EA: f64, kGA: f64, EI: f64, mass: f64, rotary: f64) -> Bar {
-    let (kGA_y, kGA_z) = (Some(kGA), Some(kGA));
-    Bar { EA, EI_y: EI, EI_z: EI, GJ: EI, kGA_y, kGA_z, mass_per_length: mass, rotary_y: rotary, rotary_z: rotary }
 }
 
 /// The beams of `tools/golden_kane.py`.
