@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use flexarm::{
-    Arm, Command, Equations, Error, Live, LiveOptions, LiveState, LoadOptions, Modelling, Pose, Readings, Robot,
-    RunOptions, Servos, StepError, StepperKind, Wrench,
+    Arm, Command, Equations, Live, LiveOptions, LiveState, LoadOptions, Modelling, Pose, Readings, Robot, RunOptions,
+    Servos, StepperKind, Wrench,
 };
 use nalgebra::UnitQuaternion;
 use toml_edit::DocumentMut;
@@ -101,22 +101,17 @@ impl Plant {
         let arm = robot.flexible(settings.modelling)?;
         let options = options(settings, None);
         let live = arm.live(settings.pose.as_deref(), options.step_s, &options)?;
-        let equations = match settings.stepper.entry().maximal {
-            true => None,
-            false => match arm.equations(settings.pose.as_deref(), &LiveOptions::default()) {
-                Ok(equations) => Some(equations).filter(|own| !own.coordinates().is_empty()),
-                Err(Error::Step { source: StepError::NoEquations, .. }) => None,
-                Err(error) => return Err(error.into()),
-            },
-        };
+        let has_acceleration = !settings.stepper.entry().maximal;
+        let equations = arm.equations(settings.pose.as_deref(), &LiveOptions::default()).ok();
+        let equations = equations.filter(|own| has_acceleration && !own.coordinates().is_empty());
         let elastic = equations.map(|own| own.elastic());
         let starts = Starts {
             pose: live.position(),
             step_s: options.step_s,
             payload: filed_payload(&robot)?.map(|(_, mass)| mass),
-            releases: live.can_release() && !settings.stepper.entry().maximal,
+            releases: live.can_release() && has_acceleration,
             holding: live.effort(),
-            has_acceleration: !settings.stepper.entry().maximal,
+            has_acceleration,
             gauges: &live.gauge_channels(),
             elastic: elastic.as_deref(),
         };
