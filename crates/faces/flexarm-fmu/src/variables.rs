@@ -5,7 +5,7 @@
 
 use std::fmt::Write as _;
 
-use flexarm::{Arm, ElasticCoordinate};
+use flexarm::{Arm, Coordinate, ElasticCoordinate};
 
 /// Axes of vectors.
 const AXES: [&str; 3] = ["x", "y", "z"];
@@ -212,53 +212,7 @@ pub(crate) fn variables(arm: &Arm, starts: &Starts<'_>) -> Vec<Variable> {
     let model = &arm.flexible().model;
     let driven: Vec<usize> = arm.flexible().servo_limits().map(|(coordinate, _)| coordinate).collect();
     for (k, coordinate) in model.coordinates()[..model.n_actuated()].iter().enumerate() {
-        let slides = coordinate.slides();
-        let [position, velocity, acceleration] = motion_units(slides);
-        let effort = if slides { "N" } else { "N.m" };
-        let of_joint = |what: &str| format!("joint.{}.{what}", part(&coordinate.joint));
-        let (input, output) = (Causality::Input, Causality::Output);
-        let start = starts.pose.get(k).copied().unwrap_or(0.0);
-        let holding = starts.holding.get(k).copied().unwrap_or(0.0);
-        let text = "Target at the end of the communication step; the arm starts at rest there";
-        list.add(input, of_joint("target_position"), text, position, Some(start), Meaning::TargetPosition(k));
-        let text = "Target velocity at the end of the communication step, used with use_target_velocity";
-        list.add(input, of_joint("target_velocity"), text, velocity, Some(0.0), Meaning::TargetVelocity(k));
-        if starts.elastic.is_some() {
-            let text = "Target acceleration, of a prescribed joint in model exchange";
-            list.add(
-                input,
-                of_joint("target_acceleration"),
-                text,
-                acceleration,
-                Some(0.0),
-                Meaning::TargetAcceleration(k),
-            );
-        }
-        if driven.contains(&k) {
-            let text = format!(
-                "Torque or force at the joint, added to that of the servo; {holding:.6} {effort} hold the first pose"
-            );
-            list.add(input, of_joint("torque"), text, effort, Some(0.0), Meaning::Torque(k));
-        }
-        let outputs = [
-            ("motor_position", "Position of the motor, at the joint", position, Meaning::MotorPosition(k)),
-            ("motor_velocity", "Velocity of the motor, at the joint", velocity, Meaning::MotorVelocity(k)),
-            ("link_position", "Position of the link behind the gearbox", position, Meaning::LinkPosition(k)),
-            ("link_velocity", "Velocity of the link behind the gearbox", velocity, Meaning::LinkVelocity(k)),
-            ("effort", "Torque or force of the drive, at the joint", effort, Meaning::Effort(k)),
-        ];
-        let first = list.0.len();
-        for (what, text, unit, meaning) in outputs {
-            list.add(output, of_joint(what), text, unit, None, meaning);
-        }
-        if starts.elastic.is_some() && driven.contains(&k) {
-            let text = "Acceleration of the motor, at the joint";
-            let name = of_joint("motor_acceleration");
-            list.add(Causality::Local, name, text, acceleration, None, Meaning::MotorAcceleration(k));
-            let acceleration = list.0.len() - 1;
-            list.0[first + 1].derivative_of = Some(first);
-            list.0[acceleration].derivative_of = Some(first + 1);
-        }
+        list.joint(k, coordinate, driven.contains(&k), starts);
     }
     list.deflections(starts.elastic.unwrap_or_default());
     list.tcp(starts.has_acceleration);
@@ -298,6 +252,56 @@ impl List {
         self.0.push(Variable { name, description, unit, kind, causality, start, derivative_of: None, meaning });
     }
 
+    /// Adds joint number k; `is_driven`: whether it is driven by torque.
+    fn joint(&mut self, k: usize, coordinate: &Coordinate, is_driven: bool, starts: &Starts<'_>) {
+        let slides = coordinate.slides();
+        let [position, velocity, acceleration] = motion_units(slides);
+        let effort = if slides { "N" } else { "N.m" };
+        let of_joint = |what: &str| format!("joint.{}.{what}", part(&coordinate.joint));
+        let (input, output) = (Causality::Input, Causality::Output);
+        let start = starts.pose.get(k).copied().unwrap_or(0.0);
+        let holding = starts.holding.get(k).copied().unwrap_or(0.0);
+        let text = "Target at the end of the communication step; the arm starts at rest there";
+        self.add(input, of_joint("target_position"), text, position, Some(start), Meaning::TargetPosition(k));
+        let text = "Target velocity at the end of the communication step, used with use_target_velocity";
+        self.add(input, of_joint("target_velocity"), text, velocity, Some(0.0), Meaning::TargetVelocity(k));
+        if starts.elastic.is_some() {
+            let (name, text) =
+                (of_joint("target_acceleration"), "Target acceleration, of a prescribed joint in model exchange");
+            self.add(input, name, text, acceleration, Some(0.0), Meaning::TargetAcceleration(k));
+        }
+        if is_driven {
+            let text = format!(
+                "Torque or force at the joint, added to that of the servo; {holding:.6} {effort} hold the first pose"
+            );
+            self.add(input, of_joint("torque"), text, effort, Some(0.0), Meaning::Torque(k));
+        }
+        let outputs = [
+            ("motor_position", "Position of the motor, at the joint", position, Meaning::MotorPosition(k)),
+            ("motor_velocity", "Velocity of the motor, at the joint", velocity, Meaning::MotorVelocity(k)),
+            ("link_position", "Position of the link behind the gearbox", position, Meaning::LinkPosition(k)),
+            ("link_velocity", "Velocity of the link behind the gearbox", velocity, Meaning::LinkVelocity(k)),
+            ("effort", "Torque or force of the drive, at the joint", effort, Meaning::Effort(k)),
+        ];
+        let first = self.0.len();
+        for (what, text, unit, meaning) in outputs {
+            self.add(output, of_joint(what), text, unit, None, meaning);
+        }
+        if is_driven && starts.elastic.is_some() {
+            let (name, text) = (of_joint("motor_acceleration"), "Acceleration of the motor, at the joint");
+            self.0[first + 1].derivative_of = Some(first);
+            self.add(Causality::Local, name, text, acceleration, None, Meaning::MotorAcceleration(k));
+            self.differentiates(first + 1);
+        }
+    }
+
+    /// Makes the last variable the derivative of another one.
+    fn differentiates(&mut self, of: usize) {
+        if let Some(last) = self.0.last_mut() {
+            last.derivative_of = Some(of);
+        }
+    }
+
     /// Adds the elastic coordinates with velocities and accelerations.
     fn deflections(&mut self, elastic: &[ElasticCoordinate]) {
         for (k, ElasticCoordinate { element, number, unit }) in elastic.iter().enumerate() {
@@ -313,11 +317,12 @@ impl List {
                 (format!("der({name})"), format!("{text}, velocity"), Meaning::DeflectionVelocity(k)),
                 (format!("der({name},2)"), format!("{text}, acceleration"), Meaning::DeflectionAcceleration(k)),
             ];
-            let first = self.0.len();
-            for ((name, text, meaning), unit) in own.into_iter().zip(units) {
+            for (order, ((name, text, meaning), unit)) in own.into_iter().zip(units).enumerate() {
                 self.add(Causality::Local, name, text, unit, None, meaning);
+                if order > 0 {
+                    self.differentiates(self.0.len() - 2);
+                }
             }
-            (self.0[first + 1].derivative_of, self.0[first + 2].derivative_of) = (Some(first), Some(first + 1));
         }
     }
 
