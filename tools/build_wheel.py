@@ -29,8 +29,9 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / "crates/faces/flexarm-python"
-MOST_BYTES = 35e6  # with the web page
+MOST_BYTES = 35e6  # with the web page and the library of FMUs
 MATURIN = "maturin>=1.13,<2"
+FMU_LIBRARY = {"darwin": "libflexarm_fmu.dylib", "win32": "flexarm_fmu.dll"}.get(sys.platform, "libflexarm_fmu.so")
 #: Oldest glibc on which a manylinux wheel must run.
 OLDEST_GLIBC = "2.28"
 #: Packages that the tests require, and optional ones; tests without an optional package are
@@ -68,13 +69,25 @@ def zig_linker(tools):
     return linker
 
 
+def library(target, linker):
+    """Builds the library of FMUs, which the program in the wheel writes into them; returns its path."""
+    run("cargo", "build", "--release", "--locked", "-p", "flexarm-fmu", "-p", "flexarm-cli", cwd=ROOT)
+    if linker:
+        line = ["cargo", "rustc", "--release", "--locked", "-p", "flexarm-fmu", "--lib", "--crate-type", "cdylib"]
+        run(*line, "--", "-C", f"linker={linker}", cwd=ROOT)
+    return target / "release" / FMU_LIBRARY
+
+
 def build(tools, out, manylinux, source=PACKAGE):
     """Builds the wheel with maturin, which checks that the symbols match the wheel's name."""
     line = [tools / "maturin", "build", "--release", "--locked", "--compression-level", "9", "-o", out]
     if manylinux:
         line += ["--compatibility", f"manylinux_{OLDEST_GLIBC.replace('.', '_')}", "--", "-C", f"linker={zig_linker(tools)}"]
     # Use the build folder of the workspace, so that nothing is compiled twice.
-    extra = {"CARGO_TARGET_DIR": os.environ.get("CARGO_TARGET_DIR", str(ROOT / "target"))}
+    target = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
+    extra = {"CARGO_TARGET_DIR": str(target)}
+    if source == PACKAGE:
+        extra["FLEXARM_FMU_LIBRARY"] = str(library(target, zig_linker(tools) if manylinux else None))
     before = set(out.glob("*.whl"))
     run(*line, cwd=source, env={**os.environ, **extra, "PATH": f"{tools}{os.pathsep}{os.environ['PATH']}"})
     new = set(out.glob("*.whl")) - before
@@ -132,12 +145,12 @@ def check_recipe(python):
         print("without rattler-build: the recipe is not read")
 
 
-def inspect(wheel):
-    """Checks size and contents of the wheel."""
+def inspect(wheel, *more):
+    """Checks size and contents of the wheel; `more`: other files that it must have."""
     size = wheel.stat().st_size
     names = zipfile.ZipFile(wheel).namelist()
     print(f"{wheel}: {size / 1e6:.1f} MB, {len(names)} files")
-    wanted = ["flexarm/py.typed", "flexarm/_flexarm.pyi", "flexarm/share/robots/kr210/robot.toml", "flexarm/share/trajectories/pick_and_place.toml"]
+    wanted = ["flexarm/py.typed", "flexarm/_flexarm.pyi", "flexarm/share/robots/kr210/robot.toml", "flexarm/share/trajectories/pick_and_place.toml", *more]
     missing = [name for name in wanted if name not in names]
     if missing or size > MOST_BYTES:
         sys.exit(f"error: the wheel has {size} bytes (most {MOST_BYTES:.0f}) and lacks {missing}")
@@ -203,7 +216,7 @@ def main():
         run(sys.executable, ROOT / "tools/python_types.py", "--check")
         tools = python.parent
         wheel = build(tools, out, args.manylinux)
-        inspect(wheel)
+        inspect(wheel, f"flexarm/share/lib/{FMU_LIBRARY}")
         if args.sdist:
             file = sdist(out)
             with tarfile.open(file) as tar:

@@ -1,8 +1,11 @@
-//! Copies the data of the wheel (robots, trajectories, licences, the web page if it is built) to where
-//! maturin finds it, and sets the linker flags of extension modules.
+//! Copies the data of the wheel (robots, trajectories, licences; the web page and the library of FMUs
+//! if they are built) to where maturin finds it, and sets the linker flags of extension modules.
 
 use std::path::Path;
 use std::{env, fs, io};
+
+/// Variable with the path of the library of FMUs (`tools/build_wheel.py`).
+const LIBRARY: &str = "FLEXARM_FMU_LIBRARY";
 
 fn main() -> io::Result<()> {
     pyo3_build_config::add_extension_module_link_args();
@@ -19,6 +22,12 @@ fn main() -> io::Result<()> {
     println!("cargo::rerun-if-changed={}", page.display());
     if page.join("flexarm.wasm").exists() {
         copy(&page, &share.join("web"))?;
+    }
+    println!("cargo::rerun-if-env-changed={LIBRARY}");
+    if let Some(library) = env::var_os(LIBRARY).as_deref().map(Path::new) {
+        fs::create_dir_all(share.join("lib"))?;
+        fs::copy(library, share.join("lib").join(library.file_name().expect("a file")))?;
+        println!("cargo::rerun-if-changed={}", library.display());
     }
     for licence in ["LICENSE-APACHE", "LICENSE-MIT"] {
         fs::copy(root.join(licence), share.join(licence))?;

@@ -86,15 +86,15 @@ fn file_stem(name: &str) -> String {
     name.chars().map(|c| if c.is_alphanumeric() || c == '-' || c == '_' { c } else { '_' }).collect()
 }
 
-/// Returns the library that was built with the program: beside it, among its dependencies, or in
-/// the folder `lib`.
+/// Returns the library that was built with the program: beside it, among its dependencies, in the
+/// folder `lib`, or among the files that come with it.
 fn built_library() -> Result<PathBuf, Failure> {
     use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
     let name = format!("{DLL_PREFIX}flexarm_fmu{DLL_SUFFIX}");
     let program = std::env::current_exe().ok();
     let folder = program.as_deref().and_then(Path::parent).unwrap_or(Path::new("."));
     let places = [folder.join(&name), folder.join("deps").join(&name), folder.join("../lib").join(&name)];
-    places.iter().find(|place| place.is_file()).cloned().ok_or_else(|| {
+    places.into_iter().find(|place| place.is_file()).or_else(|| shipped::library(&name)).ok_or_else(|| {
         Failure::Usage(format!(
             "{name}, the library that an FMU contains, is not beside the program in {}: build it with cargo build \
              --release -p flexarm-fmu, or give it with --library",

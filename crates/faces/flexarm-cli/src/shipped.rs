@@ -53,6 +53,11 @@ pub(crate) fn robot_file(given: &Path) -> PathBuf {
     roots().iter().map(|root| root.join("robots").join(given)).find(|path| path.exists()).unwrap_or(found)
 }
 
+/// Returns a library that comes with the program, by the name of its file.
+pub(crate) fn library(name: &str) -> Option<PathBuf> {
+    roots().iter().map(|root| root.join("lib").join(name)).find(|path| path.is_file())
+}
+
 /// A robot by path or name; the default robot without one.
 ///
 /// # Errors

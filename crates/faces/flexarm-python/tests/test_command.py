@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -28,6 +29,16 @@ def test_shipped_robots_come_from_the_package(tmp_path: Path, monkeypatch: pytes
     assert robot.path.is_relative_to(SHARE) and robot.default_motion is not None
     assert len(list(SHARE.glob("robots/*/robot.toml"))) == 13
     assert robot.motion("point_to_point").duration > 0
+
+
+@pytest.mark.skipif(not (SHARE / "lib").exists(), reason="a wheel built from the source package alone")
+def test_an_fmu_holds_the_library_of_the_package(tmp_path: Path) -> None:
+    done = command("export-fmu", "kr210", "-o", "arm.fmu", "--json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["states"] == 36
+    with zipfile.ZipFile(tmp_path / "arm.fmu") as fmu:
+        binaries = [name for name in fmu.namelist() if name.startswith("binaries/")]
+        assert len(binaries) == 1 and len(fmu.read(binaries[0])) == next((SHARE / "lib").iterdir()).stat().st_size
 
 
 def test_exit_codes_and_messages_are_those_of_the_program(tmp_path: Path) -> None:
