@@ -151,7 +151,7 @@ impl Readings {
         self.stress.as_ref().map_or_else(Vec::new, StressMonitor::channels)
     }
 
-    /// Returns the values of [`Live::gauge_channels`]: strain (m/m) or stress (Pa); NaN with a
+    /// Returns the values of [`Readings::gauge_channels`]: strain (m/m) or stress (Pa); NaN with a
     /// stepper that has no accelerations.
     pub fn gauges(&mut self) -> Vec<f64> {
         let mut values = Vec::new();
