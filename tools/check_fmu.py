@@ -60,9 +60,11 @@ class Importer:
         largest error (m), and the number of states."""
         import numpy as np
 
-        t = np.linspace(0.0, 0.2, 201)
-        motion = {"position": 0.05 * (1 - np.cos(20.0 * t)), "velocity": np.sin(20.0 * t),
-                  "acceleration": 20.0 * np.cos(20.0 * t)}
+        # The importer holds inputs from one output to the next: the difference is proportional to it.
+        period = 1e-4
+        t = np.linspace(0.0, 0.2, round(0.2 / period) + 1)
+        motion = {"position": 0.05 * (20.0 * t - np.sin(20.0 * t)), "velocity": 1.0 - np.cos(20.0 * t),
+                  "acceleration": 20.0 * np.sin(20.0 * t)}
         joints = [v.name.rsplit(".", 1)[0] for v in self.description.modelVariables if v.name.endswith("target_position")]
         names = {what: [f"{joint}.target_{what}" for joint in joints] for what in motion}
 
@@ -78,7 +80,7 @@ class Importer:
         for k in range(1, len(t)):
             put(self.targets, [q + motion["position"][k] for q in self.pose])
             put([self.references[name] for name in names["velocity"]], [motion["velocity"][k]] * len(joints))
-            self.step(instance, k - 1)
+            self.step(instance, k - 1, period)
             own.append(self.get(instance)[3:])
         instance.terminate()
         instance.freeInstance()
@@ -92,7 +94,7 @@ class Importer:
         given = np.array(list(zip(*columns.values())), dtype=[(name, kinds.get(name, float)) for name in columns])
         outputs = ["tcp_error.position." + axis for axis in "xyz"]
         run = self.fmpy.simulate_fmu(self.folder, fmi_type="ModelExchange", solver="CVode", relative_tolerance=1e-8,
-                                     stop_time=0.2, output_interval=1e-3, input=given, output=outputs)
+                                     stop_time=0.2, output_interval=period, input=given, output=outputs)
         own, other = np.array(own), np.array([run[name] for name in outputs]).T
         states = sum(v.derivative is not None for v in self.description.modelVariables)
         return np.abs(own - other[:len(own)]).max(), np.abs(own).max(), states
@@ -184,7 +186,7 @@ def check(path, report, rounds):
         report.say("the same bits after returns to a state", first == later == fmu.swing(a, 1000, 1300))
         if fmu.description.modelExchange:
             apart, largest, states = fmu.exchange()
-            report.say("model exchange with CVode is co-simulation", apart < 0.02 * largest + 1e-6,
+            report.say("model exchange with CVode is co-simulation", apart < 5e-3 * largest,
                        f"{states} states, {apart:.1e} of {largest:.1e} m apart")
         finite = fmu.get(a)
         wrong = [lambda: fmu.set(a, [float("nan")] * len(fmu.targets)), lambda: fmu.step(a, 5),
