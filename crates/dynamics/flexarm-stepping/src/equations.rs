@@ -63,12 +63,7 @@ impl EquationsOfMotion {
         self.x.as_slice()
     }
 
-    /// Returns their velocities.
-    pub fn v(&self) -> &[f64] {
-        self.v.as_slice()
-    }
-
-    /// Returns their accelerations at the last [`EquationsOfMotion::evaluate`].
+    /// Returns the accelerations of the free coordinates at the last [`EquationsOfMotion::evaluate`].
     pub fn a(&self) -> &[f64] {
         self.a.as_slice()
     }

@@ -78,7 +78,7 @@ pub struct FmuSummary {
     pub platform: &'static str,
     /// Name of the robot.
     pub robot: String,
-    /// Number of inputs, outputs and parameters.
+    /// Number of inputs.
     pub inputs: usize,
     /// Number of outputs.
     pub outputs: usize,

@@ -80,11 +80,12 @@ fn interfaces(xml: &mut Xml, fmi: Fmi, variables: &[Variable]) -> io::Result<()>
     };
     let own = [("modelIdentifier", MODEL_IDENTIFIER), (state, "true")];
     if variables.iter().any(|variable| variable.derivative_of.is_some()) {
-        let more = [(derivative, "true"), ("completedIntegratorStepNotNeeded", "true")];
-        // needsCompletedIntegratorStep is false by default in FMI 3.0.
-        let more = if fmi == Fmi::V2 { &more[..] } else { &more[..1] };
-        let element = xml.create_element("ModelExchange").with_attributes(own);
-        element.with_attributes(more.iter().copied()).write_empty()?;
+        let mut element = xml.create_element("ModelExchange").with_attributes(own).with_attribute((derivative, "true"));
+        // The default of FMI 3.0.
+        if fmi == Fmi::V2 {
+            element = element.with_attribute(("completedIntegratorStepNotNeeded", "true"));
+        }
+        element.write_empty()?;
     }
     xml.create_element("CoSimulation")
         .with_attributes(own)

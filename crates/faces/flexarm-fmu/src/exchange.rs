@@ -39,9 +39,8 @@ impl Plant {
         let pose = self.all(Meaning::TargetPosition);
         let equations = Box::new(self.loaded()?.equations(Some(&pose), &self.live_options())?);
         self.begin_s = begin_s;
-        self.running = Some(Running::Equations { equations, time_s: begin_s, is_stale: false });
+        self.running = Some(Running::Equations { equations, time_s: begin_s, is_stale: true });
         self.update();
-        self.make_stale();
         Ok(())
     }
 

@@ -111,7 +111,7 @@ impl PyLive {
         self.lock().restore(&state.0.lock().unwrap_or_else(PoisonError::into_inner)).or_raise()
     }
 
-    /// Resets to rest at a pose at time 0.
+    /// Resets to rest at a pose at time 0, with or without its payload as it is.
     ///
     /// Parameters
     /// ----------

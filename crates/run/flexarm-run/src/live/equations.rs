@@ -110,11 +110,6 @@ impl Equations {
         self.equations.x()
     }
 
-    /// Returns the velocities of the free coordinates (per s).
-    pub fn velocities(&self) -> &[f64] {
-        self.equations.v()
-    }
-
     /// Returns the accelerations of the free coordinates (per s²).
     pub fn accelerations(&self) -> &[f64] {
         self.equations.a()
@@ -127,8 +122,7 @@ impl Equations {
     /// # Errors
     /// [`Error::Pose`] for a wrong number of joint values and for values that are not finite,
     /// [`Error::Value`] for a state or a wrench that is not finite, or without a payload that can be
-    /// put down, [`Error::Step`] if there are no
-    /// finite accelerations.
+    /// put down, [`Error::Step`] if there are no finite accelerations.
     ///
     /// # Panics
     /// If `x` or `v` has another length than [`Equations::coordinates`].

@@ -346,7 +346,7 @@ fn started(
 }
 
 impl Live {
-    /// Resets the arm to rest at a pose at time 0.
+    /// Resets the arm to rest at a pose at time 0, with or without its payload as it is.
     ///
     /// # Errors
     /// As [`Arm::live`].
