@@ -35,7 +35,7 @@ OWNERS = {  # outside crate: folders that may name it
     **dict.fromkeys(["rerun", "re_cdr", "parquet", "arrow-array", "arrow-ipc", "arrow-schema", "rustix"], ["results"]),
     **dict.fromkeys(["mcap", "zstd", "lz4_flex", "bzip2"], ["motion", "results"]), "rusqlite": ["motion"],
     "urdf-rs": ["robot"], "saphyr-parser": ["base"], "diffsol": ["dynamics"], "toml_edit": ["studies", "faces"],
-    **dict.fromkeys(["faer", "metis-sys", "hdf5-pure", "safetensors"], ["links"]),
+    **dict.fromkeys(["faer", "metis-sys", "safetensors"], ["links"]),
     **dict.fromkeys(["png", "plotters", "noto-sans-mono-bitmap", "clarabel"], ["results"]),
     **dict.fromkeys(["rand", "sobol_burley", "statrs"], ["studies"]),
     **dict.fromkeys(["clap", "clap_complete", "clap_mangen", "indicatif", "numpy", "pyo3", "pyo3-build-config", "quick-xml", "signal-hook", "twox-hash", "zip"], ["faces"]),

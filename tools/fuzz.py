@@ -1026,12 +1026,6 @@ def own_targets():
         targets.append(Target(f"program-{name}", name, {name: content}, [["motion", name, arm, "--json"]]))
     beside = {"part.nc": GCODE, "part.toml": PART}
     targets.append(Target("program-part.nc", "part.nc", beside, [["motion", "part.toml", arm, "--json"]]))
-    hdf5 = ROOT / "tools/fuzz_seeds/exudyn.hdf5"
-    if hdf5.exists():
-        words = ["--map", "A=plane(0,0,0;1,0,0),B=plane(0.8,0,0;1,0,0)"]
-        targets.append(Target("matrix-hdf5", "k.hdf5", {"k.hdf5": hdf5.read_bytes()}, [importing("k.hdf5", *words)]))
-    else:
-        print("left out: matrix-hdf5 (no tools/fuzz_seeds/exudyn.hdf5)")
     return targets
 
 
