@@ -1016,7 +1016,7 @@ def own_targets():
         files = {"beam.urdf": with_visual(f'<mesh filename="{name}"/>'), name: content}
         targets.append(Target(f"visual-{name}", name, files, [["check", "beam.urdf", "--json"], ["inspect", "beam.urdf", "--json", "--inertia-from-density", "1000"]]))
     motions = ROOT / "crates/motion/flexarm-motion-io/tests/data"
-    for name in ("plan.yaml", "display.yaml", "echo.yaml", "plan.json", "states_plain.mcap", "states_lz4.mcap", "states_zstd.mcap", "states_ros1.mcap", "states.bag", "states_bz2.bag", "states_lz4.bag", "nested_plan.mcap", "old.db3",
+    for name in ("plan.yaml", "display.yaml", "echo.yaml", "plan.json", "states_plain.mcap", "states_lz4.mcap", "states_zstd.mcap", "states_ros1.mcap", "nested_plan.mcap", "old.db3",
                  "bag_messages_packed/bag_messages_packed.db3", "bag_file_packed/bag_file_packed.db3.zstd"):
         own = Path(name).name
         targets.append(Target(f"motion-{own}", own, {own: (motions / name).read_bytes()}, [["motion", own, "--json"], ["motion", own, "--json", "-o", "other.csv", "--force"]]))
@@ -1026,12 +1026,6 @@ def own_targets():
         targets.append(Target(f"program-{name}", name, {name: content}, [["motion", name, arm, "--json"]]))
     beside = {"part.nc": GCODE, "part.toml": PART}
     targets.append(Target("program-part.nc", "part.nc", beside, [["motion", "part.toml", arm, "--json"]]))
-    hdf5 = ROOT / "tools/fuzz_seeds/exudyn.hdf5"
-    if hdf5.exists():
-        words = ["--map", "A=plane(0,0,0;1,0,0),B=plane(0.8,0,0;1,0,0)"]
-        targets.append(Target("matrix-hdf5", "k.hdf5", {"k.hdf5": hdf5.read_bytes()}, [importing("k.hdf5", *words)]))
-    else:
-        print("left out: matrix-hdf5 (no tools/fuzz_seeds/exudyn.hdf5)")
     return targets
 
 

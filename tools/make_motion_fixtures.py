@@ -5,10 +5,10 @@
     python3 tools/make_motion_fixtures.py
 
 One motion of two joints, sampled from closed forms, as flexarm's CSV (the truth of the tests) and
-as messages and bags written by the Python libraries of ROS: rosbags for SQLite bags, MCAP bags, ROS
-1 bags and the bytes of messages (CDR in both byte orders, ROS 1), Foxglove's MCAP library for
-chunks packed by lz4 and zstd, PyYAML and json for texts. The messages contain a gripper, the CSV
-does not. Reception times differ from the stamps by design.
+as messages and bags written by the Python libraries of ROS: rosbags for SQLite bags, MCAP bags and
+the bytes of messages (CDR in both byte orders, ROS 1), Foxglove's MCAP library for chunks packed by
+lz4 and zstd, PyYAML and json for texts. The messages contain a gripper, the CSV does not. Reception
+times differ from the stamps by design.
 """
 import json
 import math
@@ -19,7 +19,6 @@ from pathlib import Path
 import yaml
 from mcap.writer import CompressionType
 from mcap.writer import Writer as McapWriter
-from rosbags.rosbag1 import Writer as Rosbag1Writer
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
@@ -199,22 +198,6 @@ def mcap(name, types, topics, compression, little=True, ros1=False):
         writer.finish()
 
 
-def rosbag1(name, types, topics, compression=None):
-    """Writes a ROS 1 bag; its chunks are closed at 1 KiB, so that there are several."""
-    path = FOLDER / name
-    path.unlink(missing_ok=True)
-    writer = Rosbag1Writer(path)
-    if compression:
-        writer.set_compression(compression)
-    writer.chunk_threshold = 1024
-    with writer:
-        for topic, messages in topics:
-            connection = None
-            for k, (ns, kind, message) in enumerate(messages):
-                connection = connection or writer.add_connection(topic, kind, typestore=types.store)
-                writer.write(connection, received(ns, k), bytes(types.store.serialize_ros1(message, kind)))
-
-
 def old_database(new, old):
     """Writes the format of recorders before ROS 2 Iron: without message definitions."""
     shutil.copy(new, old)
@@ -237,10 +220,6 @@ def main():
     mcap("states_plain.mcap", ros2, both(ros2), CompressionType.NONE)
     mcap("states_big_endian.mcap", ros2, both(ros2), CompressionType.ZSTD, little=False)
     mcap("states_ros1.mcap", ros1, both(ros1), CompressionType.ZSTD, ros1=True)
-    rosbag1("states.bag", ros1, both(ros1))
-    rosbag1("states_bz2.bag", ros1, both(ros1), Rosbag1Writer.CompressionFormat.BZ2)
-    rosbag1("states_lz4.bag", ros1, both(ros1), Rosbag1Writer.CompressionFormat.LZ4)
-    rosbag1("plan.bag", ros1, [("/arm_controller/command", ros1.plan())])
     mcap("controller.mcap", ros2, [("/arm_controller/controller_state", ros2.controller_states())], CompressionType.ZSTD)
     mcap("plan.mcap", ros2, [("/arm_controller/joint_trajectory", ros2.plan())], CompressionType.ZSTD)
     mcap("nested_plan.mcap", ros2, [("/planned_path", ros2.nested_plan())], CompressionType.ZSTD)

@@ -174,15 +174,11 @@ pub enum Setting {
     PartA,
     /// Rigid part at the distal end.
     PartB,
-
-    // Case studies.
-    /// Folder with the data of the case studies.
-    Data,
 }
 
 impl Setting {
     /// All settings.
-    pub const ALL: [Self; 59] = [
+    pub const ALL: [Self; 58] = [
         Self::Step,
         Self::LogRate,
         Self::Stepper,
@@ -241,7 +237,6 @@ impl Setting {
         Self::Nodes,
         Self::PartA,
         Self::PartB,
-        Self::Data,
     ];
 
     /// Name in the library: a field, a function or a key of a file.
@@ -305,7 +300,6 @@ impl Setting {
             Self::Nodes => "nodes",
             Self::PartA => "part_a",
             Self::PartB => "part_b",
-            Self::Data => "root",
         }
     }
 }

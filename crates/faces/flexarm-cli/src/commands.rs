@@ -25,11 +25,10 @@ use crate::sensitivity::SensitivityArgs;
 use crate::serve::{self, ServeArgs};
 use crate::sweep::SweepArgs;
 use crate::terminal::{Terminal, answer, to_json, written};
-use crate::verify::VerifyArgs;
 use crate::view::ViewArgs;
 use crate::{
     compensate, convert, exchange, fmu, formats, identify, inspect, lobes, map, motion, new, posed, reduce, report,
-    sensitivity, simulate, sweep, verify, view,
+    sensitivity, simulate, sweep, view,
 };
 
 /// Help of the program without a command; a line for every command.
@@ -80,7 +79,6 @@ Other programs:
   export-fmu   Write the arm as an FMU, a plant for control programs
 
 Program:
-  verify       Run the case studies against their truths
   completions  Print a shell completion script
   man          Print the manual page
   help         Print the help of a command
@@ -153,8 +151,6 @@ pub(crate) enum Command {
     /// and payload. Its inputs are joint targets, motor torques, a wrench on the TCP, and whether the
     /// payload is carried; its outputs are encoders, drive torques, the TCP and its error.
     ExportFmu(Later<ExportFmuArgs>),
-    /// Run the case studies against their truths and write the page of results
-    Verify(Later<VerifyArgs>),
     /// Open a recording in the Rerun viewer
     View(Later<ViewArgs>),
     /// Open the web page on which the program runs, by a server that only this machine reaches
@@ -202,7 +198,6 @@ pub(crate) fn run(cli: &Cli, line: &[OsString]) -> Result<ExitCode, Failure> {
         Command::Import(args) => exchange::import(terminal, args),
         Command::Export(args) => exchange::export(terminal, args),
         Command::ExportFmu(args) => fmu::run(terminal, args),
-        Command::Verify(args) => verify::run(terminal, args),
         Command::View(args) => view::run(terminal, args),
         #[cfg(not(target_family = "wasm"))]
         Command::Serve(args) => serve::run(terminal, args),

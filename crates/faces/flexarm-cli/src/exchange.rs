@@ -72,7 +72,6 @@ fn import_job(args: &ImportArgs) -> Result<ImportJob, Failure> {
             ImportFormatName::Dmig => Some(ImportFormat::Dmig),
             ImportFormatName::Op4 => Some(ImportFormat::Op4),
             ImportFormatName::HarwellBoeing => Some(ImportFormat::HarwellBoeing),
-            ImportFormatName::Exudyn => Some(ImportFormat::Exudyn),
             ImportFormatName::Simscape => Some(ImportFormat::Simscape),
             ImportFormatName::Sid => Some(ImportFormat::Sid),
         },

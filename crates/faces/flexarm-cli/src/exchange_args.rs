@@ -13,8 +13,8 @@ Examples:
       flexarm import arm.sti --units m-kg-s --map A=947:1-3+948:1-3,B=949:1-3+950:1-3 --at A=0,0,0 --at B=1,0,0
   Matrix Market with the .toml that flexarm export writes says everything itself:
       flexarm import arm_K.mtx
-  Exudyn, interfaces by planes (unit of the file), tied rigidly:
-      flexarm import arm.hdf5 --units m-kg-s --map \"A=plane(0,0,0;1,0,0),B=plane(1,0,0;1,0,0)\"
+  Nastran, full model with GRIDs, interfaces by planes (unit of the file), tied rigidly:
+      flexarm import arm.pch --units m-kg-s --map \"A=plane(0,0,0;1,0,0),B=plane(1,0,0;1,0,0)\"
   Modal body (SID), for modal links of a robot file:
       flexarm import arm.SID_FEM --units m-kg-s --map A=1,B=2
   Stiffness only, with the mass of the link:
@@ -27,7 +27,7 @@ Maps (proximal interface first; six rows each, ux uy uz rx ry rz):
   A=#1-6                  rows of the file, from 1
   modal=#13-22            which other rows are modal coordinates
   A=1,B=2,C=3             nodes of a SID, which become the interfaces of the modal link
-  A=set:NAME, A=plane(x,y,z;nx,ny,nz)    nodes of a full model with positions (Exudyn)
+  A=plane(x,y,z;nx,ny,nz) nodes of a full model with positions (DMIG with GRIDs)
 
 Lengths are in the unit of the file, masses and inertias in SI.";
 
@@ -150,7 +150,6 @@ pub(crate) enum ImportFormatName {
     Dmig,
     Op4,
     HarwellBoeing,
-    Exudyn,
     Simscape,
     Sid,
 }

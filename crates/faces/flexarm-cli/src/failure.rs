@@ -1,5 +1,5 @@
-//! Errors that end a command: of the library, of the case studies, or of the command line; their
-//! messages, and the exit code of the process.
+//! Errors that end a command: of the library or of the command line; their messages, and the
+//! exit code of the process.
 
 use std::process::ExitCode;
 
@@ -16,8 +16,6 @@ pub(crate) enum Failure {
     In { context: String, source: Box<Failure> },
     /// An error of the library.
     Library(flexarm::Error),
-    /// An error of the case studies.
-    Verify(flexarm_verify::Error),
     /// An error of a plant for other programs.
     Plant(flexarm_fmu::PlantError),
 }
@@ -43,22 +41,12 @@ impl From<flexarm_fmu::PlantError> for Failure {
     }
 }
 
-impl From<flexarm_verify::Error> for Failure {
-    fn from(error: flexarm_verify::Error) -> Self {
-        match error {
-            flexarm_verify::Error::Library(error) => Self::Library(error),
-            other => Self::Verify(other),
-        }
-    }
-}
-
 impl std::fmt::Display for Failure {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Usage(text) => f.write_str(text),
             Self::In { context, source } => write!(f, "{context}: {source}"),
             Self::Library(error) => error.fmt(f),
-            Self::Verify(error) => error.fmt(f),
             Self::Plant(error) => error.fmt(f),
         }
     }
@@ -70,7 +58,6 @@ impl std::error::Error for Failure {
             Self::Usage(_) => None,
             Self::In { source, .. } => Some(source),
             Self::Library(error) => error.source(),
-            Self::Verify(error) => error.source(),
             Self::Plant(error) => error.source(),
         }
     }
@@ -83,7 +70,6 @@ impl Failure {
             Self::Usage(_) => Fault::Input,
             Self::In { source, .. } => return source.exit_code(),
             Self::Library(error) => error.fault(),
-            Self::Verify(error) => error.fault(),
             Self::Plant(_) => Fault::Input,
         };
         ExitCode::from(match fault {
@@ -114,7 +100,7 @@ impl Failure {
         match self {
             Self::In { source, .. } => source.page(),
             Self::Library(error) => page_of(error),
-            Self::Usage(_) | Self::Verify(_) | Self::Plant(_) => None,
+            Self::Usage(_) | Self::Plant(_) => None,
         }
     }
 }

@@ -65,7 +65,6 @@ fn flag(setting: Setting) -> &'static str {
         Setting::Nodes => "--nodes",
         Setting::PartA => "--part-a",
         Setting::PartB => "--part-b",
-        Setting::Data => "--data",
     }
 }
 

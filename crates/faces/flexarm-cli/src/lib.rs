@@ -39,7 +39,6 @@ mod summary_table;
 mod sweep;
 mod terminal;
 mod values;
-mod verify;
 mod view;
 
 use std::ffi::OsString;

@@ -210,10 +210,3 @@ impl Drop for NewFolder {
         }
     }
 }
-
-/// Returns the folder with `robots` and `tests/verification`: the first root that has both, else
-/// the current folder.
-pub(crate) fn checkout() -> PathBuf {
-    let has_both = |root: &PathBuf| root.join("robots").is_dir() && root.join("tests/verification").is_dir();
-    roots().into_iter().find(has_both).unwrap_or_else(|| PathBuf::from("."))
-}

@@ -179,7 +179,7 @@ fn all_samples_are_the_same_beam() {
 }
 
 #[test]
-fn a_sid_and_an_exudyn_model_are_beams_too() {
+fn a_sid_is_a_beam_too() {
     let place = Place::new();
     if let Some(path) = sample("formats/beam_synthetic.SID_FEM") {
         let path = path.to_str().unwrap();
@@ -195,20 +195,70 @@ fn a_sid_and_an_exudyn_model_are_beams_too() {
         assert!(error < 1e-6, "SID: {error:.1e}");
         assert!((found["mass_kg"].as_f64().unwrap() / 39.25 - 1.0).abs() < 1e-6);
     }
-    if let Some(path) = sample("formats/exudyn_femInterface_beam.hdf5.gz") {
-        let path = path.to_str().unwrap();
-        if cfg!(not(feature = "hdf5")) {
-            place.refused(&["import", path, "--units", "m-kg-s"], &["feature hdf5"]);
-            return;
+}
+
+/// DMIG with GRID entries of a frame of rods between three planes of four nodes, EA in newtons.
+fn frame(rod: f64, middle: f64) -> String {
+    let side = |bit: usize, size: f64| if bit == 0 { -size } else { size };
+    let nodes: Vec<[f64; 3]> = (0..12).map(|i| [0.4 * (i / 4) as f64, side(i & 1, 0.02), side(i & 2, 0.01)]).collect();
+    let mut k = vec![vec![0.0; 36]; 36];
+    for a in 0..12 {
+        for b in a + 1..12 {
+            let axis: Vec<f64> = (0..3).map(|x| nodes[b][x] - nodes[a][x]).collect();
+            let length = axis.iter().map(|x| x * x).sum::<f64>().sqrt();
+            let ea = match (a / 4, b / 4) {
+                (0, 2) => continue,
+                (1, 1) => middle,
+                _ => rod,
+            };
+            for (i, j) in (0..3).flat_map(|i| (0..3).map(move |j| (i, j))) {
+                let value = ea * axis[i] * axis[j] / length.powi(3);
+                for (p, q, sign) in [(a, a, 1.0), (b, b, 1.0), (a, b, -1.0), (b, a, -1.0)] {
+                    k[3 * p + i][3 * q + j] += sign * value;
+                }
+            }
         }
-        place.refused(&["import", path, "--units", "m-kg-s"], &["set:NAME", "plane("]);
-        let map = "A=plane(0,0,0;1,0,0),B=plane(1,0,0;1,0,0)";
-        let found = place.json(&["import", path, "--units", "m-kg-s", "--map", map, "--no-files"]);
-        assert!((found["mass_kg"].as_f64().unwrap() / 39.25 - 1.0).abs() < 1e-6);
-        // EA/l of the beam with stiffened ends: 100 x 50 mm, 1 m, 210 GPa.
-        let axial = matrix(&found["stiffness"])[0][0];
-        assert!((axial / 1.05e9 - 1.0).abs() < 0.02, "{axial:e}");
     }
+    let mut text = String::new();
+    for (i, p) in nodes.iter().enumerate() {
+        text += &format!("GRID,{},,{:.6},{:.6},{:.6}\n", i + 1, p[0], p[1], p[2]);
+    }
+    text += "DMIG,KAAX,0,6,2\nDMIG,MAAX,0,6,2\n";
+    for j in 0..36 {
+        text += &format!("DMIG,MAAX,{},{},,{0},{1},0.144\n", j / 3 + 1, j % 3 + 1);
+        text += &format!("DMIG,KAAX,{},{}", j / 3 + 1, j % 3 + 1);
+        for (i, row) in k.iter().enumerate().skip(j) {
+            text += &format!(",{}{},{},{:.15e}\n", if i == j { "," } else { "" }, i / 3 + 1, i % 3 + 1, row[j]);
+        }
+    }
+    text
+}
+
+/// Truth: the rods between two planes, in series; those of the middle plane keep it from narrowing.
+#[test]
+fn a_full_model_with_positions_is_held_at_planes() {
+    let place = Place::new();
+    place.write("frame.pch", frame(1e6, 1e9));
+    place.refused(&["import", "frame.pch", "--units", "m-kg-s"], &["plane("]);
+    let map = "A=plane(0,0,0;1,0,0),B=plane(0.8,0,0;1,0,0)";
+    let found = place.json(&["import", "frame.pch", "--units", "m-kg-s", "--map", map, "--no-files"]);
+    assert!((found["mass_kg"].as_f64().unwrap() / (12.0 * 0.144) - 1.0).abs() < 1e-9);
+    let lengths = [0.0_f64, 0.04].map(|y| [0.0_f64, 0.02].map(|z| (0.16 + y * y + z * z).sqrt()));
+    let half: f64 = lengths.iter().flatten().map(|l| 4.0 * 1e6 * 0.16 / l.powi(3)).sum();
+    let axial = matrix(&found["stiffness"])[0][0];
+    assert!((axial / (half / 2.0) - 1.0).abs() < 1e-6, "{axial:e}");
+    let off = map.replace("0.8", "0.7");
+    place
+        .refused(&["import", "frame.pch", "--units", "m-kg-s", "--map", &off], &["no node is on plane(0.7,0,0;1,0,0)"]);
+}
+
+#[test]
+fn hdf5_is_refused_with_a_way_out() {
+    let place = Place::new();
+    place.write("arm.h5", b"\x89HDF\r\n\x1a\n\0\0\0\0");
+    place
+        .refused(&["import", "arm.h5", "--units", "m-kg-s"], &["HDF5 is not read", "Matrix Market", "mmwrite", "DMIG"]);
+    place.refused(&["reduce", "arm.h5", "--list"], &["HDF5", "Gmsh"]);
 }
 
 /// Numbers of a SID file, block by block, in the order of the file.

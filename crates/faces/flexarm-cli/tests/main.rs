@@ -29,6 +29,5 @@ mod serve;
 mod study;
 #[cfg(feature = "parquet")]
 mod sweep;
-mod verify;
 #[cfg(unix)]
 mod view;

@@ -363,26 +363,6 @@ fn an_import_and_an_export_name_their_flags() {
 }
 
 #[test]
-fn the_case_studies_name_their_flags() {
-    let place = Place::new();
-    refused(
-        &place,
-        &["verify"],
-        &[
-            (
-                &["nocase", "--no-files"],
-                "there is no case \"nocase\"; the cases are one-beam, three-beams, lower-arm, manipulator, programs, measured, benchmarks, measured-arm",
-            ),
-            (
-                &["one-beam", "--no-files", "--data", "."],
-                "./robots/one_beam/robot.toml: there is no such file; the case studies need robots, trajectories and \
-             tests of a checkout of the project: give its folder (--data)",
-            ),
-        ],
-    );
-}
-
-#[test]
 fn a_word_that_is_no_number_is_answered_with_how_numbers_are_written() {
     let place = Place::new();
     let float = "tip: numbers have a decimal point and no unit, such as 500, 0.002 or 2e-3";

@@ -250,10 +250,11 @@ fn files_are_recognised_by_content_and_what_is_none_is_refused_with_the_list() {
         &["motion", "letter.txt"],
         &["this is not a readable motion", "Dear Sir", "bags as MCAP", "waypoints (TOML)", "tables"],
     );
-    std::fs::copy(fixture("states_bz2.bag"), place.path("ros1.log")).unwrap();
-    assert_eq!(place.json(&["motion", "ros1.log"])["format"], "bag of ROS 1, sensor_msgs/JointState");
-    place.write("old.bag", "#ROSBAG V1.2\nabc");
-    place.refused(&["motion", "old.bag"], &["bag of ROS 1", "version 2.0", "migrate"]);
+    place.write("ros1.log", "#ROSBAG V2.0\nabc 1 2 3");
+    place.refused(
+        &["motion", "ros1.log"],
+        &["ros1.log", "bag of ROS 1", "MCAP", "rosbags-convert", "--dst-storage mcap"],
+    );
     place.write("nothing.yaml", "a: 1\n");
     place.refused(&["motion", "nothing.yaml"], &["there is no motion in the text", "joint_names"]);
     place.write("folder/x.txt", "1");

@@ -84,7 +84,7 @@ fn parsed<T: std::str::FromStr<Err: std::fmt::Display>>(argument: &str, text: Op
     text.map(|text| text.parse().map_err(wrong)).transpose()
 }
 
-const FORMATS: [(&str, ImportFormat); 10] = [
+const FORMATS: [(&str, ImportFormat); 9] = [
     ("matrix-market", ImportFormat::MatrixMarket),
     ("user-element", ImportFormat::UserElement),
     ("abaqus-text", ImportFormat::AbaqusText),
@@ -92,7 +92,6 @@ const FORMATS: [(&str, ImportFormat); 10] = [
     ("dmig", ImportFormat::Dmig),
     ("op4", ImportFormat::Op4),
     ("harwell-boeing", ImportFormat::HarwellBoeing),
-    ("exudyn", ImportFormat::Exudyn),
     ("simscape", ImportFormat::Simscape),
     ("sid", ImportFormat::Sid),
 ];

@@ -24,7 +24,6 @@ fn keyword(setting: Setting) -> &'static str {
         Setting::LowestFrequency => "from_hz",
         Setting::HighestFrequency => "to_hz",
         Setting::ModesUpTo => "modes_up_to_hz",
-        Setting::Data => "data",
         Setting::GridSpacing => "spacing",
         Setting::ToolAxis => "tool_axis",
         Setting::MapJoints => "joints",

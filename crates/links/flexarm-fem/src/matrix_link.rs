@@ -1,7 +1,7 @@
 //! Makes a checked flexible link from matrices of another FE program.
 //!
 //! ```text
-//! full K, M (.sti/.mas, HDF5) --Guyan or Craig-Bampton--> superelement --+
+//! full K, M (.sti/.mas, DMIG) --Guyan or Craig-Bampton--> superelement --+
 //! reduced K, M (DMIG, .mtx, OP4, ...) -------------------> superelement --+--gate--> ReducedLink
 //! ```
 //! Start at [`link_from_superelement`]; a full model goes through [`reduce_matrices`] first.

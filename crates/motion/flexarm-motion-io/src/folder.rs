@@ -11,7 +11,7 @@ use crate::collect::{Collector, names_in_words};
 use crate::error::{MotionError, PlacedProblem, Problem};
 use crate::unpack::{Inside, ZSTD_MAGIC, look_inside};
 use crate::value::{Node, Value};
-use crate::{MessageMotion, Request, mcap, rosbag, sqlite, yaml};
+use crate::{MessageMotion, Request, mcap, sqlite, yaml};
 
 /// Maximum size of `metadata.yaml` (bytes).
 const MOST_METADATA: u64 = 16 << 20;
@@ -108,14 +108,6 @@ pub fn read_mcap(path: &Path, request: &Request<'_>) -> Result<MessageMotion, Mo
     read_files(&[path.to_owned()], path, request)
 }
 
-/// Reads a ROS 1 bag.
-///
-/// # Errors
-/// As [`crate::read_mcap`].
-pub fn read_rosbag(path: &Path, request: &Request<'_>) -> Result<MessageMotion, MotionError> {
-    read_files(&[path.to_owned()], path, request)
-}
-
 /// Reads a bag that is compressed as a whole (`.mcap.zstd`, `.db3.zstd`).
 ///
 /// # Errors
@@ -142,9 +134,6 @@ pub(crate) fn read_files(files: &[PathBuf], bag: &Path, request: &Request<'_>) -
         } else if head.starts_with(SQLITE_MAGIC) {
             format = "SQLite bag";
             sqlite::collect_file(file, &mut collector)?
-        } else if head.starts_with(rosbag::ROSBAG_MAGIC) {
-            format = "bag of ROS 1";
-            rosbag::collect_file(file, &mut collector)?
         } else if head.starts_with(ZSTD_MAGIC) {
             match look_inside(file)? {
                 Inside::Mcap(stream) => mcap::collect(stream, &mut collector).map_err(|trouble| trouble.of(&origin))?,

@@ -22,7 +22,6 @@
 //! | YAML and JSON, also as printed by `ros2 topic echo` and `rostopic echo` | [`read_text`] | those below, at any depth of the text |
 //! | MCAP, chunks plain or compressed by zstd or lz4 | [`read_mcap`] | `trajectory_msgs/JointTrajectory`, `sensor_msgs/JointState`, `control_msgs/JointTrajectoryControllerState`, and messages that contain a `JointTrajectory` (CDR of either byte order, ROS 1) |
 //! | SQLite bags (`.db3`) | [`read_db3`] | the same in CDR |
-//! | bags of ROS 1 (`.bag`), chunks plain or compressed by bzip2 or lz4 | [`read_rosbag`] | the same in the serialisation of ROS 1 |
 //! | folders of rosbag2 with `metadata.yaml` | [`read_folder`] | the same; also files compressed as a whole (`.zstd`) |
 //!
 //! All formats are converted to one tree of values ([`value`]): [`yaml`] builds it from text,
@@ -43,7 +42,6 @@ mod error;
 mod folder;
 mod mcap;
 mod message;
-mod rosbag;
 #[cfg_attr(not(feature = "sqlite"), path = "no_sqlite.rs")]
 mod sqlite;
 mod text;
@@ -53,9 +51,8 @@ mod write;
 mod yaml;
 
 pub use error::{FilePosition, MotionError, Problem};
-pub use folder::{SQLITE_MAGIC, read_db3, read_folder, read_mcap, read_packed, read_rosbag};
+pub use folder::{SQLITE_MAGIC, read_db3, read_folder, read_mcap, read_packed};
 pub use mcap::MCAP_MAGIC;
-pub use rosbag::ROSBAG_MAGIC;
 pub use text::{looks_like_messages, read_text};
 pub use unpack::ZSTD_MAGIC;
 pub use write::{TextFormat, write_joint_trajectory};

@@ -10,7 +10,7 @@ use rusqlite::{Connection, OpenFlags};
 
 use crate::collect::Collector;
 use crate::error::{MotionError, PlacedProblem, Problem};
-use crate::unpack::{Packing, ZSTD_MAGIC, unpacked};
+use crate::unpack::{ZSTD_MAGIC, unpacked};
 
 pub(crate) fn collect_file(path: &Path, into: &mut Collector<'_>) -> Result<Option<String>, MotionError> {
     let origin = path.display().to_string();
@@ -130,7 +130,7 @@ fn messages(
         };
         let (Some(&place), Ok(data)) = (places.get(&topic), data.as_blob()) else { continue };
         if data.starts_with(ZSTD_MAGIC) && into.wants(place) {
-            let (message, broken) = unpacked(Packing::Zstd, data);
+            let (message, broken) = unpacked(data);
             if let Some(what) = broken {
                 return Ok(Some(what));
             }

@@ -8,35 +8,21 @@ use crate::mcap;
 
 /// First bytes of zstd data.
 pub const ZSTD_MAGIC: &[u8] = &[0x28, 0xB5, 0x2F, 0xFD];
-/// Maximum decompressed size of a chunk, a message or a database (bytes).
+/// Maximum decompressed size of a message or a database (bytes).
 pub(crate) const MOST_BYTES: u64 = 1 << 30;
 
-/// Returns the bytes decompressed before the end or an error, and the reason for the error.
-pub(crate) fn unpacked(packing: Packing, bytes: &[u8]) -> (Vec<u8>, Option<String>) {
+/// Returns the bytes of zstd data before its end or an error, and the reason for the error.
+#[cfg(feature = "sqlite")]
+pub(crate) fn unpacked(bytes: &[u8]) -> (Vec<u8>, Option<String>) {
     let mut out = Vec::new();
-    let result = match packing {
-        #[cfg(feature = "sqlite")]
-        Packing::Zstd => {
-            zstd::stream::read::Decoder::new(bytes).and_then(|unpack| unpack.take(MOST_BYTES + 1).read_to_end(&mut out))
-        }
-        Packing::Bzip2 => bzip2::read::MultiBzDecoder::new(bytes).take(MOST_BYTES + 1).read_to_end(&mut out),
-        Packing::Lz4 => lz4_flex::frame::FrameDecoder::new(bytes).take(MOST_BYTES + 1).read_to_end(&mut out),
-    };
+    let result =
+        zstd::stream::read::Decoder::new(bytes).and_then(|unpack| unpack.take(MOST_BYTES + 1).read_to_end(&mut out));
     let broken = match result {
         Err(error) => Some(format!("its compressed content is damaged or incomplete ({error})")),
         Ok(_) if out.len() as u64 > MOST_BYTES => Some(format!("it unpacks to more than {MOST_BYTES} bytes")),
         Ok(_) => None,
     };
     (out, broken)
-}
-
-/// Compression format.
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum Packing {
-    Bzip2,
-    #[cfg(feature = "sqlite")]
-    Zstd,
-    Lz4,
 }
 
 /// Opens a compressed file as a stream.

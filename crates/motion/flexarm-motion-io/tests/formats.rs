@@ -6,8 +6,8 @@
 use std::path::{Path, PathBuf};
 
 use flexarm_motion_io::{
-    MessageMotion, MotionError, Request, TextFormat, read_db3, read_folder, read_mcap, read_packed, read_rosbag,
-    read_text, write_joint_trajectory,
+    MessageMotion, MotionError, Request, TextFormat, read_db3, read_folder, read_mcap, read_packed, read_text,
+    write_joint_trajectory,
 };
 use flexarm_trajectory::Trajectory;
 
@@ -107,51 +107,6 @@ fn mcap_files_of_every_packing_and_byte_order_are_the_motion_of_the_csv() {
     for name in ["plan.mcap", "nested_plan.mcap"] {
         assert_same(&read_mcap(&data(name), &ROBOT).unwrap(), "plan.csv", name);
     }
-}
-
-#[test]
-fn bags_of_ros_1_of_every_packing_are_the_motion_of_the_csv() {
-    for name in ["states.bag", "states_bz2.bag", "states_lz4.bag"] {
-        let motion = read_rosbag(&data(name), &ROBOT).unwrap();
-        assert_same(&motion, "states.csv", name);
-        assert_eq!((motion.format, motion.topic.as_deref()), ("bag of ROS 1", Some("/joint_states")), "{name}");
-        assert_eq!(
-            (motion.message.as_str(), motion.dropped),
-            ("sensor_msgs/JointState", vec!["gripper_finger_joint".to_owned()])
-        );
-    }
-    assert_same(&read_rosbag(&data("plan.bag"), &ROBOT).unwrap(), "plan.csv", "plan.bag");
-}
-
-/// Bags of a killed recorder: without index, truncated within a chunk or a record.
-#[test]
-fn bags_of_ros_1_that_are_cut_off_are_read_up_to_there() {
-    let folder = std::env::temp_dir().join(format!("flexarm-rosbag-{}", std::process::id()));
-    std::fs::create_dir_all(&folder).unwrap();
-    let whole = read_rosbag(&data("states.bag"), &ROBOT).unwrap().samples;
-    for name in ["states.bag", "states_bz2.bag", "states_lz4.bag"] {
-        let bytes = std::fs::read(data(name)).unwrap();
-        let mut read = Vec::new();
-        for part in [0.3, 0.5, 0.62, 0.75, 0.9] {
-            let path = folder.join("cut.bag");
-            std::fs::write(&path, &bytes[..(part * bytes.len() as f64) as usize]).unwrap();
-            match read_rosbag(&path, &ROBOT) {
-                Ok(motion) => {
-                    assert!(motion.caveats.iter().any(|c| c.code == "motion-cut"), "{name} {part}");
-                    read.push(motion.samples);
-                }
-                Err(error) => {
-                    let said = error.to_string();
-                    assert!(said.contains("end is missing") || said.contains("incomplete"), "{name} {part}: {said}");
-                }
-            }
-        }
-        assert!(read.iter().any(|n| *n > 2 && *n < whole) && read.is_sorted(), "{name}: {read:?} of {whole}");
-    }
-    std::fs::write(folder.join("old.bag"), "#ROSBAG V1.2\nabc").unwrap();
-    let error = read_rosbag(&folder.join("old.bag"), &ROBOT).unwrap_err().to_string();
-    assert!(error.contains("V1.2") && error.contains("rosbag migrate"), "{error}");
-    std::fs::remove_dir_all(&folder).unwrap();
 }
 
 #[test]
@@ -615,15 +570,7 @@ fn bytes_changed_anywhere_in_a_bag_end_in_a_motion_or_an_error() {
         seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (seed >> 33) as usize % below
     };
-    for name in [
-        "states_plain.mcap",
-        "states_lz4.mcap",
-        "states_zstd.mcap",
-        "old.db3",
-        "states.bag",
-        "states_bz2.bag",
-        "states_lz4.bag",
-    ] {
+    for name in ["states_plain.mcap", "states_lz4.mcap", "states_zstd.mcap", "old.db3"] {
         let whole = std::fs::read(data(name)).unwrap();
         for _ in 0..60 {
             let mut bytes = whole.clone();

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use flexarm::{
-    ConstraintForm, LinkModel, LoadOptions, Modelling, Motion, Robot, Setting, SpookPreset, SpookSettings, Start,
-    StepError, StepperKind, TCP_FRAME,
+    ConstraintForm, LinkModel, LoadOptions, Modelling, Motion, Robot, SpookPreset, SpookSettings, Start, StepError,
+    StepperKind, TCP_FRAME,
 };
 use flexarm_analysis::tcp_error;
 use flexarm_kinematics::{Data, Frame, Pose, State, Wrench, forward_kinematics};
@@ -37,8 +37,8 @@ impl Bench {
         let path = self.root.join(file);
         if !path.is_file() {
             let what = "there is no such file; the case studies need robots, trajectories and tests of a checkout of the \
-                        project: give its folder";
-            return Err(flexarm::Error::File { path, what: format!("{what} ({})", Setting::Data) }.into());
+                        project: give its folder as data";
+            return Err(flexarm::Error::File { path, what: what.to_owned() }.into());
         }
         Ok(Robot::load_with(&path, &LoadOptions::default())?)
     }

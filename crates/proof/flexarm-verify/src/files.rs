@@ -23,10 +23,10 @@ The case studies of this project: each method against each truth. Every number a
 `robots/`, `trajectories/` and `tests/verification/`:
 
 ```sh
-flexarm verify -o docs --force
+cargo run --release -p flexarm-verify -- -o docs --force
 ```
 
-`flexarm verify CASE` runs one case, `--check docs/verification.md` says whether the page is still what the command prints. Units are SI unless a head says \
+`CASE` after `--` runs one case, `--check docs/verification.md` says whether the page is still what the command writes. Units are SI unless a head says \
 otherwise; errors are relative: `4.6e-7` is a fraction, from 0.1 % on they are in per cent; what is below 1e-9 is printed as that, because it is rounding and differs between machines.
 
 Every claim has a bound, and the command fails if one does not hold; all of them stand at the end of the page. Bounds that were asked for are 1e-6 for statics and 1 % of the peak for motion; the others are up to twice what was measured when the case was \

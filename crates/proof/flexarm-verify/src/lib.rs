@@ -38,8 +38,6 @@ mod programs;
 pub mod textbook;
 mod three_beams;
 
-use std::ops::ControlFlow;
-
 use bench::Bench;
 use page::Case;
 
@@ -77,9 +75,8 @@ pub struct Verification {
     pub quick: bool,
 }
 
-/// Callback that receives the completed share, 0 to 1, and the name of the current case; `Break`
-/// ends the run.
-pub type Progress<'a> = dyn FnMut(f64, &str) -> ControlFlow<()> + 'a;
+/// Callback that receives the completed share, 0 to 1, and the name of the current case.
+pub type Progress<'a> = dyn FnMut(f64, &str) + 'a;
 
 /// Progress of a case.
 pub(crate) struct Pace<'a> {
@@ -92,19 +89,16 @@ pub(crate) struct Pace<'a> {
 
 impl Pace<'_> {
     /// Reports the completed share of the case, 0 to 1.
-    pub(crate) fn at(&mut self, share: f64) -> Result<(), Error> {
-        match (self.progress)(self.begin + self.own * share, self.name) {
-            ControlFlow::Continue(()) => Ok(()),
-            ControlFlow::Break(()) => Err(flexarm::Error::Interrupted { t: 0.0, partial: false }.into()),
-        }
+    pub(crate) fn at(&mut self, share: f64) {
+        (self.progress)(self.begin + self.own * share, self.name);
     }
 }
 
 /// Runs the named cases, or all if none is named.
 ///
 /// # Errors
-/// [`Error::UnknownCase`], [`flexarm::Error::File`] if files of the checkout are missing,
-/// [`flexarm::Error::Interrupted`], and the errors of the individual cases.
+/// [`Error::UnknownCase`], [`flexarm::Error::File`] if files of the checkout are missing, and the
+/// errors of the individual cases.
 pub fn verify(bench: &Bench, names: &[String], progress: &mut Progress<'_>) -> Result<Verification, Error> {
     if let Some(unknown) = names.iter().find(|name| !case_names().contains(&name.as_str())) {
         let known = case_names().join(", ");
@@ -117,13 +111,9 @@ pub fn verify(bench: &Bench, names: &[String], progress: &mut Progress<'_>) -> R
     for (name, weight, run) in wanted {
         let mut tell = |share: f64, name: &str| progress(share, name);
         let mut pace = Pace { name, begin: done / all, own: weight / all, progress: &mut tell };
-        pace.at(0.0)?;
+        pace.at(0.0);
         cases.push(run(bench, &mut pace)?);
         done += weight;
-    }
-    // Last opportunity to stop before anything is written.
-    if progress(1.0, "").is_break() {
-        return Err(flexarm::Error::Interrupted { t: 0.0, partial: false }.into());
     }
     let passed = cases.iter().flat_map(Case::claims).all(|claim| claim.holds);
     Ok(Verification { cases, passed, quick: bench.quick })

@@ -5,8 +5,8 @@ use std::io::Read;
 use std::path::Path;
 
 use flexarm_motion_io::{
-    MCAP_MAGIC, MessageMotion, MotionError, Problem, ROSBAG_MAGIC, Request, SQLITE_MAGIC, ZSTD_MAGIC,
-    looks_like_messages, read_db3, read_folder, read_mcap, read_packed, read_rosbag, read_text,
+    MCAP_MAGIC, MessageMotion, MotionError, Problem, Request, SQLITE_MAGIC, ZSTD_MAGIC, looks_like_messages, read_db3,
+    read_folder, read_mcap, read_packed, read_text,
 };
 use flexarm_settings::{Caveat, Setting};
 use flexarm_trajectory::{ColumnMap, JointLimits, KnownJoint, TableRequest, Trajectory, text_of_file};
@@ -94,11 +94,8 @@ const FORMATS: [MotionFormat; 11] = [
         recognises: |head| head.bytes.starts_with(SQLITE_MAGIC),
         read: |file| bag(file, read_db3),
     },
-    MotionFormat {
-        name: "bags of ROS 1 (.bag)",
-        recognises: |head| head.bytes.starts_with(ROSBAG_MAGIC),
-        read: |file| bag(file, read_rosbag),
-    },
+    // Bags of ROS 1 are not read: an error of their own.
+    MotionFormat { name: "", recognises: |head| head.bytes.starts_with(b"#ROSBAG V"), read: bag_of_ros_1 },
     MotionFormat {
         name: "MCAP and SQLite bags packed by zstd",
         recognises: |head| head.bytes.starts_with(ZSTD_MAGIC),
@@ -290,6 +287,13 @@ fn messages(file: &MotionFile<'_>) -> Result<ReadMotion, Error> {
     no_columns(file, "a text of messages")?;
     let (text, origin) = (text_of_file(file.path)?, file.path.display().to_string());
     with_request(file, |request| read_text(&text, &origin, request))
+}
+
+fn bag_of_ros_1(file: &MotionFile<'_>) -> Result<ReadMotion, Error> {
+    let what = "this is a bag of ROS 1; readable are bags of ROS 2 as MCAP or SQLite. rosbags-convert (pip install \
+                rosbags) makes one of it: rosbags-convert --src FILE.bag --dst FOLDER --dst-storage mcap; then give \
+                the folder";
+    Err(Error::File { path: file.path.to_owned(), what: what.to_owned() })
 }
 
 fn bag(

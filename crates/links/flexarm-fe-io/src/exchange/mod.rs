@@ -25,7 +25,7 @@
 //! ```
 //!
 //! Units: those of the files everywhere except in [`assemble_interfaces`], the only place that
-//! converts. Full models (`.sti`/`.mas`, Exudyn) stay sparse triplets with labels; they are reduced
+//! converts. Full models (`.sti`/`.mas`) stay sparse triplets with labels; they are reduced
 //! elsewhere. Writers are in the same module as the parser of their format. The modal format SID is
 //! separate: [`parse_sid`].
 //!
@@ -37,8 +37,6 @@ mod cards;
 mod diagnose;
 mod dmig;
 mod error;
-#[cfg(feature = "hdf5")]
-mod exudyn;
 mod fortran;
 mod harwell_boeing;
 mod interface;

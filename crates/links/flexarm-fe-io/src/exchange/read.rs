@@ -9,7 +9,7 @@ use nalgebra::Vector3;
 
 use super::error::{ErrorPosition, ExchangeError, ExchangeErrorKind};
 use super::matrix::{DofLabel, LabelledMatrix, MatrixRole, Storage, reordered};
-use super::recognise::{MatrixFormat, recognise};
+use super::recognise::{MatrixFormat, is_hdf5, recognise};
 use super::sidecar::Sidecar;
 use super::text::{LARGEST_UNPACKED, Text, unpack};
 use super::{abaqus_text, dmig, harwell_boeing, matrix_market, op4_binary, op4_text, sidecar, simscape, user_element};
@@ -38,8 +38,6 @@ pub struct ImportedMatrices {
     pub mass: Option<LabelledMatrix>,
     /// Positions of nodes, if the format has them.
     pub positions: BTreeMap<i64, Vector3<f64>>,
-    /// Nodes by name of their set, if the format has them.
-    pub node_sets: BTreeMap<String, Vec<i64>>,
     /// Frames of the interfaces in the order of the rows, if the format has them.
     pub frames: Vec<Pose>,
     /// Units, interfaces and frames from the sidecar of Matrix Market files.
@@ -105,7 +103,6 @@ struct CombinedFiles {
     candidates: Vec<Candidate>,
     labels: Option<(String, Vec<DofLabel>)>,
     positions: BTreeMap<i64, Vector3<f64>>,
-    node_sets: BTreeMap<String, Vec<i64>>,
     frames: Vec<Pose>,
     sidecar: Option<Sidecar>,
     warnings: Vec<String>,
@@ -279,11 +276,19 @@ pub fn parse_matrices(files: &[InputFile], names: &MatrixNames) -> Result<Import
 fn parse_file(file: &InputFile, found: &mut CombinedFiles) -> Result<(), ExchangeError> {
     let origin = file.origin.as_str();
     let Some(format) = recognise(&file.bytes) else {
-        let help = ".mtx of Adams and Altair, .mnf, .sub, .h3d and .npz cannot be read: export text, such as DMIG or \
-                    Matrix Market";
-        let expected = "Matrix Market, CalculiX or Abaqus matrices, DMIG, OP4, Harwell-Boeing, Exudyn HDF5, CSV";
+        let (found, help) = if is_hdf5(&file.bytes) {
+            let help = "HDF5 is not read: save the matrices as Matrix Market (in Python: \
+                        scipy.io.mmwrite(\"arm_K.mtx\", K), arm_M.mtx likewise), or as DMIG with GRID entries, which have \
+                        the positions of the nodes";
+            ("HDF5", help)
+        } else {
+            let help = ".mtx of Adams and Altair, .mnf, .sub, .h3d and .npz cannot be read: export text, such as DMIG \
+                        or Matrix Market";
+            ("an unknown format", help)
+        };
+        let expected = "Matrix Market, CalculiX or Abaqus matrices, DMIG, OP4, Harwell-Boeing, CSV";
         let place = ErrorPosition::file(origin);
-        return Err(place.fail(ExchangeErrorKind::NotRecognised, "file", "an unknown format", expected, help));
+        return Err(place.fail(ExchangeErrorKind::NotRecognised, "file", found, expected, help));
     };
     let bytes = unpack(&file.bytes, origin)?;
     let mut matrices = parse_format(format, &bytes, file, found)?;
@@ -310,8 +315,7 @@ fn parse_format(
     found: &mut CombinedFiles,
 ) -> Result<Vec<MatrixWithRole>, ExchangeError> {
     let origin = file.origin.as_str();
-    let is_binary = matches!(format, MatrixFormat::Op4Binary | MatrixFormat::ExudynHdf5);
-    let lossy = String::from_utf8_lossy(if is_binary { b"" } else { bytes });
+    let lossy = String::from_utf8_lossy(if format == MatrixFormat::Op4Binary { b"" } else { bytes });
     let text = Text::new(&lossy, origin);
     let by_file = file.role.or_else(|| role_by_name(origin));
     let one = |matrix| vec![(by_file, matrix)];
@@ -343,7 +347,6 @@ fn parse_format(
         MatrixFormat::Op4Text => several(op4_text::parse(text)?),
         MatrixFormat::Op4Binary => several(op4_binary::parse(bytes, origin)?),
         MatrixFormat::HarwellBoeing => one(harwell_boeing::parse(text)?),
-        MatrixFormat::ExudynHdf5 => parse_exudyn(bytes, origin, found)?,
         MatrixFormat::Csv => one(simscape::parse_matrix(text)?),
         MatrixFormat::CsvFrames => {
             found.frames = simscape::parse_frames(text)?;
@@ -360,21 +363,6 @@ fn parse_format(
             return Err(place.fail(ExchangeErrorKind::Unsupported, "file", "a modal body (SID)", expected, help));
         }
     })
-}
-
-#[cfg(not(feature = "hdf5"))]
-fn parse_exudyn(_: &[u8], origin: &str, _: &mut CombinedFiles) -> Result<Vec<MatrixWithRole>, ExchangeError> {
-    let (found, expected) = ("HDF5", "a format that this build reads");
-    let help = "build flexarm with the feature hdf5, or install the Python package, which reads it";
-    Err(ErrorPosition::file(origin).fail(ExchangeErrorKind::Syntax, "file", found, expected, help))
-}
-
-#[cfg(feature = "hdf5")]
-fn parse_exudyn(bytes: &[u8], origin: &str, found: &mut CombinedFiles) -> Result<Vec<MatrixWithRole>, ExchangeError> {
-    let exudyn = super::exudyn::parse(bytes, origin)?;
-    found.positions.extend(exudyn.positions);
-    found.node_sets.extend(exudyn.node_sets);
-    Ok(vec![(Some(MatrixRole::Stiffness), exudyn.stiffness), (Some(MatrixRole::Mass), exudyn.mass)])
 }
 
 /// Full models (`.sti`, `.mas`) are stored sparse, other files by size.
@@ -470,8 +458,8 @@ fn choose(mut found: CombinedFiles, names: &MatrixNames, origin: &str) -> Result
         let (aligned_K, aligned_M) = aligned(&K, mass, &origin)?;
         (K, M) = (aligned_K, Some(aligned_M));
     }
-    let CombinedFiles { positions, node_sets, frames, sidecar, warnings, .. } = found;
-    Ok(ImportedMatrices { format, origin, stiffness: K, mass: M, positions, node_sets, frames, sidecar, warnings })
+    let CombinedFiles { positions, frames, sidecar, warnings, .. } = found;
+    Ok(ImportedMatrices { format, origin, stiffness: K, mass: M, positions, frames, sidecar, warnings })
 }
 
 fn list(candidates: &[Candidate]) -> String {

@@ -29,8 +29,6 @@ pub enum MatrixFormat {
     HarwellBoeing,
     /// `Matrix Eqn, Node, DOF`: the rows of a Harwell-Boeing matrix of ANSYS.
     EquationMapping,
-    /// Exudyn `FEMinterface.SaveToFile` in HDF5.
-    ExudynHdf5,
     /// Matrix as comma-separated values: Simscape.
     Csv,
     /// Interface origins and quaternions as comma-separated values: Simscape.
@@ -55,7 +53,6 @@ impl MatrixFormat {
             Self::Op4Binary => "Nastran OP4 binary",
             Self::HarwellBoeing => "Harwell-Boeing",
             Self::EquationMapping => "ANSYS mapping",
-            Self::ExudynHdf5 => "Exudyn HDF5",
             Self::Csv => "comma-separated matrix",
             Self::CsvFrames => "comma-separated frames",
             Self::Sid => "SID",
@@ -70,13 +67,16 @@ impl fmt::Display for MatrixFormat {
     }
 }
 
+/// Whether a file (unpacking gzip) is HDF5, which is not read.
+pub(super) fn is_hdf5(bytes: &[u8]) -> bool {
+    const MARK: &[u8] = b"\x89HDF\r\n\x1a\n";
+    unpack_head(bytes, MARK.len()) == MARK
+}
+
 /// Recognises the format of a file (unpacking gzip); `None` if it is none of these.
 pub fn recognise(bytes: &[u8]) -> Option<MatrixFormat> {
     const HEAD: usize = 1 << 20;
     let head = unpack_head(bytes, HEAD);
-    if head.starts_with(b"\x89HDF\r\n\x1a\n") {
-        return Some(MatrixFormat::ExudynHdf5);
-    }
     // Fortran record of 24 bytes, with its length before and after.
     let lengths = [head.get(..4), head.get(28..32)];
     if [24_u32.to_le_bytes(), 24_u32.to_be_bytes()].iter().any(|length| lengths == [Some(&length[..]); 2]) {

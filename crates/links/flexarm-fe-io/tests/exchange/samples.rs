@@ -61,7 +61,6 @@ fn each_sample_is_recognised_by_its_content() {
         ("nastran_op4_binary_le.op4", MatrixFormat::Op4Binary),
         ("ansys_hbmat_K12.matrix", MatrixFormat::HarwellBoeing),
         ("ansys_hbmat_K12.mapping", MatrixFormat::EquationMapping),
-        ("exudyn_femInterface_beam.hdf5.gz", MatrixFormat::ExudynHdf5),
         ("simscape_K.csv", MatrixFormat::Csv),
         ("simscape_frames.csv", MatrixFormat::CsvFrames),
         ("beam_synthetic.SID_FEM", MatrixFormat::Sid),
@@ -119,43 +118,6 @@ fn craig_bampton_matrices_keep_their_modes_and_pass_the_gate() {
         let K12 = Matrix12::from_fn(|i, j| K[(i, j)]);
         let (_, report) = check_matrix12(&K12, &p_AB, &GateLimits::default()).unwrap();
         assert!(report.rigid_body_residual.unwrap() < 1e-6, "{report:?}"); // measured 3.5e-10, 2.2e-8
-    }
-}
-
-#[cfg(feature = "hdf5")]
-#[test]
-fn the_full_model_of_exudyn_is_read_with_positions_and_node_sets() {
-    let Some(folder) = samples() else { return };
-    let imported = read(&folder, &["formats/exudyn_femInterface_beam.hdf5.gz"]);
-    let (K, M) = (imported.stiffness.to_sparse(), imported.mass.unwrap().to_sparse());
-    assert_eq!((K.n, M.n, imported.positions.len()), (609, 609, 203));
-    assert_eq!(imported.node_sets.values().map(Vec::len).collect::<Vec<_>>(), [182]);
-
-    // Stiffness: no force under rotation about z, u = (-y, x, 0).
-    let u: Vec<f64> = imported
-        .stiffness
-        .rows
-        .iter()
-        .map(|label| {
-            let p = imported.positions[&label.node.unwrap()];
-            [-p.y, p.x, 0.0][label.dof as usize - 1]
-        })
-        .collect();
-    let (mut force, mut size) = (vec![0.0; 609], vec![0.0_f64; 609]);
-    for (i, j, k) in K.triplets() {
-        for (i, j) in [(i, j), (j, i)].into_iter().take(if i == j { 1 } else { 2 }) {
-            force[i] += k * u[j];
-            size[i] += (k * u[j]).abs();
-        }
-    }
-    let residual = force.iter().zip(&size).map(|(f, s): (&f64, &f64)| f.abs() / s.max(1.0)).fold(0.0, f64::max);
-    assert!(residual < 1e-12, "{residual}"); // measured 2e-16
-
-    // Mass: equal to that of the beam along each axis.
-    for axis in 1..=3 {
-        let on = |i: usize| f64::from(imported.stiffness.rows[i].dof == axis);
-        let mass: f64 = M.triplets().map(|(i, j, m)| if i == j { m } else { 2.0 * m } * on(i) * on(j)).sum();
-        assert!((mass / 39.25 - 1.0).abs() < 1e-9, "{mass}"); // measured 2e-14
     }
 }
 

@@ -14,8 +14,6 @@
 //! The metadata have, as JSON below the key `flexarm`, the format with its version and the names of
 //! link and interfaces.
 
-use std::collections::HashMap;
-
 use flexarm_spatial::Pose;
 use nalgebra::{DMatrix, Matrix3, Rotation3, Vector3};
 use safetensors::tensor::{Dtype, SafeTensors, TensorView, serialize};
@@ -88,7 +86,7 @@ pub fn write_stress(fields: &StressFields) -> Vec<u8> {
     let about = About { format: FORMAT.into(), link: fields.link.clone(), interfaces: fields.interfaces.clone() };
     let about = serde_json::to_string(&about).expect("strings");
     // One entry, so that equal fields give equal bytes.
-    serialize(views, Some(HashMap::from([(KEY.to_owned(), about)]))).expect("tensors of plain numbers")
+    serialize(views, Some([(KEY.to_owned(), about)].into_iter().collect())).expect("tensors of plain numbers")
 }
 
 /// Reads a stress file.

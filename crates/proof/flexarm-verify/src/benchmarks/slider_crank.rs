@@ -49,7 +49,7 @@ pub(super) const STIFFENED_ROD: usize = PARTS.len() + 1;
 pub(super) const SPOOK: usize = PARTS.len() + 2;
 
 impl SliderCrank {
-    pub(super) fn new(bench: &Bench, progress: &mut dyn FnMut(f64) -> Result<(), Error>) -> Result<Self, Error> {
+    pub(super) fn new(bench: &Bench, progress: &mut dyn FnMut(f64)) -> Result<Self, Error> {
         let folder = format!("{FOLDER}/slider_crank");
         let file = format!("{folder}/slider_crank.toml");
         let robot = bench.robot(&file)?;
@@ -67,7 +67,7 @@ impl SliderCrank {
         methods.push(Method::spook(in_parts(PARTS[1])));
         let (mut runs, count) = (Vec::new(), methods.len());
         for (k, method) in methods.into_iter().enumerate() {
-            progress(k as f64 / count as f64)?;
+            progress(k as f64 / count as f64);
             let middle = method.run(&robot, &motion, STEP_S, RATE_HZ)?;
             let slider = method.run(&slider_robot, &motion, STEP_S, RATE_HZ)?;
             let comparable = same_times(middle.rows.iter().map(|row| row.time_s), truth.iter().map(|row| row[0]));

@@ -78,14 +78,14 @@ impl Spin {
 }
 
 /// Computes the frequencies at all sweep angles and speeds of the truth.
-pub(super) fn spins(bench: &Bench, progress: &mut dyn FnMut(f64) -> Result<(), Error>) -> Result<Vec<Spin>, Error> {
+pub(super) fn spins(bench: &Bench, progress: &mut dyn FnMut(f64)) -> Result<Vec<Spin>, Error> {
     let names =
         ["sweep[deg]", "speed[rpm]", "f1[Hz]", "f2[Hz]", "f3[Hz]", "f4[Hz]", "f5[Hz]", "f6[Hz]", "f7[Hz]", "f8[Hz]"];
     let truth = columns(&bench.file(&format!("{FOLDER}/swept_rotor/truth.csv")), names)?;
     let folder = Scratch::new(&bench.scratch)?;
     let (mut spins, mut robot): (Vec<Spin>, Option<Robot>) = (Vec::new(), None);
     for (row, [sweep_deg, speed_rpm, truth_hz @ ..]) in truth.iter().enumerate() {
-        progress(row as f64 / truth.len() as f64)?;
+        progress(row as f64 / truth.len() as f64);
         if spins.last().is_none_or(|spin| spin.sweep_deg != *sweep_deg) {
             robot = None;
         }

@@ -137,9 +137,9 @@ impl<'a, 'p> Runs<'a, 'p> {
     pub(super) fn make_with(&mut self, robot: &Robot, scenario: &Scenario, options: &RunOptions) -> Result<Run, Error> {
         let options = RunOptions { log_rate_hz: SEEN_HZ, ..options.clone() };
         let weight = weight(options.stepper, options.step_s);
-        let mut progress = |t: f64, total: f64| match self.pace.at((self.done + weight * t / total) / self.all) {
-            Ok(()) => ControlFlow::Continue(()),
-            Err(_) => ControlFlow::Break(()),
+        let mut progress = |t: f64, total: f64| {
+            self.pace.at((self.done + weight * t / total) / self.all);
+            ControlFlow::Continue(())
         };
         let request = RunRequest { progress: Some(&mut progress), ..RunRequest::keeping(Keep::Curves) };
         let flexarm::Run { summary, trace, .. } =

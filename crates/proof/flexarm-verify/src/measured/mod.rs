@@ -37,13 +37,13 @@ struct Findings {
 pub(crate) fn case(bench: &Bench, pace: &mut Pace<'_>) -> Result<Case, Error> {
     let robot = bench.robot(ROBOT)?;
     let runs: Vec<Recording> = (1..=RUNS).map(|k| Recording::new(bench, &robot, k)).collect::<Result<_, _>>()?;
-    pace.at(0.1)?;
+    pace.at(0.1);
     let torques = Torques::new(&robot, &runs)?;
-    pace.at(0.2)?;
+    pace.at(0.2);
     let gears = Gears::new(&robot, &runs)?;
-    pace.at(0.6)?;
+    pace.at(0.6);
     let servos = Servos::new(&robot, &runs[0])?;
-    pace.at(0.9)?;
+    pace.at(0.9);
     let [home, there] = [0.0, 5.0].map(|t: f64| runs[0].at(&runs[0].q, (t / STEP_S).round() as usize));
     let frequencies = Frequencies::new(bench, &robot, &home, &there)?;
     Ok(page::page(&Findings { torques, gears, servos, frequencies }))

@@ -1,36 +1,125 @@
 //! glTF 2.0, binary or with separate buffers: triangles of the default scene, z up, node transforms
 //! applied.
 //!
-//! The `gltf` crate splits the file and reads its structure; indices and ranges are resolved here,
-//! because its own validation and iterators panic on invalid ones. Not supported: textures, skins,
-//! sparse or packed accessors.
+//! Not supported: textures, skins, sparse or packed accessors.
 
+use std::borrow::Cow;
 use std::path::Path;
 
-use gltf::Semantic;
-use gltf::json::accessor::{Accessor, ComponentType, Type};
-use gltf::json::mesh::Mode;
-use gltf::json::validation::Checked;
-use gltf::json::{Index, Node, Root};
 use nalgebra::{Matrix3, Matrix4, Quaternion, UnitQuaternion, Vector3, Vector4};
+use serde::Deserialize;
+use serde::de::IgnoredAny;
 
 use super::collada::Transform;
-use super::{LARGEST, MAX_TRIANGLES, MeshError, TriangleMesh, dominant_color, stl};
+use super::{LARGEST, MAX_TRIANGLES, MeshError, TriangleMesh, check_inside, dominant_color, stl};
 
 /// Maximum nesting depth of nodes; a deeper one is treated as a cycle.
 const MAX_DEPTH: usize = 64;
 /// Maximum number of mesh instances in one file; more are rejected as malicious.
 const MAX_INSTANCES: usize = 100_000;
 
+/// What is read of the JSON part. Indices are not checked.
+#[derive(Default, Deserialize)]
+#[serde(default, rename_all = "camelCase")]
+struct Root {
+    extensions_required: Vec<String>,
+    scene: Option<usize>,
+    scenes: Vec<Scene>,
+    nodes: Vec<Node>,
+    meshes: Vec<Mesh>,
+    materials: Vec<Material>,
+    accessors: Vec<Accessor>,
+    buffer_views: Vec<BufferView>,
+    buffers: Vec<Buffer>,
+}
+
+#[derive(Deserialize)]
+struct Scene {
+    #[serde(default)]
+    nodes: Vec<usize>,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(default)]
+struct Node {
+    mesh: Option<usize>,
+    children: Vec<usize>,
+    matrix: Option<[f32; 16]>,
+    translation: Option<[f32; 3]>,
+    rotation: Option<[f32; 4]>,
+    scale: Option<[f32; 3]>,
+}
+
+#[derive(Deserialize)]
+struct Mesh {
+    primitives: Vec<Primitive>,
+}
+
+#[derive(Deserialize)]
+struct Primitive {
+    attributes: Attributes,
+    indices: Option<usize>,
+    material: Option<usize>,
+    mode: Option<u32>,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "UPPERCASE")]
+struct Attributes {
+    position: Option<usize>,
+    normal: Option<usize>,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+struct Material {
+    #[serde(default)]
+    pbr_metallic_roughness: Surface,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(rename_all = "camelCase")]
+struct Surface {
+    base_color_factor: Option<[f32; 4]>,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+struct Accessor {
+    buffer_view: Option<usize>,
+    #[serde(default)]
+    byte_offset: usize,
+    component_type: u32,
+    count: usize,
+    #[serde(rename = "type")]
+    shape: String,
+    sparse: Option<IgnoredAny>,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+struct BufferView {
+    buffer: usize,
+    #[serde(default)]
+    byte_offset: usize,
+    byte_length: usize,
+    byte_stride: Option<usize>,
+}
+
+#[derive(Deserialize)]
+struct Buffer {
+    uri: Option<String>,
+}
+
+/// Types of the numbers of an accessor.
+const U8: u32 = 5121;
+const U16: u32 = 5123;
+const U32: u32 = 5125;
+const F32: u32 = 5126;
+
 pub(super) fn decode(bytes: &[u8], path: &Path) -> Result<TriangleMesh, MeshError> {
-    check_lengths(bytes, path)?;
-    let (json, blob) = if bytes.starts_with(b"glTF") {
-        let glb = gltf::Glb::from_slice(bytes).map_err(|error| malformed(path, error.to_string()))?;
-        (glb.json, glb.bin)
-    } else {
-        (bytes.into(), None)
-    };
-    let root = Root::from_slice(&json).map_err(|error| malformed(path, error.to_string()))?;
+    let (json, blob) = parts(bytes, path)?;
+    let root: Root = serde_json::from_slice(json).map_err(|error| malformed(path, error.to_string()))?;
     // Extensions of materials do not affect the triangles.
     let required = root.extensions_required.iter().find(|e| !e.starts_with("KHR_materials") && !e.contains("texture"));
     if let Some(extension) = required {
@@ -41,7 +130,7 @@ pub(super) fn decode(bytes: &[u8], path: &Path) -> Result<TriangleMesh, MeshErro
     let mut reader = Reader {
         path,
         root: &root,
-        buffers: read_buffers(&root, blob.map(|b| b.into_owned()), path)?,
+        buffers: read_buffers(&root, blob, path)?,
         mesh: TriangleMesh::default(),
         normals: Vec::new(),
         colors: Vec::new(),
@@ -50,7 +139,7 @@ pub(super) fn decode(bytes: &[u8], path: &Path) -> Result<TriangleMesh, MeshErro
     // glTF has y up: x, y, z of the file as columns in axes with z up.
     let R = Matrix3::from_columns(&[Vector3::x(), Vector3::z(), -Vector3::y()]);
     let T_V = R.to_homogeneous();
-    let scene = root.scene.map_or_else(|| root.scenes.first(), |index| root.get(index));
+    let scene = root.scenes.get(root.scene.unwrap_or(0));
     match scene {
         Some(scene) => scene.nodes.iter().try_for_each(|&node| reader.node(node, &T_V, 0))?,
         None => root.meshes.iter().try_for_each(|mesh| reader.mesh(mesh, &T_V))?,
@@ -67,34 +156,45 @@ fn malformed(path: &Path, reason: impl Into<String>) -> MeshError {
     MeshError::Malformed { path: path.to_owned(), format: "glTF", reason: reason.into() }
 }
 
-/// Checks the lengths in the header of a binary file, which must not exceed the file.
-fn check_lengths(bytes: &[u8], path: &Path) -> Result<(), MeshError> {
+/// Splits a file into JSON and, of a binary one, the bytes after it.
+fn parts<'a>(bytes: &'a [u8], path: &Path) -> Result<(&'a [u8], Option<&'a [u8]>), MeshError> {
     if !bytes.starts_with(b"glTF") {
-        return Ok(());
+        return Ok((bytes, None));
     }
-    let word = |at: usize| bytes.get(at..at + 4)?.try_into().ok().map(u32::from_le_bytes).map(u64::from);
-    let (Some(total), Some(json)) = (word(8), word(12)) else {
+    let word = |at: usize| Some(u32::from_le_bytes(bytes.get(at..at + 4)?.try_into().ok()?));
+    let (Some(version), Some(total)) = (word(4), word(8)) else {
         return Err(malformed(path, "cut off within its header"));
     };
-    if total > bytes.len() as u64 || json + 20 > total {
+    if version != 2 {
+        return Err(MeshError::Unsupported { path: path.to_owned(), feature: format!("files of glTF {version}") });
+    }
+    let total = total as usize;
+    if total > bytes.len() {
         return Err(malformed(path, format!("cut off: {} bytes, expected {total}", bytes.len())));
     }
-    Ok(())
+    let chunk = |at: usize, kind: &[u8]| {
+        let length = word(at).filter(|_| bytes.get(at + 4..at + 8) == Some(kind))?;
+        bytes[..total].get(at + 8..(at + 8).checked_add(length as usize)?)
+    };
+    let json = chunk(12, b"JSON").ok_or_else(|| malformed(path, "its JSON part is missing or cut off"))?;
+    Ok((json, chunk(20 + json.len(), b"BIN\0")))
 }
 
 /// Reads the bytes of all buffers, from the file itself, separate files, or base64 text.
-fn read_buffers(root: &Root, mut blob: Option<Vec<u8>>, path: &Path) -> Result<Vec<Vec<u8>>, MeshError> {
+fn read_buffers<'a>(root: &Root, mut blob: Option<&'a [u8]>, path: &Path) -> Result<Vec<Cow<'a, [u8]>>, MeshError> {
     let mut buffers = Vec::new();
     for buffer in &root.buffers {
         let data = match buffer.uri.as_deref() {
-            None => blob.take().ok_or_else(|| malformed(path, "its binary part is missing"))?,
+            None => Cow::Borrowed(blob.take().ok_or_else(|| malformed(path, "its binary part is missing"))?),
             Some(uri) => match uri.strip_prefix("data:") {
                 Some(data) => data
                     .split_once(";base64,")
                     .and_then(|(_, text)| decode_base64(text))
-                    .ok_or_else(|| malformed(path, "a buffer is not base64 text"))?,
+                    .ok_or_else(|| malformed(path, "a buffer is not base64 text"))?
+                    .into(),
                 None => {
                     let file = path.with_file_name(uri);
+                    check_inside(path, &file).map_err(|reason| malformed(path, reason))?;
                     if !file.is_file() {
                         return Err(malformed(path, format!("its buffer {uri:?} is not beside it")));
                     }
@@ -102,7 +202,7 @@ fn read_buffers(root: &Root, mut blob: Option<Vec<u8>>, path: &Path) -> Result<V
                     if large {
                         return Err(malformed(path, format!("its buffer {uri:?} has more than {LARGEST} bytes")));
                     }
-                    std::fs::read(&file).map_err(|source| MeshError::Io { path: file, source })?
+                    std::fs::read(&file).map_err(|source| MeshError::Io { path: file, source })?.into()
                 }
             },
         };
@@ -137,14 +237,14 @@ fn decode_base64(text: &str) -> Option<Vec<u8>> {
 struct Reader<'a> {
     path: &'a Path,
     root: &'a Root,
-    buffers: Vec<Vec<u8>>,
+    buffers: Vec<Cow<'a, [u8]>>,
     mesh: TriangleMesh,
     normals: Vec<[f32; 3]>,
     colors: Vec<(Option<[f32; 4]>, usize)>,
     instances: usize,
 }
 
-impl<'a> Reader<'a> {
+impl Reader<'_> {
     fn malformed(&self, reason: impl Into<String>) -> MeshError {
         malformed(self.path, reason)
     }
@@ -154,39 +254,35 @@ impl<'a> Reader<'a> {
     }
 
     /// Returns the element at an index, or an error if it does not exist.
-    fn get<T>(&self, index: Index<T>, what: &str) -> Result<&'a T, MeshError>
-    where
-        Root: gltf::json::root::Get<T>,
-    {
-        self.root.get(index).ok_or_else(|| self.malformed(format!("{what} {} does not exist", index.value())))
+    fn get<'b, T>(&self, list: &'b [T], index: usize, what: &str) -> Result<&'b T, MeshError> {
+        list.get(index).ok_or_else(|| self.malformed(format!("{what} {index} does not exist")))
     }
 
-    fn node(&mut self, index: Index<Node>, T_parent: &Matrix4<f64>, depth: usize) -> Result<(), MeshError> {
+    fn node(&mut self, index: usize, T_parent: &Matrix4<f64>, depth: usize) -> Result<(), MeshError> {
         self.instances += 1;
         if depth > MAX_DEPTH || self.instances > MAX_INSTANCES {
             return Err(self.malformed("its nodes form a cycle or are far too many"));
         }
-        let node = self.get(index, "node")?;
+        let node = self.get(&self.root.nodes, index, "node")?;
         let T = T_parent * local_transform(node);
         if let Some(mesh) = node.mesh {
-            self.mesh(self.get(mesh, "mesh")?, &T)?;
+            self.mesh(self.get(&self.root.meshes, mesh, "mesh")?, &T)?;
         }
-        node.children.iter().flatten().try_for_each(|&child| self.node(child, &T, depth + 1))
+        node.children.iter().try_for_each(|&child| self.node(child, &T, depth + 1))
     }
 
-    fn mesh(&mut self, mesh: &gltf::json::Mesh, T: &Matrix4<f64>) -> Result<(), MeshError> {
+    fn mesh(&mut self, mesh: &Mesh, T: &Matrix4<f64>) -> Result<(), MeshError> {
         let transform = Transform::new(T);
         for primitive in &mesh.primitives {
-            match primitive.mode {
-                Checked::Valid(Mode::Triangles) => {}
-                Checked::Valid(Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip) => continue,
-                Checked::Valid(mode) => return Err(self.unsupported(format!("{mode:?} of glTF"))),
-                Checked::Invalid => return Err(self.malformed("a primitive has an unknown mode")),
+            match primitive.mode.unwrap_or(4) {
+                0..=3 => continue, // points and lines
+                4 => {}
+                5 | 6 => return Err(self.unsupported("strips and fans of triangles of glTF")),
+                mode => return Err(self.malformed(format!("a primitive has the unknown mode {mode}"))),
             }
-            let attribute = |semantic| primitive.attributes.get(&Checked::Valid(semantic)).copied();
-            let Some(positions) = attribute(Semantic::Positions) else { continue };
+            let Some(positions) = primitive.attributes.position else { continue };
             let positions = self.vectors(positions)?;
-            let normals = attribute(Semantic::Normals).map(|index| self.vectors(index)).transpose()?;
+            let normals = primitive.attributes.normal.map(|index| self.vectors(index)).transpose()?;
             let indices: Vec<u32> = match primitive.indices {
                 Some(index) => self.indices(index)?,
                 None => (0..positions.len() as u32).collect(),
@@ -206,19 +302,19 @@ impl<'a> Reader<'a> {
             }
             let triangles = indices.chunks_exact(3).map(|t| transform.winding([t[0], t[1], t[2]].map(|i| i + first)));
             self.mesh.triangles.extend(triangles);
-            let material = primitive.material.map(|index| self.get(index, "material")).transpose()?;
-            let color = material.map(|m| m.pbr_metallic_roughness.base_color_factor.0);
+            let material = primitive.material.map(|index| self.get(&self.root.materials, index, "material"));
+            let color = material.transpose()?.map(|m| m.pbr_metallic_roughness.base_color_factor.unwrap_or([1.0; 4]));
             self.colors.push((color, indices.len() / 3));
         }
         Ok(())
     }
 
-    fn vectors(&self, index: Index<Accessor>) -> Result<Vec<Vector3<f64>>, MeshError> {
-        let accessor = self.get(index, "accessor")?;
-        let (Checked::Valid(component), Checked::Valid(Type::Vec3)) = (accessor.component_type, accessor.type_) else {
+    fn vectors(&self, index: usize) -> Result<Vec<Vector3<f64>>, MeshError> {
+        let accessor = self.get(&self.root.accessors, index, "accessor")?;
+        if accessor.shape != "VEC3" {
             return Err(self.malformed("positions and normals are not vectors"));
-        };
-        if component.0 != ComponentType::F32 {
+        }
+        if accessor.component_type != F32 {
             return Err(self.unsupported("packed vertices of glTF"));
         }
         let number = |b: &[u8]| f64::from(f32::from_le_bytes([b[0], b[1], b[2], b[3]]));
@@ -226,16 +322,15 @@ impl<'a> Reader<'a> {
         self.elements(accessor, 12, vector)
     }
 
-    fn indices(&self, index: Index<Accessor>) -> Result<Vec<u32>, MeshError> {
-        let accessor = self.get(index, "accessor")?;
-        let (Checked::Valid(component), Checked::Valid(Type::Scalar)) = (accessor.component_type, accessor.type_)
-        else {
+    fn indices(&self, index: usize) -> Result<Vec<u32>, MeshError> {
+        let accessor = self.get(&self.root.accessors, index, "accessor")?;
+        if accessor.shape != "SCALAR" {
             return Err(self.malformed("its indices are not scalars"));
-        };
-        match component.0 {
-            ComponentType::U8 => self.elements(accessor, 1, |b| u32::from(b[0])),
-            ComponentType::U16 => self.elements(accessor, 2, |b| u32::from(u16::from_le_bytes([b[0], b[1]]))),
-            ComponentType::U32 => self.elements(accessor, 4, |b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])),
+        }
+        match accessor.component_type {
+            U8 => self.elements(accessor, 1, |b| u32::from(b[0])),
+            U16 => self.elements(accessor, 2, |b| u32::from(u16::from_le_bytes([b[0], b[1]]))),
+            U32 => self.elements(accessor, 4, |b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])),
             _ => Err(self.malformed("its indices are not unsigned integers")),
         }
     }
@@ -246,27 +341,21 @@ impl<'a> Reader<'a> {
             return Err(self.unsupported("sparse accessors of glTF"));
         }
         let view = accessor.buffer_view.ok_or_else(|| self.unsupported("accessors of glTF without data"))?;
-        let view = self.get(view, "buffer view")?;
-        let buffer = self.buffers.get(view.buffer.value()).map_or(&[][..], Vec::as_slice);
-        let stride = view.byte_stride.map_or(size, |s| s.0.max(size));
-        let bytes = slice(buffer, view.byte_offset.map_or(0, |o| o.0), view.byte_length.0)
-            .and_then(|bytes| bytes.get(usize::try_from(accessor.byte_offset.map_or(0, |o| o.0)).ok()?..));
+        let view = self.get(&self.root.buffer_views, view, "buffer view")?;
+        let buffer = self.get(&self.buffers, view.buffer, "buffer")?;
+        let stride = view.byte_stride.map_or(size, |stride| stride.max(size));
+        let end = view.byte_offset.checked_add(view.byte_length);
+        let bytes = end.and_then(|end| buffer.get(view.byte_offset..end)?.get(accessor.byte_offset..));
         // The last element need not fill its stride.
-        let count = usize::try_from(accessor.count.0).ok();
-        let span =
-            count.and_then(|n| n.checked_sub(1).map_or(Some(0), |last| last.checked_mul(stride)?.checked_add(size)));
-        match (bytes, count, span) {
-            (Some(bytes), Some(count), Some(span)) if span <= bytes.len() => {
+        let count = accessor.count;
+        let span = count.checked_sub(1).map_or(Some(0), |last| last.checked_mul(stride)?.checked_add(size));
+        match (bytes, span) {
+            (Some(bytes), Some(span)) if span <= bytes.len() => {
                 Ok((0..count).map(|i| read(&bytes[i * stride..i * stride + size])).collect())
             }
             _ => Err(self.malformed("an accessor reaches beyond its buffer")),
         }
     }
-}
-
-fn slice(bytes: &[u8], offset: u64, length: u64) -> Option<&[u8]> {
-    let start = usize::try_from(offset).ok()?;
-    bytes.get(start..start.checked_add(usize::try_from(length).ok()?)?)
 }
 
 /// Transform of a node, from its matrix or its translation, rotation and scale.
@@ -275,7 +364,7 @@ fn local_transform(node: &Node) -> Matrix4<f64> {
         return Matrix4::from_column_slice(&matrix.map(f64::from));
     }
     let vector = |v: Option<[f32; 3]>, default| v.map_or(default, |v| Vector3::from(v.map(f64::from)));
-    let [x, y, z, w] = node.rotation.unwrap_or_default().0.map(f64::from);
+    let [x, y, z, w] = node.rotation.unwrap_or([0.0, 0.0, 0.0, 1.0]).map(f64::from);
     let q = UnitQuaternion::try_new(Quaternion::new(w, x, y, z), 1e-12).unwrap_or_default();
     Matrix4::new_translation(&vector(node.translation, Vector3::zeros()))
         * q.to_homogeneous()

@@ -26,7 +26,7 @@ mod stl;
 #[cfg(test)]
 mod tests;
 
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 use flexarm_kinematics::Pose;
 use nalgebra::Vector3;
@@ -158,13 +158,51 @@ pub(crate) fn decode(bytes: &[u8], path: &Path, up_axis: UpAxis) -> Result<Loade
     let mut remarks = Vec::new();
     let mesh = match format(bytes, path) {
         Some(Format::Stl) => stl::decode(bytes, path),
-        Some(Format::Obj) => obj::decode(bytes, path),
+        Some(Format::Obj) => obj::decode(bytes, path, &mut remarks),
         Some(Format::Collada) => collada::decode(bytes, path, up_axis, &mut remarks),
         Some(Format::Gltf) => gltf_file::decode(bytes, path),
         None => Err(MeshError::UnknownFormat { path: path.to_owned() }),
     }?;
     check(&mesh, path)?;
     Ok(Loaded { mesh, remarks })
+}
+
+/// Checks that a file that a mesh names is inside the mesh's robot or package: the nearest folder
+/// above the mesh with a `robot.toml` or `package.xml`, else the folder of the mesh. Links count as
+/// what they point to.
+///
+/// # Errors
+/// The reason why the file must not be read.
+fn check_inside(mesh: &Path, file: &Path) -> Result<(), String> {
+    let folder = mesh.parent().unwrap_or(Path::new(""));
+    let beside = Path::new(".").join(folder);
+    let beside = beside.canonicalize().unwrap_or(beside);
+    let inside = beside.join(file.strip_prefix(folder).unwrap_or(file));
+    let named = inside.canonicalize().unwrap_or_else(|_| without_parents(&inside));
+    let top = |folder: &Path| {
+        let is_top = |above: &&Path| ["robot.toml", "package.xml"].iter().any(|name| above.join(name).is_file());
+        folder.ancestors().find(is_top).unwrap_or(folder).to_owned()
+    };
+    // Installed meshes may be links to those of the sources.
+    let source = mesh.canonicalize().ok().and_then(|mesh| Some(top(mesh.parent()?)));
+    let own = top(&beside);
+    if named.starts_with(&own) || source.is_some_and(|top| named.starts_with(top)) {
+        return Ok(());
+    }
+    let (file, own) = (file.display(), own.display());
+    Err(format!("{file}, which it names, is outside {own} and is not read: copy it beside the mesh"))
+}
+
+/// Removes each `..` with the folder before it.
+fn without_parents(path: &Path) -> PathBuf {
+    let mut plain = PathBuf::new();
+    for part in path.components() {
+        match part {
+            Component::ParentDir => _ = plain.pop(),
+            part => plain.push(part),
+        }
+    }
+    plain
 }
 
 enum Format {

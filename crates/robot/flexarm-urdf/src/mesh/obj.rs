@@ -3,13 +3,19 @@
 
 use std::path::Path;
 
-use super::{MeshError, TriangleMesh, dominant_color, stl};
+use super::{MeshError, TriangleMesh, check_inside, dominant_color, stl};
 
-pub(super) fn decode(bytes: &[u8], path: &Path) -> Result<TriangleMesh, MeshError> {
-    // Only regular files are read: a name in the file must not lead to a device.
-    let read_file = |file: &Path| match std::fs::metadata(file) {
-        Ok(meta) if meta.is_file() => std::fs::read(file),
-        _ => Err(std::io::Error::other("not a file")),
+pub(super) fn decode(bytes: &[u8], path: &Path, remarks: &mut Vec<String>) -> Result<TriangleMesh, MeshError> {
+    let read_file = |file: &Path| {
+        if let Err(reason) = check_inside(path, file) {
+            remarks.push(reason.clone());
+            return Err(std::io::Error::other(reason));
+        }
+        // Only regular files are read: a name in the file must not lead to a device.
+        match std::fs::metadata(file) {
+            Ok(meta) if meta.is_file() => std::fs::read(file),
+            _ => Err(std::io::Error::other("not a file")),
+        }
     };
     let scene = mesh_loader::Loader::default().load_obj_from_slice_with_reader(bytes, path, read_file);
     let scene = scene.map_err(|error| MeshError::Malformed {

@@ -230,6 +230,50 @@ fn a_gltf_with_its_buffer_as_text_is_read() {
     assert!(error.to_string().contains("missing.bin"), "{error}");
 }
 
+/// Layout: robot/meshes/a.*, robot/side/a.*, and secret/a.* beside the robot.
+#[test]
+fn a_mesh_reads_files_of_its_robot_and_no_others() {
+    let top = std::env::temp_dir().join(format!("flexarm-mesh-sides-{}", std::process::id()));
+    let (meshes, data) = (top.join("robot/meshes"), glb());
+    for folder in ["robot/meshes", "robot/side", "secret"] {
+        std::fs::create_dir_all(top.join(folder)).unwrap();
+        std::fs::write(top.join(folder).join("a.bin"), &data[data.len() - 168..]).unwrap();
+        std::fs::write(top.join(folder).join("a.mtl"), "newmtl red\nKd 1 0 0\n").unwrap();
+    }
+    let load = |name: &str, text: &str| {
+        std::fs::write(meshes.join(name), text).unwrap();
+        load_with_remarks(&meshes.join(name), UpAxis::Declared)
+    };
+    let gltf = |uri: &str| load("a.gltf", &gltf_json(&format!(r#"{{"byteLength":168,"uri":"{uri}"}}"#)));
+    let refused = |uri: &str| {
+        let error = gltf(uri).unwrap_err().to_string();
+        let words = ["a.gltf", uri, "outside", "copy it beside the mesh"];
+        assert!(words.iter().all(|word| error.contains(word)), "{error}");
+    };
+    let plain = String::from_utf8(obj()).unwrap();
+    let obj = |name: &str| load("a.obj", &format!("mtllib {name}.mtl\nusemtl red\n{plain}")).unwrap();
+    let is_red = |loaded: &Loaded| loaded.mesh.color == Some([1.0, 0.0, 0.0, 1.0]) && loaded.remarks.is_empty();
+    let is_bare = |loaded: &Loaded| loaded.mesh.color.is_none() && loaded.remarks[0].contains("outside");
+
+    assert!(gltf("a.bin").is_ok() && is_red(&obj("a")));
+    refused("../side/a.bin");
+    assert!(is_bare(&obj("../side/a")));
+    std::fs::write(top.join("robot/package.xml"), "<package/>").unwrap();
+    assert!(gltf("../side/a.bin").is_ok() && is_red(&obj("../side/a")));
+    let absolute = top.join("secret/a");
+    for name in ["../../secret/a", absolute.to_str().unwrap()] {
+        refused(&format!("{name}.bin"));
+        assert!(is_bare(&obj(name)));
+    }
+    refused("../../../../x/secret.txt");
+    #[cfg(unix)]
+    {
+        std::os::unix::fs::symlink(top.join("secret/a.bin"), meshes.join("link.bin")).unwrap();
+        refused("link.bin");
+    }
+    std::fs::remove_dir_all(&top).unwrap();
+}
+
 #[test]
 fn formats_are_told_by_content_where_the_name_is_silent() {
     for (name, bytes) in all_formats().into_iter().filter(|(name, _)| !name.ends_with("obj")) {

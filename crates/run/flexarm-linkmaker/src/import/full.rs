@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use flexarm_fe_io::exchange::{Entries, ImportedMatrices, InterfaceMap, LabelledMatrix, MatrixFormat, RowPick};
+use flexarm_fe_io::exchange::{Entries, ImportedMatrices, InterfaceMap, LabelledMatrix, RowPick};
 use flexarm_fem::UnitSystem;
 use flexarm_fem::matrix_link::reduce_matrices;
 use flexarm_fem::model::FeModel;
@@ -11,7 +11,7 @@ use flexarm_fem::sparse::{ModesWanted, SparseSymmetric};
 use flexarm_settings::Setting;
 use nalgebra::{Matrix3, Vector3};
 
-use super::words::{ImportMap, NodeChoice};
+use super::words::{ImportMap, NodePlane};
 use crate::LinkError;
 
 /// Whether the matrices have more than the interface coordinates, so that they must be condensed.
@@ -27,13 +27,9 @@ pub(super) fn is_full(imported: &ImportedMatrices, map: Option<&InterfaceMap>) -
 pub(super) fn propose(imported: &ImportedMatrices) -> String {
     let setting = Setting::Map;
     if is_solid(imported) && !imported.positions.is_empty() {
-        let sets: Vec<String> =
-            imported.node_sets.iter().map(|(name, nodes)| format!("{name:?} ({} nodes)", nodes.len())).collect();
-        let list = if sets.is_empty() { "none".into() } else { sets.join(", ") };
         let (low, high) = box_of(imported);
         return format!(
-            "select the nodes of each interface, which are tied rigidly: {setting} A=set:NAME,B=set:NAME with the \
-             node sets of the file ({list}), or planes such as {setting} \
+            "select the nodes of each interface, which are tied rigidly, by planes such as {setting} \
              \"A=plane({},0,0;1,0,0),B=plane({},0,0;1,0,0)\"; the nodes extend from {:?} to {:?}",
             low.x,
             high.x,
@@ -97,12 +93,6 @@ pub(super) fn reduce(
     let rows = &imported.stiffness.rows;
     match map {
         ImportMap::Rows(map) => {
-            if imported.format == MatrixFormat::ExudynHdf5 {
-                return Err(refuse(format!(
-                    "has no rotational degrees of freedom at its nodes: {}",
-                    propose(imported)
-                )));
-            }
             let boundary = boundary_rows(imported, map)?;
             let mut is_turn: Vec<bool> = rows.iter().map(|label| label.dof > 3).collect();
             for (k, row) in boundary.iter().enumerate() {
@@ -114,8 +104,8 @@ pub(super) fn reduce(
         }
         ImportMap::Nodes(list) => {
             if !is_solid(imported) || imported.positions.is_empty() {
-                let what = "node sets and planes require node positions and three degrees of freedom per node, \
-                            which only Exudyn files have; select rows by node:";
+                let what = "planes require node positions and three degrees of freedom per node, as DMIG with GRID \
+                            entries may have them; select rows by node:";
                 return Err(refuse(format!("{what} {} A=947:1-3+948:1-3,B=949:1-3+950:1-3", Setting::Map)));
             }
             let nodes: Vec<i64> = rows.iter().step_by(3).filter_map(|label| label.node).collect();
@@ -139,13 +129,13 @@ pub(super) fn reduce(
 /// Returns the interfaces, in matrix axes, that are tied rigidly to the chosen ones of all nodes.
 fn tied(
     imported: &ImportedMatrices,
-    list: &[(String, NodeChoice)],
+    list: &[(String, NodePlane)],
     all: &[i64],
     target: &Target<'_>,
 ) -> Result<Vec<Interface>, LinkError> {
     let index: HashMap<i64, u32> = all.iter().enumerate().map(|(i, node)| (*node, i as u32)).collect();
-    let interface = |((name, choice), frame): (&(String, NodeChoice), &InterfaceFrame)| {
-        let chosen = chosen_nodes(imported, choice)
+    let interface = |((name, plane), frame): (&(String, NodePlane), &InterfaceFrame)| {
+        let chosen = nodes_on(imported, plane)
             .map_err(|what| LinkError::file(&imported.origin, format!("interface {name}: {what}")))?;
         let mut nodes: Vec<u32> = chosen.iter().filter_map(|node| index.get(node).copied()).collect();
         nodes.sort_unstable();
@@ -213,32 +203,24 @@ fn to_si(matrix: &LabelledMatrix, units: UnitSystem, is_turn: &[bool], is_mass: 
     SparseSymmetric::from_triplets(matrix.size(), &entries)
 }
 
-/// Reason why a map entry selects no nodes.
+/// A plane of a map without nodes.
 #[derive(Debug, thiserror::Error)]
-pub(super) enum NoNodes {
-    #[error("there is no node set {name:?}; the sets are {known:?}")]
-    UnknownSet { name: String, known: Vec<String> },
-    #[error("no node is on {plane}; the nodes extend from {low:?} to {high:?}")]
-    OffPlane { plane: NodeChoice, low: [f64; 3], high: [f64; 3] },
+#[error("no node is on {plane}; the nodes extend from {low:?} to {high:?}")]
+pub(super) struct NoNodes {
+    plane: NodePlane,
+    low: [f64; 3],
+    high: [f64; 3],
 }
 
-/// Returns the nodes selected by a map entry.
-pub(super) fn chosen_nodes(imported: &ImportedMatrices, choice: &NodeChoice) -> Result<Vec<i64>, NoNodes> {
-    match choice {
-        NodeChoice::Set(name) => imported.node_sets.get(name).cloned().ok_or_else(|| NoNodes::UnknownSet {
-            name: name.clone(),
-            known: imported.node_sets.keys().cloned().collect(),
-        }),
-        NodeChoice::Plane { point, normal } => {
-            let (low, high) = box_of(imported);
-            let tolerance = 1e-6 * (high - low).norm();
-            let n = normal.normalize();
-            let near = |p: &Vector3<f64>| (p - point).dot(&n).abs() <= tolerance;
-            let nodes: Vec<i64> = imported.positions.iter().filter(|(_, p)| near(p)).map(|(node, _)| *node).collect();
-            if nodes.is_empty() {
-                return Err(NoNodes::OffPlane { plane: choice.clone(), low: low.into(), high: high.into() });
-            }
-            Ok(nodes)
-        }
+/// Returns the nodes on a plane.
+pub(super) fn nodes_on(imported: &ImportedMatrices, plane: &NodePlane) -> Result<Vec<i64>, NoNodes> {
+    let (low, high) = box_of(imported);
+    let tolerance = 1e-6 * (high - low).norm();
+    let n = plane.normal.normalize();
+    let near = |p: &Vector3<f64>| (p - plane.point).dot(&n).abs() <= tolerance;
+    let nodes: Vec<i64> = imported.positions.iter().filter(|(_, p)| near(p)).map(|(node, _)| *node).collect();
+    if nodes.is_empty() {
+        return Err(NoNodes { plane: plane.clone(), low: low.into(), high: high.into() });
     }
+    Ok(nodes)
 }

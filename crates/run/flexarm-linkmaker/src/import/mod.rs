@@ -50,7 +50,7 @@ pub use flexarm_fe_io::exchange::MatrixNames as Names;
 pub use flexarm_fem::matrix_link::PartMasses;
 pub use flexarm_fem::{RigidPart, SplitAt as Split, UnitSystem as UnitsOfFile};
 pub use summary::{ImportChecks, ImportFiles, ImportInterface, ImportPart, ImportSummary, markdown, tables};
-pub use words::{FrameAt, ImportFormat, ImportMap, NodeChoice, parse_inertia, parse_part, parse_split, triple};
+pub use words::{FrameAt, ImportFormat, ImportMap, NodePlane, parse_inertia, parse_part, parse_split, triple};
 
 /// Warning about a modal link without its second-order terms, used here and where a robot uses such
 /// a link.
@@ -471,7 +471,7 @@ fn in_file(
     let map = match map {
         ImportMap::Rows(map) => map,
         ImportMap::Nodes(list) => {
-            let nodes = full::chosen_nodes(imported, &list[k].1)?;
+            let nodes = full::nodes_on(imported, &list[k].1)?;
             let points: Vec<_> = nodes.iter().filter_map(|node| imported.positions.get(node)).collect();
             let sum: Vector3<f64> = points.iter().copied().sum();
             return Ok((!points.is_empty()).then(|| (at(sum / points.len() as f64), "the centroid of its nodes")));

@@ -16,56 +16,42 @@ use crate::reduce::numbers;
 pub enum ImportMap {
     /// Rows of the matrices: `A=1001,B=1002`, `A=947:1-3+948:1-3,...`, `A=#1-6,B=#7-12`.
     Rows(InterfaceMap),
-    /// Nodes tied rigidly: `A=set:NAME,B=plane(x,y,z;nx,ny,nz)`; for full models of solids with
+    /// Nodes tied rigidly: `A=plane(x,y,z;nx,ny,nz),B=plane(...)`; for full models of solids with
     /// positions.
-    Nodes(Vec<(String, NodeChoice)>),
+    Nodes(Vec<(String, NodePlane)>),
 }
 
-/// Selection of nodes of a full model.
+/// All nodes of a full model in a plane; unit and axes of the file.
 #[derive(Clone, Debug, PartialEq)]
-pub enum NodeChoice {
-    /// A node set of the file.
-    Set(String),
-    /// All nodes in a plane; unit and axes of the file.
-    Plane {
-        /// A point in the plane.
-        point: Vector3<f64>,
-        /// Normal of the plane.
-        normal: Vector3<f64>,
-    },
+pub struct NodePlane {
+    /// A point in the plane.
+    pub point: Vector3<f64>,
+    /// Normal of the plane.
+    pub normal: Vector3<f64>,
 }
 
 impl FromStr for ImportMap {
     type Err = WordError;
 
     fn from_str(text: &str) -> Result<Self, WordError> {
-        let is_nodes = |value: &str| value.trim().starts_with("set:") || value.trim().starts_with("plane(");
+        let is_nodes = |value: &str| value.trim().starts_with("plane(");
         let parts = split_outside_brackets(text);
         let values = || parts.iter().filter_map(|part| part.split_once('=').map(|(_, value)| value));
         if !values().any(is_nodes) {
             return text.parse().map(Self::Rows).map_err(|error| WordError::Rows(Box::new(error)));
         }
         let one = |part: &&str| {
-            let form = "NAME=set:NAME or NAME=plane(x,y,z;nx,ny,nz) for every interface";
-            let wrong = || WordError::form(part, form);
+            let wrong = || WordError::form(part, "NAME=plane(x,y,z;nx,ny,nz) for every interface");
             let (name, value) = part.split_once('=').ok_or_else(wrong)?;
-            let value = value.trim();
-            let choice =
-                match (value.strip_prefix("set:"), value.strip_prefix("plane(").and_then(|v| v.strip_suffix(')'))) {
-                    (Some(set), _) => NodeChoice::Set(set.into()),
-                    (_, Some(inside)) => {
-                        let (point, normal) = inside.split_once(';').ok_or_else(wrong)?;
-                        let (point, normal) = (triple(point)?, triple(normal)?);
-                        if normal.norm() == 0.0 {
-                            return Err(WordError::NoNormal { text: (*part).to_owned() });
-                        }
-                        NodeChoice::Plane { point, normal }
-                    }
-                    _ => return Err(wrong()),
-                };
-            Ok((name.trim().to_owned(), choice))
+            let inside = value.trim().strip_prefix("plane(").and_then(|v| v.strip_suffix(')')).ok_or_else(wrong)?;
+            let (point, normal) = inside.split_once(';').ok_or_else(wrong)?;
+            let (point, normal) = (triple(point)?, triple(normal)?);
+            if normal.norm() == 0.0 {
+                return Err(WordError::NoNormal { text: (*part).to_owned() });
+            }
+            Ok((name.trim().to_owned(), NodePlane { point, normal }))
         };
-        let list: Vec<(String, NodeChoice)> = parts.iter().map(one).collect::<Result<_, _>>()?;
+        let list: Vec<(String, NodePlane)> = parts.iter().map(one).collect::<Result<_, _>>()?;
         for (k, (name, _)) in list.iter().enumerate() {
             if list[..k].iter().any(|(other, _)| other == name) {
                 return Err(WordError::NameTwice { name: name.clone() });
@@ -75,14 +61,10 @@ impl FromStr for ImportMap {
     }
 }
 
-impl fmt::Display for NodeChoice {
+impl fmt::Display for NodePlane {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Set(name) => write!(f, "set:{name}"),
-            Self::Plane { point: p, normal: n } => {
-                write!(f, "plane({},{},{};{},{},{})", p.x, p.y, p.z, n.x, n.y, n.z)
-            }
-        }
+        let Self { point: p, normal: n } = self;
+        write!(f, "plane({},{},{};{},{},{})", p.x, p.y, p.z, n.x, n.y, n.z)
     }
 }
 
@@ -166,8 +148,6 @@ pub enum ImportFormat {
     Op4,
     /// Harwell-Boeing.
     HarwellBoeing,
-    /// Exudyn HDF5.
-    Exudyn,
     /// Comma-separated, as for Simscape.
     Simscape,
     /// SID.
@@ -185,7 +165,6 @@ impl ImportFormat {
             Self::Dmig => found == MatrixFormat::Dmig,
             Self::Op4 => matches!(found, MatrixFormat::Op4Text | MatrixFormat::Op4Binary),
             Self::HarwellBoeing => found == MatrixFormat::HarwellBoeing,
-            Self::Exudyn => found == MatrixFormat::ExudynHdf5,
             Self::Simscape => found == MatrixFormat::Csv,
             Self::Sid => found == MatrixFormat::Sid,
         }
@@ -254,11 +233,15 @@ mod tests {
     #[test]
     fn a_map_names_rows_or_nodes() {
         assert!(matches!("A=947:1-3+948:1-3,B=#7-12".parse(), Ok(ImportMap::Rows(_))));
-        let map: ImportMap = "A=plane(0,0,0;1,0,0),B=set:tip".parse().unwrap();
+        let map: ImportMap = "A=plane(0,0,0;1,0,0),B=plane(1,0,0;1,0,0)".parse().unwrap();
         assert_eq!(map.entries()[0].1, "plane(0,0,0;1,0,0)");
-        assert_eq!(map.entries()[1], ("B".into(), "set:tip".into()));
-        assert!("A=set:x,B=1002".parse::<ImportMap>().unwrap_err().to_string().contains("set:NAME"));
-        assert!("A=set:x,A=set:y".parse::<ImportMap>().unwrap_err().to_string().contains("twice"));
+        assert_eq!(map.entries()[1], ("B".into(), "plane(1,0,0;1,0,0)".into()));
+        assert!(
+            "A=plane(0,0,0;1,0,0),B=1002".parse::<ImportMap>().unwrap_err().to_string().contains("every interface")
+        );
+        assert!(
+            "A=plane(0,0,0;1,0,0),A=plane(1,0,0;1,0,0)".parse::<ImportMap>().unwrap_err().to_string().contains("twice")
+        );
     }
 
     #[test]

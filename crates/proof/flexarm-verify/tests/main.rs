@@ -1,0 +1,4 @@
+//! The case studies, and the program that runs them.
+
+mod program;
+mod quick;
