@@ -28,17 +28,17 @@ FOLDERS = ["base", "dynamics", "links", "robot", "motion", "results", "run", "st
 TOP = {"proof": "faces"}  # the case studies use the facade, the command line uses them
 TESTS = "tests"  # flexarm-tests and flexarm-testkit, only for dev-dependencies
 ONLY = {
-    "flexarm-cli": ["flexarm", "flexarm-fmu", "flexarm-verify"], "flexarm-fmu": ["flexarm"],
-    "flexarm-python": ["flexarm", "flexarm-cli"],
+    "flexarm-cli": ["flexarm", "flexarm-fmu", "flexarm-rerun", "flexarm-verify"], "flexarm-fmu": ["flexarm"],
+    "flexarm-python": ["flexarm", "flexarm-cli", "flexarm-rerun"], "flexarm-rerun": ["flexarm-log", "flexarm-draw", "flexarm-kinematics"],
 }
 OWNERS = {  # outside crate: folders that may name it
-    **dict.fromkeys(["rerun", "re_cdr", "parquet", "arrow-array", "arrow-ipc", "arrow-schema", "rustix"], ["results"]),
+    **dict.fromkeys(["re_cdr", "parquet", "arrow-array", "arrow-ipc", "arrow-schema", "rustix"], ["results"]),
     **dict.fromkeys(["mcap", "zstd", "lz4_flex", "bzip2"], ["motion", "results"]), "rusqlite": ["motion"],
     "urdf-rs": ["robot"], "saphyr-parser": ["base"], "diffsol": ["dynamics"], "toml_edit": ["studies", "faces"],
     **dict.fromkeys(["faer", "metis-sys", "hdf5-pure", "safetensors"], ["links"]),
     **dict.fromkeys(["png", "plotters", "noto-sans-mono-bitmap", "clarabel"], ["results"]),
     **dict.fromkeys(["rand", "sobol_burley", "statrs"], ["studies"]),
-    **dict.fromkeys(["clap", "clap_complete", "clap_mangen", "indicatif", "numpy", "pyo3", "pyo3-build-config", "quick-xml", "signal-hook", "twox-hash", "zip"], ["faces"]),
+    **dict.fromkeys(["clap", "clap_complete", "clap_mangen", "indicatif", "numpy", "pyo3", "pyo3-build-config", "quick-xml", "rerun", "signal-hook", "twox-hash", "zip"], ["faces"]),
 }
 LARGEST_CYCLE = 3
 PRINTS = re.compile(r"\b(?:e?print(?:ln)?|dbg)!\s*[(\[{]|\bstd::io::(?:stdout|stderr)\b")
@@ -311,7 +311,7 @@ def self_test():
                "flexarm-stepping": "dynamics", "flexarm-kinematics": "dynamics", "flexarm-fem": "links", "flexarm-testkit": "tests"}
     good = {
         "flexarm-cli": ["flexarm", "flexarm-verify", "clap"], "flexarm": ["flexarm-map", "flexarm-log"], "flexarm-verify": ["flexarm", "flexarm-fem"],
-        "flexarm-map": ["flexarm-log"], "flexarm-log": ["rerun", "mcap"], "flexarm-fem": ["faer"],
+        "flexarm-map": ["flexarm-log"], "flexarm-log": ["mcap"], "flexarm-fem": ["faer"],
         "flexarm-stepping": ["flexarm-kinematics", "diffsol", "dev:flexarm-testkit", "dev:flexarm-fem"],
         "flexarm-kinematics": ["dev:flexarm-testkit"], "flexarm-testkit": ["flexarm-kinematics"],
     }
@@ -328,10 +328,10 @@ def self_test():
         ("upwards", found({"flexarm-kinematics": ["flexarm-fem"]}), "flexarm-kinematics (dynamics): dependency on flexarm-fem (links)"),
         ("upwards in tests", found({"flexarm-kinematics": ["dev:flexarm"]}), None),
         ("a study on the facade", found({"flexarm-map": ["flexarm"]}), "flexarm-map (studies): dependency on flexarm (faces)"),
-        ("a face below the facade", found({"flexarm-cli": ["flexarm-log"]}), "it uses flexarm and flexarm-fmu and flexarm-verify alone"),
+        ("a face below the facade", found({"flexarm-cli": ["flexarm-log"]}), "it uses flexarm and flexarm-fmu and flexarm-rerun and flexarm-verify alone"),
         ("testkit in the product", found({"flexarm-stepping": ["flexarm-testkit"]}), "dev-dependencies only"),
         ("mcap below", found({"flexarm-stepping": ["mcap"]}), "dependency on mcap: only motion and results may name it"),
-        ("rerun in a face", found({"flexarm-cli": ["flexarm", "rerun"]}), "dependency on rerun: only results"),
+        ("rerun below the faces", found({"flexarm-log": ["rerun", "mcap"]}), "dependency on rerun: only faces"),
         ("faer elsewhere", found({"flexarm-stepping": ["dev:faer"]}), "dev-dependency on faer: only links"),
         ("clap in the facade's folder", found({"flexarm": ["clap"]}), None),
         ("urdf-rs below", found({"flexarm-kinematics": ["urdf-rs"]}), "only robot may name it"),
