@@ -273,6 +273,5 @@ mod tests {
         let text = "rerun-cli 0.36.3 [rustc 1.95.0 (abc), LLVM 21.1] x86_64 release-0.36.3 49bb15f";
         assert_eq!(text.split_whitespace().find(|word| is_version(word)), Some("0.36.3"));
         assert!(is_version("0.37.0-alpha.1") && !is_version("release-0.36.3") && !is_version("1.95"));
-        assert!(numbers("0.36.2") < numbers(OLDEST) && numbers("0.100.0-alpha.1") > numbers(OLDEST));
     }
 }
