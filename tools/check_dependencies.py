@@ -27,17 +27,17 @@ PAGE = "ARCHITECTURE.md"
 FOLDERS = ["base", "dynamics", "links", "robot", "motion", "results", "run", "studies", "faces", "proof"]
 TESTS = "tests"  # flexarm-tests and flexarm-testkit, only for dev-dependencies
 ONLY = {
-    "flexarm-cli": ["flexarm", "flexarm-fmu"], "flexarm-fmu": ["flexarm"],
-    "flexarm-python": ["flexarm", "flexarm-cli"],
+    "flexarm-cli": ["flexarm", "flexarm-fmu", "flexarm-rerun"], "flexarm-fmu": ["flexarm"],
+    "flexarm-python": ["flexarm", "flexarm-cli", "flexarm-rerun"], "flexarm-rerun": ["flexarm-log", "flexarm-draw", "flexarm-kinematics"],
 }
 OWNERS = {  # outside crate: folders that may name it
-    **dict.fromkeys(["rerun", "re_cdr", "parquet", "arrow-array", "arrow-ipc", "arrow-schema", "rustix"], ["results"]),
+    **dict.fromkeys(["re_cdr", "parquet", "arrow-array", "arrow-ipc", "arrow-schema", "rustix"], ["results"]),
     **dict.fromkeys(["mcap", "zstd", "lz4_flex"], ["motion", "results"]), "rusqlite": ["motion"],
     "urdf-rs": ["robot"], "saphyr-parser": ["base"], "diffsol": ["dynamics"], "toml_edit": ["studies", "faces"],
     **dict.fromkeys(["faer", "metis-sys", "safetensors"], ["links"]), "clap": ["faces", "proof"],
     **dict.fromkeys(["png", "plotters", "noto-sans-mono-bitmap", "clarabel"], ["results"]),
     **dict.fromkeys(["rand", "sobol_burley", "statrs"], ["studies"]),
-    **dict.fromkeys(["clap_complete", "clap_mangen", "indicatif", "numpy", "pyo3", "pyo3-build-config", "quick-xml", "signal-hook", "twox-hash", "zip"], ["faces"]),
+    **dict.fromkeys(["clap_complete", "clap_mangen", "indicatif", "numpy", "pyo3", "pyo3-build-config", "quick-xml", "rerun", "signal-hook", "twox-hash", "zip"], ["faces"]),
 }
 LARGEST_CYCLE = 3
 PRINTS = re.compile(r"\b(?:e?print(?:ln)?|dbg)!\s*[(\[{]|\bstd::io::(?:stdout|stderr)\b")
@@ -311,7 +311,7 @@ def self_test():
                "flexarm-stepping": "dynamics", "flexarm-kinematics": "dynamics", "flexarm-fem": "links", "flexarm-testkit": "tests"}
     good = {
         "flexarm-cli": ["flexarm", "clap"], "flexarm": ["flexarm-map", "flexarm-log"], "flexarm-verify": ["flexarm", "flexarm-fem"],
-        "flexarm-map": ["flexarm-log"], "flexarm-log": ["rerun", "mcap"], "flexarm-fem": ["faer"],
+        "flexarm-map": ["flexarm-log"], "flexarm-log": ["mcap"], "flexarm-fem": ["faer"],
         "flexarm-stepping": ["flexarm-kinematics", "diffsol", "dev:flexarm-testkit", "dev:flexarm-fem"],
         "flexarm-kinematics": ["dev:flexarm-testkit"], "flexarm-testkit": ["flexarm-kinematics"],
     }
@@ -328,11 +328,11 @@ def self_test():
         ("upwards", found({"flexarm-kinematics": ["flexarm-fem"]}), "flexarm-kinematics (dynamics): dependency on flexarm-fem (links)"),
         ("upwards in tests", found({"flexarm-kinematics": ["dev:flexarm"]}), None),
         ("a study on the facade", found({"flexarm-map": ["flexarm"]}), "flexarm-map (studies): dependency on flexarm (faces)"),
-        ("a face below the facade", found({"flexarm-cli": ["flexarm-log"]}), "it uses flexarm and flexarm-fmu alone"),
+        ("a face below the facade", found({"flexarm-cli": ["flexarm-log"]}), "it uses flexarm and flexarm-fmu and flexarm-rerun alone"),
         ("a face on the case studies", found({"flexarm": ["flexarm-verify"]}), "flexarm (faces): dependency on flexarm-verify (proof)"),
         ("testkit in the product", found({"flexarm-stepping": ["flexarm-testkit"]}), "dev-dependencies only"),
         ("mcap below", found({"flexarm-stepping": ["mcap"]}), "dependency on mcap: only motion and results may name it"),
-        ("rerun in a face", found({"flexarm-cli": ["flexarm", "rerun"]}), "dependency on rerun: only results"),
+        ("rerun below the faces", found({"flexarm-log": ["rerun", "mcap"]}), "dependency on rerun: only faces"),
         ("faer elsewhere", found({"flexarm-stepping": ["dev:faer"]}), "dev-dependency on faer: only links"),
         ("clap in the facade's folder", found({"flexarm": ["clap"]}), None),
         ("urdf-rs below", found({"flexarm-kinematics": ["urdf-rs"]}), "only robot may name it"),

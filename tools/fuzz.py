@@ -13,7 +13,7 @@ step through time may be long: they must stop when asked to.
 
 The same seed gives the same runs. Failing inputs are written to the folder --keep with the command
 line and the output. Needs only Python; the valid files are in this repository, are written here, or
-by the program itself. Formats that the build does not support (Rerun recordings of a light build)
+by the program itself. Formats that the build does not support (Arrow and SQLite bags of the default build)
 are left out, with a message.
 """
 
@@ -1062,7 +1062,8 @@ def made_targets(run, folder):
             units = ["--units", "mm-t-s"]
         command = ["import", *given, *units, *words, "--no-files", "--json"]
         targets.append(Target(f"matrix-{change}", change, files, [command]))
-    run(["compare", "robot.toml", "motion.toml", "-o", "run", "--log-rate", "50", "--parquet", "--also", "arrow", "--quiet"], ["compare", "robot.toml", "motion.toml", "-o", "run", "--log-rate", "50", "--quiet"])
+    run(["compare", "robot.toml", "motion.toml", "-o", "run", "--log-rate", "50", "--parquet", "--also", "arrow", "--quiet"],
+        ["compare", "robot.toml", "motion.toml", "-o", "run", "--log-rate", "50", "--parquet", "--quiet"], ["compare", "robot.toml", "motion.toml", "-o", "run", "--log-rate", "50", "--quiet"])
     for name in ("run.csv", "run.mcap", "run.parquet", "run.arrow"):
         path = folder / "run" / name
         if not path.exists():

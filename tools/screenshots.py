@@ -126,7 +126,7 @@ def main():
     if unknown:
         parser.error(f"no picture is called {', '.join(sorted(unknown))}; there are {', '.join([*RERUN, *REPORTS])}")
     if not pathlib.Path(arguments.flexarm).is_file():
-        parser.error(f"{arguments.flexarm} is not there: cargo build --release, or --flexarm")
+        parser.error(f"{arguments.flexarm} is not there: cargo build --release --features rerun, or --flexarm")
     arguments.out.mkdir(parents=True, exist_ok=True)
     wanted = lambda name: not only or name in only
     failed = False

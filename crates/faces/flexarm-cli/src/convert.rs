@@ -1,6 +1,6 @@
 //! `flexarm convert`: arguments and table.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
@@ -15,7 +15,7 @@ Examples:
   A table for pandas or a spreadsheet, from a recording for viewers:
       flexarm convert out/run.mcap run.parquet
       flexarm convert out/run.mcap run.csv
-  The Rerun view of a run that was recorded as MCAP only:
+  The Rerun view of a run that was recorded as MCAP only (needs the feature rerun):
       flexarm convert out/run.mcap run.rrd
   What a killed run left, as a whole file:
       flexarm convert out/run.mcap whole.mcap";
@@ -40,13 +40,21 @@ pub(crate) struct ConvertArgs {
 
 pub(crate) fn run(terminal: &Terminal, args: &ConvertArgs) -> Result<ExitCode, Failure> {
     let options = ConvertOptions { from: args.from, to: args.to, overwrite: args.force };
-    let mut stop = crate::signals::stop_when_asked();
-    let summary = working(terminal, "converting", || {
-        flexarm::convert_until(&args.input, &args.output, &options, &mut |_| stop())
-    })?;
+    let summary = convert(terminal, &args.input, &args.output, &options)?;
     crate::print::warnings(terminal, &summary.warnings);
     answer(terminal, || to_json(&summary), || text(&summary));
     Ok(ExitCode::SUCCESS)
+}
+
+/// Converts a recording until the command is stopped.
+pub(crate) fn convert(
+    terminal: &Terminal,
+    input: &Path,
+    output: &Path,
+    options: &ConvertOptions,
+) -> Result<ConvertSummary, flexarm::Error> {
+    let mut stop = crate::signals::stop_when_asked();
+    working(terminal, "converting", || flexarm::convert_until(input, output, options, &mut |_| stop()))
 }
 
 fn text(summary: &ConvertSummary) -> String {

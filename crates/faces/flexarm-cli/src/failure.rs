@@ -3,7 +3,7 @@
 
 use std::process::ExitCode;
 
-use flexarm::{Fault, TrajectoryError};
+use flexarm::{Fault, RecordingFormat, TrajectoryError};
 
 use crate::print::complaint;
 
@@ -93,6 +93,21 @@ impl Failure {
         if let Some(page) = self.page() {
             eprintln!("  help: `flexarm format {page}` prints the keys with their units, and examples");
         }
+        if let Some(format) = self.lacks() {
+            eprintln!("  help: {} has it", build_with(format));
+        }
+    }
+
+    /// Returns the format of recordings that this program was built without.
+    fn lacks(&self) -> Option<RecordingFormat> {
+        use flexarm::RecordingError::{NotBuiltIn, WithoutFormat};
+        match self {
+            Self::In { source, .. } => source.lacks(),
+            Self::Library(flexarm::Error::Recording(NotBuiltIn { format, .. } | WithoutFormat { format })) => {
+                Some(*format)
+            }
+            _ => None,
+        }
     }
 
     /// Returns the format page for a file that is malformed.
@@ -103,6 +118,11 @@ impl Failure {
             Self::Usage(_) | Self::Plant(_) => None,
         }
     }
+}
+
+/// Command that runs the program with a format that it was built without.
+pub(crate) fn build_with(format: RecordingFormat) -> String {
+    format!("`cargo run --release --features {} -- ...`", format.info().feature.unwrap_or_default())
 }
 
 fn page_of(error: &flexarm::Error) -> Option<&'static str> {

@@ -6,7 +6,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use flexarm::{Outputs, RecordingFormat};
 
 use crate::args::RunArgs;
-use crate::failure::Failure;
+use crate::failure::{Failure, build_with};
 
 /// Joins words as `a, b or c`.
 fn listed(words: &[String]) -> String {
@@ -75,7 +75,10 @@ pub(crate) fn outputs(args: &RunArgs, folder: PathBuf) -> Result<Outputs, Failur
     let also = args.also.iter().map(|&format| (format, format!("--also {}", format.extension())));
     for (format, flag) in parquet.into_iter().chain(also) {
         if !format.is_built_in() {
-            return Err(Failure::Usage(format!("this program was built without {format}: omit {flag}")));
+            let built = build_with(format);
+            return Err(Failure::Usage(format!(
+                "this program was built without {format}: omit {flag}, or use {built}"
+            )));
         }
         outputs = outputs.with(format);
     }

@@ -58,6 +58,8 @@ use flexarm::written::message;
 pub fn run(line: Vec<OsString>) -> u8 {
     signals::turn_into_errors();
     flexarm::name_settings(flags::NAMES);
+    #[cfg(feature = "rerun")]
+    flexarm_rerun::install();
     let code = match Cli::try_parse_from(&line) {
         Ok(cli) => commands::run(&cli, &line).unwrap_or_else(|failure| {
             failure.print();

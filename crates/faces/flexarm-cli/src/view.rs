@@ -1,4 +1,5 @@
-//! `flexarm view`: finds the Rerun viewer and opens a recording in it.
+//! `flexarm view`: finds the Rerun viewer and opens a recording in it, which it makes of an MCAP file
+//! if there is no other.
 
 use std::ffi::OsStr;
 use std::fmt::Write as _;
@@ -8,22 +9,23 @@ use std::process::{Child, Command, ExitCode, Stdio};
 use std::time::{Duration, Instant};
 
 use clap::Args;
+#[cfg(feature = "rerun")]
+use flexarm::ConvertOptions;
 use flexarm::Error;
 
 use crate::failure::Failure;
 use crate::print::{complaint, warning};
 use crate::terminal::{Terminal, answer, to_json};
 
-/// Viewer version for which this program writes `.rrd` files.
-const WRITTEN_FOR: &str = "0.36";
-/// Latest viewer release of that version.
-const WANTED: &str = "0.36.3";
+/// Oldest viewer that shows the `.rrd` files of this program.
+const OLDEST: &str = "0.36.3";
 /// Time for which a new viewer is watched: one that cannot start fails at once.
 const WATCHED: Duration = Duration::from_secs(1);
 
 #[derive(Debug, Args)]
 pub(crate) struct ViewArgs {
-    /// .rrd or .mcap recording, .html report, or the folder of a run
+    /// .rrd or .mcap recording, .html report, or the folder of a run; an .mcap needs the feature
+    /// rerun
     pub(crate) file: PathBuf,
     /// Return only after the viewer is closed
     #[arg(long)]
@@ -31,21 +33,25 @@ pub(crate) struct ViewArgs {
 }
 
 pub(crate) fn run(terminal: &Terminal, args: &ViewArgs) -> Result<ExitCode, Failure> {
-    let file = recording(&args.file)?;
+    let mut file = recording(&args.file)?;
+    if ending(&file) == "mcap" {
+        file = arranged(terminal, &file)?;
+    }
     match ending(&file).as_str() {
         "html" | "htm" => Ok(browse(terminal, &file)),
-        kind => {
+        _ => {
             let Some(viewer) = Viewer::find() else {
                 return Ok(failed(&format!(
-                    "there is no Rerun viewer: neither `rerun` nor `python3 -m rerun` runs here.\nGet it with one of\n    \
-                     pip install rerun-sdk=={WANTED}\n    cargo install rerun-cli --version {WANTED} --locked\nor open the .mcap \
-                     recording with Foxglove (https://foxglove.dev) or PlotJuggler"
+                    "there is no Rerun viewer: neither `rerun` nor `{}` runs here.\nGet it with one of\n    \
+                     pip install \"rerun-sdk>={OLDEST}\"\n    cargo install rerun-cli --locked\nor open the .mcap \
+                     recording with Foxglove (https://foxglove.dev) or PlotJuggler",
+                    WAYS[1].join(" ")
                 )));
             };
-            if kind == "rrd" && !viewer.version.starts_with(&format!("{WRITTEN_FOR}.")) && !terminal.quiet {
+            if numbers(&viewer.version) < numbers(OLDEST) && !terminal.quiet {
                 warning(&format!(
-                    ".rrd files are written for Rerun {WRITTEN_FOR}, the viewer here is {}: if it cannot show the file, \
-                     `pip install rerun-sdk=={WANTED}` or view the .mcap recording",
+                    ".rrd files are written for Rerun {OLDEST} or newer, the viewer here is {}: if it cannot show the \
+                     file, `pip install \"rerun-sdk>={OLDEST}\"`",
                     viewer.version
                 ));
             }
@@ -76,9 +82,45 @@ fn recording(given: &Path) -> Result<PathBuf, Failure> {
     }
 }
 
+/// Makes an `.rrd` file, with its layout, of an MCAP file: beside it, or in a folder for temporary
+/// files if another file or the file system is in the way.
+#[cfg(feature = "rerun")]
+fn arranged(terminal: &Terminal, mcap: &Path) -> Result<PathBuf, Failure> {
+    let convert = |to: PathBuf| crate::convert::convert(terminal, mcap, &to, &ConvertOptions::default()).map(|_| to);
+    let beside = mcap.with_extension("rrd");
+    let time = |path: &Path| path.metadata().and_then(|file| file.modified()).ok();
+    if !beside.exists() {
+        match convert(beside) {
+            Err(Error::Write { .. }) => {}
+            made => return Ok(made?),
+        }
+    } else if time(&beside) >= time(mcap) {
+        return Ok(beside); // made of this file before
+    }
+    let folder = std::env::temp_dir().join(format!("flexarm-view-{}", std::process::id()));
+    std::fs::create_dir(&folder).map_err(|source| Error::Write { path: folder.clone(), source })?;
+    Ok(convert(folder.join(mcap.file_stem().unwrap_or_default()).with_extension("rrd"))?)
+}
+
+/// Refuses an MCAP file: as the viewer arranges it, the magnified arm is missing.
+#[cfg(not(feature = "rerun"))]
+fn arranged(_: &Terminal, mcap: &Path) -> Result<PathBuf, Failure> {
+    let file = mcap.display();
+    let what = format!(
+        "the Rerun viewer needs an .rrd of it, and this program was built without Rerun.\n    \
+         cargo run --release --features rerun -- view {file}\nmakes and opens it. Foxglove, PlotJuggler and \
+         `rerun {file}` open the .mcap as it is"
+    );
+    Err(Error::File { path: mcap.to_owned(), what }.into())
+}
+
 fn ending(path: &Path) -> String {
     path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase()).unwrap_or_default()
 }
+
+/// Programs and leading arguments: the viewer on the path, else the one of Python, which must not take
+/// modules from the working folder (`-I`).
+const WAYS: [&[&str]; 2] = [&["rerun"], &["python3", "-I", "-m", "rerun"]];
 
 /// A viewer that reported its version.
 struct Viewer {
@@ -88,10 +130,9 @@ struct Viewer {
 }
 
 impl Viewer {
-    /// Returns the viewer on the path, else the one of python3.
+    /// Returns the first viewer that runs.
     fn find() -> Option<Self> {
-        let ways: [&[&str]; 2] = [&["rerun"], &["python3", "-m", "rerun"]];
-        ways.into_iter().find_map(|words| {
+        WAYS.into_iter().find_map(|words| {
             let output = command(words).arg("--version").stdin(Stdio::null()).stderr(Stdio::null()).output().ok()?;
             let text = String::from_utf8_lossy(&output.stdout).into_owned();
             // Another program of that name would print something else.
@@ -116,6 +157,11 @@ fn is_version(word: &str) -> bool {
     let mut parts = word.split('.');
     let mut number = || parts.next().is_some_and(|part| !part.is_empty() && part.bytes().all(|b| b.is_ascii_digit()));
     number() && number() && parts.next().is_some_and(|rest| rest.starts_with(|c: char| c.is_ascii_digit()))
+}
+
+/// Returns the three numbers of a version.
+fn numbers(version: &str) -> Vec<u32> {
+    version.split(['.', '-']).take(3).map_while(|part| part.parse().ok()).collect()
 }
 
 /// Starts the viewer, and watches it for a moment or waits until it is closed.

@@ -134,6 +134,14 @@ fn what_cannot_be_converted_is_refused_and_nothing_is_touched() {
     place.refused(&["convert", "result/run.csv", "result/../result/run.csv", "--force"], &["input and output"]);
     place.refused(&["convert", "nothing.csv", "a.csv"], &["nothing.csv", "no such file"]);
     place.refused(&["convert", "result", "a.csv"], &["result", "folder", "run.mcap"]);
+    if cfg!(not(feature = "rerun")) {
+        let words = ["a.rrd", "built without Rerun", "cargo run --release --features rerun -- ..."];
+        place.refused(&["convert", "result/run.csv", "a.rrd"], &words);
+    }
+    if cfg!(not(feature = "arrow")) {
+        let words = ["built without Arrow", "cargo run --release --features arrow -- ..."];
+        place.refused(&["compare", "robot.toml", "swing.toml", "--also", "arrow"], &words);
+    }
     place.refused(&["convert", "result/run.csv", "a.xlsx"], &[".xlsx", ".parquet", "--to"]);
     place.refused(&["convert", "result/run.csv", "a.csv", "--from", "xml"], &["xml", "parquet"]);
     place.refused(&["convert", "other.csv", "a.csv"], &["other.csv", "city, price", "flexible_x_m"]);

@@ -162,3 +162,14 @@ fn force_leaves_no_recording_of_an_earlier_run_beside_the_new_ones() {
     other.write("result/study.rrd", "old");
     other.refused(&COMPARE, &["study.rrd", "exists already"]);
 }
+
+/// Truth: the first bytes of the file.
+#[cfg(feature = "rerun")]
+#[test]
+fn a_compensation_has_a_recording_of_both_runs() {
+    let place = Place::new();
+    let found = place.json(&["compensate", "robot.toml", "swing.toml", "-o", "out"]);
+    assert_eq!(found["recording"], "out/compensation.rrd");
+    let file = place.read("out/compensation.rrd");
+    assert!(file.starts_with(b"RRF2") && file.len() > 100_000, "{} bytes", file.len());
+}

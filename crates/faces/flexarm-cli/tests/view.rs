@@ -2,6 +2,7 @@
 //! messages on failure.
 
 use std::os::unix::fs::PermissionsExt;
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 use crate::common::{Answer, Place};
@@ -53,14 +54,60 @@ fn a_run_folder_opens_its_rrd_and_the_command_returns_while_the_viewer_stays() {
     close(&answer);
 }
 
+/// Python takes nothing from the working folder, its variables or the folder of the user.
 #[test]
-fn a_run_folder_without_rrd_opens_its_mcap_with_the_viewer_of_python() {
+fn without_a_viewer_on_the_path_that_of_python_is_used() {
     let place = place(&[("python3", VIEWER)]);
-    let answer = view(&place, &["one", "--json"]);
+    let answer = view(&place, &["both", "--json"]);
     assert_eq!(answer.code, 0, "{}", answer.err);
-    assert_eq!(answer.json()["viewer"], "python3 -m rerun");
-    assert_eq!(place.text("note"), "-m rerun one/run.mcap\n");
+    assert_eq!(answer.json()["viewer"], "python3 -I -m rerun");
+    assert_eq!(place.text("note"), "-I -m rerun both/run.rrd\n");
     close(&answer);
+}
+
+/// A real Python, without the packages that are installed for it.
+#[test]
+fn a_module_of_that_name_in_the_working_folder_is_not_executed() {
+    let python = "#!/bin/sh\nexec /usr/bin/python3 -S \"$@\"\n";
+    let place = place(&[("python3", python)]);
+    place.write("rerun.py", "open('note', 'w')\n");
+    if Path::new("/usr/bin/python3").exists() {
+        let answer = view(&place, &["both/run.rrd"]);
+        assert_eq!(answer.code, 1, "{}", answer.err);
+        assert!(!place.path("note").exists());
+    }
+}
+
+#[cfg(not(feature = "rerun"))]
+#[test]
+fn a_run_without_rrd_needs_a_program_with_rerun_and_is_refused_with_its_command() {
+    let place = place(&[("rerun", VIEWER)]);
+    for given in ["one", "one/run.mcap"] {
+        let words = ["cargo run --release --features rerun -- view one/run.mcap", "Foxglove", "PlotJuggler"];
+        place.refused(&["view", given], &words);
+    }
+}
+
+/// Truth: the name and the first bytes of the file that the viewer gets.
+#[cfg(all(feature = "rerun", feature = "mcap"))]
+#[test]
+fn an_mcap_is_shown_by_a_recording_beside_it_or_a_temporary_one_and_nothing_is_overwritten() {
+    let place = place(&[("rerun", &VIEWER.replace("exec /bin/sleep 20", "exit 0"))]);
+    place.json(&["compare", "robot.toml", "swing.toml", "-o", "result"]);
+    std::fs::rename(place.path("result/run.mcap"), place.path("one/run.mcap")).unwrap();
+    for given in ["one", "one/run.mcap"] {
+        assert_eq!(view(&place, &[given, "--json"]).json()["file"], "one/run.rrd");
+        assert!(place.read("one/run.rrd").starts_with(b"RRF2"));
+    }
+    // A file of that name that is older than the recording stays, and another one is shown.
+    place.write("one/run.rrd", "older");
+    let old = std::fs::File::options().write(true).open(place.path("one/run.rrd")).unwrap();
+    old.set_modified(std::time::SystemTime::UNIX_EPOCH).unwrap();
+    let shown = view(&place, &["one/run.mcap", "--json"]).json()["file"].as_str().unwrap().to_owned();
+    assert_eq!(place.text("one/run.rrd"), "older");
+    let shown = Path::new(&shown);
+    assert!(std::fs::read(shown).unwrap().starts_with(b"RRF2") && shown.starts_with(std::env::temp_dir()));
+    std::fs::remove_dir_all(shown.parent().unwrap()).unwrap();
 }
 
 /// Another program named `rerun`, and a python3 without the module.
@@ -71,7 +118,7 @@ fn without_a_viewer_it_is_said_how_to_get_one() {
     for programs in [vec![], vec![("rerun", other), ("python3", no_module)]] {
         let answer = view(&place(&programs), &["both/run.rrd"]);
         assert_eq!((answer.code, answer.out.as_str()), (1, ""));
-        answer.says(&["pip install rerun-sdk==0.36.3", "cargo install rerun-cli --version 0.36.3", "Foxglove"]);
+        answer.says(&["pip install \"rerun-sdk>=0.36.3\"", "cargo install rerun-cli", "Foxglove"]);
     }
 }
 
@@ -90,7 +137,7 @@ fn a_viewer_that_cannot_start_is_reported_with_what_it_said() {
 #[test]
 fn a_viewer_that_ends_well_at_once_is_no_failure() {
     let place = place(&[("rerun", &VIEWER.replace("exec /bin/sleep 20", "exit 0"))]);
-    let answer = view(&place, &["both/run.mcap"]);
+    let answer = view(&place, &["both/run.rrd"]);
     assert_eq!((answer.code, answer.err.as_str()), (0, ""));
     assert!(answer.out.contains("open already"), "{}", answer.out);
 }
@@ -106,16 +153,21 @@ fn waiting_lasts_as_long_as_the_viewer_and_ends_as_it_ends() {
     }
 }
 
-/// `.rrd` files depend on the viewer version, `.mcap` files do not.
+/// A viewer shows the `.rrd` files of older versions.
 #[test]
-fn another_version_of_the_viewer_gives_a_warning_for_rrd_only() {
-    let script = VIEWER.replace("0.36.3", "0.29.1").replace("exec /bin/sleep 20", "exit 0");
-    let place = place(&[("rerun", &script)]);
-    let answer = view(&place, &["both/run.rrd"]);
-    assert_eq!(answer.code, 0);
-    answer.says(&["warning", "0.36", "0.29.1", "pip install rerun-sdk==0.36.3"]);
-    assert_eq!(view(&place, &["both/run.rrd", "-q"]).err, "");
-    assert_eq!(view(&place, &["both/run.mcap"]).err, "");
+fn a_viewer_older_than_the_files_gives_a_warning() {
+    let place = |version: &str| {
+        let script = VIEWER.replace("0.36.3", version).replace("exec /bin/sleep 20", "exit 0");
+        self::place(&[("rerun", &script)])
+    };
+    for version in ["0.29.1", "0.36.2"] {
+        let place = place(version);
+        let answer = view(&place, &["both/run.rrd"]);
+        assert_eq!(answer.code, 0);
+        answer.says(&["warning", "0.36.3", version, "pip install \"rerun-sdk>=0.36.3\""]);
+        assert_eq!(view(&place, &["both/run.rrd", "-q"]).err, "");
+    }
+    assert_eq!(view(&place("0.100.0"), &["both/run.rrd"]).err, "");
 }
 
 #[test]

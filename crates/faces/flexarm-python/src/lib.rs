@@ -85,6 +85,14 @@ mod _flexarm {
     #[pymodule_export]
     use crate::sweep::sweep;
 
+    /// Makes the recordings for the viewer available.
+    #[cfg(feature = "rerun")]
+    #[pymodule_init]
+    fn init(_: &pyo3::Bound<'_, pyo3::types::PyModule>) -> pyo3::PyResult<()> {
+        flexarm_rerun::install();
+        Ok(())
+    }
+
     #[pymodule_export]
     #[expect(non_upper_case_globals, reason = "Python's name for it")]
     const __version__: &str = env!("CARGO_PKG_VERSION");

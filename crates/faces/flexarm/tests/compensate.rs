@@ -280,7 +280,7 @@ fn limits_of_speed_acceleration_and_torque_are_kept_or_named() {
 
 /// Truth: each file, read again.
 #[test]
-fn the_new_motion_is_written_by_the_endings_of_its_files_with_a_recording_of_both_runs() {
+fn the_new_motion_is_written_by_the_endings_of_its_files() {
     let (robot, motion) = shipped("kr210", "pick_and_place.toml");
     let place = Place::new("files");
     let motions: Vec<PathBuf> = ["new.toml", "new.yaml", "new.json"].map(|name| place.0.join(name)).to_vec();
@@ -299,8 +299,6 @@ fn the_new_motion_is_written_by_the_endings_of_its_files_with_a_recording_of_bot
         eprintln!("{}: {worst:.1e} rad", file.display());
         assert!(worst < 1e-9, "{}: {worst:e}", file.display());
     }
-    let recording = PathBuf::from(found.recording.clone().unwrap());
-    assert!(std::fs::metadata(&recording).unwrap().len() > 100_000);
     let error = compensate_motion(&robot, &motion, &asked).unwrap_err().to_string();
     assert!(error.contains("compensated.csv"), "{error}");
     let wrong = CompensateRequest { motions: vec![place.0.join("new.svg")], ..request() };

@@ -1,8 +1,8 @@
-//! Writes one synthetic run as CSV, MCAP and .rrd:
+//! Writes one synthetic run as CSV and MCAP:
 //! `cargo run --release --example synthetic -- FOLDER`.
 //!
 //! Expect 1001 rows, an error of at most 2.11 mm and of 1.30 mm at the end, and in
-//! `rerun FOLDER/run.rrd` an arm that swings by 1.2 rad, with its rigid twin drawn transparently.
+//! `FOLDER/run.mcap` an arm that swings by 1.2 rad, with its rigid twin drawn transparently.
 #![allow(non_snake_case, reason = "monogram notation: X_WL, pose of L in W")]
 
 #[path = "../tests/synthetic/mod.rs"]
@@ -18,8 +18,6 @@ fn main() -> Result<(), LogError> {
     recorders.push(Box::new(CsvRecorder::create(folder.join("run.csv"), options)));
     #[cfg(feature = "mcap")]
     recorders.push(Box::new(flexarm_log::McapRecorder::create(folder.join("run.mcap"), options)));
-    #[cfg(feature = "rerun")]
-    recorders.push(Box::new(flexarm_log::RrdRecorder::create(folder.join("run.rrd"), options)));
 
     recorders.begin(&synthetic::header())?;
     for step in 0..synthetic::SAMPLES {

@@ -34,7 +34,10 @@ impl CreateOptions {
 
     /// Checks that `path` can be created: it does not exist, or it may be overwritten and is
     /// writable.
-    pub(crate) fn check(self, path: &Path) -> Result<(), LogError> {
+    ///
+    /// # Errors
+    /// [`LogError::Exists`] or [`LogError::Io`] if it cannot.
+    pub fn check(self, path: &Path) -> Result<(), LogError> {
         let Ok(there) = path.metadata() else { return Ok(()) };
         if !self.overwrite {
             return Err(LogError::Exists { path: path.to_owned() });
@@ -51,7 +54,11 @@ impl CreateOptions {
     }
 
     /// Creates the file. With two concurrent runs and one name, at most one succeeds.
-    pub(crate) fn create(self, path: &Path) -> Result<File, LogError> {
+    ///
+    /// # Errors
+    /// [`LogError::Exists`] if it exists and may not be overwritten; [`LogError::Io`] if it cannot
+    /// be created.
+    pub fn create(self, path: &Path) -> Result<File, LogError> {
         let mut options = OpenOptions::new();
         options.write(true);
         match self.overwrite {
@@ -65,7 +72,7 @@ impl CreateOptions {
     }
 
     /// Returns a clock that decides when the next flush of a file is due.
-    pub(crate) fn flush_clock(self, file: &Path) -> FlushClock {
+    pub fn flush_clock(self, file: &Path) -> FlushClock {
         let folder = folder_of(file);
         let now = Instant::now();
         let scarce = is_scarce(folder);
@@ -88,12 +95,11 @@ const SCARCE_EVERY: u32 = 64;
 /// Upper bound of the flush interval: adding a larger `Duration` to an `Instant` may overflow.
 const NEVER: Duration = Duration::from_secs(10 * 365 * 24 * 3600);
 /// Reciprocal of the maximum share of wall time spent on flushes (1/20).
-#[cfg(feature = "rerun")]
 const LARGEST_SHARE: u32 = 20;
 
 /// Decides when the next flush is due. It affects when bytes reach the disk, never which bytes.
 #[derive(Debug)]
-pub(crate) struct FlushClock {
+pub struct FlushClock {
     every: Duration,
     /// Time at which the last flush became due.
     begun: Instant,
@@ -106,7 +112,7 @@ pub(crate) struct FlushClock {
 
 impl FlushClock {
     /// Whether a flush is due; called once per sample. If so, the next interval starts now.
-    pub(crate) fn due(&mut self) -> bool {
+    pub fn due(&mut self) -> bool {
         self.waiting += 1;
         let now = Instant::now();
         let in_time = now >= self.next;
@@ -122,9 +128,8 @@ impl FlushClock {
     }
 
     /// Called after a flush whose cost grows with the file size: delays the next one so that
-    /// flushes take at most 1/[`LARGEST_SHARE`] of the run time.
-    #[cfg(feature = "rerun")]
-    pub(crate) fn done(&mut self) {
+    /// flushes take at most a twentieth of the run time.
+    pub fn done(&mut self) {
         // A zero interval asks for a flush at every sample.
         if !self.every.is_zero() {
             self.next = self.next.max(self.begun + LARGEST_SHARE * self.begun.elapsed());

@@ -41,7 +41,8 @@ pub(crate) fn texts_at_start(header: &RunHeader) -> Vec<(String, String)> {
 pub(crate) fn texts_at_end(result: &RunResult) -> Vec<(String, String)> {
     let label = |(label, value): &(String, String)| (format!("figure.{label}"), value.clone());
     let mut pairs: Vec<_> = result.figures.iter().map(label).collect();
-    pairs.push((RESULT_KEY.into(), run_json::write_result(result)));
+    let result = RunResult { scenery: Vec::new(), ..result.clone() };
+    pairs.push((RESULT_KEY.into(), run_json::write_result(&result)));
     pairs
 }
 

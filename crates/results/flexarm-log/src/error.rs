@@ -147,17 +147,19 @@ impl LogError {
     }
 
     /// Returns a closure for `map_err` that turns an [`io::Error`] into [`LogError::Io`].
-    pub(crate) fn io(path: &Path, action: &'static str) -> impl FnOnce(io::Error) -> Self {
+    pub fn io(path: &Path, action: &'static str) -> impl FnOnce(io::Error) -> Self {
         move |source| Self::Io { path: path.to_owned(), action, source }
     }
 
     /// Error for `begin` on a recorder that has begun before.
-    pub(crate) fn begun_twice(path: &Path) -> Self {
+    #[must_use]
+    pub fn begun_twice(path: &Path) -> Self {
         Self::Order { path: path.to_owned(), call: "begin", problem: "a second time" }
     }
 
     /// Error for `record` or `finish` on a recorder that is not between `begin` and `finish`.
-    pub(crate) fn not_open(path: &Path, call: &'static str) -> Self {
+    #[must_use]
+    pub fn not_open(path: &Path, call: &'static str) -> Self {
         Self::Order { path: path.to_owned(), call, problem: "before begin or after finish" }
     }
 }

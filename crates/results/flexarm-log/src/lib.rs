@@ -1,10 +1,10 @@
-//! Recorders: write a run of the simulator to CSV, Parquet, MCAP and Rerun files, and read it back.
+//! Recorders: write a run of the simulator to CSV, Parquet, Arrow and MCAP files, and read it back.
 //!
 //! A run hands over one [`RunHeader`], then [`Sample`]s, then its result figures; every
 //! [`Recorder`] takes the same three calls, and [`RecorderSet`] passes them to several files at
 //! once. Start at [`CsvRecorder`] for tables (`ParquetRecorder`, feature `parquet`, for the same
 //! table as Parquet), `McapRecorder` (feature `mcap`) for ROS 2 tools, Foxglove and PlotJuggler,
-//! `RrdRecorder` (feature `rerun`) for the Rerun viewer with meshes and a layout.
+//! the crate `flexarm-rerun` for the Rerun viewer with meshes and a layout ([`RrdWriter`]).
 //!
 //! To read a file, start at [`open_recording`]: a [`RunSource`] gives header, samples and result,
 //! for reports and for other formats. [`RecordingFormat::lost_on_the_way_to`] lists what a format
@@ -65,14 +65,9 @@ mod mcap_file;
 mod multi;
 #[cfg(feature = "parquet")]
 mod parquet_file;
-#[cfg(any(test, feature = "rerun"))]
-mod plot_room;
-#[cfg(any(feature = "mcap", feature = "rerun"))]
 mod poses;
 mod read;
 mod record;
-#[cfg(feature = "rerun")]
-mod rrd_file;
 #[cfg(any(feature = "mcap", feature = "described-tables"))]
 mod run_json;
 mod shape;
@@ -84,7 +79,7 @@ mod trace_blocks;
 mod whole_file;
 mod written_behind;
 
-pub use create::CreateOptions;
+pub use create::{CreateOptions, FlushClock};
 pub use csv_file::CsvRecorder;
 pub use data_table::{DataColumn, DataTable, DataValues};
 pub use error::LogError;
@@ -101,8 +96,8 @@ pub use mcap_file::layouts::{foxglove_layout, plotjuggler_layout};
 pub use multi::RecorderSet;
 #[cfg(feature = "parquet")]
 pub use parquet_file::ParquetRecorder;
+pub use poses::{PoseClock, PoseReasons};
 pub use record::*;
-#[cfg(feature = "rerun")]
-pub use rrd_file::{RrdRecorder, RrdStudy, StudySeat};
+pub use shape::Shape;
 pub use trace::{RunSource, Trace, TraceRow};
 pub use trace_blocks::CurveQuantity;

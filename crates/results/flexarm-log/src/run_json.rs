@@ -9,7 +9,7 @@ use flexarm_kinematics::Pose;
 use nalgebra::{Matrix3, Rotation3, Translation3};
 use serde::{Deserialize, Serialize};
 
-use crate::{Attachment, BendInfo, Event, EventKind, LinkInfo, RunHeader, RunResult};
+use crate::{Attachment, BendInfo, Event, EventKind, LinkInfo, RunHeader, RunResult, Scenery};
 
 /// Name of the header in a recording.
 pub(crate) const RUN_JSON: &str = "run.json";
@@ -42,6 +42,8 @@ pub(crate) struct RunJson {
     /// Missing in files of older versions.
     #[serde(default)]
     has_static: bool,
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    has_stress: bool,
     log_rate_hz: f64,
     step_s: f64,
     /// Missing in files of older versions.
@@ -87,8 +89,8 @@ pub(crate) struct MeshEntry {
     pub(crate) triangles: usize,
 }
 
-/// Returns the header as JSON text. `meshes`: whether to list its meshes, that is whether they are
-/// stored beside it.
+/// Returns the header as JSON text. `meshes`: whether to list its meshes and the surfaces of the
+/// result, that is whether they are stored beside it.
 pub(crate) fn write(header: &RunHeader, meshes: bool) -> String {
     let entry = |mesh: &crate::LinkMesh| MeshEntry {
         link: mesh.link,
@@ -117,6 +119,7 @@ pub(crate) fn write(header: &RunHeader, meshes: bool) -> String {
         bends: header.bends.iter().map(bend).collect(),
         has_rigid: header.has_rigid,
         has_static: header.has_static,
+        has_stress: header.has_stress && meshes,
         log_rate_hz: header.log_rate_hz,
         step_s: header.step_s,
         captions: header.captions.iter().map(|caption| (caption.from_s, caption.text.clone())).collect(),
@@ -196,6 +199,7 @@ pub(crate) fn read(text: &[u8]) -> Result<(RunHeader, RunJson), RunJsonError> {
         bends: run.bends.drain(..).map(bend).collect(),
         has_rigid: run.has_rigid,
         has_static: run.has_static,
+        has_stress: run.has_stress,
         log_rate_hz: run.log_rate_hz,
         step_s: run.step_s,
         captions: run.captions.drain(..).map(|(from_s, text)| crate::Caption { from_s, text }).collect(),
@@ -221,6 +225,9 @@ struct ResultJson {
     events: Vec<(f64, String, String)>,
     /// Name, media type and text of the attached text files.
     files: Vec<(String, String, String)>,
+    /// Objects of pictures, such as the links coloured by stress; in MCAP files alone.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    scenery: Vec<Scenery>,
 }
 
 /// Returns the file with the result for the end of an MCAP file; attached files are in it
@@ -244,6 +251,7 @@ pub(crate) fn write_result(result: &RunResult) -> String {
         readable: result.readable.clone(),
         events: result.events.iter().map(event).collect(),
         files: result.attachments.iter().filter_map(file).collect(),
+        scenery: result.scenery.clone(),
     };
     serde_json::to_string(&result).expect("names, texts and numbers are JSON")
 }
@@ -260,7 +268,7 @@ pub(crate) fn read_result(text: &str) -> RunResult {
         readable: result.readable,
         events: result.events.into_iter().filter_map(event).collect(),
         attachments: result.files.into_iter().map(file).collect(),
-        scenery: Vec::new(),
+        scenery: result.scenery,
     }
 }
 

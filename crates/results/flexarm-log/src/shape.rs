@@ -6,7 +6,7 @@ use crate::{LogError, RunHeader, Sample, TwinSample};
 
 /// Numbers of entries of every sample of a run.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Shape {
+pub struct Shape {
     joints: usize,
     links: usize,
     elements: usize,
@@ -18,7 +18,9 @@ pub(crate) struct Shape {
 }
 
 impl Shape {
-    pub(crate) fn of(header: &RunHeader) -> Self {
+    /// Returns the sizes that a header asks for.
+    #[must_use]
+    pub fn of(header: &RunHeader) -> Self {
         Self {
             joints: header.joints.len(),
             links: header.links.len(),
@@ -32,7 +34,10 @@ impl Shape {
     }
 
     /// Checks the length of every list of the sample, so that the writers may index without checks.
-    pub(crate) fn check(&self, path: &Path, sample: &Sample) -> Result<(), LogError> {
+    ///
+    /// # Errors
+    /// [`LogError::Shape`] for the first list of another length; `path` is the file of the message.
+    pub fn check(&self, path: &Path, sample: &Sample) -> Result<(), LogError> {
         let twin = |twin: &TwinSample| {
             [
                 ("q", twin.q.len(), self.joints),

@@ -14,8 +14,6 @@ mod magnify;
 mod mcap;
 mod read;
 mod recorder_set;
-#[cfg(feature = "rerun")]
-mod rrd;
 mod synthetic;
 mod trace;
 

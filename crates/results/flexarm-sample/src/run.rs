@@ -7,6 +7,7 @@
 use std::path::PathBuf;
 
 use flexarm_spatial::Pose;
+use serde::{Deserialize, Serialize};
 
 /// 1 January 2000, 0:00 UTC (ns since 1970): default start time of runs, so that equal runs give
 /// equal files. Not 0, which ROS interprets as no time.
@@ -146,7 +147,7 @@ pub struct Caption {
 pub const STRESS_VIEW: &str = "Stress";
 
 /// A static object in the world.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Scenery {
     /// Title of the view that shows it; objects with the same title are shown together, those
     /// without one in all views.
@@ -158,7 +159,7 @@ pub struct Scenery {
 }
 
 /// Shape and colours of a static object (m, world; red, green, blue, alpha).
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum SceneryForm {
     /// Spheres.
     Points {

@@ -179,7 +179,9 @@ fn format(path: &Path, given: Option<RecordingFormat>, setting: Option<Setting>)
     }
     let unknown = || RecordingError::UnknownEnding { path: path.to_owned(), setting };
     let format = given.or_else(|| RecordingFormat::from_path(path)).ok_or_else(unknown)?;
-    if !format.is_built_in() {
+    let only_read = setting != Some(Setting::WrittenFormat);
+    // A format that is never read back is refused where it is opened.
+    if !format.is_built_in() && !(only_read && !format.is_read_back()) {
         return Err(RecordingError::NotBuiltIn { path: path.to_owned(), format }.into());
     }
     Ok(format)

@@ -4,7 +4,7 @@
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
-use flexarm_log::{Recorder, RecordingFormat, Trace};
+use flexarm_log::{Recorder, RecordingFormat, StudyRecorder, Trace};
 
 use crate::arm::{Arm, Run};
 use crate::comparison::difference;
@@ -68,7 +68,7 @@ pub fn compare_study(
         })
     };
     let (arms, expected) = checked_arms(variants, own_outputs)?;
-    let recording = StudyRecording::new(variants, outputs)?;
+    let recording = StudyRecording::new(variants, outputs);
     let mut summaries = Vec::new();
     let mut traces: Vec<(String, Trace)> = Vec::new();
     for (number, (variant, arm)) in variants.iter().zip(&arms).enumerate() {
@@ -152,55 +152,37 @@ fn folders(variants: &[Variant]) -> Result<Vec<String>, StudyError> {
     Ok(names)
 }
 
-#[cfg(feature = "rerun")]
 fn study_markdown(summary: &Summary) -> String {
     let robot = flexarm_settings::written::markdown(&summary.robot);
     format!("# Study of {robot}\n\n") + &crate::comparison::table(summary)
 }
 
-/// Recording of all runs, if this build and the outputs include one.
+/// Recording of all runs, if this process can write one and the outputs include it.
 struct StudyRecording {
-    #[cfg(feature = "rerun")]
-    study: Option<(PathBuf, flexarm_log::RrdStudy)>,
+    study: Option<(PathBuf, Box<dyn StudyRecorder>)>,
 }
 
-#[cfg(feature = "rerun")]
 impl StudyRecording {
-    fn new(variants: &[Variant], outputs: Option<&Outputs>) -> Result<Self, Error> {
+    fn new(variants: &[Variant], outputs: Option<&Outputs>) -> Self {
         let Some(outputs) =
             outputs.filter(|outputs| outputs.recordings.contains(&RecordingFormat::Rrd) && variants.len() > 1)
         else {
-            return Ok(Self { study: None });
+            return Self { study: None };
         };
         let path = outputs.folder.join(crate::record::STUDY_FILE);
         let options = flexarm_log::CreateOptions::default().with_overwrite(outputs.overwrite);
         let labels = variants.iter().map(|v| v.label.clone()).collect();
-        let study = flexarm_log::RrdStudy::create(&path, options, labels);
-        Ok(Self { study: Some((path, study)) })
+        let study = flexarm_log::study_recorder(&path, options, labels);
+        Self { study: study.map(|study| (path, study)) }
     }
 
     fn seat(&self, number: usize) -> Option<Box<dyn Recorder>> {
-        self.study.as_ref().map(|(_, study)| Box::new(study.seat(number)) as Box<dyn Recorder>)
+        self.study.as_ref().map(|(_, study)| study.seat(number))
     }
 
     fn finish(self, summary: &Summary) -> Result<Option<PathBuf>, Error> {
         let Some((path, study)) = self.study else { return Ok(None) };
         study.finish(&study_markdown(summary))?;
         Ok(Some(path))
-    }
-}
-
-#[cfg(not(feature = "rerun"))]
-impl StudyRecording {
-    fn new(_: &[Variant], _: Option<&Outputs>) -> Result<Self, Error> {
-        Ok(Self {})
-    }
-
-    fn seat(&self, _: usize) -> Option<Box<dyn Recorder>> {
-        None
-    }
-
-    fn finish(self, _: &Summary) -> Result<Option<PathBuf>, Error> {
-        Ok(None)
     }
 }

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use flexarm_files::{check_free, write_all};
+use flexarm_log::RecordingFormat;
 
 use super::program::{self, Corrected, ProgramFigures};
 use super::{CompensateRequest, Compensation, MotionPair, SAMPLE_S, page};
@@ -33,7 +34,8 @@ impl Files {
         check_motion_outputs(&request.motions)?;
         let in_folder = |name: &str| request.output.as_ref().map(|folder| folder.join(name));
         let folder = in_folder("compensated.csv").zip(in_folder("compensation.html")).map(|(csv, page)| [csv, page]);
-        let recording = in_folder("compensation.rrd").filter(|_| cfg!(feature = "rerun") && request.recording);
+        let recording =
+            in_folder("compensation.rrd").filter(|_| RecordingFormat::Rrd.is_built_in() && request.recording);
         let program = request.output.as_ref().filter(|_| program::is_program(motion));
         let program = program.map(|folder| [motion.path.clone(), folder.clone()]);
         let own = program.iter().map(|[file, folder]| program::in_folder(folder, file));
@@ -110,12 +112,9 @@ impl Files {
             files.push((html.clone(), page::html(answer).into_bytes()));
         }
         write_all(&files)?;
-        #[cfg(feature = "rerun")]
         if let Some(path) = &self.recording {
             super::recording::record(path, answer, arm, found, request)?;
         }
-        #[cfg(not(feature = "rerun"))]
-        let _ = (arm, found);
         Ok(())
     }
 

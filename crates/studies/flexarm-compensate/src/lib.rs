@@ -16,7 +16,6 @@ mod judge;
 mod limits;
 mod page;
 mod program;
-#[cfg(feature = "rerun")]
 mod recording;
 mod shaped;
 
@@ -96,7 +95,7 @@ pub struct CompensateRequest {
     pub output: Option<PathBuf>,
     /// Additional files of the new motion, by extension: `.csv`, `.toml`, `.yaml` and `.json`.
     pub motions: Vec<PathBuf>,
-    /// Whether to write a recording of the arm before and after (`.rrd`), if this build supports
+    /// Whether to write a recording of the arm before and after (`.rrd`), if this process can write
     /// it.
     pub recording: bool,
     /// Whether to overwrite existing files.
@@ -262,7 +261,6 @@ pub fn compensate_motion_until(
 }
 
 /// The motions before and after, for files.
-#[cfg_attr(not(feature = "rerun"), expect(dead_code, reason = "for recordings alone"))]
 struct MotionPair {
     /// Requested scenario, slowed and shaped.
     scenario: Scenario,

@@ -19,7 +19,7 @@ use flexarm_settings::written::markdown;
 const RECORDED_HZ: f64 = 200.0;
 
 /// Records the arm before and after, drawn over each other, and the rigid arm on the requested
-/// motion.
+/// motion. Without a writer of recordings does nothing.
 pub(super) fn record(
     path: &Path,
     answer: &Compensation,
@@ -28,13 +28,14 @@ pub(super) fn record(
     request: &CompensateRequest,
 ) -> Result<(), Error> {
     let options = flexarm_log::CreateOptions::default().with_overwrite(request.overwrite);
-    let study = flexarm_log::RrdStudy::create(path, options, vec!["before".into(), "after".into()]);
+    let labels = vec!["before".into(), "after".into()];
+    let Some(study) = flexarm_log::study_recorder(path, options, labels) else { return Ok(()) };
     let run = RunOptions { log_rate_hz: RECORDED_HZ, ignore_limits: true, ..request.run.clone() };
     let wanted = Arc::new(Mutex::new(Vec::new()));
     let expected = arm.expected(&found.scenario, &run)?;
     for (number, motion) in [&found.scenario.motion, &found.motion].into_iter().enumerate() {
         let scenario = Scenario { motion: motion.clone(), ..found.scenario.clone() };
-        let recorder = Against::new(Box::new(study.seat(number)), wanted.clone(), number == 0);
+        let recorder = Against::new(study.seat(number), wanted.clone(), number == 0);
         let request = RunRequest {
             recorders: vec![Box::new(recorder)],
             expected: Some(expected),

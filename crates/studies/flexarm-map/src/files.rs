@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use flexarm_files::{check_free, write_all};
+use flexarm_log::RecordingFormat;
 #[cfg(feature = "parquet")]
 use flexarm_log::{CreateOptions, DataColumn, DataTable, DataValues};
 
@@ -53,16 +54,14 @@ pub(super) fn save(
     map.files.table = text(&paths.table);
     map.files.page = text(&paths.page);
     map.files.json = text(&paths.json);
-    map.files.rrd = if cfg!(feature = "rerun") { text(&paths.rrd) } else { None };
+    map.files.rrd = text(&paths.rrd).filter(|_| RecordingFormat::Rrd.is_built_in());
     let page = page::html(map, grid).into_bytes();
     let json = serde_json::to_string_pretty(map).expect("plain numbers and strings") + "\n";
     if let Some(folder) = paths.table.parent() {
         std::fs::create_dir_all(folder).map_err(|source| Error::Write { path: folder.to_owned(), source })?;
     }
     write_table(map, &paths.table, request.overwrite)?;
-    if cfg!(feature = "rerun") {
-        recording::write(map, &paths.rrd, robot, request, arm, grid)?;
-    }
+    recording::write(map, &paths.rrd, robot, request, arm, grid)?;
     Ok(write_all(&[(paths.page.clone(), page), (paths.json.clone(), json.into_bytes())])?)
 }
 

@@ -28,7 +28,7 @@ const SHOWN_S: f64 = 2.0;
 /// Fractions of the places with better values than the iso-surfaces.
 const SURFACES: [f64; 2] = [0.25, 0.6];
 
-/// Writes the recording, if this build supports the format.
+/// Writes the recording, if this process can write the format.
 pub(super) fn write(
     map: &Map,
     path: &Path,

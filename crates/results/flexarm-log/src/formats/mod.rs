@@ -14,6 +14,7 @@
 #[cfg(feature = "arrow")]
 mod arrow_file;
 mod open;
+mod rrd;
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -21,6 +22,7 @@ use std::path::{Path, PathBuf};
 #[cfg(feature = "arrow")]
 pub use self::arrow_file::ArrowRecorder;
 pub use self::open::open_recording;
+pub use self::rrd::{RrdWriter, StudyRecorder, install_rrd_writer, study_recorder};
 use crate::{CreateOptions, LogError, Recorder, RunHeader, RunSource, table};
 
 /// Formats of recordings, in the order in which a run lists them.
@@ -38,21 +40,17 @@ pub enum RecordingFormat {
     Arrow,
 }
 
-/// Recorder and, if the format can be read back, reader of a format; `None` if this build lacks its
-/// feature.
+/// Recorder and reader of a format; `None` if this build lacks its feature.
 macro_rules! code {
-    ($recorder:ty) => {
-        Some(Code { recorder: |path, options| Box::new(<$recorder>::create(path, options)), reader: None })
-    };
     ($recorder:ty, $reader:ty) => {
         Some(Code {
             recorder: |path, options| Box::new(<$recorder>::create(path, options)),
             reader: Some(|path| Ok(Box::new(<$reader>::open(path)?))),
         })
     };
-    ($feature:literal, $($types:ty),+) => {{
+    ($feature:literal, $recorder:ty, $reader:ty) => {{
         #[cfg(feature = $feature)]
-        let code = code!($($types),+);
+        let code = code!($recorder, $reader);
         #[cfg(not(feature = $feature))]
         let code = None;
         code
@@ -89,7 +87,7 @@ const FORMATS: &[FormatInfo] = &[
         survives_a_kill: true,
         most_samples: None,
         latest_s: Some(i64::MAX as f64 * 1e-9),
-        code: code!("rerun", crate::RrdRecorder),
+        code: None, // see install_rrd_writer
     },
     FormatInfo {
         format: RecordingFormat::Csv,
@@ -159,7 +157,7 @@ pub struct FormatInfo {
     pub holds: Holds,
     /// Whether a run writes it by default.
     pub by_default: bool,
-    /// Feature of this crate that enables it; `None` if it is always available.
+    /// Feature of the program that enables it; `None` if it is always available.
     pub feature: Option<&'static str>,
     /// Whether the file of a killed run can be read; otherwise there is either a complete file or
     /// none.
@@ -254,10 +252,18 @@ impl RecordingFormat {
         self.info().holds != Holds::Pictures
     }
 
-    /// Whether this build can write the format and, if it is read back, read it.
+    /// Whether this process can write the format and, if it is read back, read it. Recordings for
+    /// the Rerun viewer need [`install_rrd_writer`], other formats a feature of this crate.
     #[must_use]
     pub fn is_built_in(self) -> bool {
-        self.info().code.is_some()
+        self.code().is_some()
+    }
+
+    fn code(self) -> Option<Code> {
+        match self {
+            Self::Rrd => rrd::writer().map(|writer| Code { recorder: writer.recorder, reader: None }),
+            _ => self.info().code,
+        }
     }
 
     /// Whether it is a table of scalars.
@@ -266,11 +272,11 @@ impl RecordingFormat {
         self.info().holds.is_table()
     }
 
-    /// Creates a recorder for `path`; `None` if the format is not in this build
+    /// Creates a recorder for `path`; `None` if the format is not available
     /// ([`RecordingFormat::is_built_in`]).
     #[must_use]
     pub fn recorder(self, path: impl Into<PathBuf>, options: CreateOptions) -> Option<Box<dyn Recorder>> {
-        self.info().code.map(|code| (code.recorder)(path.into(), options))
+        self.code().map(|code| (code.recorder)(path.into(), options))
     }
 
     /// Returns, as sentences, what a conversion from this format to another loses by their nature.

@@ -15,9 +15,9 @@ use crate::{LogError, RunSource};
 /// else, of a write-only format, or of a format that this build has no feature for.
 pub fn open_recording(path: &Path, format: RecordingFormat) -> Result<Box<dyn RunSource>, LogError> {
     check_kind(path, format)?;
-    match format.info().code {
-        Some(super::Code { reader: Some(reader), .. }) => reader(path),
-        Some(_) => Err(LogError::NotARecording {
+    match format.info().code.and_then(|code| code.reader) {
+        Some(reader) => reader(path),
+        None if !format.is_read_back() => Err(LogError::NotARecording {
             path: path.to_owned(),
             found: format!("a file in the format {format}, which is for viewing"),
             expected: "a recording in a format that is read back: MCAP, Parquet, Arrow or CSV".into(),

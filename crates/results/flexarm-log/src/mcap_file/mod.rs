@@ -59,8 +59,7 @@ use crate::{CreateOptions, EventKind, LogError, RunHeader, RunResult, START_NS, 
 ///
 /// All other topics have a message for every sample. `/tf` is also written at each sample whose
 /// error exceeds all previous ones, so that the maximum has its poses, and at the last sample; an
-/// `.rrd` file converted from the recording equals that of the run, except that it lacks the
-/// scenery of the result.
+/// `.rrd` file converted from the recording equals that of the run.
 ///
 /// Topics with `rigid` and `error` need a rigid twin, the magnified arm also
 /// [`RunHeader::magnification`]. The magnified arm is sent at most 60 times per second of simulated

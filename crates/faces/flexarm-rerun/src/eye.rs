@@ -2,7 +2,7 @@
 
 use nalgebra::{Rotation3, Vector3};
 
-use crate::{RunHeader, Sample};
+use flexarm_log::{RunHeader, Sample};
 
 /// Position and target of the 3D view's camera (m, world).
 #[derive(Clone, Copy, Debug)]

@@ -10,8 +10,8 @@ use super::colors::{self, ColorScale};
 use super::entity::{link_part, path};
 use super::stream::{Result, RrdStream};
 use super::tracks::{Instant, PoseTrack, ShapeTrack, SkeletonTrack, TintTrack, Track, point};
-use crate::{LinkMesh, RunHeader, Sample, TwinSample};
 use flexarm_draw::{BendLine, BentMesh, BentPieces, stations_in_link};
+use flexarm_log::{LinkInfo, LinkMesh, RunHeader, Sample, TwinSample};
 
 /// Colouring of a robot.
 #[derive(Clone, Copy, Debug)]
@@ -84,10 +84,10 @@ impl RobotTracks {
             Paint::Own | Paint::Deviation(_) => colors::series(1),
         };
         // Frames without a surface are written once, by the robot at true scale.
-        let shown = |(k, _): &(usize, &crate::LinkInfo)| {
+        let shown = |(k, _): &(usize, &LinkInfo)| {
             matches!(look.paint, Paint::Own) || header.meshes.iter().any(|mesh| mesh.link == *k)
         };
-        let pose_track = |(k, link): (usize, &crate::LinkInfo)| (k, PoseTrack::new(at(&link_part(&link.name))));
+        let pose_track = |(k, link): (usize, &LinkInfo)| (k, PoseTrack::new(at(&link_part(&link.name))));
         let mut robot = Self {
             links: header.links.iter().enumerate().filter(shown).map(pose_track).collect(),
             tcp: PoseTrack::new(at("tcp")),

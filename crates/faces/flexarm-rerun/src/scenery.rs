@@ -1,7 +1,7 @@
 //! Fixed objects around a robot: points, surfaces and ellipsoids of a map, with a view for each
 //! group.
 
-use crate::{RunHeader, Scenery, SceneryForm};
+use flexarm_log::{RunHeader, Scenery, SceneryForm};
 use rerun::{
     AlbedoFactor, AsComponents, Boxes3D, Color, Ellipsoids3D, EntityPath, Mesh3D, Points3D, Quaternion, Radius, Rgba32,
 };

@@ -9,13 +9,13 @@ use super::colors::{self, ColorScale};
 use super::curves::Curves;
 use super::entity::path;
 use super::eye::{Eye, eye};
+use super::plot_room::Envelope;
 use super::robot::{Paint, RobotAppearance, RobotTracks};
+use super::size;
 use super::stream::{Result, RrdStream};
 use super::tracks::{ArrowTrack, CurveExtent, Instant, PathTrack, SIM_TIME, Times, Track, point};
-use crate::plot_room::Envelope;
-use crate::poses::{PoseClock, PoseReasons, size};
-use crate::{Event, EventKind, RunHeader, RunResult, Sample, TwinSample};
 use flexarm_draw::Magnifier;
+use flexarm_log::{Event, EventKind, PoseClock, PoseReasons, RunHeader, RunResult, Sample, TwinSample};
 
 /// Role of a run in its recording.
 #[derive(Clone, Debug)]

@@ -1,38 +1,57 @@
-//! Runs as a Rerun recording (.rrd): robots with their meshes, plots, text and a window layout.
+//! Runs as recordings for the Rerun viewer (.rrd): robots with their meshes, plots, text and a
+//! window layout.
 //!
-//! Start at [`RrdRecorder`] for one run and [`RrdStudy`] for several in one view. [`run`] holds the
-//! contents of a run, made of [`robot`]s and [`curves`]; [`tracks`] buffers rows until they are
-//! worth a chunk; [`window`] defines the layout of the viewer, [`layout`] encodes it; [`stream`]
-//! writes the file. Only this module uses the `rerun` crate, whose interface changes about monthly.
+//! [`install`] makes the format known to `flexarm_log`: from then on runs, studies, maps and
+//! conversions write it. [`RrdRecorder`] records one run, `study` several in one view. `run` holds the contents of a run, made of `robot`s and `curves`; `tracks` buffers rows
+//! until they are worth a chunk; `window` defines the layout of the viewer, `layout` encodes it,
+//! `plot_room` finds axis ranges and legend corners; `stream` writes the file. Only this crate uses
+//! the `rerun` crate, whose interface changes about monthly.
+//!
+//! ```
+//! use flexarm_log::{CreateOptions, RecordingFormat};
+//!
+//! assert!(RecordingFormat::Rrd.recorder("run.rrd", CreateOptions::default()).is_none());
+//! flexarm_rerun::install();
+//! assert!(RecordingFormat::Rrd.recorder("run.rrd", CreateOptions::default()).is_some());
+//! ```
+#![allow(non_snake_case, reason = "monogram notation: X_WL, pose of L in W")]
+#![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
 mod colors;
 mod curves;
 mod entity;
 mod eye;
 mod layout;
+mod plot_room;
 mod robot;
 mod run;
 mod scenery;
 mod stream;
 mod study;
-pub(crate) mod tracks;
+mod tracks;
 mod window;
 
 use std::path::Path;
 
+use flexarm_log::{
+    CreateOptions, FileRecorder, FlushClock, LogError, OpenFile, RrdWriter, RunHeader, RunResult, Sample, Shape,
+};
 use rerun::{EntityPath, TextDocument, ViewCoordinates};
 
 use self::entity::path;
 use self::layout::{Part, PlotPlace};
 use self::run::{RunTracks, Seat};
 use self::stream::{Result, RrdStream, StreamError};
+use self::study::RrdStudy;
 use self::tracks::{CurveExtent, SIM_TIME};
-use crate::create::FlushClock;
-use crate::file_recorder::{FileRecorder, OpenFile};
-use crate::shape::Shape;
-use crate::{CreateOptions, LogError, RunHeader, RunResult, Sample};
 
-pub use self::study::{RrdStudy, StudySeat};
+/// Makes runs, studies, maps and conversions of this process write `.rrd` files.
+pub fn install() {
+    flexarm_log::install_rrd_writer(RrdWriter {
+        recorder: |path, options| Box::new(RrdRecorder::create(path, options)),
+        study: |path, options, labels| Box::new(RrdStudy::create(path, options, labels)),
+    });
+}
 
 /// Number of waiting samples at which rows are written, and the smaller number at which they are
 /// written when a flush is due: enough for compression, few enough for quick reading.
@@ -278,6 +297,11 @@ fn content_hash(header: &RunHeader, labels: &[String]) -> u64 {
     let files = header.attachments.iter().flat_map(|file| file.bytes.iter().copied());
     let bytes = texts.flat_map(|text| text.bytes().chain([0])).chain(numbers).chain(files);
     bytes.fold(OFFSET, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(PRIME))
+}
+
+/// Returns the length of a vector.
+fn size(parts: &[f64]) -> f64 {
+    parts.iter().map(|part| part * part).sum::<f64>().sqrt()
 }
 
 fn stream_error(path: &Path, action: &'static str) -> impl FnOnce(StreamError) -> LogError {

@@ -15,8 +15,8 @@ use rerun::external::re_sdk_types::blueprint::datatypes::{TextLogColumn, TextLog
 use rerun::{AsComponents, EntityPath};
 
 use super::eye::Eye;
+use super::plot_room::{Corner, arrange};
 use super::tracks::CurveExtent;
-use crate::plot_room::{Corner, arrange};
 
 const VIEW_3D: &str = "3D";
 const VIEW_PLOT: &str = "TimeSeries";

@@ -7,7 +7,8 @@ use std::time::Duration;
 
 use flexarm_draw::palette::{self, Ground};
 use flexarm_kinematics::Pose;
-use flexarm_log::{Caption, CreateOptions, Recorder, RrdRecorder, RrdStudy, RunHeader};
+use flexarm_log::{Caption, CreateOptions, Recorder, RunHeader, StudyRecorder, study_recorder};
+use flexarm_rerun::RrdRecorder;
 use rerun::ComponentIdentifier;
 use rerun::external::re_log_encoding::DecoderApp;
 use rerun::log::{Chunk, LogMsg};
@@ -18,6 +19,11 @@ fn begin(path: &Path, header: &RunHeader, flush_every: Duration) -> RrdRecorder 
     let mut recorder = RrdRecorder::create(path, CreateOptions { overwrite: true, flush_every });
     recorder.begin(header).unwrap();
     recorder
+}
+
+fn study(path: &Path, labels: Vec<String>) -> Box<dyn StudyRecorder> {
+    flexarm_rerun::install();
+    study_recorder(path, CreateOptions { overwrite: true, flush_every: NEVER }, labels).unwrap()
 }
 
 fn run(name: &str, header: &RunHeader, samples: u64, flush_every: Duration) -> Vec<u8> {
@@ -339,8 +345,7 @@ fn any_name_is_one_part_of_a_path() {
 fn a_study_holds_all_its_runs_in_one_readable_file() {
     let path = synthetic::scratch("study.rrd");
     let write = || {
-        let options = CreateOptions { overwrite: true, flush_every: NEVER };
-        let study = RrdStudy::create(&path, options, vec!["one".into(), "two/2".into()]);
+        let study = study(&path, vec!["one".into(), "two/2".into()]);
         for number in 0..2 {
             let mut seat = study.seat(number);
             seat.check().unwrap();
@@ -385,8 +390,7 @@ fn recordings_of_different_set_ups_have_different_identities() {
     assert_eq!(identities[0], identities[1]);
     assert_ne!(identities[0], identities[2]);
     let path = synthetic::scratch("identity-study.rrd");
-    let options = CreateOptions { overwrite: true, flush_every: NEVER };
-    let study = RrdStudy::create(&path, options, vec!["one".into()]);
+    let study = study(&path, vec!["one".into()]);
     let mut seat = study.seat(0);
     seat.begin(&header).unwrap();
     seat.finish(&synthetic::result()).unwrap();
@@ -398,8 +402,7 @@ fn recordings_of_different_set_ups_have_different_identities() {
 #[test]
 fn a_study_that_is_given_up_keeps_the_runs_it_has() {
     let path = synthetic::scratch("given-up.rrd");
-    let options = CreateOptions { overwrite: true, flush_every: NEVER };
-    let study = RrdStudy::create(&path, options, vec!["one".into(), "two".into()]);
+    let study = study(&path, vec!["one".into(), "two".into()]);
     let mut first = study.seat(0);
     first.begin(&synthetic::header()).unwrap();
     (0..100).for_each(|step| first.record(&synthetic::sample(step)).unwrap());
@@ -516,9 +519,8 @@ fn colours_are_those_of_the_report_and_no_two_shares_have_the_same() {
 #[test]
 fn a_study_has_its_runs_in_the_order_of_colours_and_says_whose_events_and_shares_it_shows() {
     let path = synthetic::scratch("study_colors.rrd");
-    let options = CreateOptions { overwrite: true, flush_every: NEVER };
     let labels = ["as given", "modal"];
-    let study = RrdStudy::create(&path, options, labels.map(str::to_owned).to_vec());
+    let study = study(&path, labels.map(str::to_owned).to_vec());
     for number in 0..2 {
         let mut seat = study.seat(number);
         seat.begin(&synthetic::header()).unwrap();

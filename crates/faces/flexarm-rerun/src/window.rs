@@ -6,7 +6,7 @@ use super::entity::path;
 use super::layout::Part;
 use super::run::Seat;
 use super::scenery;
-use crate::{GaugeQuantity, RunHeader, STRESS_VIEW};
+use flexarm_log::{GaugeQuantity, RunHeader, STRESS_VIEW};
 
 /// Lays out the robots with the result below, and the error and its causes beside them.
 pub(crate) fn window(header: &RunHeader, seat: &Seat, labels: &[String]) -> Part {

@@ -8,14 +8,14 @@ use rerun::TextDocument;
 use super::entity::path;
 use super::run::Seat;
 use super::{RunWriter, Store, content_hash, stream_error};
-use crate::{CreateOptions, LogError, Recorder, RunHeader, RunResult, Sample};
+use flexarm_log::{CreateOptions, LogError, Recorder, RunHeader, RunResult, Sample, StudyRecorder};
 
 /// A recording of several runs: each has its arm in its own colour (deflections magnified), its TCP
 /// path and its error; the first one also all curves and the rigid twin.
 ///
-/// The runs are recorded one after another, each through its [`StudySeat`]; time starts at zero for
+/// The runs are recorded one after another, each through its seat ([`StudyRecorder::seat`]); time starts at zero for
 /// each.
-pub struct RrdStudy {
+pub(crate) struct RrdStudy {
     path: PathBuf,
     options: CreateOptions,
     labels: Vec<String>,
@@ -25,31 +25,24 @@ pub struct RrdStudy {
 impl RrdStudy {
     /// Creates a study for `path`, with a label for each run; the file is created when the first
     /// run begins.
-    pub fn create(path: impl Into<PathBuf>, options: CreateOptions, labels: Vec<String>) -> Self {
+    pub(crate) fn create(path: impl Into<PathBuf>, options: CreateOptions, labels: Vec<String>) -> Self {
         Self { path: path.into(), options, labels, store: Arc::default() }
     }
+}
 
-    /// Returns the recorder of the run with this number.
-    ///
-    /// # Panics
-    /// If there is no label with this number.
-    #[must_use]
-    pub fn seat(&self, number: usize) -> StudySeat {
-        StudySeat {
+impl StudyRecorder for RrdStudy {
+    fn seat(&self, number: usize) -> Box<dyn Recorder> {
+        Box::new(StudySeat {
             path: self.path.clone(),
             options: self.options,
             seat: Seat::InStudy(number, self.labels[number].clone()),
             labels: self.labels.clone(),
             store: self.store.clone(),
             run: None,
-        }
+        })
     }
 
-    /// Ends the file, with a text (Markdown) that compares the runs.
-    ///
-    /// # Errors
-    /// [`LogError`] on a write error, or if no run was recorded.
-    pub fn finish(self, text: &str) -> Result<(), LogError> {
+    fn finish(self: Box<Self>, text: &str) -> Result<(), LogError> {
         let Some(mut store) = lock(&self.store).take() else { return Err(LogError::not_open(&self.path, "finish")) };
         let mut close = || {
             store.stream.constant(&path(["summary"]), &TextDocument::from_markdown(text))?;
@@ -69,7 +62,7 @@ impl Drop for RrdStudy {
 }
 
 /// Records one run of a study.
-pub struct StudySeat {
+struct StudySeat {
     path: PathBuf,
     options: CreateOptions,
     seat: Seat,

@@ -8,8 +8,8 @@ use rerun::{
     TimeColumn, Transform3D,
 };
 
+use super::plot_room::Envelope;
 use super::stream::{Result, RrdStream};
-use crate::plot_room::Envelope;
 
 /// Name of the timeline of simulated time.
 pub(crate) const SIM_TIME: &str = "sim_time";

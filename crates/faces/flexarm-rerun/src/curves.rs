@@ -4,10 +4,10 @@ use rerun::{Color, EntityPath, TimeColumn};
 
 use super::colors::{axis, component, faint, series, total};
 use super::entity::path;
+use super::size;
 use super::stream::{Result, RrdStream};
 use super::tracks::{CurveExtent, ScalarTrack};
-use crate::poses::size;
-use crate::{GaugeQuantity, RunHeader, Sample};
+use flexarm_log::{GaugeQuantity, RunHeader, Sample};
 
 /// All curves of a run.
 pub(crate) struct Curves {

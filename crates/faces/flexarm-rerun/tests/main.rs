@@ -1,0 +1,8 @@
+//! The tests of the crate, as one program: it links once.
+#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
+#![allow(non_snake_case, reason = "monogram notation: X_WT, pose of T in W")]
+
+mod installed;
+mod rrd;
+#[path = "../../../results/flexarm-log/tests/synthetic/mod.rs"]
+mod synthetic;
