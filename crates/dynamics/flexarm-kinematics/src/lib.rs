@@ -48,7 +48,6 @@ mod balancer;
 mod closure;
 mod crba;
 mod data;
-mod dynamic_tangent;
 mod energy;
 mod inverse_kinematics;
 mod kinematics;
@@ -85,7 +84,6 @@ pub use balancer::{
 pub use closure::{LOOP_AXIS_TOLERANCE_RAD, LoopClosure, PlacedLoop};
 pub use crba::{mass_matrix, mass_matrix_at_poses};
 pub use data::{Data, State};
-pub use dynamic_tangent::DynamicTangent;
 pub use energy::{
     center_of_mass, kinetic_energy, kinetic_energy_of, momentum_of, potential_energy, potential_energy_of,
 };

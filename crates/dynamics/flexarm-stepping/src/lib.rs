@@ -46,6 +46,7 @@ mod equations;
 mod equilibrium;
 mod error;
 mod events;
+mod exact_run;
 mod gear;
 mod geometric;
 mod guide;
@@ -59,7 +60,6 @@ mod motion;
 mod observation;
 mod operating_point;
 mod reduced;
-mod run_slopes;
 mod servo;
 mod static_path;
 mod static_targets;
@@ -75,6 +75,7 @@ pub use batch::{Batch, BatchRun, ToolDeflection};
 pub use drive::{CurveError, Friction, ServoAxis, SpringCurve, TorqueCurve};
 pub use equations::EquationsOfMotion;
 pub use error::StepError;
+pub use exact_run::{ExactRun, ToolErrors, TorqueLimited};
 pub use gear::{GearCoupling, Harmonic, Hysteresis, LoadFriction, Slider, TransmissionError};
 pub use guide::{Guide, GuideTerm, Play};
 pub use integrator::{Current, Integrator, TimeGrid};
@@ -85,10 +86,6 @@ pub use motion::{Held, MotionFn, PrescribedMotion};
 pub use observation::Observation;
 pub use operating_point::{OperatingPoint, PoseAnswer, PoseOutputs};
 pub use reduced::ReducedArm;
-pub use run_slopes::{
-    AxisSlope, Direction, ErrorSlopes, RunSlopes, SlopesRequest, SpringSlope, TorqueLimited, equilibrium_slopes,
-    run_slopes,
-};
 pub use static_path::StaticPath;
 pub use static_targets::{StaticTargets, TargetError, static_targets};
 pub use statics::static_equilibrium;

@@ -200,7 +200,7 @@ fn servos_drive_a_rigid_arm_with_a_loop_along_its_motion() {
         position_gain: 20.0,
         velocity_gain: 4e4,
         integral_gain: 1e5,
-        feed_forward: true,
+        feed_forward: 1.0,
         limit: f64::INFINITY,
     };
     let servo = Servo { sample_s: 1e-4, axes: (0..3).map(axis).collect(), rigid: model.clone() };
