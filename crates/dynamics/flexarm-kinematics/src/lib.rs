@@ -60,7 +60,6 @@ mod pose;
 mod redundancy;
 mod rnea;
 mod static_tangent;
-mod tree;
 
 pub use flexarm_spatial::{
     AngleKinematics, ArticulatedInertia, ElasticAngles, Pose, Real, SpatialInertia, Twist, Wrench, adjoint,

@@ -9,7 +9,7 @@
 
 use std::sync::Arc;
 
-use flexarm_kinematics::{Data, Frame, forward_kinematics, rotation_vector};
+use flexarm_kinematics::{Frame, rotation_vector};
 use nalgebra::DVector;
 
 use crate::arm::FlexibleArm;
@@ -18,6 +18,7 @@ use crate::observation::Observation;
 use crate::statics::static_equilibrium;
 use crate::stepper::{Start, Stepper};
 use crate::steppers::AlphaSettings;
+use crate::tool_run::{ToolPoses, steps};
 
 /// Settings of a run with fully converged iterations.
 #[derive(Clone, Debug)]
@@ -57,7 +58,7 @@ pub struct TorqueLimited {
 }
 
 impl ExactRun {
-    /// Runs an arm. At velocity jumps of joints under servos the reference is the motion itself.
+    /// Runs an arm.
     ///
     /// # Errors
     /// As [`new_stepper`](crate::new_stepper) and [`Stepper::step`].
@@ -75,20 +76,14 @@ impl ExactRun {
         let arm = Arc::new(arm);
         let mut stepper = settings.stepper(arm.clone(), step_s, &e)?;
         stepper.integrator = stepper.integrator.exactly();
-        let (model, m) = (&arm.model, arm.model.n_actuated());
-        let (mut rigid, mut q) = (Data::new(model), DVector::zeros(model.nv()));
-        let (mut rates, mut accelerations) = (vec![0.0; m], vec![0.0; m]);
-        let mut seen = Observation::new(&arm);
+        let (mut seen, mut poses) = (Observation::new(&arm), ToolPoses::new(&arm, &self.tool));
         let mut found = ToolErrors::default();
-        let steps = (self.duration_s / step_s - 1e-9).ceil().max(0.0) as u64;
-        for step in 0..=steps {
+        for step in 0..=steps(self.duration_s, step_s) {
             if step > 0 {
                 stepper.step()?;
             }
             stepper.observe(&mut seen);
-            arm.motion.sample(seen.t, &mut q.as_mut_slice()[..m], &mut rates, &mut accelerations);
-            forward_kinematics(model, &mut rigid, &q);
-            let (X, X_rigid) = (seen.X_WB[self.tool.body] * self.tool.X_BF, rigid.X_WF(&self.tool));
+            let [X_rigid, X] = poses.at(&seen);
             let p = X.translation.vector - X_rigid.translation.vector;
             let theta = rotation_vector(&(X.rotation.matrix() * X_rigid.rotation.matrix().transpose()));
             found.times_s.push(seen.t);

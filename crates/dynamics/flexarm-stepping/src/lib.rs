@@ -35,7 +35,6 @@
 
 mod arm;
 mod assembly;
-mod batch;
 mod dense;
 #[cfg(test)]
 mod draw;
@@ -68,10 +67,10 @@ mod steady;
 mod stepper;
 pub mod steppers;
 mod system;
+mod tool_run;
 mod tree_matrix;
 
 pub use arm::{Damping, ElasticElement, FlexibleArm, GeometricStiffness, InertiaChange, Modes, Servo, Spring};
-pub use batch::{Batch, BatchRun, ToolDeflection};
 pub use drive::{CurveError, Friction, ServoAxis, SpringCurve, TorqueCurve};
 pub use equations::EquationsOfMotion;
 pub use error::StepError;
@@ -93,4 +92,5 @@ pub use steady::{SteadyRotation, linearise_rotation};
 pub use stepper::{Counts, Start, Stepper};
 pub use steppers::*;
 pub use system::SecondOrderSystem;
+pub use tool_run::{ToolDeflection, ToolRun};
 pub use tree_matrix::{TreeMatrices, TreeNode};

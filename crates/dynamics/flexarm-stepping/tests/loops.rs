@@ -231,24 +231,6 @@ fn steps_over_a_loop_do_not_allocate() {
     }
 }
 
-#[test]
-fn runs_side_by_side_are_those_alone() {
-    let one = |beta: f64| BatchRun { arm: arm(moving(), beta), duration_s: 0.05 };
-    let runs = [one(1e-4), one(2e-4), one(3e-4), one(4e-4)];
-    let batch = Batch {
-        step_s: 1e-3,
-        stepper: StepperKind::default(),
-        start: Start::Equilibrium,
-        tool: runs[0].arm.model.frame("tool").unwrap().clone(),
-        keep_samples: true,
-    };
-    let together = batch.run(&runs);
-    for (run, found) in runs.iter().zip(together) {
-        let alone = batch.run(std::slice::from_ref(run)).remove(0).unwrap();
-        assert_eq!(found.unwrap().samples_m, alone.samples_m);
-    }
-}
-
 /// A crank that turns until the rod is too short: all steppers stop there and report place and
 /// cause.
 #[test]

@@ -7,7 +7,6 @@
 use flexarm_testkit::allocations::CountingAllocator;
 
 mod balancers;
-mod batch;
 mod chains;
 mod drives;
 mod elimination;
