@@ -870,15 +870,12 @@ rpm = [3000.0, 6000.0]
 axis = [0.0, 0.0, 1.0]
 feed = [1.0, 0.0, 0.0]
 tip = [0.0, 0.0, 50.0]
-feed_per_tooth = 0.1
 [[mode]]
 direction = "radial"
 frequency = 700.0
 damping = 0.03
 stiffness = 1e7
 """
-MEASURED_TOOL = CUTTING_TOOL[:CUTTING_TOOL.index("[[mode]]")] + '[measured]\nfile = "frf.csv"\n'
-TOOL_RESPONSE = "frequency_hz,xx_re,xx_im,yy_re,yy_im\n" + "".join(f"{hz},1e-7,{-1e-9 * hz},1e-7,{-2e-9 * hz}\n" for hz in range(10, 200, 10))
 
 
 class Target:
@@ -987,8 +984,7 @@ def own_targets():
         Target("sweep-table", "table.csv", {**base, "study.toml": SWEEP_TABLE, "table.csv": "payload.mass,motion.speed\n1.0,1.0\n1.5,0.9\n"}, [["sweep", "study.toml", "-o", "made", "--force", "--threads", "1", "--json"]], True),
         Target("compensate", "motion.toml", base, [["compensate", "robot.toml", "motion.toml", "--no-files", "--no-sweep", "--iterations", "1", "--components", "z", "--json"]], True),
         Target("map", "robot.toml", base, [["map", "robot.toml", "--over", "swing=-0.5:0.5:5", "--wrench", "1,2,3", "--no-files", "--json"]]),
-        Target("cutting-tool", "tool.toml", {**base, "tool.toml": CUTTING_TOOL}, [["lobes", "robot.toml", "--tool", "tool.toml", "--no-files", "--json"], ["lobes", "robot.toml", "--tool", "tool.toml", "--deepest", "1e-6", "--no-files", "--json"], ["lobes", "robot.toml", "--tool", "tool.toml", "--cut", "3000,0.001", "--seconds", "0.05", "--no-files", "--json"]], True),
-        Target("tool-response", "frf.csv", {**base, "tool.toml": MEASURED_TOOL, "frf.csv": TOOL_RESPONSE}, [["lobes", "robot.toml", "--tool", "tool.toml", "--no-files", "--json"], ["lobes", "robot.toml", "--tool", "tool.toml", "--deepest", "1e-6", "--no-files", "--json"]], True),
+        Target("cutting-tool", "tool.toml", {**base, "tool.toml": CUTTING_TOOL}, [["lobes", "robot.toml", "--tool", "tool.toml", "--no-files", "--json"], ["lobes", "robot.toml", "--tool", "tool.toml", "--deepest", "1e-6", "--no-files", "--json"]], True),
         Target("motion-toml", "motion.toml", base, [check, COMPARE], True),
         Target("motion-csv", "motion.csv", base, [["check", "robot.toml", "motion.csv", "--json"], [w if w != "motion.toml" else "motion.csv" for w in COMPARE]], True),
         Target("motion-table", "trace.txt", {**base, "trace.txt": TRACE}, [["motion", "trace.txt", "robot.toml", "--json"], ["motion", "trace.txt", "--columns", "t=#1[ms],swing=A1[deg]", "--json"]]),
