@@ -1041,15 +1041,14 @@ def made_targets(run, folder):
     targets = []
     for model in ("lumped", "modal"):
         files = {"beam.urdf": BOX, "motion.toml": MOTION, "bar.flex": flex, "robot.toml": ROBOT_FLEX.replace("MODEL", model)}
-        commands = [["statics", "robot.toml", "--json"], COMPARE, ["export", "bar.flex", "--format", "sid", "--units", "mm-t-s", "-o", "out", "--force", "--json"]]
+        commands = [["statics", "robot.toml", "--json"], COMPARE, ["export", "bar.flex", "--format", "simscape", "--units", "mm-t-s", "-o", "out", "--force", "--json"]]
         targets.append(Target(f"flex-{model}", "bar.flex", files, commands, True))
         targets.append(Target(f"stress-{model}", "bar.stress", {**files, "bar.stress": stress}, [COMPARE], True))
     nodes, at = ["--map", "A=1001,B=1002"], ["--at", "A=0,0,0", "--at", "B=800,0,0"]
     rows = ["--map", "A=#1-6,B=#7-12,modal=#13-16"]
     for word, change, words in (
         ("matrix-market", "bar_K.mtx", []), ("matrix-market", "bar.toml", []), ("user-element", "bar.mtx", [*nodes, *at]),
-        ("dmig", "bar.pch", nodes), ("op4", "bar.op4", [*rows, *at]), ("simscape", "bar_K.csv", [*rows, *at]), ("simscape", "bar_frames.csv", [*rows]),
-        ("sid", "bar.SID_FEM", ["--map", "A=1,B=2"]),
+        ("simscape", "bar_K.csv", [*rows, *at]), ("simscape", "bar_frames.csv", [*rows]),
     ):
         shutil.rmtree(folder / "matrices", ignore_errors=True)
         run(export(word))
@@ -1060,10 +1059,12 @@ def made_targets(run, folder):
         first = {"bar.toml": "bar_K.mtx", "bar_frames.csv": "bar_K.csv"}.get(change, change)
         given = [first] + [name for name in files if word == "simscape" and name.endswith(".csv") and name != first]
         units = [] if word == "matrix-market" else ["--units", "mm-t-s"]
-        if word == "dmig":
-            units = ["--units", "mm-t-s"]
         command = ["import", *given, *units, *words, "--no-files", "--json"]
         targets.append(Target(f"matrix-{change}", change, files, [command]))
+    stored = ROOT / "crates/faces/flexarm-cli/tests/data"
+    for name, words in (("bar.pch", nodes), ("bar.op4", ["--map", "A=#1-6,B=#7-12,modal=#13", *at]), ("bar.SID_FEM", ["--map", "A=1,B=2"])):
+        command = ["import", name, "--units", "mm-t-s", *words, "--no-files", "--json"]
+        targets.append(Target(f"matrix-{name}", name, {name: (stored / name).read_bytes()}, [command]))
     run(["compare", "robot.toml", "motion.toml", "-o", "run", "--log-rate", "50", "--parquet", "--also", "arrow", "--quiet"], ["compare", "robot.toml", "motion.toml", "-o", "run", "--log-rate", "50", "--quiet"])
     for name in ("run.csv", "run.mcap", "run.parquet", "run.arrow"):
         path = folder / "run" / name

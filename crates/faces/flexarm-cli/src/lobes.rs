@@ -12,7 +12,7 @@ use crate::failure::Failure;
 use crate::posed_args::PoseArgs;
 use crate::print::{lines, table};
 use crate::shipped::OutputFolder;
-use crate::terminal::{Terminal, answer, to_json, working};
+use crate::terminal::{Terminal, answer, to_json};
 use crate::{shipped, values};
 
 const EXAMPLES: &str = "\

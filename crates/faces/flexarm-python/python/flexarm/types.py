@@ -2081,8 +2081,6 @@ class ExportChecks(TypedDict):
     """Maximum difference of the mass, relative to `sqrt(m_ii m_jj)`; null without mass."""
     stiffness_error: float
     """Maximum difference of the stiffness, relative to `sqrt(k_ii k_jj)`."""
-    integrals_error: float | None
-    """Maximum difference of the mass integrals of a modal link; null in other formats."""
 
 
 class ExportSummary(TypedDict):
