@@ -338,7 +338,7 @@ fn an_import_and_an_export_name_their_flags() {
             (&with(&["--at", "A=0,0,0"]), "--at A=... is given twice"),
             (
                 &with(&["--format", "dmig"]),
-                "e/bar_K.csv: is Simscape CSV according to its content, but --format gives another format: omit it",
+                "e/bar_K.csv: is comma-separated matrix according to its content, but --format gives another format: omit it",
             ),
             (
                 &[&units[..], &map, &["--at", "A=0,0,0", "--at", "B=0,0,0"]].concat(),
