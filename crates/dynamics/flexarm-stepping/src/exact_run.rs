@@ -15,6 +15,7 @@ use nalgebra::DVector;
 use crate::arm::FlexibleArm;
 use crate::error::StepError;
 use crate::observation::Observation;
+use crate::servo::TorqueLimited;
 use crate::statics::static_equilibrium;
 use crate::stepper::{Start, Stepper};
 use crate::steppers::AlphaSettings;
@@ -44,17 +45,6 @@ pub struct ToolErrors {
     pub errors: Vec<[f64; 6]>,
     /// Servos that reached their torque limits, in order of the time of the first limited sample.
     pub limited: Vec<TorqueLimited>,
-}
-
-/// A servo that reached its torque limit.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TorqueLimited {
-    /// Coordinate of the joint.
-    pub coordinate: usize,
-    /// Number of limited samples.
-    pub samples: u64,
-    /// Time of the first one (s).
-    pub first_s: f64,
 }
 
 impl ExactRun {

@@ -74,7 +74,7 @@ pub use arm::{Damping, ElasticElement, FlexibleArm, GeometricStiffness, InertiaC
 pub use drive::{CurveError, Friction, ServoAxis, SpringCurve, TorqueCurve};
 pub use equations::EquationsOfMotion;
 pub use error::StepError;
-pub use exact_run::{ExactRun, ToolErrors, TorqueLimited};
+pub use exact_run::{ExactRun, ToolErrors};
 pub use gear::{GearCoupling, Harmonic, Hysteresis, LoadFriction, Slider, TransmissionError};
 pub use guide::{Guide, GuideTerm, Play};
 pub use integrator::{Current, Integrator, TimeGrid};
@@ -85,6 +85,7 @@ pub use motion::{Held, MotionFn, PrescribedMotion};
 pub use observation::Observation;
 pub use operating_point::{OperatingPoint, PoseAnswer, PoseOutputs};
 pub use reduced::ReducedArm;
+pub use servo::TorqueLimited;
 pub use static_path::StaticPath;
 pub use static_targets::{StaticTargets, TargetError, static_targets};
 pub use statics::static_equilibrium;

@@ -8,8 +8,18 @@ use nalgebra::DVector;
 
 use crate::arm::{FlexibleArm, Servo};
 use crate::drive::Friction;
-use crate::exact_run::TorqueLimited;
 use crate::gear::LoadFriction;
+
+/// A servo that reached its torque limit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TorqueLimited {
+    /// Coordinate of the joint.
+    pub coordinate: usize,
+    /// Number of limited samples.
+    pub samples: u64,
+    /// Time of the first one (s).
+    pub first_s: f64,
+}
 
 /// State of a [`Servo`] in a run.
 #[derive(Clone)]
