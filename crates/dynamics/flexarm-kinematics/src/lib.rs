@@ -67,7 +67,7 @@ pub use flexarm_spatial::{
 };
 
 #[cfg(target_arch = "x86_64")]
-pub use flexarm_spatial::lanes::{OverLanes, lanes_for, most_lanes, with_lanes};
+pub use flexarm_spatial::lanes::{OverLanes, with_lanes};
 pub use flexarm_spatial::products;
 
 pub use aba::{Roles, forward_dynamics, hybrid_dynamics};

@@ -75,7 +75,7 @@ fn the_error_of_kr210_depends_on_its_numbers_as_differences_of_runs_say() {
         let largest = truth.iter().fold(0.0f64, |m, x| m.max(x.abs()));
         let off = own.iter().zip(&truth).fold(0.0f64, |m, (a, b)| m.max((a - b).abs()));
         eprintln!("{}: {:.1e} of {largest:.2e}", parameter.name, off / largest);
-        // At most 1e-7, and rounding, 2e-14 m over twice the step.
+        // Measured 1e-8 to 5e-8, dampers 1.5e-7.
         assert!(off < 1e-6 * largest + 2e-13, "{}: {:e}", parameter.name, off / largest);
     }
 }
@@ -84,11 +84,10 @@ fn the_error_of_kr210_depends_on_its_numbers_as_differences_of_runs_say() {
 #[test]
 fn the_error_that_is_differentiated_is_that_of_a_run() {
     let (_, arm, motion) = shipped("kr210", "point_to_point");
-    let options = RunOptions { step_s: 0.01, ..RunOptions::default() };
-    let found = error_slopes(&arm, &motion, &options, &[RunParameter::Joint(1)], false).unwrap();
+    let options = RunOptions::default();
+    let found = error_slopes(&arm, &motion, &options, &[], false).unwrap();
     let theirs = arm.simulate(&motion, &options).unwrap().summary.tcp.as_ref().unwrap().peak_m;
     assert!((found.position.peak - theirs).abs() < 1e-4 * theirs, "{} {theirs}", found.position.peak);
-    assert!(found.slopes.is_empty() && found.position.peak_slopes.len() == 1);
 }
 
 /// Truth: factors on all six directions together equal the factor on the whole.
@@ -220,6 +219,7 @@ impl Changed {
             let largest = truth.iter().fold(0.0f64, |m, x| m.max(x.abs()));
             let off = slopes.zip(&truth).fold(0.0f64, |m, (a, b)| m.max((a - b).abs()));
             eprintln!("{}: {:.1e} of {largest:.2e}", own.name, off / largest);
+            // Measured 8e-9 (the motion) to 2e-7 (gains).
             assert!(off < 1e-6 * largest + 4e-14 / own.size, "{}: {:e}", own.name, off / largest);
         }
     }

@@ -25,7 +25,7 @@ use rayon::prelude::*;
 /// Relative step of parameters that change natural frequencies or the motion.
 const OF_FREQUENCY: f64 = 3e-5;
 /// Relative step of parameters that change amplitudes alone.
-const OF_AMPLITUDE: f64 = 1e-3;
+const OF_AMPLITUDE: f64 = 5e-4;
 
 /// Parameter with respect to which a run is differentiated.
 #[derive(Clone, Debug)]

@@ -5,10 +5,8 @@
 //! Depending on the writer, the number of words in a column counts a double once or twice, so the
 //! values are counted instead.
 
-use nalgebra::DMatrix;
-
 use super::error::{ErrorPosition, ExchangeError, ExchangeErrorKind};
-use super::fortran::{Format, fortran, parse_format};
+use super::fortran::{Format, parse_format};
 use super::matrix::{LabelledMatrix, Storage, Triplets};
 use super::text::{Text, shown, words};
 

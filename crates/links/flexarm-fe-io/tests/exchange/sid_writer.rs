@@ -58,7 +58,7 @@ impl InertiaTerms {
 /// Converts a modal link to Standard Input Data, SI; node 1 is A, the others follow in order.
 ///
 /// `De` is zero, because a modal link has no damping.
-pub fn sid_of_modal_link(link: &ModalLink) -> Sid {
+pub(crate) fn sid_of_modal_link(link: &ModalLink) -> Sid {
     let n = link.coordinates();
     let dense = |A: &Matrix3xX<f64>| DMatrix::from_fn(n, 3, |k, a| A[(a, k)]);
     let column = |v: &Vector3<f64>| DMatrix::from_column_slice(3, 1, v.as_slice());
@@ -143,7 +143,7 @@ fn side_by_side(n: usize, G: &[DMatrix<f64>]) -> SidMatrix {
 /// Writes a `.SID_FEM` file with 17 digits; it reads back bit for bit.
 ///
 /// Index orders are those of the struct; see [`Sid::conventions`].
-pub fn write_sid(sid: &Sid) -> String {
+pub(crate) fn write_sid(sid: &Sid) -> String {
     let mut text =
         format!("{:5} {:4}    :{}\n part\n     new modal\n          refmod\n", sid.nodes.len(), sid.nq(), sid.comment);
     let mut line = |indent: usize, key: &str, value: &str| {

@@ -16,7 +16,7 @@
 use flexarm_spatial::Pose;
 use nalgebra::{DMatrix, Matrix3, Matrix3xX, Matrix6xX, Rotation3, Translation3, Vector3};
 
-use flexarm_fem::modal::{GeometricStiffness, ModalInterface, ModalLink, PRODUCTS, axial, symmetric};
+use flexarm_fem::modal::{GeometricStiffness, ModalInterface, ModalLink, PRODUCTS, symmetric};
 
 use super::{GyroLayout, OeOrder, Sid, SidMatrix, SidNode};
 use crate::exchange::{ExchangeError, ExchangeErrorKind};
