@@ -18,7 +18,6 @@ use crate::closure;
 use crate::data::{Data, ElasticSubspace, begin, joint_position};
 use crate::kinematics::turned;
 use crate::model::{Body, JointMotion, Model};
-use crate::tree::Tree;
 
 /// Computes the mass matrix `M(q)`, nv×nv, both triangles (kg, kg m, kg m²). Fills
 /// `data.{X_PB, M}`. Does not allocate.
@@ -149,9 +148,8 @@ fn along<T: Real>(a: &Vector3<T>, rows: &[[T; 6]; 3]) -> Six<T> {
 
 /// [`mass_matrix_at_poses`] for any scalar type.
 #[inline(always)]
-pub(crate) fn composite_bodies<T: Real>(tree: &impl Tree<T>, data: &mut Data<T>) {
-    let model = tree.model();
-    turn_bodies(tree, data);
+pub(crate) fn composite_bodies<T: Real>(model: &Model, data: &mut Data<T>) {
+    turn_bodies(model, data);
     begin_modal_columns(model, data);
     for (i, body) in model.bodies.iter().enumerate().skip(1).rev() {
         let (k, own, composite) = (body.coordinate, &data.turned[i], &data.composite[i]);
@@ -192,11 +190,10 @@ pub(crate) fn composite_bodies<T: Real>(tree: &impl Tree<T>, data: &mut Data<T>)
 
 /// Fills `turned` and initialises `composite` with the inertia of each body.
 #[inline(always)]
-fn turn_bodies<T: Real>(tree: &impl Tree<T>, data: &mut Data<T>) {
-    let model = tree.model();
+fn turn_bodies<T: Real>(model: &Model, data: &mut Data<T>) {
     let base_bends = model.bodies[0].modal.is_some();
     if base_bends {
-        data.composite[0] = tree.inertia(0);
+        data.composite[0] = SpatialInertia::lift(&model.bodies[0].inertia);
     }
     // Bodies whose axes are used for their whole arm.
     let is_first = |i: usize| i == 0 || (model.bodies[i].parent == 0 && !base_bends);
@@ -204,7 +201,7 @@ fn turn_bodies<T: Real>(tree: &impl Tree<T>, data: &mut Data<T>) {
         let (X_PB, S) = (&data.X_PB[i], &data.elastic[i]);
         let (inward, outward) = data.turned.split_at_mut(i);
         let (P, B) = (&inward[body.parent], &mut outward[0]);
-        let mut inertia = tree.inertia(i);
+        let mut inertia = SpatialInertia::lift(&model.bodies[i].inertia);
         if let Some(m) = body.modal {
             inertia += data.modal[m].inertia;
         }

@@ -48,7 +48,6 @@ mod balancer;
 mod closure;
 mod crba;
 mod data;
-mod dynamic_tangent;
 mod energy;
 mod inverse_kinematics;
 mod kinematics;
@@ -61,7 +60,6 @@ mod pose;
 mod redundancy;
 mod rnea;
 mod static_tangent;
-mod tree;
 
 pub use flexarm_spatial::{
     AngleKinematics, ArticulatedInertia, ElasticAngles, Pose, Real, SpatialInertia, Twist, Wrench, adjoint,
@@ -69,7 +67,7 @@ pub use flexarm_spatial::{
 };
 
 #[cfg(target_arch = "x86_64")]
-pub use flexarm_spatial::lanes::{OverLanes, lanes_for, most_lanes, with_lanes};
+pub use flexarm_spatial::lanes::{OverLanes, with_lanes};
 pub use flexarm_spatial::products;
 
 pub use aba::{Roles, forward_dynamics, hybrid_dynamics};
@@ -85,7 +83,6 @@ pub use balancer::{
 pub use closure::{LOOP_AXIS_TOLERANCE_RAD, LoopClosure, PlacedLoop};
 pub use crba::{mass_matrix, mass_matrix_at_poses};
 pub use data::{Data, State};
-pub use dynamic_tangent::DynamicTangent;
 pub use energy::{
     center_of_mass, kinetic_energy, kinetic_energy_of, momentum_of, potential_energy, potential_energy_of,
 };

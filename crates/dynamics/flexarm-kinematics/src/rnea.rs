@@ -13,14 +13,13 @@
 //! [`crate::ModalBody`].
 
 use flexarm_spatial::products::{cross, lift, scaled, tr_mul};
-use flexarm_spatial::{Real, Twist, Wrench};
+use flexarm_spatial::{Real, SpatialInertia, Twist, Wrench};
 use nalgebra::{DVector, Vector3};
 
 use crate::balancer::{add_joint_torques, with_lines};
 use crate::closure;
 use crate::data::{Data, State, add_projection, begin, joint_motion, joint_position, rotor_energy, subspace_times};
 use crate::model::Model;
-use crate::tree::Tree;
 
 /// Computes generalised forces `τ = M(q) q̈ + bias(q, q̇)` (N m or N) for the accelerations
 /// `qddot`.
@@ -85,8 +84,7 @@ pub fn gravity_forces_at_poses<'d>(model: &Model, data: &'d mut Data, q: &DVecto
 /// [`newton_euler`] for a tree at rest, with the joint poses in `data`: bitwise the same result,
 /// without the velocity terms.
 #[inline(always)]
-pub(crate) fn at_rest<T: Real>(tree: &impl Tree<T>, data: &mut Data<T>) {
-    let model = tree.model();
+pub(crate) fn at_rest<T: Real>(model: &Model, data: &mut Data<T>) {
     let n = model.bodies.len();
     data.rotor_energy = T::zero();
     data.V.fill(Twist::zeros());
@@ -97,7 +95,7 @@ pub(crate) fn at_rest<T: Real>(tree: &impl Tree<T>, data: &mut Data<T>) {
         if i > 0 {
             // (2) and (3)
             let a = tr_mul(data.X_PB[i].rotation.matrix(), &data.A[body.parent].linear);
-            let inertia = tree.inertia(i);
+            let inertia = SpatialInertia::lift(&model.bodies[i].inertia);
             data.A[i] = Twist::new(a, Vector3::zeros());
             data.F[i] = Wrench::new(scaled(&a, inertia.mass), cross(&inertia.first_moment, &a)) - data.F_ext[i];
         }
@@ -130,8 +128,7 @@ fn with_balancers(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64], qddot
 
 /// Newton-Euler recursion for any scalar type, without balancers; the result is in `data.tau`.
 #[inline(always)]
-pub(crate) fn newton_euler<T: Real>(tree: &impl Tree<T>, data: &mut Data<T>, q: &[T], qdot: &[T], qddot: Option<&[T]>) {
-    let model = tree.model();
+pub(crate) fn newton_euler<T: Real>(model: &Model, data: &mut Data<T>, q: &[T], qdot: &[T], qddot: Option<&[T]>) {
     let n = model.bodies.len();
     data.V[0] = Twist::zeros();
     data.A[0] = Twist::new(lift(&-model.gravity), Vector3::zeros());
@@ -150,7 +147,7 @@ pub(crate) fn newton_euler<T: Real>(tree: &impl Tree<T>, data: &mut Data<T>, q: 
         if let Some(qddot) = qddot {
             A += subspace_times(model, data, i, qddot);
         }
-        let inertia = tree.inertia(i);
+        let inertia = SpatialInertia::lift(&model.bodies[i].inertia);
         let momentum = inertia.mul_twist(&V);
         data.F[i] = inertia.mul_twist(&A) + V.cross_force(&momentum) - data.F_ext[i]; // (3)
         data.V[i] = V;

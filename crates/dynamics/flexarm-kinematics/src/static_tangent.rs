@@ -31,14 +31,13 @@
 //! [`crate::gravity_forces`] take 2 n passes over the bodies.
 
 use flexarm_spatial::products::{add, add3, column as column_of, cross, cross3, dot, lift, mul, scaled, sub, tr_mul};
-use flexarm_spatial::{ElasticAngles, Pose, Real, Twist, Wrench};
+use flexarm_spatial::{ElasticAngles, Pose, Real, SpatialInertia, Twist, Wrench};
 use nalgebra::{DMatrix, DVector, Matrix3, Scalar, Vector3};
 
 use crate::balancer::{BalancerLine, BalancerPlace};
 use crate::closure::LoopTangent;
 use crate::data::Data;
 use crate::model::{JointMotion, Model};
-use crate::tree::Tree;
 
 /// Wrench on a body, for [`StaticTangent::compute`].
 #[derive(Clone, Copy, Debug)]
@@ -208,27 +207,26 @@ impl<T: Real> StaticTangent<T> {
     #[inline(always)]
     pub(crate) fn of_bodies(
         &mut self,
-        tree: &impl Tree<T>,
+        model: &Model,
         data: &Data<T>,
         q: &[T],
         loads: impl Iterator<Item = PointLoad>,
         G: &mut [T],
     ) {
         G.fill(T::zero());
-        self.carry_weights(tree, data);
+        self.carry_weights(model, data);
         for load in loads {
             self.carried[load.body].add(&load.carried(&data.X_WB[load.body]));
         }
-        self.finish(tree.model(), data, q, G);
+        self.finish(model, data, q, G);
     }
 
     /// W and T of (2) for the weight of each body.
     #[inline(always)]
-    fn carry_weights(&mut self, tree: &impl Tree<T>, data: &Data<T>) {
-        let model = tree.model();
+    fn carry_weights(&mut self, model: &Model, data: &Data<T>) {
         let gravity = lift(&model.gravity);
         for (i, (carried, body)) in self.carried.iter_mut().zip(&model.bodies).enumerate() {
-            let inertia = tree.inertia(i);
+            let inertia = SpatialInertia::lift(&model.bodies[i].inertia);
             let (mut mass, mut h_B) = (inertia.mass, inertia.first_moment);
             if let Some(m) = body.modal {
                 mass += data.modal[m].inertia.mass;

@@ -8,7 +8,6 @@ use flexarm_testkit::allocations::CountingAllocator;
 mod analytic_ik;
 mod arms;
 mod balancers;
-mod dynamic_tangent;
 mod helical;
 mod identities;
 mod loops;

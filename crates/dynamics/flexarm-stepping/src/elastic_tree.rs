@@ -16,8 +16,7 @@ use crate::tree_matrix::{TreeMatrices, TreeNode};
 
 /// Minimum number of elastic joints for elimination instead of a dense inverse: with two, 12
 /// coordinates, a step takes the same time either way, with three 2.8 instead of 3.3 us, with five
-/// 4.0 instead of 7.5, with 64 48 instead of 1800 (`examples/chains.rs`). With three a batch gains
-/// more from its SIMD lanes, whose matrices are dense.
+/// 4.0 instead of 7.5, with 64 48 instead of 1800 (`examples/chains.rs`).
 const FEWEST_NODES: usize = 4;
 
 /// Assignment of the bodies to nodes, and workspaces.

@@ -116,14 +116,6 @@ pub enum StepError {
         /// Maximum stable step (s).
         largest_s: f64,
     },
-    /// The derivative of a run is not available.
-    #[error("derivatives of a run are not available with {what}: {mend}")]
-    NoSlopes {
-        /// Feature that prevents it.
-        what: &'static str,
-        /// Remedy.
-        mend: &'static str,
-    },
     /// The arm is no ordinary differential equation in its coordinates.
     #[error(
         "an arm with hysteresis is no differential equation in its coordinates, because its springs depend on the past: leave hysteresis out"
@@ -174,7 +166,6 @@ impl StepError {
             Self::Singular { .. }
             | Self::Setup(_)
             | Self::OpenLoop { .. }
-            | Self::NoSlopes { .. }
             | Self::NoEquations
             | Self::OutOfRange
             | Self::Apart { .. } => &[],

@@ -88,16 +88,6 @@ impl EventQueue {
         Some((first.next_down(), self.jumps[self.jumps_over - 1].next_up()))
     }
 
-    /// Returns the number of jumps that are over.
-    pub(crate) fn jumps_over(&self) -> usize {
-        self.jumps_over
-    }
-
-    /// Returns the number of changes of inertia that are over.
-    pub(crate) fn changes_over(&self) -> usize {
-        self.changes_over
-    }
-
     /// Returns the next change of inertia due at `t` with its number, and marks it as over.
     pub(crate) fn due_change(&mut self, t: f64) -> Option<(usize, &InertiaChange)> {
         self.changes_before(t + SAME_TIME)

@@ -40,8 +40,7 @@ const TO_THE_END: f64 = 1e-6;
 /// the age of the matrix but to terms missing from it (weight, loads, velocities), whose error has
 /// the same sign in every step and may excite a mode.
 const EXACT: f64 = 0.5;
-/// ρ is measured in every step whose number is a multiple of this; parallel runs of a batch thus
-/// measure at the same steps.
+/// ρ is measured in every step whose number is a multiple of this.
 const MEASURED_EVERY: u64 = 8;
 /// Interval while ρ is small (see [`WELL_BELOW`]) and cannot become too large within a few steps.
 const MEASURED_RARELY: u64 = 24;
@@ -210,8 +209,6 @@ pub(crate) struct Search {
     /// `dx/dẍ` of the method (s²).
     c_K: f64,
     pub(crate) iterations: usize,
-    /// Whether it was given a fresh matrix; used by callers that compute the matrix later.
-    pub(crate) renewed: bool,
     /// Norms of the first and of the last correction.
     first: f64,
     last: f64,
@@ -219,7 +216,7 @@ pub(crate) struct Search {
 
 impl Search {
     pub(crate) fn new(t: f64, h: f64, c_K: f64) -> Self {
-        Self { t, h, c_K, iterations: 0, renewed: false, first: 0.0, last: f64::INFINITY }
+        Self { t, h, c_K, iterations: 0, first: 0.0, last: f64::INFINITY }
     }
 
     /// Returns whether the iteration stalls and needs a fresh matrix.

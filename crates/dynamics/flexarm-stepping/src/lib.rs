@@ -35,7 +35,6 @@
 
 mod arm;
 mod assembly;
-mod batch;
 mod dense;
 #[cfg(test)]
 mod draw;
@@ -46,6 +45,7 @@ mod equations;
 mod equilibrium;
 mod error;
 mod events;
+mod exact_run;
 mod gear;
 mod geometric;
 mod guide;
@@ -59,7 +59,6 @@ mod motion;
 mod observation;
 mod operating_point;
 mod reduced;
-mod run_slopes;
 mod servo;
 mod static_path;
 mod static_targets;
@@ -68,13 +67,14 @@ mod steady;
 mod stepper;
 pub mod steppers;
 mod system;
+mod tool_run;
 mod tree_matrix;
 
 pub use arm::{Damping, ElasticElement, FlexibleArm, GeometricStiffness, InertiaChange, Modes, Servo, Spring};
-pub use batch::{Batch, BatchRun, ToolDeflection};
 pub use drive::{CurveError, Friction, ServoAxis, SpringCurve, TorqueCurve};
 pub use equations::EquationsOfMotion;
 pub use error::StepError;
+pub use exact_run::{ExactRun, ToolErrors};
 pub use gear::{GearCoupling, Harmonic, Hysteresis, LoadFriction, Slider, TransmissionError};
 pub use guide::{Guide, GuideTerm, Play};
 pub use integrator::{Current, Integrator, TimeGrid};
@@ -85,10 +85,7 @@ pub use motion::{Held, MotionFn, PrescribedMotion};
 pub use observation::Observation;
 pub use operating_point::{OperatingPoint, PoseAnswer, PoseOutputs};
 pub use reduced::ReducedArm;
-pub use run_slopes::{
-    AxisSlope, Direction, ErrorSlopes, RunSlopes, SlopesRequest, SpringSlope, TorqueLimited, equilibrium_slopes,
-    run_slopes,
-};
+pub use servo::TorqueLimited;
 pub use static_path::StaticPath;
 pub use static_targets::{StaticTargets, TargetError, static_targets};
 pub use statics::static_equilibrium;
@@ -96,4 +93,5 @@ pub use steady::{SteadyRotation, linearise_rotation};
 pub use stepper::{Counts, Start, Stepper};
 pub use steppers::*;
 pub use system::SecondOrderSystem;
+pub use tool_run::{ToolDeflection, ToolRun};
 pub use tree_matrix::{TreeMatrices, TreeNode};

@@ -250,7 +250,7 @@ impl Servo {
         let of = |A: &DMatrix<f64>| {
             DMatrix::from_fn(self.axes.len(), m, |i, k| {
                 let axis = &self.axes[i];
-                if axis.feed_forward { A[(axis.coordinate, k)] } else { 0.0 }
+                axis.feed_forward * A[(axis.coordinate, k)]
             })
         };
         [of(&K), of(&D), of(&M)]
@@ -263,7 +263,7 @@ impl Servo {
             position_gain: 0.0,
             velocity_gain: 0.0,
             integral_gain: 0.0,
-            feed_forward: false,
+            feed_forward: 0.0,
             ..*axis
         };
         Self { axes: self.axes.iter().map(open).collect(), ..self.clone() }

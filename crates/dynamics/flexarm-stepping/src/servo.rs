@@ -10,21 +10,15 @@ use crate::arm::{FlexibleArm, Servo};
 use crate::drive::Friction;
 use crate::gear::LoadFriction;
 
-/// Inputs and branches of one sample of one axis, recorded for its differentiation.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct AxisSample {
-    /// Position error: reference minus joint position (rad or m).
-    pub(crate) lag: f64,
-    /// Error of the velocity loop.
-    pub(crate) error: f64,
-    /// Feed-forward torque.
-    pub(crate) ahead: f64,
-    /// Whether the integral was initialised from the held torque.
-    pub(crate) filled: bool,
-    /// Whether the torque is at its limit.
-    pub(crate) limited: bool,
-    /// Whether the integral was updated.
-    pub(crate) integrated: bool,
+/// A servo that reached its torque limit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TorqueLimited {
+    /// Coordinate of the joint.
+    pub coordinate: usize,
+    /// Number of limited samples.
+    pub samples: u64,
+    /// Time of the first one (s).
+    pub first_s: f64,
 }
 
 /// State of a [`Servo`] in a run.
@@ -44,9 +38,8 @@ pub(crate) struct ServoState {
     data: Data,
     pub(crate) reference: State,
     pub(crate) qddot: DVector<f64>,
-    /// Number of samples so far, and data of the last one.
-    pub(crate) samples: u64,
-    pub(crate) last: Vec<AxisSample>,
+    /// Axes that reached their limits, in order of the time of the first limited sample.
+    pub(crate) limited: Vec<TorqueLimited>,
 }
 
 impl ServoState {
@@ -62,8 +55,7 @@ impl ServoState {
             data: Data::new(&servo.rigid),
             reference: State::zeros(&servo.rigid),
             qddot: DVector::zeros(servo.rigid.nv()),
-            samples: 0,
-            last: vec![AxisSample::default(); n],
+            limited: Vec::with_capacity(n),
             servo,
         }
     }
@@ -76,11 +68,6 @@ impl ServoState {
         inverse_dynamics(&self.servo.rigid, &mut self.data, &self.reference, &self.qddot);
     }
 
-    /// Returns the torque of the rigid robot on the reference of the last sample.
-    pub(crate) fn rigid_torque(&self, coordinate: usize) -> f64 {
-        self.data.tau[coordinate]
-    }
-
     fn feed_forward(&self, axis: usize) -> f64 {
         let k = self.servo.axes[axis].coordinate;
         let friction = self.friction.get(k).map_or(0.0, |f| f.torque(self.reference.qdot[k]));
@@ -88,7 +75,7 @@ impl ServoState {
         let laws = self.load_friction.iter().filter(|law| law.coordinate == k);
         let loaded = laws.map(|law| law.torque(self.data.tau[k] - rotor, self.reference.qdot[k]));
         let friction = loaded.fold(friction, |sum, torque| sum + torque);
-        if self.servo.axes[axis].feed_forward { self.data.tau[k] + friction } else { 0.0 }
+        self.servo.axes[axis].feed_forward * (self.data.tau[k] + friction)
     }
 
     /// Initialises the controller such that the first sample returns the torques `needed` if the
@@ -129,12 +116,20 @@ impl ServoState {
             // Anti-windup: at the limit the integral changes only away from it.
             let limited = unlimited != self.torque[axis];
             let integrated = !limited || (unlimited > 0.0) != (error > 0.0);
-            self.last[axis] = AxisSample { lag, error, ahead, filled, limited, integrated };
+            if limited {
+                self.count_limited(t, k);
+            }
             if integrated {
                 self.integral[axis] += a.integral_gain * self.servo.sample_s * error;
             }
         }
         self.fresh = false;
-        self.samples += 1;
+    }
+
+    fn count_limited(&mut self, t: f64, coordinate: usize) {
+        match self.limited.iter_mut().find(|known| known.coordinate == coordinate) {
+            Some(known) => known.samples += 1,
+            None => self.limited.push(TorqueLimited { coordinate, samples: 1, first_s: t }),
+        }
     }
 }

@@ -130,8 +130,8 @@ fn lead(servo: &Servo, q: &mut [f64], holding: &DVector<f64>) -> Result<(), Targ
         let mut moved = 0.0f64;
         for axis in servo.axes.iter().filter(sagging) {
             let k = axis.coordinate;
-            let fed = if axis.feed_forward { fed[k] } else { 0.0 };
-            let target = motors[k] + (holding[k] - fed) / (axis.position_gain * axis.velocity_gain);
+            let target =
+                motors[k] + (holding[k] - axis.feed_forward * fed[k]) / (axis.position_gain * axis.velocity_gain);
             moved = moved.max((target - q[k]).abs());
             q[k] = target;
         }

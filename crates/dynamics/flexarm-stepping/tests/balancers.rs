@@ -180,30 +180,3 @@ fn compliance_has_the_stiffness_of_the_balancers_in_it() {
         assert!((slope - column).norm() < 1e-6 * column.norm(), "{:e}", (slope - column).norm() / column.norm());
     }
 }
-
-/// Lanes do not support balancers: such runs are computed individually, with bitwise the same
-/// results.
-#[test]
-fn runs_with_balancers_side_by_side_are_those_alone() {
-    let runs: Vec<BatchRun> = [1e-3, 2e-3]
-        .map(|beta| BatchRun { arm: arm_of(&balanced(), moving(), beta), duration_s: 0.1 })
-        .into_iter()
-        .collect();
-    let batch = Batch {
-        step_s: 1e-3,
-        stepper: StepperKind::default(),
-        start: Start::Equilibrium,
-        tool: runs[0].arm.model.frame("tcp").unwrap().clone(),
-        keep_samples: true,
-    };
-    let bare = BatchRun { arm: arm_of(&reference_arm(true).mechanism, moving(), 1e-3), duration_s: 0.1 };
-    let together: Vec<ToolDeflection> = batch.run(&runs).into_iter().map(Result::unwrap).collect();
-    for (run, together) in runs.iter().zip(&together) {
-        let alone = batch.run_alone(run).unwrap();
-        assert_eq!(alone.samples_m, together.samples_m);
-        assert!(alone.samples_m.len() > 50);
-    }
-    let without = batch.run_alone(&bare).unwrap();
-    let share = (Vector3::from(without.samples_m[0]) - Vector3::from(together[0].samples_m[0])).norm();
-    assert!(share > 1e-4, "{share}");
-}

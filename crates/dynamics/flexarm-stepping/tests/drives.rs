@@ -62,7 +62,7 @@ const IDLE: ServoAxis = ServoAxis {
     position_gain: 0.0,
     velocity_gain: 0.0,
     integral_gain: 0.0,
-    feed_forward: false,
+    feed_forward: 0.0,
     limit: f64::INFINITY,
 };
 
@@ -107,7 +107,7 @@ fn pendulum_follows_its_reference() {
     let rigid = Arc::new(Model::new(&pendulum).expect("a tree"));
     let gains = ServoAxis { position_gain: 20.0, velocity_gain: 60.0, integral_gain: 300.0, ..IDLE };
     let mut errors = Vec::new();
-    for feed_forward in [false, true] {
+    for feed_forward in [0.0, 1.0] {
         let mut arm = arm(&pendulum, None, path());
         arm.friction = vec![Friction { viscous: 0.5, coulomb: 2.0, regularisation: 0.05, ..Friction::NONE }];
         let axes = vec![ServoAxis { feed_forward, ..gains }];
@@ -116,7 +116,7 @@ fn pendulum_follows_its_reference() {
             let seen = run(&arm, kind, h, 3.0);
             let error = seen.iter().map(|o| (o.q[0] - 0.6 * (1.0 - (3.0 * o.t).cos())).abs()).fold(0.0, f64::max);
             eprintln!("{:<18} feed forward {feed_forward}: {error:.2e} rad", kind.name());
-            assert!(error < if feed_forward { 3e-5 } else { 1e-2 }, "{} {error}", kind.name());
+            assert!(error < if feed_forward > 0.0 { 3e-5 } else { 1e-2 }, "{} {error}", kind.name());
             errors.push(error);
         }
     }
@@ -139,7 +139,7 @@ fn sampled_loop(
     for n in 0..samples {
         let [q_ref, v_ref, a_ref] = path(n as f64 * sample_s);
         let error = v_ref + axis.position_gain * (q_ref - q) - v;
-        let ahead = if axis.feed_forward { J * a_ref + b * v_ref } else { 0.0 };
+        let ahead = axis.feed_forward * (J * a_ref + b * v_ref);
         // The initial integral supplies the rest of the torque of the reference motion.
         let first = if axis.integral_gain > 0.0 { J * a0 + b * v - ahead - axis.velocity_gain * error } else { 0.0 };
         let I = *integral.get_or_insert(first);
@@ -171,7 +171,7 @@ fn sampled_controller_equals_its_discrete_loop() {
     let path = |t: f64| [0.5 * (4.0 * t).sin(), 2.0 * (4.0 * t).cos(), -8.0 * (4.0 * t).sin()];
     let p = ServoAxis { position_gain: 15.0, velocity_gain: 12.0, ..IDLE };
     let pi = ServoAxis { integral_gain: 80.0, ..p };
-    let limited = ServoAxis { feed_forward: true, limit: 4.0, ..pi };
+    let limited = ServoAxis { feed_forward: 1.0, limit: 4.0, ..pi };
     for (name, axis) in [("P", p), ("PI", pi), ("limited", limited)] {
         let sample_s = 3e-3;
         let truth = sampled_loop(axis, sample_s, b, path, 500, true);
@@ -678,7 +678,7 @@ fn reference_stepper_and_generalised_alpha_agree_over_events() {
         position_gain: 15.0,
         velocity_gain: [900.0, 900.0, 400.0, 60.0, 60.0, 20.0][coordinate],
         integral_gain: [3000.0, 3000.0, 1000.0, 200.0, 200.0, 50.0][coordinate],
-        feed_forward: coordinate != 3,
+        feed_forward: f64::from(u8::from(coordinate != 3)),
         limit: f64::INFINITY,
     };
     arm.friction = vec![Friction { viscous: 2.0, coulomb: 5.0, regularisation: 0.05, ..Friction::NONE }; 6];

@@ -175,7 +175,7 @@ const IDLE: ServoAxis = ServoAxis {
     position_gain: 0.0,
     velocity_gain: 0.0,
     integral_gain: 0.0,
-    feed_forward: false,
+    feed_forward: 0.0,
     limit: f64::INFINITY,
 };
 

@@ -7,11 +7,11 @@
 use flexarm_testkit::allocations::CountingAllocator;
 
 mod balancers;
-mod batch;
 mod chains;
 mod drives;
 mod elimination;
 mod events;
+mod exact_run;
 mod gears;
 mod guides;
 mod helical;
@@ -24,12 +24,9 @@ mod poses;
 mod reference_arm;
 mod reference_stepper;
 mod rotation;
-mod run_slopes;
-mod servo_slopes;
 mod solver_work;
 mod static_targets;
 mod statics;
-mod structure_slopes;
 
 /// Counts the allocations of each thread, and so of each test.
 #[global_allocator]

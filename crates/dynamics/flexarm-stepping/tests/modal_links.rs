@@ -131,7 +131,7 @@ fn flyer_with_modes_turned_by(angle: f64) -> FlexibleArm {
         position_gain: 0.0,
         velocity_gain: 0.0,
         integral_gain: 0.0,
-        feed_forward: false,
+        feed_forward: 0.0,
         limit: f64::INFINITY,
     };
     let arm = arm_of(&soft, &springs, Arc::new(motion));
@@ -531,7 +531,7 @@ fn everything() -> FlexibleArm {
         position_gain: 20.0,
         velocity_gain: 400.0,
         integral_gain: 2000.0,
-        feed_forward: true,
+        feed_forward: 1.0,
         limit: 5000.0,
     };
     let mut arm = arm_of(&soft, &springs, reference_arm_motion());

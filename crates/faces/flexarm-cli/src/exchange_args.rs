@@ -127,7 +127,7 @@ pub(crate) struct ExportArgs {
     #[arg(long, value_name = "LENGTH-MASS-TIME", help_heading = "Matrices")]
     pub(crate) units: UnitsOfFile,
     /// Node numbers of the interfaces in formats that use them, proximal first [default:
-    /// 1001,1002,...; 1,2,... for sid]
+    /// 1001,1002,...]
     #[arg(long, value_name = "N,N,...", value_delimiter = ',', help_heading = "Interfaces")]
     pub(crate) nodes: Vec<i64>,
     /// Output folder [default: a new one in out/]
@@ -160,12 +160,6 @@ pub(crate) enum ExportFormatName {
     MatrixMarket,
     /// CalculiX, Abaqus
     UserElement,
-    /// Nastran
-    Dmig,
-    /// Nastran, text
-    Op4,
     /// Comma-separated values and a script
     Simscape,
-    /// Standard Input Data: modes and mass integrals of the modal link
-    Sid,
 }

@@ -4,9 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
-use flexarm::lobes::{
-    CutRequest, CutRun, CuttingPlace, CuttingTool, LobePoint, Lobes, LobesRequest, cut, lobes, rounded_down,
-};
+use flexarm::lobes::{CuttingPlace, CuttingTool, LobePoint, Lobes, LobesRequest, lobes, rounded_down};
 use flexarm::{Motion, Robot};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
@@ -14,7 +12,7 @@ use crate::failure::Failure;
 use crate::posed_args::PoseArgs;
 use crate::print::{lines, table};
 use crate::shipped::OutputFolder;
-use crate::terminal::{Terminal, answer, to_json, working};
+use crate::terminal::{Terminal, answer, to_json};
 use crate::{shipped, values};
 
 const EXAMPLES: &str = "\
@@ -23,8 +21,6 @@ Examples:
       flexarm lobes kr210 --at 0,-60deg,90deg,0,60deg,0 --tool endmill_20mm
   The same over other speeds, with all unstable depths, figures alone:
       flexarm lobes kr210 --at 0,-60deg,90deg,0,60deg,0 --tool endmill_20mm --rpm 2000,2500,3000 --ranges --no-files
-  One cut over time, on the arm as it moves: 2 mm deep at 8000 1/min:
-      flexarm lobes kr210 --at 0,-60deg,90deg,0,60deg,0 --tool endmill_20mm --cut 8000,0.002
   Along a path: the lowest limit over 12 places of it:
       flexarm lobes kr210 --along milling_square --places 12 --tool endmill_20mm
 The file of a tool: flexarm format tool";
@@ -52,22 +48,9 @@ pub(crate) struct LobesArgs {
     /// Maximum depth of cut to examine (m) [default: that of the tool's file]
     #[arg(long, help_heading = "Cut", value_name = "METRES", allow_hyphen_values = true)]
     pub(crate) deepest: Option<f64>,
-    /// Use only the mean cutting force (zero-order solution): fast, does not detect period doubling
-    #[arg(long, help_heading = "Cut")]
-    pub(crate) zero_order: bool,
     /// List all unstable ranges of depth, not only the lowest limit
-    #[arg(long, help_heading = "Cut", conflicts_with_all = ["zero_order", "along"])]
+    #[arg(long, help_heading = "Cut", conflicts_with = "along")]
     pub(crate) ranges: bool,
-    /// Simulate one cut over time instead: spindle speed (1/min) and depth (m)
-    #[arg(long, help_heading = "Cut over time", value_name = "RPM,DEPTH", allow_hyphen_values = true,
-        conflicts_with_all = ["along", "rpm", "zero_order", "ranges", "deepest"])]
-    pub(crate) cut: Option<String>,
-    /// Duration (s) [default: until chatter or stability is evident]
-    #[arg(long, help_heading = "Cut over time", value_name = "SECONDS", requires = "cut", allow_hyphen_values = true)]
-    pub(crate) seconds: Option<f64>,
-    /// Number of steps per tooth period
-    #[arg(long, help_heading = "Cut over time", value_name = "N", requires = "cut", default_value_t = 60)]
-    pub(crate) steps: usize,
     /// Output folder [default: a new one in out/]
     #[arg(short, long, help_heading = "Files", value_name = "FOLDER")]
     pub(crate) output: Option<PathBuf>,
@@ -89,9 +72,6 @@ pub(crate) fn run(terminal: &Terminal, args: &LobesArgs) -> Result<ExitCode, Fai
     let robot = Robot::load_with(&shipped::robot(Some(&args.pose.robot))?, &args.pose.load.options()?)?;
     let tool = cutting_tool(&args.tool, &args.rpm)?;
     let at = values::pose(args.pose.at.as_deref(), &robot)?;
-    if let Some(words) = &args.cut {
-        return follow(terminal, args, words, &robot, &tool, at.as_deref());
-    }
     let motion = args.along.as_deref().map(shipped::trajectory).transpose()?;
     let motion = motion.map(|path| Motion::load(path, &robot)).transpose()?;
     let place = match &motion {
@@ -102,7 +82,6 @@ pub(crate) fn run(terminal: &Terminal, args: &LobesArgs) -> Result<ExitCode, Fai
     let request = LobesRequest {
         modelling: args.pose.modelling.modelling(),
         deepest_m: args.deepest,
-        zero_order: args.zero_order,
         ranges: args.ranges,
         output: folder.path(),
         overwrite: args.force,
@@ -120,67 +99,6 @@ pub(crate) fn run(terminal: &Terminal, args: &LobesArgs) -> Result<ExitCode, Fai
     Ok(ExitCode::SUCCESS)
 }
 
-/// Simulates one cut over time.
-fn follow(
-    terminal: &Terminal,
-    args: &LobesArgs,
-    words: &str,
-    robot: &Robot,
-    tool: &CuttingTool,
-    at: Option<&[f64]>,
-) -> Result<ExitCode, Failure> {
-    let numbers: Option<Vec<f64>> = words.split(',').map(|word| word.trim().parse().ok()).collect();
-    let Some([spindle_rpm, depth_m]) = numbers.as_deref() else {
-        return Err(Failure::Usage(format!("--cut {words:?}: expected RPM,DEPTH, in 1/min and m, as in 8000,0.002")));
-    };
-    let folder = OutputFolder::of(args.output.as_deref(), &format!("{}-cut", robot.name), !args.no_files)?;
-    let request = CutRequest {
-        modelling: args.pose.modelling.modelling(),
-        spindle_rpm: *spindle_rpm,
-        depth_m: *depth_m,
-        seconds: args.seconds,
-        steps: args.steps,
-        output: folder.path(),
-        overwrite: args.force,
-    };
-    let found = working(terminal, "cutting", || cut(robot, tool, at, &request))?;
-    crate::print::caveats(terminal, &found.caveats);
-    answer(terminal, || to_json(&found), || cut_text(&found));
-    Ok(ExitCode::SUCCESS)
-}
-
-fn cut_text(c: &CutRun) -> String {
-    let verdict = if c.chatters { "chatters" } else { "does not chatter" };
-    let mut out = format!(
-        "{} on {}, {:.0} 1/min, {:.3} mm deep, {:.2} s: {verdict}\n",
-        c.tool,
-        c.robot,
-        c.spindle_rpm,
-        1e3 * c.depth_m,
-        c.seconds
-    );
-    let limit = match (c.limit_m, c.limit_hz) {
-        (Some(limit), Some(hz)) => format!("{} mm, then at {hz:.1} Hz", rounded_down(1e3 * limit, 3)),
-        _ => "none".to_owned(),
-    };
-    out += &format!("limit of depth at this speed: {limit}; largest multiplier {:.5}\n", c.multiplier);
-    out += &format!(
-        "from tooth to tooth the tip differs by {:.3e} mm ({:.4} feeds per tooth)\n",
-        1e3 * c.scatter_m,
-        c.scatter_per_feed
-    );
-    if let Some(hz) = c.swing_hz {
-        out += &format!("strongest vibration at {hz:.1} Hz\n");
-    }
-    out += &format!("maximum displacement {:.4} mm, maximum force {:.0} N\n", 1e3 * c.peak_m, c.peak_n);
-    for (what, path) in [("CSV", &c.file), ("plot", &c.plot)] {
-        if let Some(path) = path {
-            out += &format!("{what:<7} {path}\n");
-        }
-    }
-    out
-}
-
 /// Progress bar over the limits found; only on a terminal.
 fn progress(terminal: &Terminal) -> ProgressBar {
     let target =
@@ -195,13 +113,7 @@ fn mm(x: Option<f64>) -> String {
 }
 
 fn text(found: &Lobes) -> String {
-    let mut out = format!(
-        "{} on {}: {} limits of depth, up to {} mm\n",
-        found.tool,
-        found.robot,
-        found.method,
-        1e3 * found.deepest_m
-    );
+    let mut out = format!("{} on {}: limits of depth, up to {} mm\n", found.tool, found.robot, 1e3 * found.deepest_m);
     out += &match (found.stable_below_m, found.stable_below_at_rpm) {
         (Some(depth), Some(rpm)) => format!(
             "stable at every speed below {} mm (at {rpm:.0} 1/min); deepest at {:.0} 1/min: {} mm\n\n",
@@ -213,7 +125,7 @@ fn text(found: &Lobes) -> String {
     };
     let ranges = found.points.iter().any(|p| !p.unstable_m.is_empty());
     let along = found.poses.len() > 1;
-    let mut head = vec!["spindle [1/min]", "limit [mm]", "chatter [Hz]", "kind", "zero order [mm]"];
+    let mut head = vec!["spindle [1/min]", "limit [mm]", "chatter [Hz]", "kind"];
     head.extend(along.then_some("at [s]"));
     head.extend(ranges.then_some("unstable [mm]"));
     let mut t = table(&head);
@@ -251,7 +163,6 @@ fn row(found: &Lobes, point: &LobePoint, along: bool, ranges: bool) -> Vec<Strin
         mm(point.depth_m),
         point.chatter_hz.map_or_else(|| "-".into(), |hz| format!("{hz:.1}")),
         point.kind.unwrap_or("-").to_owned(),
-        mm(point.zero_order_depth_m),
     ];
     if along {
         row.push(found.poses[point.pose].time_s.map_or_else(|| "-".into(), |t| format!("{t:.2}")));

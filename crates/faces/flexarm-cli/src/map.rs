@@ -113,10 +113,6 @@ pub(crate) struct MapArgs {
         requires = "tool"
     )]
     pub(crate) rpm: Vec<f64>,
-    /// Compute limits of depth only from the mean cutting force (zero-order solution): fast, does
-    /// not detect period doubling
-    #[arg(long, help_heading = "What", requires = "tool")]
-    pub(crate) zero_order: bool,
     /// Quantity by which poses are compared [default: depth_m with a tool, error_m with a wrench,
     /// else compliance_worst_m_per_n]
     #[arg(long, help_heading = "What", value_name = "NAME")]
@@ -231,7 +227,6 @@ pub(crate) fn run(terminal: &Terminal, args: &MapArgs) -> Result<ExitCode, Failu
         at,
         wrench,
         tool: args.tool.as_ref().map(|given| cutting_tool(given, &args.rpm)).transpose()?,
-        zero_order: args.zero_order,
         frequencies: Some(args.frequencies),
         keep: match args.keep {
             KeepName::Best => KeptPoses::Best,

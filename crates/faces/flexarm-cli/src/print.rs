@@ -333,7 +333,6 @@ pub(crate) fn exported(summary: &flexarm::export::ExportSummary) -> String {
     let c = &summary.checks;
     out += &format!("read back: stiffness differs by {:.1e}", c.stiffness_error);
     out += &c.mass_error.map_or_else(|| ", no mass".into(), |error| format!(", mass by {error:.1e}"));
-    out += &c.integrals_error.map_or_else(String::new, |error| format!(", mass integrals by {error:.1e}"));
     out += " (relative to the diagonal)\n";
     for file in &summary.files {
         out += &format!("{file}\n");

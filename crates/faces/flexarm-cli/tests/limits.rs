@@ -168,8 +168,8 @@ fn files_that_are_no_files_are_refused_and_not_waited_for() {
     refused(&["import", "pipe.toml", "--units", "m-kg-s"], &["pipe.toml", "not a file"]);
     refused(&["reduce", "/dev/zero"], &["/dev/zero"]);
     refused(&["reduce", "pipe.toml"], &["pipe.toml", "not a file"]);
-    refused(&["export", "robot.flex", "--format", "dmig", "--units", "m-kg-s"], &["robot.flex"]);
-    refused(&["export", "pipe.toml", "--format", "dmig", "--units", "m-kg-s"], &["pipe.toml", "not a file"]);
+    refused(&["export", "robot.flex", "--format", "user-element", "--units", "m-kg-s"], &["robot.flex"]);
+    refused(&["export", "pipe.toml", "--format", "user-element", "--units", "m-kg-s"], &["pipe.toml", "not a file"]);
     refused(&["convert", "pipe.toml", "a.csv", "--from", "csv"], &["pipe.toml", "not a file"]);
 }
 

@@ -296,7 +296,7 @@ fn a_reduction_names_its_flags() {
 fn an_import_and_an_export_name_their_flags() {
     let place = Place::new();
     place.write("bar.flex", flex::text(&flex::stiffness_12()));
-    let export = ["export", "bar.flex", "--format", "op4", "--units", "m-kg-s", "-o"];
+    let export = ["export", "bar.flex", "--format", "simscape", "--units", "m-kg-s", "-o"];
     assert_eq!(place.flexarm(&[&export[..], &["e"]].concat()).code, 0);
     let readme = place.text("e/bar_README.txt");
     for line in [
@@ -314,23 +314,23 @@ fn an_import_and_an_export_name_their_flags() {
                 &["f", "--nodes", "1,1"],
                 "--nodes has [1, 1]; 2 distinct numbers between 1 and 99999999 are required, one per interface, proximal first",
             ),
-            (&["e"], "e/bar.op4: exists already and is not overwritten: choose another place, or give --force"),
+            (&["e"], "e/bar_K.csv: exists already and is not overwritten: choose another place, or give --force"),
         ],
     );
     let (units, map, at) =
         (["--units", "m-kg-s"], ["--map", "A=#1-6,B=#7-12"], ["--at", "A=0,0,0", "--at", "B=0.8,0,0"]);
     let mass = ["--mass", "1.728", "--com", "0.4,0,0", "--inertia", "0.0003,0.0924,0.0922,0,0,0"];
     let with = |more: &[&'static str]| [&units[..], &map, &at, &mass, more].concat();
-    let no_place = "e/bar.op4: the file does not contain the interface positions (unit of the file, link axes): the stiffness \
+    let no_place = "e/bar_K.csv: the file does not contain the interface positions (unit of the file, link axes): the stiffness \
                     implies, relative to A: B at (0.800000, 0.000000, 0.000000); if A is the origin of the link: --at A=0,0,0 --at \
                     B=0.800000,0.000000,0.000000";
-    let no_map = "e/bar.op4: the rows of interfaces A and B are not specified: if the proximal interface comes first: --map \
+    let no_map = "e/bar_K.csv: the rows of interfaces A and B are not specified: if the proximal interface comes first: --map \
                   \"A=#1-6,B=#7-12\"";
-    let no_units = "e/bar.op4: the units of the file are not declared: --units LENGTH-MASS-TIME, such as --units m-kg-s (N, Pa) \
+    let no_units = "e/bar_K.csv: the units of the file are not declared: --units LENGTH-MASS-TIME, such as --units m-kg-s (N, Pa) \
                     or --units mm-t-s (N, MPa); matrix files do not contain them";
     refused(
         &place,
-        &["import", "e/bar.op4", "--no-files"],
+        &["import", "e/bar_K.csv", "--no-files"],
         &[
             (&[], &format!("{no_units}\n{no_map}\n{no_place}")),
             (&[&units[..], &map].concat(), no_place),
@@ -338,7 +338,7 @@ fn an_import_and_an_export_name_their_flags() {
             (&with(&["--at", "A=0,0,0"]), "--at A=... is given twice"),
             (
                 &with(&["--format", "dmig"]),
-                "e/bar.op4: is Nastran OP4 text according to its content, but --format gives another format: omit it",
+                "e/bar_K.csv: is comma-separated matrix according to its content, but --format gives another format: omit it",
             ),
             (
                 &[&units[..], &map, &["--at", "A=0,0,0", "--at", "B=0,0,0"]].concat(),
@@ -347,7 +347,7 @@ fn an_import_and_an_export_name_their_flags() {
         ],
     );
     let modes = "--modes applies only to full models; these matrices are already reduced";
-    told(&place, &[&["import", "e/bar.op4", "--no-files"], &with(&["--modes", "3"])[..]].concat(), &[modes]);
+    told(&place, &[&["import", "e/bar_K.csv", "--no-files"], &with(&["--modes", "3"])[..]].concat(), &[modes]);
     // A sidecar file next to the matrices defines units and positions; options override it.
     let matrices = ["export", "bar.flex", "--format", "matrix-market", "--units", "m-kg-s", "-o", "m"];
     assert_eq!(place.flexarm(&matrices).code, 0);

@@ -161,13 +161,10 @@ pub(crate) fn import_link<'py>(
     caveat::answer(py, &summary, &summary.caveats)
 }
 
-const EXPORTS: [(&str, ExportFormat); 6] = [
+const EXPORTS: [(&str, ExportFormat); 3] = [
     ("matrix-market", ExportFormat::MatrixMarket),
     ("user-element", ExportFormat::UserElement),
-    ("dmig", ExportFormat::Dmig),
-    ("op4", ExportFormat::Op4),
     ("simscape", ExportFormat::Simscape),
-    ("sid", ExportFormat::Sid),
 ];
 
 /// Writes the matrices of a link for another program.
@@ -177,7 +174,7 @@ const EXPORTS: [(&str, ExportFormat); 6] = [
 /// link : path
 ///     A ``.flex`` file.
 /// format : str
-///     ``"matrix-market"``, ``"user-element"``, ``"dmig"``, ``"op4"``, ``"simscape"`` or ``"sid"``.
+///     ``"matrix-market"``, ``"user-element"`` or ``"simscape"``.
 /// output : path
 ///     Output folder.
 /// units : str, default "m-kg-s"

@@ -32,8 +32,6 @@ use crate::watch::stoppable;
 ///     Spindle speeds (1/min), instead of those in the file.
 /// deepest : float, optional
 ///     Maximum depth of cut to examine (m).
-/// zero_order : bool, default False
-///     Use only the mean cutting force.
 /// ranges : bool, default False
 ///     Return all unstable ranges of depth at each speed.
 /// links, drives : str, optional
@@ -48,7 +46,7 @@ use crate::watch::stoppable;
 ///     ``points`` with ``spindle_rpm``, ``depth_m``, ``chatter_hz`` and ``kind``, and more, as
 ///     ``flexarm lobes --json``.
 #[pyfunction]
-#[pyo3(signature = (robot, tool, *, q=None, along=None, places=12, rpm=None, deepest=None, zero_order=false, ranges=false,
+#[pyo3(signature = (robot, tool, *, q=None, along=None, places=12, rpm=None, deepest=None, ranges=false,
                     links=None, drives=None, output=None, overwrite=false))]
 #[expect(clippy::too_many_arguments, reason = "keyword arguments")]
 pub(crate) fn lobes<'py>(
@@ -60,7 +58,6 @@ pub(crate) fn lobes<'py>(
     #[pyo3(from_py_with = whole)] places: usize,
     rpm: Option<Vec<f64>>,
     deepest: Option<f64>,
-    zero_order: bool,
     ranges: bool,
     links: Option<&str>,
     drives: Option<&str>,
@@ -75,7 +72,7 @@ pub(crate) fn lobes<'py>(
     let q = q.map(|q| numbers("q", q, &[(n, "joints")], false)).transpose()?.map(|q| q.values().to_vec());
     let motion = along.map(|along| scenario(robot, Some(along), None, None, None)).transpose()?.map(|s| s.motion);
     let modelling = modelling(links, drives, None, None)?;
-    let request = LobesRequest { modelling, deepest_m: deepest, zero_order, ranges, output, overwrite };
+    let request = LobesRequest { modelling, deepest_m: deepest, ranges, output, overwrite };
     let robot = robot.get().robot.clone();
     let found = stoppable(py, move |stop| {
         let place = match &motion {

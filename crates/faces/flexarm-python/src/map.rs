@@ -197,8 +197,6 @@ fn over_joints(joints: &Bound<'_, PyDict>) -> PyResult<MapRegion> {
 ///     ``depth_m``.
 /// rpm : sequence of float, optional
 ///     Its spindle speeds (1/min); their lowest limit is used. Default: those of its file.
-/// zero_order : bool, default False
-///     Compute limits only from the mean cutting force: fast, does not detect period doubling.
 /// links, drives : str, optional
 ///     As for :meth:`Robot.flexible`.
 /// output : path, optional
@@ -219,7 +217,7 @@ fn over_joints(joints: &Bound<'_, PyDict>) -> PyResult<MapRegion> {
 #[pyfunction]
 #[pyo3(signature = (robot, *, bounds=None, spacing=None, keep_out=0.0, tool_axis=None, roll=0.0, cone=0.0, tilts=None, rolls=1,
                     joints=None, poses=None, along=None, points=1000, at=None, wrench=None, by=None, keep="best", frequencies=3,
-                    workpiece=None, tool=None, rpm=None, zero_order=false, links=None, drives=None, output=None, overwrite=false,
+                    workpiece=None, tool=None, rpm=None, links=None, drives=None, output=None, overwrite=false,
                     progress=None))]
 #[expect(clippy::too_many_arguments, reason = "keyword arguments")]
 pub(crate) fn map<'py>(
@@ -245,7 +243,6 @@ pub(crate) fn map<'py>(
     workpiece: Option<&Bound<'py, PyAny>>,
     tool: Option<PathBuf>,
     rpm: Option<Vec<f64>>,
-    zero_order: bool,
     links: Option<&str>,
     drives: Option<&str>,
     output: Option<PathBuf>,
@@ -266,7 +263,6 @@ pub(crate) fn map<'py>(
         keep: word("keep", keep, &kept)?,
         by,
         tool: tool.map(|tool| cutting_tool(py, &tool, rpm)).transpose()?,
-        zero_order,
         workpiece_m: workpiece.map(|edges| three("workpiece", edges)).transpose()?,
         output,
         overwrite,

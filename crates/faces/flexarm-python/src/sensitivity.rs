@@ -12,7 +12,7 @@ use crate::robot::PyRobot;
 use crate::scenario::scenario;
 use crate::values::{modelling, texts};
 
-/// Derivatives of the TCP error along a motion with respect to all parameters, from one run.
+/// Derivatives of the TCP error along a motion with respect to all parameters, by differences.
 ///
 /// Parameters of the robot, of its tool and of its motion are included.
 ///

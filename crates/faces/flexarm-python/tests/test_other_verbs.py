@@ -228,14 +228,12 @@ def test_a_plan_chooses_among_levers_points_and_gauges() -> None:
 
 def test_limits_of_depth_of_a_map_are_those_of_lobes(kr210: flexarm.Robot) -> None:
     joints = {"joint_2": (-1.2, -1.0, 2), "joint_3": (1.4, 1.4, 1)}
-    found = flexarm.map(
-        kr210, joints=joints, at=[0, 0, 0, 0, 0.6, 0], tool="endmill_20mm", rpm=[8000.0], zero_order=True
-    )
+    found = flexarm.map(kr210, joints=joints, at=[0, 0, 0, 0, 0.6, 0], tool="endmill_20mm", rpm=[8000.0])
     assert found.to_dict()["by"] == "depth_m"
     depths = found["depth_m"]
     for k, joint_2 in enumerate([-1.2, -1.0]):
         q = [0, joint_2, 1.4, 0, 0.6, 0]
-        alone = flexarm.lobes(kr210, "endmill_20mm", q=q, rpm=[8000.0], zero_order=True)
+        alone = flexarm.lobes(kr210, "endmill_20mm", q=q, rpm=[8000.0])
         assert depths[k] == alone["stable_below_m"]
 
 

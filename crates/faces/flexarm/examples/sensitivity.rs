@@ -1,5 +1,5 @@
 //! Finds the parameters with the strongest effect: derivatives of the TCP error along a motion with
-//! respect to all parameters of the robot, from one run:
+//! respect to all parameters of the robot, from two runs for each:
 //! `cargo run --release -p flexarm --no-default-features --example sensitivity`
 #![allow(clippy::print_stdout, reason = "an example shows its answer")]
 

@@ -100,8 +100,7 @@ fn runs_on_all_cores_are_those_of_one_thread() {
     }
 }
 
-/// A study of ten runs: different motions, payloads, stiffnesses, dampings; one with a load, which
-/// the vectorised code does not support.
+/// A study of ten runs: different motions, payloads, stiffnesses, dampings; one with a load.
 fn study(robot: &Robot) -> Vec<Variation> {
     let motion = Motion::load(root().join("trajectories/point_to_point.toml"), robot).unwrap();
     let slower = motion.trajectory.scaled(1.5).unwrap();
@@ -146,7 +145,7 @@ fn deflections_of_a_study_are_those_of_whole_runs() {
     }
 }
 
-/// Order, neighbours and threads change no bit; only the run with a load is run separately.
+/// Order, neighbours and threads change no bit.
 #[test]
 fn deflections_do_not_depend_on_company_order_or_threads() {
     let (robot, arm) = kr210();

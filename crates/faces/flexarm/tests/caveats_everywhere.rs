@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use flexarm::compensate::{CompensateRequest, compensate_motion};
-use flexarm::lobes::{CutRequest, CuttingPlace, CuttingTool, LobesRequest, cut, lobes};
+use flexarm::lobes::{CuttingPlace, CuttingTool, LobesRequest, lobes};
 use flexarm::map::{JointRange, MapRegion, MapRequest, map};
 use flexarm::sensitivity::{SensitivityRequest, pose_sensitivity, sensitivity};
 use flexarm::{
@@ -104,20 +104,9 @@ fn every_command_with_a_pose_says_of_a_robot_what_check_says() {
     let found = map(&robot, &request, &mut |_, _| std::ops::ControlFlow::Continue(())).unwrap();
     says("map", &found.caveats, &found.warnings);
     let tool = CuttingTool::load(project("robots/tools/endmill_20mm.toml")).unwrap().at_speeds(vec![8000.0]);
-    let request = LobesRequest { zero_order: true, ..LobesRequest::default() };
+    let request = LobesRequest::default();
     let found = lobes(&robot, &tool, &CuttingPlace::At(Some(&POSE)), &request, &|_, _| true).unwrap();
     says("lobes", &found.caveats, &found.warnings);
-    let request = CutRequest {
-        modelling,
-        spindle_rpm: 8000.0,
-        depth_m: 1e-4,
-        seconds: Some(0.01),
-        steps: 40,
-        output: None,
-        overwrite: false,
-    };
-    let found = cut(&robot, &tool, Some(&POSE), &request).unwrap();
-    says("a cut", &found.caveats, &found.warnings);
 }
 
 #[test]

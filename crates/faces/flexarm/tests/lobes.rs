@@ -1,10 +1,10 @@
 //! Chatter of a tool on an arm: classical cases through the facade, an independent solution at
-//! three poses, simulations that chatter.
+//! three poses.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use flexarm::lobes::{CutRequest, CuttingPlace, CuttingTool, Lobes, LobesRequest, cut, lobes, rounded_down};
+use flexarm::lobes::{CuttingPlace, CuttingTool, Lobes, LobesRequest, lobes, rounded_down};
 use flexarm::{DriveModel, Error, LinkModel, Modelling, Motion, Robot};
 use serde_json::Value;
 
@@ -137,44 +137,6 @@ fn limits_follow_the_pose_as_the_exported_response_says() {
     assert!(worst < 3e-4, "{worst:.1e}");
 }
 
-/// A finely sampled measured response of a mode is equivalent to the mode: the same zero-order
-/// limits; and it reports that no other limits are available.
-#[test]
-fn a_measured_response_gives_the_zero_order_limits_of_its_mode() {
-    let (robot, folder) = (kr210(), Folder::new("measured"));
-    let head = "format = 1\nlengths = \"mm\"\nangles = \"deg\"\npressures = \"N/mm2\"\ndeepest = 30.0\n[cutter]\nteeth = 3\ndiameter = 20.0\nhelix = 30.0\n\
-                coefficients = { tangential = 800.0, radial = 250.0 }\n[engagement]\nkind = \"down\"\nae = 5.0\n[spindle]\nrpm = [3000, 6000, 9000, 12000]\n";
-    let modal =
-        format!("{head}[[mode]]\ndirection = \"radial\"\nfrequency = 1200.0\ndamping = 0.03\nstiffness = 1.5e7\n");
-    let mut csv = String::from("frequency_hz,xx_re,xx_im,yy_re,yy_im\n");
-    for k in 1..8000 {
-        let hz = 0.5 * f64::from(k);
-        let r = hz / 1200.0;
-        let (re, im) = (1.5e7 * (1.0 - r * r), 1.5e7 * 0.06 * r);
-        let g = [re / (re * re + im * im), -im / (re * re + im * im)];
-        let _ = writeln!(csv, "{hz},{},{},{},{}", g[0], g[1], g[0], g[1]);
-    }
-    std::fs::write(folder.0.join("frf.csv"), csv).unwrap();
-    let measured = format!("{head}[measured]\nfile = \"frf.csv\"\n");
-    let pose = [0.0, -1.0, 1.6, 0.0, 0.9, 0.0];
-    let zero_order = LobesRequest { zero_order: true, ..LobesRequest::default() };
-    let modal = at(&robot, &folder.tool(&modal).unwrap(), &pose, &zero_order);
-    let measured = folder.tool(&measured).unwrap();
-    let found = at(&robot, &measured, &pose, &LobesRequest::default());
-    assert_eq!(found.method, "zero-order");
-    assert!(found.caveats.iter().any(|c| c.code == "zero-order"), "{:?}", found.warnings);
-    let mut worst: f64 = 0.0;
-    for (a, b) in modal.points.iter().zip(&found.points) {
-        worst = worst.max((a.depth_m.unwrap() / b.depth_m.unwrap() - 1.0).abs());
-    }
-    eprintln!("largest difference {worst:.1e}");
-    // measured 8e-6: linear between samples of 0.5 Hz
-    assert!(worst < 1e-3, "{worst:.1e}");
-    let ranges = LobesRequest { ranges: true, ..LobesRequest::default() };
-    let refused = lobes(&robot, &measured, &CuttingPlace::At(Some(&pose)), &ranges, &|_, _| true).unwrap_err();
-    assert!(refused.to_string().contains("zero-order"), "{refused}");
-}
-
 /// Identity: the limit along a motion is the minimum of those at its positions, each with its feed
 /// along the motion.
 #[test]
@@ -210,51 +172,6 @@ fn along_a_motion_the_limit_is_the_smallest_of_its_places() {
     }
 }
 
-/// The moving arm, not linearised, with teeth that leave the workpiece: it chatters above the
-/// limit, at its frequency, and not below.
-#[test]
-fn a_cut_chatters_above_the_limit_and_not_below() {
-    let robot = kr210();
-    let pose = [0.0, -1.0, 1.6, 0.0, 0.9, 0.0];
-    // At the first speed the arm chatters, at the second the tool on it.
-    for (rpm, chatter_below_hz) in [(1500.0, 60.0), (4000.0, 2000.0)] {
-        let tool = shipped("face_mill_63mm");
-        let request = LobesRequest::default();
-        let limit = at(&robot, &tool.clone().at_speeds(vec![rpm]), &pose, &request).points[0].clone();
-        let depth = limit.depth_m.unwrap();
-        assert!(limit.chatter_hz.unwrap() < chatter_below_hz);
-        let follow = |factor: f64| {
-            let request = CutRequest {
-                modelling: Modelling::default(),
-                spindle_rpm: rpm,
-                depth_m: factor * depth,
-                seconds: None,
-                steps: 60,
-                output: None,
-                overwrite: false,
-            };
-            cut(&robot, &tool, Some(&pose), &request).unwrap()
-        };
-        let (below, above) = (follow(0.8), follow(1.2));
-        for run in [&below, &above] {
-            eprintln!(
-                "{rpm} 1/min, {:.3} mm of {:.3}: multiplier {:.5}, {} in {:.1} s, scatter {:.2e} m, {:?} Hz (limit {:.1} Hz)",
-                1e3 * run.depth_m,
-                1e3 * depth,
-                run.multiplier,
-                if run.chatters { "chatters" } else { "quiet" },
-                run.seconds,
-                run.scatter_m,
-                run.swing_hz,
-                limit.chatter_hz.unwrap()
-            );
-        }
-        assert!(!below.chatters && below.multiplier < 1.0);
-        assert!(above.chatters && above.multiplier > 1.0);
-        assert!(above.scatter_m > 20.0 * below.scatter_m);
-    }
-}
-
 /// Typical mistakes, reported with their location and the fix.
 #[test]
 fn a_wrong_tool_is_told_with_its_place() {
@@ -276,7 +193,7 @@ fn a_wrong_tool_is_told_with_its_place() {
         ("direction = \"radial\"", "direction = \"sideways\"", "use \"radial\""),
         ("stiffness = 1.5e7", "stiffness = 1.5e7\nmass = 2.0", "not both"),
         ("damping = 0.03", "damping = 0.0", "expected a positive number"),
-        ("[[mode]]", "[measured]\nfile = \"none.csv\"\n[[mode]]", "not both"),
+        ("[[mode]]", "[measured]\nfile = \"frf.csv\"\n[[mode]]", "fit modes to the response"),
     ];
     for (old, new, words) in cases {
         assert!(good.contains(old), "{old}");
@@ -294,13 +211,8 @@ fn a_wrong_tool_is_told_with_its_place() {
     assert!(fails(&along, Modelling::default()).contains("parallel to the tool axis"));
     let bare = &good[..good.find("[[mode]]").unwrap()];
     assert!(fails(bare, rigid()).contains("nothing is elastic"));
-    let stopped = lobes(
-        &robot,
-        &folder.tool(&good).unwrap(),
-        &CuttingPlace::At(None),
-        &LobesRequest { zero_order: true, ..LobesRequest::default() },
-        &|_, _| false,
-    );
+    let stopped =
+        lobes(&robot, &folder.tool(&good).unwrap(), &CuttingPlace::At(None), &LobesRequest::default(), &|_, _| false);
     assert!(matches!(stopped, Err(Error::Interrupted { .. })));
 }
 
@@ -309,7 +221,7 @@ fn a_wrong_tool_is_told_with_its_place() {
 fn table_diagram_page_and_figures_are_written_together() {
     let (robot, folder) = (kr210(), Folder::new("files"));
     let tool = shipped("endmill_20mm").at_speeds((6..14).map(|k| 1000.0 * f64::from(k)).collect());
-    let request = LobesRequest { zero_order: true, output: Some(folder.0.join("out")), ..LobesRequest::default() };
+    let request = LobesRequest { output: Some(folder.0.join("out")), ..LobesRequest::default() };
     let found = at(&robot, &tool, &[0.0, -1.0, 1.6, 0.0, 0.9, 0.0], &request);
     let csv = std::fs::read_to_string(found.file.as_ref().unwrap()).unwrap();
     let depth: f64 = csv.lines().nth(3).unwrap().split(',').nth(1).unwrap().parse().unwrap();
@@ -330,7 +242,7 @@ fn a_tool_axis_in_world_axes_is_the_same_axis() {
     let (robot, folder) = (kr210(), Folder::new("axis"));
     let pose = [0.2, -1.0, 1.6, 0.4, 0.9, -0.3];
     let text = std::fs::read_to_string(root().join("robots/tools/face_mill_63mm.toml")).unwrap();
-    let request = LobesRequest { zero_order: true, ..LobesRequest::default() };
+    let request = LobesRequest::default();
     let own = folder.tool(&text).unwrap().at_speeds(vec![2000.0, 5000.0]);
     let found = at(&robot, &own, &pose, &request);
     let ([x, y, z], [fx, fy, fz]) = (found.poses[0].axis, found.poses[0].feed);
@@ -366,13 +278,12 @@ fn what_no_tool_has_is_refused_and_what_few_have_is_told_with_its_slip() {
         ("diameter = 20.0", "diameter = 20000.0", "diameter is 20 m"),
         ("deepest = 20.0", "deepest = 1e40", "deepest is"),
         ("to = 18000.0", "to = 1e12", "to is 1e12 1/min"),
-        ("feed_per_tooth = 0.1", "feed_per_tooth = 1e40", "feed_per_tooth is"),
     ] {
         assert!(good.contains(old), "{old}");
         let error = folder.tool(&good.replace(old, new)).map(|_| ()).unwrap_err().to_string();
         assert!(error.contains(words) && error.contains("tool.toml:"), "{new}: {error}");
     }
-    let rigid = LobesRequest { modelling: rigid(), zero_order: true, ..LobesRequest::default() };
+    let rigid = LobesRequest { modelling: rigid(), ..LobesRequest::default() };
     for (old, new, code, slip) in [
         ("damping = 0.03", "damping = 3.0", "tool-damping", "per cent"),
         ("stiffness = 1.5e7", "stiffness = 15.0", "tool-stiffness", "N/um"),

@@ -1,9 +1,8 @@
 //! Conversion of modal links to Standard Input Data and back.
 
 use crate::common::turned;
-use flexarm_fe_io::exchange::{
-    ExchangeErrorKind, SidMatrix, modal_link_from_sid, modal_link_held_at, parse_sid, sid_of_modal_link, write_sid,
-};
+use crate::exchange::sid_writer::{sid_of_modal_link, write_sid};
+use flexarm_fe_io::exchange::{ExchangeErrorKind, SidMatrix, modal_link_from_sid, modal_link_held_at, parse_sid};
 use flexarm_fem::{ModalLink, ModalOptions, UnitSystem};
 use nalgebra::{DMatrix, Matrix3, Matrix6xX};
 

@@ -85,7 +85,7 @@ fn commands_of_servos_move_the_tool_as_asked_far_above_their_position_gains() {
         position_gain: 15.0,
         velocity_gain: 60.0 * M[(coordinate, coordinate)],
         integral_gain: 0.0,
-        feed_forward: i % 2 == 0,
+        feed_forward: f64::from(u8::from(i % 2 == 0)),
         limit: f64::INFINITY,
     };
     let axes = [0, 1, 2, 4].into_iter().enumerate().map(axis).collect();

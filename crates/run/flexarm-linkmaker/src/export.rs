@@ -3,19 +3,16 @@
 //! Stiffness and mass of the interfaces, with modes where the link has them, are converted to the
 //! requested units, written, read back by the same code as every import, and compared. A text file
 //! states the order of the rows and the units, which most formats do not hold. For a link without
-//! superelement only its static stiffness is written. SID holds the modal link instead.
+//! superelement only its static stiffness is written.
 //!
 //! Not here: the formats (`flexarm-fe-io`).
 
-mod sid;
-
-use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::time::Instant;
 
 use flexarm_fe_io::exchange::{
     DofLabel, InputFile, Interface, InterfaceMap, MatrixNames, RowPick, Sidecar, SidecarInterface, assemble_interfaces,
-    parse_matrices, write_dmig, write_matrix_market, write_op4, write_sidecar, write_simscape, write_user_element,
+    parse_matrices, write_matrix_market, write_sidecar, write_simscape, write_user_element,
 };
 use flexarm_fem::reduction::{InterfaceFrame, Superelement};
 use flexarm_fem::{Pose, ReducedLink, UnitSystem, read_flex};
@@ -26,6 +23,9 @@ use serde::Serialize;
 
 use crate::{JobError, LinkError, stamp};
 
+/// Tolerance of writing and reading back, relative to `sqrt(k_ii k_jj)`.
+const DIGITS: f64 = 1e-12;
+
 /// Formats that can be written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ExportFormat {
@@ -33,14 +33,8 @@ pub enum ExportFormat {
     MatrixMarket,
     /// `*USER ELEMENT` of CalculiX and Abaqus.
     UserElement,
-    /// Nastran DMIG.
-    Dmig,
-    /// Nastran OP4, text.
-    Op4,
     /// Comma-separated values and a script for Simscape.
     Simscape,
-    /// Standard Input Data: the modal link.
-    Sid,
 }
 
 impl ExportFormat {
@@ -49,16 +43,8 @@ impl ExportFormat {
         match self {
             Self::MatrixMarket => "matrix-market",
             Self::UserElement => "user-element",
-            Self::Dmig => "dmig",
-            Self::Op4 => "op4",
             Self::Simscape => "simscape",
-            Self::Sid => "sid",
         }
-    }
-
-    /// Tolerance of writing and reading back, relative to `sqrt(k_ii k_jj)`.
-    fn digits(self) -> f64 {
-        if self == Self::Dmig { 1e-9 } else { 1e-12 }
     }
 }
 
@@ -71,7 +57,7 @@ pub struct ExportJob {
     pub format: ExportFormat,
     /// Units of the files.
     pub units: UnitSystem,
-    /// Node numbers of the interfaces; if empty, 1001, 1002, ... (for SID 1, 2, ...).
+    /// Node numbers of the interfaces; if empty, 1001, 1002, ...
     pub nodes: Vec<i64>,
     /// Output folder; created if missing.
     pub folder: PathBuf,
@@ -127,8 +113,6 @@ pub struct ExportChecks {
     pub mass_error: Option<f64>,
     /// Maximum difference of the stiffness, relative to `sqrt(k_ii k_jj)`.
     pub stiffness_error: f64,
-    /// Maximum difference of the mass integrals of a modal link; null in other formats.
-    pub integrals_error: Option<f64>,
 }
 
 /// Writes a link in another format and reads it back.
@@ -138,9 +122,6 @@ pub struct ExportChecks {
 pub fn export(job: &ExportJob) -> Result<ExportSummary, LinkError> {
     let started = Instant::now();
     let link = read_flex(&job.link).map_err(Box::new)?;
-    if job.format == ExportFormat::Sid {
-        return sid::export(job, &link, started);
-    }
     let mut warnings = Vec::new();
     let (element, has_mass) = element_of(&link, &mut warnings);
     let nodes = nodes(job, element.interfaces.len())?;
@@ -162,7 +143,7 @@ pub fn export(job: &ExportJob) -> Result<ExportSummary, LinkError> {
     let stiffness_error = difference(&element.K, &back.K);
     let mass_error = back.M.as_ref().filter(|_| has_mass).map(|M| difference(&element.M, M));
     for (what, error) in [("stiffness", Some(stiffness_error)), ("mass", mass_error)] {
-        if error.is_some_and(|error| error.is_nan() || error > job.format.digits()) {
+        if error.is_some_and(|error| error.is_nan() || error > DIGITS) {
             let error = error.unwrap_or(f64::NAN);
             warnings.push(format!("the exported {what}, read back, differs by {error:.1e} (relative to its diagonal)"));
         }
@@ -186,7 +167,6 @@ pub fn export(job: &ExportJob) -> Result<ExportSummary, LinkError> {
             rigid_body_residual: link.checks.rigid_body_residual,
             mass_error,
             stiffness_error,
-            integrals_error: None,
         },
         wall_s: started.elapsed().as_secs_f64(),
         peak_rss_bytes: stamp::peak_rss_bytes(),
@@ -246,7 +226,7 @@ struct Content<'a> {
 impl Content<'_> {
     /// Whether rows have node numbers.
     fn is_labelled(&self) -> bool {
-        matches!(self.job.format, ExportFormat::UserElement | ExportFormat::Dmig)
+        self.job.format == ExportFormat::UserElement
     }
 
     fn map(&self) -> InterfaceMap {
@@ -314,20 +294,6 @@ impl Content<'_> {
             ExportFormat::UserElement => {
                 vec![(format!("{stem}.mtx"), write_user_element(&K, M.as_ref(), &self.rows()))]
             }
-            ExportFormat::Dmig => {
-                let positions: BTreeMap<i64, _> =
-                    self.nodes.iter().copied().zip(self.frames().iter().map(|X| X.translation.vector)).collect();
-                let mut list = vec![("KAAX", &K)];
-                list.extend(M.as_ref().map(|M| ("MAAX", M)));
-                vec![(format!("{stem}.pch"), write_dmig(&list, &self.rows(), &positions))]
-            }
-            ExportFormat::Op4 => {
-                let mut list = vec![("KAAX", &K)];
-                list.extend(M.as_ref().map(|M| ("MAAX", M)));
-                vec![(format!("{stem}.op4"), write_op4(&list))]
-            }
-            // SID is written from the modal link by [`sid::export`].
-            ExportFormat::Sid => Vec::new(),
             ExportFormat::Simscape => {
                 let zero = DMatrix::zeros(K.nrows(), K.nrows());
                 let simscape = write_simscape(&stem, &K, M.as_ref().unwrap_or(&zero), &self.frames());

@@ -1,10 +1,12 @@
-//! TCP deflections in many runs of one arm, on all cores and with several runs at a time on each.
+//! TCP deflections in many runs of one arm, on all cores.
 //!
 //! For studies in which payload, motion, stiffness and damping vary and only the deflection is
 //! needed. For recordings, drives or settling use [`Arm::simulate_batch`]. Start at
 //! [`Arm::deflections`].
 
-use flexarm_stepping::{Batch, BatchRun, FlexibleArm, Spring, StepError, ToolDeflection};
+use std::sync::Arc;
+
+use flexarm_stepping::{FlexibleArm, Spring, ToolDeflection, ToolRun};
 use rayon::prelude::*;
 
 use crate::arm::Arm;
@@ -49,13 +51,10 @@ impl Arm {
     /// Computes peak, RMS and final TCP deflection of each run; with `keep_samples` also the
     /// deflection after every step.
     ///
-    /// Figures are evaluated at the start and at the end of every step, not at the log rate. Runs
-    /// of the same tree (same links and joints, whatever their inertias, stiffness, damping and
-    /// motion) are processed four at a time with AVX2 vector instructions, eight at a time with
-    /// AVX-512. Loads, torque-driven joints, curved springs, motions with corners and steppers
-    /// other than generalised-alpha exclude a run from this. Results are bitwise identical for any
-    /// grouping, order and number of threads. A failed run does not stop the others. Once `stop`
-    /// returns true, runs that have not started end with [`Error::Interrupted`].
+    /// Figures are evaluated at the start and at the end of every step, not at the log rate. Results
+    /// do not depend on the number of threads of the pool of `rayon`. A failed run does not stop the
+    /// others. Once `stop` returns true, runs that have not started end with
+    /// [`Error::Interrupted`].
     ///
     /// # Errors
     /// Per run: as [`Arm::simulate`]; [`ValueError::Factor`] unless both factors are positive.
@@ -66,57 +65,23 @@ impl Arm {
         keep_samples: bool,
         stop: &(dyn Fn() -> bool + Sync),
     ) -> Vec<Result<ToolDeflection, Error>> {
-        // Runs of similar duration are grouped.
-        let mut order: Vec<usize> = (0..runs.len()).collect();
-        order.sort_by(|a, b| runs[*a].scenario.duration_s().total_cmp(&runs[*b].scenario.duration_s()));
-        let found = order.par_chunks(Batch::most_side_by_side()).flat_map_iter(|numbers| {
-            if stop() {
-                let stopped = || Err(Error::Interrupted { t: 0.0, partial: false });
-                return numbers.iter().map(|number| (*number, stopped())).collect::<Vec<_>>();
-            }
-            let group: Vec<&Variation> = numbers.iter().map(|k| &runs[*k]).collect();
-            numbers.iter().copied().zip(self.deflections_of(&group, options, keep_samples)).collect::<Vec<_>>()
-        });
-        let mut found: Vec<_> = found.collect();
-        found.sort_by_key(|(number, _)| *number);
-        found.into_iter().map(|(_, result)| result).collect()
-    }
-
-    /// Processes a few runs on this thread.
-    fn deflections_of(
-        &self,
-        runs: &[&Variation],
-        options: &RunOptions,
-        keep_samples: bool,
-    ) -> Vec<Result<ToolDeflection, Error>> {
         let flexible = self.flexible();
-        let mut results: Vec<Option<Result<ToolDeflection, Error>>> = Vec::new();
-        let (mut going, mut starts) = (Vec::new(), Vec::new());
-        for run in runs {
-            match self.varied(run, options) {
-                Ok(arm) => {
-                    going.push(BatchRun { arm, duration_s: run.scenario.duration_s() });
-                    starts.push(run.scenario.start);
-                    results.push(None);
-                }
-                Err(error) => results.push(Some(Err(error))),
+        let one = |run: &Variation| {
+            if stop() {
+                return Err(Error::Interrupted { t: 0.0, partial: false });
             }
-        }
-        let batch = |start| Batch {
-            step_s: options.step_s,
-            stepper: options.stepper,
-            start,
-            tool: flexible.tcp.clone(),
-            keep_samples,
+            let arm = Arc::new(self.varied(run, options)?);
+            let run = ToolRun {
+                step_s: options.step_s,
+                duration_s: run.scenario.duration_s(),
+                stepper: options.stepper,
+                start: run.scenario.start,
+                tool: flexible.tcp.clone(),
+                keep_samples,
+            };
+            run.deflection(&arm).map_err(|error| flexible.explained(error))
         };
-        // The start conditions are usually the same.
-        let one = starts.windows(2).all(|pair| pair[0] == pair[1]);
-        let found: Vec<Result<ToolDeflection, StepError>> = match starts.first() {
-            Some(start) if one => batch(*start).run(&going),
-            _ => going.iter().zip(&starts).map(|(run, start)| batch(*start).run_alone(run)).collect(),
-        };
-        let mut found = found.into_iter().map(|result| result.map_err(|error| flexible.explained(error)));
-        results.into_iter().filter_map(|result| result.or_else(|| found.next())).collect()
+        runs.par_iter().map(one).collect()
     }
 
     /// Returns the arm of a run, with its factors and loads.

@@ -69,12 +69,12 @@ impl FlexibleRobot {
         self.arm_with(self.springs.clone(), motion)
     }
 
-    /// As [`Self::arm`], with other springs in the same places.
-    pub(crate) fn arm_with(
-        &self,
-        springs: Vec<Spring>,
-        motion: Arc<dyn PrescribedMotion>,
-    ) -> Result<FlexibleArm, StepError> {
+    /// As [`Self::arm`], with other springs in the same places; the laws of gears follow the
+    /// stiffness of their springs.
+    ///
+    /// # Errors
+    /// As [`Self::arm`].
+    pub fn arm_with(&self, springs: Vec<Spring>, motion: Arc<dyn PrescribedMotion>) -> Result<FlexibleArm, StepError> {
         let mut arm = FlexibleArm::new(self.model.clone(), springs, motion)?;
         if self.friction.iter().any(|f| *f != Friction::NONE) {
             arm.friction.clone_from(&self.friction);
@@ -87,7 +87,7 @@ impl FlexibleRobot {
         let n = self.rigid.nv();
         let (mut q, mut v, mut a) = (DVector::zeros(n), DVector::zeros(n), DVector::zeros(n));
         arm.motion.sample(0.0, q.as_mut_slice(), v.as_mut_slice(), a.as_mut_slice());
-        let axes = self.servo_axes(&self.inertias_felt(&self.model, &self.rigid, &q));
+        let axes = self.servo_axes(&q);
         arm.with_servo(Servo { sample_s: self.sample_s(), axes, rigid: self.rigid.clone() })
     }
 
@@ -146,11 +146,7 @@ impl FlexibleRobot {
     /// Inertia that each torque-driven joint sees when all other free coordinates are free to
     /// accelerate: `1 / (M_ff^-1)_ii`.
     pub(crate) fn quick_inertia(&self, actuated: &DVector<f64>) -> Vec<f64> {
-        self.quick_inertia_of(&self.model, actuated)
-    }
-
-    pub(crate) fn quick_inertia_of(&self, model: &Model, actuated: &DVector<f64>) -> Vec<f64> {
-        let n = model.n_actuated();
+        let (model, n) = (&self.model, self.model.n_actuated());
         let mut q = DVector::zeros(model.nv());
         q.rows_mut(0, n).copy_from(actuated);
         let M = mass_matrix(model, &mut Data::new(model), &q).clone();

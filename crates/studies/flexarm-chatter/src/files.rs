@@ -7,17 +7,13 @@ use flexarm_draw::{CurveLook, LinePlot, Panel, PlotCurve, PlotError};
 use flexarm_files::write_all;
 
 use super::tool_file::CuttingTool;
-use super::{CutRun, LobePoint, Lobes, LobesFiles};
+use super::{LobePoint, Lobes, LobesFiles};
 use flexarm_run::Error;
 use flexarm_run::html_page::opening;
 use flexarm_settings::written::markup;
 
 /// File names in the output folder.
 pub(super) const NAMES: [&str; 4] = ["lobes.csv", "lobes.svg", "lobes.html", "lobes.json"];
-/// File names for a cut over time.
-pub(super) const CUT_NAMES: [&str; 3] = ["cut.csv", "cut.svg", "cut.json"];
-/// Maximum number of plotted points of a curve.
-const SHOWN: usize = 4000;
 /// Ratio of maximum to minimum above which limits and frequencies have a logarithmic axis.
 const WIDE: f64 = 40.0;
 /// Maximum number of poses with a curve each.
@@ -52,11 +48,11 @@ fn cell(x: Option<f64>) -> String {
 }
 
 fn csv(answer: &Lobes) -> String {
-    let mut text = String::from("spindle_rpm,depth_m,chatter_hz,kind,zero_order_depth_m,pose\n");
+    let mut text = String::from("spindle_rpm,depth_m,chatter_hz,kind,pose\n");
     for p in &answer.points {
         let kind = p.kind.unwrap_or("");
-        let (depth, hz, zero) = (cell(p.depth_m), cell(p.chatter_hz), cell(p.zero_order_depth_m));
-        let _ = writeln!(text, "{},{depth},{hz},{kind},{zero},{}", p.spindle_rpm, p.pose);
+        let (depth, hz) = (cell(p.depth_m), cell(p.chatter_hz));
+        let _ = writeln!(text, "{},{depth},{hz},{kind},{}", p.spindle_rpm, p.pose);
     }
     text
 }
@@ -64,11 +60,8 @@ fn csv(answer: &Lobes) -> String {
 /// Plots depth and chatter frequency over the spindle speed.
 fn plot(answer: &Lobes, tool: &CuttingTool) -> Result<String, PlotError> {
     let rpm = |p: &LobePoint| p.spindle_rpm;
-    let depths = |f: &dyn Fn(&LobePoint) -> Option<f64>| -> Vec<f64> {
-        answer.points.iter().map(|p| f(p).map_or(f64::NAN, |d| 1e3 * d)).collect()
-    };
     let x: Vec<f64> = answer.points.iter().map(rpm).collect();
-    let limit = depths(&|p| p.depth_m);
+    let limit: Vec<f64> = answer.points.iter().map(|p| p.depth_m.map_or(f64::NAN, |d| 1e3 * d)).collect();
     let mut curves = Vec::new();
     if answer.poses.len() > 1 && answer.poses.len() <= DRAWN {
         for (k, pose) in answer.poses.iter().enumerate() {
@@ -78,9 +71,6 @@ fn plot(answer: &Lobes, tool: &CuttingTool) -> Result<String, PlotError> {
         }
     }
     curves.extend(stretches("stability limit", CurveLook::Total, &x, &limit));
-    if answer.method == "floquet" {
-        curves.extend(stretches("zero-order solution", CurveLook::Dashed, &x, &depths(&|p| p.zero_order_depth_m)));
-    }
     let finite = || limit.iter().copied().filter(|d| d.is_finite());
     let logarithmic = finite().fold(0.0, f64::max) > WIDE * finite().fold(f64::INFINITY, f64::min);
     let chatter = |kind: &str, name: &str| {
@@ -193,72 +183,4 @@ fn html(answer: &Lobes, picture: Option<&str>) -> String {
     page += "</table>\n<p>Linearised about the pose with the drives locked. Not modelled: backlash and friction of \
              the gears, process damping at low speed, flexibility of the workpiece.</p>\n</body></html>\n";
     page
-}
-
-pub(super) fn save_cut(answer: &mut CutRun, paths: [PathBuf; 3]) -> Result<(), Error> {
-    let picture = cut_plot(answer).ok();
-    answer.file = Some(paths[0].display().to_string());
-    answer.plot = picture.as_ref().map(|_| paths[1].display().to_string());
-    let json = serde_json::to_string_pretty(answer).expect("plain numbers and strings") + "\n";
-    let contents = [Some(cut_csv(answer)), picture, Some(json)];
-    let files = paths.into_iter().zip(contents).filter_map(|(path, content)| Some((path, content?)));
-    Ok(write_all(&files.collect::<Vec<_>>())?)
-}
-
-fn cut_csv(answer: &CutRun) -> String {
-    let mut text = String::from("time_s,x_m,y_m,z_m,fx_n,fy_n,fz_n,chip_m\n");
-    let c = &answer.curves;
-    for (((t, u), F), chip) in c.time.iter().zip(&c.displacement).zip(&c.force).zip(&c.chip) {
-        let _ = writeln!(text, "{t},{},{},{},{},{},{},{chip}", u.x, u.y, u.z, F.x, F.y, F.z);
-    }
-    text
-}
-
-/// Plots displacement and force over the whole simulation.
-fn cut_plot(answer: &CutRun) -> Result<String, PlotError> {
-    let c = &answer.curves;
-    // Minimum and maximum of each chunk of samples.
-    let every = (2 * c.time.len() / SHOWN).max(1);
-    let swing = |f: &dyn Fn(usize) -> f64| -> (Vec<f64>, Vec<f64>) {
-        let all: Vec<usize> = (0..c.time.len()).collect();
-        let ends = all.chunks(every).flat_map(|piece| {
-            let by = |a: &&usize, b: &&usize| f(**a).total_cmp(&f(**b));
-            let (low, high) = (piece.iter().min_by(by), piece.iter().max_by(by));
-            let mut ends: Vec<usize> = low.into_iter().chain(high).copied().collect();
-            ends.sort_unstable();
-            ends
-        });
-        ends.map(|k| (c.time[k], f(k))).unzip()
-    };
-    let curve = |name: &str, axis: usize, f: &dyn Fn(usize) -> f64| {
-        let (x, y) = swing(f);
-        PlotCurve { name: name.into(), look: CurveLook::Axis(axis), x, y }
-    };
-    let names = ["along the feed", "across the feed", "along the tool axis"];
-    let panel = |label: &str, legend: bool, f: &dyn Fn(usize, usize) -> f64| Panel {
-        label: label.into(),
-        logarithmic: false,
-        legend,
-        curves: (0..3).map(|axis| curve(names[axis], axis, &|k| f(k, axis))).collect(),
-    };
-    let panels = [
-        panel("displacement of the tip [mm]", true, &|k, axis| 1e3 * c.displacement[k][axis]),
-        panel("force on the tool [N]", false, &|k, axis| c.force[k][axis]),
-    ];
-    let limit = answer
-        .limit_m
-        .map_or_else(|| "no limit".to_owned(), |limit| format!("limit {} mm", rounded_down(1e3 * limit, 3)));
-    let verdict = if answer.chatters { "chatters" } else { "does not chatter" };
-    let title = format!(
-        "{} on {}: {:.0} 1/min, {:.3} mm {verdict}",
-        answer.tool,
-        answer.robot,
-        answer.spindle_rpm,
-        1e3 * answer.depth_m
-    );
-    let notes = [format!(
-        "{limit}; standard deviation of the tip displacement between tooth periods at the end: {:.2e} mm",
-        1e3 * answer.scatter_m
-    )];
-    LinePlot { title: &title, notes: &notes, x_label: "time [s]", panels: &panels, ..LinePlot::default() }.svg()
 }

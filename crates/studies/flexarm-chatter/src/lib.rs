@@ -2,15 +2,12 @@
 //! speed, at a pose or along a motion.
 //!
 //! At each pose the arm is a linear structure about its equilibrium, in series with the tool's own
-//! modes or its measured response (`place.rs`). The limits are those of [`milling`]. Start at
-//! [`lobes`]. [`cut`] simulates one cut over time, on the moving arm.
+//! modes (`place.rs`). The limits are those of [`milling`]. Start at [`lobes`].
 #![allow(non_snake_case, reason = "monogram notation: X_WL, K_S; see docs/references.md")]
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
 mod caveats;
-mod cut;
 mod files;
-mod measured;
 pub mod milling;
 mod place;
 mod tool_file;
@@ -20,7 +17,7 @@ use std::f64::consts::TAU;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use crate::milling::{Kind, LimitOptions, limit_of_depth, unstable_ranges, zero_order_limit};
+use crate::milling::{Kind, LimitOptions, limit_of_depth, unstable_ranges};
 use flexarm_files::check_free;
 use flexarm_settings::Quantity;
 use rayon::prelude::*;
@@ -35,9 +32,8 @@ use flexarm_run::ValueError;
 use flexarm_run::caveat;
 use flexarm_run::caveat::of_use;
 
-pub use crate::milling::{ChatterError, Simulated};
+pub use crate::milling::ChatterError;
 pub use caveats::tool_caveats;
-pub use cut::{CutRequest, CutRun, cut};
 pub use files::rounded_down;
 pub use tool_file::CuttingTool;
 
@@ -60,9 +56,6 @@ pub struct LobesRequest {
     pub modelling: Modelling,
     /// Maximum depth of cut (m); that of the tool if absent.
     pub deepest_m: Option<f64>,
-    /// Whether to use the mean force (zero-order solution) instead of the multipliers of the tooth
-    /// period.
-    pub zero_order: bool,
     /// Whether to find all unstable ranges of depth at each speed, not only the lowest limit (at a
     /// pose).
     pub ranges: bool,
@@ -81,8 +74,6 @@ pub struct Lobes {
     pub tool: String,
     /// Joints, in coordinate order.
     pub joints: Vec<String>,
-    /// Method: `floquet` or `zero-order`.
-    pub method: &'static str,
     /// Maximum depth of cut in the search (m).
     pub deepest_m: f64,
     /// Minimum limit over all poses, one per speed.
@@ -124,8 +115,6 @@ pub struct LobePoint {
     pub chatter_hz: Option<f64>,
     /// Type of bifurcation: `hopf` (independent frequency) or `flip` (period of two teeth).
     pub kind: Option<&'static str>,
-    /// Limit of the zero-order solution, for comparison (m).
-    pub zero_order_depth_m: Option<f64>,
     /// Index of the pose.
     pub pose: usize,
     /// All unstable ranges of depth (m), if requested.
@@ -189,10 +178,7 @@ pub enum LobesError {
         source: ChatterError,
     },
     /// Neither the arm nor the tool is flexible.
-    #[error(
-        "nothing is elastic: the robot has no flexible link and no elastic drive, and the tool has no mode and no \
-         measured response"
-    )]
+    #[error("nothing is elastic: the robot has no flexible link and no elastic drive, and the tool has no mode")]
     NothingYields,
     /// The feed is parallel to the tool's axis.
     #[error("the feed is parallel to the tool axis: set a feed direction across the axis (feed = [...] in [tool])")]
@@ -208,32 +194,10 @@ pub enum LobesError {
         /// Minimum number.
         least: usize,
     },
-    /// The method needs modes, but the tool has a measured response.
-    #[error(
-        "the tool has a measured response and no modes: only the limits of the zero-order solution are available; \
-         unstable ranges and simulations need [[mode]] entries"
-    )]
-    MeasuredTool,
     /// The maximum depth is not a positive number.
     #[error("the maximum depth of cut is {found} m, expected a positive number")]
     Deepest {
         /// Value found (m).
-        found: f64,
-    },
-    /// The simulation would take too many steps.
-    #[error(
-        "the simulation needs {steps} steps, the maximum is {most}: use a shorter duration or fewer steps per tooth"
-    )]
-    Long {
-        /// Number of steps.
-        steps: usize,
-        /// Maximum number of steps.
-        most: usize,
-    },
-    /// The duration of the simulation is not a positive number.
-    #[error("{} is {found} s, expected a positive number", flexarm_settings::Setting::Seconds)]
-    Seconds {
-        /// Value found (s).
         found: f64,
     },
     /// A spindle speed is not a positive number.
@@ -270,9 +234,6 @@ pub fn lobes(
     let deepest_m = request.deepest_m.unwrap_or(tool.deepest);
     check_deepest(deepest_m)?;
     check_speeds(&tool.rpm)?;
-    if tool.measured.is_some() && request.ranges {
-        return Err(LobesError::MeasuredTool.into());
-    }
     let paths = request.output.as_ref().map(|folder| files::NAMES.map(|name| folder.join(name)));
     check_free(paths.as_ref().map_or(&[], |paths| paths.as_slice()), request.overwrite)?;
 
@@ -280,11 +241,10 @@ pub fn lobes(
         CuttingPlace::At(at) => (vec![CutPose::at(robot, &request.modelling, tool, *at)?], 0),
         CuttingPlace::Along(motion, n) => CutPose::along(robot, &request.modelling, tool, motion, *n)?,
     };
-    let zero_order = request.zero_order || tool.measured.is_some();
     let (speeds, done) = (tool.rpm.len(), AtomicUsize::new(0));
     let limit = |k: usize| {
         let at = &places[k / speeds];
-        let point = point(at, tool, tool.rpm[k % speeds], deepest_m, zero_order, request.ranges, k / speeds);
+        let point = point(at, tool, tool.rpm[k % speeds], deepest_m, request.ranges, k / speeds);
         if !go_on(done.fetch_add(1, Ordering::Relaxed) + 1, speeds * places.len()) {
             return Err(Error::Interrupted { t: at.time_s.unwrap_or(0.0), partial: false });
         }
@@ -292,7 +252,6 @@ pub fn lobes(
     };
     let all: Vec<LobePoint> = (0..speeds * places.len()).into_par_iter().map(limit).collect::<Result<_, Error>>()?;
     let mut answer = assembled(robot, tool, &places, &all, deepest_m);
-    answer.method = if zero_order { "zero-order" } else { "floquet" };
     answer.left_out = left_out;
     if let CuttingPlace::Along(motion, _) = place {
         answer.caveats = of_use::of_motion(motion, &*robot.rigid_model()?);
@@ -300,16 +259,6 @@ pub fn lobes(
     answer.caveats.extend(places.iter().flat_map(|place| place.caveats(robot)));
     answer.caveats = caveat::once_each(std::mem::take(&mut answer.caveats));
     answer.caveats.extend(caveats::tool_caveats(tool));
-    if tool.measured.is_some() && !request.zero_order {
-        let message = "the tool has a measured response: the limits are those of the zero-order solution, which does \
-                       not include period doubling";
-        answer.caveats.push(Caveat::from_message(
-            "zero-order",
-            "tool",
-            message,
-            "fit modes to the response and give them as [[mode]]",
-        ));
-    }
     answer.warnings = caveat::warnings(&answer.caveats);
     if let Some(paths) = paths {
         files::save(&mut answer, tool, paths)?;
@@ -322,27 +271,12 @@ fn point(
     tool: &CuttingTool,
     rpm: f64,
     deepest_m: f64,
-    zero_order: bool,
     ranges: bool,
     pose: usize,
 ) -> Result<LobePoint, ChatterError> {
     let spindle = TAU * rpm / 60.0;
-    let zero = zero_order_limit(&|w| place.response(w), &tool.cutter, spindle, &place.band, deepest_m)?;
-    let mut point = LobePoint {
-        spindle_rpm: rpm,
-        depth_m: None,
-        chatter_hz: None,
-        kind: None,
-        zero_order_depth_m: zero.map(|limit| limit.depth),
-        pose,
-        unstable_m: Vec::new(),
-    };
-    if zero_order {
-        point.depth_m = zero.map(|limit| limit.depth);
-        point.chatter_hz = zero.map(|limit| limit.chatter_hz);
-        point.kind = zero.map(|_| "hopf");
-        return Ok(point);
-    }
+    let mut point =
+        LobePoint { spindle_rpm: rpm, depth_m: None, chatter_hz: None, kind: None, pose, unstable_m: Vec::new() };
     let options = LimitOptions::to(deepest_m);
     if let Some(limit) = limit_of_depth(&place.structure, &tool.cutter, spindle, &options)? {
         point.depth_m = Some(limit.depth);
@@ -374,17 +308,9 @@ fn check_deepest(depth_m: f64) -> Result<(), Error> {
 /// Returns the minimum limit of depth at a pose over all speeds of the tool (m): the maximum depth
 /// if the cut never chatters, NaN if the feed is parallel to the tool's axis.
 ///
-/// * `zero_order`: whether to use the mean force, as for a tool with a measured response.
-///
 /// # Errors
 /// As [`lobes`] at a pose.
-pub fn lowest_limit(
-    robot: &Robot,
-    modelling: &Modelling,
-    tool: &CuttingTool,
-    zero_order: bool,
-    q: &[f64],
-) -> Result<f64, Error> {
+pub fn lowest_limit(robot: &Robot, modelling: &Modelling, tool: &CuttingTool, q: &[f64]) -> Result<f64, Error> {
     check_speeds(&tool.rpm)?;
     let place = match CutPose::at(robot, modelling, tool, Some(q)) {
         Err(error) if error.external() == Some(&LobesError::FeedAlongAxis) => return Ok(f64::NAN),
@@ -392,7 +318,7 @@ pub fn lowest_limit(
     };
     let mut lowest = tool.deepest;
     for rpm in &tool.rpm {
-        let found = point(&place, tool, *rpm, tool.deepest, zero_order || tool.measured.is_some(), false, 0)
+        let found = point(&place, tool, *rpm, tool.deepest, false, 0)
             .map_err(|source| LobesError::Chatter { place: place.words(), source })?;
         lowest = lowest.min(found.depth_m.unwrap_or(lowest));
     }
@@ -417,7 +343,7 @@ fn assembled(robot: &Robot, tool: &CuttingTool, places: &[CutPose], all: &[LobeP
             feed: place.feed.into(),
             axis: place.axis.into(),
             frequencies_hz: place.frequencies_hz(),
-            compliance: std::array::from_fn(|i| place.response(0.0)[(i, i)].re),
+            compliance: std::array::from_fn(|i| place.structure.frequency_response(0.0)[(i, i)].re),
             stable_below_m: low.as_ref().and_then(|p| p.depth_m),
             stable_below_at_rpm: low.map(|p| p.spindle_rpm),
             depth_m: of_pose(k).iter().map(|p| p.depth_m).collect(),
@@ -432,7 +358,6 @@ fn assembled(robot: &Robot, tool: &CuttingTool, places: &[CutPose], all: &[LobeP
         robot: robot.name.clone(),
         tool: tool.name.clone(),
         joints: places.first().map_or_else(Vec::new, |place| place.joints().to_vec()),
-        method: "",
         deepest_m,
         stable_below_m: low.as_ref().and_then(|p| p.depth_m),
         stable_below_at_rpm: low.map(|p| p.spindle_rpm),

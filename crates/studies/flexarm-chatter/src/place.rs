@@ -1,5 +1,4 @@
-//! Compliance of arm and tool at the cutter at one pose: poles in the axes of the cut, plus the
-//! measured response of the tool if there is one.
+//! Compliance of arm and tool at the cutter at one pose: poles in the axes of the cut.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -7,10 +6,9 @@ use std::sync::Arc;
 use crate::milling::{Mode, Structure};
 use flexarm_kinematics::{Data, forward_kinematics};
 use flexarm_stepping::Linear;
-use nalgebra::{Complex, DVector, Matrix3, Matrix3xX, Vector3, Vector6};
+use nalgebra::{DVector, Matrix3, Matrix3xX, Vector3, Vector6};
 
 use super::LobesError;
-use super::measured::MeasuredResponse;
 use super::tool_file::{CuttingTool, ToolDirection};
 use flexarm_run::Caveat;
 use flexarm_run::Error;
@@ -41,14 +39,8 @@ pub(super) struct CutPose {
     pub(super) feed: Vector3<f64>,
     /// Direction from the spindle to the tip, world axes.
     pub(super) axis: Vector3<f64>,
-    /// Rotation from TCP to world axes.
-    R_WT: Matrix3<f64>,
     /// Arm and modes of the tool, in the axes of the cut.
     pub(super) structure: Structure,
-    /// Measured response of the tool, if any, and rotation from its axes to those of the cut.
-    measured: Option<(MeasuredResponse, Matrix3<f64>)>,
-    /// Angular frequencies for evaluating the response (rad/s).
-    pub(super) band: Vec<f64>,
 }
 
 impl CutPose {
@@ -123,47 +115,10 @@ impl CutPose {
         let structure = structure(&linear, tool, R_WC.transpose(), &R_WT.into_inner()).map_err(|source| {
             LobesError::Chatter { place: pose_in_words(&posed.joints, &posed.at, &posed.prismatic), source }
         })?;
-        if structure.poles().is_empty() && tool.measured.is_none() {
+        if structure.poles().is_empty() {
             return Err(LobesError::NothingYields.into());
         }
-        let measured = tool.measured.clone().map(|m| (m, R_WC.transpose() * R_WT.into_inner()));
-        let mut place = Self {
-            feed: R_WC.column(0).into(),
-            axis,
-            R_WT: R_WT.into_inner(),
-            structure,
-            measured,
-            band: Vec::new(),
-            time_s,
-            posed,
-            linear,
-        };
-        place.band = place.frequencies();
-        Ok(place)
-    }
-
-    /// Returns the displacement of the tip per force on it (m/N), axes of the cut.
-    pub(super) fn response(&self, omega: f64) -> Matrix3<Complex<f64>> {
-        let mut G = self.structure.frequency_response(omega);
-        if let Some((measured, R)) = &self.measured {
-            let R = R.map(|x| Complex::new(x, 0.0));
-            G += R * measured.at(omega) * R.transpose();
-        }
-        G
-    }
-
-    /// Returns the angular frequencies for evaluating the response: around the poles, and the
-    /// measured frequencies; none above the highest measured one.
-    fn frequencies(&self) -> Vec<f64> {
-        let mut band = self.structure.frequencies();
-        if let Some((measured, _)) = &self.measured {
-            let highest = measured.omega[measured.omega.len() - 1];
-            band.extend(&measured.omega);
-            band.retain(|w| *w <= highest);
-            band.sort_by(f64::total_cmp);
-            band.dedup();
-        }
-        band
+        Ok(Self { feed: R_WC.column(0).into(), axis, structure, time_s, posed, linear })
     }
 
     pub(super) fn frequencies_hz(&self) -> Vec<f64> {
@@ -172,18 +127,6 @@ impl CutPose {
         hz.sort_by(f64::total_cmp);
         hz.truncate(MAX_FREQUENCIES);
         hz
-    }
-
-    /// Returns the axes of the cut as columns, world axes.
-    pub(super) fn axes_of_cut(&self) -> Matrix3<f64> {
-        let z = -self.axis;
-        Matrix3::from_columns(&[self.feed, z.cross(&self.feed), z])
-    }
-
-    /// Returns the tool's own modes as a structure, axes of the cut.
-    pub(super) fn tool_structure(&self, tool: &CuttingTool) -> Structure {
-        let modes = tool_modes(tool, &(self.axes_of_cut().transpose() * self.R_WT));
-        Structure::from_modes(&modes).expect("as they were when the place was made")
     }
 
     /// Returns the description of the pose.

@@ -2,16 +2,15 @@
 //! tip, flexibility. Units are converted here.
 
 use std::ops::Range;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use crate::milling::{Coefficients, Cutter, Engagement};
-use flexarm_files::{NumberTable, read_text};
+use flexarm_files::read_text;
 use flexarm_settings::{OutOfRange, Quantity};
 use nalgebra::{Rotation3, Vector3};
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::measured::MeasuredResponse;
 use flexarm_run::Error;
 use flexarm_run::RobotFileError;
 use flexarm_run::robot_file::Source;
@@ -33,7 +32,8 @@ struct ToolFile {
     deepest: Option<Spanned<f64>>,
     #[serde(default)]
     mode: Vec<Spanned<ModeEntry>>,
-    measured: Option<Spanned<MeasuredEntry>>,
+    /// Not supported.
+    measured: Option<Spanned<toml::Value>>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -86,7 +86,6 @@ struct ToolEntry {
     feed: Option<Spanned<[f64; 3]>>,
     feed_axes: Option<Spanned<String>>,
     tip: Option<Spanned<[f64; 3]>>,
-    feed_per_tooth: Option<Spanned<f64>>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -110,12 +109,6 @@ enum DirectionEntry {
     Vector([f64; 3]),
 }
 
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct MeasuredEntry {
-    file: Spanned<PathBuf>,
-}
-
 /// Cutting tool from its file, in SI units.
 #[derive(Clone, Debug)]
 pub struct CuttingTool {
@@ -132,10 +125,7 @@ pub struct CuttingTool {
     pub(crate) feed: Option<Direction>,
     /// Position of the tip in the axes of the TCP (m).
     pub(crate) tip: Vector3<f64>,
-    /// Feed per tooth (m), for simulations over time.
-    pub(crate) feed_per_tooth: f64,
     pub(crate) modes: Vec<ToolMode>,
-    pub(crate) measured: Option<MeasuredResponse>,
 }
 
 /// Unit vector in the axes of the TCP or of the world.
@@ -181,8 +171,6 @@ pub(crate) enum ToolDirection {
 
 /// Default maximum depth of cut over the diameter.
 const DEEPEST: f64 = 1.0;
-/// Default feed per tooth in simulations over the diameter.
-const FEED: f64 = 0.005;
 /// Default number of spindle speeds in a range.
 const POINTS: usize = 101;
 /// Valid range of cutter diameters.
@@ -207,7 +195,6 @@ impl CuttingTool {
         let file: ToolFile = parsed(&text, &source, &[], |file: &ToolFile| &file.format)?;
         let reader = Reader {
             source: &source,
-            folder: path.parent().unwrap_or(Path::new(".")),
             length: unit("lengths", &file.lengths, &LENGTHS, &source)?,
             angle: unit("angles", &file.angles, &ANGLES, &source)?,
             pressure: unit("pressures", &file.pressures, &PRESSURES, &source)?,
@@ -247,7 +234,6 @@ fn unit(
 /// Data for reading entries.
 struct Reader<'a> {
     source: &'a Source,
-    folder: &'a Path,
     length: f64,
     angle: f64,
     pressure: f64,
@@ -260,16 +246,13 @@ impl Reader<'_> {
             Some(depth) => self.positive("deepest", depth, self.length, Quantity::LENGTH)?,
             None => DEEPEST * cutter.diameter,
         };
-        let feed_per_tooth = match &file.tool.feed_per_tooth {
-            Some(feed) => self.positive("feed_per_tooth", feed, self.length, Quantity::LENGTH)?,
-            None => FEED * cutter.diameter,
-        };
         let axis = self.direction(["axis", "axis_axes"], &file.tool.axis, &file.tool.axis_axes)?;
         let feed = self.direction(["feed", "feed_axes"], &file.tool.feed, &file.tool.feed_axes)?;
         let tip = file.tool.tip.as_ref().map_or(Ok(Vector3::zeros()), |tip| self.point("tip", tip))?;
-        if let (Some(_), Some(mode)) = (&file.measured, file.mode.first()) {
-            let message = "a tool has either [[mode]] entries or a [measured] response, not both";
-            return Err(self.error(mode.span(), message));
+        if let Some(entry) = &file.measured {
+            let message = "[measured]: tables of measured frequency responses are not read; fit modes to the response \
+                           and give each as [[mode]] with direction, frequency, damping and stiffness";
+            return Err(self.error(entry.span(), message));
         }
         Ok(CuttingTool {
             name,
@@ -279,9 +262,7 @@ impl Reader<'_> {
             axis: axis.unwrap_or(Direction::Tcp(Vector3::z())),
             feed,
             tip,
-            feed_per_tooth,
             modes: file.mode.iter().map(|mode| self.mode(mode)).collect::<Result<_, Error>>()?,
-            measured: file.measured.as_ref().map(|entry| self.measured(entry)).transpose()?,
         })
     }
 
@@ -494,16 +475,6 @@ impl Reader<'_> {
         };
         let damping_ratio = self.positive("damping", &e.damping, 1.0, Quantity::DAMPING_RATIO)?;
         Ok(ToolMode { direction, omega, damping_ratio, mass })
-    }
-
-    fn measured(&self, entry: &Spanned<MeasuredEntry>) -> Result<MeasuredResponse, Error> {
-        let file = &entry.get_ref().file;
-        let path = self.folder.join(file.get_ref());
-        if !path.is_file() {
-            let message = format!("file = {:?}: there is no file {}", file.get_ref(), path.display());
-            return Err(self.error(file.span(), message));
-        }
-        MeasuredResponse::new(&NumberTable::read(&path)?, &path)
     }
 
     /// Returns a positive number in SI units.

@@ -8,10 +8,7 @@
 
 use std::f64::consts::TAU;
 
-use flexarm_chatter::milling::{
-    ChatterError, Coefficients, Cutter, Engagement, Kind, LimitOptions, Mode, Structure, limit_of_depth,
-    zero_order_limit,
-};
+use flexarm_chatter::milling::{Coefficients, Cutter, Engagement, Kind, LimitOptions, Mode, Structure, limit_of_depth};
 use nalgebra::Vector3;
 use serde_json::Value;
 
@@ -108,86 +105,4 @@ fn limits_asked_for_more_exactly_move_less_than_their_tolerance() {
     eprintln!("largest difference {worst:.1e}");
     // measured: 8e-8; elements are of high order, one refinement too many costs little
     assert!(worst < 1e-5, "{worst:.1e}");
-}
-
-/// The zero-order solution is another algorithm: accurate in a slot with two modes, but without
-/// period doubling at low immersion.
-#[test]
-fn the_zero_order_solution_is_near_in_slots_and_misses_flips() {
-    for case in cases() {
-        let band = case.structure.frequencies();
-        let response = |w: f64| case.structure.frequency_response(w);
-        let mut ratios = Vec::new();
-        for (rpm, expected) in &case.rows {
-            let found = zero_order_limit(&response, &case.cutter, rpm * TAU / 60.0, &band, f64::INFINITY).unwrap();
-            if let (Some(found), Some((depth, kind, _))) = (found, expected) {
-                ratios.push((found.depth / depth, *kind));
-            }
-        }
-        let far = |kind: Kind| {
-            let of: Vec<f64> = ratios.iter().filter(|r| r.1 == kind).map(|r| (r.0 - 1.0).abs()).collect();
-            of.iter().sum::<f64>() / of.len().max(1) as f64
-        };
-        eprintln!("{}: mean distance {:.3} (Hopf), {:.3} (flip)", case.name, far(Kind::Hopf), far(Kind::Flip));
-        if case.name == "two_dof_slotting" {
-            assert!(far(Kind::Hopf) < 0.05, "{}", far(Kind::Hopf));
-        }
-        if case.name == "one_dof_down_0p05" {
-            assert!(far(Kind::Flip) > 0.5, "{}", far(Kind::Flip));
-        }
-    }
-}
-
-/// Truth: the search over the whole band. With a maximum depth the limit is the same or none, and
-/// frequencies without chatter are skipped.
-#[test]
-fn a_search_up_to_a_depth_finds_the_same_limit_with_less_work() {
-    let mut work = [0, 0];
-    for case in cases() {
-        let band = case.structure.frequencies();
-        for (rpm, _) in &case.rows {
-            let found = [f64::INFINITY, 5e-4].map(|deepest| {
-                let calls = std::cell::Cell::new(0);
-                let response = |w: f64| {
-                    calls.set(calls.get() + 1);
-                    case.structure.frequency_response(w)
-                };
-                let found = zero_order_limit(&response, &case.cutter, rpm * TAU / 60.0, &band, deepest).unwrap();
-                (found, calls.get())
-            });
-            let [(whole, all), (shallow, few)] = found;
-            assert_eq!(whole.filter(|limit| limit.depth <= 5e-4), shallow, "{rpm} 1/min");
-            work = [work[0] + all, work[1] + few];
-        }
-    }
-    eprintln!("{work:?} responses");
-    assert!(10 * work[1] < 7 * work[0], "{work:?}"); // measured: 0.57
-}
-
-/// A mode with a damping ratio of 30000 has poles from 2e-5 to 6e4 times its frequency, that is, 23
-/// million points over the whole band. If the tooth frequency is so low that the
-/// resonance by itself needs too many points, the search returns an error.
-#[test]
-fn the_work_of_a_limit_does_not_grow_with_the_damping() {
-    let cutter = Cutter::straight(3, Coefficients { tangential: 8e8, radial: 2.5e8, axial: 0.0 }, Engagement::slot());
-    let mode = |damping_ratio: f64, stiffness: f64| {
-        let omega = TAU * 1200.0;
-        let shape = nalgebra::Vector3::x() * omega / stiffness.sqrt();
-        let mode = |shape| Mode { angular_frequency: omega, damping_ratio, shape };
-        Structure::from_modes(&[mode(shape), mode(nalgebra::Vector3::y() * omega / stiffness.sqrt())]).unwrap()
-    };
-    for (damping, stiffness) in [(0.03, 1.5e7), (3.0, 1.5e7), (30_000.0, 1.5e7), (30_000.0, 1e2), (100.0, 1.0)] {
-        let (structure, calls) = (mode(damping, stiffness), std::cell::Cell::new(0_u64));
-        let response = |w: f64| {
-            calls.set(calls.get() + 1);
-            structure.frequency_response(w)
-        };
-        let band = structure.frequencies();
-        let found = zero_order_limit(&response, &cutter, 6000.0 * TAU / 60.0, &band, 0.02);
-        eprintln!("damping {damping}, {stiffness:e} N/m: {} responses, {found:?}", calls.get());
-        assert!(found.is_ok() && calls.get() < 5000, "{} {found:?}", calls.get()); // measured: 2223
-        let slow = zero_order_limit(&response, &cutter, 1e-6 * TAU / 60.0, &band, 1.0);
-        assert!(matches!(slow, Ok(None) | Err(ChatterError::TooSlow { .. })), "{slow:?}");
-        assert!(calls.get() < 800_000, "{}", calls.get());
-    }
 }

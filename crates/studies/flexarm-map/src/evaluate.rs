@@ -51,12 +51,11 @@ pub(super) struct Cut<'a> {
     pub(super) robot: &'a Robot,
     pub(super) modelling: &'a Modelling,
     pub(super) tool: &'a CuttingTool,
-    pub(super) zero_order: bool,
 }
 
 impl Cut<'_> {
     fn lowest_limit(&self, q: &[f64]) -> Result<f64, Error> {
-        lowest_limit(self.robot, self.modelling, self.tool, self.zero_order, q)
+        lowest_limit(self.robot, self.modelling, self.tool, q)
     }
 }
 

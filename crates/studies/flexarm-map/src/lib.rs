@@ -107,9 +107,6 @@ pub struct MapRequest {
     /// Cutting tool with its spindle speeds: the lowest limit of the depth of cut at each pose
     /// becomes a quantity.
     pub tool: Option<CuttingTool>,
-    /// Whether to compute the limits of depth from the mean cutting force only (zero-order
-    /// solution): ten times as fast, but misses period doubling.
-    pub zero_order: bool,
     /// Number of natural frequencies; default three.
     pub frequencies: Option<usize>,
     /// Poses kept at each place.
@@ -264,18 +261,13 @@ pub fn map(
     let by = layout.compared_by(request.by.as_deref())?;
     let near = home(model, request.at.as_deref())?;
     if let Some(tool) = &request.tool
-        && let Err(error) = lowest_limit(robot, &request.modelling, tool, request.zero_order, &near)
+        && let Err(error) = lowest_limit(robot, &request.modelling, tool, &near)
         && error.external::<LobesError>().is_some()
     {
         // Errors of tool or robot are the same at all poses.
         return Err(error);
     }
-    let cut = request.tool.as_ref().map(|tool| Cut {
-        robot,
-        modelling: &request.modelling,
-        tool,
-        zero_order: request.zero_order,
-    });
+    let cut = request.tool.as_ref().map(|tool| Cut { robot, modelling: &request.modelling, tool });
     let evaluator = Evaluator::new(at, &layout, request.wrench, cut);
     let choice = Choice { layout: &layout, keep: request.keep, by };
 

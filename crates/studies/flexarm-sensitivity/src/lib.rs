@@ -1,5 +1,5 @@
-//! Sensitivity of the TCP error along a motion to all parameters of the robot: exact derivatives of
-//! the whole run, for all parameters at once.
+//! Sensitivity of the TCP error along a motion to all parameters of the robot: derivatives of whole
+//! runs, by differences on all cores.
 //!
 //! Start at [`sensitivity`], or at [`error_slopes`] for numbers only; [`pose_sensitivity`] is the
 //! analysis at a pose.
@@ -8,14 +8,13 @@
 
 mod controllers;
 mod pose;
+mod slopes;
 
 use std::path::PathBuf;
 
 use flexarm_files::{check_free, write_all};
-pub use flexarm_identify::RunParameter;
-use flexarm_identify::{Effect, Parameter, link_directions, link_entries, parameters};
-pub use flexarm_stepping::{ErrorSlopes, RunSlopes};
-use flexarm_stepping::{SlopesRequest, StepError, StepperKind};
+use flexarm_identify::{Effect, Parameter, link_directions, link_entries, parameters, plant};
+use flexarm_stepping::{ExactRun, StepError, StepperKind};
 use nalgebra::Vector3;
 use serde::Serialize;
 
@@ -34,8 +33,10 @@ use flexarm_run::prepare::loaded;
 use flexarm_run::prepare::runnable;
 
 use controllers::{add_controllers, limited};
+use slopes::Repeated;
 
 pub use pose::{PoseParameter, PoseSensitivity, pose_sensitivity};
+pub use slopes::{ErrorSlopes, RunParameter, RunSlopes};
 
 /// Time below which an event counts as at the start (s).
 const SAME_TIME: f64 = 1e-9;
@@ -120,16 +121,15 @@ struct NamedParameter {
     parameter: RunParameter,
 }
 
-/// Computes the TCP error along a run and its derivatives by parameters, side by side. Only
-/// generalised-alpha is supported; its iterations are fully converged, so that the run is a smooth
-/// function of all inputs.
+/// Computes the TCP error along a run and its derivatives by parameters. Only generalised-alpha is
+/// supported; its iterations are fully converged, so that the run is a smooth function of all
+/// inputs.
 ///
-/// Cost for kr210 (18 elastic coordinates): about ten ordinary runs, plus a quarter of one for each
-/// parameter. With closed loops or modal links a hundred runs and more.
+/// Cost: two runs for each parameter, each about ten ordinary ones, on all cores of the thread pool
+/// of `rayon`.
 ///
 /// # Errors
-/// As [`Arm::simulate`]; [`Error::Step`] for features without derivatives (links with geometric
-/// stiffening, motions with velocity jumps under servos).
+/// As [`Arm::simulate`]; [`Error::Step`] for other steppers than generalised-alpha.
 pub fn error_slopes(
     arm: &Arm,
     scenario: impl Into<Scenario>,
@@ -148,9 +148,9 @@ fn slopes_and_caveats(
     keep_samples: bool,
 ) -> Result<(RunSlopes, Vec<Caveat>), Error> {
     let StepperKind::GeneralizedAlpha(settings) = options.stepper else {
-        let what = "a stepper other than generalised-alpha";
-        let source = StepError::NoSlopes { what, mend: "use the default stepper" };
-        return Err(Error::Step { source, partial: false });
+        let name = options.stepper.name();
+        let text = format!("derivatives of a run need the stepper generalised-alpha, found {name}: use the default");
+        return Err(Error::Step { source: StepError::Setup(text), partial: false });
     };
     runnable(&scenario.motion, options)?;
     let flexible = arm.flexible();
@@ -158,18 +158,16 @@ fn slopes_and_caveats(
         return Err(ValueError::NothingYields.into());
     }
     flexarm_run::loops::along_motion(&flexible.rigid, &scenario.motion.trajectory)?;
-    let explained = |error| flexible.explained(error);
-    let unloaded = flexible.arm(scenario.motion.prescribed()).map_err(explained)?;
-    let (flexible_arm, mut caveats) = loaded(arm.robot(), scenario, options, unloaded)?;
-    let request = SlopesRequest {
+    let unloaded = flexible.arm(scenario.motion.prescribed()).map_err(|error| flexible.explained(error))?;
+    let (_, mut caveats) = loaded(arm.robot(), scenario, options, unloaded)?;
+    let run = ExactRun {
         settings,
         step_s: options.step_s,
         duration_s: scenario.duration_s(),
         start: scenario.start,
         tool: flexible.tcp.clone(),
-        keep_samples,
     };
-    let found = flexarm_identify::error_slopes(&flexible_arm, parameters, &request).map_err(explained)?;
+    let found = Repeated { arm, scenario, options, run, plant: plant(arm) }.slopes(parameters, keep_samples)?;
     caveats.extend(limited(arm, &found));
     Ok((found, caveats))
 }
@@ -297,9 +295,8 @@ fn table(named: &[NamedParameter], found: &RunSlopes) -> String {
     for (k, (t, error)) in found.times_s.iter().zip(&found.errors).enumerate() {
         text += &format!("{t}");
         error.iter().for_each(|x| text += &format!(",{x:e}"));
-        let slopes = &found.slopes[k * named.len()..][..named.len()];
-        for (own, slope) in named.iter().zip(slopes) {
-            slope.iter().for_each(|x| text += &format!(",{:e}", x * own.scale));
+        for (own, slopes) in named.iter().zip(&found.slopes) {
+            slopes[k].iter().for_each(|x| text += &format!(",{:e}", x * own.scale));
         }
         text.push('\n');
     }

@@ -1,14 +1,14 @@
 //! Evaluation of the metrics of some runs of a study.
 //!
-//! If the metrics only need the tool deflection, its time, and the frequencies at the start, four
-//! runs are computed together ([`flexarm_stepping::Batch`]); otherwise each run has its full
-//! summary. The choice depends only on the metrics of the study.
+//! If the metrics only need the tool deflection, its time, and the frequencies at the start, nothing
+//! else is computed ([`flexarm_stepping::ToolRun`]); otherwise each run has its full summary. The
+//! choice depends only on the metrics of the study.
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use flexarm_stepping::{Batch, BatchRun, Start, ToolDeflection};
+use flexarm_stepping::{ToolDeflection, ToolRun};
 
 use super::Sweep;
 use super::metric::{self, Facts, Quick, SummaryFacts};
@@ -37,18 +37,6 @@ pub(super) type MetricValues = (Vec<f64>, Vec<f64>);
 
 /// Callback with the index of the point, the result of its run, and the caveats.
 pub(super) type OnResult<'a> = dyn FnMut(usize, Result<MetricValues, Error>, CaveatText) + 'a;
-
-/// Run without a full summary.
-struct QuickRun {
-    place: usize,
-    stored: CaveatText,
-    run: BatchRun,
-    tool: flexarm_kinematics::Frame,
-    start: Start,
-    options: RunOptions,
-    facts: QuickFacts,
-    flexible: Arc<flexarm_run::FlexibleRobot>,
-}
 
 /// Numbers of a run without a full summary.
 #[derive(Clone, Debug, Default)]
@@ -123,21 +111,20 @@ impl Sweep {
         stop: &AtomicBool,
         on_result: &mut OnResult<'_>,
     ) {
-        if self.quick {
-            return self.evaluate_quickly(points, stop, on_result);
-        }
         for (place, (_, values)) in points.iter().enumerate() {
             if stop.load(Ordering::Relaxed) {
                 return;
             }
             let mut caveats = Vec::new();
-            match self.whole(values, stop, &mut caveats) {
-                Err(Error::Interrupted { .. }) => return,
-                result => {
-                    let result = result.map(|facts| self.metric_values(values, &facts));
-                    on_result(place, result, self.stored_caveats(caveats));
-                }
+            let result = if self.quick {
+                self.quickly(values, &mut caveats).map(|facts| self.metric_values(values, &facts))
+            } else {
+                self.whole(values, stop, &mut caveats).map(|facts| self.metric_values(values, &facts))
+            };
+            if matches!(result, Err(Error::Interrupted { .. })) {
+                return;
             }
+            on_result(place, result, stored_caveats(caveats, &|text| self.workshop.plain(text)));
         }
     }
 
@@ -145,57 +132,6 @@ impl Sweep {
         let values = metric::values(&self.metrics, point, facts);
         let passed = self.constraints.iter().map(|c| c.violation(point, &values, facts)).collect();
         (values, passed)
-    }
-
-    /// Computes runs without full summaries, those that go together side by side.
-    fn evaluate_quickly(
-        &self,
-        points: &[(usize, Vec<ParameterValue>)],
-        stop: &AtomicBool,
-        on_result: &mut OnResult<'_>,
-    ) {
-        let mut going: Vec<QuickRun> = Vec::new();
-        for (place, (_, values)) in points.iter().enumerate() {
-            if stop.load(Ordering::Relaxed) {
-                return;
-            }
-            let mut caveats = Vec::new();
-            let run = self.quick_run(place, values, &mut caveats);
-            let stored = self.stored_caveats(caveats);
-            match run {
-                Ok(run) => going.push(QuickRun { stored, ..run }),
-                Err(error) => on_result(place, Err(error), stored),
-            }
-        }
-        // Runs of similar duration are computed together.
-        going.sort_by(|a, b| a.run.duration_s.total_cmp(&b.run.duration_s).then(a.place.cmp(&b.place)));
-        for group in going.chunk_by(QuickRun::goes_with) {
-            for few in group.chunks(Batch::most_side_by_side()) {
-                if stop.load(Ordering::Relaxed) {
-                    return;
-                }
-                let Some(first) = few.first() else { continue };
-                let batch = Batch {
-                    step_s: first.options.step_s,
-                    stepper: first.options.stepper,
-                    start: first.start,
-                    tool: first.tool.clone(),
-                    keep_samples: true,
-                };
-                let runs: Vec<BatchRun> = few.iter().map(|run| run.run.clone()).collect();
-                for (own, result) in few.iter().zip(batch.run(&runs)) {
-                    let result = result.map_err(|error| own.flexible.explained(error));
-                    let facts = result.map(|deflection| own.facts.clone().of(&deflection, &own.options));
-                    let result = facts.map(|facts| self.metric_values(&points[own.place].1, &facts));
-                    on_result(own.place, result, own.stored.clone());
-                }
-            }
-        }
-    }
-
-    /// Returns the caveats of a run in their stored form.
-    fn stored_caveats(&self, caveats: Vec<Caveat>) -> CaveatText {
-        stored_caveats(caveats, &|text| self.workshop.plain(text))
     }
 
     /// Computes a run with its full summary. `caveats` receives its caveats, also if it fails.
@@ -216,12 +152,12 @@ impl Sweep {
         Ok(SummaryFacts { summary, mass_kg: built.mass_kg })
     }
 
-    /// Prepares a run to be computed together with others. `caveats` receives the caveats known
-    /// before its first step, also if it fails.
-    fn quick_run(&self, place: usize, values: &[ParameterValue], caveats: &mut Vec<Caveat>) -> Result<QuickRun, Error> {
+    /// Computes a run without a full summary. `caveats` receives the caveats known before its first
+    /// step, also if it fails.
+    fn quickly(&self, values: &[ParameterValue], caveats: &mut Vec<Caveat>) -> Result<QuickFacts, Error> {
         let PreparedRun { built, scenario, options } = self.workshop.ready(values)?;
         caveats.extend_from_slice(&built.arm.robot_caveats());
-        let flexible = built.arm.flexible().clone();
+        let flexible = built.arm.flexible();
         let (arm, of_loads) = built.arm.at_start(&scenario, &options)?;
         let facts = QuickFacts {
             sag_m: static_sag(&arm, &flexible.tcp),
@@ -229,28 +165,19 @@ impl Sweep {
             mass_kg: built.mass_kg,
             ..QuickFacts::default()
         };
-        let before = BeforeRun {
-            robot: built.arm.robot(),
-            flexible: &flexible,
-            arm: &arm,
-            motion: &scenario.motion,
-            options: &options,
-        };
+        let before =
+            BeforeRun { robot: built.arm.robot(), flexible, arm: &arm, motion: &scenario.motion, options: &options };
         caveats.extend(before.caveats_of_study(facts.sag_m));
         caveats.extend(of_loads);
-        let run = BatchRun { arm, duration_s: scenario.duration_s() };
-        let (tool, start) = (flexible.tcp.clone(), scenario.start);
-        Ok(QuickRun { place, stored: None, run, tool, start, options, facts, flexible })
-    }
-}
-
-impl QuickRun {
-    /// Whether two runs have the same stepper, step size, start and tool.
-    fn goes_with(&self, other: &Self) -> bool {
-        self.options.stepper == other.options.stepper
-            && self.options.step_s == other.options.step_s
-            && self.start == other.start
-            && self.tool.body == other.tool.body
-            && self.tool.X_BF == other.tool.X_BF
+        let run = ToolRun {
+            step_s: options.step_s,
+            duration_s: scenario.duration_s(),
+            stepper: options.stepper,
+            start: scenario.start,
+            tool: flexible.tcp.clone(),
+            keep_samples: true,
+        };
+        let deflection = run.deflection(&Arc::new(arm)).map_err(|error| flexible.explained(error))?;
+        Ok(facts.of(&deflection, &options))
     }
 }

@@ -80,7 +80,7 @@ const USUAL_METRICS: [&str; 4] = ["tcp.peak_m", "tcp.rms_m", "tcp.end_m", "tcp.s
 const DRAWN_POINTS: &str = "the drawn points";
 /// File name of the page of a study.
 const PAGE: &str = "report.html";
-/// Maximum number of quick runs that a thread takes at a time; four of them are computed together.
+/// Maximum number of quick runs that a thread takes at a time.
 const WINDOW: usize = 64;
 /// Interval between two calls of the progress function, which can stop the runs.
 const LOOK: Duration = Duration::from_millis(50);

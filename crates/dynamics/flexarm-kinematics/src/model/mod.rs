@@ -162,24 +162,4 @@ impl Model {
     pub fn rotor_inertia(&self, coordinate: usize) -> f64 {
         self.rotors.iter().filter(|(k, _)| *k == coordinate).map(|(_, inertia)| inertia).sum()
     }
-
-    /// Whether the other model has bitwise the same joints, frames, modal bodies, balancers, loops
-    /// and gravity; inertias may differ.
-    pub fn is_same_tree(&self, other: &Self) -> bool {
-        let body =
-            |b: &Body| (b.parent, b.X_PJ, b.motion, b.coordinate, b.ratio, b.offset, b.armature, b.elastic, b.modal);
-        self.gravity == other.gravity
-            && self.balancers == other.balancers
-            && self.rotor_couplings == other.rotor_couplings
-            && self.loops == other.loops
-            && self.bodies.len() == other.bodies.len()
-            && self.bodies.iter().zip(&other.bodies).all(|(a, b)| body(a) == body(b))
-            && self
-                .frames
-                .iter()
-                .map(|f| (&f.name, f.body, f.X_BF))
-                .eq(other.frames.iter().map(|f| (&f.name, f.body, f.X_BF)))
-            && self.modal.len() == other.modal.len()
-            && self.modal.iter().zip(&other.modal).all(|(a, b)| a.body == b.body && a.tables.shapes == b.tables.shapes)
-    }
 }

@@ -23,9 +23,4 @@ impl LoadFriction {
         let t = (rate / self.regularisation).tanh();
         self.coefficient * transmitted.abs() * (1.0 - t * t) / self.regularisation
     }
-
-    /// Returns the derivative of the friction with respect to the transmitted torque.
-    pub(crate) fn by_torque(&self, transmitted: f64, rate: f64) -> f64 {
-        self.coefficient * transmitted.signum() * (rate / self.regularisation).tanh()
-    }
 }

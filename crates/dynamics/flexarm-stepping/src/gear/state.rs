@@ -99,27 +99,6 @@ impl GearState {
         }
     }
 
-    /// Returns the torque of a spring with hysteresis at its last deflection; `None` for other
-    /// springs.
-    pub(crate) fn hysteresis_torque(&self, arm: &FlexibleArm, element: usize) -> Option<f64> {
-        let (law, slipped) = arm.hysteresis.iter().zip(&self.slipped).find(|(law, _)| law.element == element)?;
-        let delta = self.delta[arm.offset(&arm.elements[element])];
-        Some(law.elastic.torque(delta) + slipped.torque(law, delta))
-    }
-
-    /// Reports each slider of each law: its number, its elastic coordinate, and its stiffness (0
-    /// while it slips).
-    pub(crate) fn stuck(&self, arm: &FlexibleArm, mut report: impl FnMut(usize, usize, f64)) {
-        let mut number = 0;
-        for (law, slipped) in arm.hysteresis.iter().zip(&self.slipped) {
-            let k = arm.offset(&arm.elements[law.element]);
-            for (s, slider) in slipped.at(law, self.delta[k]) {
-                report(number, k, if s.abs() < slider.reach { slider.stiffness } else { 0.0 });
-                number += 1;
-            }
-        }
-    }
-
     /// Writes the loads `-F` of the elements; returns the power dissipated by the dampers (W).
     pub(crate) fn loads(&self, arm: &FlexibleArm, loads: &mut [Vector6<f64>]) -> f64 {
         for (load, element) in loads.iter_mut().zip(&arm.elements) {

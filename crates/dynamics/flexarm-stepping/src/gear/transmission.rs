@@ -31,11 +31,6 @@ impl TransmissionError {
         self.harmonics.iter().map(|h| h.amplitude * (h.cycles * q + h.phase).sin()).sum()
     }
 
-    /// Returns the second derivative d²ε/dq².
-    pub(crate) fn bend(&self, q: f64) -> f64 {
-        self.harmonics.iter().map(|h| -h.amplitude * h.cycles * h.cycles * (h.cycles * q + h.phase).sin()).sum()
-    }
-
     /// Returns the derivative dε/dq.
     pub fn slope(&self, q: f64) -> f64 {
         let cosine = |h: &Harmonic| h.amplitude * h.cycles * (h.cycles * q + h.phase + FRAC_PI_2).sin();
@@ -58,9 +53,6 @@ mod tests {
             let slope = (error.at(q + 1e-6) - error.at(q - 1e-6)) / 2e-6;
             // measured 1.3e-11
             assert!((slope - error.slope(q)).abs() < 1e-9, "{slope} {}", error.slope(q));
-            let bend = (error.slope(q + 1e-5) - error.slope(q - 1e-5)) / 2e-5;
-            // measured 2e-7 of 0.6
-            assert!((bend - error.bend(q)).abs() < 2e-6, "{bend} {}", error.bend(q));
         }
     }
 }

@@ -5,10 +5,12 @@
 //! convergence. A lane that leaves it (weight or loads that change the stiffness much, steps that
 //! are too large, no equilibrium) is reported and solved individually.
 
+use std::sync::Arc;
+
 use flexarm_kinematics::lanes::{
-    LaneTree, forward_kinematics, frame_jacobian, gravity_forces_at_poses, mass_matrix_at_poses, static_tangent,
+    forward_kinematics, frame_jacobian, gravity_forces_at_poses, mass_matrix_at_poses, static_tangent,
 };
-use flexarm_kinematics::{Data, Frame, Pose, Real, StaticTangent, Wrench};
+use flexarm_kinematics::{Data, Frame, Model, Pose, Real, StaticTangent, Wrench};
 use nalgebra::DMatrix;
 
 use super::each::{PoseAnswer, PoseOutputs};
@@ -38,7 +40,7 @@ struct Element {
 /// Poses in lanes, with the workspaces for them.
 pub(super) struct LanePoints<T: Real> {
     tool: Frame,
-    tree: LaneTree<T>,
+    model: Arc<Model>,
     data: Data<T>,
     slopes: StaticTangent<T>,
     elements: Vec<Element>,
@@ -59,7 +61,10 @@ impl<T: Real> LanePoints<T> {
     pub(super) fn new(point: &OperatingPoint) -> Option<Self> {
         let OperatingPoint { arm, tool, K, .. } = point;
         let (model, n) = (&arm.model, arm.n_elastic_coordinates());
-        let tree = LaneTree::new(&vec![model.clone(); T::LANES])?;
+        // Loops are closed by an iteration whose length depends on the pose.
+        if !model.loops().is_empty() {
+            return None;
+        }
         let springs: Vec<T> = K.iter().map(|k| T::splat(*k)).collect();
         let mut rest = Factor::new(n);
         if rest.compute(&springs).any_below(0.5) {
@@ -85,7 +90,7 @@ impl<T: Real> LanePoints<T> {
             X_WT: X,
             X_WT_rigid: X,
             J: vec![T::zero(); 6 * model.nv()],
-            tree,
+            model: model.clone(),
         })
     }
 
@@ -102,13 +107,13 @@ impl<T: Real> LanePoints<T> {
     pub(super) fn solve(&mut self, F_T_W: &Wrench) -> T {
         let joints = self.q.len() - self.r.len();
         self.q[joints..].fill(T::zero());
-        forward_kinematics(&self.tree, &mut self.data, &self.q);
+        forward_kinematics(&self.model, &mut self.data, &self.q);
         self.X_WT_rigid = self.data.X_WF(&self.tool);
         let found = self.newton(F_T_W);
         self.X_WT = self.data.X_WF(&self.tool);
         static_tangent(
             &mut self.slopes,
-            &self.tree,
+            &self.model,
             &self.data,
             &self.q,
             load_at(&self.tool, F_T_W),
@@ -117,7 +122,7 @@ impl<T: Real> LanePoints<T> {
         self.tangent.add_springs(&self.K);
         self.tangent.symmetric = F_T_W.torque.norm() == 0.0;
         let positive = self.tangent.factorise();
-        frame_jacobian(&self.tree, &self.data, &self.tool, &mut self.J);
+        frame_jacobian(&self.model, &self.data, &self.tool, &mut self.J);
         found * positive
     }
 
@@ -158,11 +163,11 @@ impl<T: Real> LanePoints<T> {
     /// Computes `r = K e + p`; returns its maximum relative to the largest force.
     #[inline(always)]
     fn unbalance(&mut self, F_T_W: &Wrench) -> T {
-        let Self { tool, tree, data, elements, q, r, .. } = self;
-        forward_kinematics(tree, data, q);
+        let Self { tool, model, data, elements, q, r, .. } = self;
+        forward_kinematics(model, data, q);
         data.clear_external_wrenches();
         add_wrench(data, tool, F_T_W);
-        gravity_forces_at_poses(tree, data);
+        gravity_forces_at_poses(model, data);
         let joints = q.len() - r.len();
         let (e, p) = (&q[joints..], &data.tau.as_slice()[joints..]);
         r.fill(T::zero());
@@ -189,7 +194,7 @@ impl<T: Real> LanePoints<T> {
         let C = if asked.compliance { self.tangent.compliance(&self.J[6 * joints..]) } else { zeros };
         let mut whole = T::zero();
         if asked.frequencies {
-            mass_matrix_at_poses(&self.tree, &mut self.data);
+            mass_matrix_at_poses(&self.model, &mut self.data);
             whole = self.tangent.find_frequencies(self.data.M.as_slice());
         }
         for (lane, answer) in answers.iter_mut().enumerate() {

@@ -30,9 +30,9 @@ use crate::reduced::ReducedArm;
 
 /// Maximum difference between the velocity change of a prescribed joint and the quadrature of its
 /// accelerations over a step, relative to its speed.
-pub(crate) const IMPULSE_DEFECT: f64 = 1e-3;
+const IMPULSE_DEFECT: f64 = 1e-3;
 /// Lower bound of the speed in this ratio (rad/s or m/s).
-pub(crate) const SLOW: f64 = 0.01;
+const SLOW: f64 = 0.01;
 /// Maximum number of halvings of a step.
 const MOST_CUTS: u32 = 7;
 

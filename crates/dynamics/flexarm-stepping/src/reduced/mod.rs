@@ -28,8 +28,6 @@ use crate::gear::GearState;
 use crate::servo::ServoState;
 use events::StepStart;
 
-pub(crate) use events::{IMPULSE_DEFECT, SLOW};
-
 /// A flexible arm as a second-order system; see the module documentation.
 #[derive(Clone)]
 pub struct ReducedArm {

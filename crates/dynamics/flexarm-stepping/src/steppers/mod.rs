@@ -29,7 +29,6 @@ use crate::stepper::{Start, Stepper};
 pub use accuracy::error_of_a_period;
 pub use extrapolated::ExtrapolatedAlpha;
 pub use generalized_alpha::{AlphaSettings, GeneralizedAlpha};
-pub(crate) use generalized_alpha::{Coefficients, leave_of};
 pub use reference::{Reference, ReferenceMethod, ReferenceSettings};
 pub use rk4::{Rk4, STABILITY_LIMIT};
 pub use sdirk3::Sdirk3;

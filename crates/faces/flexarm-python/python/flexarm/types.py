@@ -1405,8 +1405,6 @@ class _LobePoint(TypedDict):
     """Frequency of the largest component of the tip's motion at the limit (Hz)."""
     kind: str | None
     """Type of bifurcation: `hopf` (independent frequency) or `flip` (period of two teeth)."""
-    zero_order_depth_m: float | None
-    """Limit of the zero-order solution, for comparison (m)."""
     pose: int
     """Index of the pose."""
 
@@ -1463,8 +1461,6 @@ class Lobes(TypedDict):
     """Name of the tool."""
     joints: list[str]
     """Joints, in coordinate order."""
-    method: str
-    """Method: `floquet` or `zero-order`."""
     deepest_m: float
     """Maximum depth of cut in the search (m)."""
     points: list[LobePoint]
@@ -2085,8 +2081,6 @@ class ExportChecks(TypedDict):
     """Maximum difference of the mass, relative to `sqrt(m_ii m_jj)`; null without mass."""
     stiffness_error: float
     """Maximum difference of the stiffness, relative to `sqrt(k_ii k_jj)`."""
-    integrals_error: float | None
-    """Maximum difference of the mass integrals of a modal link; null in other formats."""
 
 
 class ExportSummary(TypedDict):

@@ -171,52 +171,6 @@ fn assemble(
     triplets.symmetric(&name, text.origin, labels, Storage::BySize).map(Some)
 }
 
-/// Writes matrices as DMIG entries in large field: ten significant digits, relative error 5e-10.
-///
-/// * `matrices`: names, such as `KAAX` (truncated to eight characters), with their matrices.
-/// * `rows`: node and component of each row; scalar points have component 0. Every row needs a
-///   node.
-/// * `positions`: written as GRID entries.
-///
-/// # Panics
-/// If a matrix does not have one row and one column per entry of `rows`.
-pub fn write_dmig(
-    matrices: &[(&str, &nalgebra::DMatrix<f64>)],
-    rows: &[DofLabel],
-    positions: &BTreeMap<i64, Vector3<f64>>,
-) -> String {
-    let mut text = String::from("$ written by flexarm\n");
-    for (id, p) in positions {
-        text += &format!("GRID*   {id:16}{:16}{}{}\n", "", large(p.x), large(p.y));
-        text += &format!("*       {}\n", large(p.z));
-    }
-    let points: Vec<_> = rows.iter().filter(|label| label.dof == 0).filter_map(|label| label.node).collect();
-    for point in points {
-        text += &format!("SPOINT  {point:8}\n");
-    }
-    for (name, matrix) in matrices {
-        assert_eq!(matrix.shape(), (rows.len(), rows.len()), "a label for every row of {name}");
-        text += &format!("DMIG    {name:8.8}{:8}{:8}{:8}{:8}\n", 0, 6, 2, 0);
-        for (j, column) in rows.iter().enumerate() {
-            let below: Vec<usize> = (j..rows.len()).filter(|&i| matrix[(i, j)] != 0.0).collect();
-            if below.is_empty() {
-                continue;
-            }
-            text += &format!("DMIG*   {name:<16.8}{:16}{:16}\n", column.node.unwrap_or(0), column.dof);
-            for i in below {
-                let row = rows[i];
-                text += &format!("*       {:16}{:16}{}\n", row.node.unwrap_or(0), row.dof, large(matrix[(i, j)]));
-            }
-        }
-    }
-    text
-}
-
-/// Formats a number in 16 columns, nine decimals, with D exponent.
-fn large(value: f64) -> String {
-    super::fortran::fortran(value, 9, 16).replace('E', "D")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -54,17 +54,15 @@ mod user_element;
 
 pub use assemble::{InterfaceMatrices, assemble_interfaces};
 pub use diagnose::diagnose_substructure;
-pub use dmig::write_dmig;
 pub use error::{ExchangeError, ExchangeErrorKind};
 pub use interface::{Interface, InterfaceMap, RowPick, propose_map, propose_map_of};
 pub use matrix::{DofLabel, Entries, LARGEST_ASYMMETRY, LARGEST_DENSE, LabelledMatrix, MatrixRole, SparseSymmetric};
 pub use matrix_market::write_matrix_market;
-pub use op4_text::write_op4;
 pub use read::{ImportedMatrices, InputFile, MatrixNames, parse_matrices, read_matrices};
 pub use recognise::{MatrixFormat, recognise};
 pub use sid::{
     GyroLayout, OeOrder, Sid, SidConventions, SidMatrix, SidNode, modal_link_from_sid, modal_link_held_at, parse_sid,
-    read_sid, sid_of_modal_link, write_sid,
+    read_sid,
 };
 pub use sidecar::{Sidecar, SidecarInterface, write_sidecar};
 pub use simscape::{SimscapeFiles, write_simscape};

@@ -5,10 +5,8 @@
 //! Depending on the writer, the number of words in a column counts a double once or twice, so the
 //! values are counted instead.
 
-use nalgebra::DMatrix;
-
 use super::error::{ErrorPosition, ExchangeError, ExchangeErrorKind};
-use super::fortran::{Format, fortran, parse_format};
+use super::fortran::{Format, parse_format};
 use super::matrix::{LabelledMatrix, Storage, Triplets};
 use super::text::{Text, shown, words};
 
@@ -200,25 +198,4 @@ impl Reading {
         }
         self.header.finish(self.triplets, origin)
     }
-}
-
-/// Writes matrices as OUTPUT4 text, symmetric, double, dense columns, with 17 digits; they read
-/// back bit for bit.
-///
-/// The number of words in a column is the number of its values, as in pyNastran. Names are
-/// truncated to eight characters.
-pub fn write_op4(matrices: &[(&str, &DMatrix<f64>)]) -> String {
-    const PER_LINE: usize = 3;
-    let mut text = String::new();
-    for (name, matrix) in matrices {
-        let n = matrix.nrows();
-        text += &format!("{n:8}{n:8}{:8}{:8}{name:8.8}1P,3E23.16\n", 6, 2);
-        for (j, column) in matrix.column_iter().enumerate() {
-            text += &format!("{:8}{:8}{n:8}\n", j + 1, 1);
-            let values: Vec<String> = column.iter().map(|value| fortran(*value, 16, 23)).collect();
-            text.extend(values.chunks(PER_LINE).map(|line| line.concat() + "\n"));
-        }
-        text += &format!("{:8}{:8}{:8}\n{}\n", n + 1, 1, 1, fortran(1.0, 16, 23));
-    }
-    text
 }

@@ -5,8 +5,7 @@ use std::io::Read;
 use std::time::{Duration, Instant};
 
 use flexarm_fe_io::exchange::{
-    ExchangeError, ImportedMatrices, InputFile, MatrixNames, parse_matrices, write_dmig, write_matrix_market,
-    write_user_element,
+    ExchangeError, ImportedMatrices, InputFile, MatrixNames, parse_matrices, write_matrix_market, write_user_element,
 };
 use proptest::prelude::*;
 
@@ -25,7 +24,11 @@ fn seeds() -> Vec<Vec<u8>> {
         write_matrix_market(&K, &["note"]),
         "%%MatrixMarket matrix array real symmetric\n2 2\n4\n-1.5\n3\n".into(),
         write_user_element(&K, Some(&K), &rows),
-        write_dmig(&[("KAAX", &K), ("MAAX", &K)], &rows, &Default::default()),
+        "DMIG    KAAX           0       6       2       0\n\
+         DMIG*   KAAX                           7               1\n\
+         *                      7               1 4.000000000D+00\n\
+         *                      8               0-1.500000000D+00\n"
+            .into(),
         "DMIG,KAAX,0,6,2\nDMIG,KAAX,1,1,,1,1,4.,,1,2,1.\n".into(),
         "1,1, 1,1, 4.0\n1,2, 1,1, -1.5\n".into(),
         "1 1 4.0\n1 2 -1.5\n".into(),

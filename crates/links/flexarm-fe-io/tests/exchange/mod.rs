@@ -10,5 +10,6 @@ mod op4;
 mod samples;
 mod shared;
 mod sid;
+pub(crate) mod sid_writer;
 mod units;
 mod writers;

@@ -3,7 +3,6 @@
 
 use flexarm_fe_io::exchange::{
     ExchangeErrorKind, GyroLayout, OeOrder, Sid, SidMatrix, SidNode, modal_link_from_sid, parse_sid, read_sid,
-    sid_of_modal_link, write_sid,
 };
 use flexarm_fe_io::mesh::{ReadOptions, read_mesh};
 use flexarm_fem::modal::ModalSource;
@@ -15,6 +14,7 @@ use nalgebra::{DMatrix, Matrix3, Matrix3xX, Vector3};
 use proptest::prelude::*;
 
 use super::shared::{samples, truth};
+use super::sid_writer::{sid_of_modal_link, write_sid};
 use crate::common::fixed_cases;
 
 /// Point masses with three shapes: every integral is an explicit sum.

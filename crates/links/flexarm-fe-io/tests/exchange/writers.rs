@@ -1,13 +1,10 @@
 //! Written files read back bit for bit, or up to the digits of the format.
 
-use std::collections::BTreeMap;
-
 use flexarm_fe_io::exchange::{
-    DofLabel, Interface, Sidecar, SidecarInterface, assemble_interfaces, write_dmig, write_matrix_market, write_op4,
-    write_sidecar, write_simscape, write_user_element,
+    DofLabel, Interface, Sidecar, SidecarInterface, assemble_interfaces, write_matrix_market, write_sidecar,
+    write_simscape, write_user_element,
 };
 use flexarm_fem::UnitSystem;
-use nalgebra::Vector3;
 
 use super::shared::{digits_error, parse, small_structure};
 use crate::common::turned_arm;
@@ -102,25 +99,6 @@ fn a_user_element_reads_back_to_its_fourteen_digits() {
     assert_eq!(imported.stiffness.rows, labels(2));
     assert!(digits_error(imported.stiffness.dense().unwrap(), &K) < 5.1e-14); // measured 4.1e-14
     assert!(digits_error(imported.mass.unwrap().dense().unwrap(), &M) < 5.1e-14); // measured 3.8e-14
-}
-
-#[test]
-fn dmig_entries_read_back_to_their_ten_digits() {
-    let (K, M) = small_structure(2);
-    let positions = BTreeMap::from([(1001, Vector3::new(0.1, -0.2, 0.3)), (1002, Vector3::new(1.0, 2.5, -1e-3))]);
-    let imported = parse(&[("x.pch", &write_dmig(&[("KAAX", &K), ("MAAX", &M)], &labels(2), &positions))]);
-    assert_eq!(imported.stiffness.rows, labels(2));
-    assert_eq!(imported.positions, positions);
-    assert!(digits_error(imported.stiffness.dense().unwrap(), &K) < 5.1e-10); // measured 2.6e-10
-    assert!(digits_error(imported.mass.unwrap().dense().unwrap(), &M) < 5.1e-10); // measured 3.5e-10
-}
-
-#[test]
-fn op4_text_reads_back_to_the_last_bit() {
-    let (K, M) = small_structure(2);
-    let imported = parse(&[("x.op4", &write_op4(&[("KAAX", &K), ("MAAX", &M)]))]);
-    assert_eq!(imported.stiffness.dense(), Some(&K));
-    assert_eq!(imported.mass.unwrap().dense(), Some(&M));
 }
 
 #[test]

@@ -23,7 +23,7 @@
 //! | a mesh | [`ModalSource`], in [`LinkDetails::modal`](crate::LinkDetails) after [`reduce_mesh`](crate::reduce_mesh) |
 //! | a uniform beam | [`BeamLink::modal`](crate::BeamLink::modal) |
 //! | a condensed stiffness and mass | [`ModalLink::from_superelement`]: first order only |
-//! | Standard Input Data | `flexarm_fe_io::exchange::modal_link_from_sid`, and back: `sid_of_modal_link` |
+//! | Standard Input Data | `flexarm_fe_io::exchange::modal_link_from_sid` |
 //!
 //! Source: Shabana (2013), chapter 5; Wallrapp (1994).
 //!

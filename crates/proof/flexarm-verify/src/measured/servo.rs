@@ -29,8 +29,8 @@ impl Servos {
     pub(super) fn new(robot: &Robot, run: &Recording) -> Result<Self, Error> {
         Ok(Self {
             measured: tracking(run, |axis, i| if axis < WITH_ENCODER { run.link[axis][i] } else { run.motor[axis][i] }),
-            fed_forward: simulated(robot, run, true)?,
-            alone: simulated(robot, run, false)?,
+            fed_forward: simulated(robot, run, 1.0)?,
+            alone: simulated(robot, run, 0.0)?,
         })
     }
 }
@@ -40,7 +40,7 @@ fn tracking(run: &Recording, position: impl Fn(usize, usize) -> f64) -> Tracking
 }
 
 /// Simulates all axes under torque control with the default gains of robot files.
-fn simulated(robot: &Robot, run: &Recording, feed_forward: bool) -> Result<Tracking, Error> {
+fn simulated(robot: &Robot, run: &Recording, feed_forward: f64) -> Result<Tracking, Error> {
     let rows: Vec<f64> = (0..run.time_s.len()).flat_map(|i| run.at(&run.reference, i)).collect();
     let motion = Motion::from_samples(&run.time_s, &rows, robot)?;
     let modelling = Modelling { drives: DriveModel::Servo, ..Modelling::default() };

@@ -15,7 +15,7 @@ use crate::milling::structure::Structure;
 
 /// Minimum depth of the search over the maximum depth.
 const SHALLOWEST: f64 = 1e-3;
-/// Factor on the bound of the zero-order solution; the search starts there if that is deeper.
+/// Factor on the bound by the mean force; the search starts there if that is deeper.
 const BOUND: f64 = 0.5;
 /// Depth over the maximum depth at which a downward search ends.
 const NOTHING: f64 = 1e-9;
@@ -224,7 +224,7 @@ fn step_ratio(options: &LimitOptions) -> f64 {
 /// Finds the first crossing from shallow to deep.
 fn first_limit(period: &Period, options: &LimitOptions) -> Option<f64> {
     let ratio = step_ratio(options);
-    let bound = BOUND * period.zero_order_bound();
+    let bound = BOUND * period.mean_force_bound();
     let skipped = ((bound / (options.deepest * SHALLOWEST)).ln() / ratio.ln()).floor();
     let start = if skipped > 0.0 { (skipped as usize).min(options.depths - 2) } else { 0 };
     let at = |k: usize| options.deepest * SHALLOWEST.powf(1.0 - k as f64 / (options.depths - 1) as f64);

@@ -4,8 +4,7 @@
 //! the chip thickness varies, the force follows, and above a certain depth of cut the vibration
 //! grows: chatter. [`Structure`] describes the compliance at the tool's tip, [`Cutter`] the teeth.
 //! At a spindle speed, [`limit_of_depth`] computes the limit of depth from the Floquet multipliers
-//! of a tooth period, [`zero_order_limit`] from the mean force [Altintas & Budak 1995], and
-//! [`simulate`] integrates a cut in time, with loss of contact.
+//! of a tooth period.
 //!
 //! ```
 //! use flexarm_chatter::milling::{Coefficients, Cutter, Engagement, LimitOptions, Mode, Structure, limit_of_depth};
@@ -32,13 +31,9 @@ mod limit;
 mod matrices;
 mod moments;
 mod period;
-mod simulation;
 mod structure;
-mod zero_order;
 
 pub use cutter::{Coefficients, Cutter, Engagement};
 pub use error::ChatterError;
 pub use limit::{Kind, Limit, LimitOptions, leading_multiplier, limit_of_depth, unstable_ranges};
-pub use simulation::{Cut, ForcedMotion, RegenerativeCut, Simulated, simulate};
 pub use structure::{Mode, Pole, Structure};
-pub use zero_order::{ZeroOrderLimit, zero_order_limit};

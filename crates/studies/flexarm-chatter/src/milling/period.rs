@@ -139,7 +139,7 @@ impl<'a> Period<'a> {
 
     /// Returns a depth below which the mean force causes no chatter at any speed:
     /// `|b (1 - e^{-i ω T})| = 1/|λ|` with an eigenvalue λ of `G H`.
-    pub(crate) fn zero_order_bound(&self) -> f64 {
+    pub(crate) fn mean_force_bound(&self) -> f64 {
         let H = self.cutter.mean_force_matrix().map(|x| Complex::new(x, 0.0));
         let size = |w: &f64| (self.structure.frequency_response(*w) * H).norm();
         let largest = self.structure.frequencies().iter().map(size).fold(0.0, f64::max);

@@ -133,6 +133,29 @@ impl Structure {
     pub(crate) fn n_states(&self) -> usize {
         self.poles.iter().map(Pole::n_states).sum()
     }
+
+    /// Returns angular frequencies (rad/s) for evaluating the response: at equal ratios, and dense
+    /// around each resonance.
+    pub(crate) fn frequencies(&self) -> Vec<f64> {
+        let sizes: Vec<f64> = self.poles().iter().map(|p| p.value.norm()).collect();
+        let (Some(low), Some(high)) = (sizes.iter().copied().reduce(f64::min), sizes.iter().copied().reduce(f64::max))
+        else {
+            return Vec::new();
+        };
+        let (low, high) = (0.1 * low, 4.0 * high);
+        let n = (40.0 * (high / low).log10()).ceil().max(2.0);
+        let mut band: Vec<f64> = (0..=n as usize).map(|k| low * (high / low).powf(k as f64 / n)).collect();
+        for pole in self.poles() {
+            let (w, width) = (pole.value.im, pole.value.re.abs());
+            for offset in [0.0, 0.1, 0.2, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 3.0, 5.0, 8.0, 13.0] {
+                band.extend([w - offset * width, w + offset * width]);
+            }
+        }
+        band.retain(|w| *w >= low && *w <= high);
+        band.sort_by(f64::total_cmp);
+        band.dedup_by(|a, b| *a - *b < 1e-9 * *b);
+        band
+    }
 }
 
 impl Pole {

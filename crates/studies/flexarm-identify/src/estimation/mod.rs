@@ -4,8 +4,8 @@
 //! readings taken at the robot. [`MeasuredArm`] combines them; [`identify`] estimates the
 //! parameters with their uncertainties, and reports which of them the readings determine and which
 //! readings contradict the model. [`plan`] chooses poses and loads to measure. Derivatives are in
-//! closed form ([`tool_slopes`], [`compliance_slopes`], [`frequency_slopes`], [`structure_slopes`],
-//! and [`error_slopes`] along a motion).
+//! closed form ([`tool_slopes`], [`compliance_slopes`], [`frequency_slopes`],
+//! [`structure_slopes`]).
 //!
 //! Not here: files, units, robots by name (the crate root).
 
@@ -22,7 +22,6 @@ mod reading;
 mod response;
 mod sensitivity;
 mod slips;
-mod trajectory;
 
 pub use coupled_gears::{CoupledOutput, coupled_gear_stiffness};
 pub use encoders::{GearEstimate, GearRun, gear_stiffness};
@@ -39,4 +38,3 @@ pub use reading::{
 pub use response::{Answer, Probe, ResponseSlopes, Structure, StructureSlopes, structure_slopes};
 pub use sensitivity::{FrequencySlopes, compliance_slopes, frequency_slopes, tool_slopes};
 pub use slips::{FoundSlip, Slip, likely_slip};
-pub use trajectory::{RunParameter, error_slopes};

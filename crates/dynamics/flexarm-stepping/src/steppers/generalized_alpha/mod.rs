@@ -42,7 +42,6 @@ mod dispersion;
 
 use std::sync::Arc;
 
-use flexarm_kinematics::Real;
 use nalgebra::DVector;
 
 use crate::arm::FlexibleArm;
@@ -219,23 +218,18 @@ impl Coefficients {
 
     /// Returns x⁺ and v⁺ by (4), (2), (3) from x, v, a and x̃ of one coordinate and x̃⁺.
     #[inline(always)]
-    pub(crate) fn advance<T: Real>(&self, h: f64, x: T, v: T, a: T, x_tilde: T, x_tilde_new: T) -> (T, T) {
+    pub(crate) fn advance(&self, h: f64, x: f64, v: f64, a: f64, x_tilde: f64, x_tilde_new: f64) -> (f64, f64) {
         let Self { alpha_m, alpha_f, beta, gamma } = *self;
-        let c = T::splat;
         let ratio = (1.0 - alpha_f) / (1.0 - alpha_m);
-        let a_new = (c(alpha_f) * x_tilde - c(alpha_m) * a) / c(1.0 - alpha_m) + c(ratio) * x_tilde_new;
-        (
-            x + c(h) * v + c(h * h) * (c(0.5 - beta) * a + c(beta) * a_new),
-            v + c(h) * (c(1.0 - gamma) * a + c(gamma) * a_new),
-        )
+        let a_new = (alpha_f * x_tilde - alpha_m * a) / (1.0 - alpha_m) + ratio * x_tilde_new;
+        (x + h * v + h * h * ((0.5 - beta) * a + beta * a_new), v + h * ((1.0 - gamma) * a + gamma * a_new))
     }
 
     /// Returns a⁺ of (4).
     #[inline(always)]
-    pub(crate) fn remembered<T: Real>(&self, a: T, x_tilde: T, x_tilde_new: T) -> T {
+    pub(crate) fn remembered(&self, a: f64, x_tilde: f64, x_tilde_new: f64) -> f64 {
         let Self { alpha_m, alpha_f, .. } = *self;
-        let c = T::splat;
-        (c(1.0 - alpha_f) * x_tilde_new + c(alpha_f) * x_tilde - c(alpha_m) * a) / c(1.0 - alpha_m)
+        ((1.0 - alpha_f) * x_tilde_new + alpha_f * x_tilde - alpha_m * a) / (1.0 - alpha_m)
     }
 }
 

@@ -1,8 +1,8 @@
-//! Standard Input Data of a flexible body (Wallrapp 1994): reads and writes `.SID_FEM` files.
+//! Standard Input Data of a flexible body (Wallrapp 1994): reads `.SID_FEM` files.
 //!
 //! A body with `nq` shape coordinates: mass integrals as Taylor series in these, and frames of
-//! nodes. Matrices are stored as the entries of the file, so reading and writing is lossless;
-//! [`SidMatrix::m0`] and [`SidMatrix::m1`] return them dense. Indices of the first-order part are
+//! nodes. Matrices are stored as the entries of the file; [`SidMatrix::m0`] and [`SidMatrix::m1`] return
+//! them dense. Indices of the first-order part are
 //! (row, mode, column).
 //!
 //! Writers of this format differ in three places, which the file does not declare:
@@ -22,16 +22,14 @@ mod conventions;
 mod modal;
 mod parse;
 mod units;
-mod write;
 
 use std::collections::BTreeMap;
 
 use nalgebra::DMatrix;
 
 pub use conventions::{GyroLayout, OeOrder, SidConventions};
-pub use modal::{modal_link_from_sid, modal_link_held_at, sid_of_modal_link};
+pub use modal::{modal_link_from_sid, modal_link_held_at};
 pub use parse::{parse_sid, read_sid};
-pub use write::write_sid;
 
 /// Names of the matrices of a body, in file order.
 pub(super) const BODY_BLOCKS: [&str; 11] = ["mdCM", "J", "Ct", "Cr", "Me", "Gr", "Ge", "Oe", "ksigma", "Ke", "De"];

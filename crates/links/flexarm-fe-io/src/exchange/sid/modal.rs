@@ -1,4 +1,4 @@
-//! Conversion of modal links from and to Standard Input Data.
+//! Conversion of Standard Input Data to modal links.
 //!
 //! ```text
 //! mdCM = ∫ s dm + Σ C_t,k η_k          J = inertia + Σ J1_k η_k      J1 = 2 tr(Ps) 1 - 2 Ps,  Ps: symmetric part of P
@@ -16,7 +16,7 @@
 use flexarm_spatial::Pose;
 use nalgebra::{DMatrix, Matrix3, Matrix3xX, Matrix6xX, Rotation3, Translation3, Vector3};
 
-use flexarm_fem::modal::{GeometricStiffness, ModalInterface, ModalLink, PRODUCTS, axial, symmetric};
+use flexarm_fem::modal::{GeometricStiffness, ModalInterface, ModalLink, PRODUCTS, symmetric};
 
 use super::{GyroLayout, OeOrder, Sid, SidMatrix, SidNode};
 use crate::exchange::{ExchangeError, ExchangeErrorKind};
@@ -28,12 +28,7 @@ const OE_COLUMNS: [usize; 6] = [0, 1, 2, 3, 5, 4];
 /// Maximum `|RᵀR - 1|` of a node frame: files have few digits.
 const ROTATION: f64 = 1e-6;
 
-/// `φᵀ [ω]x² s` per product of ω, from `A = ∫ s φᵀ dm`.
-fn centrifugal(A: &Matrix3<f64>) -> [f64; 6] {
-    PRODUCTS.map(|(a, b)| if a == b { A[(a, a)] - A.trace() } else { A[(a, b)] + A[(b, a)] })
-}
-
-/// Symmetric part of A, inverse of [`centrifugal`].
+/// Symmetric part of `A = ∫ s φᵀ dm`, from `φᵀ [ω]x² s` per product of ω.
 fn from_centrifugal(O: [f64; 6]) -> Matrix3<f64> {
     let trace = -0.5 * (O[0] + O[1] + O[2]);
     let mut A = Matrix3::zeros();
@@ -49,105 +44,11 @@ fn skew_of(c: &Vector3<f64>) -> Matrix3<f64> {
     c.cross_matrix() * -0.5
 }
 
-/// Matrices of the inertia forces.
-struct InertiaTerms {
-    Gr: DMatrix<f64>,
-    Ge: DMatrix<f64>,
-    Oe0: DMatrix<f64>,
-    /// First-order parts, by mode.
-    Ct1: Vec<DMatrix<f64>>,
-    Cr1: Vec<DMatrix<f64>>,
-    Oe1: Vec<DMatrix<f64>>,
-}
-
-impl InertiaTerms {
-    fn of(link: &ModalLink) -> Self {
-        let (n, G) = (link.coordinates(), link.geometric.as_ref());
-        let (mut Gr, mut Ge) = (DMatrix::zeros(3, 3 * n), DMatrix::zeros(n, 3 * n));
-        let mut Oe0 = DMatrix::zeros(n, 6);
-        let zeros = |columns| vec![DMatrix::zeros(n, columns); n];
-        let (mut Ct1, mut Cr1, mut Oe1) = (zeros(3), zeros(3), zeros(6));
-        for k in 0..n {
-            let gyro = (Matrix3::identity() * link.P[k].trace() - link.P[k].transpose()) * 2.0;
-            for (row, axis) in (0..9).map(|e| (e / 3, e % 3)) {
-                Gr[(row, GyroLayout::ComponentMajor.column(n, axis, k))] = gyro[(row, axis)];
-            }
-            for (value, at) in centrifugal(&link.P[k]).into_iter().zip(OE_COLUMNS) {
-                Oe0[(k, at)] = value;
-            }
-            for l in 0..n {
-                let cross = axial(&link.N[l * n + k]);
-                for axis in 0..3 {
-                    Ge[(k, GyroLayout::ComponentMajor.column(n, axis, l))] = 2.0 * cross[axis];
-                    Ct1[l][(k, axis)] = G.map_or(0.0, |G| G.acceleration[axis][(k, l)]);
-                    Cr1[l][(k, axis)] = cross[axis] + G.map_or(0.0, |G| G.angular[axis][(k, l)]);
-                }
-                for (i, value) in centrifugal(&link.N[k * n + l]).into_iter().enumerate() {
-                    Oe1[l][(k, OE_COLUMNS[i])] = value + G.map_or(0.0, |G| G.centrifugal[i][(k, l)]);
-                }
-            }
-        }
-        Self { Gr, Ge, Oe0, Ct1, Cr1, Oe1 }
-    }
-}
-
-/// Converts a modal link to Standard Input Data, SI; node 1 is A, the others follow in order.
-///
-/// `De` is zero, because a modal link has no damping.
-pub fn sid_of_modal_link(link: &ModalLink) -> Sid {
-    let n = link.coordinates();
-    let dense = |A: &Matrix3xX<f64>| DMatrix::from_fn(n, 3, |k, a| A[(a, k)]);
-    let column = |v: &Vector3<f64>| DMatrix::from_column_slice(3, 1, v.as_slice());
-    let six = |J: &Matrix3<f64>| DMatrix::from_iterator(6, 1, PRODUCTS.into_iter().map(|place| J[place]));
-    let J1 = |P: &Matrix3<f64>| Matrix3::identity() * (2.0 * P.trace()) - (P + P.transpose());
-    let square = |A: &DMatrix<f64>| SidMatrix { structure: 2, ..SidMatrix::constant(n, A) };
-    let G = link.geometric.as_ref();
-    let InertiaTerms { Gr, Ge, Oe0, Ct1, Cr1, Oe1 } = InertiaTerms::of(link);
-    let first: Vec<_> = (0..n).map(|k| column(&link.C_t.column(k).into_owned())).collect();
-    let turning: Vec<_> = link.P.iter().map(|P| six(&J1(P))).collect();
-    let mut nodes = vec![node(1, &link.X_LA, &Matrix6xX::zeros(n), None)];
-    for (i, interface) in link.interfaces.iter().enumerate() {
-        nodes.push(node(i as i64 + 2, &interface.X_LI, &interface.Phi, G.map(|G| &G.interface[i])));
-    }
-    let one_line = |text: &str| text.replace(['\n', '\r', '|'], " ").trim().to_owned();
-    let names: Vec<_> = link.interfaces.iter().map(|interface| one_line(&interface.name)).collect();
-    Sid {
-        comment: format!(" {COMMENT} | {} | A | {}", one_line(&link.name), names.join(" | ")),
-        mass: link.mass,
-        modes: link.labels.iter().map(|label| one_line(label)).collect(),
-        nodes,
-        mdCM: SidMatrix::linear(&column(&link.first_moment), &first),
-        J: SidMatrix::linear(&six(&link.inertia), &turning),
-        Ct: if G.is_some() {
-            SidMatrix::linear(&dense(&link.C_t), &Ct1)
-        } else {
-            SidMatrix::constant(n, &dense(&link.C_t))
-        },
-        Cr: SidMatrix::linear(&dense(&link.C_r), &Cr1),
-        Me: square(&link.M),
-        Gr: SidMatrix::constant(n, &Gr),
-        Ge: SidMatrix::constant(n, &Ge),
-        Oe: SidMatrix::linear(&Oe0, &Oe1),
-        ksigma: SidMatrix::constant(n, &DMatrix::zeros(n, 1)),
-        Ke: square(&link.K),
-        De: SidMatrix::constant(n, &DMatrix::zeros(n, n)),
-        others: G.map_or_else(Vec::new, |G| {
-            let all: Vec<_> = G.interface.iter().flatten().cloned().collect();
-            vec![
-                ("K0t".into(), side_by_side(n, &G.acceleration)),
-                ("K0r".into(), side_by_side(n, &G.angular)),
-                ("K0omega".into(), side_by_side(n, &G.centrifugal)),
-                ("K0F".into(), side_by_side(n, &all)),
-            ]
-        }),
-    }
-}
-
 /// Converts Standard Input Data to a modal link.
 ///
 /// A is the first node that no coordinate moves (otherwise see [`modal_link_held_at`]); every other
-/// node becomes an interface, in file order. The names of the link and nodes are those written by
-/// [`sid_of_modal_link`], otherwise `name` and the numbers of the nodes. Damping (`De`) is ignored.
+/// node becomes an interface, in file order. The names of the link and nodes are those of the comment
+/// `modal link | NAME | A | B ...`, otherwise `name` and the numbers of the nodes. Damping (`De`) is ignored.
 /// In a file without the block `K0omega` the centrifugal stiffening remains in `Oe` and therefore
 /// in N.
 ///
@@ -298,39 +199,6 @@ fn check_sizes(origin: &str, sid: &Sid) -> Result<(), ExchangeError> {
         }
     }
     Ok(())
-}
-
-fn node(id: i64, X: &Pose, Phi: &Matrix6xX<f64>, G: Option<&[DMatrix<f64>; 6]>) -> SidNode {
-    let n = Phi.ncols();
-    let vector = |v: &Vector3<f64>| DMatrix::from_column_slice(3, 1, v.as_slice());
-    let dense = |A: &Matrix3<f64>| DMatrix::from_column_slice(3, 3, A.as_slice());
-    let half = |k: usize, at: usize| Vector3::from_fn(|a, _| Phi[(at + a, k)]);
-    let R = *X.rotation.matrix();
-    let shapes = |at: usize| {
-        let m0 = DMatrix::from_fn(3, n, |a, k| Phi[(at + a, k)]);
-        match G {
-            None => SidMatrix::constant(n, &m0),
-            Some(G) => {
-                let m1 = (0..n).map(|k| DMatrix::from_fn(3, n, |a, j| -G[at + a][(j, k)])).collect::<Vec<_>>();
-                SidMatrix::linear(&m0, &m1)
-            }
-        }
-    };
-    let moves = (0..n).map(|k| vector(&half(k, 0))).collect::<Vec<_>>();
-    let turns = (0..n).map(|k| dense(&(half(k, 3).cross_matrix() * R))).collect::<Vec<_>>();
-    SidNode {
-        id,
-        rframe: "body ref".into(),
-        origin: SidMatrix::linear(&vector(&X.translation.vector), &moves),
-        phi: shapes(0),
-        psi: shapes(3),
-        AP: SidMatrix::linear(&dense(&R), &turns),
-        sigma: None,
-    }
-}
-
-fn side_by_side(n: usize, G: &[DMatrix<f64>]) -> SidMatrix {
-    SidMatrix::constant(n, &DMatrix::from_fn(n, n * G.len(), |k, at| G[at / n][(k, at % n)]))
 }
 
 /// Matrices of a block by load, if the block is present with the expected size.
