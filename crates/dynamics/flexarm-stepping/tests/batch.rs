@@ -139,3 +139,14 @@ fn a_step_that_is_cut_in_one_run_is_no_step_of_the_others() {
     runs[2].arm.motion = Arc::new(blow);
     assert_equal_alone(&batch(2e-3, &runs), &runs);
 }
+
+/// The square of a rounded root may be less than the number.
+#[test]
+fn a_peak_that_lasts_is_told_with_its_first_time() {
+    for k in 1..200 {
+        let deflection = Vector3::new(1e-3 * f64::from(k), 0.3e-3, -0.7e-3);
+        let mut result = ToolDeflection::default();
+        (0..3).for_each(|step| result.include(f64::from(step), deflection, false));
+        assert_eq!(result.t_peak_s, 0.0, "{k}");
+    }
+}

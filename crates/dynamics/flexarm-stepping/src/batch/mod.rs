@@ -65,7 +65,8 @@ pub struct ToolDeflection {
 }
 
 impl ToolDeflection {
-    fn include(&mut self, t: f64, deflection: Vector3<f64>, keep: bool) {
+    #[doc(hidden)]
+    pub fn include(&mut self, t: f64, deflection: Vector3<f64>, keep: bool) {
         let square = dot(&deflection, &deflection);
         // Sum of squares until `finished`.
         self.rms_m += square;
@@ -209,21 +210,5 @@ impl Batch {
         let finished = results.into_iter().zip(&steps).enumerate();
         let finished = finished.map(|(k, (result, steps))| (!lanes.left_behind(k)).then(|| result.finished(*steps)));
         Some(finished.collect())
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// The square of a rounded root may be less than the number.
-    #[test]
-    fn a_peak_that_lasts_is_told_with_its_first_time() {
-        for k in 1..200 {
-            let deflection = Vector3::new(1e-3 * f64::from(k), 0.3e-3, -0.7e-3);
-            let mut result = ToolDeflection::default();
-            (0..3).for_each(|step| result.include(f64::from(step), deflection, false));
-            assert_eq!(result.t_peak_s, 0.0, "{k}");
-        }
     }
 }

@@ -22,7 +22,7 @@
 mod columns;
 mod forces;
 mod gears;
-mod lu;
+pub(crate) mod lu;
 mod recurrence;
 mod servo;
 mod tangent;
