@@ -5,7 +5,6 @@
 //! modes or its measured response (`place.rs`). The limits are those of [`milling`]. Start at
 //! [`lobes`]. [`cut`] simulates one cut over time, on the moving arm.
 #![allow(non_snake_case, reason = "monogram notation: X_WL, K_S; see docs/references.md")]
-#![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
 mod caveats;
 mod cut;
@@ -447,4 +446,12 @@ fn assembled(robot: &Robot, tool: &CuttingTool, places: &[CutPose], all: &[LobeP
         warnings: Vec::new(),
         caveats: Vec::new(),
     }
+}
+
+/// Kernels, for the tests of this crate.
+#[doc(hidden)]
+pub mod internals {
+    pub use crate::milling::leading::{SMALL as LARGEST_MATRIX, largest, leading};
+    pub use crate::milling::moments::{Moments, NODES, RULE, Rule};
+    pub use crate::milling::period::{Period, PeriodMap};
 }
