@@ -1,8 +1,5 @@
 //! Derivatives of the tool error along a motion with respect to parameters, against Richardson
 //! extrapolation of runs; the damping depends on the modes.
-#![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
-#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
-#![allow(non_snake_case, reason = "monogram notation")]
 
 use std::sync::Arc;
 
