@@ -25,7 +25,7 @@ fn moments_of_one_and_of_the_first_power_are_those_of_the_closed_form() {
             worst = worst.max((first - (e - 1.0 - z * c) / (z * z)).norm() / c);
         }
     }
-    println!("worst {worst:e}");
+    eprintln!("worst {worst:e}");
     assert!(worst < 1e-11, "{worst:e}");
 }
 
@@ -38,6 +38,6 @@ fn quadrature_and_parts_meet() {
         let (a, b) = (RULE.by_quadrature(z, c, i), RULE.by_parts(z, (z * c).exp(), i));
         worst = a.iter().zip(&b).fold(worst, |w, (a, b)| w.max((a - b).norm()));
     }
-    println!("worst {worst:e}");
+    eprintln!("worst {worst:e}");
     assert!(worst < 1e-9, "{worst:e}");
 }
