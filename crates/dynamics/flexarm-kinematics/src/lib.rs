@@ -39,7 +39,6 @@
 //! # Ok::<(), ModelError>(())
 //! ```
 #![allow(non_snake_case, reason = "monogram notation: X_WB, p_AoBo_W, M_BBo; see docs/references.md")]
-#![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
 mod aba;
 mod analytic_ik;
@@ -100,3 +99,9 @@ pub use model::{
 pub use redundancy::{NullSpaceRule, RuledSolution, inverse_kinematics_with_rule};
 pub use rnea::{gravity_forces, gravity_forces_at_poses, inverse_dynamics, nonlinear_effects};
 pub use static_tangent::{PointLoad, StaticTangent};
+
+/// Kernels, for the tests of this crate.
+#[doc(hidden)]
+pub mod internals {
+    pub use crate::analytic_ik::trig::{Fan, List, Roots, TrigPolynomial};
+}

@@ -7,11 +7,13 @@ use flexarm_testkit::allocations::CountingAllocator;
 
 mod analytic_ik;
 mod arms;
+mod balancer_laws;
 mod balancers;
 mod helical;
 mod identities;
 mod loops;
 mod singular_mass;
+mod trig;
 
 /// Counts the allocations of each thread, and so of each test.
 #[global_allocator]

@@ -32,7 +32,7 @@ pub(crate) enum Change {
 
 /// Pending and past events of a run. Times that differ by less than [`SAME_TIME`] are equal.
 #[derive(Clone)]
-pub(crate) struct EventQueue {
+pub struct EventQueue {
     /// Times of jumps of loads and prescribed velocities and of other stops of loads, ascending,
     /// and the number of them that are over.
     jumps: Vec<f64>,
@@ -46,7 +46,7 @@ pub(crate) struct EventQueue {
 
 impl EventQueue {
     /// Creates the queue for the start of a run.
-    pub(crate) fn of(arm: &FlexibleArm) -> Self {
+    pub fn of(arm: &FlexibleArm) -> Self {
         let loads = arm.loads.iter().flat_map(|load| {
             let jumps = load.wrench.jumps.iter().copied().filter(|t| jumps_at(load, *t));
             jumps.chain(load.wrench.stops.iter().copied())
@@ -63,7 +63,7 @@ impl EventQueue {
     }
 
     /// Returns the time of the next event after `t`, if any; exactly `end` if it is the same time.
-    pub(crate) fn next(&self, t: f64, end: f64) -> Option<f64> {
+    pub fn next(&self, t: f64, end: f64) -> Option<f64> {
         let change = self.changes.get(self.changes_over).map(|change| change.t);
         let sample = self.clock.as_ref().map(|clock| clock.after(t));
         let next = [change, sample, self.next_jump()].into_iter().flatten().reduce(f64::min);
@@ -75,27 +75,27 @@ impl EventQueue {
     }
 
     /// Returns the time nearest to `t` strictly between the last jump and the next one.
-    pub(crate) fn side(&self, t: f64) -> f64 {
+    pub fn side(&self, t: f64) -> f64 {
         let after = self.jumps_over.checked_sub(1).map_or(t, |k| t.max(self.jumps[k].next_up()));
         self.next_jump().map_or(after, |next| after.min(next.next_down()))
     }
 
     /// Marks the jumps at `t` as over; returns the times just before the first and just after the
     /// last of them.
-    pub(crate) fn pass_jumps(&mut self, t: f64) -> Option<(f64, f64)> {
+    pub fn pass_jumps(&mut self, t: f64) -> Option<(f64, f64)> {
         let first = self.next_jump().filter(|first| *first <= t + SAME_TIME)?;
         self.jumps_over = self.jumps.partition_point(|time| *time <= t + SAME_TIME);
         Some((first.next_down(), self.jumps[self.jumps_over - 1].next_up()))
     }
 
     /// Returns the next change of inertia due at `t` with its number, and marks it as over.
-    pub(crate) fn due_change(&mut self, t: f64) -> Option<(usize, &InertiaChange)> {
+    pub fn due_change(&mut self, t: f64) -> Option<(usize, &InertiaChange)> {
         self.changes_before(t + SAME_TIME)
     }
 
     /// Works as [`EventQueue::due_change`] for `t` approached from below: changes at `t` itself are
     /// still pending.
-    pub(crate) fn change_before(&mut self, t: f64) -> Option<(usize, &InertiaChange)> {
+    pub fn change_before(&mut self, t: f64) -> Option<(usize, &InertiaChange)> {
         self.changes_before((t - SAME_TIME).next_down())
     }
 
@@ -107,7 +107,7 @@ impl EventQueue {
     }
 
     /// Returns whether the controller takes a sample at `t`, and marks it as over.
-    pub(crate) fn sample_due(&mut self, t: f64) -> bool {
+    pub fn sample_due(&mut self, t: f64) -> bool {
         self.clock.as_mut().is_some_and(|clock| clock.is_due(t))
     }
 }
@@ -166,68 +166,4 @@ pub(crate) fn damping_after_changes(arm: &FlexibleArm) -> Vec<ArmDamping> {
         (changed.D.clone(), changed.tau.clone(), changed.proportional)
     };
     arm.inertia_changes.iter().map(damping).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn queue(jumps: &[f64], sample_s: Option<f64>) -> EventQueue {
-        EventQueue {
-            jumps: jumps.to_vec(),
-            jumps_over: 0,
-            changes: Vec::new(),
-            changes_over: 0,
-            clock: sample_s.map(|sample_s| SampleClock { sample_s, next: 0 }),
-        }
-    }
-
-    #[test]
-    fn what_is_asked_for_at_a_jump_belongs_to_the_side_from_which_it_is_asked() {
-        let mut events = queue(&[0.5, 0.5 + 0.4 * SAME_TIME, 0.7], None);
-        assert_eq!(events.side(0.3), 0.3);
-        assert!(events.side(0.5) < 0.5 && events.side(0.6) < 0.5);
-        let (before, after) = events.pass_jumps(0.5).unwrap();
-        assert!(before < 0.5 && after > 0.5 + 0.4 * SAME_TIME, "both jumps are over at once: {before} {after}");
-        assert!(events.side(0.5) > 0.5 && events.side(0.6) == 0.6 && events.side(0.8) < 0.7);
-        assert_eq!(events.pass_jumps(0.6), None);
-    }
-
-    /// A step that ends at an event up to rounding ends exactly there: no second step of the length
-    /// of a rounding error.
-    #[test]
-    fn an_event_at_the_end_of_a_step_but_for_rounding_is_at_its_end() {
-        let events = queue(&[0.1 + 0.2], None);
-        assert_eq!(events.next(0.2, 0.3), Some(0.3));
-        assert_eq!(events.next(0.2, 0.25), Some(0.1 + 0.2));
-    }
-
-    /// Truth: a clock of 1 ms has 1001 samples from 0 to 1 s, whether times are sums of steps or
-    /// multiples of them.
-    #[test]
-    fn a_controller_takes_each_sample_once() {
-        for h in [1e-3, 2.5e-4] {
-            let mut events = queue(&[], Some(1e-3));
-            let (mut t, mut sum, mut taken) = (0.0, 0.0, [0, 0]);
-            taken[0] += usize::from(events.sample_due(t));
-            while sum < 1.0 - 0.5 * h {
-                sum += h;
-                t = events.next(t, sum).unwrap().min(sum);
-                taken[usize::from(t > 0.5 + SAME_TIME)] += usize::from(events.sample_due(t));
-                assert!(!events.sample_due(t));
-                assert_eq!(t, sum, "samples are at ends of steps");
-            }
-            assert_eq!(taken, [501, 500], "{h}");
-        }
-    }
-
-    #[test]
-    fn a_payload_is_carried_from_its_time_on_and_not_before() {
-        let change = |t: f64| InertiaChange { t, body: 1, inertia: flexarm_kinematics::SpatialInertia::zeros() };
-        let mut events = EventQueue { changes: vec![change(0.5), change(0.5), change(0.9)], ..queue(&[], None) };
-        assert!(events.change_before(0.5).is_none() && events.due_change(0.4).is_none());
-        let numbers: Vec<usize> = std::iter::from_fn(|| events.due_change(0.5).map(|(number, _)| number)).collect();
-        assert_eq!(numbers, [0, 1]);
-        assert!(events.due_change(0.6).is_none() && events.change_before(1.0).is_some());
-    }
 }

@@ -30,14 +30,11 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 #![allow(non_snake_case, reason = "monogram notation: X_WB, K_S, C_S, M; see docs/references.md")]
-#![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 #![cfg_attr(not(target_arch = "x86_64"), allow(dead_code, reason = "lanes are used with AVX2 alone"))]
 
 mod arm;
 mod assembly;
 mod dense;
-#[cfg(test)]
-mod draw;
 mod drive;
 mod eigenvalues;
 mod elastic_tree;
@@ -95,3 +92,19 @@ pub use steppers::*;
 pub use system::SecondOrderSystem;
 pub use tool_run::{ToolDeflection, ToolRun};
 pub use tree_matrix::{TreeMatrices, TreeNode};
+
+/// Kernels, for the tests of this crate.
+#[doc(hidden)]
+pub mod internals {
+    pub use crate::dense::{
+        Factor, cholesky, congruence, dot, largest, largest_of_numbers, product, solve_transposed, transpose,
+    };
+    pub use crate::eigenvalues::symmetric_eigenvalues;
+    pub use crate::events::EventQueue;
+    pub use crate::gear::hysteresis::SliderState;
+    pub use crate::run_slopes::lu::Lu;
+    pub use crate::steppers::sdirk3::{GAMMA, NODES, WEIGHTS};
+    pub use crate::steppers::spook::constraint::Rows;
+    pub use crate::steppers::spook::solve::{Jacobian, Sigma, Symmetric, TreeSolver, Triangle};
+    pub use crate::tree_matrix::TreeInverse;
+}

@@ -336,8 +336,9 @@ impl<const F: usize> Elimination<F> {
 
 /// `J^-1` on a tree for `J = M + C`, or for (7); see the module documentation.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct TreeInverse {
-    pub(crate) matrices: TreeMatrices,
+pub struct TreeInverse {
+    /// The matrices to factorise.
+    pub matrices: TreeMatrices,
     /// s of (7); `None` for `J = M + C`.
     s: Option<f64>,
     plain: Elimination<1>,
@@ -355,7 +356,7 @@ impl TreeInverse {
     ///
     /// # Errors
     /// [`StepError::Singular`] if an inertia or `J` is not positive definite.
-    pub(crate) fn factor(&mut self, s: Option<f64>, t: f64) -> Result<(), StepError> {
+    pub fn factor(&mut self, s: Option<f64>, t: f64) -> Result<(), StepError> {
         self.s = s;
         let positive = match s {
             None => self.plain.factor(&self.matrices.nodes, 0.0),
@@ -385,7 +386,7 @@ impl TreeInverse {
     }
 
     /// Replaces `r` by `d = J^-1 r`; with s also computes [`TreeInverse::shift`].
-    pub(crate) fn solve(&mut self, r: &mut DVector<f64>) {
+    pub fn solve(&mut self, r: &mut DVector<f64>) {
         let nodes = &self.matrices.nodes;
         if self.s.is_none() {
             self.plain.solve(nodes, r.as_slice());
@@ -403,12 +404,12 @@ impl TreeInverse {
     }
 
     /// Returns `s M^-1 K d` of the last solution d.
-    pub(crate) fn shift(&self) -> &DVector<f64> {
+    pub fn shift(&self) -> &DVector<f64> {
         &self.shift
     }
 
     /// Computes `y = x + s M^-1 K x`, by (3).
-    pub(crate) fn correct(&mut self, x: &DVector<f64>, y: &mut DVector<f64>) {
+    pub fn correct(&mut self, x: &DVector<f64>, y: &mut DVector<f64>) {
         let Self { matrices, s, lightness, alpha, .. } = self;
         let s = s.unwrap_or(0.0);
         // Inward pass: accumulate the forces from the children.
@@ -427,131 +428,5 @@ impl TreeInverse {
                 y[6 * j + i] = x[6 * j + i] + s * (alpha[j][i] - moved[i]);
             }
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::draw::Draw;
-    use nalgebra::DMatrix;
-    use proptest::prelude::*;
-    use proptest::test_runner::TestRunner;
-
-    /// Creates a random tree with branches and several roots; stiffness differs by orders of
-    /// magnitude between nodes.
-    fn tree(seed: u64, count: usize) -> TreeMatrices {
-        let mut draw = Draw(seed);
-        let nodes = (0..count).map(|j| {
-            // Mostly chains.
-            let parent = ((draw.next().abs() * (j as f64 + 1.0)) as usize).min(j);
-            let parent = if draw.next() < 0.4 { j } else { parent };
-            let block = |draw: &mut Draw| Matrix3::from_fn(|_, _| draw.next());
-            let size = 10f64.powf(3.0 * draw.next());
-            TreeNode {
-                parent: parent.checked_sub(1),
-                inertia: draw.definite(0.3),
-                carried: [block(&mut draw), block(&mut draw), block(&mut draw)],
-                C: draw.definite(0.1) * size,
-                K: draw.definite(0.1) * size,
-            }
-        });
-        TreeMatrices { nodes: nodes.collect() }
-    }
-
-    /// Returns M of (2), C and K as dense matrices.
-    fn dense(tree: &TreeMatrices) -> [DMatrix<f64>; 3] {
-        let n = 6 * tree.nodes.len();
-        let (mut M, mut C, mut K) = (DMatrix::zeros(n, n), DMatrix::zeros(n, n), DMatrix::zeros(n, n));
-        let mut moves: Vec<DMatrix<f64>> = Vec::new();
-        for (j, node) in tree.nodes.iter().enumerate() {
-            let mut E = DMatrix::zeros(6, n);
-            if let Some(p) = node.parent {
-                let mut X = DMatrix::zeros(6, 6);
-                let [A, B, C] = &node.carried;
-                for (row, column, block) in [(0, 0, A), (0, 3, B), (3, 3, C)] {
-                    X.view_mut((row, column), (3, 3)).copy_from(block);
-                }
-                E += X * &moves[p];
-            }
-            E.view_mut((0, 6 * j), (6, 6)).fill_with_identity();
-            let I = DMatrix::from_column_slice(6, 6, node.inertia.as_slice());
-            M += E.transpose() * I * &E;
-            C.view_mut((6 * j, 6 * j), (6, 6)).copy_from(&node.C);
-            K.view_mut((6 * j, 6 * j), (6, 6)).copy_from(&node.K);
-            moves.push(E);
-        }
-        [M, C, K]
-    }
-
-    fn far(found: &DVector<f64>, truth: &DVector<f64>) -> f64 {
-        (found - truth).norm() / truth.norm()
-    }
-
-    /// Truth: the dense matrices of the same tree, by LU. Measured: 3e-13.
-    #[test]
-    fn a_tree_is_solved_as_its_dense_matrix_is() {
-        let mut runner = TestRunner::new(ProptestConfig::with_cases(60));
-        let cases = (any::<u64>(), 1_usize..=32);
-        let result = runner.run(&cases, |(seed, count)| {
-            let matrices = tree(seed, count);
-            let [M, C, _] = dense(&matrices);
-            let r = DVector::from_fn(6 * count, |i, _| ((i * i) as f64).sin());
-            let truth = (M + C).lu().solve(&r).unwrap();
-            let mut inverse = TreeInverse { matrices, ..Default::default() };
-            inverse.factor(None, 0.0).unwrap();
-            let mut d = r.clone();
-            inverse.solve(&mut d);
-            prop_assert!(far(&d, &truth) < 1e-12, "{:e}", far(&d, &truth));
-            Ok(())
-        });
-        result.unwrap();
-    }
-
-    /// Truth: `J = M + C (1 + s M^-1 K)` dense, by LU; solution, shift, and `x + s M^-1 K x`. With
-    /// damping unrelated to the stiffness, and with `C = κ K` where the roots a and b are complex,
-    /// equal, real, and very different (`τ = (κ/s)^1/2` of 0.02, 1, 2, 2.1 and 50). Measured:
-    /// 2e-12, 2e-12, 1e-12.
-    #[test]
-    fn the_corrected_matrix_is_solved_with_one_elimination_whatever_the_damping() {
-        let mut runner = TestRunner::new(ProptestConfig::with_cases(100));
-        let ratios = prop::sample::select(vec![None, Some(0.02), Some(1.0), Some(2.0), Some(2.1), Some(50.0)]);
-        let cases = (any::<u64>(), 1_usize..=32, ratios, -2.0..1.0f64);
-        let result = runner.run(&cases, |(seed, count, tau, size)| {
-            let mut matrices = tree(seed, count);
-            let nu = 10f64.powf(size);
-            let s = nu / tau.unwrap_or(1.0);
-            if let Some(tau) = tau {
-                matrices.nodes.iter_mut().for_each(|node| node.C = node.K * (tau * nu));
-            }
-            let [M, C, K] = dense(&matrices);
-            let M_inverse_K = M.clone().lu().solve(&K).unwrap();
-            let J = &M + &C + &C * &M_inverse_K * s;
-            let r = DVector::from_fn(6 * count, |i, _| ((i * i) as f64).sin());
-            let truth = J.lu().solve(&r).unwrap();
-            let mut inverse = TreeInverse { matrices, ..Default::default() };
-            inverse.factor(Some(s), 0.0).unwrap();
-            let mut d = r.clone();
-            inverse.solve(&mut d);
-            let mut corrected = r.clone();
-            inverse.correct(&r, &mut corrected);
-            let errors = [
-                far(&d, &truth),
-                far(inverse.shift(), &(&M_inverse_K * &truth * s)),
-                far(&corrected, &(&r + &M_inverse_K * &r * s)),
-            ];
-            prop_assert!(errors.iter().all(|error| *error < 1e-10), "{errors:?} {tau:?}");
-            Ok(())
-        });
-        result.unwrap();
-    }
-
-    /// A node without inertia is reported as a singular mass matrix, with springs or without.
-    #[test]
-    fn a_node_without_inertia_is_found() {
-        let mut matrices = tree(1, 3);
-        matrices.nodes[2].inertia = Matrix6::zeros();
-        let mut inverse = TreeInverse { matrices, ..Default::default() };
-        assert!(matches!(inverse.factor(Some(1.0), 0.5), Err(StepError::Singular { matrix: "mass matrix", .. })));
     }
 }

@@ -32,7 +32,6 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 #![allow(non_snake_case, reason = "monogram notation: X_LS, K_S, p_AB; see docs/references.md")]
-#![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
 mod cut;
 mod gearbox;

@@ -1,6 +1,4 @@
 //! Elastic gearboxes on the tree: invariants, compliance and rejected input.
-#![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
-#![allow(non_snake_case, reason = "monogram notation")]
 
 use flexarm_flexlink::*;
 use flexarm_kinematics::*;

@@ -1,6 +1,4 @@
 //! Invariants and effects of the substitution by modal links.
-#![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
-#![allow(non_snake_case, reason = "monogram notation")]
 
 use std::sync::Arc;
 

@@ -1,5 +1,4 @@
 //! Invariants and effects of the substitution by lumped links.
-#![allow(non_snake_case, reason = "monogram notation")]
 
 use approx::assert_relative_eq;
 use flexarm_fem::{BeamLink, BeamTheory, Material, Section};

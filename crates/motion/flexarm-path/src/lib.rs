@@ -6,7 +6,6 @@
 //!
 //! Not here: parsing of programs and files, link deflection.
 #![allow(non_snake_case, reason = "monogram notation: X_WT, R_AB; see docs/references.md")]
-#![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test stops at the first failure"))]
 
 mod arm;
 mod averaged;

@@ -1,7 +1,6 @@
 //! Minimum durations within joint velocity, acceleration and jerk limits against a nonlinear
 //! program over time (`tools/golden_jerk.py`), and without jerks against TOPP-RA
 //! (`tools/golden_toppra.py`).
-#![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
 
 use std::path::Path;
 

@@ -1,7 +1,5 @@
 //! Programs of moves as motions: the tool follows its path everywhere, and velocities and
 //! accelerations keep their limits.
-#![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
-#![allow(non_snake_case, reason = "monogram notation")]
 
 use flexarm_kinematics::{
     AnalyticArm, ControllerAxes, Data, IkOptions, Joint, JointKind, Link, Mechanism, Model, NullSpaceRule,

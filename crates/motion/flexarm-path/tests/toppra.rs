@@ -1,5 +1,4 @@
 //! Minimum durations against TOPP-RA on its own kind of paths (`tools/golden_toppra.py`).
-#![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
 
 use std::path::Path;
 

@@ -50,7 +50,6 @@
 //! Units: s, rad, rad/s, rad/s² (m, m/s, m/s² for a prismatic joint) everywhere except inside the
 //! files. Not here: robots, links and inverse kinematics; a trajectory knows only the names of its
 //! joints.
-#![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test"))]
 
 mod barrier;
 mod column_map;
@@ -95,3 +94,11 @@ pub use spline::{JointKnots, JointSamples, Samples};
 pub use table::{KnownJoint, TableInfo, TableRequest};
 pub use trajectory::{Move, Trajectory, VelocityJump};
 pub use warning::Warning;
+
+/// Kernels, for the tests of this crate.
+#[doc(hidden)]
+pub mod internals {
+    pub use crate::corner::{Corner, corners};
+    pub use crate::polynomial::{Few, Piece, roots_in_unit_interval};
+    pub use crate::via::{passing_times, rest_to_rest_spline};
+}

@@ -17,11 +17,11 @@ pub(crate) type Range = [(f64, f64); 2];
 
 /// A polynomial of degree five on `0 <= τ <= width`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Piece {
+pub struct Piece {
     /// Length in s, positive.
-    pub(crate) width: f64,
+    pub width: f64,
     /// Coefficients of `τ^k`, lowest first.
-    pub(crate) c: [f64; 6],
+    pub c: [f64; 6],
 }
 
 impl Piece {
@@ -31,7 +31,7 @@ impl Piece {
     }
 
     /// The quintic with position, velocity and acceleration given at both ends.
-    pub(crate) fn hermite(width: f64, [q0, v0, a0]: [f64; 3], [q1, v1, a1]: [f64; 3]) -> Self {
+    pub fn hermite(width: f64, [q0, v0, a0]: [f64; 3], [q1, v1, a1]: [f64; 3]) -> Self {
         let h = width;
         let step = q1 - q0;
         let c3 = (20.0 * step - (8.0 * v1 + 12.0 * v0) * h - (3.0 * a0 - a1) * h * h) / (2.0 * h.powi(3));
@@ -41,7 +41,7 @@ impl Piece {
     }
 
     /// Position, velocity, acceleration and jerk at `tau`.
-    pub(crate) fn at(&self, tau: f64) -> [f64; 4] {
+    pub fn at(&self, tau: f64) -> [f64; 4] {
         let [c0, c1, c2, c3, c4, c5] = self.c;
         [
             c0 + tau * (c1 + tau * (c2 + tau * (c3 + tau * (c4 + tau * c5)))),
@@ -81,7 +81,7 @@ impl Piece {
     }
 
     /// Minimum and maximum of derivative `order` (0 position ... 3 jerk), exact up to rounding.
-    pub(crate) fn range(&self, order: usize) -> Range {
+    pub fn range(&self, order: usize) -> Range {
         let value = |u: f64| self.at(u * self.width)[order];
         let (mut least, mut greatest) = ((0.0, value(0.0)), (0.0, value(0.0)));
         if self.is_still() {
@@ -121,7 +121,7 @@ impl Piece {
 /// A few numbers without heap allocation: coefficients of a polynomial of degree at most five, or
 /// its roots and the ends of their interval.
 #[derive(Clone, Copy, Debug, Default)]
-struct Few {
+pub struct Few {
     all: [f64; 12],
     count: usize,
 }
@@ -166,7 +166,7 @@ fn evaluate(p: &[f64], u: f64) -> f64 {
 ///
 /// Between neighbouring roots of `p'` the polynomial is monotone and has at most one root, so the
 /// recursion over the derivatives finds all roots.
-fn roots_in_unit_interval(p: &[f64]) -> Few {
+pub fn roots_in_unit_interval(p: &[f64]) -> Few {
     if p.len() < 2 {
         return Few::default();
     }
@@ -212,52 +212,4 @@ fn bracketed_root(p: &[f64], slope: &[f64], mut low: f64, mut high: f64) -> f64 
         u = next;
     }
     u
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    /// Truth: (u - 0.2)(u - 0.5)(u - 0.9).
-    #[test]
-    fn all_roots_of_a_cubic_are_found() {
-        let roots = roots_in_unit_interval(&[-0.09, 0.73, -1.6, 1.0]);
-        assert_eq!(roots.len(), 3);
-        for (found, truth) in roots.iter().zip([0.2, 0.5, 0.9]) {
-            assert!((found - truth).abs() < 1e-14); // measured 1.1e-16
-        }
-    }
-
-    proptest! {
-        /// Second algorithm: no sample on a fine grid lies outside the range found from the roots.
-        #[test]
-        fn no_sample_leaves_the_exact_range(
-            ends in prop::array::uniform6(-3.0..3.0_f64),
-            width in 0.01..5.0_f64,
-            order in 0..4_usize,
-        ) {
-            let [q0, v0, a0, q1, v1, a1] = ends;
-            let piece = Piece::hermite(width, [q0, v0, a0], [q1, v1, a1]);
-            let [(t_low, low), (t_high, high)] = piece.range(order);
-            let slack = 1e-12 * (low.abs() + high.abs() + 1.0);
-            for k in 0..=200 {
-                let value = piece.at(width * f64::from(k) / 200.0)[order];
-                prop_assert!(value >= low - slack && value <= high + slack);
-            }
-            prop_assert!((piece.at(t_low)[order] - low).abs() <= slack);
-            prop_assert!((piece.at(t_high)[order] - high).abs() <= slack);
-        }
-
-        #[test]
-        fn hermite_piece_meets_its_end_values(ends in prop::array::uniform6(-3.0..3.0_f64), width in 0.01..5.0_f64) {
-            let [q0, v0, a0, q1, v1, a1] = ends;
-            let [q, v, a, _] = Piece::hermite(width, [q0, v0, a0], [q1, v1, a1]).at(width);
-            // The rounding error scales with the terms, not with the result; measured 8e-17 of it.
-            let scale = 50.0 * (q0.abs() + q1.abs() + (v0.abs() + v1.abs()) * width + (a0.abs() + a1.abs()) * width * width);
-            prop_assert!((q - q1).abs() <= 1e-14 * scale);
-            prop_assert!((v - v1).abs() * width <= 1e-14 * scale);
-            prop_assert!((a - a1).abs() * width * width <= 1e-14 * scale);
-        }
-    }
 }

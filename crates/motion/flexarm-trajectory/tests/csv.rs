@@ -1,5 +1,4 @@
 //! CSV files: all kinds of interpolation, round trips, and all errors of a file.
-#![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
 use std::f64::consts::PI;
 use std::fmt::Write as _;

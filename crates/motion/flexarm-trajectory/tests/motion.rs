@@ -1,5 +1,4 @@
 //! Moves against closed forms, continuity of all plans, limits, holds, time scaling.
-#![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
 use approx::assert_relative_eq;
 use flexarm_trajectory::{
@@ -301,5 +300,92 @@ fn a_trajectory_of_its_pieces_is_the_same() {
     for (knots, pieces) in spoilt {
         let made = Trajectory::of_pieces(vec![(name.clone(), knots, pieces)], trajectory.duration());
         assert!(matches!(made, Err(TrajectoryError::OutOfRange { .. })));
+    }
+}
+
+const LIMITS: MotionLimits = MotionLimits { velocity: 0.8, acceleration: 2.0, jerk: 15.0 };
+
+/// A move by 1 rad, as fast as the limits allow or in a given duration.
+fn unit_move(profile: Profile, duration: Option<f64>, limits: MotionLimits) -> Trajectory {
+    plan(&[0.0], vec![PlannedMove { profile, duration, limits: vec![limits], ..PlannedMove::quintic(vec![1.0], 1.0) }])
+}
+
+fn peak(trajectory: &Trajectory, order: usize) -> f64 {
+    let peak = &trajectory.peak()[0];
+    [peak.velocity, peak.acceleration, peak.jerk][order - 1].value.abs()
+}
+
+/// Truth: 15/8, 10/sqrt(3) and 60 over the powers of the duration.
+#[test]
+fn quintic_peaks_are_those_of_the_closed_form() {
+    let quintic = unit_move(Profile::Quintic, Some(2.0), MotionLimits::UNLIMITED);
+    let [v, a, j] = [15.0 / 8.0, 10.0 / 3.0_f64.sqrt(), 60.0];
+    assert_relative_eq!(peak(&quintic, 1), v / 2.0, max_relative = 1e-14); // measured 0
+    assert_relative_eq!(peak(&quintic, 2), a / 4.0, max_relative = 1e-14); // measured 1.5e-16
+    assert_relative_eq!(peak(&quintic, 3), j / 8.0, max_relative = 1e-14); // measured 0
+}
+
+/// Truth: T = 1/v + v/a for a travel of 1, and 2/sqrt(a) for one too short to cruise.
+#[test]
+fn fastest_plain_trapezoid_is_bang_coast_bang() {
+    let duration = |limits| unit_move(Profile::Trapezoid { rounding: 0.0 }, None, limits).duration();
+    assert_relative_eq!(duration(LIMITS), 1.0 / 0.8 + 0.8 / 2.0, max_relative = 1e-15); // measured 0
+    let fast = MotionLimits { velocity: 100.0, ..LIMITS };
+    assert_relative_eq!(duration(fast), 2.0 / 2.0_f64.sqrt(), max_relative = 1e-15);
+}
+
+/// Truth: T = 1/v + v/a + a/j for a travel of 1 that reaches all three limits.
+#[test]
+fn fastest_s_curve_reaches_its_limits_and_no_more() {
+    let s_curve = |limits| unit_move(Profile::SCurve, None, limits);
+    assert_relative_eq!(s_curve(LIMITS).duration(), 1.0 / 0.8 + 0.8 / 2.0 + 2.0 / 15.0, max_relative = 1e-15);
+    let cases = [
+        (LIMITS, [0.8, 2.0, 15.0]),
+        // No cruise; acceleration limit not reached either.
+        (MotionLimits { velocity: 9.0, ..LIMITS }, [f64::NAN, 2.0, 15.0]),
+        (MotionLimits { velocity: 9.0, acceleration: 90.0, ..LIMITS }, [f64::NAN, f64::NAN, 15.0]),
+        (MotionLimits { acceleration: 90.0, ..LIMITS }, [0.8, f64::NAN, 15.0]),
+    ];
+    for (limits, reached) in cases {
+        let motion = s_curve(limits);
+        let allowed = [limits.velocity, limits.acceleration, limits.jerk];
+        for order in 0..3 {
+            let value = peak(&motion, order + 1);
+            assert!(value <= allowed[order] * (1.0 + 1e-12)); // measured 2.4e-16 over
+            if reached[order].is_finite() {
+                assert_relative_eq!(value, reached[order], max_relative = 1e-12); // measured 2.4e-16
+            }
+        }
+    }
+}
+
+#[test]
+fn shapes_of_given_duration_use_the_acceleration_they_are_allowed() {
+    let lasting = |profile, duration| unit_move(profile, Some(duration), LIMITS);
+    let trapezoid = Profile::Trapezoid { rounding: 0.1 };
+    assert_relative_eq!(peak(&lasting(trapezoid, 2.0), 2), 2.0, max_relative = 1e-12); // measured 0
+    let s_curve = lasting(Profile::SCurve, 2.0);
+    assert_relative_eq!(peak(&s_curve, 2), 2.0, max_relative = 1e-12); // measured 2.2e-16
+    assert_relative_eq!(peak(&s_curve, 3), 15.0, max_relative = 1e-12); // measured 2.4e-16
+    // Too short for the limits.
+    for profile in [trapezoid, Profile::SCurve] {
+        assert!(peak(&lasting(profile, 1.0), 2) > 2.0);
+    }
+}
+
+#[test]
+fn every_shape_ends_at_one_and_at_rest() {
+    let trapezoid = |rounding| Profile::Trapezoid { rounding };
+    for motion in [
+        unit_move(Profile::Quintic, Some(1.3), MotionLimits::UNLIMITED),
+        unit_move(trapezoid(0.0), None, LIMITS),
+        unit_move(trapezoid(1.0), None, LIMITS),
+        unit_move(trapezoid(0.1), Some(1.3), MotionLimits::UNLIMITED),
+        unit_move(Profile::SCurve, None, LIMITS),
+        unit_move(Profile::SCurve, Some(1.3), MotionLimits::UNLIMITED),
+    ] {
+        let [s, speed, _] = sample(&motion, motion.duration().next_down());
+        assert!((s[0] - 1.0).abs() < 1e-13); // measured 1.2e-15
+        assert!(speed[0].abs() < 1e-13); // measured 6.0e-15
     }
 }

@@ -1,10 +1,8 @@
 //! Tables from other programs: the same motion in every dialect, and errors for ambiguous tables.
-#![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
-#![allow(clippy::print_stdout, reason = "measured errors, with --nocapture")]
 
 use std::f64::consts::PI;
 
-use flexarm_trajectory::{ColumnMap, KnownJoint, TableRequest, Trajectory, TrajectoryError, text_of_bytes};
+use flexarm_trajectory::{ColumnMap, KnownJoint, TableRequest, Trajectory, TrajectoryError, Warning, text_of_bytes};
 
 const JOINTS: [KnownJoint<'static>; 3] = [
     KnownJoint { name: "joint_1", is_prismatic: false },
@@ -358,4 +356,108 @@ fn joints_of_parts_that_begin_later_are_held_before_and_after() {
     assert!(Trajectory::side_by_side(&[(0.0, part("a")), (0.0, part("a"))]).is_err());
     assert!(Trajectory::side_by_side(&[(-1.0, part("a"))]).is_err());
     assert!(Trajectory::side_by_side(&[]).is_err());
+}
+
+/// Reads a table of any joints.
+fn read(text: &str) -> Result<Trajectory, TrajectoryError> {
+    Trajectory::parse_table(text, "t", &TableRequest { columns: None, joints: None }).map(|(motion, _)| motion)
+}
+
+/// Positions and velocities.
+fn state(motion: &Trajectory, t: f64) -> [Vec<f64>; 2] {
+    let n = motion.joints().len();
+    let (mut q, mut v) = (vec![0.0; n], vec![0.0; n]);
+    motion.sample(t, &mut q, &mut v, &mut vec![0.0; n]);
+    [q, v]
+}
+
+fn dropped(motion: &Trajectory) -> Vec<String> {
+    let columns = |warning| if let Warning::DroppedColumns { columns } = warning { columns } else { Vec::new() };
+    motion.warnings().into_iter().flat_map(columns).collect()
+}
+
+/// Truth: differences of Python's `datetime`.
+#[test]
+fn times_of_day_and_dates_are_those_of_the_calendar() {
+    for (first, last, truth) in [
+        ("2024/02/29 23:59:59", "2024-03-01T12:00:00.004Z", 43_201.004),
+        ("1970-01-01 00:00:00", "1970-04-01 00:00:00", 90.0 * 86_400.0),
+        ("1999-12-31 00:00:00", "2000-03-01 00:00:00", 61.0 * 86_400.0),
+        ("2100-02-28 00:00:00", "2100-03-01 00:00:00", 86_400.0),
+        ("12:00:00,5+01:00", "12:00:01,75+01:00", 1.25),
+    ] {
+        let motion = read(&format!("Timestamp;joint_1[rad]\n{first};0\n{last};1\n"));
+        assert_eq!(motion.unwrap().duration(), truth, "{last}");
+    }
+    for wrong in ["25:00:00", "12:00", "2024-13-01 00:00:00", "12", "a:b:c", "1:2:3:4"] {
+        assert!(read(&format!("Timestamp;joint_1[rad]\n11:59:00;0\n{wrong};1\n")).is_err(), "{wrong}");
+    }
+}
+
+#[test]
+fn fields_are_split_with_quotes_and_runs_of_spaces_as_one_gap() {
+    let quoted = "\"t[s]\", joint_1[rad] ,\"a,b\",,\"say \"\"x\"\"\",\n\"0\",0,1,,1,\n1,2,1,,1,\n";
+    let (motion, _) = Trajectory::parse_table(quoted, "t", &request(None)).unwrap();
+    assert_eq!(
+        (motion.joints(), dropped(&motion)),
+        (&["joint_1".to_owned()][..], vec!["a,b".into(), "#4".into(), "say \"x\"".into()])
+    );
+    assert_eq!(state(&motion, 1.0)[0], [2.0]);
+    let motion = read("t[s] a[rad] b[rad]\n  0.0   2.0\t3 \n1.0 2.0 3.0\n").unwrap();
+    assert_eq!(state(&motion, 0.0)[0], [2.0, 3.0]);
+    let motion = read("t[s];a[rad]\n0;1,5\n1;2\n").unwrap();
+    assert_eq!(state(&motion, 0.0)[0], [1.5]);
+}
+
+#[test]
+fn times_of_nineteen_digits_keep_their_differences() {
+    let lasts = |unit: &str, first: &str, last: &str| {
+        read(&format!("t[{unit}];a[rad]\n{first};0\n{last};1\n")).unwrap().duration()
+    };
+    assert_eq!(lasts("ns", "1700000000123456789", "1700000000143456789"), 20_000_000.0 * 1e-9);
+    assert_eq!(lasts("s", "-0,25", "0"), 0.25);
+    assert_eq!(lasts("s", "0", "1e3"), 1e3);
+}
+
+#[test]
+fn units_are_found_in_brackets_behind_slashes_and_underscores() {
+    let deg = PI / 180.0;
+    for (column, name, scale) in [
+        ("A1[deg]", "A1", deg),
+        ("joint_1 (rad)", "joint_1", 1.0),
+        ("q1_deg", "q1", deg),
+        ("rail [mm]", "rail", 1e-3),
+        ("A1 [°]", "A1", deg),
+        ("q[0][deg]", "q[0]", deg),
+        // No unit.
+        ("joint_1", "joint_1", 1.0),
+        ("q[0]", "q[0]", 1.0),
+    ] {
+        let motion = read(&format!("t[s];{column}\n0;1\n1;0\n")).unwrap();
+        assert_eq!((motion.joints(), state(&motion, 0.0)[0][0]), (&[name.to_owned()][..], scale), "{column}");
+        let is_assumed = motion.warnings().iter().any(|warning| matches!(warning, Warning::AssumedRadians { .. }));
+        assert_eq!(is_assumed, column == name, "{column}");
+    }
+    for (column, scale) in [("Time[ms]", 1e-3), ("t / s", 1.0), ("Zeit in ms", 1e-3)] {
+        let motion = read(&format!("{column};a[rad]\n0;0\n1;1\n")).unwrap();
+        assert_eq!((motion.duration(), motion.joints().len()), (scale, 1), "{column}");
+    }
+    for (position, rate, name) in [("vel_A1[deg]", "vel_A1[deg/s]", "vel_A1"), ("w1_deg", "w1_deg_s", "w1")] {
+        let motion = read(&format!("t[s];{position};{rate}\n0;0;1\n1;1;1\n")).unwrap();
+        assert_eq!((motion.joints(), state(&motion, 0.0)[1][0]), (&[name.to_owned()][..], deg), "{rate}");
+    }
+    let message = read("t[s];A1[%]\n0;0\n1;1\n").unwrap_err().to_string();
+    assert!(message.contains("\"%\""), "{message}");
+}
+
+#[test]
+fn rates_and_paths_of_topics_lead_to_their_joint() {
+    let text = "Timestamp;/joint_states/joint_1/position;/joint_states/joint_1/velocity;/joint_states/joint_1/effort;\
+                A1;A1.vel;A2[deg];A2[deg/s]\n0;0;0.5;9;0;0.25;0;90\n1;0.5;0.5;9;0.25;0.25;90;90\n";
+    let motion = read(text).unwrap();
+    assert_eq!(
+        (motion.joints(), dropped(&motion)),
+        (&["joint_1", "A1", "A2"].map(String::from)[..], vec!["/joint_states/joint_1/effort".into()])
+    );
+    assert_eq!(state(&motion, 0.0)[1], [0.5, 0.25, PI / 2.0]);
 }

@@ -1,5 +1,4 @@
 //! Waypoint files: effect of each key, and all errors of a file.
-#![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
 use std::f64::consts::PI;
 use std::path::Path;

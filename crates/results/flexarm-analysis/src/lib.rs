@@ -47,7 +47,6 @@
 //!
 //! Frames: W world, T tool. Order: linear first, angular second. SI units.
 //! Not here: simulation, robots, files. Everything is a pure function of slices and matrices.
-#![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test"))]
 #![allow(non_snake_case, reason = "monogram notation: R_WT, X_WT, p_WT")]
 
 mod contributions;
@@ -94,3 +93,10 @@ pub use servo::NodeServo;
 pub use shaping::{Shaper, ShaperKind};
 pub use spectrum::{AmplitudeSpectrum, SpectralLine, Taper, amplitude_spectrum, strongest_line};
 pub use vibration::vibration_left;
+
+/// Kernels, for the tests of this crate.
+#[doc(hidden)]
+pub mod internals {
+    pub use crate::path_frame::tangential_at;
+    pub use crate::repeated_pose::repeated_poses;
+}

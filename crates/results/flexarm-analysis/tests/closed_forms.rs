@@ -1,5 +1,4 @@
 //! Metrics of signals with closed-form figures.
-#![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
 use std::f64::consts::{PI, TAU};
 

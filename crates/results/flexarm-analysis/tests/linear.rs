@@ -1,8 +1,5 @@
 //! Linear structures compared with closed forms: oscillators, chains of masses, rigid motions,
 //! resonance peaks.
-#![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
-#![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
-#![allow(non_snake_case, reason = "M, D, K as everywhere in mechanics")]
 
 use std::f64::consts::{PI, TAU};
 

@@ -4,7 +4,6 @@
 //! At each pose the arm is a linear structure about its equilibrium, in series with the tool's own
 //! modes (`place.rs`). The limits are those of [`milling`]. Start at [`lobes`].
 #![allow(non_snake_case, reason = "monogram notation: X_WL, K_S; see docs/references.md")]
-#![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
 mod caveats;
 mod files;
@@ -372,4 +371,12 @@ fn assembled(robot: &Robot, tool: &CuttingTool, places: &[CutPose], all: &[LobeP
         warnings: Vec::new(),
         caveats: Vec::new(),
     }
+}
+
+/// Kernels, for the tests of this crate.
+#[doc(hidden)]
+pub mod internals {
+    pub use crate::milling::leading::{SMALL as LARGEST_MATRIX, largest, leading};
+    pub use crate::milling::moments::{Moments, NODES, RULE, Rule};
+    pub use crate::milling::period::{Period, PeriodMap};
 }

@@ -1,10 +1,5 @@
 //! Six classical cases with 41 spindle speeds each, against the limits from another program
 //! (`tests/golden/milling_lobes.json`, accurate to 0.2 %).
-#![allow(
-    clippy::unwrap_used,
-    clippy::print_stderr,
-    reason = "a failed unwrap fails the test; measured numbers are shown with --nocapture"
-)]
 
 use std::f64::consts::TAU;
 

@@ -1,11 +1,5 @@
 //! Limits in closed form: constant forces (as in turning), the minimum limit of one mode, sums of
 //! tooth forces.
-#![allow(
-    clippy::unwrap_used,
-    clippy::print_stderr,
-    reason = "a failed unwrap fails the test; measured numbers are shown with --nocapture"
-)]
-#![allow(non_snake_case, reason = "letters of the equations")]
 
 use std::f64::consts::{FRAC_PI_3, PI, TAU};
 

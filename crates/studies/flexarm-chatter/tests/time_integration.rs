@@ -1,10 +1,4 @@
 //! Second algorithm: time integration of the delay equation.
-#![allow(
-    clippy::unwrap_used,
-    clippy::print_stderr,
-    reason = "a failed unwrap fails the test; measured numbers are shown with --nocapture"
-)]
-#![allow(non_snake_case, reason = "letters of the equations")]
 
 use std::f64::consts::TAU;
 

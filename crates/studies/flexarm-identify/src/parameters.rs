@@ -39,7 +39,8 @@ const DIRECTIONS: &str = "stiffness_factors";
 
 /// Location of a parameter in the robot file.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum ParameterLocation {
+#[doc(hidden)]
+pub enum ParameterLocation {
     /// `[[drive]]` of the joint: stiffness of its gearbox, or one of its entries.
     Gearbox { joint: String, entry: Option<usize> },
     /// `[[drive]]` of the joint: damping of its gearbox, or one of its entries.
@@ -452,26 +453,5 @@ fn matches(pattern: &str, name: &str) -> bool {
             let Some(rest) = name.strip_prefix(before) else { return false };
             rest.char_indices().map(|(k, _)| &rest[k..]).chain([""]).any(|rest| matches(after, rest))
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::{asks_for, fits};
-
-    #[test]
-    fn an_entry_has_two_names_and_is_asked_for_by_its_indices_alone() {
-        let name = "link.arm.stiffness[1][5]";
-        assert!(fits("link.arm.stiffness[5][1]", name) && asks_for("link.*.stiffness[*][*]", name));
-        assert!(!asks_for("*", name) && !asks_for("link.*stiffness*", name));
-        assert!(asks_for("tcp.*", "tcp.rx") && !asks_for("*", "tcp.x"));
-    }
-
-    #[test]
-    fn a_star_stands_for_anything_in_a_name() {
-        assert!(fits("drive.*.gearbox.stiffness", "drive.joint_2.gearbox.stiffness"));
-        assert!(fits("*", "payload.mass") && fits("link.*", "link.a.stiffness_factor"));
-        assert!(!fits("drive.*", "payload.mass") && !fits("payload", "payload.mass"));
-        assert!(fits("*stiffness*", "drive.a.gearbox.stiffness[2]"));
     }
 }

@@ -15,26 +15,28 @@ const RESPONSE: i64 = 4;
 
 /// Frequency response in a file.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct UffFunction {
+#[doc(hidden)]
+pub struct UffFunction {
     /// First line of its dataset, from 1.
-    pub(super) line: usize,
+    pub line: usize,
     /// Node and direction (±1 to ±3 for x, y, z) of the response.
-    pub(super) response: (i64, i64),
+    pub response: (i64, i64),
     /// Node and direction of the force.
-    pub(super) reference: (i64, i64),
+    pub reference: (i64, i64),
     /// Measured quantity: 8 displacement, 11 velocity, 12 acceleration; others are unknown.
-    pub(super) ordinate: i64,
+    pub ordinate: i64,
     /// Unit label in the file; may be empty.
-    pub(super) unit: String,
+    pub unit: String,
     /// Length and force units of the file per m and N, if dataset 164 precedes the function.
-    pub(super) per_si: Option<[f64; 2]>,
+    pub per_si: Option<[f64; 2]>,
     /// Frequencies (Hz) and values.
-    pub(super) values: Vec<(f64, Complex<f64>)>,
+    pub values: Vec<(f64, Complex<f64>)>,
 }
 
 /// Reason why a file cannot be read, with the line.
 #[derive(Debug, thiserror::Error)]
-pub(super) enum UffError {
+#[doc(hidden)]
+pub enum UffError {
     #[error("this is not a universal file: it has no dataset between lines of -1")]
     NotUniversal,
     #[error("the file has no frequency response (dataset 58 with function type 4)")]
@@ -60,7 +62,7 @@ pub(super) enum UffError {
 }
 
 /// Reads all frequency responses of a file.
-pub(super) fn read_functions(bytes: &[u8]) -> Result<Vec<UffFunction>, UffError> {
+pub fn read_functions(bytes: &[u8]) -> Result<Vec<UffFunction>, UffError> {
     let mut reader = Lines { bytes, at: 0, line: 0 };
     let (mut found, mut per_si, mut sets) = (Vec::new(), None, 0);
     while let Some(line) = reader.next() {
@@ -306,73 +308,4 @@ fn bytes_to_numbers(reader: &mut Lines<'_>, binary: &Binary, form: &ValueForm) -
     let numbers = bytes[..binary.bytes].chunks_exact(size).map(value).collect();
     reader.at += binary.bytes;
     Ok(numbers)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Writes a function with three values at equal spacing; `values` follows the header.
-    fn dataset(kind: &str, form: i64, spacing: i64, values: &[u8]) -> Vec<u8> {
-        let mut text = format!("    -1\n    {kind}\nfirst\nNONE\nNONE\nNONE\nNONE\n").into_bytes();
-        let places =
-            format!("{:5}{:10}{:5}{:10} {:10}{:10}{:4} {:10}{:10}{:4}\n", 4, 0, 0, 0, "NONE", 12, -3, "NONE", 7, 1);
-        text.extend(places.bytes());
-        text.extend(format!("{form:10}{:10}{spacing:10}{:13.5E}{:13.5E}{:13.5E}\n", 3, 10.0, 0.5, 0.0).bytes());
-        text.extend(format!("{:10}{:5}{:5}{:5} {:20} {:20}\n", 18, 0, 0, 0, "Frequency", "Hz").bytes());
-        text.extend(format!("{:10}{:5}{:5}{:5} {:20} {:20}\n", 12, 0, 0, 0, "Acceleration", "m/s^2").bytes());
-        text.extend(format!("{:10}{:5}{:5}{:5} {:20} {:20}\n", 13, 0, 0, 0, "Force", "N").bytes());
-        text.extend(b"         0    0    0    0 NONE                 NONE\n");
-        text.extend(values);
-        text.extend(b"\n    -1\n");
-        text
-    }
-
-    /// Truth: the numbers that were written.
-    #[test]
-    fn a_function_is_the_same_as_text_and_in_both_orders_of_bytes() {
-        let H = [(1.5, -2.0), (0.25, 3.0), (-1e-3, 4e-7)];
-        let text = "  1.50000E+00 -2.00000E+00  2.50000E-01  3.00000E+00 -1.00000E-03  4.00000E-07";
-        let flat: Vec<f64> = H.iter().flat_map(|(a, b)| [*a, *b]).collect();
-        let expected: Vec<(f64, Complex<f64>)> =
-            H.iter().enumerate().map(|(k, (a, b))| (10.0 + 0.5 * k as f64, Complex::new(*a, *b))).collect();
-        let head = |order: usize, bytes: usize| {
-            format!("58b     {order}     2          11  {bytes:12}     0     0           0           0")
-        };
-        let little: Vec<u8> = flat.iter().flat_map(|x| x.to_le_bytes()).collect();
-        let big: Vec<u8> = flat.iter().flat_map(|x| x.to_be_bytes()).collect();
-        let single: Vec<u8> = flat.iter().flat_map(|x| (*x as f32).to_le_bytes()).collect();
-        let uneven = "  1.00000E+01  1.50000000000E+00 -2.00000000000E+00\n  1.05000E+01  2.50000000000E-01  3.00000000000E+00\n\
-                      1.10000E+01-1.00000000000E-03 4.00000000000E-07";
-        for (kind, form, spacing, values, within) in [
-            ("58".to_owned(), 5, 1, text.as_bytes(), 1e-15),
-            ("58".to_owned(), 6, 0, uneven.as_bytes(), 1e-15),
-            (head(1, 48), 6, 1, &little[..], 0.0),
-            (head(2, 48), 6, 1, &big[..], 0.0),
-            (head(1, 24), 5, 1, &single[..], 1e-7),
-        ] {
-            let found = read_functions(&dataset(&kind, form, spacing, values)).unwrap();
-            let [one] = &found[..] else { panic!("{found:?}") };
-            assert_eq!((one.response, one.reference, one.ordinate), ((12, -3), (7, 1), 12));
-            assert_eq!((one.unit.as_str(), one.values.len()), ("m/s^2", 3));
-            for ((hz, H), (f, truth)) in one.values.iter().zip(&expected) {
-                assert!((hz - f).abs() < 1e-12 && (H - truth).norm() <= within * 5.0, "{kind}: {hz} {H}");
-            }
-        }
-        let cut = dataset(&head(1, 96), 6, 1, &little);
-        assert!(read_functions(&cut).unwrap_err().to_string().contains("announced"));
-        let short = dataset("58", 5, 1, b"  1.5 2.5");
-        assert!(read_functions(&short).unwrap_err().to_string().contains("2 of the 6 values"));
-        assert!(read_functions(b"solid x").unwrap_err().to_string().contains("not a universal file"));
-        assert!(
-            read_functions(b"    -1\n    151\nx\n    -1\n").unwrap_err().to_string().contains("no frequency response")
-        );
-    }
-
-    #[test]
-    fn units_before_a_function_belong_to_it() {
-        let mut text = b"    -1\n   164\n         9mm, mN                       2\n 1.00000000000000D+03 1.00000000000000D+03 1.0\n-2.7E+02\n    -1\n".to_vec();
-        text.extend(dataset("58", 5, 1, b" 1 2 3 4 5 6"));
-        assert_eq!(read_functions(&text).unwrap()[0].per_si, Some([1e3, 1e3]));
-    }
 }

@@ -1,8 +1,5 @@
 //! Entries of a spring's matrix and the tool pose as parameters: derivatives against Richardson
 //! extrapolation, and recovery of known values.
-#![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
-#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
-#![allow(non_snake_case, reason = "monogram notation")]
 
 use std::sync::Arc;
 

@@ -1,8 +1,5 @@
 //! Recovery of known parameters from simulated measurements: unbiased, with correct uncertainties,
 //! and without values for parameters that the readings do not determine.
-#![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
-#![allow(clippy::expect_used, clippy::unwrap_used, reason = "a failed unwrap fails the test")]
-#![allow(non_snake_case, reason = "monogram notation")]
 
 use std::sync::Arc;
 

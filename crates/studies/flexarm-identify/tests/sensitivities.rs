@@ -1,8 +1,5 @@
 //! Derivatives with respect to parameters against Richardson extrapolation of nonlinear solutions,
 //! for a soft arm whose equilibrium depends on the parameters.
-#![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
-#![allow(clippy::expect_used, clippy::unwrap_used, reason = "a failed unwrap fails the test")]
-#![allow(non_snake_case, reason = "monogram notation")]
 
 use std::sync::Arc;
 

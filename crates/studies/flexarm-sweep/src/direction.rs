@@ -144,38 +144,3 @@ fn rises(expression: &FlatEx<f64>, count: usize, place: usize) -> Option<bool> {
     }
     (up != down).then_some(up)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn names_tell_what_is_better_where_they_have_a_word_for_it() {
-        for (name, better) in [
-            ("f1_hz", Some(Better::Higher)),
-            ("bearing life (h)", Some(Better::Higher)),
-            ("payload.mass", Some(Better::Higher)),
-            ("drive.joint_2.gearbox.stiffness", Some(Better::Higher)),
-            ("peak-error", Some(Better::Lower)),
-            ("mass_kg", Some(Better::Lower)),
-            ("life_error", None),
-            ("massive", None),
-            ("k", None),
-        ] {
-            assert_eq!(of_name(name), better, "{name}");
-        }
-    }
-
-    #[test]
-    fn an_expression_turns_the_direction_over_where_it_falls() {
-        let better = |text: &str, variables: &[Option<Better>]| of_expression(&exmex::parse(text).unwrap(), variables);
-        let low = Some(Better::Lower);
-        assert_eq!(better("1000 * {a}", &[low]), low);
-        assert_eq!(better("0.006 - {a}", &[low]), Some(Better::Higher));
-        assert_eq!(better("9.81 * {b} / {a}", &[low, Some(Better::Higher)]), Some(Better::Higher));
-        assert_eq!(better("{a} + {b}", &[low, None]), low);
-        assert_eq!(better("{a} + {b}", &[low, Some(Better::Higher)]), None);
-        assert_eq!(better("abs({a} - 2)", &[low]), None);
-        assert_eq!(better("{a}", &[None]), None);
-    }
-}

@@ -24,12 +24,13 @@ use flexarm_run::{Keep, RunOptions, RunRequest};
 
 /// Result of a run.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Answer {
-    pub(super) run: usize,
+#[doc(hidden)]
+pub struct Answer {
+    pub run: usize,
     /// Values of the metrics, or the reason of the failure.
-    pub(super) result: Result<Vec<f64>, String>,
+    pub result: Result<Vec<f64>, String>,
     /// Caveats.
-    pub(super) stored: CaveatText,
+    pub stored: CaveatText,
 }
 
 /// Values of the metrics, and relative violation of each constraint.

@@ -9,7 +9,6 @@
 //! Not here: the mathematics of designs and their evaluation ([`statistics`]); comparison of a few
 //! runs by their curves ([`flexarm_run::compare_study`]).
 #![allow(non_snake_case, reason = "monogram notation: X_WL, K_S; see docs/references.md")]
-#![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
 mod changes;
 mod design;
@@ -511,4 +510,16 @@ fn skeleton(robot: &Robot, flexible: &FlexibleRobot) -> Summary {
 fn fingerprint(bytes: &[u8]) -> String {
     let hash = |start: u64| bytes.iter().fold(start, |h, byte| (h ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3));
     format!("{:016x}{:016x}", hash(0xcbf2_9ce4_8422_2325), hash(0x9e37_79b9_7f4a_7c15))
+}
+
+/// Kernels, for the tests of this crate.
+#[doc(hidden)]
+pub mod internals {
+    pub use crate::changes::change_text;
+    pub use crate::evaluate::Answer;
+    pub use crate::metric::{Constraint, Facts, Metric, MetricError, Quick, SummaryFacts, Vocabulary};
+    pub use crate::page::Axes;
+    pub use crate::replay::faster_waypoints;
+    pub use crate::run_caveats::{figures, stored_caveats, warnings};
+    pub use crate::statistics::chance::threshold;
 }

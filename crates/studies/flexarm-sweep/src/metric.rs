@@ -17,7 +17,8 @@ const NAMES: [&str; 3] = ["name", "joint", "label"];
 
 /// Number of a run that is available without its full summary.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Quick {
+#[doc(hidden)]
+pub enum Quick {
     Peak,
     PeakTime,
     Rms,
@@ -41,12 +42,13 @@ enum Variable {
 
 /// Metric of a run.
 #[derive(Clone, Debug)]
-pub(super) struct Metric {
-    pub(super) name: String,
+#[doc(hidden)]
+pub struct Metric {
+    pub name: String,
     /// Text as written.
-    pub(super) text: String,
+    pub text: String,
     /// Preferred direction, if known.
-    pub(super) better: Option<Better>,
+    pub better: Option<Better>,
     formula: Formula,
 }
 
@@ -59,7 +61,8 @@ pub(super) struct Formula {
 
 /// Reason why a text is not a metric, formula or constraint.
 #[derive(Debug, thiserror::Error)]
-pub(super) enum MetricError {
+#[doc(hidden)]
+pub enum MetricError {
     #[error("metric {text:?} has no name: expected name = expression")]
     NoName { text: String },
     #[error("metric {text:?}: the name {name:?} is taken: give it another one")]
@@ -77,26 +80,29 @@ pub(super) enum MetricError {
 }
 
 /// Names that a metric may refer to.
-pub(super) struct Vocabulary<'a> {
+#[doc(hidden)]
+pub struct Vocabulary<'a> {
     /// Names of the parameters, in the order of their columns; `None` for parameters that are not
     /// numeric.
-    pub(super) parameters: &'a [Option<String>],
+    pub parameters: &'a [Option<String>],
     /// Earlier metrics.
-    pub(super) metrics: &'a [Metric],
+    pub metrics: &'a [Metric],
     /// Summary with all names that a run of this study can have.
-    pub(super) summary: &'a Value,
+    pub summary: &'a Value,
 }
 
 /// Access to the numbers of a run.
-pub(super) trait Facts {
+#[doc(hidden)]
+pub trait Facts {
     /// Returns the number at a path; NaN if there is none.
     fn number(&self, path: &[String], quick: Option<Quick>) -> f64;
 }
 
 /// Numbers from a full summary.
-pub(super) struct SummaryFacts {
-    pub(super) summary: Value,
-    pub(super) mass_kg: f64,
+#[doc(hidden)]
+pub struct SummaryFacts {
+    pub summary: Value,
+    pub mass_kg: f64,
 }
 
 impl Facts for SummaryFacts {
@@ -130,7 +136,7 @@ impl Metric {
     ///
     /// # Errors
     /// [`MetricError`] for an unknown variable, a syntax error or an invalid name.
-    pub(super) fn parse(text: &str, known: &Vocabulary<'_>) -> Result<Self, MetricError> {
+    pub fn parse(text: &str, known: &Vocabulary<'_>) -> Result<Self, MetricError> {
         let (name, expression) = match text.split_once('=') {
             Some((name, expression)) => (name.trim(), expression.trim()),
             None => (text.trim(), text.trim()),
@@ -156,7 +162,7 @@ impl Metric {
     /// Evaluates the metric.
     ///
     /// * `before`: values of the earlier metrics.
-    pub(super) fn value(&self, parameters: &[ParameterValue], before: &[f64], facts: &dyn Facts) -> f64 {
+    pub fn value(&self, parameters: &[ParameterValue], before: &[f64], facts: &dyn Facts) -> f64 {
         self.formula.value(parameters, before, facts)
     }
 }
@@ -374,8 +380,9 @@ fn leaves(value: &Value, place: &str, found: &mut Vec<String>) {
 
 /// Constraint on a run: `expression <= expression`, or with `>=`.
 #[derive(Clone, Debug)]
-pub(super) struct Constraint {
-    pub(super) text: String,
+#[doc(hidden)]
+pub struct Constraint {
+    pub text: String,
     /// Smaller side.
     less: Formula,
     /// Larger side.
@@ -387,7 +394,7 @@ impl Constraint {
     ///
     /// # Errors
     /// As [`Metric::parse`].
-    pub(super) fn parse(text: &str, known: &Vocabulary<'_>) -> Result<Self, MetricError> {
+    pub fn parse(text: &str, known: &Vocabulary<'_>) -> Result<Self, MetricError> {
         let (left, right, turned) = match (text.split_once("<="), text.split_once(">=")) {
             (Some((left, right)), None) => (left, right, false),
             (None, Some((left, right))) => (left, right, true),
@@ -405,89 +412,11 @@ impl Constraint {
 
     /// Returns the relative violation: excess over the larger magnitude of both sides; 0 if the
     /// constraint holds, NaN if a side has no value.
-    pub(super) fn violation(&self, parameters: &[ParameterValue], metrics: &[f64], facts: &dyn Facts) -> f64 {
+    pub fn violation(&self, parameters: &[ParameterValue], metrics: &[f64], facts: &dyn Facts) -> f64 {
         let [less, more] = [&self.less, &self.more].map(|side| side.value(parameters, metrics, facts));
         if less.is_nan() || more.is_nan() {
             return f64::NAN;
         }
         (less - more).max(0.0) / less.abs().max(more.abs()).max(f64::MIN_POSITIVE)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use serde_json::json;
-
-    fn summary() -> Value {
-        json!({ "tcp": { "peak_m": 2e-3, "settling_s": null, "settling": "after 0.1 s", "holds": [] },
-                "links": [{ "name": "link_2", "peak_contribution_m": 1e-3 }], "frequencies_hz": [9.5, 20.0], "drives": { "joint_1": 4.0 } })
-    }
-
-    fn value(text: &str) -> Result<f64, MetricError> {
-        let summary = summary();
-        let parameters = [Some("payload.mass".to_owned()), None];
-        let known = Vocabulary { parameters: &parameters, metrics: &[], summary: &summary };
-        let metric = Metric::parse(text, &known)?;
-        let facts = SummaryFacts { summary: summary.clone(), mass_kg: 100.0 };
-        Ok(metric.value(&[ParameterValue::Whole(50), ParameterValue::Text("a".into())], &[], &facts))
-    }
-
-    #[test]
-    fn metrics_are_places_of_the_summary_parameters_and_expressions_of_them() {
-        assert_eq!(value("tcp.peak_m").unwrap(), 2e-3);
-        assert_eq!(value("mm = 1e3 * tcp.peak_m").unwrap(), 2.0);
-        assert_eq!(value("links.link_2.peak_contribution_m + links[0].peak_contribution_m").unwrap(), 2e-3);
-        assert_eq!(value("frequencies_hz.1 - frequencies_hz[0]").unwrap(), 10.5);
-        assert_eq!(value("x = sqrt(drives.joint_1) * payload.mass - 1.5e+1").unwrap(), 85.0);
-        assert_eq!(value("max(tcp.peak_m, 1e-2)").unwrap(), 1e-2);
-        assert_eq!(value("robot.mass_kg / payload.mass").unwrap(), 2.0);
-        assert_eq!(value("b = {links.link_2.peak_contribution_m} * 2").unwrap(), 2e-3);
-        assert!(value("tcp.settling_s").unwrap().is_nan() && value("1 / (payload.mass - 50)").unwrap().is_nan());
-    }
-
-    #[test]
-    fn frequencies_and_what_falls_with_an_error_are_better_if_higher() {
-        let (summary, parameters) = (summary(), [Some("payload.mass".to_owned()), Some("wall".to_owned())]);
-        let mut metrics: Vec<Metric> = Vec::new();
-        for (text, better) in [
-            ("frequencies_hz.0", Some(Better::Higher)),
-            ("peak_mm = 1e3 * tcp.peak_m", Some(Better::Lower)),
-            ("margin_mm = 6 - peak_mm", Some(Better::Higher)),
-            ("k = 9.81 * payload.mass / tcp.peak_m", Some(Better::Higher)),
-            ("life_h = 2e4 * (300 / drives.joint_1)^3", Some(Better::Higher)),
-            ("off = abs(frequencies_hz.0 - 12)", None),
-            ("stiffness = wall^3", Some(Better::Higher)),
-            ("x = 2 * wall", None),
-        ] {
-            let metric =
-                Metric::parse(text, &Vocabulary { parameters: &parameters, metrics: &metrics, summary: &summary });
-            metrics.push(metric.unwrap());
-            assert_eq!(metrics[metrics.len() - 1].better, better, "{text}");
-        }
-    }
-
-    #[test]
-    fn what_no_run_has_is_told_with_what_is_near() {
-        let message = value("tcp.peak").unwrap_err().to_string();
-        assert!(message.contains("\"tcp.peak\" is not in the summary") && message.contains("tcp.peak_m"), "{message}");
-        assert!(value("tcp.settling").unwrap_err().to_string().contains("is a string"));
-        assert!(value("tcp").unwrap_err().to_string().contains("several entries"));
-        assert!(value("wall_s").unwrap_err().to_string().contains("depends on the machine"));
-        assert!(value("tcp.peak_m +* 2").is_err() && value("= 2").is_err() && value("").is_err());
-        assert!(value("payload.mass = tcp.peak_m").unwrap_err().to_string().contains("taken"));
-    }
-
-    #[test]
-    fn constraints_say_by_how_much_they_are_passed() {
-        let summary = summary();
-        let known = Vocabulary { parameters: &[], metrics: &[], summary: &summary };
-        let facts = SummaryFacts { summary: summary.clone(), mass_kg: 100.0 };
-        let violation = |text: &str| Constraint::parse(text, &known).unwrap().violation(&[], &[], &facts);
-        assert_eq!(violation("tcp.peak_m <= 3e-3"), 0.0);
-        assert_eq!(violation("tcp.peak_m <= 1e-3"), 0.5);
-        assert_eq!(violation("frequencies_hz.0 >= 19"), 0.5);
-        assert!(violation("tcp.settling_s <= 1").is_nan());
-        assert!(Constraint::parse("tcp.peak_m < 1", &known).is_err());
     }
 }

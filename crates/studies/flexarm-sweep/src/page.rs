@@ -267,7 +267,7 @@ impl Sweep {
 /// Axes of the parameters in the heat maps of a page; each parameter has the same axis in all of
 /// them.
 #[derive(Debug, Default)]
-struct Axes {
+pub struct Axes {
     to_the_right: Vec<usize>,
     upwards: Vec<usize>,
 }
@@ -275,7 +275,7 @@ struct Axes {
 impl Axes {
     /// Chooses the strongest parameter and the next one that can take the other axis; returns the
     /// horizontal and the vertical one.
-    fn pair(&mut self, ranked: &[(usize, f64)]) -> Option<(usize, usize)> {
+    pub fn pair(&mut self, ranked: &[(usize, f64)]) -> Option<(usize, usize)> {
         let (first, rest) = ranked.split_first()?;
         let goes_up = self.upwards.contains(&first.0);
         let taken = if goes_up { &self.upwards } else { &self.to_the_right };
@@ -404,23 +404,5 @@ fn number(x: f64) -> String {
             if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
         }
         _ => format!("{x:.4e}"),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_parameter_keeps_its_axis_in_all_heat_maps() {
-        let mut axes = Axes::default();
-        let mut pair = |ranked: &[usize]| axes.pair(&ranked.iter().map(|p| (*p, 1.0)).collect::<Vec<_>>());
-        assert_eq!(pair(&[0, 1, 2]), Some((0, 1)));
-        assert_eq!(pair(&[1, 0, 2]), Some((0, 1)));
-        assert_eq!(pair(&[1, 2]), Some((2, 1)));
-        // Parameters 2 and 0 are both horizontal: the next one is vertical.
-        assert_eq!(pair(&[2, 0, 1]), Some((2, 1)));
-        assert_eq!(pair(&[0, 2]), None);
-        assert_eq!(pair(&[3]), None);
     }
 }

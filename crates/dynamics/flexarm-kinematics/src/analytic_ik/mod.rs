@@ -57,7 +57,7 @@ mod parallel;
 mod position;
 mod recognise;
 mod screw;
-mod trig;
+pub(crate) mod trig;
 mod wrist;
 
 use flexarm_spatial::Pose;

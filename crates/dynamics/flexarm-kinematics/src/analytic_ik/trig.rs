@@ -9,13 +9,14 @@ use nalgebra::{Complex, Vector3};
 
 /// List of bounded length on the stack.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct List<T: Copy, const N: usize> {
+pub struct List<T: Copy, const N: usize> {
     items: [T; N],
     n: usize,
 }
 
 impl<T: Copy, const N: usize> List<T, N> {
-    pub(crate) fn new(blank: T) -> Self {
+    /// An empty list.
+    pub fn new(blank: T) -> Self {
         Self { items: [blank; N], n: 0 }
     }
 
@@ -26,7 +27,8 @@ impl<T: Copy, const N: usize> List<T, N> {
         self.n += 1;
     }
 
-    pub(crate) fn as_slice(&self) -> &[T] {
+    /// The items.
+    pub fn as_slice(&self) -> &[T] {
         &self.items[..self.n]
     }
 
@@ -41,7 +43,7 @@ impl<T: Copy, const N: usize> List<T, N> {
 
 /// Roots of an equation in one angle (rad).
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Roots {
+pub struct Roots {
     angles: [f64; 2],
     n: usize,
     /// Whether every angle is a root; the one given is then the hint.
@@ -53,7 +55,8 @@ impl Roots {
         Self { angles: [center + half, center - half], n: if half == 0.0 { 1 } else { 2 }, free: false }
     }
 
-    pub(crate) fn angles(&self) -> &[f64] {
+    /// The roots.
+    pub fn angles(&self) -> &[f64] {
         &self.angles[..self.n]
     }
 }
@@ -107,19 +110,21 @@ pub(crate) fn across(h: &Vector3<f64>) -> Vector3<f64> {
 /// If the range ends at ±1 (`w` can be rotated onto `u`, as in a straight wrist), `1 - u·v` is
 /// computed as `|u - v|²/2`.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Fan {
+pub struct Fan {
     pub(crate) phi: f64,
     a: f64,
     b: f64,
 }
 
 impl Fan {
-    pub(crate) fn new(u: &Vector3<f64>, h: &Vector3<f64>, w: &Vector3<f64>) -> Self {
+    /// Prepares the equation for u, the axis h, and w.
+    pub fn new(u: &Vector3<f64>, h: &Vector3<f64>, w: &Vector3<f64>) -> Self {
         let (a, cosine, sine) = dot_turned(u, h, w);
         Self { phi: sine.atan2(cosine), a, b: cosine.hypot(sine) }
     }
 
-    pub(crate) fn angles(&self, u: &Vector3<f64>, v: &Vector3<f64>) -> Roots {
+    /// The angles t for `v`.
+    pub fn angles(&self, u: &Vector3<f64>, v: &Vector3<f64>) -> Roots {
         const UNIT: f64 = 1e-14;
         let cosine = u.dot(v);
         let (top, bottom) = (self.a + self.b, self.a - self.b);
@@ -138,14 +143,14 @@ const MOST: usize = 4;
 
 /// `c_0 + 2 Re sum_k c_k e^{i k t}` of degree at most four; `c_0` is real.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct TrigPolynomial {
+pub struct TrigPolynomial {
     c: [Complex<f64>; MOST + 1],
     degree: usize,
 }
 
 impl TrigPolynomial {
     /// `k + a cos t + b sin t`.
-    pub(crate) fn affine(k: f64, a: f64, b: f64) -> Self {
+    pub fn affine(k: f64, a: f64, b: f64) -> Self {
         let mut c = [Complex::new(0.0, 0.0); MOST + 1];
         c[0].re = k;
         c[1] = Complex::new(0.5 * a, -0.5 * b);
@@ -158,7 +163,7 @@ impl TrigPolynomial {
     }
 
     /// Product; its degree is the sum of the two degrees.
-    pub(crate) fn times(&self, other: &Self) -> Self {
+    pub fn times(&self, other: &Self) -> Self {
         let degree = self.degree + other.degree;
         let (n, m) = (self.degree as isize, other.degree as isize);
         let mut c = [Complex::new(0.0, 0.0); MOST + 1];
@@ -197,7 +202,7 @@ impl TrigPolynomial {
     /// of all roots, which are then not solutions.
     ///
     /// The polynomial `z^n f(z)` of degree 2n is solved by Aberth's simultaneous iteration.
-    pub(crate) fn roots(&self, width: f64) -> List<f64, { 2 * MOST }> {
+    pub fn roots(&self, width: f64) -> List<f64, { 2 * MOST }> {
         let mut angles = List::new(0.0);
         let largest = self.c.iter().fold(0.0_f64, |m, c| m.max(c.norm()));
         let mut degree = self.degree;
@@ -270,51 +275,5 @@ impl TrigPolynomial {
             (t, value) = (trial, next);
         }
         t
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Truth: product of factors with known roots.
-    #[test]
-    fn all_roots_of_a_trigonometric_polynomial_of_degree_four_are_found() {
-        // sin((t - r)/2) sin((t - s)/2) = (cos((r - s)/2) - cos(t - (r + s)/2)) / 2.
-        let factor = |r: f64, s: f64| {
-            let mean = 0.5 * (r + s);
-            TrigPolynomial::affine((0.5 * (r - s)).cos(), -mean.cos(), -mean.sin())
-        };
-        let known = [-3.0, -2.2, -1.1, -0.3, 0.4, 0.9, 2.0, 2.9];
-        let p = factor(known[0], known[4]).times(&factor(known[1], known[5]));
-        let p = p.times(&factor(known[2], known[7]).times(&factor(known[3], known[6])));
-        let found = p.roots(1e-3);
-        let mut found = found.as_slice().to_vec();
-        found.sort_by(f64::total_cmp);
-        assert_eq!(found.len(), 8);
-        for (f, k) in found.iter().zip(known) {
-            assert!((f - k).abs() < 1e-12, "{f} for {k}"); // measured 1.7e-16
-        }
-    }
-
-    /// Truth: a double root and a pair off the circle.
-    #[test]
-    fn a_double_root_is_found_and_complex_ones_are_not() {
-        let double = TrigPolynomial::affine(1.0, -(0.7_f64.cos()), -(0.7_f64.sin()));
-        let none = TrigPolynomial::affine(1.5, 1.0, 0.0);
-        let roots = double.times(&none).roots(1e-3);
-        assert!(!roots.as_slice().is_empty());
-        assert!(roots.as_slice().iter().all(|r| (r - 0.7).abs() < 1e-6)); // measured 1.2e-9
-    }
-
-    #[test]
-    fn a_vector_is_turned_to_a_cosine_without_loss_near_its_axis() {
-        let (u, h) = (Vector3::z(), Vector3::y());
-        let fan = Fan::new(&u, &h, &u);
-        for d in [1e-12, 1e-7, 0.3, 2.0, std::f64::consts::PI - 1e-9] {
-            let v = Vector3::new(d.sin() * 0.6, d.sin() * 0.8, d.cos());
-            let found = fan.angles(&u, &v).angles()[0];
-            assert!((found - d).abs() < 1e-15 + 4e-16 * d, "{found} for {d}"); // measured 1.3e-23
-        }
     }
 }

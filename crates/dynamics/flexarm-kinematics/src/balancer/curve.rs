@@ -118,24 +118,3 @@ fn monotone_slopes(x: &[f64], T: &[f64]) -> Vec<f64> {
         })
         .collect()
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_curve_goes_through_its_points_and_does_not_overshoot_them() {
-        let points = [[0.0, 0.0], [1.0, 0.0], [2.0, 10.0], [3.0, 10.0]];
-        let curve = BalancerCurve::new(&points).unwrap();
-        for [x, T] in points {
-            assert!((curve.at(x)[0] - T).abs() < 1e-12);
-        }
-        assert!((0..=300).all(|k| (-1e-12..=10.0 + 1e-12).contains(&curve.at(f64::from(k) * 0.01)[0])));
-        assert!(matches!(BalancerCurve::new(&points[..1]), Err(BalancerCurveError::TooFew { found: 1 })));
-        assert!(matches!(BalancerCurve::new(&[[1.0, 0.0], [1.0, 2.0]]), Err(BalancerCurveError::Order { .. })));
-        assert!(matches!(
-            BalancerCurve::new(&[[1.0, f64::NAN], [2.0, 2.0]]),
-            Err(BalancerCurveError::NotFinite { .. })
-        ));
-    }
-}

@@ -8,7 +8,7 @@ use flexarm_kinematics::Real;
 
 /// Computes `y = A x`.
 #[inline(always)]
-pub(crate) fn product<T: Real>(A: &[T], x: &[T], y: &mut [T]) {
+pub fn product<T: Real>(A: &[T], x: &[T], y: &mut [T]) {
     let Some((x_0, x)) = x.split_first() else { return };
     let (first, columns) = A.split_at(y.len());
     for (y, a) in y.iter_mut().zip(first) {
@@ -82,7 +82,7 @@ fn add_to_rows<T: Real, const N: usize>(A: &[T], factors: impl Iterator<Item = T
 
 /// Returns `aᵀ b`.
 #[inline(always)]
-pub(crate) fn dot<T: Real>(a: &[T], b: &[T]) -> T {
+pub fn dot<T: Real>(a: &[T], b: &[T]) -> T {
     let mut sums = [T::zero(); 8];
     let (a8, b8) = (a.chunks_exact(8), b.chunks_exact(8));
     let (a_rest, b_rest) = (a8.remainder(), b8.remainder());
@@ -104,7 +104,7 @@ pub(crate) fn dot<T: Real>(a: &[T], b: &[T]) -> T {
 /// Computes the Cholesky factor in the lower triangle; returns 1 where the matrix is positive
 /// definite, else 0.
 #[inline(always)]
-pub(crate) fn cholesky<T: Real>(A: &mut [T], n: usize) -> T {
+pub fn cholesky<T: Real>(A: &mut [T], n: usize) -> T {
     let mut positive = T::one();
     for j in 0..n {
         let (before, rest) = A.split_at_mut(j * n);
@@ -135,7 +135,7 @@ pub(crate) fn solve_in_place(A: &mut [f64], Bt: &mut [f64], n: usize) -> bool {
 /// Solves `A X = B` with the factor of A, from `Bᵀ` to `Xᵀ`: in transposed form, elimination works
 /// on whole columns.
 #[inline(always)]
-fn solve_transposed(L: &[f64], Bt: &mut [f64], n: usize) {
+pub fn solve_transposed(L: &[f64], Bt: &mut [f64], n: usize) {
     for k in 0..n {
         let (inward, outward) = Bt.split_at_mut(k * n);
         let column = &mut outward[..n];
@@ -167,7 +167,7 @@ fn subtract<T: Real>(to: &mut [T], factor: T, from: &[T]) {
 
 /// Computes `S C Sᵀ` with `Sᵀ = 1 + c X` for a symmetric C; both workspaces are n × n.
 #[inline(always)]
-pub(crate) fn congruence(c: f64, X: &[f64], C: &[f64], n: usize, room: [&mut [f64]; 2], product: &mut [f64]) {
+pub fn congruence(c: f64, X: &[f64], C: &[f64], n: usize, room: [&mut [f64]; 2], product: &mut [f64]) {
     let [room, Xt] = room;
     if n == 0 {
         return;
@@ -204,7 +204,7 @@ pub(crate) fn larger<T: Real>(a: T, b: T) -> T {
 
 /// Returns the maximum absolute value; NaN if an entry is NaN or infinite.
 #[inline(always)]
-pub(crate) fn largest<T: Real>(x: &[T]) -> T {
+pub fn largest<T: Real>(x: &[T]) -> T {
     let (mut largest, mut broken) = (T::zero(), T::zero());
     for x in x {
         largest = larger(largest, x.abs());
@@ -215,7 +215,7 @@ pub(crate) fn largest<T: Real>(x: &[T]) -> T {
 
 /// Returns the maximum absolute value; infinite if an entry is not finite.
 #[inline(always)]
-pub(crate) fn largest_of_numbers(x: &[f64]) -> f64 {
+pub fn largest_of_numbers(x: &[f64]) -> f64 {
     let (mut most, mut broken) = ([0.0; 4], [0.0; 4]);
     let fours = x.chunks_exact(4);
     for (k, x) in fours.remainder().iter().enumerate() {
@@ -234,7 +234,7 @@ pub(crate) fn largest_of_numbers(x: &[f64]) -> f64 {
 
 /// Factor `A = L Lᵀ` of a symmetric matrix, in reusable storage.
 #[derive(Clone, Debug)]
-pub(crate) struct Factor<T> {
+pub struct Factor<T> {
     n: usize,
     /// L in the lower triangle; the upper triangle keeps the entries of A.
     L: Vec<T>,
@@ -244,7 +244,7 @@ pub(crate) struct Factor<T> {
 
 impl<T: Real> Factor<T> {
     /// Allocates storage for n rows.
-    pub(crate) fn new(n: usize) -> Self {
+    pub fn new(n: usize) -> Self {
         Self { n, L: vec![T::zero(); n * n], inverse: vec![T::zero(); n] }
     }
 
@@ -256,7 +256,7 @@ impl<T: Real> Factor<T> {
 
     /// Factorises A (n × n, lower triangle read); returns 1 where A is positive definite, else 0.
     #[inline(always)]
-    pub(crate) fn compute(&mut self, A: &[T]) -> T {
+    pub fn compute(&mut self, A: &[T]) -> T {
         self.L.copy_from_slice(A);
         let positive = cholesky(&mut self.L, self.n);
         for (inverse, diagonal) in self.inverse.iter_mut().zip(self.L.iter().step_by(self.n + 1)) {
@@ -273,7 +273,7 @@ impl<T: Real> Factor<T> {
 
     /// Computes `x ← A^-1 x`.
     #[inline(always)]
-    pub(crate) fn solve(&self, x: &mut [T]) {
+    pub fn solve(&self, x: &mut [T]) {
         self.solve_lower(x);
         for k in (0..x.len()).rev() {
             let (inward, outward) = x.split_at_mut(k + 1);
@@ -288,7 +288,7 @@ impl<T: Real> Factor<T> {
     /// # Source
     /// LAPACK's `dsygs2`.
     #[inline(always)]
-    pub(crate) fn reduce(&self, B: &mut [T]) {
+    pub fn reduce(&self, B: &mut [T]) {
         let n = self.n;
         for k in 0..n {
             let (inward, outward) = B.split_at_mut((k + 1) * n);
@@ -327,101 +327,10 @@ impl<T: Real> Factor<T> {
 
 /// Computes `A ← Aᵀ`.
 #[inline(always)]
-fn transpose(A: &mut [f64], n: usize) {
+pub fn transpose(A: &mut [f64], n: usize) {
     for j in 0..n {
         for i in j + 1..n {
             A.swap(j * n + i, i * n + j);
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use nalgebra::{Cholesky, DMatrix, DVector};
-
-    /// Truth: nalgebra, bitwise.
-    #[test]
-    fn every_operation_has_the_bits_of_the_library() {
-        for n in [1, 3, 8, 13, 18] {
-            let entry = |i: usize, j: usize| ((i * 7 + j * 11) as f64 * 0.731).sin();
-            let B = DMatrix::from_fn(n, n, entry);
-            let A = &B * B.transpose() + DMatrix::identity(n, n);
-            let x = DVector::from_fn(n, |i, _| entry(i, 5));
-            let mut y = vec![0.0; n];
-            product(A.as_slice(), x.as_slice(), &mut y);
-            let mut expected = DVector::zeros(n);
-            expected.gemv(1.0, &A, &x, 0.0);
-            assert_eq!(y, expected.as_slice());
-            assert_eq!(dot(x.as_slice(), &y), x.dot(&expected));
-
-            let mut L = A.as_slice().to_vec();
-            assert_eq!(cholesky(&mut L, n), 1.0);
-            let factor = Cholesky::new(A.clone()).unwrap();
-            let lower = DMatrix::from_column_slice(n, n, &L).lower_triangle();
-            assert_eq!(lower, factor.l());
-            let (mut ours, mut theirs) = (B.clone(), B.clone());
-            solve_transposed(&L, ours.as_mut_slice(), n);
-            theirs.transpose_mut();
-            factor.solve_mut(&mut theirs);
-            transpose(ours.as_mut_slice(), n);
-            assert!((&ours - &theirs).amax() <= 1e-13 * theirs.amax(), "{ours} {theirs}");
-
-            let C = B.symmetric_part();
-            let [mut room, mut turned, mut found] = [A.clone(), A.clone(), A.clone()];
-            let rooms = [room.as_mut_slice(), turned.as_mut_slice()];
-            congruence(0.3, B.as_slice(), C.as_slice(), n, rooms, found.as_mut_slice());
-            let St = DMatrix::identity(n, n) + 0.3 * &B;
-            let expected = St.transpose() * &C * St;
-            assert!((&found - &expected).amax() <= 1e-14 * n as f64 * expected.amax(), "{found} {expected}");
-        }
-        assert_eq!(cholesky(&mut [1.0, 2.0, 2.0, 1.0], 2), 0.0);
-        assert_eq!(cholesky(&mut [f64::NAN], 1), 0.0);
-    }
-
-    /// Truth: nalgebra's factor, solution and products; measured 4e-14 relative to the largest
-    /// entry.
-    #[test]
-    fn a_factor_solves_and_reduces_to_standard_form() {
-        for n in [1, 2, 7, 18] {
-            let entry = |i: usize, j: usize| ((i * 7 + j * 11) as f64 * 0.731).sin();
-            let B = DMatrix::from_fn(n, n, entry);
-            let A = &B * B.transpose() + DMatrix::identity(n, n);
-            let M = &B + B.transpose() + DMatrix::identity(n, n);
-            let mut factor = Factor::new(n);
-            assert_eq!(factor.compute(A.as_slice()), 1.0);
-            let mut x = DVector::from_fn(n, |i, _| entry(i, 5));
-            let truth = Cholesky::new(A.clone()).unwrap().solve(&x);
-            factor.solve(x.as_mut_slice());
-            assert!((&x - &truth).amax() < 1e-13 * truth.amax(), "{:e}", (&x - &truth).amax());
-            let inverse = Cholesky::new(A).unwrap().l().try_inverse().unwrap();
-            let truth = &inverse * &M * inverse.transpose();
-            let mut found = M.clone();
-            factor.reduce(found.as_mut_slice());
-            let error = (found.lower_triangle() - truth.lower_triangle()).amax() / truth.amax();
-            assert!(error < 1e-12, "{n}: {error:e}");
-        }
-    }
-
-    #[test]
-    fn the_largest_of_numbers_with_what_is_no_number_is_infinite() {
-        for n in 0..13 {
-            let mut x: Vec<f64> = (0..n).map(|k| f64::from(k) - 5.5).collect();
-            assert_eq!(largest_of_numbers(&x), x.iter().fold(0.0f64, |most, x| most.max(x.abs())));
-            for broken in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
-                for k in 0..x.len() {
-                    let held = std::mem::replace(&mut x[k], broken);
-                    assert_eq!(largest_of_numbers(&x), f64::INFINITY, "{n} {k}");
-                    x[k] = held;
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn the_largest_value_tells_what_is_no_number() {
-        assert_eq!(largest(&[1.0, -3.0, 2.0]), 3.0);
-        assert_eq!(largest::<f64>(&[]), 0.0);
-        assert!(largest(&[1.0, f64::NAN, 2.0]).is_nan() && largest(&[f64::NEG_INFINITY]).is_nan());
     }
 }

@@ -19,7 +19,7 @@
 
 mod coupling;
 mod friction;
-mod hysteresis;
+pub(crate) mod hysteresis;
 mod load_friction;
 mod setup;
 mod springs;

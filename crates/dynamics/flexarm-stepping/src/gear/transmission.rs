@@ -37,22 +37,3 @@ impl TransmissionError {
         self.harmonics.iter().map(cosine).sum()
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_slope_of_a_transmission_error_is_its_derivative() {
-        let harmonics = vec![
-            Harmonic { amplitude: 3e-5, cycles: 100.0, phase: 0.3 },
-            Harmonic { amplitude: -1e-5, cycles: 200.0, phase: 1.1 },
-        ];
-        let error = TransmissionError { element: 0, motor: 0, harmonics };
-        for q in [-1.0, 0.0, 0.37] {
-            let slope = (error.at(q + 1e-6) - error.at(q - 1e-6)) / 2e-6;
-            // measured 1.3e-11
-            assert!((slope - error.slope(q)).abs() < 1e-9, "{slope} {}", error.slope(q));
-        }
-    }
-}

@@ -13,8 +13,8 @@ mod extrapolated;
 mod generalized_alpha;
 mod reference;
 mod rk4;
-mod sdirk3;
-mod spook;
+pub(crate) mod sdirk3;
+pub(crate) mod spook;
 
 use std::sync::Arc;
 
@@ -198,26 +198,4 @@ pub fn new_stepper(
         Start::Undeformed => DVector::zeros(arm.n_elastic_coordinates()),
     };
     kind.method().start(arm, h, &e)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// The table and the kinds agree, and no name refers to two steppers.
-    #[test]
-    fn every_entry_makes_a_stepper_of_its_own_name() {
-        let mut words: Vec<&str> = Vec::new();
-        for entry in STEPPERS {
-            let kind = (entry.with)(&StepperOptions::default());
-            assert!(std::ptr::eq(kind.entry(), entry), "{}", entry.name);
-            words.push(entry.name);
-            words.extend(entry.aliases);
-        }
-        assert_eq!(StepperKind::default().name(), STEPPERS[0].name);
-        let count = words.len();
-        words.sort_unstable();
-        words.dedup();
-        assert_eq!(words.len(), count, "{words:?}");
-    }
 }

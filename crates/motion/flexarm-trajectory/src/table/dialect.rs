@@ -124,35 +124,3 @@ fn days_since_1970(date: &str) -> Option<i128> {
     let (y, m) = if month > 2 { (year, month - 3) } else { (year - 1, month + 9) };
     Some(365 * y + y / 4 - y / 100 + y / 400 + (153 * m + 2) / 5 + day - 719_469)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Truth: Python's `datetime`, `(datetime(2024, 3, 1, 12, 0, 0, 4000) - datetime(1970, 1, 1))`.
-    #[test]
-    fn times_of_day_and_dates_are_those_of_the_calendar() {
-        assert_eq!(clock_time("2024-03-01T12:00:00.004Z"), Some(1_709_294_400_004_000_000_000));
-        assert_eq!(clock_time("2024/02/29 23:59:59"), Some(1_709_251_199_000_000_000_000));
-        assert_eq!(clock_time("1970-01-01 00:00:00"), Some(0));
-        assert_eq!(clock_time("12:00:01,5+01:00"), Some(43_201_500_000_000_000));
-        for wrong in ["25:00:00", "12:00", "2024-13-01 00:00:00", "12", "a:b:c", "1:2:3:4"] {
-            assert_eq!(clock_time(wrong), None, "{wrong}");
-        }
-    }
-
-    #[test]
-    fn fields_are_split_with_quotes_and_runs_of_spaces_as_one_gap() {
-        assert_eq!(Separator::Comma.split("\"a,b\", c ,\"say \"\"x\"\"\","), ["a,b", "c", "say \"x\"", ""]);
-        assert_eq!(Separator::Spaces.split("  1.0   2.0\t3 "), ["1.0", "2.0", "3"]);
-        assert_eq!(Separator::Semicolon.split("1,5;2"), ["1,5", "2"]);
-    }
-
-    #[test]
-    fn times_of_nineteen_digits_keep_their_differences() {
-        let (a, b) = (exact("1700000000123456789").unwrap(), exact("1700000000143456789").unwrap());
-        assert_eq!((b - a) as f64 / 1e12, 20_000_000.0);
-        assert_eq!(exact("-0,25"), Some(-250_000_000_000));
-        assert_eq!(exact("1e3"), None);
-    }
-}

@@ -9,14 +9,14 @@ use nalgebra::{Complex, DMatrix, DVector};
 use crate::milling::period::PeriodMap;
 
 /// Size up to which the matrix is faster.
-const SMALL: usize = 60;
+pub const SMALL: usize = 60;
 /// Maximum relative residual of the eigenvalue.
 const EXACT: f64 = 1e-10;
 /// Initial number of directions beyond the number of states.
 const MORE: usize = 30;
 
 /// Returns the leading eigenvalue; infinite for a map that overflows.
-pub(crate) fn leading(map: &PeriodMap) -> Complex<f64> {
+pub fn leading(map: &PeriodMap) -> Complex<f64> {
     if map.size() <= SMALL {
         return largest(&map.matrix());
     }
@@ -37,7 +37,8 @@ pub(crate) fn leading(map: &PeriodMap) -> Complex<f64> {
     }
 }
 
-fn largest(matrix: &DMatrix<f64>) -> Complex<f64> {
+/// Returns the largest eigenvalue of a matrix.
+pub fn largest(matrix: &DMatrix<f64>) -> Complex<f64> {
     let larger = |a: &Complex<f64>, b: &Complex<f64>| a.norm_sqr().total_cmp(&b.norm_sqr());
     // The eigenvalue iteration would not terminate.
     if !matrix.iter().all(|x| x.is_finite()) {
@@ -113,44 +114,5 @@ impl<'a> Krylov<'a> {
             }
         }
         self.H[(n, n - 1)].abs() * y[n - 1].norm()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use std::f64::consts::TAU;
-
-    use nalgebra::Vector3;
-
-    use super::*;
-    use crate::milling::cutter::{Coefficients, Cutter, Engagement};
-    use crate::milling::period::Period;
-    use crate::milling::structure::{Mode, Structure};
-
-    /// Truth: all eigenvalues of the matrix, for slow modes of an arm that hardly decay within a
-    /// period, and fast modes of a tool.
-    #[test]
-    fn few_directions_hold_the_largest_multiplier() {
-        let mode = |k: u32| Mode {
-            angular_frequency: TAU * 12.0 * 1.5_f64.powi(k as i32),
-            damping_ratio: 0.02,
-            shape: Vector3::new(f64::from(k).cos(), f64::from(2 * k).sin(), 0.3)
-                / (200.0_f64 / f64::from(1 + k * k)).sqrt(),
-        };
-        let structure = Structure::from_modes(&(0..13).map(mode).collect::<Vec<_>>()).unwrap();
-        let coefficients = Coefficients { tangential: 8e8, radial: 3e8, axial: 1e8 };
-        let straight = Cutter::straight(3, coefficients, Engagement::down(0.3));
-        let mut worst: f64 = 0.0;
-        for cutter in [straight, Cutter { diameter: 0.02, helix: 0.5, ..straight }] {
-            for (rpm, depth) in [(800.0, 1e-4), (800.0, 2e-3), (1500.0, 5e-4), (1500.0, 8e-3)] {
-                let map = Period::new(&structure, &cutter, rpm * TAU / 60.0, 4e-4).at(depth);
-                assert!(map.size() > 2 * SMALL, "{}", map.size());
-                let (few, all) = (leading(&map), largest(&map.matrix()));
-                worst = worst.max((few.norm() / all.norm() - 1.0).abs());
-            }
-        }
-        println!("worst {worst:.1e}");
-        // measured: 1e-12
-        assert!(worst < 1e-9, "{worst:.1e}");
     }
 }

@@ -22,15 +22,14 @@
 //!
 //! Not here: robots, poses, tools by name, files and units (the crate root).
 #![allow(non_snake_case, reason = "letters of the equations: M, D, K, G, H; see docs/references.md")]
-#![cfg_attr(test, allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests"))]
 
 mod cutter;
 mod error;
-mod leading;
+pub(crate) mod leading;
 mod limit;
 mod matrices;
-mod moments;
-mod period;
+pub(crate) mod moments;
+pub(crate) mod period;
 mod structure;
 
 pub use cutter::{Coefficients, Cutter, Engagement};

@@ -12,7 +12,7 @@ use std::sync::LazyLock;
 use nalgebra::{Complex, SMatrix, SVector};
 
 /// Number of nodes of an element.
-pub(crate) const NODES: usize = 6;
+pub const NODES: usize = 6;
 /// Number of quadrature points.
 const POINTS: usize = 14;
 /// Magnitude of `z` up to which the quadrature is exact to rounding; above, the sum by parts is.
@@ -20,11 +20,11 @@ const SMALL: f64 = 7.0;
 
 /// Nodes, and the data that depend only on them. Targets are the nodes and, last, the end of the
 /// element.
-pub(crate) struct Rule {
+pub struct Rule {
     /// Gauss nodes in (0, 1).
-    pub(crate) nodes: [f64; NODES],
+    pub nodes: [f64; NODES],
     /// Weights of the nodes.
-    pub(crate) weights: [f64; NODES],
+    pub weights: [f64; NODES],
     /// `1 - x_q` at the quadrature points on (0, 1).
     backward: [f64; POINTS],
     /// Weight times ℓ_j at a quadrature point on (0, c), by target, point and node.
@@ -36,14 +36,15 @@ pub(crate) struct Rule {
 
 /// Moments of one pole over one element.
 #[derive(Clone, Debug)]
-pub(crate) struct Moments {
+pub struct Moments {
     /// `e^{z c}`, by target.
-    pub(crate) decay: [Complex<f64>; NODES + 1],
+    pub decay: [Complex<f64>; NODES + 1],
     /// `I_j(c)`, by target and node.
-    pub(crate) integrals: [[Complex<f64>; NODES]; NODES + 1],
+    pub integrals: [[Complex<f64>; NODES]; NODES + 1],
 }
 
-pub(crate) static RULE: LazyLock<Rule> = LazyLock::new(Rule::new);
+/// The rule of all elements.
+pub static RULE: LazyLock<Rule> = LazyLock::new(Rule::new);
 
 impl Rule {
     fn new() -> Self {
@@ -66,7 +67,7 @@ impl Rule {
 
     /// Computes all moments for `z`, the pole times the length of the element; lengths are relative
     /// to that of the element.
-    pub(crate) fn moments(&self, z: Complex<f64>) -> Moments {
+    pub fn moments(&self, z: Complex<f64>) -> Moments {
         let targets: [f64; NODES + 1] = std::array::from_fn(|i| *self.nodes.get(i).unwrap_or(&1.0));
         let decay = targets.map(|c| (z * c).exp());
         let zero = [Complex::new(0.0, 0.0); NODES];
@@ -77,7 +78,8 @@ impl Rule {
         Moments { decay, integrals }
     }
 
-    fn by_quadrature(&self, z: Complex<f64>, c: f64, target: usize) -> [Complex<f64>; NODES] {
+    /// Integrals up to `c` by quadrature, for small `z`.
+    pub fn by_quadrature(&self, z: Complex<f64>, c: f64, target: usize) -> [Complex<f64>; NODES] {
         let mut sum = [Complex::new(0.0, 0.0); NODES];
         for (back, row) in self.backward.iter().zip(&self.table[target]) {
             let e = (z * (c * back)).exp();
@@ -88,7 +90,8 @@ impl Rule {
         sum
     }
 
-    fn by_parts(&self, z: Complex<f64>, decay: Complex<f64>, target: usize) -> [Complex<f64>; NODES] {
+    /// Integrals by repeated integration by parts, for large `z`.
+    pub fn by_parts(&self, z: Complex<f64>, decay: Complex<f64>, target: usize) -> [Complex<f64>; NODES] {
         let mut sum = [Complex::new(0.0, 0.0); NODES];
         let mut factor = z.inv();
         for order in 0..NODES {
@@ -153,48 +156,4 @@ fn derivative(coefficients: &SMatrix<f64, NODES, NODES>, j: usize, order: usize,
         sum = sum * x + falling * coefficients[(n, j)];
     }
     sum
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Truth: the sum of ℓ_j over all nodes is 1, with the integral (e^{z c} - 1) / z; weighted
-    /// with x_j it is σ, with ∫ e^{z(c-σ)} σ dσ.
-    #[test]
-    fn moments_of_one_and_of_the_first_power_are_those_of_the_closed_form() {
-        let mut worst: f64 = 0.0;
-        for z in [
-            Complex::new(-0.01, 0.3),
-            Complex::new(-0.2, 4.0),
-            Complex::new(-6.9, 0.0),
-            Complex::new(-7.1, 1.0),
-            Complex::new(-0.3, 40.0),
-            Complex::new(-3e4, 0.0),
-        ] {
-            let moments = RULE.moments(z);
-            for (i, c) in RULE.nodes.iter().copied().chain([1.0]).enumerate() {
-                let e = (z * c).exp();
-                let one: Complex<f64> = moments.integrals[i].iter().sum();
-                let first: Complex<f64> = moments.integrals[i].iter().zip(&RULE.nodes).map(|(m, x)| m * *x).sum();
-                worst = worst.max((one - (e - 1.0) / z).norm() / c);
-                worst = worst.max((first - (e - 1.0 - z * c) / (z * z)).norm() / c);
-            }
-        }
-        println!("worst {worst:e}");
-        assert!(worst < 1e-11, "{worst:e}");
-    }
-
-    /// Truth: both methods for the same integral, where both are accurate.
-    #[test]
-    fn quadrature_and_parts_meet() {
-        let z = Complex::from_polar(SMALL, 1.8);
-        let mut worst: f64 = 0.0;
-        for (i, c) in RULE.nodes.iter().copied().chain([1.0]).enumerate() {
-            let (a, b) = (RULE.by_quadrature(z, c, i), RULE.by_parts(z, (z * c).exp(), i));
-            worst = a.iter().zip(&b).fold(worst, |w, (a, b)| w.max((a - b).norm()));
-        }
-        println!("worst {worst:e}");
-        assert!(worst < 1e-9, "{worst:e}");
-    }
 }

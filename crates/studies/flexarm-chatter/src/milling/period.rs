@@ -21,7 +21,7 @@ use crate::milling::moments::{Moments, NODES, RULE};
 use crate::milling::structure::Structure;
 
 /// Division of a tooth period.
-pub(crate) struct Period<'a> {
+pub struct Period<'a> {
     structure: &'a Structure,
     cutter: &'a Cutter,
     /// Spindle speed (rad/s).
@@ -72,7 +72,8 @@ pub(crate) struct CutNode {
 }
 
 impl<'a> Period<'a> {
-    pub(crate) fn new(structure: &'a Structure, cutter: &'a Cutter, spindle: f64, longest: f64) -> Self {
+    /// Prepares a tooth period at a spindle speed (rad/s), in elements of at most `longest` seconds.
+    pub fn new(structure: &'a Structure, cutter: &'a Cutter, spindle: f64, longest: f64) -> Self {
         let mut period = Self { structure, cutter, spindle, longest, straight: None };
         if cutter.is_straight() {
             period.straight = Some(period.stretches(1.0));
@@ -160,7 +161,7 @@ impl<'a> Period<'a> {
     }
 
     /// Computes the map over one period at a depth.
-    pub(crate) fn at(&self, depth: f64) -> PeriodMap {
+    pub fn at(&self, depth: f64) -> PeriodMap {
         self.with_stretches(depth, |stretches| {
             let mut first = self.structure.n_states();
             let mut pieces = Vec::new();
@@ -276,7 +277,7 @@ enum Piece {
 }
 
 /// Map from states and chips of the last tooth to those one period later.
-pub(crate) struct PeriodMap {
+pub struct PeriodMap {
     n_states: usize,
     size: usize,
     pieces: Vec<Piece>,
@@ -289,7 +290,7 @@ impl PeriodMap {
     }
 
     /// Returns the number of states and chips.
-    pub(crate) fn size(&self) -> usize {
+    pub fn size(&self) -> usize {
         self.size
     }
 
@@ -316,7 +317,7 @@ impl PeriodMap {
     }
 
     /// Returns the map as a matrix.
-    pub(crate) fn matrix(&self) -> DMatrix<f64> {
+    pub fn matrix(&self) -> DMatrix<f64> {
         let mut map = DMatrix::zeros(self.size, self.size);
         self.apply(&DMatrix::identity(self.size, self.size), &mut map);
         map

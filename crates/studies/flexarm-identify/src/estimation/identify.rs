@@ -324,7 +324,7 @@ fn held_out(
 }
 
 /// Returns the upper 0.1 % quantile of χ² over its degrees of freedom (Wilson and Hilferty).
-fn chi_square_bound(freedom: usize) -> f64 {
+pub fn chi_square_bound(freedom: usize) -> f64 {
     let nine = 2.0 / (9.0 * freedom as f64);
     (1.0 - nine + MISFIT_QUANTILE * nine.sqrt()).powi(3)
 }
@@ -404,19 +404,5 @@ fn summarise(
         instruments: (0..measurements.instruments.len()).map(|k| measurements.instrument(k, own).0).collect(),
         targets: (0..measurements.targets.len()).map(|k| measurements.target(k, own).0).collect(),
         solution,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_bound_on_the_scatter_is_that_of_the_tables() {
-        // Truth: upper 0.1 % quantiles of χ², 29.588 and 149.449 for 10 and 100 degrees of freedom.
-        for (freedom, table) in [(10, 29.588), (100, 149.449)] {
-            let found = chi_square_bound(freedom) * freedom as f64;
-            assert!((found / table - 1.0).abs() < 1e-2, "{found} for {table}"); // measured: 5.8e-3
-        }
     }
 }

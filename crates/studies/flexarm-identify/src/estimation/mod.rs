@@ -12,11 +12,11 @@
 mod coupled_gears;
 mod encoders;
 mod identified;
-mod identify;
-mod least_squares;
+pub(crate) mod identify;
+pub(crate) mod least_squares;
 mod measurement;
 pub(crate) mod parameter;
-mod placement;
+pub(crate) mod placement;
 mod plan;
 mod reading;
 mod response;

@@ -228,7 +228,7 @@ impl Plant {
 }
 
 /// Returns the displacement by a translation (m) and a rotation vector (rad).
-pub(crate) fn displacement(twist: &Vector6<f64>) -> Pose {
+pub fn displacement(twist: &Vector6<f64>) -> Pose {
     let [linear, angular] = [twist.fixed_rows::<3>(0), twist.fixed_rows::<3>(3)];
     Pose::from_parts(Translation3::from(linear.into_owned()), Rotation3::new(angular.into_owned()))
 }

@@ -19,9 +19,8 @@
 //!
 //! Results depend only on their seed: any point follows from its number on any machine. Not here:
 //! simulations, files.
-#![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
-mod chance;
+pub(crate) mod chance;
 mod distribution;
 mod effects;
 mod indices;

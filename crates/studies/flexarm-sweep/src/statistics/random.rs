@@ -19,17 +19,3 @@ pub(crate) fn uniform(seed: u64, stream: u64, index: u64) -> f64 {
     generator.set_word_pos(2 * u128::from(index));
     generator.sample(Open01)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Truth: the numbers of the generator in sequence.
-    #[test]
-    fn a_number_by_its_index_is_the_one_that_the_stream_has_there() {
-        let numbers: Vec<f64> = stream(1, 5).sample_iter(Open01).take(100).collect();
-        assert!((0..100).rev().all(|k| uniform(1, 5, k) == numbers[k as usize]));
-        assert_ne!(uniform(2, 5, 77), numbers[77]);
-        assert_ne!(uniform(1, 6, 77), numbers[77]);
-    }
-}

@@ -30,13 +30,14 @@ use super::solve::{Jacobian, Triangle, joined};
 
 /// Constraint rows of one joint.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Rows {
+pub struct Rows {
     /// Constraint value.
-    pub(super) g: Vector6<f64>,
-    pub(super) G: Jacobian,
+    pub g: Vector6<f64>,
+    /// Jacobians of both bodies.
+    pub G: Jacobian,
     /// Motion of a prescribed joint in the rows: minus their explicit rate, per rate of its
     /// coordinate.
-    pub(super) S: Vector6<f64>,
+    pub S: Vector6<f64>,
 }
 
 impl Rows {

@@ -23,11 +23,11 @@
 
 mod checks;
 mod compliance;
-mod constraint;
+pub(crate) mod constraint;
 mod observe;
 mod pins;
 mod settings;
-mod solve;
+pub(crate) mod solve;
 
 use std::sync::Arc;
 
