@@ -9,17 +9,17 @@ const EVERY_NS: u64 = 5_000_000;
 
 /// Reasons to write the poses of a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct PoseReasons {
+pub struct PoseReasons {
     /// Whether a pose is due.
-    pub(crate) due: bool,
+    pub due: bool,
     /// Whether the error exceeds that of all previous samples.
-    pub(crate) new_peak: bool,
+    pub new_peak: bool,
 }
 
 /// Chooses the samples. The `.rrd` and the MCAP recorder have one each, with the same choice, so
 /// that an `.rrd` file can be made from an MCAP file.
 #[derive(Debug, Default)]
-pub(crate) struct PoseClock {
+pub struct PoseClock {
     last_ns: Option<u64>,
     /// Maximum error so far (m).
     largest_m: Option<f64>,
@@ -28,7 +28,7 @@ pub(crate) struct PoseClock {
 impl PoseClock {
     /// Takes a sample at a time since the start of the run (ns). Without a rigid twin (`has_rigid`)
     /// there is no error.
-    pub(crate) fn take(&mut self, since_start_ns: u64, sample: &Sample, has_rigid: bool) -> PoseReasons {
+    pub fn take(&mut self, since_start_ns: u64, sample: &Sample, has_rigid: bool) -> PoseReasons {
         let due = self.last_ns.is_none_or(|last| since_start_ns.saturating_sub(last) >= EVERY_NS);
         if due {
             self.last_ns = Some(since_start_ns);
@@ -44,25 +44,4 @@ impl PoseClock {
 
 pub(crate) fn size(parts: &[f64]) -> f64 {
     parts.iter().map(|part| part * part).sum::<f64>().sqrt()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn of_fast_samples_two_hundred_a_second_are_shown_and_those_with_a_larger_error_than_before() {
-        let mut clock = PoseClock::default();
-        let shown: Vec<PoseReasons> = (0..=20_u64)
-            .map(|ms| {
-                let error = if ms < 8 { 1e-3 * ms as f64 } else { 0.0 };
-                let sample = Sample { error_world: [error, 0.0, 0.0, 1.0, 1.0, 1.0], ..Sample::default() };
-                clock.take(1_000_000 * ms, &sample, true)
-            })
-            .collect();
-        let which =
-            |of: &dyn Fn(&PoseReasons) -> bool| -> Vec<usize> { (0..shown.len()).filter(|k| of(&shown[*k])).collect() };
-        assert_eq!(which(&|shown| shown.due), [0, 5, 10, 15, 20]);
-        assert_eq!(which(&|shown| shown.new_peak), [0, 1, 2, 3, 4, 5, 6, 7]);
-    }
 }
