@@ -12,6 +12,7 @@ mod events;
 mod exchange;
 #[cfg(unix)]
 mod faults;
+mod help;
 mod hostile_names;
 mod inspect_check;
 mod limits;
@@ -27,8 +28,10 @@ mod robots;
 mod runs;
 mod serve;
 mod study;
+mod summary_table;
 #[cfg(feature = "parquet")]
 mod sweep;
 mod verify;
 #[cfg(unix)]
 mod view;
+mod words;
