@@ -21,7 +21,6 @@
 //! ```
 //!
 //! Not here: the meaning of the files.
-#![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
 mod error;
 mod number_table;

@@ -102,35 +102,3 @@ fn number_of(cell: &str, decimal_comma: bool) -> Option<f64> {
     let value = plain.or_else(|| decimal_comma.then(|| cell.replacen(',', ".", 1).parse().ok()).flatten())?;
     value.is_finite().then_some(value)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn commas_semicolons_and_tabs_say_the_same_and_decimal_commas_are_numbers() {
-        let comma = NumberTable::parse("# tracker\na, b\n1.5,-2e3\n\n,4\n").unwrap();
-        let semicolon = NumberTable::parse("\u{feff}a;b\r\n1,5;-2e3\r\n;4\r\n").unwrap();
-        let tab = NumberTable::parse("\"a\"\t\"b\"\n1,5\t-2000\n\t4\n").unwrap();
-        assert_eq!(comma.names, ["a", "b"]);
-        assert_eq!((comma.rows[0].clone(), comma.rows[1][1]), (vec![1.5, -2000.0], 4.0));
-        assert!(comma.rows[1][0].is_nan());
-        assert_eq!((comma.lines.clone(), semicolon.lines), (vec![3, 5], vec![2, 3]));
-        assert_eq!((&comma.rows[0], &comma.rows[0]), (&semicolon.rows[0], &tab.rows[0]));
-    }
-
-    #[test]
-    fn what_is_no_table_of_numbers_is_said_with_line_and_column() {
-        let fails = |text: &str, part: &str| {
-            let error = NumberTable::parse(text).unwrap_err().to_string();
-            assert!(error.contains(part), "{error}");
-        };
-        fails("", "empty");
-        fails("a,a\n1,2\n", "twice");
-        fails("1,2\n3,4\n", "add a header");
-        fails("a,b\n1\n", "line 2: expected 2 cells");
-        fails("a,b\n1,x\n", "line 2, column \"b\": expected a number, found \"x\"");
-        fails("a,b\n1,inf\n", "found \"inf\"");
-        fails("a,b\n1,2,5\n", "expected 2 cells");
-    }
-}

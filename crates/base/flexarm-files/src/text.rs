@@ -80,17 +80,3 @@ impl Source {
         self.error(span.unwrap_or(0..0), flexarm_settings::without_types(message))
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn columns_count_characters_also_behind_letters_outside_of_ascii() {
-        let text = "a = 1\nname = \"größe µ\", x = 2\n";
-        let source = Source::new(Path::new("f.toml"), text, "robot");
-        let at = text.find('x').unwrap_or_default();
-        let error = source.error(at..at + 1, "no");
-        assert_eq!((error.line, error.column), (2, 19));
-    }
-}

@@ -68,22 +68,3 @@ fn difference<'a>(first: &str, other: &'a str) -> Option<&'a str> {
         words.find(|(a, b)| a != b).map(|(_, word)| word.trim_end_matches([':', ',']))
     })
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn twelve_sentences_of_one_kind_are_one_with_the_count_and_others_stay() {
-        let mass = |k: usize| format!("arm.urdf:{}: link \"link_{k}\" weighs {:.2e} kg", 10 * k, 1e-3 * k as f64);
-        let mut texts: Vec<String> = (1..=12).map(mass).collect();
-        texts.insert(5, "the payload is a point".into());
-        texts.push(mass(3));
-        let told = gathered(&texts);
-        let expected = format!("{} (and 11 more of this kind: link_2, link_3, link_4, ...)", mass(1));
-        assert_eq!(told, [expected, "the payload is a point".into()]);
-        assert_eq!(gathered(&texts[..2]), texts[..2]);
-        let bare: Vec<String> = ["a", "b", "c"].map(|name| format!("{name} is far")).into();
-        assert_eq!(gathered(&bare), bare, "names that are not quoted are other words");
-    }
-}

@@ -23,16 +23,3 @@ pub fn closest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) ->
     }
     best.map(|(_, candidate)| candidate.to_owned())
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_slip_is_recognised_and_another_word_is_not() {
-        let links = ["base_link", "link_1", "tool0"];
-        assert_eq!(closest("base_lnik", links).as_deref(), Some("base_link"));
-        assert_eq!(closest("Link_1", links).as_deref(), Some("link_1"));
-        assert_eq!(closest("gripper", links), None);
-    }
-}

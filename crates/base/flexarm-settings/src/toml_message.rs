@@ -45,37 +45,3 @@ fn suggested(message: &str) -> String {
         None => message.to_owned(),
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn what_is_expected_is_said_without_names_of_types() {
-        for (found, told) in [
-            (
-                "invalid type: string \"tip\", expected struct TcpEntry",
-                "invalid type: string \"tip\", expected a table, { key = value, ... }",
-            ),
-            (
-                "invalid type: integer `3`, expected struct MoveToml; docs",
-                "invalid type: integer `3`, expected a table, { key = value, ... }; docs",
-            ),
-            ("invalid type: map, expected a string\n", "invalid type: table, expected a string"),
-            (
-                "invalid type: integer `3`, expected a map",
-                "invalid type: integer `3`, expected a table, { key = value, ... }",
-            ),
-            ("missing field `section`", "missing field `section`"),
-            ("invalid type: string \"1\", expected f64", "invalid type: string \"1\", expected a number"),
-            ("invalid type: string \"1\", expected usize", "invalid type: string \"1\", expected a whole number"),
-            (
-                "unknown field `payloadd`, expected one of `tcp`, `payload`",
-                "unknown field `payloadd`, did you mean `payload`? expected one of `tcp`, `payload`",
-            ),
-            ("unknown field `x`, expected `mass` or `com`", "unknown field `x`, expected `mass` or `com`"),
-        ] {
-            assert_eq!(without_types(found), told);
-        }
-    }
-}

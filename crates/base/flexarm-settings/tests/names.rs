@@ -1,5 +1,4 @@
-//! A process has a single set of names: this is a test of its own, as it affects all tests in the
-//! same process.
+//! A process has a single set of names: no other test of this program writes the name of a setting.
 
 use flexarm_settings::{Caller, Names, Setting, name_settings};
 

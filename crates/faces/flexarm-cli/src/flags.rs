@@ -5,7 +5,8 @@ use flexarm::{Names, Setting};
 /// The flags, used in all messages of this process.
 pub(crate) const NAMES: Names = Names { setting: flag, caller: "the command line" };
 
-fn flag(setting: Setting) -> &'static str {
+/// Returns the flag of a setting.
+pub fn flag(setting: Setting) -> &'static str {
     match setting {
         Setting::Step => "--step",
         Setting::LogRate => "--log-rate",
@@ -65,28 +66,5 @@ fn flag(setting: Setting) -> &'static str {
         Setting::Nodes => "--nodes",
         Setting::PartA => "--part-a",
         Setting::PartB => "--part-b",
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use clap::CommandFactory;
-
-    use super::*;
-    use crate::commands::Cli;
-
-    #[test]
-    fn every_setting_that_a_message_names_is_a_flag_of_some_command() {
-        let mut program = Cli::command();
-        program.build();
-        let arguments = || program.get_subcommands().flat_map(|command| command.get_arguments());
-        for setting in Setting::ALL {
-            let flag = flag(setting);
-            let known = match flag.strip_prefix("--") {
-                Some(long) => arguments().any(|a| a.get_long() == Some(long)),
-                None => arguments().any(|a| a.get_short().is_some_and(|short| flag == format!("-{short}"))),
-            };
-            assert!(known, "{setting:?} is called {flag:?}, which no command takes");
-        }
     }
 }

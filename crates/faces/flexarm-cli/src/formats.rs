@@ -22,25 +22,25 @@ fn endings(formats: &[RecordingFormat]) -> Vec<String> {
 }
 
 /// Description of `convert`.
-pub(crate) fn about_convert() -> String {
+pub fn about_convert() -> String {
     let names = RecordingFormat::ALL.map(|format| format.to_string());
     format!("Write a recording as {}", listed(&names))
 }
 
 /// Input of `convert`.
-pub(crate) fn help_input() -> String {
+pub fn help_input() -> String {
     format!("Recording to read: {}", listed(&endings(&RecordingFormat::read_back())))
 }
 
 /// Values of `--from`.
-pub(crate) fn help_from() -> String {
+pub fn help_from() -> String {
     let words: Vec<&str> = RecordingFormat::read_back().into_iter().map(RecordingFormat::extension).collect();
     let words = words.join(", ");
     format!("Format of IN, whatever its name ends with: {words}")
 }
 
 /// Input of `report`.
-pub(crate) fn help_report() -> String {
+pub fn help_report() -> String {
     let endings = endings(&RecordingFormat::read_back());
     let (most, others) = endings.split_first().expect("there are formats");
     format!(
@@ -50,7 +50,7 @@ pub(crate) fn help_report() -> String {
 }
 
 /// Description of the page about recordings.
-pub(crate) fn help_page() -> String {
+pub fn help_page() -> String {
     format!("Recordings: {}", RecordingFormat::ALL.map(|format| format.to_string()).join(", "))
 }
 
@@ -83,43 +83,4 @@ pub(crate) fn outputs(args: &RunArgs, folder: PathBuf) -> Result<Outputs, Failur
         outputs = outputs.with(format);
     }
     Ok(outputs)
-}
-
-#[cfg(test)]
-mod tests {
-    use clap::CommandFactory;
-
-    use super::*;
-    use crate::commands::Cli;
-
-    /// Truth: the sentences in the help texts.
-    #[test]
-    fn help_texts_name_every_format_once() {
-        let (all, read) = (RecordingFormat::ALL.to_vec(), RecordingFormat::read_back());
-        let written = [about_convert(), help_page()].map(|text| (text, &all));
-        for (text, formats) in written.into_iter().chain([help_input(), help_from(), help_report()].map(|t| (t, &read)))
-        {
-            for format in formats {
-                let words: Vec<&str> = text.split(|c: char| !c.is_alphanumeric()).collect();
-                let (name, word) = (format.to_string(), format.extension());
-                let count = words.iter().filter(|found| **found == name || **found == word).count();
-                assert_eq!(count, 1, "{format} in {text:?}");
-            }
-        }
-        assert!(about_convert().starts_with("Write a recording as MCAP, Rerun, CSV"));
-        assert!(help_report().starts_with("Recordings (.mcap holds most; .parquet, "));
-    }
-
-    /// A format is written by default, or an option requests it.
-    #[test]
-    fn every_format_can_be_asked_for() {
-        let mut command = Cli::command();
-        command.build();
-        let compare = command.find_subcommand("compare").expect("a command");
-        let flag = compare.get_arguments().find(|argument| argument.get_id() == "also").expect("a flag");
-        let words: Vec<String> = flag.get_possible_values().iter().map(|word| word.get_name().to_owned()).collect();
-        for format in RecordingFormat::ALL {
-            assert_eq!(words.contains(&format.extension().to_owned()), !format.info().by_default, "{format}");
-        }
-    }
 }

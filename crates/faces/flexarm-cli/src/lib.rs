@@ -132,3 +132,22 @@ pub fn shipped_robot_file(given: &Path) -> PathBuf {
 pub fn shipped_tool(given: &Path) -> PathBuf {
     shipped::find(given, "robots/tools", &["", ".toml"])
 }
+
+/// Parts that the tests of this crate reach; not part of the interface.
+#[doc(hidden)]
+pub mod internals {
+    pub use crate::commands::HELP;
+    pub use crate::flags::flag;
+    pub use crate::formats::{about_convert, help_from, help_input, help_page, help_report};
+    pub use crate::print::{filled, plain_zeros};
+    #[cfg(not(target_family = "wasm"))]
+    pub use crate::serve::requested;
+    pub use crate::summary_table::{ALERT, HEADLINE, columns, summary};
+    pub use crate::sweep::plan::quoted;
+    pub use crate::view::is_version;
+
+    /// Returns the command line with all its commands.
+    pub fn command() -> clap::Command {
+        <crate::commands::Cli as clap::CommandFactory>::command()
+    }
+}

@@ -81,7 +81,7 @@ pub(crate) fn lines(table: &TextTable) -> String {
 pub(crate) const SHORTENED: &str = "names that end in … are shortened: --json has them whole\n";
 
 /// Text in lines of at most 80 columns, broken after a separator.
-pub(crate) fn filled(text: &str, separator: &str) -> String {
+pub fn filled(text: &str, separator: &str) -> String {
     let mut out = String::new();
     let mut width = 0;
     for part in text.split_inclusive(separator) {
@@ -98,7 +98,7 @@ pub(crate) fn filled(text: &str, separator: &str) -> String {
 }
 
 /// The text with zeros that were rounded from negative numbers written without their sign.
-pub(crate) fn plain_zeros(text: &str) -> String {
+pub fn plain_zeros(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     let mut before = ' ';
     for (k, c) in text.char_indices() {
@@ -414,30 +414,4 @@ pub(crate) fn caveats(terminal: &Terminal, caveats: &[Caveat]) {
         }
     }
     warnings(terminal, &texts);
-}
-
-#[cfg(test)]
-mod tests {
-    use super::{filled, plain_zeros};
-
-    #[test]
-    fn a_number_that_is_rounded_to_zero_has_no_sign() {
-        for (text, expected) in [
-            ("  -0.000  -0.001", "   0.000  -0.001"),
-            ("joint_6 -0.00", "joint_6 0.00"),
-            ("[-0.0000, 0.1]", "[0.0000, 0.1]"),
-            ("-0.0", "0.0"),
-            ("x-0.0 run-0.00 1e-0.0", "x-0.0 run-0.00 1e-0.0"),
-            ("-0.0e3 -0.05 -0 --out", "-0.0e3 -0.05 -0 --out"),
-        ] {
-            assert_eq!(plain_zeros(text), expected);
-        }
-    }
-
-    #[test]
-    fn lines_have_at_most_80_columns_where_a_separator_allows_it() {
-        let text = filled(&["joint_1 0.1234"; 12].join(", "), ", ");
-        assert!(text.lines().count() > 1 && text.lines().all(|line| line.len() <= 80), "{text}");
-        assert_eq!(text.split_whitespace().count(), 24);
-    }
 }

@@ -12,6 +12,7 @@ mod events;
 mod exchange;
 #[cfg(unix)]
 mod faults;
+mod help;
 mod hostile_names;
 mod inspect_check;
 mod limits;
@@ -27,7 +28,9 @@ mod robots;
 mod runs;
 mod serve;
 mod study;
+mod summary_table;
 #[cfg(feature = "parquet")]
 mod sweep;
 #[cfg(unix)]
 mod view;
+mod words;

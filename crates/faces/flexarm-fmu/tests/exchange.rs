@@ -1,13 +1,8 @@
 //! Model exchange: the arm as a differential equation, against its stepper and its linear model.
-#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
-#![allow(non_snake_case, reason = "monogram notation: M, J; see docs/references.md")]
-#![allow(clippy::print_stdout, reason = "measured errors beside their bounds")]
 
-mod helpers;
-
+use crate::helpers::{of_joints, robot, settings, targets, values};
 use flexarm::{DriveModel, LinkModel, Modelling, Robot};
 use flexarm_fmu::{Plant, PlantError, PlantSettings};
-use helpers::{of_joints, robot, settings, targets, values};
 use nalgebra::DMatrix;
 
 const TCP: [&str; 3] = ["tcp.position.x", "tcp.position.y", "tcp.position.z"];

@@ -1,11 +1,8 @@
 //! Plants against the arm that is commanded directly, and their FMUs.
-#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
-#![allow(clippy::print_stdout, reason = "measured errors beside their bounds")]
-
-mod helpers;
 
 use std::path::{Path, PathBuf};
 
+use crate::helpers::{of_joints, robot, root, settings, targets, values};
 use flexarm::reduce::{ReduceJob, ReduceOptions, ReduceOutputs, reduce};
 use flexarm::{
     Command, DriveModel, LinkModel, LiveOptions, Modelling, Motion, PayloadChange, Robot, RunOptions, Scenario, Servos,
@@ -14,7 +11,6 @@ use flexarm::{
 use flexarm_fmu::{
     About, Causality, Fmi, FmuJob, Kind, Plant, PlantError, PlantSettings, description, export_fmu, open_resources,
 };
-use helpers::{of_joints, robot, root, settings, targets, values};
 
 const TCP: [&str; 3] = ["tcp.position.x", "tcp.position.y", "tcp.position.z"];
 const ERROR: [&str; 3] = ["tcp_error.position.x", "tcp_error.position.y", "tcp_error.position.z"];

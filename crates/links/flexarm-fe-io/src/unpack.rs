@@ -17,7 +17,7 @@ pub(crate) fn is_gzip(bytes: &[u8]) -> bool {
 }
 
 /// Maximum allowed unpacked size of packed bytes, at most `largest`.
-pub(crate) fn allowed_unpacked(packed: usize, largest: u64) -> u64 {
+pub fn allowed_unpacked(packed: usize, largest: u64) -> u64 {
     ALWAYS_UNPACKED.max(LARGEST_RATIO.saturating_mul(packed as u64)).min(largest)
 }
 
@@ -36,7 +36,7 @@ pub struct UnpackError {
 }
 
 /// Unpacks gzip, up to `largest` bytes and the size that is plausible for the packed size.
-pub(crate) fn unpacked(packed: &[u8], largest: u64) -> Result<Vec<u8>, UnpackError> {
+pub fn unpacked(packed: &[u8], largest: u64) -> Result<Vec<u8>, UnpackError> {
     let allowed = allowed_unpacked(packed.len(), largest);
     let mut bytes = Vec::new();
     let result = MultiGzDecoder::new(packed).take(allowed + 1).read_to_end(&mut bytes);
@@ -65,36 +65,4 @@ pub(crate) fn unpacked(packed: &[u8], largest: u64) -> Result<Vec<u8>, UnpackErr
 /// [`UnpackError`] if the bytes are not gzip, truncated, or expand to far more than real files.
 pub fn unpack_gzip(packed: &[u8]) -> Result<Vec<u8>, UnpackError> {
     unpacked(packed, u64::MAX)
-}
-
-#[cfg(test)]
-mod tests {
-    use std::io::Write;
-
-    use super::*;
-
-    fn packed(bytes: &[u8]) -> Vec<u8> {
-        let mut encoder = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
-        encoder.write_all(bytes).unwrap();
-        encoder.finish().unwrap()
-    }
-
-    #[test]
-    fn a_packed_file_that_grows_without_end_is_refused_early() {
-        let bytes = packed(&vec![b'*'; 100_000]);
-        let refused = unpacked(&bytes, 1000).unwrap_err();
-        assert!(refused.too_large && refused.found.contains("more than 1000 bytes"), "{}", refused.found);
-        assert_eq!(unpacked(&bytes, 100_000).unwrap().len(), 100_000);
-        assert!(!unpacked(&bytes[..bytes.len() / 2], 100_000).unwrap_err().too_large);
-    }
-
-    /// Ratio 1000 to 1, beyond any mesh: 71 MB of blanks in 71 kB.
-    #[test]
-    fn a_ratio_that_no_mesh_has_is_refused_beyond_64_megabytes() {
-        let bytes = packed(&vec![b' '; 71 << 20]);
-        assert!(bytes.len() < 1 << 20, "{}", bytes.len());
-        assert!(unpacked(&bytes, u64::MAX).unwrap_err().too_large);
-        assert_eq!(allowed_unpacked(10 << 20, u64::MAX), 500 << 20);
-        assert_eq!(allowed_unpacked(10 << 20, 1 << 20), 1 << 20);
-    }
 }

@@ -5,7 +5,8 @@ use std::rc::Rc;
 
 /// Type of a field's values.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Kind {
+#[allow(missing_docs, reason = "named after the words of a definition")]
+pub enum Kind {
     Bool,
     U8,
     I8,
@@ -29,22 +30,23 @@ pub(crate) enum Kind {
 
 /// Number of values of a field.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Many {
+#[allow(missing_docs, reason = "named after the words of a definition")]
+pub enum Many {
     One,
     Fixed(usize),
     Sequence,
 }
 
 #[derive(Clone, Debug)]
-pub(crate) struct Field {
-    pub(crate) name: Rc<str>,
-    pub(crate) kind: Kind,
-    pub(crate) many: Many,
+pub struct Field {
+    pub name: Rc<str>,
+    pub kind: Kind,
+    pub many: Many,
 }
 
 /// A message and its parts, by their names without `msg`: `std_msgs/Header`.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Definitions {
+pub struct Definitions {
     pub(crate) root: String,
     structs: HashMap<String, Vec<Field>>,
 }
@@ -94,7 +96,7 @@ impl Definitions {
 
     /// Parses the definition in a file: that of the message, followed by those of its parts, each
     /// after a line of `=` and `MSG: name`.
-    pub(crate) fn parse(message: &str, text: &str) -> Self {
+    pub fn parse(message: &str, text: &str) -> Self {
         let root = plain_name(message);
         let mut structs = HashMap::new();
         let (mut name, mut body) = (root.clone(), String::new());
@@ -121,7 +123,7 @@ impl Definitions {
     }
 
     /// Fields of a part. A name without a package refers to `std_msgs` if there is no such part.
-    pub(crate) fn fields(&self, name: &str) -> Option<&[Field]> {
+    pub fn fields(&self, name: &str) -> Option<&[Field]> {
         let found = self.structs.get(name).or_else(|| {
             let (_, last) = name.rsplit_once('/')?;
             self.structs.get(&format!("std_msgs/{last}"))
@@ -182,27 +184,5 @@ fn kind_of(word: &str, package: &str) -> Kind {
         "Header" => Kind::Struct("std_msgs/Header".to_owned()),
         name if name.contains('/') => Kind::Struct(plain_name(name)),
         name => Kind::Struct(format!("{package}/{name}")),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn constants_defaults_bounds_and_comments_of_a_definition_are_told_apart() {
-        let text = "# a message\nuint8 ON=1\nstring WORD = a=b # no\nfloat64 gain 0.5\nstring<=8[<=3] names\nfloat32[4] q # four\n\
-                    Header header\nPart[] parts\n================================================================================\n\
-                    MSG: demo/Part\nbool is_on\n";
-        let found = Definitions::parse("demo/msg/Whole", text);
-        let names: Vec<&str> = found.fields("demo/Whole").unwrap().iter().map(|field| &*field.name).collect();
-        assert_eq!(names, ["gain", "names", "q", "header", "parts"]);
-        let kinds: Vec<(Kind, Many)> =
-            found.fields("demo/Whole").unwrap().iter().map(|field| (field.kind.clone(), field.many)).collect();
-        assert_eq!(kinds[1], (Kind::Text, Many::Sequence));
-        assert_eq!(kinds[2], (Kind::F32, Many::Fixed(4)));
-        assert_eq!(kinds[3].0, Kind::Struct("std_msgs/Header".into()));
-        assert_eq!(kinds[4].0, Kind::Struct("demo/Part".into()));
-        assert_eq!(found.fields("demo/Part").unwrap().len(), 1);
     }
 }

@@ -31,7 +31,6 @@
 //!
 //! Units: rad, rad/s, rad/s², m, s, as in ROS. Not here: robots; the caller gives the robot's
 //! joints ([`Request`]).
-#![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test"))]
 #![allow(rustdoc::private_intra_doc_links, reason = "the page describes how the modules work together")]
 
 mod assemble;
@@ -56,6 +55,12 @@ pub use mcap::MCAP_MAGIC;
 pub use text::{looks_like_messages, read_text};
 pub use unpack::ZSTD_MAGIC;
 pub use write::{TextFormat, write_joint_trajectory};
+
+/// Parts that the tests of this crate reach; not part of the interface.
+#[doc(hidden)]
+pub mod internals {
+    pub use crate::definition::{Definitions, Kind, Many};
+}
 
 use flexarm_settings::Caveat;
 use flexarm_trajectory::Trajectory;

@@ -1,7 +1,5 @@
 //! One motion in every format, written by the Python packages of ROS
 //! (`tools/make_motion_fixtures.py`): the same samples as in the library's own CSV.
-#![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
-#![allow(clippy::print_stdout, reason = "measured errors, with --nocapture")]
 
 use std::path::{Path, PathBuf};
 

@@ -25,7 +25,6 @@
 //!
 //! Not here: recording files, interpretation of the numbers.
 #![allow(non_snake_case, reason = "monogram notation: X_WL, pose of L in W")]
-#![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
 #[cfg(feature = "png")]
 mod arm_picture;
@@ -44,3 +43,26 @@ pub use bend::{BendLine, BentMesh, BentPieces};
 pub use field_plot::FieldPlot;
 pub use magnify::{Magnifier, stations_in_link};
 pub use plot::{CurveLook, LinePlot, Panel, PlotCurve, PlotError, page_plot, paper_plot, plan_plot};
+
+/// Parts that the tests of this crate reach; not part of the interface.
+#[doc(hidden)]
+pub mod internals {
+    #[cfg(feature = "png")]
+    pub use crate::arm_picture::ellipsoid::{ELLIPSOID, Ellipsoid};
+    #[cfg(feature = "png")]
+    pub use crate::arm_picture::legend::{ARROW, on_scale};
+    #[cfg(feature = "png")]
+    pub use crate::arm_picture::{Stage, arrow};
+    pub use crate::charts::{bars, range, wrapped};
+    #[cfg(feature = "png")]
+    pub use crate::mesh_picture::numbers::{displacement, displacements, position, rotations, round_below};
+    #[cfg(feature = "png")]
+    pub use crate::mesh_picture::raster::cover;
+    #[cfg(feature = "png")]
+    pub use crate::mesh_picture::stress_sheet::{is_visible, side_of_worst};
+    #[cfg(feature = "png")]
+    pub use crate::mesh_picture::view::LinkAxes;
+    pub use crate::plot::ranges::equally_long;
+    pub use crate::plot::style::PLAN;
+    pub use crate::plot::svg::{plain, three_digits};
+}

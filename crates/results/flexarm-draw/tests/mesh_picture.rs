@@ -1,11 +1,4 @@
 //! Pictures of a reduction, checked by counting pixels.
-#![cfg(feature = "png")]
-#![allow(non_snake_case, reason = "monogram notation: X_LI, pose of the interface in the link")]
-#![allow(
-    clippy::unwrap_used,
-    clippy::print_stderr,
-    reason = "a test stops at the first failure and says what it skipped"
-)]
 
 use std::path::PathBuf;
 

@@ -49,7 +49,6 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 #![allow(non_snake_case, reason = "monogram notation: X_WL, pose of L in W")]
-#![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
 mod create;
 mod csv_file;
@@ -101,3 +100,25 @@ pub use record::*;
 pub use shape::Shape;
 pub use trace::{RunSource, Trace, TraceRow};
 pub use trace_blocks::CurveQuantity;
+
+/// Kernels that the tests of this crate reach; not part of the interface.
+#[doc(hidden)]
+pub mod internals {
+    #[cfg(feature = "mcap")]
+    pub use crate::mcap_file::beat::Beat;
+    #[cfg(feature = "mcap")]
+    pub use crate::mcap_file::bent::{BentLink, INNER};
+    #[cfg(feature = "mcap")]
+    pub use crate::mcap_file::channels::topic_names;
+    #[cfg(feature = "mcap")]
+    pub use crate::mcap_file::markers::{MOST_POINTS, Path, thinned};
+    #[cfg(feature = "mcap")]
+    pub use crate::mcap_file::messages::{decode, encode};
+    #[cfg(feature = "mcap")]
+    pub use crate::mcap_file::output::WholeRecords;
+    #[cfg(any(feature = "mcap", feature = "rerun"))]
+    pub use crate::poses::{PoseClock, PoseReasons};
+    #[cfg(any(feature = "mcap", feature = "described-tables"))]
+    pub use crate::read::wall::{CAUGHT, caught};
+    pub use crate::written_behind::{CACHED, REACH, WrittenBehind};
+}

@@ -232,38 +232,3 @@ impl Blocks {
 fn wider(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
     [a[0].min(b[0]), a[1].max(b[1])]
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_values_of_a_row_are_those_of_its_quantities_in_their_order() {
-        let number = std::cell::Cell::new(0.0);
-        let next = || {
-            number.set(number.get() + 1.0);
-            f64::sin(number.get())
-        };
-        let list = |length: usize| (0..length).map(|_| next()).collect::<Vec<f64>>();
-        let element =
-            |_| ElasticSample { deflection: std::array::from_fn(|_| next()), load: std::array::from_fn(|_| next()) };
-        let row = TraceRow {
-            error_world: std::array::from_fn(|_| next()),
-            error_path: std::array::from_fn(|_| next()),
-            static_m: std::array::from_fn(|_| next()),
-            contributions: (0..3).map(|_| std::array::from_fn(|_| next())).collect(),
-            gauges: list(2),
-            q: list(2),
-            qdot: list(2),
-            effort: list(2),
-            rigid_effort: list(2),
-            elastic: (0..2).map(element).collect(),
-            energy: crate::EnergySample { kinetic: next(), potential: next(), elastic: next() },
-            ..TraceRow::default()
-        };
-        let mut values = Vec::new();
-        CurveQuantity::all_values(&row, &mut values);
-        let expected: Vec<f64> = CurveQuantity::all(&row).into_iter().map(|quantity| quantity.of(&row)).collect();
-        assert_eq!(values, expected);
-    }
-}

@@ -10,15 +10,16 @@ use std::ops::Range;
 
 /// Number of bytes at the start of a file that stay cached: most files are no longer, and are often
 /// read next.
-const CACHED: u64 = 1 << 30;
+pub const CACHED: u64 = 1 << 30;
 /// Number of bytes between two calls of `fadvise`, and the number of bytes that each call covers:
 /// the disk has time to write a page until one of the last calls covers it again.
 const STEP: u64 = 16 << 20;
-const REACH: u64 = 8 * STEP;
+/// Number of bytes that each call covers.
+pub const REACH: u64 = 8 * STEP;
 
 /// Frees the page cache behind the end of a file. It does not affect the contents of the file.
 #[derive(Debug, Default)]
-pub(crate) struct WrittenBehind {
+pub struct WrittenBehind {
     /// Length of the file at the last call of `fadvise` (bytes).
     advised: u64,
 }
@@ -32,7 +33,7 @@ impl WrittenBehind {
     }
 
     /// Returns the range of bytes to drop from the cache, if it is large enough.
-    fn next(&mut self, written: u64) -> Option<Range<u64>> {
+    pub fn next(&mut self, written: u64) -> Option<Range<u64>> {
         let reach = written.saturating_sub(REACH).max(CACHED);
         if written < reach + STEP || written < self.advised + STEP {
             return None;
@@ -52,28 +53,3 @@ fn let_go(file: &File, range: &Range<u64>) {
 
 #[cfg(not(target_os = "linux"))]
 fn let_go(_file: &File, _range: &Range<u64>) {}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Truth: counted piece by piece. The first call for a page starts writing it, a later one
-    /// drops it.
-    #[test]
-    fn what_is_far_behind_is_let_go_of_and_the_beginning_is_not() {
-        let (mut behind, mut given) = (WrittenBehind::default(), Vec::new());
-        let end = CACHED + 20 * REACH;
-        for written in (0..=end).step_by(300_000) {
-            given.extend(behind.next(written));
-        }
-        assert!(given.iter().all(|range| range.start >= CACHED && range.end <= end));
-        for piece in (CACHED..end - REACH).step_by(1 << 20) {
-            let times = given.iter().filter(|range| range.contains(&piece)).count();
-            assert!((6..=8).contains(&times), "{times} times about {piece}");
-        }
-        assert!((100..=160).contains(&given.len()), "{} times in all", given.len());
-        // Short files stay cached.
-        let mut short = WrittenBehind::default();
-        assert!((0..CACHED).step_by(1 << 20).all(|written| short.next(written).is_none()));
-    }
-}

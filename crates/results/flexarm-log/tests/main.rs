@@ -6,12 +6,21 @@ use flexarm_testkit::allocations::CountingAllocator;
 
 #[cfg(feature = "arrow")]
 mod arrow;
+#[cfg(feature = "mcap")]
+mod bent;
 mod csv;
 mod damaged;
+#[cfg(feature = "parquet")]
+mod data_table;
+mod files;
 mod formats;
 mod magnify;
 #[cfg(feature = "mcap")]
+mod markers;
+#[cfg(feature = "mcap")]
 mod mcap;
+#[cfg(feature = "mcap")]
+mod rates;
 mod read;
 mod recorder_set;
 mod synthetic;

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use flexarm_draw::Magnifier;
+use flexarm_log::internals::{decode, encode, topic_names};
 use flexarm_log::{
     CreateOptions, LinkInfo, LogError, McapRecorder, Recorder, RunHeader, RunResult, START_NS, foxglove_layout,
     plotjuggler_layout,
@@ -139,6 +140,55 @@ fn every_topic_is_there_with_schema_quality_of_service_and_all_samples() {
     ];
     let expected = expected.map(|(topic, schema, count)| (topic.to_owned(), (schema.to_owned(), count)));
     assert_eq!(topics, BTreeMap::from(expected));
+}
+
+/// Truth: derived by hand from the alignment rule.
+#[test]
+fn values_start_at_multiples_of_their_size() {
+    let expected: Vec<u8> = [
+        vec![0, 1, 0, 0],                   // encapsulation, not counted
+        vec![7, 0, 0, 0],                   // at 0
+        vec![3, 0, 0, 0, b'a', b'b', 0],    // at 4: length including the terminating zero
+        vec![0],                            // padding to 12
+        vec![1, 0, 0, 0],                   // at 12: count
+        vec![0, 0, 0, 0, 0, 0, 0xf0, 0x3f], // at 16: 1.0
+    ]
+    .concat();
+    let mut bytes = Vec::new();
+    encode((7_u32, "ab", &[1.0_f64][..]), &mut bytes).unwrap();
+    assert_eq!(bytes, expected);
+    assert_eq!(decode(&bytes), Some((7_u32, "ab", vec![1.0_f64])));
+
+    // An empty sequence ends after its count, without padding for absent elements.
+    encode(Vec::<f64>::new(), &mut bytes).unwrap();
+    assert_eq!(bytes, [0, 1, 0, 0, 0, 0, 0, 0]);
+}
+
+/// Checks that each type named by a field is defined in the schema's own text.
+#[test]
+fn every_schema_carries_all_types_it_names() {
+    const PRIMITIVES: [&str; 8] = ["string", "float64", "float32", "int32", "uint32", "uint8", "byte", "bool"];
+    const SEPARATOR: &str = "================================================================================";
+    let file = run("schemas.mcap", &synthetic::header(), synthetic::SAMPLES);
+    for schema in Summary::read(&file).unwrap().unwrap().schemas.values() {
+        let (name, text) = (&schema.name, std::str::from_utf8(&schema.data).unwrap());
+        let mut package = name.split_once('/').unwrap().0;
+        for line in text.lines().filter(|line| !line.is_empty() && *line != SEPARATOR) {
+            if let Some(part) = line.strip_prefix("MSG: ") {
+                package = part.split_once('/').unwrap().0;
+                continue;
+            }
+            let kind = line.split_whitespace().next().unwrap().trim_end_matches("[]");
+            let full = if kind.contains('/') { kind.to_owned() } else { format!("{package}/{kind}") };
+            assert!(PRIMITIVES.contains(&kind) || text.contains(&format!("MSG: {full}\n")), "{name} lacks {full}");
+        }
+    }
+}
+
+#[test]
+fn element_names_become_valid_and_distinct_topics() {
+    let names = ["lower_arm", "lower arm", "lower.arm", "3rd", ""].map(str::to_owned);
+    assert_eq!(topic_names(&names), ["lower_arm", "lower_arm_2", "lower_arm_3", "_3rd", "_"]);
 }
 
 /// Truth: the samples, decoded by hand.

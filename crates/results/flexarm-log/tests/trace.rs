@@ -1,6 +1,6 @@
 //! Samples kept by a run in memory.
 
-use flexarm_log::{CurveQuantity, ElasticSample, RunHeader, Sample, Trace};
+use flexarm_log::{CurveQuantity, ElasticSample, EnergySample, RunHeader, Sample, Trace, TwinSample};
 
 /// Truth: counting. Two and a half times the maximum number of rows are halved twice: every fourth
 /// sample is kept, evenly, and the maximum error is kept although its sample is not.
@@ -94,4 +94,50 @@ fn curves_of_a_short_run_are_its_samples() {
     let truth: Vec<f64> = (0..1000).map(|k| wave(k).flexible.q[0]).collect();
     assert_eq!((trace.curve(CurveQuantity::Joint(0)), trace.samples_per_block()), (truth, 1));
     assert_eq!(trace.beginning().len(), 1000);
+}
+
+/// Truth: each quantity in a row. Samples that are all equal leave a range of no width.
+#[test]
+fn every_curve_of_a_long_run_is_that_of_its_quantity() {
+    use CurveQuantity::*;
+    let number = std::cell::Cell::new(0.0);
+    let next = || {
+        number.set(number.get() + 1.0);
+        f64::sin(number.get())
+    };
+    let list = |length: usize| (0..length).map(|_| next()).collect::<Vec<f64>>();
+    let element =
+        |_| ElasticSample { deflection: std::array::from_fn(|_| next()), load: std::array::from_fn(|_| next()) };
+    let sample = Sample {
+        error_world: std::array::from_fn(|_| next()),
+        error_path: std::array::from_fn(|_| next()),
+        static_m: std::array::from_fn(|_| next()),
+        contributions: (0..3).map(|_| std::array::from_fn(|_| next())).collect(),
+        gauges: list(2),
+        flexible: TwinSample { q: list(2), qdot: list(2), effort: list(2), ..TwinSample::default() },
+        rigid: TwinSample { effort: list(2), ..TwinSample::default() },
+        elastic: (0..2).map(element).collect(),
+        energy: EnergySample { kinetic: next(), potential: next(), elastic: next() },
+        ..Sample::default()
+    };
+    let mut trace = Trace::new(RunHeader::default());
+    trace.push(&sample);
+    let row = trace.rows[0].clone();
+    while trace.samples_per_block() == 1 {
+        trace.push(&sample);
+    }
+    let mut all = vec![ErrorSize, TurnSize, AcrossPath, StaticSize, MovingSize];
+    all.extend((0..6).map(Error));
+    all.extend((0..3).flat_map(|c| [AlongPath(c), Energy(c)]));
+    all.extend((0..3).flat_map(|k| (0..3).map(move |c| Contribution(k, c)).chain([ContributionSize(k)])));
+    all.extend((0..2).flat_map(|k| [Gauge(k), Joint(k), JointRate(k), Effort(k), RigidEffort(k)]));
+    for k in 0..2 {
+        all.extend((0..6).flat_map(|c| [Deflection(k, c), Load(k, c)]));
+        all.extend((0..2).flat_map(|half| [DeflectionSize(k, half), LoadSize(k, half)]));
+    }
+    for quantity in all {
+        let expected = quantity.of(&row);
+        let curve = trace.curve(quantity);
+        assert!(!curve.is_empty() && curve.iter().all(|value| *value == expected), "{quantity:?}");
+    }
 }

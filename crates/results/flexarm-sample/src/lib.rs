@@ -20,7 +20,6 @@
 //!
 //! Not here: files, the simulation itself, the interpretation of its numbers.
 #![allow(non_snake_case, reason = "monogram notation: X_WL, pose of L in W")]
-#![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
 mod columns;
 mod run;

@@ -46,7 +46,6 @@
 //! Notation: `X_PJ` pose of J in P; L link, V visual, I axes of `<inertial>`. SI units.
 //! Not here: SDF and MJCF, collision shapes, textures, the dynamics model (`flexarm-kinematics`).
 #![allow(non_snake_case, reason = "monogram notation: X_PJ, R_LI, T_VG")]
-#![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test stops at what it did not expect"))]
 
 mod error;
 mod finding;
@@ -80,3 +79,14 @@ pub use read::{
 pub use resolve::search_paths_from_environment;
 pub use tcp::{default_tcp, tcp_candidates};
 pub use transmission::Transmission;
+
+/// Parts that the tests of this crate reach; not part of the interface.
+#[doc(hidden)]
+pub mod internals {
+    pub use crate::lint::lint;
+    pub use crate::mesh::{Loaded, decode};
+    pub use crate::report::Report;
+    pub use crate::xacro::macros::parameters;
+    pub use crate::xacro::process::fits;
+    pub use crate::xml::Lines;
+}

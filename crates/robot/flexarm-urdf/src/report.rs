@@ -5,9 +5,9 @@ use crate::finding::{Finding, Severity, TextPosition};
 
 /// Faults, warnings and notes about one file.
 #[derive(Default)]
-pub(crate) struct Report {
+pub struct Report {
     /// Errors.
-    pub(crate) issues: Vec<Issue>,
+    pub issues: Vec<Issue>,
     /// Warnings and notes, with the line for sorting.
     remarks: Vec<(u32, Finding)>,
 }

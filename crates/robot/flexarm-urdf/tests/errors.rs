@@ -1,9 +1,6 @@
 //! Every fault is found once, with its line and a remedy.
-#![allow(clippy::unwrap_used, reason = "a test stops at what it did not expect")]
 
-mod common;
-
-use common::{TestFolder, hinge, link, problem, problems, problems_with, robot, with_joint};
+use crate::common::{TestFolder, hinge, link, problem, problems, problems_with, robot, with_joint};
 use flexarm_urdf::{Problem, ReadOptions, Severity, UrdfError, check_urdf, check_urdf_text, parse_urdf, read_urdf};
 
 #[track_caller]

@@ -1,11 +1,7 @@
 //! Results for valid URDFs: frames, inertias, limits, mimic joints, shapes.
-#![allow(clippy::unwrap_used, reason = "a test stops at what it did not expect")]
-#![allow(non_snake_case, reason = "monogram notation: X_PJ, R_LI")]
 
-mod common;
-
+use crate::common::{INERTIAL, TestFolder, hinge, link, robot, with_joint};
 use approx::assert_relative_eq;
-use common::{INERTIAL, TestFolder, hinge, link, robot, with_joint};
 use flexarm_kinematics::JointKind;
 use flexarm_urdf::{
     Finding, Geometry, InertiaEstimate, ReadOptions, Severity, UrdfRobot, check_urdf_text, default_tcp, parse_urdf,

@@ -1,9 +1,6 @@
 //! No text makes the reader panic, and every truncation of a file is detected.
-#![allow(clippy::unwrap_used, reason = "a test stops at what it did not expect")]
 
-mod common;
-
-use common::{TestFolder, hinge, link, problem, robot};
+use crate::common::{TestFolder, hinge, link, problem, robot};
 use flexarm_urdf::{Finding, ReadOptions, UrdfError, check_urdf_text, parse_urdf, read_urdf};
 use proptest::prelude::*;
 

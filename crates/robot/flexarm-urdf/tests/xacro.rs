@@ -1,13 +1,10 @@
 //! Xacro against ROS's implementation, and against files without termination.
-#![allow(clippy::unwrap_used, reason = "a test stops at what it did not expect")]
-
-mod common;
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use common::TestFolder;
+use crate::common::TestFolder;
 use flexarm_urdf::{ReadOptions, UrdfError, XacroError, check_urdf, expand_xacro, parse_urdf, read_urdf};
 
 fn data() -> PathBuf {
@@ -244,5 +241,94 @@ fn yaml_that_grows_or_is_broken_is_refused() {
         let path = folder.write("robot.xacro", body);
         let error = expand_xacro(&path, &ReadOptions::default()).unwrap_err().to_string();
         assert!(error.contains("robot.xacro:2") && error.contains(name) || error.contains("too much"), "{error}");
+    }
+}
+
+/// What an attribute with this text becomes.
+fn attribute(text: &str) -> Result<String, UrdfError> {
+    let expanded = expand(&format!("<v n=\"{}\"/>", text.replace('&', "&amp;").replace('"', "&quot;")))?;
+    let document = roxmltree::Document::parse(&expanded).unwrap();
+    let v = document.root_element().first_element_child().unwrap();
+    Ok(v.attribute("n").unwrap().to_owned())
+}
+
+#[test]
+fn a_text_is_cut_at_dollars_with_brackets() {
+    let cut = |text: &str| attribute(text).unwrap_or_else(|e| panic!("{text}: {e}"));
+    assert_eq!(cut("a${1 + 1}c$(eval 1 + 2)"), "a2c3");
+    assert_eq!(cut("$${x} 5$"), "${x} 5$");
+    assert_eq!(cut("$$$(x)"), "$$(x)");
+    let open = attribute("${open").unwrap_err().to_string();
+    assert!(open.contains("no closing"), "{open}");
+}
+
+/// Truth: Python's repr, from `python3 -c "print(repr(...))"`.
+#[test]
+fn numbers_are_printed_as_python_prints_them() {
+    let pairs = [
+        ("0.1 + 0.2", "0.30000000000000004"),
+        ("1.0", "1.0"),
+        ("-0.0", "-0.0"),
+        ("1e16", "1e+16"),
+        ("123456789012345680.0", "1.2345678901234568e+17"),
+        ("1e15", "1000000000000000.0"),
+        ("0.0001", "0.0001"),
+        ("0.00001", "1e-05"),
+        ("1.5e-7", "1.5e-07"),
+        ("1e-300", "1e-300"),
+        ("1.0 / 3.0", "0.3333333333333333"),
+        ("float('nan')", "nan"),
+        ("-float('inf')", "-inf"),
+        ("[\"it's\", 2.0, (None,)]", "[\"it's\", 2.0, (None,)]"),
+    ];
+    for (text, expected) in pairs {
+        assert_eq!(attribute(&format!("${{{text}}}")).unwrap(), expected, "{text}");
+    }
+}
+
+#[test]
+fn text_is_a_number_where_python_takes_it_for_one() {
+    let of = |text: &str| attribute(&format!("${{{text}}}")).ok();
+    assert_eq!(of("int(' +12 ')").as_deref(), Some("12"));
+    assert_eq!(of("int('1_000')").as_deref(), Some("1000"));
+    assert_eq!(of("int('1.0')"), None);
+    assert_eq!(of("int('-')"), None);
+    assert_eq!(of("float('1e-3')").as_deref(), Some("0.001"));
+    assert_eq!(of("float('.5')").as_deref(), Some("0.5"));
+    assert_eq!(of("float('1.5.2')"), None);
+    assert_eq!(of("float('e5')"), None);
+    assert_eq!(of("float('-inf')").as_deref(), Some("-inf"));
+}
+
+/// Truth: PyYAML 6.0.3, `yaml.safe_load`.
+#[test]
+fn plain_scalars_are_what_pyyaml_makes_of_them() {
+    let pairs = [
+        ("12", "12"),
+        ("-0.5", "-0.5"),
+        ("1e3", "'1e3'"),
+        ("1.0e3", "'1.0e3'"),
+        ("1.0e+3", "1000.0"),
+        ("1.", "1.0"),
+        (".5", "0.5"),
+        ("010", "8"),
+        ("1:30", "90"),
+        ("0x1F", "31"),
+        ("yes", "True"),
+        ("off", "False"),
+        ("~", "None"),
+        ("1_000", "1000"),
+        ("-.inf", "-inf"),
+        ("12 34", "'12 34'"),
+        ("0.1.2", "'0.1.2'"),
+    ];
+    for (text, expected) in pairs {
+        let folder = TestFolder::new();
+        folder.write("values.yaml", format!("- {text}\n"));
+        let path = folder.write("robot.xacro", format!("{HEAD}<v n=\"${{xacro.load_yaml('values.yaml')}}\"/></robot>"));
+        let expanded = expand_xacro(&path, &ReadOptions::default()).unwrap();
+        let document = roxmltree::Document::parse(&expanded).unwrap();
+        let v = document.root_element().first_element_child().unwrap();
+        assert_eq!(v.attribute("n").unwrap(), format!("[{expected}]"), "{text}");
     }
 }

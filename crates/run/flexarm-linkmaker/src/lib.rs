@@ -54,7 +54,6 @@
 //! Not here: formats of other programs (`flexarm-fe-io`), elements and reduction (`flexarm-fem`),
 //! robots, motion.
 #![allow(non_snake_case, reason = "monogram notation: X_LB is the pose of B in L, K_BB a stiffness block")]
-#![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
 mod error;
 pub mod export;
@@ -69,3 +68,12 @@ pub mod yardsticks;
 pub use error::{ImportError, JobError, LinkError, WordError};
 pub use material_entry::{MaterialConstants, MaterialEntry};
 pub use stopwatch::Stopwatch;
+
+/// Parts that the tests of this crate reach; not part of the interface.
+#[doc(hidden)]
+pub mod internals {
+    pub use crate::reduce::files::from_folder;
+    pub use crate::reduce::job::{is_job, parse_job};
+    pub use crate::stamp::date;
+    pub use crate::yardsticks::of_interface;
+}

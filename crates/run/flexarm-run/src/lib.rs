@@ -15,7 +15,6 @@
 //! one pose, [`Arm::operating_point`] at many; [`mod@reduce`] converts a mesh to a flexible link.
 //! The study crates build on this crate; the crate `flexarm` re-exports all of them.
 #![allow(non_snake_case, reason = "monogram notation: X_WL, K_S; see docs/references.md")]
-#![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
 pub mod applied_load;
 mod arm;
@@ -150,3 +149,20 @@ pub use summary::{
     TcpFigures,
 };
 pub use tool_path::ToolPath;
+
+/// Kernels that the tests of this crate reach; not part of the interface.
+#[doc(hidden)]
+pub mod internals {
+    pub use crate::caveat::kinds::{EFFORT, FEW_SAMPLES};
+    pub use crate::headline::rounded;
+    pub use crate::mode_recording::describe_modes;
+    pub use crate::monitor::deflection::Deflections;
+    pub use crate::monitor::drive_load::{DriveLoad, DriveLoads};
+    pub use crate::monitor::energy::Energy;
+    pub use crate::monitor::strain::{LinkStrain, Strains};
+    pub use crate::monitor::stress::signed_von_mises;
+    pub use crate::monitor::tool::{ToolError, ToolMonitor};
+    pub use crate::monitor::tool_path::ToolPathMonitor;
+    pub use crate::report::{short, thinned};
+    pub use crate::tool_path::{Standard, Step};
+}

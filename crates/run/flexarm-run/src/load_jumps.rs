@@ -43,29 +43,3 @@ pub(crate) fn jumps_of(wrench: &(dyn Fn(f64) -> Wrench + Send + Sync), start: f6
     };
     (0..INTERVALS).filter_map(jump_in).collect()
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use nalgebra::Vector3;
-
-    fn jumps(f: impl Fn(f64) -> f64 + Send + Sync) -> Vec<f64> {
-        jumps_of(&move |t| Wrench::new(Vector3::x() * f(t), Vector3::zeros()), 0.0, 4.0)
-    }
-
-    #[test]
-    fn jumps_are_found_where_they_are_and_curves_have_none() {
-        let near = |found: Vec<f64>, truth: &[f64]| {
-            assert_eq!(found.len(), truth.len(), "{found:?}");
-            assert!(found.iter().zip(truth).all(|(a, b)| (a - b).abs() < 1e-15 * 10.0), "{found:?}");
-        };
-        near(jumps(|t| 100.0 * (t - 1.23456).signum() + 3.0 * t), &[1.23456]);
-        near(jumps(|t| 5.0 * t.floor()), &[1.0, 2.0, 3.0, 4.0]);
-        near(jumps(|t| if (0.5..0.7091).contains(&t) { 40.0 * t.sin() } else { 0.0 }), &[0.5, 0.7091]);
-        assert!(jumps(|t| 1e4 * (300.0 * t).sin()).is_empty());
-        assert!(jumps(|t| 100.0 * (t - 2.0).abs()).is_empty());
-        assert!(jumps(|t| 100.0 * (200.0 * (t - 2.0)).tanh()).is_empty());
-        assert!(jumps(|_| 7.0).is_empty());
-        assert!(jumps(|t| 1.0 / (t - 2.0)).is_empty());
-    }
-}

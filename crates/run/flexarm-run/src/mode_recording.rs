@@ -102,7 +102,7 @@ pub fn record_modes(
 }
 
 /// Adds captions and tables of the modes, each shown for the same time, to the header.
-fn describe_modes(header: &mut RunHeader, shown: &[DampedMode], seconds: f64) {
+pub fn describe_modes(header: &mut RunHeader, shown: &[DampedMode], seconds: f64) {
     header.trajectory = "modes".into();
     header.has_rigid = true;
     header.log_rate_hz = RATE_HZ;
@@ -222,23 +222,5 @@ impl<'a> Stage<'a> {
             }
         }
         sample
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use flexarm_analysis::damped_modes;
-    use nalgebra::dmatrix;
-
-    use super::*;
-
-    /// Truth: closed form, `ω = √(k/m)`, `ζ = d/(2 √(k m))`.
-    #[test]
-    fn modes_are_listed_by_frequency_and_damping_without_a_size() {
-        let found = damped_modes(&dmatrix![4.0], &dmatrix![8.0], &dmatrix![6400.0]).unwrap();
-        assert_eq!(name(0, &found[0]), "mode 1: 6.37 Hz");
-        let text = list("arm", &found, |_| 3.0);
-        assert!(text.contains("| 1 | 6.366 Hz | 2.50 % | 3 s |"), "{text}");
-        assert!(!text.contains("mm") && !text.contains("magnified"), "{text}");
     }
 }

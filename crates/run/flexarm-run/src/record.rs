@@ -444,20 +444,3 @@ fn meshes(robot: &Robot, links: &[LinkInfo]) -> Vec<LinkMesh> {
     }
     meshes
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn paths_are_shown_without_ways_back() {
-        for (path, shown) in [
-            ("/x/crates/cli/../../robots/arm", "/x/robots/arm"),
-            ("../robots/arm", "../robots/arm"),
-            ("../../a/../b", "../../b"),
-            ("a/./b.toml", "a/b.toml"),
-        ] {
-            assert_eq!(straight(Path::new(path)), shown);
-        }
-    }
-}

@@ -20,7 +20,7 @@ const PER_PERIOD: f64 = 16.0;
 const MOST_INTERVALS: usize = 64;
 
 /// Evaluates the static part at ascending times.
-pub(crate) struct StaticPart {
+pub struct StaticPart {
     path: StaticPath,
     tcp: Frame,
     /// Times between which the curve is smooth, ascending.

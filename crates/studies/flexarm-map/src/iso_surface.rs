@@ -6,11 +6,11 @@ use super::region::Grid;
 
 /// Vertices and triangles of a surface.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Surface {
+pub struct Surface {
     /// Vertices (m, world).
-    pub(super) places: Vec<[f32; 3]>,
+    pub places: Vec<[f32; 3]>,
     /// Vertex indices.
-    pub(super) triangles: Vec<[u32; 3]>,
+    pub triangles: Vec<[u32; 3]>,
 }
 
 /// Six tetrahedra of a cube around the diagonal from 0 to 7; corners numbered by bits (x lowest).
@@ -20,7 +20,7 @@ const TETRAHEDRA: [[usize; 4]; 6] =
 
 /// Returns the surface on which the values of a grid equal a level, in cubes with finite values at
 /// all corners.
-pub(super) fn iso_surface(grid: &Grid, values: &[f64], level: f64) -> Surface {
+pub fn iso_surface(grid: &Grid, values: &[f64], level: f64) -> Surface {
     let mut surface = Surface::default();
     let mut known: HashMap<(usize, usize), u32> = HashMap::new();
     let [nx, ny, nz] = grid.count;
@@ -72,42 +72,4 @@ fn crossing(grid: &Grid, values: &[f64], level: f64, (a, b): (usize, usize)) -> 
     let (p, q) = (grid.place(a), grid.place(b));
     let share = (level - values[a]) / (values[b] - values[a]);
     [0, 1, 2].map(|c| (p[c] + share * (q[c] - p[c])) as f32)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Truth: a sphere of radius r has the area 4 π r²; each edge of a closed surface belongs to
-    /// two triangles, and vertices minus edges plus triangles are two (Euler).
-    #[test]
-    fn the_surface_of_equal_distance_is_a_closed_sphere_of_the_right_area() {
-        let grid = Grid { lower: [-1.0; 3], spacing_m: 0.05, count: [41; 3] };
-        let radius = |k: usize| grid.place(k).iter().map(|x| x * x).sum::<f64>().sqrt();
-        let values: Vec<f64> = (0..grid.places()).map(radius).collect();
-        let surface = iso_surface(&grid, &values, 0.8003);
-        let p = |k: u32| nalgebra::Vector3::from(surface.places[k as usize].map(f64::from));
-        let area: f64 =
-            surface.triangles.iter().map(|&[a, b, c]| 0.5 * (p(b) - p(a)).cross(&(p(c) - p(a))).norm()).sum();
-        let whole = 4.0 * std::f64::consts::PI * 0.8003_f64.powi(2);
-        assert!((area / whole - 1.0).abs() < 2e-3, "{}", area / whole);
-        let mut edges: HashMap<(u32, u32), usize> = HashMap::new();
-        for [a, b, c] in &surface.triangles {
-            for (i, j) in [(a, b), (b, c), (c, a)] {
-                *edges.entry((*i.min(j), *i.max(j))).or_default() += 1;
-            }
-        }
-        assert!(edges.values().all(|n| *n == 2));
-        assert_eq!(surface.places.len() + surface.triangles.len() - edges.len(), 2);
-    }
-
-    #[test]
-    fn places_that_are_not_reached_have_no_surface() {
-        let grid = Grid { lower: [0.0; 3], spacing_m: 1.0, count: [2; 3] };
-        let mut values = vec![0.0; 8];
-        values[7] = 1.0;
-        assert_eq!(iso_surface(&grid, &values, 0.5).triangles.len(), 6);
-        values[0] = f64::NAN;
-        assert!(iso_surface(&grid, &values, 0.5).triangles.is_empty());
-    }
 }

@@ -18,7 +18,6 @@
 //! At each pose the results equal those of [`flexarm_run::statics()`] and [`flexarm_run::modes()`]
 //! to the last bit. Drives are locked. Collisions are not checked.
 #![allow(non_snake_case, reason = "monogram notation: X_WL, K_S; see docs/references.md")]
-#![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
 mod columns;
 mod error;
@@ -51,6 +50,16 @@ pub use poses::read_poses;
 pub use recording::{quantity_text, readable as readable_quantity};
 pub use region::{Grid, JointRange, MOST_PLACES, MapRegion, ToolDirections, WorkspaceGrid};
 pub use table::{MapPose, MapTable, QUANTILES, Spread};
+
+/// Parts that the tests of this crate reach; not part of the interface.
+#[doc(hidden)]
+pub mod internals {
+    pub use crate::columns::cheapest;
+    pub use crate::evaluate::largest_gain;
+    pub use crate::iso_surface::iso_surface;
+    pub use crate::placement::best_box;
+    pub use crate::region::round_number;
+}
 
 use self::columns::Layout;
 use self::evaluate::{Cut, Evaluator};

@@ -53,7 +53,7 @@ fn cost_by_place(table: &MapTable, grid: &Grid, by: usize) -> Vec<f64> {
 ///
 /// Complexity: linear in the number of places, independent of the size (running maxima, axis by
 /// axis).
-fn best_box(grid: &Grid, cost: &[f64], size_m: [f64; 3]) -> Option<Placement> {
+pub fn best_box(grid: &Grid, cost: &[f64], size_m: [f64; 3]) -> Option<Placement> {
     let window = size_m.map(|edge| (edge / grid.spacing_m - 1e-9).ceil().max(0.0) as usize + 1);
     if (0..3).any(|c| window[c] > grid.count[c]) {
         return None;
@@ -98,41 +98,5 @@ fn running_maximum(values: &mut [f64], count: [usize; 3], axis: usize, window: u
             }
             values[start + k * stride] = falling.front().map_or(f64::INFINITY, |&j| line[j]);
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Truth: brute force over all boxes.
-    #[test]
-    fn the_best_box_is_the_one_that_trying_all_of_them_finds() {
-        let grid = Grid { lower: [-1.0, 2.0, 0.5], spacing_m: 0.1, count: [9, 7, 5] };
-        let cost: Vec<f64> = (0..grid.places())
-            .map(|k| if k % 41 == 7 { f64::INFINITY } else { ((k as f64 * 0.618).fract() * 997.0).sin().abs() + 0.1 })
-            .collect();
-        for (size, window) in
-            [([0.2, 0.1, 0.2], [3, 2, 3]), ([0.0, 0.35, 0.1], [1, 5, 2]), ([0.11, 0.0, 0.0], [3, 1, 1])]
-        {
-            let found = best_box(&grid, &cost, size).unwrap();
-            let mut best = f64::INFINITY;
-            for z in 0..=grid.count[2] - window[2] {
-                for y in 0..=grid.count[1] - window[1] {
-                    for x in 0..=grid.count[0] - window[0] {
-                        let mut worst = 0.0_f64;
-                        for k in 0..window.iter().product::<usize>() {
-                            let (i, j, l) = (k % window[0], k / window[0] % window[1], k / (window[0] * window[1]));
-                            worst = worst.max(cost[(x + i) + 9 * ((y + j) + 7 * (z + l))]);
-                        }
-                        best = best.min(worst);
-                    }
-                }
-            }
-            assert_eq!(found.worst, best);
-            assert_eq!(found.points, window.iter().product::<usize>());
-        }
-        assert_eq!(best_box(&grid, &cost, [2.0, 0.1, 0.1]), None, "larger than the grid");
-        assert_eq!(best_box(&grid, &vec![f64::INFINITY; grid.places()], [0.0; 3]), None, "nothing is reached");
     }
 }

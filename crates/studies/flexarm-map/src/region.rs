@@ -153,7 +153,8 @@ impl Grid {
     /// # Errors
     /// [`MapError::Bounds`], [`MapError::Spacing`] or [`MapError::TooMany`] for an invalid box, an
     /// invalid spacing or too many places.
-    pub(super) fn within([lower, upper]: [[f64; 3]; 2], spacing_m: f64) -> Result<Self, MapError> {
+    #[doc(hidden)]
+    pub fn within([lower, upper]: [[f64; 3]; 2], spacing_m: f64) -> Result<Self, MapError> {
         let sound = (0..3).all(|c| lower[c].is_finite() && upper[c].is_finite() && lower[c] <= upper[c]);
         if !sound {
             return Err(MapError::Bounds { lower, upper });
@@ -195,63 +196,9 @@ pub(super) fn pose_at(place: [f64; 3], rotation: &Rotation3<f64>) -> Pose {
 }
 
 /// Returns the round number nearest to `x`: 1, 2 or 5 times a power of ten.
-pub(super) fn round_number(x: f64) -> f64 {
+pub fn round_number(x: f64) -> f64 {
     let power = 10_f64.powf(x.log10().floor());
     let factors = [1.0, 2.0, 5.0, 10.0].into_iter();
     let nearest = factors.min_by(|a, b| (x / power - a).abs().total_cmp(&(x / power - b).abs()));
     power * nearest.unwrap_or(1.0)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_grid_of_a_box_of_whole_spacings_has_both_its_ends() {
-        let grid = Grid::within([[-1.0, 0.0, 0.5], [1.0, 0.3, 0.5]], 0.1).unwrap();
-        assert_eq!(grid.count, [21, 4, 1]);
-        assert_eq!(grid.place(0), [-1.0, 0.0, 0.5]);
-        let last = grid.place(grid.places() - 1);
-        assert!((last[0] - 1.0).abs() < 1e-12 && (last[1] - 0.3).abs() < 1e-12 && last[2] == 0.5);
-        assert_eq!(grid.index(21 * 4 - 1), [20, 3, 0]);
-    }
-
-    /// Truth: directions are uniform on a cap if the area within each is proportional to its
-    /// number, `1 - cos(angle) = part (1 - cos(cone))`.
-    #[test]
-    fn directions_of_a_cone_lie_evenly_within_it() {
-        let cone = 0.6;
-        let tool = ToolDirections { axis: [0.3, -0.2, -2.0], cone_rad: cone, tilts: 50, ..ToolDirections::default() };
-        let rotations = tool.rotations().unwrap();
-        let axis = Vector3::from(tool.axis).normalize();
-        let mut mean = Vector3::zeros();
-        for (k, R) in rotations.iter().enumerate() {
-            assert!((R.matrix() * R.matrix().transpose() - Matrix3::identity()).amax() < 1e-14);
-            assert!((R.matrix().determinant() - 1.0).abs() < 1e-14);
-            let z = R * Vector3::z();
-            let share = (1.0 - z.dot(&axis)) / (1.0 - cone.cos());
-            assert!((share - k as f64 / 49.0).abs() < 1e-12, "{share}");
-            mean += z / 50.0;
-        }
-        // The centroid of a cap is on its axis at (1 + cos)/2.
-        let centre = axis * 0.5 * (1.0 + cone.cos());
-        assert!((mean - centre).norm() < 0.02, "{}", (mean - centre).norm());
-    }
-
-    #[test]
-    fn a_tool_that_points_down_has_its_x_axis_along_world_x() {
-        let R = ToolDirections::default().rotations().unwrap()[0];
-        assert!((R * Vector3::z() + Vector3::z()).norm() < 1e-15);
-        assert!((R * Vector3::x() - Vector3::x()).norm() < 1e-15);
-        let R = ToolDirections { axis: [1.0, 0.0, 0.0], ..ToolDirections::default() }.rotations().unwrap()[0];
-        assert!((R * Vector3::z() - Vector3::x()).norm() < 1e-15);
-        assert!((R.matrix().determinant() - 1.0).abs() < 1e-15);
-    }
-
-    #[test]
-    fn numbers_are_rounded_to_one_two_and_five() {
-        for (x, round) in [(0.093, 0.1), (0.17, 0.2), (0.04, 0.05), (3.4, 2.0), (8.0, 10.0)] {
-            assert!((round_number(x) / round - 1.0).abs() < 1e-12, "{x}: {}", round_number(x));
-        }
-    }
 }

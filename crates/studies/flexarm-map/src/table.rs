@@ -46,7 +46,8 @@ impl MapTable {
     }
 
     /// Returns the rows with the best and the worst value of a column.
-    pub(super) fn extremes(&self, column: usize) -> Option<(usize, usize)> {
+    #[doc(hidden)]
+    pub fn extremes(&self, column: usize) -> Option<(usize, usize)> {
         let cost = |row: usize| self.cost(column, self.row(row)[column]);
         Some((cheapest(self.rows(), cost)?, cheapest(self.rows(), |row| -cost(row))?))
     }
@@ -73,7 +74,8 @@ pub struct Spread {
 
 impl Spread {
     /// Computes the distribution of values in any order; non-finite ones are left out.
-    pub(super) fn of(mut values: Vec<f64>) -> Self {
+    #[doc(hidden)]
+    pub fn of(mut values: Vec<f64>) -> Self {
         values.retain(|x| x.is_finite());
         values.sort_unstable_by(f64::total_cmp);
         let n = values.len();
@@ -122,38 +124,5 @@ impl MapPose {
             value: values[by],
             quantities: quantities.map(|(column, value)| (column.name.clone(), *value)).collect(),
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Truth: quantiles of 0, 1, ..., 100 are their percentages.
-    #[test]
-    fn quantiles_of_equal_steps_are_their_percents() {
-        let values: Vec<f64> = (0..=100).rev().map(f64::from).chain([f64::NAN]).collect();
-        let spread = Spread::of(values);
-        for (part, value) in &spread.quantiles {
-            assert!((100.0 * part.parse::<f64>().unwrap() - value).abs() < 1e-12);
-        }
-        assert_eq!((spread.min, spread.max, spread.mean), (0.0, 100.0, 50.0));
-        assert!(Spread::of(vec![f64::NAN]).max.is_nan());
-    }
-
-    #[test]
-    fn the_best_frequency_is_the_highest_and_the_best_sag_the_least() {
-        let column = |name: &str, more_is_better| MapColumn {
-            name: name.into(),
-            meaning: String::new(),
-            quantity: true,
-            more_is_better,
-        };
-        let columns = vec![column("sag_m", false), column("frequency_1_hz", true)];
-        let table = MapTable { columns, values: vec![2.0, 10.0, 1.0, 12.0, f64::NAN, f64::NAN, 3.0, 9.0] };
-        assert_eq!(table.extremes(0), Some((1, 3)));
-        assert_eq!(table.extremes(1), Some((1, 3)));
-        assert_eq!(table.rows(), 4);
-        assert_eq!(table.column("sag_m").unwrap()[3], 3.0);
     }
 }

@@ -40,28 +40,30 @@ const MATERIALS: [(&str, f64, &str); 3] =
 /// A uniform section with the bending stiffness of the link's outline, hollow such that the link
 /// has its mass.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub(crate) struct BeamSection {
+pub struct BeamSection {
     /// One of `box`, `tube`, `rectangle`, `circle`, as in the robot file.
-    pub(crate) section: &'static str,
+    pub section: &'static str,
     /// Sizes along y and z of the section; diameters of round ones (m).
-    pub(crate) width: f64,
-    pub(crate) height: f64,
+    pub width: f64,
+    /// As `width`.
+    pub height: f64,
     /// Wall thickness (m); none of solid ones.
-    pub(crate) wall: Option<f64>,
+    pub wall: Option<f64>,
     /// Wall thickness if only half of the mass is in the wall (m).
-    pub(crate) wall_of_half: Option<f64>,
-    pub(crate) material: &'static str,
+    pub wall_of_half: Option<f64>,
+    /// Name of the material.
+    pub material: &'static str,
     /// Direction of the section's y in link axes.
-    pub(crate) y_axis: [f64; 3],
+    pub y_axis: [f64; 3],
     /// Offset of the centroid from the line between the joints, in link axes (m).
-    pub(crate) offset: [f64; 3],
+    pub offset: [f64; 3],
     /// End points of the beam, link axes (m); none if it runs from the link's frame to the next
     /// joint.
-    pub(crate) ends: Option<[[f64; 3]; 2]>,
+    pub ends: Option<[[f64; 3]; 2]>,
     /// Ratio of maximum to minimum outer size along the beam.
-    pub(crate) taper: f64,
+    pub taper: f64,
     /// Fraction of the cuts with an open outline.
-    pub(crate) open: f64,
+    pub open: f64,
 }
 
 impl BeamSection {
@@ -77,21 +79,22 @@ impl BeamSection {
 }
 
 /// Data of a link that may be a beam.
-pub(crate) struct Candidate<'a> {
+pub struct Candidate<'a> {
     /// Parent joint of the link.
-    pub(crate) proximal: Option<&'a Joint>,
+    pub proximal: Option<&'a Joint>,
     /// Joint at the distal end.
-    pub(crate) distal: &'a Joint,
-    pub(crate) inertia: Option<LinkInertia>,
+    pub distal: &'a Joint,
+    /// Inertia of the link, if it is known.
+    pub inertia: Option<LinkInertia>,
     /// Shapes, in link axes.
-    pub(crate) meshes: &'a [TriangleMesh],
+    pub meshes: &'a [TriangleMesh],
     /// Length of the whole arm (m).
-    pub(crate) arm: f64,
+    pub arm: f64,
 }
 
 /// Returns a section for the link, or the reason why there is none. If the shape is not between the
 /// link's frames, the beam runs along the body given by shape and joint axes.
-pub(crate) fn propose(link: &Candidate<'_>) -> Result<BeamSection, NoSection> {
+pub fn propose(link: &Candidate<'_>) -> Result<BeamSection, NoSection> {
     let reason = match between(link, [Vector3::zeros(), link.distal.X_PJ.translation.vector]) {
         Err(reason) if reason.is_elsewhere() => reason,
         found => return found,
@@ -108,7 +111,8 @@ pub(crate) fn propose(link: &Candidate<'_>) -> Result<BeamSection, NoSection> {
 
 /// Reason why a link has no section.
 #[derive(Clone, Debug, thiserror::Error)]
-pub(crate) enum NoSection {
+#[allow(missing_docs, reason = "the messages say it")]
+pub enum NoSection {
     #[error("too short: {:.0} mm of the arm's {:.0} mm", 1e3 * .length, 1e3 * .arm)]
     TooShort { length: f64, arm: f64 },
     #[error("its mass is unknown")]
@@ -466,6 +470,3 @@ fn equivalent(outlines: &[Outline], shape: Shape, length: f64, wall: f64) -> Bea
         open: 0.0,
     }
 }
-
-#[cfg(test)]
-mod tests;

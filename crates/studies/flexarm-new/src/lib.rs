@@ -15,7 +15,6 @@
 //! reading the description (`flexarm-urdf`), the meaning of a robot file ([`flexarm_run::Robot`]),
 //! the simulation that follows ([`flexarm_run::Arm::simulate`]).
 #![allow(non_snake_case, reason = "monogram notation: X_WL, K_S; see docs/references.md")]
-#![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
 mod assumption;
 mod beams;
@@ -43,6 +42,16 @@ use flexarm_run::motion_report::motion_report;
 
 pub use assumption::Assumption;
 pub use report::{NewDrive, NewHeld, NewJoint, NewLink, NewPayload, NewRobot};
+
+/// Parts that the tests of this crate reach; not part of the interface.
+#[doc(hidden)]
+pub mod internals {
+    pub use crate::beams::{BeamSection, Candidate, NoSection, propose};
+    pub use crate::chain::{Chain, find};
+    pub use crate::gears::{PEAK_OVER_RATED, class};
+    pub use crate::loads::guessed_payload;
+    pub use crate::place::relative;
+}
 
 /// Options of [`new_robot`]; missing ones are determined from the description.
 #[derive(Clone, Debug, Default)]

@@ -165,7 +165,7 @@ pub(crate) fn wrist_torque(payload: f64, moving_mass: f64, reach: f64) -> f64 {
 ///
 /// * `joints`: effort limit, gravity torque without payload, and its increase with payload (N m per
 ///   kg).
-pub(crate) fn guessed_payload(mass: f64, joints: &[(f64, f64, f64)]) -> f64 {
+pub fn guessed_payload(mass: f64, joints: &[(f64, f64, f64)]) -> f64 {
     let mut most = PAYLOAD_SHARE * mass;
     for &(effort, weight, per_kg) in joints {
         if effort.is_finite() && effort > weight && effort < SENSELESS * weight.max(1e-3) && per_kg > 1e-6 {
@@ -184,20 +184,4 @@ fn rounded_down(value: f64) -> f64 {
     let steps = [1.0, 1.5, 2.0, 3.0, 5.0, 7.0, 10.0];
     let step = steps.into_iter().rev().find(|s| s * power <= value * (1.0 + 1e-9)).unwrap_or(1.0);
     (step * power * 1e6).round() / 1e6
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_guessed_payload_is_a_share_of_the_mass_that_the_effort_limits_carry() {
-        assert_eq!(guessed_payload(1000.0, &[]), 150.0);
-        // 0.8 * 1000 - 600 = 200 N m remain, at 20 N m per kg.
-        assert_eq!(guessed_payload(1000.0, &[(1000.0, 600.0, 20.0)]), 10.0);
-        // A limit below the arm's own gravity torque is ignored.
-        assert_eq!(guessed_payload(1000.0, &[(500.0, 600.0, 20.0)]), 150.0);
-        assert_eq!(guessed_payload(20.6, &[]), 3.0);
-        assert_eq!(guessed_payload(0.0, &[]), 0.0);
-    }
 }

@@ -83,7 +83,7 @@ pub(crate) fn refuse_other_formats(path: &Path) -> Result<(), Error> {
 }
 
 /// Returns the relative path from a folder to a file; both must be absolute.
-fn relative(from: &Path, to: &Path) -> Option<String> {
+pub fn relative(from: &Path, to: &Path) -> Option<String> {
     let (from, to): (Vec<_>, Vec<_>) = (from.components().collect(), to.components().collect());
     let common = from.iter().zip(&to).take_while(|(a, b)| a == b).count();
     let down = to[common..].iter().map(|c| match c {
@@ -172,17 +172,4 @@ fn copied(draft: &Draft, urdf: &Path, folder: &Path, robot_path: PathBuf) -> Res
         urdf.display()
     );
     Ok(Placed { reference: name, robot_path, packages: Vec::new(), arguments: Vec::new(), files, words })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn relative_paths_lead_up_to_what_both_have_and_down_again() {
-        let of = |from: &str, to: &str| relative(from.as_ref(), to.as_ref());
-        assert_eq!(of("/a/b", "/a/b/x.urdf").as_deref(), Some("x.urdf"));
-        assert_eq!(of("/a/new", "/a/urdf/x.urdf").as_deref(), Some("../urdf/x.urdf"));
-        assert_eq!(of("/a/b/new", "/a/x.urdf").as_deref(), Some("../../x.urdf"));
-    }
 }

@@ -1,6 +1,6 @@
 //! `flexarm sweep`: studies of many runs, their shards, and their results.
 
-mod plan;
+pub(crate) mod plan;
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};

@@ -250,7 +250,7 @@ fn literal(word: &str) -> String {
 }
 
 /// Quotes a word for a shell.
-pub(super) fn quoted(word: &str) -> String {
+pub fn quoted(word: &str) -> String {
     match word.chars().all(|c| c.is_alphanumeric() || "/._-+=:,@".contains(c)) {
         true => word.to_owned(),
         false => format!("'{}'", word.replace('\'', "'\\''")),
@@ -267,16 +267,4 @@ fn text(found: &PlanSummary) -> String {
         out += &format!("merge    {}\n", found.merge);
     }
     out
-}
-
-#[cfg(test)]
-mod tests {
-    use super::quoted;
-
-    #[test]
-    fn words_with_blanks_and_quotes_stay_one_word_of_the_shell() {
-        assert_eq!(quoted("/a/b-c.toml"), "/a/b-c.toml");
-        assert_eq!(quoted("a b"), "'a b'");
-        assert_eq!(quoted("it's $x"), "'it'\\''s $x'");
-    }
 }

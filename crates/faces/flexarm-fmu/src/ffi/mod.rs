@@ -5,7 +5,7 @@
 //! zero, and objects are those that this library returned and that are not freed yet.
 
 mod c;
-mod fmi2;
+pub(crate) mod fmi2;
 mod fmi3;
 
 use std::ffi::{CStr, CString, c_char, c_void};

@@ -17,7 +17,7 @@ fn data<'a>(text: &Text<'a>) -> impl Iterator<Item = (super::error::ErrorPositio
 /// Reads `node,dof,node,dof,value` (commas or blanks); rows are sorted by node and component.
 ///
 /// Also returns a warning about internal unknowns (negative labels), if there are any.
-pub(super) fn parse_labelled(text: Text<'_>) -> Result<(LabelledMatrix, Option<String>), ExchangeError> {
+pub fn parse_labelled(text: Text<'_>) -> Result<(LabelledMatrix, Option<String>), ExchangeError> {
     let mut entries = Vec::new();
     for (place, line) in data(&text) {
         let mut values = words(line);
@@ -71,7 +71,7 @@ pub(super) fn parse_coordinate(text: Text<'_>, storage: Storage) -> Result<Label
 }
 
 /// Reads a CalculiX `.dof`: one `node.dof` per row, as text, because `10.1` and `10.10` differ.
-pub(super) fn parse_dof_list(text: Text<'_>) -> Result<Vec<DofLabel>, ExchangeError> {
+pub fn parse_dof_list(text: Text<'_>) -> Result<Vec<DofLabel>, ExchangeError> {
     let mut rows = Vec::new();
     for (place, line) in data(&text) {
         let label = line
@@ -105,40 +105,4 @@ pub(super) fn parse_equation_mapping(text: Text<'_>) -> Result<Vec<DofLabel>, Ex
         rows.push(DofLabel::new(node, dof.ok_or_else(wrong)? as u8 + 1));
     }
     Ok(rows)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn commas_and_blanks_and_either_triangle_read_alike() {
-        for text in [
-            "1,1, 1,1, 4.0\n1,2, 1,1, -1.5\n1,2, 1,2, 3.0\n",
-            "1 1 1 1 4.0\n1 1 1 2 -1.5\n1 2 1 2 3.0\n",
-            "** note\n1,1,1,1,4.\r\n1,1,1,2,-1.5\r\n1,2,1,1,-1.5\r\n1,2,1,2,3\r\n",
-        ] {
-            let (matrix, warning) = parse_labelled(Text::new(text, "t")).unwrap();
-            assert_eq!(matrix.dense().unwrap().as_slice(), [4.0, -1.5, -1.5, 3.0]);
-            assert_eq!(matrix.rows, [DofLabel::new(1, 1), DofLabel::new(1, 2)]);
-            assert_eq!(warning, None);
-        }
-    }
-
-    #[test]
-    fn internal_unknowns_of_abaqus_stand_last_and_are_reported() {
-        let text = "-2,1,-2,1,7\n-1,1,-1,1,6\n5,1,5,1,4\n5,1,-1,1,1\n";
-        let (matrix, warning) = parse_labelled(Text::new(text, "t")).unwrap();
-        let nodes: Vec<_> = matrix.rows.iter().map(|label| label.node.unwrap()).collect();
-        assert_eq!(nodes, [5, -1, -2]);
-        assert!(warning.unwrap().contains("2 rows have negative node numbers"));
-    }
-
-    #[test]
-    fn a_dof_list_is_text_and_not_numbers() {
-        let rows = parse_dof_list(Text::new("10.1\n10.10\n\n", "job.dof")).unwrap();
-        assert_eq!(rows, [DofLabel::new(10, 1), DofLabel::new(10, 10)]);
-        let error = parse_dof_list(Text::new("10.1\n10\n", "job.dof")).unwrap_err();
-        assert!(error.to_string().starts_with("job.dof:2: row: found \"10\""), "{error}");
-    }
 }

@@ -59,14 +59,14 @@ fn mend(help: &str) -> String {
 
 /// Position of an error: a file and, for text, a line of it.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct ErrorPosition<'a> {
+pub struct ErrorPosition<'a> {
     pub(super) origin: &'a str,
     pub(super) line: Option<usize>,
 }
 
 impl<'a> ErrorPosition<'a> {
     /// Refers to the file as a whole.
-    pub(super) fn file(origin: &'a str) -> Self {
+    pub fn file(origin: &'a str) -> Self {
         Self { origin, line: None }
     }
 

@@ -6,13 +6,13 @@ use super::text::shown;
 
 /// Repeated fields of equal width.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Format {
+pub struct Format {
     /// Number of columns of each field.
-    pub(super) width: usize,
+    pub width: usize,
 }
 
 /// Parses the last descriptor of a format.
-pub(super) fn parse_format(text: &str, place: &ErrorPosition<'_>) -> Result<Format, ExchangeError> {
+pub fn parse_format(text: &str, place: &ErrorPosition<'_>) -> Result<Format, ExchangeError> {
     let upper = text.to_ascii_uppercase();
     let width = upper.rfind(['I', 'E', 'D', 'F', 'G']).and_then(|letter| {
         let digits: String = upper[letter + 1..].chars().take_while(char::is_ascii_digit).collect();
@@ -25,7 +25,7 @@ pub(super) fn parse_format(text: &str, place: &ErrorPosition<'_>) -> Result<Form
 
 impl Format {
     /// Splits a line into fields; blank ones at its end are omitted.
-    pub(super) fn fields<'l>(&self, line: &'l str) -> impl Iterator<Item = &'l str> + use<'l> {
+    pub fn fields<'l>(&self, line: &'l str) -> impl Iterator<Item = &'l str> + use<'l> {
         // Columns are bytes; a line with non-ASCII characters has no valid numbers and is treated
         // as empty.
         let line = if line.is_ascii() { line.trim_end() } else { "" };
@@ -43,20 +43,4 @@ pub(super) fn fortran(value: f64, decimals: usize, width: usize) -> String {
     // A three-digit exponent replaces the letter, as in Fortran.
     let letter = if exponent.abs() < 100 { "E" } else { "" };
     format!("{:>width$}", format!("{mantissa}{letter}{sign}{:02}", exponent.abs()))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn formats_give_their_width() {
-        for (text, width) in [("(8I10)", 10), ("(3E25.16)", 25), ("1P,3E23.16", 23), ("(1P5D16.9)", 16), ("5e16.9", 16)]
-        {
-            assert_eq!(parse_format(text, &ErrorPosition::file("t")).unwrap().width, width, "{text}");
-        }
-        assert!(parse_format("(A8)", &ErrorPosition::file("t")).is_err());
-        let fields: Vec<_> = Format { width: 5 }.fields("-1.0-2.00-3.000  ").collect();
-        assert_eq!(fields, ["-1.0-", "2.00-", "3.000"]);
-    }
 }

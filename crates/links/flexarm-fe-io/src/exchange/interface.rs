@@ -147,14 +147,16 @@ impl FromStr for InterfaceMap {
 
 /// Rows of a map in a matrix, from 0.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct ResolvedMap {
-    pub(super) interfaces: Vec<[usize; 6]>,
-    pub(super) modal: Vec<usize>,
+#[doc(hidden)]
+pub struct ResolvedMap {
+    pub interfaces: Vec<[usize; 6]>,
+    pub modal: Vec<usize>,
 }
 
 impl InterfaceMap {
     /// Finds the rows; all remaining rows must be modal coordinates.
-    pub(super) fn resolve(&self, rows: &[DofLabel], origin: &str) -> Result<ResolvedMap, ExchangeError> {
+    #[doc(hidden)]
+    pub fn resolve(&self, rows: &[DofLabel], origin: &str) -> Result<ResolvedMap, ExchangeError> {
         let index: HashMap<DofLabel, usize> = rows.iter().enumerate().map(|(i, label)| (*label, i)).collect();
         let mut owner: HashMap<usize, &str> = HashMap::new();
         let mut find = |name, picks: &[RowPick]| -> Result<Vec<usize>, ExchangeError> {
@@ -293,56 +295,5 @@ pub fn propose_map(rows: &[DofLabel]) -> Option<InterfaceMap> {
             named((0..n).map(|k| vec![RowPick::Rows { first: 6 * k + 1, last: 6 * k + 6 }]).collect())
         }
         _ => None,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn rows(nodes: &[i64], last: u8) -> Vec<DofLabel> {
-        nodes.iter().flat_map(|node| (1..=last).map(|dof| DofLabel::new(*node, dof))).collect()
-    }
-
-    #[test]
-    fn a_map_is_read_and_printed_unchanged() {
-        for text in ["A=1001,B=1002", "A=947:1-3+948:1-3,B=949:1-3+950:1-3", "A=#1-6,B=#7-12,modal=#13-22", "A=5:2"] {
-            assert_eq!(text.parse::<InterfaceMap>().unwrap().to_string(), text);
-        }
-        for text in ["", "A", "A=", "A=1:0-9", "A=#0-5", "A=#6-1", "A=x", "A=1,A=2", "A=#1-99999999999999999999"] {
-            let error = text.parse::<InterfaceMap>().unwrap_err();
-            assert_eq!(error.kind, ExchangeErrorKind::Interface, "{text}: {error}");
-        }
-    }
-
-    #[test]
-    fn maps_find_their_rows_in_any_order_and_the_rest_is_modal() {
-        let mut labels = rows(&[7, 3], 6);
-        labels.push(DofLabel::new(2001, 0));
-        let map: InterfaceMap = "A=3,B=7".parse().unwrap();
-        let resolved = map.resolve(&labels, "t").unwrap();
-        assert_eq!(resolved.interfaces, [[6, 7, 8, 9, 10, 11], [0, 1, 2, 3, 4, 5]]);
-        assert_eq!(resolved.modal, [12]);
-    }
-
-    #[test]
-    fn maps_that_do_not_fit_say_what_the_file_has() {
-        let labels = rows(&[947, 948, 949, 950], 3);
-        let fail = |text: &str| text.parse::<InterfaceMap>().unwrap().resolve(&labels, "t").unwrap_err().to_string();
-        assert!(fail("A=947,B=948").contains("its nodes are [947, 948, 949, 950]"));
-        assert!(fail("A=947:1-3,B=949:1-3+950:1-3").contains("3 rows"));
-        assert!(fail("A=#1-6,B=#6-11").contains("also in A"));
-        assert!(fail("A=947:1-3+948:1-3").contains("one of 6 in no interface"));
-        assert!(fail("A=#9-14").contains("12 rows"));
-    }
-
-    #[test]
-    fn proposals_fit_the_rows() {
-        let text = |rows: &[DofLabel]| propose_map(rows).map(|map| map.to_string());
-        assert_eq!(text(&rows(&[1001, 1002], 6)).unwrap(), "A=1001,B=1002");
-        assert_eq!(text(&rows(&[947, 948, 949, 950], 3)).unwrap(), "A=947:1-3+948:1-3,B=949:1-3+950:1-3");
-        assert_eq!(text(&[DofLabel::UNKNOWN; 22]).unwrap(), "A=#1-6,B=#7-12");
-        assert_eq!(text(&rows(&[1, 2, 3], 6)).unwrap(), "A=1,B=2,C=3");
-        assert_eq!(text(&rows(&[1], 6)), None);
     }
 }

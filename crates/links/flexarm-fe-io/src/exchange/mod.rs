@@ -31,25 +31,25 @@
 //!
 //! Not here: meshes, reduction, the checks of a stiffness.
 
-mod abaqus_text;
+pub(crate) mod abaqus_text;
 mod assemble;
 mod cards;
 mod diagnose;
-mod dmig;
-mod error;
-mod fortran;
+pub(crate) mod dmig;
+pub(crate) mod error;
+pub(crate) mod fortran;
 mod harwell_boeing;
 mod interface;
 mod matrix;
-mod matrix_market;
+pub(crate) mod matrix_market;
 mod op4_binary;
 mod op4_text;
-mod read;
+pub(crate) mod read;
 mod recognise;
 mod sid;
 mod sidecar;
 mod simscape;
-mod text;
+pub(crate) mod text;
 mod user_element;
 
 pub use assemble::{InterfaceMatrices, assemble_interfaces};

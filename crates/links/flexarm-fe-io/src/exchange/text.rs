@@ -35,13 +35,14 @@ pub(super) fn unpack_head(bytes: &[u8], length: usize) -> Cow<'_, [u8]> {
 
 /// Text file with its name in messages.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Text<'a> {
+pub struct Text<'a> {
     pub(super) origin: &'a str,
     pub(super) text: &'a str,
 }
 
 impl<'a> Text<'a> {
-    pub(super) fn new(text: &'a str, origin: &'a str) -> Self {
+    /// `origin`: name in messages.
+    pub fn new(text: &'a str, origin: &'a str) -> Self {
         Self { origin, text }
     }
 
@@ -64,7 +65,7 @@ pub(super) fn words(line: &str) -> impl Iterator<Item = &str> {
 /// Parses a real number, also with the exponent letter D or without one, as in `1.5-3`.
 ///
 /// NaN and infinity are returned; the caller rejects them.
-pub(super) fn real(text: &str) -> Option<f64> {
+pub fn real(text: &str) -> Option<f64> {
     let text = text.trim();
     if let Ok(number) = text.parse() {
         return Some(number);
@@ -145,30 +146,5 @@ pub(super) fn shown(text: &str) -> String {
     match text.char_indices().nth(LONGEST) {
         Some((end, _)) => format!("{:?}...", &text[..end]),
         None => format!("{text:?}"),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn numbers_of_fortran_are_read_with_d_and_without_letter() {
-        for (text, value) in [
-            ("1.5", 1.5),
-            (" 1.055845337D+09", 1.055_845_337e9),
-            ("-2.5d-3", -2.5e-3),
-            ("1.5-3", 1.5e-3),
-            ("-1.5+3", -1.5e3),
-            ("1.-3", 1e-3),
-            (".5", 0.5),
-            ("7", 7.0),
-        ] {
-            assert_eq!(real(text), Some(value), "{text}");
-        }
-        for text in ["", "-", "1.5-", "1-5-3e", "d", "1,5", "--1", "1e"] {
-            assert_eq!(real(text), None, "{text}");
-        }
-        assert!(real("nan").unwrap().is_nan() && real("1e999").unwrap().is_infinite());
     }
 }

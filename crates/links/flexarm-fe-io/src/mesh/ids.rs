@@ -1,8 +1,9 @@
 //! Map from node or element numbers of a file to their indices.
 
 /// Lookup of unique numbers; memory is proportional to their count.
-pub(super) enum IdIndex {
+pub enum IdIndex {
     /// Numbers `first, first + 1, ...` in file order.
+    #[allow(missing_docs, reason = "named after what they are")]
     Run { first: u64, count: u32 },
     /// Table over all numbers up to the largest; `NONE` for unused numbers.
     Table(Vec<u32>),
@@ -17,7 +18,7 @@ impl IdIndex {
     ///
     /// # Errors
     /// Returns the two positions of a duplicate number.
-    pub(super) fn new(ids: &[u64]) -> Result<Self, (usize, usize)> {
+    pub fn new(ids: &[u64]) -> Result<Self, (usize, usize)> {
         let first = ids.first().copied().unwrap_or(0);
         if ids.iter().zip(0_u64..).all(|(id, k)| first.checked_add(k) == Some(*id)) {
             return Ok(Self::Run { first, count: ids.len() as u32 });
@@ -43,7 +44,7 @@ impl IdIndex {
     }
 
     /// Returns the index of a number.
-    pub(super) fn get(&self, id: u64) -> Option<u32> {
+    pub fn get(&self, id: u64) -> Option<u32> {
         match self {
             Self::Run { first, count } => id.checked_sub(*first).filter(|k| *k < u64::from(*count)).map(|k| k as u32),
             Self::Table(table) => {
@@ -58,7 +59,7 @@ impl IdIndex {
     }
 
     /// Appends the indices of the existing numbers among `first, first + step, ... <= last`.
-    pub(super) fn extend_from_range(&self, first: u64, last: u64, step: u64, out: &mut Vec<u32>) {
+    pub fn extend_from_range(&self, first: u64, last: u64, step: u64, out: &mut Vec<u32>) {
         // Clipped to the existing numbers, which bounds the work for any range in the file.
         let (low, high) = match self {
             Self::Run { count: 0, .. } => return,
@@ -75,32 +76,5 @@ impl IdIndex {
         let Some(start) = skipped.and_then(|skipped| first.checked_add(skipped)) else { return };
         let wanted = (start..=last.min(high)).step_by(usize::try_from(step).unwrap_or(usize::MAX));
         out.extend(wanted.filter_map(|id| self.get(id)));
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_layout_finds_its_numbers_and_no_others() {
-        for ids in [vec![5, 6, 7, 8], vec![8, 5, 7, 6], vec![5, 7_000_000_000, 6, 8]] {
-            let index = IdIndex::new(&ids).unwrap();
-            for (k, id) in ids.iter().enumerate() {
-                assert_eq!(index.get(*id), Some(k as u32), "{ids:?}");
-            }
-            assert_eq!((index.get(4), index.get(9), index.get(u64::MAX)), (None, None, None));
-            let mut found = Vec::new();
-            index.extend_from_range(1, u64::MAX, 2, &mut found);
-            let odd = ids.iter().enumerate().filter(|(_, id)| **id % 2 == 1 && **id < 100);
-            found.sort_unstable();
-            assert_eq!(found, odd.map(|(k, _)| k as u32).collect::<Vec<_>>(), "{ids:?}");
-        }
-    }
-
-    #[test]
-    fn a_number_that_is_there_twice_is_reported_with_both_places() {
-        assert_eq!(IdIndex::new(&[3, 4, 3]).err(), Some((0, 2)));
-        assert_eq!(IdIndex::new(&[3, u64::MAX, 9, u64::MAX]).err(), Some((1, 3)));
     }
 }

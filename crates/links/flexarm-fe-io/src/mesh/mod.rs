@@ -7,11 +7,11 @@
 
 mod draft;
 mod error;
-mod gmsh;
-mod ids;
-mod inp;
+pub(crate) mod gmsh;
+pub(crate) mod ids;
+pub(crate) mod inp;
 mod read;
-mod source;
+pub(crate) mod source;
 
 pub use error::{FilePosition, MeshError, MeshErrorKind};
 pub use read::{MeshFile, ReadOptions, parse_mesh, read_mesh};

@@ -166,28 +166,3 @@ fn foreign(text: &[u8]) -> Option<(&'static str, &'static str)> {
 const NASTRAN: &str = "Gmsh reads it: gmsh INPUT.bdf -save -format msh41 -o OUTPUT.msh; node sets may get lost, choose interfaces by \
                        place then, such as plane(0,0,0; 1,0,0); matrices that Nastran reduced (DMIG .pch, OP4) are imported as \
                        matrices";
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn an_unknown_format_is_answered_with_the_known_ones() {
-        let options = ReadOptions::default();
-        for (bytes, word) in [
-            (&b"solid cube\n"[..], "solid cube"),
-            (b"", "nothing"),
-            (b"\x1f\x8bxx", "gzip"),
-            (b"$ made by hand\nSOL 101\nCEND\nBEGIN BULK\nGRID,1,,0.,0.,0.\n", "Nastran bulk data"),
-            (b"GRID           1             0.0     0.0     0.0\nCTETRA,1,1,1,2,3,4\n", "gmsh INPUT.bdf -save"),
-            (b"    -1\n  2411\n", "universal file"),
-            (b"*KEYWORD\n*NODE\n", "LS-DYNA"),
-            (b"ISO-10303-21;\nHEADER;\n", "must be meshed first"),
-            (b"# vtk DataFile Version 3.0\n", "VTK"),
-        ] {
-            let message = parse_mesh(bytes, "x", &options).unwrap_err().to_string();
-            assert!(message.contains(word), "{message}");
-        }
-        assert_eq!(read_mesh("no/such/file.msh", &options).unwrap_err().kind, Kind::Unreadable);
-    }
-}

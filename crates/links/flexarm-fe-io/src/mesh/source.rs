@@ -6,13 +6,13 @@ use super::error::{FilePosition, MeshError, MeshErrorKind};
 
 /// Contents of the whole file.
 #[derive(Clone, Copy)]
-pub(super) struct Source<'a> {
+pub struct Source<'a> {
     /// Decompressed bytes.
-    pub(super) bytes: &'a [u8],
+    pub bytes: &'a [u8],
     /// Name of the file.
-    pub(super) origin: &'a str,
+    pub origin: &'a str,
     /// Whether positions are bytes rather than lines.
-    pub(super) binary: bool,
+    pub binary: bool,
 }
 
 impl Source<'_> {

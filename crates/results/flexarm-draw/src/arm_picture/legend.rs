@@ -9,7 +9,7 @@ pub(super) const GHOST: Rgb = [196, 202, 212];
 /// Transparency of the rigid twin.
 pub(super) const GHOST_FADE: f64 = 0.35;
 /// Colour of the arrow at the TCP: vermilion, which is not on the colour scale.
-pub(super) const ARROW: Rgb = [213, 60, 0];
+pub const ARROW: Rgb = [213, 60, 0];
 /// Position of zero on the scale of [`color::magnitude`]: shading is not visible on its darkest
 /// colours.
 const LOWEST: f64 = 0.16;
@@ -21,7 +21,7 @@ pub fn arm_color(share: f64) -> Rgb {
 }
 
 /// Position on the colour scale for a share of the maximum deviation.
-pub(super) fn on_scale(share: f64) -> f64 {
+pub fn on_scale(share: f64) -> f64 {
     LOWEST + (1.0 - LOWEST) * share
 }
 

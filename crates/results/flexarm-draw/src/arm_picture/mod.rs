@@ -8,8 +8,8 @@
 //! in their text, and at [`arm_png`] for a self-explanatory picture; [`arm_sheet`] shows both sides
 //! next to each other under a heading.
 
-mod ellipsoid;
-mod legend;
+pub(crate) mod ellipsoid;
+pub(crate) mod legend;
 mod skin;
 
 use nalgebra::{Matrix3, Vector3};
@@ -152,7 +152,7 @@ pub fn arm_sheet(
 }
 
 /// Surfaces of both arms at one instant.
-struct Stage {
+pub struct Stage {
     rigid: Skin,
     /// Surface of the magnified arm.
     shown: Skin,
@@ -160,15 +160,17 @@ struct Stage {
     values: Vec<f64>,
     rigid_twin: TwinSample,
     factor: f64,
-    /// TCP of the rigid arm and of the magnified one (m).
-    tool: Vector3<f64>,
-    moved: Vector3<f64>,
+    /// TCP of the rigid arm (m).
+    pub tool: Vector3<f64>,
+    /// TCP of the magnified arm (m).
+    pub moved: Vector3<f64>,
     /// Maximum distance of a link from the base (m).
     size: f64,
 }
 
 impl Stage {
-    fn new(header: &RunHeader, sample: &Sample) -> Result<Self, ArmPictureError> {
+    /// Returns the surfaces, if both arms can be drawn.
+    pub fn new(header: &RunHeader, sample: &Sample) -> Result<Self, ArmPictureError> {
         check(header, sample)?;
         let bodies = bodies(header, sample);
         let magnifier = Magnifier::new(header);
@@ -192,7 +194,7 @@ impl Stage {
     }
 
     /// View from a side that fits everything within the margins at the sides and below (pixels).
-    fn view(
+    pub fn view(
         &self,
         side: ArmSide,
         [width, height]: [usize; 2],
@@ -218,7 +220,7 @@ impl Stage {
     }
 
     /// Draws both arms.
-    fn draw(&self, view: &View, image: &mut Image) {
+    pub fn draw(&self, view: &View, image: &mut Image) {
         let count = self.rigid.triangles.len();
         let (colors, bright) = (vec![[GHOST; 2]; count], vec![false; count]);
         let side = vec![-1.0; self.rigid.positions.len()];
@@ -281,7 +283,7 @@ fn directions(side: ArmSide, rigid: &TwinSample) -> (Vector3<f64>, Vector3<f64>)
 }
 
 /// Draws the TCP error as an arrow from the rigid to the flexible TCP.
-fn arrow(image: &mut Image, view: &View, unit: f64, from: &Vector3<f64>, to: &Vector3<f64>) {
+pub fn arrow(image: &mut Image, view: &View, unit: f64, from: &Vector3<f64>, to: &Vector3<f64>) {
     let [a, b] = [view.project(from), view.project(to)].map(|[x, y, _]| [x, y]);
     if (b[0] - a[0]).hypot(b[1] - a[1]) > 2.0 * unit {
         image.line(a, b, 5.4 * unit, color::PAPER, 1.0);
@@ -289,120 +291,4 @@ fn arrow(image: &mut Image, view: &View, unit: f64, from: &Vector3<f64>, to: &Ve
     }
     image.line(a, a, 8.0 * unit, color::PAPER, 1.0);
     image.line(a, a, 5.5 * unit, color::INK, 1.0);
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use flexarm_sample::LinkInfo;
-    use flexarm_spatial::Pose;
-    use nalgebra::{Rotation3, Translation3};
-
-    /// An arm without surfaces: base, upright link, and a link along x, rotated so that the TCP
-    /// sags by 2 mm.
-    fn arm() -> (RunHeader, Sample) {
-        let link = |name: &str, parent| LinkInfo { name: name.into(), parent, fixed: false };
-        let header = RunHeader {
-            links: vec![link("base", None), link("arm", Some(0)), link("tool", Some(1))],
-            tcp: "tool".into(),
-            has_rigid: true,
-            magnification: 100.0,
-            color_scale_m: 2e-3,
-            ..RunHeader::default()
-        };
-        let places = |sag: f64| -> Vec<Pose> {
-            let turned = Rotation3::from_axis_angle(&Vector3::y_axis(), sag / 1.2);
-            let places =
-                [[0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [1.2, 0.0, 1.0 - sag]].map(|p| Translation3::from(Vector3::from(p)));
-            let turns = [Rotation3::identity(), turned, turned];
-            places.into_iter().zip(turns).map(|(place, turn)| Pose::from_parts(place, turn)).collect()
-        };
-        let twin = |sag: f64| TwinSample { X_WL: places(sag), X_WT: places(sag)[2], ..TwinSample::default() };
-        let sample = Sample { flexible: twin(2e-3), rigid: twin(0.0), ..Sample::default() };
-        (header, sample)
-    }
-
-    fn decoded(png: &[u8]) -> Vec<Rgb> {
-        rgba(png).into_iter().map(|p| [p[0], p[1], p[2]]).collect()
-    }
-
-    fn rgba(png: &[u8]) -> Vec<[u8; 4]> {
-        let mut reader = png::Decoder::new(std::io::Cursor::new(png)).read_info().unwrap();
-        let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
-        reader.next_frame(&mut bytes).unwrap();
-        bytes.chunks_exact(4).map(|p| [p[0], p[1], p[2], p[3]]).collect()
-    }
-
-    #[test]
-    fn an_arm_without_surfaces_is_drawn_as_rods_with_the_way_of_its_tool() {
-        let (header, sample) = arm();
-        let size = [450, 350];
-        for side in [ArmSide::Side, ArmSide::Oblique] {
-            let png = arm_png(&header, &sample, side, size).unwrap();
-            assert_eq!(png, arm_png(&header, &sample, side, size).unwrap(), "the same bytes");
-            // Without the text at the bottom.
-            let mut pixels = decoded(&png);
-            pixels.truncate(size[0] * (size[1] - 50));
-            let count = |near: Rgb, within: i32| {
-                let close = |p: &&Rgb| (0..3).all(|k| (i32::from(p[k]) - i32::from(near[k])).abs() <= within);
-                pixels.iter().filter(close).count()
-            };
-            assert!(count(ARROW, 12) > 8, "{side:?}: {} pixels of the arrow", count(ARROW, 12));
-            // The base does not move, so it has the first colour of the scale; the rigid arm is
-            // light grey.
-            assert!(count(color::magnitude(on_scale(0.0)), 40) > 200, "{side:?}");
-            let grey = |p: &&Rgb| p.iter().all(|c| (150..240).contains(c)) && p[0].abs_diff(p[2]) < 24;
-            let ghost = pixels.iter().filter(grey).count();
-            assert!(ghost > 400, "{side:?}: {ghost} pixels of the ghost");
-        }
-    }
-
-    /// Truth: the picture on paper, drawn without transparency.
-    #[test]
-    fn a_picture_without_ground_is_the_same_on_white_and_shows_dark_paper_where_there_is_no_arm() {
-        let (header, sample) = arm();
-        let size = [450, 350];
-        let picture = arm_pictures(&header, &sample, &[ArmSide::Oblique], size).unwrap().remove(0);
-        let pixels = rgba(&picture.png);
-        assert!(pixels.iter().filter(|p| p[3] == 0).count() > pixels.len() / 2, "most of it is ground");
-        assert!(pixels.iter().filter(|p| p[3] == 255).count() > 1000, "the arm covers");
-        assert!(pixels.iter().filter(|p| (100..220).contains(&p[3])).count() > 400, "the ghost is seen through");
-        let stage = Stage::new(&header, &sample).unwrap();
-        let view = stage.view(ArmSide::Oblique, size, [13.0, 13.0], None);
-        for ground in [[255; 3], [27, 31, 38]] {
-            let mut truth = Image::new(size[0], size[1], ground);
-            stage.draw(&view, &mut truth);
-            arrow(&mut truth, &view, 0.5, &stage.tool, &stage.moved);
-            let worst = pixels.iter().zip(truth.rgba.chunks_exact(4)).flat_map(|(p, truth)| {
-                let laid = |c: usize| {
-                    let a = f64::from(p[3]) / 255.0;
-                    (a * f64::from(p[c]) + (1.0 - a) * f64::from(ground[c]) - f64::from(truth[c])).abs()
-                };
-                [laid(0), laid(1), laid(2)]
-            });
-            let worst = worst.fold(0.0, f64::max);
-            assert!(worst < 5.0, "{worst} of 255 on {ground:?}"); // rounding of opacity, of colours and of means
-        }
-        // z is drawn upwards from every side.
-        let [right, up] = picture.axes[2];
-        assert!(right.abs() < 1e-9 && up > 0.5, "{:?}", picture.axes);
-    }
-
-    #[test]
-    fn what_cannot_be_drawn_is_an_error() {
-        let size = [90, 70];
-        let draw = |header: &RunHeader, sample: &Sample| arm_png(header, sample, ArmSide::Side, size).unwrap_err();
-        let (header, sample) = arm();
-        assert_eq!(draw(&RunHeader { has_rigid: false, ..header.clone() }, &sample), ArmPictureError::NoTwin);
-        assert_eq!(draw(&header, &Sample::default()), ArmPictureError::Links { found: 0, expected: 3 });
-        let mut diverged = sample.clone();
-        diverged.flexible.X_WL[2] = Pose::from(Translation3::new(f64::NAN, 0.0, 0.0));
-        assert_eq!(draw(&header, &diverged), ArmPictureError::NotFinite);
-        let mut point = sample;
-        for twin in [&mut point.flexible, &mut point.rigid] {
-            twin.X_WL.fill(Pose::identity());
-            twin.X_WT = Pose::identity();
-        }
-        assert_eq!(draw(&header, &point), ArmPictureError::Nothing);
-    }
 }

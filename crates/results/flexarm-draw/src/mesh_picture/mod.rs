@@ -20,14 +20,14 @@ pub(crate) mod draw;
 mod image;
 mod interface_sheet;
 mod legend;
-mod numbers;
-mod raster;
+pub(crate) mod numbers;
+pub(crate) mod raster;
 pub mod scene;
 mod sheet;
-mod stress_sheet;
+pub(crate) mod stress_sheet;
 mod surface;
 mod topology;
-mod view;
+pub(crate) mod view;
 
 use std::path::{Path, PathBuf};
 

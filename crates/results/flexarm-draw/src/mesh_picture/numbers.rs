@@ -22,14 +22,14 @@ fn length_unit(size: f64) -> (&'static str, f64) {
 }
 
 /// Formats a displacement, m, in a suitable unit.
-pub(super) fn displacement(value: f64) -> String {
+pub fn displacement(value: f64) -> String {
     let (unit, size) = length_unit(value);
     format!("{} {unit}", significant(value / size, 3))
 }
 
 /// Formats a displacement vector, m, in the unit of its largest component; zero if that is below
 /// `noise`.
-pub(super) fn displacements(u: &Vector3<f64>, noise: f64) -> String {
+pub fn displacements(u: &Vector3<f64>, noise: f64) -> String {
     if u.amax() <= noise {
         return "0".into();
     }
@@ -38,7 +38,7 @@ pub(super) fn displacements(u: &Vector3<f64>, noise: f64) -> String {
 }
 
 /// Formats a small rotation, rad, in mrad or µrad; zero if it is below `noise`.
-pub(super) fn rotations(theta: &Vector3<f64>, noise: f64) -> String {
+pub fn rotations(theta: &Vector3<f64>, noise: f64) -> String {
     if theta.amax() <= noise {
         return "0".into();
     }
@@ -58,7 +58,7 @@ fn triple(v: &Vector3<f64>, largest: f64) -> String {
 }
 
 /// Formats a position, m, in mm.
-pub(super) fn position(p: &Vector3<f64>) -> String {
+pub fn position(p: &Vector3<f64>) -> String {
     let [x, y, z] = [p.x, p.y, p.z].map(|x| (x * 1e4).round() / 10.0 + 0.0);
     format!("({x}, {y}, {z}) mm")
 }
@@ -74,22 +74,7 @@ pub(super) fn area(value: f64) -> String {
 }
 
 /// Returns the largest of 1, 2, 5, 10, ... that does not exceed `limit`.
-pub(super) fn round_below(limit: f64) -> f64 {
+pub fn round_below(limit: f64) -> f64 {
     let decade = 10_f64.powi(limit.log10().floor() as i32);
     [5.0, 2.0, 1.0].into_iter().map(|k| k * decade).find(|x| *x <= limit * (1.0 + 1e-12)).unwrap_or(decade)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn numbers_read_as_on_a_drawing() {
-        assert_eq!(displacement(0.000359), "0.359 mm");
-        assert_eq!(displacement(-4.2e-5), "-42.0 µm");
-        assert_eq!(displacements(&Vector3::new(1e-5, -2.5e-3, -1e-9), 1e-9), "(0.01, -2.50, 0.00) mm");
-        assert_eq!(rotations(&Vector3::new(0.0, 1e-16, 0.0), 1e-12), "0");
-        assert_eq!(position(&Vector3::new(0.04, -0.11, 1.1)), "(40, -110, 1100) mm");
-        assert_eq!([round_below(0.27), round_below(0.5), round_below(1.9)], [0.2, 0.5, 1.0]);
-    }
 }

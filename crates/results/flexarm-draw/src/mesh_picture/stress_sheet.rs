@@ -54,7 +54,7 @@ pub fn stress_sheet(picture: &StressPicture<'_>) -> Image {
 }
 
 /// Whether no triangle is between a node and the viewer.
-fn is_visible(picture: &StressPicture<'_>, node: usize, toward: &Vector3<f64>) -> bool {
+pub fn is_visible(picture: &StressPicture<'_>, node: usize, toward: &Vector3<f64>) -> bool {
     let start = picture.positions[node] + toward * (LIFT * picture.along.norm());
     let hides = |corners: &[u32; 3]| {
         let [a, b, c] = corners.map(|corner| picture.positions[corner as usize] - start);
@@ -68,7 +68,7 @@ fn is_visible(picture: &StressPicture<'_>, node: usize, toward: &Vector3<f64>) -
 }
 
 /// Direction across the link from which the worst node is seen.
-fn side_of_worst(picture: &StressPicture<'_>, axes: &LinkAxes) -> Vector3<f64> {
+pub fn side_of_worst(picture: &StressPicture<'_>, axes: &LinkAxes) -> Vector3<f64> {
     let worst = picture.worst.first().map_or(u32::MAX, |node| *node as u32);
     let around: Vec<[u32; 3]> = picture.triangles.iter().copied().filter(|corners| corners.contains(&worst)).collect();
     let normals = triangle_normals(picture.positions, &around);
@@ -112,39 +112,4 @@ fn panel(
     let style = Style::new(13.0, color::FAINT);
     image.text(picture.note, [width as f64 - 320.0, height as f64 - 33.0], Align::Right, style);
     image
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// The worst node of a box is seen on the first panel, and the end of the scale is its stress.
-    #[test]
-    fn the_worst_place_is_on_the_first_side() {
-        let corner = |k: u32| {
-            let bit = |b: u32| f64::from(k >> b & 1);
-            Vector3::new(bit(0), 0.2 * bit(1), 0.1 * bit(2))
-        };
-        let positions: Vec<Vector3<f64>> = (0..8).map(corner).collect();
-        // z = 0.1 and z = 0 faces of the box.
-        let triangles = [[4, 5, 7], [4, 7, 6], [0, 3, 1], [0, 2, 3]];
-        let stress = [1e6, 2e6, 3e6, 4e6, 5e6, 6e6, 7e6, 8e6];
-        let picture = StressPicture {
-            link: "box",
-            remark: "",
-            note: "",
-            positions: &positions,
-            triangles: &triangles,
-            stress: &stress,
-            worst: &[7, 4],
-            along: Vector3::x(),
-        };
-        let axes = LinkAxes::new(&positions, &Vector3::x());
-        assert!(side_of_worst(&picture, &axes).z > 0.9);
-        let seen = [7, 4, 0].map(|node| is_visible(&picture, node, &Vector3::new(0.3, 0.05, 1.0).normalize()));
-        assert_eq!(seen, [true, true, false]);
-        let image = stress_sheet(&picture);
-        assert!(!image.to_png().unwrap().is_empty());
-        assert_eq!(image.to_png().unwrap(), stress_sheet(&picture).to_png().unwrap());
-    }
 }

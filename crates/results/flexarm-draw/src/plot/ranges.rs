@@ -35,7 +35,7 @@ pub(super) fn ranges(points: &[Vec<(f64, f64)>], logarithmic: bool) -> Option<(R
 }
 
 /// Widens the ranges around their centres until both axes have the same scale, with a margin.
-pub(super) fn equally_long((x, y): (Range<f64>, Range<f64>), style: &Style) -> (Range<f64>, Range<f64>) {
+pub fn equally_long((x, y): (Range<f64>, Range<f64>), style: &Style) -> (Range<f64>, Range<f64>) {
     let wide = f64::from(style.panel.0 - 3 * style.margin - style.y_area);
     let high = f64::from(style.panel.1 - 2 * style.margin - style.x_area);
     let unit = 1.05 * ((x.end - x.start) / wide).max((y.end - y.start) / high);

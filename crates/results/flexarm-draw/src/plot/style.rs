@@ -2,7 +2,7 @@
 
 /// Sizes in units of the picture.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Style {
+pub struct Style {
     pub(super) panel: (u32, u32),
     pub(super) margin: u32,
     pub(super) x_area: u32,
@@ -63,4 +63,4 @@ pub(super) const COLUMN: Style = Style {
 };
 
 /// A plan: both axes have the same scale.
-pub(super) const PLAN: Style = Style { panel: (1920, 1300), equal: true, ..PAGE };
+pub const PLAN: Style = Style { panel: (1920, 1300), equal: true, ..PAGE };

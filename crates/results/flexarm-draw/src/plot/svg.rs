@@ -94,7 +94,7 @@ pub(crate) fn ink([red, green, blue]: Rgb) -> RGBColor {
 }
 
 /// Short format of a number on an axis.
-pub(crate) fn plain(x: f64) -> String {
+pub fn plain(x: f64) -> String {
     match x.abs() {
         // Rounding residues of the axis are zeros.
         size if size < 1e-12 => "0".into(),
@@ -104,6 +104,6 @@ pub(crate) fn plain(x: f64) -> String {
 }
 
 /// Rounds to three significant digits.
-pub(crate) fn three_digits(x: f64) -> f64 {
+pub fn three_digits(x: f64) -> f64 {
     format!("{x:.2e}").parse().unwrap_or(x)
 }

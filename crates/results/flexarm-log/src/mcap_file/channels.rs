@@ -184,7 +184,7 @@ fn qos_profile(latched: bool) -> String {
 
 /// Turns names into valid and distinct parts of a ROS topic: letters, digits and `_`, no digit
 /// first.
-pub(crate) fn topic_names(names: &[String]) -> Vec<String> {
+pub fn topic_names(names: &[String]) -> Vec<String> {
     // `/elastic/joint_states` is taken.
     let mut taken = BTreeSet::from(["joint_states".to_owned()]);
     let mut distinct = |base: String| {
@@ -197,15 +197,4 @@ pub(crate) fn topic_names(names: &[String]) -> Vec<String> {
         if plain.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_') { plain } else { format!("_{plain}") }
     };
     names.iter().map(|name| distinct(valid(name))).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn element_names_become_valid_and_distinct_topics() {
-        let names = ["lower_arm", "lower arm", "lower.arm", "3rd", ""].map(str::to_owned);
-        assert_eq!(topic_names(&names), ["lower_arm", "lower_arm_2", "lower_arm_3", "_3rd", "_"]);
-    }
 }

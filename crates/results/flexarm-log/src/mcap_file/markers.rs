@@ -16,7 +16,7 @@ use crate::{LinkMesh, RunHeader, Sample, TwinSample};
 /// Maximum number of triangles of a robot; larger meshes are coarsened.
 const MOST_TRIANGLES: usize = 100_000;
 /// Maximum number of points of a path; longer paths are thinned.
-const MOST_POINTS: usize = 1000;
+pub const MOST_POINTS: usize = 1000;
 /// Rate of the error markers (per second of simulated time).
 const ERROR_HZ: u32 = 20;
 
@@ -117,7 +117,7 @@ fn corners(mesh: &LinkMesh) -> Vec<[f32; 3]> {
 }
 
 /// Coarsens a mesh to at most about `most` triangles by merging close corners.
-fn thinned(mesh: &LinkMesh, most: usize) -> Cow<'_, LinkMesh> {
+pub fn thinned(mesh: &LinkMesh, most: usize) -> Cow<'_, LinkMesh> {
     if mesh.triangles.len() <= most {
         return Cow::Borrowed(mesh);
     }
@@ -145,7 +145,7 @@ fn thinned(mesh: &LinkMesh, most: usize) -> Cow<'_, LinkMesh> {
 
 /// Path of the TCP so far.
 #[derive(Debug)]
-struct Path {
+pub struct Path {
     points: Vec<[f32; 3]>,
     stride: u64,
     seen: u64,
@@ -153,11 +153,13 @@ struct Path {
 }
 
 impl Path {
-    fn new() -> Self {
+    /// Empty path.
+    pub fn new() -> Self {
         Self { points: Vec::new(), stride: 1, seen: 0, last: [0.0; 3] }
     }
 
-    fn push(&mut self, twin: &TwinSample) {
+    /// Adds the TCP of a sample.
+    pub fn push(&mut self, twin: &TwinSample) {
         self.last = twin.X_WT.translation.vector.map(|x| x as f32).into();
         if self.seen.is_multiple_of(self.stride) {
             self.points.push(self.last);
@@ -174,7 +176,8 @@ impl Path {
         }
     }
 
-    fn points(&self) -> Vec<[f32; 3]> {
+    /// Points of the path (m), the last sample included.
+    pub fn points(&self) -> Vec<[f32; 3]> {
         let mut points = self.points.clone();
         if points.last() != Some(&self.last) {
             points.push(self.last);
@@ -270,55 +273,5 @@ impl MovingMarkers {
                 ..text
             },
         ]
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// A square of `2 n²` triangles.
-    fn sheet(n: u32) -> LinkMesh {
-        let at = |k: u32| k as f32 / n as f32;
-        let positions = (0..=n).flat_map(|i| (0..=n).map(move |j| [at(i), at(j), 0.0])).collect();
-        let cell = |i: u32, j: u32| {
-            let [a, b, c, d] = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)].map(|(i, j)| i * (n + 1) + j);
-            [[a, b, c], [a, c, d]]
-        };
-        let triangles = (0..n).flat_map(|i| (0..n).flat_map(move |j| cell(i, j))).collect();
-        LinkMesh {
-            link: 0,
-            name: "sheet".into(),
-            positions,
-            normals: Vec::new(),
-            triangles,
-            color: [1.0; 4],
-            file: None,
-        }
-    }
-
-    #[test]
-    fn large_meshes_become_coarse_and_keep_their_extent_and_small_ones_stay() {
-        let mesh = sheet(100);
-        assert!(matches!(thinned(&mesh, 20_000), Cow::Borrowed(_)));
-        let coarse = thinned(&mesh, 2_000);
-        assert!((1_000..=2_000).contains(&coarse.triangles.len()), "{}", coarse.triangles.len());
-        for c in 0..2 {
-            let used = || coarse.triangles.iter().flatten().map(|k| coarse.positions[*k as usize][c]);
-            assert!(used().fold(1.0, f32::min) == 0.0 && used().fold(0.0, f32::max) > 0.95);
-        }
-    }
-
-    #[test]
-    fn a_path_keeps_its_first_and_last_point_however_long_it_is() {
-        let mut path = Path::new();
-        for k in 0..12_345_u32 {
-            let X_WT = flexarm_kinematics::Pose::translation(f64::from(k), 0.0, 0.0);
-            path.push(&TwinSample { X_WT, ..TwinSample::default() });
-            let points = path.points();
-            assert!(points.len() <= MOST_POINTS);
-            assert_eq!((points[0][0], points[points.len() - 1][0]), (0.0, k as f32));
-        }
-        assert!(path.points().len() > MOST_POINTS / 2);
     }
 }

@@ -15,14 +15,14 @@ use serde::{Deserialize, Serialize};
 const ENCAPSULATION: [u8; 4] = [0x00, 0x01, 0x00, 0x00];
 
 /// Replaces `bytes` by the encoded message.
-pub(crate) fn encode(message: impl Serialize, bytes: &mut Vec<u8>) -> io::Result<()> {
+pub fn encode(message: impl Serialize, bytes: &mut Vec<u8>) -> io::Result<()> {
     bytes.clear();
     bytes.extend(ENCAPSULATION);
     message.serialize(&mut CdrSerializer::<LittleEndian>::new(bytes)).map_err(io::Error::other)
 }
 
 /// Returns the fields at the start of a message; `None` if the bytes do not match them.
-pub(crate) fn decode<'m, T: Deserialize<'m>>(bytes: &'m [u8]) -> Option<T> {
+pub fn decode<'m, T: Deserialize<'m>>(bytes: &'m [u8]) -> Option<T> {
     let (fields, _) = re_cdr::from_bytes::<T, LittleEndian>(bytes.strip_prefix(&ENCAPSULATION)?).ok()?;
     Some(fields)
 }
@@ -172,31 +172,4 @@ pub(crate) fn markers<'a>(stamp: Stamp, markers: &'a [Marker<'a>]) -> impl Seria
         )
     };
     markers.iter().map(message).collect::<Vec<_>>()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Truth: derived by hand from the alignment rule.
-    #[test]
-    fn values_start_at_multiples_of_their_size() {
-        let expected: Vec<u8> = [
-            vec![0, 1, 0, 0],                   // encapsulation, not counted
-            vec![7, 0, 0, 0],                   // at 0
-            vec![3, 0, 0, 0, b'a', b'b', 0],    // at 4: length including the terminating zero
-            vec![0],                            // padding to 12
-            vec![1, 0, 0, 0],                   // at 12: count
-            vec![0, 0, 0, 0, 0, 0, 0xf0, 0x3f], // at 16: 1.0
-        ]
-        .concat();
-        let mut bytes = Vec::new();
-        encode((7_u32, "ab", &[1.0_f64][..]), &mut bytes).unwrap();
-        assert_eq!(bytes, expected);
-        assert_eq!(decode(&bytes), Some((7_u32, "ab", vec![1.0_f64])));
-
-        // An empty sequence ends after its count, without padding for absent elements.
-        encode(Vec::<f64>::new(), &mut bytes).unwrap();
-        assert_eq!(bytes, [0, 1, 0, 0, 0, 0, 0, 0]);
-    }
 }

@@ -8,16 +8,16 @@
 //! Start at [`McapRecorder`]; topics are in [`channels`], messages in [`messages`], coordinate
 //! frames in [`frames`], markers for viewers in [`markers`].
 
-mod beat;
-mod bent;
+pub(crate) mod beat;
+pub(crate) mod bent;
 pub(crate) mod channels;
 mod definitions;
 mod frames;
 pub(crate) mod layouts;
-mod markers;
+pub(crate) mod markers;
 mod mesh_files;
 pub(crate) mod messages;
-mod output;
+pub(crate) mod output;
 
 use std::fs::File;
 use std::io;

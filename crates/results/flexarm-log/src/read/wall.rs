@@ -10,19 +10,19 @@ use std::sync::Once;
 
 thread_local! {
     /// Whether a panic of the current thread is caught here.
-    static CAUGHT: Cell<bool> = const { Cell::new(false) };
+    pub static CAUGHT: Cell<bool> = const { Cell::new(false) };
 }
 
 /// Panic in a reader of a dependency.
 #[derive(Debug, PartialEq, thiserror::Error)]
 #[error("its reader gave up: {message}")]
-pub(crate) struct ReaderPanic {
+pub struct ReaderPanic {
     message: String,
 }
 
 /// Calls a reader of a dependency. A panic in it becomes an error and is not printed. Data changed
 /// by the reader must not be used after an error.
-pub(crate) fn caught<T>(read: impl FnOnce() -> T) -> Result<T, ReaderPanic> {
+pub fn caught<T>(read: impl FnOnce() -> T) -> Result<T, ReaderPanic> {
     static QUIET: Once = Once::new();
     QUIET.call_once(|| {
         let usual = std::panic::take_hook();
@@ -42,18 +42,4 @@ pub(crate) fn caught<T>(read: impl FnOnce() -> T) -> Result<T, ReaderPanic> {
 fn message(panic: &(dyn Any + Send)) -> String {
     let text = panic.downcast_ref::<&str>().copied().or_else(|| panic.downcast_ref::<String>().map(String::as_str));
     text.unwrap_or("without a word").chars().map(|c| if c.is_control() { ' ' } else { c }).take(120).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_panic_behind_the_wall_is_an_error_with_its_words() {
-        assert_eq!(caught(|| 1 + 1), Ok(2));
-        let (empty, k) = (Vec::<u8>::new(), 3);
-        let error = caught(|| empty[k]).unwrap_err();
-        assert!(error.message.contains("index out of bounds"), "{error}");
-        assert!(!CAUGHT.get());
-    }
 }

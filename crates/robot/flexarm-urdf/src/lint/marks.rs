@@ -6,8 +6,8 @@ use crate::finding::TextPosition;
 use crate::transmission::Transmission;
 
 /// Text for `urdf_rs`, and a mark for each of its links and joints, in the same order.
-pub(crate) struct PlainUrdf {
-    pub(crate) text: String,
+pub struct PlainUrdf {
+    pub text: String,
     pub(crate) place: TextPosition,
     pub(crate) links: Vec<LinkMarks>,
     pub(crate) joints: Vec<JointMarks>,

@@ -23,8 +23,6 @@ mod mass;
 mod obj;
 mod section;
 mod stl;
-#[cfg(test)]
-mod tests;
 
 use std::path::{Component, Path, PathBuf};
 
@@ -133,9 +131,10 @@ pub fn load_mesh_with(path: impl AsRef<Path>, up_axis: UpAxis) -> Result<Triangl
 
 /// A mesh and remarks on how it was read.
 #[derive(Debug)]
-pub(crate) struct Loaded {
-    pub(crate) mesh: TriangleMesh,
-    pub(crate) remarks: Vec<String>,
+#[doc(hidden)]
+pub struct Loaded {
+    pub mesh: TriangleMesh,
+    pub remarks: Vec<String>,
 }
 
 pub(crate) fn load_with_remarks(path: &Path, up_axis: UpAxis) -> Result<Loaded, MeshError> {
@@ -154,7 +153,8 @@ pub(crate) fn load_with_remarks(path: &Path, up_axis: UpAxis) -> Result<Loaded, 
 
 /// Decodes the bytes of a mesh file; `path` gives the extension, the name for messages, and the
 /// folder of further files.
-pub(crate) fn decode(bytes: &[u8], path: &Path, up_axis: UpAxis) -> Result<Loaded, MeshError> {
+#[doc(hidden)]
+pub fn decode(bytes: &[u8], path: &Path, up_axis: UpAxis) -> Result<Loaded, MeshError> {
     let mut remarks = Vec::new();
     let mesh = match format(bytes, path) {
         Some(Format::Stl) => stl::decode(bytes, path),

@@ -23,12 +23,12 @@ pub(crate) struct Macro {
 
 /// A parameter with its default.
 #[derive(Clone, Debug, PartialEq)]
-struct Parameter {
+pub struct Parameter {
     /// Name, with `*` or `**` for a block.
-    name: String,
+    pub name: String,
     /// Whether the value is taken from the caller's property of that name (`^`).
-    forwarded: bool,
-    default: Option<String>,
+    pub forwarded: bool,
+    pub default: Option<String>,
 }
 
 /// Macros by name, and those of namespaces; other names are looked up in `outer`.
@@ -247,7 +247,7 @@ fn unknown_parameter(called: &Macro, name: &str) -> ExpressionError {
 }
 
 /// Parses parameters such as `a b:=1 c:='x y' d:=${e} f:=^ g:=^|2 *block **blocks`.
-fn parameters(text: &str) -> Vec<Parameter> {
+pub fn parameters(text: &str) -> Vec<Parameter> {
     let mut found: Vec<Parameter> = Vec::new();
     let mut rest = text.trim_start();
     while !rest.is_empty() {
@@ -296,26 +296,4 @@ fn default_length(text: &str) -> Option<usize> {
         };
     }
     Some(at)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn parameters_have_defaults_forwarding_and_blocks() {
-        let of = |text: &str| -> Vec<(String, bool, Option<String>)> {
-            parameters(text).into_iter().map(|p| (p.name, p.forwarded, p.default)).collect()
-        };
-        let plain = |name: &str| (name.to_owned(), false, None);
-        let with = |name: &str, forwarded, default: &str| (name.to_owned(), forwarded, Some(default.to_owned()));
-        assert_eq!(of("a  *b **c "), [plain("a"), plain("*b"), plain("**c")]);
-        assert_eq!(
-            of("a:=1 b := 'x y' c=2"),
-            [with("a", false, "1"), with("b", false, "'x y'"), with("c", false, "2")]
-        );
-        assert_eq!(of("a:=${b + 1} c:=$(arg d)"), [with("a", false, "${b + 1}"), with("c", false, "$(arg d)")]);
-        assert_eq!(of("a:=^ b:=^|3"), [("a".to_owned(), true, None), with("b", true, "3")]);
-        assert_eq!(of("a:=${x}${y} b"), [with("a", false, "${x}${y}"), plain("b")]);
-    }
 }

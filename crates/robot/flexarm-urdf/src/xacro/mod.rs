@@ -17,8 +17,8 @@
 
 mod document;
 mod expression;
-mod macros;
-mod process;
+pub(crate) mod macros;
+pub(crate) mod process;
 mod scope;
 mod substitution;
 mod text;

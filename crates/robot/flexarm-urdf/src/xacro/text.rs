@@ -97,18 +97,3 @@ impl Interpreter<'_> {
         Ok(shown)
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_text_is_cut_at_dollars_with_brackets() {
-        use Piece::{Expression, Plain, Substitution};
-        let cut = |text| pieces(text).unwrap();
-        assert_eq!(cut("a${b}c$(d e)"), [Plain("a"), Expression("b"), Plain("c"), Substitution("d e")]);
-        assert_eq!(cut("$${x} 5$"), [Plain("${"), Plain("x} 5"), Plain("$")]);
-        assert_eq!(cut("$$$(x)"), [Plain("$$("), Plain("x)")]);
-        assert!(pieces("${open").unwrap_err().message.contains("no closing"));
-    }
-}

@@ -178,35 +178,3 @@ fn decimal(text: &str) -> Option<f64> {
     }
     text.replace('_', "").parse().ok()
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Truth: PyYAML 6.0.3, `yaml.safe_load`.
-    #[test]
-    fn plain_scalars_are_what_pyyaml_makes_of_them() {
-        let pairs = [
-            ("12", "12"),
-            ("-0.5", "-0.5"),
-            ("1e3", "'1e3'"),
-            ("1.0e3", "'1.0e3'"),
-            ("1.0e+3", "1000.0"),
-            ("1.", "1.0"),
-            (".5", "0.5"),
-            ("010", "8"),
-            ("1:30", "90"),
-            ("0x1F", "31"),
-            ("yes", "True"),
-            ("off", "False"),
-            ("~", "None"),
-            ("1_000", "1000"),
-            ("-.inf", "-inf"),
-            ("12 34", "'12 34'"),
-            ("0.1.2", "'0.1.2'"),
-        ];
-        for (text, expected) in pairs {
-            assert_eq!(plain(text).repr(), expected, "{text}");
-        }
-    }
-}

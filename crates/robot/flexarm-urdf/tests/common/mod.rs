@@ -1,5 +1,4 @@
 //! Small robots and a temporary folder, shared by the tests.
-#![allow(dead_code, reason = "each test file uses a part of it")]
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};

@@ -70,7 +70,8 @@ impl fmt::Display for NodePlane {
 
 impl ImportMap {
     /// Returns the names of the interfaces, in order, with the text of their selection.
-    pub(super) fn entries(&self) -> Vec<(String, String)> {
+    #[doc(hidden)]
+    pub fn entries(&self) -> Vec<(String, String)> {
         match self {
             Self::Rows(map) => map.interfaces.iter().map(|i| (i.name.clone(), i.rows_text())).collect(),
             Self::Nodes(list) => list.iter().map(|(name, choice)| (name.clone(), choice.to_string())).collect(),
@@ -224,30 +225,4 @@ pub fn parse_split(text: &str) -> Result<SplitAt, WordError> {
 pub fn triple(text: &str) -> Result<Vector3<f64>, WordError> {
     let [x, y, z] = numbers(text)?[..] else { return Err(WordError::form(text, "three numbers x,y,z")) };
     Ok(Vector3::new(x, y, z))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_map_names_rows_or_nodes() {
-        assert!(matches!("A=947:1-3+948:1-3,B=#7-12".parse(), Ok(ImportMap::Rows(_))));
-        let map: ImportMap = "A=plane(0,0,0;1,0,0),B=plane(1,0,0;1,0,0)".parse().unwrap();
-        assert_eq!(map.entries()[0].1, "plane(0,0,0;1,0,0)");
-        assert_eq!(map.entries()[1], ("B".into(), "plane(1,0,0;1,0,0)".into()));
-        assert!(
-            "A=plane(0,0,0;1,0,0),B=1002".parse::<ImportMap>().unwrap_err().to_string().contains("every interface")
-        );
-        assert!(
-            "A=plane(0,0,0;1,0,0),A=plane(1,0,0;1,0,0)".parse::<ImportMap>().unwrap_err().to_string().contains("twice")
-        );
-    }
-
-    #[test]
-    fn a_part_is_mass_centre_and_inertia() {
-        let part = parse_part("2;0,0,0.5;1,2,3,0.1,0.2,0.3").unwrap();
-        assert_eq!((part.mass, part.com.z, part.inertia[(0, 1)], part.inertia[(2, 1)]), (2.0, 0.5, 0.1, 0.3));
-        assert!(parse_part("2;0,0;1,2,3,0,0,0").is_err());
-    }
 }

@@ -21,9 +21,9 @@
 //!
 //! Not here: the reduction itself (`flexarm-fem`), the robot file.
 
-mod files;
+pub(crate) mod files;
 mod interfaces;
-mod job;
+pub(crate) mod job;
 mod listing;
 mod prepare;
 mod report;

@@ -48,7 +48,7 @@ pub(crate) const NO_STRESS_OF_MODES: CaveatKind = CaveatKind::note(
     "use model = \"lumped\" for the stress, with more segments if its own vibration matters",
 );
 /// A drive needs more than its effort limit during a run.
-pub(crate) const EFFORT: CaveatKind = CaveatKind::warning(
+pub const EFFORT: CaveatKind = CaveatKind::warning(
     "effort",
     "{where} needs {value} {unit}, its limit is {yardstick}: the real drive would not follow",
     "N m",
@@ -70,7 +70,7 @@ pub(crate) const SERVO_LIMIT: CaveatKind = CaveatKind::warning(
     "check gains, sampling, torque limit and motor inertia",
 );
 /// The sample rate is low for the first natural frequency.
-pub(crate) const FEW_SAMPLES: CaveatKind = CaveatKind::warning(
+pub const FEW_SAMPLES: CaveatKind = CaveatKind::warning(
     "few-samples",
     "{value} logged samples a second are few for a first frequency of {yardstick} Hz: peaks between them are missed; raise \
      {log_rate_hz} or lower {step_s}",

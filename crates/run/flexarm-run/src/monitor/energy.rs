@@ -8,7 +8,7 @@ use flexarm_stepping::Observation;
 use crate::summary::EnergyFigures;
 
 /// Monitors the energy.
-pub(crate) struct Energy {
+pub struct Energy {
     /// Model at the previous sample, with its payload.
     model: Arc<Model>,
     book: EnergyBook,
@@ -16,11 +16,12 @@ pub(crate) struct Energy {
 
 impl Energy {
     /// `model`: that of the arm at the start.
-    pub(crate) fn new(model: &Arc<Model>) -> Self {
+    pub fn new(model: &Arc<Model>) -> Self {
         Self { model: model.clone(), book: EnergyBook::default() }
     }
 
-    pub(crate) fn update(&mut self, seen: &Observation) {
+    /// Adds a sample.
+    pub fn update(&mut self, seen: &Observation) {
         if !Arc::ptr_eq(&self.model, &seen.model) {
             // A payload present at the start is not exchanged.
             if self.book.first.is_some() {
@@ -33,7 +34,8 @@ impl Energy {
         self.book.add(seen.t, seen.energy, seen.power, seen.impulse_work, drives);
     }
 
-    pub(crate) fn result(&self) -> EnergyFigures {
+    /// Returns the balance so far.
+    pub fn result(&self) -> EnergyFigures {
         self.book.figures()
     }
 }
@@ -139,73 +141,4 @@ fn parts(time: f64, from: f64, to: f64) -> [f64; 2] {
     }
     let [low, high] = [from.min(to), from.max(to)];
     [0.5 * time * high * high / (high - low), 0.5 * time * low * low / (high - low)]
-}
-
-#[cfg(test)]
-#[allow(clippy::print_stderr, reason = "what was measured stands beside the bound")]
-mod tests {
-    use super::*;
-    use flexarm_kinematics::{LinkInertia, forward_kinematics};
-    use flexarm_stepping::{FlexibleArm, Spring};
-
-    /// Truth: a mass m picked up at p with velocity v adds `m v²/2 - m g·p`, and removes it when
-    /// put down; v from differences of p.
-    #[test]
-    fn a_payload_brings_its_energy_and_takes_it_along() {
-        let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../..");
-        let model = crate::Robot::load(root.join("robots/one_beam")).unwrap().rigid_model().unwrap();
-        let still = Arc::new(flexarm_stepping::Held(vec![0.3]));
-        let arm = FlexibleArm::new(model.clone(), Vec::<Spring>::new(), still).unwrap();
-        let mut seen = Observation::new(&arm);
-        (seen.q[0], seen.qdot[0]) = (0.3, 0.5);
-        let frame = model.frame(crate::TCP_FRAME).unwrap().clone();
-        let (mass, com) = (2.0, nalgebra::Vector3::new(0.1, -0.2, 0.3));
-        let mut data = Data::new(&model);
-        let mut place = |q: f64| {
-            forward_kinematics(&model, &mut data, &nalgebra::DVector::from_element(1, q));
-            (data.X_WF(&frame) * nalgebra::Point3::from(com)).coords
-        };
-        let (p, v) = (place(0.3), (place(0.3 + 1e-5) - place(0.3 - 1e-5)) * (0.5 / 2e-5));
-        let truth = 0.5 * mass * v.norm_squared() - mass * model.gravity.dot(&p);
-
-        let added = LinkInertia { mass, com, inertia_com: nalgebra::Matrix3::zeros() }.spatial().at_parent(&frame.X_BF);
-        let mut inertia = model.bodies()[frame.body].inertia;
-        inertia += added;
-        let carrying = Arc::new(model.with_inertia(frame.body, inertia));
-        let mut energy = Energy::new(&model);
-        let mut payload = Vec::new();
-        for model in [&model, &model, &carrying, &carrying, &model] {
-            seen.model.clone_from(model);
-            energy.update(&seen);
-            payload.push(energy.result().payload_j);
-        }
-        assert!(payload[1] == 0.0 && payload[2] == payload[3] && payload[4].abs() < 1e-12);
-        assert!((payload[2] / truth - 1.0).abs() < 1e-9, "{} {truth}", payload[2]);
-        // A payload carried from the start adds nothing.
-        let mut energy = Energy::new(&model);
-        seen.model.clone_from(&carrying);
-        energy.update(&seen);
-        assert_eq!(energy.result().payload_j, 0.0);
-    }
-
-    /// Truth: the integral of `A sin t` over a turn is 2 A - 2 A, for each drive. Identity:
-    /// positive minus negative work is the net work.
-    #[test]
-    fn drives_that_give_back_what_they_took_have_no_net_work_and_much_gross_work() {
-        let mut book = EnergyBook::default();
-        let n = 1000;
-        for k in 0..=n {
-            let t = f64::from(k) / f64::from(n) * std::f64::consts::TAU;
-            // The second drive brakes while the first drives: their sum is zero at all times.
-            let drives = [3.0 * t.sin(), -3.0 * t.sin()];
-            book.add(t, [0.0; 3], [drives.iter().sum(), 0.0, 0.0], 0.0, drives.into_iter());
-        }
-        let figures = book.figures();
-        assert!(figures.drives_j.abs() < 1e-12, "{}", figures.drives_j);
-        // Measured 3.9e-5 too little: error of the trapezoidal rule with a thousand samples.
-        assert!((figures.drives_positive_j - 12.0).abs() < 1e-4, "{}", figures.drives_positive_j);
-        assert!((figures.drives_negative_j - 12.0).abs() < 1e-4, "{}", figures.drives_negative_j);
-        assert_eq!(parts(2.0, -1.0, 3.0), [2.25, 0.25]);
-        assert_eq!(parts(2.0, -1.0, 0.0), [0.0, 1.0]);
-    }
 }

@@ -76,7 +76,7 @@ struct Sums {
 }
 
 /// Monitors the error across the path.
-pub(crate) struct ToolPathMonitor {
+pub struct ToolPathMonitor {
     path: Arc<ToolPath>,
     sums: Vec<Sums>,
     /// Index of the current move, the first that has not ended.
@@ -93,7 +93,8 @@ pub(crate) struct ToolPathMonitor {
 }
 
 impl ToolPathMonitor {
-    pub(crate) fn new(path: Arc<ToolPath>) -> Self {
+    /// Follows the moves of this path.
+    pub fn new(path: Arc<ToolPath>) -> Self {
         let sums = vec![Sums::default(); path.moves.len()];
         let (low, high) = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
         Self {
@@ -111,7 +112,7 @@ impl ToolPathMonitor {
     }
 
     /// * `velocity`: of the rigid TCP (m/s, world axes).
-    pub(crate) fn update(&mut self, t: f64, tool: &ToolError, velocity: &Vector3<f64>) {
+    pub fn update(&mut self, t: f64, tool: &ToolError, velocity: &Vector3<f64>) {
         let moves = &self.path.moves;
         while self.now + 1 < moves.len() && t > moves[self.now].span_s[1] {
             self.now += 1;
@@ -162,7 +163,7 @@ impl ToolPathMonitor {
     }
 
     /// Returns the figures so far; None without a sample on a TCP move.
-    pub(crate) fn result(&self) -> Option<PathFigures> {
+    pub fn result(&self) -> Option<PathFigures> {
         let samples: usize = self.sums.iter().map(|sums| sums.samples).sum();
         let peak = self.sums.iter().max_by(|a, b| a.peak.total_cmp(&b.peak)).filter(|_| samples > 0)?;
         let squares: f64 = self.sums.iter().map(|sums| sums.squares).sum();
@@ -188,58 +189,5 @@ impl ToolPathMonitor {
             moves: moves.map(figures).collect(),
             points: self.points.clone(),
         })
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use flexarm_kinematics::Pose;
-    use flexarm_path::PlannedMove;
-
-    fn a_move(line: usize, span_s: [f64; 2]) -> PlannedMove {
-        PlannedMove {
-            line,
-            statement: "line".into(),
-            span_s,
-            top_m_s: Some(1.0),
-            programmed_m_s: Some(1.0),
-            slowed: None,
-            least_sigma: None,
-            blend_m: 0.0,
-        }
-    }
-
-    /// Truth: a TCP that moves along x for a second, then along y, with a sag of 2 mm and an
-    /// overshoot along x of 1 mm after the corner.
-    #[test]
-    fn sag_is_an_offset_and_a_swing_behind_the_corner_an_overshoot() {
-        let path = ToolPath {
-            moves: vec![a_move(3, [0.0, 1.0]), a_move(4, [1.0, 2.0])],
-            file: String::new(),
-            jerks: Vec::new(),
-            warnings: Vec::new(),
-            notes: Vec::new(),
-        };
-        let mut monitor = ToolPathMonitor::new(Arc::new(path));
-        for k in 0..=200 {
-            let t = 0.01 * f64::from(k);
-            let behind = t > 1.0;
-            let swing = if behind { 1e-3 * (10.0 * (t - 1.0)).sin() * (-3.0 * (t - 1.0)).exp() } else { 0.0 };
-            let velocity = if behind { Vector3::y() } else { Vector3::x() };
-            let sag = [0.0, 0.0, -2e-3];
-            let error = [swing, 0.0, -2e-3, 0.0, 0.0, 0.0];
-            let path_error = if behind { [0.0, swing, -2e-3, 0.0, 0.0, 0.0] } else { [0.0, 0.0, -2e-3, 0.0, 0.0, 0.0] };
-            let (X_rigid, X_flexible) = (Pose::identity(), Pose::identity());
-            monitor.update(t, &ToolError { X_rigid, X_flexible, error, path_error, static_m: sag }, &velocity);
-        }
-        let figures = monitor.result().unwrap();
-        let peak =
-            (0..200).map(|k| 0.005 * f64::from(k)).map(|t| (10.0 * t).sin() * (-3.0 * t).exp()).fold(0.0, f64::max);
-        assert!((figures.corner_overshoot_m - 1e-3 * peak).abs() < 2e-5 * peak, "{}", figures.corner_overshoot_m);
-        assert_eq!(figures.offset_m[2], -2e-3);
-        assert!(figures.left_m < 1e-3 && figures.left_m > 0.4e-3);
-        assert_eq!((figures.moves[0].line, figures.moves[0].across_peak_m), (3, 2e-3));
-        assert!(figures.across_peak_m > 2e-3 && figures.t_across_peak_s > 1.0);
     }
 }

@@ -101,7 +101,7 @@ impl Table {
 
 /// Returns ascending indices of at most about `most` points of curves with a common axis: the first
 /// and last point, and the minimum and maximum of every curve in each of equal pieces.
-pub(super) fn thinned(curves: &[&[f64]], length: usize, most: usize) -> Vec<usize> {
+pub fn thinned(curves: &[&[f64]], length: usize, most: usize) -> Vec<usize> {
     if length <= most || curves.is_empty() {
         return (0..length).collect();
     }
@@ -539,61 +539,4 @@ pub(super) fn overlays(runs: &[(&str, &Summary, &Trace)]) -> Vec<Plot> {
         plots.push(overlaid(plot, "all axes", &spectrum));
     }
     plots
-}
-
-#[cfg(test)]
-mod tests {
-    use flexarm_log::{ElasticSample, TraceRow};
-    use proptest::prelude::*;
-
-    use super::*;
-
-    proptest! {
-        /// Truth: the extremes of the curves themselves.
-        #[test]
-        fn thinning_keeps_the_ends_and_the_extremes_of_every_curve(
-            (length, most) in (1_usize..20_000, 50_usize..3000),
-            spikes in prop::collection::vec((0.0..1.0, -50.0..50.0), 1..6),
-        ) {
-            let wave = |c: usize, k: usize| (0.01 * k as f64 + c as f64).sin();
-            let mut curves: Vec<Vec<f64>> =
-                (0..spikes.len()).map(|c| (0..length).map(|k| wave(c, k)).collect()).collect();
-            for (curve, (place, height)) in curves.iter_mut().zip(&spikes) {
-                curve[(place * length as f64) as usize] = *height;
-            }
-            let slices: Vec<&[f64]> = curves.iter().map(Vec::as_slice).collect();
-            let keep = thinned(&slices, length, most);
-            prop_assert!(keep.windows(2).all(|pair| pair[0] < pair[1]), "ascending");
-            prop_assert_eq!((keep[0], keep[keep.len() - 1]), (0, length - 1));
-            prop_assert!(keep.len() <= most + 2, "{} of at most {}", keep.len(), most);
-            for curve in &slices {
-                let extremes = |values: &mut dyn Iterator<Item = f64>| {
-                    values.fold((f64::MAX, f64::MIN), |(low, high), y| (low.min(y), high.max(y)))
-                };
-                let all = extremes(&mut curve.iter().copied());
-                prop_assert_eq!(extremes(&mut keep.iter().map(|k| curve[*k])), all);
-            }
-        }
-    }
-
-    #[test]
-    fn springs_that_only_turn_have_no_plots_of_forces() {
-        let mut trace = Trace::default();
-        trace.header.elements = vec!["spring".into()];
-        let mut element = ElasticSample::default();
-        (element.load[5], element.deflection[5]) = (3.0, 1e-3);
-        for time_s in [0.0, 0.1] {
-            trace.rows.push(TraceRow { time_s, elastic: vec![element], ..TraceRow::default() });
-        }
-        let ids: Vec<&str> = elements(&Summary::default(), &trace).iter().map(|plot| plot.id).collect();
-        assert_eq!(ids, ["element_moment", "element_turn"]);
-    }
-
-    #[test]
-    fn numbers_that_are_none_do_not_hide_the_others() {
-        let mut curve = vec![0.0; 1000];
-        (curve[10], curve[500], curve[700]) = (f64::NAN, 3.0, f64::INFINITY);
-        assert!(thinned(&[&curve], 1000, 100).contains(&500));
-        assert_eq!(thinned(&[], 3, 100), [0, 1, 2]);
-    }
 }

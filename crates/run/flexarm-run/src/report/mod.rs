@@ -29,7 +29,8 @@ use crate::summary::{LinkStressFigures, StrainGaugeFigures, StressPointFigures, 
 use self::shares::{Part, part_shares, share_numbers};
 
 pub use again::{ReportFiles, ReportOptions, report};
-pub use html::{ReportRun, html};
+pub use curves::thinned;
+pub use html::{ReportRun, html, short};
 
 /// Title of a report of a single run.
 fn title(summary: &Summary) -> String {

@@ -88,29 +88,3 @@ fn rounded(x: f64) -> f64 {
             1.0
         }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Truth: a circle in the plane x, y with a constant sag and an error of 1 mm outwards.
-    #[test]
-    fn a_sag_is_no_error_of_the_shape_and_errors_are_enlarged_by_a_round_number() {
-        let point = |k: u32| {
-            let a = f64::from(k) * std::f64::consts::TAU / 100.0;
-            let e = Vector3::new(a.cos(), a.sin(), 0.0) * 1e-3 - Vector3::z() * 4e-3;
-            [0.3 * a.cos(), 0.3 * a.sin(), 1.0, e.x, e.y, e.z]
-        };
-        let figures = PathFigures {
-            points: (0..=100).map(point).collect(),
-            offset_m: [0.0, 0.0, -4e-3],
-            ..PathFigures::default()
-        };
-        let plan = path_plan(&figures).unwrap();
-        assert!((plan.factor - 10.0).abs() < 1e-12, "{}", plan.factor); // 0.06 of 300 mm is 18 mm
-        for word in ["x (mm)", "y (mm)", "error x 10"] {
-            assert!(plan.svg.contains(word), "{word}");
-        }
-        assert!(path_plan(&PathFigures::default()).is_none());
-    }
-}

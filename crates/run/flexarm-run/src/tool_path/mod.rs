@@ -26,6 +26,7 @@ use crate::robot::tcp_frame;
 pub(crate) use file::{is_path_file, read_path_file};
 pub use program::program_text;
 pub(crate) use program::read_robot_program;
+pub use standard::{Standard, Step};
 
 /// Assumed time for a joint to reach its top speed if its acceleration is not known, s.
 const TO_TOP_SPEED: f64 = 0.4;
@@ -40,7 +41,7 @@ const FLANGE: &str = "tool0";
 const BASE: &str = "base";
 
 /// TCP motion with the planned moves.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct ToolPath {
     /// Planned moves in order.
     pub moves: Vec<PlannedMove>,

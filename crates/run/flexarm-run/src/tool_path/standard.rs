@@ -23,7 +23,7 @@ const REST: f64 = 1.0;
 /// Standard motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub(super) enum Standard {
+pub enum Standard {
     /// P1 to P5, with a rest at each.
     Iso9283Poses,
     /// The square and two circles in the test plane.
@@ -36,7 +36,7 @@ pub(super) enum Standard {
 
 /// One step of a standard motion.
 #[allow(clippy::large_enum_variant, reason = "a few dozen of them, made once")]
-pub(super) enum Step {
+pub enum Step {
     /// Move to a TCP pose in the base.
     To(MoveKind, Pose),
     /// Rest (s).
@@ -45,7 +45,7 @@ pub(super) enum Step {
 
 impl Standard {
     /// Returns the steps of `repeats` cycles in a cube.
-    pub(super) fn steps(self, centre: Vector3<f64>, side: f64, R: Rotation3<f64>, repeats: usize) -> Vec<Step> {
+    pub fn steps(self, centre: Vector3<f64>, side: f64, R: Rotation3<f64>, repeats: usize) -> Vec<Step> {
         let pose = |p: Vector3<f64>| Pose::from_parts(Translation3::from(p), R);
         let joint = |p: Vector3<f64>| Step::To(MoveKind::Joint, pose(p));
         let line = |p: Vector3<f64>| Step::To(MoveKind::Line, pose(p));
@@ -93,28 +93,4 @@ fn circle(c: Vector3<f64>, r: f64, u: Vector3<f64>, v: Vector3<f64>, pose: &dyn 
         Step::To(kind, pose(c + to * r))
     };
     [Step::To(MoveKind::Line, pose(c + u * r)), half(v, -u), half(-v, u)]
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Truth: plane and distances of the standard, by hand for a cube of 1 m around the origin.
-    #[test]
-    fn poses_lie_in_the_test_plane_at_four_fifths_of_the_way_to_its_corners() {
-        let steps = Standard::Iso9283Poses.steps(Vector3::zeros(), 1.0, Rotation3::identity(), 2);
-        let points: Vec<Vector3<f64>> = steps
-            .iter()
-            .filter_map(|step| match step {
-                Step::To(_, X) => Some(X.translation.vector),
-                Step::Rest(_) => None,
-            })
-            .collect();
-        assert_eq!(points.len(), 11);
-        for p in &points {
-            assert!((p.x + p.z).abs() < 1e-15);
-            assert!(p.norm() < 1e-15 || (p.norm() - 0.4 * 3f64.sqrt()).abs() < 1e-15);
-        }
-        assert!((points[1] - Vector3::new(-0.4, 0.4, 0.4)).norm() < 1e-15);
-    }
 }

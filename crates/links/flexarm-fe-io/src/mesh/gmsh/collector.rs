@@ -16,7 +16,7 @@ use flexarm_fem::spelling::listed;
 type GroupKey = (u8, i64);
 
 /// Mesh data collected while the sections are read.
-pub(super) struct Collector {
+pub struct Collector {
     pub(super) draft: Draft,
     keep_lines: bool,
     names: HashMap<GroupKey, String>,
@@ -24,14 +24,15 @@ pub(super) struct Collector {
     /// Region of the draft for each group with elements.
     regions: HashMap<GroupKey, usize>,
     region_keys: Vec<GroupKey>,
-    sets: BTreeMap<GroupKey, GroupNodes>,
+    /// Nodes of each group.
+    pub sets: BTreeMap<GroupKey, GroupNodes>,
     /// Total number of nodes of all sets, each counted when it was last tidied.
     kept: usize,
 }
 
 #[derive(Default)]
-struct GroupNodes {
-    ids: Vec<u64>,
+pub struct GroupNodes {
+    pub ids: Vec<u64>,
     /// Number of them that are sorted and unique.
     tidied: usize,
     /// Offset of its first element.
@@ -59,7 +60,7 @@ impl GroupNodes {
 
 impl Collector {
     /// `keep_lines`: whether line elements may be beams.
-    pub(super) fn new(keep_lines: bool) -> Self {
+    pub fn new(keep_lines: bool) -> Self {
         Self {
             draft: Draft::default(),
             keep_lines,
@@ -119,7 +120,7 @@ impl Collector {
     }
 
     /// Adds one element with its physical groups.
-    pub(super) fn element(
+    pub fn element(
         &mut self,
         src: &Source,
         shape: &Shape,
@@ -265,36 +266,5 @@ impl Collector {
             sets.entry(name.clone()).or_insert((key.0, vec![]));
         }
         Ok(sets.into_iter().map(|(name, (_, nodes))| (name, nodes)).collect())
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Puts triangles into 64 groups, as from a file with 8 bytes per triangle; returns the number
-    /// of stored node numbers.
-    fn held(triangles: impl ExactSizeIterator<Item = [u64; 3]>) -> Result<usize, MeshError> {
-        let bytes = vec![b'\n'; 8 * triangles.len()];
-        let src = Source { bytes: &bytes, origin: "t.msh", binary: false };
-        let groups: Vec<i64> = (1..=64).collect();
-        let mut collector = Collector::new(false);
-        for (id, nodes) in (1..).zip(triangles) {
-            collector.element(&src, &shape(2).unwrap(), id, 0, &groups, &nodes)?;
-        }
-        Ok(collector.sets.values().map(|set| set.ids.capacity()).sum())
-    }
-
-    #[test]
-    fn many_groups_of_shared_nodes_do_not_grow_with_the_elements() {
-        let numbers = held((0..20_000_u32).map(u64::from).map(|k| [k % 7, 7, 8 + k % 5])).unwrap();
-        assert!(numbers <= 64 * 128, "{numbers}"); // 24 million bytes / 8 without tidying
-    }
-
-    #[test]
-    fn many_groups_of_many_nodes_are_refused() {
-        let error = held((0..40_000_u32).map(u64::from).map(|k| [3 * k, 3 * k + 1, 3 * k + 2])).unwrap_err();
-        assert_eq!(error.kind, Kind::TooLarge);
-        assert!(error.to_string().contains("at most 4 nodes per byte"), "{error}");
     }
 }

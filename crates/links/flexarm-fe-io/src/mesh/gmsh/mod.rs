@@ -3,11 +3,11 @@
 //! Both versions fill a [`Collector`]: volumes by physical group, nodes of the groups of lower
 //! dimension. Start at [`parse`]. Layout: Gmsh reference manual, "Gmsh file formats".
 
-mod collector;
+pub(crate) mod collector;
 mod msh2;
 mod msh4;
 mod reader;
-mod shapes;
+pub(crate) mod shapes;
 
 use super::error::{FilePosition, MeshError, MeshErrorKind as Kind};
 use super::read::{MeshFile, ReadOptions};

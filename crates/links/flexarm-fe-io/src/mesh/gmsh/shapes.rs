@@ -3,7 +3,7 @@
 use flexarm_fem::mesh::ElementKind;
 
 /// Gmsh element type.
-pub(super) struct Shape {
+pub struct Shape {
     /// Name in Gmsh.
     pub(super) name: &'static str,
     /// Topological dimension.
@@ -24,7 +24,7 @@ pub(super) const MOST_NODES: usize = 125;
 /// Looks up an element type number.
 ///
 /// Source: Gmsh reference manual, "MSH file format" (numbers) and "Node ordering" (edges).
-pub(super) fn shape(number: i64) -> Option<Shape> {
+pub fn shape(number: i64) -> Option<Shape> {
     let plain = |name, dim, nodes| Some(Shape { name, dim, nodes, solid: None });
     let solid = |name, kind: ElementKind, order: &'static [u8]| {
         let nodes = kind.nodes();

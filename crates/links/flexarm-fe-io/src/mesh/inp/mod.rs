@@ -8,7 +8,7 @@ mod finish;
 mod lines;
 mod properties;
 mod sets;
-mod types;
+pub(crate) mod types;
 
 use super::error::MeshError;
 use super::read::{MeshFile, ReadOptions};

@@ -32,7 +32,8 @@ use crate::strength::Strength;
 use crate::summary::{
     LinkStressFigures, SectionForceFigures, StrainGaugeFigures, StressPlaceFigures, StressPointFigures,
 };
-use equivalent::{principal, signed_von_mises, von_mises_squared};
+pub use equivalent::signed_von_mises;
+use equivalent::{principal, von_mises_squared};
 
 /// Seats this close to a tied node are left out, as a fraction of the distance between the
 /// interfaces: the stress beside a rigid tie is that of the tie.

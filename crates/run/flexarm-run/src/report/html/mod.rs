@@ -20,6 +20,7 @@ use self::arm::arm_pictures;
 use self::data::{data, thinning};
 use self::figures::{comparison, tiles};
 use self::number::number;
+pub use self::number::short;
 use self::run::method;
 use self::tables::{iso_table, parts_tables, stops_table, stress_picture, tool_path};
 use super::curves::{Plot, plots};

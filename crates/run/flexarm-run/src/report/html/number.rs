@@ -127,54 +127,8 @@ fn push_digits(text: &mut String, number: usize) {
 }
 
 /// Returns the shorter form of a number with `digits` significant digits; null if it is not finite.
-pub(super) fn short(x: f64, digits: usize) -> String {
+pub fn short(x: f64, digits: usize) -> String {
     let mut text = String::new();
     push_short(&mut text, x, digits);
     text
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Truth: the value of the digits, and both forms as written by the standard library.
-    #[test]
-    fn a_number_is_written_in_the_shorter_of_both_forms() {
-        let check = |x: f64, digits: usize| {
-            let x = if x.abs() < SMALLEST { 0.0 } else { x };
-            let rounded: f64 = format!("{x:.*e}", digits - 1).parse().unwrap();
-            let rounded = if rounded == 0.0 { 0.0 } else { rounded };
-            let (plain, scientific) = (format!("{rounded}"), format!("{rounded:e}"));
-            let truth = if scientific.len() < plain.len() { scientific } else { plain };
-            assert_eq!(short(x, digits), truth, "{x:?} with {digits} digits");
-        };
-        let mut seed = 0x9E37_79B9_7F4A_7C15_u64;
-        let mut random = || {
-            seed ^= seed << 13;
-            seed ^= seed >> 7;
-            seed ^= seed << 17;
-            seed
-        };
-        for _ in 0..50_000 {
-            let (mantissa, power) = (random() as i64 as f64 / i64::MAX as f64, (random() % 30) as i32 - 15);
-            [1, 3, 5, 7].into_iter().for_each(|digits| check(mantissa * 10f64.powi(power), digits));
-            let any = f64::from_bits(random());
-            check(if any.is_finite() { any } else { 0.5 }, 5);
-            check((random() % 3000) as f64 * 10f64.powi(power / 3), 5);
-        }
-        for x in [0.0, -0.0, 1.0, -1.0, 10.0, 99999.6, 1e15, 1.1e-300, 1.5e300, -120.0, 0.001, 0.01, 1000.0] {
-            check(x, 5);
-        }
-        // Midpoints between two numbers and their neighbours, powers of ten and their neighbours.
-        for k in 0..20_000_i32 {
-            let middle = (f64::from(10_000 + 4 * k) + 0.5) * 10f64.powi(k % 25 - 12);
-            let ten = 10f64.powi(k % 600 - 300);
-            for x in [middle, ten, 9.99995 * ten, 9.9999949 * ten] {
-                for x in [x.next_down(), x, -x, x.next_up()] {
-                    [1, 5, 6, 9].into_iter().for_each(|digits| check(x, digits));
-                }
-            }
-        }
-        assert_eq!([f64::NAN, f64::INFINITY, 1e-310].map(|x| short(x, 5)), ["null", "null", "0"]);
-    }
 }

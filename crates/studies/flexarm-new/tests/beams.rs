@@ -1,7 +1,9 @@
-use flexarm_kinematics::JointKind;
-use flexarm_urdf::Geometry;
+//! Beam sections from mass and shape of a link.
 
-use super::*;
+use flexarm_kinematics::{Joint, JointKind, LinkInertia, Pose};
+use flexarm_new::internals::{BeamSection, Candidate, NoSection, propose};
+use flexarm_urdf::{Geometry, TriangleMesh};
+use nalgebra::{Matrix3, Rotation3, Translation3, Vector3};
 
 fn candidate(mass: f64, meshes: &[TriangleMesh], X_LB: Pose) -> Result<BeamSection, NoSection> {
     let distal = Joint::new("elbow", JointKind::Fixed, "arm", "next", X_LB);
@@ -86,6 +88,12 @@ fn a_tube_of_known_wall_is_found_again() {
     assert!(errors[0].abs() < 2e-3 && errors[1].abs() < 3e-3 && errors[2].abs() < 5e-3, "{errors:?}");
 }
 
+/// Second moments of a box about its two axes.
+fn hollow([width, height]: [f64; 2], wall: f64) -> [f64; 2] {
+    let (w, h) = (width - 2.0 * wall, height - 2.0 * wall);
+    [(width * height.powi(3) - w * h.powi(3)) / 12.0, (height * width.powi(3) - h * w.powi(3)) / 12.0]
+}
+
 /// Truth: tip deflection of a cantilever under a force, `∫ (l - x)²/(E I(x)) dx`, by Simpson's
 /// rule in 2000 steps over the closed form of I(x) of a tapered box.
 #[test]
@@ -114,9 +122,9 @@ fn the_tip_of_a_tapered_link_goes_as_far_as_that_of_its_uniform_beam() {
     let mesh = lofted(length, |x| rectangle(size(x)[0], size(x)[1]));
     let X_LB = Pose::from_parts(Translation3::new(length, 0.0, 0.0), Rotation3::identity());
     let found = candidate(mass, &[mesh], X_LB).unwrap();
-    let moments = hollow(Shape::Box, [found.width, found.height], found.wall.unwrap());
+    let moments = hollow([found.width, found.height], found.wall.unwrap());
     for (axis, moment) in moments.into_iter().enumerate() {
-        let truth = simpson(&|x| (length - x).powi(2) / hollow(Shape::Box, size(x), wall)[axis]);
+        let truth = simpson(&|x| (length - x).powi(2) / hollow(size(x), wall)[axis]);
         let error = length.powi(3) / (3.0 * moment) / truth - 1.0;
         assert!(error.abs() < 2e-3, "axis {axis}: {error:.2e}");
     }

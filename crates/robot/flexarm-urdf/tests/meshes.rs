@@ -3,15 +3,15 @@
 use std::path::Path;
 
 use approx::assert_relative_eq;
+use flexarm_kinematics::Pose;
+use flexarm_urdf::internals::{Loaded, decode as decode_with};
+use flexarm_urdf::{Geometry, MeshError, UpAxis, load_mesh};
 use nalgebra::{Matrix3, Rotation3, Translation3, Vector3, vector};
 use proptest::prelude::*;
 
-use super::*;
-use crate::geometry::Geometry;
-
 /// Decodes with the declared up axis.
 fn decode(bytes: &[u8], path: &Path) -> Result<Loaded, MeshError> {
-    super::decode(bytes, path, UpAxis::Declared)
+    decode_with(bytes, path, UpAxis::Declared)
 }
 
 /// Edge lengths and centre of the box (m).
@@ -181,7 +181,7 @@ fn a_turned_up_axis_is_remarked_and_can_be_ignored() {
     assert!(remarks[0].contains("Y_UP"), "{remarks:?}");
     let z_up = String::from_utf8(collada()).unwrap().replace("Y_UP", "Z_UP");
     assert!(decode(z_up.as_bytes(), Path::new("a.dae")).unwrap().remarks.is_empty());
-    let ignored = super::decode(&collada(), Path::new("a.dae"), UpAxis::Ignored).unwrap();
+    let ignored = decode_with(&collada(), Path::new("a.dae"), UpAxis::Ignored).unwrap();
     assert!(ignored.remarks.is_empty());
     let file = vector![CENTRE[0], CENTRE[2], -CENTRE[1]];
     assert_relative_eq!(ignored.mesh.mass_properties().centroid, file, max_relative = 1e-14);

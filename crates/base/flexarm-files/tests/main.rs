@@ -1,0 +1,6 @@
+//! The tests of the crate, as one program: it links once.
+#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
+
+mod results;
+mod tables;
+mod yaml;

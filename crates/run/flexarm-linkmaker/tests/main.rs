@@ -1,0 +1,10 @@
+//! The tests of the crate, as one program: it links once.
+#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
+#![allow(non_snake_case, reason = "monogram notation, as in the crate")]
+
+mod import;
+mod job;
+mod names;
+mod urdf_link;
+mod words;
+mod yardsticks;

@@ -1,0 +1,7 @@
+//! The tests of the crate, as one program: it links once.
+#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
+#![allow(non_snake_case, reason = "monogram notation")]
+
+mod beams;
+mod chain;
+mod guesses;
