@@ -61,6 +61,6 @@ fn a_value_is_changed_in_its_place_and_nothing_else_is() {
 
 #[test]
 fn a_path_that_leads_nowhere_is_told_with_those_that_are_near() {
-    let message = changed(&["drive.j2.gearbx.stiffness=1"]).unwrap_err();
+    let message = changed(&["drive.j3.gearbox.stiffness=1"]).unwrap_err();
     assert!(message.contains("did you mean \"drive.j2.gearbox.stiffness\"?"), "{message}");
 }
