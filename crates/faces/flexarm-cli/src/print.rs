@@ -65,6 +65,9 @@ impl TextTable {
 pub(crate) fn table<C: AsRef<str>>(header: &[C]) -> TextTable {
     let mut table = TextTable { table: Table::new(), shortens: false };
     table.load_style(presets::NOTHING).set_content_arrangement(ContentArrangement::Dynamic);
+    if let Some(width) = crate::terminal::width() {
+        table.set_width(width);
+    }
     if !header.is_empty() {
         table.set_header(header.iter().map(AsRef::as_ref));
     }

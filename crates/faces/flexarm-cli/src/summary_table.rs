@@ -31,7 +31,7 @@ pub const ALERT: Style = AnsiColor::Red.on_default().bold();
 /// Width of the terminal that standard output goes to (columns).
 pub(crate) fn terminal_width() -> usize {
     // Some terminals report a width of zero.
-    Table::new().width().filter(|width| *width > 0).map_or(USUAL_WIDTH, usize::from)
+    crate::terminal::width().filter(|width| *width > 0).map_or(USUAL_WIDTH, usize::from)
 }
 
 /// Formats the figures of a run at a given width.

@@ -23,6 +23,12 @@ pub(crate) struct Terminal {
     pub(crate) quiet: bool,
 }
 
+/// Returns the width of the terminal (columns), if standard output is one.
+pub(crate) fn width() -> Option<u16> {
+    let terminal_size::Width(columns) = terminal_size::terminal_size_of(std::io::stdout())?.0;
+    Some(columns)
+}
+
 /// Prints text for people or JSON for programs, with control characters escaped; a closed pipe is
 /// not an error.
 pub(crate) fn answer(terminal: &Terminal, json: impl FnOnce() -> String, text: impl FnOnce() -> String) {
