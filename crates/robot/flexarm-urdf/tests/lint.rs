@@ -34,18 +34,18 @@ const WHOLE: &str = r#"<?xml version="1.0"?>
   <material name="grey"><color rgba="0.5 0.5 0.5 1"/></material>
   <link name="a &lt;'1'&gt; &amp; &quot;&#xe9;&quot;"/>
   <link name=" b ">
-<inertial><origin xyz="0 0 1" rpy="0 1e-3 0"/><mass value=" 0.1"/><inertia ixx="1" ixy="2" ixz="3" iyy="4" iyz="5" izz="6"/></inertial>
-<visual name="v"><origin xyz="0.1 .2 3."/><geometry><box size="1 2 3"/></geometry><material name="grey"/></visual>
-<visual><geometry><mesh filename=" package://r/b.stl" scale="1 -1 1"/></geometry></visual>
-<collision><geometry><cylinder radius="1" length="2"/></geometry></collision>
-<collision name="c"><origin rpy="0 0 1"/><geometry><sphere radius="1"/></geometry></collision>
+    <inertial><origin xyz="0 0 1" rpy="0 1e-3 0"/><mass value=" 0.1"/><inertia ixx="1" ixy="2" ixz="3" iyy="4" iyz="5" izz="6"/></inertial>
+    <visual name="v"><origin xyz="0.1 .2 3."/><geometry><box size="1 2 3"/></geometry><material name="grey"/></visual>
+    <visual><geometry><mesh filename=" package://r/b.stl" scale="1 -1 1"/></geometry></visual>
+    <collision><geometry><cylinder radius="1" length="2"/></geometry></collision>
+    <collision name="c"><origin rpy="0 0 1"/><geometry><sphere radius="1"/></geometry></collision>
   </link>
   <joint name="ab" type="revolute">
-<parent link="a &lt;'1'&gt; &amp; &quot;&#xe9;&quot;"/><child link=" b "/><origin xyz="0 0 1" rpy="0 0 0"/><axis xyz="0 0 1"/>
-<limit lower="-1" upper="inf" effort="10" velocity="2"/><dynamics damping="1" friction="2"/>
+    <parent link="a &lt;'1'&gt; &amp; &quot;&#xe9;&quot;"/><child link=" b "/><origin xyz="0 0 1" rpy="0 0 0"/><axis xyz="0 0 1"/>
+    <limit lower="-1" upper="inf" effort="10" velocity="2"/><dynamics damping="1" friction="2"/>
   </joint>
   <joint name="bc" type="prismatic">
-<parent link=" b "/><child link="c"/><limit velocity="1"/><mimic joint="ab" multiplier="2" offset="0.1"/>
+    <parent link=" b "/><child link="c"/><limit velocity="1"/><mimic joint="ab" multiplier="2" offset="0.1"/>
   </joint>
 </robot>
 "#;

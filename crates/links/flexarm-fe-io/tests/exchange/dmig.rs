@@ -17,7 +17,7 @@ DMIG*   KAAX                          12               0
 const SMALL: &str = "\
 DMIG    KAAX    0       1       1       0
 DMIG    KAAX    11      1               11      1       4.0
-    12      0       -1.5
+        12      0       -1.5
 DMIG    KAAX    12      0               12      0       3.0+0
 +       11      1       -15.-1
 ";
