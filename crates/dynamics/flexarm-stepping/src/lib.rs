@@ -102,7 +102,6 @@ pub mod internals {
     pub use crate::eigenvalues::symmetric_eigenvalues;
     pub use crate::events::EventQueue;
     pub use crate::gear::hysteresis::SliderState;
-    pub use crate::run_slopes::lu::Lu;
     pub use crate::steppers::sdirk3::{GAMMA, NODES, WEIGHTS};
     pub use crate::steppers::spook::constraint::Rows;
     pub use crate::steppers::spook::solve::{Jacobian, Sigma, Symmetric, TreeSolver, Triangle};

@@ -4,7 +4,6 @@
 //! (`crate::answer`).
 
 use anstyle::{AnsiColor, Style};
-use comfy_table::Table;
 use flexarm::written::one_line;
 use flexarm::{Figure, Files, Holds, RecordingFormat, STUDY_NOTE, Summary, Weight, figure_groups, study_rows};
 

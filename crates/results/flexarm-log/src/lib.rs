@@ -116,7 +116,7 @@ pub mod internals {
     pub use crate::mcap_file::messages::{decode, encode};
     #[cfg(feature = "mcap")]
     pub use crate::mcap_file::output::WholeRecords;
-    #[cfg(any(feature = "mcap", feature = "rerun"))]
+    #[cfg(feature = "mcap")]
     pub use crate::poses::{PoseClock, PoseReasons};
     #[cfg(any(feature = "mcap", feature = "described-tables"))]
     pub use crate::read::wall::{CAUGHT, caught};
