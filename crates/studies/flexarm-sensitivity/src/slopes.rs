@@ -27,6 +27,11 @@ const OF_FREQUENCY: f64 = 3e-5;
 /// Relative step of parameters that change amplitudes alone.
 const OF_AMPLITUDE: f64 = 5e-4;
 
+/// Place of a number in a friction law.
+pub(super) type OfFriction = fn(&mut Friction) -> &mut f64;
+/// Place of a number in a controller.
+pub(super) type OfAxis = fn(&mut ServoAxis) -> &mut f64;
+
 /// Parameter with respect to which a run is differentiated.
 #[derive(Clone, Debug)]
 pub enum RunParameter {
@@ -39,9 +44,9 @@ pub enum RunParameter {
     Tool(Vector3<f64>),
     /// Factor on a number of the friction law of a joint, given by its coordinate. It has an effect
     /// only on joints under servo control.
-    Friction(usize, fn(&mut Friction) -> &mut f64),
+    Friction(usize, OfFriction),
     /// Factor on a number of the controller of a joint, given by the number of its axis.
-    Servo(usize, fn(&mut ServoAxis) -> &mut f64),
+    Servo(usize, OfAxis),
 }
 
 /// TCP error along a run (flexible minus rigid arm) and its derivatives, one number per parameter
@@ -144,7 +149,7 @@ impl Repeated<'_> {
         for few in parameters.chunks(2 * rayon::current_num_threads()) {
             let steps: Vec<f64> = few.iter().map(|parameter| self.step(parameter)).collect();
             let run = |k: usize| {
-                let x = if k % 2 == 0 { steps[k / 2] } else { -steps[k / 2] };
+                let x = if k.is_multiple_of(2) { steps[k / 2] } else { -steps[k / 2] };
                 self.errors(Some((&few[k / 2], x))).map(|found| found.errors)
             };
             let runs = (0..2 * few.len()).into_par_iter().map(run).collect::<Result<Vec<_>, Error>>()?;
