@@ -1,7 +1,8 @@
 //! Parameters of servo-controlled joints: friction and gains.
 
-use flexarm_stepping::{FlexibleArm, Friction, ServoAxis, TorqueLimited};
+use flexarm_stepping::{FlexibleArm, ServoAxis, TorqueLimited};
 
+use super::slopes::{OfAxis, OfFriction};
 use super::{NamedParameter, RunParameter, RunSlopes};
 use flexarm_run::Arm;
 use flexarm_run::Caveat;
@@ -51,7 +52,7 @@ fn friction_of(arm: &FlexibleArm, coordinate: usize, joint: &str, slides: bool) 
     let Some(law) = arm.friction.get(coordinate) else { return Vec::new() };
     let [torque, damping, speed] = if slides { ["N", "N s/m", "m/s"] } else { ["N m", "N m s/rad", "rad/s"] };
     let dry = law.coulomb != 0.0 || law.stribeck != 0.0;
-    let all: [(&str, &str, f64, fn(&mut Friction) -> &mut f64, bool); 5] = [
+    let all: [(&str, &str, f64, OfFriction, bool); 5] = [
         ("viscous", damping, law.viscous, |law| &mut law.viscous, true),
         ("coulomb", torque, law.coulomb, |law| &mut law.coulomb, true),
         ("stribeck", torque, law.stribeck, |law| &mut law.stribeck, true),
@@ -59,7 +60,7 @@ fn friction_of(arm: &FlexibleArm, coordinate: usize, joint: &str, slides: bool) 
         ("regularisation", speed, law.regularisation, |law| &mut law.regularisation, dry),
     ];
     let acting = all.into_iter().filter(|(_, _, value, _, acts)| *acts && *value != 0.0);
-    let named = |(key, unit, value, of, _): (&str, &str, f64, fn(&mut Friction) -> &mut f64, bool)| NamedParameter {
+    let named = |(key, unit, value, of, _): (&str, &str, f64, OfFriction, bool)| NamedParameter {
         name: format!("drive.{joint}.friction.{key}"),
         unit: unit.into(),
         value,
@@ -73,13 +74,13 @@ fn friction_of(arm: &FlexibleArm, coordinate: usize, joint: &str, slides: bool) 
 /// Returns the nonzero gains and the feed-forward of a servo, each per 1 % of its value.
 fn gains_of(axis: &ServoAxis, number: usize, joint: &str, slides: bool) -> Vec<NamedParameter> {
     let (damping, stiffness) = if slides { ("N s/m", "N/m") } else { ("N m s/rad", "N m/rad") };
-    let all: [(&str, &str, f64, fn(&mut ServoAxis) -> &mut f64); 4] = [
+    let all: [(&str, &str, f64, OfAxis); 4] = [
         ("position_gain", "1/s", axis.position_gain, |axis| &mut axis.position_gain),
         ("velocity_gain", damping, axis.velocity_gain, |axis| &mut axis.velocity_gain),
         ("integral_gain", stiffness, axis.integral_gain, |axis| &mut axis.integral_gain),
         ("feed_forward", "1", axis.feed_forward, |axis| &mut axis.feed_forward),
     ];
-    let named = |(key, unit, value, of): (&str, &str, f64, fn(&mut ServoAxis) -> &mut f64)| NamedParameter {
+    let named = |(key, unit, value, of): (&str, &str, f64, OfAxis)| NamedParameter {
         name: format!("drive.{joint}.servo.{key}"),
         unit: unit.into(),
         value,

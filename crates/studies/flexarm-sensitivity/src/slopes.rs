@@ -27,6 +27,11 @@ const OF_FREQUENCY: f64 = 3e-5;
 /// Relative step of parameters that change amplitudes alone.
 const OF_AMPLITUDE: f64 = 5e-4;
 
+/// Place of a number in a friction law.
+pub(super) type OfFriction = fn(&mut Friction) -> &mut f64;
+/// Place of a number in a controller.
+pub(super) type OfAxis = fn(&mut ServoAxis) -> &mut f64;
+
 /// Parameter with respect to which a run is differentiated.
 #[derive(Clone, Debug)]
 pub enum RunParameter {
@@ -39,9 +44,9 @@ pub enum RunParameter {
     Tool(Vector3<f64>),
     /// Factor on a number of the friction law of a joint, given by its coordinate. It has an effect
     /// only on joints under servo control.
-    Friction(usize, fn(&mut Friction) -> &mut f64),
+    Friction(usize, OfFriction),
     /// Factor on a number of the controller of a joint, given by the number of its axis.
-    Servo(usize, fn(&mut ServoAxis) -> &mut f64),
+    Servo(usize, OfAxis),
 }
 
 /// TCP error along a run (flexible minus rigid arm) and its derivatives, one number per parameter
@@ -140,11 +145,18 @@ impl Repeated<'_> {
         let found = self.errors(None)?;
         let (mut position, mut rotation) = (ErrorSlopes::of(&found, 0), ErrorSlopes::of(&found, 3));
         let mut kept = Vec::new();
-        // As many at a time as cores have work for: the errors of all of them would fill the memory.
+        // Some at a time: the errors of all of them would fill the memory.
         for few in parameters.chunks(2 * rayon::current_num_threads()) {
-            let slopes =
-                few.par_iter().map(|parameter| self.difference(parameter)).collect::<Result<Vec<_>, Error>>()?;
-            for own in slopes {
+            let steps: Vec<f64> = few.iter().map(|parameter| self.step(parameter)).collect();
+            let run = |k: usize| {
+                let x = if k.is_multiple_of(2) { steps[k / 2] } else { -steps[k / 2] };
+                self.errors(Some((&few[k / 2], x))).map(|found| found.errors)
+            };
+            let runs = (0..2 * few.len()).into_par_iter().map(run).collect::<Result<Vec<_>, Error>>()?;
+            for (pair, h) in runs.chunks_exact(2).zip(&steps) {
+                let both = pair[0].iter().zip(&pair[1]);
+                let difference = |(a, b): (&[f64; 6], &[f64; 6])| std::array::from_fn(|i| (a[i] - b[i]) / (2.0 * h));
+                let own: Vec<[f64; 6]> = both.map(difference).collect();
                 position.include(&found, &own, 0);
                 rotation.include(&found, &own, 3);
                 kept.extend(keep_samples.then_some(own));
@@ -153,15 +165,6 @@ impl Repeated<'_> {
         let (steps, limited) = (found.errors.len() as u64 - 1, found.limited);
         let (times_s, errors) = if keep_samples { (found.times_s, found.errors) } else { Default::default() };
         Ok(RunSlopes { steps, position, rotation, limited, times_s, errors, slopes: kept })
-    }
-
-    /// Computes the derivatives of the errors by one parameter.
-    fn difference(&self, parameter: &RunParameter) -> Result<Vec<[f64; 6]>, Error> {
-        let h = self.step(parameter);
-        let at = |x: f64| self.errors(Some((parameter, x)));
-        let (more, less) = rayon::join(|| at(h), || at(-h));
-        let pairs = more?.errors.into_iter().zip(less?.errors);
-        Ok(pairs.map(|(more, less)| std::array::from_fn(|i| (more[i] - less[i]) / (2.0 * h))).collect())
     }
 
     /// Returns the step of the differences, in the unit of the parameter.
