@@ -30,26 +30,3 @@ fn friction_slope_is_the_derivative_of_its_torque() {
         assert!((numeric - f.slope(rate)).abs() < 1e-6 * (1.0 + f.slope(rate).abs()), "{rate}");
     }
 }
-
-/// Truth: fourth-order differences in all five parameters at once; measured 3e-12.
-#[test]
-fn the_change_of_friction_is_the_derivative_of_its_torque_by_its_numbers() {
-    let f = Friction { viscous: 3.0, coulomb: 20.0, stribeck: 8.0, stribeck_velocity: 0.2, regularisation: 0.05 };
-    let by = Friction { viscous: 0.4, coulomb: -1.0, stribeck: 2.0, stribeck_velocity: 0.03, regularisation: -0.008 };
-    let at = |x: f64, rate: f64| {
-        let of = |value: f64, by: f64| value + x * by;
-        Friction {
-            viscous: of(f.viscous, by.viscous),
-            coulomb: of(f.coulomb, by.coulomb),
-            stribeck: of(f.stribeck, by.stribeck),
-            stribeck_velocity: of(f.stribeck_velocity, by.stribeck_velocity),
-            regularisation: of(f.regularisation, by.regularisation),
-        }
-        .torque(rate)
-    };
-    for rate in [-0.3, -0.02, 0.0, 0.01, 0.5] {
-        let d = |h: f64| (at(h, rate) - at(-h, rate)) / (2.0 * h);
-        let numeric = (4.0 * d(5e-4) - d(1e-3)) / 3.0;
-        assert!((numeric - f.change(rate, &by)).abs() < 1e-9, "{rate}: {numeric} {}", f.change(rate, &by));
-    }
-}

@@ -84,7 +84,7 @@ pub use transmission::Transmission;
 #[doc(hidden)]
 pub mod internals {
     pub use crate::lint::lint;
-    pub use crate::mesh::{Loaded, decode};
+    pub use crate::mesh::{Loaded, decode, load_with_remarks};
     pub use crate::report::Report;
     pub use crate::xacro::macros::parameters;
     pub use crate::xacro::process::fits;

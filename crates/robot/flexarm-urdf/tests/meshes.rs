@@ -4,7 +4,7 @@ use std::path::Path;
 
 use approx::assert_relative_eq;
 use flexarm_kinematics::Pose;
-use flexarm_urdf::internals::{Loaded, decode as decode_with};
+use flexarm_urdf::internals::{Loaded, decode as decode_with, load_with_remarks};
 use flexarm_urdf::{Geometry, MeshError, UpAxis, load_mesh};
 use nalgebra::{Matrix3, Rotation3, Translation3, Vector3, vector};
 use proptest::prelude::*;

@@ -5,11 +5,12 @@ use flexarm_linkmaker::import::{ImportMap, parse_part};
 #[test]
 fn a_map_names_rows_or_nodes() {
     assert!(matches!("A=947:1-3+948:1-3,B=#7-12".parse(), Ok(ImportMap::Rows(_))));
-    let map: ImportMap = "A=plane(0,0,0;1,0,0),B=set:tip".parse().unwrap();
+    let map: ImportMap = "A=plane(0,0,0;1,0,0),B=plane(1,0,0;1,0,0)".parse().unwrap();
     assert_eq!(map.entries()[0].1, "plane(0,0,0;1,0,0)");
-    assert_eq!(map.entries()[1], ("B".into(), "set:tip".into()));
-    assert!("A=set:x,B=1002".parse::<ImportMap>().unwrap_err().to_string().contains("set:NAME"));
-    assert!("A=set:x,A=set:y".parse::<ImportMap>().unwrap_err().to_string().contains("twice"));
+    assert_eq!(map.entries()[1], ("B".into(), "plane(1,0,0;1,0,0)".into()));
+    let refused = |text: &str| text.parse::<ImportMap>().unwrap_err().to_string();
+    assert!(refused("A=plane(0,0,0;1,0,0),B=1002").contains("every interface"));
+    assert!(refused("A=plane(0,0,0;1,0,0),A=plane(1,0,0;1,0,0)").contains("twice"));
 }
 
 #[test]

@@ -137,7 +137,8 @@ pub struct Loaded {
     pub remarks: Vec<String>,
 }
 
-pub(crate) fn load_with_remarks(path: &Path, up_axis: UpAxis) -> Result<Loaded, MeshError> {
+/// [`load_mesh_with`] with remarks on what was left out.
+pub fn load_with_remarks(path: &Path, up_axis: UpAxis) -> Result<Loaded, MeshError> {
     let io_error = |source| MeshError::Io { path: path.to_owned(), source };
     // Devices and pipes are refused, since a read may never end.
     let meta = std::fs::metadata(path).map_err(io_error)?;
