@@ -47,7 +47,7 @@ def main():
         print("skipped: there is no valgrind")
         return
     if not Path(arguments.kernels).exists():
-        sys.exit(f"there is no {arguments.kernels}: cargo build --release --workspace --examples")
+        sys.exit(f"there is no {arguments.kernels}: cargo build --release --examples")
     here = dict(rustc=subprocess.run(["rustc", "--version"], capture_output=True, text=True, cwd=ROOT).stdout.strip(), machine=platform.machine())
     stored = json.loads(STORE.read_text()) if STORE.exists() else None
     if stored and not arguments.write and {key: stored[key] for key in here} != here:

@@ -474,7 +474,7 @@ def main():
     else:
         for program in (arguments.flexarm, arguments.prepared):
             if not Path(program).exists():
-                sys.exit(f"there is no program {program}: cargo build --release --workspace --bins --examples, or --flexarm and --prepared")
+                sys.exit(f"there is no program {program}: cargo build --release --bins --examples, or --flexarm and --prepared")
         found = measure(arguments.flexarm, arguments.prepared, arguments.repeat)
     print(markdown(found))
     if arguments.write or arguments.draw:

@@ -1,5 +1,5 @@
 //! Time per call of the recursions, in ns, for comparison with Pinocchio in
-//! `tools/pinocchio_bench.sh`: `cargo run --release --workspace --example recursion_times`
+//! `tools/pinocchio_bench.sh`: `cargo run --release --example recursion_times`
 //!
 //! 64 random states, 101 batches of 1000 calls; CSV columns
 //! build,model,function,minimum_ns,median_ns.

@@ -2,7 +2,7 @@
 //! without set-up.
 //!
 //! ```text
-//! cargo run --release --workspace --example chains [STEPS] [JOINTS ...]
+//! cargo run --release --example chains [STEPS] [JOINTS ...]
 //! ```
 //! Generalised-alpha with default settings at 1 ms; CPU time of one thread, minimum of five.
 #![allow(non_snake_case, reason = "monogram notation")]

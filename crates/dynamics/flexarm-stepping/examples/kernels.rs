@@ -1,8 +1,8 @@
 //! Repeats one kernel, to count its instructions: `tools/instruction_counts.py`.
 //!
 //! ```text
-//! cargo run --release --workspace --example kernels KERNEL TIMES
-//! cargo run --release --workspace --example kernels               # lists the names
+//! cargo run --release --example kernels KERNEL TIMES
+//! cargo run --release --example kernels               # lists the names
 //! ```
 #![allow(non_snake_case, reason = "monogram notation")]
 #![allow(clippy::print_stdout, clippy::unwrap_used, reason = "an example")]
