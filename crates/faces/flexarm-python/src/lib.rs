@@ -88,7 +88,7 @@ mod _flexarm {
     /// Makes the recordings for the viewer available.
     #[cfg(feature = "rerun")]
     #[pymodule_init]
-    fn init(_: &pyo3::Bound<'_, pyo3::types::PyModule>) -> pyo3::PyResult<()> {
+    fn init(_module: &pyo3::Bound<'_, pyo3::types::PyModule>) -> pyo3::PyResult<()> {
         flexarm_rerun::install();
         Ok(())
     }
