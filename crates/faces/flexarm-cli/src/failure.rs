@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use flexarm::{Fault, RecordingFormat, TrajectoryError};
 
-use crate::print::complaint;
+use crate::print::{complaint, say};
 
 /// An error that ends a command.
 #[derive(Debug)]
@@ -91,10 +91,10 @@ impl Failure {
             source = cause.source();
         }
         if let Some(page) = self.page() {
-            eprintln!("  help: `flexarm format {page}` prints the keys with their units, and examples");
+            say(&format!("  help: `flexarm format {page}` prints the keys with their units, and examples"));
         }
         if let Some(format) = self.lacks() {
-            eprintln!("  help: {} has it", build_with(format));
+            say(&format!("  help: {} has it", build_with(format)));
         }
     }
 

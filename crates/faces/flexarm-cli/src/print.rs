@@ -1,5 +1,6 @@
 //! Tables for people.
 
+use std::io::Write as _;
 use std::ops::{Deref, DerefMut, RangeBounds};
 
 use crate::terminal::Terminal;
@@ -387,12 +388,18 @@ fn sets(title: &str, sets: &[SetListing]) -> String {
 /// Prints a warning to standard error.
 pub(crate) fn warning(text: &str) {
     let yellow = anstyle::AnsiColor::Yellow.on_default().bold();
-    anstream::eprintln!("{yellow}warning:{yellow:#} {}", message(text));
+    say(&format!("{yellow}warning:{yellow:#} {}", message(text)));
 }
 
 /// Prints an error, or another line with its own first word, to standard error.
 pub(crate) fn complaint(word: &str, text: &str) {
-    eprintln!("{word}: {}", message(text));
+    say(&format!("{word}: {}", message(text)));
+}
+
+/// Prints a line to standard error. A closed pipe or a full disk there loses the line, not the
+/// results: the exit code still says how the command ended.
+pub(crate) fn say(line: &str) {
+    let _ = writeln!(anstream::stderr(), "{line}");
 }
 
 /// Prints warnings to standard error, those of one kind merged, unless `--quiet` is set.

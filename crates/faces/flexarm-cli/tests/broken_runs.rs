@@ -107,6 +107,25 @@ fn a_recording_that_may_not_grow_ends_the_run_with_its_name_and_reads_up_to_ther
     }
 }
 
+/// Messages that nobody can read are lost, the exit code is not.
+#[test]
+#[cfg(target_os = "linux")]
+fn a_full_disk_under_standard_error_does_not_end_a_command() {
+    let place = Place::new();
+    place.write(
+        "heavy.toml",
+        &common::ROBOT.replace("[[flexible_link]]", "payload = { mass = 9000.0 }\n\n[[flexible_link]]"),
+    );
+    let code = |arguments: &[&str]| {
+        let full = std::fs::File::options().write(true).open("/dev/full").unwrap();
+        place.command(arguments).stdout(Stdio::null()).stderr(full).status().unwrap().code()
+    };
+    assert_eq!(code(&["check", "none.toml"]), Some(2));
+    let warned = ["compare", "heavy.toml", "swing.toml", "--no-files"];
+    place.flexarm(&warned).says(&["warning"]);
+    assert_eq!(code(&warned), Some(0));
+}
+
 /// Writing the first file fails at once: the device is always full.
 #[test]
 #[cfg(target_os = "linux")]
