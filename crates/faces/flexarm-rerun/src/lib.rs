@@ -2,10 +2,11 @@
 //! window layout.
 //!
 //! [`install`] makes the format known to `flexarm_log`: from then on runs, studies, maps and
-//! conversions write it. [`RrdRecorder`] records one run, `study` several in one view. `run` holds the contents of a run, made of `robot`s and `curves`; `tracks` buffers rows
-//! until they are worth a chunk; `window` defines the layout of the viewer, `layout` encodes it,
-//! `plot_room` finds axis ranges and legend corners; `stream` writes the file. Only this crate uses
-//! the `rerun` crate, whose interface changes about monthly.
+//! conversions write it. [`RrdRecorder`] records one run, `study` several in one view. `run` holds
+//! the contents of a run, made of `robot`s and `curves`; `tracks` buffers rows until they are worth
+//! a chunk; `window` defines the layout of the viewer, `layout` encodes it, `plot_room` finds axis
+//! ranges and legend corners; `stream` writes the file. Only this crate uses the `rerun` crate,
+//! whose interface changes about monthly.
 //!
 //! ```
 //! use flexarm_log::{CreateOptions, RecordingFormat};
