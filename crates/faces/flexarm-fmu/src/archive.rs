@@ -15,7 +15,7 @@ use flexarm::{
 };
 use serde::{Deserialize, Serialize};
 use toml_edit::{DocumentMut, Item};
-use twox_hash::XxHash3_128;
+use twox_hash::XxHash64;
 use zip::write::SimpleFileOptions;
 
 use crate::description::{About, Fmi, MODEL_IDENTIFIER, description, page};
@@ -306,7 +306,7 @@ fn token(files: &NamedFiles) -> String {
     for (name, bytes) in files {
         all.extend(name.bytes().chain(bytes.iter().copied()));
     }
-    let hash = format!("{:032x}", XxHash3_128::oneshot(&all));
+    let hash = [0, 1].map(|seed| format!("{:016x}", XxHash64::oneshot(seed, &all))).concat();
     format!("{{{}-{}-{}-{}-{}}}", &hash[..8], &hash[8..12], &hash[12..16], &hash[16..20], &hash[20..])
 }
 
