@@ -31,7 +31,7 @@ fn large_meshes_become_coarse_and_keep_their_extent_and_small_ones_stay() {
 
 #[test]
 fn a_path_keeps_its_first_and_last_point_however_long_it_is() {
-    let mut path = Path::new();
+    let mut path = Path::default();
     for k in 0..12_345_u32 {
         let X_WT = flexarm_kinematics::Pose::translation(f64::from(k), 0.0, 0.0);
         path.push(&TwinSample { X_WT, ..TwinSample::default() });

@@ -152,12 +152,14 @@ pub struct Path {
     last: [f32; 3],
 }
 
-impl Path {
+impl Default for Path {
     /// Empty path.
-    pub fn new() -> Self {
+    fn default() -> Self {
         Self { points: Vec::new(), stride: 1, seen: 0, last: [0.0; 3] }
     }
+}
 
+impl Path {
     /// Adds the TCP of a sample.
     pub fn push(&mut self, twin: &TwinSample) {
         self.last = twin.X_WT.translation.vector.map(|x| x as f32).into();
@@ -206,9 +208,9 @@ impl MovingMarkers {
         Self {
             has_rigid: header.has_rigid,
             factor: is_magnified(header).then_some(header.magnification),
-            flexible: Path::new(),
-            rigid: Path::new(),
-            magnified: Path::new(),
+            flexible: Path::default(),
+            rigid: Path::default(),
+            magnified: Path::default(),
             reach: 0.0,
             seconds: Beat::new(1),
             errors: Beat::new(ERROR_HZ),
