@@ -181,7 +181,7 @@ fn format(path: &Path, given: Option<RecordingFormat>, setting: Option<Setting>)
     let format = given.or_else(|| RecordingFormat::from_path(path)).ok_or_else(unknown)?;
     let only_read = setting != Some(Setting::WrittenFormat);
     // A format that is never read back is refused where it is opened.
-    if !format.is_built_in() && !(only_read && !format.is_read_back()) {
+    if !format.is_built_in() && (!only_read || format.is_read_back()) {
         return Err(RecordingError::NotBuiltIn { path: path.to_owned(), format }.into());
     }
     Ok(format)
