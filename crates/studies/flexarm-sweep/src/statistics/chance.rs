@@ -81,7 +81,7 @@ pub fn beyond_chance(columns: &[Vec<f64>], y: &[f64]) -> BeyondChance {
 }
 
 /// Returns the share of the variance that the strongest of several parameters without effect
-/// exceeds with probability [`LEVEL`], by (2). This is the F test of a regression.
+/// exceeds with probability `LEVEL`, by (2). This is the F test of a regression.
 pub fn threshold(terms: usize, freedom: usize, parameters: usize) -> f64 {
     if freedom <= terms {
         return 1.0;
