@@ -30,7 +30,7 @@ pub(crate) enum Change {
     Matrices,
 }
 
-/// Pending and past events of a run. Times that differ by less than [`SAME_TIME`] are equal.
+/// Pending and past events of a run. Times that differ by less than `SAME_TIME` are equal.
 #[derive(Clone)]
 pub struct EventQueue {
     /// Times of jumps of loads and prescribed velocities and of other stops of loads, ascending,
