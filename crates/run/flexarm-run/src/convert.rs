@@ -1,10 +1,10 @@
 //! Conversion of recordings between formats, and reading them into memory.
 
-use std::ffi::OsString;
 use std::io::ErrorKind;
 use std::ops::ControlFlow;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
+use flexarm_files::Partial;
 use flexarm_log::{CreateOptions, LogError, RecordingFormat, RunSource, Sample, Trace, open_recording};
 use flexarm_settings::Setting;
 use serde::Serialize;
@@ -13,8 +13,6 @@ use crate::error::{Error, RecordingError};
 
 /// Number of samples between two calls of the callback.
 const POLL_EVERY: u64 = 1000;
-/// Maximum number of provisional names that are tried.
-const MOST_NAMES: u32 = 1000;
 
 /// Options of a conversion.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -84,11 +82,11 @@ pub fn convert_until(
     if progress(0.0).is_break() {
         return Err(Error::Interrupted { t: 0.0, partial: false });
     }
-    let mut partial = Partial::of(output)?;
-    // The file is new, under a provisional name, so nothing is overwritten.
-    let mut recorder = crate::record::recorder(to, &partial.path, CreateOptions::default())?;
+    let failed = |source| Error::Write { path: output.to_owned(), source };
+    let (_, partial) = Partial::create(output).map_err(failed)?;
+    let mut recorder = crate::record::recorder(to, partial.path(), CreateOptions::default().with_overwrite(true))?;
     // Messages name the requested file.
-    let hidden = partial.folder.clone();
+    let hidden = partial.path().to_owned();
     let named = |error: LogError| error.with_path_for(&hidden, output);
     recorder.begin(source.header()).map_err(named)?;
     let (mut samples, mut span, mut stopped) = (0, None, None);
@@ -112,7 +110,7 @@ pub fn convert_until(
     };
     recorder.finish(&result).map_err(named)?;
     drop(recorder);
-    partial.rename(output)?;
+    partial.finish().map_err(failed)?;
 
     let mut lost = from.lost_on_the_way_to(to, source.header());
     lost.extend(source.missing());
@@ -197,39 +195,4 @@ fn open(path: &Path, format: RecordingFormat) -> Result<Box<dyn RunSource>, Erro
 
 pub(crate) fn same_file(a: &Path, b: &Path) -> bool {
     a.canonicalize().ok().zip(b.canonicalize().ok()).is_some_and(|(a, b)| a == b)
-}
-
-/// File in a folder of its own next to the output, so that its name is unique. The folder is
-/// removed at the end.
-struct Partial {
-    folder: PathBuf,
-    path: PathBuf,
-}
-
-impl Partial {
-    fn of(output: &Path) -> Result<Self, Error> {
-        let name = output.file_name().unwrap_or_default();
-        let mut number = 0_u32;
-        loop {
-            let mut own = OsString::from(".");
-            own.push(name);
-            own.push(format!(".{}-{number}.new", std::process::id()));
-            let folder = output.with_file_name(own);
-            match std::fs::create_dir(&folder) {
-                Ok(()) => return Ok(Self { path: folder.join(name), folder }),
-                Err(error) if error.kind() == ErrorKind::AlreadyExists && number < MOST_NAMES => number += 1,
-                Err(source) => return Err(Error::Write { path: output.to_owned(), source }),
-            }
-        }
-    }
-
-    fn rename(&mut self, output: &Path) -> Result<(), Error> {
-        std::fs::rename(&self.path, output).map_err(|source| Error::Write { path: output.to_owned(), source })
-    }
-}
-
-impl Drop for Partial {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_dir_all(&self.folder); // best effort
-    }
 }
