@@ -2,6 +2,7 @@
 
 use std::cell::RefCell;
 use std::fs::{File, OpenOptions};
+use std::hash::{BuildHasher as _, Hasher as _, RandomState};
 use std::io::{ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
@@ -160,6 +161,21 @@ impl Drop for Partial {
             let _ = std::fs::remove_file(&self.path); // best effort
         }
     }
+}
+
+/// Creates a folder in `parent` that this user alone may enter, under a name that nobody can
+/// foresee: a planted folder or link is not used.
+///
+/// # Errors
+/// Error of the file system.
+pub fn private_folder(parent: &Path) -> std::io::Result<PathBuf> {
+    let random = RandomState::new().build_hasher().finish(); // its keys are the system's random bytes
+    let folder = parent.join(format!("flexarm-{random:016x}"));
+    let mut builder = std::fs::DirBuilder::new();
+    #[cfg(unix)]
+    std::os::unix::fs::DirBuilderExt::mode(&mut builder, 0o700);
+    builder.create(&folder)?;
+    Ok(folder)
 }
 
 /// Converts a name to one that is valid in a file name.

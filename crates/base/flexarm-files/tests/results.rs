@@ -4,7 +4,7 @@ use std::io::ErrorKind;
 use std::path::PathBuf;
 use std::rc::Rc;
 
-use flexarm_files::{FileError, check_free, file_stem, write_all, writing_unless};
+use flexarm_files::{FileError, check_free, file_stem, private_folder, write_all, writing_unless};
 
 #[test]
 fn results_that_cannot_all_be_written_leave_no_file_and_no_folder() {
@@ -69,6 +69,18 @@ fn a_file_that_is_replaced_keeps_its_permissions_and_the_links_to_it() {
     assert!(matches!(check_free(&[ahead.clone()], false), Err(FileError::Taken { .. })));
     write_all(&[(ahead.clone(), "new")]).unwrap();
     assert!(ahead.is_symlink() && folder.join("kept/later").is_file());
+    std::fs::remove_dir_all(&folder).unwrap();
+}
+
+#[test]
+#[cfg(unix)]
+fn a_private_folder_is_new_and_its_owner_s_alone() {
+    use std::os::unix::fs::PermissionsExt;
+
+    let folder = folder("private");
+    let [first, second] = [(); 2].map(|()| private_folder(&folder).unwrap());
+    assert_ne!(first, second);
+    assert_eq!(first.metadata().unwrap().permissions().mode() & 0o777, 0o700);
     std::fs::remove_dir_all(&folder).unwrap();
 }
 

@@ -39,6 +39,28 @@ fn labelled(order: [usize; 6]) -> String {
     text
 }
 
+/// An FMU contains the library of this program, not one that lies in the current folder, and nothing
+/// stays in the folder of temporary files.
+#[cfg(target_os = "linux")]
+#[test]
+fn the_library_of_an_fmu_is_not_taken_from_the_current_folder() {
+    let place = Place::new();
+    place.write("here/lib/libflexarm_fmu.so", "planted");
+    place.write("tmp/kept", "");
+    place.write("bin/README", "");
+    std::fs::copy(env!("CARGO_BIN_EXE_flexarm"), place.path("bin/flexarm")).unwrap();
+    let export = |library: &[&str]| {
+        let mut command = std::process::Command::new(place.path("bin/flexarm"));
+        command.args([&["export-fmu", "../robot.toml", "-o", "a.fmu"], library].concat());
+        command.current_dir(place.path("here")).env("TMPDIR", place.path("tmp"));
+        command
+    };
+    place.refused_by(&mut export(&[]), &["libflexarm_fmu.so", "not beside the program", "--library"]);
+    let asked = export(&["--library", "lib/libflexarm_fmu.so"]).output().unwrap();
+    assert!(asked.status.success(), "{asked:?}");
+    assert_eq!(std::fs::read_dir(place.path("tmp")).unwrap().count(), 1);
+}
+
 /// Truth: the stiffness of the link before it was written.
 #[test]
 fn every_format_brings_the_link_back() {

@@ -260,7 +260,8 @@ fn move_links(document: &mut DocumentMut, folder: &Path, with_stress: bool) -> R
 /// Returns whether the arm made from files is the given one: same masses, springs and frames, bit
 /// for bit.
 fn same_arm(files: &NamedFiles, arm: &Arm, settings: &PlantSettings) -> Result<bool, PlantError> {
-    let folder = std::env::temp_dir().join(format!("flexarm-fmu-{}-{:016x}", std::process::id(), unique()));
+    let parent = std::env::temp_dir();
+    let folder = flexarm::private_folder(&parent).map_err(failed(&parent))?;
     let checked = (|| {
         for (name, bytes) in files {
             let path = folder.join(name);
@@ -275,13 +276,6 @@ fn same_arm(files: &NamedFiles, arm: &Arm, settings: &PlantSettings) -> Result<b
     })();
     let _ = fs::remove_dir_all(&folder);
     checked
-}
-
-/// Returns a number that differs from call to call.
-fn unique() -> u64 {
-    use std::sync::atomic::{AtomicU64, Ordering};
-    static NEXT: AtomicU64 = AtomicU64::new(0);
-    NEXT.fetch_add(1, Ordering::Relaxed)
 }
 
 fn filed(plant: &Plant, settings: &PlantSettings, token: &str, step_s: f64) -> Filed {
