@@ -62,6 +62,21 @@ pub fn check_free(paths: &[PathBuf], overwrite: bool) -> Result<(), FileError> {
     Ok(())
 }
 
+/// Checks that no result replaces a file that it is made of, whatever the names of the two.
+///
+/// # Errors
+/// [`FileError::Unusable`], also where results may overwrite files.
+pub fn check_apart(outputs: &[PathBuf], inputs: &[&Path]) -> Result<(), FileError> {
+    let inputs: Vec<PathBuf> = inputs.iter().filter_map(|input| input.canonicalize().ok()).collect();
+    match outputs.iter().find(|output| output.canonicalize().is_ok_and(|output| inputs.contains(&output))) {
+        None => Ok(()),
+        Some(path) => {
+            let what = "is input and output: give the output another name or folder".into();
+            Err(FileError::Unusable { path: path.clone(), what })
+        }
+    }
+}
+
 /// Writes all files, each first under another name; they are renamed only when all are written. A
 /// full disk or a failed rename therefore leaves no new files behind. Files that were already
 /// overwritten before the failure keep their new content.

@@ -39,6 +39,35 @@ fn labelled(order: [usize; 6]) -> String {
     text
 }
 
+/// Overwriting is for results of an earlier command, not for what this one reads.
+#[test]
+fn no_verb_replaces_what_it_reads() {
+    let place = Place::new();
+    let said = &["is input and output", "another name or folder"];
+    place.write("job.toml", "mesh = \"beam.inp\"\n");
+    place.write("bar.mtx", "");
+    place.write("again/robot.toml", "");
+    #[cfg(unix)]
+    std::os::unix::fs::symlink("swing.toml", place.path("link.toml")).unwrap();
+    for command in [
+        &["reduce", "job.toml", "--flex", "job.toml"][..],
+        &["reduce", "job.toml", "--flex", "./beam.inp"],
+        &["import", "bar.mtx", "--flex", "bar.mtx"],
+        &["motion", "swing.toml", "robot.toml", "-o", "swing.toml"],
+        &["motion", "swing.toml", "robot.toml", "-o", "a.csv", "-o", "robot.toml"],
+        #[cfg(unix)]
+        &["motion", "swing.toml", "-o", "link.toml"],
+        &["sensitivity", "robot.toml", "swing.toml", "--table", "robot.toml"],
+        &["export-fmu", "robot.toml", "-o", "robot.toml"],
+        &["export-fmu", "robot.toml", "-o", "again/../beam.urdf"],
+    ] {
+        place.write("beam.inp", "");
+        place.refused(&[command, &["--force"]].concat(), said);
+    }
+    place.json(&["compare", "robot.toml", "swing.toml", "-o", "out"]);
+    place.refused(&["compare", "robot.toml", "out/run.csv", "-o", "out", "--force"], said);
+}
+
 /// An FMU contains the library of this program, not one that lies in the current folder, and nothing
 /// stays in the folder of temporary files.
 #[cfg(target_os = "linux")]

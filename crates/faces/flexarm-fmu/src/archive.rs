@@ -105,6 +105,10 @@ pub fn export_fmu(job: &FmuJob) -> Result<FmuSummary, PlantError> {
     flexarm::check_free(std::slice::from_ref(&job.output), job.overwrite)?;
     let library = fs::read(&job.library).map_err(failed(&job.library))?;
     let plant = Plant::new(&job.robot, &job.settings)?;
+    let robot = plant.arm().robot();
+    let meshes = robot.urdf.mesh_files.iter().map(|(_, path)| &**path);
+    let read = meshes.chain([&*robot.path, &*robot.urdf_path, &*job.library]);
+    flexarm::check_apart(std::slice::from_ref(&job.output), &read.collect::<Vec<_>>())?;
     let (files, meshes) = resources(&plant, &job.settings)?;
 
     let about_step = plant.variables().iter().find(|variable| variable.name == "step").and_then(|step| step.start);

@@ -52,8 +52,8 @@ pub struct ConvertSummary {
 /// absent, and an existing file stays until then.
 ///
 /// # Errors
-/// [`Error::Recording`] if a format is not known or input and output are the same file;
-/// [`Error::File`] if the input does not exist, or the output exists and may not be overwritten;
+/// [`Error::Recording`] if a format is not known; [`Error::File`] if the input does not exist or is
+/// the output too, or the output exists and may not be overwritten;
 /// [`Error::Log`] for errors in the files.
 pub fn convert(input: &Path, output: &Path, options: &ConvertOptions) -> Result<ConvertSummary, Error> {
     convert_until(input, output, options, &mut |_| ControlFlow::Continue(()))
@@ -74,9 +74,7 @@ pub fn convert_until(
     let from = format(input, options.from, Some(Setting::ReadFormat))?;
     let to = format(output, options.to, Some(Setting::WrittenFormat))?;
     let mut source = open(input, from)?;
-    if same_file(input, output) {
-        return Err(RecordingError::SameFile { path: input.to_owned() }.into());
-    }
+    flexarm_files::check_apart(&[output.to_owned()], &[input])?;
     flexarm_files::check_free(&[output.to_owned()], options.overwrite)?;
 
     if progress(0.0).is_break() {
@@ -191,8 +189,4 @@ fn open(path: &Path, format: RecordingFormat) -> Result<Box<dyn RunSource>, Erro
         return Err(Error::File { path: path.to_owned(), what });
     }
     Ok(open_recording(path, format)?)
-}
-
-pub(crate) fn same_file(a: &Path, b: &Path) -> bool {
-    a.canonicalize().ok().zip(b.canonicalize().ok()).is_some_and(|(a, b)| a == b)
 }
