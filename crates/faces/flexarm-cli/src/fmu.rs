@@ -1,6 +1,6 @@
 //! `flexarm export-fmu`: from flags to an FMU.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
@@ -91,14 +91,14 @@ fn file_stem(name: &str) -> String {
 fn built_library() -> Result<PathBuf, Failure> {
     use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
     let name = format!("{DLL_PREFIX}flexarm_fmu{DLL_SUFFIX}");
-    let program = std::env::current_exe().ok();
-    let folder = program.as_deref().and_then(Path::parent).unwrap_or(Path::new("."));
-    let places = [folder.join(&name), folder.join("deps").join(&name), folder.join("../lib").join(&name)];
-    places.into_iter().find(|place| place.is_file()).or_else(|| shipped::library(&name)).ok_or_else(|| {
+    let program = std::env::current_exe().unwrap_or_default();
+    let places = ["", "deps", "../lib"].map(|place| program.with_file_name(place).join(&name));
+    let beside = places.into_iter().find(|place| place.is_absolute() && place.is_file());
+    beside.or_else(|| shipped::library(&name)).ok_or_else(|| {
         Failure::Usage(format!(
-            "{name}, the library that an FMU contains, is not beside the program in {}: build it with cargo build \
+            "{name}, the library that an FMU contains, is not beside the program {}: build it with cargo build \
              --release -p flexarm-fmu, or give it with --library",
-            folder.display()
+            program.display()
         ))
     })
 }

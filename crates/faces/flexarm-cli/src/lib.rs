@@ -56,6 +56,10 @@ use flexarm::written::message;
 /// This function assumes that it owns the process: messages name settings by its flags, and signals
 /// stop the current command.
 pub fn run(line: Vec<OsString>) -> u8 {
+    if let Some(processors) = fewer_threads() {
+        // Fails only if there is a pool already, which then stays as it is.
+        let _ = rayon::ThreadPoolBuilder::new().num_threads(processors).build_global();
+    }
     signals::turn_into_errors();
     flexarm::name_settings(flags::NAMES);
     #[cfg(feature = "rerun")]
@@ -72,6 +76,19 @@ pub fn run(line: Vec<OsString>) -> u8 {
         }
     };
     [0, 1].into_iter().find(|number| ExitCode::from(*number) == code).unwrap_or(2)
+}
+
+/// Variable of the environment with the number of threads.
+pub const THREADS: &str = "RAYON_NUM_THREADS";
+
+/// Returns the number of processors if the environment asks for more threads than that
+/// ([`THREADS`]), which cost time and memory and compute nothing sooner.
+pub fn fewer_threads() -> Option<usize> {
+    let processors = std::thread::available_parallelism().ok()?.get();
+    // The second name is an older one of the same number.
+    let number = |name| std::env::var(name).ok().and_then(|text| text.parse::<usize>().ok());
+    let asked = [THREADS, "RAYON_RS_NUM_CPUS"].into_iter().find_map(number)?;
+    (asked > processors).then_some(processors)
 }
 
 /// Escapes control characters in the quoted user input, which a terminal would execute.

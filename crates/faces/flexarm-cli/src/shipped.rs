@@ -17,14 +17,18 @@ pub(crate) fn ship_from(folder: PathBuf) {
     let _ = BROUGHT.set(folder);
 }
 
-/// Folders that may hold `robots/` and `trajectories/`: the current folder, the registered one, the
-/// one of the program, and the one where it was built.
+/// Folders of the files that come with the program: the registered one, and the one beside it.
+fn installed() -> impl Iterator<Item = PathBuf> {
+    let program = std::env::current_exe().ok();
+    let beside = program.as_deref().and_then(Path::parent).map(|folder| folder.join("../share/flexarm"));
+    BROUGHT.get().cloned().into_iter().chain(beside)
+}
+
+/// Folders that may hold `robots/` and `trajectories/`: the current folder, those of the installed
+/// files, and the one where the program was built.
 fn roots() -> Vec<PathBuf> {
     let mut roots = vec![PathBuf::from(".")];
-    roots.extend(BROUGHT.get().cloned());
-    if let Some(folder) = std::env::current_exe().ok().as_deref().and_then(Path::parent) {
-        roots.push(folder.join("../share/flexarm"));
-    }
+    roots.extend(installed());
     roots.extend(Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(3).map(Path::to_owned));
     roots
 }
@@ -53,9 +57,10 @@ pub(crate) fn robot_file(given: &Path) -> PathBuf {
     roots().iter().map(|root| root.join("robots").join(given)).find(|path| path.exists()).unwrap_or(found)
 }
 
-/// Returns a library that comes with the program, by the name of its file.
+/// Returns a library that comes with the program, by the name of its file; never one of the current
+/// folder, which others may have put there.
 pub(crate) fn library(name: &str) -> Option<PathBuf> {
-    roots().iter().map(|root| root.join("lib").join(name)).find(|path| path.is_file())
+    installed().map(|root| root.join("lib").join(name)).find(|path| path.is_file())
 }
 
 /// A robot by path or name; the default robot without one.

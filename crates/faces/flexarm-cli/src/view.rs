@@ -19,6 +19,8 @@ use crate::terminal::{Terminal, answer, to_json};
 
 /// Oldest viewer that shows the `.rrd` files of this program.
 const OLDEST: &str = "0.36.3";
+/// File with the error output of a viewer.
+const LOG: &str = "log";
 /// Time for which a new viewer is watched: one that cannot start fails at once.
 const WATCHED: Duration = Duration::from_secs(1);
 
@@ -97,8 +99,8 @@ fn arranged(terminal: &Terminal, mcap: &Path) -> Result<PathBuf, Failure> {
     } else if time(&beside) >= time(mcap) {
         return Ok(beside); // made of this file before
     }
-    let folder = std::env::temp_dir().join(format!("flexarm-view-{}", std::process::id()));
-    std::fs::create_dir(&folder).map_err(|source| Error::Write { path: folder.clone(), source })?;
+    let parent = std::env::temp_dir();
+    let folder = flexarm::private_folder(&parent).map_err(|source| Error::Write { path: parent, source })?;
     Ok(convert(folder.join(mcap.file_stem().unwrap_or_default()).with_extension("rrd"))?)
 }
 
@@ -166,21 +168,27 @@ fn numbers(version: &str) -> Vec<u32> {
 
 /// Starts the viewer, and watches it for a moment or waits until it is closed.
 fn show(terminal: &Terminal, file: &Path, viewer: &Viewer, wait: bool) -> ExitCode {
-    // Error output of a viewer that cannot start. A pipe would break when this program ends.
-    let log = std::env::temp_dir().join(format!("flexarm-view-{}.log", std::process::id()));
     let mut command = command(viewer.words);
     command.arg(file).stdin(Stdio::null()).stdout(Stdio::null());
+    // Error output of a viewer that cannot start. A pipe would break when this program ends.
+    let mut folder = None;
     if !wait {
-        command.stderr(File::create(&log).map_or_else(|_| Stdio::null(), Stdio::from)).env("NO_COLOR", "1");
+        folder = flexarm::private_folder(&std::env::temp_dir()).ok();
+        let log = folder.as_ref().and_then(|folder| File::create(folder.join(LOG)).ok());
+        command.stderr(log.map_or_else(Stdio::null, Stdio::from)).env("NO_COLOR", "1");
         detach(&mut command);
     }
-    let mut child = match command.spawn() {
+    let mut child = command.spawn();
+    let ended = child.as_mut().ok().and_then(watch);
+    let mut said = String::new();
+    if let Some(folder) = folder {
+        said = std::fs::read_to_string(folder.join(LOG)).unwrap_or_default();
+        let _ = std::fs::remove_dir_all(folder); // the log is still open in the viewer, deleted when it closes
+    }
+    let mut child = match child {
         Ok(child) => child,
         Err(error) => return failed(&format!("`{}` cannot be started: {error}", viewer.name())),
     };
-    let ended = watch(&mut child);
-    let said = std::fs::read_to_string(&log).unwrap_or_default();
-    let _ = std::fs::remove_file(&log); // still open in the viewer, deleted when it closes
     if let Some(Err(status)) = ended {
         return failed(&format!("`{} {}` ended with {status}{}", viewer.name(), file.display(), last_lines(&said)));
     }

@@ -39,6 +39,57 @@ fn labelled(order: [usize; 6]) -> String {
     text
 }
 
+/// Overwriting is for results of an earlier command, not for what this one reads.
+#[test]
+fn no_verb_replaces_what_it_reads() {
+    let place = Place::new();
+    let said = &["is input and output", "another name or folder"];
+    place.write("job.toml", "mesh = \"beam.inp\"\n");
+    place.write("bar.mtx", "");
+    place.write("again/robot.toml", "");
+    #[cfg(unix)]
+    std::os::unix::fs::symlink("swing.toml", place.path("link.toml")).unwrap();
+    for command in [
+        &["reduce", "job.toml", "--flex", "job.toml"][..],
+        &["reduce", "job.toml", "--flex", "./beam.inp"],
+        &["import", "bar.mtx", "--flex", "bar.mtx"],
+        &["motion", "swing.toml", "robot.toml", "-o", "swing.toml"],
+        &["motion", "swing.toml", "robot.toml", "-o", "a.csv", "-o", "robot.toml"],
+        #[cfg(unix)]
+        &["motion", "swing.toml", "-o", "link.toml"],
+        &["sensitivity", "robot.toml", "swing.toml", "--table", "robot.toml"],
+        &["export-fmu", "robot.toml", "-o", "robot.toml"],
+        &["export-fmu", "robot.toml", "-o", "again/../beam.urdf"],
+    ] {
+        place.write("beam.inp", "");
+        place.refused(&[command, &["--force"]].concat(), said);
+    }
+    place.json(&["compare", "robot.toml", "swing.toml", "-o", "out"]);
+    place.refused(&["compare", "robot.toml", "out/run.csv", "-o", "out", "--force"], said);
+}
+
+/// An FMU contains the library of this program, not one that lies in the current folder, and nothing
+/// stays in the folder of temporary files.
+#[cfg(target_os = "linux")]
+#[test]
+fn the_library_of_an_fmu_is_not_taken_from_the_current_folder() {
+    let place = Place::new();
+    place.write("here/lib/libflexarm_fmu.so", "planted");
+    place.write("tmp/kept", "");
+    place.write("bin/README", "");
+    std::fs::copy(env!("CARGO_BIN_EXE_flexarm"), place.path("bin/flexarm")).unwrap();
+    let export = |library: &[&str]| {
+        let mut command = std::process::Command::new(place.path("bin/flexarm"));
+        command.args([&["export-fmu", "../robot.toml", "-o", "a.fmu"], library].concat());
+        command.current_dir(place.path("here")).env("TMPDIR", place.path("tmp"));
+        command
+    };
+    place.refused_by(&mut export(&[]), &["libflexarm_fmu.so", "not beside the program", "--library"]);
+    let asked = export(&["--library", "lib/libflexarm_fmu.so"]).output().unwrap();
+    assert!(asked.status.success(), "{asked:?}");
+    assert_eq!(std::fs::read_dir(place.path("tmp")).unwrap().count(), 1);
+}
+
 /// Truth: the stiffness of the link before it was written.
 #[test]
 fn every_format_brings_the_link_back() {

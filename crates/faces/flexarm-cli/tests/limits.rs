@@ -4,7 +4,7 @@
 use std::io::Write as _;
 use std::time::{Duration, Instant};
 
-use crate::common::{Place, ROBOT, SWING, URDF, with};
+use crate::common::{Answer, Place, ROBOT, SWING, URDF, with};
 
 /// Generous for a busy machine and a debug build; a refusal takes a tenth of a second.
 const AT_ONCE: Duration = Duration::from_secs(20);
@@ -37,6 +37,25 @@ fn segments_and_modes_beyond_what_a_step_can_carry_are_refused_with_the_reason()
     // The same from the file.
     place.write("robot.toml", format!("{ROBOT}segments = 9000\n"));
     refused_at_once(&place, &RUN, &["robot.toml:", "9000 segments", "at most 101"]);
+}
+
+/// A million threads, or the 65535 that the pool bounds them to, have 130 GB of stacks.
+#[test]
+#[cfg(target_os = "linux")]
+fn the_environment_does_not_get_more_threads_than_there_are_processors() {
+    let place = Place::new();
+    let arguments = ["map", "robot.toml", "--over", "swing=-1:1:3", "--no-files"];
+    let shell = |number: &str| {
+        let mut command = std::process::Command::new("sh");
+        command.args(["-c", "ulimit -v 8000000; exec \"$0\" \"$@\"", env!("CARGO_BIN_EXE_flexarm")]).args(arguments);
+        Answer::of(command.current_dir(place.path("")).env("RAYON_NUM_THREADS", number).output().unwrap())
+    };
+    for number in ["2", "1000000", "18446744073709551615", "many"] {
+        let begin = Instant::now();
+        let answer = shell(number);
+        assert_eq!(answer.code, 0, "{number} threads: {}", answer.err);
+        assert!(begin.elapsed() < AT_ONCE, "{number} threads took {:?}", begin.elapsed());
+    }
 }
 
 /// A set-up that takes seconds (594 elastic coordinates) must end on the signal, not after

@@ -179,7 +179,7 @@ fn a_recording_and_a_report_name_their_flags() {
         &place,
         &["report", "a.csv"],
         &[
-            (&["-o", "a.csv"], "a.csv is a recording and the page to be written: give the page another name with -o"),
+            (&["-o", "a.csv"], "a.csv: is input and output: give the output another name or folder"),
             (
                 &["--figures"],
                 "figures: is a file, a folder with figures is to be written there: choose another place with -o",

@@ -98,7 +98,7 @@ fn the_page_of_a_killed_run_names_its_stepper_and_what_is_missing() {
 fn a_report_does_not_replace_what_it_is_made_of() {
     let place = recorded(&[]);
     for input in ["result/run.csv", "result/run.mcap"].into_iter().filter(|name| place.path(name).exists()) {
-        place.refused(&["report", input, "-o", input, "--force"], &[input, "-o"]);
+        place.refused(&["report", input, "-o", input, "--force"], &[input, "is input and output"]);
         place.refused(&["report", "result", "-o", "result/../result/../robot.toml"], &["robot.toml", "--force"]);
     }
     place.write("new/figures", "mine");

@@ -105,6 +105,10 @@ pub fn export_fmu(job: &FmuJob) -> Result<FmuSummary, PlantError> {
     flexarm::check_free(std::slice::from_ref(&job.output), job.overwrite)?;
     let library = fs::read(&job.library).map_err(failed(&job.library))?;
     let plant = Plant::new(&job.robot, &job.settings)?;
+    let robot = plant.arm().robot();
+    let meshes = robot.urdf.mesh_files.iter().map(|(_, path)| &**path);
+    let read = meshes.chain([&*robot.path, &*robot.urdf_path, &*job.library]);
+    flexarm::check_apart(std::slice::from_ref(&job.output), &read.collect::<Vec<_>>())?;
     let (files, meshes) = resources(&plant, &job.settings)?;
 
     let about_step = plant.variables().iter().find(|variable| variable.name == "step").and_then(|step| step.start);
@@ -260,7 +264,8 @@ fn move_links(document: &mut DocumentMut, folder: &Path, with_stress: bool) -> R
 /// Returns whether the arm made from files is the given one: same masses, springs and frames, bit
 /// for bit.
 fn same_arm(files: &NamedFiles, arm: &Arm, settings: &PlantSettings) -> Result<bool, PlantError> {
-    let folder = std::env::temp_dir().join(format!("flexarm-fmu-{}-{:016x}", std::process::id(), unique()));
+    let parent = std::env::temp_dir();
+    let folder = flexarm::private_folder(&parent).map_err(failed(&parent))?;
     let checked = (|| {
         for (name, bytes) in files {
             let path = folder.join(name);
@@ -275,13 +280,6 @@ fn same_arm(files: &NamedFiles, arm: &Arm, settings: &PlantSettings) -> Result<b
     })();
     let _ = fs::remove_dir_all(&folder);
     checked
-}
-
-/// Returns a number that differs from call to call.
-fn unique() -> u64 {
-    use std::sync::atomic::{AtomicU64, Ordering};
-    static NEXT: AtomicU64 = AtomicU64::new(0);
-    NEXT.fetch_add(1, Ordering::Relaxed)
 }
 
 fn filed(plant: &Plant, settings: &PlantSettings, token: &str, step_s: f64) -> Filed {

@@ -85,10 +85,16 @@ mod _flexarm {
     #[pymodule_export]
     use crate::sweep::sweep;
 
-    /// Makes the recordings for the viewer available.
-    #[cfg(feature = "rerun")]
+    /// Bounds the number of threads, and makes the recordings for the viewer available.
     #[pymodule_init]
-    fn init(_module: &pyo3::Bound<'_, pyo3::types::PyModule>) -> pyo3::PyResult<()> {
+    fn init(module: &pyo3::Bound<'_, pyo3::types::PyModule>) -> pyo3::PyResult<()> {
+        use pyo3::types::PyAnyMethods as _;
+        // Threads that are started here would be missing in a process that forks.
+        if let Some(processors) = flexarm_cli::fewer_threads() {
+            let environment = module.py().import("os")?.getattr("environ")?;
+            environment.set_item(flexarm_cli::THREADS, processors.to_string())?;
+        }
+        #[cfg(feature = "rerun")]
         flexarm_rerun::install();
         Ok(())
     }

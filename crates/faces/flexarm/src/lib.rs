@@ -83,7 +83,7 @@ pub use flexarm_run::{
 };
 
 pub use flexarm_analysis::{Quantity, Spacing};
-pub use flexarm_files::{FileError, check_free, write_all, writing_unless};
+pub use flexarm_files::{FileError, check_apart, check_free, private_folder, write_all, writing_unless};
 pub use flexarm_flexlink::Mounting;
 pub use flexarm_kinematics::{
     BalancerCurve, BalancerCurveError, BalancerLaw, Coordinate, GasLaw, LinkInertia, Model, Pose, Wrench,

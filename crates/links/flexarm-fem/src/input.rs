@@ -34,7 +34,7 @@ mod tests {
         assert!(read_file(&folder, 1000).unwrap_err().to_string().contains("not a file"));
         assert!(read_file(Path::new("/dev/null"), 1000).unwrap_err().to_string().contains("not a file"));
         let path = folder.join(format!("flexarm-input-{}", std::process::id()));
-        std::fs::write(&path, [7; 1000]).unwrap();
+        std::io::Write::write_all(&mut File::create_new(&path).unwrap(), &[7; 1000]).unwrap();
         assert_eq!(read_file(&path, 1000).unwrap().len(), 1000);
         assert!(read_file(&path, 999).unwrap_err().to_string().contains("more than 999 bytes"));
         std::fs::remove_file(&path).unwrap();

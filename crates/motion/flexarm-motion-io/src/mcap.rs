@@ -24,6 +24,9 @@ pub const MCAP_MAGIC: &[u8] = mcap::MAGIC;
 /// Maximum size of a record, or of a decompressed chunk, in bytes: the library allocates a chunk
 /// before decompressing it.
 const MOST_BYTES: usize = 256 << 20;
+/// Largest ratio of the unpacked to the packed bytes of a file beyond [`MOST_BYTES`]: a recording of
+/// an arm at rest has less than 100.
+const MOST_TIMES: u64 = 1000;
 /// Number of bytes read at once, regardless of the stated length of a record.
 const READ_BYTES: usize = 64 << 10;
 
@@ -41,18 +44,27 @@ pub(crate) fn collect(mut file: impl Read, into: &mut Collector<'_>) -> Result<O
     let mut reader = LinearReader::new_with_options(options);
     reader.add_decompressor(Lz4::default()).expect("it has a name");
     let mut known = SchemasAndChannels::default();
+    let (mut packed, mut unpacked) = (0, 0);
     while let Some(event) = reader.next_event() {
         let cut = match event {
             Ok(LinearReadEvent::ReadRequest(_)) => match file.read(reader.insert(READ_BYTES)) {
                 Ok(read) => {
                     reader.notify_read(read);
+                    packed += read as u64;
                     None
                 }
                 Err(error) if error.kind() == ErrorKind::Interrupted => None,
                 Err(error) => Some(format!("it cannot be read on ({error})")),
             },
             Ok(LinearReadEvent::Record { opcode: op::DATA_END, .. }) => return Ok(None),
-            Ok(LinearReadEvent::Record { opcode, data }) => known.record(opcode, data, into)?,
+            Ok(LinearReadEvent::Record { opcode, data }) => {
+                unpacked += 9 + data.len() as u64; // with kind and length
+                let most = (MOST_BYTES as u64).max(MOST_TIMES * packed);
+                match unpacked > most {
+                    true => Some(format!("it unpacks to more than {most} bytes, the limit for its size")),
+                    false => known.record(opcode, data, into)?,
+                }
+            }
             Err(error) => Some(in_words(error)),
         };
         if cut.is_some() {

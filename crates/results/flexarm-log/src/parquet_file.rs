@@ -30,9 +30,9 @@ use crate::{CreateOptions, LogError, RunHeader, RunResult, Sample, table};
 /// prefix `figure.`; for readers of flexarm `flexarm.run` and `flexarm.result` (JSON), and the
 /// attached texts.
 ///
-/// A Parquet file cannot be read before its footer is written. It is therefore written under the
-/// name `<file>.partial` and renamed by `finish`; a killed run or a full disk leaves nothing under
-/// the file's own name.
+/// A Parquet file cannot be read before its footer is written. It is therefore written under a
+/// provisional name and renamed by `finish`; a killed run or a full disk leaves nothing under the
+/// file's own name.
 pub type ParquetRecorder = FileRecorder<ParquetFile>;
 
 /// A Parquet file that is being written.

@@ -16,7 +16,7 @@ use flexarm_fe_io::exchange::{
 };
 use flexarm_fem::reduction::{InterfaceFrame, Superelement};
 use flexarm_fem::{Pose, ReducedLink, UnitSystem, read_flex};
-use flexarm_files::{check_free, file_stem, write_all};
+use flexarm_files::{check_apart, check_free, file_stem, write_all};
 use flexarm_settings::Setting;
 use nalgebra::{DMatrix, Translation3};
 use serde::Serialize;
@@ -129,6 +129,7 @@ pub fn export(job: &ExportJob) -> Result<ExportSummary, LinkError> {
     let texts: Vec<(PathBuf, String)> =
         content.files().into_iter().map(|(name, text)| (job.folder.join(name), text)).collect();
     let paths: Vec<PathBuf> = texts.iter().map(|(path, _)| path.clone()).collect();
+    check_apart(&paths, &[&job.link])?;
     check_free(&paths, job.overwrite)?;
 
     // Read the texts back with the code of every import before writing any file: data that cannot

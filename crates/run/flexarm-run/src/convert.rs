@@ -1,10 +1,10 @@
 //! Conversion of recordings between formats, and reading them into memory.
 
-use std::ffi::OsString;
 use std::io::ErrorKind;
 use std::ops::ControlFlow;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
+use flexarm_files::Partial;
 use flexarm_log::{CreateOptions, LogError, RecordingFormat, RunSource, Sample, Trace, open_recording};
 use flexarm_settings::Setting;
 use serde::Serialize;
@@ -13,8 +13,6 @@ use crate::error::{Error, RecordingError};
 
 /// Number of samples between two calls of the callback.
 const POLL_EVERY: u64 = 1000;
-/// Maximum number of provisional names that are tried.
-const MOST_NAMES: u32 = 1000;
 
 /// Options of a conversion.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -54,8 +52,8 @@ pub struct ConvertSummary {
 /// absent, and an existing file stays until then.
 ///
 /// # Errors
-/// [`Error::Recording`] if a format is not known or input and output are the same file;
-/// [`Error::File`] if the input does not exist, or the output exists and may not be overwritten;
+/// [`Error::Recording`] if a format is not known; [`Error::File`] if the input does not exist or is
+/// the output too, or the output exists and may not be overwritten;
 /// [`Error::Log`] for errors in the files.
 pub fn convert(input: &Path, output: &Path, options: &ConvertOptions) -> Result<ConvertSummary, Error> {
     convert_until(input, output, options, &mut |_| ControlFlow::Continue(()))
@@ -76,19 +74,17 @@ pub fn convert_until(
     let from = format(input, options.from, Some(Setting::ReadFormat))?;
     let to = format(output, options.to, Some(Setting::WrittenFormat))?;
     let mut source = open(input, from)?;
-    if same_file(input, output) {
-        return Err(RecordingError::SameFile { path: input.to_owned() }.into());
-    }
+    flexarm_files::check_apart(&[output.to_owned()], &[input])?;
     flexarm_files::check_free(&[output.to_owned()], options.overwrite)?;
 
     if progress(0.0).is_break() {
         return Err(Error::Interrupted { t: 0.0, partial: false });
     }
-    let mut partial = Partial::of(output)?;
-    // The file is new, under a provisional name, so nothing is overwritten.
-    let mut recorder = crate::record::recorder(to, &partial.path, CreateOptions::default())?;
+    let failed = |source| Error::Write { path: output.to_owned(), source };
+    let (_, partial) = Partial::create(output).map_err(failed)?;
+    let mut recorder = crate::record::recorder(to, partial.path(), CreateOptions::default().with_overwrite(true))?;
     // Messages name the requested file.
-    let hidden = partial.folder.clone();
+    let hidden = partial.path().to_owned();
     let named = |error: LogError| error.with_path_for(&hidden, output);
     recorder.begin(source.header()).map_err(named)?;
     let (mut samples, mut span, mut stopped) = (0, None, None);
@@ -112,7 +108,7 @@ pub fn convert_until(
     };
     recorder.finish(&result).map_err(named)?;
     drop(recorder);
-    partial.rename(output)?;
+    partial.finish().map_err(failed)?;
 
     let mut lost = from.lost_on_the_way_to(to, source.header());
     lost.extend(source.missing());
@@ -193,43 +189,4 @@ fn open(path: &Path, format: RecordingFormat) -> Result<Box<dyn RunSource>, Erro
         return Err(Error::File { path: path.to_owned(), what });
     }
     Ok(open_recording(path, format)?)
-}
-
-pub(crate) fn same_file(a: &Path, b: &Path) -> bool {
-    a.canonicalize().ok().zip(b.canonicalize().ok()).is_some_and(|(a, b)| a == b)
-}
-
-/// File in a folder of its own next to the output, so that its name is unique. The folder is
-/// removed at the end.
-struct Partial {
-    folder: PathBuf,
-    path: PathBuf,
-}
-
-impl Partial {
-    fn of(output: &Path) -> Result<Self, Error> {
-        let name = output.file_name().unwrap_or_default();
-        let mut number = 0_u32;
-        loop {
-            let mut own = OsString::from(".");
-            own.push(name);
-            own.push(format!(".{}-{number}.new", std::process::id()));
-            let folder = output.with_file_name(own);
-            match std::fs::create_dir(&folder) {
-                Ok(()) => return Ok(Self { path: folder.join(name), folder }),
-                Err(error) if error.kind() == ErrorKind::AlreadyExists && number < MOST_NAMES => number += 1,
-                Err(source) => return Err(Error::Write { path: output.to_owned(), source }),
-            }
-        }
-    }
-
-    fn rename(&mut self, output: &Path) -> Result<(), Error> {
-        std::fs::rename(&self.path, output).map_err(|source| Error::Write { path: output.to_owned(), source })
-    }
-}
-
-impl Drop for Partial {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_dir_all(&self.folder); // best effort
-    }
 }

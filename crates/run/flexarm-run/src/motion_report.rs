@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 
 use flexarm_draw::{CurveLook, LinePlot, Panel, PlotCurve};
-use flexarm_files::{check_free, write_all};
+use flexarm_files::{check_apart, check_free, write_all};
 use flexarm_kinematics::{Data, Model, State, forward_kinematics, inverse_dynamics};
 use flexarm_motion_io::{TextFormat, write_joint_trajectory};
 use flexarm_settings::Setting;
@@ -169,6 +169,8 @@ pub fn motion_report(
     for output in outputs {
         Target::of(output)?;
     }
+    let of_robot = robot.iter().flat_map(|robot| [&*robot.path, &*robot.urdf_path]);
+    check_apart(outputs, &of_robot.chain([path]).collect::<Vec<_>>())?;
     check_free(outputs, overwrite)?;
     let (mut report, trajectory, torques) = match robot {
         Some(robot) => on_robot(path, robot, options)?,

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use flexarm_files::{check_free, write_all};
+use flexarm_files::{check_apart, check_free, write_all};
 use flexarm_log::RecordingFormat;
 
 use super::program::{self, Corrected, ProgramFigures};
@@ -42,6 +42,7 @@ impl Files {
         let mut all: Vec<PathBuf> =
             folder.iter().flatten().chain(&request.motions).chain(&recording).cloned().collect();
         all.extend(own);
+        check_apart(&all, &[&motion.path])?;
         check_free(&all, request.overwrite)?;
         Ok(Self { folder, recording, program })
     }

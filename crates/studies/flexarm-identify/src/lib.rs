@@ -23,7 +23,7 @@ mod units;
 use std::path::{Path, PathBuf};
 
 pub use crate::estimation::*;
-use flexarm_files::{check_free, write_all};
+use flexarm_files::{check_apart, check_free, write_all};
 
 use self::answer::answer;
 use self::choose::{check_tool, chosen};
@@ -124,7 +124,7 @@ pub fn identify_robot(robot: &Robot, measurements: &Path, request: &IdentifyRequ
         );
     }
     let targets = match &request.output {
-        Some(folder) => Some(Targets::in_folder(folder, request.overwrite)?),
+        Some(folder) => Some(Targets::in_folder(folder, robot, measurements, request.overwrite)?),
         None => None,
     };
     check_tool(robot, &chosen, &input)?;
@@ -171,9 +171,11 @@ struct Targets {
 }
 
 impl Targets {
-    fn in_folder(folder: &Path, overwrite: bool) -> Result<Self, Error> {
+    fn in_folder(folder: &Path, robot: &Robot, measurements: &Path, overwrite: bool) -> Result<Self, Error> {
         let targets = Self { robot: folder.join("robot.toml"), page: folder.join("identification.html") };
-        check_free(&[targets.robot.clone(), targets.page.clone()], overwrite)?;
+        let all = [targets.robot.clone(), targets.page.clone()];
+        check_apart(&all, &[&robot.path, &robot.urdf_path, measurements])?;
+        check_free(&all, overwrite)?;
         Ok(targets)
     }
 

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use crate::estimation::{
     Candidate, Component, LoadCase, Parameter, Plan, PlanOptions, Plant, Reading, ReadingKind, Row, plan,
 };
-use flexarm_files::{NumberTable, check_free, write_all};
+use flexarm_files::{NumberTable, check_apart, check_free, write_all};
 use flexarm_kinematics::Wrench;
 use flexarm_settings::written::csv_field;
 use nalgebra::Vector3;
@@ -214,6 +214,8 @@ pub fn plan_measurements(robot: &Robot, request: &PlanRequest) -> Result<Measure
     let targets =
         request.output.as_ref().map(|folder| [folder.join("measurements.toml"), folder.join("displacements.csv")]);
     if let Some(targets) = &targets {
+        let inputs: Vec<&Path> = request.poses.iter().chain(&request.work).map(|path| &**path).collect();
+        check_apart(targets, &inputs)?;
         check_free(targets, request.overwrite)?;
     }
     let fitted = super::chosen(&arm, &nothing_measured(), &request.fit)?;

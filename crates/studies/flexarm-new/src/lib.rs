@@ -198,6 +198,7 @@ pub fn new_robot(urdf: &Path, folder: &Path, overwrite: bool, options: &NewOptio
     files.push((robot_path.clone(), text::robot_file(&draft, &placed, &draft.beams_with_sections()).into_bytes()));
     files.push((folder.join("README.md"), text::readme(&draft, &placed).into_bytes()));
     let paths: Vec<_> = files.iter().map(|(path, _)| path.clone()).collect();
+    flexarm_files::check_apart(&paths, &[urdf])?;
     flexarm_files::check_free(&paths, overwrite).map_err(|error| match Error::from(error) {
         Error::Taken { path, .. } => Error::Taken { path, place: "folder", movable: true },
         other => other,

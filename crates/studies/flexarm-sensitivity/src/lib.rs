@@ -12,7 +12,7 @@ mod slopes;
 
 use std::path::PathBuf;
 
-use flexarm_files::{check_free, write_all};
+use flexarm_files::{check_apart, check_free, write_all};
 use flexarm_identify::{Effect, Parameter, link_directions, link_entries, parameters, plant};
 use flexarm_stepping::{ExactRun, StepError, StepperKind};
 use nalgebra::Vector3;
@@ -220,6 +220,7 @@ pub fn sensitivity(
     request: &SensitivityRequest,
 ) -> Result<Sensitivity, Error> {
     let scenario = scenario.into();
+    check_apart(request.table.as_slice(), &[&robot.path, &robot.urdf_path, &scenario.motion.path])?;
     check_free(request.table.as_slice(), request.overwrite)?;
     let arm = robot.flexible(request.run.modelling)?;
     let named = chosen(run_parameters(&arm, &scenario, &request.parameters)?, &request.parameters, |own| &own.name)?;

@@ -40,7 +40,7 @@ const CONTINUATION: [u8; 4] = [0xff; 4];
 /// schema at the start of the file, which streaming readers use, lacks what is known only at the
 /// end of the run.
 ///
-/// Like a Parquet file it is written under the name `<file>.partial` and renamed by `finish`.
+/// Like a Parquet file it is written under a provisional name and renamed by `finish`.
 pub type ArrowRecorder = FileRecorder<ArrowFile>;
 
 /// An Arrow file that is being written.

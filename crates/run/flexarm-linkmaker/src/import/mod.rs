@@ -28,7 +28,7 @@ mod sid;
 mod summary;
 mod words;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use flexarm_fe_io::exchange::{
     ImportedMatrices, InputFile, InterfaceMap, MatrixFormat, MatrixNames, MatrixRole, RowPick, assemble_interfaces,
@@ -38,7 +38,7 @@ use flexarm_fem::gate::check_matrix12;
 use flexarm_fem::matrix_link::{MatrixPlan, MatrixReduction, link_from_superelement, turned};
 use flexarm_fem::reduction::{InterfaceFrame, Superelement, stiffness12};
 use flexarm_fem::{FemError, GateLimits, Pose, Provenance, SplitAt, UnitSystem, write_flex};
-use flexarm_files::{check_free, file_stem, write_all};
+use flexarm_files::{check_apart, check_free, file_stem, write_all};
 use flexarm_settings::{Caller, Setting};
 use nalgebra::{DMatrix, Rotation3, Translation3, Vector3};
 
@@ -141,6 +141,8 @@ pub fn import(job: &ImportJob, outputs: Option<&ImportOutputs>) -> Result<Import
     let name = job.link_name();
     let targets = outputs.map(|outputs| Targets::new(outputs, &name));
     if let Some(targets) = &targets {
+        let inputs: Vec<&Path> = job.files.iter().chain(&job.mass_file).map(|path| &**path).collect();
+        check_apart(&targets.all(), &inputs)?;
         check_free(&targets.all(), targets.overwrite)?;
     }
     let first = job.files.first().ok_or(ImportError::NoFile)?;

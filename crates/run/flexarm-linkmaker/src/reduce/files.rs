@@ -2,7 +2,7 @@
 
 use std::path::{Component, Path, PathBuf};
 
-use flexarm_files::{FileError, check_free, file_stem, write_all};
+use flexarm_files::{FileError, check_apart, check_free, file_stem, write_all};
 
 use super::job::ReduceJob;
 
@@ -56,7 +56,7 @@ impl Paths {
     ///
     /// # Errors
     /// [`FileError::Taken`] for an existing file, [`FileError::Unusable`] for a folder in the place
-    /// of a file.
+    /// of a file and for an input.
     pub(super) fn new(outputs: &ReduceOutputs, job: &ReduceJob) -> Result<Self, FileError> {
         let file = file_stem(&job.link_name());
         let folder = outputs.folder.as_ref().map(|path| Folder {
@@ -72,6 +72,8 @@ impl Paths {
         let flex = outputs.flex.clone().filter(|path| in_folder.is_none() || whole(path) != in_folder);
         let with_stress = job.stress == Some(true);
         let paths = Self { folder, flex, with_stress, overwrite: outputs.overwrite };
+        let inputs = job.file.iter().chain([&job.mesh]).chain(job.urdf.as_ref().map(|urdf| &urdf.file));
+        check_apart(&paths.all(), &inputs.map(|path| &**path).collect::<Vec<_>>())?;
         paths.check()?;
         Ok(paths)
     }

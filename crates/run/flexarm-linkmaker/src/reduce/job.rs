@@ -38,6 +38,9 @@ use crate::LinkError;
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct ReduceJob {
+    /// Job file, if the job is read from one.
+    #[serde(skip)]
+    pub file: Option<PathBuf>,
     /// Mesh file; relative to the job file in a file, to the working folder in memory.
     pub mesh: PathBuf,
     /// Name of the link; default: that of the URDF's link, or of the mesh file.
@@ -303,6 +306,7 @@ pub fn parse_job(text: &str, path: &Path) -> Result<ReduceJob, LinkError> {
         entry.place = format!("{}:{}:{}", path.display(), at.line, at.column);
     }
     let folder = path.parent().unwrap_or(Path::new(""));
+    job.file = Some(path.to_owned());
     job.mesh = folder.join(&job.mesh);
     if let Some(urdf) = &mut job.urdf {
         urdf.file = folder.join(&urdf.file);

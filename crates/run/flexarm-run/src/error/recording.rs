@@ -37,22 +37,6 @@ pub enum RecordingError {
         /// Requested format.
         format: RecordingFormat,
     },
-    /// Input and output of a conversion are the same file.
-    #[error("{} is input and output: give the output another name", path.display())]
-    SameFile {
-        /// Path of the file.
-        path: PathBuf,
-    },
-    /// A report would replace a recording from which it is made.
-    #[error(
-        "{} is a recording and the page to be written: give the page another name with {}",
-        path.display(),
-        Setting::Output
-    )]
-    PageOverRecording {
-        /// Path of the file.
-        path: PathBuf,
-    },
     /// No recording is given for a report.
     #[error("give at least one recording, or the folder of a run")]
     NothingToReport,

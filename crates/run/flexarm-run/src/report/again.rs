@@ -3,13 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use flexarm_analysis::{ErrorRecord, MetricSettings, error_parts, tcp_metrics_on_path};
-use flexarm_files::{check_free, write_all};
+use flexarm_files::{check_apart, check_free, write_all};
 use flexarm_log::{EventKind, RecordingFormat, RunHeader, Trace};
 use flexarm_settings::Setting;
 use serde::Serialize;
 
 use super::{ReportRun, figures, html};
-use crate::convert::{no_sample, read_run, same_file};
+use crate::convert::{no_sample, read_run};
 use crate::error::{Error, RecordingError};
 use crate::magnification::fit_color_scale;
 use crate::stepper_settings::StepperSettings;
@@ -57,7 +57,7 @@ struct Input {
 ///
 /// # Errors
 /// As [`read_run`]; [`Error::File`] for a folder without a recording; [`Error::Taken`];
-/// [`Error::Recording`] if the page would replace one of its own recordings.
+/// [`Error::File`] if the page would replace one of its own recordings.
 pub fn report(recordings: &[PathBuf], options: &ReportOptions) -> Result<ReportFiles, Error> {
     let mut warnings = Vec::new();
     let mut inputs = Vec::new();
@@ -137,9 +137,8 @@ fn read_all(inputs: &[Input], warnings: &mut Vec<String>) -> Result<Vec<(String,
 
 /// Checks that the output paths are free, before anything is read in full or written.
 fn check_places(inputs: &[Input], page: &Path, folder: &Path, options: &ReportOptions) -> Result<(), Error> {
-    if let Some(input) = inputs.iter().find(|input| same_file(&input.path, page)) {
-        return Err(RecordingError::PageOverRecording { path: input.path.clone() }.into());
-    }
+    let read: Vec<&Path> = inputs.iter().map(|input| &*input.path).collect();
+    check_apart(&[page.to_owned()], &read)?;
     check_free(&[page.to_owned()], options.overwrite)?;
     if !options.figures || !folder.exists() {
         Ok(())

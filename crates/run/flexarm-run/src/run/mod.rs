@@ -12,9 +12,11 @@ mod sampler;
 mod shares;
 
 use std::ops::ControlFlow;
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use flexarm_analysis::{LongRecord, MetricSettings, PathFrame};
+use flexarm_files::check_apart;
 use flexarm_kinematics::Frame;
 use flexarm_linkmaker::Stopwatch;
 use flexarm_log::{
@@ -36,7 +38,8 @@ use crate::motion::Motion;
 use crate::options::{Outputs, RunOptions};
 use crate::prepare::Checked;
 use crate::record::{
-    Recordings, STRESS_PICTURE, header, link_frames, names_of_signals, ordered_links, recorders, signals, write_layouts,
+    Recordings, STRESS_PICTURE, files_of_a_run, header, link_frames, names_of_signals, ordered_links, recorders,
+    signals, write_layouts,
 };
 use crate::robot::Robot;
 use crate::run::sampler::Sampler;
@@ -176,6 +179,10 @@ pub(crate) fn simulate(
     let stress = StressMonitor::new(robot, flexible, &arm, &options.modelling)?;
     let mut run = RunLoop::new(robot, &scenario.motion, options, flexible, arm, stepper, detail);
     run.monitors = run.monitors.with_stress(stress);
+    if let Some(outputs) = outputs {
+        let all: Vec<PathBuf> = files_of_a_run().map(|file| outputs.folder.join(file)).collect();
+        check_apart(&all, &[&robot.path, &robot.urdf_path, &scenario.motion.path])?;
+    }
     let mut files = recorders(outputs, !more.is_empty())?;
     files.set.extend(more);
     let head = run.header(scenario, &expected);

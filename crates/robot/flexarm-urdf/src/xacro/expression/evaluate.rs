@@ -200,7 +200,7 @@ impl Interpreter<'_> {
             (Some(other), _) => return Err(ExpressionError::new(format!("a {} cannot be called", other.kind()))),
             (None, Some((owner, name))) => {
                 self.charge_whole(&owner)?;
-                super::methods::call(&owner, name, &arguments, &by_name)?
+                super::methods::call(&owner, name, &arguments, &by_name, &mut |size| self.charge(size))?
             }
             (None, None) => Value::None,
         };

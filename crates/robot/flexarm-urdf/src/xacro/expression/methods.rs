@@ -64,16 +64,17 @@ pub(super) fn slice(owner: &Value, [start, end, step]: [Option<i128>; 3]) -> Res
     })
 }
 
-/// `owner.name(arguments)`
+/// `owner.name(arguments)`; memory is charged before it is allocated.
 pub(super) fn call(
     owner: &Value,
     name: &str,
     arguments: &[Value],
     named: &[(String, Value)],
+    charge: &mut dyn FnMut(usize) -> Result<(), ExpressionError>,
 ) -> Result<Value, ExpressionError> {
     let method = match owner {
-        Value::Str(text) if name == "format" => return format(text, arguments, named).map(Value::text),
-        Value::Str(text) => of_text(text, name, arguments)?,
+        Value::Str(text) if name == "format" => return format(text, arguments, named, charge).map(Value::text),
+        Value::Str(text) => of_text(text, name, arguments, charge)?,
         Value::List(items) | Value::Tuple(items) => match (name, arguments) {
             ("index", [item]) => {
                 let found = items.iter().position(|i| i.equals(item));
@@ -101,7 +102,12 @@ pub(super) fn call(
     })
 }
 
-fn of_text(text: &str, name: &str, arguments: &[Value]) -> Result<Option<Value>, ExpressionError> {
+fn of_text(
+    text: &str,
+    name: &str,
+    arguments: &[Value],
+    charge: &mut dyn FnMut(usize) -> Result<(), ExpressionError>,
+) -> Result<Option<Value>, ExpressionError> {
     let texts: Vec<&str> =
         arguments.iter().map_while(|a| if let Value::Str(s) = a { Some(&**s) } else { None }).collect();
     let all_texts = texts.len() == arguments.len();
@@ -109,9 +115,13 @@ fn of_text(text: &str, name: &str, arguments: &[Value]) -> Result<Option<Value>,
     Ok(Some(match (name, &texts[..]) {
         ("join", []) if arguments.len() == 1 => {
             let parts = elements(&arguments[0])?;
-            let parts: Option<Vec<_>> =
-                parts.iter().map(|p| if let Value::Str(s) = p { Some(s.to_string()) } else { None }).collect();
-            Value::text(parts.ok_or_else(|| ExpressionError::new("join() takes texts"))?.join(text))
+            let parts: Option<Vec<&str>> =
+                parts.iter().map(|p| if let Value::Str(s) = p { Some(&**s) } else { None }).collect();
+            let parts = parts.ok_or_else(|| ExpressionError::new("join() takes texts"))?;
+            charge(
+                parts.iter().fold(text.len().saturating_mul(parts.len()), |sum, part| sum.saturating_add(part.len())),
+            )?;
+            Value::text(parts.join(text))
         }
         ("split", [separator]) if arguments.len() == 2 && !separator.is_empty() => {
             let most =
@@ -141,6 +151,7 @@ fn of_text(text: &str, name: &str, arguments: &[Value]) -> Result<Option<Value>,
             if from.is_empty() {
                 return Err(ExpressionError::new("replace() of an empty text"));
             }
+            charge(text.matches(from).count().saturating_mul(to.len()).saturating_add(text.len()))?;
             Value::text(text.replace(from, to))
         }
         ("startswith", [part]) => Value::Bool(text.starts_with(part)),
@@ -176,7 +187,12 @@ fn title(text: &str) -> String {
 }
 
 /// Evaluates `text.format(...)`: `{}`, `{0}`, `{name}`, each with `:spec`.
-fn format(text: &str, arguments: &[Value], named: &[(String, Value)]) -> Result<String, ExpressionError> {
+fn format(
+    text: &str,
+    arguments: &[Value],
+    named: &[(String, Value)],
+    charge: &mut dyn FnMut(usize) -> Result<(), ExpressionError>,
+) -> Result<String, ExpressionError> {
     let mut out = String::new();
     let (mut rest, mut next) = (text, 0);
     while let Some(at) = rest.find(['{', '}']) {
@@ -198,7 +214,9 @@ fn format(text: &str, arguments: &[Value], named: &[(String, Value)]) -> Result<
             named.iter().find(|(n, _)| n == name).map(|(_, v)| v)
         };
         let value = value.ok_or_else(|| ExpressionError::new(format!("format(): there is nothing for {{{field}}}")))?;
-        out.push_str(&formatted(value, spec)?);
+        let shown = formatted(value, spec)?;
+        charge(shown.len())?; // a value may be shown many times
+        out.push_str(&shown);
         rest = after;
     }
     out.push_str(rest);
