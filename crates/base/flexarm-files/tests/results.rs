@@ -66,7 +66,7 @@ fn a_file_that_is_replaced_keeps_its_permissions_and_the_links_to_it() {
     // A link that leads nowhere yet is in use, and is followed where that is wanted.
     let ahead = folder.join("ahead");
     symlink("kept/later", &ahead).unwrap();
-    assert!(matches!(check_free(&[ahead.clone()], false), Err(FileError::Taken { .. })));
+    assert!(matches!(check_free(std::slice::from_ref(&ahead), false), Err(FileError::Taken { .. })));
     write_all(&[(ahead.clone(), "new")]).unwrap();
     assert!(ahead.is_symlink() && folder.join("kept/later").is_file());
     std::fs::remove_dir_all(&folder).unwrap();
