@@ -9,7 +9,10 @@
 //! fraction of the first correction ([`Newton::leaving`]). ρ is measured whenever two iterations
 //! are made, at least in every eighth step (every 24th while it is small), and grows as the arm
 //! moves away from the configuration at which J was computed. While ρ is known to be small enough,
-//! a step needs one evaluation.
+//! a step needs one evaluation, unless its first correction points against the one before. This is
+//! the sign of a mode with less than four steps per period: the extrapolation misses its
+//! acceleration by several times its size, and what is left of that in every step feeds the mode if
+//! its damping is smaller.
 //!
 //! A step whose iteration fails is repeated with a matrix computed at its start, then in halves,
 //! down to `h/64`.
@@ -83,6 +86,8 @@ pub(crate) struct Newton {
     new: bool,
     /// Decaying maximum of the first corrections.
     largest_first: f64,
+    /// First correction of the last search.
+    first: DVector<f64>,
 }
 
 impl Newton {
@@ -104,6 +109,7 @@ impl Newton {
             left: TO_THE_END,
             new: false,
             largest_first: 0.0,
+            first: DVector::zeros(n),
         }
     }
 
@@ -146,12 +152,14 @@ impl Newton {
         self.factored = longest <= RENEW_ABOVE && !stale;
     }
 
-    /// Returns whether a search may end with its first correction, of norm `norm`.
+    /// Returns whether a search may end with its first correction `self.r`, of norm `norm`.
     fn ends_at_once(&mut self, norm: f64) -> bool {
         let calm = norm <= SUDDEN * self.largest_first;
         self.largest_first = norm.max(FADING * self.largest_first);
+        let turned = self.r.dot(&self.first) < 0.0;
+        self.first.copy_from(&self.r);
         let exact = self.first_contraction <= EXACT * self.left;
-        calm && exact && !self.measuring && self.contraction <= self.left
+        calm && !turned && exact && !self.measuring && self.contraction <= self.left
     }
 
     /// Records the measured ρ. A matrix computed during the search is exact there, so that its ρ is

@@ -255,6 +255,76 @@ fn shorter_communication_steps_converge() {
     assert!(fine < 0.5 * middle && middle < 0.5 * coarse && fine < 2e-5, "{coarse:e} {middle:e} {fine:e}");
 }
 
+/// Writes an arm of five joints whose hand has as much inertia as its upper arm; returns its robot
+/// file.
+fn broad_hand(folder: &Path) -> PathBuf {
+    // Link, joint: origin, angles, axis; mass, centre, moments of inertia; stiffness of the gearbox.
+    let joints = [
+        ("pan", "0 0 0.089", "0 0 0", "0 0 1", 3.7, 0.0, [0.010, 0.0067], 25900.0),
+        ("upper", "0 0.136 0", "0 1.5708 0", "0 1 0", 8.39, 0.28, [0.227, 0.0151], 25900.0),
+        ("fore", "0 -0.12 0.425", "0 0 0", "0 1 0", 2.27, 0.25, [0.0494, 0.0041], 25900.0),
+        ("wrist", "0 0 0.392", "0 1.5708 0", "0 1 0", 1.22, 0.0, [0.111, 0.219], 6250.0),
+        ("hand", "0 0.093 0", "0 0 0", "0 0 1", 1.22, 0.0, [0.111, 0.219], 6250.0),
+    ];
+    let mut urdf = "<robot name=\"arm\"><link name=\"base\"/>".to_owned();
+    let mut text = "format = 1\nname = \"arm\"\nurdf = \"arm.urdf\"\n".to_owned();
+    text += "tcp = { link = \"hand\", xyz = [0.0, 0.0, 0.0], rpy = [0.0, 0.0, 0.0] }\n";
+    let mut parent = "base";
+    for (name, xyz, rpy, axis, mass, z, [across, along], stiffness) in joints {
+        urdf += &format!(
+            r#"<joint name="{name}_joint" type="continuous"><parent link="{parent}"/><child link="{name}"/>
+            <origin xyz="{xyz}" rpy="{rpy}"/><axis xyz="{axis}"/></joint>
+            <link name="{name}"><inertial><origin xyz="0 0 {z}"/><mass value="{mass}"/>
+            <inertia ixx="{across}" iyy="{across}" izz="{along}" ixy="0" ixz="0" iyz="0"/></inertial></link>"#
+        );
+        text += &format!("[[drive]]\njoint = \"{name}_joint\"\nkind = \"gearbox\"\n");
+        text += &format!("gearbox = {{ stiffness = {stiffness:.1} }}\n");
+        parent = name;
+    }
+    for (link, distal, diameter, wall) in [("upper", "fore", 0.111, 0.02), ("fore", "wrist", 0.081, 0.0075)] {
+        text += &format!("[[flexible_link]]\nlink = \"{link}\"\ndistal = \"{distal}_joint\"\n");
+        text += &format!("damping = {{ modal = 0.03 }}\nbeam = {{ section = \"tube\", outer_diameter = {diameter}, ");
+        text +=
+            &format!("wall = {wall}, material = \"aluminium\", y_axis = [1.0, 0.0, 0.0], parts = \"from-link\" }}\n");
+    }
+    std::fs::create_dir_all(folder).unwrap();
+    std::fs::write(folder.join("arm.urdf"), urdf + "</robot>").unwrap();
+    std::fs::write(folder.join("robot.toml"), text).unwrap();
+    folder.join("robot.toml")
+}
+
+/// Targets every two steps of the solver change the accelerations in the rhythm of a mode that
+/// changes sign in every step. Truth: targets in every step.
+#[test]
+fn communication_steps_of_two_solver_steps_excite_no_mode() {
+    let folder = std::env::temp_dir().join(format!("flexarm broad hand {}", std::process::id()));
+    let path = broad_hand(&folder);
+    let errors = |period_ms: usize| -> Vec<Vec<f64>> {
+        let mut plant = Plant::new(&path, &PlantSettings::default()).unwrap();
+        let q_in = of_joints(&plant, "target_position");
+        plant.start(0.0).unwrap();
+        let h = 1e-3 * period_ms as f64;
+        let step = |k: usize| {
+            let (q, _) = targets(&vec![0.0; q_in.len()], h * k as f64);
+            q_in.iter().zip(q).for_each(|(&reference, q)| plant.set(reference, q).unwrap());
+            plant.step(plant.time_s(), h).unwrap();
+            values(&plant, &ERROR)
+        };
+        (1..=1500 / period_ms).map(step).collect()
+    };
+    let every = errors(1);
+    let peak = every.iter().flatten().fold(0.0_f64, |most, e| most.max(e.abs()));
+    for period_ms in [2, 3, 4] {
+        let own = errors(period_ms);
+        let truth = every.iter().skip(period_ms - 1).step_by(period_ms);
+        let apart = own.iter().zip(truth).flat_map(|(own, truth)| own.iter().zip(truth).map(|(a, b)| (a - b).abs()));
+        let apart = apart.fold(0.0, f64::max) / peak;
+        println!("targets every {period_ms} ms: {apart:.1e} of the peak from targets every 1 ms");
+        assert!(apart < 1e-2, "{period_ms} ms: {apart:e}");
+    }
+    std::fs::remove_dir_all(&folder).unwrap();
+}
+
 #[test]
 fn what_makes_no_sense_is_refused_with_its_name_and_changes_nothing() {
     let mut plant = Plant::new(&robot("one_beam"), &PlantSettings::default()).unwrap();

@@ -137,8 +137,9 @@ pub(crate) fn leave_of(settings: AlphaSettings, arm: &FlexibleArm, h: f64) -> Op
 /// (`what_a_quick_iteration_leaves_is_small_beside_the_error_of_its_step`).
 ///
 /// The error is amplified by the next extrapolation, up to `2 + 1/ρ` times for a mode that changes
-/// sign in every step; the damping of the scheme for such modes, `1 - ρ`, must exceed this
-/// ([`AlphaSettings::may_leave`]).
+/// sign in every step; the damping of the scheme at infinite frequency, `1 - ρ`, must exceed this
+/// ([`AlphaSettings::may_leave`]). Modes with `h ω` of 2 to 5 are damped less: a search whose first
+/// correction points against the one before goes on ([`crate::implicit`]).
 const QUICK: f64 = 0.03;
 /// Permitted iteration error as a fraction of `1 - ρ`.
 const OF_DAMPING: f64 = 0.3;
