@@ -114,7 +114,8 @@ fn a_full_disk_under_standard_error_does_not_end_a_command() {
     let place = Place::new();
     place.write(
         "heavy.toml",
-        common::ROBOT.replace("[[flexible_link]]", "payload = { mass = 9000.0 }\n\n[[flexible_link]]"),
+        common::ROBOT
+            .replace("[[flexible_link]]", "payload = { mass = 90.0, com = [0.0, 0.0, 0.0] }\n\n[[flexible_link]]"),
     );
     let code = |arguments: &[&str]| {
         let full = std::fs::File::options().write(true).open("/dev/full").unwrap();
