@@ -22,7 +22,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 LOG = "FLEXARM_BUILD_TIMES"
 REFERENCE = "faer"  # the crate to which the sum is compared
-MAX_RATIO = 36.0  # CPU seconds of the default program over those of the reference; 29.8 measured
+MAX_RATIO = 42.0  # CPU seconds of the default program over those of the reference; 27 to 30 measured
 
 
 def children():
