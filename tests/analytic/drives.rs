@@ -73,7 +73,7 @@ fn along(robot: &str, trajectory: &str, curve: &str) -> (f64, f64) {
     let robot = load(&format!("robots/{robot}"));
     let path = root().join("trajectories").join(trajectory);
     let motion = Motion::load_for(&path, &robot.rigid_model().expect("a tree")).expect("a sound trajectory");
-    let arm = robot.flexible_robot().expect("a tree").arm(motion.prescribed()).expect("an arm");
+    let arm = robot.model(&Modelling::default()).expect("a tree").arm(motion.prescribed()).expect("an arm");
     let tcp = arm.model.frame(flexarm::TCP_FRAME).expect("there").clone();
     let mut seen = Observation::new(&arm);
     let kind = StepperKind::Reference(ReferenceSettings::new(1e-10));
@@ -158,8 +158,8 @@ fn four_mass_arm_has_the_frequencies_and_the_damping_of_its_equations() {
 fn drives_can_be_made_rigid_by_a_word() {
     let robot = load("robots/kr210_identified");
     let rigid = Modelling { drives: DriveModel::Rigid, ..Modelling::default() };
-    let arm = robot.modelled(&rigid).expect("a tree").arm(Arc::new(Held(vec![0.0; 6]))).expect("an arm");
+    let arm = robot.model(&rigid).expect("a tree").arm(Arc::new(Held(vec![0.0; 6]))).expect("an arm");
     assert_eq!(arm.n_free(), 0);
-    let soft = robot.flexible_robot().expect("a tree").arm(Arc::new(Held(vec![0.0; 6]))).expect("an arm");
+    let soft = robot.model(&Modelling::default()).expect("a tree").arm(Arc::new(Held(vec![0.0; 6]))).expect("an arm");
     assert_eq!(static_equilibrium(&soft, 0.0).expect("stands").len(), 6);
 }

@@ -24,7 +24,8 @@ fn load(robot: &str) -> Robot {
 
 /// The reference arm by file with another damping.
 fn arm(damping: Damping, motion: Arc<dyn PrescribedMotion>) -> (FlexibleArm, Frame) {
-    let mut robot = load("reference_arm").flexible_robot().expect("a tree");
+    let robot = load("reference_arm").model(&Modelling::default()).expect("a tree");
+    let mut robot = Arc::unwrap_or_clone(robot);
     robot.springs.iter_mut().for_each(|spring| spring.damping = damping);
     let tool = robot.model.frame("__tcp").expect("there").clone();
     (robot.arm(motion).expect("carries its weight"), tool)
@@ -60,7 +61,7 @@ fn modes_of_the_industrial_arm_are_those_that_compare_reports() {
     let (mut q, mut v, mut a) = ([0.0; 6], [0.0; 6], [0.0; 6]);
     motion.trajectory.sample(0.0, &mut q, &mut v, &mut a);
     let options = RunOptions { log_rate_hz: 100.0, step_s: 0.01, ..RunOptions::default() };
-    let arm = robot.flexible(options.modelling).expect("a model");
+    let arm = robot.model(&Modelling::default()).expect("a model");
     let reported = arm.simulate(&motion, &options).expect("runs").summary.frequencies_hz;
     let found = modes(&robot, &Modelling::default(), Some(q.as_slice()), None, 100).expect("an equilibrium");
     assert_eq!((found.total, found.frequencies_hz.len()), (12, reported.len()));
@@ -222,7 +223,7 @@ fn a_force_at_a_resonance_shakes_the_tool_as_high_as_the_peak() {
         ..ResponseRequest::default()
     };
     let found = response(&robot, &Modelling::default(), Some(&POSE[..]), &request, None).expect("a response");
-    let own = robot.flexible_robot().expect("a tree");
+    let own = robot.model(&Modelling::default()).expect("a tree");
     let arm = own.arm(held()).expect("carries its weight");
     let tool = arm.model.frame("__tcp").expect("there").clone();
     let still = linearise(&arm, &tool, &Wrench::zeros(), 0.0).expect("an equilibrium");
@@ -281,7 +282,7 @@ fn a_joint_at_a_resonance_shakes_the_tool_as_high_as_the_peak() {
             let (sine, cosine) = (omega * t).sin_cos();
             (q[1], v[1], a[1]) = (POSE[1] + size * sine, size * omega * cosine, -size * omega * omega * sine);
         });
-        let own = robot.flexible_robot().expect("a tree");
+        let own = robot.model(&Modelling::default()).expect("a tree");
         let arm = own.arm(Arc::new(motion)).expect("carries its weight");
         let tool = arm.model.frame("__tcp").expect("there").clone();
         let mut seen = Observation::new(&arm);

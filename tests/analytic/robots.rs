@@ -18,14 +18,19 @@ fn load(robot: &str) -> Robot {
 }
 
 /// Runs a robot and reads its table back: column name to values.
-fn run(robot: &str, trajectory: &str, options: &RunOptions) -> (Summary, HashMap<String, Vec<f64>>) {
+fn run(
+    robot: &str,
+    trajectory: &str,
+    modelling: &Modelling,
+    options: &RunOptions,
+) -> (Summary, HashMap<String, Vec<f64>>) {
     let robot = load(robot);
     let path = root().join("trajectories").join(trajectory);
     let motion = Motion::load_for(&path, &robot.rigid_model().expect("a tree")).expect("a sound trajectory");
     let unique = format!("flexarm-robots-{}-{}-{trajectory}-{}", std::process::id(), robot.name, options.log_rate_hz);
     let folder = std::env::temp_dir().join(unique);
     let outputs = Outputs { recordings: [RecordingFormat::Csv].into(), ..Outputs::everything(&folder) };
-    let arm = robot.flexible(options.modelling).expect("a model");
+    let arm = robot.model(modelling).expect("a model");
     let request = RunRequest { outputs: Some(&outputs), ..RunRequest::keeping(Keep::Figures) };
     let summary = arm.simulate_with(&motion, options, request).expect("runs").summary;
     let text = std::fs::read_to_string(folder.join("run.csv")).expect("the table");
@@ -48,7 +53,7 @@ fn run(robot: &str, trajectory: &str, options: &RunOptions) -> (Summary, HashMap
 #[test]
 fn reference_arm_by_file_equals_the_converged_curve() {
     let options = RunOptions { log_rate_hz: 250.0, ..RunOptions::default() };
-    let (summary, table) = run("reference_arm", "reference_arm.toml", &options);
+    let (summary, table) = run("reference_arm", "reference_arm.toml", &Modelling::default(), &options);
     let golden = std::fs::read_to_string(root().join("tests/golden/reference_arm_mid.csv")).expect("golden file");
     let rows: Vec<Vec<f64>> = golden
         .lines()
@@ -83,9 +88,9 @@ fn reference_arm_by_file_equals_the_converged_curve() {
 /// under own weight is 3/32 instead of 1/8 of m g l³/EI (the README of the robot has the numbers).
 #[test]
 fn one_beam_sags_as_its_two_part_model_must() {
-    let (summary, _) = run("one_beam", "beam_hold.toml", &RunOptions::default());
+    let (summary, _) = run("one_beam", "beam_hold.toml", &Modelling::default(), &RunOptions::default());
     let robot = load("one_beam");
-    let span = &robot.flexible_robot().expect("a tree").spans[0];
+    let span = &robot.model(&Modelling::default()).expect("a tree").spans[0];
     let mass = |name: &str| robot.urdf.mechanism.link(name).and_then(|l| l.inertia).map_or(0.0, |i| i.mass);
     let (l, g) = (span.length, 9.81);
     // bending about the horizontal section axis: height 40 mm upright
@@ -111,7 +116,8 @@ fn kr210_has_the_published_mass_and_a_plausible_first_frequency() {
     let inspection = flexarm::inspect(&load("kr210"), None, None).expect("inspects");
     let urdf: f64 = inspection.links.iter().map(|l| l.mass_kg).sum();
     assert!((urdf - 1077.424).abs() < 0.01, "{urdf}");
-    let (summary, table) = run("kr210/links.toml", "point_to_point.toml", &RunOptions::default());
+    let (summary, table) =
+        run("kr210/links.toml", "point_to_point.toml", &Modelling::default(), &RunOptions::default());
     let f1 = summary.frequencies_hz[0];
     assert!((10.0..25.0).contains(&f1), "{f1}");
     // Both parts of a cut link are exactly the link: the rigid twin needs the torques of the URDF's
@@ -129,7 +135,7 @@ fn steppers_agree_on_the_shipped_arm() {
         let robot = load("kr210");
         let path = root().join("trajectories/point_to_point.toml");
         let motion = Motion::load_for(&path, &robot.rigid_model().expect("a tree")).expect("sound");
-        let arm = robot.flexible(options.modelling).expect("a model");
+        let arm = robot.model(&Modelling::default()).expect("a model");
         arm.simulate(&motion, &options).expect("runs").summary.tcp.expect("compared").peak_m
     };
     let reference = peak(StepperKind::Rk4, 5e-5);
@@ -149,8 +155,8 @@ fn steppers_agree_on_the_shipped_arm() {
 #[test]
 fn modal_links_on_fixed_corners_agree_with_many_parts() {
     let run_with = |modelling| {
-        let options = RunOptions { modelling, log_rate_hz: 100.0, ..RunOptions::default() };
-        run("three_beams", "beam_swing.toml", &options).0
+        let options = RunOptions { log_rate_hz: 100.0, ..RunOptions::default() };
+        run("three_beams", "beam_swing.toml", &modelling, &options).0
     };
     let modal = run_with(Modelling { links: LinkModel::Modal, ..Modelling::default() });
     let parts = run_with(Modelling { links: LinkModel::Lumped, segments: Some(7), ..Modelling::default() });

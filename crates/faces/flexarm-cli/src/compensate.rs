@@ -178,7 +178,8 @@ pub(crate) fn run(terminal: &Terminal, args: &CompensateArgs) -> Result<ExitCode
     let shaper = shaping(args)?;
     let folder = OutputFolder::of(args.output.as_deref(), &format!("{}_compensated", robot.name), !args.no_files)?;
     let request = CompensateRequest {
-        run: RunOptions { step_s: args.step, modelling: args.modelling.modelling(), ..RunOptions::default() },
+        modelling: args.modelling.modelling(),
+        run: RunOptions { step_s: args.step, ..RunOptions::default() },
         method: match args.method {
             MethodName::Dynamic => Method::Dynamic,
             MethodName::Static => Method::Static,

@@ -7,8 +7,8 @@ use clap::Args;
 use flexarm::new::NewLink;
 use flexarm::written::visible;
 use flexarm::{
-    Keep, LoadOptions, Motion, NewOptions, NewRobot, Outputs, ReadOptions, Robot, RunOptions, RunRequest, Summary,
-    gathered,
+    Keep, LoadOptions, Modelling, Motion, NewOptions, NewRobot, Outputs, ReadOptions, Robot, RunOptions, RunRequest,
+    Summary, gathered,
 };
 
 use crate::args::RobotArgs;
@@ -136,7 +136,7 @@ fn first_run(terminal: &Terminal, made: &NewRobot, folder: &Path, overwrite: boo
     };
     let request =
         RunRequest { outputs: Some(&outputs), progress: Some(&mut progress), ..RunRequest::keeping(Keep::Figures) };
-    let result = robot.flexible(options.modelling).and_then(|arm| arm.simulate_with(&motion, &options, request));
+    let result = robot.model(&Modelling::default()).and_then(|arm| arm.simulate_with(&motion, &options, request));
     bar.clear();
     Ok(result?.summary)
 }

@@ -90,12 +90,8 @@ pub(crate) fn run(terminal: &Terminal, args: &SensitivityArgs) -> Result<ExitCod
         scenario = scenario.with_loads_file(loads)?;
     }
     let request = SensitivityRequest {
-        run: RunOptions {
-            step_s: args.step,
-            modelling: args.modelling.modelling(),
-            ignore_limits: args.ignore_limits,
-            ..RunOptions::default()
-        },
+        modelling: args.modelling.modelling(),
+        run: RunOptions { step_s: args.step, ignore_limits: args.ignore_limits, ..RunOptions::default() },
         parameters: args.by.clone(),
         table: args.table.clone(),
         overwrite: args.force,

@@ -4,8 +4,8 @@ use std::ffi::OsString;
 use std::process::ExitCode;
 
 use flexarm::{
-    AlphaSettings, Arm, FlexibleRobot, Keep, Modelling, ReferenceSettings, Robot, RunOptions, RunRequest, Scenario,
-    SpookSettings, StepperOptions, Variant, sweep::Change,
+    AlphaSettings, Keep, Modelling, ReferenceSettings, RobotSource, RunOptions, RunRequest, Scenario, SpookSettings,
+    StepperOptions, Variant, sweep::Change,
 };
 
 use crate::args::RunArgs;
@@ -31,12 +31,11 @@ pub(crate) fn run(
             _ => Failure::In { context: format!("run {:?} of the study", part.label), source: Box::new(error) },
         })
     });
-    let (variants, mut as_filed): (Vec<Variant>, Vec<Option<FlexibleRobot>>) =
-        variants.collect::<Result<Vec<_>, Failure>>()?.into_iter().unzip();
-    let Some(Variant { robot, scenario, options, .. }) = variants.first() else {
+    let variants: Vec<Variant> = variants.collect::<Result<_, Failure>>()?;
+    let Some(Variant { arm, scenario, options, .. }) = variants.first() else {
         return Err(Failure::Usage("there is nothing to run".into()));
     };
-    let stem = format!("{}-{}", robot.name, scenario.motion.name);
+    let stem = format!("{}-{}", arm.robot().name, scenario.motion.name);
     let folder = OutputFolder::of(args.output.as_deref(), &stem, !args.no_files)?;
     let outputs = folder.path().map(|folder| formats::outputs(args, folder)).transpose()?;
 
@@ -46,18 +45,13 @@ pub(crate) fn run(
         bar.show(t, total);
         stop()
     };
-    let as_filed = as_filed.pop().flatten().filter(|_| options.modelling == Modelling::default());
     let result = if variants.len() == 1 {
-        let arm = match as_filed {
-            Some(flexible) => Ok(Arm::new(robot.clone(), options.modelling, flexible)),
-            None => robot.flexible(options.modelling),
-        };
         let request = RunRequest {
             outputs: outputs.as_ref(),
             progress: Some(&mut progress),
             ..RunRequest::keeping(Keep::Figures)
         };
-        arm.and_then(|arm| arm.simulate_with(scenario, options, request)).map(|run| run.summary)
+        arm.simulate_with(scenario, options, request).map(|run| run.summary)
     } else {
         flexarm::compare_study(&variants, outputs.as_ref(), &mut progress).map(|(summary, _)| summary)
     };
@@ -68,21 +62,21 @@ pub(crate) fn run(
     Ok(ExitCode::SUCCESS)
 }
 
-/// Returns robot, motion and options of a run, and the robot modelled as its file specifies, if
-/// that is known.
-fn variant(label: String, args: &RunArgs, with_twin: bool) -> Result<(Variant, Option<FlexibleRobot>), Failure> {
+/// Returns arm, motion and options of a run.
+fn variant(label: String, args: &RunArgs, with_twin: bool) -> Result<Variant, Failure> {
     let path = shipped::robot(args.robot.as_deref())?;
-    let (robot, as_filed, speed) = if args.set.is_empty() {
-        let (robot, as_filed) = Robot::load_modelled(&path, &args.load.options()?)?;
-        (robot, Some(as_filed), 1.0)
+    let (filed, speed) = if args.set.is_empty() {
+        (RobotSource::new(&path, &args.load.options()?).load()?, 1.0)
     } else {
         let changed = flexarm::sweep::load_changed(&path, &args.load.options()?, &args.set);
-        let (robot, speed) = changed.map_err(|error| Failure::In {
+        changed.map_err(|error| Failure::In {
             context: format!("with {}", args.set.iter().map(Change::to_string).collect::<Vec<_>>().join(", ")),
             source: Box::new(error.into()),
-        })?;
-        (robot, None, speed)
+        })?
     };
+    let modelling = args.modelling.modelling();
+    let arm = if modelling == Modelling::default() { filed } else { filed.robot().model(&modelling)? };
+    let robot = arm.robot();
     let trajectory = match (&args.trajectory, &robot.default_trajectory) {
         (Some(given), _) => shipped::trajectory(given)?,
         (None, Some(own)) => own.clone(),
@@ -92,7 +86,7 @@ fn variant(label: String, args: &RunArgs, with_twin: bool) -> Result<(Variant, O
         }
     };
     let motion =
-        flexarm::Motion::load_with(&trajectory, &robot, &args.motion.options()).map_err(|error| match error {
+        flexarm::Motion::load_with(&trajectory, robot, &args.motion.options()).map_err(|error| match error {
             flexarm::Error::File { path, what } if args.trajectory.is_none() => {
                 let what = format!("{what} (it is the default_trajectory of {})", robot.path.display());
                 flexarm::Error::File { path, what }
@@ -106,7 +100,7 @@ fn variant(label: String, args: &RunArgs, with_twin: bool) -> Result<(Variant, O
     let motion = if speed == 1.0 { motion } else { motion.scaled(1.0 / speed, &*robot.rigid_model()?)? };
     let scenario = Scenario::new(motion).with_start(args.from_rest);
     let scenario = args.loads.iter().try_fold(scenario, |scenario, path| scenario.with_loads_file(path))?;
-    Ok((Variant { label, robot, scenario, options: run_options(args, with_twin) }, as_filed))
+    Ok(Variant { label, scenario, options: run_options(args, with_twin), arm })
 }
 
 fn run_options(args: &RunArgs, with_twin: bool) -> RunOptions {
@@ -118,7 +112,6 @@ fn run_options(args: &RunArgs, with_twin: bool) -> RunOptions {
     RunOptions {
         stepper: (args.stepper.with)(&stepper_options),
         step_s: args.step.unwrap_or(args.stepper.default_step_s),
-        modelling: args.modelling.modelling(),
         log_rate_hz: args.log_rate,
         ignore_limits: args.ignore_limits,
         with_twin,

@@ -7,6 +7,7 @@
 use std::fs;
 use std::io::{Cursor, Write as _};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use flexarm::reduce::STRESS_FILE;
 use flexarm::{
@@ -263,7 +264,7 @@ fn move_links(document: &mut DocumentMut, folder: &Path, with_stress: bool) -> R
 
 /// Returns whether the arm made from files is the given one: same masses, springs and frames, bit
 /// for bit.
-fn same_arm(files: &NamedFiles, arm: &Arm, settings: &PlantSettings) -> Result<bool, PlantError> {
+fn same_arm(files: &NamedFiles, arm: &Arc<Arm>, settings: &PlantSettings) -> Result<bool, PlantError> {
     let parent = std::env::temp_dir();
     let folder = flexarm::private_folder(&parent).map_err(failed(&parent))?;
     let checked = (|| {
@@ -273,7 +274,7 @@ fn same_arm(files: &NamedFiles, arm: &Arm, settings: &PlantSettings) -> Result<b
             fs::write(&path, bytes).map_err(failed(&path))?;
         }
         let load = LoadOptions { tcp: settings.load.tcp.clone(), ..LoadOptions::default() };
-        let own = Robot::load_with(&folder.join(ROBOT), &load)?.flexible(settings.modelling)?;
+        let own = Robot::load_with(&folder.join(ROBOT), &load)?.model(&settings.modelling)?;
         let [own, given] = [&own, arm].map(|arm| arm.linearise(settings.pose.as_deref(), [0.0; 6]));
         let (own, given) = (own?, given?);
         Ok(own.M == given.M && own.K == given.K && own.D == given.D && own.J == given.J && own.X_WT == given.X_WT)

@@ -68,7 +68,7 @@ pub struct Plant {
     path: PathBuf,
     settings: PlantSettings,
     /// The arm as filed, shared by copies and kept when a parameter changes the robot.
-    arm: Arm,
+    arm: Arc<Arm>,
     pub(crate) variables: Arc<[Variable]>,
     /// Value of each variable; 1 is true.
     pub(crate) values: Vec<f64>,
@@ -98,7 +98,7 @@ impl Plant {
     /// [`PlantError::Robot`] if the robot cannot be loaded or has no equilibrium at the first pose.
     pub fn new(path: &Path, settings: &PlantSettings) -> Result<Self, PlantError> {
         let robot = Robot::load_with(path, &settings.load)?;
-        let arm = robot.flexible(settings.modelling)?;
+        let arm = robot.model(&settings.modelling)?;
         let options = options(settings, None);
         let live = arm.live(settings.pose.as_deref(), options.step_s, &options)?;
         let has_acceleration = !settings.stepper.entry().maximal;
@@ -133,7 +133,7 @@ impl Plant {
     }
 
     /// Returns the arm.
-    pub fn arm(&self) -> &Arm {
+    pub fn arm(&self) -> &Arc<Arm> {
         &self.arm
     }
 
@@ -297,7 +297,7 @@ impl Plant {
     }
 
     /// Returns the arm with the payload of the parameter.
-    pub(crate) fn loaded(&self) -> Result<Arm, PlantError> {
+    pub(crate) fn loaded(&self) -> Result<Arc<Arm>, PlantError> {
         let filed = self.variables.iter().find(|variable| variable.meaning == Meaning::PayloadMass);
         let Some(start) = filed.and_then(|variable| variable.start) else { return Ok(self.arm.clone()) };
         let mass = self.parameter(Meaning::PayloadMass, start);
@@ -314,7 +314,7 @@ impl Plant {
             }
         }
         let robot = Robot::from_toml(&text.to_string(), &self.path, &self.settings.load)?;
-        Ok(robot.flexible(self.settings.modelling)?)
+        Ok(robot.model(&self.settings.modelling)?)
     }
 
     /// Returns the value of a parameter; `default` if the plant has none such.
@@ -471,7 +471,7 @@ fn quaternion(pose: &Pose) -> [f64; 4] {
 fn options(settings: &PlantSettings, step_s: Option<f64>) -> RunOptions {
     let stepper = settings.stepper;
     let step_s = step_s.or(settings.step_s).unwrap_or(stepper.entry().default_step_s);
-    RunOptions { stepper, step_s, modelling: settings.modelling, ..RunOptions::default() }
+    RunOptions { stepper, step_s, ..RunOptions::default() }
 }
 
 /// Returns the robot file and the mass of its payload (kg), if it has one with a mass.

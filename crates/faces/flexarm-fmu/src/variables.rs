@@ -199,7 +199,7 @@ pub(crate) struct Starts<'a> {
 pub(crate) fn variables(arm: &Arm, starts: &Starts<'_>) -> Vec<Variable> {
     let mut list = List(Vec::new());
     list.parameters(starts);
-    if arm.flexible().has_servo() {
+    if arm.has_servo() {
         list.add(
             Causality::Parameter,
             "open_servos",
@@ -209,8 +209,8 @@ pub(crate) fn variables(arm: &Arm, starts: &Starts<'_>) -> Vec<Variable> {
             Meaning::OpenServos,
         );
     }
-    let model = &arm.flexible().model;
-    let driven: Vec<usize> = arm.flexible().servo_limits().map(|(coordinate, _)| coordinate).collect();
+    let model = &arm.model;
+    let driven: Vec<usize> = arm.servo_limits().map(|(coordinate, _)| coordinate).collect();
     for (k, coordinate) in model.coordinates()[..model.n_actuated()].iter().enumerate() {
         list.joint(k, coordinate, driven.contains(&k), starts);
     }

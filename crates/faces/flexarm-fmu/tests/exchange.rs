@@ -86,7 +86,7 @@ fn directional_derivatives_at_rest_are_those_of_the_linear_model() {
     ] {
         let settings = settings(links, drives);
         let mut plant = Plant::new(&robot(name), &settings).unwrap();
-        let arm = Robot::load(robot(name)).unwrap().flexible(settings.modelling).unwrap();
+        let arm = Robot::load(robot(name)).unwrap().model(&settings.modelling).unwrap();
         let pose = vec![0.2; arm.joints().count()];
         let motion = motion_inputs(&plant);
         motion[0].iter().for_each(|&k| plant.set(k, 0.2).unwrap());
@@ -169,7 +169,7 @@ fn arms_without_equations_and_wrong_states_are_refused() {
     document["drive"].as_array_of_tables_mut().unwrap().get_mut(0).unwrap()["gearbox"]["hysteresis"] =
         toml_edit::value(hysteresis);
     let robot_with = Robot::from_toml(&document.to_string(), &robot("kr210"), &Default::default()).unwrap();
-    let refused = robot_with.flexible(Modelling::default()).unwrap().equations(None, &Default::default());
+    let refused = robot_with.model(&Modelling::default()).unwrap().equations(None, &Default::default());
     assert!(refused.err().unwrap().to_string().contains("hysteresis"));
 
     let mut plant = Plant::new(&robot("kr210"), &PlantSettings::default()).unwrap();

@@ -27,9 +27,9 @@ fn a_plant_has_the_bits_of_the_arm_that_is_commanded_directly() {
     for (name, links, drives) in cases {
         let settings = settings(links, drives);
         let mut plant = Plant::new(&robot(name), &settings).unwrap();
-        let arm = Robot::load(robot(name)).unwrap().flexible(settings.modelling).unwrap();
+        let arm = Robot::load(robot(name)).unwrap().model(&settings.modelling).unwrap();
         let from = vec![0.1; arm.joints().count()];
-        let options = RunOptions { modelling: settings.modelling, ..RunOptions::default() };
+        let options = RunOptions::default();
         let mut live = arm.live(Some(&from), 1e-3, &options).unwrap();
         let (q_in, v_in) = (of_joints(&plant, "target_position"), of_joints(&plant, "target_velocity"));
         q_in.iter().for_each(|&k| plant.set(k, 0.1).unwrap());
@@ -124,7 +124,7 @@ fn a_payload_twice_as_heavy_sags_as_the_robot_file_with_it() {
     let mut document: toml_edit::DocumentMut = text.parse().unwrap();
     document["payload"]["mass"] = toml_edit::value(2.0 * mass);
     let edited = Robot::from_toml(&document.to_string(), &robot("kr210"), &Default::default()).unwrap();
-    let live = edited.flexible(Modelling::default()).unwrap().live(None, 1e-3, &RunOptions::default()).unwrap();
+    let live = edited.model(&Modelling::default()).unwrap().live(None, 1e-3, &RunOptions::default()).unwrap();
     let tcp = live.tcp_pose().translation.vector;
     assert_eq!(values(&plant, &TCP), tcp.as_slice(), "the static sag does not depend on the payload's inertia");
 }
@@ -136,7 +136,7 @@ fn a_payload_that_is_put_down_leaves_the_arm_of_the_robot_file_without_it() {
     let mut document: toml_edit::DocumentMut = text.parse().unwrap();
     document.remove("payload").unwrap();
     let empty = Robot::from_toml(&document.to_string(), &robot("kr210"), &Default::default()).unwrap();
-    let empty = empty.flexible(Modelling::default()).unwrap();
+    let empty = empty.model(&Modelling::default()).unwrap();
     let pose = [0.0, -1.0, 1.0, 0.0, 0.0, 0.0];
     let sag = empty.live(Some(&pose), 1e-3, &RunOptions::default()).unwrap().tcp_pose().translation.vector;
     let settings = PlantSettings { pose: Some(pose.to_vec()), ..PlantSettings::default() };
@@ -155,7 +155,7 @@ fn a_payload_that_is_put_down_leaves_the_arm_of_the_robot_file_without_it() {
     // Put down on the way: the steps of the arm whose scenario does so.
     plant.reset();
     plant.start(0.0).unwrap();
-    let arm = Robot::load(robot("kr210")).unwrap().flexible(Modelling::default()).unwrap();
+    let arm = Robot::load(robot("kr210")).unwrap().model(&Modelling::default()).unwrap();
     let still = Motion::from_samples(&[0.0, 0.3], &[pose, pose].concat(), arm.robot()).unwrap();
     let scenario = Scenario::from(&still).with_payload(PayloadChange::release(0.1));
     let run = arm.simulate(&scenario, &RunOptions::default()).unwrap();
@@ -220,7 +220,7 @@ fn states_resets_and_open_servos_do_what_they_say() {
     plant.set_flag(plant.find("open_servos").unwrap(), true).unwrap();
     plant.start(0.0).unwrap();
     let torques = of_joints(&plant, "torque");
-    let arm = Robot::load(robot("reference_arm")).unwrap().flexible(settings.modelling).unwrap();
+    let arm = Robot::load(robot("reference_arm")).unwrap().model(&settings.modelling).unwrap();
     let own = LiveOptions { servos: Servos::Open, ..LiveOptions::default() };
     let mut live = arm.live_with(None, 1e-3, &RunOptions::default(), &own).unwrap();
     let given = [30.0, -20.0, 10.0, 1.0, -1.0, 0.5];

@@ -1,6 +1,6 @@
 //! Arms: robots with their flexible links and drives, evaluated with numpy arrays.
 
-use std::sync::{Mutex, OnceLock, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use flexarm::{Arm, Error, LiveOptions, OperatingPoint, Outputs, RunOptions, RunRequest, Scenario, Servos, Words};
 use pyo3::exceptions::PyValueError;
@@ -29,7 +29,7 @@ use crate::watch::{Watch, stoppable};
 ///
 /// Examples
 /// --------
-/// >>> arm = flexarm.load("reference_arm").flexible()
+/// >>> arm = flexarm.load("reference_arm")
 /// >>> run = arm.simulate(step=2e-3)
 /// >>> run.error.shape[1]
 /// 3
@@ -38,18 +38,18 @@ use crate::watch::{Watch, stoppable};
 #[pyclass(frozen, name = "Arm", module = "flexarm")]
 pub(crate) struct PyArm {
     robot: Py<PyRobot>,
-    pub(crate) arm: Arm,
+    pub(crate) arm: Arc<Arm>,
     /// Workspace for single poses, created on first use.
     point: OnceLock<Mutex<OperatingPoint>>,
 }
 
 impl PyArm {
-    pub(crate) fn new(robot: Py<PyRobot>, arm: Arm) -> Self {
+    pub(crate) fn new(robot: Py<PyRobot>, arm: Arc<Arm>) -> Self {
         Self { robot, arm, point: OnceLock::new() }
     }
 
     fn n(&self) -> usize {
-        self.arm.flexible().model.n_actuated()
+        self.arm.model.n_actuated()
     }
 
     /// Parses one pose, if one is given.
@@ -90,13 +90,13 @@ impl PyArm {
     /// Names of the elastic elements (tuple of str).
     #[getter]
     fn elements<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
-        PyTuple::new(py, self.arm.flexible().springs.iter().map(|spring| spring.name.as_str()))
+        PyTuple::new(py, self.arm.springs.iter().map(|spring| spring.name.as_str()))
     }
 
     /// Number of elastic coordinates.
     #[getter]
     fn n_elastic(&self) -> usize {
-        self.arm.flexible().model.n_elastic()
+        self.arm.model.n_elastic()
     }
 
     /// Tree with elastic coordinates after the actuated ones, for rigid-body algorithms (Model).
@@ -289,7 +289,7 @@ impl PyArm {
     /// Examples
     /// --------
     /// >>> import numpy as np
-    /// >>> arm = flexarm.load("reference_arm").flexible()
+    /// >>> arm = flexarm.load("reference_arm")
     /// >>> found = arm.deflections(stiffness=np.linspace(0.8, 1.2, 5), step=5e-3)
     /// >>> found.peak.shape, bool(np.all(np.diff(found.peak) < 0))
     /// ((5,), True)

@@ -190,7 +190,8 @@ pub(crate) fn compensate<'py>(
     let optimal = Shaping::Optimal { delay_s: delay, band };
     let shapers = [("zv", ShaperKind::Zv.into()), ("zvd", ShaperKind::Zvd.into()), ("optimal", optimal)];
     let request = CompensateRequest {
-        run: RunOptions { step_s: step, modelling: modelling(links, drives, None, None)?, ..RunOptions::default() },
+        modelling: modelling(links, drives, None, None)?,
+        run: RunOptions { step_s: step, ..RunOptions::default() },
         method: word("method", method, &[("dynamic", Method::Dynamic), ("static", Method::Static)])?,
         components: chosen,
         iterations,

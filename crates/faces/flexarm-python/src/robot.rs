@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use flexarm::{InertiaEstimate, LoadOptions, ReadOptions, Robot};
+use flexarm::{Description, InertiaEstimate, LoadOptions, ReadOptions, Robot, RobotSource};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -21,7 +21,7 @@ use crate::values::{path, plain, texts};
 /// >>> robot = flexarm.load("kr210")
 /// >>> robot.joints[:2]
 /// ('joint_1', 'joint_2')
-/// >>> arm = robot.flexible(links="modal", drives="elastic")
+/// >>> arm = robot.model(&links="modal", drives="elastic")
 #[pyclass(frozen, name = "Robot", module = "flexarm")]
 pub(crate) struct PyRobot {
     pub(crate) robot: Arc<Robot>,
@@ -143,7 +143,7 @@ fn shipped(given: &Path) -> PyResult<PathBuf> {
 /// --------
 /// >>> base = flexarm.load("one_beam").path.parent
 /// >>> robot = flexarm.robot({"urdf": "one_beam.urdf"}, folder=base)
-/// >>> robot.flexible().n_elastic
+/// >>> robot.n_elastic
 /// 0
 #[pyfunction]
 #[pyo3(signature = (keys, folder=None, *, urdf=None))]
@@ -168,13 +168,12 @@ pub(crate) fn robot(
     let path = folder.join(VALUES);
     let read = ReadOptions { search_paths: flexarm::search_paths_from_environment(), ..ReadOptions::default() };
     let options = LoadOptions { tcp: None, urdf: read };
-    let made = py.detach(|| match &urdf {
-        Some(urdf) => Robot::from_texts(&text, urdf, &path, &options),
-        None => Robot::from_toml(&text, &path, &options),
-    });
-    let robot = made.map_err(|error| of_keys(exception(error), py, &path))?;
+    let description = urdf.as_deref().map(Description::Text);
+    let source = RobotSource { text: Some(&text), description, ..RobotSource::new(&path, &options) };
+    let made = py.detach(|| source.load());
+    let arm = made.map_err(|error| of_keys(exception(error), py, &path))?;
     let again = ("robot", (keys.copy()?, folder, urdf).into_pyobject(py)?.into_any().unbind());
-    Ok(PyRobot { robot: Arc::new(robot), again })
+    Ok(PyRobot { robot: Arc::new(arm.robot().clone()), again })
 }
 
 /// Placeholder for the file of a robot made from values.

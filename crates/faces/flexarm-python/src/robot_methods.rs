@@ -116,7 +116,7 @@ impl PyRobot {
     ) -> PyResult<PyArm> {
         let modelling = modelling(links, drives, segments, modes)?;
         let robot = slf.get().robot.clone();
-        let arm = slf.py().detach(|| robot.flexible(modelling)).or_raise()?;
+        let arm = slf.py().detach(|| robot.model(&modelling)).or_raise()?;
         Ok(PyArm::new(slf.clone().unbind(), arm))
     }
 

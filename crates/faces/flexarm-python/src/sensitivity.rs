@@ -56,7 +56,8 @@ pub(crate) fn sensitivity<'py>(
     overwrite: bool,
 ) -> PyResult<Bound<'py, PyAny>> {
     let request = SensitivityRequest {
-        run: RunOptions { step_s: step, modelling: modelling(links, drives, None, None)?, ..RunOptions::default() },
+        modelling: modelling(links, drives, None, None)?,
+        run: RunOptions { step_s: step, ..RunOptions::default() },
         parameters: by.unwrap_or_default(),
         table,
         overwrite,

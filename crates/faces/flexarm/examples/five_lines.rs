@@ -7,7 +7,7 @@ fn main() -> Result<(), Error> {
     let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(3).expect("the checkout");
     let robot = Robot::load(root.join("robots/kr210"))?;
     let motion = Motion::load(root.join("trajectories/pick_and_place.toml"), &robot)?;
-    let run = robot.flexible(Modelling::default())?.simulate(&motion, &RunOptions::default())?;
+    let run = robot.model(&Modelling::default())?.simulate(&motion, &RunOptions::default())?;
     println!("{}", run.summary.headline);
     Ok(())
 }

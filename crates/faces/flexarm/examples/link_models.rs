@@ -52,8 +52,7 @@ fn main() {
     let trajectory = arguments.next().map_or_else(|| robot.default_trajectory.clone().unwrap(), PathBuf::from);
     let motion = Motion::load_for(&trajectory, &robot.rigid_model().unwrap()).unwrap();
     let duration = motion.trajectory.duration();
-    let arm =
-        |robot: &Robot, modelling: &Modelling| robot.modelled(modelling).unwrap().arm(motion.prescribed()).unwrap();
+    let arm = |robot: &Robot, modelling: &Modelling| robot.model(modelling).unwrap().arm(motion.prescribed()).unwrap();
 
     let rigid = arm(&robot, &Modelling { links: LinkModel::Rigid, ..Modelling::default() });
     let (reference_path, _) = run(&rigid, StepperKind::Rk4, duration);
@@ -84,7 +83,7 @@ fn main() {
     let mut base = f64::NAN;
     for (name, modelling, geometric) in cases {
         stiffened(&mut robot, geometric && beams);
-        let Ok(model) = robot.modelled(&modelling) else { continue };
+        let Ok(model) = robot.model(&modelling) else { continue };
         let arm = model.arm(motion.prescribed()).unwrap();
         let (path, cost) = run(&arm, alpha, duration);
         let error = path.iter().zip(&truth).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max) / peak;

@@ -20,7 +20,7 @@ fn main() -> Result<(), Error> {
     for (name, file) in [("reference_arm", "reference_arm.toml"), ("kr210", "pick_and_place.toml")] {
         let robot = Robot::load(root.join("robots").join(name))?;
         let motion = Motion::load(root.join("trajectories").join(file), &robot)?;
-        let arm = robot.flexible(Modelling::default())?;
+        let arm = robot.model(&Modelling::default())?;
         let run = |k: u32| -> Result<Variation, Error> {
             let part = f64::from(k) / f64::from(number);
             let slower = Motion::along(motion.trajectory.scaled(1.0 + 0.2 * part)?, file, &robot)?;

@@ -46,8 +46,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let poses: usize = arguments.next().map_or(Ok(10_000), |text| text.parse())?;
     let robot = arguments.next().unwrap_or_else(|| "kr210".into());
     let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(3).expect("the checkout");
-    let arm = Robot::load(root.join("robots").join(robot))?.flexible(Modelling::default())?;
-    let model = &arm.flexible().model;
+    let arm = Robot::load(root.join("robots").join(robot))?.model(&Modelling::default())?;
+    let model = &arm.model;
     let ranges: Vec<(f64, f64)> =
         model.coordinates()[..model.n_actuated()].iter().map(|c| (c.limits.lower, c.limits.upper)).collect();
     let (mut all, joints) = (Vec::new(), ranges.len());

@@ -56,7 +56,7 @@ fn told(line: &str) -> Option<RunOptions> {
 fn lines(root: &Path, wanted: &[String]) -> Result<(), Error> {
     let robot = Robot::load(root.join("robots/reference_arm"))?;
     let motion = Motion::load(root.join("trajectories/reference_arm.toml"), &robot)?;
-    let arm = robot.flexible(Modelling::default())?;
+    let arm = robot.model(&Modelling::default())?;
     for line in wanted {
         match told(line) {
             Some(options) => {
@@ -93,7 +93,7 @@ fn main() -> Result<(), Error> {
     for (name, motion) in [("reference_arm", "reference_arm.toml"), ("kr210", "pick_and_place.toml")] {
         let robot = Robot::load(root.join("robots").join(name))?;
         let motion = Motion::load(root.join("trajectories").join(motion), &robot)?;
-        let arm = robot.flexible(Modelling::default())?;
+        let arm = robot.model(&Modelling::default())?;
         let duration = motion.trajectory.duration();
         for step_s in [10e-3, 5e-3, 1e-3] {
             let options = RunOptions { step_s, ..RunOptions::default() };

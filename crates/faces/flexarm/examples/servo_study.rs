@@ -17,7 +17,7 @@ fn tool(robot: &Robot, motion: &Motion, gain: f64) -> Result<TcpFigures, Error> 
     for drive in &mut tuned.drives {
         drive.servo.position_gain = Some(gain);
     }
-    let arm = tuned.flexible(Modelling { drives: DriveModel::Servo, ..Modelling::default() })?;
+    let arm = tuned.model(&Modelling { drives: DriveModel::Servo, ..Modelling::default() })?;
     let run = arm.simulate(motion, &RunOptions { settling_band_m: 1e-3, ..RunOptions::default() })?;
     Ok(run.summary.tcp.unwrap_or_default())
 }

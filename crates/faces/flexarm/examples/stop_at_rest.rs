@@ -23,7 +23,7 @@ fn main() -> Result<(), Error> {
     let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(3).expect("the checkout");
     let robot = Robot::load(root.join("robots/kr210"))?;
     let motion = Motion::load(root.join("trajectories/point_to_point.toml"), &robot)?;
-    let arm = robot.flexible(Modelling::default())?;
+    let arm = robot.model(&Modelling::default())?;
     let (moves, whole) = (motion.trajectory.moves(), motion.trajectory.duration());
     let end_of_move = moves.last().map_or(0.0, |last| last.end);
 

@@ -22,8 +22,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     ];
     let mut runs = Vec::new();
     for (label, modelling) in choices {
-        let options = RunOptions { modelling, ..RunOptions::default() };
-        let run = robot.flexible(modelling)?.simulate_with(&motion, &options, RunRequest::keeping(Keep::Curves))?;
+        let run = robot.model(&modelling)?.simulate_with(
+            &motion,
+            &RunOptions::default(),
+            RunRequest::keeping(Keep::Curves),
+        )?;
         runs.push((label, (run.summary, run.trace)));
     }
     let report: Vec<ReportRun<'_>> =

@@ -5,7 +5,7 @@
 //!
 //! let robot = Robot::load("robots/kr210")?;
 //! let motion = Motion::load("trajectories/pick_and_place.toml", &robot)?;
-//! let arm = robot.flexible(Modelling::default())?; // substitution once
+//! let arm = robot.model(&Modelling::default())?; // substitution once
 //! let run = arm.simulate(&motion, &RunOptions::default())?;
 //! let (t, e) = (run.time_s(), run.error_world_m()); // n, and n x 3, row after row
 //! println!("{} samples, first error {:?} m", t.len(), &e[..3]);
@@ -64,18 +64,18 @@ pub use flexarm_sweep as sweep;
 pub use flexarm_new::{NewError, NewOptions, NewRobot, new_robot};
 pub use flexarm_run::{
     AppliedLoad, Arm, BalancerEnds, BalancerError, BalancerInfo, Bend, Bending, CURVE_PIECES, Caveat, ChannelError,
-    Command, ConvertOptions, ConvertSummary, CouplingInfo, DependentInfo, DifferenceFigures, Disturbances, Drive,
-    DriveKind, DriveModel, ElasticCoordinate, ElementStatics, EquationCommand, Equations, Error, Fault, Figure,
-    FigureGroup, Files, Finding, FlexibleInfo, FlexibleRobot, GearHysteresis, HeldJoint, HoldFigures, Inspection,
-    JointInfo, Keep, LinkChoices, LinkFigures, LinkFormError, LinkInfo, LinkModel, LinkStressFigures, Live,
-    LiveOptions, LiveState, LoadError, LoadOptions, LoopError, LoopInfo, ModeFigures, ModeMovie, ModeTable, Modelling,
-    ModellingError, Motion, MotionCurve, MotionFiles, MotionOptions, MotionPeak, MotionReport, MotionViolation,
-    MountingInfo, OperatingPoints, Outputs, Owner, PathFigures, PathMoveFigures, PayloadChange, PayloadError,
-    PeakFigures, PoseError, PoseFigures, Progress, Readings, RecordingError, RecordingFiles, Recursions, ReportFiles,
-    ReportOptions, ReportRun, Response, ResponseCurve, ResponseFiles, ResponseOutputs, ResponseRequest, Robot,
-    RobotBalancer, RobotCoupling, RobotFileError, RobotLink, RobotLoop, RobotMounting, Run, RunOptions, RunRequest,
-    STUDY_NOTE, SampleObserver, Scenario, SectionForceFigures, Servos, SettingValue, Settling, Severity, ShareFigures,
-    Statics, StaticsFiles, StaticsOutputs, StepperFigures, StepperSettings, StrainGaugeFigures, StressPlaceFigures,
+    Command, ConvertOptions, ConvertSummary, CouplingInfo, DependentInfo, Description, DifferenceFigures, Disturbances,
+    Drive, DriveKind, DriveModel, ElasticCoordinate, ElementStatics, EquationCommand, Equations, Error, Fault, Figure,
+    FigureGroup, Files, Finding, FlexibleInfo, GearHysteresis, HeldJoint, HoldFigures, Inspection, JointInfo, Keep,
+    LinkChoices, LinkFigures, LinkFormError, LinkInfo, LinkModel, LinkStressFigures, Live, LiveOptions, LiveState,
+    LoadError, LoadOptions, LoopError, LoopInfo, ModeFigures, ModeMovie, ModeTable, Modelling, ModellingError, Motion,
+    MotionCurve, MotionFiles, MotionOptions, MotionPeak, MotionReport, MotionViolation, MountingInfo, OperatingPoints,
+    Outputs, Owner, PathFigures, PathMoveFigures, PayloadChange, PayloadError, PeakFigures, PoseError, PoseFigures,
+    Progress, Readings, RecordingError, RecordingFiles, Recursions, ReportFiles, ReportOptions, ReportRun, Response,
+    ResponseCurve, ResponseFiles, ResponseOutputs, ResponseRequest, Robot, RobotBalancer, RobotCoupling,
+    RobotFileError, RobotLink, RobotLoop, RobotMounting, RobotSource, Run, RunOptions, RunRequest, STUDY_NOTE,
+    SampleObserver, Scenario, SectionForceFigures, Servos, SettingValue, Settling, Severity, ShareFigures, Statics,
+    StaticsFiles, StaticsOutputs, StepperFigures, StepperSettings, StrainGaugeFigures, StressPlaceFigures,
     StressPointFigures, StressSource, StudyError, Summary, TCP_FRAME, TcpFigures, TcpInfo, ToolPath, ValueError,
     Variant, Variation, Weight, check, check_with_loads, check_with_motion, compare_study, convert, convert_until,
     figure_groups, html, inspect, markdown, modes, motion_report, parse_recording_format, read_run, readable_unit,

@@ -4,6 +4,7 @@
 use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use flexarm::{
@@ -34,7 +35,7 @@ fn numbers(n: usize, seed: f64) -> Vec<f64> {
 fn an_arm_answers_as_the_robot_that_is_substituted_for_each_question() {
     let robot = robot("kr210");
     let modelling = Modelling { links: LinkModel::Modal, drives: DriveModel::Elastic, ..Modelling::default() };
-    let arm = robot.flexible(modelling).unwrap();
+    let arm = robot.model(&modelling).unwrap();
     let wrench = [10.0, 0.0, -500.0, 0.0, 1.0, 0.0];
     let statics = flexarm::statics(&robot, &modelling, Some(&POSE), wrench).unwrap();
     assert_eq!(json(&arm.statics(Some(&POSE), wrench).unwrap()), json(&statics));
@@ -92,13 +93,13 @@ fn check_rows(recursions: &Recursions) {
 #[test]
 fn rows_of_the_recursions_have_the_bits_of_each_alone_and_fit_each_other() {
     check_rows(&robot("kr210").recursions().unwrap());
-    check_rows(&robot("reference_arm").flexible(Modelling::default()).unwrap().recursions());
+    check_rows(&robot("reference_arm").model(&Modelling::default()).unwrap().recursions());
     check_rows(&robot("palletiser").recursions().unwrap());
 }
 
 /// Maximum distance between the TCP of an arm that gets a motion as targets, with or without their
 /// velocities, and that of the run along it, over the maximum error of the run.
-fn off(arm: &Arm, motion: &Motion, period_s: f64, with_velocities: bool) -> f64 {
+fn off(arm: &Arc<Arm>, motion: &Motion, period_s: f64, with_velocities: bool) -> f64 {
     let options = RunOptions { log_rate_hz: 1.0 / period_s, ..RunOptions::default() };
     let run = arm.simulate(motion, &options).unwrap();
     let n = motion.trajectory.joints().len();
@@ -121,7 +122,7 @@ fn off(arm: &Arm, motion: &Motion, period_s: f64, with_velocities: bool) -> f64 
 #[test]
 fn an_arm_that_is_commanded_along_a_motion_goes_where_the_run_goes() {
     let robot = robot("kr210");
-    let arm = robot.flexible(Modelling::default()).unwrap();
+    let arm = robot.model(&Modelling::default()).unwrap();
     let motion = Motion::load(root().join("trajectories/point_to_point.toml"), &robot).unwrap();
     // Cubics between targets are not the quintics of the motion.
     let (fine, coarse) = (off(&arm, &motion, 1e-3, true), off(&arm, &motion, 0.05, true));
@@ -136,7 +137,7 @@ fn an_arm_that_is_commanded_along_a_motion_goes_where_the_run_goes() {
     let servo = Modelling { drives: DriveModel::Servo, ..Modelling::default() };
     let (robot, name) = (self::robot("reference_arm"), "trajectories/reference_arm.toml");
     let motion = Motion::load(root().join(name), &robot).unwrap();
-    let arm = robot.flexible(servo).unwrap();
+    let arm = robot.model(&servo).unwrap();
     let (told, late) = (off(&arm, &motion, 1e-3, true), off(&arm, &motion, 1e-3, false));
     println!("servos {told:.1e}, without velocities {late:.1e}");
     assert!(told <= 1e-3 && late <= 0.3, "{told:e}, {late:e}");
@@ -144,7 +145,7 @@ fn an_arm_that_is_commanded_along_a_motion_goes_where_the_run_goes() {
 
 #[test]
 fn a_live_arm_refuses_what_makes_no_sense_and_starts_again() {
-    let arm = robot("reference_arm").flexible(Modelling { drives: DriveModel::Servo, ..Modelling::default() }).unwrap();
+    let arm = robot("reference_arm").model(&Modelling { drives: DriveModel::Servo, ..Modelling::default() }).unwrap();
     let options = RunOptions::default();
     assert!(matches!(arm.live(None, 1.5e-3, &options), Err(Error::Value(_))));
     assert!(matches!(arm.live(Some(&[0.0; 3]), 1e-3, &options), Err(Error::Pose(_))));
@@ -176,9 +177,9 @@ fn circle(live: &mut Live, from: &[f64], steps: std::ops::Range<u32>) -> Vec<[f6
 
 #[test]
 fn a_live_arm_returns_to_a_state_and_repeats_what_followed_bit_for_bit() {
-    let backlash = robot("palletiser").flexible(Modelling::default()).unwrap();
+    let backlash = robot("palletiser").model(&Modelling::default()).unwrap();
     let servo = Modelling { drives: DriveModel::Servo, links: LinkModel::Modal, ..Modelling::default() };
-    let arms = [backlash, robot("reference_arm").flexible(servo).unwrap(), robot("kr300").flexible(servo).unwrap()];
+    let arms = [backlash, robot("reference_arm").model(&servo).unwrap(), robot("kr300").model(&servo).unwrap()];
     for arm in arms {
         let from = vec![0.1; arm.joints().count()];
         let mut live = arm.live(Some(&from), 1e-3, &RunOptions::default()).unwrap();
@@ -197,7 +198,7 @@ fn a_live_arm_returns_to_a_state_and_repeats_what_followed_bit_for_bit() {
 #[test]
 fn motors_with_the_torques_of_servos_move_as_under_servos() {
     let servo = Modelling { drives: DriveModel::Servo, ..Modelling::default() };
-    let arm = robot("reference_arm").flexible(servo).unwrap();
+    let arm = robot("reference_arm").model(&servo).unwrap();
     let (options, from) = (RunOptions::default(), vec![0.1; 6]);
     let mut closed = arm.live(Some(&from), 1e-3, &options).unwrap();
     let mut open = arm
@@ -223,7 +224,7 @@ fn motors_with_the_torques_of_servos_move_as_under_servos() {
 
 #[test]
 fn control_periods_of_any_whole_number_of_steps_can_follow_each_other() {
-    let arm = robot("kr210").flexible(Modelling::default()).unwrap();
+    let arm = robot("kr210").model(&Modelling::default()).unwrap();
     let options = RunOptions { step_s: 1e-3, ..RunOptions::default() };
     // Constant accelerations: the parabolas are exact whatever the periods.
     let at = |t: f64| POSE.map(|q| q + 0.2 * t * t);
@@ -251,7 +252,7 @@ fn control_periods_of_any_whole_number_of_steps_can_follow_each_other() {
 #[test]
 fn work_stops_when_it_is_told_to() {
     let robot = robot("kr210");
-    let arm = robot.flexible(Modelling::default()).unwrap();
+    let arm = robot.model(&Modelling::default()).unwrap();
     let poses = POSE.repeat(4000);
     let asked = AtomicUsize::new(0);
     let stop = || asked.fetch_add(1, Ordering::Relaxed) >= 2;
@@ -287,7 +288,7 @@ fn columns_in_memory_are_the_table_of_the_csv() {
             ..Outputs::everything(&folder)
         };
         let options = RunOptions { log_rate_hz: 50.0, ..RunOptions::default() };
-        let arm = robot.flexible(Modelling::default()).unwrap();
+        let arm = robot.model(&Modelling::default()).unwrap();
         let request = RunRequest { outputs: Some(&outputs), ..RunRequest::default() };
         let run = arm.simulate_with(&motion, &options, request).unwrap();
         let text = std::fs::read_to_string(folder.join("run.csv")).unwrap();

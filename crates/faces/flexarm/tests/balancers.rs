@@ -62,7 +62,7 @@ fn a_balancer_at_the_far_end_of_a_link_that_bends_holds_its_far_end() {
     let helped = strut(&robot, [1.1, 0.0, 0.0]);
     let softness = |robot: &Robot, links: LinkModel| {
         let modelling = Modelling { links, drives: DriveModel::Rigid, ..Modelling::default() };
-        let arm = robot.flexible(modelling).unwrap();
+        let arm = robot.model(&modelling).unwrap();
         let mut at = arm.operating_point().unwrap();
         at.solve(&AT, &Wrench::zeros()).unwrap();
         at.compliance()[(2, 2)]
@@ -82,7 +82,7 @@ fn a_balancer_at_the_far_end_of_a_link_that_bends_holds_its_far_end() {
 fn a_run_of_the_kr300_keeps_the_books_with_its_counterbalance() {
     let robot = Robot::load(project("robots/kr300")).unwrap();
     let motion = Motion::load(robot.default_trajectory.clone().unwrap(), &robot).unwrap();
-    let arm = robot.flexible(Modelling::default()).unwrap();
+    let arm = robot.model(&Modelling::default()).unwrap();
     let spook = StepperKind::Spook(flexarm::SpookSettings::default());
     let options = |stepper| RunOptions { stepper, log_rate_hz: 1000.0, ..RunOptions::default() };
     let alpha = arm.simulate(&motion, &options(StepperKind::default())).unwrap();
@@ -171,7 +171,7 @@ fn a_pose_without_room_for_the_gas_is_refused() {
     assert!(error.contains("has no room left above 1.0000 m"), "{error}");
     assert!(flexarm::statics(&robot, &Modelling::default(), Some(&leaning), [0.0; 6]).is_err());
     let motion = Motion::from_samples(&[0.0, 1.0], &[leaning, leaning].concat(), &robot).unwrap();
-    let arm = robot.flexible(Modelling::default()).unwrap();
+    let arm = robot.model(&Modelling::default()).unwrap();
     let error =
         arm.simulate(&motion, &RunOptions { ignore_limits: true, ..RunOptions::default() }).unwrap_err().to_string();
     assert!(error.contains("at t = 0.000 s") && error.contains("no room"), "{error}");

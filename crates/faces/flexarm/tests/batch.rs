@@ -1,6 +1,7 @@
 //! Batches of poses and runs: the same results as one by one, for any number of threads.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use flexarm::{
     Arm, Modelling, Motion, OperatingPoints, PayloadChange, Robot, RunOptions, Scenario, StepperKind, TCP_FRAME,
@@ -12,9 +13,9 @@ fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../..")
 }
 
-fn kr210() -> (Robot, Arm) {
+fn kr210() -> (Robot, Arc<Arm>) {
     let robot = Robot::load(root().join("robots/kr210")).unwrap();
-    let arm = robot.flexible(Modelling::default()).unwrap();
+    let arm = robot.model(&Modelling::default()).unwrap();
     (robot, arm)
 }
 
@@ -80,7 +81,7 @@ fn a_rigid_arm_has_poses_without_deflection() {
     let (robot, _) = kr210();
     let rigid =
         Modelling { links: flexarm::LinkModel::Rigid, drives: flexarm::DriveModel::Rigid, ..Modelling::default() };
-    let found = robot.flexible(rigid).unwrap().operating_points(&[0.1; 12], &Wrench::zeros()).unwrap();
+    let found = robot.model(&rigid).unwrap().operating_points(&[0.1; 12], &Wrench::zeros()).unwrap();
     assert!(found.len() == 2 && found.frequencies() == 0 && found.frequencies_hz.is_empty());
     assert!(found.failures.is_empty() && found.deflection_m.iter().all(|x| *x == 0.0));
 }
@@ -184,6 +185,6 @@ fn a_bad_run_is_refused_in_its_place() {
     assert!(third != second && (third / second - 1.0).abs() < 0.05, "{third} {second}");
     let rigid =
         Modelling { links: flexarm::LinkModel::Rigid, drives: flexarm::DriveModel::Rigid, ..Modelling::default() };
-    let rigid = robot.flexible(rigid).unwrap().deflections(&runs[..1], &options, false, &|| false);
+    let rigid = robot.model(&rigid).unwrap().deflections(&runs[..1], &options, false, &|| false);
     assert_eq!(rigid[0].as_ref().unwrap().peak_m, 0.0);
 }

@@ -46,8 +46,7 @@ impl Beam {
         let angles: Vec<f64> =
             times.iter().map(|t| 0.6 * s(*t).powi(3) * (10.0 - s(*t) * (15.0 - 6.0 * s(*t)))).collect();
         let motion = Motion::from_samples(&times, &angles, &robot).unwrap();
-        let options = RunOptions { modelling, ..RunOptions::default() };
-        robot.flexible(modelling).unwrap().simulate(Scenario::new(motion), &options).unwrap()
+        robot.model(&modelling).unwrap().simulate(Scenario::new(motion), &RunOptions::default()).unwrap()
     }
 }
 

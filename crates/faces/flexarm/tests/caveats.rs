@@ -326,8 +326,8 @@ fn modal_links_that_spin_fast_without_stiffening_by_load_are_reported() {
         let motion = Motion::load(project("tests/benchmarks/two_link").join(motion), &robot).unwrap();
         let modelling =
             Modelling { links, modes: Some(2).filter(|_| links == LinkModel::Modal), ..Modelling::default() };
-        let options = RunOptions { step_s: 1e-3, modelling, ..RunOptions::default() };
-        let summary = robot.flexible(modelling).unwrap().simulate(Scenario::new(motion), &options).unwrap().summary;
+        let options = RunOptions { step_s: 1e-3, ..RunOptions::default() };
+        let summary = robot.model(&modelling).unwrap().simulate(Scenario::new(motion), &options).unwrap().summary;
         summary.caveats.into_iter().filter(|caveat| caveat.code == "fast-spin").collect::<Vec<_>>()
     };
     let found = run("spin.csv", LinkModel::Modal, false);

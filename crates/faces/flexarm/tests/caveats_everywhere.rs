@@ -133,7 +133,7 @@ fn every_command_with_a_motion_says_of_it_and_of_its_loads_what_check_says() {
         assert_eq!(warnings.len(), caveats.iter().filter(|c| c.warns()).count(), "{what}");
     };
     let run = RunOptions { step_s: 0.004, ..RunOptions::default() };
-    let found = robot.flexible(run.modelling).unwrap().simulate(&scenario, &run).unwrap().summary;
+    let found = robot.model(&Modelling::default()).unwrap().simulate(&scenario, &run).unwrap().summary;
     says("compare", &found.caveats, &found.warnings);
     let request = SensitivityRequest {
         parameters: vec!["payload.mass".into()],

@@ -48,7 +48,7 @@ fn three_iterations_take_all_but_a_hundredth_of_the_peak_of_a_pick_and_place_cyc
     assert!(found.after.peak_m <= 0.01 * found.before.peak_m, "{:e}", found.after.peak_m);
     assert!(found.limits.is_empty(), "{:?}", found.limits);
     // Any run of the new motion shows the same figures.
-    let arm = robot.flexible(Modelling::default()).unwrap();
+    let arm = robot.model(&Modelling::default()).unwrap();
     let again = Motion::along((*found.trajectory).clone(), "again", &robot).unwrap();
     let run = arm.simulate(&again, &RunOptions { log_rate_hz: 1000.0, ..RunOptions::default() }).unwrap();
     assert!(run.summary.caveats.iter().all(|caveat| caveat.code != "corner"));
@@ -83,7 +83,7 @@ fn at_rest_commands_leave_nothing_where_the_motion_ends() {
     let (robot, motion) = shipped("kr210", "pick_and_place.toml");
     let found = compensate_motion(&robot, &motion, &CompensateRequest { method: Method::Static, ..request() }).unwrap();
     told("static", &found);
-    let arm = robot.flexible(Modelling::default()).unwrap();
+    let arm = robot.model(&Modelling::default()).unwrap();
     let mut at = arm.operating_point().unwrap();
     let end = |trajectory: &flexarm::Trajectory| {
         let (mut q, mut v, mut a) = ([0.0; 6], [0.0; 6], [0.0; 6]);
@@ -159,7 +159,7 @@ fn what_cannot_be_compensated_is_said() {
     fails(&rigid, request(), "no flexible link and no elastic drive");
     let other = Robot::load(root().join("robots/kr500_identified")).unwrap();
     let names =
-        |robot: &Robot| robot.flexible(Modelling::default()).unwrap().joints().map(str::to_owned).collect::<Vec<_>>();
+        |robot: &Robot| robot.model(&Modelling::default()).unwrap().joints().map(str::to_owned).collect::<Vec<_>>();
     if names(&other) != names(&robot) {
         fails(&robot, CompensateRequest { plant: Some(("other".into(), other)), ..request() }, "must be the same");
     }
@@ -200,7 +200,7 @@ fn under_the_force_of_a_cutter_the_tool_at_rest_is_where_the_rigid_arm_has_it() 
     let static_request = CompensateRequest { method: Method::Static, ..request() };
     let found = compensate_motion(&robot, scenario, &static_request).unwrap();
     told("cutter", &found);
-    let arm = robot.flexible(Modelling::default()).unwrap();
+    let arm = robot.model(&Modelling::default()).unwrap();
     let mut point = arm.operating_point().unwrap();
     let off = |trajectory: &flexarm::Trajectory, point: &mut flexarm::OperatingPoint| {
         let end = motion.trajectory.duration();
@@ -261,7 +261,7 @@ fn limits_of_speed_acceleration_and_torque_are_kept_or_named() {
     let short = CompensateRequest { accelerations: vec![1.0], ..request() };
     assert!(compensate_motion(&robot, &motion, &short).unwrap_err().to_string().contains("one per joint"));
 
-    let arm = robot.flexible(Modelling::default()).unwrap();
+    let arm = robot.model(&Modelling::default()).unwrap();
     let compensated = Motion::along((*free.trajectory).clone(), "again", &robot).unwrap();
     let run = arm.simulate(&compensated, &RunOptions { log_rate_hz: 1000.0, ..RunOptions::default() }).unwrap();
     let peak = run.values("effort").iter().skip(1).step_by(6).fold(0.0f64, |most, x| most.max(x.abs()));
@@ -346,7 +346,7 @@ fn a_robot_program_comes_back_with_targets_at_which_the_flexible_tool_is_where_i
         assert!(new.contains("corrected by flexarm for"), "{new}");
         // Read and run like any program; the end of the path is a target.
         let again = Motion::load(&program.files[0], &robot).unwrap();
-        let arm = robot.flexible(Modelling::default()).unwrap();
+        let arm = robot.model(&Modelling::default()).unwrap();
         let mut point = arm.operating_point().unwrap();
         let end = |motion: &Motion| at(&motion.trajectory, motion.trajectory.duration());
         point.solve(&end(&motion), &Wrench::zeros()).unwrap();
@@ -521,7 +521,7 @@ fn a_motion_that_begins_at_speed_is_corrected_by_the_static_method_and_refused_b
     let asked = CompensateRequest { method: Method::Static, limits: LimitRule::Tell, ..request() };
     let found = compensate_motion(&robot, &motion, &asked).unwrap();
     told("at speed", &found);
-    let arm = robot.flexible(Modelling::default()).unwrap();
+    let arm = robot.model(&Modelling::default()).unwrap();
     let mut point = arm.operating_point().unwrap();
     let mut off = |commands: &flexarm::Trajectory| {
         point.solve(&at(&motion.trajectory, 1.0), &Wrench::zeros()).unwrap();

@@ -3,9 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use flexarm::compensate::{CompensateRequest, Compensation, LimitRule, Method, ShaperKind, Shaping, compensate_motion};
-use flexarm::{
-    AppliedLoad, DriveModel, Modelling, Motion, PayloadChange, Robot, RunOptions, Scenario, TimedWrench, Wrench,
-};
+use flexarm::{AppliedLoad, DriveModel, Modelling, Motion, PayloadChange, Robot, Scenario, TimedWrench, Wrench};
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../..")
@@ -23,7 +21,7 @@ fn request() -> CompensateRequest {
 
 fn servo() -> CompensateRequest {
     let modelling = Modelling { drives: DriveModel::Servo, ..Modelling::default() };
-    CompensateRequest { run: RunOptions { modelling, ..RunOptions::default() }, ..request() }
+    CompensateRequest { modelling, ..request() }
 }
 
 fn told(name: &str, found: &Compensation) {
@@ -101,7 +99,7 @@ fn end(trajectory: &flexarm::Trajectory) -> [f64; 6] {
 fn static_targets_of_servos_leave_nothing_at_rest() {
     let (robot, motion) = shipped("manutec_r3", "manutec_r3.toml");
     let found = compensate_motion(&robot, &motion, &CompensateRequest { method: Method::Static, ..servo() }).unwrap();
-    let arm = robot.flexible(Modelling::default()).unwrap();
+    let arm = robot.model(&Modelling::default()).unwrap();
     let mut at = arm.operating_point().unwrap();
     at.solve(&end(&motion.trajectory), &Wrench::zeros()).unwrap();
     let wanted = at.rigid_tcp_pose().translation.vector;
@@ -183,7 +181,7 @@ fn targets_at_which_the_arm_waits_under_a_force_are_corrected_for_it() {
         q
     };
     let left = |robot: &Robot, line: usize, force: &Wrench| {
-        let arm = robot.flexible(Modelling::default()).unwrap();
+        let arm = robot.model(&Modelling::default()).unwrap();
         let mut at = arm.operating_point().unwrap();
         at.solve(&ends(&motion, line), force).unwrap();
         let wanted = at.rigid_tcp_pose().translation.vector;

@@ -23,9 +23,9 @@ fn beam() -> (Robot, Motion) {
 /// Returns the error of a run with these options.
 fn refused(modelling: Modelling, change: impl FnOnce(&mut RunOptions)) -> Error {
     let (robot, motion) = beam();
-    let mut options = RunOptions { modelling, ..RunOptions::default() };
+    let mut options = RunOptions::default();
     change(&mut options);
-    robot.flexible(modelling).and_then(|arm| arm.simulate(&motion, &options)).map(drop).expect_err("it is refused")
+    robot.model(&modelling).and_then(|arm| arm.simulate(&motion, &options)).map(drop).expect_err("it is refused")
 }
 
 #[test]

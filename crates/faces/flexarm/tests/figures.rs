@@ -9,18 +9,17 @@ use flexarm::{
 };
 use flexarm_log::{Trace, TraceRow};
 
-fn variant(label: &str, robot: &str, trajectory: &str, options: RunOptions) -> Variant {
+fn variant(label: &str, robot: &str, trajectory: &str, modelling: &Modelling, options: RunOptions) -> Variant {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../..");
     let robot = Robot::load_with(&root.join("robots").join(robot), &LoadOptions::default()).unwrap();
     let motion = Motion::load_for(&root.join("trajectories").join(trajectory), &robot.rigid_model().unwrap()).unwrap();
-    Variant { label: label.into(), robot, scenario: motion.into(), options }
+    Variant { label: label.into(), arm: robot.model(modelling).unwrap(), scenario: motion.into(), options }
 }
 
 fn run(robot: &str, trajectory: &str, outputs: Option<&Outputs>) -> (Summary, Trace) {
-    let v = variant("", robot, trajectory, RunOptions::default());
-    let arm = v.robot.flexible(v.options.modelling).unwrap();
+    let v = variant("", robot, trajectory, &Modelling::default(), RunOptions::default());
     let request = RunRequest { outputs, ..RunRequest::keeping(Keep::Curves) };
-    let run = arm.simulate_with(&v.scenario, &v.options, request).unwrap();
+    let run = v.arm.simulate_with(&v.scenario, &v.options, request).unwrap();
     (run.summary, run.trace)
 }
 
@@ -61,8 +60,8 @@ fn with_servos_the_contributions_still_add_up_to_the_error() {
 fn runs_with_other_steps_are_apart_by_what_their_errors_differ() {
     let modelling = |links| Modelling { links, ..Modelling::default() };
     let with = |label: &str, links: LinkModel, step_s: f64| {
-        let options = RunOptions { step_s, modelling: modelling(links), ..RunOptions::default() };
-        variant(label, "one_beam", "beam_swing.toml", options)
+        let options = RunOptions { step_s, ..RunOptions::default() };
+        variant(label, "one_beam", "beam_swing.toml", &modelling(links), options)
     };
     let apart = |variants: [Variant; 2]| {
         let (summary, traces) = compare_study(&variants, None, &mut |_, _| ControlFlow::Continue(())).unwrap();

@@ -88,7 +88,7 @@ fn the_ripple_of_a_gear_is_where_the_robot_file_puts_it() {
         (with.load[0] / without.load[0] - 1.0).abs() < 1e-3 && (with.energy_j / without.energy_j - 1.0).abs() < 2e-3
     );
 
-    let arm = robot.flexible(Modelling::default()).unwrap();
+    let arm = robot.model(&Modelling::default()).unwrap();
     let motion = moving(&robot);
     let run = |stepper: StepperKind, step_s: f64| {
         arm.simulate(&motion, &RunOptions { stepper, step_s, ..RunOptions::default() }).unwrap()
@@ -128,7 +128,7 @@ fn the_hysteresis_of_a_gear_takes_energy_and_says_what_statics_make_of_it() {
     let place = Place::new("hysteresis");
     let law = "stiffness = 2.0e6, damping = 1500.0, hysteresis = { loss_arcmin = 1.0, lost_motion_arcmin = 1.0, rated_torque = 3000.0 }";
     let robot = place.robot(&drive("joint_1", law, ""));
-    let arm = robot.flexible(Modelling::default()).unwrap();
+    let arm = robot.model(&Modelling::default()).unwrap();
     let motion = moving(&robot);
     let mut peaks = Vec::new();
     for (stepper, step_s) in [(StepperKind::default(), 2.5e-4), (StepperKind::Sdirk3, 2.5e-4), (StepperKind::Rk4, 1e-4)]
@@ -208,7 +208,7 @@ fn a_coupled_wrist_has_springs_rotors_and_torques_at_its_motors() {
     // With every stepper, also torque-controlled.
     let motion = moving(&robot);
     for drives in [DriveModel::AsFiled, DriveModel::Servo] {
-        let arm = robot.flexible(Modelling { drives, ..Modelling::default() }).unwrap();
+        let arm = robot.model(&Modelling { drives, ..Modelling::default() }).unwrap();
         let mut peaks = Vec::new();
         for (stepper, step_s, _) in steppers() {
             let run = arm.simulate(&motion, &RunOptions { stepper, step_s, ..RunOptions::default() }).unwrap();
@@ -233,7 +233,7 @@ fn a_coupled_wrist_has_springs_rotors_and_torques_at_its_motors() {
         [&one, &plain].map(|robot| modes(robot, &Modelling::default(), Some(&AT), None, 6).unwrap().frequencies_hz);
     assert_eq!(hz[0], hz[1]);
     let runs = [&one, &plain]
-        .map(|robot| robot.flexible(Modelling::default()).unwrap().simulate(&motion, &RunOptions::default()).unwrap());
+        .map(|robot| robot.model(&Modelling::default()).unwrap().simulate(&motion, &RunOptions::default()).unwrap());
     assert_eq!(runs[0].error_world_m(), runs[1].error_world_m());
 }
 
@@ -246,7 +246,7 @@ fn friction_under_load_adds_its_part_of_the_torque() {
         drive("joint_2", "stiffness = 2.0e6, damping = 1500.0", &format!("friction = {{ coulomb = 100.0{load} }}"))
     };
     let run = |robot: &Robot| {
-        let arm = robot.flexible(Modelling::default()).unwrap();
+        let arm = robot.model(&Modelling::default()).unwrap();
         arm.simulate(moving(robot), &RunOptions::default()).unwrap().summary
     };
     let (with, without) = (run(&place.robot(&text(", load = 0.06"))), run(&place.robot(&text(""))));

@@ -22,8 +22,12 @@ fn motion(robot: &Robot, trajectory: &str) -> Motion {
 }
 
 fn run(robot: &Robot, trajectory: &str, options: &RunOptions) -> (Summary, Trace) {
+    run_as(robot, trajectory, &Modelling::default(), options)
+}
+
+fn run_as(robot: &Robot, trajectory: &str, modelling: &Modelling, options: &RunOptions) -> (Summary, Trace) {
     let motion = motion(robot, trajectory);
-    let arm = robot.flexible(options.modelling).unwrap();
+    let arm = robot.model(modelling).unwrap();
     let run = arm.simulate_with(&motion, options, RunRequest::keeping(Keep::Curves)).unwrap();
     (run.summary, run.trace)
 }
@@ -104,7 +108,7 @@ fn a_robot_with_nothing_that_bends_says_so_first_and_how_to_give_it_something() 
     }
     // Rigid by choice is not a fault of the file.
     let modelling = Modelling { links: LinkModel::Rigid, drives: DriveModel::Rigid, ..Modelling::default() };
-    let (summary, _) = run(&load("kr210"), "point_to_point.toml", &RunOptions { modelling, ..RunOptions::default() });
+    let (summary, _) = run_as(&load("kr210"), "point_to_point.toml", &modelling, &RunOptions::default());
     let line = &summary.headline;
     assert!(line.starts_with("nothing is flexible") && line.contains("as chosen") && !line.contains("[["), "{line}");
     // Without the rigid twin there is nothing to compare with; what bends is said all the same.
@@ -140,7 +144,8 @@ fn a_study_has_both_parts_and_the_word_of_each_run() {
     let variant = |label: &str, robot: &str| {
         let robot = load(robot);
         let motion = motion(&robot, "pick_and_place.toml");
-        Variant { label: label.into(), robot, scenario: motion.into(), options: RunOptions::default() }
+        let arm = robot.model(&Modelling::default()).unwrap();
+        Variant { label: label.into(), arm, scenario: motion.into(), options: RunOptions::default() }
     };
     let variants = [variant("as given", "kr210"), variant("castings", "kr210/links.toml")];
     let (summary, _) = compare_study(&variants, None, &mut |_, _| ControlFlow::Continue(())).unwrap();

@@ -62,7 +62,7 @@ fn a_force_along_the_spindle_turns_its_spring() {
     let weightless = ROBOT.replace("format = 1", "format = 1\ngravity = [0.0, 0.0, 0.0]");
     let robot = place.robot(&weightless).unwrap();
     let modelling = Modelling { links: LinkModel::Rigid, ..Modelling::default() };
-    let mut at = robot.flexible(modelling).unwrap().operating_point().unwrap();
+    let mut at = robot.model(&modelling).unwrap().operating_point().unwrap();
     at.solve(&[0.3, -0.4, 0.1, 2.0], &Wrench::zeros()).unwrap();
     let C = at.compliance();
     // Only the spring is elastic, along S = (p a; a) moved to the TCP: rank one, with 1/k in its
@@ -90,7 +90,7 @@ fn every_stepper_runs_a_robot_with_a_helical_joint() {
     let swing = |t: f64| 0.5 * (1.0 - (std::f64::consts::PI * t).cos());
     let q: Vec<f64> = t.iter().flat_map(|t| [0.5, -0.4, 0.1, 4.0].map(|q| q * swing(*t))).collect();
     let motion = Motion::from_samples(&t, &q, &robot).unwrap();
-    let arm = robot.flexible(Modelling::default()).unwrap();
+    let arm = robot.model(&Modelling::default()).unwrap();
     let error = |stepper: StepperKind, step_s: f64| {
         let options = RunOptions { stepper, step_s, log_rate_hz: 100.0, ..RunOptions::default() };
         arm.simulate(&motion, &options).unwrap().error_world_m().to_vec()

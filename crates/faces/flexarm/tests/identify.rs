@@ -80,7 +80,7 @@ fn with_values(of: &Measurements, values: &[f64]) -> Measurements {
 /// Truth: the synthetic arm. Returns the share of 95 % intervals that contain it, and the spread of
 /// the errors over their deviations, 200 seeds.
 fn coverage(robot: &str) -> (f64, f64) {
-    let arm = shipped(robot).flexible(Modelling::default()).unwrap();
+    let arm = shipped(robot).model(&Modelling::default()).unwrap();
     let (plant, parameters) = (plant(&arm), stiffnesses(parameters(&arm)));
     let mut draw = Draw(2026);
     let poses = pulls(&mut draw, 24);
@@ -133,7 +133,7 @@ fn table(joints: &[String], poses: &Measurements, values: &[f64], factor: f64) -
 const JOB: &str = "format = 1\nlength = \"mm\"\nangle = \"deg\"\n[[displacement]]\nfile = \"pulls.csv\"\nload = { at = [400.0, 0, 0] }\npoint = [400.0, 0, 0]\n";
 
 fn measured(robot: &Robot, x: &[f64], noise: f64) -> (Measurements, Vec<f64>, Vec<String>) {
-    let arm = robot.flexible(Modelling::default()).unwrap();
+    let arm = robot.model(&Modelling::default()).unwrap();
     let mut draw = Draw(5);
     let poses = pulls(&mut draw, 12);
     let parameters: Vec<Parameter> = stiffnesses(parameters(&arm));
@@ -165,7 +165,7 @@ fn a_table_in_millimetres_gives_a_robot_file_that_shows_what_was_measured() {
         (new.urdf_path.canonicalize().unwrap(), &new.name),
         (robot.urdf_path.canonicalize().unwrap(), &robot.name)
     );
-    let arm = new.flexible(Modelling::default()).unwrap();
+    let arm = new.model(&Modelling::default()).unwrap();
     for (p, found) in stiffnesses(parameters(&arm)).iter().zip(&found.parameters) {
         let off = (p.initial - found.value).abs();
         assert!(off < 0.01 * found.std, "{}: {off}", p.name);
@@ -312,7 +312,7 @@ fn a_measured_robot_tells_two_of_its_gears_and_is_silent_about_the_third() {
             "[[encoders]]\nfile = \"run_{run}.csv\"\ntime = \"time_s\"\nmotor = {{ {motor} }}\nlink = {{ {link} }}\n"
         );
     }
-    let arm = robot.flexible(Modelling { drives: flexarm::DriveModel::Elastic, ..Modelling::default() }).unwrap();
+    let arm = robot.model(&Modelling { drives: flexarm::DriveModel::Elastic, ..Modelling::default() }).unwrap();
     let names: Vec<String> = arm.joints().map(str::to_owned).collect();
     for (k, name) in names.iter().enumerate() {
         job = job.replace(&format!("joint_a{} =", k + 1), &format!("{name} ="));

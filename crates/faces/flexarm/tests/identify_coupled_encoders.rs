@@ -49,7 +49,7 @@ fn coupled(folder: &Path, factors: [f64; 3]) -> Robot {
 /// Motor positions behind their gears, and link positions, of equilibria along a quasi-static
 /// motion, under gravity only.
 fn recording(robot: &Robot, seed: f64) -> String {
-    let arm = robot.flexible(Modelling::default()).unwrap();
+    let arm = robot.model(&Modelling::default()).unwrap();
     let mut at = arm.operating_point().unwrap();
     let mut text = "t,m1,m2,m3,m4,m5,m6,j4,j5,j6,l4,l5,l6\n".to_owned();
     for sample in 0..1200 {
@@ -109,7 +109,7 @@ fn springs_of_coupled_motors_are_found_from_encoders_behind_the_gears() {
     }
     let factor_of = |joint: &str| factors[joint.strip_prefix("joint_").unwrap().parse::<usize>().unwrap() - 4];
     let initial = |joint: &str| {
-        let arm = robot.flexible(Modelling::default()).unwrap();
+        let arm = robot.model(&Modelling::default()).unwrap();
         let name = format!("drive.{joint}.gearbox.stiffness");
         parameters(&arm).into_iter().find(|p| p.name == name).unwrap().initial
     };

@@ -51,7 +51,7 @@ fn record(robot: &Robot, folder: &Path) {
     std::fs::write(folder.join("motion.toml"), MOTION).unwrap();
     let motion = Motion::load(folder.join("motion.toml"), robot).unwrap();
     let options = RunOptions { step_s: 5e-4, log_rate_hz: 500.0, with_twin: false, ..RunOptions::default() };
-    let run = robot.flexible(Modelling::default()).unwrap().simulate(&motion, &options).unwrap();
+    let run = robot.model(&Modelling::default()).unwrap().simulate(&motion, &options).unwrap();
     // Positions are those of the links.
     let [time, link, deflection, load] =
         ["time", "position", "deflection", "load"].map(|name| run.values(name).to_vec());

@@ -49,7 +49,7 @@ fn with_stiffness(K: &Matrix6<f64>) -> String {
 
 /// The matrix of link_2 in the shipped file.
 fn matrix(robot: &Robot) -> Matrix6<f64> {
-    let arm = robot.flexible(Modelling::default()).unwrap();
+    let arm = robot.model(&Modelling::default()).unwrap();
     let mut K = Matrix6::zeros();
     for p in link_entries(&arm).iter().filter(|p| p.name.starts_with("link.link_2.")) {
         let digits: Vec<usize> = p.name.chars().filter_map(|c| c.to_digit(10)).map(|d| d as usize).collect();
@@ -85,7 +85,7 @@ fn the_coupling_of_shear_and_bending_is_found_and_written_into_the_robot_file() 
     other[(column, row)] = other[(row, column)];
     other[(column, column)] *= 0.8;
     let measured = Place::new("measured");
-    let arm = robot(&with_stiffness(&other), &measured.0).flexible(Modelling::default()).unwrap();
+    let arm = robot(&with_stiffness(&other), &measured.0).model(&Modelling::default()).unwrap();
     let mut at = arm.operating_point().unwrap();
     let mut text = "format = 1\n".to_owned();
     for (k, q) in poses().iter().enumerate() {
@@ -173,7 +173,7 @@ fn a_matrix_that_is_no_stiffness_is_refused_with_what_is_wrong() {
     let none = changed(&|K| K[(2, 2)] = 0.0).unwrap_err().to_string();
     assert!(none.contains("[2][2] is 0, expected a positive number"), "{none}");
     let modal = Modelling { links: LinkModel::Modal, ..Modelling::default() };
-    let error = changed(&|_| {}).unwrap().flexible(modal).map(|_| ()).unwrap_err().to_string();
+    let error = changed(&|_| {}).unwrap().model(&modal).map(|_| ()).unwrap_err().to_string();
     assert!(error.contains("one spring between two rigid parts"), "{error}");
 }
 
@@ -190,7 +190,7 @@ fn a_tool_that_is_elsewhere_is_found_from_places_and_written_into_the_robot_file
         Rotation3::new(Vector3::new(0.01, -0.02, 0.015)),
     );
     let moved = first.clone().with_tcp(&link, X_LT * shift).unwrap();
-    let arm = moved.flexible(Modelling::default()).unwrap();
+    let arm = moved.model(&Modelling::default()).unwrap();
     let mut at = arm.operating_point().unwrap();
     let mut text = "format = 1\nfit = [\"tcp.*\"]\n[instrument.tracker]\nxyz = [0, 0, 0]\n".to_owned();
     for (name, xyz) in [("a", [0.0, 0.0, 0.0]), ("b", [0.2, 0.0, 0.0]), ("c", [0.0, 0.2, 0.1])] {

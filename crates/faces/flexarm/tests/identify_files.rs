@@ -41,7 +41,7 @@ impl Place {
         let folder = std::env::temp_dir().join(format!("flexarm-identify-files-{}-{name}", std::process::id()));
         std::fs::create_dir_all(&folder).unwrap();
         let robot = robot();
-        let arm = robot.flexible(Modelling::default()).unwrap();
+        let arm = robot.model(&Modelling::default()).unwrap();
         let parameters = parameters(&arm).into_iter().filter(|p| p.name.ends_with(".stiffness")).collect();
         Self { folder, robot, draw: Draw(9), parameters }
     }
@@ -61,7 +61,7 @@ impl Place {
 
     /// Displacements (m) of the measured arm between two loads, with noise.
     fn shown(&mut self, loads: &[(Vec<f64>, LoadCase)], target: Option<Vector3<f64>>) -> Vec<[f64; 3]> {
-        let arm = self.robot.flexible(Modelling::default()).unwrap();
+        let arm = self.robot.model(&Modelling::default()).unwrap();
         let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
         let readings = loads.iter().map(|(q, load)| {
             let kind = match target {

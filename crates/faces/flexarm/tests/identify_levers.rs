@@ -67,7 +67,7 @@ fn gears(all: Vec<Parameter>) -> Vec<Parameter> {
 fn springs_of_coupled_motors_have_the_derivatives_of_their_arm_and_are_found_from_displacements() {
     let place = Place::new("coupled");
     let robot = coupled(&place);
-    let arm = robot.flexible(Modelling::default()).unwrap();
+    let arm = robot.model(&Modelling::default()).unwrap();
     let (plant, parameters) = (plant(&arm), gears(parameters(&arm)));
     assert_eq!(parameters.len(), 6);
     let poses = pulls();
@@ -120,7 +120,7 @@ fn dampers_of_coupled_motors_are_found_from_the_response_of_the_arm_that_has_the
     use flexarm::identify::{Answer, Form, MeasuredResponse, Probe, structure_slopes};
     let place = Place::new("dampers");
     let robot = coupled(&place);
-    let arm = robot.flexible(Modelling::default()).unwrap();
+    let arm = robot.model(&Modelling::default()).unwrap();
     let plant = plant(&arm);
     let of =
         |p: &Parameter| p.name.ends_with("gearbox.damping") && ["_4", "_5", "_6"].iter().any(|j| p.name.contains(j));

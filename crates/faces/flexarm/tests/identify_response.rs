@@ -73,7 +73,7 @@ struct Test {
 
 impl Test {
     fn new(robot: &Robot) -> Self {
-        let arm = robot.flexible(Modelling::default()).unwrap();
+        let arm = robot.model(&Modelling::default()).unwrap();
         let all = parameters(&arm);
         let changed: Vec<Parameter> =
             TRUTH.iter().map(|(name, _)| all.iter().find(|p| p.name == *name).unwrap().clone()).collect();
@@ -258,7 +258,7 @@ fn shapes_of_modes_tell_how_stiffness_is_shared() {
     let robot = kr210();
     let test = Test::new(&robot);
     let place = Place::new("shapes");
-    let arm = robot.flexible(Modelling::default()).unwrap();
+    let arm = robot.model(&Modelling::default()).unwrap();
     let frame = |link: &str| plant(&arm).model.frame(link).unwrap().clone();
     let (links, axes) = (["link_3", "link_4", "link_6"], [("x", Vector3::x()), ("z", Vector3::z())]);
     let probes: Vec<Probe> =
@@ -311,7 +311,7 @@ fn dampers_of_a_gearbox_of_six_come_back_one_by_one() {
         .fold(String::new(), |all, line| all + line + "\n");
     place.write("robot.toml", text);
     let robot = Robot::load(&place.0).unwrap();
-    let arm = robot.flexible(Modelling::default()).unwrap();
+    let arm = robot.model(&Modelling::default()).unwrap();
     let name = |k: usize| format!("drive.joint_2.gearbox.damping[{k}]");
     let dampers: Vec<Parameter> =
         (0..6).map(|k| parameters(&arm).into_iter().find(|p| p.name == name(k)).unwrap()).collect();
@@ -347,7 +347,7 @@ fn dampers_of_a_gearbox_of_six_come_back_one_by_one() {
         }
     }
     assert!(told >= 3, "{told}");
-    let again = Robot::load(place.0.join("out")).unwrap().flexible(Modelling::default()).unwrap();
+    let again = Robot::load(place.0.join("out")).unwrap().model(&Modelling::default()).unwrap();
     for (p, found) in
         parameters(&again).iter().filter(|p| p.name.starts_with("drive.joint_2.gearbox.damping")).zip(&found.parameters)
     {

@@ -49,7 +49,7 @@ fn elastica(alpha: f64) -> [f64; 2] {
 fn a_beam_that_is_bent_by_a_right_angle_is_in_the_equilibrium_of_the_elastica() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(3).unwrap();
     let robot = Robot::load(root.join("tests/benchmarks/large_beams/princeton.toml")).unwrap();
-    let arm = robot.flexible(Modelling::default()).unwrap();
+    let arm = robot.model(&Modelling::default()).unwrap();
     let (length, stiffness) = (0.508, 71.7e9 * 0.0123777 * 0.0032024_f64.powi(3) / 12.0);
     for force in [5.0, 50.0, 400.0, 800.0, 1000.0] {
         let linear = arm.linearise(None, [0.0, 0.0, force, 0.0, 0.0, 0.0]).unwrap();

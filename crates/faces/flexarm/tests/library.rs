@@ -4,8 +4,8 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use flexarm::{
-    AppliedLoad, Arm, DriveModel, Error, Keep, LinkModel, Modelling, Motion, PayloadChange, Robot, Run, RunOptions,
-    RunRequest, Sample, Scenario, Wrench,
+    AppliedLoad, Arm, Description, DriveModel, Error, Keep, LinkModel, Modelling, Motion, PayloadChange, Robot,
+    RobotSource, Run, RunOptions, RunRequest, Sample, Scenario, Wrench,
 };
 use nalgebra::Vector3;
 
@@ -30,7 +30,7 @@ fn arms_are_shared_by_threads_and_workspaces_are_sent_to_them() {
 fn a_run_by_values_is_the_run_by_files() {
     let robot = Robot::load(root().join("robots/kr210")).unwrap();
     let motion = Motion::load(root().join("trajectories/pick_and_place.toml"), &robot).unwrap();
-    let arm = robot.flexible(Modelling::default()).unwrap();
+    let arm = robot.model(&Modelling::default()).unwrap();
     let options = RunOptions::default();
     let run = arm.simulate(&motion, &options).unwrap();
     let curves = arm.simulate_with(&motion, &options, RunRequest::keeping(Keep::Curves)).unwrap().summary;
@@ -75,7 +75,7 @@ fn a_motion_of_arrays_is_that_of_the_file() {
     let q: Vec<f64> = t.iter().map(|t| 0.3 * (1.0 - (std::f64::consts::PI * t).cos())).collect();
     let motion = Motion::from_samples(&t, &q, &robot).unwrap();
     let rows = t.iter().zip(&q).map(|(t, q)| format!("{t},{q}\n")).collect::<String>();
-    let arm = robot.flexible(Modelling::default()).unwrap();
+    let arm = robot.model(&Modelling::default()).unwrap();
     let joint = arm.joints().next().unwrap();
     let file = std::env::temp_dir().join(format!("flexarm-library-{}.csv", std::process::id()));
     std::fs::write(&file, format!("time,{joint}\n{rows}")).unwrap();
@@ -99,7 +99,7 @@ fn a_motion_of_arrays_is_that_of_the_file() {
 fn loads_and_payloads_by_value_are_those_of_the_file() {
     let robot = Robot::load(root().join("robots/one_beam")).unwrap();
     let motion = Motion::load(root().join("trajectories/beam_swing.toml"), &robot).unwrap();
-    let arm = robot.flexible(Modelling::default()).unwrap();
+    let arm = robot.model(&Modelling::default()).unwrap();
     let file = std::env::temp_dir().join(format!("flexarm-library-{}.loads.toml", std::process::id()));
     let by_file = |text: &str| {
         std::fs::write(&file, format!("format = 1\n{text}")).unwrap();
@@ -149,7 +149,7 @@ fn loads_and_payloads_by_value_are_those_of_the_file() {
 fn an_observer_sees_every_sample_and_can_stop_the_run() {
     let robot = Robot::load(root().join("robots/one_beam")).unwrap();
     let motion = Motion::load(root().join("trajectories/beam_swing.toml"), &robot).unwrap();
-    let arm = robot.flexible(Modelling::default()).unwrap();
+    let arm = robot.model(&Modelling::default()).unwrap();
     let mut seen = 0;
     let mut count = |_: &Sample| {
         seen += 1;
@@ -184,11 +184,11 @@ fn operating_points_are_what_statics_and_modes_say() {
         }
         let robot = Robot::load(&folder).unwrap();
         for modelling in modellings {
-            let Ok(arm) = robot.flexible(modelling) else { continue };
-            if arm.flexible().springs.is_empty() {
+            let Ok(arm) = robot.model(&modelling) else { continue };
+            if arm.springs.is_empty() {
                 continue;
             }
-            let model = &arm.flexible().model;
+            let model = &arm.model;
             let ranges: Vec<(f64, f64)> = model.coordinates()[..model.n_actuated()]
                 .iter()
                 .map(|c| (c.limits.lower.max(-3.0), c.limits.upper.min(3.0)))
@@ -238,7 +238,7 @@ fn operating_points_are_what_statics_and_modes_say() {
 
 #[test]
 fn poses_of_another_length_and_without_numbers_are_refused() {
-    let arm = Robot::load(root().join("robots/kr210")).unwrap().flexible(Modelling::default()).unwrap();
+    let arm = Robot::load(root().join("robots/kr210")).unwrap().model(&Modelling::default()).unwrap();
     let mut at = arm.operating_point().unwrap();
     for q in [&[0.0; 5][..], &[0.0, f64::NAN, 0.0, 0.0, 0.0, 0.0]] {
         assert!(at.solve(q, &Wrench::zeros()).unwrap_err().to_string().contains("6"));
@@ -249,7 +249,7 @@ fn poses_of_another_length_and_without_numbers_are_refused() {
 
 #[test]
 fn a_load_beyond_buckling_is_no_operating_point_and_the_next_pose_is() {
-    let arm = Robot::load(root().join("robots/one_beam")).unwrap().flexible(Modelling::default()).unwrap();
+    let arm = Robot::load(root().join("robots/one_beam")).unwrap().model(&Modelling::default()).unwrap();
     let mut at = arm.operating_point().unwrap();
     let push = Wrench::new(Vector3::new(-1e9, 0.0, 0.0), Vector3::zeros());
     assert!(at.solve(&[0.0], &push).is_err() && at.residual().is_nan());
@@ -266,17 +266,21 @@ fn a_robot_of_texts_is_the_robot_of_its_files() {
     let options = flexarm::LoadOptions::default();
     // The description has no file: the robot file names one that does not exist.
     let text = text.replace("urdf = \"kr210.urdf\"", "urdf = \"nowhere.urdf\"");
-    let ours = Robot::from_texts(&text, &urdf, &folder.join("nowhere.toml"), &options).unwrap();
+    let nowhere = folder.join("nowhere.toml");
+    let of_texts = |urdf: &str| {
+        let description = Some(Description::Text(urdf));
+        RobotSource { text: Some(&text), description, ..RobotSource::new(&nowhere, &options) }.load()
+    };
+    let ours = of_texts(&urdf).unwrap().robot().clone();
     let theirs = Robot::load(&folder).unwrap();
     let sag = |robot: &Robot| {
-        let mut at = robot.flexible(Modelling::default()).unwrap().operating_point().unwrap();
+        let mut at = robot.model(&Modelling::default()).unwrap().operating_point().unwrap();
         at.solve(&[0.0, -1.2, 1.5, 0.0, 0.4, 0.0], &Wrench::zeros()).unwrap();
         (at.tcp_pose(), at.compliance())
     };
     assert_eq!(sag(&ours), sag(&theirs));
     // Errors in the description are reported with their line, as are errors in the robot file.
-    let wrong = Robot::from_texts(&text, &urdf.replace("joint_3", "joint_2"), &folder.join("nowhere.toml"), &options);
-    let told = wrong.unwrap_err().to_string();
+    let told = of_texts(&urdf.replace("joint_3", "joint_2")).unwrap_err().to_string();
     assert!(told.contains("nowhere.urdf:") && told.contains("joint_2"), "{told}");
     let wrong = Robot::from_toml(&text, &folder.join("nowhere.toml"), &options).unwrap_err().to_string();
     assert!(wrong.contains("there is no file"), "{wrong}");
@@ -287,7 +291,7 @@ fn a_robot_of_texts_is_the_robot_of_its_files() {
 fn columns_that_were_kept_elsewhere_are_columns_again() {
     let robot = Robot::load(root().join("robots/reference_arm")).unwrap();
     let motion = Motion::load(robot.default_trajectory.clone().unwrap(), &robot).unwrap();
-    let arm = robot.flexible(Modelling::default()).unwrap();
+    let arm = robot.model(&Modelling::default()).unwrap();
     for with_twin in [true, false] {
         let options = RunOptions { step_s: 4e-3, with_twin, ..RunOptions::default() };
         let columns = arm.simulate(&motion, &options).unwrap().columns;

@@ -76,7 +76,7 @@ fn a_run_of_the_palletiser_keeps_the_books_in_every_stepper() {
     let robot = palletiser();
     let motion = Motion::load(robot.default_trajectory.clone().unwrap(), &robot).unwrap();
     assert!(motion.violations.is_empty(), "{:?}", motion.violations);
-    let arm = robot.flexible(Modelling::default()).unwrap();
+    let arm = robot.model(&Modelling::default()).unwrap();
     let options = |stepper| RunOptions { stepper, log_rate_hz: 1000.0, ..RunOptions::default() };
     let sdirk = StepperKind::Sdirk3;
     let peaks = [StepperKind::default(), sdirk].map(|stepper| {
@@ -100,7 +100,7 @@ fn a_run_of_the_palletiser_keeps_the_books_in_every_stepper() {
 fn compliance_of_the_crank_reaches_the_tool_through_the_rod() {
     let mut robot = palletiser();
     robot.drives.retain(|drive| drive.joint == "joint_3");
-    let arm = robot.flexible(Modelling { links: LinkModel::Rigid, ..Modelling::default() }).unwrap();
+    let arm = robot.model(&Modelling { links: LinkModel::Rigid, ..Modelling::default() }).unwrap();
     let mut point = arm.operating_point().unwrap();
     for at in PLACES {
         point.solve(&order(at), &Wrench::zeros()).unwrap();
@@ -130,7 +130,7 @@ fn a_rod_that_stretches_lets_the_tool_sink_by_the_square_of_its_lever() {
     let text = format!("{head}[[loop]]{loops}\n{rod}").replace("default_trajectory", "# default_trajectory");
     std::fs::write(folder.join("robot.toml"), text).unwrap();
     let robot = Robot::load(&folder).unwrap();
-    let mut point = robot.flexible(Modelling::default()).unwrap().operating_point().unwrap();
+    let mut point = robot.model(&Modelling::default()).unwrap().operating_point().unwrap();
     for at in PLACES {
         point.solve(&order(at), &Wrench::zeros()).unwrap();
         let angle = inspect(&robot, Some(&order(at)), None).unwrap().loops[0].transmission_angle;
@@ -150,7 +150,7 @@ fn motion_of(robot: &Robot, q: &[[f64; 4]]) -> Motion {
 #[test]
 fn a_motion_over_a_dead_point_or_out_of_reach_is_refused_with_time_and_loop() {
     let robot = palletiser();
-    let arm = robot.flexible(Modelling::default()).unwrap();
+    let arm = robot.model(&Modelling::default()).unwrap();
     let run = |q: &[[f64; 4]]| {
         let options = RunOptions { ignore_limits: true, ..RunOptions::default() };
         arm.simulate(motion_of(&robot, q), &options).map(|_| ()).unwrap_err().to_string()

@@ -266,7 +266,7 @@ fn every_stepper_swings_on_the_mounting_as_the_reference_does() {
     let robot = place
         .robot(&format!("{HEAD}[mounting]\nname = \"pedestal\"\nstiffness = [8e6, 8e6, 2e7, 4e6, 4e6, 5e6]\n{DAMPED}"));
     let motion = moving(&robot);
-    let arm = robot.flexible(Modelling::default()).unwrap();
+    let arm = robot.model(&Modelling::default()).unwrap();
     let run = |stepper: StepperKind, step_s: f64| {
         let options = RunOptions { stepper, step_s, log_rate_hz: 500.0, ..RunOptions::default() };
         arm.simulate(&motion, &options).unwrap_or_else(|e| panic!("{} {e}", stepper.name()))
@@ -303,8 +303,8 @@ fn every_stepper_swings_on_the_mounting_as_the_reference_does() {
         assert!((found.peak_m / alone.peak_m - 1.0).abs() < 1e-12, "{} {}", found.peak_m, alone.peak_m);
     }
     // The rigid twin, and robots with rigid links, have a rigid mounting.
-    let rigid = robot.flexible(Modelling { links: LinkModel::Rigid, ..Modelling::default() }).unwrap();
-    assert_eq!(rigid.flexible().springs.len(), 0);
+    let rigid = robot.model(&Modelling { links: LinkModel::Rigid, ..Modelling::default() }).unwrap();
+    assert_eq!(rigid.springs.len(), 0);
 }
 
 /// Truth, to first order: each spring with play deflects by its play and by its force over its
@@ -345,7 +345,7 @@ fn springs_with_play_deflect_by_their_play_and_their_force_over_stiffness() {
     }
     // No play is a mounting without the key.
     let none = place.robot(&text.replace(&format!("{play:?}"), &format!("{:?}", [0.0; 6])));
-    assert_eq!(none.flexible_robot().unwrap().springs.len(), 1);
+    assert_eq!(none.model(&Modelling::default()).unwrap().springs.len(), 1);
 
     let base = "<link name=\"base\">";
     let floor = format!(
@@ -373,7 +373,7 @@ fn a_base_that_rocks_within_its_play_moves_as_the_reference_says() {
          backlash = [0.0, 0.0, 0.0, 2e-5, 2e-5, 0.0]\n{DAMPED}"
     ));
     let motion = moving(&robot);
-    let arm = robot.flexible(Modelling::default()).unwrap();
+    let arm = robot.model(&Modelling::default()).unwrap();
     let run = |stepper: StepperKind, step_s: f64| {
         let options = RunOptions { stepper, step_s, log_rate_hz: 500.0, ..RunOptions::default() };
         arm.simulate(&motion, &options).unwrap_or_else(|e| panic!("{} {e}", stepper.name()))
@@ -434,7 +434,7 @@ fn what_makes_no_mounting_is_refused_with_what_was_found_and_expected() {
     std::fs::write(place.0.join("cell.urdf"), light_base()).unwrap();
     fails(&six, &["\"base\"", "no mass", "mass = 0.0"]);
     let robot = place.robot(&format!("{HEAD}[mounting]\n{six}mass = 0.0\n"));
-    assert_eq!(robot.flexible_robot().unwrap().model.n_elastic(), 6);
+    assert_eq!(robot.model(&Modelling::default()).unwrap().model.n_elastic(), 6);
     // Stiffness in N/mm is reported.
     place.robot(&format!("{HEAD}[mounting]\nstiffness = [2e5, 3e5, 4e5, 5e4, 6e4, 7e4]\nmass = 100.0\n"));
     let told = check(&place.0, None, &LoadOptions::default());
@@ -448,7 +448,7 @@ fn what_makes_no_mounting_is_refused_with_what_was_found_and_expected() {
 fn an_operating_point_on_springs_has_the_compliance_of_statics() {
     let place = Place::new("point");
     let robot = place.robot(&format!("{HEAD}[mounting]\nstiffness = {}\n", written(&coupled())));
-    let arm = robot.flexible(Modelling::default()).unwrap();
+    let arm = robot.model(&Modelling::default()).unwrap();
     let mut at = arm.operating_point().unwrap();
     for q in [[0.0, 0.0], [1.0, 0.7], [-1.2, -2.0]] {
         at.solve(&q, &Wrench::zeros()).unwrap();

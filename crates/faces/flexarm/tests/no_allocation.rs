@@ -8,7 +8,7 @@ fn poses_after_the_first_do_not_allocate() {
     let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../..");
     let robot = Robot::load(root.join("robots/kr210")).unwrap();
     for links in [LinkModel::Lumped, LinkModel::Modal] {
-        let arm = robot.flexible(Modelling { links, ..Modelling::default() }).unwrap();
+        let arm = robot.model(&Modelling { links, ..Modelling::default() }).unwrap();
         let mut at = arm.operating_point().unwrap();
         let mut sum = 0.0;
         let mut visit = |k: u32| {

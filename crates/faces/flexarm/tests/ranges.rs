@@ -4,7 +4,8 @@
 use std::path::{Path, PathBuf};
 
 use flexarm::{
-    Error, LoadOptions, Modelling, Motion, PayloadChange, Robot, RunOptions, Scenario, StepperKind, statics,
+    Description, Error, LoadOptions, Modelling, Motion, PayloadChange, Robot, RobotSource, RunOptions, Scenario,
+    StepperKind, statics,
 };
 use toml::de::{DeTable, DeValue};
 
@@ -48,7 +49,10 @@ gearbox = { stiffness = 1e4, damping = 1.0 }
 fn small(mimic: bool) -> Robot {
     let follows = if mimic { "<mimic joint=\"j1\" multiplier=\"-1\"/>" } else { "" };
     let urdf = ARM.replace("MIMIC", follows);
-    Robot::from_texts(FILE, &urdf, Path::new("small/robot.toml"), &LoadOptions::default()).unwrap()
+    let (path, options, description) =
+        (Path::new("small/robot.toml"), &LoadOptions::default(), Some(Description::Text(&urdf)));
+    let source = RobotSource { text: Some(FILE), description, ..RobotSource::new(path, options) };
+    source.load().unwrap().robot().clone()
 }
 
 fn run(robot: &Robot, payload: PayloadChange, stepper: StepperKind) -> Result<(), Error> {
@@ -56,7 +60,7 @@ fn run(robot: &Robot, payload: PayloadChange, stepper: StepperKind) -> Result<()
     let motion = Motion::from_samples(&[0.0, 0.02], &vec![0.3; 2 * n], robot).unwrap();
     let scenario = Scenario::new(motion).with_payload(payload);
     let options = RunOptions { step_s: 1e-3, stepper, ..RunOptions::default() };
-    robot.flexible(options.modelling)?.simulate(&scenario, &options).map(|_| ())
+    robot.model(&Modelling::default())?.simulate(&scenario, &options).map(|_| ())
 }
 
 #[test]

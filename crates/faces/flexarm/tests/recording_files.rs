@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
-use flexarm::{Error, Keep, LoadOptions, Motion, Outputs, Robot, RunOptions, RunRequest};
+use flexarm::{Error, Keep, LoadOptions, Modelling, Motion, Outputs, Robot, RunOptions, RunRequest};
 use flexarm_log::{RecordingFormat, RunHeader, START_NS, open_recording};
 
 struct Folder(PathBuf);
@@ -25,7 +25,7 @@ fn recorded(name: &str, options: &RunOptions) -> (Folder, RunHeader) {
     let mut under_way = |t: f64, _: f64| if t > 0.0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
     let request =
         RunRequest { outputs: Some(&outputs), progress: Some(&mut under_way), ..RunRequest::keeping(Keep::Figures) };
-    let end = robot.flexible(options.modelling).unwrap().simulate_with(&motion, options, request);
+    let end = robot.model(&Modelling::default()).unwrap().simulate_with(&motion, options, request);
     assert!(matches!(end, Err(Error::Interrupted { .. })), "{end:?}");
     let header = open_recording(&folder.0.join("run.mcap"), RecordingFormat::Mcap).unwrap().header().clone();
     (folder, header)

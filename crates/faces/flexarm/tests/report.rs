@@ -14,11 +14,21 @@ use flexarm_log::Trace;
 type Run = (Summary, Trace);
 
 fn run(robot: &str, trajectory: &str, options: &RunOptions, outputs: Option<&Outputs>) -> Run {
+    run_as(robot, trajectory, &Modelling::default(), options, outputs)
+}
+
+fn run_as(
+    robot: &str,
+    trajectory: &str,
+    modelling: &Modelling,
+    options: &RunOptions,
+    outputs: Option<&Outputs>,
+) -> Run {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../..");
     let robot = Robot::load_with(&root.join("robots").join(robot), &LoadOptions::default()).unwrap();
     let model = robot.rigid_model().unwrap();
     let motion = Motion::load_for(&root.join("trajectories").join(trajectory), &model).unwrap();
-    let arm = robot.flexible(options.modelling).unwrap();
+    let arm = robot.model(modelling).unwrap();
     let run = arm.simulate_with(&motion, options, RunRequest { outputs, ..RunRequest::keeping(Keep::Curves) }).unwrap();
     (run.summary, run.trace)
 }
@@ -207,7 +217,7 @@ fn a_run_without_a_twin_leaves_out_what_needs_one() {
 #[test]
 fn several_runs_lie_over_each_other() {
     let modelling = Modelling { links: LinkModel::Rigid, drives: DriveModel::Rigid, ..Modelling::default() };
-    let rigid = run("kr210", "pick_and_place.toml", &RunOptions { modelling, ..RunOptions::default() }, None);
+    let rigid = run_as("kr210", "pick_and_place.toml", &modelling, &RunOptions::default(), None);
     let fine = run("kr210", "pick_and_place.toml", &RunOptions { step_s: 2e-3, ..RunOptions::default() }, None);
     let runs = [("as it is", arm()), ("coarse <step>", &fine), ("rigid", &rigid)];
     let runs = runs.map(|(label, (summary, trace))| ReportRun { label, summary, trace });
@@ -266,7 +276,7 @@ fn a_study_says_how_far_its_runs_are_apart() {
 #[test]
 fn an_arm_on_its_twin_has_no_scale_and_no_peak() {
     let modelling = Modelling { links: LinkModel::Rigid, drives: DriveModel::Rigid, ..Modelling::default() };
-    let rigid = run("one_beam", "beam_swing.toml", &RunOptions { modelling, ..RunOptions::default() }, None);
+    let rigid = run_as("one_beam", "beam_swing.toml", &modelling, &RunOptions::default(), None);
     let page = page_of(&rigid);
     assert!(!page.contains("magnified") && !page.contains("data:image/png") && page.contains("nothing is flexible"));
     let data = data_of(&page);
@@ -360,7 +370,7 @@ fn the_files_of_a_run_are_written_and_not_overwritten() {
         let robot = Robot::load_with(&root.join("robots/one_beam"), &LoadOptions::default()).unwrap();
         let motion =
             Motion::load_for(&root.join("trajectories/beam_swing.toml"), &robot.rigid_model().unwrap()).unwrap();
-        let arm = robot.flexible(Modelling::default()).unwrap();
+        let arm = robot.model(&Modelling::default()).unwrap();
         let request = RunRequest { outputs: Some(&outputs), ..RunRequest::default() };
         let error = arm.simulate_with(&motion, &RunOptions::default(), request).unwrap_err();
         assert!(error.to_string().contains(name), "{error}");

@@ -4,7 +4,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use flexarm::{DriveKind, LinkModel, LoadOptions, Motion, Robot, Scenario};
+use flexarm::{DriveKind, LinkModel, LoadOptions, Modelling, Motion, Robot, Scenario};
 
 fn project(path: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../..").join(path)
@@ -86,7 +86,7 @@ fn every_example_of_a_robot_file_loads() {
         assert_eq!(robot.flexible_links.len(), block.matches("[[flexible_link]]").count() + under);
         assert_eq!(robot.drives.len(), block.matches("[[drive]]").count());
         assert_eq!(robot.rigid.balancers.len(), block.matches("[[balancer]]").count());
-        robot.flexible_robot().unwrap();
+        robot.model(&Modelling::default()).unwrap();
         modal += robot.flexible_links.iter().filter(|link| link.choices.model == LinkModel::Modal).count();
         torque += robot.drives.iter().filter(|drive| drive.kind == DriveKind::Torque).count();
     }

@@ -42,7 +42,7 @@ fn load(name: &str) -> (Robot, Motion) {
 }
 
 fn run(robot: &Robot, motion: &Motion, options: &RunOptions) -> Result<Summary, flexarm::Error> {
-    let run = robot.flexible(options.modelling)?.simulate_with(motion, options, RunRequest::keeping(Keep::Figures))?;
+    let run = robot.model(&Modelling::default())?.simulate_with(motion, options, RunRequest::keeping(Keep::Figures))?;
     Ok(run.summary)
 }
 
@@ -197,7 +197,7 @@ fn a_pose_in_degrees_is_asked_about_wherever_a_pose_is_given() {
 fn traced(name: &str) -> (Summary, Trace) {
     let (robot, motion) = load(name);
     let options = RunOptions::default();
-    let arm = robot.flexible(options.modelling).unwrap();
+    let arm = robot.model(&Modelling::default()).unwrap();
     let run = arm.simulate_with(&motion, &options, RunRequest::keeping(Keep::Curves)).unwrap();
     (run.summary, run.trace)
 }

@@ -2,6 +2,7 @@
 //! Richardson differences, with several longer steps, of runs of changed robots; refusals.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use flexarm::identify::{Effect, Parameter, link_directions, parameters, plant};
 use flexarm::sensitivity::{RunParameter, SensitivityRequest, error_slopes, pose_sensitivity, sensitivity};
@@ -12,10 +13,10 @@ fn place(what: &str) -> std::path::PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../..").join(what)
 }
 
-fn shipped(robot: &str, motion: &str) -> (Robot, Arm, Motion) {
+fn shipped(robot: &str, motion: &str) -> (Robot, Arc<Arm>, Motion) {
     let robot = Robot::load(place(&format!("robots/{robot}"))).unwrap();
     let motion = Motion::load(place(&format!("trajectories/{motion}.toml")), &robot).unwrap();
-    let arm = robot.flexible(Modelling::default()).unwrap();
+    let arm = robot.model(&Modelling::default()).unwrap();
     (robot, arm, motion)
 }
 
@@ -163,7 +164,13 @@ struct Written<'a> {
 impl Changed {
     /// Errors at all instants of a run, with a number of the robot file, or else of the motion
     /// file, changed by x.
-    fn errors(&self, motion: &str, run: &RunOptions, own: Option<&Written<'_>>, x: f64) -> Vec<f64> {
+    fn errors(
+        &self,
+        motion: &str,
+        (modelling, run): (&Modelling, &RunOptions),
+        own: Option<&Written<'_>>,
+        x: f64,
+    ) -> Vec<f64> {
         let motion = std::fs::read_to_string(place(&format!("trajectories/{motion}.toml"))).unwrap();
         let (mut robot, mut moved) = (self.text.clone(), motion);
         if let Some(Written { name, text: [before, number, after], .. }) = own {
@@ -185,19 +192,20 @@ impl Changed {
         std::fs::write(&path, moved).unwrap();
         let robot = Robot::load(&file).unwrap();
         let motion = Motion::load(&path, &robot).unwrap();
-        let found = error_slopes(&robot.flexible(run.modelling).unwrap(), &motion, run, &[], true).unwrap();
+        let found = error_slopes(&robot.model(modelling).unwrap(), &motion, run, &[], true).unwrap();
         found.errors.into_iter().flatten().collect()
     }
 
     /// Compares derivatives with differences of runs of changed files.
-    fn compare(&self, motion: &str, run: &RunOptions, all: &[Written<'_>]) {
+    fn compare(&self, motion: &str, modelling: Modelling, run: &RunOptions, all: &[Written<'_>]) {
         let file = self.folder.join("robot.toml");
         std::fs::write(&file, &self.text).unwrap();
         let robot = Robot::load(&file).unwrap();
         let motion_file = Motion::load(place(&format!("trajectories/{motion}.toml")), &robot).unwrap();
         let parameters = all.iter().map(|own| own.name.to_owned()).collect();
         let table = self.folder.join("slopes.csv");
-        let request = SensitivityRequest { run: run.clone(), parameters, table: Some(table.clone()), overwrite: true };
+        let request =
+            SensitivityRequest { modelling, run: run.clone(), parameters, table: Some(table.clone()), overwrite: true };
         let found = sensitivity(&robot, &motion_file, &request).unwrap();
         assert_eq!(found.parameters.len(), all.len());
         let table = std::fs::read_to_string(table).unwrap();
@@ -215,7 +223,7 @@ impl Changed {
                 1e-3
             };
             let slopes = rows.iter().flat_map(|row| row[first..first + 6].iter().map(|x| x / scale));
-            let truth = richardson(own.size, |x| self.errors(motion, run, Some(own), x));
+            let truth = richardson(own.size, |x| self.errors(motion, (&modelling, run), Some(own), x));
             let largest = truth.iter().fold(0.0f64, |m, x| m.max(x.abs()));
             let off = slopes.zip(&truth).fold(0.0f64, |m, (a, b)| m.max((a - b).abs()));
             eprintln!("{}: {:.1e} of {largest:.2e}", own.name, off / largest);
@@ -249,12 +257,12 @@ fn the_error_of_manutec_r3_under_servos_depends_on_the_numbers_of_its_files() {
         own("motion.joint_2", ["", "0.3490658503988659", ""], 1e-4),
     ];
     let modelling = Modelling { drives: DriveModel::Servo, ..Modelling::default() };
-    let run = RunOptions { modelling, ..RunOptions::default() };
-    manutec.compare("manutec_r3", &run, &all);
+    manutec.compare("manutec_r3", modelling, &RunOptions::default(), &all);
     let robot = Robot::load(manutec.folder.join("robot.toml")).unwrap();
     let motion = Motion::load(place("trajectories/manutec_r3.toml"), &robot).unwrap();
     let parameters = vec!["payload.mass".to_owned()];
-    let found = sensitivity(&robot, &motion, &SensitivityRequest { run, parameters, ..Default::default() }).unwrap();
+    let found =
+        sensitivity(&robot, &motion, &SensitivityRequest { modelling, parameters, ..Default::default() }).unwrap();
     let limited = found.caveats.iter().find(|caveat| caveat.code == "servo-limit").unwrap();
     assert!(limited.message.contains("joint_2") && limited.message.contains("first at 1.2"), "{}", limited.message);
 }
@@ -269,7 +277,7 @@ fn loops_and_modes_depend_on_the_numbers_of_their_files() {
         own("payload.mass", ["mass = ", "180.0", ","], 1.0),
         own("drive.joint_2.gearbox.stiffness", ["stiffness = ", "3.4e6", ","], 0.01),
     ];
-    Changed::of("palletiser", "loops").compare("palletise", &coarse, &all);
+    Changed::of("palletiser", "loops").compare("palletise", Modelling::default(), &coarse, &all);
     let modelling = Modelling { links: flexarm::LinkModel::Modal, ..Modelling::default() };
     let all = [
         own("payload.mass", ["mass = ", "150.0", ","], 0.5),
@@ -279,7 +287,7 @@ fn loops_and_modes_depend_on_the_numbers_of_their_files() {
     let mut kr210 = Changed::new("modes");
     let second = kr210.text.rfind("damping = { modal = 0.03 }").unwrap();
     kr210.text.replace_range(second.., &kr210.text[second..].replacen("0.03 }", "0.0300 }", 1));
-    kr210.compare("point_to_point", &RunOptions { modelling, ..coarse }, &all);
+    kr210.compare("point_to_point", modelling, &coarse, &all);
 }
 
 impl Drop for Changed {
@@ -314,7 +322,7 @@ fn a_factor_of_one_direction_in_the_robot_file_does_what_its_derivative_says() {
     assert!(error.contains("expected six positive numbers"), "{error}");
     let modal = Modelling { links: flexarm::LinkModel::Modal, ..Modelling::default() };
     let robot = robot_with("[1, 1, 1, 1, 1.25, 1]").unwrap();
-    let error = robot.flexible(modal).map(|_| ()).unwrap_err().to_string();
+    let error = robot.model(&modal).map(|_| ()).unwrap_err().to_string();
     assert!(error.contains("lumped link"), "{error}");
 }
 

@@ -63,8 +63,8 @@ impl Arm {
         let times: Vec<f64> = (0..=(1000.0 * seconds) as u32).map(|k| 1e-3 * f64::from(k)).collect();
         let angles: Vec<f64> = times.iter().map(|t| motion(*t)).collect();
         let motion = Motion::from_samples(&times, &angles, &robot).unwrap();
-        let options = RunOptions { modelling, ..RunOptions::default() };
-        let arm = robot.flexible(modelling).unwrap();
+        let options = RunOptions::default();
+        let arm = robot.model(&modelling).unwrap();
         arm.simulate(Scenario::new(motion), &options).unwrap()
     }
 }
@@ -152,7 +152,7 @@ fn stress_files_that_do_not_fit_are_refused_and_steppers_without_accelerations_s
     let motion = Motion::from_samples(&[0.0, 0.01], &[0.3, 0.3], &robot).unwrap();
     let scenario = Scenario::new(motion);
     let run =
-        |options: &RunOptions| Robot::load(&arm.folder)?.flexible(options.modelling)?.simulate(&scenario, options);
+        |options: &RunOptions| Robot::load(&arm.folder)?.model(&Modelling::default())?.simulate(&scenario, options);
     let spook = flexarm::STEPPERS.iter().find(|entry| entry.name == "spook").unwrap();
     let stepper: StepperKind = (spook.with)(&StepperOptions::default());
     let blind = run(&RunOptions { stepper, step_s: 1e-3, ..RunOptions::default() }).unwrap().summary;
@@ -271,8 +271,8 @@ fn gauges_of_a_live_arm_read_what_those_of_a_run_read() {
     for (name, modelling) in models() {
         let run = arm.record(|t| swing(t).0, 0.5, modelling);
         let gauge = run.columns.column("gauge").unwrap();
-        let options = RunOptions { modelling, ..RunOptions::default() };
-        let flexible = robot.flexible(modelling).unwrap();
+        let options = RunOptions::default();
+        let flexible = robot.model(&modelling).unwrap();
         let mut live = flexible.live(Some(&[0.3]), 1e-3, &options).unwrap();
         assert_eq!(live.gauge_channels(), run.columns.gauges);
         let scale = gauge.values.iter().skip(3).step_by(6).fold(0.0_f64, |most, x| most.max(x.abs()));
@@ -312,7 +312,7 @@ fn gauges_that_are_not_on_a_link_with_stress_are_refused_with_the_place() {
         std::fs::write(arm.folder.join("robot.toml"), format!("{file}\n{entries}")).unwrap();
         let robot = Robot::load(&arm.folder)?;
         let motion = Motion::from_samples(&[0.0, 0.01], &[0.3, 0.3], &robot).unwrap();
-        robot.flexible(Modelling::default())?.simulate(Scenario::new(motion), &RunOptions::default())
+        robot.model(&Modelling::default())?.simulate(Scenario::new(motion), &RunOptions::default())
     };
     let twice = gauge("a", "lower_arm", on, along);
     for (entries, said) in [

@@ -83,7 +83,7 @@ fn a_run_has_the_numbers_of_the_files_that_a_person_would_write() {
         let motion = Motion::load(root().join("trajectories/point_to_point.toml"), &robot).unwrap();
         let motion = motion.scaled(1.0 / speed, &robot.rigid_model().unwrap()).unwrap();
         let options = RunOptions { step_s: 0.004, ..RunOptions::default() };
-        let arm = robot.flexible(Modelling::default()).unwrap();
+        let arm = robot.model(&Modelling::default()).unwrap();
         let summary = arm.simulate(Scenario::new(motion), &options).unwrap().summary;
         let tcp = summary.tcp.unwrap();
         let expected = [

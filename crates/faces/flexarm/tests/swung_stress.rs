@@ -79,8 +79,8 @@ fn a_swung_beam_has_the_stress_of_a_dynamic_finite_element_run() {
     // Measured 3.3e-2, 3.8e-3 and 9.1e-4.
     let models = [("two parts", lumped(2), 0.04), ("five parts", lumped(5), 5e-3), ("ten modes", modal, 1.5e-3)];
     for (name, modelling, bound) in models {
-        let options = RunOptions { modelling, step_s: 1e-4, log_rate_hz: 1e4, ..RunOptions::default() };
-        let run = robot.flexible(modelling).unwrap().simulate(Scenario::new(motion.clone()), &options).unwrap();
+        let options = RunOptions { step_s: 1e-4, log_rate_hz: 1e4, ..RunOptions::default() };
+        let run = robot.model(&modelling).unwrap().simulate(Scenario::new(motion.clone()), &options).unwrap();
         let gauge = run.columns.column("gauge").unwrap();
         let width = run.columns.gauges.len();
         let mut off = 0.0_f64;

@@ -253,7 +253,7 @@ fn a_run_of_a_lift_balances_its_energy() {
     let joints: Vec<f64> = times.iter().flat_map(|t| [0.3 + 1.4 * ramp(*t), 0.8 * ramp(*t), 0.0]).collect();
     let motion = Motion::from_samples(&times, &joints, &robot).unwrap();
     let options = RunOptions { step_s: 5e-4, log_rate_hz: 2000.0, ..RunOptions::default() };
-    let arm = robot.flexible(Modelling::default()).unwrap();
+    let arm = robot.model(&Modelling::default()).unwrap();
     let summary = arm.simulate(Scenario::new(motion), &options).unwrap().summary;
     let energy = &summary.energy;
     eprintln!("{:?} peak {:?}", energy, summary.tcp.as_ref().map(|tcp| tcp.peak_m));

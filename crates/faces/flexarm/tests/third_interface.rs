@@ -118,7 +118,7 @@ fn a_joint_a_little_off_the_third_interface_hangs_on_it_all_the_same() {
     let place = Place::new("off", &branched(0.7));
     let sag = |at: f64| {
         let robot = place.robot(at, 3.0, "").unwrap();
-        assert!(robot.flexible_robot().unwrap().links_model() == "modal");
+        assert!(robot.model(&Modelling::default()).unwrap().links_model() == "modal");
         statics(&robot, &Modelling::default(), None, [0.0; 6]).unwrap().sag_m[2]
     };
     let (there, beside) = (sag(0.7), sag(0.702));

@@ -185,7 +185,7 @@ pub struct Rig {
 impl Rig {
     /// Creates a rig at a named frame of the robot, or at its TCP if `frame` is `None`.
     pub fn new(robot: &Robot, modelling: &Modelling, frame: Option<&str>) -> Result<Self, Error> {
-        let flexible = robot.modelled(modelling)?;
+        let flexible = robot.model(modelling)?;
         let joints = vec![0.0; flexible.model.n_actuated()];
         let arm = flexible.arm(Arc::new(Held(joints))).map_err(step_error)?;
         let name = frame.unwrap_or(TCP_FRAME);
@@ -332,7 +332,7 @@ pub fn tool_path(
         link.choices.geometric = stiffening;
         link.damping = Damping::StiffnessProportional(PATH_DAMPING_S);
     }
-    let arm = robot.modelled(modelling)?.arm(motion).map_err(step_error)?;
+    let arm = robot.model(modelling)?.arm(motion).map_err(step_error)?;
     let frame = arm.model.frame(TCP_FRAME).ok_or(Error::NoTool)?.clone();
     let mut stepper = new_stepper(ALPHA, arm.clone(), h, start).map_err(step_error)?;
     let mut seen = Observation::new(&arm);

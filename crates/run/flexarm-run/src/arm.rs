@@ -1,18 +1,22 @@
-//! A flexible robot, built once and used for many runs and operating points.
-//!
-//! [`Robot::flexible`] does the costly work (substitution, modes). Its result is immutable, `Send`
-//! and `Sync`, and shared by threads. Each query uses numbers and a workspace of its own.
+//! A robot with its links and drives modelled, built once and used for many runs and poses.
 
 use std::ops::ControlFlow;
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, OnceLock};
 
+use flexarm_flexlink::FlexibleSpan;
+use flexarm_kinematics::{Data, Frame, Model, mass_matrix};
 use flexarm_log::{Columns, Trace};
-use flexarm_stepping::{FlexibleArm, Held, Linear, OperatingPoint};
+use flexarm_stepping::{
+    FlexibleArm, Friction, GearCoupling, Held, Linear, OperatingPoint, PrescribedMotion, Servo, Spring, StepError,
+};
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
+use crate::bends::Bend;
 use crate::caveat::{Caveat, Use, of_use};
-use crate::error::Error;
-use crate::flexible::FlexibleRobot;
+use crate::drive_entry::ServoEntry;
+use crate::error::{Error, PoseError};
+use crate::gear_entry::GearLaws;
 use crate::joint_values::joint_values;
 use crate::options::{Modelling, RunOptions};
 use crate::posed::Posed;
@@ -21,19 +25,55 @@ use crate::run::{self, RunRequest};
 use crate::scenario::Scenario;
 use crate::summary::Summary;
 
-/// Joint positions of the last start (rad or m), with the arm at rest there.
-type LastStart = Arc<Mutex<Option<(Vec<f64>, Arc<FlexibleArm>)>>>;
-
-/// A robot with its flexible links and drives modelled.
-#[derive(Clone)]
+/// A robot with its flexible links and drives modelled: one tree with its springs.
+///
+/// [`Robot::model`] does the costly work (substitution, modes). The arm is immutable and shared by
+/// threads; each query uses numbers and a workspace of its own.
+#[derive(Clone, Debug)]
 pub struct Arm {
-    robot: Arc<Robot>,
-    modelling: Modelling,
-    flexible: Arc<FlexibleRobot>,
-    /// Result of [`Robot::caveats`].
-    caveats: Arc<[Caveat]>,
-    /// Joint values at the start of the last motion, and the arm in equilibrium there.
-    pub(crate) last_start: LastStart,
+    /// Robot from which the arm was built.
+    pub(crate) robot: Arc<Robot>,
+    pub(crate) modelling: Modelling,
+    /// Tree of the robot.
+    pub model: Arc<Model>,
+    /// Springs in coordinate order.
+    pub springs: Vec<Spring>,
+    /// Owner of each spring, in the same order.
+    pub owners: Vec<Owner>,
+    /// Frame of the TCP, on the body that carries it.
+    pub tcp: Frame,
+    /// Flexible links.
+    pub spans: Vec<FlexibleSpan>,
+    /// Data for drawing the deflected links, in the order of the spans.
+    pub bends: Vec<Bend>,
+    /// The same robot with rigid links and without gearboxes.
+    pub rigid: Arc<Model>,
+    /// Friction of each actuated coordinate.
+    pub(crate) friction: Vec<Friction>,
+    /// Gear effects other than elasticity.
+    pub(crate) gears: GearLaws,
+    /// Torque-driven joints: coordinate, servo, torque limit.
+    pub(crate) torque: Vec<(usize, ServoEntry, f64)>,
+    /// Caveats about the models of the links.
+    pub doubts: Vec<Caveat>,
+    /// Index in `spans` of the springs under the base; they are the last span.
+    pub(crate) mounting: Option<usize>,
+    /// Reach of the mass or of the TCP, used as a length scale (m).
+    pub(crate) extent: f64,
+    /// Messages about links modelled with modes although rigid parts were requested, with the
+    /// reason.
+    pub modal_instead: Vec<String>,
+    /// Result of [`Robot::caveats`], computed when it is first asked for.
+    pub(crate) robot_caveats: OnceLock<Vec<Caveat>>,
+}
+
+/// Owner of a spring.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Owner {
+    /// Flexible link or mounting; index into [`Arm::spans`].
+    Link(usize),
+    /// Drive; index into [`crate::Robot::drives`].
+    Drive(usize),
 }
 
 /// Results of a run.
@@ -67,56 +107,29 @@ impl Run {
     }
 }
 
-impl Robot {
-    /// Returns the robot with its links and drives modelled as requested.
-    ///
-    /// Cost: a few milliseconds for reading modes and substitution.
-    ///
-    /// # Errors
-    /// [`Error::Modelling`] if a link or drive has no such model, [`Error::Model`] if the result is
-    /// not a valid tree.
-    pub fn flexible(&self, modelling: Modelling) -> Result<Arm, Error> {
-        Ok(Arm::new(self.clone(), modelling, self.modelled(&modelling)?))
-    }
-}
-
 impl Arm {
-    /// Returns the arm of a robot that is already modelled.
-    ///
-    /// * `flexible`: result of [`Robot::modelled`] with the same `modelling`.
-    pub fn new(robot: Robot, modelling: Modelling, flexible: FlexibleRobot) -> Self {
-        let caveats = robot.caveats().into();
-        Self { robot: Arc::new(robot), modelling, flexible: Arc::new(flexible), caveats, last_start: Arc::default() }
-    }
-
     /// Returns the robot from which the arm was built.
     pub fn robot(&self) -> &Robot {
         &self.robot
     }
 
-    /// Returns the shared tree, springs and drives.
-    pub fn flexible(&self) -> &Arc<FlexibleRobot> {
-        &self.flexible
-    }
-
     /// Returns [`Robot::caveats`], computed once.
-    pub fn robot_caveats(&self) -> Arc<[Caveat]> {
-        self.caveats.clone()
+    pub fn robot_caveats(&self) -> &[Caveat] {
+        self.robot_caveats.get_or_init(|| self.robot.caveats())
     }
 
     /// Returns the caveats about the robot as modelled, and about its use by a command.
-    pub fn caveats(&self, used: Use<'_>) -> Vec<Caveat> {
-        of_use(&self.robot, &self.flexible, Some(&self.caveats), used)
+    pub fn caveats(self: &Arc<Self>, used: Use<'_>) -> Vec<Caveat> {
+        of_use(self, used)
     }
 
     /// Holds the arm at a pose; `at`: values of all actuated joints (rad or m), zero by default.
     ///
     /// # Errors
     /// [`Error::Pose`] for joint values that do not fit the arm.
-    pub fn posed(&self, at: Option<&[f64]>) -> Result<Posed, Error> {
-        let names: Vec<&str> = self.flexible.rigid.coordinates().iter().map(|c| c.joint.as_str()).collect();
-        let posed = Posed::with(self.flexible.clone(), joint_values(at, &names)?)?;
-        Ok(Posed { of_robot: Some(self.robot_caveats()), ..posed })
+    pub fn posed(self: &Arc<Self>, at: Option<&[f64]>) -> Result<Posed, Error> {
+        let names: Vec<&str> = self.rigid.coordinates().iter().map(|c| c.joint.as_str()).collect();
+        Posed::new(self.clone(), joint_values(at, &names)?)
     }
 
     /// Returns mass, damping and stiffness about the static equilibrium at a pose under gravity and
@@ -128,7 +141,7 @@ impl Arm {
     /// # Errors
     /// [`Error::Pose`] for joint values that do not fit, [`Error::Step`] if there is no
     /// equilibrium.
-    pub fn linearise(&self, at: Option<&[f64]>, wrench: [f64; 6]) -> Result<Linear, Error> {
+    pub fn linearise(self: &Arc<Self>, at: Option<&[f64]>, wrench: [f64; 6]) -> Result<Linear, Error> {
         self.posed(at)?.linear(&wrench.into())
     }
 
@@ -139,12 +152,12 @@ impl Arm {
 
     /// Returns the actuated joints, in the order of poses and motions.
     pub fn joints(&self) -> impl Iterator<Item = &str> {
-        let model = &self.flexible().model;
+        let model = &self.model;
         model.coordinates()[..model.n_actuated()].iter().map(|coordinate| coordinate.joint.as_str())
     }
 
     /// Runs a motion (`&motion`), or a motion with loads, payloads and a start condition
-    /// (`&scenario`), and returns figures and columns. The modelling in `options` is ignored.
+    /// (`&scenario`), and returns figures and columns.
     ///
     /// # Errors
     /// [`Error`]; [`Error::fault`] returns whether the input or the run is at fault.
@@ -166,8 +179,7 @@ impl Arm {
         options: &RunOptions,
         request: RunRequest<'_>,
     ) -> Result<Run, Error> {
-        let options = RunOptions { modelling: self.modelling, ..options.clone() };
-        run::simulate(self, &scenario.into(), &options, request)
+        run::simulate(self, &scenario.into(), options, request)
     }
 
     /// Runs all scenarios on all cores. Results are bitwise identical to [`Arm::simulate`], for any
@@ -194,8 +206,7 @@ impl Arm {
     /// [`Error::Step`] if a spring is not positive definite, or the arm has no equilibrium under
     /// gravity at the middle of its joint ranges.
     pub fn operating_point(&self) -> Result<OperatingPoint, Error> {
-        let flexible = self.flexible();
-        let model = &flexible.model;
+        let model = &self.model;
         // Any pose within the limits is suitable.
         let middle = |lower: f64, upper: f64| match (lower.is_finite(), upper.is_finite()) {
             (true, true) => 0.5 * (lower + upper),
@@ -210,7 +221,131 @@ impl Arm {
         };
         let actuated = &model.coordinates()[..model.n_actuated()];
         let pose = actuated.iter().map(|c| middle(c.limits.lower, c.limits.upper)).collect();
-        let arm = flexible.arm(Arc::new(Held(pose))).map_err(|error| flexible.explained(error))?;
-        Ok(OperatingPoint::new(arm, flexible.tcp.clone()))
+        let arm = self.arm(Arc::new(Held(pose))).map_err(|error| self.explained(error))?;
+        Ok(OperatingPoint::new(arm, self.tcp.clone()))
+    }
+
+    /// Returns the arm for the steppers, driven along a motion.
+    ///
+    /// # Errors
+    /// As [`FlexibleArm::new`] and [`FlexibleArm::with_servo`].
+    pub fn arm(&self, motion: Arc<dyn PrescribedMotion>) -> Result<FlexibleArm, StepError> {
+        self.arm_with(self.springs.clone(), motion)
+    }
+
+    /// As [`Self::arm`], with other springs in the same places; the laws of gears follow the
+    /// stiffness of their springs.
+    ///
+    /// # Errors
+    /// As [`Self::arm`].
+    pub fn arm_with(&self, springs: Vec<Spring>, motion: Arc<dyn PrescribedMotion>) -> Result<FlexibleArm, StepError> {
+        let mut arm = FlexibleArm::new(self.model.clone(), springs, motion)?;
+        if self.friction.iter().any(|f| *f != Friction::NONE) {
+            arm.friction.clone_from(&self.friction);
+        }
+        let stiffness: Vec<f64> = arm.elements.iter().map(|element| element.K[(0, 0)]).collect();
+        let arm = self.gears.put_into(arm, |k| stiffness[k] / self.springs[k].K[(0, 0)])?;
+        if self.torque.is_empty() {
+            return Ok(arm);
+        }
+        let n = self.rigid.nv();
+        let (mut q, mut v, mut a) = (DVector::zeros(n), DVector::zeros(n), DVector::zeros(n));
+        arm.motion.sample(0.0, q.as_mut_slice(), v.as_mut_slice(), a.as_mut_slice());
+        let axes = self.servo_axes(&q);
+        arm.with_servo(Servo { sample_s: self.sample_s(), axes, rigid: self.rigid.clone() })
+    }
+
+    /// Returns the coupling of motors that move several joints, if there is one.
+    pub fn gear_coupling(&self) -> Option<&GearCoupling> {
+        self.gears.coupling.as_ref()
+    }
+
+    /// Wraps an error; if the mass matrix is singular, adds the names of the links that lack
+    /// inertia.
+    pub fn explained(&self, source: StepError) -> Error {
+        let light = match source {
+            StepError::Singular { matrix: "mass matrix", .. } => self.without_inertia(),
+            _ => Vec::new(),
+        };
+        if light.is_empty() {
+            return Error::Step { source, partial: false };
+        }
+        PoseError::WithoutInertia { path: self.robot.urdf_path.clone(), source, links: light }.into()
+    }
+
+    /// Names the elastic bodies and torque-driven joints without inertia in some direction: rows of
+    /// the mass matrix that depend linearly on earlier rows.
+    fn without_inertia(&self) -> Vec<String> {
+        /// Threshold for the pivot relative to the diagonal entry; below it a row counts as
+        /// dependent.
+        const LEAST: f64 = 1e-13;
+        let (model, n) = (&self.model, self.model.n_actuated());
+        let M = mass_matrix(model, &mut Data::new(model), &DVector::zeros(model.nv())).clone();
+        let free: Vec<usize> = self.torque.iter().map(|t| t.0).chain(n..model.nv()).collect();
+        let mut L: DMatrix<f64> = DMatrix::zeros(free.len(), free.len());
+        let mut names: Vec<String> = Vec::new();
+        for (i, &row) in free.iter().enumerate() {
+            for j in 0..i {
+                let known: f64 = (0..j).map(|k| L[(i, k)] * L[(j, k)]).sum();
+                L[(i, j)] = if L[(j, j)] > 0.0 { (M[(row, free[j])] - known) / L[(j, j)] } else { 0.0 };
+            }
+            let left = M[(row, row)] - (0..i).map(|k| L[(i, k)].powi(2)).sum::<f64>();
+            if left > LEAST * M[(row, row)] {
+                L[(i, i)] = left.sqrt();
+                continue;
+            }
+            let group = model.elastic().iter().position(|g| (g.coordinate..g.coordinate + g.size).contains(&row));
+            let name = match group.map(|k| self.owners[k]) {
+                Some(Owner::Link(k)) => format!("link {:?}", self.spans[k].link),
+                Some(Owner::Drive(_)) => format!("link {:?}", model.bodies()[model.coordinates()[row].body].name),
+                None => format!("the body of the torque-driven joint {:?}", model.coordinates()[row].joint),
+            };
+            if !names.contains(&name) {
+                names.push(name);
+            }
+        }
+        names
+    }
+
+    /// Inertia that each torque-driven joint sees when all other free coordinates are free to
+    /// accelerate: `1 / (M_ff^-1)_ii`.
+    pub(crate) fn quick_inertia(&self, actuated: &DVector<f64>) -> Vec<f64> {
+        let (model, n) = (&self.model, self.model.n_actuated());
+        let mut q = DVector::zeros(model.nv());
+        q.rows_mut(0, n).copy_from(actuated);
+        let M = mass_matrix(model, &mut Data::new(model), &q).clone();
+        let free: Vec<usize> = self.torque.iter().map(|t| t.0).chain(n..model.nv()).collect();
+        let inverse = M.select_rows(&free).select_columns(&free).cholesky().map(|c| c.inverse());
+        (0..self.torque.len()).map(|i| inverse.as_ref().map_or(0.0, |inverse| 1.0 / inverse[(i, i)])).collect()
+    }
+
+    /// Returns the caveats about the models of the links.
+    pub fn link_caveats(&self) -> Vec<Caveat> {
+        let help = "write model = \"modal\" into the robot file";
+        let instead =
+            self.modal_instead.iter().map(|text| Caveat::from_message("third-interface", "links", text, help));
+        self.doubts.iter().cloned().chain(instead).collect()
+    }
+
+    /// Whether any joint is driven by torque.
+    pub fn has_servo(&self) -> bool {
+        !self.torque.is_empty()
+    }
+
+    /// Returns the coordinates of the torque-driven joints, with the torque limit of each (N m or
+    /// N).
+    pub fn servo_limits(&self) -> impl Iterator<Item = (usize, f64)> {
+        self.torque.iter().map(|(coordinate, _, limit)| (*coordinate, *limit))
+    }
+
+    /// Returns a name for the kind of link models: rigid, lumped, modal or mixed.
+    pub fn links_model(&self) -> &'static str {
+        let modal = self.model.elastic().iter().filter(|g| g.modal).count();
+        match (self.spans.len() - usize::from(self.mounting.is_some()), modal) {
+            (0, _) => "rigid",
+            (_, 0) => "lumped",
+            (n, m) if n == m => "modal",
+            _ => "mixed",
+        }
     }
 }

@@ -152,7 +152,7 @@ fn check_loads(robot: &Robot, motion: Option<&Motion>, path: &Path, findings: &m
         findings.push(Finding::error("loads", path.display().to_string(), &message));
         return;
     };
-    let acting = robot.flexible_robot().and_then(|flexible| {
+    let acting = robot.model(&Modelling::default()).and_then(|flexible| {
         Scenario::from(motion).with_loads_file(path).and_then(|scenario| scenario.acting_on(robot, &flexible.model))
     });
     match acting {
@@ -200,7 +200,7 @@ fn check_flexible(robot: &Robot, motion: Option<&Motion>, findings: &mut Vec<Fin
         findings.push(Finding { help, ..Finding::note("no-flexible-link", file.clone(), message.into()) });
     }
     let posed = standing_pose(robot, motion).and_then(|at| {
-        let posed = Posed::held(robot, &Modelling::default(), at)?;
+        let posed = Posed::new(robot.model(&Modelling::default())?, at)?;
         let linear = posed.linear(&Vector6::zeros())?;
         Ok((posed, linear))
     });
@@ -216,7 +216,7 @@ fn check_flexible(robot: &Robot, motion: Option<&Motion>, findings: &mut Vec<Fin
                 let message = format!("first frequencies {words} {:.2?} Hz", &hz[..hz.len().min(4)]);
                 findings.push(Finding::note("modes", file, message));
             }
-            let caveats = posed.flexible.caveats().into_iter().chain(posed.validity(robot, &linear));
+            let caveats = posed.flexible.link_caveats().into_iter().chain(posed.validity(&linear));
             findings.extend(caveats.map(|caveat| Finding::caveat(&robot.path, caveat)));
         }
     }

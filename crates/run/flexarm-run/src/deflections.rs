@@ -11,7 +11,6 @@ use rayon::prelude::*;
 
 use crate::arm::Arm;
 use crate::error::{Error, ValueError};
-use crate::flexible::FlexibleRobot;
 use crate::options::RunOptions;
 use crate::prepare::{loaded, runnable};
 use crate::scenario::Scenario;
@@ -65,7 +64,7 @@ impl Arm {
         keep_samples: bool,
         stop: &(dyn Fn() -> bool + Sync),
     ) -> Vec<Result<ToolDeflection, Error>> {
-        let flexible = self.flexible();
+        let flexible = self;
         let one = |run: &Variation| {
             if stop() {
                 return Err(Error::Interrupted { t: 0.0, partial: false });
@@ -87,7 +86,7 @@ impl Arm {
     /// Returns the arm of a run, with its factors and loads.
     fn varied(&self, run: &Variation, options: &RunOptions) -> Result<FlexibleArm, Error> {
         let scenario = &run.scenario;
-        let flexible = self.flexible();
+        let flexible = self;
         let springs = flexible.scaled_springs(run.stiffness, run.damping)?;
         runnable(&scenario.motion, options)?;
         crate::loops::along_motion(&flexible.rigid, &scenario.motion.trajectory)?;
@@ -97,7 +96,7 @@ impl Arm {
     }
 }
 
-impl FlexibleRobot {
+impl Arm {
     /// Returns the springs with scaled stiffness and damping.
     pub(crate) fn scaled_springs(&self, stiffness: f64, damping: f64) -> Result<Vec<Spring>, ValueError> {
         for (what, found) in [("stiffness", stiffness), ("damping", damping)] {

@@ -1,7 +1,5 @@
 //! Summary of the loaded robot, with its kinematics and dynamics at one pose.
 
-use std::sync::Arc;
-
 use flexarm_flexlink::{FlexibleSpan, LinkForm};
 use flexarm_kinematics::{
     Coordinate, Data, Link, Mechanism, Model, State, forward_kinematics_velocity, frame_jacobian, gravity_forces,
@@ -10,10 +8,10 @@ use flexarm_kinematics::{
 use nalgebra::{DMatrix, Matrix6xX, UnitQuaternion};
 use serde::Serialize;
 
+use crate::arm::Arm;
 use crate::balancer::{self, BalancerInfo};
-use crate::caveat::{self, Caveat, Use, of_use};
+use crate::caveat::{self, Caveat, Use};
 use crate::error::Error;
-use crate::flexible::FlexibleRobot;
 use crate::loops::{self, LoopInfo};
 use crate::mounting::RobotMounting;
 use crate::options::Modelling;
@@ -212,9 +210,9 @@ pub fn inspect(robot: &Robot, at: Option<&[f64]>, velocity: Option<&[f64]>) -> R
     all_finite("the place of the TCP and its Jacobian", X.translation.vector.iter().chain(&J))?;
     all_finite("the mass matrix and the torques", M.iter().chain(&gravity).chain(&bias))?;
 
-    let flexible = Arc::new(robot.flexible_robot()?);
+    let flexible = robot.model(&Modelling::default())?;
     // Only the rigid robot is inspected, so the caveat about missing elasticity does not apply.
-    let mut caveats = of_use(robot, &flexible, None, Use::Held(&q, &[0.0; 6]));
+    let mut caveats = flexible.caveats(Use::Held(&q, &[0.0; 6]));
     caveats.retain(|caveat| caveat.code != "nothing-yields");
     Ok(Inspection {
         robot: robot.name.clone(),
@@ -268,7 +266,7 @@ fn link_infos(mechanism: &Mechanism) -> Vec<LinkInfo> {
 }
 
 /// Describes the flexible links with the models that the robot file asks for.
-fn flexible_infos(robot: &Robot, flexible: &FlexibleRobot) -> Result<Vec<FlexibleInfo>, Error> {
+fn flexible_infos(robot: &Robot, flexible: &Arm) -> Result<Vec<FlexibleInfo>, Error> {
     let forms =
         robot.flexible_links.iter().map(|link| robot.form_of(link, &Modelling::default()).map(|(form, _)| form));
     let forms = forms.collect::<Result<Vec<_>, _>>()?;

@@ -5,12 +5,12 @@
 //!
 //! let robot = Robot::load("robots/kr210")?;
 //! let motion = Motion::load("trajectories/pick_and_place.toml", &robot)?;
-//! let run = robot.flexible(Modelling::default())?.simulate(&motion, &RunOptions::default())?;
+//! let run = robot.model(&Modelling::default())?.simulate(&motion, &RunOptions::default())?;
 //! println!("{}", run.summary.headline);
 //! # Ok::<(), flexarm_run::Error>(())
 //! ```
 //!
-//! [`Robot::load`] reads, [`Robot::flexible`] models links and drives, [`Arm::simulate`] runs a
+//! [`Robot::load`] reads, [`Robot::model`] models links and drives, [`Arm::simulate`] runs a
 //! [`Motion`] or a [`Scenario`]. [`statics()`], [`modes()`] and [`response()`] compute results at
 //! one pose, [`Arm::operating_point`] at many; [`mod@reduce`] converts a mesh to a flexible link.
 //! The study crates build on this crate; the crate `flexarm` re-exports all of them.
@@ -34,7 +34,6 @@ mod drive_entry;
 mod entry_checks;
 mod error;
 pub mod file_cache;
-mod flexible;
 mod gauge_entry;
 mod gear_entry;
 mod gearbox_entry;
@@ -89,7 +88,7 @@ pub mod tool_path;
 mod twin;
 
 pub use applied_load::AppliedLoad;
-pub use arm::{Arm, Run};
+pub use arm::{Arm, Owner, Run};
 pub use balancer::{BalancerEnds, BalancerInfo, RobotBalancer};
 pub use bends::Bend;
 pub use calibration_entry::Calibration;
@@ -104,7 +103,6 @@ pub use error::{
     PayloadError, PoseError, RecordingError, StudyError, ValueError,
 };
 pub use flexarm_linkmaker::Stopwatch;
-pub use flexible::{FlexibleRobot, Owner};
 pub use gauge_entry::Gauge;
 pub use gear_entry::{GearHysteresis, RobotCoupling};
 pub use guide_entry::GuideTilt;
@@ -132,7 +130,7 @@ pub use report::{
 pub use response::{
     PeakFigures, Response, ResponseCurve, ResponseFiles, ResponseOutputs, ResponseRequest, readable_unit, response,
 };
-pub use robot::{LoadOptions, Robot, TCP_FRAME};
+pub use robot::{Description, LoadOptions, Robot, RobotSource, TCP_FRAME};
 pub use robot_file::RobotFileError;
 pub use robot_link::{LinkChoices, RobotLink, StressSource};
 pub use run::{Keep, Progress, RunRequest, SampleObserver};

@@ -60,7 +60,8 @@ pub fn record_modes(
         |x: f64, otherwise: fn(f64) -> ValueError| if x > 0.0 && x < 1000.0 { Ok(()) } else { Err(otherwise(x)) };
     within(movie.seconds, ValueError::Seconds)?;
     movie.tool_motion_m.map_or(Ok(()), |x| within(x, ValueError::ToolMotion))?;
-    let posed = Posed::new(robot, modelling, at)?;
+    let arm = robot.model(modelling)?;
+    let posed = arm.posed(at)?;
     let model = ModeModel::new(&posed, speeds)?;
     let linear = &model.linear;
     let all = modes_of(linear)?;
@@ -73,8 +74,7 @@ pub fn record_modes(
     let mut files = recorders(Some(outputs), false)?;
     (files.names.report, files.names.report_md) = (None, None);
     let mut header = robot_header(robot, &posed.arm);
-    let flexible = robot.modelled(modelling)?;
-    let (bends, stations) = stations(&flexible.bends, &posed.arm.model, &header.links);
+    let (bends, stations) = stations(&arm.bends, &posed.arm.model, &header.links);
     header.bends = bends;
     header.color_scale_m = crate::magnification::round_up(motion);
     header.volume = Some(volume(&posed, motion));
@@ -96,7 +96,7 @@ pub fn record_modes(
     let figures = vec![("modes".into(), shown.len().to_string())];
     files.set.finish(&RunResult { figures, ..RunResult::default() })?;
     let names = files.names.clone();
-    let mut figures = table(robot, &posed, &model, &all, count)?;
+    let mut figures = table(&posed, &model, &all, count)?;
     figures.files = names;
     Ok(figures)
 }

@@ -1,7 +1,7 @@
 //! Models of a robot: the form of each flexible link, and all springs, gears and drives.
 
 use std::collections::HashMap;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use flexarm_flexlink::{
     BranchJoint, FlexibleLink, GearSpring, Gearbox, LinkForm, Parts, Substituted, SubstitutionError, branch_joints,
@@ -12,13 +12,13 @@ use flexarm_linkmaker::import::SECOND_ORDER_UNKNOWN;
 use flexarm_stepping::{Friction, GearCoupling, GeometricStiffness, Spring, SpringCurve};
 use nalgebra::{DMatrix, Vector3};
 
+use crate::arm::{Arm, Owner};
 use crate::bends::bends;
 use crate::caveat::Caveat;
 use crate::caveat::kinds;
 use crate::caveat::size::Size;
 use crate::drive_entry::{DriveKind, ServoEntry};
 use crate::error::{Error, ModellingError};
-use crate::flexible::{FlexibleRobot, Owner};
 use crate::gear_entry::{GearLaws, RobotCoupling};
 use crate::gearbox_entry::curves_with_play;
 use crate::guide_entry::guide_law;
@@ -33,28 +33,19 @@ const EULER_CHAIN: &str = "its chain has angles = \"euler-zyx\": where it bends 
                            converges with the number of parts, not with the square of it as with rotation vectors";
 
 impl Robot {
-    /// Returns the robot with its flexible links and drives as the file asks.
+    /// Returns the robot with its links and drives modelled.
     ///
-    /// # Errors
-    /// As [`Robot::modelled`].
-    pub fn flexible_robot(&self) -> Result<FlexibleRobot, Error> {
-        self.modelled(&Modelling::default())
-    }
-
-    /// Returns the robot with all links rigid and all joints prescribed, as an arm without springs.
-    ///
-    /// # Errors
-    /// [`Error::Model`].
-    pub fn rigid_robot(&self) -> Result<FlexibleRobot, Error> {
-        self.modelled(&Modelling { links: LinkModel::Rigid, drives: DriveModel::Rigid, ..Modelling::default() })
-    }
-
-    /// Returns the robot with its links and drives modelled as requested.
+    /// Cost: a few milliseconds for reading modes and substitution.
     ///
     /// # Errors
     /// [`Error::Modelling`] if a link or drive has no such model, [`Error::Model`] if the result is
     /// not a valid tree.
-    pub fn modelled(&self, modelling: &Modelling) -> Result<FlexibleRobot, Error> {
+    pub fn model(&self, modelling: &Modelling) -> Result<Arc<Arm>, Error> {
+        Arc::new(self.clone()).modelled(modelling).map(Arc::new)
+    }
+
+    /// As [`Robot::model`], without a copy of the robot.
+    pub(crate) fn modelled(self: Arc<Self>, modelling: &Modelling) -> Result<Arm, Error> {
         let ChosenLinks { links, doubts, modal_instead } = self.chosen_links(modelling)?;
         let mut substituted = substitute(&self.rigid, &links).map_err(ModellingError::from)?;
         let bends = bends(&substituted);
@@ -73,8 +64,7 @@ impl Robot {
         let (springs, owners) = in_coordinate_order(&model, owned)?;
         let (friction, torque) = self.actuation(&model, modelling.drives);
         let gears = self.gear_laws(&model, &owners);
-        Ok(FlexibleRobot {
-            path: self.urdf_path.clone(),
+        Ok(Arm {
             tcp: tcp_frame(&model),
             model: Arc::new(model),
             springs,
@@ -89,6 +79,9 @@ impl Robot {
             mounting,
             extent: Size::of(&self.urdf.mechanism).extent.max(self.tcp.1.translation.vector.norm()),
             modal_instead,
+            modelling: *modelling,
+            robot_caveats: OnceLock::new(),
+            robot: self,
         })
     }
 

@@ -1,6 +1,8 @@
 //! Natural modes at a pose, with drives locked, under their servos, or turning at constant speed:
 //! frequencies, damping, TCP motion and strain energy of the links.
 
+use std::sync::Arc;
+
 use flexarm_analysis::{
     DampedMode, LinearError, compliance_parts, damped_modes, effective_mass, mode_outputs, strain_energy_shares,
 };
@@ -147,7 +149,7 @@ pub fn modes(
     speeds: Option<&[f64]>,
     count: usize,
 ) -> Result<ModeTable, Error> {
-    lowest(robot, &Posed::new(robot, modelling, at)?, speeds, count)
+    lowest(&robot.model(modelling)?.posed(at)?, speeds, count)
 }
 
 impl Arm {
@@ -155,8 +157,13 @@ impl Arm {
     ///
     /// # Errors
     /// As [`modes()`].
-    pub fn modes(&self, at: Option<&[f64]>, speeds: Option<&[f64]>, count: usize) -> Result<ModeTable, Error> {
-        lowest(self.robot(), &self.posed(at)?, speeds, count)
+    pub fn modes(
+        self: &Arc<Self>,
+        at: Option<&[f64]>,
+        speeds: Option<&[f64]>,
+        count: usize,
+    ) -> Result<ModeTable, Error> {
+        lowest(&self.posed(at)?, speeds, count)
     }
 }
 
@@ -203,20 +210,15 @@ impl ModeModel {
     }
 }
 
-fn lowest(robot: &Robot, posed: &Posed, speeds: Option<&[f64]>, count: usize) -> Result<ModeTable, Error> {
+fn lowest(posed: &Posed, speeds: Option<&[f64]>, count: usize) -> Result<ModeTable, Error> {
     let model = ModeModel::new(posed, speeds)?;
     let all = modes_of(&model.linear)?;
-    table(robot, posed, &model, &all, count)
+    table(posed, &model, &all, count)
 }
 
 /// Computes the figures of the modes.
-pub(crate) fn table(
-    robot: &Robot,
-    posed: &Posed,
-    model: &ModeModel,
-    all: &[DampedMode],
-    count: usize,
-) -> Result<ModeTable, Error> {
+pub(crate) fn table(posed: &Posed, model: &ModeModel, all: &[DampedMode], count: usize) -> Result<ModeTable, Error> {
+    let robot = posed.flexible.robot();
     let linear = &model.linear;
     // Under servos the modes share the compliance of springs and servos; it does not exist if a
     // motor is free.
@@ -224,7 +226,7 @@ pub(crate) fn table(
         0 => linear.compliance().map_err(step_error)?.diagonal(),
         _ => linear.yielding_compliance().map_or_else(Vector6::zeros, |C| C.diagonal()),
     };
-    let mut caveats = posed.caveats_of(robot, linear, &[0.0; 6]);
+    let mut caveats = posed.caveats_of(linear, &[0.0; 6]);
     let worst = all.iter().map(|mode| mode.residual).fold(0.0, f64::max);
     if worst > 1e-6 {
         let message = format!("a mode has a relative residual of {worst:.1e}: its figures are inaccurate");

@@ -101,7 +101,7 @@ impl Arm {
             return Err(Error::Step { source: StepError::Setup(text), partial: false });
         }
         let start = self.operating_point()?;
-        let elastic = self.flexible().model.n_elastic();
+        let elastic = self.model.n_elastic();
         // Empty chunks would end the iteration: a rigid arm gets one column, dropped later.
         let mut found = OperatingPoints::with_room(poses.len() / joints, elastic.max(1));
         let rows = found

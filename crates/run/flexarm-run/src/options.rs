@@ -73,8 +73,6 @@ pub struct RunOptions {
     pub stepper: StepperKind,
     /// Step size (s).
     pub step_s: f64,
-    /// Link and drive models.
-    pub modelling: Modelling,
     /// Logged samples per second; rounded to a whole number of steps per sample.
     pub log_rate_hz: f64,
     /// Whether to run although the trajectory exceeds joint limits; violations become warnings.
@@ -99,7 +97,6 @@ impl Default for RunOptions {
         Self {
             stepper,
             step_s: stepper.entry().default_step_s,
-            modelling: Modelling::default(),
             log_rate_hz: 500.0,
             ignore_limits: false,
             with_twin: true,

@@ -8,20 +8,17 @@ use flexarm_settings::Quantity;
 use flexarm_stepping::{FlexibleArm, Held, Linear, OperatingPoint, StepError, linearise};
 use nalgebra::{DVector, Vector6};
 
+use crate::arm::Arm;
 use crate::balancer;
 use crate::caveat::pose::ArmAtRest;
 use crate::caveat::{Caveat, kinds, of_use, once_each, validity};
 use crate::error::{Error, PoseError, ValueError};
-use crate::flexible::FlexibleRobot;
-use crate::joint_values::joint_values;
 use crate::loops;
-use crate::options::Modelling;
-use crate::robot::Robot;
 
 /// Flexible arm with its drives locked at a pose.
 pub struct Posed {
     /// Robot with its links and drives as modelled.
-    pub flexible: Arc<FlexibleRobot>,
+    pub flexible: Arc<Arm>,
     /// Arm with its drives locked.
     pub arm: FlexibleArm,
     /// Frame of the TCP.
@@ -32,8 +29,6 @@ pub struct Posed {
     pub prismatic: Vec<bool>,
     /// Joint values (rad or m).
     pub at: Vec<f64>,
-    /// Result of [`Robot::caveats`], if already known.
-    pub(crate) of_robot: Option<Arc<[Caveat]>>,
 }
 
 /// Wraps a step error of a command that takes no steps.
@@ -49,21 +44,9 @@ pub fn check_wrench(wrench: &[f64]) -> Result<(), ValueError> {
 }
 
 impl Posed {
-    /// Poses a robot; `at`: values of all actuated joints (rad or m), zero by default.
-    pub fn new(robot: &Robot, modelling: &Modelling, at: Option<&[f64]>) -> Result<Self, Error> {
-        let model = robot.rigid_model()?;
-        let names: Vec<&str> = model.coordinates().iter().map(|c| c.joint.as_str()).collect();
-        let at = joint_values(at, &names)?;
-        Self::held(robot, modelling, at)
-    }
-
-    /// As [`Self::new`], with `at` in coordinate order (rad or m).
-    pub(crate) fn held(robot: &Robot, modelling: &Modelling, at: Vec<f64>) -> Result<Self, Error> {
-        Self::with(Arc::new(robot.modelled(modelling)?), at)
-    }
-
-    /// Poses a robot that is already modelled; `at` in coordinate order (rad or m).
-    pub fn with(flexible: Arc<FlexibleRobot>, at: Vec<f64>) -> Result<Self, Error> {
+    /// Holds an arm at a pose; `at` in coordinate order (rad or m). [`Arm::posed`] also accepts no
+    /// values.
+    pub fn new(flexible: Arc<Arm>, at: Vec<f64>) -> Result<Self, Error> {
         loops::check_pose(&flexible.rigid, &mut Data::new(&flexible.rigid), &DVector::from_column_slice(&at))?;
         balancer::check_pose(&flexible.rigid, &mut Data::new(&flexible.rigid), &DVector::from_column_slice(&at))?;
         let model = flexible.model.clone();
@@ -71,14 +54,14 @@ impl Posed {
         let joints: Vec<String> = actuated.iter().map(|c| c.joint.clone()).collect();
         let prismatic = actuated.iter().map(|c| c.slides()).collect();
         let arm = flexible.arm(Arc::new(Held(at.clone()))).map_err(|error| flexible.explained(error))?;
-        Ok(Self { tool: flexible.tcp.clone(), flexible, arm, joints, prismatic, at, of_robot: None })
+        Ok(Self { tool: flexible.tcp.clone(), flexible, arm, joints, prismatic, at })
     }
 
     /// Returns the caveats about the robot and its equilibrium under a wrench on the TCP (world
     /// axes).
-    pub fn caveats_of(&self, robot: &Robot, linear: &Linear, wrench: &[f64; 6]) -> Vec<Caveat> {
-        let mut caveats = of_use::of_model(robot, &self.flexible, self.of_robot.as_deref());
-        caveats.extend(of_use::at_rest(robot, self, linear, wrench));
+    pub fn caveats_of(&self, linear: &Linear, wrench: &[f64; 6]) -> Vec<Caveat> {
+        let mut caveats = of_use::of_model(&self.flexible);
+        caveats.extend(of_use::at_rest(self, linear, wrench));
         once_each(caveats)
     }
 
@@ -126,20 +109,20 @@ impl Posed {
 
     /// Checks whether the models are valid at an equilibrium: deflections of links, torques of
     /// drives.
-    pub(crate) fn validity(&self, robot: &Robot, linear: &Linear) -> Vec<Caveat> {
+    pub(crate) fn validity(&self, linear: &Linear) -> Vec<Caveat> {
         let links = self.flexible.spans.iter().zip(strains(&self.flexible, &self.arm, &linear.q));
         let links = links.flat_map(|(span, (strain, rotation))| validity::link(&span.link, rotation, strain));
         let holding = linear.holding.as_slice();
         let efforts = validity::efforts(&kinds::HOLDING, self.arm.model.coordinates(), holding);
-        links.chain(efforts).chain(self.standing(robot, linear)).collect()
+        links.chain(efforts).chain(self.standing(linear)).collect()
     }
 
     /// Returns the caveats about the arm at rest.
-    fn standing(&self, robot: &Robot, linear: &Linear) -> Vec<Caveat> {
+    fn standing(&self, linear: &Linear) -> Vec<Caveat> {
         let moved = linear.X_WT.translation.vector - self.rigid_tool().translation.vector;
         let elastic = &linear.q.as_slice()[self.arm.model.n_actuated()..];
         let (flexible, arm) = (&self.flexible, &self.arm);
-        ArmAtRest { robot, flexible, arm, elastic, sag_m: moved.norm() }.caveats()
+        ArmAtRest { flexible, arm, elastic, sag_m: moved.norm() }.caveats()
     }
 
     /// State with the joints at the pose and the elastic coordinates at zero.
@@ -156,7 +139,7 @@ fn undeformed(arm: &FlexibleArm) -> (Data, State) {
 }
 
 /// Engineering strain of each flexible link and rotation of its far end (rad), at coordinates `q`.
-pub(crate) fn strains(flexible: &FlexibleRobot, arm: &FlexibleArm, q: &DVector<f64>) -> Vec<(f64, f64)> {
+pub(crate) fn strains(flexible: &Arm, arm: &FlexibleArm, q: &DVector<f64>) -> Vec<(f64, f64)> {
     let model = &arm.model;
     let (mut data, straight) = undeformed(arm);
     let mut ends = |q: &DVector<f64>| -> Vec<Pose> {

@@ -1,9 +1,9 @@
 //! Checks the input of a run before its first step.
 
-use std::sync::{Arc, PoisonError};
+use std::sync::Arc;
 
 use flexarm_settings::Setting;
-use flexarm_stepping::{FlexibleArm, Load, PrescribedMotion, StepError, StepRule, Stepper, new_stepper};
+use flexarm_stepping::{FlexibleArm, Load, StepError, StepRule, Stepper, new_stepper};
 
 use crate::arm::Arm;
 use crate::balancer;
@@ -32,27 +32,12 @@ impl Arm {
     /// # Errors
     /// All errors in the input that can be found before a stepper is built.
     pub fn at_start(&self, scenario: &Scenario, options: &RunOptions) -> Result<(FlexibleArm, Vec<Caveat>), Error> {
-        let (motion, flexible) = (&scenario.motion, self.flexible());
+        let (motion, flexible) = (&scenario.motion, self);
         runnable(motion, options)?;
         loops::along_motion(&flexible.rigid, &motion.trajectory)?;
         balancer::check_motion(&flexible.rigid, &motion.trajectory)?;
-        let arm = self.in_equilibrium(motion.prescribed()).map_err(|error| flexible.explained(error))?;
+        let arm = self.arm(motion.prescribed()).map_err(|error| flexible.explained(error))?;
         loaded(self.robot(), scenario, options, arm)
-    }
-
-    /// As [`FlexibleRobot::arm`](crate::FlexibleRobot::arm). Reuses the last arm if the motion
-    /// starts at the same joint values, since modes and damping depend on nothing else.
-    fn in_equilibrium(&self, motion: Arc<dyn PrescribedMotion>) -> Result<FlexibleArm, StepError> {
-        let n = self.flexible().model.n_actuated();
-        let (mut q, mut v, mut a) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
-        motion.sample(0.0, &mut q, &mut v, &mut a);
-        let known = self.last_start.lock().unwrap_or_else(PoisonError::into_inner).clone();
-        if let Some((_, arm)) = known.filter(|(start, _)| *start == q) {
-            return Ok(arm.along(motion));
-        }
-        let arm = self.flexible().arm(motion)?;
-        *self.last_start.lock().unwrap_or_else(PoisonError::into_inner) = Some((q, Arc::new(arm.clone())));
-        Ok(arm)
     }
 
     /// Checks the whole input of a run and builds its stepper.
@@ -60,7 +45,7 @@ impl Arm {
         let (arm, load_caveats) = self.at_start(scenario, options)?;
         let arm = Arc::new(arm);
         let stepper = new_stepper(options.stepper, arm.clone(), options.step_s, scenario.start)
-            .map_err(|error| self.flexible().explained(error))?;
+            .map_err(|error| self.explained(error))?;
         Ok(Checked { arm, stepper, load_caveats })
     }
 
@@ -70,7 +55,7 @@ impl Arm {
     /// As [`Arm::simulate`], as far as errors are found before the first step.
     pub fn expected(&self, scenario: &Scenario, options: &RunOptions) -> Result<Expected, Error> {
         let arm = self.checked(scenario, options)?.arm;
-        Ok(Expected::of(&arm, &self.flexible().tcp, scenario.duration_s(), scenario.start))
+        Ok(Expected::of(&arm, &self.tcp, scenario.duration_s(), scenario.start))
     }
 }
 

@@ -9,6 +9,7 @@ use flexarm_log::{Attachment, CreateOptions, LinkInfo, LinkMesh, Recorder, Recor
 use flexarm_stepping::FlexibleArm;
 use flexarm_urdf::Geometry;
 
+use crate::arm::Arm;
 use crate::error::{Error, RecordingError};
 use crate::motion::Motion;
 use crate::options::{Outputs, RunOptions};
@@ -249,17 +250,12 @@ pub fn straight(path: &Path) -> String {
 }
 
 /// Builds the header of a run: everything that does not change over time.
-pub(crate) fn header(
-    robot: &Robot,
-    scenario: &Scenario,
-    options: &RunOptions,
-    arm: &FlexibleArm,
-    links_model: &str,
-) -> RunHeader {
+pub(crate) fn header(flexible: &Arm, scenario: &Scenario, options: &RunOptions, arm: &FlexibleArm) -> RunHeader {
+    let (robot, links_model) = (flexible.robot(), flexible.links_model());
     let frequencies: Vec<String> = arm.modes.frequencies_hz().iter().map(|f| format!("{f:.4}")).collect();
     RunHeader {
         trajectory: scenario.motion.name.clone(),
-        metadata: metadata(robot, scenario, options, arm, links_model, &frequencies),
+        metadata: metadata(flexible, scenario, options, arm, &frequencies),
         description: description(robot, &scenario.motion, options, links_model, &frequencies),
         has_rigid: options.with_twin,
         log_rate_hz: options.log_rate_hz,
@@ -272,13 +268,13 @@ pub(crate) fn header(
 
 /// Settings and inputs of the run, in groups of key-value pairs.
 fn metadata(
-    robot: &Robot,
+    flexible: &Arm,
     scenario: &Scenario,
     options: &RunOptions,
     arm: &FlexibleArm,
-    links_model: &str,
     frequencies: &[String],
 ) -> Vec<(String, Vec<(String, String)>)> {
+    let robot = flexible.robot();
     let motion = &scenario.motion;
     let group = |name: &str, rows: &[(&str, String)]| {
         (name.to_owned(), rows.iter().map(|(k, v)| ((*k).to_owned(), v.clone())).collect::<Vec<_>>())
@@ -296,8 +292,8 @@ fn metadata(
         ("trajectory_file", straight(&motion.path)),
     ];
     inputs.extend(scenario.loads_file.as_ref().map(|path| ("loads_file", straight(path))));
-    let drives = options.modelling.drives.word().unwrap_or(AS_FILED);
-    let links_choice = options.modelling.links.word().unwrap_or(AS_FILED);
+    let drives = flexible.modelling().drives.word().unwrap_or(AS_FILED);
+    let links_choice = flexible.modelling().links.word().unwrap_or(AS_FILED);
     let mut run = vec![
         ("version", env!("CARGO_PKG_VERSION").into()),
         ("robot", robot.name.clone()),
@@ -314,7 +310,7 @@ fn metadata(
         group(
             "flexarm.model",
             &[
-                ("links", links_model.into()),
+                ("links", flexible.links_model().into()),
                 ("links_choice", links_choice.into()),
                 ("drives", drives.into()),
                 ("elements", elements.join(", ")),

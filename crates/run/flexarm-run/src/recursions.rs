@@ -66,7 +66,7 @@ impl Robot {
 impl Arm {
     /// Returns the recursions of the tree with its elastic coordinates.
     pub fn recursions(&self) -> Recursions {
-        Recursions::new(self.flexible().model.clone())
+        Recursions::new(self.model.clone())
     }
 }
 

@@ -2,6 +2,7 @@
 //! at the TCP or per radian of a joint.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use flexarm_analysis::{
     LinearSystem, Quantity, Spacing, frequency_grid, resolved_response, response_peaks, with_resonances,
@@ -179,7 +180,7 @@ pub fn response(
     request: &ResponseRequest,
     outputs: Option<&ResponseOutputs>,
 ) -> Result<Response, Error> {
-    response_at(robot, Posed::new(robot, modelling, at)?, request, outputs)
+    response_at(robot.model(modelling)?.posed(at)?, request, outputs)
 }
 
 impl Arm {
@@ -187,17 +188,13 @@ impl Arm {
     ///
     /// # Errors
     /// As [`response()`].
-    pub fn response(&self, at: Option<&[f64]>, request: &ResponseRequest) -> Result<Response, Error> {
-        response_at(self.robot(), self.posed(at)?, request, None)
+    pub fn response(self: &Arc<Self>, at: Option<&[f64]>, request: &ResponseRequest) -> Result<Response, Error> {
+        response_at(self.posed(at)?, request, None)
     }
 }
 
-fn response_at(
-    robot: &Robot,
-    posed: Posed,
-    request: &ResponseRequest,
-    outputs: Option<&ResponseOutputs>,
-) -> Result<Response, Error> {
+fn response_at(posed: Posed, request: &ResponseRequest, outputs: Option<&ResponseOutputs>) -> Result<Response, Error> {
+    let robot = posed.flexible.robot();
     let inputs = input_channels(&request.inputs, &posed)?;
     let channels = output_channels(&request.outputs)?;
     if !POINTS.contains(&request.points) {
@@ -219,7 +216,7 @@ fn response_at(
     let transfer = Transfer::resolved(&system, request.quantity, &grid);
     system.check().map_err(linear_error)?;
     let curves = transfer.curves(&inputs, &channels);
-    let mut caveats = posed.caveats_of(robot, &linear, &[0.0; 6]);
+    let mut caveats = posed.caveats_of(&linear, &[0.0; 6]);
     let within = |k: &usize| damping_ratio[*k] < UNDAMPED && (from..=to).contains(&frequencies_hz[*k]);
     if let Some(k) = (0..modes.len()).find(within) {
         let hz = frequencies_hz[k];

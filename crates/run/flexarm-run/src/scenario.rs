@@ -35,7 +35,7 @@ use crate::robot::Robot;
 ///     .with_load(AppliedLoad::during("tcp", push, 1.0, 1.5)) // 200 N down for half a second
 ///     .with_payload(PayloadChange::attach(2.0, 80.0, [0.0, 0.0, 0.2].into()))
 ///     .with_payload(PayloadChange::release(6.0));
-/// let run = robot.flexible(Modelling::default())?.simulate(&scenario, &RunOptions::default())?;
+/// let run = robot.model(&Modelling::default())?.simulate(&scenario, &RunOptions::default())?;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug)]

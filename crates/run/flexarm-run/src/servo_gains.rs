@@ -4,8 +4,8 @@ use flexarm_kinematics::{Data, mass_matrix};
 use flexarm_stepping::ServoAxis;
 use nalgebra::DVector;
 
+use crate::arm::Arm;
 use crate::drive_entry::ServoEntry;
-use crate::flexible::FlexibleRobot;
 
 /// Default gain of the position loop (1/s), bandwidth of the velocity loop (1/s), ratio of integral
 /// to velocity gain (1/s), sampling period (s).
@@ -38,7 +38,7 @@ impl ServoInertia {
     }
 }
 
-impl FlexibleRobot {
+impl Arm {
     /// Returns the sampling period of the servos (s).
     pub(crate) fn sample_s(&self) -> f64 {
         self.torque.iter().find_map(|(_, servo, _)| servo.sample_s).unwrap_or(SERVO[3])

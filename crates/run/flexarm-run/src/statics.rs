@@ -2,6 +2,7 @@
 //! there.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use flexarm_analysis::tcp_error;
 use flexarm_kinematics::{forward_kinematics, frame_jacobian};
@@ -118,7 +119,7 @@ fn statics_of(
     outputs: Option<&StaticsOutputs>,
 ) -> Result<Statics, Error> {
     let paths = outputs.map(statics_picture::places).transpose()?;
-    statics_at(robot, Posed::new(robot, modelling, at)?, modelling, wrench, paths)
+    statics_at(robot.model(modelling)?.posed(at)?, wrench, paths)
 }
 
 impl Arm {
@@ -126,18 +127,13 @@ impl Arm {
     ///
     /// # Errors
     /// As [`statics()`].
-    pub fn statics(&self, at: Option<&[f64]>, wrench: [f64; 6]) -> Result<Statics, Error> {
-        statics_at(self.robot(), self.posed(at)?, self.modelling(), wrench, None)
+    pub fn statics(self: &Arc<Self>, at: Option<&[f64]>, wrench: [f64; 6]) -> Result<Statics, Error> {
+        statics_at(self.posed(at)?, wrench, None)
     }
 }
 
-fn statics_at(
-    robot: &Robot,
-    posed: Posed,
-    modelling: &Modelling,
-    wrench: [f64; 6],
-    paths: Option<[std::path::PathBuf; 2]>,
-) -> Result<Statics, Error> {
+fn statics_at(posed: Posed, wrench: [f64; 6], paths: Option<[std::path::PathBuf; 2]>) -> Result<Statics, Error> {
+    let robot = posed.flexible.robot();
     let X_rigid = posed.rigid_tool();
     let loaded = posed.linear(&wrench.into())?;
     // Identical bit for bit to the figures of a map at this pose.
@@ -151,8 +147,8 @@ fn statics_at(
     all_finite("the holding torques", &loaded.holding)?;
 
     let elements = element_statics(&posed, &loaded);
-    let stress = stress_at_rest(robot, &posed.flexible, &posed.arm, modelling, &loaded.q)?;
-    let mut caveats = posed.caveats_of(robot, &loaded, &wrench);
+    let stress = stress_at_rest(&posed.flexible, &posed.arm, &loaded.q)?;
+    let mut caveats = posed.caveats_of(&loaded, &wrench);
     caveats.extend(validity::stress(&stress));
     let [x, y, z, rx, ry, rz] = displacement;
     let [sx, sy, sz, srx, sry, srz] = sag;
@@ -178,7 +174,7 @@ fn statics_at(
         at: posed.at.clone(),
     };
     if let Some(paths) = paths {
-        statics_picture::save(&mut statics, paths, robot, &posed, &loaded)?;
+        statics_picture::save(&mut statics, paths, &posed, &loaded)?;
     }
     Ok(statics)
 }

@@ -16,7 +16,6 @@ use crate::magnification::Expected;
 use crate::posed::Posed;
 use crate::record::{link_frames, robot_header};
 use crate::response::pose_in_words;
-use crate::robot::Robot;
 use crate::statics::Statics;
 
 /// Files in the output folder: picture, figures.
@@ -52,14 +51,8 @@ pub(crate) fn places(outputs: &StaticsOutputs) -> Result<[PathBuf; 2], Error> {
 }
 
 /// Writes the files; a failed picture gives a warning.
-pub(crate) fn save(
-    statics: &mut Statics,
-    paths: [PathBuf; 2],
-    robot: &Robot,
-    posed: &Posed,
-    loaded: &Linear,
-) -> Result<(), Error> {
-    let (header, sample) = scene(robot, posed, loaded);
+pub(crate) fn save(statics: &mut Statics, paths: [PathBuf; 2], posed: &Posed, loaded: &Linear) -> Result<(), Error> {
+    let (header, sample) = scene(posed, loaded);
     let picture = match draw(&header, &sample, statics, &posed.prismatic) {
         Ok(png) => Some(png),
         Err(why) => {
@@ -111,7 +104,8 @@ fn lines(s: &Statics, slides: &[bool]) -> Vec<String> {
 }
 
 /// Sample of the deflected arm next to the rigid one.
-fn scene(robot: &Robot, posed: &Posed, loaded: &Linear) -> (RunHeader, Sample) {
+fn scene(posed: &Posed, loaded: &Linear) -> (RunHeader, Sample) {
+    let robot = posed.flexible.robot();
     let model = &posed.arm.model;
     let mut header = robot_header(robot, &posed.arm);
     let (bends, stations) = stations(&posed.flexible.bends, model, &header.links);

@@ -3,6 +3,7 @@
 
 use std::collections::BTreeSet;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use flexarm_log::{Recorder, RecordingFormat, StudyRecorder, Trace};
 
@@ -12,7 +13,6 @@ use crate::error::{Error, StudyError};
 use crate::magnification::{Expected, fit_color_scale};
 use crate::options::{Outputs, RunOptions};
 use crate::record::{files_of_a_run, refuse_to_overwrite};
-use crate::robot::Robot;
 use crate::run::{Keep, Progress, RunRequest};
 use crate::scenario::Scenario;
 use crate::summary::Summary;
@@ -22,8 +22,8 @@ use crate::summary::Summary;
 pub struct Variant {
     /// Label in tables, plots and folder names.
     pub label: String,
-    /// Robot of the run.
-    pub robot: Robot,
+    /// Arm of the run.
+    pub arm: Arc<Arm>,
     /// Scenario of the run.
     pub scenario: Scenario,
     /// Options of the run.
@@ -67,11 +67,11 @@ pub fn compare_study(
                 .without(RecordingFormat::Rrd),
         })
     };
-    let (arms, expected) = checked_arms(variants, own_outputs)?;
+    let expected = expected_deflections(variants, own_outputs)?;
     let recording = StudyRecording::new(variants, outputs);
     let mut summaries = Vec::new();
     let mut traces: Vec<(String, Trace)> = Vec::new();
-    for (number, (variant, arm)) in variants.iter().zip(&arms).enumerate() {
+    for (number, variant) in variants.iter().enumerate() {
         let own = own_outputs(number);
         if number > 0 {
             options = RunOptions { magnification: main.options.magnification, ..variant.options.clone() };
@@ -85,7 +85,7 @@ pub fn compare_study(
             expected: Some(expected),
             ..RunRequest::keeping(Keep::Curves)
         };
-        let run = arm.simulate_with(&variant.scenario, &options, request);
+        let run = variant.arm.simulate_with(&variant.scenario, &options, request);
         let Run { mut summary, trace, .. } = run.map_err(|error| variant.named(error))?;
         before += variant.scenario.duration_s();
         summary.label = Some(variant.label.clone());
@@ -105,22 +105,20 @@ pub fn compare_study(
     Ok((summary, traces))
 }
 
-/// Returns the arms of the variants and the largest expected deflections.
+/// Returns the largest expected deflections of the variants.
 ///
 /// These are all checks that need no simulation: errors appear before minutes of running.
-fn checked_arms(
+fn expected_deflections(
     variants: &[Variant],
     own_outputs: impl Fn(usize) -> Option<Outputs>,
-) -> Result<(Vec<Arm>, Expected), Error> {
-    let (mut expected, mut arms) = (Expected::default(), Vec::new());
+) -> Result<Expected, Error> {
+    let mut expected = Expected::default();
     for (number, variant) in variants.iter().enumerate() {
-        let Variant { robot, scenario, options, .. } = variant;
-        let arm = robot.flexible(options.modelling).map_err(|error| variant.named(error))?;
+        let Variant { arm, scenario, options, .. } = variant;
         expected = expected.or(arm.expected(scenario, options).map_err(|error| variant.named(error))?);
-        arms.push(arm);
         own_outputs(number).as_ref().map_or(Ok(()), refuse_to_overwrite)?;
     }
-    Ok((arms, expected))
+    Ok(expected)
 }
 
 /// Maximum length of a run's folder name.

@@ -20,7 +20,7 @@ use crate::small_robots::two_joints;
 /// The robot of two joints with these drives, at rest.
 fn two_drives(drives: &str) -> FlexibleArm {
     let robot = two_joints(drives).unwrap();
-    robot.flexible(Modelling::default()).unwrap().flexible().arm(Arc::new(Held(vec![0.0; 2]))).unwrap()
+    robot.model(&Modelling::default()).unwrap().arm(Arc::new(Held(vec![0.0; 2]))).unwrap()
 }
 
 #[test]
@@ -124,7 +124,7 @@ fn a_gearbox_of_six_coordinates_is_judged_by_its_rotations() {
         "[[drive]]\njoint = \"a\"\nkind = \"gearbox\"\ngearbox = { stiffness = [1e6, 1e6, 1e6, 1e4, 1e4, 1e4] }\n";
     let one = "[[drive]]\njoint = \"b\"\nkind = \"gearbox\"\ngearbox = { stiffness = 1e4 }\n";
     let robot = two_joints(&format!("{six}{one}")).unwrap();
-    let flexible = robot.flexible(Modelling::default()).unwrap().flexible().clone();
+    let flexible = robot.model(&Modelling::default()).unwrap().clone();
     let arm = flexible.arm(Arc::new(Held(vec![0.0; 2]))).unwrap();
     let mut seen = Deflections::new(&arm, &flexible, 3);
     let q = |six: [f64; 6], one: f64| {
@@ -232,8 +232,8 @@ struct Beam {
 impl Beam {
     fn new() -> Self {
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../..");
-        let arm = Robot::load(root.join("robots/one_beam")).unwrap().flexible(Modelling::default()).unwrap();
-        let (flexible, model) = (arm.flexible(), &arm.flexible().model);
+        let arm = Robot::load(root.join("robots/one_beam")).unwrap().model(&Modelling::default()).unwrap();
+        let (flexible, model) = (&*arm, &arm.model);
         let span = &flexible.spans[0];
         let end = |link: &str, X_LI: Pose| {
             let frame = model.frame(link).unwrap();

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use flexarm_run::{Error, LoadOptions, Robot};
+use flexarm_run::{Description, Error, LoadOptions, Robot, RobotSource};
 
 const TWO_JOINTS: &str = r#"<robot name="two">
   <link name="base"/>
@@ -26,7 +26,10 @@ const LIFT: &str = r#"<robot name="lift">
 
 fn load(urdf: &str, tcp: &str, text: &str) -> Result<Robot, Error> {
     let text = format!("format = 1\nurdf = \"arm.urdf\"\ntcp = {{ link = \"{tcp}\" }}\n{text}");
-    Robot::from_texts(&text, urdf, Path::new("robot.toml"), &LoadOptions::default())
+    let (path, options, description) =
+        (Path::new("robot.toml"), &LoadOptions::default(), Some(Description::Text(urdf)));
+    let source = RobotSource { text: Some(&text), description, ..RobotSource::new(path, options) };
+    source.load().map(|arm| arm.robot().clone())
 }
 
 /// Two joints `a` and `b` about z, with effort limits of 10 and 5 N m.

@@ -255,7 +255,7 @@ pub fn lobes(
     if let CuttingPlace::Along(motion, _) = place {
         answer.caveats = of_use::of_motion(motion, &*robot.rigid_model()?);
     }
-    answer.caveats.extend(places.iter().flat_map(|place| place.caveats(robot)));
+    answer.caveats.extend(places.iter().flat_map(CutPose::caveats));
     answer.caveats = caveat::once_each(std::mem::take(&mut answer.caveats));
     answer.caveats.extend(caveats::tool_caveats(tool));
     answer.warnings = caveat::warnings(&answer.caveats);

@@ -1,7 +1,6 @@
 //! Compliance of arm and tool at the cutter at one pose: poles in the axes of the cut.
 
 use std::f64::consts::TAU;
-use std::sync::Arc;
 
 use crate::milling::{Mode, Structure};
 use flexarm_kinematics::{Data, forward_kinematics};
@@ -51,7 +50,7 @@ impl CutPose {
         tool: &CuttingTool,
         at: Option<&[f64]>,
     ) -> Result<Self, Error> {
-        Self::new(Posed::new(robot, modelling, at)?, tool, None, None)
+        Self::new(robot.model(modelling)?.posed(at)?, tool, None, None)
     }
 
     /// Returns places along a motion, at equal intervals of time, where the tool moves across its
@@ -82,7 +81,7 @@ impl CutPose {
             let X_WT = data.X_WF(&frame);
             (X_WT.transform_point(&tool.tip.into()).coords, tool.axis.in_world(&X_WT.rotation))
         };
-        let flexible = Arc::new(robot.modelled(modelling)?);
+        let flexible = robot.model(modelling)?;
         let (mut places, mut left_out) = (Vec::new(), 0);
         for k in 0..n {
             let t = trajectory.duration() * (k as f64 + 0.5) / n as f64;
@@ -93,7 +92,7 @@ impl CutPose {
                 left_out += 1;
                 continue;
             }
-            let posed = Posed::with(flexible.clone(), sample(t))?;
+            let posed = Posed::new(flexible.clone(), sample(t))?;
             places.push(Self::new(posed, tool, Some(t), Some(velocity / velocity.norm()))?);
         }
         if places.is_empty() { Err(LobesError::NoFeed.into()) } else { Ok((places, left_out)) }
@@ -145,8 +144,8 @@ impl CutPose {
     }
 
     /// Returns the caveats about the robot and its pose.
-    pub(super) fn caveats(&self, robot: &Robot) -> Vec<Caveat> {
-        self.posed.caveats_of(robot, &self.linear, &[0.0; 6])
+    pub(super) fn caveats(&self) -> Vec<Caveat> {
+        self.posed.caveats_of(&self.linear, &[0.0; 6])
     }
 }
 

@@ -1,5 +1,7 @@
 //! Caveats of a compensation.
 
+use std::sync::Arc;
+
 use flexarm_trajectory::Extreme;
 
 use super::job::{Commands, Discarded};
@@ -75,9 +77,9 @@ fn discarded_caveat(answer: &Compensation, discarded: &[Discarded]) -> Option<Ca
 }
 
 /// Caveat about saturated servos of the plant: commands cannot compensate for missing torque.
-pub(super) fn of_servos(plant: &Arm, efforts: &[Extreme]) -> Option<Caveat> {
+pub(super) fn of_servos(plant: &Arc<Arm>, efforts: &[Extreme]) -> Option<Caveat> {
     let joints: Vec<&str> = plant.joints().collect();
-    let at_limit = plant.flexible().servo_limits().filter_map(|(k, limit)| {
+    let at_limit = plant.servo_limits().filter_map(|(k, limit)| {
         let worst = efforts.get(k).filter(|worst| worst.value.abs() >= AT_LIMIT * limit)?;
         Some(format!("{} ({limit:.1} N m or N at {:.3} s)", joints.get(k)?, worst.time_s))
     });

@@ -1,6 +1,7 @@
 //! Files of a compensation: the new motion, the page, the recording of the arm before and after.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use flexarm_files::{check_apart, check_free, write_all};
 use flexarm_log::RecordingFormat;
@@ -51,7 +52,7 @@ impl Files {
     pub(super) fn program(
         &self,
         robot: &Robot,
-        arm: &Arm,
+        arm: &Arc<Arm>,
         scenario: &Scenario,
         request: &CompensateRequest,
         answer: &mut Compensation,
@@ -90,7 +91,7 @@ impl Files {
     pub(super) fn write(
         &self,
         answer: &mut Compensation,
-        arm: &Arm,
+        arm: &Arc<Arm>,
         found: &MotionPair,
         program: Option<Corrected>,
         request: &CompensateRequest,

@@ -38,7 +38,7 @@ const ENOUGH: f64 = 1e-5;
 
 /// A motion on the model, with the desired TCP poses.
 pub(super) struct Job<'a> {
-    arm: &'a Arm,
+    arm: &'a Arc<Arm>,
     request: &'a CompensateRequest,
     /// The motion with its loads and payloads.
     scenario: &'a Scenario,
@@ -90,7 +90,7 @@ pub(super) struct Discarded {
 
 impl<'a> Job<'a> {
     pub(super) fn new(
-        arm: &'a Arm,
+        arm: &'a Arc<Arm>,
         scenario: &'a Scenario,
         request: &'a CompensateRequest,
         stop: Stop<'a>,
@@ -180,12 +180,12 @@ impl<'a> Job<'a> {
     }
 
     /// Runs a motion on an arm, with the loads of the scenario.
-    pub(super) fn seen(&self, arm: &Arm, run: &RunOptions, motion: &Motion) -> Result<RunResult, Error> {
+    pub(super) fn seen(&self, arm: &Arc<Arm>, run: &RunOptions, motion: &Motion) -> Result<RunResult, Error> {
         self.seen_until(arm, run, motion, 0)
     }
 
     /// Runs a motion that is held at its end for `beyond` more samples.
-    fn seen_until(&self, arm: &Arm, run: &RunOptions, motion: &Motion, beyond: usize) -> Result<RunResult, Error> {
+    fn seen_until(&self, arm: &Arc<Arm>, run: &RunOptions, motion: &Motion, beyond: usize) -> Result<RunResult, Error> {
         let options =
             RunOptions { log_rate_hz: 1.0 / self.step_s(), with_twin: false, ignore_limits: true, ..run.clone() };
         let mut progress = |_, _| if (self.stop)() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
@@ -252,7 +252,7 @@ impl<'a> Job<'a> {
     /// Returns the arm held at the start of the motion: servo gains and damping of a run are those
     /// of its start.
     fn at_start(&self) -> Result<FlexibleArm, Error> {
-        let flexible = self.arm.flexible();
+        let flexible = self.arm;
         let held = Held(self.q.column(0).iter().copied().collect());
         let arm = flexible.arm(Arc::new(held)).map_err(|error| flexible.explained(error))?;
         let mut axes = arm.servo.iter().flat_map(|servo| &servo.axes);
@@ -267,7 +267,7 @@ impl<'a> Job<'a> {
 
     /// Linearises the arm at a time of the motion, with the motors of servos free.
     fn node(&self, start: &FlexibleArm, t: f64) -> Result<Node, Error> {
-        let (flexible, m) = (self.arm.flexible(), self.q.nrows());
+        let (flexible, m) = (self.arm, self.q.nrows());
         let (mut q, mut v, mut a) = (vec![0.0; m], vec![0.0; m], vec![0.0; m]);
         self.motion.trajectory.sample(t, &mut q, &mut v, &mut a);
         let servo = start.servo.as_ref().map(|servo| controllers(servo, &q, &start.friction));
@@ -356,7 +356,7 @@ impl<'a> Job<'a> {
     /// Corrects each node to its static equilibrium, with a cubic spline between the nodes.
     pub(super) fn at_rest(&self) -> Result<Commands, Error> {
         let (m, N) = self.q.shape();
-        let (flexible, arm) = (self.arm.flexible(), self.at_start()?);
+        let (flexible, arm) = (self.arm, self.at_start()?);
         let end = self.scenario.duration_s();
         let loads = self.scenario.loads.iter().map(|load| averaged(load, end, |_| None)).collect();
         let scenario = Scenario { loads, ..self.scenario.clone() };

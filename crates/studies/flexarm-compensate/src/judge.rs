@@ -1,5 +1,7 @@
 //! Evaluation of commands on a plant: the model itself, another robot, or perturbed plants.
 
+use std::sync::Arc;
+
 use flexarm_flexlink::GearStiffness;
 use flexarm_trajectory::Extreme;
 use rayon::prelude::*;
@@ -26,18 +28,18 @@ pub(super) struct PlantResult {
 
 /// A plant on which commands are evaluated.
 pub(super) struct Judge {
-    pub(super) arm: Arm,
+    pub(super) arm: Arc<Arm>,
     pub(super) run: RunOptions,
 }
 
 impl Judge {
     /// Returns the plant of the request, which must have the same joints, or the arm itself.
-    pub(super) fn of(request: &CompensateRequest, arm: &Arm) -> Result<Self, Error> {
+    pub(super) fn of(request: &CompensateRequest, arm: &Arc<Arm>) -> Result<Self, Error> {
         let Some((_, plant)) = &request.plant else {
             return Ok(Self { arm: arm.clone(), run: request.run.clone() });
         };
-        let judge = Self { arm: plant.flexible(Modelling::default())?, run: request.run.clone() };
-        let names = |arm: &Arm| arm.joints().map(str::to_owned).collect::<Vec<_>>();
+        let judge = Self { arm: plant.model(&Modelling::default())?, run: request.run.clone() };
+        let names = |arm: &Arc<Arm>| arm.joints().map(str::to_owned).collect::<Vec<_>>();
         let (found, expected) = (names(&judge.arm), names(arm));
         if found != expected {
             return Err(CompensateError::OtherJoints { found, expected }.into());
@@ -88,17 +90,17 @@ pub(super) fn sweep(
     robot: &Robot,
     request: &CompensateRequest,
     job: &Job<'_>,
-    arm: &Arm,
+    arm: &Arc<Arm>,
     found: &Motion,
 ) -> Result<Vec<PlantFigures>, Error> {
-    let modelling = request.run.modelling;
+    let modelling = request.modelling;
     let mut plants: Vec<(String, Robot, Modelling)> = vec![
         ("stiffness 30 % lower".into(), changed(robot, 0.7, 1.0), modelling),
         ("stiffness 30 % higher".into(), changed(robot, 1.3, 1.0), modelling),
         ("damping halved".into(), changed(robot, 1.0, 0.5), modelling),
     ];
-    let links = !arm.flexible().spans.is_empty();
-    if links && arm.flexible().springs.len() > arm.flexible().spans.len() {
+    let links = !arm.spans.is_empty();
+    if links && arm.springs.len() > arm.spans.len() {
         plants.push(("only drives elastic".into(), robot.clone(), Modelling { links: LinkModel::Rigid, ..modelling }));
         plants.push((
             "only links flexible".into(),
@@ -108,7 +110,7 @@ pub(super) fn sweep(
     }
     let as_it_is = job.as_it_is()?;
     let judged = plants.into_par_iter().map(|(plant, robot, modelling)| {
-        let judge = Judge { arm: robot.flexible(modelling)?, run: RunOptions { modelling, ..request.run.clone() } };
+        let judge = Judge { arm: robot.model(&modelling)?, run: request.run.clone() };
         let (before, after) = (judge.figures(job, &as_it_is)?.figures, judge.figures(job, found)?.figures);
         Ok(PlantFigures { plant, before, after })
     });

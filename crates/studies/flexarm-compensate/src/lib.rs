@@ -34,6 +34,7 @@ use files::Files;
 use flexarm_run::Arm;
 use flexarm_run::Caveat;
 use flexarm_run::Error;
+use flexarm_run::Modelling;
 use flexarm_run::Motion;
 use flexarm_run::MotionViolation;
 use flexarm_run::Robot;
@@ -71,7 +72,9 @@ pub enum Method {
 /// Input of [`compensate_motion`].
 #[derive(Clone, Debug)]
 pub struct CompensateRequest {
-    /// Stepping, and modelling of links and drives.
+    /// Models of links and drives.
+    pub modelling: Modelling,
+    /// Stepping.
     pub run: RunOptions,
     /// Method of finding commands.
     pub method: Method,
@@ -105,6 +108,7 @@ pub struct CompensateRequest {
 impl Default for CompensateRequest {
     fn default() -> Self {
         Self {
+            modelling: Modelling::default(),
             run: RunOptions { log_rate_hz: 1.0 / SAMPLE_S, ..RunOptions::default() },
             method: Method::default(),
             components: [true; 6],
@@ -249,7 +253,7 @@ pub fn compensate_motion_until(
 ) -> Result<Compensation, Error> {
     let scenario = scenario.into();
     let files = Files::of(&scenario.motion, request)?;
-    let arm = robot.flexible(request.run.modelling)?;
+    let arm = robot.model(&request.modelling)?;
     check(&scenario, request, &arm)?;
     let (mut answer, found) = limits::kept(robot, &arm, &scenario, request, stop)?;
     answer.caveats.extend(arm.caveats(Use::Along(&scenario)));
@@ -271,7 +275,7 @@ struct MotionPair {
 /// Finds commands for a motion without slowing it.
 fn attempt(
     robot: &Robot,
-    arm: &Arm,
+    arm: &Arc<Arm>,
     scenario: &Scenario,
     request: &CompensateRequest,
     stop: Stop<'_>,
@@ -328,7 +332,7 @@ fn attempt(
     Ok((answer, MotionPair { scenario, motion }, own))
 }
 
-fn check(scenario: &Scenario, request: &CompensateRequest, arm: &Arm) -> Result<(), CompensateError> {
+fn check(scenario: &Scenario, request: &CompensateRequest, arm: &Arc<Arm>) -> Result<(), CompensateError> {
     let motion = &scenario.motion;
     if !request.components.contains(&true) {
         return Err(CompensateError::NoComponent);
@@ -360,7 +364,7 @@ fn check(scenario: &Scenario, request: &CompensateRequest, arm: &Arm) -> Result<
     {
         return Err(CompensateError::StaticPayload { at_s: change.at_s });
     }
-    if arm.flexible().springs.is_empty() && !arm.flexible().has_servo() {
+    if arm.springs.is_empty() && !arm.has_servo() {
         return Err(CompensateError::NothingYields);
     }
     // Static equilibria do not depend on velocities, so the static method accepts velocity jumps.

@@ -1,5 +1,7 @@
 //! Joint limits: violations by commands, and their treatment.
 
+use std::sync::Arc;
+
 use flexarm_trajectory::{Extreme, JointLimits};
 
 use super::{CompensateError, CompensateRequest, Compensation, MotionPair, Stop, attempt};
@@ -71,7 +73,7 @@ pub(super) fn worse<'a>(
 /// Finds commands that keep the limits, according to the rule of the request.
 pub(super) fn kept(
     robot: &Robot,
-    arm: &Arm,
+    arm: &Arc<Arm>,
     scenario: &Scenario,
     request: &CompensateRequest,
     stop: Stop<'_>,

@@ -126,7 +126,7 @@ struct Stop<'a> {
 /// * `[path, folder]`: the program, and the output folder.
 pub(super) fn corrected(
     robot: &Robot,
-    arm: &Arm,
+    arm: &Arc<Arm>,
     scenario: &Scenario,
     request: &CompensateRequest,
     [path, folder]: &[PathBuf; 2],
@@ -303,13 +303,13 @@ struct AtRest<'a> {
 
 impl<'a> AtRest<'a> {
     fn new(
-        arm: &Arm,
+        arm: &Arc<Arm>,
         controller: &'a ProgramArm<'a>,
         scenario: &Scenario,
         request: &CompensateRequest,
         rests: Vec<[f64; 2]>,
     ) -> Result<Self, Error> {
-        let flexible = arm.flexible();
+        let flexible = arm;
         let held = Held(vec![0.0; controller.model.n_actuated()]);
         let held = flexible.arm(Arc::new(held)).map_err(|error| flexible.explained(error))?;
         let sags = held.servo.iter().flat_map(|servo| &servo.axes).any(|axis| axis.integral_gain <= 0.0);

@@ -23,7 +23,7 @@ const RECORDED_HZ: f64 = 200.0;
 pub(super) fn record(
     path: &Path,
     answer: &Compensation,
-    arm: &Arm,
+    arm: &Arc<Arm>,
     found: &MotionPair,
     request: &CompensateRequest,
 ) -> Result<(), Error> {

@@ -79,7 +79,7 @@ pub struct ShapedModeFigures {
 }
 
 /// Returns the motion of a scenario through a shaper.
-pub(super) fn shaped(arm: &Arm, scenario: &Scenario, shaping: Shaping) -> Result<(Motion, ShaperFigures), Error> {
+pub(super) fn shaped(arm: &Arc<Arm>, scenario: &Scenario, shaping: Shaping) -> Result<(Motion, ShaperFigures), Error> {
     let motion = &scenario.motion;
     let end = AtEnd::of(arm, scenario)?;
     let Some(first) = end.modes.first() else { return Err(CompensateError::NothingYields.into()) };
@@ -153,8 +153,8 @@ struct AtEnd {
 }
 
 impl AtEnd {
-    fn of(arm: &Arm, scenario: &Scenario) -> Result<Self, Error> {
-        let (flexible, motion) = (arm.flexible(), &scenario.motion.trajectory);
+    fn of(arm: &Arc<Arm>, scenario: &Scenario) -> Result<Self, Error> {
+        let (flexible, motion) = (arm, &scenario.motion.trajectory);
         let (m, duration) = (motion.joints().len(), motion.duration());
         let count = (duration / SAMPLE_S).ceil().max(1.0) as usize;
         let step_s = duration / count as f64;

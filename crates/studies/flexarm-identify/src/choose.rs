@@ -12,7 +12,7 @@ use flexarm_run::TCP_FRAME;
 
 /// Returns the parameters that the file or the request selects, in the robot's order.
 pub(super) fn chosen(arm: &Arm, input: &MeasurementInput, fit: &[String]) -> Result<Vec<Candidate>, Error> {
-    let all = parameters::candidates(arm.robot(), arm.flexible());
+    let all = parameters::candidates(arm.robot(), arm);
     check_patterns(&all, input, fit)?;
     let wanted = |name: &str| match (fit.is_empty(), input.fit.is_empty()) {
         (false, _) => fit.iter().any(|p| parameters::asks_for(p, name)),
@@ -23,7 +23,7 @@ pub(super) fn chosen(arm: &Arm, input: &MeasurementInput, fit: &[String]) -> Res
     let kept = |name: &str| input.keep.iter().any(|(p, _)| parameters::fits(p, name));
     let mut chosen: Vec<_> = all.clone();
     chosen.retain(|c| wanted(&c.parameter.name) && !kept(&c.parameter.name));
-    if chosen.is_empty() && arm.flexible().springs.is_empty() {
+    if chosen.is_empty() && arm.springs.is_empty() {
         return Err(IdentifyFileError::NothingGives.into());
     }
     if chosen.is_empty() {

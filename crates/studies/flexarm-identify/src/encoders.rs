@@ -103,7 +103,7 @@ pub(super) fn encoder_figures(
     let joints: Vec<String> = arm.joints().map(str::to_owned).collect();
     let coupling = arm.robot().coupling();
     let is_coupled = |joint: &String| coupling.is_some_and(|coupling| coupling.joints.contains(joint));
-    let all = candidates(arm.robot(), arm.flexible());
+    let all = candidates(arm.robot(), arm);
     let filed = |joint: &String| gearbox_of(&all, joint).filter(|_| !is_coupled(joint)).map(|p| p.initial);
     let filed: Vec<Option<f64>> = joints.iter().map(filed).collect();
     let runs = input.recordings.iter().map(|recording| Smooth::of(recording, &model, &filed));

@@ -49,7 +49,7 @@ pub use self::plan_file::{MeasurementPlan, PlanRequest, PlannedReading, plan_mea
 
 /// Returns the arm as model for the identification: tree, springs, TCP.
 pub fn plant(arm: &Arm) -> Plant {
-    parameters::plant(arm.flexible())
+    parameters::plant(arm)
 }
 
 /// Returns the identifiable parameters of an arm, with the names that files and `--fit` use.
@@ -88,7 +88,7 @@ pub fn frame_parameters(arm: &Arm) -> Vec<Parameter> {
 }
 
 fn candidates_that(arm: &Arm, wanted: impl Fn(&str) -> bool) -> Vec<Parameter> {
-    let all = parameters::candidates(arm.robot(), arm.flexible()).into_iter();
+    let all = parameters::candidates(arm.robot(), arm).into_iter();
     all.map(|c| c.parameter).filter(|parameter| wanted(&parameter.name)).collect()
 }
 
@@ -112,7 +112,7 @@ pub struct IdentifyRequest {
 /// tables; [`IdentifyFileError`] if the measurements do not fit the robot: units, frames, rank;
 /// [`Error::Taken`], [`Error::Write`].
 pub fn identify_robot(robot: &Robot, measurements: &Path, request: &IdentifyRequest) -> Result<Identification, Error> {
-    let arm = robot.flexible(request.modelling)?;
+    let arm = robot.model(&request.modelling)?;
     let joints = joints_of(&arm);
     let mut input = file::read(measurements, &Cell { joints: &joints, arm: &arm })?;
     let chosen = chosen(&arm, &input, &request.fit)?;
@@ -159,7 +159,7 @@ pub fn identify_robot(robot: &Robot, measurements: &Path, request: &IdentifyRequ
 
 /// Returns the actuated joints in coordinate order, and whether they slide.
 fn joints_of(arm: &Arm) -> Vec<(String, bool)> {
-    let model = &arm.flexible().model;
+    let model = &arm.model;
     let actuated = &model.coordinates()[..model.n_actuated()];
     actuated.iter().map(|c| (c.joint.clone(), c.slides())).collect()
 }

@@ -25,7 +25,7 @@ use flexarm_kinematics::{JointMotion, SpatialInertia};
 use flexarm_stepping::{Damping, GuideTerm, SpringCurve};
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 
-use flexarm_run::FlexibleRobot;
+use flexarm_run::Arm;
 use flexarm_run::GuideTilt;
 use flexarm_run::Owner;
 use flexarm_run::Robot;
@@ -75,7 +75,7 @@ pub(crate) struct Candidate {
 }
 
 /// Returns all parameters of an arm, in the order of drives, links, tool and payload.
-pub(crate) fn candidates(robot: &Robot, flexible: &FlexibleRobot) -> Vec<Candidate> {
+pub(crate) fn candidates(robot: &Robot, flexible: &Arm) -> Vec<Candidate> {
     let of = |owner: Owner| -> Vec<usize> {
         flexible.owners.iter().enumerate().filter(|(_, o)| **o == owner).map(|(k, _)| k).collect()
     };
@@ -136,7 +136,7 @@ pub(crate) fn candidates(robot: &Robot, flexible: &FlexibleRobot) -> Vec<Candida
 }
 
 /// Returns the numbers of the law of each tilt of a telescopic guide.
-fn guide_parameters(joint: &str, tilts: &[GuideTilt], springs: &[usize], flexible: &FlexibleRobot) -> Vec<Candidate> {
+fn guide_parameters(joint: &str, tilts: &[GuideTilt], springs: &[usize], flexible: &Arm) -> Vec<Candidate> {
     let mut found = Vec::new();
     for (tilt, spring) in tilts.iter().zip(springs) {
         let Some(guide) = flexible.springs[*spring].curve.as_ref().and_then(SpringCurve::guide) else { continue };
@@ -169,7 +169,7 @@ const ZERO_PRIOR: f64 = 1e-2;
 
 /// Returns the displacements of the joint frames, and the zeros of the joints. The rotations are in
 /// the order of roll, pitch and yaw as matrices multiply.
-fn frame_parameters(flexible: &FlexibleRobot) -> Vec<Candidate> {
+fn frame_parameters(flexible: &Arm) -> Vec<Candidate> {
     let mut found = Vec::new();
     let rigid = flexible.rigid.bodies().iter().map(|body| body.joint.as_str());
     let of_robot: Vec<&str> = rigid.collect();
@@ -287,7 +287,7 @@ fn link_directions<'a>(
 
 /// Returns the 6x6 entries of a link modelled as one spring between two rigid parts, before the
 /// factors are applied.
-fn link_entries(link: &RobotLink, spring: usize, flexible: &FlexibleRobot) -> Vec<Candidate> {
+fn link_entries(link: &RobotLink, spring: usize, flexible: &Arm) -> Vec<Candidate> {
     let group = &flexible.model.elastic()[spring];
     if group.size != 6 || group.modal {
         return Vec::new();
@@ -376,7 +376,7 @@ fn is_diagonal(K: &nalgebra::Matrix6<f64>) -> bool {
 }
 
 /// Converts the flexible robot to the plant of the estimation.
-pub(crate) fn plant(flexible: &FlexibleRobot) -> Plant {
+pub(crate) fn plant(flexible: &Arm) -> Plant {
     Plant {
         model: flexible.model.clone(),
         springs: flexible.springs.clone(),

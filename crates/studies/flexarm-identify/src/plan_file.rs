@@ -201,12 +201,12 @@ pub struct ExpectedParameter {
 /// [`Error::File`] for a table without valid poses, [`IdentifyFileError`] if there is nothing to
 /// identify, [`Error::Taken`], [`Error::Write`].
 pub fn plan_measurements(robot: &Robot, request: &PlanRequest) -> Result<MeasurementPlan, Error> {
-    let arm = robot.flexible(request.modelling)?;
+    let arm = robot.model(&request.modelling)?;
     let (joints, slides): (Vec<String>, Vec<bool>) = joints_of(&arm).into_iter().unzip();
     if let Some(text) = request.fault() {
         return Err(IdentifyFileError::Fit(text).into());
     }
-    if arm.flexible().springs.is_empty() {
+    if arm.springs.is_empty() {
         let text = "the robot has no flexible link and no elastic drive: loads do not displace it, so there is nothing to \
                     plan; add [[flexible_link]] or [[drive]] entries with initial values";
         return Err(IdentifyFileError::Fit(text.into()).into());
@@ -322,7 +322,7 @@ fn displacement(q: &[f64], setup: &Setup, std: f64) -> Reading {
 /// Poses spread over the joint ranges as Halton points.
 fn spread_poses(arm: &Arm) -> Vec<Vec<f64>> {
     const PRIMES: [u32; 16] = [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53];
-    let model = &arm.flexible().model;
+    let model = &arm.model;
     let ranges: Vec<(f64, f64)> = model.coordinates()[..model.n_actuated()]
         .iter()
         .map(|c| {

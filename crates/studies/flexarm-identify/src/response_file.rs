@@ -354,7 +354,7 @@ impl Reader<'_> {
         q: &[f64],
         span: &Range<usize>,
     ) -> Result<Probe, Error> {
-        let flexible = self.cell.arm.flexible();
+        let flexible = self.cell.arm;
         let tool = || flexible.tcp.clone();
         let Some(name) = name else { return Ok(Probe { frame: tool(), direction: *direction }) };
         let node = nodes.get(name).ok_or_else(|| {

@@ -36,6 +36,7 @@ mod take;
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::Instant;
 
 use flexarm_kinematics::{Data, Model, forward_kinematics};
@@ -259,9 +260,9 @@ pub fn map(
     let begun = Instant::now();
     let paths = request.output.as_deref().map(|folder| files::places(folder, request.overwrite)).transpose()?;
     check_wrench(&request.wrench)?;
-    let arm = robot.flexible(request.modelling)?;
+    let arm = robot.model(&request.modelling)?;
     let at = arm.operating_point()?;
-    let model = &*arm.flexible().rigid;
+    let model = &*arm.rigid;
     let actuated = &model.coordinates()[..model.n_actuated()];
     let joints: Vec<(String, bool)> = actuated.iter().map(|c| (c.joint.clone(), c.slides())).collect();
     let loaded = request.wrench != [0.0; 6];
@@ -480,7 +481,7 @@ fn reach(model: &Model) -> [[f64; 3]; 2] {
 #[allow(clippy::too_many_arguments, reason = "called once, to keep the caller short")]
 fn summed_up(
     robot: &Robot,
-    arm: &Arm,
+    arm: &Arc<Arm>,
     request: &MapRequest,
     table: MapTable,
     taken: &Evaluation,

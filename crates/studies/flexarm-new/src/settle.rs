@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use flexarm_run::{Error, Robot};
+use flexarm_run::{Description, Error, LoadOptions, RobotSource};
 use flexarm_settings::Setting;
 
 use super::assumption::{Assumption, assumption};
@@ -16,8 +16,9 @@ use super::text;
 pub(crate) fn settle(draft: &mut Draft, placed: &Placed) -> Result<(), Error> {
     let loads = |draft: &Draft, beams: &[&DraftLink]| {
         let text = text::robot_file(draft, placed, beams);
-        let urdf_path = placed.robot_path.with_file_name(&placed.reference);
-        Robot::with_description(&placed.robot_path, &text, urdf_path, draft.urdf.clone())
+        let description = Some(Description::Read(&draft.urdf));
+        let options = &LoadOptions::default();
+        RobotSource { text: Some(&text), description, ..RobotSource::new(&placed.robot_path, options) }.load()
     };
     loads(draft, &[])?;
     for k in 0..draft.links.len() {

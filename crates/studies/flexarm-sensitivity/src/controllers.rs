@@ -1,5 +1,7 @@
 //! Parameters of servo-controlled joints: friction and gains.
 
+use std::sync::Arc;
+
 use flexarm_stepping::{FlexibleArm, ServoAxis, TorqueLimited};
 
 use super::slopes::{OfAxis, OfFriction};
@@ -10,8 +12,8 @@ use flexarm_run::Error;
 use flexarm_run::Scenario;
 
 /// Adds friction and gains of servo-controlled joints.
-pub(super) fn add_controllers(arm: &Arm, scenario: &Scenario, all: &mut Vec<NamedParameter>) -> Result<(), Error> {
-    let flexible = arm.flexible();
+pub(super) fn add_controllers(arm: &Arc<Arm>, scenario: &Scenario, all: &mut Vec<NamedParameter>) -> Result<(), Error> {
+    let flexible = arm;
     if !flexible.has_servo() {
         return Ok(());
     }
@@ -27,7 +29,7 @@ pub(super) fn add_controllers(arm: &Arm, scenario: &Scenario, all: &mut Vec<Name
 }
 
 /// Returns caveats about servos that reached their limits in a differentiated run.
-pub(super) fn limited(arm: &Arm, found: &RunSlopes) -> Vec<Caveat> {
+pub(super) fn limited(arm: &Arc<Arm>, found: &RunSlopes) -> Vec<Caveat> {
     let joints: Vec<&str> = arm.joints().collect();
     let caveat = |own: &TorqueLimited| {
         let joint = joints[own.coordinate];

@@ -11,6 +11,7 @@ mod pose;
 mod slopes;
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use flexarm_files::{check_apart, check_free, write_all};
 use flexarm_identify::{Effect, Parameter, link_directions, link_entries, parameters, plant};
@@ -22,6 +23,7 @@ use flexarm_identify::parameters::{asks_for, fits};
 use flexarm_run::Arm;
 use flexarm_run::Caveat;
 use flexarm_run::Error;
+use flexarm_run::Modelling;
 use flexarm_run::Robot;
 use flexarm_run::RunOptions;
 use flexarm_run::Scenario;
@@ -44,8 +46,9 @@ const SAME_TIME: f64 = 1e-9;
 /// Input of [`sensitivity`].
 #[derive(Clone, Debug, Default)]
 pub struct SensitivityRequest {
-    /// Run options: modelling, generalised-alpha and its step, limits. Rates and recordings are
-    /// ignored.
+    /// Models of links and drives.
+    pub modelling: Modelling,
+    /// Run options: generalised-alpha and its step, limits. Rates and recordings are ignored.
     pub run: RunOptions,
     /// Names of the parameters, with * as wildcard; empty for all.
     pub parameters: Vec<String>,
@@ -131,7 +134,7 @@ struct NamedParameter {
 /// # Errors
 /// As [`Arm::simulate`]; [`Error::Step`] for other steppers than generalised-alpha.
 pub fn error_slopes(
-    arm: &Arm,
+    arm: &Arc<Arm>,
     scenario: impl Into<Scenario>,
     options: &RunOptions,
     parameters: &[RunParameter],
@@ -141,7 +144,7 @@ pub fn error_slopes(
 }
 
 fn slopes_and_caveats(
-    arm: &Arm,
+    arm: &Arc<Arm>,
     scenario: &Scenario,
     options: &RunOptions,
     parameters: &[RunParameter],
@@ -153,7 +156,7 @@ fn slopes_and_caveats(
         return Err(Error::Step { source: StepError::Setup(text), partial: false });
     };
     runnable(&scenario.motion, options)?;
-    let flexible = arm.flexible();
+    let flexible = arm;
     if flexible.springs.is_empty() && !flexible.has_servo() {
         return Err(ValueError::NothingYields.into());
     }
@@ -174,14 +177,14 @@ fn slopes_and_caveats(
 
 /// Returns the differentiable parameters of the arm; matrix entries, which are many, only if
 /// requested by name.
-fn numbers(arm: &Arm, asked: &[String]) -> Vec<Parameter> {
+fn numbers(arm: &Arc<Arm>, asked: &[String]) -> Vec<Parameter> {
     let entries = link_entries(arm).into_iter();
     let entries = entries.filter(|own| asked.iter().any(|pattern| asks_for(pattern, &own.name)));
     parameters(arm).into_iter().chain(link_directions(arm)).chain(entries).collect()
 }
 
 /// Returns all parameters by which the error along a motion is differentiated.
-fn run_parameters(arm: &Arm, scenario: &Scenario, asked: &[String]) -> Result<Vec<NamedParameter>, Error> {
+fn run_parameters(arm: &Arc<Arm>, scenario: &Scenario, asked: &[String]) -> Result<Vec<NamedParameter>, Error> {
     let of_arm = |parameter: Parameter| {
         let (per, scale) = change_of(&parameter);
         let Parameter { name, unit, initial: value, .. } = parameter.clone();
@@ -191,7 +194,7 @@ fn run_parameters(arm: &Arm, scenario: &Scenario, asked: &[String]) -> Result<Ve
     let gone = scenario.payloads.iter().any(|payload| payload.at_s <= SAME_TIME);
     let there = |own: &Parameter| !(gone && matches!(own.effect, Effect::Mass { .. }));
     let mut all: Vec<NamedParameter> = numbers(arm, asked).into_iter().filter(there).map(of_arm).collect();
-    let model = &arm.flexible().model;
+    let model = &arm.model;
     for (k, coordinate) in model.coordinates()[..model.n_actuated()].iter().enumerate() {
         let slides = coordinate.slides();
         let (unit, per) = if slides { ("m", "1 mm") } else { ("rad", "1 mrad") };
@@ -222,7 +225,7 @@ pub fn sensitivity(
     let scenario = scenario.into();
     check_apart(request.table.as_slice(), &[&robot.path, &robot.urdf_path, &scenario.motion.path])?;
     check_free(request.table.as_slice(), request.overwrite)?;
-    let arm = robot.flexible(request.run.modelling)?;
+    let arm = robot.model(&request.modelling)?;
     let named = chosen(run_parameters(&arm, &scenario, &request.parameters)?, &request.parameters, |own| &own.name)?;
     let parameters: Vec<RunParameter> = named.iter().map(|own| own.parameter.clone()).collect();
     let (found, mut caveats) = slopes_and_caveats(&arm, &scenario, &request.run, &parameters, request.table.is_some())?;

@@ -1,5 +1,7 @@
 //! Sensitivity of the static TCP pose, the compliance and the natural frequencies at a pose.
 
+use std::sync::Arc;
+
 use flexarm_identify::{Effect, compliance_slopes, frequency_slopes, plant, tool_slopes};
 use flexarm_kinematics::{Pose, Wrench};
 use nalgebra::{Matrix3, Matrix6, Vector3};
@@ -76,8 +78,8 @@ pub fn pose_sensitivity(
     at: Option<&[f64]>,
     parameters: &[String],
 ) -> Result<PoseSensitivity, Error> {
-    let arm = robot.flexible(modelling)?;
-    if arm.flexible().springs.is_empty() {
+    let arm = robot.model(&modelling)?;
+    if arm.springs.is_empty() {
         return Err(ValueError::NothingYields.into());
     }
     let joints: Vec<String> = arm.joints().map(str::to_owned).collect();
@@ -136,12 +138,12 @@ fn rows(C: &Matrix6<f64>, scale: f64) -> [[f64; 6]; 6] {
 
 fn slopes(
     robot: &Robot,
-    arm: &Arm,
+    arm: &Arc<Arm>,
     joints: Vec<String>,
     at: Vec<f64>,
     asked: Vec<PoseParameterKind>,
 ) -> Result<PoseSensitivity, Error> {
-    let explained = |error| arm.flexible().explained(error);
+    let explained = |error| arm.explained(error);
     let none = Wrench::zeros();
     let mut point = arm.operating_point()?;
     point.solve(&at, &none).map_err(explained)?;

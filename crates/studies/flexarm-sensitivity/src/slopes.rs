@@ -188,7 +188,7 @@ impl Repeated<'_> {
 
     /// Runs the arm with one parameter changed; its controllers know the change.
     fn errors(&self, change: Option<(&RunParameter, f64)>) -> Result<ToolErrors, Error> {
-        let mut flexible = (**self.arm.flexible()).clone();
+        let mut flexible = self.arm.clone();
         let (mut robot, mut springs) = (self.arm.robot().clone(), flexible.springs.clone());
         let (mut motion, mut run) = (self.scenario.motion.prescribed(), self.run.clone());
         match change {
@@ -208,7 +208,7 @@ impl Repeated<'_> {
             Some((RunParameter::Tool(along), x)) => run.tool.X_BF *= Pose::from(along * x),
             _ => {}
         }
-        let explained = |error| self.arm.flexible().explained(error);
+        let explained = |error| self.arm.explained(error);
         let mut arm = flexible.arm_with(springs, motion).map_err(explained)?;
         match change {
             Some((RunParameter::Friction(coordinate, of), x)) => *of(&mut arm.friction[*coordinate]) *= 1.0 + x,

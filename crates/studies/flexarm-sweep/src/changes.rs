@@ -4,6 +4,7 @@
 use std::fmt;
 use std::path::Path;
 use std::str::FromStr;
+use std::sync::Arc;
 
 use toml_edit::DocumentMut;
 
@@ -11,7 +12,7 @@ use super::error::SweepError;
 use super::file::Role;
 use super::target::{Target, TargetFile, edits};
 use super::value::ParameterValue;
-use flexarm_run::{Error, LoadOptions, Robot};
+use flexarm_run::{Arm, Error, LoadOptions, RobotSource};
 
 /// A change: `payload.mass=150` replaces a value, `drive.*.gearbox.stiffness*=0.5` multiplies it.
 #[derive(Clone, Debug, PartialEq)]
@@ -62,19 +63,19 @@ impl fmt::Display for Change {
 }
 
 /// Loads the robot file at `path`, or in that folder, with changes applied in their order. Returns
-/// the robot and the speed of the motion relative to its file. No file is written.
+/// the arm and the speed of the motion relative to its file. No file is written.
 ///
 /// # Errors
 /// [`SweepError::Run`] for a path without a match, with similar paths, for a factor of a value that
 /// is not a number, and if `path` is not a robot file; otherwise as [`Robot::load`].
-pub fn load_changed(path: &Path, options: &LoadOptions, changes: &[Change]) -> Result<(Robot, f64), Error> {
+pub fn load_changed(path: &Path, options: &LoadOptions, changes: &[Change]) -> Result<(Arc<Arm>, f64), Error> {
     let path = if path.is_dir() { path.join("robot.toml") } else { path.to_owned() };
     if path.extension().is_none_or(|ending| ending != "toml") {
         let what = "not a robot file, so it has no entries to change: write a robot.toml that names it";
         return Err(SweepError::Run(format!("{}: {what}", path.display())).into());
     }
     let (text, speed) = change_text(&path, &flexarm_files::read_text(&path)?, changes)?;
-    Ok((Robot::from_toml(&text, &path, options)?, speed))
+    Ok((RobotSource { text: Some(&text), ..RobotSource::new(&path, options) }.load()?, speed))
 }
 
 /// Returns the changed text of a robot file, and the speed of the motion.

@@ -143,7 +143,7 @@ impl Sweep {
         caveats: &mut Vec<Caveat>,
     ) -> Result<SummaryFacts, Error> {
         let PreparedRun { built, scenario, options } = self.workshop.ready(values)?;
-        caveats.extend_from_slice(&built.arm.robot_caveats());
+        caveats.extend_from_slice(built.arm.robot_caveats());
         let mut go_on =
             |_, _| if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
         let request = RunRequest { progress: Some(&mut go_on), ..RunRequest::keeping(Keep::Figures) };
@@ -157,8 +157,8 @@ impl Sweep {
     /// step, also if it fails.
     fn quickly(&self, values: &[ParameterValue], caveats: &mut Vec<Caveat>) -> Result<QuickFacts, Error> {
         let PreparedRun { built, scenario, options } = self.workshop.ready(values)?;
-        caveats.extend_from_slice(&built.arm.robot_caveats());
-        let flexible = built.arm.flexible();
+        caveats.extend_from_slice(built.arm.robot_caveats());
+        let flexible = &*built.arm;
         let (arm, of_loads) = built.arm.at_start(&scenario, &options)?;
         let facts = QuickFacts {
             sag_m: static_sag(&arm, &flexible.tcp),
@@ -166,8 +166,7 @@ impl Sweep {
             mass_kg: built.mass_kg,
             ..QuickFacts::default()
         };
-        let before =
-            BeforeRun { robot: built.arm.robot(), flexible, arm: &arm, motion: &scenario.motion, options: &options };
+        let before = BeforeRun { flexible, arm: &arm, motion: &scenario.motion, options: &options };
         caveats.extend(before.caveats_of_study(facts.sag_m));
         caveats.extend(of_loads);
         let run = ToolRun {

@@ -49,8 +49,8 @@ use self::file::StudyFile;
 use self::metric::{Constraint, Metric, MetricError, Vocabulary};
 use self::store::{Collected, Manifest, RUNS, Store, known_manifest};
 use self::workshop::Workshop;
+use flexarm_run::Arm;
 use flexarm_run::Error;
-use flexarm_run::FlexibleRobot;
 use flexarm_run::LinkFigures;
 use flexarm_run::PathFigures;
 use flexarm_run::Robot;
@@ -145,7 +145,7 @@ impl Sweep {
         workshop.vary(&columns, &file, finders)?;
         let design = Design::new(columns, &file)?;
         let robot = workshop.base_robot()?;
-        let flexible = robot.modelled(&workshop.base_modelling())?;
+        let flexible = robot.model(&workshop.base_modelling())?;
         let summary = serde_json::to_value(skeleton(&robot, &flexible)).unwrap_or_default();
         let parameters = parameter_names(&design);
         let mut metrics: Vec<Metric> = Vec::new();
@@ -469,7 +469,7 @@ fn parameter_names(design: &Design) -> Vec<Option<String>> {
 }
 
 /// Returns an example of a summary with all names that a run of the robot can have.
-fn skeleton(robot: &Robot, flexible: &FlexibleRobot) -> Summary {
+fn skeleton(robot: &Robot, flexible: &Arm) -> Summary {
     let links = flexible.spans.iter().map(|span| LinkFigures { name: span.link.clone(), ..LinkFigures::default() });
     let stressed = robot.flexible_links.iter().filter(|link| link.stress.is_some());
     let place = StressPlaceFigures { of_yield: Some(0.0), damage: Some(0.0), ..StressPlaceFigures::default() };

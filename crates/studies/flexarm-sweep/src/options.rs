@@ -4,7 +4,7 @@ use flexarm_settings::Words;
 use flexarm_stepping::{STEPPERS, Start, StepperEntry, StepperOptions};
 
 use super::value::ParameterValue;
-use flexarm_run::RunOptions;
+use flexarm_run::{Modelling, RunOptions};
 
 /// Names of all options.
 const KEYS: [&str; 15] = [
@@ -56,6 +56,7 @@ pub(super) struct StudyOptions {
     step_s: Option<f64>,
     settings: StepperOptions,
     run: RunOptions,
+    pub(super) modelling: Modelling,
     pub(super) start: Start,
     /// Duration over which corners of motions are rounded (s).
     pub(super) round_corners: Option<f64>,
@@ -63,8 +64,15 @@ pub(super) struct StudyOptions {
 
 impl Default for StudyOptions {
     fn default() -> Self {
-        let (settings, run, start) = (StepperOptions::default(), RunOptions::default(), Start::default());
-        Self { stepper: STEPPERS[0], step_s: None, settings, run, start, round_corners: None }
+        Self {
+            stepper: STEPPERS[0],
+            step_s: None,
+            settings: StepperOptions::default(),
+            run: RunOptions::default(),
+            modelling: Modelling::default(),
+            start: Start::default(),
+            round_corners: None,
+        }
     }
 }
 
@@ -88,8 +96,8 @@ impl StudyOptions {
             "rho_inf" => self.settings.alpha.rho = number(key, value)?,
             "rtol" => self.settings.reference.rtol = number(key, value)?,
             "round_corners" => self.round_corners = Some(number(key, value)?),
-            "segments" => self.run.modelling.segments = Some(count(key, value, 2)?),
-            "modes" => self.run.modelling.modes = Some(count(key, value, 0)?),
+            "segments" => self.modelling.segments = Some(count(key, value, 2)?),
+            "modes" => self.modelling.modes = Some(count(key, value, 0)?),
             "ignore_limits" => self.run.ignore_limits = truth(key, value)?,
             "dispersion_correction" => self.settings.alpha.dispersion_correction = truth(key, value)?,
             "stepper" => {
@@ -97,8 +105,8 @@ impl StudyOptions {
                 let known = || STEPPERS.iter().map(|entry| entry.name).collect();
                 self.stepper = StepperEntry::named(word).ok_or_else(|| OptionError::of_word(key, word, known()))?;
             }
-            "links" => self.run.modelling.links = choice(key, value)?,
-            "drives" => self.run.modelling.drives = choice(key, value)?,
+            "links" => self.modelling.links = choice(key, value)?,
+            "drives" => self.modelling.drives = choice(key, value)?,
             "from_rest" => self.start = choice(key, value)?,
             "reference_method" => self.settings.reference.method = choice(key, value)?,
             _ => return Err(OptionError::Unknown { key: key.to_owned() }),

@@ -74,10 +74,9 @@ impl Method {
         for link in &mut robot.flexible_links {
             link.choices.geometric = self.stiffening;
         }
-        let (stepper, modelling) = (self.stepper, self.modelling);
-        let options = RunOptions { stepper, step_s, modelling, log_rate_hz: rate_hz, ..RunOptions::default() };
+        let options = RunOptions { stepper: self.stepper, step_s, log_rate_hz: rate_hz, ..RunOptions::default() };
         let request = RunRequest::keeping(Keep::Curves);
-        Ok(robot.flexible(modelling)?.simulate_with(motion, &options, request)?.trace)
+        Ok(robot.model(&self.modelling)?.simulate_with(motion, &options, request)?.trace)
     }
 }
 

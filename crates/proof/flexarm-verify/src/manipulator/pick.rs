@@ -44,7 +44,7 @@ impl Pick {
         let scenario = Scenario::new(bench.motion(robot, MOTION)?).with_loads_file(bench.file(LOADS))?;
         let mut make = |links: Modelling, stepper: StepperKind, step_s: f64| {
             let modelling = Modelling { drives: DriveModel::Rigid, ..links };
-            runs.make_with(robot, &scenario, &RunOptions { stepper, step_s, modelling, ..RunOptions::default() })
+            runs.make_with(robot, &scenario, &modelling, &RunOptions { stepper, step_s, ..RunOptions::default() })
         };
         let links = [in_parts(2), ("modal, no modes".to_owned(), modal(0))];
         let truths = [make(parts(2), reference(), SHOWN_STEP_S)?, make(modal(0), reference(), SHOWN_STEP_S)?];

@@ -130,11 +130,17 @@ impl<'a, 'p> Runs<'a, 'p> {
         stepper: StepperKind,
         step_s: f64,
     ) -> Result<Run, Error> {
-        self.make_with(robot, &motion.into(), &RunOptions { stepper, step_s, modelling, ..RunOptions::default() })
+        self.make_with(robot, &motion.into(), &modelling, &RunOptions { stepper, step_s, ..RunOptions::default() })
     }
 
     /// Runs a scenario with its own options.
-    pub(super) fn make_with(&mut self, robot: &Robot, scenario: &Scenario, options: &RunOptions) -> Result<Run, Error> {
+    pub(super) fn make_with(
+        &mut self,
+        robot: &Robot,
+        scenario: &Scenario,
+        modelling: &Modelling,
+        options: &RunOptions,
+    ) -> Result<Run, Error> {
         let options = RunOptions { log_rate_hz: SEEN_HZ, ..options.clone() };
         let weight = weight(options.stepper, options.step_s);
         let mut progress = |t: f64, total: f64| {
@@ -142,8 +148,7 @@ impl<'a, 'p> Runs<'a, 'p> {
             ControlFlow::Continue(())
         };
         let request = RunRequest { progress: Some(&mut progress), ..RunRequest::keeping(Keep::Curves) };
-        let flexarm::Run { summary, trace, .. } =
-            robot.flexible(options.modelling)?.simulate_with(scenario, &options, request)?;
+        let flexarm::Run { summary, trace, .. } = robot.model(modelling)?.simulate_with(scenario, &options, request)?;
         self.done += weight;
         Ok(Run::new(summary, &trace))
     }

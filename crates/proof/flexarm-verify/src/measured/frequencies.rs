@@ -47,7 +47,7 @@ impl Frequencies {
             ("and wrist gears as identified on a KR 500", with_wrist(robot, &wrist)),
         ];
         let sets = kinds.into_iter().map(|(what, robot)| {
-            let arm = robot.flexible(Modelling { drives: DriveModel::Elastic, ..Modelling::default() })?;
+            let arm = robot.model(&Modelling { drives: DriveModel::Elastic, ..Modelling::default() })?;
             let mut at = arm.operating_point()?;
             let mut hz = |q: &[f64]| -> Result<Vec<f64>, Error> {
                 at.solve(q, &Wrench::zeros()).map_err(crate::bench::step_error)?;

@@ -75,7 +75,7 @@ impl Gears {
 
 /// Stiffness about the axis, for the gears with a link encoder (N m/rad).
 fn stiffness(robot: &Robot) -> Result<Vec<f64>, Error> {
-    let arm = robot.modelled(&ELASTIC)?.arm(Arc::new(Held(vec![0.0; AXES]))).map_err(step_error)?;
+    let arm = robot.model(&ELASTIC)?.arm(Arc::new(Held(vec![0.0; AXES]))).map_err(step_error)?;
     Ok(arm.elements.iter().map(|element| element.K[(0, 0)]).take(WITH_ENCODER).collect())
 }
 
@@ -83,7 +83,7 @@ fn stiffness(robot: &Robot) -> Result<Vec<f64>, Error> {
 pub(super) fn arm_along(robot: &Robot, run: &Recording) -> Result<FlexibleArm, Error> {
     let rows: Vec<f64> = (0..run.time_s.len()).flat_map(|i| run.at(&run.q, i)).collect();
     let motion = Motion::from_samples(&run.time_s, &rows, robot)?;
-    robot.modelled(&ELASTIC)?.arm(motion.prescribed()).map_err(step_error)
+    robot.model(&ELASTIC)?.arm(motion.prescribed()).map_err(step_error)
 }
 
 /// Motor minus link position of each gear with an encoder, at every sample (rad).

@@ -44,7 +44,7 @@ fn simulated(robot: &Robot, run: &Recording, feed_forward: f64) -> Result<Tracki
     let rows: Vec<f64> = (0..run.time_s.len()).flat_map(|i| run.at(&run.reference, i)).collect();
     let motion = Motion::from_samples(&run.time_s, &rows, robot)?;
     let modelling = Modelling { drives: DriveModel::Servo, ..Modelling::default() };
-    let mut arm = robot.modelled(&modelling)?.arm(motion.prescribed()).map_err(step_error)?;
+    let mut arm = robot.model(&modelling)?.arm(motion.prescribed()).map_err(step_error)?;
     if let Some(servo) = &arm.servo {
         let axes = servo.axes.iter().map(|axis| ServoAxis { feed_forward, ..*axis }).collect();
         arm.servo = Some(Arc::new(Servo { axes, ..(**servo).clone() }));

@@ -82,10 +82,9 @@ impl Stepped {
         truth: &Curve,
         (name, stepper, step_s, bound): Method,
     ) -> Result<Self, Error> {
-        let (log_rate_hz, modelling) = (SEEN_HZ, Modelling::default());
-        let options = RunOptions { stepper, step_s, log_rate_hz, modelling, ..RunOptions::default() };
+        let options = RunOptions { stepper, step_s, log_rate_hz: SEEN_HZ, ..RunOptions::default() };
         let request = RunRequest::keeping(Keep::Curves);
-        let trace = robot.flexible(options.modelling)?.simulate_with(motion, &options, request)?.trace;
+        let trace = robot.model(&Modelling::default())?.simulate_with(motion, &options, request)?.trace;
         if trace.rows.len() != truth.flexible.len() {
             let (stored, run) = (truth.flexible.len(), trace.rows.len());
             let what = format!("has {stored} samples, the run {run}: not the same motion");

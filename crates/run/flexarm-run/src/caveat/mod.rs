@@ -26,4 +26,5 @@ pub mod validity;
 
 pub use flexarm_settings::caveat::{Caveat, Severity};
 pub use flexarm_settings::caveat::{CaveatKind, once_each, warnings};
-pub use of_use::{Use, of_use};
+pub use of_use::Use;
+pub(crate) use of_use::of_use;

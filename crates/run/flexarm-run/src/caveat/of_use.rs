@@ -9,9 +9,10 @@ use nalgebra::Vector6;
 
 use super::size::{Size, middle};
 use super::{Caveat, motion, once_each};
+use crate::arm::Arm;
 use crate::error::Error;
-use crate::flexible::FlexibleRobot;
 use crate::motion::Motion;
+use crate::options::Modelling;
 use crate::posed::Posed;
 use crate::robot::Robot;
 use crate::scenario::Scenario;
@@ -30,15 +31,14 @@ pub enum Use<'a> {
 
 /// Returns all caveats about a robot as modelled and about its use by a command, without
 /// duplicates.
-///
-/// * `of_robot`: result of [`Robot::caveats`], if already known.
-pub fn of_use(robot: &Robot, flexible: &Arc<FlexibleRobot>, of_robot: Option<&[Caveat]>, used: Use<'_>) -> Vec<Caveat> {
-    let mut caveats = of_model(robot, flexible, of_robot);
+pub(crate) fn of_use(arm: &Arc<Arm>, used: Use<'_>) -> Vec<Caveat> {
+    let robot = arm.robot();
+    let mut caveats = of_model(arm);
     let (pose, wrench) = match used {
         Use::Held(at, wrench) => (Ok(at.to_vec()), *wrench),
         Use::Along(scenario) => {
-            caveats.extend(of_motion(&scenario.motion, &flexible.rigid));
-            caveats.extend(of_scenario(robot, scenario, flexible));
+            caveats.extend(of_motion(&scenario.motion, &arm.rigid));
+            caveats.extend(of_scenario(arm, scenario));
             (standing_pose(robot, Some(&scenario.motion)), [0.0; 6])
         }
         Use::Any => {
@@ -47,9 +47,9 @@ pub fn of_use(robot: &Robot, flexible: &Arc<FlexibleRobot>, of_robot: Option<&[C
         }
     };
     let standing = pose.and_then(|at| {
-        let posed = Posed::with(flexible.clone(), at)?;
+        let posed = Posed::new(arm.clone(), at)?;
         let linear = posed.linear(&Vector6::from(wrench))?;
-        Ok(at_rest(robot, &posed, &linear, &wrench))
+        Ok(at_rest(&posed, &linear, &wrench))
     });
     caveats.extend(standing.unwrap_or_else(|error| {
         vec![Caveat::from_message("no-equilibrium", "robot", error.to_string(), "check stiffness, masses and units")]
@@ -60,14 +60,12 @@ pub fn of_use(robot: &Robot, flexible: &Arc<FlexibleRobot>, of_robot: Option<&[C
 /// As [`of_use()`], for a robot as modelled by its file, in commands that compute nothing with its
 /// links and drives.
 pub(crate) fn of_robot(robot: &Robot) -> Result<Vec<Caveat>, Error> {
-    Ok(of_use(robot, &Arc::new(robot.flexible_robot()?), None, Use::Any))
+    Ok(of_use(&robot.model(&Modelling::default())?, Use::Any))
 }
 
 /// Returns the caveats about a robot's files, and about its links and drives as modelled.
-pub(crate) fn of_model(robot: &Robot, flexible: &FlexibleRobot, of_robot: Option<&[Caveat]>) -> Vec<Caveat> {
-    let mut caveats = of_robot.map_or_else(|| robot.caveats(), <[Caveat]>::to_vec);
-    caveats.extend(flexible.caveats());
-    caveats
+pub(crate) fn of_model(arm: &Arm) -> Vec<Caveat> {
+    arm.robot_caveats().iter().cloned().chain(arm.link_caveats()).collect()
 }
 
 /// Returns the caveats about a motion on a robot.
@@ -81,17 +79,18 @@ pub fn of_motion(motion: &Motion, rigid: &Model) -> Vec<Caveat> {
 
 /// Returns the caveats about the loads and payloads of a scenario. Those that do not fit the robot
 /// are an error of the command instead.
-fn of_scenario(robot: &Robot, scenario: &Scenario, flexible: &FlexibleRobot) -> Vec<Caveat> {
-    let Ok(acting) = scenario.acting_on(robot, &flexible.model) else { return Vec::new() };
+fn of_scenario(arm: &Arm, scenario: &Scenario) -> Vec<Caveat> {
+    let robot = arm.robot();
+    let Ok(acting) = scenario.acting_on(robot, &arm.model) else { return Vec::new() };
     let loads = motion::of_loads(&acting.loads, scenario.duration_s(), &Size::of(&robot.rigid));
     acting.caveats.into_iter().chain(loads).collect()
 }
 
 /// Returns the caveats about the arm at rest at a pose, under a wrench on the TCP.
-pub(crate) fn at_rest(robot: &Robot, posed: &Posed, linear: &Linear, wrench: &[f64; 6]) -> Vec<Caveat> {
+pub(crate) fn at_rest(posed: &Posed, linear: &Linear, wrench: &[f64; 6]) -> Vec<Caveat> {
     let mut caveats = posed.caveats();
-    caveats.extend(motion::of_wrench(wrench, &Size::of(&robot.rigid)));
-    caveats.extend(posed.validity(robot, linear));
+    caveats.extend(motion::of_wrench(wrench, &Size::of(&posed.flexible.robot().rigid)));
+    caveats.extend(posed.validity(linear));
     caveats
 }
 

@@ -4,8 +4,7 @@ use flexarm_stepping::FlexibleArm;
 
 use super::drives::{give, speed_loop};
 use super::{Caveat, kinds};
-use crate::flexible::{FlexibleRobot, Owner};
-use crate::robot::Robot;
+use crate::arm::{Arm, Owner};
 
 /// TCP sag relative to the size of the arm: note, warning.
 const SAG: [f64; 2] = [0.03, 0.1];
@@ -19,8 +18,7 @@ const DAMPED: [f64; 2] = [0.2, 0.5];
 
 /// An arm at rest.
 pub(crate) struct ArmAtRest<'a> {
-    pub(crate) robot: &'a Robot,
-    pub(crate) flexible: &'a FlexibleRobot,
+    pub(crate) flexible: &'a Arm,
     pub(crate) arm: &'a FlexibleArm,
     /// Elastic coordinates.
     pub(crate) elastic: &'a [f64],
@@ -46,8 +44,8 @@ impl ArmAtRest<'_> {
         let mut caveats = Vec::new();
         for (element, owner) in self.arm.elements.iter().zip(&self.flexible.owners) {
             let Owner::Drive(k) = owner else { continue };
-            let drive = &self.robot.drives[*k];
-            let joint = self.robot.rigid.joints.iter().find(|j| j.name == drive.joint);
+            let drive = &self.flexible.robot().drives[*k];
+            let joint = self.flexible.robot().rigid.joints.iter().find(|j| j.name == drive.joint);
             let effort = joint.map_or(f64::INFINITY, |j| j.limits.effort);
             let e = &self.elastic[self.arm.offset(element)..][..element.size];
             let norm = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>().sqrt();

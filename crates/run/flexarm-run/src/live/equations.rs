@@ -11,7 +11,6 @@ use flexarm_stepping::{EquationsOfMotion, PrescribedMotion};
 
 use crate::arm::Arm;
 use crate::error::{Error, ValueError};
-use crate::flexible::FlexibleRobot;
 use crate::joint_values::joint_values;
 use crate::live::{Commanded, LiveOptions, Loaded, Readings};
 
@@ -46,7 +45,7 @@ impl PrescribedMotion for Given {
 
 /// Equations of motion of an arm, at a state and under a command that are set from outside.
 pub struct Equations {
-    flexible: Arc<FlexibleRobot>,
+    flexible: Arc<Arm>,
     arms: Loaded,
     given: Arc<Given>,
     push: Arc<RwLock<Wrench>>,
@@ -62,7 +61,7 @@ impl Arm {
     ///
     /// # Errors
     /// As [`Arm::live_with`]; [`Error::Step`] for an arm with hysteresis.
-    pub fn equations(&self, at: Option<&[f64]>, own: &LiveOptions) -> Result<Equations, Error> {
+    pub fn equations(self: &Arc<Self>, at: Option<&[f64]>, own: &LiveOptions) -> Result<Equations, Error> {
         let names: Vec<&str> = self.joints().collect();
         let at = joint_values(at, &names)?;
         let still = vec![0.0; at.len()];

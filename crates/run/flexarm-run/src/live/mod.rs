@@ -20,7 +20,6 @@ use flexarm_stepping::{
 
 use crate::arm::Arm;
 use crate::error::{Error, ValueError};
-use crate::flexible::FlexibleRobot;
 use crate::joint_values::joint_values;
 use crate::options::RunOptions;
 use crate::payload::PayloadChange;
@@ -137,7 +136,7 @@ impl PrescribedMotion for Targets {
 
 /// A running arm, commanded period by period.
 pub struct Live {
-    flexible: Arc<FlexibleRobot>,
+    flexible: Arc<Arm>,
     arms: Loaded,
     has_payload: bool,
     servos: Servos,
@@ -175,7 +174,7 @@ impl Arm {
     /// [`Error::Pose`] for joint values that do not fit, [`Error::Value`] for a step size or a
     /// period that is not positive or not a whole number of steps, [`Error::Step`] if there is no
     /// equilibrium, [`Error::File`] for damaged stress fields below gauges.
-    pub fn live(&self, at: Option<&[f64]>, period_s: f64, options: &RunOptions) -> Result<Live, Error> {
+    pub fn live(self: &Arc<Self>, at: Option<&[f64]>, period_s: f64, options: &RunOptions) -> Result<Live, Error> {
         self.live_with(at, period_s, options, &LiveOptions::default())
     }
 
@@ -186,14 +185,14 @@ impl Arm {
     /// As [`Arm::live`]; [`Error::Value`] for open servos if no joint is driven by torque, and for
     /// factors that are not positive.
     pub fn live_with(
-        &self,
+        self: &Arc<Self>,
         at: Option<&[f64]>,
         period_s: f64,
         options: &RunOptions,
         own: &LiveOptions,
     ) -> Result<Live, Error> {
         let servos = own.servos;
-        if servos == Servos::Open && !self.flexible().has_servo() {
+        if servos == Servos::Open && !self.has_servo() {
             return Err(ValueError::NoServo.into());
         }
         if options.stepper.entry().steps == StepRule::ByErrorControl {
@@ -219,7 +218,7 @@ impl Arm {
 
 /// An arm that follows a motion under a wrench on its TCP, both set from outside.
 struct Commanded {
-    flexible: Arc<FlexibleRobot>,
+    flexible: Arc<Arm>,
     arms: Loaded,
     /// Wrench on the TCP, world axes.
     push: Arc<RwLock<Wrench>>,
@@ -227,8 +226,8 @@ struct Commanded {
 }
 
 impl Commanded {
-    fn new(of: &Arm, own: &LiveOptions, motion: Arc<dyn PrescribedMotion>) -> Result<Self, Error> {
-        let flexible = of.flexible().clone();
+    fn new(of: &Arc<Arm>, own: &LiveOptions, motion: Arc<dyn PrescribedMotion>) -> Result<Self, Error> {
+        let flexible = of.clone();
         let push = Arc::new(RwLock::new(Wrench::zeros()));
         let springs = flexible.scaled_springs(own.stiffness, own.damping)?;
         let arm = flexible.arm_with(springs, motion).map_err(|error| flexible.explained(error))?;
@@ -239,7 +238,7 @@ impl Commanded {
         };
         let arm = arm.with_timed_loads(vec![at_tool]).map_err(|source| Error::Step { source, partial: false })?;
         let readings = Readings::new(of, &arm, own.stiffness)?;
-        let arms = Loaded::new(of, &flexible, arm);
+        let arms = Loaded::new(of, arm);
         Ok(Self { flexible, arms, push, readings })
     }
 }
@@ -252,11 +251,11 @@ struct Loaded {
 }
 
 impl Loaded {
-    fn new(of: &Arm, flexible: &FlexibleRobot, arm: FlexibleArm) -> Self {
+    fn new(of: &Arm, arm: FlexibleArm) -> Self {
         // A payload on a flexible link cannot be put down, nor one without which a part of the arm
         // has no mass.
         let release = match of.robot().rigid.link(PAYLOAD_LINK).is_some() {
-            true => PayloadChange::release(0.0).on(of.robot(), &flexible.model, &[]).ok(),
+            true => PayloadChange::release(0.0).on(of.robot(), &of.model, &[]).ok(),
             false => None,
         };
         let without = release.and_then(|change| arm.clone().with_inertia_changes(vec![change]).ok());
@@ -326,7 +325,7 @@ impl Period {
 
 /// Returns the stepper of the arm at rest at the targets.
 fn started(
-    flexible: &FlexibleRobot,
+    flexible: &Arm,
     arm: &Arc<FlexibleArm>,
     options: &RunOptions,
     servos: Servos,

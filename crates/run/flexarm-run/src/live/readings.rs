@@ -10,14 +10,13 @@ use nalgebra::{Vector3, Vector6};
 
 use crate::arm::Arm;
 use crate::error::Error;
-use crate::flexible::FlexibleRobot;
 use crate::monitor::stress::StressMonitor;
 use crate::robot::tcp_frame;
 use crate::run::link_side_angles;
 
 /// Quantities of an arm at its current state.
 pub struct Readings {
-    flexible: Arc<FlexibleRobot>,
+    flexible: Arc<Arm>,
     pub(super) seen: Observation,
     /// Workspaces for the poses of the rigid arm at the targets and for the velocities of the
     /// flexible one.
@@ -31,14 +30,14 @@ pub struct Readings {
 
 impl Readings {
     /// Allocates the readings of an arm; `stiffness`: factor on that of all links.
-    pub(super) fn new(arm: &Arm, commanded: &FlexibleArm, stiffness: f64) -> Result<Self, Error> {
-        let flexible = arm.flexible().clone();
+    pub(super) fn new(arm: &Arc<Arm>, commanded: &FlexibleArm, stiffness: f64) -> Result<Self, Error> {
+        let flexible = arm.clone();
         let stress = match arm.robot().gauges.is_empty() {
             true => None,
             false => {
                 let mut robot = arm.robot().clone();
                 robot.flexible_links.iter_mut().for_each(|link| link.stiffness_factor *= stiffness);
-                StressMonitor::new(&robot, &flexible, commanded, arm.modelling())?
+                StressMonitor::new(&Arm { robot: Arc::new(robot), ..Arm::clone(arm) }, commanded)?
             }
         };
         Ok(Self {

@@ -9,7 +9,7 @@ use flexarm_analysis::{ContributionPeak, ContributionPeaks};
 use flexarm_stepping::{ElasticElement, FlexibleArm, Observation};
 use nalgebra::Vector6;
 
-use crate::flexible::{FlexibleRobot, Owner};
+use crate::arm::{Arm, Owner};
 use crate::twin::RigidTwin;
 
 /// Monitors all contributors: links, then drives, then the following error.
@@ -22,7 +22,7 @@ pub(crate) struct Contributions {
 }
 
 impl Contributions {
-    pub(crate) fn new(flexible: &FlexibleRobot, n_drives: usize) -> Self {
+    pub(crate) fn new(flexible: &Arm, n_drives: usize) -> Self {
         let n_links = flexible.spans.len();
         let places = flexible.owners.iter().map(|owner| match owner {
             Owner::Link(link) => *link,

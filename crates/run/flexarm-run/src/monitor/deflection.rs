@@ -3,7 +3,7 @@
 use flexarm_stepping::FlexibleArm;
 use nalgebra::DVector;
 
-use crate::flexible::{FlexibleRobot, Owner};
+use crate::arm::{Arm, Owner};
 
 /// Monitors the springs between motors and links.
 pub struct Deflections {
@@ -15,7 +15,7 @@ pub struct Deflections {
 
 impl Deflections {
     /// `n_drives`: number of drives of the robot.
-    pub fn new(arm: &FlexibleArm, flexible: &FlexibleRobot, n_drives: usize) -> Self {
+    pub fn new(arm: &FlexibleArm, flexible: &Arm, n_drives: usize) -> Self {
         let springs = arm.elements.iter().zip(&flexible.owners).filter_map(|(element, owner)| match owner {
             // The translations of several springs do not count.
             Owner::Drive(_)

@@ -19,7 +19,7 @@ use std::sync::Arc;
 use flexarm_kinematics::Frame;
 use flexarm_stepping::{FlexibleArm, Observation};
 
-use crate::flexible::FlexibleRobot;
+use crate::arm::Arm;
 use crate::monitor::contribution::Contributions;
 use crate::monitor::deflection::Deflections;
 use crate::monitor::drive_load::DriveLoads;
@@ -48,7 +48,7 @@ pub(crate) struct Monitors {
 impl Monitors {
     /// Creates the monitors for an arm of a robot with `n_drives` drives; `tool` is built
     /// separately.
-    pub(crate) fn new(arm: &FlexibleArm, flexible: &FlexibleRobot, n_drives: usize, tool: ToolMonitor) -> Self {
+    pub(crate) fn new(arm: &FlexibleArm, flexible: &Arm, n_drives: usize, tool: ToolMonitor) -> Self {
         Self {
             tool,
             contributions: Contributions::new(flexible, n_drives),

@@ -10,7 +10,7 @@ use flexarm_analysis::engineering_strain;
 use flexarm_kinematics::{Frame, Model, Pose, rotation_vector};
 use nalgebra::{Rotation3, Vector3};
 
-use crate::flexible::FlexibleRobot;
+use crate::arm::Arm;
 
 /// Figures of one link.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -52,7 +52,7 @@ struct Span {
     last: Option<(f64, Vector3<f64>)>,
 }
 
-/// Monitors the flexible links, in the order of [`FlexibleRobot::spans`].
+/// Monitors the flexible links, in the order of [`Arm::spans`].
 pub struct Strains {
     spans: Vec<Span>,
     largest: Vec<LinkStrain>,
@@ -60,7 +60,7 @@ pub struct Strains {
 
 impl Strains {
     /// `model`: tree of the flexible robot.
-    pub fn new(flexible: &FlexibleRobot, model: &Model) -> Self {
+    pub fn new(flexible: &Arm, model: &Model) -> Self {
         let frame = |name: &str| model.frame(name).expect("a link of the substitution");
         let spans = flexible.spans.iter().map(|span| Span {
             near: Interface::new(frame(&span.link), span.X_LA),

@@ -10,6 +10,7 @@ use toml::Spanned;
 
 use super::entries::{held_joint, limit_effort, make_helical, tcp_of};
 use super::{Robot, TCP_FRAME, finding_text};
+use crate::arm::Arm;
 use crate::balancer_entry::add_balancers;
 use crate::calibration_entry::{Calibration, calibrate};
 use crate::caveat::{Caveat, parts};
@@ -19,11 +20,11 @@ use crate::drive_entry::drives;
 use crate::entry_checks::{check_finite, keep};
 use crate::error::Error;
 use crate::file_cache::FileCache;
-use crate::flexible::FlexibleRobot;
 use crate::gauge_entry::gauges;
 use crate::link_entry::{LinkHome, flexible_link};
 use crate::loop_entry::add_loops;
 use crate::mounting_entry::add_mounting;
+use crate::options::Modelling;
 use crate::ranges::not_finite;
 use crate::robot_file::{RobotFile, parse_robot_file};
 
@@ -36,32 +37,69 @@ pub struct LoadOptions {
     pub urdf: ReadOptions,
 }
 
-impl Robot {
-    /// Loads a `robot.toml`, a folder with one, or a bare `.urdf` or `.xacro`.
+/// Source of a robot: a path, or texts that need not exist as files.
+pub struct RobotSource<'a> {
+    /// Path of a `robot.toml`, a folder with one, a `.urdf` or a `.xacro`. Relative paths in the
+    /// text start from its folder, and messages quote it.
+    pub path: &'a Path,
+    /// Text of the robot file, used instead of the content of `path`.
+    pub text: Option<&'a str>,
+    /// Description, used instead of the file that the key `urdf` names.
+    pub description: Option<Description<'a>>,
+    /// Options for loading.
+    pub options: &'a LoadOptions,
+    /// Content of the files that the text names, as far as they are already read.
+    pub files: Option<&'a FileCache>,
+}
+
+/// Description of a robot that is not read from a file.
+pub enum Description<'a> {
+    /// Text of a URDF or xacro.
+    Text(&'a str),
+    /// Description that is already read.
+    Read(&'a UrdfRobot),
+}
+
+impl<'a> RobotSource<'a> {
+    /// Returns the source of a robot file, URDF or xacro at a path.
+    pub fn new(path: &'a Path, options: &'a LoadOptions) -> Self {
+        Self { path, text: None, description: None, options, files: None }
+    }
+
+    /// Reads the robot and models its links and drives as the file asks.
     ///
     /// # Errors
     /// [`Error`] with the file, the location, the value found and how to fix it.
-    pub fn load(path: impl AsRef<Path>) -> Result<Self, Error> {
-        Self::load_with(path.as_ref(), &LoadOptions::default())
+    pub fn load(self) -> Result<Arc<Arm>, Error> {
+        let Some(text) = self.text else { return self.load_path() };
+        let own = FileCache::default();
+        let files = self.files.unwrap_or(&own);
+        let (file, source) = parse_robot_file(text, self.path)?;
+        let folder = self.path.parent().unwrap_or(Path::new("."));
+        let urdf_path = folder.join(file.urdf.get_ref());
+        let description = match self.description {
+            Some(Description::Read(urdf)) => urdf.clone(),
+            given => {
+                if given.is_none() && !urdf_path.is_file() {
+                    let message = format!("urdf = {:?}: there is no file {}", file.urdf.get_ref(), urdf_path.display());
+                    return Err(source.error(file.urdf.span(), message).into());
+                }
+                let options = urdf_options(&file, &source, folder, self.options)?;
+                match given {
+                    Some(Description::Text(text)) => parse_urdf(text, &urdf_path, &options)?,
+                    _ => files.urdf(&urdf_path, &options)?,
+                }
+            }
+        };
+        let found = Robot::of_file(self.path, urdf_path, description, &file, &source, self.options, files)?;
+        match not_finite(text) {
+            Some((span, message)) => Err(source.error(span, message).into()),
+            None => Ok(found),
+        }
     }
 
-    /// As [`Robot::load`], with options.
-    ///
-    /// # Errors
-    /// As [`Robot::load`].
-    pub fn load_with(path: &Path, options: &LoadOptions) -> Result<Self, Error> {
-        Self::load_modelled(path, options).map(|(robot, _)| robot)
-    }
-
-    /// As [`Robot::load_with`], and also returns the robot with its links and drives modelled as
-    /// the file asks ([`Robot::flexible_robot`]).
-    ///
-    /// Loading already builds this model as a check; pass it to [`Arm::new`](crate::Arm::new).
-    ///
-    /// # Errors
-    /// As [`Robot::load`].
-    pub fn load_modelled(path: &Path, options: &LoadOptions) -> Result<(Self, FlexibleRobot), Error> {
-        let path = if path.is_dir() { path.join("robot.toml") } else { path.to_owned() };
+    fn load_path(self) -> Result<Arc<Arm>, Error> {
+        let path = if self.path.is_dir() { self.path.join("robot.toml") } else { self.path.to_owned() };
         if !path.exists() {
             let what = "there is no such file; give a robot.toml, a folder with one, or a .urdf or .xacro file".into();
             return Err(Error::File { path, what });
@@ -69,22 +107,50 @@ impl Robot {
         match path.extension().and_then(|e| e.to_str()) {
             Some("toml") => {
                 let text = flexarm_files::read_text(&path)?;
-                Self::of_texts(&path, &text, None, options, &FileCache::default())
+                RobotSource { path: &path, text: Some(&text), ..self }.load()
             }
-            Some("urdf" | "xacro") => Self::from_urdf(&path, options),
+            Some("urdf" | "xacro") => Robot::from_urdf(&path, self.options),
             _ => {
                 let what = "expected a robot.toml, a folder with one, or a file ending in .urdf or .xacro".into();
                 Err(Error::File { path, what })
             }
         }
     }
+}
 
-    fn from_urdf(path: &Path, options: &LoadOptions) -> Result<(Self, FlexibleRobot), Error> {
+impl Robot {
+    /// Loads a `robot.toml`, a folder with one, or a bare `.urdf` or `.xacro`.
+    ///
+    /// # Errors
+    /// As [`RobotSource::load`].
+    pub fn load(path: impl AsRef<Path>) -> Result<Self, Error> {
+        Self::load_with(path.as_ref(), &LoadOptions::default())
+    }
+
+    /// As [`Robot::load`], with options.
+    ///
+    /// # Errors
+    /// As [`RobotSource::load`].
+    pub fn load_with(path: &Path, options: &LoadOptions) -> Result<Self, Error> {
+        RobotSource::new(path, options).load().map(|arm| arm.robot().clone())
+    }
+
+    /// Builds a robot from the text of a robot file, which need not exist on disk.
+    ///
+    /// * `path`: nominal path of the file.
+    ///
+    /// # Errors
+    /// As [`RobotSource::load`].
+    pub fn from_toml(text: &str, path: &Path, options: &LoadOptions) -> Result<Self, Error> {
+        RobotSource { text: Some(text), ..RobotSource::new(path, options) }.load().map(|arm| arm.robot().clone())
+    }
+
+    fn from_urdf(path: &Path, options: &LoadOptions) -> Result<Arc<Arm>, Error> {
         let urdf = read_urdf(path, &options.urdf)?;
         let name = urdf.mechanism.name.clone();
         let link = options.tcp.clone().or_else(|| default_tcp(&urdf.mechanism).map(str::to_owned));
         let link = link.ok_or(Error::NoTcp { in_file: false })?;
-        let mut robot = Self {
+        let robot = Self {
             name,
             path: path.to_owned(),
             urdf_path: path.to_owned(),
@@ -103,93 +169,8 @@ impl Robot {
             calibration: Vec::new(),
             gauges: Vec::new(),
             written: Vec::new(),
-            rigid_tree: Arc::default(),
         };
-        let flexible = robot.finish(None)?;
-        Ok((robot, flexible))
-    }
-
-    /// Builds a robot from the text of a robot file, which need not exist on disk.
-    ///
-    /// * `path`: nominal path of the file; relative paths start from its folder, and messages quote
-    ///   it.
-    ///
-    /// # Errors
-    /// As [`Robot::load`].
-    pub fn from_toml(text: &str, path: &Path, options: &LoadOptions) -> Result<Self, Error> {
-        Self::of_text(path, text, options, &FileCache::default())
-    }
-
-    /// As [`Robot::from_toml`], with the text of the URDF or xacro as well: neither needs to exist
-    /// as a file.
-    ///
-    /// The key `urdf` of the robot file then only gives the name quoted in messages and the
-    /// location from which meshes are searched.
-    ///
-    /// # Errors
-    /// As [`Robot::load`].
-    pub fn from_texts(text: &str, urdf: &str, path: &Path, options: &LoadOptions) -> Result<Self, Error> {
-        Self::of_texts(path, text, Some(urdf), options, &FileCache::default()).map(|(robot, _)| robot)
-    }
-
-    /// As [`Robot::from_toml`]; reads the files named in the text through the cache.
-    pub fn of_text(path: &Path, text: &str, options: &LoadOptions, files: &FileCache) -> Result<Self, Error> {
-        Self::of_texts(path, text, None, options, files).map(|(robot, _)| robot)
-    }
-
-    /// As [`Self::of_text`], optionally with the text of the description.
-    fn of_texts(
-        path: &Path,
-        text: &str,
-        description: Option<&str>,
-        options: &LoadOptions,
-        files: &FileCache,
-    ) -> Result<(Self, FlexibleRobot), Error> {
-        let (file, source) = parse_robot_file(text, path)?;
-        let folder = path.parent().unwrap_or(Path::new("."));
-        let urdf_path = folder.join(file.urdf.get_ref());
-        if description.is_none() && !urdf_path.is_file() {
-            let message = format!("urdf = {:?}: there is no file {}", file.urdf.get_ref(), urdf_path.display());
-            return Err(source.error(file.urdf.span(), message).into());
-        }
-        let mut urdf_options = options.urdf.clone();
-        urdf_options.packages.extend(file.packages.iter().map(|(name, to)| (name.clone(), folder.join(to))));
-        urdf_options.waive.extend(file.waive_inertia.iter().cloned());
-        urdf_options.discard.extend(file.discard_inertia.iter().cloned());
-        for (name, value) in &file.args {
-            let given = urdf_options.arguments.iter().any(|(given, _)| given == name);
-            let value = argument_text(name, value, &source)?;
-            if !given {
-                urdf_options.arguments.push((name.clone(), value));
-            }
-        }
-        if let Some(estimate) = inertia_estimate(&file, &source)? {
-            urdf_options.inertia_from_mesh.get_or_insert(estimate);
-        }
-        let urdf = match description {
-            Some(text) => parse_urdf(text, &urdf_path, &urdf_options)?,
-            None => files.urdf(&urdf_path, &urdf_options)?,
-        };
-        let found = Self::of_file(path, urdf_path, urdf, &file, &source, options, files)?;
-        match not_finite(text) {
-            Some((span, message)) => Err(source.error(span, message).into()),
-            None => Ok(found),
-        }
-    }
-
-    /// Builds a robot from the text of a robot file at `path` and a description that is already
-    /// read; also returns it with its links and drives modelled as the file asks.
-    ///
-    /// # Errors
-    /// As [`Robot::load`].
-    pub fn with_description(
-        path: &Path,
-        text: &str,
-        urdf_path: PathBuf,
-        urdf: UrdfRobot,
-    ) -> Result<(Self, FlexibleRobot), Error> {
-        let (file, source) = parse_robot_file(text, path)?;
-        Self::of_file(path, urdf_path, urdf, &file, &source, &LoadOptions::default(), &FileCache::default())
+        robot.finish(None)
     }
 
     /// Builds a robot from a parsed robot file and its description.
@@ -201,7 +182,7 @@ impl Robot {
         source: &Source,
         options: &LoadOptions,
         files: &FileCache,
-    ) -> Result<(Self, FlexibleRobot), Error> {
+    ) -> Result<Arc<Arm>, Error> {
         let folder = path.parent().unwrap_or(Path::new("."));
         let mut faults: Vec<Error> = Vec::new();
         let (rigid, calibration) = changed_joints(&mut urdf.mechanism, file, source, &mut faults);
@@ -225,7 +206,6 @@ impl Robot {
             calibration,
             gauges: Vec::new(),
             written: written_caveats(file),
-            rigid_tree: Arc::default(),
         };
         robot.add_entries(file, source, &LinkHome { folder, files }, &mut faults);
         match faults.len() {
@@ -233,8 +213,7 @@ impl Robot {
             1 => return Err(faults.remove(0)),
             _ => return Err(Error::Several(faults)),
         }
-        let flexible = robot.finish(Some((file, source)))?;
-        Ok((robot, flexible))
+        robot.finish(Some((file, source)))
     }
 
     /// Adds payload, loops, drives, balancers, flexible links, gauges and mounting of the file, in
@@ -282,8 +261,8 @@ impl Robot {
         }
     }
 
-    /// Adds the TCP frame and checks that both trees can be built.
-    fn finish(&mut self, file: Option<(&RobotFile, &Source)>) -> Result<FlexibleRobot, Error> {
+    /// Adds the TCP frame and models links and drives.
+    fn finish(mut self, file: Option<(&RobotFile, &Source)>) -> Result<Arc<Arm>, Error> {
         let (link, X_LT) = self.tcp.clone();
         if self.rigid.link(&link).is_none() {
             let known = self.rigid.links.iter().map(|l| l.name.clone()).collect();
@@ -298,23 +277,53 @@ impl Robot {
             let mounting = f.mounting.as_ref().map(Spanned::span);
             f.flexible_link.last().map(|e| e.link.span()).or(mounting).map(|span| (s, span))
         });
-        match (self.flexible_robot(), last_flexible) {
-            (Ok(flexible), _) => {
-                for span in &flexible.spans {
-                    let (own, parts) = (span.own_mass, span.part_masses.iter().sum::<f64>());
-                    if own > 0.0 && (parts / own - 1.0).abs() > 1e-6 {
-                        self.warnings.push(format!(
-                            "link {:?}: the two parts weigh {parts:.4} kg, the URDF's link {own:.4} kg; the parts count",
-                            span.link
-                        ));
-                    }
-                }
-                Ok(flexible)
+        let mut arm = match (Arc::new(self).modelled(&Modelling::default()), last_flexible) {
+            (Ok(arm), _) => arm,
+            (Err(Error::Modelling(fault)), Some((source, span))) => {
+                return Err(source.error(span, fault.to_string()).into());
             }
-            (Err(Error::Modelling(fault)), Some((source, span))) => Err(source.error(span, fault.to_string()).into()),
-            (Err(error), _) => Err(error),
+            (Err(error), _) => return Err(error),
+        };
+        let heavier = arm.spans.iter().filter_map(|span| {
+            let (own, parts) = (span.own_mass, span.part_masses.iter().sum::<f64>());
+            (own > 0.0 && (parts / own - 1.0).abs() > 1e-6).then(|| {
+                format!(
+                    "link {:?}: the two parts weigh {parts:.4} kg, the URDF's link {own:.4} kg; the parts count",
+                    span.link
+                )
+            })
+        });
+        let heavier: Vec<String> = heavier.collect();
+        if !heavier.is_empty() {
+            Arc::make_mut(&mut arm.robot).warnings.extend(heavier);
+        }
+        Ok(Arc::new(arm))
+    }
+}
+
+/// Returns the options for reading the URDF, with the packages, arguments and waived inertias of
+/// the robot file.
+fn urdf_options(
+    file: &RobotFile,
+    source: &Source,
+    folder: &Path,
+    options: &LoadOptions,
+) -> Result<ReadOptions, RobotFileError> {
+    let mut urdf = options.urdf.clone();
+    urdf.packages.extend(file.packages.iter().map(|(name, to)| (name.clone(), folder.join(to))));
+    urdf.waive.extend(file.waive_inertia.iter().cloned());
+    urdf.discard.extend(file.discard_inertia.iter().cloned());
+    for (name, value) in &file.args {
+        let given = urdf.arguments.iter().any(|(given, _)| given == name);
+        let value = argument_text(name, value, source)?;
+        if !given {
+            urdf.arguments.push((name.clone(), value));
         }
     }
+    if let Some(estimate) = inertia_estimate(file, source)? {
+        urdf.inertia_from_mesh.get_or_insert(estimate);
+    }
+    Ok(urdf)
 }
 
 /// Returns the rigid robot with the gravity, helical joints, calibration and effort limits of the

@@ -6,7 +6,7 @@ mod load;
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use flexarm_flexlink::Mounting;
 use flexarm_kinematics::{Frame, Mechanism, Model, Pose};
@@ -21,17 +21,15 @@ use crate::error::{Error, ValueError};
 use crate::gauge_entry::Gauge;
 use crate::gear_entry::RobotCoupling;
 use crate::mounting::RobotMounting;
+use crate::options::Modelling;
 use crate::robot_link::RobotLink;
 
-pub use load::LoadOptions;
+pub use load::{Description, LoadOptions, RobotSource};
 
 /// Name of the frame added for the tool centre point.
 pub const TCP_FRAME: &str = "__tcp";
 /// Name of the link added for the payload.
 pub const PAYLOAD_LINK: &str = "__payload";
-
-/// Last model built, with the mechanism it was built from.
-type KeptModel = Arc<Mutex<Option<(Mechanism, Arc<Model>)>>>;
 
 /// A loaded robot.
 #[derive(Clone, Debug)]
@@ -73,8 +71,6 @@ pub struct Robot {
     pub gauges: Vec<Gauge>,
     /// Caveats that can only be found in the text of the file.
     written: Vec<Caveat>,
-    /// Last tree of the rigid robot, with the mechanism it was built from.
-    rigid_tree: KeptModel,
 }
 
 impl Robot {
@@ -131,10 +127,10 @@ impl Robot {
     ///
     /// # Errors
     /// [`Error::Modelling`] if the stiffness is singular or the name is that of a link,
-    /// [`Error::Pose`] and others as [`Robot::modelled`].
+    /// [`Error::Pose`] and others as [`Robot::model`].
     pub fn with_mounting(mut self, springs: Mounting, damping: Damping) -> Result<Self, Error> {
         self.mounting = Some(RobotMounting::Springs { springs, damping, play: Vec::new() });
-        self.flexible_robot()?;
+        self.model(&Modelling::default())?;
         Ok(self)
     }
 
@@ -180,16 +176,8 @@ impl Robot {
     /// # Errors
     /// [`Error::Model`].
     pub fn rigid_model(&self) -> Result<Arc<Model>, Error> {
-        let mut kept = self.rigid_tree.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((_, model)) = kept.as_ref().filter(|(of, _)| *of == self.rigid) {
-            return Ok(model.clone());
-        }
         let model = Model::new(&self.rigid);
-        let model = model
-            .map(Arc::new)
-            .map_err(|source| Error::Model { path: self.urdf_path.clone(), source: Box::new(source) })?;
-        *kept = Some((self.rigid.clone(), model.clone()));
-        Ok(model)
+        model.map(Arc::new).map_err(|source| Error::Model { path: self.urdf_path.clone(), source: Box::new(source) })
     }
 }
 

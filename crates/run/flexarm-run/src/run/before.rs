@@ -5,13 +5,12 @@ use flexarm_stepping::{FlexibleArm, StepRule, StepperKind};
 use nalgebra::DVector;
 
 use super::steps_per_sample;
+use crate::arm::Arm;
 use crate::caveat::pose::ArmAtRest;
 use crate::caveat::{Caveat, Severity, kinds, of_use, validity};
-use crate::flexible::FlexibleRobot;
 use crate::motion::Motion;
 use crate::options::RunOptions;
 use crate::posed::strains;
-use crate::robot::Robot;
 
 /// Minimum number of steps per period of a gear's ripple, for which a second-order stepper has an
 /// amplitude error of a few per cent.
@@ -19,10 +18,8 @@ const RIPPLE_STEPS: f64 = 12.0;
 
 /// A run that is ready to start.
 pub struct BeforeRun<'a> {
-    /// Robot as described.
-    pub robot: &'a Robot,
     /// Robot with its links and drives modelled.
-    pub flexible: &'a FlexibleRobot,
+    pub flexible: &'a Arm,
     /// Arm at the start, with its loads.
     pub arm: &'a FlexibleArm,
     /// Motion.
@@ -37,11 +34,11 @@ impl BeforeRun<'_> {
     ///
     /// * `sag_m`: static TCP deflection (m).
     pub(crate) fn caveats(&self, sag_m: f64) -> Vec<Caveat> {
-        let Self { robot, flexible, arm, motion, options } = *self;
-        let mut caveats = flexible.caveats();
+        let Self { flexible, arm, motion, options } = *self;
+        let mut caveats = flexible.link_caveats();
         caveats.extend(of_use::of_motion(motion, &flexible.rigid));
         let elastic = arm.modes.equilibrium.as_slice();
-        caveats.extend(ArmAtRest { robot, flexible, arm, elastic, sag_m }.caveats());
+        caveats.extend(ArmAtRest { flexible, arm, elastic, sag_m }.caveats());
         if let Some(first) = arm.modes.frequencies_hz().first() {
             let logged_hz = 1.0 / (steps_per_sample(options) as f64 * options.step_s);
             caveats.extend(validity::sampling(*first, logged_hz));

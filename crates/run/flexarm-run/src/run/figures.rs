@@ -7,8 +7,8 @@ use flexarm_stepping::FlexibleArm;
 
 use super::before::BeforeRun;
 use super::{Detail, RunLoop, moves};
+use crate::arm::Owner;
 use crate::caveat::{Caveat, drives, kinds, validity};
-use crate::flexible::Owner;
 use crate::headline::{self, Bending, ShareFigures};
 use crate::monitor::stress::StressMonitor;
 use crate::options::RunOptions;
@@ -118,9 +118,8 @@ impl RunLoop<'_> {
 
     /// Caveats about the input and the validity of the models in the run so far.
     fn caveats(&self, summary: &Summary, sag_m: f64, mut caveats: Vec<Caveat>) -> Vec<Caveat> {
-        let (robot, flexible, arm, motion, options) =
-            (self.robot, self.flexible, &*self.arm, self.motion, self.options);
-        caveats.extend(BeforeRun { robot, flexible, arm, motion, options }.caveats(sag_m));
+        let (flexible, arm, motion, options) = (self.flexible, &*self.arm, self.motion, self.options);
+        caveats.extend(BeforeRun { flexible, arm, motion, options }.caveats(sag_m));
         caveats.extend(self.drive_caveats());
         if let Some(tcp) = summary.tcp.as_ref() {
             let of_stepper = tcp.shares_at_peak.iter().filter(|share| share.kind == headline::STEPPER);

@@ -24,11 +24,10 @@ use flexarm_log::{
 };
 use flexarm_stepping::{FlexibleArm, Observation, Stepper};
 
-use crate::arm::{Arm, Run};
+use crate::arm::{Arm, Owner, Run};
 use crate::bends::stations;
 use crate::caveat::{self, Caveat};
 use crate::error::Error;
-use crate::flexible::{FlexibleRobot, Owner};
 use crate::headline;
 use crate::magnification::{Expected, fit_color_scale};
 use crate::monitor::Monitors;
@@ -155,7 +154,7 @@ impl Detail {
 /// memory but takes a little longer.
 const LONG_RUN: u64 = 100_000;
 
-/// Runs a scenario; the modelling in `options` must be the arm's own.
+/// Runs a scenario.
 pub(crate) fn simulate(
     built: &Arm,
     scenario: &Scenario,
@@ -163,7 +162,7 @@ pub(crate) fn simulate(
     request: RunRequest<'_>,
 ) -> Result<Run, Error> {
     let stopwatch = Stopwatch::start();
-    let (robot, flexible) = (built.robot(), built.flexible());
+    let (robot, flexible) = (built.robot(), built);
     let Checked { arm, stepper, load_caveats } = built.checked(scenario, options)?;
     let detail = Detail::of(&request);
     let RunRequest { keep, outputs, mut observer, progress, recorders: more, expected } = request;
@@ -176,7 +175,7 @@ pub(crate) fn simulate(
     }
     let shares_scale = expected.is_some();
     let expected = expected.unwrap_or_else(|| detail.expected(&arm, &flexible.tcp, scenario));
-    let stress = StressMonitor::new(robot, flexible, &arm, &options.modelling)?;
+    let stress = StressMonitor::new(flexible, &arm)?;
     let mut run = RunLoop::new(robot, &scenario.motion, options, flexible, arm, stepper, detail);
     run.monitors = run.monitors.with_stress(stress);
     if let Some(outputs) = outputs {
@@ -298,7 +297,7 @@ struct Contributor {
 }
 
 /// Lists the flexible links, the elastic drives and the following error of the servos.
-fn contributors(robot: &Robot, flexible: &FlexibleRobot, arm: &FlexibleArm) -> Vec<Contributor> {
+fn contributors(robot: &Robot, flexible: &Arm, arm: &FlexibleArm) -> Vec<Contributor> {
     let (n_links, n_drives) = (flexible.spans.len(), robot.drives.len());
     let drives = robot.drives.iter().enumerate().filter(|(k, _)| flexible.owners.contains(&Owner::Drive(*k)));
     let kind = |name: &str| if robot.stands_on(name) { headline::MOUNTING } else { headline::LINK };
@@ -315,7 +314,7 @@ struct RunLoop<'a> {
     robot: &'a Robot,
     motion: &'a Motion,
     options: &'a RunOptions,
-    flexible: &'a FlexibleRobot,
+    flexible: &'a Arm,
     /// Arm whose model is that of the last sample, including its current payload.
     arm: Arc<FlexibleArm>,
     stepper: Box<dyn Stepper>,
@@ -343,7 +342,7 @@ impl<'a> RunLoop<'a> {
         robot: &'a Robot,
         motion: &'a Motion,
         options: &'a RunOptions,
-        flexible: &'a FlexibleRobot,
+        flexible: &'a Arm,
         arm: Arc<FlexibleArm>,
         stepper: Box<dyn Stepper>,
         detail: Detail,
@@ -390,7 +389,7 @@ impl<'a> RunLoop<'a> {
             Detail::Figures => RunHeader::default(),
             Detail::Columns => names_of_signals(robot, &self.arm),
             Detail::Samples => signals(robot, &self.arm),
-            Detail::Curves => header(robot, scenario, options, &self.arm, self.flexible.links_model()),
+            Detail::Curves => header(self.flexible, scenario, options, &self.arm),
         };
         RunHeader {
             has_rigid: options.with_twin,

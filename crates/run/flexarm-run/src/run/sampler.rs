@@ -5,7 +5,7 @@ use flexarm_kinematics::{AxisMotion, Frame, JointMotion};
 use flexarm_log::{ElasticSample, EnergySample, Sample};
 use flexarm_stepping::{FlexibleArm, Observation};
 
-use crate::flexible::{FlexibleRobot, Owner};
+use crate::arm::{Arm, Owner};
 use crate::monitor::tool::ToolError;
 use crate::robot::Robot;
 use crate::twin::RigidTwin;
@@ -20,7 +20,7 @@ pub(super) struct Sampler {
 }
 
 impl Sampler {
-    pub(super) fn new(robot: &Robot, flexible: &FlexibleRobot, link_frames: Vec<Frame>, stations: Vec<Frame>) -> Self {
+    pub(super) fn new(robot: &Robot, flexible: &Arm, link_frames: Vec<Frame>, stations: Vec<Frame>) -> Self {
         Self { link_frames, stations, angles: link_side_angles(robot, flexible) }
     }
 
@@ -101,7 +101,7 @@ fn place(deflection: &mut [f64; 6], load: &mut [f64; 6], motion: AxisMotion, e: 
 }
 
 /// Contributions of gearbox springs to the link-side angle, in addition to the motor's angle.
-pub(crate) fn link_side_angles(robot: &Robot, flexible: &FlexibleRobot) -> Vec<(usize, usize, f64)> {
+pub(crate) fn link_side_angles(robot: &Robot, flexible: &Arm) -> Vec<(usize, usize, f64)> {
     let mut angles = Vec::new();
     for (group, owner) in flexible.model.elastic().iter().zip(&flexible.owners) {
         let Owner::Drive(drive) = owner else { continue };

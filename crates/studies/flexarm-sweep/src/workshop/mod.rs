@@ -39,7 +39,7 @@ struct TextFile {
 
 /// Flexible model of a robot.
 pub(crate) struct Built {
-    pub(crate) arm: Arm,
+    pub(crate) arm: Arc<Arm>,
     /// Mass of all links without the payload (kg).
     pub(crate) mass_kg: f64,
 }
@@ -154,7 +154,7 @@ impl Workshop {
 
     /// Returns the modelling of links and drives for runs without options of their own.
     pub(crate) fn base_modelling(&self) -> Modelling {
-        self.options.run().modelling
+        self.options.modelling
     }
 
     /// Finds a file that the study refers to by name, and reads it.

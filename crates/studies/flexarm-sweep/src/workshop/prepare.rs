@@ -6,7 +6,9 @@ use std::sync::{Arc, PoisonError};
 use flexarm_run::loads_file::parse_loads;
 use flexarm_run::reduce::{ReduceJob, ReduceOptions, ReduceOutputs, reduce};
 use flexarm_run::robot::PAYLOAD_LINK;
-use flexarm_run::{Error, FlexibleRobot, LoadOptions, Modelling, Motion, MotionOptions, Robot, RunOptions, Scenario};
+use flexarm_run::{
+    Arm, Error, LoadOptions, Modelling, Motion, MotionOptions, Robot, RobotSource, RunOptions, Scenario,
+};
 
 use super::run_files::RunFiles;
 use super::{Built, Workshop};
@@ -30,7 +32,7 @@ impl Workshop {
     pub(crate) fn ready(&self, values: &[ParameterValue]) -> Result<PreparedRun, Error> {
         let (files, options, robot_moves) = self.run_files(values)?;
         let run = options.run();
-        let built = self.built(&files.robot, run.modelling)?;
+        let built = self.built(&files.robot, options.modelling)?;
         let motion = self.motion_of(&files, &options, &built, robot_moves)?;
         let mut scenario = Scenario::new(motion).with_start(options.start);
         if let Some((path, text)) = &files.loads {
@@ -42,7 +44,13 @@ impl Workshop {
 
     pub(super) fn robot_of(&self, path: &Path, text: &str) -> Result<Robot, Error> {
         match path.extension().is_some_and(|ending| ending == "toml") {
-            true => Robot::of_text(path, text, &LoadOptions::default(), &self.files),
+            true => RobotSource {
+                text: Some(text),
+                files: Some(&self.files),
+                ..RobotSource::new(path, &LoadOptions::default())
+            }
+            .load()
+            .map(|arm| arm.robot().clone()),
             false => Robot::load(path),
         }
     }
@@ -53,8 +61,8 @@ impl Workshop {
             return Ok(known);
         }
         let robot = self.robot_of(path, text)?;
-        let arm = robot.flexible(modelling)?;
-        let mass_kg = mass(&robot, arm.flexible());
+        let arm = robot.model(&modelling)?;
+        let mass_kg = mass(&robot, &arm);
         let built = Arc::new(Built { arm, mass_kg });
         self.arms.put(key, built.clone());
         Ok(built)
@@ -83,7 +91,7 @@ impl Workshop {
             return Ok(known);
         }
         let motion = Motion::load_text(path, text.as_deref(), built.arm.robot(), &MotionOptions::default())?;
-        let model = &built.arm.flexible().rigid;
+        let model = &built.arm.rigid;
         let motion = match round {
             Some(seconds) => motion.with_rounded_corners(seconds, model)?,
             None => motion,
@@ -117,7 +125,7 @@ impl Workshop {
 }
 
 /// Mass of all links, including the parts of flexible links, without the payload (kg).
-fn mass(robot: &Robot, flexible: &FlexibleRobot) -> f64 {
+fn mass(robot: &Robot, flexible: &Arm) -> f64 {
     let own = robot.rigid.links.iter().filter(|link| link.name != PAYLOAD_LINK);
     let own: f64 = own.filter_map(|link| link.inertia).map(|inertia| inertia.mass).sum();
     let parts = flexible.spans.iter().map(|span| span.part_masses.iter().sum::<f64>() - span.own_mass);

@@ -23,8 +23,8 @@ use flexarm_log::{GAUGE_ENDS, STRESS_VIEW, Scenery, SceneryForm};
 use flexarm_stepping::{ElasticElement, FlexibleArm, Observation};
 use nalgebra::{DMatrix, DVector, Matrix6, Point3, RowSVector};
 
+use crate::arm::{Arm, Owner};
 use crate::error::Error;
-use crate::flexible::{FlexibleRobot, Owner};
 use crate::options::Modelling;
 use crate::robot::Robot;
 use crate::robot_link::{RobotLink, StressSource};
@@ -95,12 +95,8 @@ impl StressMonitor {
     /// # Errors
     /// [`Error::File`] for a stress file that is damaged or belongs to another link, and for a gauge
     /// that is not on the surface.
-    pub(crate) fn new(
-        robot: &Robot,
-        flexible: &FlexibleRobot,
-        arm: &FlexibleArm,
-        modelling: &Modelling,
-    ) -> Result<Option<Self>, Error> {
+    pub(crate) fn new(flexible: &Arm, arm: &FlexibleArm) -> Result<Option<Self>, Error> {
+        let robot = flexible.robot();
         let mut links = Vec::new();
         for (k, link) in robot.flexible_links.iter().enumerate().filter(|(_, link)| link.stress.is_some()) {
             // Rigid links have no spans.
@@ -110,7 +106,9 @@ impl StressMonitor {
             if owned.is_empty() {
                 continue;
             }
-            let Some((fields, map)) = fields_and_map(robot, link, span, &owned, modelling)? else { continue };
+            let Some((fields, map)) = fields_and_map(robot, link, span, &owned, flexible.modelling())? else {
+                continue;
+            };
             let elements = owned.iter().map(|element| (element.coordinate, element.size)).collect();
             let frame = arm.model.frame(&span.link).expect("a link of the substitution").clone();
             let (name, length) = (span.link.clone(), span.length);
@@ -285,13 +283,11 @@ impl StressMonitor {
 
 /// Returns the stress of the links of an arm at rest at coordinates q, without times and damage.
 pub(crate) fn stress_at_rest(
-    robot: &Robot,
-    flexible: &FlexibleRobot,
+    flexible: &Arm,
     arm: &FlexibleArm,
-    modelling: &Modelling,
     q: &DVector<f64>,
 ) -> Result<Vec<LinkStressFigures>, Error> {
-    let Some(mut monitor) = StressMonitor::new(robot, flexible, arm, modelling)? else { return Ok(Vec::new()) };
+    let Some(mut monitor) = StressMonitor::new(flexible, arm)? else { return Ok(Vec::new()) };
     let mut seen = Observation::new(arm);
     seen.q.copy_from(q);
     monitor.update(&seen);
