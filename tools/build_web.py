@@ -91,11 +91,12 @@ def copy_shipped():
         (shipped / path).parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(ROOT / path, shipped / path)
     robots = []
-    for robot in sorted(path.parent for path in (ROOT / "robots").glob("*/robot.toml")):
+    for robot in sorted(path.parent for path in (ROOT / "robots").rglob("robot.toml")):
+        name = robot.relative_to(ROOT / "robots").as_posix()
         title = (robot / "README.md").read_text().splitlines()[0].lstrip("# ")
         # Meshes of finite elements are the source of the reduced links, which a run does not read.
-        files = [path for path in tracked if path.startswith(f"robots/{robot.name}/") and not path.endswith((".msh", ".msh.gz"))]
-        robots.append({"name": robot.name, "title": title, "files": files})
+        files = [path for path in tracked if path.startswith(f"robots/{name}/") and not path.endswith((".msh", ".msh.gz"))]
+        robots.append({"name": name, "title": title, "files": files})
     motions = [path for path in tracked if path.startswith("trajectories/") and path.endswith((".toml", ".csv"))]
     named = [{"name": Path(path).stem, "files": [path]} for path in motions if ".loads." not in path]
     (PUBLIC / "shipped.json").write_text(json.dumps({"robots": robots, "motions": named}))

@@ -174,7 +174,7 @@ def reduced(half: str) -> Slip:
     """Returns a reduction with a box of nodes as its interface A."""
 
     def slip(_: Place) -> list[str]:
-        mesh = ["reduce", "robots/one_beam/fe/one_beam.msh", "--units", "m-kg-s", "--material", "aluminium"]
+        mesh = ["reduce", "robots/test/one_beam/fe/one_beam.msh", "--units", "m-kg-s", "--material", "aluminium"]
         faces = ["--interface", half, "--interface", "B=plane(0.8,0,0; 1,0,0)", "--at", "A=0,0,0", "--at", "B=0.8,0,0"]
         return [*mesh, *faces, "--no-files"]
 
@@ -236,8 +236,8 @@ SLIPS: list[tuple[str, Slip, Slip]] = [
     ("wall 1.4 m for 14 mm", asked("check", "robots/kr210/beams.toml"), toml("kr210/beams.toml", r"0\.014", "1.4")),
     (
         "tube radius as diameter",
-        asked("check", "robots/three_beams/robot.toml"),
-        toml("three_beams/robot.toml", r"outer_diameter = 0\.06", "outer_diameter = 0.03"),
+        asked("check", "robots/test/three_beams/robot.toml"),
+        toml("test/three_beams/robot.toml", r"outer_diameter = 0\.06", "outer_diameter = 0.03"),
     ),
     (
         "counterbalance on the wrong side",
@@ -296,7 +296,7 @@ def false_alarms(program: str, urdfs: list[str]) -> tuple[int, list[str]]:
     """Returns the number of robots tested and their warnings: shipped ones and those of `flexarm
     new`."""
     place = Place(program)
-    robots = sorted(str(p.relative_to(place.folder)) for p in (place.folder / "robots").glob("*/*.toml"))
+    robots = sorted(str(p.relative_to(place.folder)) for p in (place.folder / "robots").rglob("*.toml"))
     robots = [robot for robot in robots if "urdf =" in (place.folder / robot).read_text()]
     for k, urdf in enumerate(urdfs):
         folder = f"made_{k}_{pathlib.Path(urdf).stem}"

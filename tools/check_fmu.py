@@ -23,7 +23,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 CASES = [  # robot, options
     ("kr210", []),
-    ("reference_arm", ["--drives", "servo", "--links", "modal"]),
+    ("robots/test/reference_arm", ["--drives", "servo", "--links", "modal"]),
     ("tests/golden/ur10_like.urdf", []),
     ("kr210", ["--links", "modal"]),
     ("kr300", ["--drives", "servo"]),

@@ -27,7 +27,7 @@ import numpy as np
 import golden_moberg as arm
 
 ROOT = Path(__file__).resolve().parent.parent
-ROBOT = ROOT / "robots" / "moberg_arm"
+ROBOT = ROOT / "robots/test" / "moberg_arm"
 STEPS = (1e-3, 5e-4, 2e-4, 1e-4)
 AT_THE_JOINT = arm.RATIO**2
 FAILED = []

@@ -20,8 +20,8 @@ from robot_file import Arm, origin
 
 ROOT = Path(__file__).parent.parent
 FILES = {"pick_and_place.toml": "kr210", "point_to_point.toml": "kr210", "large_moves.toml": "kr210", "stress.toml": "kr210", "iso9283_path.csv": "kr210",
-         "reference_arm.toml": "reference_arm", "beam_hold.toml": "one_beam", "beam_swing.toml": "three_beams",
-         "manutec_r3.toml": "manutec_r3", "identified_arms.toml": ("kr210_identified", "kr500_identified"), "three_mass.toml": "abb_three_mass", "moberg_arm.toml": "moberg_arm"}
+         "reference_arm.toml": "test/reference_arm", "beam_hold.toml": "test/one_beam", "beam_swing.toml": "test/three_beams",
+         "manutec_r3.toml": "manutec_r3", "identified_arms.toml": ("kr210_identified", "kr500_identified"), "three_mass.toml": "abb_three_mass", "moberg_arm.toml": "test/moberg_arm"}
 # m; the box behind the inertia of the payload
 PAYLOAD_HALF_SIZE = np.array([0.25, 0.25, 0.20])
 quintic = lambda u: u**3 * (10 - 15 * u + 6 * u * u)
@@ -142,11 +142,11 @@ def check(name, robot):
     position = (np.abs(q - (low + high) / 2) / ((high - low) / 2)).max()
     share = [position, (np.abs(qd) / speed).max(), (np.abs(tau) / effort).max()]
     tcp = np.array([arm.pose(x).translation for x in q[::5]])
-    print(f"{name:20} {robot:14} {t[-1]:6.2f} s; position {share[0]:.2f}, speed {share[1]:.3f}, effort {share[2]:.2f} of the limit;"
+    print(f"{name:20} {robot:18} {t[-1]:6.2f} s; position {share[0]:.2f}, speed {share[1]:.3f}, effort {share[2]:.2f} of the limit;"
           f" TCP up to {np.linalg.norm(np.diff(tcp, axis=0), axis=1).max() / 5e-3:.2f} m/s; lowest {lowest[link]:.3f} m ({link})")
     ok = share[0] <= 1 and share[1] <= 1.001 and (share[2] <= 1 or name == "stress.toml")
     # their axis is at height zero
-    return ok and (lowest[link] > 0.05 or robot in ("one_beam", "abb_three_mass", "moberg_arm"))
+    return ok and (lowest[link] > 0.05 or robot in ("test/one_beam", "abb_three_mass", "test/moberg_arm"))
 
 
 if __name__ == "__main__":

@@ -20,8 +20,8 @@ import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 ROBOTS = ["abb_three_mass", "kr210", "robots/kr210/beams.toml", "robots/kr210/drives.toml", "robots/kr210/links.toml", "kr210_identified",
-          "robots/kr210_identified/loaded.toml", "kr500_identified", "lower_arm", "manutec_r3", "one_beam", "robots/one_beam/mesh.toml",
-          "reference_arm", "reference_arm_coupled", "three_beams", "robots/three_beams/mesh.toml"]
+          "robots/kr210_identified/loaded.toml", "kr500_identified", "lower_arm", "manutec_r3", "one_beam", "robots/test/one_beam/mesh.toml",
+          "reference_arm", "reference_arm_coupled", "three_beams", "robots/test/three_beams/mesh.toml"]
 # Options that cover each stepper, link model and initial state; short motions, few samples.
 RUNS = [
     ["--stepper", "generalized-alpha"],

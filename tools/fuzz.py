@@ -1004,7 +1004,7 @@ def own_targets():
     for kind in ("v22_ascii", "v22_binary", "v41_ascii", "v41_binary"):
         name = f"three_blocks_{kind}.msh"
         targets.append(Target(f"mesh-msh-{kind}", name, {name: (data / name).read_bytes()}, [["reduce", name, "--list", "--json"]]))
-    beam = (ROOT / "robots/one_beam/fe/one_beam.msh").read_bytes()
+    beam = (ROOT / "robots/test/one_beam/fe/one_beam.msh").read_bytes()
     seats = ["--interface", "interface_A", "--interface", "interface_B", "--at", "A=centroid", "--at", "B=centroid"]
     line = ["reduce", "one_beam.msh", "--units", "m-kg-s", "--material", "steel", *seats, "--modes", "2", "--no-files", "--json"]
     targets.append(Target("mesh-msh-one_beam", "one_beam.msh", {"one_beam.msh": beam}, [line]))

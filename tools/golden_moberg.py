@@ -7,7 +7,7 @@ Moberg and Oehr.
 
 q0 motor, q1 to q3 arm masses; angles and torques as the motor sees them. D holds the dampers between
 neighbours, F the friction to ground: `friction="all"` is the published model, `friction="motor"` has
-no friction of the arm masses, as robot.toml and torque.toml of robots/moberg_arm. The numbers are
+no friction of the arm masses, as robot.toml and torque.toml of robots/test/moberg_arm. The numbers are
 those of the publication and not read from the robot's files, so a wrong number there shows in
 tools/check_moberg.py, which compares flexarm with these functions.
 
@@ -35,7 +35,7 @@ LEVERS = np.array([0.0, 0.02, 0.6, 1.53]) / RATIO
 SECONDS = 2.0
 JUMPS = (0.0, 0.3, 0.6, SECONDS)
 HEADER = """\
-# robots/moberg_arm: {what}. Tool: numpy {numpy}, scipy {scipy}; script: tools/golden_moberg.py.
+# robots/test/moberg_arm: {what}. Tool: numpy {numpy}, scipy {scipy}; script: tools/golden_moberg.py.
 # {columns}
 """
 

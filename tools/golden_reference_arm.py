@@ -11,7 +11,7 @@ exactly, the twelve elastic coordinates e are free:
 
     M_ee e'' = -K e - beta K e' - h_e(q, q', [q_a'', 0])          h by one RNEA, M_ee from CRBA
 
-Model: robots/reference_arm as read by robot_file.py; each elastic joint is a translation and a
+Model: robots/test/reference_arm as read by robot_file.py; each elastic joint is a translation and a
 Z-Y-X rotation, so that all coordinates live in a vector space. The integrator is restarted where
 the jerk of the motion jumps.
 """
@@ -32,7 +32,7 @@ GOLDEN = ROOT / "tests" / "golden" / "reference_arm_mid.csv"
 EVERY_S = 0.004
 ALLOWED = 1e-11
 HEADER = """\
-# Reference arm (robots/reference_arm): converged TCP motion, drives prescribed, elastic joints as x y z rx ry rz with
+# Reference arm (robots/test/reference_arm): converged TCP motion, drives prescribed, elastic joints as x y z rx ry rz with
 # R = Rz Ry Rx and generalised force -(K e + beta K de/dt), start in static equilibrium.
 # Tool: Pinocchio 4.1.0 (RNEA, CRBA) with scipy's DOP853 at rtol 1e-10, restarted at the jumps of the jerk; a Radau run
 # at rtol 1e-9 agrees to 7.3e-13 m. Regenerate: tools/golden_reference_arm.py. Units m, rad, s; world axes;
@@ -115,7 +115,7 @@ if __name__ == "__main__":
     ap.add_argument("--write", action="store_true", help="replace the stored file")
     args = ap.parse_args()
     motion = Motion(ROOT / "trajectories" / "reference_arm.toml")
-    hybrid = Hybrid(Arm(ROOT / "robots" / "reference_arm"), motion)
+    hybrid = Hybrid(Arm(ROOT / "robots/test" / "reference_arm"), motion)
     times = np.arange(round(motion.t_end / EVERY_S) + 1) * EVERY_S
 
     e, calls = hybrid.integrate(times, "DOP853", 1e-10, 1e-13)

@@ -1,4 +1,4 @@
-"""Draws and meshes the castings of robots/lower_arm and robots/kr210/fe.
+"""Draws and meshes the castings of robots/test/lower_arm and robots/kr210/fe.
 
 Needs gmsh and numpy (`pip install gmsh numpy`).
 
@@ -204,7 +204,7 @@ def link_3():
 
 
 CASTINGS = {
-    "lower_arm": Casting("lower_arm", "lower_arm", lower_arm, LOWER_SEATS, 1e-3, 0.041, 2700.0),
+    "lower_arm": Casting("test/lower_arm", "lower_arm", lower_arm, LOWER_SEATS, 1e-3, 0.041, 2700.0),
     "link_2": Casting("kr210/fe", "link_2", link_2, LINK_2_SEATS, 1.0, 0.0588, 7100.0),
     "link_3": Casting("kr210/fe", "link_3", link_3, LINK_3_SEATS, 1.0, 0.050, 7100.0),
 }

@@ -1,4 +1,4 @@
-"""Writes robots/reference_arm and robots/reference_arm_coupled: URDF and robot.toml. Needs numpy
+"""Writes robots/test/reference_arm and robots/test/reference_arm_coupled: URDF and robot.toml. Needs numpy
 only.
 
     python tools/make_reference_arm.py
@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-ROBOTS = Path(__file__).parent.parent / "robots"
+ROBOTS = Path(__file__).parent.parent / "robots/test"
 X, Y, Z = np.eye(3)
 
 # lower arm: aluminium box, 160 mm along link x (section y), 120 mm along link y (section z), wall
@@ -150,7 +150,7 @@ def toml(name, variant):
                       f'angles = "euler-zyx"\ndamping = {{ stiffness_beta = {variant["beta"]!r} }}\n')
     return (f"# Written by tools/make_reference_arm.py; see README.md.\nformat = 1\nname = \"{name}\"\nurdf = \"{name}.urdf\"\n"
             "tcp = { link = \"link_6\", xyz = [0.2, 0.0, 0.0], rpy = [0.0, 0.0, 0.0] }\ngravity = [0.0, 0.0, -9.81]\n"
-            "default_trajectory = \"../../trajectories/reference_arm.toml\"\n\n"
+            "default_trajectory = \"../../../trajectories/reference_arm.toml\"\n\n"
             "# aluminium box, 160 x 120 mm, wall 10 mm, shear in the walls along the force alone, as the reference data have it; 60 kg, not rho A l\n"
             + link(2) + f'beam = {{ section = "given", {box}, theory = "timoshenko", y_axis = [1.0, 0.0, 0.0], {place(low)} }}\n\n'
             "# steel tube, 140 mm, wall 6 mm, E 210 GPa, nu 0.3, shear factor 2(1 + nu)/(4 + 3 nu) of a thin tube; 40 kg\n"

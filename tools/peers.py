@@ -4,7 +4,7 @@
     python3 tools/peers.py --write             also store it in docs/performance (json, md, svg)
     python3 tools/peers.py --draw              write table and picture from the stored numbers
 
-The robot is robots/reference_arm (18 coordinates, 12 of them elastic) on its motion of 4 s. The
+The robot is robots/test/reference_arm (18 coordinates, 12 of them elastic) on its motion of 4 s. The
 error is the maximum TCP distance from tests/golden/reference_arm_mid.csv over the peak deflection,
 every 4 ms. Three measurements of flexarm: a run of a prepared arm (set-up of the run, steps, a
 sample at its start and its end: crates/faces/flexarm/examples/prepared_runs.rs), the same with 100
@@ -104,7 +104,7 @@ def error_of(samples):
 # ours
 def flexarm(program, stepper, step, files=None):
     """CPU s of the whole process, user and system."""
-    command = [program, "compare", str(ROOT / "robots" / "reference_arm"), "--stepper", stepper, "-q", "--json"]
+    command = [program, "compare", str(ROOT / "robots/test" / "reference_arm"), "--stepper", stepper, "-q", "--json"]
     command += ["--rtol", repr(step)] if stepper == "reference" else ["--step", repr(step)]
     # Samples at the times of the truth, or at every step if its steps do not match them.
     every_4_ms = stepper == "reference" or abs(round(4e-3 / step) * step - 4e-3) < 1e-12
@@ -146,7 +146,7 @@ def read_robot():
     from golden_reference_arm import Motion
     from robot_file import Arm
 
-    arm = Arm(ROOT / "robots" / "reference_arm")
+    arm = Arm(ROOT / "robots/test" / "reference_arm")
     motion = Motion(ROOT / "trajectories" / "reference_arm.toml")
     axes = {joint["name"]: joint["axis"] for joint in arm.joints}
     bodies, at = [], np.zeros(3)

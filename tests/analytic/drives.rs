@@ -140,7 +140,7 @@ fn three_mass_arm_has_its_closed_form_frequencies() {
 fn four_mass_arm_has_the_frequencies_and_the_damping_of_its_equations() {
     let text = std::fs::read_to_string(root().join("tests/benchmarks/moberg/poles.json")).expect("benchmark file");
     let truth: Value = serde_json::from_str(&text).expect("JSON");
-    for (file, motor) in [("robots/moberg_arm", "held"), ("robots/moberg_arm/torque.toml", "free")] {
+    for (file, motor) in [("robots/test/moberg_arm", "held"), ("robots/test/moberg_arm/torque.toml", "free")] {
         let cases = truth["cases"].as_array().expect("cases");
         let fits = |case: &&Value| case["k1"] == 16.7 && case["motor"] == motor && case["friction"] == "motor";
         let case = cases.iter().find(fits).expect("a case");

@@ -24,7 +24,7 @@ fn load(robot: &str) -> Robot {
 
 /// The reference arm by file with another damping.
 fn arm(damping: Damping, motion: Arc<dyn PrescribedMotion>) -> (FlexibleArm, Frame) {
-    let robot = load("reference_arm").model(&Modelling::default()).expect("a tree");
+    let robot = load("test/reference_arm").model(&Modelling::default()).expect("a tree");
     let mut robot = Arc::unwrap_or_clone(robot);
     robot.springs.iter_mut().for_each(|spring| spring.damping = damping);
     let tool = robot.model.frame("__tcp").expect("there").clone();
@@ -215,7 +215,7 @@ impl SecondOrderSystem for Shaken {
 /// response until the start has died away: height and phase of the peak.
 #[test]
 fn a_force_at_a_resonance_shakes_the_tool_as_high_as_the_peak() {
-    let robot = load("reference_arm");
+    let robot = load("test/reference_arm");
     let request = ResponseRequest {
         inputs: vec!["force-z".into()],
         outputs: vec!["z".into()],
@@ -263,7 +263,7 @@ fn a_force_at_a_resonance_shakes_the_tool_as_high_as_the_peak() {
 /// directly as well.
 #[test]
 fn a_joint_at_a_resonance_shakes_the_tool_as_high_as_the_peak() {
-    let robot = load("reference_arm");
+    let robot = load("test/reference_arm");
     let request = ResponseRequest {
         inputs: vec!["joint_2".into()],
         outputs: vec!["x".into(), "z".into()],

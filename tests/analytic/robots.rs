@@ -53,7 +53,7 @@ fn run(
 #[test]
 fn reference_arm_by_file_equals_the_converged_curve() {
     let options = RunOptions { log_rate_hz: 250.0, ..RunOptions::default() };
-    let (summary, table) = run("reference_arm", "reference_arm.toml", &Modelling::default(), &options);
+    let (summary, table) = run("test/reference_arm", "reference_arm.toml", &Modelling::default(), &options);
     let golden = std::fs::read_to_string(root().join("tests/golden/reference_arm_mid.csv")).expect("golden file");
     let rows: Vec<Vec<f64>> = golden
         .lines()
@@ -88,8 +88,8 @@ fn reference_arm_by_file_equals_the_converged_curve() {
 /// under own weight is 3/32 instead of 1/8 of m g l³/EI (the README of the robot has the numbers).
 #[test]
 fn one_beam_sags_as_its_two_part_model_must() {
-    let (summary, _) = run("one_beam", "beam_hold.toml", &Modelling::default(), &RunOptions::default());
-    let robot = load("one_beam");
+    let (summary, _) = run("test/one_beam", "beam_hold.toml", &Modelling::default(), &RunOptions::default());
+    let robot = load("test/one_beam");
     let span = &robot.model(&Modelling::default()).expect("a tree").spans[0];
     let mass = |name: &str| robot.urdf.mechanism.link(name).and_then(|l| l.inertia).map_or(0.0, |i| i.mass);
     let (l, g) = (span.length, 9.81);
@@ -156,7 +156,7 @@ fn steppers_agree_on_the_shipped_arm() {
 fn modal_links_on_fixed_corners_agree_with_many_parts() {
     let run_with = |modelling| {
         let options = RunOptions { log_rate_hz: 100.0, ..RunOptions::default() };
-        run("three_beams", "beam_swing.toml", &modelling, &options).0
+        run("test/three_beams", "beam_swing.toml", &modelling, &options).0
     };
     let modal = run_with(Modelling { links: LinkModel::Modal, ..Modelling::default() });
     let parts = run_with(Modelling { links: LinkModel::Lumped, segments: Some(7), ..Modelling::default() });

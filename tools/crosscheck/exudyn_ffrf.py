@@ -60,9 +60,9 @@ from golden_reference_arm import Motion
 from robot_file import read_urdf, skew
 
 ROOT = Path(__file__).parent.parent.parent
-ROBOT = ROOT / "robots" / "reference_arm"
+ROBOT = ROOT / "robots/test" / "reference_arm"
 MOTION = ROOT / "trajectories" / "reference_arm.toml"
-BETA = 0.0010536078174585805            # damping D = beta K of robots/reference_arm, s
+BETA = 0.0010536078174585805            # damping D = beta K of robots/test/reference_arm, s
 TCP = ("link_6", np.array([0.2, 0.0, 0.0]))
 GRAVITY = [0.0, 0.0, -9.81]
 EVERY_S = 0.004

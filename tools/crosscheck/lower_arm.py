@@ -1,10 +1,10 @@
-"""The casting of robots/lower_arm by CalculiX and NGSolve: statics, gravity, frequencies.
+"""The casting of robots/test/lower_arm by CalculiX and NGSolve: statics, gravity, frequencies.
 
     python tools/crosscheck/lower_arm.py [--program target/release/flexarm]
 
 Statics use two kinds of ties. Writes tests/verification/lower_arm_calculix.json and
 lower_arm_ngsolve.json and prints their differences from each other, from an own assembly, from
-CalculiX's own solution with its own ties, and from robots/lower_arm/lower_arm.flex. The edges are
+CalculiX's own solution with its own ties, and from robots/test/lower_arm/lower_arm.flex. The edges are
 straight, so that the 4 points of C3D10 are exact for the stiffness, but not for the mass: gravity
 loads are exact, frequencies have errors of 3e-5 and 6e-5.
 """
@@ -15,7 +15,7 @@ import scipy.sparse as sp
 
 import fe_common as fe
 
-FOLDER = fe.ROOT / "robots/lower_arm"
+FOLDER = fe.ROOT / "robots/test/lower_arm"
 MESH = FOLDER / "lower_arm.msh.gz"
 A_AT, B_AT = np.zeros(3), np.array([0.060, 0.150, 1.100])
 AXES = {"x": (1, 0, 0), "y": (0, 1, 0), "z": (0, 0, 1)}
@@ -119,7 +119,7 @@ def main():
         print(f"flexarm reduce ({rule}) - {name}: C_BB {fe.apart(link.C_BB, other['C_BB']):.1e}, weight {gravity:.1e}, frequencies {hertz[0]:.1e}, "
               f"fixed {hertz[1]:.1e}")
 
-    common = ("The casting of robots/lower_arm (TET10, straight edges, 4 points integrate the stiffness exactly). Seats interface_A and interface_B tied to (0, 0, 0) "
+    common = ("The casting of robots/test/lower_arm (TET10, straight edges, 4 points integrate the stiffness exactly). Seats interface_A and interface_B tied to (0, 0, 0) "
               "and (0.06, 0.15, 1.1) m. C_BB: motion of B (rows) by unit loads on B (columns), A held, rigid ties (RBE2); C_BB_distributing: both ties by the "
               "mean of the nodes with equal weights (RBE3). gravity: motion of B under 9.81 m/s2 along +x, +y, +z, A held, casting alone, rigid ties. "
               "frequencies_hz: A held, B free; fixed_hz: both held; rigid ties. ")

@@ -1,4 +1,4 @@
-"""Writes the structured HEX20 meshes of robots/one_beam/fe and robots/three_beams/fe. Needs numpy.
+"""Writes the structured HEX20 meshes of robots/test/one_beam/fe and robots/test/three_beams/fe. Needs numpy.
 
     python tools/crosscheck/make_beam_meshes.py
 
@@ -155,14 +155,14 @@ def lines(*mm):
 
 def main():
     bar = grid(np.linspace(-0.010, 0.010, 3), np.linspace(-0.020, 0.020, 3))
-    write(ROBOTS / "one_beam/fe/one_beam.msh", *sweep(bar, 0.8, 40, 0))
+    write(ROBOTS / "test/one_beam/fe/one_beam.msh", *sweep(bar, 0.8, 40, 0))
 
-    write(ROBOTS / "three_beams/fe/beam_1.msh.gz", *sweep(tube(0.030, 0.003, 24), 0.8, 20, 2))
+    write(ROBOTS / "test/three_beams/fe/beam_1.msh.gz", *sweep(tube(0.030, 0.003, 24), 0.8, 20, 2))
     wall = lambda y, z: abs(y) > 0.012 or abs(z) > 0.022
     box = grid(lines(-15, -12, -4, 4, 12, 15), lines(-25, -22, -11, 0, 11, 22, 25), wall)
-    write(ROBOTS / "three_beams/fe/beam_2.msh.gz", *sweep(box, 0.6, 20, 0))
+    write(ROBOTS / "test/three_beams/fe/beam_2.msh.gz", *sweep(box, 0.6, 20, 0))
     bar = grid(lines(-15, -5, 5, 15), lines(-10, 0, 10))
-    write(ROBOTS / "three_beams/fe/beam_3.msh.gz", *sweep(bar, 0.4, 20, 0))
+    write(ROBOTS / "test/three_beams/fe/beam_3.msh.gz", *sweep(bar, 0.4, 20, 0))
 
 
 if __name__ == "__main__":

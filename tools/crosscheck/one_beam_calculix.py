@@ -1,10 +1,10 @@
-"""The bar of robots/one_beam by CalculiX: statics, gravity, frequencies, large deflections.
+"""The bar of robots/test/one_beam by CalculiX: statics, gravity, frequencies, large deflections.
 
     python tools/crosscheck/one_beam_calculix.py [--skip-large]
 
 Writes tests/verification/one_beam_calculix.json and prints the differences of CalculiX from
 NGSolve, from an own assembly, from CalculiX's own solution with its own ties, and from
-robots/one_beam/fe/one_beam.flex. Stations: a unit load is distributed over a section of nodes like
+robots/test/one_beam/fe/one_beam.flex. Stations: a unit load is distributed over a section of nodes like
 an RBE3 with equal weights, and the motion of the section is the mean of its nodes (mean
 displacement, least-squares rotation).
 """
@@ -16,7 +16,7 @@ from scipy.integrate import solve_bvp
 import fe_common as fe
 import large_bar
 
-MESH = fe.ROOT / "robots/one_beam/fe/one_beam.msh"
+MESH = fe.ROOT / "robots/test/one_beam/fe/one_beam.msh"
 LENGTH, EI = 0.8, 70e9 * 0.02 * 0.04**3 / 12
 A_AT, B_AT = np.zeros(3), np.array([LENGTH, 0, 0])
 STATIONS = (0.2, 0.4, 0.6)
@@ -143,7 +143,7 @@ def main():
               f"{fe.relative(row['u_mid'], other['u_mid']):.1e}; x {u[0] / x - 1:+.2e} z {u[2] / z - 1:+.2e} turn {-row['rotation_B'][1] / turn - 1:+.2e} "
               f"mid z {row['u_mid'][2] / mid_z - 1:+.2e}; z, elastica as soft as the mesh {u[2] / elastica(row['force_n'] * softness)[1] - 1:+.2e}; "
               f"linear {u[2] / (row['force_n'] * truth['C_BB'][2, 2]) - 1:+.2e}")
-    what = ("The bar of robots/one_beam as 40 x 2 x 2 HEX20 (C3D20, 3x3x3 points), both ends tied rigidly (RBE2) to the middles of their faces, A held. "
+    what = ("The bar of robots/test/one_beam as 40 x 2 x 2 HEX20 (C3D20, 3x3x3 points), both ends tied rigidly (RBE2) to the middles of their faces, A held. "
             "C_BB: motion of B (rows) by unit loads on B (columns). station_loads: unit loads on sections, spread over their nodes as an RBE3 with equal "
             "weights does; motions are the means of the nodes, at 0.8 that of B. gravity: motion of B by 9.81 m/s2. large_load: *STATIC with NLGEOM (linear "
             "stress and Green strain), force along z that keeps its direction on B; rotation_B: rotation vector; u_mid: mean displacement at x = 0.4")

@@ -3,14 +3,14 @@
     python tools/crosscheck/swing_stress_calculix.py
 
 Writes tests/verification/swing_stress_calculix.json: von Mises stress at nodes of the mesh of beam_3 of
-robots/three_beams over time. Its near face turns about z as prescribed, its far face carries 1 kg.
+robots/test/three_beams over time. Its near face turns about z as prescribed, its far face carries 1 kg.
 Needs ccx, gmsh, numpy, scipy and pypardiso; twelve minutes.
 """
 import numpy as np
 
 import fe_common as fe
 
-MESH = fe.ROOT / "robots/three_beams/fe/beam_3.msh.gz"
+MESH = fe.ROOT / "robots/test/three_beams/fe/beam_3.msh.gz"
 LENGTH, ANGLE, TURN, END = 0.4, 0.3, 0.08, 0.1                    # m, rad, s, s
 TIP_MASS, TIP_INERTIA = 1.0, 0.00036                              # kg, kg m2
 ALPHA = 0.0                                                       # no numerical damping

@@ -1,4 +1,4 @@
-"""The meshed arm of robots/three_beams by CalculiX and NGSolve: compliance, sag, frequencies.
+"""The meshed arm of robots/test/three_beams by CalculiX and NGSolve: compliance, sag, frequencies.
 
     python tools/crosscheck/three_beams_calculix.py
 
@@ -14,7 +14,7 @@ import scipy.sparse as sp
 
 import fe_common as fe
 
-FOLDER = fe.ROOT / "robots/three_beams/fe"
+FOLDER = fe.ROOT / "robots/test/three_beams/fe"
 FILES = [FOLDER / f"beam_{k}.msh.gz" for k in (1, 2, 3)]
 TURN = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])              # frame of beam_3 in world axes
 PLACES = [(np.eye(3), np.zeros(3)), (np.eye(3), np.array([0, 0, 0.8])), (TURN, np.array([0.6, 0, 0.8]))]
@@ -123,7 +123,7 @@ def main():
     links = from_link_files()
     for name, other in results.items():
         differences(f"flexarm reduce (ten modes) - {name}", links, other)
-    what = ("The three beams of robots/three_beams at q = 0 as one mesh of HEX20, axes of the world. Both faces at a corner tied rigidly (RBE2) to one node at the "
+    what = ("The three beams of robots/test/three_beams at q = 0 as one mesh of HEX20, axes of the world. Both faces at a corner tied rigidly (RBE2) to one node at the "
             "joint, near end of beam_1 held, far end of beam_3 tied to the tip, (0.6, 0.4, 0.8) m. C_tip: motion of the tip (rows) by unit loads on it "
             "(columns). sag: motion of the tip by 9.81 m/s2 along -z on the beams and on a point mass of 1 kg at the tip. frequencies_hz: with that mass and "
             "0.00036 kg m2 about each axis. ")

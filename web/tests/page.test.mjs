@@ -56,7 +56,7 @@ test("the first arm runs by itself and has the peak of the command line", async 
 });
 
 test("each robot of the gallery runs", async () => {
-  const page = await open("#robot=one_beam");
+  const page = await open("#robot=test/one_beam");
   const names = await page.locator("#robot option").evaluateAll((options) => options.map((option) => option.value));
   assert.ok(names.length >= 13, names.join(" "));
   for (const name of names) {
@@ -82,21 +82,21 @@ test("sliders change the run as the options of the command line do, and the addr
 });
 
 test("a description with its meshes is enough: it gets a robot file and a motion", async () => {
-  const page = await open("#robot=one_beam");
+  const page = await open("#robot=test/one_beam");
   await page.setInputFiles("#choose-folder", path.join(ROOT, "robots", "kr210"));
   await page.waitForFunction(() => document.getElementById("robot").value.startsWith("/mine"));
   await settled(page);
   assert.equal(await headline(page), native_headline("kr210"));
-  const bare = await open("#robot=one_beam");
-  await bare.setInputFiles("#choose", [path.join(ROOT, "robots", "reference_arm", "reference_arm.urdf")]);
+  const bare = await open("#robot=test/one_beam");
+  await bare.setInputFiles("#choose", [path.join(ROOT, "robots", "test", "reference_arm", "reference_arm.urdf")]);
   await bare.waitForFunction(() => document.getElementById("robot").value.startsWith("/mine"));
   await settled(bare);
   assert.match(await headline(bare), /^TCP error/, await bare.textContent("#messages"));
 });
 
 test("a damaged file gets the sentence of the command line", async () => {
-  const page = await open("#robot=one_beam");
-  const text = readFileSync(path.join(ROOT, "robots", "reference_arm", "reference_arm.urdf"), "utf8");
+  const page = await open("#robot=test/one_beam");
+  const text = readFileSync(path.join(ROOT, "robots", "test", "reference_arm", "reference_arm.urdf"), "utf8");
   const broken = text.replace(/<child link="[^"]*"\/>/, "");
   await page.setInputFiles("#choose", { name: "broken.urdf", mimeType: "application/xml", buffer: Buffer.from(broken) });
   await page.waitForFunction(() => !document.getElementById("messages").hidden);
@@ -125,7 +125,7 @@ test("time is moved by keyboard, and the arm with it", async () => {
 });
 
 test("the recording opens in the viewer of Rerun, also that of the next run", async () => {
-  const page = await open("#robot=one_beam");
+  const page = await open("#robot=test/one_beam");
   await page.click("#rerun summary");
   const shown = () => page.frameLocator("#rerun iframe").locator("body[data-state=shown]").waitFor({ timeout: 120_000 });
   await shown();
@@ -138,14 +138,14 @@ test("the recording opens in the viewer of Rerun, also that of the next run", as
 });
 
 test("a copy without the viewer says so", async () => {
-  const page = await open("#robot=one_beam");
+  const page = await open("#robot=test/one_beam");
   await page.route("**/rerun.html", (route) => route.fulfill({ status: 404 }));
   await page.click("#rerun summary");
   await page.getByText("This copy of the page has no viewer").waitFor();
 });
 
 test("memory stays flat over many runs", async () => {
-  const page = await open("#robot=one_beam");
+  const page = await open("#robot=test/one_beam");
   const session = await page.context().newCDPSession(page);
   const heap = async () => {
     await session.send("HeapProfiler.collectGarbage");

@@ -27,8 +27,8 @@ for (const [name, more] of [
   ["kr210", []],
   ["kr210", ["--links", "modal"]],
   ["kr300", []],
-  ["lower_arm", []],
-  ["one_beam", ["--stepper", "spook"]],
+  ["test/lower_arm", []],
+  ["test/one_beam", ["--stepper", "spook"]],
   ["palletiser", []],
   ["manutec_r3", ["--drives", "servo"]],
 ]) {

@@ -1,7 +1,7 @@
 //! The reference arm: six axes, two links split at mid length into two halves with a 6×6 spring.
 //!
 //! Numbers as in the converged cross-check of `tests/golden/reference_arm_mid.csv`; all joint
-//! frames are parallel to the world at the home pose. The robot folder `robots/reference_arm` is
+//! frames are parallel to the world at the home pose. The robot folder `robots/test/reference_arm` is
 //! the same arm by file.
 
 use flexarm_kinematics::{ElasticAngles, Joint, JointKind, Link, LinkInertia, Mechanism, Pose};

@@ -147,7 +147,7 @@ pub fn shipped_robot_file(given: &Path) -> PathBuf {
 /// Returns the path of a cutting tool file, given by path or by shipped name; the path itself if
 /// neither exists.
 pub fn shipped_tool(given: &Path) -> PathBuf {
-    shipped::find(given, "robots/tools", &["", ".toml"])
+    shipped::find(given, &["robots/tools"], &["", ".toml"])
 }
 
 /// Parts that the tests of this crate reach; not part of the interface.

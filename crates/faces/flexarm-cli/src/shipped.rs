@@ -9,6 +9,9 @@ use flexarm::{Error, closest};
 
 use crate::failure::Failure;
 
+/// Folders of robots: arms, and arms for tests.
+const ROBOTS: [&str; 2] = ["robots", "robots/test"];
+
 /// A folder registered by the process.
 static BROUGHT: OnceLock<PathBuf> = OnceLock::new();
 
@@ -33,18 +36,21 @@ fn roots() -> Vec<PathBuf> {
     roots
 }
 
+/// The folders below every root.
+fn places(folders: &[&str]) -> impl Iterator<Item = PathBuf> {
+    roots().into_iter().flat_map(move |root| folders.iter().map(move |folder| root.join(folder)))
+}
+
 /// Returns the path itself if it exists, else `<root>/<folder>/<name>` with one of the extensions.
-pub(crate) fn find(given: &Path, folder: &str, endings: &[&str]) -> PathBuf {
+pub(crate) fn find(given: &Path, folders: &[&str], endings: &[&str]) -> PathBuf {
     let is_name = given.components().count() == 1;
     if given.exists() || !is_name {
         return given.to_owned();
     }
-    let name = given.to_string_lossy();
-    roots()
-        .iter()
-        .flat_map(|root| endings.iter().map(|e| root.join(folder).join(format!("{name}{e}"))).collect::<Vec<_>>())
-        .find(|path| path.exists())
-        .unwrap_or_else(|| given.to_owned())
+    let name = &given.to_string_lossy();
+    let places = places(folders);
+    let mut files = places.flat_map(|place| endings.iter().map(move |e| place.join(format!("{name}{e}"))));
+    files.find(|path| path.exists()).unwrap_or_else(|| given.to_owned())
 }
 
 /// Returns a robot by path, name, or path below the folder of the shipped ones
@@ -54,7 +60,7 @@ pub(crate) fn robot_file(given: &Path) -> PathBuf {
     if found.exists() {
         return found;
     }
-    roots().iter().map(|root| root.join("robots").join(given)).find(|path| path.exists()).unwrap_or(found)
+    places(&ROBOTS).map(|place| place.join(given)).find(|path| path.exists()).unwrap_or(found)
 }
 
 /// Returns a library that comes with the program, by the name of its file; never one of the current
@@ -69,9 +75,9 @@ pub(crate) fn library(name: &str) -> Option<PathBuf> {
 /// [`Error::File`] for a name that no shipped robot has, with the names that there are.
 pub(crate) fn robot(given: Option<&Path>) -> Result<PathBuf, Error> {
     let given = given.unwrap_or(Path::new("kr210"));
-    let path = find(given, "robots", &["/robot.toml"]);
+    let path = find(given, &ROBOTS, &["/robot.toml"]);
     let advice = "give a robot.toml, a folder with one, or a .urdf or .xacro file";
-    known(given, path, "robot", advice, || names("robots", |entry| entry.join("robot.toml").is_file()))
+    known(given, path, "robot", advice, || names(&ROBOTS, |entry| entry.join("robot.toml").is_file()))
 }
 
 /// A trajectory by path or name.
@@ -82,13 +88,13 @@ pub(crate) fn trajectory(given: &Path) -> Result<PathBuf, Error> {
     let path = trajectory_file(given);
     let is_motion = |path: &Path| has_ending(path, &["toml", "csv"]) && !path.to_string_lossy().contains(".loads.");
     known(given, path, "trajectory", "give a .csv or .toml file, a bag or a robot program", || {
-        names("trajectories", is_motion)
+        names(&["trajectories"], is_motion)
     })
 }
 
 /// A trajectory by path or name, for files that name trajectories.
 pub(crate) fn trajectory_file(given: &Path) -> PathBuf {
-    find(given, "trajectories", &["", ".toml", ".csv"])
+    find(given, &["trajectories"], &["", ".toml", ".csv"])
 }
 
 /// Returns a cutting tool by path or name.
@@ -96,8 +102,8 @@ pub(crate) fn trajectory_file(given: &Path) -> PathBuf {
 /// # Errors
 /// [`Error::File`] for a name that no shipped tool has, with the names that there are.
 pub(crate) fn tool(given: &Path) -> Result<PathBuf, Error> {
-    let path = find(given, "robots/tools", &[".toml"]);
-    known(given, path, "tool", "give a .toml file", || names("robots/tools", |path| has_ending(path, &["toml"])))
+    let path = find(given, &["robots/tools"], &[".toml"]);
+    known(given, path, "tool", "give a .toml file", || names(&["robots/tools"], |path| has_ending(path, &["toml"])))
 }
 
 /// Returns the folder of the built web page.
@@ -117,10 +123,10 @@ fn has_ending(path: &Path, endings: &[&str]) -> bool {
     path.extension().is_some_and(|ending| endings.iter().any(|e| ending == *e))
 }
 
-/// Names of the entries of a folder of shipped files.
-fn names(folder: &str, wanted: impl Fn(&Path) -> bool) -> Vec<String> {
-    let entries = |root: PathBuf| std::fs::read_dir(root.join(folder)).into_iter().flatten().flatten();
-    let paths = roots().into_iter().flat_map(entries).map(|entry| entry.path()).filter(|path| wanted(path));
+/// Names of the entries of folders of shipped files.
+fn names(folders: &[&str], wanted: impl Fn(&Path) -> bool) -> Vec<String> {
+    let entries = |place: PathBuf| std::fs::read_dir(place).into_iter().flatten().flatten();
+    let paths = places(folders).flat_map(entries).map(|entry| entry.path()).filter(|path| wanted(path));
     let mut names: Vec<String> = paths.filter_map(|p| Some(p.file_stem()?.to_string_lossy().into_owned())).collect();
     names.sort();
     names.dedup();

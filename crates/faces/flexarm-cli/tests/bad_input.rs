@@ -146,7 +146,7 @@ mod trajectory {
     fn joint_that_is_missing() {
         let place = Place::new();
         place.write("motion.csv", "time,joint_1\n0,0\n1,0.5\n");
-        let robot = common::shipped_robot("reference_arm");
+        let robot = common::shipped_robot("test/reference_arm");
         let answer = place.flexarm(&["compare", &robot, "motion.csv", "-o", "result"]);
         assert_eq!(answer.code, 0, "{}", answer.err);
         answer.says(&["motion.csv", "joints that the motion does not name are held", "\"joint_2\" at 0", "[hold]"]);
@@ -275,7 +275,7 @@ mod trajectory {
         ];
         compare_motion("wild.csv", WILD, &words);
         let place = Place::new();
-        let robot = common::shipped_robot("reference_arm");
+        let robot = common::shipped_robot("test/reference_arm");
         let rows = |q: f64| format!("1,{}\n", [q; 6].map(|q| q.to_string()).join(","));
         let head = "time,joint_1,joint_2,joint_3,joint_4,joint_5,joint_6\n0,0,0,0,0,0,0\n";
         place.write("fast.csv", format!("{head}{}", rows(6.0)));
@@ -858,7 +858,7 @@ mod values_on_the_command_line {
     #[test]
     fn joint_values() {
         let place = Place::new();
-        let robot = common::shipped_robot("reference_arm");
+        let robot = common::shipped_robot("test/reference_arm");
         let at = |value: &str, words: &[&str]| {
             place.refused(&["inspect", &robot, "--at", value], words);
             place.refused(&["inspect", &robot, "--velocity", value], words);

@@ -91,7 +91,7 @@ fn corners(rate_hz: u32) -> String {
 #[test]
 fn every_stepper_takes_the_blow_of_a_corner() {
     let place = Place::new();
-    let robot = shipped_robot("reference_arm");
+    let robot = shipped_robot("test/reference_arm");
     for rate in [1000, 500] {
         place.write("corner.csv", corners(rate));
         let peak = |options: &[&str]| {
@@ -122,7 +122,7 @@ fn every_stepper_takes_the_blow_of_a_corner() {
 #[test]
 fn every_stepper_takes_the_blow_of_a_short_ramp() {
     let place = Place::new();
-    let robot = shipped_robot("reference_arm");
+    let robot = shipped_robot("test/reference_arm");
     for samples in [3.0, 4.0, 6.0, 10.0] {
         let (mut text, mut q) = ("time,joint_1,joint_2,joint_3,joint_4,joint_5,joint_6\n".to_owned(), 0.0);
         for k in 0..=1500 {
@@ -158,7 +158,7 @@ fn every_stepper_takes_the_blow_of_a_short_ramp() {
 #[test]
 fn a_table_of_few_digits_moves_the_arm_alike_in_every_stepper() {
     let place = Place::new();
-    let robot = shipped_robot("reference_arm");
+    let robot = shipped_robot("test/reference_arm");
     let mut text = "time,joint_1,joint_2,joint_3,joint_4,joint_5,joint_6\n".to_owned();
     for k in 0..=4000 {
         let t = 1e-3 * f64::from(k);
@@ -178,7 +178,7 @@ fn a_table_of_few_digits_moves_the_arm_alike_in_every_stepper() {
 #[test]
 fn corners_are_told_and_can_be_rounded() {
     let place = Place::new();
-    let robot = shipped_robot("reference_arm");
+    let robot = shipped_robot("test/reference_arm");
     place.write("corner.csv", corners(1000));
     let words = "velocity of joint \"joint_1\" jumps at 3 times, most at t = 1.0000 s by -4.0000 rad/s";
     let checked = place.flexarm(&["check", &robot, "corner.csv"]);
@@ -204,14 +204,14 @@ fn all_steppers_agree_about_joint_efforts() {
     let place = Place::new();
     for (robot, step) in [
         ("abb_three_mass/robot.toml", "1e-4"),
-        ("reference_arm/robot.toml", "1e-4"),
-        ("reference_arm_coupled/robot.toml", "1e-4"),
+        ("test/reference_arm/robot.toml", "1e-4"),
+        ("test/reference_arm_coupled/robot.toml", "1e-4"),
         ("kr210/robot.toml", "1e-4"),
         ("kr210/drives.toml", "1e-4"),
         ("kr210_identified/robot.toml", "1e-4"),
-        ("three_beams/robot.toml", "1e-4"),
-        ("one_beam/robot.toml", "1e-4"),
-        ("lower_arm/robot.toml", "1e-4"),
+        ("test/three_beams/robot.toml", "1e-4"),
+        ("test/one_beam/robot.toml", "1e-4"),
+        ("test/lower_arm/robot.toml", "1e-4"),
     ] {
         let path = shipped_robot(robot);
         // The rotor's energy is in the balance as well: a tenth of it used to be missing.

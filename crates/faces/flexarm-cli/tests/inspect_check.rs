@@ -42,7 +42,7 @@ mod inspect {
     #[test]
     fn parts_of_flexible_links_are_the_links_own() {
         let place = Place::new();
-        for robot in ["one_beam", "three_beams", "kr210", "reference_arm"] {
+        for robot in ["test/one_beam", "test/three_beams", "kr210", "test/reference_arm"] {
             let seen = place.json(&["inspect", &shipped_robot(robot)]);
             let links = seen["links"].as_array().unwrap();
             for flexible in seen["flexible_links"].as_array().unwrap() {
@@ -57,7 +57,7 @@ mod inspect {
     #[test]
     fn keys_and_shapes() {
         let place = Place::new();
-        for (robot, n) in [("reference_arm", 6), ("kr210", 6), ("three_beams", 1)] {
+        for (robot, n) in [("test/reference_arm", 6), ("kr210", 6), ("test/three_beams", 1)] {
             let seen = place.json(&["inspect", &shipped_robot(robot)]);
             let joints = seen["joints"].as_array().unwrap();
             assert_eq!(joints.len(), n);
@@ -146,7 +146,7 @@ mod inspect {
     #[test]
     fn vertical_axis_carries_no_weight() {
         let place = Place::new();
-        for robot in ["reference_arm", "kr210"] {
+        for robot in ["test/reference_arm", "kr210"] {
             let torque = numbers(&at(&place, &shipped_robot(robot), &POSE, &[])["gravity_torque"]);
             let largest = torque.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
             assert!(largest > 10.0 && torque[0].abs() < 1e-12 * largest, "{robot}: {torque:?}");
@@ -156,7 +156,7 @@ mod inspect {
     #[test]
     fn mass_matrix_is_symmetric_positive_definite() {
         let place = Place::new();
-        for robot in ["reference_arm", "kr210"] {
+        for robot in ["test/reference_arm", "kr210"] {
             let m = matrix(&at(&place, &shipped_robot(robot), &POSE, &[])["mass_matrix"]);
             let n = m.len();
             for i in 0..n {
@@ -196,7 +196,7 @@ mod inspect {
     #[test]
     fn jacobian_by_finite_differences() {
         let place = Place::new();
-        for (robot, frame) in [("reference_arm", None), ("kr210", None), ("kr210", Some("link_4"))] {
+        for (robot, frame) in [("test/reference_arm", None), ("kr210", None), ("kr210", Some("link_4"))] {
             let path = shipped_robot(robot);
             let tcp: Vec<&str> = frame.iter().flat_map(|f| ["--tcp", f]).collect();
             let jacobian = matrix(&at(&place, &path, &POSE, &tcp)["jacobian"]);
@@ -221,7 +221,7 @@ mod inspect {
     #[test]
     fn bias_is_gravity_and_coriolis() {
         let place = Place::new();
-        let robot = shipped_robot("reference_arm");
+        let robot = shipped_robot("test/reference_arm");
         let still = at(&place, &robot, &POSE, &[]);
         assert_eq!(still["bias"], still["gravity_torque"], "nothing else acts at rest");
         let v = [0.5, -0.4, 0.3, 1.0, -0.8, 0.6];
@@ -250,7 +250,7 @@ mod inspect {
     #[test]
     fn names_or_order() {
         let place = Place::new();
-        let robot = shipped_robot("reference_arm");
+        let robot = shipped_robot("test/reference_arm");
         let by_order = at(&place, &robot, &POSE, &["--velocity", "0,0,0.5,0,0,0"]);
         let pairs: Vec<String> = (1..=6).rev().map(|k| format!("joint_{k} = {}", POSE[k - 1])).collect();
         let by_name = place.json(&["inspect", &robot, "--at", &pairs.join(", "), "--velocity", "joint_3=0.5"]);
@@ -351,10 +351,10 @@ mod check {
         let own = findings(&place, &["robot.toml", "swing.toml"], 0);
         assert_eq!((codes(&own, "error").len(), codes(&own, "warning").len()), (0, 0), "{own:?}");
         for (robot, motions) in [
-            ("one_beam", &["beam_swing.toml", "beam_hold.toml"][..]),
-            ("three_beams", &["beam_swing.toml"]),
-            ("reference_arm", &["reference_arm.toml"]),
-            ("reference_arm_coupled", &["reference_arm.toml"]),
+            ("test/one_beam", &["beam_swing.toml", "beam_hold.toml"][..]),
+            ("test/three_beams", &["beam_swing.toml"]),
+            ("test/reference_arm", &["reference_arm.toml"]),
+            ("test/reference_arm_coupled", &["reference_arm.toml"]),
             ("kr210", &["pick_and_place.toml", "point_to_point.toml", "iso9283_path.csv", "stress.toml"]),
         ] {
             for motion in motions {

@@ -12,7 +12,9 @@ mod statics {
     #[test]
     fn keys_and_shapes() {
         let place = Place::new();
-        for (robot, joints, flexible) in [("kr210/links.toml", 6, 2), ("reference_arm", 6, 2), ("three_beams", 1, 3)] {
+        for (robot, joints, flexible) in
+            [("kr210/links.toml", 6, 2), ("test/reference_arm", 6, 2), ("test/three_beams", 1, 3)]
+        {
             let seen = place.json(&["statics", &shipped_robot(robot), "--wrench", "1,2,3,4,5,6"]);
             for key in ["tcp_displacement_m", "tcp_rotation_rad", "sag_m", "sag_rad", "tcp_position_m"] {
                 assert_eq!(numbers(&seen[key]).len(), 3, "{robot} {key}");
@@ -178,7 +180,7 @@ mod modes {
     #[test]
     fn a_turning_arm_stiffens_and_unsteady_rotation_is_named() {
         let place = Place::new();
-        let arm = shipped_robot("reference_arm");
+        let arm = shipped_robot("test/reference_arm");
         let modes = |words: &[&str]| place.json(&[&["modes", &arm, "--count", "3"], words].concat());
         let rest = modes(&[]);
         assert!(rest["speeds"].is_null());

@@ -85,7 +85,7 @@ mod links {
     #[test]
     fn what_the_file_does_not_hold_is_asked_for() {
         let place = Place::new();
-        let (robot, motion) = (shipped_robot("lower_arm"), shipped_trajectory("beam_swing.toml"));
+        let (robot, motion) = (shipped_robot("test/lower_arm"), shipped_trajectory("beam_swing.toml"));
         let refused = |extra: &[&str], words: &[&str]| {
             place.refused(&[&["run", &robot, &motion, "--no-files"], extra].concat(), words);
         };

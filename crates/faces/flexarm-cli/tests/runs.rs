@@ -148,7 +148,7 @@ mod compare {
     #[test]
     fn six_axes() {
         let place = Place::new();
-        let (robot, motion) = (shipped_robot("reference_arm"), shipped_trajectory("reference_arm.toml"));
+        let (robot, motion) = (shipped_robot("test/reference_arm"), shipped_trajectory("reference_arm.toml"));
         let summary = place.json(&["compare", &robot, &motion, "-o", "result", "--log-rate", "100"]);
         has_stable_keys(&summary);
         let table = Table::parse(&place.text("result/run.csv"));

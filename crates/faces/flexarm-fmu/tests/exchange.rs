@@ -50,7 +50,7 @@ fn integrate(plant: &mut Plant, mut inputs: impl FnMut(&mut Plant, f64), steps: 
 fn a_solver_outside_moves_the_arm_as_its_own_stepper_does() {
     for (name, links, h) in [
         ("kr210", LinkModel::AsFiled, 2.5e-5),
-        ("reference_arm", LinkModel::Modal, 5e-6),
+        ("test/reference_arm", LinkModel::Modal, 5e-6),
         ("palletiser", LinkModel::AsFiled, 2.5e-5),
     ] {
         let settings = PlantSettings { step_s: Some(1e-4), ..settings(links, DriveModel::AsFiled) };
@@ -81,7 +81,7 @@ fn a_solver_outside_moves_the_arm_as_its_own_stepper_does() {
 fn directional_derivatives_at_rest_are_those_of_the_linear_model() {
     for (name, links, drives) in [
         ("kr210", LinkModel::AsFiled, DriveModel::AsFiled),
-        ("reference_arm", LinkModel::Modal, DriveModel::Servo),
+        ("test/reference_arm", LinkModel::Modal, DriveModel::Servo),
         ("kr300", LinkModel::AsFiled, DriveModel::Servo),
     ] {
         let settings = settings(links, drives);

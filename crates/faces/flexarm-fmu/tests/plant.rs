@@ -20,7 +20,7 @@ fn a_plant_has_the_bits_of_the_arm_that_is_commanded_directly() {
     let cases = [
         ("kr210", LinkModel::AsFiled, DriveModel::AsFiled),
         ("kr300", LinkModel::Modal, DriveModel::Servo),
-        ("reference_arm", LinkModel::Lumped, DriveModel::Servo),
+        ("test/reference_arm", LinkModel::Lumped, DriveModel::Servo),
         ("palletiser", LinkModel::AsFiled, DriveModel::AsFiled),
         ("manutec_r3", LinkModel::AsFiled, DriveModel::Elastic),
     ];
@@ -186,14 +186,14 @@ fn a_payload_that_is_put_down_leaves_the_arm_of_the_robot_file_without_it() {
         println!("{steps} ms later off by {still_rings:.1e} m");
         assert!(still_rings < 5e-6, "{flag}: {still_rings:e}");
     }
-    let fixed = Plant::new(&robot("one_beam"), &PlantSettings::default()).unwrap();
+    let fixed = Plant::new(&robot("test/one_beam"), &PlantSettings::default()).unwrap();
     assert!(fixed.find("payload.attached").is_none());
 }
 
 #[test]
 fn states_resets_and_open_servos_do_what_they_say() {
     let settings = settings(LinkModel::Modal, DriveModel::Servo);
-    let mut plant = Plant::new(&robot("reference_arm"), &settings).unwrap();
+    let mut plant = Plant::new(&robot("test/reference_arm"), &settings).unwrap();
     let first = values(&plant, &TCP);
     let swing = |plant: &mut Plant, steps: std::ops::Range<u32>| {
         let q_in = of_joints(plant, "target_position");
@@ -220,7 +220,7 @@ fn states_resets_and_open_servos_do_what_they_say() {
     plant.set_flag(plant.find("open_servos").unwrap(), true).unwrap();
     plant.start(0.0).unwrap();
     let torques = of_joints(&plant, "torque");
-    let arm = Robot::load(robot("reference_arm")).unwrap().model(&settings.modelling).unwrap();
+    let arm = Robot::load(robot("test/reference_arm")).unwrap().model(&settings.modelling).unwrap();
     let own = LiveOptions { servos: Servos::Open, ..LiveOptions::default() };
     let mut live = arm.live_with(None, 1e-3, &RunOptions::default(), &own).unwrap();
     let given = [30.0, -20.0, 10.0, 1.0, -1.0, 0.5];
@@ -327,7 +327,7 @@ fn communication_steps_of_two_solver_steps_excite_no_mode() {
 
 #[test]
 fn what_makes_no_sense_is_refused_with_its_name_and_changes_nothing() {
-    let mut plant = Plant::new(&robot("one_beam"), &PlantSettings::default()).unwrap();
+    let mut plant = Plant::new(&robot("test/one_beam"), &PlantSettings::default()).unwrap();
     let (target, error) = (of_joints(&plant, "target_position")[0], plant.find("tcp_error.length").unwrap());
     assert!(matches!(plant.step(0.0, 1e-3), Err(PlantError::NotStarted)));
     assert!(matches!(plant.set(target, f64::NAN), Err(PlantError::NotFinite { .. })));
@@ -383,7 +383,7 @@ fn token_of(folder: &Path) -> String {
 
 /// Returns the lower arm with a stress point at its worst place, in a folder.
 fn gauged(folder: &Path) -> PathBuf {
-    let shipped = root().join("robots/lower_arm");
+    let shipped = root().join("robots/test/lower_arm");
     std::fs::create_dir_all(folder).unwrap();
     for file in ["lower_arm.urdf", "lower_arm.stl", "robot.toml"] {
         std::fs::copy(shipped.join(file), folder.join(file)).unwrap();
@@ -410,8 +410,8 @@ fn the_resources_of_an_fmu_are_the_arm_wherever_they_are() {
     let urdf = root().join("tests/golden/ur10_like.urdf");
     for (path, drives) in [
         (robot("kr210"), DriveModel::AsFiled),
-        (robot("lower_arm"), DriveModel::AsFiled),
-        (robot("reference_arm"), DriveModel::Servo),
+        (robot("test/lower_arm"), DriveModel::AsFiled),
+        (robot("test/reference_arm"), DriveModel::Servo),
         (robot("palletiser"), DriveModel::AsFiled),
         (urdf, DriveModel::AsFiled),
         (gauged(&folder.join("gauged")), DriveModel::AsFiled),

@@ -29,7 +29,7 @@ use crate::watch::{Watch, stoppable};
 ///
 /// Examples
 /// --------
-/// >>> arm = flexarm.load("reference_arm")
+/// >>> arm = flexarm.load("reference_arm").flexible()
 /// >>> run = arm.simulate(step=2e-3)
 /// >>> run.error.shape[1]
 /// 3
@@ -289,7 +289,7 @@ impl PyArm {
     /// Examples
     /// --------
     /// >>> import numpy as np
-    /// >>> arm = flexarm.load("reference_arm")
+    /// >>> arm = flexarm.load("reference_arm").flexible()
     /// >>> found = arm.deflections(stiffness=np.linspace(0.8, 1.2, 5), step=5e-3)
     /// >>> found.peak.shape, bool(np.all(np.diff(found.peak) < 0))
     /// ((5,), True)

@@ -15,7 +15,7 @@ use crate::parts::{Parts, Pickled};
 ///
 /// Examples
 /// --------
-/// >>> at = flexarm.load("kr210").linearise([0.0, -1.2, 1.5, 0.0, 0.4, 0.0])
+/// >>> at = flexarm.load("kr210").flexible().linearise([0.0, -1.2, 1.5, 0.0, 0.4, 0.0])
 /// >>> at.M.shape == at.K.shape == at.D.shape
 /// True
 /// >>> at.J.shape[0]

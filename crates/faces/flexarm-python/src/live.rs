@@ -16,7 +16,7 @@ use crate::values::{as_wrench, wrench};
 /// Examples
 /// --------
 /// >>> import numpy as np
-/// >>> live = flexarm.load("reference_arm").model(&drives="servo").live()
+/// >>> live = flexarm.load("reference_arm").flexible(drives="servo").live()
 /// >>> for k in range(3):
 /// ...     live.step(np.zeros(6))
 /// >>> round(live.time, 6)

@@ -16,7 +16,7 @@ use crate::values::{as_wrench, wrench};
 ///
 /// Examples
 /// --------
-/// >>> at = flexarm.load("kr210").operating_point()
+/// >>> at = flexarm.load("kr210").flexible().operating_point()
 /// >>> at.solve([0.0, -1.2, 1.5, 0.0, 0.4, 0.0])
 /// >>> hz = at.frequencies()[0]
 #[pyclass(frozen, name = "OperatingPoint", module = "flexarm")]

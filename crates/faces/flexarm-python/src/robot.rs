@@ -21,7 +21,7 @@ use crate::values::{path, plain, texts};
 /// >>> robot = flexarm.load("kr210")
 /// >>> robot.joints[:2]
 /// ('joint_1', 'joint_2')
-/// >>> arm = robot.model(&links="modal", drives="elastic")
+/// >>> arm = robot.flexible(links="modal", drives="elastic")
 #[pyclass(frozen, name = "Robot", module = "flexarm")]
 pub(crate) struct PyRobot {
     pub(crate) robot: Arc<Robot>,
@@ -143,7 +143,7 @@ fn shipped(given: &Path) -> PyResult<PathBuf> {
 /// --------
 /// >>> base = flexarm.load("one_beam").path.parent
 /// >>> robot = flexarm.robot({"urdf": "one_beam.urdf"}, folder=base)
-/// >>> robot.n_elastic
+/// >>> robot.flexible().n_elastic
 /// 0
 #[pyfunction]
 #[pyo3(signature = (keys, folder=None, *, urdf=None))]

@@ -17,7 +17,7 @@ use crate::parts::{Parts, Pickled};
 ///
 /// Examples
 /// --------
-/// >>> run = flexarm.load("reference_arm").simulate(step=2e-3)
+/// >>> run = flexarm.load("reference_arm").flexible().simulate(step=2e-3)
 /// >>> run.time.shape == (len(run),)
 /// True
 /// >>> run.error.shape == (len(run), 3)

@@ -13,7 +13,7 @@ import flexarm
 
 SHARE = Path(flexarm.__file__).parent / "share"
 #: Every shipped robot.
-ROBOTS = sorted(folder.name for folder in (SHARE / "robots").iterdir() if (folder / "robot.toml").is_file())
+ROBOTS = sorted(file.parent.name for file in (SHARE / "robots").rglob("robot.toml"))
 #: A pose of the KR 210 within its limits (rad).
 WORKING_POSE = [0.0, -1.2, 1.5, 0.0, 0.4, 0.0]
 

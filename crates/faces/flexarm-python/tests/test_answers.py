@@ -63,7 +63,7 @@ def required(kind: Any) -> "set[str]":
 
 
 URDF = next((SHARE / "robots/kr210").glob("*.urdf"))
-JOB = SHARE / "robots/lower_arm/lower_arm.reduce.toml"
+JOB = SHARE / "robots/test/lower_arm/lower_arm.reduce.toml"
 
 
 def answers(robot: flexarm.Robot, arm: flexarm.Arm, folder: Path) -> "dict[str, tuple[Any, Any]]":

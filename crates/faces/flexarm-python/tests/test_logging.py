@@ -12,7 +12,7 @@ from conftest import SHARE, command
 
 import flexarm
 
-JOB = SHARE / "robots/lower_arm/lower_arm.reduce.toml"
+JOB = SHARE / "robots/test/lower_arm/lower_arm.reduce.toml"
 
 
 def test_files_and_runs_are_logged(arm: flexarm.Arm, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:

@@ -78,7 +78,7 @@ except KeyboardInterrupt:
 
 
 def test_ctrl_c_leaves_nothing_of_a_reduction_and_an_identification(tmp_path: Path) -> None:
-    job = SHARE / "robots/lower_arm/lower_arm.reduce.toml"
+    job = SHARE / "robots/test/lower_arm/lower_arm.reduce.toml"
     begin = time.perf_counter()
     flexarm.reduce({**tomllib.loads(job.read_text()), "mesh": str(job.parent / "lower_arm.msh.gz"), "modes": 20})
     alone = time.perf_counter() - begin

@@ -14,7 +14,7 @@ import flexarm
 
 tomllib = pytest.importorskip("tomllib")
 
-JOB = SHARE / "robots/lower_arm/lower_arm.reduce.toml"
+JOB = SHARE / "robots/test/lower_arm/lower_arm.reduce.toml"
 
 
 def told(*words: object, cwd: Path) -> dict:

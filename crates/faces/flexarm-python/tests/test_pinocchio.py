@@ -12,7 +12,7 @@ import flexarm
 pin = pytest.importorskip("pinocchio")
 
 #: Robots without payload, loops and balancers in their URDF, so that both read the same model.
-URDFS = ["kr210/kr210.urdf", "manutec_r3", "reference_arm", "three_beams", "kr300"]
+URDFS = ["kr210/kr210.urdf", "manutec_r3", "test/reference_arm", "test/three_beams", "kr300"]
 
 
 def urdf_of(name: str) -> Path:

@@ -47,7 +47,7 @@ fn run(arm: &FlexibleArm, kind: StepperKind, duration: f64) -> (Vec<Vector3<f64>
 
 fn main() {
     let mut arguments = std::env::args().skip(1);
-    let robot = PathBuf::from(arguments.next().unwrap_or_else(|| "robots/reference_arm".into()));
+    let robot = PathBuf::from(arguments.next().unwrap_or_else(|| "robots/test/reference_arm".into()));
     let mut robot = Robot::load_with(&robot, &LoadOptions::default()).unwrap();
     let trajectory = arguments.next().map_or_else(|| robot.default_trajectory.clone().unwrap(), PathBuf::from);
     let motion = Motion::load_for(&trajectory, &robot.rigid_model().unwrap()).unwrap();

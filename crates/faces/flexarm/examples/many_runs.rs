@@ -17,7 +17,7 @@ fn main() -> Result<(), Error> {
         "{:<16} {:>8} {:>6} {:>10} {:>14} {:>12} {:>12}",
         "robot", "step ms", "runs", "wall s", "us a run-step", "least mm", "largest mm"
     );
-    for (name, file) in [("reference_arm", "reference_arm.toml"), ("kr210", "pick_and_place.toml")] {
+    for (name, file) in [("test/reference_arm", "reference_arm.toml"), ("kr210", "pick_and_place.toml")] {
         let robot = Robot::load(root.join("robots").join(name))?;
         let motion = Motion::load(root.join("trajectories").join(file), &robot)?;
         let arm = robot.model(&Modelling::default())?;

@@ -54,7 +54,7 @@ fn told(line: &str) -> Option<RunOptions> {
 
 /// Prints a line with CPU ms per simulated second for each argument.
 fn lines(root: &Path, wanted: &[String]) -> Result<(), Error> {
-    let robot = Robot::load(root.join("robots/reference_arm"))?;
+    let robot = Robot::load(root.join("robots/test/reference_arm"))?;
     let motion = Motion::load(root.join("trajectories/reference_arm.toml"), &robot)?;
     let arm = robot.model(&Modelling::default())?;
     for line in wanted {
@@ -90,7 +90,7 @@ fn main() -> Result<(), Error> {
         return lines(root, &wanted);
     }
     println!("{:<16} {:>8} {:>12} {:>18} {:>12}", "robot", "step ms", "set-up us", "CPU ms per sim. s", "us per step");
-    for (name, motion) in [("reference_arm", "reference_arm.toml"), ("kr210", "pick_and_place.toml")] {
+    for (name, motion) in [("test/reference_arm", "reference_arm.toml"), ("kr210", "pick_and_place.toml")] {
         let robot = Robot::load(root.join("robots").join(name))?;
         let motion = Motion::load(root.join("trajectories").join(motion), &robot)?;
         let arm = robot.model(&Modelling::default())?;

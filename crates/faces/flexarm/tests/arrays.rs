@@ -93,7 +93,7 @@ fn check_rows(recursions: &Recursions) {
 #[test]
 fn rows_of_the_recursions_have_the_bits_of_each_alone_and_fit_each_other() {
     check_rows(&robot("kr210").recursions().unwrap());
-    check_rows(&robot("reference_arm").model(&Modelling::default()).unwrap().recursions());
+    check_rows(&robot("test/reference_arm").model(&Modelling::default()).unwrap().recursions());
     check_rows(&robot("palletiser").recursions().unwrap());
 }
 
@@ -135,7 +135,7 @@ fn an_arm_that_is_commanded_along_a_motion_goes_where_the_run_goes() {
     println!("without velocities {fine:.1e} at 1 kHz, {coarse:.1e} at 250 Hz");
     assert!(fine <= 2e-2 && coarse <= 8e-2, "{fine:e}, {coarse:e}");
     let servo = Modelling { drives: DriveModel::Servo, ..Modelling::default() };
-    let (robot, name) = (self::robot("reference_arm"), "trajectories/reference_arm.toml");
+    let (robot, name) = (self::robot("test/reference_arm"), "trajectories/reference_arm.toml");
     let motion = Motion::load(root().join(name), &robot).unwrap();
     let arm = robot.model(&servo).unwrap();
     let (told, late) = (off(&arm, &motion, 1e-3, true), off(&arm, &motion, 1e-3, false));
@@ -145,7 +145,8 @@ fn an_arm_that_is_commanded_along_a_motion_goes_where_the_run_goes() {
 
 #[test]
 fn a_live_arm_refuses_what_makes_no_sense_and_starts_again() {
-    let arm = robot("reference_arm").model(&Modelling { drives: DriveModel::Servo, ..Modelling::default() }).unwrap();
+    let arm =
+        robot("test/reference_arm").model(&Modelling { drives: DriveModel::Servo, ..Modelling::default() }).unwrap();
     let options = RunOptions::default();
     assert!(matches!(arm.live(None, 1.5e-3, &options), Err(Error::Value(_))));
     assert!(matches!(arm.live(Some(&[0.0; 3]), 1e-3, &options), Err(Error::Pose(_))));
@@ -179,7 +180,7 @@ fn circle(live: &mut Live, from: &[f64], steps: std::ops::Range<u32>) -> Vec<[f6
 fn a_live_arm_returns_to_a_state_and_repeats_what_followed_bit_for_bit() {
     let backlash = robot("palletiser").model(&Modelling::default()).unwrap();
     let servo = Modelling { drives: DriveModel::Servo, links: LinkModel::Modal, ..Modelling::default() };
-    let arms = [backlash, robot("reference_arm").model(&servo).unwrap(), robot("kr300").model(&servo).unwrap()];
+    let arms = [backlash, robot("test/reference_arm").model(&servo).unwrap(), robot("kr300").model(&servo).unwrap()];
     for arm in arms {
         let from = vec![0.1; arm.joints().count()];
         let mut live = arm.live(Some(&from), 1e-3, &RunOptions::default()).unwrap();
@@ -198,7 +199,7 @@ fn a_live_arm_returns_to_a_state_and_repeats_what_followed_bit_for_bit() {
 #[test]
 fn motors_with_the_torques_of_servos_move_as_under_servos() {
     let servo = Modelling { drives: DriveModel::Servo, ..Modelling::default() };
-    let arm = robot("reference_arm").model(&servo).unwrap();
+    let arm = robot("test/reference_arm").model(&servo).unwrap();
     let (options, from) = (RunOptions::default(), vec![0.1; 6]);
     let mut closed = arm.live(Some(&from), 1e-3, &options).unwrap();
     let mut open = arm
@@ -278,7 +279,7 @@ fn work_stops_when_it_is_told_to() {
 
 #[test]
 fn columns_in_memory_are_the_table_of_the_csv() {
-    for name in ["kr210", "palletiser", "one_beam"] {
+    for name in ["kr210", "palletiser", "test/one_beam"] {
         let robot = robot(name);
         let motion = Motion::load(robot.default_trajectory.as_ref().unwrap(), &robot).unwrap();
         let folder = std::env::temp_dir().join(format!("flexarm-arrays-{}-{name}", std::process::id()));

@@ -22,7 +22,7 @@ const GAUGES: &str =
 
 impl Beam {
     fn new(name: &str, change: impl Fn(&str) -> String) -> Self {
-        let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(3).unwrap().join("robots/one_beam");
+        let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(3).unwrap().join("robots/test/one_beam");
         let folder = std::env::temp_dir().join(format!("flexarm beam {name} {}", std::process::id()));
         std::fs::create_dir_all(&folder).unwrap();
         std::fs::copy(shipped.join("one_beam.urdf"), folder.join("one_beam.urdf")).unwrap();

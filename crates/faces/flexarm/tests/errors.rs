@@ -15,7 +15,7 @@ fn root() -> PathBuf {
 }
 
 fn beam() -> (Robot, Motion) {
-    let robot = Robot::load(root().join("robots/one_beam")).unwrap();
+    let robot = Robot::load(root().join("robots/test/one_beam")).unwrap();
     let motion = Motion::from_samples(&[0.0, 1.0], &[0.0, 0.0], &robot).unwrap();
     (robot, motion)
 }

@@ -27,11 +27,11 @@ fn run(robot: &str, trajectory: &str, outputs: Option<&Outputs>) -> (Summary, Tr
 /// no error normal to its path.
 #[test]
 fn peaks_along_the_path_axes_are_those_of_the_recorded_errors() {
-    for (robot, trajectory) in [("one_beam", "beam_swing.toml"), ("kr210", "pick_and_place.toml")] {
+    for (robot, trajectory) in [("test/one_beam", "beam_swing.toml"), ("kr210", "pick_and_place.toml")] {
         let (summary, trace) = run(robot, trajectory, None);
         let largest = |c: usize| trace.rows.iter().map(|row| row.error_path[c].abs()).fold(0.0, f64::max);
         assert_eq!(summary.tcp.unwrap().path_peak_m, [0, 1, 2].map(largest));
-        if robot == "one_beam" {
+        if robot == "test/one_beam" {
             assert!(largest(1) < 1e-6 && largest(2) > 1e-4, "{} {}", largest(1), largest(2)); // measured 2.6e-7, 2.3e-4
         }
     }
@@ -61,7 +61,7 @@ fn runs_with_other_steps_are_apart_by_what_their_errors_differ() {
     let modelling = |links| Modelling { links, ..Modelling::default() };
     let with = |label: &str, links: LinkModel, step_s: f64| {
         let options = RunOptions { step_s, ..RunOptions::default() };
-        variant(label, "one_beam", "beam_swing.toml", &modelling(links), options)
+        variant(label, "test/one_beam", "beam_swing.toml", &modelling(links), options)
     };
     let apart = |variants: [Variant; 2]| {
         let (summary, traces) = compare_study(&variants, None, &mut |_, _| ControlFlow::Continue(())).unwrap();
@@ -85,7 +85,7 @@ fn runs_with_other_steps_are_apart_by_what_their_errors_differ() {
 fn a_conversion_that_is_stopped_leaves_nothing() {
     let folder = std::env::temp_dir().join(format!("flexarm-figures-{}", std::process::id()));
     let outputs = Outputs { recordings: [RecordingFormat::Csv].into(), ..Outputs::everything(&folder) };
-    run("one_beam", "beam_swing.toml", Some(&outputs));
+    run("test/one_beam", "beam_swing.toml", Some(&outputs));
     let names = || std::fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().file_name()).collect::<Vec<_>>();
     let before = names();
     let mut asked = 0;

@@ -70,7 +70,7 @@ fn a_run_by_values_is_the_run_by_files() {
 /// Truth: the same motion, read from a file. Measured: the same bits.
 #[test]
 fn a_motion_of_arrays_is_that_of_the_file() {
-    let robot = Robot::load(root().join("robots/one_beam")).unwrap();
+    let robot = Robot::load(root().join("robots/test/one_beam")).unwrap();
     let t: Vec<f64> = (0..=200).map(|k| 0.01 * f64::from(k)).collect();
     let q: Vec<f64> = t.iter().map(|t| 0.3 * (1.0 - (std::f64::consts::PI * t).cos())).collect();
     let motion = Motion::from_samples(&t, &q, &robot).unwrap();
@@ -97,7 +97,7 @@ fn a_motion_of_arrays_is_that_of_the_file() {
 /// Truth: the same loads and payloads from a file. Measured: the same bits.
 #[test]
 fn loads_and_payloads_by_value_are_those_of_the_file() {
-    let robot = Robot::load(root().join("robots/one_beam")).unwrap();
+    let robot = Robot::load(root().join("robots/test/one_beam")).unwrap();
     let motion = Motion::load(root().join("trajectories/beam_swing.toml"), &robot).unwrap();
     let arm = robot.model(&Modelling::default()).unwrap();
     let file = std::env::temp_dir().join(format!("flexarm-library-{}.loads.toml", std::process::id()));
@@ -147,7 +147,7 @@ fn loads_and_payloads_by_value_are_those_of_the_file() {
 
 #[test]
 fn an_observer_sees_every_sample_and_can_stop_the_run() {
-    let robot = Robot::load(root().join("robots/one_beam")).unwrap();
+    let robot = Robot::load(root().join("robots/test/one_beam")).unwrap();
     let motion = Motion::load(root().join("trajectories/beam_swing.toml"), &robot).unwrap();
     let arm = robot.model(&Modelling::default()).unwrap();
     let mut seen = 0;
@@ -177,8 +177,8 @@ fn operating_points_are_what_statics_and_modes_say() {
         Modelling { drives: DriveModel::Rigid, ..Modelling::default() },
     ];
     let (mut checked, mut worst) = (0, [0.0_f64; 4]);
-    for entry in std::fs::read_dir(root().join("robots")).unwrap() {
-        let folder = entry.unwrap().path();
+    let robots = ["robots", "robots/test"].into_iter().flat_map(|place| std::fs::read_dir(root().join(place)).unwrap());
+    for folder in robots.map(|entry| entry.unwrap().path()) {
         if !folder.join("robot.toml").is_file() {
             continue;
         }
@@ -249,7 +249,7 @@ fn poses_of_another_length_and_without_numbers_are_refused() {
 
 #[test]
 fn a_load_beyond_buckling_is_no_operating_point_and_the_next_pose_is() {
-    let arm = Robot::load(root().join("robots/one_beam")).unwrap().model(&Modelling::default()).unwrap();
+    let arm = Robot::load(root().join("robots/test/one_beam")).unwrap().model(&Modelling::default()).unwrap();
     let mut at = arm.operating_point().unwrap();
     let push = Wrench::new(Vector3::new(-1e9, 0.0, 0.0), Vector3::zeros());
     assert!(at.solve(&[0.0], &push).is_err() && at.residual().is_nan());
@@ -289,7 +289,7 @@ fn a_robot_of_texts_is_the_robot_of_its_files() {
 /// Truth: the columns themselves. Inconsistent columns are refused.
 #[test]
 fn columns_that_were_kept_elsewhere_are_columns_again() {
-    let robot = Robot::load(root().join("robots/reference_arm")).unwrap();
+    let robot = Robot::load(root().join("robots/test/reference_arm")).unwrap();
     let motion = Motion::load(robot.default_trajectory.clone().unwrap(), &robot).unwrap();
     let arm = robot.model(&Modelling::default()).unwrap();
     for with_twin in [true, false] {

@@ -166,7 +166,7 @@ fn work_of_the_drives_is_called_net_and_stands_beside_what_they_put_in_and_took_
 #[test]
 fn the_same_run_gives_the_same_page_but_for_its_timings() {
     let options = RunOptions::default();
-    let pages = [(); 2].map(|()| page_of(&run("one_beam", "beam_swing.toml", &options, None)));
+    let pages = [(); 2].map(|()| page_of(&run("test/one_beam", "beam_swing.toml", &options, None)));
     assert!(timeless(&pages[0]) == timeless(&pages[1]));
     // Different timings change only that paragraph.
     let (summary, trace) = arm();
@@ -179,7 +179,7 @@ fn the_same_run_gives_the_same_page_but_for_its_timings() {
 #[test]
 fn names_cannot_break_the_page() {
     const EVIL: &str = "</script><script>alert(1)</script><b a='x' b=\"y\">&amp; <!-- \\ \u{2028}";
-    let harmless = run("one_beam", "beam_swing.toml", &RunOptions::default(), None);
+    let harmless = run("test/one_beam", "beam_swing.toml", &RunOptions::default(), None);
     let (mut summary, mut trace) = harmless.clone();
     summary.robot = EVIL.into();
     summary.warnings.push(EVIL.into());
@@ -203,7 +203,7 @@ fn names_cannot_break_the_page() {
 #[test]
 fn a_run_without_a_twin_leaves_out_what_needs_one() {
     let options = RunOptions { with_twin: false, ..RunOptions::default() };
-    let run = run("one_beam", "beam_swing.toml", &options, None);
+    let run = run("test/one_beam", "beam_swing.toml", &options, None);
     let page = page_of(&run);
     links_lead_somewhere(&page);
     for absent in ["ISO 9283", "Peak TCP error", "data:image/png", "\"tcp_error\"", "\"contributions\""] {
@@ -276,7 +276,7 @@ fn a_study_says_how_far_its_runs_are_apart() {
 #[test]
 fn an_arm_on_its_twin_has_no_scale_and_no_peak() {
     let modelling = Modelling { links: LinkModel::Rigid, drives: DriveModel::Rigid, ..Modelling::default() };
-    let rigid = run_as("one_beam", "beam_swing.toml", &modelling, &RunOptions::default(), None);
+    let rigid = run_as("test/one_beam", "beam_swing.toml", &modelling, &RunOptions::default(), None);
     let page = page_of(&rigid);
     assert!(!page.contains("magnified") && !page.contains("data:image/png") && page.contains("nothing is flexible"));
     let data = data_of(&page);
@@ -297,7 +297,7 @@ fn an_error_beyond_the_scale_of_the_picture_is_said_to_be() {
 #[test]
 fn the_band_of_settling_and_the_models_are_named() {
     let page = page_of(&run(
-        "one_beam",
+        "test/one_beam",
         "beam_swing.toml",
         &RunOptions { settling_band_m: 2.5e-4, ..RunOptions::default() },
         None,
@@ -337,7 +337,7 @@ fn the_summary_can_be_read_back() {
 fn the_files_of_a_run_are_written_and_not_overwritten() {
     let folder = Folder::new("files");
     let outputs = Outputs { recordings: BTreeSet::new(), figures: true, ..Outputs::everything(&folder.0) };
-    let (summary, _) = run("one_beam", "beam_swing.toml", &RunOptions::default(), Some(&outputs));
+    let (summary, _) = run("test/one_beam", "beam_swing.toml", &RunOptions::default(), Some(&outputs));
     let text = |name: &str| std::fs::read_to_string(folder.0.join(name)).unwrap();
     assert!(summary.files.report.as_ref().unwrap().ends_with("report.html"));
     assert!(summary.files.report_md.as_ref().unwrap().ends_with("report.md"));
@@ -367,7 +367,7 @@ fn the_files_of_a_run_are_written_and_not_overwritten() {
         std::fs::write(other.0.join(name), "mine").unwrap();
         let outputs = Outputs { folder: other.0.clone(), ..outputs.clone() };
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../..");
-        let robot = Robot::load_with(&root.join("robots/one_beam"), &LoadOptions::default()).unwrap();
+        let robot = Robot::load_with(&root.join("robots/test/one_beam"), &LoadOptions::default()).unwrap();
         let motion =
             Motion::load_for(&root.join("trajectories/beam_swing.toml"), &robot.rigid_model().unwrap()).unwrap();
         let arm = robot.model(&Modelling::default()).unwrap();

@@ -21,13 +21,13 @@ const SHIPPED: [&str; 17] = [
     "kr210_identified/loaded.toml",
     "kr300",
     "kr500_identified",
-    "lower_arm",
+    "test/lower_arm",
     "manutec_r3",
-    "one_beam",
+    "test/one_beam",
     "palletiser",
-    "reference_arm",
-    "reference_arm_coupled",
-    "three_beams",
+    "test/reference_arm",
+    "test/reference_arm_coupled",
+    "test/three_beams",
 ];
 
 fn robots() -> PathBuf {
@@ -96,7 +96,7 @@ fn shares_of_every_shipped_robot_add_up_to_its_largest_error() {
 
 #[test]
 fn shares_add_up_with_every_stepper() {
-    for (name, entry) in ["lower_arm", "kr210"].iter().flat_map(|name| STEPPERS.map(|entry| (*name, entry))) {
+    for (name, entry) in ["test/lower_arm", "kr210"].iter().flat_map(|name| STEPPERS.map(|entry| (*name, entry))) {
         let (robot, motion) = load(name);
         // An explicit stepper refuses step sizes that are too large for stiff springs.
         match run(&robot, &motion, &with(entry.name)) {
@@ -125,7 +125,7 @@ fn peak(summary: &Summary) -> f64 {
 #[test]
 fn steps_that_lose_part_of_the_largest_error_are_told_and_default_steps_are_not() {
     let mut told = 0;
-    for name in ["lower_arm", "one_beam", "kr210"] {
+    for name in ["test/lower_arm", "test/one_beam", "kr210"] {
         let (robot, motion) = load(name);
         let truth = peak(&run(&robot, &motion, &RunOptions { step_s: 1e-4, ..with("sdirk3") }).unwrap());
         for entry in STEPPERS.into_iter().filter(|entry| entry.steps != StepRule::ByErrorControl) {
@@ -153,7 +153,7 @@ fn steps_that_lose_part_of_the_largest_error_are_told_and_default_steps_are_not(
 /// The step size with which SPOOK loses a tenth of the error of the cast link.
 #[test]
 fn joints_that_drift_apart_are_a_share_and_a_caveat() {
-    let (robot, motion) = load("lower_arm");
+    let (robot, motion) = load("test/lower_arm");
     let summary = run(&robot, &motion, &RunOptions { step_s: 1e-3, ..with("spook") }).unwrap();
     check("lower_arm, spook at 1 ms", &summary);
     assert!(of_steps(&summary), "{:?}", codes(&summary));
@@ -162,7 +162,7 @@ fn joints_that_drift_apart_are_a_share_and_a_caveat() {
 
 #[test]
 fn settling_bands_that_say_nothing_are_told() {
-    let (robot, motion) = load("lower_arm");
+    let (robot, motion) = load("test/lower_arm");
     let with_band = |settling_band_m| {
         let summary = run(&robot, &motion, &RunOptions { settling_band_m, ..RunOptions::default() }).unwrap();
         let of_band = |code: &&str| ["wide-band", "band-beyond-error"].contains(code);
@@ -204,7 +204,7 @@ fn traced(name: &str) -> (Summary, Trace) {
 
 #[test]
 fn runs_of_different_robots_are_said_to_be_and_have_no_differences() {
-    let runs = ["lower_arm", "one_beam"].map(traced);
+    let runs = ["test/lower_arm", "test/one_beam"].map(traced);
     let page = |runs: [&(Summary, Trace); 2]| {
         let run = |k: usize| ReportRun { label: ["first", "second"][k], summary: &runs[k].0, trace: &runs[k].1 };
         let page = html(&[run(0), run(1)]);
@@ -247,7 +247,7 @@ fn a_link_spring_or_joint_has_one_colour_on_the_page() {
 /// The colour scale of the arm ends just above its maximum error.
 #[test]
 fn the_scale_of_colours_ends_with_the_largest_error() {
-    for name in ["kr210", "lower_arm"] {
+    for name in ["kr210", "test/lower_arm"] {
         let (summary, trace) = traced(name);
         let end = trace.header.color_scale_m / peak(&summary);
         assert!((1.0..1.35).contains(&end), "{name}: {end}");

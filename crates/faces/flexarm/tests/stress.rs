@@ -25,7 +25,7 @@ impl Drop for Arm {
 
 impl Arm {
     fn new(name: &str) -> Self {
-        let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(3).unwrap().join("robots/lower_arm");
+        let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(3).unwrap().join("robots/test/lower_arm");
         let folder = std::env::temp_dir().join(format!("flexarm stress {name} {}", std::process::id()));
         std::fs::create_dir_all(&folder).unwrap();
         for file in ["lower_arm.urdf", "lower_arm.stl"] {

@@ -389,7 +389,7 @@ fn a_parameter_that_follows_from_another_changes_the_mass_of_the_arm() {
 /// Truth: links that `reduce` makes from jobs written by hand, in robot files written by hand.
 #[test]
 fn a_link_that_is_reduced_again_is_that_of_a_job_written_by_hand() {
-    let (place, beam) = (folder("reduced"), root().join("robots/one_beam"));
+    let (place, beam) = (folder("reduced"), root().join("robots/test/one_beam"));
     let job = beam.join("fe/one_beam.reduce.toml");
     let text = format!(
         "format = 1\nrobot = {:?}\nmetrics = [\"sag = tcp.static_sag_m\", \"f = frequencies_hz.0\"]\n\

@@ -39,7 +39,7 @@ const URDF: &str = r#"<robot name="swing">
 
 /// Reduces the mesh of the shipped beam with its stress, into a folder with a robot that swings it.
 fn robot(truth: &Truth, shipped: &Path, folder: &Path) -> Robot {
-    let job = ReduceJob::load(&shipped.join("robots/three_beams/fe/beam_3.reduce.toml")).unwrap();
+    let job = ReduceJob::load(&shipped.join("robots/test/three_beams/fe/beam_3.reduce.toml")).unwrap();
     let outputs = ReduceOutputs { flex: Some(folder.join("beam_3.flex")), ..ReduceOutputs::default() };
     let job = ReduceJob { stress: Some(true), ..job };
     reduce(&job, &ReduceOptions::default(), Some(&outputs), &mut |_| {}).unwrap();

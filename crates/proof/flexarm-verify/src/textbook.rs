@@ -209,7 +209,7 @@ mod tests {
     const BAR: Stiffness =
         Stiffness { l: 0.8, EA: 5.6e7, EI_y: 7466.7, EI_z: 1866.7, GJ: 1928.0, kGA: [f64::INFINITY; 2], mu: 2.16 };
 
-    /// Truth: the roots 1.8751 and 4.6941 of the clamped beam, and robots/one_beam/README.md with a
+    /// Truth: the roots 1.8751 and 4.6941 of the clamped beam, and robots/test/one_beam/README.md with a
     /// point mass.
     #[test]
     fn frequencies_are_those_of_the_tables() {

@@ -102,8 +102,10 @@ fn a_case_is_written_once_and_then_checked() {
 fn what_cannot_be_run_is_refused_with_what_can() {
     let place = Place::new("refused");
     place.refused(&["two-beams"], &["two-beams", "one-beam", "manipulator"]);
-    place
-        .refused(&["one-beam", "--data", "nowhere", "--no-files"], &["nowhere/robots/one_beam/robot.toml", "checkout"]);
+    place.refused(
+        &["one-beam", "--data", "nowhere", "--no-files"],
+        &["nowhere/robots/test/one_beam/robot.toml", "checkout"],
+    );
     place.refused(&["one-beam", "--check", "no.md"], &["no.md", "cannot be read"]);
     place.refused(&["--no-files", "-o", "x"], &["--no-files"]);
     assert_eq!(std::fs::read_dir(place.path("")).unwrap().count(), 0);

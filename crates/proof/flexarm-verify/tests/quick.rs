@@ -45,9 +45,9 @@ fn the_same_case_gives_the_same_bytes() {
 #[test]
 fn a_link_that_is_slightly_wrong_breaks_claims() {
     let folder = std::env::temp_dir().join(format!("flexarm-verify-{}", std::process::id()));
-    copy(&bench().root.join("robots/one_beam"), &folder.join("robots/one_beam"));
+    copy(&bench().root.join("robots/test/one_beam"), &folder.join("robots/test/one_beam"));
     copy(&bench().root.join("tests/verification"), &folder.join("tests/verification"));
-    let file = folder.join("robots/one_beam/robot.toml");
+    let file = folder.join("robots/test/one_beam/robot.toml");
     let text = std::fs::read_to_string(&file).expect("copied");
     assert!(text.contains("height = 0.04,"));
     std::fs::write(&file, text.replace("height = 0.04,", "height = 0.0400002,")).expect("written");
@@ -91,5 +91,5 @@ fn unknown_cases_and_missing_files_are_named() {
     assert!(error.contains("no-beam") && error.contains("one-beam") && error.contains("manipulator"), "{error}");
     let nowhere = Bench { root: "/nowhere".into(), ..bench() };
     let error = verify(&nowhere, &["one-beam".to_owned()], &mut go).expect_err("missing").to_string();
-    assert!(error.contains("/nowhere/robots/one_beam/robot.toml"), "{error}");
+    assert!(error.contains("/nowhere/robots/test/one_beam/robot.toml"), "{error}");
 }

@@ -386,11 +386,12 @@ fn inverse_kinematics_of_the_shipped_arms_has_a_closed_form() {
         ("kr210_identified", "tool0"),
         ("kr500_identified", "tool0"),
         ("manutec_r3", "link_6"),
-        ("reference_arm", "link_6"),
-        ("reference_arm_coupled", "link_6"),
+        ("test/reference_arm", "link_6"),
+        ("test/reference_arm_coupled", "link_6"),
     ];
     for (name, link) in arms {
-        let path = format!("{}/../../../robots/{name}/{name}.urdf", env!("CARGO_MANIFEST_DIR"));
+        let file = name.trim_start_matches("test/");
+        let path = format!("{}/../../../robots/{name}/{file}.urdf", env!("CARGO_MANIFEST_DIR"));
         let options = ReadOptions { waive: vec!["link_1".into()], ..ReadOptions::default() };
         let robot = read_urdf(path, &options).unwrap();
         let model = Model::new(&robot.mechanism).unwrap();

@@ -45,7 +45,7 @@ fn the_first_time_beyond_the_limit_counts_and_a_servo_at_its_limit_is_counted() 
 #[test]
 fn a_payload_brings_its_energy_and_takes_it_along() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../..");
-    let model = Robot::load(root.join("robots/one_beam")).unwrap().rigid_model().unwrap();
+    let model = Robot::load(root.join("robots/test/one_beam")).unwrap().rigid_model().unwrap();
     let still = Arc::new(Held(vec![0.3]));
     let arm = FlexibleArm::new(model.clone(), Vec::<Spring>::new(), still).unwrap();
     let mut seen = Observation::new(&arm);
@@ -232,7 +232,7 @@ struct Beam {
 impl Beam {
     fn new() -> Self {
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../..");
-        let arm = Robot::load(root.join("robots/one_beam")).unwrap().model(&Modelling::default()).unwrap();
+        let arm = Robot::load(root.join("robots/test/one_beam")).unwrap().model(&Modelling::default()).unwrap();
         let (flexible, model) = (&*arm, &arm.model);
         let span = &flexible.spans[0];
         let end = |link: &str, X_LI: Pose| {

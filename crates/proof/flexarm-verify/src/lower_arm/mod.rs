@@ -24,8 +24,8 @@ use parts::LimitOfParts;
 use study::{FlangeLoads, Frequencies, Ties, Weight};
 use truth::{Program, Truth};
 
-const ROBOT: &str = "robots/lower_arm/robot.toml";
-const MESH: &str = "robots/lower_arm/lower_arm.msh.gz";
+const ROBOT: &str = "robots/test/lower_arm/robot.toml";
+const MESH: &str = "robots/test/lower_arm/lower_arm.msh.gz";
 /// Acceleration of gravity (m/s²).
 const G: f64 = 9.81;
 /// The frame at interface B.

@@ -13,7 +13,7 @@ use crate::page::{Bound, Case, Figure, Table, bare_error, digits, error, fixed, 
 /// Relative error of the first frequency of a bar in two parts: case 1.
 const BAR_IN_TWO_PARTS: f64 = 0.02;
 /// Wall thickness of seat A (m); degrees of freedom of a finer mesh; minimum and maximum relative
-/// change of the diagonal of the compliance with it: `robots/lower_arm/README.md`.
+/// change of the diagonal of the compliance with it: `robots/test/lower_arm/README.md`.
 const WALL_M: f64 = 0.026;
 const FINER_MESH: f64 = 484e3;
 const FINER_CHANGES: [f64; 2] = [0.002, 0.030];
@@ -45,9 +45,9 @@ fn about(found: &About, whole: Option<&MeshResult>) -> String {
         ),
     };
     format!(
-        "`robots/lower_arm`: an aluminium casting of {mass_kg:.2} kg, {length_m:.1} m between its axes, bowed, hollow, without a plane of symmetry, meshed with TET10; the disc at its end is left out. Its seat A is held, seat \
+        "`robots/test/lower_arm`: an aluminium casting of {mass_kg:.2} kg, {length_m:.1} m between its axes, bowed, hollow, without a plane of symmetry, meshed with TET10; the disc at its end is left out. Its seat A is held, seat \
         B is loaded and watched; both are tied rigidly unless said otherwise. The link is `lower_arm.flex`, made from this mesh by `flexarm reduce`: the 6x6 at B, two parts, chains of {} parts, ten modes. \
-        Axes of the link, z from A towards B. By hand: `flexarm reduce robots/lower_arm/lower_arm.reduce.toml`, `flexarm modes lower_arm --segments 4`. {truth}",
+        Axes of the link, z from A towards B. By hand: `flexarm reduce robots/test/lower_arm/lower_arm.reduce.toml`, `flexarm modes lower_arm --segments 4`. {truth}",
         listed(&CHAINS)
     )
 }

@@ -1,4 +1,4 @@
-//! Closed forms for the bar of `robots/one_beam/README.md`: aluminium, width along y, height along
+//! Closed forms for the bar of `robots/test/one_beam/README.md`: aluminium, width along y, height along
 //! z.
 
 use crate::textbook::{Stiffness, rectangle_torsion};

@@ -16,7 +16,7 @@ use crate::meshed::Meshed;
 use crate::textbook::Stiffness;
 
 /// Number of elements along x, y and z; torsional compliance with elements half the size (rad/(N
-/// m)): `robots/one_beam/fe/README.md`.
+/// m)): `robots/test/one_beam/fe/README.md`.
 pub(super) const ELEMENTS: [usize; 3] = [40, 2, 2];
 const TORSION_OF_FINER_MESH: f64 = 409.989e-6;
 /// Positions of the loaded sections (m).

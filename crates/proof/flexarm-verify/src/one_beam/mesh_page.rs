@@ -51,7 +51,7 @@ fn mesh_end_loads(case: &mut Case, found: &BarMesh) {
     let [_, across, up] = ELEMENTS;
     case.text(format!(
         "Beam and mesh differ by what beam theory leaves out: tied rigidly, the ends can neither get thinner (stretch, bending: the mesh is stiffer by a few tenths of a per cent) nor warp (torsion), and \
-         {across} x {up} elements of second order do not resolve the warping of a rectangle ({} of the {} % go with elements half as large, `robots/one_beam/fe/README.md`). The same held end makes the \
+         {across} x {up} elements of second order do not resolve the warping of a rectangle ({} of the {} % go with elements half as large, `robots/test/one_beam/fe/README.md`). The same held end makes the \
          sections near the clamp stiffer in the next table. Whoever wants the beam's numbers takes the beam's closed form.",
         percent(found.torsion_by_finer_mesh, 1),
         percent(found.torsion_error(), 1)

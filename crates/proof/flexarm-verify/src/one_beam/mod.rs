@@ -24,11 +24,11 @@ use mesh::BarMesh;
 use motion::{SpinUp, Steps};
 use study::{EndLoads, Splits, Stations, Weight};
 
-const ROBOT: &str = "robots/one_beam/robot.toml";
+const ROBOT: &str = "robots/test/one_beam/robot.toml";
 /// The same robot with its link reduced from a mesh.
-const MESHED: &str = "robots/one_beam/mesh.toml";
+const MESHED: &str = "robots/test/one_beam/mesh.toml";
 /// The mesh.
-const MESH: &str = "robots/one_beam/fe/one_beam.msh";
+const MESH: &str = "robots/test/one_beam/fe/one_beam.msh";
 /// Results of CalculiX on the mesh.
 const STORED: &str = "one_beam_calculix.json";
 /// Acceleration of gravity (m/s²).

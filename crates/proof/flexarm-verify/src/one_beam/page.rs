@@ -18,7 +18,7 @@ use crate::page::{Bound, Case, Figure, Table, bare_error, digits, error, fixed, 
 pub(super) fn page(found: &Findings) -> Case {
     let mut case = Case::new("one-beam", "1. One beam");
     case.text(format!(
-        "`robots/one_beam`: a bar of aluminium, {LENGTH_M} m long, {} mm wide and {} mm high, clamped at A, a ball of {BALL_KG} kg at its end B. \
+        "`robots/test/one_beam`: a bar of aluminium, {LENGTH_M} m long, {} mm wide and {} mm high, clamped at A, a ball of {BALL_KG} kg at its end B. \
          Euler and Bernoulli's theory unless said otherwise, so closed forms are exact truths. x points along the bar, z upwards. \
          By hand: `flexarm statics one_beam --wrench 0,0,10`, `flexarm modes one_beam --segments 5`.",
         plain(1e3 * WIDTH_M),

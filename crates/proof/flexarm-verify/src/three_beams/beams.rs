@@ -1,4 +1,4 @@
-//! Closed forms for the beams of `robots/three_beams/README.md`.
+//! Closed forms for the beams of `robots/test/three_beams/README.md`.
 
 use nalgebra::{Matrix3, Matrix6, Vector3};
 

@@ -20,8 +20,8 @@ use sections::Sections;
 use study::{Meshes, TipLoads};
 use whirl::Whirl;
 
-const ROBOT: &str = "robots/three_beams/robot.toml";
-const MESH: &str = "robots/three_beams/mesh.toml";
+const ROBOT: &str = "robots/test/three_beams/robot.toml";
+const MESH: &str = "robots/test/three_beams/mesh.toml";
 /// Acceleration of gravity (m/s²).
 const G: f64 = 9.81;
 

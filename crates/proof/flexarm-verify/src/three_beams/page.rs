@@ -19,7 +19,7 @@ use crate::page::{Bound, Case, Cell, Figure, Table, bare_error, digits, error, f
 
 /// Integration points of CalculiX along each axis of an element.
 const CALCULIX_POINTS: usize = 3;
-/// Number of elements around the tube (`robots/three_beams/fe/README.md`).
+/// Number of elements around the tube (`robots/test/three_beams/fe/README.md`).
 const AROUND_THE_TUBE: usize = 24;
 /// Every second sample is drawn: ten curves per panel would hide each other, and a point every 2 ms
 /// resolves 100 Hz.
@@ -30,7 +30,7 @@ pub(super) fn page(found: &Findings) -> Case {
     let mut case = Case::new("three-beams", "2. Three beams");
     let ([up, forwards, sideways], tip) = (LENGTHS_M, tip());
     case.text(format!(
-        "`robots/three_beams`: three aluminium beams joined at right angles, a tube of {up} m upwards, a box of {forwards} m forwards (x), a rectangle of {sideways} m sideways (y), \
+        "`robots/test/three_beams`: three aluminium beams joined at right angles, a tube of {up} m upwards, a box of {forwards} m forwards (x), a rectangle of {sideways} m sideways (y), \
          a ball of {BALL_KG} kg at the tip ({}, {}, {}) m; the joint at the base is held at 0. Every load at the tip bends and twists some of them, and no entry of a beam \
          reaches the tip without a turn and a lever. World axes, z upwards; Timoshenko's theory. By hand: `flexarm statics three_beams --wrench 0,0,10`, `flexarm compare three_beams`.",
         tip.x, tip.y, tip.z

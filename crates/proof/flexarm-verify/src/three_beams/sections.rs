@@ -68,7 +68,7 @@ impl Section {
     fn new(bench: &Bench, robot: &Robot, k: usize) -> Result<Self, Error> {
         let member = &members()[k];
         let reduced = &robot.flexible_links[k].flexible.reduced;
-        let mesh = Meshed::read(bench, &format!("robots/three_beams/fe/beam_{}.msh.gz", k + 1), UnitSystem::SI)?;
+        let mesh = Meshed::read(bench, &format!("robots/test/three_beams/fe/beam_{}.msh.gz", k + 1), UnitSystem::SI)?;
         // The first beam is along z of its link, the others are along x.
         let R = if k == TUBE { member.R.transpose() } else { Matrix3::identity() };
         let p_B = reduced.X_LB.translation.vector;

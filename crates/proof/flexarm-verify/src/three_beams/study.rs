@@ -20,7 +20,7 @@ use crate::meshed::Meshed;
 /// Step size of the runs until rest (s).
 const SETTLING_STEP_S: f64 = 2e-3;
 /// The mesh of the tube.
-const TUBE_MESH: &str = "robots/three_beams/fe/beam_1.msh.gz";
+const TUBE_MESH: &str = "robots/test/three_beams/fe/beam_1.msh.gz";
 /// Number of modes of the links used for the modal energy shares, all that the files have.
 pub(super) const ALL_MODES: usize = 10;
 
