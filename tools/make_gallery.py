@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Writes the table of docs/gallery.md: a row of computed numbers for each robot in robots/.
+"""Writes the table of docs/gallery.md: a row of computed numbers for each robot in robots/ that
+has no table in tests/arms (tools/catalogue.py writes those).
 Usage: make_gallery.py [--check]
 
 Runs `flexarm inspect`, `modes` and `compare` with --json. The program is $FLEXARM, else
@@ -104,7 +105,8 @@ def main():
     parser.add_argument("--check", action="store_true", help="compare instead of writing")
     check = parser.parse_args().check
     flexarm = program()
-    names = sorted(file.parent.name for file in ROOT.glob("robots/*/robot.toml"))
+    names = {file.parent.name for file in ROOT.glob("robots/*/robot.toml")}
+    names = sorted(names - {file.stem for file in ROOT.glob("tests/arms/*.toml")})
     rows = [HEAD, ["---"] * len(HEAD), *(row(flexarm, name) for name in names)]
     table = "".join("| " + " | ".join(line) + " |\n" for line in rows)
     print(table, end="")

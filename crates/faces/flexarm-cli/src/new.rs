@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use clap::Args;
-use flexarm::new::NewLink;
+use clap::{Args, ValueEnum};
+use flexarm::new::{NewLink, Reducer};
 use flexarm::written::visible;
 use flexarm::{
     Keep, LoadOptions, Modelling, Motion, NewOptions, NewRobot, Outputs, ReadOptions, Robot, RunOptions, RunRequest,
@@ -16,6 +16,21 @@ use crate::failure::Failure;
 use crate::print::{lines, table, warnings};
 use crate::terminal::{Bar, Terminal, answer_styled, to_json};
 use crate::{signals, summary_table};
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum Reducers {
+    Cycloidal,
+    StrainWave,
+}
+
+impl From<Reducers> for Reducer {
+    fn from(kind: Reducers) -> Self {
+        match kind {
+            Reducers::Cycloidal => Self::Cycloidal,
+            Reducers::StrainWave => Self::StrainWave,
+        }
+    }
+}
 
 #[derive(Clone, Debug, Args)]
 pub(crate) struct NewArgs {
@@ -47,6 +62,9 @@ pub(crate) struct NewArgs {
     /// reported]
     #[arg(long, help_heading = "Robot", value_name = "KG", allow_hyphen_values = true)]
     pub(crate) payload: Option<f64>,
+    /// Kind of all reducers [default: cycloidal from a rated torque of 200 N m, strain-wave below]
+    #[arg(long, help_heading = "Robot", value_name = "KIND")]
+    pub(crate) reducers: Option<Reducers>,
     /// Total mass of the arm's links without <inertial>, or with a placeholder (kg): distributed by
     /// mesh volume or by length
     #[arg(
@@ -87,7 +105,7 @@ impl NewArgs {
         };
         let LoadOptions { urdf, .. } = robot.options()?;
         let (base, tool, joints) = (self.base.clone(), self.tool.clone(), self.joints.clone());
-        Ok(NewOptions { base, tool, joints, payload_kg: self.payload, urdf })
+        Ok(NewOptions { base, tool, joints, payload_kg: self.payload, reducers: self.reducers.map(Into::into), urdf })
     }
 
     /// Returns the requested folder, or one in the current folder named after the description.

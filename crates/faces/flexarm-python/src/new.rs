@@ -2,8 +2,10 @@
 
 use std::path::PathBuf;
 
+use flexarm::new::Reducer;
 use flexarm::written::message;
 use flexarm::{Finding, NewOptions, ReadOptions, new_robot as make};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::caveat;
@@ -24,6 +26,8 @@ use crate::values::{plain, texts};
 ///     Joints that the motion moves.
 /// payload : float, optional
 ///     Mass at the tool (kg); 0 for none.
+/// reducers : {"cycloidal", "strain-wave"}, optional
+///     Kind of all reducers; by their rated torque if missing.
 /// inertia_from_density : float, optional
 ///     Density (kg/m³) of links without a mass, or with a placeholder.
 /// inertia_from_total_mass : float, optional
@@ -36,7 +40,7 @@ use crate::values::{plain, texts};
 ///     Files, chain and every assumption, as ``flexarm new --json``.
 #[pyfunction]
 #[pyo3(signature = (urdf, folder, *, base=None, tool=None, joints=None, payload=None,
-                    inertia_from_density=None, inertia_from_total_mass=None, overwrite=false))]
+                    reducers=None, inertia_from_density=None, inertia_from_total_mass=None, overwrite=false))]
 #[expect(clippy::too_many_arguments, reason = "keyword arguments")]
 pub(crate) fn new_robot<'py>(
     py: Python<'py>,
@@ -46,6 +50,7 @@ pub(crate) fn new_robot<'py>(
     tool: Option<String>,
     #[pyo3(from_py_with = texts)] joints: Option<Vec<String>>,
     payload: Option<f64>,
+    reducers: Option<&str>,
     inertia_from_density: Option<f64>,
     inertia_from_total_mass: Option<f64>,
     overwrite: bool,
@@ -56,7 +61,16 @@ pub(crate) fn new_robot<'py>(
         inertia_from_mesh: estimate(inertia_from_density, inertia_from_total_mass)?,
         ..ReadOptions::default()
     };
-    let options = NewOptions { base, tool, joints, payload_kg: payload, urdf: read };
+    let reducers = match reducers {
+        None => None,
+        Some("cycloidal") => Some(Reducer::Cycloidal),
+        Some("strain-wave") => Some(Reducer::StrainWave),
+        Some(other) => {
+            let what = format!("reducers is {other:?}; give \"cycloidal\" or \"strain-wave\"");
+            return Err(PyValueError::new_err(what));
+        }
+    };
+    let options = NewOptions { base, tool, joints, payload_kg: payload, reducers, urdf: read };
     let made = py.detach(|| make(&urdf, &folder, overwrite, &options)).or_raise()?;
     let shown = |finding: &Finding| {
         let [location, message] = [&finding.location, &finding.message].map(|text| message(text));

@@ -6,6 +6,7 @@
 
 use flexarm_testkit::allocations::CountingAllocator;
 
+mod arms;
 mod arrays;
 mod balancers;
 mod batch;

@@ -10,7 +10,7 @@ use nalgebra::{DVector, Vector3};
 use super::assumption::Assumption;
 use super::beams::{self, BeamSection, NoSection};
 use super::chain::{self, Chain};
-use super::gears::{self, GearClass};
+use super::gears::{self, GearClass, Reducer};
 use super::loads::{self, Cube, Workspace};
 use super::sample::{self, Axis, SampleMotion};
 use super::{NewError, NewOptions};
@@ -102,7 +102,7 @@ impl Draft {
         let workspace = Workspace::of(&model, &ranges);
         let reach = reach(&model, &workspace, mechanism, &chain);
         let floor = loads::wrist_torque(payload.mass, moving_mass, reach);
-        let joints = joints(&model, mechanism, &chain, &workspace, floor);
+        let joints = joints(&model, mechanism, &chain, &workspace, floor, options.reducers);
         let axes: Vec<Axis> = joints.iter().filter_map(|j| axis(j, &model, &ranges)).collect();
         let motion = sample::sample_motion(&model, &workspace, &axes);
         let links = links(&urdf, &chain);
@@ -252,7 +252,14 @@ fn reach(model: &Model, workspace: &Workspace, mechanism: &Mechanism, chain: &Ch
 /// Returns the joints of the arm with their drives.
 ///
 /// * `floor`: minimum torque assumed for a joint of this arm (N m).
-fn joints(model: &Model, mechanism: &Mechanism, chain: &Chain, workspace: &Workspace, floor: f64) -> Vec<DraftJoint> {
+fn joints(
+    model: &Model,
+    mechanism: &Mechanism,
+    chain: &Chain,
+    workspace: &Workspace,
+    floor: f64,
+    reducers: Option<Reducer>,
+) -> Vec<DraftJoint> {
     let of = |&place: &usize| {
         let joint = &mechanism.joints[place];
         let k = model.coordinates().iter().position(|c| c.joint == joint.name)?;
@@ -285,7 +292,8 @@ fn joints(model: &Model, mechanism: &Mechanism, chain: &Chain, workspace: &Works
             // Gravity torque may last, acceleration torque does not.
             Some(_) => (joint.needed / gears::PEAK_OVER_RATED).max(joint.weight.max(floor) / 1.5),
         };
-        joint.gear = (!joint.joint.kind.slides() && joint.rated > 1e-6).then(|| gears::class(joint.rated));
+        let reducer = reducers.unwrap_or_else(|| Reducer::usual(joint.rated));
+        joint.gear = (!joint.joint.kind.slides() && joint.rated > 1e-6).then(|| gears::class(reducer, joint.rated));
     }
     joints
 }

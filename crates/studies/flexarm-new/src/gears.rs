@@ -1,16 +1,16 @@
-//! Torsional stiffness of reducers by rated torque: data of two series, for a first estimate. The
-//! manufacturer's data sheet of the actual gear takes precedence.
+//! Torsional stiffness of reducers by rated torque: data of two catalogues, for a first estimate.
+//! The manufacturer's data sheet of the actual gear takes precedence.
 //!
 //! Stiffness grows almost proportionally to rated torque: both series twist by about 1e-3 rad under
-//! it.
+//! it. Sources: Nabtesco RV and Harmonic Drive CSG in `docs/references.md`.
 
 use serde::Serialize;
 
 /// Conversion from N m per arc minute to N m/rad.
 const ARC_MINUTE: f64 = 60.0 * 180.0 / std::f64::consts::PI;
 
-/// Cycloidal reducers, series RV-E of Nabtesco: size, rated torque (N m), torsional rigidity (N m
-/// per minute of arc).
+/// Cycloidal reducers, series RV-E of Nabtesco (rating table, pages 12 and 13): size, rated torque
+/// (N m), torsional rigidity (N m per minute of arc).
 const CYCLOIDAL: [(f64, f64, f64); 8] = [
     (6.0, 58.0, 20.0),
     (20.0, 167.0, 49.0),
@@ -22,8 +22,9 @@ const CYCLOIDAL: [(f64, f64, f64); 8] = [
     (450.0, 4410.0, 1176.0),
 ];
 
-/// Strain-wave gears, series CSG of Harmonic Drive at ratios from 80: size, rated torque (N m),
-/// stiffness at small torque (K1) and at large torque (K3) (N m/rad).
+/// Strain-wave gears, series CSG of Harmonic Drive at ratios from 80 (rating table, page 10;
+/// torsional stiffness, page 48): size, rated torque (N m), stiffness at small torque (K1) and at
+/// large torque (K3) (N m/rad).
 const STRAIN_WAVE: [(f64, f64, f64, f64); 8] = [
     (14.0, 10.0, 4.7e3, 7.1e3),
     (17.0, 31.0, 1.0e4, 1.6e4),
@@ -35,8 +36,22 @@ const STRAIN_WAVE: [(f64, f64, f64, f64); 8] = [
     (65.0, 1236.0, 5.4e5, 9.8e5),
 ];
 
-/// Rated torque from which arms have cycloidal reducers (N m).
-pub(crate) const CYCLOIDAL_FROM: f64 = 200.0;
+/// Kind of reducer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reducer {
+    /// Cycloidal reducer, as in the main axes of industrial arms.
+    Cycloidal,
+    /// Strain-wave gear, as in light and collaborative arms.
+    StrainWave,
+}
+
+impl Reducer {
+    /// Kind that arms usually have at a rated torque (N m).
+    pub fn usual(rated: f64) -> Self {
+        if rated >= 200.0 { Self::Cycloidal } else { Self::StrainWave }
+    }
+}
+
 /// Approximate ratio of acceleration torque to rated torque, for both series.
 pub const PEAK_OVER_RATED: f64 = 2.5;
 /// Range of the ratio of identified stiffness to the table's value: main axes of the shipped KR
@@ -57,10 +72,10 @@ pub struct GearClass {
     pub is_beyond: bool,
 }
 
-/// Returns the class of a rated torque (N m, above 0): power-law interpolation between two sizes,
-/// proportional beyond the table.
-pub fn class(rated: f64) -> GearClass {
-    if rated >= CYCLOIDAL_FROM {
+/// Returns the class of a kind of reducer with a rated torque (N m, above 0): power-law
+/// interpolation between two sizes, proportional beyond the table.
+pub fn class(reducer: Reducer, rated: f64) -> GearClass {
+    if reducer == Reducer::Cycloidal {
         let rows: Vec<_> =
             CYCLOIDAL.iter().map(|&(size, torque, rigidity)| (size, torque, rigidity * ARC_MINUTE)).collect();
         let (stiffness, sizes, is_beyond) = between(&rows, rated, "RV-", "E");

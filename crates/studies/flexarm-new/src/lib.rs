@@ -41,6 +41,7 @@ use flexarm_run::Robot;
 use flexarm_run::motion_report::motion_report;
 
 pub use assumption::Assumption;
+pub use gears::Reducer;
 pub use report::{NewDrive, NewHeld, NewJoint, NewLink, NewPayload, NewRobot};
 
 /// Parts that the tests of this crate reach; not part of the interface.
@@ -64,6 +65,8 @@ pub struct NewOptions {
     pub joints: Option<Vec<String>>,
     /// Payload mass (kg); 0 for none.
     pub payload_kg: Option<f64>,
+    /// Kind of all reducers; by their rated torque if missing.
+    pub reducers: Option<Reducer>,
     /// Options of the URDF reader: packages, arguments, masses from meshes.
     pub urdf: ReadOptions,
 }

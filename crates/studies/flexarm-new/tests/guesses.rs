@@ -1,5 +1,6 @@
 //! Guesses: gears by their class, payloads, and paths of files.
 
+use flexarm_new::Reducer::{Cycloidal, StrainWave};
 use flexarm_new::internals::{PEAK_OVER_RATED, class, guessed_payload, relative};
 
 /// One arc minute in a turn: N m per arc minute to N m/rad.
@@ -8,19 +9,30 @@ const ARC_MINUTE: f64 = 60.0 * 180.0 / std::f64::consts::PI;
 /// Truth: the rows of the tables; between them, a twist under rated torque of about 1e-3 rad.
 #[test]
 fn the_stiffness_at_the_rated_torque_of_a_size_is_that_of_the_table_and_rises_between() {
-    let exact = class(412.0).stiffness / (108.0 * ARC_MINUTE) - 1.0;
+    let exact = class(Cycloidal, 412.0).stiffness / (108.0 * ARC_MINUTE) - 1.0;
     assert!(exact.abs() < 1e-12, "{exact:.1e}");
-    let found = class(87.0);
+    let found = class(StrainWave, 87.0);
     assert!((found.low / 3.1e4 - 1.0).abs() < 1e-12 && (found.high / 5.7e4 - 1.0).abs() < 1e-12, "{found:?}");
-    let mut before = 0.0;
-    for k in 0..400 {
-        let rated = 0.5 * 1.03f64.powi(k);
-        let found = class(rated);
-        let turned = rated / found.stiffness;
-        assert!(found.stiffness > before, "{rated} {found:?}");
-        assert!((6e-4..=2.5e-3).contains(&turned), "{rated} N m: {turned:.2e} rad");
-        assert!(found.low < found.stiffness && found.stiffness < found.high);
-        before = found.stiffness;
+    for reducer in [Cycloidal, StrainWave] {
+        let mut before = 0.0;
+        for k in 0..400 {
+            let rated = 0.5 * 1.03f64.powi(k);
+            let found = class(reducer, rated);
+            let turned = rated / found.stiffness;
+            assert!(found.stiffness > before, "{rated} {found:?}");
+            assert!((6e-4..=2.5e-3).contains(&turned), "{rated} N m: {turned:.2e} rad");
+            assert!(found.low < found.stiffness && found.stiffness < found.high);
+            before = found.stiffness;
+        }
+    }
+}
+
+/// Truth: the catalogues. At one rated torque a cycloidal reducer is 1.5 to 2.8 times as stiff.
+#[test]
+fn a_strain_wave_arm_is_softer_than_a_cycloidal_one_of_the_same_torque() {
+    for rated in [58.0, 167.0, 412.0, 784.0] {
+        let ratio = class(Cycloidal, rated).stiffness / class(StrainWave, rated).stiffness;
+        assert!((1.4..3.0).contains(&ratio), "{rated} N m: {ratio}");
     }
 }
 
@@ -35,7 +47,7 @@ fn main_axes_of_identified_arms_lie_within_the_range_of_their_class() {
     ];
     for (arm, axes) in arms {
         for (axis, (effort, identified)) in axes.into_iter().enumerate() {
-            let class = class(effort / PEAK_OVER_RATED);
+            let class = class(Cycloidal, effort / PEAK_OVER_RATED);
             assert!((class.low..=class.high).contains(&identified), "{arm} {axis}: {class:?}");
         }
     }

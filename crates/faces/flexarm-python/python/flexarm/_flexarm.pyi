@@ -228,6 +228,7 @@ def new_robot(
     tool: str | None = None,
     joints: Sequence[str] | None = None,
     payload: float | None = None,
+    reducers: Literal["cycloidal", "strain-wave"] | None = None,
     inertia_from_density: float | None = None,
     inertia_from_total_mass: float | None = None,
     overwrite: bool = False,
