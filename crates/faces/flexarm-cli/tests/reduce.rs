@@ -563,17 +563,15 @@ mod refused {
 mod reference {
     use super::*;
 
-    fn case(file: &str) -> Option<String> {
-        common::reference(file).map(|path| path.display().to_string())
+    fn case(file: &str) -> String {
+        common::reference(file).display().to_string()
     }
 
     /// Truth: CalculiX, stored with the case (A held, both faces tied, its quadrature).
     #[test]
+    #[ignore = "needs the reference data beside the project"]
     fn a1_has_the_tip_compliance_of_calculix() {
-        let (Some(mesh), Some(truth)) = (case("A1_beam/beam_tet10_h50mm.inp.gz"), case("A1_beam/beam_truth.json"))
-        else {
-            return;
-        };
+        let (mesh, truth) = (case("A1_beam/beam_tet10_h50mm.inp.gz"), case("A1_beam/beam_truth.json"));
         let truth: Value = serde_json::from_str(&std::fs::read_to_string(truth).unwrap()).unwrap();
         let expected = matrix(&truth["levels"]["tet10_h50mm"]["ccx_static_C_BB"]);
         let arguments = ["reduce", &mesh, "--units", "SI", "--interface", "INTERFACE_A", "--interface", "INTERFACE_B"];
@@ -587,8 +585,9 @@ mod reference {
     }
 
     #[test]
+    #[ignore = "needs the reference data beside the project"]
     fn a2_is_reduced_from_gmsh_with_every_check_passed() {
-        let Some(mesh) = case("A2_lower_arm/arm_tet10_h30mm_v22.msh.gz") else { return };
+        let mesh = case("A2_lower_arm/arm_tet10_h30mm_v22.msh.gz");
         let arguments = ["reduce", &mesh, "--units", "m-kg-s", "--material", "aluminium", "--chains", "4"];
         let rest = ["--interface", "interface_A", "--interface", "interface_B", "--at", "A=0,-0.075,0"];
         let last = ["--at", "B=0.04,0.11,1.1", "--modes-up-to", "1000", "-o", "result"];

@@ -19,7 +19,8 @@ fn numbers(value: &toml::Value) -> Vec<f64> {
 /// commits (`tools/make_arms.py --vendor` compares them).
 #[test]
 fn masses_inertias_frames_and_limits_are_those_that_the_makers_publish() {
-    let tables: Vec<PathBuf> = std::fs::read_dir(root().join("tests/arms")).unwrap().map(|e| e.unwrap().path()).collect();
+    let tables: Vec<PathBuf> =
+        std::fs::read_dir(root().join("tests/arms")).unwrap().map(|e| e.unwrap().path()).collect();
     assert!(tables.len() >= 12, "{}", tables.len());
     let mut largest: f64 = 0.0;
     for path in tables {
@@ -54,8 +55,8 @@ fn masses_inertias_frames_and_limits_are_those_that_the_makers_publish() {
             let origin = numbers(&row["origin"]);
             let place = Vector3::new(origin[0], origin[1], origin[2]);
             let turned = Rotation3::from_euler_angles(origin[3], origin[4], origin[5]);
-            let off = (read.X_PJ.translation.vector - place).norm()
-                + (read.X_PJ.rotation.matrix() - turned.matrix()).norm();
+            let off =
+                (read.X_PJ.translation.vector - place).norm() + (read.X_PJ.rotation.matrix() - turned.matrix()).norm();
             assert!(off <= 1e-12, "{name} {joint}: {off:.1e}");
         }
     }

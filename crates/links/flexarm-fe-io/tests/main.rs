@@ -1,6 +1,5 @@
 //! The tests of the crate, as one program: it links once.
 #![allow(clippy::print_stderr, reason = "measured errors, shown with --nocapture")]
-#![allow(clippy::print_stdout, reason = "a skipped test says so")]
 #![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
 #![allow(non_snake_case, reason = "monogram notation, as in the crate")]
 

@@ -320,15 +320,10 @@ pub(crate) fn mcap_records(bytes: &[u8]) -> BTreeMap<u8, usize> {
 const FOOTER: u8 = 0x02;
 const DATA_END: u8 = 0x0f;
 
-/// Path of a reference data file, next to the project or in the folder FLEXARM_SHARED; otherwise
-/// `None`, with a message.
-#[allow(clippy::print_stderr, reason = "a test that skips says so")]
-pub(crate) fn reference(name: &str) -> Option<PathBuf> {
+/// Path of a reference data file, in the folder FLEXARM_SHARED or beside the project.
+pub(crate) fn reference(name: &str) -> PathBuf {
     let named = std::env::var_os("FLEXARM_SHARED").map(PathBuf::from);
     let above = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().map(|folder| folder.join("shared"));
     let found = named.into_iter().chain(above).map(|shared| shared.join("fe").join(name)).find(|path| path.exists());
-    if found.is_none() {
-        eprintln!("skipped: the reference file {name} is not on this machine");
-    }
-    found
+    found.unwrap_or_else(|| panic!("there is no fe/{name} below FLEXARM_SHARED or beside the project"))
 }

@@ -13,8 +13,9 @@ use crate::common::turned_arm;
 /// CalculiX 2.20 as built by Debian does not condense; the error must give this cause, not only a
 /// residual.
 #[test]
+#[ignore = "needs the reference data beside the project"]
 fn uncondensed_substructures_of_calculix_are_refused_with_the_reason() {
-    let Some(folder) = samples() else { return };
+    let folder = samples();
     for file in [
         "A1_beam/beam_tet10_h50mm_ccx220_substructure_REAL_UNCONDENSED.mtx",
         "A2_lower_arm/arm_tet10_h30mm_ccx220_substructure_REAL_UNCONDENSED.mtx",

@@ -128,8 +128,9 @@ proptest! {
 /// The samples, truncated at many places and with single bytes changed; compressed ones are
 /// unpacked first.
 #[test]
+#[ignore = "needs the reference data beside the project"]
 fn samples_that_are_cut_or_changed_do_not_panic() {
-    let Some(folder) = samples() else { return };
+    let folder = samples();
     let files = std::fs::read_dir(folder.join("formats")).unwrap();
     let mut names: Vec<_> = files.map(|entry| entry.unwrap().path()).collect();
     names.sort();

@@ -2,7 +2,7 @@
 //!
 //! The samples of `shared/fe` all describe one structure, case A1: a steel beam along x, interface
 //! A at (0, 0, 0) and B at (1, 0, 0), SI. They are not part of the repository; without them the
-//! tests that need them print "skipped". The small texts here cover every branch.
+//! tests that need them are ignored by default. The small texts here cover every branch.
 
 mod abaqus_text;
 mod defective;

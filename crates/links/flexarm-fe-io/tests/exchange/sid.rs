@@ -120,8 +120,9 @@ fn the_orders_of_a_file_are_found_by_its_own_identities() {
 }
 
 #[test]
+#[ignore = "needs the reference data beside the project"]
 fn the_sample_body_agrees_with_the_reduced_matrices() {
-    let Some(folder) = samples() else { return };
+    let folder = samples();
     let path = folder.join("formats/beam_synthetic.SID_FEM");
     let sid = read_sid(&path).unwrap();
     assert_eq!((sid.nq(), sid.nodes.len(), sid.mass), (10, 2, 39.25));
@@ -334,9 +335,10 @@ fn matrices_that_are_much_larger_than_the_file_are_refused() {
 /// Truth: integrals of the sample, computed by another program for the same mesh: `J1`, `Oe`, `Gr`,
 /// `Ge`, `Cr` against those of the modal link of that mesh. The sample has eleven digits.
 #[test]
+#[ignore = "needs the reference data beside the project"]
 #[allow(clippy::print_stderr, reason = "measured errors, shown with --nocapture")]
 fn the_sample_body_is_the_modal_link_of_its_mesh() {
-    let Some(folder) = samples() else { return };
+    let folder = samples();
     let sid = read_sid(folder.join("formats/beam_synthetic.SID_FEM")).unwrap();
     let sample = modal_link_from_sid("sample", &sid).unwrap();
     assert_eq!((sample.coordinates(), sample.interfaces.len()), (10, 1));

@@ -4,7 +4,7 @@ use flexarm_fe_io::exchange::{DofLabel, InterfaceMap, assemble_interfaces, write
 use flexarm_fem::UnitSystem;
 use nalgebra::DMatrix;
 
-use super::shared::{digits_error, parse, samples, scaled_error, small_structure, truth};
+use super::shared::{digits_error, parse, scaled_error, small_structure};
 
 /// The same structure in mm, t, s: N/mm, N, N·mm; t, t·mm, t·mm²; modes normalised to one tonne.
 ///
@@ -27,9 +27,7 @@ fn in_mm_t_s(K: &DMatrix<f64>, M: &DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>)
 fn a_copy_in_mm_t_s_gives_the_same_structure() {
     let map: InterfaceMap = "A=#1-6,B=#7-12".parse().unwrap();
     let units: UnitSystem = "mm-t-s".parse().unwrap();
-    let mut structures = vec![small_structure(4)];
-    structures.extend(samples().map(|folder| truth(&folder)));
-    for (K, M) in structures {
+    for (K, M) in [small_structure(4)] {
         let (K_mm, M_mm) = in_mm_t_s(&K, &M);
         let (K_text, M_text) = (write_matrix_market(&K_mm, &[]), write_matrix_market(&M_mm, &[]));
         let imported = parse(&[("a_K.mtx", &K_text), ("a_M.mtx", &M_text)]);
