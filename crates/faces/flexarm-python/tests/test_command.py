@@ -27,7 +27,7 @@ def test_shipped_robots_come_from_the_package(tmp_path: Path, monkeypatch: pytes
     monkeypatch.chdir(tmp_path)
     robot = flexarm.load()
     assert robot.path.is_relative_to(SHARE) and robot.default_motion is not None
-    assert len(list(SHARE.glob("robots/**/robot.toml"))) == 13
+    assert len(list(SHARE.glob("robots/**/robot.toml"))) == 26
     assert robot.motion("point_to_point").duration > 0
 
 
