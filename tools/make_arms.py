@@ -278,8 +278,9 @@ def payload_text(mass):
 def robot_text(name, arm, drives, at="stiffness"):
     """Returns robot.toml: reducers typical, or at one end of their range; at the lower end half of each
     link's mass stiffens it."""
+    motion = f"../../trajectories/{arm['motion']}.toml" if "motion" in arm else "motion.toml"
     out = [f"# {arm['title']}: written by tools/make_arms.py; what is published and what is ASSUMED: README.md.", "format = 1", f'name = "{name}"',
-           f'urdf = "{name}.urdf"', 'default_trajectory = "motion.toml"', 'tcp = { link = "tool0", xyz = [0.0, 0.0, 0.0], rpy = [0.0, 0.0, 0.0] }', "",
+           f'urdf = "{name}.urdf"', f'default_trajectory = "{motion}"', 'tcp = { link = "tool0", xyz = [0.0, 0.0, 0.0], rpy = [0.0, 0.0, 0.0] }', "",
            "# Rated payload. ASSUMED: an aluminium cube that is bolted to the flange."]
     out.append(payload_text(arm["payload"]) if at != "unloaded" else "")
     if "waive_inertia" in arm:
@@ -427,10 +428,10 @@ def texts(name, arm):
         urdf = urdf_text(name, arm)
         (folder / f"{name}.urdf").write_text(urdf)
         made = answer("new", folder / f"{name}.urdf", "--payload", arm["payload"], "--tool", "tool0", *reducers(arm), "-o", folder / "new", "--no-run")
-        motion = (folder / "new/motion.toml").read_text()
         found = outcome(lambda at: robot_text(name, arm, made["drives"], at), arm["pose"], made["drives"], folder)
         page = readme(name, arm, made, found, sags(arm, folder / "stiffness.toml"))
-        return {f"{name}.urdf": urdf, "robot.toml": robot_text(name, arm, made["drives"]), "motion.toml": motion, "README.md": page}
+        own = {} if "motion" in arm else {"motion.toml": (folder / "new/motion.toml").read_text()}
+        return {f"{name}.urdf": urdf, "robot.toml": robot_text(name, arm, made["drives"]), "README.md": page, **own}
 
 
 def differs(written, computed):
