@@ -82,7 +82,7 @@ def table(rows):
     cells = [HEAD, ["---"] * len(HEAD)]
     for row in sorted(rows, key=lambda row: row["payload"]):
         payload = f"{row['payload']:g}" if row["payload"] else "none"
-        cells.append([f"`{row['name']}`", payload, f"{row['mass']:.3g}", row["sag"], row["compliance"], row["f1"], row["gears"]])
+        cells.append([f"`{row['name']}`", payload, digits(row['mass']), row["sag"], row["compliance"], row["f1"], row["gears"]])
     return "".join("| " + " | ".join(line) + " |\n" for line in cells)
 
 

@@ -20,7 +20,7 @@ from robot_file import Arm, origin
 
 ROOT = Path(__file__).parent.parent
 FILES = {"pick_and_place.toml": "kr210", "point_to_point.toml": "kr210", "large_moves.toml": "kr210", "stress.toml": "kr210", "iso9283_path.csv": "kr210",
-         "reference_arm.toml": "test/reference_arm", "beam_hold.toml": "test/one_beam", "beam_swing.toml": "test/three_beams",
+         "handling.toml": "fanuc_r2000_210f", "reference_arm.toml": "test/reference_arm", "beam_hold.toml": "test/one_beam", "beam_swing.toml": "test/three_beams",
          "manutec_r3.toml": "manutec_r3", "identified_arms.toml": ("kr210_identified", "kr500_identified"), "three_mass.toml": "abb_three_mass", "moberg_arm.toml": "test/moberg_arm"}
 # m; the box behind the inertia of the payload
 PAYLOAD_HALF_SIZE = np.array([0.25, 0.25, 0.20])

@@ -215,7 +215,8 @@ def table_of(arm, vendor):
         lines.append(f"{name} = {{ " + ", ".join(f"{key} = {json.dumps(value)}" for key, value in row.items()) + " }")
     lines += ["", "# Boxes (centre, size) and cylinders (centre, radius, length, axis) around the slices of each mesh, mm.", "[shapes]"]
     lines += [f"{name} = {json.dumps(rows)}" for name, rows in shapes.items()]
-    for entry in made.get("flexible_link", []):
+    # Other parts than those of the published inertia would replace it.
+    for entry in (e for e in made.get("flexible_link", []) if e["beam"]["parts"] == "from-link"):
         beam = ", ".join(f"{key} = {json.dumps(value)}" for key, value in entry["beam"].items())
         lines += ["", "# The section that the mesh shows, hollow so that the link has its mass (`flexarm new`).", "[[beams]]",
                   f"link = \"{entry['link']}\"", f"distal = \"{entry['distal']}\"", f"beam = {{ {beam} }}"]
@@ -277,8 +278,9 @@ def payload_text(mass):
 def robot_text(name, arm, drives, at="stiffness"):
     """Returns robot.toml: reducers typical, or at one end of their range; at the lower end half of each
     link's mass stiffens it."""
+    motion = f"../../trajectories/{arm['motion']}.toml" if "motion" in arm else "motion.toml"
     out = [f"# {arm['title']}: written by tools/make_arms.py; what is published and what is ASSUMED: README.md.", "format = 1", f'name = "{name}"',
-           f'urdf = "{name}.urdf"', 'default_trajectory = "motion.toml"', 'tcp = { link = "tool0", xyz = [0.0, 0.0, 0.0], rpy = [0.0, 0.0, 0.0] }', "",
+           f'urdf = "{name}.urdf"', f'default_trajectory = "{motion}"', 'tcp = { link = "tool0", xyz = [0.0, 0.0, 0.0], rpy = [0.0, 0.0, 0.0] }', "",
            "# Rated payload. ASSUMED: an aluminium cube that is bolted to the flange."]
     out.append(payload_text(arm["payload"]) if at != "unloaded" else "")
     if "waive_inertia" in arm:
@@ -371,7 +373,7 @@ def readme(name, arm, made, found, poses):
     rows = [f"| {drive['joint']} | {math.degrees(row['limits'][0]):.0f} to {math.degrees(row['limits'][1]):.0f} | {math.degrees(row['limits'][2]):.0f} | "
             f"{row['limits'][3]:g} | {drive['stiffness']:.3g} | {drive['low']:.3g} to {drive['high']:.3g} | "
             f"{'cycloidal' if 'cycloidal' in drive['source'] else 'strain wave'} |" for drive, row in zip(made["drives"], joints)]
-    beams = [f"  * `{entry['link']}`: {section(entry)}" for entry in arm.get("beams", [])] or ["  * none: no mesh shows a beam"]
+    beams = [f"  * `{entry['link']}`: {section(entry)}" for entry in arm.get("beams", [])] or ["  * none"]
     worst = max(poses)
     typical, pose = found["stiffness"], degrees(arm["pose"])
     return "\n".join([
@@ -380,7 +382,7 @@ def readme(name, arm, made, found, poses):
         "```sh", f"flexarm compare {name}                # the sample motion with the rated payload", f"flexarm statics {name} --at={pose}", "```", "",
         "## Published", "",
         wrapped(f"* Masses, centres of mass, inertias, frames and limits of all links: `{source['file']}` of {source['repository']}, commit "
-                f"`{source['commit'][:12]}`, version {source['version']}, {source['licence']}, copyright {source['copyright']}. The figures are in "
+                f"`{source['commit'][:12]}`, version {source['version']}, {source['licence']}, copyright {source['copyright'].rstrip('.')}. The figures are in "
                 f"`tests/arms/{name}.toml`; `tools/make_arms.py --vendor DIR` compares them with that file."),
         wrapped(f"* Links: {sum(row[0] for row in arm['links'].values()):.4g} kg. {arm['published']}"), "",
         "## Assumed", "",
@@ -388,12 +390,14 @@ def readme(name, arm, made, found, poses):
         wrapped("* Reducers: the class of the rated torque, which is the effort limit over 2.5, with its range by the catalogues "
                 "([how it is chosen](../../docs/new_robot.md)); damping 3 % of critical, no friction, no play."),
         *(wrapped(f"* {note}") for note in arm.get("notes", [])),
-        wrapped("* Links that bend: sections that the maker's meshes show, with all of the mass in the wall (half of it at the lower end of the range)."),
+        wrapped("* Links that bend: those whose published inertia can be cut in two, with the sections that the maker's meshes show and all of the mass in the wall "
+                "(half of it at the lower end of the range); the others are rigid."),
         *beams, "* Shapes: boxes and cylinders around slices of the meshes. They are for pictures.", "",
         "| joint | range (deg) | speed (deg/s) | effort (N m) | stiffness (N m/rad) | its range | class |", "| --- | --- | --- | --- | --- | --- | --- |", *rows, "",
         "## What follows", "",
         wrapped(f"At the rated pose ({arm['pose_words']}: {pose}; flange {typical['tcp'][2]:.2f} m high) with the payload. In brackets: the range of the assumed stiffness."), "",
         "| quantity | value |", "| --- | --- |",
+        f"| reach: farthest flange from the first joint, 400 poses (m) | {made['reach_m']:.2f} |",
         f"| sag of the flange by its own weight and the payload (mm) | {spread(found, lambda f: f['sag'])} |",
         f"| of which by the payload (mm) | {digits(typical['sag'] - found['unloaded']['sag'])} |",
         f"| largest compliance of the flange (µm/N) | {spread(found, lambda f: f['compliance'])} |",
@@ -424,10 +428,10 @@ def texts(name, arm):
         urdf = urdf_text(name, arm)
         (folder / f"{name}.urdf").write_text(urdf)
         made = answer("new", folder / f"{name}.urdf", "--payload", arm["payload"], "--tool", "tool0", *reducers(arm), "-o", folder / "new", "--no-run")
-        motion = (folder / "new/motion.toml").read_text()
         found = outcome(lambda at: robot_text(name, arm, made["drives"], at), arm["pose"], made["drives"], folder)
         page = readme(name, arm, made, found, sags(arm, folder / "stiffness.toml"))
-        return {f"{name}.urdf": urdf, "robot.toml": robot_text(name, arm, made["drives"]), "motion.toml": motion, "README.md": page}
+        own = {} if "motion" in arm else {"motion.toml": (folder / "new/motion.toml").read_text()}
+        return {f"{name}.urdf": urdf, "robot.toml": robot_text(name, arm, made["drives"]), "README.md": page, **own}
 
 
 def differs(written, computed):

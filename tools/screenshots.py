@@ -24,9 +24,9 @@ import time
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 # Picture: arguments of flexarm, file in its output folder, seconds of playback before the shot.
 RERUN = {
-    "arm": (["compare"], "run.rrd", 1.0),
-    "recording": (["compare"], "run.rrd", 6.5),
-    "mcap": (["compare"], "run.mcap", 6.5),
+    "arm": (["compare", "kr210"], "run.rrd", 1.0),
+    "recording": (["compare", "kr210"], "run.rrd", 6.5),
+    "mcap": (["compare", "kr210"], "run.mcap", 6.5),
     "study": (
         ["compare", "robots/kr210/links.toml", "--with", "links=modal,name=modal links", "--with", "robot=robots/kr210/beams.toml,name=tubes"],
         "study.rrd",
@@ -37,7 +37,7 @@ RERUN = {
 ANIMATED = "arm"
 CROP = (0.0, 0.03, 1.0, 0.498)
 REPORTS = {
-    "report": ["compare"],
+    "report": ["compare", "kr210"],
     "report_study": RERUN["study"][0],
 }
 

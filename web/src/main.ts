@@ -372,7 +372,7 @@ async function begin(): Promise<void> {
     const value = link.get(name);
     if (value !== null && [...choice(name).options].some((option) => option.value === value)) choice(name).value = value;
   }
-  if (!link.has("robot")) choice("robot").value = "kr210";
+  if (!link.has("robot")) choice("robot").value = "fanuc_r2000_210f";
   await choose();
   for (const { key, min, max } of sliders) {
     const value = Number(link.get(key) ?? Number.NaN);

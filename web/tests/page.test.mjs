@@ -48,8 +48,8 @@ const native_headline = (...args) => JSON.parse(native(["compare", ...args, "--n
 
 test("the first arm runs by itself and has the peak of the command line", async () => {
   const page = await open();
-  assert.equal(await headline(page), native_headline("kr210"));
-  assert.match(await page.textContent("#instant"), /at 6\.06 s: 6\.01\d mm/);
+  assert.equal(await headline(page), native_headline("fanuc_r2000_210f"));
+  assert.match(await page.textContent("#instant"), /at 0\.75 s: 3\.83\d mm/);
   assert.ok((await page.locator("#downloads a").allTextContents()).includes("report.html"));
   await picture(page, "desktop");
   assert.deepEqual(page.complaints, []);

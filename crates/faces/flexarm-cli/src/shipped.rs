@@ -74,7 +74,7 @@ pub(crate) fn library(name: &str) -> Option<PathBuf> {
 /// # Errors
 /// [`Error::File`] for a name that no shipped robot has, with the names that there are.
 pub(crate) fn robot(given: Option<&Path>) -> Result<PathBuf, Error> {
-    let given = given.unwrap_or(Path::new("kr210"));
+    let given = given.unwrap_or(Path::new("fanuc_r2000_210f"));
     let path = find(given, &ROBOTS, &["/robot.toml"]);
     let advice = "give a robot.toml, a folder with one, or a .urdf or .xacro file";
     known(given, path, "robot", advice, || names(&ROBOTS, |entry| entry.join("robot.toml").is_file()))

@@ -507,14 +507,14 @@ mod folders {
         has_stable_keys(&summary);
         assert_eq!(
             (summary["robot"].as_str(), summary["trajectory"].as_str()),
-            (Some("kr210"), Some("pick_and_place"))
+            (Some("fanuc_r2000_210f"), Some("handling"))
         );
-        let report = place.text("out/kr210-pick_and_place-001/report.md");
+        let report = place.text("out/fanuc_r2000_210f-handling-001/report.md");
         let headline = summary["headline"].as_str().unwrap();
         assert!(headline.contains("static") && headline.contains("gearboxes"), "{headline}");
         assert_eq!(report.lines().nth(2), Some(headline));
-        assert!(place.text("out/kr210-pick_and_place-001/report.html").contains(headline));
-        let stiffness = matrix(&place.json(&["inspect", "kr210"])["flexible_links"][0]["stiffness"]);
+        assert!(place.text("out/fanuc_r2000_210f-handling-001/report.html").contains(headline));
+        let stiffness = matrix(&place.json(&["inspect", "fanuc_r2000_210f"])["flexible_links"][0]["stiffness"]);
         assert_eq!((stiffness.len(), stiffness[0].len()), (6, 6));
     }
 }

@@ -42,7 +42,7 @@ pub(crate) fn estimate(density: Option<f64>, total_mass: Option<f64>) -> PyResul
 ///
 /// Parameters
 /// ----------
-/// robot : str or os.PathLike, default "kr210"
+/// robot : str or os.PathLike, default "fanuc_r2000_210f"
 ///     A ``robot.toml``, a folder with one, a bare ``.urdf`` or ``.xacro``, or the name of a shipped robot.
 /// tcp : str, optional
 ///     Link to use as tool centre point instead of the file's.
@@ -85,7 +85,7 @@ pub(crate) fn load(
     #[pyo3(from_py_with = texts)] waive_inertia: Option<Vec<String>>,
 ) -> PyResult<PyRobot> {
     crate::command::name_keywords();
-    let given = robot.map_or(Ok(PathBuf::from("kr210")), |given| path("robot", given))?;
+    let given = robot.map_or(Ok(PathBuf::from("fanuc_r2000_210f")), |given| path("robot", given))?;
     let found = shipped(&given)?;
     let choices = PyDict::new(py);
     let estimate = estimate(inertia_from_density, inertia_from_total_mass)?;

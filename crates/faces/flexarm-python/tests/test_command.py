@@ -27,8 +27,8 @@ def test_shipped_robots_come_from_the_package(tmp_path: Path, monkeypatch: pytes
     monkeypatch.chdir(tmp_path)
     robot = flexarm.load()
     assert robot.path.is_relative_to(SHARE) and robot.default_motion is not None
-    assert len(list(SHARE.glob("robots/**/robot.toml"))) == 13
-    assert robot.motion("point_to_point").duration > 0
+    assert len(list(SHARE.glob("robots/**/robot.toml"))) == 26
+    assert robot.motion("handling").duration > 0
 
 
 @pytest.mark.skipif(not (SHARE / "lib").exists(), reason="a wheel built from the source package alone")
