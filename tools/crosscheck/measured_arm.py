@@ -2,8 +2,9 @@
 
     python tools/crosscheck/measured_arm.py FOLDER [-o FIGURES.json]     (pip install numpy scipy)
 
-FOLDER is a copy of the data of Hilti's construction robot with its URDFs (CC BY-NC-SA 3.0;
-docs/measured_arm.md says what it has to contain). The program is $FLEXARM, else
+FOLDER has the data of Hilti's construction robot (CC BY-NC-SA 3.0), as measured_arm_data.py writes it
+from the published files. With trailblazer_calibrated.urdf, whose joint frames were fitted by an
+independent model and which is not published, the rows of the calibrated URDF are made as well. The program is $FLEXARM, else
 target/release/flexarm. Prints every figure beside its bound; exit status 1 if one is larger. With -o,
 the figures are written to a file, tests/verification/measured_arm.json; none of the data is.
 
@@ -294,7 +295,8 @@ def on_floor(robot, gravity, name):
 def method(folder, source, flat, gravity, given):
     """Displacement under given springs, against the chain above."""
     print("1. Method, without a fit")
-    chain, poses = Chain(source / URDFS["calibrated"]), flat["q"][::8]
+    urdf = next(iter(URDFS.values()))
+    chain, poses = Chain(source / urdf), flat["q"][::8]
     col, gear = given["without_play"]["col"], given["gear"][:5]
     play_of = lambda key: (given[key][0], given[key][1], abs(given[key][2]) + 3.0)
     found = {}
@@ -302,7 +304,7 @@ def method(folder, source, flat, gravity, given):
         tilts = [[0.0, col[1], col[2]], [0.0, col[4], col[5]]]
         robot = folder / f"method_{name}.toml"
         stiffness = [1 / c for c in gear]
-        robot.write_text(robot_text(URDFS["calibrated"], GRAVITY * gravity, [1 / col[0], 1 / col[3]], tilts, stiffness, plays))
+        robot.write_text(robot_text(urdf, GRAVITY * gravity, [1 / col[0], 1 / col[3]], tilts, stiffness, plays))
         law = laws((col[0], col[3]), tilts, list(gear) + [0.0], plays)
         truth = np.array([chain.prism(q, law, gravity) for q in poses])
         rigid = np.array([chain.prism(q) for q in poses])
@@ -359,20 +361,21 @@ def positions(folder, source, flat, floors, down):
     frames_only = {"name": "published_rigid", "urdf": "published", "free_numbers": len(found["parameters"]) + 9}
     judged(robot, frames_only)
     report("   published URDF, joint frames fitted, rigid: held out", frames_only["held_out"]["rms_mm"], None, "mm")
-    chain = Chain(source / URDFS["calibrated"])
+    first, urdf = next(iter(URDFS.items()))
+    chain = Chain(source / urdf)
     own = lambda data: np.array([chain.prism(q) for q in data["q"]])
     at = station(own(train), train["prism"])
-    rigid = {"urdf": "calibrated", "train": summary(figures(own(train), train["prism"], at)), "held_out": summary(figures(own(held), held["prism"], at))}
+    rigid = {"urdf": first, "train": summary(figures(own(train), train["prism"], at)), "held_out": summary(figures(own(held), held["prism"], at))}
     for floor in FLOORS:
         rigid[floor] = summary(figures(own(floors[floor]), floors[floor]["prism"], station(own(floors[floor]), floors[floor]["prism"])))
-    report("   the calibrated URDF as a rigid robot: held out", rigid["held_out"]["rms_mm"], None, "mm")
-    scatter = np.column_stack([kept["calibrated_springs"][0], kept["calibrated_y"][0]])
+    report(f"   the {first} URDF as a rigid robot: held out", rigid["held_out"]["rms_mm"], None, "mm")
+    scatter = np.column_stack([kept[f"{first}_springs"][0], kept[f"{first}_y"][0]])
     numbers = [
         {"name": p["name"], "value": float(f"{p['value']:.4g}"), "std": float(f"{p['std']:.2g}"), "unit": p["unit"]}
-        for p in kept["calibrated_y"][1]["parameters"]
+        for p in kept[f"{first}_y"][1]["parameters"]
         if p["identifiable"]
     ]
-    for urdf, undeformed in (("calibrated", rigid), ("published", frames_only)):
+    for urdf, undeformed in {first: rigid, "published": frames_only}.items():
         best = next(m for m in models if m["name"] == f"{urdf}_y")["held_out"]["rms_mm"]
         part = 1 - (best / undeformed["held_out"]["rms_mm"]) ** 2
         print(f"   {urdf}: springs and play about y explain {100 * part:.1f} % of the mean square of the rigid robot")
@@ -452,10 +455,12 @@ def main():
     parser.add_argument("-o", "--output", type=Path, help="file of the figures")
     arguments = parser.parse_args()
     source = arguments.folder
+    if not (source / URDFS["calibrated"]).is_file():
+        del URDFS["calibrated"]
     needed = [*URDFS.values(), "poses.json", "compliances.json", *(f"{name}.csv.gz" for name in ("flat_train", *FLOORS))]
     missing = [name for name in needed if not (source / name).is_file()]
     if missing:
-        sys.exit(f"{source} has no {', '.join(missing)}: see docs/measured_arm.md")
+        sys.exit(f"{source} has no {', '.join(missing)}: tools/crosscheck/measured_arm_data.py writes them")
     down = {name: np.array(found["gravity_in_base"]) for name, found in json.loads((source / "poses.json").read_text()).items()}
     given = json.loads((source / "compliances.json").read_text())
     flat, floors = read(source, "flat_train"), {floor: read(source, floor) for floor in FLOORS}
