@@ -16,7 +16,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! [`Robot::load`] reads a robot, [`Robot::flexible`] adds links and drives and returns an [`Arm`],
+//! [`Robot::load`] reads a robot, [`Robot::model`] models links and drives and returns an [`Arm`],
 //! which threads may share. [`Arm::simulate`] runs a [`Motion`], or a [`Scenario`] with loads and
 //! payloads, and returns a [`Run`] with figures and columns; [`Arm::operating_point`] computes
 //! statics, compliance and frequencies at thousands of poses without allocation.
