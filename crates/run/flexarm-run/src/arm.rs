@@ -1,29 +1,19 @@
 //! A robot with its links and drives modelled, built once and used for many runs and poses.
 
-use std::ops::ControlFlow;
 use std::sync::{Arc, OnceLock};
 
 use flexarm_flexlink::FlexibleSpan;
 use flexarm_kinematics::{Data, Frame, Model, mass_matrix};
-use flexarm_log::{Columns, Trace};
-use flexarm_stepping::{
-    FlexibleArm, Friction, GearCoupling, Held, Linear, OperatingPoint, PrescribedMotion, Servo, Spring, StepError,
-};
+use flexarm_stepping::{FlexibleArm, Friction, GearCoupling, PrescribedMotion, Servo, Spring, StepError};
 use nalgebra::{DMatrix, DVector};
-use rayon::prelude::*;
 
 use crate::bends::Bend;
-use crate::caveat::{Caveat, Use, of_use};
+use crate::caveat::Caveat;
 use crate::drive_entry::ServoEntry;
 use crate::error::{Error, PoseError};
 use crate::gear_entry::GearLaws;
-use crate::joint_values::joint_values;
-use crate::options::{Modelling, RunOptions};
-use crate::posed::Posed;
+use crate::options::Modelling;
 use crate::robot::Robot;
-use crate::run::{self, RunRequest};
-use crate::scenario::Scenario;
-use crate::summary::Summary;
 
 /// A robot with its flexible links and drives modelled: one tree with its springs.
 ///
@@ -76,37 +66,6 @@ pub enum Owner {
     Drive(usize),
 }
 
-/// Results of a run.
-#[derive(Clone, Debug)]
-pub struct Run {
-    /// Figures, as in `summary.json`.
-    pub summary: Summary,
-    /// Signals; empty unless the request keeps [`Keep::Columns`](crate::Keep::Columns).
-    pub columns: Columns,
-    /// Curves, thinned for long runs; empty unless the request keeps
-    /// [`Keep::Curves`](crate::Keep::Curves) or writes recordings.
-    pub trace: Trace,
-}
-
-impl Run {
-    /// Returns the times of the samples (s).
-    pub fn time_s(&self) -> &[f64] {
-        self.values("time")
-    }
-
-    /// Returns the TCP error, flexible minus rigid, world axes (m): three values per sample. Empty
-    /// without the rigid twin.
-    pub fn error_world_m(&self) -> &[f64] {
-        self.values("error_world")
-    }
-
-    /// Returns the values of a signal, row by row; empty if there is no signal with this name.
-    /// [`Columns::columns`] lists the names.
-    pub fn values(&self, name: &str) -> &[f64] {
-        self.columns.column(name).map_or(&[], |column| &column.values)
-    }
-}
-
 impl Arm {
     /// Returns the robot from which the arm was built.
     pub fn robot(&self) -> &Robot {
@@ -118,33 +77,6 @@ impl Arm {
         self.robot_caveats.get_or_init(|| self.robot.caveats())
     }
 
-    /// Returns the caveats about the robot as modelled, and about its use by a command.
-    pub fn caveats(self: &Arc<Self>, used: Use<'_>) -> Vec<Caveat> {
-        of_use(self, used)
-    }
-
-    /// Holds the arm at a pose; `at`: values of all actuated joints (rad or m), zero by default.
-    ///
-    /// # Errors
-    /// [`Error::Pose`] for joint values that do not fit the arm.
-    pub fn posed(self: &Arc<Self>, at: Option<&[f64]>) -> Result<Posed, Error> {
-        let names: Vec<&str> = self.rigid.coordinates().iter().map(|c| c.joint.as_str()).collect();
-        Posed::new(self.clone(), joint_values(at, &names)?)
-    }
-
-    /// Returns mass, damping and stiffness about the static equilibrium at a pose under gravity and
-    /// a wrench at the TCP, and the Jacobian of the TCP with respect to the free coordinates.
-    ///
-    /// * `at`: values of all actuated joints (rad or m), zero by default.
-    /// * `wrench`: force and moment at the TCP, world axes (N, N m).
-    ///
-    /// # Errors
-    /// [`Error::Pose`] for joint values that do not fit, [`Error::Step`] if there is no
-    /// equilibrium.
-    pub fn linearise(self: &Arc<Self>, at: Option<&[f64]>, wrench: [f64; 6]) -> Result<Linear, Error> {
-        self.posed(at)?.linear(&wrench.into())
-    }
-
     /// Returns how links and drives are modelled.
     pub fn modelling(&self) -> &Modelling {
         &self.modelling
@@ -154,75 +86,6 @@ impl Arm {
     pub fn joints(&self) -> impl Iterator<Item = &str> {
         let model = &self.model;
         model.coordinates()[..model.n_actuated()].iter().map(|coordinate| coordinate.joint.as_str())
-    }
-
-    /// Runs a motion (`&motion`), or a motion with loads, payloads and a start condition
-    /// (`&scenario`), and returns figures and columns.
-    ///
-    /// # Errors
-    /// [`Error`]; [`Error::fault`] returns whether the input or the run is at fault.
-    pub fn simulate(&self, scenario: impl Into<Scenario>, options: &RunOptions) -> Result<Run, Error> {
-        self.simulate_with(scenario, options, RunRequest::default())
-    }
-
-    /// As [`Arm::simulate`], with recordings, an observer, progress or fewer signals kept,
-    /// according to `request`.
-    ///
-    /// The whole input is checked before the first file is created. If the run stops early, the
-    /// recordings are closed such that every reader accepts them.
-    ///
-    /// # Errors
-    /// As [`Arm::simulate`]; [`Error::Interrupted`] if observer or progress breaks.
-    pub fn simulate_with(
-        &self,
-        scenario: impl Into<Scenario>,
-        options: &RunOptions,
-        request: RunRequest<'_>,
-    ) -> Result<Run, Error> {
-        run::simulate(self, &scenario.into(), options, request)
-    }
-
-    /// Runs all scenarios on all cores. Results are bitwise identical to [`Arm::simulate`], for any
-    /// number of threads. Once `stop` returns true, unfinished runs end with
-    /// [`Error::Interrupted`].
-    ///
-    /// Uses the thread pool of `rayon`. A failed run does not stop the others.
-    pub fn simulate_batch(
-        &self,
-        scenarios: &[Scenario],
-        options: &RunOptions,
-        stop: &(dyn Fn() -> bool + Sync),
-    ) -> Vec<Result<Run, Error>> {
-        let one = |scenario| {
-            let progress = &mut |_, _| if stop() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
-            self.simulate_with(scenario, options, RunRequest { progress: Some(progress), ..RunRequest::default() })
-        };
-        scenarios.par_iter().map(one).collect()
-    }
-
-    /// Returns a workspace for equilibria, compliances and frequencies at any number of poses.
-    ///
-    /// # Errors
-    /// [`Error::Step`] if a spring is not positive definite, or the arm has no equilibrium under
-    /// gravity at the middle of its joint ranges.
-    pub fn operating_point(&self) -> Result<OperatingPoint, Error> {
-        let model = &self.model;
-        // Any pose within the limits is suitable.
-        let middle = |lower: f64, upper: f64| match (lower.is_finite(), upper.is_finite()) {
-            (true, true) => 0.5 * (lower + upper),
-            (false, false) => 0.0,
-            (finite, _) => {
-                if finite {
-                    lower.max(0.0)
-                } else {
-                    upper.min(0.0)
-                }
-            }
-        };
-        let actuated = &model.coordinates()[..model.n_actuated()];
-        let pose = actuated.iter().map(|c| middle(c.limits.lower, c.limits.upper)).collect();
-        let arm = self.arm(Arc::new(Held(pose))).map_err(|error| self.explained(error))?;
-        Ok(OperatingPoint::new(arm, self.tcp.clone()))
     }
 
     /// Returns the arm for the steppers, driven along a motion.

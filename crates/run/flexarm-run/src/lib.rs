@@ -88,7 +88,7 @@ pub mod tool_path;
 mod twin;
 
 pub use applied_load::AppliedLoad;
-pub use arm::{Arm, Owner, Run};
+pub use arm::{Arm, Owner};
 pub use balancer::{BalancerEnds, BalancerInfo, RobotBalancer};
 pub use bends::Bend;
 pub use calibration_entry::Calibration;
@@ -133,7 +133,7 @@ pub use response::{
 pub use robot::{Description, LoadOptions, Robot, RobotSource, TCP_FRAME};
 pub use robot_file::RobotFileError;
 pub use robot_link::{LinkChoices, RobotLink, StressSource};
-pub use run::{Keep, Progress, RunRequest, SampleObserver};
+pub use run::{Keep, Progress, Run, RunRequest, SampleObserver};
 pub use scenario::{Disturbances, Scenario};
 pub use settling::Settling;
 pub use statics::{ElementStatics, Statics, record_statics, statics};

@@ -13,6 +13,7 @@ use crate::balancer;
 use crate::caveat::pose::ArmAtRest;
 use crate::caveat::{Caveat, kinds, of_use, once_each, validity};
 use crate::error::{Error, PoseError, ValueError};
+use crate::joint_values::joint_values;
 use crate::loops;
 
 /// Flexible arm with its drives locked at a pose.
@@ -41,6 +42,55 @@ pub fn check_wrench(wrench: &[f64]) -> Result<(), ValueError> {
     let force = Quantity::FORCE.check_all("the force at the tool", wrench.iter().take(3));
     let torque = Quantity::TORQUE.check_all("the torque at the tool", wrench.iter().skip(3));
     Ok(force.and(torque)?)
+}
+
+impl Arm {
+    /// Holds the arm at a pose; `at`: values of all actuated joints (rad or m), zero by default.
+    ///
+    /// # Errors
+    /// [`Error::Pose`] for joint values that do not fit the arm.
+    pub fn posed(self: &Arc<Self>, at: Option<&[f64]>) -> Result<Posed, Error> {
+        let names: Vec<&str> = self.rigid.coordinates().iter().map(|c| c.joint.as_str()).collect();
+        Posed::new(self.clone(), joint_values(at, &names)?)
+    }
+
+    /// Returns mass, damping and stiffness about the static equilibrium at a pose under gravity and
+    /// a wrench at the TCP, and the Jacobian of the TCP with respect to the free coordinates.
+    ///
+    /// * `at`: values of all actuated joints (rad or m), zero by default.
+    /// * `wrench`: force and moment at the TCP, world axes (N, N m).
+    ///
+    /// # Errors
+    /// [`Error::Pose`] for joint values that do not fit, [`Error::Step`] if there is no
+    /// equilibrium.
+    pub fn linearise(self: &Arc<Self>, at: Option<&[f64]>, wrench: [f64; 6]) -> Result<Linear, Error> {
+        self.posed(at)?.linear(&wrench.into())
+    }
+
+    /// Returns a workspace for equilibria, compliances and frequencies at any number of poses.
+    ///
+    /// # Errors
+    /// [`Error::Step`] if a spring is not positive definite, or the arm has no equilibrium under
+    /// gravity at the middle of its joint ranges.
+    pub fn operating_point(&self) -> Result<OperatingPoint, Error> {
+        let model = &self.model;
+        // Any pose within the limits is suitable.
+        let middle = |lower: f64, upper: f64| match (lower.is_finite(), upper.is_finite()) {
+            (true, true) => 0.5 * (lower + upper),
+            (false, false) => 0.0,
+            (finite, _) => {
+                if finite {
+                    lower.max(0.0)
+                } else {
+                    upper.min(0.0)
+                }
+            }
+        };
+        let actuated = &model.coordinates()[..model.n_actuated()];
+        let pose = actuated.iter().map(|c| middle(c.limits.lower, c.limits.upper)).collect();
+        let arm = self.arm(Arc::new(Held(pose))).map_err(|error| self.explained(error))?;
+        Ok(OperatingPoint::new(arm, self.tcp.clone()))
+    }
 }
 
 impl Posed {

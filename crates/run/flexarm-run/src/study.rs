@@ -7,13 +7,13 @@ use std::sync::Arc;
 
 use flexarm_log::{Recorder, RecordingFormat, StudyRecorder, Trace};
 
-use crate::arm::{Arm, Run};
+use crate::arm::Arm;
 use crate::comparison::difference;
 use crate::error::{Error, StudyError};
 use crate::magnification::{Expected, fit_color_scale};
 use crate::options::{Outputs, RunOptions};
 use crate::record::{files_of_a_run, refuse_to_overwrite};
-use crate::run::{Keep, Progress, RunRequest};
+use crate::run::{Keep, Progress, Run, RunRequest};
 use crate::scenario::Scenario;
 use crate::summary::Summary;
 

@@ -1,7 +1,7 @@
 //! Caveats about robots and runs as values: probable errors in an input, and limits of a result's
 //! validity.
 //!
-//! Every command that uses a robot reports the same caveats about it ([`of_use()`]); runs and statics
+//! Every command that uses a robot reports the same caveats about it ([`Arm::caveats`](crate::Arm::caveats)); runs and statics
 //! add their own. Each message is built in one place ([`CaveatKind::found`]). Start at `kinds`, the
 //! catalogue; `docs/caveats.md` lists it with the source of each threshold.
 //!
@@ -27,4 +27,3 @@ pub mod validity;
 pub use flexarm_settings::caveat::{Caveat, Severity};
 pub use flexarm_settings::caveat::{CaveatKind, once_each, warnings};
 pub use of_use::Use;
-pub(crate) use of_use::of_use;

@@ -29,38 +29,45 @@ pub enum Use<'a> {
     Any,
 }
 
-/// Returns all caveats about a robot as modelled and about its use by a command, without
-/// duplicates.
-pub(crate) fn of_use(arm: &Arc<Arm>, used: Use<'_>) -> Vec<Caveat> {
-    let robot = arm.robot();
-    let mut caveats = of_model(arm);
-    let (pose, wrench) = match used {
-        Use::Held(at, wrench) => (Ok(at.to_vec()), *wrench),
-        Use::Along(scenario) => {
-            caveats.extend(of_motion(&scenario.motion, &arm.rigid));
-            caveats.extend(of_scenario(arm, scenario));
-            (standing_pose(robot, Some(&scenario.motion)), [0.0; 6])
-        }
-        Use::Any => {
-            let own = robot.default_trajectory.as_deref().and_then(|path| Motion::load(path, robot).ok());
-            (standing_pose(robot, own.as_ref()), [0.0; 6])
-        }
-    };
-    let standing = pose.and_then(|at| {
-        let posed = Posed::new(arm.clone(), at)?;
-        let linear = posed.linear(&Vector6::from(wrench))?;
-        Ok(at_rest(&posed, &linear, &wrench))
-    });
-    caveats.extend(standing.unwrap_or_else(|error| {
-        vec![Caveat::from_message("no-equilibrium", "robot", error.to_string(), "check stiffness, masses and units")]
-    }));
-    once_each(caveats)
+impl Arm {
+    /// Returns all caveats about the robot as modelled and about its use by a command, without
+    /// duplicates.
+    pub fn caveats(self: &Arc<Self>, used: Use<'_>) -> Vec<Caveat> {
+        let (arm, robot) = (self, self.robot());
+        let mut caveats = of_model(arm);
+        let (pose, wrench) = match used {
+            Use::Held(at, wrench) => (Ok(at.to_vec()), *wrench),
+            Use::Along(scenario) => {
+                caveats.extend(of_motion(&scenario.motion, &arm.rigid));
+                caveats.extend(of_scenario(arm, scenario));
+                (standing_pose(robot, Some(&scenario.motion)), [0.0; 6])
+            }
+            Use::Any => {
+                let own = robot.default_trajectory.as_deref().and_then(|path| Motion::load(path, robot).ok());
+                (standing_pose(robot, own.as_ref()), [0.0; 6])
+            }
+        };
+        let standing = pose.and_then(|at| {
+            let posed = Posed::new(arm.clone(), at)?;
+            let linear = posed.linear(&Vector6::from(wrench))?;
+            Ok(at_rest(&posed, &linear, &wrench))
+        });
+        caveats.extend(standing.unwrap_or_else(|error| {
+            vec![Caveat::from_message(
+                "no-equilibrium",
+                "robot",
+                error.to_string(),
+                "check stiffness, masses and units",
+            )]
+        }));
+        once_each(caveats)
+    }
 }
 
-/// As [`of_use()`], for a robot as modelled by its file, in commands that compute nothing with its
+/// As [`Arm::caveats`], for a robot as modelled by its file, in commands that compute nothing with its
 /// links and drives.
 pub(crate) fn of_robot(robot: &Robot) -> Result<Vec<Caveat>, Error> {
-    Ok(of_use(&robot.model(&Modelling::default())?, Use::Any))
+    Ok(robot.model(&Modelling::default())?.caveats(Use::Any))
 }
 
 /// Returns the caveats about a robot's files, and about its links and drives as modelled.

@@ -24,7 +24,9 @@ use flexarm_log::{
 };
 use flexarm_stepping::{FlexibleArm, Observation, Stepper};
 
-use crate::arm::{Arm, Owner, Run};
+use rayon::prelude::*;
+
+use crate::arm::{Arm, Owner};
 use crate::bends::stations;
 use crate::caveat::{self, Caveat};
 use crate::error::Error;
@@ -153,6 +155,83 @@ impl Detail {
 /// Number of samples above which the page is made after the recordings are closed, which saves
 /// memory but takes a little longer.
 const LONG_RUN: u64 = 100_000;
+
+/// Results of a run.
+#[derive(Clone, Debug)]
+pub struct Run {
+    /// Figures, as in `summary.json`.
+    pub summary: Summary,
+    /// Signals; empty unless the request keeps [`Keep::Columns`](crate::Keep::Columns).
+    pub columns: Columns,
+    /// Curves, thinned for long runs; empty unless the request keeps
+    /// [`Keep::Curves`](crate::Keep::Curves) or writes recordings.
+    pub trace: Trace,
+}
+
+impl Run {
+    /// Returns the times of the samples (s).
+    pub fn time_s(&self) -> &[f64] {
+        self.values("time")
+    }
+
+    /// Returns the TCP error, flexible minus rigid, world axes (m): three values per sample. Empty
+    /// without the rigid twin.
+    pub fn error_world_m(&self) -> &[f64] {
+        self.values("error_world")
+    }
+
+    /// Returns the values of a signal, row by row; empty if there is no signal with this name.
+    /// [`Columns::columns`] lists the names.
+    pub fn values(&self, name: &str) -> &[f64] {
+        self.columns.column(name).map_or(&[], |column| &column.values)
+    }
+}
+
+impl Arm {
+    /// Runs a motion (`&motion`), or a motion with loads, payloads and a start condition
+    /// (`&scenario`), and returns figures and columns.
+    ///
+    /// # Errors
+    /// [`Error`]; [`Error::fault`] returns whether the input or the run is at fault.
+    pub fn simulate(&self, scenario: impl Into<Scenario>, options: &RunOptions) -> Result<Run, Error> {
+        self.simulate_with(scenario, options, RunRequest::default())
+    }
+
+    /// As [`Arm::simulate`], with recordings, an observer, progress or fewer signals kept,
+    /// according to `request`.
+    ///
+    /// The whole input is checked before the first file is created. If the run stops early, the
+    /// recordings are closed such that every reader accepts them.
+    ///
+    /// # Errors
+    /// As [`Arm::simulate`]; [`Error::Interrupted`] if observer or progress breaks.
+    pub fn simulate_with(
+        &self,
+        scenario: impl Into<Scenario>,
+        options: &RunOptions,
+        request: RunRequest<'_>,
+    ) -> Result<Run, Error> {
+        simulate(self, &scenario.into(), options, request)
+    }
+
+    /// Runs all scenarios on all cores. Results are bitwise identical to [`Arm::simulate`], for any
+    /// number of threads. Once `stop` returns true, unfinished runs end with
+    /// [`Error::Interrupted`].
+    ///
+    /// Uses the thread pool of `rayon`. A failed run does not stop the others.
+    pub fn simulate_batch(
+        &self,
+        scenarios: &[Scenario],
+        options: &RunOptions,
+        stop: &(dyn Fn() -> bool + Sync),
+    ) -> Vec<Result<Run, Error>> {
+        let one = |scenario| {
+            let progress = &mut |_, _| if stop() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
+            self.simulate_with(scenario, options, RunRequest { progress: Some(progress), ..RunRequest::default() })
+        };
+        scenarios.par_iter().map(one).collect()
+    }
+}
 
 /// Runs a scenario.
 pub(crate) fn simulate(
