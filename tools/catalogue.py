@@ -19,7 +19,7 @@ import sys
 import tempfile
 import tomllib
 
-from make_arms import ROBOTS, TABLES, answer, differs, outcome, reducers, robot_text, size, spread, stretch, urdf_text
+from make_arms import ROBOTS, TABLES, answer, differs, outcome, reducers, robot_text, size, spread, stretch
 from make_gallery import ROOT, digits
 
 PAGE, PLOT = ROOT / "docs/catalogue.md", ROOT / "docs/images/catalogue.svg"
@@ -37,9 +37,9 @@ def ranged(name, payload, mass, found):
 
 def shipped(name, folder):
     arm = tomllib.loads((TABLES / f"{name}.toml").read_text())
-    (folder / f"{name}.urdf").write_text(urdf_text(name, arm))
-    made = answer("new", folder / f"{name}.urdf", "--payload", arm["payload"], "--tool", "tool0", *reducers(arm), "-o", folder / "new", "--no-run", "--force")
-    found = outcome(lambda at: robot_text(name, arm, made["drives"], at), arm["pose"], made["drives"], folder)
+    urdf = ROBOTS / name / f"{name}.urdf"
+    made = answer("new", urdf, "--payload", arm["payload"], "--tool", "tool0", *reducers(arm), "-o", folder / "new", "--no-run", "--force")
+    found = outcome(lambda at: robot_text(name, arm, made["drives"], at).replace(urdf.name, str(urdf)), arm["pose"], made["drives"], folder)
     return ranged(name, arm["payload"], sum(row[0] for row in arm["links"].values()), found)
 
 

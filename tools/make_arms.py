@@ -31,7 +31,7 @@ from make_gallery import ROOT, digits, program
 
 TABLES, ROBOTS = ROOT / "tests/arms", ROOT / "robots"
 MARK = "# Written by tools/make_arms.py from the maker's files.\n"
-SLICES = 6  # boxes that a link is drawn with
+RINGS, RING = 12, 16  # rings that a link is drawn with, and corners of a ring
 POSES = 32  # of the set in which the worst is looked for
 DENSITY = 2700.0  # kg/m³, aluminium: the cube that stands for the payload
 
@@ -165,8 +165,8 @@ def between(polygon, axis, low, high):
 
 
 def drawn(link, folder):
-    """Returns boxes [x, y, z, a, b, c] and cylinders [x, y, z, radius, length, axis] (mm) that enclose
-    the link's mesh slice by slice."""
+    """Returns axis, places of rings along it and their distances from it in RING directions (mm), for
+    rings around the link's mesh."""
     faces = []
     for shape in link.findall("collision") or link.findall("visual"):
         mesh = shape.find("geometry/mesh")
@@ -174,28 +174,51 @@ def drawn(link, folder):
             continue
         scale, pose = numbers(mesh.get("scale", "1 1 1")), pose_of(origin(shape))
         for face in triangles(folder / mesh.get("filename")):
-            faces.append([moved(pose, [s * x for s, x in zip(scale, point)]) for point in face])
+            faces.append([moved(pose, [1e3 * s * x for s, x in zip(scale, point)]) for point in face])
     if not faces:
         return []
     ends = [(min(p[k] for f in faces for p in f), max(p[k] for f in faces for p in f)) for k in range(3)]
     axis = max(range(3), key=lambda k: ends[k][1] - ends[k][0])
-    (start, stop), across = ends[axis], [k for k in range(3) if k != axis]
-    out = []
-    for n in range(SLICES):
-        low, high = (start + (stop - start) * m / SLICES for m in (n, n + 1))
-        points = [p for face in faces for p in between(face, axis, low, high)]
-        if not points:
-            continue
-        box = [(min(p[k] for p in points), max(p[k] for p in points)) for k in range(3)]
-        box[axis] = (low, high)
-        centre, size = [0.5 * (a + b) for a, b in box], [b - a for a, b in box]
-        i, j = across
-        corner = max(math.hypot(2 * (p[i] - centre[i]) / size[i], 2 * (p[j] - centre[j]) / size[j]) for p in points if size[i] and size[j])
-        place = [round(1e3 * x) for x in centre]
-        if corner < 1.15 and 0.8 < size[i] / size[j] < 1.25:
-            out.append([*place, round(250 * (size[i] + size[j])), round(1e3 * size[axis]), "xyz"[axis]])
-        else:
-            out.append([*place, *(max(round(1e3 * x), 1) for x in size)])
+    start, step, directions = ends[axis][0], (ends[axis][1] - ends[axis][0]) / RINGS, ring_directions()
+    places, rings = [], []
+    for n in range(RINGS + 1):
+        at = start + n * step
+        points = [p for face in faces for p in between(face, axis, at - 0.3 * step, at + 0.3 * step)]
+        if points:
+            places.append(round(at))
+            rings.append([round(max(c * p[(axis + 1) % 3] + s * p[(axis + 2) % 3] for p in points)) for c, s in directions])
+    return [axis, places, rings]
+
+
+def ring_directions():
+    return [(math.cos(2.0 * math.pi * k / RING), math.sin(2.0 * math.pi * k / RING)) for k in range(RING)]
+
+
+def mesh(axis, places, rings):
+    """Returns a binary STL (m): the surface through the rings, closed at both ends."""
+    directions = ring_directions()
+    wide = math.sin(2.0 * math.pi / RING)
+
+    def corner(at, ring, k):
+        (c, s), (c1, s1) = directions[k], directions[(k + 1) % RING]
+        h, h1 = ring[k], ring[(k + 1) % RING]
+        point = [0.0, 0.0, 0.0]
+        point[axis], point[(axis + 1) % 3], point[(axis + 2) % 3] = at, (h * s1 - h1 * s) / wide, (h1 * c - h * c1) / wide
+        return [1e-3 * x for x in point]
+
+    loops = [[corner(at, ring, k) for k in range(RING)] for at, ring in zip(places, rings)]
+    faces = [(loops[0][0], loops[0][k + 1], loops[0][k]) for k in range(1, RING - 1)]
+    faces += [(loops[-1][0], loops[-1][k], loops[-1][k + 1]) for k in range(1, RING - 1)]
+    for low, high in zip(loops, loops[1:]):
+        for k in range(RING):
+            n = (k + 1) % RING
+            faces += [(low[k], low[n], high[n]), (low[k], high[n], high[k])]
+    out = struct.pack("<80xI", len(faces))
+    for a, b, c in faces:
+        u, v = [y - x for x, y in zip(a, b)], [y - x for x, y in zip(a, c)]
+        normal = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]
+        length = size(normal) or 1.0
+        out += struct.pack("<12fH", *(x / length for x in normal), *a, *b, *c, 0)
     return out
 
 
@@ -213,7 +236,7 @@ def table_of(arm, vendor):
     lines += ["", "# Origin (m, rad) in the frame of the parent; lower, upper (rad), speed (rad/s), effort (N m).", "[joints]"]
     for name, row in joints.items():
         lines.append(f"{name} = {{ " + ", ".join(f"{key} = {json.dumps(value)}" for key, value in row.items()) + " }")
-    lines += ["", "# Boxes (centre, size) and cylinders (centre, radius, length, axis) around the slices of each mesh, mm.", "[shapes]"]
+    lines += ["", "# Rings around each mesh: axis (0 is x), places along it, distances from it in 16 directions (mm).", "[shapes]"]
     lines += [f"{name} = {json.dumps(rows)}" for name, rows in shapes.items()]
     # Other parts than those of the published inertia would replace it.
     for entry in (e for e in made.get("flexible_link", []) if e["beam"]["parts"] == "from-link"):
@@ -241,14 +264,8 @@ def urdf_text(name, arm):
         tensor = " ".join(f'{key}="{value!r}"' for key, value in zip(("ixx", "iyy", "izz", "ixy", "ixz", "iyz"), row[4:10]))
         out.append(f'  <link name="{link}">')
         out.append(f'    <inertial><origin xyz="{floats(row[1:4])}"{rpy}/><mass value="{row[0]!r}"/><inertia {tensor}/></inertial>')
-        for shape in arm["shapes"].get(link, []):
-            at = floats(1e-3 * x for x in shape[:3])
-            if shape[5] in ("x", "y", "z"):
-                turn = {"x": ' rpy="0 1.5707963267948966 0"', "y": ' rpy="1.5707963267948966 0 0"', "z": ""}[shape[5]]
-                form = f'<cylinder radius="{shape[3] / 1e3:g}" length="{shape[4] / 1e3:g}"/>'
-            else:
-                turn, form = "", f'<box size="{floats(x / 1e3 for x in shape[3:])}"/>'
-            out.append(f'    <visual><origin xyz="{at}"{turn}/><geometry>{form}</geometry></visual>')
+        if arm["shapes"].get(link):
+            out.append(f'    <visual><geometry><mesh filename="meshes/{link}.stl"/></geometry></visual>')
         out.append("  </link>")
     out.append('  <link name="tool0"/>')
     for joint, row in arm["joints"].items():
@@ -392,7 +409,7 @@ def readme(name, arm, made, found, poses):
         *(wrapped(f"* {note}") for note in arm.get("notes", [])),
         wrapped("* Links that bend: those whose published inertia can be cut in two, with the sections that the maker's meshes show and all of the mass in the wall "
                 "(half of it at the lower end of the range); the others are rigid."),
-        *beams, "* Shapes: boxes and cylinders around slices of the meshes. They are for pictures.", "",
+        *beams, "* Shapes: rings around slices of the maker's meshes. They are for pictures.", "",
         "| joint | range (deg) | speed (deg/s) | effort (N m) | stiffness (N m/rad) | its range | class |", "| --- | --- | --- | --- | --- | --- | --- |", *rows, "",
         "## What follows", "",
         wrapped(f"At the rated pose ({arm['pose_words']}: {pose}; flange {typical['tcp'][2]:.2f} m high) with the payload. In brackets: the range of the assumed stiffness."), "",
@@ -427,11 +444,15 @@ def texts(name, arm):
         folder = pathlib.Path(place)
         urdf = urdf_text(name, arm)
         (folder / f"{name}.urdf").write_text(urdf)
+        meshes = {f"meshes/{link}.stl": mesh(*shape) for link, shape in arm["shapes"].items() if shape}
+        (folder / "meshes").mkdir()
+        for file, data in meshes.items():
+            (folder / file).write_bytes(data)
         made = answer("new", folder / f"{name}.urdf", "--payload", arm["payload"], "--tool", "tool0", *reducers(arm), "-o", folder / "new", "--no-run")
         found = outcome(lambda at: robot_text(name, arm, made["drives"], at), arm["pose"], made["drives"], folder)
         page = readme(name, arm, made, found, sags(arm, folder / "stiffness.toml"))
         own = {} if "motion" in arm else {"motion.toml": (folder / "new/motion.toml").read_text()}
-        return {f"{name}.urdf": urdf, "robot.toml": robot_text(name, arm, made["drives"]), "README.md": page, **own}
+        return {f"{name}.urdf": urdf, "robot.toml": robot_text(name, arm, made["drives"]), "README.md": page, **own, **meshes}
 
 
 def differs(written, computed):
@@ -465,7 +486,9 @@ def main():
         if args.vendor and args.meshes:
             urdf, _ = expanded(arm, args.vendor, args.meshes / name)
             text = (ROBOTS / name / "robot.toml").read_text()
-            (args.meshes / name / "robot.toml").write_text(text.replace(f"{name}.urdf", urdf.name).replace('"tool0"', f'"{arm["source"]["tool"]}"'))
+            for own, theirs in ((f"{name}.urdf", urdf.name), ("tool0", arm["source"]["tool"]), ("../../trajectories", f"{ROOT}/trajectories")):
+                text = text.replace(own, theirs)
+            (args.meshes / name / "robot.toml").write_text(text)
         elif args.vendor:
             head, _, body = table.read_text().partition(MARK)
             read = table_of(arm, args.vendor)
@@ -475,11 +498,11 @@ def main():
                 faults.append(f"{table.relative_to(ROOT)}: differs from the maker's files")
         else:
             for file, text in texts(name, arm).items():
-                path = ROBOTS / name / file
+                path, data = ROBOTS / name / file, text if isinstance(text, bytes) else text.encode()
                 if not args.check:
-                    path.parent.mkdir(exist_ok=True)
-                    path.write_text(text)
-                elif not path.exists() or differs(path.read_text(), text):
+                    path.parent.mkdir(exist_ok=True, parents=True)
+                    path.write_bytes(data)
+                elif not path.exists() or (path.read_bytes() != data if data is text else differs(path.read_text(), text)):
                     faults.append(f"{path.relative_to(ROOT)}: run tools/make_arms.py {name}")
         print(name)
     print("\n".join(faults), file=sys.stderr, end="\n" if faults else "")

@@ -56,6 +56,24 @@ fn new_writes_a_robot_that_runs_and_answers_with_its_keys() {
     assert!(forced.out.contains("box 100 x 100 mm") && forced.out.contains("assumed"), "{}", forced.out);
 }
 
+/// Truth: at 80 N m of rated torque a cycloidal reducer is some twice as stiff as a strain-wave gear.
+#[test]
+fn an_arm_gets_reducers_of_the_kind_that_is_asked_for() {
+    let place = Place::new();
+    place.write("two.urdf", ARM);
+    let drive = |more: &[&str]| {
+        let line = [&["new", "two.urdf", "-o", "made", "--no-run", "--force"], more].concat();
+        place.json(&line)["drives"][0].clone()
+    };
+    let [usual, strain, cycloidal] =
+        [drive(&[]), drive(&["--reducers", "strain-wave"]), drive(&["--reducers", "cycloidal"])];
+    assert_eq!(usual, strain);
+    assert!(strain["source"].as_str().unwrap().starts_with("strain-wave gears"), "{strain}");
+    assert!(cycloidal["source"].as_str().unwrap().starts_with("cycloidal reducers"), "{cycloidal}");
+    let ratio = cycloidal["stiffness"].as_f64().unwrap() / strain["stiffness"].as_f64().unwrap();
+    assert!((2.0..3.0).contains(&ratio), "{ratio}");
+}
+
 #[test]
 fn new_says_how_to_go_on_where_it_cannot() {
     let place = Place::new();
