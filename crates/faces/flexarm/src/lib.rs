@@ -73,13 +73,13 @@ pub use flexarm_run::{
     MountingInfo, OperatingPoints, Outputs, Owner, PathFigures, PathMoveFigures, PayloadChange, PayloadError,
     PeakFigures, PoseError, PoseFigures, Progress, Readings, RecordingError, RecordingFiles, Recursions, ReportFiles,
     ReportOptions, ReportRun, Response, ResponseCurve, ResponseFiles, ResponseOutputs, ResponseRequest, Robot,
-    RobotBalancer, RobotCoupling, RobotFileError, RobotLink, RobotLoop, RobotMounting, Run, RunOptions, RunRequest,
-    STUDY_NOTE, SampleObserver, Scenario, SectionForceFigures, Servos, SettingValue, Settling, Severity, ShareFigures,
-    Statics, StaticsFiles, StaticsOutputs, StepperFigures, StepperSettings, StrainGaugeFigures, StressPlaceFigures,
-    StressPointFigures, StressSource, StudyError, Summary, TCP_FRAME, TcpFigures, TcpInfo, ToolPath, ValueError,
-    Variant, Variation, Weight, check, check_with_loads, check_with_motion, compare_study, convert, convert_until,
-    figure_groups, html, inspect, markdown, modes, motion_report, parse_recording_format, read_run, readable_unit,
-    record_modes, record_statics, report, response, rows, statics, stress_figures, study_rows,
+    RobotBalancer, RobotCoupling, RobotExport, RobotFileError, RobotFormat, RobotLink, RobotLoop, RobotMounting, Run,
+    RunOptions, RunRequest, STUDY_NOTE, SampleObserver, Scenario, SectionForceFigures, Servos, SettingValue, Settling,
+    Severity, ShareFigures, Statics, StaticsFiles, StaticsOutputs, StepperFigures, StepperSettings, StrainGaugeFigures,
+    StressPlaceFigures, StressPointFigures, StressSource, StudyError, Summary, TCP_FRAME, TcpFigures, TcpInfo,
+    ToolPath, ValueError, Variant, Variation, Weight, check, check_with_loads, check_with_motion, compare_study,
+    convert, convert_until, figure_groups, html, inspect, markdown, modes, motion_report, parse_recording_format,
+    read_run, readable_unit, record_modes, record_statics, report, response, rows, statics, stress_figures, study_rows,
 };
 
 pub use flexarm_analysis::{Quantity, Spacing};

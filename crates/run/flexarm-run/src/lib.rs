@@ -71,6 +71,7 @@ pub mod reduce;
 mod report;
 pub mod response;
 pub mod robot;
+mod robot_export;
 pub mod robot_file;
 mod robot_link;
 pub mod run;
@@ -133,6 +134,7 @@ pub use response::{
     PeakFigures, Response, ResponseCurve, ResponseFiles, ResponseOutputs, ResponseRequest, readable_unit, response,
 };
 pub use robot::{LoadOptions, Robot, TCP_FRAME};
+pub use robot_export::{RobotExport, RobotFormat};
 pub use robot_file::RobotFileError;
 pub use robot_link::{LinkChoices, RobotLink, StressSource};
 pub use run::{Keep, Progress, RunRequest, SampleObserver};
