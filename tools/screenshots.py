@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Takes the pictures of docs/images that show recordings and reports in their viewers.
 
-    pip install rerun-sdk==0.36.3 playwright pillow     (in a virtual environment; a Chromium on PATH for the reports)
+    pip install "rerun-sdk>=0.36.3" playwright pillow     (in a virtual environment; a Chromium on PATH for the reports)
     tools/screenshots.py [--flexarm target/release/flexarm] [--only recording,mcap,...] [--out docs/images]
 
 Each picture is a flexarm command and the output file to show. No display is needed: the Rerun
@@ -150,7 +150,7 @@ def main():
             with_rerun = True
         except ImportError:
             with_rerun = False
-            print("skipped: recordings (pip install rerun-sdk==0.36.3)")
+            print("skipped: recordings (pip install rerun-sdk)")
         for name, (command, file, seconds) in RERUN.items():
             if not (wanted(name) and with_rerun):
                 continue

@@ -120,21 +120,19 @@ export function readRecording(bytes: Uint8Array): Recording {
           // Each message has the whole path so far.
           paths = (message.markers as Marker[]).flatMap((marker) => shapeOf(marker) ?? []);
           break;
-        case "/tcp/error": {
-          const { linear } = message.twist;
+        case "/tcp/error":
           times.push(time);
-          errors.push([linear.x, linear.y, linear.z]);
+          errors.push(Array.from(message.position));
           break;
-        }
         case "/tcp/static_error":
-          staticErrors.push(norm(message.data));
+          staticErrors.push(norm(message.position));
           break;
         case "/tcp/contributions":
           if (contributors.length === 0) {
-            const labels: string[] = message.layout.dim[0].label.split(",");
-            contributors = labels.filter((_, k) => k % 3 === 0).map((label) => label.replace(/ x \[m\]$/, ""));
+            const names: string[] = message.name;
+            contributors = names.filter((_, k) => k % 3 === 0).map((name) => name.replace(/\/x$/, ""));
           }
-          contributions.push(Float64Array.from(message.data));
+          contributions.push(Float64Array.from(message.position));
           break;
         case "/events":
           events.push({ time, text: message.msg });

@@ -221,12 +221,22 @@ pub struct Limits {
     pub velocity: f64,
     /// Maximum torque or force (N m or N).
     pub effort: f64,
+    /// Maximum rate of change of the speed (rad/s² or m/s²).
+    pub acceleration: f64,
+    /// Maximum rate of change of the acceleration (rad/s³ or m/s³).
+    pub jerk: f64,
 }
 
 impl Limits {
     /// No limits.
-    pub const NONE: Limits =
-        Limits { lower: f64::NEG_INFINITY, upper: f64::INFINITY, velocity: f64::INFINITY, effort: f64::INFINITY };
+    pub const NONE: Limits = Limits {
+        lower: f64::NEG_INFINITY,
+        upper: f64::INFINITY,
+        velocity: f64::INFINITY,
+        effort: f64::INFINITY,
+        acceleration: f64::INFINITY,
+        jerk: f64::INFINITY,
+    };
 }
 
 /// Mimic relation `q = ratio * q_of(joint) + offset`.

@@ -2,15 +2,16 @@
 
 use std::process::ExitCode;
 
-use flexarm::WordError;
 use flexarm::export::{ExportFormat, ExportJob};
 use flexarm::import::{ImportFormat, ImportJob, ImportOutputs, Names, PartMasses, RigidPart, parse_inertia, triple};
+use flexarm::{Robot, RobotFormat, WordError};
 
-use crate::exchange_args::{ExportArgs, ExportFormatName, ImportArgs, ImportFormatName};
+use crate::exchange_args::{ExportArgs, ExportFormatName, ImportArgs, ImportFormatName, RobotFormatName};
 use crate::failure::Failure;
 use crate::print;
-use crate::shipped::OutputFolder;
+use crate::shipped::{self, OutputFolder};
 use crate::terminal::{Terminal, answer, to_json, working};
+use crate::values;
 
 pub(crate) fn import(terminal: &Terminal, args: &ImportArgs) -> Result<ExitCode, Failure> {
     let job = import_job(args)?;
@@ -25,16 +26,17 @@ pub(crate) fn import(terminal: &Terminal, args: &ImportArgs) -> Result<ExitCode,
 }
 
 pub(crate) fn export(terminal: &Terminal, args: &ExportArgs) -> Result<ExitCode, Failure> {
-    let stem = args.link.file_stem().unwrap_or_default().to_string_lossy();
+    let (Some(format), Some(units)) = (args.format, args.units) else { return export_robot(terminal, args) };
+    let stem = args.input.file_stem().unwrap_or_default().to_string_lossy();
     let folder = OutputFolder::of(args.output.as_deref(), &stem, true)?;
     let job = ExportJob {
-        link: args.link.clone(),
-        format: match args.format {
+        link: args.input.clone(),
+        format: match format {
             ExportFormatName::MatrixMarket => ExportFormat::MatrixMarket,
             ExportFormatName::UserElement => ExportFormat::UserElement,
             ExportFormatName::Simscape => ExportFormat::Simscape,
         },
-        units: args.units,
+        units,
         nodes: args.nodes.clone(),
         folder: folder.path().unwrap_or_default(),
         overwrite: args.force,
@@ -42,6 +44,24 @@ pub(crate) fn export(terminal: &Terminal, args: &ExportArgs) -> Result<ExitCode,
     let summary = working(terminal, "exporting", || flexarm::export::export(&job))?;
     print::warnings(terminal, &summary.warnings);
     answer(terminal, || to_json(&summary), || print::exported(&summary));
+    Ok(ExitCode::SUCCESS)
+}
+
+fn export_robot(terminal: &Terminal, args: &ExportArgs) -> Result<ExitCode, Failure> {
+    let robot = Robot::load_with(&shipped::robot(Some(&args.input))?, &args.load.options()?)?;
+    let format = match args.to {
+        Some(RobotFormatName::Urdf) => RobotFormat::Urdf,
+        _ => RobotFormat::Mjcf,
+    };
+    let at = values::pose(args.at.as_deref(), &robot)?;
+    let name = robot.name.clone();
+    let arm = robot.model(&args.modelling.modelling())?;
+    let export = working(terminal, "exporting", || arm.export(at.as_deref(), format))?;
+    let folder = OutputFolder::of(args.output.as_deref(), &name, true)?;
+    let paths = export.write(&folder.path().unwrap_or_default(), args.force)?;
+    let files: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
+    let json = serde_json::json!({ "step_s": export.step_s, "left_out": export.left_out, "files": files });
+    answer(terminal, || to_json(&json), || print::exported_robot(&export, &files));
     Ok(ExitCode::SUCCESS)
 }
 

@@ -3,6 +3,8 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+
+use crate::args::{ModellingArgs, RobotArgs};
 use flexarm::import::{FrameAt, ImportMap, RigidPart, Split, UnitsOfFile, parse_part, parse_split};
 
 const IMPORT_EXAMPLES: &str = "\
@@ -117,15 +119,26 @@ pub(crate) struct ImportArgs {
 
 #[derive(Debug, Args)]
 pub(crate) struct ExportArgs {
-    /// The link file (.flex)
-    #[arg(value_name = "LINK.flex")]
-    pub(crate) link: PathBuf,
-    /// Format to write
-    #[arg(long, value_enum, help_heading = "Matrices")]
-    pub(crate) format: ExportFormatName,
+    /// A link file (.flex) for --format, or a robot for --to: robot.toml, a folder with one, a .urdf
+    /// or .xacro file, or the name of a shipped robot
+    #[arg(value_name = "LINK.flex|ROBOT")]
+    pub(crate) input: PathBuf,
+    /// Simulator's format of a robot
+    #[arg(long, value_enum, help_heading = "Robots", required_unless_present = "format")]
+    pub(crate) to: Option<RobotFormatName>,
+    /// Joint values of the pose at which the robot rests, as for statics
+    #[arg(long, value_name = "Q1,Q2,...", help_heading = "Robots", allow_hyphen_values = true, requires = "to")]
+    pub(crate) at: Option<String>,
+    #[command(flatten)]
+    pub(crate) modelling: ModellingArgs,
+    #[command(flatten)]
+    pub(crate) load: RobotArgs,
+    /// Format of the matrices of a link
+    #[arg(long, value_enum, help_heading = "Matrices", requires = "units", conflicts_with = "to")]
+    pub(crate) format: Option<ExportFormatName>,
     /// Units to write: m-kg-s (N), mm-t-s (N, MPa), ...
-    #[arg(long, value_name = "LENGTH-MASS-TIME", help_heading = "Matrices")]
-    pub(crate) units: UnitsOfFile,
+    #[arg(long, value_name = "LENGTH-MASS-TIME", help_heading = "Matrices", requires = "format")]
+    pub(crate) units: Option<UnitsOfFile>,
     /// Node numbers of the interfaces in formats that use them, proximal first [default:
     /// 1001,1002,...]
     #[arg(long, value_name = "N,N,...", value_delimiter = ',', help_heading = "Interfaces")]
@@ -152,6 +165,14 @@ pub(crate) enum ImportFormatName {
     HarwellBoeing,
     Simscape,
     Sid,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum RobotFormatName {
+    /// MuJoCo: springs as joint stiffness and tendons
+    Mjcf,
+    /// A joint per elastic coordinate, with springs.json; Pinocchio, Drake
+    Urdf,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]

@@ -144,7 +144,7 @@ fn peaks(peaks: &[MotionPeak]) -> String {
             rounded(factor * peak.lower),
             rounded(factor * peak.upper),
             format!("{}{}", rounded(factor * peak.speed), used(peak.speed, peak.speed_limit)),
-            rounded(factor * peak.acceleration),
+            format!("{}{}", rounded(factor * peak.acceleration), used(peak.acceleration, peak.acceleration_limit)),
             format!("{}{}", rounded(factor * peak.jerk), used(peak.jerk, peak.jerk_limit)),
         ];
         if with_torque {

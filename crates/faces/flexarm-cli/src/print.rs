@@ -7,7 +7,7 @@ use crate::terminal::Terminal;
 use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
 use flexarm::reduce::{MeshListing, ReduceSummary, ReportTable, SetListing};
 use flexarm::written::{message, one_line};
-use flexarm::{BalancerInfo, Caveat, Finding, FlexibleInfo, Inspection, LoopInfo, gathered};
+use flexarm::{BalancerInfo, Caveat, Finding, FlexibleInfo, Inspection, LoopInfo, RobotExport, gathered};
 
 /// Maximum length of a name in a table (characters).
 const LONGEST_NAME: usize = 60;
@@ -200,7 +200,13 @@ fn joint_table(i: &Inspection) -> String {
         t.add_row(row);
     }
     t.align_right(2..);
-    lines(&t)
+    let bounded = i.joints.iter().filter(|j| j.acceleration.or(j.jerk).is_some());
+    let rates = bounded.map(|j| format!("{} {} and {}", j.name, limit(j.acceleration), limit(j.jerk)));
+    let rates: Vec<String> = rates.collect();
+    match rates.is_empty() {
+        true => lines(&t),
+        false => lines(&t) + &filled(&format!("limits of acceleration and jerk: {}", rates.join(", ")), " "),
+    }
 }
 
 fn balancer_line(b: &BalancerInfo) -> String {
@@ -342,6 +348,14 @@ pub(crate) fn exported(summary: &flexarm::export::ExportSummary) -> String {
         out += &format!("{file}\n");
     }
     out += &format!("map for flexarm import: --map \"{}\"\n", summary.map);
+    out
+}
+
+pub(crate) fn exported_robot(export: &RobotExport, files: &[String]) -> String {
+    let mut out = files.iter().take(2).map(|file| format!("{file}\n")).collect::<String>();
+    out += &format!("{} meshes\n", files.len().saturating_sub(2));
+    out += &format!("step for MuJoCo: {:?} s\n", export.step_s);
+    export.left_out.iter().for_each(|what| out += &filled(&format!("left out: {what}"), " "));
     out
 }
 

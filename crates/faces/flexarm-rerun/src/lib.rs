@@ -54,13 +54,14 @@ pub fn install() {
     });
 }
 
-/// Number of waiting samples at which rows are written, and the smaller number at which they are
-/// written when a flush is due: enough for compression, few enough for quick reading.
-const CHUNK_ROWS: [usize; 2] = [1024, 128];
-/// The same for a long run, which is one with more than [`SHORT_WRITINGS`] writes: the SDK keeps a
-/// list of all chunks in memory.
-const LONG_CHUNK_ROWS: [usize; 2] = [8 * 1024, 1024];
+/// Number of waiting samples at which rows are written: viewers read few large chunks fastest.
+const FULL_ROWS: usize = 8 * 1024;
+/// The smaller number at which rows are written every [`DUE_FLUSHES`] flushes, first and, in a run
+/// with more than [`SHORT_WRITINGS`] writes, later: the SDK keeps a list of all chunks in memory.
+const WORTH_ROWS: [usize; 2] = [128, 1024];
 const SHORT_WRITINGS: usize = 16;
+/// Ten seconds of wall time at the usual interval.
+const DUE_FLUSHES: u32 = 20;
 
 /// Writes a run as a Rerun recording.
 ///
@@ -72,6 +73,7 @@ const SHORT_WRITINGS: usize = 16;
 /// | `/<robot>/flexible/<link>`, `/<robot>/rigid/<link>` | pose in the world at true scale; below it the link's meshes, those of the rigid twin transparent |
 /// | `/<robot>/<robot of the three>/<link>/<mesh>/bending`, `.../far` | surface of a flexible link: the part between its interfaces, vertex by vertex, and the part rigid with the distal one |
 /// | `/<robot>/<robot of the three>/tcp` | pose of the TCP |
+/// | `.../<link>/frame`, `.../tcp/frame` | name of the frame, as in MCAP files: `<link>`, `rigid/<link>`, `magnified/<link>`, `<link>/tcp`; own entities attach to it by `CoordinateFrame` or `parent_frame` |
 /// | `/<robot>/path/{magnified,flexible,rigid,peak}` | TCP paths, coloured by the error, and the place of its maximum |
 /// | `/plots/tcp_error/{x,y,z,norm}`, `/plots/tcp_error_path/{tangential,normal,binormal}` | TCP error, in **mm** |
 /// | `/plots/tcp_error_rotation/{x,y,z}` | its rotation vector, in **mrad** |
@@ -200,6 +202,8 @@ pub(crate) struct RunWriter {
     shape: Shape,
     tracks: RunTracks,
     writings: usize,
+    /// Flushes since the last write.
+    flushes: u32,
     /// The layout until it is written with the first sample, whose pose sets the viewpoint.
     layout: Option<Part>,
     tools_due: bool,
@@ -214,7 +218,7 @@ impl RunWriter {
         let layout = has_layout.then(|| window::window(header, &seat, labels));
         // Surfaces and files are in the recording now; free their memory.
         let header = RunHeader { meshes: Vec::new(), attachments: Vec::new(), urdf: String::new(), ..header.clone() };
-        Ok(Self { shape: Shape::of(&header), header, tracks, writings: 0, layout, tools_due: true })
+        Ok(Self { shape: Shape::of(&header), header, tracks, writings: 0, flushes: 0, layout, tools_due: true })
     }
 
     fn record(&mut self, store: &mut Store, file: &Path, sample: &Sample) -> std::result::Result<(), LogError> {
@@ -233,10 +237,11 @@ impl RunWriter {
             self.tracks.tools(&self.header, sample, &store.stream)?;
         }
         self.tracks.push((time_ns, i64::try_from(sample.step).unwrap_or(i64::MAX)), sample);
-        let [full, worth] = if self.writings < SHORT_WRITINGS { CHUNK_ROWS } else { LONG_CHUNK_ROWS };
+        let worth = WORTH_ROWS[usize::from(self.writings >= SHORT_WRITINGS)];
         let (waiting, due) = (self.tracks.waiting(), store.flush.due());
-        if waiting >= full || due && waiting >= worth {
-            self.writings += 1;
+        self.flushes += u32::from(due);
+        if waiting >= FULL_ROWS || self.flushes >= DUE_FLUSHES && waiting >= worth {
+            (self.writings, self.flushes) = (self.writings + 1, 0);
             self.tracks.send(&store.stream)?;
         } else {
             self.tracks.send_large(&store.stream)?;

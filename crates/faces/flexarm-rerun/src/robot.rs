@@ -31,6 +31,8 @@ pub(crate) enum Paint {
 pub(crate) struct RobotAppearance {
     /// Parent entity of its links.
     pub(crate) root: EntityPath,
+    /// Prefix of the names of its frames; none if they have no names.
+    pub(crate) frames: Option<&'static str>,
     pub(crate) paint: Paint,
     /// Whether links are drawn bent; otherwise their surfaces stay undeformed.
     pub(crate) bends: bool,
@@ -83,9 +85,9 @@ impl RobotTracks {
             Paint::Plain(color) => color,
             Paint::Own | Paint::Deviation(_) => colors::series(1),
         };
-        // Frames without a surface are written once, by the robot at true scale.
+        // Frames without a surface are those of the robots at true scale.
         let shown = |(k, _): &(usize, &LinkInfo)| {
-            matches!(look.paint, Paint::Own) || header.meshes.iter().any(|mesh| mesh.link == *k)
+            matches!(look.paint, Paint::Own | Paint::Ghost) || header.meshes.iter().any(|mesh| mesh.link == *k)
         };
         let pose_track = |(k, link): (usize, &LinkInfo)| (k, PoseTrack::new(at(&link_part(&link.name))));
         let mut robot = Self {
@@ -102,11 +104,22 @@ impl RobotTracks {
         if let Some(skeleton) = &robot.skeleton {
             skeleton.style(stream)?;
         }
+        robot.name_frames(header, stream)?;
         const AXIS_LENGTH_M: f32 = 0.15;
         if !matches!(robot.look.paint, Paint::Ghost) {
             stream.constant(&robot.look.root.join(&path(["tcp"])), &TransformAxes3D::new(AXIS_LENGTH_M))?;
         }
         Ok(robot)
+    }
+
+    /// Names the frames of the links and of the tool as in MCAP files.
+    fn name_frames(&self, header: &RunHeader, stream: &RrdStream) -> Result<()> {
+        let Some(prefix) = self.look.frames else { return Ok(()) };
+        for (link, _) in &self.links {
+            let name = &header.links[*link].name;
+            stream.name_frame(&self.look.root.join(&path([&link_part(name)])), &format!("{prefix}{name}"))?;
+        }
+        stream.name_frame(&self.look.root.join(&path(["tcp"])), &format!("{prefix}{}/tcp", header.tcp))
     }
 
     fn surface(&mut self, header: &RunHeader, mesh: &LinkMesh, stream: &RrdStream) -> Result<()> {

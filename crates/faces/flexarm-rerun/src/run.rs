@@ -133,10 +133,18 @@ impl DrawnRobots {
         let Fineness { pixel_m, true_tolerance_m, quantum_m } = Fineness::of(header);
         let way = |who: &str| PathTrack::new(root.join(&path(["path", who])));
         let robot = |name: &str, paint: Paint, bends: bool, tolerance_m: f64, quantum_m: f32| {
+            let prefix = match name {
+                "rigid" => "rigid/",
+                "magnified" => "magnified/",
+                _ => "",
+            };
             // At true scale bending is hardly visible; a surface for every frame would be wasteful.
             let every_ns = if quantum_m > 0.0 { 10_000_000 } else { 100_000_000 };
             let root = root.join(&path([name]));
-            RobotTracks::new(header, RobotAppearance { root, paint, bends, tolerance_m, every_ns, quantum_m }, stream)
+            // One frame of each name in a recording.
+            let frames = seat.is_first().then_some(prefix);
+            let look = RobotAppearance { root, frames, paint, bends, tolerance_m, every_ns, quantum_m };
+            RobotTracks::new(header, look, stream)
         };
         let with_magnified = has_magnified(header);
         let flexible = match alone || !with_magnified {

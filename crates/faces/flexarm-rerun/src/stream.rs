@@ -6,12 +6,13 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use rerun::components::TransformFrameId;
 use rerun::external::re_log_types::{BlueprintActivationCommand, StoreSource};
 use rerun::log::{Chunk, RowId};
 use rerun::sink::MemorySinkStorage;
 use rerun::{
     AsComponents, EntityPath, RecordingStream, RecordingStreamBuilder, RecordingStreamError, SerializationError,
-    SerializedComponentColumn, TimeColumn, TimePoint,
+    SerializedComponentColumn, TimeColumn, TimePoint, Transform3D,
 };
 
 use super::layout::Entities;
@@ -67,6 +68,14 @@ impl RrdStream {
     /// Writes data valid at all times; a later call replaces it.
     pub(crate) fn constant(&self, path: &EntityPath, what: &dyn AsComponents) -> Result<()> {
         Ok(self.recording.log_static(path.clone(), what)?)
+    }
+
+    /// Gives the frame of an entity a name, to which other entities can be attached.
+    pub(crate) fn name_frame(&self, path: &EntityPath, name: &str) -> Result<()> {
+        let named = Transform3D::update_fields()
+            .with_parent_frame(TransformFrameId::from_entity_path(path))
+            .with_child_frame(name);
+        self.constant(&path.join(&EntityPath::from_single_string("frame")), &named)
     }
 
     /// Writes data valid from one time on.

@@ -453,6 +453,33 @@ fn texts(chunks: &[Chunk], name: &'static str) -> Vec<String> {
     chunks.iter().flat_map(of).collect()
 }
 
+/// Truth: the names of frames in MCAP files, and the viewer's name for the frame of an entity.
+#[test]
+fn frames_have_the_names_of_the_links_each_once() {
+    let chunks = chunks(&run("frames.rrd", &synthetic::header(), 10, NEVER));
+    let mut names = texts(&chunks, "Transform3D:child_frame");
+    let parents = texts(&chunks, "Transform3D:parent_frame");
+    let at = |name: &str| parents[names.iter().position(|own| own == name).unwrap()].as_str();
+    assert_eq!(at("forearm"), "tf#/synthetic/flexible/forearm");
+    assert_eq!(at("rigid/forearm"), "tf#/synthetic/rigid/forearm");
+    assert_eq!(at("magnified/forearm"), "tf#/synthetic/magnified/forearm");
+    let tool = format!("rigid/{}/tcp", synthetic::header().tcp);
+    assert_eq!(at(&tool), "tf#/synthetic/rigid/tcp");
+    names.sort();
+    assert!(names.windows(2).all(|pair| pair[0] != pair[1]), "{names:?}");
+}
+
+/// Ten seconds at 500 Hz: a chunk for each entity and a few more.
+#[test]
+fn a_short_run_has_few_chunks() {
+    let chunks = chunks(&run("chunks.rrd", &synthetic::header(), 5_000, Duration::from_millis(500)));
+    let mut entities: Vec<String> = chunks.iter().map(|chunk| chunk.entity_path().to_string()).collect();
+    entities.sort();
+    entities.dedup();
+    // measured: see the assertion
+    assert!(chunks.len() <= 2 * entities.len(), "{} chunks of {} entities", chunks.len(), entities.len());
+}
+
 #[test]
 fn what_happened_is_information_and_not_for_debugging() {
     let file = run("levels.rrd", &synthetic::header(), 100, NEVER);

@@ -514,3 +514,17 @@ fn what_is_no_robot_description_is_named_with_what_to_do() {
     assert!(error.to_string().contains("a folder"), "{error}");
     assert!(!folder.0.join("made").exists());
 }
+
+#[test]
+fn a_tool_on_the_axis_of_the_only_joint_gets_a_motion_that_moves_and_a_note() {
+    let folder = Folder::new("on_axis");
+    let urdf = r#"<robot name="turret"><link name="base"/><link name="table">
+        <inertial><mass value="20"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link><link name="tool0"/>
+        <joint name="slew" type="revolute"><parent link="base"/><child link="table"/><axis xyz="0 0 1"/>
+        <limit lower="-2" upper="2" effort="500" velocity="2"/></joint>
+        <joint name="weld" type="fixed"><parent link="table"/><child link="tool0"/><origin xyz="0 0 0.5"/></joint></robot>"#;
+    let made = made(&folder, urdf, &NewOptions::default());
+    let peak = &made.peaks[0];
+    assert!(peak.upper - peak.lower > 0.5, "{} to {}", peak.lower, peak.upper);
+    assert!(made.assumptions.iter().any(|a| a.text.contains("turns in place")), "{:?}", made.assumptions);
+}

@@ -182,11 +182,8 @@ fn joint_limits_slow_a_line_and_say_which_joint_it_is() {
 
 /// Joint limits for the check.
 fn checked(arm: &ProgramArm<'_>) -> Vec<JointLimits> {
-    let limits = |b: &JointBounds| JointLimits {
-        velocity: b.velocity,
-        acceleration: Some(b.acceleration),
-        ..JointLimits::UNLIMITED
-    };
+    let limits =
+        |b: &JointBounds| JointLimits { velocity: b.velocity, acceleration: b.acceleration, ..JointLimits::UNLIMITED };
     arm.bounds.iter().map(limits).collect()
 }
 

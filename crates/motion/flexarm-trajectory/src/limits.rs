@@ -12,7 +12,7 @@ const RELATIVE_SLACK: f64 = 1e-9;
 /// Absolute tolerance for limits near zero, rad or m (and their rates).
 const ABSOLUTE_SLACK: f64 = 1e-12;
 
-/// Limits of one joint; an infinite, NaN or absent entry means no limit.
+/// Limits of one joint; an infinite or NaN entry means no limit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JointLimits {
     /// Minimum position, rad or m.
@@ -22,13 +22,20 @@ pub struct JointLimits {
     /// Greatest speed, rad/s or m/s.
     pub velocity: f64,
     /// Greatest acceleration, rad/s² or m/s².
-    pub acceleration: Option<f64>,
+    pub acceleration: f64,
+    /// Greatest jerk, rad/s³ or m/s³.
+    pub jerk: f64,
 }
 
 impl JointLimits {
     /// No limits, as a base for struct update.
-    pub const UNLIMITED: Self =
-        Self { lower: f64::NEG_INFINITY, upper: f64::INFINITY, velocity: f64::INFINITY, acceleration: None };
+    pub const UNLIMITED: Self = Self {
+        lower: f64::NEG_INFINITY,
+        upper: f64::INFINITY,
+        velocity: f64::INFINITY,
+        acceleration: f64::INFINITY,
+        jerk: f64::INFINITY,
+    };
 }
 
 impl Default for JointLimits {
@@ -48,6 +55,8 @@ pub enum LimitKind {
     Velocity,
     /// Acceleration above [`JointLimits::acceleration`].
     Acceleration,
+    /// Jerk above [`JointLimits::jerk`].
+    Jerk,
 }
 
 /// A limit that a joint violates, with the worst value; `Display` gives one line.
@@ -61,9 +70,9 @@ pub struct LimitViolation {
     pub time_s: f64,
     /// Time of the first violation, s.
     pub since_s: f64,
-    /// The worst value with its sign, rad, rad/s or rad/s² (m, m/s or m/s²).
+    /// The worst value with its sign, rad, rad/s, rad/s² or rad/s³ (m, m/s, m/s² or m/s³).
     pub value: f64,
-    /// The limit, in the same unit; for speed and acceleration with the sign of `value`.
+    /// The limit, in the same unit; for all but positions with the sign of `value`.
     pub limit: f64,
 }
 
@@ -74,6 +83,7 @@ impl fmt::Display for LimitViolation {
             LimitKind::Upper => ("position rises above its upper limit", "change the waypoints"),
             LimitKind::Velocity => ("velocity exceeds its limit", "allow the move more time"),
             LimitKind::Acceleration => ("acceleration exceeds its limit", "allow the move more time"),
+            LimitKind::Jerk => ("jerk exceeds its limit", "allow the move more time"),
         };
         let Self { joint, time_s, since_s, value, limit, .. } = self;
         write!(
@@ -100,11 +110,11 @@ impl Trajectory {
         assert_eq!(limits.len(), n, "check_limits needs one JointLimits per joint of the trajectory");
         let mut violations = Vec::new();
         for ((joint, curve), limit) in self.joints().iter().zip(self.curves()).zip(limits) {
-            let acceleration = limit.acceleration.unwrap_or(f64::INFINITY);
             violations.extend(passed(joint, curve, LimitKind::Lower, limit.lower));
             violations.extend(passed(joint, curve, LimitKind::Upper, limit.upper));
             violations.extend(passed(joint, curve, LimitKind::Velocity, limit.velocity));
-            violations.extend(passed(joint, curve, LimitKind::Acceleration, acceleration));
+            violations.extend(passed(joint, curve, LimitKind::Acceleration, limit.acceleration));
+            violations.extend(passed(joint, curve, LimitKind::Jerk, limit.jerk));
         }
         violations
     }
@@ -120,6 +130,7 @@ fn passed(joint: &str, curve: &Curve, kind: LimitKind, limit: f64) -> Option<Lim
         LimitKind::Upper => (0, Some(limit), None),
         LimitKind::Velocity => (1, Some(limit), Some(-limit)),
         LimitKind::Acceleration => (2, Some(limit), Some(-limit)),
+        LimitKind::Jerk => (3, Some(limit), Some(-limit)),
     };
     let slack = RELATIVE_SLACK * limit.abs() + ABSOLUTE_SLACK;
 

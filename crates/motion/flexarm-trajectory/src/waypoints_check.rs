@@ -216,7 +216,8 @@ impl Context<'_> {
         for ((limit, joint), scale) in limits.iter_mut().zip(&self.joints).zip(&self.scales) {
             if let Some((_, robot)) = known.iter().find(|(name, _)| name == joint) {
                 limit.velocity = usable(robot.velocity);
-                limit.acceleration = usable(robot.acceleration.unwrap_or(f64::INFINITY));
+                limit.acceleration = usable(robot.acceleration);
+                limit.jerk = usable(robot.jerk);
             }
             let Some((_, written)) = self.file.limits.iter().find(|(name, _)| name.get_ref() == joint) else {
                 continue;

@@ -147,9 +147,9 @@ fn every_passed_limit_is_listed_with_time_and_value() {
     let moves = vec![PlannedMove::quintic(vec![1.0, -1.0, 0.1], 1.0), PlannedMove::quintic(vec![0.0, 0.0, 0.0], 2.0)];
     let trajectory = plan(&[0.0, 0.0, 0.0], moves);
     let limits = [
-        JointLimits { lower: -0.5, upper: 0.5, velocity: 15.0 / 8.0, acceleration: Some(5.0) },
-        JointLimits { lower: -0.9, upper: 0.5, velocity: 1.0, acceleration: None },
-        JointLimits { lower: f64::NAN, upper: f64::INFINITY, velocity: f64::NAN, acceleration: None },
+        JointLimits { lower: -0.5, upper: 0.5, velocity: 15.0 / 8.0, acceleration: 5.0, ..JointLimits::UNLIMITED },
+        JointLimits { lower: -0.9, upper: 0.5, velocity: 1.0, ..JointLimits::UNLIMITED },
+        JointLimits { lower: f64::NAN, upper: f64::INFINITY, velocity: f64::NAN, ..JointLimits::UNLIMITED },
     ];
     let violations = trajectory.check_limits(&limits);
     let found: Vec<_> = violations.iter().map(|v| (v.joint.as_str(), v.kind)).collect();
@@ -270,7 +270,7 @@ proptest! {
         if is_free {
             let limits: Vec<_> = shared
                 .iter()
-                .map(|l| JointLimits { velocity: l.velocity, acceleration: Some(l.acceleration), ..JointLimits::UNLIMITED })
+                .map(|l| JointLimits { velocity: l.velocity, acceleration: l.acceleration, ..JointLimits::UNLIMITED })
                 .collect();
             prop_assert_eq!(trajectory.check_limits(&limits), []);
         }

@@ -52,7 +52,7 @@ fn prismatic_joints_are_in_metres_in_a_file_of_degrees() {
 /// The limits of the move take precedence over those of the file, and these over the caller's.
 #[test]
 fn the_nearest_limit_counts() {
-    let robot = JointLimits { velocity: PI, acceleration: Some(PI), ..JointLimits::UNLIMITED };
+    let robot = JointLimits { velocity: PI, acceleration: PI, ..JointLimits::UNLIMITED };
     let head = "format = 1\nunit = \"deg\"\njoints = [\"a\"]\nstart = [0]\nprofile = \"trapezoid\"\nrounding = 0\n";
     let duration = |tail: &str| {
         let known = [("unused", JointLimits::UNLIMITED), ("a", robot)];

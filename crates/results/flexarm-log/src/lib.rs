@@ -91,6 +91,8 @@ pub use formats::*;
 #[cfg(feature = "mcap")]
 pub use mcap_file::McapRecorder;
 #[cfg(feature = "mcap")]
+pub use mcap_file::bag::rosbag2_metadata;
+#[cfg(feature = "mcap")]
 pub use mcap_file::layouts::{foxglove_layout, plotjuggler_layout};
 pub use multi::RecorderSet;
 #[cfg(feature = "parquet")]

@@ -110,6 +110,30 @@ fn a_table_is_the_same_bytes_whatever_formats_it_went_through() {
     }
 }
 
+/// Truth: the table of the same run. Both are of version 0.1.0 as of November 2026, whose arrays had
+/// no names and whose errors were twists (`compare one_beam beam_swing --log-rate 2`).
+#[cfg(feature = "mcap")]
+#[test]
+fn an_mcap_file_from_before_the_curves_had_names_gives_the_same_numbers() {
+    let older = |format: RecordingFormat| {
+        let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data");
+        read(&data.join(format!("older.{}", format.extension())), format).unwrap().1
+    };
+    let (found, truth) = (older(RecordingFormat::Mcap), older(RecordingFormat::Csv));
+    assert_eq!((found.len(), truth.len()), (11, 11));
+    for (found, truth) in found.iter().zip(&truth) {
+        let numbers = |sample: &Sample| {
+            let elastic = sample.elastic.iter().flat_map(|element| [element.deflection, element.load]).flatten();
+            let energy = [sample.energy.kinetic, sample.energy.potential, sample.energy.elastic];
+            let errors = [&sample.error_world[..], &sample.error_path[..3], &sample.static_m, &energy];
+            let all = errors.concat().into_iter().chain(sample.contributions.concat()).chain(elastic);
+            bits(&all.collect::<Vec<_>>())
+        };
+        assert_eq!(numbers(found), numbers(truth));
+    }
+    assert!(truth.iter().any(|sample| sample.error_world[2] != 0.0));
+}
+
 #[cfg(feature = "mcap")]
 #[test]
 fn an_mcap_file_gives_back_every_number_to_the_last_bit_and_poses_to_rounding() {

@@ -187,7 +187,7 @@ pub enum Problem {
     /// The lower limit is above the upper limit.
     #[error("joint {joint:?}: the lower limit {lower} is above the upper limit {upper}")]
     LimitsReversed { joint: String, lower: f64, upper: f64 },
-    /// A negative velocity or effort limit.
+    /// A negative velocity, effort, acceleration, deceleration or jerk limit.
     #[error("joint {joint:?}: the {attribute} limit {value} is negative")]
     NegativeLimit { joint: String, attribute: &'static str, value: f64 },
     /// The axis is the zero vector.

@@ -51,6 +51,13 @@ pub enum Geometry {
         /// Full length.
         length: f64,
     },
+    /// A cylinder along z between two half spheres.
+    Capsule {
+        /// Radius.
+        radius: f64,
+        /// Length of the cylinder, without the half spheres.
+        length: f64,
+    },
     /// A sphere.
     Sphere {
         /// Radius.
@@ -58,7 +65,7 @@ pub enum Geometry {
     },
 }
 
-/// Number of corners of the circles that approximate cylinders and spheres.
+/// Number of corners of the circles that approximate round shapes.
 const CORNERS: u32 = 48;
 
 impl Geometry {
@@ -76,7 +83,8 @@ impl Geometry {
             Self::Mesh { uri, path: None, .. } => return Err(MeshError::NotFound { uri: uri.clone() }),
             Self::Box { size } => box_triangles(size),
             Self::Cylinder { radius, length } => cylinder_triangles(*radius, *length),
-            Self::Sphere { radius } => sphere_triangles(*radius),
+            Self::Capsule { radius, length } => round_triangles(*radius, *length),
+            Self::Sphere { radius } => round_triangles(*radius, 0.0),
         })
     }
 
@@ -92,6 +100,14 @@ impl Geometry {
             Self::Cylinder { radius: r, length: l } => {
                 let across = r * r / 4.0;
                 (std::f64::consts::PI * r * r * l, Vector3::new(across, across, l * l / 12.0))
+            }
+            Self::Capsule { radius: r, length: l } => {
+                let (r, l) = (*r, *l);
+                let (ball, rod) = (4.0 / 3.0 * std::f64::consts::PI * r.powi(3), std::f64::consts::PI * r * r * l);
+                // The centroid of a half sphere is 3 r / 8 from its flat side.
+                let across = ball * r * r / 5.0 + rod * r * r / 4.0;
+                let along = ball * (r * r / 5.0 + 3.0 / 8.0 * r * l + l * l / 4.0) + rod * l * l / 12.0;
+                (ball + rod, Vector3::new(across, across, along) / (ball + rod))
             }
             Self::Sphere { radius: r } => (4.0 / 3.0 * std::f64::consts::PI * r.powi(3), Vector3::repeat(r * r / 5.0)),
         };
@@ -157,31 +173,39 @@ fn cylinder_triangles(radius: f64, length: f64) -> TriangleMesh {
     mesh
 }
 
-fn sphere_triangles(radius: f64) -> TriangleMesh {
-    let rings = CORNERS / 2;
+/// A sphere, or with a positive `length` a capsule.
+fn round_triangles(radius: f64, length: f64) -> TriangleMesh {
+    let half = 0.5 * length;
+    let (poles, equator) = (CORNERS / 2, CORNERS / 4);
+    // Circles from the top to the bottom: polar angle in parts of a half turn, centre along z.
+    let circles: Vec<(u32, f64)> = match length > 0.0 {
+        true => (1..=equator).map(|k| (k, half)).chain((equator..poles).map(|k| (k, -half))).collect(),
+        false => (1..poles).map(|k| (k, 0.0)).collect(),
+    };
     let mut mesh = TriangleMesh::default();
     let mut normals = Vec::new();
-    let mut push = |mesh: &mut TriangleMesh, n: [f64; 3]| {
-        mesh.positions.push(n.map(|x| (x * radius) as f32));
+    let mut push = |mesh: &mut TriangleMesh, n: [f64; 3], z: f64| {
+        mesh.positions.push([n[0] * radius, n[1] * radius, n[2] * radius + z].map(|x| x as f32));
         normals.push(n.map(|x| x as f32));
     };
-    push(&mut mesh, [0.0, 0.0, 1.0]);
-    for ring in 1..rings {
-        let (sin_polar, cos_polar) = (f64::from(ring) * std::f64::consts::PI / f64::from(rings)).sin_cos();
+    push(&mut mesh, [0.0, 0.0, 1.0], half);
+    for &(polar, z) in &circles {
+        let (sin_polar, cos_polar) = (f64::from(polar) * std::f64::consts::PI / f64::from(poles)).sin_cos();
         for k in 0..CORNERS {
             let (s, c) = (f64::from(k) * std::f64::consts::TAU / f64::from(CORNERS)).sin_cos();
-            push(&mut mesh, [sin_polar * c, sin_polar * s, cos_polar]);
+            push(&mut mesh, [sin_polar * c, sin_polar * s, cos_polar], z);
         }
     }
-    push(&mut mesh, [0.0, 0.0, -1.0]);
+    push(&mut mesh, [0.0, 0.0, -1.0], -half);
 
-    let at = |ring: u32, k: u32| 1 + (ring - 1) * CORNERS + k % CORNERS;
-    let south = 1 + (rings - 1) * CORNERS;
+    let last = circles.len() as u32;
+    let at = |circle: u32, k: u32| 1 + (circle - 1) * CORNERS + k % CORNERS;
+    let south = 1 + last * CORNERS;
     for k in 0..CORNERS {
         mesh.triangles.push([0, at(1, k), at(1, k + 1)]);
-        mesh.triangles.push([south, at(rings - 1, k + 1), at(rings - 1, k)]);
-        for ring in 1..rings - 1 {
-            let (a, b, c, d) = (at(ring, k), at(ring + 1, k), at(ring + 1, k + 1), at(ring, k + 1));
+        mesh.triangles.push([south, at(last, k + 1), at(last, k)]);
+        for circle in 1..last {
+            let (a, b, c, d) = (at(circle, k), at(circle + 1, k), at(circle + 1, k + 1), at(circle, k + 1));
             mesh.triangles.extend([[a, b, c], [a, c, d]]);
         }
     }

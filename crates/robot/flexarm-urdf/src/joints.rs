@@ -8,6 +8,7 @@ use urdf_rs::JointType;
 
 use crate::error::Problem;
 use crate::finding::TextPosition;
+use crate::lint::RATES;
 use crate::raw::{RawJoint, RawRobot};
 use crate::report::Report;
 use flexarm_settings::closest;
@@ -138,6 +139,16 @@ fn limits(raw: &RawJoint, place: &TextPosition, report: &mut Report) -> Limits {
     };
     limits.effort = magnitude("effort", "unknown-effort", limit.effort);
     limits.velocity = magnitude("velocity", "unknown-velocity", limit.velocity);
+    let codes = ["unknown-acceleration", "unknown-deceleration", "unknown-jerk"];
+    let [acceleration, deceleration, jerk] = [0, 1, 2].map(|k| magnitude(RATES[k], codes[k], raw.rates[k]));
+    limits.acceleration = acceleration.min(deceleration);
+    limits.jerk = jerk;
+    if acceleration != deceleration {
+        let message = format!(
+            "joint {name:?}: acceleration {acceleration} and deceleration {deceleration} differ; both are bounded by the smaller"
+        );
+        report.note(place, "one-acceleration", message, "");
+    }
     limits
 }
 

@@ -64,6 +64,8 @@ pub(crate) struct RawJoint {
     pub(crate) axis: Option<TextPosition>,
     /// Place of `<limit>`; `None` if it is missing and `urdf` has zeros.
     pub(crate) limit: Option<TextPosition>,
+    /// Acceleration, deceleration and jerk of `<limit>`; infinite if not given.
+    pub(crate) rates: [f64; 3],
     /// Place of `<mimic>`, or of the joint if there is none.
     pub(crate) mimic: TextPosition,
     /// Whether some part could not be read; disables further checks.
@@ -108,9 +110,9 @@ impl RawRobot {
             }
         });
         let joints = urdf.joints.into_iter().zip(plain.joints).map(|(urdf, marks)| {
-            let JointMarks { joint, axis, limit, mimic } = marks;
+            let JointMarks { joint, axis, limit, rates, mimic } = marks;
             let (X_PJ, mimic) = (pose(&urdf.origin, &joint), mimic.unwrap_or_else(|| joint.place.clone()));
-            RawJoint { urdf, X_PJ, place: joint.place, axis, limit, mimic, faulty: joint.faulty }
+            RawJoint { urdf, X_PJ, place: joint.place, axis, limit, rates, mimic, faulty: joint.faulty }
         });
         Self {
             name: urdf.name,

@@ -84,10 +84,8 @@ pub(crate) fn find_collisions(robot: &RawRobot, resolver: &Resolver<'_>, up_axis
 fn geometry(raw: &RawVisual, link: &str, resolver: &Resolver<'_>, up_axis: UpAxis, report: &mut Report) -> Geometry {
     match &raw.urdf.geometry {
         Shape::Box { size } => Geometry::Box { size: Vector3::from(**size) },
-        // The lint passes no capsule.
-        Shape::Cylinder { radius, length } | Shape::Capsule { radius, length } => {
-            Geometry::Cylinder { radius: *radius, length: *length }
-        }
+        Shape::Cylinder { radius, length } => Geometry::Cylinder { radius: *radius, length: *length },
+        Shape::Capsule { radius, length } => Geometry::Capsule { radius: *radius, length: *length },
         Shape::Sphere { radius } => Geometry::Sphere { radius: *radius },
         Shape::Mesh { filename, scale } => {
             let uri = filename.trim();

@@ -326,6 +326,7 @@ fn primitives_agree_with_their_triangles() {
     let shapes = [
         Geometry::Box { size: Vector3::from(SIZE) },
         Geometry::Cylinder { radius: 0.3, length: 0.8 },
+        Geometry::Capsule { radius: 0.3, length: 0.8 },
         Geometry::Sphere { radius: 0.4 },
     ];
     for shape in shapes {

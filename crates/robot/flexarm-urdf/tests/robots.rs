@@ -206,7 +206,7 @@ fn slips_that_leave_a_robot_are_warned_of() {
         "<link name='arm'>\n<inertal/>",
         INERTIAL,
         INERTIAL,
-        "<visual><geometry><capsule radius='1' length='1'/></geometry></visual>\n",
+        "<visual><geometry><cone radius='1' length='1'/></geometry></visual>\n",
         "<visual><geometry><sphere radius='0'/></geometry></visual></link>\n",
         "<joint name='j' type='revolute'><parent link='base'/><child link='arm'/><limit effort='1' velocity='1'/></joint>",
     ]);
@@ -227,6 +227,39 @@ fn newer_urdf_has_quaternions_and_open_limits() {
     let joint = read(&text).mechanism.joints.remove(0);
     assert_eq!((joint.limits.lower, joint.limits.upper), (f64::NEG_INFINITY, f64::INFINITY));
     assert_relative_eq!(joint.X_PJ.rotation * Vector3::x(), Vector3::y(), epsilon = 1e-15);
+}
+
+/// Truth: the attributes as written; without a deceleration the acceleration holds for both.
+#[test]
+fn bounds_of_acceleration_and_jerk_are_read_and_checked() {
+    let joint = |limit: &str| {
+        with_joint(&format!(
+            "<joint name='j' type='revolute'><parent link='base'/><child link='arm'/><axis xyz='0 0 1'/>\n\
+             <limit lower='-1' upper='1' effort='1' velocity='1' {limit}/></joint>"
+        ))
+    };
+    let limits = |limit: &str| {
+        let limits = read(&joint(limit)).mechanism.joints[0].limits;
+        (limits.acceleration, limits.jerk)
+    };
+    assert_eq!(limits(""), (f64::INFINITY, f64::INFINITY));
+    assert_eq!(limits("acceleration='4'"), (4.0, f64::INFINITY));
+    assert_eq!(limits("acceleration='4' deceleration='3' jerk='50'"), (3.0, 50.0));
+    assert_eq!(limits("deceleration='3'"), (3.0, f64::INFINITY));
+    assert_eq!(limits("acceleration='0'"), (f64::INFINITY, f64::INFINITY), "0 is unknown, as for effort");
+    let codes = |limit: &str| codes(&check_urdf_text(&joint(limit), "robot.urdf", &ReadOptions::default()));
+    assert_eq!(codes("acceleration='4' deceleration='4' jerk='50'"), codes(""));
+    assert!(codes("acceleration='4' deceleration='3'").contains(&(Severity::Note, "one-acceleration")));
+    assert!(codes("acceleration='-4'").contains(&(Severity::Error, "negative-limit")));
+    assert!(codes("jerk='fast'").contains(&(Severity::Error, "not-a-number")));
+    assert!(codes("accelaration='4'").contains(&(Severity::Warning, "unknown-attribute")));
+}
+
+#[test]
+fn a_quaternion_before_urdf_1_1_is_not_ignored_in_silence() {
+    let joint = "<joint name='j' type='continuous'><parent link='base'/><child link='arm'/><axis xyz='0 0 1'/>\
+                 <origin quat_xyzw='0 0 1 1'/></joint>";
+    assert!(codes(&read(&with_joint(joint)).warnings).contains(&(Severity::Warning, "ignored-quaternion")));
 }
 
 /// An arm with an inertial and this visual.

@@ -84,6 +84,10 @@ pub struct JointInfo {
     pub velocity: Option<f64>,
     /// Maximum torque or force (N m or N).
     pub effort: Option<f64>,
+    /// Maximum acceleration (rad/s² or m/s²).
+    pub acceleration: Option<f64>,
+    /// Maximum jerk (rad/s³ or m/s³).
+    pub jerk: Option<f64>,
 }
 
 /// A link.
@@ -249,6 +253,8 @@ fn joint_infos(model: &Model) -> Vec<JointInfo> {
         upper: finite(c.limits.upper),
         velocity: finite(c.limits.velocity),
         effort: finite(c.limits.effort),
+        acceleration: finite(c.limits.acceleration),
+        jerk: finite(c.limits.jerk),
     };
     model.coordinates().iter().map(joint).collect()
 }

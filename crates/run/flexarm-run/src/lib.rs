@@ -70,6 +70,7 @@ pub mod reduce;
 mod report;
 pub mod response;
 pub mod robot;
+mod robot_export;
 pub mod robot_file;
 mod robot_link;
 pub mod run;
@@ -131,6 +132,7 @@ pub use response::{
     PeakFigures, Response, ResponseCurve, ResponseFiles, ResponseOutputs, ResponseRequest, readable_unit, response,
 };
 pub use robot::{Description, LoadOptions, Robot, RobotSource, TCP_FRAME};
+pub use robot_export::{RobotExport, RobotFormat};
 pub use robot_file::RobotFileError;
 pub use robot_link::{LinkChoices, RobotLink, StressSource};
 pub use run::{Keep, Progress, Run, RunRequest, SampleObserver};

@@ -69,14 +69,15 @@ impl PrescribedMotion for AlongTrajectory {
     }
 }
 
-/// Returns the position and velocity limits of the joints.
+/// Returns the limits of the joints that a motion can violate.
 pub fn limits(model: &Model) -> Vec<JointLimits> {
     let actuated = &model.coordinates()[..model.n_actuated()];
     let limits = actuated.iter().map(|c| JointLimits {
         lower: c.limits.lower,
         upper: c.limits.upper,
         velocity: c.limits.velocity,
-        acceleration: None,
+        acceleration: c.limits.acceleration,
+        jerk: c.limits.jerk,
     });
     limits.collect()
 }

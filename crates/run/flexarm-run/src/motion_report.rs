@@ -96,11 +96,13 @@ pub struct MotionPeak {
     pub acceleration: f64,
     /// Time of the peak acceleration (s).
     pub acceleration_at_s: f64,
+    /// Acceleration limit.
+    pub acceleration_limit: Option<f64>,
     /// Jerk of largest magnitude, excluding jumps of the acceleration.
     pub jerk: f64,
     /// Time of the peak jerk (s).
     pub jerk_at_s: f64,
-    /// Jerk limit of a path file.
+    /// Jerk limit, of a path file or else of the robot.
     pub jerk_limit: Option<f64>,
     /// Maximum jump of the acceleration.
     pub acceleration_jump: f64,
@@ -240,17 +242,17 @@ fn on_robot(path: &Path, robot: &Robot, options: &MotionOptions) -> Result<(Moti
     let (warnings, notes) = messages(&caveats, Vec::new());
 
     let limit = |x: f64| x.is_finite().then_some(x);
+    let limits = crate::motion::limits(&model);
     let mut peaks = Vec::new();
     let mut violations: Vec<MotionViolation> = motion.violations.iter().map(of_limit).collect();
     for (k, (peak, c)) in trajectory.peak().iter().zip(actuated).enumerate() {
-        let (lower, upper, velocity) = (c.limits.lower, c.limits.upper, c.limits.velocity);
-        let limits = JointLimits { lower, upper, velocity, acceleration: None };
         let worst = torques.peak(k);
         let (torque, torque_at_s) = (Some(worst.value), Some(worst.time_s));
         let unit = c.unit();
-        let own = of_joint(peak, unit, &limits);
-        let jerk_limit = motion.tool_path.as_ref().and_then(|path| path.jerk_of(&c.joint));
-        violations.extend(jerk_limit.and_then(|limit| of_jerk(peak, limit)));
+        let own = of_joint(peak, unit, &limits[k]);
+        let planned = motion.tool_path.as_ref().and_then(|path| path.jerk_of(&c.joint));
+        violations.extend(planned.and_then(|limit| of_jerk(peak, limit)));
+        let jerk_limit = planned.or(own.jerk_limit);
         peaks.push(MotionPeak { torque, torque_at_s, torque_limit: limit(c.limits.effort), jerk_limit, ..own });
         violations.extend(torques.violation(k, &c.joint, c.limits.effort));
     }
@@ -293,9 +295,10 @@ fn of_joint(peak: &JointPeak, unit: &'static str, limits: &JointLimits) -> Motio
         speed_limit: limit(limits.velocity),
         acceleration: peak.acceleration.value,
         acceleration_at_s: peak.acceleration.time_s,
+        acceleration_limit: limit(limits.acceleration),
         jerk: peak.jerk.value,
         jerk_at_s: peak.jerk.time_s,
-        jerk_limit: None,
+        jerk_limit: limit(limits.jerk),
         acceleration_jump: peak.acceleration_jump.value,
         torque: None,
         torque_at_s: None,
@@ -310,6 +313,7 @@ pub fn of_limit(violation: &flexarm_trajectory::LimitViolation) -> MotionViolati
         LimitKind::Upper => "upper",
         LimitKind::Velocity => "velocity",
         LimitKind::Acceleration => "acceleration",
+        LimitKind::Jerk => "jerk",
     };
     MotionViolation {
         joint: violation.joint.clone(),

@@ -41,13 +41,15 @@ impl Recordings {
 /// Returns the names of the files that a run writes into its folder, recordings first.
 pub(crate) fn files_of_a_run() -> impl Iterator<Item = &'static str> {
     let recordings = RecordingFormat::ALL.into_iter().map(|format| format.info().file_name);
-    let [foxglove, plotjuggler] = LAYOUT_FILES;
     let pages = ["report.html", "report.md", "summary.json", STUDY_FILE, FIGURES_FOLDER, STRESS_PICTURE];
-    recordings.chain(pages).chain([foxglove, plotjuggler])
+    recordings.chain(pages).chain(LAYOUT_FILES).chain([BAG_FILE])
 }
 
 /// Viewer layouts written next to `run.mcap`: Foxglove, PlotJuggler.
 const LAYOUT_FILES: [&str; 2] = ["run.foxglove.json", "run.plotjuggler.xml"];
+
+/// Makes the folder with `run.mcap` a bag of ROS 2.
+const BAG_FILE: &str = "metadata.yaml";
 
 /// Recording of all runs of a study.
 pub(crate) const STUDY_FILE: &str = "study.rrd";
@@ -195,6 +197,21 @@ pub(crate) fn write_layouts(files: &Files, header: &RunHeader) -> Result<(), Err
     ];
     let there = layouts.into_iter().filter_map(|(path, text)| Some((PathBuf::from(path.as_ref()?), text(header))));
     Ok(flexarm_files::write_all(&there.collect::<Vec<_>>())?)
+}
+
+/// Writes the file that makes the folder of the finished MCAP recording a bag of ROS 2.
+#[cfg(feature = "mcap")]
+pub(crate) fn write_bag_metadata(files: &Files) -> Result<(), Error> {
+    let Some(path) = files.recordings.get(RecordingFormat::Mcap).map(Path::new) else { return Ok(()) };
+    let metadata = flexarm_log::rosbag2_metadata(path)?;
+    let file = metadata.map(|text| (path.with_file_name(BAG_FILE), text));
+    Ok(flexarm_files::write_all(&Vec::from_iter(file))?)
+}
+
+/// Without the feature `mcap` there is no bag.
+#[cfg(not(feature = "mcap"))]
+pub(crate) fn write_bag_metadata(_: &Files) -> Result<(), Error> {
+    Ok(())
 }
 
 /// Without the feature `mcap` there are no layouts.

@@ -49,7 +49,7 @@ pub(super) fn passed(
     let model = robot.rigid_model()?;
     let mut limits = limits_of(&model);
     for (limit, acceleration) in limits.iter_mut().zip(&request.accelerations) {
-        *limit = JointLimits { acceleration: Some(*acceleration), ..*limit };
+        *limit = JointLimits { acceleration: *acceleration, ..*limit };
     }
     let mut passed: Vec<MotionViolation> = motion.trajectory.check_limits(&limits).iter().map(of_limit).collect();
     for (c, worst) in model.coordinates().iter().zip(efforts) {

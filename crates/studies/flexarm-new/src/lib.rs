@@ -89,10 +89,10 @@ pub enum NewError {
     #[error(
         "robot {robot:?} has no joint that moves: {}; an arm needs at least one joint of type revolute, continuous or prismatic \
          whose lower limit is below its upper one",
-        if *fixed == 0 {
-            "it has no joints at all".to_owned()
-        } else {
-            format!("all of its {fixed} joints are fixed, mimic joints or without range")
+        match *fixed {
+            0 => "it has no joints at all".to_owned(),
+            1 => "its only joint is fixed, a mimic joint or without range".to_owned(),
+            _ => format!("all of its {fixed} joints are fixed, mimic joints or without range"),
         }
     )]
     NoMovableJoint {

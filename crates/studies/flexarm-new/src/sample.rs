@@ -108,6 +108,10 @@ pub(crate) fn sample_motion(model: &Model, workspace: &Workspace, axes: &[Axis])
             break;
         }
     }
+    if turns_in_place(&poses) {
+        let note = "no joint of the motion moves the tool, which is on their axes: it turns in place; choose another tcp or joint";
+        motion.notes.push(note.into());
+    }
     if wish == 3 {
         motion.notes.push("the effort limits are too low to hold the arm in the poses of the motion".into());
     }
@@ -141,8 +145,11 @@ fn still_height(model: &Model, data: &mut Data, workspace: &Workspace) -> f64 {
     still.map(|k| first[k]).fold(f64::INFINITY, f64::min).min(0.0)
 }
 
+/// Distance of two poses (m) below which the TCP has not moved.
+const SAME_PLACE: f64 = 1e-6;
+
 /// Chooses the pose closest to the middle of the ranges, then repeatedly the one whose TCP is
-/// farthest from all previous ones.
+/// farthest from all previous ones; if no joint moves the TCP, the one whose joints are.
 fn choose(model: &Model, data: &mut Data, poses: &[Posed], axes: &[Axis], wish: &PoseConditions) -> Vec<Posed> {
     let away = |pose: &Posed| -> f64 {
         let part =
@@ -152,13 +159,15 @@ fn choose(model: &Model, data: &mut Data, poses: &[Posed], axes: &[Axis], wish: 
     let sound: Vec<&Posed> = poses.iter().filter(|pose| wish.holds(pose, axes)).collect();
     let Some(&start) = sound.iter().min_by(|a, b| away(a).total_cmp(&away(b))) else { return Vec::new() };
     let mut rests = vec![start.clone()];
+    let turns = turns_in_place(poses);
+    let apart = |a: &Posed, b: &Posed| if turns { (&a.q - &b.q).norm() } else { (a.tool - b.tool).norm() };
     let mut way = |a: &Posed, b: &Posed| {
         (1..8).all(|i| wish.holds(&posed(model, data, a.q.lerp(&b.q, f64::from(i) / 8.0)), axes))
     };
     while rests.len() <= GOALS {
-        let distance = |pose: &Posed| rests.iter().map(|r| (r.tool - pose.tool).norm()).fold(f64::INFINITY, f64::min);
+        let distance = |pose: &Posed| rests.iter().map(|r| apart(r, pose)).fold(f64::INFINITY, f64::min);
         let mut order: Vec<(&Posed, f64)> =
-            sound.iter().map(|p| (*p, distance(p))).filter(|(_, d)| *d > 1e-6).collect();
+            sound.iter().map(|p| (*p, distance(p))).filter(|(_, d)| *d > SAME_PLACE).collect();
         order.sort_by(|a, b| b.1.total_cmp(&a.1));
         let last = &rests[rests.len() - 1];
         let next = order.iter().map(|(p, _)| *p).find(|pose| way(last, pose) && way(pose, start));
@@ -167,6 +176,11 @@ fn choose(model: &Model, data: &mut Data, poses: &[Posed], axes: &[Axis], wish: 
         rests.push(next);
     }
     rests
+}
+
+/// Whether the TCP is on the axes of all joints.
+fn turns_in_place(poses: &[Posed]) -> bool {
+    poses.iter().all(|pose| (pose.tool - poses[0].tool).norm() <= SAME_PLACE)
 }
 
 /// Returns the duration of a move (s), in tenths, and whether the effort limits are kept.

@@ -80,6 +80,8 @@ from .errors import (
     WriteError,
 )
 
+Arm.linearize = Arm.linearise
+
 __all__ = [
     "Arm",
     "Caveat",

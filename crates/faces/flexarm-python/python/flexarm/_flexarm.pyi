@@ -386,6 +386,7 @@ class Arm:
         spacing: Literal["log", "linear"] = "log",
     ) -> Response: ...
     def linearise(self, q: ArrayLike | None = None, wrench: ArrayLike | None = None) -> Linear: ...
+    linearize = linearise
     def live(
         self,
         q: ArrayLike | None = None,

@@ -2135,6 +2135,10 @@ class JointInfo(TypedDict):
     """Maximum speed (rad/s or m/s)."""
     effort: float | None
     """Maximum torque or force (N m or N)."""
+    acceleration: float | None
+    """Maximum acceleration (rad/s² or m/s²)."""
+    jerk: float | None
+    """Maximum jerk (rad/s³ or m/s³)."""
 
 
 class LinkInfo(TypedDict):
@@ -2484,12 +2488,14 @@ class MotionPeak(TypedDict):
     """Acceleration of largest magnitude, signed."""
     acceleration_at_s: float
     """Time of the peak acceleration (s)."""
+    acceleration_limit: float | None
+    """Acceleration limit."""
     jerk: float
     """Jerk of largest magnitude, excluding jumps of the acceleration."""
     jerk_at_s: float
     """Time of the peak jerk (s)."""
     jerk_limit: float | None
-    """Jerk limit of a path file."""
+    """Jerk limit, of a path file or else of the robot."""
     acceleration_jump: float
     """Maximum jump of the acceleration."""
     torque: float | None

@@ -1,8 +1,7 @@
 //! Topics of a recording: names, message types, quality of service.
 //!
-//! Rerun plots eight topics of joint states and arrays by default, in the order of their names. So
-//! the TCP error has a name that sorts first, and data that would take all eight places, such as
-//! the deflection of each element, has a type that Rerun does not plot.
+//! Every group of numbers is a `sensor_msgs/JointState`: Rerun, PlotJuggler and Foxglove label its
+//! curves by the names in the message.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
@@ -22,19 +21,27 @@ pub(crate) struct Channels {
     pub(crate) joint_states: u16,
     pub(crate) tcp_flexible: u16,
     pub(crate) rigid: Option<RigidChannels>,
-    pub(crate) elastic: Vec<ElasticChannels>,
+    /// Loads of the elastic elements, for arrows.
+    pub(crate) elastic: Vec<u16>,
     /// Present if there are elastic elements.
-    pub(crate) elastic_joint_states: Option<u16>,
+    pub(crate) elastic_joint_states: Option<Named>,
     /// Present if there is a rigid twin and the header announces the static error.
-    pub(crate) static_error: Option<u16>,
+    pub(crate) static_error: Option<Named>,
     /// Present if there are contributors.
-    pub(crate) contributions: Option<u16>,
+    pub(crate) contributions: Option<Named>,
     /// Present if there are gauges.
-    pub(crate) gauges: Option<u16>,
-    pub(crate) solver: u16,
-    pub(crate) energy: u16,
+    pub(crate) gauges: Option<Named>,
+    pub(crate) solver: Named,
+    pub(crate) energy: Named,
     pub(crate) events: u16,
     pub(crate) markers: MarkerChannels,
+}
+
+/// Topic of named numbers, a `sensor_msgs/JointState`.
+#[derive(Debug)]
+pub(crate) struct Named {
+    pub(crate) channel: u16,
+    pub(crate) names: Vec<String>,
 }
 
 /// Topics of markers.
@@ -48,27 +55,16 @@ pub(crate) struct MarkerChannels {
 }
 
 /// Topics of the rigid twin and of the comparison with it.
-#[derive(Clone, Copy, Debug)]
+#[derive(Debug)]
 pub(crate) struct RigidChannels {
     pub(crate) joint_states: u16,
     pub(crate) tcp: u16,
-    pub(crate) error: u16,
-    pub(crate) error_plot: u16,
-    pub(crate) error_path: u16,
-    pub(crate) error_path_plot: u16,
+    pub(crate) error: Named,
+    pub(crate) error_path: Named,
 }
 
-/// Topics of one elastic element.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct ElasticChannels {
-    pub(crate) load: u16,
-    pub(crate) deflection: u16,
-}
-
-const ARRAY: &str = "std_msgs/Float64MultiArray";
 const JOINTS: &str = "sensor_msgs/JointState";
 const POSE: &str = "geometry_msgs/PoseStamped";
-const TWIST: &str = "geometry_msgs/TwistStamped";
 const WRENCH: &str = "geometry_msgs/WrenchStamped";
 const MARKERS: &str = "visualization_msgs/MarkerArray";
 
@@ -85,23 +81,32 @@ impl Channels {
         let tcp_flexible = add(output, "/tcp/flexible", POSE, "tool centre point of the flexible robot")?;
         let rigid = header.has_rigid.then(|| RigidChannels::add(output)).transpose()?;
         let elements = topic_names(&header.elements).into_iter().zip(&header.elements);
-        let elastic = elements.map(|(topic, element)| ElasticChannels::add(output, &topic, element));
+        let elastic = elements.map(|(topic, element)| {
+            let what = format!(
+                "load of {element} on its distal part, axes of the proximal face [N, N m], as in /elastic/joint_states"
+            );
+            add(output, &format!("/elastic/{topic}"), WRENCH, &what)
+        });
         let elastic = elastic.collect::<io::Result<_>>()?;
         let what = "all elastic elements by name: position = deflection [m, rad], effort = load on the distal part [N, N m], axes of \
                     the proximal face";
-        let elastic_joint_states = add_if(!header.elements.is_empty(), output, "/elastic/joint_states", JOINTS, what)?;
+        let names = parts(&header.elements, &ERROR[..6]);
+        let elastic_joint_states = named_if(!header.elements.is_empty(), output, "/elastic/joint_states", names, what)?;
         let what = "static part of /tcp/error: the TCP error if the arm stood still where it is, world axes [m]";
-        let static_error = add_if(header.has_rigid && header.has_static, output, "/tcp/static_error", ARRAY, what)?;
+        let wanted = header.has_rigid && header.has_static;
+        let static_error = named_if(wanted, output, "/tcp/static_error", owned(&ERROR[..3]), what)?;
         let what = "displacement of the TCP caused by each flexible link or drive, world axes [m]";
-        let contributions = add_if(!header.contributors.is_empty(), output, "/tcp/contributions", ARRAY, what)?;
+        let names = parts(&header.contributors, &ERROR[..3]);
+        let contributions = named_if(!names.is_empty(), output, "/tcp/contributions", names, what)?;
         let what = "strain gauges [m/m] and stress points [Pa] of links";
-        let gauges = add_if(!header.gauges.is_empty(), output, "/gauges", ARRAY, what)?;
+        let gauges = named_if(!header.gauges.is_empty(), output, "/gauges", header.gauges.clone(), what)?;
         let what = "surfaces of the links in their frames: flexible as in the URDF, rigid twin as a ghost, magnified arm in blue";
         let surfaces = add_if(!header.meshes.is_empty(), output, "/markers", MARKERS, what)?;
         let what = format!("TCP error from the rigid tool on, drawn {} times", header.magnification);
         let error = add_if(is_magnified(header), output, "/markers/error", MARKERS, &what)?;
-        let solver = add(output, "/solver", ARRAY, "stepper")?;
-        let energy = add(output, "/energy", ARRAY, "energies of the flexible robot [J]")?;
+        let solver = named(output, "/solver", owned(&["iterations", "residual"]), "stepper")?;
+        let names = owned(&["kinetic", "potential", "elastic"]);
+        let energy = named(output, "/energy", names, "energies of the flexible robot [J]")?;
         let what = "events; name = kind; written at the end of the run, with the times of the events";
         let events = add(output, "/events", "rcl_interfaces/Log", what)?;
         let paths = add(output, "/markers/path", MARKERS, "paths of the tool so far, each second")?;
@@ -128,31 +133,44 @@ impl Channels {
 
 impl RigidChannels {
     fn add(output: &mut Output) -> io::Result<Self> {
-        let mut add = |topic: &str, kind: &str, note: &str| add(output, topic, kind, note);
-        let what = "not a velocity: TCP error, flexible minus rigid, world axes; linear = translation [m], angular = rotation vector [rad]";
-        let along = "not a velocity: TCP error, flexible minus rigid, along tangent, normal and binormal of the rigid path; linear = translation [m], angular = rotation vector [rad]";
-        Ok(Self {
-            joint_states: add("/rigid/joint_states", JOINTS, "rigid twin; effort is the required force of the drives")?,
-            tcp: add("/tcp/rigid", POSE, "tool centre point of the rigid twin")?,
-            error: add("/tcp/error", TWIST, what)?,
-            error_plot: add("/deviation/tcp", ARRAY, "translation of /tcp/error, for plotting")?,
-            error_path: add("/tcp/error_path", TWIST, along)?,
-            error_path_plot: add("/deviation/tcp_path", ARRAY, "translation of /tcp/error_path, for plotting")?,
-        })
+        let what = "rigid twin; effort is the required force of the drives";
+        let joint_states = add(output, "/rigid/joint_states", JOINTS, what)?;
+        let tcp = add(output, "/tcp/rigid", POSE, "tool centre point of the rigid twin")?;
+        let what = "TCP error, flexible minus rigid, world axes: translation [m], rotation vector [rad], norm of the translation [m]";
+        let error = named(output, "/tcp/error", owned(&ERROR), what)?;
+        let what = "TCP error, flexible minus rigid, along tangent, normal and binormal of the rigid path: translation [m], rotation \
+                    vector [rad]";
+        let error_path = named(output, "/tcp/error_path", owned(&PATH_ERROR), what)?;
+        Ok(Self { joint_states, tcp, error, error_path })
     }
 }
 
-impl ElasticChannels {
-    fn add(output: &mut Output, topic: &str, element: &str) -> io::Result<Self> {
-        let load = format!(
-            "load of {element} on its distal part, axes of the proximal face [N, N m], as in /elastic/joint_states"
-        );
-        let deflection = format!("not a velocity: deflection of {element}, axes of the proximal face [m, rad]");
-        Ok(Self {
-            load: add(output, &format!("/elastic/{topic}"), WRENCH, &load)?,
-            deflection: add(output, &format!("/elastic/{topic}/deflection"), TWIST, &deflection)?,
-        })
-    }
+/// Names of the parts of an error in world axes.
+const ERROR: [&str; 7] = ["x", "y", "z", "rx", "ry", "rz", "norm"];
+/// Names of the parts of an error along the path.
+const PATH_ERROR: [&str; 6] = ["tangential", "normal", "binormal", "r_tangential", "r_normal", "r_binormal"];
+
+fn owned(names: &[&str]) -> Vec<String> {
+    names.iter().map(|&name| name.to_owned()).collect()
+}
+
+/// Returns the names `<name>/<part>`.
+fn parts(names: &[String], parts: &[&str]) -> Vec<String> {
+    names.iter().flat_map(|name| parts.iter().map(move |part| format!("{name}/{part}"))).collect()
+}
+
+fn named(output: &mut Output, topic: &str, names: Vec<String>, note: &str) -> io::Result<Named> {
+    Ok(Named { channel: add(output, topic, JOINTS, note)?, names })
+}
+
+fn named_if(
+    wanted: bool,
+    output: &mut Output,
+    topic: &str,
+    names: Vec<String>,
+    note: &str,
+) -> io::Result<Option<Named>> {
+    wanted.then(|| named(output, topic, names, note)).transpose()
 }
 
 fn add_if(wanted: bool, output: &mut Output, topic: &str, kind: &str, note: &str) -> io::Result<Option<u16>> {
@@ -164,23 +182,32 @@ fn add(output: &mut Output, topic: &str, kind: &str, note: &str) -> io::Result<u
     let name = kind.replacen('/', "/msg/", 1);
     let latched = ["/robot_description", "/tf_static", "/markers", "/markers/path"].contains(&topic);
     let metadata = BTreeMap::from([
-        ("offered_qos_profiles".to_owned(), qos_profile(latched)),
+        (QUALITY_OF_SERVICE.to_owned(), qos_profile(latched)),
         ("description".to_owned(), note.to_owned()),
     ]);
     output.add_channel(topic, &name, &schema_text(kind), &metadata)
 }
 
-/// Quality of service in the form written by `ros2 bag`. Late subscribers also receive latched
-/// topics.
+/// Key of a channel's quality of service.
+pub(crate) const QUALITY_OF_SERVICE: &str = "offered_qos_profiles";
+
+/// Quality of service as `ros2 bag` writes it: the numbers of the enumerations of ROS, which all
+/// its releases read (words only the newest ones). Late subscribers also receive latched topics.
 fn qos_profile(latched: bool) -> String {
     const FOREVER: &str = "\n    sec: 9223372036\n    nsec: 854775807";
-    let (depth, durability) = if latched { (1, "transient_local") } else { (10, "volatile") };
+    let (depth, durability) = if latched { (1, TRANSIENT_LOCAL) } else { (10, VOLATILE) };
     format!(
-        "- history: keep_last\n  depth: {depth}\n  reliability: reliable\n  durability: {durability}\n  \
-         deadline:{FOREVER}\n  lifespan:{FOREVER}\n  liveliness: automatic\n  \
+        "- history: {KEEP_LAST}\n  depth: {depth}\n  reliability: {RELIABLE}\n  durability: {durability}\n  \
+         deadline:{FOREVER}\n  lifespan:{FOREVER}\n  liveliness: {AUTOMATIC}\n  \
          liveliness_lease_duration:{FOREVER}\n  avoid_ros_namespace_conventions: false\n"
     )
 }
+
+const KEEP_LAST: u8 = 1;
+const RELIABLE: u8 = 1;
+const TRANSIENT_LOCAL: u8 = 1;
+const VOLATILE: u8 = 2;
+const AUTOMATIC: u8 = 1;
 
 /// Turns names into valid and distinct parts of a ROS topic: letters, digits and `_`, no digit
 /// first.

@@ -14,19 +14,11 @@ const DEFINITIONS: &[Definition] = &[
     ("builtin_interfaces/Time", "int32 sec\nuint32 nanosec\n", &[]),
     ("std_msgs/Header", "builtin_interfaces/Time stamp\nstring frame_id\n", &["builtin_interfaces/Time"]),
     ("std_msgs/String", "string data\n", &[]),
-    ("std_msgs/MultiArrayDimension", "string label\nuint32 size\nuint32 stride\n", &[]),
-    ("std_msgs/MultiArrayLayout", "MultiArrayDimension[] dim\nuint32 data_offset\n", &["std_msgs/MultiArrayDimension"]),
-    (
-        "std_msgs/Float64MultiArray",
-        "MultiArrayLayout layout\nfloat64[] data\n",
-        &["std_msgs/MultiArrayLayout", "std_msgs/MultiArrayDimension"],
-    ),
     ("geometry_msgs/Vector3", "float64 x\nfloat64 y\nfloat64 z\n", &[]),
     ("geometry_msgs/Point", "float64 x\nfloat64 y\nfloat64 z\n", &[]),
     ("geometry_msgs/Quaternion", "float64 x 0\nfloat64 y 0\nfloat64 z 0\nfloat64 w 1\n", &[]),
     ("geometry_msgs/Transform", "Vector3 translation\nQuaternion rotation\n", &[]),
     ("geometry_msgs/Pose", "Point position\nQuaternion orientation\n", &[]),
-    ("geometry_msgs/Twist", "Vector3 linear\nVector3 angular\n", &[]),
     ("geometry_msgs/Wrench", "Vector3 force\nVector3 torque\n", &[]),
     ("geometry_msgs/TransformStamped", "std_msgs/Header header\nstring child_frame_id\nTransform transform\n", &[]),
     (
@@ -39,11 +31,6 @@ const DEFINITIONS: &[Definition] = &[
             "geometry_msgs/Point",
             "geometry_msgs/Quaternion",
         ],
-    ),
-    (
-        "geometry_msgs/TwistStamped",
-        "std_msgs/Header header\nTwist twist\n",
-        &["std_msgs/Header", "builtin_interfaces/Time", "geometry_msgs/Twist", "geometry_msgs/Vector3"],
     ),
     (
         "geometry_msgs/WrenchStamped",

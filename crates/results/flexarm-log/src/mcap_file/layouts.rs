@@ -29,13 +29,6 @@ const GROUND: Ground = Ground::Dark;
 
 fn plots(header: &RunHeader) -> Vec<Plot> {
     let mut plots = Vec::new();
-    let array = |topic: &str, k: usize, name: &str, color: Rgb| Curve {
-        topic: topic.to_owned(),
-        foxglove: format!(".data[{k}]"),
-        plotjuggler: format!("/data[{k}]"),
-        name: name.to_owned(),
-        color,
-    };
     let joint = |topic: &str, k: usize, name: &str, part: &str, color: Rgb| Curve {
         topic: topic.to_owned(),
         foxglove: format!(".{part}[{k}]"),
@@ -46,11 +39,11 @@ fn plots(header: &RunHeader) -> Vec<Plot> {
     if header.has_rigid {
         let world = ["x", "y", "z"].into_iter().enumerate();
         let mut curves: Vec<Curve> =
-            world.map(|(k, name)| array("/deviation/tcp", k, name, palette::axis(k, GROUND))).collect();
-        curves.push(array("/deviation/tcp", 3, "size", palette::total(GROUND)));
+            world.map(|(k, name)| joint("/tcp/error", k, name, "position", palette::axis(k, GROUND))).collect();
+        curves.push(joint("/tcp/error", 6, "norm", "position", palette::total(GROUND)));
         plots.push(Plot { title: "TCP error, world axes [m]", curves });
         let along = ["tangential", "normal", "binormal"].into_iter().enumerate();
-        let curves = along.map(|(k, name)| array("/deviation/tcp_path", k, name, palette::series(k, GROUND)));
+        let curves = along.map(|(k, name)| joint("/tcp/error_path", k, name, "position", palette::series(k, GROUND)));
         plots.push(Plot { title: "TCP error along and across the path [m]", curves: curves.collect() });
     }
     if !header.elements.is_empty() {

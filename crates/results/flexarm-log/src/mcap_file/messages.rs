@@ -35,7 +35,7 @@ pub(crate) type Header<'a> = (Time, &'a str);
 pub(crate) type Transforms<'a> = Vec<(Header<'a>, &'a str, [f64; 7])>;
 /// `sensor_msgs/JointState`: header, names, positions, velocities, efforts.
 pub(crate) type JointState<'a> = (Header<'a>, Vec<&'a str>, Vec<f64>, Vec<f64>, Vec<f64>);
-/// `std_msgs/Float64MultiArray`: dimensions (label, size, stride), offset, values.
+/// `std_msgs/Float64MultiArray`, of older files: dimensions (label, size, stride), offset, values.
 pub(crate) type LabelledArray<'a> = (Vec<(&'a str, u32, u32)>, u32, Vec<f64>);
 
 /// Time of a message since the epoch of the recording's clock (ns); at most [`Stamp::MAX`].
@@ -78,8 +78,8 @@ pub(crate) fn transforms<'a>(stamp: Stamp, transforms: &[Transform<'a>]) -> Tran
     transforms.iter().map(message).collect()
 }
 
-/// `sensor_msgs/JointState` with positions, velocities and efforts.
-pub(crate) fn joint_state(stamp: Stamp, names: &[String], [q, qdot, effort]: [&[f64]; 3]) -> impl Serialize {
+/// `sensor_msgs/JointState` with positions, velocities and efforts, each of every name or empty.
+pub(crate) fn joint_state(stamp: Stamp, names: &[impl Serialize], [q, qdot, effort]: [&[f64]; 3]) -> impl Serialize {
     ((stamp.time(), ""), names, q, qdot, effort)
 }
 
@@ -88,15 +88,9 @@ pub(crate) fn pose_stamped(stamp: Stamp, frame: &str, X: &Pose) -> impl Serializ
     ((stamp.time(), frame), pose(X))
 }
 
-/// `geometry_msgs/TwistStamped` or `WrenchStamped`: two vectors, linear first.
-pub(crate) fn six_vector_stamped(stamp: Stamp, frame: &str, values: &[f64; 6]) -> impl Serialize {
+/// `geometry_msgs/WrenchStamped`: force, torque.
+pub(crate) fn wrench_stamped(stamp: Stamp, frame: &str, values: &[f64; 6]) -> impl Serialize {
     ((stamp.time(), frame), values)
-}
-
-/// `std_msgs/Float64MultiArray` with one dimension, labelled with the names of the entries.
-pub(crate) fn labelled_array(labels: &str, values: &[f64]) -> impl Serialize {
-    let size = u32::try_from(values.len()).expect("a list of a recording has fewer than 2^32 entries");
-    ([(labels, size, size)].to_vec(), 0_u32, values)
 }
 
 /// Severity of an event, as in `rcl_interfaces/Log`.

@@ -8,6 +8,7 @@
 //! Start at [`McapRecorder`]; topics are in [`channels`], messages in [`messages`], coordinate
 //! frames in [`frames`], markers for viewers in [`markers`].
 
+pub(crate) mod bag;
 pub(crate) mod beat;
 pub(crate) mod bent;
 pub(crate) mod channels;
@@ -23,9 +24,7 @@ use std::fs::File;
 use std::io;
 use std::path::Path;
 
-use serde::Serialize;
-
-use self::channels::Channels;
+use self::channels::{Channels, Named, RigidChannels};
 use self::frames::{Frames, Moving, WORLD};
 use self::markers::{MovingMarkers, SurfaceFrames};
 use self::mesh_files::mesh_files;
@@ -43,15 +42,15 @@ use crate::{CreateOptions, EventKind, LogError, RunHeader, RunResult, START_NS, 
 /// | `/tf`, `/tf_static` | `tf2_msgs/TFMessage` | three trees under `world`: links, `rigid/` links and `magnified/` links; stations of a flexible link as its children `<link>/station_<k>`, the TCP as `<link>/tcp`; at most 200 times a second |
 /// | `/joint_states`, `/rigid/joint_states` | `sensor_msgs/JointState` | effort: required drive torque or force |
 /// | `/tcp/flexible`, `/tcp/rigid` | `geometry_msgs/PoseStamped` | in `world` |
-/// | `/tcp/error`, `/tcp/error_path` | `geometry_msgs/TwistStamped` | an error: translation and rotation vector; world axes, path axes |
-/// | `/deviation/tcp`, `/deviation/tcp_path` | `std_msgs/Float64MultiArray` | translation of the error, which viewers plot by default and first |
-/// | `/tcp/static_error` | `std_msgs/Float64MultiArray` | static share of the error: x, y, z, world axes |
-/// | `/tcp/contributions` | `std_msgs/Float64MultiArray` | contribution of each of [`RunHeader::contributors`] to the TCP displacement: x, y, z of each, world axes |
-/// | `/elastic/joint_states` | `sensor_msgs/JointState` | all elements as joints `<element>/x` to `<element>/rz`, so that curves have names: deflection, load |
+/// | `/tcp/error` | `sensor_msgs/JointState` | world axes: translation `x`, `y`, `z` (m), rotation vector `rx`, `ry`, `rz` (rad), `norm` of the translation (m) |
+/// | `/tcp/error_path` | `sensor_msgs/JointState` | the same along the path: `tangential`, `normal`, `binormal` (m), `r_tangential`, `r_normal`, `r_binormal` (rad) |
+/// | `/tcp/static_error` | `sensor_msgs/JointState` | static share of the error, world axes: `x`, `y`, `z` (m) |
+/// | `/tcp/contributions` | `sensor_msgs/JointState` | contribution of each of [`RunHeader::contributors`] to the TCP displacement, world axes: `<contributor>/x` and so on (m) |
+/// | `/elastic/joint_states` | `sensor_msgs/JointState` | `<element>/x` to `<element>/rz`: deflection as position, load as effort |
 /// | `/elastic/<element>` | `geometry_msgs/WrenchStamped` | the same load, for arrows; at most 60 times a second |
-/// | `/elastic/<element>/deflection` | `geometry_msgs/TwistStamped` | not a velocity: the same deflection, translation and rotation; at most 60 times a second |
-/// | `/gauges` | `std_msgs/Float64MultiArray` | strain (m/m) and stress (Pa) of [`RunHeader::gauges`] |
-/// | `/energy`, `/solver` | `std_msgs/Float64MultiArray` | |
+/// | `/gauges` | `sensor_msgs/JointState` | strain (m/m) and stress (Pa) of [`RunHeader::gauges`] |
+/// | `/energy` | `sensor_msgs/JointState` | `kinetic`, `potential`, `elastic` (J) |
+/// | `/solver` | `sensor_msgs/JointState` | `iterations`, `residual` |
 /// | `/events` | `rcl_interfaces/Log` | events, each at its own time; the name is the kind |
 /// | `/markers` | `visualization_msgs/MarkerArray` | surfaces, once, latched; namespaces `flexible`, `rigid`, `magnified` |
 /// | `/markers/path` | `visualization_msgs/MarkerArray` | TCP paths so far, every second; namespaces `path/flexible`, `path/rigid`, `path/magnified` |
@@ -67,8 +66,8 @@ use crate::{CreateOptions, EventKind, LogError, RunHeader, RunResult, START_NS, 
 /// `magnified/<link>/bend_<k>`; in a recording without magnification, such as one of modes, the
 /// flexible robot itself is drawn this way.
 ///
-/// The names of an array's entries are in the label of its only dimension, separated by commas. SI
-/// units.
+/// Numbers without the form of a message of ROS are the positions of a `JointState`, by which
+/// viewers name their curves. SI units.
 ///
 /// The `header.stamp`, log time and publish time of a message are [`RunHeader::start_ns`] (default
 /// [`START_NS`]) plus the simulated time.
@@ -76,7 +75,7 @@ use crate::{CreateOptions, EventKind, LogError, RunHeader, RunResult, START_NS, 
 /// The file also holds, as attachments, `robot.urdf`, the mesh files, `RunHeader::attachments`, for
 /// readers of flexarm `run.json` and `meshes.bin.zst` (header and surfaces) and, at the end,
 /// `result.json` and `RunResult::attachments`; as metadata, the groups of `RunHeader::metadata`,
-/// `flexarm.recording`, `flexarm.units` and, at the end, `flexarm.result`.
+/// `flexarm.recording`, `flexarm.units` and, at the end, `flexarm.result` and `rosbag2`.
 pub type McapRecorder = FileRecorder<McapFile>;
 
 /// Returns the stamp of a simulated time in a file whose time zero is `start_ns`.
@@ -131,12 +130,6 @@ pub struct McapFile {
     markers: MovingMarkers,
     joints: Vec<String>,
     elements: Vec<String>,
-    /// `<element>/x` and so on.
-    deflections: Vec<String>,
-    /// Label of the contributions.
-    contributions: String,
-    /// Label of the gauges.
-    gauges: String,
     start: Stamp,
     last: Stamp,
     samples: u32,
@@ -155,9 +148,6 @@ impl McapFile {
     fn new(file: File, header: &RunHeader, start: Stamp) -> io::Result<Self> {
         let mut output = Output::new(file)?;
         let channels = Channels::add(&mut output, header)?;
-        let parts = |names: &[String], parts: &[&str], joint: &str| -> Vec<String> {
-            names.iter().flat_map(|name| parts.iter().map(move |part| format!("{name}{joint}{part}"))).collect()
-        };
         Ok(Self {
             output,
             channels,
@@ -166,9 +156,6 @@ impl McapFile {
             markers: MovingMarkers::new(header),
             joints: header.joints.clone(),
             elements: header.elements.clone(),
-            deflections: parts(&header.elements, &["x", "y", "z", "rx", "ry", "rz"], "/"),
-            contributions: parts(&header.contributors, &["x [m]", "y [m]", "z [m]"], " ").join(","),
-            gauges: header.gauges.join(","),
             start,
             last: start,
             samples: 0,
@@ -222,26 +209,29 @@ impl McapFile {
 
     fn sample(&mut self, stamp: Stamp, sample: &Sample) -> io::Result<()> {
         self.transforms(stamp, sample)?;
-        self.robots(stamp, sample)?;
-        if let Some(channel) = self.channels.static_error {
-            self.send(channel, stamp, messages::labelled_array("x [m],y [m],z [m]", &sample.static_m))?;
+        self.robot(self.channels.joint_states, self.channels.tcp_flexible, stamp, &sample.flexible)?;
+        if let Some(RigidChannels { joint_states, tcp, .. }) = self.channels.rigid {
+            self.robot(joint_states, tcp, stamp, &sample.rigid)?;
         }
-        if let Some(channel) = self.channels.contributions {
-            let shares = sample.contributions.as_flattened();
-            let message = messages::labelled_array(&self.contributions, shares);
-            self.output.send(channel, self.samples, stamp, message)?;
-        }
-        if let Some(channel) = self.channels.gauges {
-            let message = messages::labelled_array(&self.gauges, &sample.gauges);
-            self.output.send(channel, self.samples, stamp, message)?;
+        let [x, y, z, rx, ry, rz] = sample.error_world;
+        let error = [x, y, z, rx, ry, rz, (x * x + y * y + z * z).sqrt()];
+        let energy = [sample.energy.kinetic, sample.energy.potential, sample.energy.elastic];
+        let channels = &self.channels;
+        let rigid = channels.rigid.as_ref();
+        let numbers = [
+            (rigid.map(|rigid| &rigid.error), error.as_slice()),
+            (rigid.map(|rigid| &rigid.error_path), &sample.error_path),
+            (channels.static_error.as_ref(), &sample.static_m),
+            (channels.contributions.as_ref(), sample.contributions.as_flattened()),
+            (channels.gauges.as_ref(), &sample.gauges),
+            (Some(&channels.energy), &energy),
+            (Some(&channels.solver), &sample.solver),
+        ];
+        for (topic, values) in numbers {
+            let Some(Named { channel, names }) = topic else { continue };
+            self.output.send(*channel, self.samples, stamp, messages::joint_state(stamp, names, [values, &[], &[]]))?;
         }
         self.elastic(stamp, sample)?;
-        let energy = &sample.energy;
-        let energies = [energy.kinetic, energy.potential, energy.elastic];
-        let labels = "kinetic [J],potential [J],elastic [J]";
-        self.send(self.channels.energy, stamp, messages::labelled_array(labels, &energies))?;
-        let labels = "iterations,residual";
-        self.send(self.channels.solver, stamp, messages::labelled_array(labels, &sample.solver))?;
         self.moving_markers(stamp, sample)?;
         self.samples = self.samples.wrapping_add(1);
         Ok(())
@@ -262,19 +252,12 @@ impl McapFile {
         Ok(())
     }
 
-    /// Sends the joints and the TCP of both robots.
-    fn robots(&mut self, stamp: Stamp, sample: &Sample) -> io::Result<()> {
-        self.joint_states(self.channels.joint_states, stamp, &sample.flexible)?;
-        let tool = &sample.flexible.X_WT;
-        self.send(self.channels.tcp_flexible, stamp, messages::pose_stamped(stamp, WORLD, tool))?;
-        if let Some(channels) = self.channels.rigid {
-            self.joint_states(channels.joint_states, stamp, &sample.rigid)?;
-            self.send(channels.tcp, stamp, messages::pose_stamped(stamp, WORLD, &sample.rigid.X_WT))?;
-            self.error(stamp, channels.error, channels.error_plot, "x [m],y [m],z [m],norm [m]", &sample.error_world)?;
-            let axes = "tangential [m],normal [m],binormal [m],norm [m]";
-            self.error(stamp, channels.error_path, channels.error_path_plot, axes, &sample.error_path)?;
-        }
-        Ok(())
+    /// Sends the joints and the TCP of a robot.
+    fn robot(&mut self, joint_states: u16, tcp: u16, stamp: Stamp, twin: &TwinSample) -> io::Result<()> {
+        let values = [&twin.q, &twin.qdot, &twin.effort].map(Vec::as_slice);
+        let joints = messages::joint_state(stamp, &self.joints, values);
+        self.output.send(joint_states, self.samples, stamp, joints)?;
+        self.output.send(tcp, self.samples, stamp, messages::pose_stamped(stamp, WORLD, &twin.X_WT))
     }
 
     /// Sends the markers that are due.
@@ -293,47 +276,26 @@ impl McapFile {
         Ok(())
     }
 
-    /// Sends a message on a topic that has one for every sample.
-    fn send(&mut self, channel: u16, stamp: Stamp, message: impl Serialize) -> io::Result<()> {
-        self.output.send(channel, self.samples, stamp, message)
-    }
-
-    fn joint_states(&mut self, channel: u16, stamp: Stamp, twin: &TwinSample) -> io::Result<()> {
-        let values = [&twin.q, &twin.qdot, &twin.effort].map(Vec::as_slice);
-        self.output.send(channel, self.samples, stamp, messages::joint_state(stamp, &self.joints, values))
-    }
-
-    /// Sends deflections and loads: all elements by name with every sample, and one pair of topics
-    /// per element for viewers that draw them.
+    /// Sends deflections and loads: all elements by name with every sample, and the load of each on
+    /// a topic of its own for viewers that draw arrows.
     fn elastic(&mut self, stamp: Stamp, sample: &Sample) -> io::Result<()> {
-        if let Some(channel) = self.channels.elastic_joint_states {
+        if let Some(topic) = &self.channels.elastic_joint_states {
             self.values.clear();
             self.values.extend(sample.elastic.iter().flat_map(|element| element.deflection));
             self.values.extend(sample.elastic.iter().flat_map(|element| element.load));
             let (deflections, loads) = self.values.split_at(self.values.len() / 2);
             let values = [deflections, &[], loads];
-            let message = messages::joint_state(stamp, &self.deflections, values);
-            self.output.send(channel, self.samples, stamp, message)?;
+            let message = messages::joint_state(stamp, &topic.names, values);
+            self.output.send(topic.channel, self.samples, stamp, message)?;
         }
         if self.frames.is_pictured() {
             for (index, element) in sample.elastic.iter().enumerate() {
-                let (channels, name) = (self.channels.elastic[index], &self.elements[index]);
-                let load = messages::six_vector_stamped(stamp, name, &element.load);
-                self.output.send(channels.load, self.pictures, stamp, load)?;
-                let deflection = messages::six_vector_stamped(stamp, name, &element.deflection);
-                self.output.send(channels.deflection, self.pictures, stamp, deflection)?;
+                let load = messages::wrench_stamped(stamp, &self.elements[index], &element.load);
+                self.output.send(self.channels.elastic[index], self.pictures, stamp, load)?;
             }
             self.pictures = self.pictures.wrapping_add(1);
         }
         Ok(())
-    }
-
-    /// Sends an error as a six-vector, and its translation with the norm as plain numbers.
-    fn error(&mut self, stamp: Stamp, vector: u16, plot: u16, axes: &str, error: &[f64; 6]) -> io::Result<()> {
-        self.send(vector, stamp, messages::six_vector_stamped(stamp, WORLD, error))?;
-        let [x, y, z, ..] = *error;
-        let norm = (x * x + y * y + z * z).sqrt();
-        self.send(plot, stamp, messages::labelled_array(axes, &[x, y, z, norm]))
     }
 
     /// Writes the paths up to the last sample, unless they are already in the file.
@@ -377,6 +339,7 @@ impl McapFile {
         for file in [crate::run_json::result_file(result)].iter().chain(&result.attachments) {
             self.output.attach(self.last, file)?;
         }
+        self.output.describe_bag()?;
         self.output.finish()
     }
 }

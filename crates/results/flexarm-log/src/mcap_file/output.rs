@@ -10,6 +10,8 @@ use mcap::write::NoSeek;
 use mcap::{McapError, WriteOptions, Writer};
 use serde::Serialize;
 
+use super::bag::Bag;
+use super::channels::QUALITY_OF_SERVICE;
 use super::messages::{Stamp, encode};
 use crate::written_behind::WrittenBehind;
 
@@ -35,6 +37,7 @@ pub(crate) struct Output {
     begun: Option<Stamp>,
     /// Bytes of the last message; buffer reused.
     message: Vec<u8>,
+    bag: Bag,
     /// Whether the writer is finished and must not be called any more.
     finished: bool,
 }
@@ -49,7 +52,7 @@ impl Output {
         #[cfg(not(target_family = "wasm"))] // WebAssembly is built without zstd, which is C
         let options = options.compression_level(COMPRESSION).compression_threads(0);
         let writer = options.create(NoSeek::new(WholeRecords::new(file))).map_err(io_error)?;
-        Ok(Self { writer, held: 0, begun: None, message: Vec::new(), finished: false })
+        Ok(Self { writer, held: 0, begun: None, message: Vec::new(), bag: Bag::default(), finished: false })
     }
 
     /// Adds a topic of ROS 2 messages; returns its channel number.
@@ -60,6 +63,7 @@ impl Output {
         definition: &str,
         metadata: &BTreeMap<String, String>,
     ) -> io::Result<u16> {
+        self.bag.add(topic, kind, metadata.get(QUALITY_OF_SERVICE).map_or("", String::as_str));
         let schema = self.writer.add_schema(kind, "ros2msg", definition.as_bytes()).map_err(io_error)?;
         self.writer.add_channel(schema, topic, "cdr", metadata).map_err(io_error)
     }
@@ -75,6 +79,7 @@ impl Output {
         encode(message, &mut self.message)?;
         self.held += self.message.len();
         self.begun.get_or_insert(stamp);
+        self.bag.count(channel, stamp.0);
         let header = MessageHeader { channel_id: channel, sequence, log_time: stamp.0, publish_time: stamp.0 };
         self.writer.write_to_known_channel(&header, &self.message).map_err(io_error)
     }
@@ -109,6 +114,11 @@ impl Output {
             data: file.bytes.as_slice().into(),
         };
         self.writer.attach(&attachment).map_err(io_error)
+    }
+
+    /// Writes the record that ROS 2 expects in a bag.
+    pub(crate) fn describe_bag(&mut self) -> io::Result<()> {
+        self.writer.write_metadata(&self.bag.record()).map_err(io_error)
     }
 
     /// Closes the chunk and writes the index; does nothing when called again.

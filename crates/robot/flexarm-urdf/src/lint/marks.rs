@@ -37,5 +37,7 @@ pub(crate) struct JointMarks {
     pub(crate) joint: OriginMark,
     pub(crate) axis: Option<TextPosition>,
     pub(crate) limit: Option<TextPosition>,
+    /// Acceleration, deceleration and jerk of `<limit>`; infinite if not given.
+    pub(crate) rates: [f64; 3],
     pub(crate) mimic: Option<TextPosition>,
 }

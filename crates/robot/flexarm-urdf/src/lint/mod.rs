@@ -17,10 +17,11 @@
 //!   `<origin>`, an `<inertial>` between visuals, a `<safety_controller>` without `k_velocity`. The
 //!   plain text has the default or omits the element. A `<collision>` with a fault is omitted.
 //!
-//! The model takes four things from the tree that `urdf_rs::Robot` does not contain: the places of
+//! The model takes five things from the tree that `urdf_rs::Robot` does not contain: the places of
 //! elements and whether they exist ([`OriginMark`]), the transmissions, the version (a bound that URDF
-//! 1.2 leaves open is written as infinite, as `urdf_rs` does itself), and `quat_xyzw`, which
-//! `urdf_rs` converts to angles that are wrong by up to 0.3 degrees near a pitch of 90.
+//! 1.2 leaves open is written as infinite, as `urdf_rs` does itself), `acceleration`, `deceleration`
+//! and `jerk` of `<limit>`, which `urdf_rs` drops before version 1.2, and `quat_xyzw`, which it
+//! converts to angles that are wrong by up to 0.3 degrees near a pitch of 90.
 //!
 //! Not here: conclusions from the values ([`crate::raw`] and beyond).
 
@@ -77,6 +78,9 @@ const JOINT_CHILDREN: [&str; 11] = [
     "physics",
     "hardwareInterface",
 ];
+
+/// Bounds of `<limit>` since URDF 1.2.
+pub(crate) const RATES: [&str; 3] = ["acceleration", "deceleration", "jerk"];
 
 /// Reports the faults of everything below `<robot>`. Returns `None` if the root is another element,
 /// or there are too many links and joints.
@@ -203,11 +207,11 @@ impl Lint<'_, '_> {
         let attributes: &[Attribute] = match kind {
             "mesh" => &[("filename", Text, Fault), ("scale", Numbers(3), LeftOut)],
             "box" => &[("size", Numbers(3), Fault)],
-            "cylinder" => &[("radius", Numbers(1), Fault), ("length", Numbers(1), Fault)],
+            "cylinder" | "capsule" => &[("radius", Numbers(1), Fault), ("length", Numbers(1), Fault)],
             "sphere" => &[("radius", Numbers(1), Fault)],
             _ => {
                 let message = format!("{}, <{kind}>: this shape is not drawn", self.owner);
-                let help = "shapes are mesh, box, cylinder and sphere";
+                let help = "shapes are mesh, box, cylinder, capsule and sphere";
                 self.report.warning(&self.lines.of(shape), "unknown-shape", message, help);
                 return false;
             }
@@ -252,6 +256,7 @@ impl Lint<'_, '_> {
         let bound = |name, missing| (name, Bound, As(missing));
         let limits = [bound("lower", lower), bound("upper", upper), bound("effort", "0"), bound("velocity", "0")];
         let limit = self.child(node, "limit", false, &limits);
+        let rates = named(node, "limit").map_or([f64::INFINITY; 3], |limit| self.rates(limit));
         let factors = [("joint", Name, Fault), ("multiplier", Numbers(1), LeftOut), ("offset", Numbers(1), LeftOut)];
         let mimic = self.child(node, "mimic", false, &factors);
         let dynamics = [("damping", Numbers(1), LeftOut), ("friction", Numbers(1), LeftOut)];
@@ -259,7 +264,33 @@ impl Lint<'_, '_> {
         self.end("joint");
         let faulty = self.report.issues.len() > faults;
         let joint = OriginMark { place: self.lines.of(node), quaternion, faulty };
-        Some(JointMarks { joint, axis, limit, mimic })
+        Some(JointMarks { joint, axis, limit, rates, mimic })
+    }
+
+    /// Returns the bounds of `<limit>` that are new in URDF 1.2; without a deceleration that of the
+    /// acceleration. Warns about attributes of other names.
+    fn rates(&mut self, limit: Node<'_, '_>) -> [f64; 3] {
+        const KNOWN: [&str; 7] = ["lower", "upper", "effort", "velocity", RATES[0], RATES[1], RATES[2]];
+        let (place, owner) = (self.lines.of(limit), format!("{}, <limit>", self.owner));
+        for name in limit.attributes().map(|attribute| attribute.name()).filter(|name| !KNOWN.contains(name)) {
+            let message = format!("{owner}: the attribute {name:?} is not URDF and is ignored");
+            let help = match closest(name, KNOWN) {
+                Some(meant) => format!("did you mean {meant:?}?"),
+                None => format!("remove it, or use one of {}", KNOWN.join(", ")),
+            };
+            self.report.warning(&place, "unknown-attribute", message, help);
+        }
+        let [acceleration, deceleration, jerk] = RATES.map(|attribute| {
+            let found = limit.attribute(attribute)?;
+            let bound = Bound.numbers(found);
+            if bound.is_none() {
+                let (owner, found, expected) = (owner.clone(), found.to_owned(), Bound.expected());
+                self.report.error(&place, Problem::NotANumber { owner, attribute, found, expected });
+            }
+            bound?.first().copied()
+        });
+        let open = f64::INFINITY;
+        [acceleration.unwrap_or(open), deceleration.or(acceleration).unwrap_or(open), jerk.unwrap_or(open)]
     }
 
     /// Returns the type for `urdf_rs`; "floating" replaces all unsupported types.
@@ -291,6 +322,10 @@ impl Lint<'_, '_> {
             };
             let q = UnitQuaternion::try_new(Quaternion::new(q[3], q[0], q[1], q[2]), 1e-12);
             return Some(q.unwrap_or_default());
+        }
+        if origin.has_attribute("quat_xyzw") {
+            let message = format!("{owner}: quat_xyzw is ignored in a URDF before version 1.1");
+            self.report.warning(&place, "ignored-quaternion", message, "write <robot version=\"1.1\"> or rpy");
         }
         self.element(origin, &owner, &[("xyz", Numbers(3), LeftOut), ("rpy", Numbers(3), LeftOut)]);
         let rpy = origin.attribute("rpy").and_then(|rpy| Numbers(3).numbers(rpy)).unwrap_or_default();

@@ -252,6 +252,21 @@ fn check(mesh: &TriangleMesh, path: &Path) -> Result<(), MeshError> {
 }
 
 impl TriangleMesh {
+    /// Returns the mesh as a binary STL file.
+    pub fn to_stl(&self) -> Vec<u8> {
+        let mut bytes = vec![0; 80];
+        bytes.extend((self.triangles.len() as u32).to_le_bytes());
+        for triangle in &self.triangles {
+            let corners = triangle.map(|k| Vector3::from(self.positions[k as usize]));
+            let normal = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
+            let normal = normal.try_normalize(0.0).unwrap_or_default();
+            let numbers = std::iter::once(normal).chain(corners).flat_map(|v: Vector3<f32>| [v.x, v.y, v.z]);
+            bytes.extend(numbers.flat_map(f32::to_le_bytes));
+            bytes.extend([0; 2]);
+        }
+        bytes
+    }
+
     /// Scales along the axes; negative factors mirror, and the triangles keep their outward side.
     pub fn scaled(mut self, scale: &Vector3<f64>) -> Self {
         for p in &mut self.positions {

@@ -20,6 +20,14 @@ pub enum ValueError {
     /// A value is outside the range of plausible robots.
     #[error(transparent)]
     OutOfRange(#[from] OutOfRange),
+    /// A part of the arm has no counterpart in formats of other simulators.
+    #[error("{name:?} is {what}, which cannot be exported")]
+    NotExportable {
+        /// Name of the part.
+        name: String,
+        /// Kind of the part.
+        what: &'static str,
+    },
     /// There is no payload that can be put down.
     #[error("this arm has no payload that can be put down: give its robot file a [payload] on a rigid link")]
     NoPayload,

@@ -40,7 +40,7 @@ use crate::options::{Outputs, RunOptions};
 use crate::prepare::Checked;
 use crate::record::{
     Recordings, STRESS_PICTURE, files_of_a_run, header, link_frames, names_of_signals, ordered_links, recorders,
-    signals, write_layouts,
+    signals, write_bag_metadata, write_layouts,
 };
 use crate::robot::Robot;
 use crate::run::sampler::Sampler;
@@ -319,6 +319,7 @@ fn write_results(
     let make_page = || outputs.map(|_| crate::report::page(summary, trace));
     let early = if trace.samples() < LONG_RUN { make_page() } else { None };
     let closed = files.set.finish(&trace.result).map_err(Error::from);
+    let closed = closed.and_then(|()| write_bag_metadata(&files.names));
     let page = early.or_else(make_page);
     let write = |(outputs, page): (_, String)| crate::report::write(outputs, summary, trace, &page);
     closed.and_then(|()| outputs.zip(page).map_or(Ok(()), write))

@@ -151,15 +151,18 @@ impl<'a> Cell<'a> {
         let (flange, X_FT, flange_note) = self.flange();
         let mut assumed = false;
         let of = |list: &[Option<f64>], k: usize| list.get(k).copied().flatten();
+        let finite = |limit: f64| limit.is_finite().then_some(limit);
         let bounds = (0..self.model.nv())
             .map(|k| {
-                let velocity = of(&overrides.velocities, k).unwrap_or(self.model.coordinates()[k].limits.velocity);
+                let limits = &self.model.coordinates()[k].limits;
+                let velocity = of(&overrides.velocities, k).unwrap_or(limits.velocity);
                 let velocity = if velocity > 0.0 { velocity } else { f64::INFINITY };
-                let acceleration = of(&overrides.accelerations, k).unwrap_or_else(|| {
-                    assumed = true;
-                    if velocity.is_finite() { velocity / TO_TOP_SPEED } else { ACCELERATION }
-                });
-                let (torque, jerk) = (of(&overrides.torques, k), of(&overrides.jerks, k));
+                let acceleration =
+                    of(&overrides.accelerations, k).or(finite(limits.acceleration)).unwrap_or_else(|| {
+                        assumed = true;
+                        if velocity.is_finite() { velocity / TO_TOP_SPEED } else { ACCELERATION }
+                    });
+                let (torque, jerk) = (of(&overrides.torques, k), of(&overrides.jerks, k).or(finite(limits.jerk)));
                 JointBounds { velocity, acceleration, torque, jerk }
             })
             .collect();

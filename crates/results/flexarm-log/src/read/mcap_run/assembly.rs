@@ -25,7 +25,7 @@ pub(super) enum Topic {
     Error,
     PathError,
     Elastic,
-    /// Load of one element; used by older files, which have it for every sample.
+    /// Load and deflection of one element, in older files, which have them for every sample.
     Load(usize),
     Deflection(usize),
     StaticError,
@@ -43,6 +43,39 @@ impl Topic {
     }
 }
 
+/// Form of a message with numbers, given by its type.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Form {
+    /// `sensor_msgs/JointState`.
+    Named,
+    /// `std_msgs/Float64MultiArray`, in older files.
+    Array,
+    /// `geometry_msgs/TwistStamped`, in older files, or `WrenchStamped`.
+    Six,
+    Other,
+}
+
+impl Form {
+    fn of(schema: &str) -> Self {
+        match schema {
+            "sensor_msgs/msg/JointState" => Self::Named,
+            "std_msgs/msg/Float64MultiArray" => Self::Array,
+            "geometry_msgs/msg/TwistStamped" | "geometry_msgs/msg/WrenchStamped" => Self::Six,
+            _ => Self::Other,
+        }
+    }
+
+    /// Returns the numbers of a message; `None` if it does not have this form.
+    fn numbers(self, data: &[u8]) -> Option<Vec<f64>> {
+        match self {
+            Self::Named => decode(data).map(|(_, _, values, ..): JointState<'_>| values),
+            Self::Array => decode(data).map(|(_, _, values): LabelledArray<'_>| values),
+            Self::Six => decode(data).map(|(_, values): (Header<'_>, [f64; 6])| values.to_vec()),
+            Self::Other => None,
+        }
+    }
+}
+
 /// A message that does not have the form of its topic.
 #[derive(Debug, thiserror::Error)]
 #[error("a message {topic:?} that cannot be read, at {log_time_ns} ns")]
@@ -53,7 +86,8 @@ pub(super) struct UnreadableMessage {
 
 /// Assembles the messages of a sample.
 pub(super) struct Assembly {
-    channels: HashMap<u16, Topic>,
+    schemas: HashMap<u16, Form>,
+    channels: HashMap<u16, (Topic, Form)>,
     /// Known topic names of this run.
     known: HashMap<String, Topic>,
     epoch_ns: u64,
@@ -100,6 +134,7 @@ impl Assembly {
         }
         let elastic = vec![crate::ElasticSample::default(); header.elements.len()];
         Self {
+            schemas: HashMap::new(),
             channels: HashMap::new(),
             known,
             epoch_ns,
@@ -120,19 +155,24 @@ impl Assembly {
     /// [`Assembly::done`].
     pub(super) fn take(&mut self, record: &Record<'_>) -> Result<bool, UnreadableMessage> {
         match record {
+            Record::Schema { header, .. } => {
+                self.schemas.insert(header.id, Form::of(&header.name));
+                Ok(false)
+            }
             Record::Channel(channel) => {
                 if let Some(topic) = self.known.get(&channel.topic) {
-                    self.channels.insert(channel.id, *topic);
+                    let form = self.schemas.get(&channel.schema_id).copied().unwrap_or(Form::Other);
+                    self.channels.insert(channel.id, (*topic, form));
                 }
                 // With the topic of all elements present, the topics of single elements only serve
                 // viewers.
-                if self.channels.values().any(|topic| *topic == Topic::Elastic) {
-                    self.channels.retain(|_, topic| !matches!(topic, Topic::Load(_) | Topic::Deflection(_)));
+                if self.channels.values().any(|(topic, _)| *topic == Topic::Elastic) {
+                    self.channels.retain(|_, (topic, _)| !matches!(topic, Topic::Load(_) | Topic::Deflection(_)));
                 }
                 Ok(false)
             }
             Record::Message { header, data } => {
-                let Some(&topic) = self.channels.get(&header.channel_id) else { return Ok(false) };
+                let Some(&(topic, form)) = self.channels.get(&header.channel_id) else { return Ok(false) };
                 let next = topic.is_of_a_sample() && self.sequence != Some(header.sequence);
                 // Frames precede the rest of their sample and have their own sequence numbers.
                 // Those of the last sample may follow it.
@@ -143,7 +183,7 @@ impl Assembly {
                     let time_ns = header.log_time.saturating_sub(self.epoch_ns);
                     (self.sample.time_s, self.sample.step) = exact_time(time_ns, self.step_s);
                 }
-                if self.message(topic, data).is_none() {
+                if self.message(topic, form, data).is_none() {
                     return Err(UnreadableMessage { topic, log_time_ns: header.log_time });
                 }
                 if topic.is_of_a_sample() {
@@ -169,7 +209,7 @@ impl Assembly {
     }
 
     /// Stores the numbers of a message; `None` if it does not have the form of its topic.
-    fn message(&mut self, topic: Topic, data: &[u8]) -> Option<()> {
+    fn message(&mut self, topic: Topic, form: Form, data: &[u8]) -> Option<()> {
         let sample = &mut self.sample;
         match topic {
             Topic::Frames | Topic::FixedFrames => self.frames.take(decode(data)?),
@@ -180,8 +220,8 @@ impl Assembly {
                 let (_, X_WT): (Header<'_>, _) = decode(data)?;
                 twin.X_WT = pose(X_WT);
             }
-            Topic::Error => sample.error_world = six_vector(data)?,
-            Topic::PathError => sample.error_path = six_vector(data)?,
+            Topic::Error => sample.error_world = *form.numbers(data)?.first_chunk()?, // without the norm
+            Topic::PathError => sample.error_path = form.numbers(data)?.try_into().ok()?,
             Topic::Elastic => {
                 let (_, _, deflections, velocities, loads): JointState<'_> = decode(data)?;
                 let whole = |values: &[f64]| values.len() == 6 * sample.elastic.len();
@@ -193,22 +233,19 @@ impl Assembly {
                     (element.deflection, element.load) = (*deflection, *load);
                 }
             }
-            Topic::Load(k) => sample.elastic[k].load = six_vector(data)?,
-            Topic::Deflection(k) => {
-                // In older files, an array with names.
-                let array = array(data).and_then(|values| values.try_into().ok());
-                sample.elastic[k].deflection = array.or_else(|| six_vector(data))?;
-            }
-            Topic::StaticError => sample.static_m = array(data)?.try_into().ok()?,
+            Topic::Load(k) => sample.elastic[k].load = form.numbers(data)?.try_into().ok()?,
+            Topic::Deflection(k) => sample.elastic[k].deflection = form.numbers(data)?.try_into().ok()?,
+            Topic::StaticError => sample.static_m = form.numbers(data)?.try_into().ok()?,
             Topic::Contributions => {
-                sample.contributions = array(data)?.chunks_exact(3).map(|part| [part[0], part[1], part[2]]).collect();
+                sample.contributions =
+                    form.numbers(data)?.chunks_exact(3).map(|part| [part[0], part[1], part[2]]).collect();
             }
-            Topic::Gauges => sample.gauges = array(data)?,
+            Topic::Gauges => sample.gauges = form.numbers(data)?,
             Topic::Energy => {
-                let [kinetic, potential, elastic] = array(data)?.try_into().ok()?;
+                let [kinetic, potential, elastic] = form.numbers(data)?.try_into().ok()?;
                 sample.energy = crate::EnergySample { kinetic, potential, elastic };
             }
-            Topic::Solver => sample.solver = array(data)?.try_into().ok()?,
+            Topic::Solver => sample.solver = form.numbers(data)?.try_into().ok()?,
             Topic::Events => {
                 let ((seconds, nanoseconds), _, kind, text): (Time, u8, &str, String) = decode(data)?;
                 let time_ns = u64::from(seconds) * 1_000_000_000 + u64::from(nanoseconds);
@@ -223,12 +260,4 @@ impl Assembly {
 fn joint_state(data: &[u8], joints: usize, twin: &mut TwinSample) -> Option<()> {
     (_, _, twin.q, twin.qdot, twin.effort) = decode::<JointState<'_>>(data)?;
     [&twin.q, &twin.qdot, &twin.effort].iter().all(|values| values.len() == joints).then_some(())
-}
-
-fn six_vector(data: &[u8]) -> Option<[f64; 6]> {
-    decode(data).map(|(_, values): (Header<'_>, _)| values)
-}
-
-fn array(data: &[u8]) -> Option<Vec<f64>> {
-    decode(data).map(|(_, _, values): LabelledArray<'_>| values)
 }

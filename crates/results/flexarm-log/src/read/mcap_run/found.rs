@@ -12,7 +12,7 @@ use crate::{Attachment, LogError, RunHeader};
 /// Name of the attached URDF.
 const URDF: &str = "robot.urdf";
 /// Metadata groups written by the recorder itself.
-const OWN_GROUPS: [&str; 3] = ["flexarm.recording", "flexarm.units", "flexarm.result"];
+const OWN_GROUPS: [&str; 4] = ["flexarm.recording", "flexarm.units", "flexarm.result", "rosbag2"];
 
 /// Contents of a file other than its samples.
 #[derive(Default)]

@@ -1,0 +1,131 @@
+//! Stiffness and damping as springs and dampers over one or several joints, and the step size that
+//! an explicit program needs for them.
+
+use flexarm_stepping::FlexibleArm;
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
+
+/// Entries smaller than this part of the largest one are rounding.
+const ROUNDING: f64 = 1e-12;
+
+/// A spring with a damper on a sum of elastic coordinates.
+pub(super) struct Spring {
+    /// Index of each coordinate, and its factor in the sum.
+    pub(super) terms: Vec<(usize, f64)>,
+    pub(super) stiffness: f64,
+    pub(super) damping: f64,
+}
+
+/// All springs of an arm; together they have the matrices `K` and `D`.
+pub(super) struct Springs {
+    pub(super) K: DMatrix<f64>,
+    pub(super) D: DMatrix<f64>,
+    pub(super) springs: Vec<Spring>,
+}
+
+impl Springs {
+    pub(super) fn of(arm: &FlexibleArm) -> Self {
+        let (n, first) = (arm.D.nrows(), arm.model.n_actuated());
+        let mut K = DMatrix::zeros(n, n);
+        for element in &arm.elements {
+            let at = element.coordinate - first;
+            K.view_mut((at, at), (element.size, element.size)).copy_from(&element.K);
+        }
+        for &(i, j, k) in &arm.cross_stiffness {
+            (K[(i, j)], K[(j, i)]) = (k, k);
+        }
+        let D = arm.D.clone();
+        let mut springs = Vec::new();
+        for group in groups(&K) {
+            let k = K.select_rows(&group).select_columns(&group);
+            // K = Σ k_i l_i l_iᵀ with the columns l_i of a unit lower triangle.
+            let Some(factor) = k.cholesky().map(|c| c.unpack()) else { continue };
+            let stiffness = factor.diagonal().map(|x| x * x);
+            let L = DMatrix::from_fn(group.len(), group.len(), |i, j| factor[(i, j)] / factor[(j, j)]);
+            springs.extend((0..group.len()).map(|j| Spring {
+                terms: terms(&group, &L.column(j).into_owned()),
+                stiffness: stiffness[j],
+                damping: 0.0,
+            }));
+        }
+        let mut all = Self { K, D, springs };
+        all.add_damping();
+        all
+    }
+
+    /// Damps each spring in proportion to its stiffness as far as that gives `D`; the rest becomes
+    /// dampers of their own.
+    fn add_damping(&mut self) {
+        for group in groups(&self.K) {
+            let [k, d] = [&self.K, &self.D].map(|M| M.select_rows(&group).select_columns(&group));
+            let beta = d.dot(&k) / k.norm_squared();
+            if (&d - &k * beta).amax() > ROUNDING.sqrt() * d.amax() {
+                continue;
+            }
+            let own = |spring: &&mut Spring| spring.terms.iter().all(|(k, _)| group.contains(k));
+            self.springs.iter_mut().filter(own).for_each(|spring| spring.damping = beta * spring.stiffness);
+        }
+        let mut rest = self.D.clone();
+        for spring in &self.springs {
+            for &(i, a) in &spring.terms {
+                spring.terms.iter().for_each(|&(j, b)| rest[(i, j)] -= spring.damping * a * b);
+            }
+        }
+        let least = ROUNDING.sqrt() * self.D.amax();
+        rest.iter_mut().filter(|x| x.abs() <= least).for_each(|x| *x = 0.0);
+        for group in groups(&rest) {
+            let SymmetricEigen { eigenvalues, eigenvectors } =
+                rest.select_rows(&group).select_columns(&group).symmetric_eigen();
+            for (k, &damping) in eigenvalues.iter().enumerate().filter(|&(_, &d)| d > least) {
+                let terms = terms(&group, &eigenvectors.column(k).into_owned());
+                self.springs.push(Spring { terms, stiffness: 0.0, damping });
+            }
+        }
+    }
+}
+
+fn terms(group: &[usize], factors: &DVector<f64>) -> Vec<(usize, f64)> {
+    let least = ROUNDING * factors.amax();
+    group.iter().copied().zip(factors.iter().copied()).filter(|(_, x)| x.abs() > least).collect()
+}
+
+/// Returns the coordinates that a matrix couples, group by group, without those of zero rows.
+fn groups(M: &DMatrix<f64>) -> Vec<Vec<usize>> {
+    let mut left: Vec<usize> = (0..M.nrows()).filter(|&i| M.row(i).amax() > 0.0).collect();
+    let mut groups = Vec::new();
+    while let Some(first) = left.first().copied() {
+        let mut group = vec![first];
+        let mut at = 0;
+        left.retain(|&k| k != first);
+        while at < group.len() {
+            let (coupled, other): (Vec<_>, Vec<_>) = left.iter().partition(|&&k| M[(group[at], k)] != 0.0);
+            (left, at) = (other, at + 1);
+            group.extend(coupled);
+        }
+        group.sort_unstable();
+        groups.push(group);
+    }
+    groups
+}
+
+/// Steps per period of the first mode for an error of 0.5 % with a first-order method.
+const STEPS_PER_PERIOD: f64 = 200.0;
+/// Part of the largest stable step.
+const SAFETY: f64 = 0.5;
+
+/// Returns the step size for semi-implicit Euler with implicit damping.
+///
+/// A mode of frequency `w` and damping `c` is stable for `h² w² < 4 + 2 h c`.
+pub(super) fn step(arm: &FlexibleArm) -> f64 {
+    let modes = &arm.modes;
+    let stable = modes.omega.iter().enumerate().map(|(k, w)| {
+        let shape = modes.shapes.column(k);
+        let c = shape.dot(&(&arm.D * shape));
+        (c + (c * c + 4.0 * w * w).sqrt()) / (w * w)
+    });
+    let stable = stable.fold(f64::INFINITY, f64::min);
+    let first = modes.omega.first().map_or(f64::INFINITY, |w| std::f64::consts::TAU / w);
+    let most = (SAFETY * stable).min(first / STEPS_PER_PERIOD).min(1e-3);
+    // Rounded down to 1, 2 or 5 times a power of ten.
+    let scale = 10f64.powf(most.log10().floor());
+    [5.0, 2.0, 1.0].into_iter().map(|digit| digit * scale).find(|h| *h <= most).unwrap_or(scale)
+}
