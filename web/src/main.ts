@@ -83,7 +83,7 @@ function fail(text: string): void {
   get("messages").hidden = false;
   get("messages").textContent = text;
   get("headline").classList.add("bad");
-  get("headline").textContent = "The run did not succeed; what is shown is the one before.";
+  get("headline").textContent = `The run did not succeed${shown ? "; below is the one before" : ""}.`;
 }
 
 /** Path of the robot in the program's file system. */
