@@ -10,6 +10,7 @@ Where rustup cannot fetch the target, Debian's compiler does as well (12 and lat
 rust-web-src, wasi-libc, lld-19; the standard library is then built with the program).
 """
 import argparse
+import gzip
 import json
 import os
 import shutil
@@ -87,9 +88,6 @@ def copy_shipped():
     tracked = subprocess.run(
         ["git", "ls-files", "robots", "trajectories"], cwd=ROOT, check=True, capture_output=True, text=True
     ).stdout.split()
-    for path in tracked:
-        (shipped / path).parent.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(ROOT / path, shipped / path)
     robots = []
     for robot in sorted(path.parent for path in (ROOT / "robots").rglob("robot.toml")):
         name = robot.relative_to(ROOT / "robots").as_posix()
@@ -99,7 +97,17 @@ def copy_shipped():
         robots.append({"name": name, "title": title, "files": files})
     motions = [path for path in tracked if path.startswith("trajectories/") and path.endswith((".toml", ".csv"))]
     named = [{"name": Path(path).stem, "files": [path]} for path in motions if ".loads." not in path]
+    for path in [path for entry in robots + named for path in entry["files"]]:
+        (shipped / path).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(ROOT / path, shipped / path)
     (PUBLIC / "shipped.json").write_text(json.dumps({"robots": robots, "motions": named}))
+
+
+def pack():
+    """Puts a compressed copy beside each large file, which `flexarm serve` sends instead."""
+    for path in (WEB / "dist").rglob("*"):
+        if path.suffix in (".wasm", ".js", ".css", ".json") and path.stat().st_size > 50_000:
+            Path(f"{path}.gz").write_bytes(gzip.compress(path.read_bytes(), 9, mtime=0))
 
 
 def main():
@@ -113,6 +121,7 @@ def main():
     copy_shipped()
     run("npm", "ci", "--no-fund", "--no-audit", cwd=WEB)
     run("npm", "run", "build", cwd=WEB)
+    pack()
     if args.test:
         run("npm", "test", cwd=WEB)
     size = sum(path.stat().st_size for path in (WEB / "dist").rglob("*") if path.is_file())

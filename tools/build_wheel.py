@@ -14,6 +14,8 @@ separate environment, in an empty folder, with a PATH without cargo. Status 0: s
 failed; 3: pip cannot download what it needs (no network).
 """
 import argparse
+import base64
+import hashlib
 import os
 import platform
 import shutil
@@ -147,6 +149,22 @@ def check_recipe(python):
         print("without rattler-build: the recipe is not read")
 
 
+def document(wheel, scratch):
+    """Puts the stub with docstrings into a wheel."""
+    python = environment(scratch / "stub", "numpy", wheel)
+    stub = subprocess.run([python, ROOT / "tools/python_stub.py"], check=True, stdout=subprocess.PIPE).stdout
+    digest = base64.urlsafe_b64encode(hashlib.sha256(stub).digest()).decode().rstrip("=")
+    name, new = "flexarm/_flexarm.pyi", wheel.with_suffix(".new")
+    with zipfile.ZipFile(wheel) as old, zipfile.ZipFile(new, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as out:
+        for entry in old.infolist():
+            data = stub if entry.filename == name else old.read(entry)
+            if entry.filename.endswith(".dist-info/RECORD"):
+                line = f"{name},sha256={digest},{len(stub)}"
+                data = "\n".join(line if row.startswith(f"{name},") else row for row in data.decode().splitlines()) + "\n"
+            out.writestr(entry, data)
+    new.replace(wheel)
+
+
 def inspect(wheel, *more):
     """Checks size and contents of the wheel; `more`: other files that it must have."""
     size = wheel.stat().st_size
@@ -218,6 +236,7 @@ def main():
         run(sys.executable, ROOT / "tools/python_types.py", "--check")
         tools = python.parent
         wheel = build(tools, out, args.manylinux)
+        document(wheel, scratch)
         inspect(wheel, f"flexarm/share/lib/{FMU_LIBRARY}")
         if args.sdist:
             file = sdist(out)

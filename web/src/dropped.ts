@@ -36,6 +36,26 @@ export async function readChosen(list: FileList): Promise<Files> {
   return files;
 }
 
+/** Returns copies of files where `package://NAME/PATH` of a description expects them: beside it, in a folder NAME. */
+export function placePackages(files: Files): Files {
+  const placed: Files = new Map();
+  for (const [path, bytes] of files) {
+    if (!["urdf", "xacro"].includes(ending(path))) continue;
+    for (const [, place] of text(bytes).matchAll(/(?:package|model):\/\/([^"'<>\s]+\/[^"'<>\s]+)/g)) {
+      if ([...files.keys()].some((known) => known.endsWith(`/${place}`))) continue;
+      // The file with the longest common end: meshes are often chosen without their folders.
+      const parts = place.split("/").slice(1);
+      const ends = parts.map((_, k) => `/${parts.slice(k).join("/")}`);
+      const found = ends.flatMap((end) => [...files].find(([known]) => known.endsWith(end)) ?? [])[1];
+      if (found instanceof Uint8Array) placed.set(`${DROPPED}/${place}`, found);
+    }
+  }
+  return placed;
+}
+
+/** Whether a robot or a run reads files with this ending besides robots and motions. */
+export const isPart = (path: string): boolean => ["stl", "dae", "obj", "flex", "xacro", "yaml", "xml", "toml"].includes(ending(path));
+
 const ending = (path: string): string => /\.([^./]+)$/.exec(path)?.[1].toLowerCase() ?? "";
 const text = (bytes: Uint8Array): string => new TextDecoder().decode(bytes);
 

@@ -1,7 +1,7 @@
 // The page: settings on the left, the run on the right.
 import { parse } from "smol-toml";
 import { ErrorChart } from "./chart";
-import { DROPPED, readChosen, readDrop, sortOut } from "./dropped";
+import { DROPPED, isPart, placePackages, readChosen, readDrop, sortOut } from "./dropped";
 import type { Files } from "./program";
 import type { Recording } from "./recording";
 import { ArmScene, locate } from "./scene";
@@ -14,8 +14,7 @@ const choice = (id: string): HTMLSelectElement => get<HTMLSelectElement>(id);
 const SELECTS = ["links", "drives", "stepper", "magnify"];
 const STEPPERS = ["generalized-alpha", "extrapolated-alpha", "sdirk3", "spook", "rk4", "reference"];
 const OUT = "/out";
-/** Samples per second: enough for curves of any width of screen. */
-const LOG_RATE = "250";
+const FIRST_ROBOT = "fanuc_r2000_210f";
 
 interface Summary {
   headline: string;
@@ -67,7 +66,9 @@ interface Slider {
   neutral: number;
   min: number;
   max: number;
-  /** Steps of the slider are powers of two. */
+  /** Step of the slider, on which the neutral value lies; of the power of two if `powers`. */
+  step: number;
+  /** Positions of the slider are powers of two. */
   powers: boolean;
   /** Changes that a value makes. */
   changes: (value: number) => string[];
@@ -78,10 +79,11 @@ const scene = new ArmScene(get<HTMLCanvasElement>("arm"));
 const chart = new ErrorChart(get("chart"), (to) => seek(to));
 
 function fail(text: string): void {
+  get("result").classList.add("failed");
   get("messages").hidden = false;
   get("messages").textContent = text;
   get("headline").classList.add("bad");
-  get("headline").textContent = "The run did not succeed; the message is below.";
+  get("headline").textContent = `The run did not succeed${shown ? "; below is the one before" : ""}.`;
 }
 
 /** Path of the robot in the program's file system. */
@@ -106,16 +108,16 @@ function slidersOf(text: string): Slider[] {
   }
   const mass = file.payload?.mass;
   if (typeof mass === "number" && mass > 0) {
-    found.push({ key: "payload", label: "Payload", unit: "# kg", neutral: mass, min: 0.02 * mass, max: 2 * mass, powers: false, changes: (x) => [`payload.mass=${x}`] });
+    found.push({ key: "payload", label: "Payload", unit: "# kg", neutral: mass, min: 0.05 * mass, max: 2 * mass, step: 0.05 * mass, powers: false, changes: (x) => [`payload.mass=${x}`] });
   }
-  found.push({ key: "speed", label: "Speed of the motion", unit: "× #", neutral: 1, min: 0.2, max: 1.6, powers: false, changes: (x) => [`motion.speed=${x}`] });
+  found.push({ key: "speed", label: "Speed of the motion", unit: "× #", neutral: 1, min: 0.2, max: 1.6, step: 0.05, powers: false, changes: (x) => [`motion.speed=${x}`] });
   const drives: Record<string, any>[] = Array.isArray(file.drive) ? file.drive : [];
   for (const [key, label] of [["stiffness", "Stiffness of the gearboxes"], ["damping", "Damping of the gearboxes"]]) {
     const numeric = (value: unknown): boolean => typeof value === "number" || (Array.isArray(value) && value.every(numeric));
     const joints = drives.filter((drive) => numeric(drive.gearbox?.[key])).map((drive) => drive.joint);
     if (joints.length > 0) {
       const changes = (x: number) => joints.map((joint) => `drive."${joint}".gearbox.${key}*=${x}`);
-      found.push({ key, label, unit: "× #", neutral: 1, min: 0.25, max: 4, powers: true, changes });
+      found.push({ key, label, unit: "× #", neutral: 1, min: 0.25, max: 4, step: 0.1, powers: true, changes });
     }
   }
   return found;
@@ -130,11 +132,12 @@ function showSliders(): void {
       const back = (x: number) => Number((slider.powers ? 2 ** x : x).toPrecision(3));
       Object.assign(input, { type: "range", id: `slider-${slider.key}`, min: String(of(slider.min)), max: String(of(slider.max)) });
       const write = () => (output.textContent = slider.unit.replace("#", String(Number((values.get(slider.key) ?? slider.neutral).toPrecision(3)))));
-      // A step by key is a fortieth of the range.
-      input.step = String((of(slider.max) - of(slider.min)) / 40);
+      input.step = String(slider.step);
       input.value = String(of(values.get(slider.key) ?? slider.neutral));
       input.addEventListener("input", () => {
-        values.set(slider.key, back(Number(input.value)));
+        // Exactly the value of the file, whatever its digits.
+        if (Math.abs(Number(input.value) - of(slider.neutral)) < slider.step / 2) values.delete(slider.key);
+        else values.set(slider.key, back(Number(input.value)));
         write();
         run();
       });
@@ -166,7 +169,7 @@ async function run(): Promise<void> {
     again = false;
     keepInLink();
     try {
-      const args = [...line(), "-o", OUT, "--json", "--log-rate", LOG_RATE];
+      const args = [...line(), "-o", OUT, "--json"];
       show(await start(args, await files(), `${OUT}/run.mcap`));
     } catch (error) {
       fail(`error: ${error instanceof Error ? error.message : String(error)}`);
@@ -183,6 +186,7 @@ function show(answer: Answer): void {
   }
   const summary: Summary = JSON.parse(answer.stdout);
   get("messages").hidden = true;
+  get("result").classList.remove("failed");
   get("headline").classList.remove("bad");
   get("headline").textContent = summary.headline;
   const same = shown !== undefined && shown.robot === answer.recording.robot && shown.motion === answer.recording.motion;
@@ -194,15 +198,23 @@ function show(answer: Answer): void {
   const notes = summary.warnings.map((text) => Object.assign(document.createElement("li"), { textContent: text }));
   const list = Object.assign(document.createElement("ul"), { id: "caveats" });
   list.append(...notes);
-  const first = summary.frequencies_hz[0];
+  const lowest = summary.frequencies_hz[0];
   const facts = document.createElement("p");
-  facts.textContent = `${first === undefined ? "" : `First natural frequency ${first.toFixed(2)} Hz. `}${summary.duration_s.toFixed(2)} s of motion computed in ${summary.wall_s.toFixed(2)} s.`;
+  facts.textContent = `${lowest === undefined ? "" : `First natural frequency ${lowest.toFixed(2)} Hz. `}${summary.duration_s.toFixed(2)} s of motion computed in ${summary.wall_s.toFixed(2)} s.${firstAnswer()}`;
   get("notes").replaceChildren(facts, ...(notes.length > 0 ? [Object.assign(document.createElement("h2"), { textContent: "Read this before you rely on it" }), list] : []));
   showDownloads(answer.files);
   mcap = answer.files.get(`${OUT}/run.mcap`);
   showInRerun();
   // Begin at the largest error: it is what one asks for.
   seek(same ? Math.min(time, end()) : shown.times[shown.error.indexOf(Math.max(...shown.error))] ?? 0);
+}
+
+let first: number | undefined;
+/** Says once how long the page took to its first answer. */
+function firstAnswer(): string {
+  if (first !== undefined) return "";
+  first = performance.now() / 1000;
+  return ` First answer ${first.toFixed(1)} s after the page was opened.`;
 }
 
 function showGroups(recording: Recording): void {
@@ -315,17 +327,22 @@ function keepInLink(): void {
   history.replaceState(null, "", `#${link}`);
 }
 
+/** Replaces the options of a list; what is chosen stays chosen. */
+function refill(id: string, options: HTMLOptionElement[]): void {
+  const { value } = choice(id);
+  choice(id).replaceChildren(...options);
+  if (options.some((option) => option.value === value)) choice(id).value = value;
+}
+
 function fillMotions(): void {
   const own = sortOut(mine).motions.map((path) => new Option(path.slice(DROPPED.length + 1), path));
   const listed = shipped.motions.map(({ name, files }) => new Option(name, `/${files[0]}`));
-  const { value } = choice("motion");
-  choice("motion").replaceChildren(new Option("the robot's own", ""), ...own, ...listed);
-  choice("motion").value = [...choice("motion").options].some((option) => option.value === value) ? value : "";
+  refill("motion", [new Option("the robot's own", ""), ...own, ...listed]);
 }
 
 function fillRobots(): void {
   const own = sortOut(mine).robots.map((path) => new Option(path.slice(DROPPED.length + 1), path));
-  choice("robot").replaceChildren(...own, ...shipped.robots.map(({ name, title }) => new Option(`${name}: ${title}`, name)));
+  refill("robot", [...own, ...shipped.robots.map(({ name, title }) => new Option(`${name}: ${title}`, name))]);
 }
 
 async function choose(): Promise<void> {
@@ -336,8 +353,15 @@ async function choose(): Promise<void> {
 
 async function take(files_: Files): Promise<void> {
   if (files_.size === 0) return;
-  mine = new Map([...mine, ...files_]);
   const { robots, descriptions, motions } = sortOut(files_);
+  if (robots.length + descriptions.length + motions.length === 0 && ![...files_.keys()].some(isPart)) {
+    const names = [...files_.keys()].map((path) => path.slice(DROPPED.length + 1)).join(", ");
+    get("messages").hidden = false;
+    get("messages").textContent = `${names}: no robot (.urdf, .xacro, robot.toml), motion or mesh; nothing changes`;
+    return;
+  }
+  mine = new Map([...mine, ...files_]);
+  mine = new Map([...mine, ...placePackages(mine)]);
   get("headline").textContent = "Reading your files ...";
   for (const description of robots.length > 0 ? [] : descriptions) {
     // A robot file with assumed stiffness, payload and a sample motion.
@@ -372,7 +396,7 @@ async function begin(): Promise<void> {
     const value = link.get(name);
     if (value !== null && [...choice(name).options].some((option) => option.value === value)) choice(name).value = value;
   }
-  if (!link.has("robot")) choice("robot").value = "fanuc_r2000_210f";
+  if (!link.has("robot")) choice("robot").value = FIRST_ROBOT;
   await choose();
   for (const { key, min, max } of sliders) {
     const value = Number(link.get(key) ?? Number.NaN);
@@ -388,11 +412,12 @@ async function begin(): Promise<void> {
   });
   for (const name of ["motion", ...SELECTS]) choice(name).addEventListener("change", run);
   get("settings").addEventListener("submit", (event) => event.preventDefault());
-  get("reset").addEventListener("click", () => {
+  get("reset").addEventListener("click", async () => {
     values = new Map();
     for (const name of ["motion", ...SELECTS]) choice(name).selectedIndex = 0;
-    showSliders();
-    run();
+    choice("robot").value = FIRST_ROBOT;
+    await choose();
+    await run();
   });
   get("share").addEventListener("click", async () => {
     await navigator.clipboard.writeText(location.href);

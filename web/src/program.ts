@@ -48,7 +48,7 @@ export async function runProgram(module: WebAssembly.Module, args: string[], fil
     ConsoleStdout.lineBuffered((line) => lines[1].push(line)),
     root,
   ];
-  const wasi = new WASI(["flexarm", ...args], ["NO_COLOR=1", "RUST_BACKTRACE=0"], descriptors);
+  const wasi = new WASI(["flexarm", ...args], ["NO_COLOR=1", "RUST_BACKTRACE=0"], descriptors, { debug: false });
   const instance = await WebAssembly.instantiate(module, { wasi_snapshot_preview1: wasi.wasiImport });
   let code: number;
   try {

@@ -35,7 +35,7 @@ pub use caveat::Caveat;
 pub use fault::Fault;
 pub use gathered::gathered;
 pub use quantity::{OutOfRange, Quantity};
-pub use spelling::closest;
+pub use spelling::{closest, known_names};
 pub use toml_message::without_types;
 pub use words::Words;
 

@@ -23,3 +23,12 @@ pub fn closest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) ->
     }
     best.map(|(_, candidate)| candidate.to_owned())
 }
+
+/// Lists the names that exist, for a message about one that does not, and the one that was probably
+/// meant: `["joint_1", "joint_2"]; did you mean "joint_1"?`.
+pub fn known_names<S: AsRef<str> + std::fmt::Debug>(found: &str, known: &[S]) -> String {
+    match closest(found, known.iter().map(AsRef::as_ref)) {
+        Some(meant) => format!("{known:?}; did you mean {meant:?}?"),
+        None => format!("{known:?}"),
+    }
+}

@@ -13,6 +13,15 @@ use crate::failure::Failure;
 use crate::formats;
 use crate::motion::MotionInputArgs;
 
+const EXAMPLES: &str = "\
+Examples:
+  The shipped arm with a lighter payload, as an additional run beside the first:
+      flexarm compare kr210 pick_and_place --with set=payload.mass=75,name=75kg
+  Your arm on your motion, under the loads of a file, in a folder of your own:
+      flexarm compare my_arm my_motion.csv --loads cut.toml -o results
+  Links as modal bodies, motors under servos, the figures alone:
+      flexarm compare kr210 --links modal --drives servo --no-files";
+
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Robot")]
 pub(crate) struct RobotArgs {
@@ -116,7 +125,7 @@ impl ModellingArgs {
 }
 
 #[derive(Clone, Debug, Args)]
-#[command(after_help = "All options, by groups: --help")]
+#[command(after_long_help = EXAMPLES, after_help = "All options, with examples: --help")]
 pub(crate) struct RunArgs {
     /// robot.toml, a folder with one, a .urdf or .xacro file, or the name of a shipped robot
     /// [default: kr210]

@@ -24,7 +24,7 @@ use crate::sensitivity::SensitivityArgs;
 #[cfg(not(target_family = "wasm"))]
 use crate::serve::{self, ServeArgs};
 use crate::sweep::SweepArgs;
-use crate::terminal::{Terminal, answer, to_json, written};
+use crate::terminal::{Terminal, written};
 use crate::view::ViewArgs;
 use crate::{
     compensate, convert, exchange, fmu, formats, identify, inspect, lobes, map, motion, new, posed, reduce, report,
@@ -201,10 +201,7 @@ pub(crate) fn run(cli: &Cli, line: &[OsString]) -> Result<ExitCode, Failure> {
         Command::View(args) => view::run(terminal, args),
         #[cfg(not(target_family = "wasm"))]
         Command::Serve(args) => serve::run(terminal, args),
-        Command::Format { page } => {
-            answer(terminal, || to_json(&serde_json::json!({ "page": page.text() })), || page.text().to_owned());
-            Ok(ExitCode::SUCCESS)
-        }
+        Command::Format { page } => Ok(written(terminal, "page", page.text().into())),
         Command::Completions { shell } => {
             let mut script = Vec::new();
             clap_complete::generate(*shell, &mut Cli::command(), "flexarm", &mut script);

@@ -11,23 +11,25 @@ use flexarm::{Motion, Robot, RunOptions, Scenario};
 
 use crate::args::{ModellingArgs, RobotArgs};
 use crate::failure::Failure;
+use crate::layout::{lines, table};
 use crate::motion::MotionInputArgs;
-use crate::print::{lines, table};
 use crate::shipped;
 use crate::shipped::OutputFolder;
 use crate::terminal::{Terminal, answer, to_json, working};
 
 const EXAMPLES: &str = "\
 Examples:
-  The motion with which the tool of kr210 follows the rigid arm, in a new folder of out/:
+  The motion with which the tool of kr210 follows the rigid arm:
       flexarm compensate kr210 pick_and_place
   Sag alone, and the position of the tool alone:
       flexarm compensate kr210 pick_and_place --method static --components x,y,z
   Under the force of a cutter, as JointTrajectory besides:
-      flexarm compensate kr210 milling_square --method static --loads cut.toml --write compensated.yaml
+      flexarm compensate kr210 milling_square --method static --loads cut.toml \\
+          --write compensated.yaml
   Found with one model, judged with another:
       flexarm compensate my_robot motion.csv --plant my_other_robot
-Use it as any motion: flexarm compare kr210 out/kr210_compensated-001/compensated.csv";
+  The result on the arm, as any motion:
+      flexarm compare kr210 out/kr210_compensated-001/compensated.csv";
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub(crate) enum MethodName {
@@ -244,7 +246,6 @@ fn plants_text(found: &Compensation) -> String {
     };
     row("as given", &found.before, &found.after);
     found.plants.iter().for_each(|plant| row(&plant.plant, &plant.before, &plant.after));
-    t.align_right(1..8);
     lines(&t)
 }
 

@@ -15,7 +15,7 @@ Examples:
   A table for pandas or a spreadsheet, from a recording for viewers:
       flexarm convert out/run.mcap run.parquet
       flexarm convert out/run.mcap run.csv
-  The Rerun view of a run that was recorded as MCAP only (needs the feature rerun):
+  The Rerun view of a run recorded as MCAP only (needs the feature rerun):
       flexarm convert out/run.mcap run.rrd
   What a killed run left, as a whole file:
       flexarm convert out/run.mcap whole.mcap";
@@ -59,10 +59,10 @@ pub(crate) fn convert(
 
 fn text(summary: &ConvertSummary) -> String {
     let mut out = format!("{} -> {}\n", summary.input, summary.output);
-    let mut table = crate::print::table::<&str>(&[]);
+    let mut table = crate::layout::table::<&str>(&[]);
     table.add_row(["samples", &summary.samples.to_string()]);
     table.add_row(["duration", &format!("{:.3} s", summary.duration_s)]);
-    out += &crate::print::lines(&table);
+    out += &crate::layout::lines(&table);
     for sentence in &summary.lost {
         out += &format!("lost: {sentence}\n");
     }

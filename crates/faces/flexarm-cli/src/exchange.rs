@@ -10,7 +10,7 @@ use crate::exchange_args::{ExportArgs, ExportFormatName, ImportArgs, ImportForma
 use crate::failure::Failure;
 use crate::print;
 use crate::shipped::{self, OutputFolder};
-use crate::terminal::{Terminal, answer, to_json, working};
+use crate::terminal::{Terminal, answer, answer_as_is, to_json, working};
 use crate::values;
 
 pub(crate) fn import(terminal: &Terminal, args: &ImportArgs) -> Result<ExitCode, Failure> {
@@ -21,7 +21,7 @@ pub(crate) fn import(terminal: &Terminal, args: &ImportArgs) -> Result<ExitCode,
     let outputs = (!args.no_files).then_some(outputs);
     let summary = working(terminal, "importing", || flexarm::import::import(&job, outputs.as_ref()))?;
     print::warnings(terminal, &summary.warnings);
-    answer(terminal, || to_json(&summary), || print::imported(&summary));
+    answer_as_is(terminal, || to_json(&summary), || print::imported(&summary));
     Ok(ExitCode::SUCCESS)
 }
 

@@ -12,23 +12,25 @@ Examples:
   Nastran punch file with GRIDs (positions), millimetres:
       flexarm import arm.pch --units mm-t-s --map A=1001,B=1002
   CalculiX, full model; the rotations of a rigid body are on its ROT NODE:
-      flexarm import arm.sti --units m-kg-s --map A=947:1-3+948:1-3,B=949:1-3+950:1-3 --at A=0,0,0 --at B=1,0,0
-  Matrix Market with the .toml that flexarm export writes says everything itself:
+      flexarm import arm.sti --units m-kg-s \\
+          --map A=947:1-3+948:1-3,B=949:1-3+950:1-3 --at A=0,0,0 --at B=1,0,0
+  Matrix Market with the .toml that flexarm export writes, which has all else:
       flexarm import arm_K.mtx
-  Nastran, full model with GRIDs, interfaces by planes (unit of the file), tied rigidly:
-      flexarm import arm.pch --units m-kg-s --map \"A=plane(0,0,0;1,0,0),B=plane(1,0,0;1,0,0)\"
+  Nastran, full model with GRIDs, interfaces by planes (unit of the file):
+      flexarm import arm.pch --units m-kg-s \\
+          --map \"A=plane(0,0,0;1,0,0),B=plane(1,0,0;1,0,0)\"
   Modal body (SID), for modal links of a robot file:
       flexarm import arm.SID_FEM --units m-kg-s --map A=1,B=2
   Stiffness only, with the mass of the link:
-      flexarm import arm.mtx --units m-kg-s --map A=1001,B=1002 --at A=0,0,0 --at B=1,0,0 \\
-          --mass 18.8 --com 0.5,0,0 --inertia 0.01,1.6,1.6,0,0,0
+      flexarm import arm.mtx --units m-kg-s --map A=1001,B=1002 \\
+          --at A=0,0,0 --at B=1,0,0 --mass 18.8 --com 0.5,0,0 --inertia 0.01,1.6,1.6,0,0,0
 
 Maps (proximal interface first; six rows each, ux uy uz rx ry rz):
   A=1001                  components 1 to 6 of a node
-  A=947:1-3+948:1-3       rotations are components 1 to 3 of a second node (CalculiX)
+  A=947:1-3+948:1-3       rotations: components 1 to 3 of a second node
   A=#1-6                  rows of the file, from 1
   modal=#13-22            which other rows are modal coordinates
-  A=1,B=2,C=3             nodes of a SID, which become the interfaces of the modal link
+  A=1,B=2,C=3             nodes of a SID, the interfaces of the modal link
   A=plane(x,y,z;nx,ny,nz) nodes of a full model with positions (DMIG with GRIDs)
 
 Lengths are in the unit of the file, masses and inertias in SI.";

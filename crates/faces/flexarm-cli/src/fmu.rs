@@ -18,7 +18,8 @@ Examples:
   The shipped arm for FMI 3.0, as kr210.fmu:
       flexarm export-fmu kr210
   For FMI 2.0, with servos, in a working pose, in steps of 0.5 ms:
-      flexarm export-fmu my_arm --fmi 2.0 --drives servo --at 0,-60deg,60deg,0,0,0 --step 5e-4
+      flexarm export-fmu my_arm --fmi 2.0 --drives servo \\
+          --at 0,-60deg,60deg,0,0,0 --step 5e-4
   Simulated by FMPy (pip install fmpy), which draws the outputs:
       fmpy simulate kr210.fmu --show-plot";
 

@@ -12,19 +12,21 @@ use flexarm::identify::{
 
 use crate::args::{ModellingArgs, RobotArgs};
 use crate::failure::Failure;
-use crate::print::{lines, table};
+use crate::layout::{lines, table};
 use crate::shipped;
 use crate::shipped::OutputFolder;
 use crate::terminal::{Terminal, answer, to_json, working};
 
 const EXAMPLES: &str = "\
 Examples:
-  Twelve poses that determine the gearboxes best, with a table to fill in, in a new folder of out/:
+  Twelve poses that determine the gearboxes best, with a table to fill in:
       flexarm identify kr210_identified --plan 12 --std 0.00003
   The stiffness identified from the filled table, a new robot file and a page:
-      flexarm identify kr210_identified out/kr210_identified_plan-001/measurements.toml
+      flexarm identify kr210_identified \\
+          out/kr210_identified_plan-001/measurements.toml
   Only two of the parameters, figures alone:
-      flexarm identify kr210_identified measurements.toml --fit 'drive.joint_2.*' --fit 'drive.joint_3.*' --no-files
+      flexarm identify kr210_identified measurements.toml --no-files \\
+          --fit 'drive.joint_2.*' --fit 'drive.joint_3.*'
 The file of measurements: flexarm format measurements";
 
 #[derive(Debug, Args)]
@@ -210,7 +212,6 @@ fn parameter_table(found: &Identification) -> String {
         };
         t.add_row(vec![p.name.clone(), number(p.initial), value, deviation(p.std), part, p.unit.clone()]);
     }
-    t.align_right(1..5);
     lines(&t)
 }
 

@@ -18,6 +18,7 @@ mod formats;
 mod identify;
 mod inspect;
 mod later;
+mod layout;
 mod lobes;
 mod map;
 mod motion;
@@ -42,11 +43,13 @@ mod values;
 mod view;
 
 use std::ffi::OsString;
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use clap::Parser;
-use clap::error::{ContextKind, ContextValue};
+use clap::builder::{PossibleValue, Resettable, StyledStr};
+use clap::error::{ContextKind, ContextValue, ErrorKind};
+use clap::{Arg, CommandFactory, Parser};
 use commands::Cli;
 use flexarm::written::message;
 
@@ -69,6 +72,10 @@ pub fn run(line: Vec<OsString>) -> u8 {
             failure.print();
             failure.exit_code()
         }),
+        Err(help) if help.kind() == ErrorKind::DisplayHelp && !line.iter().any(|word| word == "-h") => {
+            let _ = write!(anstream::stdout(), "{}", whole_help(&line).ansi()); // a closed pipe
+            return 0;
+        }
         Err(usage) => {
             let usage = with_visible_words(with_number_tip(usage));
             let _ = usage.print(); // a closed pipe
@@ -76,6 +83,39 @@ pub fn run(line: Vec<OsString>) -> u8 {
         }
     };
     [0, 1].into_iter().find(|number| ExitCode::from(*number) == code).unwrap_or(2)
+}
+
+/// Returns the help of the command that the line names, with all its options and with the meaning
+/// of all words that they take.
+pub fn whole_help(line: &[OsString]) -> StyledStr {
+    let mut program = Cli::command();
+    program.build();
+    let mut command = &program;
+    for word in line.iter().skip(1).filter(|word| *word != "help") {
+        command = command.find_subcommand(word).unwrap_or(command);
+    }
+    let shown = |argument: Arg| {
+        let words = argument.get_possible_values();
+        let means = |word: &PossibleValue| Some(format!("\n- {}: {}", word.get_name(), word.get_help()?));
+        let words: Option<String> = words.iter().map(means).collect();
+        let argument = argument.hide_short_help(false);
+        if argument.get_id() == "help" {
+            return argument.help("Print help; -h for a summary");
+        }
+        match (words.filter(|words| !words.is_empty()), argument.get_help()) {
+            (Some(words), Some(help)) => {
+                // The default has a line of its own.
+                let end = if argument.get_default_values().is_empty() { "" } else { "\n" };
+                let help = format!("{help}{words}{end}");
+                argument.help(help).hide_possible_values(true)
+            }
+            _ => argument,
+        }
+    };
+    let examples = command.get_after_long_help().or(command.get_after_help()).cloned();
+    let about = command.get_long_about().or(command.get_about()).cloned();
+    let command = command.clone().mut_args(shown).about(Resettable::from(about));
+    command.after_help(Resettable::from(examples)).render_help()
 }
 
 /// Variable of the environment with the number of threads.
@@ -156,12 +196,14 @@ pub mod internals {
     pub use crate::commands::HELP;
     pub use crate::flags::flag;
     pub use crate::formats::{about_convert, help_from, help_input, help_page, help_report};
-    pub use crate::print::{filled, plain_zeros};
+    pub use crate::layout::{columns, filled, table};
+    pub use crate::print::plain_zeros;
     #[cfg(not(target_family = "wasm"))]
     pub use crate::serve::requested;
-    pub use crate::summary_table::{ALERT, HEADLINE, columns, summary};
+    pub use crate::summary_table::{ALERT, HEADLINE, summary};
     pub use crate::sweep::plan::quoted;
     pub use crate::view::is_version;
+    pub use crate::whole_help;
 
     /// Returns the command line with all its commands.
     pub fn command() -> clap::Command {

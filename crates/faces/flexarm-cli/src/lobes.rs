@@ -9,18 +9,19 @@ use flexarm::{Motion, Robot};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use crate::failure::Failure;
+use crate::layout::{lines, table};
 use crate::posed_args::PoseArgs;
-use crate::print::{lines, table};
 use crate::shipped::OutputFolder;
 use crate::terminal::{Terminal, answer, to_json};
 use crate::{shipped, values};
 
 const EXAMPLES: &str = "\
 Examples:
-  Limits of depth of a shipped end mill on kr210, diagram and table in a new folder of out/:
+  Limits of depth of a shipped end mill on kr210, diagram and table:
       flexarm lobes kr210 --at 0,-60deg,90deg,0,60deg,0 --tool endmill_20mm
   The same over other speeds, with all unstable depths, figures alone:
-      flexarm lobes kr210 --at 0,-60deg,90deg,0,60deg,0 --tool endmill_20mm --rpm 2000,2500,3000 --ranges --no-files
+      flexarm lobes kr210 --at 0,-60deg,90deg,0,60deg,0 --tool endmill_20mm \\
+          --rpm 2000,2500,3000 --ranges --no-files
   Along a path: the lowest limit over 12 places of it:
       flexarm lobes kr210 --along milling_square --places 12 --tool endmill_20mm
 The file of a tool: flexarm format tool";
@@ -134,7 +135,6 @@ fn text(found: &Lobes) -> String {
     for point in found.points.iter().step_by(every) {
         t.add_row(row(found, point, along, ranges));
     }
-    t.align_right(0..);
     out += &lines(&t);
     if every > 1 {
         out +=
@@ -189,7 +189,6 @@ fn poses(found: &Lobes) -> String {
         row.push(pose.frequencies_hz.first().map_or_else(|| "-".into(), |hz| format!("{hz:.2}")));
         t.add_row(row);
     }
-    t.align_right(0..);
     let left_out = match found.left_out {
         0 => String::new(),
         n => format!("{n} places are left out: the tool is at rest there, or moves along its axis\n"),

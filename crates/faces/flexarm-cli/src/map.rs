@@ -13,29 +13,32 @@ use flexarm::{Motion, Robot};
 
 use crate::args::{ModellingArgs, RobotArgs};
 use crate::failure::Failure;
+use crate::layout::{lines, table};
 use crate::lobes::cutting_tool;
 use crate::motion::MotionInputArgs;
-use crate::print::{lines, table};
 use crate::shipped::OutputFolder;
 use crate::terminal::{Bar, Terminal, answer, to_json};
 use crate::{shipped, signals, values};
 
 const EXAMPLES: &str = "\
 Examples:
-  Where kr210 is stiff with its tool pointing down, all that it can reach, in a new folder of out/:
+  Where kr210 is stiff with its tool pointing down:
       flexarm map kr210
-  Where to put a workpiece of 0.8 x 0.6 x 0.4 m for milling with 500 N sideways, on a finer grid of a box:
-      flexarm map kr210 --box 1:2.6,-1.2:1.2,0:1.6 --grid 0.05 --wrench 500,0,0 --workpiece 0.8,0.6,0.4
+  Where to put a workpiece of 0.8 x 0.6 x 0.4 m for milling with 500 N sideways:
+      flexarm map kr210 --box 1:2.6,-1.2:1.2,0:1.6 --grid 0.05 \\
+          --wrench 500,0,0 --workpiece 0.8,0.6,0.4
   The tool may tilt by 20 degrees and turn about its axis:
       flexarm map kr210 --cone 20 --tilts 9 --rolls 6
   In joints 2 and 3, the others at zero:
-      flexarm map kr210 --over joint_2=-120deg:0deg:61 --over joint_3=0deg:120deg:61
+      flexarm map kr210 --over joint_2=-120deg:0deg:61 \\
+          --over joint_3=0deg:120deg:61
   At poses of a file, with the 6x6 compliance of each:
       flexarm map kr210 --poses poses.csv
   Along a motion:
       flexarm map kr210 --along pick_and_place --points 500
   How deep an end mill may cut before it chatters, over a table:
-      flexarm map kr210 --box 1.2:2.4,-0.6:0.6,0.6:0.6 --grid 0.1 --tool endmill_20mm --rpm 8000";
+      flexarm map kr210 --box 1.2:2.4,-0.6:0.6,0.6:0.6 --grid 0.1 \\
+          --tool endmill_20mm --rpm 8000";
 
 #[derive(Clone, Copy, Debug, Default, ValueEnum)]
 pub(crate) enum KeepName {
@@ -258,7 +261,7 @@ fn text(map: &Map) -> String {
         ),
         None => format!("{}: {} poses in {:.2} s", map.robot, map.poses, map.wall_s),
     };
-    out = crate::print::filled(&out, " ");
+    out.push('\n');
     let mut t = table(&["", "unit", "min", "median", "max", "best", "worst"]);
     for column in map.table.columns.iter().filter(|column| column.quantity) {
         let Some(spread) = map.quantities.get(&column.name) else { continue };
@@ -270,13 +273,12 @@ fn text(map: &Map) -> String {
         row.extend(numbers.map(|x| quantity_text(&column.name, x)));
         t.add_row(row);
     }
-    t.align_right(2..);
     out += &lines(&t);
     out += &format!("\nbest and worst by {}:\n", map.by);
     for (name, pose) in [("best", &map.best), ("worst", &map.worst)] {
         let place = pose.place_m.map(|x| format!("{x:.3}")).join(", ");
         let joints: Vec<String> = pose.q.iter().map(|q| format!("{q:.4}")).collect();
-        out += &crate::print::filled(&format!("  {name:<5} at {place} m, joints {}", joints.join(", ")), ", ");
+        out += &format!("  {name:<5} at {place} m, joints {}\n", joints.join(", "));
     }
     if let Some(placement) = &map.placement {
         let unit = readable_quantity(&map.by).1;

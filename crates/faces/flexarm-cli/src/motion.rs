@@ -8,7 +8,7 @@ use flexarm::{ColumnMap, MotionCurve, MotionOptions, MotionPeak, MotionReport, R
 
 use crate::args::RobotArgs;
 use crate::failure::Failure;
-use crate::print::{lines, table};
+use crate::layout::{lines, table};
 use crate::shipped;
 use crate::terminal::{Terminal, answer, to_json};
 
@@ -153,7 +153,6 @@ fn peaks(peaks: &[MotionPeak]) -> String {
         }
         t.add_row(row);
     }
-    t.align_right(2..);
     let note = if with_torque {
         "peaks per s, s², s³; in brackets the part of the limit; torque in N m (forces in N) of the rigid robot with payload\n"
     } else {

@@ -5,7 +5,6 @@ use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
 use flexarm::new::{NewLink, Reducer};
-use flexarm::written::visible;
 use flexarm::{
     Keep, LoadOptions, Modelling, Motion, NewOptions, NewRobot, Outputs, ReadOptions, Robot, RunOptions, RunRequest,
     Summary, gathered,
@@ -13,8 +12,9 @@ use flexarm::{
 
 use crate::args::RobotArgs;
 use crate::failure::Failure;
-use crate::print::{lines, table, warnings};
-use crate::terminal::{Bar, Terminal, answer_styled, to_json};
+use crate::layout::{lines, table};
+use crate::print::warnings;
+use crate::terminal::{Bar, Terminal, answer_as_is, columns, readable, to_json};
 use crate::{signals, summary_table};
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -134,7 +134,7 @@ pub(crate) fn run(terminal: &Terminal, args: &NewArgs) -> Result<ExitCode, Failu
     }
     let findings = made.findings.iter().filter(|f| f.severity != "note");
     warnings(terminal, &findings.map(|f| format!("{}: {}", f.location, f.message)).collect::<Vec<_>>());
-    answer_styled(terminal, || to_json(&made), || text(&made));
+    answer_as_is(terminal, || to_json(&made), || text(&made));
     let wrong = made.findings.iter().any(|f| f.severity == "error");
     Ok(if wrong { ExitCode::from(1) } else { ExitCode::SUCCESS })
 }
@@ -205,10 +205,10 @@ fn text(made: &NewRobot) -> String {
     for file in [&made.robot, &made.motion] {
         out += &format!("wrote    {file}\n");
     }
-    let mut out = visible(&out);
+    let mut out = readable(&out);
     if let Some(summary) = &made.summary {
         out += "\nfirst run\n";
-        out += &summary_table::summary(summary, summary_table::terminal_width());
+        out += &summary_table::summary(summary, columns());
     }
     out
 }

@@ -9,8 +9,9 @@ use flexarm::{
 };
 
 use crate::failure::Failure;
+use crate::layout::{lines, table};
 use crate::posed_args::{ModesArgs, PoseArgs, QuantityName, ResponseArgs, SpacingName, StaticsArgs};
-use crate::print::{caveats, filled, lines, table};
+use crate::print::caveats;
 use crate::shipped::OutputFolder;
 use crate::terminal::{Terminal, answer, to_json};
 use crate::{shipped, values};
@@ -19,8 +20,6 @@ use crate::{shipped, values};
 const AXES: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
 /// Peaks of a response in the columns of a terminal.
 const SHOWN_PEAKS: usize = 3;
-/// Modes in the columns of a terminal.
-const MODES_SIDE_BY_SIDE: usize = 8;
 
 fn load(pose: &PoseArgs) -> Result<Robot, Failure> {
     Ok(Robot::load_with(&shipped::robot(Some(&pose.robot))?, &pose.load.options()?)?)
@@ -96,10 +95,10 @@ pub(crate) fn response(terminal: &Terminal, args: &ResponseArgs) -> Result<ExitC
     Ok(ExitCode::SUCCESS)
 }
 
-/// First lines of an answer at a pose, of at most 80 columns.
+/// First line of an answer at a pose.
 fn pose_text(robot: &str, joints: &[String], at: &[f64], end: &str) -> String {
     let values: Vec<String> = joints.iter().zip(at).map(|(joint, q)| format!("{joint} {q:.4}")).collect();
-    filled(&format!("{robot} at {}{end}", values.join(", ")), ", ")
+    format!("{robot} at {}{end}\n", values.join(", "))
 }
 
 fn triple(values: &[f64], scale: f64) -> Vec<String> {
@@ -117,21 +116,19 @@ fn statics_text(s: &Statics) -> String {
     for e in &s.elements {
         t.add_row(row(&format!("  by {}", e.name), &e.tcp_displacement_m, &e.tcp_rotation_rad));
     }
-    t.align_right(1..);
     out += &lines(&t);
     out += "\ncompliance [um/N, urad/N; um/(N m), urad/(N m)]\n";
     let mut t = table(&["", "fx", "fy", "fz", "tx", "ty", "tz"]);
     for (axis, values) in AXES.iter().zip(&s.compliance) {
         t.add_row([vec![(*axis).to_owned()], triple(values, 1e6)].concat());
     }
-    t.align_right(1..);
     out += &lines(&t);
     let holding: Vec<String> =
         s.joints.iter().zip(&s.holding_torque).map(|(joint, torque)| format!("{joint} {torque:.2}")).collect();
-    out += &format!("\n{}", filled(&format!("holding torques [N m or N]: {}", holding.join(", ")), ", "));
+    out += &format!("\nholding torques [N m or N]: {}\n", holding.join(", "));
     for figure in flexarm::stress_figures(&s.stress, false) {
         let (name, value, unit) = (figure.name, figure.value, figure.unit);
-        out += &filled(&format!("{name}: {value} {unit}, {}", figure.note), ", ");
+        out += &format!("{name}: {value} {unit}, {}\n", figure.note);
     }
     for (what, path) in [("picture", &s.files.picture), ("figures", &s.files.json)] {
         if let Some(path) = path {
@@ -164,31 +161,24 @@ fn modes_text(m: &ModeTable) -> String {
         let mass = mass(mode.tcp[..3].iter().map(|x| x * x).sum());
         t.add_row([(k + 1).to_string(), frequency, damping, direction(&mode.tcp), mass]);
     }
-    t.align_right(1..);
     out += &lines(&t);
     let percent = |x: f64| format!("{:.1}", 100.0 * x);
-    for (block, modes) in m.modes.chunks(MODES_SIDE_BY_SIDE).enumerate() {
-        let first = block * MODES_SIDE_BY_SIDE + 1;
-        let head = |title: &str| {
-            let numbers = (first..first + modes.len()).map(|k| k.to_string());
-            table(&std::iter::once(title.to_owned()).chain(numbers).collect::<Vec<_>>())
-        };
-        let mut t = head("energy in [%]");
-        for (k, name) in m.elements.iter().enumerate() {
-            let shares = modes.iter().map(|mode| percent(mode.strain_energy[k]));
-            t.add_row(std::iter::once(name.clone()).chain(shares));
-        }
-        t.align_right(1..);
-        out += &format!("\n{}", lines(&t));
-        if !m.speeds.is_empty() {
-            continue;
-        }
+    let head = |title: &str| {
+        let numbers = (1..=m.modes.len()).map(|k| k.to_string());
+        table(&std::iter::once(title.to_owned()).chain(numbers).collect::<Vec<_>>())
+    };
+    let mut t = head("energy in [%]");
+    for (k, name) in m.elements.iter().enumerate() {
+        let shares = m.modes.iter().map(|mode| percent(mode.strain_energy[k]));
+        t.add_row(std::iter::once(name.clone()).chain(shares));
+    }
+    out += &format!("\n{}", lines(&t));
+    if m.speeds.is_empty() {
         let mut t = head("share of [%]");
         for (k, axis) in AXES[..3].iter().enumerate() {
-            let shares = modes.iter().map(|mode| mode.compliance_share[k].map_or_else(|| "-".into(), percent));
+            let shares = m.modes.iter().map(|mode| mode.compliance_share[k].map_or_else(|| "-".into(), percent));
             t.add_row(std::iter::once(format!("compliance {axis}")).chain(shares));
         }
-        t.align_right(1..);
         out += &format!("\n{}", lines(&t));
     }
     for (format, path) in m.files.recordings.iter() {
@@ -237,7 +227,6 @@ fn response_text(r: &Response) -> String {
         );
         t.add_row(row);
     }
-    t.align_right(3..);
     out += &lines(&t);
     for (what, path) in [("CSV", &r.files.csv), ("plot", &r.files.plot), ("figures", &r.files.json)] {
         if let Some(path) = path {

@@ -8,14 +8,16 @@ use crate::args::{ModellingArgs, RobotArgs};
 
 const RESPONSE_EXAMPLES: &str = "\
 Examples:
-  Dynamic compliance of the tool in all directions, table and plot in a new folder of out/:
+  Dynamic compliance of the tool in all directions, table and plot:
       flexarm response kr210 --at 0,-60deg,60deg,0,0,0
   How the tool shakes when joint 2 does, up to 100 Hz, as acceleration:
-      flexarm response kr210 --at 0,-60deg,60deg,0,0,0 --input joint_2 --output x,z --quantity acceleration --from 1 --to 100
+      flexarm response kr210 --at 0,-60deg,60deg,0,0,0 --input joint_2 \\
+          --output x,z --quantity acceleration --from 1 --to 100
   Rotations under moments, figures only:
-      flexarm response kr210 --at 0,-60deg,60deg,0,0,0 --input torque-x,torque-y,torque-z --output rx,ry,rz --no-files
+      flexarm response kr210 --at 0,-60deg,60deg,0,0,0 \\
+          --input torque-x,torque-y,torque-z --output rx,ry,rz --no-files
 
-Inputs: force-x, force-y, force-z, torque-x, torque-y, torque-z on the TCP (world axes), or names of joints.
+Inputs: force-x, force-y, force-z, torque-x, torque-y, torque-z on the TCP\n(world axes), or names of joints.
 Outputs: x, y, z, rx, ry, rz of the TCP (world axes).";
 
 /// A robot at a pose.

@@ -1,105 +1,12 @@
 //! Tables for people.
 
 use std::io::Write as _;
-use std::ops::{Deref, DerefMut, RangeBounds};
 
-use crate::terminal::Terminal;
-use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
+use crate::layout::{filled, lines, table};
+use crate::terminal::{Terminal, readable};
 use flexarm::reduce::{MeshListing, ReduceSummary, ReportTable, SetListing};
-use flexarm::written::{message, one_line};
+use flexarm::written::{message, visible};
 use flexarm::{BalancerInfo, Caveat, Finding, FlexibleInfo, Inspection, LoopInfo, RobotExport, gathered};
-
-/// Maximum length of a name in a table (characters).
-const LONGEST_NAME: usize = 60;
-
-/// A table with cells that a terminal can display.
-pub(crate) struct TextTable {
-    table: Table,
-    shortens: bool,
-}
-
-impl Deref for TextTable {
-    type Target = Table;
-    fn deref(&self) -> &Table {
-        &self.table
-    }
-}
-
-impl DerefMut for TextTable {
-    fn deref_mut(&mut self) -> &mut Table {
-        &mut self.table
-    }
-}
-
-impl TextTable {
-    /// Adds a row; names that are too long are shortened.
-    pub(crate) fn add_row<C: ToString>(&mut self, cells: impl IntoIterator<Item = C>) {
-        let cells: Vec<String> = cells.into_iter().map(|cell| self.cell(&cell.to_string())).collect();
-        self.table.add_row(cells);
-    }
-
-    /// Sets the names of the columns.
-    pub(crate) fn set_header<C: ToString>(&mut self, cells: impl IntoIterator<Item = C>) {
-        let cells: Vec<String> = cells.into_iter().map(|cell| self.cell(&cell.to_string())).collect();
-        self.table.set_header(cells);
-    }
-
-    /// Aligns columns to the right.
-    pub(crate) fn align_right(&mut self, columns: impl RangeBounds<usize>) {
-        for (_, column) in self.table.column_iter_mut().enumerate().filter(|(k, _)| columns.contains(k)) {
-            column.set_cell_alignment(CellAlignment::Right);
-        }
-    }
-
-    fn cell(&mut self, text: &str) -> String {
-        let text = one_line(text);
-        let word = |word: &str| match word.char_indices().nth(LONGEST_NAME) {
-            Some((cut, _)) => format!("{}…", &word[..cut]),
-            None => word.to_owned(),
-        };
-        let short = text.split(' ').map(word).collect::<Vec<_>>().join(" ");
-        self.shortens |= short != text;
-        short
-    }
-}
-
-pub(crate) fn table<C: AsRef<str>>(header: &[C]) -> TextTable {
-    let mut table = TextTable { table: Table::new(), shortens: false };
-    table.load_style(presets::NOTHING).set_content_arrangement(ContentArrangement::Dynamic);
-    if let Some(width) = crate::terminal::width() {
-        table.set_width(width);
-    }
-    if !header.is_empty() {
-        table.set_header(header.iter().map(AsRef::as_ref));
-    }
-    table
-}
-
-/// Formats the table without trailing blanks.
-pub(crate) fn lines(table: &TextTable) -> String {
-    let rows: String = table.to_string().lines().map(|l| l.trim_end().to_owned() + "\n").collect();
-    if table.shortens { rows + SHORTENED } else { rows }
-}
-
-/// Note that names are shortened.
-pub(crate) const SHORTENED: &str = "names that end in … are shortened: --json has them whole\n";
-
-/// Text in lines of at most 80 columns, broken after a separator.
-pub fn filled(text: &str, separator: &str) -> String {
-    let mut out = String::new();
-    let mut width = 0;
-    for part in text.split_inclusive(separator) {
-        let long = part.trim_end().chars().count();
-        if width > 0 && width + long > 80 {
-            out.truncate(out.trim_end().len());
-            out += "\n  ";
-            width = 2;
-        }
-        out += part;
-        width += part.chars().count();
-    }
-    out + "\n"
-}
 
 /// The text with zeros that were rounded from negative numbers written without their sign.
 pub fn plain_zeros(text: &str) -> String {
@@ -174,8 +81,7 @@ pub(crate) fn inspection(i: &Inspection) -> String {
         "TCP on {}: position {:.6?} m, quaternion wxyz {:.6?}",
         i.tcp.link, i.tcp.position_m, i.tcp.quaternion_wxyz
     );
-    out += &filled(&tcp, " ");
-    out
+    out + &tcp
 }
 
 /// Lists the joints with their limits, positions and torques at rest.
@@ -199,13 +105,12 @@ fn joint_table(i: &Inspection) -> String {
         row.extend(moves.then(|| format!("{:.2}", i.bias[k])));
         t.add_row(row);
     }
-    t.align_right(2..);
     let bounded = i.joints.iter().filter(|j| j.acceleration.or(j.jerk).is_some());
     let rates = bounded.map(|j| format!("{} {} and {}", j.name, limit(j.acceleration), limit(j.jerk)));
     let rates: Vec<String> = rates.collect();
     match rates.is_empty() {
         true => lines(&t),
-        false => lines(&t) + &filled(&format!("limits of acceleration and jerk: {}", rates.join(", ")), " "),
+        false => lines(&t) + &filled(&format!("limits of acceleration and jerk: {}\n", rates.join(", ")), 80),
     }
 }
 
@@ -236,7 +141,7 @@ fn flexible_lines(f: &FlexibleInfo) -> String {
         f.model,
         f.coordinates
     );
-    let mut out = filled(&line, " ");
+    let mut out = line + "\n";
     if let Some(hz) = &f.modal_frequencies_hz {
         let first: Vec<String> = hz.iter().take(6).map(|hz| format!("{hz:.1}")).collect();
         let more = if hz.len() > 6 { hz.last().map(|hz| format!(", ... {hz:.0}")) } else { None };
@@ -269,10 +174,7 @@ pub(crate) fn findings(findings: &[Finding]) -> String {
 }
 
 fn report_table(report: &ReportTable) -> String {
-    let mut t = table::<&str>(&[]);
-    if report.header.iter().any(|name| !name.is_empty()) {
-        t.set_header(report.header.clone());
-    }
+    let mut t = table(&report.header);
     for row in &report.rows {
         t.add_row(row);
     }
@@ -298,10 +200,12 @@ pub(crate) fn reduction(summary: &ReduceSummary) -> String {
     for path in &f.pictures {
         out += &format!("picture  {path}\n");
     }
-    if let Some(entry) = &f.entry {
-        out += &format!("\nto be pasted into a robot file:\n{entry}");
-    }
-    out
+    readable(&out) + &pasted(f.entry.as_deref())
+}
+
+/// Formats an entry of a robot file.
+fn pasted(entry: Option<&str>) -> String {
+    entry.map_or_else(String::new, |entry| format!("\nto be pasted into a robot file:\n{}", visible(entry)))
 }
 
 /// Formats the figures of an import.
@@ -328,10 +232,7 @@ pub(crate) fn imported(summary: &flexarm::import::ImportSummary) -> String {
             out += &format!("{what:<8} {path}\n");
         }
     }
-    if let Some(entry) = &f.entry {
-        out += &format!("\nto be pasted into a robot file:\n{entry}");
-    }
-    out
+    readable(&out) + &pasted(f.entry.as_deref())
 }
 
 /// Formats the figures of an export.
@@ -355,7 +256,7 @@ pub(crate) fn exported_robot(export: &RobotExport, files: &[String]) -> String {
     let mut out = files.iter().take(2).map(|file| format!("{file}\n")).collect::<String>();
     out += &format!("{} meshes\n", files.len().saturating_sub(2));
     out += &format!("step for MuJoCo: {:?} s\n", export.step_s);
-    export.left_out.iter().for_each(|what| out += &filled(&format!("left out: {what}"), " "));
+    export.left_out.iter().for_each(|what| out += &filled(&format!("left out: {what}\n"), 80));
     out
 }
 

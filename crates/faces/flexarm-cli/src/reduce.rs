@@ -10,7 +10,7 @@ use crate::failure::Failure;
 use crate::print;
 use crate::reduce_args::{NamedValue, OrderingName, PlaceWord, QuadratureName, ReduceArgs};
 use crate::shipped::OutputFolder;
-use crate::terminal::{Spinner, Terminal, answer, to_json};
+use crate::terminal::{Spinner, Terminal, answer, answer_as_is, to_json};
 
 pub(crate) fn run(terminal: &Terminal, args: &ReduceArgs) -> Result<ExitCode, Failure> {
     let mut job = ReduceJob::load(&args.mesh)?;
@@ -36,7 +36,7 @@ pub(crate) fn run(terminal: &Terminal, args: &ReduceArgs) -> Result<ExitCode, Fa
     spinner.clear();
     let summary = result?;
     print::warnings(terminal, &summary.warnings);
-    answer(terminal, || to_json(&summary), || print::reduction(&summary));
+    answer_as_is(terminal, || to_json(&summary), || print::reduction(&summary));
     Ok(ExitCode::SUCCESS)
 }
 

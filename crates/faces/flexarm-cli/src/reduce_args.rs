@@ -12,26 +12,31 @@ Examples:
       flexarm reduce lower_arm.msh --list
   Two named surfaces, frames at given points (unit of the mesh, link frame):
       flexarm reduce lower_arm.msh --units mm-t-s --material aluminium \\
-          --interface A=interface_A --at A=0,-75,0 --interface B=interface_B --at B=40,110,1100
+          --interface A=interface_A --at A=0,-75,0 \\
+          --interface B=interface_B --at B=40,110,1100
   Surfaces by place; a softer tie at the far end; frames from the robot's URDF:
       flexarm reduce arm.inp.gz --units m-kg-s --urdf arm.urdf --link link_2 \\
-          --interface 'A=plane(0,0,0; 0,1,0)' --interface 'B=cylinder(0,0,1.1; 0,1,0; 0.06)' --tie B=distributing
+          --interface 'A=plane(0,0,0; 0,1,0)' \\
+          --interface 'B=cylinder(0,0,1.1; 0,1,0; 0.06)' --tie B=distributing
   The same again, with other modes, from the job that the first run wrote:
-      flexarm reduce out/lower_arm-001/reduce.toml --modes-up-to 500 --chains 3,4,8
+      flexarm reduce out/lower_arm-001/reduce.toml --modes-up-to 500 \\
+          --chains 3,4,8
   With the stiffness by load, for modal links with geometric_stiffening = true:
       flexarm reduce lower_arm.reduce.toml --geometric
   Straight into a robot's folder:
       flexarm reduce lower_arm.reduce.toml --flex robots/mine/lower_arm.flex
 
 Node selectors (lengths in the unit and the frame of the mesh file):
-  NAME                               a node set or a physical group; quote \"NAME\" if it has & or ( in it
+  NAME                               a node set or a physical group; in quotes
+                                     if it has & or ( in it
   plane(x,y,z; nx,ny,nz)             nodes of the surface in a plane
-  cylinder(x,y,z; ax,ay,az; radius)  on the wall of an endless cylinder, such as a bore
-  box(x,y,z; x,y,z)                  in a box; each of the three takes a tolerance as last argument
+  cylinder(x,y,z; ax,ay,az; radius)  wall of an endless cylinder, such as a bore
+  box(x,y,z; x,y,z)                  in a box; all three take a tolerance as
+                                     last argument
   S & T                              nodes that both choose
 
-Ties: rigid (RBE2) stiffens the seat, distributing (RBE3) adds no stiffness; the truth lies between.
-Everything can stand in a job file (TOML, with mesh = \"...\"); flags go before it.";
+Ties: rigid (RBE2) stiffens the seat, distributing (RBE3) adds no stiffness; the\ntruth lies between.
+Everything can stand in a job file (TOML, with mesh = \"...\"); flags override it.";
 
 #[derive(Debug, Args)]
 #[command(after_long_help = EXAMPLES, after_help = "More, with examples: flexarm reduce --help")]

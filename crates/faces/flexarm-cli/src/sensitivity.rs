@@ -1,7 +1,7 @@
 //! `flexarm sensitivity`: derivatives of the TCP error along a motion with respect to the
 //! parameters of the robot.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
@@ -10,8 +10,8 @@ use flexarm::{Motion, Robot, RunOptions, Scenario};
 
 use crate::args::{ModellingArgs, RobotArgs};
 use crate::failure::Failure;
+use crate::layout::{lines, table};
 use crate::motion::MotionInputArgs;
-use crate::print::{lines, table};
 use crate::terminal::{Terminal, answer, to_json, working};
 use crate::{shipped, values};
 
@@ -22,7 +22,8 @@ Examples:
   On the gearboxes alone, with the derivatives over time as a table:
       flexarm sensitivity kr210 pick_and_place --by 'drive.*' --table slopes.csv
   On friction and gains of joints under servos:
-      flexarm sensitivity kr300 --drives servo --by 'drive.*.friction.*' --by 'drive.*.servo.*'
+      flexarm sensitivity kr300 --drives servo \\
+          --by 'drive.*.friction.*' --by 'drive.*.servo.*'
   On shifts of the joints:
       flexarm sensitivity kr210 milling_square --by 'motion.*'
   What sag, compliance and frequencies at a pose depend on:
@@ -103,7 +104,8 @@ pub(crate) fn run(terminal: &Terminal, args: &SensitivityArgs) -> Result<ExitCod
 }
 
 fn text(found: &Sensitivity) -> String {
-    let mut out = format!("{} on {}: {} steps of {} s\n", found.motion, found.robot, found.steps, found.step_s);
+    let motion = Path::new(&found.motion).file_stem().unwrap_or_default().to_string_lossy();
+    let mut out = format!("{motion} on {}: {} steps of {} s\n", found.robot, found.steps, found.step_s);
     out += &format!(
         "error of the tool: peak {:.4} mm at {:.3} s, RMS {:.4} mm; peak {:.4} mrad, RMS {:.4} mrad\n\n",
         1e3 * found.peak_m,
@@ -125,7 +127,7 @@ fn text(found: &Sensitivity) -> String {
             micro(own.rms_rad),
         ]);
     }
-    out += &right(&mut t);
+    out += &lines(&t);
     if let Some(file) = &found.table {
         out += &format!("\ntable    {file}\n");
     }
@@ -140,12 +142,6 @@ fn value(value: f64, unit: &str) -> String {
     // Computed gains have all digits of a double; values from a file have few.
     let short = format!("{value:.6e}").parse().unwrap_or(value);
     if unit == "1" { short.to_string() } else { format!("{short} {unit}") }
-}
-
-/// Formats the table with numbers aligned to the right.
-fn right(t: &mut crate::print::TextTable) -> String {
-    t.align_right(1..);
-    lines(t)
 }
 
 /// Number of frequencies shown for each parameter.
@@ -169,5 +165,5 @@ fn pose_text(found: &PoseSensitivity) -> String {
         row.extend(own.frequencies_hz.iter().take(hz.len()).map(|hz| format!("{:+.4}", 1e3 * hz)));
         t.add_row(row);
     }
-    out + &right(&mut t)
+    out + &lines(&t)
 }

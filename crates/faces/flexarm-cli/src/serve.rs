@@ -41,21 +41,33 @@ pub(crate) fn run(terminal: &Terminal, args: &ServeArgs) -> Result<ExitCode, Fai
     Ok(ExitCode::SUCCESS)
 }
 
-/// Answers with a file of the folder, or with a status that says why not.
+/// Answers with a file of the folder, compressed if there is one beside it and the browser takes it,
+/// or with a status that says why not.
 fn respond(request: Request, folder: &Path) {
+    let open = |path: &Path| File::open(path).ok().filter(|file| file.metadata().is_ok_and(|found| found.is_file()));
+    let takes_gzip = request.headers().iter().any(|header| {
+        header.field.equiv("Accept-Encoding")
+            && header.value.as_str().split([',', ';']).any(|word| word.trim() == "gzip")
+    });
     let file = requested(request.url()).and_then(|path| {
         let path = folder.join(path);
-        Some((File::open(&path).ok().filter(|file| file.metadata().is_ok_and(|found| found.is_file()))?, path))
+        let packed = path.with_added_extension("gz");
+        let packed = open(&packed).filter(|_| takes_gzip);
+        let is_packed = packed.is_some();
+        Some((packed.or_else(|| open(&path))?, path, is_packed))
     });
     let header = |field: &str, value: &str| Header::from_bytes(field, value).expect("the header is ASCII");
     // The browser may be gone.
     let _ = match file {
         _ if !matches!(request.method(), Method::Get | Method::Head) => request.respond(Response::empty(405)),
-        Some((file, path)) => request.respond(
-            Response::from_file(file)
+        Some((file, path, is_packed)) => {
+            let answer = Response::from_file(file)
                 .with_header(header("Content-Type", content_type(&path)))
-                .with_header(header("Cache-Control", "no-cache")),
-        ),
+                .with_header(header("Vary", "Accept-Encoding"))
+                .with_header(header("Cache-Control", "no-cache"));
+            let packed = header("Content-Encoding", "gzip");
+            request.respond(if is_packed { answer.with_header(packed) } else { answer })
+        }
         None => request.respond(Response::empty(404)),
     };
 }

@@ -11,7 +11,7 @@ use flexarm::{
 use crate::args::RunArgs;
 use crate::failure::Failure;
 use crate::shipped::OutputFolder;
-use crate::terminal::{Bar, Terminal, answer_styled, to_json};
+use crate::terminal::{Bar, Terminal, answer_as_is, columns, to_json};
 use crate::{formats, print, shipped, signals, study, summary_table};
 
 /// `line`: the command line as given.
@@ -58,7 +58,7 @@ pub(crate) fn run(
     bar.clear();
     let summary = result?;
     print::caveats(terminal, &study::caveats(&summary));
-    answer_styled(terminal, || to_json(&summary), || summary_table::summary(&summary, summary_table::terminal_width()));
+    answer_as_is(terminal, || to_json(&summary), || summary_table::summary(&summary, columns()));
     Ok(ExitCode::SUCCESS)
 }
 

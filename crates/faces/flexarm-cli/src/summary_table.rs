@@ -7,12 +7,8 @@ use anstyle::{AnsiColor, Style};
 use flexarm::written::one_line;
 use flexarm::{Figure, Files, Holds, RecordingFormat, STUDY_NOTE, Summary, Weight, figure_groups, study_rows};
 
-use crate::print::SHORTENED;
+use crate::layout::{LEAST_WIDTH, columns, table, wrapped};
 
-/// Width if the terminal does not report one (columns).
-const USUAL_WIDTH: usize = 80;
-/// Minimum width (columns); narrower terminals are treated like this.
-const LEAST_WIDTH: usize = 40;
 /// Maximum width of the plot (columns); a wider one is no clearer.
 const WIDEST_PLOT: usize = 100;
 /// Height of the plot (rows of text).
@@ -26,12 +22,6 @@ const FAINT: Style = Style::new().dimmed();
 pub const HEADLINE: Style = AnsiColor::Cyan.on_default().bold();
 /// Style of a run that stopped early.
 pub const ALERT: Style = AnsiColor::Red.on_default().bold();
-
-/// Width of the terminal that standard output goes to (columns).
-pub(crate) fn terminal_width() -> usize {
-    // Some terminals report a width of zero.
-    crate::terminal::width().filter(|width| *width > 0).map_or(USUAL_WIDTH, usize::from)
-}
 
 /// Formats the figures of a run at a given width.
 pub fn summary(summary: &Summary, width: usize) -> String {
@@ -109,14 +99,11 @@ fn files(f: &Files) -> String {
 
 /// Table of the runs of a study.
 fn study(summary: &Summary, width: usize) -> String {
-    let rows: Vec<Vec<String>> =
-        study_rows(summary).iter().map(|row| row.iter().map(|cell| one_line(cell)).collect()).collect();
-    if rows.is_empty() {
-        return String::new();
-    }
-    let mut out = format!("\n{HEADING}runs{HEADING:#}\n");
-    let table = aligned(&rows);
-    out += &if fits(&table, width) { table } else { turned(&rows, width) };
+    let rows = study_rows(summary);
+    let Some((header, runs)) = rows.split_first() else { return String::new() };
+    let mut runs_table = table(header);
+    runs.iter().for_each(|row| runs_table.add_row(row));
+    let mut out = format!("\n{HEADING}runs{HEADING:#}\n{}", runs_table.text(width));
     for run in std::iter::once(summary).chain(&summary.with).filter(|run| !run.headline.is_empty()) {
         let text = format!("{}: {}", run.label.as_deref().unwrap_or_default(), run.headline);
         out += &wrapped(&text, width).iter().map(|line| format!("{line}\n")).collect::<String>();
@@ -125,96 +112,6 @@ fn study(summary: &Summary, width: usize) -> String {
         out += &format!("{FAINT}{line}{FAINT:#}\n");
     }
     out
-}
-
-fn fits(table: &str, width: usize) -> bool {
-    table.lines().all(|line| columns(line) <= width)
-}
-
-/// Aligns the first column to the left and the others to the right.
-fn aligned(rows: &[Vec<String>]) -> String {
-    let count = rows.iter().map(Vec::len).max().unwrap_or(0);
-    let widest = |k: usize| rows.iter().filter_map(|row| row.get(k)).map(|cell| columns(cell)).max().unwrap_or(0);
-    let widths: Vec<usize> = (0..count).map(widest).collect();
-    let mut out = String::new();
-    for row in rows {
-        let mut line = String::new();
-        for (k, (cell, width)) in row.iter().zip(&widths).enumerate() {
-            let blanks = " ".repeat(width - columns(cell));
-            line += &if k == 0 { format!("  {cell}{blanks}") } else { format!("  {blanks}{cell}") };
-        }
-        out += line.trim_end();
-        out.push('\n');
-    }
-    out
-}
-
-/// Transposes the table: a row for every figure and a column for every run, split into as many
-/// tables as needed. Names too long for a column are numbered and listed below.
-fn turned(rows: &[Vec<String>], width: usize) -> String {
-    let names: Vec<&str> = rows[1..].iter().map(|row| row[0].as_str()).collect();
-    let part = |runs: &[usize], numbered: bool| {
-        let head = |run: &usize| if numbered { format!("({})", run + 1) } else { names[*run].to_owned() };
-        let row = |figure: usize| {
-            let first = std::iter::once(rows[0][figure].clone());
-            let others = runs.iter().map(|run| if figure == 0 { head(run) } else { rows[run + 1][figure].clone() });
-            first.chain(others).collect()
-        };
-        aligned(&(0..rows[0].len()).map(row).collect::<Vec<Vec<String>>>())
-    };
-    let all: Vec<usize> = (0..names.len()).collect();
-    let whole = part(&all, false);
-    if fits(&whole, width) {
-        return whole;
-    }
-    let mut out = String::new();
-    let mut rest = &all[..];
-    while !rest.is_empty() {
-        let most = (1..=rest.len()).rev().find(|count| fits(&part(&rest[..*count], true), width)).unwrap_or(1);
-        let (now, later) = rest.split_at(most);
-        out += &part(now, true);
-        out.push('\n');
-        rest = later;
-    }
-    for (k, name) in names.iter().enumerate() {
-        let number = format!("  ({})  ", k + 1);
-        let room = width - columns(&number);
-        out += &format!("{number}{}\n", shortened(name, room));
-    }
-    if names.iter().enumerate().any(|(k, name)| columns(name) + columns(&format!("  ({})  ", k + 1)) > width) {
-        out += &wrapped(SHORTENED, width).iter().map(|line| format!("{line}\n")).collect::<String>();
-    }
-    out
-}
-
-/// Shortens the text to at most `room` columns.
-fn shortened(text: &str, room: usize) -> String {
-    if columns(text) <= room {
-        return text.to_owned();
-    }
-    text.chars().take(room.saturating_sub(1)).chain(['…']).collect()
-}
-
-/// Width of a text on the terminal, one column per character, which holds for the letters of robot
-/// names.
-pub fn columns(text: &str) -> usize {
-    text.chars().count()
-}
-
-/// Splits text at blanks into lines of at most `width` columns.
-fn wrapped(text: &str, width: usize) -> Vec<String> {
-    let text = one_line(text);
-    let mut lines: Vec<String> = Vec::new();
-    for word in text.split_whitespace() {
-        match lines.last_mut() {
-            Some(line) if columns(line) + 1 + columns(word) <= width => {
-                line.push(' ');
-                line.push_str(word);
-            }
-            _ => lines.push(word.to_owned()),
-        }
-    }
-    lines
 }
 
 /// Plots the magnitude of the TCP error over time in braille dots, with the maximum, the time span

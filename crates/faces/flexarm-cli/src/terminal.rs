@@ -10,6 +10,7 @@ use clap::Args;
 use flexarm::written::visible;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
+use crate::layout::filled;
 use crate::print;
 
 /// Options of all commands.
@@ -23,20 +24,30 @@ pub(crate) struct Terminal {
     pub(crate) quiet: bool,
 }
 
-/// Returns the width of the terminal (columns), if standard output is one.
-pub(crate) fn width() -> Option<u16> {
-    let terminal_size::Width(columns) = terminal_size::terminal_size_of(std::io::stdout())?.0;
-    Some(columns)
+/// Width if neither the terminal nor the environment has one (columns).
+const USUAL_WIDTH: usize = 80;
+
+/// Width of text for people (columns): that of the terminal, else that of the variable COLUMNS.
+pub(crate) fn columns() -> usize {
+    let terminal = terminal_size::terminal_size_of(std::io::stdout()).map(|(width, _)| usize::from(width.0));
+    let named = || std::env::var("COLUMNS").ok().and_then(|text| text.parse().ok());
+    // Some terminals report a width of zero.
+    terminal.filter(|width| *width > 0).or_else(named).unwrap_or(USUAL_WIDTH)
 }
 
-/// Prints text for people or JSON for programs, with control characters escaped; a closed pipe is
-/// not an error.
+/// Prints text for people or JSON for programs, with control characters escaped and long lines
+/// wrapped; a closed pipe is not an error.
 pub(crate) fn answer(terminal: &Terminal, json: impl FnOnce() -> String, text: impl FnOnce() -> String) {
-    answer_styled(terminal, json, || print::plain_zeros(&visible(&text())));
+    answer_as_is(terminal, json, || readable(&text()));
 }
 
-/// The same for styled text, whose names are already [`visible`].
-pub(crate) fn answer_styled(terminal: &Terminal, json: impl FnOnce() -> String, text: impl FnOnce() -> String) {
+/// Text for people with control characters escaped and long lines wrapped.
+pub(crate) fn readable(text: &str) -> String {
+    filled(&print::plain_zeros(&visible(text)), columns())
+}
+
+/// The same for text whose lines stay as they are: [`readable`] already, styled, or to be pasted.
+pub(crate) fn answer_as_is(terminal: &Terminal, json: impl FnOnce() -> String, text: impl FnOnce() -> String) {
     let out = if terminal.json { visible_json(&json()) + "\n" } else { text() };
     // Colours go only to terminals, and not if NO_COLOR is set.
     let mut stdout = anstream::stdout().lock();
@@ -60,7 +71,7 @@ fn visible_json(text: &str) -> String {
 /// Prints text generated in memory; in JSON under the given key.
 pub(crate) fn written(terminal: &Terminal, key: &str, bytes: Vec<u8>) -> ExitCode {
     let text = String::from_utf8_lossy(&bytes);
-    answer(terminal, || to_json(&serde_json::json!({ key: text })), || text.to_string());
+    answer_as_is(terminal, || to_json(&serde_json::json!({ key: text })), || visible(&text));
     ExitCode::SUCCESS
 }
 

@@ -1,7 +1,7 @@
 //! Joint values and wrenches as typed by the user.
 
 use flexarm::reduce::numbers;
-use flexarm::{Motion, Robot};
+use flexarm::{Motion, Robot, known_names};
 
 use crate::failure::Failure;
 
@@ -40,7 +40,8 @@ fn parse_joint_values(text: &str, joints: &[(&str, bool)], units: &[(&str, f64)]
                 .split_once('=')
                 .ok_or_else(|| Failure::Usage(format!("{item:?}: either all joint values have names or none")))?;
             let k = names.iter().position(|j| *j == name.trim()).ok_or_else(|| {
-                Failure::Usage(format!("there is no movable joint {:?}; the joints are {names:?}", name.trim()))
+                let (name, known) = (name.trim(), known_names(name.trim(), &names));
+                Failure::Usage(format!("there is no movable joint {name:?}; the joints are {known}"))
             })?;
             if std::mem::replace(&mut given[k], true) {
                 return Err(Failure::Usage(format!("joint {:?} is given twice", names[k])));

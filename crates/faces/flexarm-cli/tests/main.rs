@@ -15,6 +15,8 @@ mod faults;
 mod help;
 mod hostile_names;
 mod inspect_check;
+#[cfg(feature = "parquet")]
+mod layout;
 mod limits;
 mod linear;
 mod mesh_caveats;

@@ -3,7 +3,7 @@
 use crate::common::Place;
 
 /// A box of 0.5 m on a vertical axis, another one on a horizontal axis.
-const ARM: &str = r#"<robot name="two">
+pub(crate) const ARM: &str = r#"<robot name="two">
   <link name="base"/>
   <link name="upper">
     <inertial><origin xyz="0.25 0 0"/><mass value="6"/><inertia ixx="0.02" iyy="0.13" izz="0.13" ixy="0" ixz="0" iyz="0"/></inertial>

@@ -43,7 +43,7 @@ fn number([i, j, k]: [usize; 3]) -> usize {
 }
 
 /// The beam as a CalculiX deck; `scale` is 1 for mm, 1e-3 for m.
-fn beam(scale: f64) -> String {
+pub(crate) fn beam(scale: f64) -> String {
     let mut nodes = String::from("*NODE, NSET=NALL\n");
     let (mut a, mut b) = (Vec::new(), Vec::new());
     for i in 0..=2 * LENGTH {
@@ -108,7 +108,7 @@ fn instead<'a>(old: &str, new: &'a str) -> Vec<&'a str> {
     SOUND.into_iter().map(|word| if word == old { new } else { word }).collect()
 }
 
-const JOB: &str = r#"mesh = "beam.inp"
+pub(crate) const JOB: &str = r#"mesh = "beam.inp"
 units = "mm-t-s"
 material = "steel"
 modes = 4

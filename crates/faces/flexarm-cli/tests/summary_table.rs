@@ -125,23 +125,6 @@ fn numbers_of_a_study_stay_whole() {
 }
 
 #[test]
-fn a_study_too_wide_for_the_terminal_has_a_row_for_each_figure() {
-    let mut summary = study_of(2);
-    summary.with[0].label = Some("links=modal".into());
-    let text = plain(&summary, 60);
-    let expected = "\
-runs
-  run           as given  links=modal
-  peak [mm]       1.4159       1.4159
-  at [s]           0.600        0.600
-  static [mm]          -            -
-  dynamic [mm]         -            -
-  RMS [mm]        1.1000       1.1000
-";
-    assert!(text.contains(expected), "{text}");
-}
-
-#[test]
 fn the_peak_is_bold_and_a_stop_is_red() {
     let stopped = Summary { end: "diverged at t = 1 s".into(), ..example() };
     let text = summary(&stopped, 80);

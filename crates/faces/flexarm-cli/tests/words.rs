@@ -1,6 +1,6 @@
 //! Words and numbers in the text that the program reads and prints.
 
-use flexarm_cli::internals::{filled, is_version, plain_zeros, quoted, requested};
+use flexarm_cli::internals::{is_version, plain_zeros, quoted, requested};
 
 #[test]
 fn versions_are_told_from_other_words() {
@@ -37,11 +37,4 @@ fn a_number_that_is_rounded_to_zero_has_no_sign() {
     ] {
         assert_eq!(plain_zeros(text), expected);
     }
-}
-
-#[test]
-fn lines_have_at_most_80_columns_where_a_separator_allows_it() {
-    let text = filled(&["joint_1 0.1234"; 12].join(", "), ", ");
-    assert!(text.lines().count() > 1 && text.lines().all(|line| line.len() <= 80), "{text}");
-    assert_eq!(text.split_whitespace().count(), 24);
 }

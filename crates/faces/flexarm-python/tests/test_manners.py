@@ -265,3 +265,9 @@ def test_caveats_are_warnings_of_their_own_class(kr210: flexarm.Robot) -> None:
     firsts = [str(warning.message).split(" (and ")[0] for warning in caught]
     assert set(firsts) <= set(messages) and len(caught) < len(messages)
     assert {caveat.code for caveat in told} == {caveat.code for caveat in told if caveat.message in firsts}
+
+
+def test_showing_a_robot_in_a_notebook_warns_of_nothing(recwarn: pytest.WarningsRecorder) -> None:
+    """At zero, joint 2 of this arm is outside its limits; nobody asked for that pose."""
+    assert "kr210" in flexarm.load("kr210")._repr_html_()
+    assert not recwarn.list

@@ -97,6 +97,7 @@ pub use flexarm_log::{
 };
 pub use flexarm_motion_io::MotionError;
 pub use flexarm_path::{PathError, PlannedMove, Slowed, SlowedBy};
+pub use flexarm_settings::known_names;
 pub use flexarm_settings::{Names, Setting, Words, gathered, name_settings, written};
 pub use flexarm_stepping::{
     AlphaSettings, ConstraintForm, InertiaChange, Linear, Load, LoadAxes, OperatingPoint, PoseAnswer, PoseOutputs,

@@ -25,6 +25,8 @@ const FOOT: u32 = 22;
 const RIGHT: u32 = 78;
 /// Colour of outlines.
 const OUTLINE: RGBColor = RGBColor(200, 0, 60);
+/// Colour of letters on a light colour, also where a page turns black into white.
+const INK: RGBColor = RGBColor(20, 20, 20);
 
 /// A quantity over a plane.
 #[derive(Clone, Debug, Default)]
@@ -124,7 +126,7 @@ impl FieldPlot<'_> {
                 }
                 for (i, value) in largest.iter().enumerate().filter(|(_, value)| value.is_finite()) {
                     if self.names.is_some() && cell[0] >= 44 && cell[1] >= 16 {
-                        let letters = if shade(*value, scale) < Some(SHADES / 2) { WHITE } else { BLACK };
+                        let letters = if shade(*value, scale) < Some(SHADES / 2) { WHITE } else { INK };
                         let style = centred(("sans-serif", 13).into_font().color(&letters));
                         chart.draw_series([Text::new(plain(three_digits(*value)), (i as f64, j as f64), style)])?;
                     }
@@ -156,7 +158,7 @@ impl FieldPlot<'_> {
             let letter = Text::new(
                 (*letter).to_owned(),
                 (0, 0),
-                centred(("sans-serif", 14).into_font().style(FontStyle::Bold).into()),
+                centred(("sans-serif", 14).into_font().style(FontStyle::Bold).color(&INK)),
             );
             let circle = Circle::new((0, 0), 8, WHITE.filled());
             chart.draw_series([EmptyElement::at((*x, *y)) + circle + Circle::new((0, 0), 8, BLACK) + letter])?;

@@ -188,6 +188,13 @@ fn load_text(path: &Path) -> Result<String, UrdfError> {
 fn parse(text: &str, path: &Path, options: &ReadOptions) -> (Result<UrdfRobot, UrdfError>, Report) {
     let mut report = Report::default();
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let (declared, prefixes) = xml::declared(text, &xml::Lines::new(path, text));
+    for (prefix, place) in prefixes {
+        let message = format!("the prefix {prefix:?} is not declared: its elements and attributes are ignored");
+        let help = format!("xmlns:{prefix}=\"...\" at the root element");
+        report.warning(&place, "undeclared-prefix", message, help);
+    }
+    let text = &*declared;
     let resolver = resolver(path, options);
     if !(xacro::is_xacro(path) || xacro::has_xacro(text)) {
         if let Some((name, _)) = options.arguments.first() {

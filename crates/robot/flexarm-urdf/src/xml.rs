@@ -2,6 +2,7 @@
 //!
 //! Not here: the meaning of elements ([`crate::document`]).
 
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 use roxmltree::{Document, Error, Node};
@@ -78,6 +79,9 @@ pub(crate) fn decode(bytes: Vec<u8>, file: &Path) -> Result<String, Box<Issue>> 
 /// parsers compare every pair. Real descriptions have up to a hundred and a dozen.
 const MOST_ATTRIBUTES: usize = 500;
 
+/// Maximum number of prefixes that are declared for a text.
+const MOST_PREFIXES: usize = 20;
+
 /// Returns the tree of the text, or the first syntax error. Limits the attributes before any parser
 /// sees them.
 pub(crate) fn parse<'t>(text: &'t str, lines: &Lines<'_>) -> Result<Document<'t>, Box<Issue>> {
@@ -85,6 +89,30 @@ pub(crate) fn parse<'t>(text: &'t str, lines: &Lines<'_>) -> Result<Document<'t>
         return Err(Box::new(issue(lines.place(at), format!("more than {MOST_ATTRIBUTES} {what}"), "fewer")));
     }
     Document::parse(text).map_err(|error| Box::new(describe(text, lines, &error)))
+}
+
+/// Returns the text with all prefixes declared at its root, and those that it does not declare
+/// itself with their places. Other readers of URDF ignore name spaces.
+pub(crate) fn declared<'t>(text: &'t str, lines: &Lines<'_>) -> (Cow<'t, str>, Vec<(String, TextPosition)>) {
+    let mut missing: Vec<(String, TextPosition)> = Vec::new();
+    let mut root = None;
+    for (at, tag, _) in tags(text).filter(|(_, tag, _)| !tag[1..].starts_with(['!', '?', '/'])) {
+        let mut words = tag.trim_start_matches('<').split_whitespace();
+        let element = words.next().unwrap_or_default();
+        root.get_or_insert(at + 1 + element.trim_end_matches(['>', '/']).len());
+        let attributes = words.filter_map(|word| Some(word.split_once('=')?.0));
+        for (prefix, _) in std::iter::once(element).chain(attributes).filter_map(|name| name.split_once(':')) {
+            let is_name = prefix.starts_with(char::is_alphabetic)
+                && prefix.chars().all(|c| c.is_alphanumeric() || "_-.".contains(c));
+            let known = ["xml", "xmlns", "xacro"].contains(&prefix) || missing.iter().any(|(name, _)| name == prefix);
+            if is_name && !known && missing.len() < MOST_PREFIXES && !text.contains(&format!("xmlns:{prefix}")) {
+                missing.push((prefix.to_owned(), lines.place(at)));
+            }
+        }
+    }
+    let Some(root) = root.filter(|_| !missing.is_empty()) else { return (text.into(), missing) };
+    let declarations: String = missing.iter().map(|(name, _)| format!(" xmlns:{name}=\"undeclared\"")).collect();
+    ((text[..root].to_owned() + &declarations + &text[root..]).into(), missing)
 }
 
 /// Returns the place and kind of an excess of attributes or namespaces.

@@ -18,7 +18,7 @@ fn malformed_xml_names_what_was_found_and_expected() {
         ("<robot name='r'>\n<link name='a", "the end of the file", "the rest of <link ...>"),
         ("<robot name='r'><link name='a'></joint></robot>", "</joint>", "</link>"),
         ("<robot name='r' name='s'/>", "a second attribute \"name\"", "once"),
-        ("<robot><x:link/></robot>", "undeclared prefix", "xmlns:x"),
+        ("<robot><xacro:link/></robot>", "undeclared prefix", "xmlns:xacro"),
         ("<robot>&boo;</robot>", "unknown entity", "plain text"),
         ("<robot name=r/>", "'r'", "quote"),
         ("plain text", "", ""),

@@ -219,6 +219,26 @@ fn slips_that_leave_a_robot_are_warned_of() {
     assert_eq!(findings.iter().find(|f| f.code == "unknown-element").unwrap().help, "did you mean <inertial>?");
 }
 
+/// Truth: the same description without the elements and attributes of the prefix.
+#[test]
+fn what_has_an_undeclared_prefix_is_ignored_with_a_warning() {
+    let body = |own: &str, attribute: &str| {
+        robot(&[
+            &link("base"),
+            &format!("<link name='arm'{attribute}>{INERTIAL}{own}</link>\n"),
+            "<joint name='j' type='continuous'><parent link='base'/><child link='arm'/><axis xyz='0 0 1'/></joint>",
+        ])
+    };
+    let text = body("<!-- <other:x/> --><drake:proximity/>", " drake:acceleration='1' gz:x='drake:y'");
+    let read = parse_urdf(&text, "robot.urdf", &ReadOptions::default()).unwrap();
+    let plain = parse_urdf(&body("", ""), "robot.urdf", &ReadOptions::default()).unwrap();
+    assert_eq!(read.mechanism, plain.mechanism);
+    let warned: Vec<&str> = (read.warnings.iter().filter(|f| f.code == "undeclared-prefix"))
+        .map(|f| f.message.split('"').nth(1).unwrap())
+        .collect();
+    assert_eq!(warned, ["drake", "gz"]);
+}
+
 #[test]
 fn newer_urdf_has_quaternions_and_open_limits() {
     let joint = "<joint name='j' type='revolute'><parent link='base'/><child link='arm'/><axis xyz='0 0 1'/>\

@@ -12,7 +12,7 @@ pub(crate) fn robot_entry(flex: &Path, link: &str, distal: Option<&str>) -> Stri
     let path = std::path::absolute(flex).unwrap_or_else(|_| flex.to_owned());
     let distal = match distal {
         Some(joint) => format!("distal = {}", quoted(joint)),
-        None => "# distal = \"...\"  the joint at the distal end, if the link has several child joints".to_owned(),
+        None => "# distal = \"...\"  the joint at the far end, if several follow the link".to_owned(),
     };
     let reduced = quoted(&path.display().to_string());
     format!("[[flexible_link]]\nlink = {}\n{distal}\nreduced = {reduced}\n", quoted(link))

@@ -181,7 +181,7 @@
     });
     const axis = {
       stroke: look.faint, grid: { stroke: look.grid, width: 1 }, ticks: { stroke: look.grid, width: 1, size: 5 },
-      font: "12px system-ui, sans-serif", labelFont: "12.5px system-ui, sans-serif",
+      font: "12px system-ui, sans-serif", labelFont: "13px system-ui, sans-serif",
     };
     const width = printing ? PRINT_WIDTH : Math.max(240, box.clientWidth);
     const old = entry.chart && !entry.fresh ? { min: entry.chart.scales.x.min, max: entry.chart.scales.x.max } : null;

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use flexarm_files::{Source, TextFileError as RobotFileError};
 use flexarm_kinematics::{JointKind, Mechanism};
-use flexarm_urdf::closest;
+use flexarm_settings::known_names;
 use serde::Deserialize;
 use toml::Spanned;
 
@@ -71,12 +71,9 @@ fn axis(
         joint.is_some_and(|j| j.kind != JointKind::Fixed && j.mimic.is_none())
     };
     let unknown = |name: &String, span| {
-        let names = || mechanism.joints.iter().map(|j| j.name.as_str()).filter(|name| free(name));
-        let meant = match closest(name, names()) {
-            Some(meant) => format!("did you mean {meant:?}?"),
-            None => format!("it has {:?}", names().collect::<Vec<_>>()),
-        };
-        fail(span, format!("the robot has no joint {name:?} that moves independently; {meant}"))
+        let names: Vec<&str> = mechanism.joints.iter().map(|j| j.name.as_str()).filter(|name| free(name)).collect();
+        let known = known_names(name, &names);
+        fail(span, format!("the robot has no joint {name:?} that moves independently; it has {known}"))
     };
     if !free(name) {
         return Err(unknown(name, entry.joint.span()));

@@ -3,6 +3,7 @@
 use flexarm_files::{Source, TextFileError as RobotFileError};
 use flexarm_flexlink::GearStiffness;
 use flexarm_kinematics::RotorCoupling;
+use flexarm_settings::known_names;
 use flexarm_stepping::GearCoupling;
 use nalgebra::DMatrix;
 use serde::Deserialize;
@@ -45,7 +46,8 @@ pub(crate) fn coupling(
         match robot.rigid.joints.iter().filter(single).find(|j| j.name == *name) {
             None => {
                 let known: Vec<_> = robot.rigid.joints.iter().filter(single).map(|j| j.name.as_str()).collect();
-                return fail(entry.joints.span(), format!("the robot has no movable joint {name:?}; it has {known:?}"));
+                let known = known_names(name, &known);
+                return fail(entry.joints.span(), format!("the robot has no movable joint {name:?}; it has {known}"));
             }
             Some(joint) if joint.mimic.is_some() => {
                 return fail(

@@ -6,6 +6,7 @@ use std::ops::Range;
 use flexarm_files::{Source, TextFileError as RobotFileError};
 use flexarm_flexlink::{GearStiffness, Gearbox, GuideTubes};
 use flexarm_kinematics::{Joint, JointKind, Mechanism};
+use flexarm_settings::known_names;
 use flexarm_stepping::Friction;
 use serde::Deserialize;
 use toml::Spanned;
@@ -298,7 +299,10 @@ fn joint_of<'m>(
         let movable =
             |joint: &&Joint| joint.kind != JointKind::Fixed && loop_of_joint(mechanism, &joint.name).is_none();
         let known: Vec<_> = mechanism.joints.iter().filter(movable).map(|joint| joint.name.as_str()).collect();
-        fail(entry.joint.span(), format!("the robot has no such movable joint; it has {known:?}"))
+        fail(
+            entry.joint.span(),
+            format!("the robot has no such movable joint; it has {}", known_names(entry.joint.get_ref(), &known)),
+        )
     })
 }
 

@@ -14,7 +14,7 @@ use std::path::PathBuf;
 
 use flexarm_files::{FileError, TextFileError as RobotFileError};
 use flexarm_linkmaker::LinkError;
-use flexarm_settings::Setting;
+use flexarm_settings::{Setting, known_names};
 
 pub use flexarm_settings::Fault;
 pub use model::{
@@ -149,7 +149,7 @@ pub enum Error {
         in_file: bool,
     },
     /// The requested TCP link does not exist.
-    #[error("TCP frame {link:?} is not a link of the robot; its links are {known:?}")]
+    #[error("TCP frame {link:?} is not a link of the robot; its links are {}", known_names(link, known))]
     UnknownTcp {
         /// Requested link.
         link: String,

@@ -7,7 +7,7 @@ use flexarm_files::{Source, TextFileError as RobotFileError};
 use flexarm_flexlink::{FlexibleLink, LinkForm, Parts, SubstitutionError, distal_joint};
 use flexarm_kinematics::{ElasticAngles, Mechanism, Pose};
 use flexarm_linkmaker::reduce::STRESS_FILE;
-use flexarm_settings::Words;
+use flexarm_settings::{Words, known_names};
 use flexarm_stepping::Damping;
 use nalgebra::{Matrix6, Vector3};
 use serde::Deserialize;
@@ -114,9 +114,12 @@ pub(crate) fn flexible_link(
     let damping = keep(damping.map_err(Error::from), faults).unwrap_or(Damping::Modal(0.0));
     let distal_name = entry.distal.as_ref().map(|d| d.get_ref().as_str());
     let distal = distal_joint(mechanism, name, distal_name).map_err(|e| {
-        let unknown = matches!(e, SubstitutionError::UnknownLink { .. });
-        let named = entry.distal.as_ref().filter(|_| !unknown);
-        source.error(named.map_or(entry.link.span(), Spanned::span), e.to_string())
+        if let SubstitutionError::UnknownLink { link, known } = &e {
+            let known = known_names(link, known);
+            let message = format!("flexible link {link:?} is not a link of the robot; its links are {known}");
+            return source.error(entry.link.span(), message);
+        }
+        source.error(entry.distal.as_ref().map_or(entry.link.span(), Spanned::span), e.to_string())
     })?;
 
     let (reduced, parts, beam) = match (&entry.reduced, &entry.beam) {

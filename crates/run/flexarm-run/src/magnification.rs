@@ -128,7 +128,7 @@ impl Expected {
 pub(crate) fn fit_color_scale<'a>(traces: impl IntoIterator<Item = &'a mut Trace>) {
     let mut traces: Vec<&mut Trace> = traces.into_iter().filter(|trace| trace.header.color_scale_m > 0.0).collect();
     let peak_m = |trace: &&mut Trace| Vector3::from_row_slice(&trace.peak.error_world[..3]).norm();
-    let largest = end_of_scale(traces.iter().map(peak_m).fold(0.0, f64::max));
+    let largest = traces.iter().map(peak_m).fold(0.0, f64::max);
     if largest > 0.0 {
         traces.iter_mut().for_each(|trace| trace.header.color_scale_m = largest);
     }

@@ -331,6 +331,7 @@ fn metadata(
                 ("links_choice", links_choice.into()),
                 ("drives", drives.into()),
                 ("elements", elements.join(", ")),
+                ("payload_kg", robot.payload_kg().to_string()),
                 ("reduction", methods.join("; ")),
                 ("frequencies_hz", frequencies.join(", ")),
             ],

@@ -9,8 +9,7 @@ use flexarm_files::write_all;
 use super::tool_file::CuttingTool;
 use super::{LobePoint, Lobes, LobesFiles};
 use flexarm_run::Error;
-use flexarm_run::html_page::opening;
-use flexarm_settings::written::markup;
+use flexarm_run::html_page::{ENDING, opening, warnings};
 
 /// File names in the output folder.
 pub(super) const NAMES: [&str; 4] = ["lobes.csv", "lobes.svg", "lobes.html", "lobes.json"];
@@ -145,7 +144,7 @@ fn notes(answer: &Lobes, tool: &CuttingTool) -> Vec<String> {
 }
 
 fn html(answer: &Lobes, picture: Option<&str>) -> String {
-    let mut page = opening(&format!("Chatter of {} on {}", answer.tool, answer.robot), "");
+    let mut page = opening(&format!("Chatter of {} on {}", answer.tool, answer.robot));
     let _ = match (answer.stable_below_m, answer.stable_below_at_rpm) {
         (Some(depth), Some(rpm)) => writeln!(
             page,
@@ -157,9 +156,7 @@ fn html(answer: &Lobes, picture: Option<&str>) -> String {
         ),
         _ => writeln!(page, "<p>No chatter up to {} mm at any speed.</p>", rounded_down(1e3 * answer.deepest_m, 2)),
     };
-    for caveat in &answer.caveats {
-        let _ = writeln!(page, "<p class=\"no\">{}</p>", markup(&caveat.message));
-    }
+    page += &warnings("", &answer.caveats.iter().map(|caveat| caveat.message.clone()).collect::<Vec<_>>());
     page += picture.unwrap_or_default();
     page += "<h2>Poses</h2>\n<table><tr><th>time [s]</th><th>minimum limit [mm]</th>\
              <th>spindle speed [1/min]</th><th>compliance along the feed [&micro;m/N]</th>\
@@ -181,6 +178,6 @@ fn html(answer: &Lobes, picture: Option<&str>) -> String {
         );
     }
     page += "</table>\n<p>Linearised about the pose with the drives locked. Not modelled: backlash and friction of \
-             the gears, process damping at low speed, flexibility of the workpiece.</p>\n</body></html>\n";
-    page
+             the gears, process damping at low speed, flexibility of the workpiece.</p>\n";
+    page + ENDING
 }

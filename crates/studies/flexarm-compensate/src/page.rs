@@ -2,16 +2,18 @@
 //! joints; a single file without scripts.
 
 use std::fmt::Write as _;
+use std::path::Path;
 
 use flexarm_draw::{CurveLook, LinePlot, Panel, PlotCurve};
 
 use super::{Compensation, ErrorFigures};
-use flexarm_run::html_page::opening;
+use flexarm_run::html_page::{ENDING, opening, warnings};
 use flexarm_settings::written::markup;
 
 /// Returns the page.
 pub(super) fn html(answer: &Compensation) -> String {
-    let mut page = opening(&format!("Compensation of {} on {}", answer.motion, answer.robot), "");
+    let motion = Path::new(&answer.motion).file_stem().unwrap_or_default().to_string_lossy();
+    let mut page = opening(&format!("Compensation of {motion} on {}", answer.robot));
     let _ = writeln!(
         page,
         "<p>Maximum TCP error (distance from the TCP of the rigid arm): {:.4} mm before, <b>{:.4} mm</b> after \
@@ -22,9 +24,7 @@ pub(super) fn html(answer: &Compensation) -> String {
         answer.iterations,
         answer.cutoff_hz.map(|hz| format!(", corrected up to {hz:.1} Hz")).unwrap_or_default()
     );
-    for caveat in &answer.caveats {
-        let _ = writeln!(page, "<p class=\"no\">{}</p>", markup(&caveat.message));
-    }
+    page += &warnings("", &answer.caveats.iter().map(|caveat| caveat.message.clone()).collect::<Vec<_>>());
     page += &curves(answer);
     page += "<h2>Other plants</h2>\n<table><tr><th>plant</th><th>peak before (mm)</th><th>peak after (mm)</th>\
              <th>RMS before (mm)</th><th>RMS after (mm)</th><th>RMS reduction</th></tr>\n";
@@ -51,7 +51,7 @@ pub(super) fn html(answer: &Compensation) -> String {
     page += &limits(answer);
     page += "<p>Not corrected: noise, backlash and hysteresis of gearboxes, errors above the cutoff frequency, and \
              effects that are not in the model.</p>\n";
-    page + "</body></html>\n"
+    page + ENDING
 }
 
 /// Describes the predicted residual vibration without and with the shaper.

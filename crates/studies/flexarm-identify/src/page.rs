@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use flexarm_draw::{CurveLook, LinePlot, Panel, PlotCurve};
 
 use super::{Compared, EncoderFigures, Identification, ResponseCurves};
-use flexarm_run::html_page::opening;
+use flexarm_run::html_page::{ENDING, opening, warnings};
 use flexarm_settings::written::markup;
 
 /// Maximum number of plotted samples of a recording.
@@ -14,8 +14,7 @@ const MOST_SAMPLES: usize = 1500;
 
 /// Returns the HTML page.
 pub(super) fn html(answer: &Identification) -> String {
-    let correlation_style = ".correlation td { text-align: center; font-size: 12px; min-width: 2.6rem }\n";
-    let mut page = opening(&format!("Identification of {}", answer.robot), correlation_style);
+    let mut page = opening(&format!("Identification of {}", answer.robot));
     let _ = writeln!(
         page,
         "<p>{} readings with {} numbers from {}.</p>",
@@ -24,9 +23,7 @@ pub(super) fn html(answer: &Identification) -> String {
         markup(&answer.measurements)
     );
     page += &headline(answer);
-    for caveat in &answer.caveats {
-        let _ = writeln!(page, "<p class=\"no\">{}</p>", markup(&caveat.message));
-    }
+    page += &warnings("", &answer.caveats.iter().map(|caveat| caveat.message.clone()).collect::<Vec<_>>());
     page += &parameters(answer);
     if !answer.frames.is_empty() {
         page += "<h2>Instruments and targets</h2>\n";
@@ -45,7 +42,7 @@ pub(super) fn html(answer: &Identification) -> String {
     answer.responses.iter().for_each(|response| page += &response_plot(response));
     answer.encoders.iter().for_each(|gear| page += &encoder_plot(gear));
     page += &correlation(answer);
-    page + "</body></html>\n"
+    page + ENDING
 }
 
 /// Returns the display unit and its factor.

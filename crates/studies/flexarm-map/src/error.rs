@@ -83,7 +83,7 @@ pub enum MapError {
         most: f64,
     },
     /// An unknown joint.
-    #[error("there is no joint {found:?} to vary; the joints are {known:?}")]
+    #[error("there is no joint {found:?} to vary; the joints are {}", flexarm_settings::known_names(found, known))]
     Joint {
         /// The joint requested.
         found: String,

@@ -6,10 +6,10 @@ use std::fmt::Write as _;
 use flexarm_draw::FieldPlot;
 use flexarm_draw::charts::histogram;
 
-use super::recording::{quantity_text, readable, scale, shown};
+use super::recording::{quantity_text, readable, scale, shown, titled};
 use super::region::Grid;
 use super::{Map, MapPose};
-use flexarm_run::html_page::opening;
+use flexarm_run::html_page::{ENDING, opening, warnings};
 use flexarm_settings::written::markup;
 
 /// Number of bars of a histogram.
@@ -17,21 +17,18 @@ const BARS: usize = 40;
 
 /// Returns the page.
 pub(super) fn html(map: &Map, grid: Option<&Grid>) -> String {
-    let mut page = opening(&format!("Map of {}", map.robot), "body { max-width: 78rem }\n");
+    let mut page = opening(&format!("Map of {}", map.robot));
     let _ = writeln!(page, "<p>{}</p>", markup(&in_short(map)));
-    for caveat in &map.caveats {
-        let _ = writeln!(page, "<p class=\"no\">{}</p>", markup(&caveat.message));
-    }
+    page += &warnings("", &map.caveats.iter().map(|caveat| caveat.message.clone()).collect::<Vec<_>>());
     if let Some(placement) = &map.placement {
-        let unit = readable(&map.by).1;
         let [low, high] = [placement.lower_m, placement.upper_m].map(|c| c.map(|x| format!("{x:.3}")).join(", "));
         let centre = placement.centre_m.map(|x| format!("{x:.3}")).join(", ");
         let _ = writeln!(
             page,
             "<h2>Best position of the workpiece</h2>\n<p>Centre at <b>{centre} m</b> (from {low} to {high} m, {} \
-             places). Worst {} in it: <b>{} {unit}</b>. The slices show its outline.</p>",
+             places). Worst {} in it: <b>{}</b>. The slices show its outline.</p>",
             placement.points,
-            markup(&map.by),
+            markup(&titled(&map.by)),
             quantity_text(&map.by, placement.worst)
         );
     }
@@ -57,7 +54,7 @@ pub(super) fn html(map: &Map, grid: Option<&Grid>) -> String {
             let _ = write!(page, " {what}: {}.", markup(name));
         }
     }
-    page + "</p>\n</body></html>\n"
+    page + "</p>\n" + ENDING
 }
 
 /// Describes the map in a sentence or two.
@@ -78,20 +75,19 @@ fn in_short(map: &Map) -> String {
         let [fx, fy, fz, tx, ty, tz] = map.wrench;
         let _ = write!(text, " Load at the TCP: {fx}, {fy}, {fz} N and {tx}, {ty}, {tz} N m (world axes).");
     }
-    text + &format!(" Best and worst by {}.", map.by)
+    text + &format!(" Best and worst by {}.", titled(&map.by))
 }
 
 fn quantities(map: &Map) -> String {
-    let mut table = "<h2>Quantities</h2>\n<table><tr><th>quantity</th><th>unit</th><th>minimum</th>\
+    let mut table = "<h2>Quantities</h2>\n<table><tr><th>quantity</th><th>minimum</th>\
                      <th>5 %</th><th>median</th><th>95 %</th><th>maximum</th></tr>\n"
         .to_owned();
     for column in map.table.columns.iter().filter(|column| column.quantity) {
         let Some(spread) = map.quantities.get(&column.name) else { continue };
-        let unit = readable(&column.name).1;
         let at = |part: &str| spread.quantiles.get(part).copied().unwrap_or(f64::NAN);
         let values = [spread.min, at("0.05"), at("0.5"), at("0.95"), spread.max];
-        let _ =
-            write!(table, "<tr><td title=\"{}\">{}</td><td>{unit}</td>", markup(&column.meaning), markup(&column.name));
+        let (meaning, title) = (markup(&column.meaning), markup(&titled(&column.name)));
+        let _ = write!(table, "<tr><td title=\"{meaning}\">{title}</td>");
         for value in values {
             let _ = write!(table, "<td>{}</td>", quantity_text(&column.name, value));
         }
@@ -110,9 +106,7 @@ fn poses(map: &Map) -> String {
         row(&markup(joint), &|pose| format!("{:.4}", pose.q[k]));
     }
     for column in map.table.columns.iter().filter(|column| column.quantity) {
-        let unit = readable(&column.name).1;
-        let name =
-            format!("{} {}", markup(&column.name), if unit.is_empty() { String::new() } else { format!("({unit})") });
+        let name = markup(&titled(&column.name));
         let value = |pose: &MapPose| pose.quantities.get(&column.name).copied().unwrap_or(f64::NAN);
         row(&name, &|pose| quantity_text(&column.name, value(pose)));
     }
@@ -125,7 +119,7 @@ fn slices(map: &Map, grid: &Grid, column: usize) -> String {
     let (factor, unit) = readable(&map.table.columns[column].name);
     let [low, high] = scale(&values).map(|x| factor * x);
     let centre = grid.index(map.best_place());
-    let mut row = format!("<h3>{}</h3>\n<div class=\"row\">\n", markup(&map.table.columns[column].name));
+    let mut row = format!("<h3>{}</h3>\n<div class=\"row\">\n", markup(&titled(&map.table.columns[column].name)));
     for (across, along, up) in [(1, 0, 2), (0, 1, 2), (2, 0, 1)] {
         let at = grid.place(map.best_place())[across];
         let axis = ["x", "y", "z"];
@@ -175,7 +169,7 @@ fn slices(map: &Map, grid: &Grid, column: usize) -> String {
 /// Draws the histogram of a quantity over the poses.
 fn spread(map: &Map, column: usize) -> String {
     let name = &map.table.columns[column].name;
-    let (factor, unit) = readable(name);
+    let factor = readable(name).0;
     let values: Vec<f64> = map.table.at(column).into_iter().map(|x| factor * x).collect();
-    histogram(&format!("{name} ({unit})"), &values, BARS)
+    histogram(&titled(name), &values, BARS)
 }

@@ -115,6 +115,18 @@ pub fn readable(name: &str) -> (f64, &'static str) {
     found.map_or((1.0, ""), |(_, factor, unit)| (*factor, *unit))
 }
 
+/// Returns the title of a quantity with the unit of [`readable`], such as "compliance worst (mm/kN)".
+pub(super) fn titled(name: &str) -> String {
+    let unit = readable(name).1;
+    let words = ["_m_per_n", "_rad_per_nm", "_rad", "_hz", "_m"].iter().find_map(|end| name.strip_suffix(end));
+    // The name of a link or joint stays as it is.
+    let words = match name.strip_prefix("share_") {
+        Some(element) => format!("share of {element}"),
+        None => words.unwrap_or(name).replace('_', " "),
+    };
+    if unit.is_empty() { words } else { format!("{words} ({unit})") }
+}
+
 /// Formats a quantity for display, in the unit of [`readable`]; limits of depth are rounded down.
 pub fn quantity_text(name: &str, value: f64) -> String {
     let shown = readable(name).0 * value;

@@ -10,7 +10,7 @@ use super::Sweep;
 use super::file::Role;
 use super::ranking::Ranking;
 use super::results::{Columns, SweepSummary};
-use flexarm_run::html_page::opening;
+use flexarm_run::html_page::{ENDING, opening, warnings};
 use flexarm_settings::written::markup;
 
 /// Maximum number of metrics with plots.
@@ -30,7 +30,7 @@ const BINS: usize = 10;
 impl Sweep {
     /// Returns the HTML page.
     pub(super) fn page(&self, summary: &SweepSummary, columns: &Columns) -> String {
-        let mut page = opening(&format!("Study {}", summary.study), "");
+        let mut page = opening(&format!("Study {}", summary.study));
         let _ = writeln!(
             page,
             "<p>{} of {} runs done, {} failed. Robot {}, varied: {}.</p>",
@@ -44,9 +44,7 @@ impl Sweep {
             let (runs, first, reason) = (failure.runs, failure.first, markup(&failure.reason));
             let _ = writeln!(page, "<p class=\"no\">{runs} runs failed, first run {first}: {reason}</p>");
         }
-        for warning in &summary.warnings {
-            let _ = writeln!(page, "<p class=\"no\">Warning: {}</p>", markup(warning));
-        }
+        page += &warnings("", &summary.warnings);
         page += &search(summary);
         page += &figures(summary);
         page += &self.best_run(summary);
@@ -57,7 +55,7 @@ impl Sweep {
         page += &sensitivities(summary);
         page += &self.pareto_plot(summary, columns);
         page += &self.matrix(columns, rankings.first());
-        page + "</body></html>\n"
+        page + ENDING
     }
 
     /// Returns the label of a parameter, and the factor for displaying its values.

@@ -13,18 +13,20 @@ use flexarm::sweep::{
     BestRun, Finders, MetricFigures, MinimiseFigures, MinimiseRequest, ParameterFigures, ParameterRole, ParameterValue,
     Replay, Shard, Sweep, SweepError, SweepRequest, SweepSummary, merge,
 };
+use flexarm::written::visible;
 
 use self::plan::PlanArgs;
 use crate::failure::Failure;
-use crate::print::{lines, table, warning};
-use crate::terminal::{Bar, Terminal, answer, to_json};
+use crate::layout::{lines, table};
+use crate::print::warnings;
+use crate::terminal::{Bar, Terminal, answer_as_is, readable, to_json};
 use crate::{shipped, signals};
 
 const EXAMPLES: &str = "\
 Examples:
   The least mass with the peak error kept, as the study's [minimise] says it:
       flexarm sweep sections.toml --minimise
-  All runs of a study on all cores, into out/payload_speed; the same command continues after a stop:
+  All runs of a study on all cores; after a stop the same command continues:
       flexarm sweep payload_speed.toml
   A quarter of them here, the others elsewhere, and all of them joined:
       flexarm sweep payload_speed.toml --shard 1/4 -o shard1
@@ -115,7 +117,7 @@ pub(crate) fn run(terminal: &Terminal, args: &SweepArgs) -> Result<ExitCode, Fai
             let output = args.output.clone().unwrap_or_else(|| args.folders[0].clone());
             let summary = merge(&sweep, &args.folders, &output, args.force, Some(command))?;
             warn(terminal, &summary);
-            answer(terminal, || to_json(&summary), || text(&summary));
+            answer_as_is(terminal, || to_json(&summary), || text(&summary));
             Ok(ExitCode::SUCCESS)
         }
         (None, Some(study)) => sweep(terminal, &args.run, study),
@@ -165,15 +167,13 @@ fn sweep(terminal: &Terminal, args: &SweepRunArgs, study: &Path) -> Result<ExitC
     bar.clear();
     let summary = result?;
     warn(terminal, &summary);
-    answer(terminal, || to_json(&summary), || text(&summary));
+    answer_as_is(terminal, || to_json(&summary), || text(&summary));
     // Some runs of a study may fail; the study fails only if no run succeeds.
     Ok(if summary.failed > 0 && summary.done == 0 { ExitCode::FAILURE } else { ExitCode::SUCCESS })
 }
 
 fn warn(terminal: &Terminal, summary: &SweepSummary) {
-    if !terminal.quiet {
-        summary.warnings.iter().for_each(|text| warning(text));
-    }
+    warnings(terminal, &summary.warnings);
 }
 
 /// Returns the command that reproduces a run from its files.
@@ -220,12 +220,13 @@ fn text(found: &SweepSummary) -> String {
     }
     out += "\n";
     let again = found.best.as_ref().and_then(|best| best.command.as_ref());
-    for (what, file) in [("runs", Some(&found.file)), ("page", found.page.as_ref()), ("again", again)] {
+    for (what, file) in [("runs", Some(&found.file)), ("page", found.page.as_ref())] {
         if let Some(file) = file {
             out += &format!("{what:<8} {file}\n");
         }
     }
-    out
+    let again = again.map_or_else(String::new, |command| format!("again    {}\n", visible(command)));
+    readable(&out) + &again
 }
 
 fn metric_table(metrics: &[MetricFigures]) -> String {
@@ -246,7 +247,6 @@ fn metric_table(metrics: &[MetricFigures]) -> String {
             strongest(metric),
         ]);
     }
-    t.align_right(1..9);
     lines(&t)
 }
 

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import shutil
 import subprocess
+import warnings
 from html import escape
 from typing import Any, Iterable, Optional, Tuple
+
+from .errors import Caveat
 
 
 def shipped_tools() -> "list[str]":
@@ -24,7 +27,10 @@ def _table(title: str, rows: Iterable[Tuple[str, str]]) -> str:
 
 
 def robot_html(robot: Any) -> str:
-    found = robot.inspect()
+    with warnings.catch_warnings():
+        # The table says nothing about a pose; those who inspect one are warned.
+        warnings.simplefilter("ignore", Caveat)
+        found = robot.inspect()
     flexible = ", ".join(link["name"] for link in found["flexible_links"]) or "none"
     return _table(
         f"Robot {robot.name}",

@@ -44,7 +44,7 @@ pub enum UrdfLinkError {
     NoRest { link: String, mesh: f64, whole: f64 },
     #[error("{0}: the mesh has more inertia than the link in the URDF; omit `rest`, or correct one of them")]
     Inertia(FemError),
-    #[error("link {link:?} has no joint {joint:?}; its joints are {known:?}")]
+    #[error("link {link:?} has no joint {joint:?}; its joints are {}", flexarm_settings::known_names(joint, known))]
     UnknownJoint { link: String, joint: String, known: Vec<String> },
 }
 

@@ -6,7 +6,7 @@ use flexarm_analysis::LinearError;
 use flexarm_fem::FemError;
 use flexarm_flexlink::{GearboxError, MountingError, SubstitutionError};
 use flexarm_kinematics::MOST_COORDINATES;
-use flexarm_settings::{OutOfRange, Setting};
+use flexarm_settings::{OutOfRange, Setting, known_names};
 use flexarm_stepping::StepError;
 
 /// Model that a link cannot have.
@@ -197,7 +197,7 @@ pub enum BalancerError {
         name: String,
     },
     /// The link does not exist.
-    #[error("balancer {name:?}: {link:?} is not a link of the robot; its links are {known:?}")]
+    #[error("balancer {name:?}: {link:?} is not a link of the robot; its links are {}", known_names(link, known))]
     UnknownLink {
         /// Name of the balancer.
         name: String,
@@ -230,7 +230,7 @@ pub enum BalancerError {
         second: String,
     },
     /// The joint does not exist.
-    #[error("balancer {name:?}: the robot has no movable joint {joint:?}; it has {known:?}")]
+    #[error("balancer {name:?}: the robot has no movable joint {joint:?}; it has {}", known_names(joint, known))]
     UnknownJoint {
         /// Name of the balancer.
         name: String,
@@ -302,7 +302,7 @@ pub enum LoopError {
         name: String,
     },
     /// The link does not exist.
-    #[error("loop {name:?}: {link:?} is not a link of the robot; its links are {known:?}")]
+    #[error("loop {name:?}: {link:?} is not a link of the robot; its links are {}", known_names(link, known))]
     UnknownLink {
         /// Name of the loop.
         name: String,
@@ -516,7 +516,7 @@ pub enum LoadError {
         wrenches: usize,
     },
     /// The frame is neither the TCP nor a moving link.
-    #[error("load on frame {frame:?}: expected \"tcp\" or a link that moves, of {known:?}")]
+    #[error("load on frame {frame:?}: expected \"tcp\" or a link that moves, of {}", known_names(frame, known))]
     UnknownFrame {
         /// Given frame.
         frame: String,
@@ -556,7 +556,7 @@ pub enum PayloadError {
         second: String,
     },
     /// The link does not exist or does not move.
-    #[error("payload link {link:?}: expected a link that moves, of {known:?}")]
+    #[error("payload link {link:?}: expected a link that moves, of {}", known_names(link, known))]
     UnknownLink {
         /// Given link.
         link: String,

@@ -2,7 +2,8 @@
 
 use flexarm_files::{Source, TextFileError as RobotFileError};
 use flexarm_kinematics::{Joint, JointKind, Link, LinkInertia, Mechanism, Pose};
-use flexarm_urdf::{UrdfRobot, closest, default_tcp};
+use flexarm_settings::known_names;
+use flexarm_urdf::{UrdfRobot, default_tcp};
 use nalgebra::{Matrix3, Vector3};
 use toml::Spanned;
 
@@ -101,7 +102,9 @@ pub(super) fn make_helical(
     let fail = |message: String| source.error(lead.span(), format!("lead of joint {name:?}: {message}"));
     let turning: Vec<String> = mechanism.joints.iter().filter(|j| j.kind.turns()).map(|j| j.name.clone()).collect();
     let joint = mechanism.joints.iter_mut().find(|j| j.name == name && j.kind.turns());
-    let joint = joint.ok_or_else(|| fail(format!("the robot has no such joint that turns; it has {turning:?}")))?;
+    let joint = joint.ok_or_else(|| {
+        fail(format!("the robot has no such joint that turns; it has {}", known_names(name, &turning)))
+    })?;
     let lead = *lead.get_ref();
     if !lead.is_finite() || lead == 0.0 {
         return Err(fail(format!("is {lead}, expected metres per turn: 0.02 for 20 mm")));
@@ -123,7 +126,8 @@ pub(super) fn limit_effort(
     let is_free = |joint: &Joint| joint.kind.degrees_of_freedom() == 1;
     let known: Vec<String> = mechanism.joints.iter().filter(|j| is_free(j)).map(|j| j.name.clone()).collect();
     let joint = mechanism.joints.iter_mut().find(|j| j.name == name && is_free(j));
-    let joint = joint.ok_or_else(|| fail(format!("the robot has no such joint that moves; it has {known:?}")))?;
+    let joint = joint
+        .ok_or_else(|| fail(format!("the robot has no such joint that moves; it has {}", known_names(name, &known))))?;
     match *limit.get_ref() {
         effort if effort > 0.0 => joint.limits.effort = effort,
         effort => return Err(fail(format!("is {effort}, expected a positive torque in N m (or force in N), or inf"))),
@@ -148,10 +152,8 @@ pub(super) fn held_joint(
     }
     let Some(joint) = mechanism.joints.iter().filter(free).find(|joint| joint.name == name) else {
         let names: Vec<&str> = mechanism.joints.iter().filter(free).map(|joint| joint.name.as_str()).collect();
-        let meant = closest(name, names.iter().copied());
-        let meant =
-            meant.map_or_else(|| format!("its joints are {names:?}"), |meant| format!("did you mean {meant:?}?"));
-        let message = format!("hold: {name:?} is not an independent joint of the robot; {meant}");
+        let known = known_names(name, &names);
+        let message = format!("hold: {name:?} is not an independent joint of the robot; its joints are {known}");
         return Err(source.error(value.span(), message));
     };
     let (lower, upper) = (joint.limits.lower, joint.limits.upper);
@@ -164,7 +166,7 @@ pub(super) fn held_joint(
 
 fn unknown_link(what: &str, link: &str, mechanism: &Mechanism) -> String {
     let known: Vec<_> = mechanism.links.iter().map(|l| l.name.as_str()).collect();
-    format!("{what} link {link:?} is not a link of the URDF; its links are {known:?}")
+    format!("{what} link {link:?} is not a link of the URDF; its links are {}", known_names(link, &known))
 }
 
 pub(super) fn tcp_of(

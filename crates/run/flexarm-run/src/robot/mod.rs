@@ -80,6 +80,12 @@ impl Robot {
         (&self.tcp.0, &self.tcp.1)
     }
 
+    /// Mass of the payload at the start of a run (kg), 0 without one.
+    pub fn payload_kg(&self) -> f64 {
+        let payload = self.rigid.links.iter().find(|link| link.name == PAYLOAD_LINK);
+        payload.and_then(|link| link.inertia.as_ref()).map_or(0.0, |inertia| inertia.mass)
+    }
+
     /// Replaces the tool centre point; the payload stays where it is. Arms built from the robot
     /// earlier keep their TCP.
     ///

@@ -37,14 +37,8 @@ pub(super) fn arm_pictures(runs: &[ReportRun<'_>]) -> String {
             continue;
         }
         out += "<div class=\"pictures\">\n";
-        let error_m = run.trace.peak.error_world[..3].iter().map(|x| x * x).sum::<f64>().sqrt();
-        let beyond = if header.color_scale_m > 0.0 && error_m > 1.001 * header.color_scale_m {
-            format!(" The tool is {} mm off, beyond the scale.", number(1e3 * error_m, 3))
-        } else {
-            String::new()
-        };
         for picture in pictures(run.trace, PICTURE_WIDTH) {
-            let caption = format!("{who}{}, at {:.3} s.{beyond}", picture.title, run.trace.peak.time_s);
+            let caption = format!("{who}{}, at {:.3} s.", picture.title, run.trace.peak.time_s);
             match picture.drawn {
                 Ok((png, axes)) => {
                     let data = base64::engine::general_purpose::STANDARD.encode(png);

@@ -14,8 +14,6 @@ mod tables;
 
 use std::fmt::Write as _;
 
-use flexarm_draw::palette::{self, Ground, hex};
-
 use self::arm::arm_pictures;
 use self::data::{data, thinning};
 use self::figures::{comparison, tiles};
@@ -23,9 +21,10 @@ use self::number::number;
 pub use self::number::short;
 use self::run::method;
 use self::tables::{iso_table, parts_tables, stops_table, stress_picture, tool_path};
+use super::again::metadata_value;
 use super::curves::{Plot, plots};
+use crate::html_page::{head, warnings};
 use crate::stepper_settings::SettingValue;
-use flexarm_settings::gathered;
 use flexarm_settings::written::markup;
 
 pub use self::run::ReportRun;
@@ -55,17 +54,7 @@ pub fn html(runs: &[ReportRun<'_>]) -> String {
     // The banner of the minified file contains a URL; licence and origin are given in a comment of
     // this page instead.
     let uplot = UPLOT.split_once("*/").map_or(UPLOT, |(_, code)| code);
-    let mut page = String::new();
-    let _ = write!(
-        page,
-        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
-         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-         <meta name=\"generator\" content=\"flexarm {}\">\n<title>{}</title>\n\
-         <style>\n{UPLOT_STYLE}\n{}{STYLE}</style>\n</head>\n<body>\n",
-        env!("CARGO_PKG_VERSION"),
-        markup(&title),
-        colors()
-    );
+    let mut page = head(&title, &format!("{UPLOT_STYLE}\n{STYLE}"));
     // The arm is rendered while the plots are written.
     let write_plots = || {
         let drawn: Vec<Vec<Plot>> = runs.iter().map(|run| plots(run.summary, run.trace)).collect();
@@ -85,23 +74,6 @@ pub fn html(runs: &[ReportRun<'_>]) -> String {
         uplot.trim_start()
     );
     page
-}
-
-/// Colours of the curves as CSS variables: `--c0` and so on, `--x`, `--y`, `--z`, `--rigid`, with a
-/// dark variant for dark colour schemes; and as `--paper-...` for print.
-fn colors() -> String {
-    let list = |prefix: &str, ground: Ground| {
-        let series = (0..palette::SERIES_LENGTH).map(|k| (format!("c{k}"), palette::series(k, ground)));
-        let axes = ["x", "y", "z"].into_iter().enumerate().map(|(k, name)| (name.to_owned(), palette::axis(k, ground)));
-        let all = series.chain(axes).chain([("rigid".to_owned(), palette::rigid(ground))]);
-        all.map(|(name, color)| format!(" --{prefix}{name}: {};", hex(color))).collect::<String>()
-    };
-    format!(
-        ":root {{{}{} }}\n@media screen and (prefers-color-scheme: dark) {{ :root {{{} }} }}\n",
-        list("", Ground::Paper),
-        list("paper-", Ground::Paper),
-        list("", Ground::Dark)
-    )
 }
 
 fn body(main: &ReportRun<'_>, runs: &[ReportRun<'_>], arm: &str, thinning: &str) -> String {
@@ -147,6 +119,8 @@ fn heading(title: &str, runs: &[ReportRun<'_>], body: &str) -> String {
         if !s.links_model.is_empty() {
             facts.push(format!("{} links", s.links_model));
         }
+        let payload = metadata_value(&runs[0].trace.header, "flexarm.model", "payload_kg");
+        facts.extend(payload.map(|kg| format!("payload {kg} kg")));
         facts.push(format!("{} s", number(s.duration_s, 4)));
         facts.extend(method(s, "step "));
     }
@@ -184,16 +158,7 @@ fn troubles(run: &ReportRun<'_>, named: bool) -> String {
     } else if s.end != "complete" {
         let _ = writeln!(out, "<p class=\"stopped\"><strong>{who}Stopped early.</strong> {}</p>", markup(&s.end));
     }
-    if !s.warnings.is_empty() {
-        let plural = if s.warnings.len() == 1 { "warning" } else { "warnings" };
-        let items: String = gathered(&s.warnings).iter().map(|w| format!("<li>{}</li>", markup(w))).collect();
-        let count = s.warnings.len();
-        let _ = writeln!(
-            out,
-            "<details class=\"warnings\" open><summary>{who}{count} {plural}</summary><ul>{items}</ul></details>"
-        );
-    }
-    out
+    out + &warnings(&who, &s.warnings)
 }
 
 fn inputs(run: &ReportRun<'_>, named: bool) -> String {
