@@ -3,20 +3,29 @@
 
     python3 tools/build_docs.py [-o target/site]
 
-Makes a virtual environment with Sphinx in target/; a warning of Sphinx is an error. The front page
-embeds the page of web/ if tools/build_web.py has built it. Exit status: 0 built, 1 a broken link or
-a warning, 3 pip cannot install Sphinx (no network).
+Makes a virtual environment with Sphinx in target/; a warning of Sphinx is an error. The page of the
+command line is written from `flexarm help`, that of the Python package from its type stubs. The front
+page embeds the page of web/ if tools/build_web.py has built it. The program is $FLEXARM, else
+target/release/flexarm, else flexarm on the PATH. Exit status: 0 built, 1 a broken link or a warning,
+3 pip cannot install Sphinx (no network).
 """
 
 import argparse
+import os
 import pathlib
 import re
 import shutil
 import subprocess
 import sys
 
+import make_gallery
+
 ROOT = pathlib.Path(__file__).resolve().parent.parent
-PACKAGES = ["sphinx==9.0.4", "myst-parser==5.2.0", "furo==2025.12.19"]
+PACKAGES = [
+    "sphinx==9.0.4", "myst-parser==5.2.0", "furo==2025.12.19", "sphinx-autoapi==3.8.0", "sphinx-copybutton==0.5.2", "sphinx-notfound-page==1.1.0",
+]
+# Written by command_line(); not stored.
+COMMAND_LINE = ROOT / "docs/command-line.md"
 
 
 def broken_links():
@@ -27,9 +36,29 @@ def broken_links():
         text = re.sub(r"```.*?```|`[^`]*`", "", (ROOT / name).read_text(), flags=re.S)
         for target in re.findall(r"\]\(([^)\s]+)\)", text):
             path = target.split("#")[0]
+            if path.startswith("python-api/") or path == COMMAND_LINE.name:
+                continue
             if path and "://" not in path and not path.startswith("mailto:") and not (ROOT / name).parent.joinpath(path).exists():
                 broken.append(f"{name}: {target} does not exist")
     return broken
+
+
+def command_line(flexarm):
+    """Writes the help of all commands as a page."""
+
+    def help_of(*command):
+        return subprocess.run([flexarm, *command, "--help"], capture_output=True, text=True, check=True, env={**os.environ, "COLUMNS": "96"}).stdout
+
+    text = "# Command line\n\nWritten from `flexarm help COMMAND`. Exit codes: 0 done, 1 the run failed, 2 bad input.\n"
+    whole = help_of()
+    text += f"\n```text\n{whole.strip()}\n```\n"
+    for line in whole.splitlines():
+        heading, command = re.fullmatch(r"([A-Z][\w ]+):", line), re.match(r"  ([a-z][a-z-]+)  +[A-Z]", line)
+        if heading and heading[1] not in ("Usage", "Start"):
+            text += f"\n## {heading[1]}\n"
+        elif command and command[1] != "help":
+            text += f"\n### {command[1]}\n\n```text\n{help_of(command[1]).strip()}\n```\n"
+    COMMAND_LINE.write_text(text)
 
 
 def main():
@@ -44,6 +73,7 @@ def main():
     if made.returncode or subprocess.run([str(python), "-m", "pip", "install", "-q", *PACKAGES], capture_output=True).returncode:
         print("skipped: pip cannot install " + ", ".join(PACKAGES))
         return 1 if broken else 3
+    command_line(make_gallery.program())
     web = ROOT / "web/dist"
     tags = ["-t", "web"] if web.is_dir() else []
     built = subprocess.run([str(python), "-m", "sphinx", *tags, "-q", "-W", "--keep-going", "-b", "html", str(ROOT / "docs"), str(out)])

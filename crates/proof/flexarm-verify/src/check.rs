@@ -5,6 +5,8 @@
 //! 5e-9, since rounding differs between processors. Pictures must have the same words and curves,
 //! with coordinates within three units of about two thousand.
 
+use std::path::{Path, PathBuf};
+
 use crate::page::FLOOR;
 
 /// Maximum absolute difference of relative errors that counts as rounding.
@@ -14,10 +16,12 @@ const RELATIVE: f64 = 0.03;
 /// Maximum difference of coordinates in a picture.
 const COORDINATE: f64 = 3.0;
 
-/// A line in which two pages differ.
+/// A line in which two pages differ, or a picture.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
 pub struct Difference {
-    /// Line number in the stored page, from 1.
+    /// Stored file.
+    pub page: PathBuf,
+    /// Line number in the stored page, from 1; 0 for a picture.
     pub line: usize,
     /// Stored text.
     pub stored: String,
@@ -26,14 +30,16 @@ pub struct Difference {
 }
 
 /// Returns the lines in which two pages differ.
-pub fn differences(stored: &str, found: &str) -> Vec<Difference> {
+///
+/// * `page`: the stored file.
+pub fn differences(page: &Path, stored: &str, found: &str) -> Vec<Difference> {
     let (stored, found): (Vec<&str>, Vec<&str>) = (stored.lines().collect(), found.lines().collect());
     (0..stored.len().max(found.len()))
         .filter_map(|k| {
             let (a, b) = (stored.get(k).copied(), found.get(k).copied());
             let same = matches!((a, b), (Some(a), Some(b)) if a == b || same_line(a, b));
             let shown = |line: Option<&str>| line.unwrap_or("(nothing)").to_owned();
-            (!same).then(|| Difference { line: k + 1, stored: shown(a), found: shown(b) })
+            (!same).then(|| Difference { page: page.to_owned(), line: k + 1, stored: shown(a), found: shown(b) })
         })
         .collect()
 }
@@ -160,6 +166,7 @@ mod tests {
 
     #[test]
     fn rounding_is_no_difference_and_news_is() {
+        let place = Path::new("page.md");
         let page =
             "| 2 parts | +1.234 % | < 1e-9 | 4.6e-7 | 22.8571 | 9.9e-4 |\nnothing x2y, 0.8 m, 2.20 of 2026-11-21";
         for (same, old, new) in [
@@ -185,9 +192,9 @@ mod tests {
             (false, "\nnothing", " nothing"),
         ] {
             let other = page.replace(old, new);
-            assert_eq!(differences(page, &other).is_empty(), same, "{old} {new}");
+            assert_eq!(differences(place, page, &other).is_empty(), same, "{old} {new}");
         }
-        assert_eq!(differences(page, &page.replace("nothing", "something"))[0].line, 2);
+        assert_eq!(differences(place, page, &page.replace("nothing", "something"))[0].line, 2);
     }
 
     /// Truth by hand: sign, digits, point, exponent; a point or an `e` without digits after it

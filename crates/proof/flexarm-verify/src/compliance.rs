@@ -81,7 +81,7 @@ mod tests {
         assert_eq!(table.columns, ["load", "a", "b"]);
         let printed: Vec<String> = table.rows.iter().map(|row| row[2].print()).collect();
         assert_eq!(printed, ["< 1e-9", "< 1e-9", "0.30 %", "< 1e-9", "< 1e-9", "< 1e-9"]);
-        let mut case = Case::new("a", "A");
+        let mut case = Case::new("a", "A", "");
         claim_each(&mut case, "loads", ("hand", &truth), &methods, 2e-3);
         let told: Vec<(&str, bool)> = case.claims().map(|claim| (claim.text.as_str(), claim.holds)).collect();
         assert_eq!(told, [("loads, a", true), ("loads, b", false)]);

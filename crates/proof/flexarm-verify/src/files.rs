@@ -1,4 +1,4 @@
-//! The page and the files that belong to it.
+//! The pages and the files that belong to them.
 
 use std::path::{Path, PathBuf};
 
@@ -7,34 +7,43 @@ use flexarm_files::{check_free, write_all};
 use crate::Error;
 use crate::Verification;
 use crate::check::{Difference, differences, same_picture};
-use crate::page::{Block, Table, claims_table, markdown, table_text, word};
+use crate::page::{Case, Claim, Table, markdown, table_text, word};
 
-/// File name of the page.
+/// File name of the first page.
 pub const PAGE: &str = "verification.md";
-/// Folder of the pictures, next to the page.
-const PICTURES: &str = "verification";
+/// Folder of the pages of the cases and of the pictures, next to the first page.
+const CASES: &str = "verification";
 /// File with every number at full precision.
 const NUMBERS: &str = "verification.json";
 
 const HEAD: &str = "\
 # Verification
 
-The case studies of this project: each method against each truth. Every number and picture on this page is written by one command from the files in \
-`robots/`, `trajectories/` and `tests/verification/`:
+Each method against each truth. Tables, pictures and claims are written by one command from the files
+in `robots/`, `trajectories/` and `tests/verification/`; a claim that does not hold fails it:
 
 ```sh
-cargo run --release -p flexarm-verify -- -o docs --force
+cargo run --release -p flexarm-verify -- -o docs --force       # CASE: that case alone
+cargo run --release -p flexarm-verify -- --check docs/verification.md
 ```
 
-`CASE` after `--` runs one case, `--check docs/verification.md` says whether the page is still what the command writes. Units are SI unless a head says \
-otherwise; errors are relative: `4.6e-7` is a fraction, from 0.1 % on they are in per cent; what is below 1e-9 is printed as that, because it is rounding and differs between machines.
+";
 
-Every claim has a bound, and the command fails if one does not hold; all of them stand at the end of the page. Bounds that were asked for are 1e-6 for statics and 1 % of the peak for motion; the others are up to twice what was measured when the case was \
-written, so that a change shows. They say what a model gives, not what is good enough: two parts miss a sixth of the sag under own weight, and that is a claim too.
+const TAIL: &str = "
+*Stored* claims compare figures that a script of `tools/crosscheck` wrote, because the data or the
+other program are not part of the project: they do not change with the program. All others are
+computed again by each run.
 
-Methods: *compliant constraints* are rigid parts in maximal coordinates with SPOOK, stiffness in the axes of the proximal part (local) or of the world (global); \
-*spring-damper* is the same parts in reduced coordinates with generalised-alpha; *n parts* are chains of rigid parts; *modal* links bend in a floating frame. \
-[theory.md](theory.md) has the equations.
+Bounds are 1e-6 for statics and 1 % of the peak for motion where these were required; the others are up
+to twice the measured value, so that a change shows. They say what a model gives, not what is good
+enough: two parts miss a sixth of the sag under own weight, and that is a claim too. Units are SI unless
+a heading says otherwise. Errors are relative, in per cent from 0.1 % on; errors below 1e-9 are rounding
+and are printed as `< 1e-9`.
+
+*Compliant constraints*: rigid parts in maximal coordinates with SPOOK, stiffness in axes of the
+proximal part (local) or of the world (global). *Spring-damper*: the same parts in reduced coordinates
+with generalised-alpha. *n parts*: chains of rigid parts. *Modal*: links with modes in a floating frame.
+[Formulation and validity](formulation.md) compares them, [theory](theory.md) has the equations.
 ";
 
 /// Output files of a verification.
@@ -44,26 +53,38 @@ pub struct VerificationFiles {
     overwrite: bool,
 }
 
-/// Returns the lines and pictures in which a stored page differs from a verification.
+/// Returns the lines and pictures in which the stored pages differ from a verification. The first
+/// page is compared if no case is left out.
+///
+/// * `path`: the stored first page.
 ///
 /// # Errors
-/// [`flexarm::Error::File`] if a figure has nothing to draw.
-pub fn differences_from(stored: &str, path: &Path, verification: &Verification) -> Result<Vec<Difference>, Error> {
-    let mut found = differences(stored, &verification.page());
-    let folder = path.parent().unwrap_or(Path::new(".")).join(PICTURES);
+/// [`flexarm::Error::File`] if a page cannot be read or a figure has nothing to draw.
+pub fn differences_from(path: &Path, verification: &Verification) -> Result<Vec<Difference>, Error> {
+    let folder = path.parent().unwrap_or(Path::new("."));
+    let mut found = Vec::new();
+    for (name, page) in verification.pages() {
+        let place = if name == PAGE { path.to_owned() } else { folder.join(&name) };
+        let what = |e| format!("the stored page cannot be read: {e}");
+        let failed = |e| flexarm::Error::File { path: place.clone(), what: what(e) };
+        let stored = std::fs::read_to_string(&place).map_err(failed)?;
+        if name != PAGE || verification.is_whole() {
+            found.extend(differences(&place, &stored, &page));
+        }
+    }
     for (name, picture) in verification.pictures()? {
-        let place = folder.join(format!("{name}.svg"));
+        let place = folder.join(CASES).join(format!("{name}.svg"));
         let old = std::fs::read_to_string(&place).unwrap_or_default();
         if old != picture && !same_picture(&old, &picture) {
             let stored = if old.is_empty() { "(nothing that can be read)" } else { "another picture" };
-            found.push(Difference { line: 0, stored: stored.into(), found: place.display().to_string() });
+            found.push(Difference { page: place, line: 0, stored: stored.into(), found: "a picture".into() });
         }
     }
     Ok(found)
 }
 
 impl VerificationFiles {
-    /// Output files in a folder. Refused if the page or its pictures already exist and may not be
+    /// Output files in a folder. Refused if the pages or the pictures already exist and may not be
     /// overwritten, or if the folder is not writable.
     ///
     /// # Errors
@@ -71,9 +92,9 @@ impl VerificationFiles {
     pub fn new(folder: impl Into<PathBuf>, overwrite: bool) -> Result<Self, Error> {
         let folder = folder.into();
         check_free(&[folder.join(PAGE), folder.join(NUMBERS)], overwrite)?;
-        let pictures = folder.join(PICTURES);
-        if !overwrite && pictures.exists() {
-            return Err(flexarm::Error::Taken { path: pictures, place: "folder", movable: false }.into());
+        let cases = folder.join(CASES);
+        if !overwrite && cases.exists() {
+            return Err(flexarm::Error::Taken { path: cases, place: "folder", movable: false }.into());
         }
         // Check write permission now rather than after a minute of computing.
         let there = folder.ancestors().find(|above| above.is_dir()).unwrap_or(Path::new("."));
@@ -83,21 +104,21 @@ impl VerificationFiles {
         Ok(Self { folder, overwrite })
     }
 
-    /// Path of the page.
+    /// Path of the first page.
     pub fn page(&self) -> PathBuf {
         self.folder.join(PAGE)
     }
 
-    /// Writes page, pictures and numbers; either all of them or none.
+    /// Writes pages, pictures and numbers; either all of them or none.
     ///
     /// # Errors
     /// [`flexarm::Error::File`], [`flexarm::Error::Write`].
     pub fn write(&self, verification: &Verification) -> Result<(), Error> {
         let mut files: Vec<(PathBuf, String)> = Vec::new();
-        files.push((self.page(), verification.page()));
+        files.extend(verification.pages().into_iter().map(|(name, page)| (self.folder.join(name), page)));
         files.push((self.folder.join(NUMBERS), verification.json() + "\n"));
         for (name, picture) in verification.pictures()? {
-            files.push((self.folder.join(PICTURES).join(format!("{name}.svg")), picture));
+            files.push((self.folder.join(CASES).join(format!("{name}.svg")), picture));
         }
         let paths: Vec<PathBuf> = files.iter().map(|(path, _)| path.clone()).collect();
         check_free(&paths, self.overwrite)?;
@@ -106,25 +127,39 @@ impl VerificationFiles {
 }
 
 impl Verification {
-    /// Returns the page as Markdown.
-    pub fn page(&self) -> String {
+    /// Whether no case and no slow part is left out.
+    fn is_whole(&self) -> bool {
+        !self.quick && self.cases.len() == crate::case_names().len()
+    }
+
+    /// Returns file name and Markdown of the first page and of the page of each case.
+    pub fn pages(&self) -> Vec<(String, String)> {
+        let of_case = |case: &Case| (format!("{CASES}/{}.md", case.name), markdown(case));
+        std::iter::once((PAGE.to_owned(), self.first_page())).chain(self.cases.iter().map(of_case)).collect()
+    }
+
+    fn first_page(&self) -> String {
         let mut text = HEAD.to_owned();
-        if self.quick || self.cases.len() < crate::case_names().len() {
+        if !self.is_whole() {
             let names: Vec<&str> = self.cases.iter().map(|case| case.name.as_str()).collect();
-            let quick = if self.quick { ", quick: what takes long is left out" } else { "" };
-            text += &format!("\n**This is a part of the page: {}{quick}.**\n", names.join(", "));
+            let quick = if self.quick { ", without slow parts" } else { "" };
+            text += &format!("**A part of the cases: {}{quick}.**\n\n", names.join(", "));
         }
-        let mut table = Table::new("", &["case", "claims", "hold"]);
+        let mut table = Table::new("", &["case", "what is compared", "claims", "hold", "stored"]);
+        let (mut covers, mut line) = (String::from("| | |\n| --- | --- |\n"), Vec::new());
         for case in &self.cases {
-            let holding = case.claims().filter(|claim| claim.holds).count();
-            let cells = [case.title.clone(), case.claims().count().to_string(), holding.to_string()];
-            table.rows.push(cells.into_iter().map(word).collect());
+            let link = format!("[{}]({CASES}/{}.md)", case.title, case.name);
+            let count = |of: &dyn Fn(&Claim) -> bool| case.claims().filter(|claim| of(claim)).count().to_string();
+            let counts = [count(&|_| true), count(&|claim| claim.holds), count(&|claim| claim.stored)];
+            table.rows.push([link, case.summary.clone()].into_iter().chain(counts).map(word).collect());
+            if let Some(figure) = case.figures().next() {
+                line.push(format!("![{}]({CASES}/{}.svg) {}", figure.caption, figure.name, case.title));
+            }
         }
-        text += &table_text(&table);
-        for case in &self.cases {
-            text += &format!("\n{}", markdown(case, PICTURES));
+        for pair in line.chunks(2) {
+            covers += &format!("| {} | {} |\n", pair[0], pair.get(1).map_or("", String::as_str));
         }
-        text + "\n## All claims\n" + &table_text(&claims_table(&self.cases))
+        format!("{}\n{covers}{TAIL}", text + table_text(&table).trim_start())
     }
 
     /// Returns everything at full precision as JSON.
@@ -137,10 +172,7 @@ impl Verification {
     /// # Errors
     /// [`flexarm::Error::File`] if a figure has nothing to draw.
     pub fn pictures(&self) -> Result<Vec<(String, String)>, Error> {
-        let figures = self.cases.iter().flat_map(|case| &case.blocks).filter_map(|block| match block {
-            Block::Figure(figure) => Some(figure),
-            _ => None,
-        });
+        let figures = self.cases.iter().flat_map(Case::figures);
         figures
             .map(|figure| {
                 let fault = |e| flexarm::Error::File { path: Path::new(&figure.name).to_owned(), what: format!("{e}") };

@@ -1,7 +1,7 @@
 //! Case studies that compare each method with each truth, from shipped files; the results are
 //! tables, figures and claims with bounds.
 //!
-//! [`verify`] runs them, [`Verification::page`] makes the page `docs/verification.md`. A case is a
+//! [`verify`] runs them, [`Verification::pages`] makes `docs/verification.md` and a page per case. A case is a
 //! module with one function that takes a [`Bench`] and returns a [`page::Case`]; a new case gets a
 //! line in `CASES`. Within a case, some files compute findings (plain numbers with names) and
 //! others write the text: the numbers in its sentences come from the findings and from constants.

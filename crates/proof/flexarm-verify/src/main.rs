@@ -31,7 +31,7 @@ struct Args {
     /// Folder with robots, trajectories and tests [default: here, else where the program was built]
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
-    /// Folder for verification.md, its pictures and verification.json
+    /// Folder for verification.md, a page per case, pictures and verification.json
     #[arg(long, short, value_name = "DIR", default_value = "out/verification")]
     output: PathBuf,
     /// Overwrite existing files
@@ -40,8 +40,8 @@ struct Args {
     /// Write no files
     #[arg(long, conflicts_with_all = ["output", "force"])]
     no_files: bool,
-    /// Compare with a stored page of the same cases instead of writing one; exit code 1 if it
-    /// differs
+    /// Compare with the stored pages of the same cases instead of writing them; exit code 1 if they
+    /// differ
     #[arg(long, value_name = "FILE", conflicts_with_all = ["output", "force"])]
     check: Option<PathBuf>,
     /// Print one JSON object
@@ -74,15 +74,11 @@ fn main() -> ExitCode {
 }
 
 fn run(args: &Args) -> Result<ExitCode, Error> {
-    let stored = match &args.check {
-        Some(path) => {
-            let what = |e| format!("the stored page cannot be read: {e}");
-            let failed = |e| flexarm::Error::File { path: path.clone(), what: what(e) };
-            Some((path, std::fs::read_to_string(path).map_err(failed)?))
-        }
-        None => None,
-    };
-    let wanted = !args.no_files && stored.is_none();
+    if let Some(path) = args.check.as_ref().filter(|path| !path.is_file()) {
+        let what = "the stored page cannot be read: there is no such file".to_owned();
+        return Err(flexarm::Error::File { path: path.clone(), what }.into());
+    }
+    let wanted = !args.no_files && args.check.is_none();
     let files = wanted.then(|| VerificationFiles::new(&args.output, args.force)).transpose()?;
     let root = args.data.clone().unwrap_or_else(checkout);
     let bench = Bench { root, scratch: std::env::temp_dir(), quick: args.quick };
@@ -99,10 +95,7 @@ fn run(args: &Args) -> Result<ExitCode, Error> {
     if let Some(files) = &files {
         files.write(&verification)?;
     }
-    let changed = match &stored {
-        Some((path, page)) => differences_from(page, path, &verification)?,
-        None => Vec::new(),
-    };
+    let changed = args.check.as_ref().map_or(Ok(Vec::new()), |path| differences_from(path, &verification))?;
     let page = files.map(|files| files.page());
     if args.json {
         let case = |c: &flexarm_verify::page::Case| {
@@ -162,10 +155,11 @@ fn comparison(path: &Path, changed: &[Difference]) -> String {
         changed.len(),
         folder.display()
     );
-    for Difference { line, stored, found } in changed.iter().take(SHOWN) {
+    for Difference { page, line, stored, found } in changed.iter().take(SHOWN) {
+        let place = page.display();
         text += &match line {
-            0 => format!("  picture {found}: stored is {stored}\n"),
-            _ => format!("  line {line}\n    stored {stored}\n    found  {found}\n"),
+            0 => format!("  {place}: stored is {stored}\n"),
+            _ => format!("  {place}, line {line}\n    stored {stored}\n    found  {found}\n"),
         };
     }
     match changed.len().saturating_sub(SHOWN) {

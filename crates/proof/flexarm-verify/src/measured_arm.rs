@@ -23,11 +23,12 @@ const INSTRUMENT_MM: f64 = 1.3;
 /// Runs the case.
 pub(crate) fn case(bench: &Bench, _pace: &mut Pace<'_>) -> Result<Case, Error> {
     let stored = bench.stored(STORED)?;
-    let mut case = Case::new("measured-arm", "8. A measured arm on a telescopic column");
+    let mut case =
+        Case::new("measured-arm", "8. A measured arm on a telescopic column", "positions by a total station, tilts");
     case.text(format!(
         "A six-axis arm with a tool on a column of two telescopic tubes, 1.98 to 3.87 m high, with a prism on the tool and a total station ({}). The arm's own weight is the \
          load. {} The figures are stored by `tools/crosscheck/measured_arm.py`, which reads a copy of the data; none of the data is in the project \
-         ([measured_arm.md](measured_arm.md)).",
+         ([measured_arm.md](../measured_arm.md)).",
         text(&stored, "source")?,
         text(&stored, "licence")?
     ));
@@ -51,7 +52,12 @@ fn method(case: &mut Case, stored: &Stored) -> Result<(), Error> {
     let truth = "independent model in numpy";
     for (key, with) in [("springs_mm", "springs"), ("play_mm", "springs and play")] {
         let claim = format!("displacement of the prism under its weight, {with} [m]");
-        case.claim(claim, truth, 1e-3 * stored.number(&format!("method/{key}"))?, Bound::AtMost(1e-3 * METHOD_MM));
+        case.stored_claim(
+            claim,
+            truth,
+            1e-3 * stored.number(&format!("method/{key}"))?,
+            Bound::AtMost(1e-3 * METHOD_MM),
+        );
     }
     Ok(())
 }
@@ -88,7 +94,7 @@ fn places(case: &mut Case, stored: &Stored) -> Result<(), Error> {
             model["urdf"].as_str().unwrap_or("?")
         );
         let bound = HELD_OUT_MM[usize::from(play)] / rigid_mm;
-        case.claim(claim, "total station", held / rigid_mm, Bound::AtMost(bound));
+        case.stored_claim(claim, "total station", held / rigid_mm, Bound::AtMost(bound));
     }
     case.table(table);
     case.figure(distances(stored)?);
@@ -164,6 +170,6 @@ fn tilts(case: &mut Case, stored: &Stored) -> Result<(), Error> {
         ]);
     }
     case.table(table);
-    case.claim("law of the tilt about x at five heights", "accelerometers", worst, Bound::AtMost(TILT));
+    case.stored_claim("law of the tilt about x at five heights", "accelerometers", worst, Bound::AtMost(TILT));
     Ok(())
 }

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use flexarm_fe_io::mesh::{ReadOptions, read_mesh};
-use flexarm_fem::chain::{Chain, ChainSource, energy_by_slice};
+use flexarm_fem::chain::energy_by_slice;
 use flexarm_fem::element::Quadrature;
 use flexarm_fem::mesh::Mesh;
 use flexarm_fem::model::{AssemblyOptions, FeModel};
@@ -100,11 +100,6 @@ pub(crate) struct Condensed<'m> {
 }
 
 impl Condensed<'_> {
-    /// Reference points of A and B (m).
-    pub(crate) fn points(&self) -> (Vector3<f64>, Vector3<f64>) {
-        (self.p_A, self.p_B)
-    }
-
     /// Motion of B (rows) under unit wrenches at B, with A held.
     pub(crate) fn compliance(&self) -> Result<Matrix6<f64>, Error> {
         let K: Matrix6<f64> = self.inner.stiffness().fixed_view::<6, 6>(6, 6).into();
@@ -113,22 +108,10 @@ impl Condensed<'_> {
 
     /// Motion of B under a uniform acceleration (m/s²), with A held.
     pub(crate) fn under_acceleration(&self, g: &Vector3<f64>) -> Vector6<f64> {
-        self.under_weight_between(g, f64::NEG_INFINITY, f64::INFINITY)
-    }
-
-    /// The same, but only the nodes between two fractions of the distance from A to B have weight.
-    pub(crate) fn under_weight_between(&self, g: &Vector3<f64>, from: f64, to: f64) -> Vector6<f64> {
         let model = self.inner.model();
         let R = model.rigid_modes(&Vector3::zeros());
         let g = DMatrix::from_fn(6, 1, |i, _| if i < 3 { g[i] } else { 0.0 });
-        let mut F = model.M.product(&(R * g));
-        let along = self.p_B - self.p_A;
-        for (node, p) in model.nodes.iter().enumerate() {
-            let fraction = (p - self.p_A).dot(&along) / along.norm_squared();
-            if fraction < from || fraction >= to {
-                model.dofs.of(node).for_each(|dof| F[dof] = 0.0);
-            }
-        }
+        let F = model.M.product(&(R * g));
         let u = self.inner.tip_under(&F);
         Vector6::from_fn(|i, _| u[(i, 0)])
     }
@@ -144,20 +127,6 @@ impl Condensed<'_> {
         let materials = vec![Material::ALUMINIUM; mesh.mesh.regions.len()];
         let U = self.inner.unit_load_shapes();
         energy_by_slice(&mesh.mesh, &mesh.model, &materials, Quadrature::Exact, &U, &planes)
-    }
-
-    /// Chain of `parts` parts.
-    pub(crate) fn chain(&self, mesh: &Meshed, parts: usize) -> Result<Chain, Error> {
-        let source = ChainSource {
-            mesh: &mesh.mesh,
-            model: &mesh.model,
-            materials: &vec![Material::ALUMINIUM; mesh.mesh.regions.len()],
-            quadrature: Quadrature::Exact,
-            U: &self.inner.unit_load_shapes(),
-            p_LA: self.p_A,
-            p_LB: self.p_B,
-        };
-        source.chain(parts).map_err(|e| fault(self.path, e))
     }
 
     /// Frequencies with A held and B free (Hz).

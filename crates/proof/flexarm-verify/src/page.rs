@@ -16,6 +16,8 @@ pub struct Case {
     pub name: String,
     /// Heading.
     pub title: String,
+    /// Subject and truths, in a line.
+    pub summary: String,
     /// Content, in order.
     pub blocks: Vec<Block>,
 }
@@ -103,6 +105,8 @@ pub struct Claim {
     pub measured: f64,
     /// Bound.
     pub bound: Bound,
+    /// Whether the number comes from stored figures, so that it does not change with the program.
+    pub stored: bool,
     /// Whether the claim holds.
     pub holds: bool,
 }
@@ -147,8 +151,8 @@ impl Claim {
 
 impl Case {
     /// Creates a case without content.
-    pub fn new(name: &str, title: &str) -> Self {
-        Self { name: name.into(), title: title.into(), blocks: Vec::new() }
+    pub fn new(name: &str, title: &str, summary: &str) -> Self {
+        Self { name: name.into(), title: title.into(), summary: summary.into(), blocks: Vec::new() }
     }
 
     /// Adds a heading.
@@ -173,8 +177,17 @@ impl Case {
 
     /// Adds a claim; a number that is not finite violates it.
     pub fn claim(&mut self, text: impl Into<String>, truth: impl Into<String>, measured: f64, bound: Bound) {
+        self.add_claim(text.into(), truth.into(), measured, bound, false);
+    }
+
+    /// Adds a claim about stored figures alone.
+    pub fn stored_claim(&mut self, text: impl Into<String>, truth: impl Into<String>, measured: f64, bound: Bound) {
+        self.add_claim(text.into(), truth.into(), measured, bound, true);
+    }
+
+    fn add_claim(&mut self, text: String, truth: String, measured: f64, bound: Bound, stored: bool) {
         let holds = bound.holds(measured);
-        self.blocks.push(Block::Claim(Claim { text: text.into(), truth: truth.into(), measured, bound, holds }));
+        self.blocks.push(Block::Claim(Claim { text, truth, measured, bound, stored, holds }));
     }
 
     /// Returns the claims, in order.
@@ -301,23 +314,21 @@ fn significant(x: f64, n: usize) -> String {
     format!("{:.*}", (n as i32 - 1 - exponent).max(0) as usize, x)
 }
 
-/// Returns the Markdown of a case; its pictures are in `folder`.
-pub fn markdown(case: &Case, folder: &str) -> String {
-    let mut text = format!("## {}\n", case.title);
+/// Returns the page of a case, Markdown; its pictures are in the same folder.
+pub fn markdown(case: &Case) -> String {
+    let mut text = format!("# {}\n", case.title);
     for block in &case.blocks {
         match block {
-            Block::Heading(heading) => text += &format!("\n### {heading}\n"),
+            Block::Heading(heading) => text += &format!("\n## {heading}\n"),
             Block::Text(paragraph) => text += &format!("\n{paragraph}\n"),
             Block::Table(table) => text += &format!("\n{}", table_text(table)),
-            Block::Figure(figure) => {
-                let Figure { name, caption, .. } = figure;
-                text += &format!("\n![{caption}]({folder}/{name}.svg)\n\n*{caption}*\n");
+            Block::Figure(Figure { name, caption, .. }) => {
+                text += &format!("\n![{caption}]({name}.svg)\n\n*{caption}*\n");
             }
-            // All claims are listed at the top of the page.
             Block::Claim(_) => {}
         }
     }
-    text
+    text + "\n## Claims\n" + &table_text(&claims_table(case))
 }
 
 pub(crate) fn table_text(table: &Table) -> String {
@@ -328,15 +339,14 @@ pub(crate) fn table_text(table: &Table) -> String {
     format!("{caption}\n{heads}{rows}")
 }
 
-/// Lists all claims of all cases in one table.
-pub fn claims_table(cases: &[Case]) -> Table {
-    let mut table = Table::new("", &["case", "claim", "truth", "measured", "bound", ""]);
-    for case in cases {
-        for claim in case.claims() {
-            let holds = if claim.holds { "holds" } else { "**does not hold**" };
-            let cells = [&case.name, &claim.text, &claim.truth, &claim.found(), &claim.limit(), holds];
-            table.rows.push(cells.into_iter().map(|text| word(text.to_owned())).collect());
-        }
+/// Lists the claims of a case.
+pub fn claims_table(case: &Case) -> Table {
+    let mut table = Table::new("", &["claim", "truth", "measured", "bound", ""]);
+    for claim in case.claims() {
+        let holds = if claim.holds { "holds" } else { "**does not hold**" };
+        let holds = if claim.stored { format!("{holds}, stored") } else { holds.to_owned() };
+        let cells = [claim.text.clone(), claim.truth.clone(), claim.found(), claim.limit(), holds];
+        table.rows.push(cells.into_iter().map(word).collect());
     }
     table
 }
@@ -390,23 +400,23 @@ mod tests {
     fn a_claim_fails_when_its_bound_is_passed() {
         let bounds = [(Bound::AtMost(0.01), [true, true, false]), (Bound::AtLeast(0.01), [false, true, true])];
         for (bound, expected) in bounds {
-            let mut case = Case::new("a", "A");
+            let mut case = Case::new("a", "A", "");
             for measured in [0.0099, 0.01, 0.0101] {
                 case.claim("x", "y", measured, bound);
             }
             assert_eq!(case.claims().map(|claim| claim.holds).collect::<Vec<_>>(), expected, "{bound:?}");
-            let printed = table_text(&claims_table(&[case]));
+            let printed = table_text(&claims_table(&case));
             assert_eq!(printed.matches("**does not hold**").count(), expected.iter().filter(|holds| !**holds).count());
         }
-        let mut case = Case::new("a", "A");
+        let mut case = Case::new("a", "A", "");
         case.claim("sag", "by hand", 2e-3, Bound::AtMost(1e-3));
-        let row = "| a | sag | by hand | 0.20 % | ≤ 0.10 % | **does not hold** |\n";
-        assert!(table_text(&claims_table(&[case])).ends_with(row));
+        let row = "| sag | by hand | 0.20 % | ≤ 0.10 % | **does not hold** |\n";
+        assert!(table_text(&claims_table(&case)).ends_with(row));
     }
 
     #[test]
     fn what_is_no_number_holds_no_bound() {
-        let mut case = Case::new("a", "A");
+        let mut case = Case::new("a", "A", "");
         case.claim("x", "y", f64::NAN, Bound::AtMost(1.0));
         case.claim("x", "y", f64::NAN, Bound::AtLeast(1.0));
         case.claim("x", "y", 0.5, Bound::AtMost(1.0));

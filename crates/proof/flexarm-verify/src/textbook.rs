@@ -135,47 +135,6 @@ pub fn rectangle_torsion(long: f64, short: f64) -> f64 {
     long * short.powi(3) * (1.0 / 3.0 - 64.0 / PI.powi(5) * short / long * series)
 }
 
-/// Torsion constant (m⁴) of a hollow rectangle with uniform wall thickness, by finite differences
-/// on Prandtl's stress function: zero on the outer boundary, one unknown constant on the hole.
-/// Timoshenko & Goodier, articles 104 and 115.
-///
-/// * `cells`: grid cells across the wall; the error decreases with `cells^(-4/3)` because of the
-///   inner corners.
-pub fn hollow_rectangle_torsion(width: f64, height: f64, wall: f64, cells: usize) -> f64 {
-    let d = wall / cells as f64;
-    let (nx, ny) = ((width / d).round() as usize, (height / d).round() as usize);
-    let is_hole = |i: usize, j: usize| i >= cells && i <= nx - cells && j >= cells && j <= ny - cells;
-    // Area of the hole plus half a cell around it, in cells.
-    let hole_area = ((nx - 2 * cells + 1) * (ny - 2 * cells + 1)) as f64;
-    let at = |i: usize, j: usize| i * (ny + 1) + j;
-    let sides = (cells..=ny - cells).flat_map(|j| [at(cells - 1, j), at(nx - cells + 1, j)]);
-    let ends = (cells..=nx - cells).flat_map(|i| [at(i, cells - 1), at(i, ny - cells + 1)]);
-    let around: Vec<usize> = sides.chain(ends).collect();
-    let mut phi = vec![0.0; (nx + 1) * (ny + 1)];
-    // Successive over-relaxation.
-    let over = 2.0 / (1.0 + (std::f64::consts::PI / nx.min(ny) as f64).sin());
-    let (mut J, mut before) = (0.0f64, -1.0);
-    while (J - before).abs() > 1e-9 * J.abs() {
-        before = J;
-        for _ in 0..50 {
-            for i in 1..nx {
-                for j in (1..ny).filter(|j| !is_hole(i, *j)) {
-                    let sum = phi[at(i - 1, j)] + phi[at(i + 1, j)] + phi[at(i, j - 1)] + phi[at(i, j + 1)];
-                    phi[at(i, j)] += over * (0.25 * (sum + 2.0) - phi[at(i, j)]);
-                }
-            }
-            let sum: f64 = around.iter().map(|k| phi[*k]).sum();
-            let hole = phi[at(cells, cells)];
-            let hole = hole + over * ((sum + 2.0 * hole_area) / around.len() as f64 - hole);
-            for i in cells..=nx - cells {
-                phi[at(i, cells)..=at(i, ny - cells)].fill(hole);
-            }
-        }
-        J = 2.0 * phi.iter().sum::<f64>();
-    }
-    J * d.powi(4)
-}
-
 /// Finds a zero of `f` between two points at which its signs differ, by bisection.
 fn bisect(f: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
     let below = f(low) < 0.0;
@@ -241,17 +200,6 @@ mod tests {
     fn torsion_of_rectangles_is_that_of_the_table() {
         assert!((rectangle_torsion(1.0, 1.0) - 0.1406).abs() < 5e-5);
         assert!((rectangle_torsion(2.0, 1.0) / 2.0 - 0.2287).abs() < 5e-5);
-    }
-
-    /// Truth: the series for the solid square, whose hole is one grid point; for a thin wall, Bredt
-    /// plus the `s t³/3` of the walls themselves.
-    #[test]
-    fn torsion_of_hollow_rectangles_lies_between_solid_and_thin_ones() {
-        let solid = hollow_rectangle_torsion(1.0, 1.0, 0.5, 40);
-        assert!((solid / rectangle_torsion(1.0, 1.0) - 1.0).abs() < 2e-3, "{solid}");
-        let thin = hollow_rectangle_torsion(1.0, 1.0, 0.02, 2);
-        let bredt = 0.02 * 0.98f64.powi(3);
-        assert!((thin / bredt - 1.0).abs() < 1e-2, "{}", thin / bredt);
     }
 
     /// Truth: a force and a moment at the end agree with the compliance of the end; curves are

@@ -62,15 +62,15 @@ fn a_case_is_written_once_and_then_checked() {
     let claims = found["claims"].as_array().unwrap();
     assert!(claims.len() > 20 && claims.iter().all(|c| c["case"] == "one-beam" && c["claim"]["holds"] == true));
     assert_eq!(found["file"], "page/verification.md");
-    // The page refers to its pictures and they exist.
-    let page = place.text("page/verification.md");
+    // The first page leads to that of the case, which refers to its pictures; they exist.
+    let first = place.text("page/verification.md");
     assert!(
-        page.contains("## 1. One beam")
-            && page.contains("| --- |")
-            && page.contains("part of the page: one-beam, quick")
+        first.contains("[1. One beam](verification/one-beam.md)") && first.contains("A part of the cases: one-beam")
     );
+    let page = place.text("page/verification/one-beam.md");
+    assert!(page.starts_with("# 1. One beam") && page.contains("## Claims"));
     let pictures: Vec<&str> =
-        page.split("](verification/").skip(1).map(|rest| rest.split(')').next().unwrap()).collect();
+        page.split("](").skip(1).map(|rest| rest.split(')').next().unwrap()).filter(|p| p.ends_with(".svg")).collect();
     assert!(pictures.len() >= 4);
     for picture in pictures {
         assert!(place.text(&format!("page/verification/{picture}")).starts_with("<svg"), "{picture}");
@@ -86,13 +86,17 @@ fn a_case_is_written_once_and_then_checked() {
     assert_eq!((same.code, same.out.contains("is what this program writes")), (Some(0), true), "{}", same.out);
     let line = page.lines().position(|line| line.contains("| F_y | 91.4286 |")).unwrap() + 1;
     let changed = page.replacen("| F_y | 91.4286 |", "| F_y | 95.4286 |", 1);
-    std::fs::write(place.path("page/verification.md"), changed).unwrap();
+    std::fs::write(place.path("page/verification/one-beam.md"), changed).unwrap();
     let other = place.run(&check);
     assert_eq!(other.code, Some(1), "{}", other.out);
-    assert!(other.out.contains(&format!("line {line}\n")) && other.out.contains("95.4286"), "{}", other.out);
+    assert!(
+        other.out.contains(&format!("one-beam.md, line {line}\n")) && other.out.contains("95.4286"),
+        "{}",
+        other.out
+    );
 
     // A missing picture is reported too.
-    std::fs::write(place.path("page/verification.md"), &page).unwrap();
+    std::fs::write(place.path("page/verification/one-beam.md"), &page).unwrap();
     std::fs::remove_file(place.path("page/verification/one-beam-steps.svg")).unwrap();
     let gone = place.run(&check);
     assert_eq!((gone.code, gone.out.contains("one-beam-steps.svg")), (Some(1), true), "{}", gone.out);

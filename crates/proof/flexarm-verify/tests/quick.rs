@@ -36,7 +36,7 @@ fn every_claim_of_the_quick_cases_holds() {
 #[test]
 fn the_same_case_gives_the_same_bytes() {
     let [a, b] = [(); 2].map(|()| quick(&["one-beam"]));
-    assert_eq!(a.page(), b.page());
+    assert_eq!(a.pages(), b.pages());
     assert_eq!(a.json(), b.json());
     assert_eq!(a.pictures().expect("drawn"), b.pictures().expect("drawn"));
 }

@@ -21,10 +21,14 @@ const CHAIN_BOUNDS: [f64; 2] = [0.015, 4e-3];
 const MODAL_BOUNDS: [(&str, f64); 3] = [("slew_30", 0.02), ("slew_20", 0.04), ("spin_30", 0.02)];
 
 pub(super) fn page(found: &Findings) -> Case {
-    let mut case = Case::new("benchmarks", "7. Benchmarks in large motion");
+    let mut case = Case::new(
+        "benchmarks",
+        "7. Benchmarks in large motion",
+        "slender arms, slider crank, blade: geometrically exact beams, CalculiX",
+    );
     case.text(format!(
-        "Slender beams that move fast and far, from plain files that any program can read (`{FOLDER}`, with the rules \
-         and the origin of each truth). Nothing damps them."
+        "Slender beams that move fast and far, without damping, from plain files that any program can read \
+         (`{FOLDER}`, with the rules and the origin of each truth)."
     ));
     two_link_arms(&mut case, &found.two_link);
     slider_crank(&mut case, &found.slider_crank);
@@ -65,10 +69,11 @@ fn two_link_arms(case: &mut Case, found: &TwoLink) {
     let text = "the same in spin_30 without stiffness by load";
     case.claim(text, EXACT_ARM, error_of("spin_30", LINEAR), Bound::AtLeast(0.03));
     case.text(format!(
-        "Chains of rigid parts bend as far as they need to: their error falls with the square of the number of parts, \
-         also where the tip deviates by more than a metre. Modal links ({MODES} modes) assume small deflections of \
-         each link from its own frame. With stiffness by load they hold while a link deflects by a few per cent of \
-         its length; the arms of 10 mm are beyond them, and with stiffness by load their steps do not converge (-)."
+        "Chains of rigid parts bend without limit: their error falls with the square of the number of parts, \
+         also where the tip deviates by more than a metre. Modal links ({MODES} modes) assume small \
+         deflections of each link from its own frame. With stiffness by load they hold while a link deflects \
+         by a few per cent of its length; the arms of 10 mm are beyond that, and their steps do not converge \
+         (-)."
     ));
     case.figure(spin_figure(found));
 }
@@ -131,10 +136,10 @@ fn slider_crank(case: &mut Case, found: &SliderCrank) {
     case.claim(text, EXACT_ROD, stiffened, Bound::AtMost(0.01));
     case.claim("the same without stiffness by load", EXACT_ROD, plain_modal, Bound::AtLeast(0.03));
     case.text(
-        "Chains carry the rod's axial force by themselves; modal links need stiffness by load for it, which includes \
-         the force of the loop's pin. Their frame is clamped at the near end, and the far end moves along a straight line there, not on an arc: the chord gets longer by half the squared \
-         slope. This second-order displacement is not in them; it is what is left in the slider's position, also \
-         with stiffness by load.",
+        "Chains carry the axial force of the rod by themselves; modal links need stiffness by load for it, \
+         which includes the force of the loop's pin. The far end of a modal link moves along a straight line \
+         in its frame and not on an arc, so the chord becomes longer by half the squared slope. This is the \
+         remaining error of the slider.",
     );
     case.figure(rod_figure(found));
 }

@@ -5,8 +5,6 @@
 //! findings, `page` and `parts_page` write them up.
 
 mod page;
-mod parts;
-mod parts_page;
 mod study;
 mod truth;
 
@@ -20,7 +18,6 @@ use crate::bench::Bench;
 use crate::meshed::Meshed;
 use crate::page::Case;
 
-use parts::LimitOfParts;
 use study::{FlangeLoads, Frequencies, Ties, Weight};
 use truth::{Program, Truth};
 
@@ -57,7 +54,6 @@ struct About {
 /// Findings on the whole mesh.
 struct MeshResult {
     degrees_of_freedom: usize,
-    limit_of_parts: LimitOfParts,
     ties: Ties,
 }
 
@@ -91,11 +87,8 @@ impl Findings {
         let (p_A, p_B) = (reduced.X_LA.translation.vector, reduced.X_LB.translation.vector);
         let condensed = mesh.condensed([Tie::Rigid; 2], p_A, p_B)?;
         let truth = Truth::new(&condensed)?;
-        let whole = MeshResult {
-            degrees_of_freedom: mesh.size(),
-            limit_of_parts: LimitOfParts::new(&mesh, &condensed, &truth)?,
-            ties: Ties::new(&mesh, [p_A, p_B], &truth, &programs)?,
-        };
+        let whole =
+            MeshResult { degrees_of_freedom: mesh.size(), ties: Ties::new(&mesh, [p_A, p_B], &truth, &programs)? };
         Self::against(&robot, &truth, &programs, about, Some(whole))
     }
 

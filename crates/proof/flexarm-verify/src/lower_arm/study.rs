@@ -8,8 +8,8 @@ use super::truth::{MODES, Program, Truth};
 use super::{ALL_MODES, B, CHAINS, G};
 use crate::Error;
 use crate::bench::{
-    Rig, Worst, column_error, compliance_error, damped, in_modes, in_parts, larger, parts, shift_and_turn_errors,
-    small_loads, weight_response, weightless,
+    Rig, Worst, compliance_error, in_modes, in_parts, larger, shift_and_turn_errors, small_loads, weight_response,
+    weightless,
 };
 use crate::compliance::{Method, by_every_method};
 use crate::meshed::{Meshed, inverse};
@@ -28,16 +28,6 @@ pub(super) struct FlangeLoads {
     pub(super) programs: Vec<Method>,
     pub(super) link_file: Method,
     pub(super) methods: Vec<Method>,
-    pub(super) axial: AxialLoad,
-}
-
-/// The usual load along the casting, two parts.
-pub(super) struct AxialLoad {
-    pub(super) force_n: f64,
-    /// Sideways deflection of the casting (m).
-    pub(super) sideways_m: f64,
-    /// Error of the response, which is due to geometry.
-    pub(super) error: f64,
 }
 
 impl FlangeLoads {
@@ -53,21 +43,7 @@ impl FlangeLoads {
             programs: programs.iter().map(program).collect(),
             link_file: Method { name: "link file".into(), C: filed.ok_or(Error::SingularLink)? },
             methods: by_every_method(robot, B, &loads, SETTLING_STEP_S, &others)?,
-            axial: AxialLoad::new(robot, &truth.C)?,
         })
-    }
-}
-
-impl AxialLoad {
-    fn new(robot: &Robot, truth: &Matrix6<f64>) -> Result<Self, Error> {
-        let two = Rig::new(&damped(weightless(robot.clone())), &parts(2), B)?;
-        let force_n = small_loads(truth)[F_Z];
-        let wrench = Vector6::new(0.0, 0.0, force_n, 0.0, 0.0, 0.0);
-        let column = (two.statics(&wrench)? - two.statics(&-wrench)?) / (2.0 * force_n);
-        let mut C = *truth;
-        C.set_column(F_Z, &column);
-        let sideways_m = force_n * truth[(0, F_Z)].hypot(truth[(1, F_Z)]);
-        Ok(Self { force_n, sideways_m, error: column_error(&C, truth, F_Z) })
     }
 }
 
@@ -144,15 +120,10 @@ pub(super) struct Frequencies {
     pub(super) programs: Vec<(&'static str, Vec<f64>)>,
     /// Relative differences and number of elastic coordinates.
     pub(super) models: Vec<(Model, Vec<f64>, usize)>,
-    /// First and last frequency of the link file's modes, both seats held (Hz).
-    pub(super) held_hz: [f64; 2],
 }
 
 impl Frequencies {
     pub(super) fn new(robot: &Robot, truth: &Truth, programs: &[Program; 2]) -> Result<Self, Error> {
-        let details = robot.flexible_links[0].flexible.reduced.details.as_ref();
-        let element = details.and_then(|details| details.superelement.as_ref());
-        let held = element.map(|element| element.fixed_frequencies_hz()).unwrap_or_default();
         let models = models().into_iter().map(|model| {
             let rig = Rig::new(&weightless(robot.clone()), &model.modelling, B)?;
             let errors = truth.hz_errors(&rig.arm.modes.frequencies_hz());
@@ -162,14 +133,7 @@ impl Frequencies {
             hz: truth.hz.clone(),
             programs: programs.iter().map(|p| (p.name, truth.hz_errors(&p.truth.hz))).collect(),
             models: models.collect::<Result<_, Error>>()?,
-            held_hz: [held.first(), held.last()].map(|f| f.copied().unwrap_or(f64::NAN)),
         })
-    }
-
-    /// Mean error of the first two frequencies with `parts` parts.
-    pub(super) fn first_two(&self, parts: usize) -> f64 {
-        let found = self.models.iter().find(|(model, ..)| model.parts == Some(parts));
-        found.map_or(f64::NAN, |(_, errors, _)| 0.5 * (errors[0] + errors[1]))
     }
 }
 

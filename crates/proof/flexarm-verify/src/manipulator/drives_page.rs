@@ -14,8 +14,9 @@ const MODES: usize = 4;
 pub(super) fn which_flexibility(case: &mut Case, found: &Flexibilities) {
     case.heading("Which flexibility matters");
     case.text(format!(
-        "`{DRIVES}` has gearboxes that yield, besides: stiffness and damping identified on another KR 210 whose links were taken as rigid (so what bends \
-         in them is in the gearboxes' numbers too, and \"both\" is an upper bound). Motors follow the motion exactly; spring-damper, two parts, {} ms.",
+        "`{DRIVES}` adds elastic gearboxes, with stiffness and damping identified on another KR 210 whose \
+         links were taken as rigid: the numbers of the gearboxes contain some deflection of links, and \"both\" \
+         is an upper bound. Motors follow the motion exactly; spring-damper, two parts, {} ms.",
         plain(1e3 * STEP_S)
     ));
     let mut table = Table::new(
@@ -39,8 +40,9 @@ pub(super) fn which_flexibility(case: &mut Case, found: &Flexibilities) {
         Bound::AtMost(0.01),
     );
     case.text(
-        "Drives of this class give three to four times what the castings do. At rest the two add up. In motion peaks need not: both together ring lower and longer (point_to_point, large_moves: the peak of both is the larger), or do not peak at one time \
-         (pick_and_place).",
+        "Drives of this class deflect three to four times as much as the castings. At rest the two add up. In \
+         motion the peaks need not add up: both together have lower frequencies and ring longer, or do not \
+         peak at the same time.",
     );
 }
 

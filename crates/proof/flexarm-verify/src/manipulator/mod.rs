@@ -1,18 +1,15 @@
 //! The whole manipulator in motion: link models and steppers compared with modal links, links
 //! compared with drives.
 //!
-//! `runs` performs the runs, `methods`, `pick`, `forearm` and `drives` compute findings, `page` and
+//! `runs` performs the runs, `methods`, `pick` and `drives` compute findings, `page` and
 //! `drives_page` write them up.
 
 mod drives;
 mod drives_page;
-mod forearm;
 mod methods;
 mod page;
 mod pick;
 mod runs;
-
-use flexarm::Robot;
 
 use crate::Error;
 use crate::Pace;
@@ -20,7 +17,6 @@ use crate::bench::Bench;
 use crate::page::Case;
 
 use drives::{ElasticDrives, Flexibilities};
-use forearm::Forearm;
 use methods::Methods;
 use pick::Pick;
 use runs::Runs;
@@ -41,10 +37,6 @@ struct Findings {
     motions: Vec<Methods>,
     /// `None` in a quick run.
     pick: Option<Pick>,
-    /// Lowest frequency of a casting with both ends held (Hz).
-    held_hz: f64,
-    /// `None` in a quick run.
-    forearm: Option<Forearm>,
     flexibilities: Flexibilities,
     elastic_drives: ElasticDrives,
 }
@@ -62,19 +54,10 @@ impl Findings {
         Ok(Self {
             motions: motions.collect::<Result<_, Error>>()?,
             pick: if bench.quick { None } else { Some(Pick::new(bench, &mut runs, &robot)?) },
-            held_hz: held_hz(&robot),
-            forearm: if bench.quick { None } else { Forearm::new(bench, &robot)? },
             flexibilities: Flexibilities::new(bench, &mut runs, moves)?,
             elastic_drives: ElasticDrives::new(bench, &mut runs, moves[moves.len() - 1])?,
         })
     }
-}
-
-/// Lowest frequency of a casting with both ends held (Hz).
-fn held_hz(robot: &Robot) -> f64 {
-    let details = robot.flexible_links.iter().filter_map(|link| link.flexible.reduced.details.as_ref());
-    let elements = details.filter_map(|details| details.superelement.as_ref());
-    elements.flat_map(|element| element.fixed_frequencies_hz()).reduce(f64::min).unwrap_or(f64::NAN)
 }
 
 /// Runs the case.

@@ -9,7 +9,7 @@ use super::servo::Servos;
 use super::torques::{Torques, VARIANTS};
 use super::{Findings, ROBOT};
 use crate::bench::Worst;
-use crate::page::{Bound, Case, Figure, Table, digits, fixed, listed, percent, plain, word};
+use crate::page::{Bound, Case, Figure, Table, digits, fixed, listed, plain, word};
 
 /// Bounds of the torque residual of a good rigid model, axes 1 to 3, on the two runs that were not
 /// used for the fit.
@@ -22,11 +22,14 @@ const RIGID_GEAR: [f64; 2] = [80e-6, 100e-6];
 const FREQUENCY_BOUND: f64 = 2e-3;
 
 pub(super) fn page(found: &Findings) -> Case {
-    let mut case = Case::new("measured", "6. A measured robot");
+    let mut case = Case::new("measured", "6. A measured robot", "recordings of a KUKA KR 300: torques, gears");
     case.text(format!(
-        "A KUKA KR 300 R2500 ultra SE with a load of 151 kg, recorded at TU Kaiserslautern in October 2020 (Weigand, Ulmen, Janot, Ruskowski; \
-         github.com/JonasWeigand/Robot_Identification, MIT licence): {RUNS} runs of 10 s with motor positions, link encoders behind the gears of axes 1 to {WITH_ENCODER}, and motor torques, every {} ms \
-         (`tests/verification/kr300`). Parameters are the authors', none fitted here but friction; stiffness of two gears was fitted to the link encoders of the same runs: `{ROBOT}` and the README beside it.",
+        "A KUKA KR 300 R2500 ultra SE with a load of 151 kg, recorded at TU Kaiserslautern in October 2020 \
+         (Weigand, Ulmen, Janot, Ruskowski; github.com/JonasWeigand/Robot_Identification, MIT licence): \
+         {RUNS} runs of 10 s with motor positions, link encoders behind the gears of axes 1 to \
+         {WITH_ENCODER}, and motor torques, every {} ms (`tests/verification/kr300`). Parameters are those of \
+         the authors; fitted here are friction and, from the link encoders of the same runs, the stiffness of \
+         two gears (`{ROBOT}` and its README).",
         plain(1e3 * STEP_S)
     ));
     torques(&mut case, &found.torques);
@@ -39,8 +42,10 @@ pub(super) fn page(found: &Findings) -> Case {
 fn torques(case: &mut Case, found: &Torques) {
     case.heading("Torques of the motors");
     case.text(format!(
-        "Inverse dynamics of the rigid arm (links, load, rotors times ratio squared, hydraulic counterbalance) along the recorded motor positions against the recorded torques, both smoothed at {} Hz without phase, {} s left out at both ends, \
-         samples in which the axis is faster than 1 deg/s. Friction (offset, viscous, Coulomb) is fitted to run 1 alone; runs 2 and 3 are unseen.",
+        "Inverse dynamics of the rigid arm (links, load, rotors times ratio squared, hydraulic \
+         counterbalance) along the recorded motor positions, against the recorded torques. Both are smoothed \
+         at {} Hz without phase; {} s at both ends and samples in which the axis is slower than 1 deg/s are \
+         left out. Friction (offset, viscous, Coulomb) is fitted to run 1; runs 2 and 3 are unseen.",
         plain(SMOOTH_HZ),
         plain(EDGE_S)
     ));
@@ -76,7 +81,12 @@ fn torques(case: &mut Case, found: &Torques) {
         table.rows.push([word(format!("A{}", axis + 1))].into_iter().chain(cells).collect());
     }
     case.table(table);
-    case.text("What is left of axis 1 looks like inertia that is missing: the source gives the load none of its own. The wrist's axes have friction that no run separates from another. At rest friction takes any value up to its limit, which no formula in the speed knows: hence the first second of the curves.");
+    case.text(
+        "The source gives the load no inertia of its own, and the rest of axis 1 looks like missing inertia. \
+         The friction of the wrist's axes cannot be separated in these runs. At rest friction takes any value \
+         up to its limit, which a formula in the speed does not contain: hence the first second of the \
+         curves.",
+    );
     case.figure(torque_figure(found));
 }
 
@@ -110,11 +120,13 @@ fn gears(case: &mut Case, found: &Gears) {
     case.heading("Deflection of the gears");
     let stiffness = |axis: usize| digits(1e-6 * found.stiffness[axis], 3).print();
     case.text(format!(
-        "A run with elastic gears, motors along the recorded positions, against motor minus link encoder (the encoder is {} ms late, which is taken off), up to {} Hz, all runs. Springs of {} MN m/rad (axis 2) and {} MN m/rad (axis 3). \
-         Free are the zero of each run and, in the last two columns, what the encoder does by itself: its ripple and one term of eccentricity per turn. Axis 1 carries no weight: its gear gives way less than its encoder errs, \
-         which is why its stiffness cannot be found here.",
-        plain(1e3 * LATE_S),
+        "A run with elastic gears and motors along the recorded positions, against motor minus link encoder, \
+         up to {} Hz, all runs. The encoder is {} ms late, which is corrected. Springs of {} MN m/rad (axis \
+         2) and {} MN m/rad (axis 3). The zero of each run is fitted and, in the last two columns, errors of \
+         the encoder: its ripple and one term of eccentricity per turn. Axis 1 carries no weight: its gear \
+         deflects less than the error of its encoder, so its stiffness cannot be determined.",
         plain(COMPARED_HZ),
+        plain(1e3 * LATE_S),
         stiffness(1),
         stiffness(2)
     ));
@@ -168,8 +180,9 @@ fn gear_figure(found: &Gears) -> Figure {
 fn servos(case: &mut Case, found: &Servos) {
     case.heading("Servos");
     case.text(
-        "All axes by torque under servos along the reference of run 1, with the default gains of robot files: what the source says of its gains has no documented units, and its controller closes axes 1 to 3 on the link encoder. \
-         Orders of magnitude, no more.",
+        "All axes under servos along the reference of run 1, with the default gains of robot files: the gains \
+         of the source have no documented units, and its controller closes axes 1 to 3 on the link encoder. \
+         Only orders of magnitude are compared.",
     );
     let mut table =
         Table::new("RMS of reference minus position (links of axes 1 to 3, motors of 4 to 6) [deg].", &["what"]);
@@ -192,13 +205,15 @@ fn servos(case: &mut Case, found: &Servos) {
         Bound::AtMost(1.0),
     );
     case.text(
-        "Simulated axes follow more closely than the real ones: no delay of communication, no current loop and no stiction are in the model. The recorded wrist runs ahead of its reference: the friction that the controller fed forward \
-         there (454, 1000 and 459 N m s/rad in the source) is more than axes 4 to 6 have (table above).",
+        "Simulated axes follow more closely than the real ones: the model has no delay of communication, no \
+         current loop and no stiction. The recorded wrist is ahead of its reference, because the controller \
+         feeds forward more friction (454, 1000 and 459 N m s/rad in the source) than axes 4 to 6 have (table \
+         above).",
     );
 }
 
 fn frequencies(case: &mut Case, found: &Frequencies) {
-    case.heading("What the gears do not explain");
+    case.heading("Frequencies");
     let mut table = Table::new("First frequencies with held motors [Hz].", &["springs", "home pose", "5 s into run 1"]);
     for set in &found.sets {
         let hz = |k: usize| listed(&set.hz[k].iter().map(|hz| digits(*hz, 3).print()).collect::<Vec<_>>());
@@ -211,16 +226,13 @@ fn frequencies(case: &mut Case, found: &Frequencies) {
         found.error,
         Bound::AtMost(FREQUENCY_BOUND),
     );
-    let with_wrist = found.sets.last().map_or(f64::NAN, |set| set.hz[1][0]);
-    let gears = found.sets.get(1).map_or(f64::NAN, |set| set.hz[1][0]);
     let [low, high] = SEEN_HZ;
     case.text(format!(
-        "While axis 1 moves, the recordings show a vibration of {} to {} Hz in which the link encoder moves five times as far as the motor, in phase. The gears alone have {} Hz at that pose; wrist gears of the class (`{WRIST}`) take \
-         it down to {} Hz, {} % of the way. What else gives way (links, bearings, pedestal, mounting of the load) is not in this model, and nothing in the recordings tells one from another.",
+        "While axis 1 moves, the recordings show a vibration of {} to {} Hz in which the link encoder moves \
+         five times as far as the motor, in phase. With the gears alone the model is higher at that pose; \
+         wrist gears of the class (`{WRIST}`) explain a part of the difference. Links, bearings, pedestal and \
+         the mounting of the load are not in this model, and the recordings do not separate them.",
         plain(low),
-        plain(high),
-        digits(gears, 3).print(),
-        digits(with_wrist, 3).print(),
-        percent((gears - with_wrist) / (gears - 0.5 * (low + high)), 0)
+        plain(high)
     ));
 }

@@ -15,10 +15,8 @@ use crate::compliance::{Method, by_every_method};
 use crate::meshed::Meshed;
 use crate::textbook::Stiffness;
 
-/// Number of elements along x, y and z; torsional compliance with elements half the size (rad/(N
-/// m)): `robots/test/one_beam/fe/README.md`.
+/// Number of elements along x, y and z.
 pub(super) const ELEMENTS: [usize; 3] = [40, 2, 2];
-const TORSION_OF_FINER_MESH: f64 = 409.989e-6;
 /// Positions of the loaded sections (m).
 const STATIONS_M: [f64; 3] = [0.2, 0.4, 0.6];
 /// Number of frequencies compared.
@@ -40,8 +38,6 @@ pub(super) struct BarMesh {
     /// Timoshenko.
     pub(super) euler_errors: [f64; 6],
     pub(super) timoshenko_errors: [f64; 6],
-    /// Relative change of the torsional compliance with elements half the size.
-    pub(super) torsion_by_finer_mesh: f64,
     pub(super) stations: Vec<SectionLoad>,
     pub(super) weight: MeshWeight,
 }
@@ -102,7 +98,6 @@ impl BarMesh {
             methods: by_every_method(meshed, None, &small_loads(&own), SETTLING_STEP_S, &others)?,
             euler_errors: against_own(bar()),
             timoshenko_errors: against_own(bar_with_shear()),
-            torsion_by_finer_mesh: TORSION_OF_FINER_MESH / own[(TORSION, TORSION)] - 1.0,
             stations: section_loads(&C, &stored)?,
             weight: MeshWeight::new(meshed, &stored, &condensation)?,
         })

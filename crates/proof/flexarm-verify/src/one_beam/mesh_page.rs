@@ -48,14 +48,12 @@ fn mesh_end_loads(case: &mut Case, found: &BarMesh) {
         Bound::AtMost(1e-7),
     );
     claim_each(case, "end loads, bar from a mesh", ("CalculiX", calculix), methods, 1e-6);
-    let [_, across, up] = ELEMENTS;
-    case.text(format!(
-        "Beam and mesh differ by what beam theory leaves out: tied rigidly, the ends can neither get thinner (stretch, bending: the mesh is stiffer by a few tenths of a per cent) nor warp (torsion), and \
-         {across} x {up} elements of second order do not resolve the warping of a rectangle ({} of the {} % go with elements half as large, `robots/test/one_beam/fe/README.md`). The same held end makes the \
-         sections near the clamp stiffer in the next table. Whoever wants the beam's numbers takes the beam's closed form.",
-        percent(found.torsion_by_finer_mesh, 1),
-        percent(found.torsion_error(), 1)
-    ));
+    case.text(
+        "Beam and mesh differ by what beam theory leaves out. Rigid ties keep the ends from contracting, \
+         which makes the mesh stiffer by some tenths of a per cent in stretch and bending, and from warping \
+         in torsion. The section has few elements for the warping of a rectangle; a finer mesh is in \
+         `robots/test/one_beam/fe/README.md`.",
+    );
     let claims = [
         ("Timoshenko's beam, stretch and bending", found.bending_error(), 0.01),
         ("Timoshenko's beam, torsion (coarse section)", found.torsion_error(), 0.05),
@@ -121,9 +119,10 @@ pub(super) fn large_loads(case: &mut Case, found: &LargeLoads) {
     case.table(beams_table(found));
     case.table(solids_table(found));
     case.text(format!(
-        "The parts of a lumped link turn by finite angles, so a chain of them follows a beam that bends far: its error falls with the number of parts. A modal link is linear \
-         within its frame and overshoots as linear FE does, by the square of the slope. Linear models stretch the line between the ends where the bar bends without stretching; the engineering strain shows it. The warning \
-         limit of {WARNING_RAD} rad stands where linear theory is wrong by {} %. \"-\": from the unloaded link Newton's method finds no equilibrium, far beyond what the model is for; the program says so.",
+        "The parts of a lumped link rotate by finite angles, so a chain follows a beam that bends far, and \
+         its error falls with the number of parts. A modal link is linear in its frame: as with linear FE, \
+         its error grows with the square of the slope. The warning limit of {WARNING_RAD} rad is where linear \
+         theory is wrong by {} %. \"-\": Newton's method finds no equilibrium, and the program reports it.",
         percent(ERROR_AT_WARNING, 1)
     ));
     let truth = "CalculiX, geometrically nonlinear";

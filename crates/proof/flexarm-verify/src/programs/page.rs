@@ -18,12 +18,16 @@ const CONVERGED: f64 = 1e-6;
 const FLOATING_FRAME_ERRORS: [f64; 2] = [5.6e-4, 3.3e-5];
 
 pub(super) fn page(found: &Findings) -> Case {
-    let mut case = Case::new("programs", "5. Other programs");
+    let mut case = Case::new("programs", "5. Other programs", "a six-axis arm: Pinocchio, Exudyn, MuJoCo");
     let About { programs, date, machine, damping_s } = &found.about;
     case.text(format!(
-        "The arm of case 4, two rigid parts per link with the full 6x6 between them, in four programs, each with its own recursions and integrators: flexarm, {}. Stored by \
-         `tools/crosscheck/other_programs.py` on {date} ({machine}), which reads robot, link and trajectory files by itself. So that all have the same model, damping is proportional to \
-         stiffness ({damping_s} s, {} % of the first mode) and the elastic joints have Euler angles; truth is Pinocchio's recursions with DOP853 at a tolerance of {STORED_TOLERANCE:e}. All programs get the parts and the 6x6 of the same `.flex` files: this case is about motion, cases 1 to 3 are about reduction. Again: `python tools/crosscheck/other_programs.py`.",
+        "The arm of case 4 with two rigid parts per link and the full 6x6 between them, in four programs, \
+         each with its own recursions and integrators: flexarm, {}. The results of the others are stored by \
+         `tools/crosscheck/other_programs.py` on {date} ({machine}), which reads robot, link and trajectory \
+         files by itself. For the same model in all programs damping is proportional to stiffness \
+         ({damping_s} s, {} % of the first mode) and the elastic joints have Euler angles. Truth: Pinocchio's \
+         recursions with DOP853 at a tolerance of {STORED_TOLERANCE:e}. This case is about motion; cases 1 to \
+         3 are about reduction.",
         programs.join(", "),
         plain(100.0 * DAMPING)
     ));
@@ -31,13 +35,14 @@ pub(super) fn page(found: &Findings) -> Case {
     if let Some(found) = &found.stored {
         stored_runs(&mut case, found);
     }
-    case.heading("Elsewhere on this page and in the project");
+    case.heading("Other comparisons");
     let [floating_frame, stiff] = FLOATING_FRAME_ERRORS;
     case.text(format!(
-        "CalculiX and NGSolve on the meshes: cases 1 to 3. Modal links against Exudyn's floating frame (`ObjectFFRFreducedOrder`) on the reference arm, meshes assembled by \
-         NGSolve: `tools/crosscheck/exudyn_ffrf.py`; the tools' curves differ by {floating_frame:e} of the peak, which statics put to a term of second order in Exudyn's interface marker \
-         ({stiff:e} with a structure ten times as stiff). Recursions against Pinocchio entry by entry, rotating beams against a geometrically exact beam, identified arms: \
-         [theory.md](theory.md), with the tests that hold them."
+        "Modal links against Exudyn's floating frame (`ObjectFFRFreducedOrder`) on the reference arm, meshes \
+         assembled by NGSolve: `tools/crosscheck/exudyn_ffrf.py`. The curves differ by {floating_frame:e} of \
+         the peak, because of a term of second order in Exudyn's interface marker ({stiff:e} with a structure \
+         ten times as stiff). Recursions against Pinocchio entry by entry, rotating beams against a \
+         geometrically exact beam, identified arms: [theory](../theory.md), with their tests."
     ));
     case
 }
@@ -74,16 +79,16 @@ fn stored_runs(case: &mut Case, found: &StoredRuns) {
         if run.is_converged() {
             let text = format!("stored converged curve of {} ({})", run.program, run.method);
             let apart = run.error.unwrap_or(f64::NAN);
-            case.claim(text, "Pinocchio, DOP853", apart, Bound::AtMost(CONVERGED));
+            case.stored_claim(text, "Pinocchio, DOP853", apart, Bound::AtMost(CONVERGED));
         }
     }
     case.table(table);
-    case.text(format!(
-        "Brought to no step, the curves of all four programs are one to better than {CONVERGED:e} of the peak: equations of motion, inertias, springs, damping and motion are the same. Rows marked \
-         \"another model\" stay away whatever the step, by terms of second order in the deflection: rotation vectors instead of Euler angles between the parts, and a spring of Exudyn's that takes \
-         angles for a moment. They say how much such a choice matters, a few {:.0e} of the deflection.",
-        found.least_of_other_models()
-    ));
+    case.text(
+        "Extrapolated to zero step, the curves of all four programs agree: equations of motion, inertias, \
+         springs, damping and motion are the same. Rows marked \"another model\" differ at any step by terms of \
+         second order in the deflection: rotation vectors instead of Euler angles between the parts, and a \
+         spring of Exudyn's that takes angles for a moment.",
+    );
     case.figure(cost_figure(found));
 }
 

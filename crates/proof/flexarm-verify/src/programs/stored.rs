@@ -44,15 +44,6 @@ impl StoredRuns {
     }
 }
 
-impl StoredRuns {
-    /// Minimum error of another model on the first motion, rounded down to a power of ten.
-    pub(super) fn least_of_other_models(&self) -> f64 {
-        let other = self.runs.iter().filter(|run| run.is_another_model());
-        let least = other.filter_map(|run| run.error).reduce(f64::min).unwrap_or(f64::NAN);
-        10f64.powf(least.log10().floor())
-    }
-}
-
 impl StoredMotion {
     fn new(of: &Value) -> Self {
         Self { name: text(&of["name"]), peak_m: of["peak_m"].as_f64().unwrap_or(f64::NAN) }

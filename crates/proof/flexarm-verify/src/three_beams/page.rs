@@ -2,37 +2,32 @@
 
 use flexarm_draw::{CurveLook, Panel, PlotCurve};
 
-use super::beams::{
-    BALL_KG, BEAMS, BOX, LENGTHS_M, RECTANGLE, TUBE, bar_shear_factors, box_walls_over_cowper, thin_tube_shear_factors,
-    tip,
-};
-use super::ring_down::{
-    self, Causes, DAMPING, FIVE_PARTS, LINEAR, ModelCauses, RingDown, Run, STEP_S, SUMMED, TOLERANCE, TWO_PARTS,
-};
+use super::beams::{BALL_KG, BEAMS, BOX, LENGTHS_M, TUBE, tip};
+use super::ring_down::{self, DAMPING, FIVE_PARTS, LINEAR, RingDown, Run, STEP_S, TOLERANCE, TWO_PARTS};
 use super::sections::{Sections, TIES, TORSION};
 use super::study::{Meshes, Model, TipLoads};
 use super::whirl::{self, TRUE_PARTS, Whirl};
 use super::{Findings, MESH};
 use crate::bench::{LOADS, PATH_DAMPING_S, SMALL_MOTION, column_error, compliance_error};
 use crate::compliance::{add_errors, claim_each};
-use crate::page::{Bound, Case, Cell, Figure, Table, bare_error, digits, error, fixed, percent, plain, signed, word};
+use crate::page::{Bound, Case, Cell, Figure, Table, digits, error, fixed, plain, signed, word};
 
 /// Integration points of CalculiX along each axis of an element.
 const CALCULIX_POINTS: usize = 3;
-/// Number of elements around the tube (`robots/test/three_beams/fe/README.md`).
-const AROUND_THE_TUBE: usize = 24;
 /// Every second sample is drawn: ten curves per panel would hide each other, and a point every 2 ms
 /// resolves 100 Hz.
 const DRAWN: usize = 2;
 const AXES: [&str; 3] = ["x", "y", "z"];
 
 pub(super) fn page(found: &Findings) -> Case {
-    let mut case = Case::new("three-beams", "2. Three beams");
+    let mut case = Case::new("three-beams", "2. Three beams", "beams in space: closed forms, NGSolve, CalculiX");
     let ([up, forwards, sideways], tip) = (LENGTHS_M, tip());
     case.text(format!(
-        "`robots/test/three_beams`: three aluminium beams joined at right angles, a tube of {up} m upwards, a box of {forwards} m forwards (x), a rectangle of {sideways} m sideways (y), \
-         a ball of {BALL_KG} kg at the tip ({}, {}, {}) m; the joint at the base is held at 0. Every load at the tip bends and twists some of them, and no entry of a beam \
-         reaches the tip without a turn and a lever. World axes, z upwards; Timoshenko's theory. By hand: `flexarm statics three_beams --wrench 0,0,10`, `flexarm compare three_beams`.",
+        "`robots/test/three_beams`: three aluminium beams joined at right angles: a tube of {up} m upwards, a box \
+         of {forwards} m forwards (x) and a rectangle of {sideways} m sideways (y), with a ball of {BALL_KG} \
+         kg at the tip ({}, {}, {}) m. The joint at the base is held at 0. Every load at the tip bends and \
+         twists several beams. World axes, z upwards; Timoshenko's theory. Commands: `flexarm statics \
+         three_beams --wrench 0,0,10`, `flexarm compare three_beams`.",
         tip.x, tip.y, tip.z
     ));
     tip_loads(&mut case, &found.tip_loads);
@@ -51,9 +46,9 @@ fn tip_loads(case: &mut Case, found: &TipLoads) {
     let TipLoads { truth, of_beams, methods } = found;
     let small = plain(1e6 * SMALL_MOTION);
     let caption = format!(
-        "Motion of the tip along each load, per unit of it, by the sum over the beams `Ad_k R_k C_k R_kᵀ Ad_kᵀ` of textbook cantilevers C_k (Timoshenko; factors of shear by \
-         Cowper, torsion of the box by Bredt), and what each beam has in it; then the error of each method: the largest of the six components of the tip's motion, over \
-         `sqrt(C_ii C_jj)`. Compliant constraints and spring-damper run in time from the undeformed arm until they rest, loads that move the tip by {small} µm or {small} µrad, up and down."
+        "Motion of the tip along each load, per unit of it: the sum over the beams `Ad_k R_k C_k R_kᵀ Ad_kᵀ` of textbook cantilevers C_k (Timoshenko; shear factors by \
+         Cowper, torsion of the box by Bredt), and the share of each beam. Error of each method: the largest of the six components of the tip's motion, over \
+         `sqrt(C_ii C_jj)`. Compliant constraints and spring-damper run in time from the undeformed arm to rest, with loads that move the tip by {small} µm or {small} µrad, up and down."
     );
     let mut table = Table::new(caption, &["load", "closed form [µm, µrad per N, N m]"]);
     table.columns.extend(BEAMS.map(String::from));
@@ -71,8 +66,11 @@ fn tip_loads(case: &mut Case, found: &TipLoads) {
 fn meshes(case: &mut Case, found: &Meshes) {
     case.heading("The same arm from meshes, against two other programs");
     case.text(format!(
-        "`{MESH}`: each beam is meshed with HEX20 and reduced on its own, ends tied rigidly, ten modes. The other programs solve the whole arm as one mesh of \
-         the same elements with the same ties. Truth: {}, which integrates to rounding, as flexarm does; {} takes {p} x {p} x {p} points, which are not exact in the curved elements of the tube.",
+        "`{MESH}`: each beam is meshed with HEX20 and reduced on its own, with rigid ties and ten modes. The \
+         other programs solve the whole arm as one mesh of the same elements with the same ties. Truth: {}, \
+         which integrates to rounding, as flexarm does. {} takes {p} x {p} x {p} points per element, which \
+         are not exact in the curved elements of the tube. Double precision leaves eight to nine digits of \
+         the compliance of thin walls.",
         found.ngsolve.provenance,
         found.calculix.provenance,
         p = CALCULIX_POINTS
@@ -85,20 +83,18 @@ fn meshes(case: &mut Case, found: &Meshes) {
     }
     add_errors(&mut table, truth, &found.methods);
     case.table(table);
-    if let Some(rule) = found.tube_rule_error {
-        case.text(format!(
-            "What is left is rounding and a rule. The stiffness of thin walls in double precision holds eight to nine digits of such a compliance (the stored files say so of their own; the tube's matrix has a condition number of {:.0e}). \
-             With CalculiX's rule the tube alone changes by {} here.",
-            found.tube_condition,
-            bare_error(rule)
-        ));
-    }
     let by = "NGSolve, whole mesh";
     claim_each(case, "meshed arm, loads at the tip", (by, truth), &found.methods, 1e-7);
     let between = compliance_error(theirs, truth);
-    case.claim("meshed arm, loads at the tip: CalculiX against NGSolve", by, between, Bound::AtMost(1e-7));
+    case.stored_claim("meshed arm, loads at the tip: CalculiX against NGSolve", by, between, Bound::AtMost(1e-7));
     case.table(sag_and_frequencies(found));
-    case.text(why_sag_and_frequencies(found));
+    case.text(
+        "Two parts carry the weight of a beam at two points. The ball is most of the load and is carried \
+         exactly, so less is missing than in a bare bar. In the lowest modes the ball moves, which all models \
+         have. In higher modes the beams bend between their ends, where two parts have a single joint and a \
+         modal link without modes has static shapes only. Modal links have the sag exactly with any number of \
+         modes.",
+    );
     let claims = [
         ("sag, modal links with any number of modes", found.modal_sag_error(), 1e-7),
         ("sag, two parts", found.shift_error("2 parts"), 0.015),
@@ -135,34 +131,7 @@ fn sag_and_frequencies(found: &Meshes) -> Table {
         let coordinates = fixed(model.elastic_coordinates as f64, 0);
         table.rows.push(row(&model.name, coordinates, &model.sag_errors, &model.hz_errors));
     }
-    let shares = [
-        ("ball's share of the kinetic energy", &found.ball_shares),
-        ("share of the strain energy between held ends", &found.held_shares),
-    ];
-    for (name, shares) in shares {
-        let mut row = vec![word(name), word(""), word(""), word("")];
-        row.extend(shares.iter().map(|share| word(format!("{:.0} %", 100.0 * share))));
-        table.rows.push(row);
-    }
     table
-}
-
-fn why_sag_and_frequencies(found: &Meshes) -> String {
-    // Modes in which the ball has most of the kinetic energy, and modes in which the beams bend
-    // between their ends.
-    let moving = found.ball_shares.iter().take_while(|share| **share > 0.5).count();
-    let held: Vec<usize> = (0..found.held_shares.len()).filter(|k| found.held_shares[*k] > 0.1).collect();
-    let two_parts = found.model("2 parts").map_or(&[][..], |model| &model.hz_errors);
-    let lowest = held.iter().filter_map(|k| two_parts.get(*k)).copied().fold(0.0, f64::min);
-    let held: Vec<String> = held.iter().map(|k| format!("f_{}", k + 1)).collect();
-    format!(
-        "Sag: two parts carry the weight of a beam at two points; the ball, which is most of the load, is carried exactly, so less is missing than in a bare bar, and the rest falls with the square of the length of a part. \
-         Frequencies: the last rows say, by modal links with ten modes, how much the ball moves in a mode, and how much of the strain energy is in shapes whose ends are held. In f_1 to f_{moving} the ball moves, and any model has them. \
-         In {} the beams bend between their ends: two parts have one joint in each beam for that and come {} % too low, a modal link without modes has static shapes alone and comes too high, from above as in \
-         any Ritz method. Modal links have the sag exactly with any number of modes.",
-        held.join(" and "),
-        percent(-lowest, 0)
-    )
 }
 
 fn frequency_figure(models: &[Model]) -> Figure {
@@ -209,7 +178,13 @@ fn sections(case: &mut Case, found: &Sections) {
     }
     case.table(ends);
     case.table(middles);
-    case.text(why_sections_differ(found));
+    case.text(
+        "Away from the ends the meshes agree with beam theory in stretch and bending. Four effects remain. \
+         Torsion of the box: Bredt's formula leaves out the thickness of the wall, and the mesh has one \
+         element through it. Shear: Cowper's factors compare mean displacements, the strain energy compares \
+         work. Rigid ties keep the ends from contracting and warping. Ties by the mean spread a torque evenly \
+         over the nodes; this is not the shear flow of a box, and it distorts the section near the ends.",
+    );
     let middle = found.worst_in_the_middle();
     case.claim("meshed beams, EA and EI in the middle", "beam theory", middle, Bound::AtMost(2e-5));
     let tube_torsion = found.beams[TUBE].end_errors[0][TORSION].abs();
@@ -224,36 +199,12 @@ fn sections(case: &mut Case, found: &Sections) {
     case.claim("files of the reduced beams: compliance", "the same meshes reduced here", filed, Bound::AtMost(1e-7));
 }
 
-fn why_sections_differ(found: &Sections) -> String {
-    let (tube, bar) = (thin_tube_shear_factors(), bar_shear_factors());
-    let walls = box_walls_over_cowper();
-    format!(
-        "Away from the ends the meshes are the beams of the textbook in stretch and bending (the tube's {:.0e} are its {AROUND_THE_TUBE} curved elements, which do not contain the quadratic shape of Poisson's \
-         contraction), and what differs has four causes. *Torsion of the box*: Bredt's formula leaves out the thickness of the wall and its corners; St. Venant's problem of this section, by finite \
-         differences, is {:+.1} % above it. The rest, and the {} % of the rectangle, is the mesh: one element through the wall, three by two in the bar. *Shear*: Cowper's factors compare mean displacements, \
-         energy compares work (thin tube {:.2} against {:.2}, bar {:.2} against {:.2}); for the box his factor is that of thin walls, those across the force included (the walls along the force alone, as tables often have it, \
-         would be {:+.0} and {:+.0} % stiffer, y and z). Shear is little of these compliances. *Rigid ties*: they keep the ends from contracting sideways and from warping, so the last half width at each end is stiffer; that is most of the {} % in stretch and bending, \
-         which falls with the length of a beam. *Ties by the mean*: all nodes of an end carry the same force, corner nodes too, and nothing keeps the end in shape. A torque so spread is not the shear flow of a box: \
-         its section is pushed out of square, and that dies out only after a quarter of the length.",
-        found.beams[TUBE].middle_errors[1],
-        100.0 * found.box_over_bredt,
-        percent(found.beams[RECTANGLE].middle_errors[3], 1),
-        tube.cowper,
-        tube.energy,
-        bar.cowper,
-        bar.energy,
-        100.0 * walls[0],
-        100.0 * walls[1],
-        percent(found.stiffer_by_rigid_ties(), 1)
-    )
-}
-
 /// Ring-down under gravity: errors of the steppers and of the models.
 fn ring_down(case: &mut Case, found: &RingDown) {
     case.heading("Ring-down");
     let caption = format!(
         "The arm of beam theory let go undeformed under its weight, {} s, damping proportional to stiffness ({} % of the first mode, {:.2} Hz, the same constant for all models). \
-         Largest distance of the tip from where it should be, every ms, over the largest deflection ({:.4} mm). Truth of the method: modal links with {} modes each and stiffness by load. Truth of the stepper: \
+         Largest distance of the tip from the truth, every ms, over the largest deflection ({:.4} mm). Truth of the method: modal links with {} modes each and stiffness by load. Truth of the stepper: \
          its own model. Both by the stepper with error control, tolerance {TOLERANCE:e}. The last column is the distance of these two truths; x, y, z are the parts of the method's error.",
         found.duration_s,
         plain(100.0 * DAMPING),
@@ -284,7 +235,6 @@ fn ring_down(case: &mut Case, found: &RingDown) {
         let truth = format!("modal links, {} modes", ring_down::MODES);
         case.claim(text, truth, found.model_error(model), Bound::AtMost(bound));
     }
-    causes(case, found);
     case.figure(ring_down_figure(found));
 }
 
@@ -330,69 +280,6 @@ fn ring_down_figure(found: &RingDown) -> Figure {
     }
 }
 
-/// Causes of the differences between models, and of the error of compliant constraints.
-fn causes(case: &mut Case, found: &RingDown) {
-    /// Number of frequencies in the table.
-    const SHOWN: usize = 4;
-    let Causes { sum_error, models, constraints } = &found.causes;
-    let caption = format!(
-        "Why: the arm as a sum of its {SUMMED} lowest modes about the sag, each swinging in closed form `a_k (1 - exp(-ζωt) (cos ω_d t + ζω/ω_d sin ω_d t))`. For modal links with stiffness by load this sum is within {} \
-         of the peak of the stepped motion. Frequencies of the other models over its frequencies; then the sum with their frequencies and its shares a_k of the sag, with their shares and its frequencies, and with both, \
-         against its own, over the peak; last the distance of the stepped motions.",
-        bare_error(*sum_error)
-    );
-    let mut table = Table::new(caption, &["model"]);
-    table.columns.extend((1..=SHOWN).map(|k| format!("f_{k}")));
-    table.columns.extend(["frequencies alone", "shares alone", "both", "stepped"].map(String::from));
-    for causes in models {
-        let ModelCauses { model, hz_errors, by_frequencies, by_shares, by_both, stepped, unexplained } = causes;
-        let mut row = vec![word(&found.models[*model].name)];
-        row.extend(hz_errors.iter().take(SHOWN).map(|e| signed(*e)));
-        row.extend([by_frequencies, by_shares, by_both, stepped].map(|e| error(*e)));
-        table.rows.push(row);
-        if *model == TWO_PARTS {
-            case.claim(
-                "three beams, ring-down, two parts: what frequencies and shares of six modes do not explain",
-                "stepped motions",
-                *unexplained,
-                Bound::AtMost(5e-4),
-            );
-        }
-    }
-    case.table(table);
-    case.text(why_they_differ(&found.causes, SHOWN));
-    case.claim(
-        format!(
-            "three beams, ring-down, compliant constraints, local, {} ms: what half a step and the frequency do not explain",
-            plain(1e3 * STEP_S)
-        ),
-        "stepped motions",
-        constraints.unexplained,
-        Bound::AtMost(2.6e-3),
-    );
-}
-
-/// * `shown`: number of frequencies in the table.
-fn why_they_differ(found: &Causes, shown: usize) -> String {
-    let linear = found.models.iter().find(|causes| causes.model == LINEAR);
-    let higher = linear.and_then(|causes| causes.hz_errors.iter().take(shown).copied().reduce(f64::max));
-    let c = &found.constraints;
-    format!(
-        "*Model.* Two parts put a third of a per cent on the first two frequencies; the phase that this adds is most of the difference, which is largest after a third of a second, when damping begins to win. The rest is the sag, which two \
-         parts miss by a little. Stiffness by load (weight turns with what bends) is in chains of parts by themselves and an option of modal links: without it their frequencies are {:.0e} higher. \
-         *Stepper.* Compliant constraints at {} ms are off by {} of the peak, in two ways. Positions are half a step ahead (`x⁺ = x + h v⁺` from rest): {} in such a sum of modes. And damping taken at the \
-         end of the step makes the frequency lower by ζhω/2, beside the second-order (hω)²/12 of the trapezoidal rule: {}; both together {}, and {} of the stepped motion is left. Local and global form differ by {} here, little, as they do with the size of the deflection.",
-        higher.unwrap_or(f64::NAN),
-        plain(1e3 * STEP_S),
-        bare_error(c.stepped),
-        bare_error(c.by_half_a_step),
-        bare_error(c.by_frequency),
-        bare_error(c.by_both),
-        bare_error(c.unexplained),
-        bare_error(c.local_from_global)
-    )
-}
-
 /// Ringing during rotation.
 fn whirl(case: &mut Case, found: &Whirl) {
     /// Bounds, one per speed.
@@ -419,7 +306,7 @@ fn whirl(case: &mut Case, found: &Whirl) {
     }
     case.table(table);
     case.text(
-        "Here beams carry beams, and all bend in space while the base turns: Coriolis and centrifugal terms of the modal links against rigid bodies that have none of them. What is left with stiffness by load goes with the deflection, so it is of second \
-         order: the end of a modal link moves along its shapes, straight (case 1).",
+        "Coriolis and centrifugal terms of modal links are compared with rigid bodies, which have none of \
+         their own. With stiffness by load the remaining error is of second order in the deflection (case 1).",
     );
 }

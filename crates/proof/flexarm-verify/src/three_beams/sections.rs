@@ -5,7 +5,7 @@ use flexarm_fem::UnitSystem;
 use flexarm_fem::reduction::Tie;
 use nalgebra::{Matrix3, Matrix6, Vector3};
 
-use super::beams::{Member, TUBE, box_torsion_over_bredt, members};
+use super::beams::{Member, TUBE, members};
 use crate::Error;
 use crate::bench::{Bench, Worst, compliance_error, larger};
 use crate::meshed::{Condensed, Meshed, inverse};
@@ -15,12 +15,8 @@ use crate::textbook::{Stiffness, at_lever, turned};
 const SLICES: usize = 20;
 /// Number of element layers in the middle whose stiffness is evaluated.
 const LAYERS: usize = 2;
-/// Grid cells across the wall of the box for its torsion constant.
-const CELLS: usize = 12;
 /// The ties that are compared, in this order.
 pub(super) const TIES: [Tie; 2] = [Tie::Rigid, Tie::Distributing];
-/// Indices of a diagonal: stretch, and bending by moments.
-const STRETCH_AND_BENDING: [usize; 3] = [0, 4, 5];
 /// Index of torsion.
 pub(super) const TORSION: usize = 3;
 
@@ -37,14 +33,12 @@ pub(super) struct Section {
 /// All three beams.
 pub(super) struct Sections {
     pub(super) beams: [Section; 3],
-    /// Relative difference of Saint-Venant's torsion constant of the box from Bredt's.
-    pub(super) box_over_bredt: f64,
 }
 
 impl Sections {
     pub(super) fn new(bench: &Bench, robot: &Robot) -> Result<Self, Error> {
         let [tube, hollow, bar] = [0, 1, 2].map(|k| Section::new(bench, robot, k));
-        Ok(Self { beams: [tube?, hollow?, bar?], box_over_bredt: box_torsion_over_bredt(CELLS) })
+        Ok(Self { beams: [tube?, hollow?, bar?] })
     }
 
     /// Maximum error of EA and EI in the middle.
@@ -55,12 +49,6 @@ impl Sections {
     /// Maximum error of a link file.
     pub(super) fn worst_file(&self) -> f64 {
         self.beams.iter().map(|beam| beam.file_error).fold(0.0, larger)
-    }
-
-    /// Mean increase in stretch and bending stiffness due to rigid ties.
-    pub(super) fn stiffer_by_rigid_ties(&self) -> f64 {
-        let errors = self.beams.iter().flat_map(|beam| STRETCH_AND_BENDING.map(|k| -beam.end_errors[0][k]));
-        errors.sum::<f64>() / (self.beams.len() * STRETCH_AND_BENDING.len()) as f64
     }
 }
 
