@@ -171,56 +171,29 @@ def read_robot():
 # --------------------------------------------------------------------------------------------------------------
 # MuJoCo
 class MuJoCo:
-    """Elastic joints as three slides and three hinges with fixed tendons for the full 6x6. MuJoCo
-    has no prescribed motion: motors of huge inertia carry the joints, with set points that each
-    integrator hits."""
+    """The arm as `flexarm export --to mjcf` writes it: three slides and three hinges for each elastic
+    joint, fixed tendons for the full 6x6, motors of huge inertia with set points that each integrator
+    hits."""
 
-    ROTOR, PD = 1e8, 200.0
+    def __init__(self, program, motion):
+        import mujoco
 
-    def __init__(self, robot):
-        self.robot = robot
-
-    def model(self, integrator, h):
-        import numpy as np
-        import scipy.linalg as sl
-
-        text = lambda a: " ".join(f"{x:.17g}" for x in np.ravel(a))
-        body, tendons, motors = "", "", ""
-        for b in self.robot["bodies"]:
-            I = b["inertia"]
-            full = [I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2]]
-            body += f'<body name="{b["name"]}" pos="{text(b["place"])}"><inertial pos="{text(b["com"])}" mass="{b["mass"]:.17g}" fullinertia="{text(full)}"/>'
-            if b["axis"] is not None:
-                name = b["name"]
-                body += f'<joint name="{name}" type="hinge" axis="{text(b["axis"])}" armature="{self.ROTOR}"/>'
-                motors += f'<motor joint="{name}" gear="{self.ROTOR}"/>'
-                motors += f'<position joint="{name}" kp="{self.ROTOR * self.PD**2}"/><velocity joint="{name}" kv="{2 * self.ROTOR * self.PD}"/>'
-                continue
-            names = [f'{b["name"]}_{axis}' for axis in ("x", "y", "z", "rx", "ry", "rz")]
-            for k in (0, 1, 2, 5, 4, 3):
-                body += f'<joint name="{names[k]}" type="{"slide" if k < 3 else "hinge"}" axis="{text(np.eye(3)[k % 3])}"/>'
-            L, d, _ = sl.ldl(b["K"])
-            for k in range(6):
-                parts = "".join(f'<joint joint="{names[i]}" coef="{L[i, k]:.17g}"/>' for i in range(6) if abs(L[i, k]) > 1e-14)
-                tendons += f'<fixed springlength="0 0" stiffness="{d[k, k]:.17g}" damping="{self.robot["beta"] * d[k, k]:.17g}">{parts}</fixed>'
-        body += f'<site name="tool" pos="{text(self.robot["tool"])}"/>' + "</body>" * len(self.robot["bodies"])
-        return (f'<mujoco><compiler angle="radian" autolimits="true" balanceinertia="false"/><option timestep="{h!r}" integrator="{integrator}"'
-                f' gravity="{text(self.robot["gravity"])}"><flag contact="disable"/></option><worldbody>{body}</worldbody>'
-                f"<tendon>{tendons}</tendon><actuator>{motors}</actuator></mujoco>")
+        mujoco.set_mju_user_warning(lambda text: None)
+        with tempfile.TemporaryDirectory() as folder:
+            subprocess.run([program, "export", str(ROOT / "robots" / "reference_arm"), "--to", "mjcf", "-o", folder], check=True, capture_output=True)
+            self.model = mujoco.MjModel.from_xml_path(f"{folder}/reference_arm.xml")
+        self.motion = motion
 
     def run(self, integrator, h):
         import mujoco
         import numpy as np
         from mujoco import rollout
 
-        mujoco.set_mju_user_warning(lambda text: None)
-        model = mujoco.MjModel.from_xml_string(self.model(integrator, h))
+        model = self.model
         data = mujoco.MjData(model)
-        joints = [model.joint(b["name"]).qposadr[0] for b in self.robot["bodies"] if b["axis"] is not None]
-        elastic = np.setdiff1d(np.arange(model.nq), joints)
-        data.qpos[joints] = self.robot["motion"](0.0)[0]
-        data.qpos[elastic] = self.robot["rest"].reshape(-1, 6)[:, [0, 1, 2, 5, 4, 3]].ravel()
-        n, motion = round(END_S / h), self.robot["motion"]
+        model.opt.timestep, model.opt.integrator = h, getattr(mujoco.mjtIntegrator, f"mjINT_{integrator.upper()}")
+        mujoco.mj_resetDataKeyframe(model, data, 0)
+        n, motion = round(END_S / h), self.motion
         if integrator == "RK4":
             middle = [motion((k + 0.5) * h) for k in range(n)]
             points = [np.array([m[i] for m in middle]) for i in (2, 0, 1)]
@@ -246,7 +219,7 @@ class MuJoCo:
         def tool(x):
             data.qpos[:] = x
             mujoco.mj_kinematics(model, data)
-            return data.site("tool").xpos.copy()
+            return data.site("tcp").xpos.copy()
 
         every = max(1, round(1e-3 / h)) if h < 1e-3 else 1
         samples = lambda: [((k + 1) * h, tool(states[0, k, 1 : 1 + model.nq])) for k in range(every - 1, n, every)]
@@ -364,7 +337,7 @@ def measure(program, example, repeat):
 
         versions = {name: version(name) for name in ("mujoco", "exudyn", "pin")}
         robot = read_robot()
-        mujoco, exudyn = MuJoCo(robot), Exudyn(robot)
+        mujoco, exudyn = MuJoCo(program, robot["motion"]), Exudyn(robot)
         peers += [("MuJoCo", mujoco, name, h) for name, steps in MUJOCO for h in steps]
         peers += [("Exudyn", exudyn, name, h) for name, steps in EXUDYN for h in steps]
     versions["flexarm"] = subprocess.run([program, "--version"], capture_output=True, text=True).stdout.split()[-1]

@@ -255,7 +255,7 @@ pub(crate) fn exported(summary: &flexarm::export::ExportSummary) -> String {
 pub(crate) fn exported_robot(export: &RobotExport, files: &[String]) -> String {
     let mut out = files.iter().take(2).map(|file| format!("{file}\n")).collect::<String>();
     out += &format!("{} meshes\n", files.len().saturating_sub(2));
-    out += &format!("step for MuJoCo: {:?} s\n", export.step_s);
+    out += &export.step_s.map_or_else(String::new, |step| format!("step for MuJoCo: {step:?} s\n"));
     export.left_out.iter().for_each(|what| out += &filled(&format!("left out: {what}\n"), 80));
     out
 }

@@ -42,6 +42,7 @@ mod ranges;
 #[cfg(feature = "mcap")]
 mod recording_files;
 mod report;
+mod robot_export;
 mod robot_file_docs;
 mod run_says;
 mod sensitivity;

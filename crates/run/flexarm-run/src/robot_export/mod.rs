@@ -34,8 +34,8 @@ pub enum RobotFormat {
 /// Files of an exported arm.
 #[derive(Clone, Debug, Serialize)]
 pub struct RobotExport {
-    /// Step size with which MuJoCo stays within 0.5 % of the largest deflection (s).
-    pub step_s: f64,
+    /// Step size with which MuJoCo stays within 0.5 % of the largest deflection (s); for MJCF.
+    pub step_s: Option<f64>,
     /// What the arm has and the format cannot say.
     pub left_out: Vec<String>,
     /// Names and contents of the files, relative to one folder; the description comes first.
@@ -71,7 +71,7 @@ impl Arm {
         let name = format!("{}.{ending}", file_name(&self.robot().name));
         files.insert(0, (name.into(), text.into_bytes()));
         files.insert(1, ("springs.json".into(), springs_json(&posed, &axes, &springs, step_s, &left_out).into_bytes()));
-        Ok(RobotExport { step_s, left_out, files })
+        Ok(RobotExport { step_s: (format == RobotFormat::Mjcf).then_some(step_s), left_out, files })
     }
 }
 

@@ -9,6 +9,8 @@ use crate::error::{Error, ValueError};
 use crate::posed::Posed;
 use crate::robot::Robot;
 
+/// Least moment of inertia that MuJoCo takes (kg m²).
+const LEAST_INERTIA: f64 = 1e-15;
 /// Folder of the meshes.
 pub(super) const MESHES: &str = "meshes";
 /// Parts of a six-coordinate joint in the order of their motion: translation, then Z-Y-X angles.
@@ -118,8 +120,8 @@ fn part(body: &Body) -> Result<Part, ValueError> {
     })
 }
 
-/// Joins each moving body without mass, such as the motor of an elastic gear, with its only child:
-/// MuJoCo lets no such body move.
+/// Checks that MuJoCo takes the inertia of each body, and joins each moving body without mass, such
+/// as the motor of an elastic gear, with its only child: MuJoCo lets no such body move.
 pub(super) fn with_mass(mut parts: Vec<Part>) -> Result<Vec<Part>, ValueError> {
     while let Some(light) = (1..parts.len()).find(|&k| parts[k].mass == 0.0 && !parts[k].joints.is_empty()) {
         let mut children = (light + 1..parts.len()).filter(|&k| parts[k].parent == light);
@@ -143,5 +145,15 @@ pub(super) fn with_mass(mut parts: Vec<Part>) -> Result<Vec<Part>, ValueError> {
         parts.remove(light);
         parts.iter_mut().filter(|part| part.parent > light).for_each(|part| part.parent -= 1);
     }
-    Ok(parts)
+    let refused = |part: &&Part| {
+        let moments = part.inertia.symmetric_eigenvalues();
+        part.mass > 0.0 && (moments.min() < LEAST_INERTIA || 2.0 * moments.max() > moments.sum() * (1.0 + 1e-9))
+    };
+    match parts[1..].iter().find(refused) {
+        Some(part) => Err(ValueError::NotExportable {
+            name: part.name.clone(),
+            what: "a body with an inertia that no mass distribution has",
+        }),
+        None => Ok(parts),
+    }
 }

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use flexarm_kinematics::Pose;
+use flexarm_kinematics::{Limits, Pose};
 use flexarm_settings::written::markup;
 use nalgebra::Vector3;
 
@@ -82,11 +82,11 @@ fn link(out: &mut String, part: &Part) {
     out.push_str("  </link>\n");
 }
 
-/// Limits of a motor; an elastic joint has none.
+/// Limits of a motor; an elastic joint stays far within 1 m and 1 rad.
 fn limit(axis: &Axis, posed: &Posed) -> String {
     let coordinates = posed.arm.model.coordinates();
     let limits = coordinates.get(axis.coordinate).filter(|_| axis.coordinate < posed.arm.model.n_actuated());
-    let limits = limits.map_or(flexarm_kinematics::Limits::NONE, |c| c.limits);
+    let limits = limits.map_or(Limits { lower: -1.0, upper: 1.0, ..Limits::NONE }, |c| c.limits);
     let bounds = [
         ("lower", limits.lower),
         ("upper", limits.upper),
