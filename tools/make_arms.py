@@ -139,10 +139,15 @@ def figures(urdf, tool):
 
 
 def triangles(path):
-    """Returns the triangles of an STL file, or the vertices of a Collada file in metres."""
+    """Returns the triangles of an STL file, or of a Collada file in metres."""
     if path.suffix.lower() == ".dae":
-        values = [numbers(e.text) for e in ElementTree.parse(path).iterfind(".//{*}float_array") if "position" in e.get("id")]
-        yield from ([row[k:k + 3]] for row in values for k in range(0, len(row), 3))
+        for shape in ElementTree.parse(path).iterfind(".//{*}mesh"):
+            values = next(numbers(e.text) for e in shape.iterfind(".//{*}float_array") if "position" in e.get("id"))
+            for part in [*shape.iterfind("{*}triangles"), *shape.iterfind("{*}polylist")]:
+                places = {e.get("semantic"): int(e.get("offset")) for e in part.iterfind("{*}input")}
+                corners = [int(word) for word in part.find("{*}p").text.split()][places["VERTEX"]::1 + max(places.values())]
+                points = [values[3 * k:3 * k + 3] for k in corners]
+                yield from (points[k:k + 3] for k in range(0, len(points), 3))
         return
     data = path.read_bytes()
     count = struct.unpack_from("<I", data, 80)[0] if len(data) > 84 else -1
