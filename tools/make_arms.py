@@ -139,6 +139,16 @@ def figures(urdf, tool):
 
 
 def triangles(path):
+    """Returns the triangles of an STL file, or of a Collada file in metres."""
+    if path.suffix.lower() == ".dae":
+        for shape in ElementTree.parse(path).iterfind(".//{*}mesh"):
+            values = next(numbers(e.text) for e in shape.iterfind(".//{*}float_array") if "position" in e.get("id"))
+            for part in [*shape.iterfind("{*}triangles"), *shape.iterfind("{*}polylist")]:
+                places = {e.get("semantic"): int(e.get("offset")) for e in part.iterfind("{*}input")}
+                corners = [int(word) for word in part.find("{*}p").text.split()][places["VERTEX"]::1 + max(places.values())]
+                points = [values[3 * k:3 * k + 3] for k in corners]
+                yield from (points[k:k + 3] for k in range(0, len(points), 3))
+        return
     data = path.read_bytes()
     count = struct.unpack_from("<I", data, 80)[0] if len(data) > 84 else -1
     if len(data) == 84 + 50 * count:
@@ -170,11 +180,11 @@ def drawn(link, folder):
     faces = []
     for shape in link.findall("collision") or link.findall("visual"):
         mesh = shape.find("geometry/mesh")
-        if mesh is None or not mesh.get("filename").lower().endswith(".stl"):
+        if mesh is None:
             continue
         scale, pose = numbers(mesh.get("scale", "1 1 1")), pose_of(origin(shape))
         for face in triangles(folder / mesh.get("filename")):
-            faces.append([moved(pose, [1e3 * s * x for s, x in zip(scale, point)]) for point in face])
+            faces.append([[1e3 * x for x in moved(pose, [s * x for s, x in zip(scale, point)])] for point in face])
     if not faces:
         return []
     ends = [(min(p[k] for f in faces for p in f), max(p[k] for f in faces for p in f)) for k in range(3)]
