@@ -114,9 +114,19 @@ impl Arm {
     /// # Errors
     /// [`Error::Pose`] for joint values that do not fit the arm.
     pub fn posed(&self, at: Option<&[f64]>) -> Result<Posed, Error> {
-        let names: Vec<&str> = self.flexible.rigid.coordinates().iter().map(|c| c.joint.as_str()).collect();
-        let posed = Posed::with(self.flexible.clone(), joint_values(at, &names)?)?;
+        let posed = Posed::with(self.flexible.clone(), self.values(at)?)?;
         Ok(Posed { of_robot: Some(self.robot_caveats()), ..posed })
+    }
+
+    /// As [`Arm::posed`], for equilibria alone ([`Posed::resting`]).
+    pub(crate) fn resting(&self, at: Option<&[f64]>) -> Result<Posed, Error> {
+        let posed = Posed::resting(self.flexible.clone(), self.values(at)?)?;
+        Ok(Posed { of_robot: Some(self.robot_caveats()), ..posed })
+    }
+
+    fn values(&self, at: Option<&[f64]>) -> Result<Vec<f64>, Error> {
+        let names: Vec<&str> = self.flexible.rigid.coordinates().iter().map(|c| c.joint.as_str()).collect();
+        joint_values(at, &names)
     }
 
     /// Returns mass, damping and stiffness about the static equilibrium at a pose under gravity and

@@ -51,10 +51,19 @@ pub fn check_wrench(wrench: &[f64]) -> Result<(), ValueError> {
 impl Posed {
     /// Poses a robot; `at`: values of all actuated joints (rad or m), zero by default.
     pub fn new(robot: &Robot, modelling: &Modelling, at: Option<&[f64]>) -> Result<Self, Error> {
+        Self::held(robot, modelling, Self::values(robot, at)?)
+    }
+
+    /// As [`Self::new`], for equilibria alone ([`Self::resting`]).
+    pub(crate) fn at_rest(robot: &Robot, modelling: &Modelling, at: Option<&[f64]>) -> Result<Self, Error> {
+        let at = Self::values(robot, at)?;
+        Self::resting(Arc::new(robot.modelled(modelling)?), at)
+    }
+
+    fn values(robot: &Robot, at: Option<&[f64]>) -> Result<Vec<f64>, Error> {
         let model = robot.rigid_model()?;
         let names: Vec<&str> = model.coordinates().iter().map(|c| c.joint.as_str()).collect();
-        let at = joint_values(at, &names)?;
-        Self::held(robot, modelling, at)
+        joint_values(at, &names)
     }
 
     /// As [`Self::new`], with `at` in coordinate order (rad or m).
@@ -64,13 +73,29 @@ impl Posed {
 
     /// Poses a robot that is already modelled; `at` in coordinate order (rad or m).
     pub fn with(flexible: Arc<FlexibleRobot>, at: Vec<f64>) -> Result<Self, Error> {
+        let arm = flexible.arm(Arc::new(Held(at.clone())));
+        Self::of(flexible, arm, at)
+    }
+
+    /// As [`Self::with`], for equilibria alone: an arm with a link between springs that has no mass
+    /// has no modes.
+    pub(crate) fn resting(flexible: Arc<FlexibleRobot>, at: Vec<f64>) -> Result<Self, Error> {
+        let held = Arc::new(Held(at.clone()));
+        let arm = match flexible.arm(held.clone()) {
+            Err(StepError::Singular { matrix, .. }) if matrix.starts_with("mass matrix") => flexible.arm_at_rest(held),
+            arm => arm,
+        };
+        Self::of(flexible, arm, at)
+    }
+
+    fn of(flexible: Arc<FlexibleRobot>, arm: Result<FlexibleArm, StepError>, at: Vec<f64>) -> Result<Self, Error> {
         loops::check_pose(&flexible.rigid, &mut Data::new(&flexible.rigid), &DVector::from_column_slice(&at))?;
         balancer::check_pose(&flexible.rigid, &mut Data::new(&flexible.rigid), &DVector::from_column_slice(&at))?;
         let model = flexible.model.clone();
         let actuated = &model.coordinates()[..model.n_actuated()];
         let joints: Vec<String> = actuated.iter().map(|c| c.joint.clone()).collect();
         let prismatic = actuated.iter().map(|c| c.slides()).collect();
-        let arm = flexible.arm(Arc::new(Held(at.clone()))).map_err(|error| flexible.explained(error))?;
+        let arm = arm.map_err(|error| flexible.explained(error))?;
         Ok(Self { tool: flexible.tcp.clone(), flexible, arm, joints, prismatic, at, of_robot: None })
     }
 

@@ -118,7 +118,7 @@ fn statics_of(
     outputs: Option<&StaticsOutputs>,
 ) -> Result<Statics, Error> {
     let paths = outputs.map(statics_picture::places).transpose()?;
-    statics_at(robot, Posed::new(robot, modelling, at)?, modelling, wrench, paths)
+    statics_at(robot, Posed::at_rest(robot, modelling, at)?, modelling, wrench, paths)
 }
 
 impl Arm {
@@ -127,7 +127,7 @@ impl Arm {
     /// # Errors
     /// As [`statics()`].
     pub fn statics(&self, at: Option<&[f64]>, wrench: [f64; 6]) -> Result<Statics, Error> {
-        statics_at(self.robot(), self.posed(at)?, self.modelling(), wrench, None)
+        statics_at(self.robot(), self.resting(at)?, self.modelling(), wrench, None)
     }
 }
 
