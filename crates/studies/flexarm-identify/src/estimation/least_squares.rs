@@ -185,8 +185,8 @@ pub struct Progress {
 
 /// Maximum correlation of neighbours on a curve.
 const MOST_CORRELATED: f64 = 0.98;
-/// Minimum pivot of rows left out of the fit.
-const LEFT: f64 = 1e-4;
+/// Minimum pivot of rows left out of the fit: their predictions are uncertain by its inverse.
+const LEFT: f64 = 0.1;
 /// Relative pivot below which an unknown without a prior depends on others.
 const DEPENDENT: f64 = 1e-12;
 /// Relative change of the errors of the model, and step over deviations, at which they are kept.
