@@ -402,6 +402,35 @@ impl StaticTangent {
         self.loops = Some(tangent);
     }
 
+    /// Adds to `dtau` the change of the static forces on the coordinates from the first one on, as
+    /// the subtree of a body moves with a twist (world axes, about the world origin) while all
+    /// coordinates keep their values: (3) and (4) with the body's joint frame as another joint. Call
+    /// [`StaticTangent::compute`] before.
+    ///
+    /// # Panics
+    /// If the model has closed loops or balancers.
+    pub fn add_moved_subtree(&self, model: &Model, data: &Data, body: usize, moved: &Twist, dtau: &mut [f64]) {
+        assert!(model.loops.is_empty() && model.balancers.is_empty(), "loops and balancers are not covered");
+        let (v, w, end) = (&moved.linear, &moved.angular, model.bodies[body].subtree_end);
+        let Carried { f, A, N, .. } = &self.carried[body];
+        let (force, moment) = (A * w, N * w + v.cross(f));
+        for column in &self.columns {
+            if (body..end).contains(&column.body) {
+                dtau[column.k] -= w.dot(&column.row);
+            } else if column.body < body && body < model.bodies[column.body].subtree_end {
+                dtau[column.k] -= column.v.dot(&force) + column.w.dot(&moment);
+            }
+        }
+        let behind =
+            model.modal.iter().filter(|entry| (body..end).contains(&entry.body) && entry.coordinate >= self.first);
+        for entry in behind {
+            let R = data.X_WB[entry.body].rotation.matrix();
+            for (k, C_t) in entry.tables.shapes.C_t.iter().enumerate() {
+                dtau[entry.coordinate - self.first + k] -= w.dot(&(R * C_t).cross(&model.gravity));
+            }
+        }
+    }
+
     /// As [`StaticTangent::compute`], for loads and balancers only, without gravity; for trees
     /// without closed loops and modal bodies.
     ///

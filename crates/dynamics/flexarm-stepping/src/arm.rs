@@ -188,6 +188,8 @@ pub struct FlexibleArm {
     pub cross_damping: Vec<(usize, usize, f64)>,
     /// Natural modes at the start pose, drives locked.
     pub modes: Modes,
+    /// Whether it serves equilibria alone: without modes and damping, so that links need no mass.
+    pub at_rest: bool,
 }
 
 /// Sampled joint controllers; see [`ServoAxis`].

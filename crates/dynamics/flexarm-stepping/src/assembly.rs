@@ -27,6 +27,21 @@ impl FlexibleArm {
         springs: Vec<S>,
         motion: Arc<dyn PrescribedMotion>,
     ) -> Result<Self, StepError> {
+        let mut arm = Self { at_rest: false, ..Self::at_rest(model, springs, motion)? };
+        arm.update_modes_and_damping()?;
+        Ok(arm)
+    }
+
+    /// Creates an arm for equilibria alone: without modes and damping, so that links between springs
+    /// need no mass.
+    ///
+    /// # Errors
+    /// As [`FlexibleArm::new`], except that no equilibrium is sought.
+    pub fn at_rest<S: Into<Spring>>(
+        model: Arc<Model>,
+        springs: Vec<S>,
+        motion: Arc<dyn PrescribedMotion>,
+    ) -> Result<Self, StepError> {
         let groups = model.elastic();
         if springs.len() != groups.len() {
             return Err(StepError::Setup(format!(
@@ -50,7 +65,7 @@ impl FlexibleArm {
             elements.push(ElasticElement { name, body, coordinate, size, modal, K, C, damping, curve, geometric });
         }
         let n = model.n_elastic();
-        let mut arm = Self {
+        Ok(Self {
             model,
             elements,
             D: DMatrix::zeros(n, n),
@@ -69,9 +84,8 @@ impl FlexibleArm {
             cross_stiffness: Vec::new(),
             cross_damping: Vec::new(),
             modes: Modes::default(),
-        };
-        arm.update_modes_and_damping()?;
-        Ok(arm)
+            at_rest: true,
+        })
     }
 
     /// Returns the arm with constant external loads: (body, wrench at Bo in world axes).
@@ -161,13 +175,13 @@ impl FlexibleArm {
     }
 
     /// Recomputes the modes at `t = 0` and the damping matrix that depends on them; to be called
-    /// after fields were changed directly.
+    /// after fields were changed directly. Does nothing for an arm at rest.
     ///
     /// # Errors
     /// As [`FlexibleArm::new`].
     pub fn update_modes_and_damping(&mut self) -> Result<(), StepError> {
         let n = self.n_elastic_coordinates();
-        if n == 0 {
+        if n == 0 || self.at_rest {
             return Ok(());
         }
         self.modes = modes_at(self, 0.0)?;

@@ -3,7 +3,7 @@
 
 use flexarm_kinematics::products::{add, cross, lift, tr_mul};
 use flexarm_kinematics::{
-    Data, Frame, PointLoad, Real, State, StaticTangent, Wrench, forward_kinematics, gravity_forces,
+    Data, Frame, PointLoad, Real, State, StaticTangent, Twist, Wrench, forward_kinematics, gravity_forces,
     gravity_forces_at_poses,
 };
 use nalgebra::{DMatrix, DVector};
@@ -302,6 +302,11 @@ impl StaticSlopes {
         self.loads.extend(arm.loads.iter().map(|load| load.point_load(t, &data.X_WB[load.body])));
         self.loads.extend(tool.map(|(tool, F_T_W)| load_at(tool, F_T_W)));
         self.exact.compute(&arm.model, data, q, &self.loads, G);
+    }
+
+    /// [`StaticTangent::add_moved_subtree`], after [`StaticSlopes::compute`].
+    pub(crate) fn add_moved_subtree(&self, arm: &FlexibleArm, data: &Data, body: usize, moved: &Twist, p: &mut [f64]) {
+        self.exact.add_moved_subtree(&arm.model, data, body, moved, p);
     }
 
     fn difference(

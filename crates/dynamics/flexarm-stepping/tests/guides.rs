@@ -21,7 +21,7 @@ fn column() -> (Arc<Model>, Vec<GearSpring>) {
     let slide = JointKind::Prismatic(Vector3::z_axis());
     column.joints.push(Joint::new("lift", slide, "lower", "upper", Pose::identity()));
     let tubes = GuideTubes { outer_end: OUTER_END, inner_end: 0.0, tilts: [true, true, false] };
-    let gearbox = Gearbox { joint: "lift".into(), stiffness: GearStiffness::Guide(tubes) };
+    let gearbox = Gearbox { joint: "lift".into(), stiffness: GearStiffness::Guide(tubes), seat: None };
     let springs = insert_gearboxes(&mut column, &[gearbox]).expect("fits");
     (Arc::new(Model::new(&column).expect("a tree")), springs)
 }

@@ -389,8 +389,11 @@ fn steppers_agree_on_the_reference_arm_with_modal_links() {
 fn geared_arm(motion: Arc<dyn PrescribedMotion>) -> FlexibleArm {
     let reference = reference_arm(true);
     let mut mechanism = reference.mechanism.clone();
-    let gearboxes = [("joint2", 2e6), ("joint3", 1e6)]
-        .map(|(joint, k)| Gearbox { joint: joint.into(), stiffness: GearStiffness::Axis(k) });
+    let gearboxes = [("joint2", 2e6), ("joint3", 1e6)].map(|(joint, k)| Gearbox {
+        joint: joint.into(),
+        stiffness: GearStiffness::Axis(k),
+        seat: None,
+    });
     let gears = insert_gearboxes(&mut mechanism, &gearboxes).expect("fits");
     let damping = Damping::StiffnessProportional(reference.beta);
     let mut springs: Vec<(String, Spring)> =
@@ -515,7 +518,7 @@ fn everything() -> FlexibleArm {
         ("joint3", GearStiffness::Axis(1e6)),
         ("joint5", GearStiffness::Full(full)),
     ];
-    let gearboxes = gearboxes.map(|(joint, stiffness)| Gearbox { joint: joint.into(), stiffness });
+    let gearboxes = gearboxes.map(|(joint, stiffness)| Gearbox { joint: joint.into(), stiffness, seat: None });
     let gears = insert_gearboxes(&mut soft, &gearboxes).expect("fits");
     let mut springs: Vec<(String, Spring)> =
         modals.iter().map(|m| (m.name.clone(), modal_spring(m, Damping::Modal(0.02)))).collect();

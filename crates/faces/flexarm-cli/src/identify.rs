@@ -1,20 +1,25 @@
 //! `flexarm identify`: parameters from measurements, and plans of poses to measure.
 
+use std::cell::{Cell, RefCell};
+use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::time::{Duration, Instant};
 
 use clap::Args;
 use flexarm::Robot;
 use flexarm::identify::{
-    EncoderFigures, Identification, IdentifyRequest, MeasurementPlan, PlanRequest, Weight, identify_robot,
-    plan_measurements,
+    EncoderFigures, Identification, IdentifyRequest, MeasurementPlan, ModelError, PlanRequest, Progress, Weight,
+    identify_robot_watched, plan_measurements,
 };
 
 use crate::args::{ModellingArgs, RobotArgs};
 use crate::failure::Failure;
 use crate::layout::{lines, table};
+use crate::print::say;
 use crate::shipped;
 use crate::shipped::OutputFolder;
+use crate::signals::stop_when_asked;
 use crate::terminal::{Terminal, answer, to_json, working};
 
 const EXAMPLES: &str = "\
@@ -49,8 +54,8 @@ pub(crate) struct IdentifyArgs {
     /// Choose the N most informative poses instead of reading measurements
     #[arg(long, help_heading = "Plan", value_name = "N", conflicts_with = "measurements")]
     pub(crate) plan: Option<usize>,
-    /// Candidate forces of the plan, world axes (N; may be repeated) [default: 500 N down, along x
-    /// and along y]
+    /// Candidate forces of the plan, world axes (N; may be repeated) [default: down, along x and
+    /// along y, as large as the effort limits allow, 500 N at most]
     #[arg(
         long = "pull",
         help_heading = "Plan",
@@ -91,6 +96,9 @@ pub(crate) struct IdentifyArgs {
     pub(crate) force: bool,
 }
 
+/// Time between two lines about the progress where there is no terminal.
+const TOLD_EVERY: Duration = Duration::from_secs(10);
+
 pub(crate) fn run(terminal: &Terminal, args: &IdentifyArgs) -> Result<ExitCode, Failure> {
     let robot = Robot::load_with(&shipped::robot(Some(&args.robot))?, &args.load.options()?)?;
     match (args.plan, &args.measurements) {
@@ -104,7 +112,19 @@ pub(crate) fn run(terminal: &Terminal, args: &IdentifyArgs) -> Result<ExitCode, 
                 output: folder.path(),
                 overwrite: args.force,
             };
-            let found = working(terminal, "fitting the parameters", || identify_robot(&robot, measurements, &request))?;
+            let stop = RefCell::new(stop_when_asked());
+            let told = Cell::new(Instant::now());
+            let watch = |progress: &Progress| {
+                if !terminal.quiet && !std::io::stderr().is_terminal() && told.get().elapsed() >= TOLD_EVERY {
+                    told.set(Instant::now());
+                    let Progress { iteration, rms, step } = progress;
+                    say(&format!("iteration {iteration}: residuals {rms:.3} and last step {step:.1e} deviations"));
+                }
+                stop.borrow_mut()().is_continue()
+            };
+            let found = working(terminal, "fitting the parameters", || {
+                identify_robot_watched(&robot, measurements, &request, &watch)
+            })?;
             crate::print::caveats(terminal, &found.caveats);
             answer(terminal, || to_json(&found), || text(&found));
             Ok(ExitCode::SUCCESS)
@@ -138,9 +158,7 @@ fn plan(terminal: &Terminal, args: &IdentifyArgs, robot: &Robot, count: usize) -
         overwrite: args.force,
         ..PlanRequest::new(count)
     };
-    if !forces.is_empty() {
-        request.forces = forces;
-    }
+    request.forces = forces;
     let found = working(terminal, "planning the measurements", || plan_measurements(robot, &request))?;
     crate::print::warnings(terminal, &found.warnings);
     answer(terminal, || to_json(&found), || plan_text(&found));
@@ -158,7 +176,9 @@ fn readable(unit: &str) -> (&str, f64) {
 }
 
 /// Maximum number of undetermined combinations in the terminal.
-const MOST_COMBINATIONS: usize = 8;
+const MOST_COMBINATIONS: usize = 3;
+/// Maximum number of parameters in a combination in the terminal.
+const MOST_PARTS: usize = 4;
 
 fn text(found: &Identification) -> String {
     let Identification { robot, measurements, readings, numbers, .. } = found;
@@ -188,7 +208,7 @@ fn text(found: &Identification) -> String {
     }
     for point in &found.targets {
         let [x, y, z] = point.xyz;
-        out += &format!("target {} is at {x:.5}, {y:.5}, {z:.5} m on the tool\n", point.name);
+        out += &format!("target {} is at {x:.5}, {y:.5}, {z:.5} m on {}\n", point.name, point.link);
     }
     for caveat in found.caveats.iter().filter(|caveat| !caveat.warns()) {
         out += &format!("note: {}\n", caveat.message);
@@ -204,11 +224,12 @@ fn text(found: &Identification) -> String {
 fn parameter_table(found: &Identification) -> String {
     let mut t = table(&["parameter", "before", "value", "std", "", "unit"]);
     for p in &found.parameters {
-        let (value, part) = match p.identifiable {
-            true if p.std.is_nan() => (number(p.value), "no fit".to_owned()),
-            true => (number(p.value), part_of(p.std, p.value, p.initial)),
-            false if p.value != p.initial => (number(p.value), "with others".to_owned()),
-            false => ("undetermined".to_owned(), String::new()),
+        let (value, part) = match (p.identifiable, p.rigid) {
+            (true, _) => (number(p.value), part_of(p.std, p.value, p.initial)),
+            // The bound of a clearance or compliance is its largest value.
+            (false, true) if p.interval[1].is_finite() => (format!("<= {}", number(p.interval[1])), "rigid".to_owned()),
+            (false, true) => (format!(">= {}", number(p.interval[0])), "rigid".to_owned()),
+            (false, false) => (number(p.value), "not alone".to_owned()),
         };
         t.add_row(vec![p.name.clone(), number(p.initial), value, deviation(p.std), part, p.unit.clone()]);
     }
@@ -229,8 +250,24 @@ fn residual_lines(found: &Identification) -> String {
             number(factor * held.rms),
             number(factor * held.rms_before)
         );
+        if held.skipped > 0 {
+            out += &format!("{} of {} parts of the readings cannot be held out\n", held.skipped, held.folds);
+        }
+    }
+    for error in &found.model_errors {
+        out += &format!("error of the model in {}: {}\n", error.kind, model_error(error));
     }
     out
+}
+
+/// States the error of the model in a kind of readings with its unit.
+fn model_error(error: &ModelError) -> String {
+    match error.kind {
+        "displacements" | "places" => format!("{} mm", number(1e3 * error.error)),
+        "rotations" => format!("{} mrad", number(1e3 * error.error)),
+        "frequencies" => format!("{} %", number(100.0 * error.error)),
+        _ => number(error.error),
+    }
 }
 
 fn encoder_line(gear: &EncoderFigures) -> String {
@@ -253,8 +290,10 @@ fn encoder_line(gear: &EncoderFigures) -> String {
 fn combination_lines(untold: &[Vec<Weight>]) -> String {
     let mut out = String::new();
     for combination in untold.iter().take(MOST_COMBINATIONS) {
-        let parts: Vec<String> = combination.iter().map(|w| format!("{:+.2} {}", w.weight, w.name)).collect();
-        out += &format!("not determined: {}\n", parts.join(" "));
+        let of = |w: &Weight| format!("{:+.2} {}", w.weight, w.name);
+        let parts: Vec<String> = combination.iter().take(MOST_PARTS).map(of).collect();
+        let more = if combination.len() > MOST_PARTS { " ..." } else { "" };
+        out += &format!("not determined: {}{more}\n", parts.join(" "));
     }
     if let Some(more) = untold.len().checked_sub(MOST_COMBINATIONS).filter(|more| *more > 0) {
         out += &format!("not determined: {more} more combinations (--json and the page list them)\n");

@@ -90,7 +90,7 @@ fn coverage(robot: &str) -> (f64, f64) {
     let (mut inside, mut squares, mut count) = (0.0, 0.0, 0.0);
     for _ in 0..200 {
         let noisy: Vec<f64> = exact.iter().map(|x| x + NOISE * normal(&mut draw)).collect();
-        let found = identify(&plant, &parameters, &with_values(&poses, &noisy), &options).unwrap();
+        let found = identify(&plant, &parameters, &with_values(&poses, &noisy), &options, &|_| true).unwrap();
         for (p, x) in found.parameters.iter().zip(&truth) {
             assert!(p.identifiable, "{}", p.name);
             let value = p.initial * x.exp();
@@ -154,12 +154,12 @@ fn a_table_in_millimetres_gives_a_robot_file_that_shows_what_was_measured() {
     let request = IdentifyRequest { output: Some(output.clone()), ..IdentifyRequest::default() };
     let found = identify_robot(&robot, &folder.join("job.toml"), &request).unwrap();
     for (p, x) in found.parameters.iter().zip(x) {
-        let error = ((p.value / p.initial).ln() - x).abs();
-        assert!(error < 1e-8, "{}: {error:e}", p.name); // measured: below 1e-10
+        // Without noise, the prior alone pulls, by a small part of the deviation.
+        let error = (p.value - p.initial * x.exp()).abs() / p.std;
+        assert!(error < 0.01, "{}: {error:e}", p.name);
     }
-    assert!(found.residual.before > 1e-5 && found.residual.after < 1e-12, "{:?}", found.residual);
-    // The new file has these stiffnesses to a hundredth of their deviations, and everything else
-    // from the old one.
+    assert!(found.residual.before > 1e-5 && found.residual.after < 1e-8, "{:?}", found.residual);
+    // The new file has these stiffnesses, and everything else from the old one.
     let new = Robot::load(&output).unwrap();
     assert_eq!(
         (new.urdf_path.canonicalize().unwrap(), &new.name),
@@ -168,7 +168,7 @@ fn a_table_in_millimetres_gives_a_robot_file_that_shows_what_was_measured() {
     let arm = new.model(&Modelling::default()).unwrap();
     for (p, found) in stiffnesses(parameters(&arm)).iter().zip(&found.parameters) {
         let off = (p.initial - found.value).abs();
-        assert!(off < 0.01 * found.std, "{}: {off}", p.name);
+        assert!(off < 1e-11 * found.value, "{}: {off}", p.name);
     }
     let page = std::fs::read_to_string(output.join("identification.html")).unwrap();
     assert!(page.contains("drive.joint_6.gearbox.stiffness") && page.matches("<svg").count() == 1);
@@ -242,13 +242,13 @@ fn a_plan_tells_more_than_as_many_poses_as_they_come_and_its_table_is_read_when_
     std::fs::write(folder.join("displacements.csv"), filled).unwrap();
     let found = identify_robot(&robot, &job, &IdentifyRequest::default()).unwrap();
     for (found, promised) in found.parameters.iter().zip(&plan.parameters) {
-        // The file has four digits of a degree; the measurement equals the expectation.
-        assert!((found.value / found.initial - 1.0).abs() < 1e-3, "{}", found.name);
         // At the TCP the axes of the forearm and of the flange nearly coincide.
         if !found.identifiable {
             assert!(found.std.is_nan() && promised.std > 0.3 * promised.initial, "{}", found.name);
             continue;
         }
+        // The file has four digits of a degree; the measurement equals the expectation.
+        assert!((found.value - found.initial).abs() < 0.3 * found.std, "{}", found.name);
         let ratio = found.std / promised.std;
         // The plan includes prior knowledge, a factor of two, also for parameters correlated with
         // this one; the fit does not.
@@ -281,10 +281,6 @@ fn what_is_wrong_in_a_file_of_measurements_is_said_with_its_place() {
         &format!("format = 1\nfit = [\"payload.mass\"]\n[[frequency]]\n{q}\nhz = [5.0]\nstd = 0.1\n"),
         "no parameter of this robot matches",
     );
-    let two = format!(
-        "format = 1\n[[frequency]]\n{q}\nhz = [5.0]\nstd = 0.1\n[[displacement]]\n{q}\nvalue = [0, 0, -1e-4]\nload = {{ mass = 10 }}\n"
-    );
-    fails(&two, "std is missing");
     let robot = Robot::load(root().join("robots/kr210/kr210.urdf")).unwrap();
     let good = format!("format = 1\n[[displacement]]\n{q}\nvalue = [0, 0, -1e-4]\nload = {{ mass = 10 }}\n");
     std::fs::write(&job, good).unwrap();

@@ -109,13 +109,12 @@ fn the_coupling_of_shear_and_bending_is_found_and_written_into_the_robot_file() 
     assert_eq!(found.parameters.len(), 2);
     for (p, (i, j)) in found.parameters.iter().zip([(row, column), (column, column)]) {
         eprintln!("{}: {:.6e} of {:.6e} +- {:.1e} {}", p.name, p.value, other[(i, j)], p.std, p.unit);
-        assert!(p.identifiable && (p.value - other[(i, j)]).abs() < 1e-3 * p.std, "{}", p.name);
+        assert!(p.identifiable && (p.value - other[(i, j)]).abs() < 0.05 * p.std, "{}", p.name);
     }
     let new = Robot::load(&output).unwrap();
     let off = (matrix(&new) - other).abs();
-    // Numbers are written to a hundredth of their deviation.
     let std = found.parameters.iter().map(|p| p.std).fold(0.0, f64::max);
-    assert!(off.max() < 0.02 * std, "{off}");
+    assert!(off.max() < 0.05 * std, "{off}");
     // Both names of an entry are accepted; an additional factor would duplicate it.
     let request = IdentifyRequest { fit: vec![name, "link.link_2.*".into()], ..IdentifyRequest::default() };
     let error = identify_robot(&first, &place.0.join("job.toml"), &request).unwrap_err().to_string();
@@ -210,15 +209,15 @@ fn a_tool_that_is_elsewhere_is_found_from_places_and_written_into_the_robot_file
     let truth = [0.004, -0.003, 0.006, 0.01, -0.02, 0.015];
     for (p, truth) in found.parameters.iter().zip(truth) {
         eprintln!("{}: {:.9} of {truth} +- {:.1e} {}", p.name, p.value, p.std, p.unit);
-        assert!(p.identifiable && (p.value - truth).abs() < 1e-8, "{}: {}", p.name, p.value);
+        assert!(p.identifiable && (p.value - truth).abs() < 0.02 * p.std, "{}: {}", p.name, p.value);
     }
     let new = Robot::load(&output).unwrap();
     let (now, before) = (new.tcp().1, moved.tcp().1);
     let apart = (now.translation.vector - before.translation.vector).norm();
     let turned = (now.rotation.inverse() * before.rotation).angle();
     eprintln!("written and read: {apart:.1e} m, {turned:.1e} rad");
-    // Written to 1e-7.
-    assert!(new.tcp().0 == link && apart < 2e-7 && turned < 2e-7, "{apart:e} {turned:e}");
+    // The pull of the prior.
+    assert!(new.tcp().0 == link && apart < 1e-6 && turned < 1e-6, "{apart:e} {turned:e}");
     // A tool chosen instead of the file's cannot be written into the file.
     let error = identify_robot(&moved, &place.0.join("job.toml"), &IdentifyRequest::default()).unwrap_err().to_string();
     assert!(error.contains("chosen as the TCP at loading"), "{error}");

@@ -75,8 +75,7 @@ impl Place {
                     load: load.clone(),
                     target: 0,
                     instrument: 0,
-                    value: Vector3::zeros(),
-                    std: Vector3::repeat(NOISE),
+                    rows: (0..3).map(|of| Row { of, value: 0.0, std: NOISE }).collect(),
                 },
             };
             Reading { name: "a".into(), q: q.clone(), kind }
@@ -85,6 +84,7 @@ impl Place {
             readings: readings.collect(),
             targets: target.map(Target::Known).into_iter().collect(),
             instruments: vec![flexarm::identify::Instrument::Known(nalgebra::IsometryMatrix3::identity())],
+            ..Measurements::default()
         };
         let model = MeasuredArm { plant: &plant(&arm), parameters: &self.parameters, measurements: &measurements };
         let values = model.predicted(&DVector::from_column_slice(&TRUTH)).unwrap();
@@ -242,7 +242,8 @@ fn inertia_of_loads_and_relative_deviations_of_frequencies_count() {
     let point = expected("load = { mass = 50, com = [0, 0, 0.2] }");
     let body = expected("load = { mass = 50, com = [0, 0, 0.2], inertia = [20, 20, 20, 0, 0, 0] }");
     assert!(body[0].0 < point[0].0 - 1e-3, "{body:?} {point:?}");
-    assert!((body[0].1 - 0.08).abs() < 1e-12 && (body[1].1 - 0.1).abs() < 1e-12);
+    // One per cent of each frequency, and the error of the model.
+    assert!((body[0].1 / body[1].1 - 0.8).abs() < 1e-9 && body[0].1 >= 0.08, "{body:?}");
     let refused = |load: &str, std: &str, part: &str| {
         let error = place.identify(&job(load, std)).unwrap_err().to_string();
         assert!(error.contains(part), "{error}");
@@ -308,8 +309,7 @@ fn plans_and_identifications_tell_what_check_tells_of_the_robot() {
     assert!(plan.warnings.iter().any(|text| text.contains("payload")), "{:?}", plan.warnings);
 }
 
-/// Two dial gauge readings of 1 mm where the robot file predicts half of it. With this prior the
-/// third gear used to be reported as identified with a deviation of 247 %.
+/// Two dial gauge readings of 1 mm where the robot file predicts half of it.
 #[test]
 fn what_the_readings_know_less_than_within_a_factor_of_two_is_not_claimed() {
     let place = Place::new("gauge");
@@ -324,10 +324,10 @@ fn what_the_readings_know_less_than_within_a_factor_of_two_is_not_claimed() {
         eprintln!("{}: {:.3e} +- {:.1e}, told {}", p.name, p.value, p.std, p.identifiable);
         match p.identifiable {
             true => assert!(p.std / p.value <= 2f64.ln(), "{p:?}"),
-            false => assert!(p.value == p.initial && p.std.is_nan(), "{p:?}"),
+            false => assert!(p.std.is_nan(), "{p:?}"),
         }
     }
     let json = serde_json::to_value(&found).unwrap();
     let third = &json["parameters"][2];
-    assert!(third["std"].is_null() && third["identifiable"] == false && third["value"] == third["initial"], "{third}");
+    assert!(third["std"].is_null() && third["identifiable"] == false, "{third}");
 }

@@ -289,7 +289,7 @@ fn shapes_of_modes_tell_how_stiffness_is_shared() {
     for p in &answer.parameters {
         let factor = TRUTH.iter().find(|(name, _)| *name == p.name).unwrap().1;
         eprintln!("{}: {:.6} of {:.6}", p.name, p.value, p.initial * factor);
-        assert!((p.value / (p.initial * factor) - 1.0).abs() < 1e-5, "{}", p.name);
+        assert!((p.value - p.initial * factor).abs() < 0.05 * p.std, "{}", p.name);
     }
 }
 
@@ -342,8 +342,6 @@ fn dampers_of_a_gearbox_of_six_come_back_one_by_one() {
         if p.identifiable {
             told += 1;
             assert!(off.abs() < 1e-2, "{}: {off:e}", p.name);
-        } else {
-            assert_eq!(p.value, p.initial);
         }
     }
     assert!(told >= 3, "{told}");

@@ -226,7 +226,7 @@ fn joint_frames_of_a_rigid_arm_are_found_without_any_stiffness() {
     for (name, truth) in [("joint.wrist.x", 0.001), ("joint.wrist.zero", 0.003)] {
         let (value, error) = (parameter(name).value, (parameter(name).value - truth).abs());
         eprintln!("{name}: {value:.6e}, off by {error:.1e}");
-        assert!(parameter(name).identifiable && error < 1e-9, "{name}: {value} {error:e}"); // measured 2.8e-16
+        assert!(parameter(name).identifiable && error < 0.02 * parameter(name).std, "{name}: {value} {error:e}");
     }
     // The height of the tracker, which is not known, hides that of the wrist.
     assert!(!parameter("joint.wrist.z").identifiable);

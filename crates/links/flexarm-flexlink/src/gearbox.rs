@@ -10,6 +10,11 @@
 //! connection. Six springs with play act one after another: translations along x, y, z, then
 //! rotations about x, y, z. At zero deflection all frames are unchanged.
 //!
+//! A seat deflects before the joint, so that its two springs do not turn with it:
+//! ```text
+//! parent --spring x--> --spring y--> <joint>__seated --joint--> <joint>__motor --spring--> child
+//! ```
+//!
 //! The guide of a telescopic joint tilts in the middle of the overlap of its tubes, which moves
 //! half as fast as the joint. Two joints that mimic it move there and back:
 //! ```text
@@ -79,6 +84,8 @@ pub struct Gearbox {
     pub joint: String,
     /// Stiffness of the spring.
     pub stiffness: GearStiffness,
+    /// Stiffness of the housing about x and y of the joint frame, before the joint (N m/rad).
+    pub seat: Option<[f64; 2]>,
 }
 
 /// Spring inserted for a gearbox or a mounting.
@@ -212,7 +219,12 @@ fn there_and_back(
     (middle, tilted)
 }
 
-/// Inserts a spring outward of each of the joints.
+/// Suffixes of the names of the springs of a seat.
+pub const SEAT: [&str; 2] = [".seat_x", ".seat_y"];
+/// `GearSpring::component` of the first spring of a seat.
+const SEATED: usize = 6;
+
+/// Inserts a spring outward of each of the joints, and those of its seat inward.
 ///
 /// # Errors
 /// [`GearboxError`] with the name of the joint; that gearbox is then not in the mechanism.
@@ -235,6 +247,10 @@ pub fn insert_gearboxes(mechanism: &mut Mechanism, gearboxes: &[Gearbox]) -> Res
             return Err(GearboxError::Slides { joint: name.clone() });
         }
         check_stiffness(name, &gearbox.stiffness)?;
+        let found = gearbox.seat.map_or(1.0, |seat| smallest_of(&seat));
+        if found <= 0.0 || !found.is_finite() {
+            return Err(GearboxError::NotPositive { joint: name.clone(), found });
+        }
         if let GearStiffness::Guide(tubes) = &gearbox.stiffness
             && !(matches!(joint.kind, JointKind::Prismatic(_)) && tubes.tilts.contains(&true))
         {
@@ -244,7 +260,20 @@ pub fn insert_gearboxes(mechanism: &mut Mechanism, gearboxes: &[Gearbox]) -> Res
         let motor = format!("{name}__motor");
         let child = std::mem::replace(&mut joint.child, motor.clone());
         mechanism.links.push(Link { name: motor.clone(), inertia: None });
-
+        let seat = gearbox.seat.map(|k| {
+            let seated = format!("{name}__seated");
+            let parent = std::mem::replace(&mut joint.parent, seated.clone());
+            let X = std::mem::replace(&mut joint.X_PJ, Pose::identity());
+            let axes = SEAT.into_iter().zip([Vector3::x_axis(), Vector3::y_axis()]).zip(k);
+            let turn = |((suffix, axis), k)| (suffix, JointKind::ElasticRevolute(axis), DMatrix::from_element(1, 1, k));
+            (axes.map(turn).collect(), (parent, seated), X)
+        });
+        if let Some((parts, ends, X)) = seat {
+            mechanism.links.push(Link { name: ends.1.clone(), inertia: None });
+            let seated = insert_springs(mechanism, name, parts, ends, X);
+            let behind = |spring: GearSpring| GearSpring { component: spring.component + SEATED, ..spring };
+            springs.extend(seated.into_iter().map(behind));
+        }
         let parts = spring_joints(&gearbox.stiffness, along);
         let (parent, child) = match &gearbox.stiffness {
             GearStiffness::Guide(tubes) => there_and_back(mechanism, &slide, tubes, motor, child),

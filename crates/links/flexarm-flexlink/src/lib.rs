@@ -42,7 +42,7 @@ mod substitute;
 
 pub use cut::{CutError, cut_chain, cut_inertia};
 pub use flexarm_fem::ReducedLink;
-pub use gearbox::{GearSpring, GearStiffness, Gearbox, GearboxError, GuideTubes, insert_gearboxes};
+pub use gearbox::{GearSpring, GearStiffness, Gearbox, GearboxError, GuideTubes, SEAT, insert_gearboxes};
 pub use interfaces::{BranchJoint, branch_joints};
 pub use modal::modal_body;
 pub use mounting::{Mounting, MountingError, base_link, insert_mounting};

@@ -40,7 +40,7 @@ fn robot() -> Mechanism {
 }
 
 fn gearbox(joint: &str, stiffness: GearStiffness) -> Gearbox {
-    Gearbox { joint: joint.into(), stiffness }
+    Gearbox { joint: joint.into(), stiffness, seat: None }
 }
 
 /// Symmetric positive definite 6x6 matrix with all couplings.
@@ -193,6 +193,38 @@ fn tip_gives_way_by_lever_and_axis() {
         eprintln!("{joint} {stiffness:?}: {error:.1e}");
         assert!(error < 1e-12, "{joint} {stiffness:?}: {error:e}");
     }
+}
+
+/// Truth: `Σ u uᵀ/k` with the axes of the joint frame before the joint turns for the seat, and the
+/// joint's axis for its gear, at two values of the joint.
+#[test]
+fn a_seat_yields_about_axes_that_do_not_turn_with_the_joint() {
+    for turned in [-0.4, 1.1] {
+        let q = [0.7, 0.3, turned];
+        let (seat, k) = ([4e5, 3e5], 1e5);
+        let mut soft = robot();
+        let gear = Gearbox { seat: Some(seat), ..gearbox("elbow", GearStiffness::Axis(k)) };
+        let springs = insert_gearboxes(&mut soft, &[gear]).expect("fits");
+        let (C, X_WT, X_WJ) = tip_compliance(&soft, &springs, q);
+        let JointKind::Revolute(axis) = robot().joint("elbow").expect("there").kind else { panic!("turns") };
+        let before = X_WJ.rotation * Rotation3::from_axis_angle(&axis, -turned);
+        let lever = X_WT.translation.vector - X_WJ.translation.vector;
+        let own = [(Vector3::x(), seat[0]), (Vector3::y(), seat[1]), (*axis, k)];
+        let truth: Matrix6<f64> = own.into_iter().fold(Matrix6::zeros(), |sum, (axis, k)| {
+            let axis = before * axis;
+            let mut u = nalgebra::Vector6::zeros();
+            u.fixed_rows_mut::<3>(0).copy_from(&axis.cross(&lever));
+            u.fixed_rows_mut::<3>(3).copy_from(&axis);
+            sum + u * u.transpose() / k
+        });
+        let error = (C - truth).amax() / truth.amax();
+        eprintln!("joint at {turned}: {error:.1e}");
+        assert!(error < 1e-12, "{turned}: {error:e}"); // measured: 3e-16
+    }
+    let mut mechanism = robot();
+    let weak = Gearbox { seat: Some([1e5, 0.0]), ..gearbox("elbow", GearStiffness::Axis(1e5)) };
+    assert!(matches!(insert_gearboxes(&mut mechanism, &[weak]), Err(GearboxError::NotPositive { .. })));
+    assert_eq!(mechanism, robot());
 }
 
 /// Every invalid gearbox is rejected by name, and the mechanism is unchanged.

@@ -144,7 +144,7 @@ fn joints_keep_their_order_whichever_half_of_a_link_carries_them() {
     flexible.parts = Parts::FromLink(0.5);
     flexible.reduced.X_LB = Pose::translation(L, 0.02, 0.0);
     let mut substituted = substitute(&arm, &[flexible]).expect("fits");
-    let gear = Gearbox { joint: "near_1".into(), stiffness: GearStiffness::Axis(1e4) };
+    let gear = Gearbox { joint: "near_1".into(), stiffness: GearStiffness::Axis(1e4), seat: None };
     insert_gearboxes(&mut substituted.mechanism, &[gear]).expect("fits");
     let (rigid, soft) = (Model::new(&arm).expect("a tree"), Model::new(&substituted.mechanism).expect("a tree"));
     let names = |model: &Model| -> Vec<String> {

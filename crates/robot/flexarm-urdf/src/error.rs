@@ -196,6 +196,9 @@ pub enum Problem {
     /// A mimic joint whose leader does not exist.
     #[error("joint {joint:?} mimics {leader:?}, which does not exist")]
     UnknownMimic { joint: String, leader: String, closest: Option<String> },
+    /// A joint with several `<mimic>`, of which a URDF allows one.
+    #[error("joint {joint:?} has {count} <mimic>; a joint follows one other joint")]
+    SeveralMimics { joint: String, count: usize },
     /// Joints that mimic each other.
     #[error("the joints {} mimic each other in a circle", quoted(joints))]
     MimicCycle { joints: Vec<String> },
@@ -252,6 +255,7 @@ impl Problem {
             Self::NegativeLimit { .. } => "negative-limit",
             Self::ZeroAxis { .. } => "zero-axis",
             Self::UnknownMimic { .. } => "unknown-mimic",
+            Self::SeveralMimics { .. } => "several-mimics",
             Self::MimicCycle { .. } => "mimic-cycle",
             Self::NegativeMass { .. } => "negative-mass",
             Self::ZeroMass { .. } => "zero-mass",
@@ -297,6 +301,10 @@ impl Problem {
             Self::LimitsReversed { .. } => "exchange lower and upper; angles are in radians".into(),
             Self::NegativeLimit { .. } => "limits of speed and effort are magnitudes; 0 means unknown".into(),
             Self::ZeroAxis { .. } => "write the axis as a unit vector, such as xyz=\"0 0 1\"".into(),
+            Self::SeveralMimics { .. } => {
+                "keep one; a joint that depends on several is driven by a motion of its own or belongs to a [[loop]]"
+                    .into()
+            }
             Self::MimicCycle { .. } => "let one of them go without <mimic>".into(),
             Self::NegativeMass { .. } => "correct the sign; a counterweight has positive mass too".into(),
             Self::ZeroMass { .. } => {

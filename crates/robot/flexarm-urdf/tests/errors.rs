@@ -173,6 +173,11 @@ fn followers_have_a_leader_that_moves() {
     let (_, fault) = problem(&with_joint(&follower("jj")));
     assert_eq!(fault.code(), "unknown-mimic");
     assert_eq!(problem(&with_joint(&follower("j"))).1, Problem::MimicCycle { joints: vec!["j".into()] });
+    let two =
+        hinge("j", "base", "arm").replace("</joint>", "<mimic joint='a'/><mimic joint='b' multiplier='2'/></joint>");
+    let (_, fault) = problem(&with_joint(&two));
+    assert_eq!(fault, Problem::SeveralMimics { joint: "j".into(), count: 2 });
+    assert!(fault.help().contains("[[loop]]"), "{}", fault.help());
     let fixed = "<joint name='f' type='fixed'><parent link='arm'/><child link='tip'/></joint>\n";
     let text = robot(&[&link("base"), &link("arm"), "<link name='tip'/>\n", &follower("f"), fixed]);
     assert_eq!(warned(&text), ["mimic-fixed"]);

@@ -102,7 +102,16 @@ impl Arm {
     /// # Errors
     /// As [`Self::arm`].
     pub fn arm_with(&self, springs: Vec<Spring>, motion: Arc<dyn PrescribedMotion>) -> Result<FlexibleArm, StepError> {
-        let mut arm = FlexibleArm::new(self.model.clone(), springs, motion)?;
+        self.completed(FlexibleArm::new(self.model.clone(), springs, motion)?)
+    }
+
+    /// As [`Self::arm`], for equilibria alone: links between springs need no mass.
+    pub(crate) fn arm_at_rest(&self, motion: Arc<dyn PrescribedMotion>) -> Result<FlexibleArm, StepError> {
+        self.completed(FlexibleArm::at_rest(self.model.clone(), self.springs.clone(), motion)?)
+    }
+
+    /// Adds friction, gear laws and servos to an arm.
+    fn completed(&self, mut arm: FlexibleArm) -> Result<FlexibleArm, StepError> {
         if self.friction.iter().any(|f| *f != Friction::NONE) {
             arm.friction.clone_from(&self.friction);
         }
@@ -127,7 +136,7 @@ impl Arm {
     /// inertia.
     pub fn explained(&self, source: StepError) -> Error {
         let light = match source {
-            StepError::Singular { matrix: "mass matrix", .. } => self.without_inertia(),
+            StepError::Singular { matrix, .. } if matrix.starts_with("mass matrix") => self.without_inertia(),
             _ => Vec::new(),
         };
         if light.is_empty() {

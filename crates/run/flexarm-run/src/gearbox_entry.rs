@@ -43,6 +43,8 @@ pub(crate) struct GearboxEntry {
     pub transmission_error: Vec<HarmonicEntry>,
     /// Internal friction, in catalogue terms.
     pub hysteresis: Option<HysteresisEntry>,
+    /// Stiffness of the housing about x and y of the joint frame, before the joint's angle (N m/rad).
+    pub seat: Option<Spanned<[f64; 2]>>,
     /// Tubes of a telescopic joint, instead of a stiffness.
     pub guide: Option<GuideEntry>,
 }
@@ -77,6 +79,8 @@ impl GearDamping {
     pub fn of(&self, component: usize, size: usize) -> Damping {
         match &self.dampers {
             None => Damping::Modal(0.03),
+            // The springs of a seat have none.
+            Some(d) if component >= d.len() => Damping::Modal(0.03),
             Some(d) if size == 1 => Damping::Dampers([d[component], 0.0, 0.0, 0.0, 0.0, 0.0]),
             Some(d) => Damping::Dampers(std::array::from_fn(|c| d[c])),
         }
@@ -122,7 +126,23 @@ pub(crate) fn gear(
     let law = gear.hysteresis.as_ref().map(|entry| hysteresis(entry, about, curve));
     let hysteresis = law.transpose().map_err(|error| at(error.to_string()))?;
     let damping = GearDamping { dampers, curves, play, transmission, hysteresis, tilts: Vec::new() };
-    Ok((Gearbox { joint: joint.name.clone(), stiffness }, damping))
+    let seat = gear.seat.as_ref().map(|seat| seat_of(joint, seat.get_ref(), size, gear));
+    let seat = seat.transpose().map_err(|text| at(text.into()))?;
+    Ok((Gearbox { joint: joint.name.clone(), stiffness, seat }, damping))
+}
+
+/// Returns the stiffness of the housing of a joint before its angle.
+fn seat_of(joint: &Joint, seat: &[f64; 2], size: usize, gear: &GearboxEntry) -> Result<[f64; 2], &'static str> {
+    if joint.kind == flexarm_kinematics::JointKind::Fixed {
+        return Err("seat is before the angle of a moving joint; this joint is fixed: use stiffness");
+    }
+    if size > 3 || gear.hysteresis.is_some() || !gear.transmission_error.is_empty() {
+        return Err("seat goes with one or three stiffnesses, without transmission_error and hysteresis");
+    }
+    match seat.iter().all(|k| k.is_finite() && *k > 0.0) {
+        true => Ok(*seat),
+        false => Err("seat takes two finite stiffnesses above 0"),
+    }
 }
 
 /// Makes an error at a gearbox.
@@ -247,14 +267,14 @@ fn guide_gear(
     gear: &GearboxEntry,
     at: GearboxFault<'_>,
 ) -> Result<(Gearbox, GearDamping), RobotFileError> {
-    let others = gear.stiffness.is_some() || gear.backlash.is_some() || gear.curve.is_some();
+    let others = gear.stiffness.is_some() || gear.backlash.is_some() || gear.curve.is_some() || gear.seat.is_some();
     if others || gear.hysteresis.is_some() || !gear.transmission_error.is_empty() {
         let text = "guide takes the place of stiffness and of all other laws of a gearbox: keep guide and damping";
         return Err(at(text.into()));
     }
     let (tubes, tilts) = guide.checked(joint).map_err(|error| at(error.to_string()))?;
     let dampers = dampers(gear, tilts.len(), at)?;
-    let gearbox = Gearbox { joint: joint.name.clone(), stiffness: GearStiffness::Guide(tubes) };
+    let gearbox = Gearbox { joint: joint.name.clone(), stiffness: GearStiffness::Guide(tubes), seat: None };
     Ok((
         gearbox,
         GearDamping {

@@ -198,7 +198,10 @@ impl Robot {
         let mut laws = GearLaws::default();
         let place = |joint: &str| model.coordinates()[..model.n_actuated()].iter().position(|c| c.joint == joint);
         let spring = |number: usize| {
-            let element = owners.iter().position(|owner| *owner == Owner::Drive(number))?;
+            // The springs of a seat come first.
+            let seated = self.drives[number].gearbox.as_ref().is_some_and(|(gearbox, _)| gearbox.seat.is_some());
+            let mut own = (0..owners.len()).filter(|k| owners[*k] == Owner::Drive(number));
+            let element = own.nth(if seated { 2 } else { 0 })?;
             (model.elastic()[element].size == 1).then_some(element)
         };
         for (number, drive) in self.drives.iter().enumerate() {

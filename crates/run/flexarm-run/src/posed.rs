@@ -50,8 +50,17 @@ impl Arm {
     /// # Errors
     /// [`Error::Pose`] for joint values that do not fit the arm.
     pub fn posed(self: &Arc<Self>, at: Option<&[f64]>) -> Result<Posed, Error> {
+        Posed::new(self.clone(), self.values(at)?)
+    }
+
+    /// As [`Arm::posed`], for equilibria alone ([`Posed::resting`]).
+    pub(crate) fn resting(self: &Arc<Self>, at: Option<&[f64]>) -> Result<Posed, Error> {
+        Posed::resting(self.clone(), self.values(at)?)
+    }
+
+    fn values(&self, at: Option<&[f64]>) -> Result<Vec<f64>, Error> {
         let names: Vec<&str> = self.rigid.coordinates().iter().map(|c| c.joint.as_str()).collect();
-        Posed::new(self.clone(), joint_values(at, &names)?)
+        joint_values(at, &names)
     }
 
     /// Returns mass, damping and stiffness about the static equilibrium at a pose under gravity and
@@ -97,13 +106,29 @@ impl Posed {
     /// Holds an arm at a pose; `at` in coordinate order (rad or m). [`Arm::posed`] also accepts no
     /// values.
     pub fn new(flexible: Arc<Arm>, at: Vec<f64>) -> Result<Self, Error> {
+        let arm = flexible.arm(Arc::new(Held(at.clone())));
+        Self::of(flexible, arm, at)
+    }
+
+    /// As [`Self::new`], for equilibria alone: an arm with a link between springs that has no mass
+    /// has no modes.
+    pub(crate) fn resting(flexible: Arc<Arm>, at: Vec<f64>) -> Result<Self, Error> {
+        let held = Arc::new(Held(at.clone()));
+        let arm = match flexible.arm(held.clone()) {
+            Err(StepError::Singular { matrix, .. }) if matrix.starts_with("mass matrix") => flexible.arm_at_rest(held),
+            arm => arm,
+        };
+        Self::of(flexible, arm, at)
+    }
+
+    fn of(flexible: Arc<Arm>, arm: Result<FlexibleArm, StepError>, at: Vec<f64>) -> Result<Self, Error> {
         loops::check_pose(&flexible.rigid, &mut Data::new(&flexible.rigid), &DVector::from_column_slice(&at))?;
         balancer::check_pose(&flexible.rigid, &mut Data::new(&flexible.rigid), &DVector::from_column_slice(&at))?;
         let model = flexible.model.clone();
         let actuated = &model.coordinates()[..model.n_actuated()];
         let joints: Vec<String> = actuated.iter().map(|c| c.joint.clone()).collect();
         let prismatic = actuated.iter().map(|c| c.slides()).collect();
-        let arm = flexible.arm(Arc::new(Held(at.clone()))).map_err(|error| flexible.explained(error))?;
+        let arm = arm.map_err(|error| flexible.explained(error))?;
         Ok(Self { tool: flexible.tcp.clone(), flexible, arm, joints, prismatic, at })
     }
 

@@ -119,7 +119,7 @@ fn statics_of(
     outputs: Option<&StaticsOutputs>,
 ) -> Result<Statics, Error> {
     let paths = outputs.map(statics_picture::places).transpose()?;
-    statics_at(robot.model(modelling)?.posed(at)?, wrench, paths)
+    statics_at(robot.model(modelling)?.resting(at)?, wrench, paths)
 }
 
 impl Arm {
@@ -128,7 +128,7 @@ impl Arm {
     /// # Errors
     /// As [`statics()`].
     pub fn statics(self: &Arc<Self>, at: Option<&[f64]>, wrench: [f64; 6]) -> Result<Statics, Error> {
-        statics_at(self.posed(at)?, wrench, None)
+        statics_at(self.resting(at)?, wrench, None)
     }
 }
 

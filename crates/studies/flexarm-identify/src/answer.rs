@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use crate::estimation::{
-    Form, Identified, Instrument, MeasuredArm, Measurements, Parameter, ParameterEstimate, Plant, Reading, ReadingKind,
-    Target,
+    Form, Identified, Instrument, MeasuredArm, Measurements, ModelError, Parameter, ParameterEstimate, Plant, Reading,
+    ReadingKind, Target,
 };
 use flexarm_kinematics::Pose;
 use nalgebra::{DVector, Vector3};
@@ -44,9 +44,10 @@ pub struct Identification {
     pub held_out: Option<HeldOutFigures>,
     /// Ratio of the scatter to the declared one if chance does not explain it; otherwise null.
     pub misfit: Option<f64>,
-    /// Whether the deviations of the readings were given; if not, they are estimated from the
-    /// scatter.
+    /// Whether the deviations of all readings were given; the others are estimated from the scatter.
     pub deviations_known: bool,
+    /// Errors of the model that the fit found, per kind of readings.
+    pub model_errors: Vec<ModelError>,
     /// Gears with recorded positions of motor and link.
     pub encoders: Vec<EncoderFigures>,
     /// Readings that contradict the others, worst first.
@@ -89,22 +90,23 @@ pub struct FittedParameter {
     pub unit: String,
     /// Initial value.
     pub initial: f64,
-    /// Estimated value; the initial value if the parameter is not identifiable. A displacement of a
-    /// joint frame always has the value found, since others may replace it.
+    /// Value of the fit, which the new robot file has, whether or not the readings determine it.
     pub value: f64,
-    /// Standard deviation; NaN (null in JSON) if the parameter is not identifiable or the model
-    /// does not fit the readings.
+    /// Standard deviation; NaN (null in JSON) if the parameter is not identifiable.
     pub std: f64,
-    /// 95 % confidence interval; NaN (nulls) where `std` is NaN.
+    /// 95 % confidence interval; NaN (nulls) if the parameter is neither identifiable nor rigid. The
+    /// upper end of a stiffness that is rigid within the readings is infinite (null).
     pub interval: [f64; 2],
     /// Whether the readings determine the parameter.
     pub identifiable: bool,
+    /// Whether a spring or a clearance is rigid within the readings.
+    pub rigid: bool,
 }
 
 impl FittedParameter {
     fn of(found: &ParameterEstimate) -> Self {
-        let ParameterEstimate { name, unit, initial, value, std, interval, identifiable, .. } = found.clone();
-        Self { name, unit, initial, value, std, interval, identifiable }
+        let ParameterEstimate { name, unit, initial, value, std, interval, identifiable, rigid } = found.clone();
+        Self { name, unit, initial, value, std, interval, identifiable, rigid }
     }
 }
 
@@ -133,6 +135,8 @@ pub struct Residual {
 pub struct HeldOutFigures {
     /// Number of folds.
     pub folds: usize,
+    /// Number of folds that are not predicted, since the others do not determine an unknown.
+    pub skipped: usize,
     /// With the parameters fitted to the other folds.
     pub rms: f64,
     /// With the robot file as it is.
@@ -183,7 +187,9 @@ pub struct FoundFrame {
 pub struct FoundPoint {
     /// Name of the target.
     pub name: String,
-    /// Position in tool axes (m).
+    /// Link on which it is; `tcp` for the tool.
+    pub link: String,
+    /// Position in the axes of the link or the tool (m).
     pub xyz: [f64; 3],
 }
 
@@ -202,7 +208,7 @@ pub struct Compared {
     pub before: f64,
     /// Value predicted with the estimated parameters.
     pub after: f64,
-    /// Standard deviation of the measured value.
+    /// Standard deviation of the residual, with the error of the model.
     pub std: f64,
 }
 
@@ -230,6 +236,11 @@ fn kind_of(reading: &Reading) -> &'static str {
         ReadingKind::Response(_) => "responses",
         ReadingKind::Shape(_) => "mode shapes",
     }
+}
+
+/// Returns the name of the link on which a target is.
+fn link_of(input: &MeasurementInput, target: usize) -> &str {
+    input.measurements.links.get(target).and_then(Option::as_ref).map_or("tcp", |frame| &frame.name)
 }
 
 /// Describes each instrument and target in a sentence.
@@ -271,7 +282,8 @@ fn described(input: &MeasurementInput, found: &Identified) -> Vec<String> {
             }
             _ => None,
         });
-        format!("Target {name}: position {} in TCP axes ({how}){said}.", millimetres(&found.targets[k]))
+        let at = millimetres(&found.targets[k]);
+        format!("Target {name}: position {at} in the axes of {} ({how}){said}.", link_of(input, k))
     });
     instruments.chain(targets).collect()
 }
@@ -323,8 +335,8 @@ fn numbers(measurements: &Measurements) -> Vec<(String, &'static str)> {
                 }
                 all.extend(["x", "y", "z"].map(|axis| (format!("{}, about {axis}", reading.name), "rad")));
             }
-            ReadingKind::Place { .. } => {
-                all.extend(["x", "y", "z"].map(|axis| (format!("{}, {axis}", reading.name), "m")));
+            ReadingKind::Place { rows, .. } => {
+                all.extend(rows.iter().map(|row| (format!("{}, {}", reading.name, ["x", "y", "z"][row.of]), "m")));
             }
             ReadingKind::Known { .. } => all.push((reading.name.clone(), "ln")),
             ReadingKind::Frequencies { rows, .. } => {
@@ -355,7 +367,7 @@ pub(super) fn rms(values: impl ExactSizeIterator<Item = f64>) -> f64 {
 
 /// Returns each measured number with its predictions.
 fn compared(plant: &Plant, measurements: &Measurements, found: &Identified) -> Vec<Compared> {
-    let deviations: Vec<f64> = measurements.readings.iter().flat_map(Reading::deviations).collect();
+    let deviations = &found.solution.deviations;
     let observed = MeasuredArm { plant, parameters: &[], measurements }.observed();
     let kinds: Vec<&str> = measurements.readings.iter().flat_map(|r| vec![kind_of(r); r.rows()]).collect();
     let one = |(k, (name, unit)): (usize, (String, &'static str))| Compared {
@@ -363,8 +375,8 @@ fn compared(plant: &Plant, measurements: &Measurements, found: &Identified) -> V
         unit,
         kind: kinds[k],
         measured: observed[k],
-        before: observed[k] + found.before[k] * deviations[k],
-        after: observed[k] + found.solution.residuals[k] * deviations[k],
+        before: observed[k] + found.before[k],
+        after: observed[k] + found.solution.residuals[k],
         std: deviations[k],
     };
     numbers(measurements).into_iter().enumerate().map(one).collect()
@@ -374,12 +386,18 @@ fn compared(plant: &Plant, measurements: &Measurements, found: &Identified) -> V
 fn residuals(found: &Identified, compared: &[Compared]) -> (Residual, Option<HeldOutFigures>) {
     let one_unit = compared.windows(2).all(|pair| pair[0].unit == pair[1].unit);
     let unit = if one_unit { compared[0].unit } else { "std" };
-    let in_unit = |r: f64, k: usize| if one_unit { r * compared[k].std } else { r };
+    let in_unit = |r: f64, k: usize| if one_unit { r } else { r / compared[k].std };
     let all = |residuals: &[f64]| rms(residuals.iter().enumerate().map(|(k, r)| in_unit(*r, k)));
     let held_out = found.held_out.as_ref().map(|held| {
         let seen: Vec<usize> = (0..held.residuals.len()).filter(|k| held.residuals[*k].is_finite()).collect();
         let of = |values: &[f64]| rms(seen.iter().map(|k| in_unit(values[*k], *k)));
-        HeldOutFigures { folds: held.folds, rms: of(&held.residuals), rms_before: of(&found.before), unit }
+        HeldOutFigures {
+            folds: held.folds,
+            skipped: held.skipped,
+            rms: of(&held.residuals),
+            rms_before: of(&found.before),
+            unit,
+        }
     });
     let after = all(found.solution.residuals.as_slice());
     (Residual { before: all(&found.before), after, unit }, held_out)
@@ -417,10 +435,11 @@ pub(super) fn answer(
         residual,
         held_out,
         misfit: found.misfit,
-        deviations_known: input.deviations_known,
+        deviations_known: input.measurements.readings.iter().all(|r| r.deviations().iter().all(|std| *std > 0.0)),
+        model_errors: found.model_errors.clone(),
         encoders: Vec::new(),
         suspicious: suspicious.collect(),
-        shapes: shapes(plant, fitted, measurements, &found.solution.unknowns)?,
+        shapes: shapes(plant, fitted, measurements, &found.unknowns)?,
         instruments: frames(input, found),
         targets: points(input, found),
         iterations: found.solution.iterations,
@@ -468,6 +487,10 @@ fn frames(input: &MeasurementInput, found: &Identified) -> Vec<FoundFrame> {
 
 fn points(input: &MeasurementInput, found: &Identified) -> Vec<FoundPoint> {
     let all = input.targets.iter().zip(&found.targets).zip(&input.measurements.targets);
-    let unknown = all.filter(|(_, given)| matches!(given, Target::Unknown(_)));
-    unknown.map(|((name, p), _)| FoundPoint { name: name.clone(), xyz: (*p).into() }).collect()
+    let point = |(k, ((name, p), _)): (usize, ((&String, &Vector3<f64>), _))| FoundPoint {
+        name: name.clone(),
+        link: link_of(input, k).to_owned(),
+        xyz: (*p).into(),
+    };
+    all.enumerate().filter(|(_, (_, given))| matches!(given, Target::Unknown(_))).map(point).collect()
 }

@@ -77,26 +77,29 @@ fn set_priors(chosen: &mut [Candidate], input: &MeasurementInput, all: &[Candida
     for candidate in chosen.iter_mut() {
         let logarithmic = candidate.parameter.is_logarithmic();
         if let Some(factor) = input.uncertainty.filter(|_| logarithmic) {
-            candidate.parameter.prior = factor.ln();
+            candidate.parameter.prior = Some(factor.ln());
         }
     }
-    for (name, uncertainty, place) in &input.known {
-        let Some(candidate) = chosen.iter_mut().find(|c| c.parameter.name == *name) else {
-            let text = format!("{name:?} is not fitted; the parameters of this robot are {:?}", listed(all));
-            return Err(at_place(place, text));
-        };
-        let logarithmic = candidate.parameter.is_logarithmic();
-        if logarithmic && *uncertainty <= 1.0 {
-            let text = "the uncertainty of a stiffness or damping is a factor above 1: 1.5 means up to 1.5 times \
-                        larger or smaller";
+    for (pattern, uncertainty, place) in &input.known {
+        let mut matching = chosen.iter_mut().filter(|c| parameters::fits(pattern, &c.parameter.name)).peekable();
+        if matching.peek().is_none() {
+            let text = format!("{pattern:?} is not fitted; the parameters of this robot are {:?}", listed(all));
             return Err(at_place(place, text));
         }
-        let unit = match candidate.parameter.unit.as_str() {
-            "m" => input.length_m,
-            "rad" => input.angle_rad,
-            _ => 1.0,
-        };
-        candidate.parameter.prior = if logarithmic { uncertainty.ln() } else { *uncertainty * unit };
+        for candidate in matching {
+            let logarithmic = candidate.parameter.is_logarithmic();
+            if logarithmic && *uncertainty <= 1.0 {
+                let text = "the uncertainty of a stiffness or damping is a factor above 1: 1.5 means up to 1.5 times \
+                            larger or smaller";
+                return Err(at_place(place, text));
+            }
+            let unit = match candidate.parameter.unit.as_str() {
+                "m" => input.length_m,
+                "rad" => input.angle_rad,
+                _ => 1.0,
+            };
+            candidate.parameter.prior = Some(if logarithmic { uncertainty.ln() } else { *uncertainty * unit });
+        }
     }
     Ok(())
 }

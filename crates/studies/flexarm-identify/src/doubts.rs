@@ -1,6 +1,6 @@
 //! Caveats about an identification.
 
-use crate::estimation::{Identified, MeasuredArm, NoAnswer, ParameterEstimate, Plant, Reading, ReadingKind};
+use crate::estimation::{Identified, MeasuredArm, ParameterEstimate, Plant, ReadingKind};
 use nalgebra::DVector;
 
 use super::answer::{Identification, rms};
@@ -22,7 +22,7 @@ const LOAD_UNIT: CaveatKind = CaveatKind::warning(
 const ENCODER_RESIDUAL: CaveatKind = CaveatKind::warning(
     "encoder-rest",
     "{where}: {value} rad (or m) of the deflection are not explained by the torque, the noise of the encoders is \
-     {yardstick}: the error of the stiffness may exceed its standard deviation",
+     {yardstick}: the standard deviation of the stiffness includes that, as if it followed the torque in part",
     "rad",
     "give the measured torque, lower `below`, or check friction, masses, transmission errors and flexible \
      neighbouring links",
@@ -43,13 +43,10 @@ const FRAME_RATIO: f64 = 0.05;
 pub(super) fn caveats(found: &Identified) -> Vec<Caveat> {
     let mut caveats = Vec::new();
     if let Some(factor) = found.misfit {
-        let results = match found.parameters.iter().all(|p| p.std.is_nan()) {
-            true => "the fit does not reproduce the readings, and its results have no standard deviations",
-            false => "the standard deviations of the results are scaled by this factor",
-        };
         let text = format!(
             "the residuals are {factor:.1} times as large as the standard deviations of the readings: the model lacks \
-             a flexible part, loads or frames are wrong, or the standard deviations are too small; {results}"
+             a flexible part, loads or frames are wrong, or the standard deviations are too small; the standard \
+             deviations of the results include this error of the model"
         );
         caveats.push(Caveat::from_message(
             "misfit",
@@ -58,28 +55,17 @@ pub(super) fn caveats(found: &Identified) -> Vec<Caveat> {
             "fit more parameters, and check the largest residuals",
         ));
     }
-    for parameter in found.parameters.iter().filter(|p| !p.identifiable && !p.shared) {
-        let text = format!("these readings do not determine {}: it keeps its initial value", parameter.name);
-        caveats.push(Caveat::from_message(
-            "not-identifiable",
-            "measurements",
-            text,
-            "add readings at the poses of a measurement plan",
-        ));
-    }
-    let together = |p: &&ParameterEstimate| p.shared && !p.identifiable && !p.name.starts_with("joint.");
-    for parameter in found.parameters.iter().filter(together) {
+    let unsure = |p: &&ParameterEstimate| !p.identifiable && !p.rigid;
+    let unsure: Vec<&str> = found.parameters.iter().filter(unsure).map(|p| p.name.as_str()).collect();
+    if !unsure.is_empty() {
         let text = format!(
-            "these readings determine {} only together with others: it has the value nearest to the initial one that \
-             explains them",
-            parameter.name
+            "these readings do not determine {} of {} parameters alone: {}",
+            unsure.len(),
+            found.parameters.len(),
+            grouped(&unsure)
         );
-        caveats.push(Caveat::from_message(
-            "not-identifiable",
-            "measurements",
-            text,
-            "add readings at the poses of a measurement plan",
-        ));
+        let remedy = "add readings at the poses of a measurement plan, or keep values that you know";
+        caveats.push(Caveat::from_message("not-identifiable", "measurements", text, remedy));
     }
     if let Some(held) = found.held_out.as_ref().filter(|held| held.rms > held.rms_initial) {
         let text = format!(
@@ -94,11 +80,35 @@ pub(super) fn caveats(found: &Identified) -> Vec<Caveat> {
             "fit fewer parameters or measure more poses",
         ));
     }
-    if !found.solution.converged && found.misfit.is_none() {
+    if !found.solution.converged {
         let text = "the fit did not converge: its values may be inaccurate";
         caveats.push(Caveat::from_message("not-converged", "measurements", text, "use better initial values"));
     }
     caveats
+}
+
+/// Maximum number of names in a message.
+const MOST_NAMES: usize = 8;
+
+/// Lists names; those that differ in their last part alone as one.
+fn grouped(names: &[&str]) -> String {
+    let mut groups: Vec<(&str, Vec<&str>)> = Vec::new();
+    for name in names {
+        let (head, last) = name.rsplit_once('.').unwrap_or(("", name));
+        match groups.last_mut().filter(|(own, _)| *own == head && !head.is_empty()) {
+            Some((_, lasts)) => lasts.push(last),
+            None => groups.push((head, vec![last])),
+        }
+    }
+    let one = |(head, lasts): &(&str, Vec<&str>)| match (head.is_empty(), &lasts[..]) {
+        (true, lasts) => lasts.join(", "),
+        (false, [last]) => format!("{head}.{last}"),
+        (false, lasts) => format!("{head}.{{{}}}", lasts.join(", ")),
+    };
+    let mut all: Vec<String> = groups.iter().take(MOST_NAMES).map(one).collect();
+    let more: usize = groups.iter().skip(MOST_NAMES).map(|(_, lasts)| lasts.len()).sum();
+    all.extend((more > 0).then(|| format!("and {more} more")));
+    all.join(", ")
 }
 
 /// Returns a caveat about gear effects that the fit does not include.
@@ -132,7 +142,7 @@ pub(super) fn encoder_caveats(encoders: &[EncoderFigures]) -> impl Iterator<Item
 
 /// Displacements under forces, or under masses, that differ from the robot's by more than
 /// [`LOAD_RATIO`]. Checks whether the factor between N and kg explains the ratio.
-pub(super) fn load_caveats(plant: &Plant, input: &MeasurementInput) -> Result<Vec<Caveat>, NoAnswer> {
+pub(super) fn load_caveats(plant: &Plant, input: &MeasurementInput) -> Vec<Caveat> {
     let mut caveats = Vec::new();
     for (what, slip, pulls) in [("forces", "kg given as N", true), ("masses", "N given as kg", false)] {
         let some = input.measurements.of_readings(|k| match &input.measurements.readings[k].kind {
@@ -148,10 +158,8 @@ pub(super) fn load_caveats(plant: &Plant, input: &MeasurementInput) -> Result<Ve
         }
         let arm = MeasuredArm { plant, parameters: &[], measurements: &some };
         // The size of a displacement does not depend on the unknown rotations of instruments.
-        let predicted = arm.predicted(&DVector::zeros(some.own_unknowns()))?;
-        let deviations: Vec<f64> = some.readings.iter().flat_map(Reading::deviations).collect();
-        let size =
-            |values: &[f64]| values.iter().zip(&deviations).map(|(x, std)| (x / std).powi(2)).sum::<f64>().sqrt();
+        let Ok(predicted) = arm.predicted(&DVector::zeros(some.own_unknowns())) else { continue };
+        let size = |values: &[f64]| values.iter().map(|x| x * x).sum::<f64>().sqrt();
         let ratio = size(&arm.observed()) / size(&predicted);
         if !ratio.is_finite() || (1.0 / LOAD_RATIO..=LOAD_RATIO).contains(&ratio) {
             continue;
@@ -163,7 +171,13 @@ pub(super) fn load_caveats(plant: &Plant, input: &MeasurementInput) -> Result<Ve
         };
         caveats.push(LOAD_UNIT.found(what, ratio, LOAD_RATIO).likely(likely));
     }
-    Ok(caveats)
+    caveats
+}
+
+/// Rows of tables of places without a reading.
+pub(super) fn empty_caveat(input: &MeasurementInput) -> Option<Caveat> {
+    let text = format!("{} rows of the tables have no place and are skipped", input.empty_rows);
+    (input.empty_rows > 0).then(|| Caveat::from_message("empty-rows", "measurements", text, "").as_note())
 }
 
 /// Positions that do not fit the robot at any pose of the instrument.

@@ -23,7 +23,8 @@ pub struct EncoderFigures {
     pub joint: String,
     /// Stiffness (N m/rad, N/m).
     pub stiffness: f64,
-    /// Standard deviation of the stiffness, by leaving out seconds of the recordings.
+    /// Standard deviation of the stiffness: by leaving out seconds of the recordings, and of what the
+    /// torque does not explain beyond the noise.
     pub std: f64,
     /// Delay of the link's encoder (s).
     pub delay_s: f64,
@@ -66,7 +67,7 @@ impl EncoderFigures {
 
             joint: joint.to_owned(),
             stiffness: gear.stiffness,
-            std: gear.std_ln * gear.stiffness.abs(),
+            std: gear.std_ln.hypot(unexplained(&gear, noise_rms)) * gear.stiffness.abs(),
             delay_s: gear.delay_s,
             r2: gear.r2,
             told: gear.is_told(),
@@ -89,6 +90,13 @@ impl EncoderFigures {
         };
         self.told.then(|| Reading { name: format!("encoders of {}", self.joint), q: Vec::new(), kind })
     }
+}
+
+/// Returns the relative standard deviation of a compliance due to the deflection that neither torque
+/// nor noise explains: its correlation with the torque is unknown, evenly spread within ±1.
+fn unexplained(gear: &GearEstimate, noise_rms: f64) -> f64 {
+    let rest = (gear.rest_rms.powi(2) - noise_rms.powi(2)).max(0.0).sqrt();
+    if gear.deflection_rms > 0.0 { rest / (gear.deflection_rms * 3f64.sqrt()) } else { 0.0 }
 }
 
 /// Estimates the stiffness of each gear with an encoder on its link side.

@@ -74,6 +74,16 @@ pub enum IdentifyFileError {
         /// Advice.
         help: String,
     },
+    /// Frequencies are probably in rad/s.
+    #[error(
+        "the measured frequencies are {ratio:.2} times as large as those of the robot model, all of them about 2 pi \
+         times: they are expected in Hz; divide numbers in rad/s by 2 pi, or give initial stiffnesses of the right \
+         order of magnitude"
+    )]
+    Radians {
+        /// Geometric mean of the ratios of measured to predicted frequencies.
+        ratio: f64,
+    },
     /// A measured point does not move.
     #[error(
         "{reading}: in the model the arm does not move there in that direction, or cannot be excited so: check nodes, \
@@ -143,6 +153,20 @@ pub enum IdentifyFileError {
         /// Relative residual in the other axes.
         mended: f64,
     },
+    /// One change of the readings makes them fit the robot.
+    #[error(
+        "the places do not fit the robot (residual {:.0} %), but they do if {likely} (residual {:.0} %): check the \
+         readings",
+        100.0 * rest, 100.0 * mended
+    )]
+    OneSlip {
+        /// Change, as a clause.
+        likely: String,
+        /// Relative residual of the readings.
+        rest: f64,
+        /// Relative residual with the change.
+        mended: f64,
+    },
     /// The fit failed.
     #[error("{0}")]
     Fit(String),
@@ -171,6 +195,18 @@ pub(super) fn of_slip(found: FoundSlip, joints: &[(String, bool)]) -> Error {
             let mut likely = joints.clone();
             order.iter().zip(&joints).for_each(|(place, joint)| likely[*place].clone_from(joint));
             IdentifyFileError::JointOrder { joints, likely, rest, mended }.into()
+        }
+        Slip::Sign(joint) => {
+            let likely = format!("joint {:?} turns the other way (its values have the wrong sign)", joints[joint]);
+            IdentifyFileError::OneSlip { likely, rest, mended }.into()
+        }
+        Slip::Zero(joint, by) => {
+            let likely = format!("{:.0} degrees are added to the values of joint {:?}", by.to_degrees(), joints[joint]);
+            IdentifyFileError::OneSlip { likely, rest, mended }.into()
+        }
+        Slip::Mirrored => {
+            let likely = "one axis of the instrument is reversed (its axes are left-handed)".into();
+            IdentifyFileError::OneSlip { likely, rest, mended }.into()
         }
         Slip::Axes(R_WI) => {
             let (r, p, y) = R_WI.euler_angles();

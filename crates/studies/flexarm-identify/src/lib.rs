@@ -15,6 +15,7 @@ mod file;
 mod page;
 pub mod parameters;
 mod plan_file;
+mod plan_load;
 mod response_file;
 pub mod rewrite;
 mod uff;
@@ -27,7 +28,7 @@ use flexarm_files::{check_apart, check_free, write_all};
 
 use self::answer::answer;
 use self::choose::{check_tool, chosen};
-use self::doubts::{encoder_caveats, frame_caveat, gear_caveat, load_caveats};
+use self::doubts::{empty_caveat, encoder_caveats, frame_caveat, gear_caveat, load_caveats};
 use self::error::{of_names, of_slip};
 use self::file::{Cell, MeasurementInput};
 use self::parameters::ParameterLocation;
@@ -112,6 +113,20 @@ pub struct IdentifyRequest {
 /// tables; [`IdentifyFileError`] if the measurements do not fit the robot: units, frames, rank;
 /// [`Error::Taken`], [`Error::Write`].
 pub fn identify_robot(robot: &Robot, measurements: &Path, request: &IdentifyRequest) -> Result<Identification, Error> {
+    identify_robot_watched(robot, measurements, request, &|_| true)
+}
+
+/// As [`identify_robot`]; calls `watch` after each iteration and ends the search with the best
+/// values so far where it returns false.
+///
+/// # Errors
+/// As [`identify_robot`].
+pub fn identify_robot_watched(
+    robot: &Robot,
+    measurements: &Path,
+    request: &IdentifyRequest,
+    watch: &dyn Fn(&Progress) -> bool,
+) -> Result<Identification, Error> {
     let arm = robot.model(&request.modelling)?;
     let joints = joints_of(&arm);
     let mut input = file::read(measurements, &Cell { joints: &joints, arm: &arm })?;
@@ -136,19 +151,17 @@ pub fn identify_robot(robot: &Robot, measurements: &Path, request: &IdentifyRequ
     if let Some(slip) = likely_slip(&plant, &parameters, &input.measurements, &slides) {
         return Err(of_slip(slip, &joints));
     }
-    let options = IdentifyOptions {
-        search: Search { loss: input.loss, ..Search::default() },
-        deviations_known: input.deviations_known,
-        ..IdentifyOptions::default()
-    };
-    let found = identify(&plant, &parameters, &input.measurements, &options).map_err(of_names(&input))?;
+    let options =
+        IdentifyOptions { search: Search { loss: input.loss, ..Search::default() }, ..IdentifyOptions::default() };
+    let found = identify(&plant, &parameters, &input.measurements, &options, watch).map_err(of_names(&input))?;
     let mut answer = answer(robot, measurements, &plant, &parameters, &input, &found)?;
     answer.caveats.extend(frame_caveat(&answer));
     answer.caveats.extend(gear_caveat(robot));
     answer.caveats.extend(encoder_caveats(&encoders));
-    let failed = |error: NoAnswer| IdentifyFileError::Fit(error.to_string());
-    answer.caveats.extend(load_caveats(&plant, &input).map_err(failed)?);
-    answer.caveats.extend(arm.caveats(Use::Any));
+    answer.caveats.extend(load_caveats(&plant, &input));
+    answer.caveats.extend(empty_caveat(&input));
+    // Stiffnesses are first guesses here.
+    answer.caveats.extend(arm.caveats(Use::Any).into_iter().filter(|caveat| caveat.code != "gear-stiffness"));
     answer.warnings = warnings(&answer.caveats);
     answer.encoders = encoders;
     if let Some(targets) = targets {
@@ -187,7 +200,6 @@ impl Targets {
         answer: &mut Identification,
     ) -> Result<(), Error> {
         let identified = found.parameters.iter().zip(chosen);
-        let identified = identified.filter(|(p, _)| p.identifiable || p.shared);
         let places = |c: &parameters::Candidate| std::iter::once(c.written.clone()).chain(c.tied.clone());
         let identified: Vec<(ParameterEstimate, ParameterLocation)> =
             identified.flat_map(|(p, c)| places(c).map(|place| (p.clone(), place))).collect();
@@ -208,8 +220,9 @@ impl Targets {
 /// Kernels, for the tests of this crate.
 #[doc(hidden)]
 pub mod internals {
+    pub use crate::estimation::bounded::bounded_minimum;
     pub use crate::estimation::identify::chi_square_bound;
-    pub use crate::estimation::least_squares::{orthonormal, scale};
+    pub use crate::estimation::least_squares::scale;
     pub use crate::estimation::parameter::displacement;
     pub use crate::estimation::placement::rigid_fit;
     pub use crate::parameters::ParameterLocation;

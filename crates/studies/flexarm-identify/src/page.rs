@@ -78,10 +78,10 @@ fn parameters(answer: &Identification) -> String {
         "<h2>Parameters</h2>\n<table><tr><th>parameter</th><th>before</th><th>value</th><th>std</th><th>95 % interval</th><th>unit</th></tr>\n",
     );
     for p in &answer.parameters {
-        let (class, value) = match p.identifiable {
-            true => ("", number(p.value)),
-            false if p.value != p.initial => (" class=\"no\"", format!("{} (only with others)", number(p.value))),
-            false => (" class=\"no\"", "not identifiable: initial value".to_owned()),
+        let (class, value) = match (p.identifiable, p.rigid) {
+            (true, _) => ("", number(p.value)),
+            (false, true) => ("", format!("{} (rigid within the readings)", number(p.value))),
+            (false, false) => (" class=\"no\"", format!("{} (not determined alone)", number(p.value))),
         };
         let _ = writeln!(
             out,

@@ -5,6 +5,7 @@
 //! | --- | --- |
 //! | `drive.JOINT.gearbox.stiffness` | single stiffness of a gearbox (N m/rad; N/m if it slides) |
 //! | `drive.JOINT.gearbox.stiffness[k]` | one of three or six stiffnesses, from 0 |
+//! | `drive.JOINT.gearbox.seat[k]` | stiffness of the housing about x or y, before the joint |
 //! | `link.LINK.stiffness_factor` | factor on the whole stiffness of a flexible link |
 //! | `link.LINK.stiffness_factors[k]` | factor on one of six directions of a lumped link, from 0 |
 //! | `link.LINK.stiffness[i][j]` | entry of a two-part link's symmetric 6x6 (N/m, N, N m/rad) |
@@ -20,7 +21,7 @@
 //! | `joint.JOINT.zero` | zero of a joint (rad; m if it slides) |
 
 use crate::estimation::{Effect, Parameter, Plant, SpringPart};
-use flexarm_flexlink::GearStiffness;
+use flexarm_flexlink::{GearStiffness, SEAT};
 use flexarm_kinematics::{JointMotion, SpatialInertia};
 use flexarm_stepping::{Damping, GuideTerm, SpringCurve};
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
@@ -43,6 +44,8 @@ const DIRECTIONS: &str = "stiffness_factors";
 pub enum ParameterLocation {
     /// `[[drive]]` of the joint: stiffness of its gearbox, or one of its entries.
     Gearbox { joint: String, entry: Option<usize> },
+    /// `[[drive]]` of the joint: one of the two stiffnesses of its seat.
+    Seat { joint: String, entry: usize },
     /// `[[drive]]` of the joint: damping of its gearbox, or one of its entries.
     GearboxDamping { joint: String, entry: Option<usize> },
     /// `[[flexible_link]]` of the link: damping.
@@ -81,13 +84,23 @@ pub(crate) fn candidates(robot: &Robot, flexible: &Arm) -> Vec<Candidate> {
     };
     let mut found = Vec::new();
     for (number, drive) in robot.drives.iter().enumerate() {
-        let springs = of(Owner::Drive(number));
+        let mut springs = of(Owner::Drive(number));
         let Some((gearbox, damping)) = drive.gearbox.as_ref().filter(|_| !springs.is_empty()) else { continue };
         // A piecewise stiffness curve has no single stiffness, but one with backlash has.
         if !damping.curves.is_empty() && damping.play.is_empty() {
             continue;
         }
         let slides = flexible.model.coordinates().iter().any(|c| c.joint == drive.joint && c.slides());
+        if let Some(seat) = gearbox.seat {
+            // They come before those of the gearbox.
+            let own: Vec<usize> = springs.drain(..2).collect();
+            found.extend(own.iter().zip(seat).enumerate().map(|(entry, (spring, k))| {
+                let name = format!("drive.{}.gearbox.seat[{entry}]", drive.joint);
+                let place = SpringPart { spring: *spring, coordinate: None };
+                let written = ParameterLocation::Seat { joint: drive.joint.clone(), entry };
+                stiffness(name, "N m/rad", k, vec![place], written)
+            }));
+        }
         match &gearbox.stiffness {
             GearStiffness::Guide(_) => found.extend(guide_parameters(&drive.joint, &damping.tilts, &springs, flexible)),
             stiffness => found.extend(gearbox_parameters(&drive.joint, stiffness, &springs, slides)),
@@ -162,10 +175,9 @@ fn guide_parameters(joint: &str, tilts: &[GuideTilt], springs: &[usize], flexibl
     found
 }
 
-/// Default prior standard deviations of shifts (m) and rotations (rad) of joint frames, and of the
-/// zeros of joints.
-const FRAME_PRIOR: f64 = 3e-3;
-const ZERO_PRIOR: f64 = 1e-2;
+/// Usual shifts (m) and rotations (rad) of joint frames, and zeros of joints.
+const FRAME_SIZE: f64 = 3e-3;
+const ZERO_SIZE: f64 = 1e-2;
 
 /// Returns the displacements of the joint frames, and the zeros of the joints. The rotations are in
 /// the order of roll, pitch and yaw as matrices multiply.
@@ -176,9 +188,12 @@ fn frame_parameters(flexible: &Arm) -> Vec<Candidate> {
     let bodies = flexible.model.bodies().iter().enumerate().skip(1);
     for (body, own) in bodies.filter(|(_, own)| of_robot.contains(&own.joint.as_str())) {
         let JointMotion::Axis(motion) = own.motion else { continue };
+        // The frame of a joint with a seat is that of the seat.
+        let seat = format!("{}__spring{}", own.joint, SEAT[0]);
+        let body = flexible.model.bodies().iter().position(|body| body.joint == seat).unwrap_or(body);
         let (joint, axis) = (&own.joint, Vector6::from_row_slice(motion.column().as_slice()));
         let mut add = |key: &str, unit: &str, twist: Vector6<f64>, zero: bool| {
-            let effect = Effect::Frame { body, twist, prior: if zero { ZERO_PRIOR } else { FRAME_PRIOR } };
+            let effect = Effect::Frame { body, twist, size: if zero { ZERO_SIZE } else { FRAME_SIZE } };
             let written = ParameterLocation::Frame { joint: joint.clone(), twist, axis, zero };
             found.push(Candidate::new(format!("{FRAME}.{joint}.{key}"), unit, 0.0, effect, written));
         };
@@ -236,8 +251,7 @@ impl Candidate {
     }
 
     fn new(name: String, unit: &str, initial: f64, effect: Effect, written: ParameterLocation) -> Self {
-        let mut parameter = Parameter { name, unit: unit.into(), initial, prior: 1.0, effect };
-        parameter.prior = parameter.reference();
+        let parameter = Parameter { name, unit: unit.into(), initial, prior: None, effect };
         Self { parameter, written, tied: Vec::new() }
     }
 }

@@ -12,6 +12,7 @@ use nalgebra::Vector3;
 use serde::Serialize;
 
 use super::parameters;
+use super::plan_load::Efforts;
 use super::{IdentifyFileError, joints_of, plant};
 use flexarm_run::Arm;
 use flexarm_run::Caveat;
@@ -37,7 +38,9 @@ pub struct PlanRequest {
     pub fit: Vec<String>,
     /// Number of readings.
     pub count: usize,
-    /// Candidate forces on the tool, world axes (N).
+    /// Candidate forces on the tool, world axes (N). If empty, forces downwards and to two sides that
+    /// the effort limits of the joints allow, 500 N at most; poses where they exceed the limits are
+    /// left out.
     pub forces: Vec<[f64; 3]>,
     /// Candidate points of application of the force, tool axes (m); the TCP if empty. A force
     /// causes no rotation about an axis through its point of application.
@@ -61,15 +64,13 @@ pub struct PlanRequest {
 }
 
 impl PlanRequest {
-    /// Returns a request for a number of readings under 500 N downwards and to two sides, measured
-    /// to 0.03 mm.
+    /// Returns a request for a number of readings, measured to 0.03 mm.
     pub fn new(count: usize) -> Self {
-        let forces = vec![[0.0, 0.0, -500.0], [500.0, 0.0, 0.0], [0.0, 500.0, 0.0]];
         Self {
             modelling: Modelling::default(),
             fit: Vec::new(),
             count,
-            forces,
+            forces: Vec::new(),
             levers: Vec::new(),
             points: Vec::new(),
             directions: Vec::new(),
@@ -142,10 +143,14 @@ struct Setup {
     direction: Option<[f64; 3]>,
 }
 
+/// Returns points on the tool; the TCP if there are none.
+fn or_tcp(points: &[[f64; 3]]) -> Vec<[f64; 3]> {
+    if points.is_empty() { vec![[0.0; 3]] } else { points.to_vec() }
+}
+
 impl PlanRequest {
     /// Returns all combinations of force, point of application, measured point and direction.
     fn setups(&self) -> Vec<Setup> {
-        let or_tcp = |points: &[[f64; 3]]| if points.is_empty() { vec![[0.0; 3]] } else { points.to_vec() };
         let unit = |d: &[f64; 3]| Some(Vector3::from(*d).normalize().into());
         let directions =
             if self.directions.is_empty() { vec![None] } else { self.directions.iter().map(unit).collect() };
@@ -163,8 +168,8 @@ impl PlanRequest {
 
     /// Returns the reason why the request is invalid, as a sentence.
     fn fault(&self) -> Option<String> {
-        if self.count == 0 || self.forces.is_empty() || !(self.std_m > 0.0 && self.std_m.is_finite()) {
-            return Some("a plan needs at least one reading, one force and a positive standard deviation".into());
+        if self.count == 0 || !(self.std_m > 0.0 && self.std_m.is_finite()) {
+            return Some("a plan needs at least one reading and a positive standard deviation".into());
         }
         for (what, rows) in
             [("force", &self.forces), ("lever", &self.levers), ("point", &self.points), ("direction", &self.directions)]
@@ -224,10 +229,21 @@ pub fn plan_measurements(robot: &Robot, request: &PlanRequest) -> Result<Measure
         Some(path) => poses_of(path, &joints)?,
         None => spread_poses(&arm),
     };
-    let setups = request.setups();
+    let efforts = Efforts::of(&arm, &poses)?;
+    let (chosen_forces, mut request) = (!request.forces.is_empty(), request.clone());
+    if !chosen_forces {
+        request.forces = efforts.default_forces(&or_tcp(&request.levers));
+    }
+    let request = &request;
     let reading = |q: &Vec<f64>, setup: &Setup| displacement(q, setup, request.std_m);
+    let setups = request.setups();
+    let heavy =
+        |pose: usize, setup: &Setup| efforts.share(pose, setup.force, setup.at).filter(|(_, share)| *share > 1.0);
+    let pairs = (0..poses.len()).flat_map(|pose| setups.iter().map(move |setup| (pose, *setup)));
+    let pairs: Vec<(usize, Setup)> =
+        pairs.filter(|(pose, setup)| chosen_forces || heavy(*pose, setup).is_none()).collect();
     let candidates: Vec<Candidate> =
-        poses.iter().flat_map(|q| setups.iter().map(move |setup| Candidate(reading(q, setup)))).collect();
+        pairs.iter().map(|(pose, setup)| Candidate(reading(&poses[*pose], setup))).collect();
     let purpose: Vec<Reading> = match &request.work {
         Some(path) => {
             let work = Setup { force: request.forces[0], at: [0.0; 3], point: [0.0; 3], direction: None };
@@ -238,12 +254,22 @@ pub fn plan_measurements(robot: &Robot, request: &PlanRequest) -> Result<Measure
     let plant = plant(&arm);
     let options = PlanOptions { count: request.count, purpose, repeat: false };
     let [best, first] = plans(&plant, &fitted, &candidates, &options)?;
-    let caveats = arm.caveats(Use::Any);
+    let mut caveats = arm.caveats(Use::Any);
+    let over: Vec<(&str, f64)> = best.chosen.iter().filter_map(|k| heavy(pairs[*k].0, &pairs[*k].1)).collect();
+    if let Some((joint, share)) = over.iter().max_by(|a, b| a.1.total_cmp(&b.1)) {
+        let text = format!(
+            "the loads of {} of {} readings exceed effort limits, that of joint {joint:?} by a factor of {share:.1}",
+            over.len(),
+            best.chosen.len()
+        );
+        let remedy = "give smaller forces, or none: then they follow from the limits";
+        caveats.push(Caveat::from_message("plan-load", "plan", text, remedy));
+    }
     let mut answer = MeasurementPlan {
         warnings: warnings(&caveats),
         caveats,
         robot: robot.name.clone(),
-        poses: planned(&plant, &candidates, &best, &setups)?,
+        poses: planned(&plant, &candidates, &best, &pairs)?,
         joints,
         parameters: fitted.iter().zip(&best.deviations).map(expected).collect(),
         work_std_m: best.purpose.iter().copied().reduce(f64::max),
@@ -299,7 +325,7 @@ fn nothing_measured() -> super::MeasurementInput {
         uncertainty: None,
         known: Vec::new(),
         loss: crate::estimation::Loss::Square,
-        deviations_known: true,
+        empty_rows: 0,
         length: "m",
         angle_rad: 1.0,
         length_m: 1.0,
@@ -376,10 +402,10 @@ fn planned(
     plant: &Plant,
     candidates: &[Candidate],
     best: &Plan,
-    setups: &[Setup],
+    pairs: &[(usize, Setup)],
 ) -> Result<Vec<PlannedReading>, Error> {
     let one = |number: &usize| {
-        let setup = setups[number % setups.len()];
+        let setup = pairs[*number].1;
         let q = candidates[*number].0.q.clone();
         let reading = displacement(&q, &Setup { direction: None, ..setup }, 1.0);
         let measurements = crate::estimation::Measurements { readings: vec![reading], ..Default::default() };

@@ -168,7 +168,6 @@ impl Reader<'_> {
                 form,
                 points: kept.iter().map(point).collect(),
             });
-            self.given.push(("response", e.std.is_some() || columns, span.clone()));
             self.measurements.readings.push(Reading { name: curve.name, q: q.clone(), kind });
         }
         Ok(())
@@ -341,7 +340,6 @@ impl Reader<'_> {
         let probes = names.iter().zip(directions).map(probe).collect::<Result<Vec<Probe>, Error>>()?;
         let (std, load) = (self.std(e.std.as_ref(), 1.0)?, self.load(&e.load, &span)?);
         let kind = ReadingKind::Shape(MeasuredShape { load, probes, amplitudes, std });
-        self.given.push(("shape", e.std.is_some(), span));
         self.measurements.readings.push(Reading { name: format!("shape {}", number + 1), q, kind });
         Ok(())
     }
@@ -367,15 +365,7 @@ impl Reader<'_> {
         let NodeEntry { link, xyz, axes } = node.get_ref();
         let frame = match link {
             None => tool(),
-            Some(link) => {
-                flexible.model.frame(link.get_ref()).filter(|frame| frame.body > 0).cloned().ok_or_else(|| {
-                    let known: Vec<&str> = flexarm_run::applied_load::moving_links(&flexible.model);
-                    self.error(
-                        link.span(),
-                        format!("the robot has no moving link {:?}; it has {known:?}", link.get_ref()),
-                    )
-                })?
-            }
+            Some(link) => self.moving_link(link)?,
         };
         if xyz.iter().any(|x| !x.is_finite()) {
             return Err(self.error(node.span(), "xyz: expected finite numbers"));

@@ -62,7 +62,7 @@ pub fn rewritten(
 
 /// Writes one value to its place; the pose of the tool is left to [`put_tool`].
 fn put(file: &mut DocumentMut, found: &ParameterEstimate, written: &ParameterLocation) -> Result<(), RewriteError> {
-    let number = rounded(found.value, found.std);
+    let number = exact(found.value);
     match written {
         ParameterLocation::Gearbox { joint, entry } => {
             let drive = named(file, "drive", "joint", joint)?;
@@ -70,6 +70,12 @@ fn put(file: &mut DocumentMut, found: &ParameterEstimate, written: &ParameterLoc
             let stiffness = gearbox.and_then(|gearbox| gearbox.get_mut("stiffness"));
             let missing = || RewriteError::NoGearbox { joint: joint.clone(), key: "stiffness" };
             put_stiffness(stiffness.ok_or_else(missing)?, *entry, found)
+        }
+        ParameterLocation::Seat { joint, entry } => {
+            let gearbox = named(file, "drive", "joint", joint)?.get_mut("gearbox").and_then(Item::as_table_like_mut);
+            let seat = gearbox.and_then(|gearbox| gearbox.get_mut("seat"));
+            let missing = || RewriteError::NoGearbox { joint: joint.clone(), key: "seat" };
+            put_stiffness(seat.ok_or_else(missing)?, Some(*entry), found)
         }
         ParameterLocation::GearboxDamping { joint, entry } => {
             put_gear_damping(named(file, "drive", "joint", joint)?, joint, *entry, found)
@@ -114,15 +120,15 @@ fn put(file: &mut DocumentMut, found: &ParameterEstimate, written: &ParameterLoc
 fn comments(found: &[(ParameterEstimate, ParameterLocation)]) -> String {
     let mut out = String::from("# Identified by flexarm identify: value, standard deviation, previous value.\n");
     let mut last = "";
-    for (ParameterEstimate { name, unit, value, std, initial, identifiable, .. }, _) in found {
+    for (ParameterEstimate { name, unit, value, std, initial, identifiable, rigid, .. }, _) in found {
         // Tied parameters have several places.
         if std::mem::replace(&mut last, name) == name {
             continue;
         }
-        let deviation = match std.is_finite() {
-            true => format!("+- {} {unit}", plain(rounded(*std, *std))),
-            false if !identifiable => format!("{unit} (found together with others)"),
-            false => format!("{unit} (the fit does not reproduce the readings: no standard deviation)"),
+        let deviation = match (std.is_finite(), rigid) {
+            (true, _) => format!("+- {} {unit}", plain(rounded(*std, *std))),
+            (false, true) => format!("{unit} (rigid within the readings)"),
+            (false, false) => format!("{unit} (not determined alone)"),
         };
         let value = if *identifiable { rounded(*value, *std) } else { rounded(*value, 1e-4 * value.abs()) };
         out += &format!("#   {name} = {} {deviation}, was {}\n", plain(value), plain(*initial));
@@ -136,7 +142,12 @@ fn plain(x: f64) -> String {
     text.strip_suffix(".0").map_or_else(|| text.clone(), str::to_owned)
 }
 
-/// Rounds a value to two digits beyond the first digit of its deviation.
+/// Rounds a value to twelve digits, so that the file is the model whose residuals are reported.
+fn exact(value: f64) -> f64 {
+    format!("{value:.11e}").parse().unwrap_or(value)
+}
+
+/// Rounds a value to two digits beyond the first digit of its deviation, for comments.
 fn rounded(value: f64, std: f64) -> f64 {
     if !(std > 0.0 && std.is_finite() && value.is_finite()) {
         return value;
@@ -181,7 +192,7 @@ fn put_stiffness(item: &mut Item, entry: Option<usize>, found: &ParameterEstimat
     let what = || "gearbox.stiffness".to_owned();
     let value =
         item.as_value_mut().ok_or_else(|| RewriteError::Form { what: what(), expected: "a number or a list" })?;
-    let number = rounded(found.value, found.std);
+    let number = exact(found.value);
     match (value, entry) {
         (Value::Array(list), Some(k)) => {
             let old = list.get_mut(k).ok_or_else(|| RewriteError::NoEntry { list: what(), entry: k })?;
@@ -219,7 +230,7 @@ fn put_link_damping(link: &mut dyn TableLike, name: &str, found: &ParameterEstim
         }
         None => {
             let mut modal = InlineTable::new();
-            modal.insert("modal", rounded(found.value, found.std).into());
+            modal.insert("modal", exact(found.value).into());
             link.insert("damping", toml_edit::value(modal));
         }
     }
@@ -266,8 +277,7 @@ fn put_tool(
     }
     let entry = file.get_mut("tcp").and_then(Item::as_table_like_mut);
     let entry = entry.ok_or_else(|| RewriteError::Form { what: "tcp".into(), expected: "a table" })?;
-    // Rounded to 0.1 µm and 0.1 µrad.
-    let list = |values: [f64; 3]| values.map(|x| (x * 1e7).round() / 1e7).into_iter().collect::<Array>();
+    let list = |values: [f64; 3]| values.map(exact).into_iter().collect::<Array>();
     entry.insert("xyz", toml_edit::value(list(X_LT.translation.vector.into())));
     if part(3) != Vector3::zeros() {
         let (roll, pitch, yaw) = X_LT.rotation.euler_angles();
@@ -301,7 +311,7 @@ fn put_frames(
     }
     for (Calibration { joint, frame, zero }, _) in corrections {
         let entry = calibration_of(file, &joint)?;
-        let list = |values: [f64; 3]| values.map(|x| (x * 1e9).round() / 1e9).into_iter().collect::<Array>();
+        let list = |values: [f64; 3]| values.map(exact).into_iter().collect::<Array>();
         let (roll, pitch, yaw) = frame.rotation.euler_angles();
         for (key, values) in [("xyz", frame.translation.vector.into()), ("rpy", [roll, pitch, yaw])] {
             if values != [0.0; 3] {
@@ -309,7 +319,7 @@ fn put_frames(
             }
         }
         if zero != 0.0 {
-            let zero = (zero * 1e9).round() / 1e9;
+            let zero = exact(zero);
             match entry.get_mut("zero").and_then(Item::as_value_mut) {
                 Some(old) => replace(old, zero),
                 None => {
@@ -375,7 +385,7 @@ fn put_gear_damping(
         (Value::Array(list), Some(k)) => {
             let missing = || RewriteError::NoEntry { list: format!("gearbox.damping of {joint:?}"), entry: k };
             let old = list.get_mut(k).ok_or_else(missing)?;
-            replace(old, rounded(found.value, found.std));
+            replace(old, exact(found.value));
         }
         (damping, _) => put_damping(damping, found),
     }
@@ -388,7 +398,7 @@ fn put_damping(item: &mut Value, found: &ParameterEstimate) {
     let factor = found.value / found.initial;
     match item {
         Value::Array(list) if list.len() == 1 => {
-            list.iter_mut().for_each(|cell| replace(cell, rounded(found.value, found.std)));
+            list.iter_mut().for_each(|cell| replace(cell, exact(found.value)));
         }
         Value::Array(list) => {
             for cell in list.iter_mut() {
@@ -396,7 +406,7 @@ fn put_damping(item: &mut Value, found: &ParameterEstimate) {
                 replace(cell, old * factor);
             }
         }
-        number => replace(number, rounded(found.value, found.std)),
+        number => replace(number, exact(found.value)),
     }
 }
 

@@ -13,6 +13,10 @@ use flexarm_run::Error;
 /// Ratio of measured to predicted size above which wrong units are the only plausible cause.
 const UNIT_RATIO: f64 = 100.0;
 
+/// Maximum factor by which every frequency differs from 2π times that of the model if it is given in
+/// rad/s: the effect of wrong stiffnesses differs more between modes.
+const RADIAN_RATIO: f64 = 1.6;
+
 /// Rejects modes with numbers beyond those of the model.
 pub(super) fn check_modes(plant: &Plant, input: &MeasurementInput) -> Result<(), Error> {
     let modes = plant.model.n_elastic();
@@ -29,8 +33,8 @@ pub(super) fn check_modes(plant: &Plant, input: &MeasurementInput) -> Result<(),
 /// Compares displacements and distances with those of the nominal robot; a large ratio indicates
 /// wrong units.
 pub(super) fn check_units(plant: &Plant, input: &MeasurementInput) -> Result<(), Error> {
-    let of = |kind: fn(&ReadingKind) -> bool| {
-        let mut some = input.measurements.of_readings(|k| kind(&input.measurements.readings[k].kind));
+    let of = |which: fn(&Reading) -> bool| {
+        let mut some = input.measurements.of_readings(|k| which(&input.measurements.readings[k]));
         some.instruments.iter_mut().for_each(|i| *i = Instrument::Known(Pose::identity()));
         some.targets.iter_mut().for_each(|t| {
             if let Target::Unknown(guess) = t {
@@ -39,28 +43,31 @@ pub(super) fn check_units(plant: &Plant, input: &MeasurementInput) -> Result<(),
         });
         some
     };
-    let both = |some: &Measurements| -> Result<(Vec<f64>, Vec<f64>), Error> {
+    // An arm without equilibrium is not judged here.
+    let both = |some: &Measurements| {
         let arm = MeasuredArm { plant, parameters: &[], measurements: some };
-        let expected = arm.predicted(&DVector::zeros(0)).map_err(|e| IdentifyFileError::Fit(e.to_string()))?;
-        Ok((arm.observed(), expected))
+        let expected = arm.predicted(&DVector::zeros(0)).unwrap_or_default();
+        (arm.observed(), expected)
     };
     let norm = |values: &[f64]| values.iter().map(|x| x * x).sum::<f64>().sqrt();
-    let moved = of(|kind| matches!(kind, ReadingKind::Displacement { .. }));
-    let (measured, expected) = both(&moved)?;
+    let moved = of(|reading| matches!(reading.kind, ReadingKind::Displacement { .. }));
+    let (measured, expected) = both(&moved);
     told_ratio("displacements", norm(&measured), norm(&expected), input)?;
-    let (measured, expected) = both(&of(|kind| matches!(kind, ReadingKind::Place { .. })))?;
+    let (measured, expected) = both(&of(|reading| reading.position().is_some()));
     let spread = |values: &[f64]| {
         let points: Vec<Vector3<f64>> = values.chunks_exact(3).map(Vector3::from_column_slice).collect();
         let middle = points.iter().sum::<Vector3<f64>>() / points.len().max(1) as f64;
         points.iter().map(|p| (p - middle).norm_squared()).sum::<f64>().sqrt()
     };
     told_ratio("distances between places", spread(&measured), spread(&expected), input)?;
+    let (measured, expected) = both(&of(|reading| matches!(reading.kind, ReadingKind::Frequencies { .. })));
+    told_frequencies(&measured, &expected)?;
     for reading in &input.measurements.readings {
         let ReadingKind::Response(response) = &reading.kind else { continue };
         let plain = MeasuredResponse { form: Form::Logarithmic, ..response.clone() };
         let reading = Reading { kind: ReadingKind::Response(plain), ..reading.clone() };
         let one = Measurements { readings: vec![reading.clone()], ..Measurements::default() };
-        let (measured, expected) = both(&one)?;
+        let (measured, expected) = both(&one);
         let off: f64 = measured.iter().zip(&expected).step_by(2).map(|(a, b)| a - b).sum();
         let ratio = (off / response.points.len() as f64).exp();
         if expected.iter().any(|x| !x.is_finite()) {
@@ -71,6 +78,20 @@ pub(super) fn check_units(plant: &Plant, input: &MeasurementInput) -> Result<(),
         }
     }
     Ok(())
+}
+
+/// Refuses frequencies that are those of the model in rad/s.
+fn told_frequencies(measured: &[f64], expected: &[f64]) -> Result<(), Error> {
+    let ratios: Vec<f64> = measured.iter().zip(expected).map(|(a, b)| a / b).collect();
+    let turn = std::f64::consts::TAU;
+    let in_rad = |ratio: &f64| (turn / RADIAN_RATIO..turn * RADIAN_RATIO).contains(ratio);
+    match !ratios.is_empty() && ratios.iter().all(in_rad) {
+        true => {
+            let ratio = (ratios.iter().map(|ratio| ratio.ln()).sum::<f64>() / ratios.len() as f64).exp();
+            Err(IdentifyFileError::Radians { ratio }.into())
+        }
+        false => Ok(()),
+    }
 }
 
 fn told_ratio(what: &'static str, measured: f64, expected: f64, input: &MeasurementInput) -> Result<(), Error> {

@@ -26,12 +26,12 @@ fn entry(plant: &Plant, spring: usize, row: usize, column: usize) -> Parameter {
     let size = (K[(row, row)] * K[(column, column)]).sqrt();
     let (name, initial) = (format!("{spring}[{row}][{column}]"), K[(row, column)]);
     let effect = Effect::Entry { spring, row, column, factor: 1.0, size };
-    Parameter { name, unit: "N".into(), initial, prior: 0.5 * size, effect }
+    Parameter { name, unit: "N".into(), initial, prior: None, effect }
 }
 
 fn tool(axis: usize) -> Parameter {
     let name = format!("tool {axis}");
-    Parameter { name, unit: "m".into(), initial: 0.0, prior: 0.05, effect: Effect::Tool(axis) }
+    Parameter { name, unit: "m".into(), initial: 0.0, prior: None, effect: Effect::Tool(axis) }
 }
 
 fn parameters(plant: &Plant) -> Vec<Parameter> {
@@ -45,8 +45,8 @@ fn parameters(plant: &Plant) -> Vec<Parameter> {
 
 fn frame(plant: &Plant, joint: &str, twist: Vector6<f64>) -> Parameter {
     let body = plant.model.bodies().iter().position(|body| body.joint == joint).unwrap();
-    let effect = Effect::Frame { body, twist, prior: 0.05 };
-    Parameter { name: format!("frame of {joint}"), unit: "m".into(), initial: 0.0, prior: 0.05, effect }
+    let effect = Effect::Frame { body, twist, size: 0.05 };
+    Parameter { name: format!("frame of {joint}"), unit: "m".into(), initial: 0.0, prior: None, effect }
 }
 
 fn step_of(parameter: &Parameter) -> f64 {
@@ -93,8 +93,7 @@ fn measurements(plant: &Plant) -> Measurements {
             load: LoadCase { carried, ..pull },
             target: 0,
             instrument: 0,
-            value: Vector3::new(0.3, 0.1, 2.0),
-            std: Vector3::repeat(1e-4),
+            rows: (0..3).map(|of| Row { of, value: [0.3, 0.1, 2.0][of], std: 1e-4 }).collect(),
         },
         ReadingKind::Frequencies {
             load: heavy.clone(),
@@ -119,7 +118,7 @@ fn measurements(plant: &Plant) -> Measurements {
     let readings = readings.map(|(k, kind)| Reading { name: format!("{k}"), q: POSE.to_vec(), kind }).collect();
     let X = Pose::from_parts(Translation3::new(3.0, 1.0, -0.5), Rotation3::from_euler_angles(0.4, -0.2, 2.2));
     let targets = vec![Target::Known(Vector3::new(0.2, -0.1, 0.15))];
-    Measurements { readings, targets, instruments: vec![Instrument::Known(X)] }
+    Measurements { readings, targets, instruments: vec![Instrument::Known(X)], ..Measurements::default() }
 }
 
 /// Truth: sixth-order differences of the residuals, reading after reading, away from the initial
@@ -149,8 +148,8 @@ fn readings_of_all_kinds_change_with_entries_and_with_the_tool_as_differences_sa
             let size = truth.amax().max(1e-3 * largest / step_of(parameter));
             let error = (J.column(p) - &truth).amax();
             eprintln!("reading {k}, {}: {:.1e} of {:.2e}", parameter.name, error / size, truth.amax());
-            // Measured: at most 7e-10; for frames, whose derivatives are differences themselves, 2e-7.
-            let allowed = if matches!(parameter.effect, Effect::Frame { .. }) { 1e-5 } else { 1e-8 };
+            // Measured: at most 7e-10; derivatives of vibrations by frames are differences: 2e-7.
+            let allowed = if matches!(parameter.effect, Effect::Frame { .. }) && k > 1 { 1e-5 } else { 1e-8 };
             assert!(error < allowed * size, "reading {k}, {}: {:e}", parameter.name, error / size);
         }
     }
@@ -226,10 +225,11 @@ fn entries_far_from_the_guess_are_found_and_the_matrix_stays_definite_on_the_way
     let none = MeasuredArm { plant: &soft, parameters: &[], measurements: &poses };
     let exact = none.predicted(&DVector::zeros(0)).unwrap();
     let options = IdentifyOptions { folds: 0, ..IdentifyOptions::default() };
-    let found = identify(&plant, &parameters, &read(&poses, &exact), &options).unwrap();
+    let found = identify(&plant, &parameters, &read(&poses, &exact), &options, &|_| true).unwrap();
     for (p, truth) in found.parameters.iter().zip(truth) {
         eprintln!("{}: {:.6e} of {truth:.6e}, first {:.6e}", p.name, p.value, p.initial);
-        assert!(p.identifiable && (p.value - truth).abs() < 1e-7 * soft.springs[0].K[(0, 0)], "{}", p.name);
+        // The prior pulls by a small part of the deviation.
+        assert!(p.identifiable && (p.value - truth).abs() < 0.1 * p.std, "{}", p.name);
     }
     // Outside the cone of positive definite matrices the arm has no solution, so the search rejects
     // the step.
@@ -246,7 +246,7 @@ fn entries_far_from_the_guess_are_found_and_the_matrix_stays_definite_on_the_way
     let mut squares = 0.0;
     for _ in 0..40 {
         let noisy: Vec<f64> = exact.iter().map(|value| value + 1e-5 * normal()).collect();
-        let found = identify(&plant, &parameters, &read(&poses, &noisy), &options).unwrap();
+        let found = identify(&plant, &parameters, &read(&poses, &noisy), &options, &|_| true).unwrap();
         squares += found.parameters.iter().zip(truth).map(|(p, t)| ((p.value - t) / p.std).powi(2)).sum::<f64>();
     }
     let spread = (squares / 120.0).sqrt();

@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 #![allow(non_snake_case, reason = "monogram notation")]
 
+mod calibration;
 mod coupled_gears;
 mod encoders;
 mod entries_and_tool;

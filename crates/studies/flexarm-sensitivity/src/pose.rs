@@ -152,7 +152,7 @@ fn slopes(
         PoseParameterKind::Tool(_) => None,
     };
     let all: Vec<Parameter> = asked.iter().filter_map(of_arm).collect();
-    let tool = tool_slopes(&mut point, &all).map_err(explained)?;
+    let tool = tool_slopes(&mut point, &all);
     let compliance = compliance_slopes(&mut point, &none, &all).map_err(explained)?;
     let frequencies = frequency_slopes(&plant(arm), &all, &at).map_err(explained)?;
     let of = |(k, parameter): (usize, Parameter)| {

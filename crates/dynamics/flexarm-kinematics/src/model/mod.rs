@@ -113,6 +113,11 @@ impl Model {
         &self.coordinates
     }
 
+    /// Whether a body is in the subtree of another one, or is that body.
+    pub fn is_in_subtree(&self, body: usize, of: usize) -> bool {
+        (of..self.bodies[of].subtree_end).contains(&body)
+    }
+
     /// Balancers, in the order given in the mechanism.
     pub fn balancers(&self) -> &[PlacedBalancer] {
         &self.balancers

@@ -16,7 +16,7 @@ mod each;
 mod lanes;
 mod tangent;
 
-use flexarm_kinematics::{Data, Frame, Pose, Wrench, forward_kinematics, frame_jacobian, mass_matrix_at_poses};
+use flexarm_kinematics::{Data, Frame, Pose, Twist, Wrench, forward_kinematics, frame_jacobian, mass_matrix_at_poses};
 use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX};
 
 use crate::arm::FlexibleArm;
@@ -334,6 +334,43 @@ impl OperatingPoint {
         p.copy_from(&all.rows(self.arm.model.n_actuated(), self.r.len()));
     }
 
+    /// Returns the change of the static forces on the elastic coordinates and the twist of a frame
+    /// (world axes, at its origin), as the subtree of a body moves with a twist in the body's joint
+    /// axes while all coordinates keep their values; `None` for arms with closed loops, balancers or
+    /// load-dependent stiffness.
+    pub fn moved_subtree(&self, body: usize, moved: &Twist, frame: &Frame, p: &mut [f64]) -> Option<Twist> {
+        let model = &self.arm.model;
+        let geometric = self.arm.elements.iter().any(|element| element.geometric.is_some());
+        if geometric || !model.loops().is_empty() || !model.balancers().is_empty() {
+            return None;
+        }
+        let own = &model.bodies()[body];
+        let X_WJ = self.data.X_WB[own.parent] * own.X_PJ;
+        let (R, at) = (X_WJ.rotation, X_WJ.translation.vector);
+        let w = R * moved.angular;
+        let v = R * moved.linear + at.cross(&w);
+        self.slopes.add_moved_subtree(&self.arm, &self.data, body, &Twist::new(v, w), p);
+        let behind = model.is_in_subtree(frame.body, body);
+        let p_F = self.data.X_WF(frame).translation.vector;
+        Some(if behind { Twist::new(v + w.cross(&p_F), w) } else { Twist::zeros() })
+    }
+
+    /// Returns the pose of a frame of the arm in the world at the equilibrium.
+    pub fn pose_of(&self, frame: &Frame) -> Pose {
+        self.data.X_WF(frame)
+    }
+
+    /// Returns the twist of a frame per generalised force on each elastic coordinate, transposed:
+    /// n×6, as [`Self::yielding`] for the tool.
+    pub fn yielding_of(&mut self, frame: &Frame) -> &DMatrix<f64> {
+        if self.factored {
+            let mut J = Matrix6xX::zeros(self.q.len());
+            frame_jacobian(&self.arm.model, &self.data, frame, &mut J);
+            self.tangent.solve(&J.as_slice()[6 * self.arm.model.n_actuated()..], true);
+        }
+        &self.tangent.Y
+    }
+
     /// Returns the twist of the tool per rate of the coordinates, joints first, 6×(m + n).
     pub fn jacobian(&self) -> &Matrix6xX<f64> {
         &self.J
@@ -370,10 +407,8 @@ impl OperatingPoint {
     ///
     /// Cost: as [`OperatingPoint::compliance`].
     pub fn yielding(&mut self) -> &DMatrix<f64> {
-        if self.factored {
-            self.tangent.solve(&self.J.as_slice()[6 * self.arm.model.n_actuated()..], true);
-        }
-        &self.tangent.Y
+        let tool = self.tool.clone();
+        self.yielding_of(&tool)
     }
 
     /// Returns the natural frequencies (Hz), ascending, undamped, drives locked, with the symmetric

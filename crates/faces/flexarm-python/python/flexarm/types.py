@@ -66,6 +66,7 @@ __all__ = [
     "MinimiseFigures",
     "ModalFigures",
     "ModeFigures",
+    "ModelError",
     "ModesSummary",
     "MotionPeak",
     "MotionViolation",
@@ -1173,13 +1174,15 @@ class FittedParameter(TypedDict):
     initial: float
     """Initial value."""
     value: float
-    """Estimated value; the initial value if the parameter is not identifiable. A displacement of a joint frame always has the value found, since others may replace it."""
+    """Value of the fit, which the new robot file has, whether or not the readings determine it."""
     std: float
-    """Standard deviation; NaN (null in JSON) if the parameter is not identifiable or the model does not fit the readings."""
+    """Standard deviation; NaN (null in JSON) if the parameter is not identifiable."""
     interval: list[float]
-    """95 % confidence interval; NaN (nulls) where `std` is NaN."""
+    """95 % confidence interval; NaN (nulls) if the parameter is neither identifiable nor rigid. The upper end of a stiffness that is rigid within the readings is infinite (null)."""
     identifiable: bool
     """Whether the readings determine the parameter."""
+    rigid: bool
+    """Whether a spring or a clearance is rigid within the readings."""
 
 
 class Weight(TypedDict):
@@ -1207,12 +1210,23 @@ class HeldOutFigures(TypedDict):
 
     folds: int
     """Number of folds."""
+    skipped: int
+    """Number of folds that are not predicted, since the others do not determine an unknown."""
     rms: float
     """With the parameters fitted to the other folds."""
     rms_before: float
     """With the robot file as it is."""
     unit: str
     """Unit, as in Residual."""
+
+
+class ModelError(TypedDict):
+    """Error of the model in one kind of readings, in addition to their deviations."""
+
+    kind: str
+    """Kind of readings."""
+    error: float
+    """Standard deviation (m or rad; relative for frequencies; as the compared numbers for responses and shapes)."""
 
 
 class EncoderFigures(TypedDict):
@@ -1223,7 +1237,7 @@ class EncoderFigures(TypedDict):
     stiffness: float
     """Stiffness (N m/rad, N/m)."""
     std: float
-    """Standard deviation of the stiffness, by leaving out seconds of the recordings."""
+    """Standard deviation of the stiffness: by leaving out seconds of the recordings, and of what the torque does not explain beyond the noise."""
     delay_s: float
     """Delay of the link's encoder (s)."""
     r2: float
@@ -1284,8 +1298,10 @@ class FoundPoint(TypedDict):
 
     name: str
     """Name of the target."""
+    link: str
+    """Link on which it is; `tcp` for the tool."""
     xyz: list[float]
-    """Position in tool axes (m)."""
+    """Position in the axes of the link or the tool (m)."""
 
 
 class Identification(TypedDict):
@@ -1312,7 +1328,9 @@ class Identification(TypedDict):
     misfit: float | None
     """Ratio of the scatter to the declared one if chance does not explain it; otherwise null."""
     deviations_known: bool
-    """Whether the deviations of the readings were given; if not, they are estimated from the scatter."""
+    """Whether the deviations of all readings were given; the others are estimated from the scatter."""
+    model_errors: list[ModelError]
+    """Errors of the model that the fit found, per kind of readings."""
     encoders: list[EncoderFigures]
     """Gears with recorded positions of motor and link."""
     suspicious: list[Suspicious]

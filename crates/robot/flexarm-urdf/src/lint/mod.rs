@@ -259,6 +259,11 @@ impl Lint<'_, '_> {
         let rates = named(node, "limit").map_or([f64::INFINITY; 3], |limit| self.rates(limit));
         let factors = [("joint", Name, Fault), ("multiplier", Numbers(1), LeftOut), ("offset", Numbers(1), LeftOut)];
         let mimic = self.child(node, "mimic", false, &factors);
+        let second = elements(node).filter(|n| n.has_tag_name("mimic")).nth(1);
+        if let Some(second) = second {
+            let count = elements(node).filter(|n| n.has_tag_name("mimic")).count();
+            self.report.error(&self.lines.of(second), Problem::SeveralMimics { joint: name.to_owned(), count });
+        }
         let dynamics = [("damping", Numbers(1), LeftOut), ("friction", Numbers(1), LeftOut)];
         self.child(node, "dynamics", false, &dynamics);
         self.end("joint");

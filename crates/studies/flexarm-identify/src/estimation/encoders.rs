@@ -16,6 +16,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::estimation::coupled_gears::{CoupledOutput, coupled_gear_stiffness};
+
 /// Recording of one gear, evenly sampled, all signals filtered alike.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GearRun {
@@ -77,48 +79,15 @@ pub(crate) const BLOCK: usize = 250;
 ///
 /// Returns `None` with fewer than two blocks of samples, or if the torque is constant.
 pub fn gear_stiffness(runs: &[GearRun]) -> Option<GearEstimate> {
-    let halves;
-    let runs = match runs {
-        [one] => {
-            halves = split(one);
-            &halves[..]
-        }
-        runs => runs,
+    let output = |run: &GearRun| CoupledOutput {
+        deflection: run.deflection.clone(),
+        rate: run.rate.clone(),
+        deflection_rate: run.deflection_rate.clone(),
+        torques: vec![run.torque.clone()],
+        instruments: vec![run.instrument.clone()],
     };
-    if runs.is_empty() || runs.iter().map(|run| run.deflection.len()).sum::<usize>() < 2 * BLOCK {
-        return None;
-    }
-    let all: Vec<usize> = (0..runs.len()).collect();
-    let fit = Fit::of(runs, &all, None)?;
-    // Jackknife over blocks of time.
-    let blocks: Vec<(usize, usize)> =
-        all.iter().flat_map(|run| (0..runs[*run].deflection.len() / BLOCK).map(move |k| (*run, k * BLOCK))).collect();
-    let left: Vec<f64> =
-        blocks.iter().filter_map(|block| Fit::of(runs, &all, Some(*block))).map(|fit| fit.compliance).collect();
-    // Cross-validation over runs.
-    let (mut unseen_r2, mut without_each) = (Vec::new(), Vec::new());
-    for run in &all {
-        let others: Vec<usize> = all.iter().copied().filter(|k| k != run).collect();
-        let other = Fit::of(runs, &others, None)?;
-        without_each.push(1.0 / other.compliance);
-        let (rest, whole) = other.left_of(&runs[*run]);
-        unseen_r2.push(1.0 - rest / whole);
-    }
-    let apart: Vec<f64> = without_each.iter().map(|stiffness: &f64| 1.0 / stiffness).collect();
-    let curves: Vec<_> = runs.iter().map(|run| fit.curves(run)).collect();
-    let sums = curves.iter().map(squares).fold((0.0, 0.0), |(a, b), (rest, whole)| (a + rest, b + whole));
-    let count = runs.iter().map(|run| run.deflection.len()).sum::<usize>() as f64;
-    Some(GearEstimate {
-        stiffness: 1.0 / fit.compliance,
-        std_ln: jackknife(&left).max(jackknife(&apart)) / fit.compliance.abs(),
-        delay_s: fit.delay,
-        r2: 1.0 - sums.0 / sums.1,
-        unseen_r2,
-        without_each,
-        rest_rms: (sums.0 / count).sqrt(),
-        deflection_rms: (sums.1 / count).sqrt(),
-        curves,
-    })
+    let runs: Vec<Vec<CoupledOutput>> = runs.iter().map(|run| vec![output(run)]).collect();
+    coupled_gear_stiffness(&runs)?.pop()
 }
 
 /// Returns the jackknife standard deviation of an estimate, from the estimates that each leave out
@@ -127,18 +96,6 @@ pub(crate) fn jackknife(without: &[f64]) -> f64 {
     let n = without.len() as f64;
     let mean = without.iter().sum::<f64>() / n;
     ((n - 1.0) / n * without.iter().map(|x| (x - mean).powi(2)).sum::<f64>()).sqrt()
-}
-
-fn split(run: &GearRun) -> [GearRun; 2] {
-    let middle = run.deflection.len() / 2;
-    let part = |range: std::ops::Range<usize>| GearRun {
-        deflection: run.deflection[range.clone()].to_vec(),
-        torque: run.torque[range.clone()].to_vec(),
-        instrument: run.instrument[range.clone()].to_vec(),
-        rate: run.rate[range.clone()].to_vec(),
-        deflection_rate: run.deflection_rate[range].to_vec(),
-    };
-    [part(0..middle), part(middle..run.deflection.len())]
 }
 
 /// Normal equations of a linear fit with instrumental variables: `Zᵀ X a = Zᵀ y`.
@@ -194,55 +151,6 @@ impl Normal {
 
 /// Minimum singular value of the scaled matrix for linearly independent columns.
 const DEPENDENT: f64 = 1e-9;
-
-/// Compliance, delay and damping time constant fitted to some runs.
-struct Fit {
-    compliance: f64,
-    delay: f64,
-    damping_s: f64,
-}
-
-impl Fit {
-    /// Fits runs with an offset for each, without one block.
-    fn of(runs: &[GearRun], some: &[usize], without: Option<(usize, usize)>) -> Option<Self> {
-        let centred_runs: Vec<[Vec<f64>; 5]> = some
-            .iter()
-            .map(|&k| {
-                let run = &runs[k];
-                let left_out =
-                    |i: &usize| without.is_some_and(|(r, first)| r == k && (first..first + BLOCK).contains(i));
-                let kept: Vec<usize> = (0..run.deflection.len()).filter(|i| !left_out(i)).collect();
-                let all = [&run.deflection, &run.torque, &run.instrument, &run.rate, &run.deflection_rate];
-                all.map(|x| centred(x, &kept))
-            })
-            .collect();
-        let mut sums = Normal::new(2);
-        centred_runs.iter().for_each(|[y, t, z, v, _]| sums.add(&[(0, t, z), (1, v, v)], y));
-        let found = sums.solved(1)?;
-        let (compliance, delay) = (found[0], found[1]);
-        // Damping is fitted to the residual: in a joint fit, friction, which jumps where the torque
-        // is largest, would be taken for damping and change the compliance.
-        let damping = centred_runs.iter().map(|[y, t, _, v, w]| {
-            let rest: Vec<f64> = (0..y.len()).map(|k| y[k] - compliance * t[k] - delay * v[k]).collect();
-            (rest, &w[..])
-        });
-        Some(Self { compliance, delay, damping_s: damping_time(damping) })
-    }
-
-    /// Returns the deflection of a run without offset, delay and damping, and the deflection that
-    /// the torque predicts.
-    fn curves(&self, run: &GearRun) -> [Vec<f64>; 2] {
-        let kept: Vec<usize> = (0..run.deflection.len()).collect();
-        let [y, t, v, w] = [&run.deflection, &run.torque, &run.rate, &run.deflection_rate].map(|x| centred(x, &kept));
-        let measured = (0..y.len()).map(|k| y[k] - self.delay * v[k] + self.damping_s * w[k]).collect();
-        [measured, t.iter().map(|t| self.compliance * t).collect()]
-    }
-
-    /// Returns the sums of squares of a run without offset: the residual, and the deflection.
-    fn left_of(&self, run: &GearRun) -> (f64, f64) {
-        squares(&self.curves(run))
-    }
-}
 
 /// Returns the time constant T of a residual modelled as `-T` times a rate; 0 if the rates are
 /// zero.

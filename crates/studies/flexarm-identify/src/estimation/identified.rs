@@ -1,7 +1,7 @@
 //! Result of an identification: estimates, cross-validation, and the reasons why it fails.
 
 use flexarm_kinematics::Pose;
-use nalgebra::{DMatrix, Vector3};
+use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::estimation::least_squares::Solution;
 use crate::estimation::measurement::NoAnswer;
@@ -15,17 +15,27 @@ pub struct ParameterEstimate {
     pub unit: String,
     /// Initial value.
     pub initial: f64,
-    /// Estimated value; the initial value if the parameter is not identifiable.
+    /// Value of the fit, whether or not the readings determine it.
     pub value: f64,
-    /// Standard deviation; NaN if the parameter is not identifiable or the model does not fit the
-    /// readings.
+    /// Standard deviation; NaN if the readings do not determine the value.
     pub std: f64,
-    /// 95 % confidence interval; NaN where `std` is NaN.
+    /// 95 % confidence interval; NaN if the parameter is neither identifiable nor rigid.
     pub interval: [f64; 2],
-    /// Whether the readings determine the parameter.
+    /// Whether the readings determine the value.
     pub identifiable: bool,
-    /// Whether it has its found value even if the readings only determine it together with others.
-    pub shared: bool,
+    /// Whether a spring or a clearance is rigid within the readings: `interval` has the least
+    /// stiffness that they allow.
+    pub rigid: bool,
+}
+
+/// Error of the model in one kind of readings, in addition to their deviations.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct ModelError {
+    /// Kind of readings.
+    pub kind: &'static str,
+    /// Standard deviation (m or rad; relative for frequencies; as the compared numbers for
+    /// responses and shapes).
+    pub error: f64,
 }
 
 /// Cross-validation: residuals of readings that the fit did not use.
@@ -33,11 +43,13 @@ pub struct ParameterEstimate {
 pub struct HeldOut {
     /// Number of folds.
     pub folds: usize,
+    /// Number of folds that are not predicted, since the other folds do not determine an unknown.
+    pub skipped: usize,
     /// RMS of the standardised residuals, each predicted from the other folds.
     pub rms: f64,
     /// RMS of the standardised residuals with the initial values.
     pub rms_initial: f64,
-    /// Standardised residual of each number of each reading; NaN where no prediction is possible.
+    /// Residual of each number of each reading; NaN where no prediction is possible.
     pub residuals: Vec<f64>,
 }
 
@@ -50,9 +62,12 @@ pub struct Identified {
     pub correlation: DMatrix<f64>,
     /// Combinations that the readings do not determine: parameter and weight, largest weight first.
     pub untold: Vec<Vec<(usize, f64)>>,
+    /// Search coordinates of the parameters, then the unknowns of the measurements.
+    pub unknowns: DVector<f64>,
     /// Solution of the least-squares problem.
     pub solution: Solution,
-    /// Standardised residuals with the initial values, with the unknowns of the measurement fitted.
+    /// Residuals with the initial values, with the unknowns of the measurement fitted; NaN if the arm
+    /// has no equilibrium with them.
     pub before: Vec<f64>,
     /// Residuals over their own standard deviation after the fit; a magnitude above four
     /// contradicts the other readings.
@@ -62,6 +77,8 @@ pub struct Identified {
     /// Ratio of the scatter to the declared one, if chance exceeds it less than once in a thousand
     /// cases.
     pub misfit: Option<f64>,
+    /// Errors of the model that the fit found.
+    pub model_errors: Vec<ModelError>,
     /// Cross-validation.
     pub held_out: Option<HeldOut>,
     /// Estimated poses of unknown instruments: the world in the instrument's axes.

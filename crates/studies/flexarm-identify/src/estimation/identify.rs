@@ -1,49 +1,50 @@
 //! Identification of arm parameters from readings: estimates, uncertainties, combinations that are
 //! not identifiable, and evidence against the model.
+//!
+//! One fit gives everything: its solution is what is reported and written. Springs are sought as
+//! compliances with a prior around zero that are not negative, so that a spring which the readings
+//! do not determine is rigid.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
-use crate::estimation::identified::{HeldOut, Identified, IdentifyError, ParameterEstimate};
-use crate::estimation::least_squares::{Residuals, Search, Solution, SolveError, solve};
-use crate::estimation::measurement::MeasuredArm;
-use crate::estimation::parameter::{Effect, Parameter, Plant};
+use crate::estimation::identified::{HeldOut, Identified, IdentifyError, ModelError, ParameterEstimate};
+use crate::estimation::least_squares::{Progress, Residuals, Search, Solution, SolveError, Unknown, scale, solve};
+use crate::estimation::measurement::{MeasuredArm, NoAnswer};
+use crate::estimation::parameter::{Parameter, Plant};
 use crate::estimation::placement::placed;
-use crate::estimation::reading::{Instrument, Measurements, Reading, ReadingKind};
+use crate::estimation::reading::{Instrument, KINDS, Measurements, ReadingKind};
 
 /// Magnitude of a normalised residual above which its reading is suspicious.
 const SUSPICIOUS: f64 = 4.0;
 /// One-sided normal quantile for a probability of one in a thousand, above which the scatter counts
 /// as larger than declared.
 const MISFIT_QUANTILE: f64 = 3.09;
-/// Maximum number of rounds of the iteration for an unknown scatter.
-const SCATTER_ROUNDS: usize = 6;
 /// Maximum number of further starts of a search that may end in a local minimum.
 const STARTS: usize = 12;
-/// Ratio of scatter to declared deviation above which the fit is rejected and reports no
-/// deviations.
-const NO_FIT: f64 = 2.0;
-/// Maximum share of an identifiable parameter in directions that are not identified.
-const UNTOLD: f64 = 0.05;
+/// Maximum ratio of posterior to prior deviation of a parameter that the readings determine.
+const LEARNT: f64 = 0.5;
+/// Normal quantile of a 95 % interval.
+const INTERVAL: f64 = 1.96;
 
 /// Options of an identification.
 #[derive(Clone, Copy, Debug)]
 pub struct IdentifyOptions {
     /// Loss, maximum number of iterations, and tolerance.
     pub search: Search,
-    /// Whether the deviations of the readings are known. If not, only their ratios count and the
-    /// scatter about the fit sets their size.
-    pub deviations_known: bool,
     /// Number of folds of the cross-validation; 0 for none.
     pub folds: usize,
 }
 
 impl Default for IdentifyOptions {
     fn default() -> Self {
-        Self { search: Search::default(), deviations_known: true, folds: 10 }
+        Self { search: Search::default(), folds: 10 }
     }
 }
 
 /// Identifies the parameters.
+///
+/// * `watch`: called after each iteration; the search ends with the best values so far where it
+///   returns false.
 ///
 /// # Errors
 /// [`IdentifyError`].
@@ -52,195 +53,240 @@ pub fn identify(
     parameters: &[Parameter],
     measurements: &Measurements,
     options: &IdentifyOptions,
+    watch: &dyn Fn(&Progress) -> bool,
 ) -> Result<Identified, IdentifyError> {
     let rows = measurements.rows();
     if rows == 0 || parameters.is_empty() {
         return Err(IdentifyError::Nothing { parameters: parameters.len(), rows });
     }
-    let mut measurements = placed(plant, measurements)?;
-    let (scatter, begin) = match options.deviations_known {
-        true => (1.0, None),
-        false => scatter(plant, parameters, &measurements, options).map(|(scatter, at)| (scatter, Some(at)))?,
+    let mut unknowns = unknowns(parameters, measurements);
+    let start: Vec<f64> = parameters.iter().zip(&unknowns).map(|(p, u)| p.search(u.start).0).collect();
+    let measurements = placed(&plant.with(parameters, &start), measurements)?;
+    unknowns.extend((0..measurements.own_unknowns()).map(|_| Unknown::free()));
+    let fit = Fit { plant, parameters, measurements: &measurements, search: &options.search, watch };
+    let before = Fit { parameters: &[], watch: &|_| true, ..fit }.solved(&unknowns[parameters.len()..]);
+    let before = match before {
+        Ok(found) => found.residuals.as_slice().to_vec(),
+        // The arm with its initial values has no equilibrium.
+        Err(IdentifyError::Model(_)) => vec![f64::NAN; rows],
+        Err(error) => return Err(error),
     };
-    measurements.readings.iter_mut().for_each(|reading| reading.scale_deviations(scatter));
-    let before = initial_residuals(plant, &measurements, options)?;
-    let solution = match begin {
-        Some(begin) => fitted(plant, parameters, &measurements, options, Some(&begin))?,
-        None => searched(plant, parameters, &measurements, options)?,
-    };
-    let (solution, shared) = with_kept(plant, parameters, &measurements, options, solution)?;
-    let held_out = held_out(plant, parameters, &measurements, options, &solution, &before)?;
-    let mut found = summarise(parameters, &shared, &measurements, options, solution, before, held_out);
-    // Back to units of the given deviations.
-    found.solution.residuals *= scatter;
-    found.before.iter_mut().for_each(|r| *r *= scatter);
-    if let Some(held) = &mut found.held_out {
-        held.residuals.iter_mut().for_each(|r| *r *= scatter);
-        (held.rms, held.rms_initial) = (held.rms * scatter, held.rms_initial * scatter);
-    }
-    let sound =
-        |p: &ParameterEstimate| p.value.is_finite() && (p.std.is_nan() || p.interval.iter().all(|x| x.is_finite()));
+    let solution = fit.searched(&unknowns)?;
+    let found = fit.summary(&unknowns, solution, before, options.folds);
+    let sound = |p: &ParameterEstimate| p.value.is_finite() && (p.std.is_finite() || !p.identifiable);
     match found.parameters.iter().all(sound) {
         true => Ok(found),
         false => Err(IdentifyError::NotFinite),
     }
 }
 
-/// Prior deviation that keeps a parameter at its initial value, relative to its reference.
-const PINNED: f64 = 1e-9;
-/// Maximum ratio of the scatters with some parameters at their initial values and without.
-const AS_WELL: f64 = 1.1;
-
-/// Returns the ratio of the scatter about the fit to the given deviations, for the case in which
-/// only the ratios of deviations are known, and the unknowns at the end of the search. The
-/// iteration starts from the scatter about the arm with its initial values, so that the loss and
-/// the test for identifiable directions are scaled from the start.
-fn scatter(
-    plant: &Plant,
-    parameters: &[Parameter],
-    measurements: &Measurements,
-    options: &IdentifyOptions,
-) -> Result<(f64, DVector<f64>), IdentifyError> {
-    let rms = |values: &[f64]| (values.iter().map(|x| x * x).sum::<f64>() / values.len() as f64).sqrt();
-    let observed = MeasuredArm { plant, parameters: &[], measurements }.observed();
-    let deviations = measurements.readings.iter().flat_map(Reading::deviations);
-    let sizes: Vec<f64> = observed.iter().zip(deviations).map(|(x, std)| x / std).collect();
-    let first = rms(&initial_residuals(plant, measurements, options)?).max(1e-9 * rms(&sizes));
-    let first = if first > 0.0 { first } else { 1.0 };
-    let mut scatter = first;
-    let mut at: Option<DVector<f64>> = None;
-    for _ in 0..SCATTER_ROUNDS {
-        let mut scaled = measurements.clone();
-        scaled.readings.iter_mut().for_each(|reading| reading.scale_deviations(scatter));
-        let solution = match &at {
-            Some(at) => fitted(plant, parameters, &scaled, options, Some(at))?,
-            None => searched(plant, parameters, &scaled, options)?,
-        };
-        if solution.freedom == 0 {
-            return Err(IdentifyError::NoScatter { rows: measurements.rows() });
+/// Returns the unknowns of the parameters. Readings at rest determine compliances from a rigid arm,
+/// whose displacements are linear in them; vibrations have no derivatives there.
+fn unknowns(parameters: &[Parameter], measurements: &Measurements) -> Vec<Unknown> {
+    let kind = |vibrates: &dyn Fn(&ReadingKind) -> bool| measurements.readings.iter().any(|r| vibrates(&r.kind));
+    let rigid = !kind(&|kind| kind.vibrates());
+    let alone = !kind(&|kind| !matches!(kind, ReadingKind::Known { .. }));
+    let known = |name: &str| kind(&|kind| matches!(kind, ReadingKind::Known { parameter, .. } if parameter == name));
+    let of = |parameter: &Parameter| {
+        let mut unknown = parameter.unknown(rigid);
+        if alone {
+            unknown.start = parameter.coordinate(0.0);
+            // No reading concerns the others: they keep their initial values.
+            if let (Some((mean, _)), false) = (&mut unknown.prior, known(&parameter.name)) {
+                *mean = unknown.start;
+            }
         }
-        let next = (scatter * solution.scale.sqrt()).max(1e-6 * first);
-        let settled = (next / scatter).ln().abs() < 0.01;
-        (scatter, at) = (next, Some(solution.unknowns));
-        if settled {
-            break;
-        }
-    }
-    Ok((scatter, at.unwrap_or_else(|| DVector::zeros(parameters.len() + measurements.own_unknowns()))))
-}
-
-/// Keeps the parameters that the readings do not determine at their initial values and fits the
-/// others again. Returns that solution, with the directions and deviations of the free one, if it
-/// explains the readings about as well; otherwise the free solution. Also returns which parameters
-/// have their found value although the readings only determine it together with others: joint
-/// frames, and numbers of guides whose initial values contradict the readings.
-fn with_kept(
-    plant: &Plant,
-    parameters: &[Parameter],
-    measurements: &Measurements,
-    options: &IdentifyOptions,
-    solution: Solution,
-) -> Result<(Solution, Vec<bool>), IdentifyError> {
-    let mut shared: Vec<bool> = parameters.iter().map(Parameter::is_shared).collect();
-    let found = estimates(parameters, &shared, &solution, 1.0);
-    let of_guide = |k: usize| matches!(parameters[k].effect, Effect::Guide { .. });
-    for _ in 0..2 {
-        let kept = |k: &usize| !found[*k].identifiable && !shared[*k] && solution.unknowns[*k] != 0.0;
-        let kept: Vec<usize> = (0..parameters.len()).filter(kept).collect();
-        if kept.is_empty() {
-            break;
-        }
-        let (mut start, mut priors) = (solution.unknowns.clone(), priors(parameters));
-        for &k in &kept {
-            (start[k], priors[k]) = (0.0, PINNED * parameters[k].reference());
-        }
-        let again = fitted_within(plant, parameters, measurements, options, (&start, &priors)).ok();
-        if let Some(again) = again.filter(|again| (again.scale / solution.scale).sqrt() <= AS_WELL) {
-            let Solution { unknowns, residuals, weights, leverages, scale, cost, converged, .. } = again;
-            let solution = Solution { unknowns, residuals, weights, leverages, scale, cost, converged, ..solution };
-            return Ok((solution, shared));
-        }
-        kept.into_iter().filter(|k| of_guide(*k)).for_each(|k| shared[k] = true);
-    }
-    Ok((solution, shared))
-}
-
-/// Returns the prior deviations, each at most the parameter's reference: a weaker prior must not
-/// make a parameter identifiable.
-fn priors(parameters: &[Parameter]) -> Vec<f64> {
-    parameters.iter().map(|parameter| parameter.prior.min(parameter.reference())).collect()
-}
-
-fn fitted(
-    plant: &Plant,
-    parameters: &[Parameter],
-    measurements: &Measurements,
-    options: &IdentifyOptions,
-    start: Option<&DVector<f64>>,
-) -> Result<Solution, IdentifyError> {
-    let zeros = DVector::zeros(parameters.len() + measurements.own_unknowns());
-    let within = (start.unwrap_or(&zeros), &priors(parameters)[..]);
-    fitted_within(plant, parameters, measurements, options, within)
-}
-
-/// Fits all readings from a start, with given prior deviations.
-fn fitted_within(
-    plant: &Plant,
-    parameters: &[Parameter],
-    measurements: &Measurements,
-    options: &IdentifyOptions,
-    (start, priors): (&DVector<f64>, &[f64]),
-) -> Result<Solution, IdentifyError> {
-    let arm = MeasuredArm { plant, parameters, measurements };
-    solve(&arm, start, priors, &options.search).map_err(|error| match error {
-        SolveError::Model(error) => IdentifyError::Model(error),
-        SolveError::Nuisance(number) => IdentifyError::Untold { what: own_name(measurements, number) },
-        SolveError::NotFinite => IdentifyError::NotFinite,
-    })
-}
-
-/// Fits all readings. The cost of frequency responses has local minima where resonances of the
-/// model are close to other resonances of the arm. Such problems are first fitted in the logarithm
-/// of the response, and from further starts as long as the scatter exceeds the declared one.
-fn searched(
-    plant: &Plant,
-    parameters: &[Parameter],
-    measurements: &Measurements,
-    options: &IdentifyOptions,
-) -> Result<Solution, IdentifyError> {
-    let vibrates = |reading: &Reading| matches!(reading.kind, ReadingKind::Response(_));
-    if !measurements.readings.iter().any(vibrates) {
-        return fitted(plant, parameters, measurements, options, None);
-    }
-    let logarithmic = measurements.logarithmic();
-    let from = |start: &DVector<f64>| -> Result<Solution, IdentifyError> {
-        let begin = match &logarithmic {
-            Some(smooth) => fitted(plant, parameters, smooth, options, Some(start))?.unknowns,
-            None => start.clone(),
-        };
-        fitted(plant, parameters, measurements, options, Some(&begin))
+        unknown
     };
-    let zeros = DVector::zeros(parameters.len() + measurements.own_unknowns());
-    let mut best = from(&zeros);
-    for number in 0..STARTS {
-        if options.deviations_known && best.as_ref().is_ok_and(|best| !misfits(best)) {
-            break;
+    parameters.iter().map(of).collect()
+}
+
+/// A measured arm as a problem in the unknowns of the fit.
+struct InUnknowns<'a>(MeasuredArm<'a>);
+
+impl Residuals for InUnknowns<'_> {
+    type Error = NoAnswer;
+
+    fn evaluate(&self, unknowns: &DVector<f64>, J: Option<&mut DMatrix<f64>>) -> Result<DVector<f64>, NoAnswer> {
+        let mut x = unknowns.clone();
+        let rates = to_search(self.0.parameters, &mut x);
+        let Some(J) = J else { return self.0.evaluate(&x, None) };
+        let r = self.0.evaluate(&x, Some(&mut *J))?;
+        rates.iter().enumerate().for_each(|(k, rate)| J.column_mut(k).scale_mut(*rate));
+        Ok(r)
+    }
+}
+
+/// Converts the parameters in `x` to search coordinates; returns the derivatives.
+fn to_search(parameters: &[Parameter], x: &mut DVector<f64>) -> Vec<f64> {
+    let of = |(parameter, x): (&Parameter, &mut f64)| {
+        let (search, rate) = parameter.search(*x);
+        *x = search;
+        rate
+    };
+    parameters.iter().zip(x.iter_mut()).map(of).collect()
+}
+
+/// Parameters, readings, and how they are fitted.
+#[derive(Clone, Copy)]
+struct Fit<'a> {
+    plant: &'a Plant,
+    parameters: &'a [Parameter],
+    measurements: &'a Measurements,
+    search: &'a Search,
+    watch: &'a dyn Fn(&Progress) -> bool,
+}
+
+impl Fit<'_> {
+    /// Fits all readings.
+    fn solved(&self, unknowns: &[Unknown]) -> Result<Solution, IdentifyError> {
+        let Self { plant, parameters, measurements, search, watch } = *self;
+        let problem = InUnknowns(MeasuredArm { plant, parameters, measurements });
+        solve(&problem, &measurements.noise(), unknowns, search, watch).map_err(|error| match error {
+            SolveError::Model(error) => IdentifyError::Model(error),
+            SolveError::Nuisance(k) => IdentifyError::Untold { what: own_name(measurements, k - parameters.len()) },
+            SolveError::NoScatter => IdentifyError::NoScatter { rows: measurements.rows() },
+            SolveError::NotFinite => IdentifyError::NotFinite,
+        })
+    }
+
+    /// Fits all readings. The cost of frequency responses has local minima where resonances of the
+    /// model are close to other resonances of the arm. Such problems are first fitted in the
+    /// logarithm of the response, and from further starts as long as the scatter exceeds the
+    /// declared one.
+    fn searched(&self, unknowns: &[Unknown]) -> Result<Solution, IdentifyError> {
+        let responds = |kind: &ReadingKind| matches!(kind, ReadingKind::Response(_));
+        if !self.measurements.readings.iter().any(|reading| responds(&reading.kind)) {
+            return self.solved(unknowns);
         }
-        let mut start = zeros.clone();
-        for (k, parameter) in parameters.iter().enumerate() {
-            start[k] = spread(number, k) * parameter.reference();
-        }
-        let other = from(&start);
-        let better = match (&other, &best) {
-            (Ok(other), Ok(best)) => other.cost < best.cost,
-            (Ok(_), Err(_)) => true,
-            _ => false,
+        let logarithmic = self.measurements.logarithmic();
+        let from = |starts: &dyn Fn(usize, &Parameter) -> f64| {
+            let mut begun = unknowns.to_vec();
+            for (k, parameter) in self.parameters.iter().enumerate() {
+                begun[k].start = parameter.coordinate(starts(k, parameter));
+            }
+            if let Some(smooth) = &logarithmic {
+                let found = Fit { measurements: smooth, ..*self }.solved(&begun)?;
+                begun.iter_mut().zip(found.unknowns.iter()).for_each(|(unknown, x)| unknown.start = *x);
+            }
+            self.solved(&begun)
         };
-        if better {
-            best = other;
+        let mut best = from(&|_, _| 0.0);
+        for number in 0..STARTS {
+            if best.as_ref().is_ok_and(|best| self.misfit(best).is_none() && self.is_known()) {
+                break;
+            }
+            let other = from(&|k, parameter| spread(number, k) * parameter.reference());
+            let noise = self.measurements.noise();
+            let size = |k: usize| if noise[k].std > 0.0 { noise[k].std } else { noise[k].size };
+            let error =
+                |found: &Solution| (0..noise.len()).map(|k| (found.residuals[k] / size(k)).powi(2)).sum::<f64>();
+            let better = match (&other, &best) {
+                (Ok(other), Ok(best)) => error(other) < error(best),
+                (Ok(_), Err(_)) => true,
+                _ => false,
+            };
+            if better {
+                best = other;
+            }
+        }
+        best
+    }
+
+    /// Whether all readings have known deviations.
+    fn is_known(&self) -> bool {
+        self.measurements.noise().iter().all(|noise| noise.std > 0.0)
+    }
+
+    /// Returns the ratio of the scatter to the given deviations if it is larger than chance
+    /// explains in some kind of readings.
+    fn misfit(&self, found: &Solution) -> Option<f64> {
+        let noise = self.measurements.noise();
+        let of = |kind: usize| {
+            let own: Vec<usize> = (0..noise.len()).filter(|k| noise[*k].kind == Some(kind)).collect();
+            if own.is_empty() || own.iter().any(|k| noise[*k].std == 0.0) {
+                return None;
+            }
+            let over: Vec<f64> = own.iter().map(|k| found.residuals[*k] / noise[*k].std).collect();
+            let freedom: f64 = own.iter().map(|k| 1.0 - found.leverages[*k]).sum();
+            let factor = scale(&over, freedom, self.search.loss);
+            (freedom >= 0.5 && factor * factor > chi_square_bound(freedom)).then_some(factor)
+        };
+        (0..KINDS.len()).filter_map(of).reduce(f64::max)
+    }
+
+    /// Predicts the readings of each fold from the other folds; readings at one pose are in one
+    /// fold.
+    fn held_out(&self, solution: &Solution, before: &[f64], folds: usize) -> Option<HeldOut> {
+        let mut poses: Vec<&[f64]> = Vec::new();
+        let mut pose_of_row = Vec::new();
+        for reading in &self.measurements.readings {
+            let known = poses.iter().rposition(|q| !q.is_empty() && *q == reading.q);
+            let pose = known.unwrap_or(poses.len());
+            if known.is_none() {
+                poses.push(&reading.q);
+            }
+            pose_of_row.extend(std::iter::repeat_n(pose, reading.rows()));
+        }
+        let folds = folds.min(poses.len());
+        if folds < 2 {
+            return None;
+        }
+        let noise = self.measurements.noise();
+        let (mut residuals, mut skipped) = (vec![f64::NAN; noise.len()], 0);
+        for fold in 0..folds {
+            let own: Vec<usize> = (0..noise.len()).filter(|k| pose_of_row[*k] % folds == fold).collect();
+            match solution.without(&own) {
+                Some(found) => own.iter().zip(found.iter()).for_each(|(k, r)| residuals[*k] = *r),
+                None => skipped += 1,
+            }
+        }
+        let seen: Vec<usize> = (0..residuals.len()).filter(|k| residuals[*k].is_finite()).collect();
+        let square = |values: &[f64]| seen.iter().map(|k| (values[*k] / solution.deviations[*k]).powi(2)).sum::<f64>();
+        let rms = |values: &[f64]| (square(values) / seen.len() as f64).sqrt();
+        (!seen.is_empty()).then(|| HeldOut {
+            folds,
+            skipped,
+            rms: rms(&residuals),
+            rms_initial: rms(before),
+            residuals,
+        })
+    }
+
+    fn summary(&self, unknowns: &[Unknown], solution: Solution, before: Vec<f64>, folds: usize) -> Identified {
+        let Self { parameters, measurements, .. } = *self;
+        let mut x = solution.unknowns.clone();
+        let rates = to_search(parameters, &mut x);
+        let C = &solution.covariance;
+        let p = parameters.len();
+        let sign = |i: usize, j: usize| (rates[i] * rates[j]).signum();
+        let correlation = DMatrix::from_fn(p, p, |i, j| sign(i, j) * C[(i, j)] / (C[(i, i)] * C[(j, j)]).sqrt());
+        let r = solution.residuals.component_div(&solution.deviations);
+        let over_own = |(r, h): (&f64, &f64)| r / (1.0 - h).max(1e-6).sqrt();
+        let normalised: Vec<f64> = r.iter().zip(solution.leverages.iter()).map(over_own).collect();
+        let mut suspicious: Vec<usize> = (0..normalised.len()).filter(|k| normalised[*k].abs() > SUSPICIOUS).collect();
+        suspicious.sort_by(|a, b| normalised[*b].abs().total_cmp(&normalised[*a].abs()));
+        let own = &x.as_slice()[p..];
+        let estimate = |(k, parameter): (usize, &Parameter)| {
+            estimate(parameter, &unknowns[k], solution.unknowns[k], C[(k, k)].sqrt())
+        };
+        let errors = solution.model_errors.iter().enumerate().filter(|(_, error)| **error > 0.0);
+        Identified {
+            parameters: parameters.iter().enumerate().map(estimate).collect(),
+            correlation,
+            untold: untold(unknowns, C, p),
+            normalised,
+            suspicious,
+            misfit: self.misfit(&solution),
+            model_errors: errors.map(|(kind, error)| ModelError { kind: KINDS[kind], error: *error }).collect(),
+            held_out: self.held_out(&solution, &before, folds),
+            before,
+            instruments: (0..measurements.instruments.len()).map(|k| measurements.instrument(k, own).0).collect(),
+            targets: (0..measurements.targets.len()).map(|k| measurements.target(k, own).0).collect(),
+            unknowns: x,
+            solution,
         }
     }
-    best
 }
 
 /// Returns a number between -1.5 and 1.5 for a start and a coordinate, from the additive recurrence
@@ -249,11 +295,6 @@ fn spread(start: usize, coordinate: usize) -> f64 {
     const PRIMES: [f64; 12] = [2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0, 19.0, 23.0, 29.0, 31.0, 37.0];
     let root = PRIMES[coordinate % PRIMES.len()].sqrt() * (1 + coordinate / PRIMES.len()) as f64;
     3.0 * (root * (start + 1) as f64).fract() - 1.5
-}
-
-/// Whether the residuals scatter more than chance explains.
-fn misfits(solution: &Solution) -> bool {
-    solution.freedom > 0 && solution.scale > chi_square_bound(solution.freedom)
 }
 
 /// Describes an unknown of the measurements by its number.
@@ -271,138 +312,55 @@ fn own_name(measurements: &Measurements, number: usize) -> String {
     "the position of a target on the tool".to_owned()
 }
 
-/// Returns the standardised residuals of the arm with its initial values, with the unknowns of the
-/// measurements fitted.
-fn initial_residuals(
-    plant: &Plant,
-    measurements: &Measurements,
-    options: &IdentifyOptions,
-) -> Result<Vec<f64>, IdentifyError> {
-    Ok(fitted(plant, &[], measurements, options, None)?.residuals.iter().copied().collect())
-}
-
-/// Predicts each fold of the readings from the other folds.
-fn held_out(
-    plant: &Plant,
-    parameters: &[Parameter],
-    measurements: &Measurements,
-    options: &IdentifyOptions,
-    all: &Solution,
-    before: &[f64],
-) -> Result<Option<HeldOut>, IdentifyError> {
-    let folds = options.folds.min(measurements.readings.len());
-    if folds < 2 {
-        return Ok(None);
-    }
-    let mut residuals = vec![f64::NAN; measurements.rows()];
-    let mut first = Vec::with_capacity(measurements.readings.len());
-    let mut row = 0;
-    for reading in &measurements.readings {
-        first.push(row);
-        row += reading.rows();
-    }
-    for fold in 0..folds {
-        let others = measurements.of_readings(|k| k % folds != fold);
-        let own = measurements.of_readings(|k| k % folds == fold);
-        // A fold is skipped if the others do not determine the unknowns of the measurement.
-        let Ok(found) = fitted(plant, parameters, &others, options, Some(&all.unknowns)) else { continue };
-        let arm = MeasuredArm { plant, parameters, measurements: &own };
-        let unseen = arm.evaluate(&found.unknowns, None)?;
-        let places = (0..measurements.readings.len())
-            .filter(|k| k % folds == fold)
-            .flat_map(|k| first[k]..first[k] + measurements.readings[k].rows());
-        for (place, r) in places.zip(unseen.iter()) {
-            residuals[place] = *r;
-        }
-    }
-    let seen: Vec<usize> = (0..residuals.len()).filter(|k| residuals[*k].is_finite()).collect();
-    if seen.is_empty() {
-        return Ok(None);
-    }
-    let rms = |values: &[f64]| (seen.iter().map(|k| values[*k].powi(2)).sum::<f64>() / seen.len() as f64).sqrt();
-    Ok(Some(HeldOut { folds, rms: rms(&residuals), rms_initial: rms(before), residuals }))
-}
-
 /// Returns the upper 0.1 % quantile of χ² over its degrees of freedom (Wilson and Hilferty).
-pub fn chi_square_bound(freedom: usize) -> f64 {
-    let nine = 2.0 / (9.0 * freedom as f64);
+pub fn chi_square_bound(freedom: f64) -> f64 {
+    let nine = 2.0 / (9.0 * freedom);
     (1.0 - nine + MISFIT_QUANTILE * nine.sqrt()).powi(3)
 }
 
-/// Returns the estimates of the parameters.
+/// Returns the estimate of a parameter.
 ///
-/// * `shared`: which parameters have their found value even if they are not identifiable.
-/// * `scatter`: ratio of the deviations to those of the solution; NaN if the model does not fit.
-fn estimates(parameters: &[Parameter], shared: &[bool], solution: &Solution, scatter: f64) -> Vec<ParameterEstimate> {
-    let V = solution.directions.columns(0, solution.identified);
-    let share = |k: usize| 1.0 - V.row(k).norm_squared();
-    let estimate = |(k, parameter): (usize, &Parameter)| {
-        let spread = solution.covariance[(k, k)].sqrt();
-        // The search judges directions before the prior is dropped; at the solution the data may
-        // determine them less well, hence the second condition.
-        let identifiable = share(k) <= UNTOLD && spread <= parameter.reference();
-        let (x, std) = (solution.unknowns[k], if identifiable { spread * scatter } else { f64::NAN });
-        ParameterEstimate {
-            name: parameter.name.clone(),
-            unit: parameter.unit.clone(),
-            initial: parameter.initial,
-            value: if identifiable || shared[k] { parameter.value(x) } else { parameter.initial },
-            std: parameter.deviation(x, std),
-            interval: parameter.interval(x, std, 1.96),
-            identifiable,
-            shared: shared[k],
-        }
+/// * `z`: unknown of the fit; `std`: its posterior standard deviation.
+fn estimate(parameter: &Parameter, unknown: &Unknown, z: f64, std: f64) -> ParameterEstimate {
+    let learnt = unknown.prior.is_none_or(|(_, prior)| std <= LEARNT * prior);
+    let above_zero = z - INTERVAL * std > 0.0;
+    let identifiable = learnt
+        && match parameter.is_yielding() {
+            true => above_zero,
+            false => !parameter.is_logarithmic() || std <= parameter.reference(),
+        };
+    let rigid = learnt && parameter.is_yielding() && !above_zero;
+    let (x, rate) = parameter.search(z);
+    let interval = match identifiable || rigid {
+        true => parameter.interval(z - INTERVAL * std, z + INTERVAL * std),
+        false => [f64::NAN; 2],
     };
-    parameters.iter().enumerate().map(estimate).collect()
+    ParameterEstimate {
+        name: parameter.name.clone(),
+        unit: parameter.unit.clone(),
+        initial: parameter.initial,
+        value: parameter.value(x),
+        std: if identifiable { parameter.deviation(x, std * rate.abs()) } else { f64::NAN },
+        interval,
+        identifiable,
+        rigid,
+    }
 }
 
-/// Returns the directions that are not identified as parameters and weights, largest weight first.
-fn untold(solution: &Solution) -> Vec<Vec<(usize, f64)>> {
-    let combination = |j: usize| {
-        let column = solution.directions.column(j);
+/// Returns the directions of the parameters, over their prior deviations, of which the readings
+/// know no more than the prior, as parameters and weights, largest weight first.
+fn untold(unknowns: &[Unknown], C: &DMatrix<f64>, p: usize) -> Vec<Vec<(usize, f64)>> {
+    let std: Vec<f64> = unknowns[..p].iter().map(|unknown| unknown.prior.map_or(1.0, |(_, std)| std)).collect();
+    let over = DMatrix::from_fn(p, p, |i, j| C[(i, j)] / (std[i] * std[j]));
+    let eigen = SymmetricEigen::new(over);
+    let combination = |k: usize| {
+        let column = eigen.eigenvectors.column(k);
         let mut parts: Vec<(usize, f64)> = column.iter().copied().enumerate().filter(|(_, w)| w.abs() > 0.2).collect();
         parts.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
         parts
     };
-    (solution.identified..solution.directions.ncols()).map(combination).collect()
-}
-
-fn summarise(
-    parameters: &[Parameter],
-    shared: &[bool],
-    measurements: &Measurements,
-    options: &IdentifyOptions,
-    mut solution: Solution,
-    before: Vec<f64>,
-    held_out: Option<HeldOut>,
-) -> Identified {
-    let p = parameters.len();
-    let misfit = (options.deviations_known && misfits(&solution)).then(|| solution.scale.sqrt());
-    let scatter = match options.deviations_known {
-        true => misfit.unwrap_or(1.0),
-        false if solution.freedom > 0 => solution.scale.sqrt(),
-        false => f64::INFINITY,
-    };
-    let fits = misfit.is_none_or(|factor| factor <= NO_FIT);
-    solution.converged &= fits;
-    let C = &solution.covariance;
-    let correlation = DMatrix::from_fn(p, p, |i, j| C[(i, j)] / (C[(i, i)] * C[(j, j)]).sqrt());
-    let over_own = |(r, h): (&f64, &f64)| r / (scatter * (1.0 - h).max(1e-6).sqrt());
-    let normalised: Vec<f64> = solution.residuals.iter().zip(solution.leverages.iter()).map(over_own).collect();
-    let mut suspicious: Vec<usize> = (0..normalised.len()).filter(|k| normalised[*k].abs() > SUSPICIOUS).collect();
-    suspicious.sort_by(|a, b| normalised[*b].abs().total_cmp(&normalised[*a].abs()));
-    let own = &solution.unknowns.as_slice()[p..];
-    Identified {
-        parameters: estimates(parameters, shared, &solution, if fits { scatter } else { f64::NAN }),
-        correlation,
-        untold: untold(&solution),
-        before,
-        normalised,
-        suspicious,
-        misfit,
-        held_out,
-        instruments: (0..measurements.instruments.len()).map(|k| measurements.instrument(k, own).0).collect(),
-        targets: (0..measurements.targets.len()).map(|k| measurements.target(k, own).0).collect(),
-        solution,
-    }
+    // At half the variance of the prior, readings and prior know the same.
+    let mut none: Vec<usize> = (0..p).filter(|k| eigen.eigenvalues[*k] > 0.5).collect();
+    none.sort_by(|a, b| eigen.eigenvalues[*b].total_cmp(&eigen.eigenvalues[*a]));
+    none.into_iter().map(combination).collect()
 }

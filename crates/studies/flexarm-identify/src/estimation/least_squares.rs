@@ -1,30 +1,61 @@
-//! Nonlinear least squares with uncertainties. Directions that the data do not determine stay at
-//! their prior.
+//! Nonlinear least squares with priors, bounds and errors of the model: one maximum-a-posteriori
+//! fit.
 //!
 //! ```text
-//! minimise Σ ρ(r_i(x, b))
-//! x: parameters with priors N(0, σ_p²); b: unknowns of the measurement without priors
+//! minimise Σ ρ(r_i / s_i) + Σ ((x_k - μ_k) / σ_k)²,   x_k >= b_k,   s_i² = std_i² + (τ_κ size_i)²
 //! ```
-//! The Levenberg-Marquardt method first solves the problem with the prior as additional rows. Then
-//! the singular values of the Jacobian (columns scaled by σ_p, nuisance unknowns projected out)
-//! show which directions of x the data determine better than the prior. A second solution drops the
-//! prior in these directions, so that the estimates are free of it; in the others x stays at the
-//! prior. Residuals are in units of their standard deviations. Not here: the measurements and the
-//! meaning of the parameters.
+//! τ_κ is the error of the model in residuals of kind κ: that at which they scatter as their `s_i`
+//! say, over the degrees of freedom that the fit leaves them (Huber's proposal 2, so that a few
+//! outliers do not count). The Levenberg-Marquardt method alternates with its estimation until both
+//! settle; the last iterations keep it. Not here: the measurements and the meaning of the unknowns.
 
 use nalgebra::{DMatrix, DVector};
+
+use crate::estimation::bounded::bounded_minimum;
 
 /// A model of measurements.
 pub trait Residuals {
     /// Error of the model.
     type Error;
 
-    /// Returns the residuals over their standard deviations, given all unknowns, parameters first.
-    /// Writes their derivatives into `J` if given (resized as needed).
+    /// Returns the predicted minus the measured numbers, given all unknowns. Writes their
+    /// derivatives into `J` if given (resized as needed).
     ///
     /// # Errors
     /// If the model has no solution at these unknowns.
     fn evaluate(&self, unknowns: &DVector<f64>, J: Option<&mut DMatrix<f64>>) -> Result<DVector<f64>, Self::Error>;
+}
+
+/// Error of a measured number.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Noise {
+    /// Known standard deviation; 0 if the scatter of its kind alone gives it.
+    pub std: f64,
+    /// Kind, whose numbers have one error of the model; `None` for prior knowledge, which has none.
+    pub kind: Option<usize>,
+    /// Error of the number per unit error of the model.
+    pub size: f64,
+    /// Distance to the next number of the same curve; 0 for numbers of their own. Errors of the model
+    /// along a curve are correlated.
+    pub along: usize,
+}
+
+/// Unknown with its start, prior and bound.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Unknown {
+    /// Value at which the search starts.
+    pub start: f64,
+    /// Mean and standard deviation of the prior, if there is one.
+    pub prior: Option<(f64, f64)>,
+    /// Lower bound.
+    pub lower: f64,
+}
+
+impl Unknown {
+    /// Returns an unknown of the measurement: without prior and bound, from 0.
+    pub fn free() -> Self {
+        Self { start: 0.0, prior: None, lower: f64::NEG_INFINITY }
+    }
 }
 
 /// Loss function of a residual.
@@ -58,6 +89,12 @@ impl Loss {
             Self::Cauchy(c) => c * c * (r / c).powi(2).ln_1p(),
         }
     }
+
+    /// Returns the magnitude at which a residual is clipped for the scatter, and the mean of the
+    /// clipped squares of standard normal numbers.
+    fn clip(self) -> (f64, f64) {
+        if self == Self::Square { (f64::INFINITY, 1.0) } else { (2.5, 0.977_56) }
+    }
 }
 
 /// Options of a search.
@@ -65,7 +102,7 @@ impl Loss {
 pub struct Search {
     /// Loss function.
     pub loss: Loss,
-    /// Maximum number of iterations of each phase.
+    /// Maximum number of iterations.
     pub most_iterations: usize,
     /// Maximum step of any unknown over its standard deviation at convergence.
     pub tolerance: f64,
@@ -80,35 +117,41 @@ impl Default for Search {
 /// Solution of a least-squares problem.
 #[derive(Clone, Debug)]
 pub struct Solution {
-    /// All unknowns, parameters first.
+    /// Unknowns.
     pub unknowns: DVector<f64>,
-    /// Residuals over their standard deviations.
+    /// Predicted minus measured numbers.
     pub residuals: DVector<f64>,
-    /// Weights of the residuals under the loss; 1 for the square.
-    pub weights: DVector<f64>,
+    /// Standard deviations of the residuals, with the error of the model.
+    pub deviations: DVector<f64>,
+    /// Error of the model per kind.
+    pub model_errors: Vec<f64>,
     /// Leverages of the residuals, 0 to 1.
     pub leverages: DVector<f64>,
-    /// Covariance of the parameters; that of the prior in directions that are not identified.
+    /// Covariance of the unknowns, as if none were at its bound.
     pub covariance: DMatrix<f64>,
-    /// Directions in the parameters over their prior deviations, as unit columns, best determined
-    /// first.
-    pub directions: DMatrix<f64>,
-    /// Ratio of the prior deviation to the deviation due to the data, per direction.
-    pub gains: Vec<f64>,
-    /// Number of identified directions.
-    pub identified: usize,
-    /// Square of the scale of the residuals: `Σ r² / (m - n)` with the square loss, otherwise a
-    /// robust estimate that a few outliers do not change.
-    pub scale: f64,
-    /// Twice the cost of the residuals under the loss.
-    pub cost: f64,
-    /// Degrees of freedom, m - n.
-    pub freedom: usize,
-    /// Iterations of both phases.
+    /// Number of iterations.
     pub iterations: usize,
-    /// Whether the last step was below the tolerance and, for an identification, whether the model
-    /// fits the readings.
+    /// Whether the last step was below the tolerance.
     pub converged: bool,
+    /// Weighted derivatives and residuals, and the covariance of the unknowns that are not at their
+    /// bounds, for [`Self::without`].
+    rows: DMatrix<f64>,
+    free: DMatrix<f64>,
+    roots: DVector<f64>,
+}
+
+impl Solution {
+    /// Returns the residuals of some rows, predicted from the other rows: to first order,
+    /// `(1 - A C Aᵀ)^-1 r` with their weighted derivatives A. `None` if the others do not determine
+    /// an unknown on which they depend.
+    pub fn without(&self, some: &[usize]) -> Option<DVector<f64>> {
+        let A = self.rows.select_rows(some);
+        let left = DMatrix::identity(some.len(), some.len()) - &A * &self.free * A.transpose();
+        let factor = left.cholesky().filter(|factor| factor.l_dirty().diagonal().min() > LEFT)?;
+        let r = DVector::from_iterator(some.len(), some.iter().map(|k| self.residuals[*k] * self.roots[*k]));
+        let found = factor.solve(&r);
+        Some(DVector::from_iterator(some.len(), found.iter().zip(some).map(|(r, k)| r / self.roots[*k])))
+    }
 }
 
 /// Reason why there is no solution.
@@ -118,304 +161,339 @@ pub enum SolveError<E> {
     /// The model has no solution at the start.
     #[error(transparent)]
     Model(E),
-    /// The residuals do not determine an unknown of the measurement.
+    /// The residuals do not determine an unknown without a prior.
     #[error("the measurements do not determine their own unknown {0}")]
     Nuisance(usize),
+    /// There are as many unknowns as numbers, and no standard deviations.
+    #[error("the scatter cannot be estimated: there are as many unknowns as numbers")]
+    NoScatter,
     /// A residual or derivative is not finite.
     #[error("a residual or a derivative is not finite")]
     NotFinite,
 }
 
-/// Gain above which a direction counts as identified. At 1 the data determine it as well as the
-/// prior does.
-const IDENTIFIED: f64 = 1.0;
-/// Relative size below which a column counts as linearly dependent.
-const DEPENDENT: f64 = 1e-10;
+/// Progress of a search, after each iteration.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Progress {
+    /// Number of the iteration, from 1.
+    pub iteration: usize,
+    /// Root mean square of the residuals over their present standard deviations.
+    pub rms: f64,
+    /// Maximum step of an unknown over its standard deviation.
+    pub step: f64,
+}
 
-/// Solves the problem from a start.
+/// Maximum correlation of neighbours on a curve.
+const MOST_CORRELATED: f64 = 0.98;
+/// Minimum pivot of rows left out of the fit: their predictions are uncertain by its inverse.
+const LEFT: f64 = 0.1;
+/// Relative pivot below which an unknown without a prior depends on others.
+const DEPENDENT: f64 = 1e-12;
+/// Relative change of the errors of the model, and step over deviations, at which they are kept.
+const SETTLED: (f64, f64) = (1e-3, 0.1);
+/// Minimum error of the model relative to the scatter at the start.
+const LEAST_ERROR: f64 = 1e-8;
+
+/// Solves the problem.
 ///
-/// * `start`: all unknowns; those of the measurements may be guesses.
-/// * `prior`: standard deviation of each parameter about 0, positive; the unknowns of the
-///   measurements have none.
+/// * `watch`: called after each iteration; the search ends where it returns false.
 ///
 /// # Errors
 /// [`SolveError`].
 pub fn solve<P: Residuals>(
     problem: &P,
-    start: &DVector<f64>,
-    prior: &[f64],
+    noise: &[Noise],
+    unknowns: &[Unknown],
     search: &Search,
+    watch: &dyn Fn(&Progress) -> bool,
 ) -> Result<Solution, SolveError<P::Error>> {
-    let prior = DVector::from_column_slice(prior);
-    let n = start.len();
-    // Phase 1: all parameters are regularised by the prior.
-    let free = DMatrix::identity(n, n);
-    let held = descend(&Slope { problem, basis: &free, prior: Some(&prior), search }, start.clone())?;
-    // Phase 2: without the prior, along the identified directions.
-    let known = Identifiability::of(&held, &prior)?;
-    let begin = known.projected(&held.unknowns, &prior);
-    let basis = known.basis(&prior, n);
-    let mut found = descend(&Slope { problem, basis: &basis, prior: None, search }, begin)?;
-    found.iterations += held.iterations;
-    Ok(finish(found, known, &basis, &prior, search.loss))
-}
-
-/// End of a descent.
-struct Descent {
-    unknowns: DVector<f64>,
-    residuals: DVector<f64>,
-    weights: DVector<f64>,
-    J: DMatrix<f64>,
-    iterations: usize,
-    converged: bool,
-}
-
-/// Search along the columns of a basis, with or without a prior.
-struct Slope<'a, P> {
-    problem: &'a P,
-    basis: &'a DMatrix<f64>,
-    prior: Option<&'a DVector<f64>>,
-    search: &'a Search,
-}
-
-impl<P: Residuals> Slope<'_, P> {
-    fn weights(&self, r: &DVector<f64>) -> DVector<f64> {
-        r.map(|r| self.search.loss.weight(r))
-    }
-
-    /// Returns twice the cost of the residuals and of the distance from the prior.
-    fn cost(&self, r: &DVector<f64>, x: &DVector<f64>) -> f64 {
-        let held = self.prior.map_or(0.0, |p| p.iter().zip(x.iter()).map(|(p, x)| (x / p).powi(2)).sum());
-        r.iter().map(|r| self.search.loss.cost(*r)).sum::<f64>() + held
-    }
-
-    /// Evaluates residuals, derivatives and cost.
-    fn evaluate(&self, x: &DVector<f64>, J: &mut DMatrix<f64>) -> Result<(DVector<f64>, f64), SolveError<P::Error>> {
-        let r = self.problem.evaluate(x, Some(&mut *J)).map_err(SolveError::Model)?;
-        let cost = self.cost(&r, x);
-        match J.iter().all(|x| x.is_finite()) {
-            true => Ok((r, cost)),
-            false => Err(SolveError::NotFinite),
-        }
-    }
-
-    /// Returns matrix and right-hand side of the normal equations of the weighted problem in
-    /// coordinates along the basis.
-    fn normal_equations(&self, x: &DVector<f64>, r: &DVector<f64>, J: &DMatrix<f64>) -> (DMatrix<f64>, DVector<f64>) {
-        let w = self.weights(r);
-        let B = J * self.basis;
-        let weighted = DMatrix::from_fn(B.nrows(), B.ncols(), |i, j| w[i] * B[(i, j)]);
-        let mut normal = B.tr_mul(&weighted);
-        let mut gradient = weighted.tr_mul(r);
-        if let Some(prior) = self.prior {
-            for (k, p) in prior.iter().enumerate() {
-                normal[(k, k)] += 1.0 / (p * p);
-                gradient[k] += x[k] / (p * p);
+    let start = DVector::from_iterator(unknowns.len(), unknowns.iter().map(|u| u.start.max(u.lower)));
+    let mut J = DMatrix::zeros(0, 0);
+    let r = evaluated(problem, &start, &mut J)?;
+    let mut fit =
+        Fit { problem, noise, unknowns, search, s: DVector::zeros(r.len()), errors: Vec::new(), least: Vec::new() };
+    fit.first_errors(&r);
+    let mut state = State { x: start, r, J, damping: 1e-4 };
+    let (mut iterations, mut kept, mut converged) = (0, fit.errors.is_empty(), unknowns.is_empty());
+    while iterations < search.most_iterations && !converged {
+        iterations += 1;
+        let (moved, step) = fit.step(&mut state)?;
+        match kept {
+            true => converged = step <= search.tolerance,
+            false => {
+                let change = fit.update_errors(&state);
+                kept = !moved || (change < SETTLED.0 && step < SETTLED.1) || 2 * iterations > search.most_iterations;
             }
         }
-        (normal, gradient)
+        let over = state.r.component_div(&fit.s);
+        let progress = Progress { iteration: iterations, rms: over.norm() / (over.len() as f64).sqrt(), step };
+        if !watch(&progress) || (kept && !moved) {
+            break;
+        }
+    }
+    fit.finish(state, iterations, converged)
+}
+
+fn evaluated<P: Residuals>(
+    problem: &P,
+    x: &DVector<f64>,
+    J: &mut DMatrix<f64>,
+) -> Result<DVector<f64>, SolveError<P::Error>> {
+    let r = problem.evaluate(x, Some(&mut *J)).map_err(SolveError::Model)?;
+    match r.iter().chain(J.iter()).all(|x| x.is_finite()) {
+        true => Ok(r),
+        false => Err(SolveError::NotFinite),
+    }
+}
+
+/// State of a search.
+struct State {
+    x: DVector<f64>,
+    r: DVector<f64>,
+    J: DMatrix<f64>,
+    damping: f64,
+}
+
+struct Fit<'a, P> {
+    problem: &'a P,
+    noise: &'a [Noise],
+    unknowns: &'a [Unknown],
+    search: &'a Search,
+    /// Standard deviations with the present errors of the model.
+    s: DVector<f64>,
+    errors: Vec<f64>,
+    /// Minimum errors of the model.
+    least: Vec<f64>,
+}
+
+impl<P: Residuals> Fit<'_, P> {
+    /// Estimates the errors of the model from the residuals at the start.
+    fn first_errors(&mut self, r: &DVector<f64>) {
+        let kinds = self.noise.iter().filter_map(|noise| noise.kind).max().map_or(0, |most| most + 1);
+        for kind in 0..kinds {
+            let rows = self.rows_of(r, kind);
+            let rms =
+                (rows.iter().map(|(r, noise)| (r / noise.size).powi(2)).sum::<f64>() / rows.len().max(1) as f64).sqrt();
+            let needed = rows.iter().any(|(_, noise)| noise.std == 0.0);
+            self.least.push(if needed { (LEAST_ERROR * rms).max(f64::MIN_POSITIVE.sqrt()) } else { 0.0 });
+            let error = scatter(&rows, rows.len() as f64, self.search.loss);
+            self.errors.push(error.max(self.least[kind]));
+        }
+        self.set_deviations();
     }
 
-    /// Increases the damping until a step does not increase the cost. Returns the new unknowns if
-    /// there are any, and whether the last step was below the tolerance.
-    fn damped_step(
-        &self,
-        x: &DVector<f64>,
-        cost: f64,
-        (normal, gradient): &(DMatrix<f64>, DVector<f64>),
-        damping: &mut f64,
-    ) -> (Option<DVector<f64>>, bool) {
+    fn rows_of(&self, r: &DVector<f64>, kind: usize) -> Vec<(f64, Noise)> {
+        let all = r.iter().zip(self.noise).filter(|(_, noise)| noise.kind == Some(kind));
+        all.map(|(r, noise)| (*r, *noise)).collect()
+    }
+
+    fn set_deviations(&mut self) {
+        let error = |noise: &Noise| noise.kind.map_or(0.0, |kind| self.errors[kind] * noise.size);
+        self.s = DVector::from_iterator(self.noise.len(), self.noise.iter().map(|own| own.std.hypot(error(own))));
+    }
+
+    /// Estimates the errors of the model anew; returns their largest relative change.
+    fn update_errors(&mut self, state: &State) -> f64 {
+        let (rows, normal) = self.normal(state);
+        let free = inverse(&normal, |k| state.x[k] > self.unknowns[k].lower);
+        let leverages = free.map_or_else(|| DVector::zeros(self.s.len()), |free| leverages(&rows, &free));
+        let mut change = 0.0_f64;
+        for kind in 0..self.errors.len() {
+            let some = self.rows_of(&state.r, kind);
+            let taken: f64 =
+                leverages.iter().zip(self.noise).filter(|(_, n)| n.kind == Some(kind)).map(|(h, _)| h).sum();
+            let old = self.errors[kind];
+            let new = scatter(&some, some.len() as f64 - taken, self.search.loss) * correlated(&some);
+            let new = new.max(self.least[kind]);
+            // An error far below the deviations of the readings does not matter.
+            let std = some.iter().map(|(_, noise)| noise.std / noise.size).fold(0.0, f64::max);
+            change = change.max((new.hypot(std) / old.hypot(std)).ln().abs());
+            self.errors[kind] = new;
+        }
+        self.set_deviations();
+        if change.is_nan() { 0.0 } else { change }
+    }
+
+    /// Returns the derivatives over deviations with the weights of the loss, and the normal matrix
+    /// with the priors.
+    fn normal(&self, state: &State) -> (DMatrix<f64>, DMatrix<f64>) {
+        let roots = self.roots(&state.r);
+        let mut rows = state.J.clone();
+        rows.column_iter_mut().for_each(|mut column| column.component_mul_assign(&roots));
+        let mut normal = rows.tr_mul(&rows);
+        for (k, unknown) in self.unknowns.iter().enumerate() {
+            normal[(k, k)] += unknown.prior.map_or(0.0, |(_, std)| 1.0 / (std * std));
+        }
+        (rows, normal)
+    }
+
+    /// Returns the root of the weight of each residual: of the loss, over its deviation.
+    fn roots(&self, r: &DVector<f64>) -> DVector<f64> {
+        r.zip_map(&self.s, |r, s| self.search.loss.weight(r / s).sqrt() / s)
+    }
+
+    /// Returns twice the cost of the residuals and of the distance from the priors.
+    fn cost(&self, r: &DVector<f64>, x: &DVector<f64>) -> f64 {
+        let prior =
+            |(unknown, x): (&Unknown, &f64)| unknown.prior.map_or(0.0, |(mean, std)| ((x - mean) / std).powi(2));
+        let held: f64 = self.unknowns.iter().zip(x.iter()).map(prior).sum();
+        r.iter().zip(self.s.iter()).map(|(r, s)| self.search.loss.cost(r / s)).sum::<f64>() + held
+    }
+
+    /// Increases the damping until a step does not increase the cost. Returns whether there is one,
+    /// and its size over the deviations of the unknowns.
+    fn step(&self, state: &mut State) -> Result<(bool, f64), SolveError<P::Error>> {
+        let cost = self.cost(&state.r, &state.x);
+        if !cost.is_finite() {
+            return Err(SolveError::NotFinite);
+        }
+        let (rows, normal) = self.normal(state);
+        let mut gradient = rows.tr_mul(&state.r.component_mul(&self.roots(&state.r)));
+        for ((g, unknown), x) in gradient.iter_mut().zip(self.unknowns).zip(state.x.iter()) {
+            *g += unknown.prior.map_or(0.0, |(mean, std)| (x - mean) / (std * std));
+        }
+        let lower = DVector::from_iterator(
+            self.unknowns.len(),
+            self.unknowns.iter().zip(state.x.iter()).map(|(u, x)| u.lower - x),
+        );
         let diagonal = normal.diagonal();
+        let mut size = 0.0;
         for _ in 0..12 {
             let mut damped = normal.clone();
             for (k, d) in diagonal.iter().enumerate() {
-                damped[(k, k)] += *damping * d.max(f64::MIN_POSITIVE);
+                damped[(k, k)] += state.damping * d.max(f64::MIN_POSITIVE);
             }
-            let Some(factor) = damped.cholesky() else {
-                *damping = (*damping * 10.0).max(1e-10);
+            let Some(step) = bounded_minimum(&damped, &gradient, &lower) else {
+                state.damping = (state.damping * 10.0).max(1e-10);
                 continue;
             };
-            let step = factor.solve(gradient);
-            let moved = x - self.basis * &step;
-            let tried = self.problem.evaluate(&moved, None);
-            let size = step.iter().zip(diagonal.iter()).map(|(s, d)| s.abs() * d.sqrt()).fold(0.0, f64::max);
-            let settled = size <= self.search.tolerance;
-            match tried {
-                Ok(found) if self.cost(&found, &moved) <= cost * (1.0 + 1e-14) => {
-                    *damping = (*damping * 0.1).max(1e-12);
-                    return (Some(moved), settled);
+            size = step.iter().zip(diagonal.iter()).map(|(s, d)| s.abs() * d.sqrt()).fold(0.0, f64::max);
+            let mut moved = &state.x + &step;
+            moved.iter_mut().zip(self.unknowns).for_each(|(x, unknown)| *x = x.max(unknown.lower));
+            let mut J = DMatrix::zeros(0, 0);
+            match evaluated(self.problem, &moved, &mut J) {
+                Ok(r) if self.cost(&r, &moved) <= cost * (1.0 + 1e-14) => {
+                    *state = State { x: moved, r, J, damping: (state.damping * 0.1).max(1e-12) };
+                    return Ok((true, size));
                 }
                 // Converged to rounding.
-                _ if settled => return (None, true),
-                _ => *damping = (*damping * 10.0).max(1e-10),
+                _ if size <= self.search.tolerance => break,
+                _ => state.damping = (state.damping * 10.0).max(1e-10),
             }
         }
-        (None, false)
+        Ok((false, size))
     }
-}
 
-/// Runs the Levenberg-Marquardt method. The weights of the loss are updated in every iteration.
-fn descend<P: Residuals>(slope: &Slope<'_, P>, start: DVector<f64>) -> Result<Descent, SolveError<P::Error>> {
-    let mut J = DMatrix::zeros(0, 0);
-    let mut x = start;
-    let (mut r, mut cost) = slope.evaluate(&x, &mut J)?;
-    if !cost.is_finite() {
-        return Err(SolveError::NotFinite);
-    }
-    let (mut damping, mut iterations, mut converged) = (1e-4, 0, slope.basis.ncols() == 0);
-    while iterations < slope.search.most_iterations && !converged {
-        iterations += 1;
-        let equations = slope.normal_equations(&x, &r, &J);
-        let (better, settled) = slope.damped_step(&x, cost, &equations, &mut damping);
-        converged = settled;
-        match better {
-            Some(better) => {
-                x = better;
-                (r, cost) = slope.evaluate(&x, &mut J)?;
+    fn finish(self, state: State, iterations: usize, converged: bool) -> Result<Solution, SolveError<P::Error>> {
+        let (rows, normal) = self.normal(&state);
+        let own: Vec<usize> = (0..self.unknowns.len()).filter(|k| self.unknowns[*k].prior.is_none()).collect();
+        if let Some(k) = dependent(&normal.select_rows(&own).select_columns(&own)) {
+            return Err(SolveError::Nuisance(own[k]));
+        }
+        let covariance = inverse(&normal, |_| true).ok_or(SolveError::NotFinite)?;
+        let free = inverse(&normal, |k| state.x[k] > self.unknowns[k].lower).ok_or(SolveError::NotFinite)?;
+        let leverages = leverages(&rows, &free);
+        for kind in (0..self.errors.len()).filter(|kind| self.least[*kind] > 0.0) {
+            let own = self.noise.iter().zip(leverages.iter()).filter(|(noise, _)| noise.kind == Some(kind));
+            if own.map(|(_, h)| 1.0 - h).sum::<f64>() < 0.5 {
+                return Err(SolveError::NoScatter);
             }
-            None if !converged => break,
-            None => {}
         }
-    }
-    let weights = slope.weights(&r);
-    Ok(Descent { unknowns: x, residuals: r, weights, J, iterations, converged })
-}
-
-/// Directions of the parameters, sorted by how well the data determine them.
-struct Identifiability {
-    directions: DMatrix<f64>,
-    gains: Vec<f64>,
-    identified: usize,
-}
-
-impl Identifiability {
-    fn of<E>(descent: &Descent, prior: &DVector<f64>) -> Result<Self, SolveError<E>> {
-        let p = prior.len();
-        if p == 0 {
-            return Ok(Self { directions: DMatrix::zeros(0, 0), gains: Vec::new(), identified: 0 });
-        }
-        let root = descent.weights.map(f64::sqrt);
-        let weighted = DMatrix::from_fn(descent.J.nrows(), descent.J.ncols(), |i, j| root[i] * descent.J[(i, j)]);
-        let mut A = weighted.columns(0, p).into_owned();
-        for (k, sigma) in prior.iter().enumerate() {
-            A.column_mut(k).scale_mut(*sigma);
-        }
-        let b = weighted.ncols() - p;
-        if b > 0 {
-            let own = weighted.columns(p, b).into_owned();
-            let Q = orthonormal(&own).map_err(SolveError::Nuisance)?;
-            A -= &Q * Q.tr_mul(&A);
-        }
-        // Rows of zeros do not change the singular values and make the SVD return all directions.
-        let rows = A.nrows().max(p);
-        let A = A.resize(rows, p, 0.0);
-        // A prior of 1e308 times a derivative overflows, here or in the squared norm of a column.
-        if !A.norm_squared().is_finite() {
-            return Err(SolveError::NotFinite);
-        }
-        let svd = A.svd(false, true);
-        let gains = svd.singular_values.as_slice().to_vec();
-        let directions = svd.v_t.map_or_else(|| DMatrix::identity(p, p), |rows| rows.transpose());
-        let identified = gains.iter().take_while(|gain| **gain > IDENTIFIED).count();
-        Ok(Self { directions, gains, identified })
-    }
-
-    /// Columns along which the unknowns may move: identified directions of the parameters, then the
-    /// unknowns of the measurements.
-    fn basis(&self, prior: &DVector<f64>, unknowns: usize) -> DMatrix<f64> {
-        let (p, k) = (prior.len(), self.identified);
-        let own = unknowns - p;
-        let mut basis = DMatrix::zeros(unknowns, k + own);
-        for (i, j) in (0..p).flat_map(|i| (0..k).map(move |j| (i, j))) {
-            basis[(i, j)] = prior[i] * self.directions[(i, j)];
-        }
-        for j in 0..own {
-            basis[(p + j, k + j)] = 1.0;
-        }
-        basis
-    }
-
-    /// Returns the unknowns with the directions that are not identified set to the prior.
-    fn projected(&self, unknowns: &DVector<f64>, prior: &DVector<f64>) -> DVector<f64> {
-        let p = prior.len();
-        let over = DVector::from_fn(p, |i, _| unknowns[i] / prior[i]);
-        let V = self.directions.columns(0, self.identified);
-        let kept = V * V.tr_mul(&over);
-        let mut projected = unknowns.clone();
-        for i in 0..p {
-            projected[i] = prior[i] * kept[i];
-        }
-        projected
+        Ok(Solution {
+            roots: self.roots(&state.r),
+            unknowns: state.x,
+            residuals: state.r,
+            deviations: self.s,
+            model_errors: self.errors,
+            leverages,
+            covariance,
+            iterations,
+            converged,
+            rows,
+            free,
+        })
     }
 }
 
-/// Returns orthonormal columns that span those of `A`. The error is the number of the first column
-/// that depends on earlier ones.
-pub fn orthonormal(A: &DMatrix<f64>) -> Result<DMatrix<f64>, usize> {
-    let (Q, R) = A.clone().qr().unpack();
-    let is_own = |k: usize| R.get((k, k)).is_some_and(|left| *left > DEPENDENT * A.column(k).norm());
-    (0..A.ncols()).find(|k| !is_own(*k)).map_or(Ok(Q), Err)
+/// Returns the diagonal of `A C Aᵀ`.
+fn leverages(A: &DMatrix<f64>, C: &DMatrix<f64>) -> DVector<f64> {
+    let AC = A * C;
+    DVector::from_fn(A.nrows(), |i, _| AC.row(i).dot(&A.row(i)).clamp(0.0, 1.0))
 }
 
-fn finish(found: Descent, known: Identifiability, basis: &DMatrix<f64>, prior: &DVector<f64>, loss: Loss) -> Solution {
-    let (m, p) = (found.residuals.len(), prior.len());
-    let columns = basis.ncols();
-    let root = found.weights.map(f64::sqrt);
-    let B = &found.J * basis;
-    let weighted = DMatrix::from_fn(m, columns, |i, j| root[i] * B[(i, j)]);
-    // Normal matrix scaled to a unit diagonal, so that units do not matter.
-    let normal = weighted.tr_mul(&weighted);
-    let scales = normal.diagonal().map(|d| if d > 0.0 { 1.0 / d.sqrt() } else { 1.0 });
-    let scaled = DMatrix::from_fn(columns, columns, |i, j| scales[i] * normal[(i, j)] * scales[j]);
-    let inverse = scaled.cholesky().map_or_else(|| DMatrix::zeros(columns, columns), |factor| factor.inverse());
-    let inverse = DMatrix::from_fn(columns, columns, |i, j| scales[i] * inverse[(i, j)] * scales[j]);
-    let spread = basis * &inverse * basis.transpose();
-    let mut covariance = spread.view((0, 0), (p, p)).into_owned();
-    // Covariance of the prior in the directions that are not identified.
-    let S = DMatrix::from_diagonal(prior);
-    let kept = known.directions.columns(0, known.identified);
-    let across = DMatrix::identity(p, p) - kept * kept.transpose();
-    covariance += &S * across * &S;
-    let leverages = DVector::from_fn(m, |i, _| {
-        let row = weighted.row(i);
-        (row * &inverse * row.transpose())[(0, 0)].clamp(0.0, 1.0)
-    });
-    let freedom = m.saturating_sub(columns);
-    Solution {
-        scale: scale(found.residuals.as_slice(), freedom, loss),
-        cost: found.residuals.iter().map(|r| loss.cost(*r)).sum(),
-        unknowns: found.unknowns,
-        residuals: found.residuals,
-        weights: found.weights,
-        leverages,
-        covariance,
-        directions: known.directions,
-        gains: known.gains,
-        identified: known.identified,
-        freedom,
-        iterations: found.iterations,
-        converged: found.converged,
+/// Returns the inverse of a normal matrix over some of its unknowns, 0 for the others.
+fn inverse(normal: &DMatrix<f64>, of: impl Fn(usize) -> bool) -> Option<DMatrix<f64>> {
+    let some: Vec<usize> = (0..normal.nrows()).filter(|k| of(*k)).collect();
+    // Scaled to a unit diagonal, so that units do not matter.
+    let scale: Vec<f64> = some.iter().map(|k| 1.0 / normal[(*k, *k)].sqrt()).collect();
+    let n = some.len();
+    if n == 0 {
+        return Some(DMatrix::zeros(normal.nrows(), normal.nrows()));
     }
+    let scaled = DMatrix::from_fn(n, n, |i, j| scale[i] * normal[(some[i], some[j])] * scale[j]);
+    let small = scaled.cholesky()?.inverse();
+    let mut whole = DMatrix::zeros(normal.nrows(), normal.nrows());
+    for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
+        whole[(some[i], some[j])] = scale[i] * small[(i, j)] * scale[j];
+    }
+    whole.iter().all(|x| x.is_finite()).then_some(whole)
 }
 
-/// Multiple of the scale at which residuals are clipped.
-const CLIPPED: f64 = 2.5;
-/// Mean of `min(z², CLIPPED²)` for standard normal z.
-const CLIPPED_MEAN: f64 = 0.977_56;
+/// Returns the number of the first unknown that depends on those before it in a normal matrix.
+fn dependent(normal: &DMatrix<f64>) -> Option<usize> {
+    let mut left = normal.clone();
+    for k in 0..left.nrows() {
+        let pivot = left[(k, k)];
+        if pivot.is_nan() || pivot <= DEPENDENT * normal[(k, k)] {
+            return Some(k);
+        }
+        let column = left.column(k).into_owned();
+        left.ger(-1.0 / pivot, &column, &column, 1.0);
+    }
+    None
+}
 
-/// Returns the square of the scale s of the residuals; NaN without degrees of freedom. Robust
-/// (Huber's proposal 2): `Σ min(r²/s², CLIPPED²) = CLIPPED_MEAN (m - n)`.
-pub fn scale(residuals: &[f64], freedom: usize, loss: Loss) -> f64 {
-    if freedom == 0 {
-        return f64::NAN;
+/// Returns the error of the model at which residuals scatter as their deviations say; 0 if they
+/// scatter less without it.
+///
+/// * `freedom`: number of the residuals minus what the fit takes.
+fn scatter(rows: &[(f64, Noise)], freedom: f64, loss: Loss) -> f64 {
+    let (clip, mean) = loss.clip();
+    let excess = |t: f64| {
+        let square =
+            |(r, noise): &(f64, Noise)| (r * r / (noise.std.powi(2) + (t * noise.size).powi(2))).min(clip * clip);
+        rows.iter().map(square).sum::<f64>() - mean * freedom
+    };
+    let most =
+        (rows.iter().map(|(r, noise)| (r / noise.size).powi(2)).sum::<f64>() / (mean * freedom).max(1e-9)).sqrt();
+    let known = rows.iter().all(|(_, noise)| noise.std > 0.0);
+    if rows.is_empty() || most == 0.0 || (known && excess(0.0) <= 0.0) {
+        return 0.0;
     }
-    let mut square = residuals.iter().map(|r| r * r).sum::<f64>() / freedom as f64;
-    if loss == Loss::Square {
-        return square;
+    let (mut low, mut high) = ((1e-10 * most).ln(), most.ln());
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        *(if excess(middle.exp()) > 0.0 { &mut low } else { &mut high }) = middle;
     }
-    for _ in 0..100 {
-        let sum: f64 = residuals.iter().map(|r| (r * r).min(CLIPPED * CLIPPED * square)).sum();
-        square = sum / (CLIPPED_MEAN * freedom as f64);
+    high.exp()
+}
+
+/// Returns the factor on the error of the model for residuals that are correlated along a curve: the
+/// root of the number of residuals over that of independent ones, `(1 + ρ)/(1 - ρ)` with the
+/// correlation ρ of neighbours.
+fn correlated(rows: &[(f64, Noise)]) -> f64 {
+    let along = rows.first().map_or(0, |(_, noise)| noise.along);
+    if along == 0 || rows.len() <= along {
+        return 1.0;
     }
-    square
+    let product: f64 = rows.iter().zip(&rows[along..]).map(|((a, _), (b, _))| a * b).sum();
+    let square: f64 = rows.iter().map(|(r, _)| r * r).sum();
+    let rho = (product / square.max(f64::MIN_POSITIVE)).clamp(0.0, MOST_CORRELATED);
+    ((1.0 + rho) / (1.0 - rho)).sqrt()
+}
+
+/// Returns the ratio of the scatter of residuals to their deviations.
+pub fn scale(residuals: &[f64], freedom: f64, loss: Loss) -> f64 {
+    let unit = Noise { std: 0.0, kind: None, size: 1.0, along: 0 };
+    scatter(&residuals.iter().map(|r| (*r, unit)).collect::<Vec<_>>(), freedom, loss)
 }

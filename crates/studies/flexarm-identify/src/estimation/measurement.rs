@@ -7,9 +7,9 @@
 
 use std::borrow::Cow;
 
-use flexarm_kinematics::{Frame, Pose, SpatialInertia, rotation_vector};
+use flexarm_kinematics::{Frame, Pose, SpatialInertia, Wrench, rotation_vector};
 use flexarm_stepping::{OperatingPoint, StepError};
-use nalgebra::{DMatrix, DVector, Matrix3xX, Rotation3, Translation3, Vector3, Vector6};
+use nalgebra::{DMatrix, DVector, Matrix3xX, Matrix6xX, Rotation3, Translation3, Vector3, Vector6};
 
 use crate::estimation::least_squares::Residuals;
 use crate::estimation::parameter::{Effect, Parameter, Plant, carried_along, displacement, tool_shift};
@@ -17,7 +17,7 @@ use crate::estimation::reading::{
     Component, LoadCase, MeasuredResponse, MeasuredShape, Measurements, Reading, ReadingKind, Row,
 };
 use crate::estimation::response::structure_slopes;
-use crate::estimation::sensitivity::{frequency_slopes, tool_slopes};
+use crate::estimation::sensitivity::{frequency_slopes, slopes_at_rest, with_deflection};
 
 /// An arm with unknown parameters and the measurements made on it.
 pub struct MeasuredArm<'a> {
@@ -45,28 +45,42 @@ struct Block {
     slopes: DMatrix<f64>,
 }
 
-/// Tool at rest at a pose, and its derivatives with respect to the parameters.
+/// Frame at rest at a pose, and its derivatives with respect to the parameters.
 struct AtRest {
-    X_WT: Pose,
-    /// Translation at the tool's origin.
-    slopes: Option<Matrix3xX<f64>>,
-    turns: Option<Matrix3xX<f64>>,
+    X_WF: Pose,
+    /// Twists (world axes, at the frame's origin).
+    slopes: Option<Matrix6xX<f64>>,
 }
 
 impl AtRest {
-    fn point(&self, p_T: &Vector3<f64>) -> Vector3<f64> {
-        self.X_WT.translation.vector + self.X_WT.rotation * p_T
+    fn point(&self, p_F: &Vector3<f64>) -> Vector3<f64> {
+        self.X_WF.translation.vector + self.X_WF.rotation * p_F
     }
 
-    fn point_slopes(&self, p_T: &Vector3<f64>) -> Option<Matrix3xX<f64>> {
-        let arm = self.X_WT.rotation * p_T;
-        let (slopes, turns) = (self.slopes.as_ref()?, self.turns.as_ref()?);
-        let mut moved = slopes.clone();
+    /// Returns the angular velocities.
+    fn turns(&self) -> Option<Matrix3xX<f64>> {
+        self.slopes.as_ref().map(|slopes| slopes.fixed_rows::<3>(3).into_owned())
+    }
+
+    fn point_slopes(&self, p_F: &Vector3<f64>) -> Option<Matrix3xX<f64>> {
+        let arm = self.X_WF.rotation * p_F;
+        let (slopes, turns) = (self.slopes.as_ref()?, self.turns()?);
+        let mut moved = slopes.fixed_rows::<3>(0).into_owned();
         for (mut to, w) in moved.column_iter_mut().zip(turns.column_iter()) {
             to += w.cross(&arm);
         }
         Some(moved)
     }
+}
+
+/// Operating point under a load, the parameters there, and the pose and wrench for which it was
+/// solved last.
+struct Room<'a> {
+    at: Vector3<f64>,
+    carried: SpatialInertia,
+    point: OperatingPoint,
+    parameters: Cow<'a, [Parameter]>,
+    solved: Option<(Vec<f64>, Wrench)>,
 }
 
 /// Operating points of the loads met so far.
@@ -75,55 +89,62 @@ struct Workspaces<'a> {
     parameters: &'a [Parameter],
     /// Coordinates of the parameters.
     x: Vec<f64>,
-    known: Vec<(Vector3<f64>, SpatialInertia, OperatingPoint)>,
+    known: Vec<Room<'a>>,
 }
 
 impl<'a> Workspaces<'a> {
-    /// Solves for the tool at rest at a pose under a load.
-    fn at_rest(&mut self, q: &[f64], load: &LoadCase, slopes: bool) -> Result<AtRest, StepError> {
-        let known = self.known.iter().position(|(at, carried, _)| *at == load.at && *carried == load.carried);
+    /// Returns the operating point at a pose under a load.
+    fn solved(&mut self, q: &[f64], load: &LoadCase) -> Result<&mut Room<'a>, StepError> {
+        let known = self.known.iter().position(|room| room.at == load.at && room.carried == load.carried);
         let number = match known {
             Some(number) => number,
             None => {
                 let tool = &self.plant.tool;
                 let X = Pose::from_parts(Translation3::from(load.at), Rotation3::identity());
                 let frame = Frame { name: tool.name.clone(), body: tool.body, X_BF: tool.X_BF * X };
-                let arm = self.loaded(&load.carried).held(q)?;
-                self.known.push((load.at, load.carried, OperatingPoint::new(arm, frame)));
+                let point = OperatingPoint::new(self.loaded(&load.carried).at_rest(q)?, frame);
+                let parameters = self.under(&load.carried);
+                self.known.push(Room { at: load.at, carried: load.carried, point, parameters, solved: None });
                 self.known.len() - 1
             }
         };
-        let parameters = if slopes { self.under(&load.carried) } else { Cow::Borrowed(&[][..]) };
-        let turn = tool_shift(self.parameters, &self.x).1;
-        let at = &mut self.known[number].2;
-        at.solve(q, &load.wrench)?;
-        let X = Pose::from_parts(Translation3::from(-load.at), Rotation3::identity());
-        let X_WT = at.tcp_pose() * X;
-        if !slopes {
-            return Ok(AtRest { X_WT, slopes: None, turns: None });
+        let room = &mut self.known[number];
+        if !room.solved.as_ref().is_some_and(|(at, wrench)| at == q && *wrench == load.wrench) {
+            room.solved = None;
+            room.point.solve(q, &load.wrench)?;
+            room.solved = Some((q.to_vec(), load.wrench));
         }
-        let mut V = tool_slopes(at, &parameters)?;
-        let arm = X_WT.rotation * load.at;
-        let tools: Vec<(usize, [Vector3<f64>; 2])> = tool_twists(self.parameters, &X_WT.rotation, &turn).collect();
-        if !tools.is_empty() {
+        Ok(room)
+    }
+
+    /// Solves for a frame at rest at a pose under a load; `None` for the tool.
+    fn at_rest(
+        &mut self,
+        q: &[f64],
+        load: &LoadCase,
+        frame: Option<&Frame>,
+        slopes: bool,
+    ) -> Result<AtRest, StepError> {
+        let own = frame.cloned().unwrap_or_else(|| self.plant.tool.clone());
+        let turn = tool_shift(self.parameters, &self.x).1;
+        let all = self.parameters;
+        let Room { point: at, parameters, .. } = self.solved(q, load)?;
+        let X_WF = at.pose_of(&own);
+        if !slopes {
+            return Ok(AtRest { X_WF, slopes: None });
+        }
+        let (mut forces, mut twists) = slopes_at_rest(at, parameters, &own);
+        let R_WT = at.tcp_pose().rotation;
+        let J = at.jacobian().columns_range(at.arm().model.n_actuated()..).into_owned();
+        for (k, [v, w]) in tool_twists(all, &R_WT, &turn) {
             // The applied force moves with the tool, which changes its moment.
-            let C = at.compliance();
-            for (k, [v, w]) in &tools {
-                let moment = (v + w.cross(&arm)).cross(&load.wrench.force);
-                V.column_mut(*k).gemv(1.0, &C.fixed_columns::<3>(3), &moment, 1.0);
+            let moment = (v + w.cross(&(R_WT * load.at))).cross(&load.wrench.force);
+            forces.column_mut(k).gemv_tr(-1.0, &J.fixed_rows::<3>(3), &moment, 1.0);
+            if frame.is_none() {
+                twists.set_column(k, &Vector6::from_iterator(v.iter().chain(&w).copied()));
             }
         }
-        let mut turns = V.fixed_rows::<3>(3).into_owned();
-        let mut moved = V.fixed_rows::<3>(0).into_owned();
-        for (mut to, w) in moved.column_iter_mut().zip(turns.column_iter()) {
-            // From the point of application of the load to the tool's origin.
-            to -= w.cross(&arm);
-        }
-        for (k, [v, w]) in tools {
-            moved.column_mut(k).axpy(1.0, &v, 1.0);
-            turns.column_mut(k).axpy(1.0, &w, 1.0);
-        }
-        Ok(AtRest { X_WT, slopes: Some(moved), turns: Some(turns) })
+        Ok(AtRest { X_WF, slopes: Some(with_deflection(at, &own, &forces, twists)) })
     }
 
     /// Returns the parameters for an arm that carries a mass at its tool: moving the tool also
@@ -183,7 +204,7 @@ impl MeasuredArm<'_> {
         let of = |reading: &Reading| -> Vec<f64> {
             match &reading.kind {
                 ReadingKind::Displacement { rows, .. } => rows.iter().map(|row| row.value).collect(),
-                ReadingKind::Place { value, .. } => value.iter().copied().collect(),
+                ReadingKind::Place { rows, .. } => rows.iter().map(|row| row.value).collect(),
                 ReadingKind::Known { value, .. } => vec![*value],
                 ReadingKind::TargetAt { value, .. } => value.iter().copied().collect(),
                 ReadingKind::InstrumentAt { value, std, .. } => {
@@ -219,6 +240,19 @@ impl MeasuredArm<'_> {
         Ok(all)
     }
 
+    /// Returns the readings with their first rows, those of one pose one after another, which share
+    /// its equilibrium.
+    fn by_pose(&self) -> Vec<(&Reading, usize)> {
+        let mut row = 0;
+        let placed = self.measurements.readings.iter().map(|reading| {
+            row += reading.rows();
+            (reading, row - reading.rows())
+        });
+        let mut all: Vec<(&Reading, usize)> = placed.collect();
+        all.sort_by(|a, b| a.0.q.partial_cmp(&b.0.q).unwrap_or(std::cmp::Ordering::Equal));
+        all
+    }
+
     fn rooms(&self, unknowns: &DVector<f64>) -> Workspaces<'_> {
         let x = unknowns.as_slice()[..self.parameters.len()].to_vec();
         Workspaces { plant: self.plant.with(self.parameters, &x), parameters: self.parameters, x, known: Vec::new() }
@@ -238,9 +272,13 @@ impl MeasuredArm<'_> {
             ReadingKind::Displacement { before, after, point, rows } => {
                 self.displacement(rooms, &reading.q, [before, after], point, rows, own, slopes).map_err(named)
             }
-            ReadingKind::Place { load, target, instrument, .. } => {
-                let at = rooms.at_rest(&reading.q, load, slopes).map_err(named)?;
-                Ok(self.place(&at, *target, *instrument, own))
+            ReadingKind::Place { load, target, instrument, rows } => {
+                let link = self.measurements.links.get(*target).and_then(Option::as_ref);
+                let at = rooms.at_rest(&reading.q, load, link, slopes).map_err(named)?;
+                let whole = self.place(&at, *target, *instrument, own);
+                let axes: Vec<usize> = rows.iter().map(|row| row.of).collect();
+                let values = axes.iter().map(|axis| whole.values[*axis]).collect();
+                Ok(Block { values, slopes: whole.slopes.select_rows(&axes) })
             }
             ReadingKind::Known { parameter, .. } => {
                 // A parameter that is not fitted stays at zero.
@@ -397,7 +435,7 @@ impl MeasuredArm<'_> {
             }
         }
         if let Some(first) = three {
-            slopes.view_mut((0, p + first), (3, 3)).copy_from(&(X_IW.rotation * at.X_WT.rotation).into_inner());
+            slopes.view_mut((0, p + first), (3, 3)).copy_from(&(X_IW.rotation * at.X_WF.rotation).into_inner());
         }
         Block { values, slopes }
     }
@@ -446,10 +484,10 @@ impl MeasuredArm<'_> {
         own: &[f64],
         slopes: bool,
     ) -> Result<Block, StepError> {
-        let before = rooms.at_rest(q, loads[0], slopes)?;
-        let after = rooms.at_rest(q, loads[1], slopes)?;
+        let before = rooms.at_rest(q, loads[0], None, slopes)?;
+        let after = rooms.at_rest(q, loads[1], None, slopes)?;
         let moved = after.point(point) - before.point(point);
-        let turn = after.X_WT.rotation * before.X_WT.rotation.inverse();
+        let turn = after.X_WF.rotation * before.X_WF.rotation.inverse();
         let turned = rotation_vector(turn.matrix());
         // Directions in world axes; directions in an instrument's axes are rotated into the world.
         let seen_from = |instrument: Option<usize>| instrument.map(|k| self.measurements.instrument(k, own));
@@ -464,7 +502,7 @@ impl MeasuredArm<'_> {
         let values = rows.iter().map(value).collect();
         let none = |values| Ok(Block { values, slopes: DMatrix::zeros(rows.len(), 0) });
         let (Some(a), Some(b)) = (after.point_slopes(point), before.point_slopes(point)) else { return none(values) };
-        let (Some(wa), Some(wb)) = (&after.turns, &before.turns) else { return none(values) };
+        let (Some(wa), Some(wb)) = (after.turns(), before.turns()) else { return none(values) };
         // The rotation from before to after has the angular velocity wa - R wb; the inverse left
         // Jacobian maps it to the rate of the rotation vector.
         let rate = left_jacobian(&turned).try_inverse().unwrap_or_else(nalgebra::Matrix3::identity);
@@ -501,16 +539,14 @@ impl Residuals for MeasuredArm<'_> {
         let observed = self.observed();
         let slopes = J.is_some();
         let mut all = DMatrix::zeros(if slopes { m } else { 0 }, unknowns.len());
-        let mut first = 0;
-        for reading in &self.measurements.readings {
+        for (reading, first) in self.by_pose() {
             let block = self.block(&mut rooms, reading, own, slopes)?;
-            for (i, (value, std)) in block.values.iter().zip(reading.deviations()).enumerate() {
-                residuals[first + i] = (value - observed[first + i]) / std;
-                if slopes {
-                    all.row_mut(first + i).copy_from(&(block.slopes.row(i) / std));
-                }
+            for (i, value) in block.values.iter().enumerate() {
+                residuals[first + i] = value - observed[first + i];
             }
-            first += block.values.len();
+            if slopes {
+                all.rows_mut(first, block.values.len()).copy_from(&block.slopes);
+            }
         }
         if let Some(J) = J {
             *J = all;

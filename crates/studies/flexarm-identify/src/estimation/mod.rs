@@ -9,6 +9,7 @@
 //!
 //! Not here: files, units, robots by name (the crate root).
 
+pub(crate) mod bounded;
 mod coupled_gears;
 mod encoders;
 mod identified;
@@ -25,9 +26,9 @@ mod slips;
 
 pub use coupled_gears::{CoupledOutput, coupled_gear_stiffness};
 pub use encoders::{GearEstimate, GearRun, gear_stiffness};
-pub use identified::{HeldOut, Identified, IdentifyError, ParameterEstimate};
+pub use identified::{HeldOut, Identified, IdentifyError, ModelError, ParameterEstimate};
 pub use identify::{IdentifyOptions, identify};
-pub use least_squares::{Loss, Residuals, Search, Solution, SolveError, solve};
+pub use least_squares::{Loss, Noise, Progress, Residuals, Search, Solution, SolveError, Unknown, solve};
 pub use measurement::{MeasuredArm, NoAnswer};
 pub use parameter::{Effect, Parameter, Plant, SpringPart};
 pub use plan::{Candidate, Plan, PlanOptions, plan};

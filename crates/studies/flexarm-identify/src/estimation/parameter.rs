@@ -6,6 +6,8 @@ use flexarm_kinematics::{Frame, Model, Pose, SpatialInertia};
 use flexarm_stepping::{Damping, FlexibleArm, GearCoupling, GuideTerm, Held, Spring, SpringCurve, StepError};
 use nalgebra::{DMatrix, Matrix3, Rotation3, Translation3, Vector3, Vector6};
 
+use crate::estimation::least_squares::Unknown;
+
 /// Model of an arm: tree, springs in coordinate order, tool.
 #[derive(Clone, Debug)]
 pub struct Plant {
@@ -82,8 +84,8 @@ pub enum Effect {
         body: usize,
         /// Twist per unit of the search coordinate.
         twist: Vector6<f64>,
-        /// Default prior standard deviation (m, rad).
-        prior: f64,
+        /// Usual size of the displacement (m, rad).
+        size: f64,
     },
     /// Mass (kg) on a body, with inertia proportional to it: `per_kg` about Bo, B axes.
     Mass {
@@ -103,12 +105,21 @@ pub struct Parameter {
     pub unit: String,
     /// Initial value.
     pub initial: f64,
-    /// Prior standard deviation: of the logarithm for stiffness and damping, otherwise in the unit
-    /// of the value.
-    pub prior: f64,
+    /// Standard deviation of the search coordinate about the initial value if it is known: of the
+    /// logarithm for stiffness and damping, otherwise in the unit of the value. `None` if the
+    /// initial value says only the order of magnitude.
+    pub prior: Option<f64>,
     /// Effect on the arm.
     pub effect: Effect,
 }
+
+/// Standard deviation of a compliance about zero, over the compliance of the initial value.
+const COMPLIANCE: f64 = 10.0;
+/// Minimum compliance over its standard deviation: a stiffness beyond it has the effect of a rigid
+/// spring.
+const RIGID: f64 = 1e-6;
+/// Standard deviation of the logarithm of a positive number of known order of magnitude.
+const MAGNITUDE: f64 = std::f64::consts::LN_10;
 
 impl Parameter {
     /// Whether the search coordinate is the logarithm of the value, which keeps the value positive.
@@ -120,14 +131,18 @@ impl Parameter {
         }
     }
 
-    /// Whether the readings determine the parameter together with others of its kind: displacements
-    /// of joint frames partly replace each other, so that all of them keep their found values.
-    pub fn is_shared(&self) -> bool {
-        matches!(self.effect, Effect::Frame { .. })
+    /// Whether the parameter is a compliance, a stiffness or a clearance: the fit seeks a number
+    /// that is 0 for a rigid arm.
+    pub fn is_yielding(&self) -> bool {
+        match &self.effect {
+            Effect::Stiffness(_) => true,
+            Effect::Guide { term, .. } => matches!(term, GuideTerm::Compliance(_) | GuideTerm::Gap),
+            _ => false,
+        }
     }
 
-    /// Returns the maximum standard deviation of the search coordinate for the parameter to count
-    /// as identifiable, whatever its prior is. It is also the default prior.
+    /// Returns the standard deviation of the search coordinate that is assumed without other
+    /// knowledge, for plans of measurements; a stiffness is identified if it is known better.
     pub fn reference(&self) -> f64 {
         match &self.effect {
             Effect::Stiffness(_) | Effect::Damping(_) | Effect::Damper { .. } => std::f64::consts::LN_2,
@@ -135,8 +150,58 @@ impl Parameter {
             Effect::Tool(_) => 0.01,
             Effect::Guide { term, .. } if term.is_positive() => std::f64::consts::LN_2,
             Effect::Guide { size, .. } => 0.5 * size,
-            Effect::Frame { prior, .. } => *prior,
+            Effect::Frame { size, .. } => *size,
             Effect::Mass { .. } => (0.5 * self.initial.abs()).max(1.0),
+        }
+    }
+
+    /// Returns the unknown of the fit: the compliance over the initial one for a stiffness, a number
+    /// of a guide itself, otherwise the search coordinate.
+    ///
+    /// * `rigid`: whether the search for compliances starts at a rigid arm.
+    pub(crate) fn unknown(&self, rigid: bool) -> Unknown {
+        let at = self.coordinate(0.0);
+        if self.is_yielding() {
+            let std = COMPLIANCE * self.yielding_size();
+            let known = |prior: f64| (at, if self.is_logarithmic() { at * prior.sinh() } else { prior });
+            let prior = self.prior.map_or((0.0, std), known);
+            let lower = RIGID * std;
+            return Unknown {
+                start: if rigid && self.prior.is_none() { lower } else { at },
+                prior: Some(prior),
+                lower,
+            };
+        }
+        let std = if self.is_logarithmic() { MAGNITUDE } else { self.reference() };
+        let lower = if matches!(self.effect, Effect::Mass { .. }) { -self.initial } else { f64::NEG_INFINITY };
+        Unknown { start: 0.0, prior: Some((0.0, self.prior.unwrap_or(std))), lower }
+    }
+
+    /// Returns the compliance of the initial value in the unit of [`Self::unknown`].
+    fn yielding_size(&self) -> f64 {
+        match &self.effect {
+            Effect::Guide { size, term, .. } if !term.is_positive() => *size,
+            _ => 1.0,
+        }
+    }
+
+    /// Returns the unknown of the fit at a search coordinate.
+    pub(crate) fn coordinate(&self, x: f64) -> f64 {
+        match &self.effect {
+            Effect::Stiffness(_) => (-x).exp(),
+            Effect::Guide { term: GuideTerm::Gap, .. } => x.exp(),
+            Effect::Guide { term: GuideTerm::Compliance(_), .. } => self.initial + x,
+            _ => x,
+        }
+    }
+
+    /// Returns the search coordinate of an unknown of the fit, and its derivative.
+    pub(crate) fn search(&self, z: f64) -> (f64, f64) {
+        match &self.effect {
+            Effect::Stiffness(_) => (-z.ln(), -1.0 / z),
+            Effect::Guide { term: GuideTerm::Gap, .. } => (z.ln(), 1.0 / z),
+            Effect::Guide { term: GuideTerm::Compliance(_), .. } => (z - self.initial, 1.0),
+            _ => (z, 1.0),
         }
     }
 
@@ -151,9 +216,12 @@ impl Parameter {
         if self.is_logarithmic() { self.value(x) * std } else { std }
     }
 
-    /// Returns the interval of the value for a number of standard deviations to each side.
-    pub fn interval(&self, x: f64, std: f64, deviations: f64) -> [f64; 2] {
-        [self.value(x - deviations * std), self.value(x + deviations * std)]
+    /// Returns the interval of the value for unknowns of the fit between two numbers; a stiffness
+    /// without an upper limit is infinite.
+    pub(crate) fn interval(&self, low: f64, high: f64) -> [f64; 2] {
+        let low = if self.is_yielding() { low.max(0.0) } else { low };
+        let [a, b] = [low, high].map(|z| self.value(self.search(z).0));
+        [a.min(b), a.max(b)]
     }
 }
 
@@ -219,7 +287,18 @@ impl Plant {
     /// # Errors
     /// As [`FlexibleArm::new`] and [`FlexibleArm::with_coupling`].
     pub fn held(&self, q: &[f64]) -> Result<FlexibleArm, StepError> {
-        let arm = FlexibleArm::new(self.model.clone(), self.springs.clone(), Arc::new(Held(q.to_vec())))?;
+        self.coupled(FlexibleArm::new(self.model.clone(), self.springs.clone(), Arc::new(Held(q.to_vec())))?)
+    }
+
+    /// Returns the arm with drives locked at a pose, only for equilibria.
+    ///
+    /// # Errors
+    /// As [`FlexibleArm::at_rest`] and [`FlexibleArm::with_coupling`].
+    pub fn at_rest(&self, q: &[f64]) -> Result<FlexibleArm, StepError> {
+        self.coupled(FlexibleArm::at_rest(self.model.clone(), self.springs.clone(), Arc::new(Held(q.to_vec())))?)
+    }
+
+    fn coupled(&self, arm: FlexibleArm) -> Result<FlexibleArm, StepError> {
         match &self.coupling {
             Some(coupling) => arm.with_coupling(coupling.clone()),
             None => Ok(arm),

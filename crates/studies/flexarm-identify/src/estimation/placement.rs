@@ -6,7 +6,7 @@ use nalgebra::{DVector, Matrix3, Rotation3, Translation3, Vector3};
 use crate::estimation::identified::IdentifyError;
 use crate::estimation::measurement::MeasuredArm;
 use crate::estimation::parameter::Plant;
-use crate::estimation::reading::{Component, Instrument, Measurements, ReadingKind, Target};
+use crate::estimation::reading::{Component, Instrument, Measurements, Reading, ReadingKind, Target};
 
 /// Returns the measurements with each unknown instrument at its best fit to the arm with its
 /// initial values.
@@ -20,14 +20,16 @@ pub(crate) fn placed(plant: &Plant, measurements: &Measurements) -> Result<Measu
         let said = measurements.readings.iter().any(|reading| of_it(&reading.kind));
         match measurements.instruments[number] {
             Instrument::Unknown(_) if !said => {
-                let seen =
-                    |kind: &ReadingKind| matches!(kind, ReadingKind::Place { instrument, .. } if *instrument == number);
+                let seen = |reading: &Reading| {
+                    let own = matches!(reading.kind, ReadingKind::Place { instrument, .. } if instrument == number);
+                    own && reading.position().is_some()
+                };
                 let [world, own] = both_points(plant, measurements, seen)?;
                 let too_few = || IdentifyError::Instrument { instrument: number, places: world.len() };
                 placed.instruments[number] = Instrument::Unknown(rigid_fit(&world, &own).ok_or_else(too_few)?);
             }
             Instrument::Axes(_) if !said => {
-                let seen = |kind: &ReadingKind| seen_in_axes(kind, number);
+                let seen = |reading: &Reading| seen_in_axes(&reading.kind, number);
                 let [world, own] = both_points(plant, measurements, seen)?;
                 let too_few = || IdentifyError::Axes { instrument: number, displacements: world.len() };
                 placed.instruments[number] = Instrument::Axes(rotation_fit(&world, &own).ok_or_else(too_few)?);
@@ -51,10 +53,10 @@ fn seen_in_axes(kind: &ReadingKind, instrument: usize) -> bool {
 fn both_points(
     plant: &Plant,
     measurements: &Measurements,
-    some: impl Fn(&ReadingKind) -> bool,
+    some: impl Fn(&Reading) -> bool,
 ) -> Result<[Vec<Vector3<f64>>; 2], IdentifyError> {
     // With instruments at the identity, predictions are in world axes.
-    let mut seen = measurements.of_readings(|k| some(&measurements.readings[k].kind));
+    let mut seen = measurements.of_readings(|k| some(&measurements.readings[k]));
     seen.instruments.iter_mut().for_each(|i| *i = Instrument::Known(Pose::identity()));
     seen.targets.iter_mut().for_each(|t| {
         if let Target::Unknown(guess) = t {

@@ -51,9 +51,17 @@ fn rows_of(plant: &Plant, parameters: &[Parameter], reading: &Reading) -> Result
     let mut J = DMatrix::zeros(0, 0);
     arm.evaluate(&DVector::zeros(parameters.len()), Some(&mut J))?;
     for (k, parameter) in parameters.iter().enumerate() {
-        J.column_mut(k).scale_mut(parameter.prior);
+        J.column_mut(k).scale_mut(prior(parameter));
+    }
+    for (mut row, std) in J.row_iter_mut().zip(reading.deviations()) {
+        row /= std;
     }
     Ok(J)
+}
+
+/// Returns the standard deviation of a parameter's search coordinate before the measurement.
+fn prior(parameter: &Parameter) -> f64 {
+    parameter.prior.unwrap_or_else(|| parameter.reference())
 }
 
 /// Chooses readings among candidates.
@@ -85,7 +93,7 @@ pub fn plan(
     }
     search.exchange(&mut information);
     let inverse = inverse_of(&information);
-    let deviations = (0..p).map(|k| parameters[k].prior * inverse[(k, k)].sqrt()).collect();
+    let deviations = (0..p).map(|k| prior(&parameters[k]) * inverse[(k, k)].sqrt()).collect();
     let deviation_of = |J: &DMatrix<f64>, i: usize| (J.row(i) * &inverse * J.row(i).transpose())[(0, 0)].sqrt();
     let purpose = options.purpose.iter().zip(&purpose).flat_map(|(reading, J)| {
         let units = reading.deviations();

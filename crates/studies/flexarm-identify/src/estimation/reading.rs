@@ -1,8 +1,9 @@
 //! Readings, and the instruments and targets they refer to.
 
-use flexarm_kinematics::{Pose, SpatialInertia, Wrench};
+use flexarm_kinematics::{Frame, Pose, SpatialInertia, Wrench};
 use nalgebra::{Complex, DVector, Rotation3, Translation3, Vector3};
 
+use crate::estimation::least_squares::Noise;
 use crate::estimation::response::{Answer, Probe, StructureSlopes};
 
 /// Additional mass at the tool and force on it.
@@ -179,7 +180,7 @@ pub enum ReadingKind {
         /// Measured components.
         rows: Vec<Row<Component>>,
     },
-    /// Position of a target on the tool, in the axes of an instrument.
+    /// Position of a target, in the axes of an instrument.
     Place {
         /// Load during the measurement.
         load: LoadCase,
@@ -187,10 +188,8 @@ pub enum ReadingKind {
         target: usize,
         /// Number of the instrument.
         instrument: usize,
-        /// Position (m).
-        value: Vector3<f64>,
-        /// Standard deviation of each component (m).
-        std: Vector3<f64>,
+        /// Measured components (m) along the axes 0 to 2.
+        rows: Vec<Row<usize>>,
     },
     /// Direct measurement of a parameter by another method ([`crate::estimation::gear_stiffness`]).
     Known {
@@ -241,7 +240,7 @@ impl Reading {
     pub fn rows(&self) -> usize {
         match &self.kind {
             ReadingKind::Displacement { rows, .. } => rows.len(),
-            ReadingKind::Place { .. } => 3,
+            ReadingKind::Place { rows, .. } => rows.len(),
             ReadingKind::Known { .. } => 1,
             ReadingKind::TargetAt { .. } => 3,
             ReadingKind::InstrumentAt { std, .. } => 3 + 3 * usize::from(std.is_some()),
@@ -251,21 +250,14 @@ impl Reading {
         }
     }
 
-    /// Multiplies all standard deviations by a factor.
-    pub(crate) fn scale_deviations(&mut self, factor: f64) {
-        match &mut self.kind {
-            ReadingKind::Displacement { rows, .. } => rows.iter_mut().for_each(|row| row.std *= factor),
-            ReadingKind::Place { std, .. } => *std *= factor,
-            ReadingKind::Known { std, .. } | ReadingKind::TargetAt { std, .. } => *std *= factor,
-            ReadingKind::InstrumentAt { std, std_rotation, .. } => {
-                *std = std.map(|std| std * factor);
-                *std_rotation *= factor;
-            }
-            ReadingKind::Frequencies { rows, .. } => rows.iter_mut().for_each(|row| row.std *= factor),
-            ReadingKind::Response(response) => {
-                response.points.iter_mut().for_each(|(.., std)| *std = std.map(|std| std * factor));
-            }
-            ReadingKind::Shape(shape) => shape.std *= factor,
+    /// Returns the position of a target if it is measured along all axes.
+    pub fn position(&self) -> Option<Vector3<f64>> {
+        match &self.kind {
+            ReadingKind::Place { rows, .. } => match &rows[..] {
+                [x, y, z] => Some(Vector3::new(x.value, y.value, z.value)),
+                _ => None,
+            },
+            _ => None,
         }
     }
 
@@ -273,7 +265,7 @@ impl Reading {
     pub fn deviations(&self) -> Vec<f64> {
         match &self.kind {
             ReadingKind::Displacement { rows, .. } => rows.iter().map(|row| row.std).collect(),
-            ReadingKind::Place { std, .. } => std.iter().copied().collect(),
+            ReadingKind::Place { rows, .. } => rows.iter().map(|row| row.std).collect(),
             ReadingKind::Known { std, .. } => vec![*std],
             ReadingKind::TargetAt { std, .. } => vec![*std; 3],
             ReadingKind::InstrumentAt { std, std_rotation, .. } => {
@@ -283,6 +275,41 @@ impl Reading {
             ReadingKind::Response(response) => response.points.iter().flat_map(|(.., std)| *std).collect(),
             ReadingKind::Shape(shape) => vec![shape.std; shape.probes.len()],
         }
+    }
+}
+
+/// Names of the kinds of numbers that have an error of the model each.
+pub(crate) const KINDS: [&str; 7] =
+    ["displacements", "rotations", "places", "frequencies", "responses", "complex responses", "mode shapes"];
+
+impl ReadingKind {
+    /// Whether it depends on masses and vibrations.
+    pub(crate) fn vibrates(&self) -> bool {
+        matches!(self, Self::Frequencies { .. } | Self::Response(_) | Self::Shape(_))
+    }
+}
+
+impl Reading {
+    /// Returns the error of each number.
+    fn noise(&self) -> Vec<Noise> {
+        let kind = |row: usize| match &self.kind {
+            ReadingKind::Displacement { rows, .. } => Some(usize::from(rows[row].of.parts().2)),
+            ReadingKind::Place { .. } => Some(2),
+            ReadingKind::Known { .. } | ReadingKind::TargetAt { .. } | ReadingKind::InstrumentAt { .. } => None,
+            ReadingKind::Frequencies { .. } => Some(3),
+            ReadingKind::Response(response) if response.form == Form::Logarithmic => Some(4),
+            ReadingKind::Response(_) => Some(5),
+            ReadingKind::Shape(_) => Some(6),
+        };
+        // The error of a model in frequencies is relative.
+        let size = |row: usize| match &self.kind {
+            ReadingKind::Frequencies { rows, .. } => rows[row].value,
+            _ => 1.0,
+        };
+        // Both numbers of a frequency, then those of the next.
+        let along = if matches!(self.kind, ReadingKind::Response(_)) { 2 } else { 0 };
+        let all = self.deviations().into_iter().enumerate();
+        all.map(|(row, std)| Noise { std, kind: kind(row), size: size(row), along }).collect()
     }
 }
 
@@ -324,6 +351,8 @@ pub struct Measurements {
     pub readings: Vec<Reading>,
     /// Targets.
     pub targets: Vec<Target>,
+    /// Link frame of each target that is not on the tool; shorter if the others are on the tool.
+    pub links: Vec<Option<Frame>>,
     /// Instruments.
     pub instruments: Vec<Instrument>,
 }
@@ -334,6 +363,11 @@ impl Measurements {
     pub fn own_unknowns(&self) -> usize {
         let targets = self.targets.iter().filter(|t| matches!(t, Target::Unknown(_))).count();
         self.of_instruments() + 3 * targets
+    }
+
+    /// Returns the error of each measured number.
+    pub(crate) fn noise(&self) -> Vec<Noise> {
+        self.readings.iter().flat_map(Reading::noise).collect()
     }
 
     fn of_instruments(&self) -> usize {

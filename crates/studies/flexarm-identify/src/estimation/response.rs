@@ -123,7 +123,7 @@ pub fn structure_slopes(
     let arm = plant.held(q)?;
     let mut at = OperatingPoint::new(arm.clone(), plant.tool.clone());
     at.solve(q, &none)?;
-    let forces = force_slopes(&mut at, parameters)?;
+    let forces = force_slopes(&mut at, parameters);
     let q = at.coordinates().clone();
     let here = Tangents::at(&arm, &plant.tool, &none, &q);
     let (omega2, shapes) = eigen(&here)?;

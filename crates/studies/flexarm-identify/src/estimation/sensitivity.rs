@@ -10,9 +10,9 @@
 
 use std::sync::Arc;
 
-use flexarm_kinematics::{Data, Frame, Wrench, forward_kinematics, rotation_vector};
+use flexarm_kinematics::{Data, Frame, Twist, Wrench, forward_kinematics, rotation_vector};
 use flexarm_stepping::{FlexibleArm, Guide, GuideTerm, OperatingPoint, SpringCurve, StepError, Tangents};
-use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX, SymmetricEigen, Vector6};
+use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX, SymmetricEigen, Vector3, Vector6};
 
 use crate::estimation::parameter::{Effect, Parameter, Plant, SpringPart, displacement, entry_slope, scaled, slope_of};
 
@@ -26,18 +26,20 @@ const DIFFERENCE: f64 = 1e-3;
 
 /// Computes `dr/dx`, the derivative of the unbalanced forces on the elastic coordinates with
 /// respect to each parameter, n×p.
-pub(crate) fn force_slopes(at: &mut OperatingPoint, parameters: &[Parameter]) -> Result<DMatrix<f64>, StepError> {
-    slopes_at_rest(at, parameters).map(|(forces, _)| forces)
+pub(crate) fn force_slopes(at: &mut OperatingPoint, parameters: &[Parameter]) -> DMatrix<f64> {
+    let tool = at.tool().clone();
+    slopes_at_rest(at, parameters, &tool).0
 }
 
-/// Computes `dr/dx`, n×p, and the twists of the tool with all coordinates held (world axes, at its
+/// Computes `dr/dx`, n×p, and the twists of a frame with all coordinates held (world axes, at its
 /// origin), 6×p.
-fn slopes_at_rest(
+pub(crate) fn slopes_at_rest(
     at: &mut OperatingPoint,
     parameters: &[Parameter],
-) -> Result<(DMatrix<f64>, Matrix6xX<f64>), StepError> {
+    frame: &Frame,
+) -> (DMatrix<f64>, Matrix6xX<f64>) {
     let n = at.deflections().len();
-    let (mut slopes, rigid) = frame_slopes(at, parameters);
+    let (mut slopes, rigid) = frame_slopes(at, parameters, frame);
     for (k, parameter) in parameters.iter().enumerate() {
         match &parameter.effect {
             Effect::Stiffness(places) => {
@@ -77,7 +79,7 @@ fn slopes_at_rest(
             }
         }
     }
-    Ok((slopes, rigid))
+    (slopes, rigid)
 }
 
 /// Returns the forces of a spring per relative change of its stiffness, with their elastic
@@ -118,34 +120,67 @@ fn carrying(arm: &FlexibleArm, body: usize, per_kg: &flexarm_kinematics::Spatial
 /// For [`Effect::Tool`] this is only the part due to deflection, which is zero here: loads stay in
 /// place, and the motion of the frame itself is not included. [`crate::estimation::MeasuredArm`]
 /// includes both.
-///
-/// # Errors
-/// As [`OperatingPoint::solve`].
-pub fn tool_slopes(at: &mut OperatingPoint, parameters: &[Parameter]) -> Result<Matrix6xX<f64>, StepError> {
-    let (forces, rigid) = slopes_at_rest(at, parameters)?;
-    let moved = at.yielding().tr_mul(&forces);
-    Ok(Matrix6xX::from_fn(parameters.len(), |i, j| rigid[(i, j)] - moved[(i, j)]))
+pub fn tool_slopes(at: &mut OperatingPoint, parameters: &[Parameter]) -> Matrix6xX<f64> {
+    let tool = at.tool().clone();
+    let (forces, rigid) = slopes_at_rest(at, parameters, &tool);
+    with_deflection(at, &tool, &forces, rigid)
+}
+
+/// Adds the part due to deflection to the twists of a frame with all coordinates held.
+pub(crate) fn with_deflection(
+    at: &mut OperatingPoint,
+    frame: &Frame,
+    forces: &DMatrix<f64>,
+    mut twists: Matrix6xX<f64>,
+) -> Matrix6xX<f64> {
+    let moved = at.yielding_of(frame).tr_mul(forces);
+    twists.iter_mut().zip(moved.iter()).for_each(|(twist, moved)| *twist -= moved);
+    twists
 }
 
 /// Computes the derivatives with respect to displacements of joint frames; other columns are zero.
-fn frame_slopes(at: &mut OperatingPoint, parameters: &[Parameter]) -> (DMatrix<f64>, Matrix6xX<f64>) {
+fn frame_slopes(at: &mut OperatingPoint, parameters: &[Parameter], frame: &Frame) -> (DMatrix<f64>, Matrix6xX<f64>) {
     let n = at.deflections().len();
     let (mut forces, mut twists) = (DMatrix::zeros(n, parameters.len()), Matrix6xX::zeros(parameters.len()));
-    let moves = |parameter: &Parameter| matches!(parameter.effect, Effect::Frame { .. });
-    if !parameters.iter().any(moves) {
-        return (forces, twists);
+    let mut others = Vec::new();
+    for (k, parameter) in parameters.iter().enumerate() {
+        let Effect::Frame { body, twist, .. } = &parameter.effect else { continue };
+        let part = |first: usize| Vector3::new(twist[first], twist[first + 1], twist[first + 2]);
+        let moved = Twist::new(part(0), part(3));
+        match at.moved_subtree(*body, &moved, frame, forces.column_mut(k).as_mut_slice()) {
+            Some(Twist { linear, angular }) => {
+                twists.set_column(k, &Vector6::from_iterator(linear.iter().chain(&angular).copied()));
+            }
+            None => others.push(k),
+        }
     }
+    if !others.is_empty() {
+        frame_differences(at, parameters, frame, &others, (&mut forces, &mut twists));
+    }
+    (forces, twists)
+}
+
+/// Computes the derivatives of [`frame_slopes`] for arms with closed loops, balancers or
+/// load-dependent stiffness by central differences.
+fn frame_differences(
+    at: &mut OperatingPoint,
+    parameters: &[Parameter],
+    frame: &Frame,
+    some: &[usize],
+    (forces, twists): (&mut DMatrix<f64>, &mut Matrix6xX<f64>),
+) {
+    let n = at.deflections().len();
     let mut arm = at.arm().clone();
     let mut data = Data::new(&arm.model);
     let mut moved = [DVector::zeros(n), DVector::zeros(n)];
-    for (k, parameter) in parameters.iter().enumerate() {
-        let Effect::Frame { body, twist, .. } = &parameter.effect else { continue };
+    for &k in some {
+        let Effect::Frame { body, twist, .. } = &parameters[k].effect else { continue };
         let X_PJ = arm.model.bodies()[*body].X_PJ;
         let [behind, ahead] = [-FRAME_STEP, FRAME_STEP].map(|step| {
             Arc::make_mut(&mut arm.model).set_joint_frame(*body, X_PJ * displacement(&(twist * step)));
             at.forces_of(&arm, &mut moved[usize::from(step > 0.0)]);
             forward_kinematics(&arm.model, &mut data, at.coordinates());
-            data.X_WF(at.tool())
+            data.X_WF(frame)
         });
         Arc::make_mut(&mut arm.model).set_joint_frame(*body, X_PJ);
         forces.set_column(k, &((&moved[1] - &moved[0]) / (2.0 * FRAME_STEP)));
@@ -156,7 +191,6 @@ fn frame_slopes(at: &mut OperatingPoint, parameters: &[Parameter]) -> (DMatrix<f
     }
     // The poses of the operating point are those of its arm again.
     at.forces_of(&arm, &mut moved[0]);
-    (forces, twists)
 }
 
 /// Returns the arm with the joint frame of a body displaced by [`FRAME_STEP`] along a twist and
@@ -192,11 +226,11 @@ pub struct FrequencySlopes {
 /// # Errors
 /// As [`OperatingPoint::solve`]; [`StepError::Singular`] if a coordinate has no mass.
 pub fn frequency_slopes(plant: &Plant, parameters: &[Parameter], q: &[f64]) -> Result<FrequencySlopes, StepError> {
-    let arm = plant.held(q)?;
+    let arm = plant.at_rest(q)?;
     let none = Wrench::zeros();
     let mut at = OperatingPoint::new(arm.clone(), plant.tool.clone());
     at.solve(q, &none)?;
-    let forces = force_slopes(&mut at, parameters)?;
+    let forces = force_slopes(&mut at, parameters);
     let here = Tangents::at(&arm, &plant.tool, &none, at.coordinates());
     let (omega2, shapes) = eigen(&here)?;
     let symmetric = (&here.K + here.K.transpose()) * 0.5;
@@ -287,7 +321,7 @@ pub fn compliance_slopes(
     F_T_W: &Wrench,
     parameters: &[Parameter],
 ) -> Result<Vec<Matrix6<f64>>, StepError> {
-    let forces = force_slopes(at, parameters)?;
+    let forces = force_slopes(at, parameters);
     let (arm, tool, q) = (at.arm().clone(), at.tool().clone(), at.coordinates().clone());
     let here = Tangents::at(&arm, &tool, F_T_W, &q);
     let singular = || StepError::Singular { matrix: "static stiffness (with the effect of weight and load)", t: 0.0 };

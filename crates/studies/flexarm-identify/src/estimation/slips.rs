@@ -1,5 +1,5 @@
-//! Detection of mistakes in a file of measurements that no stiffness explains: permuted joints,
-//! displacements in other axes.
+//! Detection of mistakes in a file of measurements that no stiffness explains: permuted joints, a
+//! joint with another sign or zero, displacements in other axes, mirrored positions.
 //!
 //! Displacements are nearly linear in the compliances of the springs,
 //!
@@ -17,7 +17,7 @@ use crate::estimation::least_squares::Residuals;
 use crate::estimation::measurement::MeasuredArm;
 use crate::estimation::parameter::{Effect, Parameter, Plant};
 use crate::estimation::placement::{points, rigid_fit, rotation_fit};
-use crate::estimation::reading::{Component, Instrument, Measurements, ReadingKind, Target};
+use crate::estimation::reading::{Component, Instrument, Measurements, Reading, ReadingKind, Target};
 
 /// Mistake that explains readings which the arm does not.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,6 +26,12 @@ pub enum Slip {
     Order(Vec<usize>),
     /// Rotation from the axes of the measured displacements to world axes.
     Axes(Rotation3<f64>),
+    /// A joint that turns the other way.
+    Sign(usize),
+    /// A joint whose zero is off by an angle (rad).
+    Zero(usize, f64),
+    /// Positions along an axis of the instrument have the other sign: left-handed axes.
+    Mirrored,
 }
 
 /// A mistake, and the relative residuals with and without it.
@@ -63,7 +69,7 @@ pub fn likely_slip(
 ) -> Option<FoundSlip> {
     let is_spring = |p: &&Parameter| matches!(p.effect, Effect::Stiffness(_));
     let springs: Vec<Parameter> = parameters.iter().filter(is_spring).cloned().collect();
-    let moved = some_of(measurements, |kind| match kind {
+    let moved = some_of(measurements, |reading| match &reading.kind {
         ReadingKind::Displacement { rows, .. } => rows.iter().all(|row| matches!(row.of, Component::Along(_))),
         _ => false,
     });
@@ -71,17 +77,42 @@ pub fn likely_slip(
         let rest = |order: &[usize]| Some(Displacements::of(plant, &springs, &ordered(&moved, order))?.rest());
         let whole = moved.readings.iter().all(|reading| reading.rows() == 3);
         let axes = || Displacements::of(plant, &springs, &moved).filter(|_| whole)?.turned();
-        among(rest, axes, slides, 0)
+        among(rest, &|| axes().map(|(R, rest)| (Slip::Axes(R), rest)), slides, 0)
     });
-    let placed = some_of(measurements, |kind| matches!(kind, ReadingKind::Place { .. }));
-    let rest = |order: &[usize]| place_rest(plant, &ordered(&placed, order));
-    found.flatten().or_else(|| among(rest, || None, slides, 1))
+    let placed = some_of(measurements, |reading| reading.position().is_some());
+    // Places judge the rigid robot: initial stiffnesses may be far off.
+    let rigid: Vec<f64> = springs.iter().map(|spring| spring.search(spring.unknown(true).start).0).collect();
+    let stiff = &plant.with(&springs, &rigid);
+    let rest = |order: &[usize]| place_rest(stiff, &ordered(&placed, order));
+    found.flatten().or_else(|| among(rest, &|| one_joint(stiff, &placed, slides), slides, 1))
+}
+
+/// Returns the change of one joint, or of the handedness of the positions, with the smallest
+/// residual.
+fn one_joint(plant: &Plant, placed: &Measurements, slides: &[bool]) -> Option<(Slip, f64)> {
+    let quarter = std::f64::consts::FRAC_PI_2;
+    let turns = |joint: &usize| !slides[*joint];
+    let zeros = (0..slides.len()).filter(turns).flat_map(|j| [1.0, -1.0, 2.0].map(|k| Slip::Zero(j, k * quarter)));
+    let all = (0..slides.len()).map(Slip::Sign).chain(zeros).chain([Slip::Mirrored]);
+    let scored = all.filter_map(|slip| {
+        let mut other = placed.clone();
+        for reading in &mut other.readings {
+            match (&slip, &mut reading.kind) {
+                (Slip::Sign(joint), _) => reading.q[*joint] *= -1.0,
+                (Slip::Zero(joint, by), _) => reading.q[*joint] += by,
+                (_, ReadingKind::Place { rows, .. }) => rows[0].value *= -1.0,
+                _ => {}
+            }
+        }
+        Some((slip, place_rest(plant, &other)?))
+    });
+    scored.min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
 /// Selects some readings at equal intervals, with instruments at the world's origin and targets at
 /// their initial guess.
-fn some_of(measurements: &Measurements, some: impl Fn(&ReadingKind) -> bool) -> Measurements {
-    let all: Vec<usize> = (0..measurements.readings.len()).filter(|k| some(&measurements.readings[*k].kind)).collect();
+fn some_of(measurements: &Measurements, some: impl Fn(&Reading) -> bool) -> Measurements {
+    let all: Vec<usize> = (0..measurements.readings.len()).filter(|k| some(&measurements.readings[*k])).collect();
     let every = all.len().div_ceil(MOST_READINGS).max(1);
     let kept: Vec<usize> = all.into_iter().step_by(every).collect();
     let mut few = measurements.of_readings(|k| kept.contains(&k));
@@ -105,15 +136,14 @@ fn ordered(measurements: &Measurements, order: &[usize]) -> Measurements {
 /// them; `kind`: 0 for displacements, 1 for positions.
 fn among(
     rest: impl Fn(&[usize]) -> Option<f64>,
-    axes: impl Fn() -> Option<(Rotation3<f64>, f64)>,
+    others: &dyn Fn() -> Option<(Slip, f64)>,
     slides: &[bool],
     kind: usize,
 ) -> Option<FoundSlip> {
     let as_said: Vec<usize> = (0..slides.len()).collect();
     let before = rest(&as_said).filter(|rest| *rest > REST[kind])?;
     let order = best_order(&rest, as_said, before, slides);
-    let axes = axes().map(|(R, rest)| (Slip::Axes(R), rest));
-    let found = [Some((Slip::Order(order.0), order.1)), axes].into_iter().flatten();
+    let found = [Some((Slip::Order(order.0), order.1)), others()].into_iter().flatten();
     let (slip, rest_mended) = found.min_by(|a, b| a.1.total_cmp(&b.1))?;
     (rest_mended < (MENDED * before).min(LEFT[kind])).then_some(FoundSlip { slip, rest: before, rest_mended })
 }
@@ -148,7 +178,7 @@ fn best_order(
     climbed.min_by(least).unwrap_or((Vec::new(), f64::INFINITY))
 }
 
-/// Displacements, and their derivatives with respect to each compliance, over their deviations.
+/// Displacements, and their derivatives with respect to each compliance.
 struct Displacements {
     A: DMatrix<f64>,
     b: DVector<f64>,
@@ -159,9 +189,7 @@ impl Displacements {
         let arm = MeasuredArm { plant, parameters: springs, measurements };
         let mut J = DMatrix::zeros(0, 0);
         arm.evaluate(&DVector::zeros(springs.len()), Some(&mut J)).ok()?;
-        let deviations = measurements.readings.iter().flat_map(crate::estimation::reading::Reading::deviations);
-        let b = arm.observed().iter().zip(deviations).map(|(value, std)| value / std).collect::<Vec<_>>();
-        Some(Self { A: -J, b: DVector::from_vec(b) })
+        Some(Self { A: -J, b: DVector::from_vec(arm.observed()) })
     }
 
     /// Returns the part of `b` that the springs explain with non-negative compliances: the most

@@ -165,33 +165,43 @@ impl Reader<'_> {
         Ok(LoadCase { wrench, at: Vector3::from(at) * length, carried })
     }
 
-    /// Returns a standard deviation in SI units; 1 if none is given.
+    /// Returns a standard deviation in SI units; 0 if none is given.
     pub(crate) fn std(&self, given: Option<&Spanned<f64>>, factor: f64) -> Result<f64, Error> {
         match given {
-            None => Ok(1.0),
+            None => Ok(0.0),
             Some(std) if std.get_ref().is_finite() && *std.get_ref() > 0.0 => Ok(std.get_ref() * factor),
             Some(std) => Err(self.error(std.span(), format!("std is {}, expected a positive number", std.get_ref()))),
         }
     }
 
+    /// Reads a table of the joints and some of the given columns.
     pub(super) fn table(&self, file: &Spanned<PathBuf>, columns: &[&str]) -> Result<NumberTable, Error> {
+        let table = self.table_with(file, &[])?;
+        let joints: Vec<&str> = self.cell.joints.iter().map(|(name, _)| name.as_str()).collect();
+        match table.names.iter().find(|n| !columns.contains(&n.as_str()) && !joints.contains(&n.as_str())) {
+            None => Ok(table),
+            Some(stray) => {
+                let what =
+                    format!("column {stray:?} is not known; expected the joints {joints:?} and some of {columns:?}");
+                Err(Error::File { path: self.folder.join(file.get_ref()), what })
+            }
+        }
+    }
+
+    /// Reads a table that has the joints and the given columns.
+    pub(super) fn table_with(&self, file: &Spanned<PathBuf>, columns: &[String]) -> Result<NumberTable, Error> {
         let path = self.folder.join(file.get_ref());
         if !path.is_file() {
             let message = format!("file = {:?}: there is no file {}", file.get_ref(), path.display());
             return Err(self.error(file.span(), message));
         }
         let table = NumberTable::read(&path)?;
-        let joints: Vec<&str> = self.cell.joints.iter().map(|(name, _)| name.as_str()).collect();
         let fail = |what: String| Error::File { path: path.clone(), what };
-        if let Some(stray) =
-            table.names.iter().find(|n| !columns.contains(&n.as_str()) && !joints.contains(&n.as_str()))
-        {
-            return Err(fail(format!(
-                "column {stray:?} is not known; expected the joints {joints:?} and some of {columns:?}"
-            )));
+        if let Some((joint, _)) = self.cell.joints.iter().find(|(joint, _)| table.column(joint).is_none()) {
+            return Err(fail(format!("there is no column for joint {joint:?}")));
         }
-        if let Some(missing) = joints.iter().find(|joint| table.column(joint).is_none()) {
-            return Err(fail(format!("there is no column for joint {missing:?}")));
+        if let Some(missing) = columns.iter().find(|name| table.column(name).is_none()) {
+            return Err(fail(format!("there is no column {missing:?}; found {:?}", table.names)));
         }
         if table.rows.is_empty() {
             return Err(fail("the table has no rows".into()));

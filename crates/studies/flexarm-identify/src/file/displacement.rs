@@ -134,8 +134,8 @@ impl Reader<'_> {
             e.instrument.as_ref().map(|name| self.chosen("instrument", Some(name), &self.instruments, &span));
         let instrument = instrument.transpose()?;
         let mut rows = self.translations(&said, instrument, sigma, &span)?;
-        rows.extend(self.rotations(&said, instrument, &span)?);
-        let FileDisplacement { name, q, load, point, value, rotation, std, std_rotation, .. } = said;
+        rows.extend(self.rotations(&said, instrument)?);
+        let FileDisplacement { name, q, load, point, .. } = said;
         if let Some(bad) = rows.iter().find(|row| !row.value.is_finite()) {
             return Err(self.error(span, format!("{name}: found {}, expected a finite number", bad.value)));
         }
@@ -147,8 +147,6 @@ impl Reader<'_> {
         }
         let point = Vector3::from(point) * self.units.length;
         let kind = ReadingKind::Displacement { before, after, point, rows };
-        let what = if rotation.is_some() { "displacement and rotation" } else { "displacement" };
-        self.given.push((what, std.is_some() || (value.is_none() && std_rotation.is_some()), span));
         self.measurements.readings.push(Reading { name, q, kind });
         Ok(())
     }
@@ -193,17 +191,8 @@ impl Reader<'_> {
     }
 
     /// Returns the measured rotations.
-    fn rotations(
-        &self,
-        said: &FileDisplacement,
-        instrument: Option<usize>,
-        span: &Range<usize>,
-    ) -> Result<Vec<Row<Component>>, Error> {
+    fn rotations(&self, said: &FileDisplacement, instrument: Option<usize>) -> Result<Vec<Row<Component>>, Error> {
         let Some(turn) = said.rotation else { return Ok(Vec::new()) };
-        if said.std_rotation.is_some() != said.std.is_some() && said.value.is_some() {
-            let text = "displacements and rotations have different units: give both std and std_rotation";
-            return Err(self.error(span.clone(), text));
-        }
         let std = self.std(said.std_rotation.as_ref(), self.units.angle)?;
         let row = |(axis, angle): ([f64; 3], Option<f64>)| {
             let d = Vector3::from(axis);

@@ -28,6 +28,8 @@ pub(super) struct TargetEntry {
     xyz: [f64; 3],
     #[serde(default)]
     unknown: bool,
+    /// Link in whose axes `xyz` is; the tool if absent.
+    link: Option<Spanned<String>>,
     /// Standard deviation of each component.
     std: Option<Spanned<f64>>,
 }
@@ -60,7 +62,9 @@ impl Reader<'_> {
             self.measurements.instruments.push(Instrument::Known(X_WI.inverse()));
         }
         for (name, entry) in targets {
-            let TargetEntry { xyz, unknown, std } = entry.get_ref();
+            let TargetEntry { link, xyz, unknown, std } = entry.get_ref();
+            let frame = link.as_ref().map(|link| self.moving_link(link)).transpose()?;
+            self.measurements.links.push(frame);
             if let Some(bad) = xyz.iter().find(|x| !x.is_finite()) {
                 return Err(self.error(entry.span(), format!("found {bad}, expected finite numbers")));
             }
@@ -112,7 +116,7 @@ impl Reader<'_> {
             self.measurements.instruments[k] = unknown;
             if let Some((std, std_rotation)) = deviations {
                 let kind = ReadingKind::InstrumentAt { instrument: k, value: said, std, std_rotation };
-                self.known("instrument", name, kind, entry.span());
+                self.known("instrument", name, kind);
             }
         }
         for (k, (name, entry)) in targets.iter().enumerate().filter(|(k, _)| hit[*k]) {
@@ -123,15 +127,14 @@ impl Reader<'_> {
             }
             if let Some(std) = std {
                 let std = self.std(Some(std), self.units.length)?;
-                self.known("target", name, ReadingKind::TargetAt { target: k, value, std }, entry.span());
+                self.known("target", name, ReadingKind::TargetAt { target: k, value, std });
             }
         }
         Ok(())
     }
 
     /// Adds prior knowledge of a frame as a reading.
-    fn known(&mut self, what: &'static str, name: &str, kind: ReadingKind, span: std::ops::Range<usize>) {
-        self.given.push((what, true, span));
+    fn known(&mut self, what: &'static str, name: &str, kind: ReadingKind) {
         self.measurements.readings.push(Reading { name: format!("{what} {name}"), q: Vec::new(), kind });
     }
 }

@@ -47,7 +47,6 @@ impl Reader<'_> {
         let rows = hz.iter().zip(modes).map(|(f, mode)| Row { of: mode - 1, value: *f, std: of(*f) }).collect();
         let kind = ReadingKind::Frequencies { load: self.load(&e.load, &span)?, rows };
         let q = self.joints(&e.joints)?;
-        self.given.push(("frequency", e.std.is_some() || e.std_relative.is_some(), span));
         self.measurements.readings.push(Reading { name: format!("frequency {}", number + 1), q, kind });
         Ok(())
     }

@@ -97,8 +97,8 @@ pub(super) struct MeasurementInput {
     /// Name, uncertainty, and place in the file.
     pub(super) known: Vec<(String, f64, RobotFileError)>,
     pub(super) loss: Loss,
-    /// Whether standard deviations are given.
-    pub(super) deviations_known: bool,
+    /// Number of rows of tables of places without a reading.
+    pub(super) empty_rows: usize,
     /// Name of the unit of length, for messages.
     pub(super) length: &'static str,
     pub(super) length_m: f64,
@@ -132,11 +132,15 @@ pub(super) fn read(path: &Path, cell: &Cell<'_>) -> Result<MeasurementInput, Err
         instruments: Vec::new(),
         targets: Vec::new(),
         measurements: Measurements::default(),
-        given: Vec::new(),
+        empty_rows: 0,
     };
     reader.readings(&file)?;
     let recordings = file.encoders.iter().map(|entry| reader.encoders(entry)).collect::<Result<Vec<_>, Error>>()?;
-    let deviations_known = reader.deviations(!recordings.is_empty())?;
+    if reader.measurements.readings.is_empty() && recordings.is_empty() {
+        let text = "there is no reading: add [[displacement]], [[place]], [[frequency]], [[response]], [[shape]] or \
+                    [[encoders]]";
+        return Err(reader.error(0..0, text));
+    }
     let given =
         |list: &[Spanned<String>]| list.iter().map(|p| (p.get_ref().clone(), source.error(p.span(), ""))).collect();
     let known = file.parameter.iter().map(|entry| {
@@ -154,7 +158,7 @@ pub(super) fn read(path: &Path, cell: &Cell<'_>) -> Result<MeasurementInput, Err
         uncertainty: file.uncertainty.as_ref().map(|value| uncertainty(value, 1.0, &source)).transpose()?,
         known: known.collect::<Result<_, RobotFileError>>()?,
         loss: loss(&file.loss, &source)?,
-        deviations_known,
+        empty_rows: reader.empty_rows,
         length,
         length_m,
         angle_rad: units.angle,
@@ -214,36 +218,5 @@ impl Reader<'_> {
             self.shape(&file.node, k, entry)?;
         }
         self.settle_frames(&file.instrument, &file.target)
-    }
-
-    /// Whether standard deviations are given. All readings must give one or none; all must if kinds
-    /// are mixed.
-    fn deviations(&self, recordings: bool) -> Result<bool, Error> {
-        let Some(first) = self.given.first() else {
-            if recordings {
-                return Ok(true);
-            }
-            let text = "there is no reading: add [[displacement]], [[place]], [[frequency]], [[response]], [[shape]] or [[encoders]]";
-            return Err(self.error(0..0, text));
-        };
-        if self.given.iter().all(|(_, given, _)| *given) {
-            return Ok(true);
-        }
-        let mixed = self.given.iter().find(|(kind, given, _)| *kind != first.0 || *given != first.1);
-        match mixed {
-            // Encoder recordings have standard deviations of their own, so the other readings need
-            // them too.
-            None if recordings => {
-                Err(self.error(first.2.clone(), "std is missing: with [[encoders]] all other readings need one"))
-            }
-            None if first.0 == "displacement and rotation" => {
-                Err(self.error(first.2.clone(), "displacements and rotations together need std and std_rotation"))
-            }
-            None => Ok(false),
-            Some((_, _, span)) => {
-                let text = "std is missing: all readings need one if they are of several kinds or some have one";
-                Err(self.error(span.clone(), text))
-            }
-        }
     }
 }

@@ -1,10 +1,9 @@
-//! Positions of targets on the tool in the axes of an instrument.
+//! Positions of targets in the axes of an instrument.
 
 use std::ops::Range;
 use std::path::PathBuf;
 
-use crate::estimation::{Reading, ReadingKind};
-use nalgebra::Vector3;
+use crate::estimation::{Reading, ReadingKind, Row};
 use serde::Deserialize;
 use toml::Spanned;
 
@@ -19,6 +18,8 @@ pub(super) struct PlaceEntry {
     joints: Option<Spanned<Joints>>,
     instrument: Option<Spanned<String>>,
     target: Option<Spanned<String>>,
+    /// Names of the columns of x, y and z; other columns of the table are then ignored.
+    columns: Option<[String; 3]>,
     #[serde(default)]
     load: LoadEntry,
     value: Option<[f64; 3]>,
@@ -33,41 +34,47 @@ impl Reader<'_> {
         let (e, span) = (entry.get_ref(), entry.span());
         let instrument = self.chosen("instrument", e.instrument.as_ref(), &self.instruments, &span)?;
         let target = self.chosen("target", e.target.as_ref(), &self.targets, &span)?;
-        let one = |reader: &mut Self, name, q, load: LoadEntry, value: [f64; 3], std: Option<Spanned<f64>>| {
-            if let Some(bad) = value.iter().find(|x| !x.is_finite()) {
+        let one = |reader: &mut Self, name, q, load: LoadEntry, value: [Option<f64>; 3], std: Option<Spanned<f64>>| {
+            if let Some(bad) = value.iter().flatten().find(|x| !x.is_finite()) {
                 return Err(reader.error(span.clone(), format!("{name}: found {bad}, expected finite numbers")));
             }
-            let kind = ReadingKind::Place {
-                load: reader.load(&load, &span)?,
-                target,
-                instrument,
-                value: Vector3::from(value) * reader.units.length,
-                std: Vector3::repeat(reader.std(std.as_ref(), reader.units.length)?),
-            };
-            reader.given.push(("place", std.is_some(), span.clone()));
+            let (length, std) = (reader.units.length, reader.std(std.as_ref(), reader.units.length)?);
+            let row = |(of, value): (usize, Option<f64>)| Some(Row { of, value: value? * length, std });
+            let rows = value.into_iter().enumerate().filter_map(row).collect();
+            let kind = ReadingKind::Place { load: reader.load(&load, &span)?, target, instrument, rows };
             reader.measurements.readings.push(Reading { name, q, kind });
             Ok(())
         };
         match (&e.file, &e.joints, e.value) {
             (Some(file), None, None) => {
-                let table = self.table(file, &[&LOAD_COLUMNS[..], &COLUMNS].concat())?;
+                let table = match &e.columns {
+                    Some(own) => self.table_with(file, own)?,
+                    None => self.table(file, &[&LOAD_COLUMNS[..], &COLUMNS].concat())?,
+                };
+                let [x, y, z] = e.columns.as_ref().map_or(["x", "y", "z"], |own| own.each_ref().map(String::as_str));
+                let before = self.measurements.readings.len();
                 for row in 0..table.rows.len() {
                     let at = TableRow { table: &table, row };
                     let name = format!("{} line {}", file.get_ref().display(), table.lines[row]);
-                    let value =
-                        at.filled(["x", "y", "z"]).and_then(|[x, y, z]| Some([x?, y?, z?])).ok_or_else(|| {
-                            self.error(file.span(), format!("{name}: a place needs x, y and z in every row"))
-                        })?;
+                    let Some(value) = at.filled([x, y, z]) else {
+                        self.empty_rows += 1;
+                        continue;
+                    };
                     let std = at.get("std").map(|x| Spanned::new(file.span(), x)).or_else(|| e.std.clone());
                     let q = self.table_joints(&at, file.span())?;
                     let load = self.with_columns(e.load, &at, file)?;
                     one(self, name, q, load, value, std)?;
                 }
-                Ok(())
+                match self.measurements.readings.len() > before {
+                    true => Ok(()),
+                    false => {
+                        Err(self.error(file.span(), format!("no row of the table has a value of {x}, {y} or {z}")))
+                    }
+                }
             }
             (None, Some(joints), Some(value)) => {
                 let q = self.joints(joints)?;
-                one(self, format!("place {}", number + 1), q, e.load, value, e.std.clone())
+                one(self, format!("place {}", number + 1), q, e.load, value.map(Some), e.std.clone())
             }
             _ => Err(self.error(span, "a place needs joints = [...] and value = [x, y, z], or file = \"table.csv\"")),
         }

@@ -3,8 +3,10 @@
 use std::ops::Range;
 use std::path::Path;
 
+use flexarm_kinematics::Frame;
 use flexarm_run::robot_file::Source;
 use flexarm_run::{Arm, Error};
+use toml::Spanned;
 
 use crate::estimation::Measurements;
 
@@ -33,13 +35,21 @@ pub(crate) struct Reader<'a> {
     pub(super) instruments: Vec<String>,
     pub(super) targets: Vec<String>,
     pub(crate) measurements: Measurements,
-    /// For each reading: kind of quantity, whether a standard deviation is given, and its place in
-    /// the file.
-    pub(crate) given: Vec<(&'static str, bool, Range<usize>)>,
+    /// Number of rows of tables of places without a reading.
+    pub(super) empty_rows: usize,
 }
 
 impl Reader<'_> {
     pub(crate) fn error(&self, span: Range<usize>, message: impl Into<String>) -> Error {
         self.source.error(span, message).into()
+    }
+
+    /// Returns the frame of a moving link of the flexible arm.
+    pub(crate) fn moving_link(&self, link: &Spanned<String>) -> Result<Frame, Error> {
+        let model = &self.cell.arm.model;
+        model.frame(link.get_ref()).filter(|frame| frame.body > 0).cloned().ok_or_else(|| {
+            let known: Vec<&str> = flexarm_run::applied_load::moving_links(model);
+            self.error(link.span(), format!("the robot has no moving link {:?}; it has {known:?}", link.get_ref()))
+        })
     }
 }
