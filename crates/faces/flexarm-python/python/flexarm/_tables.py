@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 
-def _module(name: str, extra: str) -> Any:
+def _module(name: str) -> Any:
     import importlib
 
     try:
         return importlib.import_module(name)
     except ModuleNotFoundError as error:
-        raise ModuleNotFoundError(f"this needs {name}: pip install flexarm[{extra}]", name=name) from error
+        raise ModuleNotFoundError(f"this needs {name}: pip install {name}", name=name) from error
 
 
 def to_arrow(run: Any) -> Any:
