@@ -13,7 +13,7 @@ project = "flexarm"
 author = "The flexarm developers"
 copyright = "The flexarm developers"
 version = release = WORKSPACE["version"]
-extensions = ["myst_parser", "autoapi.extension", "sphinx.ext.mathjax", "sphinx_copybutton", "notfound.extension"]
+extensions = ["myst_parser", "autoapi.extension", "sphinx.ext.napoleon", "sphinx.ext.mathjax", "sphinx_copybutton", "notfound.extension"]
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 3
 copybutton_prompt_text = "$ "

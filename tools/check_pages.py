@@ -32,7 +32,7 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 # Pages with commands; those of a group use each other's files, groups run at the same time.
 RUN = [
     ["docs/tutorials/my_arm.md", "docs/tutorials/measure.md"],
-    ["docs/tutorials/mesh_to_link.md", "README.md", "docs/choosing.md", "docs/faq.md"],
+    ["docs/tutorials/mesh_to_link.md", "docs/links.md", "docs/response.md", "README.md", "docs/choosing.md", "docs/faq.md"],
 ]
 NUMBER = r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?"
 TOKEN = re.compile(rf"{NUMBER}(?![\w.]*\w)|[^\s]")
@@ -201,14 +201,20 @@ class Source:
         return float(re.search(r"^\| default program, .* \| (\d+) \|$", (ROOT / "docs/performance.md").read_text(), flags=re.M)[1])
 
     def claims(self):
-        rows = re.findall(r"^\| \d+\. .*\| (\d+) \| \d+ \|$", (ROOT / "docs/verification.md").read_text(), flags=re.M)
-        return sum(map(int, rows))
+        rows = re.findall(r"^\| \[.*\| (\d+) \| \d+ \| (\d+) \|$", (ROOT / "docs/verification.md").read_text(), flags=re.M)
+        return [sum(int(row[k]) for row in rows) for k in (0, 1)]
 
     def ratio(self, error, figure="cpu_ms"):
         """CPU time of the best other program over ours, at equal error."""
         ours = [line for line in self.peers["lines"] if line["program"] == "flexarm"]
         others = [line for line in self.peers["lines"] if line["program"] != "flexarm"]
         return peers.fastest(others, error)["cpu_ms"] / peers.fastest(ours, error, figure)[figure]
+
+    def verified(self, case, row, columns):
+        """Cells of the first row of a table of a case that begins with some cells; per cent as printed."""
+        text = (ROOT / f"docs/verification/{case}.md").read_text()
+        cells = next(line for line in text.splitlines() if line.startswith(f"| {row} |")).split("|")[1:-1]
+        return [float(re.search(NUMBER, cells[k])[0]) for k in columns]
 
     def error(self, stepper, step):
         return next(line["error"] for line in self.peers["lines"] if (line["stepper"], line["step"]) == (stepper, step))
@@ -233,12 +239,14 @@ class Source:
 # Of the measured arm: rigid with fitted frames, springs, springs and play.
 MODELS = [("rigid_frames",), ("published", ""), ("published", "y")]
 
+cell = lambda percent: f"{{}} {percent}".strip()
+
 # Page, sentence or table row with {} for each figure, and a function from the source to the figures.
 FIGURES = [
     ("README.md", "once: {} CPU minutes", lambda s: [s.build_s() / 60]),
     ("README.md", "{} mm from where the rigid model says", lambda s: [s.peak_mm("kr210")]),
     ("README.md", "would be off by {} mm", lambda s: [1e3 * s.run("compare kr210")["tcp"]["static_at_peak_m"]]),
-    ("README.md", "[docs/verification.md](docs/verification.md): {} claims", lambda s: [s.claims()]),
+    ("README.md", "[docs/verification.md](docs/verification.md): {} claims, each with its bound; {} of them", lambda s: s.claims()),
     (
         "README.md",
         "misses the tool by {} mm (rms), elastic tubes and gears by {} mm, with play by {} mm",
@@ -269,6 +277,18 @@ FIGURES = [
     ("docs/choosing.md", "is refused | {} at 0.125 ms |", lambda s: [s.error("rk4", 1.25e-4)]),
     ("docs/choosing.md", "are judged | {} at `--rtol` 1e-9 |", lambda s: [s.error("reference", 1e-9)]),
     ("docs/choosing.md", "without motors | {} at 0.1 ms |", lambda s: [s.error("spook", 1e-4)]),
+    *(
+        ("docs/formulation.md", f"| {row} | {{}} | {cell(sag)} | {cell(first)} | {cell(second)} |", lambda s, row=row, k=columns: s.verified("one-beam", row, k))
+        for row, sag, first, second, columns in [
+            ("2 parts", "%", "%", "%", (1, 2, 4, 6)),
+            ("3 parts", "%", "%", "%", (1, 2, 4, 6)),
+            ("5 parts", "%", "%", "%", (1, 2, 4, 6)),
+            ("9 parts", "%", "", "%", (1, 2, 4, 6)),
+        ]
+    ),
+    ("docs/formulation.md", "| 2 parts | {} % |", lambda s: s.verified("manipulator", "2 parts | spring-damper, 1 ms", [11])),
+    ("docs/formulation.md", "| 4 parts | {} % |", lambda s: s.verified("manipulator", "4 parts | spring-damper, 1 ms", [11])),
+    ("docs/thesis.md", "the preset is {} % of the peak off, the exact formulas {} %", lambda s: [s.verified("manipulator", f"2 parts | {row}, 1 ms", [11])[0] for row in ("compliant constraints, preset `source`", "compliant constraints, local")]),
     ("docs/faq.md", "the peak is then {} mm instead of {} mm", lambda s: [s.peak_mm("kr210 --from-rest undeformed"), s.peak_mm("kr210")]),
     ("docs/faq.md", "the peaks differ by {} %", lambda s: [100 * abs(s.peak_mm("kr210 --links modal") / s.peak_mm("kr210") - 1)]),
     ("docs/compensate.md", "(column `after`: {} mm)", lambda s: s.compensated("kr210")[-2:-1]),

@@ -1,13 +1,14 @@
 #!/usr/bin/env python3
-"""Takes the pictures of docs/images that show recordings and reports in their viewers.
+"""Makes the pictures of docs/images from the program, or says which are out of date.
 
-    pip install "rerun-sdk>=0.36.3" playwright pillow     (in a virtual environment; a Chromium on PATH for the reports)
-    tools/screenshots.py [--flexarm target/release/flexarm] [--only recording,mcap,...] [--out docs/images]
+    pip install "rerun-sdk>=0.36.3" playwright pillow     (in a virtual environment; a Chromium on PATH for the pages)
+    tools/screenshots.py [--flexarm target/release/flexarm] [--only recording,map,...] [--out docs/images]
+    tools/screenshots.py --check        pictures that are older than their sources, by the commits
 
 Each picture is a flexarm command and the output file to show. No display is needed: the Rerun
 viewer runs headless (it needs a Vulkan driver; in software: Debian's mesa-vulkan-drivers and
 libvulkan1). Missing programs are reported and skipped; the exit status is 1 only if a possible
-picture failed.
+picture failed. Drawn by hand: logo.svg, formulation.svg; of the built page of web/: web.webp.
 """
 
 import argparse
@@ -24,24 +25,36 @@ import time
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 # Picture: arguments of flexarm, file in its output folder, seconds of playback before the shot.
 RERUN = {
-    "arm": (["compare", "kr210"], "run.rrd", 1.0),
-    "recording": (["compare", "kr210"], "run.rrd", 6.5),
-    "mcap": (["compare", "kr210"], "run.mcap", 6.5),
+    "arm": (["compare"], "run.rrd", 1.0),
+    "recording": (["compare"], "run.rrd", 6.5),
     "study": (
         ["compare", "robots/kr210/links.toml", "--with", "links=modal,name=modal links", "--with", "robot=robots/kr210/beams.toml,name=tubes"],
         "study.rrd",
         6.5,
     ),
 }
+# Picture: arguments of flexarm, page in its output folder, heading at the top of the picture.
+PAGES = {
+    "report": (["compare"], "report.html", None),
+    "map": (["map", "kr210", "--box", "0.9:2.5,-1:1,0.2:1.8", "--grid", "0.1", "--keep-out", "0.9", "--wrench", "500,0,0", "--workpiece", "0.8,0.6,0.4"], "map.html", "Slices through the best place"),
+}
+# What the pictures show: a newer commit there makes a picture old.
+SOURCES = {
+    "arm": ["crates/faces/flexarm-rerun/src"],
+    "recording": ["crates/faces/flexarm-rerun/src"],
+    "study": ["crates/faces/flexarm-rerun/src"],
+    "report": ["crates/run/flexarm-run/src/report"],
+    "map": ["crates/studies/flexarm-map/src"],
+    "python_plot": ["crates/faces/flexarm-python/python/flexarm/_plot.py"],
+    "lobes": ["crates/studies/flexarm-chatter/src"],
+    "sweep": ["crates/studies/flexarm-sweep/src"],
+    "reduce": ["crates/run/flexarm-linkmaker/src"],
+    "stress": ["crates/results/flexarm-draw/src"],
+    "web": ["web/src"],
+}
 # The moving picture of the README, and the part of the window that it shows.
 ANIMATED = "arm"
 CROP = (0.0, 0.03, 1.0, 0.498)
-REPORTS = {
-    "report": ["compare", "kr210"],
-    "report_study": RERUN["study"][0],
-}
-
-
 def free_port():
     with socket.socket() as s:
         s.bind(("127.0.0.1", 0))
@@ -104,6 +117,27 @@ def animation(file, out, scratch, seconds):
     pictures[0].save(out, save_all=True, append_images=pictures[1:], duration=duration, loop=0, quality=60, method=6)
 
 
+def page_picture(page, heading, out):
+    """Saves the top of a page, or what begins at a heading."""
+    from playwright.sync_api import sync_playwright
+
+    browser = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+    with sync_playwright() as playwright:
+        view = playwright.chromium.launch(executable_path=browser, args=["--no-sandbox"]).new_page(viewport={"width": 1100, "height": 1000})
+        view.goto(page.resolve().as_uri())
+        view.wait_for_timeout(1000)
+        if heading:
+            view.get_by_role("heading", name=heading).evaluate("heading => heading.scrollIntoView()")
+        view.screenshot(path=out)
+
+
+def old_pictures(folder):
+    """Pictures whose sources have a newer commit."""
+    stamp = lambda *paths: int(subprocess.run(["git", "log", "-1", "--format=%ct", "--", *paths], cwd=ROOT, capture_output=True, text=True).stdout or 0)
+    pictures = {picture.stem: picture for picture in sorted(folder.iterdir())}
+    return [name for name, paths in SOURCES.items() if name not in pictures or stamp(str(pictures[name])) < stamp(*paths)]
+
+
 def smaller(picture):
     """Reduces to 256 colours, which suffice for a screen, at a quarter of the size."""
     try:
@@ -120,11 +154,16 @@ def main():
     parser.add_argument("--flexarm", default=str(ROOT / "target/release/flexarm"))
     parser.add_argument("--only", default="", help="names, with commas between them")
     parser.add_argument("--out", type=pathlib.Path, default=ROOT / "docs/images")
+    parser.add_argument("--check", action="store_true", help="list pictures that are older than their sources")
     arguments = parser.parse_args()
+    if arguments.check:
+        old = old_pictures(arguments.out)
+        print(f"older than their sources: {', '.join(old)}" if old else "no picture is older than its sources")
+        return 1 if old else 0
     only = set(filter(None, arguments.only.split(",")))
-    unknown = only - set(RERUN) - set(REPORTS)
+    unknown = only - {*RERUN, *PAGES, "python_plot"}
     if unknown:
-        parser.error(f"no picture is called {', '.join(sorted(unknown))}; there are {', '.join([*RERUN, *REPORTS])}")
+        parser.error(f"no picture is called {', '.join(sorted(unknown))}; there are {', '.join([*RERUN, *PAGES, 'python_plot'])}")
     if not pathlib.Path(arguments.flexarm).is_file():
         parser.error(f"{arguments.flexarm} is not there: cargo build --release --features rerun, or --flexarm")
     arguments.out.mkdir(parents=True, exist_ok=True)
@@ -167,20 +206,25 @@ def main():
             except Exception as error:
                 print(f"{name}: no picture: {error}", file=sys.stderr)
                 failed = True
-        for name, command in REPORTS.items():
-            if not wanted(name):
-                continue
-            folder = pathlib.Path(scratch) / f"pictures_{name}"
-            check = [sys.executable, str(ROOT / "tools/check_report.py"), str(run(command) / "report.html"), "--pictures", str(folder)]
-            done = subprocess.run(check, capture_output=True, text=True)
-            print(done.stdout.strip().splitlines()[-1] if done.stdout.strip() else done.stderr.strip())
-            if done.returncode != 0:
-                failed = True
-            elif (folder / "top.png").is_file():
-                out = arguments.out / f"{name}.png"
-                shutil.copyfile(folder / "top.png", out)
-                smaller(out)
-                print(f"{out}: {out.stat().st_size} bytes")
+        for name, (command, file, heading) in PAGES.items():
+            if wanted(name):
+                try:
+                    out = arguments.out / f"{name}.png"
+                    page_picture(run(command) / file, heading, out)
+                    smaller(out)
+                    print(f"{out}: {out.stat().st_size} bytes")
+                except ImportError:
+                    print(f"skipped: {name} (pip install playwright)")
+        if wanted("python_plot"):
+            try:
+                import flexarm
+                import matplotlib.figure
+
+                figure = matplotlib.figure.Figure(figsize=(7.5, 3.2), layout="constrained")
+                flexarm.load("kr210").flexible().simulate().plot(figure.subplots())
+                figure.savefig(arguments.out / "python_plot.png", dpi=120)
+            except ImportError:
+                print("skipped: python_plot (install the wheel and matplotlib)")
     return 1 if failed else 0
 
 

@@ -183,7 +183,7 @@ fn text(made: &NewRobot) -> String {
         ]);
     }
     out += &lines(&t);
-    out += "torques in N m with payload; limits in brackets make no sense\n\n";
+    out += "torques in N m with payload; limits in brackets are implausible and not used\n\n";
     let mut t = table(&["link", "mm", "kg", "section"]);
     for link in &made.links {
         let mass = link.mass.map_or_else(|| "-".to_owned(), |m| format!("{m:.2}"));

@@ -32,7 +32,7 @@ pub(crate) enum DecodeError {
     NoDefinition(String),
     #[error("it ends within `{field}`")]
     CutOff { field: Rc<str> },
-    #[error("`{field}` is to have {count} values, more than the message has bytes")]
+    #[error("the length of `{field}` is given as {count}, which exceeds the size of the message")]
     Count { field: Rc<str>, count: usize },
     #[error("`{field}` is of the kind {kind}, which is not read")]
     Kind { field: Rc<str>, kind: String },

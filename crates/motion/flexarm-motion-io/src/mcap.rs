@@ -80,7 +80,7 @@ fn in_words(error: McapError) -> String {
         McapError::UnexpectedEof | McapError::UnexpectedEoc => "its end is missing".to_owned(),
         McapError::BadChunkCrc { .. } => "a checksum does not fit".to_owned(),
         McapError::RecordTooLarge { len: length, .. } | McapError::ChunkTooLarge(length) => {
-            format!("a record or chunk is to have {length} bytes, at most {MOST_BYTES} are read at once")
+            format!("a record or chunk has a length of {length} bytes; the limit is {MOST_BYTES}")
         }
         McapError::UnsupportedCompression(other) => {
             let zstd = if cfg!(target_family = "wasm") { "" } else { "zstd, " };

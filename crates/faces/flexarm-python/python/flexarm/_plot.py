@@ -10,7 +10,7 @@ from ._tables import _module
 def _axes(ax: Any) -> Any:
     if ax is not None:
         return ax
-    _, ax = _module("matplotlib.pyplot", "plot").subplots(layout="constrained")
+    _, ax = _module("matplotlib.pyplot").subplots(layout="constrained")
     return ax
 
 

@@ -92,14 +92,14 @@ def run(run: Any) -> Optional[Any]:
             import rerun as rr  # type: ignore[import-not-found,unused-ignore]
             from rerun.notebook import Viewer  # type: ignore[import-not-found,unused-ignore]
         except ImportError as error:
-            raise ModuleNotFoundError("this needs rerun: pip install flexarm[notebook]", name="rerun") from error
+            raise ModuleNotFoundError("this needs rerun: pip install 'rerun-sdk[notebook]'", name="rerun") from error
         recording = rr.RecordingStream("flexarm")
         viewer = Viewer(recording=recording)
         recording.log_file_from_path(file)
         return viewer
     program = shutil.which("rerun")
     if program is None:
-        raise ModuleNotFoundError("this needs the Rerun viewer: pip install flexarm[rerun]", name="rerun")
+        raise ModuleNotFoundError("this needs the Rerun viewer: pip install rerun-sdk", name="rerun")
     subprocess.Popen([program, file], start_new_session=True)
     return None
 
