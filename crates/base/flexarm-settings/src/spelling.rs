@@ -10,7 +10,8 @@ pub fn closest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) ->
     if length > LONGEST_WORD {
         return None;
     }
-    let allowed = (length / 3).clamp(1, 4);
+    // At least one character is right.
+    let allowed = (length / 3).clamp(1, 4).min(length.saturating_sub(1));
     let mut best: Option<(usize, &str)> = None;
     for candidate in candidates {
         if candidate.chars().count().abs_diff(length) > allowed {

@@ -11,7 +11,7 @@ use crate::args::stepper_words;
 use crate::failure::Failure;
 use crate::posed_args::PoseArgs;
 use crate::terminal::{Terminal, answer, to_json};
-use crate::{shipped, values};
+use crate::{print, shipped, values};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -78,6 +78,7 @@ pub(crate) fn run(terminal: &Terminal, args: &ExportFmuArgs) -> Result<ExitCode,
     let output = args.output.clone().unwrap_or_else(|| format!("{}.fmu", file_stem(&robot.name)).into());
     let job = FmuJob { robot: path, settings, fmi, library, output, overwrite: args.force };
     let summary = export_fmu(&job)?;
+    print::caveats(terminal, &summary.caveats);
     answer(terminal, || to_json(&summary), || text(&summary));
     Ok(ExitCode::SUCCESS)
 }

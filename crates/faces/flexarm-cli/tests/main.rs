@@ -9,6 +9,8 @@ mod broken_runs;
 mod common;
 mod convert;
 mod events;
+#[cfg(feature = "parquet")]
+mod every_verb;
 mod exchange;
 #[cfg(unix)]
 mod faults;

@@ -151,11 +151,50 @@ fn a_planned_trajectory_with_a_gripper_runs_on_a_shipped_arm_and_gives_the_figur
 fn joints_that_no_robot_has_are_refused_with_those_that_may_be_meant() {
     let place = Place::new();
     place.write("plan.yaml", planned().replace("joint_1, joint_2, joint_3", "joitn_1, joitn_2, joitn_3"));
-    place.refused(&["motion", "plan.yaml", "kr210"], &["joitn_1", "did you mean \"joint_1\"?", "its joints are"]);
-    // In flexarm's own format one is enough.
-    place.write("own.csv", "time,swing,finger\n0,0,0\n1,1,0\n");
-    place
-        .refused(&["motion", "own.csv", "robot.toml"], &["the motion moves \"finger\", which the robot does not have"]);
+    place.refused(&["motion", "plan.yaml", "kr210"], &["joitn_1", "did you mean \"joint_1\"?"]);
+}
+
+/// Truth: one answer for one name, whatever the format.
+#[test]
+fn a_misspelt_joint_is_refused_and_a_gripper_is_left_out_in_every_format() {
+    let place = Place::new();
+    let formats = [
+        (
+            "moves.toml",
+            "format = 1\nunit = \"rad\"\njoints = [\"joint_1\", \"NAME\"]\nstart = [0.0, 0.0]\n\
+                        [[move]]\nto = [1.0, 0.0]\nduration = 1.0\n",
+        ),
+        (
+            "samples.toml",
+            "format = 1\nunit = \"rad\"\njoints = [\"joint_1\", \"NAME\"]\n[samples]\ntime = [0.0, 1.0]\n\
+                          position = [[0.0, 0.0], [1.0, 0.0]]\nvelocity = [[0.0, 0.0], [0.0, 0.0]]\n",
+        ),
+        ("comma.csv", "time,joint_1,NAME\n0,0,0\n1,1,0\n"),
+        ("semicolon.csv", "t[s];joint_1[rad];NAME[rad]\n0;0;0\n1;1;0\n"),
+        ("tab.txt", "t[s]\tjoint_1[rad]\tNAME[rad]\n0\t0\t0\n1\t1\t0\n"),
+        (
+            "plan.json",
+            "{\"joint_names\": [\"joint_1\", \"NAME\"], \"points\": [{\"positions\": [0, 0], \"time_from_start\": 0}, \
+                       {\"positions\": [1, 0], \"time_from_start\": 1}]}",
+        ),
+        (
+            "state.yaml",
+            "header: {stamp: 1}\nname: [joint_1, NAME]\nposition: [0, 0]\n---\n\
+                        header: {stamp: 2}\nname: [joint_1, NAME]\nposition: [1, 0]\n",
+        ),
+        (
+            "run.csv",
+            "time,flexible_x_m,joint_1_position_rad,NAME_position_rad,kinetic_energy_j\n0,0,0,0,0\n1,0,1,0,0\n",
+        ),
+    ];
+    for (file, text) in formats {
+        place.write(file, text.replace("NAME", "jiont_2"));
+        place.refused(&["motion", file, "kr210"], &["jiont_2", "did you mean \"joint_2\"?"]);
+        place.write(file, text.replace("NAME", "gripper"));
+        let warnings = place.json(&["motion", file, "kr210"])["warnings"].to_string();
+        assert_eq!(warnings.matches("gripper").count(), 1, "{file}: {warnings}");
+        assert!(warnings.contains("left out"), "{file}: {warnings}");
+    }
 }
 
 #[test]

@@ -9,6 +9,7 @@ use std::io::{Cursor, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use flexarm::caveat::{Caveat, Use, warnings};
 use flexarm::reduce::STRESS_FILE;
 use flexarm::{
     Arm, DriveModel, InertiaEstimate, LinkModel, LoadOptions, Modelling, ReadOptions, Robot, StepperEntry,
@@ -91,6 +92,10 @@ pub struct FmuSummary {
     pub step_s: f64,
     /// Meshes in the resources, because masses are computed from them.
     pub meshes: usize,
+    /// Sentences of the caveats that are warnings.
+    pub warnings: Vec<String>,
+    /// Caveats about the robot, its pose and the step.
+    pub caveats: Vec<Caveat>,
 }
 
 fn failed(path: &Path) -> impl FnOnce(std::io::Error) -> PlantError + '_ {
@@ -127,6 +132,9 @@ pub fn export_fmu(job: &FmuJob) -> Result<FmuSummary, PlantError> {
     entries.extend(files.into_iter().map(|(name, bytes)| (format!("resources/{name}"), bytes)));
     let bytes = zipped(&entries).map_err(failed(&job.output))?;
     flexarm::write_all(&[(job.output.clone(), &bytes)])?;
+    let arm = plant.arm();
+    let pose = job.settings.pose.clone().unwrap_or_else(|| vec![0.0; arm.flexible().rigid.n_actuated()]);
+    let caveats = arm.caveats(Use::Commanded(&pose, job.settings.stepper, step_s));
     let count = |causality| plant.variables().iter().filter(|variable| variable.causality == causality).count();
     Ok(FmuSummary {
         file: job.output.clone(),
@@ -140,6 +148,8 @@ pub fn export_fmu(job: &FmuJob) -> Result<FmuSummary, PlantError> {
         states: plant.state_references().len(),
         step_s,
         meshes,
+        warnings: warnings(&caveats),
+        caveats,
     })
 }
 

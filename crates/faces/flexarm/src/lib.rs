@@ -55,7 +55,7 @@ pub use flexarm_map as map;
 #[doc(inline)]
 pub use flexarm_new as new;
 #[doc(inline)]
-pub use flexarm_run::reduce;
+pub use flexarm_run::{caveat, reduce};
 #[doc(inline)]
 pub use flexarm_sensitivity as sensitivity;
 #[doc(inline)]

@@ -100,6 +100,11 @@ fn slips() -> Vec<(&'static str, Change, &'static [&'static str])> {
             &["gear-lever"],
         ),
         ("friction in N mm", set("drive.*.friction", "{ coulomb = 1e6 }"), &["friction"]),
+        (
+            "friction that begins at 4 rad/s",
+            set("drive.*.friction", "{ coulomb = 1.0, regularisation = 4.0 }"),
+            &["friction-smoothing"],
+        ),
         ("servo sampled every second", torque(true, set("drive.0.servo", "{ sample_s = 1.0 }")), &["sampling"]),
         (
             "balancer in N mm/rad",
@@ -123,6 +128,10 @@ fn slips() -> Vec<(&'static str, Change, &'static [&'static str])> {
         ),
         ("links without damping", set("flexible_link.*.damping", "{ modal = 0.0 }"), &["no-damping"]),
         ("stiffness_beta of 0", set("flexible_link.*.damping", "{ stiffness_beta = 0.0 }"), &["no-damping"]),
+        ("gear damping of 0.03", set("drive.*.gearbox.damping", "0.03"), &["gear-damping", "no-damping"]),
+        ("counterbalance in bar", key("balancer.0.gas.pressure", 1e-5), &["balancer-weak"]),
+        ("modal damping of 3e-4", set("flexible_link.*.damping", "{ modal = 3e-4 }"), &["damping-ratio"]),
+        ("calibration in degrees", calibrated("zero", -0.18), &["calibration"]),
         ("gears without damping", set("drive.*.gearbox.damping", "0.0"), &["no-damping"]),
         ("walls a tenth", key("flexible_link.*.beam.wall", 0.1), &["wall"]),
         ("radius for diameter", key("flexible_link.*.beam.outer_diameter", 0.5), &["section-size"]),

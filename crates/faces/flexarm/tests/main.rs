@@ -13,6 +13,7 @@ mod batch;
 mod beam_stress;
 mod caveats;
 mod caveats_everywhere;
+mod caveats_of_entries;
 mod compensate;
 mod compensate_variants;
 mod controller_axes;

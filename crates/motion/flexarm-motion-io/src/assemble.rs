@@ -2,10 +2,10 @@
 //! choice of velocities.
 
 use flexarm_settings::Caveat;
-use flexarm_trajectory::{JointSamples, SampleError, Samples, Trajectory, TrajectoryError};
+use flexarm_trajectory::{JointSamples, SampleError, Samples, Trajectory, TrajectoryError, velocity_mismatch};
 
-use crate::collect::{Received, Series, Topic, names_in_words};
-use crate::error::{PlacedProblem, Problem};
+use crate::collect::{Received, Series, Topic};
+use crate::error::{PlacedProblem, Problem, list};
 use crate::message::Point;
 
 /// Stamps that go back by at most this are sorted (s).
@@ -163,7 +163,7 @@ fn tell_ends(lines: &[Line], first: f64, last: f64, told: &mut FileCaveats<'_>) 
     }
     let once: Vec<String> = lines.iter().filter(|line| line.t.len() == 1).map(|line| line.joint.clone()).collect();
     if !once.is_empty() {
-        told.note("motion-ends", &format!("recorded only once, and held there: {}", names_in_words(&once)));
+        told.note("motion-ends", &format!("recorded only once, and held there: {}", list(&once)));
     }
 }
 
@@ -345,14 +345,7 @@ fn judge_velocities(lines: &mut [Line], told: &mut FileCaveats<'_>) {
             line.v.fill(f64::NAN);
             continue;
         }
-        let n = (line.t.len() - 1) as f64;
-        let (mut slopes, mut misses) = (0.0, 0.0);
-        for i in 1..line.t.len() {
-            let slope = (line.q[i] - line.q[i - 1]) / (line.t[i] - line.t[i - 1]);
-            slopes += slope * slope / n;
-            misses += (slope - 0.5 * (line.v[i] + line.v[i - 1])).powi(2) / n;
-        }
-        let (slope, miss) = (f64::sqrt(slopes), f64::sqrt(misses));
+        let [miss, slope] = velocity_mismatch(&line.t, &line.q, &line.v);
         if miss > BELONGS[0] * slope + BELONGS[1] {
             foreign.push(format!("{:?} ({miss:.3} of {slope:.3} rad/s)", line.joint));
             line.v.fill(f64::NAN);

@@ -3,10 +3,12 @@
 use std::collections::HashMap;
 use std::rc::Rc;
 
+use flexarm_trajectory::foreign_joints;
+
 use crate::Request;
 use crate::cdr::{Encoding, decode};
 use crate::definition::{Definitions, plain_name};
-use crate::error::{PlacedProblem, Problem, list};
+use crate::error::{PlacedProblem, Problem};
 use crate::message::{Message, Points, State, motion_of};
 use crate::value::Node;
 
@@ -155,7 +157,7 @@ impl<'a> Collector<'a> {
     ///
     /// # Errors
     /// [`Problem::NoTopic`], [`Problem::Topic`], a problem with a message of the topic, or
-    /// [`Problem::NoJoint`].
+    /// [`Problem::Names`].
     pub(crate) fn choose(mut self) -> Result<(Topic, Vec<String>), PlacedProblem> {
         let all: Vec<String> = self.topics.iter().map(Topic::described).collect();
         let readable = |topics: &[Topic]| -> Vec<String> {
@@ -200,15 +202,18 @@ impl<'a> Collector<'a> {
         if let Some(trouble) = topic.trouble.take() {
             return Err(trouble);
         }
+        let mut names: Vec<String> = topic.series.iter().map(|series| series.joint.clone()).collect();
+        names.extend(topic.foreign.iter().cloned());
         if topic.series.is_empty() {
-            let mut names = topic.foreign;
-            names.extend(self.topics.into_iter().flat_map(|topic| topic.foreign));
+            names.extend(self.topics.iter().flat_map(|topic| topic.foreign.iter().cloned()));
             names.sort();
             names.dedup();
-            return Err(PlacedProblem::new(match names.is_empty() {
-                true => Problem::NoPositions,
-                false => Problem::NoJoint { names },
-            }));
+        }
+        if names.is_empty() {
+            return Err(PlacedProblem::new(Problem::NoPositions));
+        }
+        if let Some(joints) = self.request.joints {
+            foreign_joints(&names, joints).map_err(|error| PlacedProblem::new(error.into()))?;
         }
         let own = topic.described();
         Ok((topic, others.into_iter().filter(|other| *other != own).collect()))
@@ -303,9 +308,4 @@ fn joined(topics: &[String]) -> String {
         text += &format!(", ... ({} in all)", topics.len());
     }
     if text.is_empty() { "none".to_owned() } else { text }
-}
-
-/// Formats names for messages.
-pub(crate) fn names_in_words(names: &[String]) -> String {
-    list(names)
 }

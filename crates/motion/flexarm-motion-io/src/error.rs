@@ -4,7 +4,11 @@ use std::fmt;
 use std::path::PathBuf;
 
 use flexarm_settings::Setting;
-use flexarm_trajectory::TrajectoryError;
+use flexarm_trajectory::{NameError, TrajectoryError};
+
+/// Content expected of a point without positions.
+pub(crate) const NO_POSITIONS: &str =
+    "expected a position for each joint; ros2 topic echo prints them all with --full-length";
 
 /// Error of reading a motion.
 #[derive(Debug, thiserror::Error)]
@@ -92,9 +96,9 @@ pub enum Problem {
         /// Top-level keys.
         found: String,
     },
-    /// Array shortened by the program that printed it.
+    /// Array that the program which printed it shortened (`...`) or left out (`<sequence type: ...>`).
     #[error(
-        "an array ends with \"...\": it was shortened when it was printed; print it whole (ros2 topic echo --full-length)"
+        "an array was shortened when it was printed; print it whole (ros2 topic echo --full-length, without --no-arr)"
     )]
     ShortenedArray,
     /// Missing key.
@@ -237,12 +241,9 @@ pub enum Problem {
         /// Topic requested.
         asked: String,
     },
-    /// None of the joints belongs to the robot.
-    #[error("none of the joints {} is a joint of the robot", list(names))]
-    NoJoint {
-        /// Joints of the messages.
-        names: Vec<String>,
-    },
+    /// Names that do not fit the robot.
+    #[error(transparent)]
+    Names(#[from] NameError),
     /// No usable sample.
     #[error("no position is a number; was the robot connected when this was recorded?")]
     NoPositions,

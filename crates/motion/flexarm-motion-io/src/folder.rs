@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use flexarm_settings::Caveat;
 
 use crate::assemble::assemble;
-use crate::collect::{Collector, names_in_words};
+use crate::collect::Collector;
 use crate::error::{MotionError, PlacedProblem, Problem};
 use crate::unpack::{Inside, ZSTD_MAGIC, look_inside};
 use crate::value::{Node, Value};
@@ -177,7 +177,6 @@ fn finish(
     }
     let (name, message) = (topic.name.clone(), topic.message.clone());
     let dropped = topic.foreign.clone();
-    caveats.extend(dropped_note(&dropped, shown));
     let made = assemble(topic, shown, true).map_err(|trouble| trouble.of(shown))?;
     caveats.extend(made.caveats);
     let (trajectory, samples) = (made.trajectory, made.samples);
@@ -197,12 +196,4 @@ fn chosen(taken: &str, others: &[String], shown: &str) -> Caveat {
         Setting::Topic
     );
     Caveat::from_message("motion-topic", shown, message, "").mended_by(&[Setting::Topic])
-}
-
-/// Caveat about dropped joints.
-pub(crate) fn dropped_note(dropped: &[String], shown: &str) -> Option<Caveat> {
-    let message = format!("{shown}: joints that the robot does not move are left out: {}", names_in_words(dropped));
-    let caveat =
-        Caveat::from_message("motion-dropped-joints", shown, message, "a gripper is one; a joint of the arm is not");
-    (!dropped.is_empty()).then_some(caveat)
 }

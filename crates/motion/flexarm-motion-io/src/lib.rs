@@ -68,7 +68,7 @@ use flexarm_trajectory::Trajectory;
 /// Selection of the joints and the topic of a file.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Request<'a> {
-    /// Joints of the robot; others are dropped, with a caveat. Without it all joints are read.
+    /// Joints of the robot; others are dropped and listed. Without it all joints are read.
     pub joints: Option<&'a [&'a str]>,
     /// Topic of a bag; without it one is selected, with a caveat.
     pub topic: Option<&'a str>,

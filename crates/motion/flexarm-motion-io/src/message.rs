@@ -3,7 +3,7 @@
 
 use std::rc::Rc;
 
-use crate::error::{PlacedProblem, Problem};
+use crate::error::{NO_POSITIONS, PlacedProblem, Problem};
 use crate::value::{Node, Value};
 
 /// Maximum depth of a motion in a message.
@@ -128,10 +128,13 @@ fn points(node: &Node, names: &Node, list: &Node) -> Result<Points, PlacedProble
     };
     let mut found: Vec<Point> = Vec::with_capacity(items.len());
     for (i, item) in items.iter().enumerate() {
+        if let Value::Text(_) = item.value {
+            return Err(wrong("points", item, "a list of points"));
+        }
         let of = || format!("point {}", i + 1);
         let missing = |key, expected| PlacedProblem::at(item.line, Problem::MissingKey { of: of(), key, expected });
         let positions = item.get("positions").or_else(|| item.get("position"));
-        let positions = positions.ok_or_else(|| missing("positions", "expected a position for each joint"))?;
+        let positions = positions.ok_or_else(|| missing("positions", NO_POSITIONS))?;
         let time = item.get("time_from_start");
         let time = time.ok_or_else(|| missing("time_from_start", "expected sec and nanosec, or seconds"))?;
         let point = Point {
@@ -219,20 +222,19 @@ fn check_lengths(
 }
 
 fn names_of(node: &Node, key: &str) -> Result<Vec<Rc<str>>, PlacedProblem> {
-    let wrong = || wrong(key, node, "a list of names of joints");
+    let wrong = |node: &Node| wrong(key, node, "a list of names of joints");
     let names: Vec<Rc<str>> = match &node.value {
         Value::List(items) => {
             let name = |item: &Node| match &item.value {
-                Value::Text(text) if &**text == "..." => Err(PlacedProblem::at(item.line, Problem::ShortenedArray)),
-                Value::Text(text) => Ok(text.clone()),
+                Value::Text(text) if !text.ends_with("...") => Ok(text.clone()),
                 Value::Whole(whole) => Ok(whole.to_string().into()),
-                _ => Err(wrong()),
+                _ => Err(wrong(item)),
             };
             items.iter().map(name).collect::<Result<_, _>>()?
         }
         Value::Numbers(numbers) => numbers.iter().map(|number| number.to_string().into()).collect(),
         Value::Null => Vec::new(),
-        _ => return Err(wrong()),
+        _ => return Err(wrong(node)),
     };
     let mut sorted: Vec<&str> = names.iter().map(|name| &**name).collect();
     sorted.sort_unstable();
@@ -248,7 +250,6 @@ fn numbers(node: &Node, key: &str) -> Result<Vec<f64>, PlacedProblem> {
         Value::Null => Ok(Vec::new()),
         Value::List(items) => {
             let number = |item: &Node| match &item.value {
-                Value::Text(text) if &**text == "..." => Err(PlacedProblem::at(item.line, Problem::ShortenedArray)),
                 // JSON has no literal for NaN.
                 Value::Null => Ok(f64::NAN),
                 _ => item.number().ok_or_else(|| wrong(key, item, "numbers alone")),
@@ -271,7 +272,13 @@ fn rates(node: &Node, key: &str) -> Result<Vec<f64>, PlacedProblem> {
     node.get(key).map_or(Ok(Vec::new()), |values| numbers(values, key))
 }
 
+/// The problem of a value of the wrong kind, or of one that `ros2 topic echo` did not print whole.
 fn wrong(key: &str, node: &Node, expected: &'static str) -> PlacedProblem {
+    if let Value::Text(text) = &node.value
+        && (text.contains("...") || text.starts_with("<sequence type:") || text.starts_with("<array type:"))
+    {
+        return PlacedProblem::at(node.line, Problem::ShortenedArray);
+    }
     PlacedProblem::at(node.line, Problem::Value { key: key.to_owned(), found: node.in_words(), expected })
 }
 

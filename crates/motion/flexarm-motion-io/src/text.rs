@@ -5,7 +5,6 @@ use flexarm_settings::Caveat;
 use crate::assemble::assemble;
 use crate::collect::Collector;
 use crate::error::{MotionError, PlacedProblem, Problem};
-use crate::folder::dropped_note;
 use crate::value::{Node, Value};
 use crate::{MessageMotion, Request, yaml};
 
@@ -95,7 +94,6 @@ fn read(text: &str, origin: &str, request: &Request<'_>) -> Result<MessageMotion
     }
     let (topic, _) = collector.choose()?;
     let dropped = topic.foreign.clone();
-    caveats.extend(dropped_note(&dropped, origin));
     let message = match (topic.received.is_empty(), topic.of) {
         (false, _) => "trajectory_msgs/JointTrajectory",
         (true, "position") => "sensor_msgs/JointState",

@@ -75,6 +75,21 @@ fn a_joint_trajectory_as_text_is_the_motion_of_the_csv() {
     }
 }
 
+/// The robot's joint is renamed, so that the name in the file is misspelt.
+#[test]
+fn a_misspelt_joint_is_an_error_in_every_text_and_every_bag() {
+    let robot = Request { joints: Some(&["joint_1", "jiont_2"]), topic: None };
+    let truth = "\"joint_2\" is not a joint of the robot; did you mean \"jiont_2\"? rename it";
+    for name in ["plan.yaml", "plan_ros1.yaml", "plan.json", "plan_floats.json", "display.yaml", "echo.yaml"] {
+        let found = refusal(read_text(&text(name), name, &robot));
+        assert!(found.contains(truth), "{name}: {found}");
+    }
+    for name in ["states_zstd.mcap", "states_ros1.mcap", "plan.mcap"] {
+        let found = refusal(read_mcap(&data(name), &robot));
+        assert!(found.contains(truth), "{name}: {found}");
+    }
+}
+
 #[test]
 fn json_with_tabs_and_a_state_with_too_few_velocities_are_read() {
     let tabs = text("plan.json").replace("\n ", "\n\t").replace("\t ", "\t\t");
@@ -488,7 +503,23 @@ fn what_is_wrong_with_a_text_is_told_with_its_line() {
         ),
         (
             &format!("{points}- {{positions: [0, 0, '...'], time_from_start: 1.0}}\n"),
-            "t, line 3: an array ends with \"...\": it was shortened when it was printed; print it whole (ros2 topic echo --full-length)",
+            "t, line 3: an array was shortened when it was printed; print it whole (ros2 topic echo --full-length, without --no-arr)",
+        ),
+        (
+            &format!("{points}- {{positions: [0, 0], time_from_start: 0.0}}\n- '...'\n"),
+            "t, line 4: an array was shortened when it was printed; print it whole (ros2 topic echo --full-length,",
+        ),
+        (
+            "joint_names: [joint_1, '...']\npoints: []\n",
+            "t, line 1: an array was shortened when it was printed; print it whole (ros2 topic echo --full-length,",
+        ),
+        (
+            "joint_names: [joint_1]\npoints: '<sequence type: trajectory_msgs/msg/JointTrajectoryPoint, length: 9>'\n",
+            "t, line 2: an array was shortened when it was printed; print it whole (ros2 topic echo --full-length, without --no-arr)",
+        ),
+        (
+            &format!("{points}- {{time_from_start: 1.0}}\n"),
+            "t, line 3: point 1 has no `positions`; expected a position for each joint; ros2 topic echo prints them all with --full-length",
         ),
         (
             &format!("{points}- {{positions: [0, zero], time_from_start: 1.0}}\n"),
@@ -512,7 +543,7 @@ fn what_is_wrong_with_a_text_is_told_with_its_line() {
         ),
         (
             "joint_names: [a, b]\npoints:\n- {positions: [0, 0], time_from_start: 0}\n- {positions: [0, 1], time_from_start: 1}\n",
-            "t: none of the joints \"a\", \"b\" is a joint of the robot",
+            "t: none of the names \"a\", \"b\" is a joint of the robot, which has \"joint_1\", \"joint_2\"",
         ),
     ];
     for (text, expected) in cases {
@@ -549,7 +580,7 @@ fn what_is_wrong_with_a_bag_is_told() {
     let other = Request { joints: Some(&["axis_1"]), topic: None };
     let found = refusal(read_mcap(&data("states_zstd.mcap"), &other));
     assert!(
-        found.contains("none of the joints \"gripper_finger_joint\", \"joint_1\", \"joint_2\" is a joint of the robot"),
+        found.contains("none of the names \"gripper_finger_joint\", \"joint_1\", \"joint_2\" is a joint of the robot"),
         "{found}"
     );
     let found = refusal(read_folder(&data(""), &ROBOT));

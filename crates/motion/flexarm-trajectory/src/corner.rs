@@ -106,11 +106,13 @@ impl<'a> Samples<'a> {
     /// Whether the samples around i equal a cubic within rounding: then the apparent corner is a
     /// rounding step.
     fn is_rounding(&self, i: usize) -> bool {
-        self.resolution > 0.0
-            && WINDOWS.iter().any(|window| {
-                let range = i.saturating_sub(*window)..(i + window + 1).min(self.q.len());
-                distance_from_cubic(&self.t[range.clone()], &self.q[range]) < BEYOND_ROUNDING * self.resolution
-            })
+        WINDOWS.iter().any(|window| {
+            let range = i.saturating_sub(*window)..(i + window + 1).min(self.q.len());
+            let (t, q) = (&self.t[range.clone()], &self.q[range]);
+            // Numbers of a fixed count of significant digits have a step that depends on their size.
+            let step = self.resolution.max(resolution(q));
+            step > 0.0 && distance_from_cubic(t, q) < BEYOND_ROUNDING * step
+        })
     }
 
     fn corner_at(&self, i: usize) -> Option<Corner> {
@@ -138,7 +140,7 @@ impl<'a> Samples<'a> {
 
 /// Resolution of positions that are multiples of a step plus an offset: decimals of a table, counts
 /// of an encoder. 0 if there is no significant one.
-fn resolution(q: &[f64]) -> f64 {
+pub(crate) fn resolution(q: &[f64]) -> f64 {
     let differences = || q.windows(2).map(|pair| (pair[1] - pair[0]).abs());
     let least = 1e-5 * differences().fold(0.0, f64::max);
     // Euclid's algorithm; remainders within `least` of zero or of a full multiple count as zero.

@@ -42,10 +42,9 @@
 //! * mathematics: [`Trajectory`] (sampling, time scaling, moves and holds), [`Plan`] (quintic,
 //!   trapezoid and S-curve moves, via points), [`Samples`] (splines through sampled joint values),
 //!   [`JointPeak`], [`LimitViolation`];
-//! * files: [`Trajectory::from_path`], [`Trajectory::parse_csv`], [`Trajectory::parse_toml`],
-//!   [`Trajectory::to_csv`], [`Trajectory::to_waypoints_toml`], [`Trajectory::parse_table`] for
-//!   tables of other programs. The module pages [`csv_file`], [`waypoints`] and [`table`] describe
-//!   the formats.
+//! * files: [`Trajectory::from_path`], [`Trajectory::parse_table`], [`Trajectory::parse_toml`],
+//!   [`Trajectory::to_csv`], [`Trajectory::to_waypoints_toml`]. The module pages [`waypoints`] and
+//!   [`table`] describe the formats; [`foreign_joints`] is the rule for names of joints.
 //!
 //! Units: s, rad, rad/s, rad/s² (m, m/s, m/s² for a prismatic joint) everywhere except inside the
 //! files. Not here: robots, links and inverse kinematics; a trajectory knows only the names of its
@@ -54,15 +53,16 @@
 mod barrier;
 mod column_map;
 mod corner;
-pub mod csv_file;
 mod csv_write;
 mod curve;
 mod error;
 mod file;
 mod gap;
 pub mod jerk_law;
+mod joint_names;
 mod leg;
 mod limits;
+mod noise;
 mod optimal;
 mod peak;
 mod plan;
@@ -86,11 +86,13 @@ pub use column_map::{ColumnMap, ColumnMapError};
 pub use curve::LONGEST;
 pub use error::{FileError, TrajectoryError};
 pub use file::{bytes_of_file, text_of_bytes, text_of_file};
+pub use joint_names::{NameError, foreign_joints};
 pub use limits::{JointLimits, LimitKind, LimitViolation};
+pub use noise::Noise;
 pub use peak::{Extreme, JointPeak};
 pub use plan::{MotionLimits, Plan, PlannedMove, Profile};
 pub use problem::{PlanError, Problem, SampleError};
-pub use spline::{JointKnots, JointSamples, Samples};
+pub use spline::{JointKnots, JointSamples, Samples, velocity_mismatch};
 pub use table::{KnownJoint, TableInfo, TableRequest};
 pub use trajectory::{Move, Trajectory, VelocityJump};
 pub use warning::Warning;
@@ -99,6 +101,7 @@ pub use warning::Warning;
 #[doc(hidden)]
 pub mod internals {
     pub use crate::corner::{Corner, corners};
+    pub use crate::noise::noise;
     pub use crate::polynomial::{Few, Piece, roots_in_unit_interval};
     pub use crate::via::{passing_times, rest_to_rest_spline};
 }

@@ -5,6 +5,7 @@
 use flexarm_settings::Setting;
 
 use crate::curve::LONGEST;
+use crate::joint_names::NameError;
 use crate::polynomial::FARTHEST;
 
 /// A problem in a file; the message includes the remedy.
@@ -17,23 +18,6 @@ pub enum Problem {
     /// Nothing but blank lines and comments.
     #[error("the file is empty; expected a header `time,<joint>,...` and at least two rows")]
     Empty,
-    /// The header has no time column.
-    #[error("no column `time` in the header {}; the first line must name the columns: `time,<joint>,...`", list(found))]
-    NoTimeColumn {
-        /// Columns of the header.
-        found: Vec<String>,
-    },
-    /// Columns are not separated by commas.
-    #[error(
-        "the columns are separated by {separator:?}, expected commas (and points in decimal numbers); export the file again or replace them"
-    )]
-    WrongSeparator {
-        /// The separator found.
-        separator: char,
-    },
-    /// Column without a name.
-    #[error("a column has no name; name each column of the header or remove the comma too much")]
-    UnnamedColumn,
     /// Repeated column name.
     #[error("the column is called {name:?}, as column {first} is; remove or rename one of them")]
     RepeatedColumn {
@@ -187,7 +171,7 @@ pub enum Problem {
         list(found),
         Setting::Columns
     )]
-    NoTimeColumnFound {
+    NoTimeColumn {
         /// Columns of the header.
         found: Vec<String>,
     },
@@ -201,20 +185,9 @@ pub enum Problem {
         /// Time columns.
         columns: Vec<String>,
     },
-    /// No column matches a joint.
-    #[error(
-        "no column of the header {} is a joint: the joints are {}; rename the columns, or name them: {} \
-         <joint>=<column>",
-        list(found),
-        list(joints),
-        Setting::Columns
-    )]
-    NoJointColumn {
-        /// Columns of the header.
-        found: Vec<String>,
-        /// Joints of the robot.
-        joints: Vec<String>,
-    },
+    /// Names that do not fit the robot.
+    #[error(transparent)]
+    Names(NameError),
     /// Requested column that does not exist.
     #[error("there is no column {asked:?}; the header has {}", list(found))]
     NoSuchColumn {
@@ -322,6 +295,16 @@ pub enum SampleError {
         found: usize,
         /// Number of times.
         expected: usize,
+    },
+    /// Cut-off of a smoothing that the samples do not resolve.
+    #[error(
+        "a smoothing with a cut-off of {found} Hz; expected more than 0 and less than half the sampling rate, {most_hz:.4} Hz"
+    )]
+    Cutoff {
+        /// Cut-off given (Hz).
+        found: f64,
+        /// Half the sampling rate (Hz).
+        most_hz: f64,
     },
     /// Accelerations without velocities.
     #[error(

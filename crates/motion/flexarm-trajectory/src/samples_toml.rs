@@ -9,9 +9,10 @@
 //! time = [0.0, 0.01, 0.02]                                # s
 //! position = [[0.0, 0.0], [0.1, -0.2], [0.2, -0.4]]       # a row per time, a number per joint
 //! velocity = [[0.0, 0.0], [10.0, -20.0], [0.0, 0.0]]      # optional, and `acceleration` with it
+//! # cutoff_hz = 20.0                                      # smooths recorded positions
 //! ```
 //!
-//! Equivalent to samples in CSV ([`crate::csv_file`]): quintics between the rows.
+//! Equivalent to samples in CSV ([`crate::table`]): quintics between the rows.
 
 use serde::Deserialize;
 use toml::Spanned;
@@ -44,6 +45,8 @@ struct SamplesToml {
     position: Spanned<Vec<Vec<f64>>>,
     velocity: Option<Spanned<Vec<Vec<f64>>>>,
     acceleration: Option<Spanned<Vec<Vec<f64>>>>,
+    /// Cut-off of a smoothing of the positions (Hz).
+    cutoff_hz: Option<f64>,
 }
 
 /// Whether the text holds samples instead of moves.
@@ -55,7 +58,7 @@ pub(crate) fn has_samples(text: &str) -> bool {
 pub(crate) fn trajectory(file: &SamplesFileToml) -> Result<Trajectory, Located> {
     let names = joint_names(&file.joints)?;
     let scales = scales(&file.unit, &file.metres, &names)?;
-    let SamplesToml { time, position, velocity, acceleration } = file.samples.get_ref();
+    let SamplesToml { time, position, velocity, acceleration, cutoff_hz } = file.samples.get_ref();
     let columns = |rows: &Spanned<Vec<Vec<f64>>>, key: &'static str| -> Result<Vec<Vec<f64>>, Located> {
         let (found, expected) = (rows.get_ref().len(), time.get_ref().len());
         if found != expected {
@@ -80,7 +83,11 @@ pub(crate) fn trajectory(file: &SamplesFileToml) -> Result<Trajectory, Located> 
         acceleration: acceleration.as_ref().map(|columns| columns[k].clone()),
     };
     let samples = Samples { times: time.get_ref().clone(), joints: names.iter().enumerate().map(joint).collect() };
-    samples.interpolate().map_err(|error| {
+    let made = match cutoff_hz {
+        Some(hz) => samples.smoothed(*hz).map_err(Into::into).and_then(|smooth| smooth.interpolate()),
+        None => samples.interpolate(),
+    };
+    made.map_err(|error| {
         let problem = match error {
             TrajectoryError::Samples(error) => Problem::Samples(error),
             TrajectoryError::OutOfRange { joint, .. } => Problem::OutOfRange { joint },

@@ -23,13 +23,17 @@
 //! acceleration, and the velocity jumps in between. Given velocities and accelerations next to a
 //! corner are not used, since it is unknown which side they belong to.
 
+use std::borrow::Cow;
+
 use crate::corner::{Corner, corners};
 use crate::curve::Curve;
 use crate::error::TrajectoryError;
 use crate::gap::gaps;
+use crate::noise::{MAX_SHARE, noise, smoothed, without_rounding};
 use crate::polynomial::Piece;
 use crate::problem::SampleError;
 use crate::trajectory::Trajectory;
+use crate::warning::Warning;
 
 /// An end with a speed below this fraction of the top speed is at rest.
 const REST_FRACTION: f64 = 0.02;
@@ -75,11 +79,36 @@ impl Samples {
     pub fn interpolate(&self) -> Result<Trajectory, TrajectoryError> {
         self.check()?;
         let knots: Vec<f64> = self.times.iter().map(|t| t - self.times[0]).collect();
-        let curve = |joint: &JointSamples| joint.curve(&knots);
-        let curves = self.joints.iter().map(curve).collect();
+        let (curves, notes): (Vec<Curve>, Vec<Option<Warning>>) = (self.joints.iter())
+            .map(|joint| {
+                let (joint, note) = joint.judged(&knots);
+                (joint.curve(&knots), note)
+            })
+            .unzip();
         let names = self.joints.iter().map(|joint| joint.name.clone()).collect();
-        let notes = gaps(&knots, &self.joints).into_iter().collect();
+        let notes = gaps(&knots, &self.joints).into_iter().chain(notes.into_iter().flatten()).collect();
         Trajectory::from_curves(names, curves, knots[knots.len() - 1], notes)
+    }
+
+    /// Returns the samples with smoothed positions, which pass half the amplitude at the cut-off;
+    /// velocities and accelerations follow from them. Holds are kept.
+    ///
+    /// # Errors
+    /// [`SampleError`] as [`Samples::interpolate`], and for a cut-off that is not between 0 and half
+    /// the sampling rate.
+    pub fn smoothed(&self, cutoff_hz: f64) -> Result<Self, SampleError> {
+        self.check()?;
+        let n = self.times.len();
+        let most_hz = 0.5 * (n - 1) as f64 / (self.times[n - 1] - self.times[0]);
+        if !(cutoff_hz > 0.0 && cutoff_hz < most_hz) {
+            return Err(SampleError::Cutoff { found: cutoff_hz, most_hz });
+        }
+        let joint = |joint: &JointSamples| JointSamples {
+            name: joint.name.clone(),
+            position: smoothed(&self.times, &joint.position, cutoff_hz),
+            ..JointSamples::default()
+        };
+        Ok(Self { times: self.times.clone(), joints: self.joints.iter().map(joint).collect() })
     }
 
     /// Checks the preconditions of [`Samples::interpolate`].
@@ -107,6 +136,35 @@ impl Samples {
         }
         Ok(())
     }
+}
+
+/// Maximum step (s) and minimum number of samples for which velocities are compared with slopes.
+const DENSE: (f64, usize) = (0.1, 6);
+/// Velocities are foreign if they differ from the slopes by more than this part of the slopes and
+/// this (rad/s or m/s).
+const FOREIGN: [f64; 2] = [0.5, 0.02];
+
+/// Returns the RMS difference of velocities to the slopes between samples, and the RMS slope.
+pub fn velocity_mismatch(t: &[f64], q: &[f64], v: &[f64]) -> [f64; 2] {
+    let n = (t.len() - 1) as f64;
+    let (mut slopes, mut misses) = (0.0, 0.0);
+    for i in 1..t.len() {
+        let slope = (q[i] - q[i - 1]) / (t[i] - t[i - 1]);
+        slopes += slope * slope / n;
+        misses += (slope - 0.5 * (v[i] + v[i - 1])).powi(2) / n;
+    }
+    [f64::sqrt(misses), f64::sqrt(slopes)]
+}
+
+/// The same for velocities that do not belong to densely sampled positions: of another sign or
+/// unit, or zeros.
+fn foreign(t: &[f64], q: &[f64], v: &[f64]) -> Option<[f64; 2]> {
+    let (n, lasts) = (t.len(), t[t.len() - 1] - t[0]);
+    if n < DENSE.1 || lasts > DENSE.0 * (n - 1) as f64 {
+        return None;
+    }
+    let [miss, slope] = velocity_mismatch(t, q, v);
+    (miss > FOREIGN[0] * slope + FOREIGN[1]).then_some([miss, slope])
 }
 
 /// Exact values of one joint at knots: nothing is estimated, no corners are searched for.
@@ -169,6 +227,26 @@ impl JointSamples {
             }
         }
         Ok(())
+    }
+}
+
+impl JointSamples {
+    /// The samples without velocities that are not theirs and without the noise of rounding, and
+    /// what is to be said about velocities and noise.
+    fn judged(&self, times: &[f64]) -> (Cow<'_, Self>, Option<Warning>) {
+        let (joint, position) = (self.name.clone(), &self.position);
+        if let Some(velocity) = &self.velocity {
+            let Some([miss, slope]) = foreign(times, position, velocity) else { return (Cow::Borrowed(self), None) };
+            let bare = Self { name: joint.clone(), position: position.clone(), ..Self::default() };
+            return (Cow::Owned(bare), Some(Warning::ForeignVelocities { joint, miss, slope }));
+        }
+        let Some(noise) = noise(times, position).filter(|noise| noise.share > MAX_SHARE) else {
+            return (Cow::Borrowed(self), None);
+        };
+        match without_rounding(times, position, &noise) {
+            Some(position) => (Cow::Owned(Self { position, ..self.clone() }), None),
+            None => (Cow::Borrowed(self), Some(Warning::Noise { joint, noise })),
+        }
     }
 }
 

@@ -195,6 +195,16 @@ impl Trajectory {
         })
     }
 
+    /// Returns the same motion without some joints.
+    #[must_use]
+    pub fn without_joints(&self, names: &[String]) -> Self {
+        let mut rest = self.clone();
+        rest.joints.retain(|joint| !names.contains(joint));
+        let kept = self.joints.iter().zip(&self.curves).filter(|(joint, _)| !names.contains(joint));
+        rest.curves = kept.map(|(_, curve)| curve.clone()).collect();
+        rest
+    }
+
     /// Returns the same motion with additional joints, each held at the given position (rad or m)
     /// from start to end.
     ///

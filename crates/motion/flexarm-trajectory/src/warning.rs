@@ -5,6 +5,7 @@ use std::fmt;
 use flexarm_settings::Setting;
 
 use crate::curve::{Curve, QUIET_SPEED};
+use crate::noise::Noise;
 
 /// Jumps below this fraction of the peak acceleration are rounding errors.
 const QUIET_JUMP: f64 = 1e-6;
@@ -49,13 +50,6 @@ pub enum Warning {
         /// Number of knots with a jump.
         count: usize,
     },
-    /// A CSV file without a `# unit:` line holds values that are large for radians.
-    LooksLikeDegrees {
-        /// Joint name.
-        joint: String,
-        /// Maximum absolute position as read, rad.
-        largest: f64,
-    },
     /// A table does not state the unit of these joints.
     AssumedRadians {
         /// Names of the joints.
@@ -92,6 +86,22 @@ pub enum Warning {
         to_s: f64,
         /// Usual sampling interval, s.
         usual_s: f64,
+    },
+    /// Noise of the positions makes a considerable part of the acceleration.
+    Noise {
+        /// Joint name.
+        joint: String,
+        /// The noise.
+        noise: Noise,
+    },
+    /// Velocities that are not the slopes of the positions are not used.
+    ForeignVelocities {
+        /// Joint name.
+        joint: String,
+        /// RMS difference to the slopes, rad/s or m/s.
+        miss: f64,
+        /// RMS slope, rad/s or m/s.
+        slope: f64,
     },
     /// The last row of a table is incomplete.
     CutRow {
@@ -137,7 +147,7 @@ impl fmt::Display for Warning {
             ),
             Self::VelocityJumps { joint, time_s, jump, count } => write!(
                 f,
-                "the velocity of joint {joint:?} jumps at {count} {times}, most at t = {time_s:.4} s by {jump:.4} rad/s \
+                "the velocity of joint {joint:?} jumps at {count} {times}, most at t = {time_s:.4} s by {jump:.3e} rad/s \
                  (or m/s): no drive can do that, and the arm is struck with just this impulse; round the corners ({setting}), or \
                  give samples of a motion without them",
                 times = if *count == 1 { "time" } else { "times" },
@@ -147,11 +157,6 @@ impl fmt::Display for Warning {
                 f,
                 "the acceleration of joint {joint:?} jumps at {count} times, most at t = {time_s:.4} s by {jump:.3e}, \
                  which excites every mode: use `rounding`, another profile, or data with continuous accelerations"
-            ),
-            Self::LooksLikeDegrees { joint, largest } => write!(
-                f,
-                "joint {joint:?} reaches {largest:.4} rad in a file that does not state its unit: \
-                 add the line `# unit: deg` or `# unit: rad` at its top"
             ),
             Self::AssumedRadians { joints } => write!(
                 f,
@@ -183,6 +188,18 @@ impl fmt::Display for Warning {
                     sample + 1
                 )
             }
+            Self::Noise { joint, noise: Noise { rms, share, cutoff_hz } } => write!(
+                f,
+                "joint {joint:?} has noise of {rms:.1e} rad (or m) in its positions, which makes {:.0} % of its acceleration: \
+                 smooth it with a cut-off in the file, such as `# cutoff: {cutoff_hz:.2} Hz` in a table or `cutoff_hz` in \
+                 [samples]",
+                100.0 * share
+            ),
+            Self::ForeignVelocities { joint, miss, slope } => write!(
+                f,
+                "the velocities of joint {joint:?} are not those of its positions (they differ by {miss:.3} of {slope:.3} \
+                 rad/s or m/s) and are not used; check their sign and unit, or leave them out"
+            ),
             Self::CutRow { line } => {
                 write!(f, "the last row (line {line}) is not whole and is left out: the file was cut off")
             }

@@ -8,6 +8,7 @@ mod csv;
 mod gap;
 mod jerk_law;
 mod motion;
+mod noise;
 mod polynomial;
 mod table;
 mod time_law;

@@ -147,9 +147,8 @@ fn our_own_format_is_read_as_ever() {
     let (motion, info) = Trajectory::parse_table(text, "own", &request(None)).unwrap();
     assert_eq!(motion, Trajectory::parse_csv(text, "own").unwrap());
     assert_eq!(info.format, "CSV samples");
-    // A joint that the robot lacks is kept: the caller rejects it.
     let (motion, _) = Trajectory::parse_table("time,joint_1,axis\n0,0,0\n1,1,1\n", "own", &request(None)).unwrap();
-    assert_eq!(motion.joints(), ["joint_1", "axis"]);
+    assert_eq!((motion.joints(), dropped(&motion)), (&["joint_1".to_owned()][..], vec!["axis".to_owned()]));
 }
 
 #[test]
@@ -245,10 +244,10 @@ fn what_a_table_leaves_open_is_refused_with_its_place() {
         ),
         (
             "t[s];x;y\n0;1;1\n1;2;2\n",
-            "f, line 1: no column of the header \"t[s]\", \"x\", \"y\" is a joint: the joints are \"joint_1\", \"joint_2\", \"rail\"",
+            "f, line 1: none of the names \"t[s]\", \"x\", \"y\" is a joint of the robot, which has \"joint_1\", \"joint_2\", \"rail\"",
         ),
         ("0 1 2\n1 2 3\n", "f, line 1: the table has 3 columns of numbers and no header"),
-        ("t[s];joint_1[%]\n0;1\n1;2\n", "f, line 1: no column of the header"),
+        ("t[s];joint_1[%]\n0;1\n1;2\n", "f, line 1, column 2: \"joint_1[%]\" is not a joint"),
         (
             "t[s];rail[deg]\n0;1\n1;2\n",
             "f, line 1: the column \"rail[deg]\" has the unit of an angle; expected a length: the joint is prismatic",
@@ -460,4 +459,35 @@ fn rates_and_paths_of_topics_lead_to_their_joint() {
         (&["joint_1", "A1", "A2"].map(String::from)[..], vec!["/joint_states/joint_1/effort".into()])
     );
     assert_eq!(state(&motion, 0.0)[1], [0.5, 0.25, PI / 2.0]);
+}
+
+/// Each separator, with and without units: the same names, the same answer.
+#[test]
+fn a_misspelt_joint_is_an_error_whatever_the_separator_and_a_gripper_is_left_out() {
+    let table = |separator: &str, names: &[&str]| {
+        let rows =
+            [names.join(separator), vec!["0"; names.len()].join(separator), vec!["1"; names.len()].join(separator)];
+        Trajectory::parse_table(&rows.join("\n"), "f", &request(None)).map(|(motion, _)| motion)
+    };
+    for separator in [",", ";", "\t", " "] {
+        for (time, unit) in [("time", ""), ("t[s]", "[rad]")] {
+            let named = |joint: &str| format!("{joint}{unit}");
+            let error = table(separator, &[time, &named("joint_1"), &named("jiont_2")]).unwrap_err().to_string();
+            assert!(error.contains("line 1, column 3") && error.contains("did you mean \"joint_2\"?"), "{error}");
+            assert!(error.contains(&format!("columns joint_2=jiont_2{unit}")), "{error}");
+            let error = table(separator, &[time, &named("joint_1"), &named("Joint_1.vel")]).unwrap_err().to_string();
+            assert!(error.contains("did you mean \"joint_1\"?"), "{error}");
+            let motion = table(separator, &[time, &named("joint_1"), &named("joint_2"), &named("gripper")]).unwrap();
+            assert_eq!(dropped(&motion), [named("gripper")]);
+            // All joints that this name could mean have their columns.
+            let motion = table(separator, &[time, &named("joint_1"), &named("joint_2"), &named("joint_3")]).unwrap();
+            assert_eq!(dropped(&motion), [named("joint_3")]);
+        }
+    }
+}
+
+#[test]
+fn a_rate_before_its_position_has_the_unit_of_the_position() {
+    let motion = read("t[s];a.vel;a[deg]\n0;90;0\n1;90;90\n").unwrap();
+    assert_eq!(state(&motion, 0.0)[1], [PI / 2.0]);
 }

@@ -24,6 +24,9 @@ use crate::tree::Body;
 
 /// Relative tolerance of the checks, that of single-precision files.
 const TOLERANCE: f64 = 1e-6;
+/// Range of the mass of an arm over the volume of its outer shape (kg/m³): castings with drives in
+/// them have 800 to 3000.
+const SOLID: std::ops::RangeInclusive<f64> = 150.0..=9000.0;
 
 /// Returns the inertia of each link; `None` for massless frames. Faults go to the report.
 ///
@@ -310,6 +313,16 @@ fn fill_from_shapes(
         InertiaEstimate::Density(density) => density,
         InertiaEstimate::TotalMass(mass) => mass / volume,
     };
+    let judged = !by_length && matches!(estimate, InertiaEstimate::TotalMass(_));
+    if let Some((first, _)) = filled.first().filter(|_| judged && !SOLID.contains(&density)) {
+        let message = format!(
+            "the shapes of the links have {volume:.3e} m3 in all, {density:.3} kg/m3; arms have {} to {} by their outer shape",
+            SOLID.start(),
+            SOLID.end()
+        );
+        let help = "check the scale of the meshes and the mass: a robot four times too large has a 64th of its density";
+        report.warning(&robot.links[*first].place, "estimated-density", message, help);
+    }
     for (i, M_L) in filled {
         let inertia =
             LinkInertia { mass: M_L.mass * density, com: M_L.com(), inertia_com: M_L.inertia_com() * density };

@@ -337,6 +337,12 @@ fn inertia_is_estimated_from_shapes_on_request() {
     assert_relative_eq!(robot.mechanism.link("arm").unwrap().inertia.unwrap().mass, 10.0, max_relative = 1e-14);
     assert_relative_eq!(robot.mechanism.link("base").unwrap().inertia.unwrap().mass, 20.0, max_relative = 1e-14);
 
+    // Lengths four times too large make a density of a 64th.
+    assert!(robot.warnings.iter().all(|found| found.code != "estimated-density"));
+    let found = parse_urdf(&with_base, "r.urdf", &total(30.0 / 64.0)).unwrap().warnings;
+    let told = found.iter().find(|found| found.code == "estimated-density").unwrap();
+    assert!(told.message.contains("3.255 kg/m3") && told.severity == Severity::Warning, "{told:?}");
+
     for (text, options, code) in [
         (&text, total(-1.0), "bad-estimate"),
         (&text.replace("<visual>", "<collision>").replace("</visual>", "</collision>"), density, "missing-inertial"),

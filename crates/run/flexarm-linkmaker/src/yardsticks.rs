@@ -14,6 +14,11 @@ pub const OSMIUM: f64 = 22_600.0;
 /// links reach 0.43 with 0.02 of the nodes.
 const SPREAD: f64 = 0.25;
 const SHARE: f64 = 0.1;
+/// Largest distance of the centre of mass from the origin, and radius of gyration, over the distance
+/// of the interfaces from the origin or from each other.
+const BEYOND: f64 = 5.0;
+/// Largest distance of an interface's point from the centroid of its nodes, over their extent.
+const BESIDE: f64 = 2.0;
 
 /// Returns the speed of sound along a link according to its stiffness in the stiffest of three
 /// directions, `l √(k/m)` (m/s); `None` if `K` is not positive definite or the result is not
@@ -55,6 +60,19 @@ pub(crate) fn of_link(link: &ReducedLink, whole: &RigidPart) -> Vec<Doubt> {
         );
         doubts.push(Doubt::found("link-sound", speed, yardstick, said));
     }
+    let (com, gyration) = (whole.com.norm(), (whole.inertia.symmetric_eigenvalues().max() / whole.mass).sqrt());
+    let size = [link.X_LA, link.X_LB].map(|X| X.translation.vector.norm()).into_iter().fold(length, f64::max);
+    for (code, what, value) in
+        [("link-com", "its centre of mass is", com), ("link-gyration", "its radius of gyration is", gyration)]
+    {
+        if whole.mass > 0.0 && size > 0.0 && value > BEYOND * size {
+            let said = format!(
+                "{what} {value:.3e} m, with interfaces within {size:.3e} m: expected at most {BEYOND} times that (lengths in mm, \
+                 or inertia in kg mm2?)"
+            );
+            doubts.push(Doubt::found(code, value, BEYOND * size, said));
+        }
+    }
     let density = least_density(whole.mass, &whole.inertia);
     if density.is_finite() && density > OSMIUM {
         let said = format!(
@@ -64,6 +82,19 @@ pub(crate) fn of_link(link: &ReducedLink, whole: &RigidPart) -> Vec<Doubt> {
         doubts.push(Doubt::found("link-density", density, OSMIUM, said));
     }
     doubts
+}
+
+/// Returns a warning about an interface whose point is far from its nodes.
+///
+/// * `off`: distance from their centroid (m). `extent`: diagonal of their box (m).
+pub(crate) fn of_point(name: &str, off: f64, extent: f64) -> Option<Doubt> {
+    (extent > 0.0 && off > BESIDE * extent).then(|| {
+        let said = format!(
+            "the point of interface {name:?} is {off:.3e} m from the centroid of its nodes, which extend over {extent:.3e} m: \
+             expected at most {BESIDE} times that (another unit or another interface?)"
+        );
+        Doubt::found("interface-point", off, BESIDE * extent, said)
+    })
 }
 
 /// Returns a warning about an interface that is a section of the link rather than a seat: its nodes

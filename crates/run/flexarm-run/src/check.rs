@@ -15,6 +15,7 @@ use crate::caveat::{self, Caveat};
 use crate::drive_entry::DriveKind;
 use crate::error::Error;
 use crate::loops;
+use crate::monitor::stress::StressMonitor;
 use crate::motion::Motion;
 use crate::motion_formats::{self, MotionFile, MotionOptions};
 use crate::options::Modelling;
@@ -215,6 +216,9 @@ fn check_flexible(robot: &Robot, motion: Option<&Motion>, findings: &mut Vec<Fin
             if !hz.is_empty() {
                 let message = format!("first frequencies {words} {:.2?} Hz", &hz[..hz.len().min(4)]);
                 findings.push(Finding::note("modes", file, message));
+            }
+            if let Err(error) = StressMonitor::new(&posed.flexible, &posed.arm) {
+                findings.push(Finding::error("stress", robot.path.display().to_string(), &error));
             }
             let caveats = posed.flexible.link_caveats().into_iter().chain(posed.validity(&linear));
             findings.extend(caveats.map(|caveat| Finding::caveat(&robot.path, caveat)));

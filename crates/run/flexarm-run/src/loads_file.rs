@@ -201,10 +201,14 @@ fn axes(entry: &Spanned<LoadEntry>, source: &Source) -> Result<LoadAxes, RobotFi
 /// Caveats about angles that look like degrees: the phase of a sine, arguments of sin and cos in
 /// expressions.
 fn doubts(e: &LoadEntry) -> Vec<Caveat> {
-    let parts = [&e.fx, &e.fy, &e.fz, &e.tx, &e.ty, &e.tz];
-    let sines = parts.into_iter().flatten().flat_map(|text| sines(text.get_ref()));
-    let doubtful = sines.filter_map(|(text, rate, phase)| caveat::loads::of_sine(&text, rate, phase));
+    let doubtful = sines_of(e).filter_map(|(text, rate, phase)| caveat::loads::of_sine(&text, rate, phase));
     caveat::loads::of_phase(e.phase).into_iter().chain(doubtful).collect()
+}
+
+/// The sines and cosines in all expressions of a load; see [`sines`].
+fn sines_of(e: &LoadEntry) -> impl Iterator<Item = (String, f64, f64)> + '_ {
+    let parts = [&e.fx, &e.fy, &e.fz, &e.tx, &e.ty, &e.tz];
+    parts.into_iter().flatten().flat_map(|text| sines(text.get_ref()))
 }
 
 /// Sines and cosines of an expression whose argument is linear in t, as text, rate (1/s) and value
@@ -365,7 +369,8 @@ impl Reading<'_> {
     fn expression(&self, duration: f64) -> Result<Curve, Error> {
         let value = expression(self.entry.get_ref(), self.source, (self.start, self.end))?;
         let bends = jumps_of(&*value, self.start.max(0.0), self.end.min(duration));
-        Ok(Curve { value, bends, period: EXPRESSION_PERIOD })
+        let periods = sines_of(self.entry.get_ref()).map(|(_, rate, _)| TAU / rate.abs());
+        Ok(Curve { value, bends, period: periods.fold(EXPRESSION_PERIOD, f64::min) })
     }
 }
 
@@ -410,7 +415,7 @@ fn stray_key(e: &LoadEntry, kind: &str) -> Option<(&'static str, &'static str)> 
     keys.iter().find(stray).map(|(key, _, kinds)| (*key, *kinds))
 }
 
-/// Assumed period of an expression, whose content is unknown, for the reference stepper (s).
+/// Assumed longest period of an expression, whose content is unknown, for the reference stepper (s).
 pub(crate) const EXPRESSION_PERIOD: f64 = 5e-3;
 /// Maximum length of an expression (characters).
 const LONGEST_EXPRESSION: usize = 2000;

@@ -5,11 +5,11 @@ use std::sync::Arc;
 
 use flexarm_kinematics::{Coordinate, Model};
 use flexarm_stepping::PrescribedMotion;
-use flexarm_trajectory::{JointLimits, JointSamples, KnownJoint, LimitViolation, Samples, Trajectory};
+use flexarm_trajectory::{JointLimits, JointSamples, KnownJoint, LimitViolation, Samples, Trajectory, foreign_joints};
 
 use crate::caveat::{self, Caveat};
 use crate::error::{Error, PoseError, ValueError};
-use crate::motion_formats::{self, MotionFile, MotionOptions, ReadMotion, refuse_dependent, unknown_joints};
+use crate::motion_formats::{self, MotionFile, MotionOptions, ReadMotion, refuse_dependent};
 use crate::robot::Robot;
 use crate::tool_path::{Cell, ToolPath};
 
@@ -164,17 +164,21 @@ impl Motion {
         let read = motion_formats::read(&file)?;
         let ReadMotion { trajectory, format, topic, samples, dropped, caveats, tool_path } = read;
         trajectory.check_units(&path.display().to_string(), &joints)?;
-        let motion = Self::of(trajectory, path, model, hold)?;
-        Ok(Self { format, topic, samples, dropped, notes: caveats, tool_path: tool_path.map(Arc::new), ..motion })
+        let mut motion = Self::of(trajectory, path, model, hold)?;
+        motion.dropped.extend(dropped);
+        Ok(Self { format, topic, samples, notes: caveats, tool_path: tool_path.map(Arc::new), ..motion })
     }
 
     fn of(trajectory: Trajectory, path: &Path, model: &Model, hold: &[(String, f64)]) -> Result<Self, Error> {
         let actuated = &model.coordinates()[..model.n_actuated()];
         let limits = limits(model);
         let names: Vec<&str> = actuated.iter().map(|c| c.joint.as_str()).collect();
-        let warnings = warnings(&trajectory, path);
         let dependent: Vec<&str> = model.dependent().iter().map(|c| c.joint.as_str()).collect();
-        check_joints(path, trajectory.joints(), &names, &dependent)?;
+        refuse_dependent(path, trajectory.joints(), &names, &dependent)?;
+        let dropped = foreign_joints(trajectory.joints(), &names)
+            .map_err(|e| Error::File { path: path.to_owned(), what: e.to_string() })?;
+        let trajectory = trajectory.without_joints(&dropped);
+        let warnings = warnings(&trajectory, path);
         let still = actuated.iter().filter(|c| !trajectory.joints().contains(&c.joint));
         let place = |c: &Coordinate| {
             let told = hold.iter().find(|(joint, _)| *joint == c.joint).map(|(_, value)| *value);
@@ -191,8 +195,7 @@ impl Motion {
         let likely = caveat::motion::degrees(&violations, model);
         let name = path.file_stem().map_or_else(|| "trajectory".into(), |s| s.to_string_lossy().into_owned());
         let (path, trajectory) = (path.to_owned(), Arc::new(trajectory));
-        let made = (String::new(), None, None, Vec::new(), Vec::new());
-        let (format, topic, samples, dropped, notes) = made;
+        let (format, topic, samples, notes) = (String::new(), None, None, Vec::new());
         Ok(Self {
             name,
             path,
@@ -242,7 +245,15 @@ impl Motion {
     pub fn caveats(&self) -> Vec<Caveat> {
         let file = self.path.display().to_string();
         let told = self.warnings.iter().map(|text| Caveat::from_message("trajectory", &file, text, ""));
-        self.notes.iter().cloned().chain(told).chain(self.held_note()).collect()
+        self.notes.iter().cloned().chain(self.dropped_caveat()).chain(told).chain(self.held_note()).collect()
+    }
+
+    fn dropped_caveat(&self) -> Option<Caveat> {
+        let file = self.path.display().to_string();
+        let names: Vec<String> = self.dropped.iter().map(|name| format!("{name:?}")).collect();
+        let message = format!("{file}: joints that the robot does not have are left out: {}", names.join(", "));
+        let help = "a gripper is one; a joint of the arm is not";
+        (!names.is_empty()).then(|| Caveat::from_message("motion-dropped-joints", &file, message, help))
     }
 
     /// Caveats about held joints: a note for positions given in the robot file, a warning for
@@ -266,13 +277,6 @@ impl Motion {
     pub fn prescribed(&self) -> Arc<dyn PrescribedMotion> {
         Arc::new(AlongTrajectory(self.trajectory.clone()))
     }
-}
-
-/// Checks that the motion moves only joints that the robot has.
-fn check_joints(path: &Path, moved: &[String], joints: &[&str], dependent: &[&str]) -> Result<(), Error> {
-    refuse_dependent(path, moved, joints, dependent)?;
-    let unknown: Vec<String> = moved.iter().filter(|name| !joints.contains(&name.as_str())).cloned().collect();
-    if unknown.is_empty() { Ok(()) } else { Err(unknown_joints(path, &unknown, joints)) }
 }
 
 fn warnings(trajectory: &Trajectory, path: &Path) -> Vec<String> {

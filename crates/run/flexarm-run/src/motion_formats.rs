@@ -5,12 +5,11 @@ use std::io::Read;
 use std::path::Path;
 
 use flexarm_motion_io::{
-    MCAP_MAGIC, MessageMotion, MotionError, Problem, Request, SQLITE_MAGIC, ZSTD_MAGIC, looks_like_messages, read_db3,
+    MCAP_MAGIC, MessageMotion, MotionError, Request, SQLITE_MAGIC, ZSTD_MAGIC, looks_like_messages, read_db3,
     read_folder, read_mcap, read_packed, read_text,
 };
 use flexarm_settings::{Caveat, Setting};
 use flexarm_trajectory::{ColumnMap, JointLimits, KnownJoint, TableRequest, Trajectory, text_of_file};
-use flexarm_urdf::closest;
 
 use crate::error::Error;
 use crate::tool_path::{Cell, ToolPath, is_path_file, read_path_file, read_robot_program};
@@ -310,14 +309,7 @@ fn with_request(
 ) -> Result<ReadMotion, Error> {
     let names: Option<Vec<&str>> = file.joints.map(|joints| joints.iter().map(|joint| joint.name).collect());
     let request = Request { joints: names.as_deref(), topic: file.options.topic.as_deref() };
-    let motion = read(&request).map_err(|error| match &error {
-        MotionError::Content { problem, .. } => match &**problem {
-            Problem::NoJoint { names: found } => unknown_joints(file.path, found, names.as_deref().unwrap_or_default()),
-            _ => Error::Motion(error),
-        },
-        _ => Error::Motion(error),
-    })?;
-    let MessageMotion { trajectory, format, topic, message, samples, dropped, caveats } = motion;
+    let MessageMotion { trajectory, format, topic, message, samples, dropped, caveats } = read(&request)?;
     let format = format!("{format}, {message}");
     Ok(ReadMotion { trajectory, format, topic, samples: Some(samples), dropped, caveats, tool_path: None })
 }
@@ -359,19 +351,4 @@ pub(crate) fn refuse_dependent(
          the others out"
     );
     Err(Error::File { path: path.to_owned(), what })
-}
-
-pub(crate) fn unknown_joints(path: &Path, unknown: &[String], joints: &[&str]) -> Error {
-    let meant = |name: &String| match closest(name, joints.iter().copied()) {
-        Some(meant) => format!("{name:?} (did you mean {meant:?}?)"),
-        None => format!("{name:?}"),
-    };
-    let unknown: Vec<String> = unknown.iter().map(meant).collect();
-    let joints = joints.iter().map(|name| format!("{name:?}")).collect::<Vec<_>>().join(", ");
-    let what = format!(
-        "the motion moves {}, which the robot does not have; its joints are {joints}: rename them in the motion, or remove \
-         them",
-        unknown.join(", ")
-    );
-    Error::File { path: path.to_owned(), what }
 }

@@ -38,6 +38,39 @@ const TOOL_DAMPING: CaveatKind = CaveatKind::warning(
     "damping is a ratio: 3 per cent is 0.03",
 );
 
+/// Number of teeth that no milling cutter has.
+const TOOL_TEETH: CaveatKind = CaveatKind::warning(
+    "tool-teeth",
+    "the cutter of {where} has {value} teeth, milling cutters end at {yardstick}",
+    "",
+    "teeth is the number of teeth on the circumference",
+);
+/// Modal mass of a tool outside the usual range.
+const TOOL_MASS: CaveatKind = CaveatKind::warning(
+    "tool-mass",
+    "{where} has a modal mass of {value} kg, the usual range of tools and spindles ends at {yardstick} kg",
+    "kg",
+    "mass and stiffness of a mode belong together: k = m (2 pi f)^2",
+);
+/// Arc of engagement so small that hardly anything is cut.
+const TOOL_ENGAGEMENT: CaveatKind = CaveatKind::warning(
+    "tool-engagement",
+    "a tooth of {where} cuts over {value} rad of a turn, the usual range ends at {yardstick} rad",
+    "rad",
+    "ae is in the lengths of the file, immersion is a ratio to the diameter",
+);
+/// Largest depth of the search far below the diameter.
+const TOOL_DEEPEST: CaveatKind = CaveatKind::warning(
+    "tool-deepest",
+    "limits of {where} are sought up to {value} times its diameter only, less than {yardstick}",
+    "",
+    "deepest is in the lengths of the file",
+);
+
+const TEETH: RangeInclusive<f64> = 1.0..=100.0;
+const MASS: RangeInclusive<f64> = 1e-3..=1e3;
+const ENGAGEMENT: RangeInclusive<f64> = 0.06..=TAU + 1e-9;
+const DEEPEST: RangeInclusive<f64> = 2e-3..=20.0;
 const DIAMETER: RangeInclusive<f64> = 1e-4..=0.5;
 const FREQUENCY: RangeInclusive<f64> = 20.0..=1e5;
 const STIFFNESS: RangeInclusive<f64> = 1e4..=1e10;
@@ -58,10 +91,15 @@ pub fn tool_caveats(tool: &CuttingTool) -> Vec<Caveat> {
         }
     };
     check(&TOOL_DIAMETER, &name, tool.cutter.diameter, &DIAMETER, slip::LENGTH);
+    check(&TOOL_TEETH, &name, tool.cutter.teeth as f64, &TEETH, &[]);
+    let arc = tool.cutter.engagement.exit - tool.cutter.engagement.entry;
+    check(&TOOL_ENGAGEMENT, &name, arc, &ENGAGEMENT, &[]);
+    check(&TOOL_DEEPEST, &name, tool.deepest / tool.cutter.diameter, &DEEPEST, slip::LENGTH);
     for (k, mode) in tool.modes.iter().enumerate() {
         let whose = format!("mode {} of {name}", k + 1);
         check(&TOOL_FREQUENCY, &whose, mode.omega / TAU, &FREQUENCY, TOO_FAST);
         check(&TOOL_STIFFNESS, &whose, mode.mass * mode.omega * mode.omega, &STIFFNESS, TOO_SOFT);
+        check(&TOOL_MASS, &whose, mode.mass, &MASS, &[(1e3, "grams"), (1e-3, "tonnes")]);
         check(&TOOL_DAMPING, &whose, mode.damping_ratio, &DAMPING, TOO_DAMPED);
     }
     found

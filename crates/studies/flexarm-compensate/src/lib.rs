@@ -344,6 +344,10 @@ fn check(scenario: &Scenario, request: &CompensateRequest, arm: &Arc<Arm>) -> Re
     if !(found > 0.0 && found <= LONGEST_STEP_S) {
         return Err(CompensateError::Value { what: "the step", found, expected: "a time of at most 0.004 s" });
     }
+    if let Some(hz) = request.cutoff_hz.filter(|hz| *hz > 0.5 / found) {
+        let expected = "at most half the number of steps per second (Hz)";
+        return Err(CompensateError::Value { what: "the cutoff", found: hz, expected });
+    }
     let found = motion.trajectory.duration();
     if found > LONGEST_S {
         return Err(CompensateError::Value { what: "the duration of the motion", found, expected: "at most 600 s" });

@@ -304,6 +304,9 @@ fn minimise(entry: &Spanned<MinimiseToml>, source: &Source) -> Result<MinimiseEn
     })
 }
 
+/// Keys of a robot file that only name things.
+const LABELS: [&str; 3] = ["name", "format", "urdf"];
+
 fn parameter(entry: &Spanned<ParameterToml>, source: &Source) -> Result<ParameterEntry, RobotFileError> {
     let own = entry.get_ref();
     let fail = |message: String| source.error(entry.span(), message);
@@ -312,6 +315,11 @@ fn parameter(entry: &Spanned<ParameterToml>, source: &Source) -> Result<Paramete
         return Err(fail("a parameter needs a path, such as \"payload.mass\", or paths = [...]".into()));
     };
     let fail = |message: String| source.error(entry.span(), format!("parameter {first:?}: {message}"));
+    if let Some(label) = paths.iter().find(|path| LABELS.contains(&path.as_str())) {
+        return Err(fail(format!(
+            "{label:?} is a label that no result depends on; vary a number of the robot or the run"
+        )));
+    }
     let role = match own.role.as_ref().map(|role| role.get_ref().as_str()) {
         None | Some("value") => Role::Value,
         Some("factor") => Role::Factor,
@@ -355,6 +363,11 @@ fn values(
             let known = known.filter(|known| !known.is_empty()).ok_or_else(|| {
                 source.error(list.span(), "values: expected a list of finite numbers, of strings, or of true and false")
             })?;
+            if known.len() > 1 && known.iter().all(|value| *value == known[0]) {
+                return Err(
+                    source.error(list.span(), "values: all are equal, so that nothing is varied; give different ones")
+                );
+            }
             match word.as_ref().map(|word| word.get_ref().as_str()) {
                 None => Ok((Values::Levels(known), None)),
                 Some("choice") => Ok((Values::Choice(known), None)),

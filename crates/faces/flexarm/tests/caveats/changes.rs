@@ -168,6 +168,16 @@ pub(super) fn set(path: &'static str, text: &'static str) -> Change {
     })
 }
 
+/// Calibrates the first joint that has a drive.
+pub(super) fn calibrated(entry: &'static str, value: f64) -> Change {
+    Box::new(move |texts| {
+        let drives = texts.robot.get("drive").and_then(Value::as_array);
+        let Some(joint) = drives.and_then(|all| all[0].get("joint")).cloned() else { return false };
+        let table = Table::from_iter([("joint".to_owned(), joint), (entry.to_owned(), value.into())]);
+        texts.robot.insert("calibration".into(), Value::Array(vec![table.into()])).is_none()
+    })
+}
+
 /// Multiplies an attribute in the URDF.
 pub(super) fn urdf(element: &'static str, attribute: &'static str, factor: f64) -> Change {
     Box::new(move |texts| {

@@ -1,5 +1,7 @@
 //! Dialects of tables: lines, field separators, and numbers with decimal points or commas.
 
+use std::borrow::Cow;
+
 use flexarm_settings::written::csv_fields;
 
 /// Field separator of a line.
@@ -61,18 +63,22 @@ pub(super) fn number(field: &str) -> Option<(f64, Decimal)> {
 }
 
 /// The number with a decimal point and an ASCII minus sign.
-fn plain(field: &str) -> Option<(String, Decimal)> {
-    let text = field.trim().replace('\u{2212}', "-");
+fn plain(field: &str) -> Option<(Cow<'_, str>, Decimal)> {
+    let field = field.trim();
+    let text = match field.is_ascii() {
+        true => Cow::Borrowed(field),
+        false => Cow::Owned(field.replace('\u{2212}', "-")),
+    };
     match (text.contains('.'), text.matches(',').count()) {
         (true, 0) => Some((text, Decimal::Point)),
         (false, 0) => Some((text, Decimal::None)),
-        (false, 1) => Some((text.replace(',', "."), Decimal::Comma)),
+        (false, 1) => Some((text.replace(',', ".").into(), Decimal::Comma)),
         _ => None,
     }
 }
 
 /// A time in units of 1e-12, exact as written: seconds since 1970 with nanoseconds have more digits
-/// than an f64.
+/// than an f64. `None` for more than twelve decimals.
 pub(super) fn exact(field: &str) -> Option<i128> {
     const DIGITS: usize = 12;
     let (text, _) = plain(field)?;
@@ -82,11 +88,15 @@ pub(super) fn exact(field: &str) -> Option<i128> {
     };
     let (whole, rest) = text.split_once('.').unwrap_or((text, ""));
     let are_digits = |text: &str| text.bytes().all(|byte| byte.is_ascii_digit());
-    if (whole.is_empty() && rest.is_empty()) || !are_digits(whole) || !are_digits(rest) || whole.len() > 24 {
+    if (whole.is_empty() && rest.is_empty())
+        || !are_digits(whole)
+        || !are_digits(rest)
+        || whole.len() > 24
+        || rest.len() > DIGITS
+    {
         return None;
     }
-    let kept = &rest[..rest.len().min(DIGITS)];
-    let digits = format!("{whole}{kept:0<DIGITS$}");
+    let digits = format!("{whole}{rest:0<DIGITS$}");
     Some(sign * digits.parse::<i128>().ok()?)
 }
 

@@ -8,7 +8,9 @@ use super::lines::{Table, run_joint};
 use super::located::{Located, at, at_field, nowhere};
 use super::request::TableRequest;
 use crate::column_map::ColumnMap;
+use crate::joint_names::{NameError, misspelt};
 use crate::problem::Problem;
+use crate::trajectory::StatedUnit;
 use crate::warning::Warning;
 
 /// A column in use.
@@ -28,6 +30,19 @@ pub(super) struct Layout {
     pub(super) notes: Vec<Warning>,
     /// Joints whose unit is not given anywhere.
     pub(super) assumed: Vec<String>,
+    /// Units that comments give to joints.
+    pub(super) stated: Vec<StatedUnit>,
+}
+
+impl Layout {
+    fn new(time: usize, time_unit: Option<Unit>) -> Self {
+        let (used, notes, assumed, stated) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        Self { time, time_unit, used, notes, assumed, stated }
+    }
+
+    pub(super) fn find(&self, joint: &str, order: usize) -> Option<&Used> {
+        self.used.iter().find(|used| used.joint == joint && used.order == order)
+    }
 }
 
 impl Table<'_> {
@@ -41,21 +56,20 @@ impl Table<'_> {
         let time = place("time").ok_or_else(|| self.no_time())?;
         let seconds = Unit { measure: Measure::Time, per_s: 0, scale: 1.0 };
         let notes = vec![Warning::PositionsOfRun];
-        Ok(Layout { time, time_unit: Some(seconds), used: used.collect(), notes, assumed: Vec::new() })
+        Ok(Layout { used: used.collect(), notes, ..Layout::new(time, Some(seconds)) })
     }
 
     fn no_time(&self) -> Located {
-        at(self.header_line, Problem::NoTimeColumnFound { found: self.names.clone() })
+        at(self.header_line, Problem::NoTimeColumn { found: self.names.clone() })
     }
 
     /// Layout given by the user.
     pub(super) fn mapped(&self, map: &ColumnMap, request: &TableRequest<'_>) -> Result<Layout, Located> {
-        let mut layout = Layout { time: 0, time_unit: None, used: Vec::new(), notes: Vec::new(), assumed: Vec::new() };
-        let time = match &map.time {
+        let (time, time_unit) = match &map.time {
             Some(column) => self.column(column)?,
-            None => self.only_time()?,
+            None => self.only_time(request)?,
         };
-        (layout.time, layout.time_unit) = time;
+        let mut layout = Layout::new(time, time_unit);
         if let Some(wrong) = layout.time_unit.filter(|unit| unit.measure != Measure::Time) {
             let column = self.shown(layout.time);
             return Err(self.bad_unit(column, wrong, "a time"));
@@ -75,55 +89,78 @@ impl Table<'_> {
     /// Layout according to the header.
     pub(super) fn guessed(&self, request: &TableRequest<'_>) -> Result<Layout, Located> {
         let known = |name: &str| request.joints.is_none_or(|joints| joints.iter().any(|joint| joint.name == name));
-        let (time, time_unit) = self.only_time()?;
-        let mut layout = Layout { time, time_unit, used: Vec::new(), notes: Vec::new(), assumed: Vec::new() };
-        let mut dropped = Vec::new();
-        for (place, column) in self.names.iter().enumerate().filter(|(place, _)| *place != time) {
-            if column.is_empty() {
+        let (time, time_unit) = self.only_time(request)?;
+        let mut layout = Layout::new(time, time_unit);
+        // Places of the columns that are left out, with the joint and the order that they name.
+        let mut dropped: Vec<(usize, Option<(String, usize)>)> = Vec::new();
+        let (first_row, is_own) = (self.first_row(), self.is_own(request));
+        let others = (0..self.names.len()).filter(|place| *place != time);
+        let mut columns: Vec<_> = others.map(|place| (place, self.read_name(place, request))).collect();
+        // Positions first: a rate without a unit has that of its position.
+        columns.sort_by_key(|(_, (_, order, ..))| *order);
+        for (place, (name, order, unit, unknown)) in columns {
+            let field = first_row.get(place);
+            if self.names[place].is_empty() {
                 // A trailing separator leaves an empty last field; an unnamed column elsewhere may
                 // be a row index.
-                if place + 1 < self.names.len() {
-                    dropped.push(format!("#{}", place + 1));
+                if place + 1 < self.names.len() || field.is_some_and(|field| !field.is_empty()) {
+                    dropped.push((place, None));
                 }
                 continue;
             }
-            let (name, order, unit, unknown) = self.read_name(place, request);
-            let is_numeric = || self.first_row().get(place).is_some_and(|field| number(field).is_some());
+            let is_numeric = || field.is_none_or(|field| request.joints.is_some() || number(field).is_some());
             match name {
-                Some(joint) if known(&joint) && (request.joints.is_some() || is_numeric()) => {
+                Some(joint) if known(&joint) && (is_own || is_numeric()) => {
                     if let Some(found) = unknown {
                         let accepted = "rad, deg, m, mm, and rates of them";
-                        return Err(at_field(
-                            self.header_line,
-                            place,
-                            Problem::UnknownUnit { key: "column", found, accepted },
-                        ));
+                        let problem = Problem::UnknownUnit { key: "column", found, accepted };
+                        return Err(at_field(self.header_line, place, problem));
                     }
-                    if layout.used.iter().any(|used| used.joint == joint && used.order == order) {
-                        let first = layout.used.iter().find(|used| used.joint == joint && used.order == order);
-                        let first = first.map_or(0, |used| used.place + 1);
-                        return Err(at_field(self.header_line, place, Problem::RepeatedColumn { name: joint, first }));
+                    if let Some(used) = layout.find(&joint, order) {
+                        let problem = Problem::RepeatedColumn { name: joint, first: used.place + 1 };
+                        return Err(at_field(self.header_line, place, problem));
                     }
                     self.add_order(&mut layout, request, &joint, place, unit, order)?;
                 }
-                _ => dropped.push(column.clone()),
+                name => dropped.push((place, name.map(|joint| (joint, order)))),
             }
         }
-        // Rates without positions cannot be used.
-        let (used, rates): (Vec<Used>, Vec<Used>) = {
-            let has = |joint: &str| layout.used.iter().any(|used| used.joint == joint && used.order == 0);
-            layout.used.iter().cloned().partition(|used| has(&used.joint))
-        };
-        dropped.extend(rates.iter().map(|used| self.names[used.place].clone()));
-        layout.used = used;
-        if layout.used.is_empty() {
-            let joints = request.joints.unwrap_or_default().iter().map(|joint| joint.name.to_owned()).collect();
-            return Err(at(self.header_line, Problem::NoJointColumn { found: self.names.clone(), joints }));
-        }
+        dropped.sort_by_key(|(place, _)| *place);
+        self.check_names(&layout, &dropped, request)?;
         if !dropped.is_empty() {
-            layout.notes.push(Warning::DroppedColumns { columns: dropped });
+            let columns = dropped.iter().map(|(place, _)| self.shown(*place)).collect();
+            layout.notes.push(Warning::DroppedColumns { columns });
         }
         Ok(layout)
+    }
+
+    /// Rejects misspelt names, rates without positions, and a table without any joint.
+    fn check_names(
+        &self,
+        layout: &Layout,
+        dropped: &[(usize, Option<(String, usize)>)],
+        request: &TableRequest<'_>,
+    ) -> Result<(), Located> {
+        let joints: Vec<&str> = request.joints.unwrap_or_default().iter().map(|joint| joint.name).collect();
+        for (place, name) in dropped {
+            let Some((name, order)) = name else { continue };
+            let unnamed: Vec<&str> =
+                joints.iter().copied().filter(|joint| layout.find(joint, *order).is_none()).collect();
+            if let Some((found, meant)) = misspelt([name.as_str()], &unnamed) {
+                let (found, column) = (found.to_owned(), Some(self.shown(*place)));
+                let problem = Problem::Names(NameError::Misspelt { found, meant, column });
+                return Err(at_field(self.header_line, *place, problem));
+            }
+        }
+        if let Some(rate) = layout.used.iter().find(|used| layout.find(&used.joint, 0).is_none()) {
+            let (column, joint, found) = (self.shown(rate.place), rate.joint.clone(), self.names.clone());
+            return Err(at_field(self.header_line, rate.place, Problem::NoPositionColumn { column, joint, found }));
+        }
+        if !layout.used.is_empty() {
+            return Ok(());
+        }
+        let (found, joints) = (self.names.clone(), joints.into_iter().map(str::to_owned).collect());
+        Err(at(self.header_line, Problem::Names(NameError::NoneKnown { found, joints, is_table: true })))
     }
 
     /// Joint, order, unit and unknown unit of a column; the joint is `None` if the column is not
@@ -135,8 +172,17 @@ impl Table<'_> {
     ) -> (Option<String>, usize, Option<Unit>, Option<String>) {
         let column = &self.names[place];
         let is_known = |name: &str| request.joints.is_some_and(|joints| joints.iter().any(|joint| joint.name == name));
-        if is_known(column) {
+        // A column with a rate beside it is the joint of this rate, whatever its name looks like.
+        let has_rate = || self.names.iter().any(|name| name.strip_suffix(".vel") == Some(column));
+        if is_known(column) || has_rate() {
             return (Some(column.clone()), 0, self.units[place], None);
+        }
+        let own_rate = [(".vel", 1), (".acc", 2)].into_iter().find_map(|(end, order)| {
+            let joint = column.strip_suffix(end)?;
+            self.names.iter().any(|name| name == joint).then(|| (joint.to_owned(), order))
+        });
+        if let Some((joint, order)) = own_rate {
+            return (Some(joint), order, self.units[place], None);
         }
         let (name, unit, unknown) = name_and_unit(column);
         let unit = unit.or(self.units[place]);
@@ -154,9 +200,10 @@ impl Table<'_> {
     }
 
     /// The only time column.
-    fn only_time(&self) -> Result<(usize, Option<Unit>), Located> {
+    fn only_time(&self, request: &TableRequest<'_>) -> Result<(usize, Option<Unit>), Located> {
         let mut found = Vec::new();
-        for (place, column) in self.names.iter().enumerate() {
+        let is_joint = |name: &str| request.joints.is_some_and(|joints| joints.iter().any(|joint| joint.name == name));
+        for (place, column) in self.names.iter().enumerate().filter(|(_, column)| !is_joint(column)) {
             let (name, unit, _) = name_and_unit(column);
             let unit = unit.or(self.units[place]);
             if meaning(&name, unit) == Meaning::Time {
@@ -249,8 +296,8 @@ impl Table<'_> {
         order: usize,
     ) -> Result<(), Located> {
         let known = request.joints.and_then(|joints| joints.iter().find(|known| known.name == joint));
-        let is_metres = self.metres.iter().any(|name| name == joint);
-        let is_prismatic = known.map(|known| known.is_prismatic).or(is_metres.then_some(true));
+        let metres = self.metres.iter().find(|(_, name)| name == joint).map(|(line, _)| *line);
+        let is_prismatic = known.map(|known| known.is_prismatic).or(metres.map(|_| true));
         if let Some(unit) = unit {
             let expected = match (is_prismatic, unit.measure) {
                 (Some(true), Measure::Angle) => Some("a length: the joint is prismatic"),
@@ -262,25 +309,33 @@ impl Table<'_> {
                 return Err(self.bad_unit(self.shown(place), unit, expected));
             }
             let stated = self.degrees.filter(|_| unit.measure == Measure::Angle);
-            if stated.is_some_and(|degrees| degrees != (unit.scale != 1.0)) {
+            if stated.is_some_and(|(_, degrees)| degrees != (unit.scale != 1.0)) {
                 let (first, second) = if unit.scale == 1.0 { ("deg", "rad") } else { ("rad", "deg") };
                 let (first, second) = (first.to_owned(), second.to_owned());
-                return Err(at_field(
-                    self.header_line,
-                    place,
-                    Problem::ContradictingUnits { key: "unit", first, second },
-                ));
+                let problem = Problem::ContradictingUnits { key: "unit", first, second };
+                return Err(at_field(self.header_line, place, problem));
             }
         }
-        let scale = match (unit, is_prismatic, self.degrees) {
+        let mut state = |is_length, line| {
+            if order == 0 {
+                layout.stated.push(StatedUnit { joint: joint.to_owned(), is_length, line });
+            }
+        };
+        let scale = match (unit, metres, self.degrees) {
             (Some(unit), ..) => unit.scale,
-            (None, Some(true), _) | (None, _, Some(false)) => 1.0,
-            (None, _, Some(true)) => std::f64::consts::PI / 180.0,
-            (None, _, None) => {
-                // A rate has the unit of its position, which is looked up once all columns are
-                // known.
-                let position = layout.used.iter().find(|used| used.joint == joint && used.order == 0);
-                let scale = position.filter(|_| order > 0).map_or(1.0, |used| used.scale);
+            (None, Some(line), _) => {
+                state(true, line);
+                1.0
+            }
+            (None, None, Some((line, true))) => {
+                state(false, line);
+                std::f64::consts::PI / 180.0
+            }
+            (None, None, Some((_, false))) => 1.0,
+            (None, None, None) if is_prismatic == Some(true) => 1.0,
+            (None, None, None) => {
+                // A rate has the unit of its position.
+                let scale = layout.find(joint, 0).filter(|_| order > 0).map_or(1.0, |used| used.scale);
                 if order == 0 {
                     layout.assumed.push(joint.to_owned());
                 }

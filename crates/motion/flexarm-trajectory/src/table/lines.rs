@@ -1,7 +1,7 @@
 //! Header, separator and lines of a table, and the units that its comments state.
 
 use super::dialect::{Separator, clock_time, number};
-use super::header::{Unit, name_and_unit, unit};
+use super::header::{Measure, Unit, name_and_unit, unit};
 use super::located::{Located, at, nowhere};
 use super::request::TableRequest;
 use crate::problem::Problem;
@@ -15,9 +15,12 @@ pub(super) struct Table<'t> {
     pub(super) units: Vec<Option<Unit>>,
     /// Number and text of each line of numbers.
     pub(super) lines: Vec<(usize, &'t str)>,
-    /// Units stated in the comments: whether angles are in degrees, prismatic joints.
-    pub(super) degrees: Option<bool>,
-    pub(super) metres: Vec<String>,
+    /// Whether comments state that angles are in degrees, with the line.
+    pub(super) degrees: Option<(usize, bool)>,
+    /// Prismatic joints named by comments, with the line.
+    pub(super) metres: Vec<(usize, String)>,
+    /// Cut-off of a smoothing that a comment states (Hz), with the line.
+    pub(super) cutoff: Option<(usize, f64)>,
     /// Whether the last line is terminated.
     pub(super) ends_whole: bool,
     /// First and last line of the text above the header.
@@ -86,6 +89,7 @@ impl<'t> Table<'t> {
             lines,
             degrees: None,
             metres: Vec::new(),
+            cutoff: None,
             ends_whole,
             preamble,
         };
@@ -93,41 +97,53 @@ impl<'t> Table<'t> {
         Ok(table)
     }
 
-    /// Reads units from the comments, as in the library's own format.
+    /// Reads the units that comments state.
     fn read_comments(&mut self, text: &str) -> Result<(), Located> {
         for (i, line) in text.lines().enumerate().filter(|(_, line)| line.starts_with('#')) {
             let Some((key, value)) = line[1..].split_once(':') else { continue };
-            let value = value.trim();
+            let (line, value) = (i + 1, value.trim());
             match (key.trim(), value) {
                 ("unit", "rad" | "deg") => {
                     let degrees = value == "deg";
-                    if self.degrees.is_some_and(|before| before != degrees) {
+                    if self.degrees.is_some_and(|(_, before)| before != degrees) {
                         let (first, second) = (if degrees { "rad" } else { "deg" }.to_owned(), value.to_owned());
-                        return Err(at(i + 1, Problem::ContradictingUnits { key: "unit", first, second }));
+                        return Err(at(line, Problem::ContradictingUnits { key: "unit", first, second }));
                     }
-                    self.degrees = Some(degrees);
+                    self.degrees = Some((line, degrees));
                 }
                 ("unit", found) => {
                     let found = found.to_owned();
-                    return Err(at(i + 1, Problem::UnknownUnit { key: "unit", found, accepted: "rad, deg" }));
+                    return Err(at(line, Problem::UnknownUnit { key: "unit", found, accepted: "rad, deg" }));
                 }
-                ("metres", names) => self.metres.extend(names.split(',').map(|name| name.trim().to_owned())),
+                ("metres", names) => {
+                    self.metres.extend(names.split(',').map(|name| (line, name.trim().to_owned())));
+                }
+                ("cutoff", found) => {
+                    let hz = found.strip_suffix("Hz").and_then(|number| number.trim().parse().ok());
+                    let wrong =
+                        || Problem::Value { key: "cutoff".into(), found: found.into(), expected: "Hz, such as 20 Hz" };
+                    self.cutoff = Some((line, hz.ok_or_else(|| at(line, wrong()))?));
+                }
+                ("time", found) if found != "s" && unit(found).is_none_or(|unit| unit.measure == Measure::Time) => {
+                    let found = found.to_owned();
+                    return Err(at(line, Problem::UnknownUnit { key: "time", found, accepted: "s" }));
+                }
                 _ => {}
             }
         }
         Ok(())
     }
 
-    /// Whether the table has the library's own format.
+    /// Whether the header is that of samples: a column `time`, and no units, which are s and rad
+    /// unless a comment states another one.
     pub(super) fn is_own(&self, request: &TableRequest<'_>) -> bool {
         let is_known = |name: &str| request.joints.is_some_and(|joints| joints.iter().any(|joint| joint.name == name));
         let is_plain = |name: &String| is_known(name) || matches!(name_and_unit(name), (_, None, None));
-        self.separator == Separator::Comma
-            && self.preamble.is_none()
+        request.columns.is_none()
             && self.names.iter().any(|name| name == "time")
             && self.units.iter().all(Option::is_none)
             && !self.is_run()
-            && self.names.iter().all(|name| !name.is_empty() && is_plain(name))
+            && self.names.iter().all(is_plain)
     }
 
     /// Whether the table is that of a run.

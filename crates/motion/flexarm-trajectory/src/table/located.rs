@@ -11,14 +11,6 @@ pub(super) struct Located {
     pub(super) more_lines: Vec<usize>,
 }
 
-impl Located {
-    /// Moves the problem out.
-    pub(super) fn take(&mut self) -> Self {
-        let problem = std::mem::replace(&mut self.problem, Box::new(Problem::Empty));
-        Self { line: self.line, column: self.column, problem, more_lines: Vec::new() }
-    }
-}
-
 pub(super) fn at(line: usize, problem: Problem) -> Located {
     Located { line: Some(line), column: None, problem: Box::new(problem), more_lines: Vec::new() }
 }

@@ -1,17 +1,31 @@
-//! Tables of joint values from other programs: any separator, decimal points or commas, units in
-//! the column names, columns that are not part of the motion; and `run.csv`, the table of a run of
+//! Tables of joint values: samples in CSV files, tables of other programs with any separator,
+//! decimal points or commas and units in the column names, and `run.csv`, the table of a run of
 //! this library.
 //!
-//! What the table leaves open is either given by the user ([`crate::ColumnMap`]) or assumed, with a
-//! [`Warning`]. The library's own format ([`crate::csv_file`]) is read unchanged: a table with
-//! commas, a column `time` and no units in its header.
+//! ```csv
+//! # unit: deg
+//! # time: s
+//! time,joint_1,joint_2,joint_1.vel,joint_2.vel
+//! 0.00,0.0,0.0,0.0,0.0
+//! 0.01,0.1,-0.2,10.0,-20.0
+//! ```
 //!
+//! What the table leaves open is either given by the user ([`crate::ColumnMap`]) or assumed, with a
+//! [`Warning`]. A table with a column `time` and no units in its header is in s and rad.
+//!
+//! * Three comments have a meaning: `# unit: rad` or `# unit: deg` for all joints, with `deg/s` and
+//!   `deg/s²` for rates; `# metres: joint_x, joint_y` names prismatic joints, whose columns are in m
+//!   whatever the unit; `# time: s`.
+//! * `# cutoff: 20 Hz` smooths the positions; see [`crate::Samples::smoothed`].
+//! * Times must increase; the first one becomes `t = 0`. Steps may vary. Between the rows the
+//!   joints follow quintic splines; see [`crate::Samples::interpolate`].
 //! * The header is the first line that is neither blank nor a comment (`#`, `%`, `//`), or the last
 //!   comment before numbers begin. A second line may hold only units.
 //! * A name may end with its unit: `A1[deg]`, `q1 (rad)`, `q1_deg`, `t / ms`. Names that end with
 //!   `vel`, `velocity`, `acc` are rates; in `/joint_states/joint_1/position` the last part is the
 //!   quantity.
-//! * If the joints of the robot are known, columns with other names are dropped, with a warning.
+//! * If the joints of the robot are known, columns with other names are dropped, with a warning; a
+//!   name close to a joint without a column is an error.
 //!
 //! Start at [`Trajectory::parse_table`].
 
@@ -23,6 +37,8 @@ mod located;
 pub(crate) mod request;
 mod rows;
 
+use self::dialect::Separator;
+use self::header::{Measure, Unit};
 use self::layout::Layout;
 use self::lines::Table;
 use self::located::{Located, at, at_field};
@@ -65,29 +81,20 @@ impl Trajectory {
         // Line ends of old Macintosh files.
         let with_ends = (text.contains('\r') && !text.contains('\n')).then(|| text.replace('\r', "\n"));
         let text = with_ends.as_deref().unwrap_or(text);
-        let mut table = Table::find(text, request);
-        if request.columns.is_none() && table.as_ref().is_ok_and(|table| table.is_own(request)) {
-            let own = Self::parse_csv(text, origin);
-            let rows = table.map_or(0, |table| table.lines.len());
-            return own.map(|own| (own, TableInfo { format: "CSV samples".to_owned(), rows })).map_err(decimal_commas);
-        }
-        let read = table.as_mut().map_err(|problem| problem.take());
-        read.and_then(|table| table.read(request)).map_err(|Located { line, column, problem, more_lines }| {
+        let read = Table::find(text, request).and_then(|table| table.read(request));
+        read.map_err(|Located { line, column, problem, more_lines }| {
             let (origin, problem) = (origin.to_owned(), *problem);
             Box::new(FileError { origin, line, column, problem, more_lines }).into()
         })
     }
-}
 
-/// A row of the library's own format with twice the number of fields has decimal commas.
-fn decimal_commas(error: TrajectoryError) -> TrajectoryError {
-    let TrajectoryError::File(mut file) = error else { return error };
-    if let Problem::Ragged { found, expected } = file.problem
-        && found == 2 * expected
-    {
-        file.problem = Problem::DecimalCommas { found, expected };
+    /// As [`Trajectory::parse_table`], for a table whose header names time and joints.
+    ///
+    /// # Errors
+    /// As [`Trajectory::parse_table`].
+    pub fn parse_csv(text: &str, origin: &str) -> Result<Self, TrajectoryError> {
+        Self::parse_table(text, origin, &TableRequest::default()).map(|(trajectory, _)| trajectory)
     }
-    TrajectoryError::File(file)
 }
 
 impl Table<'_> {
@@ -97,14 +104,25 @@ impl Table<'_> {
             (None, true) => self.of_run()?,
             (None, false) => self.guessed(request)?,
         };
-        let rows = self.rows(&layout)?;
-        self.check_angles(&layout, &rows)?;
+        self.check_metres(&layout)?;
+        let (rows, is_own) = (self.rows(&layout)?, self.is_own(request));
+        if is_own {
+            let seconds = Unit { measure: Measure::Time, per_s: 0, scale: 1.0 };
+            layout.time_unit = layout.time_unit.or(Some(seconds));
+        }
         let scale = self.time_scale(&mut layout, &rows);
         let origin = rows.times.first().copied().unwrap_or_default();
         let times: Vec<f64> = rows.times.iter().map(|t| t.since(origin) * scale).collect();
-        let samples = Samples { times, joints: joints(&layout, &rows) };
+        let mut samples = Samples { times, joints: joints(&layout, &rows) };
+        if let Some((line, hz)) = self.cutoff {
+            samples = samples.smoothed(hz).map_err(|error| match error {
+                SampleError::Cutoff { .. } => at(line, Problem::Samples(error)),
+                _ => self.placed(error.into(), &layout, &rows),
+            })?;
+        }
         let trajectory = samples.interpolate().map_err(|error| self.placed(error, &layout, &rows))?;
-        if !layout.assumed.is_empty() {
+        self.check_angles(&layout, &rows)?;
+        if !is_own && !layout.assumed.is_empty() {
             layout.notes.push(Warning::AssumedRadians { joints: layout.assumed.clone() });
         }
         if let Some((first, last)) = self.preamble {
@@ -118,13 +136,28 @@ impl Table<'_> {
         }
         let decimals = if rows.comma { ", decimal commas" } else { "" };
         let kind = if self.is_run() && request.columns.is_none() { "table of a run" } else { "table" };
-        let format = format!("{kind}, {}{decimals}", self.separator.in_words());
+        let format = match is_own && self.separator == Separator::Comma {
+            true => "CSV samples".to_owned(),
+            false => format!("{kind}, {}{decimals}", self.separator.in_words()),
+        };
         let trajectory = layout.notes.into_iter().fold(trajectory, Trajectory::with_note);
+        let trajectory = trajectory.with_told_units(layout.stated);
         Ok((trajectory, TableInfo { format, rows: rows.times.len() }))
     }
 }
 
 impl Table<'_> {
+    /// Rejects names of prismatic joints that the table does not have.
+    fn check_metres(&self, layout: &Layout) -> Result<(), Located> {
+        let is_used = |name: &str| layout.used.iter().any(|used| used.joint == name);
+        let is_column = |name: &str| self.names.iter().any(|column| column == name);
+        let Some((line, name)) = self.metres.iter().find(|(_, name)| !is_used(name) && !is_column(name)) else {
+            return Ok(());
+        };
+        let joints = layout.used.iter().filter(|used| used.order == 0).map(|used| used.joint.clone()).collect();
+        Err(at(*line, Problem::UnknownJoint { key: "metres", name: name.clone(), joints }))
+    }
+
     /// Rejects angles too large for radians in a table that does not state its unit.
     fn check_angles(&self, layout: &Layout, rows: &Rows) -> Result<(), Located> {
         for (used, values) in layout.used.iter().zip(&rows.values) {
@@ -164,6 +197,10 @@ impl Table<'_> {
                     let more_lines = not_increasing(&times).filter(|k| k != row).map(|row| rows.lines[row]).collect();
                     Located { more_lines, ..at_field(rows.lines[*row], layout.time, Problem::Samples(error)) }
                 }
+                SampleError::AccelerationWithoutVelocity { joint } => match layout.find(joint, 2) {
+                    Some(used) => at_field(self.header_line, used.place, Problem::Samples(error)),
+                    None => at(self.header_line, Problem::Samples(error)),
+                },
                 _ => at(self.header_line, Problem::Samples(error)),
             },
             TrajectoryError::OutOfRange { joint, time_s } => {

@@ -27,6 +27,7 @@ impl Time {
     /// Time elapsed since another one, without rounding either of them first.
     pub(super) fn since(self, other: Self) -> f64 {
         match (self.exact, other.exact) {
+            (_, Some(0)) => self.value,
             (Some(this), Some(other)) => (this - other) as f64 / 1e12,
             _ => self.value - other.value,
         }
@@ -169,7 +170,7 @@ pub(super) fn joints(layout: &Layout, rows: &Rows) -> Vec<JointSamples> {
         JointSamples {
             name: used.joint.clone(),
             position: find(&used.joint, 0).unwrap_or_default(),
-            acceleration: velocity.is_some().then(|| find(&used.joint, 2)).flatten(),
+            acceleration: find(&used.joint, 2),
             velocity,
         }
     };

@@ -402,6 +402,10 @@ pub(super) fn summary_of(
     doubts.extend(modes.first().iter().flat_map(|m| coarse("the mesh", m.lumped_error, m.reduced_error)));
     doubts.extend(yardsticks::of_link(link, &reduction.whole));
     doubts.extend(spreads(chosen, file.mesh.nodes.len()));
+    doubts.extend(chosen.iter().filter_map(|one| {
+        let off = (one.interface.X_LI.translation.vector - one.centroid).norm();
+        yardsticks::of_point(&one.interface.name, off, one.extent.norm())
+    }));
     let caveats: Vec<Caveat> = doubts.into_iter().map(|doubt| doubted(&link.name, doubt)).collect();
     let kept = reduction.fixed_modes.len();
     ReduceSummary {

@@ -5,7 +5,7 @@ use flexarm_kinematics::{BalancerLaw, Data, Mechanism, Model, forward_kinematics
 use nalgebra::DVector;
 
 use super::size::spread_poses;
-use super::slip::{EFFORT, slip};
+use super::slip::{EFFORT, Factor, slip};
 use super::{Caveat, kinds};
 
 /// Maximum balancer torque relative to the maximum gravity torque: note, warning.
@@ -46,7 +46,10 @@ pub(crate) fn of_balancers(mechanism: &Mechanism, rigid: &Model) -> Vec<Caveat> 
             let likely = slip(torque, &(0.01 * weight..=STRONG[0] * weight), EFFORT, 1.0);
             caveats.push(if torque > STRONG[1] * weight { caveat.likely(likely) } else { caveat.as_note() });
         } else if torque < WEAK * weight {
-            caveats.push(kinds::BALANCER_WEAK.with_unit(alone.unit).found(&name, torque, WEAK * weight));
+            let gas = matches!(balancer.law, BalancerLaw::Gas(_)).then_some((1e-5, "pressure in bar"));
+            let factors: Vec<Factor> = gas.into_iter().chain([(1e-3, "kN, kN m or N/mm")]).collect();
+            let likely = slip(torque, &(0.03 * weight..=STRONG[0] * weight), &factors, 1.0);
+            caveats.push(kinds::BALANCER_WEAK.with_unit(alone.unit).found(&name, torque, WEAK * weight).likely(likely));
         }
         if weight > 0.0 && alone.with > RAISED * alone.without {
             let caveat = kinds::BALANCER_SIDE.with_unit(alone.unit).found(&name, alone.with, alone.without);

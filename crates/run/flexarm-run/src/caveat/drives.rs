@@ -36,6 +36,8 @@ const BEARING: f64 = 5e-3;
 const LEVER: RangeInclusive<f64> = 1e-3..=1.0;
 /// Backlash to each side (rad): note, warning.
 const PLAY: [f64; 2] = [0.01, 0.05];
+/// Minimum damping over stiffness of a gear (s); identified gears have 1e-4 to 7e-3.
+const UNDAMPED: f64 = 2e-6;
 /// Maximum transmission error (rad); small strain wave gears have 2 arcmin.
 const TRANSMISSION_ERROR: f64 = 1e-3;
 /// Maximum hysteresis loss (rad); small strain wave gears have 3 arcmin, belts more.
@@ -47,6 +49,8 @@ const LOAD_FRICTION: f64 = 0.5;
 const RATIO: RangeInclusive<f64> = 1.0..=5000.0;
 /// Maximum reflected rotor inertia, relative to the largest inertia moved by a joint.
 const ROTOR: f64 = 10.0;
+/// Largest speed at which friction reaches its value, over the speed limit.
+const SMOOTHING: f64 = 0.1;
 /// Range of the sampling period of a servo (s).
 const SAMPLE: RangeInclusive<f64> = 1e-6..=0.05;
 /// Maximum gain of a position loop (1/s).
@@ -69,6 +73,7 @@ pub(crate) fn of_drives(drives: &[Drive], mechanism: &Mechanism, rigid: &Model) 
         let speed = joint.map_or(f64::INFINITY, |j| j.limits.velocity);
         caveats.extend(motor(drive, heaviest));
         caveats.extend(friction(drive, effort, speed));
+        caveats.extend(smoothing(drive, speed));
         if drive.load_friction > LOAD_FRICTION {
             let caveat = kinds::LOAD_FRICTION.found(name(drive), drive.load_friction, LOAD_FRICTION);
             caveats.push(caveat.likely(slip(
@@ -156,6 +161,11 @@ fn gear(drive: &Drive, effort: f64, others: Option<f64>) -> Vec<Caveat> {
     if gear.dampers.as_ref().is_some_and(|d| d.len() == 1) && relaxation > CREEP {
         caveats.push(kinds::CREEP.found(name(drive), relaxation, CREEP));
     }
+    if relaxation > 0.0 && relaxation < UNDAMPED {
+        let factors = &[(1e-3, "kN m s/rad or per ms"), (1.0 / slip::DEGREES, "N m s/deg")];
+        let likely = slip(relaxation, &(1e-4..=1e-2), factors, 1.0);
+        caveats.push(kinds::GEAR_UNDAMPED.found(name(drive), relaxation, UNDAMPED).likely(likely));
+    }
     let [play, _] = drive.play(false);
     if play > PLAY[0] {
         let likely = slip(play, &(0.0..=PLAY[0]), slip::ANGLE, 1.0);
@@ -219,6 +229,15 @@ fn friction(drive: &Drive, effort: f64, speed: f64) -> Option<Caveat> {
             1.0,
         ))
     })
+}
+
+/// Checks whether friction acts well below the speed limit.
+fn smoothing(drive: &Drive, speed: f64) -> Option<Caveat> {
+    let f = &drive.friction;
+    let rubs = f.coulomb + f.stribeck + drive.load_friction > 0.0;
+    let (width, most) = (f.regularisation, SMOOTHING * speed);
+    let caveat = || kinds::FRICTION_SMOOTHING.found(name(drive), width, most);
+    (rubs && width > most).then(|| caveat().likely(slip(width, &(1e-4..=most), &slip::ANGLE[..1], 1.0)))
 }
 
 /// Checks sampling and position gain of a servo.

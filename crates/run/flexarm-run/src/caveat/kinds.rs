@@ -2,6 +2,7 @@
 //! threshold.
 
 use super::CaveatKind;
+pub(crate) use super::kinds_of_entries::*;
 pub(crate) use super::kinds_of_use::*;
 
 /// The far end of a flexible link rotates beyond small rotations.

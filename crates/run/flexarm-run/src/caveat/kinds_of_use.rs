@@ -17,7 +17,7 @@ pub(crate) const BALANCER_STRONG: CaveatKind = CaveatKind::warning(
     "a balancer carries about the weight of the arm: check rate, pressure, area and ends (N/m, Pa, m2, m)",
 );
 /// A balancer is negligibly weak.
-pub(crate) const BALANCER_WEAK: CaveatKind = CaveatKind::note(
+pub(crate) const BALANCER_WEAK: CaveatKind = CaveatKind::warning(
     "balancer-weak",
     "{where} puts at most {value} {unit} on a joint, less than a thousandth of the gravity torque of the arm ({yardstick} {unit})",
     "N m",

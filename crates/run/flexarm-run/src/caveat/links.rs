@@ -29,6 +29,8 @@ const THICK: f64 = 3.0;
 const SLENDER: RangeInclusive<f64> = 5e-4..=1.0;
 /// Range of torsional stiffness relative to bending stiffness.
 const TORSION: RangeInclusive<f64> = 1e-3..=1e3;
+/// Range of the radius of gyration of a section by its mass, relative to that by its stiffness.
+const ROTARY: RangeInclusive<f64> = 0.1..=10.0;
 /// Maximum tip deflection due to an eccentric shear centre, relative to that of bending.
 const TWIST: f64 = 0.01;
 /// Wall thickness relative to the width (diameter) of a hollow section: note, warning. By Eurocode
@@ -38,8 +40,8 @@ const THIN: [f64; 2] = [1.0 / 42.0, 1.0 / 90.0];
 pub(super) const USUAL_DAMPING: f64 = 0.03;
 /// Range of the link's mass relative to that of its section.
 const MASS: RangeInclusive<f64> = 0.02..=50.0;
-/// Maximum damping ratio of jointed structures.
-const RATIO: f64 = 0.2;
+/// Range of the damping ratio of jointed structures.
+const RATIO: RangeInclusive<f64> = 1e-3..=0.2;
 /// Maximum beta in `D = beta K` (s); above it the link creeps instead of vibrating.
 pub(crate) const CREEP: f64 = 0.05;
 
@@ -80,6 +82,9 @@ fn geometric(name: &str, link: &RobotLink) -> Option<Caveat> {
 /// that weight at a lever of 1 m: cast pedestals and anchored plates stay below a tenth of it.
 const SINKS: [f64; 2] = [1e-3, 5e-3];
 
+/// Minimum sink (m): even the softest of stiff springs gives more.
+const RIGID_SINK: f64 = 1e-9;
+
 /// Checks the springs under the base.
 pub(crate) fn of_mounting(robot: &Robot) -> Vec<Caveat> {
     let Some(RobotMounting::Springs { springs, damping: damped, .. }) = &robot.mounting else { return Vec::new() };
@@ -94,6 +99,10 @@ pub(crate) fn of_mounting(robot: &Robot) -> Vec<Caveat> {
         let likely =
             slip(sink, &(1e-7..=SINKS[0]), &[(1e3, "stiffness in kN/m or N/mm"), (1e6, "stiffness in kN/mm")], 1.0);
         caveats.push(kinds::MOUNTING_SINK.found(&name, sink, SINKS[0]).likely(likely));
+    }
+    if sink < RIGID_SINK {
+        let likely = slip(sink, &(1e-8..=SINKS[0]), &[(1e-6, "stiffness in uN/m"), (1e-3, "stiffness in mN/m")], 1.0);
+        caveats.push(kinds::MOUNTING_RIGID.found(&name, sink, RIGID_SINK).likely(likely));
     }
     // Moment of the weight at a lever of 1 m.
     let tilt = weight / least(3);
@@ -114,7 +123,7 @@ fn material(name: &str, material: &Material) -> impl Iterator<Item = Caveat> {
 }
 
 /// Returns a caveat if a value is outside its range, with the nearer end as threshold.
-fn outside(
+pub(super) fn outside(
     kind: &CaveatKind,
     name: &str,
     value: f64,
@@ -144,6 +153,11 @@ fn section(name: &str, beam: &BeamLink) -> Vec<Caveat> {
         let caveat = kinds::SECTION_RADIUS.found(name, radius, end);
         caveats.extend((!range.contains(&radius)).then(|| caveat.likely(slip(radius, &range, factors, 0.5))));
         caveats.extend(outside(&kinds::TORSION, name, bar.GJ / bending, &TORSION, &[]));
+        // A section of one material has I_y from its mass as from its stiffness.
+        let turns = (bar.rotary_y.max(bar.rotary_z) / bar.mass_per_length).sqrt();
+        let far = turns > 0.0 && !ROTARY.contains(&(turns / radius));
+        let likely = || slip(turns / radius, &ROTARY, &[(1e6, "kg mm"), (1e3, "g m")], 0.5);
+        caveats.extend(far.then(|| kinds::ROTARY.found(name, turns, radius).likely(likely())));
     }
     caveats.extend(shear_centre(name, beam, &bar));
     let own = bar.mass_per_length * length;
@@ -213,9 +227,9 @@ fn damping(name: &str, damping: &Damping) -> Option<Caveat> {
         Damping::Modal(0.0) | Damping::StiffnessProportional(0.0) | Damping::Rayleigh(0.0, 0.0) => {
             Some(kinds::NO_DAMPING.found(name, 0.0, USUAL_DAMPING))
         }
-        Damping::Modal(ratio) if *ratio > RATIO => {
-            let likely = slip(*ratio, &(1e-3..=0.1), &[(100.0, "per cent"), (10.0, "a digit")], 1.0);
-            Some(kinds::DAMPING_RATIO.found(name, *ratio, RATIO).likely(likely))
+        Damping::Modal(ratio) => {
+            let slips = &[(100.0, "per cent"), (10.0, "a digit"), (0.01, "divided by 100 twice"), (0.1, "a digit")];
+            outside(&kinds::DAMPING_RATIO, name, *ratio, &RATIO, slips)
         }
         Damping::StiffnessProportional(beta) | Damping::Rayleigh(_, beta) if *beta > CREEP => {
             let likely = slip(*beta, &(0.0..=CREEP), &[(1e3, "milliseconds")], 1.0);

@@ -10,7 +10,9 @@
 pub(crate) mod balancers;
 pub(crate) mod chain;
 pub(crate) mod drives;
+pub(crate) mod entries;
 pub(crate) mod kinds;
+mod kinds_of_entries;
 mod kinds_of_use;
 pub(crate) mod links;
 pub(crate) mod loads;

@@ -3,12 +3,12 @@
 use std::sync::Arc;
 
 use flexarm_kinematics::Model;
-use flexarm_stepping::Linear;
+use flexarm_stepping::{Linear, StepperKind};
 use flexarm_trajectory::LimitViolation;
 use nalgebra::Vector6;
 
 use super::size::{Size, middle};
-use super::{Caveat, motion, once_each};
+use super::{Caveat, motion, once_each, validity};
 use crate::arm::Arm;
 use crate::error::Error;
 use crate::motion::Motion;
@@ -22,6 +22,8 @@ use crate::scenario::Scenario;
 pub enum Use<'a> {
     /// Holds it at a pose (rad or m) with a wrench on the TCP (world axes; N, N m).
     Held(&'a [f64], &'a [f64; 6]),
+    /// Steps it from a pose (rad or m) on commands that come later, with a stepper and its step (s).
+    Commanded(&'a [f64], StepperKind, f64),
     /// Moves it along a motion with its loads.
     Along(&'a Scenario),
     /// Neither: the robot is checked at the start of its own motion, or else in the middle of its
@@ -37,6 +39,7 @@ impl Arm {
         let mut caveats = of_model(arm);
         let (pose, wrench) = match used {
             Use::Held(at, wrench) => (Ok(at.to_vec()), *wrench),
+            Use::Commanded(at, ..) => (Ok(at.to_vec()), [0.0; 6]),
             Use::Along(scenario) => {
                 caveats.extend(of_motion(&scenario.motion, &arm.rigid));
                 caveats.extend(of_scenario(arm, scenario));
@@ -50,7 +53,12 @@ impl Arm {
         let standing = pose.and_then(|at| {
             let posed = Posed::new(arm.clone(), at)?;
             let linear = posed.linear(&Vector6::from(wrench))?;
-            Ok(at_rest(&posed, &linear, &wrench))
+            let mut caveats = at_rest(&posed, &linear, &wrench);
+            if let (Use::Commanded(_, stepper, step_s), Some(first)) = (used, posed.arm.modes.frequencies_hz().first())
+            {
+                caveats.extend(validity::step(stepper, step_s, *first, posed.arm.first_damping_ratio()));
+            }
+            Ok(caveats)
         });
         caveats.extend(standing.unwrap_or_else(|error| {
             vec![Caveat::from_message(

@@ -26,6 +26,8 @@ const WEIGHTLESS: f64 = 30.0;
 const POINT_MASS: f64 = 10.0;
 /// Joint speed (rad/s) and tip speed (m/s) above which limits are probably in degrees per second.
 const FAST: (f64, f64) = (30.0, 120.0);
+/// Joint speed that no robot has (rad/s); the fastest SCARA and delta robots have 45.
+const FASTEST: f64 = 50.0;
 /// Maximum effort limit relative to the largest gravity torque.
 const STRONG: f64 = 300.0;
 /// Maximum tip acceleration from an effort limit (m/s²).
@@ -182,8 +184,9 @@ fn joint_limits(mechanism: &Mechanism, size: &Size) -> Vec<Caveat> {
     let fast = turning.iter().filter(|j| j.limits.velocity.is_finite() && j.limits.velocity > FAST.0).map(|joint| {
         let speed = joint.limits.velocity;
         let caveat = kinds::SPEED_LIMIT.found(format!("joint {:?}", joint.name), speed, FAST.0);
-        let caveat = caveat.likely(slip(speed, &(0.05..=FAST.0), &slip::ANGLE[..1], 1.0));
-        if speed * size.beyond(&joint.parent) > FAST.1 { caveat } else { caveat.as_note() }
+        let factors = &[slip::ANGLE[0], (60.0 / std::f64::consts::TAU, "1/min")];
+        let caveat = caveat.likely(slip(speed, &(0.05..=FAST.0), factors, 1.0));
+        if speed > FASTEST || speed * size.beyond(&joint.parent) > FAST.1 { caveat } else { caveat.as_note() }
     });
     let ends = |j: &Joint| j.limits.lower.abs().max(j.limits.upper.abs());
     let wide: Vec<_> = turning.iter().filter(|j| ends(j).is_finite() && ends(j) > 2.0 * TURN).collect();

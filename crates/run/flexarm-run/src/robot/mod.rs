@@ -169,6 +169,7 @@ impl Robot {
         caveats
             .extend(self.flexible_links.iter().flat_map(|link| caveat::links::of_link(link, inertia(link).as_ref())));
         caveats.extend(caveat::links::of_mounting(self));
+        caveats.extend(caveat::entries::of_entries(self));
         if let Ok(rigid) = self.rigid_model() {
             caveats.extend(caveat::drives::of_drives(&self.drives, &self.rigid, &rigid));
             caveats.extend(caveat::balancers::of_balancers(&self.rigid, &rigid));

@@ -7,7 +7,7 @@ use nalgebra::DVector;
 use super::steps_per_sample;
 use crate::arm::Arm;
 use crate::caveat::pose::ArmAtRest;
-use crate::caveat::{Caveat, Severity, kinds, of_use, validity};
+use crate::caveat::{Caveat, kinds, of_use, validity};
 use crate::motion::Motion;
 use crate::options::RunOptions;
 use crate::posed::strains;
@@ -59,14 +59,9 @@ impl BeforeRun<'_> {
         caveats
     }
 
-    /// As `caveats`, for a study that keeps no samples: checks the links at rest, and turns
-    /// torques of the rigid robot above a limit into warnings.
+    /// As `caveats`, for a study that keeps no samples: also checks the links at rest.
     pub fn caveats_of_study(&self, sag_m: f64) -> Vec<Caveat> {
-        let warns = |caveat: Caveat| match caveat.code == kinds::MOTION_EFFORT.code {
-            true => Caveat { severity: Severity::Warning, ..caveat },
-            false => caveat,
-        };
-        self.caveats(sag_m).into_iter().map(warns).chain(self.links_at_rest()).collect()
+        self.caveats(sag_m).into_iter().chain(self.links_at_rest()).collect()
     }
 
     /// Checks for links that deflect too far at rest.

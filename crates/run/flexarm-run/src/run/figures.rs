@@ -137,7 +137,11 @@ impl RunLoop<'_> {
             caveats.push(kinds::NO_STRESS.found(format!("stepper {}", self.options.stepper.name()), 0.0, 0.0));
         }
         caveats.extend(validity::energy(self.monitors.energy.result().imbalance));
-        caveats.extend(self.effort_caveats());
+        let efforts = self.effort_caveats();
+        // The torque of the run replaces that of the rigid robot.
+        let is_known = |of: &Caveat| efforts.iter().any(|run| run.location == of.location);
+        caveats.retain(|caveat| caveat.code != kinds::MOTION_EFFORT.code || !is_known(caveat));
+        caveats.extend(efforts);
         caveats
     }
 

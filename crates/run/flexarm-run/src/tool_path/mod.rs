@@ -8,6 +8,7 @@ mod program;
 mod standard;
 mod tables;
 
+use std::ops::RangeInclusive;
 use std::path::Path;
 
 use flexarm_kinematics::{Frame, Model, Pose};
@@ -19,6 +20,7 @@ use flexarm_trajectory::Trajectory;
 use nalgebra::DVector;
 
 use crate::caveat::Caveat;
+use crate::caveat::slip::slip;
 use crate::controller_entry::RobotAxis;
 use crate::error::Error;
 use crate::robot::tcp_frame;
@@ -205,6 +207,7 @@ impl ToolPath {
             warnings.push(format!("the arm has more joints than the path needs: {held} {what}"));
         }
         warnings.extend(tool_warning(program, arm));
+        warnings.extend(acceleration_warning(program));
         let slowed = planned.moves.iter().filter_map(|of| of.slowed.as_ref().map(|slowed| slowed_warning(of, slowed)));
         warnings.extend(first_of(slowed.collect()));
         let near = planned.moves.iter().filter_map(|of| {
@@ -269,6 +272,25 @@ fn tool_warning(program: &Program, arm: &ProgramArm<'_>) -> Option<String> {
         other.0,
         other.1 * 1e3
     ))
+}
+
+/// Range of the acceleration of a TCP along its path (m/s²); KUKA's default is 2.3.
+const PATH_ACCELERATION: RangeInclusive<f64> = 0.01..=300.0;
+
+/// Warns about the first path acceleration that no robot has.
+fn acceleration_warning(program: &Program) -> Option<String> {
+    use flexarm_path::program::Item;
+    program.items.iter().find_map(|item| {
+        let Item::Move(of) = item else { return None };
+        let found = of.speed.linear_m_s2.filter(|found| !PATH_ACCELERATION.contains(found))?;
+        let (least, most) = (PATH_ACCELERATION.start(), PATH_ACCELERATION.end());
+        let likely = slip(found, &PATH_ACCELERATION, &[(1e3, "mm/s2"), (1e-3, "mm/s2 for m/s2")], 1.0);
+        let likely = if likely.is_empty() { likely } else { format!(" ({likely})") };
+        Some(format!(
+            "line {}: {}: the acceleration along the path is {found} m/s2, robots have {least} to {most}{likely}: check its unit",
+            of.line, of.statement
+        ))
+    })
 }
 
 fn slowed_warning(of: &PlannedMove, slowed: &Slowed) -> String {
