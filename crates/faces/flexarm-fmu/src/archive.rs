@@ -133,7 +133,7 @@ pub fn export_fmu(job: &FmuJob) -> Result<FmuSummary, PlantError> {
     let bytes = zipped(&entries).map_err(failed(&job.output))?;
     flexarm::write_all(&[(job.output.clone(), &bytes)])?;
     let arm = plant.arm();
-    let pose = job.settings.pose.clone().unwrap_or_else(|| vec![0.0; arm.flexible().rigid.n_actuated()]);
+    let pose = job.settings.pose.clone().unwrap_or_else(|| vec![0.0; arm.rigid.n_actuated()]);
     let caveats = arm.caveats(Use::Commanded(&pose, job.settings.stepper, step_s));
     let count = |causality| plant.variables().iter().filter(|variable| variable.causality == causality).count();
     Ok(FmuSummary {

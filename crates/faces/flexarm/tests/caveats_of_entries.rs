@@ -115,7 +115,7 @@ fn an_expression_that_the_steps_do_not_resolve_is_told() {
         std::fs::write(&file, format!("format = 1\n[[load]]\nkind = \"expression\"\nfz = {fz:?}\n")).unwrap();
         let scenario = Scenario::new(motion.clone()).with_loads_file(&file).unwrap();
         let options = RunOptions { step_s: 1e-3, ..RunOptions::default() };
-        let run = robot.flexible(Modelling::default()).unwrap().simulate(&scenario, &options).unwrap();
+        let run = robot.model(&Modelling::default()).unwrap().simulate(&scenario, &options).unwrap();
         run.summary.caveats.into_iter().filter(|of| of.code == "short-load").map(|of| of.message).collect::<Vec<_>>()
     };
     assert_eq!(told("sin(2*pi*20*t)"), [""; 0]);
