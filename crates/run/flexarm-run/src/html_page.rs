@@ -62,10 +62,7 @@ fn colors() -> String {
         named(ground).into_iter().map(|(name, color)| format!(" --{prefix}{name}: {};", hex(color))).collect()
     };
     // Plots have the colours of paper in their attributes, which a style overrides.
-    let mut dark =
-        "svg rect[fill=\"#FFFFFF\"] { fill: var(--paper); } svg text[fill=\"#000000\"] { fill: var(--ink); } \
-                    svg [stroke=\"#000000\"] { stroke: var(--ink); }\n"
-            .to_owned();
+    let mut dark = String::new();
     for (name, color) in named(Ground::Paper) {
         let paper = hex(color).to_uppercase();
         let _ = writeln!(
