@@ -36,7 +36,7 @@ fn number(element: &str, name: &str) -> f64 {
 /// up to them.
 #[test]
 fn springs_and_dampers_of_the_mjcf_add_up_to_the_matrices_of_the_arm() {
-    for robot in ["kr210/robot.toml", "reference_arm_coupled", "kr210_identified", "lower_arm/robot.toml"] {
+    for robot in ["kr210/robot.toml", "test/reference_arm_coupled", "kr210_identified", "test/lower_arm"] {
         let export = arm(robot, LinkModel::Lumped).export(None, RobotFormat::Mjcf).unwrap();
         let springs: serde_json::Value = serde_json::from_str(text(&export, 1)).unwrap();
         let names: Vec<&str> =
@@ -97,7 +97,7 @@ fn what_no_format_can_hold_is_refused_or_told() {
     assert!(refused("manutec_r3", LinkModel::AsFiled).contains("link_1"));
     let told =
         |robot: &str| arm(robot, LinkModel::AsFiled).export(None, RobotFormat::Mjcf).unwrap().left_out.join("; ");
-    assert!(told("moberg_arm").contains("play") && told("moberg_arm").contains("friction"));
+    assert!(told("test/moberg_arm").contains("play") && told("test/moberg_arm").contains("friction"));
     assert!(told("kr300").contains("balancers"));
-    assert_eq!(told("reference_arm"), "");
+    assert_eq!(told("test/reference_arm"), "");
 }
