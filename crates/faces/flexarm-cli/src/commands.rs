@@ -143,7 +143,7 @@ pub(crate) enum Command {
     Reduce(Later<ReduceArgs>),
     /// Create a flexible link from matrices of another FE program
     Import(Later<ImportArgs>),
-    /// Write the matrices of a flexible link for another FE program
+    /// Write an elastic arm for MuJoCo, Pinocchio or Drake, or the matrices of a link for an FE program
     Export(Later<ExportArgs>),
     /// Write the arm as an FMU, a plant for control programs
     ///

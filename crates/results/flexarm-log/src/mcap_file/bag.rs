@@ -1,5 +1,5 @@
-//! What ROS 2 asks of a bag beside its messages: the record `rosbag2` in the file, and the file
-//! `metadata.yaml` of a folder.
+//! Metadata of a bag of ROS 2: the record `rosbag2` in the file, and the file `metadata.yaml` of a
+//! folder.
 //!
 //! The form is version 5 of rosbag2's metadata, which all its releases since Humble read. It is
 //! written as JSON, which is YAML.

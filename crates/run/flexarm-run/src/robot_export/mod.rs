@@ -2,7 +2,7 @@
 //!
 //! Every elastic coordinate becomes a joint. Stiffness and damping are those of the arm at the pose;
 //! [`springs`] splits coupled matrices into springs over several joints, which MuJoCo calls fixed
-//! tendons. What a format cannot hold is listed, never dropped silently. Start at [`Arm::export`].
+//! tendons. Parts that a format cannot express are listed. Start at [`Arm::export`].
 
 mod mjcf;
 mod parts;
@@ -36,7 +36,7 @@ pub enum RobotFormat {
 pub struct RobotExport {
     /// Step size with which MuJoCo stays within 0.5 % of the largest deflection (s); for MJCF.
     pub step_s: Option<f64>,
-    /// What the arm has and the format cannot say.
+    /// Parts of the arm that the format cannot express.
     pub left_out: Vec<String>,
     /// Names and contents of the files, relative to one folder; the description comes first.
     #[serde(skip)]
@@ -49,8 +49,8 @@ impl Arm {
     /// * `at`: values of all actuated joints (rad or m), zero by default.
     ///
     /// # Errors
-    /// [`ValueError::NotExportable`](crate::ValueError::NotExportable) for arms with modal links, closed loops or screw joints;
-    /// [`Error::Pose`] for joint values that do not fit.
+    /// [`ValueError::NotExportable`](crate::ValueError::NotExportable) for arms with modal links,
+    /// closed loops or screw joints; [`Error::Pose`] for joint values that do not fit.
     pub fn export(self: &Arc<Self>, at: Option<&[f64]>, format: RobotFormat) -> Result<RobotExport, Error> {
         let posed = self.posed(at)?;
         let (mut parts, mut files) = parts(self.robot(), &posed)?;
@@ -117,7 +117,7 @@ fn springs_json(posed: &Posed, axes: &[&Axis], springs: &Springs, step_s: f64, l
     format!("{text:#}\n")
 }
 
-/// Lists what neither format can say.
+/// Lists the parts of the arm that neither format can express.
 fn left_out(posed: &Posed) -> Vec<String> {
     let arm = &posed.arm;
     let mut list = Vec::new();

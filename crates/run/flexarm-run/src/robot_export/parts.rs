@@ -9,8 +9,8 @@ use crate::error::{Error, ValueError};
 use crate::posed::Posed;
 use crate::robot::Robot;
 
-/// Least moment of inertia that MuJoCo takes (kg m²).
-const LEAST_INERTIA: f64 = 1e-15;
+/// Minimum moment of inertia that MuJoCo takes (kg m²).
+const MIN_INERTIA: f64 = 1e-15;
 /// Folder of the meshes.
 pub(super) const MESHES: &str = "meshes";
 /// Parts of a six-coordinate joint in the order of their motion: translation, then Z-Y-X angles.
@@ -147,7 +147,7 @@ pub(super) fn with_mass(mut parts: Vec<Part>) -> Result<Vec<Part>, ValueError> {
     }
     let refused = |part: &&Part| {
         let moments = part.inertia.symmetric_eigenvalues();
-        part.mass > 0.0 && (moments.min() < LEAST_INERTIA || 2.0 * moments.max() > moments.sum() * (1.0 + 1e-9))
+        part.mass > 0.0 && (moments.min() < MIN_INERTIA || 2.0 * moments.max() > moments.sum() * (1.0 + 1e-9))
     };
     match parts[1..].iter().find(refused) {
         Some(part) => Err(ValueError::NotExportable {

@@ -52,13 +52,16 @@ impl Springs {
         all
     }
 
-    /// Damps each spring in proportion to its stiffness as far as that gives `D`; the rest becomes
-    /// dampers of their own.
+    /// Damps the springs of a group in proportion to their stiffness where that gives its rows of
+    /// `D`; the rest becomes dampers of their own.
     fn add_damping(&mut self) {
         for group in groups(&self.K) {
             let [k, d] = [&self.K, &self.D].map(|M| M.select_rows(&group).select_columns(&group));
             let beta = d.dot(&k) / k.norm_squared();
-            if (&d - &k * beta).amax() > ROUNDING.sqrt() * d.amax() {
+            let least = ROUNDING.sqrt() * d.amax();
+            let others = (0..self.D.nrows()).filter(|k| !group.contains(k));
+            let coupled = self.D.select_rows(&group).select_columns(&others.collect::<Vec<_>>());
+            if (&d - &k * beta).amax() > least || coupled.iter().any(|x| x.abs() > least) {
                 continue;
             }
             let own = |spring: &&mut Spring| spring.terms.iter().all(|(k, _)| group.contains(k));
