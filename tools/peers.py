@@ -180,7 +180,7 @@ class MuJoCo:
 
         mujoco.set_mju_user_warning(lambda text: None)
         with tempfile.TemporaryDirectory() as folder:
-            subprocess.run([program, "export", str(ROOT / "robots" / "reference_arm"), "--to", "mjcf", "-o", folder], check=True, capture_output=True)
+            subprocess.run([program, "export", str(ROOT / "robots" / "test" / "reference_arm"), "--to", "mjcf", "-o", folder], check=True, capture_output=True)
             self.model = mujoco.MjModel.from_xml_path(f"{folder}/reference_arm.xml")
         self.motion = motion
 
