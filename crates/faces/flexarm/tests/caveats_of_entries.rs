@@ -46,7 +46,7 @@ const STRENGTH: &str = "strength = { yield = 3.55e8, tensile = 5.1e8, fatigue = 
 #[test]
 fn slips_in_strengths_gauges_and_damping_of_a_beam_are_told() {
     let folder = Folder::new("beam");
-    let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(3).unwrap().join("robots/one_beam");
+    let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(3).unwrap().join("robots/test/one_beam");
     std::fs::copy(shipped.join("one_beam.urdf"), folder.0.join("one_beam.urdf")).unwrap();
     let text = std::fs::read_to_string(shipped.join("robot.toml")).unwrap();
     let kept = text.lines().filter(|line| !line.starts_with("default_trajectory") && !line.starts_with("damping"));
@@ -108,7 +108,7 @@ fn slips_in_guides_calibrations_and_mountings_are_told() {
 fn an_expression_that_the_steps_do_not_resolve_is_told() {
     let folder = Folder::new("expression");
     let robot =
-        Robot::load(Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(3).unwrap().join("robots/one_beam")).unwrap();
+        Robot::load(Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(3).unwrap().join("robots/test/one_beam")).unwrap();
     let motion = Motion::from_samples(&[0.0, 0.1, 0.2], &[0.0, 0.0, 0.0], &robot).unwrap();
     let told = |fz: &str| {
         let file = folder.0.join("loads.toml");
