@@ -2,11 +2,12 @@
 //! that need no other program.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use flexarm::{Arm, LinkModel, Modelling, Robot, RobotExport, RobotFormat};
 use nalgebra::DMatrix;
 
-fn arm(robot: &str, links: LinkModel) -> Arm {
+fn arm(robot: &str, links: LinkModel) -> Arc<Arm> {
     let path: PathBuf = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../robots").join(robot);
     Robot::load(path).unwrap().flexible(Modelling { links, ..Modelling::default() }).unwrap()
 }
