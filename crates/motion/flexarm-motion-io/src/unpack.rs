@@ -8,8 +8,8 @@ use crate::mcap;
 
 /// First bytes of zstd data.
 pub const ZSTD_MAGIC: &[u8] = &[0x28, 0xB5, 0x2F, 0xFD];
-/// Maximum decompressed size of a database (bytes).
-const MOST_BYTES: u64 = 1 << 30;
+/// Maximum decompressed size of a message or a database (bytes).
+pub(crate) const MOST_BYTES: u64 = 1 << 30;
 
 /// Returns the bytes of zstd data before its end or an error, and the reason for the error.
 ///
@@ -21,7 +21,7 @@ pub(crate) fn unpacked(bytes: &[u8], most: u64) -> (Vec<u8>, Option<String>) {
     let broken = match result {
         Err(error) => Some(format!("its compressed content is damaged or incomplete ({error})")),
         Ok(_) if out.len() as u64 > most => {
-            Some(format!("a message unpacks to more than {most} bytes, what is left of the limit for its size"))
+            Some(format!("a message unpacks to more than {most} bytes, the limit for it"))
         }
         Ok(_) => None,
     };
