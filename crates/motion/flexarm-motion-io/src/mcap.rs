@@ -5,9 +5,7 @@
 //! used here (schema, channel, message).
 
 use std::collections::HashMap;
-use std::fs::File;
 use std::io::{Cursor, ErrorKind, Read};
-use std::path::Path;
 
 use lz4_flex::frame::FrameDecoder;
 use mcap::records::{Record, op};
@@ -16,7 +14,7 @@ use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::{McapError, McapResult};
 
 use crate::collect::Collector;
-use crate::error::{MotionError, PlacedProblem};
+use crate::error::PlacedProblem;
 
 /// First bytes of an MCAP file.
 pub const MCAP_MAGIC: &[u8] = mcap::MAGIC;
