@@ -84,6 +84,9 @@ impl Roles {
 ///
 /// O(n), no allocation; O(n³) via the mass matrix for mimic joints, coupled rotors and closed
 /// loops. Accelerations are NaN where a mass matrix is not positive definite.
+///
+/// # Panics
+/// If a vector is not nv long.
 pub fn forward_dynamics<'d>(
     model: &Model,
     data: &'d mut Data,
@@ -91,6 +94,8 @@ pub fn forward_dynamics<'d>(
     roles_all_free: &Roles,
     tau: &DVector<f64>,
 ) -> &'d DVector<f64> {
+    state.check_sizes(model);
+    model.check_size("tau", tau.len());
     data.tau.as_mut_slice().copy_from_slice(tau.as_slice());
     solve(model, data, state, roles_all_free);
     &data.qddot
@@ -103,6 +108,9 @@ pub fn forward_dynamics<'d>(
 /// balancers. Fills `data.{X_PB, V, A}`. O(n), no allocation; dense if a free coordinate has mimic
 /// joints or coupled rotors, or with closed loops. Accelerations are NaN where a mass matrix is not
 /// positive definite.
+///
+/// # Panics
+/// If a vector is not nv long.
 pub fn hybrid_dynamics(
     model: &Model,
     data: &mut Data,
@@ -111,6 +119,9 @@ pub fn hybrid_dynamics(
     qddot: &mut DVector<f64>,
     tau: &mut DVector<f64>,
 ) {
+    state.check_sizes(model);
+    model.check_size("qddot", qddot.len());
+    model.check_size("tau", tau.len());
     data.tau.as_mut_slice().copy_from_slice(tau.as_slice());
     data.qddot.as_mut_slice().copy_from_slice(qddot.as_slice());
     solve(model, data, state, roles);

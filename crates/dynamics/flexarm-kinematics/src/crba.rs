@@ -21,7 +21,11 @@ use crate::model::{Body, JointMotion, Model};
 
 /// Computes the mass matrix `M(q)`, nv×nv, both triangles (kg, kg m, kg m²). Fills
 /// `data.{X_PB, M}`. Does not allocate.
+///
+/// # Panics
+/// If a vector is not nv long.
 pub fn mass_matrix<'d>(model: &Model, data: &'d mut Data, q: &DVector<f64>) -> &'d DMatrix<f64> {
+    model.check_size("q", q.len());
     if !model.loops.is_empty() {
         closure::place(model, data, q.as_slice());
         mass_matrix_at_poses(model, data);

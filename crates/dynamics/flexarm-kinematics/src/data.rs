@@ -25,6 +25,14 @@ pub struct State<T: Scalar = f64> {
 }
 
 impl<T: Real> State<T> {
+    /// Checks that there is one position and one velocity per coordinate.
+    #[track_caller]
+    #[inline]
+    pub(crate) fn check_sizes(&self, model: &Model) {
+        model.check_size("q", self.q.len());
+        model.check_size("qdot", self.qdot.len());
+    }
+
     /// Zero positions and velocities.
     pub fn zeros(model: &Model) -> Self {
         Self { q: DVector::zeros(model.nv()), qdot: DVector::zeros(model.nv()) }

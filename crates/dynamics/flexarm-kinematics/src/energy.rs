@@ -9,6 +9,9 @@ use crate::kinematics::{forward_kinematics, forward_kinematics_velocity};
 use crate::model::Model;
 
 /// Computes the kinetic energy (J); fills `data.{X_PB, X_WB, V}`.
+///
+/// # Panics
+/// If a vector is not nv long.
 pub fn kinetic_energy(model: &Model, data: &mut Data, state: &State) -> f64 {
     forward_kinematics_velocity(model, data, state);
     kinetic_energy_of(model, data)
@@ -37,6 +40,9 @@ pub fn momentum_of(model: &Model, data: &Data) -> Wrench {
 
 /// Computes the potential energy (J) of gravity, zero at the world origin, and of the balancers;
 /// fills `data.{X_PB, X_WB}`.
+///
+/// # Panics
+/// If `q` is not nv long.
 pub fn potential_energy(model: &Model, data: &mut Data, q: &nalgebra::DVector<f64>) -> f64 {
     forward_kinematics(model, data, q);
     potential_energy_of(model, data)

@@ -61,6 +61,9 @@ pub struct IkError {
 ///
 /// # Errors
 /// [`IkError`] if the target is not reached within tolerance.
+///
+/// # Panics
+/// If `q_start` is not nv long.
 pub fn inverse_kinematics(
     model: &Model,
     data: &mut Data,
@@ -69,6 +72,7 @@ pub fn inverse_kinematics(
     q_start: &DVector<f64>,
     options: &IkOptions,
 ) -> Result<DVector<f64>, IkError> {
+    model.check_size("q_start", q_start.len());
     let n = model.n_actuated();
     let limits: Vec<(f64, f64)> = model.coordinates()[..n].iter().map(|c| (c.limits.lower, c.limits.upper)).collect();
     let clamp = |q: &mut DVector<f64>| {

@@ -16,7 +16,11 @@ use crate::model::{Frame, JointMotion, Model};
 use crate::pose::identity;
 
 /// Computes the poses of all bodies; fills `data.{X_PB, X_WB}`.
+///
+/// # Panics
+/// If a vector is not nv long.
 pub fn forward_kinematics(model: &Model, data: &mut Data, q: &nalgebra::DVector<f64>) {
+    model.check_size("q", q.len());
     match model.loops.is_empty() {
         true => place_and_measure(model, data, q.as_slice()),
         false => closure::place(model, data, q.as_slice()),
@@ -41,7 +45,11 @@ pub(crate) fn place_bodies<T: Real>(model: &Model, data: &mut Data<T>, q: &[T]) 
 }
 
 /// Computes poses and twists of all bodies; fills `data.{X_PB, X_WB, V}`.
+///
+/// # Panics
+/// If a vector is not nv long.
 pub fn forward_kinematics_velocity(model: &Model, data: &mut Data, state: &State) {
+    state.check_sizes(model);
     match model.loops.is_empty() {
         true => move_bodies(model, data, state.q.as_slice(), state.qdot.as_slice()),
         false => closure::move_bodies(model, data, state),
@@ -199,8 +207,9 @@ pub(crate) fn turned<T: Real>(motion: AxisMotion, R_WB: &Matrix3<T>, ratio: f64)
 /// axes.
 ///
 /// # Panics
-/// If `Jdot` does not have nv columns.
+/// If `Jdot` does not have nv columns, or a vector is not nv long.
 pub fn frame_jacobian_derivative(model: &Model, data: &Data, state: &State, frame: &Frame, Jdot: &mut Matrix6xX<f64>) {
+    state.check_sizes(model);
     assert_eq!(Jdot.ncols(), model.nv(), "the Jacobian needs one column per coordinate");
     Jdot.fill(0.0);
     let p_T = (data.X_WB[frame.body] * frame.X_BF).translation.vector;

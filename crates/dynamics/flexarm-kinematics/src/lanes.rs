@@ -20,8 +20,12 @@ pub fn mass_matrix_at_poses<T: Real>(model: &Model, data: &mut Data<T>) {
 }
 
 /// [`crate::forward_kinematics`]; the poses are in `data.X_WB`.
+///
+/// # Panics
+/// If `q` is not nv long.
 #[inline(always)]
 pub fn forward_kinematics<T: Real>(model: &Model, data: &mut Data<T>, q: &[T]) {
+    model.check_size("q", q.len());
     place_bodies(model, data, q);
 }
 
@@ -32,8 +36,12 @@ pub fn gravity_forces_at_poses<T: Real>(model: &Model, data: &mut Data<T>) {
 }
 
 /// [`crate::frame_jacobian`], column by column in `J` (6×nv).
+///
+/// # Panics
+/// If `J` does not have nv columns.
 #[inline(always)]
 pub fn frame_jacobian<T: Real>(model: &Model, data: &Data<T>, frame: &Frame, J: &mut [T]) {
+    assert_eq!(J.len(), 6 * model.nv(), "the Jacobian needs one column per coordinate");
     tree_jacobian(
         model,
         data,
@@ -45,6 +53,9 @@ pub fn frame_jacobian<T: Real>(model: &Model, data: &Data<T>, frame: &Frame, J: 
 }
 
 /// [`StaticTangent::compute`] without balancers, under one load, column by column in `G`.
+///
+/// # Panics
+/// If the size of `G` does not match, or `q` is not nv long.
 #[inline(always)]
 pub fn static_tangent<T: Real>(
     tangent: &mut StaticTangent<T>,
@@ -54,5 +65,8 @@ pub fn static_tangent<T: Real>(
     load: PointLoad,
     G: &mut [T],
 ) {
+    model.check_size("q", q.len());
+    let n = tangent.size(model);
+    assert_eq!(G.len(), n * n, "a row and a column per coordinate");
     tangent.of_bodies(model, data, q, std::iter::once(load), G);
 }

@@ -34,6 +34,9 @@ pub struct FoundSolution {
 ///
 /// # Errors
 /// [`IkError`] of the start with the smallest residual, if none reaches the pose.
+///
+/// # Panics
+/// If `q_start` is not nv long.
 pub fn inverse_kinematics_from_many_starts(
     model: &Model,
     data: &mut Data,
@@ -43,6 +46,7 @@ pub fn inverse_kinematics_from_many_starts(
     options: &IkOptions,
     starts: usize,
 ) -> Result<Vec<FoundSolution>, IkError> {
+    model.check_size("q_start", q_start.len());
     let chain = coordinates_of(model, frame);
     let steps = steps_of_recurrence(chain.len());
     let mut found: Vec<FoundSolution> = Vec::new();

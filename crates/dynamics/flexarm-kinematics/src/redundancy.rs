@@ -50,7 +50,7 @@ pub struct RuledSolution {
 /// [`IkError`] if the target is not reached within tolerance.
 ///
 /// # Panics
-/// If the posture of the rule is not nv long.
+/// If `q_start` or the posture of the rule is not nv long.
 pub fn inverse_kinematics_with_rule(
     model: &Model,
     data: &mut Data,

@@ -28,6 +28,9 @@ use crate::model::Model;
 /// elastic joint must supply. External wrenches in `data.F_ext` and balancers are subtracted. Fills
 /// `data.{X_PB, V, A, F, tau}`; `A` has gravity subtracted. O(n), no allocation.
 ///
+/// # Panics
+/// If a vector is not nv long.
+///
 /// # Source
 /// [Featherstone 2008], Table 5.1.
 pub fn inverse_dynamics<'d>(
@@ -36,6 +39,8 @@ pub fn inverse_dynamics<'d>(
     state: &State,
     qddot: &DVector<f64>,
 ) -> &'d DVector<f64> {
+    state.check_sizes(model);
+    model.check_size("qddot", qddot.len());
     let (q, qdot, qddot) = (state.q.as_slice(), state.qdot.as_slice(), qddot.as_slice());
     match model.loops.is_empty() {
         true => balanced(model, data, q, qdot, Some(qddot)),
@@ -46,7 +51,11 @@ pub fn inverse_dynamics<'d>(
 
 /// Computes generalised forces at zero acceleration: Coriolis, centrifugal, gravity, balancers and
 /// external loads.
+///
+/// # Panics
+/// If a vector is not nv long.
 pub fn nonlinear_effects<'d>(model: &Model, data: &'d mut Data, state: &State) -> &'d DVector<f64> {
+    state.check_sizes(model);
     let (q, qdot) = (state.q.as_slice(), state.qdot.as_slice());
     match model.loops.is_empty() {
         true => balanced(model, data, q, qdot, None),
@@ -57,7 +66,11 @@ pub fn nonlinear_effects<'d>(model: &Model, data: &'d mut Data, state: &State) -
 
 /// Computes the generalised forces that hold the mechanism static at `q`, against gravity,
 /// balancers and external loads.
+///
+/// # Panics
+/// If a vector is not nv long.
 pub fn gravity_forces<'d>(model: &Model, data: &'d mut Data, q: &DVector<f64>) -> &'d DVector<f64> {
+    model.check_size("q", q.len());
     if model.loops.is_empty() {
         begin(model, data, q.as_slice());
         for i in 1..model.bodies.len() {
@@ -69,7 +82,11 @@ pub fn gravity_forces<'d>(model: &Model, data: &'d mut Data, q: &DVector<f64>) -
 
 /// As [`gravity_forces`], with the joint poses left in `data` by [`crate::forward_kinematics`] at
 /// `q`.
+///
+/// # Panics
+/// If a vector is not nv long.
 pub fn gravity_forces_at_poses<'d>(model: &Model, data: &'d mut Data, q: &DVector<f64>) -> &'d DVector<f64> {
+    model.check_size("q", q.len());
     match (model.loops.is_empty(), model.balancers.is_empty()) {
         (true, true) => at_rest(model, data),
         (true, false) => {

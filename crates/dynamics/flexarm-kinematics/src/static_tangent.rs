@@ -159,6 +159,11 @@ impl PointLoad {
 }
 
 impl<T: Real> StaticTangent<T> {
+    /// Number of rows and columns of the matrix.
+    pub(crate) fn size(&self, model: &Model) -> usize {
+        model.nv() - self.first
+    }
+
     /// Creates the workspace for the coordinates from `first` on: 0 for all, [`Model::n_actuated`]
     /// for the elastic ones.
     pub fn new(model: &Model, first: usize) -> Self {
@@ -387,10 +392,11 @@ impl StaticTangent {
     /// * `data`: after [`crate::forward_kinematics`] at `q`.
     ///
     /// # Panics
-    /// If the size of `G` does not match.
+    /// If the size of `G` does not match, or `q` is not nv long.
     pub fn compute(&mut self, model: &Model, data: &Data, q: &DVector<f64>, loads: &[PointLoad], G: &mut DMatrix<f64>) {
-        let n = model.nv() - self.first;
+        let n = self.size(model);
         assert_eq!(G.shape(), (n, n), "a row and a column per coordinate");
+        model.check_size("q", q.len());
         let Some(mut tangent) = self.loops.take() else { return self.of_tree(model, data, q, loads, G) };
         self.of_tree(model, data, q, loads, &mut tangent.G);
         self.tau_d.fill(0.0);
@@ -435,7 +441,7 @@ impl StaticTangent {
     /// without closed loops and modal bodies.
     ///
     /// # Panics
-    /// If the size of `G` does not match.
+    /// If the size of `G` does not match, or `q` is not nv long.
     pub fn of_loads(
         &mut self,
         model: &Model,
@@ -444,8 +450,9 @@ impl StaticTangent {
         loads: &[PointLoad],
         G: &mut DMatrix<f64>,
     ) {
-        let n = model.nv() - self.first;
+        let n = self.size(model);
         assert_eq!(G.shape(), (n, n), "a row and a column per coordinate");
+        model.check_size("q", q.len());
         G.fill(0.0);
         self.carried.fill(Carried::weight(Vector3::zeros(), &Vector3::zeros()));
         self.carry_loads(model, data, loads.iter().copied());

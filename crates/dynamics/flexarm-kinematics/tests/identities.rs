@@ -524,3 +524,63 @@ fn a_joint_frame_set_in_a_model_is_that_of_a_mechanism_with_this_frame() {
     eprintln!("frames {worst:.1e}");
     assert!(worst < 1e-12, "{worst:e}"); // measured 2e-16
 }
+
+/// Vectors that are too long were accepted, too short ones ended in an index out of bounds.
+#[test]
+fn a_vector_of_another_length_than_the_tree_is_refused_with_both_lengths() {
+    let Case { model, mut data, state, qddot, .. } = case(3, 4);
+    let (n, roles) = (model.nv(), Roles::all_free(&model));
+    for length in [0, n - 1, n + 1] {
+        let other = DVector::zeros(length);
+        let with = |q: &DVector<f64>, qdot: &DVector<f64>| State { q: q.clone(), qdot: qdot.clone() };
+        let states = [with(&other, &state.qdot), with(&state.q, &other)];
+        let mut refused = |name: &str, call: &mut dyn FnMut(&mut Data)| {
+            let caught = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| call(&mut data)));
+            let panic = caught.expect_err(name);
+            let text = panic.downcast_ref::<String>().expect(name);
+            let expected = format!("has {length} values, expected one for each of the {n} coordinates");
+            assert!(text.contains(&expected), "{name}: {text}");
+        };
+        for state in &states {
+            refused("inverse_dynamics", &mut |data| {
+                let _ = inverse_dynamics(&model, data, state, &qddot);
+            });
+            refused("nonlinear_effects", &mut |data| {
+                let _ = nonlinear_effects(&model, data, state);
+            });
+            refused("forward_dynamics", &mut |data| {
+                let _ = forward_dynamics(&model, data, state, &roles, &qddot);
+            });
+            refused("kinetic_energy", &mut |data| {
+                let _ = kinetic_energy(&model, data, state);
+            });
+            refused("forward_kinematics_velocity", &mut |data| forward_kinematics_velocity(&model, data, state));
+        }
+        refused("inverse_dynamics", &mut |data| {
+            let _ = inverse_dynamics(&model, data, &state, &other);
+        });
+        refused("forward_dynamics", &mut |data| {
+            let _ = forward_dynamics(&model, data, &state, &roles, &other);
+        });
+        refused("gravity_forces", &mut |data| {
+            let _ = gravity_forces(&model, data, &other);
+        });
+        refused("gravity_forces_at_poses", &mut |data| {
+            let _ = gravity_forces_at_poses(&model, data, &other);
+        });
+        refused("mass_matrix", &mut |data| {
+            let _ = mass_matrix(&model, data, &other);
+        });
+        refused("potential_energy", &mut |data| {
+            let _ = potential_energy(&model, data, &other);
+        });
+        refused("forward_kinematics", &mut |data| forward_kinematics(&model, data, &other));
+        let (mut both, frame, X) = (qddot.clone(), model.frames()[0].clone(), Pose::identity());
+        refused("hybrid_dynamics", &mut |data| {
+            hybrid_dynamics(&model, data, &state, &roles, &mut both, &mut other.clone())
+        });
+        refused("inverse_kinematics", &mut |data| {
+            let _ = inverse_kinematics(&model, data, &frame, &X, &other, &IkOptions::default());
+        });
+    }
+}

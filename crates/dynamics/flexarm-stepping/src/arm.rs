@@ -276,7 +276,11 @@ impl FlexibleArm {
 
     /// Returns the elastic energy (J) at all coordinates `q`, without transmission errors and
     /// losses of sliders.
+    ///
+    /// # Panics
+    /// If `q` is not nv long.
     pub fn elastic_energy(&self, q: &[f64]) -> f64 {
+        self.model.check_size("q", q.len());
         let own = |element: &ElasticElement| element.energy(&q[element.coordinate..][..element.size], q);
         let e = &q[self.model.n_actuated()..];
         self.cross_stiffness.iter().fold(self.elements.iter().map(own).sum(), |sum, &(i, j, k)| sum + k * e[i] * e[j])
@@ -284,7 +288,13 @@ impl FlexibleArm {
 
     /// Writes positions and velocities of the actuated joints at time `t` into `state` and their
     /// accelerations into `qddot`.
+    ///
+    /// # Panics
+    /// If a vector is not nv long.
     pub fn prescribed_state(&self, t: f64, state: &mut State, qddot: &mut DVector<f64>) {
+        self.model.check_size("q", state.q.len());
+        self.model.check_size("qdot", state.qdot.len());
+        self.model.check_size("qddot", qddot.len());
         let n = self.model.n_actuated();
         let (q, qdot) = (state.q.as_mut_slice(), state.qdot.as_mut_slice());
         self.motion.sample(t, &mut q[..n], &mut qdot[..n], &mut qddot.as_mut_slice()[..n]);

@@ -79,8 +79,12 @@ impl EquationsOfMotion {
 
     /// Sets the torques of the joints in [`FlexibleArm::torque_driven`] (N m or N), up to the limits
     /// of their drives.
+    ///
+    /// # Panics
+    /// If there is not one torque per such joint.
     pub fn set_torques(&mut self, torques: &[f64]) {
         let Some(servo) = &mut self.system.servo else { return };
+        assert_eq!(torques.len(), servo.torque.len(), "one torque per torque-driven joint");
         for ((own, torque), axis) in servo.torque.iter_mut().zip(torques).zip(&servo.servo.axes) {
             *own = torque.clamp(-axis.limit, axis.limit);
         }

@@ -299,7 +299,11 @@ pub struct Tangents {
 impl Tangents {
     /// Computes the matrices at all coordinates `q` (joints, then elastic ones), under weight, the
     /// loads at time 0 and a wrench at the tool's origin (world axes).
+    ///
+    /// # Panics
+    /// If `q` is not nv long.
     pub fn at(arm: &FlexibleArm, tool: &Frame, F_T_W: &Wrench, q: &DVector<f64>) -> Self {
+        arm.model.check_size("q", q.len());
         let model = &arm.model;
         let (m, n) = (model.n_actuated(), arm.n_elastic_coordinates());
         let mut data = Data::new(model);

@@ -47,13 +47,20 @@ pub struct SteadyRotation {
 ///   motion is at time 0; `rates`: joint rates (rad/s or m/s).
 ///
 /// # Errors
-/// [`StepError::NoEquilibrium`], [`StepError::Singular`], [`StepError::OpenLoop`].
+/// [`StepError::Setup`] for a wrong number of joints, [`StepError::NoEquilibrium`],
+/// [`StepError::Singular`], [`StepError::OpenLoop`].
 pub fn linearise_rotation(
     arm: &FlexibleArm,
     tool: &Frame,
     at: &[f64],
     rates: &[f64],
 ) -> Result<SteadyRotation, StepError> {
+    let joints = arm.model.n_actuated();
+    for (what, found) in [("positions", at.len()), ("rates", rates.len())] {
+        if found != joints {
+            return Err(StepError::Setup(format!("{found} joint {what} are given, the arm has {joints} joints")));
+        }
+    }
     let arm = arm.with_motors_held();
     let in_stages = |stages: u32| {
         let mut e = static_equilibrium(&arm, 0.0)?;

@@ -70,6 +70,7 @@ impl Failure {
             Self::Usage(_) => Fault::Input,
             Self::In { source, .. } => return source.exit_code(),
             Self::Library(error) => error.fault(),
+            Self::Plant(flexarm_fmu::PlantError::Written(error)) => error.fault(),
             Self::Plant(_) => Fault::Input,
         };
         ExitCode::from(match fault {

@@ -223,6 +223,6 @@ pub(crate) enum OrderingName {
     Auto,
     /// Approximate minimum degree
     Amd,
-    /// Nested dissection (METIS)
+    /// Nested dissection
     Nested,
 }

@@ -36,7 +36,10 @@ pub(crate) fn run(terminal: &Terminal, args: &ServeArgs) -> Result<ExitCode, Fai
         open_in_browser(url.as_ref());
     }
     for request in server.incoming_requests() {
-        respond(request, &folder);
+        let folder = folder.clone();
+        // A client that does not read its answer holds up its own thread only. Without a thread the
+        // request is dropped, which answers it with status 500.
+        let _ = std::thread::Builder::new().spawn(move || respond(request, &folder));
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -151,6 +151,11 @@ impl Viewer {
 fn command(words: &[&str]) -> Command {
     let mut command = Command::new(words[0]);
     command.args(&words[1..]);
+    // A relative or empty entry of the path would offer programs of the working folder.
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    if let Ok(path) = std::env::join_paths(std::env::split_paths(&path).filter(|folder| folder.is_absolute())) {
+        command.env("PATH", path);
+    }
     command
 }
 
@@ -259,7 +264,7 @@ fn browse(terminal: &Terminal, file: &Path) -> ExitCode {
 
 /// Opens a file or an address in the browser; returns the process id of the opener if it started.
 pub(crate) fn open_in_browser(target: &OsStr) -> Option<u32> {
-    let mut opener = Command::new("xdg-open");
+    let mut opener = command(&["xdg-open"]);
     opener.arg(target).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
     detach(&mut opener);
     let mut child = opener.spawn().ok().filter(|_| cfg!(target_os = "linux"))?;

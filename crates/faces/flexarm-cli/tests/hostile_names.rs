@@ -152,3 +152,23 @@ fn warnings_of_one_kind_are_one_line_with_their_count_and_each_description_warns
         assert!(run.err.contains("(and 13 more of the description: flexarm check)"), "{}", run.err);
     }
 }
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_folder_whose_name_is_not_text_gets_the_files_of_any_other() {
+    use std::os::unix::ffi::OsStrExt as _;
+    let place = Place::new();
+    let files = |folder: &std::path::Path| {
+        let mut names: Vec<_> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+        names.sort();
+        names
+    };
+    let odd = std::ffi::OsStr::from_bytes(b"n\xff\xfe");
+    for folder in [std::ffi::OsStr::new("plain"), odd] {
+        let mut command = place.command(&["compare", "robot.toml", "swing.toml", "-o"]);
+        assert!(command.arg(folder).output().unwrap().status.success());
+    }
+    assert_eq!(files(&place.path("plain")), files(&place.path("").join(odd)));
+    let others = files(&place.path("")).into_iter().filter(|name| name.to_string_lossy().starts_with('n')).count();
+    assert_eq!(others, 1, "a folder of another name");
+}

@@ -38,6 +38,7 @@ impl Server {
     /// Returns the head and the body of the answer.
     fn ask(&self, method: &str, path: &str) -> (String, String) {
         let mut stream = TcpStream::connect(&self.address).unwrap();
+        stream.set_read_timeout(Some(std::time::Duration::from_secs(60))).unwrap();
         write!(stream, "{method} {path} HTTP/1.1\r\nHost: {}\r\nConnection: close\r\n\r\n", self.address).unwrap();
         let mut text = String::new();
         stream.read_to_string(&mut text).unwrap();
@@ -79,4 +80,22 @@ fn a_port_in_use_gets_a_message_with_the_remedy() {
     let server = Server::start(&place);
     let (_, port) = server.address.split_once(':').unwrap();
     place.refused(&["serve", "--no-open", "--port", port], &[port, "in use", "without --port"]);
+}
+
+#[test]
+fn a_client_that_does_not_read_its_answer_holds_up_no_other() {
+    let place = Place::new();
+    std::fs::create_dir(place.path("web")).unwrap();
+    place.write("web/index.html", "the page");
+    // More than the buffers of a connection.
+    std::fs::File::create(place.path("web/flexarm.wasm")).unwrap().set_len(64 << 20).unwrap();
+    let server = Server::start(&place);
+    let mut silent = Vec::new();
+    for _ in 0..8 {
+        let mut stream = TcpStream::connect(&server.address).unwrap();
+        write!(stream, "GET /flexarm.wasm HTTP/1.1\r\nHost: {}\r\n\r\n", server.address).unwrap();
+        stream.read_exact(&mut [0; 12]).unwrap(); // the answer has begun
+        silent.push(stream);
+    }
+    assert_eq!(server.ask("GET", "/").1, "the page");
 }

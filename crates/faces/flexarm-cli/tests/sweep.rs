@@ -284,6 +284,23 @@ fn shards_are_planned_run_and_joined_by_a_shell() {
         place.json(&["sweep", "plan", "study.toml", "-n", "3", "--engine", engine, "-o", engine]);
         assert!(place.text(&format!("{engine}/{file}")).contains(part));
     }
+    // Combining letters and quotes are text of Python, not escapes of another language.
+    let results = "re\u{301}sultats \"1\"";
+    place.json(&[
+        "sweep",
+        "plan",
+        "study.toml",
+        "-n",
+        "3",
+        "--engine",
+        "hyperqueue",
+        "--results",
+        results,
+        "-o",
+        "accent",
+    ]);
+    let script = place.text("accent/submit.py");
+    assert!(script.contains("re\u{301}sultats \\\"1\\\"\"") && !script.contains("\\u{"), "{script}");
     place.refused(&["sweep", "plan", "study.toml", "-n", "3", "-o", "plan"], &["exists already", "--force"]);
     place.refused(&["sweep", "plan", "study.toml", "-n", "300", "-o", "p"], &["200 shards"]);
     place.refused(&["sweep", "study.toml", "--shard", "4/3"], &["4/3"]);

@@ -196,3 +196,15 @@ fn a_report_goes_to_the_browser_or_is_named() {
         assert!(place.text("note").trim_end().ends_with("report.html"));
     }
 }
+
+#[test]
+fn a_relative_entry_of_the_path_offers_no_viewer() {
+    let place = place(&[("rerun", VIEWER)]);
+    for path in ["bin", "bin:", "./bin:/none"] {
+        let mut command = place.command(&["view", "both"]);
+        let answer = Answer::of(command.env("PATH", path).env("NOTE", place.path("note")).output().unwrap());
+        assert_eq!(answer.code, 1, "{path}: {}", answer.err);
+        answer.says(&["there is no Rerun viewer"]);
+        assert!(!place.path("note").exists(), "{path}");
+    }
+}

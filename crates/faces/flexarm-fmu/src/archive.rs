@@ -9,6 +9,7 @@ use std::io::{Cursor, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use flexarm::FileError;
 use flexarm::caveat::{Caveat, Use, warnings};
 use flexarm::reduce::STRESS_FILE;
 use flexarm::{
@@ -276,12 +277,13 @@ fn move_links(document: &mut DocumentMut, folder: &Path, with_stress: bool) -> R
 /// for bit.
 fn same_arm(files: &NamedFiles, arm: &Arc<Arm>, settings: &PlantSettings) -> Result<bool, PlantError> {
     let parent = std::env::temp_dir();
-    let folder = flexarm::private_folder(&parent).map_err(failed(&parent))?;
+    let folder =
+        flexarm::private_folder(&parent).map_err(|source| FileError::Write { path: parent.clone(), source })?;
     let checked = (|| {
         for (name, bytes) in files {
             let path = folder.join(name);
-            fs::create_dir_all(path.parent().unwrap_or(&folder)).map_err(failed(&folder))?;
-            fs::write(&path, bytes).map_err(failed(&path))?;
+            let written = fs::create_dir_all(path.parent().unwrap_or(&folder)).and_then(|()| fs::write(&path, bytes));
+            written.map_err(|source| FileError::Write { path, source })?;
         }
         let load = LoadOptions { tcp: settings.load.tcp.clone(), ..LoadOptions::default() };
         let own = Robot::load_with(&folder.join(ROBOT), &load)?.model(&settings.modelling)?;

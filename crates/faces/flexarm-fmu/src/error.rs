@@ -47,6 +47,24 @@ pub enum PlantError {
         /// Value.
         found: f64,
     },
+    /// A truth value is another number.
+    #[error("{name} = {found}: expected 0 or 1")]
+    TruthValue {
+        /// Name of the variable.
+        name: String,
+        /// Value.
+        found: f64,
+    },
+    /// The first step, which sets the step of the solver, is far shorter than the parameter `step`.
+    #[error(
+        "the first communication step is {length_s} s, less than a thousandth of the solver's step of {step_s} s: set the parameter step to what such steps need"
+    )]
+    Short {
+        /// Communication step (s).
+        length_s: f64,
+        /// Parameter `step` (s).
+        step_s: f64,
+    },
     /// A step has no positive length.
     #[error("the communication step is {0} s: expected a positive length")]
     Length(f64),

@@ -194,7 +194,8 @@ impl Instance {
         self.expect("a step", &[Phase::Step])?;
         let done = self.plant.step(from_s, length_s);
         // A wrong call leaves the arm as it was.
-        let kept = matches!(done, Ok(()) | Err(PlantError::Time { .. } | PlantError::Length(_)));
+        let kept =
+            matches!(done, Ok(()) | Err(PlantError::Time { .. } | PlantError::Length(_) | PlantError::Short { .. }));
         if !kept && !matches!(&done, Err(PlantError::Robot(flexarm::Error::Value(_)))) {
             self.phase = Phase::Failed;
         }

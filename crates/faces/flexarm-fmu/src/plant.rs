@@ -17,6 +17,8 @@ use crate::variables::{Causality, Kind, Meaning, Starts, StateReferences, Variab
 const WHOLE: f64 = 1e-6;
 /// Tolerance between the time of the caller and that of the plant (in communication steps).
 const SAME_TIME: f64 = 1e-3;
+/// Minimum length of the first communication step: all later ones are solved in steps of it (in steps).
+const SHORTEST: f64 = 1e-3;
 
 /// Settings for making a plant of a robot.
 #[derive(Clone, Debug)]
@@ -335,6 +337,7 @@ impl Plant {
     ///
     /// # Errors
     /// [`PlantError::NotStarted`]; [`PlantError::Time`] if `from_s` is not the time of the plant;
+    /// [`PlantError::Short`] for a first step below a thousandth of the parameter `step`;
     /// [`PlantError::Robot`] for a length that is no multiple of the solver step, and for a step
     /// that fails.
     pub fn step(&mut self, from_s: f64, length_s: f64) -> Result<(), PlantError> {
@@ -356,6 +359,9 @@ impl Plant {
         if self.steps == 0 {
             let step_s = self.parameter(Meaning::Step, 0.0);
             let count = length_s / step_s;
+            if count < SHORTEST {
+                return Err(PlantError::Short { length_s, step_s });
+            }
             if (count - count.round()).abs() > WHOLE || count < 0.5 {
                 let live = self.begun(Some(length_s / count.ceil().max(1.0)))?;
                 self.running = Some(Running::Steps(Box::new(live)));

@@ -405,3 +405,29 @@ fn a_map_of_listed_poses_has_the_compliance_of_statics_at_each() {
     assert!(taken(&robot, &one).caveats.iter().any(|caveat| caveat.code == "one-place"));
     std::fs::remove_dir_all(&folder).unwrap();
 }
+
+#[test]
+fn a_map_with_a_tool_that_is_stopped_within_a_pose_keeps_the_places_done() {
+    let (robot, tool) = (robot("kr210"), end_mill().at_speeds(vec![8000.0, 9000.0]));
+    let at = Some(vec![0.3, 0.0, 0.0, 0.2, 0.9, -0.1]);
+    let folder = std::env::temp_dir().join(format!("flexarm-map-stopped-{}", std::process::id()));
+    let ranges = vec![joint("joint_2", [-1.2, -0.8], 4)];
+    let request = MapRequest { tool: Some(tool), at, output: Some(folder.clone()), ..over(ranges) };
+    let mut looks = 0;
+    let stopped = map(&robot, &request, &mut |done, all| {
+        assert_eq!(all, 4.0);
+        looks += usize::from(done >= 1.0);
+        // The second look after the first place is within the second one.
+        if looks > 1 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    });
+    let error = stopped.unwrap_err();
+    assert_eq!(error.fault(), Fault::Run);
+    let Some(&MapError::Interrupted { done, places: 4, .. }) = error.external() else { panic!("{error}") };
+    assert!((1..4).contains(&done), "{done}");
+    assert!(error.to_string().contains(&format!("their results are in {}", folder.display())), "{error}");
+    let json = std::fs::read_to_string(folder.join("map.json")).unwrap();
+    std::fs::remove_dir_all(&folder).unwrap();
+    let found: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert_eq!((found["reachable"].as_u64(), found["points"].as_u64()), (Some(done as u64), Some(4)));
+    assert!(found["warnings"].to_string().contains(&format!("{done} of 4 places")), "{}", found["warnings"]);
+}

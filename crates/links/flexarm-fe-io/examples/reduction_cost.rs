@@ -23,7 +23,7 @@ fn main() {
     let modes: usize = words.get(4).map_or(20, |w| w.parse().unwrap());
     let ordering = match std::env::var("ORDERING").as_deref() {
         Ok("amd") => Ordering::MinimumDegree,
-        Ok("metis") => Ordering::NestedDissection,
+        Ok("nested") => Ordering::NestedDissection,
         _ => Ordering::Auto,
     };
     let mut last = Instant::now();

@@ -1,9 +1,10 @@
 //! Bags of one or several files: those listed in `metadata.yaml` of a folder, or all in the folder.
 
 use std::fs::File;
-use std::io::Read;
+use std::io::{Read, Seek};
 use std::path::{Path, PathBuf};
 
+use flexarm_files::most_unpacked;
 use flexarm_settings::Caveat;
 
 use crate::assemble::assemble;
@@ -127,19 +128,23 @@ pub(crate) fn read_files(files: &[PathBuf], bag: &Path, request: &Request<'_>) -
     for file in files {
         let origin = file.display().to_string();
         let mut head = Vec::new();
-        let opened = File::open(file).and_then(|open| open.take(16).read_to_end(&mut head));
-        opened.map_err(|source| MotionError::Read { path: file.clone(), source })?;
+        let failed = |source| MotionError::Read { path: file.clone(), source };
+        let mut open = File::open(file).map_err(failed)?;
+        open.by_ref().take(16).read_to_end(&mut head).map_err(failed)?;
+        let most = most_unpacked(open.metadata().map_err(failed)?.len());
+        let placed = |trouble: PlacedProblem| trouble.of(&origin);
         let ended = if head.starts_with(mcap::MCAP_MAGIC) {
-            mcap::collect_file(file, &mut collector)?
+            open.rewind().map_err(failed)?;
+            mcap::collect(open, most, &mut collector).map_err(placed)?
         } else if head.starts_with(SQLITE_MAGIC) {
             format = "SQLite bag";
-            sqlite::collect_file(file, &mut collector)?
+            sqlite::collect_file(file, most, &mut collector)?
         } else if head.starts_with(ZSTD_MAGIC) {
-            match look_inside(file)? {
-                Inside::Mcap(stream) => mcap::collect(stream, &mut collector).map_err(|trouble| trouble.of(&origin))?,
+            match look_inside(file, most)? {
+                Inside::Mcap(stream) => mcap::collect(stream, most, &mut collector).map_err(placed)?,
                 Inside::Database(bytes) => {
                     format = "SQLite bag";
-                    sqlite::collect_bytes(bytes, &mut collector).map_err(|trouble| trouble.of(&origin))?
+                    sqlite::collect_bytes(bytes, most, &mut collector).map_err(placed)?
                 }
             }
         } else {

@@ -5,9 +5,7 @@
 //! used here (schema, channel, message).
 
 use std::collections::HashMap;
-use std::fs::File;
 use std::io::{Cursor, ErrorKind, Read};
-use std::path::Path;
 
 use lz4_flex::frame::FrameDecoder;
 use mcap::records::{Record, op};
@@ -16,7 +14,7 @@ use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::{McapError, McapResult};
 
 use crate::collect::Collector;
-use crate::error::{MotionError, PlacedProblem};
+use crate::error::PlacedProblem;
 
 /// First bytes of an MCAP file.
 pub const MCAP_MAGIC: &[u8] = mcap::MAGIC;
@@ -24,19 +22,17 @@ pub const MCAP_MAGIC: &[u8] = mcap::MAGIC;
 /// Maximum size of a record, or of a decompressed chunk, in bytes: the library allocates a chunk
 /// before decompressing it.
 const MOST_BYTES: usize = 256 << 20;
-/// Largest ratio of the unpacked to the packed bytes of a file beyond [`MOST_BYTES`]: a recording of
-/// an arm at rest has less than 100.
-const MOST_TIMES: u64 = 1000;
 /// Number of bytes read at once, regardless of the stated length of a record.
 const READ_BYTES: usize = 64 << 10;
 
-pub(crate) fn collect_file(path: &Path, into: &mut Collector<'_>) -> Result<Option<String>, MotionError> {
-    let failed = |source| MotionError::Read { path: path.to_owned(), source };
-    collect(File::open(path).map_err(failed)?, into).map_err(|trouble| trouble.of(&path.display().to_string()))
-}
-
 /// Collects the messages of a file. Returns the reason if it ends prematurely.
-pub(crate) fn collect(mut file: impl Read, into: &mut Collector<'_>) -> Result<Option<String>, PlacedProblem> {
+///
+/// * `most`: maximum size of all records, bytes.
+pub(crate) fn collect(
+    mut file: impl Read,
+    most: u64,
+    into: &mut Collector<'_>,
+) -> Result<Option<String>, PlacedProblem> {
     let options = LinearReaderOptions::default()
         .with_skip_end_magic(true)
         .with_prevalidate_chunk_crcs(true) // a damaged chunk is dropped as a whole
@@ -44,13 +40,12 @@ pub(crate) fn collect(mut file: impl Read, into: &mut Collector<'_>) -> Result<O
     let mut reader = LinearReader::new_with_options(options);
     reader.add_decompressor(Lz4::default()).expect("it has a name");
     let mut known = SchemasAndChannels::default();
-    let (mut packed, mut unpacked) = (0, 0);
+    let mut unpacked = 0;
     while let Some(event) = reader.next_event() {
         let cut = match event {
             Ok(LinearReadEvent::ReadRequest(_)) => match file.read(reader.insert(READ_BYTES)) {
                 Ok(read) => {
                     reader.notify_read(read);
-                    packed += read as u64;
                     None
                 }
                 Err(error) if error.kind() == ErrorKind::Interrupted => None,
@@ -59,7 +54,6 @@ pub(crate) fn collect(mut file: impl Read, into: &mut Collector<'_>) -> Result<O
             Ok(LinearReadEvent::Record { opcode: op::DATA_END, .. }) => return Ok(None),
             Ok(LinearReadEvent::Record { opcode, data }) => {
                 unpacked += 9 + data.len() as u64; // with kind and length
-                let most = (MOST_BYTES as u64).max(MOST_TIMES * packed);
                 match unpacked > most {
                     true => Some(format!("it unpacks to more than {most} bytes, the limit for its size")),
                     false => known.record(opcode, data, into)?,

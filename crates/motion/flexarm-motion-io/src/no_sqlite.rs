@@ -5,11 +5,11 @@ use std::path::Path;
 use crate::collect::Collector;
 use crate::error::{MotionError, PlacedProblem, Problem};
 
-pub(crate) fn collect_file(path: &Path, _: &mut Collector<'_>) -> Result<Option<String>, MotionError> {
+pub(crate) fn collect_file(path: &Path, _: u64, _: &mut Collector<'_>) -> Result<Option<String>, MotionError> {
     Err(refused().of(&path.display().to_string()))
 }
 
-pub(crate) fn collect_bytes(_: Vec<u8>, _: &mut Collector<'_>) -> Result<Option<String>, PlacedProblem> {
+pub(crate) fn collect_bytes(_: Vec<u8>, _: u64, _: &mut Collector<'_>) -> Result<Option<String>, PlacedProblem> {
     Err(refused())
 }
 

@@ -10,9 +10,12 @@ use rusqlite::{Connection, OpenFlags};
 
 use crate::collect::Collector;
 use crate::error::{MotionError, PlacedProblem, Problem};
-use crate::unpack::{ZSTD_MAGIC, unpacked};
+use crate::unpack::{MOST_BYTES, ZSTD_MAGIC, unpacked};
 
-pub(crate) fn collect_file(path: &Path, into: &mut Collector<'_>) -> Result<Option<String>, MotionError> {
+/// Collects from a file.
+///
+/// * `most`: maximum size of all messages after decompression, bytes.
+pub(crate) fn collect_file(path: &Path, most: u64, into: &mut Collector<'_>) -> Result<Option<String>, MotionError> {
     let origin = path.display().to_string();
     let file = || {
         let mut log = path.as_os_str().to_owned();
@@ -29,11 +32,15 @@ pub(crate) fn collect_file(path: &Path, into: &mut Collector<'_>) -> Result<Opti
         None => Connection::open_with_flags(path, flags),
     };
     let database = opened.map_err(|error| failed(&error).of(&origin))?;
-    collect(&database, into).map_err(|trouble| trouble.of(&origin))
+    collect(&database, most, into).map_err(|trouble| trouble.of(&origin))
 }
 
 /// Collects from a database that was decompressed into memory.
-pub(crate) fn collect_bytes(mut bytes: Vec<u8>, into: &mut Collector<'_>) -> Result<Option<String>, PlacedProblem> {
+pub(crate) fn collect_bytes(
+    mut bytes: Vec<u8>,
+    most: u64,
+    into: &mut Collector<'_>,
+) -> Result<Option<String>, PlacedProblem> {
     // There is no log file in memory: format version 2 (with a log) is read as version 1.
     for at in [18, 19] {
         if let Some(version) = bytes.get_mut(at) {
@@ -44,7 +51,7 @@ pub(crate) fn collect_bytes(mut bytes: Vec<u8>, into: &mut Collector<'_>) -> Res
     let size = bytes.len();
     database.deserialize_read_exact("main", &bytes[..], size, true).map_err(|error| failed(&error))?;
     drop(bytes);
-    collect(&database, into)
+    collect(&database, most, into)
 }
 
 /// Escapes a character of a path in a file URI.
@@ -60,7 +67,7 @@ fn failed(error: &rusqlite::Error) -> PlacedProblem {
     PlacedProblem::new(Problem::Container { container: "SQLite file", what: error.to_string() })
 }
 
-fn collect(database: &Connection, into: &mut Collector<'_>) -> Result<Option<String>, PlacedProblem> {
+fn collect(database: &Connection, most: u64, into: &mut Collector<'_>) -> Result<Option<String>, PlacedProblem> {
     let tables = names_of_tables(database).map_err(|error| failed(&error))?;
     let has = |table: &str| tables.iter().any(|name| name == table);
     if !has("topics") || !has("messages") {
@@ -80,7 +87,7 @@ fn collect(database: &Connection, into: &mut Collector<'_>) -> Result<Option<Str
         let place = into.topic(&name, &message, &encoding, definitions.get(&message).map(String::as_str));
         places.insert(id, place);
     }
-    messages(database, &places, into)
+    messages(database, &places, most, into)
 }
 
 fn names_of_tables(database: &Connection) -> rusqlite::Result<Vec<String>> {
@@ -110,12 +117,13 @@ fn definitions(database: &Connection) -> rusqlite::Result<HashMap<String, String
 fn messages(
     database: &Connection,
     places: &HashMap<i64, usize>,
+    most: u64,
     into: &mut Collector<'_>,
 ) -> Result<Option<String>, PlacedProblem> {
     let query = database.prepare("SELECT topic_id, timestamp, data FROM messages ORDER BY id");
     let mut query = query.map_err(|error| failed(&error))?;
     let mut rows = query.query([]).map_err(|error| failed(&error))?;
-    let mut read = 0_usize;
+    let (mut read, mut left) = (0_usize, most);
     loop {
         let row = match rows.next() {
             Ok(Some(row)) => row,
@@ -130,10 +138,11 @@ fn messages(
         };
         let (Some(&place), Ok(data)) = (places.get(&topic), data.as_blob()) else { continue };
         if data.starts_with(ZSTD_MAGIC) && into.wants(place) {
-            let (message, broken) = unpacked(data);
+            let (message, broken) = unpacked(data, left.min(MOST_BYTES));
             if let Some(what) = broken {
                 return Ok(Some(what));
             }
+            left -= message.len() as u64;
             into.bytes(place, log_ns, &message)?;
         } else {
             into.bytes(place, log_ns, data)?;

@@ -12,14 +12,17 @@ pub const ZSTD_MAGIC: &[u8] = &[0x28, 0xB5, 0x2F, 0xFD];
 pub(crate) const MOST_BYTES: u64 = 1 << 30;
 
 /// Returns the bytes of zstd data before its end or an error, and the reason for the error.
+///
+/// * `most`: maximum size of the content, bytes.
 #[cfg(feature = "sqlite")]
-pub(crate) fn unpacked(bytes: &[u8]) -> (Vec<u8>, Option<String>) {
+pub(crate) fn unpacked(bytes: &[u8], most: u64) -> (Vec<u8>, Option<String>) {
     let mut out = Vec::new();
-    let result =
-        zstd::stream::read::Decoder::new(bytes).and_then(|unpack| unpack.take(MOST_BYTES + 1).read_to_end(&mut out));
+    let result = zstd::stream::read::Decoder::new(bytes).and_then(|unpack| unpack.take(most + 1).read_to_end(&mut out));
     let broken = match result {
         Err(error) => Some(format!("its compressed content is damaged or incomplete ({error})")),
-        Ok(_) if out.len() as u64 > MOST_BYTES => Some(format!("it unpacks to more than {MOST_BYTES} bytes")),
+        Ok(_) if out.len() as u64 > most => {
+            Some(format!("a message unpacks to more than {most} bytes, the limit for it"))
+        }
         Ok(_) => None,
     };
     (out, broken)
@@ -27,13 +30,36 @@ pub(crate) fn unpacked(bytes: &[u8]) -> (Vec<u8>, Option<String>) {
 
 /// Opens a compressed file as a stream.
 #[cfg(not(target_family = "wasm"))]
-fn open_packed(path: &Path) -> std::io::Result<Box<dyn Read>> {
-    Ok(Box::new(zstd::stream::read::Decoder::new(std::fs::File::open(path)?)?))
+fn open_packed(path: &Path, most: u64) -> std::io::Result<Box<dyn Read>> {
+    let file = std::fs::File::open(path)?;
+    Ok(Box::new(Bounded { stream: zstd::stream::read::Decoder::new(file)?, most, left: most }))
+}
+
+/// Stream that fails after `most` bytes.
+#[cfg(not(target_family = "wasm"))]
+struct Bounded<R> {
+    stream: R,
+    most: u64,
+    left: u64,
+}
+
+#[cfg(not(target_family = "wasm"))]
+impl<R: Read> Read for Bounded<R> {
+    fn read(&mut self, into: &mut [u8]) -> std::io::Result<usize> {
+        let read = self.stream.read(into)?;
+        let too_large = || {
+            let what =
+                format!("it unpacks to more than {} bytes, the limit for its size; unpack it with zstd -d", self.most);
+            std::io::Error::other(what)
+        };
+        self.left = self.left.checked_sub(read as u64).ok_or_else(too_large)?;
+        Ok(read)
+    }
 }
 
 /// Fails: WebAssembly is built without zstd, which is C.
 #[cfg(target_family = "wasm")]
-fn open_packed(_: &Path) -> std::io::Result<Box<dyn Read>> {
+fn open_packed(_: &Path, _: u64) -> std::io::Result<Box<dyn Read>> {
     Err(std::io::Error::other("zstd cannot be read here; unpack it with zstd -d"))
 }
 
@@ -45,9 +71,10 @@ pub(crate) enum Inside {
     Database(Vec<u8>),
 }
 
-pub(crate) fn look_inside(path: &Path) -> Result<Inside, MotionError> {
+/// * `most`: maximum size of the content, bytes.
+pub(crate) fn look_inside(path: &Path, most: u64) -> Result<Inside, MotionError> {
     let failed = |source| MotionError::Read { path: path.to_owned(), source };
-    let mut stream = BufReader::new(open_packed(path).map_err(failed)?);
+    let mut stream = BufReader::new(open_packed(path, most).map_err(failed)?);
     let mut head = [0; 16];
     let mut filled = 0;
     while filled < head.len() {

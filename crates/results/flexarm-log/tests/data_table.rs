@@ -57,3 +57,17 @@ fn a_table_that_was_cut_or_changed_is_told_as_no_table() {
     }
     std::fs::remove_file(&path).unwrap();
 }
+
+/// Equal numbers pack to almost nothing: the size of the file bounds neither memory nor time.
+#[test]
+fn a_small_table_that_unpacks_to_more_than_the_limit_is_refused_before_it_is_read() {
+    let path = std::env::temp_dir().join(format!("flexarm-table-bomb-{}.parquet", std::process::id()));
+    let column = |name: &str| DataColumn::new(name, DataValues::Number(vec![1.0; 17_000_000]));
+    let bomb = DataTable { columns: vec![column("a"), column("b")], texts: Vec::new() };
+    bomb.write(&path, CreateOptions::default().with_overwrite(true)).unwrap();
+    let bytes = std::fs::metadata(&path).unwrap().len();
+    let error = DataTable::read(&path).unwrap_err().to_string();
+    std::fs::remove_file(&path).unwrap();
+    assert!(bytes < 268_435, "{bytes}");
+    assert!(error.contains("unpacks to 272000000 bytes, more than 268435456, the limit for its size"), "{error}");
+}

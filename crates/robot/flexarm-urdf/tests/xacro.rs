@@ -335,3 +335,18 @@ fn plain_scalars_are_what_pyyaml_makes_of_them() {
         assert_eq!(v.attribute("n").unwrap(), format!("[{expected}]"), "{text}");
     }
 }
+
+#[test]
+fn a_robot_says_once_which_variables_and_yaml_files_its_values_are_from() {
+    let folder = TestFolder::new();
+    folder.write("values.yaml", "mass: 2.0\n");
+    let body = "<link name='base'/><link name='$(env HOME)'/><link name='$(optenv HOME none)2'/>\
+                <link name='$(optenv NO_SUCH_VARIABLE x)'/>\
+                <link name=\"rod${xacro.load_yaml('values.yaml')['mass']}${xacro.load_yaml('values.yaml')['mass']}\"/>";
+    let path = folder.write("robot.xacro", format!("{HEAD}{body}</robot>"));
+    let findings = check_urdf(&path, &ReadOptions::default());
+    let sources: Vec<&str> = findings.iter().filter(|f| f.code == "xacro-source").map(|f| &*f.message).collect();
+    assert_eq!(sources.len(), 2, "{sources:?}");
+    assert_eq!(sources[0], "the robot has values of the environment variable HOME");
+    assert!(sources[1].ends_with("values.yaml"), "{sources:?}");
+}

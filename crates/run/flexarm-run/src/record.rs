@@ -189,14 +189,14 @@ pub(crate) fn recorders(outputs: Option<&Outputs>, in_study: bool) -> Result<Rec
 
 /// Writes viewer layouts for the MCAP recording, if there is one.
 #[cfg(feature = "mcap")]
-pub(crate) fn write_layouts(files: &Files, header: &RunHeader) -> Result<(), Error> {
-    type Layout = fn(&RunHeader) -> String;
-    let layouts: [(_, Layout); 2] = [
-        (&files.foxglove_layout, flexarm_log::foxglove_layout),
-        (&files.plotjuggler_layout, flexarm_log::plotjuggler_layout),
-    ];
-    let there = layouts.into_iter().filter_map(|(path, text)| Some((PathBuf::from(path.as_ref()?), text(header))));
-    Ok(flexarm_files::write_all(&there.collect::<Vec<_>>())?)
+pub(crate) fn write_layouts(outputs: Option<&Outputs>, header: &RunHeader) -> Result<(), Error> {
+    let Some(outputs) = outputs.filter(|outputs| outputs.recordings.contains(&RecordingFormat::Mcap)) else {
+        return Ok(());
+    };
+    let [foxglove, plotjuggler] = LAYOUT_FILES.map(|name| outputs.folder.join(name));
+    let layouts =
+        [(foxglove, flexarm_log::foxglove_layout(header)), (plotjuggler, flexarm_log::plotjuggler_layout(header))];
+    Ok(flexarm_files::write_all(&layouts)?)
 }
 
 /// Writes the file that makes the folder of the finished MCAP recording a bag of ROS 2.
@@ -216,7 +216,7 @@ pub(crate) fn write_bag_metadata(_: &Files) -> Result<(), Error> {
 
 /// Without the feature `mcap` there are no layouts.
 #[cfg(not(feature = "mcap"))]
-pub(crate) fn write_layouts(_: &Files, _: &RunHeader) -> Result<(), Error> {
+pub(crate) fn write_layouts(_: Option<&Outputs>, _: &RunHeader) -> Result<(), Error> {
     Ok(())
 }
 

@@ -307,9 +307,17 @@ fn check_deepest(depth_m: f64) -> Result<(), Error> {
 /// Returns the minimum limit of depth at a pose over all speeds of the tool (m): the maximum depth
 /// if the cut never chatters, NaN if the feed is parallel to the tool's axis.
 ///
+/// `go_on` is called before each speed; it stops the computation by returning `false`.
+///
 /// # Errors
 /// As [`lobes`] at a pose.
-pub fn lowest_limit(robot: &Robot, modelling: &Modelling, tool: &CuttingTool, q: &[f64]) -> Result<f64, Error> {
+pub fn lowest_limit(
+    robot: &Robot,
+    modelling: &Modelling,
+    tool: &CuttingTool,
+    q: &[f64],
+    go_on: &dyn Fn() -> bool,
+) -> Result<f64, Error> {
     check_speeds(&tool.rpm)?;
     let place = match CutPose::at(robot, modelling, tool, Some(q)) {
         Err(error) if error.external() == Some(&LobesError::FeedAlongAxis) => return Ok(f64::NAN),
@@ -317,6 +325,9 @@ pub fn lowest_limit(robot: &Robot, modelling: &Modelling, tool: &CuttingTool, q:
     };
     let mut lowest = tool.deepest;
     for rpm in &tool.rpm {
+        if !go_on() {
+            return Err(Error::Interrupted { t: 0.0, partial: false });
+        }
         let found = point(&place, tool, *rpm, tool.deepest, false, 0)
             .map_err(|source| LobesError::Chatter { place: place.words(), source })?;
         lowest = lowest.min(found.depth_m.unwrap_or(lowest));

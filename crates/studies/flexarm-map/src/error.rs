@@ -1,5 +1,7 @@
 //! Errors of a map.
 
+use std::path::PathBuf;
+
 use flexarm_run::ExternalError;
 use flexarm_settings::{Fault, Setting};
 
@@ -177,12 +179,17 @@ pub enum MapError {
         by: String,
     },
     /// Interrupted by the user.
-    #[error("stopped after {done} of {places} places; nothing is written")]
+    #[error("stopped after {done} of {places} places; {}", match folder {
+        Some(folder) => format!("their results are in {}", folder.display()),
+        None => "nothing is written".to_owned(),
+    })]
     Interrupted {
         /// Number of places done.
         done: usize,
         /// Total number of places.
         places: usize,
+        /// Folder of the results of the places done.
+        folder: Option<PathBuf>,
     },
 }
 

@@ -54,8 +54,8 @@ pub(super) struct Cut<'a> {
 }
 
 impl Cut<'_> {
-    fn lowest_limit(&self, q: &[f64]) -> Result<f64, Error> {
-        lowest_limit(self.robot, self.modelling, self.tool, q)
+    fn lowest_limit(&self, q: &[f64], go_on: &dyn Fn() -> bool) -> Result<f64, Error> {
+        lowest_limit(self.robot, self.modelling, self.tool, q, go_on)
     }
 }
 
@@ -65,7 +65,7 @@ impl<'a> Evaluator<'a> {
         Self { at, layout, wrench: Wrench::new(Vector3::new(fx, fy, fz), Vector3::new(tx, ty, tz)), cut }
     }
 
-    /// Whether a pose takes so long that batches between two checks for interruption must be small.
+    /// Whether a pose takes so long that a thread takes one place at a time.
     pub(super) fn is_slow(&self) -> bool {
         self.cut.is_some()
     }
@@ -75,12 +75,20 @@ impl<'a> Evaluator<'a> {
     ///
     /// * `poses`: actuated joints in coordinate order (rad or m), pose after pose.
     /// * `seats`: one per pose.
-    pub(super) fn push(&mut self, poses: &[f64], seats: &[Seat], rows: &mut Vec<f64>, mut failed: impl FnMut(Error)) {
+    /// * `go_on`: returns `false` if the rest is not wanted; cutting limits then fail.
+    pub(super) fn push(
+        &mut self,
+        poses: &[f64],
+        seats: &[Seat],
+        rows: &mut Vec<f64>,
+        go_on: &dyn Fn() -> bool,
+        mut failed: impl FnMut(Error),
+    ) {
         let Self { at, layout, wrench, cut } = self;
         let (joints, loaded) = (layout.joints, layout.loaded);
         let mut push = |k: usize, weighed: &GravityResult, found: &PoseAnswer| -> Result<(), Error> {
             let q = &poses[k * joints..][..joints];
-            let depth = cut.map(|cut| cut.lowest_limit(q)).transpose()?;
+            let depth = cut.map(|cut| cut.lowest_limit(q, go_on)).transpose()?;
             push_row(layout, q, seats[k], weighed, found, depth, rows);
             Ok(())
         };

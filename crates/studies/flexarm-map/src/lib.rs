@@ -246,7 +246,8 @@ impl GridFigures {
 
 /// Computes a map.
 ///
-/// `go_on` is called with the number of places done and their total, and may interrupt.
+/// `go_on` is called with the number of places done and their total, from any thread, and may
+/// interrupt: the places done are then written before the error.
 ///
 /// # Errors
 /// [`MapError`] for an invalid or unreachable region, [`Error::Pose`] for joint positions that do
@@ -255,7 +256,7 @@ impl GridFigures {
 pub fn map(
     robot: &Robot,
     request: &MapRequest,
-    go_on: &mut dyn FnMut(f64, f64) -> ControlFlow<()>,
+    go_on: &mut (dyn FnMut(f64, f64) -> ControlFlow<()> + Send),
 ) -> Result<Map, Error> {
     let begun = Instant::now();
     let paths = request.output.as_deref().map(|folder| files::places(folder, request.overwrite)).transpose()?;
@@ -271,7 +272,7 @@ pub fn map(
     let by = layout.compared_by(request.by.as_deref())?;
     let near = home(model, request.at.as_deref())?;
     if let Some(tool) = &request.tool
-        && let Err(error) = lowest_limit(robot, &request.modelling, tool, &near)
+        && let Err(error) = lowest_limit(robot, &request.modelling, tool, &near, &|| true)
         && error.external::<LobesError>().is_some()
     {
         // Errors of tool or robot are the same at all poses.
@@ -286,12 +287,19 @@ pub fn map(
         _ => Vec::new(),
     };
     let (places, caveats) = region_of(request, model, &near, &rotations)?;
-    let mut taken = take(&places.as_places(&rotations), &evaluator, &choice, go_on)?;
+    let region = places.as_places(&rotations);
+    let mut taken = take(&region, &evaluator, &choice, go_on)?;
+    let (done, all) = (taken.done, region.count());
+    let stopped = |folder| MapError::Interrupted { done, places: all, folder };
+    if done < all && taken.rows.is_empty() {
+        return Err(stopped(None).into());
+    }
     let grid = places.grid();
     let table = MapTable { columns: layout.columns.clone(), values: std::mem::take(&mut taken.rows) };
     let mut found = summed_up(robot, &arm, request, table, &taken, by, grid.as_ref(), rotations.len())?;
     found.caveats.extend(caveats);
     found.caveats.extend(one_place(&found));
+    found.caveats.extend((done < all).then(|| unfinished(done, all)));
     found.caveats.extend(request.tool.iter().flat_map(flexarm_chatter::tool_caveats));
     found.caveats.extend(caveat::validity::outside_limits(actuated, &near).filter(|_| request.at.is_some()));
     found.caveats.extend(validity(robot, request, &found));
@@ -300,7 +308,10 @@ pub fn map(
     if let Some(paths) = paths {
         files::save(&mut found, &paths, robot, request, &arm, grid.as_ref())?;
     }
-    Ok(found)
+    match done < all {
+        true => Err(stopped(request.output.clone()).into()),
+        false => Ok(found),
+    }
 }
 
 /// A checked region.
@@ -557,6 +568,11 @@ fn no_placement(edges: [f64; 3]) -> Caveat {
     let message =
         format!("the workpiece of {edges:?} m does not fit anywhere on the grid with all its places within reach");
     Caveat::from_message("no-placement", "map", message, "use a smaller workpiece or more tool directions")
+}
+
+fn unfinished(done: usize, places: usize) -> Caveat {
+    let message = format!("the map was stopped: {done} of {places} places are in it");
+    Caveat::from_message("map-stopped", "map", message, "run it to its end")
 }
 
 /// Returns a caveat if the map has a single place, so that there is nothing to compare.

@@ -1,6 +1,9 @@
 //! Evaluation of the places of a map on all cores.
 
 use std::ops::ControlFlow;
+use std::sync::Mutex;
+use std::sync::atomic::Ordering::Relaxed;
+use std::sync::atomic::{AtomicBool, AtomicUsize};
 
 use flexarm_kinematics::Pose;
 use nalgebra::Rotation3;
@@ -16,10 +19,8 @@ use super::{KeptPoses, MOST_PLACES, MapError};
 const CHUNK: usize = 64;
 /// Number of waiting poses at which they are evaluated; the poses of one place are never split.
 const MOST_WAITING: usize = 256;
-/// Number of places between two calls of `go_on`.
+/// Number of places whose rows are added up at once.
 const BLOCK: usize = 8192;
-/// Both numbers for slow evaluations.
-const SLOW: [usize; 2] = [1, 16];
 
 /// Appends the joint positions of the pose with this number to an empty list.
 pub(super) type PoseOf<'a> = dyn Fn(usize, &mut Vec<f64>) + Sync + 'a;
@@ -53,6 +54,8 @@ impl Places<'_> {
 pub(super) struct Evaluation {
     /// Rows in the order of the places.
     pub(super) rows: Vec<f64>,
+    /// Number of places done, with or without rows.
+    pub(super) done: usize,
     /// Number of places with at least one row.
     pub(super) reachable: usize,
     /// Number of poses tried.
@@ -66,6 +69,7 @@ pub(super) struct Evaluation {
 impl Evaluation {
     fn add(&mut self, other: Self) {
         self.rows.extend(other.rows);
+        self.done += other.done;
         self.reachable += other.reachable;
         self.poses += other.poses;
         self.failed += other.failed;
@@ -81,36 +85,54 @@ pub(super) struct Choice<'a> {
     pub(super) by: usize,
 }
 
-/// Evaluates all places; the rows do not depend on the number of threads.
+/// Evaluates all places, or those finished before `go_on` breaks; the rows do not depend on the
+/// number of threads.
 ///
 /// # Errors
-/// [`MapError::Interrupted`] if `go_on` breaks, [`MapError::TooManyRows`] if the rows do not fit in
-/// memory.
+/// [`MapError::TooManyRows`] if the rows do not fit in memory.
 pub(super) fn take(
     places: &Places<'_>,
     evaluator: &Evaluator<'_>,
     choice: &Choice<'_>,
-    go_on: &mut dyn FnMut(f64, f64) -> ControlFlow<()>,
+    go_on: &mut (dyn FnMut(f64, f64) -> ControlFlow<()> + Send),
 ) -> Result<Evaluation, MapError> {
     let (all, mut taken) = (places.count(), Evaluation::default());
-    let [chunk, block] = if evaluator.is_slow() { SLOW } else { [CHUNK, BLOCK] };
-    for first in (0..all).step_by(block) {
-        if go_on(first as f64, all as f64).is_break() {
-            return Err(MapError::Interrupted { done: first, places: all });
+    let chunk = if evaluator.is_slow() { 1 } else { CHUNK };
+    let (go_on, done, stopped) = (Mutex::new(go_on), AtomicUsize::new(0), AtomicBool::new(false));
+    let wanted = || {
+        // While one thread asks, the others work.
+        if let Ok(mut go_on) = go_on.try_lock()
+            && !stopped.load(Relaxed)
+            && go_on(done.load(Relaxed) as f64, all as f64).is_break()
+        {
+            stopped.store(true, Relaxed);
         }
-        let last = (first + block).min(all);
+        !stopped.load(Relaxed)
+    };
+    for first in (0..all).step_by(BLOCK) {
+        let last = (first + BLOCK).min(all);
         let chunks: Vec<usize> = (first..last).step_by(chunk).collect();
         let worker = Worker::new(places, evaluator, choice);
-        let parts: Vec<Evaluation> = chunks
+        let parts: Vec<Option<Evaluation>> = chunks
             .into_par_iter()
-            .map_with(worker, |worker, from| worker.chunk(from, (from + chunk).min(last)))
+            .map_with(worker, |worker, from| {
+                let to = (from + chunk).min(last);
+                let part = wanted().then(|| worker.chunk(from, to, &wanted));
+                done.fetch_add(to - from, Relaxed);
+                part.filter(|_| !stopped.load(Relaxed))
+            })
             .collect();
-        parts.into_iter().for_each(|part| taken.add(part));
+        parts.into_iter().flatten().for_each(|part| taken.add(part));
+        if stopped.load(Relaxed) {
+            return Ok(taken);
+        }
         if taken.rows.len() / choice.layout.width() > MOST_PLACES {
             return Err(MapError::TooManyRows { most: MOST_PLACES });
         }
     }
-    let _ = go_on(all as f64, all as f64);
+    if let Ok(go_on) = go_on.into_inner() {
+        let _ = go_on(all as f64, all as f64);
+    }
     Ok(taken)
 }
 
@@ -141,8 +163,8 @@ impl<'a> Worker<'a> {
         Self { places, finder, evaluator, choice, branches, waiting, seats: Vec::new(), rows: Vec::new() }
     }
 
-    fn chunk(&mut self, from: usize, to: usize) -> Evaluation {
-        let mut taken = Evaluation::default();
+    fn chunk(&mut self, from: usize, to: usize, go_on: &dyn Fn() -> bool) -> Evaluation {
+        let mut taken = Evaluation { done: to - from, ..Evaluation::default() };
         for place in from..to {
             match self.places {
                 Places::Grid { grid, rotations, finder, keep_out_m } => {
@@ -161,10 +183,10 @@ impl<'a> Worker<'a> {
                 }
             }
             if self.seats.len() >= MOST_WAITING {
-                self.answer(&mut taken);
+                self.answer(&mut taken, go_on);
             }
         }
-        self.answer(&mut taken);
+        self.answer(&mut taken, go_on);
         taken
     }
 
@@ -178,10 +200,10 @@ impl<'a> Worker<'a> {
     }
 
     /// Evaluates all waiting poses, and keeps the selected rows of each place.
-    fn answer(&mut self, taken: &mut Evaluation) {
+    fn answer(&mut self, taken: &mut Evaluation, go_on: &dyn Fn() -> bool) {
         taken.poses += self.seats.len();
         let mut rows = std::mem::take(&mut self.rows);
-        self.evaluator.push(&self.waiting, &self.seats, &mut rows, |error| {
+        self.evaluator.push(&self.waiting, &self.seats, &mut rows, go_on, |error| {
             taken.failed += 1;
             taken.first_failure.get_or_insert_with(|| error.to_string());
         });

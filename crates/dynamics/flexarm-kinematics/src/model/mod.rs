@@ -73,6 +73,19 @@ impl Model {
         self.coordinates.len()
     }
 
+    /// Checks that there is one value per coordinate.
+    ///
+    /// * `what`: name of the values for the message.
+    ///
+    /// # Panics
+    /// If there is not.
+    #[track_caller]
+    #[inline]
+    pub fn check_size(&self, what: &str, found: usize) {
+        let expected = self.nv();
+        assert!(found == expected, "{what} has {found} values, expected one for each of the {expected} coordinates");
+    }
+
     /// Number of actuated coordinates; they come first.
     pub fn n_actuated(&self) -> usize {
         self.n_actuated

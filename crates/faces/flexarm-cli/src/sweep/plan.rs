@@ -216,15 +216,16 @@ impl Plan<'_> {
 
     fn kubernetes(&self) -> Planned {
         let Self { args, folder, .. } = self;
-        let PlanArgs { shards: n, cores, image, claim, .. } = args;
+        let PlanArgs { shards: n, cores, .. } = args;
+        let (image, claim) = (in_double_quotes(&args.image), in_double_quotes(&args.claim));
         let name = self.name.to_lowercase().replace('_', "-");
         let job = |name: &str, indexed: &str, command: &str| {
             format!(
                 "apiVersion: batch/v1\nkind: Job\nmetadata:\n  name: {name}\nspec:\n{indexed}  backoffLimit: 20\n  template:\n    spec:\n      \
-                 restartPolicy: OnFailure\n      containers:\n        - name: flexarm\n          image: {image:?}\n          workingDir: /study\n          \
+                 restartPolicy: OnFailure\n      containers:\n        - name: flexarm\n          image: {image}\n          workingDir: /study\n          \
                  command: [\"sh\", \"-c\"]\n          args:\n            - |\n              exec {command}\n          resources:\n            requests: \
                  {{ cpu: \"{cores}\" }}\n          volumeMounts:\n            - {{ name: study, mountPath: /study }}\n      volumes:\n        - name: study\n          \
-                 persistentVolumeClaim: {{ claimName: {claim:?} }}\n"
+                 persistentVolumeClaim: {{ claimName: {claim} }}\n"
             )
         };
         let indexed = format!("  completions: {n}\n  parallelism: {n}\n  completionMode: Indexed\n");
@@ -243,10 +244,15 @@ impl Plan<'_> {
     }
 }
 
+/// Text in double quotes as JSON has it, which Python and YAML read alike.
+fn in_double_quotes(text: &str) -> String {
+    serde_json::Value::from(text).to_string()
+}
+
 /// Converts a quoted shell word to a Python string literal.
 fn literal(word: &str) -> String {
     let plain = word.strip_prefix('\'').and_then(|word| word.strip_suffix('\'')).map(|word| word.replace("'\\''", "'"));
-    format!("{:?}", plain.unwrap_or_else(|| word.to_owned()))
+    in_double_quotes(&plain.unwrap_or_else(|| word.to_owned()))
 }
 
 /// Quotes a word for a shell.

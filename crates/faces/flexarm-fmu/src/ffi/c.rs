@@ -7,7 +7,7 @@ use std::ptr;
 
 use flexarm::{DriveModel, LinkModel, Modelling, Words};
 
-use super::{NULL, array, get_each, guarded, message, set_each, string, text_of};
+use super::{NULL, array, get_each, guarded, message, set_each, string, string_or_null, text_of};
 use crate::error::PlantError;
 use crate::plant::{Plant, PlantSettings, PlantState};
 use crate::variables::{Causality, Kind};
@@ -95,8 +95,11 @@ unsafe fn opened(
     pose: Option<&[f64]>,
 ) -> Result<Handle, String> {
     // SAFETY: as promised by the caller.
-    let (robot, [links, drives]) = unsafe { (string(robot), models.map(|model| string(model))) };
+    let (robot, [links, drives]) = unsafe { (string(robot), models.map(|model| string_or_null(model))) };
     let robot = robot.ok_or("robot: expected a path as UTF-8")?;
+    let links = links.map_err(|error| format!("links: expected a word as UTF-8 ({error})"))?;
+    let drives = drives.map_err(|error| format!("drives: expected a word as UTF-8 ({error})"))?;
+    let pose = pose.ok_or("pose: a null pointer, expected n_pose numbers; for zero, n_pose = 0")?;
     let unknown = |what: &str, word: &str, known: String| format!("{what} = {word:?}: expected one of {known}");
     let links = match links {
         None => LinkModel::AsFiled,
@@ -113,7 +116,7 @@ unsafe fn opened(
     let settings = PlantSettings {
         modelling: Modelling { links, drives, ..Modelling::default() },
         step_s: (step_s != 0.0).then_some(step_s),
-        pose: pose.filter(|pose| !pose.is_empty()).map(<[f64]>::to_vec),
+        pose: (!pose.is_empty()).then(|| pose.to_vec()),
         ..PlantSettings::default()
     };
     let plant = Plant::new(Path::new(robot), &settings).map_err(|error| text_of(&error))?;
@@ -141,9 +144,13 @@ extern "C" fn flexarm_count(plant: *const Handle) -> usize {
 extern "C" fn flexarm_find(plant: *const Handle, name: *const c_char) -> c_int {
     // SAFETY: the caller passes a plant and a string, or null.
     let (plant, name) = unsafe { (plant.as_ref(), string(name)) };
-    let found = plant.zip(name).and_then(|(handle, name)| handle.plant.find(name));
+    let Some((handle, name)) = plant.zip(name) else {
+        failed("a null pointer or a name that is not UTF-8; expected a plant and the name of a variable");
+        return -1;
+    };
+    let found = handle.plant.find(name);
     found.and_then(|reference| c_int::try_from(reference).ok()).unwrap_or_else(|| {
-        failed(&format!("there is no variable {:?}", name.unwrap_or_default()));
+        failed(&format!("there is no variable {name:?}"));
         -1
     })
 }
@@ -184,7 +191,13 @@ extern "C" fn flexarm_set(plant: *mut Handle, references: *const u32, values: *c
             set_each(references, values, n, |reference, value| {
                 let reference = reference as usize;
                 match handle.plant.variables().get(reference).map(|variable| variable.kind) {
-                    Some(Kind::Boolean) => handle.plant.set_flag(reference, value != 0.0),
+                    Some(Kind::Boolean) if value == 0.0 || value == 1.0 => {
+                        handle.plant.set_flag(reference, value == 1.0)
+                    }
+                    Some(Kind::Boolean) => {
+                        let name = handle.plant.variables()[reference].name.clone();
+                        Err(PlantError::TruthValue { name, found: value })
+                    }
                     _ => handle.plant.set(reference, value),
                 }
             })
@@ -262,5 +275,65 @@ extern "C" fn flexarm_free_state(state: *mut PlantState) {
         // SAFETY: the caller frees a state once.
         let state = unsafe { Box::from_raw(state) };
         guarded(|| drop(state));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::ffi::CStr;
+
+    use super::*;
+
+    const ROBOT: &CStr = match CStr::from_bytes_with_nul(
+        concat!(env!("CARGO_MANIFEST_DIR"), "/../../../robots/moberg_arm/robot.toml\0").as_bytes(),
+    ) {
+        Ok(path) => path,
+        Err(_) => panic!("the path has a zero"),
+    };
+
+    fn open(links: *const c_char, pose: *const f64, n_pose: usize) -> *mut Handle {
+        flexarm_open(ROBOT.as_ptr(), links, ptr::null(), 0.0, pose, n_pose)
+    }
+
+    /// Message of the last error.
+    fn said() -> String {
+        ERROR.with(|error| error.borrow().to_str().unwrap().to_owned())
+    }
+
+    #[test]
+    fn what_is_given_but_unreadable_does_not_count_as_not_given() {
+        let none = ptr::null();
+        assert!(open(c"\xff\xfe".as_ptr(), none.cast(), 0).is_null());
+        assert!(said().contains("links: expected a word as UTF-8"), "{}", said());
+        assert!(open(none, none.cast(), 5).is_null());
+        assert!(said().contains("pose: a null pointer"), "{}", said());
+        let plant = open(none, none.cast(), 0);
+        assert!(!plant.is_null(), "{}", said());
+        assert_eq!(flexarm_find(plant, none), -1);
+        assert!(said().contains("a null pointer"), "{}", said());
+        flexarm_free(plant);
+    }
+
+    #[test]
+    fn a_truth_value_is_zero_or_one() {
+        let plant = open(ptr::null(), ptr::null(), 0);
+        let flag = flexarm_find(plant, c"use_target_velocity".as_ptr()) as u32;
+        let mut found = -1.0;
+        for (value, expected) in [(1.0, 0), (f64::NAN, -1), (0.5, -1), (0.0, 0)] {
+            assert_eq!(flexarm_set(plant, &flag, &value, 1), expected, "{value}");
+        }
+        assert!(said().contains("use_target_velocity = 0.5: expected 0 or 1"), "{}", said());
+        assert_eq!((flexarm_get(plant, &flag, &mut found, 1), found), (0, 0.0));
+        flexarm_free(plant);
+    }
+
+    #[test]
+    fn a_first_step_far_below_the_step_of_the_solver_is_refused_and_the_arm_goes_on() {
+        let plant = open(ptr::null(), ptr::null(), 0);
+        assert_eq!(flexarm_start(plant, 0.0), 0, "{}", said());
+        assert_eq!(flexarm_step(plant, 1e-9), -1);
+        assert!(said().contains("the first communication step is 0.000000001 s"), "{}", said());
+        assert_eq!((flexarm_step(plant, 0.01), flexarm_time(plant)), (0, 0.01));
+        flexarm_free(plant);
     }
 }

@@ -356,7 +356,12 @@ extern "C" fn fmi2CompletedIntegratorStep(
     // SAFETY: the importer passes an instance and places for the answers, or null.
     unsafe {
         call(component, |instance| {
-            (*event.as_mut().ok_or(NULL)?, *terminate.as_mut().ok_or(NULL)?) = (0, 0);
+            if event.is_null() || terminate.is_null() {
+                return Err(NULL);
+            }
+            // Not as references: both may be the same place.
+            event.write(0);
+            terminate.write(0);
             instance.complete_step()
         })
     }

@@ -10,6 +10,7 @@ mod fmi3;
 
 use std::ffi::{CStr, CString, c_char, c_void};
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::str::Utf8Error;
 
 use crate::error::PlantError;
 use crate::instance::{Instance, InstanceState, StateValues};
@@ -25,10 +26,19 @@ fn guarded<T>(work: impl FnOnce() -> T) -> Option<T> {
 /// Returns the text of a string; `None` for null and for what is not UTF-8.
 ///
 /// # Safety
-/// `text` is null or ends with zero.
+/// As [`string_or_null`].
 unsafe fn string<'a>(text: *const c_char) -> Option<&'a str> {
     // SAFETY: as promised by the caller.
-    (!text.is_null()).then(|| unsafe { CStr::from_ptr(text) }).and_then(|text| text.to_str().ok())
+    unsafe { string_or_null(text) }.ok().flatten()
+}
+
+/// Returns the text of a string; `None` for null.
+///
+/// # Safety
+/// `text` is null or ends with zero.
+unsafe fn string_or_null<'a>(text: *const c_char) -> Result<Option<&'a str>, Utf8Error> {
+    // SAFETY: as promised by the caller.
+    (!text.is_null()).then(|| unsafe { CStr::from_ptr(text) }.to_str()).transpose()
 }
 
 /// Returns an array as a slice; `None` if it is null but not empty.
@@ -60,17 +70,19 @@ unsafe fn array_mut<'a, T>(values: *mut T, count: usize) -> Option<&'a mut [T]> 
 /// Writes the value of each reference.
 ///
 /// # Safety
-/// As [`array`] and [`array_mut`], with `n` references and values.
+/// Both arrays are null or have `n` entries; they may overlap.
 unsafe fn get_each<T>(
     references: *const u32,
     values: *mut T,
     n: usize,
     mut get: impl FnMut(u32) -> Result<T, PlantError>,
 ) -> Result<(), PlantError> {
-    // SAFETY: as promised by the caller.
-    let (references, values) = unsafe { (array(references, n).ok_or(NULL)?, array_mut(values, n).ok_or(NULL)?) };
-    references.iter().zip(values).try_for_each(|(&reference, value)| {
-        *value = get(reference)?;
+    if n > 0 && (references.is_null() || values.is_null()) {
+        return Err(NULL);
+    }
+    (0..n).try_for_each(|k| {
+        // SAFETY: as promised by the caller.
+        unsafe { values.add(k).write(get(references.add(k).read())?) };
         Ok(())
     })
 }
@@ -113,16 +125,13 @@ impl Differential {
     unsafe fn compute(self, instance: &mut Instance) -> Result<(), PlantError> {
         let Self { unknowns, knowns, seed, result } = self;
         // SAFETY: as promised by the caller.
-        let (unknowns, knowns, seed, result) = unsafe {
-            (
-                array(unknowns.0, unknowns.1),
-                array(knowns.0, knowns.1),
-                array(seed.0, seed.1),
-                array_mut(result.0, result.1),
-            )
-        };
-        let references = [unknowns.ok_or(NULL)?, knowns.ok_or(NULL)?];
-        instance.directional_derivative(references, seed.ok_or(NULL)?, result.ok_or(NULL)?)
+        let (unknowns, knowns, seed) =
+            unsafe { (array(unknowns.0, unknowns.1), array(knowns.0, knowns.1), array(seed.0, seed.1)) };
+        // The result may be written where the seed was.
+        let seed = seed.ok_or(NULL)?.to_vec();
+        // SAFETY: as promised by the caller.
+        let result = unsafe { array_mut(result.0, result.1) }.ok_or(NULL)?;
+        instance.directional_derivative([unknowns.ok_or(NULL)?, knowns.ok_or(NULL)?], &seed, result)
     }
 }
 

@@ -16,6 +16,7 @@
 mod block;
 mod cholesky;
 mod dense;
+mod dissection;
 mod lanczos;
 mod ordering;
 mod registers;

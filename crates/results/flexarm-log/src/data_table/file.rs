@@ -8,8 +8,8 @@ use std::fs::File;
 use std::path::Path;
 use std::sync::Arc;
 
+use flexarm_files::most_unpacked;
 use parquet::basic::{Compression, Encoding, LogicalType, Repetition, Type as PhysicalType, ZstdLevel};
-use parquet::column::reader::get_typed_column_reader;
 use parquet::data_type::{ByteArray, ByteArrayType, DataType, DoubleType, Int64Type};
 use parquet::errors::ParquetError;
 use parquet::file::metadata::KeyValue;
@@ -126,11 +126,13 @@ impl DataTable {
     pub fn read(path: &Path) -> Result<Self, LogError> {
         let file = File::open(path).map_err(LogError::io(path, "open the table"))?;
         parquet_table::read(path, || {
-            let reader = SerializedFileReader::new(file)?;
+            let most = most_unpacked(file.metadata()?.len());
+            let reader = parquet_table::open(file)?;
             let metadata = reader.metadata().file_metadata();
             let pairs = metadata.key_value_metadata().into_iter().flatten();
             let texts = pairs.filter_map(|pair| Some((pair.key.clone(), pair.value.clone()?))).collect();
             let schema = metadata.schema_descr();
+            let mut letters = 0;
             let columns = schema.columns().iter().enumerate().map(|(place, column)| {
                 let values = match column.physical_type() {
                     PhysicalType::INT64 => {
@@ -143,6 +145,12 @@ impl DataTable {
                     PhysicalType::BYTE_ARRAY => {
                         let text = |bytes: ByteArray| bytes.as_utf8().map(str::to_owned);
                         let texts = values::<ByteArrayType>(&reader, place)?;
+                        // One entry of a dictionary may be the text of all rows.
+                        letters += texts.iter().flatten().map(|text| text.len() as u64).sum::<u64>();
+                        if letters > most {
+                            let what = format!("its texts have more than {most} bytes, the limit for its size");
+                            return Err(ParquetError::General(what));
+                        }
                         DataValues::Text(texts.into_iter().map(|x| x.map(text).transpose()).collect::<Result<_, _>>()?)
                     }
                     other => return Err(ParquetError::General(format!("column {} of type {other}", column.name()))),
@@ -166,24 +174,6 @@ impl DataTable {
 
 /// Reads the values of a column from all row groups.
 fn values<T: DataType>(reader: &SerializedFileReader<File>, place: usize) -> Result<Vec<Option<T::T>>, ParquetError> {
-    let mut all = Vec::new();
-    for number in 0..reader.num_row_groups() {
-        let group = reader.get_row_group(number)?;
-        let rows = usize::try_from(group.metadata().num_rows()).unwrap_or(0);
-        let mut column = get_typed_column_reader::<T>(group.get_column_reader(place)?);
-        let (mut present, mut levels) = (Vec::new(), Vec::new());
-        while levels.len().max(present.len()) < rows {
-            let (records, ..) = column.read_records(rows, Some(&mut levels), None, &mut present)?;
-            if records == 0 {
-                break;
-            }
-        }
-        if levels.is_empty() {
-            all.extend(present.into_iter().map(Some));
-        } else {
-            let mut present = present.into_iter();
-            all.extend(levels.iter().map(|level| if *level > 0 { present.next() } else { None }));
-        }
-    }
-    Ok(all)
+    let groups = (0..reader.num_row_groups()).map(|group| parquet_table::column::<T>(reader, group, place));
+    Ok(groups.collect::<Result<Vec<_>, _>>()?.concat())
 }

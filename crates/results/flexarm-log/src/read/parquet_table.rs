@@ -3,10 +3,13 @@
 use std::fs::File;
 use std::path::Path;
 
+use flexarm_files::most_unpacked;
 use parquet::basic::{Repetition, Type as PhysicalType};
-use parquet::column::reader::get_typed_column_reader;
-use parquet::data_type::DoubleType;
+use parquet::column::page::{Page, PageMetadata, PageReader};
+use parquet::column::reader::{get_column_reader, get_typed_column_reader};
+use parquet::data_type::{DataType, DoubleType};
 use parquet::errors::ParquetError;
+use parquet::file::metadata::RowGroupMetaData;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 
 use super::not_a_recording;
@@ -20,7 +23,7 @@ pub(crate) type ParquetRun = TableRun<RowGroups>;
 impl ParquetRun {
     pub(crate) fn open(path: &Path) -> Result<Self, LogError> {
         let file = File::open(path).map_err(LogError::io(path, "open the recording"))?;
-        let groups = RowGroups(read(path, || SerializedFileReader::new(file))?);
+        let groups = RowGroups(read(path, || open(file))?);
         let names: Vec<String> = {
             let schema = groups.0.metadata().file_metadata().schema_descr();
             schema.columns().iter().map(|column| column.path().string()).collect()
@@ -54,30 +57,12 @@ impl RowGroups {
     }
 
     /// Reads the numbers of a column in a row group.
-    fn column(&self, path: &Path, group: usize, place: usize, values: &mut Vec<f64>) -> Result<(), LogError> {
-        let (mut present, mut levels) = (Vec::new(), Vec::new());
-        let rows = read(path, || {
-            let group = self.0.get_row_group(group)?;
-            let rows = usize::try_from(group.metadata().num_rows()).unwrap_or(0);
-            let mut reader = get_typed_column_reader::<DoubleType>(group.get_column_reader(place)?);
-            while levels.len().max(present.len()) < rows {
-                let (records, ..) = reader.read_records(rows, Some(&mut levels), None, &mut present)?;
-                if records == 0 {
-                    break;
-                }
-            }
-            Ok(rows)
-        })?;
+    fn numbers(&self, path: &Path, group: usize, place: usize, values: &mut Vec<f64>) -> Result<(), LogError> {
+        let numbers = read(path, || column::<DoubleType>(&self.0, group, place))?;
         values.clear();
-        match levels.is_empty() {
-            true => values.append(&mut present),
-            false => {
-                let mut present = present.into_iter();
-                let value = |level: &i16| if *level > 0 { present.next().unwrap_or(f64::NAN) } else { f64::NAN };
-                values.extend(levels.iter().map(value));
-            }
-        }
-        if values.len() != rows {
+        values.extend(numbers.into_iter().map(|number| number.unwrap_or(f64::NAN)));
+        let rows = self.0.metadata().row_group(group).num_rows();
+        if values.len() as i64 != rows {
             let found = format!("{} numbers in a group of {rows} rows", values.len());
             return Err(not_a_recording(path, found, "as many numbers as rows"));
         }
@@ -92,7 +77,92 @@ impl Blocks for RowGroups {
 
     fn read(&self, path: &Path, block: usize, places: &[usize], columns: &mut [Vec<f64>]) -> Result<(), LogError> {
         let mut both = places.iter().zip(columns);
-        both.try_for_each(|(&place, column)| self.column(path, block, place, column))
+        both.try_for_each(|(&place, column)| self.numbers(path, block, place, column))
+    }
+}
+
+/// Opens a file, and checks what it says that it unpacks to.
+///
+/// # Errors
+/// [`ParquetError`] if the file is not Parquet, or is too large for its length.
+pub(crate) fn open(file: File) -> Result<SerializedFileReader<File>, ParquetError> {
+    let most = most_unpacked(file.metadata()?.len());
+    let reader = SerializedFileReader::new(file)?;
+    let groups = reader.metadata().row_groups();
+    let number = |count: i64| u64::try_from(count).unwrap_or(0);
+    let rows = |group: &RowGroupMetaData| number(group.num_rows()).saturating_mul(size_of::<f64>() as u64);
+    let columns = groups.iter().flat_map(|group| group.columns().iter().map(move |column| (group, column)));
+    let sizes = columns.map(|(group, column)| number(column.uncompressed_size()).max(rows(group)));
+    let size = sizes.fold(0, u64::saturating_add);
+    if size > most {
+        let what = format!("it unpacks to {size} bytes, more than {most}, the limit for its size");
+        return Err(ParquetError::General(what));
+    }
+    Ok(reader)
+}
+
+/// Reads a column of a row group; `None` for a missing value.
+pub(crate) fn column<T: DataType>(
+    reader: &SerializedFileReader<File>,
+    group: usize,
+    place: usize,
+) -> Result<Vec<Option<T::T>>, ParquetError> {
+    let group = reader.get_row_group(group)?;
+    let described = group.metadata().column(place);
+    if described.column_descr().max_rep_level() > 0 {
+        return Err(ParquetError::General(format!("column {} has lists", described.column_path())));
+    }
+    let pages = Pages { pages: group.get_column_page_reader(place)?, left: described.uncompressed_size() };
+    let rows = usize::try_from(group.metadata().num_rows()).unwrap_or(0);
+    let mut column = get_typed_column_reader::<T>(get_column_reader(described.column_descr_ptr(), Box::new(pages)));
+    let (mut present, mut levels) = (Vec::new(), Vec::new());
+    while levels.len().max(present.len()) < rows {
+        let (records, ..) = column.read_records(rows, Some(&mut levels), None, &mut present)?;
+        if records == 0 {
+            break;
+        }
+    }
+    let mut present = present.into_iter();
+    Ok(match levels.is_empty() {
+        true => present.map(Some).collect(),
+        false => levels.iter().map(|level| if *level > 0 { present.next() } else { None }).collect(),
+    })
+}
+
+/// Pages of a column of a row group, up to the size that the file states for it.
+struct Pages {
+    pages: Box<dyn PageReader>,
+    left: i64,
+}
+
+impl Iterator for Pages {
+    type Item = Result<Page, ParquetError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        self.get_next_page().transpose()
+    }
+}
+
+impl PageReader for Pages {
+    fn get_next_page(&mut self) -> Result<Option<Page>, ParquetError> {
+        let page = self.pages.get_next_page()?;
+        self.left -= page.as_ref().map_or(0, |page| page.buffer().len() as i64);
+        match self.left < 0 {
+            true => Err(ParquetError::General("a column is larger than the file states".into())),
+            false => Ok(page),
+        }
+    }
+
+    fn peek_next_page(&mut self) -> Result<Option<PageMetadata>, ParquetError> {
+        self.pages.peek_next_page()
+    }
+
+    fn skip_next_page(&mut self) -> Result<(), ParquetError> {
+        self.pages.skip_next_page()
+    }
+
+    fn at_record_boundary(&mut self) -> Result<bool, ParquetError> {
+        self.pages.at_record_boundary()
     }
 }
 

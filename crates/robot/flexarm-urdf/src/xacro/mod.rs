@@ -122,6 +122,8 @@ pub(crate) struct Interpreter<'a> {
     /// Prefixes declared anywhere.
     namespaces: Vec<(String, String)>,
     remarks: Vec<Finding>,
+    /// Variables and YAML files whose values are used.
+    sources: BTreeSet<String>,
     at: At,
     work: usize,
     depth: usize,
@@ -143,6 +145,7 @@ impl<'a> Interpreter<'a> {
             packages: HashMap::new(),
             namespaces: Vec::new(),
             remarks: Vec::new(),
+            sources: BTreeSet::new(),
             work: 0,
             depth: 0,
         }
@@ -222,6 +225,15 @@ impl<'a> Interpreter<'a> {
         self.charge(meta.len() as usize)?;
         let bytes = std::fs::read(path).map_err(|e| failed(e.to_string()))?;
         xml::decode(bytes, path).map_err(|issue| ExpressionError::new(issue.to_string()))
+    }
+
+    /// Notes once that the robot, and so each recording of it, has values from outside the document.
+    fn note_source(&mut self, source: String) {
+        if !self.sources.contains(&source) {
+            let message = format!("the robot has values of {source}");
+            self.remark(Severity::Note, "xacro-source", message, "recordings carry them");
+            self.sources.insert(source);
+        }
     }
 
     /// Creates an error at a place, with the enclosing calls and files.

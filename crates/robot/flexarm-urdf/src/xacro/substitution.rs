@@ -23,11 +23,11 @@ impl Interpreter<'_> {
         let text = match &words[..] {
             ["arg", name] => self.argument(name)?,
             ["find", package] => self.package(package)?.display().to_string(),
-            ["env", name] => std::env::var(name).map_err(|_| {
+            ["env", name] => self.variable(name).ok_or_else(|| {
                 let message = format!("the environment variable {name} is not set");
                 ExpressionError::new(message).help("set it, or write $(optenv NAME default) in the file")
             })?,
-            ["optenv", name, default @ ..] => std::env::var(name).unwrap_or_else(|_| default.join(" ")),
+            ["optenv", name, default @ ..] => self.variable(name).unwrap_or_else(|| default.join(" ")),
             ["dirname"] => shown(self.here().parent()),
             ["cwd"] => shown(std::env::current_dir().ok().as_deref()),
             [command, ..] if !COMMANDS.contains(command) => {
@@ -41,6 +41,13 @@ impl Interpreter<'_> {
         };
         self.charge(text.len())?;
         Ok(text)
+    }
+
+    /// Value of an environment variable.
+    fn variable(&mut self, name: &str) -> Option<String> {
+        let value = std::env::var(name).ok()?;
+        self.note_source(format!("the environment variable {name}"));
+        Some(value)
     }
 
     /// Value of an argument of the document.

@@ -29,6 +29,7 @@ impl Interpreter<'_> {
         let path = self.beside(path);
         let text = self.read(&path)?;
         let shown = path.display().to_string();
+        self.note_source(format!("the file {shown}"));
         let file: Rc<std::path::Path> = path.into();
         self.files.push(file);
         let value = self.yaml(&text).map_err(|trouble| trouble.within(shown));

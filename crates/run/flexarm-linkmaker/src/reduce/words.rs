@@ -197,7 +197,7 @@ pub enum OrderingChoice {
     Auto,
     /// Approximate minimum degree.
     Amd,
-    /// Nested dissection (METIS).
+    /// Nested dissection.
     Nested,
 }
 

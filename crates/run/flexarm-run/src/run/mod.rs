@@ -265,7 +265,7 @@ pub(crate) fn simulate(
     files.set.extend(more);
     let head = run.header(scenario, &expected);
     files.begin(&head)?;
-    write_layouts(&files.names, &head)?;
+    write_layouts(outputs, &head)?;
     files.set.on_threads();
     let mut columns = (keep == Keep::Columns).then(|| Columns::new(&head));
     run.trace = detail.trace(outputs.is_some(), head);

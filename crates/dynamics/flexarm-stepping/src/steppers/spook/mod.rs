@@ -145,12 +145,16 @@ impl Spook {
     /// Starts at `t = 0` at rest with elastic coordinates `e`.
     ///
     /// # Errors
-    /// [`StepError::Setup`] for features that are not supported in maximal coordinates: mimic
-    /// joints, torque drives, payload changes, nonlinear springs, gear effects other than
-    /// elasticity, and end links without mass or moments of inertia; [`StepError::ModalLinks`] for
-    /// modal links.
+    /// [`StepError::Setup`] for a wrong number of elastic coordinates, and for features that are not
+    /// supported in maximal coordinates: mimic joints, torque drives, payload changes, nonlinear
+    /// springs, gear effects other than elasticity, and end links without mass or moments of
+    /// inertia; [`StepError::ModalLinks`] for modal links.
     pub fn new(arm: FlexibleArm, h: f64, settings: SpookSettings, e: &DVector<f64>) -> Result<Self, StepError> {
         check_known(&arm)?;
+        let (found, expected) = (e.len(), arm.n_elastic_coordinates());
+        if found != expected {
+            return Err(StepError::Setup(format!("{found} elastic coordinates are given, the arm has {expected}")));
+        }
         let model = arm.model.clone();
         check_ends(&model)?;
         let (mut state, mut qddot) = (State::zeros(&model), DVector::zeros(model.nv()));

@@ -27,10 +27,6 @@ pub(super) fn walk(
     /// Maximum record size accepted even in small files (bytes): a chunk expands when decompressed.
     const LARGE: u64 = 32 << 20;
     const READ_BYTES: usize = 64 << 10;
-    /// Maximum size of all records together, however small the file (bytes), and beyond that over
-    /// the size of the file; recordings of runs have a ratio below 20.
-    const LARGE_FILE: u64 = 256 << 20;
-    const MOST_TIMES: u64 = 1000;
 
     let mut file = File::open(path).map_err(LogError::io(path, "open the recording"))?;
     let length = file.metadata().map_err(LogError::io(path, "read the recording"))?.len();
@@ -39,7 +35,7 @@ pub(super) fn walk(
         .with_prevalidate_chunk_crcs(true) // a damaged chunk gives an error at once, rather than some numbers first
         .with_record_length_limit(usize::try_from(length.max(LARGE)).unwrap_or(usize::MAX));
     let mut reader = LinearReader::new_with_options(options);
-    let (most, mut unpacked) = (LARGE_FILE.max(MOST_TIMES.saturating_mul(length)), 0);
+    let (most, mut unpacked) = (flexarm_files::most_unpacked(length), 0);
     loop {
         let from = &mut reader;
         let event = match caught(move || from.next_event()) {
