@@ -108,7 +108,8 @@ fn slips_in_guides_calibrations_and_mountings_are_told() {
 fn an_expression_that_the_steps_do_not_resolve_is_told() {
     let folder = Folder::new("expression");
     let robot =
-        Robot::load(Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(3).unwrap().join("robots/test/one_beam")).unwrap();
+        Robot::load(Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(3).unwrap().join("robots/test/one_beam"))
+            .unwrap();
     let motion = Motion::from_samples(&[0.0, 0.1, 0.2], &[0.0, 0.0, 0.0], &robot).unwrap();
     let told = |fz: &str| {
         let file = folder.0.join("loads.toml");
