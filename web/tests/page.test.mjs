@@ -1,7 +1,7 @@
 // The built page in Chromium, served by `flexarm serve`.
 import assert from "node:assert/strict";
 import { spawn } from "node:child_process";
-import { readFileSync } from "node:fs";
+import { readFileSync, readdirSync } from "node:fs";
 import path from "node:path";
 import test from "node:test";
 import { gzipSync } from "node:zlib";
@@ -76,9 +76,9 @@ test("sliders change the run as the options of the command line do, and the addr
   await settled(page);
   await page.waitForFunction(() => /payload=8/.test(location.hash));
   await page.click("#reset");
-  await page.waitForFunction(() => location.hash === "#robot=kr210");
+  await page.waitForFunction(() => location.hash === "#robot=fanuc_r2000_210f");
   await settled(page);
-  assert.equal(await headline(page), native_headline("kr210"));
+  assert.equal(await headline(page), native_headline("fanuc_r2000_210f"));
 });
 
 test("a description with its meshes is enough: it gets a robot file and a motion", async () => {
@@ -102,6 +102,46 @@ test("a damaged file gets the sentence of the command line", async () => {
   await page.waitForFunction(() => !document.getElementById("messages").hidden);
   assert.match(await page.textContent("#messages"), /^error: .*broken\.urdf/);
   await picture(page, "broken");
+});
+
+test("a motion, a picture and a broken file leave the robot as it is", async () => {
+  const page = await open("#robot=kr210");
+  const robot = () => page.inputValue("#robot");
+  await page.setInputFiles("#choose", { name: "photo.png", mimeType: "image/png", buffer: Buffer.from([0x89, 0x50, 0x4e, 0x47]) });
+  await page.getByText("photo.png: no robot").waitFor();
+  assert.equal(await robot(), "kr210");
+  await page.setInputFiles("#choose", path.join(ROOT, "trajectories", "milling_square.toml"));
+  await page.waitForFunction(() => document.getElementById("motion").value.startsWith("/mine"));
+  await settled(page);
+  assert.deepEqual([await robot(), await headline(page)], ["kr210", native_headline("kr210", "milling_square")]);
+  await page.setInputFiles("#choose", { name: "broken.urdf", mimeType: "application/xml", buffer: Buffer.from("<robot name='x'>") });
+  await page.waitForFunction(() => document.getElementById("result").classList.contains("failed"));
+  assert.equal(await robot(), "kr210");
+});
+
+test("sliders return to the values of the file", async () => {
+  const page = await open("#robot=kr210&payload=173&stiffness=1.07");
+  for (const [name, key, times] of [["payload", "ArrowLeft", 3], ["stiffness", "ArrowLeft", 1]]) {
+    await page.locator(`#slider-${name}`).focus();
+    for (let k = 0; k < times; k++) await page.keyboard.press(key);
+  }
+  await page.waitForFunction(() => location.hash === "#robot=kr210");
+  await settled(page);
+  assert.equal(await headline(page), native_headline("kr210"));
+});
+
+test("meshes of package:// are found among files chosen without their folders", async () => {
+  const page = await open("#robot=kr210");
+  const stl = path.join(ROOT, "robots", "kr210", "meshes");
+  const mesh = readdirSync(stl).find((name) => name.endsWith(".stl"));
+  const inertial = "<inertial><mass value='5'/><inertia ixx='0.1' iyy='0.1' izz='0.1' ixy='0' ixz='0' iyz='0'/></inertial>";
+  const urdf = `<robot name='two'><link name='base'/><link name='arm'>${inertial}<visual><geometry><mesh filename='package://my_arm/meshes/${mesh}'/></geometry></visual></link><link name='tool0'/>
+    <joint name='j' type='revolute'><parent link='base'/><child link='arm'/><axis xyz='0 1 0'/><limit lower='-1' upper='1' effort='900' velocity='1'/></joint>
+    <joint name='f' type='fixed'><parent link='arm'/><child link='tool0'/><origin xyz='0.5 0 0'/></joint></robot>`;
+  await page.setInputFiles("#choose", [{ name: "two.urdf", mimeType: "application/xml", buffer: Buffer.from(urdf) }, { name: mesh, mimeType: "model/stl", buffer: readFileSync(path.join(stl, mesh)) }]);
+  await page.waitForFunction(() => document.getElementById("robot").value.startsWith("/mine"));
+  await settled(page);
+  assert.doesNotMatch((await page.textContent("#notes")) + (await page.textContent("#messages")), /not found|does not exist/);
 });
 
 test("the page fits a phone, in light and dark", async () => {

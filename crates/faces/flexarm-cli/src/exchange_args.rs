@@ -23,7 +23,8 @@ Examples:
       flexarm import arm.SID_FEM --units m-kg-s --map A=1,B=2
   Stiffness only, with the mass of the link:
       flexarm import arm.mtx --units m-kg-s --map A=1001,B=1002 \\
-          --at A=0,0,0 --at B=1,0,0 --mass 18.8 --com 0.5,0,0 --inertia 0.01,1.6,1.6,0,0,0
+          --at A=0,0,0 --at B=1,0,0 \\
+          --mass 18.8 --com 0.5,0,0 --inertia 0.01,1.6,1.6,0,0,0
 
 Maps (proximal interface first; six rows each, ux uy uz rx ry rz):
   A=1001                  components 1 to 6 of a node

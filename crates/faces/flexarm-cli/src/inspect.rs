@@ -3,10 +3,11 @@
 use std::process::ExitCode;
 
 use flexarm::Robot;
+use flexarm::written::visible;
 
 use crate::args::{CheckArgs, InspectArgs};
 use crate::failure::Failure;
-use crate::terminal::{Terminal, answer, to_json};
+use crate::terminal::{Terminal, answer, answer_as_is, to_json};
 use crate::{print, shipped, values};
 
 pub(crate) fn inspect(terminal: &Terminal, args: &InspectArgs) -> Result<ExitCode, Failure> {
@@ -28,7 +29,8 @@ pub(crate) fn check(terminal: &Terminal, args: &CheckArgs) -> Result<ExitCode, F
     let loads = args.loads.as_deref();
     let findings = flexarm::check_with_motion(&robot, trajectory.as_deref(), &motion, loads, &options);
     let json = || serde_json::json!({ "findings": findings }).to_string();
-    answer(terminal, json, || print::findings(&findings));
+    // Messages, which editors and scripts read line by line, are not wrapped.
+    answer_as_is(terminal, json, || visible(&print::findings(&findings)));
     let wrong = findings.iter().any(|f| f.severity == "error");
     Ok(if wrong { ExitCode::from(2) } else { ExitCode::SUCCESS })
 }

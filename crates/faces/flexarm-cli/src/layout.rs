@@ -14,7 +14,7 @@ const LONGEST_NUMBER: usize = 24;
 const GAP: &str = "  ";
 
 /// Note that names are shortened.
-pub(crate) const SHORTENED: &str = "names that end in … are shortened: --json has them whole\n";
+const SHORTENED: &str = "names that end in … are shortened: --json has them whole\n";
 
 /// A table: a row of names, then rows of numbers and words. Columns of numbers are aligned to the
 /// right; the first column has the labels of the rows.
@@ -51,7 +51,7 @@ impl TextTable {
         let few = blocks(&all, width);
         let even = (0..width).rev().map(|width| blocks(&all, width)).take_while(|more| more.len() == few.len()).last();
         let parts: Vec<String> = even.unwrap_or(few).iter().map(|shown| block(&rows, &all, shown, width)).collect();
-        parts.join("\n") + if rows == self.rows { "" } else { SHORTENED }
+        parts.join("\n") + &if rows == self.rows { String::new() } else { filled(SHORTENED, width) }
     }
 }
 
@@ -87,7 +87,7 @@ impl Column {
         let name = rows[0].get(k).map_or("", String::as_str);
         let cells = || rows[1..].iter().filter_map(|row| row.get(k)).map(String::as_str);
         let filled = || cells().filter(|cell| !["", "-"].contains(cell));
-        let has_numbers = k > 0 && 2 * filled().filter(|cell| is_number(cell)).count() > filled().count();
+        let has_numbers = k > 0 && 2 * filled().filter(|cell| is_number(cell)).count() >= filled().count();
         let word = |text: &str| text.split(' ').map(columns).max().unwrap_or(0);
         let widest = cells().map(columns).max().unwrap_or(0);
         let least = match has_numbers {

@@ -256,7 +256,7 @@ pub(crate) fn exported_robot(export: &RobotExport, files: &[String]) -> String {
     let mut out = files.iter().take(2).map(|file| format!("{file}\n")).collect::<String>();
     out += &format!("{} meshes\n", files.len().saturating_sub(2));
     out += &export.step_s.map_or_else(String::new, |step| format!("step for MuJoCo: {step:?} s\n"));
-    export.left_out.iter().for_each(|what| out += &filled(&format!("left out: {what}\n"), 80));
+    export.left_out.iter().for_each(|what| out += &format!("left out: {what}\n"));
     out
 }
 

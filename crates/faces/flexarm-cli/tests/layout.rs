@@ -75,7 +75,7 @@ fn a_path_longer_than_the_terminal_stays_whole() {
 }
 
 /// Commands without a table of their own.
-const WITHOUT_TABLES: [&str; 7] = ["export-fmu", "view", "serve", "format", "completions", "man", "help"];
+const WITHOUT_TABLES: [&str; 8] = ["check", "export-fmu", "view", "serve", "format", "completions", "man", "help"];
 
 /// A line for every command that prints figures, in this order: a later one reads what an earlier
 /// one wrote.
@@ -87,7 +87,6 @@ const LINES: &[&str] = &[
     "convert first/run.mcap run.csv",
     "inspect kr210",
     "inspect kr210 --velocity -1,20,300,-4000,5000,60000",
-    "check kr210 pick_and_place",
     "motion pick_and_place kr210",
     "motion pick_and_place",
     "statics kr210 --wrench 100,0,0",

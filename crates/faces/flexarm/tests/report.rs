@@ -284,14 +284,13 @@ fn an_arm_on_its_twin_has_no_scale_and_no_peak() {
     assert!(events.iter().all(|event| event["kind"] != "peak"), "{events:?}");
 }
 
-/// Truth: a scale that ends below the error.
-#[cfg(feature = "png")]
 #[test]
-fn an_error_beyond_the_scale_of_the_picture_is_said_to_be() {
-    let (summary, mut trace) = arm().clone();
-    assert!(!page_of(arm()).contains("beyond the scale"));
-    trace.header.color_scale_m = 0.1 * summary.tcp.as_ref().unwrap().peak_m;
-    assert_eq!(page_of(&(summary, trace)).matches("beyond the scale").count(), 4, "two captions, two descriptions");
+fn the_page_names_the_payload_and_follows_dark_screens_and_paper() {
+    let page = page_of(arm());
+    assert!(page.contains("<span>payload 150 kg</span>"));
+    for part in ["name=\"viewport\"", "prefers-color-scheme: dark", "@media print", "print-color-adjust: exact"] {
+        assert!(page.contains(part), "{part}");
+    }
 }
 
 #[test]

@@ -244,13 +244,13 @@ fn a_link_spring_or_joint_has_one_colour_on_the_page() {
     assert_eq!(distinct.len(), colors.len(), "{colors:?}");
 }
 
-/// The colour scale of the arm ends just above its maximum error.
+/// The colour scale of the arm ends at its maximum error.
 #[test]
 fn the_scale_of_colours_ends_with_the_largest_error() {
     for name in ["kr210", "test/lower_arm"] {
         let (summary, trace) = traced(name);
         let end = trace.header.color_scale_m / peak(&summary);
-        assert!((1.0..1.35).contains(&end), "{name}: {end}");
+        assert!((end - 1.0).abs() < 1e-9, "{name}: {end}");
         let page = html(&[ReportRun { label: "run", summary: &summary, trace: &trace }]);
         assert!(page.contains("</i>TCP error") && !page.contains("path of the tool.</p>"));
     }
