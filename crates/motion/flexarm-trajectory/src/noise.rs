@@ -28,8 +28,9 @@ const SPLINE: f64 = 6.0;
 const WITHIN_ROUNDING: f64 = 0.75;
 /// Maximum noise that rounding to a step explains, over the step; exactly 1/√12 for white noise.
 const OF_ROUNDING: f64 = 0.5;
-/// Number of equal samples that count as a hold, which smoothing keeps.
-const HOLD: usize = 10;
+/// Number and duration (s) of equal samples that count as a hold, which smoothing keeps; slow motions
+/// of rounded positions have shorter ones.
+const HOLD: (usize, f64) = (10, 0.05);
 
 /// Noise of the positions of a joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -107,16 +108,17 @@ pub(crate) fn without_rounding(t: &[f64], q: &[f64], found: &Noise) -> Option<Ve
 pub(crate) fn smoothed(t: &[f64], q: &[f64], cutoff_hz: f64) -> Vec<f64> {
     let (n, mut smooth) = (q.len(), q.to_vec());
     let hold_end = |from: usize| from + q[from..].iter().take_while(|x| **x == q[from]).count() - 1;
+    let is_hold = |from: usize, to: usize| to + 1 - from >= HOLD.0 && t[to] - t[from] >= HOLD.1;
     let mut first = 0;
     let mut after_hold = false;
     while first + 1 < n {
         let held = hold_end(first);
-        if held + 1 - first >= HOLD {
+        if is_hold(first, held) {
             (first, after_hold) = (held, true);
             continue;
         }
         let mut last = held;
-        while last + 1 < n && hold_end(last) + 1 - last < HOLD {
+        while last + 1 < n && !is_hold(last, hold_end(last)) {
             last = hold_end(last).max(last + 1);
         }
         let ends = [after_hold, last + 1 < n];

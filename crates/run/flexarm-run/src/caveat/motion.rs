@@ -12,6 +12,8 @@ use super::{Caveat, kinds};
 
 /// Number of time intervals at which a motion and its loads are checked.
 const TIMES: usize = 200;
+/// Ratio of rigid-robot torque to effort limit above which the motion does not suit this robot.
+const HASTE: f64 = 10.0;
 /// Fraction of the speed limit below which a motion may be given in other time units.
 const SLOW: f64 = 2e-3;
 /// Minimum plausible travel of a motion (rad).
@@ -42,7 +44,8 @@ pub(crate) fn of_motion(name: &str, trajectory: &Trajectory, model: &Model) -> V
     for (c, torque) in model.coordinates().iter().zip(&torque) {
         if *torque > c.limits.effort {
             let caveat = kinds::MOTION_EFFORT.with_unit(c.effort_unit());
-            caveats.push(caveat.found(format!("joint {:?}", c.joint), *torque, c.limits.effort));
+            let caveat = caveat.found(format!("joint {:?}", c.joint), *torque, c.limits.effort);
+            caveats.push(if *torque > HASTE * c.limits.effort { caveat } else { caveat.as_note() });
         }
     }
     let used = model.coordinates().iter().zip(&speed).filter(|(c, _)| c.limits.velocity.is_finite());
