@@ -2,13 +2,14 @@
 //! that need no other program.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use flexarm::{Arm, LinkModel, Modelling, Robot, RobotExport, RobotFormat};
 use nalgebra::DMatrix;
 
-fn arm(robot: &str, links: LinkModel) -> Arm {
+fn arm(robot: &str, links: LinkModel) -> Arc<Arm> {
     let path: PathBuf = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../robots").join(robot);
-    Robot::load(path).unwrap().flexible(Modelling { links, ..Modelling::default() }).unwrap()
+    Robot::load(path).unwrap().model(&Modelling { links, ..Modelling::default() }).unwrap()
 }
 
 fn text(export: &RobotExport, k: usize) -> &str {
@@ -76,7 +77,7 @@ fn springs_and_dampers_of_the_mjcf_add_up_to_the_matrices_of_the_arm() {
 #[test]
 fn exported_bodies_have_the_mass_of_the_arm_and_none_that_moves_is_without() {
     let arm = arm("kr210/robot.toml", LinkModel::Lumped);
-    let truth = arm.flexible().model.moving_mass();
+    let truth = arm.model.moving_mass();
     let mjcf = arm.export(None, RobotFormat::Mjcf).unwrap();
     let masses: Vec<f64> = elements(text(&mjcf, 0), "inertial").iter().map(|body| number(body, "mass")).collect();
     assert_eq!(masses.len(), elements(text(&mjcf, 0), "body").len());
@@ -85,7 +86,7 @@ fn exported_bodies_have_the_mass_of_the_arm_and_none_that_moves_is_without() {
     assert!(error.abs() < 1e-12, "{error}");
     // The URDF is read back as a robot with the same joints, motors and elastic coordinates.
     let urdf = arm.export(None, RobotFormat::Urdf).unwrap();
-    let joints = arm.flexible().model.nv();
+    let joints = arm.model.nv();
     assert_eq!(elements(text(&urdf, 0), "joint").iter().filter(|joint| !joint.contains("fixed")).count(), joints);
 }
 
