@@ -55,31 +55,32 @@ impl Springs {
     /// Damps the springs of a group in proportion to their stiffness where that gives its rows of
     /// `D`; the rest becomes dampers of their own.
     fn add_damping(&mut self) {
-        for group in groups(&self.K) {
-            let [k, d] = [&self.K, &self.D].map(|M| M.select_rows(&group).select_columns(&group));
+        let (K, D) = (&self.K, &self.D);
+        // Translations and rotations differ by orders of magnitude: entries are compared with the diagonal.
+        let size = D.diagonal().map(f64::sqrt);
+        let is_small = |x: f64, i: usize, j: usize| x.abs() <= ROUNDING.sqrt() * size[i] * size[j];
+        let mut rest = D.clone();
+        for group in groups(K) {
+            let [k, d] = [K, D].map(|M| M.select_rows(&group).select_columns(&group));
             let beta = d.dot(&k) / k.norm_squared();
-            let least = ROUNDING.sqrt() * d.amax();
-            let others = (0..self.D.nrows()).filter(|k| !group.contains(k));
-            let coupled = self.D.select_rows(&group).select_columns(&others.collect::<Vec<_>>());
-            if (&d - &k * beta).amax() > least || coupled.iter().any(|x| x.abs() > least) {
+            let expected = |i: usize, j: usize| if group.contains(&j) { beta * K[(i, j)] } else { 0.0 };
+            let all = 0..D.nrows();
+            if group.iter().any(|&i| all.clone().any(|j| !is_small(D[(i, j)] - expected(i, j), i, j))) {
                 continue;
             }
             let own = |spring: &&mut Spring| spring.terms.iter().all(|(k, _)| group.contains(k));
             self.springs.iter_mut().filter(own).for_each(|spring| spring.damping = beta * spring.stiffness);
-        }
-        let mut rest = self.D.clone();
-        for spring in &self.springs {
-            for &(i, a) in &spring.terms {
-                spring.terms.iter().for_each(|&(j, b)| rest[(i, j)] -= spring.damping * a * b);
+            for &i in &group {
+                rest.row_mut(i).fill(0.0);
+                rest.column_mut(i).fill(0.0);
             }
         }
-        let least = ROUNDING.sqrt() * self.D.amax();
-        rest.iter_mut().filter(|x| x.abs() <= least).for_each(|x| *x = 0.0);
         for group in groups(&rest) {
-            let SymmetricEigen { eigenvalues, eigenvectors } =
-                rest.select_rows(&group).select_columns(&group).symmetric_eigen();
-            for (k, &damping) in eigenvalues.iter().enumerate().filter(|&(_, &d)| d > least) {
-                let terms = terms(&group, &eigenvectors.column(k).into_owned());
+            let size = size.select_rows(&group);
+            let scaled = rest.select_rows(&group).select_columns(&group).component_div(&(&size * size.transpose()));
+            let SymmetricEigen { eigenvalues, eigenvectors } = scaled.symmetric_eigen();
+            for (k, &damping) in eigenvalues.iter().enumerate().filter(|&(_, &d)| d > ROUNDING) {
+                let terms = terms(&group, &eigenvectors.column(k).component_mul(&size));
                 self.springs.push(Spring { terms, stiffness: 0.0, damping });
             }
         }
@@ -87,8 +88,7 @@ impl Springs {
 }
 
 fn terms(group: &[usize], factors: &DVector<f64>) -> Vec<(usize, f64)> {
-    let least = ROUNDING * factors.amax();
-    group.iter().copied().zip(factors.iter().copied()).filter(|(_, x)| x.abs() > least).collect()
+    group.iter().copied().zip(factors.iter().copied()).filter(|(_, x)| *x != 0.0).collect()
 }
 
 /// Returns the coordinates that a matrix couples, group by group, without those of zero rows.
