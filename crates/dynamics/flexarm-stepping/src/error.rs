@@ -39,6 +39,16 @@ pub enum StepError {
         /// Size of the last correction relative to the acceleration.
         correction: f64,
     },
+    /// The iteration of a step did not converge while links deflected beyond their model.
+    #[error(
+        "the step to t = {t:.6} s did not converge, and a smaller step does not help: the model has ended there, because {doubt}"
+    )]
+    BeyondModel {
+        /// Time (s).
+        t: f64,
+        /// Caveat about the link.
+        doubt: String,
+    },
     /// A matrix that must be positive definite is not.
     #[error("the {matrix} at t = {t:.6} s is not positive definite: check masses and stiffnesses")]
     Singular {
@@ -168,7 +178,8 @@ impl StepError {
             | Self::OpenLoop { .. }
             | Self::NoEquations
             | Self::OutOfRange
-            | Self::Apart { .. } => &[],
+            | Self::Apart { .. }
+            | Self::BeyondModel { .. } => &[],
         }
     }
 }

@@ -223,11 +223,11 @@ pub(crate) struct RunArgs {
     pub(crate) magnify: Option<f64>,
     /// Start time of the run in recordings with absolute times (MCAP), in seconds since 1970
     /// [default: 946684800, 1 January 2000, so that equal runs give equal files]
-    #[arg(long, value_name = "now|SECONDS", value_parser = parse_start_time, allow_hyphen_values = true)]
+    #[arg(long, help_heading = "Files", value_name = "now|SECONDS", value_parser = parse_start_time, allow_hyphen_values = true)]
     pub(crate) start_time: Option<u64>,
     /// Embed the mesh files in the robot description of the MCAP, so that it shows on any machine
     /// (Foxglove draws them; Rerun and RViz need files)
-    #[arg(long)]
+    #[arg(long, help_heading = "Files")]
     pub(crate) embed_meshes: bool,
     /// Output folder [default: a new one in out/]
     #[arg(short, long, help_heading = "Files", value_name = "FOLDER")]

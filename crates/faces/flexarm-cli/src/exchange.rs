@@ -53,7 +53,7 @@ fn export_robot(terminal: &Terminal, args: &ExportArgs) -> Result<ExitCode, Fail
         Some(RobotFormatName::Urdf) => RobotFormat::Urdf,
         _ => RobotFormat::Mjcf,
     };
-    let at = values::pose(args.at.as_deref(), &robot)?;
+    let at = Some(values::joint_values(args.at.as_deref(), &robot)?.map_or_else(|| robot.start_pose(), Ok)?);
     let name = robot.name.clone();
     let arm = robot.model(&args.modelling.modelling())?;
     let export = working(terminal, "exporting", || arm.export(at.as_deref(), format))?;

@@ -68,7 +68,7 @@ pub(crate) fn run(terminal: &Terminal, args: &ExportFmuArgs) -> Result<ExitCode,
         modelling: args.pose.modelling.modelling(),
         stepper: (args.stepper.with)(&StepperOptions::default()),
         step_s: args.step,
-        pose: values::pose(args.pose.at.as_deref(), &robot)?,
+        pose: Some(values::joint_values(args.pose.at.as_deref(), &robot)?.map_or_else(|| robot.start_pose(), Ok)?),
     };
     let fmi = if args.fmi == FmiName::V2 { Fmi::V2 } else { Fmi::V3 };
     let library = match &args.library {

@@ -12,7 +12,7 @@ use crate::{print, shipped, values};
 
 pub(crate) fn inspect(terminal: &Terminal, args: &InspectArgs) -> Result<ExitCode, Failure> {
     let robot = Robot::load_with(&shipped::robot(Some(&args.robot))?, &args.load.options()?)?;
-    let at = values::pose(args.at.as_deref(), &robot)?;
+    let at = values::joint_values(args.at.as_deref(), &robot)?;
     let velocity = values::joint_values(args.velocity.as_deref(), &robot)?;
     let inspection = flexarm::inspect(&robot, at.as_deref(), velocity.as_deref())?;
     if !terminal.quiet {

@@ -72,7 +72,7 @@ pub(crate) fn cutting_tool(given: &Path, rpm: &[f64]) -> Result<CuttingTool, Fai
 pub(crate) fn run(terminal: &Terminal, args: &LobesArgs) -> Result<ExitCode, Failure> {
     let robot = Robot::load_with(&shipped::robot(Some(&args.pose.robot))?, &args.pose.load.options()?)?;
     let tool = cutting_tool(&args.tool, &args.rpm)?;
-    let at = values::pose(args.pose.at.as_deref(), &robot)?;
+    let at = values::joint_values(args.pose.at.as_deref(), &robot)?;
     let motion = args.along.as_deref().map(shipped::trajectory).transpose()?;
     let motion = motion.map(|path| Motion::load(path, &robot)).transpose()?;
     let place = match &motion {

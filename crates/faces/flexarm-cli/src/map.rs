@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use clap::{Args, ValueEnum};
 use flexarm::map::{
     JointRange, KeptPoses, Map, MapPose, MapRegion, MapRequest, ToolDirections, WorkspaceGrid, map, quantity_text,
-    read_poses, readable_quantity,
+    quantity_title, read_poses, readable_quantity,
 };
 use flexarm::reduce::numbers;
 use flexarm::{Motion, Robot};
@@ -16,6 +16,7 @@ use crate::failure::Failure;
 use crate::layout::{lines, table};
 use crate::lobes::cutting_tool;
 use crate::motion::MotionInputArgs;
+use crate::print::counted;
 use crate::shipped::OutputFolder;
 use crate::terminal::{Bar, Terminal, answer, to_json};
 use crate::{shipped, signals, values};
@@ -63,9 +64,9 @@ pub(crate) struct MapArgs {
     #[arg(long, help_heading = "Where", value_name = "M", allow_hyphen_values = true)]
     pub(crate) grid: Option<f64>,
     /// Exclude positions nearer than this to the vertical line through the first joint (m), where
-    /// the arm itself is
-    #[arg(long, help_heading = "Where", value_name = "M", default_value_t = 0.0, allow_hyphen_values = true)]
-    pub(crate) keep_out: f64,
+    /// the arm itself is [default: 0 with --box, else the radius of base and first link]
+    #[arg(long, help_heading = "Where", value_name = "M", allow_hyphen_values = true)]
+    pub(crate) keep_out: Option<f64>,
     /// Direction of the tool's z axis in the world
     #[arg(long, help_heading = "Where", value_name = "X,Y,Z", default_value = "0,0,-1", allow_hyphen_values = true)]
     pub(crate) tool_axis: String,
@@ -256,25 +257,30 @@ pub(crate) fn run(terminal: &Terminal, args: &MapArgs) -> Result<ExitCode, Failu
 fn text(map: &Map) -> String {
     let mut out = match &map.grid {
         Some(grid) => format!(
-            "{}: {} of {} places within reach, {} m apart, {} directions of the tool; {} poses in {:.2} s",
-            map.robot, map.reachable, map.points, grid.spacing_m, grid.directions, map.poses, map.wall_s
+            "{}: {} of {} places within reach, {} m apart, {} of the tool; {} in {:.2} s",
+            map.robot,
+            map.reachable,
+            map.points,
+            grid.spacing_m,
+            counted(grid.directions, "direction"),
+            counted(map.poses, "pose"),
+            map.wall_s
         ),
-        None => format!("{}: {} poses in {:.2} s", map.robot, map.poses, map.wall_s),
+        None => format!("{}: {} in {:.2} s", map.robot, counted(map.poses, "pose"), map.wall_s),
     };
     out.push('\n');
-    let mut t = table(&["", "unit", "min", "median", "max", "best", "worst"]);
+    let mut t = table(&["", "min", "median", "max", "best", "worst"]);
     for column in map.table.columns.iter().filter(|column| column.quantity) {
         let Some(spread) = map.quantities.get(&column.name) else { continue };
-        let unit = readable_quantity(&column.name).1;
         let median = spread.quantiles.get("0.5").copied().unwrap_or(f64::NAN);
         let pose = |pose: &MapPose| pose.quantities.get(&column.name).copied().unwrap_or(f64::NAN);
         let numbers = [spread.min, median, spread.max, pose(&map.best), pose(&map.worst)];
-        let mut row = vec![column.name.clone(), unit.to_owned()];
+        let mut row = vec![quantity_title(&column.name)];
         row.extend(numbers.map(|x| quantity_text(&column.name, x)));
         t.add_row(row);
     }
     out += &lines(&t);
-    out += &format!("\nbest and worst by {}:\n", map.by);
+    out += &format!("\nbest and worst by {}:\n", quantity_title(&map.by));
     for (name, pose) in [("best", &map.best), ("worst", &map.worst)] {
         let place = pose.place_m.map(|x| format!("{x:.3}")).join(", ");
         let joints: Vec<String> = pose.q.iter().map(|q| format!("{q:.4}")).collect();

@@ -9,6 +9,7 @@ use flexarm::{ColumnMap, MotionCurve, MotionOptions, MotionPeak, MotionReport, R
 use crate::args::RobotArgs;
 use crate::failure::Failure;
 use crate::layout::{lines, table};
+use crate::print::counted;
 use crate::shipped;
 use crate::terminal::{Terminal, answer, to_json};
 
@@ -87,8 +88,8 @@ fn text(report: &MotionReport) -> String {
     let robot = report.robot.as_ref().map_or_else(String::new, |robot| format!(" on {robot}"));
     let mut out = format!("{}{robot}: {}", report.motion, report.format);
     out += &report.topic.as_ref().map_or_else(String::new, |topic| format!(", topic {topic}"));
-    out += &format!("\n{} s, {} joints", rounded(report.duration_s), report.joints.len());
-    out += &report.samples.map_or_else(String::new, |samples| format!(", {samples} samples"));
+    out += &format!("\n{} s, {}", rounded(report.duration_s), counted(report.joints.len(), "joint"));
+    out += &report.samples.map_or_else(String::new, |samples| format!(", {}", counted(samples, "sample")));
     if let (Some(length), Some(speed)) = (report.tcp_length_m, report.tcp_speed_m_s) {
         out += &format!("; path of the tool {length:.4} m, up to {:.1} mm/s", 1e3 * speed);
     }

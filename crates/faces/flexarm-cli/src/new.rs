@@ -13,7 +13,7 @@ use flexarm::{
 use crate::args::RobotArgs;
 use crate::failure::Failure;
 use crate::layout::{lines, table};
-use crate::print::warnings;
+use crate::print::{counted, warnings};
 use crate::terminal::{Bar, Terminal, answer_as_is, columns, readable, to_json};
 use crate::{signals, summary_table};
 
@@ -160,8 +160,13 @@ fn first_run(terminal: &Terminal, made: &NewRobot, folder: &Path, overwrite: boo
 }
 
 fn text(made: &NewRobot) -> String {
-    let mut out =
-        format!("{}: {} joints from {:?} to the tool {:?}\n", made.name, made.joints.len(), made.base, made.tool);
+    let mut out = format!(
+        "{}: {} from {:?} to the tool {:?}\n",
+        made.name,
+        counted(made.joints.len(), "joint"),
+        made.base,
+        made.tool
+    );
     out += &format!(
         "{:.2} m reach, {:.2} kg that move, payload {} kg{}\n\n",
         made.reach_m,

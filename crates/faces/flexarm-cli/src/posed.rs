@@ -28,7 +28,7 @@ fn load(pose: &PoseArgs) -> Result<Robot, Failure> {
 pub(crate) fn statics(terminal: &Terminal, args: &StaticsArgs) -> Result<ExitCode, Failure> {
     let wrench = args.wrench.as_deref().map_or(Ok([0.0; 6]), |text| values::wrench("--wrench", text))?;
     let (robot, modelling) = (load(&args.pose)?, args.pose.modelling.modelling());
-    let at = values::pose(args.pose.at.as_deref(), &robot)?;
+    let at = values::joint_values(args.pose.at.as_deref(), &robot)?;
     let at = at.as_deref();
     let found = match &args.output {
         Some(folder) => {
@@ -47,7 +47,7 @@ pub(crate) fn modes(terminal: &Terminal, args: &ModesArgs) -> Result<ExitCode, F
         return Err(Failure::Usage("--count must be at least 1".into()));
     }
     let robot = load(&args.pose)?;
-    let at = values::pose(args.pose.at.as_deref(), &robot)?;
+    let at = values::joint_values(args.pose.at.as_deref(), &robot)?;
     let speeds = values::joint_speeds(args.speeds.as_deref(), &robot)?;
     let (at, speeds) = (at.as_deref(), speeds.as_deref());
     let modelling = args.pose.modelling.modelling();
@@ -86,7 +86,7 @@ pub(crate) fn response(terminal: &Terminal, args: &ResponseArgs) -> Result<ExitC
     let found = flexarm::response(
         &robot,
         &args.pose.modelling.modelling(),
-        values::pose(args.pose.at.as_deref(), &robot)?.as_deref(),
+        values::joint_values(args.pose.at.as_deref(), &robot)?.as_deref(),
         &request,
         outputs.as_ref(),
     )?;

@@ -340,3 +340,8 @@ pub(crate) fn caveats(terminal: &Terminal, caveats: &[Caveat]) {
     }
     warnings(terminal, &texts);
 }
+
+/// Returns a number with its noun: `1 joint`, `2 joints`.
+pub(crate) fn counted(number: usize, noun: &str) -> String {
+    format!("{number} {noun}{}", if number == 1 { "" } else { "s" })
+}

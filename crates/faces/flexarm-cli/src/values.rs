@@ -1,7 +1,7 @@
 //! Joint values and wrenches as typed by the user.
 
 use flexarm::reduce::numbers;
-use flexarm::{Motion, Robot, known_names};
+use flexarm::{Robot, known_names};
 
 use crate::failure::Failure;
 
@@ -61,25 +61,6 @@ fn parse_joint_values(text: &str, joints: &[(&str, bool)], units: &[(&str, f64)]
         }
     }
     Ok(values)
-}
-
-/// Pose at which a command looks at a robot: the values given, else the start of the robot's own
-/// motion; `None` for a robot without one, which is then at zero.
-///
-/// # Errors
-/// As [`joint_values`].
-pub(crate) fn pose(text: Option<&str>, robot: &Robot) -> Result<Option<Vec<f64>>, Failure> {
-    let own = robot.default_trajectory.as_deref().filter(|_| text.is_none());
-    // A motion that cannot be loaded is an error of the commands that run it.
-    match own.and_then(|path| Motion::load(path, robot).ok()) {
-        Some(motion) => {
-            let n = motion.trajectory.joints().len();
-            let (mut q, mut v, mut a) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
-            motion.trajectory.sample(0.0, &mut q, &mut v, &mut a);
-            Ok(Some(q))
-        }
-        None => joint_values(text, robot),
-    }
 }
 
 /// Values of a robot's joints, if any are given; see [`parse_joint_values`].

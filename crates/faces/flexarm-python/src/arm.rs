@@ -337,7 +337,8 @@ impl PyArm {
     /// Parameters
     /// ----------
     /// q : array_like, shape (n,) or (m, n), optional
-    ///     Joints (rad or m), one pose or m poses, which run on all cores. Default: zero.
+    ///     Joints (rad or m), one pose or m poses, which run on all cores. Default:
+    ///     :attr:`Robot.start_pose`.
     /// wrench : array_like, shape (3,) or (6,), optional
     ///     Force (N), and moment (N m), on the tool at the TCP, world axes.
     ///
@@ -353,9 +354,9 @@ impl PyArm {
     ) -> PyResult<PyStatics> {
         let (py, own) = (slf.py(), slf.get());
         let F = self::wrench(wrench)?;
-        let zero = vec![0.0; own.n()];
+        let start = own.arm.robot().start_pose().or_raise()?;
         let given = q.filter(|q| !q.is_none()).map(|q| numbers("q", q, &[(own.n(), "joints")], true)).transpose()?;
-        let poses = given.as_ref().map_or(zero.as_slice(), |given| given.values());
+        let poses = given.as_ref().map_or(start.as_slice(), |given| given.values());
         if let Some(m) = given.as_ref().and_then(|given| given.rows) {
             let (poses, arm) = (poses.to_vec(), own.arm.clone());
             let found = stoppable(py, move |stop| arm.operating_points_until(&poses, &as_wrench(F), stop))?;
@@ -379,7 +380,7 @@ impl PyArm {
     /// Parameters
     /// ----------
     /// q : array_like, shape (n,), optional
-    ///     Joints (rad or m). Default: zero.
+    ///     Joints (rad or m). Default: :attr:`Robot.start_pose`.
     /// count : int, default 10
     /// speeds : array_like, shape (n,), optional
     ///     Constant speeds of the joints (rad/s or m/s): modes about the equilibrium of the turning
@@ -407,7 +408,7 @@ impl PyArm {
     /// Parameters
     /// ----------
     /// q : array_like, shape (n,), optional
-    ///     Joints (rad or m). Default: zero.
+    ///     Joints (rad or m). Default: :attr:`Robot.start_pose`.
     /// inputs : sequence of str, default ("force-x", "force-y", "force-z")
     ///     ``"force-x"`` to ``"torque-z"`` on the tool, and names of joints.
     /// outputs : sequence of str, default ("x", "y", "z")
@@ -448,7 +449,7 @@ impl PyArm {
     /// Parameters
     /// ----------
     /// q : array_like, shape (n,), optional
-    ///     Joints (rad or m). Default: zero.
+    ///     Joints (rad or m). Default: :attr:`Robot.start_pose`.
     /// wrench : array_like, shape (3,) or (6,), optional
     ///     Wrench on the tool, world axes (N, N m).
     ///

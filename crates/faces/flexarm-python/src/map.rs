@@ -164,8 +164,9 @@ fn over_joints(joints: &Bound<'_, PyDict>) -> PyResult<MapRegion> {
 ///     workspace.
 /// spacing : float, optional
 ///     Spacing of the positions (m).
-/// keep_out : float, default 0
-///     Exclude positions nearer than this to the vertical line through the first joint (m).
+/// keep_out : float, optional
+///     Exclude positions nearer than this to the vertical line through the first joint (m). Default:
+///     0 with ``bounds``, else the radius of base and first moving link.
 /// tool_axis : array_like, shape (3,), default (0, 0, -1)
 ///     Direction of the tool's z axis in the world.
 /// roll, cone : float, default 0
@@ -215,7 +216,7 @@ fn over_joints(joints: &Bound<'_, PyDict>) -> PyResult<MapRegion> {
 /// >>> len(found)
 /// 25
 #[pyfunction]
-#[pyo3(signature = (robot, *, bounds=None, spacing=None, keep_out=0.0, tool_axis=None, roll=0.0, cone=0.0, tilts=None, rolls=1,
+#[pyo3(signature = (robot, *, bounds=None, spacing=None, keep_out=None, tool_axis=None, roll=0.0, cone=0.0, tilts=None, rolls=1,
                     joints=None, poses=None, along=None, points=1000, at=None, wrench=None, by=None, keep="best", frequencies=3,
                     workpiece=None, tool=None, rpm=None, links=None, drives=None, output=None, overwrite=false,
                     progress=None))]
@@ -225,7 +226,7 @@ pub(crate) fn map<'py>(
     robot: &Bound<'py, PyRobot>,
     bounds: Option<&Bound<'py, PyAny>>,
     spacing: Option<f64>,
-    keep_out: f64,
+    keep_out: Option<f64>,
     tool_axis: Option<&Bound<'py, PyAny>>,
     roll: f64,
     cone: f64,
@@ -284,7 +285,7 @@ struct Places<'a, 'py> {
 struct GridArguments<'a, 'py> {
     bounds: Option<&'a Bound<'py, PyAny>>,
     spacing: Option<f64>,
-    keep_out: f64,
+    keep_out: Option<f64>,
     tool_axis: Option<&'a Bound<'py, PyAny>>,
     roll: f64,
     cone: f64,

@@ -59,6 +59,14 @@ impl PyRobot {
         self.limits_of(py, |c| [c.limits.lower, c.limits.upper])
     }
 
+    /// Pose at which the robot is analysed by default, (n,) (rad or m): the start of its own motion,
+    /// or zero.
+    #[getter]
+    fn start_pose<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let pose = self.robot.start_pose().or_raise()?;
+        array(py, [pose.len()], pose)
+    }
+
     /// Maximum speed of each joint, (n,) (rad/s or m/s).
     #[getter]
     fn velocity_limits<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
@@ -155,7 +163,7 @@ impl PyRobot {
     /// Parameters
     /// ----------
     /// q, velocity : array_like, shape (n,), optional
-    ///     Joints (rad or m) and their velocities. Default: zero.
+    ///     Joints (rad or m) and their velocities. Default: :attr:`start_pose` and zero.
     #[pyo3(signature = (q=None, velocity=None))]
     fn inspect<'py>(
         &self,

@@ -503,6 +503,9 @@ fn an_iteration_that_enlarges_the_error_of_an_undamped_arm_is_discarded_and_the_
     let discarded = found.caveats.iter().find(|caveat| caveat.code == "discarded").unwrap();
     assert!(discarded.message.contains("iteration 3 (up to 200.0 Hz) multiplied it by 19"), "{}", discarded.message);
     assert!(found.iterations < 6 && found.cutoff_hz.unwrap() < 150.0);
+    // Discarded iterations are in no list: one peak before, and a smaller one per iteration kept.
+    assert_eq!(found.model_peaks_m.len(), 1 + found.iterations, "{:?}", found.model_peaks_m);
+    assert!(found.model_peaks_m.is_sorted_by(|a, b| a > b), "{:?}", found.model_peaks_m);
     // Measured 3.1e-4 with the third and fifth iteration discarded; the first two, up to 200 Hz,
     // leave 6.4e-4.
     assert!(found.after.rms_m < 4e-4 * found.before.rms_m, "{:e}", found.after.rms_m / found.before.rms_m);

@@ -209,11 +209,29 @@ fn a_map_along_a_motion_is_at_the_motions_poses() {
     }
 }
 
+/// Truth: the meshes of the KR 210; base and carriage reach 0.3 to 0.9 m from the axis of joint 1.
+#[test]
+fn by_default_no_place_of_a_workspace_is_inside_the_column_of_the_arm() {
+    let robot = robot("kr210");
+    let nearest = |grid: WorkspaceGrid| {
+        let request = MapRequest { region: MapRegion::Workspace(grid), ..MapRequest::default() };
+        let found = taken(&robot, &request);
+        (0..found.table.rows())
+            .map(|k| found.table.row(k)[0].hypot(found.table.row(k)[1]))
+            .fold(f64::INFINITY, f64::min)
+    };
+    let usual = nearest(WorkspaceGrid { spacing_m: Some(0.3), ..WorkspaceGrid::default() });
+    println!("nearest place {usual:.3} m");
+    assert!((0.3..1.2).contains(&usual), "{usual}");
+    let all = WorkspaceGrid { spacing_m: Some(0.3), keep_out_m: Some(0.0), ..WorkspaceGrid::default() };
+    assert!(nearest(all) < 0.3);
+}
+
 #[test]
 fn a_workpiece_goes_where_its_worst_place_is_best() {
     let robot = robot("kr210");
     let region =
-        MapRegion::Workspace(WorkspaceGrid { keep_out_m: 0.9, ..grid([[0.6, -1.0, 0.4], [2.2, 1.0, 1.6]], 0.2) });
+        MapRegion::Workspace(WorkspaceGrid { keep_out_m: Some(0.9), ..grid([[0.6, -1.0, 0.4], [2.2, 1.0, 1.6]], 0.2) });
     let request = MapRequest { region, workpiece_m: Some([0.4, 0.6, 0.2]), ..MapRequest::default() };
     let found = taken(&robot, &request);
     let placement = found.placement.as_ref().unwrap();

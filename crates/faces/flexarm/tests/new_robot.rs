@@ -528,3 +528,28 @@ fn a_tool_on_the_axis_of_the_only_joint_gets_a_motion_that_moves_and_a_note() {
     assert!(peak.upper - peak.lower > 0.5, "{} to {}", peak.lower, peak.upper);
     assert!(made.assumptions.iter().any(|a| a.text.contains("turns in place")), "{:?}", made.assumptions);
 }
+
+/// Truth: the description. The centre of mass of the upper arm is near its first joint, where two
+/// parts of positive mass at the middles of its halves cannot have it.
+#[test]
+fn a_link_that_is_heavy_at_one_end_keeps_its_body() {
+    let folder = Folder::new("heavy");
+    let at = upper_mass();
+    let urdf = ARM.urdf("").replace(
+        &format!(r#"<origin xyz="0.4 0 0"/><mass value="{at}"/>"#),
+        &format!(r#"<origin xyz="0.05 0.01 0"/><mass value="{at}"/>"#),
+    );
+    assert!(urdf.contains("0.05 0.01 0"));
+    let made = made(&folder, &urdf, &NewOptions { payload_kg: Some(0.0), ..NewOptions::default() });
+    assert!(!codes(&made).iter().any(|code| code == "uniform-mass"));
+    let robot = Robot::load(&made.robot).unwrap();
+    let arm = robot.model(&flexarm::Modelling::default()).unwrap();
+    let (rigid, flexible) = (&arm.rigid, &arm.model);
+    let torque = |model: &flexarm::Model| {
+        let q = nalgebra::DVector::from_fn(model.nv(), |k, _| if k < 3 { 0.1 * k as f64 } else { 0.0 });
+        flexarm_kinematics::gravity_forces(model, &mut flexarm_kinematics::Data::new(model), &q)[1]
+    };
+    let (own, parts) = (torque(rigid), torque(flexible));
+    assert!((parts / own - 1.0).abs() < 1e-12, "{own} {parts}");
+    assert!(arm.spans.iter().any(|span| span.link == "upper"));
+}

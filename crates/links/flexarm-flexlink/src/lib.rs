@@ -40,7 +40,7 @@ mod modal;
 mod mounting;
 mod substitute;
 
-pub use cut::{CutError, cut_chain, cut_inertia};
+pub use cut::{CutError, SharedInertia, cut_chain, cut_inertia, share_inertia};
 pub use flexarm_fem::ReducedLink;
 pub use gearbox::{GearSpring, GearStiffness, Gearbox, GearboxError, GuideTubes, SEAT, insert_gearboxes};
 pub use interfaces::{BranchJoint, branch_joints};

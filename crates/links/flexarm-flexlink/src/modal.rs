@@ -8,9 +8,10 @@ use flexarm_kinematics::{
 };
 use nalgebra::DMatrix;
 
-use crate::cut::CutError;
 use crate::interfaces::nearest;
-use crate::substitute::{FlexibleLink, FlexibleSpan, Parts, Site, SubstitutionError, inertia_of, move_children};
+use crate::substitute::{
+    FlexibleLink, FlexibleSpan, Parts, Site, SubstitutionError, inertia_of, move_children, shared,
+};
 
 /// Maximum distance of the far interface from the far end of the reduced link, relative to its
 /// length.
@@ -43,7 +44,8 @@ fn smallest_scaled(M: &DMatrix<f64>) -> f64 {
 ///
 /// Attached bodies are fixed rigidly to the interface on their side of the split. With
 /// [`Parts::FromLink`], the mass integrals of the undeformed body are replaced by those of the
-/// mechanism's link.
+/// mechanism's link; where no body with these has the shapes of the beam, the beam has a share of
+/// the mass, and bodies at its ends have the rest.
 pub(crate) fn substitute_modal(
     mechanism: &mut Mechanism,
     flexible: &FlexibleLink,
@@ -59,11 +61,17 @@ pub(crate) fn substitute_modal(
         return Err(fail(format!("its interface {:?} lies {distance:.3e} m from B of the reduced link", far.name)));
     }
     let mut body = modal_body(modal);
-    if let Parts::FromLink(_) = flexible.parts {
-        take_mass_integrals(&mut body, name, site)?;
+    let (mut share, mut ends) = (1.0, attached_bodies(flexible, site));
+    if let Parts::FromLink(_) = flexible.parts
+        && !take_mass_integrals(&mut body, name, site)?
+    {
+        let divided = shared(flexible, site)?;
+        share = divided.share;
+        scale_mass(&mut body, share);
+        ends = divided.ends.map(|part| (part.mass > 0.0).then(|| inertia_of(&part).spatial()));
     }
 
-    let [near, beyond] = attached_bodies(flexible, site);
+    let [near, beyond] = ends;
     for link in mechanism.links.iter_mut().filter(|l| l.name == *name) {
         link.inertia = near.map(rigid);
     }
@@ -77,25 +85,37 @@ pub(crate) fn substitute_modal(
         X_LA: reduced.X_LA,
         X_DB: Pose::from(far.X_LI.translation).inverse() * reduced.X_LB,
         length: site.length,
-        own_mass: site.own.map_or(0.0, |i| i.mass),
         part_masses,
         lumped: None,
+        share,
     })
 }
 
-/// Replaces the mass integrals of the undeformed body by those of the mechanism's link.
-fn take_mass_integrals(body: &mut ModalBody, name: &str, site: &Site) -> Result<(), SubstitutionError> {
-    let own = site.own.ok_or_else(|| SubstitutionError::NoInertia { link: name.to_owned() })?.spatial();
+/// Replaces the mass integrals of the undeformed body by those of the mechanism's link; returns
+/// whether a body with them has the mode shapes, and leaves the body unchanged if not.
+fn take_mass_integrals(body: &mut ModalBody, name: &str, site: &Site) -> Result<bool, SubstitutionError> {
+    let own = site.own(name)?.spatial();
     if (own.mass / body.mass - 1.0).abs() > 1e-9 {
         let what = format!("it weighs {} kg, the link {} kg", body.mass, own.mass);
         return Err(SubstitutionError::Modal { link: name.to_owned(), what });
     }
+    let before = (body.first_moment, body.inertia);
     (body.first_moment, body.inertia) = (own.first_moment, own.rotational);
-    let smallest = smallest_scaled(&body.mass_matrix());
-    if smallest <= 0.0 {
-        return Err(SubstitutionError::Cut { link: name.to_owned(), source: CutError::Modes { smallest } });
+    let fits = smallest_scaled(&body.mass_matrix()) > 0.0;
+    if !fits {
+        (body.first_moment, body.inertia) = before;
     }
-    Ok(())
+    Ok(fits)
+}
+
+/// Scales the mass of a body, with its distribution and its shapes unchanged.
+fn scale_mass(body: &mut ModalBody, factor: f64) {
+    body.mass *= factor;
+    body.first_moment *= factor;
+    body.inertia *= factor;
+    body.M *= factor;
+    body.C_t.iter_mut().chain(&mut body.C_r).for_each(|integral| *integral *= factor);
+    body.P.iter_mut().chain(&mut body.N).for_each(|integral| *integral *= factor);
 }
 
 /// Adds a child link per interface, with the joints nearest to it; that at B has the inertia

@@ -138,8 +138,8 @@ pub fn insert_mounting(
         X_LA: *X_BS,
         X_DB: Pose::identity(),
         length: 0.0,
-        own_mass: mass,
         part_masses: vec![mass],
+        share: 1.0,
         lumped: None,
     };
     Ok((springs, span))

@@ -7,7 +7,7 @@ use flexarm_fem::{ModalLink, ReducedLink, RigidPart, drop_coupling};
 use flexarm_kinematics::{ElasticAngles, Joint, JointKind, Link, LinkInertia, Mechanism, Pose};
 use nalgebra::{Matrix6, Vector3};
 
-use crate::cut::{CutError, cut_chain, cut_inertia};
+use crate::cut::{CutError, SharedInertia, cut_chain, cut_inertia, share_inertia};
 use crate::interfaces::{BranchJoint, branch_joints};
 use crate::modal::substitute_modal;
 
@@ -67,8 +67,9 @@ impl LinkForm {
 pub enum Parts {
     /// From the reduced link.
     Reduced,
-    /// From the mechanism's own inertia of the link, divided at this fraction of the line A-B; the
-    /// rigid mechanism keeps its mass properties.
+    /// From the mechanism's own inertia of the link, divided at this fraction of the line A-B, or
+    /// shared by the beam and its ends where it cannot be divided; together the parts have its mass,
+    /// centre of mass and inertia.
     FromLink(f64),
 }
 
@@ -100,12 +101,12 @@ pub struct FlexibleSpan {
     pub X_DB: Pose,
     /// Distance between the interfaces (m).
     pub length: f64,
-    /// Mass of the link in the original mechanism (kg).
-    pub own_mass: f64,
     /// Masses of the parts, proximal first (kg); for a modal link, the modal body first.
     pub part_masses: Vec<f64>,
     /// Joints and parts of a lumped link; `None` for a modal link and a mounting.
     pub lumped: Option<Chain>,
+    /// Share of a modal link's own mass in that of the link; the rest is fixed to its ends.
+    pub share: f64,
 }
 
 /// Mechanism with its flexible links.
@@ -297,28 +298,44 @@ impl Site {
         let own = mechanism.link(name).and_then(|l| l.inertia);
         Ok(Self { distal_joint: distal.name.clone(), p_LA, p_LB, length, own })
     }
+
+    /// Returns the mechanism's own inertia of the link.
+    pub(crate) fn own(&self, link: &str) -> Result<LinkInertia, SubstitutionError> {
+        self.own.ok_or_else(|| SubstitutionError::NoInertia { link: link.to_owned() })
+    }
+}
+
+/// Divides the mechanism's own inertia of a link into its beam and bodies at its two ends.
+pub(crate) fn shared(flexible: &FlexibleLink, site: &Site) -> Result<SharedInertia, SubstitutionError> {
+    share_inertia(&site.own(&flexible.link)?, [&flexible.reduced.proximal, &flexible.reduced.distal])
+        .map_err(|source| SubstitutionError::Cut { link: flexible.link.clone(), source })
 }
 
 /// Elastic joints and parts of a lumped link, proximal first.
 fn lumped_parts(flexible: &FlexibleLink, site: &Site) -> Result<Chain, SubstitutionError> {
-    let (name, reduced) = (&flexible.link, &flexible.reduced);
-    let cut = |source| SubstitutionError::Cut { link: name.clone(), source };
-    let own = || site.own.ok_or_else(|| SubstitutionError::NoInertia { link: name.clone() });
-    Ok(match (&flexible.form, flexible.parts) {
-        (LinkForm::Chain(chain), Parts::Reduced) => chain.clone(),
-        (LinkForm::Chain(chain), Parts::FromLink(_)) => {
-            let parts = cut_chain(&own()?, &site.p_LA, &site.p_LB, &chain.parts).map_err(cut)?;
-            Chain { joints: chain.joints.clone(), parts }
-        }
-        (_, Parts::Reduced) => {
+    let reduced = &flexible.reduced;
+    let chain = match &flexible.form {
+        LinkForm::Chain(chain) => chain.clone(),
+        _ => {
             let parts = vec![reduced.proximal.clone(), reduced.distal.clone()];
             Chain { joints: vec![reduced.split.clone()], parts }
         }
-        (_, Parts::FromLink(split)) => {
-            let parts = cut_inertia(&own()?, &site.p_LA, &site.p_LB, split).map_err(cut)?.to_vec();
-            Chain { joints: vec![reduced.split.clone()], parts }
-        }
-    })
+    };
+    let Parts::FromLink(split) = flexible.parts else { return Ok(chain) };
+    let own = site.own(&flexible.link)?;
+    let cut = match &flexible.form {
+        LinkForm::Chain(_) => cut_chain(&own, &site.p_LA, &site.p_LB, &chain.parts),
+        _ => cut_inertia(&own, &site.p_LA, &site.p_LB, split).map(Vec::from),
+    };
+    if let Some(parts) = cut {
+        return Ok(Chain { parts, ..chain });
+    }
+    let SharedInertia { share, ends: [near, far] } = shared(flexible, site)?;
+    let mut parts: Vec<RigidPart> = chain.parts.iter().map(|part| part.with_mass(share * part.mass)).collect();
+    let last = parts.len() - 1;
+    parts[0] = parts[0].merged(&near);
+    parts[last] = parts[last].merged(&far);
+    Ok(Chain { parts, ..chain })
 }
 
 fn insert_chain(
@@ -366,9 +383,9 @@ fn insert_chain(
         X_LA: flexible.reduced.X_LA,
         X_DB: X_LD.inverse() * flexible.reduced.X_LB,
         length: site.length,
-        own_mass: site.own.map_or(0.0, |i| i.mass),
         part_masses: parts.iter().map(|p| p.mass).collect(),
         lumped: Some(chain),
+        share: 1.0,
     };
     (span, springs)
 }

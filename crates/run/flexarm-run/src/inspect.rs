@@ -15,7 +15,7 @@ use crate::error::Error;
 use crate::loops::{self, LoopInfo};
 use crate::mounting::RobotMounting;
 use crate::options::Modelling;
-use crate::posed::all_finite;
+use crate::posed::{all_finite, pose_of};
 use crate::robot::{Robot, tcp_frame};
 use crate::robot_link::RobotLink;
 
@@ -186,15 +186,15 @@ fn rows(M: &DMatrix<f64>) -> Vec<Vec<f64>> {
     M.row_iter().map(|r| r.iter().copied().collect()).collect()
 }
 
-/// Inspects the rigid robot (with payload) at a pose. `at` (rad or m) and `velocity` are for all
-/// actuated joints, zero by default.
+/// Inspects the rigid robot (with payload) at a pose. `at` (rad or m, by default
+/// [`Robot::start_pose`]) and `velocity` (by default zero) are for all actuated joints.
 ///
 /// # Errors
 /// [`Error::Pose`] for joint values that do not fit.
 pub fn inspect(robot: &Robot, at: Option<&[f64]>, velocity: Option<&[f64]>) -> Result<Inspection, Error> {
     let model = robot.rigid_model()?;
     let names: Vec<&str> = model.coordinates().iter().map(|c| c.joint.as_str()).collect();
-    let (q, v) = (joint_values(at, &names)?, joint_values(velocity, &names)?);
+    let (q, v) = (pose_of(robot, at)?, joint_values(velocity, &names)?);
     let mut state = State::zeros(&model);
     state.q.copy_from_slice(&q);
     state.qdot.copy_from_slice(&v);

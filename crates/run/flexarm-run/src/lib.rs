@@ -22,6 +22,7 @@ pub mod balancer;
 mod balancer_entry;
 mod beam_entry;
 mod bends;
+mod body_change;
 mod calibration_entry;
 pub mod caveat;
 mod check;

@@ -134,8 +134,7 @@ pub(crate) fn flexible_link(
     let (form, coupling) = (LinkForm::TwoParts, entry.coupling);
     let flexible = FlexibleLink { link: name.clone(), distal, reduced, parts, form, angles, coupling };
     let geometric = entry.geometric_stiffening.as_ref().is_some_and(|asked| *asked.get_ref());
-    let parts_asked = entry.beam.as_ref().is_none_or(|beam| beam.get_ref().parts.is_some());
-    let choices = LinkChoices { model, segments, modes, eigenmodes, geometric, parts_asked };
+    let choices = LinkChoices { model, segments, modes, eigenmodes, geometric };
     let (stiffness_factor, stiffness_factors) = factors(entry, source)?;
     let stiffness = entry.stiffness.as_ref().map(|given| matrix6(given, entry, source)).transpose()?;
     let stress = stress_source(entry, source, home)?;

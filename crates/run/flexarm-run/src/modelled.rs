@@ -4,18 +4,19 @@ use std::collections::HashMap;
 use std::sync::{Arc, OnceLock};
 
 use flexarm_flexlink::{
-    BranchJoint, FlexibleLink, GearSpring, Gearbox, LinkForm, Parts, Substituted, SubstitutionError, branch_joints,
-    insert_gearboxes, insert_mounting, substitute,
+    BranchJoint, FlexibleLink, GearSpring, Gearbox, LinkForm, Substituted, branch_joints, insert_gearboxes,
+    insert_mounting, substitute,
 };
 use flexarm_kinematics::{Coordinate, ElasticAngles, ElasticGroup, Model};
 use flexarm_linkmaker::import::SECOND_ORDER_UNKNOWN;
 use flexarm_stepping::{Friction, GearCoupling, GeometricStiffness, Spring, SpringCurve};
-use nalgebra::{DMatrix, Vector3};
+use nalgebra::DMatrix;
 
 use crate::arm::{Arm, Owner};
 use crate::bends::bends;
 use crate::caveat::Caveat;
 use crate::caveat::kinds;
+use crate::caveat::lumping;
 use crate::caveat::size::Size;
 use crate::drive_entry::{DriveKind, ServoEntry};
 use crate::error::{Error, ModellingError};
@@ -93,10 +94,8 @@ impl Robot {
             let (form, instead) = self.form_of(link, modelling)?;
             chosen.modal_instead.extend(instead);
             chosen.doubts.extend(doubts_of(link, &form));
-            let mut flexible = FlexibleLink { form, ..link.flexible.clone() };
-            let uncut = self.uncut(link, &mut flexible);
-            chosen.doubts.extend(uncut.map(|text| Caveat::from_message("uniform-mass", "links", text, "")));
-            chosen.links.push(flexible);
+            chosen.doubts.extend(lumping::of_parts(link, &form));
+            chosen.links.push(FlexibleLink { form, ..link.flexible.clone() });
         }
         // An option that applies to no link is an error.
         let modal = chosen.links.iter().filter(|link| matches!(link.form, LinkForm::Modal(_))).count();
@@ -160,7 +159,7 @@ impl Robot {
             let (LinkForm::Modal(modal), Some(k)) = (&link.form, span) else { continue };
             let source = &self.flexible_links[k];
             let geometric = modal.geometric.as_ref().filter(|_| source.choices.geometric);
-            let geometric = geometric.map(|g| Arc::new(stiffening(g)));
+            let geometric = geometric.map(|g| Arc::new(stiffening(g, substituted.spans[k].share)));
             let (name, K, damping) = (link.link.clone(), &modal.K * source.stiffness_factor, source.damping);
             let spring = Spring { name, K, damping, curve: None, geometric };
             owned.push(OwnedSpring { group: link.link.clone(), spring, owner: Owner::Link(k) });
@@ -253,28 +252,6 @@ impl Robot {
         })?;
         Ok((modal, Some(format!("link {name:?} is modal (model = \"modal\"): {why}"))))
     }
-
-    /// Uses the mass of a uniform beam if the file does not choose whose mass the parts take and
-    /// the link's own mass cannot be cut; returns a message in that case.
-    fn uncut(&self, link: &RobotLink, flexible: &mut FlexibleLink) -> Option<String> {
-        if link.choices.parts_asked {
-            return None;
-        }
-        let Err(SubstitutionError::Cut { link: name, source }) =
-            substitute(&self.rigid, std::slice::from_ref(flexible))
-        else {
-            return None;
-        };
-        flexible.parts = Parts::Reduced;
-        let middle = flexible.reduced.rigid().com;
-        let own =
-            self.rigid.link(&name).and_then(|link| link.inertia).map_or_else(Vector3::zeros, |inertia| inertia.com);
-        Some(format!(
-            "link {name:?}: the URDF's inertia cannot be spread along the beam ({source}); its parts have the URDF's mass as a \
-             uniform beam instead, whose centre of mass is {:.4} m from the URDF's; set parts = \"uniform\" if this is intended",
-            (middle - own).norm()
-        ))
-    }
 }
 
 /// Flexible links with the model chosen for each.
@@ -326,11 +303,13 @@ fn in_coordinate_order(model: &Model, owned: Vec<OwnedSpring>) -> Result<(Vec<Sp
     model.elastic().iter().map(of_group).collect::<Result<Vec<_>, _>>().map(|found| found.into_iter().unzip())
 }
 
-fn stiffening(g: &flexarm_fem::GeometricStiffness) -> GeometricStiffness {
+/// Returns the stiffness by loads of a modal link with a share of its mass.
+fn stiffening(g: &flexarm_fem::GeometricStiffness, share: f64) -> GeometricStiffness {
+    let scaled = |G: &DMatrix<f64>| G * share;
     GeometricStiffness {
-        acceleration: g.acceleration.clone(),
-        angular: g.angular.clone(),
-        centrifugal: g.centrifugal.clone(),
+        acceleration: g.acceleration.each_ref().map(scaled),
+        angular: g.angular.each_ref().map(scaled),
+        centrifugal: g.centrifugal.each_ref().map(scaled),
         interface: g.interface.clone(),
     }
 }

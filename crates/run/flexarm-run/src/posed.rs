@@ -15,6 +15,8 @@ use crate::caveat::{Caveat, kinds, of_use, once_each, validity};
 use crate::error::{Error, PoseError, ValueError};
 use crate::joint_values::joint_values;
 use crate::loops;
+use crate::motion::Motion;
+use crate::robot::Robot;
 
 /// Flexible arm with its drives locked at a pose.
 pub struct Posed {
@@ -32,6 +34,33 @@ pub struct Posed {
     pub at: Vec<f64>,
 }
 
+impl Robot {
+    /// Returns the pose at which the robot is analysed by default (rad or m): the start of the motion
+    /// of the robot file, or zero for a robot without one.
+    ///
+    /// # Errors
+    /// [`Error::Model`].
+    pub fn start_pose(&self) -> Result<Vec<f64>, Error> {
+        let n = self.rigid_model()?.n_actuated();
+        let mut q = vec![0.0; n];
+        // A motion that cannot be loaded is an error of the commands that run it.
+        if let Some(motion) = self.default_trajectory.as_deref().and_then(|path| Motion::load(path, self).ok()) {
+            motion.trajectory.sample(0.0, &mut q, &mut vec![0.0; n], &mut vec![0.0; n]);
+        }
+        Ok(q)
+    }
+}
+
+/// Returns the values of all actuated joints (rad or m), by default [`Robot::start_pose`].
+pub(crate) fn pose_of(robot: &Robot, at: Option<&[f64]>) -> Result<Vec<f64>, Error> {
+    if at.is_none() {
+        return robot.start_pose();
+    }
+    let model = robot.rigid_model()?;
+    let names: Vec<&str> = model.coordinates().iter().map(|c| c.joint.as_str()).collect();
+    joint_values(at, &names)
+}
+
 /// Wraps a step error of a command that takes no steps.
 pub fn step_error(source: StepError) -> Error {
     Error::Step { source, partial: false }
@@ -45,28 +74,24 @@ pub fn check_wrench(wrench: &[f64]) -> Result<(), ValueError> {
 }
 
 impl Arm {
-    /// Holds the arm at a pose; `at`: values of all actuated joints (rad or m), zero by default.
+    /// Holds the arm at a pose; `at`: values of all actuated joints (rad or m),
+    /// [`Robot::start_pose`] by default.
     ///
     /// # Errors
     /// [`Error::Pose`] for joint values that do not fit the arm.
     pub fn posed(self: &Arc<Self>, at: Option<&[f64]>) -> Result<Posed, Error> {
-        Posed::new(self.clone(), self.values(at)?)
+        Posed::new(self.clone(), pose_of(&self.robot, at)?)
     }
 
     /// As [`Arm::posed`], for equilibria alone ([`Posed::resting`]).
     pub(crate) fn resting(self: &Arc<Self>, at: Option<&[f64]>) -> Result<Posed, Error> {
-        Posed::resting(self.clone(), self.values(at)?)
-    }
-
-    fn values(&self, at: Option<&[f64]>) -> Result<Vec<f64>, Error> {
-        let names: Vec<&str> = self.rigid.coordinates().iter().map(|c| c.joint.as_str()).collect();
-        joint_values(at, &names)
+        Posed::resting(self.clone(), pose_of(&self.robot, at)?)
     }
 
     /// Returns mass, damping and stiffness about the static equilibrium at a pose under gravity and
     /// a wrench at the TCP, and the Jacobian of the TCP with respect to the free coordinates.
     ///
-    /// * `at`: values of all actuated joints (rad or m), zero by default.
+    /// * `at`: values of all actuated joints (rad or m), [`Robot::start_pose`] by default.
     /// * `wrench`: force and moment at the TCP, world axes (N, N m).
     ///
     /// # Errors

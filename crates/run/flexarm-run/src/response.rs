@@ -168,7 +168,7 @@ struct Channel {
 /// Computes the frequency response of the flexible robot at a pose, linearised about its static
 /// equilibrium under gravity, with the other drives locked.
 ///
-/// `at`: values of all actuated joints (rad or m); zero by default.
+/// `at`: values of all actuated joints (rad or m); [`Robot::start_pose`] by default.
 ///
 /// # Errors
 /// [`Error::Channel`] and [`Error::Value`] for invalid channel names and values, [`Error::Step`] if

@@ -72,9 +72,6 @@ pub struct LinkChoices {
     pub eigenmodes: Option<usize>,
     /// Whether loads change the stiffness (geometric stiffening).
     pub geometric: bool,
-    /// Whether the file says whose mass the parts take; if not, the parts take that of the uniform
-    /// beam when the link's own mass cannot be cut.
-    pub parts_asked: bool,
 }
 
 /// Key of the robot file that requested something unavailable.

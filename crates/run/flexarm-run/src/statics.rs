@@ -87,7 +87,7 @@ pub struct ElementStatics {
 /// Computes the equilibrium of the flexible robot at a pose under gravity and a wrench at the TCP,
 /// with the drives locked.
 ///
-/// `at`: values of all actuated joints (rad or m), zero by default; `wrench`: in world axes, not
+/// `at`: values of all actuated joints (rad or m), [`Robot::start_pose`] by default; `wrench`: in world axes, not
 /// rotating with the deflection.
 ///
 /// # Errors

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use flexarm_trajectory::Extreme;
 
 use super::job::{Commands, Discarded};
-use super::{Compensation, limits};
+use super::{CompensateRequest, Compensation, Method, limits};
 use flexarm_run::Arm;
 use flexarm_run::Caveat;
 use flexarm_run::MotionViolation;
@@ -96,13 +96,12 @@ pub(super) fn of_servos(plant: &Arc<Arm>, efforts: &[Extreme]) -> Option<Caveat>
 /// Returns the caveats of a result.
 ///
 /// * `own`: limits that the motion itself violates.
-/// * `asked`: number of TCP components to correct.
 pub(super) fn of(
     answer: &Compensation,
     own: &[MotionViolation],
     robot: &Robot,
     found: &Commands,
-    asked: usize,
+    request: &CompensateRequest,
 ) -> Vec<Caveat> {
     let mut caveats = Vec::new();
     let worse: Vec<&str> = limits::worse(&answer.limits, own).map(|limit| limit.message.as_str()).collect();
@@ -125,8 +124,8 @@ pub(super) fn of(
             Caveat::from_message("play", "compensation", text, "approach every point from the same side").as_note(),
         );
     }
-    // Shaping alone (a single peak, that of the start) is not meant to reduce the error.
-    let corrected = answer.model_peaks_m.len() != 1;
+    // Shaping alone is not meant to reduce the error.
+    let corrected = request.method == Method::Static || request.iterations > 0;
     if corrected && answer.after.peak_m > 0.5 * answer.before.peak_m {
         let text = format!(
             "the error on the plant is reduced by less than half ({:.3} of {:.3} mm remain)",
@@ -142,6 +141,7 @@ pub(super) fn of(
     }
     caveats.extend(discarded_caveat(answer, &found.discarded));
     caveats.extend(quick_caveat(answer, found.quicker));
+    let asked = request.components.iter().filter(|asked| **asked).count();
     caveats.extend(found.fewest.and_then(|fewest| singular_caveat(fewest, asked)));
     caveats
 }

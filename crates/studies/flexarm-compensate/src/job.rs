@@ -66,6 +66,7 @@ pub(super) struct Commands {
     pub(super) motion: Motion,
     /// Change of the joint positions, m×N.
     pub(super) change: DMatrix<f64>,
+    /// Peak error without correction and after each iteration kept (m).
     pub(super) peaks: Vec<f64>,
     pub(super) kept: usize,
     pub(super) cutoff_hz: Option<f64>,
@@ -325,7 +326,6 @@ impl<'a> Job<'a> {
             let change = &best.change + inversion.commands(&y, self.step_s()).columns(0, N);
             let next = self.error(&change, beyond)?;
             let left = size(&within(&next));
-            best.peaks.push(peak(&within(&next)));
             if left.is_nan() || left > least / SETTLED {
                 let cutoff_hz = inversion.cutoff_hz();
                 best.discarded.push(Discarded { iteration, cutoff_hz, growth: left / least });
@@ -340,6 +340,7 @@ impl<'a> Job<'a> {
             let settled = left > SETTLED * least || left < ENOUGH * first;
             (least, best.motion, best.change) = (left, self.moved(&change)?, change);
             best.kept += 1;
+            best.peaks.push(peak(&within(&next)));
             best.cutoff_hz = Some(inversion.cutoff_hz());
             error = within(&next);
             whole = next;

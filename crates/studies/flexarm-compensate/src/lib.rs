@@ -162,7 +162,7 @@ pub struct Compensation {
     pub before: ErrorFigures,
     /// Error with the new commands, on the plant.
     pub after: ErrorFigures,
-    /// Peak error on the model after each iteration; the first entry is without correction (m).
+    /// Peak error on the model without correction and after each iteration kept (m).
     pub model_peaks_m: Vec<f64>,
     /// Number of iterations kept.
     pub iterations: usize,
@@ -326,7 +326,7 @@ fn attempt(
         trajectory: found.motion.trajectory.clone(),
         curves: curves.collect(),
     };
-    answer.caveats = caveats::of(&answer, &own, robot, &found, job.rows.len());
+    answer.caveats = caveats::of(&answer, &own, robot, &found, request);
     answer.caveats.extend(caveats::of_servos(&judge.arm, &after.efforts));
     let motion = found.motion;
     Ok((answer, MotionPair { scenario, motion }, own))

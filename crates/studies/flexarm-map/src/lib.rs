@@ -19,6 +19,7 @@
 //! to the last bit. Drives are locked. Collisions are not checked.
 #![allow(non_snake_case, reason = "monogram notation: X_WL, K_S; see docs/references.md")]
 
+mod column;
 mod columns;
 mod error;
 mod evaluate;
@@ -48,7 +49,7 @@ pub use columns::MapColumn;
 pub use error::MapError;
 pub use placement::Placement;
 pub use poses::read_poses;
-pub use recording::{quantity_text, readable as readable_quantity};
+pub use recording::{quantity_text, readable as readable_quantity, titled as quantity_title};
 pub use region::{Grid, JointRange, MOST_PLACES, MapRegion, ToolDirections, WorkspaceGrid};
 pub use table::{MapPose, MapTable, QUANTILES, Spread};
 
@@ -286,7 +287,7 @@ pub fn map(
         MapRegion::Workspace(workspace) => workspace.tool.rotations()?,
         _ => Vec::new(),
     };
-    let (places, caveats) = region_of(request, model, &near, &rotations)?;
+    let (places, caveats) = region_of(robot, request, model, &near, &rotations)?;
     let region = places.as_places(&rotations);
     let mut taken = take(&region, &evaluator, &choice, go_on)?;
     let (done, all) = (taken.done, region.count());
@@ -343,6 +344,7 @@ impl<'m> Region<'m> {
 
 /// Checks the region and returns the places or poses to evaluate.
 fn region_of<'m>(
+    robot: &Robot,
     request: &'m MapRequest,
     model: &'m Model,
     near: &[f64],
@@ -358,7 +360,11 @@ fn region_of<'m>(
     }
     match &request.region {
         MapRegion::Workspace(workspace) => {
-            let found = workspace.keep_out_m;
+            let found = match (workspace.keep_out_m, workspace.bounds) {
+                (Some(radius), _) => radius,
+                (None, Some(_)) => 0.0,
+                (None, None) => column::radius(robot, model, near),
+            };
             if !(found.is_finite() && found >= 0.0) {
                 return Err(MapError::KeepOut { found }.into());
             }
@@ -382,7 +388,7 @@ fn region_of<'m>(
             if queries > MOST_QUERIES {
                 return Err(MapError::TooManyDirections { found: queries, most: MOST_QUERIES }.into());
             }
-            Ok((Region::Grid(grid, Box::new(finder), workspace.keep_out_m), caveats))
+            Ok((Region::Grid(grid, Box::new(finder), found), caveats))
         }
         MapRegion::Joints(ranges) => joint_region(ranges, model, near),
         MapRegion::Poses(poses) => poses::region(poses, model),

@@ -116,7 +116,7 @@ pub fn readable(name: &str) -> (f64, &'static str) {
 }
 
 /// Returns the title of a quantity with the unit of [`readable`], such as "compliance worst (mm/kN)".
-pub(super) fn titled(name: &str) -> String {
+pub fn titled(name: &str) -> String {
     let unit = readable(name).1;
     let words = ["_m_per_n", "_rad_per_nm", "_rad", "_hz", "_m"].iter().find_map(|end| name.strip_suffix(end));
     // The name of a link or joint stays as it is.

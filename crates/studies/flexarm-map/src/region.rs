@@ -45,8 +45,9 @@ pub struct WorkspaceGrid {
     /// Grid spacing (m); default: about a thirtieth of the longest edge.
     pub spacing_m: Option<f64>,
     /// Radius around the vertical line (world z) through the first joint within which places are
-    /// left out (m), because the arm itself is there.
-    pub keep_out_m: f64,
+    /// left out (m), because the arm itself is there; default: 0 in a box that is given, else the
+    /// radius of base and first moving link.
+    pub keep_out_m: Option<f64>,
     /// Tool directions.
     pub tool: ToolDirections,
 }

@@ -31,6 +31,9 @@ const SLENDER: f64 = 1.2;
 const SHARE: f64 = 0.08;
 /// Minimum wall thickness that can be cast, bent or printed (m).
 const THINNEST: f64 = 5e-4;
+/// Minimum wall thickness relative to the smaller outer size, below which walls buckle before they
+/// yield (EN 1993-1-1, table 5.2, for round ones).
+const THIN: f64 = 1.0 / 90.0;
 /// Tolerances of a round section: ratio of the principal second moments, and ratio of perimeters.
 const ROUND: [f64; 2] = [0.12, 0.06];
 /// Candidate materials, lightest first: name, density (kg/m³), and description.
@@ -194,6 +197,9 @@ fn between(link: &Candidate<'_>, [from, to]: [Vector3<f64>; 2]) -> Result<BeamSe
     let (material, wall) = wall(&outlines, shape, inertia.mass)?;
     let mut section = equivalent(&outlines, shape, length, wall);
     section.material = material;
+    if let Some(wall) = section.wall.filter(|wall| *wall < THIN * section.width.min(section.height)) {
+        return Err(NoSection::ThinWall { mass: inertia.mass, wall, material });
+    }
     if section.taper > TAPER {
         return Err(NoSection::Tapered { taper: section.taper });
     }

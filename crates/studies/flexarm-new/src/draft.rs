@@ -24,8 +24,6 @@ pub(crate) struct DraftLink {
     pub(crate) length: f64,
     pub(crate) mass: Option<f64>,
     pub(crate) section: Result<BeamSection, NoSection>,
-    /// Whether the link has the mass of a uniform beam, because its own inertia cannot be split.
-    pub(crate) uniform: bool,
     /// Whether its shapes are the collision shapes.
     pub(crate) of_collisions: bool,
 }
@@ -339,7 +337,6 @@ fn links(urdf: &UrdfRobot, chain: &Chain) -> Vec<DraftLink> {
             length: length.norm(),
             mass: inertia.map(|i| i.mass),
             section,
-            uniform: false,
             of_collisions,
         });
     }

@@ -11,8 +11,8 @@ use super::draft::{Draft, DraftJoint, DraftLink, placeholders};
 use super::place::Placed;
 use super::text;
 
-/// Tries each beam in the robot file to be written: a link whose inertia cannot be split gets the
-/// mass of a uniform beam; a beam that cannot be used at all is left out, with the reason.
+/// Tries each beam in the robot file to be written: one that cannot be used is left out, with the
+/// reason.
 pub(crate) fn settle(draft: &mut Draft, placed: &Placed) -> Result<(), Error> {
     let loads = |draft: &Draft, beams: &[&DraftLink]| {
         let text = text::robot_file(draft, placed, beams);
@@ -25,8 +25,6 @@ pub(crate) fn settle(draft: &mut Draft, placed: &Placed) -> Result<(), Error> {
         if draft.links[k].section.is_err() {
             continue;
         }
-        let Err(_) = loads(draft, &[&draft.links[k]]) else { continue };
-        draft.links[k].uniform = true;
         if let Err(error) = loads(draft, &[&draft.links[k]]) {
             draft.links[k].section = Err(NoSection::Refused(Arc::new(error)));
         }

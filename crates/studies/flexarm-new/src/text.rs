@@ -198,8 +198,7 @@ fn links(t: &mut String, draft: &Draft, beams: &[&DraftLink]) -> std::fmt::Resul
         if s.offset != [0.0; 3] {
             let _ = write!(beam, ", offset = {}", vector(&s.offset, 5));
         }
-        let parts = if link.uniform { "uniform" } else { "from-link" };
-        writeln!(t, "beam = {{ {beam}, parts = {parts:?} }}")?;
+        writeln!(t, "beam = {{ {beam}, parts = \"from-link\" }}")?;
     }
     let others: Vec<&DraftLink> = draft.links.iter().filter(|l| l.section.is_err()).collect();
     if !others.is_empty() {

@@ -141,6 +141,11 @@ fn a_mass_that_contradicts_the_mesh_gives_no_section_and_says_so() {
     assert_eq!(of(7000.0 * solid).unwrap().material, "ductile_iron");
     assert_eq!(of(2600.0 * solid).unwrap().material, "aluminium");
     assert!(of(0.1).unwrap_err().to_string().contains("wall of"));
+    // 2 kg of aluminium around 0.18 x 0.12 m are a wall of 1.4 mm, an eighty-seventh of its height;
+    // around twice the size 0.7 mm, a 350th.
+    assert!(of(2.0).is_ok());
+    let large = lofted(0.9, |_| rectangle(0.36, 0.24));
+    assert!(candidate(2.0, &[large], X_LB).unwrap_err().to_string().contains("wall of 0.69 mm"));
     let aside = Pose::from_parts(Translation3::new(0.0, 0.0, 0.9), Rotation3::identity());
     let frames = candidate(20.0, std::slice::from_ref(&mesh), aside).unwrap_err().to_string();
     assert!(frames.contains("are not along the link"), "{frames}");

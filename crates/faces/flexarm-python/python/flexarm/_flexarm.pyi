@@ -196,7 +196,7 @@ def map(
     *,
     bounds: ArrayLike | None = None,
     spacing: float | None = None,
-    keep_out: float = 0.0,
+    keep_out: float | None = None,
     tool_axis: ArrayLike | None = None,
     roll: float = 0.0,
     cone: float = 0.0,
@@ -278,6 +278,8 @@ class Robot:
     def limits(self) -> _Floats: ...
     @property
     def velocity_limits(self) -> _Floats: ...
+    @property
+    def start_pose(self) -> _Floats: ...
     @property
     def tcp_link(self) -> str: ...
     @property

@@ -138,6 +138,13 @@ pub(crate) const UNSTEADY_ROTATION: CaveatKind = CaveatKind::warning(
     "%",
     "turn one joint about a vertical axis, or set gravity to zero, for modes that last",
 );
+/// The links of a turning arm have too few modes.
+pub(crate) const FEW_MODES: CaveatKind = CaveatKind::warning(
+    "few-modes",
+    "{where} is off by about {value} %, because the links have few modes: the speed couples them (limit {yardstick} %)",
+    "%",
+    "give the links more modes: modes = 32 on the link",
+);
 /// A joint is outside its limits at a pose.
 pub(crate) const OUTSIDE_LIMITS: CaveatKind = CaveatKind::warning(
     "outside-limits",
@@ -346,14 +353,14 @@ pub(crate) const LINK_STIFFNESS: CaveatKind = CaveatKind::warning(
     "link-stiffness",
     "the stiffness given for {where} is {value} times that of its beam or .flex file in one direction, measured links stay within {yardstick} times",
     "",
-    "stiffness is the 6x6 of the spring between the two parts (N/m, N, N m/rad), as flexarm inspect shows it",
+    "stiffness is the 6x6 of the spring between the two parts, at the split and in link axes (N/m, N, N m/rad): see docs/robot-file.md",
 );
 /// The stiffness given for a link has no coupling terms.
 pub(crate) const LINK_COUPLING: CaveatKind = CaveatKind::warning(
     "link-stiffness",
     "the stiffness given for {where} has no coupling terms, its beam or .flex file has some of {value} of the diagonal (reported above {yardstick})",
     "",
-    "give all 36 numbers of the spring between the two parts, as flexarm inspect shows them",
+    "give all 36 numbers of the spring between the two parts, at the split and in link axes: see docs/robot-file.md",
 );
 /// The speed of sound along a link, from stiffness and mass, is implausible.
 pub(crate) const LINK_SOUND: CaveatKind = CaveatKind::warning(

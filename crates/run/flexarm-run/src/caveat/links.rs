@@ -4,12 +4,14 @@
 use std::ops::RangeInclusive;
 
 use flexarm_fem::{Bar, BeamLink, Material, Section};
+use flexarm_flexlink::Parts;
 use flexarm_kinematics::LinkInertia;
 use flexarm_settings::Setting;
 use flexarm_stepping::Damping;
 
 use super::slip::{self, slip};
 use super::{Caveat, CaveatKind, kinds};
+use crate::body_change::BodyChange;
 use crate::mounting::RobotMounting;
 use crate::options::LinkModel;
 use crate::robot::Robot;
@@ -40,6 +42,11 @@ const THIN: [f64; 2] = [1.0 / 42.0, 1.0 / 90.0];
 pub(super) const USUAL_DAMPING: f64 = 0.03;
 /// Range of the link's mass relative to that of its section.
 const MASS: RangeInclusive<f64> = 0.02..=50.0;
+/// Maximum distance between the centres of mass of the parts and of the URDF's link, relative to
+/// the length.
+const SHIFT: f64 = 0.01;
+/// Maximum change of the moments of inertia, relative to the largest.
+const INERTIA: f64 = 0.05;
 /// Range of the damping ratio of jointed structures.
 const RATIO: RangeInclusive<f64> = 1e-3..=0.2;
 /// Maximum beta in `D = beta K` (s); above it the link creeps instead of vibrating.
@@ -56,9 +63,34 @@ pub(crate) fn of_link(link: &RobotLink, own: Option<&LinkInertia>) -> Vec<Caveat
         caveats.extend(section(&name, beam));
         caveats.extend(sizes(&name, beam, own));
     }
+    caveats.extend(own.and_then(|own| body(&name, link, own)));
     caveats.extend(geometric(&name, link));
     caveats.extend(super::stiffness::of_stiffness(&name, link));
     caveats
+}
+
+/// Compares the body of the parts with that of the URDF, if the parts do not take it from there.
+fn body(name: &str, link: &RobotLink, own: &LinkInertia) -> Option<Caveat> {
+    let RobotLink { flexible, .. } = link;
+    let (length, body) = (flexible.reduced.p_AB().norm(), flexible.reduced.rigid());
+    let change = BodyChange::of(own, &body);
+    if flexible.parts != Parts::Reduced || (change.shift < SHIFT * length && change.inertia < INERTIA) {
+        return None;
+    }
+    let message = format!(
+        "{name}: its parts move the centre of mass by {:.4} m from the URDF's, {:.1} N m of static torque, and change \
+         its moments of inertia by up to {:.0} %",
+        change.shift,
+        9.81 * body.mass * change.shift,
+        100.0 * change.inertia
+    );
+    let help = match link.beam {
+        Some(_) => "leave parts = \"uniform\" out, unless the URDF's inertia is wrong",
+        None => "compare the mesh of the .flex file with the URDF",
+    };
+    let caveat = Caveat { value: Some(change.shift), ..Caveat::from_message("uniform-mass", name, message, help) };
+    // Moments of inertia alone change no static torque.
+    Some(if change.shift < SHIFT * length { caveat.as_note() } else { caveat })
 }
 
 /// Checks whether requested geometric stiffening is available for the link.

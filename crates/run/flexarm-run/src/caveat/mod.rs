@@ -17,6 +17,7 @@ mod kinds_of_use;
 pub(crate) mod links;
 pub(crate) mod loads;
 pub(crate) mod loops;
+pub(crate) mod lumping;
 pub mod motion;
 pub mod of_use;
 pub(crate) mod parts;

@@ -1,6 +1,7 @@
 //! Entries of a robot file that change the rigid robot: joints, payload, TCP and masses of links.
 
 use flexarm_files::{Source, TextFileError as RobotFileError};
+use flexarm_flexlink::Parts;
 use flexarm_kinematics::{Joint, JointKind, Link, LinkInertia, Mechanism, Pose};
 use flexarm_settings::known_names;
 use flexarm_urdf::{UrdfRobot, default_tcp};
@@ -9,11 +10,13 @@ use toml::Spanned;
 
 use super::load::LoadOptions;
 use super::{PAYLOAD_LINK, Robot};
+use crate::body_change::BodyChange;
 use crate::caveat::Caveat;
 use crate::entry_checks::{check_finite, loop_of_joint, pose};
 use crate::error::Error;
 use crate::link_entry::FlexibleLinkEntry;
 use crate::robot_file::{PayloadEntry, RobotFile};
+use crate::robot_link::RobotLink;
 
 impl Robot {
     /// Sets the mass of a beam link to the value in its entry, keeping its centre of mass and radii
@@ -40,6 +43,27 @@ impl Robot {
         match found {
             true => Ok(()),
             false => Err(fail("the URDF gives it no mass that could be changed: leave mass out".into())),
+        }
+    }
+
+    /// Gives the rigid robot the mass, centre of mass and inertia of those flexible links that do not
+    /// take them from it.
+    pub(super) fn weigh_flexible_links(&mut self) {
+        for RobotLink { flexible, .. } in &self.flexible_links {
+            let Some(link) = self.rigid.links.iter_mut().find(|link| link.name == flexible.link) else { continue };
+            let body = flexible.reduced.rigid();
+            if flexible.parts != Parts::Reduced
+                || link.inertia.is_some_and(|own| BodyChange::of(&own, &body).is_rounding())
+            {
+                continue;
+            }
+            if let Some(own) = link.inertia.filter(|own| (body.mass / own.mass - 1.0).abs() > 1e-6) {
+                self.warnings.push(format!(
+                    "link {:?}: its parts weigh {:.4} kg, the URDF's link {:.4} kg; the parts count",
+                    flexible.link, body.mass, own.mass
+                ));
+            }
+            link.inertia = Some(LinkInertia { mass: body.mass, com: body.com, inertia_com: body.inertia });
         }
     }
 

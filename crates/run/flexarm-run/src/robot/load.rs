@@ -247,6 +247,7 @@ impl Robot {
             let flexible = flexible_link(entry, urdf, source, home, &mut self.warnings, faults);
             self.flexible_links.extend(keep(flexible, faults));
         }
+        self.weigh_flexible_links();
         // A gauge on a link that has a fault of its own is not judged.
         let links = file.flexible_link.iter().map(|entry| {
             let name = entry.link.get_ref().as_str();
@@ -277,27 +278,11 @@ impl Robot {
             let mounting = f.mounting.as_ref().map(Spanned::span);
             f.flexible_link.last().map(|e| e.link.span()).or(mounting).map(|span| (s, span))
         });
-        let mut arm = match (Arc::new(self).modelled(&Modelling::default()), last_flexible) {
-            (Ok(arm), _) => arm,
-            (Err(Error::Modelling(fault)), Some((source, span))) => {
-                return Err(source.error(span, fault.to_string()).into());
-            }
-            (Err(error), _) => return Err(error),
-        };
-        let heavier = arm.spans.iter().filter_map(|span| {
-            let (own, parts) = (span.own_mass, span.part_masses.iter().sum::<f64>());
-            (own > 0.0 && (parts / own - 1.0).abs() > 1e-6).then(|| {
-                format!(
-                    "link {:?}: the two parts weigh {parts:.4} kg, the URDF's link {own:.4} kg; the parts count",
-                    span.link
-                )
-            })
-        });
-        let heavier: Vec<String> = heavier.collect();
-        if !heavier.is_empty() {
-            Arc::make_mut(&mut arm.robot).warnings.extend(heavier);
+        match (Arc::new(self).modelled(&Modelling::default()), last_flexible) {
+            (Ok(arm), _) => Ok(Arc::new(arm)),
+            (Err(Error::Modelling(fault)), Some((source, span))) => Err(source.error(span, fault.to_string()).into()),
+            (Err(error), _) => Err(error),
         }
-        Ok(Arc::new(arm))
     }
 }
 

@@ -2,8 +2,11 @@
 
 use flexarm_analysis::TcpMetrics;
 use flexarm_log::{Event, EventKind};
+use flexarm_stepping::StepError;
 
 use super::RunLoop;
+use crate::caveat::{Caveat, kinds};
+use crate::error::Error;
 
 impl RunLoop<'_> {
     /// Returns the events up to the end of the run, ordered by time.
@@ -49,5 +52,18 @@ impl RunLoop<'_> {
         events.retain(|event| event.time_s <= reached + 1e-9);
         events.sort_by(|a, b| a.time_s.total_cmp(&b.time_s).then(a.kind.cmp(&b.kind)));
         events
+    }
+}
+
+/// Blames the model of a link instead of the step for an iteration that failed while the link was
+/// deflected beyond its model.
+pub(super) fn beyond_model(error: Error, caveats: &[Caveat]) -> Error {
+    let of_shape =
+        |caveat: &&Caveat| [kinds::LARGE_DEFORMATION.code, kinds::LARGE_STRAIN.code].contains(&&*caveat.code);
+    match (error, caveats.iter().find(of_shape)) {
+        (Error::Step { source: StepError::NotConverged { t, .. }, partial }, Some(caveat)) => {
+            Error::Step { source: StepError::BeyondModel { t, doubt: caveat.message.clone() }, partial }
+        }
+        (error, _) => error,
     }
 }

@@ -279,6 +279,7 @@ pub(crate) fn simulate(
     }
 
     let (mut summary, mut events) = run.summary(built.robot_caveats().to_vec());
+    let end = end.map_err(|error| events::beyond_model(error, &summary.caveats));
     if let Err(error) = &end {
         events.push(Event { time_s: run.seen.t, kind: EventKind::Stopped, text: error.to_string() });
     }

@@ -6,9 +6,7 @@ use std::sync::{Arc, PoisonError};
 use flexarm_run::loads_file::parse_loads;
 use flexarm_run::reduce::{ReduceJob, ReduceOptions, ReduceOutputs, reduce};
 use flexarm_run::robot::PAYLOAD_LINK;
-use flexarm_run::{
-    Arm, Error, LoadOptions, Modelling, Motion, MotionOptions, Robot, RobotSource, RunOptions, Scenario,
-};
+use flexarm_run::{Error, LoadOptions, Modelling, Motion, MotionOptions, Robot, RobotSource, RunOptions, Scenario};
 
 use super::run_files::RunFiles;
 use super::{Built, Workshop};
@@ -62,7 +60,7 @@ impl Workshop {
         }
         let robot = self.robot_of(path, text)?;
         let arm = robot.model(&modelling)?;
-        let mass_kg = mass(&robot, &arm);
+        let mass_kg = mass(&robot);
         let built = Arc::new(Built { arm, mass_kg });
         self.arms.put(key, built.clone());
         Ok(built)
@@ -124,10 +122,8 @@ impl Workshop {
     }
 }
 
-/// Mass of all links, including the parts of flexible links, without the payload (kg).
-fn mass(robot: &Robot, flexible: &Arm) -> f64 {
+/// Mass of all links without the payload (kg).
+fn mass(robot: &Robot) -> f64 {
     let own = robot.rigid.links.iter().filter(|link| link.name != PAYLOAD_LINK);
-    let own: f64 = own.filter_map(|link| link.inertia).map(|inertia| inertia.mass).sum();
-    let parts = flexible.spans.iter().map(|span| span.part_masses.iter().sum::<f64>() - span.own_mass);
-    own + parts.sum::<f64>()
+    own.filter_map(|link| link.inertia).map(|inertia| inertia.mass).sum()
 }

@@ -359,7 +359,7 @@ fn unusable(path: &Path, what: impl ToString) -> Error {
 }
 
 /// Returns the parts without the bodies attached to the link, whose loads act at its interfaces.
-fn without_attached(reduced: &ReducedLink, mut parts: Vec<RigidPart>) -> Vec<RigidPart> {
+pub(crate) fn without_attached(reduced: &ReducedLink, mut parts: Vec<RigidPart>) -> Vec<RigidPart> {
     let along = reduced.X_LB.translation.vector - reduced.X_LA.translation.vector;
     for body in reduced.details.iter().flat_map(|details| &details.attached) {
         let is_beyond = (body.com - reduced.split.X_LS.translation.vector).dot(&along) > 0.0;
