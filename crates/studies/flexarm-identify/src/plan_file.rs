@@ -240,8 +240,10 @@ pub fn plan_measurements(robot: &Robot, request: &PlanRequest) -> Result<Measure
     let heavy =
         |pose: usize, setup: &Setup| efforts.share(pose, setup.force, setup.at).filter(|(_, share)| *share > 1.0);
     let pairs = (0..poses.len()).flat_map(|pose| setups.iter().map(move |setup| (pose, *setup)));
-    let pairs: Vec<(usize, Setup)> =
-        pairs.filter(|(pose, setup)| chosen_forces || heavy(*pose, setup).is_none()).collect();
+    let light: Vec<(usize, Setup)> =
+        pairs.clone().filter(|(pose, setup)| chosen_forces || heavy(*pose, setup).is_none()).collect();
+    // An arm whose own weight exceeds the limits is planned all the same, with a warning.
+    let pairs = if light.len() < request.count { pairs.collect() } else { light };
     let candidates: Vec<Candidate> =
         pairs.iter().map(|(pose, setup)| Candidate(reading(&poses[*pose], setup))).collect();
     let purpose: Vec<Reading> = match &request.work {
