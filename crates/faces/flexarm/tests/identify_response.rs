@@ -229,8 +229,9 @@ fn tables_and_universal_files_of_one_test_tell_the_same() {
         let found = identify_robot(&robot, &path, &IdentifyRequest::default()).unwrap();
         for (p, (_, factor)) in found.parameters.iter().map(|p| (p, TRUTH.iter().find(|(n, _)| *n == p.name).unwrap()))
         {
-            let error = (p.value / (p.initial * factor) - 1.0).abs();
-            assert!(error < 1e-6, "{name}, {}: {error:e}", p.name); // measured: see the line below
+            // Without noise, the prior alone pulls, by a small part of the deviation.
+            let error = (p.value - p.initial * factor).abs() / p.std;
+            assert!(error < 0.05, "{name}, {}: {error:e}", p.name);
         }
         let worst = found.parameters.iter().map(|p| {
             let factor = TRUTH.iter().find(|(n, _)| *n == p.name).unwrap().1;

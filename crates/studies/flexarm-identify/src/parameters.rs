@@ -94,12 +94,7 @@ pub(crate) fn candidates(robot: &Robot, flexible: &Arm) -> Vec<Candidate> {
         if let Some(seat) = gearbox.seat {
             // They come before those of the gearbox.
             let own: Vec<usize> = springs.drain(..2).collect();
-            found.extend(own.iter().zip(seat).enumerate().map(|(entry, (spring, k))| {
-                let name = format!("drive.{}.gearbox.seat[{entry}]", drive.joint);
-                let place = SpringPart { spring: *spring, coordinate: None };
-                let written = ParameterLocation::Seat { joint: drive.joint.clone(), entry };
-                stiffness(name, "N m/rad", k, vec![place], written)
-            }));
+            found.extend(seat_parameters(&drive.joint, seat, &own));
         }
         match &gearbox.stiffness {
             GearStiffness::Guide(_) => found.extend(guide_parameters(&drive.joint, &damping.tilts, &springs, flexible)),
@@ -146,6 +141,15 @@ pub(crate) fn candidates(robot: &Robot, flexible: &Arm) -> Vec<Candidate> {
     found.extend(tool_parameters());
     found.extend(frame_parameters(flexible));
     found
+}
+
+/// Returns the two stiffnesses of a seat.
+fn seat_parameters(joint: &str, seat: [f64; 2], springs: &[usize]) -> impl Iterator<Item = Candidate> {
+    springs.iter().zip(seat).enumerate().map(move |(entry, (spring, k))| {
+        let place = SpringPart { spring: *spring, coordinate: None };
+        let written = ParameterLocation::Seat { joint: joint.to_owned(), entry };
+        stiffness(format!("drive.{joint}.gearbox.seat[{entry}]"), "N m/rad", k, vec![place], written)
+    })
 }
 
 /// Returns the numbers of the law of each tilt of a telescopic guide.

@@ -237,11 +237,7 @@ pub fn plan_measurements(robot: &Robot, request: &PlanRequest) -> Result<Measure
     let request = &request;
     let reading = |q: &Vec<f64>, setup: &Setup| displacement(q, setup, request.std_m);
     let setups = request.setups();
-    let heavy =
-        |pose: usize, setup: &Setup| efforts.share(pose, setup.force, setup.at).filter(|(_, share)| *share > 1.0);
-    let pairs = (0..poses.len()).flat_map(|pose| setups.iter().map(move |setup| (pose, *setup)));
-    let pairs: Vec<(usize, Setup)> =
-        pairs.filter(|(pose, setup)| chosen_forces || heavy(*pose, setup).is_none()).collect();
+    let pairs = allowed(&efforts, poses.len(), &setups, if chosen_forces { 0 } else { request.count });
     let candidates: Vec<Candidate> =
         pairs.iter().map(|(pose, setup)| Candidate(reading(&poses[*pose], setup))).collect();
     let purpose: Vec<Reading> = match &request.work {
@@ -255,16 +251,8 @@ pub fn plan_measurements(robot: &Robot, request: &PlanRequest) -> Result<Measure
     let options = PlanOptions { count: request.count, purpose, repeat: false };
     let [best, first] = plans(&plant, &fitted, &candidates, &options)?;
     let mut caveats = arm.caveats(Use::Any);
-    let over: Vec<(&str, f64)> = best.chosen.iter().filter_map(|k| heavy(pairs[*k].0, &pairs[*k].1)).collect();
-    if let Some((joint, share)) = over.iter().max_by(|a, b| a.1.total_cmp(&b.1)) {
-        let text = format!(
-            "the loads of {} of {} readings exceed effort limits, that of joint {joint:?} by a factor of {share:.1}",
-            over.len(),
-            best.chosen.len()
-        );
-        let remedy = "give smaller forces, or none: then they follow from the limits";
-        caveats.push(Caveat::from_message("plan-load", "plan", text, remedy));
-    }
+    let over = best.chosen.iter().filter_map(|k| efforts.excess(pairs[*k].0, pairs[*k].1.force, pairs[*k].1.at));
+    caveats.extend(load_caveat(&over.collect::<Vec<_>>(), best.chosen.len()));
     let mut answer = MeasurementPlan {
         warnings: warnings(&caveats),
         caveats,
@@ -284,6 +272,27 @@ pub fn plan_measurements(robot: &Robot, request: &PlanRequest) -> Result<Measure
         (answer.file, answer.table) = (Some(file.display().to_string()), Some(table.display().to_string()));
     }
     Ok(answer)
+}
+
+/// Returns the poses and setups whose loads the drives can hold, if there are `least` of them above 0;
+/// otherwise all.
+fn allowed(efforts: &Efforts, poses: usize, setups: &[Setup], least: usize) -> Vec<(usize, Setup)> {
+    let all: Vec<(usize, Setup)> = (0..poses).flat_map(|pose| setups.iter().map(move |setup| (pose, *setup))).collect();
+    let light = all.iter().copied().filter(|(pose, setup)| efforts.excess(*pose, setup.force, setup.at).is_none());
+    let light: Vec<(usize, Setup)> = light.collect();
+    if least > 0 && light.len() >= least { light } else { all }
+}
+
+/// Returns the caveat about planned loads that exceed effort limits: joints, and their shares of them.
+fn load_caveat(over: &[(&str, f64)], readings: usize) -> Option<Caveat> {
+    let (joint, share) = over.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let text = format!(
+        "the loads of {} of {readings} readings exceed effort limits, that of joint {joint:?} by a factor of \
+         {share:.1}",
+        over.len()
+    );
+    let remedy = "give smaller forces, or none: then they follow from the limits";
+    Some(Caveat::from_message("plan-load", "plan", text, remedy))
 }
 
 /// Returns the best plan, and the one with the same number of candidates in their given order.

@@ -43,14 +43,14 @@ impl Efforts {
         J.column_iter().map(|s| s.fixed_rows::<3>(0).dot(force) + s.fixed_rows::<3>(3).dot(&moment)).collect()
     }
 
-    /// Returns the joint that a force takes closest to its limit at a pose, and the share of its
-    /// limit.
-    pub(super) fn share(&self, pose: usize, force: [f64; 3], at: [f64; 3]) -> Option<(&str, f64)> {
+    /// Returns the joint whose limit a force exceeds most at a pose, and the effort over the limit;
+    /// `None` if it exceeds none.
+    pub(super) fn excess(&self, pose: usize, force: [f64; 3], at: [f64; 3]) -> Option<(&str, f64)> {
         let (weight, J, R) = self.poses[pose].as_ref()?;
         let own = Self::per_newton(J, R, &force.into(), &at.into());
         let shares = weight.iter().zip(own).zip(&self.limits).map(|((w, f), limit)| (w - f).abs() / limit);
         let (joint, share) = shares.enumerate().max_by(|a, b| a.1.total_cmp(&b.1))?;
-        Some((&self.joints[joint], share))
+        (share > 1.0).then(|| (self.joints[joint].as_str(), share))
     }
 
     /// Returns the forces of a plan: down, along x and along y of the world, half of what the limits

@@ -190,7 +190,7 @@ const LEFT: f64 = 0.1;
 /// Relative pivot below which an unknown without a prior depends on others.
 const DEPENDENT: f64 = 1e-12;
 /// Relative change of the errors of the model, and step over deviations, at which they are kept.
-const SETTLED: (f64, f64) = (1e-3, 0.1);
+const SETTLED: (f64, f64) = (1e-2, 0.1);
 /// Minimum error of the model relative to the scatter at the start.
 const LEAST_ERROR: f64 = 1e-8;
 
