@@ -53,7 +53,7 @@ ALLOWED = {  # file: allowed hit (a pattern), and the reason
     "crates/motion/flexarm-motion-io/src/error.rs": (r"--full-length|--no-arr", "how to call another program, ROS 2"),
     "crates/robot/flexarm-urdf/src/resolve.rs": (r"std::env", "search_paths_from_environment, which the caller may use or not"),
     "crates/robot/flexarm-urdf/src/xacro/substitution.rs": (r"std::env|env::var|env::current", "xacro's own $(env NAME), $(optenv NAME), $(cwd)"),
-    "crates/run/flexarm-run/src/motion_formats.rs": (r"--src|--dst|--dst-storage", "how to call another program, rosbags-convert"),
+    "crates/run/flexarm-run/src/motions/motion_formats.rs": (r"--src|--dst|--dst-storage", "how to call another program, rosbags-convert"),
     "crates/run/flexarm-run/src/report/html/figures.rs": (r"--c", "a custom property of a style sheet"),
     **dict.fromkeys(["crates/proof/flexarm-verify/src/" + file for file in (
         "files.rs", "one_beam/page.rs", "three_beams/page.rs", "lower_arm/page.rs", "manipulator/page.rs")],

@@ -19,10 +19,10 @@ CRATES = ["flexarm-run", "flexarm-linkmaker", "flexarm-settings", *(f"flexarm-{s
     "chatter", "compensate", "identify", "map", "new", "sensitivity", "sweep"))]
 #: Results: struct, its file, and the name of its type in Python.
 ROOTS = [
-    ("Summary", "flexarm-run/src/summary.rs", "RunSummary"),
-    ("Statics", "flexarm-run/src/statics.rs", "StaticsDetails"),
-    ("ModeTable", "flexarm-run/src/modes.rs", "ModesSummary"),
-    ("Response", "flexarm-run/src/response.rs", "ResponseSummary"),
+    ("Summary", "flexarm-run/src/run/summary.rs", "RunSummary"),
+    ("Statics", "flexarm-run/src/poses/statics.rs", "StaticsDetails"),
+    ("ModeTable", "flexarm-run/src/poses/modes.rs", "ModesSummary"),
+    ("Response", "flexarm-run/src/poses/response.rs", "ResponseSummary"),
     ("Map", "flexarm-map/src/lib.rs", "MapSummary"),
     ("Compensation", "flexarm-compensate/src/lib.rs", "Compensation"),
     ("Sensitivity", "flexarm-sensitivity/src/lib.rs", "Sensitivity"),
@@ -34,7 +34,7 @@ ROOTS = [
     ("ReduceSummary", "flexarm-linkmaker/src/reduce/summary.rs", "ReduceSummary"),
     ("ImportSummary", "flexarm-linkmaker/src/import/summary.rs", "ImportSummary"),
     ("ExportSummary", "flexarm-linkmaker/src/export.rs", "ExportSummary"),
-    ("Inspection", "flexarm-run/src/inspect.rs", "Inspection"),
+    ("Inspection", "flexarm-run/src/poses/inspect.rs", "Inspection"),
     ("Finding", "flexarm-run/src/check.rs", "Finding"),
     ("NewRobot", "flexarm-new/src/report.rs", "NewRobot"),
 ]

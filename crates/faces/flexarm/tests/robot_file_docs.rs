@@ -189,7 +189,7 @@ fn keys(sources: &[impl AsRef<str>]) -> BTreeMap<String, BTreeSet<String>> {
 
 /// Sources of `robot.toml`: the file itself and every entry.
 fn robot_sources() -> Vec<String> {
-    let mut found = vec!["crates/run/flexarm-run/src/robot_file.rs".to_owned()];
+    let mut found = vec!["crates/run/flexarm-run/src/robot/robot_file.rs".to_owned()];
     for folder in ["crates/run/flexarm-run/src", "crates/run/flexarm-linkmaker/src"] {
         let names = std::fs::read_dir(project(folder)).unwrap().map(|file| file.unwrap().file_name());
         let names = names.map(|name| name.into_string().unwrap());
@@ -198,7 +198,7 @@ fn robot_sources() -> Vec<String> {
     found
 }
 
-const LOADS: [&str; 1] = ["crates/run/flexarm-run/src/loads_file.rs"];
+const LOADS: [&str; 1] = ["crates/run/flexarm-run/src/motions/loads_file.rs"];
 const MOTION: [&str; 2] =
     ["crates/motion/flexarm-trajectory/src/waypoints_toml.rs", "crates/motion/flexarm-trajectory/src/samples_toml.rs"];
 

@@ -7,21 +7,21 @@ use flexarm_urdf::{Finding as UrdfFinding, Severity};
 use nalgebra::Vector6;
 use serde::Serialize;
 
-use crate::balancer;
+use crate::arm::options::Modelling;
 use crate::caveat::motion::of_motion;
 use crate::caveat::of_use::standing_pose;
 use crate::caveat::size::Size;
 use crate::caveat::{self, Caveat};
-use crate::drive_entry::DriveKind;
 use crate::error::Error;
-use crate::loops;
-use crate::monitor::stress::StressMonitor;
-use crate::motion::Motion;
-use crate::motion_formats::{self, MotionFile, MotionOptions};
-use crate::options::Modelling;
-use crate::posed::Posed;
+use crate::motions::motion::Motion;
+use crate::motions::motion_formats::{self, MotionFile, MotionOptions};
+use crate::motions::scenario::Scenario;
+use crate::poses::posed::Posed;
+use crate::robot::balancer;
+use crate::robot::drive_entry::DriveKind;
+use crate::robot::loops;
 use crate::robot::{LoadOptions, Robot};
-use crate::scenario::Scenario;
+use crate::run::monitor::stress::StressMonitor;
 
 /// A finding.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]

@@ -4,7 +4,7 @@ use flexarm_kinematics::{Joint, Mechanism};
 
 use super::size::Size;
 use super::{Caveat, CaveatKind, kinds};
-use crate::drive_entry::{Drive, DriveKind};
+use crate::robot::drive_entry::{Drive, DriveKind};
 use crate::robot::{PAYLOAD_LINK, Robot};
 
 /// Joint range that separates fingers (less) from arm joints (more) (rad).

@@ -10,7 +10,7 @@ use super::links::{CREEP, USUAL_DAMPING};
 use super::size::inertia_moved;
 use super::slip::{self, slip};
 use super::{Caveat, kinds};
-use crate::drive_entry::{Drive, DriveKind};
+use crate::robot::drive_entry::{Drive, DriveKind};
 
 /// Effort limit above which drives have stiff gears (N m); weaker drives may contain springs on
 /// purpose.

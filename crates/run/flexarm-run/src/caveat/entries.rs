@@ -6,10 +6,10 @@ use super::links::outside;
 use super::size::Size;
 use super::slip::{self, slip};
 use super::{Caveat, kinds};
-use crate::calibration_entry::Calibration;
-use crate::gauge_entry::Gauge;
 use crate::robot::Robot;
-use crate::robot_link::RobotLink;
+use crate::robot::calibration_entry::Calibration;
+use crate::robot::gauge_entry::Gauge;
+use crate::robot::robot_link::RobotLink;
 
 /// Range of yield and tensile strength, from plastics to drawn wire (Pa).
 const STRENGTH: RangeInclusive<f64> = 5e6..=4.5e9;

@@ -11,11 +11,11 @@ use flexarm_stepping::Damping;
 
 use super::slip::{self, slip};
 use super::{Caveat, CaveatKind, kinds};
+use crate::arm::options::LinkModel;
 use crate::body_change::BodyChange;
-use crate::mounting::RobotMounting;
-use crate::options::LinkModel;
 use crate::robot::Robot;
-use crate::robot_link::RobotLink;
+use crate::robot::mounting::RobotMounting;
+use crate::robot::robot_link::RobotLink;
 
 /// Range of Young's modulus, from polymers to diamond (Pa).
 const YOUNG: RangeInclusive<f64> = 1e8..=1.3e12;

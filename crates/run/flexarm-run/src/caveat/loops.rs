@@ -4,7 +4,7 @@ use flexarm_kinematics::Model;
 use flexarm_trajectory::Trajectory;
 
 use super::{Caveat, CaveatKind, kinds};
-use crate::loops::{along_motion, over_ranges};
+use crate::robot::loops::{along_motion, over_ranges};
 
 /// Transmission angle: note below the first, warning below the second (rad). At 10 degrees a rod
 /// carries six times the force.

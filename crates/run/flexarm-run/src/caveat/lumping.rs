@@ -8,8 +8,8 @@ use flexarm_settings::Setting;
 use nalgebra::{DVector, Vector3};
 
 use super::{Caveat, Severity};
-use crate::monitor::stress::without_attached;
-use crate::robot_link::RobotLink;
+use crate::robot::robot_link::RobotLink;
+use crate::run::monitor::stress::without_attached;
 
 /// Error of the sag of a uniform beam of two parts under its own weight, and of the frequency of
 /// its third mode in a plane; both fall with the square of the number of joints.

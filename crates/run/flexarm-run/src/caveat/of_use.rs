@@ -10,12 +10,12 @@ use nalgebra::Vector6;
 use super::size::{Size, middle};
 use super::{Caveat, motion, once_each, validity};
 use crate::arm::Arm;
+use crate::arm::options::Modelling;
 use crate::error::Error;
-use crate::motion::Motion;
-use crate::options::Modelling;
-use crate::posed::Posed;
+use crate::motions::motion::Motion;
+use crate::motions::scenario::Scenario;
+use crate::poses::posed::Posed;
 use crate::robot::Robot;
-use crate::scenario::Scenario;
 
 /// Use of a robot by a command.
 #[derive(Clone, Copy)]

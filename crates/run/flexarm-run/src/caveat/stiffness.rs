@@ -6,7 +6,7 @@ use nalgebra::{Matrix6, Vector6};
 
 use super::slip::{self, slip};
 use super::{Caveat, kinds};
-use crate::robot_link::RobotLink;
+use crate::robot::robot_link::RobotLink;
 
 /// Maximum stiffness ratio, or inverse ratio, of measured links to their beam or mesh in any
 /// direction.

@@ -8,7 +8,7 @@ use flexarm_stepping::{StepperKind, error_of_a_period};
 
 use super::slip::{self, slip};
 use super::{Caveat, CaveatKind, kinds};
-use crate::summary::LinkStressFigures;
+use crate::run::summary::LinkStressFigures;
 
 /// Maximum elastic rotation for which the linear elastic model is assumed valid (rad).
 const ROTATION_LIMIT: f64 = 0.05;

@@ -9,11 +9,11 @@ use flexarm_settings::Setting;
 use serde::Serialize;
 
 use super::{ReportRun, figures, html};
-use crate::convert::{no_sample, read_run};
 use crate::error::{Error, RecordingError};
-use crate::magnification::fit_color_scale;
-use crate::stepper_settings::StepperSettings;
-use crate::summary::{StepperFigures, Summary, TcpFigures};
+use crate::report::convert::{no_sample, read_run};
+use crate::run::magnification::fit_color_scale;
+use crate::run::stepper_settings::StepperSettings;
+use crate::run::summary::{StepperFigures, Summary, TcpFigures};
 
 /// Options of a report.
 #[derive(Clone, Debug, Default)]
@@ -78,7 +78,7 @@ pub fn report(recordings: &[PathBuf], options: &ReportOptions) -> Result<ReportF
         return Err(RecordingError::NothingToReport.into());
     };
     let page = options.output.clone().unwrap_or_else(|| first.path.with_file_name("report.html"));
-    let folder = page.with_file_name(crate::record::FIGURES_FOLDER);
+    let folder = page.with_file_name(crate::run::record::FIGURES_FOLDER);
     check_places(&inputs, &page, &folder, options)?;
 
     let mut runs = read_all(&inputs, &mut warnings)?;
@@ -123,7 +123,8 @@ fn read_all(inputs: &[Input], warnings: &mut Vec<String>) -> Result<Vec<(String,
             tcp.settling_band_m = settling_band_m(&trace.header);
         }
         if summary.difference.is_none() {
-            summary.difference = runs.first().and_then(|(_, _, first)| crate::comparison::difference(first, &trace));
+            summary.difference =
+                runs.first().and_then(|(_, _, first)| crate::run::comparison::difference(first, &trace));
         }
         let label = match (inputs.len(), &summary.label) {
             (1, _) => super::title(&summary),
@@ -273,7 +274,7 @@ fn computed(trace: &Trace) -> Summary {
         },
         duration_s: trace.rows.last().map_or(0.0, |row| row.time_s),
         tcp,
-        error_curve: crate::summary::thinned(&times, &errors),
+        error_curve: crate::run::summary::thinned(&times, &errors),
         moves_s: moves.iter().map(|&(start, end)| [start, end]).collect(),
         computed: true,
         ..Summary::default()

@@ -3,7 +3,7 @@
 use flexarm_analysis::amplitude_spectrum;
 use flexarm_log::{CurveQuantity, GaugeQuantity, Trace};
 
-use crate::summary::Summary;
+use crate::run::summary::Summary;
 
 /// Maximum number of points of a curve that is always shown.
 const MOST_POINTS: usize = 3000;

@@ -11,7 +11,7 @@ use flexarm_settings::written::csv_field;
 use super::curves::{Kind, Plot, PlotView, plots};
 use super::picture::printed;
 use crate::error::Error;
-use crate::summary::Summary;
+use crate::run::summary::Summary;
 
 /// Width of the pictures of the arm (pixels): 300 per inch across both columns of a paper.
 const PICTURE_WIDTH: usize = 1800;

@@ -4,6 +4,9 @@
 //! terminal share them. `curves` provides the data of the plots, `picture` renders the arm,
 //! `figures` writes the folder for papers.
 
+pub(crate) mod convert;
+pub mod html_page;
+
 mod again;
 mod curves;
 mod figures;
@@ -19,12 +22,12 @@ use flexarm_log::Trace;
 use flexarm_settings::gathered;
 use flexarm_settings::written::{markdown as markdown_text, markdown_row};
 
+use crate::arm::options::Outputs;
 use crate::error::Error;
-use crate::headline::{self, rounded};
-use crate::options::Outputs;
-use crate::record::FIGURES_FOLDER;
-use crate::settling::within;
-use crate::summary::{LinkStressFigures, StrainGaugeFigures, StressPointFigures, Summary};
+use crate::run::headline::{self, rounded};
+use crate::run::record::FIGURES_FOLDER;
+use crate::run::settling::within;
+use crate::run::summary::{LinkStressFigures, StrainGaugeFigures, StressPointFigures, Summary};
 
 use self::shares::{Part, part_shares, share_numbers};
 
@@ -87,7 +90,7 @@ pub fn markdown(summary: &Summary) -> String {
     }
     if !summary.with.is_empty() {
         page += "\n## Runs of the study\n\n";
-        page += &crate::comparison::table(summary);
+        page += &crate::run::comparison::table(summary);
     }
     if !summary.warnings.is_empty() {
         page += "\n## Warnings\n\n";

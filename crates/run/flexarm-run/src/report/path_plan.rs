@@ -3,7 +3,7 @@
 use flexarm_draw::{CurveLook, Panel, PlotCurve, plan_plot};
 use nalgebra::{Matrix3, Vector3};
 
-use crate::monitor::tool_path::PathFigures;
+use crate::run::monitor::tool_path::PathFigures;
 
 /// Displayed size of the maximum error, relative to the size of the path.
 const SHOWN: f64 = 0.06;

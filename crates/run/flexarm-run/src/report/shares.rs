@@ -1,8 +1,8 @@
 //! Contributions to the maximum TCP error of links, drives, servos and stepper, for tables and
 //! page.
 
-use crate::headline::{self, rounded};
-use crate::summary::{DriveFigures, LinkFigures, Summary};
+use crate::run::headline::{self, rounded};
+use crate::run::summary::{DriveFigures, LinkFigures, Summary};
 
 /// Contribution of one part of the arm to the maximum TCP error, with its own figures.
 pub(super) struct PartShare<'a> {

@@ -12,11 +12,11 @@ use super::load::LoadOptions;
 use super::{PAYLOAD_LINK, Robot};
 use crate::body_change::BodyChange;
 use crate::caveat::Caveat;
-use crate::entry_checks::{check_finite, loop_of_joint, pose};
 use crate::error::Error;
-use crate::link_entry::FlexibleLinkEntry;
-use crate::robot_file::{PayloadEntry, RobotFile};
-use crate::robot_link::RobotLink;
+use crate::robot::entry_checks::{check_finite, loop_of_joint, pose};
+use crate::robot::link_entry::FlexibleLinkEntry;
+use crate::robot::robot_file::{PayloadEntry, RobotFile};
+use crate::robot::robot_link::RobotLink;
 
 impl Robot {
     /// Sets the mass of a beam link to the value in its entry, keeping its centre of mass and radii

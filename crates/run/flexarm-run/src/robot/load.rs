@@ -11,22 +11,22 @@ use toml::Spanned;
 use super::entries::{held_joint, limit_effort, make_helical, tcp_of};
 use super::{Robot, TCP_FRAME, finding_text};
 use crate::arm::Arm;
-use crate::balancer_entry::add_balancers;
-use crate::calibration_entry::{Calibration, calibrate};
+use crate::arm::options::Modelling;
 use crate::caveat::{Caveat, parts};
-use crate::controller_entry::controller_axes;
-use crate::coupling_entry::coupling;
-use crate::drive_entry::drives;
-use crate::entry_checks::{check_finite, keep};
 use crate::error::Error;
-use crate::file_cache::FileCache;
-use crate::gauge_entry::gauges;
-use crate::link_entry::{LinkHome, flexible_link};
-use crate::loop_entry::add_loops;
-use crate::mounting_entry::add_mounting;
-use crate::options::Modelling;
 use crate::ranges::not_finite;
-use crate::robot_file::{RobotFile, parse_robot_file};
+use crate::robot::balancer_entry::add_balancers;
+use crate::robot::calibration_entry::{Calibration, calibrate};
+use crate::robot::controller_entry::controller_axes;
+use crate::robot::coupling_entry::coupling;
+use crate::robot::drive_entry::drives;
+use crate::robot::entry_checks::{check_finite, keep};
+use crate::robot::file_cache::FileCache;
+use crate::robot::gauge_entry::gauges;
+use crate::robot::link_entry::{LinkHome, flexible_link};
+use crate::robot::loop_entry::add_loops;
+use crate::robot::mounting_entry::add_mounting;
+use crate::robot::robot_file::{RobotFile, parse_robot_file};
 
 /// Options for loading a robot.
 #[derive(Clone, Debug, Default)]

@@ -1,6 +1,29 @@
 //! A loaded robot: URDF, payload, tool centre point and flexible links, from which models are
 //! built.
 
+pub mod balancer;
+pub(crate) mod balancer_entry;
+pub(crate) mod beam_entry;
+pub(crate) mod calibration_entry;
+pub(crate) mod controller_entry;
+pub(crate) mod coupling_entry;
+pub(crate) mod drive_entry;
+pub(crate) mod entry_checks;
+pub mod file_cache;
+pub(crate) mod gauge_entry;
+pub(crate) mod gear_entry;
+pub(crate) mod gearbox_entry;
+pub(crate) mod guide_entry;
+pub(crate) mod link_entry;
+pub(crate) mod loop_entry;
+pub mod loops;
+pub(crate) mod mounting;
+pub(crate) mod mounting_entry;
+pub mod robot_file;
+pub(crate) mod robot_link;
+pub(crate) mod strength;
+pub mod toml_file;
+
 mod entries;
 mod load;
 
@@ -13,16 +36,16 @@ use flexarm_kinematics::{Frame, Mechanism, Model, Pose};
 use flexarm_stepping::{Damping, FlexibleArm};
 use flexarm_urdf::UrdfRobot;
 
-use crate::calibration_entry::Calibration;
+use crate::arm::options::Modelling;
 use crate::caveat::{self, Caveat};
-use crate::controller_entry::RobotAxis;
-use crate::drive_entry::Drive;
 use crate::error::{Error, ValueError};
-use crate::gauge_entry::Gauge;
-use crate::gear_entry::RobotCoupling;
-use crate::mounting::RobotMounting;
-use crate::options::Modelling;
-use crate::robot_link::RobotLink;
+use crate::robot::calibration_entry::Calibration;
+use crate::robot::controller_entry::RobotAxis;
+use crate::robot::drive_entry::Drive;
+use crate::robot::gauge_entry::Gauge;
+use crate::robot::gear_entry::RobotCoupling;
+use crate::robot::mounting::RobotMounting;
+use crate::robot::robot_link::RobotLink;
 
 pub use load::{Description, LoadOptions, RobotSource};
 

@@ -12,7 +12,7 @@ use nalgebra::UnitQuaternion;
 
 use super::parts::{Axis, MESHES, Part};
 use super::springs::{Spring, Springs};
-use crate::posed::Posed;
+use crate::poses::posed::Posed;
 use crate::robot::Robot;
 
 /// Rotor inertia of a motor with prescribed motion (kg m² or kg).

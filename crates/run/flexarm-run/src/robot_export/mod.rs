@@ -20,7 +20,7 @@ use self::parts::{Axis, parts, with_mass};
 use self::springs::{Springs, step};
 use crate::arm::Arm;
 use crate::error::Error;
-use crate::posed::Posed;
+use crate::poses::posed::Posed;
 
 /// Description of robots that another simulator reads.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -6,7 +6,7 @@ use flexarm_kinematics::{AxisMotion, Body, JointMotion, Pose};
 use nalgebra::{Matrix3, Vector3};
 
 use crate::error::{Error, ValueError};
-use crate::posed::Posed;
+use crate::poses::posed::Posed;
 use crate::robot::Robot;
 
 /// Minimum moment of inertia that MuJoCo takes (kg m²).

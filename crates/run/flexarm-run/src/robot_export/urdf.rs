@@ -7,7 +7,7 @@ use flexarm_settings::written::markup;
 use nalgebra::Vector3;
 
 use super::parts::{Axis, MESHES, Part};
-use crate::posed::Posed;
+use crate::poses::posed::Posed;
 use crate::robot::Robot;
 
 pub(super) fn text(robot: &Robot, posed: &Posed, parts: &[Part]) -> String {

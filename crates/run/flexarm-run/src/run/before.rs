@@ -6,11 +6,11 @@ use nalgebra::DVector;
 
 use super::steps_per_sample;
 use crate::arm::Arm;
+use crate::arm::options::RunOptions;
 use crate::caveat::pose::ArmAtRest;
 use crate::caveat::{Caveat, kinds, of_use, validity};
-use crate::motion::Motion;
-use crate::options::RunOptions;
-use crate::posed::strains;
+use crate::motions::motion::Motion;
+use crate::poses::posed::strains;
 
 /// Minimum number of steps per period of a gear's ripple, for which a second-order stepper has an
 /// amplitude error of a few per cent.

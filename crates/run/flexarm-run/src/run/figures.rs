@@ -8,11 +8,11 @@ use flexarm_stepping::FlexibleArm;
 use super::before::BeforeRun;
 use super::{Detail, RunLoop, moves};
 use crate::arm::Owner;
+use crate::arm::options::RunOptions;
 use crate::caveat::{Caveat, drives, kinds, validity};
-use crate::headline::{self, Bending, ShareFigures};
-use crate::monitor::stress::StressMonitor;
-use crate::options::RunOptions;
-use crate::summary::{CURVE_PIECES, DriveFigures, LinkFigures, StepperFigures, Summary, TcpFigures};
+use crate::run::headline::{self, Bending, ShareFigures};
+use crate::run::monitor::stress::StressMonitor;
+use crate::run::summary::{CURVE_PIECES, DriveFigures, LinkFigures, StepperFigures, Summary, TcpFigures};
 
 impl RunLoop<'_> {
     /// Returns the figures so far; `robot_caveats` come before those of the run.

@@ -5,6 +5,19 @@
 //! recorders, curves and observer. `figures` computes the figures from the monitors, `events` the
 //! list of events.
 
+pub(crate) mod comparison;
+pub(crate) mod headline;
+pub mod magnification;
+pub(crate) mod monitor;
+pub mod prepare;
+pub mod record;
+pub(crate) mod settling;
+pub(crate) mod static_part;
+pub(crate) mod stepper_settings;
+pub(crate) mod study;
+pub mod summary;
+pub(crate) mod twin;
+
 mod before;
 mod events;
 mod figures;
@@ -26,30 +39,29 @@ use flexarm_stepping::{FlexibleArm, Observation, Stepper};
 
 use rayon::prelude::*;
 
+use crate::arm::bends::stations;
+use crate::arm::options::{Outputs, RunOptions};
 use crate::arm::{Arm, Owner};
-use crate::bends::stations;
 use crate::caveat::{self, Caveat};
 use crate::error::Error;
-use crate::headline;
-use crate::magnification::{Expected, fit_color_scale};
-use crate::monitor::Monitors;
-use crate::monitor::stress::StressMonitor;
-use crate::monitor::tool::ToolMonitor;
-use crate::motion::Motion;
-use crate::options::{Outputs, RunOptions};
-use crate::prepare::Checked;
-use crate::record::{
+use crate::motions::motion::Motion;
+use crate::motions::scenario::Scenario;
+use crate::robot::Robot;
+use crate::run::magnification::{Expected, fit_color_scale};
+use crate::run::monitor::Monitors;
+use crate::run::monitor::stress::StressMonitor;
+use crate::run::monitor::tool::ToolMonitor;
+use crate::run::prepare::Checked;
+use crate::run::record::{
     Recordings, STRESS_PICTURE, files_of_a_run, header, link_frames, names_of_signals, ordered_links, recorders,
     signals, write_bag_metadata, write_layouts,
 };
-use crate::robot::Robot;
 use crate::run::sampler::Sampler;
 pub(crate) use crate::run::sampler::link_side_angles;
 use crate::run::shares::AtPeak;
-use crate::scenario::Scenario;
-use crate::static_part::StaticPart;
-use crate::summary::{Files, Summary};
-use crate::twin::RigidTwin;
+use crate::run::static_part::StaticPart;
+use crate::run::summary::{Files, Summary};
+use crate::run::twin::RigidTwin;
 
 pub use before::BeforeRun;
 pub use figures::static_sag;

@@ -6,9 +6,9 @@ use flexarm_log::{ElasticSample, EnergySample, Sample};
 use flexarm_stepping::{FlexibleArm, Observation};
 
 use crate::arm::{Arm, Owner};
-use crate::monitor::tool::ToolError;
 use crate::robot::Robot;
-use crate::twin::RigidTwin;
+use crate::run::monitor::tool::ToolError;
+use crate::run::twin::RigidTwin;
 
 /// Frames and coordinates of an arm that go into a sample.
 pub(super) struct Sampler {

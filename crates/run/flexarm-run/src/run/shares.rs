@@ -12,7 +12,7 @@ use flexarm_kinematics::{Data, Frame, Model, forward_kinematics, frame_jacobian}
 use flexarm_stepping::Observation;
 use nalgebra::{DVector, Matrix6xX, Vector3};
 
-use crate::twin::RigidTwin;
+use crate::run::twin::RigidTwin;
 
 /// Nodes and weights of Gauss quadrature on 0..1.
 const GAUSS: [(f64, f64); 3] =

@@ -6,8 +6,8 @@ use flexarm_draw::palette;
 
 use super::number::{fixed, number};
 use super::run::{ReportRun, method};
-use crate::comparison::of_one_robot;
-use crate::summary::{EnergyFigures, Summary, TcpFigures};
+use crate::run::comparison::of_one_robot;
+use crate::run::summary::{EnergyFigures, Summary, TcpFigures};
 use flexarm_settings::written::markup;
 
 /// Name of the settling time in the standard.
@@ -17,7 +17,7 @@ const NOTHING_M: f64 = 1e-12;
 
 /// Describes the settling band of a run, such as "within 0.1 mm".
 pub(super) fn within(run: &ReportRun<'_>) -> Option<String> {
-    run.summary.tcp.as_ref()?.settling_band_m.map(crate::settling::within)
+    run.summary.tcp.as_ref()?.settling_band_m.map(crate::run::settling::within)
 }
 
 /// Whether the TCP coincides with that of the rigid twin throughout.

@@ -23,8 +23,8 @@ use self::run::method;
 use self::tables::{iso_table, parts_tables, stops_table, stress_picture, tool_path};
 use super::again::metadata_value;
 use super::curves::{Plot, plots};
-use crate::html_page::{head, warnings};
-use crate::stepper_settings::SettingValue;
+use crate::report::html_page::{head, warnings};
+use crate::run::stepper_settings::SettingValue;
 use flexarm_settings::written::markup;
 
 pub use self::run::ReportRun;

@@ -3,7 +3,7 @@
 use flexarm_log::Trace;
 
 use super::number::number;
-use crate::summary::Summary;
+use crate::run::summary::Summary;
 
 /// Run shown in a report.
 #[derive(Clone, Copy, Debug)]

@@ -7,12 +7,12 @@ use base64::Engine as _;
 use super::figures::{STABILISATION, moving, within, without_number};
 use super::number::number;
 use super::run::ReportRun;
-use crate::headline;
-use crate::monitor::tool_path::PathMoveFigures;
-use crate::record::STRESS_PICTURE;
 use crate::report::path_plan::path_plan;
 use crate::report::shares::{Part, part_shares, share_numbers};
-use crate::summary::Summary;
+use crate::run::headline;
+use crate::run::monitor::tool_path::PathMoveFigures;
+use crate::run::record::STRESS_PICTURE;
+use crate::run::summary::Summary;
 use flexarm_settings::written::markup;
 
 /// Maximum number of moves in the table of the page.

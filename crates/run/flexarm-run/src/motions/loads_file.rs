@@ -1,0 +1,543 @@
+//! Files of loads and payloads (`--loads FILE.toml`), read into the values of a
+//! [`Scenario`](crate::Scenario).
+//!
+//! Loads have a file of their own because they belong to a run and not to a robot. Start at
+//! `read_loads`. Not here: the effect of the values on a robot (`applied_load`, `payload`). The
+//! values keep their location in the file (`LoadLocation`), so that later errors can name it.
+
+use std::f64::consts::{PI, TAU};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use exmex::{Express, FlatEx};
+use flexarm_files::{Source, TextFileError as RobotFileError, read_text};
+use flexarm_kinematics::{LinkInertia, Wrench};
+use flexarm_stepping::{LoadAxes, TimedWrench};
+use nalgebra::{Matrix3, Vector3};
+use serde::Deserialize;
+use toml::Spanned;
+
+use crate::caveat::{self, Caveat};
+use crate::error::{Error, LoadError};
+use crate::motions::applied_load::AppliedLoad;
+use crate::motions::load_jumps::jumps_of;
+use crate::motions::payload::PayloadChange;
+use crate::ranges::OF_LOADS;
+use crate::robot::toml_file::parsed;
+
+/// Loads file as written.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct LoadsFile {
+    format: Spanned<i64>,
+    #[serde(default)]
+    load: Vec<Spanned<LoadEntry>>,
+    #[serde(default)]
+    payload: Vec<Spanned<PayloadEntry>>,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct LoadEntry {
+    /// `tcp` or a link name.
+    frame: Option<Spanned<String>>,
+    /// `world` or `frame`.
+    axes: Option<Spanned<String>>,
+    /// `step`, `impulse`, `sine`, `sweep`, `milling`, `table` or `expression`.
+    kind: Spanned<String>,
+    /// Start time (s).
+    #[serde(default)]
+    start: f64,
+    /// End time (s); the end of the run by default.
+    end: Option<Spanned<f64>>,
+    /// Force amplitude (N).
+    #[serde(default)]
+    force: [f64; 3],
+    /// Moment amplitude (N m).
+    #[serde(default)]
+    torque: [f64; 3],
+    /// sine: frequency (Hz).
+    frequency: Option<Spanned<f64>>,
+    /// sine: phase (rad).
+    #[serde(default)]
+    phase: f64,
+    /// sweep: start frequency (Hz).
+    from: Option<Spanned<f64>>,
+    /// sweep: end frequency (Hz).
+    to: Option<Spanned<f64>>,
+    /// impulse: duration of the half sine (s); `force` is then the impulse (N s).
+    duration: Option<Spanned<f64>>,
+    /// milling: number of cutting edges.
+    teeth: Option<u32>,
+    /// milling: spindle speed (rev/min).
+    spindle_rpm: Option<Spanned<f64>>,
+    /// milling: number of harmonics of the tooth frequency in addition to the mean; 3 by default.
+    harmonics: Option<u32>,
+    /// table: CSV with time, fx, fy, fz and optionally tx, ty, tz (s, N, N m).
+    file: Option<Spanned<PathBuf>>,
+    /// expression: functions of t (s), for fx, fy, fz, tx, ty, tz.
+    fx: Option<Spanned<String>>,
+    fy: Option<Spanned<String>>,
+    fz: Option<Spanned<String>>,
+    tx: Option<Spanned<String>>,
+    ty: Option<Spanned<String>>,
+    tz: Option<Spanned<String>>,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PayloadEntry {
+    /// Time of the change (s).
+    at: f64,
+    /// New mass (kg), which replaces the mass carried before; 0 drops it.
+    mass: f64,
+    /// Link that carries the payload; by default that of the robot's payload, or else of the TCP.
+    link: Option<Spanned<String>>,
+    /// Centre of mass in link axes (m).
+    #[serde(default)]
+    com: [f64; 3],
+    /// `ixx iyy izz ixy ixz iyz` about the centre of mass (kg m²).
+    inertia: Option<Spanned<[f64; 6]>>,
+}
+
+type WrenchFn = Arc<dyn Fn(f64) -> Wrench + Send + Sync>;
+
+/// Location of a value in the file: its entry, its frame or link, and its inertia.
+#[derive(Clone, Debug)]
+pub(crate) struct LoadLocation {
+    entry: RobotFileError,
+    frame: RobotFileError,
+    inertia: RobotFileError,
+}
+
+impl LoadLocation {
+    fn new(source: &Source, entry: Range<usize>, frame: Option<Range<usize>>, inertia: Option<Range<usize>>) -> Self {
+        let place = |span: Option<Range<usize>>| source.error(span.unwrap_or_else(|| entry.clone()), "");
+        Self { entry: place(None), frame: place(frame), inertia: place(inertia) }
+    }
+
+    /// Error about the value as a whole, with its location if it was read from a file.
+    pub(crate) fn entry(written: Option<&Self>, cause: impl Into<LoadError>) -> Error {
+        Self::error(written.map(|written| &written.entry), cause.into())
+    }
+
+    /// Error about the frame or link.
+    pub(crate) fn frame(written: Option<&Self>, cause: impl Into<LoadError>) -> Error {
+        Self::error(written.map(|written| &written.frame), cause.into())
+    }
+
+    /// Error about the inertia.
+    pub(crate) fn inertia(written: Option<&Self>, cause: impl Into<LoadError>) -> Error {
+        Self::error(written.map(|written| &written.inertia), cause.into())
+    }
+
+    fn error(place: Option<&RobotFileError>, cause: LoadError) -> Error {
+        match place {
+            Some(place) => RobotFileError { message: cause.to_string(), ..place.clone() }.into(),
+            None => cause.into(),
+        }
+    }
+}
+
+/// Reads a loads file for a run that ends at `duration` (s).
+///
+/// # Errors
+/// [`Error`] with file, location, the value found and the expected one.
+pub(crate) fn read_loads(path: &Path, duration: f64) -> Result<(Vec<AppliedLoad>, Vec<PayloadChange>), Error> {
+    parse_loads(&read_text(path)?, path, duration)
+}
+
+/// As `read_loads`, from the text of the file.
+pub fn parse_loads(text: &str, path: &Path, duration: f64) -> Result<(Vec<AppliedLoad>, Vec<PayloadChange>), Error> {
+    let source = Source::new(path, text, "loads");
+    let file: LoadsFile = parsed(text, &source, OF_LOADS, |file: &LoadsFile| &file.format)?;
+    let folder = path.parent().unwrap_or(Path::new("."));
+    let loads = file.load.iter().map(|entry| load(entry, folder, duration, &source));
+    let payloads = file.payload.iter().map(|entry| payload(entry, &source));
+    let loads = loads.collect::<Result<_, _>>()?;
+    for (k, entry) in file.payload.iter().enumerate() {
+        let same = |other: &Spanned<PayloadEntry>| {
+            let [a, b] = [entry, other].map(Spanned::get_ref);
+            a.at == b.at && a.link.as_ref().map(Spanned::get_ref) == b.link.as_ref().map(Spanned::get_ref)
+        };
+        if file.payload[..k].iter().any(same) {
+            let message = format!("two payloads change at {} s on the same link: keep one of them", entry.get_ref().at);
+            return Err(source.error(entry.span(), message).into());
+        }
+    }
+    Ok((loads, payloads.collect()))
+}
+
+fn load(entry: &Spanned<LoadEntry>, folder: &Path, duration: f64, source: &Source) -> Result<AppliedLoad, Error> {
+    let e = entry.get_ref();
+    let axes = axes(entry, source)?;
+    let (end, last) = end(entry, duration, source)?;
+    if let Some((key, kinds)) = stray_key(e, e.kind.get_ref()) {
+        let message = format!("kind = {:?} takes no {key}, only {kinds} does", e.kind.get_ref());
+        return Err(source.error(entry.span(), message).into());
+    }
+    let Curve { value, bends, period } = Reading { entry, source, start: e.start, end }.curve(folder, duration)?;
+    let jumps = [e.start].into_iter().chain(last).chain(bends).collect();
+    let name = e.frame.as_ref().map_or("tcp", |frame| frame.get_ref());
+    let written = LoadLocation::new(source, entry.span(), e.frame.as_ref().map(Spanned::span), None);
+    let load =
+        AppliedLoad::new(name, TimedWrench { axes, value, jumps, stops: Vec::new(), period }).starting_at(e.start);
+    Ok(AppliedLoad { written: Some(written), doubts: doubts(e), ..load })
+}
+
+fn axes(entry: &Spanned<LoadEntry>, source: &Source) -> Result<LoadAxes, RobotFileError> {
+    let axes = entry.get_ref().axes.as_ref();
+    match axes.map(|axes| axes.get_ref().as_str()) {
+        None | Some("world") => Ok(LoadAxes::World),
+        Some("frame") => Ok(LoadAxes::Frame),
+        Some(other) => {
+            let message = format!("axes {other:?} are not known; use \"world\" or \"frame\"");
+            Err(source.error(span_or(axes, entry), message))
+        }
+    }
+}
+
+/// Caveats about angles that look like degrees: the phase of a sine, arguments of sin and cos in
+/// expressions.
+fn doubts(e: &LoadEntry) -> Vec<Caveat> {
+    let doubtful = sines_of(e).filter_map(|(text, rate, phase)| caveat::loads::of_sine(&text, rate, phase));
+    caveat::loads::of_phase(e.phase).into_iter().chain(doubtful).collect()
+}
+
+/// The sines and cosines in all expressions of a load; see [`sines`].
+fn sines_of(e: &LoadEntry) -> impl Iterator<Item = (String, f64, f64)> + '_ {
+    let parts = [&e.fx, &e.fy, &e.fz, &e.tx, &e.ty, &e.tz];
+    parts.into_iter().flatten().flat_map(|text| sines(text.get_ref()))
+}
+
+/// Sines and cosines of an expression whose argument is linear in t, as text, rate (1/s) and value
+/// at t = 0.
+fn sines(text: &str) -> Vec<(String, f64, f64)> {
+    let starts = ["sin", "cos"].into_iter().flat_map(|name| text.match_indices(name).map(|(at, _)| at));
+    let one = |at: usize| {
+        let open = at + 3 + text[at + 3..].find(|c: char| !c.is_whitespace())?;
+        let mut depth = 0;
+        let close = text[open..].char_indices().find_map(|(k, c)| {
+            depth += i32::from(c == '(') - i32::from(c == ')');
+            (depth <= 0).then_some(open + k)
+        })?;
+        let argument: FlatEx<f64> = exmex::parse(text.get(open + 1..close)?).ok()?;
+        if argument.var_names() != ["t"] {
+            return None;
+        }
+        let value = |t: f64| argument.eval(&[t]).ok().filter(|x| x.is_finite());
+        let [a, b, c] = [value(0.0)?, value(1.0)?, value(2.0)?];
+        let linear = (c - 2.0 * b + a).abs() <= 1e-9 * (a.abs() + b.abs() + c.abs());
+        linear.then(|| (text[at..=close].to_owned(), b - a, a))
+    };
+    starts.filter_map(one).collect()
+}
+
+/// Returns the latest end of a load (s), and the end given in the file, if any (s).
+fn end(entry: &Spanned<LoadEntry>, duration: f64, source: &Source) -> Result<(f64, Option<f64>), RobotFileError> {
+    let e = entry.get_ref();
+    let last = e.end.as_ref().map(|end| *end.get_ref());
+    let numbers = [e.start, e.phase].into_iter().chain(last).chain(e.force).chain(e.torque);
+    if let Some(bad) = numbers.into_iter().find(|x| !x.is_finite()) {
+        return Err(source.error(entry.span(), format!("a load has the entry {bad}, expected finite numbers")));
+    }
+    let end = last.unwrap_or(duration.max(e.start));
+    if end < e.start {
+        let message = format!("a load ends at {end} s before it starts at {} s", e.start);
+        return Err(source.error(span_or(e.end.as_ref(), entry), message));
+    }
+    Ok((end, last))
+}
+
+/// Load as a function of time.
+struct Curve {
+    value: WrenchFn,
+    /// Times of kinks and jumps, except start and end (s).
+    bends: Vec<f64>,
+    /// Shortest period in the load (s).
+    period: f64,
+}
+
+/// Entry being read, with the time interval in which it acts (s).
+struct Reading<'a> {
+    entry: &'a Spanned<LoadEntry>,
+    source: &'a Source,
+    start: f64,
+    end: f64,
+}
+
+impl Reading<'_> {
+    fn curve(&self, folder: &Path, duration: f64) -> Result<Curve, Error> {
+        let kind = &self.entry.get_ref().kind;
+        match kind.get_ref().as_str() {
+            "step" => Ok(self.scaled(Vec::new(), f64::INFINITY, |_| 1.0)),
+            "impulse" => Ok(self.impulse()?),
+            "sine" => Ok(self.sine()?),
+            "sweep" => Ok(self.sweep()?),
+            "milling" => Ok(self.milling()?),
+            "table" => self.table(folder),
+            "expression" => self.expression(duration),
+            other => {
+                let text = "use step, impulse, sine, sweep, milling, table or expression";
+                Err(self.source.error(kind.span(), format!("load kind {other:?} is not known; {text}")).into())
+            }
+        }
+    }
+
+    fn lacks(&self, what: &str) -> RobotFileError {
+        let kind = &self.entry.get_ref().kind;
+        self.source.error(kind.span(), format!("kind = {:?} needs {what} = ...", kind.get_ref()))
+    }
+
+    fn needs(&self, value: Option<&Spanned<f64>>, what: &str) -> Result<f64, RobotFileError> {
+        match value {
+            Some(x) if x.get_ref().is_finite() && *x.get_ref() > 0.0 => Ok(*x.get_ref()),
+            Some(x) => {
+                Err(self.source.error(x.span(), format!("{what} = {}: expected a positive number", x.get_ref())))
+            }
+            None => Err(self.lacks(what)),
+        }
+    }
+
+    /// Force and torque of the entry times a factor of the time since its start.
+    fn scaled(&self, bends: Vec<f64>, period: f64, factor: impl Fn(f64) -> f64 + Send + Sync + 'static) -> Curve {
+        let e = self.entry.get_ref();
+        let size = Wrench::new(e.force.into(), e.torque.into());
+        let (start, end) = (self.start, self.end);
+        let value = move |t| if t >= start && t <= end { size * factor(t - start) } else { Wrench::zeros() };
+        Curve { value: Arc::new(value), bends, period }
+    }
+
+    /// Half sine of area 1.
+    fn impulse(&self) -> Result<Curve, RobotFileError> {
+        let d = self.needs(self.entry.get_ref().duration.as_ref(), "duration")?;
+        // The pulse is zero at both ends; extra breakpoints make the stepper resolve its middle.
+        let bends = [0.137, 0.5, 0.863, 1.0].iter().map(|s| self.start + s * d).collect();
+        let factor = move |t: f64| if t < d { 0.5 * PI / d * (PI * t / d).sin() } else { 0.0 };
+        Ok(self.scaled(bends, f64::INFINITY, factor))
+    }
+
+    fn sine(&self) -> Result<Curve, RobotFileError> {
+        let (f, phase) =
+            (self.needs(self.entry.get_ref().frequency.as_ref(), "frequency")?, self.entry.get_ref().phase);
+        Ok(self.scaled(Vec::new(), 1.0 / f, move |t| (TAU * f * t + phase).sin()))
+    }
+
+    fn sweep(&self) -> Result<Curve, RobotFileError> {
+        let e = self.entry.get_ref();
+        let (from, to) = (self.needs(e.from.as_ref(), "from")?, self.needs(e.to.as_ref(), "to")?);
+        let rate = (to - from) / (self.end - self.start).max(1e-9);
+        let factor = move |t: f64| (TAU * (from * t + 0.5 * rate * t * t)).sin();
+        Ok(self.scaled(Vec::new(), 1.0 / from.max(to), factor))
+    }
+
+    fn milling(&self) -> Result<Curve, RobotFileError> {
+        let e = self.entry.get_ref();
+        let fail = |message: String| self.source.error(self.entry.span(), message);
+        let teeth = f64::from(e.teeth.ok_or_else(|| self.lacks("teeth"))?);
+        if teeth == 0.0 {
+            return Err(fail("teeth = 0: expected the number of cutting edges".into()));
+        }
+        let tooth = teeth * self.needs(e.spindle_rpm.as_ref(), "spindle_rpm")? / 60.0;
+        let harmonics = e.harmonics.unwrap_or(3);
+        if harmonics > MOST_HARMONICS {
+            return Err(fail(format!("harmonics = {harmonics}: expected at most {MOST_HARMONICS}")));
+        }
+        // Mean 1 plus harmonics of halving amplitude, shaped like an intermittent cut.
+        let factor = move |t: f64| {
+            1.0 + (1..=harmonics)
+                .map(|k| 0.5f64.powi(k as i32 - 1) * (TAU * f64::from(k) * tooth * t).sin())
+                .sum::<f64>()
+        };
+        Ok(self.scaled(Vec::new(), 1.0 / (tooth * f64::from(harmonics.max(1))), factor))
+    }
+
+    fn table(&self, folder: &Path) -> Result<Curve, Error> {
+        let file = self.entry.get_ref().file.as_ref().ok_or_else(|| self.lacks("file"))?;
+        let path = folder.join(file.get_ref());
+        if !path.is_file() {
+            let message = format!("file = {:?}: there is no file {}", file.get_ref(), path.display());
+            return Err(self.source.error(file.span(), message).into());
+        }
+        let (inner, bends) = table(&path)?;
+        let (start, end) = (self.start, self.end);
+        let value = move |t| if t >= start && t <= end { inner(t) } else { Wrench::zeros() };
+        Ok(Curve { value: Arc::new(value), bends, period: f64::INFINITY })
+    }
+
+    fn expression(&self, duration: f64) -> Result<Curve, Error> {
+        let value = expression(self.entry.get_ref(), self.source, (self.start, self.end))?;
+        let bends = jumps_of(&*value, self.start.max(0.0), self.end.min(duration));
+        let periods = sines_of(self.entry.get_ref()).map(|(_, rate, _)| TAU / rate.abs());
+        Ok(Curve { value, bends, period: periods.fold(EXPRESSION_PERIOD, f64::min) })
+    }
+}
+
+/// Converts an entry; whether the robot can carry the payload is checked later.
+fn payload(entry: &Spanned<PayloadEntry>, source: &Source) -> PayloadChange {
+    let e = entry.get_ref();
+    let [xx, yy, zz, xy, xz, yz] = e.inertia.as_ref().map_or([0.0; 6], |inertia| *inertia.get_ref());
+    let inertia_com = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
+    let (link, inertia) = (e.link.as_ref().map(Spanned::span), e.inertia.as_ref().map(Spanned::span));
+    PayloadChange {
+        at_s: e.at,
+        link: e.link.as_ref().map(|link| link.get_ref().clone()),
+        carried: LinkInertia { mass: e.mass, com: e.com.into(), inertia_com },
+        written: Some(LoadLocation::new(source, entry.span(), link, inertia)),
+    }
+}
+
+/// Returns a key that this kind of load does not use, with the kinds that do.
+fn stray_key(e: &LoadEntry, kind: &str) -> Option<(&'static str, &'static str)> {
+    let sized = "step, impulse, sine, sweep and milling";
+    let keys = [
+        ("force", e.force != [0.0; 3], sized),
+        ("torque", e.torque != [0.0; 3], sized),
+        ("frequency", e.frequency.is_some(), "sine"),
+        ("phase", e.phase != 0.0, "sine"),
+        ("from", e.from.is_some(), "sweep"),
+        ("to", e.to.is_some(), "sweep"),
+        ("duration", e.duration.is_some(), "impulse"),
+        ("teeth", e.teeth.is_some(), "milling"),
+        ("spindle_rpm", e.spindle_rpm.is_some(), "milling"),
+        ("harmonics", e.harmonics.is_some(), "milling"),
+        ("file", e.file.is_some(), "table"),
+        ("fx", e.fx.is_some(), "expression"),
+        ("fy", e.fy.is_some(), "expression"),
+        ("fz", e.fz.is_some(), "expression"),
+        ("tx", e.tx.is_some(), "expression"),
+        ("ty", e.ty.is_some(), "expression"),
+        ("tz", e.tz.is_some(), "expression"),
+    ];
+    let known = ["step", "impulse", "sine", "sweep", "milling", "table", "expression"].contains(&kind);
+    let stray = |(_, given, kinds): &&(&str, bool, &str)| known && *given && !kinds.contains(kind);
+    keys.iter().find(stray).map(|(key, _, kinds)| (*key, *kinds))
+}
+
+/// Assumed longest period of an expression, whose content is unknown, for the reference stepper (s).
+pub(crate) const EXPRESSION_PERIOD: f64 = 5e-3;
+/// Maximum length of an expression (characters).
+const LONGEST_EXPRESSION: usize = 2000;
+/// Maximum number of harmonics of a milling force; higher ones are negligible.
+const MOST_HARMONICS: u32 = 50;
+/// Maximum number of table rows at whose times the reference stepper stops.
+const MOST_ROWS: usize = 1000;
+
+/// Location of a value, or else of its entry.
+fn span_or<T, E>(value: Option<&Spanned<T>>, entry: &Spanned<E>) -> Range<usize> {
+    value.map_or(entry.span(), Spanned::span)
+}
+
+/// Reads a CSV table: linear between rows, zero outside; also returns the times of its kinks.
+fn table(path: &Path) -> Result<(WrenchFn, Vec<f64>), Error> {
+    let fail = |what: String| Error::File { path: path.to_owned(), what };
+    let text = read_text(path)?;
+    let mut lines = text.lines().enumerate().filter(|(_, l)| !l.trim().is_empty() && !l.starts_with('#'));
+    let header: Vec<String> =
+        lines.next().map(|(_, l)| l.split(',').map(|w| w.trim().to_owned()).collect()).unwrap_or_default();
+    const NAMES: [&str; 7] = ["time", "fx", "fy", "fz", "tx", "ty", "tz"];
+    if header.first().is_none_or(|h| h != "time") || header.iter().any(|h| !NAMES.contains(&h.as_str())) {
+        return Err(fail(format!("the header is {header:?}, expected time and some of fx, fy, fz, tx, ty, tz")));
+    }
+    let earlier = |k: usize| header[..k].iter().position(|name| *name == header[k]);
+    if let Some((k, first)) = (0..header.len()).find_map(|k| Some((k, earlier(k)?))) {
+        let (name, first, second) = (&header[k], first + 1, k + 1);
+        let mend = "remove or rename one of them";
+        return Err(fail(format!("the header names {name:?} twice, in columns {first} and {second}: {mend}")));
+    }
+    let mut rows: Vec<(f64, [f64; 6])> = Vec::new();
+    for (number, line) in lines {
+        let values: Vec<f64> = line.split(',').map_while(|w| w.trim().parse().ok()).collect();
+        if values.len() != header.len() || values.iter().any(|x| !x.is_finite()) {
+            return Err(fail(format!("line {}: expected {} finite numbers, found {line:?}", number + 1, header.len())));
+        }
+        let mut row = [0.0; 6];
+        for (name, value) in header.iter().zip(&values).skip(1) {
+            if let Some(k) = NAMES.iter().position(|n| n == name) {
+                row[k - 1] = *value;
+            }
+        }
+        if rows.last().is_some_and(|(t, _)| *t >= values[0]) {
+            return Err(fail(format!("line {}: time {} does not rise", number + 1, values[0])));
+        }
+        rows.push((values[0], row));
+    }
+    if rows.len() < 2 {
+        return Err(fail("a table of loads needs at least two rows".into()));
+    }
+    let bends = if rows.len() <= MOST_ROWS { &rows[..] } else { &[rows[0], rows[rows.len() - 1]][..] };
+    let bends = bends.iter().map(|(t, _)| *t).collect();
+    let wrench = Arc::new(move |t| {
+        let k = rows.partition_point(|(x, _)| *x <= t);
+        let between = |k: usize| {
+            let ((t0, a), (t1, b)) = (&rows[k - 1], &rows[k]);
+            let s = (t - t0) / (t1 - t0);
+            let at = |c: usize| a[c] + s * (b[c] - a[c]);
+            Wrench::new(Vector3::new(at(0), at(1), at(2)), Vector3::new(at(3), at(4), at(5)))
+        };
+        match k {
+            0 => Wrench::zeros(),
+            k if k < rows.len() => between(k),
+            k if t == rows[k - 1].0 => between(k - 1),
+            _ => Wrench::zeros(),
+        }
+    });
+    Ok((wrench, bends))
+}
+
+/// Component of an expression, and whether it depends on time.
+type Part = Option<(FlatEx<f64>, bool)>;
+
+fn expression(e: &LoadEntry, source: &Source, (start, end): (f64, f64)) -> Result<WrenchFn, Error> {
+    let texts = [&e.fx, &e.fy, &e.fz, &e.tx, &e.ty, &e.tz];
+    if texts.iter().all(|t| t.is_none()) {
+        let message = "kind = \"expression\" needs some of fx, fy, fz, tx, ty, tz as a function of t";
+        return Err(source.error(e.kind.span(), message).into());
+    }
+    let parsed = texts.into_iter().map(|text| text.as_ref().map(|text| part(text, source, (start, end))).transpose());
+    let parts: Vec<Part> = parsed.collect::<Result<_, _>>()?;
+    Ok(Arc::new(move |t| {
+        if t < start || t > end {
+            return Wrench::zeros();
+        }
+        let at = |k: usize| match &parts[k] {
+            Some((parsed, timed)) => {
+                parsed.eval(if *timed { std::slice::from_ref(&t) } else { &[] }).unwrap_or(f64::NAN)
+            }
+            None => 0.0,
+        };
+        Wrench::new(Vector3::new(at(0), at(1), at(2)), Vector3::new(at(3), at(4), at(5)))
+    }))
+}
+
+/// Parses one component, a function of t (s), and checks that it is finite at the start, the middle
+/// and the end of its time interval.
+fn part(
+    entry: &Spanned<String>,
+    source: &Source,
+    (start, end): (f64, f64),
+) -> Result<(FlatEx<f64>, bool), RobotFileError> {
+    let text = entry.get_ref();
+    let fail = |message: String| source.error(entry.span(), message);
+    if text.len() > LONGEST_EXPRESSION {
+        let length = text.len();
+        return Err(fail(format!(
+            "the expression has {length} characters, at most {LONGEST_EXPRESSION} are read, for it is computed in \
+             every step: use kind = \"table\" for curves without a short formula"
+        )));
+    }
+    let parsed: FlatEx<f64> = exmex::parse(text).map_err(|error| fail(format!("expression {text:?}: {error}")))?;
+    let unknown: Vec<&String> = parsed.var_names().iter().filter(|v| *v != "t").collect();
+    if !unknown.is_empty() {
+        return Err(fail(format!("expression {text:?} has the variables {unknown:?}; only t (s) is known")));
+    }
+    let timed = !parsed.var_names().is_empty();
+    for t in [start.max(0.0), 0.5 * (start.max(0.0) + end), end] {
+        let probe = parsed.eval(if timed { std::slice::from_ref(&t) } else { &[] });
+        if !probe.is_ok_and(|x: f64| x.is_finite()) {
+            return Err(fail(format!("expression {text:?} is not a finite number at t = {t} s")));
+        }
+    }
+    Ok((parsed, timed))
+}

@@ -1,0 +1,284 @@
+//! Trajectories of a robot: joints in coordinate order, checked against its limits.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use flexarm_kinematics::{Coordinate, Model};
+use flexarm_stepping::PrescribedMotion;
+use flexarm_trajectory::{JointLimits, JointSamples, KnownJoint, LimitViolation, Samples, Trajectory, foreign_joints};
+
+use crate::caveat::{self, Caveat};
+use crate::error::{Error, PoseError, ValueError};
+use crate::motions::motion_formats::{self, MotionFile, MotionOptions, ReadMotion, refuse_dependent};
+use crate::motions::tool_path::{Cell, ToolPath};
+use crate::robot::Robot;
+
+/// Trajectory whose joints are the model's actuated coordinates.
+#[derive(Clone, Debug)]
+pub struct Motion {
+    /// Name for logs.
+    pub name: String,
+    /// Path of the file.
+    pub path: PathBuf,
+    /// Trajectory, in coordinate order.
+    pub trajectory: Arc<Trajectory>,
+    /// Exceeded limits.
+    pub violations: Vec<LimitViolation>,
+    /// Unit error that would explain positions beyond their limits; empty if there is none.
+    pub likely: &'static str,
+    /// Warnings.
+    pub warnings: Vec<String>,
+    /// Joints that the file does not contain.
+    pub held: Vec<HeldJoint>,
+    /// Planned moves, if the motion is given as a TCP path.
+    pub tool_path: Option<Arc<ToolPath>>,
+    /// Description of the file's format; empty for a computed motion.
+    pub format: String,
+    /// Topic, if the file is a bag.
+    pub topic: Option<String>,
+    /// Number of rows, messages or points in the file; None for waypoints.
+    pub samples: Option<usize>,
+    /// Joints in the file that the robot does not have; they are ignored.
+    pub dropped: Vec<String>,
+    /// Choices, assumptions and omissions made when reading the file.
+    pub notes: Vec<Caveat>,
+}
+
+/// Joint that the motion does not contain.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HeldJoint {
+    /// Joint name.
+    pub joint: String,
+    /// Position at which it is held (rad or m).
+    pub at: f64,
+    /// Whether the position is given in the robot file.
+    pub told: bool,
+}
+
+struct AlongTrajectory(Arc<Trajectory>);
+
+impl PrescribedMotion for AlongTrajectory {
+    fn sample(&self, t: f64, q: &mut [f64], qdot: &mut [f64], qddot: &mut [f64]) {
+        self.0.sample(t, q, qdot, qddot);
+    }
+
+    fn velocity_jumps(&self) -> Vec<f64> {
+        let mut times: Vec<f64> = self.0.velocity_jumps().iter().map(|jump| jump.time_s).collect();
+        times.dedup();
+        times
+    }
+}
+
+/// Returns the limits of the joints that a motion can violate.
+pub fn limits(model: &Model) -> Vec<JointLimits> {
+    let actuated = &model.coordinates()[..model.n_actuated()];
+    let limits = actuated.iter().map(|c| JointLimits {
+        lower: c.limits.lower,
+        upper: c.limits.upper,
+        velocity: c.limits.velocity,
+        acceleration: c.limits.acceleration,
+        jerk: c.limits.jerk,
+    });
+    limits.collect()
+}
+
+impl Motion {
+    /// Reads a motion file for a robot, in any format of `docs/motions.md`. Joints it does not
+    /// contain are held at the position in the robot file, or else at zero or the limit closest to
+    /// zero.
+    ///
+    /// # Errors
+    /// [`Error::File`], [`Error::Trajectory`] or [`Error::Motion`] for an invalid format, units,
+    /// times, or joints that the robot does not have; [`Error::Model`].
+    pub fn load(path: impl AsRef<Path>, robot: &Robot) -> Result<Self, Error> {
+        Self::load_with(path, robot, &MotionOptions::default())
+    }
+
+    /// As [`Motion::load`], with a given topic of a bag or given columns of a table.
+    ///
+    /// # Errors
+    /// As [`Motion::load`], and if the topic or the columns do not exist.
+    pub fn load_with(path: impl AsRef<Path>, robot: &Robot, options: &MotionOptions) -> Result<Self, Error> {
+        Self::load_text(path.as_ref(), None, robot, options)
+    }
+
+    /// As [`Motion::load_with`], with a text instead of the file's content, for waypoints and TCP
+    /// paths.
+    pub fn load_text(path: &Path, text: Option<&str>, robot: &Robot, options: &MotionOptions) -> Result<Self, Error> {
+        let model = robot.rigid_model()?;
+        let Robot { hold, controller, .. } = robot;
+        Self::read(path, &Cell { model: &model, tcp_link: Some(&robot.tcp.0), hold, controller }, options, text)
+    }
+
+    /// As [`Motion::load`], for a model without a robot.
+    ///
+    /// # Errors
+    /// As [`Motion::load`].
+    pub fn load_for(path: &Path, model: &Model) -> Result<Self, Error> {
+        Self::read(path, &Cell { model, tcp_link: None, hold: &[], controller: &[] }, &MotionOptions::default(), None)
+    }
+
+    /// Interpolates sampled positions by a spline, as for the rows of a CSV file.
+    ///
+    /// * `t`: n times (s), increasing; shifted so that the first is 0.
+    /// * `q`: n rows of all actuated joints in coordinate order, row by row (rad or m).
+    ///
+    /// # Errors
+    /// [`Error::Pose`] for a wrong number of values, [`Error::Trajectory`] for values that are not
+    /// finite or times that do not increase; [`Error::Model`].
+    pub fn from_samples(t: &[f64], q: &[f64], robot: &Robot) -> Result<Self, Error> {
+        let model = robot.rigid_model()?;
+        let actuated = &model.coordinates()[..model.n_actuated()];
+        let n = actuated.len();
+        if q.len() != n * t.len() {
+            let (found, times) = (q.len(), t.len());
+            return Err(PoseError::Samples { found, times, joints: n }.into());
+        }
+        let column = |k: usize| q.iter().skip(k).step_by(n.max(1)).copied().collect();
+        let joint = |(k, c): (usize, &Coordinate)| JointSamples {
+            name: c.joint.clone(),
+            position: column(k),
+            ..JointSamples::default()
+        };
+        let samples = Samples { times: t.to_vec(), joints: actuated.iter().enumerate().map(joint).collect() };
+        Self::along(samples.interpolate()?, "samples", robot)
+    }
+
+    /// Returns the motion along a computed trajectory, such as a spline or a plan of moves.
+    ///
+    /// * `name`: name for logs and messages.
+    ///
+    /// # Errors
+    /// [`Error::File`] for joints that the robot does not have; [`Error::Model`].
+    pub fn along(trajectory: Trajectory, name: &str, robot: &Robot) -> Result<Self, Error> {
+        Self::of(trajectory, Path::new(name), &*robot.rigid_model()?, &robot.hold)
+    }
+
+    fn read(path: &Path, cell: &Cell<'_>, options: &MotionOptions, text: Option<&str>) -> Result<Self, Error> {
+        let Cell { model, hold, .. } = *cell;
+        let actuated = &model.coordinates()[..model.n_actuated()];
+        let named: Vec<(&str, JointLimits)> = actuated.iter().map(|c| c.joint.as_str()).zip(limits(model)).collect();
+        let joints: Vec<KnownJoint<'_>> =
+            actuated.iter().map(|c| KnownJoint { name: &c.joint, is_prismatic: c.slides() }).collect();
+        let file = MotionFile { path, joints: Some(&joints), limits: &named, options, cell: Some(cell), text };
+        let read = motion_formats::read(&file)?;
+        let ReadMotion { trajectory, format, topic, samples, dropped, caveats, tool_path } = read;
+        trajectory.check_units(&path.display().to_string(), &joints)?;
+        let mut motion = Self::of(trajectory, path, model, hold)?;
+        motion.dropped.extend(dropped);
+        Ok(Self { format, topic, samples, notes: caveats, tool_path: tool_path.map(Arc::new), ..motion })
+    }
+
+    fn of(trajectory: Trajectory, path: &Path, model: &Model, hold: &[(String, f64)]) -> Result<Self, Error> {
+        let actuated = &model.coordinates()[..model.n_actuated()];
+        let limits = limits(model);
+        let names: Vec<&str> = actuated.iter().map(|c| c.joint.as_str()).collect();
+        let dependent: Vec<&str> = model.dependent().iter().map(|c| c.joint.as_str()).collect();
+        refuse_dependent(path, trajectory.joints(), &names, &dependent)?;
+        let dropped = foreign_joints(trajectory.joints(), &names)
+            .map_err(|e| Error::File { path: path.to_owned(), what: e.to_string() })?;
+        let trajectory = trajectory.without_joints(&dropped);
+        let warnings = warnings(&trajectory, path);
+        let still = actuated.iter().filter(|c| !trajectory.joints().contains(&c.joint));
+        let place = |c: &Coordinate| {
+            let told = hold.iter().find(|(joint, _)| *joint == c.joint).map(|(_, value)| *value);
+            let at = told.unwrap_or(0.0f64.max(c.limits.lower).min(c.limits.upper));
+            HeldJoint { joint: c.joint.clone(), at, told: told.is_some() }
+        };
+        let held: Vec<HeldJoint> = still.map(place).collect();
+        let named_held: Vec<(&str, f64)> = held.iter().map(|held| (held.joint.as_str(), held.at)).collect();
+        let trajectory = trajectory.with_held_joints(&named_held)?;
+        let trajectory = trajectory
+            .with_joint_order(&names)
+            .map_err(|e| Error::File { path: path.to_owned(), what: e.to_string() })?;
+        let violations = trajectory.check_limits(&limits);
+        let likely = caveat::motion::degrees(&violations, model);
+        let name = path.file_stem().map_or_else(|| "trajectory".into(), |s| s.to_string_lossy().into_owned());
+        let (path, trajectory) = (path.to_owned(), Arc::new(trajectory));
+        let (format, topic, samples, notes) = (String::new(), None, None, Vec::new());
+        Ok(Self {
+            name,
+            path,
+            trajectory,
+            violations,
+            likely,
+            warnings,
+            held,
+            format,
+            topic,
+            samples,
+            dropped,
+            notes,
+            tool_path: None,
+        })
+    }
+
+    /// Scales the duration of the motion by `factor`, including pauses.
+    ///
+    /// # Errors
+    /// [`Error::Trajectory`] unless `factor` is positive, and if values overflow.
+    pub fn scaled(self, factor: f64, model: &Model) -> Result<Self, Error> {
+        let trajectory = self.trajectory.scaled(factor)?;
+        let warnings = warnings(&trajectory, &self.path);
+        let limits = limits(model);
+        let violations = trajectory.check_limits(&limits);
+        let likely = caveat::motion::degrees(&violations, model);
+        // The planned moves are valid only at their own speed.
+        Ok(Self { trajectory: Arc::new(trajectory), violations, likely, warnings, tool_path: None, ..self })
+    }
+
+    /// Replaces each corner, where a velocity jumps, by a blend of duration `seconds`.
+    ///
+    /// # Errors
+    /// [`Error::Value`] unless `seconds` is positive, [`Error::Trajectory`] if values overflow.
+    pub fn with_rounded_corners(self, seconds: f64, model: &Model) -> Result<Self, Error> {
+        if !(seconds > 0.0 && seconds.is_finite()) {
+            return Err(ValueError::CornerTime(seconds).into());
+        }
+        let trajectory = self.trajectory.with_rounded_corners(seconds)?;
+        let warnings = warnings(&trajectory, &self.path);
+        let violations = trajectory.check_limits(&limits(model));
+        Ok(Self { trajectory: Arc::new(trajectory), violations, warnings, ..self })
+    }
+
+    /// Returns the caveats about the motion.
+    pub fn caveats(&self) -> Vec<Caveat> {
+        let file = self.path.display().to_string();
+        let told = self.warnings.iter().map(|text| Caveat::from_message("trajectory", &file, text, ""));
+        self.notes.iter().cloned().chain(self.dropped_caveat()).chain(told).chain(self.held_note()).collect()
+    }
+
+    fn dropped_caveat(&self) -> Option<Caveat> {
+        let file = self.path.display().to_string();
+        let names: Vec<String> = self.dropped.iter().map(|name| format!("{name:?}")).collect();
+        let message = format!("{file}: joints that the robot does not have are left out: {}", names.join(", "));
+        let help = "a gripper is one; a joint of the arm is not";
+        (!names.is_empty()).then(|| Caveat::from_message("motion-dropped-joints", &file, message, help))
+    }
+
+    /// Caveats about held joints: a note for positions given in the robot file, a warning for
+    /// assumed ones.
+    fn held_note(&self) -> Vec<Caveat> {
+        let (told, assumed): (Vec<&HeldJoint>, Vec<&HeldJoint>) = self.held.iter().partition(|held| held.told);
+        let file = self.path.display().to_string();
+        let note = |held: &[&HeldJoint], end: &str| {
+            let places: Vec<String> = held.iter().map(|held| format!("{:?} at {}", held.joint, held.at)).collect();
+            let places = places.join(", ");
+            let message = format!("{file}: joints that the motion does not name are held: {places}{end}");
+            Caveat::from_message("held-joints", &file, message, "name them in the motion to move them")
+        };
+        let assumed =
+            (!assumed.is_empty()).then(|| note(&assumed, " ([hold] in the robot file says where, in rad or m)"));
+        let told = (!told.is_empty()).then(|| note(&told, "").as_note());
+        assumed.into_iter().chain(told).collect()
+    }
+
+    /// Returns the motion in the form that steppers use.
+    pub fn prescribed(&self) -> Arc<dyn PrescribedMotion> {
+        Arc::new(AlongTrajectory(self.trajectory.clone()))
+    }
+}
+
+fn warnings(trajectory: &Trajectory, path: &Path) -> Vec<String> {
+    trajectory.warnings().iter().map(|w| format!("{}: {w}", path.display())).collect()
+}

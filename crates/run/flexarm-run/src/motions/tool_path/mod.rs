@@ -1,0 +1,307 @@
+//! Motions given as TCP paths: a program of moves and a robot become joint trajectories.
+//!
+//! `file` reads flexarm's own path files; robot programs are read elsewhere into a [`Program`].
+//! Both end in `ToolPath::plan`.
+
+mod file;
+mod program;
+mod standard;
+mod tables;
+
+use std::ops::RangeInclusive;
+use std::path::Path;
+
+use flexarm_kinematics::{Frame, Model, Pose};
+use flexarm_path::program::{Note, Program};
+use flexarm_path::{
+    ControllerAxis, JointBounds, PathOptions, PlannedMove, ProgramArm, Slowed, SlowedBy, coordinates_of, plan,
+};
+use flexarm_trajectory::Trajectory;
+use nalgebra::DVector;
+
+use crate::caveat::Caveat;
+use crate::caveat::slip::slip;
+use crate::error::Error;
+use crate::robot::controller_entry::RobotAxis;
+use crate::robot::tcp_frame;
+
+pub(crate) use file::{is_path_file, read_path_file};
+pub use program::program_text;
+pub(crate) use program::read_robot_program;
+pub use standard::{Standard, Step};
+
+/// Assumed time for a joint to reach its top speed if its acceleration is not known, s.
+const TO_TOP_SPEED: f64 = 0.4;
+/// Assumed acceleration of a joint without a speed limit, rad/s² or m/s².
+const ACCELERATION: f64 = 10.0;
+/// Smallest singular value below which a path counts as near-singular, m/rad.
+const NEAR_SINGULAR: f64 = 0.02;
+/// Maximum number of notes of one kind that are listed individually.
+const TOLD: usize = 4;
+/// ROS name of the link at the controller's flange.
+const FLANGE: &str = "tool0";
+const BASE: &str = "base";
+
+/// TCP motion with the planned moves.
+#[derive(Debug, Clone, Default)]
+pub struct ToolPath {
+    /// Planned moves in order.
+    pub moves: Vec<PlannedMove>,
+    /// Path of the file.
+    pub(crate) file: String,
+    /// Jerk limits kept by the motion, by joint, rad/s³ or m/s³.
+    pub(crate) jerks: Vec<(String, f64)>,
+    /// Warnings.
+    pub(crate) warnings: Vec<String>,
+    /// Notes.
+    pub(crate) notes: Vec<String>,
+}
+
+/// Robot data needed for planning.
+#[derive(Clone, Copy)]
+pub struct Cell<'a> {
+    /// Rigid robot.
+    pub model: &'a Model,
+    /// Link that carries the tool centre point.
+    pub tcp_link: Option<&'a str>,
+    /// Held joints and their positions.
+    pub hold: &'a [(String, f64)],
+    /// Axes that the controller counts differently from the joints.
+    pub controller: &'a [RobotAxis],
+}
+
+/// Assumptions made where data are missing, as sentences.
+#[derive(Debug, Clone, Default)]
+pub struct Assumed {
+    /// Link on which tools are assumed to be mounted; irrelevant if a path has no tool of its own.
+    pub(crate) flange: Option<String>,
+    pub(crate) accelerations: Option<String>,
+}
+
+impl Assumed {
+    pub(crate) fn warnings(self) -> Vec<String> {
+        self.flange.into_iter().chain(self.accelerations).collect()
+    }
+}
+
+/// Overrides of the joint limits in the robot's description.
+#[derive(Debug, Clone, Default)]
+pub struct Overrides {
+    pub(crate) velocities: Vec<Option<f64>>,
+    pub(crate) accelerations: Vec<Option<f64>>,
+    pub(crate) jerks: Vec<Option<f64>>,
+    pub(crate) torques: Vec<Option<f64>>,
+}
+
+impl<'a> Cell<'a> {
+    /// Returns the flange frame of the controller, the robot's TCP in it, and a note if a link had
+    /// to be chosen.
+    fn flange(&self) -> (Frame, Pose, Option<String>) {
+        let tcp = tcp_frame(self.model);
+        let named = |name: &str| self.model.frame(name).filter(|frame| frame.body == tcp.body).cloned();
+        let (flange, note) = match (named(FLANGE), self.tcp_link.and_then(named)) {
+            (Some(flange), _) => (flange, None),
+            (None, Some(link)) => {
+                let note = format!(
+                    "tools of the program are assumed to be mounted on link {:?}: the robot has no link {FLANGE:?}",
+                    link.name
+                );
+                (link, Some(note))
+            }
+            (None, None) => (
+                tcp.clone(),
+                Some("tools of the program are assumed to be mounted on the tool centre point".to_owned()),
+            ),
+        };
+        let X_FT = flange.X_BF.inverse() * tcp.X_BF;
+        (flange, X_FT, note)
+    }
+
+    /// Pose of the controller's world in the model's: that of the link `base` if it does not move.
+    fn world(&self) -> Pose {
+        let base = self.model.frame(BASE).filter(|frame| frame.body == 0);
+        base.map_or_else(Pose::identity, |frame| frame.X_BF)
+    }
+
+    /// Coordinates at rest before the program.
+    fn rest(&self) -> DVector<f64> {
+        let coordinates = self.model.coordinates();
+        DVector::from_fn(self.model.nv(), |k, _| {
+            let c = &coordinates[k];
+            let given = self.hold.iter().find(|(joint, _)| *joint == c.joint).map(|(_, value)| *value);
+            given.unwrap_or(0.0f64.max(c.limits.lower).min(c.limits.upper))
+        })
+    }
+
+    /// Returns the controller's convention for these axes; empty if it counts the joints as they
+    /// are.
+    pub fn controller_axes(&self, axes: &[usize]) -> Vec<ControllerAxis> {
+        let place = |joint: &str| axes.iter().position(|&k| self.model.coordinates()[k].joint == joint);
+        let axis = |&k: &usize| {
+            let given = self.controller.iter().find(|axis| axis.joint == self.model.coordinates()[k].joint);
+            given.map_or(ControllerAxis::SAME, |given| {
+                let relative = given.relative.as_ref();
+                let relative = relative.and_then(|(joint, factor)| Some((place(joint)?, *factor)));
+                ControllerAxis { sense: given.sense, zero: given.zero, relative }
+            })
+        };
+        if self.controller.is_empty() { Vec::new() } else { axes.iter().map(axis).collect() }
+    }
+
+    /// Returns the arm as seen by the program's controller.
+    pub fn arm(&self, overrides: &Overrides) -> (ProgramArm<'a>, Assumed) {
+        let (flange, X_FT, flange_note) = self.flange();
+        let mut assumed = false;
+        let of = |list: &[Option<f64>], k: usize| list.get(k).copied().flatten();
+        let finite = |limit: f64| limit.is_finite().then_some(limit);
+        let bounds = (0..self.model.nv())
+            .map(|k| {
+                let limits = &self.model.coordinates()[k].limits;
+                let velocity = of(&overrides.velocities, k).unwrap_or(limits.velocity);
+                let velocity = if velocity > 0.0 { velocity } else { f64::INFINITY };
+                let acceleration =
+                    of(&overrides.accelerations, k).or(finite(limits.acceleration)).unwrap_or_else(|| {
+                        assumed = true;
+                        if velocity.is_finite() { velocity / TO_TOP_SPEED } else { ACCELERATION }
+                    });
+                let (torque, jerk) = (of(&overrides.torques, k), of(&overrides.jerks, k).or(finite(limits.jerk)));
+                JointBounds { velocity, acceleration, torque, jerk }
+            })
+            .collect();
+        let accelerations = assumed.then(|| {
+            format!(
+                "accelerations of the joints are not known: each is taken to reach its top speed in {TO_TOP_SPEED} s ([limits] of a \
+                 path file tells them)"
+            )
+        });
+        let axes = coordinates_of(self.model, &tcp_frame(self.model));
+        let (X_MW, rest) = (self.world(), self.rest());
+        let controller = Vec::new();
+        let arm =
+            ProgramArm { model: self.model, flange, X_FT, X_MW, axes, controller, bounds, rest, starts_at_rest: false };
+        (arm, Assumed { flange: flange_note, accelerations })
+    }
+}
+
+impl ToolPath {
+    /// Plans the joint trajectory of a program; `warnings` are those found earlier.
+    pub(crate) fn plan(
+        file: &Path,
+        program: &Program,
+        arm: &ProgramArm<'_>,
+        options: &PathOptions,
+        mut warnings: Vec<String>,
+    ) -> Result<(Trajectory, Self), Error> {
+        let planned = plan(program, arm, options).map_err(|source| {
+            let notes = program.notes.iter().take(TOLD).map(noted).collect();
+            Error::Path { path: file.to_owned(), source: Box::new(source), notes }
+        })?;
+        let stops = planned.stops.iter().map(|(line, why)| format!("line {line}: no blend: {why}")).collect();
+        warnings.extend(first_of(stops));
+        let held = planned.held.join(", ");
+        if !held.is_empty() {
+            let what = match options.rule {
+                None => "stay while the tool follows its path (redundancy of a path file chooses otherwise)",
+                Some(_) => "move redundantly, towards the requested posture",
+            };
+            warnings.push(format!("the arm has more joints than the path needs: {held} {what}"));
+        }
+        warnings.extend(tool_warning(program, arm));
+        warnings.extend(acceleration_warning(program));
+        let slowed = planned.moves.iter().filter_map(|of| of.slowed.as_ref().map(|slowed| slowed_warning(of, slowed)));
+        warnings.extend(first_of(slowed.collect()));
+        let near = planned.moves.iter().filter_map(|of| {
+            let (sigma, t) = of.least_sigma.filter(|(sigma, _)| *sigma < NEAR_SINGULAR)?;
+            Some(format!(
+                "line {}: {}: passes near a singular pose at {t:.3} s (least singular value {sigma:.1e} m/rad): joints move fast \
+                 for little of the tool",
+                of.line, of.statement
+            ))
+        });
+        warnings.extend(first_of(near.collect()));
+        let notes = program.notes.iter().map(noted).collect();
+        let jerk = |(k, bounds): (usize, &JointBounds)| Some((arm.model.coordinates()[k].joint.clone(), bounds.jerk?));
+        let jerks = arm.bounds.iter().enumerate().filter_map(jerk).collect();
+        let file = file.display().to_string();
+        Ok((planned.trajectory, Self { moves: planned.moves, file, jerks, warnings, notes }))
+    }
+
+    /// Returns the jerk limit of a joint, rad/s³ or m/s³, if one is given.
+    pub(crate) fn jerk_of(&self, joint: &str) -> Option<f64> {
+        self.jerks.iter().find(|(name, _)| name == joint).map(|(_, jerk)| *jerk)
+    }
+
+    /// Returns the caveats about the path.
+    pub(crate) fn caveats(&self) -> Vec<Caveat> {
+        let caveat =
+            |text: &String| Caveat::from_message("tool-path", &self.file, format!("{}: {text}", self.file), "");
+        let notes = self.notes.iter().map(|text| caveat(text).as_note());
+        self.warnings.iter().map(caveat).chain(notes).collect()
+    }
+}
+
+fn noted(note: &Note) -> String {
+    let place = note.line.map_or_else(String::new, |line| format!("line {line}: "));
+    format!("{place}{}", note.text)
+}
+
+/// Returns the first few of a list, and the number of those left out.
+fn first_of(mut notes: Vec<String>) -> Vec<String> {
+    let more = notes.len().saturating_sub(TOLD);
+    if more > 0 {
+        notes.truncate(TOLD);
+        notes.push(format!("and {more} more like the last"));
+    }
+    notes
+}
+
+/// Warns if the program's tool differs from the robot's, at which the error is measured.
+fn tool_warning(program: &Program, arm: &ProgramArm<'_>) -> Option<String> {
+    use flexarm_path::program::Item;
+    let other = program.items.iter().find_map(|item| match item {
+        Item::Move(of) => {
+            let X_FT = of.X_FT?;
+            let apart = (X_FT.translation.vector - arm.X_FT.translation.vector).norm();
+            (apart > 1e-6).then_some((of.line, apart))
+        }
+        Item::Dwell { .. } => None,
+    })?;
+    Some(format!(
+        "line {}: the program's tool ends {:.1} mm from the robot's tool centre point: the program's follows the path, the error \
+         is measured at the robot's (tcp of the robot file)",
+        other.0,
+        other.1 * 1e3
+    ))
+}
+
+/// Range of the acceleration of a TCP along its path (m/s²); KUKA's default is 2.3.
+const PATH_ACCELERATION: RangeInclusive<f64> = 0.01..=300.0;
+
+/// Warns about the first path acceleration that no robot has.
+fn acceleration_warning(program: &Program) -> Option<String> {
+    use flexarm_path::program::Item;
+    program.items.iter().find_map(|item| {
+        let Item::Move(of) = item else { return None };
+        let found = of.speed.linear_m_s2.filter(|found| !PATH_ACCELERATION.contains(found))?;
+        let (least, most) = (PATH_ACCELERATION.start(), PATH_ACCELERATION.end());
+        let likely = slip(found, &PATH_ACCELERATION, &[(1e3, "mm/s2"), (1e-3, "mm/s2 for m/s2")], 1.0);
+        let likely = if likely.is_empty() { likely } else { format!(" ({likely})") };
+        Some(format!(
+            "line {}: {}: the acceleration along the path is {found} m/s2, robots have {least} to {most}{likely}: check its unit",
+            of.line, of.statement
+        ))
+    })
+}
+
+fn slowed_warning(of: &PlannedMove, slowed: &Slowed) -> String {
+    let by = match &slowed.by {
+        SlowedBy::JointSpeed(joint) => format!("the speed of joint {joint:?}"),
+        SlowedBy::JointAcceleration(joint) => format!("the acceleration of joint {joint:?}"),
+        SlowedBy::JointJerk(joint) => format!("the jerk of joint {joint:?}"),
+        SlowedBy::JointTorque(joint) => format!("the torque of joint {joint:?}"),
+        SlowedBy::Turning => "the turning of the tool".to_owned(),
+        SlowedBy::PathAcceleration => "the acceleration across the path".to_owned(),
+    };
+    let (line, statement, t, part) = (of.line, &of.statement, slowed.time_s, 100.0 * slowed.part);
+    format!("line {line}: {statement}: slowed to {part:.0} % of its speed at {t:.3} s by {by}")
+}

@@ -1,0 +1,271 @@
+//! A robot held at a pose: starting point of statics, modes and frequency response.
+
+use std::sync::Arc;
+
+use flexarm_analysis::engineering_strain;
+use flexarm_kinematics::{Data, Frame, Pose, State, Wrench, forward_kinematics, rotation_vector};
+use flexarm_settings::Quantity;
+use flexarm_stepping::{FlexibleArm, Held, Linear, OperatingPoint, StepError, linearise};
+use nalgebra::{DVector, Vector6};
+
+use crate::arm::Arm;
+use crate::arm::joint_values::joint_values;
+use crate::caveat::pose::ArmAtRest;
+use crate::caveat::{Caveat, kinds, of_use, once_each, validity};
+use crate::error::{Error, PoseError, ValueError};
+use crate::motions::motion::Motion;
+use crate::robot::Robot;
+use crate::robot::balancer;
+use crate::robot::loops;
+
+/// Flexible arm with its drives locked at a pose.
+pub struct Posed {
+    /// Robot with its links and drives as modelled.
+    pub flexible: Arc<Arm>,
+    /// Arm with its drives locked.
+    pub arm: FlexibleArm,
+    /// Frame of the TCP.
+    pub tool: Frame,
+    /// Actuated joints, in coordinate order.
+    pub joints: Vec<String>,
+    /// Whether each joint is prismatic.
+    pub prismatic: Vec<bool>,
+    /// Joint values (rad or m).
+    pub at: Vec<f64>,
+}
+
+impl Robot {
+    /// Returns the pose at which the robot is analysed by default (rad or m): the start of the motion
+    /// of the robot file, or zero for a robot without one.
+    ///
+    /// # Errors
+    /// [`Error::Model`].
+    pub fn start_pose(&self) -> Result<Vec<f64>, Error> {
+        let n = self.rigid_model()?.n_actuated();
+        let mut q = vec![0.0; n];
+        // A motion that cannot be loaded is an error of the commands that run it.
+        if let Some(motion) = self.default_trajectory.as_deref().and_then(|path| Motion::load(path, self).ok()) {
+            motion.trajectory.sample(0.0, &mut q, &mut vec![0.0; n], &mut vec![0.0; n]);
+        }
+        Ok(q)
+    }
+}
+
+/// Returns the values of all actuated joints (rad or m), by default [`Robot::start_pose`].
+pub(crate) fn pose_of(robot: &Robot, at: Option<&[f64]>) -> Result<Vec<f64>, Error> {
+    if at.is_none() {
+        return robot.start_pose();
+    }
+    let model = robot.rigid_model()?;
+    let names: Vec<&str> = model.coordinates().iter().map(|c| c.joint.as_str()).collect();
+    joint_values(at, &names)
+}
+
+/// Wraps a step error of a command that takes no steps.
+pub fn step_error(source: StepError) -> Error {
+    Error::Step { source, partial: false }
+}
+
+/// Checks a force and moment on the TCP (six values).
+pub fn check_wrench(wrench: &[f64]) -> Result<(), ValueError> {
+    let force = Quantity::FORCE.check_all("the force at the tool", wrench.iter().take(3));
+    let torque = Quantity::TORQUE.check_all("the torque at the tool", wrench.iter().skip(3));
+    Ok(force.and(torque)?)
+}
+
+impl Arm {
+    /// Holds the arm at a pose; `at`: values of all actuated joints (rad or m),
+    /// [`Robot::start_pose`] by default.
+    ///
+    /// # Errors
+    /// [`Error::Pose`] for joint values that do not fit the arm.
+    pub fn posed(self: &Arc<Self>, at: Option<&[f64]>) -> Result<Posed, Error> {
+        Posed::new(self.clone(), pose_of(&self.robot, at)?)
+    }
+
+    /// As [`Arm::posed`], for equilibria alone ([`Posed::resting`]).
+    pub(crate) fn resting(self: &Arc<Self>, at: Option<&[f64]>) -> Result<Posed, Error> {
+        Posed::resting(self.clone(), pose_of(&self.robot, at)?)
+    }
+
+    /// Returns mass, damping and stiffness about the static equilibrium at a pose under gravity and
+    /// a wrench at the TCP, and the Jacobian of the TCP with respect to the free coordinates.
+    ///
+    /// * `at`: values of all actuated joints (rad or m), [`Robot::start_pose`] by default.
+    /// * `wrench`: force and moment at the TCP, world axes (N, N m).
+    ///
+    /// # Errors
+    /// [`Error::Pose`] for joint values that do not fit, [`Error::Step`] if there is no
+    /// equilibrium.
+    pub fn linearise(self: &Arc<Self>, at: Option<&[f64]>, wrench: [f64; 6]) -> Result<Linear, Error> {
+        self.posed(at)?.linear(&wrench.into())
+    }
+
+    /// Returns a workspace for equilibria, compliances and frequencies at any number of poses.
+    ///
+    /// # Errors
+    /// [`Error::Step`] if a spring is not positive definite, or the arm has no equilibrium under
+    /// gravity at the middle of its joint ranges.
+    pub fn operating_point(&self) -> Result<OperatingPoint, Error> {
+        let model = &self.model;
+        // Any pose within the limits is suitable.
+        let middle = |lower: f64, upper: f64| match (lower.is_finite(), upper.is_finite()) {
+            (true, true) => 0.5 * (lower + upper),
+            (false, false) => 0.0,
+            (finite, _) => {
+                if finite {
+                    lower.max(0.0)
+                } else {
+                    upper.min(0.0)
+                }
+            }
+        };
+        let actuated = &model.coordinates()[..model.n_actuated()];
+        let pose = actuated.iter().map(|c| middle(c.limits.lower, c.limits.upper)).collect();
+        let arm = self.arm(Arc::new(Held(pose))).map_err(|error| self.explained(error))?;
+        Ok(OperatingPoint::new(arm, self.tcp.clone()))
+    }
+}
+
+impl Posed {
+    /// Holds an arm at a pose; `at` in coordinate order (rad or m). [`Arm::posed`] also accepts no
+    /// values.
+    pub fn new(flexible: Arc<Arm>, at: Vec<f64>) -> Result<Self, Error> {
+        let arm = flexible.arm(Arc::new(Held(at.clone())));
+        Self::of(flexible, arm, at)
+    }
+
+    /// As [`Self::new`], for equilibria alone: an arm with a link between springs that has no mass
+    /// has no modes.
+    pub(crate) fn resting(flexible: Arc<Arm>, at: Vec<f64>) -> Result<Self, Error> {
+        let held = Arc::new(Held(at.clone()));
+        let arm = match flexible.arm(held.clone()) {
+            Err(StepError::Singular { matrix, .. }) if matrix.starts_with("mass matrix") => flexible.arm_at_rest(held),
+            arm => arm,
+        };
+        Self::of(flexible, arm, at)
+    }
+
+    fn of(flexible: Arc<Arm>, arm: Result<FlexibleArm, StepError>, at: Vec<f64>) -> Result<Self, Error> {
+        loops::check_pose(&flexible.rigid, &mut Data::new(&flexible.rigid), &DVector::from_column_slice(&at))?;
+        balancer::check_pose(&flexible.rigid, &mut Data::new(&flexible.rigid), &DVector::from_column_slice(&at))?;
+        let model = flexible.model.clone();
+        let actuated = &model.coordinates()[..model.n_actuated()];
+        let joints: Vec<String> = actuated.iter().map(|c| c.joint.clone()).collect();
+        let prismatic = actuated.iter().map(|c| c.slides()).collect();
+        let arm = arm.map_err(|error| flexible.explained(error))?;
+        Ok(Self { tool: flexible.tcp.clone(), flexible, arm, joints, prismatic, at })
+    }
+
+    /// Returns the caveats about the robot and its equilibrium under a wrench on the TCP (world
+    /// axes).
+    pub fn caveats_of(&self, linear: &Linear, wrench: &[f64; 6]) -> Vec<Caveat> {
+        let mut caveats = of_use::of_model(&self.flexible);
+        caveats.extend(of_use::at_rest(self, linear, wrench));
+        once_each(caveats)
+    }
+
+    /// Checks whether the pose is within the joint ranges, and whether anything is elastic.
+    pub(crate) fn caveats(&self) -> Vec<Caveat> {
+        let model = &self.arm.model;
+        let mut caveats: Vec<Caveat> =
+            validity::outside_limits(&model.coordinates()[..model.n_actuated()], &self.at).collect();
+        if self.flexible.springs.is_empty() {
+            let message =
+                "the robot has no flexible link and no elastic drive: it does not deflect and does not vibrate";
+            caveats.push(Caveat::from_message(
+                "nothing-yields",
+                "robot",
+                message,
+                "add [[flexible_link]] or [[drive]] entries",
+            ));
+        }
+        caveats
+    }
+
+    /// Linearises about the static equilibrium under gravity and a wrench at the TCP (world axes).
+    pub fn linear(&self, wrench: &Vector6<f64>) -> Result<Linear, Error> {
+        let F = Wrench::new(wrench.fixed_rows::<3>(0).into(), wrench.fixed_rows::<3>(3).into());
+        check_wrench(wrench.as_slice())?;
+        linearise(&self.arm, &self.tool, &F, 0.0).map_err(|error| self.flexible.explained(error))
+    }
+
+    /// Returns the static equilibrium under gravity and a wrench at the TCP (world axes), as used
+    /// by maps.
+    pub(crate) fn operating_point(&self, wrench: &[f64; 6]) -> Result<OperatingPoint, Error> {
+        let [fx, fy, fz, tx, ty, tz] = *wrench;
+        let mut at = OperatingPoint::new(self.arm.clone(), self.tool.clone());
+        let F = Wrench::new([fx, fy, fz].into(), [tx, ty, tz].into());
+        at.solve(&self.at, &F).map_err(|error| self.flexible.explained(error))?;
+        Ok(at)
+    }
+
+    /// Returns the TCP pose with all elastic coordinates at zero.
+    pub(crate) fn rigid_tool(&self) -> Pose {
+        let (mut data, state) = self.undeformed();
+        forward_kinematics(&self.arm.model, &mut data, &state.q);
+        data.X_WF(&self.tool)
+    }
+
+    /// Checks whether the models are valid at an equilibrium: deflections of links, torques of
+    /// drives.
+    pub(crate) fn validity(&self, linear: &Linear) -> Vec<Caveat> {
+        let links = self.flexible.spans.iter().zip(strains(&self.flexible, &self.arm, &linear.q));
+        let links = links.flat_map(|(span, (strain, rotation))| validity::link(&span.link, rotation, strain));
+        let holding = linear.holding.as_slice();
+        let efforts = validity::efforts(&kinds::HOLDING, self.arm.model.coordinates(), holding);
+        links.chain(efforts).chain(self.standing(linear)).collect()
+    }
+
+    /// Returns the caveats about the arm at rest.
+    fn standing(&self, linear: &Linear) -> Vec<Caveat> {
+        let moved = linear.X_WT.translation.vector - self.rigid_tool().translation.vector;
+        let elastic = &linear.q.as_slice()[self.arm.model.n_actuated()..];
+        let (flexible, arm) = (&self.flexible, &self.arm);
+        ArmAtRest { flexible, arm, elastic, sag_m: moved.norm() }.caveats()
+    }
+
+    /// State with the joints at the pose and the elastic coordinates at zero.
+    pub(crate) fn undeformed(&self) -> (Data, State) {
+        undeformed(&self.arm)
+    }
+}
+
+/// State with the joints at the start of the motion and the elastic coordinates at zero.
+fn undeformed(arm: &FlexibleArm) -> (Data, State) {
+    let mut state = State::zeros(&arm.model);
+    arm.prescribed_state(0.0, &mut state, &mut DVector::zeros(arm.model.nv()));
+    (Data::new(&arm.model), state)
+}
+
+/// Engineering strain of each flexible link and rotation of its far end (rad), at coordinates `q`.
+pub(crate) fn strains(flexible: &Arm, arm: &FlexibleArm, q: &DVector<f64>) -> Vec<(f64, f64)> {
+    let model = &arm.model;
+    let (mut data, straight) = undeformed(arm);
+    let mut ends = |q: &DVector<f64>| -> Vec<Pose> {
+        forward_kinematics(model, &mut data, q);
+        let pose = |link: &str, X: &Pose| data.X_WF(model.frame(link).expect("a link of the substitution")) * *X;
+        let spans = flexible.spans.iter();
+        spans.map(|s| pose(&s.link, &s.X_LA).inverse() * pose(&s.distal_link, &s.X_DB)).collect()
+    };
+    let (bent, straight) = (ends(q), ends(&straight.q));
+    let pairs = flexible.spans.iter().zip(bent.iter().zip(&straight));
+    pairs
+        .map(|(span, (bent, straight))| {
+            let change = bent.translation.vector.norm() - span.length;
+            let strain = engineering_strain(change, span.length).map_or(0.0, f64::abs);
+            (strain, rotation_vector((straight.rotation.inverse() * bent.rotation).matrix()).norm())
+        })
+        .collect()
+}
+
+/// Checks that the figures of a result are finite.
+///
+/// # Errors
+/// [`Error::Pose`] if they are not: masses, lengths or joint values of 1e200 overflow.
+pub(crate) fn all_finite<'a>(what: &str, values: impl IntoIterator<Item = &'a f64>) -> Result<(), Error> {
+    match values.into_iter().all(|x| x.is_finite()) {
+        true => Ok(()),
+        false => Err(PoseError::Overflow { what: what.to_owned() }.into()),
+    }
+}

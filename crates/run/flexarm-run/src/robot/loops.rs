@@ -1,0 +1,265 @@
+//! Closed loops: the pins that close the kinematic loops of a robot, the poses in which they close,
+//! and their transmission angles.
+
+use flexarm_kinematics::{
+    Data, Joint, JointKind, Link, LoopClosure, Mechanism, Model, ModelError, Pose, forward_kinematics,
+};
+use flexarm_trajectory::Trajectory;
+use nalgebra::{DVector, Rotation3, Unit, Vector3};
+use serde::Serialize;
+
+use crate::caveat::size::spread_poses;
+use crate::error::LoopError;
+use crate::robot::Robot;
+use crate::robot::entry_checks::loop_of_joint;
+
+/// A loop to add to a robot ([`Robot::with_loops`]): a pin on one link passes through an eye on
+/// another.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RobotLoop {
+    /// Unique name.
+    pub name: String,
+    /// Link that carries the pin, and a point on the pin's axis in link axes (m).
+    pub pin: (String, [f64; 3]),
+    /// Axis of the pin in the axes of that link; by default that of the first revolute dependent
+    /// joint.
+    pub axis: Option<[f64; 3]>,
+    /// Link that carries the eye, and the eye's position in link axes (m).
+    pub eye: (String, [f64; 3]),
+    /// The two joints of the loop that depend on the others.
+    pub dependent: [String; 2],
+    /// Joint values near which the loop is assembled (rad or m); 0 for joints not listed.
+    pub at: Vec<(String, f64)>,
+}
+
+/// A loop at a pose.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct LoopInfo {
+    /// Name.
+    pub name: String,
+    /// Dependent joints.
+    pub dependent: Vec<DependentInfo>,
+    /// Transmission angle (rad, at most π/2).
+    pub transmission_angle: f64,
+    /// Minimum transmission angle over poses spread over the joint ranges, except those excluded by
+    /// limits of dependent joints.
+    pub smallest_transmission_angle: Option<f64>,
+}
+
+/// A dependent joint.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct DependentInfo {
+    /// Name.
+    pub name: String,
+    /// `revolute`, `continuous` or `prismatic`.
+    #[serde(rename = "type")]
+    pub kind: &'static str,
+    /// Minimum position (rad or m).
+    pub lower: Option<f64>,
+    /// Maximum position (rad or m).
+    pub upper: Option<f64>,
+    /// Position (rad or m).
+    pub q: f64,
+}
+
+impl Robot {
+    /// Adds closed loops to the robot.
+    ///
+    /// # Errors
+    /// [`LoopError`] for unknown links and joints, values that are not finite, a duplicate name,
+    /// loops that are not planar, do not close or are at a dead point where they are assembled, and
+    /// joints that have a drive.
+    pub fn with_loops(mut self, loops: Vec<RobotLoop>) -> Result<Self, LoopError> {
+        for own in loops {
+            self.add_loop(own)?;
+        }
+        if let Some(drive) = self.drives.iter().find(|drive| loop_of_joint(&self.rigid, &drive.joint).is_some()) {
+            let name = loop_of_joint(&self.rigid, &drive.joint).unwrap_or_default().to_owned();
+            return Err(LoopError::Driven { name, joint: drive.joint.clone() });
+        }
+        self.check_loops()?;
+        Ok(self)
+    }
+
+    /// Adds a loop. The frames of pin and eye are fixed to their links, so that on a flexible link
+    /// each moves with the part it is on.
+    pub(crate) fn add_loop(&mut self, own: RobotLoop) -> Result<(), LoopError> {
+        let RobotLoop { name, pin, axis, eye, dependent, at } = own;
+        if self.rigid.loops.iter().any(|other| other.name == name) {
+            return Err(LoopError::Twice { name });
+        }
+        for (link, place) in [&pin, &eye] {
+            if self.rigid.link(link).is_none() {
+                let known = self.rigid.links.iter().map(|l| l.name.clone()).filter(|l| !l.starts_with("__")).collect();
+                return Err(LoopError::UnknownLink { name, link: link.clone(), known });
+            }
+            if let Some(value) = place.iter().find(|x| !x.is_finite()) {
+                return Err(LoopError::NotFinite { name, what: format!("its point on link {link:?}"), value: *value });
+            }
+        }
+        let axis = match axis {
+            None => axis_of_joint(&self.rigid, &pin.0, &dependent)
+                .ok_or_else(|| LoopError::NoAxis { name: name.clone() })?,
+            Some(axis) => Unit::try_new(Vector3::from(axis), 1e-9)
+                .filter(|axis| axis.iter().all(|x| x.is_finite()))
+                .ok_or_else(|| LoopError::BadAxis { name: name.clone(), axis })?,
+        };
+        let frames = ["pin", "eye"].map(|end| format!("__loop_{name}_{end}"));
+        for ((link, place), frame) in [pin, eye].into_iter().zip(&frames) {
+            let X = Pose::from_parts(Vector3::from(place).into(), Rotation3::identity());
+            self.rigid.joints.push(Joint::new(format!("{frame}_joint"), JointKind::Fixed, link, frame, X));
+            self.rigid.links.push(Link { name: frame.clone(), inertia: None });
+        }
+        let [pin, eye] = frames;
+        self.rigid.loops.push(LoopClosure { name, pin, axis, eye, dependent, at });
+        Ok(())
+    }
+
+    /// Checks that all loops close.
+    pub(crate) fn check_loops(&self) -> Result<(), LoopError> {
+        match Model::new(&self.rigid) {
+            Err(ModelError::BadLoop { name, what }) => Err(LoopError::Unfit { name, what }),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Axis of the first revolute one of the joints, in the axes of a link, with all joints at zero.
+fn axis_of_joint(mechanism: &Mechanism, link: &str, joints: &[String; 2]) -> Option<Unit<Vector3<f64>>> {
+    let turning = joints.iter().filter_map(|name| mechanism.joint(name)).find(|joint| joint.kind.turns())?;
+    let axis = turning.kind.axis_motion()?.axis();
+    let at = rotation_at_zero(mechanism, &turning.child)?;
+    let link = rotation_at_zero(mechanism, link)?;
+    Unit::try_new(link.inverse() * (at * axis), 1e-9)
+}
+
+/// Orientation of a link with all joints at zero; None if the joints do not form a tree.
+fn rotation_at_zero(mechanism: &Mechanism, link: &str) -> Option<Rotation3<f64>> {
+    let (mut at, mut R) = (link, Rotation3::identity());
+    for _ in 0..=mechanism.joints.len() {
+        match mechanism.joints.iter().find(|joint| joint.child == at) {
+            Some(joint) => (at, R) = (&joint.parent, joint.X_PJ.rotation * R),
+            None => return Some(R),
+        }
+    }
+    None
+}
+
+fn finite(x: f64) -> Option<f64> {
+    x.is_finite().then_some(x)
+}
+
+/// Returns the loops of the rigid robot at joint values (rad or m).
+pub(crate) fn at_pose(model: &Model, q: &DVector<f64>) -> Vec<LoopInfo> {
+    if model.loops().is_empty() {
+        return Vec::new();
+    }
+    let mut data = Data::new(model);
+    forward_kinematics(model, &mut data, q);
+    let smallest = over_ranges(model).smallest;
+    let joint = |k: usize| {
+        let c = &model.dependent()[k];
+        let (lower, upper) = (finite(c.limits.lower), finite(c.limits.upper));
+        DependentInfo { name: c.joint.clone(), kind: c.kind, lower, upper, q: data.dependent_values()[k] }
+    };
+    let info = |(k, own): (usize, &flexarm_kinematics::PlacedLoop)| LoopInfo {
+        name: own.name.clone(),
+        dependent: vec![joint(2 * k), joint(2 * k + 1)],
+        transmission_angle: data.transmission_angles()[k],
+        smallest_transmission_angle: finite(smallest[k]),
+    };
+    model.loops().iter().enumerate().map(info).collect()
+}
+
+/// Behaviour of the loops in poses spread over the joint ranges.
+pub(crate) struct OverRanges {
+    /// Minimum transmission angle of each loop (rad); infinite if no pose counted.
+    pub(crate) smallest: Vec<f64>,
+    /// Fraction of the poses in which each loop does not close.
+    pub(crate) open: Vec<f64>,
+}
+
+/// Evaluates the loops over the joint ranges; poses excluded by limits of dependent joints do not
+/// count for the angles.
+pub(crate) fn over_ranges(model: &Model) -> OverRanges {
+    let (n, mut data) = (model.loops().len(), Data::new(model));
+    let (mut smallest, mut open, mut poses) = (vec![f64::INFINITY; n], vec![0.0; n], 0.0);
+    for q in spread_poses(model) {
+        forward_kinematics(model, &mut data, &q);
+        poses += 1.0;
+        if let Some(k) = data.open_loop() {
+            open[k] += 1.0;
+            continue;
+        }
+        let values = model.dependent().iter().zip(data.dependent_values());
+        if values.into_iter().any(|(c, q)| *q < c.limits.lower || *q > c.limits.upper) {
+            continue;
+        }
+        smallest.iter_mut().zip(data.transmission_angles()).for_each(|(least, angle)| *least = least.min(*angle));
+    }
+    open.iter_mut().for_each(|open| *open /= poses);
+    OverRanges { smallest, open }
+}
+
+/// Checks that all loops close at these joint values (rad or m).
+///
+/// # Errors
+/// [`LoopError::Open`] with the first loop that does not close.
+pub(crate) fn check_pose(model: &Model, data: &mut Data, q: &DVector<f64>) -> Result<(), LoopError> {
+    if model.loops().is_empty() {
+        return Ok(());
+    }
+    forward_kinematics(model, data, q);
+    data.open_loop().map_or(Ok(()), |k| Err(LoopError::Open { name: model.loops()[k].name.clone() }))
+}
+
+/// Number of time intervals at which a motion is checked.
+const TIMES: usize = 1000;
+
+/// Behaviour of the loops along a motion of the rigid robot.
+pub struct AlongMotion {
+    /// Minimum transmission angle of each loop (rad), and its time (s).
+    pub(crate) smallest: Vec<(f64, f64)>,
+    /// Minimum and maximum of each dependent joint (rad or m).
+    pub(crate) range: Vec<[f64; 2]>,
+}
+
+/// Follows a motion and checks that the loops close and do not pass a dead point, where the
+/// assembly mode is ambiguous.
+///
+/// # Errors
+/// [`LoopError::AlongMotion`].
+pub fn along_motion(model: &Model, trajectory: &Trajectory) -> Result<AlongMotion, LoopError> {
+    let (n, loops) = (model.nv(), model.loops().len());
+    let mut seen = AlongMotion {
+        smallest: vec![(f64::INFINITY, 0.0); loops],
+        range: vec![[f64::INFINITY, f64::NEG_INFINITY]; model.dependent().len()],
+    };
+    if loops == 0 {
+        return Ok(seen);
+    }
+    let (mut data, mut q, mut v, mut a) = (Data::new(model), DVector::zeros(n), vec![0.0; n], vec![0.0; n]);
+    // Angles at the last two times.
+    let mut before: Vec<[f64; 2]> = vec![[f64::NAN; 2]; loops];
+    for i in 0..=TIMES {
+        let t = trajectory.duration() * i as f64 / TIMES as f64;
+        trajectory.sample(t, q.as_mut_slice(), &mut v, &mut a);
+        let at = |source| LoopError::AlongMotion { t, source: Box::new(source) };
+        check_pose(model, &mut data, &q).map_err(at)?;
+        for (k, angle) in data.transmission_angles().iter().copied().enumerate() {
+            // An angle whose extrapolation is below zero but which rises again has passed zero.
+            let [last_but_one, last] = before[k];
+            if 2.0 * last - last_but_one <= 0.0 && angle > 0.0 && last < 0.2 {
+                return Err(at(LoopError::DeadPoint { name: model.loops()[k].name.clone() }));
+            }
+            before[k] = [last, angle];
+            if angle < seen.smallest[k].0 {
+                seen.smallest[k] = (angle, t);
+            }
+        }
+        for ([low, high], value) in seen.range.iter_mut().zip(data.dependent_values()) {
+            (*low, *high) = (low.min(*value), high.max(*value));
+        }
+    }
+    Ok(seen)
+}

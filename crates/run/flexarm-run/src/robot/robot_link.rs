@@ -1,0 +1,197 @@
+//! A flexible link of a robot with the data from which its models are built.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use flexarm_fem::stress::StressFields;
+use flexarm_fem::{BeamLink, FemError, ModalLink, ModalOptions};
+use flexarm_flexlink::{FlexibleLink, LinkForm};
+use flexarm_kinematics::MOST_COORDINATES;
+use flexarm_stepping::Damping;
+use nalgebra::Matrix6;
+
+use crate::arm::options::{LinkModel, Modelling};
+use crate::error::LinkFormError;
+use crate::robot::strength::Strength;
+
+/// Maximum number of fixed-interface modes of a link.
+const MOST_MODES: usize = 200;
+
+/// Default number of fixed-interface modes of a beam link.
+const BEAM_MODES: usize = 6;
+
+/// Flexible link with the data from which its models are built.
+#[derive(Clone, Debug)]
+pub struct RobotLink {
+    /// The link with its reduced model.
+    pub flexible: FlexibleLink,
+    /// Damping of the link.
+    pub damping: Damping,
+    /// Stiffness of the spring between its two parts, symmetric and positive definite; replaces
+    /// that of the source (N/m, N, N m/rad).
+    pub stiffness: Option<Matrix6<f64>>,
+    /// Factor on the stiffness of all models of the link.
+    pub stiffness_factor: f64,
+    /// Additional factors on the springs of a lumped link, one per direction: K becomes `S K S`,
+    /// where the diagonal of S holds their square roots.
+    pub stiffness_factors: [f64; 6],
+    /// Beam from which the link is built, if it is a beam.
+    pub beam: Option<BeamLink>,
+    /// Choices made in the robot file.
+    pub choices: LinkChoices,
+    /// Source of its stress, if that is computed.
+    pub stress: Option<StressSource>,
+    /// Strength against which its stress is judged; by default that of its material.
+    pub strength: Option<Strength>,
+}
+
+/// Source of the stress of a flexible link.
+#[derive(Clone, Debug, PartialEq)]
+pub enum StressSource {
+    /// Stress fields from a file beside that of the reduced link.
+    File {
+        /// The file.
+        path: PathBuf,
+        /// Its content.
+        fields: Arc<StressFields>,
+    },
+    /// Section forces of the beam.
+    Beam,
+}
+
+/// Choices of a robot file for a flexible link.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LinkChoices {
+    /// Link model: lumped or modal.
+    pub model: LinkModel,
+    /// Number of rigid parts of a lumped link.
+    pub segments: usize,
+    /// Number of fixed-interface modes of a modal link.
+    pub modes: Option<usize>,
+    /// Number of eigenmodes of a modal link, used instead of fixed-interface modes.
+    pub eigenmodes: Option<usize>,
+    /// Whether loads change the stiffness (geometric stiffening).
+    pub geometric: bool,
+}
+
+/// Key of the robot file that requested something unavailable.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum RequestedKey {
+    Model,
+    Segments,
+    Modes,
+    Eigenmodes,
+    Geometric,
+    Directions,
+    Stiffness,
+}
+
+impl RobotLink {
+    /// Applies the stiffness factors to a spring of the lumped models.
+    pub(crate) fn scaled(&self, K: &Matrix6<f64>) -> Matrix6<f64> {
+        let root = self.stiffness_factors.map(f64::sqrt);
+        let K = self.stiffness.as_ref().unwrap_or(K);
+        Matrix6::from_fn(|i, j| root[i] * K[(i, j)] * root[j]) * self.stiffness_factor
+    }
+
+    /// Whether the source provides geometric stiffening for a modal link.
+    pub fn has_geometric(&self) -> bool {
+        let stored = self.flexible.reduced.details.as_ref().and_then(|details| details.modal.as_ref());
+        self.beam.is_some() || stored.is_some_and(|modal| modal.geometric.is_some())
+    }
+
+    /// Returns the model of the link; rigid links have none.
+    ///
+    /// # Errors
+    /// [`LinkFormError`] with what the source of the link lacks.
+    pub fn form(&self, modelling: &Modelling) -> Result<LinkForm, LinkFormError> {
+        self.form_or_key(modelling).map_err(|(_, error)| error)
+    }
+
+    /// As [`Self::form`], with the robot file key that requested what is missing.
+    pub(crate) fn form_or_key(&self, modelling: &Modelling) -> Result<LinkForm, (RequestedKey, LinkFormError)> {
+        let link = || self.flexible.link.clone();
+        let model = if modelling.links == LinkModel::AsFiled { self.choices.model } else { modelling.links };
+        match model {
+            LinkModel::Modal if self.stiffness_factors != [1.0; 6] => {
+                Err((RequestedKey::Directions, LinkFormError::ModalDirections { link: link() }))
+            }
+            LinkModel::Modal if self.stiffness.is_some() => {
+                Err((RequestedKey::Stiffness, LinkFormError::ModalStiffness { link: link() }))
+            }
+            LinkModel::Modal => self.modal(modelling).map(|modal| LinkForm::Modal(Arc::new(modal))),
+            _ => match modelling.segments.unwrap_or(self.choices.segments) {
+                2 => Ok(LinkForm::TwoParts),
+                parts if self.stiffness.is_some() => {
+                    Err((RequestedKey::Stiffness, LinkFormError::ChainStiffness { link: link(), parts }))
+                }
+                n => self.lumped(n).map_err(|error| (RequestedKey::Segments, error)),
+            },
+        }
+    }
+
+    fn lumped(&self, segments: usize) -> Result<LinkForm, LinkFormError> {
+        let link = || self.flexible.link.clone();
+        let coordinates = 6 * segments.saturating_sub(1);
+        if coordinates > MOST_COORDINATES {
+            return Err(LinkFormError::ManySegments { link: link(), segments, coordinates });
+        }
+        if let Some(beam) = &self.beam {
+            let chain = beam.chain(segments).map(LinkForm::Chain);
+            return chain.map_err(|source| LinkFormError::Chain { link: link(), source: Box::new(source) });
+        }
+        let chains = self.flexible.reduced.details.as_ref().map_or(&[][..], |d| &d.chains[..]);
+        let chain = chains.iter().find(|chain| chain.parts.len() == segments).cloned();
+        chain.map(LinkForm::Chain).ok_or_else(|| LinkFormError::NoChain {
+            link: link(),
+            segments,
+            stored: chains.iter().map(|chain| chain.parts.len()).collect(),
+        })
+    }
+
+    fn modal(&self, modelling: &Modelling) -> Result<ModalLink, (RequestedKey, LinkFormError)> {
+        let name = &self.flexible.link;
+        let link = || name.clone();
+        let fail = |asked: RequestedKey| {
+            move |source: FemError| (asked, LinkFormError::NotModal { link: name.clone(), source: Box::new(source) })
+        };
+        let wanted = modelling.modes.or(self.choices.modes);
+        if let Some(modes) = wanted.filter(|modes| *modes > MOST_MODES) {
+            let error = LinkFormError::ManyModes { link: link(), modes, most: MOST_MODES };
+            return Err((RequestedKey::Modes, error));
+        }
+        let full = match &self.beam {
+            Some(beam) => {
+                let modes = wanted.unwrap_or(BEAM_MODES);
+                let options = ModalOptions { modes, geometric: self.choices.geometric, ..ModalOptions::default() };
+                beam.modal_with(&ModalOptions { elements: options.elements.max(4 * modes), ..options })
+                    .map_err(fail(RequestedKey::Modes))?
+            }
+            None => {
+                let details = self.flexible.reduced.details.as_ref();
+                let stored = details.and_then(|details| details.modal.clone()).map(Ok);
+                let condensed = || {
+                    let element = details?.superelement.as_ref()?;
+                    Some(ModalLink::from_superelement(name, element).map_err(fail(RequestedKey::Model)))
+                };
+                let no_mass = || (RequestedKey::Model, LinkFormError::NoModalMass { link: link() });
+                let modal = stored.or_else(condensed).ok_or_else(no_mass)??;
+                let stored = modal.coordinates().saturating_sub(6 * modal.interfaces.len());
+                match wanted {
+                    Some(n) if n < stored => modal.truncated(n).map_err(fail(RequestedKey::Modes))?,
+                    Some(modes) if modes > stored => {
+                        return Err((RequestedKey::Modes, LinkFormError::FewModes { link: link(), modes, stored }));
+                    }
+                    _ => modal,
+                }
+            }
+        };
+        if self.choices.geometric && full.geometric.is_none() {
+            return Err((RequestedKey::Geometric, LinkFormError::NoGeometric { link: link() }));
+        }
+        match self.choices.eigenmodes {
+            Some(keep) => full.orthogonalised(Some(keep)).map_err(fail(RequestedKey::Eigenmodes)),
+            None => Ok(full),
+        }
+    }
+}

@@ -1,0 +1,92 @@
+//! Monitors of a run: one file per quantity, each a struct that receives every logged sample
+//! (`update`) and returns its figures at any time (`result`).
+//!
+//! A monitor receives the arm as observed by the stepper ([`Observation`]) and the rigid twin, and
+//! keeps sums and maxima, no curves. Not here: samples for recordings (`run::sampler`), messages
+//! about the figures (`caveat`).
+
+pub(crate) mod contribution;
+pub(crate) mod deflection;
+pub(crate) mod drive_load;
+pub(crate) mod energy;
+pub(crate) mod strain;
+pub(crate) mod stress;
+pub(crate) mod tool;
+pub(crate) mod tool_path;
+
+use std::sync::Arc;
+
+use flexarm_kinematics::Frame;
+use flexarm_stepping::{FlexibleArm, Observation};
+
+use crate::arm::Arm;
+use crate::motions::tool_path::ToolPath;
+use crate::run::monitor::contribution::Contributions;
+use crate::run::monitor::deflection::Deflections;
+use crate::run::monitor::drive_load::DriveLoads;
+use crate::run::monitor::energy::Energy;
+use crate::run::monitor::strain::Strains;
+use crate::run::monitor::stress::StressMonitor;
+use crate::run::monitor::tool::{ToolError, ToolMonitor};
+use crate::run::monitor::tool_path::ToolPathMonitor;
+use crate::run::twin::RigidTwin;
+
+/// All monitors of a run.
+pub(crate) struct Monitors {
+    pub(crate) tool: ToolMonitor,
+    pub(crate) contributions: Contributions,
+    pub(crate) strains: Strains,
+    pub(crate) deflections: Deflections,
+    pub(crate) drive_loads: DriveLoads,
+    pub(crate) energy: Energy,
+    /// For links with stress fields.
+    pub(crate) stress: Option<StressMonitor>,
+    /// For motions given as TCP paths.
+    pub(crate) tool_path: Option<ToolPathMonitor>,
+}
+
+impl Monitors {
+    /// Creates the monitors for an arm of a robot with `n_drives` drives; `tool` is built
+    /// separately.
+    pub(crate) fn new(arm: &FlexibleArm, flexible: &Arm, n_drives: usize, tool: ToolMonitor) -> Self {
+        Self {
+            tool,
+            contributions: Contributions::new(flexible, n_drives),
+            strains: Strains::new(flexible, &arm.model),
+            deflections: Deflections::new(arm, flexible, n_drives),
+            drive_loads: DriveLoads::new(arm),
+            energy: Energy::new(&arm.model),
+            stress: None,
+            tool_path: None,
+        }
+    }
+
+    /// Adds a monitor of the TCP path.
+    #[must_use]
+    pub(crate) fn along(self, path: Option<Arc<ToolPath>>) -> Self {
+        Self { tool_path: path.map(ToolPathMonitor::new), ..self }
+    }
+
+    /// Adds a monitor of stress.
+    #[must_use]
+    pub(crate) fn with_stress(self, stress: Option<StressMonitor>) -> Self {
+        Self { stress, ..self }
+    }
+
+    /// Passes a sample to all monitors; returns its TCP error.
+    pub(crate) fn update(&mut self, seen: &Observation, twin: &RigidTwin, arm: &FlexibleArm, tcp: &Frame) -> ToolError {
+        self.drive_loads.update(seen);
+        self.contributions.update(seen, twin, arm);
+        self.strains.update(seen.t, &seen.X_WB, &twin.data.X_WB);
+        self.deflections.update(&seen.q);
+        self.energy.update(seen);
+        if let Some(stress) = &mut self.stress {
+            stress.update(seen);
+        }
+        let tool = self.tool.update(seen, twin, tcp);
+        if let Some(path) = &mut self.tool_path {
+            path.update(seen.t, &tool, &twin.velocity);
+        }
+        tool
+    }
+}

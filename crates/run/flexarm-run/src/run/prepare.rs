@@ -1,0 +1,160 @@
+//! Checks the input of a run before its first step.
+
+use std::sync::Arc;
+
+use flexarm_settings::Setting;
+use flexarm_stepping::{FlexibleArm, Load, StepError, StepRule, Stepper, new_stepper};
+
+use crate::arm::Arm;
+use crate::arm::options::RunOptions;
+use crate::caveat::size::Size;
+use crate::caveat::{self, Caveat};
+use crate::error::{Error, ValueError};
+use crate::motions::loads_file::EXPRESSION_PERIOD;
+use crate::motions::motion::Motion;
+use crate::motions::scenario::Scenario;
+use crate::robot::Robot;
+use crate::robot::balancer;
+use crate::robot::loops;
+use crate::run::magnification::Expected;
+
+/// A run whose input has been checked.
+pub(crate) struct Checked {
+    pub(crate) arm: Arc<FlexibleArm>,
+    pub(crate) stepper: Box<dyn Stepper>,
+    pub(crate) load_caveats: Vec<Caveat>,
+}
+
+impl Arm {
+    /// Returns the arm at the start of a scenario, with its loads and payloads, and the caveats
+    /// about the loads.
+    ///
+    /// # Errors
+    /// All errors in the input that can be found before a stepper is built.
+    pub fn at_start(&self, scenario: &Scenario, options: &RunOptions) -> Result<(FlexibleArm, Vec<Caveat>), Error> {
+        let (motion, flexible) = (&scenario.motion, self);
+        runnable(motion, options)?;
+        loops::along_motion(&flexible.rigid, &motion.trajectory)?;
+        balancer::check_motion(&flexible.rigid, &motion.trajectory)?;
+        let arm = self.arm(motion.prescribed()).map_err(|error| flexible.explained(error))?;
+        loaded(self.robot(), scenario, options, arm)
+    }
+
+    /// Checks the whole input of a run and builds its stepper.
+    pub(crate) fn checked(&self, scenario: &Scenario, options: &RunOptions) -> Result<Checked, Error> {
+        let (arm, load_caveats) = self.at_start(scenario, options)?;
+        let arm = Arc::new(arm);
+        let stepper = new_stepper(options.stepper, arm.clone(), options.step_s, scenario.start)
+            .map_err(|error| self.explained(error))?;
+        Ok(Checked { arm, stepper, load_caveats })
+    }
+
+    /// Returns an estimate of the deflections of a run.
+    ///
+    /// # Errors
+    /// As [`Arm::simulate`], as far as errors are found before the first step.
+    pub fn expected(&self, scenario: &Scenario, options: &RunOptions) -> Result<Expected, Error> {
+        let arm = self.checked(scenario, options)?.arm;
+        Ok(Expected::of(&arm, &self.tcp, scenario.duration_s(), scenario.start))
+    }
+}
+
+/// Checks that a motion respects the joint limits, and that the options are valid for it.
+pub fn runnable(motion: &Motion, options: &RunOptions) -> Result<(), Error> {
+    if !motion.violations.is_empty() && !options.ignore_limits {
+        let mut violations: Vec<String> = motion.violations.iter().map(ToString::to_string).collect();
+        if let Some(first) = violations.first_mut().filter(|_| !motion.likely.is_empty()) {
+            *first += &format!(" ({})", motion.likely);
+        }
+        return Err(Error::Limits { path: motion.path.clone(), violations });
+    }
+    check_options(motion, options)
+}
+
+/// Returns the arm with the loads and payloads of a scenario, and the caveats about them.
+pub fn loaded(
+    robot: &Robot,
+    scenario: &Scenario,
+    options: &RunOptions,
+    mut arm: FlexibleArm,
+) -> Result<(FlexibleArm, Vec<Caveat>), Error> {
+    let failed = |source: StepError| Error::Step { source, partial: false };
+    let mut load_caveats = Vec::new();
+    if !scenario.loads.is_empty() || !scenario.payloads.is_empty() {
+        let duration = scenario.duration_s();
+        let mut acting = scenario.acting_on(robot, &arm.model)?;
+        load_caveats = acting.caveats;
+        load_caveats.extend(caveat::motion::of_loads(&acting.loads, duration, &Size::of(&robot.rigid)));
+        if options.stepper.entry().steps != StepRule::ByErrorControl {
+            acting.loads.iter_mut().for_each(|load| stop_within(load, options.step_s));
+            load_caveats.extend(fast_loads(&acting.loads, options.step_s));
+        }
+        arm = arm.with_inertia_changes(acting.changes).map_err(failed)?;
+        arm = arm.with_timed_loads(acting.loads).map_err(failed)?;
+    }
+    Ok((arm, load_caveats))
+}
+
+/// Maximum number of steps of a run (some hours).
+const MOST_STEPS: f64 = 1e9;
+/// Range of the magnification of deflections.
+const MAGNIFICATIONS: std::ops::RangeInclusive<f64> = 1e-3..=1e6;
+
+/// Checks that the options are valid, and that step size and duration give a finite run.
+fn check_options(motion: &Motion, options: &RunOptions) -> Result<(), Error> {
+    let positive =
+        |x: f64, otherwise: fn(f64) -> ValueError| if x.is_finite() && x > 0.0 { Ok(()) } else { Err(otherwise(x)) };
+    positive(options.step_s, ValueError::Step)?;
+    positive(options.log_rate_hz, ValueError::LogRate)?;
+    positive(options.settling_band_m, ValueError::SettlingBand)?;
+    positive(options.magnification.unwrap_or(1.0), ValueError::Magnification)?;
+    if let Some(factor) = options.magnification.filter(|factor| !MAGNIFICATIONS.contains(factor)) {
+        let (least, most) = (*MAGNIFICATIONS.start(), *MAGNIFICATIONS.end());
+        return Err(ValueError::MagnificationRange { found: factor, least, most }.into());
+    }
+    let duration = motion.trajectory.duration();
+    let (step_s, duration_s) = (options.step_s, duration);
+    if step_s > duration_s {
+        return Err(ValueError::StepBeyondMotion { step_s, duration_s }.into());
+    }
+    if duration_s / step_s > MOST_STEPS {
+        return Err(ValueError::TooManySteps { step_s, duration_s, most: MOST_STEPS }.into());
+    }
+    Ok(())
+}
+
+/// Minimum number of steps per period of a load for sufficient accuracy.
+const STEPS_PER_LOAD: f64 = 8.0;
+
+/// Number of steps within a short load: the trapezoidal rule integrates half a sine to 0.14 %.
+const STEPS_OF_SHORT_LOAD: u32 = 24;
+
+/// Maximum number of kinks at which steps end; a table can have one per row.
+const MOST_BENDS: usize = 100;
+
+/// Adds stops within a load that is too short for the step size to resolve.
+fn stop_within(load: &mut Load, h: f64) {
+    let (first, last) = load.wrench.jumps.iter().fold((f64::INFINITY, 0.0f64), |(a, b), t| (a.min(*t), b.max(*t)));
+    let lasts = last - first;
+    if lasts > 0.0 && lasts < f64::from(STEPS_OF_SHORT_LOAD) * h {
+        let inner = (0..=STEPS_OF_SHORT_LOAD).map(|k| first + lasts * f64::from(k) / f64::from(STEPS_OF_SHORT_LOAD));
+        let bends = load.wrench.jumps.iter().copied().take(MOST_BENDS);
+        load.wrench.stops = inner.chain(bends).collect();
+    }
+}
+
+/// Caveats about loads whose period the step size does not resolve.
+fn fast_loads(loads: &[Load], h: f64) -> Vec<Caveat> {
+    let fast = |load: &Load| {
+        let period = load.wrench.period;
+        let steps = period / h;
+        (period != EXPRESSION_PERIOD && steps < STEPS_PER_LOAD).then(|| {
+            let hz = 1.0 / period;
+            let step = Setting::Step;
+            format!("a load of {hz:.1} Hz has {steps:.1} steps per period: it does not act as written; lower {step}")
+        })
+    };
+    let caveat =
+        |text: String| Caveat::from_message("short-load", "loads", text, "lower the step").mended_by(&[Setting::Step]);
+    loads.iter().filter_map(|load| fast(load).map(caveat)).collect()
+}
