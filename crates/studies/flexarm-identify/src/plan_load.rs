@@ -11,13 +11,15 @@ const SHARE: f64 = 0.5;
 /// Smallest force worth hanging on (N).
 const SMALLEST: f64 = 1.0;
 
+/// Holding efforts at a pose, Jacobian of the joints and orientation of the tool.
+type AtPose = (Vec<f64>, Matrix6xX<f64>, Rotation3<f64>);
+
 /// Efforts of the drives at candidate poses under the arm's weight.
 pub(super) struct Efforts {
     joints: Vec<String>,
     limits: Vec<f64>,
-    /// Holding efforts, Jacobian of the joints and orientation of the tool; `None` for poses without
-    /// equilibrium.
-    poses: Vec<Option<(Vec<f64>, Matrix6xX<f64>, Rotation3<f64>)>>,
+    /// `None` for poses without equilibrium.
+    poses: Vec<Option<AtPose>>,
 }
 
 impl Efforts {
