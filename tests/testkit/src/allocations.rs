@@ -15,13 +15,13 @@ thread_local! {
     /// Bytes held, and the most so far: what one thread takes and another gives back is counted
     /// wrongly.
     static HELD: Cell<isize> = const { Cell::new(0) };
-    static MOST: Cell<isize> = const { Cell::new(0) };
+    static MAX: Cell<isize> = const { Cell::new(0) };
 }
 
 fn hold(bytes: isize) {
     let _ = HELD.try_with(|held| {
         held.set(held.get() + bytes);
-        let _ = MOST.try_with(|most| most.set(most.get().max(held.get())));
+        let _ = MAX.try_with(|most| most.set(most.get().max(held.get())));
     });
 }
 
@@ -53,7 +53,7 @@ pub fn count_allocations(work: impl FnOnce()) -> usize {
 /// Most bytes that `work` holds at a time on this thread (with [`CountingAllocator`] installed).
 pub fn most_bytes(work: impl FnOnce()) -> usize {
     let before = HELD.with(Cell::get);
-    MOST.with(|most| most.set(before));
+    MAX.with(|most| most.set(before));
     work();
-    (MOST.with(Cell::get) - before).max(0) as usize
+    (MAX.with(Cell::get) - before).max(0) as usize
 }

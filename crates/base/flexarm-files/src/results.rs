@@ -10,9 +10,9 @@ use std::rc::Rc;
 use crate::FileError;
 
 /// Maximum number of provisional names that are tried.
-const MOST_NAMES: u32 = 10_000;
+const MAX_NAMES: u32 = 10_000;
 /// Maximum number of symbolic links to a file, that of Linux.
-const MOST_LINKS: u32 = 40;
+const MAX_LINKS: u32 = 40;
 
 thread_local! {
     /// Predicate that returns true once the results of this thread are no longer wanted.
@@ -131,7 +131,7 @@ impl Partial {
     /// Error of the file system.
     pub fn create(path: &Path) -> std::io::Result<(File, Self)> {
         let mut end = path.to_owned();
-        for _ in 0..MOST_LINKS {
+        for _ in 0..MAX_LINKS {
             let Ok(next) = end.read_link() else { break };
             end = end.with_file_name(next);
         }
@@ -148,7 +148,7 @@ impl Partial {
                     }
                     return Ok((file, new));
                 }
-                Err(error) if error.kind() == ErrorKind::AlreadyExists && number < MOST_NAMES => number += 1,
+                Err(error) if error.kind() == ErrorKind::AlreadyExists && number < MAX_NAMES => number += 1,
                 Err(error) => return Err(error),
             }
         }

@@ -6,7 +6,7 @@ use std::collections::HashMap;
 use saphyr_parser::{Event, Parser, ScalarStyle};
 
 /// Maximum nesting depth of collections.
-const MOST_NESTED: usize = 40;
+const MAX_NESTED: usize = 40;
 
 /// Text or collection.
 #[derive(Clone, Debug)]
@@ -109,8 +109,8 @@ pub fn read_yaml<'t, E: From<YamlError>>(
             Event::DocumentEnd => anchors.clear(),
             _ => {}
         }
-        if open.len() + done.as_ref().map_or(0, |done| done.height) > MOST_NESTED {
-            return Err(fail(format!("collections are nested more than {MOST_NESTED} deep")));
+        if open.len() + done.as_ref().map_or(0, |done| done.height) > MAX_NESTED {
+            return Err(fail(format!("collections are nested more than {MAX_NESTED} deep")));
         }
         let Some(done) = done else { continue };
         if done.anchor > 0 {

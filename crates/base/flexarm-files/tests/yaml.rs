@@ -3,7 +3,7 @@
 use flexarm_files::{YamlError, YamlValue, read_yaml};
 
 /// Maximum depth of a document.
-const MOST_NESTED: usize = 40;
+const MAX_NESTED: usize = 40;
 
 fn fails(text: &str, most: usize) -> YamlError {
     read_yaml(text, most, |_| Ok::<(), YamlError>(())).unwrap_err()
@@ -32,8 +32,8 @@ fn what_lies_behind_aliases_is_counted_and_as_deep_as_it_would_be_written() {
         format!("a0: &a0 x\n{}", links.collect::<String>())
     };
     // The enclosing map adds one level.
-    assert!(read_yaml(&chain(MOST_NESTED - 1), 10_000, |_| Ok::<(), YamlError>(())).is_ok());
-    let deep = fails(&chain(MOST_NESTED), 10_000);
+    assert!(read_yaml(&chain(MAX_NESTED - 1), 10_000, |_| Ok::<(), YamlError>(())).is_ok());
+    let deep = fails(&chain(MAX_NESTED), 10_000);
     assert_eq!((deep.line, deep.message.contains("nested more than 40 deep")), (41, true), "{deep:?}");
     assert!(fails(&chain(30), 200).message.contains("more than 200 numbers"));
     assert!(fails("a: &a [*a]", 100).message.contains("an alias refers to"));

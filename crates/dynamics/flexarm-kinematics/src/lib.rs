@@ -93,9 +93,7 @@ pub use kinematics::{
 pub use many_starts::{FoundSolution, inverse_kinematics_from_many_starts};
 pub use mechanism::{Joint, JointKind, Limits, Link, LinkInertia, Mechanism, Mimic, RotorCoupling};
 pub use modal::{InterfaceShape, ModalBody};
-pub use model::{
-    Body, Coordinate, ElasticGroup, Frame, JointMotion, MOST_COORDINATES, Model, ModelError, moment_floor,
-};
+pub use model::{Body, Coordinate, ElasticGroup, Frame, JointMotion, MAX_COORDINATES, Model, ModelError, moment_floor};
 pub use redundancy::{NullSpaceRule, RuledSolution, inverse_kinematics_with_rule};
 pub use rnea::{gravity_forces, gravity_forces_at_poses, inverse_dynamics, nonlinear_effects};
 pub use static_tangent::{PointLoad, StaticTangent};

@@ -11,7 +11,7 @@ use flexarm_kinematics::Real;
 use crate::dense::{dot, larger};
 
 /// Maximum number of QL steps per eigenvalue; two are typical.
-const MOST_STEPS: usize = 60;
+const MAX_STEPS: usize = 60;
 
 /// Lower bound of squares used as divisors; the matrix is scaled to about one.
 const SMALLEST: f64 = 1e-280;
@@ -113,7 +113,7 @@ fn ql<T: Real>(d: &mut [T], e: &mut [T]) -> T {
             if !block.end.any_above(l as f64) {
                 break;
             }
-            if step == MOST_STEPS {
+            if step == MAX_STEPS {
                 ended = T::splat(l as f64).pick_below(block.end, T::zero(), ended);
                 break;
             }

@@ -8,10 +8,10 @@ use crate::error::StepError;
 pub(crate) const TOLERANCE: f64 = 1e-13;
 /// Maximum number of iterations, and that with hysteresis: the first loading curve may be soft,
 /// then stiff, and full steps may oscillate between its pieces.
-const MOST_ITERATIONS: [usize; 2] = [30, 200];
+const MAX_ITERATIONS: [usize; 2] = [30, 200];
 /// Maximum number of halvings of a step that leads away from the equilibrium of a gear with
 /// hysteresis.
-pub(crate) const MOST_HALVINGS: usize = 12;
+pub(crate) const MAX_HALVINGS: usize = 12;
 
 /// Forces on the elastic coordinates.
 pub(crate) trait Forces {
@@ -43,7 +43,7 @@ pub(crate) struct Equilibrium {
 /// [`StepError::NoEquilibrium`], and those of the forces.
 pub(crate) fn equilibrium(forces: &mut impl Forces, mut e: DVector<f64>) -> Result<Equilibrium, StepError> {
     let searches = forces.has_hysteresis();
-    let most = MOST_ITERATIONS[usize::from(searches)];
+    let most = MAX_ITERATIONS[usize::from(searches)];
     let (mut residual, mut iterations) = (f64::INFINITY, 0);
     loop {
         let (r, scale) = forces.unbalanced(&e)?;
@@ -63,7 +63,7 @@ pub(crate) fn equilibrium(forces: &mut impl Forces, mut e: DVector<f64>) -> Resu
         }
         // The full step may overshoot for large deflections: no coordinate moves by more than 0.5.
         let mut part = (0.5 / step.amax()).min(1.0);
-        for _ in 0..if searches { MOST_HALVINGS } else { 0 } {
+        for _ in 0..if searches { MAX_HALVINGS } else { 0 } {
             if forces.unbalanced(&(&e - &step * part))?.0.norm() < r.norm() {
                 break;
             }

@@ -50,7 +50,7 @@ pub enum GuideTerm {
 }
 
 /// Maximum number of iterations for the moment; halving the bracket alone needs 60.
-const MOST_ITERATIONS: usize = 100;
+const MAX_ITERATIONS: usize = 100;
 
 impl GuideTerm {
     /// Whether the number is positive in every law.
@@ -121,7 +121,7 @@ impl Guide {
         let half = 0.5 * play.gap / l;
         let (mut low, mut high) = ((theta - half) / C, (theta + half) / C);
         let (mut moment, mut last) = (0.5 * (low + high), high - low);
-        for _ in 0..MOST_ITERATIONS {
+        for _ in 0..MAX_ITERATIONS {
             let [found, slope] = self.tilt(moment, l);
             let off = found - theta;
             if off > 0.0 {

@@ -28,7 +28,7 @@ use crate::system::SecondOrderSystem;
 /// Maximum number of Newton iterations for one set of accelerations.
 const MAX_ITERATIONS: usize = 25;
 /// Maximum number of halvings of a failed step.
-const MOST_HALVINGS: u32 = 6;
+const MAX_HALVINGS: u32 = 6;
 /// Number of iterations above which a step renews the matrix for the next one; at twice this number
 /// it renews the matrix for itself.
 const RENEW_ABOVE: usize = 4;
@@ -309,7 +309,7 @@ impl<M: ImplicitStep> Integrator for M {
         let steps = grid.steps();
         self.newton_mut().last_iterations = 0;
         self.newton_mut().begin_step(steps);
-        cross(self, system, t, dt, MOST_HALVINGS)
+        cross(self, system, t, dt, MAX_HALVINGS)
     }
 
     fn restart(&mut self, system: &mut impl SecondOrderSystem) -> Result<(), StepError> {

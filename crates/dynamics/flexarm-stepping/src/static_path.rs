@@ -20,7 +20,7 @@ const SMALL: f64 = 1e-7;
 /// Corrections below this count as zero (m, rad).
 const NOTHING: f64 = 1e-15;
 /// Maximum number of corrections with one inverse; a current inverse needs three or four.
-const MOST_CORRECTIONS: usize = 8;
+const MAX_CORRECTIONS: usize = 8;
 
 /// Returns a time just before `t` (s), closer than the separation of events.
 pub(crate) fn before(t: f64) -> f64 {
@@ -154,7 +154,7 @@ impl StaticPath {
     fn correct(&mut self, t: f64) -> bool {
         let Some(inverse) = self.inverse.take() else { return false };
         let (mut found, mut last) = (false, f64::INFINITY);
-        for _ in 0..MOST_CORRECTIONS {
+        for _ in 0..MAX_CORRECTIONS {
             self.balance(t);
             product(inverse.as_slice(), self.unbalanced.as_slice(), self.correction.as_mut_slice());
             let size = self.correction.amax();

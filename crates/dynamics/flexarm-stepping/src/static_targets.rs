@@ -14,7 +14,7 @@ use crate::motion::Held;
 /// Accepted error of the tool pose (m, rad).
 const TOLERANCE: f64 = 1e-12;
 /// Maximum number of Newton iterations.
-const MOST_ITERATIONS: usize = 30;
+const MAX_ITERATIONS: usize = 30;
 /// Relative singular value below which the joints cannot move the tool in that direction.
 const RANK: f64 = 1e-6;
 
@@ -85,7 +85,7 @@ pub fn static_targets(
     let rows: Vec<usize> = (0..6).filter(|k| components[*k]).collect();
     let mut targets = DVector::from_column_slice(q);
     let mut before = None;
-    for iterations in 0..=MOST_ITERATIONS {
+    for iterations in 0..=MAX_ITERATIONS {
         let held = arm.along(Arc::new(Held(targets.as_slice().to_vec())));
         let at = linearise(&held, tool, F_T_W, t)?;
         let off = displacement(&wanted, &at.X_WT);
@@ -100,7 +100,7 @@ pub fn static_targets(
             return Ok(StaticTargets { q, before, after, iterations });
         }
         let G = at.command_slopes().unwrap_or_else(|| at.J_a.clone()).select_rows(&rows);
-        if iterations == MOST_ITERATIONS || !G.norm_squared().is_finite() {
+        if iterations == MAX_ITERATIONS || !G.norm_squared().is_finite() {
             let norm = |range: std::ops::Range<usize>| {
                 range.filter(|k| components[*k]).map(|k| off[k].abs()).fold(0.0, f64::max)
             };
@@ -124,7 +124,7 @@ fn lead(servo: &Servo, q: &mut [f64], holding: &DVector<f64>) -> Result<(), Targ
         return Err(TargetError::NothingHolds { joint });
     }
     let (mut data, mut state) = (Data::new(&servo.rigid), State::zeros(&servo.rigid));
-    for _ in 0..MOST_ITERATIONS {
+    for _ in 0..MAX_ITERATIONS {
         state.q.copy_from_slice(q);
         let fed = inverse_dynamics(&servo.rigid, &mut data, &state, &DVector::zeros(n)).clone();
         let mut moved = 0.0f64;
@@ -140,7 +140,7 @@ fn lead(servo: &Servo, q: &mut [f64], holding: &DVector<f64>) -> Result<(), Targ
         }
     }
     let (left_m, left_rad) = (f64::INFINITY, f64::INFINITY);
-    Err(TargetError::NotReached { iterations: MOST_ITERATIONS, left_m, left_rad })
+    Err(TargetError::NotReached { iterations: MAX_ITERATIONS, left_m, left_rad })
 }
 
 /// Returns the tool pose of the rigid arm, with all elastic coordinates zero.

@@ -176,9 +176,9 @@ fn readable(unit: &str) -> (&str, f64) {
 }
 
 /// Maximum number of undetermined combinations in the terminal.
-const MOST_COMBINATIONS: usize = 3;
+const MAX_COMBINATIONS: usize = 3;
 /// Maximum number of parameters in a combination in the terminal.
-const MOST_PARTS: usize = 4;
+const MAX_PARTS: usize = 4;
 
 fn text(found: &Identification) -> String {
     let Identification { robot, measurements, readings, numbers, .. } = found;
@@ -289,13 +289,13 @@ fn encoder_line(gear: &EncoderFigures) -> String {
 /// Lists the first combinations of parameters that the readings do not determine.
 fn combination_lines(untold: &[Vec<Weight>]) -> String {
     let mut out = String::new();
-    for combination in untold.iter().take(MOST_COMBINATIONS) {
+    for combination in untold.iter().take(MAX_COMBINATIONS) {
         let of = |w: &Weight| format!("{:+.2} {}", w.weight, w.name);
-        let parts: Vec<String> = combination.iter().take(MOST_PARTS).map(of).collect();
-        let more = if combination.len() > MOST_PARTS { " ..." } else { "" };
+        let parts: Vec<String> = combination.iter().take(MAX_PARTS).map(of).collect();
+        let more = if combination.len() > MAX_PARTS { " ..." } else { "" };
         out += &format!("not determined: {}{more}\n", parts.join(" "));
     }
-    if let Some(more) = untold.len().checked_sub(MOST_COMBINATIONS).filter(|more| *more > 0) {
+    if let Some(more) = untold.len().checked_sub(MAX_COMBINATIONS).filter(|more| *more > 0) {
         out += &format!("not determined: {more} more combinations (--json and the page list them)\n");
     }
     out

@@ -3,11 +3,11 @@
 use flexarm::written::one_line;
 
 /// Minimum width (columns); narrower terminals are treated like this.
-pub(crate) const LEAST_WIDTH: usize = 40;
+pub(crate) const MIN_WIDTH: usize = 40;
 /// Columns that the longest name leaves free, for a number beside it.
 const BESIDE_A_NAME: usize = 20;
 /// Minimum width of a column of text, unless it is narrower by itself.
-const LEAST_TEXT: usize = 16;
+const MIN_TEXT: usize = 16;
 /// Maximum width of a number with its unit.
 const LONGEST_NUMBER: usize = 24;
 /// Blanks between two columns.
@@ -41,7 +41,7 @@ impl TextTable {
     /// Formats the table in lines of at most `width` columns: names of columns and words are
     /// wrapped; columns that still do not fit follow below, with the labels again.
     pub fn text(&self, width: usize) -> String {
-        let width = width.max(LEAST_WIDTH);
+        let width = width.max(MIN_WIDTH);
         let longest = width - BESIDE_A_NAME;
         let cell = |cell: &String| cell.split(' ').map(|word| shortened(word, longest)).collect::<Vec<_>>().join(" ");
         let rows: Vec<Vec<String>> = self.rows.iter().map(|row| row.iter().map(cell).collect()).collect();
@@ -92,7 +92,7 @@ impl Column {
         let widest = cells().map(columns).max().unwrap_or(0);
         let least = match has_numbers {
             true => widest,
-            false => cells().map(word).max().unwrap_or(0).max(widest.min(LEAST_TEXT)),
+            false => cells().map(word).max().unwrap_or(0).max(widest.min(MIN_TEXT)),
         };
         Self { has_numbers, cells: widest, least: least.max(word(name)), most: widest.max(columns(name)) }
     }

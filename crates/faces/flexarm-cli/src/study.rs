@@ -17,7 +17,7 @@ pub(crate) struct Part<'a> {
 }
 
 /// Maximum number of additional runs.
-const MOST_OTHERS: usize = 50;
+const MAX_OTHERS: usize = 50;
 
 /// Options that apply to the study as a whole.
 const SHARED: [&str; 10] =
@@ -37,10 +37,10 @@ pub(crate) fn caveats(summary: &Summary) -> Vec<Caveat> {
 
 /// Returns the runs of a study, the main one first. `line` is the command line as given.
 pub(crate) fn parts<'a>(main: &'a RunArgs, line: &[OsString]) -> Result<Vec<Part<'a>>, Failure> {
-    if main.with.len() > MOST_OTHERS {
+    if main.with.len() > MAX_OTHERS {
         let found = main.with.len();
         return Err(Failure::Usage(format!(
-            "--with is given {found} times: at most {MOST_OTHERS}, for their curves are drawn over each other; more need runs of their own, \
+            "--with is given {found} times: at most {MAX_OTHERS}, for their curves are drawn over each other; more need runs of their own, \
              with --no-files --json for instance"
         )));
     }

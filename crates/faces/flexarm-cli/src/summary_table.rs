@@ -7,7 +7,7 @@ use anstyle::{AnsiColor, Style};
 use flexarm::written::one_line;
 use flexarm::{Figure, Files, Holds, RecordingFormat, STUDY_NOTE, Summary, Weight, figure_groups, study_rows};
 
-use crate::layout::{LEAST_WIDTH, columns, table, wrapped};
+use crate::layout::{MIN_WIDTH, columns, table, wrapped};
 
 /// Maximum width of the plot (columns); a wider one is no clearer.
 const WIDEST_PLOT: usize = 100;
@@ -25,7 +25,7 @@ pub const ALERT: Style = AnsiColor::Red.on_default().bold();
 
 /// Formats the figures of a run at a given width.
 pub fn summary(summary: &Summary, width: usize) -> String {
-    let width = width.max(LEAST_WIDTH);
+    let width = width.max(MIN_WIDTH);
     let (robot, trajectory, links) =
         (one_line(&summary.robot), one_line(&summary.trajectory), one_line(&summary.links_model));
     let mut out = String::new();

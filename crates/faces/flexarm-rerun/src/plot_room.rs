@@ -20,7 +20,7 @@ const APART: f64 = 20.0;
 /// Maximum relative growth of an axis for a third label.
 const FOR_A_LABEL: f64 = 0.2;
 /// Maximum relative growth of an axis for the legend.
-const MOST_ROOM: f64 = 0.8;
+const MAX_ROOM: f64 = 0.8;
 
 /// Minimum and maximum of curves over the run, in pieces of equal numbers of rows.
 #[derive(Clone, Debug, Default)]
@@ -117,7 +117,7 @@ pub(crate) fn arrange(curves: &[&Envelope], names: &[usize]) -> Option<Arrangeme
     let length = |[low, high]: [f64; 2]| high - low;
     let least = found.into_iter().min_by(|(_, a), (_, b)| length(*a).total_cmp(&length(*b)));
     let (corner, range) = least.unwrap_or(found[0]);
-    let fits = length(range) <= (1.0 + MOST_ROOM) * length(base);
+    let fits = length(range) <= (1.0 + MAX_ROOM) * length(base);
     Some(Arrangement { corner, range: if fits { range } else { base } })
 }
 

@@ -30,9 +30,9 @@ use crate::reduction::{Condensation, Interface, Tie};
 use crate::sparse::{SparseSymmetric, gram};
 
 /// Maximum number of nodes of the larger space; above it the stiffness would take gigabytes.
-const MOST_NODES: usize = 600_000;
+const MAX_NODES: usize = 600_000;
 /// Maximum number of steps; the result is then a lower bound.
-const MOST_STEPS: usize = 80;
+const MAX_STEPS: usize = 80;
 /// Tolerance: energy of a step relative to the energy of the solution.
 const DONE: f64 = 1e-4;
 
@@ -70,7 +70,7 @@ impl OrderCheck {
              it {}{worst:.2} times as far, usual is below {} (by component: {}), so its stiffness is off by {:+.0} %; mesh with \
              elements of second order (quadratic; TET10 instead of TET4), or with more layers through the thickness",
             if worst > 1.0 { "stiff" } else { "soft" },
-            if self.steps >= MOST_STEPS { "at least " } else { "" },
+            if self.steps >= MAX_STEPS { "at least " } else { "" },
             Self::LARGEST_RATIO,
             list.join(", "),
             100.0 * (worst - 1.0)
@@ -94,7 +94,7 @@ pub fn check_order(
     U: &DMatrix<f64>,
 ) -> Result<Option<OrderCheck>, AssemblyError> {
     let added = added_nodes(mesh);
-    if added == 0 || added + mesh.nodes.len() > MOST_NODES {
+    if added == 0 || added + mesh.nodes.len() > MAX_NODES {
         return Ok(None);
     }
     let finer = promoted(mesh);
@@ -208,7 +208,7 @@ impl<'m> Hierarchy<'m> {
         let mut z = self.precondition(condensation, &residual);
         let mut p = z.clone();
         let mut rho = dots(&residual, &z);
-        for step in 0..MOST_STEPS {
+        for step in 0..MAX_STEPS {
             if rho.iter().zip(energy).all(|(rho, energy)| !(rho.abs() > DONE * energy)) {
                 return (x, step);
             }
@@ -229,7 +229,7 @@ impl<'m> Hierarchy<'m> {
             }
             rho = next;
         }
-        (x, MOST_STEPS)
+        (x, MAX_STEPS)
     }
 }
 

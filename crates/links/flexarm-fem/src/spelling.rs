@@ -9,9 +9,9 @@ pub fn nearest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> Opti
 
 /// Joins at most eight of `items` for a message.
 pub fn listed<T: std::fmt::Display>(items: impl IntoIterator<Item = T>) -> String {
-    const MOST: usize = 8;
+    const MAX: usize = 8;
     let mut items = items.into_iter();
-    let shown: Vec<String> = items.by_ref().take(MOST).map(|item| item.to_string()).collect();
+    let shown: Vec<String> = items.by_ref().take(MAX).map(|item| item.to_string()).collect();
     match (shown.is_empty(), items.count()) {
         (true, _) => "none".into(),
         (false, 0) => shown.join(", "),

@@ -10,7 +10,7 @@ use crate::definition::{Definitions, Field, Kind, Many};
 use crate::value::{Node, Value};
 
 /// Maximum nesting depth of structs.
-const MOST_NESTED: usize = 16;
+const MAX_NESTED: usize = 16;
 
 /// Serialisation format.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,7 +26,7 @@ pub(crate) enum DecodeError {
     Encapsulation(u8, u8),
     #[error("it has {0} bytes, fewer than the head of a message")]
     NoHead(usize),
-    #[error("its definition is nested more than {MOST_NESTED} deep")]
+    #[error("its definition is nested more than {MAX_NESTED} deep")]
     Nested,
     #[error("the definition of {0} is missing")]
     NoDefinition(String),
@@ -68,7 +68,7 @@ struct Bytes<'m> {
 
 impl Bytes<'_> {
     fn structure(&mut self, definitions: &Definitions, name: &str, depth: usize) -> Result<Node, DecodeError> {
-        if depth > MOST_NESTED {
+        if depth > MAX_NESTED {
             return Err(DecodeError::Nested);
         }
         let fields = definitions.fields(name).ok_or_else(|| DecodeError::NoDefinition(name.to_owned()))?;

@@ -14,9 +14,9 @@ use crate::value::Node;
 
 /// Maximum number of positions of all topics together: about half a gigabyte with times, velocities
 /// and accelerations.
-const MOST_POSITIONS: usize = 12_000_000;
+const MAX_POSITIONS: usize = 12_000_000;
 /// Maximum number of unrequested joint names kept for messages.
-const MOST_FOREIGN: usize = 1000;
+const MAX_FOREIGN: usize = 1000;
 
 /// Samples of a joint on a topic, by message. Missing values are NaN.
 #[derive(Debug, Default)]
@@ -125,8 +125,8 @@ impl<'a> Collector<'a> {
         if let Err(trouble) = taken {
             topic.trouble = Some(trouble.in_message(&topic.name, topic.count));
         }
-        if self.positions > MOST_POSITIONS {
-            return Err(PlacedProblem::new(Problem::TooManyNumbers { most: MOST_POSITIONS }));
+        if self.positions > MAX_POSITIONS {
+            return Err(PlacedProblem::new(Problem::TooManyNumbers { most: MAX_POSITIONS }));
         }
         Ok(())
     }
@@ -244,7 +244,7 @@ impl Topic {
             self.series.push(Series { joint: joint.to_string(), ..Series::default() });
             Some(self.series.len() - 1)
         } else {
-            if self.foreign.len() < MOST_FOREIGN {
+            if self.foreign.len() < MAX_FOREIGN {
                 self.foreign.push(joint.to_string());
             }
             None
@@ -302,9 +302,9 @@ fn same_topic(asked: &str, name: &str) -> bool {
 }
 
 fn joined(topics: &[String]) -> String {
-    const MOST: usize = 15;
-    let mut text = topics.iter().take(MOST).cloned().collect::<Vec<_>>().join(", ");
-    if topics.len() > MOST {
+    const MAX: usize = 15;
+    let mut text = topics.iter().take(MAX).cloned().collect::<Vec<_>>().join(", ");
+    if topics.len() > MAX {
         text += &format!(", ... ({} in all)", topics.len());
     }
     if text.is_empty() { "none".to_owned() } else { text }

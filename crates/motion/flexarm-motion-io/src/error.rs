@@ -266,12 +266,12 @@ pub enum Problem {
 
 /// Formats names as `"a", "b"`, at most twelve.
 pub(crate) fn list(names: &[String]) -> String {
-    const MOST: usize = 12;
+    const MAX: usize = 12;
     if names.is_empty() {
         return "none".to_owned();
     }
-    let mut shown: Vec<String> = names.iter().take(MOST).map(|name| format!("{name:?}")).collect();
-    if names.len() > MOST {
+    let mut shown: Vec<String> = names.iter().take(MAX).map(|name| format!("{name:?}")).collect();
+    if names.len() > MAX {
         shown.push(format!("... ({} in all)", names.len()));
     }
     shown.join(", ")

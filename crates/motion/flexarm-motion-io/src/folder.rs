@@ -15,7 +15,7 @@ use crate::value::{Node, Value};
 use crate::{MessageMotion, Request, mcap, sqlite, yaml};
 
 /// Maximum size of `metadata.yaml` (bytes).
-const MOST_METADATA: u64 = 16 << 20;
+const MAX_METADATA: u64 = 16 << 20;
 
 /// Reads a rosbag2 folder.
 ///
@@ -34,7 +34,7 @@ fn files_of(folder: &Path) -> Result<Vec<PathBuf>, MotionError> {
     if metadata.is_file() {
         let failed = |source| MotionError::Read { path: metadata.clone(), source };
         let mut text = String::new();
-        File::open(&metadata).and_then(|file| file.take(MOST_METADATA).read_to_string(&mut text)).map_err(failed)?;
+        File::open(&metadata).and_then(|file| file.take(MAX_METADATA).read_to_string(&mut text)).map_err(failed)?;
         yaml::documents(&text, &mut |node| {
             let listed = node.get("rosbag2_bagfile_information").and_then(|node| node.get("relative_file_paths"));
             if let Some(Node { value: Value::List(items), .. }) = listed {

@@ -21,7 +21,7 @@ pub const MCAP_MAGIC: &[u8] = mcap::MAGIC;
 
 /// Maximum size of a record, or of a decompressed chunk, in bytes: the library allocates a chunk
 /// before decompressing it.
-const MOST_BYTES: usize = 256 << 20;
+const MAX_BYTES: usize = 256 << 20;
 /// Number of bytes read at once, regardless of the stated length of a record.
 const READ_BYTES: usize = 64 << 10;
 
@@ -36,7 +36,7 @@ pub(crate) fn collect(
     let options = LinearReaderOptions::default()
         .with_skip_end_magic(true)
         .with_prevalidate_chunk_crcs(true) // a damaged chunk is dropped as a whole
-        .with_record_length_limit(MOST_BYTES);
+        .with_record_length_limit(MAX_BYTES);
     let mut reader = LinearReader::new_with_options(options);
     reader.add_decompressor(Lz4::default()).expect("it has a name");
     let mut known = SchemasAndChannels::default();
@@ -74,7 +74,7 @@ fn in_words(error: McapError) -> String {
         McapError::UnexpectedEof | McapError::UnexpectedEoc => "its end is missing".to_owned(),
         McapError::BadChunkCrc { .. } => "a checksum does not fit".to_owned(),
         McapError::RecordTooLarge { len: length, .. } | McapError::ChunkTooLarge(length) => {
-            format!("a record or chunk has a length of {length} bytes; the limit is {MOST_BYTES}")
+            format!("a record or chunk has a length of {length} bytes; the limit is {MAX_BYTES}")
         }
         McapError::UnsupportedCompression(other) => {
             let zstd = if cfg!(target_family = "wasm") { "" } else { "zstd, " };

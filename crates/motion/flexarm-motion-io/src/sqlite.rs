@@ -10,7 +10,7 @@ use rusqlite::{Connection, OpenFlags};
 
 use crate::collect::Collector;
 use crate::error::{MotionError, PlacedProblem, Problem};
-use crate::unpack::{MOST_BYTES, ZSTD_MAGIC, unpacked};
+use crate::unpack::{MAX_BYTES, ZSTD_MAGIC, unpacked};
 
 /// Collects from a file.
 ///
@@ -138,7 +138,7 @@ fn messages(
         };
         let (Some(&place), Ok(data)) = (places.get(&topic), data.as_blob()) else { continue };
         if data.starts_with(ZSTD_MAGIC) && into.wants(place) {
-            let (message, broken) = unpacked(data, left.min(MOST_BYTES));
+            let (message, broken) = unpacked(data, left.min(MAX_BYTES));
             if let Some(what) = broken {
                 return Ok(Some(what));
             }

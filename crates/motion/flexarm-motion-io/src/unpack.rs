@@ -9,7 +9,7 @@ use crate::mcap;
 /// First bytes of zstd data.
 pub const ZSTD_MAGIC: &[u8] = &[0x28, 0xB5, 0x2F, 0xFD];
 /// Maximum decompressed size of a message or a database (bytes).
-pub(crate) const MOST_BYTES: u64 = 1 << 30;
+pub(crate) const MAX_BYTES: u64 = 1 << 30;
 
 /// Returns the bytes of zstd data before its end or an error, and the reason for the error.
 ///
@@ -95,9 +95,9 @@ pub(crate) fn look_inside(path: &Path, most: u64) -> Result<Inside, MotionError>
         return Err(PlacedProblem::new(Problem::NotRead { what }).of(&origin));
     }
     let mut bytes = Vec::new();
-    whole.take(MOST_BYTES + 1).read_to_end(&mut bytes).map_err(failed)?;
-    if bytes.len() as u64 > MOST_BYTES {
-        let problem = Problem::TooLarge { most: MOST_BYTES, mend: "unpack it with zstd -d" };
+    whole.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(failed)?;
+    if bytes.len() as u64 > MAX_BYTES {
+        let problem = Problem::TooLarge { most: MAX_BYTES, mend: "unpack it with zstd -d" };
         return Err(PlacedProblem::new(problem).of(&origin));
     }
     Ok(Inside::Database(bytes))

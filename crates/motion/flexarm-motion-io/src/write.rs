@@ -5,7 +5,7 @@ use std::fmt::Write;
 use flexarm_trajectory::{Trajectory, TrajectoryError};
 
 /// Maximum number of points in a file.
-const MOST_POINTS: f64 = 5e6;
+const MAX_POINTS: f64 = 5e6;
 
 /// Text format of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,7 +29,7 @@ pub fn write_joint_trajectory(
 ) -> Result<String, TrajectoryError> {
     let duration_s = trajectory.duration();
     let intervals = duration_s * rate_hz;
-    if !(rate_hz > 0.0 && rate_hz.is_finite() && intervals <= MOST_POINTS) {
+    if !(rate_hz > 0.0 && rate_hz.is_finite() && intervals <= MAX_POINTS) {
         return Err(TrajectoryError::BadRate { rate_hz, duration_s });
     }
     let n = trajectory.joints().len();

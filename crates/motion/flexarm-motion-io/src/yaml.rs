@@ -10,7 +10,7 @@ use crate::error::{PlacedProblem, Problem};
 use crate::value::{Node, Value};
 
 /// Maximum number of values of a text, with those behind aliases counted each time.
-const MOST_VALUES: usize = 20_000_000;
+const MAX_VALUES: usize = 20_000_000;
 
 /// Calls `take` with each document in turn, so that a long recording is not in memory twice.
 pub(crate) fn documents(
@@ -19,7 +19,7 @@ pub(crate) fn documents(
 ) -> Result<(), PlacedProblem> {
     // There are few keys, which occur often; they are shared.
     let mut keys = HashMap::new();
-    read_yaml(text, MOST_VALUES, |root| take(node(root, &mut keys)))
+    read_yaml(text, MAX_VALUES, |root| take(node(root, &mut keys)))
 }
 
 impl From<YamlError> for PlacedProblem {

@@ -14,8 +14,8 @@ use crate::time_law::{Bound, Law, PathPoint};
 /// Number of points along a route with few stations, and minimum and maximum number of parts per
 /// station.
 const POINTS: usize = 2000;
-const LEAST_PARTS: usize = 2;
-const MOST_PARTS: usize = 8;
+const MIN_PARTS: usize = 2;
+const MAX_PARTS: usize = 8;
 /// Fractions of the time between two knots of a law at which its limits are checked.
 const CHECKED: [f64; 4] = [0.0, 0.25, 0.5, 0.75];
 /// A limit is near above this fraction of it, in squared speeds.
@@ -92,7 +92,7 @@ impl<'a> Limits<'a> {
 
     /// Adds points between the stations, so that short routes have many.
     pub(crate) fn divided(&mut self, stations: &[PathPoint]) -> Vec<PathPoint> {
-        let parts = (POINTS / stations.len()).clamp(LEAST_PARTS, MOST_PARTS);
+        let parts = (POINTS / stations.len()).clamp(MIN_PARTS, MAX_PARTS);
         let mut points = Vec::with_capacity(parts * stations.len());
         for (k, pair) in stations.windows(2).enumerate() {
             points.push(pair[0].clone());

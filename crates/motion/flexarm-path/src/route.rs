@@ -23,12 +23,12 @@ const SHORTEST_BLEND: f64 = 1e-7;
 /// Deceleration assumed for a blend by speed if the program gives none (m/s²).
 const BRAKING: f64 = 2.0;
 /// Minimum number of intervals of a piece.
-const LEAST_INTERVALS: usize = 24;
+const MIN_INTERVALS: usize = 24;
 /// Minimum number of intervals of a piece shorter than the spacing, of which milling programs have
 /// many.
-const LEAST_OF_SHORT: usize = 6;
+const MIN_OF_SHORT: usize = 6;
 /// Maximum number of intervals before the path is refined.
-const MOST_INTERVALS: usize = 4000;
+const MAX_INTERVALS: usize = 4000;
 /// Maximum number of halvings of an interval.
 const HALVINGS: usize = 12;
 
@@ -381,8 +381,8 @@ fn slower(a: &Speed, b: &Speed) -> Speed {
 }
 
 fn intervals(length: f64, options: &PathOptions) -> usize {
-    let least = if length < options.spacing_m { LEAST_OF_SHORT } else { LEAST_INTERVALS };
-    ((length / options.spacing_m).ceil() as usize).clamp(least, MOST_INTERVALS)
+    let least = if length < options.spacing_m { MIN_OF_SHORT } else { MIN_INTERVALS };
+    ((length / options.spacing_m).ceil() as usize).clamp(least, MAX_INTERVALS)
 }
 
 /// Points of a path in joint space.

@@ -29,7 +29,7 @@ const SAME_TIME: f64 = 1e-6;
 /// Maximum deviation of the joint curves over time from the path (rad or m).
 const KEPT: f64 = 1e-10;
 /// Maximum number of intervals of the law between two knots.
-const MOST_INTERVALS: usize = 64;
+const MAX_INTERVALS: usize = 64;
 /// Maximum number of halvings between two knots.
 const HALVINGS: usize = 10;
 /// Maximum deviation of joint jerks over time from those along the path, relative to their bounds.
@@ -251,7 +251,7 @@ impl<'r> Schedule<'r> {
             push(knots, now, next.clone());
             last = next;
             k += skip + 1;
-            stride = (2 * stride).min(MOST_INTERVALS);
+            stride = (2 * stride).min(MAX_INTERVALS);
         }
         let by_leg = self.pieces_by_leg();
         moves.extend((0..self.route.legs.len()).map(|leg| self.planned(leg, &by_leg, now)));

@@ -11,7 +11,7 @@
 const STANDS_OUT: f64 = 10.0;
 /// Number of changes of slope considered on either side, and minimum number required.
 const AROUND: usize = 4;
-const LEAST_AROUND: usize = 2;
+const MIN_AROUND: usize = 2;
 /// Smaller jumps are left to the spline; fraction of the top speed.
 const SMALLEST: f64 = 1e-4;
 /// Numbers of samples on either side of a corner, over which rounded data must differ from a smooth
@@ -85,7 +85,7 @@ impl<'a> Samples<'a> {
     /// `None` with too few samples nearby.
     fn around(&self, i: usize, j: usize) -> Option<(f64, f64, f64)> {
         let (left, right) = (i.saturating_sub(AROUND).max(1)..i, j + 1..self.last.min(j + 1 + AROUND));
-        if left.len() < LEAST_AROUND || right.len() < LEAST_AROUND {
+        if left.len() < MIN_AROUND || right.len() < MIN_AROUND {
             return None;
         }
         let acceleration = |k: usize| self.change(k) / self.span(k);

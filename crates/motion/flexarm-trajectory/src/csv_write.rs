@@ -8,7 +8,7 @@ use crate::error::TrajectoryError;
 use crate::trajectory::Trajectory;
 
 /// Maximum number of rows; more means a wrong rate.
-const MOST_ROWS: f64 = 1e8;
+const MAX_ROWS: f64 = 1e8;
 
 impl Trajectory {
     /// Writes positions, velocities and accelerations in SI units: one row every `1 / rate_hz` s
@@ -20,7 +20,7 @@ impl Trajectory {
     pub fn to_csv(&self, rate_hz: f64, mut out: impl Write) -> Result<(), TrajectoryError> {
         let duration_s = self.duration();
         let intervals = duration_s * rate_hz;
-        if !(rate_hz > 0.0 && rate_hz.is_finite() && intervals <= MOST_ROWS) {
+        if !(rate_hz > 0.0 && rate_hz.is_finite() && intervals <= MAX_ROWS) {
             return Err(TrajectoryError::BadRate { rate_hz, duration_s });
         }
         writeln!(out, "# unit: rad")?;

@@ -6,7 +6,7 @@ use crate::warning::Warning;
 /// A step is a gap if it exceeds this multiple of the usual step.
 const GAP: f64 = 4.0;
 /// Minimum number of steps from which the usual step is determined.
-const LEAST_STEPS: usize = 10;
+const MIN_STEPS: usize = 10;
 /// Maximum usual step of samples (s); longer steps are those of waypoints.
 const LONGEST_STEP: f64 = 0.1;
 /// Minimum fraction of the steps within a factor of two of their median in evenly sampled data.
@@ -22,7 +22,7 @@ const EVEN: f64 = 0.75;
 /// * `times`: times from the first sample, increasing (s).
 pub(crate) fn gaps(times: &[f64], joints: &[JointSamples]) -> Option<Warning> {
     let steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    if steps.len() < LEAST_STEPS {
+    if steps.len() < MIN_STEPS {
         return None;
     }
     let mut sorted = steps.clone();

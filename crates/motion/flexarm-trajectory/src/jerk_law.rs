@@ -117,8 +117,8 @@ const NEAR: f64 = 0.97;
 /// Number of intervals over a rise of the acceleration in the last round.
 const OF_RISE: f64 = 10.0;
 /// Minimum and maximum number of intervals over the duration, not counting the stations.
-const LEAST: f64 = 200.0;
-const MOST: f64 = 30_000.0;
+const MIN: f64 = 200.0;
+const MAX: f64 = 30_000.0;
 /// Rounds of the search: factor of the interval length, and relative gap to the optimal duration at
 /// the start and at the end of the round.
 const ROUNDS: [(f64, [f64; 2]); 2] = [(4.0, [0.1, 1e-3]), (1.0, [1e-2, 1e-5])];
@@ -142,7 +142,7 @@ pub fn least_time_with_jerks(
     rise: f64,
     place: &mut dyn FnMut(usize, f64) -> PathBounds,
 ) -> QuinticLaw {
-    let step = |duration: f64| (rise / OF_RISE).min(duration / LEAST).max(duration / MOST);
+    let step = |duration: f64| (rise / OF_RISE).min(duration / MIN).max(duration / MAX);
     let mut law = QuinticLaw::along(law, stations, ROUNDS[0].0 * step(law.duration()));
     for (round, gap) in ROUNDS {
         law = law.divided(round * step(law.duration()));

@@ -24,7 +24,7 @@ use crate::trajectory::Trajectory;
 use crate::waypoints_check::{Located, bad_value, joint_names, scales};
 
 /// Maximum number of rows written.
-const MOST_ROWS: f64 = 5e6;
+const MAX_ROWS: f64 = 5e6;
 
 /// The whole file.
 #[derive(Debug, Deserialize)]
@@ -107,7 +107,7 @@ impl Trajectory {
     pub fn to_samples_toml(&self, rate_hz: f64) -> Result<String, TrajectoryError> {
         let duration_s = self.duration();
         let intervals = duration_s * rate_hz;
-        if !(rate_hz > 0.0 && rate_hz.is_finite() && intervals <= MOST_ROWS) {
+        if !(rate_hz > 0.0 && rate_hz.is_finite() && intervals <= MAX_ROWS) {
             return Err(TrajectoryError::BadRate { rate_hz, duration_s });
         }
         let n = self.joints().len();

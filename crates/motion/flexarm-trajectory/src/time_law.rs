@@ -93,9 +93,9 @@ pub enum LawError {
     Infeasible(usize),
 }
 
-/// Paths with fewer intervals than this are divided, each interval into at most `MOST_PARTS` parts.
+/// Paths with fewer intervals than this are divided, each interval into at most `MAX_PARTS` parts.
 const INTERVALS: usize = 4000;
-const MOST_PARTS: usize = 128;
+const MAX_PARTS: usize = 128;
 /// Relative to `b`, a factor of `u` below this counts as zero.
 const NO_FACTOR: f64 = 1e-12;
 
@@ -206,7 +206,7 @@ pub fn least_time(points: &[PathPoint]) -> Result<Vec<f64>, LawError> {
     if let Some(k) = (1..n).find(|&k| points[k].s.partial_cmp(&points[k - 1].s) != Some(std::cmp::Ordering::Greater)) {
         return Err(LawError::Points(k));
     }
-    let parts = (INTERVALS / (n - 1)).clamp(1, MOST_PARTS);
+    let parts = (INTERVALS / (n - 1)).clamp(1, MAX_PARTS);
     if parts == 1 {
         return least_time_at(points);
     }

@@ -221,9 +221,9 @@ impl fmt::Display for Warning {
 
 /// Lists the first few names.
 fn some(names: &[String]) -> String {
-    const MOST: usize = 8;
-    let mut shown: Vec<String> = names.iter().take(MOST).map(|name| format!("{name:?}")).collect();
-    if names.len() > MOST {
+    const MAX: usize = 8;
+    let mut shown: Vec<String> = names.iter().take(MAX).map(|name| format!("{name:?}")).collect();
+    if names.len() > MAX {
         shown.push(format!("... ({} in all)", names.len()));
     }
     shown.join(", ")

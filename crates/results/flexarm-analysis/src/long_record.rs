@@ -1,6 +1,6 @@
 //! A record that grows during a run with bounded memory.
 //!
-//! Up to [`LongRecord::MOST`] samples all are kept, and the figures are those of
+//! Up to [`LongRecord::MAX`] samples all are kept, and the figures are those of
 //! [`tcp_metrics_on_path`]. Beyond that, finished stops are evaluated and their samples dropped,
 //! and figures of the whole record are accumulated sample by sample, by the same sums. Exceptions
 //! to exactness:
@@ -26,7 +26,7 @@ use crate::repeated_pose::repeated_poses;
 const RINGING: usize = 1 << 15;
 const ARRIVAL: usize = 64;
 /// Maximum number of blocks of the curve of maximum errors; beyond it pairs are merged.
-const MOST_BLOCKS: usize = 1 << 13;
+const MAX_BLOCKS: usize = 1 << 13;
 
 /// One sample: see the fields of [`ErrorRecord`].
 #[derive(Debug, Clone, Copy)]
@@ -73,14 +73,14 @@ pub struct LongRecord {
 impl LongRecord {
     /// Maximum number of samples kept individually: 65,536, which is 2 minutes and 11 seconds at
     /// 500 samples per second and takes 8 MB.
-    pub const MOST: usize = 1 << 16;
+    pub const MAX: usize = 1 << 16;
 
     /// Creates an empty record of a motion with these moves (start and end, s, ascending). If
     /// `rests_there`, the TCP comes to rest at the static part of its error, which is then the
     /// final value of stops ([`ErrorRecord::quasi_static`]).
     #[must_use]
     pub fn new(moves: Vec<(f64, f64)>, rests_there: bool, settings: MetricSettings) -> Self {
-        Self { rests_there, ..Self::keeping(Self::MOST, moves, settings) }
+        Self { rests_there, ..Self::keeping(Self::MAX, moves, settings) }
     }
 
     /// Works as [`LongRecord::new`] with another maximum number of samples, for tests.
@@ -439,7 +439,7 @@ impl Curve {
             }
             return;
         }
-        if self.blocks.len() == MOST_BLOCKS {
+        if self.blocks.len() == MAX_BLOCKS {
             self.blocks = self.blocks.chunks(2).map(|pair| pair.iter().copied().fold(0.0, f64::max)).collect();
             self.size *= 2;
         }

@@ -76,7 +76,7 @@ pub enum ShaperError {
 /// Number of grid points per period of the fastest mode.
 const PER_PERIOD: f64 = 24.0;
 /// Maximum delay in periods of the fastest mode.
-const MOST_PERIODS: f64 = 25.0;
+const MAX_PERIODS: f64 = 25.0;
 /// Number of frequencies at which the band of a mode is evaluated.
 const IN_BAND: usize = 21;
 /// Maximum width of the band.
@@ -161,8 +161,8 @@ fn check(modes: &[ShapedMode], delay_s: f64, band: f64) -> Result<(), ShaperErro
         }
     }
     let periods = delay_s * modes.iter().map(|mode| mode.hz).fold(0.0, f64::max);
-    if periods > MOST_PERIODS {
-        return Err(ShaperError::Long { delay_s, periods, most: MOST_PERIODS });
+    if periods > MAX_PERIODS {
+        return Err(ShaperError::Long { delay_s, periods, most: MAX_PERIODS });
     }
     Ok(())
 }

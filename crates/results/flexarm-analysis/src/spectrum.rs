@@ -6,7 +6,7 @@
 use std::f64::consts::{PI, TAU};
 
 /// Maximum number of samples that are transformed.
-const MOST_SAMPLES: usize = 1 << 14;
+const MAX_SAMPLES: usize = 1 << 14;
 /// Minimum number of samples for a spectrum.
 const FEWEST_SAMPLES: usize = 16;
 /// Minimum number of cycles of a line within the record.
@@ -135,12 +135,12 @@ impl Tapered {
         let scale = signal.iter().flatten().fold(0.0, |peak: f64, x| peak.max(x.abs()));
         let (mut samples, step) = match taper {
             Taper::FadeOut => {
-                let n = times.len().min(MOST_SAMPLES);
+                let n = times.len().min(MAX_SAMPLES);
                 evenly(&times[..n], &signal[..n])
             }
             Taper::Both => {
                 let (samples, step) = evenly(times, signal);
-                let block = samples.len().div_ceil(MOST_SAMPLES);
+                let block = samples.len().div_ceil(MAX_SAMPLES);
                 (samples.chunks_exact(block).map(mean).collect(), step * block as f64)
             }
         };

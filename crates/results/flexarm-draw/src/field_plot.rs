@@ -13,7 +13,7 @@ use crate::palette::magnitude;
 use crate::plot::{Area, Axes, Chart, PlotError, axes, ink, picture, plain, three_digits};
 
 /// Maximum number of cells along an axis of the picture.
-const MOST_CELLS: usize = 120;
+const MAX_CELLS: usize = 120;
 /// Number of shades of the scale.
 const SHADES: u8 = 48;
 /// Longest side of the field of cells (pixels), and sides of the field of named cells.
@@ -81,7 +81,7 @@ impl FieldPlot<'_> {
 
     fn draw(&self, scale: [f64; 2]) -> Result<String, PlotError> {
         // Drawn cells, each a whole number of pixels.
-        let every = if self.names.is_some() { [1, 1] } else { self.count.map(|n| n.div_ceil(MOST_CELLS)) };
+        let every = if self.names.is_some() { [1, 1] } else { self.count.map(|n| n.div_ceil(MAX_CELLS)) };
         let shown = [0, 1].map(|k| self.count[k].div_ceil(every[k]));
         let steps = [0, 1].map(|k| {
             let [first, last] = self.ranges[k];

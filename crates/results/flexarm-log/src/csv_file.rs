@@ -50,7 +50,7 @@ struct Lines {
 }
 
 /// Buffer size above which lines are written to the file (bytes).
-const MOST_WAITING: usize = 128 << 10;
+const MAX_WAITING: usize = 128 << 10;
 
 impl Lines {
     fn new(file: File) -> Self {
@@ -75,7 +75,7 @@ impl Lines {
     }
 
     fn is_full(&self) -> bool {
-        self.waiting.len() > MOST_WAITING
+        self.waiting.len() > MAX_WAITING
     }
 
     /// Writes the buffered lines. On failure they are dropped, and the file is cut back to its last

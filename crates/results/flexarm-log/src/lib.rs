@@ -113,7 +113,7 @@ pub mod internals {
     #[cfg(feature = "mcap")]
     pub use crate::mcap_file::channels::topic_names;
     #[cfg(feature = "mcap")]
-    pub use crate::mcap_file::markers::{MOST_POINTS, Path, thinned};
+    pub use crate::mcap_file::markers::{MAX_POINTS, Path, thinned};
     #[cfg(feature = "mcap")]
     pub use crate::mcap_file::messages::{decode, encode};
     #[cfg(feature = "mcap")]

@@ -6,7 +6,7 @@
 use crate::{ElasticSample, TraceRow};
 
 /// Maximum number of blocks, more than a page has points for.
-const MOST_BLOCKS: usize = 4096;
+const MAX_BLOCKS: usize = 4096;
 
 /// A scalar of a run over time, as shown in curves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -166,7 +166,7 @@ impl Blocks {
         self.way += norm(&[0, 1, 2].map(|c| row.rigid_m[c] - self.last_m[c]));
         self.last_m = row.rigid_m;
         if self.is_empty() || self.filled == self.size {
-            if self.times.len() == MOST_BLOCKS {
+            if self.times.len() == MAX_BLOCKS {
                 self.halve();
             }
             self.times.push([row.time_s; 2]);
@@ -188,7 +188,7 @@ impl Blocks {
 
     /// Merges every two blocks into one.
     fn halve(&mut self) {
-        for k in 0..MOST_BLOCKS / 2 {
+        for k in 0..MAX_BLOCKS / 2 {
             self.times[k] = [self.times[2 * k][0], self.times[2 * k + 1][1]];
             self.ways[k] = [self.ways[2 * k][0], self.ways[2 * k + 1][1]];
             let second = std::mem::take(&mut self.ranges[2 * k + 1]);
@@ -198,8 +198,8 @@ impl Blocks {
             self.ranges[2 * k + 1] = second;
             self.ranges.swap(k, 2 * k);
         }
-        self.times.truncate(MOST_BLOCKS / 2);
-        self.ways.truncate(MOST_BLOCKS / 2);
+        self.times.truncate(MAX_BLOCKS / 2);
+        self.ways.truncate(MAX_BLOCKS / 2);
         self.size *= 2;
     }
 

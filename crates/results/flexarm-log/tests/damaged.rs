@@ -6,7 +6,7 @@ use flexarm_log::{CreateOptions, RecordingFormat, open_recording};
 use flexarm_testkit::allocations::most_bytes;
 
 /// Maximum memory for reading a small file (bytes).
-const MOST_BYTES: usize = 200 << 20;
+const MAX_BYTES: usize = 200 << 20;
 const CHANGES: u64 = 1000;
 
 /// Pseudo-random numbers with a fixed sequence (xorshift).
@@ -51,7 +51,7 @@ fn a_damaged_recording_is_read_or_refused_in_bounded_memory() {
             let most = most_bytes(|| {
                 outcome = open_recording(&path, format).and_then(|mut run| run.replay(&mut |_| Ok(())).map(|_| ()));
             });
-            assert!(most < MOST_BYTES, "{format}, change {kind}: {most} bytes");
+            assert!(most < MAX_BYTES, "{format}, change {kind}: {most} bytes");
             match outcome {
                 Ok(()) => read += 1,
                 Err(error) => {

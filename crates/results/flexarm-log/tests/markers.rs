@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use flexarm_log::internals::{MOST_POINTS, Path, thinned};
+use flexarm_log::internals::{MAX_POINTS, Path, thinned};
 use flexarm_log::{LinkMesh, TwinSample};
 
 /// A square of `2 n²` triangles.
@@ -36,8 +36,8 @@ fn a_path_keeps_its_first_and_last_point_however_long_it_is() {
         let X_WT = flexarm_kinematics::Pose::translation(f64::from(k), 0.0, 0.0);
         path.push(&TwinSample { X_WT, ..TwinSample::default() });
         let points = path.points();
-        assert!(points.len() <= MOST_POINTS);
+        assert!(points.len() <= MAX_POINTS);
         assert_eq!((points[0][0], points[points.len() - 1][0]), (0.0, k as f32));
     }
-    assert!(path.points().len() > MOST_POINTS / 2);
+    assert!(path.points().len() > MAX_POINTS / 2);
 }

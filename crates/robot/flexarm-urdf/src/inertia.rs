@@ -162,8 +162,8 @@ fn check_moments(
 /// Warns about joints that move no mass, whose inertia is missing in the results. Many such joints
 /// give one warning.
 fn tell_massless(robot: &RawRobot, massless: Vec<(TextPosition, Problem)>, report: &mut Report) {
-    const MOST: usize = 3;
-    if massless.len() <= MOST {
+    const MAX: usize = 3;
+    if massless.len() <= MAX {
         for (place, problem) in massless {
             report.warning(&place, problem.code(), problem.to_string(), problem.help());
         }

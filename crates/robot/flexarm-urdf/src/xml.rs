@@ -77,16 +77,16 @@ pub(crate) fn decode(bytes: Vec<u8>, file: &Path) -> Result<String, Box<Issue>> 
 
 /// Maximum number of attributes of an element, and of namespace declarations in a text, since
 /// parsers compare every pair. Real descriptions have up to a hundred and a dozen.
-const MOST_ATTRIBUTES: usize = 500;
+const MAX_ATTRIBUTES: usize = 500;
 
 /// Maximum number of prefixes that are declared for a text.
-const MOST_PREFIXES: usize = 20;
+const MAX_PREFIXES: usize = 20;
 
 /// Returns the tree of the text, or the first syntax error. Limits the attributes before any parser
 /// sees them.
 pub(crate) fn parse<'t>(text: &'t str, lines: &Lines<'_>) -> Result<Document<'t>, Box<Issue>> {
     if let Some((at, what)) = crowded(text) {
-        return Err(Box::new(issue(lines.place(at), format!("more than {MOST_ATTRIBUTES} {what}"), "fewer")));
+        return Err(Box::new(issue(lines.place(at), format!("more than {MAX_ATTRIBUTES} {what}"), "fewer")));
     }
     Document::parse(text).map_err(|error| Box::new(describe(text, lines, &error)))
 }
@@ -105,7 +105,7 @@ pub(crate) fn declared<'t>(text: &'t str, lines: &Lines<'_>) -> (Cow<'t, str>, V
             let is_name = prefix.starts_with(char::is_alphabetic)
                 && prefix.chars().all(|c| c.is_alphanumeric() || "_-.".contains(c));
             let known = ["xml", "xmlns", "xacro"].contains(&prefix) || missing.iter().any(|(name, _)| name == prefix);
-            if is_name && !known && missing.len() < MOST_PREFIXES && !text.contains(&format!("xmlns:{prefix}")) {
+            if is_name && !known && missing.len() < MAX_PREFIXES && !text.contains(&format!("xmlns:{prefix}")) {
                 missing.push((prefix.to_owned(), lines.place(at)));
             }
         }
@@ -117,13 +117,13 @@ pub(crate) fn declared<'t>(text: &'t str, lines: &Lines<'_>) -> (Cow<'t, str>, V
 
 /// Returns the place and kind of an excess of attributes or namespaces.
 fn crowded(text: &str) -> Option<(usize, &'static str)> {
-    if let Some((at, _)) = text.match_indices("xmlns").nth(MOST_ATTRIBUTES) {
+    if let Some((at, _)) = text.match_indices("xmlns").nth(MAX_ATTRIBUTES) {
         return Some((at, "declared name spaces"));
     }
     // Parsers stop at a '<' within a tag.
     let elements = tags(text).filter_map(|(at, tag, _)| Some((at, tag[1..].split('<').next()?)));
     let mut elements = elements.filter(|(_, tag)| !tag.starts_with(['!', '?']));
-    let crowded = elements.find(|(_, tag)| tag.match_indices('=').nth(MOST_ATTRIBUTES).is_some());
+    let crowded = elements.find(|(_, tag)| tag.match_indices('=').nth(MAX_ATTRIBUTES).is_some());
     crowded.map(|(at, _)| (at, "attributes in one element"))
 }
 

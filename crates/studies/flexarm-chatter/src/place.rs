@@ -19,7 +19,7 @@ use flexarm_run::posed::Posed;
 use flexarm_run::response::pose_in_words;
 
 /// Minimum number of poses along a motion.
-const LEAST_PLACES: usize = 2;
+const MIN_PLACES: usize = 2;
 /// Speed below which the tool counts as at rest (m/s).
 const STANDS: f64 = 1e-5;
 /// Sine of the angle to the tool's axis below which a feed counts as parallel to it.
@@ -62,8 +62,8 @@ impl CutPose {
         motion: &Motion,
         n: usize,
     ) -> Result<(Vec<Self>, usize), Error> {
-        if n < LEAST_PLACES {
-            return Err(LobesError::Places { found: n, least: LEAST_PLACES }.into());
+        if n < MIN_PLACES {
+            return Err(LobesError::Places { found: n, least: MIN_PLACES }.into());
         }
         let model = robot.rigid_model()?;
         let names: Vec<&str> = model.coordinates().iter().map(|c| c.joint.as_str()).collect();

@@ -176,7 +176,7 @@ const POINTS: usize = 101;
 /// Valid range of cutter diameters.
 const DIAMETER: Quantity = Quantity { unit: "m", least: 1e-6, most: 2.0 };
 /// Maximum number of spindle speeds.
-const MOST_POINTS: usize = 10_000;
+const MAX_POINTS: usize = 10_000;
 
 const LENGTHS: [(&str, f64); 2] = [("m", 1.0), ("mm", 1e-3)];
 const ANGLES: [(&str, f64); 2] = [("rad", 1.0), ("deg", std::f64::consts::PI / 180.0)];
@@ -384,7 +384,7 @@ impl Reader<'_> {
             (Some(list), None, None) if e.points.is_none() => {
                 let rpm = list.get_ref();
                 let ascending = rpm.windows(2).all(|pair| pair[0] < pair[1]);
-                if rpm.is_empty() || !ascending || rpm.len() > MOST_POINTS || rpm[0] <= 0.0 {
+                if rpm.is_empty() || !ascending || rpm.len() > MAX_POINTS || rpm[0] <= 0.0 {
                     return Err(self.error(list.span(), "rpm must be positive, ascending speeds (1/min)"));
                 }
                 self.located(list.span(), Quantity::SPEED.check_all("rpm", rpm))?;
@@ -398,9 +398,9 @@ impl Reader<'_> {
                     return Err(self
                         .error(to.span(), format!("speeds from {low} to {high} 1/min: to must be greater than from")));
                 }
-                if !(2..=MOST_POINTS).contains(&points) {
+                if !(2..=MAX_POINTS).contains(&points) {
                     let span = e.points.as_ref().map_or(entry.span(), Spanned::span);
-                    return Err(self.error(span, format!("points = {points}: expected 2 to {MOST_POINTS}")));
+                    return Err(self.error(span, format!("points = {points}: expected 2 to {MAX_POINTS}")));
                 }
                 Ok((0..points).map(|k| low + (high - low) * k as f64 / (points - 1) as f64).collect())
             }

@@ -55,7 +55,7 @@ const SAMPLE_S: f64 = 1e-3;
 /// Maximum step size (s): the error is sampled with it.
 const LONGEST_STEP_S: f64 = 4e-3;
 /// Maximum number of iterations of a request.
-const MOST_ITERATIONS: usize = 100;
+const MAX_ITERATIONS: usize = 100;
 /// Maximum duration of a motion (s): all of it is held in memory, with a sample per millisecond.
 const LONGEST_S: f64 = 600.0;
 
@@ -352,7 +352,7 @@ fn check(scenario: &Scenario, request: &CompensateRequest, arm: &Arc<Arm>) -> Re
     if found > LONGEST_S {
         return Err(CompensateError::Value { what: "the duration of the motion", found, expected: "at most 600 s" });
     }
-    if request.iterations > MOST_ITERATIONS {
+    if request.iterations > MAX_ITERATIONS {
         let found = request.iterations as f64;
         return Err(CompensateError::Value { what: "the number of iterations", found, expected: "at most 100" });
     }

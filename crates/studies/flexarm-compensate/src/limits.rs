@@ -22,7 +22,7 @@ const SAME: f64 = 1e-3;
 /// Margin of a slowed motion below a limit.
 const ROOM: f64 = 1.01;
 /// Maximum number of attempts at slowing a motion.
-const MOST_TIMES: usize = 6;
+const MAX_TIMES: usize = 6;
 /// Maximum factor by which a motion is slowed.
 const SLOWEST: f64 = 5.0;
 
@@ -80,7 +80,7 @@ pub(super) fn kept(
 ) -> Result<(Compensation, MotionPair), Error> {
     let mut scenario = scenario.clone();
     let mut slowed = 1.0;
-    for _ in 0..MOST_TIMES {
+    for _ in 0..MAX_TIMES {
         let (mut answer, found, own) = attempt(robot, arm, &scenario, request, stop)?;
         answer.slowed = slowed;
         if slowed > 1.0 {

@@ -22,7 +22,7 @@ const RESTS: f64 = 1e-9;
 /// Fraction of the maximum vibration below which a mode is ignored.
 const SMALL: f64 = 1e-3;
 /// Maximum number of modes, and of periods of a mode within the delay.
-const MOST: (usize, f64) = (8, 20.0);
+const MAX: (usize, f64) = (8, 20.0);
 /// Offsets, in units of the band, of the frequencies at which the spectrum of a motion is
 /// evaluated.
 const IN_BAND: [f64; 5] = [-1.0, -0.5, 0.0, 0.5, 1.0];
@@ -91,7 +91,7 @@ pub(super) fn shaped(arm: &Arc<Arm>, scenario: &Scenario, shaping: Shaping) -> R
         }
         Shaping::Optimal { delay_s, band } => {
             let delay_s = delay_s.unwrap_or_else(|| 1.0 / first.damped_frequency_hz());
-            let modes = end.vibrations(band, MOST.1 / delay_s);
+            let modes = end.vibrations(band, MAX.1 / delay_s);
             let found = Shaper::optimal(&modes, delay_s, band).map_err(CompensateError::from)?;
             ("optimal", found.shaper, band, modes)
         }
@@ -200,7 +200,7 @@ impl AtEnd {
         all.sort_by(|a, b| b.vibration.total_cmp(&a.vibration));
         let most = all.first().map_or(0.0, |mode| mode.vibration);
         all.retain(|mode| mode.vibration >= SMALL * most);
-        all.truncate(MOST.0);
+        all.truncate(MAX.0);
         all
     }
 }

@@ -19,7 +19,7 @@ use flexarm_run::Error;
 use flexarm_run::Robot;
 
 /// Maximum number of suspicious readings in the result.
-const MOST_SUSPICIOUS: usize = 10;
+const MAX_SUSPICIOUS: usize = 10;
 
 /// Result of `flexarm identify`.
 #[derive(Clone, Debug, Serialize)]
@@ -414,7 +414,7 @@ pub(super) fn answer(
     let measurements = &input.measurements;
     let compared = compared(plant, measurements, found);
     let (residual, held_out) = residuals(found, &compared);
-    let suspicious = found.suspicious.iter().take(MOST_SUSPICIOUS).map(|k| Suspicious {
+    let suspicious = found.suspicious.iter().take(MAX_SUSPICIOUS).map(|k| Suspicious {
         reading: compared[*k].name.clone(),
         measured: compared[*k].measured,
         expected: compared[*k].after,

@@ -88,7 +88,7 @@ pub(super) fn caveats(found: &Identified) -> Vec<Caveat> {
 }
 
 /// Maximum number of names in a message.
-const MOST_NAMES: usize = 8;
+const MAX_NAMES: usize = 8;
 
 /// Lists names; those that differ in their last part alone as one.
 fn grouped(names: &[&str]) -> String {
@@ -105,8 +105,8 @@ fn grouped(names: &[&str]) -> String {
         (false, [last]) => format!("{head}.{last}"),
         (false, lasts) => format!("{head}.{{{}}}", lasts.join(", ")),
     };
-    let mut all: Vec<String> = groups.iter().take(MOST_NAMES).map(one).collect();
-    let more: usize = groups.iter().skip(MOST_NAMES).map(|(_, lasts)| lasts.len()).sum();
+    let mut all: Vec<String> = groups.iter().take(MAX_NAMES).map(one).collect();
+    let more: usize = groups.iter().skip(MAX_NAMES).map(|(_, lasts)| lasts.len()).sum();
     all.extend((more > 0).then(|| format!("and {more} more")));
     all.join(", ")
 }

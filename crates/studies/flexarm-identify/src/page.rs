@@ -10,7 +10,7 @@ use flexarm_run::html_page::{ENDING, opening, warnings};
 use flexarm_settings::written::markup;
 
 /// Maximum number of plotted samples of a recording.
-const MOST_SAMPLES: usize = 1500;
+const MAX_SAMPLES: usize = 1500;
 
 /// Returns the HTML page.
 pub(super) fn html(answer: &Identification) -> String {
@@ -151,7 +151,7 @@ fn response_plot(response: &ResponseCurves) -> String {
 /// Plots the deflection of a gear over time: measured, and predicted from its torque.
 fn encoder_plot(gear: &EncoderFigures) -> String {
     let panel = |(number, ([measured, expected], step_s)): (usize, (&[Vec<f64>; 2], &f64))| {
-        let every = measured.len().div_ceil(MOST_SAMPLES).max(1);
+        let every = measured.len().div_ceil(MAX_SAMPLES).max(1);
         let curve = |name: &str, look, y: &[f64]| PlotCurve {
             name: name.into(),
             look,

@@ -20,7 +20,7 @@ use flexarm_run::Error;
 /// Maximum size of a universal file (bytes).
 const LARGEST: u64 = 1 << 30;
 /// Maximum number of points of one response.
-const MOST_POINTS: usize = 20_000;
+const MAX_POINTS: usize = 20_000;
 /// Standard gravity, the unit `g` of accelerometers (m/s²).
 const GRAVITY: f64 = 9.80665;
 
@@ -186,9 +186,9 @@ impl Reader<'_> {
                 e.file.span(),
                 format!("{}: no nonzero value from {from} to {to} Hz: check from and to", curve.name),
             )),
-            n if n > MOST_POINTS => Err(self.error(
+            n if n > MAX_POINTS => Err(self.error(
                 e.file.span(),
-                format!("{}: {n} frequencies, the maximum is {MOST_POINTS}: use from, to and every", curve.name),
+                format!("{}: {n} frequencies, the maximum is {MAX_POINTS}: use from, to and every", curve.name),
             )),
             _ => Ok(kept),
         }

@@ -7,7 +7,7 @@
 use nalgebra::Complex;
 
 /// Maximum number of values of a function.
-const MOST: usize = 10_000_000;
+const MAX: usize = 10_000_000;
 /// Number of header lines before the values of a function.
 const HEAD: usize = 11;
 /// Function type of a frequency response.
@@ -47,7 +47,7 @@ pub enum UffError {
     Unexpected { line: usize, expected: &'static str, found: String },
     #[error("line {line}: expected `58b`, byte order (1 or 2), number format (2), lines and bytes; found {found:?}")]
     Binary { line: usize, found: String },
-    #[error("line {line}: the number of values is {count}, expected a whole number up to {MOST}")]
+    #[error("line {line}: the number of values is {count}, expected a whole number up to {MAX}")]
     Count { line: usize, count: f64 },
     #[error("line {line}: form {form} of values is not known; use 2, 4, 5 or 6")]
     Form { line: usize, form: i64 },
@@ -185,7 +185,7 @@ impl ValueForm {
         else {
             return Err(reader.unexpected("form, number and spacing of the values", text));
         };
-        if !(0.0..=MOST as f64).contains(&count) || count.fract() != 0.0 {
+        if !(0.0..=MAX as f64).contains(&count) || count.fract() != 0.0 {
             return Err(UffError::Count { line, count });
         }
         let even = (spacing == 1.0).then_some((first, step));

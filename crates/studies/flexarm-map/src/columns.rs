@@ -6,7 +6,7 @@ use super::MapError;
 use flexarm_chatter::CuttingTool;
 
 /// Maximum number of natural frequencies of a map.
-pub(super) const MOST_FREQUENCIES: usize = 12;
+pub(super) const MAX_FREQUENCIES: usize = 12;
 
 /// A column of a map.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -81,7 +81,7 @@ impl Layout {
         matrix: bool,
     ) -> Self {
         let elastic = arm.n_elastic_coordinates();
-        let frequencies = frequencies.min(elastic).min(MOST_FREQUENCIES);
+        let frequencies = frequencies.min(elastic).min(MAX_FREQUENCIES);
         let mut columns: Vec<MapColumn> = HEAD.iter().map(|(name, meaning)| place(name, meaning)).collect();
         columns.extend(
             joints.iter().map(|(joint, slides)| {

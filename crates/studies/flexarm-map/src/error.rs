@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use flexarm_run::ExternalError;
 use flexarm_settings::{Fault, Setting};
 
-use super::MOST_PLACES;
+use super::MAX_PLACES;
 
 /// An error of a map.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -111,7 +111,7 @@ pub enum MapError {
         points: usize,
     },
     /// A list of poses that is empty or too long.
-    #[error("the list has {found} poses, expected one to {MOST_PLACES}")]
+    #[error("the list has {found} poses, expected one to {MAX_PLACES}")]
     Poses {
         /// Number of poses.
         found: usize,
@@ -120,7 +120,7 @@ pub enum MapError {
     #[error("no joint is given for the map to vary")]
     NoJoints,
     /// An invalid number of instants of a motion.
-    #[error("a map along a motion needs from one to {MOST_PLACES} instants")]
+    #[error("a map along a motion needs from one to {MAX_PLACES} instants")]
     Instants,
     /// An unknown quantity.
     #[error("the map has no quantity {found:?} to compare poses by; it has {}", known.join(", "))]

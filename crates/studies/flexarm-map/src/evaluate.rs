@@ -6,7 +6,7 @@ use flexarm_kinematics::Wrench;
 use flexarm_stepping::{OperatingPoint, PoseAnswer, PoseOutputs};
 use nalgebra::{Matrix3, Matrix6, Vector3};
 
-use super::columns::{HEAD, Layout, MOST_FREQUENCIES};
+use super::columns::{HEAD, Layout, MAX_FREQUENCIES};
 use flexarm_chatter::{CuttingTool, lowest_limit};
 use flexarm_run::Error;
 use flexarm_run::Modelling;
@@ -25,12 +25,12 @@ pub(super) struct Seat {
 #[derive(Clone, Copy)]
 struct GravityResult {
     sag: [f64; 6],
-    hz: [f64; MOST_FREQUENCIES],
+    hz: [f64; MAX_FREQUENCIES],
 }
 
 impl GravityResult {
     fn new(found: &PoseAnswer, layout: &Layout) -> Self {
-        let mut hz = [f64::NAN; MOST_FREQUENCIES];
+        let mut hz = [f64::NAN; MAX_FREQUENCIES];
         hz[..layout.frequencies].copy_from_slice(&found.frequencies_hz[..layout.frequencies]);
         Self { sag: tcp_error(&found.rigid_tcp_pose, &found.tcp_pose), hz }
     }

@@ -50,7 +50,7 @@ pub use error::MapError;
 pub use placement::Placement;
 pub use poses::read_poses;
 pub use recording::{quantity_text, readable as readable_quantity, titled as quantity_title};
-pub use region::{Grid, JointRange, MOST_PLACES, MapRegion, ToolDirections, WorkspaceGrid};
+pub use region::{Grid, JointRange, MAX_PLACES, MapRegion, ToolDirections, WorkspaceGrid};
 pub use table::{MapPose, MapTable, QUANTILES, Spread};
 
 /// Parts that the tests of this crate reach; not part of the interface.
@@ -66,7 +66,7 @@ pub mod internals {
 use self::columns::Layout;
 use self::evaluate::{Cut, Evaluator};
 use self::finder::Finder;
-use self::region::{MOST_QUERIES, round_number};
+use self::region::{MAX_QUERIES, round_number};
 use self::take::{Choice, Evaluation, Places, PoseOf, take};
 use flexarm_chatter::{CuttingTool, LobesError, lowest_limit};
 use flexarm_run::Arm;
@@ -385,15 +385,15 @@ fn region_of<'m>(
             let spacing = workspace.spacing_m.unwrap_or_else(|| round_number(edge.max(1e-3) / usual));
             let grid = Grid::within(bounds, spacing)?;
             let queries = grid.places() as f64 * rotations.len() as f64;
-            if queries > MOST_QUERIES {
-                return Err(MapError::TooManyDirections { found: queries, most: MOST_QUERIES }.into());
+            if queries > MAX_QUERIES {
+                return Err(MapError::TooManyDirections { found: queries, most: MAX_QUERIES }.into());
             }
             Ok((Region::Grid(grid, Box::new(finder), found), caveats))
         }
         MapRegion::Joints(ranges) => joint_region(ranges, model, near),
         MapRegion::Poses(poses) => poses::region(poses, model),
         MapRegion::Along { motion, points } => {
-            if !(1..=MOST_PLACES).contains(points) {
+            if !(1..=MAX_PLACES).contains(points) {
                 return Err(MapError::Instants.into());
             }
             let (n, trajectory, points) = (near.len(), &motion.trajectory, *points);
@@ -438,8 +438,8 @@ fn joint_region<'m>(ranges: &'m [JointRange], model: &Model, near: &[f64]) -> Re
         numbers.push(k);
         poses *= *points as f64;
     }
-    if poses > MOST_PLACES as f64 {
-        return Err(MapError::TooMany { places: poses, most: MOST_PLACES }.into());
+    if poses > MAX_PLACES as f64 {
+        return Err(MapError::TooMany { places: poses, most: MAX_PLACES }.into());
     }
     let near = near.to_vec();
     let values = move |pose: usize, q: &mut Vec<f64>| {

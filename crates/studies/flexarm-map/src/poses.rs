@@ -8,7 +8,7 @@ use flexarm_settings::{OutOfRange, Quantity};
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::region::MOST_PLACES;
+use super::region::MAX_PLACES;
 use super::{MapError, Region};
 use flexarm_run::Caveat;
 use flexarm_run::Error;
@@ -149,7 +149,7 @@ fn some(poses: Vec<Vec<f64>>) -> Result<Vec<Vec<f64>>, PoseListError> {
 pub(super) fn region<'m>(poses: &'m [Vec<f64>], model: &Model) -> Result<(Region<'m>, Vec<Caveat>), Error> {
     let actuated = &model.coordinates()[..model.n_actuated()];
     let names: Vec<&str> = actuated.iter().map(|c| c.joint.as_str()).collect();
-    if !(1..=MOST_PLACES).contains(&poses.len()) {
+    if !(1..=MAX_PLACES).contains(&poses.len()) {
         return Err(MapError::Poses { found: poses.len() }.into());
     }
     let mut caveats = Vec::new();

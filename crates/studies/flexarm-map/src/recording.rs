@@ -20,9 +20,9 @@ use flexarm_run::record::robot_header;
 use flexarm_settings::written::markdown;
 
 /// Maximum number of points in a view; larger maps are thinned.
-const MOST_POINTS: usize = 300_000;
+const MAX_POINTS: usize = 300_000;
 /// Maximum number of ellipsoids.
-const MOST_ELLIPSOIDS: usize = 400;
+const MAX_ELLIPSOIDS: usize = 400;
 /// Duration for which each pose is shown (s).
 const SHOWN_S: f64 = 2.0;
 /// Fractions of the places with better values than the iso-surfaces.
@@ -192,7 +192,7 @@ pub(super) fn scale(values: &[f64]) -> [f64; 2] {
 
 fn scenery(map: &Map, grid: Option<&Grid>) -> Vec<Scenery> {
     let place = |k: usize| [0, 1, 2].map(|c| map.table.row(k)[c] as f32);
-    let every = map.table.rows().div_ceil(MOST_POINTS).max(1);
+    let every = map.table.rows().div_ceil(MAX_POINTS).max(1);
     let rows: Vec<usize> = (0..map.table.rows()).step_by(every).collect();
     let size = size_of(map, grid);
     let mut all = Vec::new();
@@ -285,7 +285,7 @@ fn ellipsoids(map: &Map, size: f32) -> Option<Scenery> {
     let worst = index("compliance_worst_m_per_n")?;
     let scale = scale(&map.table.at(worst));
     // An odd stride, so that the ellipsoids are not all in one plane of the grid.
-    let every = map.table.rows().div_ceil(MOST_ELLIPSOIDS).max(1) | 1;
+    let every = map.table.rows().div_ceil(MAX_ELLIPSOIDS).max(1) | 1;
     let rows = (0..map.table.rows()).step_by(every);
     let apart = size * (every as f32).cbrt();
     let (mut places, mut half_axes_m, mut quaternions, mut colors) = (vec![], vec![], vec![], vec![]);

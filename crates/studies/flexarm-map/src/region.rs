@@ -6,9 +6,9 @@ use nalgebra::{Matrix3, Rotation3, Translation3, Unit, Vector3};
 use super::MapError;
 
 /// Maximum number of places and of rows of a map, held in memory with about 300 bytes each.
-pub const MOST_PLACES: usize = 5_000_000;
+pub const MAX_PLACES: usize = 5_000_000;
 /// Maximum number of places times directions, to bound the run time.
-pub(super) const MOST_QUERIES: f64 = 1e8;
+pub(super) const MAX_QUERIES: f64 = 1e8;
 /// Golden angle (rad) of the spiral of cone directions.
 const GOLDEN_RAD: f64 = 2.399_963_229_728_653;
 
@@ -166,8 +166,8 @@ impl Grid {
         // An edge that is a multiple of the spacing includes both its ends.
         let steps = [0, 1, 2].map(|c| ((upper[c] - lower[c]) / spacing_m + 1e-9).floor());
         let places = steps.iter().map(|n| n + 1.0).product::<f64>();
-        if places > MOST_PLACES as f64 {
-            return Err(MapError::TooMany { places, most: MOST_PLACES });
+        if places > MAX_PLACES as f64 {
+            return Err(MapError::TooMany { places, most: MAX_PLACES });
         }
         let first = |c: usize| lower[c] + 0.5 * (upper[c] - lower[c] - steps[c] * spacing_m).max(0.0);
         Ok(Self { lower: [first(0), first(1), first(2)], spacing_m, count: steps.map(|n| n as usize + 1) })

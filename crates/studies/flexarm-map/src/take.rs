@@ -13,12 +13,12 @@ use super::columns::{Layout, PLACE, cheapest};
 use super::evaluate::{Evaluator, Seat};
 use super::finder::Finder;
 use super::region::{Grid, pose_at};
-use super::{KeptPoses, MOST_PLACES, MapError};
+use super::{KeptPoses, MAX_PLACES, MapError};
 
 /// Number of places per task of a thread.
 const CHUNK: usize = 64;
 /// Number of waiting poses at which they are evaluated; the poses of one place are never split.
-const MOST_WAITING: usize = 256;
+const MAX_WAITING: usize = 256;
 /// Number of places whose rows are added up at once.
 const BLOCK: usize = 8192;
 
@@ -126,8 +126,8 @@ pub(super) fn take(
         if stopped.load(Relaxed) {
             return Ok(taken);
         }
-        if taken.rows.len() / choice.layout.width() > MOST_PLACES {
-            return Err(MapError::TooManyRows { most: MOST_PLACES });
+        if taken.rows.len() / choice.layout.width() > MAX_PLACES {
+            return Err(MapError::TooManyRows { most: MAX_PLACES });
         }
     }
     if let Ok(go_on) = go_on.into_inner() {
@@ -182,7 +182,7 @@ impl<'a> Worker<'a> {
                     self.seats.push(Seat { place, direction: 0, branch: 0 });
                 }
             }
-            if self.seats.len() >= MOST_WAITING {
+            if self.seats.len() >= MAX_WAITING {
                 self.answer(&mut taken, go_on);
             }
         }

@@ -10,7 +10,7 @@ use super::gears::three_digits;
 use super::place::Placed;
 
 /// Maximum plausible effort limit of a joint of an arm (N m).
-const MOST_EFFORT: f64 = 1e6;
+const MAX_EFFORT: f64 = 1e6;
 
 /// Quotes a text as a TOML string, also for keys.
 fn quoted(text: &str) -> String {
@@ -161,7 +161,7 @@ fn held(t: &mut String, draft: &Draft) -> std::fmt::Result {
 fn efforts(t: &mut String, draft: &Draft) -> std::fmt::Result {
     let of_arm = draft.joints.iter().filter(|j| j.effort_fault.is_some()).map(|j| &j.joint);
     let known = |effort: f64| of_arm.clone().any(|joint| joint.limits.effort == effort);
-    let is_senseless = |effort: f64| effort <= 0.0 || effort > MOST_EFFORT || known(effort);
+    let is_senseless = |effort: f64| effort <= 0.0 || effort > MAX_EFFORT || known(effort);
     let held = draft.chain.held.iter().map(|&(k, _)| &draft.urdf.mechanism.joints[k]);
     let held = held.filter(|joint| is_senseless(joint.limits.effort));
     let named: Vec<String> = of_arm

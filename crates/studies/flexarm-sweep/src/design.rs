@@ -43,7 +43,7 @@ pub(super) struct Design {
 }
 
 /// Maximum number of runs of a study.
-const MOST_RUNS: u64 = 5_000_000;
+const MAX_RUNS: u64 = 5_000_000;
 
 impl Column {
     /// Returns a column of a parameter entry.
@@ -121,13 +121,12 @@ impl Design {
             fail(&file.sample_place, message)
         })?;
         let points = if drawn.is_empty() { 1 } else { sample.points() };
-        let runs =
-            sizes.iter().try_fold(points as u64, |all, n| all.checked_mul(*n as u64)).filter(|n| *n <= MOST_RUNS);
+        let runs = sizes.iter().try_fold(points as u64, |all, n| all.checked_mul(*n as u64)).filter(|n| *n <= MAX_RUNS);
         let Some(runs) = runs else {
             let place = columns.first().map_or(&file.sample_place, |column| &column.place);
             return Err(fail(
                 place,
-                format!("the study has more than {MOST_RUNS} runs: use fewer values, or a sample instead of a grid"),
+                format!("the study has more than {MAX_RUNS} runs: use fewer values, or a sample instead of a grid"),
             ));
         };
         Ok(Self { columns, sizes, directions, drawn, derived, sample, runs: runs as usize })

@@ -177,7 +177,7 @@ pub(super) const TABLE: &str = "the table of runs";
 /// Default number of values in a range.
 const USUAL_STEPS: usize = 5;
 /// Maximum number of levels of a parameter, and of points of a sample.
-const MOST_VALUES: i64 = 1_000_000;
+const MAX_VALUES: i64 = 1_000_000;
 
 /// Reads the file of a study.
 ///
@@ -285,9 +285,9 @@ fn sample(
 
 fn count(value: &Spanned<i64>, what: &str, least: i64, source: &Source) -> Result<usize, RobotFileError> {
     match *value.get_ref() {
-        n if (least..=MOST_VALUES).contains(&n) => Ok(n as usize),
+        n if (least..=MAX_VALUES).contains(&n) => Ok(n as usize),
         n => {
-            let message = format!("{what} = {n}: expected a whole number from {least} to {MOST_VALUES}");
+            let message = format!("{what} = {n}: expected a whole number from {least} to {MAX_VALUES}");
             Err(source.error(value.span(), message))
         }
     }

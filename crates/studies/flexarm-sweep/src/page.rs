@@ -14,16 +14,16 @@ use flexarm_run::html_page::{ENDING, opening, warnings};
 use flexarm_settings::written::markup;
 
 /// Maximum number of metrics with plots.
-const MOST_METRICS: usize = 4;
+const MAX_METRICS: usize = 4;
 /// Maximum number of columns in the scatter matrix.
-const MOST_COLUMNS: usize = 8;
+const MAX_COLUMNS: usize = 8;
 /// Maximum number of points of a scatter plot, and of each plot in the scatter matrix.
-const MOST_POINTS: usize = 1500;
-const MOST_IN_MATRIX: usize = 1000;
+const MAX_POINTS: usize = 1500;
+const MAX_IN_MATRIX: usize = 1000;
 /// Maximum number of panels in a row of effects.
-const MOST_PANELS: usize = 6;
+const MAX_PANELS: usize = 6;
 /// Maximum number of parameter values with a heat map row or column each.
-const MOST_CELLS: usize = 40;
+const MAX_CELLS: usize = 40;
 /// Number of rows or columns for parameters with more values.
 const BINS: usize = 10;
 
@@ -76,7 +76,7 @@ impl Sweep {
 
     /// Returns the rankings of the metrics with plots.
     fn rankings(&self, columns: &Columns) -> Vec<Ranking> {
-        (0..self.metrics.len().min(MOST_METRICS)).map(|metric| self.ranking(columns, metric)).collect()
+        (0..self.metrics.len().min(MAX_METRICS)).map(|metric| self.ranking(columns, metric)).collect()
     }
 
     /// Lists the parameters that matter, and those whose effect cannot be distinguished from
@@ -157,7 +157,7 @@ impl Sweep {
                 let points = effect.groups.iter().map(|g| [factor * g.x, g.mean, g.std_error]).collect();
                 Some(EffectPanel { x_label: &labels[*p], y_label: &metric.name, points })
             };
-            let panels: Vec<EffectPanel<'_>> = ranking.matter.iter().take(MOST_PANELS).filter_map(panel).collect();
+            let panels: Vec<EffectPanel<'_>> = ranking.matter.iter().take(MAX_PANELS).filter_map(panel).collect();
             if !panels.is_empty() {
                 rows.push(panels);
             }
@@ -170,7 +170,7 @@ impl Sweep {
         let Some(pareto) = &summary.pareto else { return String::new() };
         let place = |name: &String| self.metrics.iter().position(|metric| metric.name == *name);
         let (Some(a), Some(b)) = (place(&pareto.metrics[0]), place(&pareto.metrics[1])) else { return String::new() };
-        let every = columns.runs.len().div_ceil(MOST_POINTS).max(1);
+        let every = columns.runs.len().div_ceil(MAX_POINTS).max(1);
         let all = columns.metrics[a].iter().zip(&columns.metrics[b]).step_by(every);
         let points: Vec<[f64; 2]> = all.map(|(x, y)| [*x, *y]).collect();
         let front: Vec<[f64; 2]> = pareto.runs.iter().map(|run| run.values).collect();
@@ -240,12 +240,12 @@ impl Sweep {
     }
 
     fn matrix(&self, columns: &Columns, ranking: Option<&Ranking>) -> String {
-        let every = columns.runs.len().div_ceil(MOST_IN_MATRIX).max(1);
+        let every = columns.runs.len().div_ceil(MAX_IN_MATRIX).max(1);
         let thinned = |values: &[f64]| -> Vec<f64> { values.iter().copied().step_by(every).collect() };
-        let metrics = self.metrics.len().min(MOST_METRICS);
+        let metrics = self.metrics.len().min(MAX_METRICS);
         let ranked = ranking.map(|r| r.matter.iter().map(|(p, _)| *p).chain(r.untold.iter().copied()));
         let mut named: Vec<(String, Vec<f64>)> = Vec::new();
-        for p in ranked.into_iter().flatten().take(MOST_COLUMNS - metrics) {
+        for p in ranked.into_iter().flatten().take(MAX_COLUMNS - metrics) {
             if let Some(x) = self.shown_values(p, columns) {
                 named.push((self.shown(p).0, thinned(&x)));
             }
@@ -295,7 +295,7 @@ fn cells(values: &[f64]) -> (Vec<String>, Vec<Option<usize>>) {
     let mut levels: Vec<f64> = values.iter().copied().filter(|x| x.is_finite()).collect();
     levels.sort_by(f64::total_cmp);
     levels.dedup();
-    if levels.len() <= MOST_CELLS {
+    if levels.len() <= MAX_CELLS {
         let place = |x: &f64| levels.iter().position(|level| level == x);
         return (levels.iter().map(|x| number(*x)).collect(), values.iter().map(place).collect());
     }

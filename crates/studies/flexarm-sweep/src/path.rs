@@ -13,7 +13,7 @@ use super::value::ParameterValue;
 /// Keys that name the entries of a list.
 const NAMES: [&str; 3] = ["joint", "link", "name"];
 /// Maximum number of similar paths listed in addition to the closest one.
-const MOST_TOLD: usize = 6;
+const MAX_TOLD: usize = 6;
 
 /// Segment of a path.
 #[derive(Clone, Debug, PartialEq)]
@@ -219,7 +219,7 @@ pub(super) fn near(path: &str, known: &[String]) -> String {
     let most = known.iter().map(alike).max().unwrap_or(0);
     let mut others: Vec<&String> =
         known.iter().filter(|other| alike(other) == most && meant.as_ref() != Some(*other)).collect();
-    others.truncate(MOST_TOLD);
+    others.truncate(MAX_TOLD);
     let listed: Vec<String> = others.iter().map(|other| format!("{other:?}")).collect();
     match (meant, listed.is_empty()) {
         (Some(meant), true) => format!("did you mean {meant:?}?"),

@@ -179,7 +179,7 @@ pub(super) struct Columns {
 }
 
 /// Maximum number of reported reasons.
-const MOST_REASONS: usize = 10;
+const MAX_REASONS: usize = 10;
 
 impl Sweep {
     /// Converts results to columns.
@@ -367,6 +367,6 @@ fn failures(answers: &[(&Answer, Vec<ParameterValue>)]) -> Vec<FailureFigures> {
         found[place].runs += 1;
     }
     found.sort_by(|a, b| b.runs.cmp(&a.runs).then(a.first.cmp(&b.first)));
-    found.truncate(MOST_REASONS);
+    found.truncate(MAX_REASONS);
     found
 }

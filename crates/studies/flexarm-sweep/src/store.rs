@@ -261,9 +261,9 @@ impl Collected {
 
 /// Shortens a list to its first few entries.
 fn shortened(list: &[String]) -> String {
-    const MOST: usize = 5;
-    match list.len() > MOST {
-        true => format!("{} and {} more", list[..MOST].join(", "), list.len() - MOST),
+    const MAX: usize = 5;
+    match list.len() > MAX {
+        true => format!("{} and {} more", list[..MAX].join(", "), list.len() - MAX),
         false => list.join(", "),
     }
 }

@@ -77,7 +77,7 @@ use wrist::Wrist;
 const CAPTURE: f64 = 3e-3;
 
 /// Maximum number of solutions of any class.
-const MOST_SOLUTIONS: usize = 16;
+const MAX_SOLUTIONS: usize = 16;
 
 /// Maximum pose residual of a solution (m, times the reach if that is above 1 m; rad).
 pub const POSE_TOLERANCE: f64 = 1e-12;
@@ -168,7 +168,7 @@ pub struct Solution {
 /// All solutions of one query; reusable.
 #[derive(Clone, Copy, Debug)]
 pub struct Solutions {
-    list: List<Solution, MOST_SOLUTIONS>,
+    list: List<Solution, MAX_SOLUTIONS>,
     miss: Option<Miss>,
 }
 
@@ -208,7 +208,7 @@ impl Solutions {
                 *twin = solution;
             }
             twin.free = free;
-        } else if self.len() < MOST_SOLUTIONS {
+        } else if self.len() < MAX_SOLUTIONS {
             self.list.push(solution);
         }
     }

@@ -139,19 +139,19 @@ impl Fan {
 }
 
 /// Maximum degree of a [`TrigPolynomial`].
-const MOST: usize = 4;
+const MAX: usize = 4;
 
 /// `c_0 + 2 Re sum_k c_k e^{i k t}` of degree at most four; `c_0` is real.
 #[derive(Clone, Copy, Debug)]
 pub struct TrigPolynomial {
-    c: [Complex<f64>; MOST + 1],
+    c: [Complex<f64>; MAX + 1],
     degree: usize,
 }
 
 impl TrigPolynomial {
     /// `k + a cos t + b sin t`.
     pub fn affine(k: f64, a: f64, b: f64) -> Self {
-        let mut c = [Complex::new(0.0, 0.0); MOST + 1];
+        let mut c = [Complex::new(0.0, 0.0); MAX + 1];
         c[0].re = k;
         c[1] = Complex::new(0.5 * a, -0.5 * b);
         Self { c, degree: 1 }
@@ -166,7 +166,7 @@ impl TrigPolynomial {
     pub fn times(&self, other: &Self) -> Self {
         let degree = self.degree + other.degree;
         let (n, m) = (self.degree as isize, other.degree as isize);
-        let mut c = [Complex::new(0.0, 0.0); MOST + 1];
+        let mut c = [Complex::new(0.0, 0.0); MAX + 1];
         for (k, c) in c.iter_mut().enumerate().take(degree + 1) {
             let k = k as isize;
             for j in (k - m).max(-n)..=n.min(k + m) {
@@ -202,7 +202,7 @@ impl TrigPolynomial {
     /// of all roots, which are then not solutions.
     ///
     /// The polynomial `z^n f(z)` of degree 2n is solved by Aberth's simultaneous iteration.
-    pub fn roots(&self, width: f64) -> List<f64, { 2 * MOST }> {
+    pub fn roots(&self, width: f64) -> List<f64, { 2 * MAX }> {
         let mut angles = List::new(0.0);
         let largest = self.c.iter().fold(0.0_f64, |m, c| m.max(c.norm()));
         let mut degree = self.degree;
@@ -226,9 +226,9 @@ impl TrigPolynomial {
     }
 
     /// Complex roots of `z^n f(z)`.
-    fn aberth(&self, degree: usize) -> [Complex<f64>; 2 * MOST] {
+    fn aberth(&self, degree: usize) -> [Complex<f64>; 2 * MAX] {
         let n = 2 * degree;
-        let mut z = [Complex::new(0.0, 0.0); 2 * MOST];
+        let mut z = [Complex::new(0.0, 0.0); 2 * MAX];
         for (j, z) in z.iter_mut().enumerate().take(n) {
             // Start values off the circle and irregular: values on the circle, or mirrored in it,
             // would remain so.

@@ -9,7 +9,7 @@ use crate::model::{JointMotion, Model};
 
 /// Maximum number of Newton iterations after the closed form. Rigid links need one as confirmation,
 /// flexible links three or four.
-const MOST_ITERATIONS: usize = 12;
+const MAX_ITERATIONS: usize = 12;
 
 impl Solved {
     /// Computes the dependent coordinates from (1) into `q`, the joint poses of the loops into
@@ -44,7 +44,7 @@ impl Solved {
         };
         // Newton's method on (1), with J at the current poses.
         let mut last = f64::INFINITY;
-        for _ in 0..MOST_ITERATIONS {
+        for _ in 0..MAX_ITERATIONS {
             for (body, x) in loop_.dependent.into_iter().zip(x) {
                 let own = &model.bodies[body];
                 if let JointMotion::Axis(motion) = own.motion {

@@ -14,7 +14,7 @@ use crate::modal::ModalTables;
 use crate::model::Model;
 use crate::model::body::{Body, Frame, JointMotion, Modal, Outward};
 use crate::model::check::{check_inertia, check_tree, children_of_links, out_of_range};
-use crate::model::error::{MOST_COORDINATES, ModelError};
+use crate::model::error::{MAX_COORDINATES, ModelError};
 use crate::model::numbering::Numbering;
 
 impl Model {
@@ -205,7 +205,7 @@ impl<'a> Builder<'a> {
         let drafts = draft_loops(self.mechanism, &self.frames, &self.bodies)?;
         let followers: Vec<usize> = drafts.iter().flat_map(LoopDraft::dependent).collect();
         let Numbering { coordinates, elastic, n_actuated } = self.number(&followers);
-        if coordinates.len() > MOST_COORDINATES {
+        if coordinates.len() > MAX_COORDINATES {
             return Err(ModelError::TooManyCoordinates { found: coordinates.len() });
         }
         self.share(&coordinates[..n_actuated])?;

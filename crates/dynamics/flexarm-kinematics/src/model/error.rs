@@ -3,7 +3,7 @@
 use flexarm_settings::OutOfRange;
 
 /// Maximum number of independent coordinates of a model.
-pub const MOST_COORDINATES: usize = 600;
+pub const MAX_COORDINATES: usize = 600;
 
 /// Reason why a mechanism is not a valid tree.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -122,9 +122,9 @@ pub enum ModelError {
         /// Name of the link or joint.
         name: String,
     },
-    /// The model has more than [`MOST_COORDINATES`] coordinates.
+    /// The model has more than [`MAX_COORDINATES`] coordinates.
     #[error(
-        "the model has {found} coordinates (joints, springs and modes together), at most {MOST_COORDINATES} are taken: memory grows with \
+        "the model has {found} coordinates (joints, springs and modes together), at most {MAX_COORDINATES} are taken: memory grows with \
          their square and the time of a step with their cube"
     )]
     TooManyCoordinates {

@@ -28,7 +28,7 @@ use crate::closure::PlacedLoop;
 
 pub use body::{Body, Coordinate, ElasticGroup, Frame, JointMotion};
 pub use check::moment_floor;
-pub use error::{MOST_COORDINATES, ModelError};
+pub use error::{MAX_COORDINATES, ModelError};
 
 pub(crate) use body::Modal;
 

@@ -15,7 +15,7 @@ use nalgebra::DMatrix;
 
 use super::each::{PoseAnswer, PoseOutputs};
 use super::tangent::{Tangent, to_hertz};
-use super::{MOST_ITERATIONS, OperatingPoint, SLOW, settled};
+use super::{MAX_ITERATIONS, OperatingPoint, SLOW, settled};
 use crate::arm::FlexibleArm;
 use crate::dense::{Factor, larger, largest};
 use crate::statics::{add_wrench, load_at};
@@ -132,7 +132,7 @@ impl<T: Real> LanePoints<T> {
         let (mut active, mut found) = (T::one(), T::zero());
         let mut previous = T::splat(f64::INFINITY);
         let half = T::splat(0.5);
-        for iteration in 0..MOST_ITERATIONS {
+        for iteration in 0..MAX_ITERATIONS {
             let residual = self.unbalance(F_T_W);
             for lane in 0..T::LANES {
                 if active.lane(lane) != 1.0 {

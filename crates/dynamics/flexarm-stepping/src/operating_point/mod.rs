@@ -21,7 +21,7 @@ use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX};
 
 use crate::arm::FlexibleArm;
 use crate::dense::Factor;
-use crate::equilibrium::MOST_HALVINGS;
+use crate::equilibrium::MAX_HALVINGS;
 use crate::error::StepError;
 use crate::linear::loaded_equilibrium;
 use crate::motion::Held;
@@ -32,7 +32,7 @@ use tangent::{Tangent, to_hertz};
 /// Accepted unbalanced force relative to the largest force.
 const TOLERANCE: f64 = 1e-13;
 /// Maximum number of Newton iterations.
-const MOST_ITERATIONS: usize = 60;
+const MAX_ITERATIONS: usize = 60;
 /// Residual reduction of a step above which the tangent is renewed.
 const SLOW: f64 = 0.1;
 
@@ -183,7 +183,7 @@ impl OperatingPoint {
     fn newton(&mut self) -> Result<f64, StepError> {
         let (m, n) = (self.arm.model.n_actuated(), self.r.len());
         let (mut residual, mut buckled) = (f64::INFINITY, false);
-        for iteration in 0..MOST_ITERATIONS {
+        for iteration in 0..MAX_ITERATIONS {
             self.iterations = iteration;
             self.forces();
             let scale = self.unbalance();
@@ -220,7 +220,7 @@ impl OperatingPoint {
         }
         match buckled {
             true => Err(beyond_buckling()),
-            false => Err(StepError::NoEquilibrium { t: 0.0, iterations: MOST_ITERATIONS, residual }),
+            false => Err(StepError::NoEquilibrium { t: 0.0, iterations: MAX_ITERATIONS, residual }),
         }
     }
 
@@ -229,7 +229,7 @@ impl OperatingPoint {
     fn come_closer(&mut self, mut part: f64, unbalanced: f64) {
         let (m, n) = (self.arm.model.n_actuated(), self.r.len());
         let step = self.r.clone();
-        for _ in 0..MOST_HALVINGS {
+        for _ in 0..MAX_HALVINGS {
             self.forces();
             self.unbalance();
             if self.r.norm() < unbalanced {

@@ -34,7 +34,7 @@ const IMPULSE_DEFECT: f64 = 1e-3;
 /// Lower bound of the speed in this ratio (rad/s or m/s).
 const SLOW: f64 = 0.01;
 /// Maximum number of halvings of a step.
-const MOST_CUTS: u32 = 7;
+const MAX_CUTS: u32 = 7;
 
 /// Velocities and accelerations of the actuated joints at the start of a step.
 #[derive(Clone)]
@@ -105,7 +105,7 @@ impl ReducedArm {
             self.sample_joints(t);
             self.keep_start(t);
         }
-        for _ in 0..MOST_CUTS {
+        for _ in 0..MAX_CUTS {
             if self.meets_impulse(t, stop, rule) {
                 break;
             }

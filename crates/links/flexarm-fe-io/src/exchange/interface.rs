@@ -18,7 +18,7 @@ use super::matrix::{DofLabel, LabelledMatrix};
 /// Name of a map in messages.
 const ORIGIN: &str = "map of interfaces";
 /// Maximum number of rows in a map.
-const MOST_ROWS: i64 = 100_000;
+const MAX_ROWS: i64 = 100_000;
 
 /// Selection of rows of a matrix.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -87,7 +87,7 @@ fn parse_pick(name: &str, text: &str) -> Result<RowPick, ExchangeError> {
     let range = |text: &str| -> Option<(i64, i64)> {
         let (first, last) = text.split_once('-').unwrap_or((text, text));
         let (first, last) = (first.trim().parse().ok()?, last.trim().parse().ok()?);
-        (0 <= first && first <= last && last - first < MOST_ROWS).then_some((first, last))
+        (0 <= first && first <= last && last - first < MAX_ROWS).then_some((first, last))
     };
     if let Some(rows) = text.strip_prefix('#') {
         let (first, last) = range(rows).filter(|(first, _)| *first > 0).ok_or_else(refuse)?;
@@ -261,7 +261,7 @@ pub fn propose_map_of(matrix: &LabelledMatrix) -> Option<InterfaceMap> {
 }
 
 /// Number of nodes or groups of six rows above which no map is proposed: a full model, or modes.
-const MOST_PROPOSED: usize = 4;
+const MAX_PROPOSED: usize = 4;
 
 /// Proposes a map, if the rows suggest one; the user must confirm it.
 ///
@@ -285,13 +285,13 @@ pub fn propose_map(rows: &[DofLabel]) -> Option<InterfaceMap> {
     let all = |last: u8| components.values().all(|dofs| dofs.iter().copied().eq(1..=last));
     let node = |i: usize, last: u8| RowPick::Node { node: order[i], first: 1, last };
     match order.len() {
-        n @ 2..=MOST_PROPOSED if all(6) => named((0..n).map(|k| vec![node(k, 6)]).collect()),
-        n @ 4..=MOST_PROPOSED if all(3) && n.is_multiple_of(2) => {
+        n @ 2..=MAX_PROPOSED if all(6) => named((0..n).map(|k| vec![node(k, 6)]).collect()),
+        n @ 4..=MAX_PROPOSED if all(3) && n.is_multiple_of(2) => {
             named((0..n / 2).map(|k| vec![node(2 * k, 3), node(2 * k + 1, 3)]).collect())
         }
         0 if rows.len() >= 12 && rows.len() <= super::matrix::LARGEST_DENSE => {
             let n = rows.len() / 6;
-            let n = if rows.len().is_multiple_of(6) && n <= MOST_PROPOSED { n } else { 2 };
+            let n = if rows.len().is_multiple_of(6) && n <= MAX_PROPOSED { n } else { 2 };
             named((0..n).map(|k| vec![RowPick::Rows { first: 6 * k + 1, last: 6 * k + 6 }]).collect())
         }
         _ => None,

@@ -20,7 +20,7 @@ use crate::reduction::{InterfaceFrame, Superelement, Tie, stiffness12, worst};
 const AGREEMENT: f64 = 1e-6;
 
 /// Maximum number of rows of a matrix: far above any use, and small enough for the memory.
-const MOST_ROWS: usize = 6000;
+const MAX_ROWS: usize = 6000;
 
 /// Writes the tables as text; empty if the link has no details.
 pub(super) fn write_details(link: &ReducedLink) -> String {
@@ -196,8 +196,8 @@ fn read_dense(table: &Table<'_, '_>, key: &str, smallest: usize) -> Result<DMatr
     let node = table.require(key, "one array per row")?;
     let rows = node.list()?;
     let n = rows.len();
-    if n < smallest || n > MOST_ROWS {
-        let expected = format!("{smallest} to {MOST_ROWS} rows: six per interface, then the modes");
+    if n < smallest || n > MAX_ROWS {
+        let expected = format!("{smallest} to {MAX_ROWS} rows: six per interface, then the modes");
         return Err(node.fail(FlexErrorKind::WrongSize, format!("{n} rows"), expected, "is the file cut off?"));
     }
     let mut A = DMatrix::zeros(n, n);

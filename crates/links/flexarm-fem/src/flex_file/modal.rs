@@ -14,7 +14,7 @@ use crate::modal::{GeometricStiffness, ModalInterface, ModalLink};
 use crate::reduced::ReducedLink;
 
 /// Maximum number of coordinates, more than any link has.
-const MOST_COORDINATES: usize = 6000;
+const MAX_COORDINATES: usize = 6000;
 
 /// Keys of the table.
 const KEYS: [&str; 13] = [
@@ -145,8 +145,8 @@ pub(super) fn read_modal(
 fn read_labels(table: &Table<'_, '_>) -> Result<Vec<String>, FlexFileError> {
     let labels = table.require("coordinates", "a text for each coordinate")?;
     let list = labels.list()?;
-    if list.is_empty() || list.len() > MOST_COORDINATES {
-        let expected = format!("1 to {MOST_COORDINATES} coordinates");
+    if list.is_empty() || list.len() > MAX_COORDINATES {
+        let expected = format!("1 to {MAX_COORDINATES} coordinates");
         return Err(labels.fail(FlexErrorKind::WrongSize, list.len().to_string(), expected, ""));
     }
     list.iter().map(|label| label.text().map(str::to_owned)).collect()

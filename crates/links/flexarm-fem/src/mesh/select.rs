@@ -168,7 +168,7 @@ impl Chooser<'_> {
 
     /// Lists the existing sets for an error message.
     fn known(&self, name: &str) -> String {
-        const MOST: usize = 12;
+        const MAX: usize = 12;
         let lower = name.to_lowercase();
         let is_region = self.mesh.regions.iter().any(|region| region.name.to_lowercase() == lower);
         let remark = if is_region {
@@ -182,8 +182,8 @@ impl Chooser<'_> {
             return format!("{remark}the mesh has no node sets: choose by place, such as plane(0,0,0; 1,0,0)");
         }
         sets.sort_by_cached_key(|(set, size)| (strsim::levenshtein(&lower, &set.to_lowercase()), Reverse(*size)));
-        let shown: Vec<String> = sets.iter().take(MOST).map(|(set, size)| format!("{set:?} ({size} nodes)")).collect();
-        let more = sets.len().saturating_sub(MOST);
+        let shown: Vec<String> = sets.iter().take(MAX).map(|(set, size)| format!("{set:?} ({size} nodes)")).collect();
+        let more = sets.len().saturating_sub(MAX);
         let rest = if more > 0 { format!(" and {more} more") } else { String::new() };
         format!("{remark}known are {}{rest}", shown.join(", "))
     }

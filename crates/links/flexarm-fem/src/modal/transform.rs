@@ -15,7 +15,7 @@ pub(super) struct Eigenpairs {
 }
 
 /// Maximum number of sweeps over all pairs of columns; half as many have always been enough.
-const MOST_SWEEPS: usize = 60;
+const MAX_SWEEPS: usize = 60;
 
 /// All modes of a dense symmetric positive definite pencil; `None` if it is not positive definite.
 ///
@@ -33,7 +33,7 @@ pub(super) fn eigenpairs(K: &DMatrix<f64>, M: &DMatrix<f64>) -> Option<Eigenpair
     if H.iter().any(|x| !x.is_finite()) {
         return None;
     }
-    for _ in 0..MOST_SWEEPS {
+    for _ in 0..MAX_SWEEPS {
         let mut worst = 0.0_f64;
         for i in 0..n {
             for j in i + 1..n {

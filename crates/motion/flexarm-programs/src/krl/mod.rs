@@ -30,7 +30,7 @@ use parse::Unit;
 use system::Krl;
 
 /// Maximum number of routine files read in addition to the program.
-const MOST_SIBLINGS: usize = 64;
+const MAX_SIBLINGS: usize = 64;
 
 /// Number of parent folders of the program in which the controller's data are searched.
 const LEVELS_OF_A_BACKUP: usize = 4;
@@ -150,7 +150,7 @@ fn add_siblings(texts: &mut Vec<Text>, path: &Path, unit: &mut Unit, data: &mut 
     called(&unit.main, &mut calls);
     let mut siblings = 0;
     while let Some(name) = calls.pop() {
-        if siblings >= MOST_SIBLINGS || dialect::is_built_in(&name) || !asked.insert(name.clone()) {
+        if siblings >= MAX_SIBLINGS || dialect::is_built_in(&name) || !asked.insert(name.clone()) {
             continue;
         }
         let Some((file, bytes)) = beside(path, &name, "src") else { continue };

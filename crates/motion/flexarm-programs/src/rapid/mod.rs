@@ -34,7 +34,7 @@ pub(crate) struct Rapid {
 }
 
 /// Maximum number of modules searched next to the program.
-const MOST_SIBLINGS: usize = 64;
+const MAX_SIBLINGS: usize = 64;
 
 type Rapids<'a> = Machine<'a, Rapid>;
 
@@ -105,7 +105,7 @@ fn add_siblings(texts: &mut Vec<Text>, unit: &mut parse::Unit) -> Result<()> {
     };
     let mut files: Vec<_> = entries.flatten().map(|entry| entry.path()).filter(is_module).collect();
     files.sort();
-    files.truncate(MOST_SIBLINGS);
+    files.truncate(MAX_SIBLINGS);
     let mut siblings: Vec<(Text, parse::Unit)> = Vec::new();
     for file in files {
         let Ok(bytes) = std::fs::read(&file) else { continue };

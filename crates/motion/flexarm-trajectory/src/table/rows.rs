@@ -8,7 +8,7 @@ use crate::problem::Problem;
 use crate::spline::JointSamples;
 
 /// Maximum number of values kept.
-const MOST_NUMBERS: usize = 30_000_000;
+const MAX_NUMBERS: usize = 30_000_000;
 
 /// A time as written.
 #[derive(Clone, Copy, Debug)]
@@ -88,8 +88,8 @@ impl Table<'_> {
                 rows.repeated += 1;
                 continue;
             }
-            if rows.times.len() >= MOST_NUMBERS / (layout.used.len() + 1) {
-                return Err(at(line, Problem::TooManyNumbers { most: MOST_NUMBERS }));
+            if rows.times.len() >= MAX_NUMBERS / (layout.used.len() + 1) {
+                return Err(at(line, Problem::TooManyNumbers { most: MAX_NUMBERS }));
             }
             rows.lines.push(line);
             rows.times.push(time);

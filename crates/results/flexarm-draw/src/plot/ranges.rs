@@ -6,7 +6,7 @@ use crate::plot::curve::Panel;
 use crate::plot::style::Style;
 
 /// Maximum ratio of the highest to the lowest value of a logarithmic panel.
-const MOST_DECADES: f64 = 1e8;
+const MAX_DECADES: f64 = 1e8;
 
 /// Returns the drawable points of each curve.
 pub(super) fn points(panel: &Panel) -> Vec<Vec<(f64, f64)>> {
@@ -26,7 +26,7 @@ pub(super) fn ranges(points: &[Vec<(f64, f64)>], logarithmic: bool) -> Option<(R
     let (x_low, x_high) = span(|p| p.0)?;
     let (low, high) = span(|p| p.1)?;
     let y = if logarithmic {
-        0.7 * low.max(high / MOST_DECADES)..1.5 * high
+        0.7 * low.max(high / MAX_DECADES)..1.5 * high
     } else {
         let room = 0.05 * (high - low).max(1e-9 * high.abs()).max(1e-12);
         low - room..high + room

@@ -14,9 +14,9 @@ use super::messages::{Marker, MarkerKind};
 use crate::{LinkMesh, RunHeader, Sample, TwinSample};
 
 /// Maximum number of triangles of a robot; larger meshes are coarsened.
-const MOST_TRIANGLES: usize = 100_000;
+const MAX_TRIANGLES: usize = 100_000;
 /// Maximum number of points of a path; longer paths are thinned.
-pub const MOST_POINTS: usize = 1000;
+pub const MAX_POINTS: usize = 1000;
 /// Rate of the error markers (per second of simulated time).
 const ERROR_HZ: u32 = 20;
 
@@ -29,7 +29,7 @@ const ERROR: [f32; 4] = [0.9, 0.15, 0.15, 1.0];
 /// Returns the surfaces of all robots, in the frames of their links.
 pub(crate) fn surfaces<'a>(header: &RunHeader, frames: &'a SurfaceFrames) -> Vec<Marker<'a>> {
     let total: usize = header.meshes.iter().map(|mesh| mesh.triangles.len()).sum();
-    let share = |mesh: &LinkMesh| (mesh.triangles.len() as f64 / total as f64 * MOST_TRIANGLES as f64) as usize;
+    let share = |mesh: &LinkMesh| (mesh.triangles.len() as f64 / total as f64 * MAX_TRIANGLES as f64) as usize;
     let meshes: Vec<Cow<'_, LinkMesh>> = header.meshes.iter().map(|mesh| thinned(mesh, share(mesh).max(16))).collect();
     let deviates = deviating(header);
     let mut markers = Vec::new();
@@ -168,7 +168,7 @@ impl Path {
         }
         self.seen += 1;
         // The limit includes the last point.
-        if self.points.len() >= MOST_POINTS {
+        if self.points.len() >= MAX_POINTS {
             let mut keep = false;
             self.points.retain(|_| {
                 keep = !keep;

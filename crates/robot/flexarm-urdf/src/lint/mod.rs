@@ -8,7 +8,7 @@
 //! prefixes and with only the first of each element that may occur once. This has three reasons:
 //!
 //! * The parsers of `urdf_rs` recurse, and overflow the stack in a file of 100,000 nested elements.
-//!   The plain text is five elements deep and has at most [`MOST_ELEMENTS`] links and joints,
+//!   The plain text is five elements deep and has at most [`MAX_ELEMENTS`] links and joints,
 //!   regardless of the file.
 //! * All faults are reported together: missing or wrong values are replaced by zeros, and `urdf_rs`
 //!   continues.
@@ -45,7 +45,7 @@ use attribute::Missing::{As, Fault, LeftOut};
 pub(crate) use marks::{JointMarks, LinkMarks, OriginMark, PlainUrdf};
 
 /// Maximum number of links and joints of a robot; some checks compare every pair.
-const MOST_ELEMENTS: usize = 4000;
+const MAX_ELEMENTS: usize = 4000;
 
 const JOINT_TYPES: [&str; 7] = ["fixed", "revolute", "continuous", "prismatic", "floating", "planar", "spherical"];
 /// Children of `<robot>`, `<link>` and `<joint>` that are URDF or a well-known extension.
@@ -91,8 +91,8 @@ pub fn lint(root: Node<'_, '_>, lines: &Lines<'_>, report: &mut Report) -> Optio
         return None;
     }
     let found = elements(root).filter(|n| matches!(n.tag_name().name(), "link" | "joint")).count();
-    if found > MOST_ELEMENTS {
-        report.error(&place, Problem::TooManyElements { found, most: MOST_ELEMENTS });
+    if found > MAX_ELEMENTS {
+        report.error(&place, Problem::TooManyElements { found, most: MAX_ELEMENTS });
         return None;
     }
     let version = version(root);

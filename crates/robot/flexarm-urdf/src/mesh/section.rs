@@ -30,7 +30,7 @@ pub struct CrossSection {
 
 /// Maximum number of loops; outlines with more, such as screens and threads, are replaced by their
 /// convex hull.
-const MOST_LOOPS: usize = 400;
+const MAX_LOOPS: usize = 400;
 /// Maximum fraction of the cut's length in open outlines.
 const OPEN: f64 = 0.02;
 /// Loops overlap if their total area exceeds that of their hull by this factor.
@@ -56,7 +56,7 @@ pub fn cross_section(meshes: &[TriangleMesh], X_LS: &Pose) -> Option<CrossSectio
     }
     let hull = convex_hull(points);
     let of_hull = || polygon(&hull).map(|section| CrossSection { is_closed: false, ..section });
-    if open > OPEN * whole || loops.len() > MOST_LOOPS {
+    if open > OPEN * whole || loops.len() > MAX_LOOPS {
         return of_hull();
     }
     let outer = outermost(&loops);

@@ -11,7 +11,7 @@ use crate::finding::TextPosition;
 use crate::xml;
 
 /// Maximum nesting depth of elements.
-const MOST_NESTED: usize = 200;
+const MAX_NESTED: usize = 200;
 
 /// Place of an element; copies share the name of the file.
 #[derive(Clone, Debug)]
@@ -78,10 +78,10 @@ impl Element {
 pub(crate) fn parse(text: &str, file: &Rc<Path>) -> Result<Element, Box<Issue>> {
     let lines = xml::Lines::new(file, text);
     let document = xml::parse(text, &lines)?;
-    let deepest = document.descendants().find(|n| n.ancestors().nth(MOST_NESTED).is_some());
+    let deepest = document.descendants().find(|n| n.ancestors().nth(MAX_NESTED).is_some());
     if let Some(node) = deepest {
         let problem = crate::Problem::Malformed {
-            found: format!("elements nested {MOST_NESTED} deep"),
+            found: format!("elements nested {MAX_NESTED} deep"),
             expected: "fewer".to_owned(),
         };
         return Err(Box::new(Issue { place: lines.of(node), problem }));

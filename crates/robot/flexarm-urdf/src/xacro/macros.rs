@@ -12,7 +12,7 @@ use super::{Content, Interpreter, Outcome};
 use flexarm_settings::closest;
 
 /// Maximum depth of nested calls; ROS's xacro fails at about 200.
-const MOST_CALLS: usize = 300;
+const MAX_CALLS: usize = 300;
 
 /// A macro definition.
 pub(crate) struct Macro {
@@ -102,8 +102,8 @@ impl Interpreter<'_> {
             (element.name["xacro:".len()..].to_owned(), None)
         };
         let (inner_macros, inner_scope, called) = self.resolve(&name, macros, scope, at)?;
-        if self.calls.len() >= MOST_CALLS {
-            let trouble = ExpressionError::new(format!("macros call each other more than {MOST_CALLS} deep"));
+        if self.calls.len() >= MAX_CALLS {
+            let trouble = ExpressionError::new(format!("macros call each other more than {MAX_CALLS} deep"));
             return Err(self.fault(at, trouble.help("does a macro call itself without an end?")));
         }
         self.called_macros.insert(called.name.clone());

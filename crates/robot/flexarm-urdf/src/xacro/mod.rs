@@ -39,15 +39,15 @@ use crate::{Issue, UrdfError, xml};
 use flexarm_settings::closest;
 
 /// Maximum work for one document, approximately the number of bytes read and written.
-const MOST_WORK: usize = 100_000_000;
+const MAX_WORK: usize = 100_000_000;
 /// Work charged for an element, approximately its memory (bytes).
 const ELEMENT: usize = 200;
 /// Maximum nesting depth of elements, macros, files and expressions.
-const MOST_DEPTH: usize = 5_000;
+const MAX_DEPTH: usize = 5_000;
 /// Maximum nesting depth of included files.
-const MOST_FILES: usize = 50;
+const MAX_FILES: usize = 50;
 /// Maximum size of a file (bytes).
-const MOST_BYTES: u64 = 32 << 20;
+const MAX_BYTES: u64 = 32 << 20;
 /// Stack size of the expansion thread (bytes); the maximum depth needs about 40 MB in a debug
 /// build.
 const STACK: usize = 256 << 20;
@@ -192,7 +192,7 @@ impl<'a> Interpreter<'a> {
     /// Charges work, and fails if the limit is exceeded.
     fn charge(&mut self, work: usize) -> Result<(), ExpressionError> {
         self.work = self.work.saturating_add(work);
-        if self.work <= MOST_WORK {
+        if self.work <= MAX_WORK {
             return Ok(());
         }
         Err(ExpressionError::new("the file makes too much: more than 100 million letters were looked at or written")
@@ -202,7 +202,7 @@ impl<'a> Interpreter<'a> {
     /// Enters one nesting level; the caller leaves it.
     fn deeper(&mut self) -> Result<(), ExpressionError> {
         self.depth += 1;
-        if self.depth <= MOST_DEPTH {
+        if self.depth <= MAX_DEPTH {
             return Ok(());
         }
         Err(ExpressionError::new("macros, files and properties use each other too deeply")
@@ -219,8 +219,8 @@ impl<'a> Interpreter<'a> {
         if !meta.is_file() {
             return Err(failed("it is no file".into()));
         }
-        if meta.len() > MOST_BYTES {
-            return Err(failed(format!("it has {} MB, at most {} are read", meta.len() >> 20, MOST_BYTES >> 20)));
+        if meta.len() > MAX_BYTES {
+            return Err(failed(format!("it has {} MB, at most {} are read", meta.len() >> 20, MAX_BYTES >> 20)));
         }
         self.charge(meta.len() as usize)?;
         let bytes = std::fs::read(path).map_err(|e| failed(e.to_string()))?;

@@ -8,7 +8,7 @@ use super::expression::value::Value;
 use super::expression::{ExpressionError, is_built_in};
 use super::macros::Macros;
 use super::scope::{self, Scope, Table};
-use super::{Content, ELEMENT, Interpreter, MOST_FILES, Outcome, boolean};
+use super::{Content, ELEMENT, Interpreter, MAX_FILES, Outcome, boolean};
 use crate::error::XacroError;
 use crate::finding::Severity;
 
@@ -277,8 +277,8 @@ impl Interpreter<'_> {
     }
 
     fn included(&mut self, path: &Path, at: &At, macros: &Rc<Macros>, scope: &Scope) -> Outcome<Vec<Node>> {
-        if self.files.len() >= MOST_FILES {
-            let trouble = ExpressionError::new(format!("files include each other more than {MOST_FILES} deep"));
+        if self.files.len() >= MAX_FILES {
+            let trouble = ExpressionError::new(format!("files include each other more than {MAX_FILES} deep"));
             return Err(self.fault(at, trouble.help("does a file include itself?")));
         }
         let text = self.read(path).map_err(|e| self.fault(at, e))?;

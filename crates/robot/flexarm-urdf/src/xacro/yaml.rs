@@ -12,7 +12,7 @@ use super::expression::value::{Value, float_of, lookup};
 use super::scope::Table;
 
 /// Maximum number of values of a file, with those behind aliases counted each time.
-const MOST_VALUES: usize = 1_000_000;
+const MAX_VALUES: usize = 1_000_000;
 /// Tags that multiply by a unit, with the factor to rad or m.
 const UNITS: [(&str, f64); 6] = [
     ("radians", 1.0),
@@ -39,7 +39,7 @@ impl Interpreter<'_> {
 
     fn yaml(&mut self, text: &str) -> Result<Value, ExpressionError> {
         let mut root = None;
-        read_yaml(text, MOST_VALUES, |node| {
+        read_yaml(text, MAX_VALUES, |node| {
             if root.is_some() {
                 return Err(ExpressionError::new("a second document, expected one"));
             }

@@ -105,14 +105,14 @@ impl MeshFrame<'_> {
 
     /// Lists the node sets of the mesh, for messages.
     pub(super) fn known_sets(&self) -> String {
-        const MOST: usize = 12;
+        const MAX: usize = 12;
         let sets = &self.mesh.node_sets;
         if sets.is_empty() {
             return "the mesh has no node sets: select nodes by position, such as plane(0,0,0; 1,0,0)".into();
         }
         let shown: Vec<String> =
-            sets.iter().take(MOST).map(|(name, nodes)| format!("{name:?} ({} nodes)", nodes.len())).collect();
-        let more = sets.len().saturating_sub(MOST);
+            sets.iter().take(MAX).map(|(name, nodes)| format!("{name:?} ({} nodes)", nodes.len())).collect();
+        let more = sets.len().saturating_sub(MAX);
         let rest = if more > 0 { format!(" and {more} more ({} shows all)", Setting::List) } else { String::new() };
         format!("node sets of the mesh: {}{rest}", shown.join(", "))
     }

@@ -65,7 +65,7 @@ pub(crate) use words::{MATERIAL_FORMS, SPLIT_FORMS};
 /// Default number of modes to keep.
 const MODES: usize = 10;
 /// Maximum number of modes; more are taken for a typing error.
-const MOST_MODES: usize = 1000;
+const MAX_MODES: usize = 1000;
 /// Number of modes with A held against which the reduced models are checked.
 const JUDGED_MODES: usize = 10;
 
@@ -197,8 +197,8 @@ fn with_defaults(job: &ReduceJob) -> Result<ReduceJob, JobError> {
         (Some(_), Some(_)) => {
             return Err(JobError::ModesTwice);
         }
-        (Some(modes), None) if modes > MOST_MODES => {
-            return Err(JobError::TooManyModes { found: modes, most: MOST_MODES });
+        (Some(modes), None) if modes > MAX_MODES => {
+            return Err(JobError::TooManyModes { found: modes, most: MAX_MODES });
         }
         (None, Some(hz)) if !(hz.is_finite() && hz > 0.0) => {
             return Err(JobError::ModesUpTo(hz));

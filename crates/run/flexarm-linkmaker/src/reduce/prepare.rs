@@ -18,7 +18,7 @@ use super::job::ReduceJob;
 use super::summary::{MaterialFigures, RegionFigures};
 use super::urdf_link::UrdfLink;
 use super::words::{MATERIAL_FORMS, OrderingChoice, QuadratureChoice, SplitChoice, described};
-use super::{JUDGED_MODES, MODES, MOST_MODES};
+use super::{JUDGED_MODES, MAX_MODES, MODES};
 use crate::{JobError, LinkError, stamp};
 
 /// Input of a reduction.
@@ -209,7 +209,7 @@ fn differ(a: &Material, b: &Material) -> bool {
 
 fn wanted_modes(job: &ReduceJob) -> ModesWanted {
     match (job.modes, job.modes_up_to_hz) {
-        (_, Some(hz)) => ModesWanted::Below { omega2: (std::f64::consts::TAU * hz).powi(2), at_most: MOST_MODES },
+        (_, Some(hz)) => ModesWanted::Below { omega2: (std::f64::consts::TAU * hz).powi(2), at_most: MAX_MODES },
         (modes, None) => ModesWanted::Count(modes.unwrap_or(MODES)),
     }
 }

@@ -160,7 +160,7 @@ impl Arm {
     fn without_inertia(&self) -> Vec<String> {
         /// Threshold for the pivot relative to the diagonal entry; below it a row counts as
         /// dependent.
-        const LEAST: f64 = 1e-13;
+        const MIN: f64 = 1e-13;
         let (model, n) = (&self.model, self.model.n_actuated());
         let M = mass_matrix(model, &mut Data::new(model), &DVector::zeros(model.nv())).clone();
         let free: Vec<usize> = self.torque.iter().map(|t| t.0).chain(n..model.nv()).collect();
@@ -172,7 +172,7 @@ impl Arm {
                 L[(i, j)] = if L[(j, j)] > 0.0 { (M[(row, free[j])] - known) / L[(j, j)] } else { 0.0 };
             }
             let left = M[(row, row)] - (0..i).map(|k| L[(i, k)].powi(2)).sum::<f64>();
-            if left > LEAST * M[(row, row)] {
+            if left > MIN * M[(row, row)] {
                 L[(i, i)] = left.sqrt();
                 continue;
             }

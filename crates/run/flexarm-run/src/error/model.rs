@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use flexarm_analysis::LinearError;
 use flexarm_fem::FemError;
 use flexarm_flexlink::{GearboxError, MountingError, SubstitutionError};
-use flexarm_kinematics::MOST_COORDINATES;
+use flexarm_kinematics::MAX_COORDINATES;
 use flexarm_settings::{OutOfRange, Setting, known_names};
 use flexarm_stepping::StepError;
 
@@ -45,7 +45,7 @@ pub enum LinkFormError {
         "link {link:?}: {segments} segments have {coordinates} elastic coordinates, a robot can have {} in all, for \
          the time of a step grows with their cube: ask for at most {} in one link, or for modes, which say more with \
          fewer",
-        MOST_COORDINATES, MOST_COORDINATES / 6 + 1
+        MAX_COORDINATES, MAX_COORDINATES / 6 + 1
     )]
     ManySegments {
         /// Name of the link.

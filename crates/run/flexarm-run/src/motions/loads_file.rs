@@ -341,8 +341,8 @@ impl Reading<'_> {
         }
         let tooth = teeth * self.needs(e.spindle_rpm.as_ref(), "spindle_rpm")? / 60.0;
         let harmonics = e.harmonics.unwrap_or(3);
-        if harmonics > MOST_HARMONICS {
-            return Err(fail(format!("harmonics = {harmonics}: expected at most {MOST_HARMONICS}")));
+        if harmonics > MAX_HARMONICS {
+            return Err(fail(format!("harmonics = {harmonics}: expected at most {MAX_HARMONICS}")));
         }
         // Mean 1 plus harmonics of halving amplitude, shaped like an intermittent cut.
         let factor = move |t: f64| {
@@ -420,9 +420,9 @@ pub(crate) const EXPRESSION_PERIOD: f64 = 5e-3;
 /// Maximum length of an expression (characters).
 const LONGEST_EXPRESSION: usize = 2000;
 /// Maximum number of harmonics of a milling force; higher ones are negligible.
-const MOST_HARMONICS: u32 = 50;
+const MAX_HARMONICS: u32 = 50;
 /// Maximum number of table rows at whose times the reference stepper stops.
-const MOST_ROWS: usize = 1000;
+const MAX_ROWS: usize = 1000;
 
 /// Location of a value, or else of its entry.
 fn span_or<T, E>(value: Option<&Spanned<T>>, entry: &Spanned<E>) -> Range<usize> {
@@ -466,7 +466,7 @@ fn table(path: &Path) -> Result<(WrenchFn, Vec<f64>), Error> {
     if rows.len() < 2 {
         return Err(fail("a table of loads needs at least two rows".into()));
     }
-    let bends = if rows.len() <= MOST_ROWS { &rows[..] } else { &[rows[0], rows[rows.len() - 1]][..] };
+    let bends = if rows.len() <= MAX_ROWS { &rows[..] } else { &[rows[0], rows[rows.len() - 1]][..] };
     let bends = bends.iter().map(|(t, _)| *t).collect();
     let wrench = Arc::new(move |t| {
         let k = rows.partition_point(|(x, _)| *x <= t);

@@ -6,18 +6,18 @@ use flexarm_log::{CurveQuantity, GaugeQuantity, Trace};
 use crate::run::summary::Summary;
 
 /// Maximum number of points of a curve that is always shown.
-const MOST_POINTS: usize = 3000;
+const MAX_POINTS: usize = 3000;
 /// Maximum number of values of a plot with many curves.
-const MOST_NUMBERS: usize = 24_000;
+const MAX_NUMBERS: usize = 24_000;
 /// Maximum number of points of curves behind a selector.
-const MOST_DETAIL: usize = 1000;
+const MAX_DETAIL: usize = 1000;
 /// A spectrum is shown up to the last amplitude above this share of its maximum.
 const QUIET: f64 = 1e-3;
 
 const WHOLE_RUN: &str = "whole run";
 
 /// Maximum number of stops whose spectra are shown.
-const MOST_STOPS: usize = 8;
+const MAX_STOPS: usize = 8;
 
 /// A plot: curves over a common axis, or several such sets to choose from.
 #[derive(Clone, Debug, Default)]
@@ -91,7 +91,7 @@ impl Kind {
 
 impl Table {
     fn new(x: Vec<f64>, curves: Vec<Curve>, most: usize) -> Self {
-        let most = most.min(MOST_NUMBERS / (curves.len() + 1)).max(200);
+        let most = most.min(MAX_NUMBERS / (curves.len() + 1)).max(200);
         let keep = thinned(&curves.iter().map(|c| c.y.as_slice()).collect::<Vec<_>>(), x.len(), most);
         let pick = |values: &[f64]| keep.iter().map(|k| values[*k]).collect();
         let curves = curves.iter().map(|c| Curve { y: pick(&c.y), ..c.clone() }).collect();
@@ -174,7 +174,7 @@ const DRIVES: &str = "Joints and energy";
 fn error(trace: &Trace) -> Plot {
     let mut curves = vec![curve(trace, "size", Kind::Total, 1e3, CurveQuantity::ErrorSize)];
     curves.extend(axes(trace, 1e3, CurveQuantity::Error));
-    let mut views = one_view(Table::new(trace.curve_times(), curves, MOST_POINTS));
+    let mut views = one_view(Table::new(trace.curve_times(), curves, MAX_POINTS));
     let mut note = "Flexible minus rigid tool centre point, world axes.".to_owned();
     if trace.header.has_static {
         views[0].name = "error".into();
@@ -198,7 +198,7 @@ fn static_and_dynamic(trace: &Trace) -> PlotView {
         curve(trace, "static", Kind::Plain, 1e3, CurveQuantity::StaticSize),
         curve(trace, "dynamic", Kind::Plain, 1e3, CurveQuantity::MovingSize),
     ];
-    let table = Table::new(trace.curve_times(), curves, MOST_POINTS);
+    let table = Table::new(trace.curve_times(), curves, MAX_POINTS);
     PlotView { name: "static and dynamic".into(), tables: vec![table], ..PlotView::default() }
 }
 
@@ -209,7 +209,7 @@ fn rotation(trace: &Trace) -> Plot {
         y_label: "rotation error",
         y_unit: "mrad",
         note: "Rotation vector from the rigid to the flexible tool, world axes.".into(),
-        views: one_view(Table::new(trace.curve_times(), curves, MOST_POINTS)),
+        views: one_view(Table::new(trace.curve_times(), curves, MAX_POINTS)),
         ..over_time("tcp_rotation", TOOL, "Rotation of the tool over time")
     }
 }
@@ -227,7 +227,7 @@ fn path_over_time(trace: &Trace) -> Plot {
         y_label: "deviation",
         y_unit: "mm",
         note: "Axes of the rigid tool's path: along it, and two across with minimum rotation (the normal begins on the inside of the first bend).".into(),
-        views: one_view(Table::new(trace.curve_times(), path_curves(trace), MOST_POINTS)),
+        views: one_view(Table::new(trace.curve_times(), path_curves(trace), MAX_POINTS)),
         ..over_time("path_time", TOOL, "Deviation in path axes over time")
     }
 }
@@ -242,7 +242,7 @@ fn path_over_length(trace: &Trace) -> Plot {
         x_unit: "m",
         y_label: "deviation",
         y_unit: "mm",
-        views: one_view(Table::new(trace.curve_ways(), path_curves(trace), MOST_POINTS)),
+        views: one_view(Table::new(trace.curve_ways(), path_curves(trace), MAX_POINTS)),
         ..Plot::default()
     }
 }
@@ -286,7 +286,7 @@ fn spectrum(summary: &Summary, trace: &Trace) -> Option<Plot> {
     let shown = |hz: &[f64], curves: Vec<Curve>| {
         let range = 1..hz.partition_point(|f| *f <= end).max(2).min(hz.len());
         let curves = curves.into_iter().map(|c| Curve { y: c.y[range.clone()].to_vec(), ..c });
-        Table::new(hz[range.clone()].to_vec(), curves.collect(), MOST_POINTS)
+        Table::new(hz[range.clone()].to_vec(), curves.collect(), MAX_POINTS)
     };
     // In a long run only the beginning is stored at the full sample rate.
     let end_s = errors.last().map_or(0.0, |(time_s, _)| *time_s);
@@ -294,7 +294,7 @@ fn spectrum(summary: &Summary, trace: &Trace) -> Option<Plot> {
     let name = if is_whole { WHOLE_RUN.to_owned() } else { format!("first {end_s:.4} s") };
     let mut views = vec![PlotView { name, tables: vec![shown(&hz, curves)], ..PlotView::default() }];
     // At stops the spectrum shows the vibration without the motion.
-    let holds = summary.tcp.iter().flat_map(|tcp| &tcp.holds).take(MOST_STOPS).enumerate();
+    let holds = summary.tcp.iter().flat_map(|tcp| &tcp.holds).take(MAX_STOPS).enumerate();
     let holds = holds.filter(|(_, hold)| is_whole || hold.end_s <= end_s);
     let stops = holds.filter_map(|(k, hold)| {
         let place = |t: f64| errors.partition_point(|(time_s, _)| *time_s < t - 1e-9);
@@ -332,7 +332,7 @@ fn contributions(trace: &Trace) -> Option<Plot> {
     let view = |name: &str, of: &dyn Fn(usize) -> CurveQuantity| {
         let curves =
             names.iter().enumerate().map(|(k, name)| curve(trace, name.clone(), Kind::of(trace, name), 1e3, of(k)));
-        let table = Table::new(trace.curve_times(), curves.collect(), MOST_POINTS);
+        let table = Table::new(trace.curve_times(), curves.collect(), MAX_POINTS);
         PlotView { name: name.into(), tables: vec![table], ..PlotView::default() }
     };
     let mut views = vec![view("size", &CurveQuantity::ContributionSize)];
@@ -353,7 +353,7 @@ fn gauges(trace: &Trace, quantity: GaugeQuantity) -> Option<Plot> {
     let (id, unit, scale) = quantity.shown();
     let own = trace.header.gauges_of(quantity).enumerate();
     let curves = own.map(|(n, (k, name))| curve(trace, name, Kind::Part(n), scale, CurveQuantity::Gauge(k)));
-    let table = Table::new(trace.curve_times(), curves.collect(), MOST_POINTS);
+    let table = Table::new(trace.curve_times(), curves.collect(), MAX_POINTS);
     let title = match quantity {
         GaugeQuantity::Strain => "Strain gauges",
         GaugeQuantity::Stress => "Stress points",
@@ -376,11 +376,11 @@ fn elements(summary: &Summary, trace: &Trace) -> Vec<Plot> {
     let make = |plot: Plot, scale: f64, size: fn(usize) -> CurveQuantity, part: fn(usize, usize) -> CurveQuantity| {
         let sizes = names.iter().enumerate();
         let sizes = sizes.map(|(k, name)| curve(trace, name.clone(), Kind::of(trace, name), scale, size(k)));
-        let table = Table::new(trace.curve_times(), sizes.collect(), MOST_POINTS);
+        let table = Table::new(trace.curve_times(), sizes.collect(), MAX_POINTS);
         let mut views = vec![PlotView { name: "all, size".into(), tables: vec![table], ..PlotView::default() }];
         for (k, name) in names.iter().enumerate() {
             let axes = axes(trace, scale, |c| part(k, c));
-            let table = Table::new(trace.curve_times(), axes, MOST_DETAIL);
+            let table = Table::new(trace.curve_times(), axes, MAX_DETAIL);
             views.push(PlotView { name: name.clone(), tables: vec![table], ..PlotView::default() });
         }
         Plot { views, ..plot }
@@ -437,7 +437,7 @@ fn torques(trace: &Trace) -> Plot {
     let names = &trace.header.joints;
     let all = names.iter().enumerate();
     let all = all.map(|(k, name)| curve(trace, name.clone(), Kind::of(trace, name), 1.0, CurveQuantity::Effort(k)));
-    let table = Table::new(trace.curve_times(), all.collect(), MOST_POINTS);
+    let table = Table::new(trace.curve_times(), all.collect(), MAX_POINTS);
     let mut views = vec![PlotView { name: "all, flexible".into(), tables: vec![table], ..PlotView::default() }];
     for (k, name) in names.iter().enumerate() {
         let mut curves = vec![curve(trace, "flexible", Kind::of(trace, name), 1.0, CurveQuantity::Effort(k))];
@@ -445,7 +445,7 @@ fn torques(trace: &Trace) -> Plot {
             curves.push(curve(trace, "rigid", Kind::Dashed, 1.0, CurveQuantity::RigidEffort(k)));
         }
         let y_unit = if slides(trace, k) { "N" } else { "N m" };
-        let table = Table::new(trace.curve_times(), curves, MOST_DETAIL);
+        let table = Table::new(trace.curve_times(), curves, MAX_DETAIL);
         views.push(PlotView { name: name.clone(), y_unit, tables: vec![table] });
     }
     let all_slide = !names.is_empty() && (0..names.len()).all(|k| slides(trace, k));
@@ -476,7 +476,7 @@ fn joints(trace: &Trace) -> Vec<Plot> {
             y_label: "position",
             y_unit: if sliding { "mm" } else { "°" },
             note: "Of the flexible robot, at the link.".into(),
-            views: one_view(Table::new(trace.curve_times(), curves, MOST_POINTS)),
+            views: one_view(Table::new(trace.curve_times(), curves, MAX_POINTS)),
             ..over_time(id, DRIVES, title)
         })
     };
@@ -493,7 +493,7 @@ fn energy(trace: &Trace) -> Plot {
         y_label: "energy",
         y_unit: "J",
         note: "Of the flexible robot; gravity from its value at the start.".into(),
-        views: one_view(Table::new(trace.curve_times(), curves, MOST_POINTS)),
+        views: one_view(Table::new(trace.curve_times(), curves, MAX_POINTS)),
         ..over_time("energy", DRIVES, "Energy")
     }
 }

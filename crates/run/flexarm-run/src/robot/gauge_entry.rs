@@ -12,7 +12,7 @@ use toml::Spanned;
 use crate::robot::entry_checks::check_finite;
 
 /// Maximum number of grids of a rosette.
-const MOST_GRIDS: usize = 8;
+const MAX_GRIDS: usize = 8;
 
 /// Strain gauge as written.
 #[derive(Clone, Debug, Deserialize)]
@@ -97,9 +97,9 @@ fn rosette(entry: &StrainGaugeEntry, links: StressLinks<'_>, source: &Source) ->
     }
     let Some(angles) = &entry.angles_deg else { return Ok(vec![Gauge { grid: Some((direction, 0.0)), ..gauge }]) };
     check_finite("angles_deg", angles.get_ref(), angles.span(), source)?;
-    if angles.get_ref().is_empty() || angles.get_ref().len() > MOST_GRIDS {
+    if angles.get_ref().is_empty() || angles.get_ref().len() > MAX_GRIDS {
         let message = format!(
-            "angles_deg has {} entries: give one to {MOST_GRIDS} angles, such as [0, 45, 90]",
+            "angles_deg has {} entries: give one to {MAX_GRIDS} angles, such as [0, 45, 90]",
             angles.get_ref().len()
         );
         return Err(source.error(angles.span(), message));

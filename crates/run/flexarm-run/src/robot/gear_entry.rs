@@ -16,7 +16,7 @@ const ARCMIN: f64 = 60.0 * ARCSEC;
 /// Default number of sliders of a hysteresis.
 const SLIDERS: usize = 8;
 /// Maximum number of sliders.
-const MOST_SLIDERS: i64 = 200;
+const MAX_SLIDERS: i64 = 200;
 /// Fraction of the rated torque at which catalogues give the lost motion.
 const LOST_MOTION_AT: f64 = 0.03;
 
@@ -134,7 +134,7 @@ pub(crate) enum HysteresisEntryError {
     LossWithinPlay { loss: f64 },
     #[error("hysteresis has reach {0}, expected a positive deflection in rad")]
     Reach(f64),
-    #[error("hysteresis has {0} sliders, expected 1 to {most}", most = MOST_SLIDERS)]
+    #[error("hysteresis has {0} sliders, expected 1 to {most}", most = MAX_SLIDERS)]
     Sliders(i64),
 }
 
@@ -227,7 +227,7 @@ pub(crate) fn hysteresis(
     };
     let sliders = match entry.sliders {
         None => SLIDERS,
-        Some(n) if (1..=MOST_SLIDERS).contains(&n) => n as usize,
+        Some(n) if (1..=MAX_SLIDERS).contains(&n) => n as usize,
         Some(n) => return Err(HysteresisEntryError::Sliders(n)),
     };
     Ok(GearHysteresis { elastic, sliders: Hysteresis::even_sliders(friction, reach, sliders), loss })

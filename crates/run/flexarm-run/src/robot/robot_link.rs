@@ -6,7 +6,7 @@ use std::sync::Arc;
 use flexarm_fem::stress::StressFields;
 use flexarm_fem::{BeamLink, FemError, ModalLink, ModalOptions};
 use flexarm_flexlink::{FlexibleLink, LinkForm};
-use flexarm_kinematics::MOST_COORDINATES;
+use flexarm_kinematics::MAX_COORDINATES;
 use flexarm_stepping::Damping;
 use nalgebra::Matrix6;
 
@@ -15,7 +15,7 @@ use crate::error::LinkFormError;
 use crate::robot::strength::Strength;
 
 /// Maximum number of fixed-interface modes of a link.
-const MOST_MODES: usize = 200;
+const MAX_MODES: usize = 200;
 
 /// Default number of fixed-interface modes of a beam link.
 const BEAM_MODES: usize = 6;
@@ -133,7 +133,7 @@ impl RobotLink {
     fn lumped(&self, segments: usize) -> Result<LinkForm, LinkFormError> {
         let link = || self.flexible.link.clone();
         let coordinates = 6 * segments.saturating_sub(1);
-        if coordinates > MOST_COORDINATES {
+        if coordinates > MAX_COORDINATES {
             return Err(LinkFormError::ManySegments { link: link(), segments, coordinates });
         }
         if let Some(beam) = &self.beam {
@@ -156,8 +156,8 @@ impl RobotLink {
             move |source: FemError| (asked, LinkFormError::NotModal { link: name.clone(), source: Box::new(source) })
         };
         let wanted = modelling.modes.or(self.choices.modes);
-        if let Some(modes) = wanted.filter(|modes| *modes > MOST_MODES) {
-            let error = LinkFormError::ManyModes { link: link(), modes, most: MOST_MODES };
+        if let Some(modes) = wanted.filter(|modes| *modes > MAX_MODES) {
+            let error = LinkFormError::ManyModes { link: link(), modes, most: MAX_MODES };
             return Err((RequestedKey::Modes, error));
         }
         let full = match &self.beam {

@@ -41,8 +41,8 @@ impl RunLoop<'_> {
         jumps.sort_by(f64::total_cmp);
         jumps.dedup();
         // Tables and milling loads have a kink at every row; a list of those is of no use.
-        const MOST_JUMPS: usize = 20;
-        for t in jumps.iter().take(if jumps.len() <= MOST_JUMPS { MOST_JUMPS } else { 1 }) {
+        const MAX_JUMPS: usize = 20;
+        for t in jumps.iter().take(if jumps.len() <= MAX_JUMPS { MAX_JUMPS } else { 1 }) {
             add(*t, EventKind::Load, "an external load changes".into());
         }
         for change in &self.arm.inertia_changes {

@@ -96,7 +96,7 @@ pub fn loaded(
 }
 
 /// Maximum number of steps of a run (some hours).
-const MOST_STEPS: f64 = 1e9;
+const MAX_STEPS: f64 = 1e9;
 /// Range of the magnification of deflections.
 const MAGNIFICATIONS: std::ops::RangeInclusive<f64> = 1e-3..=1e6;
 
@@ -117,8 +117,8 @@ fn check_options(motion: &Motion, options: &RunOptions) -> Result<(), Error> {
     if step_s > duration_s {
         return Err(ValueError::StepBeyondMotion { step_s, duration_s }.into());
     }
-    if duration_s / step_s > MOST_STEPS {
-        return Err(ValueError::TooManySteps { step_s, duration_s, most: MOST_STEPS }.into());
+    if duration_s / step_s > MAX_STEPS {
+        return Err(ValueError::TooManySteps { step_s, duration_s, most: MAX_STEPS }.into());
     }
     Ok(())
 }
@@ -130,7 +130,7 @@ const STEPS_PER_LOAD: f64 = 8.0;
 const STEPS_OF_SHORT_LOAD: u32 = 24;
 
 /// Maximum number of kinks at which steps end; a table can have one per row.
-const MOST_BENDS: usize = 100;
+const MAX_BENDS: usize = 100;
 
 /// Adds stops within a load that is too short for the step size to resolve.
 fn stop_within(load: &mut Load, h: f64) {
@@ -138,7 +138,7 @@ fn stop_within(load: &mut Load, h: f64) {
     let lasts = last - first;
     if lasts > 0.0 && lasts < f64::from(STEPS_OF_SHORT_LOAD) * h {
         let inner = (0..=STEPS_OF_SHORT_LOAD).map(|k| first + lasts * f64::from(k) / f64::from(STEPS_OF_SHORT_LOAD));
-        let bends = load.wrench.jumps.iter().copied().take(MOST_BENDS);
+        let bends = load.wrench.jumps.iter().copied().take(MAX_BENDS);
         load.wrench.stops = inner.chain(bends).collect();
     }
 }

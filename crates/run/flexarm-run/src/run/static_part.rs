@@ -17,7 +17,7 @@ const GRID_S: f64 = 0.02;
 /// Number of equilibria per shortest period of a load.
 const PER_PERIOD: f64 = 16.0;
 /// Maximum number of grid intervals that are computed together.
-const MOST_INTERVALS: usize = 64;
+const MAX_INTERVALS: usize = 64;
 
 /// Evaluates the static part at ascending times.
 pub struct StaticPart {
@@ -92,8 +92,8 @@ impl StaticPart {
             return Some(Block { start, end, values: vec![self.displacement(start)?] });
         }
         let intervals = ((end - start) / self.grid_s).ceil().max(1.0);
-        let (intervals, end) = match intervals > MOST_INTERVALS as f64 {
-            true => (MOST_INTERVALS, start + MOST_INTERVALS as f64 * self.grid_s),
+        let (intervals, end) = match intervals > MAX_INTERVALS as f64 {
+            true => (MAX_INTERVALS, start + MAX_INTERVALS as f64 * self.grid_s),
             // A cubic needs three intervals; fewer if the section is shorter than three samples.
             false => ((intervals as usize).max(if end - start > 3.0 * self.sample_s { 3 } else { 1 }), end),
         };

@@ -22,12 +22,12 @@ const NOTHING: f64 = 1e-9;
 /// Relative tolerance of a limit on given elements.
 const EXACT: f64 = 1e-7;
 /// Maximum number of refinements of the elements.
-const MOST_HALVINGS: usize = 6;
+const MAX_HALVINGS: usize = 6;
 /// Minimum product of maximum depth, compliance at resonance and cutting coefficients for a mode to
 /// be relevant (at about 1 it chatters by itself).
 const MATTERS: f64 = 0.2;
 /// Maximum size of a map for computing eigenvalues.
-const MOST_UNKNOWNS: usize = 2500;
+const MAX_UNKNOWNS: usize = 2500;
 /// Angle (rad) from the negative real axis within which a multiplier counts as on it.
 const ON_AXIS: f64 = 1e-6;
 
@@ -97,7 +97,7 @@ pub fn limit_of_depth(
     check_size(&period, options.deepest, spindle)?;
     let Some(mut depth) = first_limit(&period, options) else { return Ok(None) };
     let mut change = f64::INFINITY;
-    for _ in 0..MOST_HALVINGS {
+    for _ in 0..MAX_HALVINGS {
         longest /= 2.0;
         period = Period::new(structure, cutter, spindle, longest);
         check_size(&period, depth, spindle)?;
@@ -194,8 +194,8 @@ fn check(cutter: &Cutter, spindle: f64, options: &LimitOptions) -> Result<(), Ch
 
 fn check_size(period: &Period, depth: f64, spindle: f64) -> Result<(), ChatterError> {
     let unknowns = period.unknowns(depth);
-    if unknowns > MOST_UNKNOWNS {
-        return Err(ChatterError::TooSlow { rpm: spindle * 60.0 / TAU, unknowns, most: MOST_UNKNOWNS });
+    if unknowns > MAX_UNKNOWNS {
+        return Err(ChatterError::TooSlow { rpm: spindle * 60.0 / TAU, unknowns, most: MAX_UNKNOWNS });
     }
     Ok(())
 }

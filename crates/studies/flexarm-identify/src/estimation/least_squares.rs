@@ -184,7 +184,7 @@ pub struct Progress {
 }
 
 /// Maximum correlation of neighbours on a curve.
-const MOST_CORRELATED: f64 = 0.98;
+const MAX_CORRELATED: f64 = 0.98;
 /// Minimum pivot of rows left out of the fit: their predictions are uncertain by its inverse.
 const LEFT: f64 = 0.1;
 /// Relative pivot below which an unknown without a prior depends on others.
@@ -192,7 +192,7 @@ const DEPENDENT: f64 = 1e-12;
 /// Relative change of the errors of the model, and step over deviations, at which they are kept.
 const SETTLED: (f64, f64) = (1e-2, 0.1);
 /// Minimum error of the model relative to the scatter at the start.
-const LEAST_ERROR: f64 = 1e-8;
+const MIN_ERROR: f64 = 1e-8;
 
 /// Solves the problem.
 ///
@@ -275,7 +275,7 @@ impl<P: Residuals> Fit<'_, P> {
             let rms =
                 (rows.iter().map(|(r, noise)| (r / noise.size).powi(2)).sum::<f64>() / rows.len().max(1) as f64).sqrt();
             let needed = rows.iter().any(|(_, noise)| noise.std == 0.0);
-            self.least.push(if needed { (LEAST_ERROR * rms).max(f64::MIN_POSITIVE.sqrt()) } else { 0.0 });
+            self.least.push(if needed { (MIN_ERROR * rms).max(f64::MIN_POSITIVE.sqrt()) } else { 0.0 });
             let error = scatter(&rows, rows.len() as f64, self.search.loss);
             self.errors.push(error.max(self.least[kind]));
         }
@@ -488,7 +488,7 @@ fn correlated(rows: &[(f64, Noise)]) -> f64 {
     }
     let product: f64 = rows.iter().zip(&rows[along..]).map(|((a, _), (b, _))| a * b).sum();
     let square: f64 = rows.iter().map(|(r, _)| r * r).sum();
-    let rho = (product / square.max(f64::MIN_POSITIVE)).clamp(0.0, MOST_CORRELATED);
+    let rho = (product / square.max(f64::MIN_POSITIVE)).clamp(0.0, MAX_CORRELATED);
     ((1.0 + rho) / (1.0 - rho)).sqrt()
 }
 

@@ -53,7 +53,7 @@ const REST: [f64; 2] = [0.25, 0.1];
 const MENDED: f64 = 1.0 / 3.0;
 const LEFT: [f64; 2] = [0.15, 0.05];
 /// Maximum number of readings used.
-const MOST_READINGS: usize = 16;
+const MAX_READINGS: usize = 16;
 /// Number of alternating fits of compliances and rotation.
 const ROUNDS: usize = 15;
 
@@ -113,7 +113,7 @@ fn one_joint(plant: &Plant, placed: &Measurements, slides: &[bool]) -> Option<(S
 /// their initial guess.
 fn some_of(measurements: &Measurements, some: impl Fn(&Reading) -> bool) -> Measurements {
     let all: Vec<usize> = (0..measurements.readings.len()).filter(|k| some(&measurements.readings[*k])).collect();
-    let every = all.len().div_ceil(MOST_READINGS).max(1);
+    let every = all.len().div_ceil(MAX_READINGS).max(1);
     let kept: Vec<usize> = all.into_iter().step_by(every).collect();
     let mut few = measurements.of_readings(|k| kept.contains(&k));
     few.instruments.iter_mut().for_each(|i| *i = Instrument::Known(Pose::identity()));

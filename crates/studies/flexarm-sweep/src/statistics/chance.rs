@@ -32,7 +32,7 @@ const FEWEST: usize = 8;
 const DRAWS_PER_TERM: usize = 16;
 const TERMS: (usize, usize) = (2, 6);
 /// Maximum number of samples used; more of them do not change the selection.
-const MOST_DRAWS: usize = 4000;
+const MAX_DRAWS: usize = 4000;
 /// Relative length below which a column counts as linearly dependent.
 const TINY: f64 = 1e-9;
 
@@ -44,7 +44,7 @@ const TINY: f64 = 1e-9;
 pub fn beyond_chance(columns: &[Vec<f64>], y: &[f64]) -> BeyondChance {
     let sound = |k: &usize| y[*k].is_finite() && columns.iter().all(|x| x[*k].is_finite());
     let rows: Vec<usize> = (0..y.len()).filter(sound).collect();
-    let rows: Vec<usize> = rows.iter().copied().step_by(rows.len().div_ceil(MOST_DRAWS).max(1)).collect();
+    let rows: Vec<usize> = rows.iter().copied().step_by(rows.len().div_ceil(MAX_DRAWS).max(1)).collect();
     let mut found = BeyondChance { parameters: Vec::new(), chance: 1.0 };
     let mut residuals: Vec<f64> = rows.iter().map(|k| y[*k]).collect();
     let size = dot(&residuals, &residuals);

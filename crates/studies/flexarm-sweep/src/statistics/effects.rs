@@ -37,11 +37,11 @@ pub enum Grouping {
 }
 
 /// Maximum number of values of a random parameter for one group per value.
-const MOST_LEVELS: usize = 12;
+const MAX_LEVELS: usize = 12;
 /// Maximum number of groups of other random parameters.
 const BINS: usize = 8;
 /// Minimum size of a group, if there are enough runs for three groups.
-const LEAST_IN_BIN: usize = 6;
+const MIN_IN_BIN: usize = 6;
 
 /// Returns the main effect of a parameter; `None` with fewer than two groups, or if the result does
 /// not vary.
@@ -52,7 +52,7 @@ pub fn main_effect(x: &[f64], y: &[f64], grouping: Grouping) -> Option<MainEffec
         x.iter().copied().zip(y.iter().copied()).filter(|(x, y)| x.is_finite() && y.is_finite()).collect();
     pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut groups: Vec<&[(f64, f64)]> = pairs.chunk_by(|a, b| a.0 == b.0).collect();
-    if groups.len() > MOST_LEVELS && grouping == Grouping::Bins {
+    if groups.len() > MAX_LEVELS && grouping == Grouping::Bins {
         groups = bins(&pairs);
     }
     if groups.len() < 2 {
@@ -73,7 +73,7 @@ pub fn main_effect(x: &[f64], y: &[f64], grouping: Grouping) -> Option<MainEffec
 /// group.
 fn bins(pairs: &[(f64, f64)]) -> Vec<&[(f64, f64)]> {
     let n = pairs.len();
-    let wanted = (n / LEAST_IN_BIN).clamp(3, BINS);
+    let wanted = (n / MIN_IN_BIN).clamp(3, BINS);
     let mut groups = Vec::with_capacity(wanted);
     let (mut start, mut end) = (0, 0);
     for level in pairs.chunk_by(|a, b| a.0 == b.0) {

@@ -32,8 +32,8 @@ impl SampleMethod {
     pub fn most_dimensions(self) -> usize {
         match self {
             Self::Random | Self::LatinHypercube => usize::MAX,
-            Self::Sobol => sobol::MOST_DIMENSIONS,
-            Self::Saltelli => sobol::MOST_DIMENSIONS / 2,
+            Self::Sobol => sobol::MAX_DIMENSIONS,
+            Self::Saltelli => sobol::MAX_DIMENSIONS / 2,
         }
     }
 }

@@ -8,7 +8,7 @@ use sobol_burley::parts::sobol_rev;
 use crate::statistics::random::stream;
 
 /// Maximum number of dimensions.
-pub(crate) const MOST_DIMENSIONS: usize = sobol_burley::NUM_DIMENSIONS as usize;
+pub(crate) const MAX_DIMENSIONS: usize = sobol_burley::NUM_DIMENSIONS as usize;
 /// Number of binary digits of the point number, after which the sequence repeats with another
 /// shift.
 const BLOCK: u32 = 16;

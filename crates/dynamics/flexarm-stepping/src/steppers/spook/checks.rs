@@ -30,7 +30,7 @@ pub(super) fn check_known(arm: &FlexibleArm) -> Result<(), StepError> {
 }
 
 /// Minimum ratio of the smallest to the largest principal moment of inertia of an end body.
-const LEAST_MOMENT: f64 = 1e-9;
+const MIN_MOMENT: f64 = 1e-9;
 
 /// Checks the bodies at the ends of the arm: with six degrees of freedom and no body outward, they
 /// need mass and moments of inertia of their own. Other bodies get them from the bodies they carry.
@@ -40,7 +40,7 @@ pub(super) fn check_ends(model: &Model) -> Result<(), StepError> {
         let mass = body.inertia.mass;
         let moments = if mass > 0.0 { body.inertia.inertia_com().symmetric_eigenvalues() } else { Vector3::zeros() };
         let (least, most) = (moments.min(), moments.max());
-        if mass <= 0.0 || least <= LEAST_MOMENT * most {
+        if mass <= 0.0 || least <= MIN_MOMENT * most {
             return Err(StepError::Setup(format!(
                 "spook works in maximal coordinates and needs a mass and three moments of inertia of link {:?}, at the end of \
                  the arm: it has {mass} kg and principal moments of {least:.3e} to {most:.3e} kg m²; give it (or its payload) \

@@ -8,12 +8,12 @@ use crate::exchange::error::{ErrorPosition, ExchangeError, ExchangeErrorKind};
 use crate::exchange::text::{Text, shown, unpack, words};
 
 /// Maximum number of shape coordinates; larger sizes are errors.
-const MOST_MODES: usize = 10_000;
+const MAX_MODES: usize = 10_000;
 /// Maximum number of rows or columns: `Ge` has three columns per shape coordinate.
-const MOST_ROWS: usize = 3 * MOST_MODES;
+const MAX_ROWS: usize = 3 * MAX_MODES;
 /// Maximum number of entries of a dense matrix, including zeros: constant part, and part per byte
 /// of the file.
-const MOST_ENTRIES: (usize, usize) = (1 << 20, 16);
+const MAX_ENTRIES: (usize, usize) = (1 << 20, 16);
 
 /// Reads a `.SID_FEM` file, optionally compressed with gzip.
 ///
@@ -54,7 +54,7 @@ pub fn parse_sid(text: &str, origin: &str) -> Result<Sid, ExchangeError> {
         None => (place, line.trim(), None),
     });
     let lines = lines.filter(|(_, key, value)| !key.is_empty() || value.is_some());
-    let most_entries = MOST_ENTRIES.0.saturating_add(text.text.len().saturating_mul(MOST_ENTRIES.1));
+    let most_entries = MAX_ENTRIES.0.saturating_add(text.text.len().saturating_mul(MAX_ENTRIES.1));
     let mut cursor = Cursor { lines: lines.peekable(), origin, most_entries };
     cursor.expect("part")?;
     cursor.expect("new modal")?;
@@ -98,7 +98,7 @@ impl<'a, I: Iterator<Item = Line<'a>>> Cursor<'a, I> {
             let value = value.unwrap_or("");
             match key {
                 "mass" => sid.mass = place.number("mass", value)?,
-                "nelastq" => promised = count(&place, "nelastq", value, MOST_MODES)?,
+                "nelastq" => promised = count(&place, "nelastq", value, MAX_MODES)?,
                 _ if key.starts_with("ielastq") => sid.modes.push(value.to_owned()),
                 _ => return Err(unexpected(&place, key, "mass, nelastq, ielastq (k) or end refmod")),
             }
@@ -217,10 +217,10 @@ impl<'a, I: Iterator<Item = Line<'a>>> Cursor<'a, I> {
             }
             match key {
                 "order" => matrix.order = count(&place, "order", value, 255)? as u8,
-                "nrow" => matrix.nrow = count(&place, "nrow", value, MOST_ROWS)?,
-                "ncol" => matrix.ncol = count(&place, "ncol", value, MOST_ROWS)?,
-                "nq" => matrix.nq = count(&place, "nq", value, MOST_MODES)?,
-                "nqn" => matrix.nqn = count(&place, "nqn", value, MOST_MODES)?,
+                "nrow" => matrix.nrow = count(&place, "nrow", value, MAX_ROWS)?,
+                "ncol" => matrix.ncol = count(&place, "ncol", value, MAX_ROWS)?,
+                "nq" => matrix.nq = count(&place, "nq", value, MAX_MODES)?,
+                "nqn" => matrix.nqn = count(&place, "nqn", value, MAX_MODES)?,
                 "structure" => matrix.structure = count(&place, "structure", value, 255)? as u8,
                 _ => entry(&mut matrix, &place, name, key, value)?,
             }

@@ -46,7 +46,7 @@ const FEW: usize = 32;
 
 /// Maximum number of nodes in all sets: constant part, and part per byte of the file. That is 160
 /// groups of all nodes at 40 bytes per node.
-const MOST_MEMBERS: (usize, usize) = (1 << 20, 4);
+const MAX_MEMBERS: (usize, usize) = (1 << 20, 4);
 
 impl GroupNodes {
     /// Sorts and removes duplicates, since neighbouring elements share most of their nodes. Returns
@@ -155,9 +155,9 @@ impl Collector {
             }
             if set.ids.len() > 2 * set.tidied + FEW {
                 self.kept += set.tidy();
-                if self.kept > MOST_MEMBERS.0 + MOST_MEMBERS.1 * src.bytes.len() {
+                if self.kept > MAX_MEMBERS.0 + MAX_MEMBERS.1 * src.bytes.len() {
                     let element = format!("physical group {:?}", self.name(key));
-                    let expected = format!("at most {} nodes per byte of the file in all groups", MOST_MEMBERS.1);
+                    let expected = format!("at most {} nodes per byte of the file in all groups", MAX_MEMBERS.1);
                     return Err(src.error(Kind::TooLarge, at, element, "too many nodes", expected));
                 }
             }

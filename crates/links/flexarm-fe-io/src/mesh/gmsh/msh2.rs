@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use super::collector::Collector;
 use super::reader::{Layout, Reader};
-use super::shapes::MOST_NODES;
+use super::shapes::MAX_NODES;
 use crate::mesh::error::MeshError;
 
 /// Reads `$Nodes`: number and position of each node.
@@ -26,7 +26,7 @@ pub(super) fn elements(reader: &mut Reader, collector: &mut Collector) -> Result
     let ascii = reader.layout == Layout::Ascii;
     let count = reader.checked(count, "number of elements", [if ascii { 4 } else { 2 }, 0, 0])?;
     let mut done = 0;
-    let mut nodes = [0_u64; MOST_NODES];
+    let mut nodes = [0_u64; MAX_NODES];
     while done < count {
         let at = reader.pos;
         let first_id = if ascii { reader.id("element number")? } else { 0 };

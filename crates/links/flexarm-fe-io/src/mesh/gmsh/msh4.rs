@@ -4,11 +4,11 @@ use nalgebra::Vector3;
 
 use super::collector::Collector;
 use super::reader::{Layout, Reader};
-use super::shapes::MOST_NODES;
+use super::shapes::MAX_NODES;
 use crate::mesh::error::{MeshError, MeshErrorKind as Kind};
 
 /// Maximum number of physical groups of one entity.
-const MOST_GROUPS: usize = 64;
+const MAX_GROUPS: usize = 64;
 
 /// Reads `$Entities`; only the physical groups of each are kept.
 pub(super) fn entities(reader: &mut Reader, collector: &mut Collector) -> Result<(), MeshError> {
@@ -29,9 +29,9 @@ pub(super) fn entities(reader: &mut Reader, collector: &mut Collector) -> Result
             if dim > 0 {
                 tags(reader, "number of bounding entities")?;
             }
-            if groups.len() > MOST_GROUPS {
+            if groups.len() > MAX_GROUPS {
                 let (element, found) = (format!("entity {tag} of dimension {dim}"), format!("{} groups", groups.len()));
-                let expected = format!("at most {MOST_GROUPS} physical groups");
+                let expected = format!("at most {MAX_GROUPS} physical groups");
                 return Err(reader.src.error(Kind::TooLarge, reader.pos, element, found, expected));
             }
             if !groups.is_empty() {
@@ -77,7 +77,7 @@ pub(super) fn nodes(reader: &mut Reader, collector: &mut Collector) -> Result<()
 /// Reads `$Elements`: per entity and type the number and the nodes of each element.
 pub(super) fn elements(reader: &mut Reader, collector: &mut Collector) -> Result<(), MeshError> {
     let block_count = header(reader)?;
-    let mut nodes = [0_u64; MOST_NODES];
+    let mut nodes = [0_u64; MAX_NODES];
     for _ in 0..block_count {
         let at = reader.pos + usize::from(reader.layout == Layout::Ascii);
         let dim = reader.int("dimension of an entity")?;

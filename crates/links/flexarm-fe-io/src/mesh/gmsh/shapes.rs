@@ -19,7 +19,7 @@ const HEX: &[u8] = &[0, 1, 2, 3, 4, 5, 6, 7, 8, 11, 13, 9, 16, 18, 19, 17, 10, 1
 const WEDGE: &[u8] = &[0, 1, 2, 3, 4, 5, 6, 9, 7, 12, 14, 13, 8, 10, 11];
 
 /// Maximum number of nodes of the types in the table.
-pub(super) const MOST_NODES: usize = 125;
+pub(super) const MAX_NODES: usize = 125;
 
 /// Looks up an element type number.
 ///

@@ -181,10 +181,10 @@ impl<'a> Deck<'a> {
     }
 
     fn ignore(&mut self, card: &Card) {
-        const MOST: usize = 100; // names in a message
+        const MAX: usize = 100; // names in a message
         match self.ignored.iter().position(|(title, _)| *title == card.title) {
             Some(k) => self.ignored[k].1 += 1,
-            None if self.ignored.len() < MOST => self.ignored.push((card.title.clone(), 1)),
+            None if self.ignored.len() < MAX => self.ignored.push((card.title.clone(), 1)),
             None => {}
         }
     }

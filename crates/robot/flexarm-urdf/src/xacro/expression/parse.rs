@@ -5,9 +5,9 @@ use super::token::{Token, tokens};
 use super::value::Value;
 
 /// Maximum nesting depth of brackets, signs and conditions.
-const MOST_NESTED: usize = 60;
+const MAX_NESTED: usize = 60;
 /// Maximum number of tokens in an expression.
-const MOST_TOKENS: usize = 4000;
+const MAX_TOKENS: usize = 4000;
 
 #[derive(Debug)]
 pub(super) enum Expr {
@@ -83,9 +83,9 @@ pub(super) fn parse(text: &str) -> Result<Expr, ExpressionError> {
     if tokens.is_empty() {
         return Err(ExpressionError::new("the expression is empty"));
     }
-    if tokens.len() > MOST_TOKENS {
+    if tokens.len() > MAX_TOKENS {
         return Err(ExpressionError::new(format!(
-            "the expression has {} words, at most {MOST_TOKENS} are read",
+            "the expression has {} words, at most {MAX_TOKENS} are read",
             tokens.len()
         )));
     }
@@ -201,8 +201,8 @@ impl Parser {
     /// Parses `a if b else c`.
     fn expression(&mut self) -> Result<Expr, ExpressionError> {
         self.nested += 1;
-        if self.nested > MOST_NESTED {
-            return Err(ExpressionError::new(format!("the expression is nested more than {MOST_NESTED} deep")));
+        if self.nested > MAX_NESTED {
+            return Err(ExpressionError::new(format!("the expression is nested more than {MAX_NESTED} deep")));
         }
         let then = self.disjunction()?;
         let tree = if self.take_word("if") {
@@ -292,8 +292,8 @@ impl Parser {
         for sign in ["-", "+", "~"] {
             if self.take_sign(sign) {
                 self.nested += 1;
-                if self.nested > MOST_NESTED {
-                    return Err(ExpressionError::new(format!("the expression is nested more than {MOST_NESTED} deep")));
+                if self.nested > MAX_NESTED {
+                    return Err(ExpressionError::new(format!("the expression is nested more than {MAX_NESTED} deep")));
                 }
                 let tree = Expr::Unary(sign, Box::new(self.unary()?));
                 self.nested -= 1;
@@ -304,8 +304,8 @@ impl Parser {
         if self.take_sign("**") {
             // Right-associative; binds more strongly than a sign on its left, but not on its right.
             self.nested += 1;
-            if self.nested > MOST_NESTED {
-                return Err(ExpressionError::new(format!("the expression is nested more than {MOST_NESTED} deep")));
+            if self.nested > MAX_NESTED {
+                return Err(ExpressionError::new(format!("the expression is nested more than {MAX_NESTED} deep")));
             }
             let exponent = self.unary()?;
             self.nested -= 1;

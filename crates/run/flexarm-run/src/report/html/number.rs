@@ -29,7 +29,7 @@ const SMALLEST: f64 = 1e-300;
 /// Maximum number of digits for the fast path. With more digits, or where the scaled number is so
 /// close to a rounding boundary (in units of the last digit) that round-off could decide, the
 /// standard library is used.
-const MOST_SCALED: usize = 9;
+const MAX_SCALED: usize = 9;
 const NEAR_MIDDLE: f64 = 1e-4;
 
 /// Returns the significant digits of a positive number as an integer, and the power of ten of the
@@ -47,7 +47,7 @@ fn scaled(x: f64, digits: usize) -> Option<(u64, i32)> {
     let least = 10_u64.pow((digits - 1) as u32);
     // Wrong by at most one, which is corrected below.
     let mut exponent = x.log10().floor() as i32;
-    if digits > MOST_SCALED || exponent.abs() > 250 {
+    if digits > MAX_SCALED || exponent.abs() > 250 {
         return None;
     }
     let times = |exponent: i32| match digits as i32 - 1 - exponent {

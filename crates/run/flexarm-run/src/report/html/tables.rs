@@ -16,7 +16,7 @@ use crate::run::summary::Summary;
 use flexarm_settings::written::markup;
 
 /// Maximum number of moves in the table of the page.
-const MOST_MOVES: usize = 200;
+const MAX_MOVES: usize = 200;
 
 /// Returns the plan of the TCP path and its moves, if the motion is given as one.
 pub(super) fn tool_path(run: &ReportRun<'_>) -> String {
@@ -48,7 +48,7 @@ pub(super) fn tool_path(run: &ReportRun<'_>) -> String {
             optional(of.top_m_s),
         ]
     };
-    let rows: Vec<Vec<String>> = path.moves.iter().take(MOST_MOVES).map(row).collect();
+    let rows: Vec<Vec<String>> = path.moves.iter().take(MAX_MOVES).map(row).collect();
     let head = [
         "line",
         "move",
@@ -61,8 +61,8 @@ pub(super) fn tool_path(run: &ReportRun<'_>) -> String {
         "reached (mm/s)",
     ];
     out += &table("Moves of the tool", &head, &rows);
-    if path.moves.len() > MOST_MOVES {
-        let _ = writeln!(out, "<p class=\"note\">{} more moves are in the summary.</p>", path.moves.len() - MOST_MOVES);
+    if path.moves.len() > MAX_MOVES {
+        let _ = writeln!(out, "<p class=\"note\">{} more moves are in the summary.</p>", path.moves.len() - MAX_MOVES);
     }
     out + "</section>\n"
 }
@@ -81,7 +81,7 @@ pub(super) fn stress_picture(run: &ReportRun<'_>) -> String {
 }
 
 /// Maximum number of poses with several stops in the table of the page.
-const MOST_POSES: usize = 50;
+const MAX_POSES: usize = 50;
 
 /// Row of the ISO table: name, meaning, unit, value.
 type Iso = (&'static str, &'static str, &'static str, fn(&Summary) -> Option<f64>);
@@ -200,7 +200,7 @@ pub(super) fn stops_table(s: &Summary, of: &str) -> String {
     let head =
         ["stop", "from (s)", "to (s)", "error at rest (mm)", "settled after (s)", "overshoot (mm)", "rings at (Hz)"];
     let stops = table(&format!("Stops{of}"), &head, &rows);
-    let poses: Vec<Vec<String>> = (tcp.poses.iter().take(MOST_POSES))
+    let poses: Vec<Vec<String>> = (tcp.poses.iter().take(MAX_POSES))
         .map(|pose| {
             let place = pose.place_m.map(|x| number(1e3 * x, 5)).join(", ");
             let visits = pose.visits.to_string();

@@ -16,7 +16,7 @@ use crate::run::monitor::tool::ToolError;
 /// Speed below which the TCP has no direction, m/s.
 const REST: f64 = 1e-5;
 /// Maximum number of points kept for a picture.
-const MOST_POINTS: usize = 8192;
+const MAX_POINTS: usize = 8192;
 
 /// Errors across the path of a motion given as a TCP path.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -152,7 +152,7 @@ impl ToolPathMonitor {
             self.points.push([p.x, p.y, p.z, e.x, e.y, e.z]);
         }
         self.seen += 1;
-        if self.points.len() >= MOST_POINTS {
+        if self.points.len() >= MAX_POINTS {
             let mut k = 0;
             self.points.retain(|_| {
                 k += 1;
