@@ -6,7 +6,8 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use flexarm::{DriveModel, LoadOptions, Modelling, Motion, Robot, modes, statics};
+use flexarm::poses::{modes, statics};
+use flexarm::{DriveModel, LoadOptions, Modelling, Motion, Robot};
 use flexarm_stepping::{Held, Observation, ReferenceSettings, Start, StepperKind, new_stepper, static_equilibrium};
 use nalgebra::Vector3;
 use serde_json::Value;
@@ -74,7 +75,7 @@ fn along(robot: &str, trajectory: &str, curve: &str) -> (f64, f64) {
     let path = root().join("trajectories").join(trajectory);
     let motion = Motion::load_for(&path, &robot.rigid_model().expect("a tree")).expect("a sound trajectory");
     let arm = robot.model(&Modelling::default()).expect("a tree").arm(motion.prescribed()).expect("an arm");
-    let tcp = arm.model.frame(flexarm::TCP_FRAME).expect("there").clone();
+    let tcp = arm.model.frame(flexarm::robots::TCP_FRAME).expect("there").clone();
     let mut seen = Observation::new(&arm);
     let kind = StepperKind::Reference(ReferenceSettings::new(1e-10));
     let mut stepper = new_stepper(kind, arm, 2e-3, Start::Equilibrium).expect("starts");

@@ -6,7 +6,8 @@ use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use flexarm::{LoadOptions, Modelling, Motion, ResponseRequest, Robot, RunOptions, modes, response, statics};
+use flexarm::poses::{ResponseRequest, modes, response, statics};
+use flexarm::{LoadOptions, Modelling, Motion, Robot, RunOptions};
 use flexarm_analysis::{Taper, strongest_line};
 use flexarm_kinematics::{Data, Frame, Model, State, Wrench, forward_kinematics, mass_matrix};
 use flexarm_stepping::*;

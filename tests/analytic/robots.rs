@@ -5,9 +5,8 @@
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-use flexarm::{
-    Keep, LinkModel, LoadOptions, Modelling, Motion, Outputs, RecordingFormat, Robot, RunOptions, RunRequest, Summary,
-};
+use flexarm::recordings::RecordingFormat;
+use flexarm::{Keep, LinkModel, LoadOptions, Modelling, Motion, Outputs, Robot, RunOptions, RunRequest, Summary};
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("inside the workspace").to_owned()
@@ -129,7 +128,8 @@ fn kr210_has_the_published_mass_and_a_plausible_first_frequency() {
 /// Generalised-alpha, SPOOK and RK4 agree on the shipped arm's peak; measured within 4e-4.
 #[test]
 fn steppers_agree_on_the_shipped_arm() {
-    use flexarm::{SpookSettings, StepperKind};
+    use flexarm::StepperKind;
+    use flexarm::steppers::SpookSettings;
     let peak = |stepper: StepperKind, step_s: f64| {
         let options = RunOptions { stepper, step_s, ..RunOptions::default() };
         let robot = load("kr210");

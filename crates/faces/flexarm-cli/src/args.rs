@@ -4,10 +4,11 @@ use std::path::PathBuf;
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
-use flexarm::{
-    ConstraintForm, DriveModel, InertiaEstimate, LinkModel, LoadOptions, Modelling, ReadOptions, RecordingFormat,
-    ReferenceMethod, STEPPERS, SpookPreset, Start, StepperEntry, Words, sweep::Change,
-};
+use flexarm::recordings::RecordingFormat;
+use flexarm::robots::{InertiaEstimate, ReadOptions};
+use flexarm::settings::Words;
+use flexarm::steppers::{ConstraintForm, ReferenceMethod, STEPPERS, SpookPreset, Start, StepperEntry};
+use flexarm::{DriveModel, LinkModel, LoadOptions, Modelling, sweep::Change};
 
 use crate::failure::Failure;
 use crate::formats;
@@ -54,7 +55,8 @@ pub(crate) struct RobotArgs {
 impl RobotArgs {
     /// Returns the options for loading a robot.
     pub(crate) fn options(&self) -> Result<LoadOptions, Failure> {
-        let mut urdf = ReadOptions { search_paths: flexarm::search_paths_from_environment(), ..ReadOptions::default() };
+        let mut urdf =
+            ReadOptions { search_paths: flexarm::robots::search_paths_from_environment(), ..ReadOptions::default() };
         for package in &self.packages {
             let (name, folder) = package
                 .split_once('=')

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
-use flexarm::{ConvertOptions, ConvertSummary, RecordingFormat, parse_recording_format};
+use flexarm::recordings::{ConvertOptions, ConvertSummary, RecordingFormat, parse_recording_format};
 
 use crate::failure::Failure;
 use crate::formats;
@@ -54,7 +54,7 @@ pub(crate) fn convert(
     options: &ConvertOptions,
 ) -> Result<ConvertSummary, flexarm::Error> {
     let mut stop = crate::signals::stop_when_asked();
-    working(terminal, "converting", || flexarm::convert_until(input, output, options, &mut |_| stop()))
+    working(terminal, "converting", || flexarm::recordings::convert_until(input, output, options, &mut |_| stop()))
 }
 
 fn text(summary: &ConvertSummary) -> String {

@@ -2,9 +2,13 @@
 
 use std::process::ExitCode;
 
-use flexarm::export::{ExportFormat, ExportJob};
-use flexarm::import::{ImportFormat, ImportJob, ImportOutputs, Names, PartMasses, RigidPart, parse_inertia, triple};
-use flexarm::{Robot, RobotFormat, WordError};
+use flexarm::Robot;
+use flexarm::links::WordError;
+use flexarm::links::export::{ExportFormat, ExportJob};
+use flexarm::links::import::{
+    ImportFormat, ImportJob, ImportOutputs, Names, PartMasses, RigidPart, parse_inertia, triple,
+};
+use flexarm::robots::RobotFormat;
 
 use crate::exchange_args::{ExportArgs, ExportFormatName, ImportArgs, ImportFormatName, RobotFormatName};
 use crate::failure::Failure;
@@ -19,7 +23,7 @@ pub(crate) fn import(terminal: &Terminal, args: &ImportArgs) -> Result<ExitCode,
     let folder = OutputFolder::of(args.output.as_deref(), &job.link_name(), in_folder && !args.no_files)?;
     let outputs = ImportOutputs { folder: folder.path(), flex: args.flex.clone(), overwrite: args.force };
     let outputs = (!args.no_files).then_some(outputs);
-    let summary = working(terminal, "importing", || flexarm::import::import(&job, outputs.as_ref()))?;
+    let summary = working(terminal, "importing", || flexarm::links::import::import(&job, outputs.as_ref()))?;
     print::warnings(terminal, &summary.warnings);
     answer_as_is(terminal, || to_json(&summary), || print::imported(&summary));
     Ok(ExitCode::SUCCESS)
@@ -41,7 +45,7 @@ pub(crate) fn export(terminal: &Terminal, args: &ExportArgs) -> Result<ExitCode,
         folder: folder.path().unwrap_or_default(),
         overwrite: args.force,
     };
-    let summary = working(terminal, "exporting", || flexarm::export::export(&job))?;
+    let summary = working(terminal, "exporting", || flexarm::links::export::export(&job))?;
     print::warnings(terminal, &summary.warnings);
     answer(terminal, || to_json(&summary), || print::exported(&summary));
     Ok(ExitCode::SUCCESS)

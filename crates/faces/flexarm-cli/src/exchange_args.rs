@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 
 use crate::args::{ModellingArgs, RobotArgs};
-use flexarm::import::{FrameAt, ImportMap, RigidPart, Split, UnitsOfFile, parse_part, parse_split};
+use flexarm::links::import::{FrameAt, ImportMap, RigidPart, Split, UnitsOfFile, parse_part, parse_split};
 
 const IMPORT_EXAMPLES: &str = "\
 Examples:

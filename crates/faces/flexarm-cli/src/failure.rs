@@ -3,7 +3,9 @@
 
 use std::process::ExitCode;
 
-use flexarm::{Fault, RecordingFormat, TrajectoryError};
+use flexarm::Fault;
+use flexarm::errors::TrajectoryError;
+use flexarm::recordings::RecordingFormat;
 
 use crate::print::{complaint, say};
 
@@ -26,8 +28,8 @@ impl From<flexarm::Error> for Failure {
     }
 }
 
-impl From<flexarm::LinkError> for Failure {
-    fn from(error: flexarm::LinkError) -> Self {
+impl From<flexarm::links::LinkError> for Failure {
+    fn from(error: flexarm::links::LinkError) -> Self {
         Self::Library(error.into())
     }
 }
@@ -101,7 +103,7 @@ impl Failure {
 
     /// Returns the format of recordings that this program was built without.
     fn lacks(&self) -> Option<RecordingFormat> {
-        use flexarm::RecordingError::{NotBuiltIn, WithoutFormat};
+        use flexarm::errors::RecordingError::{NotBuiltIn, WithoutFormat};
         match self {
             Self::In { source, .. } => source.lacks(),
             Self::Library(flexarm::Error::Recording(NotBuiltIn { format, .. } | WithoutFormat { format })) => {

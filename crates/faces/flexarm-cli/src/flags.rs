@@ -1,6 +1,6 @@
 //! Names of the library's settings on the command line.
 
-use flexarm::{Names, Setting};
+use flexarm::settings::{Names, Setting};
 
 /// The flags, used in all messages of this process.
 pub(crate) const NAMES: Names = Names { setting: flag, caller: "the command line" };

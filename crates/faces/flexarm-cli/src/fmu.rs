@@ -4,7 +4,8 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
-use flexarm::{Robot, STEPPERS, StepRule, StepperEntry, StepperOptions};
+use flexarm::Robot;
+use flexarm::steppers::{STEPPERS, StepRule, StepperEntry, StepperOptions};
 use flexarm_fmu::{Fmi, FmuJob, FmuSummary, PlantSettings, export_fmu};
 
 use crate::args::stepper_words;

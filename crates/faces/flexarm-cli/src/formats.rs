@@ -3,7 +3,8 @@
 use std::path::PathBuf;
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use flexarm::{Outputs, RecordingFormat};
+use flexarm::Outputs;
+use flexarm::recordings::RecordingFormat;
 
 use crate::args::RunArgs;
 use crate::failure::{Failure, build_with};
@@ -62,7 +63,7 @@ pub(crate) fn also() -> impl TypedValueParser<Value = RecordingFormat> {
         PossibleValue::new(info.extension).help(format!("{} ({}){late}", info.name, info.file_name))
     });
     let parser = PossibleValuesParser::new(words.collect::<Vec<_>>());
-    parser.try_map(|word| flexarm::parse_recording_format(&word))
+    parser.try_map(|word| flexarm::recordings::parse_recording_format(&word))
 }
 
 /// Returns the output folder of a run and the requested files.

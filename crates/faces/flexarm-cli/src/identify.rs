@@ -135,7 +135,7 @@ pub(crate) fn run(terminal: &Terminal, args: &IdentifyArgs) -> Result<ExitCode, 
 
 /// Parses three numbers from each text.
 fn threes(flag: &str, what: &str, texts: &[String]) -> Result<Vec<[f64; 3]>, Failure> {
-    let of = |text: &String| match flexarm::reduce::numbers(text).as_deref() {
+    let of = |text: &String| match flexarm::links::reduce::numbers(text).as_deref() {
         Ok([x, y, z]) => Ok([*x, *y, *z]),
         _ => Err(Failure::Usage(format!("{flag} {text:?}: expected {what}"))),
     };

@@ -3,7 +3,7 @@
 use std::process::ExitCode;
 
 use flexarm::Robot;
-use flexarm::written::visible;
+use flexarm::settings::written::visible;
 
 use crate::args::{CheckArgs, InspectArgs};
 use crate::failure::Failure;
@@ -27,7 +27,7 @@ pub(crate) fn check(terminal: &Terminal, args: &CheckArgs) -> Result<ExitCode, F
     let robot = shipped::robot(Some(&args.robot))?;
     let (motion, options) = (args.motion.options(), args.load.options()?);
     let loads = args.loads.as_deref();
-    let findings = flexarm::check_with_motion(&robot, trajectory.as_deref(), &motion, loads, &options);
+    let findings = flexarm::robots::check_with_motion(&robot, trajectory.as_deref(), &motion, loads, &options);
     let json = || serde_json::json!({ "findings": findings }).to_string();
     // Messages, which editors and scripts read line by line, are not wrapped.
     answer_as_is(terminal, json, || visible(&print::findings(&findings)));

@@ -1,6 +1,6 @@
 //! Text that fits the terminal: tables and paragraphs, in which no number and no word is cut.
 
-use flexarm::written::one_line;
+use flexarm::settings::written::one_line;
 
 /// Minimum width (columns); narrower terminals are treated like this.
 pub(crate) const MIN_WIDTH: usize = 40;
@@ -203,5 +203,5 @@ fn line_break(line: &str, width: usize, indent: usize) -> Option<usize> {
     let fits = |at: &usize| before(*at) <= width && indent + word(*at) <= width;
     let comma = |at: &usize| before(*at) > width / 2 && line[..*at].trim_end().ends_with([',', ';']);
     let fitting = || breaks().filter(fits);
-    fitting().filter(comma).last().or_else(|| fitting().last()).or_else(|| breaks().find(|at| before(*at) > width))
+    fitting().rfind(comma).or_else(|| fitting().next_back()).or_else(|| breaks().find(|at| before(*at) > width))
 }

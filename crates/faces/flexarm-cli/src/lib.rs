@@ -51,7 +51,7 @@ use clap::builder::{PossibleValue, Resettable, StyledStr};
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Arg, CommandFactory, Parser};
 use commands::Cli;
-use flexarm::written::message;
+use flexarm::settings::written::message;
 
 /// Runs a command line, program name first, and returns the exit code of the process: 0 success, 1
 /// failed run, 2 bad input.
@@ -64,7 +64,7 @@ pub fn run(line: Vec<OsString>) -> u8 {
         let _ = rayon::ThreadPoolBuilder::new().num_threads(processors).build_global();
     }
     signals::turn_into_errors();
-    flexarm::name_settings(flags::NAMES);
+    flexarm::settings::name_settings(flags::NAMES);
     #[cfg(feature = "rerun")]
     flexarm_rerun::install();
     let code = match Cli::try_parse_from(&line) {

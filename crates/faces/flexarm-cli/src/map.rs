@@ -4,11 +4,11 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
+use flexarm::links::reduce::numbers;
 use flexarm::map::{
     JointRange, KeptPoses, Map, MapPose, MapRegion, MapRequest, ToolDirections, WorkspaceGrid, map, quantity_text,
     quantity_title, read_poses, readable_quantity,
 };
-use flexarm::reduce::numbers;
 use flexarm::{Motion, Robot};
 
 use crate::args::{ModellingArgs, RobotArgs};

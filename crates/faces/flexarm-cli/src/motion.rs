@@ -4,7 +4,8 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
-use flexarm::{ColumnMap, MotionCurve, MotionOptions, MotionPeak, MotionReport, Robot};
+use flexarm::Robot;
+use flexarm::motions::{ColumnMap, MotionCurve, MotionOptions, MotionPeak, MotionReport};
 
 use crate::args::RobotArgs;
 use crate::failure::Failure;
@@ -78,7 +79,7 @@ pub(crate) fn run(terminal: &Terminal, args: &MotionArgs) -> Result<ExitCode, Fa
     };
     let motion = shipped::trajectory(&args.motion)?;
     let options = args.input.options();
-    let report = flexarm::motion_report(&motion, robot.as_ref(), &options, &outputs, args.rate, args.force)?;
+    let report = flexarm::motions::motion_report(&motion, robot.as_ref(), &options, &outputs, args.rate, args.force)?;
     crate::print::warnings(terminal, &report.warnings);
     answer(terminal, || to_json(&report), || text(&report));
     Ok(ExitCode::SUCCESS)

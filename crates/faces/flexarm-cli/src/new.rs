@@ -5,10 +5,9 @@ use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
 use flexarm::new::{NewLink, Reducer};
-use flexarm::{
-    Keep, LoadOptions, Modelling, Motion, NewOptions, NewRobot, Outputs, ReadOptions, Robot, RunOptions, RunRequest,
-    Summary, gathered,
-};
+use flexarm::robots::{NewOptions, NewRobot, ReadOptions};
+use flexarm::settings::gathered;
+use flexarm::{Keep, LoadOptions, Modelling, Motion, Outputs, Robot, RunOptions, RunRequest, Summary};
 
 use crate::args::RobotArgs;
 use crate::failure::Failure;
@@ -128,7 +127,7 @@ impl NewArgs {
 pub(crate) fn run(terminal: &Terminal, args: &NewArgs) -> Result<ExitCode, Failure> {
     let options = args.options()?;
     let folder = args.folder(&options.urdf);
-    let mut made = flexarm::new_robot(&args.urdf, &folder, args.force, &options)?;
+    let mut made = flexarm::robots::new_robot(&args.urdf, &folder, args.force, &options)?;
     if !args.no_run {
         made.summary = Some(Box::new(first_run(terminal, &made, &folder, args.force)?));
     }

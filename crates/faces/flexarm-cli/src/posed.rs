@@ -3,10 +3,10 @@
 
 use std::process::ExitCode;
 
-use flexarm::{
-    ModeMovie, ModeTable, Outputs, Quantity, Response, ResponseOutputs, ResponseRequest, Robot, Spacing, Statics,
-    StaticsOutputs,
+use flexarm::poses::{
+    ModeMovie, ModeTable, Quantity, Response, ResponseOutputs, ResponseRequest, Spacing, Statics, StaticsOutputs,
 };
+use flexarm::{Outputs, Robot};
 
 use crate::failure::Failure;
 use crate::layout::{lines, table};
@@ -33,9 +33,9 @@ pub(crate) fn statics(terminal: &Terminal, args: &StaticsArgs) -> Result<ExitCod
     let found = match &args.output {
         Some(folder) => {
             let outputs = StaticsOutputs { folder: folder.clone(), overwrite: args.force };
-            flexarm::record_statics(&robot, &modelling, at, wrench, &outputs)?
+            flexarm::poses::record_statics(&robot, &modelling, at, wrench, &outputs)?
         }
-        None => flexarm::statics(&robot, &modelling, at, wrench)?,
+        None => flexarm::poses::statics(&robot, &modelling, at, wrench)?,
     };
     caveats(terminal, &found.caveats);
     answer(terminal, || to_json(&found), || statics_text(&found));
@@ -55,9 +55,9 @@ pub(crate) fn modes(terminal: &Terminal, args: &ModesArgs) -> Result<ExitCode, F
         Some(folder) => {
             let outputs = Outputs { overwrite: args.force, ..Outputs::everything(folder) };
             let movie = ModeMovie { seconds: args.seconds, tool_motion_m: args.tool_motion };
-            flexarm::record_modes(&robot, &modelling, at, speeds, args.count, &movie, &outputs)?
+            flexarm::poses::record_modes(&robot, &modelling, at, speeds, args.count, &movie, &outputs)?
         }
-        None => flexarm::modes(&robot, &modelling, at, speeds, args.count)?,
+        None => flexarm::poses::modes(&robot, &modelling, at, speeds, args.count)?,
     };
     caveats(terminal, &found.caveats);
     answer(terminal, || to_json(&found), || modes_text(&found));
@@ -83,7 +83,7 @@ pub(crate) fn response(terminal: &Terminal, args: &ResponseArgs) -> Result<ExitC
     let stem = format!("{}-response", robot.name);
     let folder = OutputFolder::of(args.folder.as_deref(), &stem, !args.no_files)?;
     let outputs = folder.path().map(|folder| ResponseOutputs { folder, overwrite: args.force });
-    let found = flexarm::response(
+    let found = flexarm::poses::response(
         &robot,
         &args.pose.modelling.modelling(),
         values::joint_values(args.pose.at.as_deref(), &robot)?.as_deref(),
@@ -126,7 +126,7 @@ fn statics_text(s: &Statics) -> String {
     let holding: Vec<String> =
         s.joints.iter().zip(&s.holding_torque).map(|(joint, torque)| format!("{joint} {torque:.2}")).collect();
     out += &format!("\nholding torques [N m or N]: {}\n", holding.join(", "));
-    for figure in flexarm::stress_figures(&s.stress, false) {
+    for figure in flexarm::report::stress_figures(&s.stress, false) {
         let (name, value, unit) = (figure.name, figure.value, figure.unit);
         out += &format!("{name}: {value} {unit}, {}\n", figure.note);
     }
@@ -214,7 +214,7 @@ fn response_text(r: &Response) -> String {
     let head: Vec<String> = head.chain((1..=SHOWN_PEAKS).map(|k| format!("peak {k} at [Hz]"))).collect();
     let mut t = table(&head);
     for c in &r.curves {
-        let (unit, factor) = flexarm::readable_unit(&c.unit);
+        let (unit, factor) = flexarm::poses::readable_unit(&c.unit);
         let number = |x: f64| match factor * x {
             0.0 => "0".to_owned(),
             x if (1e-3..1e5).contains(&x.abs()) => format!("{x:.4}"),

@@ -4,9 +4,11 @@ use std::io::Write as _;
 
 use crate::layout::{filled, lines, table};
 use crate::terminal::{Terminal, readable};
-use flexarm::reduce::{MeshListing, ReduceSummary, ReportTable, SetListing};
-use flexarm::written::{message, visible};
-use flexarm::{BalancerInfo, Caveat, Finding, FlexibleInfo, Inspection, LoopInfo, RobotExport, gathered};
+use flexarm::Caveat;
+use flexarm::links::reduce::{MeshListing, ReduceSummary, ReportTable, SetListing};
+use flexarm::robots::{BalancerInfo, Finding, FlexibleInfo, Inspection, LoopInfo, RobotExport};
+use flexarm::settings::gathered;
+use flexarm::settings::written::{message, visible};
 
 /// The text with zeros that were rounded from negative numbers written without their sign.
 pub fn plain_zeros(text: &str) -> String {
@@ -183,8 +185,8 @@ fn report_table(report: &ReportTable) -> String {
 
 /// Formats the figures of a reduction.
 pub(crate) fn reduction(summary: &ReduceSummary) -> String {
-    let mut out = format!("link {}\n{}\n", summary.link, flexarm::reduce::headline(summary));
-    for report in flexarm::reduce::tables(summary).iter().filter(|report| !report.page_only) {
+    let mut out = format!("link {}\n{}\n", summary.link, flexarm::links::reduce::headline(summary));
+    for report in flexarm::links::reduce::tables(summary).iter().filter(|report| !report.page_only) {
         out += &report_table(report);
     }
     let f = &summary.files;
@@ -209,7 +211,7 @@ fn pasted(entry: Option<&str>) -> String {
 }
 
 /// Formats the figures of an import.
-pub(crate) fn imported(summary: &flexarm::import::ImportSummary) -> String {
+pub(crate) fn imported(summary: &flexarm::links::import::ImportSummary) -> String {
     let mut out = format!(
         "link {}\n{}: {}, {}, {} rows; {}\n",
         summary.link,
@@ -219,7 +221,7 @@ pub(crate) fn imported(summary: &flexarm::import::ImportSummary) -> String {
         summary.rows,
         summary.method
     );
-    for report in flexarm::import::tables(summary).iter().filter(|report| !report.page_only) {
+    for report in flexarm::links::import::tables(summary).iter().filter(|report| !report.page_only) {
         out += &report_table(report);
     }
     let f = &summary.files;
@@ -236,7 +238,7 @@ pub(crate) fn imported(summary: &flexarm::import::ImportSummary) -> String {
 }
 
 /// Formats the figures of an export.
-pub(crate) fn exported(summary: &flexarm::export::ExportSummary) -> String {
+pub(crate) fn exported(summary: &flexarm::links::export::ExportSummary) -> String {
     let mut out = format!(
         "link {} as {} in {}: {} rows, {} of them modes\n",
         summary.link, summary.format, summary.units, summary.rows, summary.modes

@@ -2,7 +2,7 @@
 
 use std::process::ExitCode;
 
-use flexarm::reduce::{
+use flexarm::links::reduce::{
     At, InterfaceEntry, OrderingChoice, QuadratureChoice, ReduceJob, ReduceOptions, ReduceOutputs, UrdfEntry,
 };
 
@@ -16,7 +16,7 @@ pub(crate) fn run(terminal: &Terminal, args: &ReduceArgs) -> Result<ExitCode, Fa
     let mut job = ReduceJob::load(&args.mesh)?;
     job.put_over(flags(args)?);
     if args.list {
-        let listing = flexarm::reduce::list_mesh(&job)?;
+        let listing = flexarm::links::reduce::list_mesh(&job)?;
         answer(terminal, || to_json(&listing), || print::listing(&listing));
         return Ok(ExitCode::SUCCESS);
     }
@@ -25,10 +25,10 @@ pub(crate) fn run(terminal: &Terminal, args: &ReduceArgs) -> Result<ExitCode, Fa
     let outputs = ReduceOutputs { folder: folder.path(), flex: args.flex.clone(), overwrite: args.force };
     let outputs = (!args.no_files).then_some(outputs);
     let mut options = ReduceOptions::default();
-    options.urdf.search_paths = flexarm::search_paths_from_environment();
+    options.urdf.search_paths = flexarm::robots::search_paths_from_environment();
 
     let spinner = Spinner::new(terminal, "{pos}/{len} {msg}");
-    let result = flexarm::reduce::reduce(&job, &options, outputs.as_ref(), &mut |step| {
+    let result = flexarm::links::reduce::reduce(&job, &options, outputs.as_ref(), &mut |step| {
         spinner.bar.set_length(step.of as u64);
         spinner.bar.set_position(step.number as u64);
         spinner.bar.set_message(step.step);

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use clap::{Args, ValueEnum};
-use flexarm::reduce::{FrameEntry, MaterialChoice, NodeSelector, SplitChoice, Tie, Units, numbers};
+use flexarm::links::reduce::{FrameEntry, MaterialChoice, NodeSelector, SplitChoice, Tie, Units, numbers};
 
 const EXAMPLES: &str = "\
 Examples:

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
-use flexarm::{ReportFiles, ReportOptions};
+use flexarm::report::{ReportFiles, ReportOptions};
 
 use crate::failure::Failure;
 use crate::terminal::{Terminal, answer, to_json, working};
@@ -34,7 +34,7 @@ pub(crate) struct ReportArgs {
 
 pub(crate) fn run(terminal: &Terminal, args: &ReportArgs) -> Result<ExitCode, Failure> {
     let options = ReportOptions { output: args.output.clone(), figures: args.figures, overwrite: args.force };
-    let files = working(terminal, "drawing the report", || flexarm::report(&args.recordings, &options))?;
+    let files = working(terminal, "drawing the report", || flexarm::report::report(&args.recordings, &options))?;
     crate::print::warnings(terminal, &files.warnings);
     answer(terminal, || to_json(&files), || text(&files));
     Ok(ExitCode::SUCCESS)

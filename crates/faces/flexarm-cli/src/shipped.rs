@@ -5,7 +5,8 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-use flexarm::{Error, closest};
+use flexarm::Error;
+use flexarm::robots::closest;
 
 use crate::failure::Failure;
 

@@ -3,10 +3,9 @@
 use std::ffi::OsString;
 use std::process::ExitCode;
 
-use flexarm::{
-    AlphaSettings, Keep, Modelling, ReferenceSettings, RobotSource, RunOptions, RunRequest, Scenario, SpookSettings,
-    StepperOptions, Variant, sweep::Change,
-};
+use flexarm::runs::Variant;
+use flexarm::steppers::{AlphaSettings, ReferenceSettings, SpookSettings, StepperOptions};
+use flexarm::{Keep, Modelling, RobotSource, RunOptions, RunRequest, Scenario, sweep::Change};
 
 use crate::args::RunArgs;
 use crate::failure::Failure;
@@ -53,7 +52,7 @@ pub(crate) fn run(
         };
         arm.simulate_with(scenario, options, request).map(|run| run.summary)
     } else {
-        flexarm::compare_study(&variants, outputs.as_ref(), &mut progress).map(|(summary, _)| summary)
+        flexarm::runs::compare_study(&variants, outputs.as_ref(), &mut progress).map(|(summary, _)| summary)
     };
     bar.clear();
     let summary = result?;

@@ -4,8 +4,11 @@
 //! (`crate::answer`).
 
 use anstyle::{AnsiColor, Style};
-use flexarm::written::one_line;
-use flexarm::{Figure, Files, Holds, RecordingFormat, STUDY_NOTE, Summary, Weight, figure_groups, study_rows};
+use flexarm::Summary;
+use flexarm::recordings::{Holds, RecordingFormat};
+use flexarm::report::{Figure, Weight, figure_groups};
+use flexarm::runs::{Files, STUDY_NOTE, study_rows};
+use flexarm::settings::written::one_line;
 
 use crate::layout::{MIN_WIDTH, columns, table, wrapped};
 

@@ -1,7 +1,8 @@
 //! Joint values and wrenches as typed by the user.
 
-use flexarm::reduce::numbers;
-use flexarm::{Robot, known_names};
+use flexarm::Robot;
+use flexarm::links::reduce::numbers;
+use flexarm::robots::known_names;
 
 use crate::failure::Failure;
 

@@ -9,9 +9,9 @@ use std::process::{Child, Command, ExitCode, Stdio};
 use std::time::{Duration, Instant};
 
 use clap::Args;
-#[cfg(feature = "rerun")]
-use flexarm::ConvertOptions;
 use flexarm::Error;
+#[cfg(feature = "rerun")]
+use flexarm::recordings::ConvertOptions;
 
 use crate::failure::Failure;
 use crate::print::{complaint, warning};
@@ -100,7 +100,7 @@ fn arranged(terminal: &Terminal, mcap: &Path) -> Result<PathBuf, Failure> {
         return Ok(beside); // made of this file before
     }
     let parent = std::env::temp_dir();
-    let folder = flexarm::private_folder(&parent).map_err(|source| Error::Write { path: parent, source })?;
+    let folder = flexarm::files::private_folder(&parent).map_err(|source| Error::Write { path: parent, source })?;
     Ok(convert(folder.join(mcap.file_stem().unwrap_or_default()).with_extension("rrd"))?)
 }
 
@@ -178,7 +178,7 @@ fn show(terminal: &Terminal, file: &Path, viewer: &Viewer, wait: bool) -> ExitCo
     // Error output of a viewer that cannot start. A pipe would break when this program ends.
     let mut folder = None;
     if !wait {
-        folder = flexarm::private_folder(&std::env::temp_dir()).ok();
+        folder = flexarm::files::private_folder(&std::env::temp_dir()).ok();
         let log = folder.as_ref().and_then(|folder| File::create(folder.join(LOG)).ok());
         command.stderr(log.map_or_else(Stdio::null, Stdio::from)).env("NO_COLOR", "1");
         detach(&mut command);

@@ -789,7 +789,7 @@ mod values_on_the_command_line {
 
     #[test]
     fn words() {
-        let steppers = flexarm::STEPPERS.map(|entry| entry.name);
+        let steppers = flexarm::steppers::STEPPERS.map(|entry| entry.name);
         options(&["--stepper", "euler"], &[&["'euler'", "--stepper"][..], &steppers].concat());
         options(&["--reference-method", "euler"], &["'euler'", "--reference-method", "bdf", "esdirk34", "tsit45"]);
         options(&["--links", "stiff"], &["'stiff'", "--links", "rigid", "lumped"]);

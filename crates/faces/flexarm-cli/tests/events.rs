@@ -4,7 +4,7 @@
 use std::fmt::Write as _;
 
 use crate::common::{Place, shipped_robot, shipped_trajectory};
-use flexarm::{STEPPERS, StepRule, StepperEntry};
+use flexarm::steppers::{STEPPERS, StepRule, StepperEntry};
 use serde_json::Value;
 
 /// Options with which each stepper of the registry handles sudden events.

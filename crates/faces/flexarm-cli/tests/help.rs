@@ -1,7 +1,7 @@
 //! Help texts, flags and the settings that messages name.
 
-use flexarm::RecordingFormat;
-use flexarm::Setting;
+use flexarm::recordings::RecordingFormat;
+use flexarm::settings::Setting;
 use flexarm_cli::internals::{HELP, about_convert, command, flag, help_from, help_input, help_page, help_report};
 
 #[test]

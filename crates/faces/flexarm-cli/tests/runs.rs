@@ -606,7 +606,7 @@ mod stopped {
 
     #[test]
     fn by_divergence() {
-        for stepper in flexarm::STEPPERS.map(|entry| entry.name) {
+        for stepper in flexarm::steppers::STEPPERS.map(|entry| entry.name) {
             let place = Place::new();
             place.write("spin.csv", spin());
             let options = ["--ignore-limits", "--stepper", stepper, "--step", "1e-4", "--log-rate", "1000", "--json"];

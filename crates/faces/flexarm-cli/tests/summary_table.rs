@@ -1,6 +1,7 @@
 //! The table of a run.
 
-use flexarm::{DifferenceFigures, Files, LinkFigures, StepperFigures, Summary, TcpFigures};
+use flexarm::Summary;
+use flexarm::runs::{DifferenceFigures, Files, LinkFigures, StepperFigures, TcpFigures};
 use flexarm_cli::internals::{ALERT, HEADLINE, columns, summary};
 
 fn example() -> Summary {

@@ -9,13 +9,13 @@ use std::io::{Cursor, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use flexarm::FileError;
 use flexarm::caveat::{Caveat, Use, warnings};
-use flexarm::reduce::STRESS_FILE;
-use flexarm::{
-    Arm, DriveModel, InertiaEstimate, LinkModel, LoadOptions, Modelling, ReadOptions, Robot, StepperEntry,
-    StepperOptions, Words,
-};
+use flexarm::errors::FileError;
+use flexarm::links::reduce::STRESS_FILE;
+use flexarm::robots::{InertiaEstimate, ReadOptions};
+use flexarm::settings::Words;
+use flexarm::steppers::{StepperEntry, StepperOptions};
+use flexarm::{Arm, DriveModel, LinkModel, LoadOptions, Modelling, Robot};
 use serde::{Deserialize, Serialize};
 use toml_edit::{DocumentMut, Item};
 use twox_hash::XxHash64;
@@ -109,13 +109,13 @@ fn failed(path: &Path) -> impl FnOnce(std::io::Error) -> PlantError + '_ {
 /// [`PlantError::Robot`] if the robot cannot be loaded, [`PlantError::File`] if a file cannot be
 /// read or written, exists, or if the arm of the resources is not the original one.
 pub fn export_fmu(job: &FmuJob) -> Result<FmuSummary, PlantError> {
-    flexarm::check_free(std::slice::from_ref(&job.output), job.overwrite)?;
+    flexarm::files::check_free(std::slice::from_ref(&job.output), job.overwrite)?;
     let library = fs::read(&job.library).map_err(failed(&job.library))?;
     let plant = Plant::new(&job.robot, &job.settings)?;
     let robot = plant.arm().robot();
     let meshes = robot.urdf.mesh_files.iter().map(|(_, path)| &**path);
     let read = meshes.chain([&*robot.path, &*robot.urdf_path, &*job.library]);
-    flexarm::check_apart(std::slice::from_ref(&job.output), &read.collect::<Vec<_>>())?;
+    flexarm::files::check_apart(std::slice::from_ref(&job.output), &read.collect::<Vec<_>>())?;
     let (files, meshes) = resources(&plant, &job.settings)?;
 
     let about_step = plant.variables().iter().find(|variable| variable.name == "step").and_then(|step| step.start);
@@ -132,7 +132,7 @@ pub fn export_fmu(job: &FmuJob) -> Result<FmuSummary, PlantError> {
     entries.push((format!("resources/{SETTINGS}"), filed));
     entries.extend(files.into_iter().map(|(name, bytes)| (format!("resources/{name}"), bytes)));
     let bytes = zipped(&entries).map_err(failed(&job.output))?;
-    flexarm::write_all(&[(job.output.clone(), &bytes)])?;
+    flexarm::files::write_all(&[(job.output.clone(), &bytes)])?;
     let arm = plant.arm();
     let pose = job.settings.pose.clone().unwrap_or_else(|| vec![0.0; arm.rigid.n_actuated()]);
     let caveats = arm.caveats(Use::Commanded(&pose, job.settings.stepper, step_s));
@@ -278,7 +278,7 @@ fn move_links(document: &mut DocumentMut, folder: &Path, with_stress: bool) -> R
 fn same_arm(files: &NamedFiles, arm: &Arc<Arm>, settings: &PlantSettings) -> Result<bool, PlantError> {
     let parent = std::env::temp_dir();
     let folder =
-        flexarm::private_folder(&parent).map_err(|source| FileError::Write { path: parent.clone(), source })?;
+        flexarm::files::private_folder(&parent).map_err(|source| FileError::Write { path: parent.clone(), source })?;
     let checked = (|| {
         for (name, bytes) in files {
             let path = folder.join(name);

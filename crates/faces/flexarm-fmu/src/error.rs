@@ -13,7 +13,7 @@ pub enum PlantError {
     Robot(#[from] flexarm::Error),
     /// Files exist or cannot be written.
     #[error(transparent)]
-    Written(#[from] flexarm::FileError),
+    Written(#[from] flexarm::errors::FileError),
     /// There is no variable with this reference.
     #[error("there is no variable with the reference {0}")]
     Reference(usize),

@@ -1,6 +1,6 @@
 //! Model exchange: the plant as a differential equation, at states that a solver outside sets.
 
-use flexarm::EquationCommand;
+use flexarm::live::EquationCommand;
 
 use crate::error::PlantError;
 use crate::plant::{Plant, Running};

@@ -3,10 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use flexarm::{
-    Arm, Command, Equations, Live, LiveOptions, LiveState, LoadOptions, Modelling, Pose, Readings, Robot, RunOptions,
-    Servos, StepperKind, Wrench,
-};
+use flexarm::live::{Command, Equations, Live, LiveOptions, LiveState, Readings, Servos};
+use flexarm::{Arm, LoadOptions, Modelling, Pose, Robot, RunOptions, StepperKind, Wrench};
 use nalgebra::UnitQuaternion;
 use toml_edit::DocumentMut;
 

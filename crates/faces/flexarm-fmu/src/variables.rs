@@ -5,7 +5,9 @@
 
 use std::fmt::Write as _;
 
-use flexarm::{Arm, Coordinate, ElasticCoordinate};
+use flexarm::Arm;
+use flexarm::live::ElasticCoordinate;
+use flexarm::robots::Coordinate;
 
 /// Axes of vectors.
 const AXES: [&str; 3] = ["x", "y", "z"];

@@ -3,11 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use crate::helpers::{of_joints, robot, root, settings, targets, values};
-use flexarm::reduce::{ReduceJob, ReduceOptions, ReduceOutputs, reduce};
-use flexarm::{
-    Command, DriveModel, LinkModel, LiveOptions, Modelling, Motion, PayloadChange, Robot, RunOptions, Scenario, Servos,
-    Wrench, statics,
-};
+use flexarm::links::reduce::{ReduceJob, ReduceOptions, ReduceOutputs, reduce};
+use flexarm::live::{Command, LiveOptions, Servos};
+use flexarm::poses::statics;
+use flexarm::{DriveModel, LinkModel, Modelling, Motion, PayloadChange, Robot, RunOptions, Scenario, Wrench};
 use flexarm_fmu::{
     About, Causality, Fmi, FmuJob, Kind, Plant, PlantError, PlantSettings, description, export_fmu, open_resources,
 };

@@ -1,6 +1,6 @@
 //! Results at a pose: statics, modes, frequency response.
 
-use flexarm::{ModeTable, OperatingPoint, OperatingPoints, Quantity, Response, ResponseRequest, Spacing};
+use flexarm::poses::{ModeTable, OperatingPoint, OperatingPoints, Quantity, Response, ResponseRequest, Spacing};
 use pyo3::prelude::*;
 use pyo3::types::{PyList, PyTuple};
 
@@ -338,7 +338,7 @@ pub(crate) struct PyResponse {
 }
 
 pub(crate) fn response(response: Response, request: &ResponseRequest) -> PyResponse {
-    let all = |of: fn(&flexarm::ResponseCurve) -> &[f64]| response.curves.iter().flat_map(of).copied().collect();
+    let all = |of: fn(&flexarm::poses::ResponseCurve) -> &[f64]| response.curves.iter().flat_map(of).copied().collect();
     PyResponse {
         frequency: response.frequency_hz.clone(),
         natural_frequencies: response.frequencies_hz.clone(),

@@ -2,7 +2,10 @@
 
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-use flexarm::{Arm, Error, LiveOptions, OperatingPoint, Outputs, RunOptions, RunRequest, Scenario, Servos, Words};
+use flexarm::live::{LiveOptions, Servos};
+use flexarm::poses::OperatingPoint;
+use flexarm::settings::Words;
+use flexarm::{Arm, Error, Outputs, RunOptions, RunRequest, Scenario};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PyTuple};
@@ -549,7 +552,7 @@ impl PyArm {
         let mut look = |done: f64, total: f64| locked().look(done, total);
         let mut show = observer.map(|observer| {
             let locked = &locked;
-            move |sample: &flexarm::Sample| {
+            move |sample: &flexarm::recordings::Sample| {
                 let shown =
                     Python::attach(|py| observer.call1(py, (PySample::new(sample),))?.extract::<Option<bool>>(py));
                 match shown {
@@ -560,7 +563,9 @@ impl PyArm {
             }
         });
         let result = py.detach(|| {
-            let show = show.as_mut().map(|show| show as &mut dyn FnMut(&flexarm::Sample) -> std::ops::ControlFlow<()>);
+            let show = show
+                .as_mut()
+                .map(|show| show as &mut dyn FnMut(&flexarm::recordings::Sample) -> std::ops::ControlFlow<()>);
             let request = RunRequest { outputs, observer: show, progress: Some(&mut look), ..RunRequest::default() };
             self.arm.simulate_with(scenario, options, request)
         });

@@ -1,6 +1,7 @@
 //! Caveats (probable mistakes in inputs, limits of results) as warnings of their own class.
 
-use flexarm::{Caveat, gathered, written};
+use flexarm::Caveat;
+use flexarm::settings::{gathered, written};
 use pyo3::call::PyCallArgs;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};

@@ -11,7 +11,7 @@ use pyo3::prelude::*;
 pub(crate) fn name_keywords() {
     static NAMED: Once = Once::new();
     NAMED.call_once(|| {
-        flexarm::name_settings(crate::names::NAMES);
+        flexarm::settings::name_settings(crate::names::NAMES);
     });
 }
 

@@ -83,7 +83,7 @@ impl PyCompensated {
     }
 
     fn __repr__(&self) -> String {
-        format!("<Compensated {}>", flexarm::written::one_line(&self.headline))
+        format!("<Compensated {}>", flexarm::settings::written::one_line(&self.headline))
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {

@@ -1,6 +1,7 @@
 //! TCP deflections of many runs, given as lists of runs or as arrays of parameters.
 
-use flexarm::{PayloadChange, Scenario, ToolDeflection, Variation};
+use flexarm::runs::{ToolDeflection, Variation};
+use flexarm::{PayloadChange, Scenario};
 use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
 

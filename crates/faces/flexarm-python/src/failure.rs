@@ -2,9 +2,10 @@
 //! since they have two base classes.
 
 use flexarm::compensate::CompensateError;
+use flexarm::errors::NewError;
 use flexarm::identify::IdentifyFileError;
 use flexarm::map::MapError;
-use flexarm::{Error, Fault, NewError};
+use flexarm::{Error, Fault};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::types::PyType;
@@ -72,7 +73,7 @@ pub(crate) fn raised(py: Python<'_>, class: &str, message: String) -> PyErr {
     let made = || -> PyResult<PyErr> {
         let class = py.import("flexarm.errors")?.getattr(class)?.cast_into::<PyType>()?;
         // Python prints uncaught messages without escaping.
-        Ok(PyErr::from_type(class, flexarm::written::message(&message)))
+        Ok(PyErr::from_type(class, flexarm::settings::written::message(&message)))
     };
     made().unwrap_or_else(|error| error)
 }

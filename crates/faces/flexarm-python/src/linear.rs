@@ -1,6 +1,6 @@
 //! The linear system about an equilibrium.
 
-use flexarm::Linear;
+use flexarm::poses::Linear;
 use pyo3::prelude::*;
 
 use crate::arrays::view;

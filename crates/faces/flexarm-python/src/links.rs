@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use flexarm::export::{ExportFormat, ExportJob, export};
-use flexarm::import::{ImportFormat, ImportJob, ImportOutputs, import};
-use flexarm::reduce::{ReduceJob, ReduceOptions, ReduceOutputs, ReduceProgress, reduce as reduce_job};
+use flexarm::links::export::{ExportFormat, ExportJob, export};
+use flexarm::links::import::{ImportFormat, ImportJob, ImportOutputs, import};
+use flexarm::links::reduce::{ReduceJob, ReduceOptions, ReduceOutputs, ReduceProgress, reduce as reduce_job};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;

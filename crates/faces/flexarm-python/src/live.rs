@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use flexarm::{Command, Live, LiveState};
+use flexarm::live::{Command, Live, LiveState};
 use pyo3::prelude::*;
 
 use crate::arrays::{array, numbers};

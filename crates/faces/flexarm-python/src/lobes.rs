@@ -89,7 +89,7 @@ pub(crate) fn lobes<'py>(
 fn no_tool(py: Python<'_>, tool: &Path) -> PyResult<PyErr> {
     let shipped: Vec<String> = py.import("flexarm._show")?.call_method0("shipped_tools")?.extract()?;
     let name = tool.to_string_lossy();
-    let near = flexarm::closest(&name, shipped.iter().map(String::as_str));
+    let near = flexarm::robots::closest(&name, shipped.iter().map(String::as_str));
     let near = near.map_or_else(String::new, |near| format!(" (did you mean {near:?}?)"));
     let shipped = shipped.join(", ");
     let what = format!("there is no such file and no shipped tool of this name{near}; shipped are {shipped}");

@@ -107,7 +107,7 @@ impl PyMap {
     }
 
     fn __repr__(&self) -> String {
-        format!("<Map {}>", flexarm::written::one_line(&self.headline))
+        format!("<Map {}>", flexarm::settings::written::one_line(&self.headline))
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {

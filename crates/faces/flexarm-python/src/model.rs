@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use flexarm::{Error, Recursions};
+use flexarm::Error;
+use flexarm::poses::Recursions;
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 

@@ -2,7 +2,8 @@
 
 use std::path::PathBuf;
 
-use flexarm::{Motion, MotionOptions, Robot, Trajectory};
+use flexarm::motions::{MotionOptions, Trajectory};
+use flexarm::{Motion, Robot};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;

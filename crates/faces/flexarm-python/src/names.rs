@@ -1,6 +1,6 @@
 //! Names of the library's settings in Python: keyword arguments.
 
-use flexarm::{Names, Setting};
+use flexarm::settings::{Names, Setting};
 
 /// The names, used in all messages of this process.
 pub(crate) const NAMES: Names = Names { setting: keyword, caller: "the keyword arguments" };

@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use flexarm::new::Reducer;
-use flexarm::written::message;
-use flexarm::{Finding, NewOptions, ReadOptions, new_robot as make};
+use flexarm::robots::{Finding, NewOptions, ReadOptions, new_robot as make};
+use flexarm::settings::written::message;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -57,7 +57,7 @@ pub(crate) fn new_robot<'py>(
 ) -> PyResult<Bound<'py, PyAny>> {
     crate::command::name_keywords();
     let read = ReadOptions {
-        search_paths: flexarm::search_paths_from_environment(),
+        search_paths: flexarm::robots::search_paths_from_environment(),
         inertia_from_mesh: estimate(inertia_from_density, inertia_from_total_mass)?,
         ..ReadOptions::default()
     };

@@ -2,7 +2,8 @@
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use flexarm::{Error, OperatingPoint};
+use flexarm::Error;
+use flexarm::poses::OperatingPoint;
 use pyo3::prelude::*;
 
 use crate::arrays::{array, numbers};

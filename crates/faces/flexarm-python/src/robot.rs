@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use flexarm::{Description, InertiaEstimate, LoadOptions, ReadOptions, Robot, RobotSource};
+use flexarm::robots::{Description, InertiaEstimate, ReadOptions};
+use flexarm::{LoadOptions, Robot, RobotSource};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -90,7 +91,7 @@ pub(crate) fn load(
     let choices = PyDict::new(py);
     let estimate = estimate(inertia_from_density, inertia_from_total_mass)?;
     let mut urdf = ReadOptions {
-        search_paths: flexarm::search_paths_from_environment(),
+        search_paths: flexarm::robots::search_paths_from_environment(),
         inertia_from_mesh: estimate,
         waive: waive_inertia.clone().unwrap_or_default(),
         ..ReadOptions::default()
@@ -166,7 +167,7 @@ pub(crate) fn robot(
     let folder = folder.unwrap_or_else(|| PathBuf::from("."));
     let folder = std::path::absolute(&folder).unwrap_or(folder);
     let path = folder.join(VALUES);
-    let read = ReadOptions { search_paths: flexarm::search_paths_from_environment(), ..ReadOptions::default() };
+    let read = ReadOptions { search_paths: flexarm::robots::search_paths_from_environment(), ..ReadOptions::default() };
     let options = LoadOptions { tcp: None, urdf: read };
     let description = urdf.as_deref().map(Description::Text);
     let source = RobotSource { text: Some(&text), description, ..RobotSource::new(&path, &options) };
@@ -227,11 +228,11 @@ pub(crate) fn check<'py>(
     let robot = shipped(&path("robot", robot)?)?;
     let motion = motion.map(|motion| path("motion", motion)).transpose()?;
     let motion = motion.map(|motion| flexarm_cli::shipped_motion(&motion));
-    let urdf = ReadOptions { search_paths: flexarm::search_paths_from_environment(), ..ReadOptions::default() };
+    let urdf = ReadOptions { search_paths: flexarm::robots::search_paths_from_environment(), ..ReadOptions::default() };
     let options = LoadOptions { tcp: None, urdf };
     let findings = py.detach(|| {
-        let input = flexarm::MotionOptions::default();
-        flexarm::check_with_motion(&robot, motion.as_deref(), &input, None, &options)
+        let input = flexarm::motions::MotionOptions::default();
+        flexarm::robots::check_with_motion(&robot, motion.as_deref(), &input, None, &options)
     });
     plain(py, &findings)
 }

@@ -20,7 +20,7 @@ impl PyRobot {
     fn limits_of<'py, const N: usize>(
         &self,
         py: Python<'py>,
-        of: impl Fn(&flexarm::Coordinate) -> [f64; N],
+        of: impl Fn(&flexarm::robots::Coordinate) -> [f64; N],
     ) -> PyResult<Bound<'py, PyAny>> {
         let model = self.robot.rigid_model().or_raise()?;
         let actuated = &model.coordinates()[..model.n_actuated()];

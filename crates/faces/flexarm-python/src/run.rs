@@ -1,6 +1,7 @@
 //! Runs: figures, and every logged sample as columns.
 
-use flexarm::{Column, Columns, Run, Sample};
+use flexarm::Run;
+use flexarm::recordings::{Column, Columns, Sample};
 use pyo3::exceptions::{PyAttributeError, PyKeyError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
@@ -233,7 +234,7 @@ impl PyRun {
     /// Returns scalar columns, with names as in ``run.csv`` (dict of str to ndarray); this copies.
     fn table<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let table = PyDict::new(py);
-        for (name, values) in flexarm::flat_columns(&self.columns) {
+        for (name, values) in flexarm::recordings::flat_columns(&self.columns) {
             table.set_item(name, array(py, [values.len()], values)?)?;
         }
         Ok(table)
@@ -290,7 +291,7 @@ impl PyRun {
     }
 
     fn __repr__(&self) -> String {
-        format!("<Run {}>", flexarm::written::one_line(&self.headline))
+        format!("<Run {}>", flexarm::settings::written::one_line(&self.headline))
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {

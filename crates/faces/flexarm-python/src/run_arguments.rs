@@ -2,7 +2,8 @@
 
 use std::collections::HashMap;
 
-use flexarm::{Outputs, RecordingFormat, RunOptions, Scenario};
+use flexarm::recordings::RecordingFormat;
+use flexarm::{Outputs, RunOptions, Scenario};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;

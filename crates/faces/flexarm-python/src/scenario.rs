@@ -1,6 +1,7 @@
 //! Scenarios of a run: motion, loads, payloads, initial state.
 
-use flexarm::{AppliedLoad, Motion, PayloadChange, Scenario, Wrench};
+use flexarm::motions::AppliedLoad;
+use flexarm::{Motion, PayloadChange, Scenario, Wrench};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
@@ -71,7 +72,7 @@ impl PyLoad {
     }
 
     fn __repr__(&self) -> String {
-        format!("<Load {}>", flexarm::written::one_line(&self.text))
+        format!("<Load {}>", flexarm::settings::written::one_line(&self.text))
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {

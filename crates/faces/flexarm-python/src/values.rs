@@ -2,10 +2,12 @@
 
 use std::path::PathBuf;
 
-use flexarm::{
-    AlphaSettings, DriveModel, LinkModel, Modelling, ReferenceSettings, STEPPERS, SpookSettings, Start, StepperEntry,
-    StepperKind, StepperOptions, Words, Wrench, closest,
+use flexarm::robots::closest;
+use flexarm::settings::Words;
+use flexarm::steppers::{
+    AlphaSettings, ReferenceSettings, STEPPERS, SpookSettings, Start, StepperEntry, StepperOptions,
 };
+use flexarm::{DriveModel, LinkModel, Modelling, StepperKind, Wrench};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;

@@ -100,7 +100,7 @@ pub(crate) fn stoppable_telling<T: Send + 'static>(
     let (sender, receiver) = channel::<T>();
     let worker = std::thread::spawn(move || {
         let work = || work(&|| asked.load(Ordering::Relaxed));
-        let found = flexarm::writing_unless(move || unwanted.load(Ordering::Relaxed), work);
+        let found = flexarm::files::writing_unless(move || unwanted.load(Ordering::Relaxed), work);
         let _ = sender.send(found); // the receiver may be gone
     });
     let receiver = Mutex::new(receiver);

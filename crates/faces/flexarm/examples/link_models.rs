@@ -10,7 +10,9 @@
 
 use std::path::PathBuf;
 
-use flexarm::{LinkModel, LoadOptions, Modelling, Motion, Robot, Start, StepperKind, TCP_FRAME};
+use flexarm::robots::TCP_FRAME;
+use flexarm::steppers::Start;
+use flexarm::{LinkModel, LoadOptions, Modelling, Motion, Robot, StepperKind};
 use flexarm_stepping::{AlphaSettings, FlexibleArm, Observation, ReferenceSettings, static_equilibrium};
 use nalgebra::Vector3;
 

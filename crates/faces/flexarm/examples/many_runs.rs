@@ -8,7 +8,8 @@
 use std::path::Path;
 use std::time::Instant;
 
-use flexarm::{Error, Modelling, Motion, PayloadChange, Robot, RunOptions, Scenario, Variation};
+use flexarm::runs::Variation;
+use flexarm::{Error, Modelling, Motion, PayloadChange, Robot, RunOptions, Scenario};
 
 fn main() -> Result<(), Error> {
     let number: u32 = std::env::args().nth(1).and_then(|n| n.parse().ok()).unwrap_or(400);

@@ -13,9 +13,8 @@
 use std::path::Path;
 
 use cpu_time::ThreadTime;
-use flexarm::{
-    Arm, Error, Keep, Modelling, Motion, ReferenceSettings, Robot, RunOptions, RunRequest, STEPPERS, StepperOptions,
-};
+use flexarm::steppers::{ReferenceSettings, STEPPERS, StepperOptions};
+use flexarm::{Arm, Error, Keep, Modelling, Motion, Robot, RunOptions, RunRequest};
 
 const TIMES: usize = 9;
 

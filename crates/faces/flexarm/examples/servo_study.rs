@@ -6,7 +6,8 @@
 //! arm.
 #![allow(clippy::print_stdout, reason = "an example shows its answer")]
 
-use flexarm::{DriveModel, Error, Modelling, Motion, Robot, RunOptions, TcpFigures};
+use flexarm::runs::TcpFigures;
+use flexarm::{DriveModel, Error, Modelling, Motion, Robot, RunOptions};
 
 /// Gains of the position loops (1/s).
 const GAINS: [f64; 6] = [5.0, 10.0, 20.0, 40.0, 80.0, 160.0];

@@ -7,7 +7,8 @@
 
 use std::ops::ControlFlow;
 
-use flexarm::{Error, Modelling, Motion, Robot, RunOptions, RunRequest, Sample};
+use flexarm::recordings::Sample;
+use flexarm::{Error, Modelling, Motion, Robot, RunOptions, RunRequest};
 
 /// Criterion of rest: distance of the TCP from its final position (m), and duration (s).
 const NEAR_M: f64 = 2e-4;

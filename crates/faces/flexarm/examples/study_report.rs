@@ -7,7 +7,8 @@
 use std::error::Error;
 use std::path::Path;
 
-use flexarm::{Keep, LinkModel, LoadOptions, Modelling, Motion, ReportRun, Robot, RunOptions, RunRequest, html};
+use flexarm::report::{ReportRun, html};
+use flexarm::{Keep, LinkModel, LoadOptions, Modelling, Motion, Robot, RunOptions, RunRequest};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let path = std::env::args().nth(1).ok_or("give the file to write")?;

@@ -22,8 +22,9 @@
 //! statics, compliance and frequencies at thousands of poses without allocation.
 //!
 //! [`Arm::simulate_with`] also writes recordings and a report. [`inspect()`] and [`check()`]
-//! examine what was loaded; [`statics()`], [`modes()`] and [`response()`] give complete results at
-//! one pose; [`mod@reduce`] creates a flexible link from a mesh.
+//! examine what was loaded; [`poses`] gives complete results at
+//! one pose; [`links::reduce`] creates a flexible link from a mesh. Names are sorted by subject into
+//! modules; at the root are those that a first program needs.
 //!
 //! Examples, from simple to advanced
 //! (`cargo run --release -p flexarm --no-default-features --example NAME`):
@@ -39,8 +40,8 @@
 //! | `link_models` | every link model against a reference: accuracy and cost |
 //!
 //! An [`Error`] states its cause with numbers; a [`Caveat`] warns of a doubtful result. Both carry
-//! the settings that would fix them as values ([`Setting`]); a front end sets their names once
-//! ([`name_settings`]).
+//! the settings that would fix them as values ([`settings::Setting`]); a front end sets their names once
+//! ([`settings::name_settings`]).
 #![allow(non_snake_case, reason = "monogram notation: X_WL, K_S; see docs/references.md")]
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
@@ -55,54 +56,176 @@ pub use flexarm_map as map;
 #[doc(inline)]
 pub use flexarm_new as new;
 #[doc(inline)]
-pub use flexarm_run::{caveat, reduce};
+pub use flexarm_run::caveat;
 #[doc(inline)]
 pub use flexarm_sensitivity as sensitivity;
 #[doc(inline)]
 pub use flexarm_sweep as sweep;
 
-pub use flexarm_new::{NewError, NewOptions, NewRobot, new_robot};
+pub use flexarm_kinematics::{Pose, Wrench};
 pub use flexarm_run::{
-    AppliedLoad, Arm, BalancerEnds, BalancerError, BalancerInfo, Bend, Bending, CURVE_PIECES, Caveat, ChannelError,
-    Command, ConvertOptions, ConvertSummary, CouplingInfo, DependentInfo, Description, DifferenceFigures, Disturbances,
-    Drive, DriveKind, DriveModel, ElasticCoordinate, ElementStatics, EquationCommand, Equations, Error, Fault, Figure,
-    FigureGroup, Files, Finding, FlexibleInfo, GearHysteresis, HeldJoint, HoldFigures, Inspection, JointInfo, Keep,
-    LinkChoices, LinkFigures, LinkFormError, LinkInfo, LinkModel, LinkStressFigures, Live, LiveOptions, LiveState,
-    LoadError, LoadOptions, LoopError, LoopInfo, ModeFigures, ModeMovie, ModeTable, Modelling, ModellingError, Motion,
-    MotionCurve, MotionFiles, MotionOptions, MotionPeak, MotionReport, MotionViolation, MountingInfo, OperatingPoints,
-    Outputs, Owner, PathFigures, PathMoveFigures, PayloadChange, PayloadError, PeakFigures, PoseError, PoseFigures,
-    Progress, Readings, RecordingError, RecordingFiles, Recursions, ReportFiles, ReportOptions, ReportRun, Response,
-    ResponseCurve, ResponseFiles, ResponseOutputs, ResponseRequest, Robot, RobotBalancer, RobotCoupling, RobotExport,
-    RobotFileError, RobotFormat, RobotLink, RobotLoop, RobotMounting, RobotSource, Run, RunOptions, RunRequest,
-    STUDY_NOTE, SampleObserver, Scenario, SectionForceFigures, Servos, SettingValue, Settling, Severity, ShareFigures,
-    Statics, StaticsFiles, StaticsOutputs, StepperFigures, StepperSettings, StrainGaugeFigures, StressPlaceFigures,
-    StressPointFigures, StressSource, StudyError, Summary, TCP_FRAME, TcpFigures, TcpInfo, ToolPath, ValueError,
-    Variant, Variation, Weight, check, check_with_loads, check_with_motion, compare_study, convert, convert_until,
-    figure_groups, html, inspect, markdown, modes, motion_report, parse_recording_format, read_run, readable_unit,
-    record_modes, record_statics, report, response, rows, statics, stress_figures, study_rows,
+    Arm, Caveat, DriveModel, Error, Fault, Keep, LinkModel, LoadOptions, Modelling, Motion, Outputs, PayloadChange,
+    Robot, RobotSource, Run, RunOptions, RunRequest, Scenario, Severity, Summary, check, inspect,
 };
+pub use flexarm_stepping::StepperKind;
 
-pub use flexarm_analysis::{Quantity, Spacing};
-pub use flexarm_files::{FileError, check_apart, check_free, private_folder, write_all, writing_unless};
-pub use flexarm_flexlink::Mounting;
-pub use flexarm_kinematics::{
-    BalancerCurve, BalancerCurveError, BalancerLaw, Coordinate, GasLaw, LinkInertia, Model, Pose, Wrench,
-};
-pub use flexarm_linkmaker::{ImportError, JobError, LinkError, WordError, export, import};
-#[cfg(feature = "arrow")]
-pub use flexarm_log::arrow_stream;
-pub use flexarm_log::{
-    Column, Columns, CurveQuantity, DataColumn, DataTable, DataValues, FormatInfo, Holds, RecordingFormat, Sample,
-    Trace, flat_columns,
-};
-pub use flexarm_motion_io::MotionError;
-pub use flexarm_path::{PathError, PlannedMove, Slowed, SlowedBy};
-pub use flexarm_settings::known_names;
-pub use flexarm_settings::{Names, Setting, Words, gathered, name_settings, written};
-pub use flexarm_stepping::{
-    AlphaSettings, ConstraintForm, InertiaChange, Linear, Load, LoadAxes, OperatingPoint, PoseAnswer, PoseOutputs,
-    ReferenceMethod, ReferenceSettings, STEPPERS, SpookPreset, SpookSettings, Start, StepError, StepRule, StepperEntry,
-    StepperKind, StepperOptions, StepperSetting, TimedWrench, ToolDeflection,
-};
-pub use flexarm_trajectory::{ColumnMap, ColumnMapError, Trajectory, TrajectoryError};
-pub use flexarm_urdf::{InertiaEstimate, ReadOptions, closest, search_paths_from_environment};
+/// An arm held at a pose: statics, natural modes, frequency response; thousands of poses.
+///
+/// ```no_run
+/// use flexarm::poses::{modes, statics};
+/// use flexarm::{Modelling, Robot};
+///
+/// let (robot, as_filed) = (Robot::load("robots/kr210")?, Modelling::default());
+/// let sag_m = statics(&robot, &as_filed, None, [0.0; 6])?.sag_m;
+/// let hz = modes(&robot, &as_filed, None, None, 3)?.frequencies_hz;
+/// println!("{sag_m:?} m, {hz:?} Hz");
+/// # Ok::<(), flexarm::Error>(())
+/// ```
+pub mod poses {
+    pub use flexarm_analysis::{Quantity, Spacing};
+    pub use flexarm_run::{
+        ElementStatics, ModeFigures, ModeMovie, ModeTable, OperatingPoints, PeakFigures, Recursions, Response,
+        ResponseCurve, ResponseFiles, ResponseOutputs, ResponseRequest, Statics, StaticsFiles, StaticsOutputs, modes,
+        readable_unit, record_modes, record_statics, response, statics,
+    };
+    pub use flexarm_stepping::{Linear, OperatingPoint, PoseAnswer, PoseOutputs};
+}
+
+/// What a robot file and a description say, and what a check of them finds.
+///
+/// ```no_run
+/// use flexarm::Robot;
+///
+/// let robot = Robot::load("robots/kr210")?;
+/// for link in &robot.flexible_links {
+///     println!("{}: {} parts", link.flexible.link, link.choices.segments);
+/// }
+/// # Ok::<(), flexarm::Error>(())
+/// ```
+pub mod robots {
+    pub use flexarm_flexlink::Mounting;
+    pub use flexarm_kinematics::{BalancerCurve, BalancerLaw, Coordinate, GasLaw, LinkInertia, Model};
+    pub use flexarm_new::{NewOptions, NewRobot, new_robot};
+    pub use flexarm_run::{
+        BalancerEnds, BalancerInfo, Bend, CouplingInfo, DependentInfo, Description, Drive, DriveKind, Finding,
+        FlexibleInfo, GearHysteresis, Inspection, JointInfo, LinkChoices, LinkInfo, LoopInfo, MountingInfo, Owner,
+        RobotBalancer, RobotCoupling, RobotExport, RobotFormat, RobotLink, RobotLoop, RobotMounting, StressSource,
+        TCP_FRAME, TcpInfo, check_with_loads, check_with_motion,
+    };
+    pub use flexarm_settings::known_names;
+    pub use flexarm_urdf::{InertiaEstimate, ReadOptions, closest, search_paths_from_environment};
+}
+
+/// Motions of the joints, paths of the TCP, loads and payloads.
+///
+/// ```no_run
+/// use flexarm::{Motion, Robot};
+///
+/// let robot = Robot::load("robots/kr210")?;
+/// let motion = Motion::load("trajectories/pick_and_place.toml", &robot)?;
+/// println!("{} s", motion.trajectory.duration());
+/// # Ok::<(), flexarm::Error>(())
+/// ```
+pub mod motions {
+    pub use flexarm_path::{PlannedMove, Slowed, SlowedBy};
+    pub use flexarm_run::{
+        AppliedLoad, Disturbances, HeldJoint, MotionCurve, MotionFiles, MotionOptions, MotionPeak, MotionReport,
+        MotionViolation, PathFigures, PathMoveFigures, ToolPath, motion_report,
+    };
+    pub use flexarm_stepping::{InertiaChange, Load, LoadAxes, TimedWrench};
+    pub use flexarm_trajectory::{ColumnMap, Trajectory};
+}
+
+/// Studies of several runs, and the figures of a run.
+pub mod runs {
+    pub use flexarm_run::{
+        Bending, CURVE_PIECES, DifferenceFigures, Files, HoldFigures, LinkFigures, LinkStressFigures, PoseFigures,
+        Progress, RecordingFiles, STUDY_NOTE, SampleObserver, SectionForceFigures, SettingValue, Settling,
+        ShareFigures, StepperFigures, StepperSettings, StrainGaugeFigures, StressPlaceFigures, StressPointFigures,
+        TcpFigures, Variant, Variation, compare_study, study_rows,
+    };
+    pub use flexarm_stepping::ToolDeflection;
+}
+
+/// An arm that is commanded period by period, and its equations of motion.
+///
+/// ```no_run
+/// use flexarm::{Modelling, Robot, RunOptions};
+///
+/// let arm = Robot::load("robots/kr210")?.model(&Modelling::default())?;
+/// let live = arm.live(None, 1e-3, &RunOptions::default())?;
+/// println!("{} s", live.time_s());
+/// # Ok::<(), flexarm::Error>(())
+/// ```
+pub mod live {
+    pub use flexarm_run::{
+        Command, ElasticCoordinate, EquationCommand, Equations, Live, LiveOptions, LiveState, Readings, Servos,
+    };
+}
+
+/// Time steppers and their settings.
+///
+/// ```no_run
+/// use flexarm::steppers::STEPPERS;
+///
+/// for entry in STEPPERS {
+///     println!("{}: {} s", entry.name, entry.default_step_s);
+/// }
+/// # Ok::<(), flexarm::Error>(())
+/// ```
+pub mod steppers {
+    pub use flexarm_stepping::{
+        AlphaSettings, ConstraintForm, ReferenceMethod, ReferenceSettings, STEPPERS, SpookPreset, SpookSettings, Start,
+        StepRule, StepperEntry, StepperOptions, StepperSetting,
+    };
+}
+
+/// Reports of runs: a page for the browser, Markdown, rows of a table.
+pub mod report {
+    pub use flexarm_run::{
+        Figure, FigureGroup, ReportFiles, ReportOptions, ReportRun, Weight, figure_groups, html, markdown, report,
+        rows, stress_figures,
+    };
+}
+
+/// Recordings of runs: formats, columns, conversion.
+pub mod recordings {
+    #[cfg(feature = "arrow")]
+    pub use flexarm_log::arrow_stream;
+    pub use flexarm_log::{
+        Column, Columns, CurveQuantity, DataColumn, DataTable, DataValues, FormatInfo, Holds, RecordingFormat, Sample,
+        Trace, flat_columns,
+    };
+    pub use flexarm_run::{ConvertOptions, ConvertSummary, convert, convert_until, parse_recording_format, read_run};
+}
+
+/// Flexible links from meshes and from matrices of other programs.
+pub mod links {
+    pub use flexarm_linkmaker::{ImportError, JobError, LinkError, WordError, export, import};
+    pub use flexarm_run::reduce;
+}
+
+/// Results that are written as a whole or not at all.
+pub mod files {
+    pub use flexarm_files::{check_apart, check_free, private_folder, write_all, writing_unless};
+}
+
+/// Causes of an [`Error`](crate::Error).
+pub mod errors {
+    pub use flexarm_files::FileError;
+    pub use flexarm_kinematics::BalancerCurveError;
+    pub use flexarm_motion_io::MotionError;
+    pub use flexarm_new::NewError;
+    pub use flexarm_path::PathError;
+    pub use flexarm_run::{
+        BalancerError, ChannelError, LinkFormError, LoadError, LoopError, ModellingError, PayloadError, PoseError,
+        RecordingError, RobotFileError, StudyError, ValueError,
+    };
+    pub use flexarm_stepping::StepError;
+    pub use flexarm_trajectory::{ColumnMapError, TrajectoryError};
+}
+
+/// Settings that messages name; a front end sets their names once.
+pub mod settings {
+    pub use flexarm_settings::{Names, Setting, Words, gathered, name_settings, written};
+}

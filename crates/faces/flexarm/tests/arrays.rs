@@ -7,9 +7,12 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use flexarm::live::{Command, Live, LiveOptions, Servos};
+use flexarm::poses::{Recursions, ResponseRequest};
+use flexarm::recordings::{RecordingFormat, flat_columns};
+use flexarm::runs::Variation;
 use flexarm::{
-    Arm, Command, DriveModel, Error, LinkModel, Live, LiveOptions, Modelling, Motion, Outputs, RecordingFormat,
-    Recursions, ResponseRequest, Robot, RunOptions, RunRequest, Scenario, Servos, Variation, Wrench, flat_columns,
+    Arm, DriveModel, Error, LinkModel, Modelling, Motion, Outputs, Robot, RunOptions, RunRequest, Scenario, Wrench,
 };
 
 const POSE: [f64; 6] = [0.0, -1.2, 1.5, 0.0, 0.4, 0.0];
@@ -37,12 +40,12 @@ fn an_arm_answers_as_the_robot_that_is_substituted_for_each_question() {
     let modelling = Modelling { links: LinkModel::Modal, drives: DriveModel::Elastic, ..Modelling::default() };
     let arm = robot.model(&modelling).unwrap();
     let wrench = [10.0, 0.0, -500.0, 0.0, 1.0, 0.0];
-    let statics = flexarm::statics(&robot, &modelling, Some(&POSE), wrench).unwrap();
+    let statics = flexarm::poses::statics(&robot, &modelling, Some(&POSE), wrench).unwrap();
     assert_eq!(json(&arm.statics(Some(&POSE), wrench).unwrap()), json(&statics));
-    let modes = flexarm::modes(&robot, &modelling, Some(&POSE), None, 5).unwrap();
+    let modes = flexarm::poses::modes(&robot, &modelling, Some(&POSE), None, 5).unwrap();
     assert_eq!(json(&arm.modes(Some(&POSE), None, 5).unwrap()), json(&modes));
     let request = ResponseRequest { points: 20, ..ResponseRequest::default() };
-    let response = flexarm::response(&robot, &modelling, Some(&POSE), &request, None).unwrap();
+    let response = flexarm::poses::response(&robot, &modelling, Some(&POSE), &request, None).unwrap();
     assert_eq!(json(&arm.response(Some(&POSE), &request).unwrap()), json(&response));
 
     let linear = arm.linearise(Some(&POSE), wrench).unwrap();

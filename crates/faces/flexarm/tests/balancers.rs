@@ -3,9 +3,10 @@
 
 use std::path::{Path, PathBuf};
 
+use flexarm::errors::BalancerError;
+use flexarm::robots::{BalancerLaw, RobotBalancer};
 use flexarm::{
-    BalancerError, BalancerLaw, DriveModel, LinkModel, LoadOptions, Modelling, Motion, Robot, RobotBalancer,
-    RunOptions, StepperKind, Wrench, check, inspect,
+    DriveModel, LinkModel, LoadOptions, Modelling, Motion, Robot, RunOptions, StepperKind, Wrench, check, inspect,
 };
 
 fn project(path: &str) -> PathBuf {
@@ -83,7 +84,7 @@ fn a_run_of_the_kr300_keeps_the_books_with_its_counterbalance() {
     let robot = Robot::load(project("robots/kr300")).unwrap();
     let motion = Motion::load(robot.default_trajectory.clone().unwrap(), &robot).unwrap();
     let arm = robot.model(&Modelling::default()).unwrap();
-    let spook = StepperKind::Spook(flexarm::SpookSettings::default());
+    let spook = StepperKind::Spook(flexarm::steppers::SpookSettings::default());
     let options = |stepper| RunOptions { stepper, log_rate_hz: 1000.0, ..RunOptions::default() };
     let alpha = arm.simulate(&motion, &options(StepperKind::default())).unwrap();
     assert!(alpha.summary.caveats.iter().all(|c| c.code != "energy-open"), "{:?}", alpha.summary.caveats);
@@ -162,14 +163,14 @@ fn what_no_balancer_is_is_refused_with_its_place_and_what_is_expected() {
 #[test]
 fn a_pose_without_room_for_the_gas_is_refused() {
     let robot = Robot::load(project("robots/kr210")).unwrap();
-    let gas = flexarm::GasLaw { force: 1e3, opposing: 0.0, at: 0.5, slope: 2.0, exponent: 1.0, pulls: true };
+    let gas = flexarm::robots::GasLaw { force: 1e3, opposing: 0.0, at: 0.5, slope: 2.0, exponent: 1.0, pulls: true };
     let balancer =
         RobotBalancer::between("b", ("link_1", [-0.9, 0.0, 0.0]), ("link_2", [0.0, 0.0, 0.9]), BalancerLaw::Gas(gas));
     let robot = robot.with_balancer(balancer.clone()).unwrap();
     let leaning = [0.0, 0.5, 0.5, 0.0, 0.0, 0.0];
     let error = inspect(&robot, Some(&leaning), None).unwrap_err().to_string();
     assert!(error.contains("has no room left above 1.0000 m"), "{error}");
-    assert!(flexarm::statics(&robot, &Modelling::default(), Some(&leaning), [0.0; 6]).is_err());
+    assert!(flexarm::poses::statics(&robot, &Modelling::default(), Some(&leaning), [0.0; 6]).is_err());
     let motion = Motion::from_samples(&[0.0, 1.0], &[leaning, leaning].concat(), &robot).unwrap();
     let arm = robot.model(&Modelling::default()).unwrap();
     let error =

@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use flexarm::{
-    Arm, Modelling, Motion, OperatingPoints, PayloadChange, Robot, RunOptions, Scenario, StepperKind, TCP_FRAME,
-    ToolDeflection, Variation, Wrench,
-};
+use flexarm::poses::OperatingPoints;
+use flexarm::robots::TCP_FRAME;
+use flexarm::runs::{ToolDeflection, Variation};
+use flexarm::{Arm, Modelling, Motion, PayloadChange, Robot, RunOptions, Scenario, StepperKind, Wrench};
 use nalgebra::Vector3;
 
 fn root() -> PathBuf {
@@ -118,8 +118,12 @@ fn study(robot: &Robot) -> Vec<Variation> {
             if k < 4 { run } else { run.with_stiffness(0.6 + 0.05 * part).with_damping(0.5 + 0.2 * part) }
         })
         .collect();
-    let push =
-        flexarm::AppliedLoad::during(TCP_FRAME, Wrench::new(Vector3::new(0.0, 0.0, 300.0), Vector3::zeros()), 0.2, 0.5);
+    let push = flexarm::motions::AppliedLoad::during(
+        TCP_FRAME,
+        Wrench::new(Vector3::new(0.0, 0.0, 300.0), Vector3::zeros()),
+        0.2,
+        0.5,
+    );
     runs.push(Variation::new(Scenario::from(&motion).with_load(push)));
     runs
 }

@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use flexarm::{LinkModel, Modelling, Motion, Robot, Run, RunOptions, Scenario, statics};
+use flexarm::poses::statics;
+use flexarm::{LinkModel, Modelling, Motion, Robot, Run, RunOptions, Scenario};
 
 /// The shipped beam with stress and a pair of gauges on both sides of its root, in a folder of its
 /// own.

@@ -7,11 +7,11 @@ use std::path::{Path, PathBuf};
 use flexarm::compensate::{CompensateRequest, compensate_motion};
 use flexarm::lobes::{CuttingPlace, CuttingTool, LobesRequest, lobes};
 use flexarm::map::{JointRange, MapRegion, MapRequest, map};
+use flexarm::motions::{MotionOptions, motion_report};
+use flexarm::poses::{ResponseRequest, modes, response, statics};
+use flexarm::robots::check_with_loads;
 use flexarm::sensitivity::{SensitivityRequest, pose_sensitivity, sensitivity};
-use flexarm::{
-    Caveat, LoadOptions, Modelling, Motion, MotionOptions, ResponseRequest, Robot, RunOptions, Scenario,
-    check_with_loads, inspect, modes, motion_report, response, statics,
-};
+use flexarm::{Caveat, LoadOptions, Modelling, Motion, Robot, RunOptions, Scenario, inspect};
 
 fn project(path: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../..").join(path)

@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 use flexarm::compensate::{
     CompensateRequest, Compensation, LimitRule, Method, ShaperKind, compensate_motion, compensate_motion_until,
 };
-use flexarm::{AppliedLoad, Error, Modelling, Motion, Robot, RunOptions, Scenario, TimedWrench, Wrench};
+use flexarm::motions::{AppliedLoad, TimedWrench};
+use flexarm::{Error, Modelling, Motion, Robot, RunOptions, Scenario, Wrench};
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../..")
@@ -85,7 +86,7 @@ fn at_rest_commands_leave_nothing_where_the_motion_ends() {
     told("static", &found);
     let arm = robot.model(&Modelling::default()).unwrap();
     let mut at = arm.operating_point().unwrap();
-    let end = |trajectory: &flexarm::Trajectory| {
+    let end = |trajectory: &flexarm::motions::Trajectory| {
         let (mut q, mut v, mut a) = ([0.0; 6], [0.0; 6], [0.0; 6]);
         trajectory.sample(trajectory.duration(), &mut q, &mut v, &mut a);
         q
@@ -182,7 +183,7 @@ impl Drop for Place {
     }
 }
 
-fn at(trajectory: &flexarm::Trajectory, t: f64) -> [f64; 6] {
+fn at(trajectory: &flexarm::motions::Trajectory, t: f64) -> [f64; 6] {
     let (mut q, mut v, mut a) = ([0.0; 6], [0.0; 6], [0.0; 6]);
     trajectory.sample(t, &mut q, &mut v, &mut a);
     q
@@ -202,7 +203,7 @@ fn under_the_force_of_a_cutter_the_tool_at_rest_is_where_the_rigid_arm_has_it() 
     told("cutter", &found);
     let arm = robot.model(&Modelling::default()).unwrap();
     let mut point = arm.operating_point().unwrap();
-    let off = |trajectory: &flexarm::Trajectory, point: &mut flexarm::OperatingPoint| {
+    let off = |trajectory: &flexarm::motions::Trajectory, point: &mut flexarm::poses::OperatingPoint| {
         let end = motion.trajectory.duration();
         point.solve(&at(&motion.trajectory, end), &Wrench::zeros()).unwrap();
         let wanted = point.rigid_tcp_pose();
@@ -526,7 +527,7 @@ fn a_motion_that_begins_at_speed_is_corrected_by_the_static_method_and_refused_b
     told("at speed", &found);
     let arm = robot.model(&Modelling::default()).unwrap();
     let mut point = arm.operating_point().unwrap();
-    let mut off = |commands: &flexarm::Trajectory| {
+    let mut off = |commands: &flexarm::motions::Trajectory| {
         point.solve(&at(&motion.trajectory, 1.0), &Wrench::zeros()).unwrap();
         let wanted = point.rigid_tcp_pose().translation.vector;
         point.solve(&at(commands, 1.0), &Wrench::zeros()).unwrap();

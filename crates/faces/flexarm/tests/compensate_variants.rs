@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use flexarm::compensate::{CompensateRequest, Compensation, LimitRule, Method, ShaperKind, Shaping, compensate_motion};
-use flexarm::{AppliedLoad, DriveModel, Modelling, Motion, PayloadChange, Robot, Scenario, TimedWrench, Wrench};
+use flexarm::motions::{AppliedLoad, TimedWrench};
+use flexarm::{DriveModel, Modelling, Motion, PayloadChange, Robot, Scenario, Wrench};
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../..")
@@ -88,7 +89,7 @@ impl Drop for Place {
     }
 }
 
-fn end(trajectory: &flexarm::Trajectory) -> [f64; 6] {
+fn end(trajectory: &flexarm::motions::Trajectory) -> [f64; 6] {
     let (mut q, mut v, mut a) = ([0.0; 6], [0.0; 6], [0.0; 6]);
     trajectory.sample(trajectory.duration(), &mut q, &mut v, &mut a);
     q

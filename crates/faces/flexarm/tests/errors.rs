@@ -3,12 +3,14 @@
 
 use std::path::{Path, PathBuf};
 
-use flexarm::reduce::{ReduceJob, ReduceOptions, UrdfEntry, reduce};
-use flexarm::{
-    AppliedLoad, ConstraintForm, Error, Fault, JobError, LinkError, LinkModel, LoadError, Modelling, ModellingError,
-    Motion, PoseError, ResponseRequest, Robot, RunOptions, Setting, SpookPreset, SpookSettings, StepError, StepperKind,
-    ValueError, Wrench,
-};
+use flexarm::errors::{LoadError, ModellingError, PoseError, StepError, ValueError};
+use flexarm::links::reduce::{ReduceJob, ReduceOptions, UrdfEntry, reduce};
+use flexarm::links::{JobError, LinkError};
+use flexarm::motions::AppliedLoad;
+use flexarm::poses::ResponseRequest;
+use flexarm::settings::Setting;
+use flexarm::steppers::{ConstraintForm, SpookPreset, SpookSettings};
+use flexarm::{Error, Fault, LinkModel, Modelling, Motion, Robot, RunOptions, StepperKind, Wrench};
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../..")
@@ -72,16 +74,16 @@ fn poses_loads_and_responses_name_joint_frame_and_bound() {
     let (robot, _) = beam();
     let modelling = Modelling::default();
     let joints = robot.rigid_model().unwrap().n_actuated();
-    let error = flexarm::modes(&robot, &modelling, Some(&vec![0.0; joints + 1]), None, 3).unwrap_err();
+    let error = flexarm::poses::modes(&robot, &modelling, Some(&vec![0.0; joints + 1]), None, 3).unwrap_err();
     assert!(
         matches!(&error, Error::Pose(PoseError::Count { found, joints: known }) if *found == joints + 1 && known.len() == joints)
     );
-    let error = flexarm::modes(&robot, &modelling, Some(&vec![f64::NAN; joints]), None, 3).unwrap_err();
+    let error = flexarm::poses::modes(&robot, &modelling, Some(&vec![f64::NAN; joints]), None, 3).unwrap_err();
     assert!(matches!(error, Error::Pose(PoseError::NotFinite { value, .. }) if value.is_nan()));
     let error = AppliedLoad::sampled("tcp", &[0.0, 0.0], &[Wrench::zeros(), Wrench::zeros()]).err().unwrap();
     assert!(matches!(error, Error::Load(LoadError::Samples { times: 2, wrenches: 2 })));
     let request = ResponseRequest { points: 1, ..ResponseRequest::default() };
-    let error = flexarm::response(&robot, &modelling, None, &request, None).unwrap_err();
+    let error = flexarm::poses::response(&robot, &modelling, None, &request, None).unwrap_err();
     assert!(matches!(error, Error::Value(ValueError::Points { found: 1, least: 2, most: 100_000 })), "{error}");
     assert_eq!(error.to_string(), "points must lie between 2 and 100000, found 1");
 }

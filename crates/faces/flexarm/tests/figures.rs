@@ -3,9 +3,10 @@
 use std::ops::ControlFlow;
 use std::path::Path;
 
+use flexarm::recordings::{ConvertOptions, RecordingFormat, convert_until};
+use flexarm::runs::{Variant, compare_study};
 use flexarm::{
-    ConvertOptions, Error, Keep, LinkModel, LoadOptions, Modelling, Motion, Outputs, RecordingFormat, Robot,
-    RunOptions, RunRequest, Summary, Variant, compare_study, convert_until,
+    Error, Keep, LinkModel, LoadOptions, Modelling, Motion, Outputs, Robot, RunOptions, RunRequest, Summary,
 };
 use flexarm_log::{Trace, TraceRow};
 

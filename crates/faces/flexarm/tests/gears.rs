@@ -3,10 +3,10 @@
 
 use std::path::{Path, PathBuf};
 
-use flexarm::{
-    DriveModel, Error, LoadOptions, Modelling, Motion, ReferenceSettings, Robot, RunOptions, SpookSettings,
-    StepperKind, Variation, check, inspect, modes, statics,
-};
+use flexarm::poses::{modes, statics};
+use flexarm::runs::Variation;
+use flexarm::steppers::{ReferenceSettings, SpookSettings};
+use flexarm::{DriveModel, Error, LoadOptions, Modelling, Motion, Robot, RunOptions, StepperKind, check, inspect};
 use nalgebra::{Matrix2, Vector2};
 
 const ARCSEC: f64 = std::f64::consts::PI / 648_000.0;

@@ -3,10 +3,10 @@
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
-use flexarm::{
-    DriveModel, Keep, LinkModel, LoadOptions, Modelling, Motion, Robot, RunOptions, RunRequest, Settling, Summary,
-    Trace, Variant, compare_study, statics, study_rows,
-};
+use flexarm::poses::statics;
+use flexarm::recordings::Trace;
+use flexarm::runs::{Settling, Variant, compare_study, study_rows};
+use flexarm::{DriveModel, Keep, LinkModel, LoadOptions, Modelling, Motion, Robot, RunOptions, RunRequest, Summary};
 use nalgebra::Vector3;
 
 fn root() -> PathBuf {
@@ -128,7 +128,9 @@ fn a_stop_at_which_the_tool_does_not_settle_is_the_settling_time_of_the_run() {
     assert_eq!(tcp.settling_s, None);
     assert!(matches!(tcp.settling_state(), Settling::NotSettled { ref stops, of: 3 } if stops.len() == 2));
     assert!(tcp.settling.starts_with("not settled at stop 1, which lasts 0.500 s, stop 2"), "{}", tcp.settling);
-    for text in [flexarm::markdown(&summary), flexarm::rows(&summary).into_iter().map(|row| row.1).collect()] {
+    for text in
+        [flexarm::report::markdown(&summary), flexarm::report::rows(&summary).into_iter().map(|row| row.1).collect()]
+    {
         assert!(text.contains("not settled at stop 1"), "{text}");
     }
     // With a wider band the worst stop counts, not the last one.
@@ -155,6 +157,6 @@ fn a_study_has_both_parts_and_the_word_of_each_run() {
     assert_eq!(rows[2][column("static [mm]")], format!("{:.4}", 1e3 * tcp.static_at_peak_m.unwrap()));
     assert_eq!(rows[2][column("dynamic [mm]")], format!("{:.4}", 1e3 * tcp.dynamic_peak_m.unwrap()));
     assert_eq!(rows[1][column("settling [s]")], "not settled");
-    let page = flexarm::markdown(&summary);
+    let page = flexarm::report::markdown(&summary);
     assert!(page.contains(&format!("* castings: {}", summary.with[0].headline)), "{page}");
 }

@@ -4,10 +4,9 @@
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 
-use flexarm::{
-    LinkModel, LoadOptions, Modelling, Motion, ReferenceSettings, Robot, RunOptions, SpookSettings, StepperKind,
-    Wrench, inspect, statics,
-};
+use flexarm::poses::statics;
+use flexarm::steppers::{ReferenceSettings, SpookSettings};
+use flexarm::{LinkModel, LoadOptions, Modelling, Motion, Robot, RunOptions, StepperKind, Wrench, inspect};
 
 /// Lead of the thread (m per turn).
 const LEAD: f64 = 0.05;

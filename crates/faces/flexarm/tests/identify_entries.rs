@@ -4,8 +4,9 @@
 use std::path::{Path, PathBuf};
 
 use flexarm::identify::{IdentifyRequest, identify_robot, link_entries};
+use flexarm::poses::statics;
 use flexarm::sensitivity::pose_sensitivity;
-use flexarm::{LinkModel, Modelling, Robot, Wrench, statics};
+use flexarm::{LinkModel, Modelling, Robot, Wrench};
 use nalgebra::{Matrix6, Rotation3, Translation3, Vector3};
 
 struct Place(PathBuf);

@@ -3,9 +3,12 @@
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
+use flexarm::motions::AppliedLoad;
+use flexarm::recordings::Sample;
+use flexarm::robots::Description;
 use flexarm::{
-    AppliedLoad, Arm, Description, DriveModel, Error, Keep, LinkModel, Modelling, Motion, PayloadChange, Robot,
-    RobotSource, Run, RunOptions, RunRequest, Sample, Scenario, Wrench,
+    Arm, DriveModel, Error, Keep, LinkModel, Modelling, Motion, PayloadChange, Robot, RobotSource, Run, RunOptions,
+    RunRequest, Scenario, Wrench,
 };
 use nalgebra::Vector3;
 
@@ -21,7 +24,7 @@ fn arms_are_shared_by_threads_and_workspaces_are_sent_to_them() {
     is_shared::<Arm>();
     is_shared::<Motion>();
     is_shared::<Run>();
-    is_sent::<flexarm::OperatingPoint>();
+    is_sent::<flexarm::poses::OperatingPoint>();
     is_sent::<Error>();
 }
 
@@ -165,7 +168,7 @@ fn an_observer_sees_every_sample_and_can_stop_the_run() {
     assert!(matches!(stopped, Err(Error::Interrupted { t, .. }) if (t - 0.102).abs() < 1e-9), "{:?}", stopped.err());
 }
 
-/// Truth: [`flexarm::statics`] and [`flexarm::modes`], which compute equilibrium and modes by other
+/// Truth: [`flexarm::poses::statics`] and [`flexarm::poses::modes`], which compute equilibrium and modes by other
 /// code, with an eigenvalue solver for damped modes. Every shipped robot, link model and drive,
 /// with force and moment at the TCP; the three-mass arm rotates by half a radian under them.
 /// Measured over 104 poses: 6e-13, 1e-10 (tangents by differences), 2e-14, 1e-13.
@@ -200,7 +203,7 @@ fn operating_points_are_what_statics_and_modes_say() {
                 let moment = if k % 2 == 0 { 0.0 } else { 5.0 };
                 let wrench = [10.0, -20.0, 15.0 * k as f64, moment, 0.0, -moment];
                 let F = Wrench::new(Vector3::from_row_slice(&wrench[..3]), Vector3::from_row_slice(&wrench[3..]));
-                let truth = flexarm::statics(&robot, &modelling, Some(&q), wrench).unwrap();
+                let truth = flexarm::poses::statics(&robot, &modelling, Some(&q), wrench).unwrap();
                 at.solve(&q, &F).unwrap();
                 let moved = at.tcp_pose().translation.vector - at.rigid_tcp_pose().translation.vector;
                 let expected = Vector3::from(truth.tcp_displacement_m);
@@ -216,9 +219,9 @@ fn operating_points_are_what_statics_and_modes_say() {
                 let scale = truth.holding_torque.iter().fold(1.0, |m: f64, x| m.max(x.abs()));
                 worst[2] = efforts.fold(worst[2], |worst, (a, b)| worst.max((a - b).abs() / scale));
                 at.solve(&q, &Wrench::zeros()).unwrap();
-                let torque_driven = robot.drives.iter().any(|drive| drive.kind == flexarm::DriveKind::Torque);
+                let torque_driven = robot.drives.iter().any(|drive| drive.kind == flexarm::robots::DriveKind::Torque);
                 if !torque_driven {
-                    let modes = flexarm::modes(&robot, &modelling, Some(&q), None, 6).unwrap();
+                    let modes = flexarm::poses::modes(&robot, &modelling, Some(&q), None, 6).unwrap();
                     for (found, truth) in at.frequencies_hz().iter().zip(&modes.undamped_frequencies_hz) {
                         worst[3] = worst[3].max((found / truth - 1.0).abs());
                     }

@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use flexarm::poses::modes;
+use flexarm::robots::Description;
 use flexarm::*;
 use flexarm_kinematics::{Data, gravity_forces, mass_matrix};
 use nalgebra::{DMatrix, DVector};

@@ -3,10 +3,9 @@
 
 use std::path::{Path, PathBuf};
 
-use flexarm::{
-    LinkModel, LoadOptions, Modelling, Motion, Robot, RobotLoop, RunOptions, StepperKind, Wrench, check, inspect,
-    statics,
-};
+use flexarm::poses::statics;
+use flexarm::robots::RobotLoop;
+use flexarm::{LinkModel, LoadOptions, Modelling, Motion, Robot, RunOptions, StepperKind, Wrench, check, inspect};
 
 fn project(path: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../..").join(path)
@@ -87,7 +86,7 @@ fn a_run_of_the_palletiser_keeps_the_books_in_every_stepper() {
     eprintln!("peaks {peaks:?}");
     assert!(peaks[0] > 3e-4 && (peaks[0] / peaks[1] - 1.0).abs() < 1e-5, "{peaks:?}");
     // SPOOK in its own coordinates, first order and with stiffness-proportional damping.
-    let spook = StepperKind::Spook(flexarm::SpookSettings::default());
+    let spook = StepperKind::Spook(flexarm::steppers::SpookSettings::default());
     let run = arm.simulate(&motion, &options(spook)).unwrap();
     let off = run.summary.tcp.as_ref().unwrap().peak_m / peaks[0] - 1.0;
     eprintln!("SPOOK {off:.1e}");

@@ -7,7 +7,8 @@ use flexarm::lobes::{CuttingPlace, CuttingTool, LobesError, LobesRequest, lobes}
 use flexarm::map::{
     JointRange, KeptPoses, Map, MapError, MapRegion, MapRequest, ToolDirections, WorkspaceGrid, map, read_poses,
 };
-use flexarm::{Error, Fault, Modelling, Motion, Robot, modes, statics};
+use flexarm::poses::{modes, statics};
+use flexarm::{Error, Fault, Modelling, Motion, Robot};
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(3).unwrap().to_owned()

@@ -6,7 +6,9 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use flexarm::reduce::{At, InterfaceEntry, MaterialChoice, QuadratureChoice, ReduceJob, ReduceOptions, Tie, reduce};
+use flexarm::links::reduce::{
+    At, InterfaceEntry, MaterialChoice, QuadratureChoice, ReduceJob, ReduceOptions, Tie, reduce,
+};
 
 /// A bar of 600 x 60 x 40 mm along x as a CalculiX deck in memory, so that single entries can be
 /// corrupted.

@@ -4,10 +4,10 @@
 use std::f64::consts::TAU;
 use std::path::PathBuf;
 
-use flexarm::{
-    Error, LinkModel, LoadOptions, Modelling, Motion, ReferenceSettings, Robot, RunOptions, SpookSettings, StepperKind,
-    Variation, Wrench, check, modes, statics,
-};
+use flexarm::poses::{modes, statics};
+use flexarm::runs::Variation;
+use flexarm::steppers::{ReferenceSettings, SpookSettings};
+use flexarm::{Error, LinkModel, LoadOptions, Modelling, Motion, Robot, RunOptions, StepperKind, Wrench, check};
 use nalgebra::{Matrix3, Matrix6, Rotation3, Vector3};
 
 /// A rail along x, a slewing column, a boom; every moving link has mass.

@@ -3,7 +3,9 @@
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use flexarm::{Error, InertiaEstimate, Motion, NewError, NewOptions, NewRobot, Robot, check, new_robot};
+use flexarm::errors::NewError;
+use flexarm::robots::{InertiaEstimate, NewOptions, NewRobot, new_robot};
+use flexarm::{Error, Motion, Robot, check};
 
 /// A folder that is removed with the test.
 struct Folder(PathBuf);
@@ -545,7 +547,7 @@ fn a_link_that_is_heavy_at_one_end_keeps_its_body() {
     let robot = Robot::load(&made.robot).unwrap();
     let arm = robot.model(&flexarm::Modelling::default()).unwrap();
     let (rigid, flexible) = (&arm.rigid, &arm.model);
-    let torque = |model: &flexarm::Model| {
+    let torque = |model: &flexarm::robots::Model| {
         let q = nalgebra::DVector::from_fn(model.nv(), |k, _| if k < 3 { 0.1 * k as f64 } else { 0.0 });
         flexarm_kinematics::gravity_forces(model, &mut flexarm_kinematics::Data::new(model), &q)[1]
     };

@@ -3,9 +3,10 @@
 
 use std::path::{Path, PathBuf};
 
+use flexarm::poses::statics;
+use flexarm::robots::Description;
 use flexarm::{
-    Description, Error, LoadOptions, Modelling, Motion, PayloadChange, Robot, RobotSource, RunOptions, Scenario,
-    StepperKind, statics,
+    Error, LoadOptions, Modelling, Motion, PayloadChange, Robot, RobotSource, RunOptions, Scenario, StepperKind,
 };
 use toml::de::{DeTable, DeValue};
 

@@ -5,9 +5,10 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
+use flexarm::report::{ReportRun, html, markdown};
+use flexarm::runs::DifferenceFigures;
 use flexarm::{
-    DifferenceFigures, DriveModel, Keep, LinkModel, LoadOptions, Modelling, Motion, Outputs, ReportRun, Robot,
-    RunOptions, RunRequest, Summary, html, markdown,
+    DriveModel, Keep, LinkModel, LoadOptions, Modelling, Motion, Outputs, Robot, RunOptions, RunRequest, Summary,
 };
 use flexarm_log::Trace;
 

@@ -4,7 +4,8 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use flexarm::{Arm, LinkModel, Modelling, Robot, RobotExport, RobotFormat};
+use flexarm::robots::{RobotExport, RobotFormat};
+use flexarm::{Arm, LinkModel, Modelling, Robot};
 use nalgebra::DMatrix;
 
 fn arm(robot: &str, links: LinkModel) -> Arc<Arm> {

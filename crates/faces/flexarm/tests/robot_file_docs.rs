@@ -4,7 +4,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use flexarm::{DriveKind, LinkModel, LoadOptions, Modelling, Motion, Robot, Scenario};
+use flexarm::robots::DriveKind;
+use flexarm::{LinkModel, LoadOptions, Modelling, Motion, Robot, Scenario};
 
 fn project(path: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../..").join(path)

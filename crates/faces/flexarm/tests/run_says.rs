@@ -3,9 +3,13 @@
 
 use std::path::{Path, PathBuf};
 
+use flexarm::poses::statics;
+use flexarm::recordings::Trace;
+use flexarm::report::{ReportRun, figure_groups, html};
+use flexarm::steppers::{STEPPERS, StepRule, StepperOptions};
 use flexarm::{
-    Keep, LoadOptions, Modelling, Motion, ReportRun, Robot, RunOptions, RunRequest, STEPPERS, StepRule, StepperOptions,
-    Summary, Trace, figure_groups, html, inspect, sensitivity::pose_sensitivity, statics,
+    Keep, LoadOptions, Modelling, Motion, Robot, RunOptions, RunRequest, Summary, inspect,
+    sensitivity::pose_sensitivity,
 };
 use serde_json::Value;
 

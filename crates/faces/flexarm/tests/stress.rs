@@ -3,12 +3,13 @@
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
-use flexarm::reduce::{ReduceJob, ReduceOptions, ReduceOutputs, reduce};
+use flexarm::links::reduce::{ReduceJob, ReduceOptions, ReduceOutputs, reduce};
+use flexarm::live::{Command, LiveOptions};
+use flexarm::poses::statics;
+use flexarm::recordings::{DataTable, DataValues};
+use flexarm::steppers::StepperOptions;
 use flexarm::sweep::{Finders, Shard, Sweep, SweepRequest};
-use flexarm::{
-    Command, DataTable, DataValues, LinkModel, LiveOptions, Modelling, Motion, Robot, Run, RunOptions, Scenario,
-    StepperKind, StepperOptions, Summary, statics,
-};
+use flexarm::{LinkModel, Modelling, Motion, Robot, Run, RunOptions, Scenario, StepperKind, Summary};
 use flexarm_fem::stress::{StressFields, inertia_loads, parse_stress, von_mises};
 use nalgebra::{Matrix3, Vector3};
 
@@ -153,7 +154,7 @@ fn stress_files_that_do_not_fit_are_refused_and_steppers_without_accelerations_s
     let scenario = Scenario::new(motion);
     let run =
         |options: &RunOptions| Robot::load(&arm.folder)?.model(&Modelling::default())?.simulate(&scenario, options);
-    let spook = flexarm::STEPPERS.iter().find(|entry| entry.name == "spook").unwrap();
+    let spook = flexarm::steppers::STEPPERS.iter().find(|entry| entry.name == "spook").unwrap();
     let stepper: StepperKind = (spook.with)(&StepperOptions::default());
     let blind = run(&RunOptions { stepper, step_s: 1e-3, ..RunOptions::default() }).unwrap().summary;
     assert!(blind.stress.is_empty() && blind.caveats.iter().any(|caveat| caveat.code == "no-stress"));

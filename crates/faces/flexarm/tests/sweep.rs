@@ -4,9 +4,11 @@
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
-use flexarm::reduce::{ReduceJob, ReduceOptions, ReduceOutputs, reduce};
+use flexarm::links::reduce::{ReduceJob, ReduceOptions, ReduceOutputs, reduce};
+use flexarm::poses::{modes, statics};
+use flexarm::recordings::{DataTable, DataValues};
 use flexarm::sweep::{Finders, Shard, Sweep, SweepError, SweepRequest, merge};
-use flexarm::{DataTable, DataValues, Error, Modelling, Motion, Robot, RunOptions, Scenario, modes, statics};
+use flexarm::{Error, Modelling, Motion, Robot, RunOptions, Scenario};
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(3).unwrap().to_owned()

@@ -5,7 +5,7 @@
 
 use std::path::{Path, PathBuf};
 
-use flexarm::reduce::{ReduceJob, ReduceOptions, ReduceOutputs, reduce};
+use flexarm::links::reduce::{ReduceJob, ReduceOptions, ReduceOutputs, reduce};
 use flexarm::{LinkModel, Modelling, Motion, Robot, RunOptions, Scenario};
 
 #[derive(serde::Deserialize)]

@@ -4,7 +4,8 @@
 use std::path::{Path, PathBuf};
 
 use flexarm::identify::{Identification, IdentifyRequest, PlanRequest, identify_robot, plan_measurements};
-use flexarm::{Modelling, Motion, Robot, RunOptions, Scenario, statics};
+use flexarm::poses::statics;
+use flexarm::{Modelling, Motion, Robot, RunOptions, Scenario};
 
 /// Two tubes that move half of the lift each, and an arm with a mass at its end.
 const URDF: &str = include_str!("data/lift.urdf");

@@ -3,7 +3,8 @@
 
 use std::path::PathBuf;
 
-use flexarm::{LinkModel, LoadOptions, Modelling, Robot, check, statics};
+use flexarm::poses::statics;
+use flexarm::{LinkModel, LoadOptions, Modelling, Robot, check};
 use flexarm_fem::{BeamLink, BeamTheory, LinkDetails, Material, ModalInterface, ReducedLink, Section, write_flex};
 use flexarm_kinematics::Pose;
 use nalgebra::Matrix6xX;

@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use flexarm::{Motion, Pose, Robot, TCP_FRAME};
+use flexarm::robots::TCP_FRAME;
+use flexarm::{Motion, Pose, Robot};
 use flexarm_kinematics::{Data, Model, forward_kinematics};
 use nalgebra::{DVector, Rotation3, Vector3};
 
@@ -279,7 +280,8 @@ fn jerks_of_joints_hold_in_a_path_file_and_in_a_program_and_are_shown_with_their
     for (name, text) in [("path.toml", &path), ("program.toml", &program)] {
         let file = folder.join(name);
         std::fs::write(&file, text).unwrap();
-        let report = flexarm::motion_report(&file, Some(&robot), &Default::default(), &[], 500.0, false).unwrap();
+        let report =
+            flexarm::motions::motion_report(&file, Some(&robot), &Default::default(), &[], 500.0, false).unwrap();
         let limit = 1500f64.to_radians();
         for peak in &report.peaks {
             assert!((peak.jerk_limit.unwrap() - limit).abs() < 1e-9);
@@ -292,8 +294,10 @@ fn jerks_of_joints_hold_in_a_path_file_and_in_a_program_and_are_shown_with_their
     // A limit that is active only at a corner: reported with its joint.
     let slowed = load(&robot, "path.toml", &path).unwrap();
     let said = &slowed.tool_path.as_ref().unwrap().moves;
-    let by_jerk =
-        said.iter().filter_map(|of| of.slowed.as_ref()).any(|slow| matches!(&slow.by, flexarm::SlowedBy::JointJerk(_)));
+    let by_jerk = said
+        .iter()
+        .filter_map(|of| of.slowed.as_ref())
+        .any(|slow| matches!(&slow.by, flexarm::motions::SlowedBy::JointJerk(_)));
     assert!(by_jerk, "{said:?}");
     let wrong = path.replacen("jerk = 1500", "jerk = 0", 1);
     let error = load(&robot, "path.toml", &wrong).unwrap_err().to_string();

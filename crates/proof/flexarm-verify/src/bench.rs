@@ -4,10 +4,10 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use flexarm::{
-    ConstraintForm, LinkModel, LoadOptions, Modelling, Motion, Robot, SpookPreset, SpookSettings, Start, StepError,
-    StepperKind, TCP_FRAME,
-};
+use flexarm::errors::StepError;
+use flexarm::robots::TCP_FRAME;
+use flexarm::steppers::{ConstraintForm, SpookPreset, SpookSettings, Start};
+use flexarm::{LinkModel, LoadOptions, Modelling, Motion, Robot, StepperKind};
 use flexarm_analysis::tcp_error;
 use flexarm_kinematics::{Data, Frame, Pose, State, Wrench, forward_kinematics};
 use flexarm_stepping::{

@@ -76,7 +76,7 @@ impl From<FemError> for Error {
 
 impl From<Box<MeshError>> for Error {
     fn from(error: Box<MeshError>) -> Self {
-        Self::Library(flexarm::LinkError::from(error).into())
+        Self::Library(flexarm::links::LinkError::from(error).into())
     }
 }
 

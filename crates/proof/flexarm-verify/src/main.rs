@@ -9,7 +9,8 @@ use std::time::Instant;
 
 use clap::Parser;
 use clap::builder::PossibleValuesParser;
-use flexarm::{Fault, Names, Setting};
+use flexarm::Fault;
+use flexarm::settings::{Names, Setting};
 use flexarm_verify::bench::Bench;
 use flexarm_verify::check::Difference;
 use flexarm_verify::{Error, Verification, VerificationFiles, case_names, differences_from, verify};
@@ -55,7 +56,7 @@ fn main() -> ExitCode {
         Setting::Overwrite => "--force",
         other => other.key(),
     };
-    flexarm::name_settings(Names { setting, caller: "the command line" });
+    flexarm::settings::name_settings(Names { setting, caller: "the command line" });
     run(&Args::parse()).unwrap_or_else(|error| {
         let text = error.to_string();
         eprintln!("error: {text}");

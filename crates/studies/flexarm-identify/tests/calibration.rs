@@ -10,6 +10,9 @@ use flexarm_run::{Modelling, Robot};
 use flexarm_testkit::Draw;
 use nalgebra::{Rotation3, Translation3, Vector3};
 
+/// Joint values and the markers of two targets; `None` where a coordinate was not seen.
+type Row = (Vec<f64>, [[Option<f64>; 3]; 2]);
+
 /// Noise of a camera (m).
 const NOISE: f64 = 1e-4;
 const JOINTS: [&str; 6] = ["yaw", "pitch", "l1", "l2", "r1", "r2"];
@@ -76,7 +79,7 @@ impl Place {
     }
 
     /// Measures both hands at some poses with noise; some cells are empty. Returns poses and readings.
-    fn measure(&self, robot: &Robot, draw: &mut Draw) -> Vec<(Vec<f64>, [[Option<f64>; 3]; 2])> {
+    fn measure(&self, robot: &Robot, draw: &mut Draw) -> Vec<Row> {
         let arm = robot.model(&Modelling::default()).unwrap();
         let mut at = arm.operating_point().unwrap();
         let X_IW = instrument();
@@ -128,7 +131,7 @@ fn normal(draw: &mut Draw) -> f64 {
 }
 
 /// Root mean square of the residuals (m) of a robot file with the instrument and targets of an answer.
-fn rms(robot: &Robot, found: &Identification, rows: &[(Vec<f64>, [[Option<f64>; 3]; 2])]) -> f64 {
+fn rms(robot: &Robot, found: &Identification, rows: &[Row]) -> f64 {
     let arm = robot.model(&Modelling::default()).unwrap();
     let mut at = arm.operating_point().unwrap();
     let [frame] = &found.instruments[..] else { panic!("one camera") };

@@ -9,11 +9,11 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use clap::{Args, Subcommand};
+use flexarm::settings::written::visible;
 use flexarm::sweep::{
     BestRun, Finders, MetricFigures, MinimiseFigures, MinimiseRequest, ParameterFigures, ParameterRole, ParameterValue,
     Replay, Shard, Sweep, SweepError, SweepRequest, SweepSummary, merge,
 };
-use flexarm::written::visible;
 
 use self::plan::PlanArgs;
 use crate::failure::Failure;

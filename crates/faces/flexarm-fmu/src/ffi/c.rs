@@ -5,7 +5,8 @@ use std::ffi::{CString, c_char, c_int};
 use std::path::Path;
 use std::ptr;
 
-use flexarm::{DriveModel, LinkModel, Modelling, Words};
+use flexarm::settings::Words;
+use flexarm::{DriveModel, LinkModel, Modelling};
 
 use super::{NULL, array, get_each, guarded, message, set_each, string, string_or_null, text_of};
 use crate::error::PlantError;

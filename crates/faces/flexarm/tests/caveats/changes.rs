@@ -3,7 +3,8 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use flexarm::{LoadOptions, Modelling, Motion, Robot, check, statics};
+use flexarm::poses::statics;
+use flexarm::{LoadOptions, Modelling, Motion, Robot, check};
 use toml::{Table, Value};
 
 pub(super) fn project(path: &str) -> PathBuf {

@@ -27,7 +27,8 @@ fn in_mm_t_s(K: &DMatrix<f64>, M: &DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>)
 fn a_copy_in_mm_t_s_gives_the_same_structure() {
     let map: InterfaceMap = "A=#1-6,B=#7-12".parse().unwrap();
     let units: UnitSystem = "mm-t-s".parse().unwrap();
-    for (K, M) in [small_structure(4)] {
+    {
+        let (K, M) = small_structure(4);
         let (K_mm, M_mm) = in_mm_t_s(&K, &M);
         let (K_text, M_text) = (write_matrix_market(&K_mm, &[]), write_matrix_market(&M_mm, &[]));
         let imported = parse(&[("a_K.mtx", &K_text), ("a_M.mtx", &M_text)]);

@@ -263,8 +263,8 @@ impl<'a> Sides<'a> {
                 _ => {}
             }
         }
-        for to in 0..2 {
-            self.gains[to][v as usize] = self.graph.weight(v) - opposite[to];
+        for (to, opposite) in opposite.into_iter().enumerate() {
+            self.gains[to][v as usize] = self.graph.weight(v) - opposite;
             self.queues[to].push((self.gains[to][v as usize], v));
         }
     }

@@ -10,7 +10,9 @@ mod two_link;
 
 use std::path::Path;
 
-use flexarm::{ConstraintForm, Keep, Modelling, Motion, Robot, RunOptions, RunRequest, StepperKind, Trace};
+use flexarm::recordings::Trace;
+use flexarm::steppers::ConstraintForm;
+use flexarm::{Keep, Modelling, Motion, Robot, RunOptions, RunRequest, StepperKind};
 use flexarm_files::NumberTable;
 use nalgebra::Vector2;
 

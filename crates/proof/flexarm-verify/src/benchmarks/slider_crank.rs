@@ -86,7 +86,7 @@ impl SliderCrank {
 }
 
 /// Position of the crank's pin at time `t` (m).
-fn crank_pin(trajectory: &flexarm::Trajectory, t: f64) -> Vector2<f64> {
+fn crank_pin(trajectory: &flexarm::motions::Trajectory, t: f64) -> Vector2<f64> {
     let (mut q, mut rates) = ([0.0], [0.0]);
     trajectory.sample(t, &mut q, &mut rates, &mut [0.0]);
     CRANK_M * Vector2::new(q[0].cos(), q[0].sin())

@@ -7,8 +7,9 @@ use std::f64::consts::TAU;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use flexarm::reduce::{ReduceJob, ReduceOptions, ReduceOutputs, reduce};
-use flexarm::{LoadOptions, Modelling, Robot, modes};
+use flexarm::links::reduce::{ReduceJob, ReduceOptions, ReduceOutputs, reduce};
+use flexarm::poses::modes;
+use flexarm::{LoadOptions, Modelling, Robot};
 
 use super::{FOLDER, columns};
 use crate::Error;

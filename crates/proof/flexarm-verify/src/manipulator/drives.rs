@@ -1,6 +1,7 @@
 //! Elastic links, elastic drives, and both; then every method again with elastic drives.
 
-use flexarm::{ConstraintForm, DriveModel, LinkModel, Modelling, StepperKind};
+use flexarm::steppers::ConstraintForm;
+use flexarm::{DriveModel, LinkModel, Modelling, StepperKind};
 use nalgebra::Vector3;
 
 use super::methods::{SHOWN_STEP_S, reference};

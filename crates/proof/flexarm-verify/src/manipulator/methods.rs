@@ -1,8 +1,7 @@
 //! One motion, every model and stepper.
 
-use flexarm::{
-    ConstraintForm, LinkModel, Modelling, Motion, ReferenceSettings, Robot, SpookPreset, SpookSettings, StepperKind,
-};
+use flexarm::steppers::{ConstraintForm, ReferenceSettings, SpookPreset, SpookSettings};
+use flexarm::{LinkModel, Modelling, Motion, Robot, StepperKind};
 use flexarm_stepping::Damping;
 
 use super::runs::{MethodRun, Run, Runs, Sizes, stepper_name};

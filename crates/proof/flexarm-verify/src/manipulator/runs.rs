@@ -2,7 +2,8 @@
 
 use std::ops::ControlFlow;
 
-use flexarm::{Keep, Modelling, Motion, Robot, RunOptions, RunRequest, Scenario, StepperKind, Summary, Trace};
+use flexarm::recordings::Trace;
+use flexarm::{Keep, Modelling, Motion, Robot, RunOptions, RunRequest, Scenario, StepperKind, Summary};
 use nalgebra::Vector3;
 
 use crate::Error;

@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use flexarm::{ConstraintForm, LinkModel, Modelling, Robot, SpookPreset, SpookSettings, Start, StepperKind};
+use flexarm::steppers::{ConstraintForm, SpookPreset, SpookSettings, Start};
+use flexarm::{LinkModel, Modelling, Robot, StepperKind};
 use flexarm_stepping::{Damping, MotionFn, ReferenceSettings};
 use nalgebra::Vector3;
 

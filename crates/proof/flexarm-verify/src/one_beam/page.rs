@@ -1,6 +1,6 @@
 //! The page of the case.
 
-use flexarm::ConstraintForm;
+use flexarm::steppers::ConstraintForm;
 use flexarm_draw::{CurveLook, Panel, PlotCurve};
 
 use super::bar::{BALL_KG, HEIGHT_M, LENGTH_M, WIDTH_M};

@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use flexarm::{ConstraintForm, Keep, Modelling, Motion, ReferenceSettings, Robot, RunOptions, RunRequest, StepperKind};
+use flexarm::steppers::{ConstraintForm, ReferenceSettings};
+use flexarm::{Keep, Modelling, Motion, Robot, RunOptions, RunRequest, StepperKind};
 use flexarm_kinematics::ElasticAngles;
 use flexarm_stepping::Damping;
 use nalgebra::Vector3;

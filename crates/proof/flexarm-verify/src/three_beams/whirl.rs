@@ -3,7 +3,8 @@
 
 use std::sync::Arc;
 
-use flexarm::{LinkModel, Modelling, Robot, Start};
+use flexarm::steppers::Start;
+use flexarm::{LinkModel, Modelling, Robot};
 use flexarm_stepping::MotionFn;
 
 use crate::Error;

@@ -53,8 +53,11 @@ pub(super) struct Shape {
     pub(super) color: [f32; 4],
 }
 
+/// Name and content of a file.
+type MeshFile = (PathBuf, Vec<u8>);
+
 /// Returns the world and the bodies of an arm, parents first, and the mesh files.
-pub(super) fn parts(robot: &Robot, posed: &Posed) -> Result<(Vec<Part>, Vec<(PathBuf, Vec<u8>)>), Error> {
+pub(super) fn parts(robot: &Robot, posed: &Posed) -> Result<(Vec<Part>, Vec<MeshFile>), Error> {
     let model = &posed.arm.model;
     if let Some(closed) = model.loops().first() {
         return Err(ValueError::NotExportable { name: closed.name.clone(), what: "a closed loop" }.into());
@@ -62,11 +65,10 @@ pub(super) fn parts(robot: &Robot, posed: &Posed) -> Result<(Vec<Part>, Vec<(Pat
     let bodies = model.bodies().iter();
     let mut parts = bodies.map(part).collect::<Result<Vec<_>, _>>()?;
     // The first joint of a coordinate drives it; those after it follow.
-    for k in 0..parts.len() {
-        let body = &model.bodies()[k];
-        let Some(axis) = parts[k].joints.first().filter(|_| (body.ratio, body.offset) != (1.0, 0.0)) else { continue };
-        let follows = Some((body.ratio, body.offset)).filter(|_| axis.coordinate < model.nv());
-        parts[k].joints[0].follows = follows;
+    for (part, body) in parts.iter_mut().zip(model.bodies()) {
+        let follows = (body.ratio, body.offset);
+        let Some(axis) = part.joints.first_mut().filter(|_| follows != (1.0, 0.0)) else { continue };
+        axis.follows = Some(follows).filter(|_| axis.coordinate < model.nv());
     }
     let mut files = Vec::new();
     for visual in &robot.urdf.visuals {
