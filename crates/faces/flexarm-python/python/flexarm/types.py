@@ -1037,7 +1037,7 @@ class Compensation(TypedDict):
     after: ErrorFigures
     """Error with the new commands, on the plant."""
     model_peaks_m: list[float]
-    """Peak error on the model after each iteration; the first entry is without correction (m)."""
+    """Peak error on the model without correction and after each iteration kept (m)."""
     iterations: int
     """Number of iterations kept."""
     cutoff_hz: float | None
