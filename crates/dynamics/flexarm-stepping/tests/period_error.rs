@@ -41,6 +41,18 @@ fn half_the_step_divides_the_error_of_a_period_by_the_power_of_the_order() {
     assert_eq!(error_of_a_period(kind("reference"), 1.0, 0.03), 0.0);
 }
 
+/// The end of a step of many periods is close to rest, as is the damped oscillation at that time;
+/// all of the oscillation is lost.
+#[test]
+fn steps_above_half_a_period_lose_the_whole_oscillation() {
+    for entry in STEPPERS.into_iter().filter(|entry| entry.steps != StepRule::ByErrorControl) {
+        for h_omega in [3.2, 10.0, 110.0] {
+            let found = error_of_a_period(kind(entry.name), h_omega, 0.03);
+            assert!(found >= 1.0, "{}, {h_omega}: {found}", entry.name);
+        }
+    }
+}
+
 /// The preset of the source damps with a time in proportion to the step: an oscillation without
 /// physical damping decays at any step size.
 #[test]

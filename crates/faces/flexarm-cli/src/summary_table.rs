@@ -32,7 +32,7 @@ pub fn summary(summary: &Summary, width: usize) -> String {
     let (robot, trajectory, links) =
         (one_line(&summary.robot), one_line(&summary.trajectory), one_line(&summary.links_model));
     let mut out = String::new();
-    for line in wrapped(&summary.headline, width) {
+    for line in wrapped(&one_line(&summary.headline), width) {
         out += &format!("{HEADLINE}{line}{HEADLINE:#}\n");
     }
     out += &format!("{HEADING}{robot} on {trajectory}{HEADING:#}, {links} links\n");
@@ -109,7 +109,7 @@ fn study(summary: &Summary, width: usize) -> String {
     let mut out = format!("\n{HEADING}runs{HEADING:#}\n{}", runs_table.text(width));
     for run in std::iter::once(summary).chain(&summary.with).filter(|run| !run.headline.is_empty()) {
         let text = format!("{}: {}", run.label.as_deref().unwrap_or_default(), run.headline);
-        out += &wrapped(&text, width).iter().map(|line| format!("{line}\n")).collect::<String>();
+        out += &wrapped(&one_line(&text), width).iter().map(|line| format!("{line}\n")).collect::<String>();
     }
     for line in wrapped(STUDY_NOTE, width) {
         out += &format!("{FAINT}{line}{FAINT:#}\n");

@@ -136,10 +136,22 @@ mod trajectory {
 
     #[test]
     fn joint_that_the_robot_lacks() {
-        let csv = "time,swing,swong\n0,0,0\n1,0.5,0\n";
-        compare_motion("extra.csv", csv, &["extra.csv", "\"swong\"", "its joints are \"swing\"", "rename"]);
+        let csv = "time,swong\n0,0\n1,0.5\n";
+        let words = ["\"swong\" is not a joint of the robot", "did you mean \"swing\"?", "rename"];
+        compare_motion("extra.csv", csv, &[&["extra.csv, line 1, column 2"], &words[..]].concat());
         let toml = with(SWING, "\"swing\"", "\"swong\"");
-        compare_motion("other.toml", toml, &["other.toml", "\"swong\"", "its joints are \"swing\"", "rename"]);
+        compare_motion("other.toml", toml, &[&["other.toml"], &words[..]].concat());
+    }
+
+    /// A column that is no joint of the robot is left out with a warning, even with a name close to
+    /// a joint, if the file names this joint as well.
+    #[test]
+    fn column_that_is_no_joint() {
+        let place = Place::new();
+        place.write("extra.csv", "time,swing,swong\n0,0,0\n1,0.5,0\n");
+        let answer = place.flexarm(&["compare", "robot.toml", "extra.csv", "--no-files"]);
+        assert_eq!(answer.code, 0, "{}", answer.err);
+        answer.says(&["warning: extra.csv", "left out: \"swong\"", "--columns"]);
     }
 
     #[test]

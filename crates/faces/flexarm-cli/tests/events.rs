@@ -180,7 +180,7 @@ fn corners_are_told_and_can_be_rounded() {
     let place = Place::new();
     let robot = shipped_robot("test/reference_arm");
     place.write("corner.csv", corners(1000));
-    let words = "velocity of joint \"joint_1\" jumps at 3 times, most at t = 1.0000 s by -4.0000 rad/s";
+    let words = "velocity of joint \"joint_1\" jumps at 3 times, most at t = 1.0000 s by -4.000e0 rad/s";
     let checked = place.flexarm(&["check", &robot, "corner.csv"]);
     assert!(checked.out.contains(words) && checked.out.contains("--round-corners"), "{}", checked.out);
     let line = ["compare", &robot, "corner.csv", "--no-files"];

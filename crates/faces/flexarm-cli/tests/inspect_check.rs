@@ -586,11 +586,21 @@ mod check {
     #[test]
     fn degrees_in_a_file_of_radians_are_named() {
         let place = Place::new();
+        // A file that calls its degrees radians, and one without a unit and with less than two turns.
+        place.write("rad.csv", "# unit: rad\ntime,swing\n0,0\n1,60\n2,0\n");
+        place.write("few.csv", "time,swing\n0,0\n1,10\n2,0\n");
+        for file in ["rad.csv", "few.csv"] {
+            let found = findings(&place, &["robot.toml", file], 2);
+            let passed = found.iter().find(|f| f["code"] == "joint-limit").unwrap_or_else(|| panic!("{found:?}"));
+            assert_eq!(passed["likely"], "about 57 times: degrees?", "{found:?}");
+            place.refused(&["compare", "robot.toml", file, "-o", "result"], &["upper limit", "degrees?"]);
+        }
+        // More than two turns without a unit are not taken as radians at all.
         place.write("deg.csv", "time,swing\n0,0\n1,60\n2,0\n");
         let found = findings(&place, &["robot.toml", "deg.csv"], 2);
-        let passed = found.iter().find(|f| f["code"] == "joint-limit").unwrap();
-        assert_eq!(passed["likely"], "about 57 times: degrees?", "{found:?}");
-        place.refused(&["compare", "robot.toml", "deg.csv", "-o", "result"], &["upper limit", "degrees?"]);
+        assert_eq!(codes(&found, "error"), ["trajectory"], "{found:?}");
+        assert!(found.iter().any(|f| f["message"].as_str().unwrap().contains("`swing[deg]`")), "{found:?}");
+        place.refused(&["compare", "robot.toml", "deg.csv", "-o", "result"], &["deg.csv, line 1", "`# unit: deg`"]);
     }
 
     #[test]

@@ -98,17 +98,50 @@ fn nastran_bulk_data_are_told_how_to_become_a_mesh() {
 
 /// A link that is heavy at one end cannot be represented by two bodies at the centres of the
 /// halves.
+///
+/// Truth: the torque and the moment of inertia about the joint of a link of 1.728 kg at 0.1 m, with
+/// 0.0923904 kg m² about its centre of mass, and of the ball of 0.5 kg at 0.8 m. The share s of the
+/// beam, whose centre of mass is 0.3 m from that of the link, is the largest that leaves a body:
+///
+/// ```text
+/// 0.09216 (1 - s) = 1.728 * 0.3² s/(1 - s)
+/// ```
+///
+/// with the second moment of mass along the beam, 0.09216 kg m² for the link and for the uniform
+/// beam. The rest has its centre of mass before the near end, so all of it is fixed there, and the
+/// distal part is half of the beam.
 #[test]
-fn a_beam_whose_link_cannot_be_cut_takes_the_mass_of_the_uniform_beam_and_says_so() {
+fn a_link_that_cannot_be_cut_keeps_its_body_with_most_mass_along_the_beam_and_the_rest_at_its_ends() {
     let place = Place::new();
-    place.write("beam.urdf", common::URDF.replace("xyz=\"0.4 0 0\"", "xyz=\"0.1 0 0\""));
-    let output = place.command(&["check", "robot.toml"]).output().unwrap();
-    let said = format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
-    assert!(said.contains("cannot be spread along the beam") && said.contains("0.3000 m"), "{said}");
-    // If requested explicitly, it remains an error.
-    place.write("robot.toml", common::ROBOT.replace("section = ", "parts = \"from-link\", section = "));
-    let output = place.command(&["check", "robot.toml"]).output().unwrap();
-    assert_ne!(output.status.code(), Some(0));
+    let off_centre = common::with(common::URDF, "xyz=\"0.4 0 0\"", "xyz=\"0.1 0 0\"");
+    place.write("beam.urdf", common::with(&off_centre, "<axis xyz=\"0 0 1\"/>", "<axis xyz=\"0 1 0\"/>"));
+    let inspected = |parts: &str| {
+        place.write("robot.toml", common::with(common::ROBOT, "section = ", &format!("{parts}section = ")));
+        let found = place.json(&["inspect", "robot.toml"]);
+        let [torque, inertia] = [found["gravity_torque"][0].as_f64(), found["mass_matrix"][0][0].as_f64()];
+        let masses = common::numbers(&found["flexible_links"][0]["parts_kg"]);
+        let uniform_mass = found["caveats"].as_array().unwrap().iter().any(|c| c["code"] == "uniform-mass");
+        (torque.unwrap(), inertia.unwrap(), masses, uniform_mass)
+    };
+    let torque = -9.81 * (1.728 * 0.1 + 0.5 * 0.8);
+    let inertia = 0.0923904 + 1.728 * 0.1 * 0.1 + 0.000125 + 0.5 * 0.8 * 0.8;
+    let ratio = 1.728 * 0.3 * 0.3 / 0.09216_f64;
+    let share = 1.0 + 0.5 * ratio - (ratio + 0.25 * ratio * ratio).sqrt();
+    for parts in ["", "parts = \"from-link\", "] {
+        let (of_weight, about_joint, masses, is_warned) = inspected(parts);
+        assert!((of_weight - torque).abs() < 1e-9, "{parts}: {of_weight} instead of {torque}");
+        assert!((about_joint - inertia).abs() < 1e-9, "{parts}: {about_joint} instead of {inertia}");
+        assert!((masses.iter().sum::<f64>() - 1.728).abs() < 1e-9 && !is_warned, "{parts}: {masses:?}");
+        assert!((masses[1] - 0.5 * share * 1.728).abs() < 1e-9, "{parts}: {masses:?}, share {share}");
+        let check = place.flexarm(&["check", "robot.toml"]);
+        assert!(check.code == 0 && check.out.contains("0 errors, 0 warnings"), "{} {}", check.out, check.err);
+    }
+    // The uniform beam of the same mass is taken only if requested, and says what it changes.
+    let (of_weight, _, masses, is_warned) = inspected("parts = \"uniform\", ");
+    let uniform = -9.81 * (1.728 * 0.4 + 0.5 * 0.8);
+    assert!((of_weight - uniform).abs() < 1e-9 && masses == [0.864, 0.864] && is_warned, "{of_weight} {masses:?}");
+    let check = place.flexarm(&["check", "robot.toml"]);
+    assert!(check.out.contains("move the centre of mass by 0.3000 m"), "{}", check.out);
 }
 
 /// Truth: the frequencies of the link that was exported.

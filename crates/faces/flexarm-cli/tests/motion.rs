@@ -248,7 +248,7 @@ fn tables_take_a_map_of_columns_in_every_command_that_takes_a_motion() {
     assert!(!findings.to_string().contains("\"error\""), "{findings}");
     place.refused(
         &["motion", "trace.txt", "robot.toml"],
-        &["no column of the header", "\"swing\"", "--columns <joint>=<column>"],
+        &["none of the names", "\"A1\"", "is a joint of the robot", "\"swing\"", "--columns <joint>=<column>"],
     );
     place.refused(
         &["motion", "swing.toml", "robot.toml", "--columns", "t=a"],

@@ -583,7 +583,7 @@ mod stopped {
             let t = 0.01 * f64::from(k);
             format!("{t},{},{},2000\n", 1000.0 * t * t, 2000.0 * t)
         };
-        "time,swing,swing.vel,swing.acc\n".to_owned() + &(0..=1000).map(row).collect::<String>()
+        "time,swing[rad],swing.vel,swing.acc\n".to_owned() + &(0..=1000).map(row).collect::<String>()
     }
 
     /// Checks complete lines of finite numbers in the table, and a closed MCAP. Returns the last

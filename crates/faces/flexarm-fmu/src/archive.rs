@@ -134,7 +134,7 @@ pub fn export_fmu(job: &FmuJob) -> Result<FmuSummary, PlantError> {
     let bytes = zipped(&entries).map_err(failed(&job.output))?;
     flexarm::files::write_all(&[(job.output.clone(), &bytes)])?;
     let arm = plant.arm();
-    let pose = job.settings.pose.clone().unwrap_or_else(|| vec![0.0; arm.rigid.n_actuated()]);
+    let pose = first_pose(arm, &job.settings);
     let caveats = arm.caveats(Use::Commanded(&pose, job.settings.stepper, step_s));
     let count = |causality| plant.variables().iter().filter(|variable| variable.causality == causality).count();
     Ok(FmuSummary {
@@ -287,12 +287,19 @@ fn same_arm(files: &NamedFiles, arm: &Arc<Arm>, settings: &PlantSettings) -> Res
         }
         let load = LoadOptions { tcp: settings.load.tcp.clone(), ..LoadOptions::default() };
         let own = Robot::load_with(&folder.join(ROBOT), &load)?.model(&settings.modelling)?;
-        let [own, given] = [&own, arm].map(|arm| arm.linearise(settings.pose.as_deref(), [0.0; 6]));
+        // Without a given pose the arms would be posed differently: the resources have no motion.
+        let pose = first_pose(arm, settings);
+        let [own, given] = [&own, arm].map(|arm| arm.linearise(Some(&pose), [0.0; 6]));
         let (own, given) = (own?, given?);
         Ok(own.M == given.M && own.K == given.K && own.D == given.D && own.J == given.J && own.X_WT == given.X_WT)
     })();
     let _ = fs::remove_dir_all(&folder);
     checked
+}
+
+/// Returns the joint positions at the start (rad or m), as [`Plant::new`] takes them.
+fn first_pose(arm: &Arm, settings: &PlantSettings) -> Vec<f64> {
+    settings.pose.clone().unwrap_or_else(|| vec![0.0; arm.joints().count()])
 }
 
 fn filed(plant: &Plant, settings: &PlantSettings, token: &str, step_s: f64) -> Filed {
@@ -306,7 +313,7 @@ fn filed(plant: &Plant, settings: &PlantSettings, token: &str, step_s: f64) -> F
         modes: modelling.modes,
         stepper: settings.stepper.name().to_owned(),
         step_s,
-        pose: settings.pose.clone().unwrap_or_else(|| vec![0.0; plant.arm().joints().count()]),
+        pose: first_pose(plant.arm(), settings),
         tcp: settings.load.tcp.clone(),
     }
 }

@@ -91,7 +91,7 @@ pub mod poses {
     pub use flexarm_stepping::{Linear, OperatingPoint, PoseAnswer, PoseOutputs};
 }
 
-/// What a robot file and a description say, and what a check of them finds.
+/// Contents of a robot file and its description, and findings about them.
 ///
 /// ```no_run
 /// use flexarm::Robot;
@@ -210,7 +210,7 @@ pub mod files {
     pub use flexarm_files::{check_apart, check_free, private_folder, write_all, writing_unless};
 }
 
-/// Causes of an [`Error`](crate::Error).
+/// Causes of an error of the library.
 pub mod errors {
     pub use flexarm_files::FileError;
     pub use flexarm_kinematics::BalancerCurveError;

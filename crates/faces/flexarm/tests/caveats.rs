@@ -257,12 +257,14 @@ fn slips_are_told_and_plausible_robots_are_not() {
     println!("told {told} of {made} slips, {} false alarms in {tried} harmless changes", false_alarms.len());
     missed.iter().for_each(|missed| println!("missed: {missed}"));
     assert_eq!(false_alarms, [""; 0]);
-    // Gear stiffnesses of the arm on the motor side are lower by the ratio squared; a tool of 10 m
+    // Gear stiffnesses of the arm on the motor side are lower by the ratio squared, its speeds higher by the ratio; a tool of 10 m
     // is within three times the reach of the large arm. The fifth gear of kr210 rotates a quarter
     // as far as the others under their torques: in N m/deg it rotates 14.7 times as far, and a gear
     // of kr500 with half the stiffness, which is plausible, 15 times.
     let known = [
         ("abb_three_mass/", "gears in N mm/rad"),
+        ("abb_three_mass/", "friction that begins at 4 rad/s"),
+        ("abb_three_mass/", "gear damping of 0.03"),
         ("kr300/", "tcp in cm"),
         ("kr210/", "one gear in N m/deg"),
         ("kr210_identified/", "one gear in N m/deg"),

@@ -1,4 +1,4 @@
-//! Where the model of a link ends: few modes, rigid parts of castings, deflections that are too large.
+//! Limits of the model of a link: few modes, rigid parts of castings, large deflections.
 
 use std::path::{Path, PathBuf};
 

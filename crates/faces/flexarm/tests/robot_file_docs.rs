@@ -63,6 +63,10 @@ fn every_example_of_a_robot_file_loads() {
         (read("docs/robot-file.md") + &read("docs/mounting.md") + &read("docs/gears.md"), Place::new("robots"));
     let (mut modal, mut torque) = (0, 0);
     for block in blocks(&page, "toml") {
+        // A 6x6 alone is an entry of a link; `link_bodies` reads both of them.
+        if block.starts_with("stiffness = [") {
+            continue;
+        }
         // Loops belong to another robot: the shipped palletiser has the same entries.
         if block.contains("[[loop]]") {
             let shipped = read("robots/palletiser/robot.toml");
@@ -191,7 +195,7 @@ fn keys(sources: &[impl AsRef<str>]) -> BTreeMap<String, BTreeSet<String>> {
 /// Sources of `robot.toml`: the file itself and every entry.
 fn robot_sources() -> Vec<String> {
     let mut found = vec!["crates/run/flexarm-run/src/robot/robot_file.rs".to_owned()];
-    for folder in ["crates/run/flexarm-run/src", "crates/run/flexarm-linkmaker/src"] {
+    for folder in ["crates/run/flexarm-run/src/robot", "crates/run/flexarm-linkmaker/src"] {
         let names = std::fs::read_dir(project(folder)).unwrap().map(|file| file.unwrap().file_name());
         let names = names.map(|name| name.into_string().unwrap());
         found.extend(names.filter(|name| name.ends_with("_entry.rs")).map(|name| format!("{folder}/{name}")));

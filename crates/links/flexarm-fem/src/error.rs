@@ -101,7 +101,7 @@ pub enum FemError {
     NotPositiveDefinite {
         /// Name of the matrix.
         what: &'static str,
-        /// Smallest eigenvalue of the matrix scaled to a unit diagonal.
+        /// Minimum eigenvalue of the matrix scaled to a unit diagonal.
         min_eigenvalue: f64,
         /// Minimum allowed eigenvalue.
         allowed: f64,

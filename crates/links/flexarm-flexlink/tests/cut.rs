@@ -92,7 +92,7 @@ fn assert_is(found: &RigidPart, link: &LinkInertia) {
 #[test]
 fn beam_and_ends_of_a_link_that_cannot_be_cut_are_exactly_the_link() {
     let (p_LA, p_LB) = (Vector3::zeros(), vector![0.8, 0.0, 0.0]);
-    for (x, y, factor) in [(0.1, 0.0, 1.0), (-0.05, 0.1, 1.0), (0.9, 0.0, 0.5), (0.4, 0.0, 0.1), (0.3, 0.2, 0.1)] {
+    for (x, y, factor) in [(0.1, 0.0, 1.0), (-0.05, 0.1, 1.0), (0.9, 0.0, 0.5), (0.4, 0.0, 0.1), (0.3, 0.02, 0.1)] {
         let mut link = bar();
         (link.com.x, link.com.y) = (x, y);
         link.inertia_com *= factor;
@@ -119,6 +119,18 @@ fn a_bar_with_a_ball_at_its_end_has_the_mass_of_the_ball_there() {
     assert!((0.5..0.56).contains(&found.share), "{}", found.share);
     let [near, far] = found.ends;
     assert!(near.mass > 5.2 && far.mass < 1e-12, "{} {}", near.mass, far.mass);
+}
+
+/// Centre of mass 0.22 m from that of the beam, a tenth of its inertia: 0.2 % are left for the beam.
+#[test]
+fn a_body_far_off_its_beam_that_leaves_less_than_a_percent_is_refused() {
+    let mut link = bar();
+    (link.com.x, link.com.y) = (0.3, 0.2);
+    link.inertia_com *= 0.1;
+    let error = share(&link).unwrap_err();
+    assert_relative_eq!(error.share, 0.002_028_873, epsilon = 1e-8);
+    let text = error.to_string();
+    assert!(text.contains("leave 0.20 % of its 12.000 kg for the beam, at least 1 % are needed"), "{text}");
 }
 
 #[test]

@@ -610,10 +610,10 @@ fn sizes_that_a_bag_makes_up_are_refused() {
     };
     let long_text = [&[1, 0][..], &u32::MAX.to_le_bytes(), b"pkg"].concat();
     let cases = [
-        (record(5, 1 << 50, b"bytes"), "to have 1125899906842624 bytes, at most 268435456 are read at once"),
+        (record(5, 1 << 50, b"bytes"), "has a length of 1125899906842624 bytes; the limit is 268435456"),
         (record(5, 200 << 20, b"bytes"), "its end is missing"),
         (record(3, long_text.len() as u64, &long_text), "a record ends within a value"),
-        (chunk("zstd", 1 << 40, b"bytes"), "to have 1099511627776 bytes, at most 268435456 are read at once"),
+        (chunk("zstd", 1 << 40, b"bytes"), "has a length of 1099511627776 bytes; the limit is 268435456"),
         (chunk("lz4", 1 << 20, b"bytes"), "its compressed content is damaged or incomplete"),
         (chunk("zstd", 1 << 20, b"bytes"), "its compressed content is damaged or incomplete"),
         (chunk("brotli", 1 << 20, b"bytes"), "a chunk is packed by \"brotli\"; read are zstd, lz4 and none"),

@@ -161,7 +161,7 @@ pub(crate) fn resolution(q: &[f64]) -> f64 {
     step
 }
 
-/// Largest distance of samples from their least-squares cubic.
+/// Maximum distance of samples from their least-squares cubic.
 fn distance_from_cubic(t: &[f64], q: &[f64]) -> f64 {
     let (first, last) = (t[0], t[t.len() - 1]);
     let x: Vec<f64> = t.iter().map(|t| 2.0 * (t - first) / (last - first) - 1.0).collect();

@@ -101,7 +101,7 @@ pub enum TrajectoryError {
         joint: String,
         /// Time of the largest difference, s.
         time_s: f64,
-        /// Largest difference, rad or m.
+        /// Maximum difference, rad or m.
         difference: f64,
     },
     /// The output cannot be written.

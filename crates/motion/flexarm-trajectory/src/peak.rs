@@ -31,7 +31,7 @@ pub struct JointPeak {
     /// Jerk of greatest magnitude within the pieces, rad/s³ or m/s³, without jumps of the
     /// acceleration.
     pub jerk: Extreme,
-    /// Largest jump of the acceleration, rad/s² or m/s²: at rounding level, except for an unrounded
+    /// Maximum jump of the acceleration, rad/s² or m/s²: at rounding level, except for an unrounded
     /// trapezoid or samples of a motion with jumps.
     pub acceleration_jump: Extreme,
 }

@@ -225,7 +225,7 @@ pub enum Problem {
         joint: String,
         /// Its column.
         column: String,
-        /// Largest position as written.
+        /// Maximum position as written.
         largest: f64,
     },
     /// Sampled values are invalid.

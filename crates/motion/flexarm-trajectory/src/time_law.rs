@@ -157,7 +157,7 @@ impl Lines {
         (upper, lower.unwrap_or([f64::NEG_INFINITY, 0.0]))
     }
 
-    /// Largest `x` at which some `u` is admissible. The gap between the lines is concave in `x`, so
+    /// Maximum `x` at which some `u` is admissible. The gap between the lines is concave in `x`, so
     /// Newton's method from above ends at the root after finitely many lines.
     fn largest_x(&self) -> Option<f64> {
         let mut x = self.x_max;
@@ -186,7 +186,7 @@ impl Lines {
         None
     }
 
-    /// Largest admissible `u` at `x`, at least the lower bound.
+    /// Maximum admissible `u` at `x`, at least the lower bound.
     fn largest_u(&self, x: f64) -> f64 {
         let (upper, lower) = self.tightest(x);
         (upper[0] + upper[1] * x).max(lower[0] + lower[1] * x)

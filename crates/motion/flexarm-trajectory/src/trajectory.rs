@@ -352,6 +352,14 @@ impl Trajectory {
         warnings
     }
 
+    /// Returns the columns of a table that are not part of the motion.
+    pub fn dropped_columns(&self) -> impl Iterator<Item = &String> {
+        self.notes.iter().flat_map(|note| match note {
+            Warning::DroppedColumns { columns } => &columns[..],
+            _ => &[],
+        })
+    }
+
     pub(crate) fn notes(&self) -> &[Warning] {
         &self.notes
     }

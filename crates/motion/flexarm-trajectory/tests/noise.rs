@@ -127,7 +127,7 @@ fn a_cut_off_beyond_half_the_sampling_rate_is_refused_with_its_line() {
     assert!(Trajectory::parse_csv(&text("3 Hz"), "f").is_ok());
 }
 
-/// Truth: the motion by the positions alone.
+/// Truth: the motion of the positions without velocities.
 #[test]
 fn velocities_of_another_sign_or_unit_or_zeros_are_told_and_not_used() {
     let times: Vec<f64> = (0..=150).map(|k| 0.02 * f64::from(k)).collect();

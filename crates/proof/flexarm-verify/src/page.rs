@@ -180,7 +180,7 @@ impl Case {
         self.add_claim(text.into(), truth.into(), measured, bound, false);
     }
 
-    /// Adds a claim about stored figures alone.
+    /// Adds a claim about stored figures, which no run of today changes.
     pub fn stored_claim(&mut self, text: impl Into<String>, truth: impl Into<String>, measured: f64, bound: Bound) {
         self.add_claim(text.into(), truth.into(), measured, bound, true);
     }

@@ -175,7 +175,9 @@ fn followers_have_a_leader_that_moves() {
     assert_eq!(problem(&with_joint(&follower("j"))).1, Problem::MimicCycle { joints: vec!["j".into()] });
     let two =
         hinge("j", "base", "arm").replace("</joint>", "<mimic joint='a'/><mimic joint='b' multiplier='2'/></joint>");
-    let (_, fault) = problem(&with_joint(&two));
+    let (a, b) = (hinge("a", "arm", "hand"), hinge("b", "hand", "tip"));
+    let text = robot(&[&link("base"), &link("arm"), &link("hand"), &link("tip"), &two, &a, &b]);
+    let (_, fault) = problem(&text);
     assert_eq!(fault, Problem::SeveralMimics { joint: "j".into(), count: 2 });
     assert!(fault.help().contains("[[loop]]"), "{}", fault.help());
     let fixed = "<joint name='f' type='fixed'><parent link='arm'/><child link='tip'/></joint>\n";

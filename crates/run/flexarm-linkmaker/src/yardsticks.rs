@@ -14,10 +14,10 @@ pub const OSMIUM: f64 = 22_600.0;
 /// links reach 0.43 with 0.02 of the nodes.
 const SPREAD: f64 = 0.25;
 const SHARE: f64 = 0.1;
-/// Largest distance of the centre of mass from the origin, and radius of gyration, over the distance
+/// Maximum distance of the centre of mass from the origin, and radius of gyration, over the distance
 /// of the interfaces from the origin or from each other.
 const BEYOND: f64 = 5.0;
-/// Largest distance of an interface's point from the centroid of its nodes, over their extent.
+/// Maximum distance of an interface's point from the centroid of its nodes, over their extent.
 const BESIDE: f64 = 2.0;
 
 /// Returns the speed of sound along a link according to its stiffness in the stiffest of three

@@ -12,7 +12,7 @@ pub(crate) struct BodyChange {
     pub(crate) mass: f64,
     /// Distance between the centres of mass (m).
     pub(crate) shift: f64,
-    /// Largest change of an entry of the inertia about the centre of mass, relative to the largest
+    /// Maximum change of an entry of the inertia about the centre of mass, relative to the largest
     /// of both.
     pub(crate) inertia: f64,
 }

@@ -59,7 +59,7 @@ const TOOL_ENGAGEMENT: CaveatKind = CaveatKind::warning(
     "rad",
     "ae is in the lengths of the file, immersion is a ratio to the diameter",
 );
-/// Largest depth of the search far below the diameter.
+/// Maximum depth of the search far below the diameter.
 const TOOL_DEEPEST: CaveatKind = CaveatKind::warning(
     "tool-deepest",
     "limits of {where} are sought up to {value} times its diameter only, less than {yardstick}",

@@ -4,11 +4,11 @@ use flexarm_kinematics::Wrench;
 use flexarm_run::{Arm, Error};
 use nalgebra::{Matrix6xX, Rotation3, Vector3};
 
-/// Largest force of a plan by default (N).
+/// Maximum force of a plan by default (N).
 const LARGEST: f64 = 500.0;
 /// Share of the force that the limits allow at half of the poses.
 const SHARE: f64 = 0.5;
-/// Smallest force worth hanging on (N).
+/// Minimum force worth hanging on (N).
 const SMALLEST: f64 = 1.0;
 
 /// Holding efforts at a pose, Jacobian of the joints and orientation of the tool.

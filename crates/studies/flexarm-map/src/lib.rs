@@ -297,7 +297,7 @@ pub fn map(
     }
     let grid = places.grid();
     let table = MapTable { columns: layout.columns.clone(), values: std::mem::take(&mut taken.rows) };
-    let mut found = summed_up(robot, &arm, request, table, &taken, by, grid.as_ref(), rotations.len())?;
+    let mut found = summed_up(robot, &arm, request, table, &taken, by, (all, grid.as_ref()), rotations.len())?;
     found.caveats.extend(caveats);
     found.caveats.extend(one_place(&found));
     found.caveats.extend((done < all).then(|| unfinished(done, all)));
@@ -503,10 +503,10 @@ fn summed_up(
     table: MapTable,
     taken: &Evaluation,
     by: usize,
-    grid: Option<&Grid>,
+    (places, grid): (usize, Option<&Grid>),
     directions: usize,
 ) -> Result<Map, Error> {
-    let points = grid.map_or(taken.poses, Grid::places);
+    let points = grid.map_or(places, Grid::places);
     let Some((best, worst)) = table.extremes(by) else {
         return Err(nothing_found(request, &table, taken, by, points).into());
     };

@@ -67,7 +67,7 @@ impl fmt::Display for Change {
 ///
 /// # Errors
 /// [`SweepError::Run`] for a path without a match, with similar paths, for a factor of a value that
-/// is not a number, and if `path` is not a robot file; otherwise as [`Robot::load`].
+/// is not a number, and if `path` is not a robot file; otherwise as [`RobotSource::load`].
 pub fn load_changed(path: &Path, options: &LoadOptions, changes: &[Change]) -> Result<(Arc<Arm>, f64), Error> {
     let path = if path.is_dir() { path.join("robot.toml") } else { path.to_owned() };
     if path.extension().is_none_or(|ending| ending != "toml") {

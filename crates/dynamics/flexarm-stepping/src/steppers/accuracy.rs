@@ -6,7 +6,7 @@
 //! ```
 //! (1) is a body on a spring, with time in units of 1/ω.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
 use flexarm_kinematics::{ElasticAngles, Joint, JointKind, Link, LinkInertia, Mechanism, Model, Pose, Wrench};
@@ -24,7 +24,9 @@ const LOAD: f64 = 1e-3;
 const MANY: f64 = 1000.0;
 
 /// Returns the maximum error over the first period of an oscillation relative to its amplitude: the
-/// stepper runs on (1) and is compared with (2). Zero for steppers with error control.
+/// stepper runs on (1) and is compared with (2). Zero for steppers with error control; at least one
+/// for steps above half a period, which cannot show the oscillation, however close their ends are to
+/// (2).
 ///
 /// * `h_omega`: step size times angular frequency.
 /// * `zeta`: damping ratio of the oscillation, below 1.
@@ -35,7 +37,8 @@ pub fn error_of_a_period(kind: StepperKind, h_omega: f64, zeta: f64) -> f64 {
         return 0.0;
     }
     let steps = (TAU / h_omega).ceil() as usize;
-    swing(kind, h_omega, zeta, steps).unwrap_or(f64::INFINITY)
+    let error = swing(kind, h_omega, zeta, steps).unwrap_or(f64::INFINITY);
+    if h_omega > PI { error.max(1.0) } else { error }
 }
 
 /// Returns the maximum error over `steps` steps; `None` if the stepper refuses them.

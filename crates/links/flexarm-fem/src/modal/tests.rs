@@ -424,7 +424,7 @@ fn slender(EI_z: f64) -> BeamLink {
     }
 }
 
-/// Smallest positive load at which `K + load G` becomes singular.
+/// Minimum positive load at which `K + load G` becomes singular.
 fn buckling_load(K: &DMatrix<f64>, G: &DMatrix<f64>) -> f64 {
     // K⁻¹ G x = -x/load: eigenvalues of L⁻¹ G L⁻ᵀ.
     let L = K.clone().cholesky().unwrap().l();

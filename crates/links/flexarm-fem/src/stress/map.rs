@@ -15,7 +15,7 @@ use crate::modal::{Field, ModalLink, axial};
 use crate::reduced::ElasticSplit;
 use crate::rigid_part::RigidPart;
 
-/// Largest relative difference between the compliance of a link and that of its fields.
+/// Maximum relative difference between the compliance of a link and that of its fields.
 const SAME_LINK: f64 = 1e-3;
 
 /// Linear map from the coordinates of a link's model to stress.

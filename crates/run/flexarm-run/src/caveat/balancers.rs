@@ -49,7 +49,10 @@ pub(crate) fn of_balancers(mechanism: &Mechanism, rigid: &Model) -> Vec<Caveat> 
             let gas = matches!(balancer.law, BalancerLaw::Gas(_)).then_some((1e-5, "pressure in bar"));
             let factors: Vec<Factor> = gas.into_iter().chain([(1e-3, "kN, kN m or N/mm")]).collect();
             let likely = slip(torque, &(0.03 * weight..=STRONG[0] * weight), &factors, 1.0);
-            caveats.push(kinds::BALANCER_WEAK.with_unit(alone.unit).found(&name, torque, WEAK * weight).likely(likely));
+            let caveat = kinds::BALANCER_WEAK.with_unit(alone.unit).found(&name, torque, WEAK * weight).likely(likely);
+            // A gas spring that reaches its free length is weak in some poses; a cylinder with a pressure is not.
+            let cylinder = matches!(&balancer.law, BalancerLaw::Gas(gas) if gas.pulls);
+            caveats.push(if cylinder { caveat } else { caveat.as_note() });
         }
         if weight > 0.0 && alone.with > RAISED * alone.without {
             let caveat = kinds::BALANCER_SIDE.with_unit(alone.unit).found(&name, alone.with, alone.without);

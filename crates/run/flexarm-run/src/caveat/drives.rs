@@ -49,7 +49,7 @@ const LOAD_FRICTION: f64 = 0.5;
 const RATIO: RangeInclusive<f64> = 1.0..=5000.0;
 /// Maximum reflected rotor inertia, relative to the largest inertia moved by a joint.
 const ROTOR: f64 = 10.0;
-/// Largest speed at which friction reaches its value, over the speed limit.
+/// Maximum speed at which friction reaches its value, over the speed limit.
 const SMOOTHING: f64 = 0.1;
 /// Range of the sampling period of a servo (s).
 const SAMPLE: RangeInclusive<f64> = 1e-6..=0.05;

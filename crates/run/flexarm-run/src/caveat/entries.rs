@@ -2,6 +2,8 @@
 
 use std::ops::RangeInclusive;
 
+use nalgebra::Vector3;
+
 use super::links::outside;
 use super::size::Size;
 use super::slip::{self, slip};
@@ -16,18 +18,18 @@ const STRENGTH: RangeInclusive<f64> = 5e6..=4.5e9;
 /// Range of the fatigue strength at a reversed stress over the tensile strength; metals have 0.3 to
 /// 0.6.
 const FATIGUE: RangeInclusive<f64> = 0.1..=0.7;
-/// Smallest angle between the grids of a rosette (rad); rosettes have 45, 60 or 90 degrees.
+/// Minimum angle between the grids of a rosette (rad); rosettes have 45, 60 or 90 degrees.
 const GRIDS: f64 = 5.0 / slip::DEGREES;
-/// Largest distance of a gauge from the axis of a beam over the size of its section; the corner of
+/// Maximum distance of a gauge from the axis of a beam over the size of its section; the corner of
 /// a square has 0.71.
 const ON_SECTION: f64 = 0.75;
 /// Range of the tilt of a guide (rad) under the weight of the robot at its reach.
 const TILT: RangeInclusive<f64> = 1e-7..=0.5;
 /// Range of the transition of a guide's play, and limit of its centre, over the same moment.
 const TRANSITION: RangeInclusive<f64> = 1e-4..=10.0;
-/// Largest calibration of a joint: shift (m) and angle (rad).
+/// Maximum calibration of a joint: shift (m) and angle (rad).
 const CALIBRATION: [f64; 2] = [0.05, 0.05];
-/// Largest distance of the end of a guide's tube over the size of the robot.
+/// Maximum distance of the end of a guide's tube over the size of the robot.
 const FAR: f64 = 1.5;
 
 /// Returns all of these caveats.
@@ -77,11 +79,18 @@ fn of_gauge(gauge: &Gauge, links: &[RobotLink]) -> Vec<Caveat> {
     let [from, to] = [link.flexible.reduced.X_LA, link.flexible.reduced.X_LB].map(|X| X.translation.vector);
     let axis = to - from;
     if axis.norm() > 0.0 {
-        let at = gauge.at - from;
-        // Nearest point of the axis within the beam.
-        let along = (at.dot(&axis) / axis.norm_squared()).clamp(0.0, 1.0);
-        let off = (at - axis * along).norm();
-        let likely = slip(off, &(0.0..=ON_SECTION * size), slip::LENGTH, 1.0);
+        // Distance from the nearest point of the axis within the beam.
+        let distance = |place: &Vector3<f64>| {
+            let at = place - from;
+            let along = (at.dot(&axis) / axis.norm_squared()).clamp(0.0, 1.0);
+            (at - axis * along).norm()
+        };
+        let off = distance(&gauge.at);
+        let room = 0.0..=ON_SECTION * size;
+        let likely = match room.contains(&distance(&(gauge.at * 1e-3))) {
+            true => "millimetres?".to_owned(),
+            false => slip(off, &room, slip::LENGTH, 1.0),
+        };
         let caveat = kinds::GAUGE_PLACE.found(format!("gauge {:?}", gauge.name), off, ON_SECTION * size).likely(likely);
         caveats.extend((off > ON_SECTION * size).then_some(caveat));
     }

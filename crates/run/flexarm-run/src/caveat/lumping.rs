@@ -62,7 +62,7 @@ pub(crate) fn of_parts(link: &RobotLink, form: &LinkForm) -> Option<Caveat> {
     Some(Caveat { severity, value: Some(sag), yardstick: Some(bound), ..caveat })
 }
 
-/// Largest difference of the displacement of B under the own weight along x, y or z from that of
+/// Maximum difference of the displacement of B under the own weight along x, y or z from that of
 /// the mesh, relative to the largest of the mesh.
 fn sag_error(chain: &Chain, modal: &ModalLink, p_LB: &Vector3<f64>) -> Option<f64> {
     let Phi = &modal.interfaces.first()?.Phi;

@@ -186,7 +186,9 @@ fn joint_limits(mechanism: &Mechanism, size: &Size) -> Vec<Caveat> {
         let caveat = kinds::SPEED_LIMIT.found(format!("joint {:?}", joint.name), speed, FAST.0);
         let factors = &[slip::ANGLE[0], (60.0 / std::f64::consts::TAU, "1/min")];
         let caveat = caveat.likely(slip(speed, &(0.05..=FAST.0), factors, 1.0));
-        if speed > FASTEST || speed * size.beyond(&joint.parent) > FAST.1 { caveat } else { caveat.as_note() }
+        // Machines with one or two axes can be modelled on the motor side.
+        let arm = turning.len() > 2;
+        if (arm && speed > FASTEST) || speed * size.beyond(&joint.parent) > FAST.1 { caveat } else { caveat.as_note() }
     });
     let ends = |j: &Joint| j.limits.lower.abs().max(j.limits.upper.abs());
     let wide: Vec<_> = turning.iter().filter(|j| ends(j).is_finite() && ends(j) > 2.0 * TURN).collect();

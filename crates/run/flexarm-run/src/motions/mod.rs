@@ -1,4 +1,4 @@
-//! What an arm is asked to do: motions, loads and payloads, and their files.
+//! Motions of an arm, loads and payloads, and their files.
 
 pub mod applied_load;
 pub(crate) mod load_jumps;

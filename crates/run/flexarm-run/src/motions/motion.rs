@@ -174,7 +174,8 @@ impl Motion {
         let limits = limits(model);
         let names: Vec<&str> = actuated.iter().map(|c| c.joint.as_str()).collect();
         let dependent: Vec<&str> = model.dependent().iter().map(|c| c.joint.as_str()).collect();
-        refuse_dependent(path, trajectory.joints(), &names, &dependent)?;
+        let moved: Vec<String> = trajectory.joints().iter().chain(trajectory.dropped_columns()).cloned().collect();
+        refuse_dependent(path, &moved, &names, &dependent)?;
         let dropped = foreign_joints(trajectory.joints(), &names)
             .map_err(|e| Error::File { path: path.to_owned(), what: e.to_string() })?;
         let trajectory = trajectory.without_joints(&dropped);

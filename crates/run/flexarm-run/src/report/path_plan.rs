@@ -75,7 +75,7 @@ fn named(axis: &Vector3<f64>) -> String {
     format!("along ({:.2}, {:.2}, {:.2})", axis.x, axis.y, axis.z)
 }
 
-/// Largest of 1, 2 or 5 times a power of ten that does not exceed `x`.
+/// Maximum of 1, 2 or 5 times a power of ten that does not exceed `x`.
 fn rounded(x: f64) -> f64 {
     let power = 10f64.powf(x.log10().floor());
     let digit = x / power;

@@ -134,23 +134,23 @@ pub(crate) fn fit_color_scale<'a>(traces: impl IntoIterator<Item = &'a mut Trace
     }
 }
 
-/// Largest of 1, 2, 5 times a power of ten that does not exceed `x`.
+/// Maximum of 1, 2, 5 times a power of ten that does not exceed `x`.
 fn round_down(x: f64) -> f64 {
     let decade = 10f64.powf(x.log10().floor());
     [5.0, 2.0, 1.0].into_iter().map(|k| k * decade).find(|y| *y <= x * (1.0 + 1e-9)).unwrap_or(decade)
 }
 
-/// Smallest round number not below `x`, larger by at most a third; 0 for 0.
+/// Minimum round number not below `x`, larger by at most a third; 0 for 0.
 fn end_of_scale(x: f64) -> f64 {
     next_of(&[1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0], x)
 }
 
-/// Smallest of 1, 2, 5 times a power of ten not below `x`; 0 for 0.
+/// Minimum of 1, 2, 5 times a power of ten not below `x`; 0 for 0.
 pub fn round_up(x: f64) -> f64 {
     next_of(&[1.0, 2.0, 5.0, 10.0], x)
 }
 
-/// Smallest of these steps times a power of ten not below `x`; 0 for 0.
+/// Minimum of these steps times a power of ten not below `x`; 0 for 0.
 fn next_of(steps: &[f64], x: f64) -> f64 {
     if !(x > 0.0 && x.is_finite()) {
         return 0.0;

@@ -173,10 +173,10 @@ const LONG_RUN: u64 = 100_000;
 pub struct Run {
     /// Figures, as in `summary.json`.
     pub summary: Summary,
-    /// Signals; empty unless the request keeps [`Keep::Columns`](crate::Keep::Columns).
+    /// Signals; empty unless the request keeps [`Keep::Columns`].
     pub columns: Columns,
     /// Curves, thinned for long runs; empty unless the request keeps
-    /// [`Keep::Curves`](crate::Keep::Curves) or writes recordings.
+    /// [`Keep::Curves`] or writes recordings.
     pub trace: Trace,
 }
 
@@ -332,7 +332,7 @@ fn write_results(
     let make_page = || outputs.map(|_| crate::report::page(summary, trace));
     let early = if trace.samples() < LONG_RUN { make_page() } else { None };
     let closed = files.set.finish(&trace.result).map_err(Error::from);
-    let closed = closed.and_then(|()| write_bag_metadata(&files.names));
+    let closed = closed.and_then(|()| write_bag_metadata(outputs));
     let page = early.or_else(make_page);
     let write = |(outputs, page): (_, String)| crate::report::write(outputs, summary, trace, &page);
     closed.and_then(|()| outputs.zip(page).map_or(Ok(()), write))

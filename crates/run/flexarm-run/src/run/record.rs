@@ -201,16 +201,20 @@ pub(crate) fn write_layouts(outputs: Option<&Outputs>, header: &RunHeader) -> Re
 
 /// Writes the file that makes the folder of the finished MCAP recording a bag of ROS 2.
 #[cfg(feature = "mcap")]
-pub(crate) fn write_bag_metadata(files: &Files) -> Result<(), Error> {
-    let Some(path) = files.recordings.get(RecordingFormat::Mcap).map(Path::new) else { return Ok(()) };
-    let metadata = flexarm_log::rosbag2_metadata(path)?;
+pub(crate) fn write_bag_metadata(outputs: Option<&Outputs>) -> Result<(), Error> {
+    let Some(outputs) = outputs.filter(|outputs| outputs.recordings.contains(&RecordingFormat::Mcap)) else {
+        return Ok(());
+    };
+    // Not the path of the summary: as text it is another one if the folder's name is not text.
+    let path = outputs.folder.join(RecordingFormat::Mcap.info().file_name);
+    let metadata = flexarm_log::rosbag2_metadata(&path)?;
     let file = metadata.map(|text| (path.with_file_name(BAG_FILE), text));
     Ok(flexarm_files::write_all(&Vec::from_iter(file))?)
 }
 
 /// Without the feature `mcap` there is no bag.
 #[cfg(not(feature = "mcap"))]
-pub(crate) fn write_bag_metadata(_: &Files) -> Result<(), Error> {
+pub(crate) fn write_bag_metadata(_: Option<&Outputs>) -> Result<(), Error> {
     Ok(())
 }
 

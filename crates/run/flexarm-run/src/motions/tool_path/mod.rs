@@ -34,7 +34,7 @@ pub use standard::{Standard, Step};
 const TO_TOP_SPEED: f64 = 0.4;
 /// Assumed acceleration of a joint without a speed limit, rad/s² or m/s².
 const ACCELERATION: f64 = 10.0;
-/// Smallest singular value below which a path counts as near-singular, m/rad.
+/// Minimum singular value below which a path counts as near-singular, m/rad.
 const NEAR_SINGULAR: f64 = 0.02;
 /// Maximum number of notes of one kind that are listed individually.
 const TOLD: usize = 4;
