@@ -294,7 +294,7 @@ FIGURES = [
     ("docs/compensate.md", "(column `after`: {} mm)", lambda s: s.compensated("kr210")[-2:-1]),
     *(
         ("docs/compensate.md", f"| `{arguments}`{more} | {{}} Hz | {{}} mm | {', '.join(['{}'] * n)} | {{}} mm |", lambda s, a=arguments: s.compensated(a))
-        for arguments, more, n in [("kr300 --drives servo", "", 5), ("kr300", " (motors where they are commanded)", 5), ("manutec_r3 --drives servo", "", 4)]
+        for arguments, more, n in [("kr300 --drives servo", "", 5), ("kr300", " (motors where they are commanded)", 3), ("manutec_r3 --drives servo", "", 4)]
     ),
     *(
         ("docs/compensate.md", f"| `{flags}` | {{}} s | {{}}, {{}} |", lambda s, f=flags: s.shaped(f))
