@@ -1,7 +1,8 @@
 //! Maps of the workspace.
 
+use std::ops::ControlFlow;
 use std::path::PathBuf;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use flexarm::map::{JointRange, KeptPoses, Map, MapRegion, MapRequest, ToolDirections, WorkspaceGrid, map as take};
 use flexarm::{Motion, Robot};
@@ -19,7 +20,7 @@ use crate::robot::PyRobot;
 use crate::run_arguments::progress_function;
 use crate::scenario::scenario;
 use crate::values::{maybe_whole, modelling, whole, word, wrench};
-use crate::watch::Watch;
+use crate::watch::stoppable_telling;
 
 /// Sag, compliance, frequencies and error under load at many poses. Created by :func:`flexarm.map`.
 #[pyclass(frozen, name = "Map", module = "flexarm")]
@@ -358,14 +359,24 @@ fn with_bar<'py>(
 
 /// Computes a map that signals and a progress function can stop.
 fn watched(py: Python<'_>, robot: &Robot, request: &MapRequest, progress: Option<Py<PyAny>>) -> PyResult<Map> {
-    let watch = Mutex::new(Watch::new(progress));
-    let locked = || watch.lock().unwrap_or_else(PoisonError::into_inner);
-    let result = py.detach(|| take(robot, request, &mut |done, all| locked().look(done, all)));
-    let mut watch = watch.into_inner().unwrap_or_else(PoisonError::into_inner);
-    if let Some(raised) = watch.raised.take() {
-        return Err(raised);
+    // Progress, reported by the thread that may call Python.
+    let at: Arc<Mutex<Option<(f64, f64)>>> = Arc::default();
+    let seen = at.clone();
+    let (robot, request) = (robot.clone(), request.clone());
+    let work = move |stop: &(dyn Fn() -> bool + Sync)| {
+        take(&robot, &request, &mut |done, all| {
+            *at.lock().unwrap_or_else(PoisonError::into_inner) = Some((done, all));
+            if stop() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        })
+    };
+    let mut tell = |py: Python<'_>| match (seen.lock().unwrap_or_else(PoisonError::into_inner).take(), &progress) {
+        (Some((done, all)), Some(progress)) => progress.call1(py, (done, all)).map(drop),
+        _ => Ok(()),
+    };
+    let map = stoppable_telling(py, work, &mut tell)?.or_raise()?;
+    match &progress {
+        Some(progress) => progress.call1(py, (map.points as f64, map.points as f64)).map(drop)?,
+        None => {}
     }
-    let map = result.or_raise()?;
-    watch.done(map.points as f64)?;
     Ok(map)
 }
