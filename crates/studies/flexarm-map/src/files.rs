@@ -57,12 +57,10 @@ pub(super) fn save(
     map.files.rrd = text(&paths.rrd).filter(|_| RecordingFormat::Rrd.is_built_in());
     let page = page::html(map, grid).into_bytes();
     let json = serde_json::to_string_pretty(map).expect("plain numbers and strings") + "\n";
-    if let Some(folder) = paths.table.parent() {
-        std::fs::create_dir_all(folder).map_err(|source| Error::Write { path: folder.to_owned(), source })?;
-    }
+    // First of all, since it makes the folder and refuses if the call was broken off.
+    write_all(&[(paths.page.clone(), page), (paths.json.clone(), json.into_bytes())])?;
     write_table(map, &paths.table, request.overwrite)?;
-    recording::write(map, &paths.rrd, robot, request, arm, grid)?;
-    Ok(write_all(&[(paths.page.clone(), page), (paths.json.clone(), json.into_bytes())])?)
+    recording::write(map, &paths.rrd, robot, request, arm, grid)
 }
 
 /// Writes the table with its texts.
