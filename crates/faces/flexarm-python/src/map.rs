@@ -374,9 +374,8 @@ fn watched(py: Python<'_>, robot: &Robot, request: &MapRequest, progress: Option
         _ => Ok(()),
     };
     let map = stoppable_telling(py, work, &mut tell)?.or_raise()?;
-    match &progress {
-        Some(progress) => progress.call1(py, (map.points as f64, map.points as f64)).map(drop)?,
-        None => {}
+    if let Some(progress) = &progress {
+        progress.call1(py, (map.points as f64, map.points as f64))?;
     }
     Ok(map)
 }
