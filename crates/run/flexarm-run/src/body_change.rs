@@ -3,7 +3,7 @@
 use flexarm_fem::RigidPart;
 use flexarm_kinematics::LinkInertia;
 
-/// Maximum relative difference of numbers that agree but for rounding.
+/// Maximum relative difference of numbers that are equal up to rounding.
 const ROUNDING: f64 = 1e-9;
 
 /// Change from the URDF's body of a link to that of its flexible model.
