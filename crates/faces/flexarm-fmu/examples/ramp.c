@@ -8,6 +8,7 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "flexarm.h"
 
@@ -26,6 +27,16 @@ static uint32_t reference(const flexarm_plant *arm, const char *name)
     return (uint32_t)found;
 }
 
+/* The target position of the first joint under motion. */
+static uint32_t first_target(const flexarm_plant *arm)
+{
+    for (uint32_t k = 0; k < flexarm_count(arm); k++)
+        if (strstr(flexarm_name(arm, k), ".target_position") != NULL)
+            return k;
+    fprintf(stderr, "error: no joint has a target position\n");
+    exit(1);
+}
+
 int main(int count, char **arguments)
 {
     const char *robot = count > 1 ? arguments[1] : "robots/kr210";
@@ -33,10 +44,7 @@ int main(int count, char **arguments)
     flexarm_plant *arm = flexarm_open(robot, NULL, NULL, 0.0, NULL, 0);
     if (arm == NULL)
         check(-1);
-    /* The first input is the target position of the first joint. */
-    uint32_t target = 0;
-    while (flexarm_causality(arm, target) != FLEXARM_INPUT)
-        target++;
+    uint32_t target = first_target(arm);
     uint32_t error = reference(arm, "tcp_error.length");
     printf("%s: %zu variables, moving %s\n", robot, flexarm_count(arm), flexarm_name(arm, target));
 
