@@ -74,7 +74,7 @@ def zig_linker(tools):
 def library(target, linker):
     """Builds the library of FMUs, which the program in the wheel writes into them; returns its path."""
     # With the features of the wheel, so that nothing is compiled twice.
-    features = ["--features", "flexarm-cli/arrow,flexarm-cli/rerun,flexarm-cli/sqlite"]
+    features = ["--features", "flexarm-cli/rerun,flexarm-cli/sqlite"]
     run("cargo", "build", "--release", "--locked", "-p", "flexarm-fmu", "-p", "flexarm-cli", *features, cwd=ROOT)
     if linker:
         line = ["cargo", "rustc", "--release", "--locked", "-p", "flexarm-fmu", "--lib", "--crate-type", "cdylib"]

@@ -31,13 +31,13 @@ ONLY = {
     "flexarm-python": ["flexarm", "flexarm-cli", "flexarm-rerun"], "flexarm-rerun": ["flexarm-log", "flexarm-draw", "flexarm-kinematics"],
 }
 OWNERS = {  # outside crate: folders that may name it
-    **dict.fromkeys(["re_cdr", "parquet", "arrow-array", "arrow-ipc", "arrow-schema", "rustix"], ["results"]),
+    **dict.fromkeys(["re_cdr", "parquet", "rustix"], ["results"]),
     **dict.fromkeys(["mcap", "zstd", "lz4_flex"], ["motion", "results"]), "rusqlite": ["motion"],
     "urdf-rs": ["robot"], "saphyr-parser": ["base"], "diffsol": ["dynamics"], "toml_edit": ["studies", "faces"],
     **dict.fromkeys(["faer", "safetensors"], ["links"]), "clap": ["faces", "proof"],
     **dict.fromkeys(["png", "plotters", "noto-sans-mono-bitmap", "clarabel"], ["results"]),
     **dict.fromkeys(["rand", "sobol_burley", "statrs"], ["studies"]),
-    **dict.fromkeys(["clap_complete", "clap_mangen", "indicatif", "numpy", "pyo3", "pyo3-build-config", "quick-xml", "rerun", "signal-hook", "twox-hash", "zip"], ["faces"]),
+    **dict.fromkeys(["arrow-array", "clap_complete", "clap_mangen", "indicatif", "numpy", "pyo3", "pyo3-build-config", "quick-xml", "rerun", "signal-hook", "twox-hash", "zip"], ["faces"]),
 }
 LARGEST_CYCLE = 3
 PRINTS = re.compile(r"\b(?:e?print(?:ln)?|dbg)!\s*[(\[{]|\bstd::io::(?:stdout|stderr)\b")

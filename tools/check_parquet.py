@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Compares Parquet and Arrow recordings, read by another library, with the CSV of the same run.
+"""Compares a Parquet recording, read by another library, with the CSV of the same run.
 
-    python3 tools/check_parquet.py FOLDER                   run.parquet, run.arrow and run.csv in it
-    python3 tools/check_parquet.py FILE.parquet FILE.csv    or FILE.arrow
+    python3 tools/check_parquet.py FOLDER                   run.parquet and run.csv in it
+    python3 tools/check_parquet.py FILE.parquet FILE.csv
 
-    flexarm compare --also parquet --also arrow -o FOLDER   makes all of them
+    flexarm compare --parquet -o FOLDER                     makes both
 
 Checks the names of the columns and their order, every number to the last bit, doubles without
 missing values, row groups of bounded size, and the metadata. Needs pyarrow (Apache-2.0); without it
@@ -24,17 +24,12 @@ def bits(x):
 
 
 def read(path):
-    """Returns the table of a file, the rows of its groups or batches, and its metadata."""
-    import pyarrow as pa
+    """Returns the table of a file, the rows of its groups, and its metadata."""
     import pyarrow.parquet as pq
 
-    if path.suffix == ".parquet":
-        file = pq.ParquetFile(path)
-        groups = [file.metadata.row_group(k).num_rows for k in range(file.metadata.num_row_groups)]
-        return file.read(), groups, file.metadata.metadata
-    file = pa.ipc.open_file(pa.memory_map(str(path)))
-    groups = [file.get_batch(k).num_rows for k in range(file.num_record_batches)]
-    return file.read_all(), groups, file.schema.metadata
+    file = pq.ParquetFile(path)
+    groups = [file.metadata.row_group(k).num_rows for k in range(file.metadata.num_row_groups)]
+    return file.read(), groups, file.metadata.metadata
 
 
 def check(path, csv_path):
@@ -80,11 +75,9 @@ def check(path, csv_path):
 
 def main(arguments):
     if len(arguments) == 1:
-        folder = Path(arguments[0])
-        recordings = [path for path in (folder / "run.parquet", folder / "run.arrow") if path.exists()]
-        csv_path = folder / "run.csv"
+        path, csv_path = Path(arguments[0]) / "run.parquet", Path(arguments[0]) / "run.csv"
     elif len(arguments) == 2:
-        recordings, csv_path = [Path(arguments[0])], Path(arguments[1])
+        path, csv_path = Path(arguments[0]), Path(arguments[1])
     else:
         sys.exit(__doc__)
     try:
@@ -92,18 +85,14 @@ def main(arguments):
     except ImportError:
         print("skipped: pyarrow is not installed (pip install pyarrow)")
         return 0
-    missing = [str(path) for path in recordings + [csv_path] if not path.exists()]
-    if missing or not recordings:
-        files = ", ".join(missing) or f"{arguments[0]}: run.parquet, run.arrow"
-        sys.exit(f"error: {files}: no such file; flexarm compare --also parquet --also arrow -o FOLDER makes them")
-    status = 0
-    for path in recordings:
-        problems, seen = check(path, csv_path)
-        for problem in problems:
-            print(f"error: {path}: {problem}", file=sys.stderr)
-        print(f"{path.suffix[1:]}: {seen}, {len(problems)} problems (pyarrow {pyarrow.__version__})")
-        status = 1 if problems else status
-    return status
+    missing = [str(file) for file in (path, csv_path) if not file.exists()]
+    if missing:
+        sys.exit(f"error: {', '.join(missing)}: no such file; flexarm compare --parquet -o FOLDER makes both")
+    problems, seen = check(path, csv_path)
+    for problem in problems:
+        print(f"error: {path}: {problem}", file=sys.stderr)
+    print(f"{path.suffix[1:]}: {seen}, {len(problems)} problems (pyarrow {pyarrow.__version__})")
+    return 1 if problems else 0
 
 
 if __name__ == "__main__":

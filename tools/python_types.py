@@ -44,7 +44,6 @@ NAMES = {"Caveat": "CaveatDict", "Files": "RunFiles"}
 WRITTEN = {
     "RecordingFiles": [
         *((key, "str | None", True, f"Recording ({key}), if it was written.") for key in ["csv", "mcap", "rrd", "parquet"]),
-        ("arrow", "str", False, "Recording (arrow), if it was written."),
     ],
     "StepperSettings": [
         ("rho_inf", "float", False, "Of the generalised-alpha method."),

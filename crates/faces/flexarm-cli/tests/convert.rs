@@ -84,32 +84,6 @@ fn parquet_is_written_by_a_run_that_is_asked_for_it() {
     assert!(place.snapshot().keys().all(|path| !path.to_string_lossy().contains("partial")));
 }
 
-/// Formats not written by default are written on request, and the summary names the file.
-#[cfg(feature = "arrow")]
-#[test]
-fn a_run_that_is_asked_for_arrow_writes_it_and_a_report_is_made_of_it() {
-    let place = Place::new();
-    let run = ["compare", "robot.toml", "swing.toml", "-o", "result"];
-    assert!(place.json(&run)["files"].get("arrow").is_none());
-    let summary = place.json(&[&run[..], &["--also", "arrow", "--force"]].concat());
-    assert_eq!(summary["files"]["arrow"], "result/run.arrow");
-    assert!(place.snapshot().keys().all(|path| !path.to_string_lossy().contains("partial")));
-    convert(&place, "result/run.arrow", "a.csv");
-    assert!(place.read("a.csv") == place.read("result/run.csv"));
-    convert(&place, "a.csv", "b.feather");
-    let summary = convert(&place, "b.feather", "b.csv");
-    assert_eq!((&summary["from"], &summary["to"]), (&Value::from("arrow"), &Value::from("csv")));
-    assert!(place.read("b.csv") == place.read("a.csv"));
-    // The file contains the result: the report needs no other file.
-    let report = place.json(&["report", "result/run.arrow", "-o", "page.html"]);
-    assert_eq!(report["inputs"][0], "result/run.arrow");
-    assert_eq!(report["warnings"].as_array().unwrap().len(), 0);
-    assert!(place.text("page.html").contains("id=\"plots\""));
-    // A later run without it removes the old file.
-    place.json(&[&run[..], &["--force"]].concat());
-    assert!(!place.path("result/run.arrow").exists());
-}
-
 #[cfg(feature = "mcap")]
 #[test]
 fn a_recording_without_its_end_is_read_with_a_warning() {
@@ -137,10 +111,6 @@ fn what_cannot_be_converted_is_refused_and_nothing_is_touched() {
     if cfg!(not(feature = "rerun")) {
         let words = ["a.rrd", "built without Rerun", "cargo run --release --features rerun -- ..."];
         place.refused(&["convert", "result/run.csv", "a.rrd"], &words);
-    }
-    if cfg!(not(feature = "arrow")) {
-        let words = ["built without Arrow", "cargo run --release --features arrow -- ..."];
-        place.refused(&["compare", "robot.toml", "swing.toml", "--also", "arrow"], &words);
     }
     place.refused(&["convert", "result/run.csv", "a.xlsx"], &[".xlsx", ".parquet", "--to"]);
     place.refused(&["convert", "result/run.csv", "a.csv", "--from", "xml"], &["xml", "parquet"]);

@@ -137,7 +137,7 @@ impl PyArm {
     ///     Folder for recordings and a report. Default: nothing is written.
     /// overwrite : bool, default False
     /// formats : sequence of str, optional
-    ///     Recordings to write, of ``"csv"``, ``"mcap"``, ``"rrd"``, ``"parquet"``, ``"arrow"``.
+    ///     Recordings to write, of ``"csv"``, ``"mcap"``, ``"rrd"``, ``"parquet"``.
     ///     Default: the usual ones.
     /// figures : bool, default False
     ///     Also write plots and pictures for papers.

@@ -190,8 +190,6 @@ pub mod report {
 
 /// Recordings of runs: formats, columns, conversion.
 pub mod recordings {
-    #[cfg(feature = "arrow")]
-    pub use flexarm_log::arrow_stream;
     pub use flexarm_log::{
         Column, Columns, CurveQuantity, DataColumn, DataTable, DataValues, FormatInfo, Holds, RecordingFormat, Sample,
         Trace, flat_columns,

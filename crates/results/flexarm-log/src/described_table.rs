@@ -1,16 +1,14 @@
-//! A table with texts for everything that has no column: the part that Parquet and Arrow share,
-//! for writing and reading.
+//! Texts of a Parquet file for everything that has no column.
 //!
 //! Writing: [`texts_at_start`], [`texts_at_end`], and samples in blocks of columns ([`Block`]).
-//! Reading: a [`DescribedTable`] from the column names and texts of a file, and [`TableRun`] over
-//! any source of blocks of numbers ([`Blocks`]).
+//! Reading: a [`DescribedTable`] from the column names and texts of a file.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use crate::read::{not_a_recording, stem};
 use crate::shape::Shape;
 use crate::table::{self, TableLayout};
-use crate::{Attachment, LogError, RunHeader, RunResult, RunSource, Sample, run_json};
+use crate::{Attachment, LogError, RunHeader, RunResult, Sample, run_json};
 
 /// Key of the run header, the same JSON as `run.json` in MCAP files.
 const RUN_KEY: &str = "flexarm.run";
@@ -83,9 +81,9 @@ impl Block {
 #[derive(Debug)]
 pub(crate) struct DescribedTable {
     pub(crate) layout: TableLayout,
-    result: RunResult,
+    pub(crate) result: RunResult,
     /// Whether the file holds a run header ([`RUN_KEY`]).
-    described: bool,
+    pub(crate) described: bool,
 }
 
 impl DescribedTable {
@@ -101,7 +99,7 @@ impl DescribedTable {
         let refuse = |(found, expected)| not_a_recording(path, found, expected);
         let layout = match value(RUN_KEY).map(|text| run_json::read(text.as_bytes())) {
             Some(Ok((header, run))) => {
-                // Some formats do not keep the order of the texts.
+                // Other writers do not keep the order of the texts.
                 attachments.sort_by_key(|file| run.attachments.iter().position(|name| *name == file.name));
                 TableLayout::of_header(header, names)
             }
@@ -124,63 +122,5 @@ fn media_type(name: &str) -> &'static str {
         Some("json") => "application/json",
         Some("toml") => "application/toml",
         _ => "text/plain",
-    }
-}
-
-/// A table read in blocks of rows.
-pub(crate) trait Blocks {
-    /// Number of blocks.
-    fn count(&self) -> usize;
-
-    /// Reads the given columns (indices in the file) of one block. Missing numbers are NaN; all
-    /// columns get the same length.
-    fn read(&self, path: &Path, block: usize, places: &[usize], columns: &mut [Vec<f64>]) -> Result<(), LogError>;
-}
-
-/// A run read from a table with texts.
-#[derive(Debug)]
-pub(crate) struct TableRun<B> {
-    path: PathBuf,
-    table: DescribedTable,
-    blocks: B,
-}
-
-impl<B: Blocks> TableRun<B> {
-    pub(crate) fn new(path: &Path, mut table: DescribedTable, blocks: B) -> Result<Self, LogError> {
-        if !table.described && blocks.count() > 0 {
-            let mut times = [Vec::new()];
-            blocks.read(path, 0, &table.layout.places[..1], &mut times)?;
-            if let [first, second, ..] = times[0][..] {
-                table.layout.header.log_rate_hz = table::rate_hz(first, second);
-            }
-        }
-        Ok(Self { path: path.to_owned(), table, blocks })
-    }
-}
-
-impl<B: Blocks> RunSource for TableRun<B> {
-    fn header(&self) -> &RunHeader {
-        &self.table.layout.header
-    }
-
-    fn missing(&self) -> Vec<String> {
-        let undescribed = "the file does not say which robot and trajectory it is of: another program wrote it";
-        if self.table.described { Vec::new() } else { vec![undescribed.into()] }
-    }
-
-    fn replay(&mut self, take: &mut dyn FnMut(&Sample) -> Result<(), LogError>) -> Result<RunResult, LogError> {
-        let layout = &self.table.layout;
-        let mut columns = vec![Vec::new(); layout.places.len()];
-        let (mut sample, mut row) = (Sample::default(), Vec::new());
-        for block in 0..self.blocks.count() {
-            self.blocks.read(&self.path, block, &layout.places, &mut columns)?;
-            for k in 0..columns[0].len() {
-                row.clear();
-                row.extend(columns.iter().map(|column| column[k]));
-                layout.sample(&row, &mut sample);
-                take(&sample)?;
-            }
-        }
-        Ok(self.table.result.clone())
     }
 }

@@ -73,24 +73,3 @@ fn places(columns: &Columns, has_rigid: bool) -> Vec<ColumnSource> {
     take("energy", 0..3);
     places
 }
-
-/// Exports the table as a stream of Arrow's C interface with a single record batch. Other libraries
-/// in the same process can use the numbers without a copy.
-///
-/// # Errors
-/// [`arrow_schema::ArrowError`] if the columns do not form a record batch; the columns of a run
-/// always do.
-#[cfg(feature = "arrow")]
-pub fn arrow_stream(columns: &Columns) -> Result<impl Send + 'static, arrow_schema::ArrowError> {
-    use std::sync::Arc;
-
-    use arrow_array::ffi_stream::FFI_ArrowArrayStream;
-    use arrow_array::{ArrayRef, Float64Array, RecordBatch, RecordBatchIterator};
-
-    let named = flat_columns(columns)
-        .into_iter()
-        .map(|(name, numbers)| (name, Arc::new(Float64Array::from(numbers)) as ArrayRef, false));
-    let batch = RecordBatch::try_from_iter_with_nullable(named)?;
-    let schema = batch.schema();
-    Ok(FFI_ArrowArrayStream::new(Box::new(RecordBatchIterator::new([Ok(batch)], schema))))
-}

@@ -1,4 +1,4 @@
-//! Recorders: write a run of the simulator to CSV, Parquet, Arrow and MCAP files, and read it back.
+//! Recorders: write a run of the simulator to CSV, Parquet and MCAP files, and read it back.
 //!
 //! A run hands over one [`RunHeader`], then [`Sample`]s, then its result figures; every
 //! [`Recorder`] takes the same three calls, and [`RecorderSet`] passes them to several files at
@@ -53,7 +53,7 @@
 mod create;
 mod csv_file;
 mod data_table;
-#[cfg(feature = "described-tables")]
+#[cfg(feature = "parquet")]
 mod described_table;
 mod error;
 mod file_recorder;
@@ -67,14 +67,14 @@ mod parquet_file;
 mod poses;
 mod read;
 mod record;
-#[cfg(any(feature = "mcap", feature = "described-tables"))]
+#[cfg(any(feature = "mcap", feature = "parquet"))]
 mod run_json;
 mod shape;
 mod table;
 mod threads;
 mod trace;
 mod trace_blocks;
-#[cfg(feature = "described-tables")]
+#[cfg(feature = "parquet")]
 mod whole_file;
 mod written_behind;
 
@@ -83,8 +83,6 @@ pub use csv_file::CsvRecorder;
 pub use data_table::{DataColumn, DataTable, DataValues};
 pub use error::LogError;
 pub use file_recorder::{FileRecorder, OpenFile};
-#[cfg(feature = "arrow")]
-pub use flat::arrow_stream;
 pub use flat::flat_columns;
 pub use flexarm_sample::*;
 pub use formats::*;
@@ -120,7 +118,7 @@ pub mod internals {
     pub use crate::mcap_file::output::WholeRecords;
     #[cfg(feature = "mcap")]
     pub use crate::poses::{PoseClock, PoseReasons};
-    #[cfg(any(feature = "mcap", feature = "described-tables"))]
+    #[cfg(any(feature = "mcap", feature = "parquet"))]
     pub use crate::read::wall::{CAUGHT, caught};
     pub use crate::written_behind::{CACHED, REACH, WrittenBehind};
 }

@@ -4,8 +4,6 @@
 
 use flexarm_testkit::allocations::CountingAllocator;
 
-#[cfg(feature = "arrow")]
-mod arrow;
 #[cfg(feature = "mcap")]
 mod bent;
 mod csv;

@@ -530,6 +530,6 @@ fn a_rerun_file_is_not_read_back() {
     let path = scratch("viewed", RecordingFormat::Rrd);
     std::fs::write(&path, b"RRF2").unwrap();
     let error = open_recording(&path, RecordingFormat::Rrd).map(|_| ()).unwrap_err().to_string();
-    assert!(error.contains("MCAP, Parquet, Arrow or CSV") && error.contains("run.mcap"), "{error}");
+    assert!(error.contains("MCAP, Parquet or CSV") && error.contains("run.mcap"), "{error}");
     remove(&[&path]);
 }

@@ -500,8 +500,6 @@ class _RunFiles(TypedDict):
 class RunFiles(_RunFiles, total=False):
     """Written files; null where none was written."""
 
-    arrow: str
-    """Recording (arrow), if it was written."""
     study: str | None
     """Rerun recording of all runs of a study."""
     stress: str | None

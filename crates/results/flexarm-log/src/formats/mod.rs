@@ -7,20 +7,16 @@
 //! | format | contents read back |
 //! | --- | --- |
 //! | MCAP | everything; numbers exactly, poses of links to 1e-13 (stored as quaternions from link to link) |
-//! | Parquet, Arrow | the numbers of the columns exactly; names, set-up, result and events; no poses of links, no velocities |
+//! | Parquet | the numbers of the columns exactly; names, set-up, result and events; no poses of links, no velocities |
 //! | CSV | the numbers of the columns exactly (times to 1 ns once converted through MCAP); no poses, velocities, result, nor names of robot and trajectory |
 //! | .rrd | nothing; for viewing only |
 
-#[cfg(feature = "arrow")]
-mod arrow_file;
 mod open;
 mod rrd;
 
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-#[cfg(feature = "arrow")]
-pub use self::arrow_file::ArrowRecorder;
 pub use self::open::open_recording;
 pub use self::rrd::{RrdWriter, StudyRecorder, install_rrd_writer, study_recorder};
 use crate::{CreateOptions, LogError, Recorder, RunHeader, RunSource, table};
@@ -36,8 +32,6 @@ pub enum RecordingFormat {
     Csv,
     /// Apache Parquet.
     Parquet,
-    /// Apache Arrow IPC, also called Feather, version 2.
-    Arrow,
 }
 
 /// Recorder and reader of a format; `None` if this build lacks its feature.
@@ -63,7 +57,6 @@ const FORMATS: &[FormatInfo] = &[
         format: RecordingFormat::Mcap,
         name: "MCAP",
         extension: "mcap",
-        other_extensions: &[],
         file_name: "run.mcap",
         magic: b"\x89MCAP",
         holds: Holds::Everything,
@@ -78,7 +71,6 @@ const FORMATS: &[FormatInfo] = &[
         format: RecordingFormat::Rrd,
         name: "Rerun",
         extension: "rrd",
-        other_extensions: &[],
         file_name: "run.rrd",
         magic: b"RRF",
         holds: Holds::Pictures,
@@ -93,7 +85,6 @@ const FORMATS: &[FormatInfo] = &[
         format: RecordingFormat::Csv,
         name: "CSV",
         extension: "csv",
-        other_extensions: &[],
         file_name: "run.csv",
         magic: b"",
         holds: Holds::Table,
@@ -108,7 +99,6 @@ const FORMATS: &[FormatInfo] = &[
         format: RecordingFormat::Parquet,
         name: "Parquet",
         extension: "parquet",
-        other_extensions: &[],
         file_name: "run.parquet",
         magic: b"PAR1",
         holds: Holds::DescribedTable,
@@ -118,21 +108,6 @@ const FORMATS: &[FormatInfo] = &[
         most_samples: Some(16_384 * i16::MAX as u64), // row groups are counted in 16 bits
         latest_s: None,
         code: code!("parquet", crate::ParquetRecorder, crate::read::ParquetRun),
-    },
-    FormatInfo {
-        format: RecordingFormat::Arrow,
-        name: "Arrow",
-        extension: "arrow",
-        other_extensions: &["feather"],
-        file_name: "run.arrow",
-        magic: b"ARROW1",
-        holds: Holds::DescribedTable,
-        by_default: false,
-        feature: Some("arrow"),
-        survives_a_kill: false,
-        most_samples: None,
-        latest_s: None,
-        code: code!("arrow", arrow_file::ArrowRecorder, arrow_file::ArrowRun),
     },
 ];
 
@@ -147,8 +122,6 @@ pub struct FormatInfo {
     /// File name extension, without the dot; also the word on command lines and the key in
     /// summaries.
     pub extension: &'static str,
-    /// Other accepted extensions.
-    pub other_extensions: &'static [&'static str],
     /// File name in the folder of a run.
     pub file_name: &'static str,
     /// First bytes of every file; empty for text.
@@ -234,8 +207,7 @@ impl RecordingFormat {
     #[must_use]
     pub fn from_word(word: &str) -> Option<Self> {
         let word = word.to_ascii_lowercase();
-        let has = |info: &&FormatInfo| info.extension == word || info.other_extensions.contains(&word.as_str());
-        FORMATS.iter().find(has).map(|info| info.format)
+        FORMATS.iter().find(|info| info.extension == word).map(|info| info.format)
     }
 
     /// Returns the formats that are read back, in the order of decreasing contents.

@@ -20,7 +20,7 @@ pub fn open_recording(path: &Path, format: RecordingFormat) -> Result<Box<dyn Ru
         None if !format.is_read_back() => Err(LogError::NotARecording {
             path: path.to_owned(),
             found: format!("a file in the format {format}, which is for viewing"),
-            expected: "a recording in a format that is read back: MCAP, Parquet, Arrow or CSV".into(),
+            expected: "a recording in a format that is read back: MCAP, Parquet or CSV".into(),
             mend: "give run.mcap of the same run".into(),
         }),
         None => Err(LogError::NotARecording {

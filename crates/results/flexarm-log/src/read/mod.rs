@@ -11,7 +11,7 @@ mod csv_table;
 mod mcap_run;
 #[cfg(feature = "parquet")]
 pub(crate) mod parquet_table;
-#[cfg(any(feature = "mcap", feature = "described-tables"))]
+#[cfg(any(feature = "mcap", feature = "parquet"))]
 pub(crate) mod wall;
 
 use std::path::{Path, PathBuf};

@@ -1,7 +1,7 @@
 //! Reader of the Parquet file of a run, row group by row group.
 
 use std::fs::File;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use flexarm_files::most_unpacked;
 use parquet::basic::{Repetition, Type as PhysicalType};
@@ -14,11 +14,15 @@ use parquet::file::reader::{FileReader, SerializedFileReader};
 
 use super::not_a_recording;
 use super::wall::caught;
-use crate::LogError;
-use crate::described_table::{Blocks, DescribedTable, TableRun};
+use crate::described_table::DescribedTable;
+use crate::{LogError, RunHeader, RunResult, RunSource, Sample, table};
 
 /// A run read from a Parquet file.
-pub(crate) type ParquetRun = TableRun<RowGroups>;
+pub(crate) struct ParquetRun {
+    path: PathBuf,
+    table: DescribedTable,
+    groups: RowGroups,
+}
 
 impl ParquetRun {
     pub(crate) fn open(path: &Path) -> Result<Self, LogError> {
@@ -31,14 +35,50 @@ impl ParquetRun {
         let pairs = groups.0.metadata().file_metadata().key_value_metadata();
         let texts: Vec<(String, String)> =
             pairs.into_iter().flatten().filter_map(|pair| Some((pair.key.clone(), pair.value.clone()?))).collect();
-        let table = DescribedTable::of(path, &names, &texts)?;
+        let mut table = DescribedTable::of(path, &names, &texts)?;
         groups.check_columns(path, &table.layout.places)?;
-        Self::new(path, table, groups)
+        if !table.described && groups.0.num_row_groups() > 0 {
+            let mut times = Vec::new();
+            groups.numbers(path, 0, table.layout.places[0], &mut times)?;
+            if let [first, second, ..] = times[..] {
+                table.layout.header.log_rate_hz = table::rate_hz(first, second);
+            }
+        }
+        Ok(Self { path: path.to_owned(), table, groups })
+    }
+}
+
+impl RunSource for ParquetRun {
+    fn header(&self) -> &RunHeader {
+        &self.table.layout.header
+    }
+
+    fn missing(&self) -> Vec<String> {
+        let undescribed = "the file does not say which robot and trajectory it is of: another program wrote it";
+        if self.table.described { Vec::new() } else { vec![undescribed.into()] }
+    }
+
+    fn replay(&mut self, take: &mut dyn FnMut(&Sample) -> Result<(), LogError>) -> Result<RunResult, LogError> {
+        let layout = &self.table.layout;
+        let mut columns = vec![Vec::new(); layout.places.len()];
+        let (mut sample, mut row) = (Sample::default(), Vec::new());
+        for group in 0..self.groups.0.num_row_groups() {
+            for (&place, column) in layout.places.iter().zip(&mut columns) {
+                self.groups.numbers(&self.path, group, place, column)?;
+            }
+            for k in 0..columns[0].len() {
+                row.clear();
+                row.extend(columns.iter().map(|column| column[k]));
+                layout.sample(&row, &mut sample);
+                take(&sample)?;
+            }
+        }
+        Ok(self.table.result.clone())
     }
 }
 
 /// Row groups of a file.
-pub(crate) struct RowGroups(SerializedFileReader<File>);
+struct RowGroups(SerializedFileReader<File>);
 
 impl RowGroups {
     /// Checks that the columns of the run are plain numbers.
@@ -67,17 +107,6 @@ impl RowGroups {
             return Err(not_a_recording(path, found, "as many numbers as rows"));
         }
         Ok(())
-    }
-}
-
-impl Blocks for RowGroups {
-    fn count(&self) -> usize {
-        self.0.num_row_groups()
-    }
-
-    fn read(&self, path: &Path, block: usize, places: &[usize], columns: &mut [Vec<f64>]) -> Result<(), LogError> {
-        let mut both = places.iter().zip(columns);
-        both.try_for_each(|(&place, column)| self.numbers(path, block, place, column))
     }
 }
 
