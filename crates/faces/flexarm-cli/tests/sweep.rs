@@ -1,4 +1,4 @@
-//! `flexarm sweep`: studies, interruptions, plans for engines, minimisation of a metric.
+//! `flexarm sweep`: studies, interruptions, plans for engines.
 
 use std::time::{Duration, Instant};
 
@@ -278,7 +278,6 @@ fn shards_are_planned_run_and_joined_by_a_shell() {
     assert_eq!(place.text("plan/shards.txt").lines().count(), 3);
     for (engine, file, part) in [
         ("slurm", "shards.sbatch", "#SBATCH --array=1-3"),
-        ("kubernetes", "shards.yaml", "completionMode: Indexed"),
         ("hyperqueue", "submit.py", "SHARDS, CORES"),
     ] {
         place.json(&["sweep", "plan", "study.toml", "-n", "3", "--engine", engine, "-o", engine]);
@@ -316,39 +315,6 @@ fn shards_are_planned_run_and_joined_by_a_shell() {
         &["sweep", "study.toml", "-o", "whole"],
         &["another study", "the number of runs (200 and 208)", "--force"],
     );
-}
-
-/// Truth: the minimum-width beam has exactly the required first frequency.
-#[test]
-fn the_least_width_of_a_beam_has_the_frequency_that_must_hold() {
-    let place = place();
-    let search =
-        common::with(STUDY, "distribution = \"uniform\"\nlow = 0.015\nhigh = 0.025", "from = 0.01\nto = 0.038");
-    let search = common::with(&search, "from = 0.5\nto = 1.0\ncount = 8", "from = 0.99\nto = 1.0");
-    let search = common::with(&search, "\n[sample]\ncount = 25\n", "");
-    let search = common::with(&search, "\"f1_hz", "\"width = link.bar.beam.width\", \"f1_hz");
-    place.write("study.toml", search);
-    let words = [
-        "sweep",
-        "study.toml",
-        "--minimise",
-        "width",
-        "--constraint",
-        "f1_hz >= 20",
-        "--most-runs",
-        "240",
-        "-o",
-        "least",
-    ];
-    let found = place.json(&words);
-    assert_eq!((found["minimise"]["kept"].as_bool(), found["best"]["metric"].as_str()), (Some(true), Some("width")));
-    let f1 = found["best"]["metrics"]["f1_hz"].as_f64().unwrap();
-    assert!((20.0..20.02).contains(&f1), "{f1}"); // measured 20.002
-    // Again: nothing is run again, and the answer is the same.
-    let again = place.json(&words);
-    assert_eq!(again["best"], found["best"]);
-    place.refused(&["sweep", "study.toml", "--minimise", "-o", "x"], &["[minimise]"]);
-    place.refused(&["sweep", "study.toml", "--minimise", "weight", "-o", "x"], &["\"weight\" is not a metric"]);
 }
 
 #[test]

@@ -21,7 +21,6 @@ pub(super) struct Column {
     pub(super) paths: Vec<String>,
     pub(super) role: Role,
     pub(super) values: Values,
-    pub(super) bounds: Option<(f64, f64)>,
     pub(super) place: RobotFileError,
     /// Group of linked parameters.
     linked: Option<String>,
@@ -48,8 +47,8 @@ const MAX_RUNS: u64 = 5_000_000;
 impl Column {
     /// Returns a column of a parameter entry.
     pub(super) fn of(entry: &ParameterEntry, name: String, paths: Vec<String>) -> Self {
-        let ParameterEntry { role, values, bounds, place, linked, .. } = entry.clone();
-        Self { name, paths, role, values, bounds, place, linked }
+        let ParameterEntry { role, values, place, linked, .. } = entry.clone();
+        Self { name, paths, role, values, place, linked }
     }
 
     /// Whether the column belongs to a linked group.

@@ -108,12 +108,6 @@ pub enum SweepError {
         /// Folder of the results.
         folder: PathBuf,
     },
-    /// A minimisation is not possible.
-    #[error("{what}")]
-    Minimise {
-        /// Reason.
-        what: String,
-    },
 }
 
 impl From<SweepError> for flexarm_run::Error {

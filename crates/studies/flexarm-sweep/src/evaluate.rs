@@ -33,12 +33,6 @@ pub struct Answer {
     pub stored: CaveatText,
 }
 
-/// Values of the metrics, and relative violation of each constraint.
-pub(super) type MetricValues = (Vec<f64>, Vec<f64>);
-
-/// Callback with the index of the point, the result of its run, and the caveats.
-pub(super) type OnResult<'a> = dyn FnMut(usize, Result<MetricValues, Error>, CaveatText) + 'a;
-
 /// Numbers of a run without a full summary.
 #[derive(Clone, Debug, Default)]
 struct QuickFacts {
@@ -96,43 +90,22 @@ impl QuickFacts {
 impl Sweep {
     /// Computes some runs, one group after the other; calls `on_result` with each result.
     pub(super) fn evaluate(&self, runs: &[usize], stop: &AtomicBool, on_result: &mut dyn FnMut(Answer)) {
-        let points: Vec<(usize, Vec<ParameterValue>)> =
-            runs.iter().map(|run| (*run, self.design.values(*run))).collect();
-        self.evaluate_points(&points, stop, &mut |place, result, stored| {
-            let result = result.map(|(metrics, _)| metrics).map_err(|error| self.workshop.reason(&error));
-            on_result(Answer { run: points[place].0, result, stored });
-        });
-    }
-
-    /// Computes runs with given parameter values; calls `on_result` with their metrics and their
-    /// violation of each constraint of the study.
-    pub(super) fn evaluate_points(
-        &self,
-        points: &[(usize, Vec<ParameterValue>)],
-        stop: &AtomicBool,
-        on_result: &mut OnResult<'_>,
-    ) {
-        for (place, (_, values)) in points.iter().enumerate() {
+        for &run in runs {
             if stop.load(Ordering::Relaxed) {
                 return;
             }
-            let mut caveats = Vec::new();
+            let (values, mut caveats) = (self.design.values(run), Vec::new());
             let result = if self.quick {
-                self.quickly(values, &mut caveats).map(|facts| self.metric_values(values, &facts))
+                self.quickly(&values, &mut caveats).map(|facts| metric::values(&self.metrics, &values, &facts))
             } else {
-                self.whole(values, stop, &mut caveats).map(|facts| self.metric_values(values, &facts))
+                self.whole(&values, stop, &mut caveats).map(|facts| metric::values(&self.metrics, &values, &facts))
             };
             if matches!(result, Err(Error::Interrupted { .. })) {
                 return;
             }
-            on_result(place, result, stored_caveats(caveats, &|text| self.workshop.plain(text)));
+            let result = result.map_err(|error| self.workshop.reason(&error));
+            on_result(Answer { run, result, stored: stored_caveats(caveats, &|text| self.workshop.plain(text)) });
         }
-    }
-
-    fn metric_values(&self, point: &[ParameterValue], facts: &dyn Facts) -> MetricValues {
-        let values = metric::values(&self.metrics, point, facts);
-        let passed = self.constraints.iter().map(|c| c.violation(point, &values, facts)).collect();
-        (values, passed)
     }
 
     /// Computes a run with its full summary. `caveats` receives its caveats, also if it fails.

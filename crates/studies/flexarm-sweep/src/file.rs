@@ -38,7 +38,6 @@ struct StudyToml {
     better: BTreeMap<String, Spanned<String>>,
     best: Option<Spanned<String>>,
     pareto: Option<Spanned<[String; 2]>>,
-    minimise: Option<Spanned<MinimiseToml>>,
 }
 
 /// Varied parameter.
@@ -79,17 +78,6 @@ struct SampleToml {
     seed: u64,
 }
 
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct MinimiseToml {
-    metric: Spanned<String>,
-    #[serde(default)]
-    constraints: Vec<Spanned<String>>,
-    runs: Option<Spanned<i64>>,
-    #[serde(default)]
-    seed: u64,
-}
-
 /// Effect of a parameter's value on the value in the file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -126,8 +114,6 @@ pub(super) struct ParameterEntry {
     /// Group of parameters that vary together.
     pub(super) linked: Option<String>,
     pub(super) values: Values,
-    /// Minimum and maximum in a search.
-    pub(super) bounds: Option<(f64, f64)>,
     pub(super) place: RobotFileError,
 }
 
@@ -136,15 +122,6 @@ pub(super) struct ParameterEntry {
 pub(super) struct Placed {
     pub(super) text: String,
     pub(super) place: RobotFileError,
-}
-
-/// Options of a minimisation.
-#[derive(Clone, Debug)]
-pub(super) struct MinimiseEntry {
-    pub(super) metric: Placed,
-    pub(super) constraints: Vec<Placed>,
-    pub(super) runs: Option<usize>,
-    pub(super) seed: u64,
 }
 
 /// Contents of the file after checks.
@@ -169,7 +146,6 @@ pub(super) struct StudyFile {
     pub(super) better: Vec<(String, Better, RobotFileError)>,
     pub(super) best: Option<Placed>,
     pub(super) pareto: Option<([String; 2], RobotFileError)>,
-    pub(super) minimise: Option<MinimiseEntry>,
 }
 
 /// Name of the group that links the columns of a table of runs.
@@ -217,7 +193,6 @@ pub(super) fn read(path: &Path) -> Result<StudyFile, Error> {
         better: file.better.iter().map(|(name, word)| better(name, word, &source)).collect::<Result<_, _>>()?,
         best: file.best.as_ref().map(placed),
         pareto: file.pareto.as_ref().map(|pair| (pair.get_ref().clone(), source.error(pair.span(), ""))),
-        minimise: file.minimise.as_ref().map(|entry| minimise(entry, &source)).transpose()?,
         text,
     })
 }
@@ -293,17 +268,6 @@ fn count(value: &Spanned<i64>, what: &str, least: i64, source: &Source) -> Resul
     }
 }
 
-fn minimise(entry: &Spanned<MinimiseToml>, source: &Source) -> Result<MinimiseEntry, RobotFileError> {
-    let own = entry.get_ref();
-    let placed = |text: &Spanned<String>| Placed { text: text.get_ref().clone(), place: source.error(text.span(), "") };
-    Ok(MinimiseEntry {
-        metric: placed(&own.metric),
-        constraints: own.constraints.iter().map(placed).collect(),
-        runs: own.runs.as_ref().map(|runs| count(runs, "runs", 1, source)).transpose()?,
-        seed: own.seed,
-    })
-}
-
 /// Keys of a robot file that only name things.
 const LABELS: [&str; 3] = ["name", "format", "urdf"];
 
@@ -328,7 +292,7 @@ fn parameter(entry: &Spanned<ParameterToml>, source: &Source) -> Result<Paramete
             return Err(fail(format!("as = {other:?} is not known; use \"value\", \"factor\" or \"offset\"")));
         }
     };
-    let (values, bounds) = values(own, source, &fail)?;
+    let values = values(own, source, &fail)?;
     let Placed { place, .. } = Placed { text: String::new(), place: source.error(entry.span(), "") };
     if own.each && own.name.is_some() {
         return Err(fail("each = true creates several parameters, named by their paths: remove name".into()));
@@ -340,20 +304,20 @@ fn parameter(entry: &Spanned<ParameterToml>, source: &Source) -> Result<Paramete
     }
     let (each, linked) = (own.each, own.linked.clone());
     let name = own.name.as_ref().map(|name| name.get_ref().clone());
-    Ok(ParameterEntry { name, paths, role, each, linked, values, bounds, place })
+    Ok(ParameterEntry { name, paths, role, each, linked, values, place })
 }
 
-/// Returns the values of a parameter, and its bounds.
+/// Returns the values of a parameter.
 fn values(
     own: &ParameterToml,
     source: &Source,
     fail: &dyn Fn(String) -> RobotFileError,
-) -> Result<(Values, Option<(f64, f64)>), RobotFileError> {
+) -> Result<Values, RobotFileError> {
     const ONE: &str = "give exactly one of values = [...], from and to, distribution = \"...\" or expression = \"...\"";
     let has_range = own.from.is_some() || own.to.is_some() || own.count.is_some();
     if let Some(expression) = &own.expression {
         return match own.values.is_none() && !has_range && own.distribution.is_none() {
-            true => Ok((Values::Derived(expression.clone()), None)),
+            true => Ok(Values::Derived(expression.clone())),
             false => Err(fail(ONE.into())),
         };
     }
@@ -369,28 +333,25 @@ fn values(
                 );
             }
             match word.as_ref().map(|word| word.get_ref().as_str()) {
-                None => Ok((Values::Levels(known), None)),
-                Some("choice") => Ok((Values::Choice(known), None)),
+                None => Ok(Values::Levels(known)),
+                Some("choice") => Ok(Values::Choice(known)),
                 Some(other) => {
                     Err(fail(format!("distribution = {other:?} does not allow values; only \"choice\" does")))
                 }
             }
         }
         (None, true, None) => range(own, source, fail),
-        (None, false, Some(word)) => {
-            let distribution = distribution(own, word.get_ref(), fail)?;
-            Ok((Values::Spread(distribution), distribution.bounds()))
-        }
+        (None, false, Some(word)) => distribution(own, word.get_ref(), fail).map(Values::Spread),
         _ => Err(fail(ONE.into())),
     }
 }
 
-/// Returns equally or logarithmically spaced values of a range, and its bounds.
+/// Returns equally or logarithmically spaced values of a range.
 fn range(
     own: &ParameterToml,
     source: &Source,
     fail: &dyn Fn(String) -> RobotFileError,
-) -> Result<(Values, Option<(f64, f64)>), RobotFileError> {
+) -> Result<Values, RobotFileError> {
     let (Some(from), Some(to)) = (own.from, own.to) else {
         return Err(fail("a range needs from = ... and to = ...".into()));
     };
@@ -415,8 +376,7 @@ fn range(
             (false, false) => from + (to - from) * part,
         }
     };
-    let levels = (0..steps).map(|k| ParameterValue::Number(at(k))).collect();
-    Ok((Values::Levels(levels), Some((from.min(to), from.max(to)))))
+    Ok(Values::Levels((0..steps).map(|k| ParameterValue::Number(at(k))).collect()))
 }
 
 fn keys_of_distribution(
@@ -512,7 +472,6 @@ fn table_of_runs(path: &Path, place: &RobotFileError) -> Result<Vec<ParameterEnt
             each: false,
             linked: Some(TABLE.into()),
             values: Values::Levels(levels),
-            bounds: None,
             place: place.clone(),
         })
     };

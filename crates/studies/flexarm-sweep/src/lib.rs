@@ -3,8 +3,7 @@
 //!
 //! `docs/sweep.md` describes the file of a study. [`Sweep::load`] reads and checks it,
 //! [`Sweep::run`] computes the missing runs in a folder or in a shard of it, [`merge`] joins
-//! folders of shards, and [`Sweep::minimise`] minimises a metric. Runs are numbered from 0; the
-//! number alone determines a run, on any machine.
+//! folders of shards. Runs are numbered from 0; the number alone determines a run, on any machine.
 //!
 //! Not here: the mathematics of designs and their evaluation ([`statistics`]); comparison of a few
 //! runs by their curves ([`flexarm_run::compare_study`]).
@@ -17,7 +16,6 @@ mod error;
 mod evaluate;
 mod file;
 mod metric;
-mod minimise;
 mod options;
 mod page;
 mod path;
@@ -46,7 +44,7 @@ use flexarm_run::Stopwatch;
 use self::design::{Column, Design};
 use self::evaluate::Answer;
 use self::file::StudyFile;
-use self::metric::{Constraint, Metric, MetricError, Vocabulary};
+use self::metric::{Metric, MetricError, Vocabulary};
 use self::store::{Collected, Manifest, RUNS, Store, known_manifest};
 use self::workshop::Workshop;
 use flexarm_run::Arm;
@@ -64,7 +62,6 @@ pub use self::changes::{Change, load_changed};
 pub use self::direction::Better;
 pub use self::error::SweepError;
 pub use self::file::Role as ParameterRole;
-pub use self::minimise::{MinimiseFigures, MinimiseRequest};
 pub use self::replay::Replay;
 pub use self::results::{
     BestRun, FailureFigures, IndexFigures, MetricFigures, ParameterFigures, ParetoFigures, ParetoRun, SweepSummary,
@@ -106,11 +103,8 @@ pub struct Sweep {
     design: Design,
     workshop: Workshop,
     metrics: Vec<Metric>,
-    constraints: Vec<Constraint>,
-    /// Whether all metrics and constraints are available without the full summary of a run.
+    /// Whether all metrics are available without the full summary of a run.
     quick: bool,
-    /// Example of a summary with all names that a run can have.
-    vocabulary: serde_json::Value,
 }
 
 /// Arguments of [`Sweep::run`].
@@ -167,16 +161,10 @@ impl Sweep {
             metric.better = said.map(|(_, better, _)| *better).or(metric.better);
             metrics.push(metric);
         }
-        let known = Vocabulary { parameters: &parameters, metrics: &metrics, summary: &summary };
-        let mut constraints = Vec::new();
-        for text in file.minimise.iter().flat_map(|entry| &entry.constraints) {
-            let fail = |error: MetricError| RobotFileError { message: error.to_string(), ..text.place.clone() };
-            constraints.push(Constraint::parse(&text.text, &known).map_err(fail)?);
-        }
         check_names(&file, &metrics)?;
         table::check()?;
-        let quick = metrics.iter().all(Metric::is_quick) && constraints.iter().all(Constraint::is_quick);
-        Ok(Self { file, design, workshop, metrics, constraints, quick, vocabulary: summary })
+        let quick = metrics.iter().all(Metric::is_quick);
+        Ok(Self { file, design, workshop, metrics, quick })
     }
 
     /// Returns the name of the study, by default the stem of its file name.
@@ -197,11 +185,6 @@ impl Sweep {
     /// Names of the metrics.
     pub fn metrics(&self) -> Vec<&str> {
         self.metrics.iter().map(|metric| metric.name.as_str()).collect()
-    }
-
-    /// Names of the parameters; `None` for those that are not numeric.
-    fn parameter_names(&self) -> Vec<Option<String>> {
-        parameter_names(&self.design)
     }
 
     /// Values of the parameters in a run, in the order of the parameters.
@@ -517,7 +500,7 @@ fn fingerprint(bytes: &[u8]) -> String {
 pub mod internals {
     pub use crate::changes::change_text;
     pub use crate::evaluate::Answer;
-    pub use crate::metric::{Constraint, Facts, Metric, MetricError, Quick, SummaryFacts, Vocabulary};
+    pub use crate::metric::{Facts, Metric, MetricError, Quick, SummaryFacts, Vocabulary};
     pub use crate::page::Axes;
     pub use crate::replay::faster_waypoints;
     pub use crate::run_caveats::{figures, stored_caveats, warnings};

@@ -59,7 +59,7 @@ pub(super) struct Formula {
     variables: Vec<Variable>,
 }
 
-/// Reason why a text is not a metric, formula or constraint.
+/// Reason why a text is not a metric or formula.
 #[derive(Debug, thiserror::Error)]
 #[doc(hidden)]
 pub enum MetricError {
@@ -75,8 +75,6 @@ pub enum MetricError {
     OfTheMachine { word: String },
     #[error("{word:?} {what}; {near}")]
     NoNumber { word: String, what: &'static str, near: String },
-    #[error("constraint {text:?}: expected metric <= number, or metric >= number")]
-    NoConstraint { text: String },
 }
 
 /// Names that a metric may refer to.
@@ -375,48 +373,5 @@ fn leaves(value: &Value, place: &str, found: &mut Vec<String>) {
         }
         Value::Null | Value::Number(_) | Value::Bool(_) => found.push(place.to_owned()),
         Value::String(_) => {}
-    }
-}
-
-/// Constraint on a run: `expression <= expression`, or with `>=`.
-#[derive(Clone, Debug)]
-#[doc(hidden)]
-pub struct Constraint {
-    pub text: String,
-    /// Smaller side.
-    less: Formula,
-    /// Larger side.
-    more: Formula,
-}
-
-impl Constraint {
-    /// Parses a constraint.
-    ///
-    /// # Errors
-    /// As [`Metric::parse`].
-    pub fn parse(text: &str, known: &Vocabulary<'_>) -> Result<Self, MetricError> {
-        let (left, right, turned) = match (text.split_once("<="), text.split_once(">=")) {
-            (Some((left, right)), None) => (left, right, false),
-            (None, Some((left, right))) => (left, right, true),
-            _ => return Err(MetricError::NoConstraint { text: text.to_owned() }),
-        };
-        let (left, right) = (Formula::parse(left.trim(), known)?, Formula::parse(right.trim(), known)?);
-        let (less, more) = if turned { (right, left) } else { (left, right) };
-        Ok(Self { text: text.trim().to_owned(), less, more })
-    }
-
-    /// Whether the constraint is available without the full summary of a run.
-    pub(super) fn is_quick(&self) -> bool {
-        self.less.is_quick() && self.more.is_quick()
-    }
-
-    /// Returns the relative violation: excess over the larger magnitude of both sides; 0 if the
-    /// constraint holds, NaN if a side has no value.
-    pub fn violation(&self, parameters: &[ParameterValue], metrics: &[f64], facts: &dyn Facts) -> f64 {
-        let [less, more] = [&self.less, &self.more].map(|side| side.value(parameters, metrics, facts));
-        if less.is_nan() || more.is_nan() {
-            return f64::NAN;
-        }
-        (less - more).max(0.0) / less.abs().max(more.abs()).max(f64::MIN_POSITIVE)
     }
 }

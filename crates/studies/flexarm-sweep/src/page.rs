@@ -45,7 +45,6 @@ impl Sweep {
             let _ = writeln!(page, "<p class=\"no\">{runs} runs failed, first run {first}: {reason}</p>");
         }
         page += &warnings("", &summary.warnings);
-        page += &search(summary);
         page += &figures(summary);
         page += &self.best_run(summary);
         let rankings = self.rankings(columns);
@@ -328,37 +327,6 @@ fn figures(summary: &SweepSummary) -> String {
         );
     }
     out + "</table>\n"
-}
-
-/// Describes the progress and result of a search.
-fn search(summary: &SweepSummary) -> String {
-    let Some(found) = &summary.minimise else { return String::new() };
-    let kept = if found.start_kept { "satisfies" } else { "violates" };
-    let start = found.start.map_or_else(String::new, |start| {
-        format!(" The run of the unchanged files gives {} and {kept} the constraints.", number(start))
-    });
-    let constraints = match found.constraints.is_empty() {
-        true => String::new(),
-        false => format!(" subject to {}", markup(&found.constraints.join(", "))),
-    };
-    let end = match (found.kept, found.settled) {
-        (false, _) => "no run satisfied the constraints",
-        (true, true) => "the search converged",
-        (true, false) => "the search reached its maximum number of runs: more runs may find a lower value",
-    };
-    let mut out = format!(
-        "<h2>Minimum of {}{constraints}</h2>\n<p>{} generations, {end}.{start}</p>\n",
-        markup(&found.metric),
-        found.generations
-    );
-    let known = found.progress.iter().enumerate().filter_map(|(k, value)| Some(((k + 1) as f64, (*value)?)));
-    let (x, y): (Vec<f64>, Vec<f64>) = known.unzip();
-    let curves = vec![PlotCurve { name: found.metric.clone(), look: CurveLook::Marked, x, y }];
-    let panels = [Panel { label: found.metric.clone(), logarithmic: false, legend: false, curves }];
-    let title = "Minimum so far that satisfies the constraints";
-    let plot = LinePlot { title, x_label: "generation", panels: &panels, ..LinePlot::default() };
-    out += &plot.svg().map(|svg| format!("<div>{svg}</div>\n")).unwrap_or_default();
-    out
 }
 
 fn sensitivities(summary: &SweepSummary) -> String {

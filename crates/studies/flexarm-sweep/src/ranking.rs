@@ -38,21 +38,21 @@ struct Source {
 
 impl Sweep {
     /// Returns the grouping of runs by a parameter.
-    fn grouping(&self, parameter: usize, columns: &Columns) -> Grouping {
+    fn grouping(&self, parameter: usize) -> Grouping {
         let column = &self.design.columns[parameter];
         let is_listed = matches!(column.values, Values::Levels(_)) && !column.is_linked_by(TABLE);
-        if is_listed && columns.of_design { Grouping::Levels } else { Grouping::Bins }
+        if is_listed { Grouping::Levels } else { Grouping::Bins }
     }
 
     /// Returns the main effect of a numeric parameter on a metric.
     pub(super) fn effect(&self, parameter: usize, metric: usize, columns: &Columns) -> Option<MainEffect> {
         let x = columns.parameters[parameter].as_ref()?;
-        main_effect(x, &columns.metrics[metric], self.grouping(parameter, columns))
+        main_effect(x, &columns.metrics[metric], self.grouping(parameter))
     }
 
     /// Ranks the parameters by their effect on a metric.
     pub(super) fn ranking(&self, columns: &Columns, metric: usize) -> Ranking {
-        let sources = if columns.of_design { self.sources() } else { Vec::new() };
+        let sources = self.sources();
         let mut ranking = Ranking::default();
         let mut named = Vec::new();
         for source in &sources {

@@ -9,7 +9,6 @@ use super::Sweep;
 use super::direction::Better;
 use super::evaluate::Answer;
 use super::file::Role;
-use super::minimise::MinimiseFigures;
 use super::replay::Replay;
 use super::run_caveats::{self, CaveatFigures};
 use super::store::Collected;
@@ -46,8 +45,6 @@ pub struct SweepSummary {
     pub best: Option<BestRun>,
     /// Pareto-optimal runs of two metrics; null with one metric.
     pub pareto: Option<ParetoFigures>,
-    /// Figures of the search, if this is one.
-    pub minimise: Option<MinimiseFigures>,
     /// Sentences of the caveats that are warnings, each once, with the number of affected runs.
     pub warnings: Vec<String>,
     /// Caveats as from `check` and `compare`, each once with its worst value, warnings first.
@@ -171,8 +168,6 @@ pub struct FailureFigures {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Columns {
     pub(super) runs: Vec<usize>,
-    /// Whether the runs are those of the design, not of a search.
-    pub(super) of_design: bool,
     /// Values of the parameters; `None` if not numeric.
     pub(super) parameters: Vec<Option<Vec<f64>>>,
     pub(super) metrics: Vec<Vec<f64>>,
@@ -183,7 +178,7 @@ const MAX_REASONS: usize = 10;
 
 impl Sweep {
     /// Converts results to columns.
-    fn columns(&self, answers: &[(&Answer, Vec<ParameterValue>)], of_design: bool) -> Columns {
+    fn columns(&self, answers: &[(&Answer, Vec<ParameterValue>)]) -> Columns {
         let number = |value: &ParameterValue| value.number().unwrap_or(f64::NAN);
         let parameter = |k: usize| {
             let numeric = self.design.columns[k].is_numeric();
@@ -196,7 +191,6 @@ impl Sweep {
         };
         Columns {
             runs: answers.iter().map(|(answer, _)| answer.run).collect(),
-            of_design,
             parameters: (0..self.design.columns.len()).map(parameter).collect(),
             metrics: (0..self.metrics.len()).map(metric).collect(),
         }
@@ -206,18 +200,7 @@ impl Sweep {
     pub(super) fn summary(&self, collected: &Collected) -> (SweepSummary, Columns) {
         let answers: Vec<(&Answer, Vec<ParameterValue>)> =
             collected.answers.values().map(|(answer, _)| (answer, self.design.values(answer.run))).collect();
-        let (summary, columns) = self.summary_of(&answers, true);
-        (SweepSummary { doubles: collected.doubles, ..summary }, columns)
-    }
-
-    /// Returns the figures of runs with given parameter values; `of_design`: whether the runs are
-    /// those of the design.
-    pub(super) fn summary_of(
-        &self,
-        answers: &[(&Answer, Vec<ParameterValue>)],
-        of_design: bool,
-    ) -> (SweepSummary, Columns) {
-        let columns = self.columns(answers, of_design);
+        let columns = self.columns(&answers);
         let failed = answers.iter().filter(|(answer, _)| answer.result.is_err()).count();
         let caveats = run_caveats::figures(answers.iter().map(|(answer, _)| *answer));
         let summary = SweepSummary {
@@ -227,11 +210,12 @@ impl Sweep {
             failed,
             parameters: self.parameter_figures(&columns),
             metrics: self.metric_figures(&columns),
-            failures: failures(answers),
+            failures: failures(&answers),
             warnings: run_caveats::warnings(&caveats, answers.len()),
             caveats,
-            best: self.best(answers, &columns),
+            best: self.best(&answers, &columns),
             pareto: self.pareto(&columns),
+            doubles: collected.doubles,
             ..SweepSummary::default()
         };
         (summary, columns)
@@ -250,23 +234,13 @@ impl Sweep {
         let finite = values.iter().enumerate().filter(|(_, value)| value.is_finite());
         let finite = finite.map(|(row, value)| (row, better.as_cost(*value)));
         let (row, _) = finite.min_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)))?;
-        Some(self.best_of(answers[row].0, &answers[row].1, goal, better))
-    }
-
-    /// Returns the preferred direction of a metric, by default lower.
-    pub(super) fn better(&self, metric: usize) -> Better {
-        self.metrics[metric].better.unwrap_or(Better::Lower)
-    }
-
-    /// Describes a run as the best one.
-    pub(super) fn best_of(&self, answer: &Answer, values: &[ParameterValue], goal: usize, better: Better) -> BestRun {
-        let empty = Vec::new();
-        let results = answer.result.as_ref().unwrap_or(&empty);
-        let parameters = self.design.columns.iter().zip(values);
+        let (answer, parameters) = &answers[row];
+        let results = answer.result.as_deref().unwrap_or_default();
+        let parameters = self.design.columns.iter().zip(parameters);
         let metric = |(k, metric): (usize, &super::metric::Metric)| {
             (metric.name.clone(), results.get(k).copied().filter(|x| x.is_finite()))
         };
-        BestRun {
+        Some(BestRun {
             run: answer.run,
             metric: self.metrics[goal].name.clone(),
             better,
@@ -275,7 +249,12 @@ impl Sweep {
             metrics: self.metrics.iter().enumerate().map(metric).collect(),
             files: None,
             command: None,
-        }
+        })
+    }
+
+    /// Returns the preferred direction of a metric, by default lower.
+    pub(super) fn better(&self, metric: usize) -> Better {
+        self.metrics[metric].better.unwrap_or(Better::Lower)
     }
 
     fn pareto(&self, columns: &Columns) -> Option<ParetoFigures> {
@@ -298,7 +277,7 @@ impl Sweep {
     /// each grid point.
     fn indices(&self, values: &[f64], columns: &Columns) -> Vec<IndexFigures> {
         let drawn = self.design.drawn();
-        if self.file.method != SampleMethod::Saltelli || drawn.is_empty() || !columns.of_design {
+        if self.file.method != SampleMethod::Saltelli || drawn.is_empty() {
             return Vec::new();
         }
         // Missing and failed runs are NaN.

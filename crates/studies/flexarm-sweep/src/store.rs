@@ -462,16 +462,6 @@ impl Sweep {
     /// Returns the table of some runs, in the given order.
     pub(super) fn table(&self, answers: &[Answer], manifest: &Manifest) -> DataTable {
         let values: Vec<Vec<ParameterValue>> = answers.iter().map(|answer| self.design.values(answer.run)).collect();
-        self.table_of(answers, &values, manifest)
-    }
-
-    /// Returns the table of runs with the given parameter values.
-    pub(super) fn table_of(
-        &self,
-        answers: &[Answer],
-        values: &[Vec<ParameterValue>],
-        manifest: &Manifest,
-    ) -> DataTable {
         let mut columns = vec![
             DataColumn::new("run", DataValues::Whole(answers.iter().map(|answer| answer.run as i64).collect())),
             DataColumn::new(

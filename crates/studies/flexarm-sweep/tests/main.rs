@@ -14,5 +14,4 @@ mod random;
 mod replay;
 mod run_caveats;
 mod sample;
-mod search;
 mod sobol;

@@ -1,6 +1,6 @@
-//! Metrics and constraints of runs.
+//! Metrics of runs.
 
-use flexarm_sweep::internals::{Constraint, Metric, MetricError, SummaryFacts, Vocabulary};
+use flexarm_sweep::internals::{Metric, MetricError, SummaryFacts, Vocabulary};
 use flexarm_sweep::{Better, ParameterValue};
 use serde_json::{Value, json};
 
@@ -60,17 +60,4 @@ fn what_no_run_has_is_told_with_what_is_near() {
     assert!(value("wall_s").unwrap_err().to_string().contains("depends on the machine"));
     assert!(value("tcp.peak_m +* 2").is_err() && value("= 2").is_err() && value("").is_err());
     assert!(value("payload.mass = tcp.peak_m").unwrap_err().to_string().contains("taken"));
-}
-
-#[test]
-fn constraints_say_by_how_much_they_are_passed() {
-    let summary = summary();
-    let known = Vocabulary { parameters: &[], metrics: &[], summary: &summary };
-    let facts = SummaryFacts { summary: summary.clone(), mass_kg: 100.0 };
-    let violation = |text: &str| Constraint::parse(text, &known).unwrap().violation(&[], &[], &facts);
-    assert_eq!(violation("tcp.peak_m <= 3e-3"), 0.0);
-    assert_eq!(violation("tcp.peak_m <= 1e-3"), 0.5);
-    assert_eq!(violation("frequencies_hz.0 >= 19"), 0.5);
-    assert!(violation("tcp.settling_s <= 1").is_nan());
-    assert!(Constraint::parse("tcp.peak_m < 1", &known).is_err());
 }

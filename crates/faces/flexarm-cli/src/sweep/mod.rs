@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use clap::{Args, Subcommand};
 use flexarm::settings::written::visible;
 use flexarm::sweep::{
-    BestRun, Finders, MetricFigures, MinimiseFigures, MinimiseRequest, ParameterFigures, ParameterRole, ParameterValue,
+    BestRun, Finders, MetricFigures, ParameterFigures, ParameterRole, ParameterValue,
     Replay, Shard, Sweep, SweepError, SweepRequest, SweepSummary, merge,
 };
 
@@ -24,8 +24,6 @@ use crate::{shipped, signals};
 
 const EXAMPLES: &str = "\
 Examples:
-  The least mass with the peak error kept, as the study's [minimise] says it:
-      flexarm sweep sections.toml --minimise
   All runs of a study on all cores; after a stop the same command continues:
       flexarm sweep payload_speed.toml
   A quarter of them here, the others elsewhere, and all of them joined:
@@ -55,16 +53,6 @@ pub(crate) struct SweepRunArgs {
     /// Number of concurrent runs [default: one per core]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub(crate) threads: Option<u16>,
-    /// Search the minimum of this metric within the bounds of the parameters; without a name, that
-    /// of the study's [minimise]
-    #[arg(long, value_name = "METRIC", num_args = 0..=1, default_missing_value = "", conflicts_with = "shard")]
-    pub(crate) minimise: Option<String>,
-    /// Constraint on the minimum, such as 'peak_mm <= 6' (may be repeated)
-    #[arg(long, value_name = "CONDITION", requires = "minimise")]
-    pub(crate) constraint: Vec<String>,
-    /// Maximum number of runs of the search [default: 400]
-    #[arg(long, value_name = "N", requires = "minimise", value_parser = clap::value_parser!(u32).range(1..))]
-    pub(crate) most_runs: Option<u32>,
     /// Folder of the results; existing results of the same study are not run again [default: out/
     /// and the name of the study]
     #[arg(short, long, help_heading = "Files", value_name = "FOLDER")]
@@ -76,8 +64,7 @@ pub(crate) struct SweepRunArgs {
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum SweepCommand {
-    /// Write the files that an engine needs to run the shards of a study: scripts for Slurm,
-    /// HyperQueue, a shell, jobs of Kubernetes
+    /// Write the scripts with which Slurm, HyperQueue or a shell runs the shards of a study
     Plan(PlanArgs),
     /// Merge the results of shards into one table
     Merge(MergeArgs),
@@ -127,9 +114,8 @@ pub(crate) fn run(terminal: &Terminal, args: &SweepArgs) -> Result<ExitCode, Fai
 
 fn sweep(terminal: &Terminal, args: &SweepRunArgs, study: &Path) -> Result<ExitCode, Failure> {
     let mut sweep = Sweep::load(study, &FINDERS)?;
-    let ending = if args.minimise.is_some() { "_least" } else { "" };
     let request = SweepRequest {
-        output: args.output.clone().unwrap_or_else(|| Path::new("out").join(clean(sweep.name()) + ending)),
+        output: args.output.clone().unwrap_or_else(|| Path::new("out").join(clean(sweep.name()))),
         overwrite: args.force,
         shard: args.shard.unwrap_or(Shard::ALL),
         threads: args.threads.map(usize::from),
@@ -152,17 +138,7 @@ fn sweep(terminal: &Terminal, args: &SweepRunArgs, study: &Path) -> Result<ExitC
         bar.show_as(done as f64, all as f64, || format!("{done} of {all} runs"));
         stop()
     };
-    let result = match &args.minimise {
-        None => sweep.run(&request, &mut progress),
-        Some(metric) => {
-            let search = MinimiseRequest {
-                metric: Some(metric.clone()).filter(|metric| !metric.is_empty()),
-                constraints: args.constraint.clone(),
-                runs: args.most_runs.map(|n| n as usize),
-            };
-            sweep.minimise(&request, &search, &mut progress)
-        }
-    };
+    let result = sweep.run(&request, &mut progress);
     drop(watch);
     bar.clear();
     let summary = result?;
@@ -210,7 +186,6 @@ fn text(found: &SweepSummary) -> String {
         found.study, found.done, found.runs, found.failed, found.wall_s, found.cpu_s
     );
     out += &metric_table(&found.metrics);
-    out.extend(found.minimise.as_ref().map(search_lines));
     out.extend(found.best.as_ref().map(|best| best_lines(best, &found.parameters)));
     for failure in &found.failures {
         out += &format!("\nfailed: {} runs, first {}: {}\n", failure.runs, failure.first, failure.reason);
@@ -248,26 +223,6 @@ fn metric_table(metrics: &[MetricFigures]) -> String {
         ]);
     }
     lines(&t)
-}
-
-/// States how a minimisation ended and where it started.
-fn search_lines(search: &MinimiseFigures) -> String {
-    let constraints = match search.constraints.as_slice() {
-        [] => String::new(),
-        some => format!(" under {}", some.join(", ")),
-    };
-    let end = match (search.kept, search.settled) {
-        (false, _) => "no run keeps that",
-        (true, true) => "settled",
-        (true, false) => "ended with its runs, more might find less",
-    };
-    format!(
-        "\nleast {}{constraints}: {} generations, {end}; as filed {}{}\n",
-        search.metric,
-        search.generations,
-        number(search.start),
-        if search.start_kept { "" } else { " (which does not keep it)" }
-    )
 }
 
 /// Lists the best run with the values of its parameters.

@@ -26,19 +26,12 @@ pub(crate) struct PlanArgs {
     /// Engine that runs the shards
     #[arg(long, value_enum, default_value_t = Engine::None)]
     pub(crate) engine: Engine,
-    /// Path of the program on the machines of the shards [default: this one; for kubernetes
-    /// flexarm]
+    /// Path of the program on the machines of the shards [default: this one]
     #[arg(long, value_name = "PATH")]
     pub(crate) program: Option<PathBuf>,
     /// Cores per shard
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
     pub(crate) cores: u16,
-    /// Container image with the program (kubernetes)
-    #[arg(long, value_name = "IMAGE", default_value = "flexarm:latest")]
-    pub(crate) image: String,
-    /// Volume claim with the study and its files; also receives the results (kubernetes)
-    #[arg(long, value_name = "NAME", default_value = "flexarm")]
-    pub(crate) claim: String,
     /// Folder of the results [default: out/ and the name of the study]
     #[arg(long, value_name = "FOLDER")]
     pub(crate) results: Option<PathBuf>,
@@ -58,8 +51,6 @@ pub(crate) enum Engine {
     None,
     /// A Slurm job array, and a job that merges
     Slurm,
-    /// An indexed Kubernetes job
-    Kubernetes,
     /// HyperQueue tasks
     Hyperqueue,
 }
@@ -83,8 +74,6 @@ struct PlanSummary {
     engine: Engine,
     /// Command to type.
     start: String,
-    /// Command that merges the results, if the engine does not.
-    merge: String,
     files: Vec<String>,
 }
 
@@ -99,24 +88,20 @@ pub(crate) fn run(terminal: &Terminal, args: &PlanArgs) -> Result<ExitCode, Fail
     let folder = args.output.clone().unwrap_or_else(|| PathBuf::from(format!("{name}_plan")));
     let whole =
         |path: &Path| quoted(&std::path::absolute(path).unwrap_or_else(|_| path.to_owned()).display().to_string());
-    let inside = args.engine == Engine::Kubernetes;
-    let own = std::env::current_exe().ok().filter(|_| !inside);
-    let program = args.program.clone().or(own).unwrap_or_else(|| PathBuf::from("flexarm"));
+    let program = args.program.clone().or_else(|| std::env::current_exe().ok());
+    let program = program.unwrap_or_else(|| PathBuf::from("flexarm"));
     let results = args.results.clone().unwrap_or_else(|| Path::new("out").join(&name));
-    // A container has its own file system: paths are relative to its volume.
-    let shown = |path: &Path| if inside { quoted(&path.display().to_string()) } else { whole(path) };
     let plan = Plan {
         args,
         name,
         program: quoted(&program.display().to_string()),
-        study: shown(&args.study),
-        results: shown(&results),
+        study: whole(&args.study),
+        results: whole(&results),
         folder: &folder,
     };
-    let (files, start, joins) = match args.engine {
+    let (files, start) = match args.engine {
         Engine::None => plan.none(),
         Engine::Slurm => plan.slurm(),
-        Engine::Kubernetes => plan.kubernetes(),
         Engine::Hyperqueue => plan.hyperqueue(),
     };
     write_files(&files, args.force)?;
@@ -126,14 +111,14 @@ pub(crate) fn run(terminal: &Terminal, args: &PlanArgs) -> Result<ExitCode, Fail
         shards: args.shards,
         engine: args.engine,
         start,
-        merge: if joins { String::new() } else { plan.merge() },
         files: files.iter().map(|(path, _)| path.display().to_string()).collect(),
     };
     answer(terminal, || to_json(&summary), || text(&summary));
     Ok(ExitCode::SUCCESS)
 }
 
-type Planned = (Vec<(PathBuf, String)>, String, bool);
+/// Files, and the command to type.
+type Planned = (Vec<(PathBuf, String)>, String);
 
 impl Plan<'_> {
     /// Returns the command of a shard whose number is in a shell variable.
@@ -162,7 +147,7 @@ impl Plan<'_> {
         );
         let (run, shards) = (self.folder.join("run.sh"), self.folder.join("shards.txt"));
         let start = format!("sh {}", run.display());
-        (vec![(run, script), (shards, list)], start, true)
+        (vec![(run, script), (shards, list)], start)
     }
 
     fn slurm(&self) -> Planned {
@@ -185,74 +170,27 @@ impl Plan<'_> {
             (folder.join("merge.sbatch"), merge),
             (folder.join("submit.sh"), submit.to_owned()),
         ];
-        (files, format!("sh {}", folder.join("submit.sh").display()), true)
+        (files, format!("sh {}", folder.join("submit.sh").display()))
     }
 
     fn hyperqueue(&self) -> Planned {
-        let Self { name, args, folder, program, study, results } = self;
-        let (n, cores) = (args.shards, args.cores);
-        // A task whose worker is lost is restarted elsewhere.
-        let submit = format!(
-            "#!/bin/sh\n# Submits the shards to the HyperQueue server of this user (hq), waits for them, and joins the results.\nset -e\n\
-             cd \"$(dirname \"$0\")\"\n\
-             hq submit --name {name} --array 1-{n} --cpus {cores} --crash-limit 20 --wait --stdout 'shard-%{{TASK_ID}}.log' \
-             --stderr 'shard-%{{TASK_ID}}.err' -- sh ./shard.sh\n{}\n",
-            self.merge()
-        );
-        let shard = format!("#!/bin/sh\n# One shard; HyperQueue says which.\nexec {}\n", self.shard("\"$HQ_TASK_ID\""));
+        let Self { args, folder, program, study, results, .. } = self;
         let python = include_str!("hyperqueue.py.in")
             .replace("@PROGRAM@", &literal(program))
             .replace("@STUDY@", &literal(study))
             .replace("@RESULTS@", &literal(results))
-            .replace("@SHARDS@", &n.to_string())
-            .replace("@CORES@", &cores.to_string());
-        let files = vec![
-            (folder.join("submit.sh"), submit),
-            (folder.join("shard.sh"), shard),
-            (folder.join("submit.py"), python),
-        ];
-        (files, format!("sh {}", folder.join("submit.sh").display()), true)
-    }
-
-    fn kubernetes(&self) -> Planned {
-        let Self { args, folder, .. } = self;
-        let PlanArgs { shards: n, cores, .. } = args;
-        let (image, claim) = (in_double_quotes(&args.image), in_double_quotes(&args.claim));
-        let name = self.name.to_lowercase().replace('_', "-");
-        let job = |name: &str, indexed: &str, command: &str| {
-            format!(
-                "apiVersion: batch/v1\nkind: Job\nmetadata:\n  name: {name}\nspec:\n{indexed}  backoffLimit: 20\n  template:\n    spec:\n      \
-                 restartPolicy: OnFailure\n      containers:\n        - name: flexarm\n          image: {image}\n          workingDir: /study\n          \
-                 command: [\"sh\", \"-c\"]\n          args:\n            - |\n              exec {command}\n          resources:\n            requests: \
-                 {{ cpu: \"{cores}\" }}\n          volumeMounts:\n            - {{ name: study, mountPath: /study }}\n      volumes:\n        - name: study\n          \
-                 persistentVolumeClaim: {{ claimName: {claim} }}\n"
-            )
-        };
-        let indexed = format!("  completions: {n}\n  parallelism: {n}\n  completionMode: Indexed\n");
-        let shards = "# Shards of the study; paths count from the volume, which is /study in the containers.\n"
-            .to_owned()
-            + &job(&name, &indexed, &self.shard("$((JOB_COMPLETION_INDEX + 1))"));
-        let merge = "# To be created when the shards are over.\n".to_owned()
-            + &job(&format!("{name}-merge"), "", &self.merge());
-        let (job, join) = (folder.join("shards.yaml"), folder.join("merge.yaml"));
-        let start = format!(
-            "kubectl apply -f {} && kubectl wait --for=condition=complete --timeout=-1s job/{name} && kubectl apply -f {}",
-            job.display(),
-            join.display()
-        );
-        (vec![(job, shards), (join, merge)], start, true)
+            .replace("@SHARDS@", &args.shards.to_string())
+            .replace("@CORES@", &args.cores.to_string());
+        let script = folder.join("submit.py");
+        let start = format!("python {}", script.display());
+        (vec![(script, python)], start)
     }
 }
 
-/// Text in double quotes as JSON has it, which Python and YAML read alike.
-fn in_double_quotes(text: &str) -> String {
-    serde_json::Value::from(text).to_string()
-}
-
-/// Converts a quoted shell word to a Python string literal.
+/// Converts a quoted shell word to a Python string literal, which JSON has too.
 fn literal(word: &str) -> String {
     let plain = word.strip_prefix('\'').and_then(|word| word.strip_suffix('\'')).map(|word| word.replace("'\\''", "'"));
-    in_double_quotes(&plain.unwrap_or_else(|| word.to_owned()))
+    serde_json::Value::from(plain.unwrap_or_else(|| word.to_owned())).to_string()
 }
 
 /// Quotes a word for a shell.
@@ -269,8 +207,5 @@ fn text(found: &PlanSummary) -> String {
         out += &format!("file     {file}\n");
     }
     out += &format!("start    {}\n", found.start);
-    if !found.merge.is_empty() {
-        out += &format!("merge    {}\n", found.merge);
-    }
     out
 }

@@ -63,7 +63,6 @@ __all__ = [
     "MaterialFigures",
     "MeasurementPlan",
     "MetricFigures",
-    "MinimiseFigures",
     "ModalFigures",
     "ModeFigures",
     "ModelError",
@@ -1624,27 +1623,6 @@ class ParetoFigures(TypedDict):
     """Runs, sorted by the first metric."""
 
 
-class MinimiseFigures(TypedDict):
-    """Progress and result of a search."""
-
-    metric: str
-    """Metric to minimise."""
-    constraints: list[str]
-    """Constraints."""
-    kept: bool
-    """Whether the best run satisfies all constraints."""
-    settled: bool
-    """Whether the search converged, that is, its points hardly differ."""
-    generations: int
-    """Number of generations."""
-    start: float | None
-    """Value at the start of the search; null if that run failed."""
-    start_kept: bool
-    """Whether the run at the start satisfies the constraints."""
-    progress: list[float | None]
-    """Minimum so far of the runs that satisfy the constraints, after each generation; null before there is one."""
-
-
 class CaveatFigures(TypedDict):
     """Caveat with the runs it concerns, represented by the worst of them."""
 
@@ -1703,8 +1681,6 @@ class SweepSummary(TypedDict):
     """Best run; null if no run succeeded."""
     pareto: ParetoFigures | None
     """Pareto-optimal runs of two metrics; null with one metric."""
-    minimise: MinimiseFigures | None
-    """Figures of the search, if this is one."""
     warnings: list[str]
     """Sentences of the caveats that are warnings, each once, with the number of affected runs."""
     caveats: list[CaveatFigures]

@@ -63,16 +63,6 @@ impl Distribution {
             }
         }
     }
-
-    /// Returns minimum and maximum; `None` if unbounded.
-    pub fn bounds(&self) -> Option<(f64, f64)> {
-        match *self {
-            Self::Uniform { low, high } | Self::LogUniform { low, high } | Self::Triangular { low, high, .. } => {
-                Some((low, high))
-            }
-            Self::Normal { .. } | Self::LogNormal { .. } => None,
-        }
-    }
 }
 
 /// Returns the quantile of the standard normal distribution.

@@ -3,7 +3,7 @@
 //! A study evaluates many points of a unit cube: a [`Sample`] (random, Latin hypercube, Sobol,
 //! Saltelli) or a full grid ([`grid_levels`]); a [`Distribution`] maps coordinates to values.
 //! [`main_effect`], [`beyond_chance`], [`sobol_indices`], [`spread`] and [`pareto_front`] evaluate
-//! the results; [`LeastSearch`] minimises one of them within bounds.
+//! the results.
 //!
 //! ```
 //! use flexarm_sweep::statistics::{Distribution, Sample, SampleMethod, sobol_indices};
@@ -26,7 +26,6 @@ mod effects;
 mod indices;
 mod random;
 mod sample;
-mod search;
 mod sobol;
 
 pub use chance::{BeyondChance, beyond_chance};
@@ -34,4 +33,3 @@ pub use distribution::Distribution;
 pub use effects::{EffectGroup, Grouping, MainEffect, Spread, main_effect, pareto_front, spread};
 pub use indices::{SobolIndex, sobol_indices};
 pub use sample::{Sample, SampleMethod, grid_levels};
-pub use search::{LeastSearch, SearchResult};

@@ -309,26 +309,6 @@ impl Workshop {
         Ok(found.collect())
     }
 
-    /// Returns the present value of a parameter: the number in the file, or the neutral value of a
-    /// factor or offset.
-    pub(crate) fn current(&self, column: usize) -> Option<f64> {
-        let (target, _) = self.targets[column].first()?;
-        match (self.roles[column], target) {
-            (Role::Factor, _) | (_, Target::Speed) => Some(1.0),
-            (Role::Offset, _) => Some(0.0),
-            (Role::Value, Target::Entry(which, path)) => {
-                let (root, _) = self.texts.get(&self.base_path(*which)?)?.parsed.as_ref()?;
-                let found = places(root, path);
-                match found.first()?.value(root)? {
-                    toml::Value::Float(x) => Some(*x),
-                    toml::Value::Integer(n) => Some(*n as f64),
-                    _ => None,
-                }
-            }
-            _ => None,
-        }
-    }
-
     /// Returns the edits that a value makes in a file, given earlier edits.
     fn entry_edits(
         &self,
