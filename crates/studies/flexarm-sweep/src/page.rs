@@ -4,7 +4,7 @@
 use std::fmt::Write as _;
 
 use flexarm_draw::charts::{BarPair, EffectPanel, ScatterPlot, bar_pairs, effects, scatter_matrix};
-use flexarm_draw::{CurveLook, FieldPlot, LinePlot, Panel, PlotCurve};
+use flexarm_draw::FieldPlot;
 
 use super::Sweep;
 use super::file::Role;
