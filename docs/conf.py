@@ -15,6 +15,7 @@ copyright = "The flexarm developers"
 version = release = WORKSPACE["version"]
 extensions = ["myst_parser", "autoapi.extension", "sphinx.ext.napoleon", "sphinx.ext.mathjax", "sphinx_copybutton", "notfound.extension"]
 myst_enable_extensions = ["dollarmath"]
+myst_fence_as_directive = ["math"]
 myst_heading_anchors = 3
 copybutton_prompt_text = "$ "
 # Pygments has no lexer for CSV. tools/build_docs.py checks links between files.
