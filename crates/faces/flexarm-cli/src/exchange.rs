@@ -12,10 +12,9 @@ use flexarm::robots::RobotFormat;
 
 use crate::exchange_args::{ExportArgs, ExportFormatName, ImportArgs, ImportFormatName, RobotFormatName};
 use crate::failure::Failure;
-use crate::print;
 use crate::shipped::{self, OutputFolder};
 use crate::terminal::{Terminal, answer, answer_as_is, to_json, working};
-use crate::values;
+use crate::{print, values};
 
 pub(crate) fn import(terminal: &Terminal, args: &ImportArgs) -> Result<ExitCode, Failure> {
     let job = import_job(args)?;

@@ -2,8 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::common::flex;
-use crate::common::{self, Place, matrix, numbers};
+use crate::common::{self, Place, flex, matrix, numbers};
 
 /// Maximum difference of two matrices over the geometric mean of the diagonal of the first.
 fn difference(a: &[Vec<f64>], b: &[Vec<f64>]) -> f64 {

@@ -276,10 +276,9 @@ fn shards_are_planned_run_and_joined_by_a_shell() {
     assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
     assert_eq!(place.read("results/runs.parquet"), place.read("whole/runs.parquet"));
     assert_eq!(place.text("plan/shards.txt").lines().count(), 3);
-    for (engine, file, part) in [
-        ("slurm", "shards.sbatch", "#SBATCH --array=1-3"),
-        ("hyperqueue", "submit.py", "SHARDS, CORES"),
-    ] {
+    for (engine, file, part) in
+        [("slurm", "shards.sbatch", "#SBATCH --array=1-3"), ("hyperqueue", "submit.py", "SHARDS, CORES")]
+    {
         place.json(&["sweep", "plan", "study.toml", "-n", "3", "--engine", engine, "-o", engine]);
         assert!(place.text(&format!("{engine}/{file}")).contains(part));
     }

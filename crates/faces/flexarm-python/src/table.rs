@@ -14,8 +14,8 @@ pub(crate) fn stream<'py>(py: Python<'py>, columns: &Columns) -> PyResult<Bound<
     let named = flat_columns(columns)
         .into_iter()
         .map(|(name, numbers)| (name, Arc::new(Float64Array::from(numbers)) as ArrayRef, false));
-    let batch = RecordBatch::try_from_iter_with_nullable(named)
-        .map_err(|error| PyValueError::new_err(error.to_string()))?;
+    let batch =
+        RecordBatch::try_from_iter_with_nullable(named).map_err(|error| PyValueError::new_err(error.to_string()))?;
     let schema = batch.schema();
     let stream = FFI_ArrowArrayStream::new(Box::new(RecordBatchIterator::new([Ok(batch)], schema)));
     Ok(PyCapsule::new_with_value(py, stream, c"arrow_array_stream")?.into_any())

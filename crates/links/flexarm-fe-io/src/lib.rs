@@ -27,23 +27,24 @@
     reason = "a NaN must fail a check: !(x <= bound) refuses it, x > bound lets it pass"
 )]
 
+mod error;
 pub mod exchange;
 pub mod mesh;
 mod unpack;
 
 pub use unpack::{UnpackError, unpack_gzip};
 
-pub use exchange::ExchangeError;
-pub use mesh::{MeshError, MeshFile, ReadOptions, parse_mesh, read_mesh};
+pub use error::{FeFileError, FilePosition};
+pub use mesh::{MeshFile, ReadOptions, parse_mesh, read_mesh};
 
 /// Parts of the readers that the tests of this crate reach; not part of the interface.
 #[doc(hidden)]
 pub mod internals {
     pub use crate::exchange::abaqus_text::{parse_dof_list, parse_labelled};
     pub use crate::exchange::dmig::parse as parse_dmig;
-    pub use crate::exchange::error::ErrorPosition;
     pub use crate::exchange::fortran::{Format, parse_format};
     pub use crate::exchange::matrix_market::parse as parse_matrix_market;
+    pub use crate::exchange::position::ErrorPosition;
     pub use crate::exchange::read::other_names;
     pub use crate::exchange::text::{Text, real};
     pub use crate::mesh::gmsh::collector::Collector;

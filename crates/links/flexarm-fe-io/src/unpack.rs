@@ -25,8 +25,6 @@ pub fn allowed_unpacked(packed: usize, largest: u64) -> u64 {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{found}, expected {expected}: {help}")]
 pub struct UnpackError {
-    /// Whether the bytes expand to far more than real files; otherwise they are no whole gzip file.
-    pub too_large: bool,
     /// Description of the bytes.
     pub found: String,
     /// Description of valid bytes.
@@ -42,7 +40,6 @@ pub fn unpacked(packed: &[u8], largest: u64) -> Result<Vec<u8>, UnpackError> {
     let result = MultiGzDecoder::new(packed).take(allowed + 1).read_to_end(&mut bytes);
     if let Err(error) = result {
         return Err(UnpackError {
-            too_large: false,
             found: format!("{error} after {} bytes", bytes.len()),
             expected: "a whole gzip file".into(),
             help: "is the file cut off? unpack it with gunzip to see",
@@ -50,7 +47,6 @@ pub fn unpacked(packed: &[u8], largest: u64) -> Result<Vec<u8>, UnpackError> {
     }
     if bytes.len() as u64 > allowed {
         return Err(UnpackError {
-            too_large: true,
             found: format!("{} bytes that unpack to more than {allowed} bytes", packed.len()),
             expected: format!("at most {LARGEST_RATIO} times the packed size, or {ALWAYS_UNPACKED} bytes"),
             help: "if the file is sound, unpack it with gunzip and give the unpacked file",

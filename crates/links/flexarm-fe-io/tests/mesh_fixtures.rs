@@ -4,7 +4,7 @@
 use std::collections::BTreeSet;
 use std::io::Write;
 
-use flexarm_fe_io::mesh::{MeshErrorKind, MeshFile, ReadOptions, parse_mesh};
+use flexarm_fe_io::mesh::{MeshFile, ReadOptions, parse_mesh};
 use flexarm_fem::mesh::{Mesh, connected_parts, skin};
 use flexarm_fem::{ElementKind, UnitSystem};
 use nalgebra::Vector3;
@@ -255,7 +255,7 @@ fn a_compressed_file_is_the_same_and_a_cut_one_is_refused() {
     let packed = encoder.finish().unwrap();
     assert_eq!(read(&packed), read(V41_BINARY));
     let error = parse_mesh(&packed[..packed.len() / 2], "cut.msh.gz", &ReadOptions::default()).unwrap_err();
-    assert_eq!(error.kind, MeshErrorKind::Unreadable);
+    assert_eq!(&*error.expected, "a whole gzip file");
 }
 
 #[test]
@@ -263,7 +263,7 @@ fn a_cut_file_is_refused_wherever_it_is_cut() {
     for bytes in [V22, V22_BINARY, V41, V41_BINARY] {
         for end in (0..bytes.len() - 20).step_by(97) {
             let error = parse_mesh(&bytes[..end], "cut", &ReadOptions::default()).unwrap_err();
-            assert_ne!(error.kind, MeshErrorKind::TooLarge, "{error}");
+            assert!(!error.expected.contains("fewer than") && !error.found.contains("too many"), "{error}");
         }
     }
 }
@@ -273,7 +273,6 @@ fn a_count_that_the_file_cannot_hold_is_refused_before_memory_is_taken() {
     let text = String::from_utf8(V22.to_vec()).unwrap();
     let wild = text.replacen("$Nodes\n145\n", "$Nodes\n900000000000000\n", 1);
     let error = parse_mesh(wild.as_bytes(), "wild.msh", &ReadOptions::default()).unwrap_err();
-    assert_eq!(error.kind, MeshErrorKind::Truncated);
     assert!(error.to_string().contains("900000000000000"), "{error}");
 }
 

@@ -1,7 +1,6 @@
 //! Hand-written Gmsh files: groups, beams, and rejected input with its advice.
 
-use flexarm_fe_io::mesh::{FilePosition, MeshErrorKind as Kind, ReadOptions, parse_mesh};
-use flexarm_fe_io::mesh::{MeshError, MeshFile};
+use flexarm_fe_io::{FeFileError, FilePosition, MeshFile, ReadOptions, parse_mesh};
 use flexarm_fem::mesh::BeamProperties;
 use flexarm_fem::{BeamTheory, ElementKind, Section};
 use nalgebra::Vector3;
@@ -19,7 +18,7 @@ fn msh2(names: &str, elements: &[&str]) -> String {
     format!("$MeshFormat\n2.2 0 8\n$EndMeshFormat\n{names}{NODES}{elements}")
 }
 
-fn read(text: &str) -> Result<MeshFile, MeshError> {
+fn read(text: &str) -> Result<MeshFile, FeFileError> {
     parse_mesh(text.as_bytes(), "hand.msh", &ReadOptions::default())
 }
 
@@ -77,7 +76,6 @@ fn lines_are_beams_only_where_the_caller_says_so() {
 
     let options = ReadOptions { beams: vec![("spin".into(), tube())], ..ReadOptions::default() };
     let error = parse_mesh(text.as_bytes(), "hand.msh", &options).unwrap_err();
-    assert_eq!(error.kind, Kind::Missing);
     assert!(error.to_string().contains("spine, edge"), "{error}");
 
     let bent = msh2("1 4 \"spine\"", &["1 8 2 4 1 1 2 5", "4 4 2 0 1 1 2 3 4"]);
@@ -95,23 +93,22 @@ fn nothing_but_beams_is_a_mesh_too() {
 
 #[test]
 fn impossible_elements_are_refused_with_their_line() {
-    for (elements, kind, word) in [
-        (&["1 4 2 1 1 1 2 3 9"][..], Kind::Missing, "hand.msh:14: TET4 element 1: found node 9"),
-        (&["1 4 2 1 1 1 2 3 4", "2 4 2 1 1 1 2 3 3"], Kind::Element, "hand.msh:15: TET4 element 2: found node 3 twice"),
-        (&["1 4 2 1 1 1 2 3 4", "2 4 2 1 1 2 1 3 4"], Kind::Element, "elements 1 and 2"),
-        (&["1 4 2 1 1 1 2 3 4", "2 4 2 2 1 1 2 3 4"], Kind::Region, "one physical volume"),
-        (&["1 2 2 1 1 1 2 3"], Kind::Missing, "no volume elements"),
-        (&["1 2 2 1 1 1 2 9", "2 4 2 1 1 1 2 3 4"], Kind::Missing, "physical_2_1"),
-        (&["1 7 2 1 1 1 2 3 4 5"], Kind::Unsupported, "5-node pyramid"),
-        (&["1 12 2 1 1 1 2 3 4 5"], Kind::Unsupported, "Mesh.SecondOrderIncomplete=1"),
-        (&["1 29 2 1 1 1 2 3 4 5"], Kind::Unsupported, "Mesh.ElementOrder=2"),
-        (&["1 777 2 1 1 1 2 3 4 5"], Kind::Unsupported, "type 777"),
-        (&["1 4 2 1 1 1 2 3"], Kind::Syntax, "\"$EndElements\""),
-        (&["1 4 2 1 1 1 2 x 4"], Kind::Syntax, "hand.msh:14: node of an element: found \"x\""),
-        (&["1 4 2 1 1 1 2 3 4 5"], Kind::Syntax, "end of $Elements: found \"5\""),
+    for (elements, word) in [
+        (&["1 4 2 1 1 1 2 3 9"][..], "hand.msh:14: TET4 element 1: found node 9"),
+        (&["1 4 2 1 1 1 2 3 4", "2 4 2 1 1 1 2 3 3"], "hand.msh:15: TET4 element 2: found node 3 twice"),
+        (&["1 4 2 1 1 1 2 3 4", "2 4 2 1 1 2 1 3 4"], "elements 1 and 2"),
+        (&["1 4 2 1 1 1 2 3 4", "2 4 2 2 1 1 2 3 4"], "one physical volume"),
+        (&["1 2 2 1 1 1 2 3"], "no volume elements"),
+        (&["1 2 2 1 1 1 2 9", "2 4 2 1 1 1 2 3 4"], "physical_2_1"),
+        (&["1 7 2 1 1 1 2 3 4 5"], "5-node pyramid"),
+        (&["1 12 2 1 1 1 2 3 4 5"], "Mesh.SecondOrderIncomplete=1"),
+        (&["1 29 2 1 1 1 2 3 4 5"], "Mesh.ElementOrder=2"),
+        (&["1 777 2 1 1 1 2 3 4 5"], "type 777"),
+        (&["1 4 2 1 1 1 2 3"], "\"$EndElements\""),
+        (&["1 4 2 1 1 1 2 x 4"], "hand.msh:14: node of an element: found \"x\""),
+        (&["1 4 2 1 1 1 2 3 4 5"], "end of $Elements: found \"5\""),
     ] {
         let error = read(&msh2("", elements)).unwrap_err();
-        assert_eq!(error.kind, kind, "{error}");
         assert!(error.to_string().contains(word), "{error}");
     }
 }
@@ -119,15 +116,16 @@ fn impossible_elements_are_refused_with_their_line() {
 #[test]
 fn impossible_nodes_are_refused_with_their_line() {
     let good = msh2("", &["1 4 2 1 1 1 2 3 4"]);
-    for (from, to, kind, line) in [
-        ("5 1 1 1", "4 1 1 1", Kind::Duplicate, 10),
-        ("3 0 1 0", "3 0 inf 0", Kind::NotFinite, 8),
-        ("3 0 1 0", "3 0 1e400 0", Kind::NotFinite, 8),
-        ("3 0 1 0", "3 0 1,0 0", Kind::Syntax, 8),
-        ("3 0 1 0", "-3 0 1 0", Kind::Syntax, 8),
+    for (from, to, line, word) in [
+        ("5 1 1 1", "4 1 1 1", 10, "a second node with this number"),
+        ("3 0 1 0", "3 0 inf 0", 8, "finite coordinates"),
+        ("3 0 1 0", "3 0 1e400 0", 8, "finite coordinates"),
+        ("3 0 1 0", "3 0 1,0 0", 8, "found \"1,0\""),
+        ("3 0 1 0", "-3 0 1 0", 8, "found \"-3\""),
     ] {
         let error = read(&good.replacen(from, to, 1)).unwrap_err();
-        assert_eq!((error.kind, error.place), (kind, FilePosition::Line(line)), "{error}");
+        assert_eq!(error.place, FilePosition::Line(line), "{error}");
+        assert!(error.to_string().contains(word), "{error}");
     }
     // Fortran exponents and Windows line ends are accepted.
     let odd = good.replacen("3 0 1 0", "3 0 1.0D+00 0", 1).replace('\n', "\r\n");
@@ -163,7 +161,6 @@ fn an_entity_in_two_physical_volumes_is_refused_with_both_names() {
                 $Nodes\n1 4 1 4\n3 1 1 4\n1\n2\n3\n4\n0 0 0 .1 .2 .3\n1 0 0 .1 .2 .3\n0 1 0 .1 .2 .3\n0 0 1 .1 .2 .3\n$EndNodes\n\
                 $Elements\n1 1 1 1\n3 1 4 1\n1 1 2 3 4\n$EndElements\n";
     let error = read(text).unwrap_err();
-    assert_eq!(error.kind, Kind::Region);
     assert!(error.to_string().contains("\"body\" and \"rib\""), "{error}");
     // In one group it is read, and the parameters of its nodes are ignored.
     let mesh = read(&text.replace("1 1 1 2 1 -2 0", "1 1 1 1 -2 0")).unwrap().mesh;

@@ -1,8 +1,7 @@
 //! Hand-written CalculiX and Abaqus decks: cards, sets, sections, and rejected input with its
 //! advice.
 
-use flexarm_fe_io::mesh::{FilePosition, MeshErrorKind as Kind, ReadOptions, parse_mesh};
-use flexarm_fe_io::mesh::{MeshError, MeshFile};
+use flexarm_fe_io::{FeFileError, FilePosition, MeshFile, ReadOptions, parse_mesh};
 use flexarm_fem::mesh::BeamProperties;
 use flexarm_fem::{BeamTheory, ElementKind, Section};
 use nalgebra::Vector3;
@@ -12,11 +11,11 @@ const NODES: &str =
     "*NODE, NSET=Nall\n1, 0,0,0\n2, 1,0,0\n3, 1,1,0\n4, 0,1,0\n5, 0,0,1\n6, 1,0,1\n7, 1,1,1\n8, 0,1,1\n9, .2,.2,2\n";
 const CUBE: &str = "*ELEMENT, TYPE=C3D8, ELSET=cube\n1, 1,2,3,4,5,6,7,8\n";
 
-fn read(text: &str) -> Result<MeshFile, MeshError> {
+fn read(text: &str) -> Result<MeshFile, FeFileError> {
     parse_mesh(text.as_bytes(), "hand.inp", &ReadOptions::default())
 }
 
-fn cube_and(more: &str) -> Result<MeshFile, MeshError> {
+fn cube_and(more: &str) -> Result<MeshFile, FeFileError> {
     read(&format!("{NODES}{CUBE}{more}"))
 }
 
@@ -59,7 +58,8 @@ fn sets_that_contain_each_other_over_and_over_are_resolved_all_the_same() {
 
     // Nesting so deep that the work would grow without bound is rejected at once.
     let deep: String = (1..100_000).map(|k| format!("*NSET, NSET=s{k}\ns{}\n", k - 1)).collect();
-    assert_eq!(cube_and(&format!("*NSET, NSET=s0\n1\n{deep}")).unwrap_err().kind, Kind::TooLarge);
+    let error = cube_and(&format!("*NSET, NSET=s0\n1\n{deep}")).unwrap_err();
+    assert!(error.to_string().contains("too many members"), "{error}");
 }
 
 #[test]
@@ -94,7 +94,7 @@ fn surfaces_give_the_nodes_of_their_faces() {
     assert_eq!(mesh.node_sets["mixed"], [1, 2, 4, 5, 6, 8]);
     assert_eq!(mesh.node_sets["points"], [0, 8]);
     let error = cube_and("*SURFACE, NAME=bottom\ncube, S7\n").unwrap_err();
-    assert_eq!(error.kind, Kind::Unsupported);
+    assert!(error.to_string().contains("a face S1 to S6 of a solid"), "{error}");
 }
 
 #[test]
@@ -173,7 +173,6 @@ fn one_instance_in_place_is_a_flat_deck_and_more_are_refused() {
 
     for moved in ["1., 0., 0.\n", "0,0,0\n0,0,0, 0,0,1, 90\n"] {
         let error = read(&format!("{part}*Instance, name=P-1, part=P\n{moved}*End Instance\n{rest}")).unwrap_err();
-        assert_eq!(error.kind, Kind::Unsupported);
         assert!(error.to_string().contains("merge the instances"), "{error}");
     }
     let two = "*Instance, name=P-1, part=P\n*End Instance\n*Instance, name=P-2, part=P\n*End Instance\n";
@@ -183,52 +182,45 @@ fn one_instance_in_place_is_a_flat_deck_and_more_are_refused() {
 #[test]
 fn what_cannot_be_read_is_refused_with_line_and_advice() {
     let sections = "*MATERIAL, NAME=m\n*ELASTIC\n1,.3\n*DENSITY\n1\n*SOLID SECTION, ELSET=cube, MATERIAL=m\n";
-    for (more, kind, line, word) in [
-        ("*INCLUDE, INPUT=mesh.inp\n", Kind::Unsupported, 13, "\"mesh.inp\""),
-        ("*ELEMENT, TYPE=S4R\n2, 1,2,3,4\n", Kind::Unsupported, 13, "mesh the part with solids"),
-        ("*ELEMENT, TYPE=B32\n2, 1,2,3\n", Kind::Unsupported, 13, "B31 or B33"),
-        ("*ELEMENT, TYPE=C3D4\n2, 1,2,3\n", Kind::Syntax, 14, "found 3 nodes; expected 4 nodes"),
-        ("*ELEMENT, TYPE=C3D4\n2, 1,2,3,4,5\n", Kind::Syntax, 14, "found 5 nodes"),
-        ("*ELEMENT, TYPE=C3D4\n2, 1,2,3,99\n", Kind::Missing, 14, "node 99"),
-        ("*ELEMENT, TYPE=C3D4\n1, 1,2,3,5\n", Kind::Duplicate, 14, "element 1"),
-        ("*ELEMENT, TYPE=C3D8\n2, 1,2,3,4,5,6,7,8\n", Kind::Region, 14, "elements 1 and 2"),
-        ("*ELEMENT, TYPE=C3D4\n2, 1,2,3,3\n", Kind::Element, 14, "node 3 twice"),
-        ("*NODE\n1, 0,0,0\n", Kind::Duplicate, 14, "node 1"),
-        ("*NODE\n10, 0,nan,0\n", Kind::NotFinite, 14, "node 10"),
-        ("*NODE, SYSTEM=C\n", Kind::Unsupported, 13, "rectangular"),
-        ("*NSET, NSET=a\n1, nobody\n", Kind::Missing, 14, "Nall"),
-        ("*NSET, NSET=a\n1, 77\n", Kind::Missing, 13, "node 77"),
-        ("*NSET, NSET=a, GENERATE\n1, 7, 0\n", Kind::Syntax, 14, "first, last, step"),
-        ("*MATERIAL, NAME=m\n*ELASTIC, TYPE=ORTHO\n1,1,1\n", Kind::Unsupported, 14, "isotropic"),
-        ("*MATERIAL, NAME=m\n*ELASTIC\n1\n", Kind::Syntax, 14, "E, nu"),
-        ("*MATERIAL, NAME=m\n*MATERIAL, NAME=M\n", Kind::Duplicate, 14, "second material"),
-        ("*SOLID SECTION, ELSET=cube, MATERIAL=m\n", Kind::Missing, 13, "MATERIAL=m"),
-        ("*SOLID SECTION, ELSET=cub, MATERIAL=m\n", Kind::Missing, 13, "one of: cube"),
+    for (more, line, word) in [
+        ("*INCLUDE, INPUT=mesh.inp\n", 13, "\"mesh.inp\""),
+        ("*ELEMENT, TYPE=S4R\n2, 1,2,3,4\n", 13, "mesh the part with solids"),
+        ("*ELEMENT, TYPE=B32\n2, 1,2,3\n", 13, "B31 or B33"),
+        ("*ELEMENT, TYPE=C3D4\n2, 1,2,3\n", 14, "found 3 nodes; expected 4 nodes"),
+        ("*ELEMENT, TYPE=C3D4\n2, 1,2,3,4,5\n", 14, "found 5 nodes"),
+        ("*ELEMENT, TYPE=C3D4\n2, 1,2,3,99\n", 14, "node 99"),
+        ("*ELEMENT, TYPE=C3D4\n1, 1,2,3,5\n", 14, "element 1"),
+        ("*ELEMENT, TYPE=C3D8\n2, 1,2,3,4,5,6,7,8\n", 14, "elements 1 and 2"),
+        ("*ELEMENT, TYPE=C3D4\n2, 1,2,3,3\n", 14, "node 3 twice"),
+        ("*NODE\n1, 0,0,0\n", 14, "node 1"),
+        ("*NODE\n10, 0,nan,0\n", 14, "node 10"),
+        ("*NODE, SYSTEM=C\n", 13, "rectangular"),
+        ("*NSET, NSET=a\n1, nobody\n", 14, "Nall"),
+        ("*NSET, NSET=a\n1, 77\n", 13, "node 77"),
+        ("*NSET, NSET=a, GENERATE\n1, 7, 0\n", 14, "first, last, step"),
+        ("*MATERIAL, NAME=m\n*ELASTIC, TYPE=ORTHO\n1,1,1\n", 14, "isotropic"),
+        ("*MATERIAL, NAME=m\n*ELASTIC\n1\n", 14, "E, nu"),
+        ("*MATERIAL, NAME=m\n*MATERIAL, NAME=M\n", 14, "second material"),
+        ("*SOLID SECTION, ELSET=cube, MATERIAL=m\n", 13, "MATERIAL=m"),
+        ("*SOLID SECTION, ELSET=cub, MATERIAL=m\n", 13, "one of: cube"),
     ] {
         let error = cube_and(more).unwrap_err();
-        assert_eq!((error.kind, error.place), (kind, FilePosition::Line(line)), "{more}{error}");
+        assert_eq!(error.place, FilePosition::Line(line), "{more}{error}");
         assert!(error.to_string().contains(word), "{error}");
     }
-    for (more, kind, word) in [
-        ("*SOLID SECTION, ELSET=cube, MATERIAL=m\n", Kind::Region, "a second section"),
-        (
-            "*ELEMENT, TYPE=B31, ELSET=b\n2, 1,2\n*SOLID SECTION, ELSET=b, MATERIAL=m\n",
-            Kind::Unsupported,
-            "B31 with *SOLID SECTION",
-        ),
+    for (more, word) in [
+        ("*SOLID SECTION, ELSET=cube, MATERIAL=m\n", "a second section"),
+        ("*ELEMENT, TYPE=B31, ELSET=b\n2, 1,2\n*SOLID SECTION, ELSET=b, MATERIAL=m\n", "B31 with *SOLID SECTION"),
         (
             "*ELEMENT, TYPE=B31, ELSET=b\n2, 1,2\n*BEAM SECTION, ELSET=b, MATERIAL=m, SECTION=I\n1\n",
-            Kind::Unsupported,
             "PIPE (radius, wall)",
         ),
         (
             "*ELEMENT, TYPE=B31, ELSET=b\n2, 1,2\n*BEAM SECTION, ELSET=b, MATERIAL=m, SECTION=PIPE\n1,2\n",
-            Kind::Material,
             "wall thickness",
         ),
     ] {
         let error = cube_and(&format!("{sections}{more}")).unwrap_err();
-        assert_eq!(error.kind, kind, "{error}");
         assert!(error.to_string().contains(word), "{error}");
     }
     assert!(cube_and(&sections.replace(".3", ".7")).unwrap_err().to_string().contains("Poisson"));

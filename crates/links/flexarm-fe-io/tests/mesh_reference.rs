@@ -3,8 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-use flexarm_fe_io::mesh::MeshFile;
-use flexarm_fe_io::mesh::{ReadOptions, read_mesh};
+use flexarm_fe_io::mesh::{MeshFile, ReadOptions, read_mesh};
 use flexarm_fem::mesh::{Mesh, connected_parts, select, skin};
 use flexarm_fem::{ElementKind, Material};
 

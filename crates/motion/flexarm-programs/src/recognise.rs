@@ -46,65 +46,31 @@ fn language_of_ending(name: &str) -> Option<Language> {
     }
 }
 
-/// Whether the line begins with one of the words as a whole word.
-fn begins(line: &str, words: &[&str]) -> bool {
-    words.iter().any(|word| {
+/// Whether the line begins with one of the words, separated by bars, as a whole word.
+fn begins(line: &str, words: &str) -> bool {
+    words.split('|').any(|word| {
         line.strip_prefix(word).is_some_and(|rest| !rest.starts_with(|c: char| c.is_alphanumeric() || c == '_'))
     })
 }
 
 fn is_krl(line: &str) -> bool {
-    const WORDS: [&str; 22] = [
-        "&access",
-        "&rel",
-        "&param",
-        "defdat",
-        "deffct",
-        "enddat",
-        "ptp",
-        "lin",
-        "circ",
-        "sptp",
-        "slin",
-        "scirc",
-        "ptp_rel",
-        "lin_rel",
-        "decl",
-        "bas",
-        "$vel",
-        "$vel_axis",
-        "$base",
-        "$tool",
-        "$apo",
-        "$acc",
-    ];
-    begins(line, &WORDS) || (begins(line, &["def", "global def"]) && !line.ends_with(':'))
+    const WORDS: &str = "\
+        &access|&rel|&param|defdat|deffct|enddat|ptp|lin|circ|sptp|slin|scirc|ptp_rel|lin_rel|decl|\
+        bas|$vel|$vel_axis|$base|$tool|$apo|$acc";
+    begins(line, WORDS) || (begins(line, "def|global def") && !line.ends_with(':'))
 }
 
 fn is_rapid(line: &str) -> bool {
-    const WORDS: [&str; 14] = [
-        "module",
-        "endmodule",
-        "proc",
-        "endproc",
-        "local proc",
-        "pers",
-        "const",
-        "var",
-        "task pers",
-        "local const",
-        "movej",
-        "movel",
-        "movec",
-        "moveabsj",
-    ];
-    begins(line, &WORDS) && !line.contains("movej(") && !line.contains("movel(") && !line.contains("movec(")
+    const WORDS: &str = "\
+        module|endmodule|proc|endproc|local proc|pers|const|var|task pers|local const|movej|movel|\
+        movec|moveabsj";
+    begins(line, WORDS) && !line.contains("movej(") && !line.contains("movel(") && !line.contains("movec(")
 }
 
 fn is_urscript(line: &str) -> bool {
     let calls = ["movej(", "movel(", "movec(", "movep(", "set_tcp(", "textmsg(", "set_digital_out(", "set_payload("];
     calls.iter().any(|call| line.starts_with(call))
-        || (begins(line, &["def", "thread", "while", "if"]) && line.ends_with(':'))
+        || (begins(line, "def|thread|while|if") && line.ends_with(':'))
         || line.contains("=p[")
         || line.contains("= p[")
 }

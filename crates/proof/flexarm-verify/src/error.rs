@@ -1,7 +1,7 @@
 //! Errors of the case studies: those of the library, and truths that cannot be computed.
 
 use flexarm::Fault;
-use flexarm_fe_io::MeshError;
+use flexarm_fe_io::FeFileError;
 use flexarm_fem::FemError;
 use flexarm_fem::sparse::ModesError;
 use flexarm_files::FileError;
@@ -74,8 +74,8 @@ impl From<FemError> for Error {
     }
 }
 
-impl From<Box<MeshError>> for Error {
-    fn from(error: Box<MeshError>) -> Self {
+impl From<Box<FeFileError>> for Error {
+    fn from(error: Box<FeFileError>) -> Self {
         Self::Library(flexarm::links::LinkError::from(error).into())
     }
 }

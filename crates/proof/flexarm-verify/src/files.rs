@@ -4,10 +4,9 @@ use std::path::{Path, PathBuf};
 
 use flexarm_files::{check_free, write_all};
 
-use crate::Error;
-use crate::Verification;
 use crate::check::{Difference, differences, same_picture};
 use crate::page::{Case, Claim, Table, markdown, table_text, word};
+use crate::{Error, Verification};
 
 /// File name of the first page.
 pub const PAGE: &str = "verification.md";

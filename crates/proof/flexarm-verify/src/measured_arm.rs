@@ -4,10 +4,9 @@
 use flexarm_draw::{CurveLook, Panel, PlotCurve};
 use serde_json::Value;
 
-use crate::Error;
-use crate::Pace;
 use crate::bench::{Bench, Stored};
 use crate::page::{Bound, Case, Cell, Figure, Table, digits, fixed, percent, plain, word};
+use crate::{Error, Pace};
 
 /// Stored figures.
 const STORED: &str = "measured_arm.json";

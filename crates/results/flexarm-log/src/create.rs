@@ -27,7 +27,6 @@ impl Default for CreateOptions {
 
 impl CreateOptions {
     /// Returns the options with [`CreateOptions::overwrite`] set to `overwrite`.
-    #[must_use]
     pub fn with_overwrite(self, overwrite: bool) -> Self {
         Self { overwrite, ..self }
     }

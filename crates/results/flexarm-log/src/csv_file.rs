@@ -9,9 +9,8 @@ use flexarm_settings::written::csv_field;
 use crate::create::FlushClock;
 use crate::file_recorder::{FileRecorder, OpenFile};
 use crate::shape::Shape;
-use crate::table;
 use crate::written_behind::WrittenBehind;
-use crate::{CreateOptions, LogError, RunHeader, RunResult, Sample};
+use crate::{CreateOptions, LogError, RunHeader, RunResult, Sample, table};
 
 /// Writes a run as comma-separated values with a header line.
 ///

@@ -126,7 +126,6 @@ fn others(paths: &[PathBuf]) -> String {
 impl LogError {
     /// Returns the same error with every path in the folder `hidden` replaced by `shown`. Files
     /// created under a temporary name are thus reported under the name that the user gave.
-    #[must_use]
     pub fn with_path_for(mut self, hidden: &Path, shown: &Path) -> Self {
         let rename = |path: &mut PathBuf| {
             if path.starts_with(hidden) {
@@ -152,13 +151,11 @@ impl LogError {
     }
 
     /// Error for `begin` on a recorder that has begun before.
-    #[must_use]
     pub fn begun_twice(path: &Path) -> Self {
         Self::Order { path: path.to_owned(), call: "begin", problem: "a second time" }
     }
 
     /// Error for `record` or `finish` on a recorder that is not between `begin` and `finish`.
-    #[must_use]
     pub fn not_open(path: &Path, call: &'static str) -> Self {
         Self::Order { path: path.to_owned(), call, problem: "before begin or after finish" }
     }

@@ -19,7 +19,6 @@ pub struct Shape {
 
 impl Shape {
     /// Returns the sizes that a header asks for.
-    #[must_use]
     pub fn of(header: &RunHeader) -> Self {
         Self {
             joints: header.joints.len(),

@@ -77,7 +77,6 @@ pub struct TraceRow {
 
 impl TraceRow {
     /// Norm of the TCP error (m).
-    #[must_use]
     pub fn error_m(&self) -> f64 {
         size(&self.error_world)
     }
@@ -126,19 +125,16 @@ impl Trace {
     pub const BEGINNING: usize = 100_000;
 
     /// Creates an empty trace of a run.
-    #[must_use]
     pub fn new(header: RunHeader) -> Self {
         Self { header, stride: 1, peak_error: -1.0, ..Self::default() }
     }
 
     /// Creates an empty trace that keeps no rows, only the sample of the maximum error.
-    #[must_use]
     pub fn without_curves(header: RunHeader) -> Self {
         Self { without_curves: true, ..Self::new(header) }
     }
 
     /// Creates an empty trace that keeps few rows of a long run, for a page that shows its curves.
-    #[must_use]
     pub fn for_page(header: RunHeader) -> Self {
         Self { for_page: true, ..Self::new(header) }
     }
@@ -199,7 +195,6 @@ impl Trace {
 
     /// Returns a curve: a value for each row or, in a long run, minimum and maximum of each block.
     /// NaN for quantities that the run lacks.
-    #[must_use]
     pub fn curve(&self, quantity: CurveQuantity) -> Vec<f64> {
         match self.blocks.is_empty() {
             true => self.rows.iter().map(|row| quantity.of(row)).collect(),
@@ -208,7 +203,6 @@ impl Trace {
     }
 
     /// Returns the times of [`Trace::curve`] (s).
-    #[must_use]
     pub fn curve_times(&self) -> Vec<f64> {
         match self.blocks.is_empty() {
             true => self.rows.iter().map(|row| row.time_s).collect(),
@@ -217,7 +211,6 @@ impl Trace {
     }
 
     /// Returns the path length of the rigid TCP at the times of [`Trace::curve`] (m).
-    #[must_use]
     pub fn curve_ways(&self) -> Vec<f64> {
         if !self.blocks.is_empty() {
             return self.blocks.ways();
@@ -234,14 +227,12 @@ impl Trace {
     }
 
     /// Number of samples per minimum and maximum of a curve; 1 for a curve with all samples.
-    #[must_use]
     pub fn samples_per_block(&self) -> u64 {
         self.blocks.size().max(1)
     }
 
     /// Returns time (s) and translational error (m, world axes) of every sample, in a long run of
     /// the first [`Trace::BEGINNING`] samples.
-    #[must_use]
     pub fn beginning(&self) -> Vec<(f64, [f64; 3])> {
         match self.blocks.is_empty() {
             true => self.rows.iter().map(translation).collect(),
@@ -250,13 +241,11 @@ impl Trace {
     }
 
     /// Number of samples pushed, kept or not.
-    #[must_use]
     pub fn samples(&self) -> u64 {
         self.seen
     }
 
     /// Number of samples per row: 1 for a run that is not thinned, otherwise a power of two.
-    #[must_use]
     pub fn stride(&self) -> u64 {
         self.stride.max(1)
     }
@@ -267,7 +256,6 @@ impl Trace {
     }
 
     /// Returns the events, in order of time.
-    #[must_use]
     pub fn events(&self) -> &[Event] {
         &self.result.events
     }

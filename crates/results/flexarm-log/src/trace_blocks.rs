@@ -55,7 +55,6 @@ impl CurveQuantity {
     const SIZES: [Self; 5] = [Self::ErrorSize, Self::TurnSize, Self::AcrossPath, Self::StaticSize, Self::MovingSize];
 
     /// Returns its value in a row; NaN if the run has no such joint, contributor or element.
-    #[must_use]
     pub fn of(self, row: &TraceRow) -> f64 {
         let element = |k: usize| row.elastic.get(k);
         let number = |values: &[f64], k: usize| values.get(k).copied().unwrap_or(f64::NAN);

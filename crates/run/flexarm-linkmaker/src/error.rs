@@ -39,12 +39,9 @@ pub enum LinkError {
     /// An invalid reduced-link file.
     #[error(transparent)]
     Flex(#[from] Box<flexarm_fem::FlexFileError>),
-    /// An invalid mesh file.
+    /// An invalid mesh or matrix file of another FE program.
     #[error(transparent)]
-    Mesh(#[from] Box<flexarm_fe_io::MeshError>),
-    /// An invalid matrix file of another FE program.
-    #[error(transparent)]
-    Exchange(#[from] Box<flexarm_fe_io::ExchangeError>),
+    FeFile(#[from] Box<flexarm_fe_io::FeFileError>),
     /// An invalid interface of a link to be reduced.
     #[error("{place}: interface {interface:?}: {what}")]
     Interface {

@@ -22,14 +22,8 @@ use flexarm_settings::Quantity;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use flexarm_run::Caveat;
-use flexarm_run::Error;
-use flexarm_run::Modelling;
-use flexarm_run::Motion;
-use flexarm_run::Robot;
-use flexarm_run::ValueError;
-use flexarm_run::caveat;
 use flexarm_run::caveat::of_use;
+use flexarm_run::{Caveat, Error, Modelling, Motion, Robot, ValueError, caveat};
 
 pub use crate::milling::ChatterError;
 pub use caveats::tool_caveats;

@@ -9,14 +9,9 @@ use nalgebra::{DVector, Matrix3, Matrix3xX, Vector3, Vector6};
 
 use super::LobesError;
 use super::tool_file::{CuttingTool, ToolDirection};
-use flexarm_run::Caveat;
-use flexarm_run::Error;
-use flexarm_run::Modelling;
-use flexarm_run::Motion;
-use flexarm_run::Robot;
-use flexarm_run::TCP_FRAME;
 use flexarm_run::posed::Posed;
 use flexarm_run::response::pose_in_words;
+use flexarm_run::{Caveat, Error, Modelling, Motion, Robot, TCP_FRAME};
 
 /// Minimum number of poses along a motion.
 const MIN_PLACES: usize = 2;

@@ -6,10 +6,7 @@ use flexarm_trajectory::Extreme;
 
 use super::job::{Commands, Discarded};
 use super::{CompensateRequest, Compensation, Method, limits};
-use flexarm_run::Arm;
-use flexarm_run::Caveat;
-use flexarm_run::MotionViolation;
-use flexarm_run::Robot;
+use flexarm_run::{Arm, Caveat, MotionViolation, Robot};
 
 /// Minimum remaining fraction of the model's peak error that is explained, and minimum share of it
 /// above the cutoff frequency for that explanation.

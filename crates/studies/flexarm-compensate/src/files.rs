@@ -8,14 +8,8 @@ use flexarm_log::RecordingFormat;
 
 use super::program::{self, Corrected, ProgramFigures};
 use super::{CompensateRequest, Compensation, MotionPair, SAMPLE_S, page};
-use flexarm_run::Arm;
-use flexarm_run::Caveat;
-use flexarm_run::Error;
-use flexarm_run::Motion;
-use flexarm_run::Robot;
-use flexarm_run::Scenario;
-use flexarm_run::motion_report::check_motion_outputs;
-use flexarm_run::motion_report::motion_texts;
+use flexarm_run::motion_report::{check_motion_outputs, motion_texts};
+use flexarm_run::{Arm, Caveat, Error, Motion, Robot, Scenario};
 
 /// Tolerance for the TCP position at corrected targets (m), for the rounding of written digits.
 const WRITTEN_WITHIN_M: f64 = 1e-6;

@@ -12,14 +12,9 @@ use nalgebra::{DMatrix, DVector, Quaternion, Rotation3, Translation3, UnitQuater
 use rayon::prelude::*;
 
 use super::{CompensateError, CompensateRequest, Stop};
-use flexarm_run::AppliedLoad;
-use flexarm_run::Arm;
-use flexarm_run::Error;
-use flexarm_run::Motion;
-use flexarm_run::Scenario;
 use flexarm_run::prepare::loaded;
 use flexarm_run::robot::tcp_frame;
-use flexarm_run::{RunOptions, RunRequest};
+use flexarm_run::{AppliedLoad, Arm, Error, Motion, RunOptions, RunRequest, Scenario};
 
 /// Maximum time between two nodes at which the arm is linearised (s).
 const NODE_S: f64 = 0.02;

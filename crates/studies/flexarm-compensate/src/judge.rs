@@ -8,14 +8,7 @@ use rayon::prelude::*;
 
 use super::job::{Job, RunResult, distances};
 use super::{CompensateError, CompensateRequest, ErrorFigures, PlantFigures};
-use flexarm_run::Arm;
-use flexarm_run::DriveModel;
-use flexarm_run::Error;
-use flexarm_run::LinkModel;
-use flexarm_run::Modelling;
-use flexarm_run::Motion;
-use flexarm_run::Robot;
-use flexarm_run::RunOptions;
+use flexarm_run::{Arm, DriveModel, Error, LinkModel, Modelling, Motion, Robot, RunOptions};
 
 /// Result of commands on a plant.
 pub(super) struct PlantResult {

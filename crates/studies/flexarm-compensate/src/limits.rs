@@ -5,16 +5,9 @@ use std::sync::Arc;
 use flexarm_trajectory::{Extreme, JointLimits};
 
 use super::{CompensateError, CompensateRequest, Compensation, MotionPair, Stop, attempt};
-use flexarm_run::Arm;
-use flexarm_run::Caveat;
-use flexarm_run::Error;
-use flexarm_run::Motion;
-use flexarm_run::MotionViolation;
-use flexarm_run::Robot;
-use flexarm_run::Scenario;
 use flexarm_run::motion::limits as limits_of;
-use flexarm_run::motion_report::of_effort;
-use flexarm_run::motion_report::of_limit;
+use flexarm_run::motion_report::{of_effort, of_limit};
+use flexarm_run::{Arm, Caveat, Error, Motion, MotionViolation, Robot, Scenario};
 
 /// Increase of a violation over that of the motion itself, as a fraction of the limit, up to which
 /// it counts as the motion's own.

@@ -21,15 +21,8 @@ use serde::Serialize;
 
 use super::CompensateRequest;
 use super::job::averaged;
-use flexarm_run::AppliedLoad;
-use flexarm_run::Arm;
-use flexarm_run::Error;
-use flexarm_run::Motion;
-use flexarm_run::Robot;
-use flexarm_run::Scenario;
-use flexarm_run::tool_path::Cell;
-use flexarm_run::tool_path::Overrides;
-use flexarm_run::tool_path::program_text;
+use flexarm_run::tool_path::{Cell, Overrides, program_text};
+use flexarm_run::{AppliedLoad, Arm, Error, Motion, Robot, Scenario};
 
 /// Name of the program's folder within the output folder.
 pub(super) const FOLDER: &str = "program";

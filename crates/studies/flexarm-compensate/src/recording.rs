@@ -8,11 +8,7 @@ use flexarm_log::{LogError, Recorder, RunHeader, RunResult, Sample, TwinSample};
 use nalgebra::Vector3;
 
 use super::{CompensateRequest, Compensation, MotionPair};
-use flexarm_run::Arm;
-use flexarm_run::Error;
-use flexarm_run::RunOptions;
-use flexarm_run::Scenario;
-use flexarm_run::{Keep, RunRequest};
+use flexarm_run::{Arm, Error, Keep, RunOptions, RunRequest, Scenario};
 use flexarm_settings::written::markdown;
 
 /// Sampling rate of the recording (Hz).

@@ -10,10 +10,7 @@ use nalgebra::DMatrix;
 use serde::Serialize;
 
 use super::{CompensateError, SAMPLE_S};
-use flexarm_run::Arm;
-use flexarm_run::Error;
-use flexarm_run::Motion;
-use flexarm_run::Scenario;
+use flexarm_run::{Arm, Error, Motion, Scenario};
 
 /// Damping ratio above which a mode hardly oscillates.
 const SWINGS: f64 = 0.4;

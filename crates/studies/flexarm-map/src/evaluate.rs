@@ -8,10 +8,7 @@ use nalgebra::{Matrix3, Matrix6, Vector3};
 
 use super::columns::{HEAD, Layout, MAX_FREQUENCIES};
 use flexarm_chatter::{CuttingTool, lowest_limit};
-use flexarm_run::Error;
-use flexarm_run::Modelling;
-use flexarm_run::Robot;
-use flexarm_run::posed;
+use flexarm_run::{Error, Modelling, Robot, posed};
 
 /// Indices of a pose in the map.
 #[derive(Clone, Copy, Debug)]

@@ -13,9 +13,7 @@ use super::MapColumn;
 use super::MapTable;
 use super::region::Grid;
 use super::{Map, MapRequest, page, recording};
-use flexarm_run::Arm;
-use flexarm_run::Error;
-use flexarm_run::Robot;
+use flexarm_run::{Arm, Error, Robot};
 
 /// Paths of the files of a map.
 pub(super) struct MapPaths {

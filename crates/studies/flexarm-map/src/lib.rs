@@ -69,20 +69,13 @@ use self::finder::Finder;
 use self::region::{MAX_QUERIES, round_number};
 use self::take::{Choice, Evaluation, Places, PoseOf, take};
 use flexarm_chatter::{CuttingTool, LobesError, lowest_limit};
-use flexarm_run::Arm;
-use flexarm_run::Caveat;
-use flexarm_run::Error;
-use flexarm_run::Modelling;
-use flexarm_run::Robot;
-use flexarm_run::Scenario;
-use flexarm_run::ValueError;
-use flexarm_run::caveat;
 use flexarm_run::caveat::Use;
 use flexarm_run::caveat::motion::of_wrench;
 use flexarm_run::caveat::size::Size;
 use flexarm_run::inspect::joint_values;
 use flexarm_run::posed::check_wrench;
 use flexarm_run::robot::tcp_frame;
+use flexarm_run::{Arm, Caveat, Error, Modelling, Robot, Scenario, ValueError, caveat};
 
 /// Number of poses sampled to estimate the reach of the arm.
 const REACH_POSES: usize = 20_000;

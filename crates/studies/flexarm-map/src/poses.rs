@@ -10,12 +10,10 @@ use toml::Spanned;
 
 use super::region::MAX_PLACES;
 use super::{MapError, Region};
-use flexarm_run::Caveat;
-use flexarm_run::Error;
-use flexarm_run::Robot;
 use flexarm_run::inspect::joint_values;
 use flexarm_run::robot_file::Source;
 use flexarm_run::toml_file::parsed;
+use flexarm_run::{Caveat, Error, Robot};
 
 /// A list of poses as written in TOML.
 #[derive(Debug, Deserialize)]

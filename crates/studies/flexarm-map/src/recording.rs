@@ -12,11 +12,8 @@ use super::iso_surface::iso_surface;
 use super::region::Grid;
 use super::{Map, MapPose, MapRequest, columns};
 use flexarm_chatter::rounded_down;
-use flexarm_run::Arm;
-use flexarm_run::Error;
-use flexarm_run::Robot;
-use flexarm_run::record::link_frames;
-use flexarm_run::record::robot_header;
+use flexarm_run::record::{link_frames, robot_header};
+use flexarm_run::{Arm, Error, Robot};
 use flexarm_settings::written::markdown;
 
 /// Maximum number of points in a view; larger maps are thinned.

@@ -35,10 +35,8 @@ use std::path::Path;
 use flexarm_settings::Setting;
 use flexarm_urdf::ReadOptions;
 
-use flexarm_run::Error;
-use flexarm_run::Motion;
-use flexarm_run::Robot;
 use flexarm_run::motion_report::motion_report;
+use flexarm_run::{Error, Motion, Robot};
 
 pub use assumption::Assumption;
 pub use gears::Reducer;

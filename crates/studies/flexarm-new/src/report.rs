@@ -8,10 +8,7 @@ use super::assumption::Assumption;
 use super::draft::Draft;
 use super::gears::three_digits;
 use super::place::Placed;
-use flexarm_run::Finding;
-use flexarm_run::MotionPeak;
-use flexarm_run::MotionReport;
-use flexarm_run::Summary;
+use flexarm_run::{Finding, MotionPeak, MotionReport, Summary};
 
 /// Result of `flexarm new`.
 #[derive(Debug, Serialize)]

@@ -6,10 +6,7 @@ use flexarm_stepping::{FlexibleArm, ServoAxis, TorqueLimited};
 
 use super::slopes::{OfAxis, OfFriction};
 use super::{NamedParameter, RunParameter, RunSlopes};
-use flexarm_run::Arm;
-use flexarm_run::Caveat;
-use flexarm_run::Error;
-use flexarm_run::Scenario;
+use flexarm_run::{Arm, Caveat, Error, Scenario};
 
 /// Adds friction and gains of servo-controlled joints.
 pub(super) fn add_controllers(arm: &Arc<Arm>, scenario: &Scenario, all: &mut Vec<NamedParameter>) -> Result<(), Error> {

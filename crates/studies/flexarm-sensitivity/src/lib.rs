@@ -20,19 +20,9 @@ use nalgebra::Vector3;
 use serde::Serialize;
 
 use flexarm_identify::parameters::{asks_for, fits};
-use flexarm_run::Arm;
-use flexarm_run::Caveat;
-use flexarm_run::Error;
-use flexarm_run::Modelling;
-use flexarm_run::Robot;
-use flexarm_run::RunOptions;
-use flexarm_run::Scenario;
-use flexarm_run::ValueError;
-use flexarm_run::caveat::Use;
-use flexarm_run::caveat::once_each;
-use flexarm_run::caveat::warnings;
-use flexarm_run::prepare::loaded;
-use flexarm_run::prepare::runnable;
+use flexarm_run::caveat::{Use, once_each, warnings};
+use flexarm_run::prepare::{loaded, runnable};
+use flexarm_run::{Arm, Caveat, Error, Modelling, Robot, RunOptions, Scenario, ValueError};
 
 use controllers::{add_controllers, limited};
 use slopes::Repeated;

@@ -8,15 +8,9 @@ use nalgebra::{Matrix3, Matrix6, Vector3};
 use serde::Serialize;
 
 use flexarm_identify::Parameter;
-use flexarm_run::Arm;
-use flexarm_run::Caveat;
-use flexarm_run::Error;
-use flexarm_run::Modelling;
-use flexarm_run::Robot;
-use flexarm_run::ValueError;
-use flexarm_run::caveat::Use;
-use flexarm_run::caveat::warnings;
+use flexarm_run::caveat::{Use, warnings};
 use flexarm_run::inspect::joint_values;
+use flexarm_run::{Arm, Caveat, Error, Modelling, Robot, ValueError};
 
 use super::{change_of, chosen, numbers};
 

@@ -15,12 +15,8 @@ use super::metric::{self, Facts, Quick, SummaryFacts};
 use super::run_caveats::{CaveatText, stored_caveats};
 use super::value::ParameterValue;
 use super::workshop::PreparedRun;
-use flexarm_run::Caveat;
-use flexarm_run::Error;
-use flexarm_run::run::BeforeRun;
-use flexarm_run::run::static_sag;
-use flexarm_run::run::steps_per_sample;
-use flexarm_run::{Keep, RunOptions, RunRequest};
+use flexarm_run::run::{BeforeRun, static_sag, steps_per_sample};
+use flexarm_run::{Caveat, Error, Keep, RunOptions, RunRequest};
 
 /// Result of a run.
 #[derive(Clone, Debug, PartialEq)]

@@ -47,16 +47,11 @@ use self::file::StudyFile;
 use self::metric::{Metric, MetricError, Vocabulary};
 use self::store::{Collected, Manifest, RUNS, Store, known_manifest};
 use self::workshop::Workshop;
-use flexarm_run::Arm;
-use flexarm_run::Error;
-use flexarm_run::LinkFigures;
-use flexarm_run::PathFigures;
-use flexarm_run::Robot;
-use flexarm_run::RobotFileError;
-use flexarm_run::Summary;
-use flexarm_run::TcpFigures;
 use flexarm_run::summary::DriveFigures;
-use flexarm_run::{LinkStressFigures, StrainGaugeFigures, StressPlaceFigures, StressPointFigures};
+use flexarm_run::{
+    Arm, Error, LinkFigures, LinkStressFigures, PathFigures, Robot, RobotFileError, StrainGaugeFigures,
+    StressPlaceFigures, StressPointFigures, Summary, TcpFigures,
+};
 
 pub use self::changes::{Change, load_changed};
 pub use self::direction::Better;

@@ -3,8 +3,8 @@
 
 use std::fmt::Write as _;
 
-use flexarm_draw::charts::{BarPair, EffectPanel, ScatterPlot, bar_pairs, effects, scatter_matrix};
 use flexarm_draw::FieldPlot;
+use flexarm_draw::charts::{BarPair, EffectPanel, ScatterPlot, bar_pairs, effects, scatter_matrix};
 
 use super::Sweep;
 use super::file::Role;

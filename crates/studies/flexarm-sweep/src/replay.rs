@@ -9,9 +9,7 @@ use super::Sweep;
 use super::value::ParameterValue;
 use super::workshop::RunFiles;
 use flexarm_identify::rewrite::moved_paths;
-use flexarm_run::Error;
-use flexarm_run::Motion;
-use flexarm_run::MotionOptions;
+use flexarm_run::{Error, Motion, MotionOptions};
 
 /// Sampling rate of a motion that is not given by waypoints (Hz).
 const ROWS_HZ: f64 = 1000.0;

@@ -6,9 +6,8 @@ use std::sync::Arc;
 use serde::Serialize;
 
 use super::evaluate::Answer;
-use flexarm_run::Caveat;
-use flexarm_run::Severity;
 use flexarm_run::caveat::once_each;
+use flexarm_run::{Caveat, Severity};
 
 /// Caveats of a run as JSON; `None` if there are none. Runs with equal caveats share one text.
 pub(super) type CaveatText = Option<Arc<str>>;

@@ -21,12 +21,11 @@ use flexarm_files::{read_text, write_all};
 use flexarm_log::{CreateOptions, DataColumn, DataTable, DataValues, LogError};
 use serde::{Deserialize, Serialize};
 
-use super::Sweep;
 use super::design::CAVEATS;
 use super::error::SweepError;
 use super::evaluate::Answer;
-use super::table;
 use super::value::ParameterValue;
+use super::{Sweep, table};
 use flexarm_run::Error;
 
 /// File that identifies the study of a folder.

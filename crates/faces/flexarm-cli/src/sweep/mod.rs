@@ -11,8 +11,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use clap::{Args, Subcommand};
 use flexarm::settings::written::visible;
 use flexarm::sweep::{
-    BestRun, Finders, MetricFigures, ParameterFigures, ParameterRole, ParameterValue,
-    Replay, Shard, Sweep, SweepError, SweepRequest, SweepSummary, merge,
+    BestRun, Finders, MetricFigures, ParameterFigures, ParameterRole, ParameterValue, Replay, Shard, Sweep, SweepError,
+    SweepRequest, SweepSummary, merge,
 };
 
 use self::plan::PlanArgs;

@@ -5,26 +5,26 @@
 
 use std::collections::{BTreeSet, HashMap};
 
-use super::error::{ExchangeError, ExchangeErrorKind};
 use super::matrix::{DofLabel, LabelledMatrix, Storage, Triplets};
 use super::text::{Text, shown, words};
+use crate::FeFileError;
 
 /// Lines with data, without comments and empty lines.
-fn data<'a>(text: &Text<'a>) -> impl Iterator<Item = (super::error::ErrorPosition<'a>, &'a str)> + use<'a> {
+fn data<'a>(text: &Text<'a>) -> impl Iterator<Item = (super::position::ErrorPosition<'a>, &'a str)> + use<'a> {
     text.lines().filter(|(_, line)| !line.starts_with("**") && !line.trim().is_empty())
 }
 
 /// Reads `node,dof,node,dof,value` (commas or blanks); rows are sorted by node and component.
 ///
 /// Also returns a warning about internal unknowns (negative labels), if there are any.
-pub fn parse_labelled(text: Text<'_>) -> Result<(LabelledMatrix, Option<String>), ExchangeError> {
+pub fn parse_labelled(text: Text<'_>) -> Result<(LabelledMatrix, Option<String>), FeFileError> {
     let mut entries = Vec::new();
     for (place, line) in data(&text) {
         let mut values = words(line);
-        let mut label = |what| -> Result<DofLabel, ExchangeError> {
+        let mut label = |what| -> Result<DofLabel, FeFileError> {
             let node = place.integer(what, place.word(what, &mut values)?)?;
             let dof = place.word("degree of freedom", &mut values)?;
-            let range = || place.fail(ExchangeErrorKind::Syntax, "degree of freedom", shown(dof), "0 to 255", "");
+            let range = || place.fail("degree of freedom", shown(dof), "0 to 255", "");
             Ok(DofLabel::new(node, dof.parse().map_err(|_| range())?))
         };
         let (row, column) = (label("node of the row")?, label("node of the column")?);
@@ -50,13 +50,13 @@ pub fn parse_labelled(text: Text<'_>) -> Result<(LabelledMatrix, Option<String>)
         triplets.push(index[&row], index[&column], value, &place);
     }
     if rows.is_empty() {
-        return Err(text.file().fail(ExchangeErrorKind::Missing, "matrix", "no entries", "at least one", ""));
+        return Err(text.file().fail("matrix", "no entries", "at least one", ""));
     }
     Ok((triplets.symmetric("the matrix", text.origin, rows, Storage::BySize)?, warning))
 }
 
 /// Reads `row column value`, rows from 1; they have no labels.
-pub(super) fn parse_coordinate(text: Text<'_>, storage: Storage) -> Result<LabelledMatrix, ExchangeError> {
+pub(super) fn parse_coordinate(text: Text<'_>, storage: Storage) -> Result<LabelledMatrix, FeFileError> {
     let mut triplets = Triplets::default();
     for (place, line) in data(&text) {
         let mut values = words(line);
@@ -71,21 +71,21 @@ pub(super) fn parse_coordinate(text: Text<'_>, storage: Storage) -> Result<Label
 }
 
 /// Reads a CalculiX `.dof`: one `node.dof` per row, as text, because `10.1` and `10.10` differ.
-pub fn parse_dof_list(text: Text<'_>) -> Result<Vec<DofLabel>, ExchangeError> {
+pub fn parse_dof_list(text: Text<'_>) -> Result<Vec<DofLabel>, FeFileError> {
     let mut rows = Vec::new();
     for (place, line) in data(&text) {
         let label = line
             .trim()
             .split_once('.')
             .and_then(|(node, dof)| Some(DofLabel::new(node.parse().ok()?, dof.parse().ok()?)));
-        let wrong = || place.fail(ExchangeErrorKind::Syntax, "row", shown(line), "node.dof, such as 948.3", "");
+        let wrong = || place.fail("row", shown(line), "node.dof, such as 948.3", "");
         rows.push(label.ok_or_else(wrong)?);
     }
     Ok(rows)
 }
 
 /// Reads an ANSYS `.mapping`: `equation node label`, with labels such as `UX` and `ROTX`.
-pub(super) fn parse_equation_mapping(text: Text<'_>) -> Result<Vec<DofLabel>, ExchangeError> {
+pub(super) fn parse_equation_mapping(text: Text<'_>) -> Result<Vec<DofLabel>, FeFileError> {
     const COMPONENTS: [&str; 6] = ["UX", "UY", "UZ", "ROTX", "ROTY", "ROTZ"];
     let mut rows = Vec::new();
     for (place, line) in data(&text).skip(1) {
@@ -93,14 +93,14 @@ pub(super) fn parse_equation_mapping(text: Text<'_>) -> Result<Vec<DofLabel>, Ex
         let equation = place.index("equation", place.word("equation", &mut values)?)?;
         if equation != rows.len() {
             let (found, expected) = (format!("{}", equation + 1), format!("{}", rows.len() + 1));
-            return Err(place.fail(ExchangeErrorKind::Syntax, "equation", found, expected, "equations in order"));
+            return Err(place.fail("equation", found, expected, "equations in order"));
         }
         let node = place.integer("node", place.word("node", &mut values)?)?;
         let name = place.word("DOF", &mut values)?;
         let dof = COMPONENTS.iter().position(|known| name.eq_ignore_ascii_case(known));
         let wrong = || {
             let help = "only displacements and rotations can be taken over";
-            place.fail(ExchangeErrorKind::Unsupported, "DOF", shown(name), COMPONENTS.join(", "), help)
+            place.fail("DOF", shown(name), COMPONENTS.join(", "), help)
         };
         rows.push(DofLabel::new(node, dof.ok_or_else(wrong)? as u8 + 1));
     }

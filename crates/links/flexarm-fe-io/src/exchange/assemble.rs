@@ -14,10 +14,11 @@
 use nalgebra::DMatrix;
 
 use super::diagnose::diagnose_substructure;
-use super::error::{ErrorPosition, ExchangeError, ExchangeErrorKind};
 use super::interface::{InterfaceMap, propose_map};
 use super::matrix::{Entries, LabelledMatrix};
+use super::position::ErrorPosition;
 use super::read::ImportedMatrices;
+use crate::FeFileError;
 use flexarm_fem::units::UnitSystem;
 
 /// Stiffness and mass of the interfaces, SI, modal coordinates last.
@@ -41,21 +42,20 @@ pub struct InterfaceMatrices {
 /// * `units`: units of the file; `None` uses those of the sidecar.
 ///
 /// # Errors
-/// [`ExchangeErrorKind::Ambiguous`] without a map (with a proposal) or without units,
-/// [`ExchangeErrorKind::Interface`] if the map does not fit or leaves rows that are not modes,
-/// [`ExchangeErrorKind::Defective`] from [`diagnose_substructure`].
+/// Without a map (with a proposal) or units, for a map that does not fit or leaves rows that are not
+/// modes, and as [`diagnose_substructure`].
 pub fn assemble_interfaces(
     imported: &ImportedMatrices,
     map: Option<&InterfaceMap>,
     units: Option<&UnitSystem>,
-) -> Result<InterfaceMatrices, ExchangeError> {
+) -> Result<InterfaceMatrices, FeFileError> {
     let place = ErrorPosition::file(&imported.origin);
     let sidecar = imported.sidecar.as_ref();
     let map = map.cloned().or_else(|| Some(sidecar?.map())).filter(|map| !map.interfaces.is_empty());
     let map = map.ok_or_else(|| ask_for_map(imported))?;
     let Some(units) = units.copied().or_else(|| Some(sidecar?.units)) else {
         let help = "name them, such as m-kg-s or mm-t-s";
-        return Err(place.fail(ExchangeErrorKind::Ambiguous, "units", "nothing", "the units of the file", help));
+        return Err(place.fail("units", "nothing", "the units of the file", help));
     };
     let resolved = map.resolve(&imported.stiffness.rows, &imported.origin)?;
     let rows: Vec<usize> = resolved.interfaces.iter().flatten().chain(&resolved.modal).copied().collect();
@@ -70,11 +70,11 @@ pub fn assemble_interfaces(
         .collect();
     let energy = units.force() * units.length;
     let inertia = units.mass * units.length * units.length;
-    let pick = |matrix: &LabelledMatrix, unit: f64| -> Result<DMatrix<f64>, ExchangeError> {
+    let pick = |matrix: &LabelledMatrix, unit: f64| -> Result<DMatrix<f64>, FeFileError> {
         let Entries::Dense(dense) = &matrix.entries else {
             let found = format!("a matrix of {} rows", matrix.size());
             let help = "a full model must first be reduced to its interfaces";
-            return Err(place.fail(ExchangeErrorKind::Interface, "rows", found, "a reduced matrix", help));
+            return Err(place.fail("rows", found, "a reduced matrix", help));
         };
         Ok(DMatrix::from_fn(rows.len(), rows.len(), |i, j| dense[(rows[i], rows[j])] * (unit / (d[i] * d[j]))))
     };
@@ -99,7 +99,7 @@ fn check_modes(
     K: &DMatrix<f64>,
     rows: &[usize],
     boundary: usize,
-) -> Result<(), ExchangeError> {
+) -> Result<(), FeFileError> {
     /// Maximum coupling relative to the diagonal that counts as rounding.
     const COUPLED: f64 = 1e-6;
     let is_said = |i: usize| imported.stiffness.rows[rows[i]].node.is_some_and(|node| node >= 0);
@@ -112,19 +112,13 @@ fn check_modes(
         let help = "if these rows are modal coordinates, add modal=#13-22 to the map; a full model must first be \
                     reduced to its interfaces";
         let expected = "fixed-interface modes, which have no stiffness with other rows";
-        return Err(ErrorPosition::file(&imported.origin).fail(
-            ExchangeErrorKind::Interface,
-            "rows",
-            found,
-            expected,
-            help,
-        ));
+        return Err(ErrorPosition::file(&imported.origin).fail("rows", found, expected, help));
     }
     Ok(())
 }
 
 /// Error that asks for the rows of A and B, with a proposed map if the rows suggest one.
-fn ask_for_map(imported: &ImportedMatrices) -> ExchangeError {
+fn ask_for_map(imported: &ImportedMatrices) -> FeFileError {
     let rows = &imported.stiffness.rows;
     let help = match propose_map(rows) {
         Some(map) => format!("if the proximal interface comes first, give the map {map}"),
@@ -133,5 +127,5 @@ fn ask_for_map(imported: &ImportedMatrices) -> ExchangeError {
     let nodes: std::collections::BTreeSet<i64> = rows.iter().filter_map(|label| label.node).collect();
     let found = format!("{} rows of {} nodes and nothing about interfaces", rows.len(), nodes.len());
     let expected = "which rows are interface A and which B";
-    ErrorPosition::file(&imported.origin).fail(ExchangeErrorKind::Ambiguous, "interfaces", found, expected, help)
+    ErrorPosition::file(&imported.origin).fail("interfaces", found, expected, help)
 }

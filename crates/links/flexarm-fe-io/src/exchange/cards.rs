@@ -1,7 +1,8 @@
 //! Nastran bulk data: joins physical lines in small, large or free field into entries.
 
-use super::error::{ErrorPosition, ExchangeError, ExchangeErrorKind};
+use super::position::ErrorPosition;
 use super::text::{Text, shown};
+use crate::FeFileError;
 
 /// Entry with all its continuation lines.
 #[derive(Debug)]
@@ -28,7 +29,7 @@ impl<'a> Card<'a> {
 }
 
 /// Entries with one of these keywords, in file order.
-pub(super) fn cards<'a>(text: Text<'a>, keywords: &[&str]) -> Result<Vec<Card<'a>>, ExchangeError> {
+pub(super) fn cards<'a>(text: Text<'a>, keywords: &[&str]) -> Result<Vec<Card<'a>>, FeFileError> {
     let mut cards: Vec<Card<'_>> = Vec::new();
     let mut skipping = true;
     for (place, line) in text.lines() {
@@ -50,7 +51,7 @@ pub(super) fn cards<'a>(text: Text<'a>, keywords: &[&str]) -> Result<Vec<Card<'a
         let Some(card) = cards.last_mut().filter(|_| !skipping) else { continue };
         if let Some(beyond) = beyond {
             let (found, help) = (shown(beyond), "put the rest on a line of its own that begins with a comma");
-            return Err(place.fail(ExchangeErrorKind::Syntax, "free field", found, "ten fields in a line", help));
+            return Err(place.fail("free field", found, "ten fields in a line", help));
         }
         card.fields.extend(fields);
     }

@@ -2,9 +2,10 @@
 
 use nalgebra::DMatrix;
 
-use super::error::{ErrorPosition, ExchangeError, ExchangeErrorKind};
+use super::position::ErrorPosition;
 use super::read::ImportedMatrices;
 use super::recognise::MatrixFormat;
+use crate::FeFileError;
 
 /// Relative force under translation above which it is of order one: nothing cancels.
 const OF_ORDER_ONE: f64 = 0.5;
@@ -23,12 +24,12 @@ const ROUND_OFF: f64 = 1e-10;
 /// * `K`: rows of the interfaces first, six each; any units.
 ///
 /// # Errors
-/// [`ExchangeErrorKind::Defective`].
+/// If the interfaces are uncoupled.
 pub fn diagnose_substructure(
     imported: &ImportedMatrices,
     K: &DMatrix<f64>,
     interfaces: usize,
-) -> Result<(), ExchangeError> {
+) -> Result<(), FeFileError> {
     if interfaces < 2 || K.nrows() < 6 * interfaces {
         return Ok(());
     }
@@ -52,7 +53,7 @@ pub fn diagnose_substructure(
         "is the matrix not condensed, or are the rows those of other interfaces?"
     };
     let expected = "a free structure whose interfaces feel each other";
-    Err(ErrorPosition::file(&imported.origin).fail(ExchangeErrorKind::Defective, "stiffness", found, expected, help))
+    Err(ErrorPosition::file(&imported.origin).fail("stiffness", found, expected, help))
 }
 
 /// Maximum `|k_ij| / sqrt(|k_ii k_jj|)` between an interface and the others; 0 only if all are

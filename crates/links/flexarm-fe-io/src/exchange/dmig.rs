@@ -10,9 +10,10 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use nalgebra::Vector3;
 
 use super::cards::{Card, cards};
-use super::error::{ErrorPosition, ExchangeError, ExchangeErrorKind};
 use super::matrix::{DofLabel, LabelledMatrix, Storage, Triplets};
+use super::position::ErrorPosition;
 use super::text::{Text, shown};
+use crate::FeFileError;
 
 /// Contents of a file with DMIG entries.
 #[derive(Debug, Default)]
@@ -31,7 +32,7 @@ struct RawMatrix<'a> {
 }
 
 /// Reads all matrices that can be a stiffness or a mass; others are named in the warnings.
-pub fn parse(text: Text<'_>) -> Result<Dmig, ExchangeError> {
+pub fn parse(text: Text<'_>) -> Result<Dmig, FeFileError> {
     let mut result = Dmig::default();
     let mut matrices: Vec<RawMatrix<'_>> = Vec::new();
     let mut index: HashMap<String, usize> = HashMap::new();
@@ -60,17 +61,17 @@ pub fn parse(text: Text<'_>) -> Result<Dmig, ExchangeError> {
 }
 
 /// Checks the header `DMIG NAME 0 IFO TIN TOUT POLAR _ NCOL`.
-fn check_header(card: &Card<'_>, name: &str) -> Result<(), ExchangeError> {
+fn check_header(card: &Card<'_>, name: &str) -> Result<(), FeFileError> {
     let place = card.place;
     let is_header = card.field(1) == "0" && !card.field(2).is_empty();
     if name.is_empty() || !is_header {
         let element = format!("DMIG {name}");
         let expected = "its header first: DMIG, NAME, 0, IFO, TIN";
-        return Err(place.fail(ExchangeErrorKind::Syntax, element, "a column", expected, "is the file cut off?"));
+        return Err(place.fail(element, "a column", expected, "is the file cut off?"));
     }
     let refuse = |what, field: &str, expected, help| {
         let element = format!("DMIG {name}, {what}");
-        Err(place.fail(ExchangeErrorKind::Unsupported, element, shown(field), expected, help))
+        Err(place.fail(element, shown(field), expected, help))
     };
     match card.field(2) {
         "1" | "2" | "6" | "9" => {}
@@ -84,7 +85,7 @@ fn check_header(card: &Card<'_>, name: &str) -> Result<(), ExchangeError> {
 }
 
 /// Reads a column `DMIG NAME GJ CJ _ (Gi Ci Ai Bi)...`.
-fn parse_column<'a>(card: &Card<'a>, matrix: &mut RawMatrix<'a>) -> Result<(), ExchangeError> {
+fn parse_column<'a>(card: &Card<'a>, matrix: &mut RawMatrix<'a>) -> Result<(), FeFileError> {
     let column = label(&card.place, "column", card.field(1), card.field(2))?;
     let place_of = |i: usize| card.place_of(i);
     for first in (4..card.fields.len()).step_by(4) {
@@ -96,15 +97,15 @@ fn parse_column<'a>(card: &Card<'a>, matrix: &mut RawMatrix<'a>) -> Result<(), E
         let row = label(&place, "row", node, dof)?;
         let element = format!("DMIG {}, row {row}, column {column}", matrix.name);
         if !imaginary.is_empty() && place.number(&element, imaginary)? != 0.0 {
-            let (found, kind) = (shown(imaginary), ExchangeErrorKind::Unsupported);
-            return Err(place.fail(kind, element, found, "no imaginary part", ""));
+            let found = shown(imaginary);
+            return Err(place.fail(element, found, "no imaginary part", ""));
         }
         matrix.entries.push((row, column, place.number(&element, value)?, place));
     }
     Ok(())
 }
 
-fn label(place: &ErrorPosition<'_>, what: &str, node: &str, dof: &str) -> Result<DofLabel, ExchangeError> {
+fn label(place: &ErrorPosition<'_>, what: &str, node: &str, dof: &str) -> Result<DofLabel, FeFileError> {
     let node = place.integer(what, node)?;
     let component = match dof {
         "" => Some(0),
@@ -112,13 +113,13 @@ fn label(place: &ErrorPosition<'_>, what: &str, node: &str, dof: &str) -> Result
     };
     let wrong = || {
         let element = format!("component of the {what}");
-        place.fail(ExchangeErrorKind::Syntax, element, shown(dof), "1 to 6, or 0 for a scalar point", "")
+        place.fail(element, shown(dof), "1 to 6, or 0 for a scalar point", "")
     };
     component.map(|dof| DofLabel::new(node, dof)).ok_or_else(wrong)
 }
 
 /// Reads a grid point `GRID ID CP X1 X2 X3 CD`.
-fn parse_grid(card: &Card<'_>, result: &mut Dmig) -> Result<(), ExchangeError> {
+fn parse_grid(card: &Card<'_>, result: &mut Dmig) -> Result<(), FeFileError> {
     let place = card.place;
     let id = place.integer("GRID number", card.field(0))?;
     let mut p = Vector3::zeros();
@@ -147,7 +148,7 @@ fn assemble(
     raw: RawMatrix<'_>,
     text: Text<'_>,
     warnings: &mut Vec<String>,
-) -> Result<Option<LabelledMatrix>, ExchangeError> {
+) -> Result<Option<LabelledMatrix>, FeFileError> {
     let RawMatrix { name, is_rectangular, header, entries } = raw;
     let rows: BTreeSet<DofLabel> = entries.iter().map(|(row, ..)| *row).collect();
     let columns: BTreeSet<DofLabel> = entries.iter().map(|(_, column, ..)| *column).collect();

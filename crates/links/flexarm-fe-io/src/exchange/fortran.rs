@@ -1,8 +1,9 @@
 //! Fortran edit descriptors: `(8I10)`, `(1P,3E25.16)`, `1P5D16.9`, fields of such formats, and numbers
 //! as Fortran writes them.
 
-use super::error::{ErrorPosition, ExchangeError, ExchangeErrorKind};
+use super::position::ErrorPosition;
 use super::text::shown;
+use crate::FeFileError;
 
 /// Repeated fields of equal width.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -12,14 +13,14 @@ pub struct Format {
 }
 
 /// Parses the last descriptor of a format.
-pub fn parse_format(text: &str, place: &ErrorPosition<'_>) -> Result<Format, ExchangeError> {
+pub fn parse_format(text: &str, place: &ErrorPosition<'_>) -> Result<Format, FeFileError> {
     let upper = text.to_ascii_uppercase();
     let width = upper.rfind(['I', 'E', 'D', 'F', 'G']).and_then(|letter| {
         let digits: String = upper[letter + 1..].chars().take_while(char::is_ascii_digit).collect();
         digits.parse().ok().filter(|width| (1..=80).contains(width))
     });
     let expected = "a Fortran format such as (3E25.16)";
-    let wrong = || place.fail(ExchangeErrorKind::Syntax, "format", shown(text), expected, "");
+    let wrong = || place.fail("format", shown(text), expected, "");
     width.map(|width| Format { width }).ok_or_else(wrong)
 }
 

@@ -1,17 +1,18 @@
 //! Harwell-Boeing as written by ANSYS `HBMAT`: `RSA` (lower triangle by columns) and `RUA`.
 
-use super::error::{ErrorPosition, ExchangeError, ExchangeErrorKind};
 use super::fortran::{Format, parse_format};
 use super::matrix::{LabelledMatrix, Storage, Triplets};
+use super::position::ErrorPosition;
 use super::text::{Text, shown, words};
+use crate::FeFileError;
 
 /// Reads a matrix; a `.mapping` file gives the labels of its rows.
-pub(super) fn parse(text: Text<'_>) -> Result<LabelledMatrix, ExchangeError> {
+pub(super) fn parse(text: Text<'_>) -> Result<LabelledMatrix, FeFileError> {
     let mut lines = text.lines();
     let mut next = || {
         lines.next().ok_or_else(|| {
             let expected = "a header of four lines";
-            text.file().fail(ExchangeErrorKind::Syntax, "header", "the end of the file", expected, "")
+            text.file().fail("header", "the end of the file", expected, "")
         })
     };
     let (_title, (place, counts)) = (next()?, next()?);
@@ -38,13 +39,13 @@ pub(super) fn parse(text: Text<'_>) -> Result<LabelledMatrix, ExchangeError> {
         let end = place.index("column pointer", pointer)?;
         if end < start || end > promised || (column == 0 && end != 0) || (column == n && end != promised) {
             let expected = format!("rising numbers from 1 to {}", promised + 1);
-            return Err(place.fail(ExchangeErrorKind::Syntax, "column pointer", shown(pointer), expected, ""));
+            return Err(place.fail("column pointer", shown(pointer), expected, ""));
         }
         for ((place, row), (value_place, value)) in indices[start..end].iter().zip(&values[start..end]) {
             let row = place.index("row number", row)?;
             if row >= n {
                 let found = format!("{}", row + 1);
-                return Err(place.fail(ExchangeErrorKind::Syntax, "row number", found, format!("1 to {n}"), ""));
+                return Err(place.fail("row number", found, format!("1 to {n}"), ""));
             }
             triplets.push(row, column - 1, value_place.number("entry", value)?, value_place);
         }
@@ -61,13 +62,13 @@ fn list<'a>(
     what: &str,
     format: Format,
     count: usize,
-) -> Result<Vec<(ErrorPosition<'a>, &'a str)>, ExchangeError> {
+) -> Result<Vec<(ErrorPosition<'a>, &'a str)>, FeFileError> {
     let mut fields = Vec::new();
     while fields.len() < count {
         let Some((place, line)) = lines.next() else {
             let (found, expected) = (format!("{} {what}", fields.len()), format!("{count}"));
             let help = "is the file cut off?";
-            return Err(text.file().fail(ExchangeErrorKind::WrongSize, "matrix", found, expected, help));
+            return Err(text.file().fail("matrix", found, expected, help));
         };
         fields.extend(format.fields(line).map(|field| (place, field)));
     }
@@ -76,19 +77,19 @@ fn list<'a>(
 }
 
 /// Numbers of rows and entries of a real, symmetric or unsymmetric, assembled matrix.
-fn parse_kind(place: &ErrorPosition<'_>, line: &str) -> Result<(usize, usize), ExchangeError> {
+fn parse_kind(place: &ErrorPosition<'_>, line: &str) -> Result<(usize, usize), FeFileError> {
     let mut words = words(line);
     let kind = place.word("type", &mut words)?;
     if !matches!(kind.to_ascii_uppercase().as_str(), "RSA" | "RUA") {
         let expected = "RSA or RUA: real, symmetric or unsymmetric, assembled";
-        return Err(place.fail(ExchangeErrorKind::Unsupported, "type", shown(kind), expected, ""));
+        return Err(place.fail("type", shown(kind), expected, ""));
     }
     let rows = place.index("number of rows", place.word("number of rows", &mut words)?)? + 1;
     let columns = place.index("number of columns", place.word("number of columns", &mut words)?)? + 1;
     let entries = place.index("number of entries", place.word("number of entries", &mut words)?)? + 1;
     if rows != columns {
         let found = format!("{rows} rows and {columns} columns");
-        return Err(place.fail(ExchangeErrorKind::Unsupported, "size", found, "a square matrix", ""));
+        return Err(place.fail("size", found, "a square matrix", ""));
     }
     Ok((rows, entries))
 }

@@ -12,8 +12,9 @@ use std::collections::{BTreeMap, HashMap};
 use std::fmt;
 use std::str::FromStr;
 
-use super::error::{ErrorPosition, ExchangeError, ExchangeErrorKind};
 use super::matrix::{DofLabel, LabelledMatrix};
+use super::position::ErrorPosition;
+use crate::FeFileError;
 
 /// Name of a map in messages.
 const ORIGIN: &str = "map of interfaces";
@@ -59,16 +60,16 @@ pub struct InterfaceMap {
     pub modal: Vec<RowPick>,
 }
 
-fn wrong(element: impl Into<Box<str>>, found: impl Into<Box<str>>, expected: &str, help: &str) -> ExchangeError {
-    ErrorPosition::file(ORIGIN).fail(ExchangeErrorKind::Interface, element, found, expected, help)
+fn wrong(element: impl Into<Box<str>>, found: impl Into<Box<str>>, expected: &str, help: &str) -> FeFileError {
+    ErrorPosition::file(ORIGIN).fail(element, found, expected, help)
 }
 
 impl Interface {
     /// Parses the rows of one interface, such as `947:1-3+948:1-3`.
     ///
     /// # Errors
-    /// [`ExchangeErrorKind::Interface`].
-    pub fn parse(name: &str, rows: &str) -> Result<Self, ExchangeError> {
+    /// If the text is not a list of rows.
+    pub fn parse(name: &str, rows: &str) -> Result<Self, FeFileError> {
         let picks = rows.split('+').map(|text| parse_pick(name, text)).collect::<Result<_, _>>()?;
         Ok(Self { name: name.to_owned(), picks })
     }
@@ -79,7 +80,7 @@ impl Interface {
     }
 }
 
-fn parse_pick(name: &str, text: &str) -> Result<RowPick, ExchangeError> {
+fn parse_pick(name: &str, text: &str) -> Result<RowPick, FeFileError> {
     let text = text.trim();
     let help = "write A=1001 or A=1001:1-6 or A=#1-6; join several with +";
     let refuse =
@@ -123,9 +124,9 @@ impl fmt::Display for InterfaceMap {
 }
 
 impl FromStr for InterfaceMap {
-    type Err = ExchangeError;
+    type Err = FeFileError;
 
-    fn from_str(text: &str) -> Result<Self, ExchangeError> {
+    fn from_str(text: &str) -> Result<Self, FeFileError> {
         let mut map = Self::default();
         for part in text.split(',') {
             let Some((name, rows)) = part.split_once('=') else {
@@ -156,10 +157,10 @@ pub struct ResolvedMap {
 impl InterfaceMap {
     /// Finds the rows; all remaining rows must be modal coordinates.
     #[doc(hidden)]
-    pub fn resolve(&self, rows: &[DofLabel], origin: &str) -> Result<ResolvedMap, ExchangeError> {
+    pub fn resolve(&self, rows: &[DofLabel], origin: &str) -> Result<ResolvedMap, FeFileError> {
         let index: HashMap<DofLabel, usize> = rows.iter().enumerate().map(|(i, label)| (*label, i)).collect();
         let mut owner: HashMap<usize, &str> = HashMap::new();
-        let mut find = |name, picks: &[RowPick]| -> Result<Vec<usize>, ExchangeError> {
+        let mut find = |name, picks: &[RowPick]| -> Result<Vec<usize>, FeFileError> {
             let mut found = Vec::new();
             for pick in picks {
                 found.extend(find_rows(*pick, name, rows.len(), &index, origin)?);
@@ -190,13 +191,7 @@ impl InterfaceMap {
                 let help = "a full model must first be reduced to its interfaces; if these rows are modal \
                             coordinates, add modal=... to the map";
                 let expected = "interfaces and modal coordinates only";
-                return Err(ErrorPosition::file(origin).fail(
-                    ExchangeErrorKind::Interface,
-                    "rows",
-                    found,
-                    expected,
-                    help,
-                ));
+                return Err(ErrorPosition::file(origin).fail("rows", found, expected, help));
             }
             modal.push(row);
         }
@@ -210,7 +205,7 @@ fn find_rows(
     size: usize,
     index: &HashMap<DofLabel, usize>,
     origin: &str,
-) -> Result<Vec<usize>, ExchangeError> {
+) -> Result<Vec<usize>, FeFileError> {
     match pick {
         RowPick::Rows { first, last } if last <= size => Ok((first - 1..last).collect()),
         RowPick::Rows { .. } => {

@@ -5,7 +5,8 @@ use std::fmt;
 
 use nalgebra::DMatrix;
 
-use super::error::{ErrorPosition, ExchangeError, ExchangeErrorKind};
+use super::position::ErrorPosition;
+use crate::FeFileError;
 
 /// Maximum number of rows of a matrix that is stored dense (32 MB).
 pub const LARGEST_DENSE: usize = 2000;
@@ -197,11 +198,11 @@ impl Triplets {
 
     /// Labels for rows without information in the file; an error if there are too few entries for
     /// `n` rows.
-    pub(super) fn unlabelled(&self, n: usize, place: &ErrorPosition<'_>) -> Result<Vec<DofLabel>, ExchangeError> {
+    pub(super) fn unlabelled(&self, n: usize, place: &ErrorPosition<'_>) -> Result<Vec<DofLabel>, FeFileError> {
         if n == 0 || (n > LARGEST_DENSE && n > 8 * self.len()) {
             let found = format!("{n} rows, but {} entries", self.len());
             let help = "a stiffness has an entry in every row; is this another file?";
-            return Err(place.fail(ExchangeErrorKind::WrongSize, "matrix", found, "entries in every row", help));
+            return Err(place.fail("matrix", found, "entries in every row", help));
         }
         Ok(vec![DofLabel::UNKNOWN; n])
     }
@@ -215,7 +216,7 @@ impl Triplets {
         origin: &str,
         rows: Vec<DofLabel>,
         storage: Storage,
-    ) -> Result<LabelledMatrix, ExchangeError> {
+    ) -> Result<LabelledMatrix, FeFileError> {
         let n = rows.len();
         let mut scale = vec![0.0_f64; n];
         for t in self.entries.iter().filter(|t| t.row == t.column) {
@@ -260,7 +261,7 @@ fn common_value(
     rows: &[DofLabel],
     name: &str,
     origin: &str,
-) -> Result<(f64, f64), ExchangeError> {
+) -> Result<(f64, f64), FeFileError> {
     let first = group[0];
     let Some(last) = group.iter().find(|t| t.value != first.value) else { return Ok((first.value, 0.0)) };
 
@@ -280,7 +281,6 @@ fn common_value(
     let line = Some(last.line as usize).filter(|line| *line > 0);
     let what = if mirrored.is_some() { "mirrored entries" } else { "the entry twice" };
     Err(ErrorPosition { origin, line }.fail(
-        ExchangeErrorKind::Unequal,
         element,
         format!("{what}: {:e} (line {}) and {:e}", first.value, first.line, last.value),
         format!("equal values, mirrored ones to {LARGEST_ASYMMETRY:.0e} of sqrt(k_ii k_jj)"),

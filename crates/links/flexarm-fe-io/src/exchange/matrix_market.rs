@@ -7,9 +7,10 @@
 
 use nalgebra::DMatrix;
 
-use super::error::{ErrorPosition, ExchangeError, ExchangeErrorKind};
 use super::matrix::{LabelledMatrix, Storage, Triplets};
+use super::position::ErrorPosition;
 use super::text::{Text, shown, words};
+use crate::FeFileError;
 
 /// Symmetry: one triangle (the lower one by the standard), or all entries.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -19,7 +20,7 @@ enum Symmetry {
 }
 
 /// Reads a matrix; its rows have no labels.
-pub fn parse(text: Text<'_>) -> Result<LabelledMatrix, ExchangeError> {
+pub fn parse(text: Text<'_>) -> Result<LabelledMatrix, FeFileError> {
     let mut lines = text.lines();
     let (place, banner) = lines.next().ok_or_else(|| cut_off(&text.file()))?;
     let (is_array, symmetry) = parse_banner(&place, banner)?;
@@ -32,7 +33,7 @@ pub fn parse(text: Text<'_>) -> Result<LabelledMatrix, ExchangeError> {
     let columns = place.index("number of columns", place.word("number of columns", &mut size)?)? + 1;
     if rows != columns {
         let found = format!("{rows} rows and {columns} columns");
-        return Err(place.fail(ExchangeErrorKind::Unsupported, "size", found, "a square matrix", ""));
+        return Err(place.fail("size", found, "a square matrix", ""));
     }
     let header = place;
     let mut triplets = Triplets::default();
@@ -49,7 +50,7 @@ pub fn parse(text: Text<'_>) -> Result<LabelledMatrix, ExchangeError> {
         let mut values = words(line);
         if triplets.len() == promised {
             let found = format!("more than {promised} entries");
-            return Err(place.fail(ExchangeErrorKind::WrongSize, "matrix", found, format!("{promised}"), ""));
+            return Err(place.fail("matrix", found, format!("{promised}"), ""));
         }
         if is_array {
             let value = place.number("entry", place.word("entry", &mut values)?)?;
@@ -64,7 +65,7 @@ pub fn parse(text: Text<'_>) -> Result<LabelledMatrix, ExchangeError> {
             let column = place.index("column", place.word("column", &mut values)?)?;
             if row.max(column) >= rows {
                 let found = format!("row {}, column {}", row + 1, column + 1);
-                return Err(place.fail(ExchangeErrorKind::Syntax, "entry", found, format!("1 to {rows}"), ""));
+                return Err(place.fail("entry", found, format!("1 to {rows}"), ""));
             }
             let value = place.number("entry", place.word("entry", &mut values)?)?;
             triplets.push(row, column, value, &place);
@@ -74,7 +75,7 @@ pub fn parse(text: Text<'_>) -> Result<LabelledMatrix, ExchangeError> {
     if triplets.len() < promised {
         let (found, expected) = (format!("{} entries", triplets.len()), format!("{promised}, as in its header"));
         let help = "is the file cut off?";
-        return Err(header.fail(ExchangeErrorKind::WrongSize, "matrix", found, expected, help));
+        return Err(header.fail("matrix", found, expected, help));
     }
     let labels = triplets.unlabelled(rows, &header)?;
     triplets.symmetric("the matrix", text.origin, labels, Storage::BySize)
@@ -87,21 +88,19 @@ fn size_of_array(rows: usize, symmetry: Symmetry) -> usize {
     }
 }
 
-fn cut_off(place: &ErrorPosition<'_>) -> ExchangeError {
-    place.fail(ExchangeErrorKind::Syntax, "header", "the end of the file", "a header and a line with the size", "")
+fn cut_off(place: &ErrorPosition<'_>) -> FeFileError {
+    place.fail("header", "the end of the file", "a header and a line with the size", "")
 }
 
 /// Parses whether the layout is an array, and the symmetry.
-fn parse_banner(place: &ErrorPosition<'_>, banner: &str) -> Result<(bool, Symmetry), ExchangeError> {
+fn parse_banner(place: &ErrorPosition<'_>, banner: &str) -> Result<(bool, Symmetry), FeFileError> {
     let lower = banner.to_ascii_lowercase();
     let words: Vec<_> = words(lower.trim_start_matches('\u{feff}')).collect();
     let [_, "matrix", layout, field, symmetry] = words[..] else {
         let expected = "%%MatrixMarket matrix coordinate|array real|integer symmetric|general";
-        return Err(place.fail(ExchangeErrorKind::Syntax, "header", shown(banner), expected, ""));
+        return Err(place.fail("header", shown(banner), expected, ""));
     };
-    let refuse = |element, found: &str, expected, help| {
-        Err(place.fail(ExchangeErrorKind::Unsupported, element, shown(found), expected, help))
-    };
+    let refuse = |element, found: &str, expected, help| Err(place.fail(element, shown(found), expected, help));
     let is_array = match layout {
         "array" => true,
         "coordinate" => false,

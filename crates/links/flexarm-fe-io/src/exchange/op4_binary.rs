@@ -1,8 +1,9 @@
 //! Nastran OUTPUT4 binary: Fortran records, little or big endian, dense or sparse, BIGMAT or not.
 
-use super::error::{ErrorPosition, ExchangeError, ExchangeErrorKind};
 use super::matrix::{LabelledMatrix, Triplets};
 use super::op4_text::Header;
+use super::position::ErrorPosition;
+use crate::FeFileError;
 
 /// Bytes with their byte order.
 struct Records<'a> {
@@ -13,7 +14,7 @@ struct Records<'a> {
 }
 
 /// Reads all square matrices.
-pub(super) fn parse(bytes: &[u8], origin: &str) -> Result<Vec<LabelledMatrix>, ExchangeError> {
+pub(super) fn parse(bytes: &[u8], origin: &str) -> Result<Vec<LabelledMatrix>, FeFileError> {
     let is_big_endian = bytes.starts_with(&24_u32.to_be_bytes());
     let mut records = Records { bytes, at: 0, is_big_endian, origin };
     let mut matrices = Vec::new();
@@ -33,11 +34,9 @@ pub(super) fn parse(bytes: &[u8], origin: &str) -> Result<Vec<LabelledMatrix>, E
 }
 
 impl<'a> Records<'a> {
-    fn fail(&self, what: &str, found: impl Into<Box<str>>, expected: &str) -> ExchangeError {
+    fn fail(&self, what: &str, found: impl Into<Box<str>>, expected: &str) -> FeFileError {
         let element = format!("{what} before byte {}", self.at);
-        let kind = ExchangeErrorKind::Syntax;
         ErrorPosition::file(self.origin).fail(
-            kind,
             element,
             found,
             expected,
@@ -72,7 +71,7 @@ impl<'a> Records<'a> {
     }
 
     /// Reads the payload of the next record.
-    fn next(&mut self, what: &str) -> Result<&'a [u8], ExchangeError> {
+    fn next(&mut self, what: &str) -> Result<&'a [u8], FeFileError> {
         let rest = &self.bytes[self.at..];
         let length = |at: usize| Some(self.integer(rest.get(at..at.checked_add(4)?)?, 0));
         let payload = length(0).and_then(|size| {
@@ -88,7 +87,7 @@ impl<'a> Records<'a> {
     }
 
     /// Reads one column; `false` after the last.
-    fn column(&mut self, header: &Header, triplets: &mut Triplets) -> Result<bool, ExchangeError> {
+    fn column(&mut self, header: &Header, triplets: &mut Triplets) -> Result<bool, FeFileError> {
         let what = format!("column of {}", header.name);
         let record = self.next(&what)?;
         if record.len() < 12 || !record.len().is_multiple_of(4) {
@@ -143,7 +142,7 @@ impl<'a> Records<'a> {
         row: usize,
         column: usize,
         triplets: &mut Triplets,
-    ) -> Result<(), ExchangeError> {
+    ) -> Result<(), FeFileError> {
         let size = if header.is_double { 8 } else { 4 };
         let count = data.len() / size;
         let fits = row > 0 && row.checked_add(count).is_some_and(|end| end <= header.rows + 1);
@@ -156,8 +155,7 @@ impl<'a> Records<'a> {
             let value = self.number(bytes, header.is_double);
             if !value.is_finite() {
                 let element = format!("entry ({}, {column}) of {}", row + i, header.name);
-                let kind = ExchangeErrorKind::NotFinite;
-                return Err(place.fail(kind, element, value.to_string(), "a finite number", ""));
+                return Err(place.fail(element, value.to_string(), "a finite number", ""));
             }
             triplets.push(row + i - 1, column - 1, value, &place);
         }

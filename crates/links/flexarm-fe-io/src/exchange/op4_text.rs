@@ -5,10 +5,11 @@
 //! Depending on the writer, the number of words in a column counts a double once or twice, so the
 //! values are counted instead.
 
-use super::error::{ErrorPosition, ExchangeError, ExchangeErrorKind};
 use super::fortran::{Format, parse_format};
 use super::matrix::{LabelledMatrix, Storage, Triplets};
+use super::position::ErrorPosition;
 use super::text::{Text, shown, words};
+use crate::FeFileError;
 
 /// Header of a matrix, in text and in binary files.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,11 +28,9 @@ impl Header {
         name: &str,
         [columns, rows, _form, kind]: [i64; 4],
         place: &ErrorPosition<'_>,
-    ) -> Result<Self, ExchangeError> {
+    ) -> Result<Self, FeFileError> {
         let element = format!("OP4 matrix {name}");
-        let refuse = |found: String, expected: &str| {
-            place.fail(ExchangeErrorKind::Unsupported, element.as_str(), found, expected, "")
-        };
+        let refuse = |found: String, expected: &str| place.fail(element.as_str(), found, expected, "");
         if !matches!(kind, 1 | 2) {
             return Err(refuse(format!("TYPE {kind}"), "1 or 2 (real)"));
         }
@@ -46,7 +45,7 @@ impl Header {
     }
 
     /// Builds the symmetric matrix, or `None` for a rectangular one.
-    pub(super) fn finish(self, triplets: Triplets, origin: &str) -> Result<Option<LabelledMatrix>, ExchangeError> {
+    pub(super) fn finish(self, triplets: Triplets, origin: &str) -> Result<Option<LabelledMatrix>, FeFileError> {
         if self.rows != self.columns {
             return Ok(None);
         }
@@ -73,7 +72,7 @@ struct Reading {
 }
 
 /// Reads all square matrices.
-pub(super) fn parse(text: Text<'_>) -> Result<Vec<LabelledMatrix>, ExchangeError> {
+pub(super) fn parse(text: Text<'_>) -> Result<Vec<LabelledMatrix>, FeFileError> {
     let mut matrices = Vec::new();
     let mut reading: Option<Reading> = None;
     for (place, line) in text.lines().filter(|(_, line)| !line.trim().is_empty()) {
@@ -86,7 +85,7 @@ pub(super) fn parse(text: Text<'_>) -> Result<Vec<LabelledMatrix>, ExchangeError
         }
         let Some(current) = reading.as_mut() else {
             let expected = "NCOL, NROW, FORM, TYPE, a name and a format";
-            return Err(place.fail(ExchangeErrorKind::Syntax, "header", shown(line), expected, ""));
+            return Err(place.fail("header", shown(line), expected, ""));
         };
         if line.contains('.') { current.values(&place, line)? } else { current.integers(&place, line)? }
     }
@@ -103,7 +102,7 @@ fn is_header(line: &str) -> bool {
         && name.is_some_and(|c| c.starts_with(|c: char| c.is_ascii_alphabetic()))
 }
 
-fn begin(place: &ErrorPosition<'_>, head: &str, line: &str) -> Result<Reading, ExchangeError> {
+fn begin(place: &ErrorPosition<'_>, head: &str, line: &str) -> Result<Reading, FeFileError> {
     let mut numbers = [0; 4];
     for (i, number) in numbers.iter_mut().enumerate() {
         *number = place.integer("header", head.get(8 * i..8 * i + 8).unwrap_or(""))?;
@@ -124,7 +123,7 @@ fn begin(place: &ErrorPosition<'_>, head: &str, line: &str) -> Result<Reading, E
 impl Reading {
     /// Reads the header of a column (three integers) or of a string of a sparse column (one or
     /// two).
-    fn integers(&mut self, place: &ErrorPosition<'_>, line: &str) -> Result<(), ExchangeError> {
+    fn integers(&mut self, place: &ErrorPosition<'_>, line: &str) -> Result<(), FeFileError> {
         self.check_count(place)?;
         let numbers = words(line).map(|word| place.integer("column", word)).collect::<Result<Vec<_>, _>>()?;
         let (row, promised) = match numbers[..] {
@@ -132,7 +131,7 @@ impl Reading {
                 let last = self.header.columns as i64 + 1;
                 if !(1..=last).contains(&column) {
                     let found = format!("column {column}");
-                    return Err(place.fail(ExchangeErrorKind::Syntax, "column", found, format!("1 to {last}"), ""));
+                    return Err(place.fail("column", found, format!("1 to {last}"), ""));
                 }
                 self.column = column as usize;
                 // The words of a sparse column are counted per string.
@@ -145,18 +144,18 @@ impl Reading {
             }
             _ => {
                 let expected = "one, two or three whole numbers";
-                return Err(place.fail(ExchangeErrorKind::Syntax, "line", shown(line), expected, ""));
+                return Err(place.fail("line", shown(line), expected, ""));
             }
         };
         let size = |n: i64| usize::try_from(n).ok().filter(|n| *n as u64 <= 2 * u64::from(u32::MAX));
         let (Some(row), Some(promised)) = (size(row), size(promised)) else {
-            return Err(place.fail(ExchangeErrorKind::Syntax, "row", shown(line), "positive numbers", ""));
+            return Err(place.fail("row", shown(line), "positive numbers", ""));
         };
         (self.row, self.promised, self.count) = (row, promised, 0);
         Ok(())
     }
 
-    fn values(&mut self, place: &ErrorPosition<'_>, line: &str) -> Result<(), ExchangeError> {
+    fn values(&mut self, place: &ErrorPosition<'_>, line: &str) -> Result<(), FeFileError> {
         for field in self.format.fields(line) {
             let value = place.number("entry", field)?;
             let row = self.row + self.count;
@@ -168,7 +167,7 @@ impl Reading {
             if self.column == 0 || row == 0 || row > self.header.rows || self.count > self.promised {
                 let element = format!("entry ({row}, {}) of {}", self.column, self.header.name);
                 let expected = format!("{} values, rows 1 to {}", self.promised, self.header.rows);
-                return Err(place.fail(ExchangeErrorKind::WrongSize, element, "one value more", expected, ""));
+                return Err(place.fail(element, "one value more", expected, ""));
             }
             self.triplets.push(row - 1, self.column - 1, value, place);
         }
@@ -176,7 +175,7 @@ impl Reading {
     }
 
     /// Checks the number of values; a double may count as one word or two.
-    fn check_count(&self, place: &ErrorPosition<'_>) -> Result<(), ExchangeError> {
+    fn check_count(&self, place: &ErrorPosition<'_>) -> Result<(), FeFileError> {
         let halves = self.header.is_double && 2 * self.count == self.promised;
         if self.count == self.promised || halves || self.column == self.header.columns + 1 {
             return Ok(());
@@ -184,17 +183,17 @@ impl Reading {
         let element = format!("column {} of {}", self.column, self.header.name);
         let found = format!("{} values", self.count);
         let expected = format!("{} words", self.promised);
-        Err(place.fail(ExchangeErrorKind::WrongSize, element, found, expected, "is the file cut off?"))
+        Err(place.fail(element, found, expected, "is the file cut off?"))
     }
 
-    fn finish(self, place: &ErrorPosition<'_>, origin: &str) -> Result<Option<LabelledMatrix>, ExchangeError> {
+    fn finish(self, place: &ErrorPosition<'_>, origin: &str) -> Result<Option<LabelledMatrix>, FeFileError> {
         self.check_count(place)?;
         if self.column != self.header.columns + 1 {
             let found = format!("the end after column {}", self.column);
             let expected = format!("column {} as its end mark", self.header.columns + 1);
             let element = format!("OP4 matrix {}", self.header.name);
             let help = "is the file cut off?";
-            return Err(place.fail(ExchangeErrorKind::WrongSize, element, found, expected, help));
+            return Err(place.fail(element, found, expected, help));
         }
         self.header.finish(self.triplets, origin)
     }

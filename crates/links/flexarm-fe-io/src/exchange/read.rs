@@ -7,12 +7,13 @@ use std::path::{Path, PathBuf};
 use flexarm_spatial::Pose;
 use nalgebra::Vector3;
 
-use super::error::{ErrorPosition, ExchangeError, ExchangeErrorKind};
 use super::matrix::{DofLabel, LabelledMatrix, MatrixRole, Storage, reordered};
+use super::position::ErrorPosition;
 use super::recognise::{MatrixFormat, is_hdf5, recognise};
 use super::sidecar::Sidecar;
 use super::text::{LARGEST_UNPACKED, Text, unpack};
 use super::{abaqus_text, dmig, harwell_boeing, matrix_market, op4_binary, op4_text, sidecar, simscape, user_element};
+use crate::FeFileError;
 use flexarm_fem::input::read_file;
 
 /// Names of the matrices to select in files with several (DMIG, OP4); `None`: by the letters K and
@@ -66,18 +67,11 @@ impl InputFile {
     /// Reads a file.
     ///
     /// # Errors
-    /// [`ExchangeErrorKind::Unreadable`].
-    pub fn open(path: impl AsRef<Path>) -> Result<Self, ExchangeError> {
+    /// If the file cannot be read.
+    pub fn open(path: impl AsRef<Path>) -> Result<Self, FeFileError> {
         let origin = path.as_ref().display().to_string();
-        let refuse = |error: std::io::Error| {
-            ErrorPosition::file(&origin).fail(
-                ExchangeErrorKind::Unreadable,
-                "file",
-                error.to_string(),
-                "a readable file",
-                "",
-            )
-        };
+        let refuse =
+            |error: std::io::Error| ErrorPosition::file(&origin).fail("file", error.to_string(), "a readable file", "");
         let bytes = read_file(path.as_ref(), LARGEST_UNPACKED).map_err(refuse)?;
         Ok(Self { origin, bytes, role: None })
     }
@@ -117,8 +111,8 @@ struct CombinedFiles {
 /// `stiffness`) or as a mass, the other matrix is found by name, with a warning.
 ///
 /// # Errors
-/// [`ExchangeError`] with file, line, element, value found and value expected.
-pub fn read_matrices<P: AsRef<Path>>(paths: &[P], names: &MatrixNames) -> Result<ImportedMatrices, ExchangeError> {
+/// [`FeFileError`] with file, line, element, value found and value expected.
+pub fn read_matrices<P: AsRef<Path>>(paths: &[P], names: &MatrixNames) -> Result<ImportedMatrices, FeFileError> {
     let mut files = paths.iter().map(InputFile::open).collect::<Result<Vec<_>, _>>()?;
     companions(&mut files)?;
     let other = other_matrix(&files)?;
@@ -133,7 +127,7 @@ pub fn read_matrices<P: AsRef<Path>>(paths: &[P], names: &MatrixNames) -> Result
 }
 
 /// Finds the mass that belongs to a single stiffness, or vice versa, by its name.
-fn other_matrix(files: &[InputFile]) -> Result<Option<InputFile>, ExchangeError> {
+fn other_matrix(files: &[InputFile]) -> Result<Option<InputFile>, FeFileError> {
     let is_matrix = |format| {
         matches!(
             format,
@@ -193,7 +187,7 @@ pub fn other_names(name: &str, role: MatrixRole) -> Vec<String> {
 }
 
 /// Adds files in the same folder that belong to the given ones.
-fn companions(files: &mut Vec<InputFile>) -> Result<(), ExchangeError> {
+fn companions(files: &mut Vec<InputFile>) -> Result<(), FeFileError> {
     // Compare canonical paths, since a file may have several paths.
     let real = |path: &Path| std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
     let given = files.len();
@@ -226,7 +220,7 @@ fn companions(files: &mut Vec<InputFile>) -> Result<(), ExchangeError> {
 }
 
 /// Paths of the files that may belong to a file, with their roles according to a sidecar.
-fn wanted_by(file: &InputFile) -> Result<Vec<(PathBuf, Option<MatrixRole>)>, ExchangeError> {
+fn wanted_by(file: &InputFile) -> Result<Vec<(PathBuf, Option<MatrixRole>)>, FeFileError> {
     let path = Path::new(&file.origin);
     let folder = path.parent().unwrap_or(Path::new(""));
     let full = path.file_name().unwrap_or_default().to_string_lossy();
@@ -264,7 +258,7 @@ fn wanted_by(file: &InputFile) -> Result<Vec<(PathBuf, Option<MatrixRole>)>, Exc
 ///
 /// # Errors
 /// As [`read_matrices`].
-pub fn parse_matrices(files: &[InputFile], names: &MatrixNames) -> Result<ImportedMatrices, ExchangeError> {
+pub fn parse_matrices(files: &[InputFile], names: &MatrixNames) -> Result<ImportedMatrices, FeFileError> {
     let mut found = CombinedFiles::default();
     for file in files {
         parse_file(file, &mut found)?;
@@ -273,7 +267,7 @@ pub fn parse_matrices(files: &[InputFile], names: &MatrixNames) -> Result<Import
     choose(found, names, origin)
 }
 
-fn parse_file(file: &InputFile, found: &mut CombinedFiles) -> Result<(), ExchangeError> {
+fn parse_file(file: &InputFile, found: &mut CombinedFiles) -> Result<(), FeFileError> {
     let origin = file.origin.as_str();
     let Some(format) = recognise(&file.bytes) else {
         let (found, help) = if is_hdf5(&file.bytes) {
@@ -288,7 +282,7 @@ fn parse_file(file: &InputFile, found: &mut CombinedFiles) -> Result<(), Exchang
         };
         let expected = "Matrix Market, CalculiX or Abaqus matrices, DMIG, OP4, Harwell-Boeing, CSV";
         let place = ErrorPosition::file(origin);
-        return Err(place.fail(ExchangeErrorKind::NotRecognised, "file", found, expected, help));
+        return Err(place.fail("file", found, expected, help));
     };
     let bytes = unpack(&file.bytes, origin)?;
     let mut matrices = parse_format(format, &bytes, file, found)?;
@@ -313,7 +307,7 @@ fn parse_format(
     bytes: &[u8],
     file: &InputFile,
     found: &mut CombinedFiles,
-) -> Result<Vec<MatrixWithRole>, ExchangeError> {
+) -> Result<Vec<MatrixWithRole>, FeFileError> {
     let origin = file.origin.as_str();
     let lossy = String::from_utf8_lossy(if format == MatrixFormat::Op4Binary { b"" } else { bytes });
     let text = Text::new(&lossy, origin);
@@ -360,7 +354,7 @@ fn parse_format(
             let help = "read it with parse_sid";
             let expected = "stiffness and mass of interfaces";
             let place = ErrorPosition::file(origin);
-            return Err(place.fail(ExchangeErrorKind::Unsupported, "file", "a modal body (SID)", expected, help));
+            return Err(place.fail("file", "a modal body (SID)", expected, help));
         }
     })
 }
@@ -402,14 +396,14 @@ fn role_by_letter(name: &str) -> Option<MatrixRole> {
 }
 
 /// Selects stiffness and mass and gives them the same rows.
-fn choose(mut found: CombinedFiles, names: &MatrixNames, origin: &str) -> Result<ImportedMatrices, ExchangeError> {
+fn choose(mut found: CombinedFiles, names: &MatrixNames, origin: &str) -> Result<ImportedMatrices, FeFileError> {
     for (name, role) in [(&names.stiffness, MatrixRole::Stiffness), (&names.mass, MatrixRole::Mass)] {
         let Some(name) = name else { continue };
         let is_named = |candidate: &Candidate| candidate.matrix.name.eq_ignore_ascii_case(name);
         if !found.candidates.iter().any(is_named) {
             let (found, expected) = (format!("{name:?}"), format!("one of {}", list(&found.candidates)));
             let element = format!("name of the {}", role.name());
-            return Err(ErrorPosition::file(origin).fail(ExchangeErrorKind::Missing, element, found, expected, ""));
+            return Err(ErrorPosition::file(origin).fail(element, found, expected, ""));
         }
         for candidate in &mut found.candidates {
             if is_named(candidate) {
@@ -424,12 +418,11 @@ fn choose(mut found: CombinedFiles, names: &MatrixNames, origin: &str) -> Result
         only.role = only.role.or(Some(MatrixRole::Stiffness));
     }
     let all = list(&found.candidates);
-    let mut take = |role: MatrixRole| -> Result<Option<Candidate>, ExchangeError> {
+    let mut take = |role: MatrixRole| -> Result<Option<Candidate>, FeFileError> {
         let fits = |candidate: &&Candidate| candidate.role == Some(role);
         if found.candidates.iter().filter(fits).count() > 1 {
             let help = format!("name the {}, or give its file alone", role.name());
-            let kind = ExchangeErrorKind::Ambiguous;
-            return Err(ErrorPosition::file(origin).fail(kind, role.name(), all.clone(), "one matrix", help));
+            return Err(ErrorPosition::file(origin).fail(role.name(), all.clone(), "one matrix", help));
         }
         let place = found.candidates.iter().position(|candidate| candidate.role == Some(role));
         Ok(place.map(|i| found.candidates.swap_remove(i)))
@@ -438,13 +431,7 @@ fn choose(mut found: CombinedFiles, names: &MatrixNames, origin: &str) -> Result
     let Some(stiffness) = stiffness else {
         let help = "say which matrix is the stiffness";
         let nothing = if all.is_empty() { "no matrix".to_owned() } else { all };
-        return Err(ErrorPosition::file(origin).fail(
-            ExchangeErrorKind::Missing,
-            "stiffness",
-            nothing,
-            "a stiffness",
-            help,
-        ));
+        return Err(ErrorPosition::file(origin).fail("stiffness", nothing, "a stiffness", help));
     };
 
     let Candidate { format, origin, matrix: mut K, .. } = stiffness;
@@ -467,17 +454,11 @@ fn list(candidates: &[Candidate]) -> String {
     candidates.iter().map(text).collect::<Vec<_>>().join(", ")
 }
 
-fn apply_labels(matrix: &mut LabelledMatrix, labels: &[DofLabel], from: &str) -> Result<(), ExchangeError> {
+fn apply_labels(matrix: &mut LabelledMatrix, labels: &[DofLabel], from: &str) -> Result<(), FeFileError> {
     if labels.len() != matrix.size() {
         let (found, expected) = (format!("{} rows", labels.len()), format!("{}, as the matrix has", matrix.size()));
         let help = "do the files belong to the same calculation?";
-        return Err(ErrorPosition::file(from).fail(
-            ExchangeErrorKind::WrongSize,
-            "list of rows",
-            found,
-            expected,
-            help,
-        ));
+        return Err(ErrorPosition::file(from).fail("list of rows", found, expected, help));
     }
     matrix.rows = labels.to_vec();
     Ok(())
@@ -488,14 +469,14 @@ fn aligned(
     K: &LabelledMatrix,
     M: &LabelledMatrix,
     origin: &str,
-) -> Result<(LabelledMatrix, LabelledMatrix), ExchangeError> {
+) -> Result<(LabelledMatrix, LabelledMatrix), FeFileError> {
     if K.rows == M.rows {
         return Ok((K.clone(), M.clone()));
     }
     let refuse = || {
         let found = format!("{} rows of stiffness, {} rows of mass", K.size(), M.size());
         let help = "do the files belong to the same calculation?";
-        ErrorPosition::file(origin).fail(ExchangeErrorKind::WrongSize, "rows", found, "the same rows", help)
+        ErrorPosition::file(origin).fail("rows", found, "the same rows", help)
     };
     let unique = |matrix: &LabelledMatrix| {
         matrix.is_labelled() && matrix.rows.iter().collect::<HashSet<_>>().len() == matrix.size()

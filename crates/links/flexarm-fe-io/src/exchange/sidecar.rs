@@ -21,9 +21,9 @@ use flexarm_spatial::Pose;
 use nalgebra::{Matrix3, Rotation3, Translation3, Vector3};
 use serde::Deserialize;
 
-use super::error::{ExchangeError, ExchangeErrorKind};
 use super::interface::{Interface, InterfaceMap};
 use super::text::Text;
+use crate::FeFileError;
 use flexarm_fem::units::UnitSystem;
 
 /// Value of the key `format`.
@@ -86,17 +86,15 @@ fn no_rotation() -> [[f64; 3]; 3] {
 }
 
 /// Reads a sidecar.
-pub(super) fn parse(text: Text<'_>) -> Result<Sidecar, ExchangeError> {
+pub(super) fn parse(text: Text<'_>) -> Result<Sidecar, FeFileError> {
     let syntax = |error: toml::de::Error| {
         let line = error.span().map(|span| text.text.get(..span.start).unwrap_or("").matches('\n').count() + 1);
-        let place = super::error::ErrorPosition { line, ..text.file() };
+        let place = super::position::ErrorPosition { line, ..text.file() };
         let expected = "the keys format, version, stiffness, mass, units, [[interface]] with name, rows, xyz, rotation";
-        place.fail(ExchangeErrorKind::Syntax, "sidecar", error.message(), expected, "")
+        place.fail("sidecar", error.message(), expected, "")
     };
     let raw: RawSidecar = toml::from_str(text.text).map_err(syntax)?;
-    let refuse = |element: String, found: String, expected: String| {
-        text.file().fail(ExchangeErrorKind::Syntax, element, found, expected, "")
-    };
+    let refuse = |element: String, found: String, expected: String| text.file().fail(element, found, expected, "");
     if raw.format != FORMAT || raw.version != VERSION {
         let found = format!("{:?}, version {}", raw.format, raw.version);
         return Err(refuse("format".into(), found, format!("{FORMAT:?}, version {VERSION}")));

@@ -6,17 +6,17 @@
 use flexarm_spatial::Pose;
 use nalgebra::{DMatrix, Quaternion, Translation3, UnitQuaternion};
 
-use super::error::{ExchangeError, ExchangeErrorKind};
 use super::matrix::{LabelledMatrix, Storage, Triplets};
 use super::text::{Text, words};
+use crate::FeFileError;
 
 /// Lines with numbers, without comments.
-fn rows<'a>(text: &Text<'a>) -> impl Iterator<Item = (super::error::ErrorPosition<'a>, &'a str)> + use<'a> {
+fn rows<'a>(text: &Text<'a>) -> impl Iterator<Item = (super::position::ErrorPosition<'a>, &'a str)> + use<'a> {
     text.lines().filter(|(_, line)| !line.trim().is_empty() && !line.starts_with(['#', '%']))
 }
 
 /// Reads a square matrix, one row per line.
-pub(super) fn parse_matrix(text: Text<'_>) -> Result<LabelledMatrix, ExchangeError> {
+pub(super) fn parse_matrix(text: Text<'_>) -> Result<LabelledMatrix, FeFileError> {
     let n = rows(&text).count();
     let mut triplets = Triplets::default();
     for (row, (place, line)) in rows(&text).enumerate() {
@@ -30,7 +30,7 @@ pub(super) fn parse_matrix(text: Text<'_>) -> Result<LabelledMatrix, ExchangeErr
         }
         if count != n {
             let (found, expected) = (format!("{count} columns"), format!("{n}, as there are rows"));
-            return Err(place.fail(ExchangeErrorKind::WrongSize, "row", found, expected, "is the file cut off?"));
+            return Err(place.fail("row", found, expected, "is the file cut off?"));
         }
     }
     let labels = triplets.unlabelled(n, &text.file())?;
@@ -38,7 +38,7 @@ pub(super) fn parse_matrix(text: Text<'_>) -> Result<LabelledMatrix, ExchangeErr
 }
 
 /// Reads one frame per line: `x, y, z, qw, qx, qy, qz`.
-pub(super) fn parse_frames(text: Text<'_>) -> Result<Vec<Pose>, ExchangeError> {
+pub(super) fn parse_frames(text: Text<'_>) -> Result<Vec<Pose>, FeFileError> {
     let mut frames = Vec::new();
     for (place, line) in rows(&text) {
         let mut values = words(line);
@@ -51,7 +51,7 @@ pub(super) fn parse_frames(text: Text<'_>) -> Result<Vec<Pose>, ExchangeError> {
         if !((quaternion.norm() - 1.0).abs() < 1e-6) {
             let found = format!("a quaternion of norm {}", quaternion.norm());
             let expected = "norm 1; the order is w, x, y, z";
-            return Err(place.fail(ExchangeErrorKind::Syntax, "frame", found, expected, ""));
+            return Err(place.fail("frame", found, expected, ""));
         }
         let R = UnitQuaternion::from_quaternion(quaternion).to_rotation_matrix();
         frames.push(Pose::from_parts(Translation3::new(v[0], v[1], v[2]), R));

@@ -5,21 +5,20 @@ use std::io::Read;
 
 use flate2::read::MultiGzDecoder;
 
-use super::error::{ErrorPosition, ExchangeError, ExchangeErrorKind};
+use super::position::ErrorPosition;
+use crate::FeFileError;
 use crate::unpack::{is_gzip, unpacked};
 
 /// Maximum unpacked size, bytes; a full model of 300 000 unknowns takes half of it.
 pub(super) const LARGEST_UNPACKED: u64 = 2 << 30;
 
 /// Returns the bytes, unpacked if they are compressed with gzip.
-pub(super) fn unpack<'b>(bytes: &'b [u8], origin: &str) -> Result<Cow<'b, [u8]>, ExchangeError> {
+pub(super) fn unpack<'b>(bytes: &'b [u8], origin: &str) -> Result<Cow<'b, [u8]>, FeFileError> {
     if !is_gzip(bytes) {
         return Ok(Cow::Borrowed(bytes));
     }
     let unpacked = unpacked(bytes, LARGEST_UNPACKED);
-    unpacked.map(Cow::Owned).map_err(|e| {
-        ErrorPosition::file(origin).fail(ExchangeErrorKind::Unreadable, "gzip data", e.found, e.expected, e.help)
-    })
+    unpacked.map(Cow::Owned).map_err(|e| ErrorPosition::file(origin).fail("gzip data", e.found, e.expected, e.help))
 }
 
 /// Returns the first bytes, unpacked; an unpacking error ends the result silently.
@@ -84,27 +83,27 @@ pub fn real(text: &str) -> Option<f64> {
 
 impl ErrorPosition<'_> {
     /// Parses a finite number.
-    pub(super) fn number(&self, element: &str, text: &str) -> Result<f64, ExchangeError> {
+    pub(super) fn number(&self, element: &str, text: &str) -> Result<f64, FeFileError> {
         match real(text) {
             Some(number) if number.is_finite() => Ok(number),
             Some(_) => {
                 let help = "NaN and infinity in a matrix mean that the program that wrote it failed";
-                Err(self.fail(ExchangeErrorKind::NotFinite, element, shown(text), "a finite number", help))
+                Err(self.fail(element, shown(text), "a finite number", help))
             }
-            None => Err(self.fail(ExchangeErrorKind::Syntax, element, shown(text), "a number", "")),
+            None => Err(self.fail(element, shown(text), "a number", "")),
         }
     }
 
-    pub(super) fn integer(&self, element: &str, text: &str) -> Result<i64, ExchangeError> {
-        let wrong = || self.fail(ExchangeErrorKind::Syntax, element, shown(text), "a whole number", "");
+    pub(super) fn integer(&self, element: &str, text: &str) -> Result<i64, FeFileError> {
+        let wrong = || self.fail(element, shown(text), "a whole number", "");
         text.trim().parse().map_err(|_| wrong())
     }
 
     /// Parses a row or column number from 1; returns it from 0.
-    pub(super) fn index(&self, element: &str, text: &str) -> Result<usize, ExchangeError> {
+    pub(super) fn index(&self, element: &str, text: &str) -> Result<usize, FeFileError> {
         let wrong = || {
             let expected = "a row or column number from 1 to 4294967295";
-            self.fail(ExchangeErrorKind::Syntax, element, shown(text), expected, "")
+            self.fail(element, shown(text), expected, "")
         };
         match text.trim().parse::<u32>() {
             Ok(index) if index > 0 => Ok(index as usize - 1),
@@ -117,22 +116,14 @@ impl ErrorPosition<'_> {
         &self,
         element: &str,
         words: &mut impl Iterator<Item = &'w str>,
-    ) -> Result<&'w str, ExchangeError> {
-        words.next().ok_or_else(|| {
-            self.fail(
-                ExchangeErrorKind::Syntax,
-                element,
-                "the end of the line",
-                "one more value",
-                "is the file cut off?",
-            )
-        })
+    ) -> Result<&'w str, FeFileError> {
+        words.next().ok_or_else(|| self.fail(element, "the end of the line", "one more value", "is the file cut off?"))
     }
 
     /// Rejects anything after the last value of a line.
-    pub(super) fn end<'w>(&self, words: &mut impl Iterator<Item = &'w str>) -> Result<(), ExchangeError> {
+    pub(super) fn end<'w>(&self, words: &mut impl Iterator<Item = &'w str>) -> Result<(), FeFileError> {
         let Some(word) = words.next() else { return Ok(()) };
-        Err(self.fail(ExchangeErrorKind::Syntax, "line", shown(word), "the end of the line", ""))
+        Err(self.fail("line", shown(word), "the end of the line", ""))
     }
 }
 

@@ -5,10 +5,11 @@
 
 use nalgebra::DMatrix;
 
-use super::error::{ErrorPosition, ExchangeError, ExchangeErrorKind};
 use super::fortran::fortran;
 use super::matrix::{DofLabel, LabelledMatrix, MatrixRole, Storage, Triplets};
+use super::position::ErrorPosition;
 use super::text::{Text, shown, words};
+use crate::FeFileError;
 
 /// Section of the file that the current lines belong to.
 enum Block {
@@ -37,17 +38,17 @@ struct RawMatrix<'a> {
 }
 
 /// Reads the stiffness, the mass, or both.
-pub(super) fn parse(text: Text<'_>) -> Result<Vec<(MatrixRole, LabelledMatrix)>, ExchangeError> {
+pub(super) fn parse(text: Text<'_>) -> Result<Vec<(MatrixRole, LabelledMatrix)>, FeFileError> {
     let raw = scan(text)?;
     if raw.matrices.is_empty() {
         let help = "CalculiX and Abaqus write it with *SUBSTRUCTURE MATRIX OUTPUT, STIFFNESS=YES";
-        return Err(text.file().fail(ExchangeErrorKind::Missing, "file", "no *MATRIX", "*MATRIX,TYPE=STIFFNESS", help));
+        return Err(text.file().fail("file", "no *MATRIX", "*MATRIX,TYPE=STIFFNESS", help));
     }
     let rows = labels(&raw, text)?;
     raw.matrices.iter().map(|matrix| Ok((matrix.role, assemble(matrix, &raw, &rows, text)?))).collect()
 }
 
-fn scan(text: Text<'_>) -> Result<Raw<'_>, ExchangeError> {
+fn scan(text: Text<'_>) -> Result<Raw<'_>, FeFileError> {
     let mut raw = Raw::default();
     let mut block = Block::Other;
     for (place, line) in text.lines() {
@@ -87,7 +88,7 @@ fn scan(text: Text<'_>) -> Result<Raw<'_>, ExchangeError> {
     Ok(raw)
 }
 
-fn scan_keyword<'a>(raw: &mut Raw<'a>, place: &ErrorPosition<'a>, line: &str) -> Result<Block, ExchangeError> {
+fn scan_keyword<'a>(raw: &mut Raw<'a>, place: &ErrorPosition<'a>, line: &str) -> Result<Block, FeFileError> {
     let upper: String = line.to_ascii_uppercase().replace(' ', "");
     let mut parts = upper.trim().split(',');
     let keyword = parts.next().unwrap_or_default();
@@ -106,8 +107,7 @@ fn scan_keyword<'a>(raw: &mut Raw<'a>, place: &ErrorPosition<'a>, line: &str) ->
                 Some("MASS") => MatrixRole::Mass,
                 found => {
                     let found = shown(found.unwrap_or_default());
-                    let kind = ExchangeErrorKind::Unsupported;
-                    return Err(place.fail(kind, "*MATRIX, TYPE", found, "STIFFNESS or MASS", ""));
+                    return Err(place.fail("*MATRIX, TYPE", found, "STIFFNESS or MASS", ""));
                 }
             };
             raw.matrices.push(RawMatrix { role, place: *place, values: Vec::new() });
@@ -120,7 +120,7 @@ fn scan_keyword<'a>(raw: &mut Raw<'a>, place: &ErrorPosition<'a>, line: &str) ->
 
 /// `dof, dof, ...` of the first node, then `position, dof, dof, ...`; each is valid for the nodes
 /// that follow.
-fn scan_components(raw: &mut Raw<'_>, place: &ErrorPosition<'_>, line: &str) -> Result<(), ExchangeError> {
+fn scan_components(raw: &mut Raw<'_>, place: &ErrorPosition<'_>, line: &str) -> Result<(), FeFileError> {
     let mut numbers = Vec::new();
     for word in words(line) {
         numbers.push(place.integer("degree of freedom", word)?);
@@ -134,10 +134,10 @@ fn scan_components(raw: &mut Raw<'_>, place: &ErrorPosition<'_>, line: &str) -> 
     if position <= last || position > i64::from(u32::MAX) {
         let found = format!("position {position}");
         let expected = format!("a number above {last}");
-        return Err(place.fail(ExchangeErrorKind::Syntax, "position of a node", found, expected, ""));
+        return Err(place.fail("position of a node", found, expected, ""));
     }
     let dof = |dof: &i64| {
-        let wrong = |_| place.fail(ExchangeErrorKind::Syntax, "degree of freedom", dof.to_string(), "1 to 6", "");
+        let wrong = |_| place.fail("degree of freedom", dof.to_string(), "1 to 6", "");
         u8::try_from(*dof).map_err(wrong)
     };
     raw.components.push((position as usize - 1, dofs.iter().map(dof).collect::<Result<_, _>>()?));
@@ -145,13 +145,13 @@ fn scan_components(raw: &mut Raw<'_>, place: &ErrorPosition<'_>, line: &str) -> 
 }
 
 /// Labels of all rows; the size of the matrices is checked against them.
-fn labels(raw: &Raw<'_>, text: Text<'_>) -> Result<Vec<DofLabel>, ExchangeError> {
+fn labels(raw: &Raw<'_>, text: Text<'_>) -> Result<Vec<DofLabel>, FeFileError> {
     let place = text.file();
     let count = if raw.nodes.is_empty() { raw.nodes_promised.unwrap_or(0) } else { raw.nodes.len() };
     if raw.nodes_promised.is_some_and(|promised| promised != count) {
         let found = format!("{count} node numbers");
         let expected = format!("NODES={}", raw.nodes_promised.unwrap_or(0));
-        return Err(place.fail(ExchangeErrorKind::WrongSize, "** ELEMENT NODES", found, expected, ""));
+        return Err(place.fail("** ELEMENT NODES", found, expected, ""));
     }
     // A header that declares more nodes than there are entries is rejected.
     let most = raw.matrices.iter().map(|matrix| matrix.values.len()).max().unwrap_or(0);
@@ -167,12 +167,12 @@ fn labels(raw: &Raw<'_>, text: Text<'_>) -> Result<Vec<DofLabel>, ExchangeError>
         if rows.len() > most || position > most {
             let found = format!("{most} entries for more than {most} rows");
             let help = "is the file cut off?";
-            return Err(place.fail(ExchangeErrorKind::WrongSize, "*MATRIX", found, "a lower triangle", help));
+            return Err(place.fail("*MATRIX", found, "a lower triangle", help));
         }
     }
     if rows.is_empty() {
         let expected = "a line of degrees of freedom for each node";
-        return Err(place.fail(ExchangeErrorKind::Missing, "*USER ELEMENT", "no degrees of freedom", expected, ""));
+        return Err(place.fail("*USER ELEMENT", "no degrees of freedom", expected, ""));
     }
     Ok(rows)
 }
@@ -182,7 +182,7 @@ fn assemble(
     raw: &Raw<'_>,
     rows: &[DofLabel],
     text: Text<'_>,
-) -> Result<LabelledMatrix, ExchangeError> {
+) -> Result<LabelledMatrix, FeFileError> {
     let n = rows.len();
     let (triangle, square) = (n * (n + 1) / 2, n * n);
     let values = &raw_matrix.values;
@@ -190,8 +190,7 @@ fn assemble(
     if values.len() != triangle && !is_square {
         let found = format!("{} entries", values.len());
         let expected = format!("{triangle}, the lower triangle of {n} rows");
-        let kind = ExchangeErrorKind::WrongSize;
-        return Err(raw_matrix.place.fail(kind, "*MATRIX", found, expected, "is the file cut off?"));
+        return Err(raw_matrix.place.fail("*MATRIX", found, expected, "is the file cut off?"));
     }
     let mut triplets = Triplets::default();
     let (mut row, mut column) = (0, 0);

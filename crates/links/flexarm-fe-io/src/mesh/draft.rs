@@ -4,12 +4,10 @@ use std::collections::{BTreeMap, HashMap};
 
 use nalgebra::Vector3;
 
-use super::error::{FilePosition, MeshError, MeshErrorKind as Kind};
 use super::ids::IdIndex;
 use super::source::Source;
-use flexarm_fem::mesh::corner_count;
-use flexarm_fem::mesh::turn_reversed;
-use flexarm_fem::mesh::{ElementBlock, ElementKind, Mesh, Region};
+use crate::FeFileError;
+use flexarm_fem::mesh::{ElementBlock, ElementKind, Mesh, Region, corner_count, turn_reversed};
 use flexarm_fem::spelling::listed;
 use flexarm_fem::units::UnitSystem;
 
@@ -71,19 +69,19 @@ impl Draft {
     }
 
     /// Checks the nodes: unique numbers, finite positions, not too many.
-    pub(super) fn index_nodes(&self, src: &Source) -> Result<IdIndex, MeshError> {
+    pub(super) fn index_nodes(&self, src: &Source) -> Result<IdIndex, FeFileError> {
         if self.nodes.len() >= u32::MAX as usize {
             let found = format!("{} nodes", self.nodes.len());
-            return Err(src.error_in(Kind::TooLarge, FilePosition::File, "mesh", found, "fewer than 4294967295 nodes"));
+            return Err(src.error_in_file("mesh", found, "fewer than 4294967295 nodes"));
         }
         if let Some(k) = self.nodes.iter().position(|p| !p.iter().all(|x| x.is_finite())) {
             let (element, found) = (format!("node {}", self.node_ids[k]), format!("{:?}", self.nodes[k].as_slice()));
-            return Err(src.error(Kind::NotFinite, self.node_offsets[k], element, found, "finite coordinates"));
+            return Err(src.error(self.node_offsets[k], element, found, "finite coordinates"));
         }
         IdIndex::new(&self.node_ids).map_err(|(_, again)| {
             let element = format!("node {}", self.node_ids[again]);
             let offset = self.node_offsets[again];
-            src.error(Kind::Duplicate, offset, element, "a second node with this number", "every node once")
+            src.error(offset, element, "a second node with this number", "every node once")
         })
     }
 
@@ -94,14 +92,14 @@ impl Draft {
         index: &IdIndex,
         sets: Vec<(String, Vec<u32>)>,
         units: &UnitSystem,
-    ) -> Result<(Mesh, Vec<String>), MeshError> {
+    ) -> Result<(Mesh, Vec<String>), FeFileError> {
         let mut warnings = self.warnings;
         let mut blocks = Vec::with_capacity(self.blocks.len());
         for block in self.blocks.iter().filter(|block| !block.ids.is_empty()) {
             blocks.push(resolve(src, index, block)?);
         }
         if blocks.is_empty() {
-            let error = src.error_in(Kind::Missing, FilePosition::File, "mesh", "no volume elements", "at least one");
+            let error = src.error_in_file("mesh", "no volume elements", "at least one");
             return Err(error.help("was only the surface meshed, or are the volumes in no physical group?"));
         }
         refuse_twins(src, &self.blocks, &blocks)?;
@@ -130,17 +128,17 @@ impl Draft {
 }
 
 /// Converts node numbers to indices; rejects missing and repeated nodes.
-fn resolve(src: &Source, index: &IdIndex, block: &DraftBlock) -> Result<ElementBlock, MeshError> {
+fn resolve(src: &Source, index: &IdIndex, block: &DraftBlock) -> Result<ElementBlock, FeFileError> {
     let n = block.kind.nodes();
     let mut connectivity = Vec::with_capacity(block.nodes.len());
     for (k, nodes) in block.nodes.chunks_exact(n).enumerate() {
-        let fault = |kind, found: String, expected: &str| {
+        let fault = |found: String, expected: &str| {
             let element = format!("{} element {}", block.kind.name(), block.ids[k]);
-            src.error(kind, block.offsets[k], element, found, expected)
+            src.error(block.offsets[k], element, found, expected)
         };
         for id in nodes {
             let Some(node) = index.get(*id) else {
-                return Err(fault(Kind::Missing, format!("node {id}"), "a node of the file"));
+                return Err(fault(format!("node {id}"), "a node of the file"));
             };
             connectivity.push(node);
         }
@@ -149,14 +147,14 @@ fn resolve(src: &Source, index: &IdIndex, block: &DraftBlock) -> Result<ElementB
         sorted[..n].sort_unstable();
         if let Some(pair) = sorted[..n].windows(2).find(|pair| pair[0] == pair[1]) {
             let found = format!("node {} twice", pair[0]);
-            return Err(fault(Kind::Element, found, "different nodes").help("a collapsed element: mesh it anew"));
+            return Err(fault(found, "different nodes").help("a collapsed element: mesh it anew"));
         }
     }
     Ok(ElementBlock { kind: block.kind, region: block.region, ids: block.ids.clone(), connectivity })
 }
 
 /// Rejects two elements with the same corners.
-fn refuse_twins(src: &Source, drafts: &[DraftBlock], blocks: &[ElementBlock]) -> Result<(), MeshError> {
+fn refuse_twins(src: &Source, drafts: &[DraftBlock], blocks: &[ElementBlock]) -> Result<(), FeFileError> {
     // (sorted corners, place) of every element; duplicates are adjacent after sorting.
     let mut keys: Vec<([u32; 8], (u32, u32))> = Vec::with_capacity(blocks.iter().map(ElementBlock::len).sum());
     for (b, block) in (0..).zip(blocks) {
@@ -176,11 +174,11 @@ fn refuse_twins(src: &Source, drafts: &[DraftBlock], blocks: &[ElementBlock]) ->
         let block = filled[b as usize];
         (block.region, block.ids[k as usize], block.offsets[k as usize])
     });
-    let (kind, help) = if first == second {
-        (Kind::Element, "was a volume meshed or written twice?")
+    let help = if first == second {
+        "was a volume meshed or written twice?"
     } else {
-        (Kind::Region, "it is in two regions: leave it in one physical volume or element set")
+        "it is in two regions: leave it in one physical volume or element set"
     };
     let element = format!("elements {} and {}", id.min(twin), id.max(twin));
-    Err(src.error(kind, offset.max(again), element, "the same corner nodes", "every element once").help(help))
+    Err(src.error(offset.max(again), element, "the same corner nodes", "every element once").help(help))
 }

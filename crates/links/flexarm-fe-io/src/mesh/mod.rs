@@ -6,12 +6,10 @@
 //! [`ElementKind`](flexarm_fem::ElementKind).
 
 mod draft;
-mod error;
 pub(crate) mod gmsh;
 pub(crate) mod ids;
 pub(crate) mod inp;
 mod read;
 pub(crate) mod source;
 
-pub use error::{FilePosition, MeshError, MeshErrorKind};
 pub use read::{MeshFile, ReadOptions, parse_mesh, read_mesh};

@@ -3,8 +3,8 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use super::error::{FilePosition, MeshError, MeshErrorKind as Kind};
 use super::source::{Source, shown};
+use crate::FeFileError;
 use flexarm_fem::mesh::{BeamProperties, Mesh};
 
 use super::{gmsh, inp};
@@ -56,14 +56,12 @@ pub struct MeshFile {
 /// ```
 ///
 /// # Errors
-/// [`MeshError`] with file, place, value found and value expected.
-pub fn read_mesh(path: impl AsRef<Path>, options: &ReadOptions) -> Result<MeshFile, MeshError> {
+/// [`FeFileError`] with file, place, value found and value expected.
+pub fn read_mesh(path: impl AsRef<Path>, options: &ReadOptions) -> Result<MeshFile, FeFileError> {
     let path = path.as_ref();
     let origin = path.display().to_string();
     let src = Source { bytes: &[], origin: &origin, binary: false };
-    let unreadable = |error: std::io::Error| {
-        src.error_in(Kind::Unreadable, FilePosition::File, "file", error.to_string(), "a file that can be read")
-    };
+    let unreadable = |error: std::io::Error| src.error_in_file("file", error.to_string(), "a file that can be read");
     let bytes = read_file(path, LARGEST).map_err(unreadable)?;
     parse_mesh(&bytes, &origin, options)
 }
@@ -72,23 +70,21 @@ pub fn read_mesh(path: impl AsRef<Path>, options: &ReadOptions) -> Result<MeshFi
 ///
 /// # Errors
 /// As [`read_mesh`].
-pub fn parse_mesh(bytes: &[u8], origin: &str, options: &ReadOptions) -> Result<MeshFile, MeshError> {
+pub fn parse_mesh(bytes: &[u8], origin: &str, options: &ReadOptions) -> Result<MeshFile, FeFileError> {
     let src = Source { bytes, origin, binary: false };
     if is_gzip(bytes) {
-        let unpacked = unpacked(bytes, LARGEST).map_err(|e| {
-            let kind = if e.too_large { Kind::TooLarge } else { Kind::Unreadable };
-            src.error_in(kind, FilePosition::File, "gzip", e.found, e.expected).help(e.help)
-        })?;
+        let unpacked = unpacked(bytes, LARGEST)
+            .map_err(|error| src.error_in_file("gzip", error.found, error.expected).help(error.help))?;
         return parse_plain(&Source { bytes: &unpacked, ..src }, options);
     }
     parse_plain(&src, options)
 }
 
-fn parse_plain(src: &Source, options: &ReadOptions) -> Result<MeshFile, MeshError> {
+fn parse_plain(src: &Source, options: &ReadOptions) -> Result<MeshFile, FeFileError> {
     let text = src.bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(src.bytes).trim_ascii_start();
     if let Some((name, help)) = foreign(text) {
         let expected = "Gmsh .msh (2.2, 4.1), or .inp of CalculiX or Abaqus";
-        return Err(src.error_in(Kind::Format, FilePosition::File, "format", name, expected).help(help));
+        return Err(src.error_in_file("format", name, expected).help(help));
     }
     match text.first() {
         Some(b'$') => gmsh::parse(src, options),
@@ -96,10 +92,10 @@ fn parse_plain(src: &Source, options: &ReadOptions) -> Result<MeshFile, MeshErro
         Some(_) => {
             let first_line = text.split(|byte| matches!(byte, b'\n' | b'\r')).next().unwrap_or(text);
             let expected = "$MeshFormat (Gmsh .msh) or a line with * (CalculiX or Abaqus .inp)";
-            let error = src.error_in(Kind::Format, FilePosition::File, "format", shown(first_line), expected);
+            let error = src.error_in_file("format", shown(first_line), expected);
             Err(error.help("geometry such as STEP or STL must be meshed first, for example with Gmsh"))
         }
-        None => Err(src.error_in(Kind::Truncated, FilePosition::File, "file", "nothing", "a mesh")),
+        None => Err(src.error_in_file("file", "nothing", "a mesh")),
     }
 }
 

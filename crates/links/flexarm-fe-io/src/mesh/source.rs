@@ -2,7 +2,7 @@
 //!
 //! Readers only keep byte offsets; a line number is computed when a message needs it.
 
-use super::error::{FilePosition, MeshError, MeshErrorKind};
+use crate::error::{FeFileError, FilePosition};
 
 /// Contents of the whole file.
 #[derive(Clone, Copy)]
@@ -19,39 +19,28 @@ impl Source<'_> {
     /// Creates an error at a byte offset.
     pub(super) fn error(
         &self,
-        kind: MeshErrorKind,
         offset: usize,
         element: impl Into<Box<str>>,
         found: impl Into<Box<str>>,
         expected: impl Into<Box<str>>,
-    ) -> MeshError {
+    ) -> FeFileError {
         let offset = offset.min(self.bytes.len());
         let place = if self.binary {
             FilePosition::Byte(offset)
         } else {
             FilePosition::Line(1 + self.bytes[..offset].iter().filter(|byte| **byte == b'\n').count())
         };
-        self.error_in(kind, place, element, found, expected)
+        FeFileError::new(self.origin, place, element, found, expected)
     }
 
-    /// Creates an error at a given place.
-    pub(super) fn error_in(
+    /// Creates an error of the file as a whole.
+    pub(super) fn error_in_file(
         &self,
-        kind: MeshErrorKind,
-        place: FilePosition,
         element: impl Into<Box<str>>,
         found: impl Into<Box<str>>,
         expected: impl Into<Box<str>>,
-    ) -> MeshError {
-        MeshError {
-            kind,
-            origin: self.origin.into(),
-            place,
-            element: element.into(),
-            found: found.into(),
-            expected: expected.into(),
-            help: "".into(),
-        }
+    ) -> FeFileError {
+        FeFileError::new(self.origin, FilePosition::File, element, found, expected)
     }
 }
 

@@ -1,8 +1,8 @@
 //! Files that are well formed but wrong.
 
 use flexarm_fe_io::exchange::{
-    ExchangeErrorKind, InputFile, MatrixNames, MatrixRole, assemble_interfaces, parse_matrices, propose_map,
-    write_matrix_market, write_user_element,
+    InputFile, MatrixNames, MatrixRole, assemble_interfaces, parse_matrices, propose_map, write_matrix_market,
+    write_user_element,
 };
 use flexarm_fem::gate::check_matrix12;
 use flexarm_fem::{GateLimits, Matrix12, UnitSystem};
@@ -24,7 +24,6 @@ fn uncondensed_substructures_of_calculix_are_refused_with_the_reason() {
         let map = propose_map(&imported.stiffness.rows).unwrap();
         assert!(map.to_string().contains(":1-3+"), "{map}");
         let error = assemble_interfaces(&imported, Some(&map), Some(&UnitSystem::SI)).unwrap_err();
-        assert_eq!(error.kind, ExchangeErrorKind::Defective);
         let message = error.to_string();
         for part in ["exactly zero", "2.20", "without condensing", "SOLVER=MATRIXSTORAGE", ".sti", "flexarm reduce"] {
             assert!(message.contains(part), "{part}: {message}");
@@ -62,7 +61,6 @@ fn matrices_with_other_faults_are_left_to_the_gate_and_uncoupled_ones_are_not() 
     for (factor, part) in [(0.0, "exactly zero"), (1e-13, "only rounding")] {
         let of_block = |i: usize, j: usize| if i / 6 == j / 6 { 1.0 } else { factor };
         let error = assemble(&nalgebra::DMatrix::from_fn(12, 12, |i, j| K[(i, j)] * of_block(i, j))).unwrap_err();
-        assert_eq!(error.kind, ExchangeErrorKind::Defective);
         let message = error.to_string();
         assert!(message.contains(part) && message.contains("without condensing"), "{message}");
     }
@@ -94,7 +92,7 @@ fn coupled_rows_are_no_modes_unless_the_map_says_so() {
     let error = assemble("A=#1-6,B=#7-12").unwrap_err();
     assert!(error.found.contains("row 14 coupled with row 3") && error.help.contains("modal="), "{error}");
     assert_eq!(assemble("A=#1-6,B=#7-12,modal=#13-15").unwrap().modes, 3);
-    assert_eq!(assemble("modal=#13-15").unwrap_err().kind, ExchangeErrorKind::Ambiguous);
+    assert_eq!(&*assemble("modal=#13-15").unwrap_err().element, "interfaces");
 }
 
 #[test]
@@ -102,7 +100,6 @@ fn without_a_map_the_error_proposes_one() {
     let (K, _) = small_structure(3);
     let imported = parse(&[("x_K.mtx", &write_matrix_market(&K, &[]))]);
     let error = assemble_interfaces(&imported, None, Some(&UnitSystem::SI)).unwrap_err();
-    assert_eq!(error.kind, ExchangeErrorKind::Ambiguous);
     assert!(error.help.contains("A=#1-6,B=#7-12"), "{error}");
     let error = assemble_interfaces(&imported, propose_map(&imported.stiffness.rows).as_ref(), None).unwrap_err();
     assert!(error.to_string().contains("mm-t-s"), "{error}");
@@ -113,7 +110,6 @@ fn several_matrices_need_a_name_and_two_bare_ones_a_role() {
     let dmig = "DMIG,K1,0,6,2\nDMIG,K1,1,1,,1,1,4.\nDMIG,K2,0,6,2\nDMIG,K2,1,1,,1,1,5.\n";
     let files = [InputFile::new("a.pch", dmig)];
     let error = parse_matrices(&files, &MatrixNames::default()).unwrap_err();
-    assert_eq!(error.kind, ExchangeErrorKind::Ambiguous);
     assert!(error.found.contains("K1") && error.found.contains("K2"), "{error}");
     let named = MatrixNames { stiffness: Some("k2".into()), mass: Some("K1".into()) };
     let imported = parse_matrices(&files, &named).unwrap();

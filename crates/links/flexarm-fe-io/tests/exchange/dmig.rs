@@ -64,6 +64,6 @@ fn a_column_without_header_and_a_bad_value_are_named_with_line() {
     assert!(error.to_string().contains("its header first"), "{error}");
     let bad = LARGE.replace("-1.500000000D+00", "-1.5O0000000D+00");
     let error = parse(Text::new(&bad, "t")).unwrap_err();
-    assert_eq!(error.line, Some(6));
+    assert_eq!(error.place, flexarm_fe_io::FilePosition::Line(6));
     assert!(error.element.contains("row 12:0, column 11:1"), "{error}");
 }

@@ -4,15 +4,16 @@
 use std::io::Read;
 use std::time::{Duration, Instant};
 
+use flexarm_fe_io::FeFileError;
 use flexarm_fe_io::exchange::{
-    ExchangeError, ImportedMatrices, InputFile, MatrixNames, parse_matrices, write_matrix_market, write_user_element,
+    ImportedMatrices, InputFile, MatrixNames, parse_matrices, write_matrix_market, write_user_element,
 };
 use proptest::prelude::*;
 
 use super::shared::samples;
 use crate::common::fixed_cases;
 
-fn parse(bytes: &[u8]) -> Result<ImportedMatrices, ExchangeError> {
+fn parse(bytes: &[u8]) -> Result<ImportedMatrices, FeFileError> {
     parse_matrices(&[InputFile::new("fuzz", bytes)], &MatrixNames::default())
 }
 

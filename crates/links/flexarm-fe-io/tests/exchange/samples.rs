@@ -3,9 +3,8 @@
 use flexarm_fe_io::exchange::{
     DofLabel, Entries, InterfaceMap, MatrixFormat, MatrixNames, assemble_interfaces, propose_map, read_matrices,
 };
-use flexarm_fem::UnitSystem;
 use flexarm_fem::gate::check_matrix12;
-use flexarm_fem::{GateLimits, Matrix12};
+use flexarm_fem::{GateLimits, Matrix12, UnitSystem};
 use nalgebra::{DMatrix, Vector3};
 
 use super::shared::{digits_error, read, samples, truth};

@@ -1,9 +1,7 @@
 //! Standard Input Data: identities of the body, index orders that differ between files, reading and
 //! writing.
 
-use flexarm_fe_io::exchange::{
-    ExchangeErrorKind, GyroLayout, OeOrder, Sid, SidMatrix, SidNode, modal_link_from_sid, parse_sid, read_sid,
-};
+use flexarm_fe_io::exchange::{GyroLayout, OeOrder, Sid, SidMatrix, SidNode, modal_link_from_sid, parse_sid, read_sid};
 use flexarm_fe_io::mesh::{ReadOptions, read_mesh};
 use flexarm_fem::modal::ModalSource;
 use flexarm_fem::model::{AssemblyOptions, FeModel, materials};
@@ -116,7 +114,7 @@ fn the_orders_of_a_file_are_found_by_its_own_identities() {
     }
     let mut wrong = point_masses(GyroLayout::ComponentMajor, OeOrder::XyYzXz, false);
     wrong.Gr.entries0.insert((0, 0), 100.0);
-    assert_eq!(wrong.conventions("t").unwrap_err().kind, ExchangeErrorKind::Ambiguous);
+    assert!(wrong.conventions("t").unwrap_err().found.contains("neither order"));
 }
 
 #[test]
@@ -264,7 +262,6 @@ fn structures_of_square_matrices_are_refused_elsewhere() {
         for structure in structures {
             let text = with_block(name, |block| set(block, "structure", structure));
             let error = parse_sid(&text, "t").unwrap_err();
-            assert_eq!(error.kind, ExchangeErrorKind::WrongSize);
             assert!(&*error.element == name && error.expected.contains("a square matrix"), "{error}");
         }
     }

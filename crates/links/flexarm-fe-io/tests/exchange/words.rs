@@ -1,6 +1,6 @@
 //! Words of matrix files: Fortran's formats and numbers, names of files, maps of interfaces.
 
-use flexarm_fe_io::exchange::{DofLabel, ExchangeErrorKind, InterfaceMap, MatrixRole, propose_map};
+use flexarm_fe_io::exchange::{DofLabel, InterfaceMap, MatrixRole, propose_map};
 use flexarm_fe_io::internals::{ErrorPosition, Format, other_names, parse_format, real};
 
 #[test]
@@ -60,7 +60,7 @@ fn a_map_is_read_and_printed_unchanged() {
     }
     for text in ["", "A", "A=", "A=1:0-9", "A=#0-5", "A=#6-1", "A=x", "A=1,A=2", "A=#1-99999999999999999999"] {
         let error = text.parse::<InterfaceMap>().unwrap_err();
-        assert_eq!(error.kind, ExchangeErrorKind::Interface, "{text}: {error}");
+        assert_eq!(&*error.origin, "map of interfaces", "{text}: {error}");
     }
 }
 

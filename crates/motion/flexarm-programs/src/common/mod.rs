@@ -73,3 +73,8 @@ impl Text {
 
 /// Maximum number of characters of a statement in a message or a move.
 const LONGEST_EXCERPT: usize = 100;
+
+/// Whether a name is one of the words of a text, which blanks separate.
+pub(crate) fn is_among(name: &str, words: &str) -> bool {
+    words.split(' ').any(|word| word == name)
+}

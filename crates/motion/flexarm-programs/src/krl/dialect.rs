@@ -10,46 +10,17 @@ use crate::common::frames::{mm_deg_zyx, pose_zyx_mm_deg};
 use crate::common::machine::{Dialect, Flow};
 use crate::common::tree::{Argument, Operator, Statement};
 use crate::common::value::{Record, Value, depends};
-use crate::common::{Result, Span, fail};
+use crate::common::{Result, Span, fail, is_among};
 
 /// System variables that have no effect on the motion of the arm.
-const STILL: [&str; 31] = [
-    "$anout",
-    "$anin",
-    "$timer",
-    "$timer_stop",
-    "$timer_flag",
-    "$bwdstart",
-    "$advance",
-    "$load",
-    "$load_a1",
-    "$load_a2",
-    "$load_a3",
-    "$h_pos",
-    "$act_tool",
-    "$act_base",
-    "$act_tool_c",
-    "$act_base_c",
-    "$gear_jerk",
-    "$jerk",
-    "$collmon_tol_pro",
-    "$loop_msg",
-    "$loop_cont",
-    "$vel_extax",
-    "$acc_extax",
-    "$ov_appl",
-    "$torqmon",
-    "$torqmon_com",
-    "$msg_t",
-    "$cmd",
-    "$error",
-    "$home",
-    "$tech",
-];
+const STILL: &str = "\
+    $anout $anin $timer $timer_stop $timer_flag $bwdstart $advance $load $load_a1 $load_a2 $load_a3 \
+    $h_pos $act_tool $act_base $act_tool_c $act_base_c $gear_jerk $jerk $collmon_tol_pro $loop_msg \
+    $loop_cont $vel_extax $acc_extax $ov_appl $torqmon $torqmon_com $msg_t $cmd $error $home $tech";
 
 /// Whether a name is implemented by this reader.
 pub(super) fn is_built_in(name: &str) -> bool {
-    parse::MOTIONS.contains(&name) || matches!(name, "bas" | "wait sec" | "wait for")
+    is_among(name, parse::MOTIONS) || matches!(name, "bas" | "wait sec" | "wait for")
 }
 
 impl Dialect for Krl {
@@ -90,7 +61,7 @@ impl Dialect for Krl {
     }
 
     fn instruction(machine: &mut Krls<'_>, name: &str, arguments: &[Argument], span: Span) -> Result<Flow> {
-        if parse::MOTIONS.contains(&name) {
+        if is_among(name, parse::MOTIONS) {
             motion::motion(machine, name, arguments, span)?;
             return Ok(Flow::On);
         }
@@ -132,7 +103,7 @@ impl Dialect for Krl {
         if machine.dialect.is_given || !name.starts_with('$') {
             return Ok(true);
         }
-        if STILL.contains(&name) {
+        if is_among(name, STILL) {
             let what = match name {
                 "$load" | "$load_a1" | "$load_a2" | "$load_a3" => {
                     "loads of the program are not taken: the robot has its own"
@@ -174,23 +145,9 @@ impl Dialect for Krl {
     }
 
     fn is_still(name: &str) -> bool {
+        const BEGINNINGS: &str = "msg set_cd_params ir_stopm swrite str user grp h_gripper h50 varstate clear log";
         matches!(name, "$out" | "$flag" | "$cycflag" | "$timer" | "$anout" | "$timer_stop")
-            || [
-                "msg",
-                "set_cd_params",
-                "ir_stopm",
-                "swrite",
-                "str",
-                "user",
-                "grp",
-                "h_gripper",
-                "h50",
-                "varstate",
-                "clear",
-                "log",
-            ]
-            .iter()
-            .any(|known| name.starts_with(known))
+            || BEGINNINGS.split(' ').any(|beginning| name.starts_with(beginning))
     }
 }
 

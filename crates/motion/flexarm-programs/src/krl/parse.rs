@@ -7,7 +7,7 @@ use crate::common::expressions::{Parser, Syntax};
 use crate::common::lexer::{Spelling, Token, tokens};
 use crate::common::tree::{Action, Argument, Expr, Kind, Operator, Parameter, Routine, Statement};
 use crate::common::value::Value;
-use crate::common::{Fail, Result, Span, Text, fail};
+use crate::common::{Fail, Result, Span, Text, fail, is_among};
 
 pub(crate) const SPELLING: Spelling = Spelling {
     comment: ';',
@@ -34,23 +34,8 @@ pub(super) struct Unit {
 const TYPES: [&str; 9] = ["int", "real", "bool", "char", "frame", "pos", "e6pos", "axis", "e6axis"];
 
 /// Motion words.
-pub(super) const MOTIONS: [&str; 15] = [
-    "ptp",
-    "lin",
-    "circ",
-    "ptp_rel",
-    "lin_rel",
-    "circ_rel",
-    "sptp",
-    "slin",
-    "scirc",
-    "spl",
-    "sptp_rel",
-    "slin_rel",
-    "scirc_rel",
-    "spl_rel",
-    "asyptp",
-];
+pub(super) const MOTIONS: &str =
+    "ptp lin circ ptp_rel lin_rel circ_rel sptp slin scirc spl sptp_rel slin_rel scirc_rel spl_rel asyptp";
 
 pub(super) fn parse(text: &Text, file: usize) -> Result<Unit> {
     let mut parser = Parser::new(Syntax::Krl, tokens(&without_header(&text.text), file, &SPELLING)?);
@@ -337,7 +322,7 @@ fn simple(parser: &mut Parser, word: &str) -> Result<Vec<Action>> {
         "brake" | "resume" => {
             refuse(parser, "motion that is broken off by an interrupt is not simulated: take the statement out")
         }
-        _ if MOTIONS.contains(&word) => motion(parser),
+        _ if is_among(word, MOTIONS) => motion(parser),
         _ if parser.is_symbol_ahead(1, "(") => {
             let name = parser.expect_name()?;
             let arguments = parser.arguments()?;

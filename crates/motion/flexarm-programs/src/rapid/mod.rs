@@ -17,7 +17,7 @@ use crate::common::machine::{Dialect, Flow, Machine};
 use crate::common::recorder::{Recorded, Recorder};
 use crate::common::tree::{Argument, Operator, Statement};
 use crate::common::value::{Value, depends};
-use crate::common::{Result, Span, Text, fail};
+use crate::common::{Result, Span, Text, fail, is_among};
 use crate::{ReadOptions, decode, given_text};
 
 use motion::Settings;
@@ -216,57 +216,13 @@ impl Dialect for Rapid {
     }
 
     fn is_still(name: &str) -> bool {
-        const WORDS: [&str; 48] = [
-            "set",
-            "reset",
-            "setdo",
-            "setgo",
-            "setao",
-            "pulsedo",
-            "invertdo",
-            "tpwrite",
-            "tperase",
-            "tpshow",
-            "errwrite",
-            "errlog",
-            "clkstart",
-            "clkstop",
-            "clkreset",
-            "connect",
-            "idelete",
-            "ienable",
-            "idisable",
-            "iwatch",
-            "isleep",
-            "isignaldi",
-            "isignaldo",
-            "itimer",
-            "gripload",
-            "mechunitload",
-            "actunit",
-            "deactunit",
-            "open",
-            "close",
-            "write",
-            "writebin",
-            "rewind",
-            "print",
-            "softdeact",
-            "socketcreate",
-            "socketconnect",
-            "socketsend",
-            "socketclose",
-            "wzenable",
-            "wzdisable",
-            "triggio",
-            "triggequip",
-            "triggint",
-            "motionsup",
-            "eoffsoff",
-            "load0",
-            "bookerrno",
-        ];
-        WORDS.contains(&name)
+        const WORDS: &str = "\
+            set reset setdo setgo setao pulsedo invertdo tpwrite tperase tpshow errwrite errlog \
+            clkstart clkstop clkreset connect idelete ienable idisable iwatch isleep isignaldi \
+            isignaldo itimer gripload mechunitload actunit deactunit open close write writebin \
+            rewind print softdeact socketcreate socketconnect socketsend socketclose wzenable \
+            wzdisable triggio triggequip triggint motionsup eoffsoff load0 bookerrno";
+        is_among(name, WORDS)
     }
 }
 

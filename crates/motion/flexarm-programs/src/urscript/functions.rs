@@ -7,47 +7,15 @@ use super::{UrScripts, pose};
 use crate::common::frames::{angles_zyx, pose_rotation_vector, rotation_vector_of, rotation_zyx};
 use crate::common::tree::{Argument, Operator};
 use crate::common::value::Value;
-use crate::common::{Result, Span, fail};
+use crate::common::{Result, Span, fail, is_among};
 
-const KNOWN: [&str; 34] = [
-    "pose_trans",
-    "pose_add",
-    "pose_sub",
-    "pose_inv",
-    "interpolate_pose",
-    "point_dist",
-    "pose_dist",
-    "get_inverse_kin",
-    "get_forward_kin",
-    "rpy2rotvec",
-    "rotvec2rpy",
-    "d2r",
-    "r2d",
-    "sin",
-    "cos",
-    "tan",
-    "asin",
-    "acos",
-    "atan",
-    "atan2",
-    "sqrt",
-    "pow",
-    "exp",
-    "log",
-    "floor",
-    "ceil",
-    "round",
-    "norm",
-    "length",
-    "make_list",
-    "to_num",
-    "to_str",
-    "str_cat",
-    "normalize",
-];
+const KNOWN: &str = "\
+    pose_trans pose_add pose_sub pose_inv interpolate_pose point_dist pose_dist get_inverse_kin \
+    get_forward_kin rpy2rotvec rotvec2rpy d2r r2d sin cos tan asin acos atan atan2 sqrt pow exp log \
+    floor ceil round norm length make_list to_num to_str str_cat normalize";
 
 pub(super) fn is_known(name: &str) -> bool {
-    KNOWN.contains(&name)
+    is_among(name, KNOWN)
 }
 
 pub(super) fn function(machine: &mut UrScripts<'_>, name: &str, arguments: &[Argument], span: Span) -> Result<Value> {

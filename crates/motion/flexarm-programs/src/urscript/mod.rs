@@ -19,7 +19,7 @@ use crate::common::machine::{Dialect, Flow, Machine, positional};
 use crate::common::recorder::{Recorded, Recorder};
 use crate::common::tree::{Argument, Operator, Statement};
 use crate::common::value::{Value, depends};
-use crate::common::{Result, Span, Text, fail};
+use crate::common::{Result, Span, Text, fail, is_among};
 use crate::{ReadOptions, decode, given_text};
 
 /// URScript state in addition to variables.
@@ -150,73 +150,26 @@ impl Dialect for UrScript {
     }
 
     fn is_still(name: &str) -> bool {
-        const WORDS: [&str; 16] = [
-            "textmsg",
-            "set_payload",
-            "set_target_payload",
-            "set_payload_mass",
-            "set_payload_cog",
-            "set_gravity",
-            "request_boolean_from_primary_client",
-            "enter_critical",
-            "exit_critical",
-            "start",
-            "set_safety_mode_transition_hardness",
-            "set_tool_communication",
-            "set_runstate_outputs",
-            "varmsg",
-            "set_target_payload_inertia",
-            "set_digital_out",
-        ];
-        const BEGINNINGS: [&str; 16] = [
-            "set_standard_",
-            "set_configurable_",
-            "set_tool_",
-            "set_analog_",
-            "set_euromap_",
-            "socket_",
-            "write_",
-            "modbus_",
-            "rtde_",
-            "rpc_",
-            "rq_set",
-            "set_flag",
-            "zero_ftsensor",
-            "set_input_actions",
-            "set_baselight",
-            "popup_",
-        ];
-        WORDS.contains(&name) || BEGINNINGS.iter().any(|beginning| name.starts_with(beginning))
+        const WORDS: &str = "\
+            textmsg set_payload set_target_payload set_payload_mass set_payload_cog set_gravity \
+            request_boolean_from_primary_client enter_critical exit_critical start \
+            set_safety_mode_transition_hardness set_tool_communication set_runstate_outputs varmsg \
+            set_target_payload_inertia set_digital_out";
+        const BEGINNINGS: &str = "\
+            set_standard_ set_configurable_ set_tool_ set_analog_ set_euromap_ socket_ write_ \
+            modbus_ rtde_ rpc_ rq_set set_flag zero_ftsensor set_input_actions set_baselight popup_";
+        is_among(name, WORDS) || BEGINNINGS.split(' ').any(|beginning| name.starts_with(beginning))
     }
 }
 
 /// Functions that depend on values known only to the controller, or change the execution of moves.
 fn is_refused(name: &str) -> bool {
-    const WORDS: [&str; 22] = [
-        "servoj",
-        "servoc",
-        "servol",
-        "speedj",
-        "speedl",
-        "force_mode",
-        "force_mode_set_damping",
-        "freedrive_mode",
-        "teach_mode",
-        "conveyor_pulse_decode",
-        "track_conveyor_linear",
-        "track_conveyor_circular",
-        "path_offset_enable",
-        "path_offset_set",
-        "move_until",
-        "direct_torque",
-        "optimove_j",
-        "optimovej",
-        "optimovel",
-        "run",
-        "mc_add_linear",
-        "position_deviation_warning",
-    ];
-    WORDS.contains(&name)
+    const WORDS: &str = "\
+        servoj servoc servol speedj speedl force_mode force_mode_set_damping freedrive_mode \
+        teach_mode conveyor_pulse_decode track_conveyor_linear track_conveyor_circular \
+        path_offset_enable path_offset_set move_until direct_torque optimove_j optimovej optimovel \
+        run mc_add_linear position_deviation_warning";
+    is_among(name, WORDS)
 }
 
 fn still_words(name: &str) -> &'static str {

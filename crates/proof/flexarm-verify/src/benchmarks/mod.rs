@@ -16,10 +16,9 @@ use flexarm::{Keep, Modelling, Motion, Robot, RunOptions, RunRequest, StepperKin
 use flexarm_files::NumberTable;
 use nalgebra::Vector2;
 
-use crate::Error;
-use crate::Pace;
 use crate::bench::{ALPHA, Bench, spook};
 use crate::page::Case;
+use crate::{Error, Pace};
 
 use slider_crank::SliderCrank;
 use swept_rotor::Spin;

@@ -12,11 +12,10 @@ use flexarm::Robot;
 use flexarm_fem::UnitSystem;
 use flexarm_fem::reduction::Tie;
 
-use crate::Error;
-use crate::Pace;
 use crate::bench::Bench;
 use crate::meshed::Meshed;
 use crate::page::Case;
+use crate::{Error, Pace};
 
 use study::{FlangeLoads, Frequencies, Ties, Weight};
 use truth::{Program, Truth};

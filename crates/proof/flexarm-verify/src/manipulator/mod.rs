@@ -11,10 +11,9 @@ mod page;
 mod pick;
 mod runs;
 
-use crate::Error;
-use crate::Pace;
 use crate::bench::Bench;
 use crate::page::Case;
+use crate::{Error, Pace};
 
 use drives::{ElasticDrives, Flexibilities};
 use methods::Methods;

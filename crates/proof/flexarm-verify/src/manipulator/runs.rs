@@ -6,10 +6,9 @@ use flexarm::recordings::Trace;
 use flexarm::{Keep, Modelling, Motion, Robot, RunOptions, RunRequest, Scenario, StepperKind, Summary};
 use nalgebra::Vector3;
 
-use crate::Error;
-use crate::Pace;
 use crate::bench::larger;
 use crate::page::plain;
+use crate::{Error, Pace};
 
 /// Sampling rate of the TCP (1/s).
 const SEEN_HZ: f64 = 500.0;

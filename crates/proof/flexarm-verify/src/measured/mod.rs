@@ -11,10 +11,9 @@ mod recording;
 mod servo;
 mod torques;
 
-use crate::Error;
-use crate::Pace;
 use crate::bench::Bench;
 use crate::page::Case;
+use crate::{Error, Pace};
 
 use frequencies::Frequencies;
 use gears::Gears;

@@ -14,10 +14,9 @@ mod study;
 use flexarm::Robot;
 use flexarm_kinematics::LinkInertia;
 
-use crate::Error;
-use crate::Pace;
 use crate::bench::Bench;
 use crate::page::Case;
+use crate::{Error, Pace};
 
 use large_loads::LargeLoads;
 use mesh::BarMesh;

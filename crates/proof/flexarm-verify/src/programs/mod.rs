@@ -7,10 +7,9 @@ mod page;
 mod stored;
 mod today;
 
-use crate::Error;
-use crate::Pace;
 use crate::bench::{Bench, Stored};
 use crate::page::Case;
+use crate::{Error, Pace};
 
 use stored::StoredRuns;
 use today::Today;

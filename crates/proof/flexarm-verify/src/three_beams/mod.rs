@@ -10,10 +10,9 @@ mod sections;
 mod study;
 mod whirl;
 
-use crate::Error;
-use crate::Pace;
 use crate::bench::Bench;
 use crate::page::Case;
+use crate::{Error, Pace};
 
 use ring_down::RingDown;
 use sections::Sections;

@@ -186,32 +186,27 @@ impl RecordingFormat {
     };
 
     /// Returns the facts about the format.
-    #[must_use]
     pub fn info(self) -> &'static FormatInfo {
         &FORMATS[self as usize]
     }
 
     /// Returns the file name extension, without the dot.
-    #[must_use]
     pub fn extension(self) -> &'static str {
         self.info().extension
     }
 
     /// Returns the format of a file according to its extension.
-    #[must_use]
     pub fn from_path(path: &Path) -> Option<Self> {
         Self::from_word(path.extension()?.to_str()?)
     }
 
     /// Returns the format with this extension, ignoring case.
-    #[must_use]
     pub fn from_word(word: &str) -> Option<Self> {
         let word = word.to_ascii_lowercase();
         FORMATS.iter().find(|info| info.extension == word).map(|info| info.format)
     }
 
     /// Returns the formats that are read back, in the order of decreasing contents.
-    #[must_use]
     pub fn read_back() -> Vec<Self> {
         let mut formats: Vec<Self> = Self::ALL.into_iter().filter(|format| format.is_read_back()).collect();
         formats.sort_by_key(|format| format.info().holds);
@@ -219,14 +214,12 @@ impl RecordingFormat {
     }
 
     /// Whether recordings of this format are read back; others are for viewing.
-    #[must_use]
     pub fn is_read_back(self) -> bool {
         self.info().holds != Holds::Pictures
     }
 
     /// Whether this process can write the format and, if it is read back, read it. Recordings for
     /// the Rerun viewer need [`install_rrd_writer`], other formats a feature of this crate.
-    #[must_use]
     pub fn is_built_in(self) -> bool {
         self.code().is_some()
     }
@@ -239,20 +232,17 @@ impl RecordingFormat {
     }
 
     /// Whether it is a table of scalars.
-    #[must_use]
     pub fn is_table(self) -> bool {
         self.info().holds.is_table()
     }
 
     /// Creates a recorder for `path`; `None` if the format is not available
     /// ([`RecordingFormat::is_built_in`]).
-    #[must_use]
     pub fn recorder(self, path: impl Into<PathBuf>, options: CreateOptions) -> Option<Box<dyn Recorder>> {
         self.code().map(|code| (code.recorder)(path.into(), options))
     }
 
     /// Returns, as sentences, what a conversion from this format to another loses by their nature.
-    #[must_use]
     pub fn lost_on_the_way_to(self, to: Self, header: &RunHeader) -> Vec<String> {
         let (here, there) = (self.info().holds, to.info().holds);
         let mut lost = match (here.is_table(), there.is_table()) {

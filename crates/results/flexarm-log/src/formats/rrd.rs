@@ -40,7 +40,6 @@ pub fn install_rrd_writer(writer: RrdWriter) {
 
 /// Creates the recording of a study for `path`, with a label for each run; `None` if no writer is
 /// installed. The file is created when the first run begins.
-#[must_use]
 pub fn study_recorder(
     path: impl Into<PathBuf>,
     options: CreateOptions,

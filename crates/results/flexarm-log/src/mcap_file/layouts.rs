@@ -65,7 +65,6 @@ fn plots(header: &RunHeader) -> Vec<Plot> {
 
 /// Returns a layout for [Foxglove](https://foxglove.dev): the arm with the rigid twin on the left,
 /// plots on the right, events below.
-#[must_use]
 pub fn foxglove_layout(header: &RunHeader) -> String {
     let plots = plots(header);
     let mut panels = serde_json::Map::new();
@@ -137,7 +136,6 @@ fn scene(header: &RunHeader) -> Value {
 }
 
 /// Returns a layout for [PlotJuggler](https://plotjuggler.io): the plots, two per tab.
-#[must_use]
 pub fn plotjuggler_layout(header: &RunHeader) -> String {
     let plots = plots(header);
     let mut tabs = String::new();

@@ -6,9 +6,8 @@ use std::rc::Rc;
 use flexarm_files::{YamlError, YamlNode, YamlValue, read_yaml};
 
 use super::Interpreter;
-use super::expression::ExpressionError;
-use super::expression::unique;
 use super::expression::value::{Value, float_of, lookup};
+use super::expression::{ExpressionError, unique};
 use super::scope::Table;
 
 /// Maximum number of values of a file, with those behind aliases counted each time.

@@ -1,6 +1,6 @@
 //! Errors of values in several notations, as users write them.
 
-use flexarm_fe_io::ExchangeError;
+use flexarm_fe_io::FeFileError;
 use flexarm_fem::FemError;
 
 use crate::reduce::{MATERIAL_FORMS, SPLIT_FORMS};
@@ -76,7 +76,7 @@ pub enum WordError {
     },
     /// An invalid map of rows.
     #[error(transparent)]
-    Rows(Box<ExchangeError>),
+    Rows(Box<FeFileError>),
 }
 
 impl WordError {

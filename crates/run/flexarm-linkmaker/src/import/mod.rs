@@ -379,7 +379,7 @@ fn plan(job: &ImportJob, name: &str, units: UnitSystem, source: &str, method: &s
     }
 }
 
-fn read(job: &ImportJob) -> Result<ImportedMatrices, flexarm_fe_io::exchange::ExchangeError> {
+fn read(job: &ImportJob) -> Result<ImportedMatrices, flexarm_fe_io::FeFileError> {
     let Some(mass) = &job.mass_file else {
         let imported = read_matrices(&job.files, &job.names)?;
         // A sidecar found next to the stiffness names the mass file.

@@ -99,7 +99,7 @@ impl Reduction {
     ///
     /// # Errors
     /// [`LinkError::Job`] for invalid numbers, [`LinkError::Files`] for taken paths,
-    /// [`LinkError::Mesh`] for an invalid mesh.
+    /// [`LinkError::FeFile`] for an invalid mesh.
     pub fn open(
         job: &ReduceJob,
         outputs: Option<&ReduceOutputs>,
@@ -166,7 +166,7 @@ impl Reduction {
 /// Lists the contents of a job's mesh. Units, materials and positions may be missing.
 ///
 /// # Errors
-/// [`LinkError::Mesh`], or [`LinkError::Interface`] for interfaces that select no nodes.
+/// [`LinkError::FeFile`], or [`LinkError::Interface`] for interfaces that select no nodes.
 pub fn list_mesh(job: &ReduceJob) -> Result<MeshListing, LinkError> {
     let read = ReadOptions { units: job.units.unwrap_or(UnitSystem::SI), ..ReadOptions::default() };
     let file = read_mesh(&job.mesh, &read).map_err(Box::new)?;

@@ -3,7 +3,8 @@
 use nalgebra::{DMatrix, Matrix3};
 
 use super::{Sid, SidMatrix};
-use crate::exchange::error::{ErrorPosition, ExchangeError, ExchangeErrorKind};
+use crate::FeFileError;
+use crate::exchange::position::ErrorPosition;
 
 /// Order of the columns of `Gr` and `Ge`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -97,9 +98,8 @@ impl Sid {
     /// `J1` both orders of `Oe` fit; then the first order is returned.
     ///
     /// # Errors
-    /// [`ExchangeErrorKind::Ambiguous`] if the numbers fit neither order; `origin` is used in the
-    /// message.
-    pub fn conventions(&self, origin: &str) -> Result<SidConventions, ExchangeError> {
+    /// If the numbers fit neither order; `origin` is used in the message.
+    pub fn conventions(&self, origin: &str) -> Result<SidConventions, FeFileError> {
         let J1: Vec<_> = (0..self.nq()).map(|mode| self.J1(mode)).collect();
         let size = J1.iter().fold(f64::MIN_POSITIVE, |size, J| size.max(J.amax()));
         let of_gyro = |layout| {
@@ -126,13 +126,7 @@ impl Sid {
                 let found = format!("numbers that fit neither order: {residual:.1e} of J1");
                 let expected = format!("an identity with J1 that holds to {FITS:.0e}");
                 let help = "is J given without its first order, or with products of the other sign?";
-                return Err(ErrorPosition::file(origin).fail(
-                    ExchangeErrorKind::Ambiguous,
-                    name,
-                    found,
-                    expected,
-                    help,
-                ));
+                return Err(ErrorPosition::file(origin).fail(name, found, expected, help));
             }
         }
         Ok(SidConventions {

@@ -19,7 +19,8 @@ use nalgebra::{DMatrix, Matrix3, Matrix3xX, Matrix6xX, Rotation3, Translation3, 
 use flexarm_fem::modal::{GeometricStiffness, ModalInterface, ModalLink, PRODUCTS, symmetric};
 
 use super::{GyroLayout, OeOrder, Sid, SidMatrix, SidNode};
-use crate::exchange::{ExchangeError, ExchangeErrorKind};
+use crate::FeFileError;
+use crate::exchange::position::ErrorPosition;
 
 /// Start of the comment that stores the names of the link and its nodes.
 const COMMENT: &str = "modal link";
@@ -56,12 +57,10 @@ fn skew_of(c: &Vector3<f64>) -> Matrix3<f64> {
 /// * `sid`: data in SI.
 ///
 /// # Errors
-/// [`ExchangeErrorKind::Ambiguous`] as [`Sid::conventions`]; [`ExchangeErrorKind::Missing`] without
-/// a node A or another one; [`ExchangeErrorKind::Unsupported`] with initial stress;
-/// [`ExchangeErrorKind::Defective`] for a mass or stiffness that is not positive definite, and for
-/// frames that are not orthonormal; [`ExchangeErrorKind::WrongSize`] for blocks whose size does not
-/// match the number of modes.
-pub fn modal_link_from_sid(name: &str, sid: &Sid) -> Result<ModalLink, ExchangeError> {
+/// As [`Sid::conventions`]; without a node A or another one; with initial stress; for a mass or
+/// stiffness that is not positive definite, frames that are not orthonormal, and blocks whose size
+/// does not match the number of modes.
+pub fn modal_link_from_sid(name: &str, sid: &Sid) -> Result<ModalLink, FeFileError> {
     check_sizes(name, sid)?;
     of_node(name, sid, held_node(name, sid)?)
 }
@@ -72,13 +71,13 @@ pub fn modal_link_from_sid(name: &str, sid: &Sid) -> Result<ModalLink, ExchangeE
 /// geometric stiffness belongs to the frame of the data and is then dropped.
 ///
 /// # Errors
-/// As [`modal_link_from_sid`]; [`ExchangeErrorKind::Missing`] if the node does not exist.
-pub fn modal_link_held_at(name: &str, sid: &Sid, node: i64) -> Result<ModalLink, ExchangeError> {
+/// As [`modal_link_from_sid`]; if the node does not exist.
+pub fn modal_link_held_at(name: &str, sid: &Sid, node: i64) -> Result<ModalLink, FeFileError> {
     check_sizes(name, sid)?;
     let ids: Vec<i64> = sid.nodes.iter().map(|node| node.id).collect();
     let Some(A) = ids.iter().position(|id| *id == node) else {
         let (found, expected) = (format!("the nodes {ids:?}"), format!("node {node}"));
-        return Err(fail(name, ExchangeErrorKind::Missing, "frame", found, &expected, ""));
+        return Err(fail(name, "frame", found, &expected, ""));
     };
     of_node(name, sid, A)
 }
@@ -86,11 +85,11 @@ pub fn modal_link_held_at(name: &str, sid: &Sid, node: i64) -> Result<ModalLink,
 /// Converts the data with a given node as A.
 ///
 /// * `A`: index of the clamped node.
-fn of_node(name: &str, sid: &Sid, A: usize) -> Result<ModalLink, ExchangeError> {
+fn of_node(name: &str, sid: &Sid, A: usize) -> Result<ModalLink, FeFileError> {
     let conventions = sid.conventions(name)?;
     if sid.ksigma.m0().iter().any(|x| *x != 0.0) {
         let help = "a modal link is free of stress where its coordinates are zero";
-        return Err(fail(name, ExchangeErrorKind::Unsupported, "ksigma", "initial stress", "zeros", help));
+        return Err(fail(name, "ksigma", "initial stress", "zeros", help));
     }
     let n = sid.nq();
     let names = node_names(sid);
@@ -101,10 +100,10 @@ fn of_node(name: &str, sid: &Sid, A: usize) -> Result<ModalLink, ExchangeError> 
             let Phi = Matrix6xX::from_fn(n, |r, k| if r < 3 { phi[(r, k)] } else { psi[(r - 3, k)] });
             Ok(ModalInterface { name: node_name.clone(), X_LI: frame(name, node)?, Phi })
         })
-        .collect::<Result<Vec<_>, ExchangeError>>()?;
+        .collect::<Result<Vec<_>, FeFileError>>()?;
     if interfaces.is_empty() {
         let (found, help) = ("one node", "the distal interface must be a node of the file");
-        return Err(fail(name, ExchangeErrorKind::Missing, "frame", found, "a node that moves", help));
+        return Err(fail(name, "frame", found, "a node that moves", help));
     }
 
     let (Ct, Cr) = (sid.Ct.m0(), sid.Cr.m0());
@@ -138,35 +137,20 @@ fn of_node(name: &str, sid: &Sid, A: usize) -> Result<ModalLink, ExchangeError> 
     if !(link.mass > 0.0) || !link.is_positive_definite() {
         let expected = "a positive mass, Me and Ke positive definite with A held";
         let help = "are rigid motions among the modes?";
-        return Err(fail(name, ExchangeErrorKind::Defective, "Me, Ke", "others", expected, help));
+        return Err(fail(name, "Me, Ke", "others", expected, help));
     }
     Ok(link)
 }
 
-fn fail(
-    origin: &str,
-    kind: ExchangeErrorKind,
-    element: &str,
-    found: impl Into<Box<str>>,
-    expected: &str,
-    help: &str,
-) -> ExchangeError {
-    ExchangeError {
-        kind,
-        origin: origin.into(),
-        line: None,
-        element: element.into(),
-        found: found.into(),
-        expected: expected.into(),
-        help: help.into(),
-    }
+fn fail(origin: &str, element: &str, found: impl Into<Box<str>>, expected: &str, help: &str) -> FeFileError {
+    ErrorPosition::file(origin).fail(element, found, expected, help)
 }
 
 /// Block with its name and allowed sizes.
 type Block<'a> = (&'a str, &'a SidMatrix, &'a [(usize, usize)]);
 
 /// Checks the sizes: those of a file were checked, but data built by the caller may have any size.
-fn check_sizes(origin: &str, sid: &Sid) -> Result<(), ExchangeError> {
+fn check_sizes(origin: &str, sid: &Sid) -> Result<(), FeFileError> {
     let n = sid.nq();
     let body: [Block<'_>; 9] = [
         ("mdCM", &sid.mdCM, &[(3, 1)]),
@@ -195,7 +179,7 @@ fn check_sizes(origin: &str, sid: &Sid) -> Result<(), ExchangeError> {
             .any(|(rows, columns)| (matrix.nrow, matrix.ncol) == (*rows, if *columns == 0 { n } else { *columns }));
         if !fits || n == 0 {
             let found = format!("{} x {} with {n} modes", matrix.nrow, matrix.ncol);
-            return Err(fail(origin, ExchangeErrorKind::WrongSize, name, found, "the size of the standard", ""));
+            return Err(fail(origin, name, found, "the size of the standard", ""));
         }
     }
     Ok(())
@@ -319,20 +303,20 @@ fn motion_of(node: &SidNode, n: usize) -> Matrix6xX<f64> {
 }
 
 /// Index of the first node that no coordinate moves.
-fn held_node(origin: &str, sid: &Sid) -> Result<usize, ExchangeError> {
+fn held_node(origin: &str, sid: &Sid) -> Result<usize, FeFileError> {
     sid.nodes.iter().position(is_still).ok_or_else(|| {
         let expected = "a node without displacement: interface A, at which the frame is tangent";
         let help = "say which node is A, or make the file with the proximal interface as its frame";
-        fail(origin, ExchangeErrorKind::Missing, "frame", "nodes that all move", expected, help)
+        fail(origin, "frame", "nodes that all move", expected, help)
     })
 }
 
-fn frame(origin: &str, node: &SidNode) -> Result<Pose, ExchangeError> {
+fn frame(origin: &str, node: &SidNode) -> Result<Pose, FeFileError> {
     let R = Matrix3::from_iterator(node.AP.m0().iter().copied());
     let gap = (R.transpose() * R - Matrix3::identity()).amax();
     if !(gap <= ROTATION && R.determinant() > 0.0) {
         let found = format!("|RᵀR - 1| = {gap:.1e} at node {}", node.id);
-        return Err(fail(origin, ExchangeErrorKind::Defective, "AP", found, "a rotation matrix", ""));
+        return Err(fail(origin, "AP", found, "a rotation matrix", ""));
     }
     let p = Vector3::from_iterator(node.origin.m0().iter().copied());
     Ok(Pose::from_parts(Translation3::from(p), Rotation3::from_matrix_unchecked(R)))

@@ -4,7 +4,8 @@ use std::iter::Peekable;
 use std::path::Path;
 
 use super::{BODY_BLOCKS, NODE_BLOCKS, Sid, SidMatrix, SidNode};
-use crate::exchange::error::{ErrorPosition, ExchangeError, ExchangeErrorKind};
+use crate::FeFileError;
+use crate::exchange::position::ErrorPosition;
 use crate::exchange::text::{Text, shown, unpack, words};
 
 /// Maximum number of shape coordinates; larger sizes are errors.
@@ -18,8 +19,8 @@ const MAX_ENTRIES: (usize, usize) = (1 << 20, 16);
 /// Reads a `.SID_FEM` file, optionally compressed with gzip.
 ///
 /// # Errors
-/// [`ExchangeError`] with file, line, element, value found and value expected.
-pub fn read_sid(path: impl AsRef<Path>) -> Result<Sid, ExchangeError> {
+/// [`FeFileError`] with file, line, element, value found and value expected.
+pub fn read_sid(path: impl AsRef<Path>) -> Result<Sid, FeFileError> {
     let file = crate::exchange::InputFile::open(path)?;
     let bytes = unpack(&file.bytes, &file.origin)?;
     parse_sid(&String::from_utf8_lossy(&bytes), &file.origin)
@@ -40,7 +41,7 @@ struct Cursor<'a, I: Iterator<Item = Line<'a>>> {
 ///
 /// # Errors
 /// As [`read_sid`].
-pub fn parse_sid(text: &str, origin: &str) -> Result<Sid, ExchangeError> {
+pub fn parse_sid(text: &str, origin: &str) -> Result<Sid, FeFileError> {
     let text = Text::new(text, origin);
     let mut lines = text.lines();
     let (place, first) = lines.next().unwrap_or((text.file(), ""));
@@ -66,20 +67,20 @@ pub fn parse_sid(text: &str, origin: &str) -> Result<Sid, ExchangeError> {
     if nodes != sid.nodes.len() as i64 || modes != sid.nq() as i64 {
         let found = format!("{} nodes, {} modes", sid.nodes.len(), sid.nq());
         let expected = format!("{nodes} and {modes}, as in its first line");
-        return Err(place.fail(ExchangeErrorKind::WrongSize, "file", found, expected, ""));
+        return Err(place.fail("file", found, expected, ""));
     }
     Ok(sid)
 }
 
 impl<'a, I: Iterator<Item = Line<'a>>> Cursor<'a, I> {
-    fn next(&mut self, expected: &str) -> Result<Line<'a>, ExchangeError> {
+    fn next(&mut self, expected: &str) -> Result<Line<'a>, FeFileError> {
         self.lines.next().ok_or_else(|| {
             let help = "is the file cut off?";
-            ErrorPosition::file(self.origin).fail(ExchangeErrorKind::Syntax, "file", "its end", expected, help)
+            ErrorPosition::file(self.origin).fail("file", "its end", expected, help)
         })
     }
 
-    fn expect(&mut self, word: &str) -> Result<(), ExchangeError> {
+    fn expect(&mut self, word: &str) -> Result<(), FeFileError> {
         let (place, key, _) = self.next(word)?;
         if same(key, word) { Ok(()) } else { Err(unexpected(&place, key, word)) }
     }
@@ -90,7 +91,7 @@ impl<'a, I: Iterator<Item = Line<'a>>> Cursor<'a, I> {
     }
 
     /// Reads `refmod`: mass, number of shape coordinates, and a description of each.
-    fn refmod(&mut self, sid: &mut Sid) -> Result<(), ExchangeError> {
+    fn refmod(&mut self, sid: &mut Sid) -> Result<(), FeFileError> {
         self.expect("refmod")?;
         let mut promised = 0;
         while !self.take("end refmod") {
@@ -108,9 +109,7 @@ impl<'a, I: Iterator<Item = Line<'a>>> Cursor<'a, I> {
         }
         if sid.modes.len() != promised {
             let found = format!("{} lines ielastq", sid.modes.len());
-            let kind = ExchangeErrorKind::WrongSize;
             return Err(ErrorPosition::file(self.origin).fail(
-                kind,
                 "refmod",
                 found,
                 format!("{promised}, as nelastq says"),
@@ -121,7 +120,7 @@ impl<'a, I: Iterator<Item = Line<'a>>> Cursor<'a, I> {
     }
 
     /// Reads `frame`: the nodes.
-    fn frame(&mut self, sid: &mut Sid) -> Result<(), ExchangeError> {
+    fn frame(&mut self, sid: &mut Sid) -> Result<(), FeFileError> {
         self.expect("frame")?;
         while !self.take("end frame") {
             let (place, key, value) = self.next("end frame")?;
@@ -135,7 +134,7 @@ impl<'a, I: Iterator<Item = Line<'a>>> Cursor<'a, I> {
         Ok(())
     }
 
-    fn node(&mut self, place: ErrorPosition<'a>, id: i64, nq: usize) -> Result<SidNode, ExchangeError> {
+    fn node(&mut self, place: ErrorPosition<'a>, id: i64, nq: usize) -> Result<SidNode, FeFileError> {
         let mut rframe = String::new();
         let mut found: [Option<SidMatrix>; 5] = Default::default();
         while !self.take("end node") {
@@ -152,14 +151,13 @@ impl<'a, I: Iterator<Item = Line<'a>>> Cursor<'a, I> {
         let [Some(origin), Some(phi), Some(psi), Some(AP), sigma] = found else {
             let found = found.iter().zip(NODE_BLOCKS).filter_map(|(block, name)| block.as_ref().and(Some(name)));
             let found: Vec<_> = found.collect();
-            let kind = ExchangeErrorKind::Missing;
-            return Err(place.fail(kind, format!("node {id}"), found.join(", "), "origin, phi, psi, AP", ""));
+            return Err(place.fail(format!("node {id}"), found.join(", "), "origin, phi, psi, AP", ""));
         };
         Ok(SidNode { id, rframe, origin, phi, psi, AP, sigma })
     }
 
     /// Reads the matrices of the body up to `end modal`.
-    fn body(&mut self, sid: &mut Sid) -> Result<(), ExchangeError> {
+    fn body(&mut self, sid: &mut Sid) -> Result<(), FeFileError> {
         let nq = sid.nq();
         let mut found: [Option<SidMatrix>; 11] = Default::default();
         while !self.take("end modal") {
@@ -189,18 +187,11 @@ impl<'a, I: Iterator<Item = Line<'a>>> Cursor<'a, I> {
             return Ok(());
         }
         let found = format!("no {}", missing.join(", "));
-        let kind = ExchangeErrorKind::Missing;
-        Err(ErrorPosition::file(self.origin).fail(
-            kind,
-            "modal",
-            found,
-            "all matrices of the body",
-            "is the file cut off?",
-        ))
+        Err(ErrorPosition::file(self.origin).fail("modal", found, "all matrices of the body", "is the file cut off?"))
     }
 
     /// Reads a matrix up to `end <name>`.
-    fn matrix(&mut self, head: ErrorPosition<'a>, name: &str, nq: usize) -> Result<SidMatrix, ExchangeError> {
+    fn matrix(&mut self, head: ErrorPosition<'a>, name: &str, nq: usize) -> Result<SidMatrix, FeFileError> {
         let mut matrix = SidMatrix::default();
         let end = format!("end {name}");
         let mut last = head;
@@ -213,7 +204,7 @@ impl<'a, I: Iterator<Item = Line<'a>>> Cursor<'a, I> {
             // entry.
             if is_head && !(matrix.entries0.is_empty() && matrix.entries1.is_empty()) {
                 let (element, expected) = (format!("{name}, {key}"), "all sizes before the first entry");
-                return Err(place.fail(ExchangeErrorKind::Syntax, element, shown(value), expected, ""));
+                return Err(place.fail(element, shown(value), expected, ""));
             }
             match key {
                 "order" => matrix.order = count(&place, "order", value, 255)? as u8,
@@ -237,7 +228,7 @@ fn check_sizes(
     name: &str,
     nq: usize,
     most_entries: usize,
-) -> Result<(), ExchangeError> {
+) -> Result<(), FeFileError> {
     let shape = (matrix.nrow, matrix.ncol);
     let expected: &[(usize, usize)] = match name {
         "origin" | "mdCM" => &[(3, 1)],
@@ -251,7 +242,7 @@ fn check_sizes(
         "Oe" => &[(nq, 6)],
         _ => &[],
     };
-    let fail = |found: String, expected: String| Err(end.fail(ExchangeErrorKind::WrongSize, name, found, expected, ""));
+    let fail = |found: String, expected: String| Err(end.fail(name, found, expected, ""));
     if matrix.order > 1
         || matrix.structure > 4
         || matrix.nq > nq
@@ -283,7 +274,7 @@ fn entry(
     name: &str,
     key: &str,
     value: &str,
-) -> Result<(), ExchangeError> {
+) -> Result<(), FeFileError> {
     let expected = format!("m0( i, j), m1( i, k, j) or end {name}");
     let Some((kind, indices)) = key.strip_suffix(')').and_then(|key| key.split_once('(')) else {
         return Err(unexpected(place, key, &expected));
@@ -299,29 +290,23 @@ fn entry(
         }
         _ => {
             let size = format!("{} x {}, nq {}, order {}", matrix.nrow, matrix.ncol, matrix.nq, matrix.order);
-            return Err(place.fail(
-                ExchangeErrorKind::Syntax,
-                element,
-                shown(key),
-                format!("{expected} in {size}"),
-                "",
-            ));
+            return Err(place.fail(element, shown(key), format!("{expected} in {size}"), ""));
         }
     };
     match previous.filter(|previous| *previous != value) {
         None => Ok(()),
         Some(previous) => {
             let found = format!("{previous:e} and {value:e}");
-            Err(place.fail(ExchangeErrorKind::Unequal, element, found, "one value", ""))
+            Err(place.fail(element, found, "one value", ""))
         }
     }
 }
 
 /// Parses a count with an upper limit.
-fn count(place: &ErrorPosition<'_>, what: &str, text: &str, most: usize) -> Result<usize, ExchangeError> {
+fn count(place: &ErrorPosition<'_>, what: &str, text: &str, most: usize) -> Result<usize, FeFileError> {
     match usize::try_from(place.integer(what, text)?) {
         Ok(count) if count <= most => Ok(count),
-        _ => Err(place.fail(ExchangeErrorKind::Syntax, what, shown(text), format!("0 to {most}"), "")),
+        _ => Err(place.fail(what, shown(text), format!("0 to {most}"), "")),
     }
 }
 
@@ -330,6 +315,6 @@ fn same(key: &str, word: &str) -> bool {
     key.split_whitespace().map(str::to_ascii_lowercase).eq(word.split_whitespace().map(str::to_ascii_lowercase))
 }
 
-fn unexpected(place: &ErrorPosition<'_>, key: &str, expected: &str) -> ExchangeError {
-    place.fail(ExchangeErrorKind::Syntax, "line", shown(key), expected, "")
+fn unexpected(place: &ErrorPosition<'_>, key: &str, expected: &str) -> FeFileError {
+    place.fail("line", shown(key), expected, "")
 }

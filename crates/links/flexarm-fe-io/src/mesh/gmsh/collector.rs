@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use super::reader::Reader;
 use super::shapes::{Shape, advice, shape};
+use crate::FeFileError;
 use crate::mesh::draft::Draft;
-use crate::mesh::error::{FilePosition, MeshError, MeshErrorKind as Kind};
 use crate::mesh::ids::IdIndex;
 use crate::mesh::read::ReadOptions;
 use crate::mesh::source::{Source, shown};
@@ -74,7 +74,7 @@ impl Collector {
     }
 
     /// Reads `$PhysicalNames`: dimension, tag and quoted name of each group.
-    pub(super) fn physical_names(&mut self, reader: &mut Reader) -> Result<(), MeshError> {
+    pub(super) fn physical_names(&mut self, reader: &mut Reader) -> Result<(), FeFileError> {
         let count = reader.size("number of physical names")?;
         let count = reader.checked(count, "number of physical names", [2, 0, 0])?;
         for _ in 0..count {
@@ -86,7 +86,7 @@ impl Collector {
             let (Some(name), 0..=3) = (name, dim) else {
                 let found = format!("dimension {dim}, name {}", shown(quoted));
                 let expected = "a dimension 0 to 3 and a name in quotes";
-                return Err(reader.src.error(Kind::Syntax, at, "$PhysicalNames", found, expected));
+                return Err(reader.src.error(at, "$PhysicalNames", found, expected));
             };
             self.names.insert((dim as u8, tag.abs()), String::from_utf8_lossy(name).into_owned());
         }
@@ -104,17 +104,17 @@ impl Collector {
     }
 
     /// Looks up an element type; rejects unsupported volumes.
-    pub(super) fn shape(&self, reader: &Reader, at: usize, number: i64) -> Result<Shape, MeshError> {
+    pub(super) fn shape(&self, reader: &Reader, at: usize, number: i64) -> Result<Shape, FeFileError> {
         let known = "4, 8, 6 nodes (tetrahedron, hexahedron, prism) or 10, 20, 15";
         match shape(number) {
             Some(found) if found.dim < 3 || found.solid.is_some() => Ok(found),
             Some(found) => {
                 let found = format!("{} (Gmsh type {number})", found.name);
-                Err(reader.src.error(Kind::Unsupported, at, "$Elements", found, known).help(advice(number)))
+                Err(reader.src.error(at, "$Elements", found, known).help(advice(number)))
             }
             None => {
                 let found = format!("Gmsh element type {number}");
-                Err(reader.src.error(Kind::Unsupported, at, "$Elements", found, known).help(advice(number)))
+                Err(reader.src.error(at, "$Elements", found, known).help(advice(number)))
             }
         }
     }
@@ -128,13 +128,13 @@ impl Collector {
         at: usize,
         groups: &[i64],
         nodes: &[u64],
-    ) -> Result<(), MeshError> {
+    ) -> Result<(), FeFileError> {
         if let Some((kind, order)) = shape.solid {
             if let [first, second, ..] = groups {
                 let both = [first, second].map(|tag| format!("{:?}", self.name((3, *tag)))).join(" and ");
                 let found = format!("the physical volumes {both}");
                 return Err(src
-                    .error(Kind::Region, at, format!("element {id}"), found, "one physical volume")
+                    .error(at, format!("element {id}"), found, "one physical volume")
                     .help("leave each volume in one physical group"));
             }
             self.keep(
@@ -158,7 +158,7 @@ impl Collector {
                 if self.kept > MAX_MEMBERS.0 + MAX_MEMBERS.1 * src.bytes.len() {
                     let element = format!("physical group {:?}", self.name(key));
                     let expected = format!("at most {} nodes per byte of the file in all groups", MAX_MEMBERS.1);
-                    return Err(src.error(Kind::TooLarge, at, element, "too many nodes", expected));
+                    return Err(src.error(at, element, "too many nodes", expected));
                 }
             }
             if self.keep_lines && shape.dim == 1 && nodes.len() == 2 {
@@ -184,7 +184,7 @@ impl Collector {
     }
 
     /// Names regions and sets, turns the lines of beam groups into beams, and checks everything.
-    pub(super) fn finish(mut self, src: &Source, options: &ReadOptions) -> Result<(Mesh, Vec<String>), MeshError> {
+    pub(super) fn finish(mut self, src: &Source, options: &ReadOptions) -> Result<(Mesh, Vec<String>), FeFileError> {
         let has_volume_groups = self.region_keys.iter().any(|(dim, tag)| *dim == 3 && *tag != 0);
         self.check_beams(src, options)?;
         let mut keep = Vec::with_capacity(self.region_keys.len());
@@ -210,23 +210,17 @@ impl Collector {
     }
 
     /// Checks that every beam group of the options is a physical curve of two-node lines.
-    fn check_beams(&self, src: &Source, options: &ReadOptions) -> Result<(), MeshError> {
+    fn check_beams(&self, src: &Source, options: &ReadOptions) -> Result<(), FeFileError> {
         for (group, _) in &options.beams {
             let curves = || self.sets.iter().filter(|(key, _)| key.0 == 1);
             let Some((_, set)) = curves().find(|(key, _)| self.name(**key) == *group) else {
                 let element = format!("beam group {group:?}");
                 let expected = format!("a physical curve: {}", listed(curves().map(|(key, _)| self.name(*key))));
-                return Err(src.error_in(
-                    Kind::Missing,
-                    FilePosition::File,
-                    element,
-                    "no such physical curve",
-                    expected,
-                ));
+                return Err(src.error_in_file(element, "no such physical curve", expected));
             };
             if let Some(at) = set.bent_line {
                 let element = format!("beam group {group:?}");
-                let error = src.error(Kind::Unsupported, at, element, "a line of second order", "2-node lines");
+                let error = src.error(at, element, "a line of second order", "2-node lines");
                 return Err(error.help("mesh beams with Mesh.ElementOrder=1"));
             }
         }
@@ -235,7 +229,7 @@ impl Collector {
 
     /// Node sets by name; if groups of several dimensions share a name, the highest dimension keeps
     /// it.
-    fn node_sets(&mut self, src: &Source, index: &IdIndex) -> Result<Vec<(String, Vec<u32>)>, MeshError> {
+    fn node_sets(&mut self, src: &Source, index: &IdIndex) -> Result<Vec<(String, Vec<u32>)>, FeFileError> {
         // Remove the remaining duplicates: neighbouring elements share most of their nodes.
         for set in self.sets.values_mut() {
             set.tidy();
@@ -255,7 +249,7 @@ impl Collector {
             let nodes = set.ids.iter().map(|id| {
                 index.get(*id).ok_or_else(|| {
                     let found = format!("node {id}");
-                    src.error(Kind::Missing, set.at, format!("physical group {name:?}"), found, "a node of the file")
+                    src.error(set.at, format!("physical group {name:?}"), found, "a node of the file")
                 })
             });
             let nodes = nodes.collect::<Result<Vec<u32>, _>>()?;

@@ -9,14 +9,14 @@ mod msh4;
 mod reader;
 pub(crate) mod shapes;
 
-use super::error::{FilePosition, MeshError, MeshErrorKind as Kind};
 use super::read::{MeshFile, ReadOptions};
 use super::source::{Source, shown};
+use crate::FeFileError;
 use collector::Collector;
 use reader::{Layout, Reader};
 
 /// Reads a whole file.
-pub(super) fn parse(src: &Source, options: &ReadOptions) -> Result<MeshFile, MeshError> {
+pub(super) fn parse(src: &Source, options: &ReadOptions) -> Result<MeshFile, FeFileError> {
     let mut reader = Reader { src: *src, pos: 0, layout: Layout::Ascii };
     let mut header = None;
     let mut collector = Collector::new(!options.beams.is_empty());
@@ -30,11 +30,11 @@ pub(super) fn parse(src: &Source, options: &ReadOptions) -> Result<MeshFile, Mes
                 reader = Reader { layout: reader.layout, ..text };
             }
             (b"Nodes" | b"Elements" | b"Entities", None) | (b"NOD" | b"ELM", _) => {
-                let error = src.error(Kind::Format, at, "format", format!("${}", shown(section)), "$MeshFormat first");
+                let error = src.error(at, "format", format!("${}", shown(section)), "$MeshFormat first");
                 return Err(error.help("MSH 1 is not read: save as version 4.1 or 2.2"));
             }
             (b"PartitionedEntities", _) => {
-                let error = src.error(Kind::Unsupported, at, "mesh", "$PartitionedEntities", "a mesh in one piece");
+                let error = src.error(at, "mesh", "$PartitionedEntities", "a mesh in one piece");
                 return Err(error.help("in Gmsh use UnpartitionMesh and save again"));
             }
             (b"Entities", Some(Header { version: 4, .. })) => msh4::entities(&mut reader, &mut collector)?,
@@ -52,7 +52,7 @@ pub(super) fn parse(src: &Source, options: &ReadOptions) -> Result<MeshFile, Mes
     }
 
     let Some(header) = header else {
-        return Err(src.error_in(Kind::Format, FilePosition::File, "format", "no $MeshFormat", "a Gmsh mesh"));
+        return Err(src.error_in_file("format", "no $MeshFormat", "a Gmsh mesh"));
     };
     let src = reader.src;
     let (mesh, warnings) = collector.finish(&src, options)?;
@@ -102,7 +102,7 @@ fn skip_section(reader: &mut Reader, section: &[u8]) {
 
 /// Reads `version file-type data-size` and, in binary files, the integer 1 that shows the byte
 /// order.
-fn mesh_format(reader: &mut Reader) -> Result<Header, MeshError> {
+fn mesh_format(reader: &mut Reader) -> Result<Header, FeFileError> {
     let at = reader.pos;
     let version_word = reader.word("version")?;
     let version = match version_word {
@@ -110,7 +110,7 @@ fn mesh_format(reader: &mut Reader) -> Result<Header, MeshError> {
         b"4.1" => 4,
         _ => {
             let found = shown(version_word);
-            let error = reader.src.error(Kind::Format, at, "version of the MSH format", found, "2.2 or 4.1");
+            let error = reader.src.error(at, "version of the MSH format", found, "2.2 or 4.1");
             return Err(error.help("in Gmsh set Mesh.MshFileVersion=4.1 and save again"));
         }
     };
@@ -119,7 +119,7 @@ fn mesh_format(reader: &mut Reader) -> Result<Header, MeshError> {
     if !matches!((file_type, size, version), (0, ..) | (1, 8, _) | (1, 4, 4)) {
         let found = format!("file type {file_type}, data size {size}");
         let expected = "file type 0 or 1 and data size 8, or 4 in version 4.1";
-        return Err(reader.src.error(Kind::Format, at, "$MeshFormat", found, expected));
+        return Err(reader.src.error(at, "$MeshFormat", found, expected));
     }
     if file_type == 1 {
         reader.rest_of_line();
@@ -129,7 +129,7 @@ fn mesh_format(reader: &mut Reader) -> Result<Header, MeshError> {
         let big_endian = one == i64::from(1_i32.swap_bytes());
         if one != 1 && !big_endian {
             let expected = "1 in one of the two byte orders";
-            let error = reader.src.error(Kind::Format, at, "byte order", one.to_string(), expected);
+            let error = reader.src.error(at, "byte order", one.to_string(), expected);
             return Err(error.help("was the file transferred as text?"));
         }
         reader.layout = Layout::Binary { big_endian, size: size as usize };

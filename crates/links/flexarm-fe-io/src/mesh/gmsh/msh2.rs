@@ -5,10 +5,10 @@ use nalgebra::Vector3;
 use super::collector::Collector;
 use super::reader::{Layout, Reader};
 use super::shapes::MAX_NODES;
-use crate::mesh::error::MeshError;
+use crate::FeFileError;
 
 /// Reads `$Nodes`: number and position of each node.
-pub(super) fn nodes(reader: &mut Reader, collector: &mut Collector) -> Result<(), MeshError> {
+pub(super) fn nodes(reader: &mut Reader, collector: &mut Collector) -> Result<(), FeFileError> {
     let count = text_count(reader, "number of nodes")?;
     let count = reader.checked(count, "number of nodes", [1, 0, 3])?;
     for _ in 0..count {
@@ -21,7 +21,7 @@ pub(super) fn nodes(reader: &mut Reader, collector: &mut Collector) -> Result<()
 }
 
 /// Reads `$Elements`: one per line in text, runs of one type in binary.
-pub(super) fn elements(reader: &mut Reader, collector: &mut Collector) -> Result<(), MeshError> {
+pub(super) fn elements(reader: &mut Reader, collector: &mut Collector) -> Result<(), FeFileError> {
     let count = text_count(reader, "number of elements")?;
     let ascii = reader.layout == Layout::Ascii;
     let count = reader.checked(count, "number of elements", [if ascii { 4 } else { 2 }, 0, 0])?;
@@ -58,7 +58,7 @@ pub(super) fn elements(reader: &mut Reader, collector: &mut Collector) -> Result
 }
 
 /// Reads a count on its own line, which is text in binary files as well.
-fn text_count(reader: &mut Reader, what: &str) -> Result<u64, MeshError> {
+fn text_count(reader: &mut Reader, what: &str) -> Result<u64, FeFileError> {
     let layout = std::mem::replace(&mut reader.layout, Layout::Ascii);
     let count = reader.size(what);
     if layout != Layout::Ascii {

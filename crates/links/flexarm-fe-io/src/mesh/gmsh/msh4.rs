@@ -5,13 +5,13 @@ use nalgebra::Vector3;
 use super::collector::Collector;
 use super::reader::{Layout, Reader};
 use super::shapes::MAX_NODES;
-use crate::mesh::error::{MeshError, MeshErrorKind as Kind};
+use crate::FeFileError;
 
 /// Maximum number of physical groups of one entity.
 const MAX_GROUPS: usize = 64;
 
 /// Reads `$Entities`; only the physical groups of each are kept.
-pub(super) fn entities(reader: &mut Reader, collector: &mut Collector) -> Result<(), MeshError> {
+pub(super) fn entities(reader: &mut Reader, collector: &mut Collector) -> Result<(), FeFileError> {
     let mut counts = [0; 4];
     for count in &mut counts {
         *count = reader.size("number of entities")?;
@@ -32,7 +32,7 @@ pub(super) fn entities(reader: &mut Reader, collector: &mut Collector) -> Result
             if groups.len() > MAX_GROUPS {
                 let (element, found) = (format!("entity {tag} of dimension {dim}"), format!("{} groups", groups.len()));
                 let expected = format!("at most {MAX_GROUPS} physical groups");
-                return Err(reader.src.error(Kind::TooLarge, reader.pos, element, found, expected));
+                return Err(reader.src.error(reader.pos, element, found, expected));
             }
             if !groups.is_empty() {
                 collector.entity(dim, tag, groups);
@@ -42,14 +42,14 @@ pub(super) fn entities(reader: &mut Reader, collector: &mut Collector) -> Result
     Ok(())
 }
 
-fn tags(reader: &mut Reader, what: &str) -> Result<Vec<i64>, MeshError> {
+fn tags(reader: &mut Reader, what: &str) -> Result<Vec<i64>, FeFileError> {
     let count = reader.size(what)?;
     let count = reader.checked(count, what, [1, 0, 0])?;
     (0..count).map(|_| reader.int("tag").map(i64::abs)).collect()
 }
 
 /// Reads `$Nodes`: per entity the numbers of its nodes, then their positions.
-pub(super) fn nodes(reader: &mut Reader, collector: &mut Collector) -> Result<(), MeshError> {
+pub(super) fn nodes(reader: &mut Reader, collector: &mut Collector) -> Result<(), FeFileError> {
     let block_count = header(reader)?;
     for _ in 0..block_count {
         let dim = reader.int("dimension of an entity")?;
@@ -75,7 +75,7 @@ pub(super) fn nodes(reader: &mut Reader, collector: &mut Collector) -> Result<()
 }
 
 /// Reads `$Elements`: per entity and type the number and the nodes of each element.
-pub(super) fn elements(reader: &mut Reader, collector: &mut Collector) -> Result<(), MeshError> {
+pub(super) fn elements(reader: &mut Reader, collector: &mut Collector) -> Result<(), FeFileError> {
     let block_count = header(reader)?;
     let mut nodes = [0_u64; MAX_NODES];
     for _ in 0..block_count {
@@ -86,7 +86,7 @@ pub(super) fn elements(reader: &mut Reader, collector: &mut Collector) -> Result
         let shape = collector.shape(reader, at, number)?;
         if dim != i64::from(shape.dim) {
             let found = format!("a {} in an entity of dimension {dim}", shape.name);
-            return Err(reader.src.error(Kind::Syntax, at, "$Elements", found, format!("dimension {}", shape.dim)));
+            return Err(reader.src.error(at, "$Elements", found, format!("dimension {}", shape.dim)));
         }
         let count = reader.size("number of elements")?;
         let count = reader.checked(count, "number of elements", [0, 1 + shape.nodes, 0])?;
@@ -104,7 +104,7 @@ pub(super) fn elements(reader: &mut Reader, collector: &mut Collector) -> Result
 }
 
 /// Reads the numbers of blocks and items, minimum and maximum number; returns only the first.
-fn header(reader: &mut Reader) -> Result<usize, MeshError> {
+fn header(reader: &mut Reader) -> Result<usize, FeFileError> {
     let blocks = reader.size("number of entity blocks")?;
     for what in ["number in all", "smallest number", "largest number"] {
         reader.size(what)?;

@@ -1,6 +1,6 @@
 //! Reads the numbers of a Gmsh file in order, as text or in binary of either byte order.
 
-use crate::mesh::error::{MeshError, MeshErrorKind as Kind};
+use crate::FeFileError;
 use crate::mesh::source::{Source, parse_f64, parse_u64, shown};
 
 /// Encoding of numbers.
@@ -31,7 +31,7 @@ impl<'a> Reader<'a> {
     }
 
     /// Reads the next word of text.
-    pub(super) fn word(&mut self, what: &str) -> Result<&'a [u8], MeshError> {
+    pub(super) fn word(&mut self, what: &str) -> Result<&'a [u8], FeFileError> {
         self.skip_blanks();
         let rest = &self.src.bytes[self.pos..];
         let length = rest.iter().position(u8::is_ascii_whitespace).unwrap_or(rest.len());
@@ -56,7 +56,7 @@ impl<'a> Reader<'a> {
     }
 
     /// Reads a signed integer, C `int`.
-    pub(super) fn int(&mut self, what: &str) -> Result<i64, MeshError> {
+    pub(super) fn int(&mut self, what: &str) -> Result<i64, FeFileError> {
         match self.layout {
             Layout::Ascii => {
                 let at = self.pos;
@@ -74,7 +74,7 @@ impl<'a> Reader<'a> {
     }
 
     /// Reads an unsigned integer, C `size_t`.
-    pub(super) fn size(&mut self, what: &str) -> Result<u64, MeshError> {
+    pub(super) fn size(&mut self, what: &str) -> Result<u64, FeFileError> {
         match self.layout {
             Layout::Ascii => {
                 let at = self.pos;
@@ -94,14 +94,14 @@ impl<'a> Reader<'a> {
     }
 
     /// Reads the number of a node or an element in MSH 2, an `int`.
-    pub(super) fn id(&mut self, what: &str) -> Result<u64, MeshError> {
+    pub(super) fn id(&mut self, what: &str) -> Result<u64, FeFileError> {
         let at = self.pos;
         let value = self.int(what)?;
         u64::try_from(value).map_err(|_| self.wrong(at, what, value.to_string().as_bytes(), "no negative number"))
     }
 
     /// Reads a real number, C `double`.
-    pub(super) fn real(&mut self, what: &str) -> Result<f64, MeshError> {
+    pub(super) fn real(&mut self, what: &str) -> Result<f64, FeFileError> {
         match self.layout {
             Layout::Ascii => {
                 let at = self.pos;
@@ -118,7 +118,7 @@ impl<'a> Reader<'a> {
     /// Checks a count of items that have at least `parts` integers, sizes and reals each.
     ///
     /// A count that is too large for the rest of the file is rejected before anything is allocated.
-    pub(super) fn checked(&self, count: u64, what: &str, parts: [usize; 3]) -> Result<usize, MeshError> {
+    pub(super) fn checked(&self, count: u64, what: &str, parts: [usize; 3]) -> Result<usize, FeFileError> {
         let [ints, sizes, reals] = parts;
         let each = match self.layout {
             Layout::Ascii => 2 * (ints + sizes + reals),
@@ -130,13 +130,13 @@ impl<'a> Reader<'a> {
             _ => {
                 let found = format!("a count of {count}");
                 let expected = format!("at most {fits}, for which the file has bytes");
-                Err(self.src.error(Kind::Truncated, self.pos, what, found, expected).help("was the file cut off?"))
+                Err(self.src.error(self.pos, what, found, expected).help("was the file cut off?"))
             }
         }
     }
 
     /// Reads the word `$End<section>`.
-    pub(super) fn end_of(&mut self, section: &str) -> Result<(), MeshError> {
+    pub(super) fn end_of(&mut self, section: &str) -> Result<(), FeFileError> {
         let expected = format!("$End{section}");
         self.skip_blanks();
         let at = self.pos;
@@ -144,23 +144,23 @@ impl<'a> Reader<'a> {
         if word == expected.as_bytes() {
             return Ok(());
         }
-        Err(self.src.error(Kind::Syntax, at, format!("end of ${section}"), shown(word), expected))
+        Err(self.src.error(at, format!("end of ${section}"), shown(word), expected))
     }
 
-    fn bytes<const N: usize>(&mut self, what: &str) -> Result<[u8; N], MeshError> {
+    fn bytes<const N: usize>(&mut self, what: &str) -> Result<[u8; N], FeFileError> {
         let bytes = self.src.bytes[self.pos..].first_chunk::<N>().ok_or_else(|| self.ended(what))?;
         self.pos += N;
         Ok(*bytes)
     }
 
-    fn ended(&self, what: &str) -> MeshError {
+    fn ended(&self, what: &str) -> FeFileError {
         let at = self.src.bytes.len();
-        self.src.error(Kind::Truncated, at, what, "the end of the file", "more data").help("was the file cut off?")
+        self.src.error(at, what, "the end of the file", "more data").help("was the file cut off?")
     }
 
-    fn wrong(&self, from: usize, what: &str, word: &[u8], expected: &str) -> MeshError {
+    fn wrong(&self, from: usize, what: &str, word: &[u8], expected: &str) -> FeFileError {
         // Position of the word itself, not of the blanks before it.
         let blanks = self.src.bytes[from..].iter().take_while(|byte| byte.is_ascii_whitespace()).count();
-        self.src.error(Kind::Syntax, from + blanks, what, shown(word), expected)
+        self.src.error(from + blanks, what, shown(word), expected)
     }
 }

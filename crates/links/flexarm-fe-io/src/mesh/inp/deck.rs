@@ -8,8 +8,8 @@ use super::lines::{Card, Lines, fields, id, numbers, squeezed};
 use super::properties::{MaterialCard, SectionCard};
 use super::sets::{Scope, Sets};
 use super::types::{Class, advice, class};
+use crate::FeFileError;
 use crate::mesh::draft::Draft;
-use crate::mesh::error::{MeshError, MeshErrorKind as Kind};
 use crate::mesh::source::{Source, shown};
 use flexarm_fem::units::UnitSystem;
 
@@ -87,7 +87,7 @@ impl<'a> Deck<'a> {
     }
 
     /// Reads all cards up to the first step.
-    pub(super) fn read(&mut self) -> Result<(), MeshError> {
+    pub(super) fn read(&mut self) -> Result<(), FeFileError> {
         let mut in_steps = false;
         while let Some(card) = self.lines.card() {
             in_steps |= card.name == "STEP";
@@ -122,7 +122,7 @@ impl<'a> Deck<'a> {
         Ok(())
     }
 
-    fn card(&mut self, card: &Card) -> Result<(), MeshError> {
+    fn card(&mut self, card: &Card) -> Result<(), FeFileError> {
         let src = self.lines.src;
         match card.name.as_str() {
             "NODE" => self.nodes(card),
@@ -133,14 +133,14 @@ impl<'a> Deck<'a> {
                 let new = MaterialCard::new(&src, card)?;
                 if self.material_by_name.insert(squeezed(&new.name), self.materials.len()).is_some() {
                     let found = format!("a second material {:?}", new.name);
-                    return Err(src.error(Kind::Duplicate, card.at, "*MATERIAL", found, "different names"));
+                    return Err(src.error(card.at, "*MATERIAL", found, "different names"));
                 }
                 self.materials.push(new);
                 Ok(())
             }
             "ELASTIC" | "DENSITY" => {
                 let Some(material) = self.materials.last_mut() else {
-                    return Err(src.error(Kind::Syntax, card.at, card.title.as_str(), "no *MATERIAL", "one before it"));
+                    return Err(src.error(card.at, card.title.as_str(), "no *MATERIAL", "one before it"));
                 };
                 if card.name == "DENSITY" {
                     return material.density(&mut self.lines, card, &self.units);
@@ -190,7 +190,7 @@ impl<'a> Deck<'a> {
     }
 
     /// One instance that is not moved is equivalent to a flat deck.
-    fn instance(&mut self, card: &Card) -> Result<(), MeshError> {
+    fn instance(&mut self, card: &Card) -> Result<(), FeFileError> {
         let src = self.lines.src;
         self.instances += 1;
         let help = "export the part alone, or merge the instances into one part and put it in place there";
@@ -207,7 +207,7 @@ impl<'a> Deck<'a> {
     }
 
     /// Reads `*NODE`: number, x, y, z.
-    fn nodes(&mut self, card: &Card) -> Result<(), MeshError> {
+    fn nodes(&mut self, card: &Card) -> Result<(), FeFileError> {
         let src = self.lines.src;
         if self.scope == Scope::Assembly {
             self.draft.warnings.push("reference points of the assembly were left out".to_owned());
@@ -226,9 +226,8 @@ impl<'a> Deck<'a> {
             for (x, word) in p.iter_mut().zip(words) {
                 *x = match word {
                     b"" => 0.0,
-                    _ => crate::mesh::source::parse_f64(word).ok_or_else(|| {
-                        src.error(Kind::Syntax, at, format!("node {id}"), shown(word), "a coordinate")
-                    })?,
+                    _ => crate::mesh::source::parse_f64(word)
+                        .ok_or_else(|| src.error(at, format!("node {id}"), shown(word), "a coordinate"))?,
                 };
             }
             self.draft.add_node(id, p, at);
@@ -245,7 +244,7 @@ impl<'a> Deck<'a> {
     }
 
     /// Reads `*ELEMENT`: number and nodes, over one or more lines.
-    fn element_card(&mut self, card: &Card) -> Result<(), MeshError> {
+    fn element_card(&mut self, card: &Card) -> Result<(), FeFileError> {
         let src = self.lines.src;
         let type_name = squeezed(card.need(&src, "TYPE")?);
         let Some((class, remark)) = class(&type_name) else {
@@ -287,7 +286,7 @@ impl<'a> Deck<'a> {
             let count = elements.nodes.len() - start;
             if count != each {
                 let (what, found) = (format!("{type_name} element {element}"), format!("{count} nodes"));
-                return Err(src.error(Kind::Syntax, line.0, what, found, format!("{each} nodes")));
+                return Err(src.error(line.0, what, found, format!("{each} nodes")));
             }
             elements.ids.push(element);
             elements.offsets.push(at);
@@ -301,7 +300,7 @@ impl<'a> Deck<'a> {
     }
 
     /// Reads `*NSET` and `*ELSET`.
-    fn set(&mut self, card: &Card) -> Result<(), MeshError> {
+    fn set(&mut self, card: &Card) -> Result<(), FeFileError> {
         let src = self.lines.src;
         let of_nodes = card.name == "NSET";
         let name = card.need(&src, &card.name)?;
@@ -320,7 +319,7 @@ impl<'a> Deck<'a> {
     }
 
     /// Reads `*SURFACE`, of nodes or of element faces.
-    fn surface(&mut self, card: &Card) -> Result<(), MeshError> {
+    fn surface(&mut self, card: &Card) -> Result<(), FeFileError> {
         let src = self.lines.src;
         let name = card.need(&src, "NAME")?.to_owned();
         let kind = squeezed(card.get("TYPE").unwrap_or("ELEMENT"));

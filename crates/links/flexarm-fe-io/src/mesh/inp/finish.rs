@@ -7,13 +7,12 @@ use super::lines::squeezed;
 use super::properties::SectionCard;
 use super::sets::{Budget, Scope, unknown};
 use super::types::Class;
-use crate::mesh::error::{MeshError, MeshErrorKind as Kind};
+use crate::FeFileError;
 use crate::mesh::ids::IdIndex;
 use crate::mesh::read::ReadOptions;
 use crate::mesh::source::parse_u64;
 use flexarm_fem::beam::BeamTheory;
-use flexarm_fem::mesh::face_nodes;
-use flexarm_fem::mesh::{ElementKind, Mesh, Region};
+use flexarm_fem::mesh::{ElementKind, Mesh, Region, face_nodes};
 use flexarm_fem::spelling::listed;
 
 const NONE: u32 = u32::MAX;
@@ -23,7 +22,7 @@ type NamedNodeSet = (String, Vec<u32>);
 
 impl Deck<'_> {
     /// Builds the mesh and checks it.
-    pub(super) fn finish(mut self, options: &ReadOptions) -> Result<(Mesh, Vec<String>), MeshError> {
+    pub(super) fn finish(mut self, options: &ReadOptions) -> Result<(Mesh, Vec<String>), FeFileError> {
         let src = self.lines.src;
         let nodes = self.draft.index_nodes(&src)?;
         let elements = self.index_elements()?;
@@ -52,22 +51,22 @@ impl Deck<'_> {
         self.elements.groups[self.elements.cards[element] as usize].class
     }
 
-    fn index_elements(&self) -> Result<IdIndex, MeshError> {
+    fn index_elements(&self) -> Result<IdIndex, FeFileError> {
         let (src, elements) = (self.lines.src, &self.elements);
         if elements.ids.len() >= NONE as usize {
             let found = format!("{} elements", elements.ids.len());
-            return Err(src.error(Kind::TooLarge, 0, "mesh", found, "fewer than 4294967295 elements"));
+            return Err(src.error(0, "mesh", found, "fewer than 4294967295 elements"));
         }
         IdIndex::new(&elements.ids).map_err(|(_, again)| {
             let element = format!("element {}", elements.ids[again]);
             let found = "a second element with this number";
-            src.error(Kind::Duplicate, elements.offsets[again], element, found, "every element once")
+            src.error(elements.offsets[again], element, found, "every element once")
         })
     }
 
     /// Index of the region of every element: that of its section, or of its set if it has no
     /// section.
-    fn regions(&mut self, elsets: &[Vec<u32>]) -> Result<Vec<u32>, MeshError> {
+    fn regions(&mut self, elsets: &[Vec<u32>]) -> Result<Vec<u32>, FeFileError> {
         let src = self.lines.src;
         let mut region_of = vec![NONE; self.elements.ids.len()];
         for section in &self.sections {
@@ -94,28 +93,28 @@ impl Deck<'_> {
         section: &SectionCard,
         elements: &[u32],
         region_of: &mut [u32],
-    ) -> Result<Option<BeamTheory>, MeshError> {
+    ) -> Result<Option<BeamTheory>, FeFileError> {
         let mut theory: Option<BeamTheory> = None;
         for element in elements.iter().map(|element| *element as usize) {
-            let fault = |kind, found: String, expected: &str| {
+            let fault = |found: String, expected: &str| {
                 let what = format!("element {} of section {:?}", self.elements.ids[element], section.elset);
-                Err(self.lines.src.error(kind, section.at, what, found, expected))
+                Err(self.lines.src.error(section.at, what, found, expected))
             };
             if region_of[element] != NONE {
                 let other = &self.draft.regions[region_of[element] as usize].name;
-                return fault(Kind::Region, format!("a second section; the first is {other:?}"), "one section");
+                return fault(format!("a second section; the first is {other:?}"), "one section");
             }
             let card = &self.elements.groups[self.elements.cards[element] as usize];
             match (card.class, section.beam.is_some()) {
                 (Class::Solid(_), false) => {}
                 (Class::Beam(of_card), true) if theory.is_none_or(|known| known == of_card) => theory = Some(of_card),
                 (Class::Beam(_), true) => {
-                    return fault(Kind::Unsupported, "both B31 and B33".into(), "one of them per section");
+                    return fault("both B31 and B33".into(), "one of them per section");
                 }
                 _ => {
                     let found = format!("{} with {}", card.type_name, section.title);
                     let expected = "solids with *SOLID SECTION, beams with *BEAM SECTION";
-                    return fault(Kind::Unsupported, found, expected);
+                    return fault(found, expected);
                 }
             }
             region_of[element] = self.draft.regions.len() as u32;
@@ -145,7 +144,7 @@ impl Deck<'_> {
     }
 
     /// Applies beam sections given by the caller.
-    fn beams_of_options(&mut self, options: &ReadOptions, region_of: &[u32]) -> Result<(), MeshError> {
+    fn beams_of_options(&mut self, options: &ReadOptions, region_of: &[u32]) -> Result<(), FeFileError> {
         let mut with_beams = BTreeSet::new();
         for (element, region) in region_of.iter().enumerate() {
             if matches!(self.class(element), Class::Beam(_)) {
@@ -173,7 +172,7 @@ impl Deck<'_> {
         elements: &IdIndex,
         elsets: &[Vec<u32>],
         budget: &mut Budget,
-    ) -> Result<Vec<NamedNodeSet>, MeshError> {
+    ) -> Result<Vec<NamedNodeSet>, FeFileError> {
         let src = self.lines.src;
         let mut own = Vec::with_capacity(self.nsets.list.len());
         for set in &self.nsets.list {
@@ -214,7 +213,7 @@ impl Deck<'_> {
     }
 
     /// Appends the nodes of elements.
-    fn nodes_of(&self, nodes: &IdIndex, elements: &[u32], out: &mut Vec<u32>) -> Result<(), MeshError> {
+    fn nodes_of(&self, nodes: &IdIndex, elements: &[u32], out: &mut Vec<u32>) -> Result<(), FeFileError> {
         for element in elements {
             let count = self.class(*element as usize).nodes();
             self.some_nodes(nodes, *element as usize, 0..count, out)?;
@@ -231,14 +230,14 @@ impl Deck<'_> {
         element: usize,
         places: impl IntoIterator<Item = usize>,
         out: &mut Vec<u32>,
-    ) -> Result<(), MeshError> {
+    ) -> Result<(), FeFileError> {
         let start = self.elements.starts[element];
         for place in places {
             let id = self.elements.nodes[start + place];
             out.push(nodes.get(id).ok_or_else(|| {
                 let what = format!("element {}", self.elements.ids[element]);
                 let at = self.elements.offsets[element];
-                self.lines.src.error(Kind::Missing, at, what, format!("node {id}"), "a node of the file")
+                self.lines.src.error(at, what, format!("node {id}"), "a node of the file")
             })?);
         }
         Ok(())
@@ -252,13 +251,13 @@ impl Deck<'_> {
         elsets: &[Vec<u32>],
         nsets: &[Vec<u32>],
         budget: &mut Budget,
-    ) -> Result<Vec<u32>, MeshError> {
+    ) -> Result<Vec<u32>, FeFileError> {
         let src = self.lines.src;
         let mut out = Vec::new();
         for (at, member, face) in &surface.items {
             let what = || format!("surface {:?}", surface.name);
             let number = parse_u64(member.as_bytes());
-            let missing = || src.error(Kind::Missing, *at, what(), member.as_str(), "a number or set of the file");
+            let missing = || src.error(*at, what(), member.as_str(), "a number or set of the file");
             if surface.of_nodes {
                 match number {
                     Some(id) => out.push(nodes.get(id).ok_or_else(missing)?),
@@ -280,7 +279,7 @@ impl Deck<'_> {
             };
             budget.spend(&src, *at, &surface.name, 8 * members.len())?;
             for element in members {
-                let found = |text: &str| src.error(Kind::Unsupported, *at, what(), text, "a face S1 to S6 of a solid");
+                let found = |text: &str| src.error(*at, what(), text, "a face S1 to S6 of a solid");
                 let Class::Solid(kind) = self.class(*element as usize) else {
                     return Err(found("a face of an element that is not a solid"));
                 };

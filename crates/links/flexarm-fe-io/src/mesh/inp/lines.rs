@@ -1,6 +1,6 @@
 //! Lines of a deck: cards `*NAME, KEY=VALUE, FLAG` and their data lines.
 
-use crate::mesh::error::{MeshError, MeshErrorKind as Kind};
+use crate::FeFileError;
 use crate::mesh::source::{Source, parse_f64, parse_u64, shown};
 
 /// Lines that are neither blank nor comments.
@@ -101,15 +101,15 @@ impl Card {
     }
 
     /// Value of a required parameter.
-    pub(super) fn need(&self, src: &Source, key: &str) -> Result<&str, MeshError> {
-        self.get(key).filter(|value| !value.is_empty()).ok_or_else(|| {
-            src.error(Kind::Syntax, self.at, self.title.as_str(), format!("no {key}="), format!("{key}=name"))
-        })
+    pub(super) fn need(&self, src: &Source, key: &str) -> Result<&str, FeFileError> {
+        self.get(key)
+            .filter(|value| !value.is_empty())
+            .ok_or_else(|| src.error(self.at, self.title.as_str(), format!("no {key}="), format!("{key}=name")))
     }
 
     /// Creates an error at the card.
-    pub(super) fn refuse(&self, src: &Source, found: impl Into<Box<str>>, expected: &str) -> MeshError {
-        src.error(Kind::Unsupported, self.at, self.title.as_str(), found, expected)
+    pub(super) fn refuse(&self, src: &Source, found: impl Into<Box<str>>, expected: &str) -> FeFileError {
+        src.error(self.at, self.title.as_str(), found, expected)
     }
 }
 
@@ -120,21 +120,21 @@ pub(super) fn fields(line: &[u8]) -> impl Iterator<Item = &[u8]> {
 }
 
 /// Parses all fields of a data line as numbers; an empty field is zero.
-pub(super) fn numbers(src: &Source, card: &Card, (at, line): Line) -> Result<Vec<f64>, MeshError> {
+pub(super) fn numbers(src: &Source, card: &Card, (at, line): Line) -> Result<Vec<f64>, FeFileError> {
     let number = |field: &[u8]| {
         let value = if field.is_empty() { Some(0.0) } else { parse_f64(field) };
         match value {
             Some(value) if value.is_finite() => Ok(value),
-            Some(_) => Err(src.error(Kind::NotFinite, at, card.title.as_str(), shown(field), "a finite number")),
-            None => Err(src.error(Kind::Syntax, at, card.title.as_str(), shown(field), "a number")),
+            Some(_) => Err(src.error(at, card.title.as_str(), shown(field), "a finite number")),
+            None => Err(src.error(at, card.title.as_str(), shown(field), "a number")),
         }
     };
     fields(line).map(number).collect()
 }
 
 /// Parses a field as the number of a node or an element.
-pub(super) fn id(src: &Source, at: usize, what: &str, field: &[u8]) -> Result<u64, MeshError> {
-    parse_u64(field).ok_or_else(|| src.error(Kind::Syntax, at, what, shown(field), "a number without sign or point"))
+pub(super) fn id(src: &Source, at: usize, what: &str, field: &[u8]) -> Result<u64, FeFileError> {
+    parse_u64(field).ok_or_else(|| src.error(at, what, shown(field), "a number without sign or point"))
 }
 
 /// Converts to upper case and removes blanks.

@@ -10,13 +10,13 @@ mod properties;
 mod sets;
 pub(crate) mod types;
 
-use super::error::MeshError;
 use super::read::{MeshFile, ReadOptions};
 use super::source::Source;
+use crate::FeFileError;
 use deck::Deck;
 
 /// Reads a whole file.
-pub(super) fn parse(src: &Source, options: &ReadOptions) -> Result<MeshFile, MeshError> {
+pub(super) fn parse(src: &Source, options: &ReadOptions) -> Result<MeshFile, FeFileError> {
     let mut deck = Deck::new(*src, options.units);
     deck.read()?;
     let element_types = deck.element_types();

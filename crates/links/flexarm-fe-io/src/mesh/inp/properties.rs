@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 
 use super::lines::{Card, Lines, numbers, squeezed};
 use super::sets::Scope;
-use crate::mesh::error::{MeshError, MeshErrorKind as Kind};
+use crate::FeFileError;
 use crate::mesh::source::Source;
 use flexarm_fem::FemError;
 use flexarm_fem::beam::BeamTheory;
@@ -36,7 +36,7 @@ pub(super) struct SectionCard {
 }
 
 impl MaterialCard {
-    pub(super) fn new(src: &Source, card: &Card) -> Result<Self, MeshError> {
+    pub(super) fn new(src: &Source, card: &Card) -> Result<Self, FeFileError> {
         let name = card.need(src, "NAME")?.to_owned();
         Ok(Self { name, at: card.at, elastic: None, density: None })
     }
@@ -48,7 +48,7 @@ impl MaterialCard {
         card: &Card,
         units: &UnitSystem,
         warnings: &mut Vec<String>,
-    ) -> Result<(), MeshError> {
+    ) -> Result<(), FeFileError> {
         let src = lines.src;
         let kind = card.get("TYPE").unwrap_or("ISOTROPIC");
         if !["ISOTROPIC", "ISO"].contains(&squeezed(kind).as_str()) {
@@ -57,7 +57,7 @@ impl MaterialCard {
         }
         let values = first_line(lines, card)?;
         let [E, nu, ..] = values[..] else {
-            return Err(src.error(Kind::Syntax, card.at, "*ELASTIC", format!("{values:?}"), "E, nu"));
+            return Err(src.error(card.at, "*ELASTIC", format!("{values:?}"), "E, nu"));
         };
         if lines.data().is_some() {
             let name = &self.name;
@@ -68,13 +68,13 @@ impl MaterialCard {
     }
 
     /// Reads `*DENSITY`.
-    pub(super) fn density(&mut self, lines: &mut Lines, card: &Card, units: &UnitSystem) -> Result<(), MeshError> {
+    pub(super) fn density(&mut self, lines: &mut Lines, card: &Card, units: &UnitSystem) -> Result<(), FeFileError> {
         self.density = Some(first_line(lines, card)?[0] * units.density());
         Ok(())
     }
 
     /// Returns the material, or `None` with a warning if the data in the deck is incomplete.
-    pub(super) fn material(&self, src: &Source, warnings: &mut Vec<String>) -> Result<Option<Material>, MeshError> {
+    pub(super) fn material(&self, src: &Source, warnings: &mut Vec<String>) -> Result<Option<Material>, FeFileError> {
         let (Some((E, nu)), Some(rho)) = (self.elastic, self.density) else {
             let missing = if self.elastic.is_none() { "*ELASTIC" } else { "*DENSITY" };
             warnings.push(format!("material {:?} has no {missing} and was left out", self.name));
@@ -90,7 +90,7 @@ impl MaterialCard {
 
 impl SectionCard {
     /// Reads `*SOLID SECTION`.
-    pub(super) fn solid(src: &Source, card: &Card, scope: Scope) -> Result<Self, MeshError> {
+    pub(super) fn solid(src: &Source, card: &Card, scope: Scope) -> Result<Self, FeFileError> {
         if card.has("COMPOSITE") {
             return Err(card.refuse(src, "COMPOSITE", "one material per section"));
         }
@@ -111,7 +111,7 @@ impl SectionCard {
         scope: Scope,
         units: &UnitSystem,
         warnings: &mut Vec<String>,
-    ) -> Result<Self, MeshError> {
+    ) -> Result<Self, FeFileError> {
         let src = lines.src;
         let mut section = Self::solid(&src, card, scope)?;
         for key in ["OFFSET1", "OFFSET2"] {
@@ -146,13 +146,7 @@ impl SectionCard {
         let at = |k: usize| direction.get(k).copied().unwrap_or(0.0);
         let y_axis = Vector3::new(at(0), at(1), at(2));
         if y_axis.norm() == 0.0 {
-            return Err(src.error(
-                Kind::Syntax,
-                card.at,
-                card.title.as_str(),
-                "a direction of zero",
-                "n1 of the section",
-            ));
+            return Err(src.error(card.at, card.title.as_str(), "a direction of zero", "n1 of the section"));
         }
         section.beam = Some((shape, y_axis));
         Ok(section)
@@ -169,12 +163,12 @@ impl SectionCard {
         src: &Source,
         materials: &'a [MaterialCard],
         by_name: &HashMap<String, usize>,
-    ) -> Result<&'a MaterialCard, MeshError> {
+    ) -> Result<&'a MaterialCard, FeFileError> {
         let found = by_name.get(&squeezed(&self.material)).and_then(|k| materials.get(*k));
         found.ok_or_else(|| {
             let known = format!("one of: {}", listed(materials.iter().map(|known| &known.name)));
             let found = format!("MATERIAL={}", self.material);
-            src.error(Kind::Missing, self.at, self.title.as_str(), found, known)
+            src.error(self.at, self.title.as_str(), found, known)
         })
     }
 }
@@ -195,14 +189,14 @@ fn beam_section(name: &str, dimensions: &[f64]) -> Option<Section> {
 }
 
 /// Numbers of the first data line, which is required.
-fn first_line(lines: &mut Lines, card: &Card) -> Result<Vec<f64>, MeshError> {
+fn first_line(lines: &mut Lines, card: &Card) -> Result<Vec<f64>, FeFileError> {
     let src = lines.src;
     match lines.data() {
         Some(line) => numbers(&src, card, line),
-        None => Err(src.error(Kind::Syntax, card.at, card.title.as_str(), "no data line", "numbers in the next line")),
+        None => Err(src.error(card.at, card.title.as_str(), "no data line", "numbers in the next line")),
     }
 }
 
-fn impossible(src: &Source, at: usize, element: String, error: &FemError) -> MeshError {
-    src.error(Kind::Material, at, element, error.to_string(), "possible numbers").help("do the units fit?")
+fn impossible(src: &Source, at: usize, element: String, error: &FemError) -> FeFileError {
+    src.error(at, element, error.to_string(), "possible numbers").help("do the units fit?")
 }

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use super::lines::{Line, fields, squeezed, unquoted};
-use crate::mesh::error::{FilePosition, MeshError, MeshErrorKind as Kind};
+use crate::FeFileError;
 use crate::mesh::ids::IdIndex;
 use crate::mesh::source::{Source, parse_u64, shown};
 use flexarm_fem::spelling::listed;
@@ -21,7 +21,7 @@ impl Budget {
     }
 
     /// Counts members of a set or surface at an offset.
-    pub(super) fn spend(&mut self, src: &Source, at: usize, name: &str, members: usize) -> Result<(), MeshError> {
+    pub(super) fn spend(&mut self, src: &Source, at: usize, name: &str, members: usize) -> Result<(), FeFileError> {
         match self.left.checked_sub(members) {
             Some(left) => {
                 self.left = left;
@@ -29,7 +29,7 @@ impl Budget {
             }
             None => {
                 let expected = "at most 16 members per byte of the file in all sets together";
-                Err(src.error(Kind::TooLarge, at, format!("set {name:?}"), "too many members", expected))
+                Err(src.error(at, format!("set {name:?}"), "too many members", expected))
             }
         }
     }
@@ -80,7 +80,7 @@ impl Sets {
     }
 
     /// Finds a set by name, ignoring case, with or without the instance before a point.
-    pub(super) fn find(&self, src: &Source, name: &str, scope: Scope, at: usize) -> Result<usize, MeshError> {
+    pub(super) fn find(&self, src: &Source, name: &str, scope: Scope, at: usize) -> Result<usize, FeFileError> {
         let look = |name: &str| {
             let key = squeezed(unquoted(name));
             let inside = self.by_name.get(&(scope, key.clone()));
@@ -90,7 +90,7 @@ impl Sets {
         known.ok_or_else(|| {
             let known = listed(self.list.iter().map(|set| &set.name));
             let element = format!("{} set {name:?}", self.what);
-            src.error(Kind::Missing, at, element, "no such set so far", format!("one of: {known}"))
+            src.error(at, element, "no such set so far", format!("one of: {known}"))
         })
     }
 
@@ -105,7 +105,7 @@ impl Sets {
         (at, line): Line,
         generate: bool,
         take_ids: bool,
-    ) -> Result<(), MeshError> {
+    ) -> Result<(), FeFileError> {
         if generate {
             let values: Option<Vec<u64>> = fields(line).map(parse_u64).collect();
             let range = match values.as_deref() {
@@ -113,7 +113,7 @@ impl Sets {
                 Some([first, last, step]) if *step > 0 => [*first, *last, *step],
                 _ => {
                     let element = format!("{} set {:?}, GENERATE", self.what, self.list[set].name);
-                    return Err(src.error(Kind::Syntax, at, element, shown(line), "first, last, step"));
+                    return Err(src.error(at, element, shown(line), "first, last, step"));
                 }
             };
             self.list[set].ranges.extend(take_ids.then_some(range));
@@ -148,7 +148,7 @@ impl Sets {
         index: &IdIndex,
         own: Vec<Vec<u32>>,
         budget: &mut Budget,
-    ) -> Result<Vec<Vec<u32>>, MeshError> {
+    ) -> Result<Vec<Vec<u32>>, FeFileError> {
         // Direct members of each set.
         let mut direct = own;
         direct.resize(self.list.len(), Vec::new());
@@ -157,7 +157,7 @@ impl Sets {
                 members.push(index.get(*id).ok_or_else(|| {
                     let element = format!("{} set {:?}", self.what, set.name);
                     let found = format!("{} {id}", self.what);
-                    src.error(Kind::Missing, set.at, element, found, format!("a {} of the file", self.what))
+                    src.error(set.at, element, found, format!("a {} of the file", self.what))
                 })?);
             }
             for [first, last, step] in &set.ranges {
@@ -204,6 +204,6 @@ fn tidy(members: &mut Vec<u32>, before: usize) {
 }
 
 /// Creates an error for an unknown name, without a position in the file.
-pub(super) fn unknown(src: &Source, element: String, found: String, known: String) -> MeshError {
-    src.error_in(Kind::Missing, FilePosition::File, element, found, known)
+pub(super) fn unknown(src: &Source, element: String, found: String, known: String) -> FeFileError {
+    src.error_in_file(element, found, known)
 }

@@ -9,76 +9,12 @@ use super::value::{Value, float_of, float_repr, int_of};
 use super::{ExpressionError, Interpreter, Scope};
 
 /// Functions by their names without module.
-const FUNCTIONS: [&str; 68] = [
-    "sin",
-    "cos",
-    "tan",
-    "asin",
-    "acos",
-    "atan",
-    "atan2",
-    "sinh",
-    "cosh",
-    "tanh",
-    "sqrt",
-    "exp",
-    "log",
-    "log10",
-    "log2",
-    "floor",
-    "ceil",
-    "trunc",
-    "fabs",
-    "hypot",
-    "pow",
-    "fmod",
-    "copysign",
-    "radians",
-    "degrees",
-    "isnan",
-    "isinf",
-    "isfinite",
-    "isclose",
-    "gcd",
-    "list",
-    "dict",
-    "len",
-    "str",
-    "float",
-    "int",
-    "bool",
-    "min",
-    "max",
-    "round",
-    "sorted",
-    "range",
-    "abs",
-    "all",
-    "any",
-    "divmod",
-    "enumerate",
-    "ord",
-    "chr",
-    "repr",
-    "reversed",
-    "set",
-    "sum",
-    "tuple",
-    "type",
-    "zip",
-    "load_yaml",
-    "abs_filename",
-    "dotify",
-    "arg",
-    "message",
-    "warning",
-    "error",
-    "print_location",
-    "fatal",
-    "tokenize",
-    "cbrt",
-    "fsum",
-];
+const FUNCTIONS: &str = "\
+    sin cos tan asin acos atan atan2 sinh cosh tanh sqrt exp log log10 log2 floor ceil trunc fabs \
+    hypot pow fmod copysign radians degrees isnan isinf isfinite isclose gcd list dict len str float \
+    int bool min max round sorted range abs all any divmod enumerate ord chr repr reversed set sum \
+    tuple type zip load_yaml abs_filename dotify arg message warning error print_location fatal \
+    tokenize cbrt fsum";
 
 /// Returns a constant, a module or a function.
 pub(super) fn named_value(name: &str) -> Option<Value> {
@@ -93,7 +29,7 @@ pub(super) fn named_value(name: &str) -> Option<Value> {
         "math" => Value::Module("math"),
         "python" => Value::Module("python"),
         "xacro" => Value::Module("xacro"),
-        _ => Value::Function(FUNCTIONS.iter().find(|f| **f == name)?),
+        _ => Value::Function(FUNCTIONS.split(' ').find(|function| *function == name)?),
     })
 }
 
