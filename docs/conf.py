@@ -1,5 +1,6 @@
 """Sphinx configuration of the documentation site; tools/build_docs.py builds it."""
 
+import os
 import pathlib
 import re
 import tomllib
@@ -19,10 +20,11 @@ myst_fence_as_directive = ["math"]
 myst_heading_anchors = 3
 copybutton_prompt_text = "$ "
 # Pygments has no lexer for CSV. tools/build_docs.py checks links between files.
-suppress_warnings = ["misc.highlighting_failure"]
+# Types such as "path" in docstrings are words, not names.
+suppress_warnings = ["misc.highlighting_failure", "ref.python"]
 
-# The Python package, from its sources and type stubs: nothing is compiled.
-autoapi_dirs = [str(ROOT / "crates/faces/flexarm-python/python")]
+# The Python package, from its sources and type stubs, without importing it.
+autoapi_dirs = [os.environ.get("FLEXARM_PYTHON", str(ROOT / "crates/faces/flexarm-python/python"))]
 autoapi_file_patterns = ["*.pyi", "*.py"]
 autoapi_options = ["members", "show-module-summary", "imported-members"]
 autoapi_root = "python-api"

@@ -4,8 +4,9 @@
     python3 tools/build_docs.py [-o target/site]
 
 Makes a virtual environment with Sphinx in target/; a warning of Sphinx is an error. The page of the
-command line is written from `flexarm help`, that of the Python package from its type stubs. The front
-page embeds the page of web/ if tools/build_web.py has built it. The program is $FLEXARM, else
+command line is written from `flexarm help`, that of the Python package from the newest wheel in
+target/wheels, whose type stub has the docstrings of the compiled classes; without a wheel, from the
+sources. The front page embeds the page of web/ if tools/build_web.py has built it. The program is $FLEXARM, else
 target/release/flexarm, else flexarm on the PATH. Exit status: 0 built, 1 a broken link or a warning,
 3 pip cannot install Sphinx (no network).
 """
@@ -17,6 +18,7 @@ import re
 import shutil
 import subprocess
 import sys
+import zipfile
 
 import make_gallery
 
@@ -61,6 +63,19 @@ def command_line(flexarm):
     COMMAND_LINE.write_text(text)
 
 
+def python_package():
+    """The folder with the Python package: that of the newest wheel, else that of the sources."""
+    wheels = sorted((ROOT / "target/wheels").glob("flexarm-*.whl"), key=lambda file: file.stat().st_mtime)
+    if not wheels:
+        print("without a wheel in target/wheels: compiled classes are left out (tools/build_wheel.py)")
+        return ROOT / "crates/faces/flexarm-python/python"
+    folder = ROOT / "target/docs-python"
+    shutil.rmtree(folder, ignore_errors=True)
+    with zipfile.ZipFile(wheels[-1]) as wheel:
+        wheel.extractall(folder, [name for name in wheel.namelist() if re.fullmatch(r"flexarm/\w+\.pyi?", name)])
+    return folder
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("-o", "--out", type=pathlib.Path, default=ROOT / "target/site")
@@ -76,7 +91,8 @@ def main():
     command_line(make_gallery.program())
     web = ROOT / "web/dist"
     tags = ["-t", "web"] if web.is_dir() else []
-    built = subprocess.run([str(python), "-m", "sphinx", *tags, "-q", "-W", "--keep-going", "-b", "html", str(ROOT / "docs"), str(out)])
+    sphinx = [str(python), "-m", "sphinx", *tags, "-q", "-W", "--keep-going", "-b", "html", str(ROOT / "docs"), str(out)]
+    built = subprocess.run(sphinx, env={**os.environ, "FLEXARM_PYTHON": str(python_package())})
     if tags:
         shutil.copytree(web, out / "web", dirs_exist_ok=True)
     if built.returncode == 0:

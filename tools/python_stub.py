@@ -22,7 +22,7 @@ def documented(text, module):
         for node in nodes:
             if not isinstance(node, (ast.ClassDef, ast.FunctionDef)):
                 continue
-            thing = owner.__dict__.get(node.name)
+            thing = getattr(owner, node.name, None)
             doc = inspect.getdoc(thing) if thing is not None and not node.name.startswith("__") else None
             if doc and ast.get_docstring(node) is None:
                 places.append((node.body[0], node.col_offset + 4, doc))

@@ -8,12 +8,14 @@
 Each picture is a flexarm command and the output file to show. No display is needed: the Rerun
 viewer runs headless (it needs a Vulkan driver; in software: Debian's mesa-vulkan-drivers and
 libvulkan1). Missing programs are reported and skipped; the exit status is 1 only if a possible
-picture failed. Drawn by hand: logo.svg, formulation.svg; of the built page of web/: web.webp.
+picture failed. Made elsewhere: catalogue.svg by tools/catalogue.py, web.webp from the desktop.png
+that `PICTURES=FOLDER tools/build_web.py --test` writes; logo.svg and formulation.svg by hand.
 """
 
 import argparse
 import os
 import pathlib
+import re
 import shutil
 import signal
 import socket
@@ -33,10 +35,17 @@ RERUN = {
         6.5,
     ),
 }
-# Picture: arguments of flexarm, page in its output folder, heading at the top of the picture.
+# Picture: arguments of flexarm, page in its output folder, headings at the top and below the end of the picture.
 PAGES = {
-    "report": (["compare"], "report.html", None),
-    "map": (["map", "kr210", "--box", "0.9:2.5,-1:1,0.2:1.8", "--grid", "0.1", "--keep-out", "0.9", "--wrench", "500,0,0", "--workpiece", "0.8,0.6,0.4"], "map.html", "Slices through the best place"),
+    "report": (["compare"], "report.html", None, None),
+    "map": (["map", "kr210", "--box", "0.9:2.5,-1:1,0.2:1.8", "--grid", "0.1", "--keep-out", "0.9", "--wrench", "500,0,0", "--workpiece", "0.8,0.6,0.4"], "map.html", "Slices through the best place", None),
+    "sweep": (["sweep", "payload_speed.toml"], "report.html", "Main effects", "Pareto front"),
+}
+# Picture: arguments of flexarm, pictures in its output folder, one above the other; width.
+OUTPUTS = {
+    "lobes.svg": (["lobes", "kr210", "--at", "0,-60deg,90deg,0,60deg,0", "--tool", "endmill_20mm"], ["lobes.svg"], None),
+    "reduce.png": (["reduce", "robots/test/lower_arm/lower_arm.reduce.toml"], ["interfaces.png", "unit_loads.png"], 1000),
+    "stress.webp": (["compare", "kr210_stress", "pick_and_place"], ["stress.png"], 1100),
 }
 # What the pictures show: a newer commit there makes a picture old.
 SOURCES = {
@@ -55,6 +64,8 @@ SOURCES = {
 # The moving picture of the README, and the part of the window that it shows.
 ANIMATED = "arm"
 CROP = (0.0, 0.03, 1.0, 0.498)
+
+
 def free_port():
     with socket.socket() as s:
         s.bind(("127.0.0.1", 0))
@@ -117,8 +128,8 @@ def animation(file, out, scratch, seconds):
     pictures[0].save(out, save_all=True, append_images=pictures[1:], duration=duration, loop=0, quality=60, method=6)
 
 
-def page_picture(page, heading, out):
-    """Saves the top of a page, or what begins at a heading."""
+def page_picture(page, begin, end, out):
+    """Saves the top of a page, or what is between two headings."""
     from playwright.sync_api import sync_playwright
 
     browser = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
@@ -126,9 +137,38 @@ def page_picture(page, heading, out):
         view = playwright.chromium.launch(executable_path=browser, args=["--no-sandbox"]).new_page(viewport={"width": 1100, "height": 1000})
         view.goto(page.resolve().as_uri())
         view.wait_for_timeout(1000)
-        if heading:
-            view.get_by_role("heading", name=heading).evaluate("heading => heading.scrollIntoView()")
-        view.screenshot(path=out)
+        top = lambda heading: view.get_by_role("heading", name=heading).bounding_box()["y"]
+        first = top(begin) if begin else 0
+        high = top(end) - first if end else 1000
+        view.screenshot(path=out, full_page=True, clip={"x": 0, "y": first, "width": 1100, "height": high})
+
+
+def stacked(files, width, out):
+    """Saves pictures one above the other; a vector picture as it is."""
+    if out.suffix == ".svg":
+        shutil.copyfile(files[0], out)
+        return
+    from PIL import Image
+
+    pictures = [Image.open(file).convert("RGB") for file in files]
+    pictures = [picture.resize((width, round(picture.height * width / picture.width))) for picture in pictures]
+    whole = Image.new("RGB", (width, sum(picture.height for picture in pictures)))
+    for k, picture in enumerate(pictures):
+        whole.paste(picture, (0, sum(above.height for above in pictures[:k])))
+    whole.save(out, **({"quality": 80, "method": 6} if out.suffix == ".webp" else {}))
+    if out.suffix == ".png":
+        smaller(out)
+
+
+def prepare(flexarm, scratch):
+    """Files of the runs: the study of docs/sweep.md, the KR 210 class arm with the stress of its castings."""
+    study = (ROOT / "docs/sweep.md").read_text()
+    (scratch / "payload_speed.toml").write_text(re.search(r"```toml\n(# payload_speed.toml\n.*?)```", study, re.S)[1])
+    robot = scratch / "kr210_stress"
+    shutil.copytree(ROOT / "robots/kr210", robot)
+    for link in ("link_2", "link_3"):
+        reduce = [flexarm, "reduce", robot / f"fe/{link}.reduce.toml", "--stress", "--flex", robot / f"fe/{link}.flex", "--force", "-o", scratch / link, "--quiet"]
+        subprocess.run(reduce, check=True, stdout=subprocess.DEVNULL)
 
 
 def old_pictures(folder):
@@ -161,9 +201,10 @@ def main():
         print(f"older than their sources: {', '.join(old)}" if old else "no picture is older than its sources")
         return 1 if old else 0
     only = set(filter(None, arguments.only.split(",")))
-    unknown = only - {*RERUN, *PAGES, "python_plot"}
+    names = [*RERUN, *PAGES, *(file.partition(".")[0] for file in OUTPUTS), "python_plot"]
+    unknown = only - set(names)
     if unknown:
-        parser.error(f"no picture is called {', '.join(sorted(unknown))}; there are {', '.join([*RERUN, *PAGES, 'python_plot'])}")
+        parser.error(f"no picture is called {', '.join(sorted(unknown))}; there are {', '.join(names)}")
     if not pathlib.Path(arguments.flexarm).is_file():
         parser.error(f"{arguments.flexarm} is not there: cargo build --release --features rerun, or --flexarm")
     arguments.out.mkdir(parents=True, exist_ok=True)
@@ -177,9 +218,8 @@ def main():
             key = tuple(command)
             if key not in runs:
                 folder = pathlib.Path(scratch) / str(len(runs))
-                subprocess.run(
-                    [arguments.flexarm, *command, "-o", str(folder), "--quiet"], check=True, cwd=ROOT, stdout=subprocess.DEVNULL
-                )
+                made = [str(pathlib.Path(scratch) / word) if (pathlib.Path(scratch) / word).exists() else word for word in command]
+                subprocess.run([arguments.flexarm, *made, "-o", str(folder), "--quiet"], check=True, cwd=ROOT, stdout=subprocess.DEVNULL)
                 runs[key] = folder
             return runs[key]
 
@@ -206,15 +246,25 @@ def main():
             except Exception as error:
                 print(f"{name}: no picture: {error}", file=sys.stderr)
                 failed = True
-        for name, (command, file, heading) in PAGES.items():
+        if wanted("sweep") or wanted("stress"):
+            prepare(arguments.flexarm, pathlib.Path(scratch))
+        for name, (command, file, begin, end) in PAGES.items():
             if wanted(name):
                 try:
                     out = arguments.out / f"{name}.png"
-                    page_picture(run(command) / file, heading, out)
+                    page_picture(run(command) / file, begin, end, out)
                     smaller(out)
                     print(f"{out}: {out.stat().st_size} bytes")
                 except ImportError:
                     print(f"skipped: {name} (pip install playwright)")
+        for file, (command, files, width) in OUTPUTS.items():
+            out = arguments.out / file
+            if wanted(out.stem):
+                try:
+                    stacked([run(command) / part for part in files], width, out)
+                    print(f"{out}: {out.stat().st_size} bytes")
+                except ImportError:
+                    print(f"skipped: {out.stem} (pip install pillow)")
         if wanted("python_plot"):
             try:
                 import flexarm
