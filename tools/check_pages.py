@@ -257,7 +257,7 @@ FIGURES = [
         "1/{} to 1/{} of the processor time of the best of MuJoCo and Exudyn; a whole process 1/{} to 1/{}",
         lambda s: [s.ratio(e, figure) for figure in ("cpu_ms", "process_ms") for e in (peers.CLASSES[0], peers.CLASSES[-1])],
     ),
-    ("docs/accuracy.md", "to {} mm (rms), where a rigid robot with fitted joint frames misses {} mm", lambda s: [s.row(*key)[2] for key in (MODELS[2], MODELS[0])]),
+    ("docs/accuracy.md", "within {} mm (rms); a rigid robot with fitted joint frames is off by {} mm", lambda s: [s.row(*key)[2] for key in (MODELS[2], MODELS[0])]),
     *(
         ("docs/measured_arm.md", f"| {name}, {urdf} URDF{more} | {{}} | {{}} | {{}} ({{}}) | {{}} | {{}} |", lambda s, key=key: s.row(*key))
         for name, urdf, more, key in [

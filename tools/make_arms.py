@@ -398,14 +398,17 @@ def readme(name, arm, made, found, poses):
     source, joints = arm["source"], [row for row in arm["joints"].values() if "axis" in row]
     side = 1e3 * (arm["payload"] / DENSITY) ** (1.0 / 3.0)
     rows = [f"| {drive['joint']} | {math.degrees(row['limits'][0]):.0f} to {math.degrees(row['limits'][1]):.0f} | {math.degrees(row['limits'][2]):.0f} | "
-            f"{row['limits'][3]:g} | {drive['stiffness']:.3g} | {drive['low']:.3g} to {drive['high']:.3g} | "
-            f"{'cycloidal' if 'cycloidal' in drive['source'] else 'strain wave'} |" for drive, row in zip(made["drives"], joints)]
+            f"{row['limits'][3]:g} | {'cycloidal' if 'cycloidal' in drive['source'] else 'strain wave'} | "
+            f"{drive['stiffness']:.3g} | {drive['low']:.3g} | {drive['high']:.3g} |" for drive, row in zip(made["drives"], joints)]
     beams = [f"  * `{entry['link']}`: {section(entry)}" for entry in arm.get("beams", [])] or ["  * none"]
     worst = max(poses)
     typical, pose = found["stiffness"], degrees(arm["pose"])
     return "\n".join([
         f"# {arm['title']}", "",
         wrapped(f"{arm['what']} None of this is endorsed by the maker."), "",
+        wrapped(f"At the rated pose with {arm['payload']:g} kg the flange sags by {spread(found, lambda f: f['sag']).replace(' (', ' mm (')}, and the first natural frequency is "
+                f"{spread(found, lambda f: f['f'][0]).replace(' (', ' Hz (')}. In brackets: the range that follows from the assumed stiffness. More figures are at the end of "
+                "the page."), "",
         "```sh", f"flexarm compare {name}                # the sample motion with the rated payload", f"flexarm statics {name} --at={pose}", "```", "",
         "## Published", "",
         wrapped(f"* Masses, centres of mass, inertias, frames and limits of all links: `{source['file']}` of {source['repository']}, commit "
@@ -413,24 +416,24 @@ def readme(name, arm, made, found, poses):
                 f"`tests/arms/{name}.toml`; `tools/make_arms.py --vendor DIR` compares them with that file."),
         wrapped(f"* Links: {sum(row[0] for row in arm['links'].values()):.4g} kg. {arm['published']}"), "",
         "## Assumed", "",
-        wrapped(f"* Payload: a cube of aluminium (side {side:.0f} mm) bolted to the flange, its centre of mass {side / 2:.0f} mm before it."),
-        wrapped("* Reducers: the class of the rated torque, which is the effort limit over 2.5, with its range by the catalogues "
-                "([how it is chosen](../../docs/new_robot.md)); damping 3 % of critical, no friction, no play."),
+        wrapped(f"* Payload: a cube of aluminium (side {side:.0f} mm) bolted to the flange, its centre of mass {side / 2:.0f} mm in front of it."),
+        wrapped("* Reducers: no stiffness is published. The rated torque of a reducer is the effort limit of its joint divided by 2.5; stiffness and range are those of "
+                "reducers of this torque in catalogues ([method](../../docs/new_robot.md)). Damping is 3 % of critical; there is no friction and no play."),
         *(wrapped(f"* {note}") for note in arm.get("notes", [])),
-        wrapped("* Links that bend: those whose published inertia can be cut in two, with the sections that the maker's meshes show and all of the mass in the wall "
-                "(half of it at the lower end of the range); the others are rigid."),
-        *beams, "* Shapes: rings around slices of the maker's meshes. They are for pictures.", "",
-        "| joint | range (deg) | speed (deg/s) | effort (N m) | stiffness (N m/rad) | its range | class |", "| --- | --- | --- | --- | --- | --- | --- |", *rows, "",
-        "## What follows", "",
-        wrapped(f"At the rated pose ({arm['pose_words']}: {pose}; flange {typical['tcp'][2]:.2f} m high) with the payload. In brackets: the range of the assumed stiffness."), "",
+        wrapped("* Flexible links: the slender ones whose published inertia can be divided into two rigid bodies. The outer section is that of the maker's mesh. The wall "
+                "contains all of the link's mass (half of it at the lower end of the range). The other links are rigid."),
+        *beams, "* Shapes: simplified outlines of the maker's meshes, for pictures only.", "",
+        "| joint | range (deg) | speed (deg/s) | effort limit (N m) | reducer | stiffness (N m/rad) | from | to |", "| --- | --- | --- | --- | --- | --- | --- | --- |", *rows, "",
+        "## Results", "",
+        wrapped(f"At the rated pose ({arm['pose_words']}: {pose}; flange {typical['tcp'][2]:.2f} m high) with the payload and locked drives:"), "",
         "| quantity | value |", "| --- | --- |",
-        f"| reach: farthest flange from the first joint, 400 poses (m) | {made['reach_m']:.2f} |",
-        f"| sag of the flange by its own weight and the payload (mm) | {spread(found, lambda f: f['sag'])} |",
-        f"| of which by the payload (mm) | {digits(typical['sag'] - found['unloaded']['sag'])} |",
-        f"| largest compliance of the flange (µm/N) | {spread(found, lambda f: f['compliance'])} |",
-        *(f"| frequency {k + 1}, drives locked (Hz) | {spread(found, lambda f, k=k: f['f'][k])} |" for k in range(3)),
-        f"| share in the sag (%) | reducers {digits(typical['gears'])}, links {digits(100.0 - typical['gears'])} |", "",
-        wrapped(f"Worst of {len(poses)} poses (a Halton sequence of {POSES} over the joints' ranges, those with the flange above the floor): {digits(worst[0])} mm at "
+        f"| reach: maximum distance of the flange from the first joint, over 400 poses (m) | {made['reach_m']:.2f} |",
+        f"| sag of the flange under the weight of arm and payload (mm) | {spread(found, lambda f: f['sag'])} |",
+        f"| of which under the payload (mm) | {digits(typical['sag'] - found['unloaded']['sag'])} |",
+        f"| maximum compliance of the flange (µm/N) | {spread(found, lambda f: f['compliance'])} |",
+        *(f"| natural frequency {k + 1} (Hz) | {spread(found, lambda f, k=k: f['f'][k])} |" for k in range(3)),
+        f"| shares of the sag (%) | reducers {digits(typical['gears'])}, links {digits(100.0 - typical['gears'])} |", "",
+        wrapped(f"Maximum sag over {len(poses)} poses ({POSES} of a Halton sequence over the joint ranges, without those below the floor): {digits(worst[0])} mm at "
                 f"{degrees(worst[1])}."), ""])
 
 

@@ -38,7 +38,7 @@ RERUN = {
 # Picture: arguments of flexarm, page in its output folder, headings at the top and below the end of the picture.
 PAGES = {
     "report": (["compare"], "report.html", None, None),
-    "map": (["map", "kr210", "--box", "0.9:2.5,-1:1,0.2:1.8", "--grid", "0.1", "--keep-out", "0.9", "--wrench", "500,0,0", "--workpiece", "0.8,0.6,0.4"], "map.html", "Slices through the best place", None),
+    "map": (["map", "kr210", "--box", "0.9:2.5,-1:1,0.2:1.8", "--grid", "0.1", "--keep-out", "0.9", "--wrench", "500,0,0", "--workpiece", "0.8,0.6,0.4"], "map.html", "Slices through the best place", "compliance worst"),
     "sweep": (["sweep", "payload_speed.toml"], "report.html", "Main effects", "Pareto front"),
 }
 # Picture: arguments of flexarm, pictures in its output folder, one above the other; width.

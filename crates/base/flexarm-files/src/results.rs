@@ -178,8 +178,8 @@ impl Drop for Partial {
     }
 }
 
-/// Creates a folder in `parent` that this user alone may enter, under a name that nobody can
-/// foresee: a planted folder or link is not used.
+/// Creates a folder in `parent` that only this user may enter, under an unpredictable name, so that
+/// a folder or link prepared by others is not used.
 ///
 /// # Errors
 /// Error of the file system.

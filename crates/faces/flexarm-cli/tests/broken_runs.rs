@@ -107,7 +107,7 @@ fn a_recording_that_may_not_grow_ends_the_run_with_its_name_and_reads_up_to_ther
     }
 }
 
-/// Messages that nobody can read are lost, the exit code is not.
+/// Messages to a closed terminal are lost, the exit code is not.
 #[test]
 #[cfg(target_os = "linux")]
 fn a_full_disk_under_standard_error_does_not_end_a_command() {

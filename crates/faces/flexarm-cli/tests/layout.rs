@@ -108,8 +108,8 @@ const LINES: &[&str] = &[
     "import exported/beam_K.mtx -o imported",
 ];
 
-/// Every line runs in 80 columns and in so many that nothing is wrapped. Truth: both have the same
-/// words, so that none is cut.
+/// Every line runs in 80 columns, and in a terminal so wide that nothing is wrapped. Truth: both
+/// outputs have the same words, so that none is cut.
 #[test]
 fn tables_of_all_commands_fit_80_columns() {
     let place = Place::new();

@@ -81,7 +81,7 @@ fn the_error_of_kr210_depends_on_its_numbers_as_differences_of_runs_say() {
     }
 }
 
-/// The run that is repeated is that of `compare` but for what iterations leave.
+/// The run that is repeated is that of `compare`, except for the residuals of its iterations.
 #[test]
 fn the_error_that_is_differentiated_is_that_of_a_run() {
     let (_, arm, motion) = shipped("kr210", "point_to_point");

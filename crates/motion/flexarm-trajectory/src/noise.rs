@@ -131,8 +131,8 @@ pub(crate) fn smoothed(t: &[f64], q: &[f64], cutoff_hz: f64) -> Vec<f64> {
 /// Values of the smoothing spline at its knots; `fixed`: whether it passes through the ends.
 ///
 /// With γ the second derivatives at the inner knots: `(R + λ Qᵀ W Q) γ = Qᵀ q`, `s = q - λ W Q γ`,
-/// where Q takes second differences, R is the Gram matrix of the hat functions, and W is 1 but for
-/// fixed ends.
+/// where Q takes second differences, R is the Gram matrix of the hat functions, and W is the
+/// identity except at fixed ends.
 fn smoothing_spline(t: &[f64], q: &[f64], fixed: [bool; 2], cutoff_hz: f64) -> Vec<f64> {
     let n = q.len();
     if n < 3 {

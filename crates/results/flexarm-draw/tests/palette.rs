@@ -1,4 +1,4 @@
-//! Colours that every eye tells apart.
+//! Colours that are distinguishable with any colour vision.
 
 use flexarm_draw::palette::{Ground, Rgb, SERIES_LENGTH, axis, magnitude, rigid, series, total};
 use nalgebra::{Matrix3, Vector3};

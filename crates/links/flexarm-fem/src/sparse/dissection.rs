@@ -23,8 +23,8 @@ const PASSES: usize = 6;
 /// Label of a vertex of the separator; 0 and 1 are the sides.
 const SEPARATOR: u8 = 2;
 
-/// Number without order by which equals are told apart: the order of the nodes of a mesh would make
-/// all pairs of one direction, and separators oblique.
+/// Pseudorandom number that decides between equal candidates. With the order of the nodes of a mesh
+/// all pairs would have one direction, and separators would be oblique.
 fn scattered(number: u32) -> u32 {
     number.wrapping_mul(2_654_435_761) >> 5
 }
