@@ -8,10 +8,11 @@
     python3 tools/make_arms.py --vendor DIR --meshes OUT   the same arms with the maker's meshes
 
 A table holds what the maker publishes (masses, inertias, frames, limits, rated payload), with the
-file, its version and its licence, and the sizes that the maker's meshes show. Shapes are drawn anew
-from these sizes. Reducers, the motion and all that follows are computed by the program: $FLEXARM,
-else target/release/flexarm, else flexarm on the PATH. DIR holds the makers' packages, each in a
-folder of its own, by the name that the table gives. Needs no third-party packages.
+file, its version and its licence, the sections that the maker's meshes show, and the parts that
+each link is drawn with: few lengths, chosen by eye. Reducers, the motion and all that follows are
+computed by the program: $FLEXARM, else target/release/flexarm, else flexarm on the PATH. DIR holds
+the makers' packages, each in a folder of its own, by the name that the table gives. Needs no
+third-party packages.
 """
 
 import argparse
@@ -19,7 +20,6 @@ import json
 import math
 import pathlib
 import re
-import struct
 import subprocess
 import sys
 import tempfile
@@ -28,10 +28,14 @@ import tomllib
 from xml.etree import ElementTree
 
 from make_gallery import ROOT, digits, program
+from make_meshes import X, Y, Z, body, cylinder, difference, dot, pipe, stl, unit
 
 TABLES, ROBOTS = ROOT / "tests/arms", ROOT / "robots"
 MARK = "# Written by tools/make_arms.py from the maker's files.\n"
-RINGS, RING = 12, 16  # rings that a link is drawn with, and corners of a ring
+SECTIONS = {"casting": 3.5, "box": 7.0}  # powers of the superellipse
+EDGE = 0.1  # chamfer of a drum over its radius
+CUT, TURN = 0.45, 30.0  # of each side of a corner of a pipe; degrees from ring to ring
+STEP = 0.2  # m, at most from ring to ring: a link that bends is drawn smoothly
 POSES = 32  # of the set in which the worst is looked for
 DENSITY = 2700.0  # kg/m³, aluminium: the cube that stands for the payload
 
@@ -135,100 +139,56 @@ def figures(urdf, tool):
         at, I = origin(inertial) or [0.0] * 6, inertial.find("inertia")
         tensor = [float(I.get(k)) for k in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")]
         table[name] = [float(inertial.find("mass").get("value")), *at[:3], *tensor, *(at[3:] if any(at[3:]) else [])]
-    return table, rows, bodies
+    return table, rows
 
 
-def triangles(path):
-    """Returns the triangles of an STL file, or of a Collada file in metres."""
-    if path.suffix.lower() == ".dae":
-        for shape in ElementTree.parse(path).iterfind(".//{*}mesh"):
-            values = next(numbers(e.text) for e in shape.iterfind(".//{*}float_array") if "position" in e.get("id"))
-            for part in [*shape.iterfind("{*}triangles"), *shape.iterfind("{*}polylist")]:
-                places = {e.get("semantic"): int(e.get("offset")) for e in part.iterfind("{*}input")}
-                corners = [int(word) for word in part.find("{*}p").text.split()][places["VERTEX"]::1 + max(places.values())]
-                points = [values[3 * k:3 * k + 3] for k in corners]
-                yield from (points[k:k + 3] for k in range(0, len(points), 3))
-        return
-    data = path.read_bytes()
-    count = struct.unpack_from("<I", data, 80)[0] if len(data) > 84 else -1
-    if len(data) == 84 + 50 * count:
-        for k in range(count):
-            values = struct.unpack_from("<9f", data, 84 + 50 * k + 12)
-            yield [values[0:3], values[3:6], values[6:9]]
-    else:
-        points = [numbers(line.split("vertex")[1]) for line in data.decode().splitlines() if "vertex" in line]
-        yield from (points[k:k + 3] for k in range(0, len(points), 3))
+def solid(part):
+    """Returns a closed solid (m) from a line of a table (mm): `drum AXIS RADIUS FROM TO`; with a comma
+    between sections, `box AXIS PLACE HALF HALF, PLACE HALF HALF`, and `casting`, which is rounder;
+    `pipe X Y Z RADIUS, X Y Z RADIUS`, whose bends are round. Two more numbers of a drum or section are
+    its centre across the axis. What lies across an axis is in the order of x, y, z."""
+    kind, sizes = part.split(maxsplit=1)
+    if kind == "pipe":
+        return pipe(filled(bent(metres(sizes)), 3))
+    letter, sizes = sizes.split(maxsplit=1)
+    rows, axis = metres(sizes), "xyz".index(letter)
+
+    def centre(place, across):
+        point = list(across or (0.0, 0.0))
+        return point[:axis] + [place] + point[axis:]
+
+    if kind == "drum":
+        (radius, start, end, *across), = rows
+        return cylinder(centre(0.0, across), (X, Y, Z)[axis], radius, start, end, EDGE * radius)
+    stations = [(centre(place, across), *((b, a) if letter == "y" else (a, b))) for place, a, b, *across in filled(rows, 1)]
+    return body((X, Y, Z)[axis], stations, SECTIONS[kind])
 
 
-def between(polygon, axis, low, high):
-    """Returns the part of a polygon between two planes."""
-    for sign, plane in ((1.0, low), (-1.0, -high)):
-        kept = []
-        for a, b in zip(polygon, polygon[1:] + polygon[:1]):
-            u, v = sign * a[axis] - plane, sign * b[axis] - plane
-            if u >= 0.0:
-                kept.append(a)
-            if u * v < 0.0:
-                kept.append([x + u / (u - v) * (y - x) for x, y in zip(a, b)])
-        polygon = kept
-    return polygon
+def metres(text):
+    return [[1e-3 * x for x in numbers(row)] for row in text.split(",")]
 
 
-def drawn(link, folder):
-    """Returns axis, places of rings along it and their distances from it in RING directions (mm), for
-    rings around the link's mesh."""
-    faces = []
-    for shape in link.findall("collision") or link.findall("visual"):
-        mesh = shape.find("geometry/mesh")
-        if mesh is None:
-            continue
-        scale, pose = numbers(mesh.get("scale", "1 1 1")), pose_of(origin(shape))
-        for face in triangles(folder / mesh.get("filename")):
-            faces.append([[1e3 * x for x in moved(pose, [s * x for s, x in zip(scale, point)])] for point in face])
-    if not faces:
-        return []
-    ends = [(min(p[k] for f in faces for p in f), max(p[k] for f in faces for p in f)) for k in range(3)]
-    axis = max(range(3), key=lambda k: ends[k][1] - ends[k][0])
-    start, step, directions = ends[axis][0], (ends[axis][1] - ends[axis][0]) / RINGS, ring_directions()
-    places, rings = [], []
-    for n in range(RINGS + 1):
-        at = start + n * step
-        points = [p for face in faces for p in between(face, axis, at - 0.3 * step, at + 0.3 * step)]
-        if points:
-            places.append(round(at))
-            rings.append([round(max(c * p[(axis + 1) % 3] + s * p[(axis + 2) % 3] for p in points)) for c, s in directions])
-    return [axis, places, rings]
+def mixed(a, b, at):
+    return [x + at * (y - x) for x, y in zip(a, b)]
 
 
-def ring_directions():
-    return [(math.cos(2.0 * math.pi * k / RING), math.sin(2.0 * math.pi * k / RING)) for k in range(RING)]
+def bent(rows):
+    """Returns rows of a pipe, its corners replaced by parabolas."""
+    line = rows[:1]
+    for a, b, c in zip(rows, rows[1:], rows[2:]):
+        low, high = mixed(b, a, CUT), mixed(b, c, CUT)
+        turn = math.degrees(math.acos(min(1.0, dot(unit(difference(b, a)), unit(difference(c, b))))))
+        steps = math.ceil(turn / TURN) or 1
+        line += [mixed(mixed(low, b, k / steps), mixed(b, high, k / steps), k / steps) for k in range(steps + 1)]
+    return line + rows[-1:]
 
 
-def mesh(axis, places, rings):
-    """Returns a binary STL (m): the surface through the rings, closed at both ends."""
-    directions = ring_directions()
-    wide = math.sin(2.0 * math.pi / RING)
-
-    def corner(at, ring, k):
-        (c, s), (c1, s1) = directions[k], directions[(k + 1) % RING]
-        h, h1 = ring[k], ring[(k + 1) % RING]
-        point = [0.0, 0.0, 0.0]
-        point[axis], point[(axis + 1) % 3], point[(axis + 2) % 3] = at, (h * s1 - h1 * s) / wide, (h1 * c - h * c1) / wide
-        return [1e-3 * x for x in point]
-
-    loops = [[corner(at, ring, k) for k in range(RING)] for at, ring in zip(places, rings)]
-    faces = [(loops[0][0], loops[0][k + 1], loops[0][k]) for k in range(1, RING - 1)]
-    faces += [(loops[-1][0], loops[-1][k], loops[-1][k + 1]) for k in range(1, RING - 1)]
-    for low, high in zip(loops, loops[1:]):
-        for k in range(RING):
-            n = (k + 1) % RING
-            faces += [(low[k], low[n], high[n]), (low[k], high[n], high[k])]
-    out = struct.pack("<80xI", len(faces))
-    for a, b, c in faces:
-        u, v = [y - x for x, y in zip(a, b)], [y - x for x, y in zip(a, c)]
-        normal = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]
-        length = size(normal) or 1.0
-        out += struct.pack("<12fH", *(x / length for x in normal), *a, *b, *c, 0)
+def filled(rows, places):
+    """Adds rows so that neighbours are at most STEP apart; the first `places` numbers of a row are its place."""
+    out = rows[:1]
+    for a, b in zip(rows, rows[1:]):
+        steps = math.ceil(math.dist(a[:places], b[:places]) / STEP) or 1
+        out += [mixed(a, b, k / steps) for k in range(1, steps + 1)]
     return out
 
 
@@ -237,8 +197,7 @@ def table_of(arm, vendor):
     with tempfile.TemporaryDirectory() as place:
         folder = pathlib.Path(place)
         urdf, found = expanded(arm, vendor, folder)
-        links, joints, bodies = figures(urdf, arm["source"]["tool"])
-        shapes = {name: drawn(link, folder) for name, link in bodies.items()}
+        links, joints = figures(urdf, arm["source"]["tool"])
         made = tomllib.loads((folder / "robot.toml").read_text())
     half = {link["name"]: link["wall_of_half_mass"] for link in found["links"]}
     lines = ["# kg; centre of mass (m); ixx iyy izz ixy ixz iyz (kg m2) about it; roll pitch yaw of its axes, if any.", "[links]"]
@@ -246,8 +205,6 @@ def table_of(arm, vendor):
     lines += ["", "# Origin (m, rad) in the frame of the parent; lower, upper (rad), speed (rad/s), effort (N m).", "[joints]"]
     for name, row in joints.items():
         lines.append(f"{name} = {{ " + ", ".join(f"{key} = {json.dumps(value)}" for key, value in row.items()) + " }")
-    lines += ["", "# Rings around each mesh: axis (0 is x), places along it, distances from it in 16 directions (mm).", "[shapes]"]
-    lines += [f"{name} = {json.dumps(rows)}" for name, rows in shapes.items()]
     # Other parts than those of the published inertia would replace it.
     for entry in (e for e in made.get("flexible_link", []) if e["beam"]["parts"] == "from-link"):
         beam = ", ".join(f"{key} = {json.dumps(value)}" for key, value in entry["beam"].items())
@@ -422,7 +379,7 @@ def readme(name, arm, made, found, poses):
         *(wrapped(f"* {note}") for note in arm.get("notes", [])),
         wrapped("* Flexible links: the slender ones whose published inertia can be divided into two rigid bodies. The outer section is that of the maker's mesh. The wall "
                 "contains all of the link's mass (half of it at the lower end of the range). The other links are rigid."),
-        *beams, "* Shapes: simplified outlines of the maker's meshes, for pictures only.", "",
+        *beams, "* Shapes: drums, boxes and pipes of about the maker's sizes, for pictures only.", "",
         "| joint | range (deg) | speed (deg/s) | effort limit (N m) | reducer | stiffness (N m/rad) | from | to |", "| --- | --- | --- | --- | --- | --- | --- | --- |", *rows, "",
         "## Results", "",
         wrapped(f"At the rated pose ({arm['pose_words']}: {pose}; flange {typical['tcp'][2]:.2f} m high) with the payload and locked drives:"), "",
@@ -457,7 +414,7 @@ def texts(name, arm):
         folder = pathlib.Path(place)
         urdf = urdf_text(name, arm)
         (folder / f"{name}.urdf").write_text(urdf)
-        meshes = {f"meshes/{link}.stl": mesh(*shape) for link, shape in arm["shapes"].items() if shape}
+        meshes = {f"meshes/{link}.stl": stl(map(solid, parts.splitlines())) for link, parts in arm["shapes"].items()}
         (folder / "meshes").mkdir()
         for file, data in meshes.items():
             (folder / file).write_bytes(data)
