@@ -8,8 +8,9 @@ use flexarm_settings::{OutOfRange, Quantity};
 use serde::Deserialize;
 use toml::Spanned;
 
+use super::MapError;
+use super::checked_region::Region;
 use super::region::MAX_PLACES;
-use super::{MapError, Region};
 use flexarm_run::Caveat;
 use flexarm_run::Error;
 use flexarm_run::Robot;
