@@ -27,7 +27,7 @@ use super::results::SweepSummary;
 use super::run_caveats::CaveatText;
 use super::store::{Manifest, RUNS, STUDY, known_manifest};
 use super::value::ParameterValue;
-use super::{LOOK, PAGE, Sweep, SweepProgress, SweepRequest, fingerprint, table};
+use super::{PAGE, POLL_INTERVAL, Sweep, SweepProgress, SweepRequest, fingerprint, table};
 use flexarm_run::Error;
 use flexarm_run::RobotFileError;
 
@@ -306,7 +306,7 @@ impl Sweep {
             }
             drop(sender);
             loop {
-                match receiver.recv_timeout(LOOK) {
+                match receiver.recv_timeout(POLL_INTERVAL) {
                     Ok((k, outcome)) => {
                         if let Err(error) = journal.keep(&numbers(&points[k]), &outcome) {
                             failed.get_or_insert(error);
