@@ -3,17 +3,17 @@
 
 use std::sync::Arc;
 
-use flexarm_kinematics::{Data, Model, State, Wrench, mass_matrix};
+use flexarm_kinematics::{Data, ElasticGroup, Model, State, Wrench, mass_matrix};
 use nalgebra::{DMatrix, DVector};
 
-use crate::arm::{Damping, ElasticElement, FlexibleArm, InertiaChange, Modes, Servo, Spring};
 use crate::error::StepError;
 use crate::events::SAME_TIME;
 use crate::load::Load;
 use crate::modes::modes_at;
 use crate::motion::PrescribedMotion;
+use crate::plant::{Damping, ElasticElement, InertiaChange, Modes, Plant, Servo, Spring};
 
-impl FlexibleArm {
+impl Plant {
     /// Creates an arm from a model and the springs of its elastic groups.
     ///
     /// `springs` lists name, stiffness and damping in the order of `model.elastic()`. The modal
@@ -27,16 +27,16 @@ impl FlexibleArm {
         springs: Vec<S>,
         motion: Arc<dyn PrescribedMotion>,
     ) -> Result<Self, StepError> {
-        let mut arm = Self { at_rest: false, ..Self::at_rest(model, springs, motion)? };
-        arm.update_modes_and_damping()?;
-        Ok(arm)
+        let mut plant = Self { at_rest: false, ..Self::at_rest(model, springs, motion)? };
+        plant.update_modes_and_damping()?;
+        Ok(plant)
     }
 
     /// Creates an arm for equilibria alone: without modes and damping, so that links between springs
     /// need no mass.
     ///
     /// # Errors
-    /// As [`FlexibleArm::new`], except that no equilibrium is sought.
+    /// As [`Plant::new`], except that no equilibrium is sought.
     pub fn at_rest<S: Into<Spring>>(
         model: Arc<Model>,
         springs: Vec<S>,
@@ -50,20 +50,8 @@ impl FlexibleArm {
                 springs.len()
             )));
         }
-        let mut elements = Vec::new();
-        for (spring, group) in springs.into_iter().zip(groups) {
-            let Spring { name, K, damping, curve, geometric } = spring.into();
-            if K.shape() != (group.size, group.size) {
-                let (rows, size) = (K.nrows(), group.size);
-                let text = format!("the stiffness of {name:?} has {rows} rows, its joint has {size} coordinates");
-                return Err(StepError::Setup(text));
-            }
-            let Some(C) = K.clone().cholesky().map(|c| c.inverse()) else {
-                return Err(StepError::Singular { matrix: "stiffness of an elastic joint", t: 0.0 });
-            };
-            let (body, coordinate, size, modal) = (group.body, group.coordinate, group.size, group.modal);
-            elements.push(ElasticElement { name, body, coordinate, size, modal, K, C, damping, curve, geometric });
-        }
+        let elements = springs.into_iter().zip(groups).map(|(spring, group)| element(spring.into(), group));
+        let elements = elements.collect::<Result<Vec<_>, _>>()?;
         let n = model.n_elastic();
         Ok(Self {
             model,
@@ -78,7 +66,6 @@ impl FlexibleArm {
             loads: Vec::new(),
             inertia_changes: Vec::new(),
             transmission: Vec::new(),
-            hysteresis: Vec::new(),
             load_friction: Vec::new(),
             coupling: None,
             cross_stiffness: Vec::new(),
@@ -91,7 +78,7 @@ impl FlexibleArm {
     /// Returns the arm with constant external loads: (body, wrench at Bo in world axes).
     ///
     /// # Errors
-    /// As [`FlexibleArm::new`].
+    /// As [`Plant::new`].
     pub fn with_loads(self, loads: Vec<(usize, Wrench)>) -> Result<Self, StepError> {
         self.with_timed_loads(loads.into_iter().map(|(body, F)| Load::constant(body, F)).collect())
     }
@@ -99,7 +86,7 @@ impl FlexibleArm {
     /// Returns the arm with external loads that change with time.
     ///
     /// # Errors
-    /// As [`FlexibleArm::new`].
+    /// As [`Plant::new`].
     pub fn with_timed_loads(mut self, loads: Vec<Load>) -> Result<Self, StepError> {
         self.loads = loads;
         self.update_modes_and_damping()?;
@@ -110,7 +97,7 @@ impl FlexibleArm {
     /// start.
     ///
     /// # Errors
-    /// As [`FlexibleArm::new`].
+    /// As [`Plant::new`].
     pub fn with_inertia_changes(mut self, mut changes: Vec<InertiaChange>) -> Result<Self, StepError> {
         changes.sort_by(|a, b| a.t.total_cmp(&b.t));
         self.inertia_changes = changes;
@@ -146,6 +133,8 @@ impl FlexibleArm {
             let text = format!("the servo's rigid robot has {} coordinates, the arm has {n} drives", servo.rigid.nv());
             return Err(StepError::Setup(text));
         }
+        // A motor needs an inertia of its own or a body behind it, and a load that its friction can
+        // read.
         for &k in &self.torque_driven {
             let mut bodies = self.model.bodies().iter().enumerate().skip(1);
             let body = bodies.find(|(_, b)| b.coordinate == k && !b.elastic);
@@ -178,7 +167,7 @@ impl FlexibleArm {
     /// after fields were changed directly. Does nothing for an arm at rest.
     ///
     /// # Errors
-    /// As [`FlexibleArm::new`].
+    /// As [`Plant::new`].
     pub fn update_modes_and_damping(&mut self) -> Result<(), StepError> {
         let n = self.n_elastic_coordinates();
         if n == 0 || self.at_rest {
@@ -269,4 +258,28 @@ impl FlexibleArm {
             self.D.ger(2.0 * zeta / total * omega, &Mphi, &Mphi, 1.0);
         }
     }
+}
+
+/// Assigns a spring to its coordinates.
+fn element(spring: Spring, group: &ElasticGroup) -> Result<ElasticElement, StepError> {
+    let Spring { name, mut K, damping, mut curve, hysteresis, geometric } = spring;
+    let ElasticGroup { body, coordinate, size, modal, .. } = *group;
+    if K.shape() != (size, size) {
+        let rows = K.nrows();
+        let text = format!("the stiffness of {name:?} has {rows} rows, its joint has {size} coordinates");
+        return Err(StepError::Setup(text));
+    }
+    let Some(mut C) = K.clone().cholesky().map(|c| c.inverse()) else {
+        return Err(StepError::Singular { matrix: "stiffness of an elastic joint", t: 0.0 });
+    };
+    if let Some(law) = &hysteresis {
+        if size != 1 {
+            return Err(StepError::Setup(format!("hysteresis of {name:?}: it needs a spring of one coordinate")));
+        }
+        let first_loading = law.first_loading();
+        K[(0, 0)] = first_loading.stiffest();
+        C[(0, 0)] = 1.0 / first_loading.stiffest();
+        curve = Some(first_loading.into());
+    }
+    Ok(ElasticElement { name, body, coordinate, size, modal, K, C, damping, curve, hysteresis, geometric })
 }

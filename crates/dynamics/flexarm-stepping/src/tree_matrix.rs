@@ -273,6 +273,7 @@ impl<const F: usize> Elimination<F> {
         for (j, own) in tree.iter().enumerate().rev() {
             let (inner, outer) = self.nodes.split_at_mut(j);
             let node = &mut outer[0];
+            // Pivot Δ = Î + S.
             node.inverse = node.inertia;
             for (to, S) in node.inverse.iter_mut().flatten().zip(own.springs::<F>(s).iter().flatten()) {
                 *to += S;
@@ -290,6 +291,7 @@ impl<const F: usize> Elimination<F> {
                     passed[i][c].set_column(k, &stretched[i]);
                 }
             }
+            // Î of the parent takes Xᵀ S Δ^-1 Î X.
             let Some(p) = own.parent else { continue };
             for (to, passed) in inner[p].inertia.iter_mut().flatten().zip(passed.iter().flatten()) {
                 *to += own.inertia_inward(passed);
@@ -344,7 +346,7 @@ pub struct TreeInverse {
     plain: Elimination<1>,
     corrected: Elimination<2>,
     /// `I^-1`, for (3).
-    lightness: Vec<Matrix6<f64>>,
+    inverse_inertia: Vec<Matrix6<f64>>,
     /// α of each node in (3).
     alpha: Vec<Vector6<f64>>,
     /// `s M^-1 K d` of the last solution d.
@@ -370,12 +372,12 @@ impl TreeInverse {
 
     fn invert_inertias(&mut self, t: f64) -> Result<(), StepError> {
         let nodes = &self.matrices.nodes;
-        self.lightness.resize(nodes.len(), Matrix6::zeros());
+        self.inverse_inertia.resize(nodes.len(), Matrix6::zeros());
         self.alpha.resize(nodes.len(), Vector6::zeros());
         if self.shift.len() != 6 * nodes.len() {
             self.shift = DVector::zeros(6 * nodes.len());
         }
-        for (inverse, node) in self.lightness.iter_mut().zip(nodes) {
+        for (inverse, node) in self.inverse_inertia.iter_mut().zip(nodes) {
             let mut inertia = [[node.inertia]];
             if !invert(&mut inertia) {
                 return Err(StepError::Singular { matrix: "mass matrix", t });
@@ -410,7 +412,7 @@ impl TreeInverse {
 
     /// Computes `y = x + s M^-1 K x`, by (3).
     pub fn correct(&mut self, x: &DVector<f64>, y: &mut DVector<f64>) {
-        let Self { matrices, s, lightness, alpha, .. } = self;
+        let Self { matrices, s, inverse_inertia, alpha, .. } = self;
         let s = s.unwrap_or(0.0);
         // Inward pass: accumulate the forces from the children.
         alpha.iter_mut().for_each(|alpha| *alpha = Vector6::zeros());
@@ -420,7 +422,7 @@ impl TreeInverse {
                 let carried = node.inward(&f);
                 alpha[p] += carried;
             }
-            alpha[j] = product(&lightness[j], &(f - alpha[j]));
+            alpha[j] = product(&inverse_inertia[j], &(f - alpha[j]));
         }
         for (j, node) in matrices.nodes.iter().enumerate() {
             let moved = node.parent.map_or(Vector6::zeros(), |p| node.outward(&alpha[p]));

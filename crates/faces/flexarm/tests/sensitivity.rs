@@ -4,10 +4,10 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use flexarm::identify::{Effect, Parameter, link_directions, parameters, plant};
+use flexarm::identify::{Effect, Parameter, link_directions, nominal, parameters};
 use flexarm::sensitivity::{RunParameter, SensitivityRequest, error_slopes, pose_sensitivity, sensitivity};
 use flexarm::{Arm, DriveModel, Modelling, Motion, Robot, RunOptions};
-use flexarm_stepping::{AlphaSettings, ExactRun, FlexibleArm, Start};
+use flexarm_stepping::{AlphaSettings, ExactRun, Plant, Start};
 
 fn place(what: &str) -> std::path::PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../..").join(what)
@@ -22,16 +22,16 @@ fn shipped(robot: &str, motion: &str) -> (Robot, Arc<Arm>, Motion) {
 
 /// Errors at all instants of a run with one parameter changed.
 fn errors(arm: &Arm, motion: &Motion, parameter: &Parameter, x: f64) -> Vec<f64> {
-    let plant = plant(arm).with(std::slice::from_ref(parameter), &[x]);
-    let flexible = FlexibleArm::new(plant.model, plant.springs, motion.prescribed()).unwrap();
+    let changed = nominal(arm).with(std::slice::from_ref(parameter), &[x]);
+    let plant = Plant::new(changed.model, changed.springs, motion.prescribed()).unwrap();
     let run = ExactRun {
         settings: AlphaSettings::default(),
         step_s: 1e-3,
         duration_s: motion.trajectory.duration(),
         start: Start::Equilibrium,
-        tool: plant.tool,
+        tool: changed.tool,
     };
-    run.errors(&flexible).unwrap().errors.into_iter().flatten().collect()
+    run.errors(&plant).unwrap().errors.into_iter().flatten().collect()
 }
 
 /// Derivative by differences of sixth order.
@@ -306,7 +306,7 @@ fn a_factor_of_one_direction_in_the_robot_file_does_what_its_derivative_says() {
     let robot_with = |factors: &str| kr210.with(key, &format!("{key}stiffness_factors = {factors}\n"));
     let sag = |factor: f64| {
         let robot = robot_with(&format!("[1, 1, 1, 1, {factor:?}, 1]")).unwrap();
-        flexarm::poses::statics(&robot, &Modelling::default(), Some(&at), [0.0; 6]).unwrap().sag_m[2]
+        robot.model(&Modelling::default()).unwrap().statics(Some(&at), [0.0; 6]).unwrap().sag_m[2]
     };
     let robot = robot_with("[1, 1, 1, 1, 1.25, 1]").unwrap();
     let by = ["link.link_2.stiffness_factors[4]".to_owned()];
@@ -339,7 +339,7 @@ fn a_gear_with_ripple_gives_way_at_a_pose_by_what_its_spring_carries() {
     };
     let sag = |x: f64| {
         let robot = with("ripple", 352_800.0 * x.exp());
-        flexarm::poses::statics(&robot, &Modelling::default(), Some(&at), [0.0; 6]).unwrap().sag_m.to_vec()
+        robot.model(&Modelling::default()).unwrap().statics(Some(&at), [0.0; 6]).unwrap().sag_m.to_vec()
     };
     let by = ["drive.joint_2.gearbox.stiffness".to_owned()];
     let found = pose_sensitivity(&with("ripple", 352_800.0), Modelling::default(), Some(&at), &by).unwrap();

@@ -73,9 +73,20 @@ pub enum Parts {
     FromLink(f64),
 }
 
-/// Elastic joint of a lumped flexible link.
+/// Elastic joint of a lumped flexible link, between its proximal part P and its distal part Q.
+///
+/// ```text
+/// [ f ]   [ K_tt   K_tr ] [ d ]       f (N), t (N m): wrench on Q at So that displaces it, P held
+/// [ t ] = [ K_trᵀ  K_rr ] [ φ ]       d (m), φ (rad): displacement of So and rotation of Q
+/// ```
+/// All in S axes, which are those of P: about another point the blocks are others. `K_tr` is not
+/// zero where the link bends under a force at So. Linear in d and φ: a link that turns by tenths of
+/// a radian needs more parts.
+///
+/// [`substitute`] does not check `K_S`: [`flexarm_fem::stiffness_at_split`] refuses what is not
+/// symmetric and positive definite, and so do the steppers.
 #[derive(Clone, Debug)]
-pub struct Spring {
+pub struct ElasticJoint {
     /// Name of the flexible link.
     pub link: String,
     /// Name of the elastic joint.
@@ -115,7 +126,7 @@ pub struct Substituted {
     /// Tree with elastic joints.
     pub mechanism: Mechanism,
     /// Elastic joints of lumped links, in the order given, proximal first.
-    pub springs: Vec<Spring>,
+    pub springs: Vec<ElasticJoint>,
     /// One per flexible link, in the order given.
     pub spans: Vec<FlexibleSpan>,
 }
@@ -246,7 +257,7 @@ pub fn distal_joint<'m>(
 /// Joints of a lumped link beyond the plane through S normal to A-B, and always the distal joint,
 /// move to the distal part `<link>__distal`. Joints of a modal link move to the nearest interface.
 /// At zero elastic coordinates all frames are unchanged, and the actuated coordinates keep their
-/// order.
+/// order. Stiffnesses are not checked, see [`ElasticJoint`].
 ///
 /// # Errors
 /// [`SubstitutionError`] with the name of the link.
@@ -343,7 +354,7 @@ fn insert_chain(
     flexible: &FlexibleLink,
     site: &Site,
     chain: Chain,
-) -> (FlexibleSpan, Vec<Spring>) {
+) -> (FlexibleSpan, Vec<ElasticJoint>) {
     let (name, Chain { joints, parts }) = (&flexible.link, &chain);
     // The proximal part keeps the link's frame and name; the frames of the others are at the joints
     // inward of them.
@@ -368,7 +379,7 @@ fn insert_chain(
         let kind = JointKind::Elastic(flexible.angles);
         mechanism.joints.push(Joint::new(&joint_name, kind, &parent, &distal_link, X_LP.inverse() * joint.X_LS));
         let K_S = if flexible.coupling { joint.K_S } else { drop_coupling(&joint.K_S) };
-        springs.push(Spring {
+        springs.push(ElasticJoint {
             link: name.clone(),
             joint: joint_name,
             distal_link: distal_link.clone(),

@@ -28,7 +28,7 @@ const BATCHES: usize = QUEUE + 2;
 /// Maximum time between two batches while samples arrive.
 const PAUSE: Duration = Duration::from_millis(20);
 /// Time between two checks of the free disk space.
-const LOOK: Duration = Duration::from_millis(200);
+const POLL_INTERVAL: Duration = Duration::from_millis(200);
 
 /// Consecutive samples.
 #[derive(Default)]
@@ -109,7 +109,7 @@ impl Threads {
                 self.hand_over();
             }
         }
-        self.untold().map_or(Ok(()), Err)
+        self.unreported().map_or(Ok(()), Err)
     }
 
     /// Sends the batch to all recorders and begins the next.
@@ -122,7 +122,7 @@ impl Threads {
             let _ = worker.queue.send(Message::Samples(self.batches[0].clone()));
         }
         self.handed_over = Instant::now();
-        if self.handed_over - self.looked >= LOOK {
+        if self.handed_over - self.looked >= POLL_INTERVAL {
             (self.scarce, self.looked) = (is_scarce(&self.folder), self.handed_over);
         }
         if self.scarce {
@@ -176,7 +176,7 @@ impl Threads {
     }
 
     /// Returns the first error not returned yet.
-    fn untold(&self) -> Option<LogError> {
+    fn unreported(&self) -> Option<LogError> {
         self.workers.iter().find_map(|worker| worker.failed.lock().unwrap_or_else(PoisonError::into_inner).take())
     }
 }

@@ -20,7 +20,7 @@ use crate::poses::posed::Posed;
 use crate::robot::balancer;
 use crate::robot::drive_entry::DriveKind;
 use crate::robot::loops;
-use crate::robot::{LoadOptions, Robot};
+use crate::robot::{LoadOptions, Robot, RobotSource};
 use crate::run::monitor::stress::StressMonitor;
 
 /// A finding.
@@ -111,14 +111,15 @@ pub fn check_with_motion(
 ) -> Vec<Finding> {
     let mut findings = Vec::new();
     let path = robot;
-    let robot = match Robot::load_with(path, options) {
-        Ok(robot) => robot,
+    let arm = match RobotSource::new(path, options).load() {
+        Ok(arm) => arm,
         Err(error) => {
             load_findings(&error, path, &mut findings);
             findings.extend(trajectory.and_then(|path| motion_without_robot(path, motion_options)));
             return findings;
         }
     };
+    let robot = arm.robot();
     findings.extend(robot.urdf.warnings.iter().map(Finding::from));
     let file = robot.path.clone();
     let own = robot.caveats().into_iter().filter(|caveat| !caveat.of_description);
@@ -129,19 +130,19 @@ pub fn check_with_motion(
             findings.push(Finding::error("missing-file", path.display().to_string(), &message));
             None
         }
-        (Some(path), _) => check_motion(&robot, path, motion_options, &mut findings),
+        (Some(path), _) => check_motion(robot, path, motion_options, &mut findings),
         // Errors of the default trajectory are only reported when it is checked itself.
         (None, Some(own)) => robot.rigid_model().ok().and_then(|model| {
-            let motion = crate::Motion::load(own, &robot).ok()?;
+            let motion = crate::Motion::load(own, robot).ok()?;
             let along = of_motion(&motion.name, &motion.trajectory, &model);
             findings.extend(along.into_iter().map(|caveat| Finding::caveat(own, caveat)));
             Some(motion)
         }),
         (None, None) => None,
     };
-    check_flexible(&robot, motion.as_ref(), &mut findings);
+    check_flexible(robot, motion.as_ref(), &mut findings);
     if let Some(path) = loads {
-        check_loads(&robot, motion.as_ref(), path, &mut findings);
+        check_loads(robot, motion.as_ref(), path, &mut findings);
     }
     findings
 }
@@ -153,8 +154,8 @@ fn check_loads(robot: &Robot, motion: Option<&Motion>, path: &Path, findings: &m
         findings.push(Finding::error("loads", path.display().to_string(), &message));
         return;
     };
-    let acting = robot.model(&Modelling::default()).and_then(|flexible| {
-        Scenario::from(motion).with_loads_file(path).and_then(|scenario| scenario.acting_on(robot, &flexible.model))
+    let acting = robot.model(&Modelling::default()).and_then(|arm| {
+        Scenario::from(motion).with_loads_file(path).and_then(|scenario| scenario.acting_on(robot, &arm.model))
     });
     match acting {
         Err(error) => findings.push(Finding::error("loads", path.display().to_string(), &error)),
@@ -212,15 +213,15 @@ fn check_flexible(robot: &Robot, motion: Option<&Motion>, findings: &mut Vec<Fin
                 || "in the middle of the joint ranges".to_owned(),
                 |motion| format!("at the start of {}", motion.name),
             );
-            let hz = posed.arm.modes.frequencies_hz();
+            let hz = posed.plant.modes.frequencies_hz();
             if !hz.is_empty() {
                 let message = format!("first frequencies {words} {:.2?} Hz", &hz[..hz.len().min(4)]);
                 findings.push(Finding::note("modes", file, message));
             }
-            if let Err(error) = StressMonitor::new(&posed.flexible, &posed.arm) {
+            if let Err(error) = StressMonitor::new(&posed.arm, &posed.plant) {
                 findings.push(Finding::error("stress", robot.path.display().to_string(), &error));
             }
-            let caveats = posed.flexible.link_caveats().into_iter().chain(posed.validity(&linear));
+            let caveats = posed.arm.link_caveats().into_iter().chain(posed.validity(&linear));
             findings.extend(caveats.map(|caveat| Finding::caveat(&robot.path, caveat)));
         }
     }
@@ -242,8 +243,8 @@ fn check_motion(robot: &Robot, path: &Path, options: &MotionOptions, findings: &
             findings.extend(motion.violations.iter().map(|v| passed(v)));
             let closed = robot.rigid_model().map(|model| loops::along_motion(&model, &motion.trajectory).err());
             findings.extend(closed.ok().flatten().map(|e| Finding::error("loop", file(), &e)));
-            let room = robot.rigid_model().map(|model| balancer::check_motion(&model, &motion.trajectory));
-            findings.extend(room.ok().and_then(Result::err).map(|e| Finding::error("balancer", file(), &e)));
+            let balancers = robot.rigid_model().map(|model| balancer::check_motion(&model, &motion.trajectory));
+            findings.extend(balancers.ok().and_then(Result::err).map(|e| Finding::error("balancer", file(), &e)));
             let along = robot.rigid_model().map(|model| of_motion(&motion.name, &motion.trajectory, &model));
             let caveats = motion.caveats().into_iter().chain(along.unwrap_or_default());
             findings.extend(caveats.map(|caveat| Finding::caveat(path, caveat)));

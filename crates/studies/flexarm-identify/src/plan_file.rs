@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::estimation::{
-    Candidate, Component, LoadCase, Parameter, Plan, PlanOptions, Plant, Reading, ReadingKind, Row, plan,
+    Candidate, Component, LoadCase, NominalArm, Parameter, Plan, PlanOptions, Reading, ReadingKind, Row, plan,
 };
 use flexarm_files::{NumberTable, check_apart, check_free, write_all};
 use flexarm_kinematics::Wrench;
@@ -11,9 +11,8 @@ use flexarm_settings::written::csv_field;
 use nalgebra::Vector3;
 use serde::Serialize;
 
-use super::parameters;
 use super::plan_load::Efforts;
-use super::{IdentifyFileError, joints_of, plant};
+use super::{IdentifyFileError, joints_of, nominal};
 use flexarm_run::Arm;
 use flexarm_run::Caveat;
 use flexarm_run::Error;
@@ -166,6 +165,16 @@ impl PlanRequest {
         all
     }
 
+    /// Returns the files to write, none of which may be a file of the request or exist already.
+    fn targets(&self) -> Result<Option<[PathBuf; 2]>, Error> {
+        let Some(folder) = &self.output else { return Ok(None) };
+        let targets = [folder.join("measurements.toml"), folder.join("displacements.csv")];
+        let inputs: Vec<&Path> = self.poses.iter().chain(&self.work).map(|path| &**path).collect();
+        check_apart(&targets, &inputs)?;
+        check_free(&targets, self.overwrite)?;
+        Ok(Some(targets))
+    }
+
     /// Returns the reason why the request is invalid, as a sentence.
     fn fault(&self) -> Option<String> {
         if self.count == 0 || !(self.std_m > 0.0 && self.std_m.is_finite()) {
@@ -216,15 +225,9 @@ pub fn plan_measurements(robot: &Robot, request: &PlanRequest) -> Result<Measure
                     plan; add [[flexible_link]] or [[drive]] entries with initial values";
         return Err(IdentifyFileError::Fit(text.into()).into());
     }
-    let targets =
-        request.output.as_ref().map(|folder| [folder.join("measurements.toml"), folder.join("displacements.csv")]);
-    if let Some(targets) = &targets {
-        let inputs: Vec<&Path> = request.poses.iter().chain(&request.work).map(|path| &**path).collect();
-        check_apart(targets, &inputs)?;
-        check_free(targets, request.overwrite)?;
-    }
+    let targets = request.targets()?;
     let fitted = super::chosen(&arm, &nothing_measured(), &request.fit)?;
-    let fitted: Vec<_> = fitted.into_iter().map(|candidate: parameters::Candidate| candidate.parameter).collect();
+    let fitted: Vec<Parameter> = fitted.into_iter().map(|candidate| candidate.parameter).collect();
     let poses = match &request.poses {
         Some(path) => poses_of(path, &joints)?,
         None => spread_poses(&arm),
@@ -236,8 +239,7 @@ pub fn plan_measurements(robot: &Robot, request: &PlanRequest) -> Result<Measure
     }
     let request = &request;
     let reading = |q: &Vec<f64>, setup: &Setup| displacement(q, setup, request.std_m);
-    let setups = request.setups();
-    let pairs = allowed(&efforts, poses.len(), &setups, if chosen_forces { 0 } else { request.count });
+    let pairs = allowed(&efforts, poses.len(), &request.setups(), if chosen_forces { 0 } else { request.count });
     let candidates: Vec<Candidate> =
         pairs.iter().map(|(pose, setup)| Candidate(reading(&poses[*pose], setup))).collect();
     let purpose: Vec<Reading> = match &request.work {
@@ -247,9 +249,9 @@ pub fn plan_measurements(robot: &Robot, request: &PlanRequest) -> Result<Measure
         }
         None => Vec::new(),
     };
-    let plant = plant(&arm);
+    let nominal = nominal(&arm);
     let options = PlanOptions { count: request.count, purpose, repeat: false };
-    let [best, first] = plans(&plant, &fitted, &candidates, &options)?;
+    let [best, first] = plans(&nominal, &fitted, &candidates, &options)?;
     let mut caveats = arm.caveats(Use::Any);
     let over = best.chosen.iter().filter_map(|k| efforts.excess(pairs[*k].0, pairs[*k].1.force, pairs[*k].1.at));
     caveats.extend(load_caveat(&over.collect::<Vec<_>>(), best.chosen.len()));
@@ -257,7 +259,7 @@ pub fn plan_measurements(robot: &Robot, request: &PlanRequest) -> Result<Measure
         warnings: warnings(&caveats),
         caveats,
         robot: robot.name.clone(),
-        poses: planned(&plant, &candidates, &best, &pairs)?,
+        poses: planned(&nominal, &candidates, &best, &pairs)?,
         joints,
         parameters: fitted.iter().zip(&best.deviations).map(expected).collect(),
         work_std_m: best.purpose.iter().copied().reduce(f64::max),
@@ -297,13 +299,13 @@ fn load_caveat(over: &[(&str, f64)], readings: usize) -> Option<Caveat> {
 
 /// Returns the best plan, and the one with the same number of candidates in their given order.
 fn plans(
-    plant: &Plant,
+    nominal: &NominalArm,
     fitted: &[Parameter],
     candidates: &[Candidate],
     options: &PlanOptions,
 ) -> Result<[Plan; 2], Error> {
     let plan_of = |candidates: &[Candidate]| {
-        plan(plant, fitted, candidates, options).map_err(|error| IdentifyFileError::Fit(error.to_string()))
+        plan(nominal, fitted, candidates, options).map_err(|error| IdentifyFileError::Fit(error.to_string()))
     };
     let best = plan_of(candidates)?;
     if best.chosen.len() < options.count {
@@ -408,7 +410,7 @@ fn poses_of(path: &Path, joints: &[String]) -> Result<Vec<Vec<f64>>, Error> {
 }
 
 fn planned(
-    plant: &Plant,
+    nominal: &NominalArm,
     candidates: &[Candidate],
     best: &Plan,
     pairs: &[(usize, Setup)],
@@ -418,7 +420,7 @@ fn planned(
         let q = candidates[*number].0.q.clone();
         let reading = displacement(&q, &Setup { direction: None, ..setup }, 1.0);
         let measurements = crate::estimation::Measurements { readings: vec![reading], ..Default::default() };
-        let arm = crate::estimation::MeasuredArm { plant, parameters: &[], measurements: &measurements };
+        let arm = crate::estimation::MeasuredArm { nominal, parameters: &[], measurements: &measurements };
         let moved = arm.predicted(&nalgebra::DVector::zeros(0)).map_err(|e| IdentifyFileError::Fit(e.to_string()))?;
         let Setup { force, at, point, direction } = setup;
         Ok(PlannedReading { joints: q, force, at, point, direction, expected_m: [moved[0], moved[1], moved[2]] })

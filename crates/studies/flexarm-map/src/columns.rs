@@ -1,6 +1,6 @@
 //! Columns of a map: names, units, order, and the direction of improvement.
 
-use flexarm_stepping::FlexibleArm;
+use flexarm_stepping::Plant;
 
 use super::MapError;
 use flexarm_chatter::CuttingTool;
@@ -73,14 +73,14 @@ impl Layout {
     /// * `tool`: a cutting tool.
     /// * `matrix`: whether to include the full compliance matrix.
     pub(super) fn new(
-        arm: &FlexibleArm,
+        plant: &Plant,
         joints: &[(String, bool)],
         loaded: bool,
         frequencies: usize,
         tool: Option<&CuttingTool>,
         matrix: bool,
     ) -> Self {
-        let elastic = arm.n_elastic_coordinates();
+        let elastic = plant.n_elastic_coordinates();
         let frequencies = frequencies.min(elastic).min(MAX_FREQUENCIES);
         let mut columns: Vec<MapColumn> = HEAD.iter().map(|(name, meaning)| place(name, meaning)).collect();
         columns.extend(
@@ -123,12 +123,12 @@ impl Layout {
             columns.push(MapColumn { more_is_better: true, ..less("depth_m", &meaning) });
         }
         let whole = if loaded { "error" } else { "sag" };
-        for element in &arm.elements {
+        for element in &plant.elements {
             let meaning = format!("share of the element in the {whole}, along the {whole}, first order");
             columns.push(MapColumn { quantity: true, ..place(&format!("share_{}", element.name), &meaning) });
         }
         let range = |first: usize, size: usize| first..first + size;
-        let elements = arm.elements.iter().map(|element| range(arm.offset(element), element.size)).collect();
+        let elements = plant.elements.iter().map(|element| range(plant.offset(element), element.size)).collect();
         Self { columns, joints: joints.len(), frequencies, loaded, cuts: tool.is_some(), matrix, elements }
     }
 

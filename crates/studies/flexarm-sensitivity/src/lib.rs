@@ -3,6 +3,20 @@
 //!
 //! Start at [`sensitivity`], or at [`error_slopes`] for numbers only; [`pose_sensitivity`] is the
 //! analysis at a pose.
+//!
+//! ```
+//! use flexarm_run::{Modelling, Robot};
+//! use flexarm_sensitivity::pose_sensitivity;
+//!
+//! # std::env::set_current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../../.."))?;
+//! let robot = Robot::load("robots/kr210")?;
+//! let found = pose_sensitivity(&robot, Modelling::default(), None, &["link.*.stiffness_factor".into()])?;
+//! for own in &found.parameters {
+//!     println!("{} per {}: the TCP rises by {} m", own.name, own.per, own.tcp_m[2]);
+//! }
+//! # assert!(!found.parameters.is_empty());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 #![allow(non_snake_case, reason = "monogram notation: X_WL, K_S; see docs/references.md")]
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
@@ -14,7 +28,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use flexarm_files::{check_apart, check_free, write_all};
-use flexarm_identify::{Effect, Parameter, link_directions, link_entries, parameters, plant};
+use flexarm_identify::{Effect, Parameter, link_directions, link_entries, nominal, parameters};
 use flexarm_stepping::{ExactRun, StepError, StepperKind};
 use nalgebra::Vector3;
 use serde::Serialize;
@@ -146,21 +160,20 @@ fn slopes_and_caveats(
         return Err(Error::Step { source: StepError::Setup(text), partial: false });
     };
     runnable(&scenario.motion, options)?;
-    let flexible = arm;
-    if flexible.springs.is_empty() && !flexible.has_servo() {
+    if arm.springs.is_empty() && !arm.has_servo() {
         return Err(ValueError::NothingYields.into());
     }
-    flexarm_run::loops::along_motion(&flexible.rigid, &scenario.motion.trajectory)?;
-    let unloaded = flexible.arm(scenario.motion.prescribed()).map_err(|error| flexible.explained(error))?;
+    flexarm_run::loops::along_motion(&arm.rigid, &scenario.motion.trajectory)?;
+    let unloaded = arm.plant(scenario.motion.prescribed()).map_err(|error| arm.explained(error))?;
     let (_, mut caveats) = loaded(arm.robot(), scenario, options, unloaded)?;
     let run = ExactRun {
         settings,
         step_s: options.step_s,
         duration_s: scenario.duration_s(),
         start: scenario.start,
-        tool: flexible.tcp.clone(),
+        tool: arm.tcp.clone(),
     };
-    let found = Repeated { arm, scenario, options, run, plant: plant(arm) }.slopes(parameters, keep_samples)?;
+    let found = Repeated { arm, scenario, options, run, nominal: nominal(arm) }.slopes(parameters, keep_samples)?;
     caveats.extend(limited(arm, &found));
     Ok((found, caveats))
 }

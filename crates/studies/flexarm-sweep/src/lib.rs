@@ -5,6 +5,24 @@
 //! [`Sweep::run`] computes the missing runs in a folder or in a shard of it, [`merge`] joins
 //! folders of shards. Runs are numbered from 0; the number alone determines a run, on any machine.
 //!
+//! ```
+//! use flexarm_sweep::{Finders, Sweep};
+//!
+//! # std::env::set_current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../../.."))?;
+//! let root = std::env::current_dir()?;
+//! let [robot, motion] = ["robots/kr210/robot.toml", "trajectories/point_to_point.toml"].map(|file| root.join(file));
+//! let study = format!(
+//!     "format = 1\nrobot = {robot:?}\nmotion = {motion:?}\n\
+//!      [[parameter]]\npath = \"payload.mass\"\nvalues = [30.0, 75.5, 150.0]\n"
+//! );
+//! let path = std::env::temp_dir().join(format!("study_{}.toml", std::process::id()));
+//! std::fs::write(&path, study)?;
+//! let sweep = Sweep::load(&path, &Finders::default());
+//! # std::fs::remove_file(path)?;
+//! assert_eq!(sweep?.runs(), 3);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
 //! Not here: the mathematics of designs and their evaluation ([`statistics`]); comparison of a few
 //! runs by their curves ([`flexarm_run::compare_study`]).
 #![allow(non_snake_case, reason = "monogram notation: X_WL, K_S; see docs/references.md")]
@@ -74,7 +92,7 @@ const PAGE: &str = "report.html";
 /// Maximum number of quick runs that a thread takes at a time.
 const WINDOW: usize = 64;
 /// Interval between two calls of the progress function, which can stop the runs.
-const LOOK: Duration = Duration::from_millis(50);
+const POLL_INTERVAL: Duration = Duration::from_millis(50);
 
 /// Functions that find robots and motions by name.
 #[derive(Clone, Copy, Debug)]
@@ -134,12 +152,12 @@ impl Sweep {
         workshop.vary(&columns, &file, finders)?;
         let design = Design::new(columns, &file)?;
         let robot = workshop.base_robot()?;
-        let flexible = robot.model(&workshop.base_modelling())?;
-        let summary = serde_json::to_value(skeleton(&robot, &flexible)).unwrap_or_default();
+        let arm = robot.model(&workshop.base_modelling())?;
+        let summary = serde_json::to_value(skeleton(&robot, &arm)).unwrap_or_default();
         let parameters = parameter_names(&design);
         let mut metrics: Vec<Metric> = Vec::new();
         let usual = file.metrics.is_empty().then(|| {
-            let frequency = (!flexible.springs.is_empty()).then_some("f1_hz = frequencies_hz.0");
+            let frequency = (!arm.springs.is_empty()).then_some("f1_hz = frequencies_hz.0");
             let place = file.robot.place.clone();
             USUAL_METRICS
                 .into_iter()
@@ -294,7 +312,7 @@ impl Sweep {
             }
             drop(sender);
             loop {
-                match receiver.recv_timeout(LOOK) {
+                match receiver.recv_timeout(POLL_INTERVAL) {
                     Ok(answer) if failed.is_none() => match keep(answer) {
                         Ok(()) => done += 1,
                         Err(error) => {
@@ -447,8 +465,8 @@ fn parameter_names(design: &Design) -> Vec<Option<String>> {
 }
 
 /// Returns an example of a summary with all names that a run of the robot can have.
-fn skeleton(robot: &Robot, flexible: &Arm) -> Summary {
-    let links = flexible.spans.iter().map(|span| LinkFigures { name: span.link.clone(), ..LinkFigures::default() });
+fn skeleton(robot: &Robot, arm: &Arm) -> Summary {
+    let links = arm.spans.iter().map(|span| LinkFigures { name: span.link.clone(), ..LinkFigures::default() });
     let stressed = robot.flexible_links.iter().filter(|link| link.stress.is_some());
     let place = StressPlaceFigures { of_yield: Some(0.0), damage: Some(0.0), ..StressPlaceFigures::default() };
     let stress = stressed.map(|link| {
@@ -470,14 +488,14 @@ fn skeleton(robot: &Robot, flexible: &Arm) -> Summary {
     let elastic = robot.drives.iter().filter(|drive| drive.gearbox.is_some());
     let elastic = elastic.map(|drive| DriveFigures { joint: drive.joint.clone(), ..DriveFigures::default() });
     let drives: BTreeMap<String, f64> =
-        flexible.model.coordinates().iter().map(|coordinate| (coordinate.joint.clone(), 0.0)).collect();
+        arm.model.coordinates().iter().map(|coordinate| (coordinate.joint.clone(), 0.0)).collect();
     Summary {
         tcp: Some(TcpFigures::default()),
         path: Some(PathFigures::default()),
         links: links.collect(),
         stress: stress.collect(),
         elastic_drives: elastic.collect(),
-        frequencies_hz: vec![0.0; flexible.model.nv() - flexible.model.n_actuated()],
+        frequencies_hz: vec![0.0; arm.model.nv() - arm.model.n_actuated()],
         drives,
         ..Summary::default()
     }

@@ -2,19 +2,18 @@
 
 use nalgebra::DMatrix;
 
-use crate::arm::{Damping, FlexibleArm};
 use crate::error::StepError;
 use crate::gear::coupling::GearCoupling;
-use crate::gear::hysteresis::Hysteresis;
 use crate::gear::transmission::TransmissionError;
+use crate::plant::{Damping, Plant};
 
-impl FlexibleArm {
+impl Plant {
     /// Returns the arm with gears that couple several joints. Springs, dampers and friction given
     /// so far are those of the motors after their gears; they are transformed to the joints.
     ///
     /// # Errors
     /// [`StepError::Setup`] if sizes differ, or if springs have more than one coordinate, are
-    /// nonlinear or are missing for some motors; errors of [`FlexibleArm::new`].
+    /// nonlinear or are missing for some motors; errors of [`Plant::new`].
     pub fn with_coupling(mut self, coupling: GearCoupling) -> Result<Self, StepError> {
         let n = coupling.coordinates.len();
         let single = |k: &usize| self.elements.get(*k).is_some_and(|e| e.size == 1 && e.curve.is_none());
@@ -27,6 +26,7 @@ impl FlexibleArm {
                 "a coupling of {n} joints needs {n} straight springs of one coordinate, or none, and a {n}x{n} matrix"
             )));
         }
+        // Stiffness and damping over the joints: C^-T diag(k) C^-1.
         let (mut stiffness, mut damping) = (Vec::new(), Vec::new());
         for &k in &coupling.elements {
             let element = &self.elements[k];
@@ -35,6 +35,7 @@ impl FlexibleArm {
         }
         let K = GearCoupling::on_joints(&coupling.C_inverse, &stiffness_of(n, &stiffness));
         let D = GearCoupling::on_joints(&coupling.C_inverse, &stiffness_of(n, &damping));
+        // Off-diagonal entries become cross terms, the diagonal replaces that of the motors' springs.
         for (i, &k) in coupling.elements.iter().enumerate() {
             let row = self.offset(&self.elements[k]);
             for (j, &l) in coupling.elements.iter().enumerate().skip(i + 1) {
@@ -56,34 +57,11 @@ impl FlexibleArm {
         Ok(self)
     }
 
-    /// Returns the arm with hysteresis in gears; the springs of these gears get the first loading
-    /// curve.
-    ///
-    /// # Errors
-    /// [`StepError::Setup`] if an element does not exist or has more than one coordinate; errors of
-    /// [`FlexibleArm::new`].
-    pub fn with_hysteresis(mut self, laws: Vec<Hysteresis>) -> Result<Self, StepError> {
-        for law in &laws {
-            let Some(element) = self.elements.get_mut(law.element).filter(|e| e.size == 1) else {
-                return Err(StepError::Setup(format!(
-                    "hysteresis of element {}: it needs a spring of one coordinate",
-                    law.element
-                )));
-            };
-            let curve = law.first_loading();
-            element.K[(0, 0)] = curve.stiffest();
-            element.C[(0, 0)] = 1.0 / curve.stiffest();
-            element.curve = Some(curve.into());
-        }
-        self.hysteresis = laws;
-        self.update_modes_and_damping()?;
-        Ok(self)
-    }
-
     /// Returns the arm with transmission errors.
     ///
     /// # Errors
-    /// As [`FlexibleArm::with_hysteresis`].
+    /// [`StepError::Setup`] if an element does not exist or has more than one coordinate; errors of
+    /// [`Plant::new`].
     pub fn with_transmission_errors(mut self, errors: Vec<TransmissionError>) -> Result<Self, StepError> {
         for error in &errors {
             let single = self.elements.get(error.element).is_some_and(|e| e.size == 1);
@@ -112,7 +90,7 @@ impl FlexibleArm {
     }
 
     /// Returns `dD/d(ln d)` for the damper d of one motor in coupled gears, in the form of
-    /// [`FlexibleArm::coupled_stiffness_slope`].
+    /// [`Plant::coupled_stiffness_slope`].
     pub fn coupled_damping_slope(&self, element: usize) -> Option<(Vec<usize>, DMatrix<f64>)> {
         let coupling = self.coupling.as_ref()?;
         let motor = coupling.elements.iter().position(|k| *k == element)?;
@@ -135,7 +113,8 @@ impl FlexibleArm {
     /// Returns whether any gear has a transmission error, hysteresis, load-dependent friction or
     /// coupling, or any joint a telescopic guide.
     pub(crate) fn has_gear_laws(&self) -> bool {
-        !(self.transmission.is_empty() && self.hysteresis.is_empty() && self.load_friction.is_empty())
+        !(self.transmission.is_empty() && self.load_friction.is_empty())
+            || self.has_hysteresis()
             || self.has_guides()
             || self.coupling.as_ref().is_some_and(|coupling| !coupling.is_none())
     }

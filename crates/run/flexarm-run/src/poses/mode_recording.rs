@@ -1,14 +1,16 @@
 //! Modes as a recording: each mode oscillates for a few seconds, one after another, slowly and with
 //! a visible amplitude.
 
+use std::sync::Arc;
+
 use flexarm_analysis::{DampedMode, tcp_error};
 use flexarm_kinematics::{Frame, forward_kinematics};
 use flexarm_log::{Caption, ElasticSample, RunHeader, RunResult, Sample, TwinSample};
 use flexarm_stepping::Linear;
 use nalgebra::DVector;
 
+use crate::arm::Arm;
 use crate::arm::bends::stations;
-use crate::arm::options::Modelling;
 use crate::arm::options::Outputs;
 use crate::error::{Error, PoseError, ValueError};
 use crate::poses::modes::{ModeModel, ModeTable, modes_of, table};
@@ -41,64 +43,64 @@ impl Default for ModeMovie {
     }
 }
 
-/// As [`crate::modes()`], and writes a recording in which the modes oscillate one after another
-/// about the static equilibrium, next to the rigid robot at rest.
-///
-/// # Errors
-/// As [`crate::modes()`]; [`Error::Pose`] for a robot without modes, [`Error::Value`],
-/// [`Error::File`] and [`Error::Log`] for files.
-pub fn record_modes(
-    robot: &Robot,
-    modelling: &Modelling,
-    at: Option<&[f64]>,
-    speeds: Option<&[f64]>,
-    count: usize,
-    movie: &ModeMovie,
-    outputs: &Outputs,
-) -> Result<ModeTable, Error> {
-    let within =
-        |x: f64, otherwise: fn(f64) -> ValueError| if x > 0.0 && x < 1000.0 { Ok(()) } else { Err(otherwise(x)) };
-    within(movie.seconds, ValueError::Seconds)?;
-    movie.tool_motion_m.map_or(Ok(()), |x| within(x, ValueError::ToolMotion))?;
-    let arm = robot.model(modelling)?;
-    let posed = arm.posed(at)?;
-    let model = ModeModel::new(&posed, speeds)?;
-    let linear = &model.linear;
-    let all = modes_of(linear)?;
-    if all.is_empty() {
-        return Err(PoseError::NoModes.into());
-    }
-    let shown = &all[..count.min(all.len())];
-    let motion = movie.tool_motion_m.unwrap_or_else(|| PART_OF_REACH * reach(&posed));
-
-    let mut files = recorders(Some(outputs), false)?;
-    (files.names.report, files.names.report_md) = (None, None);
-    let mut header = robot_header(robot, &posed.arm);
-    let (bends, stations) = stations(&arm.bends, &posed.arm.model, &header.links);
-    header.bends = bends;
-    header.color_scale_m = crate::run::magnification::round_up(motion);
-    header.volume = Some(volume(&posed, motion));
-    let swings = (movie.seconds * SHOWN_HZ).ceil();
-    describe_modes(&mut header, shown, swings / SHOWN_HZ);
-    files.begin(&header)?;
-    let per_mode = (swings / SHOWN_HZ * RATE_HZ).round() as u64;
-    let mut stage = Stage::new(robot, &posed, linear, stations);
-    for (k, mode) in shown.iter().enumerate() {
-        let size = magnification(mode, linear, motion);
-        let last = if k + 1 == shown.len() { per_mode } else { per_mode - 1 };
-        for frame in 0..=last {
-            let step = k as u64 * per_mode + frame;
-            let (sine, cosine) = (std::f64::consts::TAU * SHOWN_HZ * frame as f64 / RATE_HZ).sin_cos();
-            let shape = mode.shape.map(|x| size * (x.re * sine + x.im * cosine));
-            files.set.record(stage.sample(step, &(&linear.equilibrium + shape)))?;
+impl Arm {
+    /// As [`Arm::modes`], and writes a recording in which the modes oscillate one after another
+    /// about the static equilibrium, next to the rigid robot at rest.
+    ///
+    /// # Errors
+    /// As [`Arm::modes`]; [`Error::Pose`] for a robot without modes, [`Error::Value`],
+    /// [`Error::File`] and [`Error::Log`] for files.
+    pub fn record_modes(
+        self: &Arc<Self>,
+        at: Option<&[f64]>,
+        speeds: Option<&[f64]>,
+        count: usize,
+        movie: &ModeMovie,
+        outputs: &Outputs,
+    ) -> Result<ModeTable, Error> {
+        let within =
+            |x: f64, otherwise: fn(f64) -> ValueError| if x > 0.0 && x < 1000.0 { Ok(()) } else { Err(otherwise(x)) };
+        within(movie.seconds, ValueError::Seconds)?;
+        movie.tool_motion_m.map_or(Ok(()), |x| within(x, ValueError::ToolMotion))?;
+        let posed = self.posed(at)?;
+        let model = ModeModel::new(&posed, speeds)?;
+        let linear = &model.linear;
+        let all = modes_of(linear)?;
+        if all.is_empty() {
+            return Err(PoseError::NoModes.into());
         }
+        let shown = &all[..count.min(all.len())];
+        let motion = movie.tool_motion_m.unwrap_or_else(|| PART_OF_REACH * reach(&posed));
+
+        let mut files = recorders(Some(outputs), false)?;
+        (files.names.report, files.names.report_md) = (None, None);
+        let mut header = robot_header(self.robot(), &posed.plant);
+        let (bends, stations) = stations(&self.bends, &posed.plant.model, &header.links);
+        header.bends = bends;
+        header.color_scale_m = crate::run::magnification::round_up(motion);
+        header.volume = Some(volume(&posed, motion));
+        let swings = (movie.seconds * SHOWN_HZ).ceil();
+        describe_modes(&mut header, shown, swings / SHOWN_HZ);
+        files.begin(&header)?;
+        let per_mode = (swings / SHOWN_HZ * RATE_HZ).round() as u64;
+        let mut stage = Stage::new(self.robot(), &posed, linear, stations);
+        for (k, mode) in shown.iter().enumerate() {
+            let size = magnification(mode, linear, motion);
+            let last = if k + 1 == shown.len() { per_mode } else { per_mode - 1 };
+            for frame in 0..=last {
+                let step = k as u64 * per_mode + frame;
+                let (sine, cosine) = (std::f64::consts::TAU * SHOWN_HZ * frame as f64 / RATE_HZ).sin_cos();
+                let shape = mode.shape.map(|x| size * (x.re * sine + x.im * cosine));
+                files.set.record(stage.sample(step, &(&linear.equilibrium + shape)))?;
+            }
+        }
+        let figures = vec![("modes".into(), shown.len().to_string())];
+        files.set.finish(&RunResult { figures, ..RunResult::default() })?;
+        let names = files.names.clone();
+        let mut figures = table(&posed, &model, &all, count)?;
+        figures.files = names;
+        Ok(figures)
     }
-    let figures = vec![("modes".into(), shown.len().to_string())];
-    files.set.finish(&RunResult { figures, ..RunResult::default() })?;
-    let names = files.names.clone();
-    let mut figures = table(&posed, &model, &all, count)?;
-    figures.files = names;
-    Ok(figures)
 }
 
 /// Adds captions and tables of the modes, each shown for the same time, to the header.
@@ -137,7 +139,7 @@ fn list(robot: &str, shown: &[DampedMode], start: impl Fn(usize) -> f64) -> Stri
 /// Bounding box of all bodies and the TCP, enlarged by the TCP amplitude (m).
 fn volume(posed: &Posed, motion_m: f64) -> [[f64; 3]; 2] {
     let (mut data, state) = posed.undeformed();
-    forward_kinematics(&posed.arm.model, &mut data, &state.q);
+    forward_kinematics(&posed.plant.model, &mut data, &state.q);
     let places = data.X_WB.iter().map(|X| X.translation.vector).chain([data.X_WF(&posed.tool).translation.vector]);
     places.fold([[f64::MAX; 3], [f64::MIN; 3]], |[low, high], p| {
         let corner = |c: usize| (low[c].min(p[c] - motion_m), high[c].max(p[c] + motion_m));
@@ -149,7 +151,7 @@ fn volume(posed: &Posed, motion_m: f64) -> [[f64; 3]; 2] {
 /// Maximum distance of the TCP from a joint (m).
 fn reach(posed: &Posed) -> f64 {
     let (mut data, state) = posed.undeformed();
-    forward_kinematics(&posed.arm.model, &mut data, &state.q);
+    forward_kinematics(&posed.plant.model, &mut data, &state.q);
     let tool = data.X_WF(&posed.tool).translation.vector;
     data.X_WB.iter().skip(1).map(|X| (X.translation.vector - tool).norm()).fold(0.0, f64::max)
 }
@@ -176,7 +178,7 @@ struct Stage<'a> {
 impl<'a> Stage<'a> {
     fn new(robot: &Robot, posed: &'a Posed, linear: &'a Linear, stations: Vec<Frame>) -> Self {
         let (mut data, state) = posed.undeformed();
-        let model = &posed.arm.model;
+        let model = &posed.plant.model;
         forward_kinematics(model, &mut data, &state.q);
         let frames = link_frames(robot, model);
         let zero = vec![0.0; posed.at.len()];
@@ -194,13 +196,13 @@ impl<'a> Stage<'a> {
     }
 
     fn sample(&mut self, step: u64, x: &DVector<f64>) -> &Sample {
-        let driven = &self.posed.arm.torque_driven;
+        let driven = &self.posed.plant.torque_driven;
         for (value, &k) in x.iter().zip(driven) {
             self.q[k] = *value;
         }
         let (first, ne) = (self.q.len() + driven.len() - x.len(), x.len() - driven.len());
         self.q.rows_mut(first, ne).copy_from(&x.rows(driven.len(), ne));
-        forward_kinematics(&self.posed.arm.model, &mut self.data, &self.q);
+        forward_kinematics(&self.posed.plant.model, &mut self.data, &self.q);
         let sample = &mut self.sample;
         sample.time_s = step as f64 / RATE_HZ;
         sample.step = step;

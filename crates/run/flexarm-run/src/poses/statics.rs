@@ -11,12 +11,10 @@ use nalgebra::{DVector, Matrix6xX};
 use serde::Serialize;
 
 use crate::arm::Arm;
-use crate::arm::options::Modelling;
 use crate::caveat::{self, Caveat, validity};
 use crate::error::Error;
 use crate::poses::posed::{Posed, all_finite};
 use crate::poses::statics_picture::{self, StaticsFiles, StaticsOutputs};
-use crate::robot::Robot;
 use crate::run::monitor::stress::stress_at_rest;
 use crate::run::summary::LinkStressFigures;
 
@@ -84,56 +82,38 @@ pub struct ElementStatics {
     pub energy_j: f64,
 }
 
-/// Computes the equilibrium of the flexible robot at a pose under gravity and a wrench at the TCP,
-/// with the drives locked.
-///
-/// `at`: values of all actuated joints (rad or m), [`Robot::start_pose`] by default; `wrench`: in world axes, not
-/// rotating with the deflection.
-///
-/// # Errors
-/// [`Error::Pose`] for joint values that do not fit, [`Error::Step`] if there is no equilibrium.
-pub fn statics(robot: &Robot, modelling: &Modelling, at: Option<&[f64]>, wrench: [f64; 6]) -> Result<Statics, Error> {
-    statics_of(robot, modelling, at, wrench, None)
-}
-
-/// As [`statics()`], and writes the result and a picture of the arm with magnified deflections next
-/// to the rigid arm.
-///
-/// # Errors
-/// As [`statics()`]; [`Error::File`] and [`Error::Write`] for files.
-pub fn record_statics(
-    robot: &Robot,
-    modelling: &Modelling,
-    at: Option<&[f64]>,
-    wrench: [f64; 6],
-    outputs: &StaticsOutputs,
-) -> Result<Statics, Error> {
-    statics_of(robot, modelling, at, wrench, Some(outputs))
-}
-
-fn statics_of(
-    robot: &Robot,
-    modelling: &Modelling,
-    at: Option<&[f64]>,
-    wrench: [f64; 6],
-    outputs: Option<&StaticsOutputs>,
-) -> Result<Statics, Error> {
-    let paths = outputs.map(statics_picture::places).transpose()?;
-    statics_at(robot.model(modelling)?.resting(at)?, wrench, paths)
-}
-
 impl Arm {
-    /// As [`statics()`], for an arm that is already modelled.
+    /// Returns the equilibrium at a pose under gravity and a wrench at the TCP, with the drives
+    /// locked.
+    ///
+    /// * `at`: values of all actuated joints (rad or m), [`crate::Robot::start_pose`] by default.
+    /// * `wrench`: force and moment at the TCP in world axes (N, N m), not rotating with the
+    ///   deflection.
     ///
     /// # Errors
-    /// As [`statics()`].
+    /// [`Error::Pose`] for joint values that do not fit, [`Error::Step`] if there is no
+    /// equilibrium.
     pub fn statics(self: &Arc<Self>, at: Option<&[f64]>, wrench: [f64; 6]) -> Result<Statics, Error> {
         statics_at(self.resting(at)?, wrench, None)
+    }
+
+    /// As [`Arm::statics`], and writes the result and a picture of the arm with magnified
+    /// deflections next to the rigid arm.
+    ///
+    /// # Errors
+    /// As [`Arm::statics`]; [`Error::File`] and [`Error::Write`] for files.
+    pub fn record_statics(
+        self: &Arc<Self>,
+        at: Option<&[f64]>,
+        wrench: [f64; 6],
+        outputs: &StaticsOutputs,
+    ) -> Result<Statics, Error> {
+        statics_at(self.resting(at)?, wrench, Some(statics_picture::places(outputs)?))
     }
 }
 
 fn statics_at(posed: Posed, wrench: [f64; 6], paths: Option<[std::path::PathBuf; 2]>) -> Result<Statics, Error> {
-    let robot = posed.flexible.robot();
+    let robot = posed.arm.robot();
     let X_rigid = posed.rigid_tool();
     let loaded = posed.linear(&wrench.into())?;
     // Identical bit for bit to the figures of a map at this pose.
@@ -147,7 +127,7 @@ fn statics_at(posed: Posed, wrench: [f64; 6], paths: Option<[std::path::PathBuf;
     all_finite("the holding torques", &loaded.holding)?;
 
     let elements = element_statics(&posed, &loaded);
-    let stress = stress_at_rest(&posed.flexible, &posed.arm, &loaded.q)?;
+    let stress = stress_at_rest(&posed.arm, &posed.plant, &loaded.q)?;
     let mut caveats = posed.caveats_of(&loaded, &wrench);
     caveats.extend(validity::stress(&stress));
     let [x, y, z, rx, ry, rz] = displacement;
@@ -162,7 +142,7 @@ fn statics_at(posed: Posed, wrench: [f64; 6], paths: Option<[std::path::PathBuf;
         sag_m: [sx, sy, sz],
         sag_rad: [srx, sry, srz],
         compliance: C.row_iter().map(|row| row.iter().copied().collect()).collect(),
-        motor_torque: robot.motor_torques(&posed.arm, loaded.holding.as_slice()),
+        motor_torque: robot.motor_torques(&posed.plant, loaded.holding.as_slice()),
         holding_torque: loaded.holding.as_slice().to_vec(),
         elements,
         stress,
@@ -184,14 +164,14 @@ fn statics_at(posed: Posed, wrench: [f64; 6], paths: Option<[std::path::PathBuf;
 fn element_statics(posed: &Posed, loaded: &Linear) -> Vec<ElementStatics> {
     // To first order each element's contribution is its deflection times the Jacobian at the rigid
     // pose.
-    let model = &posed.arm.model;
+    let model = &posed.plant.model;
     let (mut data, state) = posed.undeformed();
     forward_kinematics(model, &mut data, &state.q);
     let mut J = Matrix6xX::zeros(model.nv());
     frame_jacobian(model, &data, &posed.tool, &mut J);
     let ne = model.n_elastic();
     let J = J.columns(model.nv() - ne, ne);
-    let (springs, energies) = posed.arm.springs_at_rest(&loaded.q);
+    let (springs, energies) = posed.plant.springs_at_rest(&loaded.q);
     let mut elements = Vec::new();
     for ((name, range), energy_j) in loaded.elements.iter().zip(energies) {
         let (first, n) = (range.start, range.len());

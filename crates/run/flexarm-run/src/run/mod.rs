@@ -21,11 +21,12 @@ pub(crate) mod twin;
 mod before;
 mod events;
 mod figures;
+mod request;
 mod sampler;
 mod shares;
 
 use std::ops::ControlFlow;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use flexarm_analysis::{LongRecord, MetricSettings, PathFrame};
@@ -35,7 +36,7 @@ use flexarm_linkmaker::Stopwatch;
 use flexarm_log::{
     Attachment, BendInfo, Columns, Event, EventKind, Recorder, RecorderSet, RunHeader, RunResult, Sample, Trace,
 };
-use flexarm_stepping::{FlexibleArm, Observation, Stepper};
+use flexarm_stepping::{Observation, Plant, Stepper};
 
 use rayon::prelude::*;
 
@@ -65,6 +66,9 @@ use crate::run::twin::RigidTwin;
 
 pub use before::BeforeRun;
 pub use figures::static_sag;
+pub use request::{Keep, Progress, Run, RunRequest, SampleObserver};
+
+use request::Detail;
 
 /// Name of the servo following error among the contributors to the TCP error.
 const FOLLOWING_ERROR: &str = "following error";
@@ -79,125 +83,9 @@ const POLL_EVERY: usize = 2000;
 /// Maximum number of steps between two calls.
 const RAREST_POLL: usize = 64;
 
-/// Called with simulated and total time (s); breaking stops the run and leaves readable files.
-pub type Progress<'a> = dyn FnMut(f64, f64) -> ControlFlow<()> + 'a;
-
-/// Called with each logged sample; breaking stops the run.
-pub type SampleObserver<'a> = dyn FnMut(&Sample) -> ControlFlow<()> + 'a;
-
-/// Signals kept by a run in addition to its figures.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Keep {
-    /// None; fastest.
-    Figures,
-    /// All logged samples as columns.
-    #[default]
-    Columns,
-    /// Curves of the report, thinned for long runs.
-    Curves,
-}
-
-/// Requested results of a run, and callbacks during the run.
-#[derive(Default)]
-pub struct RunRequest<'a> {
-    /// Signals to keep.
-    pub keep: Keep,
-    /// Recordings and report to write.
-    pub outputs: Option<&'a Outputs>,
-    /// Called with each logged sample.
-    pub observer: Option<&'a mut SampleObserver<'a>>,
-    /// Called at intervals during the run.
-    pub progress: Option<&'a mut Progress<'a>>,
-    /// Recorders in addition to those of `outputs`.
-    pub recorders: Vec<Box<dyn Recorder>>,
-    /// Expected deflections of all runs that are shown together, for a common magnification and
-    /// colour scale.
-    pub expected: Option<Expected>,
-}
-
-impl RunRequest<'_> {
-    /// Returns a request that keeps these signals, without files or callbacks.
-    pub fn keeping(keep: Keep) -> Self {
-        Self { keep, ..Self::default() }
-    }
-}
-
-/// Parts of a sample that are computed; each level includes those before it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum Detail {
-    /// Figures of the summary.
-    Figures,
-    /// Signals of [`flexarm_log::Columns`].
-    Columns,
-    /// Whole samples.
-    Samples,
-    /// Curves, and all contents of recordings.
-    Curves,
-}
-
-impl Detail {
-    fn of(request: &RunRequest<'_>) -> Self {
-        match request.keep {
-            _ if request.outputs.is_some() || !request.recorders.is_empty() => Self::Curves,
-            Keep::Curves => Self::Curves,
-            _ if request.observer.is_some() => Self::Samples,
-            Keep::Columns => Self::Columns,
-            Keep::Figures => Self::Figures,
-        }
-    }
-
-    /// Returns the deflections to expect; only recordings need the magnification.
-    fn expected(self, arm: &FlexibleArm, tcp: &Frame, scenario: &Scenario) -> Expected {
-        match self {
-            Self::Curves => Expected::of(arm, tcp, scenario.duration_s(), scenario.start),
-            _ => Expected::default(),
-        }
-    }
-
-    /// Returns an empty trace with the curves of this level.
-    fn trace(self, for_page: bool, head: RunHeader) -> Trace {
-        match for_page {
-            _ if self < Self::Curves => Trace::without_curves(head),
-            true => Trace::for_page(head),
-            false => Trace::new(head),
-        }
-    }
-}
-
 /// Number of samples above which the page is made after the recordings are closed, which saves
 /// memory but takes a little longer.
 const LONG_RUN: u64 = 100_000;
-
-/// Results of a run.
-#[derive(Clone, Debug)]
-pub struct Run {
-    /// Figures, as in `summary.json`.
-    pub summary: Summary,
-    /// Signals; empty unless the request keeps [`Keep::Columns`].
-    pub columns: Columns,
-    /// Curves, thinned for long runs; empty unless the request keeps
-    /// [`Keep::Curves`] or writes recordings.
-    pub trace: Trace,
-}
-
-impl Run {
-    /// Returns the times of the samples (s).
-    pub fn time_s(&self) -> &[f64] {
-        self.values("time")
-    }
-
-    /// Returns the TCP error, flexible minus rigid, world axes (m): three values per sample. Empty
-    /// without the rigid twin.
-    pub fn error_world_m(&self) -> &[f64] {
-        self.values("error_world")
-    }
-
-    /// Returns the values of a signal, row by row; empty if there is no signal with this name.
-    /// [`Columns::columns`] lists the names.
-    pub fn values(&self, name: &str) -> &[f64] {
-        self.columns.column(name).map_or(&[], |column| &column.values)
-    }
-}
 
 impl Arm {
     /// Runs a motion (`&motion`), or a motion with loads, payloads and a start condition
@@ -247,14 +135,14 @@ impl Arm {
 
 /// Runs a scenario.
 pub(crate) fn simulate(
-    built: &Arm,
+    arm: &Arm,
     scenario: &Scenario,
     options: &RunOptions,
     request: RunRequest<'_>,
 ) -> Result<Run, Error> {
     let stopwatch = Stopwatch::start();
-    let (robot, flexible) = (built.robot(), built);
-    let Checked { arm, stepper, load_caveats } = built.checked(scenario, options)?;
+    let robot = arm.robot();
+    let Checked { plant, stepper, load_caveats } = arm.checked(scenario, options)?;
     let detail = Detail::of(&request);
     let RunRequest { keep, outputs, mut observer, progress, recorders: more, expected } = request;
     let mut to_the_end = |_, _| ControlFlow::Continue(());
@@ -265,16 +153,11 @@ pub(crate) fn simulate(
         return Err(Error::Interrupted { t: 0.0, partial: false });
     }
     let shares_scale = expected.is_some();
-    let expected = expected.unwrap_or_else(|| detail.expected(&arm, &flexible.tcp, scenario));
-    let stress = StressMonitor::new(flexible, &arm)?;
-    let mut run = RunLoop::new(robot, &scenario.motion, options, flexible, arm, stepper, detail);
+    let expected = expected.unwrap_or_else(|| detail.expected(&plant, &arm.tcp, scenario));
+    let stress = StressMonitor::new(arm, &plant)?;
+    let mut run = RunLoop::new(robot, &scenario.motion, options, arm, plant, stepper, detail);
     run.monitors = run.monitors.with_stress(stress);
-    if let Some(outputs) = outputs {
-        let all: Vec<PathBuf> = files_of_a_run().map(|file| outputs.folder.join(file)).collect();
-        check_apart(&all, &[&robot.path, &robot.urdf_path, &scenario.motion.path])?;
-    }
-    let mut files = recorders(outputs, !more.is_empty())?;
-    files.set.extend(more);
+    let mut files = open_recordings(outputs, more, &[&robot.path, &robot.urdf_path, &scenario.motion.path])?;
     let head = run.header(scenario, &expected);
     files.begin(&head)?;
     write_layouts(outputs, &head)?;
@@ -290,7 +173,7 @@ pub(crate) fn simulate(
         fit_color_scale([&mut run.trace]);
     }
 
-    let (mut summary, mut events) = run.summary(built.robot_caveats().to_vec());
+    let (mut summary, mut events) = run.summary(arm.robot_caveats().to_vec());
     let end = end.map_err(|error| events::beyond_model(error, &summary.caveats));
     if let Err(error) = &end {
         events.push(Event { time_s: run.seen.t, kind: EventKind::Stopped, text: error.to_string() });
@@ -309,6 +192,21 @@ pub(crate) fn simulate(
     });
     how_it_ended(end, write_results(&mut files, outputs, &summary, &run.trace))?;
     Ok(Run { summary, columns: columns.unwrap_or_default(), trace: run.trace })
+}
+
+/// Opens the recordings of a run, none of which may be a file of its input.
+fn open_recordings(
+    outputs: Option<&Outputs>,
+    more: Vec<Box<dyn Recorder>>,
+    input: &[&Path],
+) -> Result<Recordings, Error> {
+    if let Some(outputs) = outputs {
+        let all: Vec<PathBuf> = files_of_a_run().map(|file| outputs.folder.join(file)).collect();
+        check_apart(&all, input)?;
+    }
+    let mut files = recorders(outputs, !more.is_empty())?;
+    files.set.extend(more);
+    Ok(files)
 }
 
 /// Writes the picture of the stress; returns its path.
@@ -390,13 +288,13 @@ struct Contributor {
 }
 
 /// Lists the flexible links, the elastic drives and the following error of the servos.
-fn contributors(robot: &Robot, flexible: &Arm, arm: &FlexibleArm) -> Vec<Contributor> {
-    let (n_links, n_drives) = (flexible.spans.len(), robot.drives.len());
-    let drives = robot.drives.iter().enumerate().filter(|(k, _)| flexible.owners.contains(&Owner::Drive(*k)));
+fn contributors(robot: &Robot, arm: &Arm, plant: &Plant) -> Vec<Contributor> {
+    let (n_links, n_drives) = (arm.spans.len(), robot.drives.len());
+    let drives = robot.drives.iter().enumerate().filter(|(k, _)| arm.owners.contains(&Owner::Drive(*k)));
     let kind = |name: &str| if robot.stands_on(name) { headline::MOUNTING } else { headline::LINK };
-    let links = flexible.spans.iter().enumerate().map(|(k, span)| (k, span.link.clone(), kind(&span.link)));
+    let links = arm.spans.iter().enumerate().map(|(k, span)| (k, span.link.clone(), kind(&span.link)));
     let drives = drives.map(|(k, drive)| (n_links + k, drive.joint.clone(), headline::GEARBOX));
-    let follows = !arm.torque_driven.is_empty();
+    let follows = !plant.torque_driven.is_empty();
     let following = follows.then(|| (n_links + n_drives, FOLLOWING_ERROR.to_owned(), headline::SERVO));
     let contributors = links.chain(drives).chain(following);
     contributors.map(|(place, name, kind)| Contributor { place, name, kind }).collect()
@@ -407,9 +305,9 @@ struct RunLoop<'a> {
     robot: &'a Robot,
     motion: &'a Motion,
     options: &'a RunOptions,
-    flexible: &'a Arm,
+    arm: &'a Arm,
     /// Arm whose model is that of the last sample, including its current payload.
-    arm: Arc<FlexibleArm>,
+    plant: Arc<Plant>,
     stepper: Box<dyn Stepper>,
     tcp: Frame,
     twin: RigidTwin,
@@ -435,42 +333,42 @@ impl<'a> RunLoop<'a> {
         robot: &'a Robot,
         motion: &'a Motion,
         options: &'a RunOptions,
-        flexible: &'a Arm,
-        arm: Arc<FlexibleArm>,
+        arm: &'a Arm,
+        plant: Arc<Plant>,
         stepper: Box<dyn Stepper>,
         detail: Detail,
     ) -> Self {
-        let tcp = flexible.tcp.clone();
+        let tcp = arm.tcp.clone();
         let duration = motion.trajectory.duration();
         let last = (duration / options.step_s - 1e-9).ceil().max(0.0) as u64;
         let every = steps_per_sample(options);
-        let mut twin = RigidTwin::new(&arm);
-        let tool = tool_monitor(&arm, &tcp, &mut twin, motion, options, every as f64 * options.step_s);
+        let mut twin = RigidTwin::new(&plant);
+        let tool = tool_monitor(&plant, &tcp, &mut twin, motion, options, every as f64 * options.step_s);
         let (mut bends, mut places, mut frames) = Default::default();
         if detail >= Detail::Samples {
-            (bends, places) = stations(&flexible.bends, &arm.model, &ordered_links(robot));
-            frames = link_frames(robot, &arm.model);
+            (bends, places) = stations(&arm.bends, &plant.model, &ordered_links(robot));
+            frames = link_frames(robot, &plant.model);
         }
         Self {
             robot,
             motion,
             options,
-            flexible,
+            arm,
             tcp,
             twin,
-            seen: Observation::new(&arm),
-            monitors: Monitors::new(&arm, flexible, robot.drives.len(), tool).along(motion.tool_path.clone()),
-            sampler: Sampler::new(robot, flexible, frames, places),
+            seen: Observation::new(&plant),
+            monitors: Monitors::new(&plant, arm, robot.drives.len(), tool).along(motion.tool_path.clone()),
+            sampler: Sampler::new(robot, arm, frames, places),
             sample: Sample::default(),
             trace: Trace::default(),
             bends,
-            contributors: contributors(robot, flexible, &arm),
+            contributors: contributors(robot, arm, &plant),
             at_peak: AtPeak::default(),
             motors: Default::default(),
             detail,
             every,
             last,
-            arm,
+            plant,
             stepper,
         }
     }
@@ -480,9 +378,9 @@ impl<'a> RunLoop<'a> {
         let (robot, options, stress) = (self.robot, self.options, self.monitors.stress.as_ref());
         let head = match self.detail {
             Detail::Figures => RunHeader::default(),
-            Detail::Columns => names_of_signals(robot, &self.arm),
-            Detail::Samples => signals(robot, &self.arm),
-            Detail::Curves => header(self.flexible, scenario, options, &self.arm),
+            Detail::Columns => names_of_signals(robot, &self.plant),
+            Detail::Samples => signals(robot, &self.plant),
+            Detail::Curves => header(self.arm, scenario, options, &self.plant),
         };
         RunHeader {
             has_rigid: options.with_twin,
@@ -507,7 +405,7 @@ impl<'a> RunLoop<'a> {
         observer: &mut SampleObserver<'_>,
     ) -> Result<(), Error> {
         let total = self.last as f64 * self.options.step_s;
-        let poll_every = (POLL_EVERY / self.arm.model.nv().max(1)).clamp(1, RAREST_POLL) as u64;
+        let poll_every = (POLL_EVERY / self.plant.model.nv().max(1)).clamp(1, RAREST_POLL) as u64;
         for step in 0..=self.last {
             if step % self.every == 0 || step == self.last {
                 self.observe(step);
@@ -532,27 +430,27 @@ impl<'a> RunLoop<'a> {
     fn observe(&mut self, step: u64) {
         self.stepper.observe(&mut self.seen);
         // The twin carries the same payload as the arm.
-        if !Arc::ptr_eq(&self.arm.model, &self.seen.model) {
-            Arc::make_mut(&mut self.arm).model.clone_from(&self.seen.model);
+        if !Arc::ptr_eq(&self.plant.model, &self.seen.model) {
+            Arc::make_mut(&mut self.plant).model.clone_from(&self.seen.model);
         }
         // The torques of the twin are needed only in samples.
         match self.detail {
-            Detail::Figures => self.twin.place(&self.arm, &self.tcp, self.seen.t),
-            _ => self.twin.update(&self.arm, &self.tcp, self.seen.t),
+            Detail::Figures => self.twin.place(&self.plant, &self.tcp, self.seen.t),
+            _ => self.twin.update(&self.plant, &self.tcp, self.seen.t),
         }
-        if self.arm.coupling.is_some() {
-            for (motor, torque) in self.robot.motor_torques(&self.arm, self.seen.drive.as_slice()) {
+        if self.plant.coupling.is_some() {
+            for (motor, torque) in self.robot.motor_torques(&self.plant, self.seen.drive.as_slice()) {
                 let peak = self.motors.entry(motor).or_default();
                 *peak = peak.max(torque.abs());
             }
         }
-        let tool = self.monitors.update(&self.seen, &self.twin, &self.arm, &self.tcp);
+        let tool = self.monitors.update(&self.seen, &self.twin, &self.plant, &self.tcp);
         self.at_peak.update(&tool.error, &self.seen, &self.twin);
         let sample = &mut self.sample;
         sample.error_world = tool.error;
         if self.detail > Detail::Figures {
             self.sampler.fill(sample, &self.seen, &self.twin, &tool);
-            sampler::fill_elastic(sample, &self.seen, &self.arm);
+            sampler::fill_elastic(sample, &self.seen, &self.plant);
         }
         let moved = self.monitors.contributions.moved();
         sample.contributions.clear();
@@ -573,7 +471,7 @@ pub fn steps_per_sample(options: &RunOptions) -> u64 {
 
 /// Builds the TCP monitor of a run with sampling interval `sample_s` (s).
 fn tool_monitor(
-    arm: &Arc<FlexibleArm>,
+    plant: &Arc<Plant>,
     tcp: &Frame,
     twin: &mut RigidTwin,
     motion: &Motion,
@@ -589,14 +487,14 @@ fn tool_monitor(
         }
         *t >= still_until
     });
-    let path = PathFrame::before(instants.map(|t| twin.rates(arm, tcp, t)));
-    let static_part = options.with_twin.then(|| StaticPart::new(arm, tcp, moves(motion), duration, sample_s));
+    let path = PathFrame::before(instants.map(|t| twin.rates(plant, tcp, t)));
+    let static_part = options.with_twin.then(|| StaticPart::new(plant, tcp, moves(motion), duration, sample_s));
     // The arm settles at the static part, unless servos move the joints or loads act.
-    let rests_there = arm.torque_driven.is_empty() && arm.loads.is_empty();
-    let first_hz = arm.modes.frequencies_hz().first().copied().unwrap_or(0.0);
+    let rests_there = plant.torque_driven.is_empty() && plant.loads.is_empty();
+    let first_hz = plant.modes.frequencies_hz().first().copied().unwrap_or(0.0);
     let settings = MetricSettings { settling_band_m: options.settling_band_m, lowest_hz: RINGING_FROM * first_hz };
     let record = LongRecord::new(moves(motion), rests_there, settings);
-    ToolMonitor::new(path, static_part, record.with_room((duration / sample_s) as usize + 2))
+    ToolMonitor::new(path, static_part, record.with_capacity((duration / sample_s) as usize + 2))
 }
 
 /// Returns the start and end of each move (s).

@@ -12,7 +12,7 @@ use flexarm_stepping::{OperatingPoint, StepError};
 use nalgebra::{DMatrix, DVector, Matrix3xX, Matrix6xX, Rotation3, Translation3, Vector3, Vector6};
 
 use crate::estimation::least_squares::Residuals;
-use crate::estimation::parameter::{Effect, Parameter, Plant, carried_along, displacement, tool_shift};
+use crate::estimation::parameter::{Effect, NominalArm, Parameter, carried_along, displacement, tool_shift};
 use crate::estimation::reading::{
     Component, LoadCase, MeasuredResponse, MeasuredShape, Measurements, Reading, ReadingKind, Row,
 };
@@ -22,7 +22,7 @@ use crate::estimation::sensitivity::{frequency_slopes, slopes_at_rest, with_defl
 /// An arm with unknown parameters and the measurements made on it.
 pub struct MeasuredArm<'a> {
     /// Nominal arm.
-    pub plant: &'a Plant,
+    pub nominal: &'a NominalArm,
     /// Unknown parameters.
     pub parameters: &'a [Parameter],
     /// Measurements.
@@ -75,7 +75,7 @@ impl AtRest {
 
 /// Operating point under a load, the parameters there, and the pose and wrench for which it was
 /// solved last.
-struct Room<'a> {
+struct Workspace<'a> {
     at: Vector3<f64>,
     carried: SpatialInertia,
     point: OperatingPoint,
@@ -85,36 +85,37 @@ struct Room<'a> {
 
 /// Operating points of the loads met so far.
 struct Workspaces<'a> {
-    plant: Plant,
+    nominal: NominalArm,
     parameters: &'a [Parameter],
     /// Coordinates of the parameters.
     x: Vec<f64>,
-    known: Vec<Room<'a>>,
+    known: Vec<Workspace<'a>>,
 }
 
 impl<'a> Workspaces<'a> {
     /// Returns the operating point at a pose under a load.
-    fn solved(&mut self, q: &[f64], load: &LoadCase) -> Result<&mut Room<'a>, StepError> {
-        let known = self.known.iter().position(|room| room.at == load.at && room.carried == load.carried);
+    fn solved(&mut self, q: &[f64], load: &LoadCase) -> Result<&mut Workspace<'a>, StepError> {
+        let known =
+            self.known.iter().position(|workspace| workspace.at == load.at && workspace.carried == load.carried);
         let number = match known {
             Some(number) => number,
             None => {
-                let tool = &self.plant.tool;
+                let tool = &self.nominal.tool;
                 let X = Pose::from_parts(Translation3::from(load.at), Rotation3::identity());
                 let frame = Frame { name: tool.name.clone(), body: tool.body, X_BF: tool.X_BF * X };
                 let point = OperatingPoint::new(self.loaded(&load.carried).at_rest(q)?, frame);
                 let parameters = self.under(&load.carried);
-                self.known.push(Room { at: load.at, carried: load.carried, point, parameters, solved: None });
+                self.known.push(Workspace { at: load.at, carried: load.carried, point, parameters, solved: None });
                 self.known.len() - 1
             }
         };
-        let room = &mut self.known[number];
-        if !room.solved.as_ref().is_some_and(|(at, wrench)| at == q && *wrench == load.wrench) {
-            room.solved = None;
-            room.point.solve(q, &load.wrench)?;
-            room.solved = Some((q.to_vec(), load.wrench));
+        let workspace = &mut self.known[number];
+        if !workspace.solved.as_ref().is_some_and(|(at, wrench)| at == q && *wrench == load.wrench) {
+            workspace.solved = None;
+            workspace.point.solve(q, &load.wrench)?;
+            workspace.solved = Some((q.to_vec(), load.wrench));
         }
-        Ok(room)
+        Ok(workspace)
     }
 
     /// Solves for a frame at rest at a pose under a load; `None` for the tool.
@@ -125,17 +126,17 @@ impl<'a> Workspaces<'a> {
         frame: Option<&Frame>,
         slopes: bool,
     ) -> Result<AtRest, StepError> {
-        let own = frame.cloned().unwrap_or_else(|| self.plant.tool.clone());
+        let own = frame.cloned().unwrap_or_else(|| self.nominal.tool.clone());
         let turn = tool_shift(self.parameters, &self.x).1;
         let all = self.parameters;
-        let Room { point: at, parameters, .. } = self.solved(q, load)?;
+        let Workspace { point: at, parameters, .. } = self.solved(q, load)?;
         let X_WF = at.pose_of(&own);
         if !slopes {
             return Ok(AtRest { X_WF, slopes: None });
         }
         let (mut forces, mut twists) = slopes_at_rest(at, parameters, &own);
         let R_WT = at.tcp_pose().rotation;
-        let J = at.jacobian().columns_range(at.arm().model.n_actuated()..).into_owned();
+        let J = at.jacobian().columns_range(at.plant().model.n_actuated()..).into_owned();
         for (k, [v, w]) in tool_twists(all, &R_WT, &turn) {
             // The applied force moves with the tool, which changes its moment.
             let moment = (v + w.cross(&(R_WT * load.at))).cross(&load.wrench.force);
@@ -153,7 +154,7 @@ impl<'a> Workspaces<'a> {
         if !self.parameters.iter().any(|p| matches!(p.effect, Effect::Tool(_) | Effect::Frame { .. })) {
             return Cow::Borrowed(self.parameters);
         }
-        let (body, X_BF) = (self.plant.tool.body, self.plant.tool.X_BF);
+        let (body, X_BF) = (self.nominal.tool.body, self.nominal.tool.X_BF);
         let I = carried.at_parent(&X_BF);
         let mut all = self.parameters.to_vec();
         for (k, [v, w]) in tool_twists(self.parameters, &X_BF.rotation, &tool_shift(self.parameters, &self.x).1) {
@@ -178,9 +179,9 @@ impl<'a> Workspaces<'a> {
         Cow::Owned(all)
     }
 
-    fn loaded(&self, carried: &SpatialInertia) -> Plant {
-        let tool = &self.plant.tool;
-        self.plant.carrying(tool.body, &carried.at_parent(&tool.X_BF))
+    fn loaded(&self, carried: &SpatialInertia) -> NominalArm {
+        let tool = &self.nominal.tool;
+        self.nominal.carrying(tool.body, &carried.at_parent(&tool.X_BF))
     }
 }
 
@@ -190,11 +191,11 @@ impl MeasuredArm<'_> {
     /// # Errors
     /// [`NoAnswer`] if the arm has no solution for a reading.
     pub fn predicted(&self, unknowns: &DVector<f64>) -> Result<Vec<f64>, NoAnswer> {
-        let mut rooms = self.rooms(unknowns);
+        let mut workspaces = self.workspaces(unknowns);
         let own = &unknowns.as_slice()[self.parameters.len()..];
         let mut values = Vec::new();
         for reading in &self.measurements.readings {
-            values.extend(self.block(&mut rooms, reading, own, false)?.values);
+            values.extend(self.block(&mut workspaces, reading, own, false)?.values);
         }
         Ok(values)
     }
@@ -228,12 +229,12 @@ impl MeasuredArm<'_> {
     /// # Errors
     /// [`NoAnswer`] if the arm has no solution for a reading.
     pub fn assurances(&self, unknowns: &DVector<f64>) -> Result<Vec<(usize, usize, f64)>, NoAnswer> {
-        let rooms = self.rooms(unknowns);
+        let workspaces = self.workspaces(unknowns);
         let mut all = Vec::new();
         for (number, reading) in self.measurements.readings.iter().enumerate() {
             let ReadingKind::Shape(shape) = &reading.kind else { continue };
-            let plant = rooms.loaded(&shape.load.carried);
-            let found = structure_slopes(&plant, &[], &reading.q, &shape.probes);
+            let nominal = workspaces.loaded(&shape.load.carried);
+            let found = structure_slopes(&nominal, &[], &reading.q, &shape.probes);
             let found = found.map_err(|source| NoAnswer { reading: reading.name.clone(), source })?;
             all.extend(shape.likeliest(&found).map(|(mode, assurance, _)| (number, mode, assurance)));
         }
@@ -253,16 +254,21 @@ impl MeasuredArm<'_> {
         all
     }
 
-    fn rooms(&self, unknowns: &DVector<f64>) -> Workspaces<'_> {
+    fn workspaces(&self, unknowns: &DVector<f64>) -> Workspaces<'_> {
         let x = unknowns.as_slice()[..self.parameters.len()].to_vec();
-        Workspaces { plant: self.plant.with(self.parameters, &x), parameters: self.parameters, x, known: Vec::new() }
+        Workspaces {
+            nominal: self.nominal.with(self.parameters, &x),
+            parameters: self.parameters,
+            x,
+            known: Vec::new(),
+        }
     }
 
     /// Predicts the numbers of a reading, and their derivatives with respect to all unknowns if
     /// `slopes`.
     fn block(
         &self,
-        rooms: &mut Workspaces<'_>,
+        workspaces: &mut Workspaces<'_>,
         reading: &Reading,
         own: &[f64],
         slopes: bool,
@@ -270,11 +276,11 @@ impl MeasuredArm<'_> {
         let named = |source| NoAnswer { reading: reading.name.clone(), source };
         match &reading.kind {
             ReadingKind::Displacement { before, after, point, rows } => {
-                self.displacement(rooms, &reading.q, [before, after], point, rows, own, slopes).map_err(named)
+                self.displacement(workspaces, &reading.q, [before, after], point, rows, own, slopes).map_err(named)
             }
             ReadingKind::Place { load, target, instrument, rows } => {
                 let link = self.measurements.links.get(*target).and_then(Option::as_ref);
-                let at = rooms.at_rest(&reading.q, load, link, slopes).map_err(named)?;
+                let at = workspaces.at_rest(&reading.q, load, link, slopes).map_err(named)?;
                 let whole = self.place(&at, *target, *instrument, own);
                 let axes: Vec<usize> = rows.iter().map(|row| row.of).collect();
                 let values = axes.iter().map(|axis| whole.values[*axis]).collect();
@@ -283,7 +289,7 @@ impl MeasuredArm<'_> {
             ReadingKind::Known { parameter, .. } => {
                 // A parameter that is not fitted stays at zero.
                 let number = self.parameters.iter().position(|p| p.name == *parameter);
-                let value = number.map_or(0.0, |k| rooms.x[k]);
+                let value = number.map_or(0.0, |k| workspaces.x[k]);
                 let columns = if slopes { self.parameters.len() + own.len() } else { 0 };
                 let slope = |_, j: usize| f64::from(u8::from(Some(j) == number));
                 Ok(Block { values: vec![value], slopes: DMatrix::from_fn(1, columns, slope) })
@@ -298,17 +304,19 @@ impl MeasuredArm<'_> {
                 Ok(self.instrument_at(*instrument, value, std.is_some(), own, slopes))
             }
             ReadingKind::Frequencies { load, rows } => {
-                let plant = rooms.loaded(&load.carried);
-                let parameters = if slopes { rooms.under(&load.carried) } else { Cow::Borrowed(&[][..]) };
-                let found = frequency_slopes(&plant, &parameters, &reading.q).map_err(named)?;
+                let nominal = workspaces.loaded(&load.carried);
+                let parameters = if slopes { workspaces.under(&load.carried) } else { Cow::Borrowed(&[][..]) };
+                let found = frequency_slopes(&nominal, &parameters, &reading.q).map_err(named)?;
                 let values = rows.iter().map(|row| found.hz.get(row.of).copied().unwrap_or(f64::NAN)).collect();
                 let slopes = self.with_own(rows.len(), own.len(), slopes, |i, j| found.slopes[(rows[i].of, j)]);
                 Ok(Block { values, slopes })
             }
             ReadingKind::Response(measured) => {
-                self.response(rooms, &reading.q, measured, own.len(), slopes).map_err(named)
+                self.response(workspaces, &reading.q, measured, own.len(), slopes).map_err(named)
             }
-            ReadingKind::Shape(measured) => self.shape(rooms, &reading.q, measured, own.len(), slopes).map_err(named),
+            ReadingKind::Shape(measured) => {
+                self.shape(workspaces, &reading.q, measured, own.len(), slopes).map_err(named)
+            }
         }
     }
 
@@ -360,17 +368,17 @@ impl MeasuredArm<'_> {
 
     fn response(
         &self,
-        rooms: &Workspaces<'_>,
+        workspaces: &Workspaces<'_>,
         q: &[f64],
         measured: &MeasuredResponse,
         own: usize,
         slopes: bool,
     ) -> Result<Block, StepError> {
-        let plant = rooms.loaded(&measured.load.carried);
-        let parameters = if slopes { rooms.under(&measured.load.carried) } else { Cow::Borrowed(&[][..]) };
+        let nominal = workspaces.loaded(&measured.load.carried);
+        let parameters = if slopes { workspaces.under(&measured.load.carried) } else { Cow::Borrowed(&[][..]) };
         let probes = [measured.watched.clone(), measured.hit.clone()];
         let omega: Vec<f64> = measured.points.iter().map(|(omega, ..)| *omega).collect();
-        let found = structure_slopes(&plant, &parameters, q, &probes)?.response(0, 1, measured.answer, &omega)?;
+        let found = structure_slopes(&nominal, &parameters, q, &probes)?.response(0, 1, measured.answer, &omega)?;
         let values = found.values.iter().enumerate().flat_map(|(k, value)| measured.numbers(k, *value)).collect();
         let slope = |i: usize, j: usize| {
             let k = i / 2;
@@ -381,15 +389,15 @@ impl MeasuredArm<'_> {
 
     fn shape(
         &self,
-        rooms: &Workspaces<'_>,
+        workspaces: &Workspaces<'_>,
         q: &[f64],
         measured: &MeasuredShape,
         own: usize,
         slopes: bool,
     ) -> Result<Block, StepError> {
-        let plant = rooms.loaded(&measured.load.carried);
-        let parameters = if slopes { rooms.under(&measured.load.carried) } else { Cow::Borrowed(&[][..]) };
-        let found = structure_slopes(&plant, &parameters, q, &measured.probes)?;
+        let nominal = workspaces.loaded(&measured.load.carried);
+        let parameters = if slopes { workspaces.under(&measured.load.carried) } else { Cow::Borrowed(&[][..]) };
+        let found = structure_slopes(&nominal, &parameters, q, &measured.probes)?;
         let none = || StepError::Singular { matrix: "mode shapes at the measured points (they do not move)", t: 0.0 };
         let (mode, _, seen) = measured.likeliest(&found).ok_or_else(none)?;
         let all = found.shape_slopes(mode);
@@ -476,7 +484,7 @@ impl MeasuredArm<'_> {
     #[expect(clippy::too_many_arguments, reason = "what a displacement is made of")]
     fn displacement(
         &self,
-        rooms: &mut Workspaces<'_>,
+        workspaces: &mut Workspaces<'_>,
         q: &[f64],
         loads: [&LoadCase; 2],
         point: &Vector3<f64>,
@@ -484,8 +492,8 @@ impl MeasuredArm<'_> {
         own: &[f64],
         slopes: bool,
     ) -> Result<Block, StepError> {
-        let before = rooms.at_rest(q, loads[0], None, slopes)?;
-        let after = rooms.at_rest(q, loads[1], None, slopes)?;
+        let before = workspaces.at_rest(q, loads[0], None, slopes)?;
+        let after = workspaces.at_rest(q, loads[1], None, slopes)?;
         let moved = after.point(point) - before.point(point);
         let turn = after.X_WF.rotation * before.X_WF.rotation.inverse();
         let turned = rotation_vector(turn.matrix());
@@ -533,14 +541,14 @@ impl Residuals for MeasuredArm<'_> {
 
     fn evaluate(&self, unknowns: &DVector<f64>, J: Option<&mut DMatrix<f64>>) -> Result<DVector<f64>, NoAnswer> {
         let own = &unknowns.as_slice()[self.parameters.len()..];
-        let mut rooms = self.rooms(unknowns);
+        let mut workspaces = self.workspaces(unknowns);
         let m = self.measurements.rows();
         let mut residuals = DVector::zeros(m);
         let observed = self.observed();
         let slopes = J.is_some();
         let mut all = DMatrix::zeros(if slopes { m } else { 0 }, unknowns.len());
         for (reading, first) in self.by_pose() {
-            let block = self.block(&mut rooms, reading, own, slopes)?;
+            let block = self.block(&mut workspaces, reading, own, slopes)?;
             for (i, value) in block.values.iter().enumerate() {
                 residuals[first + i] = value - observed[first + i];
             }

@@ -49,11 +49,11 @@ impl Pins {
     pub(super) fn new(model: &Model) -> Self {
         let (n, count) = (model.bodies().len(), 2 * model.loops().len());
         let zero = Row { G: [Vector6::zeros(); 2], c: 0.0 };
-        let room = || vec![Vector6::zeros(); n];
+        let zeros = || vec![Vector6::zeros(); n];
         Self {
             rows: vec![zero; count],
             bodies: model.loops().iter().flat_map(|own| [own.ends; 2]).collect(),
-            columns: (0..count).map(|_| (room(), room())).collect(),
+            columns: (0..count).map(|_| (zeros(), zeros())).collect(),
             A: DMatrix::zeros(count, count),
             mu: DVector::zeros(count),
         }
@@ -86,8 +86,8 @@ impl Pins {
                 let X_WP = poses[body.parent] * body.X_PJ;
                 let JointMotion::Axis(motion) = body.motion else { return Vector2::zeros() };
                 let S = motion.twist(1.0);
-                let arm = p_eye - X_WP.translation.vector;
-                (X.rotation.inverse() * (X_WP.rotation * S.linear + (X_WP.rotation * S.angular).cross(&arm))).xy()
+                let lever = p_eye - X_WP.translation.vector;
+                (X.rotation.inverse() * (X_WP.rotation * S.linear + (X_WP.rotation * S.angular).cross(&lever))).xy()
             });
             let closes = gap <= LARGEST_GAP && u.perp(&v).abs() >= DEAD_POINT_RAD * u.norm() * v.norm();
             if !closes && open.is_none() {

@@ -1,14 +1,16 @@
-//! Flexible arm, the input of every stepper: tree, springs, damping, drives, motion, external
+//! Plant, the input of every stepper: tree of an arm, springs, damping, drives, motion, external
 //! loads.
 //!
-//! Immutable and shared; each stepper derives its own state from it. Start at [`FlexibleArm::new`] (`assembly.rs`).
+//! Immutable and shared; each stepper derives its own state from it. Start at [`Plant::new`]
+//! (`assembly.rs`).
 //!
-//! The free coordinates x of an arm are those of the joints driven by torque, followed by the
+//! The free coordinates x of a plant are those of the joints driven by torque, followed by the
 //! elastic ones. All other joints are prescribed.
 
 use std::sync::Arc;
 
 use flexarm_kinematics::{AxisMotion, Data, JointMotion, Model, SpatialInertia, State, Wrench};
+use flexarm_spatial::GeometricStiffness;
 use nalgebra::{DMatrix, DVector, Matrix6};
 
 use crate::dense::add_product;
@@ -28,31 +30,35 @@ pub struct Spring {
     pub damping: Damping,
     /// Law of the spring if it is nonlinear; only for a single coordinate.
     pub curve: Option<SpringCurve>,
+    /// Hysteresis of a gear, which takes the place of `K` and `curve`; only for a single coordinate.
+    pub hysteresis: Option<Hysteresis>,
     /// Load-dependent stiffness (geometric stiffening); only for modal bodies.
     pub geometric: Option<Arc<GeometricStiffness>>,
 }
 
-impl From<(String, Matrix6<f64>, Damping)> for Spring {
-    fn from((name, K, damping): (String, Matrix6<f64>, Damping)) -> Self {
-        let K = DMatrix::from_column_slice(6, 6, K.as_slice());
-        Self { name, K, damping, curve: None, geometric: None }
+impl Spring {
+    /// Creates a linear spring.
+    pub fn linear(name: impl Into<String>, K: DMatrix<f64>, damping: Damping) -> Self {
+        Self { name: name.into(), K, damping, curve: None, hysteresis: None, geometric: None }
+    }
+
+    /// Returns the spring with its forces multiplied by a factor; damping and geometric stiffness
+    /// stay.
+    #[must_use]
+    pub fn stiffened(self, factor: f64) -> Self {
+        Self {
+            K: self.K * factor,
+            curve: self.curve.map(|curve| curve.scaled(factor)),
+            hysteresis: self.hysteresis.map(|law| law.scaled(factor)),
+            ..self
+        }
     }
 }
 
-/// Geometric stiffness of a modal body: contributions of loads to its stiffness, n×n per unit load.
-///
-/// `K + Σ α_i acceleration_i + Σ ω_i ω_j centrifugal_ij` accounts for the body's own inertia forces
-/// under acceleration and rotation, in body axes. Loads of the attached bodies are in `interface`.
-#[derive(Clone, Debug, PartialEq)]
-pub struct GeometricStiffness {
-    /// Per unit acceleration of the origin, gravity subtracted (s²/m).
-    pub acceleration: [DMatrix<f64>; 3],
-    /// Per unit angular acceleration.
-    pub angular: [DMatrix<f64>; 3],
-    /// Per `ω_x², ω_y², ω_z², ω_x ω_y, ω_x ω_z, ω_y ω_z`.
-    pub centrifugal: [DMatrix<f64>; 6],
-    /// Per unit force and moment at each interface, link axes.
-    pub interface: Vec<[DMatrix<f64>; 6]>,
+impl From<(String, Matrix6<f64>, Damping)> for Spring {
+    fn from((name, K, damping): (String, Matrix6<f64>, Damping)) -> Self {
+        Self::linear(name, DMatrix::from_column_slice(6, 6, K.as_slice()), damping)
+    }
 }
 
 /// A spring assigned to its coordinates: generalised force `-(K e + D ė)`.
@@ -74,8 +80,10 @@ pub struct ElasticElement {
     pub C: DMatrix<f64>,
     /// Damping.
     pub damping: Damping,
-    /// See [`Spring::curve`].
+    /// See [`Spring::curve`]; with hysteresis, the curve of first loading.
     pub curve: Option<SpringCurve>,
+    /// See [`Spring::hysteresis`].
+    pub hysteresis: Option<Hysteresis>,
     /// See [`Spring::geometric`].
     pub geometric: Option<Arc<GeometricStiffness>>,
 }
@@ -147,9 +155,9 @@ pub struct InertiaChange {
     pub inertia: SpatialInertia,
 }
 
-/// Tree, springs, damping, drives and motion.
+/// An arm on its motion: tree, springs, damping, drives and loads.
 #[derive(Clone)]
-pub struct FlexibleArm {
+pub struct Plant {
     /// Kinematic tree; its elastic joints and modal bodies are the springs.
     pub model: Arc<Model>,
     /// Springs, in coordinate order; one per elastic group of the model.
@@ -173,13 +181,11 @@ pub struct FlexibleArm {
     pub loads: Vec<Load>,
     /// Changes of inertia, by time.
     pub inertia_changes: Vec<InertiaChange>,
-    /// Transmission errors; see [`FlexibleArm::with_transmission_errors`].
+    /// Transmission errors; see [`Plant::with_transmission_errors`].
     pub transmission: Vec<TransmissionError>,
-    /// Gears with hysteresis; see [`FlexibleArm::with_hysteresis`].
-    pub hysteresis: Vec<Hysteresis>,
     /// Friction that grows with the transmitted torque.
     pub load_friction: Vec<LoadFriction>,
-    /// Gears that couple several joints; see [`FlexibleArm::with_coupling`].
+    /// Gears that couple several joints; see [`Plant::with_coupling`].
     pub coupling: Option<GearCoupling>,
     /// Stiffness between elastic coordinates of coupled gears: row, column, entry; the symmetric
     /// entry is implied.
@@ -197,7 +203,7 @@ pub struct FlexibleArm {
 pub struct Servo {
     /// Sampling period (s).
     pub sample_s: f64,
-    /// One axis per joint driven by torque, in the order of [`FlexibleArm::torque_driven`].
+    /// One axis per joint driven by torque, in the order of [`Plant::torque_driven`].
     pub axes: Vec<ServoAxis>,
     /// Rigid robot for the feed-forward; its coordinates are the actuated ones.
     pub rigid: Arc<Model>,
@@ -223,7 +229,7 @@ impl Modes {
     }
 }
 
-impl FlexibleArm {
+impl Plant {
     /// Returns the damping ratio of the first mode; 0 without elastic coordinates.
     pub fn first_damping_ratio(&self) -> f64 {
         let Some(omega) = self.modes.omega.first() else { return 0.0 };
@@ -231,14 +237,14 @@ impl FlexibleArm {
         shape.dot(&(&self.D * shape)) / (2.0 * omega)
     }
 
-    /// Returns the arm with the inertia of one body replaced (about Bo, B axes); modes and damping
+    /// Returns the plant with the inertia of one body replaced (about Bo, B axes); modes and damping
     /// are not updated.
     #[must_use]
     pub fn with_inertia(&self, body: usize, inertia: SpatialInertia) -> Self {
         Self { model: Arc::new(self.model.with_inertia(body, inertia)), ..self.clone() }
     }
 
-    /// Returns the arm with another motion; modes and damping are not updated.
+    /// Returns the plant with another motion; modes and damping are not updated.
     #[must_use]
     pub fn along(&self, motion: Arc<dyn PrescribedMotion>) -> Self {
         Self { motion, ..self.clone() }
