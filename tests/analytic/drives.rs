@@ -74,11 +74,11 @@ fn along(robot: &str, trajectory: &str, curve: &str) -> (f64, f64) {
     let robot = load(&format!("robots/{robot}"));
     let path = root().join("trajectories").join(trajectory);
     let motion = Motion::load_for(&path, &robot.rigid_model().expect("a tree")).expect("a sound trajectory");
-    let arm = robot.model(&Modelling::default()).expect("a tree").arm(motion.prescribed()).expect("an arm");
-    let tcp = arm.model.frame(flexarm::robots::TCP_FRAME).expect("there").clone();
-    let mut seen = Observation::new(&arm);
+    let plant = robot.model(&Modelling::default()).expect("a tree").plant(motion.prescribed()).expect("an arm");
+    let tcp = plant.model.frame(flexarm::robots::TCP_FRAME).expect("there").clone();
+    let mut seen = Observation::new(&plant);
     let kind = StepperKind::Reference(ReferenceSettings::new(1e-10));
-    let mut stepper = new_stepper(kind, arm, 2e-3, Start::Equilibrium).expect("starts");
+    let mut stepper = new_stepper(kind, plant, 2e-3, Start::Equilibrium).expect("starts");
     let text = std::fs::read_to_string(root().join("tests/golden").join(curve)).expect("golden file");
     let (mut error, mut peak) = (0.0f64, 0.0f64);
     for (k, line) in text.lines().filter(|l| !l.starts_with(['#', 't'])).enumerate() {
@@ -159,8 +159,8 @@ fn four_mass_arm_has_the_frequencies_and_the_damping_of_its_equations() {
 fn drives_can_be_made_rigid_by_a_word() {
     let robot = load("robots/kr210_identified");
     let rigid = Modelling { drives: DriveModel::Rigid, ..Modelling::default() };
-    let arm = robot.model(&rigid).expect("a tree").arm(Arc::new(Held(vec![0.0; 6]))).expect("an arm");
-    assert_eq!(arm.n_free(), 0);
-    let soft = robot.model(&Modelling::default()).expect("a tree").arm(Arc::new(Held(vec![0.0; 6]))).expect("an arm");
+    let plant = robot.model(&rigid).expect("a tree").plant(Arc::new(Held(vec![0.0; 6]))).expect("an arm");
+    assert_eq!(plant.n_free(), 0);
+    let soft = robot.model(&Modelling::default()).expect("a tree").plant(Arc::new(Held(vec![0.0; 6]))).expect("an arm");
     assert_eq!(static_equilibrium(&soft, 0.0).expect("stands").len(), 6);
 }

@@ -24,12 +24,12 @@ fn load(robot: &str) -> Robot {
 }
 
 /// The reference arm by file with another damping.
-fn arm(damping: Damping, motion: Arc<dyn PrescribedMotion>) -> (FlexibleArm, Frame) {
+fn plant(damping: Damping, motion: Arc<dyn PrescribedMotion>) -> (Plant, Frame) {
     let robot = load("test/reference_arm").model(&Modelling::default()).expect("a tree");
     let mut robot = Arc::unwrap_or_clone(robot);
     robot.springs.iter_mut().for_each(|spring| spring.damping = damping);
     let tool = robot.model.frame("__tcp").expect("there").clone();
-    (robot.arm(motion).expect("carries its weight"), tool)
+    (robot.plant(motion).expect("carries its weight"), tool)
 }
 
 fn held() -> Arc<dyn PrescribedMotion> {
@@ -110,17 +110,17 @@ fn response_at_rest_is_the_compliance() {
 /// damping 0.2 %, 60 cycles.
 #[test]
 fn ringing_from_a_shape_has_the_frequency_of_its_mode() {
-    let (arm, tool) = arm(Damping::Modal(0.002), held());
-    let still = linearise(&arm, &tool, &Wrench::zeros(), 0.0).expect("an equilibrium");
-    let model = arm.model.clone();
+    let (plant, tool) = plant(Damping::Modal(0.002), held());
+    let still = linearise(&plant, &tool, &Wrench::zeros(), 0.0).expect("an equilibrium");
+    let model = plant.model.clone();
     let mut data = Data::new(&model);
-    let frequencies = arm.modes.frequencies_hz();
+    let frequencies = plant.modes.frequencies_hz();
     // A start in the shape of one mode, 0.2 mm at the tool: the first three.
     for (j, truth) in frequencies.iter().take(3).enumerate() {
-        let phi = arm.modes.shapes.column(j).into_owned();
+        let phi = plant.modes.shapes.column(j).into_owned();
         let motion = (&still.J * &phi).rows(0, 3).norm();
         let start = &still.equilibrium + phi * (2e-4 / motion);
-        let mut system = ReducedArm::new(arm.clone());
+        let mut system = ReducedArm::new(plant.clone());
         let settings = AlphaSettings { rho: 1.0, dispersion_correction: true };
         let rest = DVector::zeros(start.len());
         let h = 1.0 / (200.0 * truth);
@@ -147,14 +147,14 @@ fn ringing_from_a_shape_has_the_frequency_of_its_mode() {
 /// force of 400 N held it.
 #[test]
 fn ringing_after_release_from_a_load_has_the_frequency_of_a_mode() {
-    let (arm, tool) = arm(Damping::Modal(0.01), held());
-    let still = linearise(&arm, &tool, &Wrench::zeros(), 0.0).expect("an equilibrium");
-    let model = arm.model.clone();
+    let (plant, tool) = plant(Damping::Modal(0.01), held());
+    let still = linearise(&plant, &tool, &Wrench::zeros(), 0.0).expect("an equilibrium");
+    let model = plant.model.clone();
     let mut data = Data::new(&model);
     for direction in [Vector3::x(), Vector3::y(), Vector3::z()] {
         let pull = Wrench::new(direction * 400.0, Vector3::zeros());
-        let start = linearise(&arm, &tool, &pull, 0.0).expect("an equilibrium").equilibrium;
-        let mut system = ReducedArm::new(arm.clone());
+        let start = linearise(&plant, &tool, &pull, 0.0).expect("an equilibrium").equilibrium;
+        let mut system = ReducedArm::new(plant.clone());
         let rest = DVector::zeros(start.len());
         let mut alpha =
             GeneralizedAlpha::new(&mut system, 0.0, 5e-4, AlphaSettings::default(), start, rest).expect("starts");
@@ -167,7 +167,7 @@ fn ringing_after_release_from_a_load_has_the_frequency_of_a_mode() {
             alpha.step(&mut system).expect("steps");
         }
         let line = strongest_line(&times, &signal, Taper::FadeOut).expect("it rings");
-        let off = arm.modes.frequencies_hz().iter().map(|f| (f - line.hz).abs()).fold(f64::INFINITY, f64::min);
+        let off = plant.modes.frequencies_hz().iter().map(|f| (f - line.hz).abs()).fold(f64::INFINITY, f64::min);
         eprintln!("let go along {:?}: {:.3} Hz, {off:.1e} Hz from a mode", direction.as_slice(), line.hz);
         assert!(off < 0.5 / duration); // measured 1.1e-3 Hz
     }
@@ -225,10 +225,10 @@ fn a_force_at_a_resonance_shakes_the_tool_as_high_as_the_peak() {
     };
     let found = response(&robot, &Modelling::default(), Some(&POSE[..]), &request, None).expect("a response");
     let own = robot.model(&Modelling::default()).expect("a tree");
-    let arm = own.arm(held()).expect("carries its weight");
-    let tool = arm.model.frame("__tcp").expect("there").clone();
-    let still = linearise(&arm, &tool, &Wrench::zeros(), 0.0).expect("an equilibrium");
-    let model = arm.model.clone();
+    let plant = own.plant(held()).expect("carries its weight");
+    let tool = plant.model.frame("__tcp").expect("there").clone();
+    let still = linearise(&plant, &tool, &Wrench::zeros(), 0.0).expect("an equilibrium");
+    let model = plant.model.clone();
     let mut data = Data::new(&model);
     for peak in found.curves[0].peaks.iter().take(2) {
         let omega = TAU * peak.frequency_hz;
@@ -237,7 +237,7 @@ fn a_force_at_a_resonance_shakes_the_tool_as_high_as_the_peak() {
         let mut state = State::zeros(&model);
         state.q.copy_from(&still.q);
         let M = mass_matrix(&model, &mut data, &state.q).view((6, 6), (B.len(), B.len())).clone_owned();
-        let mut system = Shaken { arm: ReducedArm::new(arm.clone()), B, omega, M };
+        let mut system = Shaken { arm: ReducedArm::new(plant.clone()), B, omega, M };
         let h = TAU / omega / 200.0;
         let settings = AlphaSettings { rho: 1.0, dispersion_correction: true };
         let rest = DVector::zeros(still.equilibrium.len());
@@ -284,11 +284,11 @@ fn a_joint_at_a_resonance_shakes_the_tool_as_high_as_the_peak() {
             (q[1], v[1], a[1]) = (POSE[1] + size * sine, size * omega * cosine, -size * omega * omega * sine);
         });
         let own = robot.model(&Modelling::default()).expect("a tree");
-        let arm = own.arm(Arc::new(motion)).expect("carries its weight");
-        let tool = arm.model.frame("__tcp").expect("there").clone();
-        let mut seen = Observation::new(&arm);
+        let plant = own.plant(Arc::new(motion)).expect("carries its weight");
+        let tool = plant.model.frame("__tcp").expect("there").clone();
+        let mut seen = Observation::new(&plant);
         let kind = StepperKind::GeneralizedAlpha(AlphaSettings { rho: 1.0, dispersion_correction: true });
-        let mut stepper = new_stepper(kind, arm, TAU / omega / 200.0, Start::Equilibrium).expect("starts");
+        let mut stepper = new_stepper(kind, plant, TAU / omega / 200.0, Start::Equilibrium).expect("starts");
         let mut samples = Vec::new();
         let periods = 80;
         for step in 0..200 * periods {

@@ -13,7 +13,7 @@ use flexarm_kinematics::Model;
 use flexarm_stepping::*;
 use flexarm_testkit::{reference_arm, reference_motion};
 
-fn arm() -> FlexibleArm {
+fn plant() -> Plant {
     let reference = reference_arm(true);
     let model = Arc::new(Model::new(&reference.mechanism).expect("valid"));
     let damping = Damping::StiffnessProportional(reference.beta);
@@ -24,7 +24,7 @@ fn arm() -> FlexibleArm {
         v.copy_from_slice(&y);
         a.copy_from_slice(&z);
     });
-    FlexibleArm::new(model, springs, Arc::new(motion)).expect("valid")
+    Plant::new(model, springs, Arc::new(motion)).expect("valid")
 }
 
 /// Cost per step, averaged over the whole motion of 4 s.
@@ -35,14 +35,14 @@ fn steps(c: &mut Criterion) {
         (StepperKind::Spook(SpookSettings::default()), 1e-3),
         (StepperKind::Rk4, 1e-4),
     ];
-    let arm = arm();
+    let plant = plant();
     let mut group = c.benchmark_group("thousand_steps");
     group.sample_size(20);
     for (kind, h) in kinds {
         let name = BenchmarkId::new(kind.name(), format!("{h:e}"));
         group.bench_function(name, |b| {
             b.iter_batched(
-                || new_stepper(kind, arm.clone(), h, Start::Equilibrium).expect("starts"),
+                || new_stepper(kind, plant.clone(), h, Start::Equilibrium).expect("starts"),
                 |mut stepper| {
                     for _ in 0..1000 {
                         stepper.step().expect("steps");

@@ -16,7 +16,7 @@ use flexarm_stepping::*;
 use flexarm_testkit::chain_arm;
 
 /// Returns the arm; its joints oscillate.
-fn arm(joints: usize) -> FlexibleArm {
+fn plant(joints: usize) -> Plant {
     let chains = chain_arm(joints, 0, ElasticAngles::EulerZyx);
     let model = Arc::new(Model::new(&chains.mechanism).unwrap());
     let damping = Damping::StiffnessProportional(1e-3);
@@ -28,7 +28,7 @@ fn arm(joints: usize) -> FlexibleArm {
             (*q, v[k], a[k]) = (size * (w * t - s), size * w * (1.0 - c), size * w * w * s);
         }
     });
-    FlexibleArm::new(model, springs, Arc::new(motion)).unwrap()
+    Plant::new(model, springs, Arc::new(motion)).unwrap()
 }
 
 fn main() {
@@ -48,10 +48,10 @@ fn main() {
         let mut coordinates = 0;
         for _ in 0..5 {
             let start = ThreadTime::now();
-            let arm = arm(joints);
-            coordinates = arm.n_elastic_coordinates();
+            let plant = plant(joints);
+            coordinates = plant.n_elastic_coordinates();
             let alpha = StepperKind::GeneralizedAlpha(AlphaSettings::default());
-            let mut stepper = new_stepper(alpha, arm, 1e-3, Start::Equilibrium).unwrap();
+            let mut stepper = new_stepper(alpha, plant, 1e-3, Start::Equilibrium).unwrap();
             set_up = set_up.min(start.elapsed().as_secs_f64());
             let start = ThreadTime::now();
             for _ in 0..steps {

@@ -89,8 +89,8 @@ fn recursion(times: usize, mut call: impl FnMut(&mut Case)) {
     }
 }
 
-fn steps(times: usize, arm: FlexibleArm, kind: StepperKind, h: f64) {
-    let mut stepper = new_stepper(kind, arm, h, Start::Equilibrium).unwrap();
+fn steps(times: usize, plant: Plant, kind: StepperKind, h: f64) {
+    let mut stepper = new_stepper(kind, plant, h, Start::Equilibrium).unwrap();
     for _ in 0..times {
         stepper.step().unwrap();
     }
@@ -99,23 +99,23 @@ fn steps(times: usize, arm: FlexibleArm, kind: StepperKind, h: f64) {
 
 /// Returns the reference arm and `times` poses.
 fn poses(times: usize) -> (OperatingPoint, Vec<f64>) {
-    let arm = beams();
-    let tool = arm.model.frame("tcp").unwrap().clone();
+    let plant = beams();
+    let tool = plant.model.frame("tcp").unwrap().clone();
     let poses = (0..6 * times).map(|k| 2.0 * (k as f64 * 0.618_034).fract() - 1.0).collect();
-    (OperatingPoint::new(arm, tool), poses)
+    (OperatingPoint::new(plant, tool), poses)
 }
 
 /// Returns the reference arm on its motion.
-fn beams() -> FlexibleArm {
+fn beams() -> Plant {
     let reference = reference_arm(true);
     let damping = Damping::StiffnessProportional(reference.beta);
     let springs = reference.K_S.map(|K| ("spring".to_owned(), K, damping)).to_vec();
     let motion = MotionFn(follow_reference_motion);
-    FlexibleArm::new(Arc::new(Model::new(&reference.mechanism).unwrap()), springs, Arc::new(motion)).unwrap()
+    Plant::new(Arc::new(Model::new(&reference.mechanism).unwrap()), springs, Arc::new(motion)).unwrap()
 }
 
 /// Returns an arm with two links of four elastic joints each.
-fn chains() -> FlexibleArm {
+fn chains() -> Plant {
     let chains = chain_arm(4, 0, ElasticAngles::EulerZyx);
     let damping = Damping::StiffnessProportional(1e-3);
     let springs: Vec<_> = chains.K.iter().map(|K| ("spring".to_owned(), *K, damping)).collect();
@@ -126,7 +126,7 @@ fn chains() -> FlexibleArm {
             (*q, v[k], a[k]) = (size * (w * t - s), size * w * (1.0 - c), size * w * w * s);
         }
     });
-    FlexibleArm::new(Arc::new(Model::new(&chains.mechanism).unwrap()), springs, Arc::new(motion)).unwrap()
+    Plant::new(Arc::new(Model::new(&chains.mechanism).unwrap()), springs, Arc::new(motion)).unwrap()
 }
 
 fn main() {

@@ -20,20 +20,20 @@ const DURATION: f64 = 4.0;
 /// Interval of the compared points (s).
 const POINTS: f64 = 0.5e-3;
 
-fn arm() -> FlexibleArm {
+fn plant() -> Plant {
     let reference = reference_arm(true);
     let model = Arc::new(Model::new(&reference.mechanism).unwrap());
     let damping = Damping::StiffnessProportional(reference.beta);
     let springs = reference.K_S.map(|K| ("spring".to_owned(), K, damping)).to_vec();
     let motion = MotionFn(follow_reference_motion);
-    FlexibleArm::new(model, springs, Arc::new(motion)).unwrap()
+    Plant::new(model, springs, Arc::new(motion)).unwrap()
 }
 
 /// Returns the tool positions every [`POINTS`], and the work.
-fn path(arm: &FlexibleArm, kind: StepperKind, h: f64) -> (Vec<Vector3<f64>>, Counts) {
-    let tool = arm.model.frame("tcp").unwrap();
-    let mut stepper = new_stepper(kind, arm.clone(), h, Start::Equilibrium).unwrap();
-    let mut seen = Observation::new(arm);
+fn path(plant: &Plant, kind: StepperKind, h: f64) -> (Vec<Vector3<f64>>, Counts) {
+    let tool = plant.model.frame("tcp").unwrap();
+    let mut stepper = new_stepper(kind, plant.clone(), h, Start::Equilibrium).unwrap();
+    let mut seen = Observation::new(plant);
     // Longer steps are compared at their own times.
     let every = (POINTS / h).round().max(1.0) as usize;
     let mut points = Vec::new();
@@ -48,8 +48,8 @@ fn path(arm: &FlexibleArm, kind: StepperKind, h: f64) -> (Vec<Vector3<f64>>, Cou
 }
 
 /// Returns the CPU time of the steps (s).
-fn cost(arm: &FlexibleArm, kind: StepperKind, h: f64) -> f64 {
-    let mut stepper = new_stepper(kind, arm.clone(), h, Start::Equilibrium).unwrap();
+fn cost(plant: &Plant, kind: StepperKind, h: f64) -> f64 {
+    let mut stepper = new_stepper(kind, plant.clone(), h, Start::Equilibrium).unwrap();
     let start = cpu_time::ThreadTime::now();
     for _ in 0..(DURATION / h).round() as usize {
         stepper.step().unwrap();
@@ -58,23 +58,23 @@ fn cost(arm: &FlexibleArm, kind: StepperKind, h: f64) -> f64 {
 }
 
 /// Returns the same points of the rigid arm.
-fn rigid_path(arm: &FlexibleArm, count: usize) -> Vec<Vector3<f64>> {
-    let (mut data, mut state) = (Data::new(&arm.model), State::zeros(&arm.model));
-    let mut qddot = DVector::zeros(arm.model.nv());
+fn rigid_path(plant: &Plant, count: usize) -> Vec<Vector3<f64>> {
+    let (mut data, mut state) = (Data::new(&plant.model), State::zeros(&plant.model));
+    let mut qddot = DVector::zeros(plant.model.nv());
     let place = |k: usize| {
-        arm.prescribed_state(k as f64 * POINTS, &mut state, &mut qddot);
-        forward_kinematics(&arm.model, &mut data, &state.q);
-        data.X_WF(arm.model.frame("tcp").unwrap()).translation.vector
+        plant.prescribed_state(k as f64 * POINTS, &mut state, &mut qddot);
+        forward_kinematics(&plant.model, &mut data, &state.q);
+        data.X_WF(plant.model.frame("tcp").unwrap()).translation.vector
     };
     (0..count).map(place).collect()
 }
 
 fn main() {
-    let arm = arm();
+    let plant = plant();
     let alpha = StepperKind::GeneralizedAlpha(AlphaSettings::default());
     let reference = StepperKind::Reference(ReferenceSettings::new(1e-12));
-    let (truth, _) = path(&arm, reference, POINTS);
-    let rigid = rigid_path(&arm, truth.len());
+    let (truth, _) = path(&plant, reference, POINTS);
+    let rigid = rigid_path(&plant, truth.len());
     let peak = truth.iter().zip(&rigid).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
 
     let mut lines: Vec<(StepperKind, f64)> = Vec::new();
@@ -87,7 +87,7 @@ fn main() {
     let mut least = vec![f64::INFINITY; lines.len()];
     for _ in 0..5 {
         for (least, (kind, h)) in least.iter_mut().zip(&lines) {
-            *least = least.min(cost(&arm, *kind, *h));
+            *least = least.min(cost(&plant, *kind, *h));
         }
     }
     println!(
@@ -95,7 +95,7 @@ fn main() {
         "stepper", "step ms", "error/peak", "eval/step", "factors", "CPU ms per s"
     );
     for ((kind, h), cost) in lines.iter().zip(&least) {
-        let (points, counts) = path(&arm, *kind, *h);
+        let (points, counts) = path(&plant, *kind, *h);
         let stride = (h / POINTS).round().max(1.0) as usize;
         let error = points.iter().zip(truth.iter().step_by(stride)).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
         println!(

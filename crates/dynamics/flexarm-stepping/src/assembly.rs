@@ -6,14 +6,14 @@ use std::sync::Arc;
 use flexarm_kinematics::{Data, Model, State, Wrench, mass_matrix};
 use nalgebra::{DMatrix, DVector};
 
-use crate::arm::{Damping, ElasticElement, FlexibleArm, InertiaChange, Modes, Servo, Spring};
 use crate::error::StepError;
 use crate::events::SAME_TIME;
 use crate::load::Load;
 use crate::modes::modes_at;
 use crate::motion::PrescribedMotion;
+use crate::plant::{Damping, ElasticElement, InertiaChange, Modes, Plant, Servo, Spring};
 
-impl FlexibleArm {
+impl Plant {
     /// Creates an arm from a model and the springs of its elastic groups.
     ///
     /// `springs` lists name, stiffness and damping in the order of `model.elastic()`. The modal
@@ -27,16 +27,16 @@ impl FlexibleArm {
         springs: Vec<S>,
         motion: Arc<dyn PrescribedMotion>,
     ) -> Result<Self, StepError> {
-        let mut arm = Self { at_rest: false, ..Self::at_rest(model, springs, motion)? };
-        arm.update_modes_and_damping()?;
-        Ok(arm)
+        let mut plant = Self { at_rest: false, ..Self::at_rest(model, springs, motion)? };
+        plant.update_modes_and_damping()?;
+        Ok(plant)
     }
 
     /// Creates an arm for equilibria alone: without modes and damping, so that links between springs
     /// need no mass.
     ///
     /// # Errors
-    /// As [`FlexibleArm::new`], except that no equilibrium is sought.
+    /// As [`Plant::new`], except that no equilibrium is sought.
     pub fn at_rest<S: Into<Spring>>(
         model: Arc<Model>,
         springs: Vec<S>,
@@ -91,7 +91,7 @@ impl FlexibleArm {
     /// Returns the arm with constant external loads: (body, wrench at Bo in world axes).
     ///
     /// # Errors
-    /// As [`FlexibleArm::new`].
+    /// As [`Plant::new`].
     pub fn with_loads(self, loads: Vec<(usize, Wrench)>) -> Result<Self, StepError> {
         self.with_timed_loads(loads.into_iter().map(|(body, F)| Load::constant(body, F)).collect())
     }
@@ -99,7 +99,7 @@ impl FlexibleArm {
     /// Returns the arm with external loads that change with time.
     ///
     /// # Errors
-    /// As [`FlexibleArm::new`].
+    /// As [`Plant::new`].
     pub fn with_timed_loads(mut self, loads: Vec<Load>) -> Result<Self, StepError> {
         self.loads = loads;
         self.update_modes_and_damping()?;
@@ -110,7 +110,7 @@ impl FlexibleArm {
     /// start.
     ///
     /// # Errors
-    /// As [`FlexibleArm::new`].
+    /// As [`Plant::new`].
     pub fn with_inertia_changes(mut self, mut changes: Vec<InertiaChange>) -> Result<Self, StepError> {
         changes.sort_by(|a, b| a.t.total_cmp(&b.t));
         self.inertia_changes = changes;
@@ -178,7 +178,7 @@ impl FlexibleArm {
     /// after fields were changed directly. Does nothing for an arm at rest.
     ///
     /// # Errors
-    /// As [`FlexibleArm::new`].
+    /// As [`Plant::new`].
     pub fn update_modes_and_damping(&mut self) -> Result<(), StepError> {
         let n = self.n_elastic_coordinates();
         if n == 0 || self.at_rest {

@@ -10,8 +10,8 @@
 use flexarm_kinematics::{Data, ElasticAngles, JointMotion, Model, Pose, SpatialInertia, State, skew};
 use nalgebra::{Matrix3, Matrix6};
 
-use crate::arm::{Damping, FlexibleArm};
 use crate::dense::add_product;
+use crate::plant::{Damping, Plant};
 use crate::tree_matrix::{TreeMatrices, TreeNode};
 
 /// Minimum number of elastic joints for elimination instead of a dense inverse: with two, 12
@@ -41,30 +41,30 @@ struct ElasticJoint {
 
 impl ElasticTree {
     /// Returns the tree of an arm if its steps are faster along the tree than with dense matrices.
-    pub(crate) fn that_pays(arm: &FlexibleArm) -> Option<Self> {
-        Self::of(arm).filter(|tree| tree.len() >= FEWEST_NODES && arm.damps_by_element())
+    pub(crate) fn that_pays(plant: &Plant) -> Option<Self> {
+        Self::of(plant).filter(|tree| tree.len() >= FEWEST_NODES && plant.damps_by_element())
     }
 
     /// Returns `None` if a free coordinate does not belong to an elastic joint with six
     /// coordinates, if a spring is nonlinear or a gear has other effects, or if closed loops
     /// connect branches of the tree.
-    pub(crate) fn of(arm: &FlexibleArm) -> Option<Self> {
-        let model = &arm.model;
-        let straight = arm.elements.iter().all(|e| e.size == 6 && !e.modal && e.curve.is_none());
+    pub(crate) fn of(plant: &Plant) -> Option<Self> {
+        let model = &plant.model;
+        let straight = plant.elements.iter().all(|e| e.size == 6 && !e.modal && e.curve.is_none());
         if model.has_modal()
             || !model.loops().is_empty()
             || !straight
-            || arm.has_gear_laws()
-            || !arm.torque_driven.is_empty()
+            || plant.has_gear_laws()
+            || !plant.torque_driven.is_empty()
         {
             return None;
         }
-        let mut joints = Vec::with_capacity(arm.elements.len());
-        for element in &arm.elements {
+        let mut joints = Vec::with_capacity(plant.elements.len());
+        for element in &plant.elements {
             let JointMotion::Elastic(angles) = model.bodies()[element.body].motion else { return None };
             let (body, coordinate, one) = (element.body, element.coordinate, Matrix3::identity());
             // Coordinates must be in the order of the nodes, nodes in the order of the bodies.
-            let in_order = arm.offset(element) == 6 * joints.len();
+            let in_order = plant.offset(element) == 6 * joints.len();
             let outward = joints.last().is_none_or(|last: &ElasticJoint| last.body < body);
             if !(in_order && outward) {
                 return None;
@@ -136,7 +136,7 @@ impl ElasticJoint {
     }
 }
 
-impl FlexibleArm {
+impl Plant {
     /// Returns whether the damping matrix is block diagonal with one block per element.
     pub(crate) fn damps_by_element(&self) -> bool {
         self.cross_damping.is_empty()

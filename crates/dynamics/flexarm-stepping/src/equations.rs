@@ -11,11 +11,11 @@ use std::sync::Arc;
 
 use nalgebra::DVector;
 
-use crate::arm::FlexibleArm;
 use crate::dense::largest_of_numbers;
 use crate::error::StepError;
 use crate::integrator::check_deflection;
 use crate::observation::{Observation, observe_reduced};
+use crate::plant::Plant;
 use crate::reduced::ReducedArm;
 use crate::statics::static_equilibrium;
 use crate::system::SecondOrderSystem;
@@ -36,26 +36,26 @@ impl EquationsOfMotion {
     /// # Errors
     /// [`StepError::NoEquations`] for an arm with hysteresis; [`StepError::NoEquilibrium`] and
     /// [`StepError::OpenLoop`] as for a stepper.
-    pub fn at_rest(arm: impl Into<Arc<FlexibleArm>>) -> Result<Self, StepError> {
-        let arm = arm.into();
-        if !arm.hysteresis.is_empty() {
+    pub fn at_rest(plant: impl Into<Arc<Plant>>) -> Result<Self, StepError> {
+        let plant = plant.into();
+        if !plant.hysteresis.is_empty() {
             return Err(StepError::NoEquations);
         }
-        let e = static_equilibrium(&arm, 0.0)?;
-        let mut system = ReducedArm::new(arm);
+        let e = static_equilibrium(&plant, 0.0)?;
+        let mut system = ReducedArm::new(plant);
         let (x, v) = system.start(&e)?;
         system.check_loops(&x, &v)?;
         let a = DVector::zeros(x.len());
         system.evaluate(0.0, &x, &v, &a);
-        let holding: Vec<f64> = system.arm.torque_driven.iter().map(|&k| system.data.tau[k]).collect();
+        let holding: Vec<f64> = system.plant.torque_driven.iter().map(|&k| system.data.tau[k]).collect();
         let mut own = Self { system, x, v, a };
         own.set_torques(&holding);
         Ok(own)
     }
 
     /// Returns the arm.
-    pub fn arm(&self) -> &FlexibleArm {
-        &self.system.arm
+    pub fn plant(&self) -> &Plant {
+        &self.system.plant
     }
 
     /// Returns the free coordinates (rad, m; modal coordinates in their own units).
@@ -77,7 +77,7 @@ impl EquationsOfMotion {
         self.v.copy_from_slice(v);
     }
 
-    /// Sets the torques of the joints in [`FlexibleArm::torque_driven`] (N m or N), up to the limits
+    /// Sets the torques of the joints in [`Plant::torque_driven`] (N m or N), up to the limits
     /// of their drives.
     ///
     /// # Panics
@@ -91,8 +91,8 @@ impl EquationsOfMotion {
     }
 
     /// Replaces masses and damping by those of an arm that is the same otherwise.
-    pub fn change_masses(&mut self, arm: &Arc<FlexibleArm>) {
-        self.system.arm = arm.clone();
+    pub fn change_masses(&mut self, plant: &Arc<Plant>) {
+        self.system.plant = plant.clone();
     }
 
     /// Computes the accelerations.
@@ -102,14 +102,14 @@ impl EquationsOfMotion {
     /// deflections of metres and for accelerations that are not finite, [`StepError::Singular`] if
     /// the mass matrix cannot be factorised.
     pub fn evaluate(&mut self) -> Result<(), StepError> {
-        if check_deflection(&self.system.arm, &self.x, 0.0, 0.0).is_err() {
+        if check_deflection(&self.system.plant, &self.x, 0.0, 0.0).is_err() {
             return Err(StepError::OutOfRange);
         }
         // The motion may have changed since the last call.
         self.system.sampled_at = f64::NAN;
         let computed = self.system.acceleration(0.0, &self.x, &self.v, &mut self.a);
         if let Err(error) = computed {
-            return Err(StepError::dead_point(&self.system.arm.model, &self.system.data, 0.0).unwrap_or(error));
+            return Err(StepError::dead_point(&self.system.plant.model, &self.system.data, 0.0).unwrap_or(error));
         }
         match largest_of_numbers(self.a.as_slice()).is_finite() {
             true => Ok(()),

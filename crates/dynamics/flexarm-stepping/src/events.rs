@@ -13,8 +13,8 @@ use std::sync::Arc;
 
 use nalgebra::DMatrix;
 
-use crate::arm::{FlexibleArm, InertiaChange};
 use crate::load::Load;
+use crate::plant::{InertiaChange, Plant};
 
 /// Times that differ by less than this are equal (s).
 pub(crate) const SAME_TIME: f64 = 1e-9;
@@ -46,20 +46,20 @@ pub struct EventQueue {
 
 impl EventQueue {
     /// Creates the queue for the start of a run.
-    pub fn of(arm: &FlexibleArm) -> Self {
-        let loads = arm.loads.iter().flat_map(|load| {
+    pub fn of(plant: &Plant) -> Self {
+        let loads = plant.loads.iter().flat_map(|load| {
             let jumps = load.wrench.jumps.iter().copied().filter(|t| jumps_at(load, *t));
             jumps.chain(load.wrench.stops.iter().copied())
         });
-        let mut jumps: Vec<f64> = loads.chain(arm.motion.velocity_jumps()).collect();
+        let mut jumps: Vec<f64> = loads.chain(plant.motion.velocity_jumps()).collect();
         jumps.sort_by(f64::total_cmp);
-        let clock = arm.servo.as_ref().map(|servo| SampleClock { sample_s: servo.sample_s, next: 0 });
-        Self { jumps, jumps_over: 0, changes: arm.inertia_changes.clone(), changes_over: 0, clock }
+        let clock = plant.servo.as_ref().map(|servo| SampleClock { sample_s: servo.sample_s, next: 0 });
+        Self { jumps, jumps_over: 0, changes: plant.inertia_changes.clone(), changes_over: 0, clock }
     }
 
     /// Creates a queue with the changes of inertia only, for statics.
-    pub(crate) fn of_changes(arm: &FlexibleArm) -> Self {
-        Self { jumps: Vec::new(), jumps_over: 0, changes: arm.inertia_changes.clone(), changes_over: 0, clock: None }
+    pub(crate) fn of_changes(plant: &Plant) -> Self {
+        Self { jumps: Vec::new(), jumps_over: 0, changes: plant.inertia_changes.clone(), changes_over: 0, clock: None }
     }
 
     /// Returns the time of the next event after `t`, if any; exactly `end` if it is the same time.
@@ -136,7 +136,7 @@ impl SampleClock {
     }
 }
 
-impl FlexibleArm {
+impl Plant {
     /// Returns the times at which a load begins, ends, jumps or has a kink (s), load by load.
     pub fn load_jumps(&self) -> impl Iterator<Item = f64> {
         self.loads.iter().flat_map(|load| load.wrench.jumps.iter().copied())
@@ -155,8 +155,8 @@ pub(crate) type ArmDamping = (DMatrix<f64>, Vec<f64>, bool);
 /// Returns the damping of the arm after each change of inertia: modal damping is recomputed with
 /// the modes of the changed arm. If the arm has no static equilibrium with its new payload, the
 /// previous damping is kept.
-pub(crate) fn damping_after_changes(arm: &FlexibleArm) -> Vec<ArmDamping> {
-    let mut changed = arm.clone();
+pub(crate) fn damping_after_changes(plant: &Plant) -> Vec<ArmDamping> {
+    let mut changed = plant.clone();
     let damping = |change: &InertiaChange| {
         changed.model = Arc::new(changed.model.with_inertia(change.body, change.inertia));
         let mut renewed = changed.clone();
@@ -165,5 +165,5 @@ pub(crate) fn damping_after_changes(arm: &FlexibleArm) -> Vec<ArmDamping> {
         }
         (changed.D.clone(), changed.tau.clone(), changed.proportional)
     };
-    arm.inertia_changes.iter().map(damping).collect()
+    plant.inertia_changes.iter().map(damping).collect()
 }

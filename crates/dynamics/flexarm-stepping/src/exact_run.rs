@@ -12,9 +12,9 @@ use std::sync::Arc;
 use flexarm_kinematics::{Frame, rotation_vector};
 use nalgebra::DVector;
 
-use crate::arm::FlexibleArm;
 use crate::error::StepError;
 use crate::observation::Observation;
+use crate::plant::Plant;
 use crate::servo::TorqueLimited;
 use crate::statics::static_equilibrium;
 use crate::stepper::{Start, Stepper};
@@ -52,21 +52,21 @@ impl ExactRun {
     ///
     /// # Errors
     /// As [`new_stepper`](crate::new_stepper) and [`Stepper::step`].
-    pub fn errors(&self, arm: &FlexibleArm) -> Result<ToolErrors, StepError> {
+    pub fn errors(&self, plant: &Plant) -> Result<ToolErrors, StepError> {
         let Self { settings, step_s, .. } = *self;
         if !(step_s.is_finite() && step_s > 0.0) {
             return Err(StepError::Setup(format!("the step must be a positive time in seconds, found {step_s}")));
         }
-        let mut arm = arm.clone();
-        arm.carry_from_start()?;
+        let mut plant = plant.clone();
+        plant.carry_from_start()?;
         let e = match self.start {
-            Start::Equilibrium => static_equilibrium(&arm, 0.0)?,
-            Start::Undeformed => DVector::zeros(arm.n_elastic_coordinates()),
+            Start::Equilibrium => static_equilibrium(&plant, 0.0)?,
+            Start::Undeformed => DVector::zeros(plant.n_elastic_coordinates()),
         };
-        let arm = Arc::new(arm);
-        let mut stepper = settings.stepper(arm.clone(), step_s, &e)?;
+        let plant = Arc::new(plant);
+        let mut stepper = settings.stepper(plant.clone(), step_s, &e)?;
         stepper.integrator = stepper.integrator.exactly();
-        let (mut seen, mut poses) = (Observation::new(&arm), ToolPoses::new(&arm, &self.tool));
+        let (mut seen, mut poses) = (Observation::new(&plant), ToolPoses::new(&plant, &self.tool));
         let mut found = ToolErrors::default();
         for step in 0..=steps(self.duration_s, step_s) {
             if step > 0 {

@@ -3,7 +3,7 @@
 use flexarm_kinematics::{Data, JointMotion, Wrench};
 use nalgebra::DMatrix;
 
-use crate::arm::{FlexibleArm, GeometricStiffness};
+use crate::plant::{GeometricStiffness, Plant};
 
 impl GeometricStiffness {
     fn matrices(&self) -> impl Iterator<Item = &DMatrix<f64>> {
@@ -13,11 +13,11 @@ impl GeometricStiffness {
 
 /// Adds the forces of load-dependent stiffness of modal bodies, for the loads of the last
 /// Newton-Euler pass in `data`; `e` and `f` are over the elastic coordinates.
-pub(crate) fn add_geometric_forces(arm: &FlexibleArm, data: &Data, e: &[f64], f: &mut [f64]) {
-    for element in &arm.elements {
+pub(crate) fn add_geometric_forces(plant: &Plant, data: &Data, e: &[f64], f: &mut [f64]) {
+    for element in &plant.elements {
         let Some(geometric) = &element.geometric else { continue };
-        let range = arm.offset(element)..arm.offset(element) + element.size;
-        for (matrix, load) in geometric.matrices().zip(geometric_loads(arm, data, element.body, geometric)) {
+        let range = plant.offset(element)..plant.offset(element) + element.size;
+        for (matrix, load) in geometric.matrices().zip(geometric_loads(plant, data, element.body, geometric)) {
             if load == 0.0 {
                 continue;
             }
@@ -33,7 +33,7 @@ pub(crate) fn add_geometric_forces(arm: &FlexibleArm, data: &Data, e: &[f64], f:
 /// Returns the loads in the order of [`GeometricStiffness::matrices`], from the last Newton-Euler
 /// pass.
 fn geometric_loads<'a>(
-    arm: &'a FlexibleArm,
+    plant: &'a Plant,
     data: &'a Data,
     body: usize,
     geometric: &'a GeometricStiffness,
@@ -57,7 +57,7 @@ fn geometric_loads<'a>(
     let wrenches = (0..geometric.interface.len()).flat_map(move |number| {
         // The load at the interface is the negative of the wrench that the attached body requires,
         // in link axes.
-        let carried = arm.model.bodies().iter().enumerate().find(|(_, b)| {
+        let carried = plant.model.bodies().iter().enumerate().find(|(_, b)| {
             b.parent == body && matches!(b.motion, JointMotion::Interface { interface, .. } if interface == number)
         });
         let F = carried.map_or(Wrench::zeros(), |(i, _)| {

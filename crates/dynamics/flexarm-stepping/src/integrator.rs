@@ -6,11 +6,11 @@ use std::sync::Arc;
 
 use nalgebra::DVector;
 
-use crate::arm::FlexibleArm;
 use crate::dense::largest_of_numbers;
 use crate::error::StepError;
 use crate::events::Change;
 use crate::observation::{Observation, observe_reduced};
+use crate::plant::Plant;
 use crate::reduced::ReducedArm;
 use crate::stepper::{Counts, LARGEST_DEFLECTION, Stepper};
 use crate::system::SecondOrderSystem;
@@ -218,11 +218,11 @@ impl<I: Integrator> ReducedStepper<I> {
     /// Starts an arm at `t = 0` with elastic coordinates `e`; `make` builds the integrator from
     /// positions and velocities.
     pub(crate) fn start(
-        arm: impl Into<Arc<FlexibleArm>>,
+        plant: impl Into<Arc<Plant>>,
         e: &DVector<f64>,
         make: impl FnOnce(&mut ReducedArm, DVector<f64>, DVector<f64>) -> Result<I, StepError>,
     ) -> Result<Self, StepError> {
-        let mut system = ReducedArm::new(arm);
+        let mut system = ReducedArm::new(plant);
         let (x, v) = system.start(e)?;
         system.check_loops(&x, &v)?;
         let integrator = make(&mut system, x, v)?;
@@ -249,12 +249,12 @@ impl<I: Integrator + 'static> Stepper for ReducedStepper<I> {
             }
             if let Err(error) = integrator.advance_to(system, stop) {
                 // An open loop makes the state NaN; report the loop as the cause of the failure.
-                return Err(StepError::dead_point(&system.arm.model, &system.data, stop).unwrap_or(error));
+                return Err(StepError::dead_point(&system.plant.model, &system.data, stop).unwrap_or(error));
             }
             // Apply the events at this time.
             let h = integrator.step_size();
             let now = integrator.current_mut();
-            check_deflection(&system.arm, &now.x, stop, h)?;
+            check_deflection(&system.plant, &now.x, stop, h)?;
             match system.at_time(stop, &now.x, &mut now.v)? {
                 Change::Nothing => {}
                 Change::Motion => integrator.restart(system)?,
@@ -282,13 +282,13 @@ impl<I: Integrator + 'static> Stepper for ReducedStepper<I> {
     fn restart(&mut self) -> Result<(), StepError> {
         let t = self.integrator.time();
         if let Some(servo) = &mut self.system.servo {
-            servo.add(t, &self.system.arm);
+            servo.add(t, &self.system.plant);
         }
         self.integrator.restart(&mut self.system)
     }
 
-    fn change_masses(&mut self, arm: &Arc<FlexibleArm>) -> Result<(), StepError> {
-        self.system.arm = arm.clone();
+    fn change_masses(&mut self, plant: &Arc<Plant>) -> Result<(), StepError> {
+        self.system.plant = plant.clone();
         self.integrator.renew(&mut self.system)
     }
 
@@ -298,12 +298,12 @@ impl<I: Integrator + 'static> Stepper for ReducedStepper<I> {
 }
 
 /// Returns an error if an elastic coordinate exceeds [`LARGEST_DEFLECTION`].
-pub(crate) fn check_deflection(arm: &FlexibleArm, x: &DVector<f64>, t: f64, h: f64) -> Result<(), StepError> {
+pub(crate) fn check_deflection(plant: &Plant, x: &DVector<f64>, t: f64, h: f64) -> Result<(), StepError> {
     if largest_of_numbers(x.as_slice()) <= LARGEST_DEFLECTION {
         return Ok(());
     }
-    for element in arm.elements.iter().filter(|e| !e.modal || e.size >= 6) {
-        let first = arm.torque_driven.len() + arm.offset(element);
+    for element in plant.elements.iter().filter(|e| !e.modal || e.size >= 6) {
+        let first = plant.torque_driven.len() + plant.offset(element);
         let largest = x.as_slice()[first..first + element.size.min(6)].iter().fold(0.0f64, |m, e| m.max(e.abs()));
         if largest > LARGEST_DEFLECTION {
             let what = format!("the deflection of link {:?} reached {largest:.1e} m or rad", element.name);

@@ -1,7 +1,7 @@
 //! Time steppers for flexible arms: generalised-alpha, SPOOK, explicit RK4, a reference with error
 //! control; static equilibrium and modes.
 //!
-//! [`new_stepper`] turns a [`FlexibleArm`] (tree, springs, damping, motion) into a [`Stepper`],
+//! [`new_stepper`] turns a [`Plant`] (tree, springs, damping, motion) into a [`Stepper`],
 //! which the caller advances and observes. The integrators for reduced coordinates know only
 //! [`SecondOrderSystem`]; SPOOK works in the maximal coordinates of the bodies. Not here: files,
 //! metrics, the replacement of links by flexible ones.
@@ -21,9 +21,9 @@
 //! beam.joints.push(Joint::new("spring", elastic, "clamp", "tip", Pose::identity()));
 //!
 //! let spring = ("spring".to_owned(), Matrix6::identity() * 1e5, Damping::Modal(0.03));
-//! let arm = FlexibleArm::new(Arc::new(Model::new(&beam)?), vec![spring], Arc::new(Held(vec![])))?;
-//! let mut seen = Observation::new(&arm);
-//! let mut stepper = new_stepper(StepperKind::GeneralizedAlpha(AlphaSettings::default()), arm, 1e-3, Start::Equilibrium)?;
+//! let plant = Plant::new(Arc::new(Model::new(&beam)?), vec![spring], Arc::new(Held(vec![])))?;
+//! let mut seen = Observation::new(&plant);
+//! let mut stepper = new_stepper(StepperKind::GeneralizedAlpha(AlphaSettings::default()), plant, 1e-3, Start::Equilibrium)?;
 //! stepper.step()?;
 //! stepper.observe(&mut seen);
 //! assert!((seen.q[2] + 10.0 * 9.81 / 1e5).abs() < 1e-6); // sag = m g / k
@@ -32,7 +32,6 @@
 #![allow(non_snake_case, reason = "monogram notation: X_WB, K_S, C_S, M; see docs/references.md")]
 #![cfg_attr(not(target_arch = "x86_64"), allow(dead_code, reason = "lanes are used with AVX2 alone"))]
 
-mod arm;
 mod assembly;
 mod dense;
 mod drive;
@@ -55,6 +54,7 @@ mod modes;
 mod motion;
 mod observation;
 mod operating_point;
+mod plant;
 mod reduced;
 mod servo;
 mod static_path;
@@ -67,7 +67,6 @@ mod system;
 mod tool_run;
 mod tree_matrix;
 
-pub use arm::{Damping, ElasticElement, FlexibleArm, GeometricStiffness, InertiaChange, Modes, Servo, Spring};
 pub use drive::{CurveError, Friction, ServoAxis, SpringCurve, TorqueCurve};
 pub use equations::EquationsOfMotion;
 pub use error::StepError;
@@ -81,6 +80,7 @@ pub use modes::modes_at;
 pub use motion::{Held, MotionFn, PrescribedMotion};
 pub use observation::Observation;
 pub use operating_point::{OperatingPoint, PoseAnswer, PoseOutputs};
+pub use plant::{Damping, ElasticElement, GeometricStiffness, InertiaChange, Modes, Plant, Servo, Spring};
 pub use reduced::ReducedArm;
 pub use servo::TorqueLimited;
 pub use static_path::StaticPath;

@@ -19,10 +19,10 @@ use flexarm_kinematics::{
 };
 use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX};
 
-use crate::arm::{ElasticElement, FlexibleArm, Servo};
 use crate::drive::{Friction, ServoAxis};
 use crate::equilibrium::{Equilibrium, Forces, equilibrium};
 use crate::error::StepError;
+use crate::plant::{ElasticElement, Plant, Servo};
 use crate::statics::{
     StaticSlopes, for_vibration, leave_play, spring_forces, static_equilibrium, static_forces, to_the_edge, with_curves,
 };
@@ -128,22 +128,22 @@ impl Linear {
 ///
 /// # Errors
 /// [`StepError::NoEquilibrium`], [`StepError::Singular`], [`StepError::OpenLoop`].
-pub fn linearise(arm: &FlexibleArm, tool: &Frame, F_T_W: &Wrench, t: f64) -> Result<Linear, StepError> {
-    let model = &arm.model;
-    let (m, nv, driven) = (model.n_actuated(), model.nv(), arm.torque_driven.len());
+pub fn linearise(plant: &Plant, tool: &Frame, F_T_W: &Wrench, t: f64) -> Result<Linear, StepError> {
+    let model = &plant.model;
+    let (m, nv, driven) = (model.n_actuated(), model.nv(), plant.torque_driven.len());
     // Indices of the free coordinates.
-    let free: Vec<usize> = arm.torque_driven.iter().copied().chain(m..nv).collect();
+    let free: Vec<usize> = plant.torque_driven.iter().copied().chain(m..nv).collect();
     let n = free.len();
     let mut data = Data::new(model);
-    let statics = Statics { arm, tool, F_T_W: *F_T_W, t };
+    let statics = Statics { plant, tool, F_T_W: *F_T_W, t };
     let Equilibrium { e, residual, iterations } = statics.equilibrium(&mut data)?;
-    let q = all_coordinates(arm, t, &e);
+    let q = all_coordinates(plant, t, &e);
     let p = statics.forces(&mut data, &q);
 
     let slopes = statics.slopes(&mut data, &q);
-    let springs = among_free(&for_vibration(arm, &arm.stiffness(), q.as_slice(), &e), driven);
+    let springs = among_free(&for_vibration(plant, &plant.stiffness(), q.as_slice(), &e), driven);
     let K = statics.tangent(&springs, &slopes, &free)?;
-    let D = among_free(&arm.D, driven);
+    let D = among_free(&plant.D, driven);
     let M = mass_matrix(model, &mut data, &q).clone();
     forward_kinematics(model, &mut data, &q);
     if let Some(open) = StepError::open_loop(model, &data, t) {
@@ -156,12 +156,12 @@ pub fn linearise(arm: &FlexibleArm, tool: &Frame, F_T_W: &Wrench, t: f64) -> Res
     // their servos.
     let (mut M_a, mut K_a) = (M.columns(0, m).select_rows(&free), slopes.columns(0, m).select_rows(&free));
     let mut J_a = J.columns(0, m).into_owned();
-    for &k in &arm.torque_driven {
+    for &k in &plant.torque_driven {
         M_a.column_mut(k).fill(0.0);
         K_a.column_mut(k).fill(0.0);
         J_a.column_mut(k).fill(0.0);
     }
-    let place = |e: &ElasticElement| driven + arm.offset(e)..driven + arm.offset(e) + e.size;
+    let place = |e: &ElasticElement| driven + plant.offset(e)..driven + plant.offset(e) + e.size;
     let mut linear = Linear {
         equilibrium: q.select_rows(&free),
         M: M.select_rows(&free).select_columns(&free),
@@ -169,20 +169,20 @@ pub fn linearise(arm: &FlexibleArm, tool: &Frame, F_T_W: &Wrench, t: f64) -> Res
         K,
         driven,
         springs,
-        elements: arm.elements.iter().map(|e| (e.name.clone(), place(e))).collect(),
+        elements: plant.elements.iter().map(|e| (e.name.clone(), place(e))).collect(),
         M_a,
         D_a: DMatrix::zeros(n, m),
         K_a,
         J: Matrix6xX::from_fn(n, |i, j| J[(i, free[j])]),
         J_a,
         X_WT: data.X_WF(tool),
-        holding: holding(arm, &q, &e, &p),
+        holding: holding(plant, &q, &e, &p),
         q,
         residual,
         iterations,
     };
-    if let Some(servo) = &arm.servo {
-        linear.close_loops(arm, servo);
+    if let Some(servo) = &plant.servo {
+        linear.close_loops(plant, servo);
     }
     Ok(linear)
 }
@@ -198,25 +198,25 @@ fn among_free(elastic: &DMatrix<f64>, driven: usize) -> DMatrix<f64> {
 
 /// Returns the joint forces that hold the pose: weight, loads, and reactions of transmission errors
 /// on the motors.
-fn holding(arm: &FlexibleArm, q: &DVector<f64>, e: &DVector<f64>, p: &DVector<f64>) -> DVector<f64> {
-    let mut holding = p.rows(0, arm.model.n_actuated()).into_owned();
-    let F = spring_forces(arm, q.as_slice(), e);
-    arm.add_motor_forces(q.as_slice(), F.as_slice(), holding.as_mut_slice());
+fn holding(plant: &Plant, q: &DVector<f64>, e: &DVector<f64>, p: &DVector<f64>) -> DVector<f64> {
+    let mut holding = p.rows(0, plant.model.n_actuated()).into_owned();
+    let F = spring_forces(plant, q.as_slice(), e);
+    plant.add_motor_forces(q.as_slice(), F.as_slice(), holding.as_mut_slice());
     holding
 }
 
 impl Linear {
     /// Adds the servos: springs and dampers towards the commands, and their feed-forward.
-    fn close_loops(&mut self, arm: &FlexibleArm, servo: &Servo) {
-        let m = arm.model.n_actuated();
-        let [K, D, M] = servo.fed_forward(self.q.rows(0, m).as_slice(), &arm.friction);
+    fn close_loops(&mut self, plant: &Plant, servo: &Servo) {
+        let m = plant.model.n_actuated();
+        let [K, D, M] = servo.fed_forward(self.q.rows(0, m).as_slice(), &plant.friction);
         for (i, axis) in servo.axes.iter().enumerate() {
             let (position, rate) = (axis.velocity_gain * axis.position_gain, axis.velocity_gain);
             self.K[(i, i)] += position;
             self.D[(i, i)] += rate;
             for (j, other) in servo.axes.iter().enumerate() {
-                let of_motor = |k: usize| viscous(&arm.friction, k);
-                self.D[(i, j)] += arm.over_joints(axis.coordinate, other.coordinate, of_motor);
+                let of_motor = |k: usize| viscous(&plant.friction, k);
+                self.D[(i, j)] += plant.over_joints(axis.coordinate, other.coordinate, of_motor);
             }
             self.K_a[(i, axis.coordinate)] -= position;
             self.D_a[(i, axis.coordinate)] -= rate;
@@ -237,7 +237,7 @@ impl Servo {
     /// Returns the feed-forward torques about rest at a pose per command, per rate and per
     /// acceleration of the commands: one row per axis, one column per joint.
     ///
-    /// * `pose`: all actuated joints; `friction`: of these joints, as in [`FlexibleArm::friction`];
+    /// * `pose`: all actuated joints; `friction`: of these joints, as in [`Plant::friction`];
     ///   its viscous part is fed forward as well.
     pub fn fed_forward(&self, pose: &[f64], friction: &[Friction]) -> [DMatrix<f64>; 3] {
         let (model, m) = (&self.rigid, pose.len());
@@ -270,7 +270,7 @@ impl Servo {
     }
 }
 
-impl FlexibleArm {
+impl Plant {
     /// Returns the arm without servos: motors follow their commands exactly.
     #[must_use]
     pub fn with_motors_held(&self) -> Self {
@@ -302,15 +302,15 @@ impl Tangents {
     ///
     /// # Panics
     /// If `q` is not nv long.
-    pub fn at(arm: &FlexibleArm, tool: &Frame, F_T_W: &Wrench, q: &DVector<f64>) -> Self {
-        arm.model.check_size("q", q.len());
-        let model = &arm.model;
-        let (m, n) = (model.n_actuated(), arm.n_elastic_coordinates());
+    pub fn at(plant: &Plant, tool: &Frame, F_T_W: &Wrench, q: &DVector<f64>) -> Self {
+        plant.model.check_size("q", q.len());
+        let model = &plant.model;
+        let (m, n) = (model.n_actuated(), plant.n_elastic_coordinates());
         let mut data = Data::new(model);
-        let statics = Statics { arm, tool, F_T_W: *F_T_W, t: 0.0 };
+        let statics = Statics { plant, tool, F_T_W: *F_T_W, t: 0.0 };
         let e = q.rows(m, n).into_owned();
-        let K =
-            for_vibration(arm, &arm.stiffness(), q.as_slice(), &e) + statics.slopes(&mut data, q).view((m, m), (n, n));
+        let K = for_vibration(plant, &plant.stiffness(), q.as_slice(), &e)
+            + statics.slopes(&mut data, q).view((m, m), (n, n));
         let M = mass_matrix(model, &mut data, q).view((m, m), (n, n)).into_owned();
         forward_kinematics(model, &mut data, q);
         let mut J = Matrix6xX::zeros(model.nv());
@@ -320,10 +320,10 @@ impl Tangents {
 }
 
 /// Returns all coordinates: joints on their reference at `t`, and elastic coordinates `e`.
-fn all_coordinates(arm: &FlexibleArm, t: f64, e: &DVector<f64>) -> DVector<f64> {
-    let model = &arm.model;
+fn all_coordinates(plant: &Plant, t: f64, e: &DVector<f64>) -> DVector<f64> {
+    let model = &plant.model;
     let (mut state, mut qddot) = (State::zeros(model), DVector::zeros(model.nv()));
-    arm.prescribed_state(t, &mut state, &mut qddot);
+    plant.prescribed_state(t, &mut state, &mut qddot);
     state.q.rows_mut(model.n_actuated(), e.len()).copy_from(e);
     state.q
 }
@@ -335,18 +335,18 @@ fn all_coordinates(arm: &FlexibleArm, t: f64, e: &DVector<f64>) -> DVector<f64> 
 /// [`StepError::NoEquilibrium`], [`StepError::OpenLoop`], and [`StepError::Singular`] beyond a
 /// buckling load.
 pub(crate) fn loaded_equilibrium(
-    arm: &FlexibleArm,
+    plant: &Plant,
     tool: &Frame,
     F_T_W: &Wrench,
     t: f64,
 ) -> Result<DVector<f64>, StepError> {
-    let statics = Statics { arm, tool, F_T_W: *F_T_W, t };
-    Ok(statics.equilibrium(&mut Data::new(&arm.model))?.e)
+    let statics = Statics { plant, tool, F_T_W: *F_T_W, t };
+    Ok(statics.equilibrium(&mut Data::new(&plant.model))?.e)
 }
 
 /// Static loading: weight, loads of the arm, wrench on the tool.
 struct Statics<'a> {
-    arm: &'a FlexibleArm,
+    plant: &'a Plant,
     tool: &'a Frame,
     /// Force and moment on the tool.
     F_T_W: Wrench,
@@ -361,7 +361,7 @@ impl Statics<'_> {
     /// Returns the equilibrium, found from that under weight at once or, where that fails, with the
     /// wrench rising in steps.
     fn equilibrium(&self, data: &mut Data) -> Result<Equilibrium, StepError> {
-        let under_weight = static_equilibrium(self.arm, self.t)?;
+        let under_weight = static_equilibrium(self.plant, self.t)?;
         match self.equilibrium_from(data, under_weight.clone()) {
             Err(StepError::Singular { .. } | StepError::NoEquilibrium { .. }) if self.F_T_W != Wrench::zeros() => {
                 self.in_load_steps(data, under_weight)
@@ -387,7 +387,7 @@ impl Statics<'_> {
 
     /// Solves `K e + p(e) = 0` from elastic coordinates.
     fn equilibrium_from(&self, data: &mut Data, e: DVector<f64>) -> Result<Equilibrium, StepError> {
-        let mut under_load = UnderLoad { statics: self, data, at_rest: self.arm.stiffness(), buckled: false };
+        let mut under_load = UnderLoad { statics: self, data, at_rest: self.plant.stiffness(), buckled: false };
         equilibrium(&mut under_load, e).map_err(|error| match error {
             StepError::NoEquilibrium { .. } if under_load.buckled => self.singular(),
             other => other,
@@ -402,10 +402,10 @@ impl Statics<'_> {
         slopes: &DMatrix<f64>,
         free: &[usize],
     ) -> Result<DMatrix<f64>, StepError> {
-        let (driven, ne) = (self.arm.torque_driven.len(), self.arm.model.n_elastic());
+        let (driven, ne) = (self.plant.torque_driven.len(), self.plant.model.n_elastic());
         let mut change = slopes.select_rows(free).select_columns(free);
         // Without constant moments the forces have a potential, and any asymmetry is round-off.
-        let moments = self.arm.loads.iter().any(|load| load.wrench.at(self.t).torque.norm() > 0.0);
+        let moments = self.plant.loads.iter().any(|load| load.wrench.at(self.t).torque.norm() > 0.0);
         if self.F_T_W.torque.norm() == 0.0 && !moments {
             change = (&change + change.transpose()) * 0.5;
         }
@@ -421,7 +421,7 @@ impl Statics<'_> {
     /// Returns the static forces; see [`static_forces`].
     fn forces(&self, data: &mut Data, q: &DVector<f64>) -> DVector<f64> {
         let mut p = DVector::zeros(q.len());
-        static_forces(self.arm, Some((self.tool, &self.F_T_W)), self.t, data, q, &mut p);
+        static_forces(self.plant, Some((self.tool, &self.F_T_W)), self.t, data, q, &mut p);
         p
     }
 
@@ -429,7 +429,7 @@ impl Statics<'_> {
     fn slopes(&self, data: &mut Data, q: &DVector<f64>) -> DMatrix<f64> {
         let mut P = DMatrix::zeros(q.len(), q.len());
         let tool = Some((self.tool, &self.F_T_W));
-        StaticSlopes::new(self.arm, 0).compute(self.arm, tool, self.t, data, q, &mut P);
+        StaticSlopes::new(self.plant, 0).compute(self.plant, tool, self.t, data, q, &mut P);
         P
     }
 }
@@ -446,19 +446,19 @@ struct UnderLoad<'a> {
 
 impl Forces for UnderLoad<'_> {
     fn unbalanced(&mut self, e: &DVector<f64>) -> Result<(DVector<f64>, f64), StepError> {
-        let arm = self.statics.arm;
-        let q = all_coordinates(arm, self.statics.t, e);
+        let plant = self.statics.plant;
+        let q = all_coordinates(plant, self.statics.t, e);
         let p = self.statics.forces(self.data, &q);
-        let spring = spring_forces(arm, q.as_slice(), e);
-        let elastic_p = p.rows(arm.model.n_actuated(), e.len());
-        let scale = elastic_p.amax().max(spring.amax()).max(arm.friction_of_gears());
+        let spring = spring_forces(plant, q.as_slice(), e);
+        let elastic_p = p.rows(plant.model.n_actuated(), e.len());
+        let scale = elastic_p.amax().max(spring.amax()).max(plant.friction_of_gears());
         Ok((&spring + elastic_p, scale))
     }
 
     fn step(&mut self, e: &DVector<f64>, r: &DVector<f64>, scale: f64) -> Result<DVector<f64>, StepError> {
-        let (arm, m, n) = (self.statics.arm, self.statics.arm.model.n_actuated(), e.len());
-        let q = all_coordinates(arm, self.statics.t, e);
-        let springs = with_curves(arm, &self.at_rest, q.as_slice(), e);
+        let (plant, m, n) = (self.statics.plant, self.statics.plant.model.n_actuated(), e.len());
+        let q = all_coordinates(plant, self.statics.t, e);
+        let springs = with_curves(plant, &self.at_rest, q.as_slice(), e);
         let slopes = self.statics.slopes(self.data, &q).view((m, m), (n, n)).into_owned();
         let is_stable = |K: &DMatrix<f64>| ((K + K.transpose()) * 0.5).cholesky().is_some();
         // If the tangent is not positive definite, its step leads uphill to a saddle point; a step
@@ -466,18 +466,18 @@ impl Forces for UnderLoad<'_> {
         let tangent = &springs + &slopes;
         let stable = is_stable(&tangent);
         self.buckled |= !stable;
-        let out = leave_play(arm, q.as_slice(), e, r, scale, &springs) + slopes;
+        let out = leave_play(plant, q.as_slice(), e, r, scale, &springs) + slopes;
         let K = match (stable && is_stable(&out), stable) {
             (true, _) => out,
             (false, true) => tangent,
             _ => springs,
         };
         let step = K.lu().solve(r).ok_or_else(|| self.statics.singular())?;
-        Ok(to_the_edge(arm, q.as_slice(), e, step))
+        Ok(to_the_edge(plant, q.as_slice(), e, step))
     }
 
     fn has_hysteresis(&self) -> bool {
-        !self.statics.arm.hysteresis.is_empty()
+        !self.statics.plant.hysteresis.is_empty()
     }
 
     fn time(&self) -> f64 {

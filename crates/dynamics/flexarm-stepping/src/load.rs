@@ -118,8 +118,8 @@ impl Load {
             LoadAxes::Frame => F.at_parent(&self.X_BF),
             LoadAxes::World => {
                 let turned = Wrench::new(X_WB.rotation.inverse() * F.force, X_WB.rotation.inverse() * F.torque);
-                let arm: &Vector3<f64> = &self.X_BF.translation.vector;
-                Wrench::new(turned.force, turned.torque + arm.cross(&turned.force))
+                let lever: &Vector3<f64> = &self.X_BF.translation.vector;
+                Wrench::new(turned.force, turned.torque + lever.cross(&turned.force))
             }
         }
     }

@@ -3,8 +3,8 @@
 use flexarm_kinematics::{Data, State, mass_matrix};
 use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
 
-use crate::arm::{FlexibleArm, Modes};
 use crate::error::StepError;
+use crate::plant::{Modes, Plant};
 use crate::statics::{for_vibration, static_equilibrium, tangent_stiffness};
 
 /// Computes the undamped modes at time `t` of the motion about static equilibrium, including the
@@ -12,18 +12,18 @@ use crate::statics::{for_vibration, static_equilibrium, tangent_stiffness};
 ///
 /// # Errors
 /// [`StepError::NoEquilibrium`] or [`StepError::Singular`].
-pub fn modes_at(arm: &FlexibleArm, t: f64) -> Result<Modes, StepError> {
-    let n = arm.n_elastic_coordinates();
+pub fn modes_at(plant: &Plant, t: f64) -> Result<Modes, StepError> {
+    let n = plant.n_elastic_coordinates();
     if n == 0 {
         return Ok(Modes::default());
     }
-    let model = &arm.model;
-    let equilibrium = static_equilibrium(arm, t)?;
-    let mut data = Data::new(&arm.model);
+    let model = &plant.model;
+    let equilibrium = static_equilibrium(plant, t)?;
+    let mut data = Data::new(&plant.model);
     let (mut state, mut qddot) = (State::zeros(model), DVector::zeros(model.nv()));
-    arm.prescribed_state(t, &mut state, &mut qddot);
-    let K = for_vibration(arm, &arm.stiffness(), state.q.as_slice(), &equilibrium);
-    let Kt = tangent_stiffness(arm, &mut data, t, &equilibrium, &K);
+    plant.prescribed_state(t, &mut state, &mut qddot);
+    let K = for_vibration(plant, &plant.stiffness(), state.q.as_slice(), &equilibrium);
+    let Kt = tangent_stiffness(plant, &mut data, t, &equilibrium, &K);
     let na = model.n_actuated();
     state.q.rows_mut(na, n).copy_from(&equilibrium);
     let M = mass_matrix(model, &mut data, &state.q).view((na, na), (n, n)).clone_owned();

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use flexarm_kinematics::{Model, Pose};
 use nalgebra::{DVector, Vector6};
 
-use crate::arm::FlexibleArm;
 use crate::dense::dot;
+use crate::plant::Plant;
 use crate::reduced::ReducedArm;
 
 /// Observable quantities of a stepper at its current time.
@@ -44,8 +44,8 @@ pub struct Observation {
 
 impl Observation {
     /// Allocates an observation for the arm.
-    pub fn new(arm: &FlexibleArm) -> Self {
-        let model = &arm.model;
+    pub fn new(plant: &Plant) -> Self {
+        let model = &plant.model;
         Self {
             t: 0.0,
             model: model.clone(),
@@ -54,7 +54,7 @@ impl Observation {
             qddot: DVector::zeros(model.nv()),
             X_WB: vec![Pose::identity(); model.bodies().len()],
             drive: DVector::zeros(model.n_actuated()),
-            load: vec![Vector6::zeros(); arm.elements.len()],
+            load: vec![Vector6::zeros(); plant.elements.len()],
             energy: [0.0; 3],
             power: [0.0; 3],
             impulse_work: 0.0,
@@ -73,11 +73,11 @@ pub(crate) fn observe_reduced(
     out: &mut Observation,
 ) {
     let [kinetic, potential] = system.observe(t, x, v, a, &mut out.X_WB);
-    let (arm, data, state) = (&*system.arm, &system.data, &system.state);
-    let (n, driven) = (arm.model.n_actuated(), &arm.torque_driven);
+    let (plant, data, state) = (&*system.plant, &system.data, &system.state);
+    let (n, driven) = (plant.model.n_actuated(), &plant.torque_driven);
     let (e, rates) = (&x.as_slice()[driven.len()..], &v.as_slice()[driven.len()..]);
     out.t = t;
-    out.model.clone_from(&arm.model);
+    out.model.clone_from(&plant.model);
     out.q.copy_from(&state.q);
     out.qdot.copy_from(&state.qdot);
     out.qddot.copy_from(&system.qddot);
@@ -91,20 +91,20 @@ pub(crate) fn observe_reduced(
     // Springs, dampers and friction.
     let gears = system.gears.as_ref();
     let [mut damping, elastic] = match gears {
-        Some(gears) => [gears.loads(arm, &mut out.load), gears.energy(arm)],
+        Some(gears) => [gears.loads(plant, &mut out.load), gears.energy(plant)],
         None => {
             let rooms = [system.shifted.as_mut_slice(), system.forces.as_mut_slice()];
-            element_loads(arm, e, rates, rooms, &mut out.load)
+            element_loads(plant, e, rates, rooms, &mut out.load)
         }
     };
     for k in 0..n {
         let rate = state.qdot[k];
-        damping += gears.map_or_else(|| arm.friction_torque(k, rate), |gears| gears.friction[k]) * rate;
+        damping += gears.map_or_else(|| plant.friction_torque(k, rate), |gears| gears.friction[k]) * rate;
     }
     out.hysteresis_work = gears.map_or(0.0, |gears| gears.lost);
 
     // Powers and energies.
-    let loads = arm.loads.iter().map(|load| {
+    let loads = plant.loads.iter().map(|load| {
         let F = load.on_body(system.events.side(t), &data.X_WB[load.body]);
         data.V[load.body].power(&F)
     });
@@ -118,7 +118,7 @@ pub(crate) fn observe_reduced(
 ///
 /// * `rooms`: scratch, at least one number per elastic coordinate each.
 fn element_loads(
-    arm: &FlexibleArm,
+    plant: &Plant,
     e: &[f64],
     rates: &[f64],
     rooms: [&mut [f64]; 2],
@@ -130,10 +130,10 @@ fn element_loads(
     let [dampers, springs] = rooms.map(|room| &mut room[..rates.len()]);
     dampers.fill(0.0);
     springs.fill(0.0);
-    arm.add_damping(rates, dampers);
+    plant.add_damping(rates, dampers);
     let mut energy = 0.0;
-    for (load, element) in loads.iter_mut().zip(&arm.elements) {
-        let range = arm.offset(element)..arm.offset(element) + element.size;
+    for (load, element) in loads.iter_mut().zip(&plant.elements) {
+        let range = plant.offset(element)..plant.offset(element) + element.size;
         let (own, spring) = (&e[range.clone()], &mut springs[range.clone()]);
         element.add_spring_force(own, &[], spring);
         energy += match &element.curve {
@@ -144,6 +144,6 @@ fn element_loads(
         let forces = spring.iter().zip(&dampers[range]);
         load.iter_mut().zip(forces).for_each(|(load, (spring, damper))| *load = -(spring + damper));
     }
-    let crossed = arm.cross_stiffness.iter().map(|&(i, j, k)| k * e[i] * e[j]);
+    let crossed = plant.cross_stiffness.iter().map(|&(i, j, k)| k * e[i] * e[j]);
     [dot(dampers, rates), energy + crossed.sum::<f64>()]
 }

@@ -6,9 +6,9 @@ use std::sync::Arc;
 use flexarm_kinematics::{Data, State, inverse_dynamics};
 use nalgebra::DVector;
 
-use crate::arm::{FlexibleArm, Servo};
 use crate::drive::Friction;
 use crate::gear::LoadFriction;
+use crate::plant::{Plant, Servo};
 
 /// A servo that reached its torque limit.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -43,11 +43,11 @@ pub(crate) struct ServoState {
 }
 
 impl ServoState {
-    pub(crate) fn new(servo: Arc<Servo>, arm: &FlexibleArm) -> Self {
+    pub(crate) fn new(servo: Arc<Servo>, plant: &Plant) -> Self {
         let n = servo.axes.len();
         Self {
-            friction: arm.friction.clone(),
-            load_friction: arm.load_friction.clone(),
+            friction: plant.friction.clone(),
+            load_friction: plant.load_friction.clone(),
             torque: vec![0.0; n],
             own: vec![0.0; n],
             integral: vec![0.0; n],
@@ -61,10 +61,10 @@ impl ServoState {
     }
 
     /// Computes the reference motion and the torques of the rigid robot at `t`.
-    fn update_reference(&mut self, t: f64, arm: &FlexibleArm) {
+    fn update_reference(&mut self, t: f64, plant: &Plant) {
         let n = self.qddot.len();
         let (q, qdot) = (self.reference.q.as_mut_slice(), self.reference.qdot.as_mut_slice());
-        arm.motion.sample(t, &mut q[..n], &mut qdot[..n], self.qddot.as_mut_slice());
+        plant.motion.sample(t, &mut q[..n], &mut qdot[..n], self.qddot.as_mut_slice());
         inverse_dynamics(&self.servo.rigid, &mut self.data, &self.reference, &self.qddot);
     }
 
@@ -88,22 +88,22 @@ impl ServoState {
     }
 
     /// Updates the torques after a change of those that the motion adds, at time `t`.
-    pub(crate) fn add(&mut self, t: f64, arm: &FlexibleArm) {
+    pub(crate) fn add(&mut self, t: f64, plant: &Plant) {
         for ((torque, own), axis) in self.torque.iter_mut().zip(&self.own).zip(&self.servo.axes) {
-            *torque = (own + arm.motion.added_torque(t, axis.coordinate)).clamp(-axis.limit, axis.limit);
+            *torque = (own + plant.motion.added_torque(t, axis.coordinate)).clamp(-axis.limit, axis.limit);
         }
     }
 
     /// Computes the sample at time `t`.
-    pub(crate) fn sample(&mut self, t: f64, arm: &FlexibleArm, x: &[f64], v: &[f64]) {
-        self.update_reference(t, arm);
+    pub(crate) fn sample(&mut self, t: f64, plant: &Plant, x: &[f64], v: &[f64]) {
+        self.update_reference(t, plant);
         for axis in 0..self.servo.axes.len() {
             let a = self.servo.axes[axis];
             let k = a.coordinate;
             let lag = self.reference.q[k] - x[axis];
             let wanted = self.reference.qdot[k] + a.position_gain * lag;
             let error = wanted - v[axis];
-            let (ahead, added) = (self.feed_forward(axis), arm.motion.added_torque(t, k));
+            let (ahead, added) = (self.feed_forward(axis), plant.motion.added_torque(t, k));
             // Without integral action the load is not compensated: the joint sags until the gains
             // balance it.
             let filled = self.fresh && a.integral_gain > 0.0;

@@ -7,11 +7,11 @@ use flexarm_kinematics::products::{add, mul};
 use flexarm_kinematics::{Data, Frame, JointMotion, State, forward_kinematics, gravity_forces};
 use nalgebra::{DMatrix, DVector, Vector3};
 
-use crate::arm::{FlexibleArm, InertiaChange};
 use crate::dense::product;
 use crate::error::StepError;
 use crate::events::EventQueue;
 use crate::geometric::add_geometric_forces;
+use crate::plant::{InertiaChange, Plant};
 use crate::statics::{add_spring_forces, static_equilibrium, tangent_stiffness, with_curves};
 
 /// Relative correction that ends the search: the next correction would be at least ten times
@@ -33,7 +33,7 @@ pub(crate) fn before(t: f64) -> f64 {
 /// the tangent stiffness changes little along a motion, so that its inverse at one position serves
 /// many times.
 pub struct StaticPath {
-    arm: Arc<FlexibleArm>,
+    plant: Arc<Plant>,
     events: EventQueue,
     data: Data,
     /// Drives at the last time, springs at `e`.
@@ -50,20 +50,20 @@ pub struct StaticPath {
 
 impl StaticPath {
     /// Creates the path of an arm with its loads and changes of inertia.
-    pub fn new(arm: impl Into<Arc<FlexibleArm>>) -> Self {
-        let arm = arm.into();
-        let (nv, n) = (arm.model.nv(), arm.n_elastic_coordinates());
+    pub fn new(plant: impl Into<Arc<Plant>>) -> Self {
+        let plant = plant.into();
+        let (nv, n) = (plant.model.nv(), plant.n_elastic_coordinates());
         Self {
-            events: EventQueue::of_changes(&arm),
-            data: Data::new(&arm.model),
-            state: State::zeros(&arm.model),
+            events: EventQueue::of_changes(&plant),
+            data: Data::new(&plant.model),
+            state: State::zeros(&plant.model),
             qddot: DVector::zeros(nv),
-            e: if arm.modes.equilibrium.len() == n { arm.modes.equilibrium.clone() } else { DVector::zeros(n) },
+            e: if plant.modes.equilibrium.len() == n { plant.modes.equilibrium.clone() } else { DVector::zeros(n) },
             unbalanced: DVector::zeros(n),
             correction: DVector::zeros(n),
             inverse: None,
             sought_at: None,
-            arm,
+            plant,
         }
     }
 
@@ -76,7 +76,7 @@ impl StaticPath {
     pub fn at(&mut self, t: f64) -> Result<&DVector<f64>, StepError> {
         self.take_inverse();
         while let Some((_, change)) = self.events.due_change(t) {
-            carry(&mut self.arm, change);
+            carry(&mut self.plant, change);
         }
         self.balanced(t)
     }
@@ -88,15 +88,15 @@ impl StaticPath {
     pub fn just_before(&mut self, t: f64) -> Result<&DVector<f64>, StepError> {
         self.take_inverse();
         while let Some((_, change)) = self.events.change_before(t) {
-            carry(&mut self.arm, change);
+            carry(&mut self.plant, change);
         }
         self.balanced(before(t))
     }
 
     fn balanced(&mut self, t: f64) -> Result<&DVector<f64>, StepError> {
-        self.arm.prescribed_state(t, &mut self.state, &mut self.qddot);
+        self.plant.prescribed_state(t, &mut self.state, &mut self.qddot);
         if !(self.e.is_empty() || self.correct(t)) {
-            self.e = static_equilibrium(&self.arm, t)?;
+            self.e = static_equilibrium(&self.plant, t)?;
             self.bend();
             self.sought_at = Some(t);
         }
@@ -106,7 +106,7 @@ impl StaticPath {
     /// Returns the displacement of a frame from its position with all springs undeformed (m, world
     /// axes), at the coordinates of the last requested time.
     pub fn displacement(&mut self, frame: &Frame) -> Vector3<f64> {
-        forward_kinematics(&self.arm.model, &mut self.data, &self.state.q);
+        forward_kinematics(&self.plant.model, &mut self.data, &self.state.q);
         let yielding = self.data.X_WF(frame).translation.vector;
         yielding - self.undeformed(frame)
     }
@@ -114,16 +114,16 @@ impl StaticPath {
     /// Returns the undeformed position of a frame, for the poses in `data`; with closed loops these
     /// poses are overwritten.
     fn undeformed(&mut self, frame: &Frame) -> Vector3<f64> {
-        let Self { arm, data, state, .. } = self;
-        if !arm.model.loops().is_empty() {
-            state.q.as_mut_slice()[arm.model.n_actuated()..].fill(0.0);
-            forward_kinematics(&arm.model, data, &state.q);
+        let Self { plant, data, state, .. } = self;
+        if !plant.model.loops().is_empty() {
+            state.q.as_mut_slice()[plant.model.n_actuated()..].fill(0.0);
+            forward_kinematics(&plant.model, data, &state.q);
             self.bend();
             return self.data.X_WF(frame).translation.vector;
         }
         let (mut p, mut i) = (frame.X_BF.translation.vector, frame.body);
         while i > 0 {
-            let body = &arm.model.bodies()[i];
+            let body = &plant.model.bodies()[i];
             let bends = body.elastic || matches!(body.motion, JointMotion::Interface { .. });
             let X = if bends { &body.X_PJ } else { &data.X_PB[i] };
             p = add(&mul(X.rotation.matrix(), &p), &X.translation.vector);
@@ -133,21 +133,21 @@ impl StaticPath {
     }
 
     /// Returns the arm with its current inertias.
-    pub fn arm(&self) -> &FlexibleArm {
-        &self.arm
+    pub fn plant(&self) -> &Plant {
+        &self.plant
     }
 
     /// Computes the inverse at the last full solution; delayed until a second time is requested.
     fn take_inverse(&mut self) {
         let Some(t) = self.sought_at.take().filter(|_| !self.e.is_empty()) else { return };
-        let K = with_curves(&self.arm, &self.arm.stiffness(), self.state.q.as_slice(), &self.e);
-        let factor = tangent_stiffness(&self.arm, &mut self.data, t, &self.e, &K).cholesky();
+        let K = with_curves(&self.plant, &self.plant.stiffness(), self.state.q.as_slice(), &self.e);
+        let factor = tangent_stiffness(&self.plant, &mut self.data, t, &self.e, &K).cholesky();
         self.inverse = factor.map(|factor| factor.inverse());
     }
 
     /// Writes the elastic coordinates into the state.
     fn bend(&mut self) {
-        self.state.q.as_mut_slice()[self.arm.model.n_actuated()..].copy_from_slice(self.e.as_slice());
+        self.state.q.as_mut_slice()[self.plant.model.n_actuated()..].copy_from_slice(self.e.as_slice());
     }
 
     /// Runs Newton's method with the existing inverse; returns false if it does not converge.
@@ -178,20 +178,20 @@ impl StaticPath {
 
     /// Computes the unbalanced forces of springs, weight and loads at the state.
     fn balance(&mut self, t: f64) {
-        let Self { arm, data, state, e, unbalanced, .. } = self;
-        if !arm.loads.is_empty() {
-            forward_kinematics(&arm.model, data, &state.q);
-            arm.apply_loads(data, t);
+        let Self { plant, data, state, e, unbalanced, .. } = self;
+        if !plant.loads.is_empty() {
+            forward_kinematics(&plant.model, data, &state.q);
+            plant.apply_loads(data, t);
         }
-        let forces = gravity_forces(&arm.model, data, &state.q);
-        unbalanced.copy_from(&forces.rows(arm.model.n_actuated(), e.len()));
-        add_geometric_forces(arm, data, e.as_slice(), unbalanced.as_mut_slice());
-        add_spring_forces(arm, state.q.as_slice(), e.as_slice(), unbalanced.as_mut_slice());
+        let forces = gravity_forces(&plant.model, data, &state.q);
+        unbalanced.copy_from(&forces.rows(plant.model.n_actuated(), e.len()));
+        add_geometric_forces(plant, data, e.as_slice(), unbalanced.as_mut_slice());
+        add_spring_forces(plant, state.q.as_slice(), e.as_slice(), unbalanced.as_mut_slice());
     }
 }
 
 /// Applies a change of inertia to the arm.
-fn carry(arm: &mut Arc<FlexibleArm>, change: &InertiaChange) {
-    let arm = Arc::make_mut(arm);
-    arm.model = Arc::new(arm.model.with_inertia(change.body, change.inertia));
+fn carry(plant: &mut Arc<Plant>, change: &InertiaChange) {
+    let plant = Arc::make_mut(plant);
+    plant.model = Arc::new(plant.model.with_inertia(change.body, change.inertia));
 }

@@ -5,11 +5,11 @@ use std::sync::Arc;
 use flexarm_kinematics::{Data, Frame, Pose, State, Wrench, forward_kinematics, inverse_dynamics, rotation_vector};
 use nalgebra::{DVector, Vector6};
 
-use crate::arm::{FlexibleArm, Servo};
 use crate::drive::ServoAxis;
 use crate::error::StepError;
 use crate::linear::linearise;
 use crate::motion::Held;
+use crate::plant::{Plant, Servo};
 
 /// Accepted error of the tool pose (m, rad).
 const TOLERANCE: f64 = 1e-12;
@@ -61,7 +61,7 @@ pub enum TargetError {
 
 /// Computes joint targets with which the tool at rest is where the rigid arm has it at `q`.
 ///
-/// * `arm`: its own motion is ignored; the payload is that at time 0.
+/// * `plant`: its own motion is ignored; the payload is that at time 0.
 /// * `F_T_W`: constant wrench on the tool, world axes, as in [`linearise`].
 /// * `t`: time (s) at which the arm's loads are evaluated.
 /// * `components`: components of position and rotation (world axes) to be matched.
@@ -73,20 +73,20 @@ pub enum TargetError {
 /// # Errors
 /// [`TargetError`].
 pub fn static_targets(
-    arm: &FlexibleArm,
+    plant: &Plant,
     tool: &Frame,
     q: &[f64],
     F_T_W: &Wrench,
     t: f64,
     components: &[bool; 6],
 ) -> Result<StaticTargets, TargetError> {
-    let (servo, arm) = (&arm.servo, &arm.with_motors_held());
-    let wanted = rigid_pose(arm, tool, q);
+    let (servo, plant) = (&plant.servo, &plant.with_motors_held());
+    let wanted = rigid_pose(plant, tool, q);
     let rows: Vec<usize> = (0..6).filter(|k| components[*k]).collect();
     let mut targets = DVector::from_column_slice(q);
     let mut before = None;
     for iterations in 0..=MAX_ITERATIONS {
-        let held = arm.along(Arc::new(Held(targets.as_slice().to_vec())));
+        let held = plant.along(Arc::new(Held(targets.as_slice().to_vec())));
         let at = linearise(&held, tool, F_T_W, t)?;
         let off = displacement(&wanted, &at.X_WT);
         let before = *before.get_or_insert(off);
@@ -144,11 +144,11 @@ fn lead(servo: &Servo, q: &mut [f64], holding: &DVector<f64>) -> Result<(), Targ
 }
 
 /// Returns the tool pose of the rigid arm, with all elastic coordinates zero.
-fn rigid_pose(arm: &FlexibleArm, tool: &Frame, q: &[f64]) -> Pose {
-    let mut all = DVector::zeros(arm.model.nv());
+fn rigid_pose(plant: &Plant, tool: &Frame, q: &[f64]) -> Pose {
+    let mut all = DVector::zeros(plant.model.nv());
     all.rows_mut(0, q.len()).copy_from_slice(q);
-    let mut data = Data::new(&arm.model);
-    forward_kinematics(&arm.model, &mut data, &all);
+    let mut data = Data::new(&plant.model);
+    forward_kinematics(&plant.model, &mut data, &all);
     data.X_WF(tool)
 }
 

@@ -8,10 +8,10 @@ use flexarm_kinematics::{
 };
 use nalgebra::{DMatrix, DVector};
 
-use crate::arm::FlexibleArm;
 use crate::equilibrium::{Forces, TOLERANCE, equilibrium};
 use crate::error::StepError;
 use crate::geometric::add_geometric_forces;
+use crate::plant::Plant;
 
 /// Computes the elastic coordinates at which the springs carry gravity and the loads at time `t`.
 ///
@@ -19,26 +19,26 @@ use crate::geometric::add_geometric_forces;
 ///
 /// # Errors
 /// [`StepError::NoEquilibrium`], [`StepError::Singular`] or [`StepError::OpenLoop`].
-pub fn static_equilibrium(arm: &FlexibleArm, t: f64) -> Result<DVector<f64>, StepError> {
-    let n = arm.n_elastic_coordinates();
+pub fn static_equilibrium(plant: &Plant, t: f64) -> Result<DVector<f64>, StepError> {
+    let n = plant.n_elastic_coordinates();
     // Start from the equilibrium computed with the modes, which is the solution if nothing has
     // changed since; with nonlinear springs (backlash) start undeformed.
-    let straight = arm.elements.iter().all(|element| element.curve.is_none());
-    let known = t == 0.0 && straight && arm.modes.equilibrium.len() == n;
-    let e = if known { arm.modes.equilibrium.clone() } else { DVector::zeros(n) };
+    let straight = plant.elements.iter().all(|element| element.curve.is_none());
+    let known = t == 0.0 && straight && plant.modes.equilibrium.len() == n;
+    let e = if known { plant.modes.equilibrium.clone() } else { DVector::zeros(n) };
     if n == 0 {
         return Ok(e);
     }
-    if let Some(apart) = arm.apart(&joints_at(arm, t)) {
+    if let Some(apart) = plant.apart(&joints_at(plant, t)) {
         return Err(apart);
     }
-    let mut weight = UnderWeight { arm, data: Data::new(&arm.model), K: arm.stiffness(), t };
+    let mut weight = UnderWeight { plant, data: Data::new(&plant.model), K: plant.stiffness(), t };
     Ok(equilibrium(&mut weight, e)?.e)
 }
 
 /// An arm under gravity and its loads at time t, drives held.
 struct UnderWeight<'a> {
-    arm: &'a FlexibleArm,
+    plant: &'a Plant,
     data: Data,
     K: DMatrix<f64>,
     t: f64,
@@ -46,22 +46,22 @@ struct UnderWeight<'a> {
 
 impl Forces for UnderWeight<'_> {
     fn unbalanced(&mut self, e: &DVector<f64>) -> Result<(DVector<f64>, f64), StepError> {
-        let found = unbalanced(self.arm, &mut self.data, self.t, e);
-        StepError::open_loop(&self.arm.model, &self.data, self.t).map_or(Ok(found), Err)
+        let found = unbalanced(self.plant, &mut self.data, self.t, e);
+        StepError::open_loop(&self.plant.model, &self.data, self.t).map_or(Ok(found), Err)
     }
 
     fn step(&mut self, e: &DVector<f64>, r: &DVector<f64>, scale: f64) -> Result<DVector<f64>, StepError> {
-        let Self { arm, data, K, t } = self;
-        let q = joints_at(arm, *t);
-        let steep = with_curves(arm, K, &q, e);
-        let mut tangent = |K: &DMatrix<f64>| tangent_stiffness(arm, data, *t, e, K).cholesky();
-        let factor = tangent(&leave_play(arm, &q, e, r, scale, &steep)).or_else(|| tangent(&steep));
+        let Self { plant, data, K, t } = self;
+        let q = joints_at(plant, *t);
+        let steep = with_curves(plant, K, &q, e);
+        let mut tangent = |K: &DMatrix<f64>| tangent_stiffness(plant, data, *t, e, K).cholesky();
+        let factor = tangent(&leave_play(plant, &q, e, r, scale, &steep)).or_else(|| tangent(&steep));
         let singular = StepError::Singular { matrix: "static stiffness (with the effect of weight)", t: *t };
-        Ok(to_the_edge(arm, &q, e, factor.ok_or(singular)?.solve(r)))
+        Ok(to_the_edge(plant, &q, e, factor.ok_or(singular)?.solve(r)))
     }
 
     fn has_hysteresis(&self) -> bool {
-        !self.arm.hysteresis.is_empty()
+        !self.plant.hysteresis.is_empty()
     }
 
     fn time(&self) -> f64 {
@@ -70,62 +70,62 @@ impl Forces for UnderWeight<'_> {
 }
 
 /// Returns the unbalanced generalised forces, and the scale of the balancing forces.
-fn unbalanced(arm: &FlexibleArm, data: &mut Data, t: f64, e: &DVector<f64>) -> (DVector<f64>, f64) {
-    let g = gravity_part(arm, data, t, e);
-    let spring = spring_forces(arm, &joints_at(arm, t), e);
-    let scale = g.amax().max(spring.amax()).max(arm.friction_of_gears());
+fn unbalanced(plant: &Plant, data: &mut Data, t: f64, e: &DVector<f64>) -> (DVector<f64>, f64) {
+    let g = gravity_part(plant, data, t, e);
+    let spring = spring_forces(plant, &joints_at(plant, t), e);
+    let scale = g.amax().max(spring.amax()).max(plant.friction_of_gears());
     (spring + g, scale)
 }
 
-pub(crate) fn spring_forces(arm: &FlexibleArm, q: &[f64], e: &DVector<f64>) -> DVector<f64> {
+pub(crate) fn spring_forces(plant: &Plant, q: &[f64], e: &DVector<f64>) -> DVector<f64> {
     let mut f = DVector::zeros(e.len());
-    add_spring_forces(arm, q, e.as_slice(), f.as_mut_slice());
+    add_spring_forces(plant, q, e.as_slice(), f.as_mut_slice());
     f
 }
 
 /// Returns the joint positions at time `t`; empty if no spring depends on them.
-fn joints_at(arm: &FlexibleArm, t: f64) -> Vec<f64> {
-    if arm.transmission.is_empty() && !arm.has_guides() {
+fn joints_at(plant: &Plant, t: f64) -> Vec<f64> {
+    if plant.transmission.is_empty() && !plant.has_guides() {
         return Vec::new();
     }
-    let (mut state, mut qddot) = (State::zeros(&arm.model), DVector::zeros(arm.model.nv()));
-    arm.prescribed_state(t, &mut state, &mut qddot);
+    let (mut state, mut qddot) = (State::zeros(&plant.model), DVector::zeros(plant.model.nv()));
+    plant.prescribed_state(t, &mut state, &mut qddot);
     state.q.as_slice().to_vec()
 }
 
 /// Adds the spring forces, `f += K e` or the curves, over the elastic coordinates, with the joints
 /// at `q`.
-pub(crate) fn add_spring_forces(arm: &FlexibleArm, q: &[f64], e: &[f64], f: &mut [f64]) {
-    for (k, element) in arm.elements.iter().enumerate() {
-        let range = arm.offset(element)..arm.offset(element) + element.size;
+pub(crate) fn add_spring_forces(plant: &Plant, q: &[f64], e: &[f64], f: &mut [f64]) {
+    for (k, element) in plant.elements.iter().enumerate() {
+        let range = plant.offset(element)..plant.offset(element) + element.size;
         match element.size {
-            1 => element.add_spring_force(&[arm.deflection(k, e[range.start], q)], q, &mut f[range]),
+            1 => element.add_spring_force(&[plant.deflection(k, e[range.start], q)], q, &mut f[range]),
             _ => element.add_spring_force(&e[range.clone()], q, &mut f[range]),
         }
     }
-    arm.add_cross_forces(e, f);
+    plant.add_cross_forces(e, f);
 }
 
 /// Writes the static forces without springs at `q` into `p`, over all coordinates: weight, the
 /// loads at time `t`, a wrench at the tool's origin (world axes) and load-dependent stiffness. Does
 /// not allocate.
 pub(crate) fn static_forces(
-    arm: &FlexibleArm,
+    plant: &Plant,
     tool: Option<(&Frame, &Wrench)>,
     t: f64,
     data: &mut Data,
     q: &DVector<f64>,
     p: &mut DVector<f64>,
 ) {
-    let (model, m) = (&arm.model, arm.model.n_actuated());
+    let (model, m) = (&plant.model, plant.model.n_actuated());
     forward_kinematics(model, data, q);
     data.clear_external_wrenches();
-    arm.apply_loads(data, t);
+    plant.apply_loads(data, t);
     if let Some((tool, F_T_W)) = tool {
         add_wrench(data, tool, F_T_W);
     }
     p.copy_from(gravity_forces_at_poses(model, data, q));
-    add_geometric_forces(arm, data, &q.as_slice()[m..], &mut p.as_mut_slice()[m..]);
+    add_geometric_forces(plant, data, &q.as_slice()[m..], &mut p.as_mut_slice()[m..]);
 }
 
 /// Adds a wrench at a frame's origin (world axes) to the external wrench on its body, for the poses
@@ -138,28 +138,28 @@ pub(crate) fn add_wrench<T: Real>(data: &mut Data<T>, at: &Frame, F_W: &Wrench) 
     data.F_ext[at.body] += Wrench::new(force, add(&moment, &cross(&p_B, &force)));
 }
 
-fn gravity_part(arm: &FlexibleArm, data: &mut Data, t: f64, e: &DVector<f64>) -> DVector<f64> {
-    let model = &arm.model;
+fn gravity_part(plant: &Plant, data: &mut Data, t: f64, e: &DVector<f64>) -> DVector<f64> {
+    let model = &plant.model;
     let (mut state, mut qddot) = (State::zeros(model), DVector::zeros(model.nv()));
-    arm.prescribed_state(t, &mut state, &mut qddot);
+    plant.prescribed_state(t, &mut state, &mut qddot);
     state.q.rows_mut(model.n_actuated(), e.len()).copy_from(e);
-    if !arm.loads.is_empty() {
+    if !plant.loads.is_empty() {
         forward_kinematics(model, data, &state.q);
-        arm.apply_loads(data, t);
+        plant.apply_loads(data, t);
     }
     let mut g = gravity_forces(model, data, &state.q).rows(model.n_actuated(), e.len()).clone_owned();
-    add_geometric_forces(arm, data, e.as_slice(), g.as_mut_slice());
+    add_geometric_forces(plant, data, e.as_slice(), g.as_mut_slice());
     g
 }
 
 /// Returns the stiffness with the tangent slopes of nonlinear springs; within backlash, where the
 /// slope is zero, the steepest slope is used to leave it.
-pub(crate) fn with_curves(arm: &FlexibleArm, K: &DMatrix<f64>, q: &[f64], e: &DVector<f64>) -> DMatrix<f64> {
+pub(crate) fn with_curves(plant: &Plant, K: &DMatrix<f64>, q: &[f64], e: &DVector<f64>) -> DMatrix<f64> {
     let mut tangent = K.clone();
-    for (number, element) in arm.elements.iter().enumerate() {
+    for (number, element) in plant.elements.iter().enumerate() {
         if let Some(curve) = &element.curve {
-            let k = arm.offset(element);
-            tangent[(k, k)] = curve.slope_beyond_play(arm.deflection(number, e[k], q), q);
+            let k = plant.offset(element);
+            tangent[(k, k)] = curve.slope_beyond_play(plant.deflection(number, e[k], q), q);
         }
     }
     tangent
@@ -167,11 +167,11 @@ pub(crate) fn with_curves(arm: &FlexibleArm, K: &DMatrix<f64>, q: &[f64], e: &DV
 
 /// Works as [`with_curves`] for small motions: friction does not slip, so that sliders act as
 /// springs.
-pub(crate) fn for_vibration(arm: &FlexibleArm, K: &DMatrix<f64>, q: &[f64], e: &DVector<f64>) -> DMatrix<f64> {
-    let mut tangent = with_curves(arm, K, q, e);
-    for law in &arm.hysteresis {
-        let k = arm.offset(&arm.elements[law.element]);
-        tangent[(k, k)] = law.stuck_slope(arm.deflection(law.element, e[k], q));
+pub(crate) fn for_vibration(plant: &Plant, K: &DMatrix<f64>, q: &[f64], e: &DVector<f64>) -> DMatrix<f64> {
+    let mut tangent = with_curves(plant, K, q, e);
+    for law in &plant.hysteresis {
+        let k = plant.offset(&plant.elements[law.element]);
+        tangent[(k, k)] = law.stuck_slope(plant.deflection(law.element, e[k], q));
     }
     tangent
 }
@@ -182,7 +182,7 @@ const BEYOND_EDGE: f64 = 1.001;
 /// Returns the stiffness K with which Newton's step out of a backlash ends just beyond its edge,
 /// however small the unbalanced force r. Forces below the accepted part of `scale` do not count.
 pub(crate) fn leave_play(
-    arm: &FlexibleArm,
+    plant: &Plant,
     q: &[f64],
     e: &DVector<f64>,
     r: &DVector<f64>,
@@ -190,11 +190,11 @@ pub(crate) fn leave_play(
     K: &DMatrix<f64>,
 ) -> DMatrix<f64> {
     let mut K = K.clone();
-    for (number, element) in arm.elements.iter().enumerate() {
-        let k = arm.offset(element);
+    for (number, element) in plant.elements.iter().enumerate() {
+        let k = plant.offset(element);
         if let Some(curve) = &element.curve
             && r[k].abs() > TOLERANCE * scale
-            && let Some(way) = curve.way_out(arm.deflection(number, e[k], q), -r[k])
+            && let Some(way) = curve.way_out(plant.deflection(number, e[k], q), -r[k])
         {
             K[(k, k)] = K[(k, k)].min(r[k].abs() / (BEYOND_EDGE * way));
         }
@@ -205,11 +205,11 @@ pub(crate) fn leave_play(
 /// Returns a step of Newton's method, to be subtracted from `e`, that takes no coordinate out of its
 /// play further than just beyond the edge: the force on it there is not that of the step's start if
 /// others move too.
-pub(crate) fn to_the_edge(arm: &FlexibleArm, q: &[f64], e: &DVector<f64>, mut step: DVector<f64>) -> DVector<f64> {
-    for (number, element) in arm.elements.iter().enumerate() {
-        let k = arm.offset(element);
+pub(crate) fn to_the_edge(plant: &Plant, q: &[f64], e: &DVector<f64>, mut step: DVector<f64>) -> DVector<f64> {
+    for (number, element) in plant.elements.iter().enumerate() {
+        let k = plant.offset(element);
         if let Some(curve) = &element.curve
-            && let Some(way) = curve.way_out(arm.deflection(number, e[k], q), -step[k])
+            && let Some(way) = curve.way_out(plant.deflection(number, e[k], q), -step[k])
         {
             let most = BEYOND_EDGE * way;
             step[k] = step[k].clamp(-most, most);
@@ -220,18 +220,18 @@ pub(crate) fn to_the_edge(arm: &FlexibleArm, q: &[f64], e: &DVector<f64>, mut st
 
 /// Returns `K + dg/de` under weight and the loads at time `t`, symmetrised.
 pub(crate) fn tangent_stiffness(
-    arm: &FlexibleArm,
+    plant: &Plant,
     data: &mut Data,
     t: f64,
     e: &DVector<f64>,
     K: &DMatrix<f64>,
 ) -> DMatrix<f64> {
-    let (m, n) = (arm.model.n_actuated(), e.len());
-    let (mut state, mut qddot) = (State::zeros(&arm.model), DVector::zeros(arm.model.nv()));
-    arm.prescribed_state(t, &mut state, &mut qddot);
+    let (m, n) = (plant.model.n_actuated(), e.len());
+    let (mut state, mut qddot) = (State::zeros(&plant.model), DVector::zeros(plant.model.nv()));
+    plant.prescribed_state(t, &mut state, &mut qddot);
     state.q.rows_mut(m, n).copy_from(e);
     let mut G = DMatrix::zeros(n, n);
-    StaticSlopes::new(arm, m).compute(arm, None, t, data, &state.q, &mut G);
+    StaticSlopes::new(plant, m).compute(plant, None, t, data, &state.q, &mut G);
     K + (&G + G.transpose()) * 0.5
 }
 
@@ -257,12 +257,12 @@ pub(crate) fn load_at(frame: &Frame, F_W: &Wrench) -> PointLoad {
 }
 
 impl StaticSlopes {
-    pub(crate) fn new(arm: &FlexibleArm, first: usize) -> Self {
-        let zeros = DVector::zeros(arm.model.nv());
+    pub(crate) fn new(plant: &Plant, first: usize) -> Self {
+        let zeros = DVector::zeros(plant.model.nv());
         Self {
             first,
-            exact: StaticTangent::new(&arm.model, first),
-            loads: Vec::with_capacity(arm.loads.len() + 1),
+            exact: StaticTangent::new(&plant.model, first),
+            loads: Vec::with_capacity(plant.loads.len() + 1),
             moved: zeros.clone(),
             up: zeros.clone(),
             down: zeros,
@@ -273,45 +273,45 @@ impl StaticSlopes {
     /// leaves the poses at `q` in `data`.
     pub(crate) fn compute(
         &mut self,
-        arm: &FlexibleArm,
+        plant: &Plant,
         tool: Option<(&Frame, &Wrench)>,
         t: f64,
         data: &mut Data,
         q: &DVector<f64>,
         G: &mut DMatrix<f64>,
     ) {
-        forward_kinematics(&arm.model, data, q);
-        self.compute_at_poses(arm, tool, t, data, q, G);
+        forward_kinematics(&plant.model, data, q);
+        self.compute_at_poses(plant, tool, t, data, q, G);
     }
 
     /// Works as [`StaticSlopes::compute`] with the poses at `q` already in `data`.
     pub(crate) fn compute_at_poses(
         &mut self,
-        arm: &FlexibleArm,
+        plant: &Plant,
         tool: Option<(&Frame, &Wrench)>,
         t: f64,
         data: &mut Data,
         q: &DVector<f64>,
         G: &mut DMatrix<f64>,
     ) {
-        if arm.elements.iter().any(|element| element.geometric.is_some()) {
-            self.difference(arm, tool, t, data, q, G);
-            return forward_kinematics(&arm.model, data, q);
+        if plant.elements.iter().any(|element| element.geometric.is_some()) {
+            self.difference(plant, tool, t, data, q, G);
+            return forward_kinematics(&plant.model, data, q);
         }
         self.loads.clear();
-        self.loads.extend(arm.loads.iter().map(|load| load.point_load(t, &data.X_WB[load.body])));
+        self.loads.extend(plant.loads.iter().map(|load| load.point_load(t, &data.X_WB[load.body])));
         self.loads.extend(tool.map(|(tool, F_T_W)| load_at(tool, F_T_W)));
-        self.exact.compute(&arm.model, data, q, &self.loads, G);
+        self.exact.compute(&plant.model, data, q, &self.loads, G);
     }
 
     /// [`StaticTangent::add_moved_subtree`], after [`StaticSlopes::compute`].
-    pub(crate) fn add_moved_subtree(&self, arm: &FlexibleArm, data: &Data, body: usize, moved: &Twist, p: &mut [f64]) {
-        self.exact.add_moved_subtree(&arm.model, data, body, moved, p);
+    pub(crate) fn add_moved_subtree(&self, plant: &Plant, data: &Data, body: usize, moved: &Twist, p: &mut [f64]) {
+        self.exact.add_moved_subtree(&plant.model, data, body, moved, p);
     }
 
     fn difference(
         &mut self,
-        arm: &FlexibleArm,
+        plant: &Plant,
         tool: Option<(&Frame, &Wrench)>,
         t: f64,
         data: &mut Data,
@@ -322,9 +322,9 @@ impl StaticSlopes {
         moved.copy_from(q);
         for (k, mut column) in (*first..q.len()).zip(G.column_iter_mut()) {
             moved[k] = q[k] + DIFFERENCE;
-            static_forces(arm, tool, t, data, moved, up);
+            static_forces(plant, tool, t, data, moved, up);
             moved[k] = q[k] - DIFFERENCE;
-            static_forces(arm, tool, t, data, moved, down);
+            static_forces(plant, tool, t, data, moved, down);
             moved[k] = q[k];
             let slopes = up.iter().zip(down.iter()).skip(*first).map(|(up, down)| (up - down) / (2.0 * DIFFERENCE));
             column.iter_mut().zip(slopes).for_each(|(to, slope)| *to = slope);

@@ -13,11 +13,11 @@ use std::sync::Arc;
 use flexarm_kinematics::{Data, Frame, forward_kinematics, frame_jacobian};
 use nalgebra::{DMatrix, DVector, Matrix6xX};
 
-use crate::arm::FlexibleArm;
 use crate::equilibrium::{Equilibrium, Forces, equilibrium};
 use crate::error::StepError;
 use crate::linear::Linear;
 use crate::motion::MotionFn;
+use crate::plant::Plant;
 use crate::reduced::ReducedArm;
 use crate::statics::{for_vibration, spring_forces, static_equilibrium};
 use crate::system::SecondOrderSystem;
@@ -49,27 +49,22 @@ pub struct SteadyRotation {
 /// # Errors
 /// [`StepError::Setup`] for a wrong number of joints, [`StepError::NoEquilibrium`],
 /// [`StepError::Singular`], [`StepError::OpenLoop`].
-pub fn linearise_rotation(
-    arm: &FlexibleArm,
-    tool: &Frame,
-    at: &[f64],
-    rates: &[f64],
-) -> Result<SteadyRotation, StepError> {
-    let joints = arm.model.n_actuated();
+pub fn linearise_rotation(plant: &Plant, tool: &Frame, at: &[f64], rates: &[f64]) -> Result<SteadyRotation, StepError> {
+    let joints = plant.model.n_actuated();
     for (what, found) in [("positions", at.len()), ("rates", rates.len())] {
         if found != joints {
             return Err(StepError::Setup(format!("{found} joint {what} are given, the arm has {joints} joints")));
         }
     }
-    let arm = arm.with_motors_held();
+    let plant = plant.with_motors_held();
     let in_stages = |stages: u32| {
-        let mut e = static_equilibrium(&arm, 0.0)?;
+        let mut e = static_equilibrium(&plant, 0.0)?;
         for k in 1..stages {
             // Centrifugal loads are quadratic in the rates.
             let share = f64::from(k) / f64::from(stages);
-            e = equilibrium(&mut Rotation::new(&arm, at, rates, share.sqrt()), e)?.e;
+            e = equilibrium(&mut Rotation::new(&plant, at, rates, share.sqrt()), e)?.e;
         }
-        let mut rotation = Rotation::new(&arm, at, rates, 1.0);
+        let mut rotation = Rotation::new(&plant, at, rates, 1.0);
         let found = equilibrium(&mut rotation, e)?;
         Ok((rotation, found))
     };
@@ -84,7 +79,7 @@ struct Rotation {
 }
 
 impl Rotation {
-    fn new(arm: &FlexibleArm, at: &[f64], rates: &[f64], share: f64) -> Self {
+    fn new(plant: &Plant, at: &[f64], rates: &[f64], share: f64) -> Self {
         let (at, rates) = (at.to_vec(), rates.iter().map(|rate| rate * share).collect::<Vec<_>>());
         let motion = MotionFn(move |t: f64, q: &mut [f64], qdot: &mut [f64], qddot: &mut [f64]| {
             for ((q, at), rate) in q.iter_mut().zip(&at).zip(&rates) {
@@ -93,7 +88,10 @@ impl Rotation {
             qdot.copy_from_slice(&rates);
             qddot.fill(0.0);
         });
-        Self { system: ReducedArm::new(arm.along(Arc::new(motion))), zero: DVector::zeros(arm.n_elastic_coordinates()) }
+        Self {
+            system: ReducedArm::new(plant.along(Arc::new(motion))),
+            zero: DVector::zeros(plant.n_elastic_coordinates()),
+        }
     }
 
     /// Returns the forces on the elastic coordinates at time t (s), without accelerations.
@@ -130,23 +128,23 @@ impl Rotation {
         self.system.evaluate(0.0, e, &self.zero, &self.zero);
         let holding = self.system.data.tau.rows(0, m).into_owned();
         let q = self.system.state.q.clone();
-        let arm = self.system.arm().clone();
-        let mut data = Data::new(&arm.model);
-        forward_kinematics(&arm.model, &mut data, &q);
-        if let Some(open) = StepError::open_loop(&arm.model, &data, 0.0) {
+        let plant = self.system.plant().clone();
+        let mut data = Data::new(&plant.model);
+        forward_kinematics(&plant.model, &mut data, &q);
+        if let Some(open) = StepError::open_loop(&plant.model, &data, 0.0) {
             return Err(open);
         }
-        let mut J = Matrix6xX::zeros(arm.model.nv());
-        frame_jacobian(&arm.model, &data, tool, &mut J);
+        let mut J = Matrix6xX::zeros(plant.model.nv());
+        frame_jacobian(&plant.model, &data, tool, &mut J);
         let fastest = rates.iter().fold(0.0_f64, |most, rate| most.max(rate.abs()));
         let later = self.forces(1.0 / fastest.max(f64::MIN_POSITIVE), e, &self.zero.clone());
         let linear = Linear {
             equilibrium: e.clone(),
-            springs: for_vibration(&arm, &arm.stiffness(), q.as_slice(), e),
-            elements: arm
+            springs: for_vibration(&plant, &plant.stiffness(), q.as_slice(), e),
+            elements: plant
                 .elements
                 .iter()
-                .map(|own| (own.name.clone(), arm.offset(own)..arm.offset(own) + own.size))
+                .map(|own| (own.name.clone(), plant.offset(own)..plant.offset(own) + own.size))
                 .collect(),
             M,
             D,
@@ -163,14 +161,14 @@ impl Rotation {
             iterations,
             q,
         };
-        Ok(SteadyRotation { linear, damping: arm.D.clone(), change: (later - r).amax() / scale })
+        Ok(SteadyRotation { linear, damping: plant.D.clone(), change: (later - r).amax() / scale })
     }
 }
 
 impl Forces for Rotation {
     fn unbalanced(&mut self, e: &DVector<f64>) -> Result<(DVector<f64>, f64), StepError> {
         let r = self.forces(0.0, e, &self.zero.clone());
-        let springs = spring_forces(self.system.arm(), self.system.state.q.as_slice(), e);
+        let springs = spring_forces(self.system.plant(), self.system.state.q.as_slice(), e);
         let scale = (&r - &springs).amax().max(springs.amax()).max(f64::MIN_POSITIVE);
         Ok((r, scale))
     }
@@ -181,7 +179,7 @@ impl Forces for Rotation {
     }
 
     fn has_hysteresis(&self) -> bool {
-        !self.system.arm().hysteresis.is_empty()
+        !self.system.plant().hysteresis.is_empty()
     }
 
     fn time(&self) -> f64 {

@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use flexarm_settings::Words;
 
-use crate::arm::FlexibleArm;
 use crate::error::StepError;
 use crate::observation::Observation;
+use crate::plant::Plant;
 
 /// Initial state of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -75,7 +75,7 @@ pub trait Stepper: Send {
     ///
     /// # Errors
     /// [`StepError::NotInMaximal`]; as [`Stepper::restart`].
-    fn change_masses(&mut self, arm: &Arc<FlexibleArm>) -> Result<(), StepError>;
+    fn change_masses(&mut self, plant: &Arc<Plant>) -> Result<(), StepError>;
 
     /// Returns a copy that goes on from the current state with the same bits; `None` if the solver
     /// cannot be copied.

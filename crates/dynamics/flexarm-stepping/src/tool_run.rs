@@ -6,9 +6,9 @@ use std::sync::Arc;
 use flexarm_kinematics::{Data, Frame, Pose, forward_kinematics};
 use nalgebra::{DVector, Vector3};
 
-use crate::arm::FlexibleArm;
 use crate::error::StepError;
 use crate::observation::Observation;
+use crate::plant::Plant;
 use crate::stepper::Start;
 use crate::steppers::{StepperKind, new_stepper};
 
@@ -67,9 +67,9 @@ impl ToolRun {
     ///
     /// # Errors
     /// [`StepError`] as returned by a stepper.
-    pub fn deflection(&self, arm: &Arc<FlexibleArm>) -> Result<ToolDeflection, StepError> {
-        let mut stepper = new_stepper(self.stepper, arm.clone(), self.step_s, self.start)?;
-        let (mut seen, mut poses) = (Observation::new(arm), ToolPoses::new(arm, &self.tool));
+    pub fn deflection(&self, plant: &Arc<Plant>) -> Result<ToolDeflection, StepError> {
+        let mut stepper = new_stepper(self.stepper, plant.clone(), self.step_s, self.start)?;
+        let (mut seen, mut poses) = (Observation::new(plant), ToolPoses::new(plant, &self.tool));
         let mut result = ToolDeflection { steps: steps(self.duration_s, self.step_s), ..ToolDeflection::default() };
         for step in 0..=result.steps {
             if step > 0 {
@@ -91,7 +91,7 @@ pub(crate) fn steps(duration_s: f64, step_s: f64) -> u64 {
 
 /// Poses of the tool on the flexible arm and on the rigid arm, whose joints follow the motion.
 pub(crate) struct ToolPoses<'a> {
-    arm: &'a FlexibleArm,
+    plant: &'a Plant,
     tool: &'a Frame,
     rigid: Data,
     q: DVector<f64>,
@@ -100,17 +100,17 @@ pub(crate) struct ToolPoses<'a> {
 }
 
 impl<'a> ToolPoses<'a> {
-    pub(crate) fn new(arm: &'a FlexibleArm, tool: &'a Frame) -> Self {
-        let (model, m) = (&arm.model, arm.model.n_actuated());
+    pub(crate) fn new(plant: &'a Plant, tool: &'a Frame) -> Self {
+        let (model, m) = (&plant.model, plant.model.n_actuated());
         let rates = [vec![0.0; m], vec![0.0; m]];
-        Self { arm, tool, rigid: Data::new(model), q: DVector::zeros(model.nv()), rates }
+        Self { plant, tool, rigid: Data::new(model), q: DVector::zeros(model.nv()), rates }
     }
 
     /// Returns the poses on the rigid and on the flexible arm at the time of an observation.
     pub(crate) fn at(&mut self, seen: &Observation) -> [Pose; 2] {
-        let Self { arm, tool, rigid, q, rates: [rates, accelerations] } = self;
-        arm.motion.sample(seen.t, &mut q.as_mut_slice()[..rates.len()], rates, accelerations);
-        forward_kinematics(&arm.model, rigid, q);
+        let Self { plant, tool, rigid, q, rates: [rates, accelerations] } = self;
+        plant.motion.sample(seen.t, &mut q.as_mut_slice()[..rates.len()], rates, accelerations);
+        forward_kinematics(&plant.model, rigid, q);
         [rigid.X_WF(tool), seen.X_WB[tool.body] * tool.X_BF]
     }
 }

@@ -31,9 +31,9 @@ fn balanced() -> Mechanism {
     tree
 }
 
-fn arm_of(tree: &Mechanism, motion: Arc<dyn PrescribedMotion>, beta: f64) -> FlexibleArm {
+fn arm_of(tree: &Mechanism, motion: Arc<dyn PrescribedMotion>, beta: f64) -> Plant {
     let springs = reference_arm(true).K_S.map(|K| ("spring".to_owned(), K, Damping::StiffnessProportional(beta)));
-    FlexibleArm::new(Arc::new(Model::new(tree).unwrap()), springs.to_vec(), motion).unwrap()
+    Plant::new(Arc::new(Model::new(tree).unwrap()), springs.to_vec(), motion).unwrap()
 }
 
 fn moving() -> Arc<dyn PrescribedMotion> {
@@ -41,22 +41,16 @@ fn moving() -> Arc<dyn PrescribedMotion> {
 }
 
 /// Returns the position of the TCP at the end of a run.
-fn end(arm: &FlexibleArm, kind: StepperKind, h: f64, start: Start, duration: f64) -> Vector3<f64> {
-    end_of(arm, kind, h, start, duration).0
+fn end(plant: &Plant, kind: StepperKind, h: f64, start: Start, duration: f64) -> Vector3<f64> {
+    end_of(plant, kind, h, start, duration).0
 }
 
 /// Returns the same, the potential energy of weight and balancers there (J), and the drive torques
 /// (N m).
-fn end_of(
-    arm: &FlexibleArm,
-    kind: StepperKind,
-    h: f64,
-    start: Start,
-    duration: f64,
-) -> (Vector3<f64>, f64, DVector<f64>) {
-    let tcp = arm.model.frame("tcp").unwrap().clone();
-    let mut seen = Observation::new(arm);
-    let mut stepper = new_stepper(kind, arm.clone(), h, start).unwrap();
+fn end_of(plant: &Plant, kind: StepperKind, h: f64, start: Start, duration: f64) -> (Vector3<f64>, f64, DVector<f64>) {
+    let tcp = plant.model.frame("tcp").unwrap().clone();
+    let mut seen = Observation::new(plant);
+    let mut stepper = new_stepper(kind, plant.clone(), h, start).unwrap();
     (0..(duration / h).round() as usize).for_each(|_| stepper.step().unwrap());
     stepper.observe(&mut seen);
     ((seen.X_WB[tcp.body] * tcp.X_BF).translation.vector, seen.energy[1], seen.drive)
@@ -73,15 +67,15 @@ fn of(word: &str) -> StepperKind {
 #[test]
 fn an_arm_with_balancers_rests_where_statics_say_in_every_stepper() {
     let held: Arc<dyn PrescribedMotion> = Arc::new(Held(POSE.to_vec()));
-    let arm = arm_of(&balanced(), held.clone(), 1e-3);
+    let plant = arm_of(&balanced(), held.clone(), 1e-3);
     let bare = arm_of(&reference_arm(true).mechanism, held, 1e-3);
-    let at = |arm: &FlexibleArm| end(arm, StepperKind::default(), 1e-3, Start::Equilibrium, 0.0);
-    let (rest, share) = (at(&arm), (at(&arm) - at(&bare)).norm());
-    let (_, stored, held) = end_of(&arm, StepperKind::default(), 1e-3, Start::Equilibrium, 0.0);
+    let at = |plant: &Plant| end(plant, StepperKind::default(), 1e-3, Start::Equilibrium, 0.0);
+    let (rest, share) = (at(&plant), (at(&plant) - at(&bare)).norm());
+    let (_, stored, held) = end_of(&plant, StepperKind::default(), 1e-3, Start::Equilibrium, 0.0);
     assert!(share > 1e-4, "{share}");
     for entry in STEPPERS.into_iter().filter(|entry| entry.steps != StepRule::UpToTheStabilityLimit) {
         for h in [1e-4, 1e-3] {
-            let (end, energy, drives) = end_of(&arm, of(entry.name), h, Start::Equilibrium, 0.02);
+            let (end, energy, drives) = end_of(&plant, of(entry.name), h, Start::Equilibrium, 0.02);
             let drift = (end - rest).norm() / share;
             assert!((energy - stored).abs() < 1e-6, "{}: {energy} J, {stored} J", entry.name);
             // measured 5.9e-8 N m of 1.1 kN m, energy 2e-9 J
@@ -97,14 +91,14 @@ fn an_arm_with_balancers_rests_where_statics_say_in_every_stepper() {
 /// 1e-6, RK4 1.0e-7, SPOOK 2.9e-4 at 0.2 ms and 1.1e-4 at 0.1 ms.
 #[test]
 fn steppers_agree_on_an_arm_that_moves_with_balancers() {
-    let arm = arm_of(&balanced(), moving(), 1e-3);
+    let plant = arm_of(&balanced(), moving(), 1e-3);
     let bare = arm_of(&reference_arm(true).mechanism, moving(), 1e-3);
-    let run = |arm: &FlexibleArm, word: &str, h: f64| end(arm, of(word), h, Start::Equilibrium, 0.8);
-    let truth = run(&arm, "reference", 1e-3);
+    let run = |plant: &Plant, word: &str, h: f64| end(plant, of(word), h, Start::Equilibrium, 0.8);
+    let truth = run(&plant, "reference", 1e-3);
     let share = (truth - run(&bare, "reference", 1e-3)).norm();
     assert!(share > 1e-4, "{share}");
     let off = |word: &str, h: f64| {
-        let off = (run(&arm, word, h) - truth).norm() / share;
+        let off = (run(&plant, word, h) - truth).norm() / share;
         eprintln!("{word} h {h:.0e}: {off:.1e} of what the balancers change ({share:.1e} m)");
         off
     };
@@ -119,9 +113,9 @@ fn steppers_agree_on_an_arm_that_moves_with_balancers() {
 /// conserved; RK4 at 25 us, measured 8e-7 of the energy exchanged between them.
 #[test]
 fn a_ringing_arm_keeps_its_energy_with_balancers_in_it() {
-    let arm = arm_of(&balanced(), Arc::new(Held(POSE.to_vec())), 1e-12);
-    let mut stepper = new_stepper(of("rk4"), arm.clone(), 2.5e-5, Start::Undeformed).unwrap();
-    let mut seen = Observation::new(&arm);
+    let plant = arm_of(&balanced(), Arc::new(Held(POSE.to_vec())), 1e-12);
+    let mut stepper = new_stepper(of("rk4"), plant.clone(), 2.5e-5, Start::Undeformed).unwrap();
+    let mut seen = Observation::new(&plant);
     let (mut totals, mut kinetic) = (Vec::new(), 0.0f64);
     for _ in 0..8000 {
         stepper.observe(&mut seen);
@@ -155,18 +149,18 @@ fn a_balancer_raises_the_frequency_as_the_closed_form_says() {
     let K = DMatrix::from_element(1, 1, soft);
     let damping = Damping::StiffnessProportional(0.0);
     let spring = Spring { name: "hinge".into(), K, damping, curve: None, geometric: None };
-    let arm = FlexibleArm::new(Arc::new(Model::new(&tree).unwrap()), vec![spring], Arc::new(Held(vec![]))).unwrap();
+    let plant = Plant::new(Arc::new(Model::new(&tree).unwrap()), vec![spring], Arc::new(Held(vec![]))).unwrap();
     let truth = ((soft + rate * D * k - m * 9.81 * l) / (m * l * l)).sqrt();
     // measured 2e-16
-    assert!((arm.modes.omega[0] / truth - 1.0).abs() < 1e-12, "{} {truth}", arm.modes.omega[0]);
+    assert!((plant.modes.omega[0] / truth - 1.0).abs() < 1e-12, "{} {truth}", plant.modes.omega[0]);
 }
 
 /// Truth: central differences of the equilibria under small forces at the tool; measured 2.3e-8.
 #[test]
 fn compliance_has_the_stiffness_of_the_balancers_in_it() {
-    let arm = arm_of(&balanced(), Arc::new(Held(POSE.to_vec())), 1e-3);
-    let tool = arm.model.frame("tcp").unwrap().clone();
-    let mut at = OperatingPoint::new(arm, tool);
+    let plant = arm_of(&balanced(), Arc::new(Held(POSE.to_vec())), 1e-3);
+    let tool = plant.model.frame("tcp").unwrap().clone();
+    let mut at = OperatingPoint::new(plant, tool);
     at.solve(&POSE, &Wrench::zeros()).unwrap();
     let C = at.compliance();
     for c in 0..3 {

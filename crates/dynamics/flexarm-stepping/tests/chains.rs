@@ -14,7 +14,7 @@ const STIFFNESS: [f64; 6] = [1e7, 1e6, 1e6, 300.0, 250.0, 500.0];
 
 /// Returns the cantilever as n equal parts with a spring in the middle of each; a heavy ball beside
 /// its tip twists it.
-fn cantilever(n: usize, angles: ElasticAngles, gravity: Vector3<f64>, aside: f64) -> FlexibleArm {
+fn cantilever(n: usize, angles: ElasticAngles, gravity: Vector3<f64>, aside: f64) -> Plant {
     let mut chain = Mechanism::new("cantilever");
     chain.gravity = gravity;
     chain.links.push(Link { name: "part 0".into(), inertia: None });
@@ -44,15 +44,15 @@ fn cantilever(n: usize, angles: ElasticAngles, gravity: Vector3<f64>, aside: f64
         let K = Matrix6::from_diagonal(&(Vector6::from(STIFFNESS) / piece));
         springs.push((format!("spring {k}"), K, Damping::StiffnessProportional(1e-4)).into());
     }
-    FlexibleArm::new(Arc::new(Model::new(&chain).unwrap()), springs, Arc::new(Held(vec![]))).unwrap()
+    Plant::new(Arc::new(Model::new(&chain).unwrap()), springs, Arc::new(Held(vec![]))).unwrap()
 }
 
 /// Returns the static position of the tip.
 fn tip(n: usize, angles: ElasticAngles, gravity: Vector3<f64>, aside: f64) -> Vector3<f64> {
-    let arm = cantilever(n, angles, gravity, aside);
-    let q = static_equilibrium(&arm, 0.0).unwrap();
-    let mut data = Data::new(&arm.model);
-    forward_kinematics(&arm.model, &mut data, &q);
+    let plant = cantilever(n, angles, gravity, aside);
+    let q = static_equilibrium(&plant, 0.0).unwrap();
+    let mut data = Data::new(&plant.model);
+    forward_kinematics(&plant.model, &mut data, &q);
     let end = data.X_WB.last().unwrap();
     end * nalgebra::Point3::new(0.5 * LENGTH / n as f64, 0.0, 0.0) - nalgebra::Point3::origin()
 }

@@ -44,7 +44,7 @@ fn rotor(spring: Option<f64>, armature: f64) -> Mechanism {
 }
 
 /// Returns the rotor, optionally with an undamped spring.
-fn arm(mechanism: &Mechanism, spring: Option<f64>, motion: Arc<dyn PrescribedMotion>) -> FlexibleArm {
+fn plant(mechanism: &Mechanism, spring: Option<f64>, motion: Arc<dyn PrescribedMotion>) -> Plant {
     let model = Arc::new(Model::new(mechanism).expect("a tree"));
     let damping = Damping::StiffnessProportional(0.0);
     let springs: Vec<Spring> = spring
@@ -54,7 +54,7 @@ fn arm(mechanism: &Mechanism, spring: Option<f64>, motion: Arc<dyn PrescribedMot
             Spring { name, K, damping, curve: None, geometric: None }
         })
         .collect();
-    FlexibleArm::new(model, springs, motion).expect("valid")
+    Plant::new(model, springs, motion).expect("valid")
 }
 
 const IDLE: ServoAxis = ServoAxis {
@@ -77,9 +77,9 @@ fn motion(f: impl Fn(f64) -> [f64; 3] + Send + Sync + 'static) -> Arc<dyn Prescr
 }
 
 /// Returns the observations at every step.
-fn run(arm: &FlexibleArm, kind: StepperKind, h: f64, duration: f64) -> Vec<Observation> {
-    let mut stepper = new_stepper(kind, arm.clone(), h, Start::Undeformed).expect("starts");
-    let mut seen = Observation::new(arm);
+fn run(plant: &Plant, kind: StepperKind, h: f64, duration: f64) -> Vec<Observation> {
+    let mut stepper = new_stepper(kind, plant.clone(), h, Start::Undeformed).expect("starts");
+    let mut seen = Observation::new(plant);
     let mut all = Vec::new();
     for k in 0..=(duration / h).round() as usize {
         if k > 0 {
@@ -108,12 +108,12 @@ fn pendulum_follows_its_reference() {
     let gains = ServoAxis { position_gain: 20.0, velocity_gain: 60.0, integral_gain: 300.0, ..IDLE };
     let mut errors = Vec::new();
     for feed_forward in [0.0, 1.0] {
-        let mut arm = arm(&pendulum, None, path());
-        arm.friction = vec![Friction { viscous: 0.5, coulomb: 2.0, regularisation: 0.05, ..Friction::NONE }];
+        let mut plant = plant(&pendulum, None, path());
+        plant.friction = vec![Friction { viscous: 0.5, coulomb: 2.0, regularisation: 0.05, ..Friction::NONE }];
         let axes = vec![ServoAxis { feed_forward, ..gains }];
-        let arm = arm.with_servo(Servo { sample_s: 1e-3, axes, rigid: rigid.clone() }).expect("valid");
+        let plant = plant.with_servo(Servo { sample_s: 1e-3, axes, rigid: rigid.clone() }).expect("valid");
         for (kind, h) in [(ALPHA, 1e-3), (StepperKind::Rk4, 1e-3), (reference(1e-8), 1e-3)] {
-            let seen = run(&arm, kind, h, 3.0);
+            let seen = run(&plant, kind, h, 3.0);
             let error = seen.iter().map(|o| (o.q[0] - 0.6 * (1.0 - (3.0 * o.t).cos())).abs()).fold(0.0, f64::max);
             eprintln!("{:<18} feed forward {feed_forward}: {error:.2e} rad", kind.name());
             assert!(error < if feed_forward > 0.0 { 3e-5 } else { 1e-2 }, "{} {error}", kind.name());
@@ -182,11 +182,11 @@ fn sampled_controller_equals_its_discrete_loop() {
             (ALPHA, 2.5e-4, 1e-7),
         ];
         for (kind, h, bound) in cases {
-            let mut arm = arm(&rotor(None, 0.0), None, motion(path));
-            arm.friction = vec![Friction { viscous: b, ..Friction::NONE }];
-            let arm = arm.with_servo(servo(sample_s, axis)).expect("valid");
+            let mut plant = plant(&rotor(None, 0.0), None, motion(path));
+            plant.friction = vec![Friction { viscous: b, ..Friction::NONE }];
+            let plant = plant.with_servo(servo(sample_s, axis)).expect("valid");
             let per = (sample_s / h).round() as usize;
-            let seen = run(&arm, kind, h, 499.0 * sample_s);
+            let seen = run(&plant, kind, h, 499.0 * sample_s);
             let error = |k: usize| {
                 let of = |o: &Observation| [o.q[0], o.qdot[0], o.drive[0]][k];
                 truth.iter().zip(seen.iter().step_by(per)).map(|(a, o)| (a[k] - of(o)).abs()).fold(0.0, f64::max)
@@ -217,7 +217,7 @@ fn torque_limit_saturates_without_winding_up() {
     let truth = sampled_loop(axis, sample_s, b, target, 5001, true);
     let proportional = top(&sampled_loop(ServoAxis { integral_gain: 0.0, ..axis }, sample_s, b, target, 5001, true));
     let wound_up = top(&sampled_loop(axis, sample_s, b, target, 5001, false));
-    let mut rotor = arm(&rotor(None, 0.0), None, motion(target));
+    let mut rotor = plant(&rotor(None, 0.0), None, motion(target));
     rotor.friction = vec![Friction { viscous: b, ..Friction::NONE }];
     let seen = run(&rotor.with_servo(servo(sample_s, axis)).expect("valid"), StepperKind::Rk4, 1e-3, 5.0);
     let rows: Vec<[f64; 3]> = seen.iter().map(|o| [o.q[0], o.qdot[0], o.drive[0]]).collect();
@@ -244,11 +244,11 @@ fn coasting_rotor_stops_when_its_friction_says() {
     let (b, c, w0) = (0.2, 0.5, 6.0);
     let rest = J / b * (1.0f64 + b * w0 / c).ln();
     for v_0 in [0.1, 0.02, 0.004] {
-        let mut arm = arm(&rotor(None, 0.0), None, motion(move |_| [0.0, w0, 0.0]));
-        arm.friction = vec![Friction { viscous: b, coulomb: c, regularisation: v_0, ..Friction::NONE }];
-        let arm = arm.with_servo(servo(100.0, IDLE)).expect("valid");
+        let mut plant = plant(&rotor(None, 0.0), None, motion(move |_| [0.0, w0, 0.0]));
+        plant.friction = vec![Friction { viscous: b, coulomb: c, regularisation: v_0, ..Friction::NONE }];
+        let plant = plant.with_servo(servo(100.0, IDLE)).expect("valid");
         for (kind, h) in [(ALPHA, 1e-3), (reference(1e-8), 1e-3)] {
-            let seen = run(&arm, kind, h, 1.2 * rest);
+            let seen = run(&plant, kind, h, 1.2 * rest);
             let exact = |t: f64| if t < rest { (w0 + c / b) * (-b / J * t).exp() - c / b } else { 0.0 };
             let worst = seen.iter().map(|o| (o.qdot[0] - exact(o.t)).abs()).fold(0.0, f64::max);
             let slow = seen.iter().find(|o| o.qdot[0] < v_0).expect("stops").t;
@@ -269,20 +269,20 @@ fn coasting_rotor_stops_when_its_friction_says() {
 const GEAR: f64 = 900.0;
 
 /// Returns an arm with a constant moment on the body behind a held gearbox with the given curve.
-fn loaded(curve: Option<TorqueCurve>, moment: f64) -> FlexibleArm {
+fn loaded(curve: Option<TorqueCurve>, moment: f64) -> Plant {
     let model = Arc::new(Model::new(&rotor(Some(GEAR), 0.0)).expect("a tree"));
     let body = model.frame("body").expect("there").body;
     let (name, damping) = ("gear".to_owned(), Damping::StiffnessProportional(0.0));
     let curve = curve.map(SpringCurve::from);
     let spring = Spring { name, K: DMatrix::from_element(1, 1, GEAR), damping, curve, geometric: None };
-    let arm = FlexibleArm::new(model, vec![spring], Arc::new(Held(vec![0.3]))).expect("valid");
-    arm.with_loads(vec![(body, Wrench::new(Vector3::zeros(), Vector3::z() * moment))]).expect("valid")
+    let plant = Plant::new(model, vec![spring], Arc::new(Held(vec![0.3]))).expect("valid");
+    plant.with_loads(vec![(body, Wrench::new(Vector3::zeros(), Vector3::z() * moment))]).expect("valid")
 }
 
 /// Returns the time of the first return to rest at the start, from the rates, and the maximum
 /// relative change of the energy.
-fn period(arm: &FlexibleArm, moment: f64, kind: StepperKind, h: f64, duration: f64) -> (f64, f64, f64) {
-    let seen = run(arm, kind, h, duration);
+fn period(plant: &Plant, moment: f64, kind: StepperKind, h: f64, duration: f64) -> (f64, f64, f64) {
+    let seen = run(plant, kind, h, duration);
     let mut found = f64::NAN;
     for pair in seen.windows(2).skip(2) {
         let (a, b) = (pair[0].qdot[1], pair[1].qdot[1]);
@@ -327,9 +327,9 @@ fn body_with_backlash_bounces_in_closed_form() {
         let contact = (PI - (speed / w / (moment / GEAR)).atan()) / w;
         let truth = 2.0 * (fall + contact);
         let depth = half + moment / GEAR + ((moment / GEAR).powi(2) + (speed / w).powi(2)).sqrt();
-        let arm = loaded(Some(TorqueCurve::backlash(GEAR, half)), moment);
+        let plant = loaded(Some(TorqueCurve::backlash(GEAR, half)), moment);
         for (kind, h) in [(StepperKind::Rk4, 2e-5), (ALPHA, 1e-4), (reference(1e-9), 1e-3)] {
-            let (found, drift, top) = period(&arm, moment, kind, h, 1.5 * truth);
+            let (found, drift, top) = period(&plant, moment, kind, h, 1.5 * truth);
             eprintln!(
                 "{:<18} half {half}: period {:.1e}, depth {:.1e}, energy {drift:.1e}",
                 kind.name(),
@@ -363,9 +363,9 @@ fn period_on_a_curved_spring_is_that_of_the_quadrature() {
                 2.0 * 0.5 * low * u.sin() * PI / n as f64 / (2.0 * free(e) / J).sqrt()
             })
             .sum();
-        let arm = loaded(Some(curve.clone()), moment);
+        let plant = loaded(Some(curve.clone()), moment);
         for (kind, h) in [(StepperKind::Rk4, 2e-5), (ALPHA, 1e-4), (reference(1e-9), 1e-3)] {
-            let (found, drift, top) = period(&arm, moment, kind, h, 1.5 * truth);
+            let (found, drift, top) = period(&plant, moment, kind, h, 1.5 * truth);
             eprintln!(
                 "{:<18} M {moment}: period {:.1e}, depth {:.1e}, energy {drift:.1e}",
                 kind.name(),
@@ -392,16 +392,19 @@ fn pulse(body: usize, peak: f64, T: f64) -> Load {
 #[test]
 fn free_motor_behind_a_spring_swings_as_two_masses() {
     let (J_1, peak, T) = (0.5, 30.0, 0.02);
-    let arm = arm(&rotor(Some(GEAR), J_1), Some(GEAR), Arc::new(Held(vec![0.0])));
-    let body = arm.model.frame("body").expect("there").body;
-    let arm =
-        arm.with_servo(servo(100.0, IDLE)).expect("valid").with_timed_loads(vec![pulse(body, peak, T)]).expect("valid");
+    let plant = plant(&rotor(Some(GEAR), J_1), Some(GEAR), Arc::new(Held(vec![0.0])));
+    let body = plant.model.frame("body").expect("there").body;
+    let plant = plant
+        .with_servo(servo(100.0, IDLE))
+        .expect("valid")
+        .with_timed_loads(vec![pulse(body, peak, T)])
+        .expect("valid");
     let truth = (GEAR * (1.0 / J_1 + 1.0 / J)).sqrt() / TAU;
     let impulse = peak * T * 2.0 / PI;
     // The trapezoidal rule underestimates the half sine by (π h/T)²/12.
     let rule = |h: f64| 1.1 * (PI * h / T).powi(2) / 12.0;
     for (kind, h, bound) in [(StepperKind::Rk4, 1e-4, 1e-9), (ALPHA, 5e-4, rule(5e-4)), (reference(1e-9), 1e-3, 1e-6)] {
-        let seen = run(&arm, kind, h, 2.0);
+        let seen = run(&plant, kind, h, 2.0);
         let crossings: Vec<f64> = seen
             .windows(2)
             .filter(|p| p[0].t > T && p[0].q[1] < 0.0 && p[1].q[1] >= 0.0)
@@ -421,8 +424,8 @@ fn free_motor_behind_a_spring_swings_as_two_masses() {
 fn rotor_adds_to_the_torque_of_the_joint() {
     let path = || motion(|t| [t * t, 2.0 * t, 2.0]);
     for armature in [0.0, 3.0] {
-        let arm = arm(&rotor(None, armature), None, path());
-        let seen = run(&arm, ALPHA, 1e-2, 0.5);
+        let plant = plant(&rotor(None, armature), None, path());
+        let seen = run(&plant, ALPHA, 1e-2, 0.5);
         for o in &seen {
             assert!((o.drive[0] - 2.0 * (J + armature)).abs() < 1e-12, "{}", o.drive[0]);
             assert!((o.energy[0] - 0.5 * (J + armature) * (2.0 * o.t).powi(2)).abs() < 1e-12, "{:?}", o.energy);
@@ -437,10 +440,10 @@ fn rotor_adds_to_the_torque_of_the_joint() {
 #[test]
 fn explicit_step_must_follow_the_free_motor() {
     let J_1 = 1e-3;
-    let arm = arm(&rotor(Some(GEAR), J_1), Some(GEAR), Arc::new(Held(vec![0.0])));
-    let arm = arm.with_servo(servo(100.0, IDLE)).expect("valid");
+    let plant = plant(&rotor(Some(GEAR), J_1), Some(GEAR), Arc::new(Held(vec![0.0])));
+    let plant = plant.with_servo(servo(100.0, IDLE)).expect("valid");
     let limit = 2.61 / (GEAR * (1.0 / J_1 + 1.0 / J)).sqrt();
-    let start = |h: f64| new_stepper(StepperKind::Rk4, arm.clone(), h, Start::Undeformed).map(|_| ());
+    let start = |h: f64| new_stepper(StepperKind::Rk4, plant.clone(), h, Start::Undeformed).map(|_| ());
     assert!(start(100.0 / (100.0 / (0.95 * limit)).ceil()).is_ok());
     let error = start(100.0 / (100.0 / (1.1 * limit)).floor()).expect_err("unstable");
     assert!(matches!(error, StepError::UnstableStep { .. }), "{error}");
@@ -449,8 +452,8 @@ fn explicit_step_must_follow_the_free_motor() {
 /// A joint driven by torque without inertia on the motor side of its spring is refused.
 #[test]
 fn massless_motor_before_a_spring_is_refused() {
-    let arm = arm(&rotor(Some(GEAR), 0.0), Some(GEAR), Arc::new(Held(vec![0.0])));
-    let text = arm.with_servo(servo(1e-3, IDLE)).map(|_| ()).expect_err("refused").to_string();
+    let plant = plant(&rotor(Some(GEAR), 0.0), Some(GEAR), Arc::new(Held(vec![0.0])));
+    let text = plant.with_servo(servo(1e-3, IDLE)).map(|_| ()).expect_err("refused").to_string();
     assert!(text.contains("motor_inertia"), "{text}");
 }
 
@@ -458,7 +461,7 @@ fn massless_motor_before_a_spring_is_refused() {
 
 /// Returns a body of 7 kg on a six-DoF spring with coupling; its tool frame is off its centre of
 /// mass.
-fn sprung_body(gravity: Vector3<f64>) -> FlexibleArm {
+fn sprung_body(gravity: Vector3<f64>) -> Plant {
     let mut beam = Mechanism::new("beam");
     beam.gravity = gravity;
     let I = Matrix3::new(0.2, 0.02, 0.0, 0.02, 0.3, 0.01, 0.0, 0.01, 0.25);
@@ -471,7 +474,7 @@ fn sprung_body(gravity: Vector3<f64>) -> FlexibleArm {
     let scale = Matrix6::from_diagonal(&Vector6::new(100.0, 120.0, 90.0, 30.0, 40.0, 35.0));
     let K = scale * A * A.transpose() * scale;
     let spring = ("spring".to_owned(), K, Damping::Rayleigh(2.0, 1e-3));
-    FlexibleArm::new(Arc::new(Model::new(&beam).expect("a tree")), vec![spring], Arc::new(Held(vec![]))).expect("valid")
+    Plant::new(Arc::new(Model::new(&beam).expect("a tree")), vec![spring], Arc::new(Held(vec![]))).expect("valid")
 }
 
 /// Truth: `(K + i p D - p² M)⁻¹ F` of all six coordinates, `D = 2 M + 0.001 K`, below, at and above
@@ -482,17 +485,17 @@ fn sprung_body(gravity: Vector3<f64>) -> FlexibleArm {
 /// absolute tolerance).
 #[test]
 fn harmonic_force_swings_the_tip_as_the_frequency_response_says() {
-    let arm = sprung_body(Vector3::zeros());
+    let plant = sprung_body(Vector3::zeros());
     let X_BF = Pose::translation(0.5, 0.1, 0.0);
-    let M = mass_matrix(&arm.model, &mut Data::new(&arm.model), &DVector::zeros(6)).clone();
-    let (K, D) = (arm.stiffness(), &M * 2.0 + arm.stiffness() * 1e-3);
-    let frequencies = arm.modes.frequencies_hz();
+    let M = mass_matrix(&plant.model, &mut Data::new(&plant.model), &DVector::zeros(6)).clone();
+    let (K, D) = (plant.stiffness(), &M * 2.0 + plant.stiffness() * 1e-3);
+    let frequencies = plant.modes.frequencies_hz();
     for hz in [0.5 * frequencies[0], 1.02 * frequencies[0], 1.5 * frequencies[1]] {
         let p = TAU * hz;
         let force = vector![0.01, -0.02, 0.03];
         let wrench = move |t: f64| Wrench::new(force * (p * t).sin(), Vector3::zeros());
         let load = Load { body: 1, X_BF, wrench: TimedWrench::new(wrench) };
-        let arm = arm.clone().with_timed_loads(vec![load]).expect("valid");
+        let plant = plant.clone().with_timed_loads(vec![load]).expect("valid");
         // Sine and cosine parts: [K - p² M, -p D; p D, K - p² M] [s; c] = [F; 0].
         let mut A = DMatrix::zeros(12, 12);
         let dynamic = &K - &M * (p * p);
@@ -511,7 +514,7 @@ fn harmonic_force_swings_the_tip_as_the_frequency_response_says() {
         {
             let h = 1.0 / hz / steps;
             let cycles = (8.0 * hz).ceil();
-            let seen = run(&arm, kind, h, cycles / hz);
+            let seen = run(&plant, kind, h, cycles / hz);
             let last = &seen[seen.len() - steps as usize..];
             let error = last.iter().map(|o| (&o.q - steady(o.t)).amax()).fold(0.0, f64::max) / amplitude;
             eprintln!("{:<18} {hz:.2} Hz: {error:.1e} of {amplitude:.2e}", kind.name());
@@ -527,20 +530,20 @@ fn harmonic_force_swings_the_tip_as_the_frequency_response_says() {
 /// trapezoidal rule with 20 steps.
 #[test]
 fn impulse_changes_the_momentum_by_its_integral() {
-    let arm = sprung_body(Vector3::zeros());
+    let plant = sprung_body(Vector3::zeros());
     let (T, force, X_BF) = (1e-5, vector![300.0, -200.0, 500.0], Pose::translation(0.5, 0.1, 0.0));
     let wrench = move |t: f64| Wrench::new(force * if t < T { (PI * t / T).sin() } else { 0.0 }, Vector3::zeros());
     let load = Load { body: 1, X_BF, wrench: TimedWrench::new(wrench) };
-    let arm = arm.with_timed_loads(vec![load]).expect("valid");
+    let plant = plant.with_timed_loads(vec![load]).expect("valid");
     let impulse = force * (T * 2.0 / PI);
     let p = vector![0.4, 0.0, 0.0] + X_BF.translation.vector;
     for (kind, h) in [(StepperKind::Rk4, T / 20.0), (ALPHA, T / 20.0)] {
-        let seen = run(&arm, kind, h, T);
+        let seen = run(&plant, kind, h, T);
         let last = seen.last().expect("rows");
-        let (mut data, mut state) = (Data::new(&arm.model), State::zeros(&arm.model));
+        let (mut data, mut state) = (Data::new(&plant.model), State::zeros(&plant.model));
         (state.q, state.qdot) = (last.q.clone(), last.qdot.clone());
-        forward_kinematics_velocity(&arm.model, &mut data, &state);
-        let found = momentum_of(&arm.model, &data);
+        forward_kinematics_velocity(&plant.model, &mut data, &state);
+        let found = momentum_of(&plant.model, &data);
         let errors = [
             (found.force - impulse).norm() / impulse.norm(),
             (found.torque - p.cross(&impulse)).norm() / p.cross(&impulse).norm(),
@@ -560,8 +563,8 @@ fn load_in_frame_axes_turns_along() {
     for axes in [LoadAxes::Frame, LoadAxes::World] {
         let wrench = TimedWrench::new(move |t| Wrench::new(F * (1.0 + t), Vector3::z() * 0.3)).in_axes(axes);
         let load = Load { body: 1, X_BF, wrench };
-        let arm = arm(&rotor(None, 0.0), None, path()).with_timed_loads(vec![load]).expect("valid");
-        for o in run(&arm, ALPHA, 1e-2, 3.0) {
+        let plant = plant(&rotor(None, 0.0), None, path()).with_timed_loads(vec![load]).expect("valid");
+        for o in run(&plant, ALPHA, 1e-2, 3.0) {
             let turn = nalgebra::Rotation3::from_axis_angle(&Vector3::z_axis(), 2.0 * o.t);
             let lever = turn * X_BF.translation.vector;
             let force = match axes {
@@ -589,32 +592,32 @@ fn geared(elastic: bool) -> flexarm_testkit::ReferenceArm {
 }
 
 /// Returns the reference arm, held, that releases its tool (20 of 23 kg) at `t`.
-fn dropping_arm(t: f64, beta: f64, motion: Arc<dyn PrescribedMotion>) -> (FlexibleArm, FlexibleArm) {
+fn dropping_arm(t: f64, beta: f64, motion: Arc<dyn PrescribedMotion>) -> (Plant, Plant) {
     let reference = geared(true);
     let model = Arc::new(Model::new(&reference.mechanism).expect("valid"));
     let damping = Damping::StiffnessProportional(beta);
     let springs: Vec<_> = (0..2).map(|k| (format!("link {k}"), reference.K_S[k], damping)).collect();
     let body = model.frame("link6").expect("there").body;
     let flange = LinkInertia { mass: 3.0, com: vector![-0.01, 0.0, 0.0], inertia_com: Matrix3::identity() * 5e-3 };
-    let mut arm = FlexibleArm::new(model.clone(), springs.clone(), motion.clone()).expect("valid");
-    arm.inertia_changes = vec![InertiaChange { t, body, inertia: flange.spatial() }];
+    let mut plant = Plant::new(model.clone(), springs.clone(), motion.clone()).expect("valid");
+    plant.inertia_changes = vec![InertiaChange { t, body, inertia: flange.spatial() }];
     let light = Arc::new(model.with_inertia(body, flange.spatial()));
-    (arm, FlexibleArm::new(light, springs, motion).expect("valid"))
+    (plant, Plant::new(light, springs, motion).expect("valid"))
 }
 
 /// Truth: before the drop the static pose with the payload, at the end the pose without it;
 /// likewise drives and energy. Measured: 1e-15.
 #[test]
 fn arm_that_drops_its_payload_comes_to_rest_in_the_new_static_pose() {
-    let (arm, light) = dropping_arm(0.1, 1e-2, Arc::new(Held(vec![0.4, 0.5, -0.3, 0.7, 0.6, -1.2])));
+    let (plant, light) = dropping_arm(0.1, 1e-2, Arc::new(Held(vec![0.4, 0.5, -0.3, 0.7, 0.6, -1.2])));
     let (heavy_e, light_e) =
-        (static_equilibrium(&arm, 0.0).expect("stands"), static_equilibrium(&light, 0.0).expect("stands"));
+        (static_equilibrium(&plant, 0.0).expect("stands"), static_equilibrium(&light, 0.0).expect("stands"));
     let jump = (&heavy_e - &light_e).amax();
     let mut at_rest = Observation::new(&light);
     new_stepper(ALPHA, light.clone(), 1e-3, Start::Equilibrium).expect("starts").observe(&mut at_rest);
     for kind in [ALPHA, reference(1e-8)] {
-        let mut stepper = new_stepper(kind, arm.clone(), 1e-3, Start::Equilibrium).expect("starts");
-        let mut seen = Observation::new(&arm);
+        let mut stepper = new_stepper(kind, plant.clone(), 1e-3, Start::Equilibrium).expect("starts");
+        let mut seen = Observation::new(&plant);
         let mut before = 0.0f64;
         for k in 1..=4000 {
             stepper.step().expect("steps");
@@ -640,10 +643,10 @@ fn arm_that_drops_its_payload_comes_to_rest_in_the_new_static_pose() {
 /// 5.8e-4 of the jump.
 #[test]
 fn ringing_after_the_drop_has_the_new_static_pose_as_its_mean() {
-    let (arm, light) = dropping_arm(0.05, 2e-5, Arc::new(Held(vec![0.4, 0.5, -0.3, 0.7, 0.6, -1.2])));
-    let jump = static_equilibrium(&arm, 0.0).expect("stands") - static_equilibrium(&light, 0.0).expect("stands");
+    let (plant, light) = dropping_arm(0.05, 2e-5, Arc::new(Held(vec![0.4, 0.5, -0.3, 0.7, 0.6, -1.2])));
+    let jump = static_equilibrium(&plant, 0.0).expect("stands") - static_equilibrium(&light, 0.0).expect("stands");
     let truth = static_equilibrium(&light, 0.0).expect("stands");
-    let seen = run_from(&arm, ALPHA, 1e-3, 10.05);
+    let seen = run_from(&plant, ALPHA, 1e-3, 10.05);
     let after: Vec<&Observation> = seen.iter().filter(|o| o.t > 0.05).collect();
     let mean = after.iter().fold(DVector::zeros(12), |m, o| m + o.q.rows(6, 12)) / after.len() as f64;
     let error = (mean - truth).amax() / jump.amax();
@@ -651,9 +654,9 @@ fn ringing_after_the_drop_has_the_new_static_pose_as_its_mean() {
     assert!(error < 3e-3, "{error}");
 }
 
-fn run_from(arm: &FlexibleArm, kind: StepperKind, h: f64, duration: f64) -> Vec<Observation> {
-    let mut stepper = new_stepper(kind, arm.clone(), h, Start::Equilibrium).expect("starts");
-    let mut seen = Observation::new(arm);
+fn run_from(plant: &Plant, kind: StepperKind, h: f64, duration: f64) -> Vec<Observation> {
+    let mut stepper = new_stepper(kind, plant.clone(), h, Start::Equilibrium).expect("starts");
+    let mut seen = Observation::new(plant);
     let mut all = Vec::new();
     for _ in 0..(duration / h).round() as usize {
         stepper.step().expect("steps");
@@ -672,7 +675,7 @@ fn run_from(arm: &FlexibleArm, kind: StepperKind, h: f64, duration: f64) -> Vec<
 #[test]
 fn reference_stepper_and_generalised_alpha_agree_over_events() {
     let path: Arc<dyn PrescribedMotion> = Arc::new(MotionFn(follow_reference_motion));
-    let (mut arm, _) = dropping_arm(0.208, 1e-3, path);
+    let (mut plant, _) = dropping_arm(0.208, 1e-3, path);
     let axis = |coordinate| ServoAxis {
         coordinate,
         position_gain: 15.0,
@@ -681,12 +684,12 @@ fn reference_stepper_and_generalised_alpha_agree_over_events() {
         feed_forward: f64::from(u8::from(coordinate != 3)),
         limit: f64::INFINITY,
     };
-    arm.friction = vec![Friction { viscous: 2.0, coulomb: 5.0, regularisation: 0.05, ..Friction::NONE }; 6];
+    plant.friction = vec![Friction { viscous: 2.0, coulomb: 5.0, regularisation: 0.05, ..Friction::NONE }; 6];
     let rigid = Arc::new(Model::new(&geared(false).mechanism).expect("a tree"));
-    let arm = arm.with_servo(Servo { sample_s: 4e-3, axes: (0..6).map(axis).collect(), rigid }).expect("valid");
+    let plant = plant.with_servo(Servo { sample_s: 4e-3, axes: (0..6).map(axis).collect(), rigid }).expect("valid");
     let at = |kind, h: f64| {
-        let mut stepper = new_stepper(kind, arm.clone(), h, Start::Equilibrium).expect("starts");
-        let mut seen = Observation::new(&arm);
+        let mut stepper = new_stepper(kind, plant.clone(), h, Start::Equilibrium).expect("starts");
+        let mut seen = Observation::new(&plant);
         let mut curve = Vec::new();
         for _ in 0..100 {
             (0..(4e-3 / h).round() as usize).for_each(|_| stepper.step().expect("steps"));
@@ -715,7 +718,8 @@ fn reference_stepper_and_generalised_alpha_agree_over_events() {
 /// Truth: the integral of the moment over the inertia.
 #[test]
 fn the_reference_stepper_sees_short_loads_and_fast_ones() {
-    let arm = arm(&rotor(None, 0.0), None, Arc::new(Held(vec![0.0]))).with_servo(servo(100.0, IDLE)).expect("valid");
+    let plant =
+        plant(&rotor(None, 0.0), None, Arc::new(Held(vec![0.0]))).with_servo(servo(100.0, IDLE)).expect("valid");
     let (start, T) = (1.0105, 0.002);
     let moment = |m: f64| Wrench::new(Vector3::zeros(), Vector3::z() * m);
     let pulse = TimedWrench::new(move |t| {
@@ -727,10 +731,10 @@ fn the_reference_stepper_sees_short_loads_and_fast_ones() {
     // The sine: at rest again after a whole period, in between at most twice its amplitude over J
     // omega.
     for (wrench, truth) in [(pulse, 30.0 * T * 2.0 / PI / J), (sine, 2.0 * 30.0 / (J * TAU * 50.0))] {
-        let arm = arm.clone().with_timed_loads(vec![Load::at_origin(1, wrench)]).expect("valid");
+        let plant = plant.clone().with_timed_loads(vec![Load::at_origin(1, wrench)]).expect("valid");
         for method in [ReferenceMethod::Bdf, ReferenceMethod::Esdirk34, ReferenceMethod::Tsit45] {
             let kind = StepperKind::Reference(ReferenceSettings { method, ..ReferenceSettings::new(1e-6) });
-            let top = run(&arm, kind, 1e-3, 1.5).iter().map(|o| o.qdot[0]).fold(0.0, f64::max);
+            let top = run(&plant, kind, 1e-3, 1.5).iter().map(|o| o.qdot[0]).fold(0.0, f64::max);
             assert!((top / truth - 1.0).abs() < 1e-3, "{method:?} {top} {truth}");
         }
     }
@@ -740,12 +744,12 @@ fn the_reference_stepper_sees_short_loads_and_fast_ones() {
 /// NaN.
 #[test]
 fn a_load_that_is_no_number_stops_the_run() {
-    let arm = arm(&rotor(Some(GEAR), 0.5), Some(GEAR), Arc::new(Held(vec![0.0])));
-    let body = arm.model.frame("body").expect("there").body;
+    let plant = plant(&rotor(Some(GEAR), 0.5), Some(GEAR), Arc::new(Held(vec![0.0])));
+    let body = plant.model.frame("body").expect("there").body;
     let wrench = TimedWrench::new(|t: f64| Wrench::new(Vector3::zeros(), Vector3::z() / (t - 0.5)));
-    let arm = arm.with_timed_loads(vec![Load::at_origin(body, wrench)]).expect("valid");
+    let plant = plant.with_timed_loads(vec![Load::at_origin(body, wrench)]).expect("valid");
     for kind in [ALPHA, StepperKind::Rk4] {
-        let mut stepper = new_stepper(kind, arm.clone(), 1e-3, Start::Undeformed).expect("starts");
+        let mut stepper = new_stepper(kind, plant.clone(), 1e-3, Start::Undeformed).expect("starts");
         let end = (0..1000).find_map(|_| stepper.step().err());
         assert!(matches!(end, Some(StepError::Diverged { .. })), "{}: {end:?}", kind.name());
     }
@@ -763,10 +767,10 @@ fn a_mass_matrix_that_is_not_positive_definite_stops_a_run_with_its_time() {
     two.rotor_couplings.push(RotorCoupling { joints: ["axis".into(), "second_axis".into()], inertia: 100.0 });
     let rigid = Arc::new(Model::new(&two).expect("a tree"));
     let axes = (0..2).map(|coordinate| ServoAxis { coordinate, ..IDLE }).collect();
-    let arm = arm(&two, None, Arc::new(Held(vec![0.1, 0.2])));
-    let arm = arm.with_servo(Servo { sample_s: 1e-3, axes, rigid }).expect("valid");
+    let plant = plant(&two, None, Arc::new(Held(vec![0.1, 0.2])));
+    let plant = plant.with_servo(Servo { sample_s: 1e-3, axes, rigid }).expect("valid");
     for kind in [ALPHA, StepperKind::Rk4, StepperKind::Sdirk3, reference(1e-6)] {
-        let started = new_stepper(kind, arm.clone(), 1e-3, Start::Undeformed);
+        let started = new_stepper(kind, plant.clone(), 1e-3, Start::Undeformed);
         let error = started.and_then(|mut stepper| stepper.step().map(|_| ())).expect_err("no mass matrix");
         let told = error.to_string();
         assert!(

@@ -9,7 +9,7 @@ use flexarm_testkit::{Draw, chain_arm};
 use nalgebra::{DMatrix, DVector};
 
 /// Returns chains with `joints` joints in two links and a branch, with a motion of all joints.
-fn arm(joints: usize, branch: usize, angles: ElasticAngles, damping: impl Fn(usize) -> Damping) -> FlexibleArm {
+fn plant(joints: usize, branch: usize, angles: ElasticAngles, damping: impl Fn(usize) -> Damping) -> Plant {
     let chains = chain_arm(joints, branch, angles);
     let model = Arc::new(Model::new(&chains.mechanism).unwrap());
     let springs = chains.K.iter().enumerate().map(|(k, K)| (format!("spring {k}"), *K, damping(k))).collect();
@@ -23,7 +23,7 @@ fn arm(joints: usize, branch: usize, angles: ElasticAngles, damping: impl Fn(usi
             a[k] = size * w * w * s;
         }
     });
-    FlexibleArm::new::<(String, nalgebra::Matrix6<f64>, Damping)>(model, springs, Arc::new(motion)).unwrap()
+    Plant::new::<(String, nalgebra::Matrix6<f64>, Damping)>(model, springs, Arc::new(motion)).unwrap()
 }
 
 /// The same system without its tree structure.
@@ -100,7 +100,7 @@ fn an_arm_of_chains_has_on_its_tree_the_same_matrices() {
             |_| Damping::Rayleigh(0.5, 1e-3),
         ];
         for damping in dampings {
-            let mut system = ReducedArm::new(arm(joints, branch, angles, damping));
+            let mut system = ReducedArm::new(plant(joints, branch, angles, damping));
             let n = system.dimension();
             let mut draw = Draw(joints as u64);
             let mut vector = |size: f64| DVector::from_fn(n, |_, _| size * draw.signed());
@@ -125,11 +125,11 @@ fn an_arm_of_chains_has_on_its_tree_the_same_matrices() {
 /// Runs one integrator on the arm with its tree and on the dense one; returns the maximum distance
 /// relative to the peak, and both counts.
 fn compared<I: Integrator>(
-    arm: &FlexibleArm,
+    plant: &Plant,
     (h, steps): (f64, usize),
     make: impl Fn(&mut dyn Beginning, f64) -> I,
 ) -> (f64, [Counts; 2]) {
-    let (mut tree, mut dense) = (ReducedArm::new(arm.clone()), Dense(ReducedArm::new(arm.clone())));
+    let (mut tree, mut dense) = (ReducedArm::new(plant.clone()), Dense(ReducedArm::new(plant.clone())));
     let (mut a, mut b) = (make(&mut tree, h), make(&mut dense, h));
     let rest = b.current().x.clone();
     let (mut far, mut peak) = (0.0f64, 0.0f64);
@@ -167,19 +167,19 @@ impl<S: SecondOrderSystem> Beginning for S {
 fn a_run_along_the_tree_is_the_dense_run() {
     let proportional: fn(f64) -> Damping = Damping::StiffnessProportional;
     for (joints, branch, beta, h) in [(2, 2, 1e-3, 1e-3), (3, 0, 1e-5, 1e-3), (8, 2, 1e-3, 2e-3), (31, 3, 1e-4, 1e-3)] {
-        let arm = arm(joints, branch, ElasticAngles::RotationVector, |_| proportional(beta));
-        let e = static_equilibrium(&arm, 0.0).unwrap();
+        let plant = plant(joints, branch, ElasticAngles::RotationVector, |_| proportional(beta));
+        let e = static_equilibrium(&plant, 0.0).unwrap();
         let steps = if joints > 20 { 60 } else { 200 };
         for rho in [0.0, 0.5, 0.9, 1.0] {
             for dispersion_correction in [true, false] {
                 let settings = AlphaSettings { rho, dispersion_correction };
-                let (far, [tree, dense]) = compared(&arm, (h, steps), |s, h| s.alpha(h, settings, e.clone()));
+                let (far, [tree, dense]) = compared(&plant, (h, steps), |s, h| s.alpha(h, settings, e.clone()));
                 eprintln!("{joints} joints, rho {rho}, corrected {dispersion_correction}: {far:.1e}, {tree:?}");
                 assert!(far < 1e-9, "{far:e}");
                 assert_eq!(tree, dense);
             }
         }
-        let (far, [tree, dense]) = compared(&arm, (h, steps), |s, h| s.sdirk3(h, e.clone()));
+        let (far, [tree, dense]) = compared(&plant, (h, steps), |s, h| s.sdirk3(h, e.clone()));
         eprintln!("{joints} joints, sdirk3: {far:.1e}, {tree:?}");
         assert!(far < 1e-9 && tree == dense, "{far:e}");
     }
@@ -190,11 +190,11 @@ fn a_run_along_the_tree_is_the_dense_run() {
         |_| Damping::Rayleigh(2.0, 5e-4),
     ];
     for damping in dampings {
-        let arm = arm(6, 2, ElasticAngles::EulerZyx, damping);
-        let e = static_equilibrium(&arm, 0.0).unwrap();
+        let plant = plant(6, 2, ElasticAngles::EulerZyx, damping);
+        let e = static_equilibrium(&plant, 0.0).unwrap();
         for dispersion_correction in [true, false] {
             let settings = AlphaSettings { rho: 0.9, dispersion_correction };
-            let (far, [tree, dense]) = compared(&arm, (1e-3, 200), |s, h| s.alpha(h, settings, e.clone()));
+            let (far, [tree, dense]) = compared(&plant, (1e-3, 200), |s, h| s.alpha(h, settings, e.clone()));
             eprintln!("{:?}, corrected {dispersion_correction}: {far:.1e}, {tree:?}", damping(0));
             assert!(far < 1e-9 && tree == dense, "{far:e}");
         }
@@ -204,7 +204,7 @@ fn a_run_along_the_tree_is_the_dense_run() {
 /// Including renewals of the matrices.
 #[test]
 fn steps_of_chains_do_not_allocate() {
-    let arm = arm(8, 2, ElasticAngles::RotationVector, |_| Damping::StiffnessProportional(1e-3));
+    let plant = plant(8, 2, ElasticAngles::RotationVector, |_| Damping::StiffnessProportional(1e-3));
     let kinds = [
         StepperKind::GeneralizedAlpha(AlphaSettings::default()),
         StepperKind::GeneralizedAlpha(AlphaSettings { rho: 0.9, dispersion_correction: false }),
@@ -212,7 +212,7 @@ fn steps_of_chains_do_not_allocate() {
         StepperKind::Spook(SpookSettings::default()),
     ];
     for kind in kinds {
-        let mut stepper = new_stepper(kind, arm.clone(), 1e-3, Start::Equilibrium).unwrap();
+        let mut stepper = new_stepper(kind, plant.clone(), 1e-3, Start::Equilibrium).unwrap();
         stepper.step().unwrap();
         let before = stepper.counts().factorisations;
         let allocations = count_allocations(|| (0..400).for_each(|_| stepper.step().unwrap()));

@@ -23,7 +23,7 @@ impl PrescribedMotion for Jumps {
     }
 }
 
-fn arm(jumps: &[f64], sample_s: Option<f64>) -> FlexibleArm {
+fn plant(jumps: &[f64], sample_s: Option<f64>) -> Plant {
     let mut slide = Mechanism::new("slide");
     slide.links.push(Link { name: "base".into(), inertia: None });
     let inertia = LinkInertia { mass: 2.0, com: Vector3::zeros(), inertia_com: Matrix3::identity() };
@@ -31,13 +31,13 @@ fn arm(jumps: &[f64], sample_s: Option<f64>) -> FlexibleArm {
     slide.joints.push(Joint::new("x", JointKind::Prismatic(Vector3::x_axis()), "base", "body", Pose::identity()));
     let model = Arc::new(Model::new(&slide).unwrap());
     let motion = Arc::new(Jumps(jumps.to_vec()));
-    let mut arm = FlexibleArm::new::<(String, Matrix6<f64>, Damping)>(Arc::clone(&model), vec![], motion).unwrap();
-    arm.servo = sample_s.map(|sample_s| Arc::new(Servo { sample_s, axes: Vec::new(), rigid: model }));
-    arm
+    let mut plant = Plant::new::<(String, Matrix6<f64>, Damping)>(Arc::clone(&model), vec![], motion).unwrap();
+    plant.servo = sample_s.map(|sample_s| Arc::new(Servo { sample_s, axes: Vec::new(), rigid: model }));
+    plant
 }
 
 fn queue(jumps: &[f64], sample_s: Option<f64>) -> EventQueue {
-    EventQueue::of(&arm(jumps, sample_s))
+    EventQueue::of(&plant(jumps, sample_s))
 }
 
 #[test]
@@ -82,9 +82,9 @@ fn a_controller_takes_each_sample_once() {
 #[test]
 fn a_payload_is_carried_from_its_time_on_and_not_before() {
     let change = |t: f64| InertiaChange { t, body: 1, inertia: SpatialInertia::zeros() };
-    let mut arm = arm(&[], None);
-    arm.inertia_changes = vec![change(0.5), change(0.5), change(0.9)];
-    let mut events = EventQueue::of(&arm);
+    let mut plant = plant(&[], None);
+    plant.inertia_changes = vec![change(0.5), change(0.5), change(0.9)];
+    let mut events = EventQueue::of(&plant);
     assert!(events.change_before(0.5).is_none() && events.due_change(0.4).is_none());
     let numbers: Vec<usize> = std::iter::from_fn(|| events.due_change(0.5).map(|(number, _)| number)).collect();
     assert_eq!(numbers, [0, 1]);

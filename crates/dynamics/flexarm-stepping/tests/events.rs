@@ -53,7 +53,7 @@ impl PrescribedMotion for Corners {
 }
 
 /// Returns a slide along x with a body on a 6x6 spring, and gravity if given.
-fn slide(motion: Arc<dyn PrescribedMotion>, gravity: f64, damping: Damping) -> FlexibleArm {
+fn slide(motion: Arc<dyn PrescribedMotion>, gravity: f64, damping: Damping) -> Plant {
     let mut slide = Mechanism::new("slide");
     slide.gravity = -Vector3::z() * gravity;
     let carriage = LinkInertia { mass: 2.0, com: Vector3::zeros(), inertia_com: Matrix3::identity() * 0.1 };
@@ -71,7 +71,7 @@ fn slide(motion: Arc<dyn PrescribedMotion>, gravity: f64, damping: Damping) -> F
     let elastic = JointKind::Elastic(ElasticAngles::RotationVector);
     slide.joints.push(Joint::new("spring", elastic, "carriage", "body", Pose::identity()));
     let spring = ("spring".to_owned(), Matrix6::identity() * K, damping);
-    FlexibleArm::new(Arc::new(Model::new(&slide).unwrap()), vec![spring], motion).unwrap()
+    Plant::new(Arc::new(Model::new(&slide).unwrap()), vec![spring], motion).unwrap()
 }
 
 fn held() -> Arc<dyn PrescribedMotion> {
@@ -79,9 +79,9 @@ fn held() -> Arc<dyn PrescribedMotion> {
 }
 
 /// Returns the maximum distance of elastic coordinate `k` from `truth(t)` at the steps.
-fn error(arm: &FlexibleArm, kind: StepperKind, h: f64, duration: f64, k: usize, truth: impl Fn(f64) -> f64) -> f64 {
-    let mut stepper = new_stepper(kind, arm.clone(), h, Start::Equilibrium).unwrap();
-    let mut seen = Observation::new(arm);
+fn error(plant: &Plant, kind: StepperKind, h: f64, duration: f64, k: usize, truth: impl Fn(f64) -> f64) -> f64 {
+    let mut stepper = new_stepper(kind, plant.clone(), h, Start::Equilibrium).unwrap();
+    let mut seen = Observation::new(plant);
     let mut worst = 0.0f64;
     for _ in 0..(duration / h).round() as usize {
         stepper.step().unwrap();
@@ -91,12 +91,12 @@ fn error(arm: &FlexibleArm, kind: StepperKind, h: f64, duration: f64, k: usize, 
     worst
 }
 
-fn pick_up(t: f64, mass: f64, damping: Damping) -> FlexibleArm {
-    let mut arm = slide(held(), 9.81, damping);
-    let body = arm.model.frame("body").unwrap().body;
+fn pick_up(t: f64, mass: f64, damping: Damping) -> Plant {
+    let mut plant = slide(held(), 9.81, damping);
+    let body = plant.model.frame("body").unwrap().body;
     let inertia = LinkInertia { mass, com: Vector3::zeros(), inertia_com: Matrix3::identity() * 0.05 * mass };
-    arm.inertia_changes = vec![InertiaChange { t, body, inertia: inertia.spatial() }];
-    arm
+    plant.inertia_changes = vec![InertiaChange { t, body, inertia: inertia.spatial() }];
+    plant
 }
 
 /// Truth: closed form of a mass that is attached to a spring at rest. The time of the event is at
@@ -108,13 +108,13 @@ fn pick_up(t: f64, mass: f64, damping: Damping) -> FlexibleArm {
 fn an_arm_that_picks_up_fifty_times_its_mass_swings_about_the_new_sag() {
     let (heavy, g) = (50.0 * MASS, 9.81);
     for at in [0.1, 0.10037] {
-        let arm = pick_up(at, heavy, Damping::StiffnessProportional(0.0));
+        let plant = pick_up(at, heavy, Damping::StiffnessProportional(0.0));
         let omega = (K / heavy).sqrt();
         let (before, after) = (-MASS * g / K, -heavy * g / K);
         let truth = |t: f64| if t < at { before } else { after + (before - after) * (omega * (t - at)).cos() };
         let cases = registered(false).map(|kind| (kind, if is_fine(&kind) { 1e-6 } else { 2e-4 }));
         for (kind, bound) in cases.chain([(PLAIN, 2e-3)]) {
-            let error = error(&arm, kind, 1e-3, 2.0, 2, truth) / after.abs();
+            let error = error(&plant, kind, 1e-3, 2.0, 2, truth) / after.abs();
             eprintln!("{:<18} at {at}: {error:.1e}", kind.name());
             assert!(error < bound, "{} at {at}: {error}", kind.name());
         }
@@ -125,9 +125,9 @@ fn an_arm_that_picks_up_fifty_times_its_mass_swings_about_the_new_sag() {
 #[test]
 fn a_payload_of_time_zero_hangs_still() {
     let heavy = 7.0 * MASS;
-    let arm = pick_up(0.0, heavy, Damping::Modal(0.03));
+    let plant = pick_up(0.0, heavy, Damping::Modal(0.03));
     for kind in registered(true) {
-        let error = error(&arm, kind, 1e-3, 0.1, 2, |_| -heavy * 9.81 / K);
+        let error = error(&plant, kind, 1e-3, 0.1, 2, |_| -heavy * 9.81 / K);
         // The sag is 0.17 m; from the equilibrium without payload the arm would oscillate with that
         // amplitude.
         assert!(error < 1e-6, "{} {error}", kind.name());
@@ -139,7 +139,7 @@ fn a_payload_of_time_zero_hangs_still() {
 #[test]
 fn modal_damping_keeps_its_ratio_with_another_payload() {
     let (heavy, g, zeta, at) = (50.0 * MASS, 9.81, 0.03_f64, 0.1);
-    let arm = pick_up(at, heavy, Damping::Modal(zeta));
+    let plant = pick_up(at, heavy, Damping::Modal(zeta));
     let omega = (K / heavy).sqrt();
     let damped = omega * (1.0 - zeta * zeta).sqrt();
     let (before, after) = (-MASS * g / K, -heavy * g / K);
@@ -149,7 +149,7 @@ fn modal_damping_keeps_its_ratio_with_another_payload() {
         after + (before - after) * (-zeta * omega * s).exp() * swing
     };
     for kind in registered(false) {
-        let error = error(&arm, kind, 1e-3, 4.0, 2, truth) / after.abs();
+        let error = error(&plant, kind, 1e-3, 4.0, 2, truth) / after.abs();
         eprintln!("{:<18} {error:.1e}", kind.name());
         // measured 2e-5; with the damping of the empty arm 0.2
         assert!(error < 2e-4, "{} {error}", kind.name());
@@ -167,15 +167,15 @@ fn a_load_that_begins_and_ends_between_steps_acts_as_long_as_it_lasts() {
         let force = if (from..=to).contains(&t) { F } else { 0.0 };
         Wrench::new(Vector3::x() * force, Vector3::zeros())
     });
-    let mut arm = slide(held(), 0.0, Damping::StiffnessProportional(0.0));
-    let body = arm.model.frame("body").unwrap().body;
-    arm = arm.with_timed_loads(vec![Load::at_origin(body, wrench.with_jumps(vec![from, to]))]).unwrap();
+    let mut plant = slide(held(), 0.0, Damping::StiffnessProportional(0.0));
+    let body = plant.model.frame("body").unwrap().body;
+    plant = plant.with_timed_loads(vec![Load::at_origin(body, wrench.with_jumps(vec![from, to]))]).unwrap();
     let omega = (K / MASS).sqrt();
     let ramp = |t: f64, s: f64| if t > s { F / K * (1.0 - (omega * (t - s)).cos()) } else { 0.0 };
     let truth = |t: f64| ramp(t, from) - ramp(t, to);
     let cases = registered(false).map(|kind| (kind, if is_fine(&kind) { 1e-5 } else { 5e-4 }));
     for (kind, bound) in cases.chain([(PLAIN, 2e-2), (SPOOK, 0.1)]) {
-        let errors = [1e-3, 2.5e-4].map(|h| error(&arm, kind, h, 0.2, 0, truth) / (F / K));
+        let errors = [1e-3, 2.5e-4].map(|h| error(&plant, kind, h, 0.2, 0, truth) / (F / K));
         eprintln!("{:<18} {errors:?}", kind.name());
         assert!(errors[0] < bound, "{} {errors:?}", kind.name());
         if kind == PLAIN {
@@ -192,7 +192,7 @@ fn a_load_that_begins_and_ends_between_steps_acts_as_long_as_it_lasts() {
 fn the_base_velocity_jumps_and_the_spring_takes_the_impulse() {
     let corners = vec![(0.0, 0.3), (0.02, -0.5), (0.06037, 1.0), (0.0611, 0.2), (0.1, 0.0)];
     let motion = Corners { corners: corners.clone() };
-    let arm = slide(Arc::new(motion), 0.0, Damping::StiffnessProportional(0.0));
+    let plant = slide(Arc::new(motion), 0.0, Damping::StiffnessProportional(0.0));
     let omega = (K / MASS).sqrt();
     let truth = |t: f64| {
         let mut before = 0.0;
@@ -209,7 +209,7 @@ fn the_base_velocity_jumps_and_the_spring_takes_the_impulse() {
         [(kind, 1e-3, bounds[0]), (kind, 2e-3, bounds[1])]
     });
     for (kind, h, bound) in cases.chain([(PLAIN, 5e-4, 1e-2), (reference(), 1e-3, 1e-6), (SPOOK, 1e-4, 1e-2)]) {
-        let error = error(&arm, kind, h, 0.2, 0, truth) / size;
+        let error = error(&plant, kind, h, 0.2, 0, truth) / size;
         eprintln!("{:<18} {h:.0e}: {error:.1e}", kind.name());
         assert!(error < bound, "{} {h}: {error}", kind.name());
     }
@@ -230,14 +230,14 @@ fn velocities_that_rise_within_a_few_steps_strike_as_hard_as_corners() {
         qdot[0] = v / rise * s;
         qddot[0] = if s > 0.0 && s < rise { v / rise } else { 0.0 };
     });
-    let arm = slide(Arc::new(motion), 0.0, Damping::StiffnessProportional(0.0));
+    let plant = slide(Arc::new(motion), 0.0, Damping::StiffnessProportional(0.0));
     let omega = (K / MASS).sqrt();
     let pushed = |t: f64| v / rise / omega.powi(2) * (1.0 - (omega * t.max(0.0)).cos());
     let truth = |t: f64| pushed(t - from - rise) - pushed(t - from);
     for kind in registered(false) {
         let steps = if is_fine(&kind) { [1e-4, 1e-4] } else { [1e-3, 2e-3] };
         for h in steps {
-            let error = error(&arm, kind, h, 0.2, 0, truth) * omega / v;
+            let error = error(&plant, kind, h, 0.2, 0, truth) * omega / v;
             eprintln!("{:<18} {h:.0e}: {error:.1e}", kind.name());
             assert!(error < 1e-2, "{} {h}: {error}", kind.name());
         }
@@ -249,10 +249,10 @@ fn velocities_that_rise_within_a_few_steps_strike_as_hard_as_corners() {
 #[test]
 fn the_work_of_a_blow_is_the_energy_that_it_brings() {
     let motion = Corners { corners: vec![(0.0105, 0.5), (0.0305, -0.25)] };
-    let arm = slide(Arc::new(motion), 0.0, Damping::StiffnessProportional(0.0));
+    let plant = slide(Arc::new(motion), 0.0, Damping::StiffnessProportional(0.0));
     for kind in registered(false) {
-        let mut stepper = new_stepper(kind, arm.clone(), 1e-3, Start::Equilibrium).unwrap();
-        let mut seen = Observation::new(&arm);
+        let mut stepper = new_stepper(kind, plant.clone(), 1e-3, Start::Equilibrium).unwrap();
+        let mut seen = Observation::new(&plant);
         (0..40).for_each(|_| stepper.step().unwrap());
         stepper.observe(&mut seen);
         let truth = 2.0 * (0.5 * 0.5f64.powi(2) + -0.75 * (0.5 - 0.375));
@@ -267,19 +267,19 @@ fn the_work_of_a_blow_is_the_energy_that_it_brings() {
 #[test]
 fn events_at_one_time_and_events_within_one_step_are_all_met() {
     let motion = Corners { corners: vec![(0.05, 0.4), (0.0503, -0.2), (0.06, 0.0)] };
-    let mut arm = slide(Arc::new(motion), 9.81, Damping::StiffnessProportional(1e-4));
-    let body = arm.model.frame("body").unwrap().body;
+    let mut plant = slide(Arc::new(motion), 9.81, Damping::StiffnessProportional(1e-4));
+    let body = plant.model.frame("body").unwrap().body;
     let change = |t: f64, mass: f64| {
         let inertia = LinkInertia { mass, com: Vector3::x() * 0.1, inertia_com: Matrix3::identity() };
         InertiaChange { t, body, inertia: inertia.spatial() }
     };
-    arm.inertia_changes = vec![change(0.05, 80.0), change(0.0508, 5.0), change(0.06, 30.0)];
+    plant.inertia_changes = vec![change(0.05, 80.0), change(0.0508, 5.0), change(0.06, 30.0)];
     let force = |t: f64| Vector3::x() * if t >= 0.0505 { 500.0 } else { 0.0 };
     let wrench = TimedWrench::new(move |t| Wrench::new(force(t), Vector3::zeros())).with_jumps(vec![0.0505]);
-    arm = arm.with_timed_loads(vec![Load::at_origin(body, wrench)]).unwrap();
+    plant = plant.with_timed_loads(vec![Load::at_origin(body, wrench)]).unwrap();
     let end = |kind: StepperKind, h: f64| {
-        let mut stepper = new_stepper(kind, arm.clone(), h, Start::Equilibrium).unwrap();
-        let mut seen = Observation::new(&arm);
+        let mut stepper = new_stepper(kind, plant.clone(), h, Start::Equilibrium).unwrap();
+        let mut seen = Observation::new(&plant);
         (0..(0.2 / h).round() as usize).for_each(|_| stepper.step().unwrap());
         stepper.observe(&mut seen);
         seen.q.rows(1, 6).clone_owned()

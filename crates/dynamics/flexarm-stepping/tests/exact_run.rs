@@ -8,7 +8,7 @@ use flexarm_testkit::{reference_arm, reference_motion};
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
 /// A mass on a vertical spring, with a damper.
-fn oscillator([m, k, d]: [f64; 3]) -> FlexibleArm {
+fn oscillator([m, k, d]: [f64; 3]) -> Plant {
     let mut tree = Mechanism::new("mass on a spring");
     tree.links.push(Link { name: "ground".into(), inertia: None });
     let inertia = LinkInertia { mass: m, com: Vector3::zeros(), inertia_com: Matrix3::identity() };
@@ -22,7 +22,7 @@ fn oscillator([m, k, d]: [f64; 3]) -> FlexibleArm {
         curve: None,
         geometric: None,
     };
-    FlexibleArm::new(Arc::new(Model::new(&tree).unwrap()), vec![spring], Arc::new(Held(vec![]))).unwrap()
+    Plant::new(Arc::new(Model::new(&tree).unwrap()), vec![spring], Arc::new(Held(vec![]))).unwrap()
 }
 
 /// Closed form of the fall from the relaxed spring.
@@ -51,11 +51,11 @@ fn a_falling_mass_depends_on_mass_spring_and_damper_as_in_closed_form() {
     let sag = numbers[0] * 9.81 / numbers[1];
     for dispersion_correction in [false, true] {
         let last = |step_s: f64, numbers: [f64; 3]| {
-            let arm = oscillator(numbers);
+            let plant = oscillator(numbers);
             let settings = AlphaSettings { rho: 0.9, dispersion_correction };
-            let tool = arm.model.frame("mass").unwrap().clone();
+            let tool = plant.model.frame("mass").unwrap().clone();
             let run = ExactRun { settings, step_s, duration_s: 0.4, start: Start::Undeformed, tool };
-            run.errors(&arm).unwrap().errors.last().unwrap()[2]
+            run.errors(&plant).unwrap().errors.last().unwrap()[2]
         };
         for which in 0..3 {
             let truth = difference(1e-4, which, numbers, |numbers| fall(numbers, 0.4));
@@ -85,15 +85,15 @@ fn the_exact_run_is_the_ordinary_run_but_for_what_iterations_leave() {
         qddot.copy_from_slice(&z);
     });
     let model = Arc::new(Model::new(&reference.mechanism).unwrap());
-    let arm = FlexibleArm::new(model, springs, Arc::new(motion)).unwrap();
-    let tool = arm.model.frame("tcp").unwrap().clone();
+    let plant = Plant::new(model, springs, Arc::new(motion)).unwrap();
+    let tool = plant.model.frame("tcp").unwrap().clone();
     let settings = AlphaSettings::default();
     let run = ExactRun { settings, step_s: 2e-3, duration_s: 0.4, start: Start::Equilibrium, tool: tool.clone() };
-    let exact = run.errors(&arm).unwrap();
+    let exact = run.errors(&plant).unwrap();
     let ordinary = |step_s: f64| {
         let mut stepper =
-            new_stepper(StepperKind::GeneralizedAlpha(settings), arm.clone(), step_s, Start::Equilibrium).unwrap();
-        let mut seen = Observation::new(&arm);
+            new_stepper(StepperKind::GeneralizedAlpha(settings), plant.clone(), step_s, Start::Equilibrium).unwrap();
+        let mut seen = Observation::new(&plant);
         let every = (2e-3 / step_s).round() as usize;
         let place = |stepper: &mut Box<dyn Stepper>, seen: &mut Observation| {
             stepper.observe(seen);
@@ -112,10 +112,10 @@ fn the_exact_run_is_the_ordinary_run_but_for_what_iterations_leave() {
     let parts = |errors: &[f64; 6]| Vector3::new(errors[0], errors[1], errors[2]);
     let shift: Vec<Vector3<f64>> = exact.errors.iter().zip(&coarse).map(|(e, p)| parts(e) - p).collect();
     let rigid = |t: f64| {
-        let mut q = nalgebra::DVector::zeros(arm.model.nv());
+        let mut q = nalgebra::DVector::zeros(plant.model.nv());
         q.as_mut_slice()[..6].copy_from_slice(&reference_motion(t).0);
-        let mut data = flexarm_kinematics::Data::new(&arm.model);
-        flexarm_kinematics::forward_kinematics(&arm.model, &mut data, &q);
+        let mut data = flexarm_kinematics::Data::new(&plant.model);
+        flexarm_kinematics::forward_kinematics(&plant.model, &mut data, &q);
         data.X_WF(&tool).translation.vector
     };
     let off = exact.times_s.iter().zip(&shift).map(|(t, shift)| (shift + rigid(*t)).norm());
@@ -126,11 +126,11 @@ fn the_exact_run_is_the_ordinary_run_but_for_what_iterations_leave() {
 
 #[test]
 fn a_step_that_is_no_time_is_refused() {
-    let arm = oscillator([10.0, 1.6e4, 60.0]);
-    let (settings, tool) = (AlphaSettings::default(), arm.model.frame("mass").unwrap().clone());
+    let plant = oscillator([10.0, 1.6e4, 60.0]);
+    let (settings, tool) = (AlphaSettings::default(), plant.model.frame("mass").unwrap().clone());
     for step_s in [0.0, f64::NAN] {
         let run = ExactRun { settings, step_s, duration_s: 0.1, start: Start::Equilibrium, tool: tool.clone() };
-        let error = run.errors(&arm).unwrap_err().to_string();
+        let error = run.errors(&plant).unwrap_err().to_string();
         assert!(error.contains("positive time in seconds"), "{error}");
     }
 }

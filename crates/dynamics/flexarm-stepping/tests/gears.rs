@@ -49,10 +49,10 @@ fn spring(k: f64, damper: f64) -> Spring {
     Spring { name: "gear".into(), K: DMatrix::from_element(1, 1, k), damping, curve: None, geometric: None }
 }
 
-fn arm(tree: &Mechanism, damper: f64, motion: Arc<dyn PrescribedMotion>) -> FlexibleArm {
+fn plant(tree: &Mechanism, damper: f64, motion: Arc<dyn PrescribedMotion>) -> Plant {
     let model = Arc::new(Model::new(tree).expect("a tree"));
     let springs: Vec<Spring> = (0..model.n_elastic()).map(|_| spring(K, damper)).collect();
-    FlexibleArm::new(model, springs, motion).expect("valid")
+    Plant::new(model, springs, motion).expect("valid")
 }
 
 /// Motion of one joint; `f(t)` returns position, speed, acceleration.
@@ -60,9 +60,9 @@ fn motion(f: impl Fn(f64) -> [f64; 3] + Send + Sync + 'static) -> Arc<dyn Prescr
     Arc::new(MotionFn(move |t: f64, q: &mut [f64], v: &mut [f64], a: &mut [f64]| [q[0], v[0], a[0]] = f(t)))
 }
 
-fn run(arm: &FlexibleArm, kind: StepperKind, h: f64, duration: f64) -> Vec<Observation> {
-    let mut stepper = new_stepper(kind, arm.clone(), h, Start::Undeformed).expect("starts");
-    let mut seen = Observation::new(arm);
+fn run(plant: &Plant, kind: StepperKind, h: f64, duration: f64) -> Vec<Observation> {
+    let mut stepper = new_stepper(kind, plant.clone(), h, Start::Undeformed).expect("starts");
+    let mut seen = Observation::new(plant);
     let mut all = Vec::new();
     for k in 0..=(duration / h).round() as usize {
         if k > 0 {
@@ -106,15 +106,15 @@ fn at_rest_the_joint_is_off_by_the_error_of_its_gear() {
         let errors = ripple(100.0, 4e-5);
         let truth = 4e-5 * (100.0 * q + 0.4).sin() + 2e-5 * (200.0 * q - 1.0).sin() + torque / K;
         let still = Arc::new(Held(vec![q]));
-        let arm = arm(&chain(1, 0.0), 0.0, still).with_transmission_errors(errors).unwrap();
-        let body = arm.model.frame("body_0").unwrap().clone();
+        let plant = plant(&chain(1, 0.0), 0.0, still).with_transmission_errors(errors).unwrap();
+        let body = plant.model.frame("body_0").unwrap().clone();
         let load = Wrench::new(Vector3::zeros(), vector![0.0, 0.0, torque]);
-        let arm = arm.with_loads(vec![(body.body, load)]).unwrap();
-        let e = static_equilibrium(&arm, 0.0).unwrap();
-        let linear = linearise(&arm, &body, &Wrench::zeros(), 0.0).unwrap();
-        let mut path = StaticPath::new(arm.clone());
+        let plant = plant.with_loads(vec![(body.body, load)]).unwrap();
+        let e = static_equilibrium(&plant, 0.0).unwrap();
+        let linear = linearise(&plant, &body, &Wrench::zeros(), 0.0).unwrap();
+        let mut path = StaticPath::new(plant.clone());
         let along = path.at(0.0).unwrap()[1];
-        let mut point = OperatingPoint::new(arm.clone(), body.clone());
+        let mut point = OperatingPoint::new(plant.clone(), body.clone());
         point.solve(&[q], &Wrench::zeros()).unwrap();
         let turned = point.tcp_pose().rotation.euler_angles().2 - point.rigid_tcp_pose().rotation.euler_angles().2;
         for found in [e[0], linear.equilibrium[0], along] {
@@ -142,7 +142,7 @@ fn ripple_drives_the_joint_through_its_resonance_as_a_base_drives_an_oscillator(
         let omega = w / cycles;
         let turning = motion(move |t| [omega * t, omega, 0.0]);
         let harmonics = vec![Harmonic { amplitude: A, cycles, phase: 0.0 }];
-        let arm = arm(&chain(1, 0.05), d, turning)
+        let plant = plant(&chain(1, 0.05), d, turning)
             .with_transmission_errors(vec![TransmissionError { element: 0, motor: 0, harmonics }])
             .unwrap();
         let truth = A * ((K * K + (d * w).powi(2)) / ((K - J * w * w).powi(2) + (d * w).powi(2))).sqrt();
@@ -154,7 +154,7 @@ fn ripple_drives_the_joint_through_its_resonance_as_a_base_drives_an_oscillator(
             (StepperKind::Rk4, 50.0, 1e-4),
             (reference(), 50.0, 1e-5),
         ] {
-            let seen = run(&arm, kind, period / steps, settled + 2.0 * period);
+            let seen = run(&plant, kind, period / steps, settled + 2.0 * period);
             // Amplitude of the first harmonic over the last period.
             let last = &seen[seen.len() - 51..seen.len() - 1];
             let (mut c, mut s) = (0.0, 0.0);
@@ -180,14 +180,14 @@ const IDLE: ServoAxis = ServoAxis {
 };
 
 /// Returns an arm whose motor turns freely, without torque, with an initial speed.
-fn coasting(tree: &Mechanism, damper: f64, speed: f64) -> FlexibleArm {
+fn coasting(tree: &Mechanism, damper: f64, speed: f64) -> Plant {
     let mut rigid = Mechanism::new("rigid");
     rigid.links.push(Link { name: "base".into(), inertia: None });
     let inertia = LinkInertia { mass: 1.0, com: Vector3::zeros(), inertia_com: Matrix3::identity() * J };
     rigid.links.push(Link { name: "body".into(), inertia: Some(inertia) });
     rigid.joints.push(Joint::new("axis_0", JointKind::Continuous(Vector3::z_axis()), "base", "body", Pose::identity()));
     let servo = Servo { sample_s: 1.0, axes: vec![IDLE], rigid: Arc::new(Model::new(&rigid).unwrap()) };
-    arm(tree, damper, motion(move |t| [speed * t, speed, 0.0])).with_servo(servo).unwrap()
+    plant(tree, damper, motion(move |t| [speed * t, speed, 0.0])).with_servo(servo).unwrap()
 }
 
 /// Truth: without supply and damping the energy of a coasting motor with its body is conserved,
@@ -195,11 +195,11 @@ fn coasting(tree: &Mechanism, damper: f64, speed: f64) -> FlexibleArm {
 /// (RK4 at 0.05 ms), 5.8e-4 (SDIRK at 0.1 ms).
 #[test]
 fn ripple_takes_no_energy_from_a_motor_that_coasts() {
-    let arm = coasting(&chain(1, 0.3), 0.0, 2.5).with_transmission_errors(ripple(100.0, 2e-3)).unwrap();
+    let plant = coasting(&chain(1, 0.3), 0.0, 2.5).with_transmission_errors(ripple(100.0, 2e-3)).unwrap();
     for (kind, h, bound) in
         [(reference(), 1e-3, 1e-6), (StepperKind::Rk4, 5e-5, 1e-6), (StepperKind::Sdirk3, 1e-4, 1e-3)]
     {
-        let seen = run(&arm, kind, h, 0.5);
+        let seen = run(&plant, kind, h, 0.5);
         let energy = |o: &Observation| o.energy.iter().sum::<f64>();
         let drift = seen.iter().map(|o| (energy(o) / energy(&seen[0]) - 1.0).abs()).fold(0.0, f64::max);
         let swing = seen.iter().map(|o| o.energy[2] / energy(&seen[0])).fold(0.0, f64::max);
@@ -215,12 +215,12 @@ fn law() -> Hysteresis {
 }
 
 /// Returns the body under an oscillating torque, its motor held.
-fn swinging(amplitude: f64, hz: f64) -> FlexibleArm {
-    let arm = arm(&chain(1, 0.0), 20.0, Arc::new(Held(vec![0.0]))).with_hysteresis(vec![law()]).unwrap();
-    let body = arm.model.frame("body_0").unwrap().body;
+fn swinging(amplitude: f64, hz: f64) -> Plant {
+    let plant = plant(&chain(1, 0.0), 20.0, Arc::new(Held(vec![0.0]))).with_hysteresis(vec![law()]).unwrap();
+    let body = plant.model.frame("body_0").unwrap().body;
     let torque = move |t: f64| Wrench::new(Vector3::zeros(), vector![0.0, 0.0, amplitude * (TAU * hz * t).sin()]);
     let wrench = TimedWrench::new(torque).with_period(1.0 / hz);
-    arm.with_timed_loads(vec![Load { wrench, ..Load::constant(body, Wrench::zeros()) }]).unwrap()
+    plant.with_timed_loads(vec![Load { wrench, ..Load::constant(body, Wrench::zeros()) }]).unwrap()
 }
 
 /// Truth: the area of Masing's loop at the amplitude reached, `4 Σ k r (A - r)`, for any speed of
@@ -229,9 +229,9 @@ fn swinging(amplitude: f64, hz: f64) -> FlexibleArm {
 #[test]
 fn a_closed_cycle_loses_the_area_of_its_loop_at_any_speed() {
     for (amplitude, hz) in [(25.0, 0.5), (25.0, 2.0), (90.0, 0.5), (90.0, 2.0), (4.0, 1.0)] {
-        let arm = swinging(amplitude, hz);
+        let plant = swinging(amplitude, hz);
         for kind in [ALPHA, StepperKind::Sdirk3, StepperKind::Rk4] {
-            let seen = run(&arm, kind, 2.5e-4 / hz, 2.0 / hz);
+            let seen = run(&plant, kind, 2.5e-4 / hz, 2.0 / hz);
             let half = seen.len() / 2;
             let lost = seen[seen.len() - 1].hysteresis_work - seen[half].hysteresis_work;
             let reached = seen[half..].iter().map(|o| o.q[0].abs().max(o.q[1].abs())).fold(0.0, f64::max);
@@ -253,8 +253,8 @@ fn a_closed_cycle_loses_the_area_of_its_loop_at_any_speed() {
 /// (order 2.0), SDIRK 3.5e-4 to 2.5e-6 (1.8), RK4 2.0e-4 to 2.1e-6 (1.7).
 #[test]
 fn steppers_with_hysteresis_come_to_one_solution_as_the_step_falls() {
-    let shaken = |arm: &FlexibleArm, kind: StepperKind, h: f64| -> Vec<f64> {
-        let seen = run(arm, kind, h, 0.12);
+    let shaken = |plant: &Plant, kind: StepperKind, h: f64| -> Vec<f64> {
+        let seen = run(plant, kind, h, 0.12);
         let every = (4e-3 / h).round() as usize;
         seen.iter().step_by(every).map(|o| o.q[1]).collect()
     };
@@ -262,13 +262,13 @@ fn steppers_with_hysteresis_come_to_one_solution_as_the_step_falls() {
         let w = TAU * 20.0;
         [8e-3 * (1.0 - (w * t).cos()), 8e-3 * w * (w * t).sin(), 8e-3 * w * w * (w * t).cos()]
     });
-    let arm = arm(&chain(1, 0.0), 5.0, start).with_hysteresis(vec![law()]).unwrap();
-    let truth = shaken(&arm, StepperKind::Rk4, 4e-6);
+    let plant = plant(&chain(1, 0.0), 5.0, start).with_hysteresis(vec![law()]).unwrap();
+    let truth = shaken(&plant, StepperKind::Rk4, 4e-6);
     let peak = truth.iter().fold(0.0f64, |m, x| m.max(x.abs()));
     assert!(peak > 5e-4, "{peak}");
     for kind in [ALPHA, StepperKind::Sdirk3, StepperKind::Rk4] {
         let errors = [4e-4, 1e-4, 2.5e-5].map(|h| {
-            let found = shaken(&arm, kind, h);
+            let found = shaken(&plant, kind, h);
             found.iter().zip(&truth).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / peak
         });
         let order = (errors[0] / errors[2]).log2() / 4.0;
@@ -282,19 +282,19 @@ fn steppers_with_hysteresis_come_to_one_solution_as_the_step_falls() {
 #[test]
 fn modes_have_the_stuck_stiffness_and_statics_the_first_loading() {
     let (friction, reach) = (40.0, 4e-4);
-    let arm = arm(&chain(1, 0.0), 0.0, Arc::new(Held(vec![0.0]))).with_hysteresis(vec![law()]).unwrap();
-    let body = arm.model.frame("body_0").unwrap().clone();
+    let plant = plant(&chain(1, 0.0), 0.0, Arc::new(Held(vec![0.0]))).with_hysteresis(vec![law()]).unwrap();
+    let body = plant.model.frame("body_0").unwrap().clone();
     let stuck = K + 6.0 * (2.0 * friction / (reach * 6.0)) * (5.5 / 6.0);
     for x in [0.0, 0.5, 1.0, 2.0] {
         let torque = K * x * reach + friction * if x > 1.0 { 1.0 } else { 2.0 * x - x * x };
         let load = Wrench::new(Vector3::zeros(), vector![0.0, 0.0, torque]);
-        let arm = arm.clone().with_loads(vec![(body.body, load)]).unwrap();
-        let e = static_equilibrium(&arm, 0.0).unwrap()[0];
+        let plant = plant.clone().with_loads(vec![(body.body, load)]).unwrap();
+        let e = static_equilibrium(&plant, 0.0).unwrap()[0];
         assert!((e - x * reach).abs() < 1e-15, "{x}: {e}");
-        assert!((arm.modes.omega[0] / (stuck / J).sqrt() - 1.0).abs() < 1e-12, "{x}");
-        let linear = linearise(&arm, &body, &Wrench::zeros(), 0.0).unwrap();
+        assert!((plant.modes.omega[0] / (stuck / J).sqrt() - 1.0).abs() < 1e-12, "{x}");
+        let linear = linearise(&plant, &body, &Wrench::zeros(), 0.0).unwrap();
         assert!((linear.compliance().unwrap()[(5, 5)] * stuck - 1.0).abs() < 1e-12, "{x}");
-        let mut point = OperatingPoint::new(arm, body.clone());
+        let mut point = OperatingPoint::new(plant, body.clone());
         point.solve(&[0.0], &Wrench::zeros()).unwrap();
         assert!((point.compliance()[(5, 5)] * stuck - 1.0).abs() < 1e-12, "{x}");
     }
@@ -315,13 +315,13 @@ fn friction_under_load_is_its_part_of_the_transmitted_torque() {
     rigid.joints[1].kind = JointKind::Fixed;
     for torque in [-60.0, 60.0] {
         for (tree, element) in [(chain(1, 0.2), Some(0)), (rigid.clone(), None)] {
-            let mut arm = arm(&tree, 30.0, motion(move |t| [speed * t, speed, 0.0]));
-            (arm.friction, arm.load_friction) = (vec![friction], laws(element));
-            let body = arm.model.frame("body_0").unwrap().body;
+            let mut plant = plant(&tree, 30.0, motion(move |t| [speed * t, speed, 0.0]));
+            (plant.friction, plant.load_friction) = (vec![friction], laws(element));
+            let body = plant.model.frame("body_0").unwrap().body;
             let load = Wrench::new(Vector3::zeros(), vector![0.0, 0.0, -torque]);
-            let arm = arm.with_loads(vec![(body, load)]).unwrap();
+            let plant = plant.with_loads(vec![(body, load)]).unwrap();
             for kind in [ALPHA, StepperKind::Rk4] {
-                let seen = run(&arm, kind, 1e-3, 2.0);
+                let seen = run(&plant, kind, 1e-3, 2.0);
                 let last = &seen[seen.len() - 1];
                 let truth = torque + 2.0 * speed + 5.0 + c * f64::abs(torque);
                 assert!((last.drive[0] / truth - 1.0).abs() < 1e-9, "{torque} {} {truth}", last.drive[0]);
@@ -332,13 +332,13 @@ fn friction_under_load_is_its_part_of_the_transmitted_torque() {
         }
     }
     // A motor that coasts against the load loses the energy dissipated by its friction.
-    let mut arm = coasting(&chain(1, 0.4), 3.0, 4.0);
-    arm.load_friction = laws(Some(0));
-    let body = arm.model.frame("body_0").unwrap().body;
+    let mut plant = coasting(&chain(1, 0.4), 3.0, 4.0);
+    plant.load_friction = laws(Some(0));
+    let body = plant.model.frame("body_0").unwrap().body;
     let load = Wrench::new(Vector3::zeros(), vector![0.0, 0.0, -6.0]);
-    let arm = arm.with_loads(vec![(body, load)]).unwrap();
+    let plant = plant.with_loads(vec![(body, load)]).unwrap();
     for kind in [ALPHA, StepperKind::Sdirk3, StepperKind::Rk4, reference()] {
-        let seen = run(&arm, kind, 2e-4, 0.5);
+        let seen = run(&plant, kind, 2e-4, 0.5);
         eprintln!(
             "{:<18} coasts from {} to {:.4}, energy {:.1e}",
             kind.name(),
@@ -352,9 +352,9 @@ fn friction_under_load_is_its_part_of_the_transmitted_torque() {
     let mut bare = chain(1, 0.4);
     bare.joints[1].kind = JointKind::Fixed;
     let model = Arc::new(Model::new(&bare).unwrap());
-    let mut arm = FlexibleArm::new(model.clone(), Vec::<Spring>::new(), Arc::new(Held(vec![0.0]))).unwrap();
-    arm.load_friction = laws(None);
-    let refused = arm.with_servo(Servo { sample_s: 1e-3, axes: vec![IDLE], rigid: model });
+    let mut plant = Plant::new(model.clone(), Vec::<Spring>::new(), Arc::new(Held(vec![0.0]))).unwrap();
+    plant.load_friction = laws(None);
+    let refused = plant.with_servo(Servo { sample_s: 1e-3, axes: vec![IDLE], rigid: model });
     assert!(refused.is_err_and(|e| e.to_string().contains("gearbox")));
 }
 
@@ -369,7 +369,7 @@ fn coupled(C: Matrix2<f64>, elements: Vec<usize>) -> GearCoupling {
 /// A wrist whose second motor also turns the first joint, and vice versa.
 const WRIST: Matrix2<f64> = Matrix2::new(1.0, 0.25, -0.4, 1.0);
 
-fn two(C: Option<Matrix2<f64>>) -> FlexibleArm {
+fn two(C: Option<Matrix2<f64>>) -> Plant {
     let moves = MotionFn(|t: f64, q: &mut [f64], v: &mut [f64], a: &mut [f64]| {
         for (k, (far, w)) in [(0.5, 3.0f64), (-0.8, 5.0)].into_iter().enumerate() {
             (q[k], v[k], a[k]) = (far * (1.0 - (w * t).cos()), far * w * (w * t).sin(), far * w * w * (w * t).cos());
@@ -377,11 +377,11 @@ fn two(C: Option<Matrix2<f64>>) -> FlexibleArm {
     });
     let model = Arc::new(Model::new(&chain(2, 0.1)).unwrap());
     let springs = vec![spring(K, 12.0), spring(0.6 * K, 7.0)];
-    let mut arm = FlexibleArm::new(model, springs, Arc::new(moves)).unwrap();
-    arm.friction = vec![Friction { viscous: 3.0, coulomb: 2.0, regularisation: 0.02, ..Friction::NONE }; 2];
+    let mut plant = Plant::new(model, springs, Arc::new(moves)).unwrap();
+    plant.friction = vec![Friction { viscous: 3.0, coulomb: 2.0, regularisation: 0.02, ..Friction::NONE }; 2];
     match C {
-        Some(C) => arm.with_coupling(coupled(C, vec![0, 1])).unwrap(),
-        None => arm,
+        Some(C) => plant.with_coupling(coupled(C, vec![0, 1])).unwrap(),
+        None => plant,
     }
 }
 
@@ -389,7 +389,7 @@ fn two(C: Option<Matrix2<f64>>) -> FlexibleArm {
 /// C^-T K_m C^-1 and M = [J_1 + J_2, J_2; J_2, J_2], both written out as 2x2 matrices.
 #[test]
 fn coupled_gears_give_way_and_swing_as_two_springs_at_the_motors() {
-    let arm = two(Some(WRIST));
+    let plant = two(Some(WRIST));
     let K_m = Matrix2::new(K, 0.0, 0.0, 0.6 * K);
     let mixed = WRIST;
     let back = mixed.try_inverse().unwrap();
@@ -398,17 +398,17 @@ fn coupled_gears_give_way_and_swing_as_two_springs_at_the_motors() {
     let A = M.try_inverse().unwrap() * stiff;
     let (half, det) = (0.5 * A.trace(), A.determinant());
     let root = (half * half - det).sqrt();
-    for (found, truth) in arm.modes.omega.iter().zip([(half - root).sqrt(), (half + root).sqrt()]) {
+    for (found, truth) in plant.modes.omega.iter().zip([(half - root).sqrt(), (half + root).sqrt()]) {
         assert!((found / truth - 1.0).abs() < 1e-12, "{found} {truth}");
     }
     // A torque on the second body acts on both joints, one on the first body on the first joint
     // only.
     let torques = [7.0, -11.0];
     let wrench = |k: usize| {
-        let body = arm.model.frame(&format!("body_{k}")).unwrap().body;
+        let body = plant.model.frame(&format!("body_{k}")).unwrap().body;
         (body, Wrench::new(Vector3::zeros(), vector![0.0, 0.0, torques[k]]))
     };
-    let loaded = arm.clone().with_loads(vec![wrench(0), wrench(1)]).unwrap();
+    let loaded = plant.clone().with_loads(vec![wrench(0), wrench(1)]).unwrap();
     let tau = Vector2::new(torques[0] + torques[1], torques[1]);
     let truth = mixed * K_m.try_inverse().unwrap() * mixed.transpose() * tau;
     let e = static_equilibrium(&loaded, 0.0).unwrap();
@@ -418,7 +418,7 @@ fn coupled_gears_give_way_and_swing_as_two_springs_at_the_motors() {
     // Modal damping: the requested ratio in every mode.
     let mut springs = vec![spring(K, 0.0), spring(0.6 * K, 0.0)];
     springs.iter_mut().for_each(|s| s.damping = Damping::Modal(0.04));
-    let modal = FlexibleArm::new(arm.model.clone(), springs, Arc::new(Held(vec![0.0, 0.0]))).unwrap();
+    let modal = Plant::new(plant.model.clone(), springs, Arc::new(Held(vec![0.0, 0.0]))).unwrap();
     let modal = modal.with_coupling(coupled(mixed, vec![0, 1])).unwrap();
     for (omega, phi) in modal.modes.omega.iter().zip(modal.modes.shapes.column_iter()) {
         assert!((phi.dot(&(&modal.D * phi)) / (2.0 * 0.04 * omega) - 1.0).abs() < 1e-12);
@@ -430,17 +430,17 @@ fn coupled_gears_give_way_and_swing_as_two_springs_at_the_motors() {
 /// coupling (C = 1) results are bitwise those of single gears.
 #[test]
 fn a_run_with_coupled_gears_balances_and_without_coupling_has_the_same_bits() {
-    let arm = two(Some(WRIST));
-    let truth = run(&arm, reference(), 1e-3, 0.6);
+    let plant = two(Some(WRIST));
+    let truth = run(&plant, reference(), 1e-3, 0.6);
     let peak = truth.iter().map(|o| o.q[2].abs()).fold(0.0, f64::max);
     for (kind, h, bound) in [(ALPHA, 1e-3, 3e-2), (StepperKind::Sdirk3, 1e-3, 3e-2), (StepperKind::Rk4, 2e-4, 1e-5)] {
-        let seen = run(&arm, kind, h, 0.6);
+        let seen = run(&plant, kind, h, 0.6);
         let every = (1e-3 / h).round() as usize;
         let error =
             seen.iter().step_by(every).zip(&truth).map(|(a, b)| (a.q[2] - b.q[2]).abs()).fold(0.0, f64::max) / peak;
         eprintln!("{:<18} {error:.1e} of the peak, energy {:.1e}", kind.name(), imbalance(&seen));
         assert!(error < bound && imbalance(&seen) < 1e-3, "{} {error} {}", kind.name(), imbalance(&seen));
-        let coupling = arm.coupling.as_ref().unwrap();
+        let coupling = plant.coupling.as_ref().unwrap();
         for o in seen.iter().step_by(50) {
             let motors = coupling.motor_torques(o.drive.as_slice());
             let rates = &coupling.C_inverse * o.qdot.rows(0, 2);
@@ -456,12 +456,12 @@ fn a_run_with_coupled_gears_balances_and_without_coupling_has_the_same_bits() {
     }
     // SPOOK and the reference stepper report what they do not support.
     let spook = StepperKind::Spook(SpookSettings::default());
-    for (arm, kind, word) in [
+    for (plant, kind, word) in [
         (two(Some(WRIST)), spook, "several joints"),
         (swinging(1.0, 1.0), spook, "hysteresis"),
         (swinging(1.0, 1.0), reference(), "hysteresis"),
     ] {
-        let refused = new_stepper(kind, arm, 1e-3, Start::Equilibrium).err().expect("refused").to_string();
+        let refused = new_stepper(kind, plant, 1e-3, Start::Equilibrium).err().expect("refused").to_string();
         assert!(refused.contains(word), "{refused}");
     }
 }

@@ -26,7 +26,7 @@ fn column() -> (Arc<Model>, Vec<GearSpring>) {
     (Arc::new(Model::new(&column).expect("a tree")), springs)
 }
 
-fn arm(play: Option<Play>, dampers: f64, motion: Arc<dyn PrescribedMotion>) -> FlexibleArm {
+fn plant(play: Option<Play>, dampers: f64, motion: Arc<dyn PrescribedMotion>) -> Plant {
     let (model, springs) = column();
     let guide = Guide { coordinate: 0, overlap: [OUTER_END, -1.0], compliance: COMPLIANCE, play };
     let spring = |spring: GearSpring| Spring {
@@ -36,15 +36,15 @@ fn arm(play: Option<Play>, dampers: f64, motion: Arc<dyn PrescribedMotion>) -> F
         curve: Some(SpringCurve::Guide(guide)),
         geometric: None,
     };
-    FlexibleArm::new(model, springs.into_iter().map(spring).collect(), motion).expect("stands")
+    Plant::new(model, springs.into_iter().map(spring).collect(), motion).expect("stands")
 }
 
 /// Truth: tilt by C(l) M under the moment of the weight at the deflected lever.
 #[test]
 fn the_tilt_of_a_column_grows_as_its_tubes_overlap_less() {
     for position in [0.1, 0.7, 1.2] {
-        let arm = arm(None, 0.0, Arc::new(Held(vec![position])));
-        let e = static_equilibrium(&arm, 0.0).expect("stands");
+        let plant = plant(None, 0.0, Arc::new(Held(vec![position])));
+        let e = static_equilibrium(&plant, 0.0).expect("stands");
         let l: f64 = OUTER_END - position;
         let C = COMPLIANCE[0] + COMPLIANCE[1] / l + COMPLIANCE[2] / (l * l);
         // The mass is above the middle of the overlap by this height.
@@ -55,11 +55,11 @@ fn the_tilt_of_a_column_grows_as_its_tubes_overlap_less() {
         // measured 3e-16
         assert!(error.abs() < 1e-10 && e[0].abs() < 1e-12, "{position} {e} {error:e}");
         // The tangent of a pose is that of the guide at this overlap.
-        let tool = arm.model.frame("upper").expect("there").clone();
-        let mut point = OperatingPoint::new(arm.clone(), tool.clone());
+        let tool = plant.model.frame("upper").expect("there").clone();
+        let mut point = OperatingPoint::new(plant.clone(), tool.clone());
         point.solve(&[position], &Wrench::zeros()).expect("stands");
         assert!((point.deflections()[1] / e[1] - 1.0).abs() < 1e-12);
-        let linear = linearise(&arm, &tool, &Wrench::zeros(), 0.0).expect("stands");
+        let linear = linearise(&plant, &tool, &Wrench::zeros(), 0.0).expect("stands");
         let K = linear.springs[(1, 1)];
         assert!((K * C - 1.0).abs() < 1e-12, "{K}");
     }
@@ -70,8 +70,8 @@ fn the_tilt_of_a_column_grows_as_its_tubes_overlap_less() {
 fn a_guide_with_play_leans_to_the_side_of_its_load() {
     let play = Play { gap: 4e-4, centre: 5.0, width: 20.0 };
     let position = 1.1;
-    let arm = arm(Some(play), 0.0, Arc::new(Held(vec![position])));
-    let e = static_equilibrium(&arm, 0.0).expect("stands");
+    let plant = plant(Some(play), 0.0, Arc::new(Held(vec![position])));
+    let e = static_equilibrium(&plant, 0.0).expect("stands");
     let l: f64 = OUTER_END - position;
     let C = COMPLIANCE[0] + COMPLIANCE[1] / l + COMPLIANCE[2] / (l * l);
     let height = position + 0.3 - 0.5 * (OUTER_END + position);
@@ -91,7 +91,7 @@ fn tubes_that_do_not_overlap_are_an_error_with_the_name_of_the_guide() {
 }
 
 fn arm_at(position: f64) -> Result<DVector<f64>, StepError> {
-    let soft = arm(None, 0.0, Arc::new(Held(vec![0.2])));
+    let soft = plant(None, 0.0, Arc::new(Held(vec![0.2])));
     static_equilibrium(&soft.along(Arc::new(Held(vec![position]))), 0.0)
 }
 
@@ -111,19 +111,19 @@ fn the_drive_of_a_lifting_column_does_the_work_that_its_energy_takes() {
         (StepperKind::Rk4, 2e-5),
         (StepperKind::Reference(ReferenceSettings::new(1e-10)), 1e-4),
     ] {
-        let arm = Arc::new(arm(Some(play), 0.0, Arc::new(MotionFn(lift.0))));
-        let mut stepper = new_stepper(kind, arm.clone(), h, Start::Undeformed).expect("starts");
-        let mut seen = Observation::new(&arm);
+        let plant = Arc::new(plant(Some(play), 0.0, Arc::new(MotionFn(lift.0))));
+        let mut stepper = new_stepper(kind, plant.clone(), h, Start::Undeformed).expect("starts");
+        let mut seen = Observation::new(&plant);
         stepper.observe(&mut seen);
         let total = |seen: &Observation| seen.energy.iter().sum::<f64>();
         let (begun, mut work, mut power) = (total(&seen), 0.0, seen.power[0]);
         let (mut worst, mut largest, mut without) = (0.0_f64, 0.0_f64, 0.0);
         for _ in 0..(0.5 / h) as usize {
-            let was = reaction(&arm, &seen.q) * seen.qdot[0];
+            let was = reaction(&plant, &seen.q) * seen.qdot[0];
             stepper.step().expect("steps");
             stepper.observe(&mut seen);
             work += 0.5 * h * (power + seen.power[0]);
-            without += 0.5 * h * (was + reaction(&arm, &seen.q) * seen.qdot[0]);
+            without += 0.5 * h * (was + reaction(&plant, &seen.q) * seen.qdot[0]);
             power = seen.power[0];
             worst = worst.max((total(&seen) - begun - work).abs());
             largest = largest.max(seen.energy[2]);
@@ -138,12 +138,12 @@ fn the_drive_of_a_lifting_column_does_the_work_that_its_energy_takes() {
 }
 
 /// Force of the guides on the lift at constant tilt, by a difference of their energies.
-fn reaction(arm: &FlexibleArm, q: &DVector<f64>) -> f64 {
+fn reaction(plant: &Plant, q: &DVector<f64>) -> f64 {
     let h = 1e-5;
     let at = |change: f64| {
         let mut q = q.clone();
         q[0] += change;
-        arm.elastic_energy(q.as_slice())
+        plant.elastic_energy(q.as_slice())
     };
     (at(h) - at(-h)) / (2.0 * h)
 }

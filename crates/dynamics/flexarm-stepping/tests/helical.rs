@@ -25,7 +25,7 @@ fn steppers() -> [StepperKind; 4] {
 }
 
 /// Returns an upright spindle that carries a body, behind a spring if `spring`.
-fn spindle(spring: bool, motion: Arc<dyn PrescribedMotion>) -> FlexibleArm {
+fn spindle(spring: bool, motion: Arc<dyn PrescribedMotion>) -> Plant {
     let mut tree = Mechanism::new("spindle");
     let axis = Vector3::z_axis();
     let inertia_com = Matrix3::from_diagonal(&Vector3::new(0.03, 0.03, I_ZZ));
@@ -46,7 +46,7 @@ fn spindle(spring: bool, motion: Arc<dyn PrescribedMotion>) -> FlexibleArm {
     let K = DMatrix::from_element(1, 1, STIFFNESS);
     let springs = Spring { name: "spring".into(), K, damping, curve: None, geometric: None };
     let springs = if spring { vec![springs] } else { vec![] };
-    FlexibleArm::new(Arc::new(Model::new(&tree).unwrap()), springs, motion).unwrap()
+    Plant::new(Arc::new(Model::new(&tree).unwrap()), springs, motion).unwrap()
 }
 
 /// Truth: released with relaxed spring, the spindle oscillates as φ₀ (1 - cos ωt) with φ₀ = -m g
@@ -56,15 +56,15 @@ fn spindle(spring: bool, motion: Arc<dyn PrescribedMotion>) -> FlexibleArm {
 /// rest at most 2e-10.
 #[test]
 fn a_body_on_a_sprung_spindle_swings_about_its_sag() {
-    let arm = spindle(true, Arc::new(Held(vec![0.0])));
+    let plant = spindle(true, Arc::new(Held(vec![0.0])));
     let (sag, omega) = (-MASS * G * PITCH / STIFFNESS, (STIFFNESS / INERTIA).sqrt());
-    assert!((arm.modes.omega[0] / omega - 1.0).abs() < 1e-12, "{} {omega}", arm.modes.omega[0]);
+    assert!((plant.modes.omega[0] / omega - 1.0).abs() < 1e-12, "{} {omega}", plant.modes.omega[0]);
     let h = 2e-4;
     for (kind, bound) in steppers().into_iter().zip([1e-5, 1e-7, 5e-6, 5e-2]) {
         let mut worst = [0.0f64; 2];
         for (start, worst) in [Start::Equilibrium, Start::Undeformed].into_iter().zip(&mut worst) {
-            let mut stepper = new_stepper(kind, arm.clone(), h, start).unwrap();
-            let mut seen = Observation::new(&arm);
+            let mut stepper = new_stepper(kind, plant.clone(), h, start).unwrap();
+            let mut seen = Observation::new(&plant);
             for _ in 0..2500 {
                 stepper.step().unwrap();
                 stepper.observe(&mut seen);
@@ -101,10 +101,10 @@ impl PrescribedMotion for Swing {
 /// excluded.
 #[test]
 fn a_driven_spindle_needs_the_torque_of_the_textbook() {
-    let arm = spindle(false, Arc::new(Swing));
+    let plant = spindle(false, Arc::new(Swing));
     for (kind, bound) in steppers().into_iter().zip([1e-12, 1e-12, 1e-12, 5e-3]) {
-        let mut stepper = new_stepper(kind, arm.clone(), 2e-4, Start::Equilibrium).unwrap();
-        let mut seen = Observation::new(&arm);
+        let mut stepper = new_stepper(kind, plant.clone(), 2e-4, Start::Equilibrium).unwrap();
+        let mut seen = Observation::new(&plant);
         let (mut worst, mut largest) = (0.0f64, 0.0f64);
         for _ in 0..5000 {
             stepper.step().unwrap();

@@ -11,7 +11,7 @@ use nalgebra::{DVector, Matrix6xX, Vector3};
 
 const POSE: [f64; 3] = [0.3, 0.35, 0.2];
 
-fn arm(motion: Arc<dyn PrescribedMotion>, beta: f64) -> FlexibleArm {
+fn plant(motion: Arc<dyn PrescribedMotion>, beta: f64) -> Plant {
     let made = palletising_arm(true);
     let spring = |(name, K): (String, _)| Spring {
         name,
@@ -21,7 +21,7 @@ fn arm(motion: Arc<dyn PrescribedMotion>, beta: f64) -> FlexibleArm {
         geometric: None,
     };
     let springs: Vec<Spring> = made.springs.into_iter().map(spring).collect();
-    FlexibleArm::new(Arc::new(Model::new(&made.mechanism).unwrap()), springs, motion).unwrap()
+    Plant::new(Arc::new(Model::new(&made.mechanism).unwrap()), springs, motion).unwrap()
 }
 
 /// Returns a motion from [`POSE`] to another pose in 0.6 s, with continuous acceleration.
@@ -46,10 +46,10 @@ fn of(word: &str) -> StepperKind {
 
 /// Returns the final state of a run: position of the tool, energies (kinetic, potential, elastic),
 /// drive forces.
-fn end(arm: &FlexibleArm, kind: StepperKind, h: f64, duration: f64) -> (Vector3<f64>, f64, DVector<f64>) {
-    let tool = arm.model.frame("tool").unwrap().clone();
-    let mut seen = Observation::new(arm);
-    let mut stepper = new_stepper(kind, arm.clone(), h, Start::Equilibrium).unwrap();
+fn end(plant: &Plant, kind: StepperKind, h: f64, duration: f64) -> (Vector3<f64>, f64, DVector<f64>) {
+    let tool = plant.model.frame("tool").unwrap().clone();
+    let mut seen = Observation::new(plant);
+    let mut stepper = new_stepper(kind, plant.clone(), h, Start::Equilibrium).unwrap();
     (0..(duration / h).round() as usize).for_each(|_| stepper.step().unwrap());
     stepper.observe(&mut seen);
     ((seen.X_WB[tool.body] * tool.X_BF).translation.vector, seen.energy[1], seen.drive.clone())
@@ -59,19 +59,19 @@ fn end(arm: &FlexibleArm, kind: StepperKind, h: f64, duration: f64) -> (Vector3<
 /// the end of the motion: measured generalised-alpha 1.0e-6, SDIRK3 8e-7, RK4 1.1e-7.
 #[test]
 fn steppers_agree_on_an_arm_with_a_loop() {
-    let arm = arm(moving(), 1e-4);
-    let (truth, _, drives) = end(&arm, of("reference"), 1e-3, 0.5);
+    let plant = plant(moving(), 1e-4);
+    let (truth, _, drives) = end(&plant, of("reference"), 1e-3, 0.5);
     let rigid = {
-        let mut data = Data::new(&arm.model);
-        let (mut state, mut a) = (State::zeros(&arm.model), DVector::zeros(arm.model.nv()));
-        arm.prescribed_state(0.5, &mut state, &mut a);
-        forward_kinematics(&arm.model, &mut data, &state.q);
-        data.X_WF(arm.model.frame("tool").unwrap()).translation.vector
+        let mut data = Data::new(&plant.model);
+        let (mut state, mut a) = (State::zeros(&plant.model), DVector::zeros(plant.model.nv()));
+        plant.prescribed_state(0.5, &mut state, &mut a);
+        forward_kinematics(&plant.model, &mut data, &state.q);
+        data.X_WF(plant.model.frame("tool").unwrap()).translation.vector
     };
     let share = (truth - rigid).norm();
     assert!(share > 1e-4, "{share}");
     for (word, h) in [("generalized-alpha", 2e-4), ("sdirk3", 2e-4), ("rk4", 2e-5)] {
-        let (found, _, torque) = end(&arm, of(word), h, 0.5);
+        let (found, _, torque) = end(&plant, of(word), h, 0.5);
         let off = (found - truth).norm() / share;
         let torque = (torque - &drives).amax() / drives.amax();
         eprintln!("{word} h {h:.0e}: {off:.1e} of the deflection ({share:.1e} m), torques {torque:.1e}");
@@ -85,11 +85,11 @@ fn steppers_agree_on_an_arm_with_a_loop() {
 /// m.
 #[test]
 fn spook_tends_to_the_others_on_an_arm_with_a_loop() {
-    let arm = arm(moving(), 1e-3);
-    let (truth, _, drives) = end(&arm, of("reference"), 1e-3, 0.5);
+    let plant = plant(moving(), 1e-3);
+    let (truth, _, drives) = end(&plant, of("reference"), 1e-3, 0.5);
     let mut last = f64::INFINITY;
     for h in [4e-4, 2e-4, 1e-4, 5e-5] {
-        let (found, _, torque) = end(&arm, of("spook"), h, 0.5);
+        let (found, _, torque) = end(&plant, of("spook"), h, 0.5);
         let off = (found - truth).norm();
         let torque = (torque - &drives).amax() / drives.amax();
         eprintln!("spook h {h:.0e}: {off:.2e} m, torques {torque:.1e}");
@@ -104,22 +104,23 @@ fn spook_tends_to_the_others_on_an_arm_with_a_loop() {
 /// due to the deflection itself, measured 7.7e-8 of it.
 #[test]
 fn an_arm_with_a_loop_rests_where_virtual_work_says() {
-    let mut arm = arm(Arc::new(Held(POSE.to_vec())), 1e-3);
+    let mut plant = plant(Arc::new(Held(POSE.to_vec())), 1e-3);
     // Ten thousand times stiffer, to reduce the second-order remainder.
-    for element in &mut arm.elements {
+    for element in &mut plant.elements {
         element.K *= 1e4;
     }
-    arm.update_modes_and_damping().unwrap();
-    let (model, tool) = (&arm.model, arm.model.frame("tool").unwrap());
+    plant.update_modes_and_damping().unwrap();
+    let (model, tool) = (&plant.model, plant.model.frame("tool").unwrap());
     let (mut data, mut state) = (Data::new(model), State::zeros(model));
     state.q.rows_mut(0, 3).copy_from_slice(&POSE);
-    let g = flexarm_kinematics::gravity_forces(model, &mut data, &state.q).rows(3, arm.model.n_elastic()).into_owned();
+    let g =
+        flexarm_kinematics::gravity_forces(model, &mut data, &state.q).rows(3, plant.model.n_elastic()).into_owned();
     forward_kinematics(model, &mut data, &state.q);
     let (rigid, mut J) = (data.X_WF(tool).translation.vector, Matrix6xX::zeros(model.nv()));
     frame_jacobian(model, &data, tool, &mut J);
-    let e = -arm.stiffness().cholesky().unwrap().solve(&g);
+    let e = -plant.stiffness().cholesky().unwrap().solve(&g);
     let expected = J.view((0, 3), (3, e.len())) * &e;
-    let (found, ..) = end(&arm, StepperKind::default(), 1e-3, 0.0);
+    let (found, ..) = end(&plant, StepperKind::default(), 1e-3, 0.0);
     let off = (found - rigid - &expected).norm() / expected.norm();
     eprintln!("sag {:.3e} m, {off:.1e} of it from first order", expected.norm());
     assert!(off < 1e-6, "{off:e}");
@@ -129,10 +130,10 @@ fn an_arm_with_a_loop_rests_where_virtual_work_says() {
 /// [`OperatingPoint`], measured 1.3e-8.
 #[test]
 fn compliance_over_a_loop_is_the_slope_of_the_equilibria() {
-    let arm = arm(Arc::new(Held(POSE.to_vec())), 1e-3);
-    let tool = arm.model.frame("tool").unwrap().clone();
-    let linear = linearise(&arm, &tool, &Wrench::zeros(), 0.0).unwrap();
-    let mut point = OperatingPoint::new(arm.clone(), tool.clone());
+    let plant = plant(Arc::new(Held(POSE.to_vec())), 1e-3);
+    let tool = plant.model.frame("tool").unwrap().clone();
+    let linear = linearise(&plant, &tool, &Wrench::zeros(), 0.0).unwrap();
+    let mut point = OperatingPoint::new(plant.clone(), tool.clone());
     let mut place = |F: Vector3<f64>| {
         point.solve(&POSE, &Wrench::new(F, Vector3::zeros())).unwrap();
         point.tcp_pose().translation.vector
@@ -154,9 +155,9 @@ fn compliance_over_a_loop_is_the_slope_of_the_equilibria() {
 /// 4.3e-11 of the exchanged energy.
 #[test]
 fn a_ringing_arm_with_a_loop_keeps_its_energy() {
-    let arm = arm(Arc::new(Held(POSE.to_vec())), 1e-14);
-    let mut stepper = new_stepper(of("rk4"), arm.clone(), 1e-5, Start::Undeformed).unwrap();
-    let mut seen = Observation::new(&arm);
+    let plant = plant(Arc::new(Held(POSE.to_vec())), 1e-14);
+    let mut stepper = new_stepper(of("rk4"), plant.clone(), 1e-5, Start::Undeformed).unwrap();
+    let mut seen = Observation::new(&plant);
     let (mut totals, mut kinetic) = (Vec::new(), 0.0f64);
     for _ in 0..5000 {
         stepper.step().unwrap();
@@ -173,10 +174,10 @@ fn a_ringing_arm_with_a_loop_keeps_its_energy() {
 /// point.
 #[test]
 fn frequencies_over_a_loop_agree_between_linear_structure_and_operating_point() {
-    let arm = arm(Arc::new(Held(POSE.to_vec())), 1e-3);
-    let tool = arm.model.frame("tool").unwrap().clone();
-    let linear = linearise(&arm, &tool, &Wrench::zeros(), 0.0).unwrap();
-    let mut point = OperatingPoint::new(arm.clone(), tool);
+    let plant = plant(Arc::new(Held(POSE.to_vec())), 1e-3);
+    let tool = plant.model.frame("tool").unwrap().clone();
+    let linear = linearise(&plant, &tool, &Wrench::zeros(), 0.0).unwrap();
+    let mut point = OperatingPoint::new(plant.clone(), tool);
     point.solve(&POSE, &Wrench::zeros()).unwrap();
     let L = linear.M.clone().cholesky().unwrap().l();
     let inverse = L.clone().try_inverse().unwrap();
@@ -204,15 +205,15 @@ fn servos_drive_a_rigid_arm_with_a_loop_along_its_motion() {
         limit: f64::INFINITY,
     };
     let servo = Servo { sample_s: 1e-4, axes: (0..3).map(axis).collect(), rigid: model.clone() };
-    let arm = FlexibleArm::new(model.clone(), Vec::<Spring>::new(), moving()).unwrap().with_servo(servo).unwrap();
-    let mut seen = Observation::new(&arm);
-    let mut stepper = new_stepper(StepperKind::default(), arm.clone(), 1e-4, Start::Equilibrium).unwrap();
+    let plant = Plant::new(model.clone(), Vec::<Spring>::new(), moving()).unwrap().with_servo(servo).unwrap();
+    let mut seen = Observation::new(&plant);
+    let mut stepper = new_stepper(StepperKind::default(), plant.clone(), 1e-4, Start::Equilibrium).unwrap();
     let (mut data, mut state, mut a) = (Data::new(&model), State::zeros(&model), DVector::zeros(3));
     let (mut worst, mut torque) = (0.0f64, 0.0f64);
     for _ in 0..5000 {
         stepper.step().unwrap();
         stepper.observe(&mut seen);
-        arm.prescribed_state(stepper.time(), &mut state, &mut a);
+        plant.prescribed_state(stepper.time(), &mut state, &mut a);
         worst = worst.max((&seen.q - &state.q).amax());
         let needed = inverse_dynamics(&model, &mut data, &state, &a);
         torque = torque.max((&seen.drive - needed).amax() / needed.amax());
@@ -225,7 +226,7 @@ fn servos_drive_a_rigid_arm_with_a_loop_along_its_motion() {
 #[test]
 fn steps_over_a_loop_do_not_allocate() {
     for (word, h) in [("generalized-alpha", 2e-4), ("sdirk3", 2e-4), ("rk4", 2e-5), ("spook", 2e-4)] {
-        let mut stepper = new_stepper(of(word), arm(moving(), 1e-4), h, Start::Equilibrium).unwrap();
+        let mut stepper = new_stepper(of(word), plant(moving(), 1e-4), h, Start::Equilibrium).unwrap();
         (0..20).for_each(|_| stepper.step().unwrap());
         assert_eq!(count_allocations(|| (0..100).for_each(|_| stepper.step().unwrap())), 0, "{word}");
     }
@@ -247,7 +248,7 @@ fn a_motion_that_tears_a_loop_apart_ends_with_its_name_and_time() {
     };
     for word in ["generalized-alpha", "sdirk3", "rk4", "reference", "spook"] {
         let mut stepper =
-            new_stepper(of(word), arm(tearing(), 1e-3), if word == "rk4" { 2e-5 } else { 1e-3 }, Start::Equilibrium)
+            new_stepper(of(word), plant(tearing(), 1e-3), if word == "rk4" { 2e-5 } else { 1e-3 }, Start::Equilibrium)
                 .unwrap();
         let error = (0..40_000).find_map(|_| stepper.step().err()).expect("it must stop");
         eprintln!("{word}: {error}");
@@ -256,7 +257,7 @@ fn a_motion_that_tears_a_loop_apart_ends_with_its_name_and_time() {
             "{word}: {error}"
         );
     }
-    let far = arm(Arc::new(Held(vec![0.0, 0.0, 0.0])), 1e-3);
+    let far = plant(Arc::new(Held(vec![0.0, 0.0, 0.0])), 1e-3);
     let mut point = OperatingPoint::new(far.clone(), far.model.frame("tool").unwrap().clone());
     let error = point.solve(&[0.0, -2.0, 3.1], &Wrench::zeros()).unwrap_err();
     assert!(matches!(error, StepError::OpenLoop { .. }), "{error}");

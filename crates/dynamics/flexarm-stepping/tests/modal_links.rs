@@ -45,20 +45,16 @@ fn own_inertia(modal: &ModalLink) -> LinkInertia {
 }
 
 /// Springs in the order of the model, selected by the name of their group.
-pub(crate) fn arm_of(
-    mechanism: &Mechanism,
-    springs: &[(String, Spring)],
-    motion: Arc<dyn PrescribedMotion>,
-) -> FlexibleArm {
+pub(crate) fn arm_of(mechanism: &Mechanism, springs: &[(String, Spring)], motion: Arc<dyn PrescribedMotion>) -> Plant {
     let model = Arc::new(Model::new(mechanism).expect("a tree"));
     let of = |group: &ElasticGroup| springs.iter().find(|(name, _)| *name == group.name).expect("a spring").1.clone();
     let ordered: Vec<Spring> = model.elastic().iter().map(of).collect();
-    FlexibleArm::new(model, ordered, motion).expect("valid")
+    Plant::new(model, ordered, motion).expect("valid")
 }
 
-fn run(arm: &FlexibleArm, kind: StepperKind, h: f64, start: Start, times: &[f64]) -> Vec<Observation> {
-    let mut stepper = new_stepper(kind, arm.clone(), h, start).expect("starts");
-    let (mut seen, mut done) = (Observation::new(arm), 0);
+fn run(plant: &Plant, kind: StepperKind, h: f64, start: Start, times: &[f64]) -> Vec<Observation> {
+    let mut stepper = new_stepper(kind, plant.clone(), h, start).expect("starts");
+    let (mut seen, mut done) = (Observation::new(plant), 0);
     let at = |t: &f64| {
         for _ in done..(t / h).round() as u64 {
             stepper.step().expect("steps");
@@ -79,12 +75,12 @@ fn bar(EA: f64, kGA: f64, EI: f64, mass: f64, rotary: f64) -> Bar {
 
 /// Returns a soft beam with a mass at its tip, flying freely: three prismatic and three revolute
 /// joints without torque, without gravity.
-fn free_flyer() -> FlexibleArm {
+fn free_flyer() -> Plant {
     flyer_with_modes_turned_by(0.0)
 }
 
 /// Returns the same with its first two modes, which have the same frequency, rotated by this angle.
-fn flyer_with_modes_turned_by(angle: f64) -> FlexibleArm {
+fn flyer_with_modes_turned_by(angle: f64) -> Plant {
     let beam = BeamLink::new("beam", Section::Given(bar(1e6, 4e5, 60.0, 0.6, 3e-3)), Material::STEEL, 1.5);
     // Five modes: with four, one of two modes with the same frequency would be missing, and which
     // one would be arbitrary.
@@ -134,10 +130,10 @@ fn flyer_with_modes_turned_by(angle: f64) -> FlexibleArm {
         feed_forward: 0.0,
         limit: f64::INFINITY,
     };
-    let arm = arm_of(&soft, &springs, Arc::new(motion));
+    let plant = arm_of(&soft, &springs, Arc::new(motion));
     let rigid = Arc::new(Model::new(&body).expect("a tree"));
     let servo = Servo { sample_s: 1000.0, axes: (0..6).map(idle).collect(), rigid };
-    arm.with_servo(servo).expect("a joint that carries a modal link needs no rotor")
+    plant.with_servo(servo).expect("a joint that carries a modal link needs no rotor")
 }
 
 /// Returns the link with its coordinates k and l rotated into each other: the same deflections in
@@ -177,24 +173,24 @@ fn modes_of_one_frequency_may_be_taken_in_any_directions() {
 }
 
 /// Returns momentum and energy of an observation.
-fn kept(arm: &FlexibleArm, seen: &Observation) -> (Wrench, f64) {
-    let (mut data, mut state) = (Data::new(&arm.model), State::zeros(&arm.model));
+fn kept(plant: &Plant, seen: &Observation) -> (Wrench, f64) {
+    let (mut data, mut state) = (Data::new(&plant.model), State::zeros(&plant.model));
     state.q.copy_from(&seen.q);
     state.qdot.copy_from(&seen.qdot);
-    forward_kinematics_velocity(&arm.model, &mut data, &state);
-    (momentum_of(&arm.model, &data), seen.energy.iter().sum())
+    forward_kinematics_velocity(&plant.model, &mut data, &state);
+    (momentum_of(&plant.model, &data), seen.energy.iter().sum())
 }
 
 /// Returns the maximum relative change of linear momentum, angular momentum and energy.
 fn drift_of_the_flyer(kind: StepperKind, h: f64) -> [f64; 3] {
-    let arm = free_flyer();
+    let plant = free_flyer();
     let times: Vec<f64> = (0..=20).map(|k| 0.02 * f64::from(k)).collect();
-    let seen = run(&arm, kind, h, Start::Undeformed, &times);
-    let (p0, E0) = kept(&arm, &seen[0]);
+    let seen = run(&plant, kind, h, Start::Undeformed, &times);
+    let (p0, E0) = kept(&plant, &seen[0]);
     let bent = seen.iter().map(|o| o.q.rows(6, 3).norm()).fold(0.0, f64::max);
     let mut worst = [0.0f64; 3];
     for o in &seen {
-        let (p, E) = kept(&arm, o);
+        let (p, E) = kept(&plant, o);
         let found = [
             (p.force - p0.force).norm() / p0.force.norm(),
             (p.torque - p0.torque).norm() / p0.torque.norm(),
@@ -247,11 +243,11 @@ fn drift_of_the_cantilever(kind: StepperKind, steps_per_period: f64, periods: f6
     let flexible = FlexibleLink { form: LinkForm::Modal(modal.clone()), ..FlexibleLink::new("beam", reduced) };
     let soft = substitute(&root, &[flexible]).expect("fits").mechanism;
     let springs = [("beam".to_owned(), modal_spring(&modal, Damping::StiffnessProportional(0.0)))];
-    let arm = arm_of(&soft, &springs, Arc::new(Held(vec![0.0])));
-    let period = 1.0 / arm.modes.frequencies_hz()[0];
+    let plant = arm_of(&soft, &springs, Arc::new(Held(vec![0.0])));
+    let period = 1.0 / plant.modes.frequencies_hz()[0];
     let h = period / steps_per_period;
-    let mut stepper = new_stepper(kind, arm.clone(), h, Start::Undeformed).expect("starts");
-    let mut seen = Observation::new(&arm);
+    let mut stepper = new_stepper(kind, plant.clone(), h, Start::Undeformed).expect("starts");
+    let mut seen = Observation::new(&plant);
     let mut energies = Vec::new();
     let mut swing = 0.0f64;
     for _ in 0..=(periods * steps_per_period) as usize {
@@ -316,16 +312,16 @@ fn arm_beams() -> [BeamLink; 2] {
 
 /// Returns the rigid reference arm with the two halves of each arm in one link.
 fn whole_links() -> Mechanism {
-    let mut arm = reference_arm(false).mechanism;
+    let mut plant = reference_arm(false).mechanism;
     for (name, next, length) in [("2b", "3", vector![0.0, 0.0, 1.095]), ("4b", "5", vector![1.0, 0.0, 0.0])] {
-        arm.links.retain(|l| l.name != format!("link{name}"));
-        arm.joints.retain(|j| j.name != format!("joint{name}"));
-        for joint in arm.joints.iter_mut().filter(|j| j.name == format!("joint{next}")) {
+        plant.links.retain(|l| l.name != format!("link{name}"));
+        plant.joints.retain(|j| j.name != format!("joint{name}"));
+        for joint in plant.joints.iter_mut().filter(|j| j.name == format!("joint{next}")) {
             joint.parent = format!("link{}", &name[..1]);
             joint.X_PJ = Pose::translation(length.x, length.y, length.z);
         }
     }
-    arm
+    plant
 }
 
 fn reference_arm_motion() -> Arc<dyn PrescribedMotion> {
@@ -333,7 +329,7 @@ fn reference_arm_motion() -> Arc<dyn PrescribedMotion> {
 }
 
 /// The reference arm with modal links.
-fn modal_arm(options: &ModalOptions, damping: Damping, motion: Arc<dyn PrescribedMotion>) -> FlexibleArm {
+fn modal_arm(options: &ModalOptions, damping: Damping, motion: Arc<dyn PrescribedMotion>) -> Plant {
     let modals = arm_beams().map(|b| Arc::new(b.modal_with(options).expect("a beam")));
     let links: Vec<FlexibleLink> = arm_beams()
         .iter()
@@ -348,14 +344,14 @@ fn modal_arm(options: &ModalOptions, damping: Damping, motion: Arc<dyn Prescribe
     arm_of(&soft, &springs, motion)
 }
 
-fn tcp(arm: &FlexibleArm, seen: &Observation) -> Vector3<f64> {
-    let frame = arm.model.frame("tcp").expect("there");
+fn tcp(plant: &Plant, seen: &Observation) -> Vector3<f64> {
+    let frame = plant.model.frame("tcp").expect("there");
     (seen.X_WB[frame.body] * frame.X_BF).translation.vector
 }
 
 /// Returns the maximum distance between the TCP positions of two runs.
-fn distance(arm: &FlexibleArm, a: &[Observation], b: &[Observation]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| (tcp(arm, a) - tcp(arm, b)).norm()).fold(0.0, f64::max)
+fn distance(plant: &Plant, a: &[Observation], b: &[Observation]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (tcp(plant, a) - tcp(plant, b)).norm()).fold(0.0, f64::max)
 }
 
 /// Truth: RK4, which differs from the reference stepper at rtol 1e-10 by 9e-11 m. The TCP deflects
@@ -366,27 +362,27 @@ fn distance(arm: &FlexibleArm, a: &[Observation], b: &[Observation]) -> f64 {
 #[test]
 fn steppers_agree_on_the_reference_arm_with_modal_links() {
     let options = ModalOptions { geometric: true, ..ModalOptions::default() };
-    let arm = modal_arm(&options, Damping::Modal(0.02), reference_arm_motion());
+    let plant = modal_arm(&options, Damping::Modal(0.02), reference_arm_motion());
     let times: Vec<f64> = (0..=60).map(|k| 0.01 * f64::from(k)).collect();
-    let of = |kind, h| run(&arm, kind, h, Start::Equilibrium, &times);
-    let truth = of(StepperKind::Rk4, 1e-2 / (0.004 * arm.modes.omega.last().expect("modes")).ceil());
-    let error = distance(&arm, &truth, &of(reference(1e-10), 1e-2));
+    let of = |kind, h| run(&plant, kind, h, Start::Equilibrium, &times);
+    let truth = of(StepperKind::Rk4, 1e-2 / (0.004 * plant.modes.omega.last().expect("modes")).ceil());
+    let error = distance(&plant, &truth, &of(reference(1e-10), 1e-2));
     eprintln!("reference stepper and RK4: {error:.1e} m");
     assert!(error < 3e-10, "{error:e}");
     for (correction, bound) in [(true, 1.5e-7), (false, 3e-6)] {
-        let errors = [2e-3, 1e-3].map(|h| distance(&arm, &truth, &of(alpha(0.9, correction), h)));
+        let errors = [2e-3, 1e-3].map(|h| distance(&plant, &truth, &of(alpha(0.9, correction), h)));
         let order = (errors[0] / errors[1]).log2();
         eprintln!("generalised-alpha, dispersion correction {correction}: {errors:?} m, order {order:.2}");
         assert!(errors[1] < bound && (order - 2.0).abs() < 0.1, "{errors:?}");
     }
     let refusal =
-        new_stepper(StepperKind::Spook(SpookSettings::default()), arm.clone(), 1e-3, Start::Equilibrium).err();
+        new_stepper(StepperKind::Spook(SpookSettings::default()), plant.clone(), 1e-3, Start::Equilibrium).err();
     let text = refusal.expect("refused").to_string();
     assert!(text.contains("modal links") && text.contains("generalized-alpha"), "{text}");
 }
 
 /// Returns the lumped reference arm with single-axis gearboxes at axes 2 and 3.
-fn geared_arm(motion: Arc<dyn PrescribedMotion>) -> FlexibleArm {
+fn geared_arm(motion: Arc<dyn PrescribedMotion>) -> Plant {
     let reference = reference_arm(true);
     let mut mechanism = reference.mechanism.clone();
     let gearboxes = [("joint2", 2e6), ("joint3", 1e6)].map(|(joint, k)| Gearbox {
@@ -408,11 +404,11 @@ fn geared_arm(motion: Arc<dyn PrescribedMotion>) -> FlexibleArm {
 /// 0.125 ms, with an order decreasing to 1.28; at rest 1e-10 of the sag of 5.5 mm.
 #[test]
 fn spook_with_gearboxes_converges_with_first_order_and_rests_exactly() {
-    let arm = geared_arm(reference_arm_motion());
+    let plant = geared_arm(reference_arm_motion());
     let times: Vec<f64> = (0..=60).map(|k| 0.02 * f64::from(k)).collect();
-    let truth = run(&arm, reference(1e-9), 1e-3, Start::Equilibrium, &times);
+    let truth = run(&plant, reference(1e-9), 1e-3, Start::Equilibrium, &times);
     let spook = StepperKind::Spook(SpookSettings::default());
-    let error = |kind, h| distance(&arm, &truth, &run(&arm, kind, h, Start::Equilibrium, &times));
+    let error = |kind, h| distance(&plant, &truth, &run(&plant, kind, h, Start::Equilibrium, &times));
     let errors = [1e-3, 5e-4, 2.5e-4, 1.25e-4].map(|h| error(spook, h));
     let order = (errors[2] / errors[3]).log2();
     let smooth = error(ALPHA, 1e-3);
@@ -420,12 +416,12 @@ fn spook_with_gearboxes_converges_with_first_order_and_rests_exactly() {
     assert!(errors[0] < 3e-5 && errors[3] < 1e-6 && order > 0.9, "{errors:?}");
     assert!(smooth < 2e-7, "{smooth}");
 
-    let arm = geared_arm(Arc::new(Held(vec![0.4, 0.5, -0.3, 0.7, 0.6, -1.2])));
+    let plant = geared_arm(Arc::new(Held(vec![0.4, 0.5, -0.3, 0.7, 0.6, -1.2])));
     for h in [1e-4, 1e-3, 1e-2] {
-        let seen = run(&arm, spook, h, Start::Equilibrium, &[0.0, 0.2]);
-        let straight = run(&arm, ALPHA, h, Start::Undeformed, &[0.0]);
-        let sag = (tcp(&arm, &seen[0]) - tcp(&arm, &straight[0])).norm();
-        let drift = (tcp(&arm, &seen[1]) - tcp(&arm, &seen[0])).norm();
+        let seen = run(&plant, spook, h, Start::Equilibrium, &[0.0, 0.2]);
+        let straight = run(&plant, ALPHA, h, Start::Undeformed, &[0.0]);
+        let sag = (tcp(&plant, &seen[0]) - tcp(&plant, &straight[0])).norm();
+        let drift = (tcp(&plant, &seen[1]) - tcp(&plant, &seen[0])).norm();
         eprintln!("SPOOK h {h:.0e}: drift {:.1e} of the sag {sag:.4} m", drift / sag);
         assert!(drift < 1e-8 * sag, "{h}: {}", drift / sag);
     }
@@ -433,7 +429,7 @@ fn spook_with_gearboxes_converges_with_first_order_and_rests_exactly() {
 
 // --- Chains of rigid parts
 
-fn chain_arm(parts: usize, motion: Arc<dyn PrescribedMotion>) -> FlexibleArm {
+fn chain_arm(parts: usize, motion: Arc<dyn PrescribedMotion>) -> Plant {
     let links: Vec<FlexibleLink> = arm_beams()
         .iter()
         .map(|beam| {
@@ -467,8 +463,8 @@ fn chain_arm(parts: usize, motion: Arc<dyn PrescribedMotion>) -> FlexibleArm {
 #[test]
 fn chains_of_rigid_parts_converge_to_the_modal_link() {
     let pose = || Arc::new(Held(vec![0.4, 0.7, -0.3, 0.7, 0.6, -1.2]));
-    let sag = |arm: &FlexibleArm| {
-        let tcp_at = |start| tcp(arm, &run(arm, ALPHA, 1e-3, start, &[0.0])[0]);
+    let sag = |plant: &Plant| {
+        let tcp_at = |start| tcp(plant, &run(plant, ALPHA, 1e-3, start, &[0.0])[0]);
         tcp_at(Start::Equilibrium) - tcp_at(Start::Undeformed)
     };
     let errors = |geometric: bool, parts: usize| {
@@ -496,7 +492,7 @@ fn chains_of_rigid_parts_converge_to_the_modal_link() {
 
 /// Returns the reference arm with modal links with geometric stiffening, gearboxes with one, three
 /// and six stiffnesses, and sampled controllers.
-fn everything() -> FlexibleArm {
+fn everything() -> Plant {
     let options = ModalOptions { geometric: true, modes: 2, ..ModalOptions::default() };
     let modals = arm_beams().map(|b| Arc::new(b.modal_with(&options).expect("a beam")));
     let links: Vec<FlexibleLink> = arm_beams()
@@ -537,11 +533,11 @@ fn everything() -> FlexibleArm {
         feed_forward: 1.0,
         limit: 5000.0,
     };
-    let mut arm = arm_of(&soft, &springs, reference_arm_motion());
-    arm.friction =
+    let mut plant = arm_of(&soft, &springs, reference_arm_motion());
+    plant.friction =
         vec![Friction { viscous: 3.0, coulomb: 20.0, stribeck: 5.0, stribeck_velocity: 0.1, regularisation: 0.05 }; 6];
     let rigid = Arc::new(Model::new(&whole_links()).expect("a tree"));
-    arm.with_servo(Servo { sample_s: 1e-3, axes: (0..6).map(axis).collect(), rigid }).expect("valid")
+    plant.with_servo(Servo { sample_s: 1e-3, axes: (0..6).map(axis).collect(), rigid }).expect("valid")
 }
 
 /// With modal links, gearboxes, backlash, friction and servos, samples included; and the two
@@ -551,8 +547,8 @@ fn everything() -> FlexibleArm {
 #[test]
 fn steps_do_not_allocate_with_modal_links_and_drives() {
     let ends = [(ALPHA, 2.5e-4), (StepperKind::Rk4, 2e-5)].map(|(kind, h)| {
-        let arm = everything();
-        let mut stepper = new_stepper(kind, arm.clone(), h, Start::Equilibrium).expect("starts");
+        let plant = everything();
+        let mut stepper = new_stepper(kind, plant.clone(), h, Start::Equilibrium).expect("starts");
         stepper.step().expect("first");
         let allocations = count_allocations(|| {
             for _ in 1..(0.2 / h).round() as usize {
@@ -560,7 +556,7 @@ fn steps_do_not_allocate_with_modal_links_and_drives() {
             }
         });
         assert_eq!(allocations, 0, "{}", kind.name());
-        let mut seen = Observation::new(&arm);
+        let mut seen = Observation::new(&plant);
         stepper.observe(&mut seen);
         eprintln!("{}: {:?} after {:?}", kind.name(), seen.q.rows(0, 6).as_slice(), stepper.counts());
         seen.q

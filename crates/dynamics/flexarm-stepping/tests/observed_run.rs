@@ -6,23 +6,23 @@ use flexarm_kinematics::{Data, Model, forward_kinematics};
 use flexarm_stepping::*;
 use flexarm_testkit::{follow_reference_motion, reference_arm};
 
-fn arm() -> FlexibleArm {
+fn plant() -> Plant {
     let reference = reference_arm(true);
     let model = Arc::new(Model::new(&reference.mechanism).unwrap());
     let damping = Damping::StiffnessProportional(reference.beta);
     let springs =
         vec![("lower".to_owned(), reference.K_S[0], damping), ("upper".to_owned(), reference.K_S[1], damping)];
     let motion = MotionFn(follow_reference_motion);
-    FlexibleArm::new(model, springs, Arc::new(motion)).unwrap()
+    Plant::new(model, springs, Arc::new(motion)).unwrap()
 }
 
 /// Truth: poses with the springs deflected and with the springs at zero; energy and loads from the
 /// stiffness matrix.
 #[test]
 fn displacement_energy_and_loads_are_those_of_their_definitions() {
-    let arm = arm();
-    let (model, tool) = (&arm.model, arm.model.frame("tcp").unwrap().clone());
-    let mut path = StaticPath::new(arm.clone());
+    let plant = plant();
+    let (model, tool) = (&plant.model, plant.model.frame("tcp").unwrap().clone());
+    let mut path = StaticPath::new(plant.clone());
     let mut data = Data::new(model);
     for t in [0.0, 0.3, 0.6, 1.1] {
         let mut q = path.at(t).unwrap().clone();
@@ -36,19 +36,19 @@ fn displacement_energy_and_loads_are_those_of_their_definitions() {
         assert!((found - truth).norm() < 1e-14, "{:.1e}", (found - truth).norm());
     }
 
-    let mut stepper = new_stepper(StepperKind::default(), arm.clone(), 2e-3, Start::Equilibrium).unwrap();
-    let mut seen = Observation::new(&arm);
+    let mut stepper = new_stepper(StepperKind::default(), plant.clone(), 2e-3, Start::Equilibrium).unwrap();
+    let mut seen = Observation::new(&plant);
     for _ in 0..150 {
         stepper.step().unwrap();
     }
     stepper.observe(&mut seen);
     let n = model.n_actuated();
     let (e, rates) = (seen.q.rows(n, 12).clone_owned(), seen.qdot.rows(n, 12).clone_owned());
-    let forces = arm.stiffness() * &e + &arm.D * &rates;
+    let forces = plant.stiffness() * &e + &plant.D * &rates;
     for (load, truth) in seen.load.iter().zip([forces.rows(0, 6), forces.rows(6, 6)]) {
         assert!((load + truth).norm() < 1e-12 * truth.norm());
     }
-    let energy = arm.elastic_energy(seen.q.as_slice());
+    let energy = plant.elastic_energy(seen.q.as_slice());
     assert!((seen.energy[2] - energy).abs() < 1e-13 * energy && energy > 0.0);
-    assert!((seen.power[2] - rates.dot(&(&arm.D * &rates))).abs() < 1e-12 * seen.power[2]);
+    assert!((seen.power[2] - rates.dot(&(&plant.D * &rates))).abs() < 1e-12 * seen.power[2]);
 }

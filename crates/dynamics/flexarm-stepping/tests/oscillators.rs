@@ -227,7 +227,7 @@ fn stiff_modes_shrink_by_the_spectral_radius_each_step() {
 }
 
 /// Returns one body on a 6x6 spring without gravity: the linear oscillator of the SPOOK step.
-fn body_on_spring(k: f64, beta: f64) -> FlexibleArm {
+fn body_on_spring(k: f64, beta: f64) -> Plant {
     let mut tree = Mechanism::new("oscillator");
     tree.gravity = Vector3::zeros();
     tree.links.push(Link { name: "base".into(), inertia: None });
@@ -237,7 +237,7 @@ fn body_on_spring(k: f64, beta: f64) -> FlexibleArm {
     tree.joints.push(Joint::new("spring", kind, "base", "body", Pose::identity()));
     let model = Arc::new(Model::new(&tree).expect("valid"));
     let spring = ("spring".to_owned(), Matrix6::identity() * k, Damping::StiffnessProportional(beta));
-    FlexibleArm::new(model, vec![spring], Arc::new(Held(vec![]))).expect("valid")
+    Plant::new(model, vec![spring], Arc::new(Held(vec![]))).expect("valid")
 }
 
 /// Recurrence `(M + h² K/4)(v⁺ - v) = -h K g - h τ K v⁺` in every step; measured 1e-15 of the
@@ -245,10 +245,10 @@ fn body_on_spring(k: f64, beta: f64) -> FlexibleArm {
 #[test]
 fn spook_on_a_linear_oscillator_is_the_known_recurrence() {
     let (m, k, tau, h) = (3.0, 4e3, 2e-3, 5e-3);
-    let arm = body_on_spring(k, tau);
-    let mut seen = Observation::new(&arm);
+    let plant = body_on_spring(k, tau);
+    let mut seen = Observation::new(&plant);
     let e = DVector::from_vec(vec![0.01, 0.0, 0.0, 0.0, 0.0, 0.0]);
-    let mut spook = Spook::new(arm, h, SpookSettings::default(), &e).expect("starts");
+    let mut spook = Spook::new(plant, h, SpookSettings::default(), &e).expect("starts");
     let (mut x, mut v) = (0.01, 0.0);
     for _ in 0..200 {
         spook.step().expect("steps");
@@ -266,10 +266,10 @@ fn spook_frequency_is_accurate_to_second_order() {
     let (m, k) = (3.0f64, 4e3f64);
     let omega = (k / m).sqrt();
     let frequency = |h: f64| {
-        let arm = body_on_spring(k, 0.0);
-        let mut seen = Observation::new(&arm);
+        let plant = body_on_spring(k, 0.0);
+        let mut seen = Observation::new(&plant);
         let e = DVector::from_vec(vec![0.01, 0.0, 0.0, 0.0, 0.0, 0.0]);
-        let mut spook = Spook::new(arm, h, SpookSettings::default(), &e).expect("starts");
+        let mut spook = Spook::new(plant, h, SpookSettings::default(), &e).expect("starts");
         // Zero crossings, linearly interpolated.
         let (mut last, mut first, mut latest, mut count) = (0.01, None, 0.0, 0);
         for _ in 0..(4.0 / h) as usize {
@@ -301,15 +301,16 @@ fn every_stepper_is_of_the_order_that_it_states() {
     let w = omega * (1.0 - zeta * zeta).sqrt();
     let swing = (w * t).cos() + zeta * omega / w * (w * t).sin();
     let truth = F / k * (1.0 - (-zeta * omega * t).exp() * swing);
-    let arm = body_on_spring(k, 2.0 * zeta / omega);
-    let arm = arm.clone().with_loads(vec![(arm.elements[0].body, Wrench::new(Vector3::x() * F, Vector3::zeros()))]);
-    let arm = arm.expect("valid");
+    let plant = body_on_spring(k, 2.0 * zeta / omega);
+    let plant =
+        plant.clone().with_loads(vec![(plant.elements[0].body, Wrench::new(Vector3::x() * F, Vector3::zeros()))]);
+    let plant = plant.expect("valid");
     for entry in STEPPERS.into_iter().filter(|entry| entry.steps != StepRule::ByErrorControl) {
         let errors = [4e-4, 2e-4].map(|h| {
             let kind = (entry.with)(&StepperOptions::default());
-            let mut stepper = new_stepper(kind, arm.clone(), h, Start::Undeformed).expect("starts");
+            let mut stepper = new_stepper(kind, plant.clone(), h, Start::Undeformed).expect("starts");
             (0..(t / h).round() as usize).for_each(|_| stepper.step().expect("steps"));
-            let mut seen = Observation::new(&arm);
+            let mut seen = Observation::new(&plant);
             stepper.observe(&mut seen);
             (seen.q[0] - truth).abs() / (F / k)
         });
@@ -326,10 +327,10 @@ fn modal_damping_gives_every_mode_its_ratio() {
     let reference = flexarm_testkit::reference_arm(true);
     let model = Arc::new(Model::new(&reference.mechanism).expect("valid"));
     let springs = reference.K_S.map(|K| ("spring".to_owned(), K, Damping::Modal(0.03)));
-    let arm = FlexibleArm::new(model, springs.to_vec(), Arc::new(Held(vec![0.0; 6]))).expect("valid");
-    let modal: DMatrix<f64> = arm.modes.shapes.transpose() * &arm.D * &arm.modes.shapes;
+    let plant = Plant::new(model, springs.to_vec(), Arc::new(Held(vec![0.0; 6]))).expect("valid");
+    let modal: DMatrix<f64> = plant.modes.shapes.transpose() * &plant.D * &plant.modes.shapes;
     for i in 0..12 {
-        let omega = arm.modes.omega[i];
+        let omega = plant.modes.omega[i];
         for j in 0..12 {
             let truth = if i == j { 2.0 * 0.03 * omega } else { 0.0 };
             assert!((modal[(i, j)] - truth).abs() < 1e-8 * 2.0 * 0.03 * omega, "{i} {j} {}", modal[(i, j)]);

@@ -17,7 +17,7 @@ fn point(stiffness: f64) -> OperatingPoint {
     let springs = reference.K_S.map(|K| ("spring".to_owned(), K * stiffness, damping)).to_vec();
     let held = Arc::new(Held(vec![0.0; model.n_actuated()]));
     let tool = model.frame("tcp").unwrap().clone();
-    OperatingPoint::new(FlexibleArm::new(model, springs, held).unwrap(), tool)
+    OperatingPoint::new(Plant::new(model, springs, held).unwrap(), tool)
 }
 
 /// Returns 31 poses, the last group of four not full; one contains an infinite value.
@@ -38,7 +38,7 @@ fn of_pose(X: &flexarm_kinematics::Pose) -> Vec<u64> {
 /// Returns the number of poses with a result, all bitwise those of [`OperatingPoint::solve`].
 fn assert_equal_alone(stiffness: f64, F: &Wrench) -> usize {
     let (mut together, mut alone) = (point(stiffness), point(stiffness));
-    let joints = together.arm().model.n_actuated();
+    let joints = together.plant().model.n_actuated();
     let (poses, mut next, mut answered) = (poses(joints), 0, 0);
     together.solve_each(&poses, F, ALL, |k, answer| {
         assert_eq!(k, next, "in order");
@@ -83,7 +83,7 @@ fn every_pose_among_many_has_the_bits_of_the_pose_alone() {
 #[test]
 fn half_a_pose_and_a_broken_load_have_their_errors() {
     let mut at = point(1.0);
-    let joints = at.arm().model.n_actuated();
+    let joints = at.plant().model.n_actuated();
     let mut told = Vec::new();
     at.solve_each(&vec![0.1; 5 * joints + 1], &Wrench::zeros(), PoseOutputs::default(), |_, answer| {
         told.push(answer.map(|_| ()).map_err(|error| error.to_string()));

@@ -27,23 +27,23 @@ fn golden() -> Vec<Golden> {
     .collect()
 }
 
-fn arm() -> FlexibleArm {
+fn plant() -> Plant {
     let reference = reference_arm(true);
     let model = Arc::new(Model::new(&reference.mechanism).expect("valid"));
     let damping = Damping::StiffnessProportional(reference.beta);
     let springs =
         vec![("lower".to_owned(), reference.K_S[0], damping), ("upper".to_owned(), reference.K_S[1], damping)];
     let motion = MotionFn(follow_reference_motion);
-    FlexibleArm::new(model, springs, Arc::new(motion)).expect("valid")
+    Plant::new(model, springs, Arc::new(motion)).expect("valid")
 }
 
 /// Returns the maximum TCP difference to the golden curve relative to the peak deflection.
 fn tcp_error(kind: StepperKind, h: f64) -> f64 {
     let golden = golden();
-    let arm = arm();
-    let tcp = arm.model.frame("tcp").expect("there").clone();
-    let mut seen = Observation::new(&arm);
-    let mut stepper = new_stepper(kind, arm, h, Start::Equilibrium).expect("starts");
+    let plant = plant();
+    let tcp = plant.model.frame("tcp").expect("there").clone();
+    let mut seen = Observation::new(&plant);
+    let mut stepper = new_stepper(kind, plant, h, Start::Equilibrium).expect("starts");
     let (mut peak, mut worst, mut done) = (0.0f64, 0.0f64, 0u64);
     for row in &golden {
         peak = peak.max((row.flexible - row.rigid).norm());
@@ -81,15 +81,15 @@ const ALPHA: StepperKind = StepperKind::GeneralizedAlpha(AlphaSettings { rho: 0.
 /// 9.0660.)
 #[test]
 fn frequencies_and_static_pose_equal_those_of_the_other_tool() {
-    let arm = arm();
-    let found = arm.modes.frequencies_hz();
+    let plant = plant();
+    let found = plant.modes.frequencies_hz();
     let truth = [9.06600653, 11.77337488, 19.6421425, 36.51154171, 107.00642497, 114.55233058];
     for (f, truth) in found.iter().zip(truth) {
         assert!((f / truth - 1.0).abs() < 1e-8, "{f} {truth}"); // measured 1e-9, the digits given
     }
     assert!((found[11] / 596.29191711 - 1.0).abs() < 1e-8);
-    assert!(arm.modes.residual < 1e-10); // measured 3e-13
-    let e = static_equilibrium(&arm, 0.0).expect("stands");
+    assert!(plant.modes.residual < 1e-10); // measured 3e-13
+    let e = static_equilibrium(&plant, 0.0).expect("stands");
     assert!((e[4] / 0.0007123926534315615 - 1.0).abs() < 1e-10); // measured 3e-15
     assert!((e[10] / 0.0002340045417227465 - 1.0).abs() < 1e-10);
 }
@@ -132,9 +132,9 @@ fn plain_generalized_alpha_is_bounded_by_the_trapezoidal_rule() {
 #[test]
 fn what_a_quick_iteration_leaves_is_small_beside_the_error_of_its_step() {
     let path = |h: f64, left: Option<f64>| {
-        let arm = arm();
-        let e = static_equilibrium(&arm, 0.0).expect("stands");
-        let mut system = ReducedArm::new(arm);
+        let plant = plant();
+        let e = static_equilibrium(&plant, 0.0).expect("stands");
+        let mut system = ReducedArm::new(plant);
         let v = DVector::zeros(e.len());
         let alpha = GeneralizedAlpha::new(&mut system, 0.0, h, AlphaSettings::default(), e, v).expect("starts");
         let mut alpha = left.map_or(alpha.clone(), |left| alpha.leaving(left));
@@ -165,12 +165,12 @@ fn what_a_quick_iteration_leaves_is_small_beside_the_error_of_its_step() {
 #[test]
 fn coarse_steps_of_a_run_take_two_evaluations() {
     let h = 10e-3;
-    let e = static_equilibrium(&arm(), 0.0).expect("stands");
+    let e = static_equilibrium(&plant(), 0.0).expect("stands");
     let v = DVector::zeros(e.len());
-    let mut system = ReducedArm::new(arm());
+    let mut system = ReducedArm::new(plant());
     let mut whole = GeneralizedAlpha::new(&mut system, 0.0, h, AlphaSettings::default(), e, v).expect("starts");
-    let mut run = new_stepper(ALPHA, arm(), h, Start::Equilibrium).expect("starts");
-    let mut seen = Observation::new(&arm());
+    let mut run = new_stepper(ALPHA, plant(), h, Start::Equilibrium).expect("starts");
+    let mut seen = Observation::new(&plant());
     let (mut apart, mut largest) = (0.0f64, 0.0f64);
     for _ in 0..200 {
         whole.step(&mut system).expect("steps");
@@ -192,13 +192,13 @@ fn coarse_steps_of_a_run_take_two_evaluations() {
 #[test]
 fn what_the_matrix_does_not_know_feeds_no_mode() {
     let at_end = |kind: StepperKind| {
-        let arm = arm();
-        let tcp = arm.model.frame("tcp").expect("there").clone();
+        let plant = plant();
+        let tcp = plant.model.frame("tcp").expect("there").clone();
         let pull = TimedWrench::new(|t| Wrench::new(Vector3::new(15e3 * t, 0.0, -5e3 * t), Vector3::zeros()));
         let load = Load { body: tcp.body, X_BF: tcp.X_BF, wrench: pull };
-        let arm = arm.with_timed_loads(vec![load]).expect("stands");
-        let mut seen = Observation::new(&arm);
-        let mut stepper = new_stepper(kind, arm, 10e-3, Start::Equilibrium).expect("starts");
+        let plant = plant.with_timed_loads(vec![load]).expect("stands");
+        let mut seen = Observation::new(&plant);
+        let mut stepper = new_stepper(kind, plant, 10e-3, Start::Equilibrium).expect("starts");
         (0..200).for_each(|_| stepper.step().expect("steps"));
         stepper.observe(&mut seen);
         (seen.q.rows(6, 12).into_owned(), stepper.counts())
@@ -320,10 +320,10 @@ fn reference_stepper_agrees_with_rk4() {
     let reference_arm = reference_arm(true);
     let model = Arc::new(Model::new(&reference_arm.mechanism).expect("valid"));
     let springs = reference_arm.K_S.map(|K| ("spring".to_owned(), K, Damping::Modal(0.03))).to_vec();
-    let arm = FlexibleArm::new(model, springs, arm().motion).expect("valid");
+    let plant = Plant::new(model, springs, plant().motion).expect("valid");
     let run = |kind: StepperKind, h: f64| {
-        let mut seen = Observation::new(&arm);
-        let mut stepper = new_stepper(kind, arm.clone(), h, Start::Equilibrium).expect("starts");
+        let mut seen = Observation::new(&plant);
+        let mut stepper = new_stepper(kind, plant.clone(), h, Start::Equilibrium).expect("starts");
         let mut curve = Vec::new();
         for _ in 0..1000 {
             (0..(4e-3 / h).round() as usize).for_each(|_| stepper.step().expect("steps"));
@@ -347,7 +347,7 @@ fn reference_stepper_agrees_with_rk4() {
 fn steps_do_not_allocate() {
     for entry in STEPPERS.into_iter().filter(|entry| !entry.allocates) {
         let kind = (entry.with)(&StepperOptions::default());
-        let mut stepper = new_stepper(kind, arm(), 1e-4, Start::Equilibrium).expect("starts");
+        let mut stepper = new_stepper(kind, plant(), 1e-4, Start::Equilibrium).expect("starts");
         stepper.step().expect("first");
         let allocations = count_allocations(|| {
             for _ in 0..50 {
@@ -373,18 +373,18 @@ fn work_of_the_drives_is_stored_or_dissipated() {
         (reference, 2.5e-4, 1e-6),
         (StepperKind::Sdirk3, 5e-4, 1e-7),
     ] {
-        let arm = arm();
-        let n = arm.model.n_actuated();
-        let mut seen = Observation::new(&arm);
-        let mut stepper = new_stepper(kind, arm.clone(), h, Start::Equilibrium).expect("starts");
+        let plant = plant();
+        let n = plant.model.n_actuated();
+        let mut seen = Observation::new(&plant);
+        let mut stepper = new_stepper(kind, plant.clone(), h, Start::Equilibrium).expect("starts");
         let mut powers = Vec::new();
         let mut energies = Vec::new();
         let steps = 2 * (0.6 / h).round() as usize; // the first move, without the kink at its end
         for step in 0..=steps {
             stepper.observe(&mut seen);
             let drive = seen.drive.dot(&seen.qdot.rows(0, n));
-            let rates = seen.qdot.rows(n, arm.n_elastic_coordinates()).clone_owned();
-            powers.push(drive - rates.dot(&(&arm.D * &rates)));
+            let rates = seen.qdot.rows(n, plant.n_elastic_coordinates()).clone_owned();
+            powers.push(drive - rates.dot(&(&plant.D * &rates)));
             energies.push(seen.energy.iter().sum::<f64>());
             if step < steps {
                 stepper.step().expect("steps");
@@ -419,10 +419,10 @@ fn unlike_damping_of_the_links_costs_no_more_iterations() {
         let model = Arc::new(Model::new(&reference.mechanism).expect("valid"));
         let springs = (0..2).map(|k| (format!("link {k}"), reference.K_S[k], damping[k])).collect();
         let motion = MotionFn(follow_reference_motion);
-        let arm = FlexibleArm::new(model, springs, Arc::new(motion)).expect("valid");
+        let plant = Plant::new(model, springs, Arc::new(motion)).expect("valid");
         let run = |kind: StepperKind, h: f64| {
-            let mut seen = Observation::new(&arm);
-            let mut stepper = new_stepper(kind, arm.clone(), h, Start::Undeformed).expect("starts");
+            let mut seen = Observation::new(&plant);
+            let mut stepper = new_stepper(kind, plant.clone(), h, Start::Undeformed).expect("starts");
             for _ in 0..(0.5 / h).round() as usize {
                 stepper.step().expect("steps");
             }

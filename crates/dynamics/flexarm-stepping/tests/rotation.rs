@@ -40,10 +40,10 @@ fn a_mass_on_a_turntable_has_the_frequencies_of_its_closed_form() {
     table.joints.push(Joint::new("spring", elastic, "disc", "mass", Pose::translation(radius, 0.0, 0.0)));
     let K = Matrix6::from_diagonal(&Vector6::new(k[0], k[1], k[2], 1e4, 1e4, 1e4));
     let springs = vec![("spring".to_owned(), K, Damping::StiffnessProportional(0.0))];
-    let arm = FlexibleArm::new(Arc::new(Model::new(&table).unwrap()), springs, Arc::new(Held(vec![0.3]))).unwrap();
-    let tool = arm.model.frame("mass").unwrap().clone();
+    let plant = Plant::new(Arc::new(Model::new(&table).unwrap()), springs, Arc::new(Held(vec![0.3]))).unwrap();
+    let tool = plant.model.frame("mass").unwrap().clone();
     for w in [10.0, 30.0] {
-        let found = linearise_rotation(&arm, &tool, &[0.3], &[w]).unwrap();
+        let found = linearise_rotation(&plant, &tool, &[0.3], &[w]).unwrap();
         let stretch = m * w * w * radius / (k[0] - m * w * w);
         assert!((found.linear.equilibrium[0] / stretch - 1.0).abs() < 1e-10, "{}", found.linear.equilibrium[0]);
         assert!(found.change < 1e-12, "{}", found.change);
@@ -61,7 +61,7 @@ fn a_mass_on_a_turntable_has_the_frequencies_of_its_closed_form() {
 }
 
 /// Returns a beam of square section that turns about z.
-fn rotor(beam: &BeamLink, form: LinkForm) -> FlexibleArm {
+fn rotor(beam: &BeamLink, form: LinkForm) -> Plant {
     let mut root = Mechanism::new("rotor");
     root.gravity = Vector3::zeros();
     for name in ["base", "beam", "tip"] {
@@ -97,10 +97,10 @@ fn a_turning_beam_stiffens_as_in_the_literature_whatever_its_model() {
         ("16 parts", LinkForm::Chain(beam.chain(16).unwrap()), 3e-3), // measured 1.5e-3
     ];
     for (name, form, bound) in forms {
-        let arm = rotor(&beam, form);
-        let tool = arm.model.frame("tip").unwrap().clone();
+        let plant = rotor(&beam, form);
+        let tool = plant.model.frame("tip").unwrap().clone();
         for (speed, truth) in [(1.0, 3.6816_f64), (2.0, 4.1373), (4.0, 5.5850), (10.0, 11.2023)] {
-            let found = linearise_rotation(&arm, &tool, &[0.0], &[speed * unit]).unwrap();
+            let found = linearise_rotation(&plant, &tool, &[0.0], &[speed * unit]).unwrap();
             let omega = frequencies(&found.linear);
             let off =
                 |truth: f64| omega.iter().map(|own| (own / (truth * unit) - 1.0).abs()).fold(f64::INFINITY, f64::min);

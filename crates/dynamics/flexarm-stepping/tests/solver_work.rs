@@ -30,12 +30,12 @@ fn every_stepper_works_as_hard_as_it_did() {
     let model = Arc::new(Model::new(&reference.mechanism).expect("valid"));
     let springs = reference.K_S.map(|K| ("spring".to_owned(), K, Damping::Modal(0.03))).to_vec();
     let motion = MotionFn(follow_reference_motion);
-    let arm = FlexibleArm::new(model, springs, Arc::new(motion)).expect("valid");
+    let plant = Plant::new(model, springs, Arc::new(motion)).expect("valid");
     let found = STEPPERS.map(|entry| {
         let told = WORK.iter().find(|work| work.0 == entry.name);
         let h = told.unwrap_or_else(|| panic!("{} has no line in WORK", entry.name)).1;
         let kind = (entry.with)(&StepperOptions::default());
-        let mut stepper = new_stepper(kind, arm.clone(), h, Start::Equilibrium).expect("starts");
+        let mut stepper = new_stepper(kind, plant.clone(), h, Start::Equilibrium).expect("starts");
         (0..(0.5 / h).round() as usize).for_each(|_| stepper.step().expect("steps"));
         let Counts { steps, evaluations, factorisations } = stepper.counts();
         (entry.name, h, [steps, evaluations, factorisations])

@@ -3,29 +3,29 @@
 use std::sync::Arc;
 
 use flexarm_kinematics::{Frame, Model, Wrench, rotation_vector};
-use flexarm_stepping::{Damping, FlexibleArm, Held, OperatingPoint, StaticTargets, linearise, static_targets};
+use flexarm_stepping::{Damping, Held, OperatingPoint, Plant, StaticTargets, linearise, static_targets};
 use flexarm_testkit::reference_arm;
 use nalgebra::{Vector3, Vector6};
 
 const POSE: [f64; 6] = [0.4, 0.5, -0.3, 0.7, 0.6, -1.2];
 
-fn arm(softer: f64) -> (FlexibleArm, Frame) {
+fn plant(softer: f64) -> (Plant, Frame) {
     let reference = reference_arm(true);
     let model = Arc::new(Model::new(&reference.mechanism).expect("valid"));
     let spring =
         |name: &str, k: usize| (name.to_owned(), reference.K_S[k] / softer, Damping::StiffnessProportional(2e-3));
     let tool = model.frame("tcp").expect("there").clone();
     let springs = vec![spring("lower", 0), spring("upper", 1)];
-    (FlexibleArm::new(model, springs, Arc::new(Held(POSE.to_vec()))).expect("valid"), tool)
+    (Plant::new(model, springs, Arc::new(Held(POSE.to_vec()))).expect("valid"), tool)
 }
 
 /// Truth: the equilibrium of [`OperatingPoint`], on an arm that sags by 4 cm, also under a load.
 #[test]
 fn at_rest_the_tool_of_a_soft_arm_is_where_the_rigid_arm_has_it() {
-    let (arm, tool) = arm(20.0);
+    let (plant, tool) = plant(20.0);
     let load = Wrench::new(Vector3::new(90.0, 50.0, -200.0), Vector3::new(10.0, 0.0, 20.0));
-    let found = static_targets(&arm, &tool, &POSE, &load, 0.0, &[true; 6]).unwrap();
-    let mut at = OperatingPoint::new(arm.clone(), tool.clone());
+    let found = static_targets(&plant, &tool, &POSE, &load, 0.0, &[true; 6]).unwrap();
+    let mut at = OperatingPoint::new(plant.clone(), tool.clone());
     at.solve(&POSE, &Wrench::zeros()).unwrap();
     let wanted = at.rigid_tcp_pose();
     at.solve(&found.q, &load).unwrap();
@@ -42,10 +42,10 @@ fn at_rest_the_tool_of_a_soft_arm_is_where_the_rigid_arm_has_it() {
 
 #[test]
 fn with_the_position_alone_the_joints_move_as_little_as_they_can() {
-    let (arm, tool) = arm(20.0);
+    let (plant, tool) = plant(20.0);
     let position = [true, true, true, false, false, false];
-    let all = static_targets(&arm, &tool, &POSE, &Wrench::zeros(), 0.0, &[true; 6]).unwrap();
-    let some = static_targets(&arm, &tool, &POSE, &Wrench::zeros(), 0.0, &position).unwrap();
+    let all = static_targets(&plant, &tool, &POSE, &Wrench::zeros(), 0.0, &[true; 6]).unwrap();
+    let some = static_targets(&plant, &tool, &POSE, &Wrench::zeros(), 0.0, &position).unwrap();
     let way = |found: &StaticTargets| found.q.iter().zip(POSE).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
     assert!(some.after.amax() < 1e-12 && way(&some) < way(&all), "{} {}", way(&some), way(&all));
 }
@@ -54,10 +54,10 @@ fn with_the_position_alone_the_joints_move_as_little_as_they_can() {
 /// cm, also under a load.
 #[test]
 fn the_tool_at_rest_moves_with_each_command_as_its_equilibrium_does() {
-    let (arm, tool) = arm(20.0);
+    let (plant, tool) = plant(20.0);
     let load = Wrench::new(Vector3::new(90.0, 50.0, -200.0), Vector3::new(10.0, 0.0, 20.0));
-    let slopes = linearise(&arm, &tool, &load, 0.0).unwrap().command_slopes().unwrap();
-    let mut at = OperatingPoint::new(arm, tool);
+    let slopes = linearise(&plant, &tool, &load, 0.0).unwrap().command_slopes().unwrap();
+    let mut at = OperatingPoint::new(plant, tool);
     at.solve(&POSE, &load).unwrap();
     let here = at.tcp_pose();
     for k in 0..6 {

@@ -19,7 +19,7 @@ pub(crate) enum Failure {
     /// An error of the library.
     Library(flexarm::Error),
     /// An error of a plant for other programs.
-    Plant(flexarm_fmu::PlantError),
+    Fmu(flexarm_fmu::FmuError),
 }
 
 impl From<flexarm::Error> for Failure {
@@ -34,11 +34,11 @@ impl From<flexarm::links::LinkError> for Failure {
     }
 }
 
-impl From<flexarm_fmu::PlantError> for Failure {
-    fn from(error: flexarm_fmu::PlantError) -> Self {
+impl From<flexarm_fmu::FmuError> for Failure {
+    fn from(error: flexarm_fmu::FmuError) -> Self {
         match error {
-            flexarm_fmu::PlantError::Robot(error) => Self::Library(error),
-            other => Self::Plant(other),
+            flexarm_fmu::FmuError::Robot(error) => Self::Library(error),
+            other => Self::Fmu(other),
         }
     }
 }
@@ -49,7 +49,7 @@ impl std::fmt::Display for Failure {
             Self::Usage(text) => f.write_str(text),
             Self::In { context, source } => write!(f, "{context}: {source}"),
             Self::Library(error) => error.fmt(f),
-            Self::Plant(error) => error.fmt(f),
+            Self::Fmu(error) => error.fmt(f),
         }
     }
 }
@@ -60,7 +60,7 @@ impl std::error::Error for Failure {
             Self::Usage(_) => None,
             Self::In { source, .. } => Some(source),
             Self::Library(error) => error.source(),
-            Self::Plant(error) => error.source(),
+            Self::Fmu(error) => error.source(),
         }
     }
 }
@@ -72,8 +72,8 @@ impl Failure {
             Self::Usage(_) => Fault::Input,
             Self::In { source, .. } => return source.exit_code(),
             Self::Library(error) => error.fault(),
-            Self::Plant(flexarm_fmu::PlantError::Written(error)) => error.fault(),
-            Self::Plant(_) => Fault::Input,
+            Self::Fmu(flexarm_fmu::FmuError::Written(error)) => error.fault(),
+            Self::Fmu(_) => Fault::Input,
         };
         ExitCode::from(match fault {
             Fault::Input => 2,
@@ -118,7 +118,7 @@ impl Failure {
         match self {
             Self::In { source, .. } => source.page(),
             Self::Library(error) => page_of(error),
-            Self::Usage(_) | Self::Plant(_) => None,
+            Self::Usage(_) | Self::Fmu(_) => None,
         }
     }
 }

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use clap::{Args, ValueEnum};
 use flexarm::Robot;
 use flexarm::steppers::{STEPPERS, StepRule, StepperEntry, StepperOptions};
-use flexarm_fmu::{Fmi, FmuJob, FmuSummary, PlantSettings, export_fmu};
+use flexarm_fmu::{Fmi, FmuJob, FmuSettings, FmuSummary, export_fmu};
 
 use crate::args::stepper_words;
 use crate::failure::Failure;
@@ -64,7 +64,7 @@ pub(crate) fn run(terminal: &Terminal, args: &ExportFmuArgs) -> Result<ExitCode,
     }
     let (path, load) = (shipped::robot(Some(&args.pose.robot))?, args.pose.load.options()?);
     let robot = Robot::load_with(&path, &load)?;
-    let settings = PlantSettings {
+    let settings = FmuSettings {
         load,
         modelling: args.pose.modelling.modelling(),
         stepper: (args.stepper.with)(&StepperOptions::default()),

@@ -22,8 +22,8 @@ use twox_hash::XxHash64;
 use zip::write::SimpleFileOptions;
 
 use crate::description::{About, Fmi, MODEL_IDENTIFIER, description, page};
-use crate::error::PlantError;
-use crate::plant::{Plant, PlantSettings};
+use crate::error::FmuError;
+use crate::model::{FmuModel, FmuSettings};
 use crate::variables::Causality;
 
 /// File with the settings of the plant in the resources.
@@ -56,7 +56,7 @@ pub struct FmuJob {
     /// Robot file or URDF.
     pub robot: PathBuf,
     /// Settings of the plant.
-    pub settings: PlantSettings,
+    pub settings: FmuSettings,
     /// Version of the standard.
     pub fmi: Fmi,
     /// Library of this crate, for the platform of this program.
@@ -99,54 +99,54 @@ pub struct FmuSummary {
     pub caveats: Vec<Caveat>,
 }
 
-fn failed(path: &Path) -> impl FnOnce(std::io::Error) -> PlantError + '_ {
-    move |error| PlantError::File { path: path.to_owned(), what: error.to_string() }
+fn failed(path: &Path) -> impl FnOnce(std::io::Error) -> FmuError + '_ {
+    move |error| FmuError::File { path: path.to_owned(), what: error.to_string() }
 }
 
 /// Writes an FMU.
 ///
 /// # Errors
-/// [`PlantError::Robot`] if the robot cannot be loaded, [`PlantError::File`] if a file cannot be
+/// [`FmuError::Robot`] if the robot cannot be loaded, [`FmuError::File`] if a file cannot be
 /// read or written, exists, or if the arm of the resources is not the original one.
-pub fn export_fmu(job: &FmuJob) -> Result<FmuSummary, PlantError> {
+pub fn export_fmu(job: &FmuJob) -> Result<FmuSummary, FmuError> {
     flexarm::files::check_free(std::slice::from_ref(&job.output), job.overwrite)?;
     let library = fs::read(&job.library).map_err(failed(&job.library))?;
-    let plant = Plant::new(&job.robot, &job.settings)?;
-    let robot = plant.arm().robot();
+    let model = FmuModel::new(&job.robot, &job.settings)?;
+    let robot = model.arm().robot();
     let meshes = robot.urdf.mesh_files.iter().map(|(_, path)| &**path);
     let read = meshes.chain([&*robot.path, &*robot.urdf_path, &*job.library]);
     flexarm::files::check_apart(std::slice::from_ref(&job.output), &read.collect::<Vec<_>>())?;
-    let (files, meshes) = resources(&plant, &job.settings)?;
+    let (files, meshes) = resources(&model, &job.settings)?;
 
-    let about_step = plant.variables().iter().find(|variable| variable.name == "step").and_then(|step| step.start);
+    let about_step = model.variables().iter().find(|variable| variable.name == "step").and_then(|step| step.start);
     let step_s = about_step.unwrap_or_default();
     let token = token(&files);
-    let about = About { name: &plant.arm().robot().name, token: &token, step_s };
-    let xml = description(job.fmi, &about, plant.variables()).map_err(failed(&job.output))?;
-    let html = page(&about, plant.variables()).map_err(failed(&job.output))?;
+    let about = About { name: &model.arm().robot().name, token: &token, step_s };
+    let xml = description(job.fmi, &about, model.variables()).map_err(failed(&job.output))?;
+    let html = page(&about, model.variables()).map_err(failed(&job.output))?;
     let platform = platform(job.fmi);
     let binary = format!("binaries/{platform}/{MODEL_IDENTIFIER}.{}", std::env::consts::DLL_EXTENSION);
     let mut entries = vec![("modelDescription.xml".to_owned(), xml), (binary, library)];
     entries.push(("documentation/index.html".to_owned(), html));
-    let filed = serde_json::to_vec_pretty(&filed(&plant, &job.settings, &token, step_s)).unwrap_or_default();
+    let filed = serde_json::to_vec_pretty(&filed(&model, &job.settings, &token, step_s)).unwrap_or_default();
     entries.push((format!("resources/{SETTINGS}"), filed));
     entries.extend(files.into_iter().map(|(name, bytes)| (format!("resources/{name}"), bytes)));
     let bytes = zipped(&entries).map_err(failed(&job.output))?;
     flexarm::files::write_all(&[(job.output.clone(), &bytes)])?;
-    let arm = plant.arm();
+    let arm = model.arm();
     let pose = first_pose(arm, &job.settings);
     let caveats = arm.caveats(Use::Commanded(&pose, job.settings.stepper, step_s));
-    let count = |causality| plant.variables().iter().filter(|variable| variable.causality == causality).count();
+    let count = |causality| model.variables().iter().filter(|variable| variable.causality == causality).count();
     Ok(FmuSummary {
         file: job.output.clone(),
         bytes: bytes.len() as u64,
         fmi_version: if job.fmi == Fmi::V2 { "2.0" } else { "3.0" },
         platform,
-        robot: plant.arm().robot().name.clone(),
+        robot: model.arm().robot().name.clone(),
         inputs: count(Causality::Input),
         outputs: count(Causality::Output),
         parameters: count(Causality::Parameter),
-        states: plant.state_references().len(),
+        states: model.state_references().len(),
         step_s,
         meshes,
         warnings: warnings(&caveats),
@@ -173,10 +173,10 @@ fn platform(fmi: Fmi) -> &'static str {
 type NamedFiles = Vec<(String, Vec<u8>)>;
 
 /// Returns the files of the robot and the number of meshes among them.
-fn resources(plant: &Plant, settings: &PlantSettings) -> Result<(NamedFiles, usize), PlantError> {
-    let robot = plant.arm().robot();
+fn resources(model: &FmuModel, settings: &FmuSettings) -> Result<(NamedFiles, usize), FmuError> {
+    let robot = model.arm().robot();
     let without = robot_files(robot, settings, &[])?;
-    if same_arm(&without, plant.arm(), settings).unwrap_or(false) {
+    if same_arm(&without, model.arm(), settings).unwrap_or(false) {
         return Ok((without, 0));
     }
     let mut meshes = Vec::new();
@@ -185,29 +185,28 @@ fn resources(plant: &Plant, settings: &PlantSettings) -> Result<(NamedFiles, usi
         meshes.push((reference.clone(), format!("meshes/{number}{ending}"), path.clone()));
     }
     let with = robot_files(robot, settings, &meshes)?;
-    if same_arm(&with, plant.arm(), settings)? {
+    if same_arm(&with, model.arm(), settings)? {
         return Ok((with, meshes.len()));
     }
     let what = "the arm that is made from the resources of the FMU is not the arm of this file".into();
-    Err(PlantError::File { path: robot.path.clone(), what })
+    Err(FmuError::File { path: robot.path.clone(), what })
 }
 
 /// Returns robot file, URDF and reduced links, with the meshes: reference, name, path.
 fn robot_files(
     robot: &Robot,
-    settings: &PlantSettings,
+    settings: &FmuSettings,
     meshes: &[(String, String, PathBuf)],
-) -> Result<NamedFiles, PlantError> {
+) -> Result<NamedFiles, FmuError> {
     let folder = robot.path.parent().unwrap_or(Path::new("."));
     let is_file = robot.path.extension().is_some_and(|ending| ending == "toml");
     let text = match is_file {
         true => fs::read_to_string(&robot.path).map_err(failed(&robot.path))?,
         false => "format = 1\n".to_owned(),
     };
-    let mut document: DocumentMut = text.parse().map_err(|error: toml_edit::TomlError| PlantError::File {
-        path: robot.path.clone(),
-        what: error.to_string(),
-    })?;
+    let mut document: DocumentMut = text
+        .parse()
+        .map_err(|error: toml_edit::TomlError| FmuError::File { path: robot.path.clone(), what: error.to_string() })?;
     document["urdf"] = toml_edit::value(URDF);
     document["name"] = toml_edit::value(&*robot.name);
     take_over_urdf_settings(&mut document, &settings.load.urdf);
@@ -244,9 +243,9 @@ fn take_over_urdf_settings(document: &mut DocumentMut, urdf: &ReadOptions) {
 
 /// Makes the robot file refer to copies of the reduced links and of their stress, if it is needed;
 /// returns the copies.
-fn move_links(document: &mut DocumentMut, folder: &Path, with_stress: bool) -> Result<NamedFiles, PlantError> {
+fn move_links(document: &mut DocumentMut, folder: &Path, with_stress: bool) -> Result<NamedFiles, FmuError> {
     let mut files = NamedFiles::new();
-    let mut take = |entry: &mut dyn toml_edit::TableLike| -> Result<(), PlantError> {
+    let mut take = |entry: &mut dyn toml_edit::TableLike| -> Result<(), FmuError> {
         let Some(given) = entry.get("reduced").and_then(Item::as_str).map(|path| folder.join(path)) else {
             return Ok(());
         };
@@ -275,7 +274,7 @@ fn move_links(document: &mut DocumentMut, folder: &Path, with_stress: bool) -> R
 
 /// Returns whether the arm made from files is the given one: same masses, springs and frames, bit
 /// for bit.
-fn same_arm(files: &NamedFiles, arm: &Arc<Arm>, settings: &PlantSettings) -> Result<bool, PlantError> {
+fn same_arm(files: &NamedFiles, arm: &Arc<Arm>, settings: &FmuSettings) -> Result<bool, FmuError> {
     let parent = std::env::temp_dir();
     let folder =
         flexarm::files::private_folder(&parent).map_err(|source| FileError::Write { path: parent.clone(), source })?;
@@ -297,12 +296,12 @@ fn same_arm(files: &NamedFiles, arm: &Arc<Arm>, settings: &PlantSettings) -> Res
     checked
 }
 
-/// Returns the joint positions at the start (rad or m), as [`Plant::new`] takes them.
-fn first_pose(arm: &Arm, settings: &PlantSettings) -> Vec<f64> {
+/// Returns the joint positions at the start (rad or m), as [`FmuModel::new`] takes them.
+fn first_pose(arm: &Arm, settings: &FmuSettings) -> Vec<f64> {
     settings.pose.clone().unwrap_or_else(|| vec![0.0; arm.joints().count()])
 }
 
-fn filed(plant: &Plant, settings: &PlantSettings, token: &str, step_s: f64) -> Filed {
+fn filed(model: &FmuModel, settings: &FmuSettings, token: &str, step_s: f64) -> Filed {
     let modelling = settings.modelling;
     Filed {
         format: 1,
@@ -313,7 +312,7 @@ fn filed(plant: &Plant, settings: &PlantSettings, token: &str, step_s: f64) -> F
         modes: modelling.modes,
         stepper: settings.stepper.name().to_owned(),
         step_s,
-        pose: first_pose(plant.arm(), settings),
+        pose: first_pose(model.arm(), settings),
         tcp: settings.load.tcp.clone(),
     }
 }
@@ -344,18 +343,18 @@ fn zipped(entries: &NamedFiles) -> std::io::Result<Vec<u8>> {
 /// * `token`: that of the importer, from the description.
 ///
 /// # Errors
-/// [`PlantError::File`] for resources that are missing or damaged, [`PlantError::Token`],
-/// [`PlantError::Robot`].
-pub fn open_resources(folder: &Path, token: &str) -> Result<Plant, PlantError> {
+/// [`FmuError::File`] for resources that are missing or damaged, [`FmuError::Token`],
+/// [`FmuError::Robot`].
+pub fn open_resources(folder: &Path, token: &str) -> Result<FmuModel, FmuError> {
     let path = folder.join(SETTINGS);
     let text = fs::read_to_string(&path).map_err(failed(&path))?;
-    let damaged = |what: String| PlantError::File { path: path.clone(), what };
+    let damaged = |what: String| FmuError::File { path: path.clone(), what };
     let filed: Filed = serde_json::from_str(&text).map_err(|error| damaged(error.to_string()))?;
     if filed.format != 1 {
         return Err(damaged(format!("format = {}: this library reads format 1", filed.format)));
     }
     if filed.token != token {
-        return Err(PlantError::Token { given: token.to_owned(), own: filed.token });
+        return Err(FmuError::Token { given: token.to_owned(), own: filed.token });
     }
     let stepper = StepperEntry::named(&filed.stepper);
     let stepper = stepper.ok_or_else(|| damaged(format!("stepper = {:?}: there is no such stepper", filed.stepper)))?;
@@ -368,12 +367,12 @@ pub fn open_resources(folder: &Path, token: &str) -> Result<Plant, PlantError> {
         None => DriveModel::AsFiled,
         Some(name) => DriveModel::from_word(name).ok_or_else(|| word("drives", name))?,
     };
-    let settings = PlantSettings {
+    let settings = FmuSettings {
         load: LoadOptions { tcp: filed.tcp, ..LoadOptions::default() },
         modelling: Modelling { links, drives, segments: filed.segments, modes: filed.modes },
         stepper: (stepper.with)(&StepperOptions::default()),
         step_s: Some(filed.step_s),
         pose: Some(filed.pose),
     };
-    Plant::new(&folder.join(ROBOT), &settings)
+    FmuModel::new(&folder.join(ROBOT), &settings)
 }

@@ -7,7 +7,7 @@ use crate::variables::Kind;
 /// Why a plant refuses.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-pub enum PlantError {
+pub enum FmuError {
     /// The robot cannot be loaded, started or stepped.
     #[error(transparent)]
     Robot(#[from] flexarm::Error),

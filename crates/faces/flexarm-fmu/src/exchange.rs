@@ -2,14 +2,14 @@
 
 use flexarm::live::EquationCommand;
 
-use crate::error::PlantError;
-use crate::plant::{Plant, Running};
+use crate::error::FmuError;
+use crate::model::{FmuModel, Running};
 use crate::variables::{Causality, Kind, Meaning};
 
 /// Central difference of fourth order: steps and weights.
 const DIFFERENCE: [(f64, f64); 4] = [(-2.0, 1.0 / 12.0), (-1.0, -2.0 / 3.0), (1.0, 2.0 / 3.0), (2.0, -1.0 / 12.0)];
 
-impl Plant {
+impl FmuModel {
     /// Returns whether the arm is a differential equation in its coordinates.
     pub fn has_equations(&self) -> bool {
         !self.states.states.is_empty()
@@ -26,14 +26,14 @@ impl Plant {
         &self.states.derivatives
     }
 
-    /// Starts as [`Plant::start`], for a solver outside. Servos are open: their joints get only
+    /// Starts as [`FmuModel::start`], for a solver outside. Servos are open: their joints get only
     /// the inputs `torque`.
     ///
     /// # Errors
-    /// As [`Plant::start`]; [`PlantError::NoEquations`] for an arm without equations of motion.
-    pub fn start_equations(&mut self, begin_s: f64) -> Result<(), PlantError> {
+    /// As [`FmuModel::start`]; [`FmuError::NoEquations`] for an arm without equations of motion.
+    pub fn start_equations(&mut self, begin_s: f64) -> Result<(), FmuError> {
         if !self.has_equations() {
-            return Err(PlantError::NoEquations);
+            return Err(FmuError::NoEquations);
         }
         self.check_start(begin_s)?;
         let pose = self.all(Meaning::TargetPosition);
@@ -47,13 +47,13 @@ impl Plant {
     /// Sets the time (s).
     ///
     /// # Errors
-    /// [`PlantError::NotFinite`]; [`PlantError::NotStarted`] before [`Plant::start_equations`].
-    pub fn set_time(&mut self, to_s: f64) -> Result<(), PlantError> {
+    /// [`FmuError::NotFinite`]; [`FmuError::NotStarted`] before [`FmuModel::start_equations`].
+    pub fn set_time(&mut self, to_s: f64) -> Result<(), FmuError> {
         let Some(Running::Equations { time_s, is_stale, .. }) = &mut self.running else {
-            return Err(PlantError::NotStarted);
+            return Err(FmuError::NotStarted);
         };
         if !to_s.is_finite() {
-            return Err(PlantError::NotFinite { name: "time".into(), found: to_s });
+            return Err(FmuError::NotFinite { name: "time".into(), found: to_s });
         }
         (*time_s, *is_stale) = (to_s, true);
         Ok(())
@@ -67,14 +67,14 @@ impl Plant {
     /// Sets the continuous states.
     ///
     /// # Errors
-    /// [`PlantError::NotFinite`]; [`PlantError::NotStarted`] before [`Plant::start_equations`].
-    pub fn set_states(&mut self, states: &[f64]) -> Result<(), PlantError> {
+    /// [`FmuError::NotFinite`]; [`FmuError::NotStarted`] before [`FmuModel::start_equations`].
+    pub fn set_states(&mut self, states: &[f64]) -> Result<(), FmuError> {
         if !matches!(self.running, Some(Running::Equations { .. })) {
-            return Err(PlantError::NotStarted);
+            return Err(FmuError::NotStarted);
         }
         for (&reference, &found) in self.states.states.iter().zip(states) {
             if !found.is_finite() {
-                return Err(PlantError::NotFinite { name: self.variables[reference].name.clone(), found });
+                return Err(FmuError::NotFinite { name: self.variables[reference].name.clone(), found });
             }
         }
         for (&reference, &value) in self.states.states.iter().zip(states) {
@@ -87,8 +87,8 @@ impl Plant {
     /// Returns the derivatives of the continuous states.
     ///
     /// # Errors
-    /// As [`Plant::evaluate`].
-    pub fn derivatives(&mut self) -> Result<Vec<f64>, PlantError> {
+    /// As [`FmuModel::evaluate`].
+    pub fn derivatives(&mut self) -> Result<Vec<f64>, FmuError> {
         self.evaluate()?;
         Ok(self.states.derivatives.iter().map(|&reference| self.values[reference]).collect())
     }
@@ -101,8 +101,8 @@ impl Plant {
     /// Computes outputs and derivatives if state or inputs changed; nothing in co-simulation.
     ///
     /// # Errors
-    /// [`PlantError::Robot`] for a state without finite accelerations.
-    pub fn evaluate(&mut self) -> Result<(), PlantError> {
+    /// [`FmuError::Robot`] for a state without finite accelerations.
+    pub fn evaluate(&mut self) -> Result<(), FmuError> {
         if !matches!(self.running, Some(Running::Equations { is_stale: true, .. })) {
             return Ok(());
         }
@@ -124,22 +124,22 @@ impl Plant {
     /// `knowns` (inputs, states), by central differences of fourth order.
     ///
     /// # Errors
-    /// [`PlantError::Reference`], [`PlantError::Kind`], [`PlantError::NotSettable`] for a known that
-    /// is neither input nor state; as [`Plant::evaluate`].
+    /// [`FmuError::Reference`], [`FmuError::Kind`], [`FmuError::NotSettable`] for a known that
+    /// is neither input nor state; as [`FmuModel::evaluate`].
     pub fn directional_derivative(
         &mut self,
         unknowns: &[usize],
         knowns: &[usize],
         seed: &[f64],
-    ) -> Result<Vec<f64>, PlantError> {
+    ) -> Result<Vec<f64>, FmuError> {
         if !matches!(self.running, Some(Running::Equations { .. })) {
-            return Err(PlantError::NotStarted);
+            return Err(FmuError::NotStarted);
         }
         unknowns.iter().try_for_each(|&reference| self.get(reference).map(drop))?;
         for &reference in knowns {
             let known = self.variable(reference, Kind::Real)?;
             if known.causality != Causality::Input && !self.states.states.contains(&reference) {
-                return Err(PlantError::NotSettable(known.name.clone()));
+                return Err(FmuError::NotSettable(known.name.clone()));
             }
         }
         let values = self.values.clone();

@@ -1,16 +1,16 @@
 //! An arm as a plant for other programs: FMI 2.0 and 3.0 for co-simulation and model exchange, and
 //! a C interface.
 //!
-//! [`Plant`] is an arm with named parameters, inputs and outputs. [`export_fmu`] writes one as an
+//! [`FmuModel`] is an arm with named parameters, inputs and outputs. [`export_fmu`] writes one as an
 //! FMU: a zip file with the robot, the description of its variables, and this crate as a library.
 //! The library exports the functions of FMI 2.0, those of FMI 3.0 and those of
 //! `include/flexarm.h`; the same plant stands behind all three.
 //!
 //! ```no_run
 //! use std::path::Path;
-//! use flexarm_fmu::{Plant, PlantSettings};
+//! use flexarm_fmu::{FmuModel, FmuSettings};
 //!
-//! let mut arm = Plant::new(Path::new("robots/kr210"), &PlantSettings::default())?;
+//! let mut arm = FmuModel::new(Path::new("robots/kr210"), &FmuSettings::default())?;
 //! let height = arm.find("tcp.position.z").ok_or("no such variable")?;
 //! arm.start(0.0)?;
 //! for k in 0..100 {
@@ -28,13 +28,13 @@ mod exchange;
 #[allow(unsafe_code, reason = "functions called from C take pointers")]
 mod ffi;
 mod instance;
-mod plant;
+mod model;
 mod variables;
 
 pub use archive::{FmuJob, FmuSummary, export_fmu, open_resources};
 pub use description::{About, Fmi, MODEL_IDENTIFIER, description};
-pub use error::PlantError;
-pub use plant::{Plant, PlantSettings, PlantState};
+pub use error::FmuError;
+pub use model::{FmuModel, FmuSettings, FmuState};
 pub use variables::{Causality, Kind, UNITS, Variable};
 
 /// Parts that the tests of this crate reach; not part of the interface.

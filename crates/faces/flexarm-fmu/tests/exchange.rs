@@ -2,47 +2,47 @@
 
 use crate::helpers::{of_joints, robot, settings, targets, values};
 use flexarm::{DriveModel, LinkModel, Modelling, Robot};
-use flexarm_fmu::{Plant, PlantError, PlantSettings};
+use flexarm_fmu::{FmuError, FmuModel, FmuSettings};
 use nalgebra::DMatrix;
 
 const TCP: [&str; 3] = ["tcp.position.x", "tcp.position.y", "tcp.position.z"];
 
 /// References of positions, velocities and accelerations of the targets.
-fn motion_inputs(plant: &Plant) -> [Vec<usize>; 3] {
-    ["target_position", "target_velocity", "target_acceleration"].map(|what| of_joints(plant, what))
+fn motion_inputs(model: &FmuModel) -> [Vec<usize>; 3] {
+    ["target_position", "target_velocity", "target_acceleration"].map(|what| of_joints(model, what))
 }
 
 /// Sets the swing of [`targets`] at a time, with its acceleration.
-fn swing(plant: &mut Plant, inputs: &[Vec<usize>; 3], t: f64) {
+fn swing(model: &mut FmuModel, inputs: &[Vec<usize>; 3], t: f64) {
     let still = vec![0.0; inputs[0].len()];
     let ((q, qdot), h) = (targets(&still, t), 1e-4);
     let (before, after) = (targets(&still, t - h).1, targets(&still, t + h).1);
     for k in 0..still.len() {
         let values = [q[k], qdot[k], (after[k] - before[k]) / (2.0 * h)];
-        inputs.iter().zip(values).for_each(|(inputs, value)| plant.set(inputs[k], value).unwrap());
+        inputs.iter().zip(values).for_each(|(inputs, value)| model.set(inputs[k], value).unwrap());
     }
 }
 
 /// Integrates with the classical Runge-Kutta method, as an importer would.
-fn integrate(plant: &mut Plant, mut inputs: impl FnMut(&mut Plant, f64), steps: u32, h: f64) {
+fn integrate(model: &mut FmuModel, mut inputs: impl FnMut(&mut FmuModel, f64), steps: u32, h: f64) {
     for step in 0..steps {
-        let (t, x) = (h * f64::from(step), plant.states());
+        let (t, x) = (h * f64::from(step), model.states());
         let mut sum = vec![0.0; x.len()];
         let mut slope = sum.clone();
         for (fraction, weight) in [(0.0, 1.0), (0.5, 2.0), (0.5, 2.0), (1.0, 1.0)] {
             let stage: Vec<f64> = x.iter().zip(&slope).map(|(x, slope)| x + fraction * h * slope).collect();
-            plant.set_time(t + fraction * h).unwrap();
-            inputs(plant, t + fraction * h);
-            plant.set_states(&stage).unwrap();
-            slope = plant.derivatives().unwrap();
+            model.set_time(t + fraction * h).unwrap();
+            inputs(model, t + fraction * h);
+            model.set_states(&stage).unwrap();
+            slope = model.derivatives().unwrap();
             sum.iter_mut().zip(&slope).for_each(|(sum, slope)| *sum += weight / 6.0 * slope);
         }
         let end: Vec<f64> = x.iter().zip(&sum).map(|(x, sum)| x + h * sum).collect();
-        plant.set_time(t + h).unwrap();
-        inputs(plant, t + h);
-        plant.set_states(&end).unwrap();
+        model.set_time(t + h).unwrap();
+        inputs(model, t + h);
+        model.set_states(&end).unwrap();
     }
-    plant.evaluate().unwrap();
+    model.evaluate().unwrap();
 }
 
 /// Truth: the stepper of the arm with a fine step.
@@ -53,26 +53,26 @@ fn a_solver_outside_moves_the_arm_as_its_own_stepper_does() {
         ("test/reference_arm", LinkModel::Modal, 5e-6),
         ("palletiser", LinkModel::AsFiled, 2.5e-5),
     ] {
-        let settings = PlantSettings { step_s: Some(1e-4), ..settings(links, DriveModel::AsFiled) };
-        let mut plant = Plant::new(&robot(name), &settings).unwrap();
-        let inputs = motion_inputs(&plant);
-        plant.set_flag(plant.find("use_target_velocity").unwrap(), true).unwrap();
-        plant.start(0.0).unwrap();
-        let first = values(&plant, &TCP);
+        let settings = FmuSettings { step_s: Some(1e-4), ..settings(links, DriveModel::AsFiled) };
+        let mut model = FmuModel::new(&robot(name), &settings).unwrap();
+        let inputs = motion_inputs(&model);
+        model.set_flag(model.find("use_target_velocity").unwrap(), true).unwrap();
+        model.start(0.0).unwrap();
+        let first = values(&model, &TCP);
         for k in 1..=1000 {
-            swing(&mut plant, &inputs, 1e-4 * f64::from(k));
-            plant.step(plant.time_s(), 1e-4).unwrap();
+            swing(&mut model, &inputs, 1e-4 * f64::from(k));
+            model.step(model.time_s(), 1e-4).unwrap();
         }
-        let truth = values(&plant, &TCP);
-        plant.reset();
-        plant.start_equations(0.0).unwrap();
-        assert_eq!(first, values(&plant, &TCP));
-        integrate(&mut plant, |plant, t| swing(plant, &inputs, t), (0.1_f64 / h).round() as u32, h);
+        let truth = values(&model, &TCP);
+        model.reset();
+        model.start_equations(0.0).unwrap();
+        assert_eq!(first, values(&model, &TCP));
+        integrate(&mut model, |model, t| swing(model, &inputs, t), (0.1_f64 / h).round() as u32, h);
         let apart = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
-        let (moved, off) = (apart(&first, &truth), apart(&values(&plant, &TCP), &truth));
+        let (moved, off) = (apart(&first, &truth), apart(&values(&model, &TCP), &truth));
         println!("{name}: {off:.1e} m apart after {moved:.3} m");
         assert!(off < 1e-6 && moved > 1e-2, "{name}: {off:e} {moved:e}");
-        assert!((plant.time_s() - 0.1).abs() < 1e-12);
+        assert!((model.time_s() - 0.1).abs() < 1e-12);
     }
 }
 
@@ -85,32 +85,32 @@ fn directional_derivatives_at_rest_are_those_of_the_linear_model() {
         ("kr300", LinkModel::AsFiled, DriveModel::Servo),
     ] {
         let settings = settings(links, drives);
-        let mut plant = Plant::new(&robot(name), &settings).unwrap();
+        let mut model = FmuModel::new(&robot(name), &settings).unwrap();
         let arm = Robot::load(robot(name)).unwrap().model(&settings.modelling).unwrap();
         let pose = vec![0.2; arm.joints().count()];
-        let motion = motion_inputs(&plant);
-        motion[0].iter().for_each(|&k| plant.set(k, 0.2).unwrap());
-        plant.start_equations(0.0).unwrap();
+        let motion = motion_inputs(&model);
+        motion[0].iter().for_each(|&k| model.set(k, 0.2).unwrap());
+        model.start_equations(0.0).unwrap();
         // The torques that hold the pose.
         let linear = arm.linearise(Some(&pose), [0.0; 6]).unwrap();
         let (n, driven) = (linear.M.nrows(), linear.driven);
-        let torques = of_joints(&plant, "torque");
+        let torques = of_joints(&model, "torque");
         assert_eq!(torques.len(), driven);
-        let efforts = of_joints(&plant, "effort");
-        let holding: Vec<f64> = efforts.iter().map(|&k| plant.get(k).unwrap()).collect();
+        let efforts = of_joints(&model, "effort");
+        let holding: Vec<f64> = efforts.iter().map(|&k| model.get(k).unwrap()).collect();
         for (k, &reference) in torques.iter().enumerate() {
-            plant.set(reference, holding[k]).unwrap();
+            model.set(reference, holding[k]).unwrap();
         }
-        let rest = plant.derivatives().unwrap();
+        let rest = model.derivatives().unwrap();
         let largest = rest.iter().fold(0.0_f64, |m, a| m.max(a.abs()));
         println!("{name}: accelerations at rest {largest:.1e}");
         assert!(largest < 1e-3, "{largest}");
 
-        let states: Vec<usize> = plant.state_references().to_vec();
-        let unknowns: Vec<usize> = plant.derivative_references()[n..].to_vec();
-        let columns = |plant: &mut Plant, knowns: &[usize]| {
+        let states: Vec<usize> = model.state_references().to_vec();
+        let unknowns: Vec<usize> = model.derivative_references()[n..].to_vec();
+        let columns = |model: &mut FmuModel, knowns: &[usize]| {
             let columns =
-                knowns.iter().map(|&known| plant.directional_derivative(&unknowns, &[known], &[1.0]).unwrap());
+                knowns.iter().map(|&known| model.directional_derivative(&unknowns, &[known], &[1.0]).unwrap());
             DMatrix::from_column_slice(n, knowns.len(), &columns.collect::<Vec<_>>().concat())
         };
         let inverse = linear.M.clone().try_inverse().unwrap();
@@ -121,15 +121,15 @@ fn directional_derivatives_at_rest_are_those_of_the_linear_model() {
             assert!(off < 1e-7, "{name} {what}: {off:e}");
         };
         // Motors are under servos in the linear model, so that their columns differ.
-        check("deflections", &elastic(&columns(&mut plant, &states[..n])), &elastic(&(-&inverse * &linear.K)));
-        check("velocities", &elastic(&columns(&mut plant, &states[n..])), &elastic(&(-&inverse * &linear.D)));
+        check("deflections", &elastic(&columns(&mut model, &states[..n])), &elastic(&(-&inverse * &linear.K)));
+        check("velocities", &elastic(&columns(&mut model, &states[n..])), &elastic(&(-&inverse * &linear.D)));
         if driven > 0 {
-            check("torques", &columns(&mut plant, &torques), &inverse.columns(0, driven).into_owned());
+            check("torques", &columns(&mut model, &torques), &inverse.columns(0, driven).into_owned());
         } else {
-            check("targets", &columns(&mut plant, &motion[0]), &(-&inverse * &linear.K_a));
-            check("accelerations", &columns(&mut plant, &motion[2]), &(-&inverse * &linear.M_a));
+            check("targets", &columns(&mut model, &motion[0]), &(-&inverse * &linear.K_a));
+            check("accelerations", &columns(&mut model, &motion[2]), &(-&inverse * &linear.M_a));
         }
-        let wrench: Vec<usize> = plant
+        let wrench: Vec<usize> = model
             .variables()
             .iter()
             .enumerate()
@@ -137,29 +137,29 @@ fn directional_derivatives_at_rest_are_those_of_the_linear_model() {
             .map(|(k, _)| k)
             .collect();
         let J = DMatrix::from_fn(n, 6, |i, k| linear.J[(k, i)]);
-        check("wrench", &columns(&mut plant, &wrench), &(&inverse * J));
-        assert_eq!(plant.derivatives().unwrap(), rest, "the state is as before");
+        check("wrench", &columns(&mut model, &wrench), &(&inverse * J));
+        assert_eq!(model.derivatives().unwrap(), rest, "the state is as before");
     }
 }
 
 #[test]
 fn states_of_model_exchange_are_saved_and_restored() {
-    let mut plant = Plant::new(&robot("kr210"), &PlantSettings::default()).unwrap();
-    let inputs = motion_inputs(&plant);
-    plant.start_equations(0.0).unwrap();
-    integrate(&mut plant, |plant, t| swing(plant, &inputs, t), 100, 2.5e-5);
-    let (state, tcp, slopes) = (plant.state().unwrap(), values(&plant, &TCP), plant.derivatives().unwrap());
-    integrate(&mut plant, |plant, t| swing(plant, &inputs, t), 100, 2.5e-5);
-    assert_ne!(tcp, values(&plant, &TCP));
-    plant.restore(&state).unwrap();
-    assert_eq!(slopes, plant.derivatives().unwrap());
-    assert_eq!(tcp, values(&plant, &TCP));
-    assert!((plant.time_s() - 2.5e-3).abs() < 1e-15);
+    let mut model = FmuModel::new(&robot("kr210"), &FmuSettings::default()).unwrap();
+    let inputs = motion_inputs(&model);
+    model.start_equations(0.0).unwrap();
+    integrate(&mut model, |model, t| swing(model, &inputs, t), 100, 2.5e-5);
+    let (state, tcp, slopes) = (model.state().unwrap(), values(&model, &TCP), model.derivatives().unwrap());
+    integrate(&mut model, |model, t| swing(model, &inputs, t), 100, 2.5e-5);
+    assert_ne!(tcp, values(&model, &TCP));
+    model.restore(&state).unwrap();
+    assert_eq!(slopes, model.derivatives().unwrap());
+    assert_eq!(tcp, values(&model, &TCP));
+    assert!((model.time_s() - 2.5e-3).abs() < 1e-15);
 }
 
 #[test]
 fn arms_without_equations_and_wrong_states_are_refused() {
-    let rigid = Plant::new(&robot("kr210"), &settings(LinkModel::Rigid, DriveModel::Rigid)).unwrap();
+    let rigid = FmuModel::new(&robot("kr210"), &settings(LinkModel::Rigid, DriveModel::Rigid)).unwrap();
     assert!(!rigid.has_equations() && rigid.find("joint.joint_1.target_acceleration").is_none());
     let text = std::fs::read_to_string(robot("kr210")).unwrap();
     let mut document: toml_edit::DocumentMut = text.parse().unwrap();
@@ -172,16 +172,16 @@ fn arms_without_equations_and_wrong_states_are_refused() {
     let refused = robot_with.model(&Modelling::default()).unwrap().equations(None, &Default::default());
     assert!(refused.err().unwrap().to_string().contains("hysteresis"));
 
-    let mut plant = Plant::new(&robot("kr210"), &PlantSettings::default()).unwrap();
-    assert!(matches!(plant.set_states(&plant.states()), Err(PlantError::NotStarted)));
-    plant.start_equations(0.0).unwrap();
-    assert!(matches!(plant.step(0.0, 1e-3), Err(PlantError::Order { .. })));
-    let kept = plant.states();
-    assert!(matches!(plant.set_states(&vec![f64::NAN; kept.len()]), Err(PlantError::NotFinite { .. })));
-    assert!(matches!(plant.set_time(f64::INFINITY), Err(PlantError::NotFinite { .. })));
-    let [output, state] = [plant.find("tcp.position.x").unwrap(), plant.state_references()[0]];
-    let wrong = plant.directional_derivative(&[output], &[output], &[1.0]);
-    assert!(matches!(wrong, Err(PlantError::NotSettable(_))));
-    assert!(plant.directional_derivative(&[output], &[state], &[1.0]).unwrap()[0].is_finite());
-    assert_eq!(plant.states(), kept);
+    let mut model = FmuModel::new(&robot("kr210"), &FmuSettings::default()).unwrap();
+    assert!(matches!(model.set_states(&model.states()), Err(FmuError::NotStarted)));
+    model.start_equations(0.0).unwrap();
+    assert!(matches!(model.step(0.0, 1e-3), Err(FmuError::Order { .. })));
+    let kept = model.states();
+    assert!(matches!(model.set_states(&vec![f64::NAN; kept.len()]), Err(FmuError::NotFinite { .. })));
+    assert!(matches!(model.set_time(f64::INFINITY), Err(FmuError::NotFinite { .. })));
+    let [output, state] = [model.find("tcp.position.x").unwrap(), model.state_references()[0]];
+    let wrong = model.directional_derivative(&[output], &[output], &[1.0]);
+    assert!(matches!(wrong, Err(FmuError::NotSettable(_))));
+    assert!(model.directional_derivative(&[output], &[state], &[1.0]).unwrap()[0].is_finite());
+    assert_eq!(model.states(), kept);
 }

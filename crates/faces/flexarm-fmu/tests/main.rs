@@ -5,5 +5,5 @@
 
 mod exchange;
 mod helpers;
+mod model;
 mod names;
-mod plant;

@@ -13,20 +13,20 @@ use std::path::PathBuf;
 use flexarm::robots::TCP_FRAME;
 use flexarm::steppers::Start;
 use flexarm::{LinkModel, LoadOptions, Modelling, Motion, Robot, StepperKind};
-use flexarm_stepping::{AlphaSettings, FlexibleArm, Observation, ReferenceSettings, static_equilibrium};
+use flexarm_stepping::{AlphaSettings, Observation, Plant, ReferenceSettings, static_equilibrium};
 use nalgebra::Vector3;
 
 const STEP: f64 = 1e-3;
 
 /// Computes TCP positions every millisecond, and the cost (CPU seconds per simulated second).
-fn run(arm: &FlexibleArm, kind: StepperKind, duration: f64) -> (Vec<Vector3<f64>>, f64) {
-    let tcp = arm.model.frame(TCP_FRAME).unwrap().clone();
+fn run(plant: &Plant, kind: StepperKind, duration: f64) -> (Vec<Vector3<f64>>, f64) {
+    let tcp = plant.model.frame(TCP_FRAME).unwrap().clone();
     let steps = (duration / STEP).round() as usize;
-    let mut seen = Observation::new(arm);
+    let mut seen = Observation::new(plant);
     let (mut path, mut cost) = (Vec::new(), f64::INFINITY);
     let repeats = if matches!(kind, StepperKind::Reference(_)) { 1 } else { 5 };
     for repeat in 0..repeats {
-        let mut stepper = flexarm_stepping::new_stepper(kind, arm.clone(), STEP, Start::Equilibrium).unwrap();
+        let mut stepper = flexarm_stepping::new_stepper(kind, plant.clone(), STEP, Start::Equilibrium).unwrap();
         let started = cpu_time::ThreadTime::now();
         for _ in 0..steps {
             stepper.step().unwrap();
@@ -35,7 +35,7 @@ fn run(arm: &FlexibleArm, kind: StepperKind, duration: f64) -> (Vec<Vector3<f64>
         if repeat > 0 {
             continue;
         }
-        let mut stepper = flexarm_stepping::new_stepper(kind, arm.clone(), STEP, Start::Equilibrium).unwrap();
+        let mut stepper = flexarm_stepping::new_stepper(kind, plant.clone(), STEP, Start::Equilibrium).unwrap();
         for step in 0..=steps {
             stepper.observe(&mut seen);
             path.push((seen.X_WB[tcp.body] * tcp.X_BF).translation.vector);
@@ -54,9 +54,10 @@ fn main() {
     let trajectory = arguments.next().map_or_else(|| robot.default_trajectory.clone().unwrap(), PathBuf::from);
     let motion = Motion::load_for(&trajectory, &robot.rigid_model().unwrap()).unwrap();
     let duration = motion.trajectory.duration();
-    let arm = |robot: &Robot, modelling: &Modelling| robot.model(modelling).unwrap().arm(motion.prescribed()).unwrap();
+    let plant =
+        |robot: &Robot, modelling: &Modelling| robot.model(modelling).unwrap().plant(motion.prescribed()).unwrap();
 
-    let rigid = arm(&robot, &Modelling { links: LinkModel::Rigid, ..Modelling::default() });
+    let rigid = plant(&robot, &Modelling { links: LinkModel::Rigid, ..Modelling::default() });
     let (reference_path, _) = run(&rigid, StepperKind::Rk4, duration);
     let modal = |modes| Modelling { links: LinkModel::Modal, modes: Some(modes), ..Modelling::default() };
     let modal_all = Modelling { links: LinkModel::Modal, ..Modelling::default() };
@@ -65,7 +66,7 @@ fn main() {
         |robot: &mut Robot, on: bool| robot.flexible_links.iter_mut().for_each(|l| l.choices.geometric = on);
     let beams = robot.flexible_links.iter().all(|l| l.beam.is_some());
     stiffened(&mut robot, beams);
-    let (truth, _) = run(&arm(&robot, &if beams { modal(20) } else { modal_all }), reference(), duration);
+    let (truth, _) = run(&plant(&robot, &if beams { modal(20) } else { modal_all }), reference(), duration);
     let peak = truth.iter().zip(&reference_path).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
     println!("{}: peak deflection {:.6} mm over {duration} s; step {STEP} s", robot.name, 1e3 * peak);
     println!(
@@ -86,18 +87,18 @@ fn main() {
     for (name, modelling, geometric) in cases {
         stiffened(&mut robot, geometric && beams);
         let Ok(model) = robot.model(&modelling) else { continue };
-        let arm = model.arm(motion.prescribed()).unwrap();
-        let (path, cost) = run(&arm, alpha, duration);
+        let plant = model.plant(motion.prescribed()).unwrap();
+        let (path, cost) = run(&plant, alpha, duration);
         let error = path.iter().zip(&truth).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max) / peak;
         let sag = (path[0] - reference_path[0]).norm();
-        let f: Vec<String> = arm.modes.frequencies_hz().iter().take(10).map(|f| format!("{f:.2}")).collect();
+        let f: Vec<String> = plant.modes.frequencies_hz().iter().take(10).map(|f| format!("{f:.2}")).collect();
         if base.is_nan() {
             base = cost;
         }
-        assert!(static_equilibrium(&arm, 0.0).is_ok());
+        assert!(static_equilibrium(&plant, 0.0).is_ok());
         println!(
             "| {name} | {} | {:.5} | {:.3} | {} | {:.2} | {:.2} |",
-            arm.n_elastic_coordinates(),
+            plant.n_elastic_coordinates(),
             1e3 * sag,
             100.0 * error,
             f.join(" "),

@@ -5,8 +5,8 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use flexarm::identify::{
-    Component, IdentifyOptions, IdentifyRequest, LoadCase, MeasuredArm, Measurements, Parameter, PlanRequest, Plant,
-    Reading, ReadingKind, Row, identify, identify_robot, parameters, plan_measurements, plant,
+    Component, IdentifyOptions, IdentifyRequest, LoadCase, MeasuredArm, Measurements, NominalArm, Parameter,
+    PlanRequest, Reading, ReadingKind, Row, identify, identify_robot, nominal, parameters, plan_measurements,
 };
 use flexarm::{Error, Modelling, Robot, Wrench};
 use flexarm_testkit::Draw;
@@ -61,8 +61,8 @@ fn stiffnesses(all: Vec<Parameter>) -> Vec<Parameter> {
 }
 
 /// Simulated readings of an arm with parameters at `x`.
-fn shown(plant: &Plant, parameters: &[Parameter], x: &[f64], of: &Measurements) -> Vec<f64> {
-    let arm = MeasuredArm { plant, parameters, measurements: of };
+fn shown(nominal: &NominalArm, parameters: &[Parameter], x: &[f64], of: &Measurements) -> Vec<f64> {
+    let arm = MeasuredArm { nominal, parameters, measurements: of };
     arm.predicted(&DVector::from_column_slice(x)).unwrap()
 }
 
@@ -81,16 +81,16 @@ fn with_values(of: &Measurements, values: &[f64]) -> Measurements {
 /// the errors over their deviations, 200 seeds.
 fn coverage(robot: &str) -> (f64, f64) {
     let arm = shipped(robot).model(&Modelling::default()).unwrap();
-    let (plant, parameters) = (plant(&arm), stiffnesses(parameters(&arm)));
+    let (nominal, parameters) = (nominal(&arm), stiffnesses(parameters(&arm)));
     let mut draw = Draw(2026);
     let poses = pulls(&mut draw, 24);
     let truth: Vec<f64> = (0..parameters.len()).map(|k| 0.3 * (1.7 * k as f64 + 1.0).sin()).collect();
-    let exact = shown(&plant, &parameters, &truth, &poses);
+    let exact = shown(&nominal, &parameters, &truth, &poses);
     let options = IdentifyOptions { folds: 0, ..IdentifyOptions::default() };
     let (mut inside, mut squares, mut count) = (0.0, 0.0, 0.0);
     for _ in 0..200 {
         let noisy: Vec<f64> = exact.iter().map(|x| x + NOISE * normal(&mut draw)).collect();
-        let found = identify(&plant, &parameters, &with_values(&poses, &noisy), &options, &|_| true).unwrap();
+        let found = identify(&nominal, &parameters, &with_values(&poses, &noisy), &options, &|_| true).unwrap();
         for (p, x) in found.parameters.iter().zip(&truth) {
             assert!(p.identifiable, "{}", p.name);
             let value = p.initial * x.exp();
@@ -137,7 +137,7 @@ fn measured(robot: &Robot, x: &[f64], noise: f64) -> (Measurements, Vec<f64>, Ve
     let mut draw = Draw(5);
     let poses = pulls(&mut draw, 12);
     let parameters: Vec<Parameter> = stiffnesses(parameters(&arm));
-    let mut values = shown(&plant(&arm), &parameters, x, &poses);
+    let mut values = shown(&nominal(&arm), &parameters, x, &poses);
     values.iter_mut().for_each(|d| *d += noise * normal(&mut draw));
     (poses, values, arm.joints().map(str::to_owned).collect())
 }

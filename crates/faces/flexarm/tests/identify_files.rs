@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use flexarm::identify::{
     Component, Identification, IdentifyRequest, LoadCase, MeasuredArm, Measurements, Parameter, PlanRequest, Reading,
-    ReadingKind, Row, Target, identify_robot, parameters, plan_measurements, plant,
+    ReadingKind, Row, Target, identify_robot, nominal, parameters, plan_measurements,
 };
 use flexarm::{Error, Modelling, Robot, Wrench};
 use flexarm_testkit::Draw;
@@ -86,7 +86,7 @@ impl Place {
             instruments: vec![flexarm::identify::Instrument::Known(nalgebra::IsometryMatrix3::identity())],
             ..Measurements::default()
         };
-        let model = MeasuredArm { plant: &plant(&arm), parameters: &self.parameters, measurements: &measurements };
+        let model = MeasuredArm { nominal: &nominal(&arm), parameters: &self.parameters, measurements: &measurements };
         let values = model.predicted(&DVector::from_column_slice(&TRUTH)).unwrap();
         values.chunks_exact(3).map(|d| [0, 1, 2].map(|k| d[k] + NOISE * self.normal())).collect()
     }

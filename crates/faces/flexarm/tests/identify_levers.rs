@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use flexarm::identify::{
     Component, IdentifyOptions, IdentifyRequest, LoadCase, MeasuredArm, Measurements, Parameter, PlanRequest, Reading,
-    ReadingKind, Row, frequency_slopes, identify, identify_robot, parameters, plan_measurements, plant,
+    ReadingKind, Row, frequency_slopes, identify, identify_robot, nominal, parameters, plan_measurements,
 };
 use flexarm::{Modelling, Robot, Wrench};
 use nalgebra::{DVector, Vector3};
@@ -68,14 +68,14 @@ fn springs_of_coupled_motors_have_the_derivatives_of_their_arm_and_are_found_fro
     let place = Place::new("coupled");
     let robot = coupled(&place);
     let arm = robot.model(&Modelling::default()).unwrap();
-    let (plant, parameters) = (plant(&arm), gears(parameters(&arm)));
+    let (nominal, parameters) = (nominal(&arm), gears(parameters(&arm)));
     assert_eq!(parameters.len(), 6);
     let poses = pulls();
-    let measured = MeasuredArm { plant: &plant, parameters: &parameters, measurements: &poses };
+    let measured = MeasuredArm { nominal: &nominal, parameters: &parameters, measurements: &poses };
     let shown = |x: &[f64]| DVector::from_vec(measured.predicted(&DVector::from_column_slice(x)).unwrap());
     let q = &poses.readings[3].q;
-    let hz = |x: &[f64]| DVector::from_vec(frequency_slopes(&plant.with(&parameters, x), &[], q).unwrap().hz);
-    let slopes = frequency_slopes(&plant, &parameters, q).unwrap().slopes;
+    let hz = |x: &[f64]| DVector::from_vec(frequency_slopes(&nominal.with(&parameters, x), &[], q).unwrap().hz);
+    let slopes = frequency_slopes(&nominal, &parameters, q).unwrap().slopes;
     let mut J = nalgebra::DMatrix::zeros(0, 0);
     evaluated(&measured, &mut J);
     let richardson = |k: usize, f: &dyn Fn(&[f64]) -> DVector<f64>| {
@@ -107,7 +107,7 @@ fn springs_of_coupled_motors_have_the_derivatives_of_their_arm_and_are_found_fro
         }
     }
     let options = IdentifyOptions { folds: 0, ..IdentifyOptions::default() };
-    let found = identify(&plant, &parameters, &read, &options, &|_| true).unwrap();
+    let found = identify(&nominal, &parameters, &read, &options, &|_| true).unwrap();
     for (p, x) in found.parameters.iter().zip(&truth) {
         let off = (p.value - p.initial * x.exp()) / p.std;
         assert!(p.identifiable && off.abs() < 0.02, "{}: {off:e}", p.name);
@@ -121,7 +121,7 @@ fn dampers_of_coupled_motors_are_found_from_the_response_of_the_arm_that_has_the
     let place = Place::new("dampers");
     let robot = coupled(&place);
     let arm = robot.model(&Modelling::default()).unwrap();
-    let plant = plant(&arm);
+    let nominal = nominal(&arm);
     let of =
         |p: &Parameter| p.name.ends_with("gearbox.damping") && ["_4", "_5", "_6"].iter().any(|j| p.name.contains(j));
     let parameters: Vec<Parameter> = parameters(&arm).into_iter().filter(of).collect();
@@ -129,14 +129,14 @@ fn dampers_of_coupled_motors_are_found_from_the_response_of_the_arm_that_has_the
     let q = [0.2, -0.9, 1.2, 0.3, 0.5, 0.2];
     let omega: Vec<f64> = (1..40).map(|k| 12.0 * f64::from(k)).collect();
     let frame = flexarm_kinematics::Frame {
-        X_BF: plant.tool.X_BF * flexarm_kinematics::Pose::translation(0.4, 0.1, 0.0),
-        ..plant.tool.clone()
+        X_BF: nominal.tool.X_BF * flexarm_kinematics::Pose::translation(0.4, 0.1, 0.0),
+        ..nominal.tool.clone()
     };
     let probes = [Vector3::z(), Vector3::new(0.6, 0.8, 0.0)].map(|direction| Probe { frame: frame.clone(), direction });
-    let found = structure_slopes(&plant, &parameters, &q, &probes).unwrap();
+    let found = structure_slopes(&nominal, &parameters, &q, &probes).unwrap();
     let slopes = found.response(0, 1, Answer::Accelerance, &omega).unwrap().slopes;
     let at = |k: usize, h: f64| {
-        let changed = plant.with(&parameters[k..=k], &[h]);
+        let changed = nominal.with(&parameters[k..=k], &[h]);
         let again = structure_slopes(&changed, &[], &q, &probes).unwrap();
         let H = again.response(0, 1, Answer::Accelerance, &omega).unwrap().values;
         DVector::from_iterator(2 * H.len(), H.iter().flat_map(|h| [h.re, h.im]))
@@ -152,7 +152,7 @@ fn dampers_of_coupled_motors_are_found_from_the_response_of_the_arm_that_has_the
         assert!(error < 1e-8, "{k}: {error:e}");
     }
     let truth = [0.4, -0.3, 0.25];
-    let other = plant.with(&parameters, &truth);
+    let other = nominal.with(&parameters, &truth);
     let readings = [(0, 0), (0, 1), (1, 1)].into_iter().map(|(watched, hit)| {
         let H = structure_slopes(&other, &[], &q, &probes).unwrap();
         let H = H.response(watched, hit, Answer::Accelerance, &omega).unwrap().values;
@@ -168,7 +168,7 @@ fn dampers_of_coupled_motors_are_found_from_the_response_of_the_arm_that_has_the
     });
     let read = Measurements { readings: readings.collect(), ..Measurements::default() };
     let options = IdentifyOptions { folds: 0, ..IdentifyOptions::default() };
-    let found = identify(&plant, &parameters, &read, &options, &|_| true).unwrap();
+    let found = identify(&nominal, &parameters, &read, &options, &|_| true).unwrap();
     for (p, x) in found.parameters.iter().zip(truth) {
         let off = (p.value - p.initial * x.exp()) / p.std;
         eprintln!("{}: off by {off:.1e} deviations", p.name);

@@ -5,8 +5,8 @@ use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 
 use flexarm::identify::{
-    Answer, Identification, IdentifyRequest, Parameter, Plant, Probe, ResponseSlopes, identify_robot, parameters,
-    plant, structure_slopes,
+    Answer, Identification, IdentifyRequest, NominalArm, Parameter, Probe, ResponseSlopes, identify_robot, nominal,
+    parameters, structure_slopes,
 };
 use flexarm::{Modelling, Robot};
 use nalgebra::{Complex, Vector3};
@@ -67,7 +67,7 @@ impl Noise {
 
 /// The tested arm, and the test: excited at the tool along z and x, observed along z.
 struct Test {
-    plant: Plant,
+    nominal: NominalArm,
     hz: Vec<f64>,
 }
 
@@ -79,13 +79,13 @@ impl Test {
             TRUTH.iter().map(|(name, _)| all.iter().find(|p| p.name == *name).unwrap().clone()).collect();
         let x: Vec<f64> = TRUTH.iter().map(|(_, factor)| f64::ln(*factor)).collect();
         let hz = (0..50).map(|k| 4.0 + 0.9 * f64::from(k)).collect();
-        Self { plant: plant(&arm).with(&changed, &x), hz }
+        Self { nominal: nominal(&arm).with(&changed, &x), hz }
     }
 
     fn response(&self, watched: Vector3<f64>, hit: Vector3<f64>) -> Vec<Complex<f64>> {
-        let probe = |direction| Probe { frame: self.plant.tool.clone(), direction };
+        let probe = |direction| Probe { frame: self.nominal.tool.clone(), direction };
         let omega: Vec<f64> = self.hz.iter().map(|hz| TAU * hz).collect();
-        let found = structure_slopes(&self.plant, &[], &POSE, &[probe(watched), probe(hit)]).unwrap();
+        let found = structure_slopes(&self.nominal, &[], &POSE, &[probe(watched), probe(hit)]).unwrap();
         let ResponseSlopes { values, .. } = found.response(0, 1, Answer::Accelerance, &omega).unwrap();
         values
     }
@@ -260,11 +260,11 @@ fn shapes_of_modes_tell_how_stiffness_is_shared() {
     let test = Test::new(&robot);
     let place = Place::new("shapes");
     let arm = robot.model(&Modelling::default()).unwrap();
-    let frame = |link: &str| plant(&arm).model.frame(link).unwrap().clone();
+    let frame = |link: &str| nominal(&arm).model.frame(link).unwrap().clone();
     let (links, axes) = (["link_3", "link_4", "link_6"], [("x", Vector3::x()), ("z", Vector3::z())]);
     let probes: Vec<Probe> =
         links.iter().flat_map(|link| axes.map(|(_, direction)| Probe { frame: frame(link), direction })).collect();
-    let found = structure_slopes(&test.plant, &[], &POSE, &probes).unwrap();
+    let found = structure_slopes(&test.nominal, &[], &POSE, &probes).unwrap();
     let mut text = head("");
     links.iter().for_each(|link| text += &format!("[node.{link}]\nlink = {link:?}\n"));
     for mode in 0..3 {
@@ -317,13 +317,13 @@ fn dampers_of_a_gearbox_of_six_come_back_one_by_one() {
     let dampers: Vec<Parameter> =
         (0..6).map(|k| parameters(&arm).into_iter().find(|p| p.name == name(k)).unwrap()).collect();
     let factors = [1.0, 1.0, 1.0, 1.6, 0.6, 1.3];
-    let plant = plant(&arm).with(&dampers, &factors.map(f64::ln));
+    let nominal = nominal(&arm).with(&dampers, &factors.map(f64::ln));
     let hz: Vec<f64> = (0..80).map(|k| 3.0 + 0.5 * f64::from(k)).collect();
     let omega: Vec<f64> = hz.iter().map(|hz| TAU * hz).collect();
     let mut job = "format = 1\nfit = [\"drive.joint_2.gearbox.damping\"]\n".to_owned();
     for (axis, direction) in [("x", Vector3::x()), ("y", Vector3::y()), ("z", Vector3::z())] {
-        let probe = Probe { frame: plant.tool.clone(), direction };
-        let found = structure_slopes(&plant, &[], &POSE, &[probe.clone(), probe]).unwrap();
+        let probe = Probe { frame: nominal.tool.clone(), direction };
+        let found = structure_slopes(&nominal, &[], &POSE, &[probe.clone(), probe]).unwrap();
         let values = found.response(0, 1, Answer::Accelerance, &omega).unwrap().values;
         place.write(&format!("{axis}.csv"), table(&hz, &values, 1.0));
         job += &format!(

@@ -4,10 +4,10 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use flexarm::identify::{Effect, Parameter, link_directions, parameters, plant};
+use flexarm::identify::{Effect, Parameter, link_directions, nominal, parameters};
 use flexarm::sensitivity::{RunParameter, SensitivityRequest, error_slopes, pose_sensitivity, sensitivity};
 use flexarm::{Arm, DriveModel, Modelling, Motion, Robot, RunOptions};
-use flexarm_stepping::{AlphaSettings, ExactRun, FlexibleArm, Start};
+use flexarm_stepping::{AlphaSettings, ExactRun, Plant, Start};
 
 fn place(what: &str) -> std::path::PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../..").join(what)
@@ -22,16 +22,16 @@ fn shipped(robot: &str, motion: &str) -> (Robot, Arc<Arm>, Motion) {
 
 /// Errors at all instants of a run with one parameter changed.
 fn errors(arm: &Arm, motion: &Motion, parameter: &Parameter, x: f64) -> Vec<f64> {
-    let plant = plant(arm).with(std::slice::from_ref(parameter), &[x]);
-    let flexible = FlexibleArm::new(plant.model, plant.springs, motion.prescribed()).unwrap();
+    let changed = nominal(arm).with(std::slice::from_ref(parameter), &[x]);
+    let plant = Plant::new(changed.model, changed.springs, motion.prescribed()).unwrap();
     let run = ExactRun {
         settings: AlphaSettings::default(),
         step_s: 1e-3,
         duration_s: motion.trajectory.duration(),
         start: Start::Equilibrium,
-        tool: plant.tool,
+        tool: changed.tool,
     };
-    run.errors(&flexible).unwrap().errors.into_iter().flatten().collect()
+    run.errors(&plant).unwrap().errors.into_iter().flatten().collect()
 }
 
 /// Derivative by differences of sixth order.

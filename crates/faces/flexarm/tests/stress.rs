@@ -273,8 +273,8 @@ fn gauges_of_a_live_arm_read_what_those_of_a_run_read() {
         let run = arm.record(|t| swing(t).0, 0.5, modelling);
         let gauge = run.columns.column("gauge").unwrap();
         let options = RunOptions::default();
-        let flexible = robot.model(&modelling).unwrap();
-        let mut live = flexible.live(Some(&[0.3]), 1e-3, &options).unwrap();
+        let arm = robot.model(&modelling).unwrap();
+        let mut live = arm.live(Some(&[0.3]), 1e-3, &options).unwrap();
         assert_eq!(live.gauge_channels(), run.columns.gauges);
         let scale = gauge.values.iter().skip(3).step_by(6).fold(0.0_f64, |most, x| most.max(x.abs()));
         let strain_scale = gauge.values.iter().step_by(6).fold(0.0_f64, |most, x| most.max(x.abs()));
@@ -292,7 +292,7 @@ fn gauges_of_a_live_arm_read_what_those_of_a_run_read() {
             compare(live.time_s(), &live.gauges());
         }
         let stiff = LiveOptions { stiffness: 2.0, ..LiveOptions::default() };
-        let mut stiff = flexible.live_with(Some(&[0.3]), 1e-3, &options, &stiff).unwrap();
+        let mut stiff = arm.live_with(Some(&[0.3]), 1e-3, &options, &stiff).unwrap();
         let (rest, stiff) = (gauge.values[0], stiff.gauges()[0]);
         println!("{name}: live off by {off:.1e}, twice the stiffness by {:.1e}", (stiff / rest - 1.0).abs());
         assert!(off < 2e-3 && (stiff / rest - 1.0).abs() < 1e-4, "{name}: {off:e}, {rest} {stiff}");

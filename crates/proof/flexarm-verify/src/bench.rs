@@ -11,7 +11,7 @@ use flexarm::{LinkModel, LoadOptions, Modelling, Motion, Robot, StepperKind};
 use flexarm_analysis::tcp_error;
 use flexarm_kinematics::{Data, Frame, Pose, State, Wrench, forward_kinematics};
 use flexarm_stepping::{
-    AlphaSettings, Damping, FlexibleArm, Held, Load, Observation, PrescribedMotion, TimedWrench, new_stepper,
+    AlphaSettings, Damping, Held, Load, Observation, Plant, PrescribedMotion, TimedWrench, new_stepper,
     static_equilibrium,
 };
 use nalgebra::{DVector, Matrix6, Vector3, Vector6};
@@ -175,7 +175,7 @@ pub fn damped(mut robot: Robot) -> Robot {
 /// An arm with its joints held at zero, and the frame at which it is loaded and observed.
 pub struct Rig {
     /// The arm.
-    pub arm: FlexibleArm,
+    pub plant: Plant,
     /// The frame.
     pub frame: Frame,
     /// Pose of the frame in the undeformed arm.
@@ -185,36 +185,36 @@ pub struct Rig {
 impl Rig {
     /// Creates a rig at a named frame of the robot, or at its TCP if `frame` is `None`.
     pub fn new(robot: &Robot, modelling: &Modelling, frame: Option<&str>) -> Result<Self, Error> {
-        let flexible = robot.model(modelling)?;
-        let joints = vec![0.0; flexible.model.n_actuated()];
-        let arm = flexible.arm(Arc::new(Held(joints))).map_err(step_error)?;
+        let arm = robot.model(modelling)?;
+        let joints = vec![0.0; arm.model.n_actuated()];
+        let plant = arm.plant(Arc::new(Held(joints))).map_err(step_error)?;
         let name = frame.unwrap_or(TCP_FRAME);
         let known = || Error::NoFrame { name: name.to_owned() };
-        let frame = arm.model.frame(name).ok_or_else(known)?.clone();
-        let X_WF = place(&arm, &frame, &DVector::zeros(arm.model.n_elastic()));
-        Ok(Self { arm, frame, X_WF })
+        let frame = plant.model.frame(name).ok_or_else(known)?.clone();
+        let X_WF = place(&plant, &frame, &DVector::zeros(plant.model.n_elastic()));
+        Ok(Self { plant, frame, X_WF })
     }
 
     /// Returns the same arm, observed at the point of a body that is at `p_W` (world axes) when
     /// undeformed.
     pub fn at_point(&self, body: usize, p_W: Vector3<f64>) -> Self {
-        let e = DVector::zeros(self.arm.model.n_elastic());
+        let e = DVector::zeros(self.plant.model.n_elastic());
         let body_only = Frame { body, X_BF: Pose::identity(), ..self.frame.clone() };
-        let X_WB = place(&self.arm, &body_only, &e);
+        let X_WB = place(&self.plant, &body_only, &e);
         let X_WF = Pose::from(nalgebra::Translation3::from(p_W));
         let frame = Frame { X_BF: X_WB.inverse() * X_WF, ..body_only };
-        Self { arm: self.arm.clone(), frame, X_WF }
+        Self { plant: self.plant.clone(), frame, X_WF }
     }
 
     /// Returns the frequencies (Hz), ascending, of the modes in which the frame moves mainly along
     /// y and mainly along z (world axes). Modes that mainly rotate it or move it along x are left
     /// out.
     pub fn bending_hz(&self) -> [Vec<f64>; 2] {
-        let modes = &self.arm.modes;
+        let modes = &self.plant.modes;
         let mut found = [Vec::new(), Vec::new()];
         for (shape, hz) in modes.shapes.column_iter().zip(modes.frequencies_hz()) {
             let step = shape * (1e-6 / shape.amax());
-            let at = |e: DVector<f64>| place(&self.arm, &self.frame, &e);
+            let at = |e: DVector<f64>| place(&self.plant, &self.frame, &e);
             let moved = tcp_error(&at(&modes.equilibrium - &step), &at(&modes.equilibrium + &step));
             let [x, y, z] = [moved[0].abs(), moved[1].abs(), moved[2].abs()];
             let turned = moved[3..].iter().copied().worst();
@@ -227,10 +227,10 @@ impl Rig {
     }
 
     /// Returns the arm under a wrench at the frame, world axes.
-    pub fn loaded(&self, wrench: &Vector6<f64>) -> Result<FlexibleArm, Error> {
+    pub fn loaded(&self, wrench: &Vector6<f64>) -> Result<Plant, Error> {
         let F = Wrench::new(wrench.fixed_rows::<3>(0).into(), wrench.fixed_rows::<3>(3).into());
         let load = Load { body: self.frame.body, X_BF: self.frame.X_BF, wrench: TimedWrench::new(move |_| F) };
-        self.arm.clone().with_timed_loads(vec![load]).map_err(step_error)
+        self.plant.clone().with_timed_loads(vec![load]).map_err(step_error)
     }
 
     /// Computes the displacement and rotation of the frame in equilibrium under a wrench at the
@@ -241,18 +241,18 @@ impl Rig {
 
     /// Like [`Rig::statics`], but observes the frame of another rig of the same arm.
     pub fn statics_at(&self, wrench: &Vector6<f64>, seen: &Self) -> Result<Vector6<f64>, Error> {
-        let arm = self.loaded(wrench)?;
-        let e = static_equilibrium(&arm, 0.0).map_err(step_error)?;
-        Ok(Vector6::from(tcp_error(&seen.X_WF, &place(&arm, &seen.frame, &e))))
+        let plant = self.loaded(wrench)?;
+        let e = static_equilibrium(&plant, 0.0).map_err(step_error)?;
+        Ok(Vector6::from(tcp_error(&seen.X_WF, &place(&plant, &seen.frame, &e))))
     }
 
     /// Like [`Rig::statics`], but steps in time from the undeformed arm until it is at rest.
     pub fn settled(&self, wrench: &Vector6<f64>, kind: StepperKind, h: f64) -> Result<Vector6<f64>, Error> {
         const AT_MOST: usize = 100_000;
         const BETWEEN: usize = 50;
-        let arm = self.loaded(wrench)?;
-        let mut stepper = new_stepper(kind, arm.clone(), h, Start::Undeformed).map_err(step_error)?;
-        let mut seen = Observation::new(&arm);
+        let plant = self.loaded(wrench)?;
+        let mut stepper = new_stepper(kind, plant.clone(), h, Start::Undeformed).map_err(step_error)?;
+        let mut seen = Observation::new(&plant);
         let (mut before, mut calm) = (Vector6::repeat(f64::INFINITY), 0);
         for step in 1..=AT_MOST {
             stepper.step().map_err(step_error)?;
@@ -277,8 +277,8 @@ impl Rig {
     ///
     /// * `h`: step size (s); `every` is a multiple of it.
     pub fn path(&self, kind: StepperKind, h: f64, every: f64, duration: f64) -> Result<Vec<Vector3<f64>>, Error> {
-        let mut stepper = new_stepper(kind, self.arm.clone(), h, Start::Undeformed).map_err(step_error)?;
-        let mut seen = Observation::new(&self.arm);
+        let mut stepper = new_stepper(kind, self.plant.clone(), h, Start::Undeformed).map_err(step_error)?;
+        let mut seen = Observation::new(&self.plant);
         let (stride, steps) = ((every / h).round() as usize, (duration / h).round() as usize);
         let mut path = vec![Vector3::zeros()];
         for step in 1..=steps {
@@ -332,10 +332,10 @@ pub fn tool_path(
         link.choices.geometric = stiffening;
         link.damping = Damping::StiffnessProportional(PATH_DAMPING_S);
     }
-    let arm = robot.model(modelling)?.arm(motion).map_err(step_error)?;
-    let frame = arm.model.frame(TCP_FRAME).ok_or(Error::NoTool)?.clone();
-    let mut stepper = new_stepper(ALPHA, arm.clone(), h, start).map_err(step_error)?;
-    let mut seen = Observation::new(&arm);
+    let plant = robot.model(modelling)?.plant(motion).map_err(step_error)?;
+    let frame = plant.model.frame(TCP_FRAME).ok_or(Error::NoTool)?.clone();
+    let mut stepper = new_stepper(ALPHA, plant.clone(), h, start).map_err(step_error)?;
+    let mut seen = Observation::new(&plant);
     let mut path = Vec::new();
     for _ in 0..steps {
         stepper.step().map_err(step_error)?;
@@ -347,10 +347,10 @@ pub fn tool_path(
 
 /// Computes the pose of a frame for given elastic coordinates, with the joints at their prescribed
 /// start.
-pub fn place(arm: &FlexibleArm, frame: &Frame, e: &DVector<f64>) -> Pose {
-    let model = &arm.model;
+pub fn place(plant: &Plant, frame: &Frame, e: &DVector<f64>) -> Pose {
+    let model = &plant.model;
     let (mut data, mut state) = (Data::new(model), State::zeros(model));
-    arm.prescribed_state(0.0, &mut state, &mut DVector::zeros(model.nv()));
+    plant.prescribed_state(0.0, &mut state, &mut DVector::zeros(model.nv()));
     state.q.rows_mut(model.n_actuated(), e.len()).copy_from(e);
     forward_kinematics(model, &mut data, &state.q);
     data.X_WF(frame)

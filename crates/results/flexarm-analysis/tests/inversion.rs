@@ -5,26 +5,26 @@ use std::sync::Arc;
 
 use flexarm_analysis::{Inversion, Node, NodeServo};
 use flexarm_kinematics::{Data, Frame, Model, Wrench, mass_matrix};
-use flexarm_stepping::{Damping, FlexibleArm, Held, Servo, ServoAxis, linearise};
+use flexarm_stepping::{Damping, Held, Plant, Servo, ServoAxis, linearise};
 use flexarm_testkit::reference_arm;
 use nalgebra::{DMatrix, DVector};
 
 const POSE: [f64; 6] = [0.4, 0.5, -0.3, 0.7, 0.6, -1.2];
 
-fn arm() -> (FlexibleArm, Frame) {
+fn plant() -> (Plant, Frame) {
     let reference = reference_arm(true);
     let model = Arc::new(Model::new(&reference.mechanism).expect("valid"));
     let spring = |name: &str, k: usize| (name.to_owned(), reference.K_S[k], Damping::StiffnessProportional(2e-3));
     let tool = model.frame("tcp").expect("there").clone();
     let springs = vec![spring("lower", 0), spring("upper", 1)];
-    (FlexibleArm::new(model, springs, Arc::new(Held(POSE.to_vec()))).expect("valid"), tool)
+    (Plant::new(model, springs, Arc::new(Held(POSE.to_vec()))).expect("valid"), tool)
 }
 
 /// Truth: forward integration of the linear equations by the trapezoidal rule.
 #[test]
 fn commands_by_the_series_of_the_inverse_move_the_tool_as_asked_at_a_third_of_the_first_frequency() {
-    let (arm, tool) = arm();
-    let at = linearise(&arm, &tool, &Wrench::zeros(), 0.0).unwrap();
+    let (plant, tool) = plant();
+    let at = linearise(&plant, &tool, &Wrench::zeros(), 0.0).unwrap();
     let six = |M: &nalgebra::Matrix6xX<f64>| DMatrix::from_fn(6, M.ncols(), |i, j| M[(i, j)]);
     let node = Node {
         M: at.M.clone(),
@@ -37,7 +37,7 @@ fn commands_by_the_series_of_the_inverse_move_the_tool_as_asked_at_a_third_of_th
         J_a: six(&at.J_a),
         servo: None,
     };
-    let hz = arm.modes.frequencies_hz()[0];
+    let hz = plant.modes.frequencies_hz()[0];
     let (length, h) = (3.0, 2.5e-4);
     let N = (length / h) as usize + 1;
     // A smooth bump with vibration, at rest at both ends.
@@ -74,7 +74,7 @@ fn commands_by_the_series_of_the_inverse_move_the_tool_as_asked_at_a_third_of_th
 /// Without integrators, so that the loop is of second order.
 #[test]
 fn commands_of_servos_move_the_tool_as_asked_far_above_their_position_gains() {
-    let (arm, tool) = arm();
+    let (plant, tool) = plant();
     let rigid = Arc::new(Model::new(&reference_arm(false).mechanism).expect("valid"));
     let M = mass_matrix(&rigid, &mut Data::new(&rigid), &DVector::from_column_slice(&POSE)).clone();
     let axis = |(i, coordinate): (usize, usize)| ServoAxis {
@@ -86,23 +86,23 @@ fn commands_of_servos_move_the_tool_as_asked_far_above_their_position_gains() {
         limit: f64::INFINITY,
     };
     let axes = [0, 1, 2, 4].into_iter().enumerate().map(axis).collect();
-    let arm = arm.with_servo(Servo { sample_s: 1e-3, axes, rigid }).unwrap();
-    let servo = arm.servo.clone().unwrap();
+    let plant = plant.with_servo(Servo { sample_s: 1e-3, axes, rigid }).unwrap();
+    let servo = plant.servo.clone().unwrap();
     let of = |value: fn(&ServoAxis) -> f64| DVector::from_iterator(4, servo.axes.iter().map(value));
     let controllers = NodeServo {
         axes: servo.axes.iter().map(|axis| axis.coordinate).collect(),
         stiffness: of(|axis| axis.velocity_gain * axis.position_gain),
         damping: of(|axis| axis.velocity_gain),
         integral: DVector::zeros(4),
-        ahead: servo.fed_forward(&POSE, &arm.friction),
+        ahead: servo.fed_forward(&POSE, &plant.friction),
     };
-    let node = |arm: &FlexibleArm, servo: Option<NodeServo>| {
-        let at = linearise(arm, &tool, &Wrench::zeros(), 0.0).unwrap();
+    let node = |plant: &Plant, servo: Option<NodeServo>| {
+        let at = linearise(plant, &tool, &Wrench::zeros(), 0.0).unwrap();
         let six = |M: &nalgebra::Matrix6xX<f64>| DMatrix::from_fn(6, M.ncols(), |i, j| M[(i, j)]);
         let (J, J_a) = (six(&at.J), six(&at.J_a));
         Node { M: at.M, D: at.D, K: at.K, M_a: at.M_a, D_a: at.D_a, K_a: at.K_a, J, J_a, servo }
     };
-    let (open, closed) = (node(&arm.with_servo_opened(), Some(controllers)), node(&arm, None));
+    let (open, closed) = (node(&plant.with_servo_opened(), Some(controllers)), node(&plant, None));
     let (length, h, hz) = (3.0, 2.5e-4, 4.0);
     let N = (length / h) as usize + 1;
     let wave = |t: f64| (t / length * std::f64::consts::PI).sin().powi(8) * (std::f64::consts::TAU * hz * t).cos();

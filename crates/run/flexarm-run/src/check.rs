@@ -153,8 +153,8 @@ fn check_loads(robot: &Robot, motion: Option<&Motion>, path: &Path, findings: &m
         findings.push(Finding::error("loads", path.display().to_string(), &message));
         return;
     };
-    let acting = robot.model(&Modelling::default()).and_then(|flexible| {
-        Scenario::from(motion).with_loads_file(path).and_then(|scenario| scenario.acting_on(robot, &flexible.model))
+    let acting = robot.model(&Modelling::default()).and_then(|arm| {
+        Scenario::from(motion).with_loads_file(path).and_then(|scenario| scenario.acting_on(robot, &arm.model))
     });
     match acting {
         Err(error) => findings.push(Finding::error("loads", path.display().to_string(), &error)),
@@ -212,15 +212,15 @@ fn check_flexible(robot: &Robot, motion: Option<&Motion>, findings: &mut Vec<Fin
                 || "in the middle of the joint ranges".to_owned(),
                 |motion| format!("at the start of {}", motion.name),
             );
-            let hz = posed.arm.modes.frequencies_hz();
+            let hz = posed.plant.modes.frequencies_hz();
             if !hz.is_empty() {
                 let message = format!("first frequencies {words} {:.2?} Hz", &hz[..hz.len().min(4)]);
                 findings.push(Finding::note("modes", file, message));
             }
-            if let Err(error) = StressMonitor::new(&posed.flexible, &posed.arm) {
+            if let Err(error) = StressMonitor::new(&posed.arm, &posed.plant) {
                 findings.push(Finding::error("stress", robot.path.display().to_string(), &error));
             }
-            let caveats = posed.flexible.link_caveats().into_iter().chain(posed.validity(&linear));
+            let caveats = posed.arm.link_caveats().into_iter().chain(posed.validity(&linear));
             findings.extend(caveats.map(|caveat| Finding::caveat(&robot.path, caveat)));
         }
     }

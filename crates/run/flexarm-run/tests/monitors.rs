@@ -12,15 +12,15 @@ use flexarm_run::internals::{
     signed_von_mises,
 };
 use flexarm_run::{Modelling, Robot, TCP_FRAME, ToolPath};
-use flexarm_stepping::{FlexibleArm, Held, Observation, Spring};
+use flexarm_stepping::{Held, Observation, Plant, Spring};
 use nalgebra::{DVector, Matrix3, Point3, Rotation3, Vector3};
 
 use crate::small_robots::two_joints;
 
 /// The robot of two joints with these drives, at rest.
-fn two_drives(drives: &str) -> FlexibleArm {
+fn two_drives(drives: &str) -> Plant {
     let robot = two_joints(drives).unwrap();
-    robot.model(&Modelling::default()).unwrap().arm(Arc::new(Held(vec![0.0; 2]))).unwrap()
+    robot.model(&Modelling::default()).unwrap().plant(Arc::new(Held(vec![0.0; 2]))).unwrap()
 }
 
 #[test]
@@ -47,7 +47,7 @@ fn a_payload_brings_its_energy_and_takes_it_along() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../..");
     let model = Robot::load(root.join("robots/test/one_beam")).unwrap().rigid_model().unwrap();
     let still = Arc::new(Held(vec![0.3]));
-    let arm = FlexibleArm::new(model.clone(), Vec::<Spring>::new(), still).unwrap();
+    let arm = Plant::new(model.clone(), Vec::<Spring>::new(), still).unwrap();
     let mut seen = Observation::new(&arm);
     (seen.q[0], seen.qdot[0]) = (0.3, 0.5);
     let frame = model.frame(TCP_FRAME).unwrap().clone();
@@ -124,13 +124,13 @@ fn a_gearbox_of_six_coordinates_is_judged_by_its_rotations() {
         "[[drive]]\njoint = \"a\"\nkind = \"gearbox\"\ngearbox = { stiffness = [1e6, 1e6, 1e6, 1e4, 1e4, 1e4] }\n";
     let one = "[[drive]]\njoint = \"b\"\nkind = \"gearbox\"\ngearbox = { stiffness = 1e4 }\n";
     let robot = two_joints(&format!("{six}{one}")).unwrap();
-    let flexible = robot.model(&Modelling::default()).unwrap().clone();
-    let arm = flexible.arm(Arc::new(Held(vec![0.0; 2]))).unwrap();
-    let mut seen = Deflections::new(&arm, &flexible, 3);
+    let arm = robot.model(&Modelling::default()).unwrap();
+    let plant = arm.plant(Arc::new(Held(vec![0.0; 2]))).unwrap();
+    let mut seen = Deflections::new(&plant, &arm, 3);
     let q = |six: [f64; 6], one: f64| {
         let mut q = DVector::from_element(arm.model.nv(), 9.0);
-        q.rows_mut(arm.elements[0].coordinate, 6).copy_from_slice(&six);
-        q[arm.elements[1].coordinate] = one;
+        q.rows_mut(plant.elements[0].coordinate, 6).copy_from_slice(&six);
+        q[plant.elements[1].coordinate] = one;
         q
     };
     seen.update(&q([5.0, 5.0, 5.0, 0.0, 3.0, -4.0], -2.0));
@@ -233,15 +233,15 @@ impl Beam {
     fn new() -> Self {
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../..");
         let arm = Robot::load(root.join("robots/test/one_beam")).unwrap().model(&Modelling::default()).unwrap();
-        let (flexible, model) = (&*arm, &arm.model);
-        let span = &flexible.spans[0];
+        let (arm, model) = (&*arm, &arm.model);
+        let span = &arm.spans[0];
         let end = |link: &str, X_LI: Pose| {
             let frame = model.frame(link).unwrap();
             (frame.body, frame.X_BF * X_LI)
         };
         let ends = [end(&span.link, span.X_LA), end(&span.distal_link, span.X_DB)];
         assert!(ends[0].0 != ends[1].0);
-        Self { seen: Strains::new(flexible, model), length: span.length, n_bodies: model.bodies().len(), ends }
+        Self { seen: Strains::new(arm, model), length: span.length, n_bodies: model.bodies().len(), ends }
     }
 
     /// Poses of the bodies at which the ends have these poses.

@@ -76,7 +76,7 @@ impl CutPose {
             let X_WT = data.X_WF(&frame);
             (X_WT.transform_point(&tool.tip.into()).coords, tool.axis.in_world(&X_WT.rotation))
         };
-        let flexible = robot.model(modelling)?;
+        let arm = robot.model(modelling)?;
         let (mut places, mut left_out) = (Vec::new(), 0);
         for k in 0..n {
             let t = trajectory.duration() * (k as f64 + 0.5) / n as f64;
@@ -87,7 +87,7 @@ impl CutPose {
                 left_out += 1;
                 continue;
             }
-            let posed = Posed::new(flexible.clone(), sample(t))?;
+            let posed = Posed::new(arm.clone(), sample(t))?;
             places.push(Self::new(posed, tool, Some(t), Some(velocity / velocity.norm()))?);
         }
         if places.is_empty() { Err(LobesError::NoFeed.into()) } else { Ok((places, left_out)) }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use flexarm_analysis::{Inversion, Node, NodeServo};
 use flexarm_kinematics::{Data, Pose, Wrench, forward_kinematics, rotation_vector};
-use flexarm_stepping::{FlexibleArm, Friction, Held, Servo, ServoAxis, TimedWrench, linearise, static_targets};
+use flexarm_stepping::{Friction, Held, Plant, Servo, ServoAxis, TimedWrench, linearise, static_targets};
 use flexarm_trajectory::{Extreme, JointKnots, Trajectory};
 use nalgebra::{DMatrix, DVector, Quaternion, Rotation3, Translation3, UnitQuaternion};
 use rayon::prelude::*;
@@ -247,28 +247,27 @@ impl<'a> Job<'a> {
 
     /// Returns the arm held at the start of the motion: servo gains and damping of a run are those
     /// of its start.
-    fn at_start(&self) -> Result<FlexibleArm, Error> {
-        let flexible = self.arm;
+    fn at_start(&self) -> Result<Plant, Error> {
         let held = Held(self.q.column(0).iter().copied().collect());
-        let arm = flexible.arm(Arc::new(held)).map_err(|error| flexible.explained(error))?;
-        let mut axes = arm.servo.iter().flat_map(|servo| &servo.axes);
+        let plant = self.arm.plant(Arc::new(held)).map_err(|error| self.arm.explained(error))?;
+        let mut axes = plant.servo.iter().flat_map(|servo| &servo.axes);
         match axes.find(|axis| axis.position_gain * axis.velocity_gain <= 0.0) {
             Some(axis) => {
                 let joint = self.motion.trajectory.joints()[axis.coordinate].clone();
                 Err(CompensateError::NothingHolds { joint }.into())
             }
-            None => Ok(arm),
+            None => Ok(plant),
         }
     }
 
     /// Linearises the arm at a time of the motion, with the motors of servos free.
-    fn node(&self, start: &FlexibleArm, t: f64) -> Result<Node, Error> {
-        let (flexible, m) = (self.arm, self.q.nrows());
+    fn node(&self, start: &Plant, t: f64) -> Result<Node, Error> {
+        let (arm, m) = (self.arm, self.q.nrows());
         let (mut q, mut v, mut a) = (vec![0.0; m], vec![0.0; m], vec![0.0; m]);
         self.motion.trajectory.sample(t, &mut q, &mut v, &mut a);
         let servo = start.servo.as_ref().map(|servo| controllers(servo, &q, &start.friction));
-        let arm = start.along(Arc::new(Held(q))).with_servo_opened();
-        let at = linearise(&arm, &flexible.tcp, &Wrench::zeros(), 0.0).map_err(|error| flexible.explained(error))?;
+        let plant = start.along(Arc::new(Held(q))).with_servo_opened();
+        let at = linearise(&plant, &arm.tcp, &Wrench::zeros(), 0.0).map_err(|error| arm.explained(error))?;
         let rows =
             |M: &nalgebra::Matrix6xX<f64>| DMatrix::from_fn(self.rows.len(), M.ncols(), |i, j| M[(self.rows[i], j)]);
         let (J, J_a) = (rows(&at.J), rows(&at.J_a));
@@ -352,18 +351,18 @@ impl<'a> Job<'a> {
     /// Corrects each node to its static equilibrium, with a cubic spline between the nodes.
     pub(super) fn at_rest(&self) -> Result<Commands, Error> {
         let (m, N) = self.q.shape();
-        let (flexible, arm) = (self.arm, self.at_start()?);
+        let plant = self.at_start()?;
         let end = self.scenario.duration_s();
         let loads = self.scenario.loads.iter().map(|load| averaged(load, end, |_| None)).collect();
         let scenario = Scenario { loads, ..self.scenario.clone() };
-        let (arm, _) = loaded(self.arm.robot(), &scenario, &self.request.run, arm)?;
+        let (plant, _) = loaded(self.arm.robot(), &scenario, &self.request.run, plant)?;
         let every = ((NODE_S / self.step_s()).round() as usize).max(1);
         let nodes: Vec<usize> = (0..N - 1).step_by(every).chain([N - 1]).collect();
         let one = |k: &usize| {
             self.go_on(self.times[*k])?;
             let q: Vec<f64> = self.q.column(*k).iter().copied().collect();
             let found =
-                static_targets(&arm, &flexible.tcp, &q, &Wrench::zeros(), self.times[*k], &self.request.components);
+                static_targets(&plant, &self.arm.tcp, &q, &Wrench::zeros(), self.times[*k], &self.request.components);
             let found = found.map_err(|source| CompensateError::Target { t_s: self.times[*k], source })?;
             Ok::<_, Error>(DVector::from_iterator(m, found.q.iter().zip(&q).map(|(new, old)| new - old)))
         };

@@ -14,7 +14,7 @@ use flexarm_kinematics::{
 use flexarm_path::program::{Item, Move, MoveKind, Target};
 use flexarm_path::{PathOptions, ProgramArm, base_of, target_at, target_joints, tool_of};
 use flexarm_programs::{NewTarget, ProgramText};
-use flexarm_stepping::{FlexibleArm, Held, InertiaChange, StepError, TargetError, linearise, static_targets};
+use flexarm_stepping::{Held, InertiaChange, Plant, StepError, TargetError, linearise, static_targets};
 use nalgebra::{DVector, Translation3, Vector3, Vector6};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -283,7 +283,7 @@ type TargetValues = (NewTarget, Option<Vector3<f64>>);
 struct AtRest<'a> {
     arm: &'a ProgramArm<'a>,
     /// Flexible arm with motors held; each load is replaced by its mean over the rest at that time.
-    held: FlexibleArm,
+    held: Plant,
     /// Payload changes, in order of time.
     changes: Vec<InertiaChange>,
     tcp: Frame,
@@ -302,9 +302,8 @@ impl<'a> AtRest<'a> {
         request: &CompensateRequest,
         rests: Vec<[f64; 2]>,
     ) -> Result<Self, Error> {
-        let flexible = arm;
         let held = Held(vec![0.0; controller.model.n_actuated()]);
-        let held = flexible.arm(Arc::new(held)).map_err(|error| flexible.explained(error))?;
+        let held = arm.plant(Arc::new(held)).map_err(|error| arm.explained(error))?;
         let sags = held.servo.iter().flat_map(|servo| &servo.axes).any(|axis| axis.integral_gain <= 0.0);
         let rests: Arc<[[f64; 2]]> = rests.into();
         let mean = |load: &AppliedLoad| {
@@ -316,8 +315,8 @@ impl<'a> AtRest<'a> {
         let loads = scenario.loads.iter().map(mean).collect();
         let acting = Scenario { loads, ..scenario.clone() }.acting_on(arm.robot(), &held.model)?;
         let held = held.with_motors_held();
-        let held = held.with_timed_loads(acting.loads).map_err(|error| flexible.explained(error))?;
-        let (tcp, loads) = (flexible.tcp.clone(), scenario.loads.clone());
+        let held = held.with_timed_loads(acting.loads).map_err(|error| arm.explained(error))?;
+        let (tcp, loads) = (arm.tcp.clone(), scenario.loads.clone());
         Ok(Self { arm: controller, held, changes: acting.changes, tcp, components: request.components, loads, sags })
     }
 
@@ -352,9 +351,9 @@ impl<'a> AtRest<'a> {
     }
 
     /// Returns the arm with its payload at a time.
-    fn carrying(&self, t: f64) -> FlexibleArm {
+    fn carrying(&self, t: f64) -> Plant {
         let due = self.changes.iter().take_while(|change| change.t <= t);
-        due.fold(self.held.clone(), |arm, change| arm.with_inertia(change.body, change.inertia))
+        due.fold(self.held.clone(), |plant, change| plant.with_inertia(change.body, change.inertia))
     }
 
     /// Returns the tool frame of a move on the flexible arm.

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use flexarm_analysis::{DampedMode, Node, ShapedMode, Shaper, ShaperKind, damped_modes, vibration_left};
 use flexarm_kinematics::Wrench;
-use flexarm_stepping::{FlexibleArm, Held, linearise};
+use flexarm_stepping::{Held, Plant, linearise};
 use flexarm_trajectory::{JointKnots, Trajectory};
 use nalgebra::DMatrix;
 use serde::Serialize;
@@ -151,7 +151,7 @@ struct AtEnd {
 
 impl AtEnd {
     fn of(arm: &Arc<Arm>, scenario: &Scenario) -> Result<Self, Error> {
-        let (flexible, motion) = (arm, &scenario.motion.trajectory);
+        let motion = &scenario.motion.trajectory;
         let (m, duration) = (motion.joints().len(), motion.duration());
         let count = (duration / SAMPLE_S).ceil().max(1.0) as usize;
         let step_s = duration / count as f64;
@@ -159,7 +159,7 @@ impl AtEnd {
         let (mut q, mut v, mut a) = (vec![0.0; m], vec![0.0; m], vec![0.0; m]);
         let start = {
             motion.sample(0.0, &mut q, &mut v, &mut a);
-            flexible.arm(Arc::new(Held(q.clone()))).map_err(|error| flexible.explained(error))?
+            arm.plant(Arc::new(Held(q.clone()))).map_err(|error| arm.explained(error))?
         };
         for (k, mut column) in accelerations.column_iter_mut().enumerate() {
             motion.sample(step_s * k as f64, &mut q, &mut v, &mut a);
@@ -170,11 +170,11 @@ impl AtEnd {
         let moving = accelerations.column_iter().rposition(|column| column.amax() > RESTS * accelerations.amax());
         let accelerations = accelerations.columns(0, (moving.unwrap_or(0) + 2).min(count + 1)).into_owned();
         // Servo gains and damping are those of the start, as in a run.
-        let mut held: FlexibleArm = start.along(Arc::new(Held(q)));
+        let mut held: Plant = start.along(Arc::new(Held(q)));
         for change in scenario.acting_on(arm.robot(), &held.model)?.changes {
             held = held.with_inertia(change.body, change.inertia);
         }
-        let at = linearise(&held, &flexible.tcp, &Wrench::zeros(), 0.0).map_err(|error| flexible.explained(error))?;
+        let at = linearise(&held, &arm.tcp, &Wrench::zeros(), 0.0).map_err(|error| arm.explained(error))?;
         let symmetric = (&at.K + at.K.transpose()) * 0.5;
         let modes = damped_modes(&at.M, &at.D, &symmetric).map_err(CompensateError::from)?;
         let swings = |mode: &DampedMode| mode.eigenvalue.im > 0.0 && (0.0..SWINGS).contains(&mode.damping_ratio());

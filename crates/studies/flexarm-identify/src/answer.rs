@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use crate::estimation::{
-    Form, Identified, Instrument, MeasuredArm, Measurements, ModelError, Parameter, ParameterEstimate, Plant, Reading,
-    ReadingKind, Target,
+    Form, Identified, Instrument, MeasuredArm, Measurements, ModelError, NominalArm, Parameter, ParameterEstimate,
+    Reading, ReadingKind, Target,
 };
 use flexarm_kinematics::Pose;
 use nalgebra::{DVector, Vector3};
@@ -366,9 +366,9 @@ pub(super) fn rms(values: impl ExactSizeIterator<Item = f64>) -> f64 {
 }
 
 /// Returns each measured number with its predictions.
-fn compared(plant: &Plant, measurements: &Measurements, found: &Identified) -> Vec<Compared> {
+fn compared(nominal: &NominalArm, measurements: &Measurements, found: &Identified) -> Vec<Compared> {
     let deviations = &found.solution.deviations;
-    let observed = MeasuredArm { plant, parameters: &[], measurements }.observed();
+    let observed = MeasuredArm { nominal, parameters: &[], measurements }.observed();
     let kinds: Vec<&str> = measurements.readings.iter().flat_map(|r| vec![kind_of(r); r.rows()]).collect();
     let one = |(k, (name, unit)): (usize, (String, &'static str))| Compared {
         name,
@@ -406,13 +406,13 @@ fn residuals(found: &Identified, compared: &[Compared]) -> (Residual, Option<Hel
 pub(super) fn answer(
     robot: &Robot,
     path: &Path,
-    plant: &Plant,
+    nominal: &NominalArm,
     fitted: &[Parameter],
     input: &MeasurementInput,
     found: &Identified,
 ) -> Result<Identification, Error> {
     let measurements = &input.measurements;
-    let compared = compared(plant, measurements, found);
+    let compared = compared(nominal, measurements, found);
     let (residual, held_out) = residuals(found, &compared);
     let suspicious = found.suspicious.iter().take(MAX_SUSPICIOUS).map(|k| Suspicious {
         reading: compared[*k].name.clone(),
@@ -439,7 +439,7 @@ pub(super) fn answer(
         model_errors: found.model_errors.clone(),
         encoders: Vec::new(),
         suspicious: suspicious.collect(),
-        shapes: shapes(plant, fitted, measurements, &found.unknowns)?,
+        shapes: shapes(nominal, fitted, measurements, &found.unknowns)?,
         instruments: frames(input, found),
         targets: points(input, found),
         iterations: found.solution.iterations,
@@ -455,12 +455,12 @@ pub(super) fn answer(
 }
 
 fn shapes(
-    plant: &Plant,
+    nominal: &NominalArm,
     fitted: &[Parameter],
     measurements: &Measurements,
     unknowns: &DVector<f64>,
 ) -> Result<Vec<ShapeFigures>, Error> {
-    let arm = MeasuredArm { plant, parameters: fitted, measurements };
+    let arm = MeasuredArm { nominal, parameters: fitted, measurements };
     let of = |unknowns: &DVector<f64>| {
         arm.assurances(unknowns).map_err(|error| Error::from(IdentifyFileError::Fit(error.to_string())))
     };

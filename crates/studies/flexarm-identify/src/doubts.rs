@@ -1,6 +1,6 @@
 //! Caveats about an identification.
 
-use crate::estimation::{Identified, MeasuredArm, ParameterEstimate, Plant, ReadingKind};
+use crate::estimation::{Identified, MeasuredArm, NominalArm, ParameterEstimate, ReadingKind};
 use nalgebra::DVector;
 
 use super::answer::{Identification, rms};
@@ -142,7 +142,7 @@ pub(super) fn encoder_caveats(encoders: &[EncoderFigures]) -> impl Iterator<Item
 
 /// Displacements under forces, or under masses, that differ from the robot's by more than
 /// [`LOAD_RATIO`]. Checks whether the factor between N and kg explains the ratio.
-pub(super) fn load_caveats(plant: &Plant, input: &MeasurementInput) -> Vec<Caveat> {
+pub(super) fn load_caveats(nominal: &NominalArm, input: &MeasurementInput) -> Vec<Caveat> {
     let mut caveats = Vec::new();
     for (what, slip, pulls) in [("forces", "kg given as N", true), ("masses", "N given as kg", false)] {
         let some = input.measurements.of_readings(|k| match &input.measurements.readings[k].kind {
@@ -156,7 +156,7 @@ pub(super) fn load_caveats(plant: &Plant, input: &MeasurementInput) -> Vec<Cavea
         if some.readings.is_empty() {
             continue;
         }
-        let arm = MeasuredArm { plant, parameters: &[], measurements: &some };
+        let arm = MeasuredArm { nominal, parameters: &[], measurements: &some };
         // The size of a displacement does not depend on the unknown rotations of instruments.
         let Ok(predicted) = arm.predicted(&DVector::zeros(some.own_unknowns())) else { continue };
         let size = |values: &[f64]| values.iter().map(|x| x * x).sum::<f64>().sqrt();

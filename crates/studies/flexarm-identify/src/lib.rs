@@ -49,8 +49,8 @@ pub use self::error::IdentifyFileError;
 pub use self::plan_file::{MeasurementPlan, PlanRequest, PlannedReading, plan_measurements};
 
 /// Returns the arm as model for the identification: tree, springs, TCP.
-pub fn plant(arm: &Arm) -> Plant {
-    parameters::plant(arm)
+pub fn nominal(arm: &Arm) -> NominalArm {
+    parameters::nominal(arm)
 }
 
 /// Returns the identifiable parameters of an arm, with the names that files and `--fit` use.
@@ -143,22 +143,22 @@ pub fn identify_robot_watched(
         None => None,
     };
     check_tool(robot, &chosen, &input)?;
-    let plant = plant(&arm);
-    check_modes(&plant, &input)?;
-    check_units(&plant, &input)?;
+    let nominal = nominal(&arm);
+    check_modes(&nominal, &input)?;
+    check_units(&nominal, &input)?;
     let parameters: Vec<Parameter> = chosen.iter().map(|c| c.parameter.clone()).collect();
     let slides: Vec<bool> = joints.iter().map(|(_, slides)| *slides).collect();
-    if let Some(slip) = likely_slip(&plant, &parameters, &input.measurements, &slides) {
+    if let Some(slip) = likely_slip(&nominal, &parameters, &input.measurements, &slides) {
         return Err(of_slip(slip, &joints));
     }
     let options =
         IdentifyOptions { search: Search { loss: input.loss, ..Search::default() }, ..IdentifyOptions::default() };
-    let found = identify(&plant, &parameters, &input.measurements, &options, watch).map_err(of_names(&input))?;
-    let mut answer = answer(robot, measurements, &plant, &parameters, &input, &found)?;
+    let found = identify(&nominal, &parameters, &input.measurements, &options, watch).map_err(of_names(&input))?;
+    let mut answer = answer(robot, measurements, &nominal, &parameters, &input, &found)?;
     answer.caveats.extend(frame_caveat(&answer));
     answer.caveats.extend(gear_caveat(robot));
     answer.caveats.extend(encoder_caveats(&encoders));
-    answer.caveats.extend(load_caveats(&plant, &input));
+    answer.caveats.extend(load_caveats(&nominal, &input));
     answer.caveats.extend(empty_caveat(&input));
     // Stiffnesses are first guesses here.
     answer.caveats.extend(arm.caveats(Use::Any).into_iter().filter(|caveat| caveat.code != "gear-stiffness"));

@@ -20,7 +20,7 @@
 //! | `joint.JOINT.x`, `.y`, `.z`, `.yaw`, `.pitch`, `.roll` | shift and rotation of a joint frame |
 //! | `joint.JOINT.zero` | zero of a joint (rad; m if it slides) |
 
-use crate::estimation::{Effect, Parameter, Plant, SpringPart};
+use crate::estimation::{Effect, NominalArm, Parameter, SpringPart};
 use flexarm_flexlink::{GearStiffness, SEAT};
 use flexarm_kinematics::{JointMotion, SpatialInertia};
 use flexarm_stepping::{Damping, GuideTerm, SpringCurve};
@@ -78,9 +78,9 @@ pub(crate) struct Candidate {
 }
 
 /// Returns all parameters of an arm, in the order of drives, links, tool and payload.
-pub(crate) fn candidates(robot: &Robot, flexible: &Arm) -> Vec<Candidate> {
+pub(crate) fn candidates(robot: &Robot, arm: &Arm) -> Vec<Candidate> {
     let of = |owner: Owner| -> Vec<usize> {
-        flexible.owners.iter().enumerate().filter(|(_, o)| **o == owner).map(|(k, _)| k).collect()
+        arm.owners.iter().enumerate().filter(|(_, o)| **o == owner).map(|(k, _)| k).collect()
     };
     let mut found = Vec::new();
     for (number, drive) in robot.drives.iter().enumerate() {
@@ -90,20 +90,20 @@ pub(crate) fn candidates(robot: &Robot, flexible: &Arm) -> Vec<Candidate> {
         if !damping.curves.is_empty() && damping.play.is_empty() {
             continue;
         }
-        let slides = flexible.model.coordinates().iter().any(|c| c.joint == drive.joint && c.slides());
+        let slides = arm.model.coordinates().iter().any(|c| c.joint == drive.joint && c.slides());
         if let Some(seat) = gearbox.seat {
             // They come before those of the gearbox.
             let own: Vec<usize> = springs.drain(..2).collect();
             found.extend(seat_parameters(&drive.joint, seat, &own));
         }
         match &gearbox.stiffness {
-            GearStiffness::Guide(_) => found.extend(guide_parameters(&drive.joint, &damping.tilts, &springs, flexible)),
+            GearStiffness::Guide(_) => found.extend(guide_parameters(&drive.joint, &damping.tilts, &springs, arm)),
             stiffness => found.extend(gearbox_parameters(&drive.joint, stiffness, &springs, slides)),
         }
         let slides = slides && drive.guide().is_none();
         found.extend(gearbox_damping(&drive.joint, damping.dampers.as_deref().unwrap_or_default(), &springs, slides));
     }
-    for (number, span) in flexible.spans.iter().enumerate() {
+    for (number, span) in arm.spans.iter().enumerate() {
         let springs = of(Owner::Link(number));
         if robot.stands_on(&span.link) {
             found.extend(mounting_parameters(robot, &springs));
@@ -114,12 +114,12 @@ pub(crate) fn candidates(robot: &Robot, flexible: &Arm) -> Vec<Candidate> {
         let name = format!("link.{}.stiffness_factor", span.link);
         let written = ParameterLocation::Link { link: span.link.clone() };
         found.push(stiffness(name, "1", link.stiffness_factor, places, written));
-        let groups = flexible.model.elastic();
+        let groups = arm.model.elastic();
         if springs.iter().all(|spring| groups[*spring].size == 6 && !groups[*spring].modal) {
             found.extend(link_directions(&span.link, &link.stiffness_factors, &springs));
         }
         if let ([spring], true) = (&springs[..], link.flexible.coupling) {
-            found.extend(link_entries(link, *spring, flexible));
+            found.extend(link_entries(link, *spring, arm));
         }
         let (unit, initial) = match link.damping {
             Damping::Modal(zeta) => ("1", zeta),
@@ -132,14 +132,14 @@ pub(crate) fn candidates(robot: &Robot, flexible: &Arm) -> Vec<Candidate> {
             found.push(Candidate::new(name, unit, initial, Effect::Damping(springs.clone()), written));
         }
     }
-    if let Some(frame) = flexible.model.frame(PAYLOAD_LINK) {
+    if let Some(frame) = arm.model.frame(PAYLOAD_LINK) {
         let mass = robot.rigid.link(PAYLOAD_LINK).and_then(|link| link.inertia).map_or(0.0, |inertia| inertia.mass);
         let per_kg = SpatialInertia::from_com(1.0, &Vector3::zeros(), &Matrix3::zeros()).at_parent(&frame.X_BF);
         let effect = Effect::Mass { body: frame.body, per_kg };
         found.push(Candidate::new("payload.mass".into(), "kg", mass, effect, ParameterLocation::Payload));
     }
     found.extend(tool_parameters());
-    found.extend(frame_parameters(flexible));
+    found.extend(frame_parameters(arm));
     found
 }
 
@@ -153,10 +153,10 @@ fn seat_parameters(joint: &str, seat: [f64; 2], springs: &[usize]) -> impl Itera
 }
 
 /// Returns the numbers of the law of each tilt of a telescopic guide.
-fn guide_parameters(joint: &str, tilts: &[GuideTilt], springs: &[usize], flexible: &Arm) -> Vec<Candidate> {
+fn guide_parameters(joint: &str, tilts: &[GuideTilt], springs: &[usize], arm: &Arm) -> Vec<Candidate> {
     let mut found = Vec::new();
     for (tilt, spring) in tilts.iter().zip(springs) {
-        let Some(guide) = flexible.springs[*spring].curve.as_ref().and_then(SpringCurve::guide) else { continue };
+        let Some(guide) = arm.springs[*spring].curve.as_ref().and_then(SpringCurve::guide) else { continue };
         let (spring, axis, name) = (*spring, tilt.axis, format!("drive.{joint}.gearbox.guide.{}", tilt.axis));
         let mut add = |key: &str, unit: &str, initial: f64, term: GuideTerm, size: f64| {
             let effect = Effect::Guide { springs: vec![spring], term, size };
@@ -185,16 +185,16 @@ const ZERO_SIZE: f64 = 1e-2;
 
 /// Returns the displacements of the joint frames, and the zeros of the joints. The rotations are in
 /// the order of roll, pitch and yaw as matrices multiply.
-fn frame_parameters(flexible: &Arm) -> Vec<Candidate> {
+fn frame_parameters(arm: &Arm) -> Vec<Candidate> {
     let mut found = Vec::new();
-    let rigid = flexible.rigid.bodies().iter().map(|body| body.joint.as_str());
+    let rigid = arm.rigid.bodies().iter().map(|body| body.joint.as_str());
     let of_robot: Vec<&str> = rigid.collect();
-    let bodies = flexible.model.bodies().iter().enumerate().skip(1);
+    let bodies = arm.model.bodies().iter().enumerate().skip(1);
     for (body, own) in bodies.filter(|(_, own)| of_robot.contains(&own.joint.as_str())) {
         let JointMotion::Axis(motion) = own.motion else { continue };
         // The frame of a joint with a seat is that of the seat.
         let seat = format!("{}__spring{}", own.joint, SEAT[0]);
-        let body = flexible.model.bodies().iter().position(|body| body.joint == seat).unwrap_or(body);
+        let body = arm.model.bodies().iter().position(|body| body.joint == seat).unwrap_or(body);
         let (joint, axis) = (&own.joint, Vector6::from_row_slice(motion.column().as_slice()));
         let mut add = |key: &str, unit: &str, twist: Vector6<f64>, zero: bool| {
             let effect = Effect::Frame { body, twist, size: if zero { ZERO_SIZE } else { FRAME_SIZE } };
@@ -305,14 +305,14 @@ fn link_directions<'a>(
 
 /// Returns the 6x6 entries of a link modelled as one spring between two rigid parts, before the
 /// factors are applied.
-fn link_entries(link: &RobotLink, spring: usize, flexible: &Arm) -> Vec<Candidate> {
-    let group = &flexible.model.elastic()[spring];
+fn link_entries(link: &RobotLink, spring: usize, arm: &Arm) -> Vec<Candidate> {
+    let group = &arm.model.elastic()[spring];
     if group.size != 6 || group.modal {
         return Vec::new();
     }
     let root = link.stiffness_factors.map(f64::sqrt);
     let factor = |i: usize, j: usize| link.stiffness_factor * root[i] * root[j];
-    let K = Matrix6::from_fn(|i, j| flexible.springs[spring].K[(i, j)] / factor(i, j));
+    let K = Matrix6::from_fn(|i, j| arm.springs[spring].K[(i, j)] / factor(i, j));
     let name = &link.flexible.link;
     let entry = |row: usize, column: usize| {
         let unit = match (row < 3, column < 3) {
@@ -394,12 +394,12 @@ fn is_diagonal(K: &nalgebra::Matrix6<f64>) -> bool {
 }
 
 /// Converts the flexible robot to the plant of the estimation.
-pub(crate) fn plant(flexible: &Arm) -> Plant {
-    Plant {
-        model: flexible.model.clone(),
-        springs: flexible.springs.clone(),
-        tool: flexible.tcp.clone(),
-        coupling: flexible.gear_coupling().cloned(),
+pub(crate) fn nominal(arm: &Arm) -> NominalArm {
+    NominalArm {
+        model: arm.model.clone(),
+        springs: arm.springs.clone(),
+        tool: arm.tcp.clone(),
+        coupling: arm.gear_coupling().cloned(),
     }
 }
 

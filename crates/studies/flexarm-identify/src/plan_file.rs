@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::estimation::{
-    Candidate, Component, LoadCase, Parameter, Plan, PlanOptions, Plant, Reading, ReadingKind, Row, plan,
+    Candidate, Component, LoadCase, NominalArm, Parameter, Plan, PlanOptions, Reading, ReadingKind, Row, plan,
 };
 use flexarm_files::{NumberTable, check_apart, check_free, write_all};
 use flexarm_kinematics::Wrench;
@@ -13,7 +13,7 @@ use serde::Serialize;
 
 use super::parameters;
 use super::plan_load::Efforts;
-use super::{IdentifyFileError, joints_of, plant};
+use super::{IdentifyFileError, joints_of, nominal};
 use flexarm_run::Arm;
 use flexarm_run::Caveat;
 use flexarm_run::Error;
@@ -247,9 +247,9 @@ pub fn plan_measurements(robot: &Robot, request: &PlanRequest) -> Result<Measure
         }
         None => Vec::new(),
     };
-    let plant = plant(&arm);
+    let nominal = nominal(&arm);
     let options = PlanOptions { count: request.count, purpose, repeat: false };
-    let [best, first] = plans(&plant, &fitted, &candidates, &options)?;
+    let [best, first] = plans(&nominal, &fitted, &candidates, &options)?;
     let mut caveats = arm.caveats(Use::Any);
     let over = best.chosen.iter().filter_map(|k| efforts.excess(pairs[*k].0, pairs[*k].1.force, pairs[*k].1.at));
     caveats.extend(load_caveat(&over.collect::<Vec<_>>(), best.chosen.len()));
@@ -257,7 +257,7 @@ pub fn plan_measurements(robot: &Robot, request: &PlanRequest) -> Result<Measure
         warnings: warnings(&caveats),
         caveats,
         robot: robot.name.clone(),
-        poses: planned(&plant, &candidates, &best, &pairs)?,
+        poses: planned(&nominal, &candidates, &best, &pairs)?,
         joints,
         parameters: fitted.iter().zip(&best.deviations).map(expected).collect(),
         work_std_m: best.purpose.iter().copied().reduce(f64::max),
@@ -297,13 +297,13 @@ fn load_caveat(over: &[(&str, f64)], readings: usize) -> Option<Caveat> {
 
 /// Returns the best plan, and the one with the same number of candidates in their given order.
 fn plans(
-    plant: &Plant,
+    nominal: &NominalArm,
     fitted: &[Parameter],
     candidates: &[Candidate],
     options: &PlanOptions,
 ) -> Result<[Plan; 2], Error> {
     let plan_of = |candidates: &[Candidate]| {
-        plan(plant, fitted, candidates, options).map_err(|error| IdentifyFileError::Fit(error.to_string()))
+        plan(nominal, fitted, candidates, options).map_err(|error| IdentifyFileError::Fit(error.to_string()))
     };
     let best = plan_of(candidates)?;
     if best.chosen.len() < options.count {
@@ -408,7 +408,7 @@ fn poses_of(path: &Path, joints: &[String]) -> Result<Vec<Vec<f64>>, Error> {
 }
 
 fn planned(
-    plant: &Plant,
+    nominal: &NominalArm,
     candidates: &[Candidate],
     best: &Plan,
     pairs: &[(usize, Setup)],
@@ -418,7 +418,7 @@ fn planned(
         let q = candidates[*number].0.q.clone();
         let reading = displacement(&q, &Setup { direction: None, ..setup }, 1.0);
         let measurements = crate::estimation::Measurements { readings: vec![reading], ..Default::default() };
-        let arm = crate::estimation::MeasuredArm { plant, parameters: &[], measurements: &measurements };
+        let arm = crate::estimation::MeasuredArm { nominal, parameters: &[], measurements: &measurements };
         let moved = arm.predicted(&nalgebra::DVector::zeros(0)).map_err(|e| IdentifyFileError::Fit(e.to_string()))?;
         let Setup { force, at, point, direction } = setup;
         Ok(PlannedReading { joints: q, force, at, point, direction, expected_m: [moved[0], moved[1], moved[2]] })

@@ -352,8 +352,8 @@ impl Reader<'_> {
         q: &[f64],
         span: &Range<usize>,
     ) -> Result<Probe, Error> {
-        let flexible = self.cell.arm;
-        let tool = || flexible.tcp.clone();
+        let arm = self.cell.arm;
+        let tool = || arm.tcp.clone();
         let Some(name) = name else { return Ok(Probe { frame: tool(), direction: *direction }) };
         let node = nodes.get(name).ok_or_else(|| {
             let known: Vec<&String> = nodes.keys().collect();
@@ -375,10 +375,10 @@ impl Reader<'_> {
         let direction = match axes.as_ref().map(|word| (word.get_ref().as_str(), word.span())) {
             None | Some(("world", _)) => *direction,
             Some(("frame", _)) => {
-                let mut all = DVector::zeros(flexible.model.nv());
+                let mut all = DVector::zeros(arm.model.nv());
                 all.rows_mut(0, q.len()).copy_from_slice(q);
-                let mut data = Data::new(&flexible.model);
-                forward_kinematics(&flexible.model, &mut data, &all);
+                let mut data = Data::new(&arm.model);
+                forward_kinematics(&arm.model, &mut data, &all);
                 data.X_WF(&frame).rotation * direction
             }
             Some((other, at)) => {

@@ -1,7 +1,7 @@
 //! Checks of measurements against the nominal arm: modes and units.
 
 use crate::estimation::{
-    Form, Instrument, MeasuredArm, MeasuredResponse, Measurements, Plant, Reading, ReadingKind, Target,
+    Form, Instrument, MeasuredArm, MeasuredResponse, Measurements, NominalArm, Reading, ReadingKind, Target,
 };
 use flexarm_kinematics::Pose;
 use nalgebra::{DVector, Vector3};
@@ -18,8 +18,8 @@ const UNIT_RATIO: f64 = 100.0;
 const RADIAN_RATIO: f64 = 1.6;
 
 /// Rejects modes with numbers beyond those of the model.
-pub(super) fn check_modes(plant: &Plant, input: &MeasurementInput) -> Result<(), Error> {
-    let modes = plant.model.n_elastic();
+pub(super) fn check_modes(nominal: &NominalArm, input: &MeasurementInput) -> Result<(), Error> {
+    let modes = nominal.model.n_elastic();
     for reading in &input.measurements.readings {
         let ReadingKind::Frequencies { rows, .. } = &reading.kind else { continue };
         if let Some(row) = rows.iter().find(|row| row.of >= modes) {
@@ -32,7 +32,7 @@ pub(super) fn check_modes(plant: &Plant, input: &MeasurementInput) -> Result<(),
 
 /// Compares displacements and distances with those of the nominal robot; a large ratio indicates
 /// wrong units.
-pub(super) fn check_units(plant: &Plant, input: &MeasurementInput) -> Result<(), Error> {
+pub(super) fn check_units(nominal: &NominalArm, input: &MeasurementInput) -> Result<(), Error> {
     let of = |which: fn(&Reading) -> bool| {
         let mut some = input.measurements.of_readings(|k| which(&input.measurements.readings[k]));
         some.instruments.iter_mut().for_each(|i| *i = Instrument::Known(Pose::identity()));
@@ -45,7 +45,7 @@ pub(super) fn check_units(plant: &Plant, input: &MeasurementInput) -> Result<(),
     };
     // An arm without equilibrium is not judged here.
     let both = |some: &Measurements| {
-        let arm = MeasuredArm { plant, parameters: &[], measurements: some };
+        let arm = MeasuredArm { nominal, parameters: &[], measurements: some };
         let expected = arm.predicted(&DVector::zeros(0)).unwrap_or_default();
         (arm.observed(), expected)
     };

@@ -12,17 +12,17 @@ use nalgebra::{Complex, DMatrix, DVector, Matrix3, Rotation3, Translation3, Vect
 const POSE: [f64; 6] = [0.4, 0.5, -0.3, 0.7, 0.6, -1.2];
 
 /// Returns the reference arm with a twentieth of its stiffness.
-fn plant() -> Plant {
+fn nominal() -> NominalArm {
     let reference = reference_arm(true);
     let model = Arc::new(Model::new(&reference.mechanism).unwrap());
     let spring = |name: &str, k: usize, damping| Spring::from((name.to_owned(), reference.K_S[k] / 20.0, damping));
     let springs = vec![spring("lower", 0, Damping::Rayleigh(0.4, 3e-4)), spring("upper", 1, Damping::Modal(0.03))];
     let tool = model.frame("tcp").unwrap().clone();
-    Plant { model, springs, tool, coupling: None }
+    NominalArm { model, springs, tool, coupling: None }
 }
 
-fn entry(plant: &Plant, spring: usize, row: usize, column: usize) -> Parameter {
-    let K = &plant.springs[spring].K;
+fn entry(nominal: &NominalArm, spring: usize, row: usize, column: usize) -> Parameter {
+    let K = &nominal.springs[spring].K;
     let size = (K[(row, row)] * K[(column, column)]).sqrt();
     let (name, initial) = (format!("{spring}[{row}][{column}]"), K[(row, column)]);
     let effect = Effect::Entry { spring, row, column, factor: 1.0, size };
@@ -34,17 +34,17 @@ fn tool(axis: usize) -> Parameter {
     Parameter { name, unit: "m".into(), initial: 0.0, prior: None, effect: Effect::Tool(axis) }
 }
 
-fn parameters(plant: &Plant) -> Vec<Parameter> {
-    let mut all = vec![entry(plant, 0, 1, 5), entry(plant, 0, 4, 4), entry(plant, 1, 0, 4)];
+fn parameters(nominal: &NominalArm) -> Vec<Parameter> {
+    let mut all = vec![entry(nominal, 0, 1, 5), entry(nominal, 0, 4, 4), entry(nominal, 1, 0, 4)];
     all.extend((0..6).map(tool));
     // Three displacements of one frame, which follow each other, and the zero of another joint.
-    all.extend([0, 5, 4].map(|axis| frame(plant, "joint2", Vector6::ith(axis, 1.0))));
-    all.push(frame(plant, "joint4", Vector6::ith(5, 1.0)));
+    all.extend([0, 5, 4].map(|axis| frame(nominal, "joint2", Vector6::ith(axis, 1.0))));
+    all.push(frame(nominal, "joint4", Vector6::ith(5, 1.0)));
     all
 }
 
-fn frame(plant: &Plant, joint: &str, twist: Vector6<f64>) -> Parameter {
-    let body = plant.model.bodies().iter().position(|body| body.joint == joint).unwrap();
+fn frame(nominal: &NominalArm, joint: &str, twist: Vector6<f64>) -> Parameter {
+    let body = nominal.model.bodies().iter().position(|body| body.joint == joint).unwrap();
     let effect = Effect::Frame { body, twist, size: 0.05 };
     Parameter { name: format!("frame of {joint}"), unit: "m".into(), initial: 0.0, prior: None, effect }
 }
@@ -66,7 +66,7 @@ fn richardson(h: f64, f: impl Fn(f64) -> DVector<f64>) -> DVector<f64> {
 
 /// Returns one reading of every kind, with a load that acts beside the tool and a mass attached
 /// there.
-fn measurements(plant: &Plant) -> Measurements {
+fn measurements(nominal: &NominalArm) -> Measurements {
     let carried = SpatialInertia::from_com(12.0, &Vector3::new(0.1, 0.2, 0.3), &(Matrix3::identity() * 0.3));
     let at = Vector3::new(0.1, 0.02, -0.05);
     let wrench = Wrench::new(Vector3::new(50.0, 20.0, -300.0), Vector3::new(4.0, -7.0, 3.0));
@@ -78,7 +78,7 @@ fn measurements(plant: &Plant) -> Measurements {
     rows.extend(axes.iter().map(|d| Row { of: Component::About(*d), value: 1e-3, std: 1e-4 }));
     let probe = |place: [f64; 3], direction| {
         let X = Pose::translation(place[0], place[1], place[2]);
-        let frame = plant.tool.clone();
+        let frame = nominal.tool.clone();
         Probe { frame: flexarm_kinematics::Frame { X_BF: frame.X_BF * X, ..frame }, direction }
     };
     let value = |k: usize| Complex::from_polar(1e-3 * (k as f64 + 1.0), k as f64 - 1.0);
@@ -125,13 +125,13 @@ fn measurements(plant: &Plant) -> Measurements {
 /// values.
 #[test]
 fn readings_of_all_kinds_change_with_entries_and_with_the_tool_as_differences_say() {
-    let plant = plant();
-    let parameters = parameters(&plant);
-    let all = measurements(&plant);
+    let nominal = nominal();
+    let parameters = parameters(&nominal);
+    let all = measurements(&nominal);
     let x = DVector::from_fn(parameters.len(), |k, _| 5.0 * step_of(&parameters[k]) * (k as f64 + 1.0).sin());
     for k in 0..all.readings.len() {
         let one = all.of_readings(|other| other == k);
-        let arm = MeasuredArm { plant: &plant, parameters: &parameters, measurements: &one };
+        let arm = MeasuredArm { nominal: &nominal, parameters: &parameters, measurements: &one };
         let mut J = DMatrix::zeros(0, 0);
         arm.evaluate(&x, Some(&mut J)).unwrap();
         // Change of the residuals per step; entries with almost no effect are compared with the
@@ -158,18 +158,18 @@ fn readings_of_all_kinds_change_with_entries_and_with_the_tool_as_differences_sa
 /// Truth: differences of the compliance with a changed entry.
 #[test]
 fn the_compliance_changes_with_an_entry_as_differences_say() {
-    let plant = plant();
-    let parameters = &parameters(&plant)[..3];
+    let nominal = nominal();
+    let parameters = &parameters(&nominal)[..3];
     let load = Wrench::new(Vector3::new(90.0, 50.0, -200.0), Vector3::zeros());
-    let solved = |plant: &Plant| {
-        let mut at = OperatingPoint::new(plant.held(&POSE).unwrap(), plant.tool.clone());
+    let solved = |nominal: &NominalArm| {
+        let mut at = OperatingPoint::new(nominal.held(&POSE).unwrap(), nominal.tool.clone());
         at.solve(&POSE, &load).unwrap();
         at
     };
-    let slopes = compliance_slopes(&mut solved(&plant), &load, parameters).unwrap();
+    let slopes = compliance_slopes(&mut solved(&nominal), &load, parameters).unwrap();
     for (slope, parameter) in slopes.iter().zip(parameters) {
         let C = |x: f64| {
-            let C = solved(&plant.with(std::slice::from_ref(parameter), &[x])).compliance();
+            let C = solved(&nominal.with(std::slice::from_ref(parameter), &[x])).compliance();
             DVector::from_column_slice(C.as_slice())
         };
         let truth = richardson(step_of(parameter), C);
@@ -209,9 +209,9 @@ fn read(of: &Measurements, values: &[f64]) -> Measurements {
 /// shear; a full Newton step from the initial values leads to an indefinite matrix.
 #[test]
 fn entries_far_from_the_guess_are_found_and_the_matrix_stays_definite_on_the_way() {
-    let plant = plant();
-    let parameters = vec![entry(&plant, 0, 4, 4), entry(&plant, 0, 0, 4), entry(&plant, 0, 1, 5)];
-    let mut soft = plant.clone();
+    let nominal = nominal();
+    let parameters = vec![entry(&nominal, 0, 4, 4), entry(&nominal, 0, 0, 4), entry(&nominal, 0, 1, 5)];
+    let mut soft = nominal.clone();
     let K = &mut soft.springs[0].K;
     let root = |K: &DMatrix<f64>, i: usize, j: usize| (K[(i, i)] * K[(j, j)]).sqrt();
     K[(4, 4)] *= 0.3;
@@ -222,10 +222,10 @@ fn entries_far_from_the_guess_are_found_and_the_matrix_stays_definite_on_the_way
     }
     let truth = [soft.springs[0].K[(4, 4)], soft.springs[0].K[(0, 4)], soft.springs[0].K[(1, 5)]];
     let poses = pulls(12);
-    let none = MeasuredArm { plant: &soft, parameters: &[], measurements: &poses };
+    let none = MeasuredArm { nominal: &soft, parameters: &[], measurements: &poses };
     let exact = none.predicted(&DVector::zeros(0)).unwrap();
     let options = IdentifyOptions { folds: 0, ..IdentifyOptions::default() };
-    let found = identify(&plant, &parameters, &read(&poses, &exact), &options, &|_| true).unwrap();
+    let found = identify(&nominal, &parameters, &read(&poses, &exact), &options, &|_| true).unwrap();
     for (p, truth) in found.parameters.iter().zip(truth) {
         eprintln!("{}: {:.6e} of {truth:.6e}, first {:.6e}", p.name, p.value, p.initial);
         // The prior pulls by a small part of the deviation.
@@ -233,8 +233,8 @@ fn entries_far_from_the_guess_are_found_and_the_matrix_stays_definite_on_the_way
     }
     // Outside the cone of positive definite matrices the arm has no solution, so the search rejects
     // the step.
-    let arm = MeasuredArm { plant: &plant, parameters: &parameters, measurements: &poses };
-    let beyond = DVector::from_vec(vec![0.0, 1.5 * root(&plant.springs[0].K, 0, 4), 0.0]);
+    let arm = MeasuredArm { nominal: &nominal, parameters: &parameters, measurements: &poses };
+    let beyond = DVector::from_vec(vec![0.0, 1.5 * root(&nominal.springs[0].K, 0, 4), 0.0]);
     assert!(arm.predicted(&beyond).unwrap_err().to_string().contains("stiffness of an elastic joint"));
     // With noise, errors over the reported deviations are standard normal; the RMS of 120 of them
     // is within 0.8 to 1.2 with 99 % probability.
@@ -246,7 +246,7 @@ fn entries_far_from_the_guess_are_found_and_the_matrix_stays_definite_on_the_way
     let mut squares = 0.0;
     for _ in 0..40 {
         let noisy: Vec<f64> = exact.iter().map(|value| value + 1e-5 * normal()).collect();
-        let found = identify(&plant, &parameters, &read(&poses, &noisy), &options, &|_| true).unwrap();
+        let found = identify(&nominal, &parameters, &read(&poses, &noisy), &options, &|_| true).unwrap();
         squares += found.parameters.iter().zip(truth).map(|(p, t)| ((p.value - t) / p.std).powi(2)).sum::<f64>();
     }
     let spread = (squares / 120.0).sqrt();

@@ -12,12 +12,12 @@ use nalgebra::{DVector, Rotation3, Translation3, Vector3};
 /// Noise of a laser tracker (m).
 const NOISE: f64 = 3e-5;
 
-fn plant() -> Plant {
+fn nominal() -> NominalArm {
     let reference = reference_arm(true);
     let model = Arc::new(Model::new(&reference.mechanism).expect("valid"));
     let spring = |name: &str, k: usize| Spring::from((name.to_owned(), reference.K_S[k], Damping::Modal(0.03)));
     let tool = model.frame("tcp").expect("there").clone();
-    Plant { model, springs: vec![spring("lower", 0), spring("upper", 1)], tool, coupling: None }
+    NominalArm { model, springs: vec![spring("lower", 0), spring("upper", 1)], tool, coupling: None }
 }
 
 fn stiffness(name: &str, spring: usize, coordinate: Option<usize>) -> Parameter {
@@ -37,8 +37,8 @@ fn parameters() -> Vec<Parameter> {
     ]
 }
 
-fn fit(plant: &Plant, parameters: &[Parameter], read: &Measurements, options: &IdentifyOptions) -> Identified {
-    identify(plant, parameters, read, options, &|_| true).unwrap()
+fn fit(nominal: &NominalArm, parameters: &[Parameter], read: &Measurements, options: &IdentifyOptions) -> Identified {
+    identify(nominal, parameters, read, options, &|_| true).unwrap()
 }
 
 const TRUTH: [f64; 6] = [0.3, -0.25, 0.4, -0.5, 0.2, -0.15];
@@ -75,8 +75,14 @@ fn pulled(draw: &mut Draw, count: usize) -> Measurements {
 }
 
 /// Simulates the readings of an arm, with noise.
-fn read(plant: &Plant, parameters: &[Parameter], truth: &[f64], from: &Measurements, draw: &mut Draw) -> Measurements {
-    let arm = MeasuredArm { plant, parameters, measurements: from };
+fn read(
+    nominal: &NominalArm,
+    parameters: &[Parameter],
+    truth: &[f64],
+    from: &Measurements,
+    draw: &mut Draw,
+) -> Measurements {
+    let arm = MeasuredArm { nominal, parameters, measurements: from };
     let mut unknowns = DVector::zeros(parameters.len() + from.own_unknowns());
     unknowns.as_mut_slice()[..truth.len()].copy_from_slice(truth);
     let mut values = arm.predicted(&unknowns).unwrap().into_iter();
@@ -100,15 +106,15 @@ fn read(plant: &Plant, parameters: &[Parameter], truth: &[f64], from: &Measureme
 /// normal. Over 1000 seeds: 94.7 % within their intervals, spread 0.998.
 #[test]
 fn of_two_hundred_fits_the_stated_deviations_are_those_of_the_errors() {
-    let (plant, parameters) = (plant(), parameters());
+    let (nominal, parameters) = (nominal(), parameters());
     let mut draw = Draw(12345);
     let poses = pulled(&mut draw, 16);
     let options = IdentifyOptions { folds: 0, ..IdentifyOptions::default() };
     let (mut inside, mut sum, mut squares, mut misfits) = (0, 0.0, 0.0, 0);
     let seeds = 200;
     for _ in 0..seeds {
-        let noisy = read(&plant, &parameters, &TRUTH, &poses, &mut draw);
-        let found = fit(&plant, &parameters, &noisy, &options);
+        let noisy = read(&nominal, &parameters, &TRUTH, &poses, &mut draw);
+        let found = fit(&nominal, &parameters, &noisy, &options);
         misfits += usize::from(found.misfit.is_some());
         for (k, parameter) in found.parameters.iter().enumerate() {
             assert!(parameter.identifiable, "{}", parameter.name);
@@ -130,7 +136,7 @@ fn of_two_hundred_fits_the_stated_deviations_are_those_of_the_errors() {
 
 #[test]
 fn a_dial_gauge_under_one_weight_tells_one_combination_and_the_rest_stays_where_it_was() {
-    let (plant, parameters) = (plant(), parameters());
+    let (nominal, parameters) = (nominal(), parameters());
     let mut draw = Draw(7);
     let mut one = pulled(&mut draw, 1);
     one.readings[0].q = vec![0.0, 0.3, 0.2, 0.0, 0.5, 0.0];
@@ -138,8 +144,8 @@ fn a_dial_gauge_under_one_weight_tells_one_combination_and_the_rest_stays_where_
         rows.drain(..2);
         after.at = Vector3::zeros();
     }
-    let noisy = read(&plant, &parameters, &TRUTH, &one, &mut draw);
-    let found = fit(&plant, &parameters, &noisy, &IdentifyOptions::default());
+    let noisy = read(&nominal, &parameters, &TRUTH, &one, &mut draw);
+    let found = fit(&nominal, &parameters, &noisy, &IdentifyOptions::default());
     // In the plane of the arm only bending about y has an effect, combined over both links: one
     // direction of six is known better than before.
     assert_eq!(found.untold.len(), 5, "{:?}", found.untold);
@@ -154,7 +160,7 @@ fn a_dial_gauge_under_one_weight_tells_one_combination_and_the_rest_stays_where_
     // Stiffnesses that are known beforehand stay about where they were.
     let known: Vec<Parameter> =
         parameters.iter().map(|p| Parameter { prior: Some(1.1f64.ln()), ..p.clone() }).collect();
-    let sure = fit(&plant, &known, &noisy, &IdentifyOptions::default());
+    let sure = fit(&nominal, &known, &noisy, &IdentifyOptions::default());
     for (k, parameter) in sure.parameters.iter().enumerate().filter(|(k, _)| k % 3 != 1) {
         assert!((parameter.value - 1.0).abs() < 1e-3, "{k}: {parameter:?}");
     }
@@ -162,7 +168,7 @@ fn a_dial_gauge_under_one_weight_tells_one_combination_and_the_rest_stays_where_
 
 #[test]
 fn a_tracker_that_stands_anywhere_and_a_target_that_is_not_known_come_out_with_the_stiffness() {
-    let (plant, parameters) = (plant(), parameters());
+    let (nominal, parameters) = (nominal(), parameters());
     let mut draw = Draw(3);
     let target = Vector3::new(0.1, 0.07, -0.03);
     let X = Pose::from_parts(Translation3::new(3.1, -2.0, 0.7), Rotation3::from_euler_angles(0.1, 0.3, 2.5));
@@ -187,10 +193,10 @@ fn a_tracker_that_stands_anywhere_and_a_target_that_is_not_known_come_out_with_t
         instruments: vec![Instrument::Known(X)],
         links: Vec::new(),
     };
-    let mut noisy = read(&plant, &parameters, &TRUTH, &known, &mut draw);
+    let mut noisy = read(&nominal, &parameters, &TRUTH, &known, &mut draw);
     noisy.instruments = vec![Instrument::Unknown(Pose::identity())];
     noisy.targets = vec![Target::Unknown(Vector3::zeros())];
-    let found = fit(&plant, &parameters, &noisy, &IdentifyOptions::default());
+    let found = fit(&nominal, &parameters, &noisy, &IdentifyOptions::default());
     let off = (found.targets[0] - target).norm();
     let turned = (found.instruments[0].rotation.inverse() * X.rotation).angle();
     eprintln!("target {off:.1e} m, instrument {turned:.1e} rad, {} iterations", found.solution.iterations);
@@ -203,12 +209,12 @@ fn a_tracker_that_stands_anywhere_and_a_target_that_is_not_known_come_out_with_t
 
 #[test]
 fn a_model_without_the_link_that_bends_is_known_by_its_residuals() {
-    let (plant, parameters) = (plant(), parameters());
+    let (nominal, parameters) = (nominal(), parameters());
     let mut draw = Draw(5);
-    let noisy = read(&plant, &parameters, &TRUTH, &pulled(&mut draw, 16), &mut draw);
+    let noisy = read(&nominal, &parameters, &TRUTH, &pulled(&mut draw, 16), &mut draw);
     let lower_only = &parameters[..3];
-    let wrong = fit(&plant, lower_only, &noisy, &IdentifyOptions::default());
-    let right = fit(&plant, &parameters, &noisy, &IdentifyOptions::default());
+    let wrong = fit(&nominal, lower_only, &noisy, &IdentifyOptions::default());
+    let right = fit(&nominal, &parameters, &noisy, &IdentifyOptions::default());
     let [w, r] = [&wrong, &right].map(|found| {
         let r = &found.held_out.as_ref().unwrap().residuals;
         (r.iter().map(|r| r * r).sum::<f64>() / r.len() as f64).sqrt() / NOISE
@@ -220,13 +226,13 @@ fn a_model_without_the_link_that_bends_is_known_by_its_residuals() {
 
 #[test]
 fn one_reading_of_a_slipped_target_is_named_and_does_not_carry_the_estimate_away() {
-    let (plant, parameters) = (plant(), parameters());
+    let (nominal, parameters) = (nominal(), parameters());
     let mut draw = Draw(11);
-    let mut noisy = read(&plant, &parameters, &TRUTH, &pulled(&mut draw, 16), &mut draw);
+    let mut noisy = read(&nominal, &parameters, &TRUTH, &pulled(&mut draw, 16), &mut draw);
     if let ReadingKind::Displacement { rows, .. } = &mut noisy.readings[9].kind {
         rows[2].value += 2e-3;
     }
-    let found = fit(&plant, &parameters, &noisy, &IdentifyOptions::default());
+    let found = fit(&nominal, &parameters, &noisy, &IdentifyOptions::default());
     assert_eq!(found.suspicious.first(), Some(&(9 * 3 + 2)), "{:?}", found.suspicious);
     for (k, parameter) in found.parameters.iter().enumerate() {
         let z = (parameter.value.ln() - TRUTH[k]) / (parameter.std / parameter.value);
@@ -236,21 +242,21 @@ fn one_reading_of_a_slipped_target_is_named_and_does_not_carry_the_estimate_away
 
 #[test]
 fn planned_poses_tell_more_than_random_ones_and_the_deviations_promised_are_those_found() {
-    let (plant, parameters) = (plant(), parameters());
+    let (nominal, parameters) = (nominal(), parameters());
     for seed in 0..10 {
         let mut draw = Draw(100 + seed);
         let candidates: Vec<Candidate> = pulled(&mut draw, 60).readings.into_iter().map(Candidate).collect();
         let options = PlanOptions { count: 6, ..PlanOptions::default() };
-        let planned = plan(&plant, &parameters, &candidates, &options).unwrap();
+        let planned = plan(&nominal, &parameters, &candidates, &options).unwrap();
         let random: Vec<Candidate> = candidates[..6].to_vec();
-        let others = plan(&plant, &parameters, &random, &options).unwrap();
+        let others = plan(&nominal, &parameters, &random, &options).unwrap();
         assert!(planned.gain > others.gain + 0.5, "{} {}", planned.gain, others.gain);
         let readings = planned.chosen.iter().map(|k| candidates[*k].0.clone()).collect();
         let poses = Measurements { readings, ..Measurements::default() };
         // Readings without noise: the deviations equal those of the plan, except for the influence
         // of its prior.
         let mut exact = poses.clone();
-        let arm = MeasuredArm { plant: &plant, parameters: &parameters, measurements: &poses };
+        let arm = MeasuredArm { nominal: &nominal, parameters: &parameters, measurements: &poses };
         let mut values = arm.predicted(&DVector::zeros(6)).unwrap().into_iter();
         for reading in &mut exact.readings {
             if let ReadingKind::Displacement { rows, .. } = &mut reading.kind {
@@ -258,7 +264,7 @@ fn planned_poses_tell_more_than_random_ones_and_the_deviations_promised_are_thos
             }
         }
         let options = IdentifyOptions { folds: 0, ..IdentifyOptions::default() };
-        let found = fit(&plant, &parameters, &exact, &options);
+        let found = fit(&nominal, &parameters, &exact, &options);
         for (k, parameter) in found.parameters.iter().enumerate() {
             let ratio = parameter.std / parameter.value / planned.deviations[k];
             let prior = 1.0 / (1.0 - (planned.deviations[k] / parameters[k].reference()).powi(2));
@@ -270,9 +276,9 @@ fn planned_poses_tell_more_than_random_ones_and_the_deviations_promised_are_thos
 /// Truth: the same readings without the two outliers of 67 standard deviations.
 #[test]
 fn two_slipped_readings_are_named_and_leave_scatter_and_deviations_as_they_are() {
-    let (plant, parameters) = (plant(), parameters());
+    let (nominal, parameters) = (nominal(), parameters());
     let mut draw = Draw(11);
-    let clean = read(&plant, &parameters, &TRUTH, &pulled(&mut draw, 16), &mut draw);
+    let clean = read(&nominal, &parameters, &TRUTH, &pulled(&mut draw, 16), &mut draw);
     let mut slipped = clean.clone();
     for reading in [4, 9] {
         if let ReadingKind::Displacement { rows, .. } = &mut slipped.readings[reading].kind {
@@ -280,7 +286,7 @@ fn two_slipped_readings_are_named_and_leave_scatter_and_deviations_as_they_are()
         }
     }
     let options = IdentifyOptions { folds: 0, ..IdentifyOptions::default() };
-    let [clean, slipped] = [&clean, &slipped].map(|read| fit(&plant, &parameters, read, &options));
+    let [clean, slipped] = [&clean, &slipped].map(|read| fit(&nominal, &parameters, read, &options));
     let mut named = slipped.suspicious.clone();
     named.sort_unstable();
     assert_eq!(named, [4 * 3 + 2, 9 * 3 + 2]);
@@ -294,21 +300,21 @@ fn two_slipped_readings_are_named_and_leave_scatter_and_deviations_as_they_are()
 /// Truth: the fit of the same readings with the correct standard deviation.
 #[test]
 fn readings_without_a_deviation_tell_it_and_name_an_outlier() {
-    let (plant, parameters) = (plant(), parameters());
+    let (nominal, parameters) = (nominal(), parameters());
     let mut draw = Draw(21);
-    let mut noisy = read(&plant, &parameters, &TRUTH, &pulled(&mut draw, 16), &mut draw);
+    let mut noisy = read(&nominal, &parameters, &TRUTH, &pulled(&mut draw, 16), &mut draw);
     if let ReadingKind::Displacement { rows, .. } = &mut noisy.readings[9].kind {
         rows[2].value += 2e-3;
     }
     let options = IdentifyOptions { folds: 0, ..IdentifyOptions::default() };
-    let known = fit(&plant, &parameters, &noisy, &options);
+    let known = fit(&nominal, &parameters, &noisy, &options);
     let mut unknown = noisy.clone();
     for reading in &mut unknown.readings {
         if let ReadingKind::Displacement { rows, .. } = &mut reading.kind {
             rows.iter_mut().for_each(|row| row.std = 0.0);
         }
     }
-    let found = fit(&plant, &parameters, &unknown, &options);
+    let found = fit(&nominal, &parameters, &unknown, &options);
     assert_eq!(found.suspicious, known.suspicious);
     for (a, b) in found.parameters.iter().zip(&known.parameters) {
         let (off, ratio) = ((a.value - b.value).abs() / b.std, a.std / b.std);
@@ -320,7 +326,7 @@ fn readings_without_a_deviation_tell_it_and_name_an_outlier() {
 /// Truth: the simulated arm and rotation.
 #[test]
 fn displacements_in_the_axes_of_an_instrument_tell_stiffness_and_axes() {
-    let (plant, parameters) = (plant(), parameters());
+    let (nominal, parameters) = (nominal(), parameters());
     let mut draw = Draw(31);
     let mut seen = pulled(&mut draw, 16);
     let R = Rotation3::from_euler_angles(0.4, -0.9, 2.2);
@@ -329,13 +335,13 @@ fn displacements_in_the_axes_of_an_instrument_tell_stiffness_and_axes() {
         rows.iter_mut().for_each(|row| row.of = Component::AlongSeen(0, row.of.parts().0));
     }
     seen.instruments = vec![Instrument::Known(Pose::from_parts(Translation3::new(9.0, 9.0, 9.0), R))];
-    let mut noisy = read(&plant, &parameters, &TRUTH, &seen, &mut draw);
+    let mut noisy = read(&nominal, &parameters, &TRUTH, &seen, &mut draw);
     let options = IdentifyOptions { folds: 0, ..IdentifyOptions::default() };
     for unknown in [false, true] {
         if unknown {
             noisy.instruments = vec![Instrument::Axes(Rotation3::identity())];
         }
-        let found = fit(&plant, &parameters, &noisy, &options);
+        let found = fit(&nominal, &parameters, &noisy, &options);
         let turned = (found.instruments[0].rotation.inverse() * R).angle();
         eprintln!("axes {turned:.1e} rad off, errors of the model {:?}", found.model_errors);
         assert!(turned < 1e-2 && found.misfit.is_none(), "{turned:e}"); // measured: 1e-3
@@ -350,7 +356,7 @@ fn displacements_in_the_axes_of_an_instrument_tell_stiffness_and_axes() {
     noisy.instruments = vec![Instrument::Axes(value.rotation)];
     let kind = ReadingKind::InstrumentAt { instrument: 0, value, std: None, std_rotation };
     noisy.readings.push(Reading { name: "instrument".into(), q: Vec::new(), kind });
-    let found = fit(&plant, &parameters, &noisy, &options);
+    let found = fit(&nominal, &parameters, &noisy, &options);
     let turned = (found.instruments[0].rotation.inverse() * R).angle();
     assert!(turned < 4e-4, "{turned:e}");
 }
@@ -358,11 +364,11 @@ fn displacements_in_the_axes_of_an_instrument_tell_stiffness_and_axes() {
 /// Truth: simulated readings of the plant, with permuted joints and rotated axes.
 #[test]
 fn joints_in_another_order_and_axes_of_another_frame_are_recognised() {
-    let (plant, parameters) = (plant(), parameters());
+    let (nominal, parameters) = (nominal(), parameters());
     let mut draw = Draw(41);
-    let noisy = read(&plant, &parameters, &TRUTH, &pulled(&mut draw, 16), &mut draw);
+    let noisy = read(&nominal, &parameters, &TRUTH, &pulled(&mut draw, 16), &mut draw);
     let slides = [false; 6];
-    let found = |read: &Measurements| likely_slip(&plant, &parameters, read, &slides);
+    let found = |read: &Measurements| likely_slip(&nominal, &parameters, read, &slides);
     assert_eq!(found(&noisy), None);
     // For each joint, the position of its value.
     for order in [[5, 4, 3, 2, 1, 0], [0, 2, 1, 3, 4, 5], [1, 2, 0, 3, 5, 4]] {
@@ -392,11 +398,11 @@ fn joints_in_another_order_and_axes_of_another_frame_are_recognised() {
 /// are close to other resonances of the arm.
 #[test]
 fn responses_that_draw_the_search_into_a_false_minimum_are_met_from_another_start() {
-    let (plant, parameters) = (plant(), parameters());
+    let (nominal, parameters) = (nominal(), parameters());
     let truth = [0.9, -0.8, 0.7, -0.9, 0.8, -0.6];
-    let arm = plant.with(&parameters, &truth);
+    let arm = nominal.with(&parameters, &truth);
     let q = vec![0.4, 0.5, -0.3, 0.7, 0.6, -1.2];
-    let mut frame = plant.tool.clone();
+    let mut frame = nominal.tool.clone();
     frame.X_BF *= Pose::translation(0.1, 0.2, -0.1);
     let probe = |direction| Probe { frame: frame.clone(), direction };
     let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
@@ -430,7 +436,7 @@ fn responses_that_draw_the_search_into_a_false_minimum_are_met_from_another_star
         });
         let measurements = Measurements { readings: readings.collect(), ..Measurements::default() };
         let options = IdentifyOptions { folds: 0, ..IdentifyOptions::default() };
-        let found = fit(&plant, &parameters, &measurements, &options);
+        let found = fit(&nominal, &parameters, &measurements, &options);
         assert!(found.misfit.is_none(), "{:?}", found.misfit);
         for (parameter, truth) in found.parameters.iter().zip(truth) {
             let z = (parameter.value.ln() - truth) / (parameter.std / parameter.value);
@@ -442,11 +448,11 @@ fn responses_that_draw_the_search_into_a_false_minimum_are_met_from_another_star
 /// Five of six springs are not fitted: the deviations include what the model lacks.
 #[test]
 fn a_fit_that_does_not_meet_the_readings_has_deviations_that_include_the_error_of_the_model() {
-    let (plant, parameters) = (plant(), parameters());
+    let (nominal, parameters) = (nominal(), parameters());
     let mut draw = Draw(5);
-    let noisy = read(&plant, &parameters, &TRUTH, &pulled(&mut draw, 16), &mut draw);
+    let noisy = read(&nominal, &parameters, &TRUTH, &pulled(&mut draw, 16), &mut draw);
     let [right, wrong] =
-        [&parameters[..], &parameters[..1]].map(|some| fit(&plant, some, &noisy, &IdentifyOptions::default()));
+        [&parameters[..], &parameters[..1]].map(|some| fit(&nominal, some, &noisy, &IdentifyOptions::default()));
     let factor = wrong.misfit.unwrap();
     let error = wrong.model_errors[0].error;
     eprintln!("{factor:.1} times the deviations, error of the model {error:.1e} m");
@@ -457,12 +463,12 @@ fn a_fit_that_does_not_meet_the_readings_has_deviations_that_include_the_error_o
 /// Truth: the simulated arm, of which one spring is rigid.
 #[test]
 fn a_rigid_spring_is_told_from_one_that_nobody_measured() {
-    let (plant, parameters) = (plant(), parameters());
+    let (nominal, parameters) = (nominal(), parameters());
     let mut truth = TRUTH;
     truth[1] = 12.0;
     let mut draw = Draw(61);
-    let noisy = read(&plant, &parameters, &truth, &pulled(&mut draw, 16), &mut draw);
-    let found = fit(&plant, &parameters, &noisy, &IdentifyOptions::default());
+    let noisy = read(&nominal, &parameters, &truth, &pulled(&mut draw, 16), &mut draw);
+    let found = fit(&nominal, &parameters, &noisy, &IdentifyOptions::default());
     let spring = &found.parameters[1];
     eprintln!("{spring:?}");
     assert!(spring.rigid && !spring.identifiable && spring.interval[0] > 10.0, "{spring:?}");

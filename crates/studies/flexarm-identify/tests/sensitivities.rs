@@ -12,12 +12,12 @@ use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, Translation3, Vector3};
 const POSE: [f64; 6] = [0.4, 0.5, -0.3, 0.7, 0.6, -1.2];
 
 /// Returns the reference arm with a twentieth of its stiffness: its tool sags by 4 cm.
-fn plant() -> Plant {
+fn nominal() -> NominalArm {
     let reference = reference_arm(true);
     let model = Arc::new(Model::new(&reference.mechanism).expect("valid"));
     let spring = |name: &str, k: usize| Spring::from((name.to_owned(), reference.K_S[k] / 20.0, Damping::Modal(0.03)));
     let tool = model.frame("tcp").expect("there").clone();
-    Plant { model, springs: vec![spring("lower", 0), spring("upper", 1)], tool, coupling: None }
+    NominalArm { model, springs: vec![spring("lower", 0), spring("upper", 1)], tool, coupling: None }
 }
 
 fn stiffness(name: &str, spring: usize, coordinate: Option<usize>) -> Parameter {
@@ -25,9 +25,9 @@ fn stiffness(name: &str, spring: usize, coordinate: Option<usize>) -> Parameter 
     Parameter { name: name.into(), unit: "1".into(), initial: 1.0, prior: None, effect }
 }
 
-fn parameters(plant: &Plant) -> Vec<Parameter> {
+fn parameters(nominal: &NominalArm) -> Vec<Parameter> {
     let per_kg = SpatialInertia::from_com(1.0, &Vector3::new(0.1, -0.05, 0.2), &(Matrix3::identity() * 0.02));
-    let mass = Effect::Mass { body: plant.tool.body, per_kg };
+    let mass = Effect::Mass { body: nominal.tool.body, per_kg };
     vec![
         stiffness("lower", 0, None),
         stiffness("upper", 1, None),
@@ -38,8 +38,8 @@ fn parameters(plant: &Plant) -> Vec<Parameter> {
 }
 
 /// Parameters for damping, one for each damping model of the springs.
-fn with_damping(plant: &mut Plant) -> Vec<Parameter> {
-    plant.springs[1].damping = Damping::Rayleigh(0.4, 3e-4);
+fn with_damping(nominal: &mut NominalArm) -> Vec<Parameter> {
+    nominal.springs[1].damping = Damping::Rayleigh(0.4, 3e-4);
     let damping = |name: &str, spring| Parameter {
         name: name.into(),
         unit: "1".into(),
@@ -47,15 +47,15 @@ fn with_damping(plant: &mut Plant) -> Vec<Parameter> {
         prior: None,
         effect: Effect::Damping(vec![spring]),
     };
-    let mut all = parameters(plant);
+    let mut all = parameters(nominal);
     all.extend([damping("modal damping of lower", 0), damping("Rayleigh damping of upper", 1)]);
     all
 }
 
 /// Returns two points beside the tool on its body, each with a direction.
-fn probes(plant: &Plant) -> [Probe; 2] {
+fn probes(nominal: &NominalArm) -> [Probe; 2] {
     let moved = |x: f64, y: f64, z: f64| {
-        let frame = plant.tool.clone();
+        let frame = nominal.tool.clone();
         flexarm_kinematics::Frame { X_BF: frame.X_BF * Pose::translation(x, y, z), ..frame }
     };
     [
@@ -78,22 +78,22 @@ fn step_of(parameter: &Parameter) -> f64 {
 
 #[test]
 fn the_tool_moves_with_each_parameter_as_the_nonlinear_equilibrium_does() {
-    let plant = plant();
-    let parameters = parameters(&plant);
+    let nominal = nominal();
+    let parameters = parameters(&nominal);
     for moment in [0.0, 60.0] {
         // With a constant moment the tangent is not symmetric.
         let load = Wrench::new(Vector3::new(90.0, 50.0, -200.0), Vector3::new(moment, -moment, 0.5 * moment));
-        let solved = |plant: &Plant| {
-            let mut at = OperatingPoint::new(plant.held(&POSE).unwrap(), plant.tool.clone());
+        let solved = |nominal: &NominalArm| {
+            let mut at = OperatingPoint::new(nominal.held(&POSE).unwrap(), nominal.tool.clone());
             at.solve(&POSE, &load).unwrap();
             at
         };
-        let mut at = solved(&plant);
+        let mut at = solved(&nominal);
         let slopes = tool_slopes(&mut at, &parameters);
         let here = at.tcp_pose();
         for (k, parameter) in parameters.iter().enumerate() {
             let place = |x: f64| {
-                let X = solved(&plant.with(std::slice::from_ref(parameter), &[x])).tcp_pose();
+                let X = solved(&nominal.with(std::slice::from_ref(parameter), &[x])).tcp_pose();
                 let turned = rotation_vector((X.rotation * here.rotation.inverse()).matrix());
                 let p = X.translation.vector;
                 DVector::from_vec(vec![p.x, p.y, p.z, turned.x, turned.y, turned.z])
@@ -109,13 +109,13 @@ fn the_tool_moves_with_each_parameter_as_the_nonlinear_equilibrium_does() {
 
 #[test]
 fn frequencies_change_with_each_parameter_and_with_the_equilibrium_that_it_moves() {
-    let plant = plant();
-    let parameters = parameters(&plant);
-    let found = frequency_slopes(&plant, &parameters, &POSE).unwrap();
+    let nominal = nominal();
+    let parameters = parameters(&nominal);
+    let found = frequency_slopes(&nominal, &parameters, &POSE).unwrap();
     for (k, parameter) in parameters.iter().enumerate() {
         let hz = |x: f64| {
-            let plant = plant.with(std::slice::from_ref(parameter), &[x]);
-            DVector::from_vec(frequency_slopes(&plant, &[], &POSE).unwrap().hz)
+            let nominal = nominal.with(std::slice::from_ref(parameter), &[x]);
+            DVector::from_vec(frequency_slopes(&nominal, &[], &POSE).unwrap().hz)
         };
         let truth = richardson(step_of(parameter), hz);
         let error = (0..6).map(|i| (found.slopes[(i, k)] - truth[i]).abs() / truth.amax()).fold(0.0, f64::max);
@@ -126,8 +126,8 @@ fn frequencies_change_with_each_parameter_and_with_the_equilibrium_that_it_moves
 
 #[test]
 fn every_row_of_every_kind_of_reading_has_the_derivatives_of_its_residual() {
-    let plant = plant();
-    let parameters = parameters(&plant);
+    let nominal = nominal();
+    let parameters = parameters(&nominal);
     let carried = SpatialInertia::from_com(12.0, &Vector3::new(0.0, 0.1, 0.2), &(Matrix3::identity() * 0.1));
     let at = Vector3::new(0.1, 0.02, -0.05);
     let pull =
@@ -177,7 +177,7 @@ fn every_row_of_every_kind_of_reading_has_the_derivatives_of_its_residual() {
         instruments: vec![Instrument::Unknown(X), Instrument::Axes(X.rotation.inverse())],
         ..Measurements::default()
     };
-    let arm = MeasuredArm { plant: &plant, parameters: &parameters, measurements: &measurements };
+    let arm = MeasuredArm { nominal: &nominal, parameters: &parameters, measurements: &measurements };
     let mut at = DVector::zeros(parameters.len() + measurements.own_unknowns());
     assert_eq!(at.len(), 5 + 6 + 3 + 3);
     for (k, x) in at.iter_mut().enumerate() {
@@ -202,10 +202,10 @@ fn every_row_of_every_kind_of_reading_has_the_derivatives_of_its_residual() {
 /// Truth: the linear system of the arm from its own matrices, as in `flexarm response`.
 #[test]
 fn a_response_is_that_of_the_linearised_arm() {
-    let mut plant = plant();
-    with_damping(&mut plant);
-    let probes = probes(&plant);
-    let arm = plant.held(&POSE).unwrap();
+    let mut nominal = nominal();
+    with_damping(&mut nominal);
+    let probes = probes(&nominal);
+    let arm = nominal.held(&POSE).unwrap();
     let at = |probe: &Probe| flexarm_stepping::linearise(&arm, &probe.frame, &Wrench::zeros(), 0.0).unwrap();
     let (watched, hit) = (at(&probes[0]), at(&probes[1]));
     let row = |J: &nalgebra::Matrix6xX<f64>, d: &Vector3<f64>| {
@@ -213,7 +213,7 @@ fn a_response_is_that_of_the_linearised_arm() {
     };
     let omega = [3.0, 9.0, 25.0, 60.0];
     let found =
-        structure_slopes(&plant, &[], &POSE, &probes).unwrap().response(0, 1, Answer::Accelerance, &omega).unwrap();
+        structure_slopes(&nominal, &[], &POSE, &probes).unwrap().response(0, 1, Answer::Accelerance, &omega).unwrap();
     for (w, value) in omega.iter().zip(&found.values) {
         let n = watched.K.nrows();
         let Z = DMatrix::from_fn(n, n, |i, j| {
@@ -227,20 +227,20 @@ fn a_response_is_that_of_the_linearised_arm() {
 
 #[test]
 fn responses_and_shapes_change_with_each_parameter_as_differences_say() {
-    let mut plant = plant();
-    let parameters = with_damping(&mut plant);
-    let probes = probes(&plant);
+    let mut nominal = nominal();
+    let parameters = with_damping(&mut nominal);
+    let probes = probes(&nominal);
     let f =
-        structure_slopes(&plant, &[], &POSE, &probes).unwrap().omega2.iter().map(|w2| w2.sqrt()).collect::<Vec<_>>();
+        structure_slopes(&nominal, &[], &POSE, &probes).unwrap().omega2.iter().map(|w2| w2.sqrt()).collect::<Vec<_>>();
     // Below, at and between resonances.
     let omega = [0.5 * f[0], f[0], 1.02 * f[1], 0.5 * (f[1] + f[2]), f[2], 1.3 * f[3]];
-    let found = structure_slopes(&plant, &parameters, &POSE, &probes).unwrap();
+    let found = structure_slopes(&nominal, &parameters, &POSE, &probes).unwrap();
     let response = found.response(0, 1, Answer::Mobility, &omega).unwrap();
     for (k, parameter) in parameters.iter().enumerate() {
         let step = if parameter.is_logarithmic() { 0.002 } else { 0.1 };
         let values = |x: f64| {
-            let plant = plant.with(std::slice::from_ref(parameter), &[x]);
-            let again = structure_slopes(&plant, &[], &POSE, &probes).unwrap();
+            let nominal = nominal.with(std::slice::from_ref(parameter), &[x]);
+            let again = structure_slopes(&nominal, &[], &POSE, &probes).unwrap();
             let H = again.response(0, 1, Answer::Mobility, &omega).unwrap().values;
             DVector::from_iterator(2 * H.len(), H.iter().flat_map(|h| [h.re, h.im]))
         };
@@ -253,8 +253,8 @@ fn responses_and_shapes_change_with_each_parameter_as_differences_say() {
         eprintln!("{}: response {error:.1e} of {:.1e}", parameter.name, truth.amax());
         assert!(error < 1e-8, "{}: {error:e}", parameter.name);
         let shape = |x: f64| {
-            let plant = plant.with(std::slice::from_ref(parameter), &[x]);
-            let shape = structure_slopes(&plant, &[], &POSE, &[]).unwrap().shapes.column(1).into_owned();
+            let nominal = nominal.with(std::slice::from_ref(parameter), &[x]);
+            let shape = structure_slopes(&nominal, &[], &POSE, &[]).unwrap().shapes.column(1).into_owned();
             let sign = shape.dot(&found.shapes.column(1)).signum();
             shape * sign
         };
@@ -268,18 +268,18 @@ fn responses_and_shapes_change_with_each_parameter_as_differences_say() {
 
 #[test]
 fn a_response_changes_with_one_damper_of_six_as_differences_say() {
-    let mut plant = plant();
-    plant.springs[0].damping = Damping::Dampers([900.0, 700.0, 800.0, 60.0, 90.0, 40.0]);
+    let mut nominal = nominal();
+    nominal.springs[0].damping = Damping::Dampers([900.0, 700.0, 800.0, 60.0, 90.0, 40.0]);
     let effect = Effect::Damper { spring: 0, coordinate: 4 };
     let parameter = Parameter { name: "about y".into(), unit: "N m s/rad".into(), initial: 90.0, prior: None, effect };
-    let probes = probes(&plant);
+    let probes = probes(&nominal);
     let omega = [3.0, 9.0, 25.0, 60.0];
-    let response = |plant: &Plant, parameters: &[Parameter]| {
-        structure_slopes(plant, parameters, &POSE, &probes).unwrap().response(0, 1, Answer::Mobility, &omega).unwrap()
+    let response = |nominal: &NominalArm, parameters: &[Parameter]| {
+        structure_slopes(nominal, parameters, &POSE, &probes).unwrap().response(0, 1, Answer::Mobility, &omega).unwrap()
     };
     let split = |H: &[nalgebra::Complex<f64>]| DVector::from_iterator(2 * H.len(), H.iter().flat_map(|h| [h.re, h.im]));
-    let own = response(&plant, std::slice::from_ref(&parameter)).slopes.column(0).into_owned();
-    let changed = |x: f64| split(&response(&plant.with(std::slice::from_ref(&parameter), &[x]), &[]).values);
+    let own = response(&nominal, std::slice::from_ref(&parameter)).slopes.column(0).into_owned();
+    let changed = |x: f64| split(&response(&nominal.with(std::slice::from_ref(&parameter), &[x]), &[]).values);
     let truth = richardson(0.02, changed);
     let error = (split(own.as_slice()) - &truth).amax() / truth.amax();
     eprintln!("{error:.1e} of {:.1e}", truth.amax());
@@ -288,19 +288,19 @@ fn a_response_changes_with_one_damper_of_six_as_differences_say() {
 
 #[test]
 fn the_compliance_changes_with_each_parameter_as_differences_say() {
-    let plant = plant();
-    let parameters = parameters(&plant);
+    let nominal = nominal();
+    let parameters = parameters(&nominal);
     for moment in [0.0, 60.0] {
         let load = Wrench::new(Vector3::new(90.0, 50.0, -200.0), Vector3::new(moment, -moment, 0.5 * moment));
-        let solved = |plant: &Plant| {
-            let mut at = OperatingPoint::new(plant.held(&POSE).unwrap(), plant.tool.clone());
+        let solved = |nominal: &NominalArm| {
+            let mut at = OperatingPoint::new(nominal.held(&POSE).unwrap(), nominal.tool.clone());
             at.solve(&POSE, &load).unwrap();
             at
         };
-        let slopes = compliance_slopes(&mut solved(&plant), &load, &parameters).unwrap();
+        let slopes = compliance_slopes(&mut solved(&nominal), &load, &parameters).unwrap();
         for (k, parameter) in parameters.iter().enumerate() {
             let C = |x: f64| {
-                let C = solved(&plant.with(std::slice::from_ref(parameter), &[x])).compliance();
+                let C = solved(&nominal.with(std::slice::from_ref(parameter), &[x])).compliance();
                 DVector::from_column_slice(C.as_slice())
             };
             let truth = richardson(step_of(parameter), C);
@@ -313,11 +313,11 @@ fn the_compliance_changes_with_each_parameter_as_differences_say() {
 
 #[test]
 fn rows_of_responses_and_shapes_have_the_derivatives_of_their_residuals() {
-    let mut plant = plant();
-    let parameters = with_damping(&mut plant);
+    let mut nominal = nominal();
+    let parameters = with_damping(&mut nominal);
     let carried = SpatialInertia::from_com(12.0, &Vector3::new(0.0, 0.1, 0.2), &(Matrix3::identity() * 0.1));
     let heavy = LoadCase { carried, ..LoadCase::none() };
-    let [watched, hit] = probes(&plant);
+    let [watched, hit] = probes(&nominal);
     let response = |form| {
         let value = |k: usize| nalgebra::Complex::from_polar(1e-3 * (k as f64 + 1.0), k as f64 - 1.0);
         ReadingKind::Response(MeasuredResponse {
@@ -338,7 +338,7 @@ fn rows_of_responses_and_shapes_have_the_derivatives_of_their_residuals() {
     let kinds = [response(Form::Logarithmic), response(Form::Complex), shape];
     let readings = kinds.map(|kind| Reading { name: "a".into(), q: POSE.to_vec(), kind }).to_vec();
     let measurements = Measurements { readings, ..Measurements::default() };
-    let arm = MeasuredArm { plant: &plant, parameters: &parameters, measurements: &measurements };
+    let arm = MeasuredArm { nominal: &nominal, parameters: &parameters, measurements: &measurements };
     let at = DVector::from_fn(parameters.len(), |k, _| 0.05 * (k as f64 + 1.0).sin());
     let mut J = DMatrix::zeros(0, 0);
     arm.evaluate(&at, Some(&mut J)).unwrap();

@@ -1,6 +1,6 @@
 //! Columns of a map: names, units, order, and the direction of improvement.
 
-use flexarm_stepping::FlexibleArm;
+use flexarm_stepping::Plant;
 
 use super::MapError;
 use flexarm_chatter::CuttingTool;
@@ -73,14 +73,14 @@ impl Layout {
     /// * `tool`: a cutting tool.
     /// * `matrix`: whether to include the full compliance matrix.
     pub(super) fn new(
-        arm: &FlexibleArm,
+        plant: &Plant,
         joints: &[(String, bool)],
         loaded: bool,
         frequencies: usize,
         tool: Option<&CuttingTool>,
         matrix: bool,
     ) -> Self {
-        let elastic = arm.n_elastic_coordinates();
+        let elastic = plant.n_elastic_coordinates();
         let frequencies = frequencies.min(elastic).min(MAX_FREQUENCIES);
         let mut columns: Vec<MapColumn> = HEAD.iter().map(|(name, meaning)| place(name, meaning)).collect();
         columns.extend(

@@ -262,7 +262,7 @@ pub fn map(
     let joints: Vec<(String, bool)> = actuated.iter().map(|c| (c.joint.clone(), c.slides())).collect();
     let loaded = request.wrench != [0.0; 6];
     let (frequencies, listed) = (request.frequencies.unwrap_or(3), matches!(request.region, MapRegion::Poses(_)));
-    let layout = Layout::new(at.arm(), &joints, loaded, frequencies, request.tool.as_ref(), listed);
+    let layout = Layout::new(at.plant(), &joints, loaded, frequencies, request.tool.as_ref(), listed);
     let by = layout.compared_by(request.by.as_deref())?;
     let near = home(model, request.at.as_deref())?;
     if let Some(tool) = &request.tool

@@ -37,7 +37,7 @@ pub(super) fn write(
     let options = CreateOptions::default().with_overwrite(request.overwrite);
     let Some(mut recorder) = RecordingFormat::Rrd.recorder(path, options) else { return Ok(()) };
     let posed = arm.operating_point()?;
-    let mut header = robot_header(robot, posed.arm());
+    let mut header = robot_header(robot, posed.plant());
     header.trajectory = "map".into();
     header.elements = Vec::new();
     header.log_rate_hz = 1.0 / SHOWN_S;
@@ -52,7 +52,7 @@ pub(super) fn write(
             Caption { from_s: k as f64 * SHOWN_S, text }
         })
         .collect();
-    let model = &posed.arm().model;
+    let model = &posed.plant().model;
     let frames = link_frames(robot, model);
     let (mut data, mut q) = (Data::new(model), DVector::zeros(model.nv()));
     let mut twin = |pose: &MapPose| {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use flexarm_stepping::{FlexibleArm, ServoAxis, TorqueLimited};
+use flexarm_stepping::{Plant, ServoAxis, TorqueLimited};
 
 use super::slopes::{OfAxis, OfFriction};
 use super::{NamedParameter, RunParameter, RunSlopes};
@@ -10,11 +10,10 @@ use flexarm_run::{Arm, Caveat, Error, Scenario};
 
 /// Adds friction and gains of servo-controlled joints.
 pub(super) fn add_controllers(arm: &Arc<Arm>, scenario: &Scenario, all: &mut Vec<NamedParameter>) -> Result<(), Error> {
-    let flexible = arm;
-    if !flexible.has_servo() {
+    if !arm.has_servo() {
         return Ok(());
     }
-    let unloaded = flexible.arm(scenario.motion.prescribed()).map_err(|error| flexible.explained(error))?;
+    let unloaded = arm.plant(scenario.motion.prescribed()).map_err(|error| arm.explained(error))?;
     let Some(servo) = &unloaded.servo else { return Ok(()) };
     for (number, axis) in servo.axes.iter().enumerate() {
         let joint = &unloaded.model.coordinates()[axis.coordinate];
@@ -47,8 +46,8 @@ pub(super) fn limited(arm: &Arc<Arm>, found: &RunSlopes) -> Vec<Caveat> {
 }
 
 /// Returns the nonzero friction parameters of a joint, each per 1 % of its value.
-fn friction_of(arm: &FlexibleArm, coordinate: usize, joint: &str, slides: bool) -> Vec<NamedParameter> {
-    let Some(law) = arm.friction.get(coordinate) else { return Vec::new() };
+fn friction_of(plant: &Plant, coordinate: usize, joint: &str, slides: bool) -> Vec<NamedParameter> {
+    let Some(law) = plant.friction.get(coordinate) else { return Vec::new() };
     let [torque, damping, speed] = if slides { ["N", "N s/m", "m/s"] } else { ["N m", "N m s/rad", "rad/s"] };
     let dry = law.coulomb != 0.0 || law.stribeck != 0.0;
     let all: [(&str, &str, f64, OfFriction, bool); 5] = [

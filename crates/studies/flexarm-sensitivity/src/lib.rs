@@ -14,7 +14,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use flexarm_files::{check_apart, check_free, write_all};
-use flexarm_identify::{Effect, Parameter, link_directions, link_entries, parameters, plant};
+use flexarm_identify::{Effect, Parameter, link_directions, link_entries, nominal, parameters};
 use flexarm_stepping::{ExactRun, StepError, StepperKind};
 use nalgebra::Vector3;
 use serde::Serialize;
@@ -146,21 +146,20 @@ fn slopes_and_caveats(
         return Err(Error::Step { source: StepError::Setup(text), partial: false });
     };
     runnable(&scenario.motion, options)?;
-    let flexible = arm;
-    if flexible.springs.is_empty() && !flexible.has_servo() {
+    if arm.springs.is_empty() && !arm.has_servo() {
         return Err(ValueError::NothingYields.into());
     }
-    flexarm_run::loops::along_motion(&flexible.rigid, &scenario.motion.trajectory)?;
-    let unloaded = flexible.arm(scenario.motion.prescribed()).map_err(|error| flexible.explained(error))?;
+    flexarm_run::loops::along_motion(&arm.rigid, &scenario.motion.trajectory)?;
+    let unloaded = arm.plant(scenario.motion.prescribed()).map_err(|error| arm.explained(error))?;
     let (_, mut caveats) = loaded(arm.robot(), scenario, options, unloaded)?;
     let run = ExactRun {
         settings,
         step_s: options.step_s,
         duration_s: scenario.duration_s(),
         start: scenario.start,
-        tool: flexible.tcp.clone(),
+        tool: arm.tcp.clone(),
     };
-    let found = Repeated { arm, scenario, options, run, plant: plant(arm) }.slopes(parameters, keep_samples)?;
+    let found = Repeated { arm, scenario, options, run, nominal: nominal(arm) }.slopes(parameters, keep_samples)?;
     caveats.extend(limited(arm, &found));
     Ok((found, caveats))
 }

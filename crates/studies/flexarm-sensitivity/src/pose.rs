@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use flexarm_identify::{Effect, compliance_slopes, frequency_slopes, plant, tool_slopes};
+use flexarm_identify::{Effect, compliance_slopes, frequency_slopes, nominal, tool_slopes};
 use flexarm_kinematics::{Pose, Wrench};
 use nalgebra::{Matrix3, Matrix6, Vector3};
 use serde::Serialize;
@@ -148,7 +148,7 @@ fn slopes(
     let all: Vec<Parameter> = asked.iter().filter_map(of_arm).collect();
     let tool = tool_slopes(&mut point, &all);
     let compliance = compliance_slopes(&mut point, &none, &all).map_err(explained)?;
-    let frequencies = frequency_slopes(&plant(arm), &all, &at).map_err(explained)?;
+    let frequencies = frequency_slopes(&nominal(arm), &all, &at).map_err(explained)?;
     let of = |(k, parameter): (usize, Parameter)| {
         let (per, scale) = change_of(&parameter);
         let moved = |first: usize| std::array::from_fn(|i| scale * tool[(first + i, k)]);

@@ -13,7 +13,7 @@
 
 use std::sync::Arc;
 
-use flexarm_identify::{Effect, Parameter, Plant};
+use flexarm_identify::{Effect, NominalArm, Parameter};
 use flexarm_kinematics::{Pose, SpatialInertia};
 use flexarm_run::prepare::loaded;
 use flexarm_run::robot::PAYLOAD_LINK;
@@ -136,7 +136,7 @@ pub(super) struct Repeated<'a> {
     pub(super) scenario: &'a Scenario,
     pub(super) options: &'a RunOptions,
     pub(super) run: ExactRun,
-    pub(super) plant: Plant,
+    pub(super) nominal: NominalArm,
 }
 
 impl Repeated<'_> {
@@ -173,7 +173,7 @@ impl Repeated<'_> {
             RunParameter::Arm(own) => match &own.effect {
                 Effect::Damping(_) | Effect::Damper { .. } => OF_AMPLITUDE,
                 Effect::Mass { body, .. } => {
-                    let bodies = self.plant.model.bodies();
+                    let bodies = self.nominal.model.bodies();
                     let all: f64 = bodies.iter().skip(1).map(|body| body.inertia.mass).sum();
                     OF_FREQUENCY * bodies[*body].inertia.mass.max(1e-3 * all)
                 }
@@ -188,17 +188,17 @@ impl Repeated<'_> {
 
     /// Runs the arm with one parameter changed; its controllers know the change.
     fn errors(&self, change: Option<(&RunParameter, f64)>) -> Result<ToolErrors, Error> {
-        let mut flexible = self.arm.clone();
-        let (mut robot, mut springs) = (self.arm.robot().clone(), flexible.springs.clone());
+        let mut arm = self.arm.clone();
+        let (mut robot, mut springs) = (self.arm.robot().clone(), arm.springs.clone());
         let (mut motion, mut run) = (self.scenario.motion.prescribed(), self.run.clone());
         match change {
             Some((RunParameter::Arm(own), x)) => {
-                let plant = self.plant.with(std::slice::from_ref(own), &[x]);
-                (flexible.model, springs, run.tool) = (plant.model, plant.springs, plant.tool);
-                if let (Effect::Mass { .. }, Some(frame)) = (&own.effect, flexible.rigid.frame(PAYLOAD_LINK)) {
-                    let mut inertia = flexible.rigid.bodies()[frame.body].inertia;
+                let changed = self.nominal.with(std::slice::from_ref(own), &[x]);
+                (arm.model, springs, run.tool) = (changed.model, changed.springs, changed.tool);
+                if let (Effect::Mass { .. }, Some(frame)) = (&own.effect, arm.rigid.frame(PAYLOAD_LINK)) {
+                    let mut inertia = arm.rigid.bodies()[frame.body].inertia;
                     inertia += SpatialInertia { mass: x, ..SpatialInertia::zeros() }.at_parent(&frame.X_BF);
-                    flexible.rigid = Arc::new(flexible.rigid.with_inertia(frame.body, inertia));
+                    arm.rigid = Arc::new(arm.rigid.with_inertia(frame.body, inertia));
                     // Another payload takes the place of all of it.
                     let links = robot.rigid.links.iter_mut().filter(|link| link.name == PAYLOAD_LINK);
                     links.filter_map(|link| link.inertia.as_mut()).for_each(|inertia| inertia.mass += x);
@@ -209,17 +209,17 @@ impl Repeated<'_> {
             _ => {}
         }
         let explained = |error| self.arm.explained(error);
-        let mut arm = flexible.arm_with(springs, motion).map_err(explained)?;
+        let mut plant = arm.plant_with(springs, motion).map_err(explained)?;
         match change {
-            Some((RunParameter::Friction(coordinate, of), x)) => *of(&mut arm.friction[*coordinate]) *= 1.0 + x,
+            Some((RunParameter::Friction(coordinate, of), x)) => *of(&mut plant.friction[*coordinate]) *= 1.0 + x,
             Some((RunParameter::Servo(number, of), x)) => {
-                if let Some(servo) = &mut arm.servo {
+                if let Some(servo) = &mut plant.servo {
                     *of(&mut Arc::make_mut(servo).axes[*number]) *= 1.0 + x;
                 }
             }
             _ => {}
         }
-        let (arm, _) = loaded(&robot, self.scenario, self.options, arm)?;
-        run.errors(&arm).map_err(explained)
+        let (plant, _) = loaded(&robot, self.scenario, self.options, plant)?;
+        run.errors(&plant).map_err(explained)
     }
 }

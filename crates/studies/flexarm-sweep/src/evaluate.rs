@@ -127,15 +127,15 @@ impl Sweep {
     fn quickly(&self, values: &[ParameterValue], caveats: &mut Vec<Caveat>) -> Result<QuickFacts, Error> {
         let PreparedRun { built, scenario, options } = self.workshop.ready(values)?;
         caveats.extend_from_slice(built.arm.robot_caveats());
-        let flexible = &*built.arm;
-        let (arm, of_loads) = built.arm.at_start(&scenario, &options)?;
+        let arm = &*built.arm;
+        let (plant, of_loads) = arm.at_start(&scenario, &options)?;
         let facts = QuickFacts {
-            sag_m: static_sag(&arm, &flexible.tcp),
-            hz: arm.modes.frequencies_hz(),
+            sag_m: static_sag(&plant, &arm.tcp),
+            hz: plant.modes.frequencies_hz(),
             mass_kg: built.mass_kg,
             ..QuickFacts::default()
         };
-        let before = BeforeRun { flexible, arm: &arm, motion: &scenario.motion, options: &options };
+        let before = BeforeRun { arm, plant: &plant, motion: &scenario.motion, options: &options };
         caveats.extend(before.caveats_of_study(facts.sag_m));
         caveats.extend(of_loads);
         let run = ToolRun {
@@ -143,10 +143,10 @@ impl Sweep {
             duration_s: scenario.duration_s(),
             stepper: options.stepper,
             start: scenario.start,
-            tool: flexible.tcp.clone(),
+            tool: arm.tcp.clone(),
             keep_samples: true,
         };
-        let deflection = run.deflection(&Arc::new(arm)).map_err(|error| flexible.explained(error))?;
+        let deflection = run.deflection(&Arc::new(plant)).map_err(|error| arm.explained(error))?;
         Ok(facts.of(&deflection, &options))
     }
 }

@@ -134,12 +134,12 @@ impl Sweep {
         workshop.vary(&columns, &file, finders)?;
         let design = Design::new(columns, &file)?;
         let robot = workshop.base_robot()?;
-        let flexible = robot.model(&workshop.base_modelling())?;
-        let summary = serde_json::to_value(skeleton(&robot, &flexible)).unwrap_or_default();
+        let arm = robot.model(&workshop.base_modelling())?;
+        let summary = serde_json::to_value(skeleton(&robot, &arm)).unwrap_or_default();
         let parameters = parameter_names(&design);
         let mut metrics: Vec<Metric> = Vec::new();
         let usual = file.metrics.is_empty().then(|| {
-            let frequency = (!flexible.springs.is_empty()).then_some("f1_hz = frequencies_hz.0");
+            let frequency = (!arm.springs.is_empty()).then_some("f1_hz = frequencies_hz.0");
             let place = file.robot.place.clone();
             USUAL_METRICS
                 .into_iter()
@@ -447,8 +447,8 @@ fn parameter_names(design: &Design) -> Vec<Option<String>> {
 }
 
 /// Returns an example of a summary with all names that a run of the robot can have.
-fn skeleton(robot: &Robot, flexible: &Arm) -> Summary {
-    let links = flexible.spans.iter().map(|span| LinkFigures { name: span.link.clone(), ..LinkFigures::default() });
+fn skeleton(robot: &Robot, arm: &Arm) -> Summary {
+    let links = arm.spans.iter().map(|span| LinkFigures { name: span.link.clone(), ..LinkFigures::default() });
     let stressed = robot.flexible_links.iter().filter(|link| link.stress.is_some());
     let place = StressPlaceFigures { of_yield: Some(0.0), damage: Some(0.0), ..StressPlaceFigures::default() };
     let stress = stressed.map(|link| {
@@ -470,14 +470,14 @@ fn skeleton(robot: &Robot, flexible: &Arm) -> Summary {
     let elastic = robot.drives.iter().filter(|drive| drive.gearbox.is_some());
     let elastic = elastic.map(|drive| DriveFigures { joint: drive.joint.clone(), ..DriveFigures::default() });
     let drives: BTreeMap<String, f64> =
-        flexible.model.coordinates().iter().map(|coordinate| (coordinate.joint.clone(), 0.0)).collect();
+        arm.model.coordinates().iter().map(|coordinate| (coordinate.joint.clone(), 0.0)).collect();
     Summary {
         tcp: Some(TcpFigures::default()),
         path: Some(PathFigures::default()),
         links: links.collect(),
         stress: stress.collect(),
         elastic_drives: elastic.collect(),
-        frequencies_hz: vec![0.0; flexible.model.nv() - flexible.model.n_actuated()],
+        frequencies_hz: vec![0.0; arm.model.nv() - arm.model.n_actuated()],
         drives,
         ..Summary::default()
     }

@@ -1,10 +1,10 @@
 //! Friction of the joints of an arm with load-dependent friction and coupled gears.
 
-use crate::arm::FlexibleArm;
 use crate::gear::load_friction::LoadFriction;
 use crate::gear::state::GearState;
+use crate::plant::Plant;
 
-impl FlexibleArm {
+impl Plant {
     /// Writes the friction of all actuated coordinates, at the given rates and transmitted torques,
     /// into `friction`.
     pub(crate) fn friction_torques(

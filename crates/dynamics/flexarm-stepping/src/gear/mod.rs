@@ -12,7 +12,7 @@
 //! scaled by two, and the loss of a closed cycle does not depend on the rate. Start at
 //! [`TransmissionError`], [`Hysteresis`], [`GearCoupling`] and [`LoadFriction`]; [`GearState`] is
 //! the state of a run. `setup` adds the laws to an arm; `springs` and `friction` are its forces.
-//! Not here: linear springs (`arm`), rotors (in the tree).
+//! Not here: linear springs (`plant`), rotors (in the tree).
 //!
 //! Sources: [Iwan 1966] for sliders in parallel; [Tuttle & Seering 1996] for (1) with harmonics of
 //! the motor.

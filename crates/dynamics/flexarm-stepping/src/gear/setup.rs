@@ -2,19 +2,19 @@
 
 use nalgebra::DMatrix;
 
-use crate::arm::{Damping, FlexibleArm};
 use crate::error::StepError;
 use crate::gear::coupling::GearCoupling;
 use crate::gear::hysteresis::Hysteresis;
 use crate::gear::transmission::TransmissionError;
+use crate::plant::{Damping, Plant};
 
-impl FlexibleArm {
+impl Plant {
     /// Returns the arm with gears that couple several joints. Springs, dampers and friction given
     /// so far are those of the motors after their gears; they are transformed to the joints.
     ///
     /// # Errors
     /// [`StepError::Setup`] if sizes differ, or if springs have more than one coordinate, are
-    /// nonlinear or are missing for some motors; errors of [`FlexibleArm::new`].
+    /// nonlinear or are missing for some motors; errors of [`Plant::new`].
     pub fn with_coupling(mut self, coupling: GearCoupling) -> Result<Self, StepError> {
         let n = coupling.coordinates.len();
         let single = |k: &usize| self.elements.get(*k).is_some_and(|e| e.size == 1 && e.curve.is_none());
@@ -61,7 +61,7 @@ impl FlexibleArm {
     ///
     /// # Errors
     /// [`StepError::Setup`] if an element does not exist or has more than one coordinate; errors of
-    /// [`FlexibleArm::new`].
+    /// [`Plant::new`].
     pub fn with_hysteresis(mut self, laws: Vec<Hysteresis>) -> Result<Self, StepError> {
         for law in &laws {
             let Some(element) = self.elements.get_mut(law.element).filter(|e| e.size == 1) else {
@@ -83,7 +83,7 @@ impl FlexibleArm {
     /// Returns the arm with transmission errors.
     ///
     /// # Errors
-    /// As [`FlexibleArm::with_hysteresis`].
+    /// As [`Plant::with_hysteresis`].
     pub fn with_transmission_errors(mut self, errors: Vec<TransmissionError>) -> Result<Self, StepError> {
         for error in &errors {
             let single = self.elements.get(error.element).is_some_and(|e| e.size == 1);
@@ -112,7 +112,7 @@ impl FlexibleArm {
     }
 
     /// Returns `dD/d(ln d)` for the damper d of one motor in coupled gears, in the form of
-    /// [`FlexibleArm::coupled_stiffness_slope`].
+    /// [`Plant::coupled_stiffness_slope`].
     pub fn coupled_damping_slope(&self, element: usize) -> Option<(Vec<usize>, DMatrix<f64>)> {
         let coupling = self.coupling.as_ref()?;
         let motor = coupling.elements.iter().position(|k| *k == element)?;

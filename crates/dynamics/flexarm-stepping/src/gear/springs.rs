@@ -2,13 +2,13 @@
 
 use nalgebra::DVector;
 
-use crate::arm::{ElasticElement, FlexibleArm};
 use crate::error::StepError;
 use crate::gear::hysteresis::Hysteresis;
 use crate::guide::Guide;
+use crate::plant::{ElasticElement, Plant};
 use crate::statics::spring_forces;
 
-impl FlexibleArm {
+impl Plant {
     /// Returns the deflection δ (rad, m) of a spring with one coordinate e, with the joints at `q`:
     /// e minus the transmission error, if any.
     pub fn deflection(&self, element: usize, e: f64, q: &[f64]) -> f64 {

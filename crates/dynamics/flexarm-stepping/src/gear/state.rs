@@ -2,10 +2,10 @@
 
 use nalgebra::{DVector, Vector6};
 
-use crate::arm::{ElasticElement, FlexibleArm};
 use crate::dense::add_product;
 use crate::drive::SpringCurve;
 use crate::gear::hysteresis::SliderState;
+use crate::plant::{ElasticElement, Plant};
 
 /// Gear state of a run: slider positions, and the forces of the last evaluation.
 #[derive(Clone, Debug)]
@@ -28,17 +28,17 @@ pub(crate) struct GearState {
 
 impl GearState {
     /// Creates the state if the arm has gear laws.
-    pub(crate) fn of(arm: &FlexibleArm) -> Option<Box<Self>> {
-        let zeros = DVector::zeros(arm.n_elastic_coordinates());
-        arm.has_gear_laws().then(|| {
+    pub(crate) fn of(plant: &Plant) -> Option<Box<Self>> {
+        let zeros = DVector::zeros(plant.n_elastic_coordinates());
+        plant.has_gear_laws().then(|| {
             Box::new(Self {
-                q: vec![0.0; arm.model.n_actuated()],
+                q: vec![0.0; plant.model.n_actuated()],
                 delta: zeros.clone(),
                 rate: zeros.clone(),
                 F: zeros.clone(),
                 damper: zeros,
-                friction: vec![0.0; arm.model.n_actuated()],
-                slipped: arm.hysteresis.iter().map(SliderState::at_rest).collect(),
+                friction: vec![0.0; plant.model.n_actuated()],
+                slipped: plant.hysteresis.iter().map(SliderState::at_rest).collect(),
                 lost: 0.0,
             })
         })
@@ -46,23 +46,23 @@ impl GearState {
 
     /// Computes springs and dampers at elastic coordinates `e` and rates `v`, with the joints at
     /// `q` and `qdot`.
-    pub(crate) fn update(&mut self, arm: &FlexibleArm, q: &[f64], qdot: &[f64], e: &[f64], v: &[f64]) {
+    pub(crate) fn update(&mut self, plant: &Plant, q: &[f64], qdot: &[f64], e: &[f64], v: &[f64]) {
         let Self { q: joints, delta, rate, F, damper, slipped, .. } = self;
         let actuated = joints.len();
         joints.copy_from_slice(&q[..actuated]);
         // Deflections (1) and their rates.
         delta.as_mut_slice().copy_from_slice(e);
         rate.as_mut_slice().copy_from_slice(v);
-        for error in &arm.transmission {
-            let k = arm.offset(&arm.elements[error.element]);
+        for error in &plant.transmission {
+            let k = plant.offset(&plant.elements[error.element]);
             delta[k] -= error.at(q[error.motor]);
             rate[k] -= error.slope(q[error.motor]) * qdot[error.motor];
         }
         // Dampers: D δ̇.
         damper.fill(0.0);
-        if arm.proportional {
-            for (element, tau) in arm.elements.iter().zip(&arm.tau) {
-                let range = arm.offset(element)..arm.offset(element) + element.size;
+        if plant.proportional {
+            for (element, tau) in plant.elements.iter().zip(&plant.tau) {
+                let range = plant.offset(element)..plant.offset(element) + element.size;
                 add_product(
                     element.K.as_slice(),
                     &rate.as_slice()[range.clone()],
@@ -71,13 +71,13 @@ impl GearState {
                 damper.as_mut_slice()[range].iter_mut().for_each(|d| *d *= tau);
             }
         } else {
-            arm.add_damping(rate.as_slice(), damper.as_mut_slice());
+            plant.add_damping(rate.as_slice(), damper.as_mut_slice());
         }
         // Springs: equation (2).
         F.copy_from(damper);
-        for (k, element) in arm.elements.iter().enumerate() {
-            let range = arm.offset(element)..arm.offset(element) + element.size;
-            match arm.hysteresis.iter().zip(&*slipped).find(|(law, _)| law.element == k) {
+        for (k, element) in plant.elements.iter().enumerate() {
+            let range = plant.offset(element)..plant.offset(element) + element.size;
+            match plant.hysteresis.iter().zip(&*slipped).find(|(law, _)| law.element == k) {
                 Some((law, slipped)) => {
                     let delta = delta[range.start];
                     F[range.start] += law.elastic.torque(delta) + slipped.torque(law, delta);
@@ -87,54 +87,54 @@ impl GearState {
                 }
             }
         }
-        arm.add_cross_forces(delta.as_slice(), F.as_mut_slice());
+        plant.add_cross_forces(delta.as_slice(), F.as_mut_slice());
     }
 
     /// Returns the slope of a nonlinear spring with one coordinate at its last deflection.
-    pub(crate) fn slope(&self, arm: &FlexibleArm, k: usize, element: &ElasticElement, curve: &SpringCurve) -> f64 {
-        let delta = self.delta[arm.offset(element)];
-        match arm.hysteresis.iter().zip(&self.slipped).find(|(law, _)| law.element == k) {
+    pub(crate) fn slope(&self, plant: &Plant, k: usize, element: &ElasticElement, curve: &SpringCurve) -> f64 {
+        let delta = self.delta[plant.offset(element)];
+        match plant.hysteresis.iter().zip(&self.slipped).find(|(law, _)| law.element == k) {
             Some((law, slipped)) => law.elastic.slope(delta) + slipped.slope(law, delta),
             None => curve.slope(delta, &self.q),
         }
     }
 
     /// Writes the loads `-F` of the elements; returns the power dissipated by the dampers (W).
-    pub(crate) fn loads(&self, arm: &FlexibleArm, loads: &mut [Vector6<f64>]) -> f64 {
-        for (load, element) in loads.iter_mut().zip(&arm.elements) {
-            let first = arm.offset(element);
+    pub(crate) fn loads(&self, plant: &Plant, loads: &mut [Vector6<f64>]) -> f64 {
+        for (load, element) in loads.iter_mut().zip(&plant.elements) {
+            let first = plant.offset(element);
             *load = Vector6::from_fn(|c, _| if c < element.size { -self.F[first + c] } else { 0.0 });
         }
         self.damper.dot(&self.rate)
     }
 
     /// Returns the energy in the springs at the last deflections (J).
-    pub(crate) fn energy(&self, arm: &FlexibleArm) -> f64 {
+    pub(crate) fn energy(&self, plant: &Plant) -> f64 {
         let mut energy = 0.0;
-        for (k, element) in arm.elements.iter().enumerate() {
-            let delta = &self.delta.as_slice()[arm.offset(element)..][..element.size];
-            energy += match arm.hysteresis.iter().zip(&self.slipped).find(|(law, _)| law.element == k) {
+        for (k, element) in plant.elements.iter().enumerate() {
+            let delta = &self.delta.as_slice()[plant.offset(element)..][..element.size];
+            energy += match plant.hysteresis.iter().zip(&self.slipped).find(|(law, _)| law.element == k) {
                 Some((law, slipped)) => law.elastic.energy(delta[0]) + slipped.energy(law, delta[0]),
                 None => element.energy(delta, &self.q),
             };
         }
-        energy + arm.cross_stiffness.iter().map(|&(i, j, k)| k * self.delta[i] * self.delta[j]).sum::<f64>()
+        energy + plant.cross_stiffness.iter().map(|&(i, j, k)| k * self.delta[i] * self.delta[j]).sum::<f64>()
     }
 
     /// Accepts the end of a step with the joints at `q` and the elastic coordinates at `e`: moves
     /// the sliders by (3) and adds their losses. The first call of a run moves them along the first
     /// loading curve.
-    pub(crate) fn settle(&mut self, arm: &FlexibleArm, q: &[f64], e: &[f64]) {
-        for (law, slipped) in arm.hysteresis.iter().zip(&mut self.slipped) {
-            let delta = arm.deflection(law.element, e[arm.offset(&arm.elements[law.element])], q);
+    pub(crate) fn settle(&mut self, plant: &Plant, q: &[f64], e: &[f64]) {
+        for (law, slipped) in plant.hysteresis.iter().zip(&mut self.slipped) {
+            let delta = plant.deflection(law.element, e[plant.offset(&plant.elements[law.element])], q);
             self.lost += slipped.advance(law, delta);
         }
     }
 
     /// Moves the sliders as [`GearState::settle`] does, for the time before the run: without
     /// losses.
-    pub(crate) fn begin(&mut self, arm: &FlexibleArm, q: &[f64], e: &[f64]) {
-        self.settle(arm, q, e);
+    pub(crate) fn begin(&mut self, plant: &Plant, q: &[f64], e: &[f64]) {
+        self.settle(plant, q, e);
         self.lost = 0.0;
     }
 }

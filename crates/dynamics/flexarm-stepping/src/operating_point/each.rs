@@ -75,7 +75,7 @@ impl OperatingPoint {
         asked: PoseOutputs,
         mut seen: impl FnMut(usize, Result<&PoseAnswer, StepError>),
     ) {
-        let joints = self.arm.model.n_actuated().max(1);
+        let joints = self.plant.model.n_actuated().max(1);
         let mut answers = vec![PoseAnswer::new(self.r.len()); LANES];
         let done = self.in_lanes(poses, F_T_W, asked, &mut answers, &mut seen);
         for (k, pose) in poses.chunks(joints).enumerate().skip(done) {
@@ -120,10 +120,10 @@ impl OperatingPoint {
         answers: &mut [PoseAnswer],
         seen: &mut dyn FnMut(usize, Result<&PoseAnswer, StepError>),
     ) -> usize {
-        let joints = self.arm.model.n_actuated();
+        let joints = self.plant.model.n_actuated();
         let finite = F_T_W.force.iter().chain(&F_T_W.torque).all(|x| x.is_finite());
         // A single pose is cheaper without lanes.
-        if joints == 0 || poses.len() < 2 * joints || !finite || !plain(&self.arm) {
+        if joints == 0 || poses.len() < 2 * joints || !finite || !plain(&self.plant) {
             return 0;
         }
         with_lanes(poses.len() / joints, InLanes { point: self, poses, F_T_W, asked, answers, seen }).unwrap_or(0)
@@ -162,7 +162,7 @@ impl OverLanes for InLanes<'_> {
     fn run<T: Real>(self) -> usize {
         let Self { point, poses, F_T_W, asked, answers, seen } = self;
         let Some(mut points) = LanePoints::<T>::new(point) else { return 0 };
-        let (joints, mut done) = (point.arm.model.n_actuated(), 0);
+        let (joints, mut done) = (point.plant.model.n_actuated(), 0);
         for group in poses.chunks(T::LANES * joints) {
             let usable = |pose: &[f64]| pose.len() == joints && pose.iter().all(|q| q.is_finite());
             let Some(first) = group.chunks(joints).find(|pose| usable(pose)) else { break };

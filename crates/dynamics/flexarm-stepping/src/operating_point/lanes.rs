@@ -16,17 +16,17 @@ use nalgebra::DMatrix;
 use super::each::{PoseAnswer, PoseOutputs};
 use super::tangent::{Tangent, to_hertz};
 use super::{MAX_ITERATIONS, OperatingPoint, SLOW, settled};
-use crate::arm::FlexibleArm;
 use crate::dense::{Factor, larger, largest};
+use crate::plant::Plant;
 use crate::statics::{add_wrench, load_at};
 
 /// Returns whether poses of an arm can be computed in lanes.
-pub(super) fn plain(arm: &FlexibleArm) -> bool {
-    arm.n_elastic_coordinates() > 0
-        && !arm.has_gear_laws()
-        && arm.loads.is_empty()
-        && arm.model.balancers().is_empty()
-        && arm.elements.iter().all(|element| element.curve.is_none() && element.geometric.is_none())
+pub(super) fn plain(plant: &Plant) -> bool {
+    plant.n_elastic_coordinates() > 0
+        && !plant.has_gear_laws()
+        && plant.loads.is_empty()
+        && plant.model.balancers().is_empty()
+        && plant.elements.iter().all(|element| element.curve.is_none() && element.geometric.is_none())
 }
 
 /// Stiffness of an element, assigned to its coordinates.
@@ -59,8 +59,8 @@ impl<T: Real> LanePoints<T> {
     /// Creates the workspaces for a supported arm; `None` if its tree has closed loops or the
     /// stiffness is not positive definite.
     pub(super) fn new(point: &OperatingPoint) -> Option<Self> {
-        let OperatingPoint { arm, tool, K, .. } = point;
-        let (model, n) = (&arm.model, arm.n_elastic_coordinates());
+        let OperatingPoint { plant, tool, K, .. } = point;
+        let (model, n) = (&plant.model, plant.n_elastic_coordinates());
         // Loops are closed by an iteration whose length depends on the pose.
         if !model.loops().is_empty() {
             return None;
@@ -71,7 +71,7 @@ impl<T: Real> LanePoints<T> {
             return None;
         }
         let element = |own: &crate::ElasticElement| Element {
-            first: arm.offset(own),
+            first: plant.offset(own),
             K: own.K.as_slice().to_vec(),
             size: own.size,
         };
@@ -81,7 +81,7 @@ impl<T: Real> LanePoints<T> {
             tool: tool.clone(),
             data,
             slopes: StaticTangent::new(model, model.n_actuated()),
-            elements: arm.elements.iter().map(element).collect(),
+            elements: plant.elements.iter().map(element).collect(),
             K: K.clone(),
             rest,
             q: vec![T::zero(); model.nv()],

@@ -19,12 +19,12 @@ mod tangent;
 use flexarm_kinematics::{Data, Frame, Pose, Twist, Wrench, forward_kinematics, frame_jacobian, mass_matrix_at_poses};
 use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX};
 
-use crate::arm::FlexibleArm;
 use crate::dense::Factor;
 use crate::equilibrium::MAX_HALVINGS;
 use crate::error::StepError;
 use crate::linear::loaded_equilibrium;
 use crate::motion::Held;
+use crate::plant::Plant;
 use crate::statics::{StaticSlopes, add_spring_forces, static_forces};
 pub use each::{PoseAnswer, PoseOutputs};
 use tangent::{Tangent, to_hertz};
@@ -42,7 +42,7 @@ const SLOW: f64 = 0.1;
 /// 0 are included.
 #[derive(Clone)]
 pub struct OperatingPoint {
-    arm: FlexibleArm,
+    plant: Plant,
     tool: Frame,
     data: Data,
     /// Whether any spring is nonlinear (backlash or curve).
@@ -85,21 +85,21 @@ impl OperatingPoint {
     /// Creates the workspace for an arm and a frame on it; nothing is solved yet.
     ///
     /// * `tool`: a frame of the arm's model.
-    pub fn new(arm: FlexibleArm, tool: Frame) -> Self {
-        let (n, nv) = (arm.n_elastic_coordinates(), arm.model.nv());
-        let K = arm.stiffness();
+    pub fn new(plant: Plant, tool: Frame) -> Self {
+        let (n, nv) = (plant.n_elastic_coordinates(), plant.model.nv());
+        let K = plant.stiffness();
         let mut rest = Factor::new(n);
         let stiff = n > 0 && rest.compute(K.as_slice()) == 1.0;
         Self {
             rest: stiff.then_some(rest),
-            data: Data::new(&arm.model),
-            curved: arm.elements.iter().any(|element| element.curve.is_some()),
+            data: Data::new(&plant.model),
+            curved: plant.elements.iter().any(|element| element.curve.is_some()),
             K,
             q: DVector::zeros(nv),
             F_T_W: Wrench::zeros(),
             p: DVector::zeros(nv),
-            holding: DVector::zeros(arm.model.n_actuated()),
-            slopes: StaticSlopes::new(&arm, arm.model.n_actuated()),
+            holding: DVector::zeros(plant.model.n_actuated()),
+            slopes: StaticSlopes::new(&plant, plant.model.n_actuated()),
             r: DVector::zeros(n),
             dp_de: DMatrix::zeros(n, n),
             tangent: Tangent::new(n),
@@ -109,7 +109,7 @@ impl OperatingPoint {
             J: Matrix6xX::zeros(nv),
             residual: f64::NAN,
             iterations: 0,
-            arm,
+            plant,
             tool,
         }
     }
@@ -129,7 +129,7 @@ impl OperatingPoint {
     /// [`StepError::NoEquilibrium`], [`StepError::OpenLoop`], and [`StepError::Singular`] beyond a
     /// buckling load.
     pub fn solve(&mut self, q: &[f64], F_T_W: &Wrench) -> Result<(), StepError> {
-        let m = self.arm.model.n_actuated();
+        let m = self.plant.model.n_actuated();
         self.residual = f64::NAN;
         if q.len() != m {
             return Err(StepError::Setup(format!("{} joint values are given, the arm has {m} joints", q.len())));
@@ -145,14 +145,14 @@ impl OperatingPoint {
         self.start_from_springs();
         self.q.fill(0.0);
         self.q.rows_mut(0, m).copy_from_slice(q);
-        forward_kinematics(&self.arm.model, &mut self.data, &self.q);
-        if let Some(open) = StepError::open_loop(&self.arm.model, &self.data, 0.0) {
+        forward_kinematics(&self.plant.model, &mut self.data, &self.q);
+        if let Some(open) = StepError::open_loop(&self.plant.model, &self.data, 0.0) {
             return Err(open);
         }
         self.X_WT_rigid = self.data.X_WF(&self.tool);
         if self.curved {
             // Leave backlash with the dedicated solver.
-            let held = FlexibleArm { motion: std::sync::Arc::new(Held(q.to_vec())), ..self.arm.clone() };
+            let held = Plant { motion: std::sync::Arc::new(Held(q.to_vec())), ..self.plant.clone() };
             let e = loaded_equilibrium(&held, &self.tool, F_T_W, 0.0)?;
             self.q.rows_mut(m, e.len()).copy_from(&e);
             // The factor of the springs at rest does not apply beyond the backlash.
@@ -162,11 +162,11 @@ impl OperatingPoint {
         // Later queries need the tangent at the equilibrium.
         self.refactor(true)?;
         self.X_WT = self.data.X_WF(&self.tool);
-        frame_jacobian(&self.arm.model, &self.data, &self.tool, &mut self.J);
+        frame_jacobian(&self.plant.model, &self.data, &self.tool, &mut self.J);
         self.holding.copy_from(&self.p.rows(0, m));
         // The springs carry the static forces.
         self.r.zip_apply(&self.p.rows(m, self.r.len()), |carried, p| *carried = -p);
-        self.arm.add_motor_forces(self.q.as_slice(), self.r.as_slice(), self.holding.as_mut_slice());
+        self.plant.add_motor_forces(self.q.as_slice(), self.r.as_slice(), self.holding.as_mut_slice());
         self.residual = residual;
         Ok(())
     }
@@ -181,7 +181,7 @@ impl OperatingPoint {
 
     /// Runs Newton's iteration from the elastic coordinates in `q`; returns the residual.
     fn newton(&mut self) -> Result<f64, StepError> {
-        let (m, n) = (self.arm.model.n_actuated(), self.r.len());
+        let (m, n) = (self.plant.model.n_actuated(), self.r.len());
         let (mut residual, mut buckled) = (f64::INFINITY, false);
         for iteration in 0..MAX_ITERATIONS {
             self.iterations = iteration;
@@ -214,7 +214,7 @@ impl OperatingPoint {
             // 0.5.
             let shorten = (0.5 / self.r.amax()).min(1.0);
             self.q.rows_mut(m, n).axpy(-shorten, &self.r, 1.0);
-            if !self.arm.hysteresis.is_empty() {
+            if !self.plant.hysteresis.is_empty() {
                 self.come_closer(shorten, unbalanced);
             }
         }
@@ -227,7 +227,7 @@ impl OperatingPoint {
     /// Reverts halves of the step in `r` until the residual is below `unbalanced`: the first
     /// loading curve of a gear may be soft, then stiff.
     fn come_closer(&mut self, mut part: f64, unbalanced: f64) {
-        let (m, n) = (self.arm.model.n_actuated(), self.r.len());
+        let (m, n) = (self.plant.model.n_actuated(), self.r.len());
         let step = self.r.clone();
         for _ in 0..MAX_HALVINGS {
             self.forces();
@@ -242,38 +242,38 @@ impl OperatingPoint {
 
     /// Computes weight, loads and load-dependent stiffness at `q`, without springs, in `p`.
     fn forces(&mut self) {
-        static_forces(&self.arm, Some((&self.tool, &self.F_T_W)), 0.0, &mut self.data, &self.q, &mut self.p);
+        static_forces(&self.plant, Some((&self.tool, &self.F_T_W)), 0.0, &mut self.data, &self.q, &mut self.p);
     }
 
     /// Computes `r = K e + p`; returns the largest of these forces.
     fn unbalance(&mut self) -> f64 {
-        let m = self.arm.model.n_actuated();
+        let m = self.plant.model.n_actuated();
         let (e, p) = (&self.q.as_slice()[m..], &self.p.as_slice()[m..]);
         self.r.fill(0.0);
-        add_spring_forces(&self.arm, self.q.as_slice(), e, self.r.as_mut_slice());
+        add_spring_forces(&self.plant, self.q.as_slice(), e, self.r.as_mut_slice());
         let springs = self.r.amax();
         let mut carried = 0.0_f64;
         for (r, p) in self.r.iter_mut().zip(p) {
             carried = carried.max(p.abs());
             *r += p;
         }
-        springs.max(carried).max(self.arm.friction_of_gears()).max(f64::MIN_POSITIVE)
+        springs.max(carried).max(self.plant.friction_of_gears()).max(f64::MIN_POSITIVE)
     }
 
     /// Computes the tangent at `q` and the factor of its symmetric part; `small`: for small
     /// motions, in which friction does not slip.
     fn refactor(&mut self, small: bool) -> Result<(), StepError> {
-        let (m, n) = (self.arm.model.n_actuated(), self.r.len());
+        let (m, n) = (self.plant.model.n_actuated(), self.r.len());
         let tool = Some((&self.tool, &self.F_T_W));
         // `data` holds the poses of the last forces, which were evaluated at `q`.
-        self.slopes.compute_at_poses(&self.arm, tool, 0.0, &mut self.data, &self.q, &mut self.dp_de);
+        self.slopes.compute_at_poses(&self.plant, tool, 0.0, &mut self.data, &self.q, &mut self.dp_de);
         self.tangent.T.copy_from_slice(self.dp_de.as_slice());
         self.tangent.add_springs(&self.K);
-        for (number, element) in self.arm.elements.iter().enumerate() {
+        for (number, element) in self.plant.elements.iter().enumerate() {
             if let Some(curve) = &element.curve {
-                let k = self.arm.offset(element);
-                let delta = self.arm.deflection(number, self.q[m + k], self.q.as_slice());
-                let stuck = self.arm.hysteresis.iter().find(|law| small && law.element == number);
+                let k = self.plant.offset(element);
+                let delta = self.plant.deflection(number, self.q[m + k], self.q.as_slice());
+                let stuck = self.plant.hysteresis.iter().find(|law| small && law.element == number);
                 let beyond_play = || curve.slope_beyond_play(delta, self.q.as_slice());
                 let slope = stuck.map_or_else(beyond_play, |law| law.stuck_slope(delta));
                 self.tangent.T[k * n + k] += slope - self.K[(k, k)];
@@ -281,7 +281,7 @@ impl OperatingPoint {
         }
         // A constant moment is not conservative; without one any asymmetry is an error of the
         // differences.
-        let moments = self.arm.loads.iter().any(|load| load.wrench.at(0.0).torque.norm() > 0.0);
+        let moments = self.plant.loads.iter().any(|load| load.wrench.at(0.0).torque.norm() > 0.0);
         self.tangent.symmetric = self.F_T_W.torque.norm() == 0.0 && !moments;
         self.factored = self.tangent.factorise() == 1.0;
         match self.factored {
@@ -291,8 +291,8 @@ impl OperatingPoint {
     }
 
     /// Returns the arm; its springs and loads apply here, its own motion does not.
-    pub fn arm(&self) -> &FlexibleArm {
-        &self.arm
+    pub fn plant(&self) -> &Plant {
+        &self.plant
     }
 
     /// Returns the pose of the tool in the world at the equilibrium.
@@ -317,7 +317,7 @@ impl OperatingPoint {
 
     /// Returns the elastic coordinates (m, rad) in the order of the elements.
     pub fn deflections(&self) -> &[f64] {
-        &self.q.as_slice()[self.arm.model.n_actuated()..]
+        &self.q.as_slice()[self.plant.model.n_actuated()..]
     }
 
     /// Returns the efforts with which the drives hold the pose (N m or N), in coordinate order.
@@ -328,10 +328,10 @@ impl OperatingPoint {
     /// Writes the static forces on the elastic coordinates, without springs, of another arm of the
     /// same tree at this equilibrium under weight, loads and the wrench into `p` (n). With changed
     /// masses this gives the derivative with respect to a mass.
-    pub fn forces_of(&mut self, other: &FlexibleArm, p: &mut DVector<f64>) {
+    pub fn forces_of(&mut self, other: &Plant, p: &mut DVector<f64>) {
         let mut all = DVector::zeros(self.q.len());
         static_forces(other, Some((&self.tool, &self.F_T_W)), 0.0, &mut self.data, &self.q, &mut all);
-        p.copy_from(&all.rows(self.arm.model.n_actuated(), self.r.len()));
+        p.copy_from(&all.rows(self.plant.model.n_actuated(), self.r.len()));
     }
 
     /// Returns the change of the static forces on the elastic coordinates and the twist of a frame
@@ -339,8 +339,8 @@ impl OperatingPoint {
     /// axes while all coordinates keep their values; `None` for arms with closed loops, balancers or
     /// load-dependent stiffness.
     pub fn moved_subtree(&self, body: usize, moved: &Twist, frame: &Frame, p: &mut [f64]) -> Option<Twist> {
-        let model = &self.arm.model;
-        let geometric = self.arm.elements.iter().any(|element| element.geometric.is_some());
+        let model = &self.plant.model;
+        let geometric = self.plant.elements.iter().any(|element| element.geometric.is_some());
         if geometric || !model.loops().is_empty() || !model.balancers().is_empty() {
             return None;
         }
@@ -349,7 +349,7 @@ impl OperatingPoint {
         let (R, at) = (X_WJ.rotation, X_WJ.translation.vector);
         let w = R * moved.angular;
         let v = R * moved.linear + at.cross(&w);
-        self.slopes.add_moved_subtree(&self.arm, &self.data, body, &Twist::new(v, w), p);
+        self.slopes.add_moved_subtree(&self.plant, &self.data, body, &Twist::new(v, w), p);
         let behind = model.is_in_subtree(frame.body, body);
         let p_F = self.data.X_WF(frame).translation.vector;
         Some(if behind { Twist::new(v + w.cross(&p_F), w) } else { Twist::zeros() })
@@ -365,8 +365,8 @@ impl OperatingPoint {
     pub fn yielding_of(&mut self, frame: &Frame) -> &DMatrix<f64> {
         if self.factored {
             let mut J = Matrix6xX::zeros(self.q.len());
-            frame_jacobian(&self.arm.model, &self.data, frame, &mut J);
-            self.tangent.solve(&J.as_slice()[6 * self.arm.model.n_actuated()..], true);
+            frame_jacobian(&self.plant.model, &self.data, frame, &mut J);
+            self.tangent.solve(&J.as_slice()[6 * self.plant.model.n_actuated()..], true);
         }
         &self.tangent.Y
     }
@@ -395,7 +395,7 @@ impl OperatingPoint {
         if !self.factored {
             return Matrix6::zeros();
         }
-        let C = self.tangent.compliance(&self.J.as_slice()[6 * self.arm.model.n_actuated()..]);
+        let C = self.tangent.compliance(&self.J.as_slice()[6 * self.plant.model.n_actuated()..]);
         Matrix6::from_fn(|i, j| C[i][j])
     }
 
@@ -420,7 +420,7 @@ impl OperatingPoint {
         if !self.factored {
             return &[];
         }
-        mass_matrix_at_poses(&self.arm.model, &mut self.data);
+        mass_matrix_at_poses(&self.plant.model, &mut self.data);
         let found = self.tangent.find_frequencies(self.data.M.as_slice()) == 1.0;
         to_hertz(found, &mut self.tangent.d);
         &self.tangent.d

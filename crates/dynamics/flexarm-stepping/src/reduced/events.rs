@@ -71,12 +71,12 @@ impl ReducedArm {
     pub(crate) fn at_time(&mut self, t: f64, x: &DVector<f64>, v: &mut DVector<f64>) -> Result<Change, StepError> {
         let mut what = Change::Nothing;
         while let Some((number, change)) = self.events.due_change(t) {
-            let arm = Arc::make_mut(&mut self.arm);
-            arm.model = Arc::new(arm.model.with_inertia(change.body, change.inertia));
+            let plant = Arc::make_mut(&mut self.plant);
+            plant.model = Arc::new(plant.model.with_inertia(change.body, change.inertia));
             if let Some((D, tau, proportional)) = self.dampings.get_mut(number) {
-                std::mem::swap(&mut arm.D, D);
-                std::mem::swap(&mut arm.tau, tau);
-                arm.proportional = *proportional;
+                std::mem::swap(&mut plant.D, D);
+                std::mem::swap(&mut plant.tau, tau);
+                plant.proportional = *proportional;
             }
             what = Change::Matrices;
         }
@@ -88,7 +88,7 @@ impl ReducedArm {
         if let Some(servo) = &mut self.servo
             && self.events.sample_due(t)
         {
-            servo.sample(t, &self.arm, x.as_slice(), v.as_slice());
+            servo.sample(t, &self.plant, x.as_slice(), v.as_slice());
             what = what.max(Change::Motion);
         }
         Ok(what)
@@ -144,7 +144,7 @@ impl ReducedArm {
         for (k, (((before, after), (mean, acceleration)), top)) in joints.enumerate() {
             let defect = after - before - h * (mean + at_end * acceleration);
             let meets = defect.abs() <= IMPULSE_DEFECT * larger(*top, after.abs());
-            all &= meets || self.arm.torque_driven.contains(&k);
+            all &= meets || self.plant.torque_driven.contains(&k);
         }
         all
     }
@@ -153,13 +153,13 @@ impl ReducedArm {
     pub(crate) fn sample_joints(&mut self, t: f64) {
         let t = self.events.side(t);
         if t != self.sampled_at {
-            self.arm.prescribed_state(t, &mut self.state, &mut self.qddot);
+            self.plant.prescribed_state(t, &mut self.state, &mut self.qddot);
             self.sampled_at = t;
         }
     }
 
     fn keep_start(&mut self, t: f64) {
-        let n = self.arm.model.n_actuated();
+        let n = self.plant.model.n_actuated();
         let start = &mut self.step_start;
         start.time = t;
         start.qdot.copy_from_slice(&self.state.qdot.as_slice()[..n]);
@@ -177,15 +177,15 @@ impl ReducedArm {
         x: &DVector<f64>,
         v: &mut DVector<f64>,
     ) -> Result<(), StepError> {
-        let n = self.arm.model.n_actuated();
+        let n = self.plant.model.n_actuated();
         // Velocity jump of each coordinate; those of the free coordinates are unknown yet.
         let jump = &mut self.tau;
         jump.fill(0.0);
-        self.arm.prescribed_state(before, &mut self.state, &mut self.qddot);
+        self.plant.prescribed_state(before, &mut self.state, &mut self.qddot);
         jump.rows_mut(0, n).copy_from(&self.state.qdot.rows(0, n));
-        self.arm.prescribed_state(after, &mut self.state, &mut self.qddot);
+        self.plant.prescribed_state(after, &mut self.state, &mut self.qddot);
         for k in 0..n {
-            let driven = self.arm.torque_driven.contains(&k);
+            let driven = self.plant.torque_driven.contains(&k);
             jump[k] = if driven { 0.0 } else { self.state.qdot[k] - jump[k] };
         }
         if jump.iter().all(|jump| *jump == 0.0) {
@@ -193,7 +193,7 @@ impl ReducedArm {
         }
         // M_ff Δv_f = -M_fp Δv_p
         self.set(t, x, v);
-        let M = mass_matrix(&self.arm.model, &mut self.data, &self.state.q);
+        let M = mass_matrix(&self.plant.model, &mut self.data, &self.state.q);
         let size = self.free.len();
         let mut M_ff = storage_of(&mut self.mass_factor, size);
         for (i, &k) in self.free.iter().enumerate() {

@@ -20,18 +20,18 @@ use flexarm_kinematics::{
 };
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-use crate::arm::FlexibleArm;
 use crate::elastic_tree::ElasticTree;
 use crate::error::StepError;
 use crate::events::{ArmDamping, EventQueue, damping_after_changes};
 use crate::gear::GearState;
+use crate::plant::Plant;
 use crate::servo::ServoState;
 use events::StepStart;
 
 /// A flexible arm as a second-order system; see the module documentation.
 #[derive(Clone)]
 pub struct ReducedArm {
-    pub(crate) arm: Arc<FlexibleArm>,
+    pub(crate) plant: Arc<Plant>,
     pub(crate) data: Data,
     pub(crate) state: State,
     pub(crate) qddot: DVector<f64>,
@@ -63,23 +63,23 @@ pub struct ReducedArm {
 
 impl ReducedArm {
     /// Creates the workspaces for the arm.
-    pub fn new(arm: impl Into<Arc<FlexibleArm>>) -> Self {
-        let arm = arm.into();
-        let model = &arm.model;
-        let n = arm.n_free();
-        let driven = arm.torque_driven.clone();
+    pub fn new(plant: impl Into<Arc<Plant>>) -> Self {
+        let plant = plant.into();
+        let model = &plant.model;
+        let n = plant.n_free();
+        let driven = plant.torque_driven.clone();
         let roles = Roles::new(model, |k| k < model.n_actuated() && !driven.contains(&k));
-        let geometric = arm.elements.iter().any(|e| e.geometric.is_some());
+        let geometric = plant.elements.iter().any(|e| e.geometric.is_some());
         Self {
-            data: Data::new(&arm.model),
+            data: Data::new(&plant.model),
             state: State::zeros(model),
             qddot: DVector::zeros(model.nv()),
             tau: DVector::zeros(model.nv()),
             free: roles.free_coordinates().to_vec(),
             roles,
-            servo: arm.servo.clone().map(|servo| ServoState::new(servo, &arm)),
-            events: EventQueue::of(&arm),
-            dampings: damping_after_changes(&arm),
+            servo: plant.servo.clone().map(|servo| ServoState::new(servo, &plant)),
+            events: EventQueue::of(&plant),
+            dampings: damping_after_changes(&plant),
             struck: 0.0,
             geometric,
             sampled_at: f64::NAN,
@@ -87,37 +87,37 @@ impl ReducedArm {
             mass_factor: Cholesky::new(DMatrix::identity(n, n)),
             shifted: DVector::zeros(n),
             forces: DVector::zeros(n),
-            gears: GearState::of(&arm),
-            tree: ElasticTree::that_pays(&arm),
+            gears: GearState::of(&plant),
+            tree: ElasticTree::that_pays(&plant),
             is_placed: false,
-            arm,
+            plant,
         }
     }
 
     /// Returns the arm.
-    pub fn arm(&self) -> &FlexibleArm {
-        &self.arm
+    pub fn plant(&self) -> &Plant {
+        &self.plant
     }
 
     /// Returns free coordinates and rates at `t = 0`: driven joints at position and speed of their
     /// reference, springs at `e`. A motion whose velocities jump at 0 starts from rest.
     pub(crate) fn start(&mut self, e: &DVector<f64>) -> Result<(DVector<f64>, DVector<f64>), StepError> {
-        let (n, driven) = (self.arm.n_free(), self.arm.torque_driven.len());
+        let (n, driven) = (self.plant.n_free(), self.plant.torque_driven.len());
         let (mut x, mut v) = (DVector::zeros(n), DVector::zeros(n));
-        self.arm.prescribed_state(0.0, &mut self.state, &mut self.qddot);
-        for (i, &k) in self.arm.torque_driven.iter().enumerate() {
+        self.plant.prescribed_state(0.0, &mut self.state, &mut self.qddot);
+        for (i, &k) in self.plant.torque_driven.iter().enumerate() {
             x[i] = self.state.q[k];
             v[i] = self.state.qdot[k];
         }
         x.rows_mut(driven, e.len()).copy_from(e);
         if let Some(gears) = &mut self.gears {
-            gears.begin(&self.arm, self.state.q.as_slice(), e.as_slice());
+            gears.begin(&self.plant, self.state.q.as_slice(), e.as_slice());
         }
         if self.servo.is_some() {
             // Initialise the controller with the torques that keep the arm on its motion with the
             // springs as they are.
             let mut at_rest = DVector::zeros(n);
-            for (i, &k) in self.arm.torque_driven.iter().enumerate() {
+            for (i, &k) in self.plant.torque_driven.iter().enumerate() {
                 at_rest[i] = self.qddot[k];
             }
             self.evaluate(0.0, &x, &v, &at_rest);
@@ -136,17 +136,17 @@ impl ReducedArm {
         let t = self.events.side(t);
         self.sample_joints(t);
         self.is_placed = false;
-        let n = self.arm.model.n_actuated();
-        let driven = self.arm.torque_driven.len();
-        for (i, &k) in self.arm.torque_driven.iter().enumerate() {
+        let n = self.plant.model.n_actuated();
+        let driven = self.plant.torque_driven.len();
+        for (i, &k) in self.plant.torque_driven.iter().enumerate() {
             self.state.q[k] = x[i];
             self.state.qdot[k] = v[i];
         }
         self.state.q.as_mut_slice()[n..].copy_from_slice(&x.as_slice()[driven..]);
         self.state.qdot.as_mut_slice()[n..].copy_from_slice(&v.as_slice()[driven..]);
-        if !self.arm.loads.is_empty() {
+        if !self.plant.loads.is_empty() {
             self.place();
-            self.arm.apply_loads(&mut self.data, t);
+            self.plant.apply_loads(&mut self.data, t);
         }
     }
 
@@ -155,25 +155,25 @@ impl ReducedArm {
     /// # Errors
     /// [`StepError::OpenLoop`].
     pub(crate) fn check_loops(&mut self, x: &DVector<f64>, v: &DVector<f64>) -> Result<(), StepError> {
-        if self.arm.model.loops().is_empty() {
+        if self.plant.model.loops().is_empty() {
             return Ok(());
         }
         self.set(0.0, x, v);
         self.place();
-        StepError::open_loop(&self.arm.model, &self.data, 0.0).map_or(Ok(()), Err)
+        StepError::open_loop(&self.plant.model, &self.data, 0.0).map_or(Ok(()), Err)
     }
 
     /// Computes the poses of the state in `data` unless they are there.
     fn place(&mut self) {
         if !self.is_placed {
-            forward_kinematics(&self.arm.model, &mut self.data, &self.state.q);
+            forward_kinematics(&self.plant.model, &mut self.data, &self.state.q);
             self.is_placed = true;
         }
     }
 
     fn set_accelerations(&mut self, a: &DVector<f64>) {
-        let (n, driven) = (self.arm.model.n_actuated(), self.arm.torque_driven.len());
-        for (i, &k) in self.arm.torque_driven.iter().enumerate() {
+        let (n, driven) = (self.plant.model.n_actuated(), self.plant.torque_driven.len());
+        for (i, &k) in self.plant.torque_driven.iter().enumerate() {
             self.qddot[k] = a[i];
         }
         self.qddot.as_mut_slice()[n..].copy_from_slice(&a.as_slice()[driven..]);
@@ -185,9 +185,9 @@ impl ReducedArm {
         self.set(t, x, v);
         self.set_accelerations(a);
         self.is_placed = true;
-        inverse_dynamics(&self.arm.model, &mut self.data, &self.state, &self.qddot);
+        inverse_dynamics(&self.plant.model, &mut self.data, &self.state, &self.qddot);
         self.add_joint_torques(x, v);
-        world_poses(&self.arm.model, &mut self.data);
+        world_poses(&self.plant.model, &mut self.data);
     }
 
     /// Works as [`ReducedArm::evaluate`] with the poses in `X_WB` and without twists; returns
@@ -202,11 +202,11 @@ impl ReducedArm {
     ) -> [f64; 2] {
         self.evaluate(t, x, v, a);
         X_WB.copy_from_slice(&self.data.X_WB);
-        [kinetic_energy_of(&self.arm.model, &self.data), potential_energy_of(&self.arm.model, &self.data)]
+        [kinetic_energy_of(&self.plant.model, &self.data), potential_energy_of(&self.plant.model, &self.data)]
     }
 
     /// Returns the torques currently held by the controller, in the order of
-    /// [`FlexibleArm::torque_driven`]; empty without a controller.
+    /// [`Plant::torque_driven`]; empty without a controller.
     pub(crate) fn held_torques(&self) -> &[f64] {
         self.servo.as_ref().map_or(&[], |s| &s.torque)
     }

@@ -14,13 +14,13 @@ const GEOMETRIC_PASSES: usize = 12;
 
 impl SecondOrderSystem for ReducedArm {
     fn dimension(&self) -> usize {
-        self.arm.n_free()
+        self.plant.n_free()
     }
 
     fn residual(&mut self, t: f64, x: &DVector<f64>, v: &DVector<f64>, a: &DVector<f64>, r: &mut DVector<f64>) {
         self.set(t, x, v);
         self.set_accelerations(a);
-        inverse_dynamics(&self.arm.model, &mut self.data, &self.state, &self.qddot);
+        inverse_dynamics(&self.plant.model, &mut self.data, &self.state, &self.qddot);
         self.is_placed = true;
         for (r, &k) in r.iter_mut().zip(&self.free) {
             *r = self.data.tau[k];
@@ -50,8 +50,8 @@ impl SecondOrderSystem for ReducedArm {
             for (&k, f) in self.free.iter().zip(forces.iter()) {
                 self.tau[k] = -f;
             }
-            let Self { arm, data, state, roles, qddot, tau, .. } = self;
-            hybrid_dynamics(&arm.model, data, state, roles, qddot, tau);
+            let Self { plant, data, state, roles, qddot, tau, .. } = self;
+            hybrid_dynamics(&plant.model, data, state, roles, qddot, tau);
             let mut change = 0.0f64;
             for (a, &k) in a.iter_mut().zip(&self.free) {
                 change = change.max((qddot[k] - *a).abs());
@@ -61,7 +61,7 @@ impl SecondOrderSystem for ReducedArm {
                 break;
             }
             // Update the loads for the accelerations just computed.
-            inverse_dynamics(&self.arm.model, &mut self.data, &self.state, &self.qddot);
+            inverse_dynamics(&self.plant.model, &mut self.data, &self.state, &self.qddot);
         }
         self.forces = forces;
         match a.iter().all(|a| a.is_finite()) {
@@ -72,7 +72,7 @@ impl SecondOrderSystem for ReducedArm {
 
     fn mass(&mut self, M: &mut DMatrix<f64>) {
         self.place();
-        mass_matrix_at_poses(&self.arm.model, &mut self.data);
+        mass_matrix_at_poses(&self.plant.model, &mut self.data);
         for (column, &l) in self.free.iter().enumerate() {
             for (row, &k) in self.free.iter().enumerate() {
                 M[(row, column)] = self.data.M[(k, l)];
@@ -81,28 +81,28 @@ impl SecondOrderSystem for ReducedArm {
     }
 
     fn damping_and_stiffness(&mut self, c_D: f64, c_K: f64, C: &mut DMatrix<f64>) {
-        let driven = self.arm.torque_driven.len();
+        let driven = self.plant.torque_driven.len();
         C.as_mut_slice().fill(0.0);
         // Friction of the joints driven by torque.
-        for (i, &k) in self.arm.torque_driven.iter().enumerate() {
+        for (i, &k) in self.plant.torque_driven.iter().enumerate() {
             // A negative friction slope (Stribeck) is dropped to keep the matrix positive definite.
-            C[(i, i)] = c_D * self.arm.friction.get(k).map_or(0.0, |f| f.slope(self.state.qdot[k]).max(0.0));
+            C[(i, i)] = c_D * self.plant.friction.get(k).map_or(0.0, |f| f.slope(self.state.qdot[k]).max(0.0));
         }
         if let Some(gears) = &self.gears {
             let rates = self.state.qdot.as_slice();
-            for (i, &row) in self.arm.torque_driven.iter().enumerate() {
-                for (j, &column) in self.arm.torque_driven.iter().enumerate() {
-                    C[(i, j)] = c_D * self.arm.friction_slope(row, column, rates, gears);
+            for (i, &row) in self.plant.torque_driven.iter().enumerate() {
+                for (j, &column) in self.plant.torque_driven.iter().enumerate() {
+                    C[(i, j)] = c_D * self.plant.friction_slope(row, column, rates, gears);
                 }
             }
         }
         // Springs, including their dampers if these are proportional.
-        for (k, element) in self.arm.elements.iter().enumerate() {
-            let (first, size) = (driven + self.arm.offset(element), element.size);
-            let damping = if self.arm.proportional { c_D * self.arm.tau[k] } else { 0.0 };
+        for (k, element) in self.plant.elements.iter().enumerate() {
+            let (first, size) = (driven + self.plant.offset(element), element.size);
+            let damping = if self.plant.proportional { c_D * self.plant.tau[k] } else { 0.0 };
             if let Some(curve) = &element.curve {
                 let slope = match &self.gears {
-                    Some(gears) => gears.slope(&self.arm, k, element, curve),
+                    Some(gears) => gears.slope(&self.plant, k, element, curve),
                     None => curve.slope(self.state.q[element.coordinate], self.state.q.as_slice()),
                 };
                 C[(first, first)] += c_K * slope + damping * element.K[(0, 0)];
@@ -111,39 +111,39 @@ impl SecondOrderSystem for ReducedArm {
                 block.zip_apply(&element.K, |c, k| *c += (c_K + damping) * k);
             }
         }
-        for &(i, j, k) in &self.arm.cross_stiffness {
+        for &(i, j, k) in &self.plant.cross_stiffness {
             C[(driven + i, driven + j)] += c_K * k;
             C[(driven + j, driven + i)] += c_K * k;
         }
         // Otherwise the damping couples the elements.
-        if !self.arm.proportional {
+        if !self.plant.proportional {
             let ne = self.dimension() - driven;
-            C.view_mut((driven, driven), (ne, ne)).zip_apply(&self.arm.D, |s, d| *s += c_D * d);
+            C.view_mut((driven, driven), (ne, ne)).zip_apply(&self.plant.D, |s, d| *s += c_D * d);
         }
     }
 
     fn stiffness(&mut self, K: &mut DMatrix<f64>) {
-        let driven = self.arm.torque_driven.len();
+        let driven = self.plant.torque_driven.len();
         K.as_mut_slice().fill(0.0);
-        for element in &self.arm.elements {
-            let (first, size) = (driven + self.arm.offset(element), element.size);
+        for element in &self.plant.elements {
+            let (first, size) = (driven + self.plant.offset(element), element.size);
             K.view_mut((first, first), (size, size)).copy_from(&element.K);
         }
-        for &(i, j, k) in &self.arm.cross_stiffness {
+        for &(i, j, k) in &self.plant.cross_stiffness {
             (K[(driven + i, driven + j)], K[(driven + j, driven + i)]) = (k, k);
         }
     }
 
     fn settle(&mut self, t: f64, x: &DVector<f64>) {
-        if self.arm.hysteresis.is_empty() {
+        if self.plant.hysteresis.is_empty() {
             return;
         }
         self.sample_joints(t);
-        for (i, &k) in self.arm.torque_driven.iter().enumerate() {
+        for (i, &k) in self.plant.torque_driven.iter().enumerate() {
             self.state.q[k] = x[i];
         }
         if let Some(gears) = &mut self.gears {
-            gears.settle(&self.arm, self.state.q.as_slice(), &x.as_slice()[self.arm.torque_driven.len()..]);
+            gears.settle(&self.plant, self.state.q.as_slice(), &x.as_slice()[self.plant.torque_driven.len()..]);
         }
     }
 
@@ -152,9 +152,9 @@ impl SecondOrderSystem for ReducedArm {
             self.place();
         }
         let Some(tree) = &mut self.tree else { return false };
-        let placed = tree.place(&self.arm.model, &self.data, &self.state, &mut to.nodes);
+        let placed = tree.place(&self.plant.model, &self.data, &self.state, &mut to.nodes);
         if placed {
-            self.arm.blocks(c_D, c_K, to);
+            self.plant.blocks(c_D, c_K, to);
         }
         placed
     }

@@ -13,9 +13,9 @@ use flexarm_kinematics::{ElasticAngles, Joint, JointKind, Link, LinkInertia, Mec
 use nalgebra::{Matrix3, Matrix6, Vector3};
 
 use super::{StepRule, StepperKind, new_stepper};
-use crate::arm::{Damping, FlexibleArm};
 use crate::motion::Held;
 use crate::observation::Observation;
+use crate::plant::{Damping, Plant};
 use crate::stepper::Start;
 
 /// Load of (1), small enough that no stepper reports a divergence.
@@ -43,9 +43,9 @@ pub fn error_of_a_period(kind: StepperKind, h_omega: f64, zeta: f64) -> f64 {
 
 /// Returns the maximum error over `steps` steps; `None` if the stepper refuses them.
 fn swing(kind: StepperKind, h: f64, zeta: f64, steps: usize) -> Option<f64> {
-    let arm = body_on_spring(zeta)?;
-    let mut seen = Observation::new(&arm);
-    let mut stepper = new_stepper(kind, arm, h, Start::Undeformed).ok()?;
+    let plant = body_on_spring(zeta)?;
+    let mut seen = Observation::new(&plant);
+    let mut stepper = new_stepper(kind, plant, h, Start::Undeformed).ok()?;
     let w = (1.0 - zeta * zeta).sqrt();
     let mut largest = 0.0f64;
     for k in 1..=steps {
@@ -59,7 +59,7 @@ fn swing(kind: StepperKind, h: f64, zeta: f64, steps: usize) -> Option<f64> {
 }
 
 /// Returns a body of unit mass on a spring of unit stiffness, with the load of (1).
-fn body_on_spring(zeta: f64) -> Option<FlexibleArm> {
+fn body_on_spring(zeta: f64) -> Option<Plant> {
     let mut tree = Mechanism::new("oscillator");
     tree.gravity = Vector3::zeros();
     tree.links.push(Link { name: "base".into(), inertia: None });
@@ -69,7 +69,7 @@ fn body_on_spring(zeta: f64) -> Option<FlexibleArm> {
     tree.joints.push(Joint::new("spring", kind, "base", "body", Pose::identity()));
     let model = Arc::new(Model::new(&tree).ok()?);
     let spring = ("spring".to_owned(), Matrix6::identity(), Damping::StiffnessProportional(2.0 * zeta));
-    let arm = FlexibleArm::new(model, vec![spring], Arc::new(Held(vec![]))).ok()?;
-    let body = arm.elements.first()?.body;
-    arm.with_loads(vec![(body, Wrench::new(Vector3::x() * LOAD, Vector3::zeros()))]).ok()
+    let plant = Plant::new(model, vec![spring], Arc::new(Held(vec![]))).ok()?;
+    let body = plant.elements.first()?.body;
+    plant.with_loads(vec![(body, Wrench::new(Vector3::x() * LOAD, Vector3::zeros()))]).ok()
 }

@@ -19,10 +19,10 @@ use std::sync::Arc;
 
 use nalgebra::DVector;
 
-use crate::arm::FlexibleArm;
 use crate::error::StepError;
 use crate::integrator::ReducedStepper;
 use crate::observation::{Observation, observe_reduced};
+use crate::plant::Plant;
 use crate::stepper::{Counts, Stepper};
 use crate::steppers::generalized_alpha::{AlphaSettings, GeneralizedAlpha};
 use crate::steppers::{Method, StepRule, StepperEntry, StepperKind, StepperSetting};
@@ -52,11 +52,11 @@ impl Method for ExtrapolatedAlpha {
         self.0.settings()
     }
 
-    fn start(&self, arm: Arc<FlexibleArm>, h: f64, e: &DVector<f64>) -> Result<Box<dyn Stepper>, StepError> {
+    fn start(&self, plant: Arc<Plant>, h: f64, e: &DVector<f64>) -> Result<Box<dyn Stepper>, StepError> {
         // Extrapolated matrices differ more between the two runs, by errors without an expansion in
         // h: three times the error.
-        let coarse = self.0.stepper(arm.clone(), h, e)?;
-        let fine = self.0.stepper(arm, 0.5 * h, e)?;
+        let coarse = self.0.stepper(plant.clone(), h, e)?;
+        let fine = self.0.stepper(plant, 0.5 * h, e)?;
         // Both start in the same state.
         let now = fine.integrator.now.clone();
         Ok(Box::new(Extrapolated { x: now.x, v: now.v, a: now.acceleration, t: 0.0, coarse, fine }))
@@ -130,9 +130,9 @@ impl Stepper for Extrapolated {
         self.fine.restart()
     }
 
-    fn change_masses(&mut self, arm: &Arc<FlexibleArm>) -> Result<(), StepError> {
-        self.coarse.change_masses(arm)?;
-        self.fine.change_masses(arm)
+    fn change_masses(&mut self, plant: &Arc<Plant>) -> Result<(), StepError> {
+        self.coarse.change_masses(plant)?;
+        self.fine.change_masses(plant)
     }
 
     fn copy(&self) -> Option<Box<dyn Stepper>> {

@@ -21,8 +21,8 @@ use std::sync::Arc;
 use flexarm_settings::Words;
 use nalgebra::DVector;
 
-use crate::arm::FlexibleArm;
 use crate::error::StepError;
+use crate::plant::Plant;
 use crate::statics::static_equilibrium;
 use crate::stepper::{Start, Stepper};
 
@@ -170,7 +170,7 @@ trait Method {
     }
 
     /// Creates the stepper at `t = 0` with elastic coordinates `e`; `h` (s) is positive.
-    fn start(&self, arm: Arc<FlexibleArm>, h: f64, e: &DVector<f64>) -> Result<Box<dyn Stepper>, StepError>;
+    fn start(&self, plant: Arc<Plant>, h: f64, e: &DVector<f64>) -> Result<Box<dyn Stepper>, StepError>;
 }
 
 /// Creates a stepper of the given kind, started at `t = 0`.
@@ -182,20 +182,20 @@ trait Method {
 /// [`StepError::Singular`] if the initial accelerations cannot be computed.
 pub fn new_stepper(
     kind: StepperKind,
-    arm: impl Into<Arc<FlexibleArm>>,
+    plant: impl Into<Arc<Plant>>,
     h: f64,
     start: Start,
 ) -> Result<Box<dyn Stepper>, StepError> {
     if !(h.is_finite() && h > 0.0) {
         return Err(StepError::Setup(format!("the step must be a positive time in seconds, found {h}")));
     }
-    let mut arm = arm.into();
-    if !arm.inertia_changes.is_empty() {
-        Arc::make_mut(&mut arm).carry_from_start()?;
+    let mut plant = plant.into();
+    if !plant.inertia_changes.is_empty() {
+        Arc::make_mut(&mut plant).carry_from_start()?;
     }
     let e = match start {
-        Start::Equilibrium => static_equilibrium(&arm, 0.0)?,
-        Start::Undeformed => DVector::zeros(arm.n_elastic_coordinates()),
+        Start::Equilibrium => static_equilibrium(&plant, 0.0)?,
+        Start::Undeformed => DVector::zeros(plant.n_elastic_coordinates()),
     };
-    kind.method().start(arm, h, &e)
+    kind.method().start(plant, h, &e)
 }

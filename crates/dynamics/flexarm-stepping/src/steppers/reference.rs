@@ -41,9 +41,9 @@ use diffsol::{
 use flexarm_settings::Words;
 use nalgebra::DVector;
 
-use crate::arm::FlexibleArm;
 use crate::error::StepError;
 use crate::integrator::{Current, Integrator, ReducedStepper};
+use crate::plant::Plant;
 use crate::stepper::{Counts, Stepper};
 use crate::steppers::{Method, StepRule, StepperEntry, StepperKind, StepperSetting};
 use crate::system::SecondOrderSystem;
@@ -145,20 +145,20 @@ impl Method for ReferenceSettings {
         vec![("rtol", StepperSetting::Number(self.rtol)), ("method", StepperSetting::of_word(self.method))]
     }
 
-    fn start(&self, arm: Arc<FlexibleArm>, h: f64, e: &DVector<f64>) -> Result<Box<dyn Stepper>, StepError> {
-        if !arm.hysteresis.is_empty() {
+    fn start(&self, plant: Arc<Plant>, h: f64, e: &DVector<f64>) -> Result<Box<dyn Stepper>, StepError> {
+        if !plant.hysteresis.is_empty() {
             let text = "the reference stepper needs continuous equations and does not support hysteresis of gears: use \
                         sdirk3 or rk4 with a small step";
             return Err(StepError::Setup(text.into()));
         }
-        let stepper = ReducedStepper::start(arm, e, |system, x, v| {
+        let stepper = ReducedStepper::start(plant, e, |system, x, v| {
             let mut integrator = Reference::new(system, 0.0, h, *self, x, v)?;
             // Otherwise a solver with large steps may miss a short load.
-            for t in system.arm.load_jumps().filter(|t| *t > 0.0) {
+            for t in system.plant.load_jumps().filter(|t| *t > 0.0) {
                 integrator.restart_at(t);
             }
             // Not an integer fraction of the period, at which samples of a sine could all be zero.
-            let period = system.arm.loads.iter().map(|load| load.wrench.period).fold(f64::INFINITY, f64::min);
+            let period = system.plant.loads.iter().map(|load| load.wrench.period).fold(f64::INFINITY, f64::min);
             integrator.limit_steps(0.137 * period);
             Ok(integrator)
         })?;

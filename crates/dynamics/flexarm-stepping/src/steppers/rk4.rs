@@ -8,9 +8,9 @@ use std::sync::Arc;
 use flexarm_kinematics::{Data, State, mass_matrix};
 use nalgebra::{DMatrix, DVector};
 
-use crate::arm::FlexibleArm;
 use crate::error::StepError;
 use crate::integrator::{Current, Integrator, ReducedStepper};
+use crate::plant::Plant;
 use crate::stepper::{Counts, Stepper};
 use crate::steppers::{Method, StepRule, StepperEntry, StepperKind};
 use crate::system::SecondOrderSystem;
@@ -35,10 +35,10 @@ impl Method for Rk4Settings {
         &ENTRY
     }
 
-    fn start(&self, arm: Arc<FlexibleArm>, h: f64, e: &DVector<f64>) -> Result<Box<dyn Stepper>, StepError> {
-        check_explicit_step(&arm, h)?;
-        let mut changed = FlexibleArm::clone(&arm);
-        for change in &arm.inertia_changes {
+    fn start(&self, plant: Arc<Plant>, h: f64, e: &DVector<f64>) -> Result<Box<dyn Stepper>, StepError> {
+        check_explicit_step(&plant, h)?;
+        let mut changed = Plant::clone(&plant);
+        for change in &plant.inertia_changes {
             changed.model = Arc::new(changed.model.with_inertia(change.body, change.inertia));
             // An arm without static equilibrium with this payload may still be able to move with
             // it.
@@ -46,7 +46,7 @@ impl Method for Rk4Settings {
                 check_explicit_step(&changed, h)?;
             }
         }
-        Ok(Box::new(ReducedStepper::start(arm, e, |system, x, v| Rk4::new(system, 0.0, h, x, v))?))
+        Ok(Box::new(ReducedStepper::start(plant, e, |system, x, v| Rk4::new(system, 0.0, h, x, v))?))
     }
 }
 
@@ -153,16 +153,16 @@ impl Integrator for Rk4 {
 
 /// Checks that every mode is inside the stability region: on the imaginary axis up to 2.78, 2.61
 /// where damping moves the eigenvalue inwards, on the negative real axis up to 2.78 again.
-fn check_explicit_step(arm: &FlexibleArm, h: f64) -> Result<(), StepError> {
+fn check_explicit_step(plant: &Plant, h: f64) -> Result<(), StepError> {
     let mut rate = 0.0f64;
-    for (j, omega) in arm.modes.omega.iter().enumerate() {
-        let phi = arm.modes.shapes.column(j);
-        rate = rate.max(omega * STABILITY_LIMIT / 2.61).max(fastest_decay(phi.dot(&(&arm.D * phi)), *omega));
+    for (j, omega) in plant.modes.omega.iter().enumerate() {
+        let phi = plant.modes.shapes.column(j);
+        rate = rate.max(omega * STABILITY_LIMIT / 2.61).max(fastest_decay(phi.dot(&(&plant.D * phi)), *omega));
     }
-    let mut highest = arm.modes.omega.last().copied().unwrap_or(0.0);
-    if !arm.torque_driven.is_empty() {
+    let mut highest = plant.modes.omega.last().copied().unwrap_or(0.0);
+    if !plant.torque_driven.is_empty() {
         // Free motors oscillate against their springs.
-        let (omega, decay) = free_rates(arm)?;
+        let (omega, decay) = free_rates(plant)?;
         rate = rate.max(omega * STABILITY_LIMIT / 2.61).max(decay);
         highest = highest.max(omega);
     }
@@ -186,21 +186,21 @@ fn fastest_decay(damping: f64, omega: f64) -> f64 {
 
 /// Returns the highest angular frequency and decay rate (1/s) with the joints driven by torque
 /// free, without Coulomb and Stribeck friction.
-fn free_rates(arm: &FlexibleArm) -> Result<(f64, f64), StepError> {
-    let (model, na) = (&arm.model, arm.model.n_actuated());
+fn free_rates(plant: &Plant) -> Result<(f64, f64), StepError> {
+    let (model, na) = (&plant.model, plant.model.n_actuated());
     let (mut state, mut qddot) = (State::zeros(model), DVector::zeros(model.nv()));
-    arm.prescribed_state(0.0, &mut state, &mut qddot);
-    state.q.rows_mut(na, arm.modes.equilibrium.len()).copy_from(&arm.modes.equilibrium);
+    plant.prescribed_state(0.0, &mut state, &mut qddot);
+    state.q.rows_mut(na, plant.modes.equilibrium.len()).copy_from(&plant.modes.equilibrium);
     let mut data = Data::new(model);
     let M = mass_matrix(model, &mut data, &state.q);
-    let free: Vec<usize> = arm.torque_driven.iter().copied().chain(na..model.nv()).collect();
-    let (n, driven) = (free.len(), arm.torque_driven.len());
+    let free: Vec<usize> = plant.torque_driven.iter().copied().chain(na..model.nv()).collect();
+    let (n, driven) = (free.len(), plant.torque_driven.len());
     let M = DMatrix::from_fn(n, n, |i, j| M[(free[i], free[j])]);
     let (mut K, mut D) = (DMatrix::zeros(n, n), DMatrix::zeros(n, n));
-    K.view_mut((driven, driven), (n - driven, n - driven)).copy_from(&arm.stiffness());
-    D.view_mut((driven, driven), (n - driven, n - driven)).copy_from(&arm.D);
-    for (i, k) in arm.torque_driven.iter().enumerate() {
-        D[(i, i)] = arm.friction.get(*k).map_or(0.0, |f| f.viscous);
+    K.view_mut((driven, driven), (n - driven, n - driven)).copy_from(&plant.stiffness());
+    D.view_mut((driven, driven), (n - driven, n - driven)).copy_from(&plant.D);
+    for (i, k) in plant.torque_driven.iter().enumerate() {
+        D[(i, i)] = plant.friction.get(*k).map_or(0.0, |f| f.viscous);
     }
     let singular = StepError::Singular { matrix: "mass matrix", t: 0.0 };
     let L = M.cholesky().ok_or(singular.clone())?.l();

@@ -36,10 +36,10 @@ use std::sync::Arc;
 
 use nalgebra::DVector;
 
-use crate::arm::FlexibleArm;
 use crate::error::StepError;
 use crate::implicit::{ImplicitStep, Newton, Search, Sizes};
 use crate::integrator::{Current, ReducedStepper};
+use crate::plant::Plant;
 use crate::stepper::Stepper;
 use crate::steppers::{Method, StepRule, StepperEntry, StepperKind};
 use crate::system::SecondOrderSystem;
@@ -64,8 +64,8 @@ impl Method for Sdirk3Settings {
         &ENTRY
     }
 
-    fn start(&self, arm: Arc<FlexibleArm>, h: f64, e: &DVector<f64>) -> Result<Box<dyn Stepper>, StepError> {
-        Ok(Box::new(ReducedStepper::start(arm, e, |system, x, v| Sdirk3::new(system, 0.0, h, x, v))?))
+    fn start(&self, plant: Arc<Plant>, h: f64, e: &DVector<f64>) -> Result<Box<dyn Stepper>, StepError> {
+        Ok(Box::new(ReducedStepper::start(plant, e, |system, x, v| Sdirk3::new(system, 0.0, h, x, v))?))
     }
 }
 

@@ -53,7 +53,7 @@ impl SpinUp {
             .collect()
     }
 
-    fn arm(&self, geometric: bool) -> FlexibleArm {
+    fn plant(&self, geometric: bool) -> Plant {
         let beam = BeamLink::new("beam", Section::Given(self.bar), Material::STEEL, self.length);
         let options = ModalOptions { geometric, ..ModalOptions::default() };
         let modal = Arc::new(beam.modal_with(&options).expect("a beam"));
@@ -92,9 +92,9 @@ impl SpinUp {
 #[test]
 fn stiffened_cantilever_follows_the_exact_beam_in_the_spin_up() {
     for case in spin_ups() {
-        let (arm, golden) = (case.arm(true), case.golden());
+        let (plant, golden) = (case.plant(true), case.golden());
         let times: Vec<f64> = golden.iter().map(|r| r.t).collect();
-        let seen = run(&arm, ALPHA, 5e-3, Start::Undeformed, &times);
+        let seen = run(&plant, ALPHA, 5e-3, Start::Undeformed, &times);
         let peak = golden.iter().map(|r| r.tip_v.abs()).fold(0.0, f64::max);
         let worst = golden.iter().zip(&seen).map(|(r, o)| (r.tip_v - o.q[2]).abs()).fold(0.0, f64::max);
         let after: Vec<_> = golden.iter().zip(&seen).filter(|(r, _)| r.t >= 15.0).collect();
@@ -123,10 +123,10 @@ fn stiffened_cantilever_follows_the_exact_beam_in_the_spin_up() {
 #[test]
 fn cantilever_without_stiffening_softens_as_the_linear_beam_does() {
     for case in spin_ups() {
-        let (arm, golden) = (case.arm(false), case.golden());
+        let (plant, golden) = (case.plant(false), case.golden());
         let linear: Vec<&Row> = golden.iter().take_while(|r| r.linear_v.abs() < 2.5).collect();
         let times: Vec<f64> = linear.iter().map(|r| r.t).collect();
-        let seen = run(&arm, ALPHA, 5e-3, Start::Undeformed, &times);
+        let seen = run(&plant, ALPHA, 5e-3, Start::Undeformed, &times);
         let worst = linear.iter().zip(&seen).map(|(r, o)| (r.linear_v - o.q[2]).abs()).fold(0.0, f64::max);
         let last = linear.last().expect("rows");
         eprintln!(
@@ -135,7 +135,7 @@ fn cantilever_without_stiffening_softens_as_the_linear_beam_does() {
         );
         assert!(worst < 1.5e-4, "{}: {worst}", case.name);
         assert!(last.linear_v < 3.0 * last.tip_v, "{}", case.name);
-        let mut stepper = new_stepper(ALPHA, arm, 5e-3, Start::Undeformed).expect("starts");
+        let mut stepper = new_stepper(ALPHA, plant, 5e-3, Start::Undeformed).expect("starts");
         let error = (0..4000).find_map(|_| stepper.step().err()).expect("diverges");
         eprintln!("{}: {error}", case.name);
         assert!(matches!(error, StepError::Diverged { .. }), "{error}");

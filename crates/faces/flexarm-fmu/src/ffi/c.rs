@@ -9,8 +9,8 @@ use flexarm::settings::Words;
 use flexarm::{DriveModel, LinkModel, Modelling};
 
 use super::{NULL, array, get_each, guarded, message, set_each, string, string_or_null, text_of};
-use crate::error::PlantError;
-use crate::plant::{Plant, PlantSettings, PlantState};
+use crate::error::FmuError;
+use crate::model::{FmuModel, FmuSettings, FmuState};
 use crate::variables::{Causality, Kind};
 
 thread_local! {
@@ -20,7 +20,7 @@ thread_local! {
 
 /// A plant with the names of its variables as C strings.
 pub(super) struct Handle {
-    plant: Plant,
+    plant: FmuModel,
     names: Vec<CString>,
     units: Vec<CString>,
 }
@@ -33,7 +33,7 @@ fn failed(text: &str) {
 ///
 /// # Safety
 /// `plant` is null or a plant that is not freed.
-unsafe fn call(plant: *mut Handle, work: impl FnOnce(&mut Handle) -> Result<(), PlantError>) -> c_int {
+unsafe fn call(plant: *mut Handle, work: impl FnOnce(&mut Handle) -> Result<(), FmuError>) -> c_int {
     // SAFETY: as promised by the caller.
     let Some(plant) = (unsafe { plant.as_mut() }) else {
         failed("the plant is a null pointer");
@@ -114,13 +114,13 @@ unsafe fn opened(
             DriveModel::from_word(word).ok_or_else(|| unknown("drives", word, DriveModel::known().join(", ")))?
         }
     };
-    let settings = PlantSettings {
+    let settings = FmuSettings {
         modelling: Modelling { links, drives, ..Modelling::default() },
         step_s: (step_s != 0.0).then_some(step_s),
         pose: (!pose.is_empty()).then(|| pose.to_vec()),
-        ..PlantSettings::default()
+        ..FmuSettings::default()
     };
-    let plant = Plant::new(Path::new(robot), &settings).map_err(|error| text_of(&error))?;
+    let plant = FmuModel::new(Path::new(robot), &settings).map_err(|error| text_of(&error))?;
     let names = plant.variables().iter().map(|variable| message(&variable.name)).collect();
     let units = plant.variables().iter().map(|variable| message(variable.unit)).collect();
     Ok(Handle { plant, names, units })
@@ -197,7 +197,7 @@ extern "C" fn flexarm_set(plant: *mut Handle, references: *const u32, values: *c
                     }
                     Some(Kind::Boolean) => {
                         let name = handle.plant.variables()[reference].name.clone();
-                        Err(PlantError::TruthValue { name, found: value })
+                        Err(FmuError::TruthValue { name, found: value })
                     }
                     _ => handle.plant.set(reference, value),
                 }
@@ -252,7 +252,7 @@ extern "C" fn flexarm_reset(plant: *mut Handle) -> c_int {
 }
 
 #[unsafe(no_mangle)]
-extern "C" fn flexarm_state(plant: *mut Handle) -> *mut PlantState {
+extern "C" fn flexarm_state(plant: *mut Handle) -> *mut FmuState {
     let mut state = ptr::null_mut();
     // SAFETY: the caller passes a plant or null.
     unsafe {
@@ -265,13 +265,13 @@ extern "C" fn flexarm_state(plant: *mut Handle) -> *mut PlantState {
 }
 
 #[unsafe(no_mangle)]
-extern "C" fn flexarm_restore(plant: *mut Handle, state: *const PlantState) -> c_int {
+extern "C" fn flexarm_restore(plant: *mut Handle, state: *const FmuState) -> c_int {
     // SAFETY: the caller passes a plant and a state of it, or null.
     unsafe { call(plant, |handle| handle.plant.restore(state.as_ref().ok_or(NULL)?)) }
 }
 
 #[unsafe(no_mangle)]
-extern "C" fn flexarm_free_state(state: *mut PlantState) {
+extern "C" fn flexarm_free_state(state: *mut FmuState) {
     if !state.is_null() {
         // SAFETY: the caller frees a state once.
         let state = unsafe { Box::from_raw(state) };

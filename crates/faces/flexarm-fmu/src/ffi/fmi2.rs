@@ -7,7 +7,7 @@ use std::ptr;
 use super::{
     Differential, NULL, array, free_state, get_each, guarded, message, put_state, put_states, set_each, string, text_of,
 };
-use crate::error::PlantError;
+use crate::error::FmuError;
 use crate::instance::{Instance, InstanceState, Interface, StateValues};
 
 type Status = c_int;
@@ -64,7 +64,7 @@ impl Log {
 ///
 /// # Safety
 /// `component` is null or an instance that is not freed.
-unsafe fn call(component: *mut c_void, work: impl FnOnce(&mut Instance) -> Result<(), PlantError>) -> Status {
+unsafe fn call(component: *mut c_void, work: impl FnOnce(&mut Instance) -> Result<(), FmuError>) -> Status {
     // SAFETY: as promised by the caller.
     let Some(component) = (unsafe { component.cast::<Component>().as_mut() }) else { return ERROR };
     match guarded(|| work(&mut component.instance)) {
@@ -85,7 +85,7 @@ macro_rules! without {
     ($($name:ident($($argument:ty),*);)*) => {$(
         #[unsafe(no_mangle)]
         extern "C" fn $name(component: *mut c_void $(, _: $argument)*) -> Status {
-            let missing = PlantError::Order { function: stringify!($name), phase: "of this FMU" };
+            let missing = FmuError::Order { function: stringify!($name), phase: "of this FMU" };
             // SAFETY: the importer passes an instance or null.
             unsafe { call(component, |_| Err(missing)) }
         }
@@ -297,7 +297,7 @@ extern "C" fn fmi2GetRealStatus(component: *mut c_void, kind: c_int, value: *mut
             let place = value.as_mut().ok_or(NULL)?;
             match kind {
                 LAST_SUCCESSFUL_TIME => *place = instance.time_s(),
-                _ => return Err(PlantError::Order { function: "fmi2GetRealStatus", phase: "for this kind of status" }),
+                _ => return Err(FmuError::Order { function: "fmi2GetRealStatus", phase: "for this kind of status" }),
             }
             Ok(())
         })

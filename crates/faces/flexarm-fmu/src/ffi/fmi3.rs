@@ -7,7 +7,7 @@ use std::ptr;
 use super::{
     Differential, NULL, array, free_state, get_each, guarded, message, put_state, put_states, set_each, string, text_of,
 };
-use crate::error::PlantError;
+use crate::error::FmuError;
 use crate::instance::{Instance, InstanceState, Interface, StateValues};
 
 type Status = c_int;
@@ -24,7 +24,7 @@ struct Component {
 }
 
 impl Component {
-    fn log(&self, error: &PlantError) {
+    fn log(&self, error: &FmuError) {
         log(self.log, self.environment, &text_of(error));
     }
 }
@@ -41,7 +41,7 @@ fn log(log: LogMessage, environment: *mut c_void, text: &str) {
 ///
 /// # Safety
 /// `component` is null or an instance that is not freed.
-unsafe fn call(component: *mut c_void, work: impl FnOnce(&mut Instance) -> Result<(), PlantError>) -> Status {
+unsafe fn call(component: *mut c_void, work: impl FnOnce(&mut Instance) -> Result<(), FmuError>) -> Status {
     // SAFETY: as promised by the caller.
     let Some(component) = (unsafe { component.cast::<Component>().as_mut() }) else { return ERROR };
     match guarded(|| work(&mut component.instance)) {
@@ -62,7 +62,7 @@ macro_rules! without {
     ($($name:ident($($argument:ty),*);)*) => {$(
         #[unsafe(no_mangle)]
         extern "C" fn $name(component: *mut c_void $(, _: $argument)*) -> Status {
-            let missing = PlantError::Order { function: stringify!($name), phase: "of this FMU" };
+            let missing = FmuError::Order { function: stringify!($name), phase: "of this FMU" };
             // SAFETY: the importer passes an instance or null.
             unsafe { call(component, |_| Err(missing)) }
         }
@@ -282,10 +282,10 @@ extern "C" fn fmi3SetBoolean(
 }
 
 /// Checks that there is a value for each reference; all variables are scalars.
-fn lengths(references: usize, values: usize) -> Result<(), PlantError> {
+fn lengths(references: usize, values: usize) -> Result<(), FmuError> {
     match references == values {
         true => Ok(()),
-        false => Err(PlantError::Order { function: "a getter or setter", phase: "with another number of values" }),
+        false => Err(FmuError::Order { function: "a getter or setter", phase: "with another number of values" }),
     }
 }
 

@@ -12,11 +12,11 @@ use std::ffi::{CStr, CString, c_char, c_void};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::str::Utf8Error;
 
-use crate::error::PlantError;
+use crate::error::FmuError;
 use crate::instance::{Instance, InstanceState, StateValues};
 
 /// Error for a null pointer where an object or an array is needed.
-const NULL: PlantError = PlantError::Order { function: "a function", phase: "with a null pointer" };
+const NULL: FmuError = FmuError::Order { function: "a function", phase: "with a null pointer" };
 
 /// Runs a function; a panic becomes `None`.
 fn guarded<T>(work: impl FnOnce() -> T) -> Option<T> {
@@ -75,8 +75,8 @@ unsafe fn get_each<T>(
     references: *const u32,
     values: *mut T,
     n: usize,
-    mut get: impl FnMut(u32) -> Result<T, PlantError>,
-) -> Result<(), PlantError> {
+    mut get: impl FnMut(u32) -> Result<T, FmuError>,
+) -> Result<(), FmuError> {
     if n > 0 && (references.is_null() || values.is_null()) {
         return Err(NULL);
     }
@@ -95,8 +95,8 @@ unsafe fn set_each<T: Copy>(
     references: *const u32,
     values: *const T,
     n: usize,
-    mut set: impl FnMut(u32, T) -> Result<(), PlantError>,
-) -> Result<(), PlantError> {
+    mut set: impl FnMut(u32, T) -> Result<(), FmuError>,
+) -> Result<(), FmuError> {
     // SAFETY: as promised by the caller.
     let (references, values) = unsafe { (array(references, n).ok_or(NULL)?, array(values, n).ok_or(NULL)?) };
     references.iter().zip(values).try_for_each(|(&reference, &value)| set(reference, value))
@@ -106,7 +106,7 @@ unsafe fn set_each<T: Copy>(
 ///
 /// # Safety
 /// As [`array_mut`], with `n` values.
-unsafe fn put_states(instance: &mut Instance, what: StateValues, to: *mut f64, n: usize) -> Result<(), PlantError> {
+unsafe fn put_states(instance: &mut Instance, what: StateValues, to: *mut f64, n: usize) -> Result<(), FmuError> {
     // SAFETY: as promised by the caller.
     instance.write_states(what, unsafe { array_mut(to, n) }.ok_or(NULL)?)
 }
@@ -122,7 +122,7 @@ struct Differential {
 impl Differential {
     /// # Safety
     /// As [`array`] and [`array_mut`].
-    unsafe fn compute(self, instance: &mut Instance) -> Result<(), PlantError> {
+    unsafe fn compute(self, instance: &mut Instance) -> Result<(), FmuError> {
         let Self { unknowns, knowns, seed, result } = self;
         // SAFETY: as promised by the caller.
         let (unknowns, knowns, seed) =
@@ -139,7 +139,7 @@ impl Differential {
 ///
 /// # Safety
 /// `place` is null or has null or a state of [`put_state`] that is not freed.
-unsafe fn put_state(place: *mut *mut c_void, new: InstanceState) -> Result<(), PlantError> {
+unsafe fn put_state(place: *mut *mut c_void, new: InstanceState) -> Result<(), FmuError> {
     // SAFETY: as promised by the caller.
     let place = unsafe { place.as_mut() }.ok_or(NULL)?;
     // SAFETY: as promised by the caller.
@@ -154,7 +154,7 @@ unsafe fn put_state(place: *mut *mut c_void, new: InstanceState) -> Result<(), P
 ///
 /// # Safety
 /// As [`put_state`].
-unsafe fn free_state(place: *mut *mut c_void) -> Result<(), PlantError> {
+unsafe fn free_state(place: *mut *mut c_void) -> Result<(), FmuError> {
     // SAFETY: as promised by the caller.
     if let Some(place) = unsafe { place.as_mut() }.filter(|place| !place.is_null()) {
         // SAFETY: as promised by the caller.
@@ -170,7 +170,7 @@ fn message(text: &str) -> CString {
 }
 
 /// Returns the text of an error with its causes.
-fn text_of(error: &PlantError) -> String {
+fn text_of(error: &FmuError) -> String {
     let mut text = error.to_string();
     let mut cause = std::error::Error::source(error);
     while let Some(error) = cause {

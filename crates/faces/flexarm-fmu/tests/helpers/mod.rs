@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use flexarm::{DriveModel, LinkModel, Modelling};
-use flexarm_fmu::{Plant, PlantSettings};
+use flexarm_fmu::{FmuModel, FmuSettings};
 
 pub(crate) fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(3).unwrap().to_owned()
@@ -13,8 +13,8 @@ pub(crate) fn robot(name: &str) -> PathBuf {
     root().join("robots").join(name).join("robot.toml")
 }
 
-pub(crate) fn settings(links: LinkModel, drives: DriveModel) -> PlantSettings {
-    PlantSettings { modelling: Modelling { links, drives, ..Modelling::default() }, ..PlantSettings::default() }
+pub(crate) fn settings(links: LinkModel, drives: DriveModel) -> FmuSettings {
+    FmuSettings { modelling: Modelling { links, drives, ..Modelling::default() }, ..FmuSettings::default() }
 }
 
 /// Targets of a smooth swing of all joints that starts at rest.
@@ -26,12 +26,12 @@ pub(crate) fn targets(from: &[f64], t: f64) -> (Vec<f64>, Vec<f64>) {
 }
 
 /// References of a variable of every joint that has it.
-pub(crate) fn of_joints(plant: &Plant, what: &str) -> Vec<usize> {
+pub(crate) fn of_joints(model: &FmuModel, what: &str) -> Vec<usize> {
     let ending = format!(".{what}");
-    let names = plant.variables().iter().enumerate();
+    let names = model.variables().iter().enumerate();
     names.filter(|(_, v)| v.name.starts_with("joint.") && v.name.ends_with(&ending)).map(|(k, _)| k).collect()
 }
 
-pub(crate) fn values(plant: &Plant, names: &[&str]) -> Vec<f64> {
-    names.iter().map(|name| plant.get(plant.find(name).unwrap()).unwrap()).collect()
+pub(crate) fn values(model: &FmuModel, names: &[&str]) -> Vec<f64> {
+    names.iter().map(|name| model.get(model.find(name).unwrap()).unwrap()).collect()
 }

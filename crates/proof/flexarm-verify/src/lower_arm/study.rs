@@ -126,8 +126,8 @@ impl Frequencies {
     pub(super) fn new(robot: &Robot, truth: &Truth, programs: &[Program; 2]) -> Result<Self, Error> {
         let models = models().into_iter().map(|model| {
             let rig = Rig::new(&weightless(robot.clone()), &model.modelling, B)?;
-            let errors = truth.hz_errors(&rig.arm.modes.frequencies_hz());
-            Ok((model, errors, rig.arm.model.n_elastic()))
+            let errors = truth.hz_errors(&rig.plant.modes.frequencies_hz());
+            Ok((model, errors, rig.plant.model.n_elastic()))
         });
         Ok(Self {
             hz: truth.hz.clone(),

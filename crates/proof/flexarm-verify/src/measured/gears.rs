@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use flexarm::{DriveModel, LinkModel, Modelling, Motion, Robot};
-use flexarm_stepping::{FlexibleArm, Held, Observation, Start, new_stepper};
+use flexarm_stepping::{Held, Observation, Plant, Start, new_stepper};
 
 use super::recording::{AXES, Recording, STEP_S, WITH_ENCODER};
 use crate::Error;
@@ -75,23 +75,23 @@ impl Gears {
 
 /// Stiffness about the axis, for the gears with a link encoder (N m/rad).
 fn stiffness(robot: &Robot) -> Result<Vec<f64>, Error> {
-    let arm = robot.model(&ELASTIC)?.arm(Arc::new(Held(vec![0.0; AXES]))).map_err(step_error)?;
-    Ok(arm.elements.iter().map(|element| element.K[(0, 0)]).take(WITH_ENCODER).collect())
+    let plant = robot.model(&ELASTIC)?.plant(Arc::new(Held(vec![0.0; AXES]))).map_err(step_error)?;
+    Ok(plant.elements.iter().map(|element| element.K[(0, 0)]).take(WITH_ENCODER).collect())
 }
 
 /// The arm with elastic gears, its motors following the smoothed recorded positions.
-pub(super) fn arm_along(robot: &Robot, run: &Recording) -> Result<FlexibleArm, Error> {
+pub(super) fn arm_along(robot: &Robot, run: &Recording) -> Result<Plant, Error> {
     let rows: Vec<f64> = (0..run.time_s.len()).flat_map(|i| run.at(&run.q, i)).collect();
     let motion = Motion::from_samples(&run.time_s, &rows, robot)?;
-    robot.model(&ELASTIC)?.arm(motion.prescribed()).map_err(step_error)
+    robot.model(&ELASTIC)?.plant(motion.prescribed()).map_err(step_error)
 }
 
 /// Motor minus link position of each gear with an encoder, at every sample (rad).
 fn simulated(robot: &Robot, run: &Recording) -> Result<Vec<Vec<f64>>, Error> {
-    let arm = arm_along(robot, run)?;
-    let first = arm.model.n_actuated();
-    let mut seen = Observation::new(&arm);
-    let mut stepper = new_stepper(ALPHA, arm, STEP_S / STEPS as f64, Start::Equilibrium).map_err(step_error)?;
+    let plant = arm_along(robot, run)?;
+    let first = plant.model.n_actuated();
+    let mut seen = Observation::new(&plant);
+    let mut stepper = new_stepper(ALPHA, plant, STEP_S / STEPS as f64, Start::Equilibrium).map_err(step_error)?;
     let mut bends = vec![Vec::new(); WITH_ENCODER];
     for sample in 0..run.time_s.len() {
         if sample > 0 {

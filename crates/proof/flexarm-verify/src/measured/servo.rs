@@ -44,14 +44,14 @@ fn simulated(robot: &Robot, run: &Recording, feed_forward: f64) -> Result<Tracki
     let rows: Vec<f64> = (0..run.time_s.len()).flat_map(|i| run.at(&run.reference, i)).collect();
     let motion = Motion::from_samples(&run.time_s, &rows, robot)?;
     let modelling = Modelling { drives: DriveModel::Servo, ..Modelling::default() };
-    let mut arm = robot.model(&modelling)?.arm(motion.prescribed()).map_err(step_error)?;
-    if let Some(servo) = &arm.servo {
+    let mut plant = robot.model(&modelling)?.plant(motion.prescribed()).map_err(step_error)?;
+    if let Some(servo) = &plant.servo {
         let axes = servo.axes.iter().map(|axis| ServoAxis { feed_forward, ..*axis }).collect();
-        arm.servo = Some(Arc::new(Servo { axes, ..(**servo).clone() }));
+        plant.servo = Some(Arc::new(Servo { axes, ..(**servo).clone() }));
     }
-    let first = arm.model.n_actuated();
-    let mut seen = Observation::new(&arm);
-    let mut stepper = new_stepper(ALPHA, arm, STEP_S / STEPS as f64, Start::Equilibrium).map_err(step_error)?;
+    let first = plant.model.n_actuated();
+    let mut seen = Observation::new(&plant);
+    let mut stepper = new_stepper(ALPHA, plant, STEP_S / STEPS as f64, Start::Equilibrium).map_err(step_error)?;
     let mut positions = vec![Vec::new(); AXES];
     for sample in 0..run.time_s.len() {
         if sample > 0 {

@@ -163,8 +163,8 @@ struct Chain {
 impl Chain {
     fn new(robot: &Robot, n: usize) -> Result<Self, Error> {
         let rig = Rig::new(robot, &parts(n), None)?;
-        let base = rig.arm.model.frame("beam_1").map_or(0, |frame| frame.body);
-        let joints = rig.arm.elements.iter().map(|element| {
+        let base = rig.plant.model.frame("beam_1").map_or(0, |frame| frame.body);
+        let joints = rig.plant.elements.iter().map(|element| {
             let at = rig.at_point(element.body, Vector3::zeros());
             (element.body, -at.frame.X_BF.translation.vector.x)
         });
@@ -282,7 +282,7 @@ impl Weight {
             let hz = [0, 1].map(|k| [nth(&side, k) / side_hz[k] - 1.0, nth(&up, k) / up_hz[k] - 1.0]);
             let sag = -rig.statics(&Vector6::zeros())?[2] / sag_m - 1.0;
             let hz = [hz[0][0], hz[0][1], hz[1][0], hz[1][1]];
-            Ok(WeightModel { name, modal, elastic_coordinates: rig.arm.model.n_elastic(), sag, hz })
+            Ok(WeightModel { name, modal, elastic_coordinates: rig.plant.model.n_elastic(), sag, hz })
         });
         let models = models.collect::<Result<_, Error>>()?;
         Ok(Self { sag_m, side_hz, up_hz, models })

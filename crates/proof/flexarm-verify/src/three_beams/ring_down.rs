@@ -63,7 +63,7 @@ pub(super) struct RingDown {
 impl RingDown {
     pub(super) fn new(robot: &Robot, quick: bool) -> Result<Self, Error> {
         let duration_s = if quick { 0.2 } else { 1.0 };
-        let first_hz = Rig::new(robot, &in_modes(MODES).1, None)?.arm.modes.frequencies_hz()[0];
+        let first_hz = Rig::new(robot, &in_modes(MODES).1, None)?.plant.modes.frequencies_hz()[0];
         let beta = 2.0 * DAMPING / (std::f64::consts::TAU * first_hz);
         let models = models(robot, beta, duration_s)?;
         let peak_m = models[STIFFENED].path.iter().map(|u| u.norm()).worst();

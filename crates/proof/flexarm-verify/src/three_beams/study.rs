@@ -103,9 +103,9 @@ impl Meshes {
             Ok(Model {
                 name,
                 modal,
-                elastic_coordinates: rig.arm.model.n_elastic(),
+                elastic_coordinates: rig.plant.model.n_elastic(),
                 sag_errors: ngsolve.sag_errors(&u),
-                hz_errors: ngsolve.hz_errors(&rig.arm.modes.frequencies_hz()),
+                hz_errors: ngsolve.hz_errors(&rig.plant.modes.frequencies_hz()),
             })
         });
         let models = models.collect::<Result<_, Error>>()?;

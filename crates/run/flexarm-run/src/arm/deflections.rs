@@ -6,7 +6,7 @@
 
 use std::sync::Arc;
 
-use flexarm_stepping::{FlexibleArm, Spring, ToolDeflection, ToolRun};
+use flexarm_stepping::{Plant, Spring, ToolDeflection, ToolRun};
 use rayon::prelude::*;
 
 use crate::arm::Arm;
@@ -64,35 +64,32 @@ impl Arm {
         keep_samples: bool,
         stop: &(dyn Fn() -> bool + Sync),
     ) -> Vec<Result<ToolDeflection, Error>> {
-        let flexible = self;
         let one = |run: &Variation| {
             if stop() {
                 return Err(Error::Interrupted { t: 0.0, partial: false });
             }
-            let arm = Arc::new(self.varied(run, options)?);
+            let plant = Arc::new(self.varied(run, options)?);
             let run = ToolRun {
                 step_s: options.step_s,
                 duration_s: run.scenario.duration_s(),
                 stepper: options.stepper,
                 start: run.scenario.start,
-                tool: flexible.tcp.clone(),
+                tool: self.tcp.clone(),
                 keep_samples,
             };
-            run.deflection(&arm).map_err(|error| flexible.explained(error))
+            run.deflection(&plant).map_err(|error| self.explained(error))
         };
         runs.par_iter().map(one).collect()
     }
 
     /// Returns the arm of a run, with its factors and loads.
-    fn varied(&self, run: &Variation, options: &RunOptions) -> Result<FlexibleArm, Error> {
+    fn varied(&self, run: &Variation, options: &RunOptions) -> Result<Plant, Error> {
         let scenario = &run.scenario;
-        let flexible = self;
-        let springs = flexible.scaled_springs(run.stiffness, run.damping)?;
+        let springs = self.scaled_springs(run.stiffness, run.damping)?;
         runnable(&scenario.motion, options)?;
-        crate::robot::loops::along_motion(&flexible.rigid, &scenario.motion.trajectory)?;
-        let arm =
-            flexible.arm_with(springs, scenario.motion.prescribed()).map_err(|error| flexible.explained(error))?;
-        Ok(loaded(self.robot(), scenario, options, arm)?.0)
+        crate::robot::loops::along_motion(&self.rigid, &scenario.motion.trajectory)?;
+        let plant = self.plant_with(springs, scenario.motion.prescribed()).map_err(|error| self.explained(error))?;
+        Ok(loaded(self.robot(), scenario, options, plant)?.0)
     }
 }
 

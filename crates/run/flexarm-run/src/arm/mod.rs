@@ -14,7 +14,7 @@ use std::sync::{Arc, OnceLock};
 
 use flexarm_flexlink::FlexibleSpan;
 use flexarm_kinematics::{Data, Frame, Model, mass_matrix};
-use flexarm_stepping::{FlexibleArm, Friction, GearCoupling, PrescribedMotion, Servo, Spring, StepError};
+use flexarm_stepping::{Friction, GearCoupling, Plant, PrescribedMotion, Servo, Spring, StepError};
 use nalgebra::{DMatrix, DVector};
 
 use crate::arm::bends::Bend;
@@ -101,9 +101,9 @@ impl Arm {
     /// Returns the arm for the steppers, driven along a motion.
     ///
     /// # Errors
-    /// As [`FlexibleArm::new`] and [`FlexibleArm::with_servo`].
-    pub fn arm(&self, motion: Arc<dyn PrescribedMotion>) -> Result<FlexibleArm, StepError> {
-        self.arm_with(self.springs.clone(), motion)
+    /// As [`Plant::new`] and [`Plant::with_servo`].
+    pub fn plant(&self, motion: Arc<dyn PrescribedMotion>) -> Result<Plant, StepError> {
+        self.plant_with(self.springs.clone(), motion)
     }
 
     /// As [`Self::arm`], with other springs in the same places; the laws of gears follow the
@@ -111,30 +111,30 @@ impl Arm {
     ///
     /// # Errors
     /// As [`Self::arm`].
-    pub fn arm_with(&self, springs: Vec<Spring>, motion: Arc<dyn PrescribedMotion>) -> Result<FlexibleArm, StepError> {
-        self.completed(FlexibleArm::new(self.model.clone(), springs, motion)?)
+    pub fn plant_with(&self, springs: Vec<Spring>, motion: Arc<dyn PrescribedMotion>) -> Result<Plant, StepError> {
+        self.completed(Plant::new(self.model.clone(), springs, motion)?)
     }
 
     /// As [`Self::arm`], for equilibria alone: links between springs need no mass.
-    pub(crate) fn arm_at_rest(&self, motion: Arc<dyn PrescribedMotion>) -> Result<FlexibleArm, StepError> {
-        self.completed(FlexibleArm::at_rest(self.model.clone(), self.springs.clone(), motion)?)
+    pub(crate) fn plant_at_rest(&self, motion: Arc<dyn PrescribedMotion>) -> Result<Plant, StepError> {
+        self.completed(Plant::at_rest(self.model.clone(), self.springs.clone(), motion)?)
     }
 
     /// Adds friction, gear laws and servos to an arm.
-    fn completed(&self, mut arm: FlexibleArm) -> Result<FlexibleArm, StepError> {
+    fn completed(&self, mut plant: Plant) -> Result<Plant, StepError> {
         if self.friction.iter().any(|f| *f != Friction::NONE) {
-            arm.friction.clone_from(&self.friction);
+            plant.friction.clone_from(&self.friction);
         }
-        let stiffness: Vec<f64> = arm.elements.iter().map(|element| element.K[(0, 0)]).collect();
-        let arm = self.gears.put_into(arm, |k| stiffness[k] / self.springs[k].K[(0, 0)])?;
+        let stiffness: Vec<f64> = plant.elements.iter().map(|element| element.K[(0, 0)]).collect();
+        let plant = self.gears.put_into(plant, |k| stiffness[k] / self.springs[k].K[(0, 0)])?;
         if self.torque.is_empty() {
-            return Ok(arm);
+            return Ok(plant);
         }
         let n = self.rigid.nv();
         let (mut q, mut v, mut a) = (DVector::zeros(n), DVector::zeros(n), DVector::zeros(n));
-        arm.motion.sample(0.0, q.as_mut_slice(), v.as_mut_slice(), a.as_mut_slice());
+        plant.motion.sample(0.0, q.as_mut_slice(), v.as_mut_slice(), a.as_mut_slice());
         let axes = self.servo_axes(&q);
-        arm.with_servo(Servo { sample_s: self.sample_s(), axes, rigid: self.rigid.clone() })
+        plant.with_servo(Servo { sample_s: self.sample_s(), axes, rigid: self.rigid.clone() })
     }
 
     /// Returns the coupling of motors that move several joints, if there is one.

@@ -54,9 +54,10 @@ impl Arm {
             let posed = Posed::new(arm.clone(), at)?;
             let linear = posed.linear(&Vector6::from(wrench))?;
             let mut caveats = at_rest(&posed, &linear, &wrench);
-            if let (Use::Commanded(_, stepper, step_s), Some(first)) = (used, posed.arm.modes.frequencies_hz().first())
+            if let (Use::Commanded(_, stepper, step_s), Some(first)) =
+                (used, posed.plant.modes.frequencies_hz().first())
             {
-                caveats.extend(validity::step(stepper, step_s, *first, posed.arm.first_damping_ratio()));
+                caveats.extend(validity::step(stepper, step_s, *first, posed.plant.first_damping_ratio()));
             }
             Ok(caveats)
         });
@@ -104,7 +105,7 @@ fn of_scenario(arm: &Arm, scenario: &Scenario) -> Vec<Caveat> {
 /// Returns the caveats about the arm at rest at a pose, under a wrench on the TCP.
 pub(crate) fn at_rest(posed: &Posed, linear: &Linear, wrench: &[f64; 6]) -> Vec<Caveat> {
     let mut caveats = posed.caveats();
-    caveats.extend(motion::of_wrench(wrench, &Size::of(&posed.flexible.robot().rigid)));
+    caveats.extend(motion::of_wrench(wrench, &Size::of(&posed.arm.robot().rigid)));
     caveats.extend(posed.validity(linear));
     caveats
 }

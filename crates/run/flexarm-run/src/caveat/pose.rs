@@ -1,6 +1,6 @@
 //! Caveats about the arm at rest in a pose: sag, first natural frequency, deflection of gears.
 
-use flexarm_stepping::FlexibleArm;
+use flexarm_stepping::Plant;
 
 use super::drives::{give, speed_loop};
 use super::{Caveat, kinds};
@@ -18,8 +18,8 @@ const DAMPED: [f64; 2] = [0.2, 0.5];
 
 /// An arm at rest.
 pub(crate) struct ArmAtRest<'a> {
-    pub(crate) flexible: &'a Arm,
-    pub(crate) arm: &'a FlexibleArm,
+    pub(crate) arm: &'a Arm,
+    pub(crate) plant: &'a Plant,
     /// Elastic coordinates.
     pub(crate) elastic: &'a [f64],
     /// Static TCP deflection (m).
@@ -29,7 +29,7 @@ pub(crate) struct ArmAtRest<'a> {
 impl ArmAtRest<'_> {
     /// Returns all of these caveats.
     pub(crate) fn caveats(&self) -> Vec<Caveat> {
-        let extent = self.flexible.extent;
+        let extent = self.arm.extent;
         let mut caveats = self.gears();
         if extent > 0.0 && self.sag_m > SAG[0] * extent {
             let caveat = kinds::SAG.found("the TCP", self.sag_m, extent);
@@ -42,20 +42,20 @@ impl ArmAtRest<'_> {
 
     fn gears(&self) -> Vec<Caveat> {
         let mut caveats = Vec::new();
-        for (element, owner) in self.arm.elements.iter().zip(&self.flexible.owners) {
+        for (element, owner) in self.plant.elements.iter().zip(&self.arm.owners) {
             let Owner::Drive(k) = owner else { continue };
-            let drive = &self.flexible.robot().drives[*k];
-            let joint = self.flexible.robot().rigid.joints.iter().find(|j| j.name == drive.joint);
+            let drive = &self.arm.robot().drives[*k];
+            let joint = self.arm.robot().rigid.joints.iter().find(|j| j.name == drive.joint);
             let effort = joint.map_or(f64::INFINITY, |j| j.limits.effort);
-            let e = &self.elastic[self.arm.offset(element)..][..element.size];
+            let e = &self.elastic[self.plant.offset(element)..][..element.size];
             let norm = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>().sqrt();
             let (along, turned) = match element.size {
                 6 => (norm(&e[..3]), norm(&e[3..])),
-                _ if element.slides(&self.arm.model) => (norm(e), 0.0),
+                _ if element.slides(&self.plant.model) => (norm(e), 0.0),
                 _ => (0.0, norm(e)),
             };
             // Play is not deflection.
-            let [turning, sliding] = drive.play(element.slides(&self.arm.model));
+            let [turning, sliding] = drive.play(element.slides(&self.plant.model));
             caveats.extend(give(drive, effort, (turned - turning).max(0.0), (along - sliding).max(0.0), 1.0));
         }
         caveats
@@ -63,18 +63,18 @@ impl ArmAtRest<'_> {
 
     /// Checks frequency and damping of the first mode.
     fn first_mode(&self, extent: f64) -> Vec<Caveat> {
-        let modes = &self.arm.modes;
+        let modes = &self.plant.modes;
         let Some(omega) = modes.omega.first() else { return Vec::new() };
         let hz = omega / std::f64::consts::TAU;
         let mut caveats = Vec::new();
-        let geared = self.flexible.owners.iter().any(|owner| matches!(owner, Owner::Drive(_)));
+        let geared = self.arm.owners.iter().any(|owner| matches!(owner, Owner::Drive(_)));
         if hz < SLOW[1] || (geared && hz < SLOW[0]) {
             let caveat = kinds::SLOW_MODE.found("the arm", hz, if hz < SLOW[1] { SLOW[1] } else { SLOW[0] });
             caveats.push(if hz < SLOW[1] { caveat } else { caveat.as_note() });
         } else if hz * extent > SOUND {
             caveats.push(kinds::FAST_MODE.found("the arm", hz, SOUND / extent));
         }
-        let ratio = self.arm.first_damping_ratio();
+        let ratio = self.plant.first_damping_ratio();
         if ratio > DAMPED[0] {
             let caveat = kinds::DAMPED_MODE.found("the first mode", ratio, 1.0);
             caveats.push(if ratio > DAMPED[1] { caveat } else { caveat.as_note() });
@@ -83,13 +83,13 @@ impl ArmAtRest<'_> {
     }
 
     fn speed_loops(&self) -> Vec<Caveat> {
-        let Some(servo) = &self.arm.servo else { return Vec::new() };
-        let n = self.arm.model.n_actuated();
+        let Some(servo) = &self.plant.servo else { return Vec::new() };
+        let n = self.plant.model.n_actuated();
         let mut q = nalgebra::DVector::zeros(n);
         let (mut v, mut a) = (vec![0.0; n], vec![0.0; n]);
-        self.arm.motion.sample(0.0, q.as_mut_slice(), &mut v, &mut a);
-        let quick = self.flexible.quick_inertia(&q);
-        let name = |k: usize| self.arm.model.coordinates()[k].joint.as_str();
+        self.plant.motion.sample(0.0, q.as_mut_slice(), &mut v, &mut a);
+        let quick = self.arm.quick_inertia(&q);
+        let name = |k: usize| self.plant.model.coordinates()[k].joint.as_str();
         let loops = servo.axes.iter().zip(quick);
         loops
             .filter_map(|(axis, inertia)| {

@@ -214,15 +214,15 @@ pub fn inspect(robot: &Robot, at: Option<&[f64]>, velocity: Option<&[f64]>) -> R
     all_finite("the place of the TCP and its Jacobian", X.translation.vector.iter().chain(&J))?;
     all_finite("the mass matrix and the torques", M.iter().chain(&gravity).chain(&bias))?;
 
-    let flexible = robot.model(&Modelling::default())?;
+    let arm = robot.model(&Modelling::default())?;
     // Only the rigid robot is inspected, so the caveat about missing elasticity does not apply.
-    let mut caveats = flexible.caveats(Use::Held(&q, &[0.0; 6]));
+    let mut caveats = arm.caveats(Use::Held(&q, &[0.0; 6]));
     caveats.retain(|caveat| caveat.code != "nothing-yields");
     Ok(Inspection {
         robot: robot.name.clone(),
         joints: joint_infos(&model),
         links: link_infos(&robot.urdf.mechanism),
-        flexible_links: flexible_infos(robot, &flexible)?,
+        flexible_links: flexible_infos(robot, &arm)?,
         coupling: robot.coupling.as_ref().map(|c| CouplingInfo { joints: c.joints.clone(), matrix: rows(&c.C) }),
         mounting: robot.mounting.as_ref().and_then(MountingInfo::of),
         tcp: TcpInfo {
@@ -272,7 +272,7 @@ fn link_infos(mechanism: &Mechanism) -> Vec<LinkInfo> {
 }
 
 /// Describes the flexible links with the models that the robot file asks for.
-fn flexible_infos(robot: &Robot, flexible: &Arm) -> Result<Vec<FlexibleInfo>, Error> {
+fn flexible_infos(robot: &Robot, arm: &Arm) -> Result<Vec<FlexibleInfo>, Error> {
     let forms =
         robot.flexible_links.iter().map(|link| robot.form_of(link, &Modelling::default()).map(|(form, _)| form));
     let forms = forms.collect::<Result<Vec<_>, _>>()?;
@@ -294,5 +294,5 @@ fn flexible_infos(robot: &Robot, flexible: &Arm) -> Result<Vec<FlexibleInfo>, Er
             stiffness: rows(&DMatrix::from_iterator(6, 6, K.iter().copied())),
         }
     };
-    Ok(flexible.spans.iter().zip(&robot.flexible_links).zip(&forms).map(info).collect())
+    Ok(arm.spans.iter().zip(&robot.flexible_links).zip(&forms).map(info).collect())
 }

@@ -73,8 +73,8 @@ pub fn record_modes(
 
     let mut files = recorders(Some(outputs), false)?;
     (files.names.report, files.names.report_md) = (None, None);
-    let mut header = robot_header(robot, &posed.arm);
-    let (bends, stations) = stations(&arm.bends, &posed.arm.model, &header.links);
+    let mut header = robot_header(robot, &posed.plant);
+    let (bends, stations) = stations(&arm.bends, &posed.plant.model, &header.links);
     header.bends = bends;
     header.color_scale_m = crate::run::magnification::round_up(motion);
     header.volume = Some(volume(&posed, motion));
@@ -137,7 +137,7 @@ fn list(robot: &str, shown: &[DampedMode], start: impl Fn(usize) -> f64) -> Stri
 /// Bounding box of all bodies and the TCP, enlarged by the TCP amplitude (m).
 fn volume(posed: &Posed, motion_m: f64) -> [[f64; 3]; 2] {
     let (mut data, state) = posed.undeformed();
-    forward_kinematics(&posed.arm.model, &mut data, &state.q);
+    forward_kinematics(&posed.plant.model, &mut data, &state.q);
     let places = data.X_WB.iter().map(|X| X.translation.vector).chain([data.X_WF(&posed.tool).translation.vector]);
     places.fold([[f64::MAX; 3], [f64::MIN; 3]], |[low, high], p| {
         let corner = |c: usize| (low[c].min(p[c] - motion_m), high[c].max(p[c] + motion_m));
@@ -149,7 +149,7 @@ fn volume(posed: &Posed, motion_m: f64) -> [[f64; 3]; 2] {
 /// Maximum distance of the TCP from a joint (m).
 fn reach(posed: &Posed) -> f64 {
     let (mut data, state) = posed.undeformed();
-    forward_kinematics(&posed.arm.model, &mut data, &state.q);
+    forward_kinematics(&posed.plant.model, &mut data, &state.q);
     let tool = data.X_WF(&posed.tool).translation.vector;
     data.X_WB.iter().skip(1).map(|X| (X.translation.vector - tool).norm()).fold(0.0, f64::max)
 }
@@ -176,7 +176,7 @@ struct Stage<'a> {
 impl<'a> Stage<'a> {
     fn new(robot: &Robot, posed: &'a Posed, linear: &'a Linear, stations: Vec<Frame>) -> Self {
         let (mut data, state) = posed.undeformed();
-        let model = &posed.arm.model;
+        let model = &posed.plant.model;
         forward_kinematics(model, &mut data, &state.q);
         let frames = link_frames(robot, model);
         let zero = vec![0.0; posed.at.len()];
@@ -194,13 +194,13 @@ impl<'a> Stage<'a> {
     }
 
     fn sample(&mut self, step: u64, x: &DVector<f64>) -> &Sample {
-        let driven = &self.posed.arm.torque_driven;
+        let driven = &self.posed.plant.torque_driven;
         for (value, &k) in x.iter().zip(driven) {
             self.q[k] = *value;
         }
         let (first, ne) = (self.q.len() + driven.len() - x.len(), x.len() - driven.len());
         self.q.rows_mut(first, ne).copy_from(&x.rows(driven.len(), ne));
-        forward_kinematics(&self.posed.arm.model, &mut self.data, &self.q);
+        forward_kinematics(&self.posed.plant.model, &mut self.data, &self.q);
         let sample = &mut self.sample;
         sample.time_s = step as f64 / RATE_HZ;
         sample.step = step;

@@ -191,8 +191,8 @@ impl ModeModel {
             let linear = posed.linear(&Vector6::zeros())?;
             return Ok(Self { damping: linear.D.clone(), linear, speeds: Vec::new(), change: 0.0 });
         }
-        let found = linearise_rotation(&posed.arm, &posed.tool, &posed.at, &speeds);
-        let found = found.map_err(|error| posed.flexible.explained(error))?;
+        let found = linearise_rotation(&posed.plant, &posed.tool, &posed.at, &speeds);
+        let found = found.map_err(|error| posed.arm.explained(error))?;
         Ok(Self { linear: found.linear, damping: found.damping, speeds, change: found.change })
     }
 
@@ -227,7 +227,7 @@ fn lowest(posed: &Posed, speeds: Option<&[f64]>, count: usize) -> Result<ModeTab
 /// Estimates the error of the frequencies of a turning arm from those with half as many modes of
 /// its links; returns a caveat if it is large.
 fn few_modes(posed: &Posed, model: &ModeModel, frequencies_hz: &[f64]) -> Option<Caveat> {
-    let arm = &posed.flexible;
+    let arm = &posed.arm;
     let of_links = arm.spans.iter().filter(|span| span.lumped.is_none()).filter_map(|span| {
         let (_, range) = model.linear.elements.iter().find(|(name, _)| *name == span.link)?;
         range.len().checked_sub(6)
@@ -247,7 +247,7 @@ fn few_modes(posed: &Posed, model: &ModeModel, frequencies_hz: &[f64]) -> Option
 
 /// Computes the figures of the modes.
 pub(crate) fn table(posed: &Posed, model: &ModeModel, all: &[DampedMode], count: usize) -> Result<ModeTable, Error> {
-    let robot = posed.flexible.robot();
+    let robot = posed.arm.robot();
     let linear = &model.linear;
     // Under servos the modes share the compliance of springs and servos; it does not exist if a
     // motor is free.
@@ -285,7 +285,7 @@ pub(crate) fn table(posed: &Posed, model: &ModeModel, all: &[DampedMode], count:
         files: Files::default(),
         warnings: caveat::warnings(&caveats),
         caveats,
-        driven: posed.arm.torque_driven.iter().take(linear.driven).map(|&k| posed.joints[k].clone()).collect(),
+        driven: posed.plant.torque_driven.iter().take(linear.driven).map(|&k| posed.joints[k].clone()).collect(),
         joints: posed.joints.clone(),
         at: posed.at.clone(),
         speeds: model.speeds.clone(),

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use flexarm_analysis::engineering_strain;
 use flexarm_kinematics::{Data, Frame, Pose, State, Wrench, forward_kinematics, rotation_vector};
 use flexarm_settings::Quantity;
-use flexarm_stepping::{FlexibleArm, Held, Linear, OperatingPoint, StepError, linearise};
+use flexarm_stepping::{Held, Linear, OperatingPoint, Plant, StepError, linearise};
 use nalgebra::{DVector, Vector6};
 
 use crate::arm::Arm;
@@ -21,9 +21,9 @@ use crate::robot::loops;
 /// Flexible arm with its drives locked at a pose.
 pub struct Posed {
     /// Robot with its links and drives as modelled.
-    pub flexible: Arc<Arm>,
+    pub arm: Arc<Arm>,
     /// Arm with its drives locked.
-    pub arm: FlexibleArm,
+    pub plant: Plant,
     /// Frame of the TCP.
     pub tool: Frame,
     /// Actuated joints, in coordinate order.
@@ -122,55 +122,55 @@ impl Arm {
         };
         let actuated = &model.coordinates()[..model.n_actuated()];
         let pose = actuated.iter().map(|c| middle(c.limits.lower, c.limits.upper)).collect();
-        let arm = self.arm(Arc::new(Held(pose))).map_err(|error| self.explained(error))?;
-        Ok(OperatingPoint::new(arm, self.tcp.clone()))
+        let plant = self.plant(Arc::new(Held(pose))).map_err(|error| self.explained(error))?;
+        Ok(OperatingPoint::new(plant, self.tcp.clone()))
     }
 }
 
 impl Posed {
     /// Holds an arm at a pose; `at` in coordinate order (rad or m). [`Arm::posed`] also accepts no
     /// values.
-    pub fn new(flexible: Arc<Arm>, at: Vec<f64>) -> Result<Self, Error> {
-        let arm = flexible.arm(Arc::new(Held(at.clone())));
-        Self::of(flexible, arm, at)
+    pub fn new(arm: Arc<Arm>, at: Vec<f64>) -> Result<Self, Error> {
+        let plant = arm.plant(Arc::new(Held(at.clone())));
+        Self::of(arm, plant, at)
     }
 
     /// As [`Self::new`], for equilibria alone: an arm with a link between springs that has no mass
     /// has no modes.
-    pub(crate) fn resting(flexible: Arc<Arm>, at: Vec<f64>) -> Result<Self, Error> {
+    pub(crate) fn resting(arm: Arc<Arm>, at: Vec<f64>) -> Result<Self, Error> {
         let held = Arc::new(Held(at.clone()));
-        let arm = match flexible.arm(held.clone()) {
-            Err(StepError::Singular { matrix, .. }) if matrix.starts_with("mass matrix") => flexible.arm_at_rest(held),
-            arm => arm,
+        let plant = match arm.plant(held.clone()) {
+            Err(StepError::Singular { matrix, .. }) if matrix.starts_with("mass matrix") => arm.plant_at_rest(held),
+            plant => plant,
         };
-        Self::of(flexible, arm, at)
+        Self::of(arm, plant, at)
     }
 
-    fn of(flexible: Arc<Arm>, arm: Result<FlexibleArm, StepError>, at: Vec<f64>) -> Result<Self, Error> {
-        loops::check_pose(&flexible.rigid, &mut Data::new(&flexible.rigid), &DVector::from_column_slice(&at))?;
-        balancer::check_pose(&flexible.rigid, &mut Data::new(&flexible.rigid), &DVector::from_column_slice(&at))?;
-        let model = flexible.model.clone();
+    fn of(arm: Arc<Arm>, plant: Result<Plant, StepError>, at: Vec<f64>) -> Result<Self, Error> {
+        loops::check_pose(&arm.rigid, &mut Data::new(&arm.rigid), &DVector::from_column_slice(&at))?;
+        balancer::check_pose(&arm.rigid, &mut Data::new(&arm.rigid), &DVector::from_column_slice(&at))?;
+        let model = arm.model.clone();
         let actuated = &model.coordinates()[..model.n_actuated()];
         let joints: Vec<String> = actuated.iter().map(|c| c.joint.clone()).collect();
         let prismatic = actuated.iter().map(|c| c.slides()).collect();
-        let arm = arm.map_err(|error| flexible.explained(error))?;
-        Ok(Self { tool: flexible.tcp.clone(), flexible, arm, joints, prismatic, at })
+        let plant = plant.map_err(|error| arm.explained(error))?;
+        Ok(Self { tool: arm.tcp.clone(), arm, plant, joints, prismatic, at })
     }
 
     /// Returns the caveats about the robot and its equilibrium under a wrench on the TCP (world
     /// axes).
     pub fn caveats_of(&self, linear: &Linear, wrench: &[f64; 6]) -> Vec<Caveat> {
-        let mut caveats = of_use::of_model(&self.flexible);
+        let mut caveats = of_use::of_model(&self.arm);
         caveats.extend(of_use::at_rest(self, linear, wrench));
         once_each(caveats)
     }
 
     /// Checks whether the pose is within the joint ranges, and whether anything is elastic.
     pub(crate) fn caveats(&self) -> Vec<Caveat> {
-        let model = &self.arm.model;
+        let model = &self.plant.model;
         let mut caveats: Vec<Caveat> =
             validity::outside_limits(&model.coordinates()[..model.n_actuated()], &self.at).collect();
-        if self.flexible.springs.is_empty() {
+        if self.arm.springs.is_empty() {
             let message =
                 "the robot has no flexible link and no elastic drive: it does not deflect and does not vibrate";
             caveats.push(Caveat::from_message(
@@ -187,69 +187,69 @@ impl Posed {
     pub fn linear(&self, wrench: &Vector6<f64>) -> Result<Linear, Error> {
         let F = Wrench::new(wrench.fixed_rows::<3>(0).into(), wrench.fixed_rows::<3>(3).into());
         check_wrench(wrench.as_slice())?;
-        linearise(&self.arm, &self.tool, &F, 0.0).map_err(|error| self.flexible.explained(error))
+        linearise(&self.plant, &self.tool, &F, 0.0).map_err(|error| self.arm.explained(error))
     }
 
     /// Returns the static equilibrium under gravity and a wrench at the TCP (world axes), as used
     /// by maps.
     pub(crate) fn operating_point(&self, wrench: &[f64; 6]) -> Result<OperatingPoint, Error> {
         let [fx, fy, fz, tx, ty, tz] = *wrench;
-        let mut at = OperatingPoint::new(self.arm.clone(), self.tool.clone());
+        let mut at = OperatingPoint::new(self.plant.clone(), self.tool.clone());
         let F = Wrench::new([fx, fy, fz].into(), [tx, ty, tz].into());
-        at.solve(&self.at, &F).map_err(|error| self.flexible.explained(error))?;
+        at.solve(&self.at, &F).map_err(|error| self.arm.explained(error))?;
         Ok(at)
     }
 
     /// Returns the TCP pose with all elastic coordinates at zero.
     pub(crate) fn rigid_tool(&self) -> Pose {
         let (mut data, state) = self.undeformed();
-        forward_kinematics(&self.arm.model, &mut data, &state.q);
+        forward_kinematics(&self.plant.model, &mut data, &state.q);
         data.X_WF(&self.tool)
     }
 
     /// Checks whether the models are valid at an equilibrium: deflections of links, torques of
     /// drives.
     pub(crate) fn validity(&self, linear: &Linear) -> Vec<Caveat> {
-        let links = self.flexible.spans.iter().zip(strains(&self.flexible, &self.arm, &linear.q));
+        let links = self.arm.spans.iter().zip(strains(&self.arm, &self.plant, &linear.q));
         let links = links.flat_map(|(span, (strain, rotation))| validity::link(&span.link, rotation, strain));
         let holding = linear.holding.as_slice();
-        let efforts = validity::efforts(&kinds::HOLDING, self.arm.model.coordinates(), holding);
+        let efforts = validity::efforts(&kinds::HOLDING, self.plant.model.coordinates(), holding);
         links.chain(efforts).chain(self.standing(linear)).collect()
     }
 
     /// Returns the caveats about the arm at rest.
     fn standing(&self, linear: &Linear) -> Vec<Caveat> {
         let moved = linear.X_WT.translation.vector - self.rigid_tool().translation.vector;
-        let elastic = &linear.q.as_slice()[self.arm.model.n_actuated()..];
-        let (flexible, arm) = (&self.flexible, &self.arm);
-        ArmAtRest { flexible, arm, elastic, sag_m: moved.norm() }.caveats()
+        let elastic = &linear.q.as_slice()[self.plant.model.n_actuated()..];
+        let (arm, plant) = (&self.arm, &self.plant);
+        ArmAtRest { arm, plant, elastic, sag_m: moved.norm() }.caveats()
     }
 
     /// State with the joints at the pose and the elastic coordinates at zero.
     pub(crate) fn undeformed(&self) -> (Data, State) {
-        undeformed(&self.arm)
+        undeformed(&self.plant)
     }
 }
 
 /// State with the joints at the start of the motion and the elastic coordinates at zero.
-fn undeformed(arm: &FlexibleArm) -> (Data, State) {
-    let mut state = State::zeros(&arm.model);
-    arm.prescribed_state(0.0, &mut state, &mut DVector::zeros(arm.model.nv()));
-    (Data::new(&arm.model), state)
+fn undeformed(plant: &Plant) -> (Data, State) {
+    let mut state = State::zeros(&plant.model);
+    plant.prescribed_state(0.0, &mut state, &mut DVector::zeros(plant.model.nv()));
+    (Data::new(&plant.model), state)
 }
 
 /// Engineering strain of each flexible link and rotation of its far end (rad), at coordinates `q`.
-pub(crate) fn strains(flexible: &Arm, arm: &FlexibleArm, q: &DVector<f64>) -> Vec<(f64, f64)> {
-    let model = &arm.model;
-    let (mut data, straight) = undeformed(arm);
+pub(crate) fn strains(arm: &Arm, plant: &Plant, q: &DVector<f64>) -> Vec<(f64, f64)> {
+    let model = &plant.model;
+    let (mut data, straight) = undeformed(plant);
     let mut ends = |q: &DVector<f64>| -> Vec<Pose> {
         forward_kinematics(model, &mut data, q);
         let pose = |link: &str, X: &Pose| data.X_WF(model.frame(link).expect("a link of the substitution")) * *X;
-        let spans = flexible.spans.iter();
+        let spans = arm.spans.iter();
         spans.map(|s| pose(&s.link, &s.X_LA).inverse() * pose(&s.distal_link, &s.X_DB)).collect()
     };
     let (bent, straight) = (ends(q), ends(&straight.q));
-    let pairs = flexible.spans.iter().zip(bent.iter().zip(&straight));
+    let pairs = arm.spans.iter().zip(bent.iter().zip(&straight));
     pairs
         .map(|(span, (bent, straight))| {
             let change = bent.translation.vector.norm() - span.length;

@@ -194,7 +194,7 @@ impl Arm {
 }
 
 fn response_at(posed: Posed, request: &ResponseRequest, outputs: Option<&ResponseOutputs>) -> Result<Response, Error> {
-    let robot = posed.flexible.robot();
+    let robot = posed.arm.robot();
     let inputs = input_channels(&request.inputs, &posed)?;
     let channels = output_channels(&request.outputs)?;
     if !POINTS.contains(&request.points) {

@@ -133,7 +133,7 @@ impl Arm {
 }
 
 fn statics_at(posed: Posed, wrench: [f64; 6], paths: Option<[std::path::PathBuf; 2]>) -> Result<Statics, Error> {
-    let robot = posed.flexible.robot();
+    let robot = posed.arm.robot();
     let X_rigid = posed.rigid_tool();
     let loaded = posed.linear(&wrench.into())?;
     // Identical bit for bit to the figures of a map at this pose.
@@ -147,7 +147,7 @@ fn statics_at(posed: Posed, wrench: [f64; 6], paths: Option<[std::path::PathBuf;
     all_finite("the holding torques", &loaded.holding)?;
 
     let elements = element_statics(&posed, &loaded);
-    let stress = stress_at_rest(&posed.flexible, &posed.arm, &loaded.q)?;
+    let stress = stress_at_rest(&posed.arm, &posed.plant, &loaded.q)?;
     let mut caveats = posed.caveats_of(&loaded, &wrench);
     caveats.extend(validity::stress(&stress));
     let [x, y, z, rx, ry, rz] = displacement;
@@ -162,7 +162,7 @@ fn statics_at(posed: Posed, wrench: [f64; 6], paths: Option<[std::path::PathBuf;
         sag_m: [sx, sy, sz],
         sag_rad: [srx, sry, srz],
         compliance: C.row_iter().map(|row| row.iter().copied().collect()).collect(),
-        motor_torque: robot.motor_torques(&posed.arm, loaded.holding.as_slice()),
+        motor_torque: robot.motor_torques(&posed.plant, loaded.holding.as_slice()),
         holding_torque: loaded.holding.as_slice().to_vec(),
         elements,
         stress,
@@ -184,14 +184,14 @@ fn statics_at(posed: Posed, wrench: [f64; 6], paths: Option<[std::path::PathBuf;
 fn element_statics(posed: &Posed, loaded: &Linear) -> Vec<ElementStatics> {
     // To first order each element's contribution is its deflection times the Jacobian at the rigid
     // pose.
-    let model = &posed.arm.model;
+    let model = &posed.plant.model;
     let (mut data, state) = posed.undeformed();
     forward_kinematics(model, &mut data, &state.q);
     let mut J = Matrix6xX::zeros(model.nv());
     frame_jacobian(model, &data, &posed.tool, &mut J);
     let ne = model.n_elastic();
     let J = J.columns(model.nv() - ne, ne);
-    let (springs, energies) = posed.arm.springs_at_rest(&loaded.q);
+    let (springs, energies) = posed.plant.springs_at_rest(&loaded.q);
     let mut elements = Vec::new();
     for ((name, range), energy_j) in loaded.elements.iter().zip(energies) {
         let (first, n) = (range.start, range.len());

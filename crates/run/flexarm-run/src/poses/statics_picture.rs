@@ -105,10 +105,10 @@ fn lines(s: &Statics, slides: &[bool]) -> Vec<String> {
 
 /// Sample of the deflected arm next to the rigid one.
 fn scene(posed: &Posed, loaded: &Linear) -> (RunHeader, Sample) {
-    let robot = posed.flexible.robot();
-    let model = &posed.arm.model;
-    let mut header = robot_header(robot, &posed.arm);
-    let (bends, stations) = stations(&posed.flexible.bends, model, &header.links);
+    let robot = posed.arm.robot();
+    let model = &posed.plant.model;
+    let mut header = robot_header(robot, &posed.plant);
+    let (bends, stations) = stations(&posed.arm.bends, model, &header.links);
     let frames = link_frames(robot, model);
     let (mut data, straight) = posed.undeformed();
     let mut twin = |q: &DVector<f64>, bent: bool| {
@@ -123,7 +123,7 @@ fn scene(posed: &Posed, loaded: &Linear) -> (RunHeader, Sample) {
 
     let base = sample.rigid.X_WL.first().map_or_else(Default::default, |X| X.translation.vector);
     let places = sample.rigid.X_WL.iter().chain([&sample.rigid.X_WT]);
-    let turns = loaded.elements.iter().zip(&posed.arm.elements).map(|((_, range), element)| {
+    let turns = loaded.elements.iter().zip(&posed.plant.elements).map(|((_, range), element)| {
         let e = loaded.equilibrium.rows(range.start, range.len());
         match (element.modal, range.len()) {
             (true, _) => 0.0,

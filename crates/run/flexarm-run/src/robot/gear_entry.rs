@@ -2,7 +2,7 @@
 //! effects of a robot.
 
 use flexarm_stepping::{
-    CurveError, FlexibleArm, GearCoupling, Harmonic, Hysteresis, LoadFriction, Slider, StepError, TorqueCurve,
+    CurveError, GearCoupling, Harmonic, Hysteresis, LoadFriction, Plant, Slider, StepError, TorqueCurve,
     TransmissionError,
 };
 use nalgebra::DMatrix;
@@ -262,14 +262,10 @@ impl GearLaws {
     }
 
     /// Adds them to an arm; `stiffer` is the stiffness factor of each element.
-    pub(crate) fn put_into(
-        &self,
-        mut arm: FlexibleArm,
-        stiffer: impl Fn(usize) -> f64,
-    ) -> Result<FlexibleArm, StepError> {
-        arm.load_friction.clone_from(&self.load_friction);
+    pub(crate) fn put_into(&self, mut plant: Plant, stiffer: impl Fn(usize) -> f64) -> Result<Plant, StepError> {
+        plant.load_friction.clone_from(&self.load_friction);
         if let Some(coupling) = &self.coupling {
-            arm = arm.with_coupling(coupling.clone())?;
+            plant = plant.with_coupling(coupling.clone())?;
         }
         if !self.hysteresis.is_empty() {
             let scaled = |law: &Hysteresis| {
@@ -277,11 +273,11 @@ impl GearLaws {
                 let sliders = law.sliders.iter().map(|s| Slider { stiffness: factor * s.stiffness, ..*s }).collect();
                 Hysteresis { elastic: law.elastic.scaled(factor), sliders, ..law.clone() }
             };
-            arm = arm.with_hysteresis(self.hysteresis.iter().map(scaled).collect())?;
+            plant = plant.with_hysteresis(self.hysteresis.iter().map(scaled).collect())?;
         }
         if !self.transmission.is_empty() {
-            arm = arm.with_transmission_errors(self.transmission.clone())?;
+            plant = plant.with_transmission_errors(self.transmission.clone())?;
         }
-        Ok(arm)
+        Ok(plant)
     }
 }

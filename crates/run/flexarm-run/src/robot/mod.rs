@@ -33,7 +33,7 @@ use std::sync::Arc;
 
 use flexarm_flexlink::Mounting;
 use flexarm_kinematics::{Frame, Mechanism, Model, Pose};
-use flexarm_stepping::{Damping, FlexibleArm};
+use flexarm_stepping::{Damping, Plant};
 use flexarm_urdf::UrdfRobot;
 
 use crate::arm::options::Modelling;
@@ -171,9 +171,9 @@ impl Robot {
 
     /// Converts joint torques to the torques of the motors that move several joints, after their
     /// gears; keyed by the joint of the drive.
-    pub(crate) fn motor_torques(&self, arm: &FlexibleArm, tau: &[f64]) -> BTreeMap<String, f64> {
-        let (Some(robot), Some(arm)) = (&self.coupling, &arm.coupling) else { return BTreeMap::new() };
-        robot.joints.iter().cloned().zip(arm.motor_torques(tau)).collect()
+    pub(crate) fn motor_torques(&self, plant: &Plant, tau: &[f64]) -> BTreeMap<String, f64> {
+        let (Some(robot), Some(plant)) = (&self.coupling, &plant.coupling) else { return BTreeMap::new() };
+        robot.joints.iter().cloned().zip(plant.motor_torques(tau)).collect()
     }
 
     /// Returns the caveats that are known before any computation.

@@ -21,7 +21,7 @@ const ROTOR: f64 = 1e8;
 const RETURN: f64 = 200.0;
 
 pub(super) fn text(robot: &Robot, posed: &Posed, parts: &[Part], springs: &Springs, step_s: f64) -> String {
-    let model = &posed.arm.model;
+    let model = &posed.plant.model;
     let mut out = String::new();
     let meshes = parts.iter().flat_map(|part| &part.shapes);
     let assets: String = meshes
@@ -90,7 +90,7 @@ impl Writer<'_> {
             );
         }
         let tool = &self.posed.tool;
-        if self.posed.arm.model.bodies()[tool.body].name == part.name {
+        if self.posed.plant.model.bodies()[tool.body].name == part.name {
             *out += &format!("{pad}<site name=\"tcp\"{}/>\n", placed(&tool.X_BF));
         }
         for child in (1..self.parts.len()).filter(|&k| self.parts[k].parent == index) {
@@ -102,7 +102,7 @@ impl Writer<'_> {
     }
 
     fn joint(&self, axis: &Axis) -> String {
-        let model = &self.posed.arm.model;
+        let model = &self.posed.plant.model;
         let (n, k) = (model.n_actuated(), axis.coordinate);
         let kind = if axis.slides { "slide" } else { "hinge" };
         let mut text = format!(
@@ -126,7 +126,7 @@ impl Writer<'_> {
             if limits.lower.is_finite() && limits.upper.is_finite() && axis.follows.is_none() {
                 let _ = write!(text, " range=\"{:?} {:?}\"", limits.lower, limits.upper);
             }
-            let armature = if self.posed.arm.torque_driven.contains(&k) { model.rotor_inertia(k) } else { ROTOR };
+            let armature = if self.posed.plant.torque_driven.contains(&k) { model.rotor_inertia(k) } else { ROTOR };
             if armature > 0.0 && axis.follows.is_none() {
                 let _ = write!(text, " armature=\"{armature:?}\"");
             }
@@ -151,8 +151,8 @@ fn tendon(spring: &Spring, axes: &[&Axis], first: usize) -> String {
 
 fn actuators(axis: &Axis, posed: &Posed) -> String {
     let name = markup(&axis.name);
-    if posed.arm.torque_driven.contains(&axis.coordinate) {
-        let effort = posed.arm.model.coordinates()[axis.coordinate].limits.effort;
+    if posed.plant.torque_driven.contains(&axis.coordinate) {
+        let effort = posed.plant.model.coordinates()[axis.coordinate].limits.effort;
         let range = if effort.is_finite() { format!(" ctrlrange=\"{:?} {effort:?}\"", -effort) } else { String::new() };
         return format!("    <motor name=\"{name}\" joint=\"{name}\"{range}/>\n");
     }
@@ -169,14 +169,14 @@ fn rest(posed: &Posed, axes: &[&Axis], motors: &[&Axis]) -> String {
     let value = |axis: &&Axis| {
         let independent = match axis.coordinate.checked_sub(posed.at.len()) {
             None => posed.at[axis.coordinate],
-            Some(k) => posed.arm.modes.equilibrium[k],
+            Some(k) => posed.plant.modes.equilibrium[k],
         };
         axis.follows.map_or(independent, |(ratio, offset)| ratio * independent + offset)
     };
     let qpos: Vec<f64> = axes.iter().map(value).collect();
     let ctrl: Vec<f64> = motors
         .iter()
-        .flat_map(|axis| match posed.arm.torque_driven.contains(&axis.coordinate) {
+        .flat_map(|axis| match posed.plant.torque_driven.contains(&axis.coordinate) {
             true => vec![0.0],
             false => vec![0.0, value(axis), 0.0],
         })

@@ -54,8 +54,8 @@ impl Arm {
     pub fn export(self: &Arc<Self>, at: Option<&[f64]>, format: RobotFormat) -> Result<RobotExport, Error> {
         let posed = self.posed(at)?;
         let (mut parts, mut files) = parts(self.robot(), &posed)?;
-        let springs = Springs::of(&posed.arm);
-        let step_s = step(&posed.arm);
+        let springs = Springs::of(&posed.plant);
+        let step_s = step(&posed.plant);
         let mut left_out = left_out(&posed);
         let (text, ending) = match format {
             RobotFormat::Mjcf => {
@@ -96,21 +96,21 @@ fn file_name(name: &str) -> String {
 
 /// Joints of the elastic coordinates, their matrices, rest position, and what is left out.
 fn springs_json(posed: &Posed, axes: &[&Axis], springs: &Springs, step_s: f64, left_out: &[String]) -> String {
-    let n = posed.arm.model.n_actuated();
+    let n = posed.plant.model.n_actuated();
     let joint = |k: usize| axes.iter().find(|axis| axis.coordinate == k).map_or("", |axis| axis.name.as_str());
     let rows = |M: &nalgebra::DMatrix<f64>| -> Vec<Vec<f64>> {
         M.row_iter().map(|row| row.iter().copied().collect()).collect()
     };
-    let rotors: Vec<f64> = (0..n).map(|k| posed.arm.model.rotor_inertia(k)).collect();
+    let rotors: Vec<f64> = (0..n).map(|k| posed.plant.model.rotor_inertia(k)).collect();
     let text = json!({
-        "joints": (n..posed.arm.model.nv()).map(joint).collect::<Vec<_>>(),
+        "joints": (n..posed.plant.model.nv()).map(joint).collect::<Vec<_>>(),
         "stiffness": rows(&springs.K),
         "damping": rows(&springs.D),
-        "rest": posed.arm.modes.equilibrium.as_slice(),
+        "rest": posed.plant.modes.equilibrium.as_slice(),
         "motors": (0..n).map(joint).collect::<Vec<_>>(),
         "rotor_inertia": rotors,
         "at": posed.at,
-        "gravity": posed.arm.model.gravity.as_slice(),
+        "gravity": posed.plant.model.gravity.as_slice(),
         "mujoco_step_s": step_s,
         "left_out": left_out,
     });
@@ -119,7 +119,7 @@ fn springs_json(posed: &Posed, axes: &[&Axis], springs: &Springs, step_s: f64, l
 
 /// Lists the parts of the arm that neither format can express.
 fn left_out(posed: &Posed) -> Vec<String> {
-    let arm = &posed.arm;
+    let arm = &posed.plant;
     let mut list = Vec::new();
     let mut add = |there: bool, what: String| list.extend(there.then_some(what));
     let named = |of: Vec<&str>| of.join(", ");

@@ -58,7 +58,7 @@ type MeshFile = (PathBuf, Vec<u8>);
 
 /// Returns the world and the bodies of an arm, parents first, and the mesh files.
 pub(super) fn parts(robot: &Robot, posed: &Posed) -> Result<(Vec<Part>, Vec<MeshFile>), Error> {
-    let model = &posed.arm.model;
+    let model = &posed.plant.model;
     if let Some(closed) = model.loops().first() {
         return Err(ValueError::NotExportable { name: closed.name.clone(), what: "a closed loop" }.into());
     }

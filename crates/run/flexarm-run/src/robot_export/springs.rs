@@ -1,7 +1,7 @@
 //! Stiffness and damping as springs and dampers over one or several joints, and the step size that
 //! an explicit program needs for them.
 
-use flexarm_stepping::FlexibleArm;
+use flexarm_stepping::Plant;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 /// Entries smaller than this part of the largest one are rounding.
@@ -23,17 +23,17 @@ pub(super) struct Springs {
 }
 
 impl Springs {
-    pub(super) fn of(arm: &FlexibleArm) -> Self {
-        let (n, first) = (arm.D.nrows(), arm.model.n_actuated());
+    pub(super) fn of(plant: &Plant) -> Self {
+        let (n, first) = (plant.D.nrows(), plant.model.n_actuated());
         let mut K = DMatrix::zeros(n, n);
-        for element in &arm.elements {
+        for element in &plant.elements {
             let at = element.coordinate - first;
             K.view_mut((at, at), (element.size, element.size)).copy_from(&element.K);
         }
-        for &(i, j, k) in &arm.cross_stiffness {
+        for &(i, j, k) in &plant.cross_stiffness {
             (K[(i, j)], K[(j, i)]) = (k, k);
         }
-        let D = arm.D.clone();
+        let D = plant.D.clone();
         let mut springs = Vec::new();
         for group in groups(&K) {
             let k = K.select_rows(&group).select_columns(&group);
@@ -118,11 +118,11 @@ const SAFETY: f64 = 0.5;
 /// Returns the step size for semi-implicit Euler with implicit damping.
 ///
 /// A mode of frequency `w` and damping `c` is stable for `h² w² < 4 + 2 h c`.
-pub(super) fn step(arm: &FlexibleArm) -> f64 {
-    let modes = &arm.modes;
+pub(super) fn step(plant: &Plant) -> f64 {
+    let modes = &plant.modes;
     let stable = modes.omega.iter().enumerate().map(|(k, w)| {
         let shape = modes.shapes.column(k);
-        let c = shape.dot(&(&arm.D * shape));
+        let c = shape.dot(&(&plant.D * shape));
         (c + (c * c + 4.0 * w * w).sqrt()) / (w * w)
     });
     let stable = stable.fold(f64::INFINITY, f64::min);

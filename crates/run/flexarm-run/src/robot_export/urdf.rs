@@ -41,7 +41,7 @@ pub(super) fn text(robot: &Robot, posed: &Posed, parts: &[Part]) -> String {
         }
     }
     let tool = &posed.tool;
-    let carrier = markup(&posed.arm.model.bodies()[tool.body].name);
+    let carrier = markup(&posed.plant.model.bodies()[tool.body].name);
     let _ = write!(
         out,
         "  <link name=\"tcp\"/>\n  <joint name=\"tcp_joint\" type=\"fixed\"><parent link=\"{carrier}\"/><child link=\"tcp\"/>{}</joint>\n",
@@ -84,8 +84,8 @@ fn link(out: &mut String, part: &Part) {
 
 /// Limits of a motor; an elastic joint stays far within 1 m and 1 rad.
 fn limit(axis: &Axis, posed: &Posed) -> String {
-    let coordinates = posed.arm.model.coordinates();
-    let limits = coordinates.get(axis.coordinate).filter(|_| axis.coordinate < posed.arm.model.n_actuated());
+    let coordinates = posed.plant.model.coordinates();
+    let limits = coordinates.get(axis.coordinate).filter(|_| axis.coordinate < posed.plant.model.n_actuated());
     let limits = limits.map_or(Limits { lower: -1.0, upper: 1.0, ..Limits::NONE }, |c| c.limits);
     let bounds = [
         ("lower", limits.lower),

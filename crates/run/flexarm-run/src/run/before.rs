@@ -1,7 +1,7 @@
 //! Caveats before the first step, for single runs and for studies.
 
 use flexarm_kinematics::State;
-use flexarm_stepping::{FlexibleArm, StepRule, StepperKind};
+use flexarm_stepping::{Plant, StepRule, StepperKind};
 use nalgebra::DVector;
 
 use super::steps_per_sample;
@@ -19,9 +19,9 @@ const RIPPLE_STEPS: f64 = 12.0;
 /// A run that is ready to start.
 pub struct BeforeRun<'a> {
     /// Robot with its links and drives modelled.
-    pub flexible: &'a Arm,
+    pub arm: &'a Arm,
     /// Arm at the start, with its loads.
-    pub arm: &'a FlexibleArm,
+    pub plant: &'a Plant,
     /// Motion.
     pub motion: &'a Motion,
     /// Stepper and step size.
@@ -34,15 +34,15 @@ impl BeforeRun<'_> {
     ///
     /// * `sag_m`: static TCP deflection (m).
     pub(crate) fn caveats(&self, sag_m: f64) -> Vec<Caveat> {
-        let Self { flexible, arm, motion, options } = *self;
-        let mut caveats = flexible.link_caveats();
-        caveats.extend(of_use::of_motion(motion, &flexible.rigid));
-        let elastic = arm.modes.equilibrium.as_slice();
-        caveats.extend(ArmAtRest { flexible, arm, elastic, sag_m }.caveats());
-        if let Some(first) = arm.modes.frequencies_hz().first() {
+        let Self { arm, plant, motion, options } = *self;
+        let mut caveats = arm.link_caveats();
+        caveats.extend(of_use::of_motion(motion, &arm.rigid));
+        let elastic = plant.modes.equilibrium.as_slice();
+        caveats.extend(ArmAtRest { arm, plant, elastic, sag_m }.caveats());
+        if let Some(first) = plant.modes.frequencies_hz().first() {
             let logged_hz = 1.0 / (steps_per_sample(options) as f64 * options.step_s);
             caveats.extend(validity::sampling(*first, logged_hz));
-            caveats.extend(validity::step(options.stepper, options.step_s, *first, arm.first_damping_ratio()));
+            caveats.extend(validity::step(options.stepper, options.step_s, *first, plant.first_damping_ratio()));
         }
         let moves = motion.trajectory.moves();
         caveats.extend(validity::long_step(options.step_s, moves.iter().map(|m| m.end - m.start)));
@@ -66,20 +66,20 @@ impl BeforeRun<'_> {
 
     /// Checks for links that deflect too far at rest.
     fn links_at_rest(&self) -> Vec<Caveat> {
-        let (arm, model) = (self.arm, &self.arm.model);
+        let (plant, model) = (self.plant, &self.plant.model);
         let mut state = State::zeros(model);
-        arm.prescribed_state(0.0, &mut state, &mut DVector::zeros(model.nv()));
+        plant.prescribed_state(0.0, &mut state, &mut DVector::zeros(model.nv()));
         let n = model.n_actuated();
-        state.q.rows_mut(n, model.nv() - n).copy_from(&arm.modes.equilibrium);
-        let links = self.flexible.spans.iter().zip(strains(self.flexible, arm, &state.q));
+        state.q.rows_mut(n, model.nv() - n).copy_from(&plant.modes.equilibrium);
+        let links = self.arm.spans.iter().zip(strains(self.arm, plant, &state.q));
         links.flat_map(|(span, (strain, rotation))| validity::link(&span.link, rotation, strain)).collect()
     }
 
     /// Reports damping that the stepper must approximate.
     fn spook(&self) -> Option<Caveat> {
-        let changes = matches!(self.options.stepper, StepperKind::Spook(_)) && !self.arm.proportional;
+        let changes = matches!(self.options.stepper, StepperKind::Spook(_)) && !self.plant.proportional;
         changes.then(|| {
-            let betas: Vec<String> = self.arm.tau.iter().map(|b| format!("{b:.2e}")).collect();
+            let betas: Vec<String> = self.plant.tau.iter().map(|b| format!("{b:.2e}")).collect();
             let message = format!(
                 "spook damps each spring in proportion to its stiffness: modal damping became D = beta K with beta = {} s, \
                  exact for the first mode",
@@ -92,18 +92,18 @@ impl BeforeRun<'_> {
     /// Checks whether the steps resolve the ripple of gears, at the maximum speed over a thousand
     /// points of the motion.
     fn ripple(&self) -> Option<Caveat> {
-        let (arm, model, duration) = (self.arm, &self.arm.model, self.motion.trajectory.duration());
-        if arm.transmission.is_empty() || self.options.stepper.entry().steps == StepRule::ByErrorControl {
+        let (plant, model, duration) = (self.plant, &self.plant.model, self.motion.trajectory.duration());
+        if plant.transmission.is_empty() || self.options.stepper.entry().steps == StepRule::ByErrorControl {
             return None;
         }
         let mut state = State::zeros(model);
         let mut fastest = vec![0.0f64; model.n_actuated()];
         for k in 0..=1000 {
-            arm.prescribed_state(duration * f64::from(k) * 1e-3, &mut state, &mut DVector::zeros(model.nv()));
+            plant.prescribed_state(duration * f64::from(k) * 1e-3, &mut state, &mut DVector::zeros(model.nv()));
             fastest.iter_mut().zip(state.qdot.iter()).for_each(|(most, rate)| *most = most.max(rate.abs()));
         }
         let harmonics =
-            arm.transmission.iter().flat_map(|error| error.harmonics.iter().map(move |h| (error.motor, h.cycles)));
+            plant.transmission.iter().flat_map(|error| error.harmonics.iter().map(move |h| (error.motor, h.cycles)));
         let rates = harmonics.map(|(motor, cycles)| (motor, cycles * fastest[motor]));
         let (motor, rate) = rates.max_by(|a, b| a.1.total_cmp(&b.1))?;
         let steps = std::f64::consts::TAU / (rate * self.options.step_s);

@@ -3,7 +3,7 @@
 use flexarm_analysis::TcpMetrics;
 use flexarm_kinematics::{Data, Frame, State, forward_kinematics};
 use flexarm_log::Event;
-use flexarm_stepping::FlexibleArm;
+use flexarm_stepping::Plant;
 
 use super::before::BeforeRun;
 use super::{Detail, RunLoop, moves};
@@ -21,12 +21,12 @@ impl RunLoop<'_> {
         let metrics = self.monitors.tool.result().metrics().ok();
         let metrics = metrics.as_ref().filter(|_| self.options.with_twin);
         let (links, elastic_drives) = (self.link_figures(), self.drive_figures());
-        let sag_m = static_sag(&self.arm, &self.tcp);
+        let sag_m = static_sag(&self.plant, &self.tcp);
         let robot = self.robot;
         let by_choice = !robot.flexible_links.is_empty()
             || robot.is_mounted()
             || robot.drives.iter().any(|drive| drive.gearbox.is_some());
-        let coordinates = self.arm.model.coordinates().iter();
+        let coordinates = self.plant.model.coordinates().iter();
         let peaks = coordinates.zip(self.monitors.drive_loads.result());
         let mut summary = Summary {
             bends: Bending {
@@ -36,12 +36,12 @@ impl RunLoop<'_> {
             },
             robot: robot.name.clone(),
             trajectory: self.motion.name.clone(),
-            links_model: self.flexible.links_model().into(),
+            links_model: self.arm.links_model().into(),
             duration_s: self.monitors.tool.result().last_time_s().unwrap_or(0.0),
             stepper: StepperFigures::new(self.options, self.stepper.counts()),
             tcp: metrics.map(|m| self.tool_figures(m, sag_m)),
             path: metrics.and_then(|_| self.monitors.tool_path.as_ref()?.result()),
-            frequencies_hz: self.arm.modes.frequencies_hz(),
+            frequencies_hz: self.plant.modes.frequencies_hz(),
             energy: self.monitors.energy.result(),
             drives: peaks.map(|(c, load)| (c.joint.clone(), load.peak)).collect(),
             motors: self.motors.clone(),
@@ -60,7 +60,7 @@ impl RunLoop<'_> {
 
     fn link_figures(&self) -> Vec<LinkFigures> {
         let seen = self.monitors.contributions.result().iter().zip(self.monitors.strains.result());
-        let figures = self.flexible.spans.iter().zip(seen).map(|(span, (moved, strained))| LinkFigures {
+        let figures = self.arm.spans.iter().zip(seen).map(|(span, (moved, strained))| LinkFigures {
             name: span.link.clone(),
             peak_contribution_m: moved.peak_m,
             engineering_strain: strained.strain,
@@ -70,16 +70,16 @@ impl RunLoop<'_> {
     }
 
     fn drive_figures(&self) -> Vec<DriveFigures> {
-        let moved = &self.monitors.contributions.result()[self.flexible.spans.len()..];
+        let moved = &self.monitors.contributions.result()[self.arm.spans.len()..];
         let seen = moved.iter().zip(self.monitors.deflections.result());
         let drives = self.robot.drives.iter().zip(seen).enumerate();
-        let elastic = drives.filter(|(k, _)| self.flexible.owners.contains(&Owner::Drive(*k)));
+        let elastic = drives.filter(|(k, _)| self.arm.owners.contains(&Owner::Drive(*k)));
         let figures = elastic.map(|(_, (drive, (moved, deflection)))| DriveFigures {
             joint: drive.joint.clone(),
             peak_contribution_m: moved.peak_m,
             peak_deflection_rad: *deflection,
             slides: drive.guide().is_none()
-                && self.arm.model.coordinates().iter().any(|c| c.joint == drive.joint && c.slides()),
+                && self.plant.model.coordinates().iter().any(|c| c.joint == drive.joint && c.slides()),
         });
         figures.collect()
     }
@@ -101,7 +101,7 @@ impl RunLoop<'_> {
         let (along, rest) = self.at_peak.along(&self.tcp);
         let mut places = vec![0.0; self.monitors.contributions.moved().len()];
         for (k, along) in along.iter().enumerate() {
-            places[self.monitors.contributions.place_of(k, &self.arm)] += along;
+            places[self.monitors.contributions.place_of(k, &self.plant)] += along;
         }
         let shares = self.contributors.iter().map(|who| ShareFigures {
             name: who.name.clone(),
@@ -118,8 +118,8 @@ impl RunLoop<'_> {
 
     /// Caveats about the input and the validity of the models in the run so far.
     fn caveats(&self, summary: &Summary, sag_m: f64, mut caveats: Vec<Caveat>) -> Vec<Caveat> {
-        let (flexible, arm, motion, options) = (self.flexible, &*self.arm, self.motion, self.options);
-        caveats.extend(BeforeRun { flexible, arm, motion, options }.caveats(sag_m));
+        let (arm, plant, motion, options) = (self.arm, &*self.plant, self.motion, self.options);
+        caveats.extend(BeforeRun { arm, plant, motion, options }.caveats(sag_m));
         caveats.extend(self.drive_caveats());
         if let Some(tcp) = summary.tcp.as_ref() {
             let of_stepper = tcp.shares_at_peak.iter().filter(|share| share.kind == headline::STEPPER);
@@ -147,9 +147,9 @@ impl RunLoop<'_> {
 
     /// Caveats about modal links that turn fast without geometric stiffening.
     fn spin_caveats(&self) -> Vec<Caveat> {
-        let first_hz = self.arm.modes.frequencies_hz().first().copied().unwrap_or(f64::INFINITY);
-        let links = self.flexible.spans.iter().zip(self.monitors.strains.result()).enumerate();
-        let elements = || self.arm.elements.iter().zip(&self.flexible.owners);
+        let first_hz = self.plant.modes.frequencies_hz().first().copied().unwrap_or(f64::INFINITY);
+        let links = self.arm.spans.iter().zip(self.monitors.strains.result()).enumerate();
+        let elements = || self.plant.elements.iter().zip(&self.arm.owners);
         let is_linear =
             |k: usize| elements().any(|(e, owner)| *owner == Owner::Link(k) && e.modal && e.geometric.is_none());
         let soft = links.filter(|(k, _)| is_linear(*k));
@@ -158,9 +158,9 @@ impl RunLoop<'_> {
 
     /// Caveats about gearbox deflections.
     fn drive_caveats(&self) -> Vec<Caveat> {
-        let coordinates = self.arm.model.coordinates();
+        let coordinates = self.plant.model.coordinates();
         let drives = self.robot.drives.iter().zip(self.monitors.deflections.result()).enumerate();
-        let elastic = drives.filter(|(k, _)| self.flexible.owners.contains(&Owner::Drive(*k)));
+        let elastic = drives.filter(|(k, _)| self.arm.owners.contains(&Owner::Drive(*k)));
         let found = elastic.flat_map(|(_, (drive, give))| {
             let joint = coordinates.iter().find(|c| c.joint == drive.joint);
             let slides = joint.is_some_and(|c| c.slides()) && drive.guide().is_none();
@@ -174,7 +174,7 @@ impl RunLoop<'_> {
 
     /// Caveats about drive torques and forces that exceed their limits.
     fn effort_caveats(&self) -> Vec<Caveat> {
-        let (coordinates, loads) = (self.arm.model.coordinates(), self.monitors.drive_loads.result());
+        let (coordinates, loads) = (self.plant.model.coordinates(), self.monitors.drive_loads.result());
         let peaks: Vec<f64> = loads.iter().map(|load| load.peak).collect();
         let mut caveats: Vec<Caveat> = validity::efforts(&kinds::EFFORT, coordinates, &peaks).collect();
         for (c, load) in coordinates.iter().zip(loads).filter(|(_, load)| load.at_limit > 0) {
@@ -187,14 +187,14 @@ impl RunLoop<'_> {
 
 /// TCP error with the drives at rest in their initial position, also for runs that start undeformed
 /// (m).
-pub fn static_sag(arm: &FlexibleArm, tcp: &Frame) -> f64 {
-    let model = &arm.model;
+pub fn static_sag(plant: &Plant, tcp: &Frame) -> f64 {
+    let model = &plant.model;
     let (mut data, mut state) = (Data::new(model), State::zeros(model));
-    arm.prescribed_state(0.0, &mut state, &mut nalgebra::DVector::zeros(model.nv()));
+    plant.prescribed_state(0.0, &mut state, &mut nalgebra::DVector::zeros(model.nv()));
     forward_kinematics(model, &mut data, &state.q);
     let rigid = data.X_WF(tcp).translation.vector;
     let n = model.n_actuated();
-    state.q.rows_mut(n, model.nv() - n).copy_from(&arm.modes.equilibrium);
+    state.q.rows_mut(n, model.nv() - n).copy_from(&plant.modes.equilibrium);
     forward_kinematics(model, &mut data, &state.q);
     (data.X_WF(tcp).translation.vector - rigid).norm()
 }

@@ -2,7 +2,7 @@
 
 use flexarm_kinematics::{Frame, frame_jacobian};
 use flexarm_log::Trace;
-use flexarm_stepping::{FlexibleArm, LoadAxes, Start};
+use flexarm_stepping::{LoadAxes, Plant, Start};
 use nalgebra::{Matrix6xX, Vector3, Vector6};
 
 use crate::run::twin::RigidTwin;
@@ -36,22 +36,22 @@ impl Expected {
     /// Estimates the deflections under gravity and rigid motion without the springs' dynamics:
     /// `e = -K^-1 tau_e` with the forces that hold the elastic coordinates of the rigid twin at
     /// zero.
-    pub(crate) fn of(arm: &FlexibleArm, tcp: &Frame, duration: f64, start: Start) -> Self {
-        let mut twin = RigidTwin::new(arm);
-        let mut J = Matrix6xX::zeros(arm.model.nv());
+    pub(crate) fn of(plant: &Plant, tcp: &Frame, duration: f64, start: Start) -> Self {
+        let mut twin = RigidTwin::new(plant);
+        let mut J = Matrix6xX::zeros(plant.model.nv());
         let mut expected = Self::default();
         // A start with undeformed springs doubles everything below.
         let sudden = if start == Start::Undeformed { 1.0 } else { SUDDEN };
         // A short load acts through its mean over half a period of the first mode.
-        let window = 0.5 / arm.modes.frequencies_hz().first().copied().unwrap_or(f64::INFINITY).max(1e-3);
-        let jumps = arm.load_jumps().map(|t| t + 0.5 * window).take(INSTANTS as usize);
+        let window = 0.5 / plant.modes.frequencies_hz().first().copied().unwrap_or(f64::INFINITY).max(1e-3);
+        let jumps = plant.load_jumps().map(|t| t + 0.5 * window).take(INSTANTS as usize);
         let evenly = (0..=INSTANTS).map(|k| duration * f64::from(k) / f64::from(INSTANTS));
         for t in evenly.chain(jumps.filter(|t| *t < duration)) {
-            twin.update(arm, tcp, t);
+            twin.update(plant, tcp, t);
             // Loads reduce the forces that hold the elastic coordinates.
-            for load in &arm.loads {
+            for load in &plant.loads {
                 let frame = Frame { name: String::new(), body: load.body, X_BF: load.X_BF };
-                frame_jacobian(&arm.model, &twin.data, &frame, &mut J);
+                frame_jacobian(&plant.model, &twin.data, &frame, &mut J);
                 let R = twin.data.X_WF(&frame).rotation;
                 let turn = |v| if load.wrench.axes == LoadAxes::Frame { R * v } else { v };
                 let mut F = Vector6::zeros();
@@ -64,7 +64,7 @@ impl Expected {
                 twin.data.tau -= J.tr_mul(&F) * sudden;
             }
             let mut moved = Vector6::zeros();
-            for element in &arm.elements {
+            for element in &plant.elements {
                 let (first, n) = (element.coordinate, element.size);
                 let e = -(&element.C * twin.data.tau.rows(first, n));
                 moved += twin.J.columns(first, n) * &e;

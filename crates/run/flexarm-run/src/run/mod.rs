@@ -35,7 +35,7 @@ use flexarm_linkmaker::Stopwatch;
 use flexarm_log::{
     Attachment, BendInfo, Columns, Event, EventKind, Recorder, RecorderSet, RunHeader, RunResult, Sample, Trace,
 };
-use flexarm_stepping::{FlexibleArm, Observation, Stepper};
+use flexarm_stepping::{Observation, Plant, Stepper};
 
 use rayon::prelude::*;
 
@@ -147,9 +147,9 @@ impl Detail {
     }
 
     /// Returns the deflections to expect; only recordings need the magnification.
-    fn expected(self, arm: &FlexibleArm, tcp: &Frame, scenario: &Scenario) -> Expected {
+    fn expected(self, plant: &Plant, tcp: &Frame, scenario: &Scenario) -> Expected {
         match self {
-            Self::Curves => Expected::of(arm, tcp, scenario.duration_s(), scenario.start),
+            Self::Curves => Expected::of(plant, tcp, scenario.duration_s(), scenario.start),
             _ => Expected::default(),
         }
     }
@@ -253,8 +253,8 @@ pub(crate) fn simulate(
     request: RunRequest<'_>,
 ) -> Result<Run, Error> {
     let stopwatch = Stopwatch::start();
-    let (robot, flexible) = (built.robot(), built);
-    let Checked { arm, stepper, load_caveats } = built.checked(scenario, options)?;
+    let (robot, arm) = (built.robot(), built);
+    let Checked { plant, stepper, load_caveats } = built.checked(scenario, options)?;
     let detail = Detail::of(&request);
     let RunRequest { keep, outputs, mut observer, progress, recorders: more, expected } = request;
     let mut to_the_end = |_, _| ControlFlow::Continue(());
@@ -265,9 +265,9 @@ pub(crate) fn simulate(
         return Err(Error::Interrupted { t: 0.0, partial: false });
     }
     let shares_scale = expected.is_some();
-    let expected = expected.unwrap_or_else(|| detail.expected(&arm, &flexible.tcp, scenario));
-    let stress = StressMonitor::new(flexible, &arm)?;
-    let mut run = RunLoop::new(robot, &scenario.motion, options, flexible, arm, stepper, detail);
+    let expected = expected.unwrap_or_else(|| detail.expected(&plant, &arm.tcp, scenario));
+    let stress = StressMonitor::new(arm, &plant)?;
+    let mut run = RunLoop::new(robot, &scenario.motion, options, arm, plant, stepper, detail);
     run.monitors = run.monitors.with_stress(stress);
     if let Some(outputs) = outputs {
         let all: Vec<PathBuf> = files_of_a_run().map(|file| outputs.folder.join(file)).collect();
@@ -390,13 +390,13 @@ struct Contributor {
 }
 
 /// Lists the flexible links, the elastic drives and the following error of the servos.
-fn contributors(robot: &Robot, flexible: &Arm, arm: &FlexibleArm) -> Vec<Contributor> {
-    let (n_links, n_drives) = (flexible.spans.len(), robot.drives.len());
-    let drives = robot.drives.iter().enumerate().filter(|(k, _)| flexible.owners.contains(&Owner::Drive(*k)));
+fn contributors(robot: &Robot, arm: &Arm, plant: &Plant) -> Vec<Contributor> {
+    let (n_links, n_drives) = (arm.spans.len(), robot.drives.len());
+    let drives = robot.drives.iter().enumerate().filter(|(k, _)| arm.owners.contains(&Owner::Drive(*k)));
     let kind = |name: &str| if robot.stands_on(name) { headline::MOUNTING } else { headline::LINK };
-    let links = flexible.spans.iter().enumerate().map(|(k, span)| (k, span.link.clone(), kind(&span.link)));
+    let links = arm.spans.iter().enumerate().map(|(k, span)| (k, span.link.clone(), kind(&span.link)));
     let drives = drives.map(|(k, drive)| (n_links + k, drive.joint.clone(), headline::GEARBOX));
-    let follows = !arm.torque_driven.is_empty();
+    let follows = !plant.torque_driven.is_empty();
     let following = follows.then(|| (n_links + n_drives, FOLLOWING_ERROR.to_owned(), headline::SERVO));
     let contributors = links.chain(drives).chain(following);
     contributors.map(|(place, name, kind)| Contributor { place, name, kind }).collect()
@@ -407,9 +407,9 @@ struct RunLoop<'a> {
     robot: &'a Robot,
     motion: &'a Motion,
     options: &'a RunOptions,
-    flexible: &'a Arm,
+    arm: &'a Arm,
     /// Arm whose model is that of the last sample, including its current payload.
-    arm: Arc<FlexibleArm>,
+    plant: Arc<Plant>,
     stepper: Box<dyn Stepper>,
     tcp: Frame,
     twin: RigidTwin,
@@ -435,42 +435,42 @@ impl<'a> RunLoop<'a> {
         robot: &'a Robot,
         motion: &'a Motion,
         options: &'a RunOptions,
-        flexible: &'a Arm,
-        arm: Arc<FlexibleArm>,
+        arm: &'a Arm,
+        plant: Arc<Plant>,
         stepper: Box<dyn Stepper>,
         detail: Detail,
     ) -> Self {
-        let tcp = flexible.tcp.clone();
+        let tcp = arm.tcp.clone();
         let duration = motion.trajectory.duration();
         let last = (duration / options.step_s - 1e-9).ceil().max(0.0) as u64;
         let every = steps_per_sample(options);
-        let mut twin = RigidTwin::new(&arm);
-        let tool = tool_monitor(&arm, &tcp, &mut twin, motion, options, every as f64 * options.step_s);
+        let mut twin = RigidTwin::new(&plant);
+        let tool = tool_monitor(&plant, &tcp, &mut twin, motion, options, every as f64 * options.step_s);
         let (mut bends, mut places, mut frames) = Default::default();
         if detail >= Detail::Samples {
-            (bends, places) = stations(&flexible.bends, &arm.model, &ordered_links(robot));
-            frames = link_frames(robot, &arm.model);
+            (bends, places) = stations(&arm.bends, &plant.model, &ordered_links(robot));
+            frames = link_frames(robot, &plant.model);
         }
         Self {
             robot,
             motion,
             options,
-            flexible,
+            arm,
             tcp,
             twin,
-            seen: Observation::new(&arm),
-            monitors: Monitors::new(&arm, flexible, robot.drives.len(), tool).along(motion.tool_path.clone()),
-            sampler: Sampler::new(robot, flexible, frames, places),
+            seen: Observation::new(&plant),
+            monitors: Monitors::new(&plant, arm, robot.drives.len(), tool).along(motion.tool_path.clone()),
+            sampler: Sampler::new(robot, arm, frames, places),
             sample: Sample::default(),
             trace: Trace::default(),
             bends,
-            contributors: contributors(robot, flexible, &arm),
+            contributors: contributors(robot, arm, &plant),
             at_peak: AtPeak::default(),
             motors: Default::default(),
             detail,
             every,
             last,
-            arm,
+            plant,
             stepper,
         }
     }
@@ -480,9 +480,9 @@ impl<'a> RunLoop<'a> {
         let (robot, options, stress) = (self.robot, self.options, self.monitors.stress.as_ref());
         let head = match self.detail {
             Detail::Figures => RunHeader::default(),
-            Detail::Columns => names_of_signals(robot, &self.arm),
-            Detail::Samples => signals(robot, &self.arm),
-            Detail::Curves => header(self.flexible, scenario, options, &self.arm),
+            Detail::Columns => names_of_signals(robot, &self.plant),
+            Detail::Samples => signals(robot, &self.plant),
+            Detail::Curves => header(self.arm, scenario, options, &self.plant),
         };
         RunHeader {
             has_rigid: options.with_twin,
@@ -507,7 +507,7 @@ impl<'a> RunLoop<'a> {
         observer: &mut SampleObserver<'_>,
     ) -> Result<(), Error> {
         let total = self.last as f64 * self.options.step_s;
-        let poll_every = (POLL_EVERY / self.arm.model.nv().max(1)).clamp(1, RAREST_POLL) as u64;
+        let poll_every = (POLL_EVERY / self.plant.model.nv().max(1)).clamp(1, RAREST_POLL) as u64;
         for step in 0..=self.last {
             if step % self.every == 0 || step == self.last {
                 self.observe(step);
@@ -532,27 +532,27 @@ impl<'a> RunLoop<'a> {
     fn observe(&mut self, step: u64) {
         self.stepper.observe(&mut self.seen);
         // The twin carries the same payload as the arm.
-        if !Arc::ptr_eq(&self.arm.model, &self.seen.model) {
-            Arc::make_mut(&mut self.arm).model.clone_from(&self.seen.model);
+        if !Arc::ptr_eq(&self.plant.model, &self.seen.model) {
+            Arc::make_mut(&mut self.plant).model.clone_from(&self.seen.model);
         }
         // The torques of the twin are needed only in samples.
         match self.detail {
-            Detail::Figures => self.twin.place(&self.arm, &self.tcp, self.seen.t),
-            _ => self.twin.update(&self.arm, &self.tcp, self.seen.t),
+            Detail::Figures => self.twin.place(&self.plant, &self.tcp, self.seen.t),
+            _ => self.twin.update(&self.plant, &self.tcp, self.seen.t),
         }
-        if self.arm.coupling.is_some() {
-            for (motor, torque) in self.robot.motor_torques(&self.arm, self.seen.drive.as_slice()) {
+        if self.plant.coupling.is_some() {
+            for (motor, torque) in self.robot.motor_torques(&self.plant, self.seen.drive.as_slice()) {
                 let peak = self.motors.entry(motor).or_default();
                 *peak = peak.max(torque.abs());
             }
         }
-        let tool = self.monitors.update(&self.seen, &self.twin, &self.arm, &self.tcp);
+        let tool = self.monitors.update(&self.seen, &self.twin, &self.plant, &self.tcp);
         self.at_peak.update(&tool.error, &self.seen, &self.twin);
         let sample = &mut self.sample;
         sample.error_world = tool.error;
         if self.detail > Detail::Figures {
             self.sampler.fill(sample, &self.seen, &self.twin, &tool);
-            sampler::fill_elastic(sample, &self.seen, &self.arm);
+            sampler::fill_elastic(sample, &self.seen, &self.plant);
         }
         let moved = self.monitors.contributions.moved();
         sample.contributions.clear();
@@ -573,7 +573,7 @@ pub fn steps_per_sample(options: &RunOptions) -> u64 {
 
 /// Builds the TCP monitor of a run with sampling interval `sample_s` (s).
 fn tool_monitor(
-    arm: &Arc<FlexibleArm>,
+    plant: &Arc<Plant>,
     tcp: &Frame,
     twin: &mut RigidTwin,
     motion: &Motion,
@@ -589,11 +589,11 @@ fn tool_monitor(
         }
         *t >= still_until
     });
-    let path = PathFrame::before(instants.map(|t| twin.rates(arm, tcp, t)));
-    let static_part = options.with_twin.then(|| StaticPart::new(arm, tcp, moves(motion), duration, sample_s));
+    let path = PathFrame::before(instants.map(|t| twin.rates(plant, tcp, t)));
+    let static_part = options.with_twin.then(|| StaticPart::new(plant, tcp, moves(motion), duration, sample_s));
     // The arm settles at the static part, unless servos move the joints or loads act.
-    let rests_there = arm.torque_driven.is_empty() && arm.loads.is_empty();
-    let first_hz = arm.modes.frequencies_hz().first().copied().unwrap_or(0.0);
+    let rests_there = plant.torque_driven.is_empty() && plant.loads.is_empty();
+    let first_hz = plant.modes.frequencies_hz().first().copied().unwrap_or(0.0);
     let settings = MetricSettings { settling_band_m: options.settling_band_m, lowest_hz: RINGING_FROM * first_hz };
     let record = LongRecord::new(moves(motion), rests_there, settings);
     ToolMonitor::new(path, static_part, record.with_room((duration / sample_s) as usize + 2))

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use flexarm_settings::Setting;
-use flexarm_stepping::{FlexibleArm, Load, StepError, StepRule, Stepper, new_stepper};
+use flexarm_stepping::{Load, Plant, StepError, StepRule, Stepper, new_stepper};
 
 use crate::arm::Arm;
 use crate::arm::options::RunOptions;
@@ -20,7 +20,7 @@ use crate::run::magnification::Expected;
 
 /// A run whose input has been checked.
 pub(crate) struct Checked {
-    pub(crate) arm: Arc<FlexibleArm>,
+    pub(crate) plant: Arc<Plant>,
     pub(crate) stepper: Box<dyn Stepper>,
     pub(crate) load_caveats: Vec<Caveat>,
 }
@@ -31,22 +31,22 @@ impl Arm {
     ///
     /// # Errors
     /// All errors in the input that can be found before a stepper is built.
-    pub fn at_start(&self, scenario: &Scenario, options: &RunOptions) -> Result<(FlexibleArm, Vec<Caveat>), Error> {
-        let (motion, flexible) = (&scenario.motion, self);
+    pub fn at_start(&self, scenario: &Scenario, options: &RunOptions) -> Result<(Plant, Vec<Caveat>), Error> {
+        let motion = &scenario.motion;
         runnable(motion, options)?;
-        loops::along_motion(&flexible.rigid, &motion.trajectory)?;
-        balancer::check_motion(&flexible.rigid, &motion.trajectory)?;
-        let arm = self.arm(motion.prescribed()).map_err(|error| flexible.explained(error))?;
-        loaded(self.robot(), scenario, options, arm)
+        loops::along_motion(&self.rigid, &motion.trajectory)?;
+        balancer::check_motion(&self.rigid, &motion.trajectory)?;
+        let plant = self.plant(motion.prescribed()).map_err(|error| self.explained(error))?;
+        loaded(self.robot(), scenario, options, plant)
     }
 
     /// Checks the whole input of a run and builds its stepper.
     pub(crate) fn checked(&self, scenario: &Scenario, options: &RunOptions) -> Result<Checked, Error> {
-        let (arm, load_caveats) = self.at_start(scenario, options)?;
-        let arm = Arc::new(arm);
-        let stepper = new_stepper(options.stepper, arm.clone(), options.step_s, scenario.start)
+        let (plant, load_caveats) = self.at_start(scenario, options)?;
+        let plant = Arc::new(plant);
+        let stepper = new_stepper(options.stepper, plant.clone(), options.step_s, scenario.start)
             .map_err(|error| self.explained(error))?;
-        Ok(Checked { arm, stepper, load_caveats })
+        Ok(Checked { plant, stepper, load_caveats })
     }
 
     /// Returns an estimate of the deflections of a run.
@@ -54,8 +54,8 @@ impl Arm {
     /// # Errors
     /// As [`Arm::simulate`], as far as errors are found before the first step.
     pub fn expected(&self, scenario: &Scenario, options: &RunOptions) -> Result<Expected, Error> {
-        let arm = self.checked(scenario, options)?.arm;
-        Ok(Expected::of(&arm, &self.tcp, scenario.duration_s(), scenario.start))
+        let plant = self.checked(scenario, options)?.plant;
+        Ok(Expected::of(&plant, &self.tcp, scenario.duration_s(), scenario.start))
     }
 }
 
@@ -76,23 +76,23 @@ pub fn loaded(
     robot: &Robot,
     scenario: &Scenario,
     options: &RunOptions,
-    mut arm: FlexibleArm,
-) -> Result<(FlexibleArm, Vec<Caveat>), Error> {
+    mut plant: Plant,
+) -> Result<(Plant, Vec<Caveat>), Error> {
     let failed = |source: StepError| Error::Step { source, partial: false };
     let mut load_caveats = Vec::new();
     if !scenario.loads.is_empty() || !scenario.payloads.is_empty() {
         let duration = scenario.duration_s();
-        let mut acting = scenario.acting_on(robot, &arm.model)?;
+        let mut acting = scenario.acting_on(robot, &plant.model)?;
         load_caveats = acting.caveats;
         load_caveats.extend(caveat::motion::of_loads(&acting.loads, duration, &Size::of(&robot.rigid)));
         if options.stepper.entry().steps != StepRule::ByErrorControl {
             acting.loads.iter_mut().for_each(|load| stop_within(load, options.step_s));
             load_caveats.extend(fast_loads(&acting.loads, options.step_s));
         }
-        arm = arm.with_inertia_changes(acting.changes).map_err(failed)?;
-        arm = arm.with_timed_loads(acting.loads).map_err(failed)?;
+        plant = plant.with_inertia_changes(acting.changes).map_err(failed)?;
+        plant = plant.with_timed_loads(acting.loads).map_err(failed)?;
     }
-    Ok((arm, load_caveats))
+    Ok((plant, load_caveats))
 }
 
 /// Maximum number of steps of a run (some hours).

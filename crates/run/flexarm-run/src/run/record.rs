@@ -6,7 +6,7 @@ use std::path::{Component, Path, PathBuf};
 use flexarm_files::Undo;
 use flexarm_kinematics::{Frame, JointKind, Model};
 use flexarm_log::{Attachment, CreateOptions, LinkInfo, LinkMesh, Recorder, RecorderSet, RecordingFormat, RunHeader};
-use flexarm_stepping::FlexibleArm;
+use flexarm_stepping::Plant;
 use flexarm_urdf::Geometry;
 
 use crate::arm::Arm;
@@ -271,37 +271,37 @@ pub fn straight(path: &Path) -> String {
 }
 
 /// Builds the header of a run: everything that does not change over time.
-pub(crate) fn header(flexible: &Arm, scenario: &Scenario, options: &RunOptions, arm: &FlexibleArm) -> RunHeader {
-    let (robot, links_model) = (flexible.robot(), flexible.links_model());
-    let frequencies: Vec<String> = arm.modes.frequencies_hz().iter().map(|f| format!("{f:.4}")).collect();
+pub(crate) fn header(arm: &Arm, scenario: &Scenario, options: &RunOptions, plant: &Plant) -> RunHeader {
+    let (robot, links_model) = (arm.robot(), arm.links_model());
+    let frequencies: Vec<String> = plant.modes.frequencies_hz().iter().map(|f| format!("{f:.4}")).collect();
     RunHeader {
         trajectory: scenario.motion.name.clone(),
-        metadata: metadata(flexible, scenario, options, arm, &frequencies),
+        metadata: metadata(arm, scenario, options, plant, &frequencies),
         description: description(robot, &scenario.motion, options, links_model, &frequencies),
         has_rigid: options.with_twin,
         log_rate_hz: options.log_rate_hz,
         step_s: options.step_s,
         start_ns: options.start_ns,
         urdf: located_urdf(robot, options.embed_meshes),
-        ..robot_header(robot, arm)
+        ..robot_header(robot, plant)
     }
 }
 
 /// Settings and inputs of the run, in groups of key-value pairs.
 fn metadata(
-    flexible: &Arm,
+    arm: &Arm,
     scenario: &Scenario,
     options: &RunOptions,
-    arm: &FlexibleArm,
+    plant: &Plant,
     frequencies: &[String],
 ) -> Vec<(String, Vec<(String, String)>)> {
-    let robot = flexible.robot();
+    let robot = arm.robot();
     let motion = &scenario.motion;
     let group = |name: &str, rows: &[(&str, String)]| {
         (name.to_owned(), rows.iter().map(|(k, v)| ((*k).to_owned(), v.clone())).collect::<Vec<_>>())
     };
     let stepper = crate::run::summary::StepperFigures::new(options, Default::default());
-    let elements: Vec<String> = arm.elements.iter().map(|e| e.name.clone()).collect();
+    let elements: Vec<String> = plant.elements.iter().map(|e| e.name.clone()).collect();
     let methods: Vec<String> = robot
         .flexible_links
         .iter()
@@ -313,8 +313,8 @@ fn metadata(
         ("trajectory_file", straight(&motion.path)),
     ];
     inputs.extend(scenario.loads_file.as_ref().map(|path| ("loads_file", straight(path))));
-    let drives = flexible.modelling().drives.word().unwrap_or(AS_FILED);
-    let links_choice = flexible.modelling().links.word().unwrap_or(AS_FILED);
+    let drives = arm.modelling().drives.word().unwrap_or(AS_FILED);
+    let links_choice = arm.modelling().links.word().unwrap_or(AS_FILED);
     let mut run = vec![
         ("version", env!("CARGO_PKG_VERSION").into()),
         ("robot", robot.name.clone()),
@@ -331,7 +331,7 @@ fn metadata(
         group(
             "flexarm.model",
             &[
-                ("links", flexible.links_model().into()),
+                ("links", arm.links_model().into()),
                 ("links_choice", links_choice.into()),
                 ("drives", drives.into()),
                 ("elements", elements.join(", ")),
@@ -345,26 +345,26 @@ fn metadata(
 }
 
 /// Header with the links and the names of the signals.
-pub(crate) fn signals(robot: &Robot, arm: &FlexibleArm) -> RunHeader {
-    RunHeader { links: ordered_links(robot), ..names_of_signals(robot, arm) }
+pub(crate) fn signals(robot: &Robot, plant: &Plant) -> RunHeader {
+    RunHeader { links: ordered_links(robot), ..names_of_signals(robot, plant) }
 }
 
 /// Header with the names of joints, springs and TCP, used for column names.
-pub(crate) fn names_of_signals(robot: &Robot, arm: &FlexibleArm) -> RunHeader {
-    let actuated = &arm.model.coordinates()[..arm.model.n_actuated()];
+pub(crate) fn names_of_signals(robot: &Robot, plant: &Plant) -> RunHeader {
+    let actuated = &plant.model.coordinates()[..plant.model.n_actuated()];
     RunHeader {
         robot: robot.name.clone(),
         joints: actuated.iter().map(|c| c.joint.clone()).collect(),
         prismatic: actuated.iter().map(|c| c.slides()).collect(),
-        elements: arm.elements.iter().map(|e| e.name.clone()).collect(),
+        elements: plant.elements.iter().map(|e| e.name.clone()).collect(),
         tcp: robot.tcp.0.clone(),
         ..RunHeader::default()
     }
 }
 
 /// Header without the data of a particular run.
-pub fn robot_header(robot: &Robot, arm: &FlexibleArm) -> RunHeader {
-    let header = signals(robot, arm);
+pub fn robot_header(robot: &Robot, plant: &Plant) -> RunHeader {
+    let header = signals(robot, plant);
     let read = |name: &str, media_type: &str, path: &std::path::Path| {
         std::fs::read(path).ok().map(|bytes| Attachment { name: name.into(), media_type: media_type.into(), bytes })
     };

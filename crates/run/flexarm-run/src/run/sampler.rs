@@ -3,7 +3,7 @@
 
 use flexarm_kinematics::{AxisMotion, Frame, JointMotion};
 use flexarm_log::{ElasticSample, EnergySample, Sample};
-use flexarm_stepping::{FlexibleArm, Observation};
+use flexarm_stepping::{Observation, Plant};
 
 use crate::arm::{Arm, Owner};
 use crate::robot::Robot;
@@ -20,8 +20,8 @@ pub(super) struct Sampler {
 }
 
 impl Sampler {
-    pub(super) fn new(robot: &Robot, flexible: &Arm, link_frames: Vec<Frame>, stations: Vec<Frame>) -> Self {
-        Self { link_frames, stations, angles: link_side_angles(robot, flexible) }
+    pub(super) fn new(robot: &Robot, arm: &Arm, link_frames: Vec<Frame>, stations: Vec<Frame>) -> Self {
+        Self { link_frames, stations, angles: link_side_angles(robot, arm) }
     }
 
     /// Fills in the arm and its twin.
@@ -72,12 +72,12 @@ impl Sampler {
 }
 
 /// Fills in deflection and load of each spring, along the axes of its joint.
-pub(super) fn fill_elastic(sample: &mut Sample, seen: &Observation, arm: &FlexibleArm) {
-    sample.elastic.resize(arm.elements.len(), ElasticSample::default());
-    for (k, element) in arm.elements.iter().enumerate() {
+pub(super) fn fill_elastic(sample: &mut Sample, seen: &Observation, plant: &Plant) {
+    sample.elastic.resize(plant.elements.len(), ElasticSample::default());
+    for (k, element) in plant.elements.iter().enumerate() {
         let e = seen.q.rows(element.coordinate, element.size);
         let (mut deflection, mut load) = ([0.0; 6], seen.load[k].into());
-        match (element.size, arm.model.bodies()[element.body].motion) {
+        match (element.size, plant.model.bodies()[element.body].motion) {
             (1, JointMotion::Axis(motion)) => place(&mut deflection, &mut load, motion, e[0]),
             (n, _) => (0..n.min(6)).for_each(|c| deflection[c] = e[c]),
         }
@@ -101,17 +101,17 @@ fn place(deflection: &mut [f64; 6], load: &mut [f64; 6], motion: AxisMotion, e: 
 }
 
 /// Contributions of gearbox springs to the link-side angle, in addition to the motor's angle.
-pub(crate) fn link_side_angles(robot: &Robot, flexible: &Arm) -> Vec<(usize, usize, f64)> {
+pub(crate) fn link_side_angles(robot: &Robot, arm: &Arm) -> Vec<(usize, usize, f64)> {
     let mut angles = Vec::new();
-    for (group, owner) in flexible.model.elastic().iter().zip(&flexible.owners) {
+    for (group, owner) in arm.model.elastic().iter().zip(&arm.owners) {
         let Owner::Drive(drive) = owner else { continue };
         let joint = &robot.drives[*drive].joint;
-        let actuated = &flexible.model.coordinates()[..flexible.model.n_actuated()];
+        let actuated = &arm.model.coordinates()[..arm.model.n_actuated()];
         let Some(k) = actuated.iter().position(|c| c.joint == *joint) else { continue };
-        let motor = &flexible.model.bodies()[actuated[k].body];
+        let motor = &arm.model.bodies()[actuated[k].body];
         let JointMotion::Axis(motion) = motor.motion else { continue };
         let axis = motion.axis();
-        match flexible.model.bodies()[group.body].motion {
+        match arm.model.bodies()[group.body].motion {
             // A sliding spring does not turn a joint, and a turning one does not move a slide.
             JointMotion::Axis(own) if own.slides() != motion.slides() => {}
             JointMotion::Axis(own) => {

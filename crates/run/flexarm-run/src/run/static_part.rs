@@ -8,7 +8,7 @@
 use std::sync::Arc;
 
 use flexarm_kinematics::Frame;
-use flexarm_stepping::{FlexibleArm, StaticPath};
+use flexarm_stepping::{Plant, StaticPath};
 use nalgebra::Vector3;
 
 /// Time between two equilibria along a motion (s); a cubic through four of them is accurate to a
@@ -44,22 +44,16 @@ struct Block {
 }
 
 impl StaticPart {
-    pub(crate) fn new(
-        arm: &Arc<FlexibleArm>,
-        tcp: &Frame,
-        moves: Vec<(f64, f64)>,
-        duration: f64,
-        sample_s: f64,
-    ) -> Self {
-        let changes = arm.inertia_changes.iter().map(|change| change.t);
+    pub(crate) fn new(plant: &Arc<Plant>, tcp: &Frame, moves: Vec<(f64, f64)>, duration: f64, sample_s: f64) -> Self {
+        let changes = plant.inertia_changes.iter().map(|change| change.t);
         let ends = moves.iter().flat_map(|&(start, end)| [start, end]);
         let mut breaks: Vec<f64> =
-            arm.load_jumps().chain(changes).chain(ends).chain([duration]).filter(|t| *t > 0.0).collect();
+            plant.load_jumps().chain(changes).chain(ends).chain([duration]).filter(|t| *t > 0.0).collect();
         breaks.sort_by(f64::total_cmp);
         breaks.dedup();
-        let period = arm.loads.iter().map(|load| load.wrench.period).fold(f64::INFINITY, f64::min);
+        let period = plant.loads.iter().map(|load| load.wrench.period).fold(f64::INFINITY, f64::min);
         Self {
-            path: StaticPath::new(arm.clone()),
+            path: StaticPath::new(plant.clone()),
             tcp: tcp.clone(),
             breaks,
             moves,
@@ -108,7 +102,7 @@ impl StaticPart {
     }
 
     fn is_loaded(&self) -> bool {
-        !self.path.arm().loads.is_empty()
+        !self.path.plant().loads.is_empty()
     }
 
     fn displacement(&mut self, t: f64) -> Option<Vector3<f64>> {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use flexarm_kinematics::{
     Data, Frame, Model, State, forward_kinematics_velocity, frame_jacobian, frame_twist, inverse_dynamics, world_poses,
 };
-use flexarm_stepping::FlexibleArm;
+use flexarm_stepping::Plant;
 use nalgebra::{DVector, Matrix6xX, Vector3};
 
 /// Kinematics and required torques of the rigid twin at one time.
@@ -25,10 +25,10 @@ pub(crate) struct RigidTwin {
 }
 
 impl RigidTwin {
-    pub(crate) fn new(arm: &FlexibleArm) -> Self {
-        let model = &arm.model;
+    pub(crate) fn new(plant: &Plant) -> Self {
+        let model = &plant.model;
         Self {
-            data: Data::new(&arm.model),
+            data: Data::new(&plant.model),
             state: State::zeros(model),
             qddot: DVector::zeros(model.nv()),
             J: Matrix6xX::zeros(model.nv()),
@@ -40,39 +40,39 @@ impl RigidTwin {
 
     /// Velocity and acceleration of the TCP at time t; zero, without any computation, while all
     /// joints are at rest.
-    pub(crate) fn rates(&mut self, arm: &FlexibleArm, tcp: &Frame, t: f64) -> [Vector3<f64>; 2] {
-        arm.prescribed_state(t, &mut self.state, &mut self.qddot);
+    pub(crate) fn rates(&mut self, plant: &Plant, tcp: &Frame, t: f64) -> [Vector3<f64>; 2] {
+        plant.prescribed_state(t, &mut self.state, &mut self.qddot);
         if self.state.qdot.iter().all(|rate| *rate == 0.0) {
             return [Vector3::zeros(); 2];
         }
-        self.update(arm, tcp, t);
+        self.update(plant, tcp, t);
         [self.velocity, self.acceleration]
     }
 
     /// Computes poses and velocities at time t with the same operations as [`RigidTwin::update`],
     /// but neither forces nor accelerations. Does nothing while the joints are at rest.
-    pub(crate) fn place(&mut self, arm: &FlexibleArm, tcp: &Frame, t: f64) {
-        arm.prescribed_state(t, &mut self.state, &mut self.qddot);
+    pub(crate) fn place(&mut self, plant: &Plant, tcp: &Frame, t: f64) {
+        plant.prescribed_state(t, &mut self.state, &mut self.qddot);
         if let Some((model, state)) = &mut self.placed {
-            if Arc::ptr_eq(model, &arm.model) && *state == self.state {
+            if Arc::ptr_eq(model, &plant.model) && *state == self.state {
                 return;
             }
-            model.clone_from(&arm.model);
+            model.clone_from(&plant.model);
             state.q.copy_from(&self.state.q);
             state.qdot.copy_from(&self.state.qdot);
         } else {
-            self.placed = Some((arm.model.clone(), self.state.clone()));
+            self.placed = Some((plant.model.clone(), self.state.clone()));
         }
-        forward_kinematics_velocity(&arm.model, &mut self.data, &self.state);
-        frame_jacobian(&arm.model, &self.data, tcp, &mut self.J);
+        forward_kinematics_velocity(&plant.model, &mut self.data, &self.state);
+        frame_jacobian(&plant.model, &self.data, tcp, &mut self.J);
         self.velocity = frame_twist(&self.data, tcp).linear;
     }
 
     /// Computes everything at time t; `data.tau` holds the torques that the drives must supply.
-    pub(crate) fn update(&mut self, arm: &FlexibleArm, tcp: &Frame, t: f64) {
+    pub(crate) fn update(&mut self, plant: &Plant, tcp: &Frame, t: f64) {
         self.placed = None;
-        let model = &arm.model;
-        arm.prescribed_state(t, &mut self.state, &mut self.qddot);
+        let model = &plant.model;
+        plant.prescribed_state(t, &mut self.state, &mut self.qddot);
         inverse_dynamics(model, &mut self.data, &self.state, &self.qddot);
         world_poses(model, &mut self.data);
         frame_jacobian(model, &self.data, tcp, &mut self.J);

@@ -10,7 +10,7 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use crate::estimation::identified::{HeldOut, Identified, IdentifyError, ModelError, ParameterEstimate};
 use crate::estimation::least_squares::{Progress, Residuals, Search, Solution, SolveError, Unknown, scale, solve};
 use crate::estimation::measurement::{MeasuredArm, NoAnswer};
-use crate::estimation::parameter::{Parameter, Plant};
+use crate::estimation::parameter::{NominalArm, Parameter};
 use crate::estimation::placement::placed;
 use crate::estimation::reading::{Instrument, KINDS, Measurements, ReadingKind};
 
@@ -49,7 +49,7 @@ impl Default for IdentifyOptions {
 /// # Errors
 /// [`IdentifyError`].
 pub fn identify(
-    plant: &Plant,
+    nominal: &NominalArm,
     parameters: &[Parameter],
     measurements: &Measurements,
     options: &IdentifyOptions,
@@ -61,9 +61,9 @@ pub fn identify(
     }
     let mut unknowns = unknowns(parameters, measurements);
     let start: Vec<f64> = parameters.iter().zip(&unknowns).map(|(p, u)| p.search(u.start).0).collect();
-    let measurements = placed(&plant.with(parameters, &start), measurements)?;
+    let measurements = placed(&nominal.with(parameters, &start), measurements)?;
     unknowns.extend((0..measurements.own_unknowns()).map(|_| Unknown::free()));
-    let fit = Fit { plant, parameters, measurements: &measurements, search: &options.search, watch };
+    let fit = Fit { nominal, parameters, measurements: &measurements, search: &options.search, watch };
     let before = Fit { parameters: &[], watch: &|_| true, ..fit }.solved(&unknowns[parameters.len()..]);
     let before = match before {
         Ok(found) => found.residuals.as_slice().to_vec(),
@@ -130,7 +130,7 @@ fn to_search(parameters: &[Parameter], x: &mut DVector<f64>) -> Vec<f64> {
 /// Parameters, readings, and how they are fitted.
 #[derive(Clone, Copy)]
 struct Fit<'a> {
-    plant: &'a Plant,
+    nominal: &'a NominalArm,
     parameters: &'a [Parameter],
     measurements: &'a Measurements,
     search: &'a Search,
@@ -140,8 +140,8 @@ struct Fit<'a> {
 impl Fit<'_> {
     /// Fits all readings.
     fn solved(&self, unknowns: &[Unknown]) -> Result<Solution, IdentifyError> {
-        let Self { plant, parameters, measurements, search, watch } = *self;
-        let problem = InUnknowns(MeasuredArm { plant, parameters, measurements });
+        let Self { nominal, parameters, measurements, search, watch } = *self;
+        let problem = InUnknowns(MeasuredArm { nominal, parameters, measurements });
         solve(&problem, &measurements.noise(), unknowns, search, watch).map_err(|error| match error {
             SolveError::Model(error) => IdentifyError::Model(error),
             SolveError::Nuisance(k) => IdentifyError::Untold { what: own_name(measurements, k - parameters.len()) },

@@ -12,7 +12,7 @@ use flexarm_stepping::{OperatingPoint, StepError};
 use nalgebra::{DMatrix, DVector, Matrix3xX, Matrix6xX, Rotation3, Translation3, Vector3, Vector6};
 
 use crate::estimation::least_squares::Residuals;
-use crate::estimation::parameter::{Effect, Parameter, Plant, carried_along, displacement, tool_shift};
+use crate::estimation::parameter::{Effect, NominalArm, Parameter, carried_along, displacement, tool_shift};
 use crate::estimation::reading::{
     Component, LoadCase, MeasuredResponse, MeasuredShape, Measurements, Reading, ReadingKind, Row,
 };
@@ -22,7 +22,7 @@ use crate::estimation::sensitivity::{frequency_slopes, slopes_at_rest, with_defl
 /// An arm with unknown parameters and the measurements made on it.
 pub struct MeasuredArm<'a> {
     /// Nominal arm.
-    pub plant: &'a Plant,
+    pub nominal: &'a NominalArm,
     /// Unknown parameters.
     pub parameters: &'a [Parameter],
     /// Measurements.
@@ -85,7 +85,7 @@ struct Room<'a> {
 
 /// Operating points of the loads met so far.
 struct Workspaces<'a> {
-    plant: Plant,
+    nominal: NominalArm,
     parameters: &'a [Parameter],
     /// Coordinates of the parameters.
     x: Vec<f64>,
@@ -99,7 +99,7 @@ impl<'a> Workspaces<'a> {
         let number = match known {
             Some(number) => number,
             None => {
-                let tool = &self.plant.tool;
+                let tool = &self.nominal.tool;
                 let X = Pose::from_parts(Translation3::from(load.at), Rotation3::identity());
                 let frame = Frame { name: tool.name.clone(), body: tool.body, X_BF: tool.X_BF * X };
                 let point = OperatingPoint::new(self.loaded(&load.carried).at_rest(q)?, frame);
@@ -125,7 +125,7 @@ impl<'a> Workspaces<'a> {
         frame: Option<&Frame>,
         slopes: bool,
     ) -> Result<AtRest, StepError> {
-        let own = frame.cloned().unwrap_or_else(|| self.plant.tool.clone());
+        let own = frame.cloned().unwrap_or_else(|| self.nominal.tool.clone());
         let turn = tool_shift(self.parameters, &self.x).1;
         let all = self.parameters;
         let Room { point: at, parameters, .. } = self.solved(q, load)?;
@@ -153,7 +153,7 @@ impl<'a> Workspaces<'a> {
         if !self.parameters.iter().any(|p| matches!(p.effect, Effect::Tool(_) | Effect::Frame { .. })) {
             return Cow::Borrowed(self.parameters);
         }
-        let (body, X_BF) = (self.plant.tool.body, self.plant.tool.X_BF);
+        let (body, X_BF) = (self.nominal.tool.body, self.nominal.tool.X_BF);
         let I = carried.at_parent(&X_BF);
         let mut all = self.parameters.to_vec();
         for (k, [v, w]) in tool_twists(self.parameters, &X_BF.rotation, &tool_shift(self.parameters, &self.x).1) {
@@ -178,9 +178,9 @@ impl<'a> Workspaces<'a> {
         Cow::Owned(all)
     }
 
-    fn loaded(&self, carried: &SpatialInertia) -> Plant {
-        let tool = &self.plant.tool;
-        self.plant.carrying(tool.body, &carried.at_parent(&tool.X_BF))
+    fn loaded(&self, carried: &SpatialInertia) -> NominalArm {
+        let tool = &self.nominal.tool;
+        self.nominal.carrying(tool.body, &carried.at_parent(&tool.X_BF))
     }
 }
 
@@ -232,8 +232,8 @@ impl MeasuredArm<'_> {
         let mut all = Vec::new();
         for (number, reading) in self.measurements.readings.iter().enumerate() {
             let ReadingKind::Shape(shape) = &reading.kind else { continue };
-            let plant = rooms.loaded(&shape.load.carried);
-            let found = structure_slopes(&plant, &[], &reading.q, &shape.probes);
+            let nominal = rooms.loaded(&shape.load.carried);
+            let found = structure_slopes(&nominal, &[], &reading.q, &shape.probes);
             let found = found.map_err(|source| NoAnswer { reading: reading.name.clone(), source })?;
             all.extend(shape.likeliest(&found).map(|(mode, assurance, _)| (number, mode, assurance)));
         }
@@ -255,7 +255,12 @@ impl MeasuredArm<'_> {
 
     fn rooms(&self, unknowns: &DVector<f64>) -> Workspaces<'_> {
         let x = unknowns.as_slice()[..self.parameters.len()].to_vec();
-        Workspaces { plant: self.plant.with(self.parameters, &x), parameters: self.parameters, x, known: Vec::new() }
+        Workspaces {
+            nominal: self.nominal.with(self.parameters, &x),
+            parameters: self.parameters,
+            x,
+            known: Vec::new(),
+        }
     }
 
     /// Predicts the numbers of a reading, and their derivatives with respect to all unknowns if
@@ -298,9 +303,9 @@ impl MeasuredArm<'_> {
                 Ok(self.instrument_at(*instrument, value, std.is_some(), own, slopes))
             }
             ReadingKind::Frequencies { load, rows } => {
-                let plant = rooms.loaded(&load.carried);
+                let nominal = rooms.loaded(&load.carried);
                 let parameters = if slopes { rooms.under(&load.carried) } else { Cow::Borrowed(&[][..]) };
-                let found = frequency_slopes(&plant, &parameters, &reading.q).map_err(named)?;
+                let found = frequency_slopes(&nominal, &parameters, &reading.q).map_err(named)?;
                 let values = rows.iter().map(|row| found.hz.get(row.of).copied().unwrap_or(f64::NAN)).collect();
                 let slopes = self.with_own(rows.len(), own.len(), slopes, |i, j| found.slopes[(rows[i].of, j)]);
                 Ok(Block { values, slopes })
@@ -366,11 +371,11 @@ impl MeasuredArm<'_> {
         own: usize,
         slopes: bool,
     ) -> Result<Block, StepError> {
-        let plant = rooms.loaded(&measured.load.carried);
+        let nominal = rooms.loaded(&measured.load.carried);
         let parameters = if slopes { rooms.under(&measured.load.carried) } else { Cow::Borrowed(&[][..]) };
         let probes = [measured.watched.clone(), measured.hit.clone()];
         let omega: Vec<f64> = measured.points.iter().map(|(omega, ..)| *omega).collect();
-        let found = structure_slopes(&plant, &parameters, q, &probes)?.response(0, 1, measured.answer, &omega)?;
+        let found = structure_slopes(&nominal, &parameters, q, &probes)?.response(0, 1, measured.answer, &omega)?;
         let values = found.values.iter().enumerate().flat_map(|(k, value)| measured.numbers(k, *value)).collect();
         let slope = |i: usize, j: usize| {
             let k = i / 2;
@@ -387,9 +392,9 @@ impl MeasuredArm<'_> {
         own: usize,
         slopes: bool,
     ) -> Result<Block, StepError> {
-        let plant = rooms.loaded(&measured.load.carried);
+        let nominal = rooms.loaded(&measured.load.carried);
         let parameters = if slopes { rooms.under(&measured.load.carried) } else { Cow::Borrowed(&[][..]) };
-        let found = structure_slopes(&plant, &parameters, q, &measured.probes)?;
+        let found = structure_slopes(&nominal, &parameters, q, &measured.probes)?;
         let none = || StepError::Singular { matrix: "mode shapes at the measured points (they do not move)", t: 0.0 };
         let (mode, _, seen) = measured.likeliest(&found).ok_or_else(none)?;
         let all = found.shape_slopes(mode);

@@ -1,6 +1,6 @@
 //! Parameters of flexible arms estimated from measurements, with their uncertainties.
 //!
-//! A [`Plant`] is the nominal arm, [`Parameter`]s are its unknowns, and [`Measurements`] the
+//! A [`NominalArm`] is the nominal arm, [`Parameter`]s are its unknowns, and [`Measurements`] the
 //! readings taken at the robot. [`MeasuredArm`] combines them; [`identify`] estimates the
 //! parameters with their uncertainties, and reports which of them the readings determine and which
 //! readings contradict the model. [`plan`] chooses poses and loads to measure. Derivatives are in
@@ -30,7 +30,7 @@ pub use identified::{HeldOut, Identified, IdentifyError, ModelError, ParameterEs
 pub use identify::{IdentifyOptions, identify};
 pub use least_squares::{Loss, Noise, Progress, Residuals, Search, Solution, SolveError, Unknown, solve};
 pub use measurement::{MeasuredArm, NoAnswer};
-pub use parameter::{Effect, Parameter, Plant, SpringPart};
+pub use parameter::{Effect, NominalArm, Parameter, SpringPart};
 pub use plan::{Candidate, Plan, PlanOptions, plan};
 pub use reading::{
     Component, Form, Instrument, LoadCase, MeasuredResponse, MeasuredShape, Measurements, Reading, ReadingKind, Row,

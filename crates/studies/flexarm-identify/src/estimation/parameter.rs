@@ -3,14 +3,14 @@
 use std::sync::Arc;
 
 use flexarm_kinematics::{Frame, Model, Pose, SpatialInertia};
-use flexarm_stepping::{Damping, FlexibleArm, GearCoupling, GuideTerm, Held, Spring, SpringCurve, StepError};
+use flexarm_stepping::{Damping, GearCoupling, GuideTerm, Held, Plant, Spring, SpringCurve, StepError};
 use nalgebra::{DMatrix, Matrix3, Rotation3, Translation3, Vector3, Vector6};
 
 use crate::estimation::least_squares::Unknown;
 
 /// Model of an arm: tree, springs in coordinate order, tool.
 #[derive(Clone, Debug)]
-pub struct Plant {
+pub struct NominalArm {
     /// Kinematic tree.
     pub model: Arc<Model>,
     /// Springs, one per elastic group.
@@ -225,53 +225,53 @@ impl Parameter {
     }
 }
 
-impl Plant {
+impl NominalArm {
     /// Returns the plant with parameters at search coordinates `x`.
     #[must_use]
     pub fn with(&self, parameters: &[Parameter], x: &[f64]) -> Self {
-        let mut plant = self.clone();
+        let mut nominal = self.clone();
         for (parameter, x) in parameters.iter().zip(x) {
             match &parameter.effect {
                 Effect::Stiffness(places) => {
                     for place in places {
-                        stiffen(&mut plant.springs[place.spring], place.coordinate, x.exp());
+                        stiffen(&mut nominal.springs[place.spring], place.coordinate, x.exp());
                     }
                 }
                 Effect::Damping(springs) => {
                     for spring in springs {
-                        let spring = &mut plant.springs[*spring];
+                        let spring = &mut nominal.springs[*spring];
                         spring.damping = spring.damping.scaled(x.exp());
                     }
                 }
                 Effect::Damper { spring, coordinate } => {
-                    if let Damping::Dampers(d) = &mut plant.springs[*spring].damping {
+                    if let Damping::Dampers(d) = &mut nominal.springs[*spring].damping {
                         d[*coordinate] *= x.exp();
                     }
                 }
                 Effect::Entry { spring, row, column, factor, .. } => {
-                    let K = &mut plant.springs[*spring].K;
+                    let K = &mut nominal.springs[*spring].K;
                     *K += entry_slope(K.nrows(), *row, *column, factor * x);
                 }
                 Effect::Tool(_) => {}
                 Effect::Guide { springs, term, .. } => {
                     for spring in springs {
-                        if let Some(SpringCurve::Guide(guide)) = &mut plant.springs[*spring].curve {
+                        if let Some(SpringCurve::Guide(guide)) = &mut nominal.springs[*spring].curve {
                             *guide = guide.with(*term, parameter.value(*x) - guide.number(*term));
                         }
                     }
                 }
                 Effect::Frame { body, twist, .. } => {
-                    let moved = plant.model.bodies()[*body].X_PJ * displacement(&(twist * *x));
-                    Arc::make_mut(&mut plant.model).set_joint_frame(*body, moved);
+                    let moved = nominal.model.bodies()[*body].X_PJ * displacement(&(twist * *x));
+                    Arc::make_mut(&mut nominal.model).set_joint_frame(*body, moved);
                 }
-                Effect::Mass { body, per_kg } => plant = plant.carrying(*body, &scaled(per_kg, *x)),
+                Effect::Mass { body, per_kg } => nominal = nominal.carrying(*body, &scaled(per_kg, *x)),
             }
         }
         let (p, turn) = tool_shift(parameters, x);
         if p != Vector3::zeros() || turn != Vector3::zeros() {
-            plant.tool.X_BF *= Pose::from_parts(Translation3::from(p), Rotation3::new(turn));
+            nominal.tool.X_BF *= Pose::from_parts(Translation3::from(p), Rotation3::new(turn));
         }
-        plant
+        nominal
     }
 
     /// Returns the plant with inertia added to a body (about Bo, B axes).
@@ -285,23 +285,23 @@ impl Plant {
     /// Returns the arm with drives locked at a pose.
     ///
     /// # Errors
-    /// As [`FlexibleArm::new`] and [`FlexibleArm::with_coupling`].
-    pub fn held(&self, q: &[f64]) -> Result<FlexibleArm, StepError> {
-        self.coupled(FlexibleArm::new(self.model.clone(), self.springs.clone(), Arc::new(Held(q.to_vec())))?)
+    /// As [`Plant::new`] and [`Plant::with_coupling`].
+    pub fn held(&self, q: &[f64]) -> Result<Plant, StepError> {
+        self.coupled(Plant::new(self.model.clone(), self.springs.clone(), Arc::new(Held(q.to_vec())))?)
     }
 
     /// Returns the arm with drives locked at a pose, only for equilibria.
     ///
     /// # Errors
-    /// As [`FlexibleArm::at_rest`] and [`FlexibleArm::with_coupling`].
-    pub fn at_rest(&self, q: &[f64]) -> Result<FlexibleArm, StepError> {
-        self.coupled(FlexibleArm::at_rest(self.model.clone(), self.springs.clone(), Arc::new(Held(q.to_vec())))?)
+    /// As [`Plant::at_rest`] and [`Plant::with_coupling`].
+    pub fn at_rest(&self, q: &[f64]) -> Result<Plant, StepError> {
+        self.coupled(Plant::at_rest(self.model.clone(), self.springs.clone(), Arc::new(Held(q.to_vec())))?)
     }
 
-    fn coupled(&self, arm: FlexibleArm) -> Result<FlexibleArm, StepError> {
+    fn coupled(&self, plant: Plant) -> Result<Plant, StepError> {
         match &self.coupling {
-            Some(coupling) => arm.with_coupling(coupling.clone()),
-            None => Ok(arm),
+            Some(coupling) => plant.with_coupling(coupling.clone()),
+            None => Ok(plant),
         }
     }
 }

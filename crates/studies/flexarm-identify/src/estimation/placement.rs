@@ -5,12 +5,12 @@ use nalgebra::{DVector, Matrix3, Rotation3, Translation3, Vector3};
 
 use crate::estimation::identified::IdentifyError;
 use crate::estimation::measurement::MeasuredArm;
-use crate::estimation::parameter::Plant;
+use crate::estimation::parameter::NominalArm;
 use crate::estimation::reading::{Component, Instrument, Measurements, Reading, ReadingKind, Target};
 
 /// Returns the measurements with each unknown instrument at its best fit to the arm with its
 /// initial values.
-pub(crate) fn placed(plant: &Plant, measurements: &Measurements) -> Result<Measurements, IdentifyError> {
+pub(crate) fn placed(nominal: &NominalArm, measurements: &Measurements) -> Result<Measurements, IdentifyError> {
     let mut placed = measurements.clone();
     for number in 0..measurements.instruments.len() {
         let of_it = |kind: &ReadingKind| match kind {
@@ -24,13 +24,13 @@ pub(crate) fn placed(plant: &Plant, measurements: &Measurements) -> Result<Measu
                     let own = matches!(reading.kind, ReadingKind::Place { instrument, .. } if instrument == number);
                     own && reading.position().is_some()
                 };
-                let [world, own] = both_points(plant, measurements, seen)?;
+                let [world, own] = both_points(nominal, measurements, seen)?;
                 let too_few = || IdentifyError::Instrument { instrument: number, places: world.len() };
                 placed.instruments[number] = Instrument::Unknown(rigid_fit(&world, &own).ok_or_else(too_few)?);
             }
             Instrument::Axes(_) if !said => {
                 let seen = |reading: &Reading| seen_in_axes(&reading.kind, number);
-                let [world, own] = both_points(plant, measurements, seen)?;
+                let [world, own] = both_points(nominal, measurements, seen)?;
                 let too_few = || IdentifyError::Axes { instrument: number, displacements: world.len() };
                 placed.instruments[number] = Instrument::Axes(rotation_fit(&world, &own).ok_or_else(too_few)?);
             }
@@ -51,7 +51,7 @@ fn seen_in_axes(kind: &ReadingKind, instrument: usize) -> bool {
 /// Returns the vectors of some readings, predicted in world axes by the arm with its initial
 /// values, and as observed.
 fn both_points(
-    plant: &Plant,
+    nominal: &NominalArm,
     measurements: &Measurements,
     some: impl Fn(&Reading) -> bool,
 ) -> Result<[Vec<Vector3<f64>>; 2], IdentifyError> {
@@ -63,7 +63,7 @@ fn both_points(
             *t = Target::Known(*guess);
         }
     });
-    let arm = MeasuredArm { plant, parameters: &[], measurements: &seen };
+    let arm = MeasuredArm { nominal, parameters: &[], measurements: &seen };
     Ok([points(&arm.predicted(&DVector::zeros(0))?), points(&arm.observed())])
 }
 

@@ -9,7 +9,7 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 
 use crate::estimation::least_squares::Residuals;
 use crate::estimation::measurement::{MeasuredArm, NoAnswer};
-use crate::estimation::parameter::{Parameter, Plant};
+use crate::estimation::parameter::{NominalArm, Parameter};
 use crate::estimation::reading::{Measurements, Reading};
 
 /// Candidate: a reading with its expected deviations; its values are ignored.
@@ -45,9 +45,9 @@ pub struct Plan {
 const ROUNDS: usize = 20;
 
 /// Rows of the Jacobian of one reading, scaled by the prior deviations.
-fn rows_of(plant: &Plant, parameters: &[Parameter], reading: &Reading) -> Result<DMatrix<f64>, NoAnswer> {
+fn rows_of(nominal: &NominalArm, parameters: &[Parameter], reading: &Reading) -> Result<DMatrix<f64>, NoAnswer> {
     let one = Measurements { readings: vec![reading.clone()], ..Measurements::default() };
-    let arm = MeasuredArm { plant, parameters, measurements: &one };
+    let arm = MeasuredArm { nominal, parameters, measurements: &one };
     let mut J = DMatrix::zeros(0, 0);
     arm.evaluate(&DVector::zeros(parameters.len()), Some(&mut J))?;
     for (k, parameter) in parameters.iter().enumerate() {
@@ -71,7 +71,7 @@ fn prior(parameter: &Parameter) -> f64 {
 /// # Errors
 /// [`NoAnswer`] if the arm has no solution for a reading of the purpose.
 pub fn plan(
-    plant: &Plant,
+    nominal: &NominalArm,
     parameters: &[Parameter],
     candidates: &[Candidate],
     options: &PlanOptions,
@@ -79,10 +79,10 @@ pub fn plan(
     let p = parameters.len();
     let rows: Vec<Option<DMatrix<f64>>> = candidates
         .iter()
-        .map(|candidate| rows_of(plant, parameters, &candidate.0).ok().filter(|J| J.iter().all(|x| x.is_finite())))
+        .map(|candidate| rows_of(nominal, parameters, &candidate.0).ok().filter(|J| J.iter().all(|x| x.is_finite())))
         .collect();
     let purpose =
-        options.purpose.iter().map(|reading| rows_of(plant, parameters, reading)).collect::<Result<Vec<_>, _>>()?;
+        options.purpose.iter().map(|reading| rows_of(nominal, parameters, reading)).collect::<Result<Vec<_>, _>>()?;
     let mut search = Choice { rows: &rows, purpose: &purpose, repeat: options.repeat, chosen: Vec::new() };
     let mut information = DMatrix::identity(p, p);
     // Greedy selection, then exchange.

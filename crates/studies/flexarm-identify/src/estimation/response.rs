@@ -15,10 +15,10 @@
 //! Start at [`structure_slopes`].
 
 use flexarm_kinematics::{Frame, Wrench};
-use flexarm_stepping::{Damping, FlexibleArm, OperatingPoint, StepError, Tangents};
+use flexarm_stepping::{Damping, OperatingPoint, Plant, StepError, Tangents};
 use nalgebra::{Complex, DMatrix, DVector, RowDVector, Vector3};
 
-use crate::estimation::parameter::{Effect, Parameter, Plant, entry_slope, slope_of};
+use crate::estimation::parameter::{Effect, NominalArm, Parameter, entry_slope, slope_of};
 use crate::estimation::sensitivity::{FRAME_STEP, along, eigen, explicit, force_slopes, frames_beside};
 
 /// Relative distance between squared frequencies below which the shapes of the two modes are not
@@ -103,7 +103,7 @@ pub struct StructureSlopes {
 /// Linearises an arm held at a pose under gravity, and computes its derivatives with respect to the
 /// parameters.
 ///
-/// * `plant`: arm with the present parameters.
+/// * `nominal`: arm with the present parameters.
 /// * `q`: actuated joints (rad or m).
 /// * `probes`: excited and measured points.
 ///
@@ -114,48 +114,48 @@ pub struct StructureSlopes {
 /// # Errors
 /// As [`OperatingPoint::solve`]; [`StepError::Singular`] if a coordinate has no mass.
 pub fn structure_slopes(
-    plant: &Plant,
+    nominal: &NominalArm,
     parameters: &[Parameter],
     q: &[f64],
     probes: &[Probe],
 ) -> Result<StructureSlopes, StepError> {
     let none = Wrench::zeros();
-    let arm = plant.held(q)?;
-    let mut at = OperatingPoint::new(arm.clone(), plant.tool.clone());
+    let plant = nominal.held(q)?;
+    let mut at = OperatingPoint::new(plant.clone(), nominal.tool.clone());
     at.solve(q, &none)?;
     let forces = force_slopes(&mut at, parameters);
     let q = at.coordinates().clone();
-    let here = Tangents::at(&arm, &plant.tool, &none, &q);
+    let here = Tangents::at(&plant, &nominal.tool, &none, &q);
     let (omega2, shapes) = eigen(&here)?;
     let symmetric = (&here.K + here.K.transpose()) * 0.5;
     let singular = || StepError::Singular { matrix: "static stiffness (with the effect of weight)", t: 0.0 };
     let factor = symmetric.cholesky().ok_or_else(singular)?;
-    let damped = Damped { arm: &arm, M: &here.M, omega2: &omega2, shapes: &shapes };
+    let damped = Damped { plant: &plant, M: &here.M, omega2: &omega2, shapes: &shapes };
     let mut slopes = Vec::with_capacity(parameters.len());
     for (k, parameter) in parameters.iter().enumerate() {
         let moved = -factor.solve(&forces.column(k));
-        let change = along(&arm, &q, &moved, |q| {
-            let at = Tangents::at(&arm, &plant.tool, &none, q);
+        let change = along(&plant, &q, &moved, |q| {
+            let at = Tangents::at(&plant, &nominal.tool, &none, q);
             let rows =
-                rows(&arm, probes, q).into_iter().map(|row| DMatrix::from_row_slice(1, row.len(), row.as_slice()));
+                rows(&plant, probes, q).into_iter().map(|row| DMatrix::from_row_slice(1, row.len(), row.as_slice()));
             [at.K, at.M].into_iter().chain(rows).collect()
         });
-        let (eK, eM) = explicit(&arm, &plant.tool, &none, &parameter.effect, &q, &here);
+        let (eK, eM) = explicit(&plant, &nominal.tool, &none, &parameter.effect, &q, &here);
         let (K, M) = (&change[0] + eK, &change[1] + eM);
         let D = damped.slope(&parameter.effect, &K, &M);
         let mut rows: Vec<RowDVector<f64>> =
             change[2..].iter().map(|row| RowDVector::from_row_slice(row.as_slice())).collect();
         if let Effect::Frame { body, twist, .. } = &parameter.effect {
-            let [ahead, behind] = frames_beside(&arm, *body, twist).map(|arm| self::rows(&arm, probes, &q));
+            let [ahead, behind] = frames_beside(&plant, *body, twist).map(|plant| self::rows(&plant, probes, &q));
             for ((row, up), down) in rows.iter_mut().zip(ahead).zip(behind) {
                 *row += (up - down) / (2.0 * FRAME_STEP);
             }
         }
         slopes.push(Structure { M, D, K, rows });
     }
-    let rows = rows(&arm, probes, &q);
+    let rows = rows(&plant, probes, &q);
     Ok(StructureSlopes {
-        structure: Structure { M: here.M, D: arm.D.clone(), K: here.K, rows },
+        structure: Structure { M: here.M, D: plant.D.clone(), K: here.K, rows },
         slopes,
         omega2,
         shapes,
@@ -163,9 +163,9 @@ pub fn structure_slopes(
 }
 
 /// Computes the Jacobian of each probe along its direction.
-fn rows(arm: &FlexibleArm, probes: &[Probe], q: &DVector<f64>) -> Vec<RowDVector<f64>> {
+fn rows(plant: &Plant, probes: &[Probe], q: &DVector<f64>) -> Vec<RowDVector<f64>> {
     let row = |probe: &Probe| {
-        let J = Tangents::at(arm, &probe.frame, &Wrench::zeros(), q).J;
+        let J = Tangents::at(plant, &probe.frame, &Wrench::zeros(), q).J;
         RowDVector::from_fn(J.ncols(), |_, j| (0..3).map(|c| probe.direction[c] * J[(c, j)]).sum())
     };
     probes.iter().map(row).collect()
@@ -173,7 +173,7 @@ fn rows(arm: &FlexibleArm, probes: &[Probe], q: &DVector<f64>) -> Vec<RowDVector
 
 /// Data for the derivative of the damping matrix.
 pub(crate) struct Damped<'a> {
-    pub(crate) arm: &'a FlexibleArm,
+    pub(crate) plant: &'a Plant,
     pub(crate) M: &'a DMatrix<f64>,
     pub(crate) omega2: &'a [f64],
     pub(crate) shapes: &'a DMatrix<f64>,
@@ -227,7 +227,7 @@ impl Damped<'_> {
             }
             _ => return dD,
         };
-        for (places, coupled) in dampers.iter().filter_map(|spring| self.arm.coupled_damping_slope(*spring)) {
+        for (places, coupled) in dampers.iter().filter_map(|spring| self.plant.coupled_damping_slope(*spring)) {
             for (a, i) in places.iter().enumerate() {
                 places.iter().enumerate().for_each(|(b, j)| dD[(*i, *j)] += coupled[(a, b)]);
             }
@@ -244,9 +244,9 @@ impl Damped<'_> {
                     for place in places {
                         // With coupled gears, each motor's spring contributes to the stiffness of
                         // several joints.
-                        match self.arm.coupled_stiffness_slope(place.spring) {
+                        match self.plant.coupled_stiffness_slope(place.spring) {
                             Some((coupled, slope)) => {
-                                let own = coupled.iter().position(|k| *k == self.arm.offset(e));
+                                let own = coupled.iter().position(|k| *k == self.plant.offset(e));
                                 dK.iter_mut().for_each(|dK| *dK += own.map_or(0.0, |k| slope[(k, k)]));
                             }
                             None if place.spring == number => dK += slope_of(&e.K, place.coordinate),
@@ -258,11 +258,11 @@ impl Damped<'_> {
                     dK += entry_slope(e.size, *row, *column, *factor);
                 }
                 Effect::Damping(springs) => {
-                    let own = springs.contains(&number) && self.arm.coupled_damping_slope(number).is_none();
+                    let own = springs.contains(&number) && self.plant.coupled_damping_slope(number).is_none();
                     more = f64::from(u8::from(own));
                 }
                 Effect::Damper { spring, coordinate } => {
-                    let own = *spring == number && self.arm.coupled_damping_slope(number).is_none();
+                    let own = *spring == number && self.plant.coupled_damping_slope(number).is_none();
                     damper = own.then_some(*coordinate);
                 }
                 Effect::Guide { .. }
@@ -271,10 +271,10 @@ impl Damped<'_> {
                 | Effect::Tool(_)
                 | Effect::Mass { .. } => {}
             }
-            let first = self.arm.offset(e);
+            let first = self.plant.offset(e);
             SpringSlope { first, size: e.size, K: e.K.clone(), dK, damping: e.damping, more, damper }
         };
-        self.arm.elements.iter().enumerate().map(of).collect()
+        self.plant.elements.iter().enumerate().map(of).collect()
     }
 
     /// Adds the derivative of `D = Σ 2 ζ_j ω_j Mφ_j (Mφ_j)ᵀ`, where ζ_j is the mean over the

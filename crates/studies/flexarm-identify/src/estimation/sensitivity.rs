@@ -11,10 +11,12 @@
 use std::sync::Arc;
 
 use flexarm_kinematics::{Data, Frame, Twist, Wrench, forward_kinematics, rotation_vector};
-use flexarm_stepping::{FlexibleArm, Guide, GuideTerm, OperatingPoint, SpringCurve, StepError, Tangents};
+use flexarm_stepping::{Guide, GuideTerm, OperatingPoint, Plant, SpringCurve, StepError, Tangents};
 use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX, SymmetricEigen, Vector3, Vector6};
 
-use crate::estimation::parameter::{Effect, Parameter, Plant, SpringPart, displacement, entry_slope, scaled, slope_of};
+use crate::estimation::parameter::{
+    Effect, NominalArm, Parameter, SpringPart, displacement, entry_slope, scaled, slope_of,
+};
 
 /// Step of the central differences over displacements of joint frames (m, rad): the error is of the
 /// order of its square.
@@ -48,8 +50,8 @@ pub(crate) fn slopes_at_rest(
                 }
             }
             Effect::Entry { spring, row, column, factor, .. } => {
-                let arm = at.arm();
-                let (first, e) = (arm.offset(&arm.elements[*spring]), at.deflections());
+                let plant = at.plant();
+                let (first, e) = (plant.offset(&plant.elements[*spring]), at.deflections());
                 slopes[(first + row, k)] += factor * e[first + column];
                 if row != column {
                     slopes[(first + column, k)] += factor * e[first + row];
@@ -59,11 +61,11 @@ pub(crate) fn slopes_at_rest(
             // load.
             Effect::Damping(_) | Effect::Damper { .. } | Effect::Tool(_) => {}
             Effect::Guide { springs, term, .. } => {
-                let (arm, q) = (at.arm(), at.coordinates().as_slice());
-                for element in springs.iter().map(|spring| &arm.elements[*spring]) {
+                let (plant, q) = (at.plant(), at.coordinates().as_slice());
+                for element in springs.iter().map(|spring| &plant.elements[*spring]) {
                     if let Some(guide) = element.curve.as_ref().and_then(SpringCurve::guide) {
                         let slope = guide.torque_slope(*term, q[element.coordinate], q);
-                        slopes[(arm.offset(element), k)] += slope * per_unit(guide, *term);
+                        slopes[(plant.offset(element), k)] += slope * per_unit(guide, *term);
                     }
                 }
             }
@@ -71,10 +73,10 @@ pub(crate) fn slopes_at_rest(
             Effect::Mass { body, per_kg } => {
                 // Forces are linear in a mass: a difference of any size is exact.
                 let (mut with, mut without) = (DVector::zeros(n), DVector::zeros(n));
-                let arm = at.arm().clone();
-                let heavier = carrying(&arm, *body, per_kg);
+                let plant = at.plant().clone();
+                let heavier = carrying(&plant, *body, per_kg);
                 at.forces_of(&heavier, &mut with);
-                at.forces_of(&arm, &mut without);
+                at.forces_of(&plant, &mut without);
                 slopes.set_column(k, &(with - without));
             }
         }
@@ -85,15 +87,15 @@ pub(crate) fn slopes_at_rest(
 /// Returns the forces of a spring per relative change of its stiffness, with their elastic
 /// coordinates.
 fn stiffness_forces(at: &OperatingPoint, place: &SpringPart) -> Vec<(usize, f64)> {
-    let (arm, e, q) = (at.arm(), at.deflections(), at.coordinates().as_slice());
-    if let Some((places, dK)) = arm.coupled_stiffness_slope(place.spring) {
+    let (plant, e, q) = (at.plant(), at.deflections(), at.coordinates().as_slice());
+    if let Some((places, dK)) = plant.coupled_stiffness_slope(place.spring) {
         let f = dK * DVector::from_iterator(places.len(), places.iter().map(|i| e[*i]));
         return places.iter().copied().zip(f.iter().copied()).collect();
     }
-    let element = &arm.elements[place.spring];
-    let first = arm.offset(element);
+    let element = &plant.elements[place.spring];
+    let first = plant.offset(element);
     // The deflection of a single-coordinate spring includes its transmission error.
-    let turned = arm.deflection(place.spring, e[first], q);
+    let turned = plant.deflection(place.spring, e[first], q);
     let e = if element.size == 1 { &[turned] } else { &e[first..first + element.size] };
     let f = match &element.curve {
         Some(curve) => DVector::from_element(1, curve.torque(e[0], q)),
@@ -108,10 +110,10 @@ fn per_unit(guide: &Guide, term: GuideTerm) -> f64 {
 }
 
 /// Returns the arm with one kilogram added.
-fn carrying(arm: &FlexibleArm, body: usize, per_kg: &flexarm_kinematics::SpatialInertia) -> FlexibleArm {
-    let mut inertia = arm.model.bodies()[body].inertia;
+fn carrying(plant: &Plant, body: usize, per_kg: &flexarm_kinematics::SpatialInertia) -> Plant {
+    let mut inertia = plant.model.bodies()[body].inertia;
     inertia += scaled(per_kg, 1.0);
-    arm.with_inertia(body, inertia)
+    plant.with_inertia(body, inertia)
 }
 
 /// Computes the derivatives of the tool pose as twists (world axes, at the tool's origin; m, rad)
@@ -170,19 +172,19 @@ fn frame_differences(
     (forces, twists): (&mut DMatrix<f64>, &mut Matrix6xX<f64>),
 ) {
     let n = at.deflections().len();
-    let mut arm = at.arm().clone();
-    let mut data = Data::new(&arm.model);
+    let mut plant = at.plant().clone();
+    let mut data = Data::new(&plant.model);
     let mut moved = [DVector::zeros(n), DVector::zeros(n)];
     for &k in some {
         let Effect::Frame { body, twist, .. } = &parameters[k].effect else { continue };
-        let X_PJ = arm.model.bodies()[*body].X_PJ;
+        let X_PJ = plant.model.bodies()[*body].X_PJ;
         let [behind, ahead] = [-FRAME_STEP, FRAME_STEP].map(|step| {
-            Arc::make_mut(&mut arm.model).set_joint_frame(*body, X_PJ * displacement(&(twist * step)));
-            at.forces_of(&arm, &mut moved[usize::from(step > 0.0)]);
-            forward_kinematics(&arm.model, &mut data, at.coordinates());
+            Arc::make_mut(&mut plant.model).set_joint_frame(*body, X_PJ * displacement(&(twist * step)));
+            at.forces_of(&plant, &mut moved[usize::from(step > 0.0)]);
+            forward_kinematics(&plant.model, &mut data, at.coordinates());
             data.X_WF(frame)
         });
-        Arc::make_mut(&mut arm.model).set_joint_frame(*body, X_PJ);
+        Arc::make_mut(&mut plant.model).set_joint_frame(*body, X_PJ);
         forces.set_column(k, &((&moved[1] - &moved[0]) / (2.0 * FRAME_STEP)));
         let turn = rotation_vector((ahead.rotation * behind.rotation.inverse()).matrix());
         let shift = ahead.translation.vector - behind.translation.vector;
@@ -190,17 +192,17 @@ fn frame_differences(
         twists.set_column(k, &Vector6::from_iterator(twist));
     }
     // The poses of the operating point are those of its arm again.
-    at.forces_of(&arm, &mut moved[0]);
+    at.forces_of(&plant, &mut moved[0]);
 }
 
 /// Returns the arm with the joint frame of a body displaced by [`FRAME_STEP`] along a twist and
 /// against it.
-pub(crate) fn frames_beside(arm: &FlexibleArm, body: usize, twist: &Vector6<f64>) -> [FlexibleArm; 2] {
+pub(crate) fn frames_beside(plant: &Plant, body: usize, twist: &Vector6<f64>) -> [Plant; 2] {
     [FRAME_STEP, -FRAME_STEP].map(|step| {
-        let mut arm = arm.clone();
-        let X_PJ = arm.model.bodies()[body].X_PJ * displacement(&(twist * step));
-        Arc::make_mut(&mut arm.model).set_joint_frame(body, X_PJ);
-        arm
+        let mut plant = plant.clone();
+        let X_PJ = plant.model.bodies()[body].X_PJ * displacement(&(twist * step));
+        Arc::make_mut(&mut plant.model).set_joint_frame(body, X_PJ);
+        plant
     })
 }
 
@@ -217,7 +219,7 @@ pub struct FrequencySlopes {
 /// Computes the natural frequencies at a pose without a wrench, and their derivatives with respect
 /// to the parameters.
 ///
-/// * `plant`: arm with the present parameters.
+/// * `nominal`: arm with the present parameters.
 /// * `q`: actuated joints (rad or m).
 ///
 /// Where two frequencies coincide, their mode shapes and their individual derivatives are not
@@ -225,13 +227,17 @@ pub struct FrequencySlopes {
 ///
 /// # Errors
 /// As [`OperatingPoint::solve`]; [`StepError::Singular`] if a coordinate has no mass.
-pub fn frequency_slopes(plant: &Plant, parameters: &[Parameter], q: &[f64]) -> Result<FrequencySlopes, StepError> {
-    let arm = plant.at_rest(q)?;
+pub fn frequency_slopes(
+    nominal: &NominalArm,
+    parameters: &[Parameter],
+    q: &[f64],
+) -> Result<FrequencySlopes, StepError> {
+    let plant = nominal.at_rest(q)?;
     let none = Wrench::zeros();
-    let mut at = OperatingPoint::new(arm.clone(), plant.tool.clone());
+    let mut at = OperatingPoint::new(plant.clone(), nominal.tool.clone());
     at.solve(q, &none)?;
     let forces = force_slopes(&mut at, parameters);
-    let here = Tangents::at(&arm, &plant.tool, &none, at.coordinates());
+    let here = Tangents::at(&plant, &nominal.tool, &none, at.coordinates());
     let (omega2, shapes) = eigen(&here)?;
     let symmetric = (&here.K + here.K.transpose()) * 0.5;
     let singular = || StepError::Singular { matrix: "static stiffness (with the effect of weight)", t: 0.0 };
@@ -239,11 +245,11 @@ pub fn frequency_slopes(plant: &Plant, parameters: &[Parameter], q: &[f64]) -> R
     let mut slopes = DMatrix::zeros(omega2.len(), parameters.len());
     for (k, parameter) in parameters.iter().enumerate() {
         let moved = -factor.solve(&forces.column(k));
-        let change = along(&arm, at.coordinates(), &moved, |q| {
-            let at = Tangents::at(&arm, &plant.tool, &none, q);
+        let change = along(&plant, at.coordinates(), &moved, |q| {
+            let at = Tangents::at(&plant, &nominal.tool, &none, q);
             vec![at.K, at.M]
         });
-        let (eK, eM) = explicit(&arm, &plant.tool, &none, &parameter.effect, at.coordinates(), &here);
+        let (eK, eM) = explicit(&plant, &nominal.tool, &none, &parameter.effect, at.coordinates(), &here);
         let (dK, dM) = (&change[0] + eK, &change[1] + eM);
         for (i, w2) in omega2.iter().enumerate() {
             let phi = shapes.column(i);
@@ -283,13 +289,13 @@ pub(crate) fn eigen(at: &Tangents) -> Result<(Vec<f64>, DMatrix<f64>), StepError
 /// Computes the derivative of matrices that depend on the coordinates, as the elastic coordinates
 /// move by `de` per unit.
 pub(crate) fn along(
-    arm: &FlexibleArm,
+    plant: &Plant,
     q: &DVector<f64>,
     de: &DVector<f64>,
     look: impl Fn(&DVector<f64>) -> Vec<DMatrix<f64>>,
 ) -> Vec<DMatrix<f64>> {
     let mut dq = DVector::zeros(q.len());
-    dq.rows_mut(arm.model.n_actuated(), de.len()).copy_from(de);
+    dq.rows_mut(plant.model.n_actuated(), de.len()).copy_from(de);
     along_coordinates(q, &dq, look)
 }
 
@@ -322,21 +328,21 @@ pub fn compliance_slopes(
     parameters: &[Parameter],
 ) -> Result<Vec<Matrix6<f64>>, StepError> {
     let forces = force_slopes(at, parameters);
-    let (arm, tool, q) = (at.arm().clone(), at.tool().clone(), at.coordinates().clone());
-    let here = Tangents::at(&arm, &tool, F_T_W, &q);
+    let (plant, tool, q) = (at.plant().clone(), at.tool().clone(), at.coordinates().clone());
+    let here = Tangents::at(&plant, &tool, F_T_W, &q);
     let singular = || StepError::Singular { matrix: "static stiffness (with the effect of weight and load)", t: 0.0 };
     let solve = |K: &DMatrix<f64>, B: &DMatrix<f64>| K.clone().lu().solve(B).ok_or_else(singular);
     let J = DMatrix::from_fn(6, here.J.ncols(), |i, j| here.J[(i, j)]);
     let (U, Y) = (solve(&here.K, &J.transpose())?, solve(&here.K.transpose(), &J.transpose())?);
     let look = |q: &DVector<f64>| {
-        let at = Tangents::at(&arm, &tool, F_T_W, q);
+        let at = Tangents::at(&plant, &tool, F_T_W, q);
         vec![DMatrix::from_fn(6, at.J.ncols(), |i, j| at.J[(i, j)]), at.K]
     };
     let mut found = Vec::with_capacity(parameters.len());
     for (k, parameter) in parameters.iter().enumerate() {
         let moved = -solve(&here.K, &forces.columns(k, 1).into_owned())?.column(0);
-        let change = along(&arm, &q, &moved, look);
-        let (eK, _) = explicit(&arm, &tool, F_T_W, &parameter.effect, &q, &here);
+        let change = along(&plant, &q, &moved, look);
+        let (eK, _) = explicit(&plant, &tool, F_T_W, &parameter.effect, &q, &here);
         // dC = dJ K^-1 Jᵀ + J K^-1 dJᵀ - J K^-1 dK K^-1 Jᵀ
         let dC = &change[0] * &U + Y.tr_mul(&change[0].transpose()) - Y.tr_mul(&((&change[1] + eK) * &U));
         found.push(Matrix6::from_fn(|i, j| dC[(i, j)]));
@@ -346,7 +352,7 @@ pub fn compliance_slopes(
 
 /// Computes the explicit derivatives of stiffness and mass with respect to the parameter.
 pub(crate) fn explicit(
-    arm: &FlexibleArm,
+    plant: &Plant,
     tool: &Frame,
     F_T_W: &Wrench,
     effect: &Effect,
@@ -358,16 +364,16 @@ pub(crate) fn explicit(
         Effect::Stiffness(places) => {
             let mut dK = DMatrix::zeros(n, n);
             for place in places {
-                if let Some((places, coupled)) = arm.coupled_stiffness_slope(place.spring) {
+                if let Some((places, coupled)) = plant.coupled_stiffness_slope(place.spring) {
                     for (a, i) in places.iter().enumerate() {
                         places.iter().enumerate().for_each(|(b, j)| dK[(*i, *j)] += coupled[(a, b)]);
                     }
                     continue;
                 }
-                let element = &arm.elements[place.spring];
-                let (first, size) = (arm.offset(element), element.size);
+                let element = &plant.elements[place.spring];
+                let (first, size) = (plant.offset(element), element.size);
                 let mut block = dK.view_mut((first, first), (size, size));
-                match arm.vibration_slope(place.spring, q.as_slice()) {
+                match plant.vibration_slope(place.spring, q.as_slice()) {
                     Some(slope) => block[(0, 0)] += slope,
                     None => block += slope_of(&element.K, place.coordinate),
                 }
@@ -375,8 +381,8 @@ pub(crate) fn explicit(
             (dK, DMatrix::zeros(n, n))
         }
         Effect::Entry { spring, row, column, factor, .. } => {
-            let element = &arm.elements[*spring];
-            let (first, size) = (arm.offset(element), element.size);
+            let element = &plant.elements[*spring];
+            let (first, size) = (plant.offset(element), element.size);
             let mut dK = DMatrix::zeros(n, n);
             dK.view_mut((first, first), (size, size)).copy_from(&entry_slope(size, *row, *column, *factor));
             (dK, DMatrix::zeros(n, n))
@@ -384,20 +390,20 @@ pub(crate) fn explicit(
         Effect::Damping(_) | Effect::Damper { .. } | Effect::Tool(_) => (DMatrix::zeros(n, n), DMatrix::zeros(n, n)),
         Effect::Guide { springs, term, size } => {
             let mut dK = DMatrix::zeros(n, n);
-            for element in springs.iter().map(|spring| &arm.elements[*spring]) {
+            for element in springs.iter().map(|spring| &plant.elements[*spring]) {
                 let Some(guide) = element.curve.as_ref().and_then(SpringCurve::guide) else { continue };
-                let (k, h, q) = (arm.offset(element), GUIDE_STEP * size, q.as_slice());
+                let (k, h, q) = (plant.offset(element), GUIDE_STEP * size, q.as_slice());
                 let slope = |change: f64| guide.with(*term, change).slope(q[element.coordinate], q);
                 dK[(k, k)] += (slope(h) - slope(-h)) / (2.0 * h) * per_unit(guide, *term);
             }
             (dK, DMatrix::zeros(n, n))
         }
         Effect::Frame { body, twist, .. } => {
-            let [ahead, behind] = frames_beside(arm, *body, twist).map(|arm| Tangents::at(&arm, tool, F_T_W, q));
+            let [ahead, behind] = frames_beside(plant, *body, twist).map(|plant| Tangents::at(&plant, tool, F_T_W, q));
             ((ahead.K - behind.K) / (2.0 * FRAME_STEP), (ahead.M - behind.M) / (2.0 * FRAME_STEP))
         }
         Effect::Mass { body, per_kg } => {
-            let heavier = Tangents::at(&carrying(arm, *body, per_kg), tool, F_T_W, q);
+            let heavier = Tangents::at(&carrying(plant, *body, per_kg), tool, F_T_W, q);
             (heavier.K - &here.K, heavier.M - &here.M)
         }
     }

@@ -15,7 +15,7 @@ use nalgebra::{DMatrix, DVector, Rotation3, Vector3};
 
 use crate::estimation::least_squares::Residuals;
 use crate::estimation::measurement::MeasuredArm;
-use crate::estimation::parameter::{Effect, Parameter, Plant};
+use crate::estimation::parameter::{Effect, NominalArm, Parameter};
 use crate::estimation::placement::{points, rigid_fit, rotation_fit};
 use crate::estimation::reading::{Component, Instrument, Measurements, Reading, ReadingKind, Target};
 
@@ -62,7 +62,7 @@ const ROUNDS: usize = 15;
 ///
 /// * `slides`: whether each joint slides; values of sliding and rotating joints are not exchanged.
 pub fn likely_slip(
-    plant: &Plant,
+    nominal: &NominalArm,
     parameters: &[Parameter],
     measurements: &Measurements,
     slides: &[bool],
@@ -74,22 +74,22 @@ pub fn likely_slip(
         _ => false,
     });
     let found = (!springs.is_empty() && moved.rows() >= 3 * springs.len()).then(|| {
-        let rest = |order: &[usize]| Some(Displacements::of(plant, &springs, &ordered(&moved, order))?.rest());
+        let rest = |order: &[usize]| Some(Displacements::of(nominal, &springs, &ordered(&moved, order))?.rest());
         let whole = moved.readings.iter().all(|reading| reading.rows() == 3);
-        let axes = || Displacements::of(plant, &springs, &moved).filter(|_| whole)?.turned();
+        let axes = || Displacements::of(nominal, &springs, &moved).filter(|_| whole)?.turned();
         among(rest, &|| axes().map(|(R, rest)| (Slip::Axes(R), rest)), slides, 0)
     });
     let placed = some_of(measurements, |reading| reading.position().is_some());
     // Places judge the rigid robot: initial stiffnesses may be far off.
     let rigid: Vec<f64> = springs.iter().map(|spring| spring.search(spring.unknown(true).start).0).collect();
-    let stiff = &plant.with(&springs, &rigid);
+    let stiff = &nominal.with(&springs, &rigid);
     let rest = |order: &[usize]| place_rest(stiff, &ordered(&placed, order));
     found.flatten().or_else(|| among(rest, &|| one_joint(stiff, &placed, slides), slides, 1))
 }
 
 /// Returns the change of one joint, or of the handedness of the positions, with the smallest
 /// residual.
-fn one_joint(plant: &Plant, placed: &Measurements, slides: &[bool]) -> Option<(Slip, f64)> {
+fn one_joint(nominal: &NominalArm, placed: &Measurements, slides: &[bool]) -> Option<(Slip, f64)> {
     let quarter = std::f64::consts::FRAC_PI_2;
     let turns = |joint: &usize| !slides[*joint];
     let zeros = (0..slides.len()).filter(turns).flat_map(|j| [1.0, -1.0, 2.0].map(|k| Slip::Zero(j, k * quarter)));
@@ -104,7 +104,7 @@ fn one_joint(plant: &Plant, placed: &Measurements, slides: &[bool]) -> Option<(S
                 _ => {}
             }
         }
-        Some((slip, place_rest(plant, &other)?))
+        Some((slip, place_rest(nominal, &other)?))
     });
     scored.min_by(|a, b| a.1.total_cmp(&b.1))
 }
@@ -185,8 +185,8 @@ struct Displacements {
 }
 
 impl Displacements {
-    fn of(plant: &Plant, springs: &[Parameter], measurements: &Measurements) -> Option<Self> {
-        let arm = MeasuredArm { plant, parameters: springs, measurements };
+    fn of(nominal: &NominalArm, springs: &[Parameter], measurements: &Measurements) -> Option<Self> {
+        let arm = MeasuredArm { nominal, parameters: springs, measurements };
         let mut J = DMatrix::zeros(0, 0);
         arm.evaluate(&DVector::zeros(springs.len()), Some(&mut J)).ok()?;
         Some(Self { A: -J, b: DVector::from_vec(arm.observed()) })
@@ -238,8 +238,8 @@ impl Displacements {
 }
 
 /// Returns the residual of the positions over their spread, with each instrument at its best fit.
-fn place_rest(plant: &Plant, measurements: &Measurements) -> Option<f64> {
-    let arm = MeasuredArm { plant, parameters: &[], measurements };
+fn place_rest(nominal: &NominalArm, measurements: &Measurements) -> Option<f64> {
+    let arm = MeasuredArm { nominal, parameters: &[], measurements };
     let (world, seen) = (points(&arm.predicted(&DVector::zeros(0)).ok()?), points(&arm.observed()));
     let (mut rest, mut spread) = (0.0, 0.0);
     for number in 0..measurements.instruments.len() {

@@ -44,11 +44,11 @@ use std::sync::Arc;
 
 use nalgebra::DVector;
 
-use crate::arm::FlexibleArm;
 use crate::dense::largest_of_numbers;
 use crate::error::StepError;
 use crate::implicit::{ImplicitStep, Newton, Search, Sizes};
 use crate::integrator::{Current, ReducedStepper};
+use crate::plant::Plant;
 use crate::stepper::Stepper;
 use crate::steppers::{Method, StepRule, StepperEntry, StepperKind, StepperSetting};
 use crate::system::SecondOrderSystem;
@@ -91,8 +91,8 @@ impl Method for AlphaSettings {
         vec![("rho_inf", StepperSetting::Number(self.rho)), ("dispersion_correction", correction)]
     }
 
-    fn start(&self, arm: Arc<FlexibleArm>, h: f64, e: &DVector<f64>) -> Result<Box<dyn Stepper>, StepError> {
-        Ok(Box::new(self.stepper(arm, h, e)?))
+    fn start(&self, plant: Arc<Plant>, h: f64, e: &DVector<f64>) -> Result<Box<dyn Stepper>, StepError> {
+        Ok(Box::new(self.stepper(plant, h, e)?))
     }
 }
 
@@ -105,16 +105,16 @@ impl AlphaSettings {
     /// Creates the stepper of an arm with its permitted iteration error.
     pub(crate) fn stepper(
         self,
-        arm: Arc<FlexibleArm>,
+        plant: Arc<Plant>,
         h: f64,
         e: &DVector<f64>,
     ) -> Result<ReducedStepper<GeneralizedAlpha>, StepError> {
         let rho = self.rho;
-        let left = leave_of(self, &arm, h);
+        let left = leave_of(self, &plant, h);
         if !(0.0..=1.0).contains(&rho) {
             return Err(StepError::Setup(format!("the spectral radius must lie between 0 and 1, found {rho}")));
         }
-        ReducedStepper::start(arm, e, |system, x, v| {
+        ReducedStepper::start(plant, e, |system, x, v| {
             let integrator = GeneralizedAlpha::new(system, 0.0, h, self, x, v)?;
             Ok(match left {
                 Some(left) => integrator.leaving(left),
@@ -126,10 +126,10 @@ impl AlphaSettings {
 
 /// Returns the permitted iteration error of an arm as a fraction of the first correction; `None`
 /// for full convergence.
-pub(crate) fn leave_of(settings: AlphaSettings, arm: &FlexibleArm, h: f64) -> Option<f64> {
-    let followed = arm.modes.omega.first().is_none_or(|omega| h * omega <= FOLLOWED);
+pub(crate) fn leave_of(settings: AlphaSettings, plant: &Plant, h: f64) -> Option<f64> {
+    let followed = plant.modes.omega.first().is_none_or(|omega| h * omega <= FOLLOWED);
     let left = if followed { settings.may_leave() } else { settings.may_leave().min(COARSE) };
-    (left > 0.0 && forgets_errors(arm)).then_some(left)
+    (left > 0.0 && forgets_errors(plant)).then_some(left)
 }
 
 /// Permitted iteration error of damped arms, as a fraction of the first correction of Newton's
@@ -155,16 +155,16 @@ const COARSE: f64 = 1e-3;
 
 /// Returns whether iteration errors do not accumulate in the arm: joints are prescribed, springs
 /// are linear and completely represented in Newton's matrix, modes are damped.
-fn forgets_errors(arm: &FlexibleArm) -> bool {
-    let straight = arm.elements.iter().all(|element| element.curve.is_none() && element.geometric.is_none());
-    let mut force = DVector::zeros(arm.n_elastic_coordinates());
-    let damped = arm.modes.omega.iter().zip(arm.modes.shapes.column_iter()).all(|(omega, shape)| {
+fn forgets_errors(plant: &Plant) -> bool {
+    let straight = plant.elements.iter().all(|element| element.curve.is_none() && element.geometric.is_none());
+    let mut force = DVector::zeros(plant.n_elastic_coordinates());
+    let damped = plant.modes.omega.iter().zip(plant.modes.shapes.column_iter()).all(|(omega, shape)| {
         force.fill(0.0);
-        arm.add_damping(shape.as_slice(), force.as_mut_slice());
+        plant.add_damping(shape.as_slice(), force.as_mut_slice());
         let twice = shape.dot(&force);
         twice >= 2.0 * DAMPED * omega
     });
-    arm.torque_driven.is_empty() && !arm.has_gear_laws() && straight && damped
+    plant.torque_driven.is_empty() && !plant.has_gear_laws() && straight && damped
 }
 
 /// The integrator with its state; see the module documentation.

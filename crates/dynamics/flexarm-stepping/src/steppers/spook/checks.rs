@@ -3,27 +3,27 @@
 use flexarm_kinematics::Model;
 use nalgebra::Vector3;
 
-use crate::arm::FlexibleArm;
 use crate::error::StepError;
+use crate::plant::Plant;
 
 /// Name of changes of inertia.
 pub(super) const CHANGES: &str = "payloads that change";
 
 /// Refuses arms with unsupported features.
-pub(super) fn check_known(arm: &FlexibleArm) -> Result<(), StepError> {
+pub(super) fn check_known(plant: &Plant) -> Result<(), StepError> {
     let unknown = [
-        (!arm.torque_driven.is_empty(), "joints driven by torque"),
-        (!arm.inertia_changes.is_empty(), CHANGES),
-        (!arm.hysteresis.is_empty(), "gears with hysteresis"),
-        (arm.has_guides(), "telescopic guides"),
-        (arm.elements.iter().any(|e| e.curve.is_some()), "springs with play or curves"),
-        (!arm.transmission.is_empty(), "transmission errors"),
-        (!arm.load_friction.is_empty(), "friction that grows with the load"),
-        (arm.coupling.as_ref().is_some_and(|coupling| !coupling.is_none()), "gears that move several joints"),
-        (arm.model.has_mimic(), "mimic joints"),
+        (!plant.torque_driven.is_empty(), "joints driven by torque"),
+        (!plant.inertia_changes.is_empty(), CHANGES),
+        (!plant.hysteresis.is_empty(), "gears with hysteresis"),
+        (plant.has_guides(), "telescopic guides"),
+        (plant.elements.iter().any(|e| e.curve.is_some()), "springs with play or curves"),
+        (!plant.transmission.is_empty(), "transmission errors"),
+        (!plant.load_friction.is_empty(), "friction that grows with the load"),
+        (plant.coupling.as_ref().is_some_and(|coupling| !coupling.is_none()), "gears that move several joints"),
+        (plant.model.has_mimic(), "mimic joints"),
     ];
     match unknown.iter().find(|(there, _)| *there) {
-        _ if arm.model.has_modal() => Err(StepError::ModalLinks),
+        _ if plant.model.has_modal() => Err(StepError::ModalLinks),
         None => Ok(()),
         Some((_, what)) => Err(StepError::NotInMaximal(what)),
     }

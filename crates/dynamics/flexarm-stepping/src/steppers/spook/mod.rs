@@ -39,10 +39,10 @@ use flexarm_spatial::products::{mul, sub, turn_symmetric};
 use flexarm_spatial::{composed, quaternion};
 use nalgebra::{DVector, Matrix3, UnitQuaternion, Vector3, Vector6};
 
-use crate::arm::FlexibleArm;
 use crate::error::StepError;
 use crate::events::{EventQueue, SAME_TIME};
 use crate::observation::Observation;
+use crate::plant::Plant;
 use crate::stepper::{Counts, LARGEST_DEFLECTION, Stepper};
 use checks::{check_ends, check_known};
 use compliance::{JointCompliance, joint_compliance, rigid_upsilon};
@@ -97,11 +97,11 @@ impl Sampled {
     }
 
     /// Samples the motion at `t` unless it was already sampled there.
-    fn take(&mut self, arm: &FlexibleArm, events: &EventQueue, t: f64) {
+    fn take(&mut self, plant: &Plant, events: &EventQueue, t: f64) {
         let t = events.side(t);
         if t != self.at {
             let Self { at, q, qdot, qddot } = self;
-            arm.motion.sample(t, q.as_mut_slice(), qdot.as_mut_slice(), qddot.as_mut_slice());
+            plant.motion.sample(t, q.as_mut_slice(), qdot.as_mut_slice(), qddot.as_mut_slice());
             *at = t;
         }
     }
@@ -110,7 +110,7 @@ impl Sampled {
 /// The stepper; see the module documentation.
 #[derive(Clone)]
 pub struct Spook {
-    arm: FlexibleArm,
+    plant: Plant,
     h: f64,
     steps: u64,
     t: f64,
@@ -149,21 +149,21 @@ impl Spook {
     /// supported in maximal coordinates: mimic joints, torque drives, payload changes, nonlinear
     /// springs, gear effects other than elasticity, and end links without mass or moments of
     /// inertia; [`StepError::ModalLinks`] for modal links.
-    pub fn new(arm: FlexibleArm, h: f64, settings: SpookSettings, e: &DVector<f64>) -> Result<Self, StepError> {
-        check_known(&arm)?;
-        let (found, expected) = (e.len(), arm.n_elastic_coordinates());
+    pub fn new(plant: Plant, h: f64, settings: SpookSettings, e: &DVector<f64>) -> Result<Self, StepError> {
+        check_known(&plant)?;
+        let (found, expected) = (e.len(), plant.n_elastic_coordinates());
         if found != expected {
             return Err(StepError::Setup(format!("{found} elastic coordinates are given, the arm has {expected}")));
         }
-        let model = arm.model.clone();
+        let model = plant.model.clone();
         check_ends(&model)?;
         let (mut state, mut qddot) = (State::zeros(&model), DVector::zeros(model.nv()));
-        arm.prescribed_state(0.0, &mut state, &mut qddot);
+        plant.prescribed_state(0.0, &mut state, &mut qddot);
         let na = model.n_actuated();
         state.q.rows_mut(na, e.len()).copy_from(e);
-        let mut events = EventQueue::of(&arm);
+        let mut events = EventQueue::of(&plant);
         events.pass_jumps(0.0);
-        if arm.motion.velocity_jumps().iter().any(|t| t.abs() <= SAME_TIME) {
+        if plant.motion.velocity_jumps().iter().any(|t| t.abs() <= SAME_TIME) {
             state.qdot.fill(0.0);
         }
         let rates = state.qdot.rows(0, na).clone_owned();
@@ -171,14 +171,14 @@ impl Spook {
         forward_kinematics_velocity(&model, &mut data, &state);
 
         let bodies: Vec<BodyState> = (0..model.bodies().len()).map(|i| body_state(&model, &data, i)).collect();
-        let compliance: Vec<_> = (0..bodies.len()).map(|i| joint_compliance(&arm, i, h, settings.preset)).collect();
+        let compliance: Vec<_> = (0..bodies.len()).map(|i| joint_compliance(&plant, i, h, settings.preset)).collect();
         let n = bodies.len();
         let loads = vec![Vector6::zeros(); n];
         let mut spook = Self {
             solver: TreeSolver::new(model.bodies().iter().map(|b| b.parent).collect()),
             pins: Pins::new(&model),
             masses: vec![Symmetric::zeros(); n],
-            arm,
+            plant,
             h,
             steps: 0,
             t: 0.0,
@@ -241,10 +241,10 @@ impl Stepper for Spook {
 
     fn observe(&mut self, out: &mut Observation) {
         let (h, t) = (self.dt, self.t);
-        self.now.take(&self.arm, &self.events, t);
-        let n = self.arm.model.n_actuated();
+        self.now.take(&self.plant, &self.events, t);
+        let n = self.plant.model.n_actuated();
         out.t = t;
-        out.model.clone_from(&self.arm.model);
+        out.model.clone_from(&self.plant.model);
         out.q.rows_mut(0, n).copy_from(&self.now.q);
         out.qdot.rows_mut(0, n).copy_from(&self.now.qdot);
         out.qddot.fill(f64::NAN);
@@ -253,27 +253,27 @@ impl Stepper for Spook {
             // Mean force over the last step; before the first step, over that step.
             self.observe_joint(i, self.lambda[i] / h, out);
         }
-        for balancer in self.arm.model.balancers() {
+        for balancer in self.plant.model.balancers() {
             potential += balancer.law.energy(balancer.length(&out.X_WB, out.q.as_slice()));
         }
         // Drives: friction and rotors are not part of the constraints.
         for (k, rate) in self.now.qdot.iter().enumerate() {
-            out.drive[k] += self.arm.friction_torque(k, *rate);
+            out.drive[k] += self.plant.friction_torque(k, *rate);
         }
-        for body in self.arm.model.bodies().iter().skip(1).filter(|b| b.armature != 0.0) {
+        for body in self.plant.model.bodies().iter().skip(1).filter(|b| b.armature != 0.0) {
             let k = body.coordinate;
             out.drive[k] += body.armature * self.now.qddot[k];
             kinetic += 0.5 * body.armature * self.now.qdot[k].powi(2);
         }
         out.power = [out.drive.dot(&out.qdot.rows(0, n)), self.load_power(), self.damping_power(&out.qdot)];
-        out.energy = [kinetic, potential, self.arm.elastic_energy(out.q.as_slice())];
+        out.energy = [kinetic, potential, self.plant.elastic_energy(out.q.as_slice())];
     }
 
     fn counts(&self) -> Counts {
         Counts { steps: self.steps, evaluations: self.steps, factorisations: self.steps }
     }
 
-    fn change_masses(&mut self, _arm: &Arc<FlexibleArm>) -> Result<(), StepError> {
+    fn change_masses(&mut self, _arm: &Arc<Plant>) -> Result<(), StepError> {
         Err(StepError::NotInMaximal(checks::CHANGES))
     }
 
@@ -286,7 +286,7 @@ impl Spook {
     /// Returns the relative displacement of the two faces of the joint of body i and its rate at
     /// the current poses, in the local form.
     fn deflection_now(&self, i: usize, angles: ElasticAngles) -> (Vector6<f64>, Vector6<f64>) {
-        let body = &self.arm.model.bodies()[i];
+        let body = &self.plant.model.bodies()[i];
         let (parent, child) = (&self.bodies[body.parent], &self.bodies[i]);
         let (X_WP, X_WQ) = (parent.X_WB() * body.X_PJ, child.X_WB());
         let rows = Rows::new(ConstraintForm::Local, angles, &X_WP, &parent.x, &X_WQ, &child.x);
@@ -298,8 +298,8 @@ impl Spook {
         let t = self.t;
         // Rates are taken at the end of the step, with the new velocities; positions at its start,
         // for g.
-        self.next.take(&self.arm, &self.events, t_next);
-        self.now.take(&self.arm, &self.events, t);
+        self.next.take(&self.plant, &self.events, t_next);
+        self.now.take(&self.plant, &self.events, t);
         for (pose, body) in self.poses.iter_mut().zip(&self.bodies) {
             *pose = body.X_WB();
         }
@@ -313,8 +313,8 @@ impl Spook {
         if pins.is_empty() {
             return solver.solve(rows, sigma, velocities, lambda).map_err(|_| singular());
         }
-        if let Some(k) = pins.update(&self.arm.model, &self.poses, &self.bodies) {
-            return Err(StepError::OpenLoop { t, name: self.arm.model.loops()[k].name.clone() });
+        if let Some(k) = pins.update(&self.plant.model, &self.poses, &self.bodies) {
+            return Err(StepError::OpenLoop { t, name: self.plant.model.loops()[k].name.clone() });
         }
         masses.copy_from_slice(&solver.M);
         solver.solve(rows, sigma, velocities, lambda).map_err(|_| singular())?;
@@ -336,7 +336,7 @@ impl Spook {
     /// Updates the right-hand sides of the joints, and their compliances in the axes of their rows.
     fn update_right_hand_sides(&mut self) {
         let h = self.dt;
-        for (i, body) in self.arm.model.bodies().iter().enumerate().skip(1) {
+        for (i, body) in self.plant.model.bodies().iter().enumerate().skip(1) {
             let (row, JointCompliance { sigma, upsilon }) = (&self.rows[i], &self.compliance[i]);
             if let Sigma::Soft(C, K) = sigma
                 && self.settings.form == ConstraintForm::Global
@@ -358,7 +358,7 @@ impl Spook {
     /// Updates the rows of every joint, including the effect of its prescribed coordinate.
     fn update_rows(&mut self) -> Result<(), StepError> {
         let (h, t) = (self.dt, self.t);
-        for (i, body) in self.arm.model.bodies().iter().enumerate().skip(1) {
+        for (i, body) in self.plant.model.bodies().iter().enumerate().skip(1) {
             let (parent, child) = (&self.bodies[body.parent], &self.bodies[i]);
             let (on, X_WQ) = (&self.poses[body.parent], &self.poses[i]);
             let X_WP = || composed(on, &body.X_PJ);
@@ -399,12 +399,12 @@ impl Spook {
     /// Updates external loads and balancer forces on each body, at Bo in world axes.
     fn update_loads(&mut self) {
         self.loads.iter_mut().for_each(|load| *load = Vector6::zeros());
-        for load in &self.arm.loads {
+        for load in &self.plant.loads {
             let X_WB = self.poses[load.body];
             let F = load.on_body(self.events.side(self.t), &X_WB);
             self.loads[load.body] += Wrench::new(X_WB.rotation * F.force, X_WB.rotation * F.torque).to_vector();
         }
-        let model = self.arm.model.clone();
+        let model = self.plant.model.clone();
         for balancer in model.balancers() {
             for (body, F_W) in balancer.wrenches(&self.poses, self.joint_value(balancer)) {
                 self.loads[body] += F_W.to_vector();
@@ -416,7 +416,7 @@ impl Spook {
     /// deflections of springs.
     fn joint_value(&self, balancer: &PlacedBalancer) -> f64 {
         let BalancerPlace::Joint { terms, offset, .. } = &balancer.place else { return 0.0 };
-        let model = &self.arm.model;
+        let model = &self.plant.model;
         let coordinate = |k: usize| {
             let of = &model.coordinates()[k];
             match model.bodies()[of.body].motion {
@@ -432,7 +432,7 @@ impl Spook {
     /// Updates the body blocks: mass, momentum, impulse of gravity, gyroscopic moment and loads,
     /// about the centre of mass in world axes.
     fn update_body_blocks(&mut self) {
-        let (h, gravity) = (self.dt, self.arm.model.gravity);
+        let (h, gravity) = (self.dt, self.plant.model.gravity);
         for (i, body) in self.bodies.iter().enumerate().skip(1) {
             // Mass matrix M.
             let R = self.poses[i].rotation.matrix();
@@ -443,9 +443,9 @@ impl Spook {
             let spin = mul(&J, &body.V.angular);
             let load = &self.loads[i];
             let (F, T): (Vector3<f64>, Vector3<f64>) = (load.fixed_rows::<3>(0).into(), load.fixed_rows::<3>(3).into());
-            let arm = -mul(R, &body.com);
+            let lever = -mul(R, &body.com);
             let force = gravity * body.mass + F;
-            let torque = T + arm.cross(&F) - body.V.angular.cross(&spin);
+            let torque = T + lever.cross(&F) - body.V.angular.cross(&spin);
             self.solver.b[i] = joined(&(body.V.linear * body.mass + force * h), &(spin + torque * h));
         }
     }
@@ -456,7 +456,7 @@ impl Spook {
         if h != self.dt {
             self.dt = h;
             for (i, compliance) in self.compliance.iter_mut().enumerate() {
-                *compliance = joint_compliance(&self.arm, i, h, self.settings.preset);
+                *compliance = joint_compliance(&self.plant, i, h, self.settings.preset);
                 self.sigma[i] = compliance.sigma;
             }
         }

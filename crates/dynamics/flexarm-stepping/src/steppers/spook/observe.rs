@@ -14,7 +14,7 @@ impl Spook {
             out.X_WB[i] = state.X_WB();
             let w = state.R.inverse() * state.V.angular;
             kinetic += 0.5 * (state.mass * state.V.linear.norm_squared() + w.dot(&(state.J * w)));
-            potential -= state.mass * self.arm.model.gravity.dot(&state.x);
+            potential -= state.mass * self.plant.model.gravity.dot(&state.x);
         }
         (kinetic, potential)
     }
@@ -22,8 +22,8 @@ impl Spook {
     /// Writes the drive force of the joint of body i, or the coordinates of its spring with rates
     /// and load. `force`: force of the joint on the body, in its rows.
     pub(super) fn observe_joint(&self, i: usize, force: Vector6<f64>, out: &mut Observation) {
-        let body = &self.arm.model.bodies()[i];
-        let element = || self.arm.elements.iter().position(|element| element.body == i);
+        let body = &self.plant.model.bodies()[i];
+        let element = || self.plant.elements.iter().position(|element| element.body == i);
         match body.motion {
             JointMotion::Axis(motion) if body.elastic => {
                 let (g, rate) = self.deflection_now(i, Default::default());
@@ -32,7 +32,7 @@ impl Spook {
                 out.qdot[body.coordinate] = rate;
                 if let Some(k) = element() {
                     out.load[k] = Vector6::zeros();
-                    out.load[k][0] = -self.arm.elements[k].K[(0, 0)] * (e + rate * self.arm.tau[k]);
+                    out.load[k][0] = -self.plant.elements[k].K[(0, 0)] * (e + rate * self.plant.tau[k]);
                 }
             }
             JointMotion::Axis(_) if body.coordinate < out.drive.len() => {
@@ -45,8 +45,8 @@ impl Spook {
                 out.q.fixed_rows_mut::<6>(body.coordinate).copy_from(&g);
                 out.qdot.fixed_rows_mut::<6>(body.coordinate).copy_from(&rate);
                 if let Some(k) = element() {
-                    let K = Matrix6::from_column_slice(self.arm.elements[k].K.as_slice());
-                    out.load[k] = -(K * (g + rate * self.arm.tau[k]));
+                    let K = Matrix6::from_column_slice(self.plant.elements[k].K.as_slice());
+                    out.load[k] = -(K * (g + rate * self.plant.tau[k]));
                 }
             }
         }
@@ -55,12 +55,12 @@ impl Spook {
     /// Returns the power of dampers and friction (W) at all rates `qdot`.
     pub(super) fn damping_power(&self, qdot: &DVector<f64>) -> f64 {
         let mut damping = 0.0;
-        for (k, element) in self.arm.elements.iter().enumerate() {
+        for (k, element) in self.plant.elements.iter().enumerate() {
             let rate = qdot.rows(element.coordinate, element.size);
-            damping += self.arm.tau[k] * rate.dot(&(&element.K * rate));
+            damping += self.plant.tau[k] * rate.dot(&(&element.K * rate));
         }
         for (k, rate) in self.now.qdot.iter().enumerate() {
-            damping += self.arm.friction_torque(k, *rate) * rate;
+            damping += self.plant.friction_torque(k, *rate) * rate;
         }
         damping
     }
@@ -68,7 +68,7 @@ impl Spook {
     /// Returns the power of the external loads (W).
     pub(super) fn load_power(&self) -> f64 {
         let mut power = 0.0;
-        for load in &self.arm.loads {
+        for load in &self.plant.loads {
             let body = &self.bodies[load.body];
             let X = body.X_WB();
             let F = load.on_body(self.events.side(self.t), &X);

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use flexarm_settings::Words;
 use nalgebra::DVector;
 
-use crate::arm::FlexibleArm;
 use crate::error::StepError;
+use crate::plant::Plant;
 use crate::stepper::Stepper;
 use crate::steppers::spook::Spook;
 use crate::steppers::{Method, StepRule, StepperEntry, StepperKind, StepperSetting};
@@ -76,7 +76,7 @@ impl Method for SpookSettings {
         vec![("form", StepperSetting::of_word(self.form)), ("preset", StepperSetting::of_word(self.preset))]
     }
 
-    fn start(&self, arm: Arc<FlexibleArm>, h: f64, e: &DVector<f64>) -> Result<Box<dyn Stepper>, StepError> {
-        Ok(Box::new(Spook::new(Arc::unwrap_or_clone(arm), h, *self, e)?))
+    fn start(&self, plant: Arc<Plant>, h: f64, e: &DVector<f64>) -> Result<Box<dyn Stepper>, StepError> {
+        Ok(Box::new(Spook::new(Arc::unwrap_or_clone(plant), h, *self, e)?))
     }
 }

@@ -45,8 +45,8 @@ impl PrescribedMotion for Given {
 
 /// Equations of motion of an arm, at a state and under a command that are set from outside.
 pub struct Equations {
-    flexible: Arc<Arm>,
-    arms: Loaded,
+    arm: Arc<Arm>,
+    plants: Loaded,
     given: Arc<Given>,
     push: Arc<RwLock<Wrench>>,
     equations: EquationsOfMotion,
@@ -66,11 +66,11 @@ impl Arm {
         let at = joint_values(at, &names)?;
         let still = vec![0.0; at.len()];
         let given = Arc::new(Given(RwLock::new([at.clone(), still.clone(), still])));
-        let Commanded { flexible, arms, push, mut readings } = Commanded::new(self, own, given.clone())?;
-        let arm = arms.carrying(own.payload)?.clone();
-        let equations = EquationsOfMotion::at_rest(arm).map_err(|error| flexible.explained(error))?;
+        let Commanded { arm, plants, push, mut readings } = Commanded::new(self, own, given.clone())?;
+        let plant = plants.carrying(own.payload)?.clone();
+        let equations = EquationsOfMotion::at_rest(plant).map_err(|error| arm.explained(error))?;
         readings.set_targets(&at);
-        let mut own = Equations { flexible, arms, given, push, equations, readings };
+        let mut own = Equations { arm, plants, given, push, equations, readings };
         own.evaluate()?;
         Ok(own)
     }
@@ -90,13 +90,13 @@ pub struct ElasticCoordinate {
 impl Equations {
     /// Returns the elastic coordinates; they follow the joints driven by torque.
     pub fn elastic(&self) -> Vec<ElasticCoordinate> {
-        let arm = self.equations.arm();
-        let all = arm.elements.iter().flat_map(|own| (1..=own.size).map(move |number| (own, number)));
+        let plant = self.equations.plant();
+        let all = plant.elements.iter().flat_map(|own| (1..=own.size).map(move |number| (own, number)));
         all.map(|(own, number)| {
             let unit = match (own.modal, own.size) {
                 (true, _) => "1",
                 (_, 6) if number <= 3 => "m",
-                (_, 1) if own.slides(&arm.model) => "m",
+                (_, 1) if own.slides(&plant.model) => "m",
                 _ => "rad",
             };
             ElasticCoordinate { element: own.name.clone(), number, unit }
@@ -127,8 +127,8 @@ impl Equations {
     /// If `x` or `v` has another length than [`Equations::coordinates`].
     pub fn set(&mut self, x: &[f64], v: &[f64], command: &EquationCommand<'_>) -> Result<(), Error> {
         let EquationCommand { q, qdot, qddot, torque, wrench, payload } = command;
-        let arm = self.arms.carrying(*payload)?;
-        let model = &self.flexible.model;
+        let plant = self.plants.carrying(*payload)?;
+        let model = &self.arm.model;
         let names: Vec<&str> = model.coordinates()[..model.n_actuated()].iter().map(|c| c.joint.as_str()).collect();
         for values in [q, qdot, qddot, torque] {
             joint_values(Some(values), &names)?;
@@ -147,8 +147,8 @@ impl Equations {
             given.iter_mut().zip([q, qdot, qddot]).for_each(|(to, from)| to.copy_from_slice(from));
         }
         *self.push.write().unwrap_or_else(PoisonError::into_inner) = *wrench;
-        self.equations.change_masses(arm);
-        let driven: Vec<f64> = self.equations.arm().torque_driven.iter().map(|&k| torque[k]).collect();
+        self.equations.change_masses(plant);
+        let driven: Vec<f64> = self.equations.plant().torque_driven.iter().map(|&k| torque[k]).collect();
         self.equations.set_torques(&driven);
         self.equations.set_state(x, v);
         self.readings.set_targets(q);

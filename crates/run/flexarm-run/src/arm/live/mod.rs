@@ -15,7 +15,7 @@ use std::sync::{Arc, PoisonError, RwLock};
 
 use flexarm_kinematics::Wrench;
 use flexarm_stepping::{
-    FlexibleArm, Load, Observation, PrescribedMotion, Start, StepRule, Stepper, TimedWrench, new_stepper,
+    Load, Observation, Plant, PrescribedMotion, Start, StepRule, Stepper, TimedWrench, new_stepper,
 };
 
 use crate::arm::Arm;
@@ -136,8 +136,8 @@ impl PrescribedMotion for Targets {
 
 /// A running arm, commanded period by period.
 pub struct Live {
-    flexible: Arc<Arm>,
-    arms: Loaded,
+    arm: Arc<Arm>,
+    plants: Loaded,
     has_payload: bool,
     servos: Servos,
     options: RunOptions,
@@ -206,11 +206,10 @@ impl Arm {
         }
         whole_steps(period_s, step_s)?;
         let targets = Arc::new(Targets(RwLock::new(Period::at_rest(&at, period_s))));
-        let Commanded { flexible, arms, push, readings } = Commanded::new(self, own, targets.clone())?;
+        let Commanded { arm, plants, push, readings } = Commanded::new(self, own, targets.clone())?;
         let (has_payload, options) = (own.payload, options.clone());
-        let stepper = started(&flexible, arms.carrying(has_payload)?, &options, servos, &targets)?;
-        let mut live =
-            Live { flexible, arms, has_payload, servos, options, period_s, targets, push, stepper, readings };
+        let stepper = started(&arm, plants.carrying(has_payload)?, &options, servos, &targets)?;
+        let mut live = Live { arm, plants, has_payload, servos, options, period_s, targets, push, stepper, readings };
         live.look();
         Ok(live)
     }
@@ -218,8 +217,8 @@ impl Arm {
 
 /// An arm that follows a motion under a wrench on its TCP, both set from outside.
 struct Commanded {
-    flexible: Arc<Arm>,
-    arms: Loaded,
+    arm: Arc<Arm>,
+    plants: Loaded,
     /// Wrench on the TCP, world axes.
     push: Arc<RwLock<Wrench>>,
     readings: Readings,
@@ -227,42 +226,42 @@ struct Commanded {
 
 impl Commanded {
     fn new(of: &Arc<Arm>, own: &LiveOptions, motion: Arc<dyn PrescribedMotion>) -> Result<Self, Error> {
-        let flexible = of.clone();
+        let arm = of.clone();
         let push = Arc::new(RwLock::new(Wrench::zeros()));
-        let springs = flexible.scaled_springs(own.stiffness, own.damping)?;
-        let arm = flexible.arm_with(springs, motion).map_err(|error| flexible.explained(error))?;
+        let springs = arm.scaled_springs(own.stiffness, own.damping)?;
+        let plant = arm.plant_with(springs, motion).map_err(|error| arm.explained(error))?;
         let at_tool = {
             let push = push.clone();
             let wrench = move |_: f64| *push.read().unwrap_or_else(PoisonError::into_inner);
-            Load { body: flexible.tcp.body, X_BF: flexible.tcp.X_BF, wrench: TimedWrench::new(wrench) }
+            Load { body: arm.tcp.body, X_BF: arm.tcp.X_BF, wrench: TimedWrench::new(wrench) }
         };
-        let arm = arm.with_timed_loads(vec![at_tool]).map_err(|source| Error::Step { source, partial: false })?;
-        let readings = Readings::new(of, &arm, own.stiffness)?;
-        let arms = Loaded::new(of, arm);
-        Ok(Self { flexible, arms, push, readings })
+        let plant = plant.with_timed_loads(vec![at_tool]).map_err(|source| Error::Step { source, partial: false })?;
+        let readings = Readings::new(of, &plant, own.stiffness)?;
+        let plants = Loaded::new(of, plant);
+        Ok(Self { arm, plants, push, readings })
     }
 }
 
 /// An arm with and without the payload of its robot file.
 struct Loaded {
-    with: Arc<FlexibleArm>,
+    with: Arc<Plant>,
     /// `None` if there is no payload that can be put down.
-    without: Option<Arc<FlexibleArm>>,
+    without: Option<Arc<Plant>>,
 }
 
 impl Loaded {
-    fn new(of: &Arm, arm: FlexibleArm) -> Self {
+    fn new(of: &Arm, plant: Plant) -> Self {
         // A payload on a flexible link cannot be put down, nor one without which a part of the arm
         // has no mass.
         let release = match of.robot().rigid.link(PAYLOAD_LINK).is_some() {
             true => PayloadChange::release(0.0).on(of.robot(), &of.model, &[]).ok(),
             false => None,
         };
-        let without = release.and_then(|change| arm.clone().with_inertia_changes(vec![change]).ok());
-        Self { with: Arc::new(arm), without: without.map(Arc::new) }
+        let without = release.and_then(|change| plant.clone().with_inertia_changes(vec![change]).ok());
+        Self { with: Arc::new(plant), without: without.map(Arc::new) }
     }
 
-    fn carrying(&self, payload: bool) -> Result<&Arc<FlexibleArm>, ValueError> {
+    fn carrying(&self, payload: bool) -> Result<&Arc<Plant>, ValueError> {
         if payload { Ok(&self.with) } else { self.without.as_ref().ok_or(ValueError::NoPayload) }
     }
 }
@@ -325,21 +324,21 @@ impl Period {
 
 /// Returns the stepper of the arm at rest at the targets.
 fn started(
-    flexible: &Arm,
-    arm: &Arc<FlexibleArm>,
+    arm: &Arm,
+    plant: &Arc<Plant>,
     options: &RunOptions,
     servos: Servos,
     targets: &Targets,
 ) -> Result<Box<dyn Stepper>, Error> {
-    let start = |arm: FlexibleArm| {
-        new_stepper(options.stepper, arm, options.step_s, Start::Equilibrium).map_err(|error| flexible.explained(error))
+    let start = |plant: Plant| {
+        new_stepper(options.stepper, plant, options.step_s, Start::Equilibrium).map_err(|error| arm.explained(error))
     };
-    let mut stepper = start(FlexibleArm::clone(arm))?;
+    let mut stepper = start(Plant::clone(plant))?;
     if servos == Servos::Open {
-        let mut seen = Observation::new(arm);
+        let mut seen = Observation::new(plant);
         stepper.observe(&mut seen);
         targets.0.write().unwrap_or_else(PoisonError::into_inner).torque.copy_from_slice(seen.drive.as_slice());
-        stepper = start(arm.with_servo_opened())?;
+        stepper = start(plant.with_servo_opened())?;
     }
     Ok(stepper)
 }
@@ -353,8 +352,8 @@ impl Live {
         let at = self.checked(at)?;
         *self.targets.0.write().unwrap_or_else(PoisonError::into_inner) = Period::at_rest(&at, self.period_s);
         *self.push.write().unwrap_or_else(PoisonError::into_inner) = Wrench::zeros();
-        let arm = self.arms.carrying(self.has_payload)?;
-        self.stepper = started(&self.flexible, arm, &self.options, self.servos, &self.targets)?;
+        let plant = self.plants.carrying(self.has_payload)?;
+        self.stepper = started(&self.arm, plant, &self.options, self.servos, &self.targets)?;
         self.look();
         Ok(())
     }
@@ -406,9 +405,9 @@ impl Live {
     /// [`Error::Value`] if there is no payload that can be put down; [`Error::Step`] with a stepper
     /// in maximal coordinates.
     pub fn set_payload(&mut self, carried: bool) -> Result<(), Error> {
-        let arm = self.arms.carrying(carried)?;
+        let plant = self.plants.carrying(carried)?;
         if carried != self.has_payload {
-            self.stepper.change_masses(arm).map_err(|source| Error::Step { source, partial: false })?;
+            self.stepper.change_masses(plant).map_err(|source| Error::Step { source, partial: false })?;
             self.has_payload = carried;
             self.look();
         }
@@ -417,7 +416,7 @@ impl Live {
 
     /// Returns whether there is a payload that can be put down.
     pub fn can_release(&self) -> bool {
-        self.arms.without.is_some()
+        self.plants.without.is_some()
     }
 
     /// Returns a copy of the current state.
@@ -454,7 +453,7 @@ impl Live {
     }
 
     fn names(&self) -> Vec<&str> {
-        let model = &self.flexible.model;
+        let model = &self.arm.model;
         model.coordinates()[..model.n_actuated()].iter().map(|c| c.joint.as_str()).collect()
     }
 
@@ -464,7 +463,7 @@ impl Live {
 
     /// Checks values; allocates only on failure.
     fn check(&self, values: &[f64]) -> Result<(), Error> {
-        match values.len() == self.flexible.model.n_actuated() && values.iter().all(|x| x.is_finite()) {
+        match values.len() == self.arm.model.n_actuated() && values.iter().all(|x| x.is_finite()) {
             true => Ok(()),
             false => self.checked(Some(values)).map(drop),
         }

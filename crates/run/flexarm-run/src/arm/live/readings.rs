@@ -5,7 +5,7 @@ use std::sync::Arc;
 use flexarm_kinematics::{
     Data, Pose, State, forward_kinematics, forward_kinematics_velocity, frame_twist, inverse_dynamics,
 };
-use flexarm_stepping::{FlexibleArm, Observation};
+use flexarm_stepping::{Observation, Plant};
 use nalgebra::{Vector3, Vector6};
 
 use crate::arm::Arm;
@@ -16,7 +16,7 @@ use crate::run::monitor::stress::StressMonitor;
 
 /// Quantities of an arm at its current state.
 pub struct Readings {
-    flexible: Arc<Arm>,
+    arm: Arc<Arm>,
     pub(super) seen: Observation,
     /// Workspaces for the poses of the rigid arm at the targets and for the velocities of the
     /// flexible one.
@@ -30,8 +30,7 @@ pub struct Readings {
 
 impl Readings {
     /// Allocates the readings of an arm; `stiffness`: factor on that of all links.
-    pub(super) fn new(arm: &Arc<Arm>, commanded: &FlexibleArm, stiffness: f64) -> Result<Self, Error> {
-        let flexible = arm.clone();
+    pub(super) fn new(arm: &Arc<Arm>, commanded: &Plant, stiffness: f64) -> Result<Self, Error> {
         let stress = match arm.robot().gauges.is_empty() {
             true => None,
             false => {
@@ -42,11 +41,11 @@ impl Readings {
         };
         Ok(Self {
             seen: Observation::new(commanded),
-            rigid: (Data::new(&flexible.rigid), State::zeros(&flexible.rigid)),
-            moving: (Data::new(&flexible.model), State::zeros(&flexible.model)),
-            link_sides: link_side_angles(arm.robot(), &flexible),
+            rigid: (Data::new(&arm.rigid), State::zeros(&arm.rigid)),
+            moving: (Data::new(&arm.model), State::zeros(&arm.model)),
+            link_sides: link_side_angles(arm.robot(), arm),
             stress,
-            flexible,
+            arm: arm.clone(),
         })
     }
 
@@ -62,12 +61,12 @@ impl Readings {
 
     /// Returns the actual joint positions (rad or m); under servos they lag behind their targets.
     pub fn position(&self) -> &[f64] {
-        &self.seen.q.as_slice()[..self.flexible.model.n_actuated()]
+        &self.seen.q.as_slice()[..self.arm.model.n_actuated()]
     }
 
     /// Returns the joint velocities (rad/s or m/s).
     pub fn velocity(&self) -> &[f64] {
-        &self.seen.qdot.as_slice()[..self.flexible.model.n_actuated()]
+        &self.seen.qdot.as_slice()[..self.arm.model.n_actuated()]
     }
 
     /// Returns the torques or forces of the drives (N m or N).
@@ -86,7 +85,7 @@ impl Readings {
     }
 
     fn at_links(&self, values: &[f64]) -> Vec<f64> {
-        let mut at_links = values[..self.flexible.model.n_actuated()].to_vec();
+        let mut at_links = values[..self.arm.model.n_actuated()].to_vec();
         for &(joint, coordinate, share) in &self.link_sides {
             at_links[joint] += share * values[coordinate];
         }
@@ -95,28 +94,28 @@ impl Readings {
 
     /// Returns the joint accelerations (rad/s² or m/s²); NaN with a stepper that has none.
     pub fn acceleration(&self) -> &[f64] {
-        &self.seen.qddot.as_slice()[..self.flexible.model.n_actuated()]
+        &self.seen.qddot.as_slice()[..self.arm.model.n_actuated()]
     }
 
     /// Returns the elastic coordinates.
     pub fn deflection(&self) -> &[f64] {
-        &self.seen.q.as_slice()[self.flexible.model.n_actuated()..]
+        &self.seen.q.as_slice()[self.arm.model.n_actuated()..]
     }
 
     /// Returns the velocities of the elastic coordinates (per s).
     pub fn deflection_velocity(&self) -> &[f64] {
-        &self.seen.qdot.as_slice()[self.flexible.model.n_actuated()..]
+        &self.seen.qdot.as_slice()[self.arm.model.n_actuated()..]
     }
 
     /// Returns the accelerations of the elastic coordinates (per s²); NaN with a stepper that has
     /// none.
     pub fn deflection_acceleration(&self) -> &[f64] {
-        &self.seen.qddot.as_slice()[self.flexible.model.n_actuated()..]
+        &self.seen.qddot.as_slice()[self.arm.model.n_actuated()..]
     }
 
     /// Returns the TCP pose in the world.
     pub fn tcp_pose(&self) -> Pose {
-        let tcp = &self.flexible.tcp;
+        let tcp = &self.arm.tcp;
         self.seen.X_WB[tcp.body] * tcp.X_BF
     }
 
@@ -125,15 +124,15 @@ impl Readings {
         let (data, state) = &mut self.moving;
         state.q.copy_from(&self.seen.q);
         state.qdot.copy_from(&self.seen.qdot);
-        forward_kinematics_velocity(&self.flexible.model, data, state);
-        let V = frame_twist(data, &self.flexible.tcp);
+        forward_kinematics_velocity(&self.arm.model, data, state);
+        let V = frame_twist(data, &self.arm.tcp);
         Vector6::from_iterator(V.linear.iter().chain(V.angular.iter()).copied())
     }
 
     /// Returns the acceleration of the TCP, world axes (m/s²); NaN with a stepper that has no
     /// accelerations.
     pub fn tcp_acceleration(&mut self) -> Vector3<f64> {
-        let (model, tcp) = (&self.flexible.model, &self.flexible.tcp);
+        let (model, tcp) = (&self.arm.model, &self.arm.tcp);
         let (data, state) = &mut self.moving;
         state.q.copy_from(&self.seen.q);
         state.qdot.copy_from(&self.seen.qdot);
@@ -165,7 +164,7 @@ impl Readings {
     /// Returns the TCP pose of the rigid arm with its joints at the last targets.
     pub fn target_pose(&mut self) -> Pose {
         let (data, state) = &mut self.rigid;
-        forward_kinematics(&self.flexible.rigid, data, &state.q);
-        data.X_WF(&tcp_frame(&self.flexible.rigid))
+        forward_kinematics(&self.arm.rigid, data, &state.q);
+        data.X_WF(&tcp_frame(&self.arm.rigid))
     }
 }

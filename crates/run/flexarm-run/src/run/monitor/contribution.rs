@@ -6,7 +6,7 @@
 //! ```
 
 use flexarm_analysis::{ContributionPeak, ContributionPeaks};
-use flexarm_stepping::{ElasticElement, FlexibleArm, Observation};
+use flexarm_stepping::{ElasticElement, Observation, Plant};
 use nalgebra::Vector6;
 
 use crate::arm::{Arm, Owner};
@@ -22,9 +22,9 @@ pub(crate) struct Contributions {
 }
 
 impl Contributions {
-    pub(crate) fn new(flexible: &Arm, n_drives: usize) -> Self {
-        let n_links = flexible.spans.len();
-        let places = flexible.owners.iter().map(|owner| match owner {
+    pub(crate) fn new(arm: &Arm, n_drives: usize) -> Self {
+        let n_links = arm.spans.len();
+        let places = arm.owners.iter().map(|owner| match owner {
             Owner::Link(link) => *link,
             Owner::Drive(drive) => n_links + drive,
         });
@@ -32,9 +32,9 @@ impl Contributions {
         Self { places: places.collect(), moved: vec![Vector6::zeros(); count], peaks: ContributionPeaks::new(count) }
     }
 
-    pub(crate) fn update(&mut self, seen: &Observation, twin: &RigidTwin, arm: &FlexibleArm) {
+    pub(crate) fn update(&mut self, seen: &Observation, twin: &RigidTwin, plant: &Plant) {
         self.moved.fill(Vector6::zeros());
-        for (element, place) in arm.elements.iter().zip(&self.places) {
+        for (element, place) in plant.elements.iter().zip(&self.places) {
             // Column by column: a product of dynamically sized views takes three times as long.
             let mut displacement = Vector6::zeros();
             for k in element.coordinate..element.coordinate + element.size {
@@ -44,7 +44,7 @@ impl Contributions {
         }
         // Following error: motors under servos deviate from the trajectory.
         if let Some(following) = self.moved.last_mut() {
-            for &k in &arm.torque_driven {
+            for &k in &plant.torque_driven {
                 *following += twin.J.column(k) * (seen.q[k] - twin.state.q[k]);
             }
         }
@@ -54,9 +54,9 @@ impl Contributions {
     }
 
     /// Returns the contributor index of a coordinate; motors belong to the following error.
-    pub(crate) fn place_of(&self, coordinate: usize, arm: &FlexibleArm) -> usize {
+    pub(crate) fn place_of(&self, coordinate: usize, plant: &Plant) -> usize {
         let within = |e: &ElasticElement| (e.coordinate..e.coordinate + e.size).contains(&coordinate);
-        arm.elements.iter().position(within).map_or(self.moved.len() - 1, |k| self.places[k])
+        plant.elements.iter().position(within).map_or(self.moved.len() - 1, |k| self.places[k])
     }
 
     /// Returns the TCP displacements at the last sample (m, rad, world axes).

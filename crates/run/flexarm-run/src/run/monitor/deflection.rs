@@ -1,6 +1,6 @@
 //! Deflections of the gearboxes of elastic drives.
 
-use flexarm_stepping::FlexibleArm;
+use flexarm_stepping::Plant;
 use nalgebra::DVector;
 
 use crate::arm::{Arm, Owner};
@@ -15,11 +15,11 @@ pub struct Deflections {
 
 impl Deflections {
     /// `n_drives`: number of drives of the robot.
-    pub fn new(arm: &FlexibleArm, flexible: &Arm, n_drives: usize) -> Self {
-        let springs = arm.elements.iter().zip(&flexible.owners).filter_map(|(element, owner)| match owner {
+    pub fn new(plant: &Plant, arm: &Arm, n_drives: usize) -> Self {
+        let springs = plant.elements.iter().zip(&arm.owners).filter_map(|(element, owner)| match owner {
             // The translations of several springs do not count.
             Owner::Drive(_)
-                if element.slides(&arm.model) && flexible.owners.iter().filter(|o| *o == owner).count() > 1 =>
+                if element.slides(&plant.model) && arm.owners.iter().filter(|o| *o == owner).count() > 1 =>
             {
                 None
             }

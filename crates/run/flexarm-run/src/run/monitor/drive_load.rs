@@ -1,7 +1,7 @@
 //! Loads of the drives: maximum force of each, time at which it first exceeded its limit, and
 //! number of samples with a saturated servo.
 
-use flexarm_stepping::{FlexibleArm, Observation};
+use flexarm_stepping::{Observation, Plant};
 
 /// Figures of one drive.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -29,10 +29,10 @@ pub struct DriveLoads {
 
 impl DriveLoads {
     /// Takes the limits from the arm.
-    pub fn new(arm: &FlexibleArm) -> Self {
-        let actuated = &arm.model.coordinates()[..arm.model.n_actuated()];
+    pub fn new(plant: &Plant) -> Self {
+        let actuated = &plant.model.coordinates()[..plant.model.n_actuated()];
         let servo = |k: usize| {
-            let mut axes = arm.servo.iter().flat_map(|servo| &servo.axes);
+            let mut axes = plant.servo.iter().flat_map(|servo| &servo.axes);
             axes.find(|axis| axis.coordinate == k).map(|axis| axis.limit)
         };
         let limits = actuated.iter().enumerate().map(|(k, c)| Limits { joint: c.limits.effort, servo: servo(k) });

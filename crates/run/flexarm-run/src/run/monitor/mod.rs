@@ -17,7 +17,7 @@ pub(crate) mod tool_path;
 use std::sync::Arc;
 
 use flexarm_kinematics::Frame;
-use flexarm_stepping::{FlexibleArm, Observation};
+use flexarm_stepping::{Observation, Plant};
 
 use crate::arm::Arm;
 use crate::motions::tool_path::ToolPath;
@@ -48,14 +48,14 @@ pub(crate) struct Monitors {
 impl Monitors {
     /// Creates the monitors for an arm of a robot with `n_drives` drives; `tool` is built
     /// separately.
-    pub(crate) fn new(arm: &FlexibleArm, flexible: &Arm, n_drives: usize, tool: ToolMonitor) -> Self {
+    pub(crate) fn new(plant: &Plant, arm: &Arm, n_drives: usize, tool: ToolMonitor) -> Self {
         Self {
             tool,
-            contributions: Contributions::new(flexible, n_drives),
-            strains: Strains::new(flexible, &arm.model),
-            deflections: Deflections::new(arm, flexible, n_drives),
-            drive_loads: DriveLoads::new(arm),
-            energy: Energy::new(&arm.model),
+            contributions: Contributions::new(arm, n_drives),
+            strains: Strains::new(arm, &plant.model),
+            deflections: Deflections::new(plant, arm, n_drives),
+            drive_loads: DriveLoads::new(plant),
+            energy: Energy::new(&plant.model),
             stress: None,
             tool_path: None,
         }
@@ -74,9 +74,9 @@ impl Monitors {
     }
 
     /// Passes a sample to all monitors; returns its TCP error.
-    pub(crate) fn update(&mut self, seen: &Observation, twin: &RigidTwin, arm: &FlexibleArm, tcp: &Frame) -> ToolError {
+    pub(crate) fn update(&mut self, seen: &Observation, twin: &RigidTwin, plant: &Plant, tcp: &Frame) -> ToolError {
         self.drive_loads.update(seen);
-        self.contributions.update(seen, twin, arm);
+        self.contributions.update(seen, twin, plant);
         self.strains.update(seen.t, &seen.X_WB, &twin.data.X_WB);
         self.deflections.update(&seen.q);
         self.energy.update(seen);

@@ -60,16 +60,16 @@ pub struct Strains {
 
 impl Strains {
     /// `model`: tree of the flexible robot.
-    pub fn new(flexible: &Arm, model: &Model) -> Self {
+    pub fn new(arm: &Arm, model: &Model) -> Self {
         let frame = |name: &str| model.frame(name).expect("a link of the substitution");
-        let spans = flexible.spans.iter().map(|span| Span {
+        let spans = arm.spans.iter().map(|span| Span {
             near: Interface::new(frame(&span.link), span.X_LA),
             far: Interface::new(frame(&span.distal_link), span.X_DB),
             length: span.length,
             R_AE: None,
             last: None,
         });
-        Self { spans: spans.collect(), largest: vec![LinkStrain::default(); flexible.spans.len()] }
+        Self { spans: spans.collect(), largest: vec![LinkStrain::default(); arm.spans.len()] }
     }
 
     /// * `X_WB`: poses of all bodies in the world at time t (s); `rigid`: those of the rigid twin,

@@ -20,7 +20,7 @@ use flexarm_fem::{FemError, ReducedLink, RigidPart};
 use flexarm_flexlink::{FlexibleSpan, LinkForm};
 use flexarm_kinematics::{Data, Frame, Pose, State, inverse_dynamics};
 use flexarm_log::{GAUGE_ENDS, STRESS_VIEW, Scenery, SceneryForm};
-use flexarm_stepping::{ElasticElement, FlexibleArm, Observation};
+use flexarm_stepping::{ElasticElement, Observation, Plant};
 use nalgebra::{DMatrix, DVector, Matrix6, Point3, RowSVector};
 
 use crate::arm::options::Modelling;
@@ -95,22 +95,22 @@ impl StressMonitor {
     /// # Errors
     /// [`Error::File`] for a stress file that is damaged or belongs to another link, and for a gauge
     /// that is not on the surface.
-    pub(crate) fn new(flexible: &Arm, arm: &FlexibleArm) -> Result<Option<Self>, Error> {
-        let robot = flexible.robot();
+    pub(crate) fn new(arm: &Arm, plant: &Plant) -> Result<Option<Self>, Error> {
+        let robot = arm.robot();
         let mut links = Vec::new();
         for (k, link) in robot.flexible_links.iter().enumerate().filter(|(_, link)| link.stress.is_some()) {
             // Rigid links have no spans.
-            let Some(span) = flexible.spans.get(k) else { continue };
-            let owned = arm.elements.iter().zip(&flexible.owners).filter(|(_, owner)| **owner == Owner::Link(k));
+            let Some(span) = arm.spans.get(k) else { continue };
+            let owned = plant.elements.iter().zip(&arm.owners).filter(|(_, owner)| **owner == Owner::Link(k));
             let owned: Vec<&ElasticElement> = owned.map(|(element, _)| element).collect();
             if owned.is_empty() {
                 continue;
             }
-            let Some((fields, map)) = fields_and_map(robot, link, span, &owned, flexible.modelling())? else {
+            let Some((fields, map)) = fields_and_map(robot, link, span, &owned, arm.modelling())? else {
                 continue;
             };
             let elements = owned.iter().map(|element| (element.coordinate, element.size)).collect();
-            let frame = arm.model.frame(&span.link).expect("a link of the substitution").clone();
+            let frame = plant.model.frame(&span.link).expect("a link of the substitution").clone();
             let (name, length) = (span.link.clone(), span.length);
             links.push(LinkStress {
                 name,
@@ -129,7 +129,7 @@ impl StressMonitor {
             return Ok(None);
         }
         let gauges = placed(robot, &links)?;
-        let (data, state) = (Data::new(&arm.model), State::zeros(&arm.model));
+        let (data, state) = (Data::new(&plant.model), State::zeros(&plant.model));
         Ok(Some(Self { links, gauges, data, state, times: Vec::new() }))
     }
 
@@ -282,13 +282,9 @@ impl StressMonitor {
 }
 
 /// Returns the stress of the links of an arm at rest at coordinates q, without times and damage.
-pub(crate) fn stress_at_rest(
-    flexible: &Arm,
-    arm: &FlexibleArm,
-    q: &DVector<f64>,
-) -> Result<Vec<LinkStressFigures>, Error> {
-    let Some(mut monitor) = StressMonitor::new(flexible, arm)? else { return Ok(Vec::new()) };
-    let mut seen = Observation::new(arm);
+pub(crate) fn stress_at_rest(arm: &Arm, plant: &Plant, q: &DVector<f64>) -> Result<Vec<LinkStressFigures>, Error> {
+    let Some(mut monitor) = StressMonitor::new(arm, plant)? else { return Ok(Vec::new()) };
+    let mut seen = Observation::new(plant);
     seen.q.copy_from(q);
     monitor.update(&seen);
     let mut links = monitor.result();

@@ -1,9 +1,10 @@
-//! Flexible arm, the input of every stepper: tree, springs, damping, drives, motion, external
+//! Plant, the input of every stepper: tree of an arm, springs, damping, drives, motion, external
 //! loads.
 //!
-//! Immutable and shared; each stepper derives its own state from it. Start at [`FlexibleArm::new`] (`assembly.rs`).
+//! Immutable and shared; each stepper derives its own state from it. Start at [`Plant::new`]
+//! (`assembly.rs`).
 //!
-//! The free coordinates x of an arm are those of the joints driven by torque, followed by the
+//! The free coordinates x of a plant are those of the joints driven by torque, followed by the
 //! elastic ones. All other joints are prescribed.
 
 use std::sync::Arc;
@@ -147,9 +148,9 @@ pub struct InertiaChange {
     pub inertia: SpatialInertia,
 }
 
-/// Tree, springs, damping, drives and motion.
+/// An arm on its motion: tree, springs, damping, drives and loads.
 #[derive(Clone)]
-pub struct FlexibleArm {
+pub struct Plant {
     /// Kinematic tree; its elastic joints and modal bodies are the springs.
     pub model: Arc<Model>,
     /// Springs, in coordinate order; one per elastic group of the model.
@@ -173,13 +174,13 @@ pub struct FlexibleArm {
     pub loads: Vec<Load>,
     /// Changes of inertia, by time.
     pub inertia_changes: Vec<InertiaChange>,
-    /// Transmission errors; see [`FlexibleArm::with_transmission_errors`].
+    /// Transmission errors; see [`Plant::with_transmission_errors`].
     pub transmission: Vec<TransmissionError>,
-    /// Gears with hysteresis; see [`FlexibleArm::with_hysteresis`].
+    /// Gears with hysteresis; see [`Plant::with_hysteresis`].
     pub hysteresis: Vec<Hysteresis>,
     /// Friction that grows with the transmitted torque.
     pub load_friction: Vec<LoadFriction>,
-    /// Gears that couple several joints; see [`FlexibleArm::with_coupling`].
+    /// Gears that couple several joints; see [`Plant::with_coupling`].
     pub coupling: Option<GearCoupling>,
     /// Stiffness between elastic coordinates of coupled gears: row, column, entry; the symmetric
     /// entry is implied.
@@ -197,7 +198,7 @@ pub struct FlexibleArm {
 pub struct Servo {
     /// Sampling period (s).
     pub sample_s: f64,
-    /// One axis per joint driven by torque, in the order of [`FlexibleArm::torque_driven`].
+    /// One axis per joint driven by torque, in the order of [`Plant::torque_driven`].
     pub axes: Vec<ServoAxis>,
     /// Rigid robot for the feed-forward; its coordinates are the actuated ones.
     pub rigid: Arc<Model>,
@@ -223,7 +224,7 @@ impl Modes {
     }
 }
 
-impl FlexibleArm {
+impl Plant {
     /// Returns the damping ratio of the first mode; 0 without elastic coordinates.
     pub fn first_damping_ratio(&self) -> f64 {
         let Some(omega) = self.modes.omega.first() else { return 0.0 };
@@ -231,14 +232,14 @@ impl FlexibleArm {
         shape.dot(&(&self.D * shape)) / (2.0 * omega)
     }
 
-    /// Returns the arm with the inertia of one body replaced (about Bo, B axes); modes and damping
+    /// Returns the plant with the inertia of one body replaced (about Bo, B axes); modes and damping
     /// are not updated.
     #[must_use]
     pub fn with_inertia(&self, body: usize, inertia: SpatialInertia) -> Self {
         Self { model: Arc::new(self.model.with_inertia(body, inertia)), ..self.clone() }
     }
 
-    /// Returns the arm with another motion; modes and damping are not updated.
+    /// Returns the plant with another motion; modes and damping are not updated.
     #[must_use]
     pub fn along(&self, motion: Arc<dyn PrescribedMotion>) -> Self {
         Self { motion, ..self.clone() }

@@ -8,7 +8,7 @@ use flexarm::{Arm, LoadOptions, Modelling, Pose, Robot, RunOptions, StepperKind,
 use nalgebra::UnitQuaternion;
 use toml_edit::DocumentMut;
 
-use crate::error::PlantError;
+use crate::error::FmuError;
 use crate::variables::{Causality, Kind, Meaning, Starts, StateReferences, Variable, variables};
 
 /// Tolerance for a communication step to be a whole number of solver steps (in steps).
@@ -20,7 +20,7 @@ const SHORTEST: f64 = 1e-3;
 
 /// Settings for making a plant of a robot.
 #[derive(Clone, Debug)]
-pub struct PlantSettings {
+pub struct FmuSettings {
     /// Options for loading the robot.
     pub load: LoadOptions,
     /// Models of links and drives.
@@ -33,7 +33,7 @@ pub struct PlantSettings {
     pub pose: Option<Vec<f64>>,
 }
 
-impl Default for PlantSettings {
+impl Default for FmuSettings {
     fn default() -> Self {
         let (load, modelling) = (LoadOptions::default(), Modelling::default());
         Self { load, modelling, stepper: StepperKind::default(), step_s: None, pose: None }
@@ -64,9 +64,9 @@ impl Running {
 
 /// An arm with its variables. It is made, gets parameters and inputs, is started, and then steps, or
 /// is evaluated at states that a solver outside sets.
-pub struct Plant {
+pub struct FmuModel {
     path: PathBuf,
-    settings: PlantSettings,
+    settings: FmuSettings,
     /// The arm as filed, shared by copies and kept when a parameter changes the robot.
     arm: Arc<Arm>,
     pub(crate) variables: Arc<[Variable]>,
@@ -82,7 +82,7 @@ pub struct Plant {
 }
 
 /// State of a plant that is started.
-pub struct PlantState {
+pub struct FmuState {
     /// `None` in model exchange, where the values have the state.
     live: Option<LiveState>,
     time_s: f64,
@@ -91,12 +91,12 @@ pub struct PlantState {
     steps: u64,
 }
 
-impl Plant {
+impl FmuModel {
     /// Makes a plant of a robot file or URDF.
     ///
     /// # Errors
-    /// [`PlantError::Robot`] if the robot cannot be loaded or has no equilibrium at the first pose.
-    pub fn new(path: &Path, settings: &PlantSettings) -> Result<Self, PlantError> {
+    /// [`FmuError::Robot`] if the robot cannot be loaded or has no equilibrium at the first pose.
+    pub fn new(path: &Path, settings: &FmuSettings) -> Result<Self, FmuError> {
         let robot = Robot::load_with(path, &settings.load)?;
         let arm = robot.model(&settings.modelling)?;
         let options = options(settings, None);
@@ -120,11 +120,11 @@ impl Plant {
         let (path, settings, states) = (robot.path, settings.clone(), StateReferences::of(&variables));
         let (running, previewed) = (Some(Running::Steps(Box::new(live))), None);
         let (begin_s, steps) = (0.0, 0);
-        let mut plant = Self { path, settings, arm, variables, values, states, running, previewed, begin_s, steps };
-        plant.update();
-        plant.running = None;
-        plant.previewed = Some(plant.settable());
-        Ok(plant)
+        let mut model = Self { path, settings, arm, variables, values, states, running, previewed, begin_s, steps };
+        model.update();
+        model.running = None;
+        model.previewed = Some(model.settable());
+        Ok(model)
     }
 
     /// Returns the variables; the position of a variable is its reference.
@@ -156,10 +156,10 @@ impl Plant {
         }
     }
 
-    pub(crate) fn variable(&self, reference: usize, kind: Kind) -> Result<&Variable, PlantError> {
-        let variable = self.variables.get(reference).ok_or(PlantError::Reference(reference))?;
+    pub(crate) fn variable(&self, reference: usize, kind: Kind) -> Result<&Variable, FmuError> {
+        let variable = self.variables.get(reference).ok_or(FmuError::Reference(reference))?;
         if variable.kind != kind {
-            return Err(PlantError::Kind { name: variable.name.clone(), kind: variable.kind });
+            return Err(FmuError::Kind { name: variable.name.clone(), kind: variable.kind });
         }
         Ok(variable)
     }
@@ -167,8 +167,8 @@ impl Plant {
     /// Returns a number.
     ///
     /// # Errors
-    /// [`PlantError::Reference`], [`PlantError::Kind`].
-    pub fn get(&self, reference: usize) -> Result<f64, PlantError> {
+    /// [`FmuError::Reference`], [`FmuError::Kind`].
+    pub fn get(&self, reference: usize) -> Result<f64, FmuError> {
         self.variable(reference, Kind::Real)?;
         Ok(self.values[reference])
     }
@@ -176,8 +176,8 @@ impl Plant {
     /// Returns a truth value.
     ///
     /// # Errors
-    /// As [`Plant::get`].
-    pub fn get_flag(&self, reference: usize) -> Result<bool, PlantError> {
+    /// As [`FmuModel::get`].
+    pub fn get_flag(&self, reference: usize) -> Result<bool, FmuError> {
         self.variable(reference, Kind::Boolean)?;
         Ok(self.values[reference] != 0.0)
     }
@@ -185,33 +185,33 @@ impl Plant {
     /// Sets a number: a parameter before the start, an input at any time.
     ///
     /// # Errors
-    /// [`PlantError::Reference`], [`PlantError::Kind`], [`PlantError::NotSettable`],
-    /// [`PlantError::NotFinite`].
-    pub fn set(&mut self, reference: usize, value: f64) -> Result<(), PlantError> {
+    /// [`FmuError::Reference`], [`FmuError::Kind`], [`FmuError::NotSettable`],
+    /// [`FmuError::NotFinite`].
+    pub fn set(&mut self, reference: usize, value: f64) -> Result<(), FmuError> {
         self.set_value(reference, Kind::Real, value)
     }
 
     /// Sets a truth value.
     ///
     /// # Errors
-    /// As [`Plant::set`].
-    pub fn set_flag(&mut self, reference: usize, value: bool) -> Result<(), PlantError> {
+    /// As [`FmuModel::set`].
+    pub fn set_flag(&mut self, reference: usize, value: bool) -> Result<(), FmuError> {
         self.set_value(reference, Kind::Boolean, f64::from(value))
     }
 
-    fn set_value(&mut self, reference: usize, kind: Kind, value: f64) -> Result<(), PlantError> {
+    fn set_value(&mut self, reference: usize, kind: Kind, value: f64) -> Result<(), FmuError> {
         let variable = self.variable(reference, kind)?;
         let name = || variable.name.clone();
         match variable.causality {
             Causality::Input => {}
             Causality::Parameter if !self.is_started() => {}
-            Causality::Parameter => return Err(PlantError::Started(name())),
+            Causality::Parameter => return Err(FmuError::Started(name())),
             Causality::Output | Causality::Independent | Causality::Local => {
-                return Err(PlantError::NotSettable(name()));
+                return Err(FmuError::NotSettable(name()));
             }
         }
         if !value.is_finite() {
-            return Err(PlantError::NotFinite { name: name(), found: value });
+            return Err(FmuError::NotFinite { name: name(), found: value });
         }
         self.values[reference] = value;
         self.make_stale();
@@ -230,7 +230,7 @@ impl Plant {
     }
 
     /// Computes the outputs that a start would give, without starting.
-    pub(crate) fn preview(&mut self, begin_s: f64) -> Result<(), PlantError> {
+    pub(crate) fn preview(&mut self, begin_s: f64) -> Result<(), FmuError> {
         if self.previewed.as_ref() == Some(&self.settable()) {
             return Ok(());
         }
@@ -250,8 +250,8 @@ impl Plant {
     /// Starts the arm at rest at the target positions, at time `begin_s` (s) of the caller.
     ///
     /// # Errors
-    /// [`PlantError::Robot`] for parameters without sense, [`PlantError::Started`].
-    pub fn start(&mut self, begin_s: f64) -> Result<(), PlantError> {
+    /// [`FmuError::Robot`] for parameters without sense, [`FmuError::Started`].
+    pub fn start(&mut self, begin_s: f64) -> Result<(), FmuError> {
         self.check_start(begin_s)?;
         (self.begin_s, self.steps) = (begin_s, 0);
         self.running = Some(Running::Steps(Box::new(self.begun(None)?)));
@@ -260,13 +260,13 @@ impl Plant {
     }
 
     /// Checks that the arm may start at a time (s).
-    pub(crate) fn check_start(&self, begin_s: f64) -> Result<(), PlantError> {
+    pub(crate) fn check_start(&self, begin_s: f64) -> Result<(), FmuError> {
         if self.is_started() {
-            return Err(PlantError::Started("start".into()));
+            return Err(FmuError::Started("start".into()));
         }
         match begin_s.is_finite() {
             true => Ok(()),
-            false => Err(PlantError::NotFinite { name: "start time".into(), found: begin_s }),
+            false => Err(FmuError::NotFinite { name: "start time".into(), found: begin_s }),
         }
     }
 
@@ -280,7 +280,7 @@ impl Plant {
     /// Returns the arm at rest at the targets.
     ///
     /// * `step_s`: step size instead of that of the parameter (s).
-    fn begun(&self, step_s: Option<f64>) -> Result<Live, PlantError> {
+    fn begun(&self, step_s: Option<f64>) -> Result<Live, FmuError> {
         let step_s = step_s.unwrap_or(self.parameter(Meaning::Step, 0.0));
         let options = options(&self.settings, Some(step_s));
         let pose = self.all(Meaning::TargetPosition);
@@ -297,7 +297,7 @@ impl Plant {
     }
 
     /// Returns the arm with the payload of the parameter.
-    pub(crate) fn loaded(&self) -> Result<Arc<Arm>, PlantError> {
+    pub(crate) fn loaded(&self) -> Result<Arc<Arm>, FmuError> {
         let filed = self.variables.iter().find(|variable| variable.meaning == Meaning::PayloadMass);
         let Some(start) = filed.and_then(|variable| variable.start) else { return Ok(self.arm.clone()) };
         let mass = self.parameter(Meaning::PayloadMass, start);
@@ -334,31 +334,31 @@ impl Plant {
     /// `step`.
     ///
     /// # Errors
-    /// [`PlantError::NotStarted`]; [`PlantError::Time`] if `from_s` is not the time of the plant;
-    /// [`PlantError::Short`] for a first step below a thousandth of the parameter `step`;
-    /// [`PlantError::Robot`] for a length that is no multiple of the solver step, and for a step
+    /// [`FmuError::NotStarted`]; [`FmuError::Time`] if `from_s` is not the time of the plant;
+    /// [`FmuError::Short`] for a first step below a thousandth of the parameter `step`;
+    /// [`FmuError::Robot`] for a length that is no multiple of the solver step, and for a step
     /// that fails.
-    pub fn step(&mut self, from_s: f64, length_s: f64) -> Result<(), PlantError> {
+    pub fn step(&mut self, from_s: f64, length_s: f64) -> Result<(), FmuError> {
         let own_s = self.time_s();
         match &self.running {
-            None => return Err(PlantError::NotStarted),
+            None => return Err(FmuError::NotStarted),
             Some(Running::Equations { .. }) => {
-                return Err(PlantError::Order { function: "a step", phase: "in model exchange" });
+                return Err(FmuError::Order { function: "a step", phase: "in model exchange" });
             }
             Some(Running::Steps(_)) => {}
         }
         if !(length_s.is_finite() && length_s > 0.0) {
-            return Err(PlantError::Length(length_s));
+            return Err(FmuError::Length(length_s));
         }
         let is_same = (from_s - own_s).abs() <= SAME_TIME * length_s;
         if !is_same {
-            return Err(PlantError::Time { given_s: from_s, own_s });
+            return Err(FmuError::Time { given_s: from_s, own_s });
         }
         if self.steps == 0 {
             let step_s = self.parameter(Meaning::Step, 0.0);
             let count = length_s / step_s;
             if count < SHORTEST {
-                return Err(PlantError::Short { length_s, step_s });
+                return Err(FmuError::Short { length_s, step_s });
             }
             if (count - count.round()).abs() > WHOLE || count < 0.5 {
                 let live = self.begun(Some(length_s / count.ceil().max(1.0)))?;
@@ -391,26 +391,26 @@ impl Plant {
     /// Returns a copy of the state of a started plant.
     ///
     /// # Errors
-    /// [`PlantError::NotStarted`].
-    pub fn state(&self) -> Result<PlantState, PlantError> {
-        let live = match self.running.as_ref().ok_or(PlantError::NotStarted)? {
+    /// [`FmuError::NotStarted`].
+    pub fn state(&self) -> Result<FmuState, FmuError> {
+        let live = match self.running.as_ref().ok_or(FmuError::NotStarted)? {
             Running::Steps(live) => Some(live.state()?),
             Running::Equations { .. } => None,
         };
         let (values, time_s) = (self.values.clone(), self.time_s());
-        Ok(PlantState { live, time_s, values, begin_s: self.begin_s, steps: self.steps })
+        Ok(FmuState { live, time_s, values, begin_s: self.begin_s, steps: self.steps })
     }
 
     /// Returns to a state of this plant, taken since it was started.
     ///
     /// # Errors
-    /// [`PlantError::NotStarted`]; [`PlantError::Robot`] for a state of another plant or of before
+    /// [`FmuError::NotStarted`]; [`FmuError::Robot`] for a state of another plant or of before
     /// a reset.
-    pub fn restore(&mut self, state: &PlantState) -> Result<(), PlantError> {
-        match (self.running.as_mut().ok_or(PlantError::NotStarted)?, &state.live) {
+    pub fn restore(&mut self, state: &FmuState) -> Result<(), FmuError> {
+        match (self.running.as_mut().ok_or(FmuError::NotStarted)?, &state.live) {
             (Running::Steps(live), Some(state)) => live.restore(state)?,
             (Running::Equations { time_s, is_stale, .. }, None) => (*time_s, *is_stale) = (state.time_s, true),
-            _ => return Err(PlantError::Order { function: "a return to a state", phase: "of the other kind of FMU" }),
+            _ => return Err(FmuError::Order { function: "a return to a state", phase: "of the other kind of FMU" }),
         }
         self.values.clone_from(&state.values);
         (self.begin_s, self.steps) = (state.begin_s, state.steps);
@@ -472,18 +472,18 @@ fn quaternion(pose: &Pose) -> [f64; 4] {
     [q.w, q.i, q.j, q.k].map(|part| sign * part)
 }
 
-fn options(settings: &PlantSettings, step_s: Option<f64>) -> RunOptions {
+fn options(settings: &FmuSettings, step_s: Option<f64>) -> RunOptions {
     let stepper = settings.stepper;
     let step_s = step_s.or(settings.step_s).unwrap_or(stepper.entry().default_step_s);
     RunOptions { stepper, step_s, ..RunOptions::default() }
 }
 
 /// Returns the robot file and the mass of its payload (kg), if it has one with a mass.
-fn filed_payload(robot: &Robot) -> Result<Option<(DocumentMut, f64)>, PlantError> {
+fn filed_payload(robot: &Robot) -> Result<Option<(DocumentMut, f64)>, FmuError> {
     if robot.path.extension().is_none_or(|ending| ending != "toml") {
         return Ok(None);
     }
-    let unreadable = |what: String| PlantError::File { path: robot.path.clone(), what };
+    let unreadable = |what: String| FmuError::File { path: robot.path.clone(), what };
     let text = std::fs::read_to_string(&robot.path).map_err(|error| unreadable(error.to_string()))?;
     let document: DocumentMut = text.parse().map_err(|error: toml_edit::TomlError| unreadable(error.to_string()))?;
     let mass = document.get("payload").and_then(|payload| payload.get("mass"));

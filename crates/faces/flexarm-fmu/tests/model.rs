@@ -8,7 +8,7 @@ use flexarm::live::{Command, LiveOptions, Servos};
 use flexarm::poses::statics;
 use flexarm::{DriveModel, LinkModel, Modelling, Motion, PayloadChange, Robot, RunOptions, Scenario, Wrench};
 use flexarm_fmu::{
-    About, Causality, Fmi, FmuJob, Kind, Plant, PlantError, PlantSettings, description, export_fmu, open_resources,
+    About, Causality, Fmi, FmuError, FmuJob, FmuModel, FmuSettings, Kind, description, export_fmu, open_resources,
 };
 
 const TCP: [&str; 3] = ["tcp.position.x", "tcp.position.y", "tcp.position.z"];
@@ -25,38 +25,38 @@ fn a_plant_has_the_bits_of_the_arm_that_is_commanded_directly() {
     ];
     for (name, links, drives) in cases {
         let settings = settings(links, drives);
-        let mut plant = Plant::new(&robot(name), &settings).unwrap();
+        let mut model = FmuModel::new(&robot(name), &settings).unwrap();
         let arm = Robot::load(robot(name)).unwrap().model(&settings.modelling).unwrap();
         let from = vec![0.1; arm.joints().count()];
         let options = RunOptions::default();
         let mut live = arm.live(Some(&from), 1e-3, &options).unwrap();
-        let (q_in, v_in) = (of_joints(&plant, "target_position"), of_joints(&plant, "target_velocity"));
-        q_in.iter().for_each(|&k| plant.set(k, 0.1).unwrap());
-        plant.set_flag(plant.find("use_target_velocity").unwrap(), true).unwrap();
-        let push = plant.find("tcp.force.z").unwrap();
-        plant.start(0.0).unwrap();
+        let (q_in, v_in) = (of_joints(&model, "target_position"), of_joints(&model, "target_velocity"));
+        q_in.iter().for_each(|&k| model.set(k, 0.1).unwrap());
+        model.set_flag(model.find("use_target_velocity").unwrap(), true).unwrap();
+        let push = model.find("tcp.force.z").unwrap();
+        model.start(0.0).unwrap();
         for k in 0..500 {
             let t = 2e-3 * f64::from(k + 1);
             let (q, qdot) = targets(&from, t);
             let force = if k > 200 { -50.0 } else { 0.0 };
             for (k, reference) in q_in.iter().enumerate() {
-                plant.set(*reference, q[k]).unwrap();
-                plant.set(v_in[k], qdot[k]).unwrap();
+                model.set(*reference, q[k]).unwrap();
+                model.set(v_in[k], qdot[k]).unwrap();
             }
-            plant.set(push, force).unwrap();
-            plant.step(plant.time_s(), 2e-3).unwrap();
+            model.set(push, force).unwrap();
+            model.step(model.time_s(), 2e-3).unwrap();
             let mut wrench = Wrench::zeros();
             wrench.force.z = force;
             live.advance(2e-3, &Command { q: &q, qdot: Some(&qdot), torque: None, wrench }).unwrap();
         }
         let tcp = live.tcp_pose().translation.vector;
-        assert_eq!(values(&plant, &TCP), tcp.as_slice(), "{name}");
+        assert_eq!(values(&model, &TCP), tcp.as_slice(), "{name}");
         let error = tcp - live.target_pose().translation.vector;
-        assert_eq!(values(&plant, &ERROR), error.as_slice(), "{name}");
+        assert_eq!(values(&model, &ERROR), error.as_slice(), "{name}");
         let motors: Vec<f64> =
-            of_joints(&plant, "motor_position").iter().map(|&reference| plant.get(reference).unwrap()).collect();
+            of_joints(&model, "motor_position").iter().map(|&reference| model.get(reference).unwrap()).collect();
         assert_eq!(motors, live.position(), "{name}");
-        let efforts: Vec<f64> = of_joints(&plant, "effort").iter().map(|&k| plant.get(k).unwrap()).collect();
+        let efforts: Vec<f64> = of_joints(&model, "effort").iter().map(|&k| model.get(k).unwrap()).collect();
         assert_eq!(efforts, live.effort(), "{name}");
     }
 }
@@ -67,17 +67,17 @@ fn velocity_and_acceleration_of_the_tcp_are_slopes_of_its_position_and_velocity(
     let cases = [(DriveModel::Elastic, 2e-4, f64::INFINITY), (DriveModel::Rigid, 2e-4, 1e-2)];
     for (drives, velocity, acceleration) in cases {
         let links = if drives == DriveModel::Rigid { LinkModel::Rigid } else { LinkModel::Lumped };
-        let mut plant = Plant::new(&robot("kr300"), &settings(links, drives)).unwrap();
-        let q_in = of_joints(&plant, "target_position");
+        let mut model = FmuModel::new(&robot("kr300"), &settings(links, drives)).unwrap();
+        let q_in = of_joints(&model, "target_position");
         let of = |what: &str| ["x", "y", "z"].map(|axis| format!("tcp.{what}.{axis}"));
         let names = [of("position"), of("velocity"), of("acceleration")];
-        plant.start(0.0).unwrap();
+        model.start(0.0).unwrap();
         let (h, mut history) = (1e-3, Vec::new());
         for k in 0..400 {
             let (q, _) = targets(&vec![0.0; q_in.len()], h * f64::from(k + 1));
-            q_in.iter().zip(q).for_each(|(&reference, q)| plant.set(reference, q).unwrap());
-            plant.step(plant.time_s(), h).unwrap();
-            history.push(names.each_ref().map(|names| values(&plant, &names.each_ref().map(String::as_str))));
+            q_in.iter().zip(q).for_each(|(&reference, q)| model.set(reference, q).unwrap());
+            model.step(model.time_s(), h).unwrap();
+            history.push(names.each_ref().map(|names| values(&model, &names.each_ref().map(String::as_str))));
         }
         for (order, bound) in [(1, velocity), (2, acceleration)] {
             let largest = history.iter().flat_map(|row| &row[order]).fold(0.0_f64, |m, v| m.max(v.abs()));
@@ -95,15 +95,15 @@ fn velocity_and_acceleration_of_the_tcp_are_slopes_of_its_position_and_velocity(
 #[test]
 fn links_lag_behind_motors_by_torque_over_stiffness() {
     // joint_2 of the arm bears the weight: the deflection is torque over stiffness.
-    let mut plant = Plant::new(&robot("abb_three_mass"), &PlantSettings::default()).unwrap();
-    let torque = plant.find("tcp.torque.z").unwrap();
-    plant.set(torque, 0.5).unwrap();
-    plant.start(0.0).unwrap();
+    let mut model = FmuModel::new(&robot("abb_three_mass"), &FmuSettings::default()).unwrap();
+    let torque = model.find("tcp.torque.z").unwrap();
+    model.set(torque, 0.5).unwrap();
+    model.start(0.0).unwrap();
     for k in 0..40_000 {
-        plant.step(1e-3 * f64::from(k), 1e-3).unwrap();
+        model.step(1e-3 * f64::from(k), 1e-3).unwrap();
     }
     let [motor, link] = ["joint.joint_1.motor_position", "joint.joint_1.link_position"];
-    let e = values(&plant, &[link])[0] - values(&plant, &[motor])[0];
+    let e = values(&model, &[link])[0] - values(&model, &[motor])[0];
     let truth = 0.5 / 20.592_698_274_307_99;
     println!("deflection {e:.9} rad, torque over stiffness {truth:.9} rad");
     assert!((e / truth - 1.0).abs() < 1e-6, "{e} {truth}");
@@ -112,20 +112,20 @@ fn links_lag_behind_motors_by_torque_over_stiffness() {
 #[test]
 fn a_payload_twice_as_heavy_sags_as_the_robot_file_with_it() {
     let text = std::fs::read_to_string(robot("kr210")).unwrap();
-    let mut plant = Plant::new(&robot("kr210"), &PlantSettings::default()).unwrap();
-    let reference = plant.find("payload.mass").unwrap();
-    let mass = plant.get(reference).unwrap();
-    let filed = values(&plant, &ERROR);
-    plant.set(reference, 2.0 * mass).unwrap();
-    plant.start(0.0).unwrap();
-    let heavier = values(&plant, &ERROR);
+    let mut model = FmuModel::new(&robot("kr210"), &FmuSettings::default()).unwrap();
+    let reference = model.find("payload.mass").unwrap();
+    let mass = model.get(reference).unwrap();
+    let filed = values(&model, &ERROR);
+    model.set(reference, 2.0 * mass).unwrap();
+    model.start(0.0).unwrap();
+    let heavier = values(&model, &ERROR);
     assert_ne!(filed, heavier);
     let mut document: toml_edit::DocumentMut = text.parse().unwrap();
     document["payload"]["mass"] = toml_edit::value(2.0 * mass);
     let edited = Robot::from_toml(&document.to_string(), &robot("kr210"), &Default::default()).unwrap();
     let live = edited.model(&Modelling::default()).unwrap().live(None, 1e-3, &RunOptions::default()).unwrap();
     let tcp = live.tcp_pose().translation.vector;
-    assert_eq!(values(&plant, &TCP), tcp.as_slice(), "the static sag does not depend on the payload's inertia");
+    assert_eq!(values(&model, &TCP), tcp.as_slice(), "the static sag does not depend on the payload's inertia");
 }
 
 /// Truth: the robot file without the payload, and a run whose payload is put down by its scenario.
@@ -138,22 +138,22 @@ fn a_payload_that_is_put_down_leaves_the_arm_of_the_robot_file_without_it() {
     let empty = empty.model(&Modelling::default()).unwrap();
     let pose = [0.0, -1.0, 1.0, 0.0, 0.0, 0.0];
     let sag = empty.live(Some(&pose), 1e-3, &RunOptions::default()).unwrap().tcp_pose().translation.vector;
-    let settings = PlantSettings { pose: Some(pose.to_vec()), ..PlantSettings::default() };
-    let mut plant = Plant::new(&robot("kr210"), &settings).unwrap();
-    let attached = plant.find("payload.attached").unwrap();
-    let loaded = values(&plant, &TCP);
-    let off = |plant: &Plant, truth: &[f64]| {
-        values(plant, &TCP).iter().zip(truth).fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()))
+    let settings = FmuSettings { pose: Some(pose.to_vec()), ..FmuSettings::default() };
+    let mut model = FmuModel::new(&robot("kr210"), &settings).unwrap();
+    let attached = model.find("payload.attached").unwrap();
+    let loaded = values(&model, &TCP);
+    let off = |model: &FmuModel, truth: &[f64]| {
+        values(model, &TCP).iter().zip(truth).fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()))
     };
-    plant.set_flag(attached, false).unwrap();
-    plant.start(0.0).unwrap();
-    let (without, moved) = (off(&plant, sag.as_slice()), off(&plant, &loaded));
+    model.set_flag(attached, false).unwrap();
+    model.start(0.0).unwrap();
+    let (without, moved) = (off(&model, sag.as_slice()), off(&model, &loaded));
     println!("sag without payload off by {without:.1e} m, with it by {moved:.1e} m");
     assert!(without < 1e-12 && moved > 1e-4, "{without:e} {moved:e}");
 
     // Put down on the way: the steps of the arm whose scenario does so.
-    plant.reset();
-    plant.start(0.0).unwrap();
+    model.reset();
+    model.start(0.0).unwrap();
     let arm = Robot::load(robot("kr210")).unwrap().model(&Modelling::default()).unwrap();
     let still = Motion::from_samples(&[0.0, 0.3], &[pose, pose].concat(), arm.robot()).unwrap();
     let scenario = Scenario::from(&still).with_payload(PayloadChange::release(0.1));
@@ -161,13 +161,13 @@ fn a_payload_that_is_put_down_leaves_the_arm_of_the_robot_file_without_it() {
     let mut errors = run.error_world_m().chunks_exact(3).skip(1);
     let mut largest = 0.0_f64;
     for k in 0..300 {
-        plant.set_flag(attached, k < 100).unwrap();
-        plant.step(plant.time_s(), 1e-3).unwrap();
+        model.set_flag(attached, k < 100).unwrap();
+        model.step(model.time_s(), 1e-3).unwrap();
         // The run is sampled at 500 Hz.
         if k % 2 == 0 {
             continue;
         }
-        let own = values(&plant, &ERROR);
+        let own = values(&model, &ERROR);
         let apart = own.iter().zip(errors.next().unwrap()).map(|(a, b)| (a - b).abs());
         largest = apart.fold(largest, f64::max);
     }
@@ -177,74 +177,74 @@ fn a_payload_that_is_put_down_leaves_the_arm_of_the_robot_file_without_it() {
 
     // At rest again without it, and with it once more.
     for (flag, truth, steps) in [(false, sag.as_slice().to_vec(), 4000), (true, loaded, 12_000)] {
-        plant.set_flag(attached, flag).unwrap();
+        model.set_flag(attached, flag).unwrap();
         for _ in 0..steps {
-            plant.step(plant.time_s(), 1e-3).unwrap();
+            model.step(model.time_s(), 1e-3).unwrap();
         }
-        let still_rings = off(&plant, &truth);
+        let still_rings = off(&model, &truth);
         println!("{steps} ms later off by {still_rings:.1e} m");
         assert!(still_rings < 5e-6, "{flag}: {still_rings:e}");
     }
-    let fixed = Plant::new(&robot("test/one_beam"), &PlantSettings::default()).unwrap();
+    let fixed = FmuModel::new(&robot("test/one_beam"), &FmuSettings::default()).unwrap();
     assert!(fixed.find("payload.attached").is_none());
 }
 
 #[test]
 fn states_resets_and_open_servos_do_what_they_say() {
     let settings = settings(LinkModel::Modal, DriveModel::Servo);
-    let mut plant = Plant::new(&robot("test/reference_arm"), &settings).unwrap();
-    let first = values(&plant, &TCP);
-    let swing = |plant: &mut Plant, steps: std::ops::Range<u32>| {
-        let q_in = of_joints(plant, "target_position");
+    let mut model = FmuModel::new(&robot("test/reference_arm"), &settings).unwrap();
+    let first = values(&model, &TCP);
+    let swing = |model: &mut FmuModel, steps: std::ops::Range<u32>| {
+        let q_in = of_joints(model, "target_position");
         for k in steps {
             let (q, _) = targets(&vec![0.0; q_in.len()], 1e-3 * f64::from(k + 1));
-            q_in.iter().zip(q).for_each(|(&reference, q)| plant.set(reference, q).unwrap());
-            plant.step(plant.time_s(), 1e-3).unwrap();
+            q_in.iter().zip(q).for_each(|(&reference, q)| model.set(reference, q).unwrap());
+            model.step(model.time_s(), 1e-3).unwrap();
         }
-        values(plant, &TCP)
+        values(model, &TCP)
     };
-    plant.start(0.0).unwrap();
-    swing(&mut plant, 0..100);
-    let state = plant.state().unwrap();
-    let end = swing(&mut plant, 100..200);
-    plant.restore(&state).unwrap();
-    assert_eq!(end, swing(&mut plant, 100..200));
-    plant.reset();
-    plant.start(0.0).unwrap();
-    assert_eq!(first, values(&plant, &TCP));
-    assert_eq!(end, swing(&mut plant, 0..200));
+    model.start(0.0).unwrap();
+    swing(&mut model, 0..100);
+    let state = model.state().unwrap();
+    let end = swing(&mut model, 100..200);
+    model.restore(&state).unwrap();
+    assert_eq!(end, swing(&mut model, 100..200));
+    model.reset();
+    model.start(0.0).unwrap();
+    assert_eq!(first, values(&model, &TCP));
+    assert_eq!(end, swing(&mut model, 0..200));
 
     // Under open servos the torques alone move the arm, as the library does it.
-    plant.reset();
-    plant.set_flag(plant.find("open_servos").unwrap(), true).unwrap();
-    plant.start(0.0).unwrap();
-    let torques = of_joints(&plant, "torque");
+    model.reset();
+    model.set_flag(model.find("open_servos").unwrap(), true).unwrap();
+    model.start(0.0).unwrap();
+    let torques = of_joints(&model, "torque");
     let arm = Robot::load(robot("test/reference_arm")).unwrap().model(&settings.modelling).unwrap();
     let own = LiveOptions { servos: Servos::Open, ..LiveOptions::default() };
     let mut live = arm.live_with(None, 1e-3, &RunOptions::default(), &own).unwrap();
     let given = [30.0, -20.0, 10.0, 1.0, -1.0, 0.5];
-    torques.iter().zip(given).for_each(|(&reference, torque)| plant.set(reference, torque).unwrap());
+    torques.iter().zip(given).for_each(|(&reference, torque)| model.set(reference, torque).unwrap());
     for _ in 0..100 {
-        plant.step(plant.time_s(), 1e-3).unwrap();
+        model.step(model.time_s(), 1e-3).unwrap();
         live.step(&Command { q: &[0.0; 6], torque: Some(&given), ..Command::default() }).unwrap();
     }
-    assert_eq!(values(&plant, &TCP), live.tcp_pose().translation.vector.as_slice());
-    assert_ne!(values(&plant, &TCP), first);
+    assert_eq!(values(&model, &TCP), live.tcp_pose().translation.vector.as_slice());
+    assert_ne!(values(&model, &TCP), first);
 }
 
 #[test]
 fn shorter_communication_steps_converge() {
     let tip = |length: f64| {
-        let mut plant = Plant::new(&robot("kr210"), &PlantSettings::default()).unwrap();
-        let q_in = of_joints(&plant, "target_position");
-        plant.start(0.0).unwrap();
+        let mut model = FmuModel::new(&robot("kr210"), &FmuSettings::default()).unwrap();
+        let q_in = of_joints(&model, "target_position");
+        model.start(0.0).unwrap();
         let steps = (0.4 / length).round() as u32;
         for k in 0..steps {
             let (q, _) = targets(&vec![0.0; q_in.len()], length * f64::from(k + 1));
-            q_in.iter().zip(q).for_each(|(&reference, q)| plant.set(reference, q).unwrap());
-            plant.step(plant.time_s(), length).unwrap();
+            q_in.iter().zip(q).for_each(|(&reference, q)| model.set(reference, q).unwrap());
+            model.step(model.time_s(), length).unwrap();
         }
-        values(&plant, &TCP)
+        values(&model, &TCP)
     };
     // 0.1 ms is shorter than the solver step, 2.5 ms is no multiple of it.
     let best = tip(1e-4);
@@ -299,15 +299,15 @@ fn communication_steps_of_two_solver_steps_excite_no_mode() {
     let folder = std::env::temp_dir().join(format!("flexarm broad hand {}", std::process::id()));
     let path = broad_hand(&folder);
     let errors = |period_ms: usize| -> Vec<Vec<f64>> {
-        let mut plant = Plant::new(&path, &PlantSettings::default()).unwrap();
-        let q_in = of_joints(&plant, "target_position");
-        plant.start(0.0).unwrap();
+        let mut model = FmuModel::new(&path, &FmuSettings::default()).unwrap();
+        let q_in = of_joints(&model, "target_position");
+        model.start(0.0).unwrap();
         let h = 1e-3 * period_ms as f64;
         let step = |k: usize| {
             let (q, _) = targets(&vec![0.0; q_in.len()], h * k as f64);
-            q_in.iter().zip(q).for_each(|(&reference, q)| plant.set(reference, q).unwrap());
-            plant.step(plant.time_s(), h).unwrap();
-            values(&plant, &ERROR)
+            q_in.iter().zip(q).for_each(|(&reference, q)| model.set(reference, q).unwrap());
+            model.step(model.time_s(), h).unwrap();
+            values(&model, &ERROR)
         };
         (1..=1500 / period_ms).map(step).collect()
     };
@@ -326,44 +326,44 @@ fn communication_steps_of_two_solver_steps_excite_no_mode() {
 
 #[test]
 fn what_makes_no_sense_is_refused_with_its_name_and_changes_nothing() {
-    let mut plant = Plant::new(&robot("test/one_beam"), &PlantSettings::default()).unwrap();
-    let (target, error) = (of_joints(&plant, "target_position")[0], plant.find("tcp_error.length").unwrap());
-    assert!(matches!(plant.step(0.0, 1e-3), Err(PlantError::NotStarted)));
-    assert!(matches!(plant.set(target, f64::NAN), Err(PlantError::NotFinite { .. })));
-    assert!(matches!(plant.set(error, 1.0), Err(PlantError::NotSettable(name)) if name == "tcp_error.length"));
-    assert!(matches!(plant.get(100_000), Err(PlantError::Reference(100_000))));
-    assert!(matches!(plant.get_flag(target), Err(PlantError::Kind { .. })));
-    plant.start(2.0).unwrap();
-    assert!(matches!(plant.start(2.0), Err(PlantError::Started(_))));
-    let step = plant.find("step").unwrap();
-    assert!(matches!(plant.set(step, 1e-3), Err(PlantError::Started(name)) if name == "step"));
-    assert!(matches!(plant.step(0.0, 1e-3), Err(PlantError::Time { .. })));
-    assert!(matches!(plant.step(2.0, -1e-3), Err(PlantError::Length(_))));
-    plant.step(2.0, 1e-3).unwrap();
-    assert!(matches!(plant.step(2.001, 1.5e-3), Err(PlantError::Robot(_))));
-    plant.step(2.001, 1e-3).unwrap();
-    assert!((plant.time_s() - 2.002).abs() < 1e-12);
-    let missing = Plant::new(Path::new("no_such_robot.toml"), &PlantSettings::default());
-    assert!(matches!(missing, Err(PlantError::Robot(_))));
+    let mut model = FmuModel::new(&robot("test/one_beam"), &FmuSettings::default()).unwrap();
+    let (target, error) = (of_joints(&model, "target_position")[0], model.find("tcp_error.length").unwrap());
+    assert!(matches!(model.step(0.0, 1e-3), Err(FmuError::NotStarted)));
+    assert!(matches!(model.set(target, f64::NAN), Err(FmuError::NotFinite { .. })));
+    assert!(matches!(model.set(error, 1.0), Err(FmuError::NotSettable(name)) if name == "tcp_error.length"));
+    assert!(matches!(model.get(100_000), Err(FmuError::Reference(100_000))));
+    assert!(matches!(model.get_flag(target), Err(FmuError::Kind { .. })));
+    model.start(2.0).unwrap();
+    assert!(matches!(model.start(2.0), Err(FmuError::Started(_))));
+    let step = model.find("step").unwrap();
+    assert!(matches!(model.set(step, 1e-3), Err(FmuError::Started(name)) if name == "step"));
+    assert!(matches!(model.step(0.0, 1e-3), Err(FmuError::Time { .. })));
+    assert!(matches!(model.step(2.0, -1e-3), Err(FmuError::Length(_))));
+    model.step(2.0, 1e-3).unwrap();
+    assert!(matches!(model.step(2.001, 1.5e-3), Err(FmuError::Robot(_))));
+    model.step(2.001, 1e-3).unwrap();
+    assert!((model.time_s() - 2.002).abs() < 1e-12);
+    let missing = FmuModel::new(Path::new("no_such_robot.toml"), &FmuSettings::default());
+    assert!(matches!(missing, Err(FmuError::Robot(_))));
 }
 
 #[test]
 fn descriptions_name_every_variable_once_with_unit_and_start() {
-    let plant = Plant::new(&robot("kr300"), &settings(LinkModel::AsFiled, DriveModel::Servo)).unwrap();
-    let mut names: Vec<&str> = plant.variables().iter().map(|variable| variable.name.as_str()).collect();
+    let model = FmuModel::new(&robot("kr300"), &settings(LinkModel::AsFiled, DriveModel::Servo)).unwrap();
+    let mut names: Vec<&str> = model.variables().iter().map(|variable| variable.name.as_str()).collect();
     names.sort_unstable();
     names.dedup();
-    assert_eq!(names.len(), plant.variables().len());
-    for variable in plant.variables() {
+    assert_eq!(names.len(), model.variables().len());
+    for variable in model.variables() {
         assert_eq!(variable.unit.is_empty(), variable.kind == Kind::Boolean, "{}", variable.name);
         let settable = matches!(variable.causality, Causality::Parameter | Causality::Input);
         assert_eq!(variable.start.is_some(), settable, "{}", variable.name);
     }
     let about = About { name: "a <robot> & \"more\"", token: "{0}", step_s: 1e-3 };
     for (fmi, element) in [(Fmi::V2, "<ScalarVariable "), (Fmi::V3, "<Float64 ")] {
-        let text = String::from_utf8(description(fmi, &about, plant.variables()).unwrap()).unwrap();
+        let text = String::from_utf8(description(fmi, &about, model.variables()).unwrap()).unwrap();
         assert!(text.contains("a &lt;robot&gt; &amp; &quot;more&quot;"), "{text}");
-        let numbers = plant.variables().iter().filter(|v| v.kind == Kind::Real || fmi == Fmi::V2).count();
+        let numbers = model.variables().iter().filter(|v| v.kind == Kind::Real || fmi == Fmi::V2).count();
         assert_eq!(text.matches(element).count(), numbers);
     }
 }
@@ -416,7 +416,7 @@ fn the_resources_of_an_fmu_are_the_arm_wherever_they_are() {
         (gauged(&folder.join("gauged")), DriveModel::AsFiled),
     ] {
         let settings = settings(LinkModel::AsFiled, drives);
-        let plant = Plant::new(&path, &settings).unwrap();
+        let model = FmuModel::new(&path, &settings).unwrap();
         let output = folder.join("arm.fmu");
         let job = FmuJob { robot: path, settings, fmi: Fmi::V3, library: library.clone(), output, overwrite: true };
         let summary = export_fmu(&job).unwrap();
@@ -425,14 +425,14 @@ fn the_resources_of_an_fmu_are_the_arm_wherever_they_are() {
         unpacked(&job.output, &own);
         let token = token_of(&own);
         let mut again = open_resources(&own.join("resources"), &token).unwrap();
-        assert_eq!(plant.variables(), again.variables());
-        assert_eq!(values(&plant, &TCP), values(&again, &TCP));
+        assert_eq!(model.variables(), again.variables());
+        assert_eq!(values(&model, &TCP), values(&again, &TCP));
         let stress = "gauge.worst_von_mises_pa";
-        if plant.find(stress).is_some() {
-            let read = values(&plant, &[stress]);
+        if model.find(stress).is_some() {
+            let read = values(&model, &[stress]);
             assert!(read[0].abs() > 1e4 && read == values(&again, &[stress]), "{read:?}");
         }
-        assert_eq!(plant.find(stress).is_some(), job.robot.starts_with(&folder));
+        assert_eq!(model.find(stress).is_some(), job.robot.starts_with(&folder));
         again.start(0.0).unwrap();
         again.step(0.0, 0.01).unwrap();
         let text = std::fs::read_to_string(own.join("resources/robot.toml")).unwrap();
@@ -440,14 +440,14 @@ fn the_resources_of_an_fmu_are_the_arm_wherever_they_are() {
         let values = document.iter().map(|(_, item)| item.to_string()).collect::<Vec<_>>();
         let is_outside = |value: &String| value.lines().any(|line| line.split('#').next().unwrap().contains(".."));
         assert!(!values.iter().any(is_outside), "{text}");
-        assert!(matches!(open_resources(&own.join("resources"), "{other}"), Err(PlantError::Token { .. })));
+        assert!(matches!(open_resources(&own.join("resources"), "{other}"), Err(FmuError::Token { .. })));
         std::fs::remove_file(own.join("resources/robot.urdf")).unwrap();
-        assert!(matches!(open_resources(&own.join("resources"), &token), Err(PlantError::Robot(_))));
+        assert!(matches!(open_resources(&own.join("resources"), &token), Err(FmuError::Robot(_))));
         std::fs::write(own.join("resources/plant.json"), "{").unwrap();
-        assert!(matches!(open_resources(&own.join("resources"), &token), Err(PlantError::File { .. })));
+        assert!(matches!(open_resources(&own.join("resources"), &token), Err(FmuError::File { .. })));
         std::fs::remove_dir_all(&own).unwrap();
         let kept = FmuJob { overwrite: false, ..job };
-        assert!(matches!(export_fmu(&kept), Err(PlantError::Written(_))));
+        assert!(matches!(export_fmu(&kept), Err(FmuError::Written(_))));
     }
     std::fs::remove_dir_all(&folder).unwrap();
 }
