@@ -6,8 +6,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use flexarm::poses::{modes, statics};
-use flexarm::{DriveModel, LoadOptions, Modelling, Motion, Robot};
+use flexarm::{DriveModel, Modelling, Motion, Robot};
 use flexarm_stepping::{Held, Observation, ReferenceSettings, Start, StepperKind, new_stepper, static_equilibrium};
 use nalgebra::Vector3;
 use serde_json::Value;
@@ -17,7 +16,7 @@ fn root() -> PathBuf {
 }
 
 fn load(file: &str) -> Robot {
-    Robot::load_with(&root().join(file), &LoadOptions::default()).expect("a sound robot")
+    Robot::load(&root().join(file)).expect("a sound robot")
 }
 
 fn golden(file: &str) -> Value {
@@ -46,16 +45,16 @@ fn identified_arms_have_the_frequencies_and_the_compliance_of_the_other_tool() {
         let file = case["file"].as_str().expect("a name");
         let q = numbers(&case["q"]);
         let robot = load(file);
-        let under_weight = modes(&robot, &Modelling::default(), Some(&q), None, 6).expect("modes");
+        let under_weight = robot.model(&Modelling::default()).expect("modes").modes(Some(&q), None, 6).expect("modes");
         let weight = worst(&under_weight.undamped_frequencies_hz, &numbers(&case["gravity"]["frequencies_hz"]));
         let mut weightless = robot.clone();
         weightless.rigid.gravity = Vector3::zeros();
-        let springs = modes(&weightless, &Modelling::default(), Some(&q), None, 6).expect("modes");
+        let springs = weightless.model(&Modelling::default()).expect("modes").modes(Some(&q), None, 6).expect("modes");
         let springs = worst(&springs.undamped_frequencies_hz, &numbers(&case["springs"]["frequencies_hz"]));
-        let held = statics(&robot, &Modelling::default(), Some(&q), [0.0; 6]).expect("statics");
+        let held = robot.model(&Modelling::default()).expect("statics").statics(Some(&q), [0.0; 6]).expect("statics");
         let truth = numbers(&case["gravity"]["sag"]);
         let sag = (0..3).map(|k| (held.sag_m[k] - truth[k]).abs()).fold(0.0, f64::max);
-        let free = statics(&weightless, &Modelling::default(), Some(&q), [0.0; 6]).expect("statics");
+        let free = weightless.model(&Modelling::default()).expect("statics").statics(Some(&q), [0.0; 6]).expect("statics");
         let C: Vec<Vec<f64>> = case["compliance"].as_array().expect("rows").iter().map(numbers).collect();
         let mut compliance = 0.0f64;
         for i in 0..6 {
@@ -119,8 +118,8 @@ fn arms_with_elastic_gearboxes_move_as_the_other_tool_has_them() {
 #[test]
 fn three_mass_arm_has_its_closed_form_frequencies() {
     let truth = golden("three_mass.json");
-    let held = modes(&load("robots/abb_three_mass"), &Modelling::default(), None, None, 2).expect("modes");
-    let free = modes(&load("robots/abb_three_mass/torque.toml"), &Modelling::default(), None, None, 3).expect("modes");
+    let held = load("robots/abb_three_mass").model(&Modelling::default()).expect("modes").modes(None, None, 2).expect("modes");
+    let free = load("robots/abb_three_mass/torque.toml").model(&Modelling::default()).expect("modes").modes(None, None, 3).expect("modes");
     let held_truth = numbers(&truth["held"]["frequencies_hz"]);
     let free_truth = numbers(&truth["free"]["frequencies_hz"]);
     eprintln!("held {:?}, free {:?}", held.undamped_frequencies_hz, free.undamped_frequencies_hz);
@@ -145,7 +144,7 @@ fn four_mass_arm_has_the_frequencies_and_the_damping_of_its_equations() {
         let cases = truth["cases"].as_array().expect("cases");
         let fits = |case: &&Value| case["k1"] == 16.7 && case["motor"] == motor && case["friction"] == "motor";
         let case = cases.iter().find(fits).expect("a case");
-        let found = modes(&load(file), &Modelling::default(), None, None, 5).expect("modes");
+        let found = load(file).model(&Modelling::default()).expect("modes").modes(None, None, 5).expect("modes");
         let first = found.frequencies_hz.len() - 3;
         let frequencies = worst(&found.frequencies_hz[first..], &numbers(&case["frequencies_hz"]));
         let damping = worst(&found.damping_ratio[first..], &numbers(&case["damping_ratios"]));

@@ -6,8 +6,8 @@ use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use flexarm::poses::{ResponseRequest, modes, response, statics};
-use flexarm::{LoadOptions, Modelling, Motion, Robot, RunOptions};
+use flexarm::poses::ResponseRequest;
+use flexarm::{Modelling, Motion, Robot, RunOptions};
 use flexarm_analysis::{Taper, strongest_line};
 use flexarm_kinematics::{Data, Frame, Model, State, Wrench, forward_kinematics, mass_matrix};
 use flexarm_stepping::*;
@@ -20,7 +20,7 @@ fn root() -> PathBuf {
 }
 
 fn load(robot: &str) -> Robot {
-    Robot::load_with(&root().join("robots").join(robot), &LoadOptions::default()).expect("a sound robot")
+    Robot::load(&root().join("robots").join(robot)).expect("a sound robot")
 }
 
 /// The reference arm by file with another damping.
@@ -64,7 +64,7 @@ fn modes_of_the_industrial_arm_are_those_that_compare_reports() {
     let options = RunOptions { log_rate_hz: 100.0, step_s: 0.01, ..RunOptions::default() };
     let arm = robot.model(&Modelling::default()).expect("a model");
     let reported = arm.simulate(&motion, &options).expect("runs").summary.frequencies_hz;
-    let found = modes(&robot, &Modelling::default(), Some(q.as_slice()), None, 100).expect("an equilibrium");
+    let found = robot.model(&Modelling::default()).expect("an equilibrium").modes(Some(q.as_slice()), None, 100).expect("an equilibrium");
     assert_eq!((found.total, found.frequencies_hz.len()), (12, reported.len()));
     let mut worst = 0.0f64;
     for (mode, truth) in found.modes.iter().zip(&reported) {
@@ -87,7 +87,7 @@ fn modes_of_the_industrial_arm_are_those_that_compare_reports() {
 fn response_at_rest_is_the_compliance() {
     let robot = load("kr210/links.toml");
     let at: &[f64] = &[0.2, -1.1, 1.2, 0.3, 0.4, 0.5];
-    let C = statics(&robot, &Modelling::default(), Some(at), [0.0; 6]).expect("an equilibrium").compliance;
+    let C = robot.model(&Modelling::default()).expect("an equilibrium").statics(Some(at), [0.0; 6]).expect("an equilibrium").compliance;
     let words = |words: [&str; 6]| words.map(str::to_owned).to_vec();
     let request = ResponseRequest {
         inputs: words(["force-x", "force-y", "force-z", "torque-x", "torque-y", "torque-z"]),
@@ -95,7 +95,7 @@ fn response_at_rest_is_the_compliance() {
         points: 2,
         ..ResponseRequest::default()
     };
-    let found = response(&robot, &Modelling::default(), Some(at), &request, None).expect("a response");
+    let found = robot.model(&Modelling::default()).expect("a response").response(Some(at), &request).expect("a response");
     let mut worst = 0.0f64;
     for (k, curve) in found.curves.iter().enumerate() {
         let (i, j) = (k % 6, k / 6);
@@ -223,7 +223,7 @@ fn a_force_at_a_resonance_shakes_the_tool_as_high_as_the_peak() {
         to_hz: Some(60.0),
         ..ResponseRequest::default()
     };
-    let found = response(&robot, &Modelling::default(), Some(&POSE[..]), &request, None).expect("a response");
+    let found = robot.model(&Modelling::default()).expect("a response").response(Some(&POSE[..]), &request).expect("a response");
     let own = robot.model(&Modelling::default()).expect("a tree");
     let plant = own.plant(held()).expect("carries its weight");
     let tool = plant.model.frame("__tcp").expect("there").clone();
@@ -271,7 +271,7 @@ fn a_joint_at_a_resonance_shakes_the_tool_as_high_as_the_peak() {
         to_hz: Some(60.0),
         ..ResponseRequest::default()
     };
-    let found = response(&robot, &Modelling::default(), Some(&POSE[..]), &request, None).expect("a response");
+    let found = robot.model(&Modelling::default()).expect("a response").response(Some(&POSE[..]), &request).expect("a response");
     for (curve, axis) in found.curves.iter().zip([0, 2]) {
         let peak = &curve.peaks[0];
         let omega = TAU * peak.frequency_hz;

@@ -6,14 +6,14 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use flexarm::recordings::RecordingFormat;
-use flexarm::{Keep, LinkModel, LoadOptions, Modelling, Motion, Outputs, Robot, RunOptions, RunRequest, Summary};
+use flexarm::{Keep, LinkModel, Modelling, Motion, Outputs, Robot, RunOptions, RunRequest, Summary};
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("inside the workspace").to_owned()
 }
 
 fn load(robot: &str) -> Robot {
-    Robot::load_with(&root().join("robots").join(robot), &LoadOptions::default()).expect("a sound robot")
+    Robot::load(&root().join("robots").join(robot)).expect("a sound robot")
 }
 
 /// Runs a robot and reads its table back: column name to values.

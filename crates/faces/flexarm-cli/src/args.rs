@@ -1,6 +1,6 @@
 //! Command-line arguments, defaults and help texts.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
@@ -8,11 +8,12 @@ use flexarm::recordings::RecordingFormat;
 use flexarm::robots::{InertiaEstimate, ReadOptions};
 use flexarm::settings::Words;
 use flexarm::steppers::{ConstraintForm, ReferenceMethod, STEPPERS, SpookPreset, Start, StepperEntry};
-use flexarm::{DriveModel, LinkModel, LoadOptions, Modelling, sweep::Change};
+use flexarm::{DriveModel, LinkModel, LoadOptions, Modelling, Robot, RobotSource, sweep::Change};
 
 use crate::failure::Failure;
 use crate::formats;
 use crate::motion::MotionInputArgs;
+use crate::shipped;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -53,6 +54,12 @@ pub(crate) struct RobotArgs {
 }
 
 impl RobotArgs {
+    /// Loads a robot by its path or the name of a shipped one.
+    pub(crate) fn load(&self, given: &Path) -> Result<Robot, Failure> {
+        let path = shipped::robot(Some(given))?;
+        Ok(RobotSource::new(&path, &self.options()?).load()?.robot().clone())
+    }
+
     /// Returns the options for loading a robot.
     pub(crate) fn options(&self) -> Result<LoadOptions, Failure> {
         let mut urdf =

@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use flexarm::compensate::{
     CompensateRequest, Compensation, ErrorFigures, LimitRule, Method, ShaperKind, Shaping, compensate_motion,
 };
-use flexarm::{Motion, Robot, RunOptions, Scenario};
+use flexarm::{Motion, RunOptions, Scenario};
 
 use crate::args::{ModellingArgs, RobotArgs};
 use crate::failure::Failure;
@@ -163,7 +163,7 @@ fn shaping(args: &CompensateArgs) -> Result<Option<Shaping>, Failure> {
 }
 
 pub(crate) fn run(terminal: &Terminal, args: &CompensateArgs) -> Result<ExitCode, Failure> {
-    let robot = Robot::load_with(&shipped::robot(Some(&args.robot))?, &args.load.options()?)?;
+    let robot = args.load.load(&args.robot)?;
     let motion = match (&args.motion, &robot.default_trajectory) {
         (Some(given), _) => shipped::trajectory(given)?,
         (None, Some(own)) => own.clone(),
@@ -172,7 +172,7 @@ pub(crate) fn run(terminal: &Terminal, args: &CompensateArgs) -> Result<ExitCode
     let motion = Motion::load_with(&motion, &robot, &args.input.options())?;
     let plant = match &args.plant {
         Some(given) => {
-            let plant = Robot::load_with(&shipped::robot(Some(given))?, &args.load.options()?)?;
+            let plant = args.load.load(given)?;
             Some((plant.name.clone(), plant))
         }
         None => None,

@@ -2,7 +2,6 @@
 
 use std::process::ExitCode;
 
-use flexarm::Robot;
 use flexarm::links::WordError;
 use flexarm::links::export::{ExportFormat, ExportJob};
 use flexarm::links::import::{
@@ -12,7 +11,7 @@ use flexarm::robots::RobotFormat;
 
 use crate::exchange_args::{ExportArgs, ExportFormatName, ImportArgs, ImportFormatName, RobotFormatName};
 use crate::failure::Failure;
-use crate::shipped::{self, OutputFolder};
+use crate::shipped::OutputFolder;
 use crate::terminal::{Terminal, answer, answer_as_is, to_json, working};
 use crate::{print, values};
 
@@ -51,7 +50,7 @@ pub(crate) fn export(terminal: &Terminal, args: &ExportArgs) -> Result<ExitCode,
 }
 
 fn export_robot(terminal: &Terminal, args: &ExportArgs) -> Result<ExitCode, Failure> {
-    let robot = Robot::load_with(&shipped::robot(Some(&args.input))?, &args.load.options()?)?;
+    let robot = args.load.load(&args.input)?;
     let format = match args.to {
         Some(RobotFormatName::Urdf) => RobotFormat::Urdf,
         _ => RobotFormat::Mjcf,

@@ -4,7 +4,6 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
-use flexarm::Robot;
 use flexarm::steppers::{STEPPERS, StepRule, StepperEntry, StepperOptions};
 use flexarm_fmu::{Fmi, FmuJob, FmuSettings, FmuSummary, export_fmu};
 
@@ -63,7 +62,7 @@ pub(crate) fn run(terminal: &Terminal, args: &ExportFmuArgs) -> Result<ExitCode,
         return Err(Failure::Usage(text));
     }
     let (path, load) = (shipped::robot(Some(&args.pose.robot))?, args.pose.load.options()?);
-    let robot = Robot::load_with(&path, &load)?;
+    let robot = args.pose.load.load(&path)?;
     let settings = FmuSettings {
         load,
         modelling: args.pose.modelling.modelling(),

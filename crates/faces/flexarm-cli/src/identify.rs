@@ -17,7 +17,6 @@ use crate::args::{ModellingArgs, RobotArgs};
 use crate::failure::Failure;
 use crate::layout::{lines, table};
 use crate::print::say;
-use crate::shipped;
 use crate::shipped::OutputFolder;
 use crate::signals::stop_when_asked;
 use crate::terminal::{Terminal, answer, to_json, working};
@@ -100,7 +99,7 @@ pub(crate) struct IdentifyArgs {
 const TOLD_EVERY: Duration = Duration::from_secs(10);
 
 pub(crate) fn run(terminal: &Terminal, args: &IdentifyArgs) -> Result<ExitCode, Failure> {
-    let robot = Robot::load_with(&shipped::robot(Some(&args.robot))?, &args.load.options()?)?;
+    let robot = args.load.load(&args.robot)?;
     match (args.plan, &args.measurements) {
         (Some(count), _) => plan(terminal, args, &robot, count),
         (None, Some(measurements)) => {

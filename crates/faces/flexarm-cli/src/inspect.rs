@@ -2,7 +2,6 @@
 
 use std::process::ExitCode;
 
-use flexarm::Robot;
 use flexarm::settings::written::visible;
 
 use crate::args::{CheckArgs, InspectArgs};
@@ -11,7 +10,7 @@ use crate::terminal::{Terminal, answer, answer_as_is, to_json};
 use crate::{print, shipped, values};
 
 pub(crate) fn inspect(terminal: &Terminal, args: &InspectArgs) -> Result<ExitCode, Failure> {
-    let robot = Robot::load_with(&shipped::robot(Some(&args.robot))?, &args.load.options()?)?;
+    let robot = args.load.load(&args.robot)?;
     let at = values::joint_values(args.at.as_deref(), &robot)?;
     let velocity = values::joint_values(args.velocity.as_deref(), &robot)?;
     let inspection = flexarm::inspect(&robot, at.as_deref(), velocity.as_deref())?;

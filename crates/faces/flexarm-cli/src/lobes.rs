@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 use flexarm::lobes::{CuttingPlace, CuttingTool, LobePoint, Lobes, LobesRequest, lobes, rounded_down};
-use flexarm::{Motion, Robot};
+use flexarm::Motion;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use crate::failure::Failure;
@@ -70,7 +70,7 @@ pub(crate) fn cutting_tool(given: &Path, rpm: &[f64]) -> Result<CuttingTool, Fai
 }
 
 pub(crate) fn run(terminal: &Terminal, args: &LobesArgs) -> Result<ExitCode, Failure> {
-    let robot = Robot::load_with(&shipped::robot(Some(&args.pose.robot))?, &args.pose.load.options()?)?;
+    let robot = args.pose.load.load(&args.pose.robot)?;
     let tool = cutting_tool(&args.tool, &args.rpm)?;
     let at = values::joint_values(args.pose.at.as_deref(), &robot)?;
     let motion = args.along.as_deref().map(shipped::trajectory).transpose()?;

@@ -219,7 +219,7 @@ fn region(args: &MapArgs, robot: &Robot) -> Result<MapRegion, Failure> {
 }
 
 pub(crate) fn run(terminal: &Terminal, args: &MapArgs) -> Result<ExitCode, Failure> {
-    let robot = Robot::load_with(&shipped::robot(Some(&args.robot))?, &args.load.options()?)?;
+    let robot = args.load.load(&args.robot)?;
     let region = region(args, &robot)?;
     let workpiece_m = args.workpiece.as_deref().map(|text| three("--workpiece", text, " (m)")).transpose()?;
     let wrench = args.wrench.as_deref().map_or(Ok([0.0; 6]), |text| values::wrench("--wrench", text))?;

@@ -4,7 +4,6 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
-use flexarm::Robot;
 use flexarm::motions::{ColumnMap, MotionCurve, MotionOptions, MotionPeak, MotionReport};
 
 use crate::args::RobotArgs;
@@ -74,7 +73,7 @@ pub(crate) fn run(terminal: &Terminal, args: &MotionArgs) -> Result<ExitCode, Fa
         outputs.push(svg.clone());
     }
     let robot = match &args.robot {
-        Some(given) => Some(Robot::load_with(&shipped::robot(Some(given))?, &args.load.options()?)?),
+        Some(given) => Some(args.load.load(given)?),
         None => None,
     };
     let motion = shipped::trajectory(&args.motion)?;

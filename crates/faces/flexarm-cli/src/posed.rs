@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use flexarm::poses::{
     ModeMovie, ModeTable, Quantity, Response, ResponseOutputs, ResponseRequest, Spacing, Statics, StaticsOutputs,
 };
-use flexarm::{Outputs, Robot};
+use flexarm::Outputs;
 
 use crate::failure::Failure;
 use crate::layout::{lines, table};
@@ -14,28 +14,25 @@ use crate::posed_args::{ModesArgs, PoseArgs, QuantityName, ResponseArgs, Spacing
 use crate::print::caveats;
 use crate::shipped::OutputFolder;
 use crate::terminal::{Terminal, answer, to_json};
-use crate::{shipped, values};
+use crate::values;
 
 /// Names of the directions at the TCP.
 const AXES: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
 /// Peaks of a response in the columns of a terminal.
 const SHOWN_PEAKS: usize = 3;
 
-fn load(pose: &PoseArgs) -> Result<Robot, Failure> {
-    Ok(Robot::load_with(&shipped::robot(Some(&pose.robot))?, &pose.load.options()?)?)
-}
-
 pub(crate) fn statics(terminal: &Terminal, args: &StaticsArgs) -> Result<ExitCode, Failure> {
     let wrench = args.wrench.as_deref().map_or(Ok([0.0; 6]), |text| values::wrench("--wrench", text))?;
-    let (robot, modelling) = (load(&args.pose)?, args.pose.modelling.modelling());
+    let robot = args.pose.load.load(&args.pose.robot)?;
     let at = values::joint_values(args.pose.at.as_deref(), &robot)?;
     let at = at.as_deref();
+    let arm = robot.model(&args.pose.modelling.modelling())?;
     let found = match &args.output {
         Some(folder) => {
             let outputs = StaticsOutputs { folder: folder.clone(), overwrite: args.force };
-            flexarm::poses::record_statics(&robot, &modelling, at, wrench, &outputs)?
+            arm.record_statics(at, wrench, &outputs)?
         }
-        None => flexarm::poses::statics(&robot, &modelling, at, wrench)?,
+        None => arm.statics(at, wrench)?,
     };
     caveats(terminal, &found.caveats);
     answer(terminal, || to_json(&found), || statics_text(&found));
@@ -46,18 +43,18 @@ pub(crate) fn modes(terminal: &Terminal, args: &ModesArgs) -> Result<ExitCode, F
     if args.count == 0 {
         return Err(Failure::Usage("--count must be at least 1".into()));
     }
-    let robot = load(&args.pose)?;
+    let robot = args.pose.load.load(&args.pose.robot)?;
     let at = values::joint_values(args.pose.at.as_deref(), &robot)?;
     let speeds = values::joint_speeds(args.speeds.as_deref(), &robot)?;
     let (at, speeds) = (at.as_deref(), speeds.as_deref());
-    let modelling = args.pose.modelling.modelling();
+    let arm = robot.model(&args.pose.modelling.modelling())?;
     let found = match &args.output {
         Some(folder) => {
             let outputs = Outputs { overwrite: args.force, ..Outputs::everything(folder) };
             let movie = ModeMovie { seconds: args.seconds, tool_motion_m: args.tool_motion };
-            flexarm::poses::record_modes(&robot, &modelling, at, speeds, args.count, &movie, &outputs)?
+            arm.record_modes(at, speeds, args.count, &movie, &outputs)?
         }
-        None => flexarm::poses::modes(&robot, &modelling, at, speeds, args.count)?,
+        None => arm.modes(at, speeds, args.count)?,
     };
     caveats(terminal, &found.caveats);
     answer(terminal, || to_json(&found), || modes_text(&found));
@@ -65,7 +62,7 @@ pub(crate) fn modes(terminal: &Terminal, args: &ModesArgs) -> Result<ExitCode, F
 }
 
 pub(crate) fn response(terminal: &Terminal, args: &ResponseArgs) -> Result<ExitCode, Failure> {
-    let robot = load(&args.pose)?;
+    let robot = args.pose.load.load(&args.pose.robot)?;
     let trimmed = |words: &[String]| words.iter().map(|w| w.trim().to_owned()).collect();
     let request = ResponseRequest {
         inputs: trimmed(&args.input),
@@ -83,13 +80,12 @@ pub(crate) fn response(terminal: &Terminal, args: &ResponseArgs) -> Result<ExitC
     let stem = format!("{}-response", robot.name);
     let folder = OutputFolder::of(args.folder.as_deref(), &stem, !args.no_files)?;
     let outputs = folder.path().map(|folder| ResponseOutputs { folder, overwrite: args.force });
-    let found = flexarm::poses::response(
-        &robot,
-        &args.pose.modelling.modelling(),
-        values::joint_values(args.pose.at.as_deref(), &robot)?.as_deref(),
-        &request,
-        outputs.as_ref(),
-    )?;
+    let at = values::joint_values(args.pose.at.as_deref(), &robot)?;
+    let arm = robot.model(&args.pose.modelling.modelling())?;
+    let found = match &outputs {
+        Some(outputs) => arm.record_response(at.as_deref(), &request, outputs)?,
+        None => arm.response(at.as_deref(), &request)?,
+    };
     caveats(terminal, &found.caveats);
     answer(terminal, || to_json(&found), || response_text(&found));
     Ok(ExitCode::SUCCESS)

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 use flexarm::sensitivity::{PoseSensitivity, Sensitivity, SensitivityRequest, pose_sensitivity, sensitivity};
-use flexarm::{Motion, Robot, RunOptions, Scenario};
+use flexarm::{Motion, RunOptions, Scenario};
 
 use crate::args::{ModellingArgs, RobotArgs};
 use crate::failure::Failure;
@@ -69,7 +69,7 @@ pub(crate) struct SensitivityArgs {
 }
 
 pub(crate) fn run(terminal: &Terminal, args: &SensitivityArgs) -> Result<ExitCode, Failure> {
-    let robot = Robot::load_with(&shipped::robot(Some(&args.robot))?, &args.load.options()?)?;
+    let robot = args.load.load(&args.robot)?;
     if args.at.is_some() {
         let at = values::joint_values(args.at.as_deref(), &robot)?;
         let modelling = args.modelling.modelling();

@@ -15,7 +15,7 @@ use flexarm::links::reduce::STRESS_FILE;
 use flexarm::robots::{InertiaEstimate, ReadOptions};
 use flexarm::settings::Words;
 use flexarm::steppers::{StepperEntry, StepperOptions};
-use flexarm::{Arm, DriveModel, LinkModel, LoadOptions, Modelling, Robot};
+use flexarm::{Arm, DriveModel, LinkModel, LoadOptions, Modelling, Robot, RobotSource};
 use serde::{Deserialize, Serialize};
 use toml_edit::{DocumentMut, Item};
 use twox_hash::XxHash64;
@@ -285,7 +285,8 @@ fn same_arm(files: &NamedFiles, arm: &Arc<Arm>, settings: &FmuSettings) -> Resul
             written.map_err(|source| FileError::Write { path, source })?;
         }
         let load = LoadOptions { tcp: settings.load.tcp.clone(), ..LoadOptions::default() };
-        let own = Robot::load_with(&folder.join(ROBOT), &load)?.model(&settings.modelling)?;
+        let filed = RobotSource::new(&folder.join(ROBOT), &load).load()?;
+        let own = filed.robot().model(&settings.modelling)?;
         // Without a given pose the arms would be posed differently: the resources have no motion.
         let pose = first_pose(arm, settings);
         let [own, given] = [&own, arm].map(|arm| arm.linearise(Some(&pose), [0.0; 6]));

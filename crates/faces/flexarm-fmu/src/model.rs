@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use flexarm::live::{Command, Equations, Live, LiveOptions, LiveState, Readings, Servos};
-use flexarm::{Arm, LoadOptions, Modelling, Pose, Robot, RunOptions, StepperKind, Wrench};
+use flexarm::{Arm, LoadOptions, Modelling, Pose, Robot, RobotSource, RunOptions, StepperKind, Wrench};
 use nalgebra::UnitQuaternion;
 use toml_edit::DocumentMut;
 
@@ -97,7 +97,8 @@ impl FmuModel {
     /// # Errors
     /// [`FmuError::Robot`] if the robot cannot be loaded or has no equilibrium at the first pose.
     pub fn new(path: &Path, settings: &FmuSettings) -> Result<Self, FmuError> {
-        let robot = Robot::load_with(path, &settings.load)?;
+        let filed = RobotSource::new(path, &settings.load).load()?;
+        let robot = filed.robot();
         let arm = robot.model(&settings.modelling)?;
         let options = options(settings, None);
         let live = arm.live(settings.pose.as_deref(), options.step_s, &options)?;
@@ -108,7 +109,7 @@ impl FmuModel {
         let starts = Starts {
             pose: live.position(),
             step_s: options.step_s,
-            payload: filed_payload(&robot)?.map(|(_, mass)| mass),
+            payload: filed_payload(robot)?.map(|(_, mass)| mass),
             releases: live.can_release() && has_acceleration,
             holding: live.effort(),
             has_acceleration,
@@ -313,8 +314,9 @@ impl FmuModel {
                 *moment = (filed.unwrap_or(0.0) * mass / start).into();
             }
         }
-        let robot = Robot::from_toml(&text.to_string(), &self.path, &self.settings.load)?;
-        Ok(robot.model(&self.settings.modelling)?)
+        let source = RobotSource::new(&self.path, &self.settings.load);
+        let filed = RobotSource { text: Some(&text.to_string()), ..source }.load()?;
+        Ok(filed.robot().model(&self.settings.modelling)?)
     }
 
     /// Returns the value of a parameter; `default` if the plant has none such.

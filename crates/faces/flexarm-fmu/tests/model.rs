@@ -2,10 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::helpers::{of_joints, robot, root, settings, targets, values};
+use crate::helpers::{changed_kr210, of_joints, robot, root, settings, targets, values};
 use flexarm::links::reduce::{ReduceJob, ReduceOptions, ReduceOutputs, reduce};
 use flexarm::live::{Command, LiveOptions, Servos};
-use flexarm::poses::statics;
 use flexarm::{DriveModel, LinkModel, Modelling, Motion, PayloadChange, Robot, RunOptions, Scenario, Wrench};
 use flexarm_fmu::{
     About, Causality, Fmi, FmuError, FmuJob, FmuModel, FmuSettings, Kind, description, export_fmu, open_resources,
@@ -122,8 +121,7 @@ fn a_payload_twice_as_heavy_sags_as_the_robot_file_with_it() {
     assert_ne!(filed, heavier);
     let mut document: toml_edit::DocumentMut = text.parse().unwrap();
     document["payload"]["mass"] = toml_edit::value(2.0 * mass);
-    let edited = Robot::from_toml(&document.to_string(), &robot("kr210"), &Default::default()).unwrap();
-    let live = edited.model(&Modelling::default()).unwrap().live(None, 1e-3, &RunOptions::default()).unwrap();
+    let live = changed_kr210(&document).live(None, 1e-3, &RunOptions::default()).unwrap();
     let tcp = live.tcp_pose().translation.vector;
     assert_eq!(values(&model, &TCP), tcp.as_slice(), "the static sag does not depend on the payload's inertia");
 }
@@ -134,8 +132,7 @@ fn a_payload_that_is_put_down_leaves_the_arm_of_the_robot_file_without_it() {
     let text = std::fs::read_to_string(robot("kr210")).unwrap();
     let mut document: toml_edit::DocumentMut = text.parse().unwrap();
     document.remove("payload").unwrap();
-    let empty = Robot::from_toml(&document.to_string(), &robot("kr210"), &Default::default()).unwrap();
-    let empty = empty.model(&Modelling::default()).unwrap();
+    let empty = changed_kr210(&document);
     let pose = [0.0, -1.0, 1.0, 0.0, 0.0, 0.0];
     let sag = empty.live(Some(&pose), 1e-3, &RunOptions::default()).unwrap().tcp_pose().translation.vector;
     let settings = FmuSettings { pose: Some(pose.to_vec()), ..FmuSettings::default() };
@@ -393,7 +390,7 @@ fn gauged(folder: &Path) -> PathBuf {
     let path = folder.join("robot.toml");
     let text = std::fs::read_to_string(&path).unwrap().replace("default_trajectory", "#");
     std::fs::write(&path, &text).unwrap();
-    let held = statics(&Robot::load(&path).unwrap(), &Modelling::default(), None, [0.0; 6]).unwrap();
+    let held = Robot::load(&path).unwrap().model(&Modelling::default()).unwrap().statics(None, [0.0; 6]).unwrap();
     let worst = held.stress[0].worst[0].position_m;
     let entry = format!("\n[[stress_point]]\nname = \"worst\"\nlink = \"lower_arm\"\nat = {worst:?}\n");
     std::fs::write(&path, text + &entry).unwrap();

@@ -109,10 +109,10 @@ pub(crate) fn load(
     choices.set_item("inertia_from_total_mass", inertia_from_total_mass)?;
     choices.set_item("waive_inertia", waive_inertia)?;
     let options = LoadOptions { tcp, urdf };
-    let robot = py.detach(|| Robot::load_with(&found, &options)).or_raise()?;
+    let arm = py.detach(|| RobotSource::new(&found, &options).load()).or_raise()?;
     let path = std::path::absolute(&found).unwrap_or(found);
     let again = ("load", (path, choices).into_pyobject(py)?.into_any().unbind());
-    Ok(PyRobot { robot: Arc::new(robot), again })
+    Ok(PyRobot { robot: Arc::new(arm.robot().clone()), again })
 }
 
 /// Returns a path, or a shipped robot by its name or by its path in the checkout, `robots/NAME`.

@@ -12,7 +12,7 @@ use std::path::PathBuf;
 
 use flexarm::robots::TCP_FRAME;
 use flexarm::steppers::Start;
-use flexarm::{LinkModel, LoadOptions, Modelling, Motion, Robot, StepperKind};
+use flexarm::{LinkModel, Modelling, Motion, Robot, StepperKind};
 use flexarm_stepping::{AlphaSettings, Observation, Plant, ReferenceSettings, static_equilibrium};
 use nalgebra::Vector3;
 
@@ -50,7 +50,7 @@ fn run(plant: &Plant, kind: StepperKind, duration: f64) -> (Vec<Vector3<f64>>, f
 fn main() {
     let mut arguments = std::env::args().skip(1);
     let robot = PathBuf::from(arguments.next().unwrap_or_else(|| "robots/test/reference_arm".into()));
-    let mut robot = Robot::load_with(&robot, &LoadOptions::default()).unwrap();
+    let mut robot = Robot::load(&robot).unwrap();
     let trajectory = arguments.next().map_or_else(|| robot.default_trajectory.clone().unwrap(), PathBuf::from);
     let motion = Motion::load_for(&trajectory, &robot.rigid_model().unwrap()).unwrap();
     let duration = motion.trajectory.duration();

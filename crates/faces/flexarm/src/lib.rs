@@ -72,12 +72,11 @@ pub use flexarm_stepping::StepperKind;
 /// An arm held at a pose: statics, natural modes, frequency response; thousands of poses.
 ///
 /// ```no_run
-/// use flexarm::poses::{modes, statics};
 /// use flexarm::{Modelling, Robot};
 ///
-/// let (robot, as_filed) = (Robot::load("robots/kr210")?, Modelling::default());
-/// let sag_m = statics(&robot, &as_filed, None, [0.0; 6])?.sag_m;
-/// let hz = modes(&robot, &as_filed, None, None, 3)?.frequencies_hz;
+/// let arm = Robot::load("robots/kr210")?.model(&Modelling::default())?;
+/// let sag_m = arm.statics(None, [0.0; 6])?.sag_m;
+/// let hz = arm.modes(None, None, 3)?.frequencies_hz;
 /// println!("{sag_m:?} m, {hz:?} Hz");
 /// # Ok::<(), flexarm::Error>(())
 /// ```
@@ -85,8 +84,8 @@ pub mod poses {
     pub use flexarm_analysis::{Quantity, Spacing};
     pub use flexarm_run::{
         ElementStatics, ModeFigures, ModeMovie, ModeTable, OperatingPoints, PeakFigures, Recursions, Response,
-        ResponseCurve, ResponseFiles, ResponseOutputs, ResponseRequest, Statics, StaticsFiles, StaticsOutputs, modes,
-        readable_unit, record_modes, record_statics, response, statics,
+        ResponseCurve, ResponseFiles, ResponseOutputs, ResponseRequest, Statics, StaticsFiles, StaticsOutputs,
+        readable_unit,
     };
     pub use flexarm_stepping::{Linear, OperatingPoint, PoseAnswer, PoseOutputs};
 }

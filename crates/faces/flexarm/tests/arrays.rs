@@ -40,12 +40,12 @@ fn an_arm_answers_as_the_robot_that_is_substituted_for_each_question() {
     let modelling = Modelling { links: LinkModel::Modal, drives: DriveModel::Elastic, ..Modelling::default() };
     let arm = robot.model(&modelling).unwrap();
     let wrench = [10.0, 0.0, -500.0, 0.0, 1.0, 0.0];
-    let statics = flexarm::poses::statics(&robot, &modelling, Some(&POSE), wrench).unwrap();
+    let statics = robot.model(&modelling).unwrap().statics(Some(&POSE), wrench).unwrap();
     assert_eq!(json(&arm.statics(Some(&POSE), wrench).unwrap()), json(&statics));
-    let modes = flexarm::poses::modes(&robot, &modelling, Some(&POSE), None, 5).unwrap();
+    let modes = robot.model(&modelling).unwrap().modes(Some(&POSE), None, 5).unwrap();
     assert_eq!(json(&arm.modes(Some(&POSE), None, 5).unwrap()), json(&modes));
     let request = ResponseRequest { points: 20, ..ResponseRequest::default() };
-    let response = flexarm::poses::response(&robot, &modelling, Some(&POSE), &request, None).unwrap();
+    let response = robot.model(&modelling).unwrap().response(Some(&POSE), &request).unwrap();
     assert_eq!(json(&arm.response(Some(&POSE), &request).unwrap()), json(&response));
 
     let linear = arm.linearise(Some(&POSE), wrench).unwrap();

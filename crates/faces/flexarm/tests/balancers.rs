@@ -59,7 +59,7 @@ const AT: [f64; 6] = [0.0, -1.1, 1.2, 0.0, 0.4, 0.0];
 /// them.
 #[test]
 fn a_balancer_at_the_far_end_of_a_link_that_bends_holds_its_far_end() {
-    let robot = Robot::load_with(&project("robots/kr210/links.toml"), &LoadOptions::default()).unwrap();
+    let robot = Robot::load(&project("robots/kr210/links.toml")).unwrap();
     let helped = strut(&robot, [1.1, 0.0, 0.0]);
     let softness = |robot: &Robot, links: LinkModel| {
         let modelling = Modelling { links, drives: DriveModel::Rigid, ..Modelling::default() };
@@ -170,7 +170,7 @@ fn a_pose_without_room_for_the_gas_is_refused() {
     let leaning = [0.0, 0.5, 0.5, 0.0, 0.0, 0.0];
     let error = inspect(&robot, Some(&leaning), None).unwrap_err().to_string();
     assert!(error.contains("has no room left above 1.0000 m"), "{error}");
-    assert!(flexarm::poses::statics(&robot, &Modelling::default(), Some(&leaning), [0.0; 6]).is_err());
+    assert!(robot.model(&Modelling::default()).unwrap().statics(Some(&leaning), [0.0; 6]).is_err());
     let motion = Motion::from_samples(&[0.0, 1.0], &[leaning, leaning].concat(), &robot).unwrap();
     let arm = robot.model(&Modelling::default()).unwrap();
     let error =

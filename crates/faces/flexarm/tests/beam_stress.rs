@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 
-use flexarm::poses::statics;
 use flexarm::{LinkModel, Modelling, Motion, Robot, Run, RunOptions, Scenario};
 
 /// The shipped beam with stress and a pair of gauges on both sides of its root, in a folder of its
@@ -102,7 +101,7 @@ fn gauges_at_the_root_of_a_swinging_beam_read_the_torque_of_its_drive() {
 #[test]
 fn stress_of_a_beam_is_computed_only_if_it_is_asked_for_and_there_is_an_outline() {
     let silent = Beam::new("silent", |text| text.replace("stress = true", ""));
-    assert!(statics(&silent.robot(), &Modelling::default(), None, [0.0; 6]).unwrap().stress.is_empty());
+    assert!(silent.robot().model(&Modelling::default()).unwrap().statics(None, [0.0; 6]).unwrap().stress.is_empty());
     let refused = |name: &str, change: &dyn Fn(&str) -> String, said: &str| {
         let beam = Beam::new(name, change);
         let error = Robot::load(&beam.folder).unwrap_err().to_string();

@@ -8,7 +8,7 @@ use flexarm::compensate::{CompensateRequest, compensate_motion};
 use flexarm::lobes::{CuttingPlace, CuttingTool, LobesRequest, lobes};
 use flexarm::map::{JointRange, MapRegion, MapRequest, map};
 use flexarm::motions::{MotionOptions, motion_report};
-use flexarm::poses::{ResponseRequest, modes, response, statics};
+use flexarm::poses::ResponseRequest;
 use flexarm::robots::check_with_loads;
 use flexarm::sensitivity::{SensitivityRequest, pose_sensitivity, sensitivity};
 use flexarm::{Caveat, LoadOptions, Modelling, Motion, Robot, RunOptions, Scenario, inspect};
@@ -75,7 +75,7 @@ fn every_command_with_a_pose_says_of_a_robot_what_check_says() {
     for code in ["gear-stiffness", "no-damping", "gear-rotation"] {
         assert!(told.contains(code), "{told:?}");
     }
-    let robot = Robot::load_with(&file, &LoadOptions::default()).unwrap();
+    let robot = Robot::load(&file).unwrap();
     let modelling = Modelling::default();
     let says = |what: &str, caveats: &[Caveat], warnings: &[String]| {
         let said = codes(caveats);
@@ -83,12 +83,12 @@ fn every_command_with_a_pose_says_of_a_robot_what_check_says() {
         let sentences: Vec<String> = caveats.iter().filter(|c| c.warns()).map(|c| c.message.clone()).collect();
         assert_eq!(sentences, warnings, "{what}");
     };
-    let found = statics(&robot, &modelling, Some(&POSE), [0.0; 6]).unwrap();
+    let found = robot.model(&modelling).unwrap().statics(Some(&POSE), [0.0; 6]).unwrap();
     says("statics", &found.caveats, &found.warnings);
-    let found = modes(&robot, &modelling, Some(&POSE), None, 4).unwrap();
+    let found = robot.model(&modelling).unwrap().modes(Some(&POSE), None, 4).unwrap();
     says("modes", &found.caveats, &found.warnings);
     let request = ResponseRequest { points: 10, ..ResponseRequest::default() };
-    let found = response(&robot, &modelling, Some(&POSE), &request, None).unwrap();
+    let found = robot.model(&modelling).unwrap().response(Some(&POSE), &request).unwrap();
     says("response", &found.caveats, &found.warnings);
     let found = inspect(&robot, Some(&POSE), None).unwrap();
     says("inspect", &found.caveats, &found.warnings);
@@ -124,7 +124,7 @@ fn every_command_with_a_motion_says_of_it_and_of_its_loads_what_check_says() {
     for code in ["gear-stiffness", "no-damping", "gear-rotation", "angle"] {
         assert!(told.contains(code), "{told:?}");
     }
-    let robot = Robot::load_with(&file, &LoadOptions::default()).unwrap();
+    let robot = Robot::load(&file).unwrap();
     let own = Motion::load(&motion, &robot).unwrap();
     let scenario = Scenario::new(own.clone()).with_loads_file(&loads).unwrap();
     let says = |what: &str, caveats: &[Caveat], warnings: &[String]| {

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use flexarm::{Error, Motion, Robot, inspect};
+use flexarm::{Error, Motion, Robot, RobotSource, inspect};
 
 fn shipped(name: &str) -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../robots").join(name)
@@ -11,9 +11,9 @@ fn shipped(name: &str) -> PathBuf {
 /// Position of the flange at axis values in degrees (m).
 fn flange(robot: &str, degrees: [f64; 6]) -> [f64; 3] {
     let options = flexarm::LoadOptions { tcp: Some("tool0".into()), ..Default::default() };
-    let robot = Robot::load_with(&shipped(robot).join("robot.toml"), &options).unwrap();
+    let arm = RobotSource::new(&shipped(robot), &options).load().unwrap();
     let q = degrees.map(f64::to_radians);
-    inspect(&robot, Some(&q), None).unwrap().tcp.position_m
+    inspect(arm.robot(), Some(&q), None).unwrap().tcp.position_m
 }
 
 /// Truth: the drawings in KUKA's data sheets. At A2 = -90 the link arm is upright, at A3 = 90 the

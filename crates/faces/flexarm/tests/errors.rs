@@ -74,16 +74,16 @@ fn poses_loads_and_responses_name_joint_frame_and_bound() {
     let (robot, _) = beam();
     let modelling = Modelling::default();
     let joints = robot.rigid_model().unwrap().n_actuated();
-    let error = flexarm::poses::modes(&robot, &modelling, Some(&vec![0.0; joints + 1]), None, 3).unwrap_err();
+    let error = robot.model(&modelling).unwrap().modes(Some(&vec![0.0; joints + 1]), None, 3).unwrap_err();
     assert!(
         matches!(&error, Error::Pose(PoseError::Count { found, joints: known }) if *found == joints + 1 && known.len() == joints)
     );
-    let error = flexarm::poses::modes(&robot, &modelling, Some(&vec![f64::NAN; joints]), None, 3).unwrap_err();
+    let error = robot.model(&modelling).unwrap().modes(Some(&vec![f64::NAN; joints]), None, 3).unwrap_err();
     assert!(matches!(error, Error::Pose(PoseError::NotFinite { value, .. }) if value.is_nan()));
     let error = AppliedLoad::sampled("tcp", &[0.0, 0.0], &[Wrench::zeros(), Wrench::zeros()]).err().unwrap();
     assert!(matches!(error, Error::Load(LoadError::Samples { times: 2, wrenches: 2 })));
     let request = ResponseRequest { points: 1, ..ResponseRequest::default() };
-    let error = flexarm::poses::response(&robot, &modelling, None, &request, None).unwrap_err();
+    let error = robot.model(&modelling).unwrap().response(None, &request).unwrap_err();
     assert!(matches!(error, Error::Value(ValueError::Points { found: 1, least: 2, most: 100_000 })), "{error}");
     assert_eq!(error.to_string(), "points must lie between 2 and 100000, found 1");
 }

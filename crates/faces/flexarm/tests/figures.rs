@@ -6,13 +6,13 @@ use std::path::Path;
 use flexarm::recordings::{ConvertOptions, RecordingFormat, convert_until};
 use flexarm::runs::{Variant, compare_study};
 use flexarm::{
-    Error, Keep, LinkModel, LoadOptions, Modelling, Motion, Outputs, Robot, RunOptions, RunRequest, Summary,
+    Error, Keep, LinkModel, Modelling, Motion, Outputs, Robot, RunOptions, RunRequest, Summary,
 };
 use flexarm_log::{Trace, TraceRow};
 
 fn variant(label: &str, robot: &str, trajectory: &str, modelling: &Modelling, options: RunOptions) -> Variant {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../..");
-    let robot = Robot::load_with(&root.join("robots").join(robot), &LoadOptions::default()).unwrap();
+    let robot = Robot::load(&root.join("robots").join(robot)).unwrap();
     let motion = Motion::load_for(&root.join("trajectories").join(trajectory), &robot.rigid_model().unwrap()).unwrap();
     Variant { label: label.into(), arm: robot.model(modelling).unwrap(), scenario: motion.into(), options }
 }

@@ -3,7 +3,6 @@
 
 use std::path::{Path, PathBuf};
 
-use flexarm::poses::{modes, statics};
 use flexarm::runs::Variation;
 use flexarm::steppers::{ReferenceSettings, SpookSettings};
 use flexarm::{DriveModel, Error, LoadOptions, Modelling, Motion, Robot, RunOptions, StepperKind, check, inspect};
@@ -25,7 +24,7 @@ impl Place {
 
     fn load(&self, text: &str) -> Result<Robot, Error> {
         std::fs::write(self.0.join("robot.toml"), format!("{HEAD}{text}")).unwrap();
-        Robot::load_with(&self.0, &LoadOptions::default())
+        Robot::load(&self.0)
     }
 
     fn robot(&self, text: &str) -> Robot {
@@ -78,7 +77,7 @@ fn the_ripple_of_a_gear_is_where_the_robot_file_puts_it() {
     let robot = place.robot(&drive("joint_2", ripple, ""));
     let plain = place.robot(&drive("joint_2", "stiffness = 2.0e6, damping = 1500.0", ""));
     let deflection =
-        |robot: &Robot| statics(robot, &Modelling::default(), Some(&AT), [0.0; 6]).unwrap().elements[0].clone();
+        |robot: &Robot| robot.model(&Modelling::default()).unwrap().statics(Some(&AT), [0.0; 6]).unwrap().elements[0].clone();
     let (with, without) = (deflection(&robot), deflection(&plain));
     let truth = 20.0 * ARCSEC * (200.0 * AT[1]).sin() + 5e-5 * (39.0 * AT[1] + 1.2).sin();
     let found = with.deflection[0] - without.deflection[0];
@@ -162,7 +161,7 @@ fn the_hysteresis_of_a_gear_takes_energy_and_says_what_statics_make_of_it() {
         let refused = arm.simulate(&motion, &RunOptions { stepper, step_s, ..RunOptions::default() }).err().unwrap();
         assert!(refused.to_string().contains("hysteresis"), "{refused}");
     }
-    let told = statics(&robot, &Modelling::default(), Some(&AT), [0.0; 6]).unwrap().caveats;
+    let told = robot.model(&Modelling::default()).unwrap().statics(Some(&AT), [0.0; 6]).unwrap().caveats;
     assert!(told.iter().any(|c| c.code == "hysteresis-linear" && c.message.contains("first loading")), "{told:?}");
 }
 
@@ -180,7 +179,7 @@ fn a_coupled_wrist_has_springs_rotors_and_torques_at_its_motors() {
     let plain = place.robot(&drives);
     let C = Matrix2::new(1.0, 0.0, -0.05, 1.0);
     let wrench = [100.0, 300.0, -200.0, 20.0, -10.0, 30.0];
-    let loaded = statics(&robot, &Modelling::default(), Some(&AT), wrench).unwrap();
+    let loaded = robot.model(&Modelling::default()).unwrap().statics(Some(&AT), wrench).unwrap();
     let load = Vector2::new(loaded.elements[0].load[0], loaded.elements[1].load[0]);
     let truth = C * Matrix2::new(1.0 / 1.5e5, 0.0, 0.0, 1.0 / 0.9e5) * C.transpose() * load;
     for k in 0..2 {
@@ -230,7 +229,7 @@ fn a_coupled_wrist_has_springs_rotors_and_torques_at_its_motors() {
     }
     let one = place.robot(&format!("{drives}{}", WRIST.replace("-0.05", "0.0")));
     let hz =
-        [&one, &plain].map(|robot| modes(robot, &Modelling::default(), Some(&AT), None, 6).unwrap().frequencies_hz);
+        [&one, &plain].map(|robot| robot.model(&Modelling::default()).unwrap().modes(Some(&AT), None, 6).unwrap().frequencies_hz);
     assert_eq!(hz[0], hz[1]);
     let runs = [&one, &plain]
         .map(|robot| robot.model(&Modelling::default()).unwrap().simulate(&motion, &RunOptions::default()).unwrap());

@@ -3,10 +3,9 @@
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
-use flexarm::poses::statics;
 use flexarm::recordings::Trace;
 use flexarm::runs::{Settling, Variant, compare_study, study_rows};
-use flexarm::{DriveModel, Keep, LinkModel, LoadOptions, Modelling, Motion, Robot, RunOptions, RunRequest, Summary};
+use flexarm::{DriveModel, Keep, LinkModel, Modelling, Motion, Robot, RunOptions, RunRequest, Summary};
 use nalgebra::Vector3;
 
 fn root() -> PathBuf {
@@ -14,7 +13,7 @@ fn root() -> PathBuf {
 }
 
 fn load(robot: &str) -> Robot {
-    Robot::load_with(&root().join("robots").join(robot), &LoadOptions::default()).unwrap()
+    Robot::load(&root().join("robots").join(robot)).unwrap()
 }
 
 fn motion(robot: &Robot, trajectory: &str) -> Motion {
@@ -43,7 +42,7 @@ fn the_static_part_of_a_run_is_the_sag_at_the_pose() {
     for row in trace.rows.iter().step_by(97) {
         let (mut q, mut v, mut a) = ([0.0; 6], [0.0; 6], [0.0; 6]);
         motion.trajectory.sample(row.time_s, &mut q, &mut v, &mut a);
-        let sag = statics(&robot, &Modelling::default(), Some(&q), [0.0; 6]).unwrap().sag_m;
+        let sag = robot.model(&Modelling::default()).unwrap().statics(Some(&q), [0.0; 6]).unwrap().sag_m;
         worst = worst.max((Vector3::from(sag) - Vector3::from(row.static_m)).norm());
         largest = largest.max(Vector3::from(sag).norm());
     }
@@ -100,7 +99,7 @@ fn the_first_line_of_the_shipped_arm_names_links_and_gearboxes() {
 #[test]
 fn a_robot_with_nothing_that_bends_says_so_first_and_how_to_give_it_something() {
     let folder = root().join("robots/kr210");
-    let bare = Robot::load_with(&folder.join("kr210.urdf"), &LoadOptions::default()).unwrap();
+    let bare = Robot::load(&folder.join("kr210.urdf")).unwrap();
     let (summary, _) = run(&bare, "point_to_point.toml", &RunOptions::default());
     assert!(summary.bends.is_nothing() && summary.headline.starts_with("nothing is flexible"), "{}", summary.headline);
     for word in ["[[flexible_link]]", "[[drive]]", "gearbox", "robot file"] {

@@ -4,9 +4,8 @@
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 
-use flexarm::poses::statics;
 use flexarm::steppers::{ReferenceSettings, SpookSettings};
-use flexarm::{LinkModel, LoadOptions, Modelling, Motion, Robot, RunOptions, StepperKind, Wrench, inspect};
+use flexarm::{LinkModel, Modelling, Motion, Robot, RunOptions, StepperKind, Wrench, inspect};
 
 /// Lead of the thread (m per turn).
 const LEAD: f64 = 0.05;
@@ -43,7 +42,7 @@ impl Place {
 
     fn robot(&self, text: &str) -> Result<Robot, flexarm::Error> {
         std::fs::write(self.0.join("robot.toml"), text).unwrap();
-        Robot::load_with(&self.0, &LoadOptions::default())
+        Robot::load(&self.0)
     }
 }
 
@@ -108,7 +107,7 @@ fn every_stepper_runs_a_robot_with_a_helical_joint() {
         assert!(worst < bound * largest, "{}: {worst} of {largest}", stepper.name());
     }
     // The weight carried by the quill loads its spring.
-    assert!(statics(&robot, &Modelling::default(), None, [0.0; 6]).unwrap().sag_m.iter().all(|x| x.is_finite()));
+    assert!(robot.model(&Modelling::default()).unwrap().statics(None, [0.0; 6]).unwrap().sag_m.iter().all(|x| x.is_finite()));
 }
 
 #[test]

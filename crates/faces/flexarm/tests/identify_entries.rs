@@ -4,7 +4,6 @@
 use std::path::{Path, PathBuf};
 
 use flexarm::identify::{IdentifyRequest, identify_robot, link_entries};
-use flexarm::poses::statics;
 use flexarm::sensitivity::pose_sensitivity;
 use flexarm::{LinkModel, Modelling, Robot, Wrench};
 use nalgebra::{Matrix6, Rotation3, Translation3, Vector3};
@@ -143,7 +142,7 @@ fn an_entry_in_the_robot_file_does_what_its_derivative_says() {
             changed[(i, j)] += h * (K[(i, i)] * K[(j, j)]).sqrt();
             changed[(j, i)] = changed[(i, j)];
             let robot = robot(&with_stiffness(&changed), &place.0);
-            statics(&robot, &Modelling::default(), Some(&at), [0.0; 6]).unwrap().sag_m[2]
+            robot.model(&Modelling::default()).unwrap().statics(Some(&at), [0.0; 6]).unwrap().sag_m[2]
         };
         let difference = (8.0 * (sag(0.01) - sag(-0.01)) - (sag(0.02) - sag(-0.02))) / 12.0;
         eprintln!("{}: slope {:.9e}, difference {difference:.9e}", p.name, p.tcp_m[2]);
@@ -230,7 +229,7 @@ fn moving_the_tool_of_a_loaded_robot_moves_the_answer_as_another_robot_file_does
     let place = Place::new("with_tcp");
     let at = [0.3, -1.2, 1.5, 0.2, 0.4, -0.5];
     let of =
-        |robot: &Robot| statics(robot, &Modelling::default(), Some(&at), [0.0, 0.0, -500.0, 0.0, 0.0, 0.0]).unwrap();
+        |robot: &Robot| robot.model(&Modelling::default()).unwrap().statics(Some(&at), [0.0, 0.0, -500.0, 0.0, 0.0, 0.0]).unwrap();
     let old = "xyz = [0.0, 0.0, 0.35]";
     let text = kr210();
     assert!(text.contains(old));

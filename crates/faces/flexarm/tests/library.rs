@@ -168,7 +168,7 @@ fn an_observer_sees_every_sample_and_can_stop_the_run() {
     assert!(matches!(stopped, Err(Error::Interrupted { t, .. }) if (t - 0.102).abs() < 1e-9), "{:?}", stopped.err());
 }
 
-/// Truth: [`flexarm::poses::statics`] and [`flexarm::poses::modes`], which compute equilibrium and modes by other
+/// Truth: [`Arm::statics`] and [`Arm::modes`], which compute equilibrium and modes by other
 /// code, with an eigenvalue solver for damped modes. Every shipped robot, link model and drive,
 /// with force and moment at the TCP; the three-mass arm rotates by half a radian under them.
 /// Measured over 104 poses: 6e-13, 1e-10 (tangents by differences), 2e-14, 1e-13.
@@ -203,7 +203,7 @@ fn operating_points_are_what_statics_and_modes_say() {
                 let moment = if k % 2 == 0 { 0.0 } else { 5.0 };
                 let wrench = [10.0, -20.0, 15.0 * k as f64, moment, 0.0, -moment];
                 let F = Wrench::new(Vector3::from_row_slice(&wrench[..3]), Vector3::from_row_slice(&wrench[3..]));
-                let truth = flexarm::poses::statics(&robot, &modelling, Some(&q), wrench).unwrap();
+                let truth = robot.model(&modelling).unwrap().statics(Some(&q), wrench).unwrap();
                 at.solve(&q, &F).unwrap();
                 let moved = at.tcp_pose().translation.vector - at.rigid_tcp_pose().translation.vector;
                 let expected = Vector3::from(truth.tcp_displacement_m);
@@ -221,7 +221,7 @@ fn operating_points_are_what_statics_and_modes_say() {
                 at.solve(&q, &Wrench::zeros()).unwrap();
                 let torque_driven = robot.drives.iter().any(|drive| drive.kind == flexarm::robots::DriveKind::Torque);
                 if !torque_driven {
-                    let modes = flexarm::poses::modes(&robot, &modelling, Some(&q), None, 6).unwrap();
+                    let modes = robot.model(&modelling).unwrap().modes(Some(&q), None, 6).unwrap();
                     for (found, truth) in at.frequencies_hz().iter().zip(&modes.undamped_frequencies_hz) {
                         worst[3] = worst[3].max((found / truth - 1.0).abs());
                     }
@@ -285,7 +285,9 @@ fn a_robot_of_texts_is_the_robot_of_its_files() {
     // Errors in the description are reported with their line, as are errors in the robot file.
     let told = of_texts(&urdf.replace("joint_3", "joint_2")).unwrap_err().to_string();
     assert!(told.contains("nowhere.urdf:") && told.contains("joint_2"), "{told}");
-    let wrong = Robot::from_toml(&text, &folder.join("nowhere.toml"), &options).unwrap_err().to_string();
+    let nowhere = folder.join("nowhere.toml");
+    let wrong = RobotSource { text: Some(&text), ..RobotSource::new(&nowhere, &options) };
+    let wrong = wrong.load().unwrap_err().to_string();
     assert!(wrong.contains("there is no file"), "{wrong}");
 }
 

@@ -2,7 +2,6 @@
 
 use std::path::Path;
 
-use flexarm::poses::modes;
 use flexarm::robots::Description;
 use flexarm::*;
 use flexarm_kinematics::{Data, gravity_forces, mass_matrix};
@@ -168,7 +167,7 @@ fn the_springs_of_the_page_are_those_of_its_beam_in_the_middle_and_at_a_quarter(
                  rotary_z = 0.01, theory = \"euler-bernoulli\", split = {split}, roll = 0.3 }}"
             );
             let robot = load(&text, &boom_urdf("")).unwrap();
-            modes(&robot, &Modelling::default(), Some(&[0.0, 0.0]), None, 6).unwrap().frequencies_hz
+            robot.model(&Modelling::default()).unwrap().modes(Some(&[0.0, 0.0]), None, 6).unwrap().frequencies_hz
         };
         let (own, filed) = (given(&format!("stiffness = {spring}")), given(""));
         for (a, b) in own.iter().zip(&filed) {

@@ -3,7 +3,6 @@
 
 use std::path::{Path, PathBuf};
 
-use flexarm::poses::statics;
 use flexarm::robots::RobotLoop;
 use flexarm::{LinkModel, LoadOptions, Modelling, Motion, Robot, RunOptions, StepperKind, Wrench, check, inspect};
 
@@ -108,7 +107,7 @@ fn compliance_of_the_crank_reaches_the_tool_through_the_rod() {
         let truth = (1.35 * at[2].cos()).powi(2) / 2.8e6;
         assert!((found / truth - 1.0).abs() < 5e-3, "{found:e} {truth:e}");
         let table =
-            statics(&robot, &Modelling { links: LinkModel::Rigid, ..Modelling::default() }, Some(&order(at)), [0.0; 6]);
+            robot.model(&Modelling { links: LinkModel::Rigid, ..Modelling::default() }).unwrap().statics(Some(&order(at)), [0.0; 6]);
         assert!(table.is_ok());
     }
 }
@@ -169,7 +168,7 @@ fn a_motion_over_a_dead_point_or_out_of_reach_is_refused_with_time_and_loop() {
     let far = [0.0, 0.6, -0.6, 0.0];
     let error = inspect(&short, Some(&order(far)), None).unwrap_err().to_string();
     assert!(error.contains("loop \"short\" does not close there"), "{error}");
-    assert!(statics(&short, &Modelling::default(), Some(&order(far)), [0.0; 6]).is_err());
+    assert!(short.model(&Modelling::default()).unwrap().statics(Some(&order(far)), [0.0; 6]).is_err());
 }
 
 #[test]

@@ -7,7 +7,6 @@ use flexarm::lobes::{CuttingPlace, CuttingTool, LobesError, LobesRequest, lobes}
 use flexarm::map::{
     JointRange, KeptPoses, Map, MapError, MapRegion, MapRequest, ToolDirections, WorkspaceGrid, map, read_poses,
 };
-use flexarm::poses::{modes, statics};
 use flexarm::{Error, Fault, Modelling, Motion, Robot};
 
 fn root() -> PathBuf {
@@ -61,9 +60,9 @@ fn a_hundred_poses_of_a_map_are_those_of_statics_and_modes_to_the_last_bit() {
         assert_eq!((found.points, found.reachable, found.table.rows()), (125, 125, 125), "{name}");
         for row in (0..125).step_by(if name == "kr210" { 1 } else { 7 }) {
             let q = joints(&found, row);
-            let weight = statics(&robot, &Modelling::default(), Some(&q), [0.0; 6]).unwrap();
-            let loaded = statics(&robot, &Modelling::default(), Some(&q), WRENCH).unwrap();
-            let hz = modes(&robot, &Modelling::default(), Some(&q), None, 4).unwrap().undamped_frequencies_hz;
+            let weight = robot.model(&Modelling::default()).unwrap().statics(Some(&q), [0.0; 6]).unwrap();
+            let loaded = robot.model(&Modelling::default()).unwrap().statics(Some(&q), WRENCH).unwrap();
+            let hz = robot.model(&Modelling::default()).unwrap().modes(Some(&q), None, 4).unwrap().undamped_frequencies_hz;
             for (c, axis) in ["x", "y", "z"].iter().enumerate() {
                 assert_eq!(value(&found, row, &format!("{axis}_m")), weight.tcp_position_m[c], "{name} {row}");
                 assert_eq!(value(&found, row, &format!("sag_{axis}_m")), weight.tcp_displacement_m[c], "{name} {row}");
@@ -411,7 +410,7 @@ fn a_map_of_listed_poses_has_the_compliance_of_statics_at_each() {
     let entries =
         ["x", "y", "z", "rx", "ry", "rz"].map(|a| ["fx", "fy", "fz", "tx", "ty", "tz"].map(|b| format!("c_{a}_{b}_")));
     for (k, pose) in poses.iter().enumerate() {
-        let truth = statics(&robot, &Modelling::default(), Some(pose), WRENCH).unwrap();
+        let truth = robot.model(&Modelling::default()).unwrap().statics(Some(pose), WRENCH).unwrap();
         for (i, line) in entries.iter().enumerate() {
             for (j, name) in line.iter().enumerate() {
                 let column = found.table.columns.iter().position(|column| column.name.starts_with(name)).unwrap();

@@ -35,7 +35,7 @@ fn shipped(name: &str) -> PathBuf {
 #[test]
 fn too_few_modes_of_a_turning_link_are_a_caveat_and_enough_are_none() {
     let table = |modes: usize| {
-        flexarm::poses::modes(&turning_bar(modes), &Modelling::default(), None, Some(&[15.0]), 8).unwrap()
+        turning_bar(modes).model(&Modelling::default()).unwrap().modes(None, Some(&[15.0]), 8).unwrap()
     };
     let truth = table(40).frequencies_hz;
     let mut said = [0, 0];
@@ -51,7 +51,7 @@ fn too_few_modes_of_a_turning_link_are_a_caveat_and_enough_are_none() {
     }
     assert!(said[0] > 0 && said[1] > 0, "{said:?}");
     // At rest there is nothing to couple the modes.
-    let rest = flexarm::poses::modes(&turning_bar(2), &Modelling::default(), None, None, 8).unwrap();
+    let rest = turning_bar(2).model(&Modelling::default()).unwrap().modes(None, None, 8).unwrap();
     assert!(!rest.caveats.iter().any(|caveat| caveat.code == "few-modes"));
 }
 
@@ -113,7 +113,7 @@ fn an_arm_stands_at_the_start_of_its_own_motion_by_default() {
     let arm = robot.model(&Modelling::default()).unwrap();
     assert_eq!(robot.start_pose().unwrap(), q);
     assert_eq!(arm.statics(None, [0.0; 6]).unwrap().at, q);
-    assert_eq!(flexarm::poses::statics(&robot, &Modelling::default(), None, [0.0; 6]).unwrap().at, q);
+    assert_eq!(robot.model(&Modelling::default()).unwrap().statics(None, [0.0; 6]).unwrap().at, q);
     assert_eq!(arm.modes(None, None, 1).unwrap().at, q);
     assert_eq!(inspect(&robot, None, None).unwrap().q, q);
 }

@@ -4,7 +4,6 @@
 use std::f64::consts::TAU;
 use std::path::PathBuf;
 
-use flexarm::poses::{modes, statics};
 use flexarm::runs::Variation;
 use flexarm::steppers::{ReferenceSettings, SpookSettings};
 use flexarm::{Error, LinkModel, LoadOptions, Modelling, Motion, Robot, RunOptions, StepperKind, Wrench, check};
@@ -46,7 +45,7 @@ impl Place {
 
     fn load(&self, text: &str) -> Result<Robot, Error> {
         std::fs::write(self.0.join("robot.toml"), text).unwrap();
-        Robot::load_with(&self.0, &LoadOptions::default())
+        Robot::load(&self.0)
     }
 
     fn robot(&self, text: &str) -> Robot {
@@ -98,7 +97,7 @@ fn the_tool_of_a_rigid_arm_gives_way_by_the_compliance_of_the_springs_at_its_lev
     let text = format!("{HEAD}{FREE}[mounting]\nstiffness = {}\nxyz = {xyz:?}\nrpy = {rpy:?}\n", written(&coupled()));
     let robot = place.robot(&text);
     let (x, slew) = (0.7, 0.5f64);
-    let found = statics(&robot, &Modelling::default(), Some(&[x, slew]), [0.0; 6]).unwrap();
+    let found = robot.model(&Modelling::default()).unwrap().statics(Some(&[x, slew]), [0.0; 6]).unwrap();
     let tool = Vector3::new(x + 0.9 * slew.cos(), 0.9 * slew.sin(), 0.6);
     let R = turned(Rotation3::from_euler_angles(rpy[0], rpy[1], rpy[2]).matrix());
     let Ad = carried(&(tool - Vector3::from(xyz)));
@@ -107,7 +106,7 @@ fn the_tool_of_a_rigid_arm_gives_way_by_the_compliance_of_the_springs_at_its_lev
     eprintln!("compliance at the lever: {error:.1e}");
     assert!(error < 1e-13, "{error}");
     // Its share has its name, and the springs carry the load on the TCP.
-    let pulled = statics(&robot, &Modelling::default(), Some(&[x, slew]), [0.0, 0.0, -500.0, 0.0, 0.0, 0.0]).unwrap();
+    let pulled = robot.model(&Modelling::default()).unwrap().statics(Some(&[x, slew]), [0.0, 0.0, -500.0, 0.0, 0.0, 0.0]).unwrap();
     assert_eq!(pulled.elements.iter().map(|e| e.name.as_str()).collect::<Vec<_>>(), ["mounting"]);
     let share = pulled.elements[0].tcp_displacement_m;
     assert!((0..3).all(|k| (share[k] - pulled.tcp_displacement_m[k]).abs() < 1e-9), "{share:?}");
@@ -126,7 +125,7 @@ fn the_first_frequencies_are_those_of_a_rigid_body_on_the_springs() {
     let pedestal = "mass = 40.0\ncom = [0.0, 0.1, -0.2]\ninertia = [1.0, 1.1, 1.2, 0.1, 0.0, 0.0]\n";
     let text = format!("{HEAD}{FREE}[mounting]\nstiffness = {STIFF:?}\nxyz = [0.0, 0.0, -0.1]\n{pedestal}");
     let (x, slew) = (-0.6, 0.9f64);
-    let found = modes(&place.robot(&text), &Modelling::default(), Some(&[x, slew]), None, 6).unwrap();
+    let found = place.robot(&text).model(&Modelling::default()).unwrap().modes(Some(&[x, slew]), None, 6).unwrap();
     let Rz = *Rotation3::from_axis_angle(&Vector3::z_axis(), slew).matrix();
     let diagonal = |a: f64, b: f64, c: f64| Matrix3::from_diagonal(&Vector3::new(a, b, c));
     let S = Vector3::new(0.0, 0.0, -0.1);
@@ -188,8 +187,8 @@ fn springs_a_beam_and_a_gearbox_of_six_are_the_same_mounting() {
     };
     let at = [0.4, -0.3];
     let figures = |robot: &Robot| {
-        let statics = statics(robot, &Modelling::default(), Some(&at), [0.1, -0.2, 0.3, 0.01, 0.02, -0.03]).unwrap();
-        let modes = modes(robot, &Modelling::default(), Some(&at), None, 4).unwrap();
+        let statics = robot.model(&Modelling::default()).unwrap().statics(Some(&at), [0.1, -0.2, 0.3, 0.01, 0.02, -0.03]).unwrap();
+        let modes = robot.model(&Modelling::default()).unwrap().modes(Some(&at), None, 4).unwrap();
         (statics.compliance.concat(), statics.tcp_displacement_m, modes.undamped_frequencies_hz[..4].to_vec())
     };
     let springs = figures(&place.robot(&text(&format!("stiffness = {}", written(&K)))));
@@ -218,8 +217,8 @@ fn springs_a_beam_and_a_gearbox_of_six_are_the_same_mounting() {
     ));
     let at = [0.0, at[0], at[1]];
     let wrench = [0.1, -0.2, 0.3, 0.01, 0.02, -0.03];
-    let statics = statics(&robot, &Modelling::default(), Some(&at), wrench).unwrap();
-    let hz = modes(&robot, &Modelling::default(), Some(&at), None, 4).unwrap().undamped_frequencies_hz[..4].to_vec();
+    let statics = robot.model(&Modelling::default()).unwrap().statics(Some(&at), wrench).unwrap();
+    let hz = robot.model(&Modelling::default()).unwrap().modes(Some(&at), None, 4).unwrap().undamped_frequencies_hz[..4].to_vec();
     compare("gearbox of six", (statics.compliance.concat(), statics.tcp_displacement_m, hz), 1e-12);
 }
 
@@ -241,7 +240,7 @@ fn the_sag_on_floor_wall_and_ceiling_follows_the_weight_and_the_place_on_the_rai
             let turn = moment.zip_map(&Vector3::from_row_slice(&STIFF[3..]), |m, k| m / k);
             let tool = Vector3::new(x + 0.9 * slew.cos(), 0.9 * slew.sin(), 0.6);
             let truth = sink + turn.cross(&tool);
-            let found = statics(&robot, &Modelling::default(), Some(&[x, slew]), [0.0; 6]).unwrap();
+            let found = robot.model(&Modelling::default()).unwrap().statics(Some(&[x, slew]), [0.0; 6]).unwrap();
             let error = (Vector3::from(found.sag_m) - truth).norm() / truth.norm();
             assert!(error < 1e-3, "{g:?} {x} {slew}: {error:.1e}");
         }
@@ -322,7 +321,7 @@ fn springs_with_play_deflect_by_their_play_and_their_force_over_stiffness() {
     let (x, slew) = (0.7, 0.5f64);
     let lever = Vector3::new(x + 0.9 * slew.cos(), 0.9 * slew.sin(), 0.6) - Vector3::from(pivot);
     let displacement = |robot: &Robot, q: &[f64], wrench: [f64; 6]| {
-        let found = statics(robot, &Modelling::default(), Some(q), wrench).unwrap();
+        let found = robot.model(&Modelling::default()).unwrap().statics(Some(q), wrench).unwrap();
         assert!(found.sag_m.iter().all(|sag| sag.abs() < 1e-15), "{:?}", found.sag_m);
         Vector3::from(found.tcp_displacement_m)
     };
@@ -453,7 +452,7 @@ fn an_operating_point_on_springs_has_the_compliance_of_statics() {
     for q in [[0.0, 0.0], [1.0, 0.7], [-1.2, -2.0]] {
         at.solve(&q, &Wrench::zeros()).unwrap();
         let C = at.compliance();
-        let truth = statics(&robot, &Modelling::default(), Some(&q), [0.0; 6]).unwrap().compliance;
+        let truth = robot.model(&Modelling::default()).unwrap().statics(Some(&q), [0.0; 6]).unwrap().compliance;
         let error = Matrix6::from_fn(|i, j| C[(i, j)] - truth[i][j]).amax() / C.amax();
         assert!(error < 1e-12, "{error}");
     }

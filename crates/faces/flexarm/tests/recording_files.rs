@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
-use flexarm::{Error, Keep, LoadOptions, Modelling, Motion, Outputs, Robot, RunOptions, RunRequest};
+use flexarm::{Error, Keep, Modelling, Motion, Outputs, Robot, RunOptions, RunRequest};
 use flexarm_log::{RecordingFormat, RunHeader, START_NS, open_recording};
 
 struct Folder(PathBuf);
@@ -18,7 +18,7 @@ impl Drop for Folder {
 fn recorded(name: &str, options: &RunOptions) -> (Folder, RunHeader) {
     let folder = Folder(std::env::temp_dir().join(format!("flexarm-recording-{}-{name}", std::process::id())));
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../..");
-    let robot = Robot::load_with(&root.join("robots/kr210"), &LoadOptions::default()).unwrap();
+    let robot = Robot::load(&root.join("robots/kr210")).unwrap();
     let motion =
         Motion::load_for(&root.join("trajectories/pick_and_place.toml"), &robot.rigid_model().unwrap()).unwrap();
     let outputs = Outputs { recordings: [RecordingFormat::Mcap].into(), ..Outputs::everything(&folder.0) };

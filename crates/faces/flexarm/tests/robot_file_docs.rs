@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use flexarm::robots::DriveKind;
-use flexarm::{LinkModel, LoadOptions, Modelling, Motion, Robot, Scenario};
+use flexarm::{LinkModel, Modelling, Motion, Robot, Scenario};
 
 fn project(path: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../..").join(path)
@@ -47,7 +47,7 @@ impl Place {
 
     fn robot(&self, text: &str) -> Robot {
         std::fs::write(self.0.join("robot.toml"), text).unwrap();
-        Robot::load_with(&self.0, &LoadOptions::default()).unwrap_or_else(|e| panic!("{e}\n{text}"))
+        Robot::load(&self.0).unwrap_or_else(|e| panic!("{e}\n{text}"))
     }
 }
 
@@ -142,7 +142,7 @@ const RAIL: &str = r#"<robot name="rail">
 fn every_example_of_a_motion_file_loads_and_goes_where_it_says() {
     let (page, place) = (read("docs/motions.md"), Place::new("motions"));
     std::fs::write(place.0.join("rail.urdf"), RAIL).unwrap();
-    let robot = Robot::load_with(&place.0.join("rail.urdf"), &LoadOptions::default()).unwrap();
+    let robot = Robot::load(&place.0.join("rail.urdf")).unwrap();
     let model = robot.rigid_model().unwrap();
     for language in ["toml", "csv"] {
         let examples = blocks(&page, language);

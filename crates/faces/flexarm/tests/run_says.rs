@@ -3,12 +3,11 @@
 
 use std::path::{Path, PathBuf};
 
-use flexarm::poses::statics;
 use flexarm::recordings::Trace;
 use flexarm::report::{ReportRun, figure_groups, html};
 use flexarm::steppers::{STEPPERS, StepRule, StepperOptions};
 use flexarm::{
-    Keep, LoadOptions, Modelling, Motion, Robot, RunOptions, RunRequest, Summary, inspect,
+    Keep, Modelling, Motion, Robot, RunOptions, RunRequest, Summary, inspect,
     sensitivity::pose_sensitivity,
 };
 use serde_json::Value;
@@ -39,7 +38,7 @@ fn robots() -> PathBuf {
 }
 
 fn load(name: &str) -> (Robot, Motion) {
-    let robot = Robot::load_with(&robots().join(name), &LoadOptions::default()).unwrap();
+    let robot = Robot::load(&robots().join(name)).unwrap();
     let motion = robot.default_trajectory.clone().unwrap();
     let motion = Motion::load_for(&motion, &robot.rigid_model().unwrap()).unwrap();
     (robot, motion)
@@ -186,7 +185,7 @@ fn a_pose_in_degrees_is_asked_about_wherever_a_pose_is_given() {
         ([0.0, -60.0, 60.0, 0.0, 30.0, 0.0], [0.0, -60.0, 60.0, 0.0, 30.0, 0.0].map(f64::to_radians));
     for (pose, count) in [(degrees, 3), (radians, 0)] {
         assert_eq!(asked(&inspect(&robot, Some(&pose), None).unwrap().warnings), count);
-        assert_eq!(asked(&statics(&robot, &Modelling::default(), Some(&pose), [0.0; 6]).unwrap().warnings), count);
+        assert_eq!(asked(&robot.model(&Modelling::default()).unwrap().statics(Some(&pose), [0.0; 6]).unwrap().warnings), count);
         let found = pose_sensitivity(&robot, Modelling::default(), Some(&pose), &[]).unwrap();
         let told: Vec<String> = found.caveats.into_iter().map(|caveat| caveat.message).collect();
         assert_eq!(asked(&told), count);

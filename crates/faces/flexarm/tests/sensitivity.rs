@@ -306,7 +306,7 @@ fn a_factor_of_one_direction_in_the_robot_file_does_what_its_derivative_says() {
     let robot_with = |factors: &str| kr210.with(key, &format!("{key}stiffness_factors = {factors}\n"));
     let sag = |factor: f64| {
         let robot = robot_with(&format!("[1, 1, 1, 1, {factor:?}, 1]")).unwrap();
-        flexarm::poses::statics(&robot, &Modelling::default(), Some(&at), [0.0; 6]).unwrap().sag_m[2]
+        robot.model(&Modelling::default()).unwrap().statics(Some(&at), [0.0; 6]).unwrap().sag_m[2]
     };
     let robot = robot_with("[1, 1, 1, 1, 1.25, 1]").unwrap();
     let by = ["link.link_2.stiffness_factors[4]".to_owned()];
@@ -339,7 +339,7 @@ fn a_gear_with_ripple_gives_way_at_a_pose_by_what_its_spring_carries() {
     };
     let sag = |x: f64| {
         let robot = with("ripple", 352_800.0 * x.exp());
-        flexarm::poses::statics(&robot, &Modelling::default(), Some(&at), [0.0; 6]).unwrap().sag_m.to_vec()
+        robot.model(&Modelling::default()).unwrap().statics(Some(&at), [0.0; 6]).unwrap().sag_m.to_vec()
     };
     let by = ["drive.joint_2.gearbox.stiffness".to_owned()];
     let found = pose_sensitivity(&with("ripple", 352_800.0), Modelling::default(), Some(&at), &by).unwrap();

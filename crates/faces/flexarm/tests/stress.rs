@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 
 use flexarm::links::reduce::{ReduceJob, ReduceOptions, ReduceOutputs, reduce};
 use flexarm::live::{Command, LiveOptions};
-use flexarm::poses::statics;
 use flexarm::recordings::{DataTable, DataValues};
 use flexarm::steppers::StepperOptions;
 use flexarm::sweep::{Finders, Shard, Sweep, SweepRequest};
@@ -345,7 +344,7 @@ fn statics_give_the_stress_of_a_held_link_with_a_load_on_the_tool() {
     let fields = arm.fields();
     let robot = Robot::load(&arm.folder).unwrap();
     for (name, modelling) in models() {
-        let held = statics(&robot, &modelling, Some(&[1.2]), [0.0; 6]).unwrap();
+        let held = robot.model(&modelling).unwrap().statics(Some(&[1.2]), [0.0; 6]).unwrap();
         let link = &held.stress[0];
         let truth = by_hand(&fields, link.clear_of_ties_m, [1.2, 0.0, 0.0]);
         let off = link.peak_pa / truth - 1.0;
@@ -365,7 +364,7 @@ fn statics_give_the_stress_of_a_held_link_with_a_load_on_the_tool() {
         let stress = stress_by_hand(&fields, [q, 0.0, 0.0]).into_iter().enumerate().map(at_seat).zip(&fields.seats);
         let far = stress.filter(|(_, seat)| seat.from_tie >= link.clear_of_ties_m);
         let truth = far.map(|(stress, _)| von_mises(stress)).fold(0.0, f64::max);
-        let pulled = statics(&robot, &modelling, Some(&[q]), [0.0, 0.0, -1000.0, 0.0, 0.0, 0.0]).unwrap();
+        let pulled = robot.model(&modelling).unwrap().statics(Some(&[q]), [0.0, 0.0, -1000.0, 0.0, 0.0, 0.0]).unwrap();
         let off = pulled.stress[0].peak_pa / truth - 1.0;
         println!("{name}: {:.4} MPa under 1000 N, off by {off:.1e}", 1e-6 * pulled.stress[0].peak_pa);
         assert!(off.abs() < 3e-4, "{name}: {off:e}"); // measured 1.0e-4

@@ -5,7 +5,6 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use flexarm::links::reduce::{ReduceJob, ReduceOptions, ReduceOutputs, reduce};
-use flexarm::poses::{modes, statics};
 use flexarm::recordings::{DataTable, DataValues};
 use flexarm::sweep::{Finders, Shard, Sweep, SweepError, SweepRequest, merge};
 use flexarm::{Error, Modelling, Motion, Robot, RunOptions, Scenario};
@@ -416,8 +415,8 @@ fn a_link_that_is_reduced_again_is_that_of_a_job_written_by_hand() {
         let own = own.replace("\"../../trajectories/beam_swing.toml\"", &at("../../trajectories/beam_swing.toml"));
         std::fs::write(&file, own.replace("\"fe/one_beam.flex\"", &format!("{flex:?}"))).unwrap();
         let robot = Robot::load(&file).unwrap();
-        let found = modes(&robot, &Modelling::default(), None, None, 1).unwrap();
-        let sag_m = statics(&robot, &Modelling::default(), None, [0.0; 6]).unwrap().sag_m;
+        let found = robot.model(&Modelling::default()).unwrap().modes(None, None, 1).unwrap();
+        let sag_m = robot.model(&Modelling::default()).unwrap().statics(None, [0.0; 6]).unwrap().sag_m;
         let wanted = sag_m.iter().map(|x| x * x).sum::<f64>().sqrt();
         assert!((sag[k] / wanted - 1.0).abs() < 1e-9, "{material}: {} of {wanted}", sag[k]);
         let (wanted, off) = (found.undamped_frequencies_hz[0], |x: f64| (f[k] / x - 1.0).abs());

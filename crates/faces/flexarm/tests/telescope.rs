@@ -4,7 +4,6 @@
 use std::path::{Path, PathBuf};
 
 use flexarm::identify::{Identification, IdentifyRequest, PlanRequest, identify_robot, plan_measurements};
-use flexarm::poses::statics;
 use flexarm::{Modelling, Motion, Robot, RunOptions, Scenario};
 
 /// Two tubes that move half of the lift each, and an arm with a mass at its end.
@@ -58,7 +57,7 @@ fn tubes_connection_and_gear_of_a_lift_deflect_as_their_laws_say() {
     let folder = Folder::new("laws");
     let robot = folder.robot(&elastic(LAW, "", 2e5, 3e4)).unwrap();
     let lift = 1.6;
-    let found = statics(&robot, &Modelling::default(), Some(&[lift, 0.0, 0.0]), [0.0; 6]).unwrap();
+    let found = robot.model(&Modelling::default()).unwrap().statics(Some(&[lift, 0.0, 0.0]), [0.0; 6]).unwrap();
     let names: Vec<&str> = found.elements.iter().map(|element| element.name.as_str()).collect();
     assert_eq!(names, ["foot.x", "foot.y", "foot.z", "lower.x", "lower.y", "lift.x", "lift.y", "wrist"]);
     let tilt = |name: &str| found.elements.iter().find(|element| element.name == name).unwrap().deflection[0];
@@ -87,7 +86,7 @@ fn calibrated_frames_and_zeros_move_the_tcp_as_frames_of_the_urdf_do() {
     let text = "[[calibration]]\njoint = \"turn\"\nxyz = [0.002, -0.001, 0.003]\nrpy = [0.004, 0.0, 0.0]\nzero = 0.01\n\
                 [[calibration]]\njoint = \"lift\"\nzero = -0.004\n";
     let at =
-        |robot: &Robot, q: &[f64]| statics(robot, &Modelling::default(), Some(q), [0.0; 6]).unwrap().tcp_position_m;
+        |robot: &Robot, q: &[f64]| robot.model(&Modelling::default()).unwrap().statics(Some(q), [0.0; 6]).unwrap().tcp_position_m;
     let found = at(&folder.robot(text).unwrap(), &[0.7, 0.3, -0.4]);
     let frame = "<origin xyz=\"0 0 0.2\"/>";
     let urdf = URDF.replace(frame, "<origin xyz=\"0.002 -0.001 0.203\" rpy=\"0.004 0 0\"/>");
@@ -131,7 +130,7 @@ fn wrong_guides_connections_and_calibrations_are_refused_with_place_and_remedy()
     }
     // Beyond the limits the tubes come apart, which is an error of the pose.
     let robot = folder.robot(&elastic(LAW, "", 2e5, 3e4)).unwrap();
-    let message = statics(&robot, &Modelling::default(), Some(&[2.6, 0.0, 0.0]), [0.0; 6]).unwrap_err().to_string();
+    let message = robot.model(&Modelling::default()).unwrap().statics(Some(&[2.6, 0.0, 0.0]), [0.0; 6]).unwrap_err().to_string();
     assert!(message.contains("guide \"lift.x\"") && message.contains("overlap by -0.1000 m"), "{message}");
 }
 
@@ -154,7 +153,7 @@ fn measured(folder: &Folder, robot: &Robot, tracker: [f64; 3]) -> Vec<[f64; 3]> 
 }
 
 fn place(robot: &Robot, q: &[f64; 3]) -> [f64; 3] {
-    let found = statics(robot, &Modelling::default(), Some(q), [0.0; 6]).unwrap();
+    let found = robot.model(&Modelling::default()).unwrap().statics(Some(q), [0.0; 6]).unwrap();
     [0, 1, 2].map(|k| found.tcp_position_m[k] + found.sag_m[k])
 }
 

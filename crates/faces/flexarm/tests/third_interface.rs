@@ -3,7 +3,6 @@
 
 use std::path::PathBuf;
 
-use flexarm::poses::statics;
 use flexarm::{LinkModel, LoadOptions, Modelling, Robot, check};
 use flexarm_fem::{BeamLink, BeamTheory, LinkDetails, Material, ModalInterface, ReducedLink, Section, write_flex};
 use flexarm_kinematics::Pose;
@@ -72,7 +71,7 @@ impl Place {
              distal = \"flange\"\nreduced = \"boom.flex\"\n{keys}"
         );
         std::fs::write(self.0.join("robot.toml"), file).unwrap();
-        Robot::load_with(&self.0.join("robot.toml"), &LoadOptions::default())
+        Robot::load(&self.0.join("robot.toml"))
     }
 }
 
@@ -95,7 +94,7 @@ fn a_camera_on_a_third_interface_bends_the_link_as_in_closed_form_whatever_model
             let modelling = Modelling { links, ..Modelling::default() };
             let sag = |camera: f64| {
                 let robot = place.robot(at, camera, keys).unwrap();
-                statics(&robot, &modelling, None, [0.0; 6]).unwrap().sag_m[2]
+                robot.model(&modelling).unwrap().statics(None, [0.0; 6]).unwrap().sag_m[2]
             };
             // Small, so that the sine equals the slope; the tube's own weight is in both.
             let (more, a) = (0.2, at * L);
@@ -105,7 +104,7 @@ fn a_camera_on_a_third_interface_bends_the_link_as_in_closed_form_whatever_model
             assert!((lowered / truth - 1.0).abs() < 1e-5, "{lowered:e} {truth:e}");
         }
         let robot = place.robot(at, 1.0, "").unwrap();
-        let told = statics(&robot, &Modelling::default(), None, [0.0; 6]).unwrap().warnings.join("\n");
+        let told = robot.model(&Modelling::default()).unwrap().statics(None, [0.0; 6]).unwrap().warnings.join("\n");
         for word in ["\"boom\"", "is modal", "\"bolts\"", "\"bracket\""] {
             assert!(told.contains(word), "{word}: {told}");
         }
@@ -120,7 +119,7 @@ fn a_joint_a_little_off_the_third_interface_hangs_on_it_all_the_same() {
     let sag = |at: f64| {
         let robot = place.robot(at, 3.0, "").unwrap();
         assert!(robot.model(&Modelling::default()).unwrap().links_model() == "modal");
-        statics(&robot, &Modelling::default(), None, [0.0; 6]).unwrap().sag_m[2]
+        robot.model(&Modelling::default()).unwrap().statics(None, [0.0; 6]).unwrap().sag_m[2]
     };
     let (there, beside) = (sag(0.7), sag(0.702));
     assert!((beside / there - 1.0).abs() < 0.01, "{there:e} {beside:e}"); // measured 3e-3, the longer lever

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use flexarm::errors::StepError;
 use flexarm::robots::TCP_FRAME;
 use flexarm::steppers::{ConstraintForm, SpookPreset, SpookSettings, Start};
-use flexarm::{LinkModel, LoadOptions, Modelling, Motion, Robot, StepperKind};
+use flexarm::{LinkModel, Modelling, Motion, Robot, StepperKind};
 use flexarm_analysis::tcp_error;
 use flexarm_kinematics::{Data, Frame, Pose, State, Wrench, forward_kinematics};
 use flexarm_stepping::{
@@ -40,7 +40,7 @@ impl Bench {
                         project: give its folder as data";
             return Err(flexarm::Error::File { path, what: what.to_owned() }.into());
         }
-        Ok(Robot::load_with(&path, &LoadOptions::default())?)
+        Ok(Robot::load(&path)?)
     }
 
     /// Path of a shipped file.

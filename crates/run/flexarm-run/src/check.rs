@@ -20,7 +20,7 @@ use crate::poses::posed::Posed;
 use crate::robot::balancer;
 use crate::robot::drive_entry::DriveKind;
 use crate::robot::loops;
-use crate::robot::{LoadOptions, Robot};
+use crate::robot::{LoadOptions, Robot, RobotSource};
 use crate::run::monitor::stress::StressMonitor;
 
 /// A finding.
@@ -111,14 +111,15 @@ pub fn check_with_motion(
 ) -> Vec<Finding> {
     let mut findings = Vec::new();
     let path = robot;
-    let robot = match Robot::load_with(path, options) {
-        Ok(robot) => robot,
+    let arm = match RobotSource::new(path, options).load() {
+        Ok(arm) => arm,
         Err(error) => {
             load_findings(&error, path, &mut findings);
             findings.extend(trajectory.and_then(|path| motion_without_robot(path, motion_options)));
             return findings;
         }
     };
+    let robot = arm.robot();
     findings.extend(robot.urdf.warnings.iter().map(Finding::from));
     let file = robot.path.clone();
     let own = robot.caveats().into_iter().filter(|caveat| !caveat.of_description);
@@ -129,19 +130,19 @@ pub fn check_with_motion(
             findings.push(Finding::error("missing-file", path.display().to_string(), &message));
             None
         }
-        (Some(path), _) => check_motion(&robot, path, motion_options, &mut findings),
+        (Some(path), _) => check_motion(robot, path, motion_options, &mut findings),
         // Errors of the default trajectory are only reported when it is checked itself.
         (None, Some(own)) => robot.rigid_model().ok().and_then(|model| {
-            let motion = crate::Motion::load(own, &robot).ok()?;
+            let motion = crate::Motion::load(own, robot).ok()?;
             let along = of_motion(&motion.name, &motion.trajectory, &model);
             findings.extend(along.into_iter().map(|caveat| Finding::caveat(own, caveat)));
             Some(motion)
         }),
         (None, None) => None,
     };
-    check_flexible(&robot, motion.as_ref(), &mut findings);
+    check_flexible(robot, motion.as_ref(), &mut findings);
     if let Some(path) = loads {
-        check_loads(&robot, motion.as_ref(), path, &mut findings);
+        check_loads(robot, motion.as_ref(), path, &mut findings);
     }
     findings
 }

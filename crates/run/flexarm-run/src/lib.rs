@@ -55,12 +55,12 @@ pub use motions::scenario::{Disturbances, Scenario};
 pub use motions::tool_path::ToolPath;
 pub use motions::{applied_load, loads_file, motion, motion_report, tool_path};
 pub use poses::inspect::{CouplingInfo, FlexibleInfo, Inspection, JointInfo, LinkInfo, MountingInfo, TcpInfo, inspect};
-pub use poses::mode_recording::{ModeMovie, record_modes};
-pub use poses::modes::{ModeFigures, ModeTable, modes};
+pub use poses::mode_recording::ModeMovie;
+pub use poses::modes::{ModeFigures, ModeTable};
 pub use poses::response::{
-    PeakFigures, Response, ResponseCurve, ResponseFiles, ResponseOutputs, ResponseRequest, readable_unit, response,
+    PeakFigures, Response, ResponseCurve, ResponseFiles, ResponseOutputs, ResponseRequest, readable_unit,
 };
-pub use poses::statics::{ElementStatics, Statics, record_statics, statics};
+pub use poses::statics::{ElementStatics, Statics};
 pub use poses::statics_picture::{StaticsFiles, StaticsOutputs};
 pub use poses::{inspect, posed, response};
 pub use report::convert::{ConvertOptions, ConvertSummary, convert, convert_until, parse_recording_format, read_run};

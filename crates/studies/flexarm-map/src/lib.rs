@@ -591,7 +591,8 @@ fn one_place(found: &Map) -> Option<Caveat> {
 
 /// Returns caveats about the worst pose, where the deflections are largest.
 fn validity(robot: &Robot, request: &MapRequest, found: &Map) -> Vec<Caveat> {
-    let Ok(worst) = flexarm_run::statics(robot, &request.modelling, Some(&found.worst.q), request.wrench) else {
+    let arm = robot.model(&request.modelling);
+    let Ok(worst) = arm.and_then(|arm| arm.statics(Some(&found.worst.q), request.wrench)) else {
         return Vec::new();
     };
     let known = &found.caveats;

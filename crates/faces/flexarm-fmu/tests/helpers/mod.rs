@@ -1,8 +1,9 @@
 //! Robots, motions and variables of the tests.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-use flexarm::{DriveModel, LinkModel, Modelling};
+use flexarm::{Arm, DriveModel, LinkModel, LoadOptions, Modelling, RobotSource};
 use flexarm_fmu::{FmuModel, FmuSettings};
 
 pub(crate) fn root() -> PathBuf {
@@ -11,6 +12,12 @@ pub(crate) fn root() -> PathBuf {
 
 pub(crate) fn robot(name: &str) -> PathBuf {
     root().join("robots").join(name).join("robot.toml")
+}
+
+/// Loads the arm of the shipped kr210 with a changed robot file.
+pub(crate) fn changed_kr210(document: &toml_edit::DocumentMut) -> Arc<Arm> {
+    let (path, options) = (robot("kr210"), LoadOptions::default());
+    RobotSource { text: Some(&document.to_string()), ..RobotSource::new(&path, &options) }.load().unwrap()
 }
 
 pub(crate) fn settings(links: LinkModel, drives: DriveModel) -> FmuSettings {

@@ -3,7 +3,6 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use flexarm::poses::statics;
 use flexarm::{LoadOptions, Modelling, Motion, Robot, check};
 use toml::{Table, Value};
 
@@ -56,12 +55,12 @@ impl Place {
         let found = check(&file, None, &options);
         let found = found.iter().filter(|f| f.code != "missing-mesh"); // the copy has no meshes
         let loud = found.filter(|f| f.severity != "note").map(|f| f.code.clone()).collect();
-        let held = Robot::load_with(&file, &options).and_then(|robot| {
+        let held = Robot::load(&file).and_then(|robot| {
             let motion = Motion::load_for(robot.default_trajectory.as_ref().unwrap(), &*robot.rigid_model()?)?;
             let n = motion.trajectory.joints().len();
             let mut q = vec![0.0; n];
             motion.trajectory.sample(0.0, &mut q, &mut vec![0.0; n], &mut vec![0.0; n]);
-            statics(&robot, &Modelling::default(), Some(&q), [0.0; 6])
+            robot.model(&Modelling::default())?.statics(Some(&q), [0.0; 6])
         });
         let loud_too = match held {
             Ok(held) => {

@@ -1,6 +1,6 @@
 //! Simeon's slider crank, a closed loop with a flexible rod, against a geometrically exact beam.
 
-use flexarm::{LoadOptions, Robot};
+use flexarm::{LoadOptions, RobotSource};
 use nalgebra::Vector2;
 
 use super::{FOLDER, Method, columns, in_plane, same_times};
@@ -54,7 +54,7 @@ impl SliderCrank {
         let file = format!("{folder}/slider_crank.toml");
         let robot = bench.robot(&file)?;
         let at_slider = LoadOptions { tcp: Some("slider".into()), ..LoadOptions::default() };
-        let slider_robot = Robot::load_with(&bench.file(&file), &at_slider)?;
+        let slider_robot = RobotSource::new(&bench.file(&file), &at_slider).load()?.robot().clone();
         let motion = bench.motion(&robot, &format!("{folder}/ramp.csv"))?;
         let names = ["t[s]", "exact_slider_x[m]", "exact_mid_v[m]", "linear_slider_x[m]", "linear_mid_v[m]"];
         let truth = columns(&bench.file(&format!("{folder}/truth_ramp.csv")), names)?;

@@ -8,8 +8,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use flexarm::links::reduce::{ReduceJob, ReduceOptions, ReduceOutputs, reduce};
-use flexarm::poses::modes;
-use flexarm::{LoadOptions, Modelling, Robot};
+use flexarm::{Modelling, Robot};
 
 use super::{FOLDER, columns};
 use crate::Error;
@@ -94,7 +93,7 @@ pub(super) fn spins(bench: &Bench, progress: &mut dyn FnMut(f64)) -> Result<Vec<
             Some(robot) => robot,
             none => none.insert(blade(&folder.0, sweep_deg.to_radians())?),
         };
-        let table = modes(robot, &Modelling::default(), None, Some(&[speed_rpm * TAU / 60.0]), COUNT)?;
+        let table = robot.model(&Modelling::default())?.modes(None, Some(&[speed_rpm * TAU / 60.0]), COUNT)?;
         let found_hz = table.undamped_frequencies_hz;
         spins.push(Spin { sweep_deg: *sweep_deg, speed_rpm: *speed_rpm, found_hz, truth_hz: truth_hz.to_vec() });
     }
@@ -167,7 +166,7 @@ flexible_link = [
     { link = "blade", distal = "end", model = "modal", modes = 16, geometric_stiffening = true, reduced = "blade.flex" },
 ]
 "#;
-    Ok(Robot::load_with(&write("robot.toml", robot)?, &LoadOptions::default())?)
+    Ok(Robot::load(&write("robot.toml", robot)?)?)
 }
 
 /// Returns the position (m) of a node: half elements along, across and through the blade.

@@ -7,8 +7,8 @@ use flexarm_log::{Caption, ElasticSample, RunHeader, RunResult, Sample, TwinSamp
 use flexarm_stepping::Linear;
 use nalgebra::DVector;
 
+use crate::arm::Arm;
 use crate::arm::bends::stations;
-use crate::arm::options::Modelling;
 use crate::arm::options::Outputs;
 use crate::error::{Error, PoseError, ValueError};
 use crate::poses::modes::{ModeModel, ModeTable, modes_of, table};
@@ -41,27 +41,26 @@ impl Default for ModeMovie {
     }
 }
 
-/// As [`crate::modes()`], and writes a recording in which the modes oscillate one after another
-/// about the static equilibrium, next to the rigid robot at rest.
-///
-/// # Errors
-/// As [`crate::modes()`]; [`Error::Pose`] for a robot without modes, [`Error::Value`],
-/// [`Error::File`] and [`Error::Log`] for files.
-pub fn record_modes(
-    robot: &Robot,
-    modelling: &Modelling,
-    at: Option<&[f64]>,
-    speeds: Option<&[f64]>,
-    count: usize,
-    movie: &ModeMovie,
-    outputs: &Outputs,
-) -> Result<ModeTable, Error> {
+impl Arm {
+    /// As [`Arm::modes`], and writes a recording in which the modes oscillate one after another
+    /// about the static equilibrium, next to the rigid robot at rest.
+    ///
+    /// # Errors
+    /// As [`Arm::modes`]; [`Error::Pose`] for a robot without modes, [`Error::Value`],
+    /// [`Error::File`] and [`Error::Log`] for files.
+    pub fn record_modes(
+        self: &Arc<Self>,
+        at: Option<&[f64]>,
+        speeds: Option<&[f64]>,
+        count: usize,
+        movie: &ModeMovie,
+        outputs: &Outputs,
+    ) -> Result<ModeTable, Error> {
     let within =
         |x: f64, otherwise: fn(f64) -> ValueError| if x > 0.0 && x < 1000.0 { Ok(()) } else { Err(otherwise(x)) };
     within(movie.seconds, ValueError::Seconds)?;
     movie.tool_motion_m.map_or(Ok(()), |x| within(x, ValueError::ToolMotion))?;
-    let arm = robot.model(modelling)?;
-    let posed = arm.posed(at)?;
+    let posed = self.posed(at)?;
     let model = ModeModel::new(&posed, speeds)?;
     let linear = &model.linear;
     let all = modes_of(linear)?;
@@ -73,8 +72,8 @@ pub fn record_modes(
 
     let mut files = recorders(Some(outputs), false)?;
     (files.names.report, files.names.report_md) = (None, None);
-    let mut header = robot_header(robot, &posed.plant);
-    let (bends, stations) = stations(&arm.bends, &posed.plant.model, &header.links);
+    let mut header = robot_header(self.robot(), &posed.plant);
+    let (bends, stations) = stations(&self.bends, &posed.plant.model, &header.links);
     header.bends = bends;
     header.color_scale_m = crate::run::magnification::round_up(motion);
     header.volume = Some(volume(&posed, motion));
@@ -82,7 +81,7 @@ pub fn record_modes(
     describe_modes(&mut header, shown, swings / SHOWN_HZ);
     files.begin(&header)?;
     let per_mode = (swings / SHOWN_HZ * RATE_HZ).round() as u64;
-    let mut stage = Stage::new(robot, &posed, linear, stations);
+    let mut stage = Stage::new(self.robot(), &posed, linear, stations);
     for (k, mode) in shown.iter().enumerate() {
         let size = magnification(mode, linear, motion);
         let last = if k + 1 == shown.len() { per_mode } else { per_mode - 1 };
@@ -99,6 +98,7 @@ pub fn record_modes(
     let mut figures = table(&posed, &model, &all, count)?;
     figures.files = names;
     Ok(figures)
+}
 }
 
 /// Adds captions and tables of the modes, each shown for the same time, to the header.

@@ -137,31 +137,18 @@ pub(crate) fn linear_error(error: LinearError) -> Error {
     PoseError::Linear(error).into()
 }
 
-/// Computes the lowest `count` modes of the flexible robot at a pose, about its static equilibrium,
-/// with the drives locked.
-///
-/// * `at`: values of all actuated joints (rad or m), [`Robot::start_pose`] by default.
-/// * `speeds`: speeds of all actuated joints (rad/s or m/s). With them the modes are those about
-///   the equilibrium of the turning arm, with stiffening by centrifugal loads and Coriolis forces,
-///   the motors following their motion exactly.
-///
-/// # Errors
-/// [`Error::Pose`] for joint values that do not fit, [`Error::Step`] if there is no equilibrium.
-pub fn modes(
-    robot: &Robot,
-    modelling: &Modelling,
-    at: Option<&[f64]>,
-    speeds: Option<&[f64]>,
-    count: usize,
-) -> Result<ModeTable, Error> {
-    lowest(&robot.model(modelling)?.posed(at)?, speeds, count)
-}
-
 impl Arm {
-    /// As [`modes()`], for an arm that is already modelled.
+    /// Returns the lowest `count` modes at a pose, about the static equilibrium, with the drives
+    /// locked.
+    ///
+    /// * `at`: values of all actuated joints (rad or m), [`Robot::start_pose`] by default.
+    /// * `speeds`: speeds of all actuated joints (rad/s or m/s). With them the modes are those about
+    ///   the equilibrium of the turning arm, with stiffening by centrifugal loads and Coriolis forces,
+    ///   the motors following their motion exactly.
     ///
     /// # Errors
-    /// As [`modes()`].
+    /// [`Error::Pose`] for joint values that do not fit, [`Error::Step`] if there is no
+    /// equilibrium.
     pub fn modes(
         self: &Arc<Self>,
         at: Option<&[f64]>,

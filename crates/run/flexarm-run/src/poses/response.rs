@@ -15,7 +15,6 @@ use nalgebra::{Complex, DMatrix, Vector6};
 use serde::Serialize;
 
 use crate::arm::Arm;
-use crate::arm::options::Modelling;
 use crate::caveat::{self, Caveat, kinds};
 use crate::error::{ChannelError, Error, ValueError};
 use crate::poses::modes::{linear_error, modes_of, tool_map};
@@ -165,31 +164,30 @@ struct Channel {
     joint: bool,
 }
 
-/// Computes the frequency response of the flexible robot at a pose, linearised about its static
-/// equilibrium under gravity, with the other drives locked.
-///
-/// `at`: values of all actuated joints (rad or m); [`Robot::start_pose`] by default.
-///
-/// # Errors
-/// [`Error::Channel`] and [`Error::Value`] for invalid channel names and values, [`Error::Step`] if
-/// there is no equilibrium, [`Error::File`] and [`Error::Write`] for files.
-pub fn response(
-    robot: &Robot,
-    modelling: &Modelling,
-    at: Option<&[f64]>,
-    request: &ResponseRequest,
-    outputs: Option<&ResponseOutputs>,
-) -> Result<Response, Error> {
-    response_at(robot.model(modelling)?.posed(at)?, request, outputs)
-}
-
 impl Arm {
-    /// As [`response()`], for an arm that is already modelled; writes no files.
+    /// Returns the frequency response at a pose, linearised about the static equilibrium under
+    /// gravity, with the other drives locked.
+    ///
+    /// `at`: values of all actuated joints (rad or m); [`Robot::start_pose`] by default.
     ///
     /// # Errors
-    /// As [`response()`].
+    /// [`Error::Channel`] and [`Error::Value`] for invalid channel names and values, [`Error::Step`]
+    /// if there is no equilibrium.
     pub fn response(self: &Arc<Self>, at: Option<&[f64]>, request: &ResponseRequest) -> Result<Response, Error> {
         response_at(self.posed(at)?, request, None)
+    }
+
+    /// As [`Arm::response`], and writes the curves and their picture.
+    ///
+    /// # Errors
+    /// As [`Arm::response`]; [`Error::File`] and [`Error::Write`] for files.
+    pub fn record_response(
+        self: &Arc<Self>,
+        at: Option<&[f64]>,
+        request: &ResponseRequest,
+        outputs: &ResponseOutputs,
+    ) -> Result<Response, Error> {
+        response_at(self.posed(at)?, request, Some(outputs))
     }
 }
 

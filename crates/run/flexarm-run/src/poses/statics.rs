@@ -11,7 +11,6 @@ use nalgebra::{DVector, Matrix6xX};
 use serde::Serialize;
 
 use crate::arm::Arm;
-use crate::arm::options::Modelling;
 use crate::caveat::{self, Caveat, validity};
 use crate::error::Error;
 use crate::poses::posed::{Posed, all_finite};
@@ -84,51 +83,33 @@ pub struct ElementStatics {
     pub energy_j: f64,
 }
 
-/// Computes the equilibrium of the flexible robot at a pose under gravity and a wrench at the TCP,
-/// with the drives locked.
-///
-/// `at`: values of all actuated joints (rad or m), [`Robot::start_pose`] by default; `wrench`: in world axes, not
-/// rotating with the deflection.
-///
-/// # Errors
-/// [`Error::Pose`] for joint values that do not fit, [`Error::Step`] if there is no equilibrium.
-pub fn statics(robot: &Robot, modelling: &Modelling, at: Option<&[f64]>, wrench: [f64; 6]) -> Result<Statics, Error> {
-    statics_of(robot, modelling, at, wrench, None)
-}
-
-/// As [`statics()`], and writes the result and a picture of the arm with magnified deflections next
-/// to the rigid arm.
-///
-/// # Errors
-/// As [`statics()`]; [`Error::File`] and [`Error::Write`] for files.
-pub fn record_statics(
-    robot: &Robot,
-    modelling: &Modelling,
-    at: Option<&[f64]>,
-    wrench: [f64; 6],
-    outputs: &StaticsOutputs,
-) -> Result<Statics, Error> {
-    statics_of(robot, modelling, at, wrench, Some(outputs))
-}
-
-fn statics_of(
-    robot: &Robot,
-    modelling: &Modelling,
-    at: Option<&[f64]>,
-    wrench: [f64; 6],
-    outputs: Option<&StaticsOutputs>,
-) -> Result<Statics, Error> {
-    let paths = outputs.map(statics_picture::places).transpose()?;
-    statics_at(robot.model(modelling)?.resting(at)?, wrench, paths)
-}
-
 impl Arm {
-    /// As [`statics()`], for an arm that is already modelled.
+    /// Returns the equilibrium at a pose under gravity and a wrench at the TCP, with the drives
+    /// locked.
+    ///
+    /// * `at`: values of all actuated joints (rad or m), [`Robot::start_pose`] by default.
+    /// * `wrench`: force and moment at the TCP in world axes (N, N m), not rotating with the
+    ///   deflection.
     ///
     /// # Errors
-    /// As [`statics()`].
+    /// [`Error::Pose`] for joint values that do not fit, [`Error::Step`] if there is no
+    /// equilibrium.
     pub fn statics(self: &Arc<Self>, at: Option<&[f64]>, wrench: [f64; 6]) -> Result<Statics, Error> {
         statics_at(self.resting(at)?, wrench, None)
+    }
+
+    /// As [`Arm::statics`], and writes the result and a picture of the arm with magnified
+    /// deflections next to the rigid arm.
+    ///
+    /// # Errors
+    /// As [`Arm::statics`]; [`Error::File`] and [`Error::Write`] for files.
+    pub fn record_statics(
+        self: &Arc<Self>,
+        at: Option<&[f64]>,
+        wrench: [f64; 6],
+        outputs: &StaticsOutputs,
+    ) -> Result<Statics, Error> {
+        statics_at(self.resting(at)?, wrench, Some(statics_picture::places(outputs)?))
     }
 }
 

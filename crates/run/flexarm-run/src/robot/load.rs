@@ -119,30 +119,13 @@ impl<'a> RobotSource<'a> {
 }
 
 impl Robot {
-    /// Loads a `robot.toml`, a folder with one, or a bare `.urdf` or `.xacro`.
+    /// Loads a `robot.toml`, a folder with one, or a bare `.urdf` or `.xacro`. With options, or from
+    /// texts, it is the robot of the arm that a [`RobotSource`] loads ([`Arm::robot`]).
     ///
     /// # Errors
     /// As [`RobotSource::load`].
     pub fn load(path: impl AsRef<Path>) -> Result<Self, Error> {
-        Self::load_with(path.as_ref(), &LoadOptions::default())
-    }
-
-    /// As [`Robot::load`], with options.
-    ///
-    /// # Errors
-    /// As [`RobotSource::load`].
-    pub fn load_with(path: &Path, options: &LoadOptions) -> Result<Self, Error> {
-        RobotSource::new(path, options).load().map(|arm| arm.robot().clone())
-    }
-
-    /// Builds a robot from the text of a robot file, which need not exist on disk.
-    ///
-    /// * `path`: nominal path of the file.
-    ///
-    /// # Errors
-    /// As [`RobotSource::load`].
-    pub fn from_toml(text: &str, path: &Path, options: &LoadOptions) -> Result<Self, Error> {
-        RobotSource { text: Some(text), ..RobotSource::new(path, options) }.load().map(|arm| arm.robot().clone())
+        RobotSource::new(path.as_ref(), &LoadOptions::default()).load().map(|arm| arm.robot().clone())
     }
 
     fn from_urdf(path: &Path, options: &LoadOptions) -> Result<Arc<Arm>, Error> {
