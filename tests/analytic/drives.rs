@@ -54,7 +54,8 @@ fn identified_arms_have_the_frequencies_and_the_compliance_of_the_other_tool() {
         let held = robot.model(&Modelling::default()).expect("statics").statics(Some(&q), [0.0; 6]).expect("statics");
         let truth = numbers(&case["gravity"]["sag"]);
         let sag = (0..3).map(|k| (held.sag_m[k] - truth[k]).abs()).fold(0.0, f64::max);
-        let free = weightless.model(&Modelling::default()).expect("statics").statics(Some(&q), [0.0; 6]).expect("statics");
+        let free =
+            weightless.model(&Modelling::default()).expect("statics").statics(Some(&q), [0.0; 6]).expect("statics");
         let C: Vec<Vec<f64>> = case["compliance"].as_array().expect("rows").iter().map(numbers).collect();
         let mut compliance = 0.0f64;
         for i in 0..6 {
@@ -118,8 +119,13 @@ fn arms_with_elastic_gearboxes_move_as_the_other_tool_has_them() {
 #[test]
 fn three_mass_arm_has_its_closed_form_frequencies() {
     let truth = golden("three_mass.json");
-    let held = load("robots/abb_three_mass").model(&Modelling::default()).expect("modes").modes(None, None, 2).expect("modes");
-    let free = load("robots/abb_three_mass/torque.toml").model(&Modelling::default()).expect("modes").modes(None, None, 3).expect("modes");
+    let held =
+        load("robots/abb_three_mass").model(&Modelling::default()).expect("modes").modes(None, None, 2).expect("modes");
+    let free = load("robots/abb_three_mass/torque.toml")
+        .model(&Modelling::default())
+        .expect("modes")
+        .modes(None, None, 3)
+        .expect("modes");
     let held_truth = numbers(&truth["held"]["frequencies_hz"]);
     let free_truth = numbers(&truth["free"]["frequencies_hz"]);
     eprintln!("held {:?}, free {:?}", held.undamped_frequencies_hz, free.undamped_frequencies_hz);

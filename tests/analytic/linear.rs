@@ -64,7 +64,11 @@ fn modes_of_the_industrial_arm_are_those_that_compare_reports() {
     let options = RunOptions { log_rate_hz: 100.0, step_s: 0.01, ..RunOptions::default() };
     let arm = robot.model(&Modelling::default()).expect("a model");
     let reported = arm.simulate(&motion, &options).expect("runs").summary.frequencies_hz;
-    let found = robot.model(&Modelling::default()).expect("an equilibrium").modes(Some(q.as_slice()), None, 100).expect("an equilibrium");
+    let found = robot
+        .model(&Modelling::default())
+        .expect("an equilibrium")
+        .modes(Some(q.as_slice()), None, 100)
+        .expect("an equilibrium");
     assert_eq!((found.total, found.frequencies_hz.len()), (12, reported.len()));
     let mut worst = 0.0f64;
     for (mode, truth) in found.modes.iter().zip(&reported) {
@@ -87,7 +91,12 @@ fn modes_of_the_industrial_arm_are_those_that_compare_reports() {
 fn response_at_rest_is_the_compliance() {
     let robot = load("kr210/links.toml");
     let at: &[f64] = &[0.2, -1.1, 1.2, 0.3, 0.4, 0.5];
-    let C = robot.model(&Modelling::default()).expect("an equilibrium").statics(Some(at), [0.0; 6]).expect("an equilibrium").compliance;
+    let C = robot
+        .model(&Modelling::default())
+        .expect("an equilibrium")
+        .statics(Some(at), [0.0; 6])
+        .expect("an equilibrium")
+        .compliance;
     let words = |words: [&str; 6]| words.map(str::to_owned).to_vec();
     let request = ResponseRequest {
         inputs: words(["force-x", "force-y", "force-z", "torque-x", "torque-y", "torque-z"]),
@@ -95,7 +104,8 @@ fn response_at_rest_is_the_compliance() {
         points: 2,
         ..ResponseRequest::default()
     };
-    let found = robot.model(&Modelling::default()).expect("a response").response(Some(at), &request).expect("a response");
+    let found =
+        robot.model(&Modelling::default()).expect("a response").response(Some(at), &request).expect("a response");
     let mut worst = 0.0f64;
     for (k, curve) in found.curves.iter().enumerate() {
         let (i, j) = (k % 6, k / 6);
@@ -223,7 +233,11 @@ fn a_force_at_a_resonance_shakes_the_tool_as_high_as_the_peak() {
         to_hz: Some(60.0),
         ..ResponseRequest::default()
     };
-    let found = robot.model(&Modelling::default()).expect("a response").response(Some(&POSE[..]), &request).expect("a response");
+    let found = robot
+        .model(&Modelling::default())
+        .expect("a response")
+        .response(Some(&POSE[..]), &request)
+        .expect("a response");
     let own = robot.model(&Modelling::default()).expect("a tree");
     let plant = own.plant(held()).expect("carries its weight");
     let tool = plant.model.frame("__tcp").expect("there").clone();
@@ -271,7 +285,11 @@ fn a_joint_at_a_resonance_shakes_the_tool_as_high_as_the_peak() {
         to_hz: Some(60.0),
         ..ResponseRequest::default()
     };
-    let found = robot.model(&Modelling::default()).expect("a response").response(Some(&POSE[..]), &request).expect("a response");
+    let found = robot
+        .model(&Modelling::default())
+        .expect("a response")
+        .response(Some(&POSE[..]), &request)
+        .expect("a response");
     for (curve, axis) in found.curves.iter().zip([0, 2]) {
         let peak = &curve.peaks[0];
         let omega = TAU * peak.frequency_hz;

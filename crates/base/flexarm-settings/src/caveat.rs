@@ -123,7 +123,7 @@ impl CaveatKind {
 
     /// Settings whose change may resolve the caveat.
     pub fn settings(&self) -> Vec<Setting> {
-        Setting::ALL.into_iter().filter(|setting| self.says.contains(&placeholder(*setting))).collect()
+        Setting::ALL.iter().copied().filter(|setting| self.says.contains(&placeholder(*setting))).collect()
     }
 }
 

@@ -39,268 +39,161 @@ pub use spelling::{closest, known_names};
 pub use toml_message::without_types;
 pub use words::Words;
 
-/// Setting named in a message.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Setting {
+/// Makes the enum, the list of its values and their keys of one table.
+macro_rules! settings {
+    ($($(#[$doc:meta])* $setting:ident = $key:literal,)*) => {
+        /// Setting named in a message.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+        pub enum Setting {
+            $($(#[$doc])* $setting,)*
+        }
+
+        impl Setting {
+            /// All settings.
+            pub const ALL: &[Self] = &[$(Self::$setting),*];
+
+            /// Name in the library: a field, a function or a key of a file.
+            pub fn key(self) -> &'static str {
+                match self {
+                    $(Self::$setting => $key,)*
+                }
+            }
+        }
+    };
+}
+
+settings! {
     // Runs.
     /// Time step of a run (s).
-    Step,
+    Step = "step_s",
     /// Samples per second that a run records.
-    LogRate,
+    LogRate = "log_rate_hz",
     /// Time stepper.
-    Stepper,
+    Stepper = "stepper",
     /// Relative tolerance of the reference stepper.
-    Tolerance,
+    Tolerance = "rtol",
     /// Method of the reference stepper.
-    ReferenceMethod,
+    ReferenceMethod = "method",
     /// Initial state of a run: equilibrium or undeformed.
-    Start,
+    Start = "start",
     /// Model of flexible links.
-    Links,
+    Links = "links",
     /// Factor by which drawn deflections are magnified.
-    Magnification,
+    Magnification = "magnification",
     /// Band around the static error within which the tool counts as settled (m).
-    SettlingBand,
+    SettlingBand = "settling_band_m",
     /// Whether to run although joint limits are exceeded.
-    IgnoreLimits,
+    IgnoreLimits = "ignore_limits",
     /// Time within which corners of a motion are rounded (s).
-    RoundCorners,
+    RoundCorners = "with_rounded_corners",
     /// One run of a study.
-    Variant,
+    Variant = "variants",
 
     // Results.
     /// Folder or file for the results.
-    Output,
+    Output = "output",
     /// Whether to replace existing files.
-    Overwrite,
+    Overwrite = "overwrite",
     /// Format of a recording to read.
-    ReadFormat,
+    ReadFormat = "from",
     /// Format of a recording to write.
-    WrittenFormat,
+    WrittenFormat = "to",
 
     // Motions.
     /// Topic of a bag that holds the motion.
-    Topic,
+    Topic = "topic",
     /// Columns of a table used for time and joints.
-    Columns,
+    Columns = "columns",
     /// Rows per second of a written motion.
-    Rate,
+    Rate = "rate_hz",
 
     // Robots.
     /// Frame whose motion is evaluated.
-    Tcp,
+    Tcp = "tcp",
     /// Folder of a ROS package.
-    Package,
+    Package = "packages",
     /// Value of a xacro argument.
-    Argument,
+    Argument = "arguments",
     /// Density for the estimation of missing inertias.
-    InertiaFromDensity,
+    InertiaFromDensity = "inertia_from_density",
     /// Total mass for the estimation of missing inertias.
-    InertiaFromTotalMass,
+    InertiaFromTotalMass = "inertia_from_total_mass",
     /// Links whose inertia is not checked.
-    WaiveInertia,
+    WaiveInertia = "waive",
 
     // Robot files made from a description.
     /// First link of an arm.
-    Base,
+    Base = "base",
     /// Tool link of an arm.
-    Tool,
+    Tool = "tool",
     /// Joints of an arm.
-    Joints,
+    Joints = "joints",
     /// Mass of the payload (kg).
-    Payload,
+    Payload = "payload_kg",
 
     // Modes and frequency responses.
     /// Duration of the oscillation of each mode in a recording (s).
-    Seconds,
+    Seconds = "seconds",
     /// Amplitude of the tool in a recording of modes (m).
-    ToolMotion,
+    ToolMotion = "tool_motion_m",
     /// Minimum frequency of a response (Hz).
-    LowestFrequency,
+    LowestFrequency = "from_hz",
     /// Maximum frequency of a response (Hz).
-    HighestFrequency,
+    HighestFrequency = "to_hz",
     /// Number of frequencies of a response.
-    Points,
+    Points = "points",
     /// Spacing of the frequencies of a response.
-    Spacing,
+    Spacing = "spacing",
 
     // Maps.
     /// Box of positions (m).
-    Bounds,
+    Bounds = "bounds",
     /// Spacing of positions (m).
-    GridSpacing,
+    GridSpacing = "spacing_m",
     /// Direction of the tool.
-    ToolAxis,
+    ToolAxis = "axis",
     /// Joints covered by a map.
-    MapJoints,
+    MapJoints = "joints_region",
 
     // Links from meshes and matrices.
     /// Units of a mesh or of matrices.
-    Units,
+    Units = "units",
     /// Name of a link.
-    Name,
+    Name = "name",
     /// Nodes of an interface.
-    Interface,
+    Interface = "interface",
     /// Frame of an interface.
-    At,
+    At = "at",
     /// Material of a mesh or of a region of it.
-    Material,
+    Material = "material",
     /// Whether to list the contents of a mesh.
-    List,
+    List = "list_mesh",
     /// Robot to which a link belongs.
-    Urdf,
+    Urdf = "urdf",
     /// Link of that robot.
-    Link,
+    Link = "link",
     /// Joint at the distal end of that link.
-    Joint,
+    Joint = "joint",
     /// Number of modes to keep.
-    Modes,
+    Modes = "modes",
     /// Frequency up to which modes are kept (Hz).
-    ModesUpTo,
+    ModesUpTo = "modes_up_to_hz",
     /// Numbers of parts of the chains to make.
-    Chains,
+    Chains = "chains",
     /// Whether to compute the geometric stiffness.
-    Geometric,
+    Geometric = "geometric",
     /// Rows or nodes of the interfaces in matrices.
-    Map,
+    Map = "map",
     /// File of the mass matrix.
-    MassFile,
+    MassFile = "mass_file",
     /// Expected format of matrices.
-    MatrixFormat,
+    MatrixFormat = "format",
     /// Node numbers to write.
-    Nodes,
+    Nodes = "nodes",
     /// Rigid part at the proximal end.
-    PartA,
+    PartA = "part_a",
     /// Rigid part at the distal end.
-    PartB,
-}
-
-impl Setting {
-    /// All settings.
-    pub const ALL: [Self; 58] = [
-        Self::Step,
-        Self::LogRate,
-        Self::Stepper,
-        Self::Tolerance,
-        Self::ReferenceMethod,
-        Self::Start,
-        Self::Links,
-        Self::Magnification,
-        Self::SettlingBand,
-        Self::IgnoreLimits,
-        Self::RoundCorners,
-        Self::Variant,
-        Self::Output,
-        Self::Overwrite,
-        Self::ReadFormat,
-        Self::WrittenFormat,
-        Self::Topic,
-        Self::Columns,
-        Self::Rate,
-        Self::Tcp,
-        Self::Package,
-        Self::Argument,
-        Self::InertiaFromDensity,
-        Self::InertiaFromTotalMass,
-        Self::WaiveInertia,
-        Self::Base,
-        Self::Tool,
-        Self::Joints,
-        Self::Payload,
-        Self::Seconds,
-        Self::ToolMotion,
-        Self::LowestFrequency,
-        Self::HighestFrequency,
-        Self::Points,
-        Self::Spacing,
-        Self::Bounds,
-        Self::GridSpacing,
-        Self::ToolAxis,
-        Self::MapJoints,
-        Self::Units,
-        Self::Name,
-        Self::Interface,
-        Self::At,
-        Self::Material,
-        Self::List,
-        Self::Urdf,
-        Self::Link,
-        Self::Joint,
-        Self::Modes,
-        Self::ModesUpTo,
-        Self::Chains,
-        Self::Geometric,
-        Self::Map,
-        Self::MassFile,
-        Self::MatrixFormat,
-        Self::Nodes,
-        Self::PartA,
-        Self::PartB,
-    ];
-
-    /// Name in the library: a field, a function or a key of a file.
-    pub fn key(self) -> &'static str {
-        match self {
-            Self::Step => "step_s",
-            Self::LogRate => "log_rate_hz",
-            Self::Stepper => "stepper",
-            Self::Tolerance => "rtol",
-            Self::ReferenceMethod => "method",
-            Self::Start => "start",
-            Self::Links => "links",
-            Self::Magnification => "magnification",
-            Self::SettlingBand => "settling_band_m",
-            Self::IgnoreLimits => "ignore_limits",
-            Self::RoundCorners => "with_rounded_corners",
-            Self::Variant => "variants",
-            Self::Output => "output",
-            Self::Overwrite => "overwrite",
-            Self::ReadFormat => "from",
-            Self::WrittenFormat => "to",
-            Self::Topic => "topic",
-            Self::Columns => "columns",
-            Self::Rate => "rate_hz",
-            Self::Tcp => "tcp",
-            Self::Package => "packages",
-            Self::Argument => "arguments",
-            Self::InertiaFromDensity => "inertia_from_density",
-            Self::InertiaFromTotalMass => "inertia_from_total_mass",
-            Self::WaiveInertia => "waive",
-            Self::Base => "base",
-            Self::Tool => "tool",
-            Self::Joints => "joints",
-            Self::Payload => "payload_kg",
-            Self::Seconds => "seconds",
-            Self::ToolMotion => "tool_motion_m",
-            Self::LowestFrequency => "from_hz",
-            Self::HighestFrequency => "to_hz",
-            Self::Points => "points",
-            Self::Spacing => "spacing",
-            Self::Bounds => "bounds",
-            Self::GridSpacing => "spacing_m",
-            Self::ToolAxis => "axis",
-            Self::MapJoints => "joints_region",
-            Self::Units => "units",
-            Self::Name => "name",
-            Self::Interface => "interface",
-            Self::At => "at",
-            Self::Material => "material",
-            Self::List => "list_mesh",
-            Self::Urdf => "urdf",
-            Self::Link => "link",
-            Self::Joint => "joint",
-            Self::Modes => "modes",
-            Self::ModesUpTo => "modes_up_to_hz",
-            Self::Chains => "chains",
-            Self::Geometric => "geometric",
-            Self::Map => "map",
-            Self::MassFile => "mass_file",
-            Self::MatrixFormat => "format",
-            Self::Nodes => "nodes",
-            Self::PartA => "part_a",
-            Self::PartB => "part_b",
-        }
-    }
+    PartB = "part_b",
 }
 
 impl fmt::Display for Setting {

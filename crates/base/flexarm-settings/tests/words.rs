@@ -28,7 +28,7 @@ fn twelve_sentences_of_one_kind_are_one_with_the_count_and_others_stay() {
 
 #[test]
 fn every_setting_has_a_name_in_the_library_and_is_listed_once() {
-    for (k, setting) in Setting::ALL.into_iter().enumerate() {
+    for (k, setting) in Setting::ALL.iter().copied().enumerate() {
         let key = setting.key();
         assert!(!key.is_empty() && key.chars().all(|c| c.is_ascii_lowercase() || c == '_'), "{setting:?}: {key}");
         assert_eq!(Setting::ALL.iter().position(|other| *other == setting), Some(k), "{setting:?}");

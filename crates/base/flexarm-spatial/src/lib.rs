@@ -23,11 +23,14 @@
 //! assert!((adjoint(&X_AB) * V_B.to_vector() - V_A.to_vector()).norm() < 1e-15);
 //! ```
 //!
-//! Not here: joints, trees, stiffness. Notation: `docs/references.md`.
+//! [`GeometricStiffness`] is what reduction of links and steppers exchange about a flexible body.
+//!
+//! Not here: joints, trees, elastic stiffness. Notation: `docs/references.md`.
 #![allow(non_snake_case, reason = "monogram notation: X_AB, Ad_BA, R_AB; see docs/references.md")]
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test stops at the first failure"))]
 
 mod blocks;
+mod geometric;
 #[cfg(target_arch = "x86_64")]
 pub mod lanes;
 pub mod products;
@@ -36,6 +39,7 @@ mod rotation;
 mod vectors;
 
 pub use blocks::{Matrix12, symmetric_part, turn6, twice};
+pub use geometric::GeometricStiffness;
 pub use real::{Real, sin_cos_all};
 pub use rotation::{AngleKinematics, ElasticAngles, quaternion, rotation_vector};
 pub use vectors::{ArticulatedInertia, Pose, SpatialInertia, Twist, Wrench, adjoint, composed, skew};

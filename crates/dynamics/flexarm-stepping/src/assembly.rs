@@ -52,17 +52,38 @@ impl Plant {
         }
         let mut elements = Vec::new();
         for (spring, group) in springs.into_iter().zip(groups) {
-            let Spring { name, K, damping, curve, geometric } = spring.into();
+            let Spring { name, mut K, damping, mut curve, hysteresis, geometric } = spring.into();
             if K.shape() != (group.size, group.size) {
                 let (rows, size) = (K.nrows(), group.size);
                 let text = format!("the stiffness of {name:?} has {rows} rows, its joint has {size} coordinates");
                 return Err(StepError::Setup(text));
             }
-            let Some(C) = K.clone().cholesky().map(|c| c.inverse()) else {
+            let Some(mut C) = K.clone().cholesky().map(|c| c.inverse()) else {
                 return Err(StepError::Singular { matrix: "stiffness of an elastic joint", t: 0.0 });
             };
-            let (body, coordinate, size, modal) = (group.body, group.coordinate, group.size, group.modal);
-            elements.push(ElasticElement { name, body, coordinate, size, modal, K, C, damping, curve, geometric });
+            if let Some(law) = &hysteresis {
+                if group.size != 1 {
+                    let text = format!("hysteresis of {name:?}: it needs a spring of one coordinate");
+                    return Err(StepError::Setup(text));
+                }
+                let first_loading = law.first_loading();
+                K[(0, 0)] = first_loading.stiffest();
+                C[(0, 0)] = 1.0 / first_loading.stiffest();
+                curve = Some(first_loading.into());
+            }
+            elements.push(ElasticElement {
+                name,
+                body: group.body,
+                coordinate: group.coordinate,
+                size: group.size,
+                modal: group.modal,
+                K,
+                C,
+                damping,
+                curve,
+                hysteresis,
+                geometric,
+            });
         }
         let n = model.n_elastic();
         Ok(Self {
@@ -78,7 +99,6 @@ impl Plant {
             loads: Vec::new(),
             inertia_changes: Vec::new(),
             transmission: Vec::new(),
-            hysteresis: Vec::new(),
             load_friction: Vec::new(),
             coupling: None,
             cross_stiffness: Vec::new(),

@@ -38,7 +38,7 @@ impl EquationsOfMotion {
     /// [`StepError::OpenLoop`] as for a stepper.
     pub fn at_rest(plant: impl Into<Arc<Plant>>) -> Result<Self, StepError> {
         let plant = plant.into();
-        if !plant.hysteresis.is_empty() {
+        if plant.has_hysteresis() {
             return Err(StepError::NoEquations);
         }
         let e = static_equilibrium(&plant, 0.0)?;

@@ -1,15 +1,9 @@
 //! Forces of load-dependent (geometric) stiffness of modal bodies.
 
 use flexarm_kinematics::{Data, JointMotion, Wrench};
-use nalgebra::DMatrix;
+use flexarm_spatial::GeometricStiffness;
 
-use crate::plant::{GeometricStiffness, Plant};
-
-impl GeometricStiffness {
-    fn matrices(&self) -> impl Iterator<Item = &DMatrix<f64>> {
-        self.acceleration.iter().chain(&self.angular).chain(&self.centrifugal).chain(self.interface.iter().flatten())
-    }
-}
+use crate::plant::Plant;
 
 /// Adds the forces of load-dependent stiffness of modal bodies, for the loads of the last
 /// Newton-Euler pass in `data`; `e` and `f` are over the elastic coordinates.

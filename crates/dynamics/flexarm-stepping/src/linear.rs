@@ -477,7 +477,7 @@ impl Forces for UnderLoad<'_> {
     }
 
     fn has_hysteresis(&self) -> bool {
-        !self.statics.plant.hysteresis.is_empty()
+        self.statics.plant.has_hysteresis()
     }
 
     fn time(&self) -> f64 {

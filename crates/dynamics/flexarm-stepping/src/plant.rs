@@ -10,6 +10,7 @@
 use std::sync::Arc;
 
 use flexarm_kinematics::{AxisMotion, Data, JointMotion, Model, SpatialInertia, State, Wrench};
+use flexarm_spatial::GeometricStiffness;
 use nalgebra::{DMatrix, DVector, Matrix6};
 
 use crate::dense::add_product;
@@ -29,31 +30,35 @@ pub struct Spring {
     pub damping: Damping,
     /// Law of the spring if it is nonlinear; only for a single coordinate.
     pub curve: Option<SpringCurve>,
+    /// Hysteresis of a gear, which takes the place of `K` and `curve`; only for a single coordinate.
+    pub hysteresis: Option<Hysteresis>,
     /// Load-dependent stiffness (geometric stiffening); only for modal bodies.
     pub geometric: Option<Arc<GeometricStiffness>>,
 }
 
-impl From<(String, Matrix6<f64>, Damping)> for Spring {
-    fn from((name, K, damping): (String, Matrix6<f64>, Damping)) -> Self {
-        let K = DMatrix::from_column_slice(6, 6, K.as_slice());
-        Self { name, K, damping, curve: None, geometric: None }
+impl Spring {
+    /// Creates a linear spring.
+    pub fn linear(name: impl Into<String>, K: DMatrix<f64>, damping: Damping) -> Self {
+        Self { name: name.into(), K, damping, curve: None, hysteresis: None, geometric: None }
+    }
+
+    /// Returns the spring with its forces multiplied by a factor; damping and geometric stiffness
+    /// stay.
+    #[must_use]
+    pub fn stiffened(self, factor: f64) -> Self {
+        Self {
+            K: self.K * factor,
+            curve: self.curve.map(|curve| curve.scaled(factor)),
+            hysteresis: self.hysteresis.map(|law| law.scaled(factor)),
+            ..self
+        }
     }
 }
 
-/// Geometric stiffness of a modal body: contributions of loads to its stiffness, n×n per unit load.
-///
-/// `K + Σ α_i acceleration_i + Σ ω_i ω_j centrifugal_ij` accounts for the body's own inertia forces
-/// under acceleration and rotation, in body axes. Loads of the attached bodies are in `interface`.
-#[derive(Clone, Debug, PartialEq)]
-pub struct GeometricStiffness {
-    /// Per unit acceleration of the origin, gravity subtracted (s²/m).
-    pub acceleration: [DMatrix<f64>; 3],
-    /// Per unit angular acceleration.
-    pub angular: [DMatrix<f64>; 3],
-    /// Per `ω_x², ω_y², ω_z², ω_x ω_y, ω_x ω_z, ω_y ω_z`.
-    pub centrifugal: [DMatrix<f64>; 6],
-    /// Per unit force and moment at each interface, link axes.
-    pub interface: Vec<[DMatrix<f64>; 6]>,
+impl From<(String, Matrix6<f64>, Damping)> for Spring {
+    fn from((name, K, damping): (String, Matrix6<f64>, Damping)) -> Self {
+        Self::linear(name, DMatrix::from_column_slice(6, 6, K.as_slice()), damping)
+    }
 }
 
 /// A spring assigned to its coordinates: generalised force `-(K e + D ė)`.
@@ -75,8 +80,10 @@ pub struct ElasticElement {
     pub C: DMatrix<f64>,
     /// Damping.
     pub damping: Damping,
-    /// See [`Spring::curve`].
+    /// See [`Spring::curve`]; with hysteresis, the curve of first loading.
     pub curve: Option<SpringCurve>,
+    /// See [`Spring::hysteresis`].
+    pub hysteresis: Option<Hysteresis>,
     /// See [`Spring::geometric`].
     pub geometric: Option<Arc<GeometricStiffness>>,
 }
@@ -176,8 +183,6 @@ pub struct Plant {
     pub inertia_changes: Vec<InertiaChange>,
     /// Transmission errors; see [`Plant::with_transmission_errors`].
     pub transmission: Vec<TransmissionError>,
-    /// Gears with hysteresis; see [`Plant::with_hysteresis`].
-    pub hysteresis: Vec<Hysteresis>,
     /// Friction that grows with the transmitted torque.
     pub load_friction: Vec<LoadFriction>,
     /// Gears that couple several joints; see [`Plant::with_coupling`].

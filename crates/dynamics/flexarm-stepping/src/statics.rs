@@ -61,7 +61,7 @@ impl Forces for UnderWeight<'_> {
     }
 
     fn has_hysteresis(&self) -> bool {
-        !self.plant.hysteresis.is_empty()
+        self.plant.has_hysteresis()
     }
 
     fn time(&self) -> f64 {
@@ -169,9 +169,11 @@ pub(crate) fn with_curves(plant: &Plant, K: &DMatrix<f64>, q: &[f64], e: &DVecto
 /// springs.
 pub(crate) fn for_vibration(plant: &Plant, K: &DMatrix<f64>, q: &[f64], e: &DVector<f64>) -> DMatrix<f64> {
     let mut tangent = with_curves(plant, K, q, e);
-    for law in &plant.hysteresis {
-        let k = plant.offset(&plant.elements[law.element]);
-        tangent[(k, k)] = law.stuck_slope(plant.deflection(law.element, e[k], q));
+    for (number, element) in plant.elements.iter().enumerate() {
+        if let Some(law) = &element.hysteresis {
+            let k = plant.offset(element);
+            tangent[(k, k)] = law.stuck_slope(plant.deflection(number, e[k], q));
+        }
     }
     tangent
 }

@@ -179,7 +179,7 @@ impl Forces for Rotation {
     }
 
     fn has_hysteresis(&self) -> bool {
-        !self.system.plant().hysteresis.is_empty()
+        self.system.plant().has_hysteresis()
     }
 
     fn time(&self) -> f64 {

@@ -148,7 +148,7 @@ fn a_balancer_raises_the_frequency_as_the_closed_form_says() {
     tree.balancers.push(Balancer { name: "spring".into(), span, law });
     let K = DMatrix::from_element(1, 1, soft);
     let damping = Damping::StiffnessProportional(0.0);
-    let spring = Spring { name: "hinge".into(), K, damping, curve: None, geometric: None };
+    let spring = Spring::linear("hinge", K, damping);
     let plant = Plant::new(Arc::new(Model::new(&tree).unwrap()), vec![spring], Arc::new(Held(vec![]))).unwrap();
     let truth = ((soft + rate * D * k - m * 9.81 * l) / (m * l * l)).sqrt();
     // measured 2e-16

@@ -44,16 +44,11 @@ fn rotor(spring: Option<f64>, armature: f64) -> Mechanism {
 }
 
 /// Returns the rotor, optionally with an undamped spring.
-fn plant(mechanism: &Mechanism, spring: Option<f64>, motion: Arc<dyn PrescribedMotion>) -> Plant {
+fn plant(mechanism: &Mechanism, stiffness: Option<f64>, motion: Arc<dyn PrescribedMotion>) -> Plant {
     let model = Arc::new(Model::new(mechanism).expect("a tree"));
     let damping = Damping::StiffnessProportional(0.0);
-    let springs: Vec<Spring> = spring
-        .iter()
-        .map(|k| {
-            let (name, K) = ("gear".to_owned(), DMatrix::from_element(1, 1, *k));
-            Spring { name, K, damping, curve: None, geometric: None }
-        })
-        .collect();
+    let spring = |k: &f64| Spring::linear("gear", DMatrix::from_element(1, 1, *k), damping);
+    let springs: Vec<Spring> = stiffness.iter().map(spring).collect();
     Plant::new(model, springs, motion).expect("valid")
 }
 
@@ -272,9 +267,8 @@ const GEAR: f64 = 900.0;
 fn loaded(curve: Option<TorqueCurve>, moment: f64) -> Plant {
     let model = Arc::new(Model::new(&rotor(Some(GEAR), 0.0)).expect("a tree"));
     let body = model.frame("body").expect("there").body;
-    let (name, damping) = ("gear".to_owned(), Damping::StiffnessProportional(0.0));
-    let curve = curve.map(SpringCurve::from);
-    let spring = Spring { name, K: DMatrix::from_element(1, 1, GEAR), damping, curve, geometric: None };
+    let linear = Spring::linear("gear", DMatrix::from_element(1, 1, GEAR), Damping::StiffnessProportional(0.0));
+    let spring = Spring { curve: curve.map(SpringCurve::from), ..linear };
     let plant = Plant::new(model, vec![spring], Arc::new(Held(vec![0.3]))).expect("valid");
     plant.with_loads(vec![(body, Wrench::new(Vector3::zeros(), Vector3::z() * moment))]).expect("valid")
 }

@@ -15,13 +15,7 @@ fn oscillator([m, k, d]: [f64; 3]) -> Plant {
     tree.links.push(Link { name: "mass".into(), inertia: Some(inertia) });
     let slide = JointKind::ElasticPrismatic(Vector3::z_axis());
     tree.joints.push(Joint::new("spring", slide, "ground", "mass", Pose::identity()));
-    let spring = Spring {
-        name: "spring".into(),
-        K: DMatrix::from_element(1, 1, k),
-        damping: Damping::Dampers([d; 6]),
-        curve: None,
-        geometric: None,
-    };
+    let spring = Spring::linear("spring", DMatrix::from_element(1, 1, k), Damping::Dampers([d; 6]));
     Plant::new(Arc::new(Model::new(&tree).unwrap()), vec![spring], Arc::new(Held(vec![]))).unwrap()
 }
 

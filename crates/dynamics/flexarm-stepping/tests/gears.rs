@@ -46,12 +46,16 @@ fn chain(count: usize, armature: f64) -> Mechanism {
 
 fn spring(k: f64, damper: f64) -> Spring {
     let damping = Damping::Dampers([damper, 0.0, 0.0, 0.0, 0.0, 0.0]);
-    Spring { name: "gear".into(), K: DMatrix::from_element(1, 1, k), damping, curve: None, geometric: None }
+    Spring::linear("gear", DMatrix::from_element(1, 1, k), damping)
 }
 
 fn plant(tree: &Mechanism, damper: f64, motion: Arc<dyn PrescribedMotion>) -> Plant {
+    plant_of(tree, &spring(K, damper), motion)
+}
+
+fn plant_of(tree: &Mechanism, spring: &Spring, motion: Arc<dyn PrescribedMotion>) -> Plant {
     let model = Arc::new(Model::new(tree).expect("a tree"));
-    let springs: Vec<Spring> = (0..model.n_elastic()).map(|_| spring(K, damper)).collect();
+    let springs = vec![spring.clone(); model.n_elastic()];
     Plant::new(model, springs, motion).expect("valid")
 }
 
@@ -211,12 +215,17 @@ fn ripple_takes_no_energy_from_a_motor_that_coasts() {
 // --- Hysteresis
 
 fn law() -> Hysteresis {
-    Hysteresis { element: 0, elastic: TorqueCurve::straight(K), sliders: Hysteresis::even_sliders(40.0, 4e-4, 6) }
+    Hysteresis { elastic: TorqueCurve::straight(K), sliders: Hysteresis::even_sliders(40.0, 4e-4, 6) }
+}
+
+/// Returns the body behind a gear with hysteresis.
+fn with_hysteresis(damper: f64, motion: Arc<dyn PrescribedMotion>) -> Plant {
+    plant_of(&chain(1, 0.0), &Spring { hysteresis: Some(law()), ..spring(K, damper) }, motion)
 }
 
 /// Returns the body under an oscillating torque, its motor held.
 fn swinging(amplitude: f64, hz: f64) -> Plant {
-    let plant = plant(&chain(1, 0.0), 20.0, Arc::new(Held(vec![0.0]))).with_hysteresis(vec![law()]).unwrap();
+    let plant = with_hysteresis(20.0, Arc::new(Held(vec![0.0])));
     let body = plant.model.frame("body_0").unwrap().body;
     let torque = move |t: f64| Wrench::new(Vector3::zeros(), vector![0.0, 0.0, amplitude * (TAU * hz * t).sin()]);
     let wrench = TimedWrench::new(torque).with_period(1.0 / hz);
@@ -262,7 +271,7 @@ fn steppers_with_hysteresis_come_to_one_solution_as_the_step_falls() {
         let w = TAU * 20.0;
         [8e-3 * (1.0 - (w * t).cos()), 8e-3 * w * (w * t).sin(), 8e-3 * w * w * (w * t).cos()]
     });
-    let plant = plant(&chain(1, 0.0), 5.0, start).with_hysteresis(vec![law()]).unwrap();
+    let plant = with_hysteresis(5.0, start);
     let truth = shaken(&plant, StepperKind::Rk4, 4e-6);
     let peak = truth.iter().fold(0.0f64, |m, x| m.max(x.abs()));
     assert!(peak > 5e-4, "{peak}");
@@ -282,7 +291,7 @@ fn steppers_with_hysteresis_come_to_one_solution_as_the_step_falls() {
 #[test]
 fn modes_have_the_stuck_stiffness_and_statics_the_first_loading() {
     let (friction, reach) = (40.0, 4e-4);
-    let plant = plant(&chain(1, 0.0), 0.0, Arc::new(Held(vec![0.0]))).with_hysteresis(vec![law()]).unwrap();
+    let plant = with_hysteresis(0.0, Arc::new(Held(vec![0.0])));
     let body = plant.model.frame("body_0").unwrap().clone();
     let stuck = K + 6.0 * (2.0 * friction / (reach * 6.0)) * (5.5 / 6.0);
     for x in [0.0, 0.5, 1.0, 2.0] {

@@ -29,13 +29,11 @@ fn column() -> (Arc<Model>, Vec<GearSpring>) {
 fn plant(play: Option<Play>, dampers: f64, motion: Arc<dyn PrescribedMotion>) -> Plant {
     let (model, springs) = column();
     let guide = Guide { coordinate: 0, overlap: [OUTER_END, -1.0], compliance: COMPLIANCE, play };
-    let spring = |spring: GearSpring| Spring {
-        name: spring.name,
-        K: DMatrix::from_element(1, 1, 1.0 / guide.compliance(OUTER_END)),
-        damping: Damping::Dampers([dampers, 0.0, 0.0, 0.0, 0.0, 0.0]),
-        curve: Some(SpringCurve::Guide(guide)),
-        geometric: None,
-    };
+    let K = DMatrix::from_element(1, 1, 1.0 / guide.compliance(OUTER_END));
+    let damping = Damping::Dampers([dampers, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    let curve = Some(SpringCurve::Guide(guide));
+    let spring =
+        |spring: GearSpring| Spring { curve: curve.clone(), ..Spring::linear(spring.name, K.clone(), damping) };
     Plant::new(model, springs.into_iter().map(spring).collect(), motion).expect("stands")
 }
 

@@ -44,7 +44,7 @@ fn spindle(spring: bool, motion: Arc<dyn PrescribedMotion>) -> Plant {
     tree.links.push(Link { name: "body".into(), inertia: Some(inertia) });
     let damping = Damping::StiffnessProportional(0.0);
     let K = DMatrix::from_element(1, 1, STIFFNESS);
-    let springs = Spring { name: "spring".into(), K, damping, curve: None, geometric: None };
+    let springs = Spring::linear("spring", K, damping);
     let springs = if spring { vec![springs] } else { vec![] };
     Plant::new(Arc::new(Model::new(&tree).unwrap()), springs, motion).unwrap()
 }

@@ -13,13 +13,7 @@ const POSE: [f64; 3] = [0.3, 0.35, 0.2];
 
 fn plant(motion: Arc<dyn PrescribedMotion>, beta: f64) -> Plant {
     let made = palletising_arm(true);
-    let spring = |(name, K): (String, _)| Spring {
-        name,
-        K,
-        damping: Damping::StiffnessProportional(beta),
-        curve: None,
-        geometric: None,
-    };
+    let spring = |(name, K): (String, _)| Spring::linear(name, K, Damping::StiffnessProportional(beta));
     let springs: Vec<Spring> = made.springs.into_iter().map(spring).collect();
     Plant::new(Arc::new(Model::new(&made.mechanism).unwrap()), springs, motion).unwrap()
 }

@@ -24,19 +24,11 @@ fn reference(rtol: f64) -> StepperKind {
 }
 
 fn spring(name: &str, K: DMatrix<f64>, damping: Damping) -> Spring {
-    Spring { name: name.into(), K, damping, curve: None, geometric: None }
+    Spring::linear(name, K, damping)
 }
 
 pub(crate) fn modal_spring(modal: &ModalLink, damping: Damping) -> Spring {
-    let geometric = modal.geometric.as_ref().map(|g| {
-        Arc::new(GeometricStiffness {
-            acceleration: g.acceleration.clone(),
-            angular: g.angular.clone(),
-            centrifugal: g.centrifugal.clone(),
-            interface: g.interface.clone(),
-        })
-    });
-    Spring { geometric, ..spring(&modal.name, modal.K.clone(), damping) }
+    Spring { geometric: modal.geometric.clone().map(Arc::new), ..spring(&modal.name, modal.K.clone(), damping) }
 }
 
 fn own_inertia(modal: &ModalLink) -> LinkInertia {

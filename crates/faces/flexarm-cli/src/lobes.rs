@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
-use flexarm::lobes::{CuttingPlace, CuttingTool, LobePoint, Lobes, LobesRequest, lobes, rounded_down};
 use flexarm::Motion;
+use flexarm::lobes::{CuttingPlace, CuttingTool, LobePoint, Lobes, LobesRequest, lobes, rounded_down};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use crate::failure::Failure;

@@ -3,10 +3,10 @@
 
 use std::process::ExitCode;
 
+use flexarm::Outputs;
 use flexarm::poses::{
     ModeMovie, ModeTable, Quantity, Response, ResponseOutputs, ResponseRequest, Spacing, Statics, StaticsOutputs,
 };
-use flexarm::Outputs;
 
 use crate::failure::Failure;
 use crate::layout::{lines, table};

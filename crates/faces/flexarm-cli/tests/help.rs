@@ -18,7 +18,7 @@ fn every_setting_that_a_message_names_is_a_flag_of_some_command() {
     let mut program = command();
     program.build();
     let arguments = || program.get_subcommands().flat_map(|command| command.get_arguments());
-    for setting in Setting::ALL {
+    for &setting in Setting::ALL {
         let flag = flag(setting);
         let known = match flag.strip_prefix("--") {
             Some(long) => arguments().any(|a| a.get_long() == Some(long)),

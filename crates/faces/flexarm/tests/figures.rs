@@ -5,9 +5,7 @@ use std::path::Path;
 
 use flexarm::recordings::{ConvertOptions, RecordingFormat, convert_until};
 use flexarm::runs::{Variant, compare_study};
-use flexarm::{
-    Error, Keep, LinkModel, Modelling, Motion, Outputs, Robot, RunOptions, RunRequest, Summary,
-};
+use flexarm::{Error, Keep, LinkModel, Modelling, Motion, Outputs, Robot, RunOptions, RunRequest, Summary};
 use flexarm_log::{Trace, TraceRow};
 
 fn variant(label: &str, robot: &str, trajectory: &str, modelling: &Modelling, options: RunOptions) -> Variant {

@@ -76,8 +76,9 @@ fn the_ripple_of_a_gear_is_where_the_robot_file_puts_it() {
                   { amplitude = 5.0e-5, per_joint_turn = 39, phase = 1.2 }]";
     let robot = place.robot(&drive("joint_2", ripple, ""));
     let plain = place.robot(&drive("joint_2", "stiffness = 2.0e6, damping = 1500.0", ""));
-    let deflection =
-        |robot: &Robot| robot.model(&Modelling::default()).unwrap().statics(Some(&AT), [0.0; 6]).unwrap().elements[0].clone();
+    let deflection = |robot: &Robot| {
+        robot.model(&Modelling::default()).unwrap().statics(Some(&AT), [0.0; 6]).unwrap().elements[0].clone()
+    };
     let (with, without) = (deflection(&robot), deflection(&plain));
     let truth = 20.0 * ARCSEC * (200.0 * AT[1]).sin() + 5e-5 * (39.0 * AT[1] + 1.2).sin();
     let found = with.deflection[0] - without.deflection[0];
@@ -228,8 +229,8 @@ fn a_coupled_wrist_has_springs_rotors_and_torques_at_its_motors() {
         assert!(peaks.iter().all(|p| (p / peaks[3] - 1.0).abs() < 2e-2), "{peaks:?}");
     }
     let one = place.robot(&format!("{drives}{}", WRIST.replace("-0.05", "0.0")));
-    let hz =
-        [&one, &plain].map(|robot| robot.model(&Modelling::default()).unwrap().modes(Some(&AT), None, 6).unwrap().frequencies_hz);
+    let hz = [&one, &plain]
+        .map(|robot| robot.model(&Modelling::default()).unwrap().modes(Some(&AT), None, 6).unwrap().frequencies_hz);
     assert_eq!(hz[0], hz[1]);
     let runs = [&one, &plain]
         .map(|robot| robot.model(&Modelling::default()).unwrap().simulate(&motion, &RunOptions::default()).unwrap());

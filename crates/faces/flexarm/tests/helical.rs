@@ -107,7 +107,16 @@ fn every_stepper_runs_a_robot_with_a_helical_joint() {
         assert!(worst < bound * largest, "{}: {worst} of {largest}", stepper.name());
     }
     // The weight carried by the quill loads its spring.
-    assert!(robot.model(&Modelling::default()).unwrap().statics(None, [0.0; 6]).unwrap().sag_m.iter().all(|x| x.is_finite()));
+    assert!(
+        robot
+            .model(&Modelling::default())
+            .unwrap()
+            .statics(None, [0.0; 6])
+            .unwrap()
+            .sag_m
+            .iter()
+            .all(|x| x.is_finite())
+    );
 }
 
 #[test]

@@ -228,8 +228,9 @@ fn a_tool_that_is_elsewhere_is_found_from_places_and_written_into_the_robot_file
 fn moving_the_tool_of_a_loaded_robot_moves_the_answer_as_another_robot_file_does() {
     let place = Place::new("with_tcp");
     let at = [0.3, -1.2, 1.5, 0.2, 0.4, -0.5];
-    let of =
-        |robot: &Robot| robot.model(&Modelling::default()).unwrap().statics(Some(&at), [0.0, 0.0, -500.0, 0.0, 0.0, 0.0]).unwrap();
+    let of = |robot: &Robot| {
+        robot.model(&Modelling::default()).unwrap().statics(Some(&at), [0.0, 0.0, -500.0, 0.0, 0.0, 0.0]).unwrap()
+    };
     let old = "xyz = [0.0, 0.0, 0.35]";
     let text = kr210();
     assert!(text.contains(old));

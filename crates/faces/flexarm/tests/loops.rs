@@ -106,8 +106,10 @@ fn compliance_of_the_crank_reaches_the_tool_through_the_rod() {
         // The weight on the lever softens or stiffens it by m g r / k, measured 3.5e-3.
         let truth = (1.35 * at[2].cos()).powi(2) / 2.8e6;
         assert!((found / truth - 1.0).abs() < 5e-3, "{found:e} {truth:e}");
-        let table =
-            robot.model(&Modelling { links: LinkModel::Rigid, ..Modelling::default() }).unwrap().statics(Some(&order(at)), [0.0; 6]);
+        let table = robot
+            .model(&Modelling { links: LinkModel::Rigid, ..Modelling::default() })
+            .unwrap()
+            .statics(Some(&order(at)), [0.0; 6]);
         assert!(table.is_ok());
     }
 }

@@ -62,7 +62,8 @@ fn a_hundred_poses_of_a_map_are_those_of_statics_and_modes_to_the_last_bit() {
             let q = joints(&found, row);
             let weight = robot.model(&Modelling::default()).unwrap().statics(Some(&q), [0.0; 6]).unwrap();
             let loaded = robot.model(&Modelling::default()).unwrap().statics(Some(&q), WRENCH).unwrap();
-            let hz = robot.model(&Modelling::default()).unwrap().modes(Some(&q), None, 4).unwrap().undamped_frequencies_hz;
+            let hz =
+                robot.model(&Modelling::default()).unwrap().modes(Some(&q), None, 4).unwrap().undamped_frequencies_hz;
             for (c, axis) in ["x", "y", "z"].iter().enumerate() {
                 assert_eq!(value(&found, row, &format!("{axis}_m")), weight.tcp_position_m[c], "{name} {row}");
                 assert_eq!(value(&found, row, &format!("sag_{axis}_m")), weight.tcp_displacement_m[c], "{name} {row}");

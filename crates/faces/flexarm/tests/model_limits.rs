@@ -34,9 +34,8 @@ fn shipped(name: &str) -> PathBuf {
 /// from 16 modes on.
 #[test]
 fn too_few_modes_of_a_turning_link_are_a_caveat_and_enough_are_none() {
-    let table = |modes: usize| {
-        turning_bar(modes).model(&Modelling::default()).unwrap().modes(None, Some(&[15.0]), 8).unwrap()
-    };
+    let table =
+        |modes: usize| turning_bar(modes).model(&Modelling::default()).unwrap().modes(None, Some(&[15.0]), 8).unwrap();
     let truth = table(40).frequencies_hz;
     let mut said = [0, 0];
     for modes in [2, 4, 8, 16, 32] {

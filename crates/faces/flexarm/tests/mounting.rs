@@ -106,7 +106,11 @@ fn the_tool_of_a_rigid_arm_gives_way_by_the_compliance_of_the_springs_at_its_lev
     eprintln!("compliance at the lever: {error:.1e}");
     assert!(error < 1e-13, "{error}");
     // Its share has its name, and the springs carry the load on the TCP.
-    let pulled = robot.model(&Modelling::default()).unwrap().statics(Some(&[x, slew]), [0.0, 0.0, -500.0, 0.0, 0.0, 0.0]).unwrap();
+    let pulled = robot
+        .model(&Modelling::default())
+        .unwrap()
+        .statics(Some(&[x, slew]), [0.0, 0.0, -500.0, 0.0, 0.0, 0.0])
+        .unwrap();
     assert_eq!(pulled.elements.iter().map(|e| e.name.as_str()).collect::<Vec<_>>(), ["mounting"]);
     let share = pulled.elements[0].tcp_displacement_m;
     assert!((0..3).all(|k| (share[k] - pulled.tcp_displacement_m[k]).abs() < 1e-9), "{share:?}");
@@ -187,7 +191,11 @@ fn springs_a_beam_and_a_gearbox_of_six_are_the_same_mounting() {
     };
     let at = [0.4, -0.3];
     let figures = |robot: &Robot| {
-        let statics = robot.model(&Modelling::default()).unwrap().statics(Some(&at), [0.1, -0.2, 0.3, 0.01, 0.02, -0.03]).unwrap();
+        let statics = robot
+            .model(&Modelling::default())
+            .unwrap()
+            .statics(Some(&at), [0.1, -0.2, 0.3, 0.01, 0.02, -0.03])
+            .unwrap();
         let modes = robot.model(&Modelling::default()).unwrap().modes(Some(&at), None, 4).unwrap();
         (statics.compliance.concat(), statics.tcp_displacement_m, modes.undamped_frequencies_hz[..4].to_vec())
     };
@@ -218,7 +226,9 @@ fn springs_a_beam_and_a_gearbox_of_six_are_the_same_mounting() {
     let at = [0.0, at[0], at[1]];
     let wrench = [0.1, -0.2, 0.3, 0.01, 0.02, -0.03];
     let statics = robot.model(&Modelling::default()).unwrap().statics(Some(&at), wrench).unwrap();
-    let hz = robot.model(&Modelling::default()).unwrap().modes(Some(&at), None, 4).unwrap().undamped_frequencies_hz[..4].to_vec();
+    let hz = robot.model(&Modelling::default()).unwrap().modes(Some(&at), None, 4).unwrap().undamped_frequencies_hz
+        [..4]
+        .to_vec();
     compare("gearbox of six", (statics.compliance.concat(), statics.tcp_displacement_m, hz), 1e-12);
 }
 

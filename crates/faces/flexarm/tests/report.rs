@@ -7,9 +7,7 @@ use std::sync::OnceLock;
 
 use flexarm::report::{ReportRun, html, markdown};
 use flexarm::runs::DifferenceFigures;
-use flexarm::{
-    DriveModel, Keep, LinkModel, Modelling, Motion, Outputs, Robot, RunOptions, RunRequest, Summary,
-};
+use flexarm::{DriveModel, Keep, LinkModel, Modelling, Motion, Outputs, Robot, RunOptions, RunRequest, Summary};
 use flexarm_log::Trace;
 
 type Run = (Summary, Trace);

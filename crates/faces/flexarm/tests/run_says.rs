@@ -7,8 +7,7 @@ use flexarm::recordings::Trace;
 use flexarm::report::{ReportRun, figure_groups, html};
 use flexarm::steppers::{STEPPERS, StepRule, StepperOptions};
 use flexarm::{
-    Keep, Modelling, Motion, Robot, RunOptions, RunRequest, Summary, inspect,
-    sensitivity::pose_sensitivity,
+    Keep, Modelling, Motion, Robot, RunOptions, RunRequest, Summary, inspect, sensitivity::pose_sensitivity,
 };
 use serde_json::Value;
 
@@ -185,7 +184,10 @@ fn a_pose_in_degrees_is_asked_about_wherever_a_pose_is_given() {
         ([0.0, -60.0, 60.0, 0.0, 30.0, 0.0], [0.0, -60.0, 60.0, 0.0, 30.0, 0.0].map(f64::to_radians));
     for (pose, count) in [(degrees, 3), (radians, 0)] {
         assert_eq!(asked(&inspect(&robot, Some(&pose), None).unwrap().warnings), count);
-        assert_eq!(asked(&robot.model(&Modelling::default()).unwrap().statics(Some(&pose), [0.0; 6]).unwrap().warnings), count);
+        assert_eq!(
+            asked(&robot.model(&Modelling::default()).unwrap().statics(Some(&pose), [0.0; 6]).unwrap().warnings),
+            count
+        );
         let found = pose_sensitivity(&robot, Modelling::default(), Some(&pose), &[]).unwrap();
         let told: Vec<String> = found.caveats.into_iter().map(|caveat| caveat.message).collect();
         assert_eq!(asked(&told), count);

@@ -85,8 +85,9 @@ fn calibrated_frames_and_zeros_move_the_tcp_as_frames_of_the_urdf_do() {
     let folder = Folder::new("calibration");
     let text = "[[calibration]]\njoint = \"turn\"\nxyz = [0.002, -0.001, 0.003]\nrpy = [0.004, 0.0, 0.0]\nzero = 0.01\n\
                 [[calibration]]\njoint = \"lift\"\nzero = -0.004\n";
-    let at =
-        |robot: &Robot, q: &[f64]| robot.model(&Modelling::default()).unwrap().statics(Some(q), [0.0; 6]).unwrap().tcp_position_m;
+    let at = |robot: &Robot, q: &[f64]| {
+        robot.model(&Modelling::default()).unwrap().statics(Some(q), [0.0; 6]).unwrap().tcp_position_m
+    };
     let found = at(&folder.robot(text).unwrap(), &[0.7, 0.3, -0.4]);
     let frame = "<origin xyz=\"0 0 0.2\"/>";
     let urdf = URDF.replace(frame, "<origin xyz=\"0.002 -0.001 0.203\" rpy=\"0.004 0 0\"/>");
@@ -130,7 +131,8 @@ fn wrong_guides_connections_and_calibrations_are_refused_with_place_and_remedy()
     }
     // Beyond the limits the tubes come apart, which is an error of the pose.
     let robot = folder.robot(&elastic(LAW, "", 2e5, 3e4)).unwrap();
-    let message = robot.model(&Modelling::default()).unwrap().statics(Some(&[2.6, 0.0, 0.0]), [0.0; 6]).unwrap_err().to_string();
+    let message =
+        robot.model(&Modelling::default()).unwrap().statics(Some(&[2.6, 0.0, 0.0]), [0.0; 6]).unwrap_err().to_string();
     assert!(message.contains("guide \"lift.x\"") && message.contains("overlap by -0.1000 m"), "{message}");
 }
 

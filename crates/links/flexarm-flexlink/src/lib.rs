@@ -47,5 +47,5 @@ pub use interfaces::{BranchJoint, branch_joints};
 pub use modal::modal_body;
 pub use mounting::{Mounting, MountingError, base_link, insert_mounting};
 pub use substitute::{
-    FlexibleLink, FlexibleSpan, LinkForm, Parts, Spring, Substituted, SubstitutionError, distal_joint, substitute,
+    ElasticJoint, FlexibleLink, FlexibleSpan, LinkForm, Parts, Substituted, SubstitutionError, distal_joint, substitute,
 };

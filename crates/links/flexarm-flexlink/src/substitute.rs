@@ -75,7 +75,7 @@ pub enum Parts {
 
 /// Elastic joint of a lumped flexible link.
 #[derive(Clone, Debug)]
-pub struct Spring {
+pub struct ElasticJoint {
     /// Name of the flexible link.
     pub link: String,
     /// Name of the elastic joint.
@@ -115,7 +115,7 @@ pub struct Substituted {
     /// Tree with elastic joints.
     pub mechanism: Mechanism,
     /// Elastic joints of lumped links, in the order given, proximal first.
-    pub springs: Vec<Spring>,
+    pub springs: Vec<ElasticJoint>,
     /// One per flexible link, in the order given.
     pub spans: Vec<FlexibleSpan>,
 }
@@ -343,7 +343,7 @@ fn insert_chain(
     flexible: &FlexibleLink,
     site: &Site,
     chain: Chain,
-) -> (FlexibleSpan, Vec<Spring>) {
+) -> (FlexibleSpan, Vec<ElasticJoint>) {
     let (name, Chain { joints, parts }) = (&flexible.link, &chain);
     // The proximal part keeps the link's frame and name; the frames of the others are at the joints
     // inward of them.
@@ -368,7 +368,7 @@ fn insert_chain(
         let kind = JointKind::Elastic(flexible.angles);
         mechanism.joints.push(Joint::new(&joint_name, kind, &parent, &distal_link, X_LP.inverse() * joint.X_LS));
         let K_S = if flexible.coupling { joint.K_S } else { drop_coupling(&joint.K_S) };
-        springs.push(Spring {
+        springs.push(ElasticJoint {
             link: name.clone(),
             joint: joint_name,
             distal_link: distal_link.clone(),

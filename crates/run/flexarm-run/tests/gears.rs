@@ -1,7 +1,7 @@
 //! Hysteresis and transmission error of a gear, from the robot file to its laws.
 
-use flexarm_run::{Error, GearHysteresis, Robot};
-use flexarm_stepping::Slider;
+use flexarm_run::{Error, Robot};
+use flexarm_stepping::{Hysteresis, Slider};
 
 use crate::small_robots::{refusal, two_joints};
 
@@ -15,14 +15,14 @@ fn geared(drive: &str, gearbox: &str) -> Result<Robot, Error> {
     ))
 }
 
-fn hysteresis(entry: &str) -> GearHysteresis {
+fn hysteresis(entry: &str) -> Hysteresis {
     let robot = geared("", &format!("hysteresis = {{ {entry} }}")).unwrap();
-    robot.drives[0].gearbox.as_ref().unwrap().1.hysteresis.clone().unwrap()
+    robot.drives[0].gearbox.as_ref().unwrap().1.hysteresis.clone().unwrap().law
 }
 
 /// Middle line and width of the loop at a torque, by bisection on the branches of a cycle
 /// between ±`far`.
-fn branches(law: &GearHysteresis, far: f64, torque: f64) -> (f64, f64) {
+fn branches(law: &Hysteresis, far: f64, torque: f64) -> (f64, f64) {
     // Branch after a reversal at ±far (Masing): sliders at ±reach unload.
     let branch = |side: f64, d: f64| {
         let slid = |s: &Slider| s.stiffness * side * (s.reach - (far - side * d)).max(-s.reach);

@@ -11,12 +11,10 @@ pub struct Slider {
     pub reach: f64,
 }
 
-/// A gearbox with rate-independent hysteresis: its torque depends on the history of its deflection,
+/// Rate-independent hysteresis of a gearbox: its torque depends on the history of its deflection,
 /// equations (2) and (3) of the module.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Hysteresis {
-    /// Element index of the gearbox spring (single coordinate).
-    pub element: usize,
     /// Elastic torque, without friction.
     pub elastic: TorqueCurve,
     /// Sliders in parallel with the elastic spring.
@@ -36,6 +34,13 @@ impl Hysteresis {
         let each = 2.0 * friction / (reach * n);
         let slope = |i: usize| if i < count { each * (n - i as f64 - 0.5) } else { 0.0 };
         (0..count).map(|i| Slider { stiffness: slope(i) - slope(i + 1), reach: slip(i) }).collect()
+    }
+
+    /// Returns the law with its torques multiplied by a factor.
+    #[must_use]
+    pub fn scaled(&self, factor: f64) -> Self {
+        let sliders = self.sliders.iter().map(|s| Slider { stiffness: factor * s.stiffness, ..*s }).collect();
+        Self { elastic: self.elastic.scaled(factor), sliders }
     }
 
     /// Returns the curve of first loading from rest.

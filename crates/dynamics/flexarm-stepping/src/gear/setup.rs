@@ -4,7 +4,6 @@ use nalgebra::DMatrix;
 
 use crate::error::StepError;
 use crate::gear::coupling::GearCoupling;
-use crate::gear::hysteresis::Hysteresis;
 use crate::gear::transmission::TransmissionError;
 use crate::plant::{Damping, Plant};
 
@@ -56,34 +55,11 @@ impl Plant {
         Ok(self)
     }
 
-    /// Returns the arm with hysteresis in gears; the springs of these gears get the first loading
-    /// curve.
+    /// Returns the arm with transmission errors.
     ///
     /// # Errors
     /// [`StepError::Setup`] if an element does not exist or has more than one coordinate; errors of
     /// [`Plant::new`].
-    pub fn with_hysteresis(mut self, laws: Vec<Hysteresis>) -> Result<Self, StepError> {
-        for law in &laws {
-            let Some(element) = self.elements.get_mut(law.element).filter(|e| e.size == 1) else {
-                return Err(StepError::Setup(format!(
-                    "hysteresis of element {}: it needs a spring of one coordinate",
-                    law.element
-                )));
-            };
-            let curve = law.first_loading();
-            element.K[(0, 0)] = curve.stiffest();
-            element.C[(0, 0)] = 1.0 / curve.stiffest();
-            element.curve = Some(curve.into());
-        }
-        self.hysteresis = laws;
-        self.update_modes_and_damping()?;
-        Ok(self)
-    }
-
-    /// Returns the arm with transmission errors.
-    ///
-    /// # Errors
-    /// As [`Plant::with_hysteresis`].
     pub fn with_transmission_errors(mut self, errors: Vec<TransmissionError>) -> Result<Self, StepError> {
         for error in &errors {
             let single = self.elements.get(error.element).is_some_and(|e| e.size == 1);
@@ -135,7 +111,8 @@ impl Plant {
     /// Returns whether any gear has a transmission error, hysteresis, load-dependent friction or
     /// coupling, or any joint a telescopic guide.
     pub(crate) fn has_gear_laws(&self) -> bool {
-        !(self.transmission.is_empty() && self.hysteresis.is_empty() && self.load_friction.is_empty())
+        !(self.transmission.is_empty() && self.load_friction.is_empty())
+            || self.has_hysteresis()
             || self.has_guides()
             || self.coupling.as_ref().is_some_and(|coupling| !coupling.is_none())
     }

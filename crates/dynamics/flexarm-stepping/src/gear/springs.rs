@@ -3,7 +3,6 @@
 use nalgebra::DVector;
 
 use crate::error::StepError;
-use crate::gear::hysteresis::Hysteresis;
 use crate::guide::Guide;
 use crate::plant::{ElasticElement, Plant};
 use crate::statics::spring_forces;
@@ -22,10 +21,10 @@ impl Plant {
         let own = &self.elements[element];
         let curve = own.curve.as_ref()?;
         let delta = self.deflection(element, q[own.coordinate], q);
-        if let Some(law) = self.hysteresis.iter().find(|law| law.element == element) {
-            return Some(law.stuck_slope(delta));
-        }
-        Some(curve.slope_beyond_play(delta, q))
+        Some(match &own.hysteresis {
+            Some(law) => law.stuck_slope(delta),
+            None => curve.slope_beyond_play(delta, q),
+        })
     }
 
     /// Returns the forces of the springs and the energy of each element, at rest with all
@@ -56,8 +55,8 @@ impl Plant {
     /// Returns the largest friction torque of the gears with hysteresis (N m or N); a scale for the
     /// force balance, in which smaller residuals do not count.
     pub(crate) fn friction_of_gears(&self) -> f64 {
-        let of_law = |law: &Hysteresis| law.sliders.iter().map(|s| s.stiffness * s.reach).sum::<f64>();
-        self.hysteresis.iter().map(of_law).fold(0.0, f64::max)
+        let laws = self.elements.iter().filter_map(|element| element.hysteresis.as_ref());
+        laws.map(|law| law.sliders.iter().map(|s| s.stiffness * s.reach).sum()).fold(0.0, f64::max)
     }
 
     /// Adds the cross stiffness of coupled springs: `f += K x`.
@@ -66,6 +65,11 @@ impl Plant {
             f[i] += k * x[j];
             f[j] += k * x[i];
         }
+    }
+
+    /// Returns whether any gear has hysteresis.
+    pub fn has_hysteresis(&self) -> bool {
+        self.elements.iter().any(|element| element.hysteresis.is_some())
     }
 
     /// Returns whether any joint has a telescopic guide.

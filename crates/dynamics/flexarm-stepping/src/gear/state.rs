@@ -21,7 +21,8 @@ pub(crate) struct GearState {
     damper: DVector<f64>,
     /// Friction per actuated coordinate.
     pub(crate) friction: Vec<f64>,
-    slipped: Vec<SliderState>,
+    /// Sliders of each element; `None` without hysteresis.
+    slipped: Vec<Option<SliderState>>,
     /// Energy lost to hysteresis so far (J).
     pub(crate) lost: f64,
 }
@@ -29,7 +30,7 @@ pub(crate) struct GearState {
 impl GearState {
     /// Creates the state if the arm has gear laws.
     pub(crate) fn of(plant: &Plant) -> Option<Box<Self>> {
-        let zeros = DVector::zeros(plant.n_elastic_coordinates());
+        let (zeros, elements) = (DVector::zeros(plant.n_elastic_coordinates()), plant.elements.iter());
         plant.has_gear_laws().then(|| {
             Box::new(Self {
                 q: vec![0.0; plant.model.n_actuated()],
@@ -38,7 +39,7 @@ impl GearState {
                 F: zeros.clone(),
                 damper: zeros,
                 friction: vec![0.0; plant.model.n_actuated()],
-                slipped: plant.hysteresis.iter().map(SliderState::at_rest).collect(),
+                slipped: elements.map(|element| element.hysteresis.as_ref().map(SliderState::at_rest)).collect(),
                 lost: 0.0,
             })
         })
@@ -75,9 +76,9 @@ impl GearState {
         }
         // Springs: equation (2).
         F.copy_from(damper);
-        for (k, element) in plant.elements.iter().enumerate() {
+        for (element, slipped) in plant.elements.iter().zip(&*slipped) {
             let range = plant.offset(element)..plant.offset(element) + element.size;
-            match plant.hysteresis.iter().zip(&*slipped).find(|(law, _)| law.element == k) {
+            match element.hysteresis.as_ref().zip(slipped.as_ref()) {
                 Some((law, slipped)) => {
                     let delta = delta[range.start];
                     F[range.start] += law.elastic.torque(delta) + slipped.torque(law, delta);
@@ -93,7 +94,7 @@ impl GearState {
     /// Returns the slope of a nonlinear spring with one coordinate at its last deflection.
     pub(crate) fn slope(&self, plant: &Plant, k: usize, element: &ElasticElement, curve: &SpringCurve) -> f64 {
         let delta = self.delta[plant.offset(element)];
-        match plant.hysteresis.iter().zip(&self.slipped).find(|(law, _)| law.element == k) {
+        match element.hysteresis.as_ref().zip(self.slipped[k].as_ref()) {
             Some((law, slipped)) => law.elastic.slope(delta) + slipped.slope(law, delta),
             None => curve.slope(delta, &self.q),
         }
@@ -111,9 +112,9 @@ impl GearState {
     /// Returns the energy in the springs at the last deflections (J).
     pub(crate) fn energy(&self, plant: &Plant) -> f64 {
         let mut energy = 0.0;
-        for (k, element) in plant.elements.iter().enumerate() {
+        for (element, slipped) in plant.elements.iter().zip(&self.slipped) {
             let delta = &self.delta.as_slice()[plant.offset(element)..][..element.size];
-            energy += match plant.hysteresis.iter().zip(&self.slipped).find(|(law, _)| law.element == k) {
+            energy += match element.hysteresis.as_ref().zip(slipped.as_ref()) {
                 Some((law, slipped)) => law.elastic.energy(delta[0]) + slipped.energy(law, delta[0]),
                 None => element.energy(delta, &self.q),
             };
@@ -125,8 +126,9 @@ impl GearState {
     /// the sliders by (3) and adds their losses. The first call of a run moves them along the first
     /// loading curve.
     pub(crate) fn settle(&mut self, plant: &Plant, q: &[f64], e: &[f64]) {
-        for (law, slipped) in plant.hysteresis.iter().zip(&mut self.slipped) {
-            let delta = plant.deflection(law.element, e[plant.offset(&plant.elements[law.element])], q);
+        for (k, (element, slipped)) in plant.elements.iter().zip(&mut self.slipped).enumerate() {
+            let Some((law, slipped)) = element.hysteresis.as_ref().zip(slipped.as_mut()) else { continue };
+            let delta = plant.deflection(k, e[plant.offset(element)], q);
             self.lost += slipped.advance(law, delta);
         }
     }

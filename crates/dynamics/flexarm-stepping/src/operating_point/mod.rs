@@ -214,7 +214,7 @@ impl OperatingPoint {
             // 0.5.
             let shorten = (0.5 / self.r.amax()).min(1.0);
             self.q.rows_mut(m, n).axpy(-shorten, &self.r, 1.0);
-            if !self.plant.hysteresis.is_empty() {
+            if self.plant.has_hysteresis() {
                 self.come_closer(shorten, unbalanced);
             }
         }
@@ -273,7 +273,7 @@ impl OperatingPoint {
             if let Some(curve) = &element.curve {
                 let k = self.plant.offset(element);
                 let delta = self.plant.deflection(number, self.q[m + k], self.q.as_slice());
-                let stuck = self.plant.hysteresis.iter().find(|law| small && law.element == number);
+                let stuck = element.hysteresis.as_ref().filter(|_| small);
                 let beyond_play = || curve.slope_beyond_play(delta, self.q.as_slice());
                 let slope = stuck.map_or_else(beyond_play, |law| law.stuck_slope(delta));
                 self.tangent.T[k * n + k] += slope - self.K[(k, k)];

@@ -135,7 +135,7 @@ impl SecondOrderSystem for ReducedArm {
     }
 
     fn settle(&mut self, t: f64, x: &DVector<f64>) {
-        if self.plant.hysteresis.is_empty() {
+        if !self.plant.has_hysteresis() {
             return;
         }
         self.sample_joints(t);

@@ -146,7 +146,7 @@ impl Method for ReferenceSettings {
     }
 
     fn start(&self, plant: Arc<Plant>, h: f64, e: &DVector<f64>) -> Result<Box<dyn Stepper>, StepError> {
-        if !plant.hysteresis.is_empty() {
+        if plant.has_hysteresis() {
             let text = "the reference stepper needs continuous equations and does not support hysteresis of gears: use \
                         sdirk3 or rk4 with a small step";
             return Err(StepError::Setup(text.into()));

@@ -37,6 +37,7 @@ mod superelement;
 mod tests;
 mod transform;
 
+pub use flexarm_spatial::GeometricStiffness;
 use flexarm_spatial::Pose;
 use nalgebra::{DMatrix, Matrix3, Matrix3xX, Matrix6xX, Vector3};
 
@@ -56,26 +57,6 @@ pub struct ModalInterface {
     pub X_LI: Pose,
     /// Displacement of Io, then rotation of I, link axes, per coordinate; (m; rad).
     pub Phi: Matrix6xX<f64>,
-}
-
-/// Geometric stiffness, per unit of the load that causes the stress.
-///
-/// ```text
-/// K_eff = K + Σ load_i G_i
-/// ```
-/// The stress is the static stress of the link with A clamped under that load only. Loads are dead
-/// loads: forces keep their direction in link axes.
-#[derive(Debug, Clone, PartialEq)]
-pub struct GeometricStiffness {
-    /// Per m/s² of the acceleration of Lo minus gravity, along x, y, z of the link: load `-a dm`.
-    pub acceleration: [DMatrix<f64>; 3],
-    /// Per rad/s² of angular acceleration about x, y, z: load `-α × s dm`.
-    pub angular: [DMatrix<f64>; 3],
-    /// Per rad²/s² of `ω_i ω_j` in the order xx yy zz xy xz yz: load `-ω × (ω × s) dm`. `ω_x ω_y`
-    /// is counted once.
-    pub centrifugal: [DMatrix<f64>; 6],
-    /// Per unit wrench on each interface, forces (1/N) before torques (1/(N·m)), at Io, link axes.
-    pub interface: Vec<[DMatrix<f64>; 6]>,
 }
 
 /// Shapes and inertia invariants of a link in its floating frame: link axes, tangent at interface

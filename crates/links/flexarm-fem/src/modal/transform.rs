@@ -254,7 +254,7 @@ impl ModalLink {
             C_r: r * &self.C_r,
             P: self.P.iter().map(both).collect(),
             N: self.N.iter().map(both).collect(),
-            geometric: self.geometric.as_ref().map(|G| G.turned(r)),
+            geometric: self.geometric.as_ref().map(|G| turned(G, r)),
             X_LA: pose(&self.X_LA),
             ..self.clone()
         }
@@ -297,42 +297,30 @@ impl ModalLink {
     }
 }
 
-impl GeometricStiffness {
-    /// Converts to unit loads along new axes; `R`: rotation from the present axes to the new ones.
-    fn turned(&self, R: &Matrix3<f64>) -> Self {
-        // A load a along the new axes has the components Rᵀ a along the present ones.
-        let three = |G: &[DMatrix<f64>]| -> [DMatrix<f64>; 3] {
-            std::array::from_fn(|i| &G[0] * R[(i, 0)] + &G[1] * R[(i, 1)] + &G[2] * R[(i, 2)])
-        };
-        let six = |G: &[DMatrix<f64>; 6]| -> [DMatrix<f64>; 6] {
-            let [x, y, z] = three(&G[..3]);
-            let [rx, ry, rz] = three(&G[3..]);
-            [x, y, z, rx, ry, rz]
-        };
-        let centrifugal = PRODUCTS.map(|(i, j)| {
-            let mut sum = self.centrifugal[0].map(|_| 0.0);
-            for ((a, b), G) in PRODUCTS.into_iter().zip(&self.centrifugal) {
-                // ω_a ω_b in products of the new components; each mixed product is counted once.
-                let once = R[(i, a)] * R[(j, b)];
-                sum += G * if i == j { once } else { once + R[(j, a)] * R[(i, b)] };
-            }
-            sum
-        });
-        Self {
-            acceleration: three(&self.acceleration),
-            angular: three(&self.angular),
-            centrifugal,
-            interface: self.interface.iter().map(six).collect(),
+/// Converts to unit loads along new axes; `R`: rotation from the present axes to the new ones.
+fn turned(stiffness: &GeometricStiffness, R: &Matrix3<f64>) -> GeometricStiffness {
+    // A load a along the new axes has the components Rᵀ a along the present ones.
+    let three = |G: &[DMatrix<f64>]| -> [DMatrix<f64>; 3] {
+        std::array::from_fn(|i| &G[0] * R[(i, 0)] + &G[1] * R[(i, 1)] + &G[2] * R[(i, 2)])
+    };
+    let six = |G: &[DMatrix<f64>; 6]| -> [DMatrix<f64>; 6] {
+        let [x, y, z] = three(&G[..3]);
+        let [rx, ry, rz] = three(&G[3..]);
+        [x, y, z, rx, ry, rz]
+    };
+    let centrifugal = PRODUCTS.map(|(i, j)| {
+        let mut sum = stiffness.centrifugal[0].map(|_| 0.0);
+        for ((a, b), G) in PRODUCTS.into_iter().zip(&stiffness.centrifugal) {
+            // ω_a ω_b in products of the new components; each mixed product is counted once.
+            let once = R[(i, a)] * R[(j, b)];
+            sum += G * if i == j { once } else { once + R[(j, a)] * R[(i, b)] };
         }
-    }
-
-    /// Applies `f` to all matrices.
-    pub(crate) fn mapped(&self, f: &dyn Fn(&DMatrix<f64>) -> DMatrix<f64>) -> Self {
-        Self {
-            acceleration: self.acceleration.each_ref().map(f),
-            angular: self.angular.each_ref().map(f),
-            centrifugal: self.centrifugal.each_ref().map(f),
-            interface: self.interface.iter().map(|G| G.each_ref().map(f)).collect(),
-        }
+        sum
+    });
+    GeometricStiffness {
+        acceleration: three(&stiffness.acceleration),
+        angular: three(&stiffness.angular),
+        centrifugal,
+        interface: stiffness.interface.iter().map(six).collect(),
     }
 }

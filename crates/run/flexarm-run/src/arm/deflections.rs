@@ -101,17 +101,10 @@ impl Arm {
                 return Err(ValueError::Factor { what, found });
             }
         }
-        Ok(self.springs.iter().map(|spring| scaled(spring, stiffness, damping)).collect())
-    }
-}
-
-/// Returns a spring with scaled stiffness and damping.
-fn scaled(spring: &Spring, stiffness: f64, damping: f64) -> Spring {
-    Spring {
-        name: spring.name.clone(),
-        K: &spring.K * stiffness,
-        damping: spring.damping.scaled(damping),
-        curve: spring.curve.as_ref().map(|curve| curve.scaled(stiffness)),
-        geometric: spring.geometric.clone(),
+        let scaled = |spring: &Spring| {
+            let scaled = spring.clone().stiffened(stiffness);
+            Spring { damping: scaled.damping.scaled(damping), ..scaled }
+        };
+        Ok(self.springs.iter().map(scaled).collect())
     }
 }

@@ -106,8 +106,7 @@ impl Arm {
         self.plant_with(self.springs.clone(), motion)
     }
 
-    /// As [`Self::arm`], with other springs in the same places; the laws of gears follow the
-    /// stiffness of their springs.
+    /// As [`Self::arm`], with other springs in the same places.
     ///
     /// # Errors
     /// As [`Self::arm`].
@@ -125,8 +124,7 @@ impl Arm {
         if self.friction.iter().any(|f| *f != Friction::NONE) {
             plant.friction.clone_from(&self.friction);
         }
-        let stiffness: Vec<f64> = plant.elements.iter().map(|element| element.K[(0, 0)]).collect();
-        let plant = self.gears.put_into(plant, |k| stiffness[k] / self.springs[k].K[(0, 0)])?;
+        let plant = self.gears.put_into(plant)?;
         if self.torque.is_empty() {
             return Ok(plant);
         }

@@ -124,7 +124,7 @@ impl Robot {
         let curves = curves_with_play(springs.K_S.diagonal().as_slice(), play);
         let owned = inserted.into_iter().map(|GearSpring { name, joint, component, K, .. }| {
             let curve = curves.get(component).cloned().flatten().map(SpringCurve::from);
-            OwnedSpring { group: joint, spring: Spring { name, K, damping: *damping, curve, geometric: None }, owner }
+            OwnedSpring { group: joint, spring: Spring { curve, ..Spring::linear(name, K, *damping) }, owner }
         });
         Ok(Some(owned.collect()))
     }
@@ -160,8 +160,8 @@ impl Robot {
             let source = &self.flexible_links[k];
             let geometric = modal.geometric.as_ref().filter(|_| source.choices.geometric);
             let geometric = geometric.map(|g| Arc::new(stiffening(g, substituted.spans[k].share)));
-            let (name, K, damping) = (link.link.clone(), &modal.K * source.stiffness_factor, source.damping);
-            let spring = Spring { name, K, damping, curve: None, geometric };
+            let K = &modal.K * source.stiffness_factor;
+            let spring = Spring { geometric, ..Spring::linear(&link.link, K, source.damping) };
             owned.push(OwnedSpring { group: link.link.clone(), spring, owner: Owner::Link(k) });
         }
         owned
@@ -178,6 +178,7 @@ impl Robot {
                 K: gear.K.clone(),
                 damping: damping.of(gear.component, gear.K.nrows()),
                 curve: damping.curves.get(gear.component).cloned().flatten().map(SpringCurve::from),
+                hysteresis: damping.hysteresis.as_ref().map(|found| found.law.clone()),
                 geometric: None,
             };
             if let (Some(tubes), Some(tilt)) = (self.drives[number].guide(), damping.tilts.get(gear.component)) {
@@ -303,13 +304,7 @@ fn in_coordinate_order(model: &Model, owned: Vec<OwnedSpring>) -> Result<(Vec<Sp
     model.elastic().iter().map(of_group).collect::<Result<Vec<_>, _>>().map(|found| found.into_iter().unzip())
 }
 
-/// Returns the stiffness by loads of a modal link with a share of its mass.
-fn stiffening(g: &flexarm_fem::GeometricStiffness, share: f64) -> GeometricStiffness {
-    let scaled = |G: &DMatrix<f64>| G * share;
-    GeometricStiffness {
-        acceleration: g.acceleration.each_ref().map(scaled),
-        angular: g.angular.each_ref().map(scaled),
-        centrifugal: g.centrifugal.each_ref().map(scaled),
-        interface: g.interface.clone(),
-    }
+/// Returns the geometric stiffness of a modal link with a share of its mass.
+fn stiffening(of_link: &GeometricStiffness, share: f64) -> GeometricStiffness {
+    GeometricStiffness { interface: of_link.interface.clone(), ..of_link.mapped(&|G| G * share) }
 }

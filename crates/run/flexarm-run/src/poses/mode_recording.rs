@@ -56,49 +56,49 @@ impl Arm {
         movie: &ModeMovie,
         outputs: &Outputs,
     ) -> Result<ModeTable, Error> {
-    let within =
-        |x: f64, otherwise: fn(f64) -> ValueError| if x > 0.0 && x < 1000.0 { Ok(()) } else { Err(otherwise(x)) };
-    within(movie.seconds, ValueError::Seconds)?;
-    movie.tool_motion_m.map_or(Ok(()), |x| within(x, ValueError::ToolMotion))?;
-    let posed = self.posed(at)?;
-    let model = ModeModel::new(&posed, speeds)?;
-    let linear = &model.linear;
-    let all = modes_of(linear)?;
-    if all.is_empty() {
-        return Err(PoseError::NoModes.into());
-    }
-    let shown = &all[..count.min(all.len())];
-    let motion = movie.tool_motion_m.unwrap_or_else(|| PART_OF_REACH * reach(&posed));
-
-    let mut files = recorders(Some(outputs), false)?;
-    (files.names.report, files.names.report_md) = (None, None);
-    let mut header = robot_header(self.robot(), &posed.plant);
-    let (bends, stations) = stations(&self.bends, &posed.plant.model, &header.links);
-    header.bends = bends;
-    header.color_scale_m = crate::run::magnification::round_up(motion);
-    header.volume = Some(volume(&posed, motion));
-    let swings = (movie.seconds * SHOWN_HZ).ceil();
-    describe_modes(&mut header, shown, swings / SHOWN_HZ);
-    files.begin(&header)?;
-    let per_mode = (swings / SHOWN_HZ * RATE_HZ).round() as u64;
-    let mut stage = Stage::new(self.robot(), &posed, linear, stations);
-    for (k, mode) in shown.iter().enumerate() {
-        let size = magnification(mode, linear, motion);
-        let last = if k + 1 == shown.len() { per_mode } else { per_mode - 1 };
-        for frame in 0..=last {
-            let step = k as u64 * per_mode + frame;
-            let (sine, cosine) = (std::f64::consts::TAU * SHOWN_HZ * frame as f64 / RATE_HZ).sin_cos();
-            let shape = mode.shape.map(|x| size * (x.re * sine + x.im * cosine));
-            files.set.record(stage.sample(step, &(&linear.equilibrium + shape)))?;
+        let within =
+            |x: f64, otherwise: fn(f64) -> ValueError| if x > 0.0 && x < 1000.0 { Ok(()) } else { Err(otherwise(x)) };
+        within(movie.seconds, ValueError::Seconds)?;
+        movie.tool_motion_m.map_or(Ok(()), |x| within(x, ValueError::ToolMotion))?;
+        let posed = self.posed(at)?;
+        let model = ModeModel::new(&posed, speeds)?;
+        let linear = &model.linear;
+        let all = modes_of(linear)?;
+        if all.is_empty() {
+            return Err(PoseError::NoModes.into());
         }
+        let shown = &all[..count.min(all.len())];
+        let motion = movie.tool_motion_m.unwrap_or_else(|| PART_OF_REACH * reach(&posed));
+
+        let mut files = recorders(Some(outputs), false)?;
+        (files.names.report, files.names.report_md) = (None, None);
+        let mut header = robot_header(self.robot(), &posed.plant);
+        let (bends, stations) = stations(&self.bends, &posed.plant.model, &header.links);
+        header.bends = bends;
+        header.color_scale_m = crate::run::magnification::round_up(motion);
+        header.volume = Some(volume(&posed, motion));
+        let swings = (movie.seconds * SHOWN_HZ).ceil();
+        describe_modes(&mut header, shown, swings / SHOWN_HZ);
+        files.begin(&header)?;
+        let per_mode = (swings / SHOWN_HZ * RATE_HZ).round() as u64;
+        let mut stage = Stage::new(self.robot(), &posed, linear, stations);
+        for (k, mode) in shown.iter().enumerate() {
+            let size = magnification(mode, linear, motion);
+            let last = if k + 1 == shown.len() { per_mode } else { per_mode - 1 };
+            for frame in 0..=last {
+                let step = k as u64 * per_mode + frame;
+                let (sine, cosine) = (std::f64::consts::TAU * SHOWN_HZ * frame as f64 / RATE_HZ).sin_cos();
+                let shape = mode.shape.map(|x| size * (x.re * sine + x.im * cosine));
+                files.set.record(stage.sample(step, &(&linear.equilibrium + shape)))?;
+            }
+        }
+        let figures = vec![("modes".into(), shown.len().to_string())];
+        files.set.finish(&RunResult { figures, ..RunResult::default() })?;
+        let names = files.names.clone();
+        let mut figures = table(&posed, &model, &all, count)?;
+        figures.files = names;
+        Ok(figures)
     }
-    let figures = vec![("modes".into(), shown.len().to_string())];
-    files.set.finish(&RunResult { figures, ..RunResult::default() })?;
-    let names = files.names.clone();
-    let mut figures = table(&posed, &model, &all, count)?;
-    figures.files = names;
-    Ok(figures)
-}
 }
 
 /// Adds captions and tables of the modes, each shown for the same time, to the header.

@@ -69,13 +69,11 @@ pub struct RobotCoupling {
     pub C_inverse: DMatrix<f64>,
 }
 
-/// Friction and elastic part of a hysteresis, before it is assigned to an element.
+/// Hysteresis of a gear.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GearHysteresis {
-    /// Elastic part, without friction.
-    pub elastic: TorqueCurve,
-    /// Friction part.
-    pub sliders: Vec<Slider>,
+    /// Law of the torque.
+    pub law: Hysteresis,
     /// Width of the loop at zero torque (rad).
     pub loss: f64,
 }
@@ -230,14 +228,14 @@ pub(crate) fn hysteresis(
         Some(n) if (1..=MAX_SLIDERS).contains(&n) => n as usize,
         Some(n) => return Err(HysteresisEntryError::Sliders(n)),
     };
-    Ok(GearHysteresis { elastic, sliders: Hysteresis::even_sliders(friction, reach, sliders), loss })
+    let sliders = Hysteresis::even_sliders(friction, reach, sliders);
+    Ok(GearHysteresis { law: Hysteresis { elastic, sliders }, loss })
 }
 
-/// Gear effects other than elasticity, assigned to their elements.
+/// Gear effects other than elasticity and hysteresis, assigned to their elements.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct GearLaws {
     pub(crate) transmission: Vec<TransmissionError>,
-    pub(crate) hysteresis: Vec<Hysteresis>,
     pub(crate) load_friction: Vec<LoadFriction>,
     pub(crate) coupling: Option<GearCoupling>,
 }
@@ -251,9 +249,6 @@ impl GearLaws {
                 let harmonics = gear.transmission.clone();
                 self.transmission.push(TransmissionError { element, motor: coordinate, harmonics });
             }
-            let law =
-                |h: &GearHysteresis| Hysteresis { element, elastic: h.elastic.clone(), sliders: h.sliders.clone() };
-            self.hysteresis.extend(gear.hysteresis.as_ref().map(law));
         }
         if drive.load_friction > 0.0 {
             let (coefficient, regularisation) = (drive.load_friction, drive.friction.regularisation);
@@ -261,19 +256,11 @@ impl GearLaws {
         }
     }
 
-    /// Adds them to an arm; `stiffer` is the stiffness factor of each element.
-    pub(crate) fn put_into(&self, mut plant: Plant, stiffer: impl Fn(usize) -> f64) -> Result<Plant, StepError> {
+    /// Adds them to a plant.
+    pub(crate) fn put_into(&self, mut plant: Plant) -> Result<Plant, StepError> {
         plant.load_friction.clone_from(&self.load_friction);
         if let Some(coupling) = &self.coupling {
             plant = plant.with_coupling(coupling.clone())?;
-        }
-        if !self.hysteresis.is_empty() {
-            let scaled = |law: &Hysteresis| {
-                let factor = stiffer(law.element);
-                let sliders = law.sliders.iter().map(|s| Slider { stiffness: factor * s.stiffness, ..*s }).collect();
-                Hysteresis { elastic: law.elastic.scaled(factor), sliders, ..law.clone() }
-            };
-            plant = plant.with_hysteresis(self.hysteresis.iter().map(scaled).collect())?;
         }
         if !self.transmission.is_empty() {
             plant = plant.with_transmission_errors(self.transmission.clone())?;

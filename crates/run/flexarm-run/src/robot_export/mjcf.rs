@@ -11,7 +11,7 @@ use flexarm_settings::written::markup;
 use nalgebra::UnitQuaternion;
 
 use super::parts::{Axis, MESHES, Part};
-use super::springs::{Spring, Springs};
+use super::springs::{JointSpring, Springs};
 use crate::poses::posed::Posed;
 use crate::robot::Robot;
 
@@ -28,7 +28,8 @@ pub(super) fn text(robot: &Robot, posed: &Posed, parts: &[Part], springs: &Sprin
         .map(|shape| format!("    <mesh name=\"{0}\" file=\"{0}.stl\" inertia=\"shell\"/>\n", shape.name))
         .collect();
     let axes: Vec<&Axis> = parts.iter().flat_map(|part| &part.joints).collect();
-    let (single, several): (Vec<&Spring>, Vec<&Spring>) = springs.springs.iter().partition(|s| s.terms.len() == 1);
+    let (single, several): (Vec<&JointSpring>, Vec<&JointSpring>) =
+        springs.springs.iter().partition(|s| s.terms.len() == 1);
     let writer = Writer { posed, parts, single: &single };
     let _ = write!(
         out,
@@ -60,7 +61,7 @@ pub(super) fn text(robot: &Robot, posed: &Posed, parts: &[Part], springs: &Sprin
 struct Writer<'a> {
     posed: &'a Posed,
     parts: &'a [Part],
-    single: &'a [&'a Spring],
+    single: &'a [&'a JointSpring],
 }
 
 impl Writer<'_> {
@@ -140,7 +141,7 @@ fn section(name: &str, lines: impl Iterator<Item = String>) -> String {
     if lines.is_empty() { lines } else { format!("  <{name}>\n{lines}  </{name}>\n") }
 }
 
-fn tendon(spring: &Spring, axes: &[&Axis], first: usize) -> String {
+fn tendon(spring: &JointSpring, axes: &[&Axis], first: usize) -> String {
     let joints = spring.terms.iter().filter_map(|&(k, factor)| {
         let axis = axes.iter().find(|axis| axis.coordinate == first + k)?;
         Some(format!("<joint joint=\"{}\" coef=\"{factor:?}\"/>", markup(&axis.name)))

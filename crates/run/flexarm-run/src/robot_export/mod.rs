@@ -138,7 +138,7 @@ fn left_out(posed: &Posed) -> Vec<String> {
             named(turning)
         ),
     );
-    add(!arm.hysteresis.is_empty(), "hysteresis of gears".into());
+    add(arm.has_hysteresis(), "hysteresis of gears".into());
     add(!arm.transmission.is_empty(), "transmission errors of gears".into());
     add(!arm.friction.is_empty() || !arm.load_friction.is_empty(), "friction of drives".into());
     add(arm.coupling.is_some(), "motors that move several joints".into());

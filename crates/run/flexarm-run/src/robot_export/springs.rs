@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 const ROUNDING: f64 = 1e-12;
 
 /// A spring with a damper on a sum of elastic coordinates.
-pub(super) struct Spring {
+pub(super) struct JointSpring {
     /// Index of each coordinate, and its factor in the sum.
     pub(super) terms: Vec<(usize, f64)>,
     pub(super) stiffness: f64,
@@ -19,21 +19,12 @@ pub(super) struct Spring {
 pub(super) struct Springs {
     pub(super) K: DMatrix<f64>,
     pub(super) D: DMatrix<f64>,
-    pub(super) springs: Vec<Spring>,
+    pub(super) springs: Vec<JointSpring>,
 }
 
 impl Springs {
     pub(super) fn of(plant: &Plant) -> Self {
-        let (n, first) = (plant.D.nrows(), plant.model.n_actuated());
-        let mut K = DMatrix::zeros(n, n);
-        for element in &plant.elements {
-            let at = element.coordinate - first;
-            K.view_mut((at, at), (element.size, element.size)).copy_from(&element.K);
-        }
-        for &(i, j, k) in &plant.cross_stiffness {
-            (K[(i, j)], K[(j, i)]) = (k, k);
-        }
-        let D = plant.D.clone();
+        let (K, D) = (plant.stiffness(), plant.D.clone());
         let mut springs = Vec::new();
         for group in groups(&K) {
             let k = K.select_rows(&group).select_columns(&group);
@@ -41,7 +32,7 @@ impl Springs {
             let Some(factor) = k.cholesky().map(|c| c.unpack()) else { continue };
             let stiffness = factor.diagonal().map(|x| x * x);
             let L = DMatrix::from_fn(group.len(), group.len(), |i, j| factor[(i, j)] / factor[(j, j)]);
-            springs.extend((0..group.len()).map(|j| Spring {
+            springs.extend((0..group.len()).map(|j| JointSpring {
                 terms: terms(&group, &L.column(j).into_owned()),
                 stiffness: stiffness[j],
                 damping: 0.0,
@@ -68,7 +59,7 @@ impl Springs {
             if group.iter().any(|&i| all.clone().any(|j| !is_small(D[(i, j)] - expected(i, j), i, j))) {
                 continue;
             }
-            let own = |spring: &&mut Spring| spring.terms.iter().all(|(k, _)| group.contains(k));
+            let own = |spring: &&mut JointSpring| spring.terms.iter().all(|(k, _)| group.contains(k));
             self.springs.iter_mut().filter(own).for_each(|spring| spring.damping = beta * spring.stiffness);
             for &i in &group {
                 rest.row_mut(i).fill(0.0);
@@ -81,7 +72,7 @@ impl Springs {
             let SymmetricEigen { eigenvalues, eigenvectors } = scaled.symmetric_eigen();
             for (k, &damping) in eigenvalues.iter().enumerate().filter(|&(_, &d)| d > ROUNDING) {
                 let terms = terms(&group, &eigenvectors.column(k).component_mul(&size));
-                self.springs.push(Spring { terms, stiffness: 0.0, damping });
+                self.springs.push(JointSpring { terms, stiffness: 0.0, damping });
             }
         }
     }

@@ -287,7 +287,7 @@ impl NominalArm {
     /// # Errors
     /// As [`Plant::new`] and [`Plant::with_coupling`].
     pub fn held(&self, q: &[f64]) -> Result<Plant, StepError> {
-        self.coupled(Plant::new(self.model.clone(), self.springs.clone(), Arc::new(Held(q.to_vec())))?)
+        self.coupled(Plant::new(self.model.clone(), self.elastic(), Arc::new(Held(q.to_vec())))?)
     }
 
     /// Returns the arm with drives locked at a pose, only for equilibria.
@@ -295,7 +295,12 @@ impl NominalArm {
     /// # Errors
     /// As [`Plant::at_rest`] and [`Plant::with_coupling`].
     pub fn at_rest(&self, q: &[f64]) -> Result<Plant, StepError> {
-        self.coupled(Plant::at_rest(self.model.clone(), self.springs.clone(), Arc::new(Held(q.to_vec())))?)
+        self.coupled(Plant::at_rest(self.model.clone(), self.elastic(), Arc::new(Held(q.to_vec())))?)
+    }
+
+    /// Springs without hysteresis, which an identification ignores.
+    fn elastic(&self) -> Vec<Spring> {
+        self.springs.iter().map(|spring| Spring { hysteresis: None, ..spring.clone() }).collect()
     }
 
     fn coupled(&self, plant: Plant) -> Result<Plant, StepError> {
@@ -356,18 +361,12 @@ pub(crate) fn scaled(per_kg: &SpatialInertia, kg: f64) -> SpatialInertia {
 
 fn stiffen(spring: &mut Spring, coordinate: Option<usize>, factor: f64) {
     match coordinate {
-        None => {
-            spring.K *= factor;
-            spring.curve = spring.curve.as_ref().map(|curve| curve.scaled(factor));
-        }
-        Some(k) => {
+        Some(k) if spring.K.nrows() > 1 => {
             let root = factor.sqrt();
             spring.K.row_mut(k).scale_mut(root);
             spring.K.column_mut(k).scale_mut(root);
-            if spring.K.nrows() == 1 {
-                spring.curve = spring.curve.as_ref().map(|curve| curve.scaled(factor));
-            }
         }
+        _ => *spring = spring.clone().stiffened(factor),
     }
 }
 

@@ -14,7 +14,7 @@ pub(super) fn check_known(plant: &Plant) -> Result<(), StepError> {
     let unknown = [
         (!plant.torque_driven.is_empty(), "joints driven by torque"),
         (!plant.inertia_changes.is_empty(), CHANGES),
-        (!plant.hysteresis.is_empty(), "gears with hysteresis"),
+        (plant.has_hysteresis(), "gears with hysteresis"),
         (plant.has_guides(), "telescopic guides"),
         (plant.elements.iter().any(|e| e.curve.is_some()), "springs with play or curves"),
         (!plant.transmission.is_empty(), "transmission errors"),
