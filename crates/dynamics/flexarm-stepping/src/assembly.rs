@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use flexarm_kinematics::{Data, Model, State, Wrench, mass_matrix};
+use flexarm_kinematics::{Data, ElasticGroup, Model, State, Wrench, mass_matrix};
 use nalgebra::{DMatrix, DVector};
 
 use crate::error::StepError;
@@ -50,41 +50,8 @@ impl Plant {
                 springs.len()
             )));
         }
-        let mut elements = Vec::new();
-        for (spring, group) in springs.into_iter().zip(groups) {
-            let Spring { name, mut K, damping, mut curve, hysteresis, geometric } = spring.into();
-            if K.shape() != (group.size, group.size) {
-                let (rows, size) = (K.nrows(), group.size);
-                let text = format!("the stiffness of {name:?} has {rows} rows, its joint has {size} coordinates");
-                return Err(StepError::Setup(text));
-            }
-            let Some(mut C) = K.clone().cholesky().map(|c| c.inverse()) else {
-                return Err(StepError::Singular { matrix: "stiffness of an elastic joint", t: 0.0 });
-            };
-            if let Some(law) = &hysteresis {
-                if group.size != 1 {
-                    let text = format!("hysteresis of {name:?}: it needs a spring of one coordinate");
-                    return Err(StepError::Setup(text));
-                }
-                let first_loading = law.first_loading();
-                K[(0, 0)] = first_loading.stiffest();
-                C[(0, 0)] = 1.0 / first_loading.stiffest();
-                curve = Some(first_loading.into());
-            }
-            elements.push(ElasticElement {
-                name,
-                body: group.body,
-                coordinate: group.coordinate,
-                size: group.size,
-                modal: group.modal,
-                K,
-                C,
-                damping,
-                curve,
-                hysteresis,
-                geometric,
-            });
-        }
+        let elements = springs.into_iter().zip(groups).map(|(spring, group)| element(spring.into(), group));
+        let elements = elements.collect::<Result<Vec<_>, _>>()?;
         let n = model.n_elastic();
         Ok(Self {
             model,
@@ -289,4 +256,28 @@ impl Plant {
             self.D.ger(2.0 * zeta / total * omega, &Mphi, &Mphi, 1.0);
         }
     }
+}
+
+/// Assigns a spring to its coordinates.
+fn element(spring: Spring, group: &ElasticGroup) -> Result<ElasticElement, StepError> {
+    let Spring { name, mut K, damping, mut curve, hysteresis, geometric } = spring;
+    let ElasticGroup { body, coordinate, size, modal, .. } = *group;
+    if K.shape() != (size, size) {
+        let rows = K.nrows();
+        let text = format!("the stiffness of {name:?} has {rows} rows, its joint has {size} coordinates");
+        return Err(StepError::Setup(text));
+    }
+    let Some(mut C) = K.clone().cholesky().map(|c| c.inverse()) else {
+        return Err(StepError::Singular { matrix: "stiffness of an elastic joint", t: 0.0 });
+    };
+    if let Some(law) = &hysteresis {
+        if size != 1 {
+            return Err(StepError::Setup(format!("hysteresis of {name:?}: it needs a spring of one coordinate")));
+        }
+        let first_loading = law.first_loading();
+        K[(0, 0)] = first_loading.stiffest();
+        C[(0, 0)] = 1.0 / first_loading.stiffest();
+        curve = Some(first_loading.into());
+    }
+    Ok(ElasticElement { name, body, coordinate, size, modal, K, C, damping, curve, hysteresis, geometric })
 }

@@ -313,15 +313,8 @@ fn fill_from_shapes(
         InertiaEstimate::Density(density) => density,
         InertiaEstimate::TotalMass(mass) => mass / volume,
     };
-    let judged = !by_length && matches!(estimate, InertiaEstimate::TotalMass(_));
-    if let Some((first, _)) = filled.first().filter(|_| judged && !SOLID.contains(&density)) {
-        let message = format!(
-            "the shapes of the links have {volume:.3e} m3 in all, {density:.3} kg/m3; arms have {} to {} by their outer shape",
-            SOLID.start(),
-            SOLID.end()
-        );
-        let help = "check the scale of the meshes and the mass: a robot four times too large has a 64th of its density";
-        report.warning(&robot.links[*first].place, "estimated-density", message, help);
+    if let (false, InertiaEstimate::TotalMass(_), Some((first, _))) = (by_length, estimate, filled.first()) {
+        check_density(&robot.links[*first], volume, density, report);
     }
     for (i, M_L) in filled {
         let inertia =
@@ -337,6 +330,20 @@ fn fill_from_shapes(
         inertias[i] = Some(inertia);
     }
     failures
+}
+
+/// Warns of a density of all shapes that no arm has; `first`: the first link with a shape.
+fn check_density(first: &RawLink, volume: f64, density: f64, report: &mut Report) {
+    if SOLID.contains(&density) {
+        return;
+    }
+    let message = format!(
+        "the shapes of the links have {volume:.3e} m3 in all, {density:.3} kg/m3; arms have {} to {} by their outer shape",
+        SOLID.start(),
+        SOLID.end()
+    );
+    let help = "check the scale of the meshes and the mass: a robot four times too large has a 64th of its density";
+    report.warning(&first.place, "estimated-density", message, help);
 }
 
 /// Returns the inertia of the shapes of a link at unit density; `None` without shapes: such a frame

@@ -27,6 +27,7 @@ use flexarm_stepping::{Damping, GuideTerm, SpringCurve};
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 
 use flexarm_run::Arm;
+use flexarm_run::Drive;
 use flexarm_run::GuideTilt;
 use flexarm_run::Owner;
 use flexarm_run::Robot;
@@ -84,52 +85,14 @@ pub(crate) fn candidates(robot: &Robot, arm: &Arm) -> Vec<Candidate> {
     };
     let mut found = Vec::new();
     for (number, drive) in robot.drives.iter().enumerate() {
-        let mut springs = of(Owner::Drive(number));
-        let Some((gearbox, damping)) = drive.gearbox.as_ref().filter(|_| !springs.is_empty()) else { continue };
-        // A piecewise stiffness curve has no single stiffness, but one with backlash has.
-        if !damping.curves.is_empty() && damping.play.is_empty() {
-            continue;
-        }
-        let slides = arm.model.coordinates().iter().any(|c| c.joint == drive.joint && c.slides());
-        if let Some(seat) = gearbox.seat {
-            // They come before those of the gearbox.
-            let own: Vec<usize> = springs.drain(..2).collect();
-            found.extend(seat_parameters(&drive.joint, seat, &own));
-        }
-        match &gearbox.stiffness {
-            GearStiffness::Guide(_) => found.extend(guide_parameters(&drive.joint, &damping.tilts, &springs, arm)),
-            stiffness => found.extend(gearbox_parameters(&drive.joint, stiffness, &springs, slides)),
-        }
-        let slides = slides && drive.guide().is_none();
-        found.extend(gearbox_damping(&drive.joint, damping.dampers.as_deref().unwrap_or_default(), &springs, slides));
+        found.extend(drive_parameters(drive, of(Owner::Drive(number)), arm));
     }
     for (number, span) in arm.spans.iter().enumerate() {
         let springs = of(Owner::Link(number));
         if robot.stands_on(&span.link) {
             found.extend(mounting_parameters(robot, &springs));
-            continue;
-        }
-        let Some(link) = robot.flexible_links.iter().find(|link| link.flexible.link == span.link) else { continue };
-        let places = springs.iter().map(|spring| SpringPart { spring: *spring, coordinate: None }).collect();
-        let name = format!("link.{}.stiffness_factor", span.link);
-        let written = ParameterLocation::Link { link: span.link.clone() };
-        found.push(stiffness(name, "1", link.stiffness_factor, places, written));
-        let groups = arm.model.elastic();
-        if springs.iter().all(|spring| groups[*spring].size == 6 && !groups[*spring].modal) {
-            found.extend(link_directions(&span.link, &link.stiffness_factors, &springs));
-        }
-        if let ([spring], true) = (&springs[..], link.flexible.coupling) {
-            found.extend(link_entries(link, *spring, arm));
-        }
-        let (unit, initial) = match link.damping {
-            Damping::Modal(zeta) => ("1", zeta),
-            Damping::StiffnessProportional(beta) => ("s", beta),
-            _ => ("1", 1.0),
-        };
-        if initial > 0.0 {
-            let name = format!("link.{}.damping", span.link);
-            let written = ParameterLocation::LinkDamping { link: span.link.clone() };
-            found.push(Candidate::new(name, unit, initial, Effect::Damping(springs.clone()), written));
+        } else if let Some(link) = robot.flexible_links.iter().find(|link| link.flexible.link == span.link) {
+            found.extend(link_parameters(link, &springs, arm));
         }
     }
     if let Some(frame) = arm.model.frame(PAYLOAD_LINK) {
@@ -140,6 +103,56 @@ pub(crate) fn candidates(robot: &Robot, arm: &Arm) -> Vec<Candidate> {
     }
     found.extend(tool_parameters());
     found.extend(frame_parameters(arm));
+    found
+}
+
+/// Returns the stiffnesses and dampers of a drive, whose springs are `springs`.
+fn drive_parameters(drive: &Drive, mut springs: Vec<usize>, arm: &Arm) -> Vec<Candidate> {
+    let mut found = Vec::new();
+    let Some((gearbox, damping)) = drive.gearbox.as_ref().filter(|_| !springs.is_empty()) else { return found };
+    // A piecewise stiffness curve has no single stiffness, but one with backlash has.
+    if !damping.curves.is_empty() && damping.play.is_empty() {
+        return found;
+    }
+    let slides = arm.model.coordinates().iter().any(|c| c.joint == drive.joint && c.slides());
+    if let Some(seat) = gearbox.seat {
+        // They come before those of the gearbox.
+        let own: Vec<usize> = springs.drain(..2).collect();
+        found.extend(seat_parameters(&drive.joint, seat, &own));
+    }
+    match &gearbox.stiffness {
+        GearStiffness::Guide(_) => found.extend(guide_parameters(&drive.joint, &damping.tilts, &springs, arm)),
+        stiffness => found.extend(gearbox_parameters(&drive.joint, stiffness, &springs, slides)),
+    }
+    let slides = slides && drive.guide().is_none();
+    found.extend(gearbox_damping(&drive.joint, damping.dampers.as_deref().unwrap_or_default(), &springs, slides));
+    found
+}
+
+/// Returns the stiffnesses and the damping of a flexible link, whose springs are `springs`.
+fn link_parameters(link: &RobotLink, springs: &[usize], arm: &Arm) -> Vec<Candidate> {
+    let name = &link.flexible.link;
+    let places = springs.iter().map(|spring| SpringPart { spring: *spring, coordinate: None }).collect();
+    let written = ParameterLocation::Link { link: name.clone() };
+    let mut found =
+        vec![stiffness(format!("link.{name}.stiffness_factor"), "1", link.stiffness_factor, places, written)];
+    let groups = arm.model.elastic();
+    if springs.iter().all(|spring| groups[*spring].size == 6 && !groups[*spring].modal) {
+        found.extend(link_directions(name, &link.stiffness_factors, springs));
+    }
+    if let ([spring], true) = (springs, link.flexible.coupling) {
+        found.extend(link_entries(link, *spring, arm));
+    }
+    let (unit, initial) = match link.damping {
+        Damping::Modal(zeta) => ("1", zeta),
+        Damping::StiffnessProportional(beta) => ("s", beta),
+        _ => ("1", 1.0),
+    };
+    if initial > 0.0 {
+        let written = ParameterLocation::LinkDamping { link: name.clone() };
+        let effect = Effect::Damping(springs.to_vec());
+        found.push(Candidate::new(format!("link.{name}.damping"), unit, initial, effect, written));
+    }
     found
 }
 

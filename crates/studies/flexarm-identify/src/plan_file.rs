@@ -11,7 +11,6 @@ use flexarm_settings::written::csv_field;
 use nalgebra::Vector3;
 use serde::Serialize;
 
-use super::parameters;
 use super::plan_load::Efforts;
 use super::{IdentifyFileError, joints_of, nominal};
 use flexarm_run::Arm;
@@ -166,6 +165,16 @@ impl PlanRequest {
         all
     }
 
+    /// Returns the files to write, none of which may be a file of the request or exist already.
+    fn targets(&self) -> Result<Option<[PathBuf; 2]>, Error> {
+        let Some(folder) = &self.output else { return Ok(None) };
+        let targets = [folder.join("measurements.toml"), folder.join("displacements.csv")];
+        let inputs: Vec<&Path> = self.poses.iter().chain(&self.work).map(|path| &**path).collect();
+        check_apart(&targets, &inputs)?;
+        check_free(&targets, self.overwrite)?;
+        Ok(Some(targets))
+    }
+
     /// Returns the reason why the request is invalid, as a sentence.
     fn fault(&self) -> Option<String> {
         if self.count == 0 || !(self.std_m > 0.0 && self.std_m.is_finite()) {
@@ -216,15 +225,9 @@ pub fn plan_measurements(robot: &Robot, request: &PlanRequest) -> Result<Measure
                     plan; add [[flexible_link]] or [[drive]] entries with initial values";
         return Err(IdentifyFileError::Fit(text.into()).into());
     }
-    let targets =
-        request.output.as_ref().map(|folder| [folder.join("measurements.toml"), folder.join("displacements.csv")]);
-    if let Some(targets) = &targets {
-        let inputs: Vec<&Path> = request.poses.iter().chain(&request.work).map(|path| &**path).collect();
-        check_apart(targets, &inputs)?;
-        check_free(targets, request.overwrite)?;
-    }
+    let targets = request.targets()?;
     let fitted = super::chosen(&arm, &nothing_measured(), &request.fit)?;
-    let fitted: Vec<_> = fitted.into_iter().map(|candidate: parameters::Candidate| candidate.parameter).collect();
+    let fitted: Vec<Parameter> = fitted.into_iter().map(|candidate| candidate.parameter).collect();
     let poses = match &request.poses {
         Some(path) => poses_of(path, &joints)?,
         None => spread_poses(&arm),
@@ -236,8 +239,7 @@ pub fn plan_measurements(robot: &Robot, request: &PlanRequest) -> Result<Measure
     }
     let request = &request;
     let reading = |q: &Vec<f64>, setup: &Setup| displacement(q, setup, request.std_m);
-    let setups = request.setups();
-    let pairs = allowed(&efforts, poses.len(), &setups, if chosen_forces { 0 } else { request.count });
+    let pairs = allowed(&efforts, poses.len(), &request.setups(), if chosen_forces { 0 } else { request.count });
     let candidates: Vec<Candidate> =
         pairs.iter().map(|(pose, setup)| Candidate(reading(&poses[*pose], setup))).collect();
     let purpose: Vec<Reading> = match &request.work {

@@ -15,10 +15,11 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! At each pose the results equal those of [`flexarm_run::statics()`] and [`flexarm_run::modes()`]
-//! to the last bit. Drives are locked. Collisions are not checked.
+//! At each pose the results equal those of [`Arm::statics`] and [`Arm::modes`] to the last bit.
+//! Drives are locked. Collisions are not checked.
 #![allow(non_snake_case, reason = "monogram notation: X_WL, K_S; see docs/references.md")]
 
+mod checked_region;
 mod column;
 mod columns;
 mod error;
@@ -63,11 +64,10 @@ pub mod internals {
     pub use crate::region::round_number;
 }
 
+use self::checked_region::region_of;
 use self::columns::Layout;
 use self::evaluate::{Cut, Evaluator};
-use self::finder::Finder;
-use self::region::{MAX_QUERIES, round_number};
-use self::take::{Choice, Evaluation, Places, PoseOf, take};
+use self::take::{Choice, Evaluation, take};
 use flexarm_chatter::{CuttingTool, LobesError, lowest_limit};
 use flexarm_run::caveat::Use;
 use flexarm_run::caveat::motion::of_wrench;
@@ -76,13 +76,6 @@ use flexarm_run::inspect::joint_values;
 use flexarm_run::posed::check_wrench;
 use flexarm_run::robot::tcp_frame;
 use flexarm_run::{Arm, Caveat, Error, Modelling, Robot, Scenario, ValueError, caveat};
-
-/// Number of poses sampled to estimate the reach of the arm.
-const REACH_POSES: usize = 20_000;
-/// Default number of places along the longest edge of a box; fewer for arms whose inverse
-/// kinematics is a numerical search, and for many tool directions.
-const USUAL_PLACES: f64 = 32.0;
-const FEW_PLACES: f64 = 10.0;
 
 /// Poses kept at each place, among all tool directions and branches of the inverse kinematics.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -308,144 +301,6 @@ pub fn map(
     }
 }
 
-/// A checked region.
-enum Region<'m> {
-    Grid(Grid, Box<Finder<'m>>, f64),
-    Poses(usize, Box<PoseOf<'m>>),
-}
-
-impl<'m> Region<'m> {
-    fn as_places<'a>(&'a self, rotations: &'a [nalgebra::Rotation3<f64>]) -> Places<'a>
-    where
-        'm: 'a,
-    {
-        match self {
-            Self::Grid(grid, finder, keep_out_m) => {
-                Places::Grid { grid: *grid, rotations, finder, keep_out_m: *keep_out_m }
-            }
-            Self::Poses(count, values) => Places::Joints { count: *count, values: &**values },
-        }
-    }
-
-    fn grid(&self) -> Option<Grid> {
-        match self {
-            Self::Grid(grid, ..) => Some(*grid),
-            Self::Poses(..) => None,
-        }
-    }
-}
-
-/// Checks the region and returns the places or poses to evaluate.
-fn region_of<'m>(
-    robot: &Robot,
-    request: &'m MapRequest,
-    model: &'m Model,
-    near: &[f64],
-    rotations: &[nalgebra::Rotation3<f64>],
-) -> Result<(Region<'m>, Vec<Caveat>), Error> {
-    if let Some(edges) = request.workpiece_m {
-        if !edges.iter().all(|edge| edge.is_finite() && *edge >= 0.0) {
-            return Err(MapError::Workpiece { found: edges }.into());
-        }
-        if !matches!(request.region, MapRegion::Workspace(_)) {
-            return Err(MapError::WorkpieceWithoutGrid.into());
-        }
-    }
-    match &request.region {
-        MapRegion::Workspace(workspace) => {
-            let found = match (workspace.keep_out_m, workspace.bounds) {
-                (Some(radius), _) => radius,
-                (None, Some(_)) => 0.0,
-                (None, None) => column::radius(robot, model, near),
-            };
-            if !(found.is_finite() && found >= 0.0) {
-                return Err(MapError::KeepOut { found }.into());
-            }
-            let mut finder = Finder::new(model, tcp_frame(model), near.to_vec());
-            let joints = finder.joints();
-            if joints < 6 {
-                return Err(MapError::TooFewJoints { joints }.into());
-            }
-            let mut caveats = Vec::new();
-            if !finder.is_closed() {
-                let message = "the arm has no closed-form inverse kinematics: poses are found by search, which is \
-                               slow and may miss branches, and places near the workspace boundary";
-                caveats.push(Caveat::from_message("searched-poses", "map", message, "map the arm over joint values"));
-            }
-            let bounds = workspace.bounds.unwrap_or_else(|| reach(model));
-            let edge = (0..3).map(|c| bounds[1][c] - bounds[0][c]).fold(0.0, f64::max);
-            let usual = if finder.is_closed() && rotations.len() < 10 { USUAL_PLACES } else { FEW_PLACES };
-            let spacing = workspace.spacing_m.unwrap_or_else(|| round_number(edge.max(1e-3) / usual));
-            let grid = Grid::within(bounds, spacing)?;
-            let queries = grid.places() as f64 * rotations.len() as f64;
-            if queries > MAX_QUERIES {
-                return Err(MapError::TooManyDirections { found: queries, most: MAX_QUERIES }.into());
-            }
-            Ok((Region::Grid(grid, Box::new(finder), found), caveats))
-        }
-        MapRegion::Joints(ranges) => joint_region(ranges, model, near),
-        MapRegion::Poses(poses) => poses::region(poses, model),
-        MapRegion::Along { motion, points } => {
-            if !(1..=MAX_PLACES).contains(points) {
-                return Err(MapError::Instants.into());
-            }
-            let (n, trajectory, points) = (near.len(), &motion.trajectory, *points);
-            let end = trajectory.duration();
-            let values = move |k: usize, q: &mut Vec<f64>| {
-                let t = if points == 1 { 0.0 } else { end * k as f64 / (points - 1) as f64 };
-                q.resize(n, 0.0);
-                let (mut v, mut a) = (vec![0.0; n], vec![0.0; n]);
-                trajectory.sample(t, q, &mut v, &mut a);
-            };
-            Ok((Region::Poses(points, Box::new(values)), Vec::new()))
-        }
-    }
-}
-
-/// Returns the product of the joint values, the first joint varying fastest.
-fn joint_region<'m>(ranges: &'m [JointRange], model: &Model, near: &[f64]) -> Result<(Region<'m>, Vec<Caveat>), Error> {
-    let actuated = &model.coordinates()[..model.n_actuated()];
-    if ranges.is_empty() {
-        return Err(MapError::NoJoints.into());
-    }
-    let (mut numbers, mut caveats, mut poses) = (Vec::new(), Vec::new(), 1.0);
-    for range in ranges {
-        let JointRange { joint, range: [first, last], points } = range;
-        let k = actuated.iter().position(|c| c.joint == *joint).ok_or_else(|| MapError::Joint {
-            found: joint.clone(),
-            known: actuated.iter().map(|c| c.joint.clone()).collect(),
-        })?;
-        if numbers.contains(&k) {
-            return Err(MapError::JointTwice(joint.clone()).into());
-        }
-        if !first.is_finite() || !last.is_finite() || *points == 0 {
-            return Err(MapError::JointRange { joint: joint.clone(), range: range.range, points: *points }.into());
-        }
-        Quantity::JOINT.check_all(&format!("joint {joint:?}"), &range.range).map_err(ValueError::from)?;
-        let limits = actuated[k].limits;
-        if first.min(*last) < limits.lower || first.max(*last) > limits.upper {
-            let (lower, upper) = (limits.lower, limits.upper);
-            let message = format!("the map moves joint {joint:?} beyond its limits {lower} to {upper}");
-            caveats.push(Caveat::from_message("outside-limits", joint, message, "reduce the range of the joint"));
-        }
-        numbers.push(k);
-        poses *= *points as f64;
-    }
-    if poses > MAX_PLACES as f64 {
-        return Err(MapError::TooMany { places: poses, most: MAX_PLACES }.into());
-    }
-    let near = near.to_vec();
-    let values = move |pose: usize, q: &mut Vec<f64>| {
-        q.extend_from_slice(&near);
-        let mut rest = pose;
-        for (&k, range) in numbers.iter().zip(ranges) {
-            q[k] = range.value(rest % range.points);
-            rest /= range.points;
-        }
-    };
-    Ok((Region::Poses(poses as usize, Box::new(values)), caveats))
-}
-
 /// Returns the positions of the joints not varied: as given, or zero clamped to the limits.
 fn home(model: &Model, at: Option<&[f64]>) -> Result<Vec<f64>, Error> {
     let actuated = &model.coordinates()[..model.n_actuated()];
@@ -454,37 +309,6 @@ fn home(model: &Model, at: Option<&[f64]>) -> Result<Vec<f64>, Error> {
         return joint_values(at, &names);
     }
     Ok(actuated.iter().map(|c| 0.0_f64.max(c.limits.lower).min(c.limits.upper)).collect())
-}
-
-/// Returns a box, with a margin, around the TCP positions that the arm reaches within its joint
-/// limits, estimated from many poses.
-fn reach(model: &Model) -> [[f64; 3]; 2] {
-    const PRIMES: [f64; 10] = [2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0, 19.0, 23.0, 29.0];
-    let tool = tcp_frame(model);
-    let actuated = &model.coordinates()[..model.n_actuated()];
-    let range = |k: usize| {
-        let limits = actuated[k].limits;
-        let (lower, upper) = (limits.lower.max(-std::f64::consts::PI), limits.upper.min(std::f64::consts::PI));
-        if lower < upper { (lower, upper) } else { (limits.lower, limits.upper) }
-    };
-    let (mut data, mut q) = (Data::new(model), DVector::zeros(model.nv()));
-    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-    for pose in 0..REACH_POSES {
-        for k in 0..actuated.len() {
-            let (lower, upper) = range(k);
-            // Kronecker sequence with square roots of primes.
-            q[k] = lower
-                + (upper - lower) * (0.5 + PRIMES[k % PRIMES.len()].sqrt() * (pose * (1 + k / 10)) as f64).fract();
-        }
-        forward_kinematics(model, &mut data, &q);
-        let place = data.X_WF(&tool).translation.vector;
-        for c in 0..3 {
-            low[c] = low[c].min(place[c]);
-            high[c] = high[c].max(place[c]);
-        }
-    }
-    let room = [0, 1, 2].map(|c| 0.02 * (high[c] - low[c]));
-    [[0, 1, 2].map(|c| low[c] - room[c]), [0, 1, 2].map(|c| high[c] + room[c])]
 }
 
 /// Computes the figures from the rows.

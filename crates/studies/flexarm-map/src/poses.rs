@@ -8,8 +8,9 @@ use flexarm_settings::{OutOfRange, Quantity};
 use serde::Deserialize;
 use toml::Spanned;
 
+use super::MapError;
+use super::checked_region::Region;
 use super::region::MAX_PLACES;
-use super::{MapError, Region};
 use flexarm_run::inspect::joint_values;
 use flexarm_run::robot_file::Source;
 use flexarm_run::toml_file::parsed;

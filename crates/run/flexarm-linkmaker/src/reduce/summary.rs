@@ -398,15 +398,7 @@ pub(super) fn summary_of(
     let details = link.details.as_deref();
     let gate = details.and_then(|details| details.gate.as_ref());
     let modes: Vec<_> = gate.map_or_else(Vec::new, |gate| gate.modes.iter().map(ModeFigures::from).collect());
-    let mut doubts = reduction.doubts.clone();
-    doubts.extend(modes.first().iter().flat_map(|m| coarse("the mesh", m.lumped_error, m.reduced_error)));
-    doubts.extend(yardsticks::of_link(link, &reduction.whole));
-    doubts.extend(spreads(chosen, file.mesh.nodes.len()));
-    doubts.extend(chosen.iter().filter_map(|one| {
-        let off = (one.interface.X_LI.translation.vector - one.centroid).norm();
-        yardsticks::of_point(&one.interface.name, off, one.extent.norm())
-    }));
-    let caveats: Vec<Caveat> = doubts.into_iter().map(|doubt| doubted(&link.name, doubt)).collect();
+    let caveats = caveats_of(reduction, modes.first(), chosen, file.mesh.nodes.len());
     let kept = reduction.fixed_modes.len();
     ReduceSummary {
         link: link.name.clone(),
@@ -448,6 +440,24 @@ pub(super) fn summary_of(
         caveats,
         files: ReduceFiles::default(),
     }
+}
+
+/// Returns the caveats about a reduction; `nodes`: number of nodes of the mesh.
+fn caveats_of(
+    reduction: &MeshReduction,
+    first_mode: Option<&ModeFigures>,
+    chosen: &[SelectedInterface],
+    nodes: usize,
+) -> Vec<Caveat> {
+    let mut doubts = reduction.doubts.clone();
+    doubts.extend(first_mode.iter().flat_map(|m| coarse("the mesh", m.lumped_error, m.reduced_error)));
+    doubts.extend(yardsticks::of_link(&reduction.link, &reduction.whole));
+    doubts.extend(spreads(chosen, nodes));
+    doubts.extend(chosen.iter().filter_map(|one| {
+        let off = (one.interface.X_LI.translation.vector - one.centroid).norm();
+        yardsticks::of_point(&one.interface.name, off, one.extent.norm())
+    }));
+    doubts.into_iter().map(|doubt| doubted(&reduction.link.name, doubt)).collect()
 }
 
 /// Returns warnings about interfaces that extend over a large share of the distance between the two

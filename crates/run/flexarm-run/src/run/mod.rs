@@ -21,11 +21,12 @@ pub(crate) mod twin;
 mod before;
 mod events;
 mod figures;
+mod request;
 mod sampler;
 mod shares;
 
 use std::ops::ControlFlow;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use flexarm_analysis::{LongRecord, MetricSettings, PathFrame};
@@ -65,6 +66,9 @@ use crate::run::twin::RigidTwin;
 
 pub use before::BeforeRun;
 pub use figures::static_sag;
+pub use request::{Keep, Progress, Run, RunRequest, SampleObserver};
+
+use request::Detail;
 
 /// Name of the servo following error among the contributors to the TCP error.
 const FOLLOWING_ERROR: &str = "following error";
@@ -79,125 +83,9 @@ const POLL_EVERY: usize = 2000;
 /// Maximum number of steps between two calls.
 const RAREST_POLL: usize = 64;
 
-/// Called with simulated and total time (s); breaking stops the run and leaves readable files.
-pub type Progress<'a> = dyn FnMut(f64, f64) -> ControlFlow<()> + 'a;
-
-/// Called with each logged sample; breaking stops the run.
-pub type SampleObserver<'a> = dyn FnMut(&Sample) -> ControlFlow<()> + 'a;
-
-/// Signals kept by a run in addition to its figures.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Keep {
-    /// None; fastest.
-    Figures,
-    /// All logged samples as columns.
-    #[default]
-    Columns,
-    /// Curves of the report, thinned for long runs.
-    Curves,
-}
-
-/// Requested results of a run, and callbacks during the run.
-#[derive(Default)]
-pub struct RunRequest<'a> {
-    /// Signals to keep.
-    pub keep: Keep,
-    /// Recordings and report to write.
-    pub outputs: Option<&'a Outputs>,
-    /// Called with each logged sample.
-    pub observer: Option<&'a mut SampleObserver<'a>>,
-    /// Called at intervals during the run.
-    pub progress: Option<&'a mut Progress<'a>>,
-    /// Recorders in addition to those of `outputs`.
-    pub recorders: Vec<Box<dyn Recorder>>,
-    /// Expected deflections of all runs that are shown together, for a common magnification and
-    /// colour scale.
-    pub expected: Option<Expected>,
-}
-
-impl RunRequest<'_> {
-    /// Returns a request that keeps these signals, without files or callbacks.
-    pub fn keeping(keep: Keep) -> Self {
-        Self { keep, ..Self::default() }
-    }
-}
-
-/// Parts of a sample that are computed; each level includes those before it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum Detail {
-    /// Figures of the summary.
-    Figures,
-    /// Signals of [`flexarm_log::Columns`].
-    Columns,
-    /// Whole samples.
-    Samples,
-    /// Curves, and all contents of recordings.
-    Curves,
-}
-
-impl Detail {
-    fn of(request: &RunRequest<'_>) -> Self {
-        match request.keep {
-            _ if request.outputs.is_some() || !request.recorders.is_empty() => Self::Curves,
-            Keep::Curves => Self::Curves,
-            _ if request.observer.is_some() => Self::Samples,
-            Keep::Columns => Self::Columns,
-            Keep::Figures => Self::Figures,
-        }
-    }
-
-    /// Returns the deflections to expect; only recordings need the magnification.
-    fn expected(self, plant: &Plant, tcp: &Frame, scenario: &Scenario) -> Expected {
-        match self {
-            Self::Curves => Expected::of(plant, tcp, scenario.duration_s(), scenario.start),
-            _ => Expected::default(),
-        }
-    }
-
-    /// Returns an empty trace with the curves of this level.
-    fn trace(self, for_page: bool, head: RunHeader) -> Trace {
-        match for_page {
-            _ if self < Self::Curves => Trace::without_curves(head),
-            true => Trace::for_page(head),
-            false => Trace::new(head),
-        }
-    }
-}
-
 /// Number of samples above which the page is made after the recordings are closed, which saves
 /// memory but takes a little longer.
 const LONG_RUN: u64 = 100_000;
-
-/// Results of a run.
-#[derive(Clone, Debug)]
-pub struct Run {
-    /// Figures, as in `summary.json`.
-    pub summary: Summary,
-    /// Signals; empty unless the request keeps [`Keep::Columns`].
-    pub columns: Columns,
-    /// Curves, thinned for long runs; empty unless the request keeps
-    /// [`Keep::Curves`] or writes recordings.
-    pub trace: Trace,
-}
-
-impl Run {
-    /// Returns the times of the samples (s).
-    pub fn time_s(&self) -> &[f64] {
-        self.values("time")
-    }
-
-    /// Returns the TCP error, flexible minus rigid, world axes (m): three values per sample. Empty
-    /// without the rigid twin.
-    pub fn error_world_m(&self) -> &[f64] {
-        self.values("error_world")
-    }
-
-    /// Returns the values of a signal, row by row; empty if there is no signal with this name.
-    /// [`Columns::columns`] lists the names.
-    pub fn values(&self, name: &str) -> &[f64] {
-        self.columns.column(name).map_or(&[], |column| &column.values)
-    }
-}
 
 impl Arm {
     /// Runs a motion (`&motion`), or a motion with loads, payloads and a start condition
@@ -247,14 +135,14 @@ impl Arm {
 
 /// Runs a scenario.
 pub(crate) fn simulate(
-    built: &Arm,
+    arm: &Arm,
     scenario: &Scenario,
     options: &RunOptions,
     request: RunRequest<'_>,
 ) -> Result<Run, Error> {
     let stopwatch = Stopwatch::start();
-    let (robot, arm) = (built.robot(), built);
-    let Checked { plant, stepper, load_caveats } = built.checked(scenario, options)?;
+    let robot = arm.robot();
+    let Checked { plant, stepper, load_caveats } = arm.checked(scenario, options)?;
     let detail = Detail::of(&request);
     let RunRequest { keep, outputs, mut observer, progress, recorders: more, expected } = request;
     let mut to_the_end = |_, _| ControlFlow::Continue(());
@@ -269,12 +157,7 @@ pub(crate) fn simulate(
     let stress = StressMonitor::new(arm, &plant)?;
     let mut run = RunLoop::new(robot, &scenario.motion, options, arm, plant, stepper, detail);
     run.monitors = run.monitors.with_stress(stress);
-    if let Some(outputs) = outputs {
-        let all: Vec<PathBuf> = files_of_a_run().map(|file| outputs.folder.join(file)).collect();
-        check_apart(&all, &[&robot.path, &robot.urdf_path, &scenario.motion.path])?;
-    }
-    let mut files = recorders(outputs, !more.is_empty())?;
-    files.set.extend(more);
+    let mut files = open_recordings(outputs, more, &[&robot.path, &robot.urdf_path, &scenario.motion.path])?;
     let head = run.header(scenario, &expected);
     files.begin(&head)?;
     write_layouts(outputs, &head)?;
@@ -290,7 +173,7 @@ pub(crate) fn simulate(
         fit_color_scale([&mut run.trace]);
     }
 
-    let (mut summary, mut events) = run.summary(built.robot_caveats().to_vec());
+    let (mut summary, mut events) = run.summary(arm.robot_caveats().to_vec());
     let end = end.map_err(|error| events::beyond_model(error, &summary.caveats));
     if let Err(error) = &end {
         events.push(Event { time_s: run.seen.t, kind: EventKind::Stopped, text: error.to_string() });
@@ -309,6 +192,21 @@ pub(crate) fn simulate(
     });
     how_it_ended(end, write_results(&mut files, outputs, &summary, &run.trace))?;
     Ok(Run { summary, columns: columns.unwrap_or_default(), trace: run.trace })
+}
+
+/// Opens the recordings of a run, none of which may be a file of its input.
+fn open_recordings(
+    outputs: Option<&Outputs>,
+    more: Vec<Box<dyn Recorder>>,
+    input: &[&Path],
+) -> Result<Recordings, Error> {
+    if let Some(outputs) = outputs {
+        let all: Vec<PathBuf> = files_of_a_run().map(|file| outputs.folder.join(file)).collect();
+        check_apart(&all, input)?;
+    }
+    let mut files = recorders(outputs, !more.is_empty())?;
+    files.set.extend(more);
+    Ok(files)
 }
 
 /// Writes the picture of the stress; returns its path.

@@ -108,21 +108,11 @@ fn of_text(
     arguments: &[Value],
     charge: &mut dyn FnMut(usize) -> Result<(), ExpressionError>,
 ) -> Result<Option<Value>, ExpressionError> {
-    let texts: Vec<&str> =
-        arguments.iter().map_while(|a| if let Value::Str(s) = a { Some(&**s) } else { None }).collect();
+    let texts: Vec<&str> = arguments.iter().map_while(Value::as_str).collect();
     let all_texts = texts.len() == arguments.len();
     let set = |chars: &str| chars.chars().collect::<Vec<char>>();
     Ok(Some(match (name, &texts[..]) {
-        ("join", []) if arguments.len() == 1 => {
-            let parts = elements(&arguments[0])?;
-            let parts: Option<Vec<&str>> =
-                parts.iter().map(|p| if let Value::Str(s) = p { Some(&**s) } else { None }).collect();
-            let parts = parts.ok_or_else(|| ExpressionError::new("join() takes texts"))?;
-            charge(
-                parts.iter().fold(text.len().saturating_mul(parts.len()), |sum, part| sum.saturating_add(part.len())),
-            )?;
-            Value::text(parts.join(text))
-        }
+        ("join", []) if arguments.len() == 1 => joined(text, &arguments[0], charge)?,
         ("split", [separator]) if arguments.len() == 2 && !separator.is_empty() => {
             let most =
                 arguments[1].as_int().ok_or_else(|| ExpressionError::new("split() takes a text and a whole number"))?;
@@ -160,16 +150,31 @@ fn of_text(
         ("removesuffix", [part]) => Value::text(text.strip_suffix(part).unwrap_or(text)),
         ("find", [part]) => Value::Int(text.find(part).map_or(-1, |at| text[..at].chars().count() as i128)),
         ("count", [part]) if !part.is_empty() => Value::Int(text.matches(part).count() as i128),
-        ("capitalize", []) => {
-            let mut letters = text.chars();
-            let first = letters.next().map(|c| c.to_uppercase().to_string()).unwrap_or_default();
-            Value::text(first + &letters.as_str().to_lowercase())
-        }
+        ("capitalize", []) => Value::text(capitalized(text)),
         ("title", []) => Value::text(title(text)),
         ("isdigit" | "isnumeric", []) => Value::Bool(!text.is_empty() && text.chars().all(char::is_numeric)),
         ("isalpha", []) => Value::Bool(!text.is_empty() && text.chars().all(char::is_alphabetic)),
         _ => return Ok(None),
     }))
+}
+
+fn joined(
+    separator: &str,
+    list: &Value,
+    charge: &mut dyn FnMut(usize) -> Result<(), ExpressionError>,
+) -> Result<Value, ExpressionError> {
+    let parts = elements(list)?;
+    let parts: Option<Vec<&str>> = parts.iter().map(Value::as_str).collect();
+    let parts = parts.ok_or_else(|| ExpressionError::new("join() takes texts"))?;
+    let separators = separator.len().saturating_mul(parts.len());
+    charge(parts.iter().fold(separators, |sum, part| sum.saturating_add(part.len())))?;
+    Ok(Value::text(parts.join(separator)))
+}
+
+fn capitalized(text: &str) -> String {
+    let mut letters = text.chars();
+    let first = letters.next().map(|c| c.to_uppercase().to_string()).unwrap_or_default();
+    first + &letters.as_str().to_lowercase()
 }
 
 fn title(text: &str) -> String {

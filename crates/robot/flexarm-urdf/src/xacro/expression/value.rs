@@ -70,6 +70,10 @@ impl Value {
     }
 
     /// Integer value; a Boolean counts as one.
+    pub(crate) fn as_str(&self) -> Option<&str> {
+        if let Self::Str(text) = self { Some(text) } else { None }
+    }
+
     pub(crate) fn as_int(&self) -> Option<i128> {
         match self {
             Self::Bool(b) => Some(i128::from(*b)),
