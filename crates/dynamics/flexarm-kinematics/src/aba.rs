@@ -227,12 +227,14 @@ fn pass_inward(model: &Model, data: &mut Data, i: usize, roles: &Roles) {
     if let Some(m) = body.modal {
         eliminate_modal(model, data, i, m, roles.prescribed_modal[m]);
     }
+    // An interface has no coordinate of its own: its body joins the H of the modal body.
     if let JointMotion::Interface { modal, interface } = body.motion {
         gather_interface(model, data, i, modal, interface);
         return;
     }
     let (pA, c) = (data.pA[i], data.bias[i]);
     let (passed_inertia, passed_force) = match body.motion {
+        // Acceleration given: the joint passes the whole inertia on.
         _ if roles.prescribed_body[i] || body.motion == JointMotion::Welded => {
             let I = data.articulated[i];
             (Some(I), pA + I.mul_twist(&c))
@@ -254,6 +256,7 @@ fn pass_inward(model: &Model, data: &mut Data, i: usize, roles: &Roles) {
         }
         JointMotion::Interface { .. } | JointMotion::Welded => return,
     };
+    // (6); the ground takes any wrench.
     if body.parent > 0 {
         let X_PB = data.X_PB[i];
         if let Some(I) = passed_inertia {
@@ -280,6 +283,7 @@ fn finish_bodies(model: &Model, data: &mut Data, roles: &Roles) {
         let body = &model.bodies[i];
         let k = body.coordinate;
         let A = data.A[body.parent].at_child(&data.X_PB[i]) + data.bias[i]; // (7)
+        // Free joints: q̈ by (8) and (10). Prescribed ones: τ = Sᵀ (I_A A' + p_A).
         data.A[i] = match body.motion {
             JointMotion::Interface { .. } => A + subspace_times(model, data, i, data.qddot.as_slice()),
             JointMotion::Welded => A,
@@ -362,6 +366,7 @@ fn eliminate_modal(model: &Model, data: &mut Data, i: usize, m: usize, prescribe
         }
         return;
     }
+    // Factor of H_ηη, in the memory of the last one.
     let mut H = modal.factor.take().map_or_else(|| DMatrix::zeros(entry.n, entry.n), Cholesky::unpack_dirty);
     H.copy_from(&modal.H);
     let Some(factor) = Cholesky::new(H) else {
@@ -468,6 +473,7 @@ fn solve_dense(model: &Model, data: &mut Data, state: &State, roles: &Roles) {
     for &k in free {
         qddot[k] = 0.0;
     }
+    // Right-hand side: τ - bias - M_fp q̈_p, with q̈ zero at the free coordinates.
     nonlinear_effects(model, data, state);
     let bias = data.tau.clone();
     crate::crba::mass_matrix_at_poses(model, data);
@@ -478,6 +484,7 @@ fn solve_dense(model: &Model, data: &mut Data, state: &State, roles: &Roles) {
         Some(factor) => factor.solve_mut(&mut solved),
         None => solved.fill(f64::NAN),
     }
+    // Complete accelerations give all forces.
     for (&k, a) in free.iter().zip(solved.iter()) {
         qddot[k] = *a;
     }

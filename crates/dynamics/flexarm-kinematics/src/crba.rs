@@ -158,6 +158,7 @@ pub(crate) fn composite_bodies<T: Real>(model: &Model, data: &mut Data<T>) {
     for (i, body) in model.bodies.iter().enumerate().skip(1).rev() {
         let (k, own, composite) = (body.coordinate, &data.turned[i], &data.composite[i]);
         let mut lower = Lower::of(&mut data.M, model);
+        // Columns of the body's own joint: F = I_c S, and its diagonal block Sᵀ F.
         match &body.motion {
             JointMotion::Axis(motion) => {
                 let F = axis_wrench(motion, &own.axis, composite);
@@ -173,12 +174,14 @@ pub(crate) fn composite_bodies<T: Real>(model: &Model, data: &mut Data<T>) {
             }
             JointMotion::Interface { .. } => interface_columns(model, data, i),
         }
+        // Columns of modal coordinates against the joint that carries the modal body.
         if let Some(m) = body.modal {
             let mut lower = Lower::of(&mut data.M, model);
             for (k, F) in data.modal[m].columns.iter().enumerate() {
                 lower.meet(model, body, &data.turned[i], model.modal[m].coordinate + k, F);
             }
         }
+        // I_c of P += I_c of B; all wrenches of the subtree move to Po and meet the joint of P.
         if body.parent > 0 {
             let shifted = data.composite[i].shifted(&data.turned[i].r);
             data.composite[body.parent] += shifted;
@@ -209,6 +212,7 @@ fn turn_bodies<T: Real>(model: &Model, data: &mut Data<T>) {
         if let Some(m) = body.modal {
             inertia += data.modal[m].inertia;
         }
+        // R is the identity and r zero: axes and subspace as they are.
         if is_first(i) {
             match &body.motion {
                 JointMotion::Axis(motion) => B.axis = motion.twist(T::splat(body.ratio)),
@@ -218,6 +222,7 @@ fn turn_bodies<T: Real>(model: &Model, data: &mut Data<T>) {
             data.composite[i] = inertia;
             continue;
         }
+        // R_0B = R_0P R_PB and p_PoBo_0 = R_0P p_PoBo_P, 0 being the first body of the arm.
         let (R, r) = (X_PB.rotation.matrix(), &X_PB.translation.vector);
         if is_first(body.parent) {
             B.R = *R;

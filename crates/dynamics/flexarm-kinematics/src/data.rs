@@ -177,6 +177,7 @@ pub(crate) fn joint_motion<T: Real>(
             let (q, qdot) = (&q[k..k + 6], &qdot[k..k + 6]);
             let ddot = Vector3::new(qdot[0], qdot[1], qdot[2]);
             let rates = Vector3::new(qdot[3], qdot[4], qdot[5]);
+            // R_PB, and B with w_PB_B = B φ̇, at the angles φ.
             let kin = angles.kinematics(&Vector3::new(q[3], q[4], q[5]), &rates);
             place_elastic(&mut data.X_PB[i], body, &kin.R, &Vector3::new(q[0], q[1], q[2]));
             let L = transposed(&kin.R);
@@ -191,6 +192,7 @@ pub(crate) fn joint_motion<T: Real>(
             let moving = k..k + modal.tables.moving[interface];
             let (d, phi) = shape.times(&q[moving.clone()]);
             let (ddot, rates) = shape.times(&qdot[moving]);
+            // The interface moves by d and turns by φ, both from the shapes: d = Φ_t η, φ = Φ_r η.
             let kin = ElasticAngles::RotationVector.kinematics(&phi, &rates);
             place_elastic(&mut data.X_PB[i], body, &kin.R, &d);
             let L = transposed(&kin.R);

@@ -89,10 +89,12 @@ pub fn inverse_kinematics(
     let weigh = |e: &Vector6<f64>| Vector6::from_fn(|i, _| if i < 3 { e[i] } else { e[i] * length });
 
     for iteration in 0..options.max_iterations {
+        // Done: position and rotation are within their tolerances.
         let (position_m, rotation_rad) = sizes(&error);
         if position_m <= options.position_tolerance_m && rotation_rad <= options.rotation_tolerance_rad {
             return Ok(q);
         }
+        // Rows of rotation times the characteristic length, so that all errors are lengths (m).
         frame_jacobian(model, data, frame, &mut J);
         let mut Jw = DMatrix::from_fn(6, n, |r, c| if r < 3 { J[(r, c)] } else { J[(r, c)] * length });
         let e = weigh(&error);
@@ -101,6 +103,7 @@ pub fn inverse_kinematics(
         let scale = Jw.norm_squared().max(1e-12);
         let mut improved = false;
         for _ in 0..25 {
+            // Levenberg-Marquardt step: (Jᵀ J + λ 1) Δq = Jᵀ e.
             let A = Jw.tr_mul(&Jw) + DMatrix::identity(n, n) * (damping * scale);
             let Some(factor) = A.cholesky() else { break };
             let step = factor.solve(&Jw.tr_mul(&e));

@@ -124,6 +124,7 @@ pub(crate) fn tree_jacobian<T: Real>(
     J.fill(T::zero());
     let p_T = data.X_WF(frame).translation.vector;
     let mut i = frame.body;
+    // From the frame to the base: column of each joint moved from Bo to To, v_To = v_Bo + w × r.
     while i > 0 {
         let X_WB = &data.X_WB[i];
         let r = sub(&p_T, &X_WB.translation.vector);
@@ -215,6 +216,7 @@ pub fn frame_jacobian_derivative(model: &Model, data: &Data, state: &State, fram
     let p_T = (data.X_WB[frame.body] * frame.X_BF).translation.vector;
     let v_T = frame_twist(data, frame).linear;
     let mut i = frame.body;
+    // Derivative of the columns l + a × r: l' + a' × r + a × r'.
     while i > 0 {
         let R = data.X_WB[i].rotation.matrix();
         let (v_B, w_B) = (R * data.V[i].linear, R * data.V[i].angular);

@@ -147,6 +147,7 @@ fn with_balancers(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64], qddot
 #[inline(always)]
 pub(crate) fn newton_euler<T: Real>(model: &Model, data: &mut Data<T>, q: &[T], qdot: &[T], qddot: Option<&[T]>) {
     let n = model.bodies.len();
+    // Ground: at rest, its acceleration -g stands for gravity.
     data.V[0] = Twist::zeros();
     data.A[0] = Twist::new(lift(&-model.gravity), Vector3::zeros());
     data.F[0] = Wrench::zeros();
@@ -155,6 +156,7 @@ pub(crate) fn newton_euler<T: Real>(model: &Model, data: &mut Data<T>, q: &[T], 
     if let Some(m) = model.bodies[0].modal {
         add_modal_forces(model, data, 0, m, qdot, qddot);
     }
+    // Outward pass; q̈ = 0 if there is none.
     for i in 1..n {
         let body = &model.bodies[i];
         let (V_PB, bias) = joint_motion(model, data, i, q, qdot);
@@ -173,6 +175,7 @@ pub(crate) fn newton_euler<T: Real>(model: &Model, data: &mut Data<T>, q: &[T], 
             add_modal_forces(model, data, i, m, qdot, qddot);
         }
     }
+    // Inward pass, then the rotors, which turn with their joints alone.
     carry_inward(model, data);
     if let Some(qddot) = qddot {
         add_rotors(model, data, qddot);

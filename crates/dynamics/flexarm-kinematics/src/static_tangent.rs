@@ -248,6 +248,7 @@ impl<T: Real> StaticTangent<T> {
     /// Sums the loads over subtrees and assembles `G`.
     #[inline(always)]
     fn finish(&mut self, model: &Model, data: &Data<T>, q: &[T], G: &mut [T]) {
+        // Loads of each subtree, by (2).
         for i in (1..model.bodies.len()).rev() {
             let parent = model.bodies[i].parent;
             let (inner, outer) = self.carried.split_at_mut(i);
@@ -266,6 +267,7 @@ impl<T: Real> StaticTangent<T> {
     fn place_columns(&mut self, model: &Model, data: &Data<T>) {
         for column in &mut self.columns {
             let (i, body) = (column.body, &model.bodies[column.body]);
+            // Twist of the coordinate, at the world's origin, in W axes: w = R a_B, v = R l_B + p × w.
             let X_WB = &data.X_WB[i];
             let (R, p) = (X_WB.rotation.matrix(), &X_WB.translation.vector);
             let S_B = match body.motion {
@@ -315,6 +317,7 @@ impl<T: Real> StaticTangent<T> {
         let mut columns = &self.columns[..];
         while let Some(head) = columns.first() {
             let i = head.body;
+            // Columns of one joint, which come together.
             let mut count = 1;
             while count < columns.len() && columns[count].body == i {
                 count += 1;
@@ -333,6 +336,7 @@ impl<T: Real> StaticTangent<T> {
                 }
                 JointMotion::Axis(_) | JointMotion::Welded => continue,
             };
+            // Force f and moment n about Bo of what the joint carries, in B axes.
             let (S, X_WB) = (&data.elastic[i], &data.X_WB[i]);
             let R = X_WB.rotation.matrix();
             let f = &self.carried[i].f;

@@ -26,6 +26,7 @@ pub(crate) fn place_balancers(
         if !law.is_finite() {
             return Err(ModelError::NotFinite { what: "law of balancer", name: name.clone() });
         }
+        // Ends of the balancer: two points on bodies, or the sum of the coordinates over its joint.
         let fail = |what: &'static str| ModelError::BadBalancer { balancer: name.clone(), what };
         let frame =
             |link: &String, what: &'static str| frames.iter().find(|f| f.name == *link).ok_or_else(|| fail(what));
@@ -63,6 +64,7 @@ fn over_joint(bodies: &[Body], joint: &str, child: usize) -> Option<BalancerPlac
     let mut i = child;
     loop {
         let body = &bodies[i];
+        // A joint contributes the share of its axis along that of the balancer's joint.
         match body.motion {
             JointMotion::Axis(motion) => {
                 let share = motion.axis().dot(&axis);

@@ -40,6 +40,7 @@ pub(crate) fn draft_loops<'m>(
         if drafts.iter().any(|other| other.closure.name == closure.name) {
             return Err(ModelError::Duplicate { what: "loop", name: closure.name.clone() });
         }
+        // A joint follows from one loop only.
         let draft = LoopDraft::new(closure, mechanism, frames, bodies)?;
         for other in &drafts {
             if let Some(&body) = draft.dependent.iter().find(|body| other.dependent.contains(body)) {
@@ -52,6 +53,7 @@ pub(crate) fn draft_loops<'m>(
         }
         drafts.push(draft);
     }
+    // Next is a loop whose chains contain no dependent joint of the loops that remain.
     let mut ordered: Vec<LoopDraft<'m>> = Vec::new();
     while !drafts.is_empty() {
         let rests =
@@ -94,17 +96,20 @@ impl<'m> LoopDraft<'m> {
             path.reverse();
             path
         };
+        // Chains from the last common body to pin and eye.
         let (to_pin, to_eye) = (path(pin.body), path(eye.body));
         let shared = to_pin.iter().zip(&to_eye).take_while(|(a, b)| a == b).count();
         let common = to_pin[shared - 1];
         let chains = [to_pin[shared..].to_vec(), to_eye[shared..].to_vec()];
         let dependent = dependent_bodies(closure, mechanism, bodies, &chains)?;
+        // The two dependent joints are in one chain, or one in each.
         let place = |body: usize| chains.iter().position(|chain| chain.contains(&body)).unwrap_or(0);
         let at = |body: usize| chains[place(body)].iter().position(|i| *i == body);
         let shape = match (place(dependent[0]), place(dependent[1])) {
             (a, b) if a == b => Shape::OneChain { chain: a, inner: usize::from(at(dependent[0]) > at(dependent[1])) },
             (a, _) => Shape::BothChains { of_pin: a },
         };
+        // Frame of the pin, its z axis along the axis of the pin.
         let turn = Rotation3::rotation_between(&Vector3::z(), &closure.axis)
             .unwrap_or_else(|| Rotation3::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI));
         let X_pin = pin.X_BF * Pose::from_parts(Vector3::zeros().into(), turn);
@@ -121,6 +126,7 @@ impl<'m> LoopDraft<'m> {
     /// later by [`super::assemble`].
     pub(crate) fn placed(&self, bodies: &[Body], nv: usize, modal_size: impl Fn(usize) -> usize) -> PlacedLoop {
         let mut moved_by: Vec<usize> = Vec::new();
+        // Coordinates that move pin or eye, apart from the dependent ones.
         for &i in self.chains.iter().flatten().filter(|i| !self.dependent.contains(i)) {
             let k = bodies[i].coordinate;
             match bodies[i].motion {

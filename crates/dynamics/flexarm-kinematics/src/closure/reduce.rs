@@ -14,6 +14,7 @@ pub(super) fn reduce(A: &DMatrix<f64>, solved: &Solved, first: usize, to: &mut D
     let T = |d: usize, j: usize| solved.T[d * solved.nv + first + j];
     for j in 0..n {
         for i in 0..n {
+            // A_ij + A_id T_dj + T_di (A_dj + A_de T_ej), sums over the dependent d and e.
             let mut sum = A[(i, j)];
             for d in 0..nd {
                 let (left, right) = (T(d, i), T(d, j));
