@@ -133,6 +133,8 @@ impl Plant {
             let text = format!("the servo's rigid robot has {} coordinates, the arm has {n} drives", servo.rigid.nv());
             return Err(StepError::Setup(text));
         }
+        // A motor needs an inertia of its own or a body behind it, and a load that its friction can
+        // read.
         for &k in &self.torque_driven {
             let mut bodies = self.model.bodies().iter().enumerate().skip(1);
             let body = bodies.find(|(_, b)| b.coordinate == k && !b.elastic);

@@ -85,12 +85,14 @@ impl ElasticTree {
         nodes.resize_with(self.joints.len(), || TreeNode::new(None));
         let mut next = 0;
         for (i, body) in model.bodies().iter().enumerate().skip(1) {
+            // Pose in the last elastic body inward, Q.
             let (carrier, X_QP) = self.carriers[body.parent];
             let X_QB = X_QP * data.X_PB[i];
             self.carriers[i] = (carrier, X_QB);
             if self.joints.get(next).is_some_and(|joint| joint.body == i) {
                 let X_PB = &data.X_PB[i];
                 let joint = &mut self.joints[next];
+                // An elastic body: S = [L 0; 0 B] of its joint, and X = S_B^-1 Ad_BQ S_Q.
                 let phi = state.q.fixed_rows::<3>(joint.coordinate + 3).into_owned();
                 joint.L = X_PB.rotation.matrix().transpose() * body.X_PJ.rotation.matrix();
                 joint.B = joint.angles.pose(&phi).1;
@@ -104,6 +106,7 @@ impl ElasticTree {
                 self.carriers[i] = (Some(next), Pose::identity());
                 next += 1;
             }
+            // M_BBo of the elastic body and of all that it carries rigidly.
             if let (Some(j), X) = &self.carriers[i] {
                 self.joints[*j].inertia += body.inertia.at_parent(X);
             }

@@ -18,7 +18,7 @@ use crate::tree_matrix::TreeInverse;
 /// `J^-1`, or the inverse of `J = M + (c_D D + c_K K) (1 + s M^-1 K)`.
 #[derive(Clone, Debug)]
 pub(crate) struct IterationMatrix {
-    pub(crate) way: MatrixForm,
+    pub(crate) form: MatrixForm,
     /// Factor s, if any.
     s: Option<f64>,
 }
@@ -32,12 +32,12 @@ pub(crate) enum MatrixForm {
     Tree(TreeInverse),
 }
 
-/// `(S + C)^-1 B`; after reading, `S = M`, `C = c_D D + c_K K` and `B = 1`. All are n × n; S and C
-/// are symmetric.
+/// `(M + C)^-1 B`; after reading, `C = c_D D + c_K K` and `B = 1`. All are n × n; M and C are
+/// symmetric.
 #[derive(Clone, Debug)]
 pub(crate) struct DenseInverse {
     /// M; after the inversion the factor.
-    pub(crate) S: DMatrix<f64>,
+    pub(crate) M: DMatrix<f64>,
     pub(crate) C: DMatrix<f64>,
     /// Bᵀ; after the inversion the inverse.
     pub(crate) inverse: DMatrix<f64>,
@@ -48,19 +48,19 @@ impl DenseInverse {
     /// Allocates matrices for n coordinates.
     fn new(n: usize) -> Self {
         let square = || DMatrix::zeros(n, n);
-        Self { S: square(), C: square(), inverse: square(), product: DVector::zeros(n) }
+        Self { M: square(), C: square(), inverse: square(), product: DVector::zeros(n) }
     }
 
     fn read(&mut self, system: &mut impl SecondOrderSystem, c_D: f64, c_K: f64) {
-        system.mass(&mut self.S);
+        system.mass(&mut self.M);
         system.damping_and_stiffness(c_D, c_K, &mut self.C);
         self.inverse.fill_with_identity();
     }
 
     fn invert(&mut self, t: f64) -> Result<(), StepError> {
-        self.S += &self.C;
-        let n = self.S.nrows();
-        match solve_in_place(self.S.as_mut_slice(), self.inverse.as_mut_slice(), n) {
+        self.M += &self.C;
+        let n = self.M.nrows();
+        match solve_in_place(self.M.as_mut_slice(), self.inverse.as_mut_slice(), n) {
             true => Ok(()),
             false => Err(StepError::Singular { matrix: "iteration matrix", t }),
         }
@@ -75,7 +75,7 @@ impl DenseInverse {
 impl IterationMatrix {
     /// Creates the matrix; the number of coordinates is that of the system read first.
     pub(crate) fn new() -> Self {
-        Self { way: MatrixForm::Tree(TreeInverse::default()), s: None }
+        Self { form: MatrixForm::Tree(TreeInverse::default()), s: None }
     }
 
     /// Reads M and `c_D D + c_K K` at the configuration of the last residual of the system; `s` as
@@ -83,13 +83,13 @@ impl IterationMatrix {
     pub(crate) fn read(&mut self, system: &mut impl SecondOrderSystem, c_D: f64, c_K: f64, s: Option<f64>) {
         self.s = s;
         // A system whose matrices were dense once keeps dense matrices.
-        if let MatrixForm::Tree(tree) = &mut self.way {
+        if let MatrixForm::Tree(tree) = &mut self.form {
             if system.along_tree(c_D, c_K, &mut tree.matrices) {
                 return;
             }
-            self.way = MatrixForm::Dense(DenseInverse::new(system.dimension()));
+            self.form = MatrixForm::Dense(DenseInverse::new(system.dimension()));
         }
-        if let MatrixForm::Dense(dense) = &mut self.way {
+        if let MatrixForm::Dense(dense) = &mut self.form {
             dense.read(system, c_D, c_K);
         }
     }
@@ -99,7 +99,7 @@ impl IterationMatrix {
     /// # Errors
     /// [`StepError::Singular`] if J, or along a tree M, is not positive definite.
     pub(crate) fn invert(&mut self, t: f64) -> Result<(), StepError> {
-        match &mut self.way {
+        match &mut self.form {
             MatrixForm::Dense(dense) => dense.invert(t),
             MatrixForm::Tree(tree) => tree.factor(self.s, t),
         }
@@ -107,7 +107,7 @@ impl IterationMatrix {
 
     /// Replaces `r` by `d = J^-1 r`; returns `|d|`.
     pub(crate) fn solve(&mut self, r: &mut DVector<f64>) -> f64 {
-        match &mut self.way {
+        match &mut self.form {
             MatrixForm::Dense(dense) => dense.solve(r),
             MatrixForm::Tree(tree) => tree.solve(r),
         }

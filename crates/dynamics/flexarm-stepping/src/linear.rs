@@ -134,12 +134,14 @@ pub fn linearise(plant: &Plant, tool: &Frame, F_T_W: &Wrench, t: f64) -> Result<
     // Indices of the free coordinates.
     let free: Vec<usize> = plant.torque_driven.iter().copied().chain(m..nv).collect();
     let n = free.len();
+    // Equilibrium, and the static forces p there.
     let mut data = Data::new(model);
     let statics = Statics { plant, tool, F_T_W: *F_T_W, t };
     let Equilibrium { e, residual, iterations } = statics.equilibrium(&mut data)?;
     let q = all_coordinates(plant, t, &e);
     let p = statics.forces(&mut data, &q);
 
+    // Free coordinates: K = springs + ∂p/∂q, D, M, and the Jacobian of the tool.
     let slopes = statics.slopes(&mut data, &q);
     let springs = among_free(&for_vibration(plant, &plant.stiffness(), q.as_slice(), &e), driven);
     let K = statics.tangent(&springs, &slopes, &free)?;

@@ -22,6 +22,7 @@ pub fn modes_at(plant: &Plant, t: f64) -> Result<Modes, StepError> {
     let mut data = Data::new(&plant.model);
     let (mut state, mut qddot) = (State::zeros(model), DVector::zeros(model.nv()));
     plant.prescribed_state(t, &mut state, &mut qddot);
+    // K_t = K + ∂g/∂e and M at the equilibrium.
     let K = for_vibration(plant, &plant.stiffness(), state.q.as_slice(), &equilibrium);
     let Kt = tangent_stiffness(plant, &mut data, t, &equilibrium, &K);
     let na = model.n_actuated();
@@ -41,6 +42,7 @@ pub fn modes_at(plant: &Plant, t: f64) -> Result<Modes, StepError> {
     order.sort_by(|&i, &j| eigen.eigenvalues[j].total_cmp(&eigen.eigenvalues[i]));
 
     let mut modes = Modes { omega: Vec::with_capacity(n), shapes: DMatrix::zeros(n, n), equilibrium, residual: 0.0 };
+    // φ = L^-T y, scaled to φᵀ M φ = 1; the residual checks the eigensolver.
     for (column, &k) in order.iter().enumerate() {
         let value = eigen.eigenvalues[k];
         if value.is_nan() || value <= 0.0 {

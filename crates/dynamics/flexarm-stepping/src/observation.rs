@@ -130,6 +130,7 @@ fn element_loads(
     let [dampers, springs] = rooms.map(|room| &mut room[..rates.len()]);
     dampers.fill(0.0);
     springs.fill(0.0);
+    // D ė, then per element K e, its energy and -(K e + D ė).
     plant.add_damping(rates, dampers);
     let mut energy = 0.0;
     for (load, element) in loads.iter_mut().zip(&plant.elements) {

@@ -86,6 +86,7 @@ pub fn static_targets(
     let mut targets = DVector::from_column_slice(q);
     let mut before = None;
     for iterations in 0..=MAX_ITERATIONS {
+        // Where the tool is at rest with the motors at the targets.
         let held = plant.along(Arc::new(Held(targets.as_slice().to_vec())));
         let at = linearise(&held, tool, F_T_W, t)?;
         let off = displacement(&wanted, &at.X_WT);
@@ -99,6 +100,8 @@ pub fn static_targets(
             }
             return Ok(StaticTargets { q, before, after, iterations });
         }
+        // Newton's method: Δq = -G⁺ (what is left), G = d(tool pose)/d(targets); the pseudo-inverse
+        // gives the shortest step.
         let G = at.command_slopes().unwrap_or_else(|| at.J_a.clone()).select_rows(&rows);
         if iterations == MAX_ITERATIONS || !G.norm_squared().is_finite() {
             let norm = |range: std::ops::Range<usize>| {

@@ -120,11 +120,13 @@ impl Rotation {
     fn linearise(&mut self, tool: &Frame, found: Equilibrium, rates: &[f64]) -> Result<SteadyRotation, StepError> {
         let Equilibrium { e, residual, iterations } = found;
         let e = &e;
+        // Matrices about the steady state, by central differences of r.
         let (K, D) = (self.slopes(e, false), self.slopes(e, true));
         let (r, scale) = self.unbalanced(e)?;
         let (m, n) = (rates.len(), e.len());
         let mut M = DMatrix::zeros(n, n);
         self.system.mass(&mut M);
+        // Torques that keep the rotation, and poses and Jacobian of the tool.
         self.system.evaluate(0.0, e, &self.zero, &self.zero);
         let holding = self.system.data.tau.rows(0, m).into_owned();
         let q = self.system.state.q.clone();
@@ -136,6 +138,7 @@ impl Rotation {
         }
         let mut J = Matrix6xX::zeros(plant.model.nv());
         frame_jacobian(&plant.model, &data, tool, &mut J);
+        // r after a turn by one radian: the same for steady rotation.
         let fastest = rates.iter().fold(0.0_f64, |most, rate| most.max(rate.abs()));
         let later = self.forces(1.0 / fastest.max(f64::MIN_POSITIVE), e, &self.zero.clone());
         let linear = Linear {

@@ -273,6 +273,7 @@ impl<const F: usize> Elimination<F> {
         for (j, own) in tree.iter().enumerate().rev() {
             let (inner, outer) = self.nodes.split_at_mut(j);
             let node = &mut outer[0];
+            // Pivot Δ = Î + S.
             node.inverse = node.inertia;
             for (to, S) in node.inverse.iter_mut().flatten().zip(own.springs::<F>(s).iter().flatten()) {
                 *to += S;
@@ -290,6 +291,7 @@ impl<const F: usize> Elimination<F> {
                     passed[i][c].set_column(k, &stretched[i]);
                 }
             }
+            // Î of the parent takes Xᵀ S Δ^-1 Î X.
             let Some(p) = own.parent else { continue };
             for (to, passed) in inner[p].inertia.iter_mut().flatten().zip(passed.iter().flatten()) {
                 *to += own.inertia_inward(passed);

@@ -165,7 +165,7 @@ fn subtract<T: Real>(to: &mut [T], factor: T, from: &[T]) {
     }
 }
 
-/// Computes `S C Sᵀ` with `Sᵀ = 1 + c X` for a symmetric C; both workspaces are n × n.
+/// Computes `Eᵀ C E` with `E = 1 + c X` for a symmetric C; both workspaces are n × n.
 #[inline(always)]
 pub fn congruence(c: f64, X: &[f64], C: &[f64], n: usize, room: [&mut [f64]; 2], product: &mut [f64]) {
     let [room, Xt] = room;

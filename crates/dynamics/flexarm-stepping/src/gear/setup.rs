@@ -26,6 +26,7 @@ impl Plant {
                 "a coupling of {n} joints needs {n} straight springs of one coordinate, or none, and a {n}x{n} matrix"
             )));
         }
+        // Stiffness and damping over the joints: C^-T diag(k) C^-1.
         let (mut stiffness, mut damping) = (Vec::new(), Vec::new());
         for &k in &coupling.elements {
             let element = &self.elements[k];
@@ -34,6 +35,7 @@ impl Plant {
         }
         let K = GearCoupling::on_joints(&coupling.C_inverse, &stiffness_of(n, &stiffness));
         let D = GearCoupling::on_joints(&coupling.C_inverse, &stiffness_of(n, &damping));
+        // Off-diagonal entries become cross terms, the diagonal replaces that of the motors' springs.
         for (i, &k) in coupling.elements.iter().enumerate() {
             let row = self.offset(&self.elements[k]);
             for (j, &l) in coupling.elements.iter().enumerate().skip(i + 1) {

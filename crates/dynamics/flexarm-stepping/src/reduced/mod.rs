@@ -68,6 +68,7 @@ impl ReducedArm {
         let model = &plant.model;
         let n = plant.n_free();
         let driven = plant.torque_driven.clone();
+        // Prescribed: actuated joints that no servo drives. All others are free.
         let roles = Roles::new(model, |k| k < model.n_actuated() && !driven.contains(&k));
         let geometric = plant.elements.iter().any(|e| e.geometric.is_some());
         Self {

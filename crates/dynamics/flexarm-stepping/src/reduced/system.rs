@@ -41,6 +41,8 @@ impl SecondOrderSystem for ReducedArm {
         self.set(t, x, v);
         self.is_placed = true;
         let mut forces = std::mem::replace(&mut self.forces, DVector::zeros(0));
+        // Springs, dampers and friction push the free coordinates; geometric stiffness depends on
+        // the accelerations and is iterated.
         for pass in 0..GEOMETRIC_PASSES {
             forces.fill(0.0);
             if pass > 0 {

@@ -192,6 +192,7 @@ fn free_rates(plant: &Plant) -> Result<(f64, f64), StepError> {
     plant.prescribed_state(0.0, &mut state, &mut qddot);
     state.q.rows_mut(na, plant.modes.equilibrium.len()).copy_from(&plant.modes.equilibrium);
     let mut data = Data::new(model);
+    // M, K and D over the driven joints and the elastic coordinates; driven joints have no spring.
     let M = mass_matrix(model, &mut data, &state.q);
     let free: Vec<usize> = plant.torque_driven.iter().copied().chain(na..model.nv()).collect();
     let (n, driven) = (free.len(), plant.torque_driven.len());
@@ -203,6 +204,7 @@ fn free_rates(plant: &Plant) -> Result<(f64, f64), StepError> {
         D[(i, i)] = plant.friction.get(*k).map_or(0.0, |f| f.viscous);
     }
     let singular = StepError::Singular { matrix: "mass matrix", t: 0.0 };
+    // Largest eigenvalues of L^-1 K L^-T (ω²) and of L^-1 D L^-T (decay), M = L Lᵀ.
     let L = M.cholesky().ok_or(singular.clone())?.l();
     let largest = |A: &DMatrix<f64>| {
         let half = L.solve_lower_triangular(A)?;

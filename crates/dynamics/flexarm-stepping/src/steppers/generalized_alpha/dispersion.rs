@@ -2,9 +2,9 @@
 //! accelerations and on Newton's matrix.
 //!
 //! ```text
-//! x̃ = Sᵀ ẍ,   Sᵀ = 1 + c h² M^-1 K                   (6)
-//! J = M + C Sᵀ,   C = h γ' D + h² β' K               (7)  derivative of (1) by ẍ⁺
-//! S J = M + c h² K + S C Sᵀ,   J^-1 = (S J)^-1 S     (8)  symmetric for every damping, unlike J
+//! x̃ = E ẍ,   E = 1 + c h² M^-1 K                         (6)
+//! J = M + C E,   C = h γ' D + h² β' K                    (7)  derivative of (1) by ẍ⁺
+//! Eᵀ J = M + c h² K + Eᵀ C E,   J^-1 = (Eᵀ J)^-1 Eᵀ      (8)  symmetric for every damping, unlike J
 //! ```
 //! Along a tree the matrix contains the complete correction: [`crate::tree_matrix`].
 
@@ -27,7 +27,7 @@ pub(super) struct DispersionCorrection {
     /// `M^-1 K` at the configuration of the last matrix.
     M_inverse_K: DMatrix<f64>,
     /// Workspace for the factor of M and for products.
-    room: [DMatrix<f64>; 3],
+    workspace: [DMatrix<f64>; 3],
     /// Product of `M^-1 K` and a vector.
     shift: DVector<f64>,
 }
@@ -41,7 +41,7 @@ impl DispersionCorrection {
             c_h2: c * h * h,
             K: none.clone(),
             M_inverse_K: none.clone(),
-            room: [none.clone(), none.clone(), none],
+            workspace: [none.clone(), none.clone(), none],
             shift: DVector::zeros(n),
         }
     }
@@ -68,15 +68,15 @@ impl DispersionCorrection {
         t: f64,
         kept: bool,
     ) -> Result<(), StepError> {
-        let MatrixForm::Dense(matrix) = &mut matrix.way else { return Ok(()) };
-        let Self { c_h2, K, M_inverse_K, room: [factor, turned, product], shift, .. } = self;
+        let MatrixForm::Dense(matrix) = &mut matrix.form else { return Ok(()) };
+        let Self { c_h2, K, M_inverse_K, workspace: [factor, turned, product], shift, .. } = self;
         let (c_h2, n) = (*c_h2, shift.len());
         if K.nrows() != n {
             for matrix in [&mut *K, &mut *M_inverse_K, &mut *factor, &mut *turned, &mut *product] {
                 *matrix = DMatrix::zeros(n, n);
             }
         }
-        factor.copy_from(&matrix.S);
+        factor.copy_from(&matrix.M);
         system.stiffness(K);
         // M^-1 K; K is symmetric.
         if !kept {
@@ -86,13 +86,13 @@ impl DispersionCorrection {
             }
         }
 
-        // Product S C Sᵀ.
+        // Product Eᵀ C E.
         let (X, C) = (M_inverse_K.as_slice(), matrix.C.as_slice());
         congruence(c_h2, X, C, n, [factor.as_mut_slice(), turned.as_mut_slice()], product.as_mut_slice());
         matrix.C.copy_from(product);
 
-        // M + c h² K, and Sᵀ as right-hand side, stored transposed.
-        matrix.S.zip_apply(K, |s, k| *s += c_h2 * k);
+        // M + c h² K, and Eᵀ as right-hand side, stored transposed.
+        matrix.M.zip_apply(K, |s, k| *s += c_h2 * k);
         matrix.inverse.zip_apply(M_inverse_K, |i, s| *i += c_h2 * s);
         Ok(())
     }
@@ -104,7 +104,7 @@ impl DispersionCorrection {
         acceleration: &DVector<f64>,
         x_tilde: &mut DVector<f64>,
     ) {
-        if let MatrixForm::Tree(tree) = &mut matrix.way {
+        if let MatrixForm::Tree(tree) = &mut matrix.form {
             return tree.correct(acceleration, x_tilde);
         }
         self.shift_by(acceleration);
@@ -116,7 +116,7 @@ impl DispersionCorrection {
     /// Returns the contribution of a change d of ẍ, the last solution with the matrix, to the
     /// change of x̃ beyond d itself: a factor and a vector, whose product is `c h² M^-1 K d`.
     pub(super) fn shift<'a>(&'a mut self, matrix: &'a IterationMatrix, d: &DVector<f64>) -> (f64, &'a DVector<f64>) {
-        if let MatrixForm::Tree(tree) = &matrix.way {
+        if let MatrixForm::Tree(tree) = &matrix.form {
             return (1.0, tree.shift());
         }
         self.shift_by(d);

@@ -308,6 +308,7 @@ impl Spook {
         self.update_body_blocks();
 
         self.update_right_hand_sides();
+        // Without loops the tree is the whole system.
         let Self { rows, sigma, solver, velocities, lambda, pins, masses, .. } = self;
         let singular = || StepError::Singular { matrix: "constraint matrix", t };
         if pins.is_empty() {
@@ -318,6 +319,7 @@ impl Spook {
         }
         masses.copy_from_slice(&solver.M);
         solver.solve(rows, sigma, velocities, lambda).map_err(|_| singular())?;
+        // With loops: the opened tree, then the impulses of the pins that close it.
         let h = self.dt;
         let upsilon = rigid_upsilon(self.settings.preset);
         let of_pins = [h, upsilon, RIGID_COMPLIANCE * 4.0 / (h * h) * upsilon];
@@ -344,6 +346,7 @@ impl Spook {
                 let R = self.poses[body.parent].rotation * body.X_PJ.rotation;
                 self.sigma[i] = Sigma::Soft(C.turned(R.matrix()), K.turned(R.matrix()));
             }
+            // s = Υ (-(4/h) g + G v), the rate of the constraint towards zero.
             let (parent, child) = (&self.bodies[body.parent], &self.bodies[i]);
             let rate = row.G.of_parent(&parent.V.to_vector()) + row.G.of_child(&child.V.to_vector());
             let mut s = row.g * (-4.0 / h * upsilon) + rate * *upsilon;
@@ -460,6 +463,7 @@ impl Spook {
                 self.sigma[i] = compliance.sigma;
             }
         }
+        // x⁺ = x + h v⁺, R⁺ = exp(h ω⁺) R.
         self.solve(t_next)?;
         let mut largest = 0.0f64;
         for ((trial, body), v) in self.trial.iter_mut().zip(&self.bodies).zip(&self.velocities).skip(1) {

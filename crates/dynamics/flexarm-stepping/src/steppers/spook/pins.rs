@@ -86,8 +86,8 @@ impl Pins {
                 let X_WP = poses[body.parent] * body.X_PJ;
                 let JointMotion::Axis(motion) = body.motion else { return Vector2::zeros() };
                 let S = motion.twist(1.0);
-                let plant = p_eye - X_WP.translation.vector;
-                (X.rotation.inverse() * (X_WP.rotation * S.linear + (X_WP.rotation * S.angular).cross(&plant))).xy()
+                let lever = p_eye - X_WP.translation.vector;
+                (X.rotation.inverse() * (X_WP.rotation * S.linear + (X_WP.rotation * S.angular).cross(&lever))).xy()
             });
             let closes = gap <= LARGEST_GAP && u.perp(&v).abs() >= DEAD_POINT_RAD * u.norm() * v.norm();
             if !closes && open.is_none() {

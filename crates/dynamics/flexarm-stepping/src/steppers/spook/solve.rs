@@ -4,24 +4,24 @@
 //! body c:       M_c v_c - G_cᵀ λ - (children) = b_c
 //! joint of c:   G_p v_p + G_c v_c + Σ λ = s                                     (1)
 //! M̂_c v_c = b̂_c + G_cᵀ λ                                       (children eliminated)
-//! S λ = ŝ - G_p v_p,   S = Σ + G_c M̂_c^-1 G_cᵀ,   ŝ = s - G_c M̂_c^-1 b̂_c        (2)
-//! M̂_p += G_pᵀ S^-1 G_p,   b̂_p += G_pᵀ S^-1 ŝ                                    (3)
+//! Q λ = ŝ - G_p v_p,   Q = Σ + G_c M̂_c^-1 G_cᵀ,   ŝ = s - G_c M̂_c^-1 b̂_c        (2)
+//! M̂_p += G_pᵀ Q^-1 G_p,   b̂_p += G_pᵀ Q^-1 ŝ                                    (3)
 //! ```
-//! For a serial arm this is the block tridiagonal LDLᵀ in body order. M̂ and S are symmetric
+//! For a serial arm this is the block tridiagonal LDLᵀ in body order. M̂ and Q are symmetric
 //! positive definite. `G_c` is square and block triangular with a known inverse, so that neither M̂
-//! nor S is factorised; in the coordinates of the rows
+//! nor Q is factorised; in the coordinates of the rows
 //!
 //! ```text
 //! M̃ = G_c^-T M̂_c G_c^-1,   b̃ = G_c^-T b̂_c,   H = M̃ + Σ^-1
-//! S^-1 = Σ^-1 H^-1 M̃,   S^-1 ŝ = Σ^-1 H^-1 (M̃ s - b̃),   v_c = G_c^-1 (s - Σ λ - G_p v_p)     (4)
+//! Q^-1 = Σ^-1 H^-1 M̃,   Q^-1 ŝ = Σ^-1 H^-1 (M̃ s - b̃),   v_c = G_c^-1 (s - Σ λ - G_p v_p)     (4)
 //! ```
 //! which holds for hard joints (Σ almost zero) and soft ones alike. If Σ is hard in some directions
-//! and soft in others, `S = Σ + M̃^-1` is inverted directly. A joint that is free along a line σ of
+//! and soft in others, `Q = Σ + M̃^-1` is inverted directly. A joint that is free along a line σ of
 //! its rows (a dependent joint of a closed loop) has a rate ε and no force along it: with
-//! `a = S_0^-1 σ` of the same joint without the free line
+//! `a = Q_0^-1 σ` of the same joint without the free line
 //!
 //! ```text
-//! S^-1 = S_0^-1 - a aᵀ / σᵀa,   σᵀλ = 0,   ε = (σᵀ S_0^-1 ŝ - aᵀ G_p v_p) / σᵀa
+//! Q^-1 = Q_0^-1 - a aᵀ / σᵀa,   σᵀλ = 0,   ε = (σᵀ Q_0^-1 ŝ - aᵀ G_p v_p) / σᵀa
 //! v_c = G_c^-1 (s - Σ λ - G_p v_p - σ ε)                                             (5)
 //! ```
 
@@ -250,15 +250,15 @@ impl Jacobian {
         }
     }
 
-    /// Returns `G_pᵀ S G_p` and `G_pᵀ y`.
+    /// Returns `G_pᵀ A G_p` and `G_pᵀ y`.
     #[inline]
-    fn on_parent(&self, S: &Symmetric, y: &Vector6<f64>) -> (Symmetric, Vector6<f64>) {
+    fn on_parent(&self, A: &Symmetric, y: &Vector6<f64>) -> (Symmetric, Vector6<f64>) {
         match self {
             Self::Levers { parent, .. } => {
                 let (f, t) = halves(y);
-                (shifted(S, &-parent), joined(&-f, &(-t - parent.cross(&f))))
+                (shifted(A, &-parent), joined(&-f, &(-t - parent.cross(&f))))
             }
-            Self::Turned { parent, .. } => (parent.congruent(S), parent.tr_times(y)),
+            Self::Turned { parent, .. } => (parent.congruent(A), parent.tr_times(y)),
         }
     }
 }
@@ -273,7 +273,8 @@ pub enum Sigma {
     Soft(Symmetric, Symmetric),
     /// Σ only.
     Mixed(Symmetric),
-    /// Multiple of the identity, except along the line S of the rows, which is free.
+    /// Multiple of the identity, except along the line S of the rows, the motion subspace of the
+    /// joint, which is free.
     Free(f64),
 }
 
@@ -286,9 +287,9 @@ impl Sigma {
         }
     }
 
-    /// Returns `S^-1` and `S^-1 ŝ` by (4).
+    /// Returns `Q^-1` and `Q^-1 ŝ` by (4).
     #[inline]
-    fn hold(&self, M: &Symmetric, b: &Vector6<f64>, s: &Vector6<f64>) -> Option<(Symmetric, Vector6<f64>)> {
+    fn eliminate(&self, M: &Symmetric, b: &Vector6<f64>, s: &Vector6<f64>) -> Option<(Symmetric, Vector6<f64>)> {
         let push = M.times(s) - b;
         Some(match self {
             Self::Hard(sigma) | Self::Free(sigma) => {
@@ -304,19 +305,19 @@ impl Sigma {
                 (K.symmetric_product(&H, M), K.times(&H.times(&push)))
             }
             Self::Mixed(sigma) => {
-                let light = M.inverse()?;
-                let S = sigma.plus(&light).inverse()?;
-                let y = S.times(&(s - light.times(b)));
-                (S, y)
+                let M_inverse = M.inverse()?;
+                let Q_inverse = sigma.plus(&M_inverse).inverse()?;
+                let y = Q_inverse.times(&(s - M_inverse.times(b)));
+                (Q_inverse, y)
             }
         })
     }
 }
 
-/// A joint with everything outward of it eliminated: `S^-1` and `S^-1 ŝ`.
+/// A joint with everything outward of it eliminated: `Q^-1` and `Q^-1 ŝ`.
 #[derive(Clone, Copy, Debug)]
 struct EliminatedJoint {
-    S_inverse: Symmetric,
+    Q_inverse: Symmetric,
     y: Vector6<f64>,
     /// For a joint with a free line: `a / σᵀa`, and the part of ε that is independent of the
     /// parent.
@@ -326,8 +327,8 @@ struct EliminatedJoint {
 impl EliminatedJoint {
     /// Frees the line σ by (5).
     fn freed(self, line: &Vector6<f64>) -> Option<Self> {
-        let Self { S_inverse, y, .. } = self;
-        let a = S_inverse.times(line);
+        let Self { Q_inverse, y, .. } = self;
+        let a = Q_inverse.times(line);
         let inertia = line.dot(&a);
         if !(inertia > 0.0 && inertia.is_finite()) {
             return None;
@@ -335,8 +336,8 @@ impl EliminatedJoint {
         let (a, own) = (a / inertia, line.dot(&y) / inertia);
         let (f, t) = halves(&(a * inertia.sqrt()));
         let outer = Symmetric { A: f * f.transpose(), B: f * t.transpose(), C: t * t.transpose() };
-        let S_inverse = S_inverse.plus(&outer.scaled(-1.0));
-        Some(Self { S_inverse, y: y - a * (own * inertia), free: Some((a, own)) })
+        let Q_inverse = Q_inverse.plus(&outer.scaled(-1.0));
+        Some(Self { Q_inverse, y: y - a * (own * inertia), free: Some((a, own)) })
     }
 }
 
@@ -357,7 +358,7 @@ impl TreeSolver {
     /// Allocates storage for a tree of bodies, parents before children; body 0 is the world.
     pub fn new(parent: Vec<usize>) -> Self {
         let (n, zero) = (parent.len(), Vector6::zeros());
-        let joints = vec![EliminatedJoint { S_inverse: Symmetric::zeros(), y: zero, free: None }; n];
+        let joints = vec![EliminatedJoint { Q_inverse: Symmetric::zeros(), y: zero, free: None }; n];
         Self { parent, M: vec![Symmetric::zeros(); n], b: vec![zero; n], s: vec![zero; n], joints }
     }
 
@@ -378,26 +379,26 @@ impl TreeSolver {
         // Inward pass: eliminate body and joint, (3) to (5).
         for i in (1..n).rev() {
             let (M, b) = rows[i].G.in_rows(&self.M[i], &self.b[i]);
-            let (S_inverse, y) = sigma[i].hold(&M, &b, &self.s[i]).ok_or(i)?;
-            let mut held = EliminatedJoint { S_inverse, y, free: None };
+            let (Q_inverse, y) = sigma[i].eliminate(&M, &b, &self.s[i]).ok_or(i)?;
+            let mut joint = EliminatedJoint { Q_inverse, y, free: None };
             if let Sigma::Free(_) = sigma[i] {
-                held = held.freed(&rows[i].S).ok_or(i)?;
+                joint = joint.freed(&rows[i].S).ok_or(i)?;
             }
-            let EliminatedJoint { S_inverse, y, .. } = held;
+            let EliminatedJoint { Q_inverse, y, .. } = joint;
             let p = self.parent[i];
             if p > 0 {
-                let (M, b) = rows[i].G.on_parent(&S_inverse, &y);
+                let (M, b) = rows[i].G.on_parent(&Q_inverse, &y);
                 self.M[p] = self.M[p].plus(&M);
                 self.b[p] += b;
             }
-            self.joints[i] = held;
+            self.joints[i] = joint;
         }
         // Outward pass: impulses and velocities.
         v[0] = Vector6::zeros();
         for i in 1..n {
-            let EliminatedJoint { S_inverse, y, free } = &self.joints[i];
+            let EliminatedJoint { Q_inverse, y, free } = &self.joints[i];
             let moved = rows[i].G.of_parent(&v[self.parent[i]]);
-            lambda[i] = y - S_inverse.times(&moved);
+            lambda[i] = y - Q_inverse.times(&moved);
             let mut u = self.s[i] - sigma[i].times(&lambda[i]) - moved;
             if let Some((a, own)) = free {
                 u -= rows[i].S * (own - a.dot(&moved));
